@@ -1,0 +1,196 @@
+//! `cell.toml`: what the laboratory knows about its cell. One file a block; this file owns the whole, reading and checking.
+//!
+//! An absent block means "not known" or "not there"; unknown keys are refused with the nearest known name.
+
+mod camera;
+mod controller;
+mod object;
+mod robot;
+mod simulation;
+
+pub use camera::{Camera, CameraPose, Intrinsics};
+pub use controller::{Controller, ControllerKind, Range};
+pub use object::{Object, PoseNoise, Support};
+pub use robot::{Robot, Table, Tool, Topics};
+pub use simulation::Simulation;
+
+use crate::toml_file::{self, TomlFileError};
+use serde::{Deserialize, Serialize};
+use std::path::{Path, PathBuf};
+
+/// Everything a cell.toml says.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Cell {
+    /// The arm; absent where an object moves alone.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub robot: Option<Robot>,
+    /// How the arm is controlled.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub controller: Option<Controller>,
+    /// The tool at the flange.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tool: Option<Tool>,
+    /// The table.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub table: Option<Table>,
+    /// Topic names of foreign bags.
+    #[serde(default, skip_serializing_if = "Topics::is_default")]
+    pub topics: Topics,
+    /// The object on the table.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub object: Option<Object>,
+    /// The camera.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub camera: Option<Camera>,
+    /// Where the simulated cell starts; the real one ignores it.
+    #[serde(default, skip_serializing_if = "Simulation::is_default")]
+    pub simulation: Simulation,
+    /// Clips of the session this file describes.
+    #[serde(default, rename = "clip", skip_serializing_if = "Vec::is_empty")]
+    pub clips: Vec<ClipEntry>,
+    /// Folder of the file: relative paths in it start here.
+    #[serde(skip)]
+    pub folder: PathBuf,
+}
+
+/// One clip of a session.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ClipEntry {
+    /// File or folder, relative to cell.toml.
+    pub file: PathBuf,
+    /// What was done in it.
+    pub kind: ClipKind,
+}
+
+/// What was done in a clip.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ClipKind {
+    /// The arm moved freely.
+    Excitation,
+    /// The arm moved, hit the object, and the object slid to rest.
+    ControlHitSlide,
+    /// An object alone, no robot.
+    FreeMotion,
+}
+
+/// A cell.toml cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum CellError {
+    /// Not readable, or a key is wrong.
+    #[error(transparent)]
+    File(#[from] TomlFileError),
+    /// The keys are known, their values make no sense together.
+    #[error("{}: {what}", path.display())]
+    Value {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong and how to mend it.
+        what: String,
+    },
+}
+
+impl Cell {
+    /// Reads and checks a cell.toml.
+    ///
+    /// # Errors
+    /// [`CellError`] with file, key and remedy.
+    pub fn read(path: &Path) -> Result<Self, CellError> {
+        let mut cell: Self = toml_file::read(path)?;
+        cell.folder = path.parent().map_or_else(PathBuf::new, Path::to_owned);
+        cell.check().map_err(|what| CellError::Value { path: path.to_owned(), what })?;
+        Ok(cell)
+    }
+
+    /// The file's text, every default spelled out where it is in force.
+    ///
+    /// # Panics
+    /// Never: every field has a TOML form.
+    #[must_use]
+    pub fn to_toml(&self) -> String {
+        toml::to_string_pretty(self).expect("numbers, strings, arrays and tables have a TOML form")
+    }
+
+    /// Number of joints, as far as this file alone tells (a URDF knows its own).
+    #[must_use]
+    pub fn dof_hint(&self) -> Option<usize> {
+        let robot = self.robot.as_ref()?;
+        if robot.model.is_some() {
+            return Some(7);
+        }
+        if !robot.joints.is_empty() {
+            return Some(robot.joints.len());
+        }
+        self.controller.as_ref().map(|c| c.stiffness.len()).filter(|n| *n > 0)
+    }
+
+    fn check(&self) -> Result<(), String> {
+        if let Some(robot) = &self.robot {
+            robot.check()?;
+        }
+        if let Some(controller) = &self.controller {
+            controller.check(self.dof_hint())?;
+        }
+        if let Some(tool) = &self.tool {
+            tool.check()?;
+        }
+        if let Some(object) = &self.object {
+            object.check()?;
+        }
+        if let Some(camera) = &self.camera {
+            camera.check()?;
+        }
+        Ok(())
+    }
+}
+
+/// `Ok` when every number is finite and inside `lo..=hi`, else the sentence to print.
+fn within(key: &str, values: &[f64], lo: f64, hi: f64) -> Result<(), String> {
+    match values.iter().find(|v| !(lo..=hi).contains(*v)) {
+        None => Ok(()),
+        Some(bad) => Err(format!("`{key}` holds {bad}; it must lie between {lo} and {hi} (SI units)")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn parse(text: &str) -> Result<Cell, String> {
+        let cell: Cell = toml_file::parse(text, Path::new("cell.toml")).map_err(|e| e.to_string())?;
+        cell.check()?;
+        Ok(cell)
+    }
+
+    const LAB: &str = include_str!("../../../config/fr3_cell.toml");
+
+    #[test]
+    fn the_shipped_cell_is_valid_and_survives_a_round_trip() {
+        let cell = parse(LAB).expect("the shipped file");
+        assert_eq!(cell.robot.as_ref().and_then(|r| r.model.as_deref()), Some("fr3"));
+        assert_eq!(parse(&cell.to_toml()).expect("own text"), cell);
+    }
+
+    #[test]
+    fn a_misspelt_key_is_refused_with_the_nearest_name() {
+        let error = parse("[table]\nhieght = 0.0\n").unwrap_err();
+        assert!(error.contains("did you mean `height`"), "{error}");
+        let error = parse("[controler]\n").unwrap_err();
+        assert!(error.contains("did you mean `controller`"), "{error}");
+    }
+
+    #[test]
+    fn the_wrong_number_of_gains_is_refused() {
+        let error = parse("[robot]\nmodel = \"fr3\"\n[controller]\nkind = \"joint_impedance\"\nstiffness = [600.0]\n")
+            .unwrap_err();
+        assert!(error.contains("7"), "{error}");
+    }
+
+    #[test]
+    fn a_mass_of_nothing_is_refused() {
+        let error = parse("[object]\nshape = \"box\"\nsize = [0.1, 0.1, 0.0]\n").unwrap_err();
+        assert!(error.contains("object.size"), "{error}");
+    }
+}

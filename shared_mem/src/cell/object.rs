@@ -1,0 +1,137 @@
+//! `[object]`: what stands on the table, and how well it is known.
+
+use super::controller::Range;
+use super::within;
+use serde::{Deserialize, Serialize};
+use std::path::PathBuf;
+
+/// The object. Ranges say where a parameter may lie; a plain `mass` says that it was weighed.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Object {
+    /// `"box"`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub shape: Option<String>,
+    /// Mesh file (obj, stl, ply), relative to cell.toml, instead of `shape`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub mesh: Option<PathBuf>,
+    /// Edge lengths along the object's x, y, z [m].
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub size: Option<[f64; 3]>,
+    /// How the base carries the load.
+    #[serde(default)]
+    pub support: Support,
+    /// Mass, where it was weighed [kg].
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub mass: Option<f64>,
+    /// Where the mass may lie [kg].
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub mass_range: Option<Range>,
+    /// Where the friction on the table may lie.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub friction_range: Option<Range>,
+    /// Where the centre of mass may lie, from the geometric centre, object frame [m].
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub centre_of_mass_range: Option<[Range; 3]>,
+    /// Where the friction against the tool may lie.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tip_friction_range: Option<Range>,
+    /// Where the restitution against the table may lie.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub restitution_range: Option<Range>,
+    /// From clip to clip: one sigma of ln(mu).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub friction_scatter: Option<f64>,
+    /// Noise of the tracker, one sigma.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub pose_noise: Option<PoseNoise>,
+}
+
+/// How the base carries the load.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Support {
+    /// On its corners.
+    #[default]
+    Corners,
+    /// Evenly over the base.
+    Uniform,
+    /// On the rim of the base.
+    Ring,
+}
+
+/// Noise of the tracker, one sigma.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PoseNoise {
+    /// Of each coordinate [m].
+    pub position: f64,
+    /// About each axis [rad].
+    pub rotation: f64,
+}
+
+impl Object {
+    pub(super) fn check(&self) -> Result<(), String> {
+        match (&self.shape, &self.mesh) {
+            (Some(shape), None) if shape == "box" => {
+                let size = self.size.ok_or("`[object] shape = \"box\"` needs `size = [x, y, z]` in metres")?;
+                within("object.size", &size, 1e-3, 10.0)?;
+            }
+            (None, Some(_)) => {}
+            (Some(shape), None) => {
+                return Err(format!(
+                    "`object.shape = \"{shape}\"` is not known; use \"box\" with `size`, or `mesh = \"file\"`"
+                ));
+            }
+            _ => return Err("`[object]` needs exactly one of `shape = \"box\"` or `mesh = \"file\"`".into()),
+        }
+        if let Some(mass) = self.mass {
+            within("object.mass", &[mass], 1e-4, 1e3)?;
+        }
+        let ranges = [
+            ("object.mass_range", self.mass_range),
+            ("object.friction_range", self.friction_range),
+            ("object.tip_friction_range", self.tip_friction_range),
+            ("object.restitution_range", self.restitution_range),
+        ];
+        for (key, range) in ranges {
+            if let Some([lo, hi]) = range
+                && !(lo >= 0.0 && hi >= lo && hi.is_finite())
+            {
+                return Err(format!("`{key}` must be [low, high] with 0 <= low <= high"));
+            }
+        }
+        Ok(())
+    }
+
+    /// Mass to simulate with when nothing was identified: the weighed one, else the middle of its range, else a homogeneous 500 kg/m³ [kg].
+    #[must_use]
+    pub fn nominal_mass(&self) -> f64 {
+        self.mass
+            .or_else(|| self.mass_range.map(middle))
+            .or_else(|| self.size.map(|s| 500.0 * s.iter().product::<f64>()))
+            .unwrap_or(0.3)
+    }
+
+    /// Friction on the table when nothing was identified: the middle of its range, else 0.3.
+    #[must_use]
+    pub fn nominal_friction(&self) -> f64 {
+        self.friction_range.map_or(0.3, middle)
+    }
+
+    /// Friction against the tool when nothing was identified: the middle of its range, else 0.2.
+    #[must_use]
+    pub fn nominal_tip_friction(&self) -> f64 {
+        self.tip_friction_range.map_or(0.2, middle)
+    }
+
+    /// Restitution against the table when nothing was identified: the middle of its range, else 0.
+    #[must_use]
+    pub fn nominal_restitution(&self) -> f64 {
+        self.restitution_range.map_or(0.0, middle)
+    }
+}
+
+fn middle([lo, hi]: Range) -> f64 {
+    0.5 * (lo + hi)
+}

@@ -1,0 +1,101 @@
+//! `[robot]`, `[tool]`, `[table]`, `[topics]`.
+
+use super::within;
+use serde::{Deserialize, Serialize};
+use std::path::PathBuf;
+
+/// The arm: a built-in model, a URDF, or only joint names where no model is known.
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Robot {
+    /// Built-in model: `"fr3"`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub model: Option<String>,
+    /// URDF file, relative to cell.toml.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub urdf: Option<PathBuf>,
+    /// Joint names in the order of the recordings, where no model is known: one second-order model a joint then.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub joints: Vec<String>,
+    /// Name of the base frame. Default: the model's root link.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub base_frame: Option<String>,
+}
+
+/// The tool: a solid capsule along the flange's z axis.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Tool {
+    /// Mass, spread evenly over the capsule [kg].
+    pub mass: f64,
+    /// Flange to the end of the tip [m]. The capsule's axis runs from the flange's origin to `length - radius`, with caps of `radius` at both ends.
+    pub length: f64,
+    /// Radius [m].
+    pub radius: f64,
+}
+
+/// The table: a horizontal plane.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Table {
+    /// Height of its surface in the base frame [m].
+    pub height: f64,
+}
+
+/// Where a ROS 2 bag keeps what is needed.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Topics {
+    /// `sensor_msgs/JointState`: q, dq and, where logged, `tau_J`.
+    pub measured: String,
+    /// `sensor_msgs/JointState`: q_d, dq_d and, where logged, `tau_J_d`.
+    pub desired: String,
+    /// `geometry_msgs/PoseStamped`: geometric centre in the base frame.
+    pub object_pose: String,
+}
+
+impl Default for Topics {
+    fn default() -> Self {
+        Self {
+            measured: "/franka_robot_state_broadcaster/measured_joint_states".into(),
+            desired: "/franka_robot_state_broadcaster/desired_joint_states".into(),
+            object_pose: "/object/pose".into(),
+        }
+    }
+}
+
+impl Topics {
+    pub(super) fn is_default(&self) -> bool {
+        *self == Self::default()
+    }
+}
+
+impl Robot {
+    pub(super) fn check(&self) -> Result<(), String> {
+        let ways =
+            usize::from(self.model.is_some()) + usize::from(self.urdf.is_some()) + usize::from(!self.joints.is_empty());
+        if ways != 1 {
+            return Err(
+                "`[robot]` needs exactly one of `model = \"fr3\"`, `urdf = \"file.urdf\"` or `joints = [names]`".into(),
+            );
+        }
+        match self.model.as_deref() {
+            None | Some("fr3") => Ok(()),
+            Some(other) => {
+                Err(format!("`robot.model = \"{other}\"` is not built in; use \"fr3\" or give `urdf = \"file.urdf\"`"))
+            }
+        }
+    }
+}
+
+impl Tool {
+    pub(super) fn check(&self) -> Result<(), String> {
+        within("tool.mass", &[self.mass], 0.0, 50.0)?;
+        within("tool.length", &[self.length], 1e-3, 2.0)?;
+        within("tool.radius", &[self.radius], 1e-4, 0.5)?;
+        if self.length <= self.radius {
+            return Err("`tool.length` must exceed `tool.radius`: it is measured to the end of the tip".into());
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,26 @@
+//! The contract between the processes of a cell: what they say to each other, in which units and frames, how long a
+//! message waits for its reader, and how all of it is written to disk.
+//!
+//! No hardware and no physics live here. Units are SI; stamps are integer nanoseconds; quaternions are `w, x, y, z`
+//! in messages and files and `nalgebra` quaternions in memory.
+//!
+//! | module | owns |
+//! |---|---|
+//! | [`msg`] | the payloads: one file a device, `repr(C)`, every field with unit and frame |
+//! | [`topics`] | every topic's name, payload and limits: nothing else names a topic |
+//! | [`transport`] | shared memory (the only iceoryx2 code) |
+//! | [`recording`] | clips and sessions on disk (the only MCAP code) |
+//! | [`cell`] | `cell.toml`: what the laboratory knows about its cell |
+//! | [`theta`] | `theta.toml`: what was identified, and the effects that were named |
+//! | [`frames`] | typed poses: `Pose<To, From>` |
+//! | [`time`] | the clock that every stamp comes from |
+
+pub mod cell;
+pub mod frames;
+pub mod msg;
+pub mod recording;
+pub mod theta;
+pub mod time;
+pub mod toml_file;
+pub mod topics;
+pub mod transport;

@@ -1,0 +1,93 @@
+//! Pictures: pixels travel as a byte slice, this header beside them.
+
+use iceoryx2::prelude::ZeroCopySend;
+
+/// Describes the bytes of one picture. User header of `/camera/color` and `/camera/depth`.
+#[derive(Debug, Clone, Copy, PartialEq, Default, ZeroCopySend)]
+#[type_name("twinalign/ImageHeader/1")]
+#[repr(C)]
+pub struct ImageHeader {
+    /// When the picture reached this machine: monotonic clock [ns].
+    pub stamp_ns: u64,
+    /// The camera's own stamp [ns], in the clock named by `stamp_domain`.
+    pub device_ns: u64,
+    /// The camera's frame counter. Colour and depth of one moment share it.
+    pub sequence: u64,
+    /// Exposure time [ns], 0 when not known.
+    pub exposure_ns: u64,
+    /// Columns.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    /// Bytes from one row to the next.
+    pub stride: u32,
+    /// How a pixel is stored.
+    pub encoding: PixelEncoding,
+    /// Metres per count of a depth pixel; 0 for colour.
+    pub depth_scale: f64,
+    /// Which clock `device_ns` belongs to.
+    pub stamp_domain: StampDomain,
+    /// Keeps the size a multiple of 8; always 0.
+    pub reserved: u32,
+}
+
+/// How a pixel is stored.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ZeroCopySend)]
+#[type_name("twinalign/PixelEncoding/1")]
+#[repr(C)]
+pub enum PixelEncoding {
+    /// Three bytes: red, green, blue.
+    #[default]
+    Rgb8 = 0,
+    /// Little-endian `u16`, in units of `depth_scale`; 0 is no measurement.
+    Depth16 = 1,
+}
+
+/// Which clock a camera stamped with: librealsense's three domains.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ZeroCopySend)]
+#[type_name("twinalign/StampDomain/1")]
+#[repr(C)]
+pub enum StampDomain {
+    /// The camera's hardware clock.
+    #[default]
+    HardwareClock = 0,
+    /// The host's clock at arrival: too coarse to calibrate with.
+    SystemTime = 1,
+    /// The hardware clock mapped to the host's.
+    GlobalTime = 2,
+}
+
+/// How the camera projects, and where it stands. Topic `/camera/info`.
+#[derive(Debug, Clone, Copy, PartialEq, ZeroCopySend)]
+#[type_name("twinalign/CameraInfo/1")]
+#[repr(C)]
+pub struct CameraInfo {
+    /// When it was sent: monotonic clock [ns].
+    pub stamp_ns: u64,
+    /// Columns.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    /// Focal lengths and principal point [pixel]: fx, fy, cx, cy. Pixel centres lie at whole numbers.
+    pub intrinsics: [f64; 4],
+    /// Brown-Conrady coefficients k1, k2, p1, p2, k3.
+    pub distortion: [f64; 5],
+    /// Camera (optical frame) in the base frame: position [m].
+    pub position: [f64; 3],
+    /// Camera (optical frame) in the base frame: orientation `w, x, y, z`.
+    pub wxyz: [f64; 4],
+}
+
+impl Default for CameraInfo {
+    fn default() -> Self {
+        Self {
+            stamp_ns: 0,
+            width: 0,
+            height: 0,
+            intrinsics: [0.0; 4],
+            distortion: [0.0; 5],
+            position: [0.0; 3],
+            wxyz: [1.0, 0.0, 0.0, 0.0],
+        }
+    }
+}

@@ -1,0 +1,28 @@
+//! The payloads that cross process borders. One file a device; every payload is `repr(C)`, holds no pointers and is
+//! versioned by its `type_name`: a change of layout changes the name, so old and new programs refuse each other
+//! instead of misreading.
+
+pub mod arm;
+pub mod event;
+pub mod gripper;
+pub mod image;
+pub mod motion;
+pub mod object;
+pub mod twin;
+pub mod wrench;
+
+/// Most joints of an arm that fit into a message. Arrays are this long; `dof` says how many entries count, the others are 0.
+pub const MAX_JOINTS: usize = 8;
+
+/// One number per joint, of which the first `dof` count.
+pub type Joints = [f64; MAX_JOINTS];
+
+/// Copies a slice into a [`Joints`] array; what does not fit is left out, what is missing is 0.
+#[must_use]
+pub fn joints_from(values: &[f64]) -> Joints {
+    let mut out = [0.0; MAX_JOINTS];
+    for (o, v) in out.iter_mut().zip(values) {
+        *o = *v;
+    }
+    out
+}

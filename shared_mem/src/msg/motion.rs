@@ -1,0 +1,80 @@
+//! How a motion is handed to the bridge: batches of set points, one per control cycle, queued ahead of time.
+//!
+//! The sender keeps a few hundred milliseconds queued and reads progress from [`super::arm::ArmState`]. Because the
+//! control thread plays the queue by its own clock, a late sender cannot make the arm jerk, and a dead one lets the
+//! queue run dry: then the arm is braked within its limits and held.
+
+use super::{Joints, MAX_JOINTS};
+use iceoryx2::prelude::ZeroCopySend;
+
+/// Set points in one [`MotionChunk`]: 50 ms at 1 kHz.
+pub const CHUNK_LENGTH: usize = 50;
+
+/// Desired state of one control cycle.
+#[derive(Debug, Clone, Copy, PartialEq, ZeroCopySend)]
+#[type_name("twinalign/SetPoint/1")]
+#[repr(C)]
+pub struct SetPoint {
+    /// Desired joint positions [rad].
+    pub q_d: Joints,
+    /// Desired joint velocities [rad/s].
+    pub dq_d: Joints,
+}
+
+impl Default for SetPoint {
+    fn default() -> Self {
+        Self { q_d: [0.0; MAX_JOINTS], dq_d: [0.0; MAX_JOINTS] }
+    }
+}
+
+/// A batch of consecutive set points of one motion. Topic `/arm/motion`.
+///
+/// Chunks of a motion are numbered from 0 without gaps. The first set point must lie where the arm is commanded to be
+/// already, at rest; the last one must be at rest too.
+#[derive(Debug, Clone, Copy, PartialEq, ZeroCopySend)]
+#[type_name("twinalign/MotionChunk/1")]
+#[repr(C)]
+pub struct MotionChunk {
+    /// When the chunk was sent: monotonic clock [ns].
+    pub stamp_ns: u64,
+    /// Chosen by the sender, not 0, different from its earlier motions.
+    pub motion_id: u64,
+    /// What the chunk is for.
+    pub kind: MotionKind,
+    /// Number of this chunk within its motion, from 0.
+    pub index: u32,
+    /// Set points that count, at most [`CHUNK_LENGTH`].
+    pub length: u32,
+    /// Number of joints that count.
+    pub dof: u32,
+    /// The set points, one per control cycle.
+    pub set_points: [SetPoint; CHUNK_LENGTH],
+}
+
+impl Default for MotionChunk {
+    fn default() -> Self {
+        Self {
+            stamp_ns: 0,
+            motion_id: 0,
+            kind: MotionKind::Play,
+            index: 0,
+            length: 0,
+            dof: 0,
+            set_points: [SetPoint::default(); CHUNK_LENGTH],
+        }
+    }
+}
+
+/// What a [`MotionChunk`] is for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ZeroCopySend)]
+#[type_name("twinalign/MotionKind/1")]
+#[repr(C)]
+pub enum MotionKind {
+    /// More follows.
+    #[default]
+    Play = 0,
+    /// The last chunk of its motion.
+    Last = 1,
+    /// Brake now, whatever is queued; the set points do not count.
+    Stop = 2,
+}

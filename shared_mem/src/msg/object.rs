@@ -1,0 +1,44 @@
+//! Pose of the tracked object, whoever tracks it.
+
+use crate::frames::{Base, Object, Pose};
+use iceoryx2::prelude::ZeroCopySend;
+
+/// The object's geometric centre in the base frame. Topic `/object/pose`.
+#[derive(Debug, Clone, Copy, PartialEq, ZeroCopySend)]
+#[type_name("twinalign/ObjectPose/1")]
+#[repr(C)]
+pub struct ObjectPose {
+    /// When the pose became known here: monotonic clock [ns].
+    pub stamp_ns: u64,
+    /// When the picture behind it was taken, by the camera's clock [ns].
+    pub device_ns: u64,
+    /// Counts the poses of one tracker.
+    pub sequence: u64,
+    /// Position in the base frame [m].
+    pub position: [f64; 3],
+    /// Orientation in the base frame, `w, x, y, z`.
+    pub wxyz: [f64; 4],
+    /// Row-major covariance of position [m²] and small rotation about the base axes [rad²]: x, y, z, rx, ry, rz. All 0: not known.
+    pub covariance: [f64; 36],
+}
+
+impl Default for ObjectPose {
+    fn default() -> Self {
+        Self {
+            stamp_ns: 0,
+            device_ns: 0,
+            sequence: 0,
+            position: [0.0; 3],
+            wxyz: [1.0, 0.0, 0.0, 0.0],
+            covariance: [0.0; 36],
+        }
+    }
+}
+
+impl ObjectPose {
+    /// The pose with its frames named; `None` when the numbers are no pose.
+    #[must_use]
+    pub fn pose(&self) -> Option<Pose<Base, Object>> {
+        Pose::from_parts(self.position, self.wxyz)
+    }
+}

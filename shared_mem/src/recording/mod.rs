@@ -1,0 +1,1 @@
+//! Clips and sessions on disk: the only code that knows MCAP.

@@ -1,0 +1,89 @@
+//! Reading a TOML file into a typed structure, with errors a person can act on: file, line, the key, the nearest known name.
+
+use serde::de::DeserializeOwned;
+use std::path::{Path, PathBuf};
+
+/// A TOML file could not be used.
+#[derive(Debug, thiserror::Error)]
+pub enum TomlFileError {
+    /// The file is missing or unreadable.
+    #[error("cannot read {}: {source}; give the path of an existing file", path.display())]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// The text is no TOML, or a key or value is not what is expected.
+    #[error("{}{}: {what}", path.display(), line.map_or(String::new(), |l| format!(":{l}")))]
+    Content {
+        /// The file.
+        path: PathBuf,
+        /// Line, from 1.
+        line: Option<usize>,
+        /// What is wrong and how to mend it.
+        what: String,
+    },
+}
+
+/// Reads `path` and interprets it as `T`. Unknown keys are refused when `T` denies them.
+///
+/// # Errors
+/// [`TomlFileError`] when the file cannot be read or does not fit `T`.
+pub fn read<T: DeserializeOwned>(path: &Path) -> Result<T, TomlFileError> {
+    let text = std::fs::read_to_string(path).map_err(|source| TomlFileError::Read { path: path.to_owned(), source })?;
+    parse(&text, path)
+}
+
+/// Interprets `text` as `T`; `path` only names it in errors.
+///
+/// # Errors
+/// [`TomlFileError::Content`] when the text does not fit `T`.
+pub fn parse<T: DeserializeOwned>(text: &str, path: &Path) -> Result<T, TomlFileError> {
+    toml::from_str(text).map_err(|error| {
+        let line = error.span().map(|span| text[..span.start.min(text.len())].matches('\n').count() + 1);
+        TomlFileError::Content { path: path.to_owned(), line, what: with_nearest_name(error.message()) }
+    })
+}
+
+/// Turns serde's "unknown field `x`, expected one of `a`, `b`" into advice.
+fn with_nearest_name(message: &str) -> String {
+    let Some(rest) = message.strip_prefix("unknown field ") else {
+        return message.replace('\n', " ");
+    };
+    let mut names = rest.split('`').skip(1).step_by(2);
+    let unknown = names.next().unwrap_or("");
+    let known: Vec<&str> = names.collect();
+    let nearest =
+        known.iter().max_by(|a, b| strsim::jaro_winkler(unknown, a).total_cmp(&strsim::jaro_winkler(unknown, b)));
+    match nearest {
+        Some(name) if strsim::jaro_winkler(unknown, name) > 0.7 => {
+            format!("unknown key `{unknown}`; did you mean `{name}`?")
+        }
+        _ => format!("unknown key `{unknown}`; known here: {}", known.join(", ")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[derive(Debug, serde::Deserialize)]
+    #[serde(deny_unknown_fields)]
+    struct Sample {
+        #[allow(dead_code)]
+        stiffness: f64,
+    }
+
+    #[test]
+    fn a_misspelt_key_names_the_nearest_known_one_and_its_line() {
+        let error = parse::<Sample>("\nstifness = 1.0\n", Path::new("cell.toml")).unwrap_err().to_string();
+        assert_eq!(error, "cell.toml:2: unknown key `stifness`; did you mean `stiffness`?");
+    }
+
+    #[test]
+    fn a_missing_key_is_named() {
+        let error = parse::<Sample>("", Path::new("cell.toml")).unwrap_err().to_string();
+        assert!(error.contains("missing field `stiffness`"), "{error}");
+    }
+}

@@ -1,0 +1,111 @@
+//! Every topic: its name, payload and limits. Nothing else in the project names a topic.
+//!
+//! Memory is set aside for the worst case when a topic opens: `(subscribers x (buffer + borrowed) + history + loans)`
+//! payloads. All topics overflow safely: a slow reader loses its oldest messages and never blocks the writer.
+
+use crate::msg::arm::{ArmCommand, ArmState};
+use crate::msg::event::Event;
+use crate::msg::gripper::GripperState;
+use crate::msg::image::CameraInfo;
+use crate::msg::motion::MotionChunk;
+use crate::msg::object::ObjectPose;
+use crate::msg::twin::{TwinGap, TwinState};
+use crate::msg::wrench::Wrench;
+use std::marker::PhantomData;
+
+/// A topic with a payload of fixed size.
+#[derive(Debug)]
+pub struct Topic<Payload> {
+    /// Name on shared memory and in recordings.
+    pub name: &'static str,
+    /// How many messages wait for each reader.
+    pub limits: Limits,
+    payload: PhantomData<fn() -> Payload>,
+}
+
+impl<Payload> Clone for Topic<Payload> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+impl<Payload> Copy for Topic<Payload> {}
+
+/// A topic of pictures.
+#[derive(Debug, Clone, Copy)]
+pub struct ImageTopic {
+    /// Name on shared memory and in recordings.
+    pub name: &'static str,
+    /// How many pictures wait for each reader.
+    pub limits: Limits,
+}
+
+/// How much a topic keeps.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Limits {
+    /// Messages that wait for a reader before the oldest is overwritten.
+    pub buffer: usize,
+    /// Messages a reader that joins late is given.
+    pub history: usize,
+    /// Messages a reader may hold at once.
+    pub borrowed: usize,
+    /// Readers at once.
+    pub subscribers: usize,
+    /// Writers at once.
+    pub publishers: usize,
+}
+
+/// Streams at the control rate: 2 s wait for a reader that stalls.
+const STREAM: Limits = Limits { buffer: 2048, history: 0, borrowed: 2, subscribers: 8, publishers: 1 };
+/// Pictures: a quarter of a second at 30 Hz; each megabyte counts.
+const PICTURES: Limits = Limits { buffer: 8, history: 0, borrowed: 2, subscribers: 4, publishers: 1 };
+/// What a late reader wants to know at once.
+const LATCHED: Limits = Limits { buffer: 4, history: 1, borrowed: 2, subscribers: 8, publishers: 1 };
+
+const fn topic<Payload>(name: &'static str, limits: Limits) -> Topic<Payload> {
+    Topic { name, limits, payload: PhantomData }
+}
+
+/// Bridge to all: state of the arm, each cycle.
+pub const ARM_STATE: Topic<ArmState> = topic("/arm/state", STREAM);
+/// Bridge to all: what the arm was told, each cycle.
+pub const ARM_COMMAND: Topic<ArmCommand> = topic("/arm/command", STREAM);
+/// Capture to bridge: motions to play. Two writers, so that a second sender is refused by the bridge and not by the transport.
+pub const ARM_MOTION: Topic<MotionChunk> =
+    topic("/arm/motion", Limits { buffer: 64, history: 0, borrowed: 2, subscribers: 4, publishers: 2 });
+/// Tracker or simulation to all: pose of the object, at frame rate.
+pub const OBJECT_POSE: Topic<ObjectPose> =
+    topic("/object/pose", Limits { buffer: 256, history: 1, borrowed: 2, subscribers: 8, publishers: 2 });
+/// Bridge to all: colour pictures.
+pub const CAMERA_COLOR: ImageTopic = ImageTopic { name: "/camera/color", limits: PICTURES };
+/// Bridge to all: depth pictures.
+pub const CAMERA_DEPTH: ImageTopic = ImageTopic { name: "/camera/depth", limits: PICTURES };
+/// Bridge to all: intrinsics and pose of the camera, once a second and to late readers.
+pub const CAMERA_INFO: Topic<CameraInfo> = topic("/camera/info", LATCHED);
+/// Bridge to all: force/torque samples.
+pub const WRENCH: Topic<Wrench> = topic("/wrench", STREAM);
+/// Bridge to all: gripper state.
+pub const GRIPPER: Topic<GripperState> =
+    topic("/gripper", Limits { buffer: 64, history: 1, borrowed: 2, subscribers: 8, publishers: 1 });
+/// Twin to all: its own state, each cycle it mirrors.
+pub const TWIN_STATE: Topic<TwinState> = topic("/twin/state", STREAM);
+/// Twin to all: real against twin, each cycle it mirrors.
+pub const TWIN_GAP: Topic<TwinGap> = topic("/twin/gap", STREAM);
+/// Anyone to all: remarks for people.
+pub const EVENTS: Topic<Event> =
+    topic("/events", Limits { buffer: 128, history: 16, borrowed: 2, subscribers: 8, publishers: 8 });
+
+/// Names of all topics, in the order of a report.
+pub const ALL: [&str; 12] = [
+    ARM_STATE.name,
+    ARM_COMMAND.name,
+    ARM_MOTION.name,
+    OBJECT_POSE.name,
+    CAMERA_COLOR.name,
+    CAMERA_DEPTH.name,
+    CAMERA_INFO.name,
+    WRENCH.name,
+    GRIPPER.name,
+    TWIN_STATE.name,
+    TWIN_GAP.name,
+    EVENTS.name,
+];

@@ -1,0 +1,103 @@
+//! Receiving messages of fixed size: by looking, or by sleeping until something was sent.
+
+use super::{Node, Service, TransportError, open_error, owner_of};
+use crate::topics::{Limits, Topic};
+use iceoryx2::port::{listener::Listener, subscriber::Subscriber as Port};
+use iceoryx2::prelude::*;
+use std::fmt::Debug;
+use std::time::Duration;
+
+/// Receives messages of one topic, oldest first.
+#[derive(Debug)]
+pub struct Subscriber<Payload: Debug + ZeroCopySend + 'static> {
+    topic: &'static str,
+    port: Port<Service, Payload, ()>,
+}
+
+/// Sleeps until something is sent on one topic.
+#[derive(Debug)]
+pub struct Wake {
+    topic: &'static str,
+    listener: Listener<Service>,
+}
+
+impl Node {
+    /// Opens the receiving side of a topic. The sender need not exist yet.
+    ///
+    /// # Errors
+    /// [`TransportError::Full`] when all places are taken, other variants when shared memory fails.
+    pub fn subscriber<Payload: Debug + ZeroCopySend + 'static>(
+        &self,
+        topic: Topic<Payload>,
+    ) -> Result<Subscriber<Payload>, TransportError> {
+        let port = self
+            .service(topic)?
+            .subscriber_builder()
+            .buffer_size(topic.limits.buffer)
+            .create()
+            .map_err(|e| subscriber_error(topic.name, topic.limits, &format!("{e:?}")))?;
+        Ok(Subscriber { topic: topic.name, port })
+    }
+
+    /// Opens something to sleep on until a topic's next message.
+    ///
+    /// # Errors
+    /// [`TransportError`] when shared memory fails.
+    pub fn wake_on(&self, topic: &'static str) -> Result<Wake, TransportError> {
+        let listener =
+            self.bell_service(topic)?.listener_builder().create().map_err(|e| open_error(topic, &format!("{e:?}")))?;
+        Ok(Wake { topic, listener })
+    }
+}
+
+pub(super) fn subscriber_error(topic: &'static str, limits: Limits, what: &str) -> TransportError {
+    if what.contains("ExceedsMaxSupported") {
+        TransportError::Full { topic, limit: limits.subscribers, side: "subscriber(s)", owner: owner_of(topic) }
+    } else {
+        open_error(topic, what)
+    }
+}
+
+impl<Payload: Debug + ZeroCopySend + Copy + 'static> Subscriber<Payload> {
+    /// The oldest message not yet received, if any.
+    ///
+    /// # Errors
+    /// [`TransportError::Port`] when shared memory fails.
+    pub fn receive(&self) -> Result<Option<Payload>, TransportError> {
+        match self.port.receive() {
+            Ok(sample) => Ok(sample.map(|s| *s.payload())),
+            Err(e) => Err(TransportError::Port { topic: self.topic, what: format!("{e:?}") }),
+        }
+    }
+
+    /// The newest message, if any arrived; older ones are dropped.
+    ///
+    /// # Errors
+    /// [`TransportError::Port`] when shared memory fails.
+    pub fn newest(&self) -> Result<Option<Payload>, TransportError> {
+        let mut last = None;
+        while let Some(message) = self.receive()? {
+            last = Some(message);
+        }
+        Ok(last)
+    }
+}
+
+impl Wake {
+    /// Sleeps until something was sent or `timeout` passed; `true` when something was sent.
+    ///
+    /// # Errors
+    /// [`TransportError::Port`] when shared memory fails. A signal is no failure.
+    pub fn wait(&self, timeout: Duration) -> Result<bool, TransportError> {
+        match self.listener.timed_wait(|_| (), timeout) {
+            Ok(count) => Ok(count > 0),
+            Err(e) => {
+                let what = format!("{e:?}");
+                if what.contains("Interrupt") {
+                    return Ok(false);
+                }
+                Err(TransportError::Port { topic: self.topic, what })
+            }
+        }
+    }
+}
