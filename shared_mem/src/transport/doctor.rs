@@ -1,6 +1,6 @@
 //! What is on shared memory right now, for `rt_bridge doctor`.
 
-use super::{Service, TransportError, configuration};
+use super::{Service, TransportError, configuration, domain};
 use iceoryx2::node::NodeView;
 use iceoryx2::prelude::*;
 
@@ -32,7 +32,7 @@ pub struct SharedMemoryReport {
 /// [`TransportError::Node`] when shared memory is not usable.
 pub fn survey() -> Result<SharedMemoryReport, TransportError> {
     let mut report = SharedMemoryReport::default();
-    iceoryx2::node::Node::<Service>::list(&configuration()?, |state| {
+    iceoryx2::node::Node::<Service>::list(&configuration(&domain())?, |state| {
         let (details, alive) = match &state {
             NodeState::Alive(view) => (view.details().clone(), true),
             NodeState::Dead(view) => (view.details().clone(), false),

@@ -86,12 +86,20 @@ impl Node {
     /// # Errors
     /// [`TransportError::Node`] when shared memory is not usable.
     pub fn open(name: &str) -> Result<Self, TransportError> {
+        Self::open_in(&domain(), name)
+    }
+
+    /// The same in a domain given here: for tests and for programs that talk to several cells.
+    ///
+    /// # Errors
+    /// [`TransportError::Node`] when shared memory is not usable or `domain` is no short name.
+    pub fn open_in(domain: &str, name: &str) -> Result<Self, TransportError> {
         let failed = |what: String| TransportError::Node { what };
         set_log_level(LogLevel::Fatal); // every failure comes back as an error; iceoryx2's own log would say it twice
         let name = NodeName::new(name).map_err(|e| failed(format!("{e:?}")))?;
         let inner = NodeBuilder::new()
             .name(&name)
-            .config(&configuration()?)
+            .config(&configuration(domain)?)
             .signal_handling_mode(SignalHandlingMode::Disabled)
             .create::<Service>()
             .map_err(|e| failed(format!("{e:?}")))?;
@@ -104,12 +112,20 @@ impl Node {
     }
 }
 
+/// The domain this process belongs to.
+fn domain() -> String {
+    std::env::var(DOMAIN_VARIABLE).unwrap_or_else(|_| "0".into())
+}
+
 /// iceoryx2's settings with our prefix, so that neither other programs nor other domains meet us.
-fn configuration() -> Result<Config, TransportError> {
-    let domain = std::env::var(DOMAIN_VARIABLE).unwrap_or_else(|_| "0".into());
-    let bad =
-        || TransportError::Node { what: format!("{DOMAIN_VARIABLE}={domain} is no short name of letters and digits") };
-    if domain.is_empty() || domain.len() > 24 || !domain.bytes().all(|b| b.is_ascii_alphanumeric() || b == b'-') {
+fn configuration(domain: &str) -> Result<Config, TransportError> {
+    let bad = || TransportError::Node {
+        what: format!(
+            "the domain {domain:?} (set by {DOMAIN_VARIABLE}) is no name of 1 to 24 letters, digits and dashes"
+        ),
+    };
+    let short_name = !domain.is_empty() && domain.len() <= 24;
+    if !short_name || !domain.bytes().all(|b| b.is_ascii_alphanumeric() || b == b'-') {
         return Err(bad());
     }
     let mut config = Config::default();
