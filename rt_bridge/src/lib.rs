@@ -1,1 +1,5 @@
-//! placeholder
+//! Hardware to shared memory: the 1 kHz loop, its safety, and the devices behind traits.
+
+pub mod arm;
+pub mod fr3;
+pub mod rt;

@@ -1,0 +1,11 @@
+//! The control thread: what runs once a millisecond and must never wait for anybody. Nothing below this module
+//! allocates, locks, logs, panics or touches a file while the loop runs.
+
+/// What to do when the machine does not grant real-time scheduling and locked memory.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub enum Realtime {
+    /// Refuse to run.
+    Enforce,
+    /// Take what is granted, and say so.
+    Ignore,
+}
