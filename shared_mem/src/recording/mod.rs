@@ -1,1 +1,35 @@
 //! Clips and sessions on disk: the only code that knows MCAP.
+//!
+//! A clip is found out, not declared: an own recording (MCAP, protobuf), a ROS 2 bag (MCAP, CDR) or a TwinAligner
+//! folder all become the same [`Clip`]. Nothing that a file says is trusted: lengths are bounded, checksums are
+//! compared, and what had to be left out is told in [`Clip::damage`] and [`Clip::warnings`].
+//!
+//! | file | owns |
+//! |---|---|
+//! | `container` | MCAP records and messages of a file that may be cut or changed |
+//! | `cdr`, `ros2` | ROS 2 messages |
+//! | `bag` | a ROS 2 bag as a clip |
+//! | `joint_log` | joint rows: one publisher, one joint order |
+//! | `checks` | faults that foreign logs have, each told in a sentence |
+//! | `clip`, `series`, `session` | what callers get |
+
+mod bag;
+mod cdr;
+mod checks;
+mod clip;
+mod container;
+mod error;
+mod joint_log;
+mod ros2;
+mod series;
+mod session;
+
+pub use clip::{Clip, read_clip};
+pub use error::ReadError;
+pub use series::{JointSeries, ObjectSeries};
+pub use session::Session;
+
+/// True for a folder that is itself one clip and no session.
+fn is_clip_folder(path: &std::path::Path) -> bool {
+    path.join("control.json").is_file() && path.join("frame.json").is_file()
+}

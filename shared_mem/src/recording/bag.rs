@@ -1,0 +1,156 @@
+//! A ROS 2 bag (storage mcap, messages in CDR) as a clip. Topic names come from `[topics]` of cell.toml.
+
+use super::checks;
+use super::clip::{self, Clip, NamedLog};
+use super::container::{Message, Messages};
+use super::error::ReadError;
+use super::joint_log::JointLog;
+use super::ros2::{JointState, StampedPose};
+use super::series::ObjectSeries;
+use crate::cell::{Cell, ClipKind, Topics};
+use crate::frames::{Base, Object, Pose};
+use std::path::Path;
+
+/// A stamp [ns] and the pose, `None` where its numbers are no pose.
+type PoseRow = (u64, Option<Pose<Base, Object>>);
+
+/// What the wanted topics held.
+#[derive(Debug, Default)]
+struct Collected {
+    measured: JointLog,
+    desired: JointLog,
+    poses: Vec<PoseRow>,
+    /// Frame that the poses name.
+    pose_frame: String,
+    /// Whether any pose carried a stamp of its own.
+    pose_stamped: bool,
+    pose_log_times_ns: Vec<u64>,
+}
+
+/// Reads a bag.
+pub(super) fn read(path: &Path, kind: ClipKind, cell: &Cell) -> Result<Clip, ReadError> {
+    let mut messages = Messages::open(path)?;
+    let mut collected = Collected::default();
+    while let Some(message) = messages.next()? {
+        collected
+            .take(&message, &cell.topics)
+            .map_err(|what| ReadError::content(path, &message.channel.topic, what))?;
+    }
+    let present = messages.present();
+    let needs_arm = cell.robot.is_some() && kind != ClipKind::FreeMotion;
+    let topics = &cell.topics;
+    let mut clip = empty_clip(path, kind);
+    clip.damage = messages.damage().summary();
+    if needs_arm || !collected.measured.is_empty() {
+        let missing = |topic: &str, role, key| ReadError::Topic {
+            path: path.to_owned(),
+            topic: topic.to_owned(),
+            role,
+            key,
+            present: present.clone(),
+        };
+        if collected.measured.is_empty() {
+            return Err(missing(&topics.measured, "measured joints", "measured"));
+        }
+        if collected.desired.is_empty() {
+            return Err(missing(&topics.desired, "desired joints", "desired"));
+        }
+        let measured = NamedLog { topic: &topics.measured, log: std::mem::take(&mut collected.measured) };
+        let desired = NamedLog { topic: &topics.desired, log: std::mem::take(&mut collected.desired) };
+        let joints = clip::joints(path, measured, desired, &clip::wanted_joints(cell))?;
+        clip.joint_names = joints.names;
+        clip.measured = joints.measured;
+        clip.desired = joints.desired;
+        clip.warnings.extend(joints.warnings);
+    }
+    if kind != ClipKind::Excitation && collected.poses.is_empty() {
+        return Err(ReadError::Topic {
+            path: path.to_owned(),
+            topic: topics.object_pose.clone(),
+            role: "object poses",
+            key: "object_pose",
+            present,
+        });
+    }
+    let base_frame = cell.robot.as_ref().and_then(|robot| robot.base_frame.as_deref());
+    clip.object = collected.object(path, &topics.object_pose, base_frame, &mut clip.warnings)?;
+    Ok(clip)
+}
+
+/// A clip of nothing.
+pub(super) fn empty_clip(path: &Path, kind: ClipKind) -> Clip {
+    Clip {
+        file: path.to_owned(),
+        kind,
+        joint_names: Vec::new(),
+        desired: Default::default(),
+        measured: Default::default(),
+        object: ObjectSeries::default(),
+        warnings: Vec::new(),
+        damage: None,
+    }
+}
+
+impl Collected {
+    /// Takes a message over when it is on a wanted topic; a sentence when it is not what that topic should hold.
+    fn take(&mut self, message: &Message<'_>, topics: &Topics) -> Result<(), String> {
+        let topic = &message.channel.topic;
+        if *topic == topics.measured || *topic == topics.desired {
+            expect_type(message, &[JointState::TYPE])?;
+            let state = JointState::decode(message.data).map_err(|e| not_decoded(&e))?;
+            let log = if *topic == topics.measured { &mut self.measured } else { &mut self.desired };
+            log.push(&state, message.log_time_ns);
+        } else if *topic == topics.object_pose {
+            expect_type(message, &[StampedPose::POSE_TYPE, StampedPose::TRANSFORM_TYPE])?;
+            let has_child = message.channel.type_name() == StampedPose::TRANSFORM_TYPE;
+            let pose = StampedPose::decode(message.data, has_child).map_err(|e| not_decoded(&e))?;
+            self.pose_stamped |= pose.stamp_ns != 0;
+            self.pose_log_times_ns.push(message.log_time_ns);
+            if self.pose_frame.is_empty() {
+                self.pose_frame = pose.frame.to_owned();
+            }
+            self.poses.push((pose.stamp_ns, Pose::from_parts(pose.position, pose.wxyz)));
+        }
+        Ok(())
+    }
+
+    fn object(
+        mut self,
+        path: &Path,
+        topic: &str,
+        base_frame: Option<&str>,
+        warnings: &mut Vec<String>,
+    ) -> Result<ObjectSeries, ReadError> {
+        if !self.pose_stamped {
+            for ((stamp, _), log_time) in self.poses.iter_mut().zip(&self.pose_log_times_ns) {
+                *stamp = *log_time;
+            }
+        }
+        if let Some(base) = base_frame
+            && !self.pose_frame.is_empty()
+            && self.pose_frame != base
+        {
+            warnings.push(format!(
+                "`{topic}`: poses name the frame `{}`, the base frame is `{base}`; they are taken as given in the \
+                 base frame: set `[robot] base_frame` or publish them in it",
+                self.pose_frame
+            ));
+        }
+        let (series, found) =
+            checks::object(self.poses, topic).map_err(|what| ReadError::content(path, topic, what))?;
+        warnings.extend(found);
+        Ok(series)
+    }
+}
+
+fn expect_type(message: &Message<'_>, wanted: &[&str]) -> Result<(), String> {
+    let found = message.channel.type_name();
+    if wanted.contains(&found) {
+        return Ok(());
+    }
+    Err(format!("holds `{found}`, not `{}`; set `[topics]` in cell.toml to the right topic", wanted.join("` or `")))
+}
+
+fn not_decoded(error: &super::cdr::CdrError) -> String {
+    format!("a message cannot be decoded: {error}; record the bag again, or set `[topics]` to another topic")
+}

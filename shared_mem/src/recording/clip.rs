@@ -1,0 +1,115 @@
+//! A clip as callers see it, whatever it was recorded with.
+
+use super::bag;
+use super::checks;
+use super::error::ReadError;
+use super::joint_log::{self, JointLog, Wanted};
+use super::series::{JointSeries, ObjectSeries};
+use crate::cell::{Cell, ClipKind};
+use std::path::{Path, PathBuf};
+
+/// One recorded clip.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Clip {
+    /// File or folder it was read from.
+    pub file: PathBuf,
+    /// What was done in it.
+    pub kind: ClipKind,
+    /// Names of the joints, in the order of both series.
+    pub joint_names: Vec<String>,
+    /// What the arm was told: `q_d`, `dq_d` and, where logged, `tau_J_d` (without gravity). Empty without an arm.
+    pub desired: JointSeries,
+    /// What the arm did: `q`, `dq` and, where logged, `tau_J` (with gravity). Empty without an arm.
+    pub measured: JointSeries,
+    /// Where the object was. Empty when it was not tracked.
+    pub object: ObjectSeries,
+    /// What was found odd in it, one sentence each.
+    pub warnings: Vec<String>,
+    /// The part of the file that could not be read; `None` when the file is whole.
+    pub damage: Option<String>,
+}
+
+/// Reads a clip; finds out itself whether it is an own recording, a ROS 2 bag or a TwinAligner folder.
+///
+/// # Errors
+/// [`ReadError`] when the file is missing, is of no known kind, lacks a topic that `cell` and `kind` ask for, lacks a
+/// joint, or more than 1 % of its rows cannot be used. A cut or partly changed file is no error: see [`Clip::damage`].
+pub fn read_clip(path: &Path, kind: ClipKind, cell: &Cell) -> Result<Clip, ReadError> {
+    bag::read(path, kind, cell)
+}
+
+impl Clip {
+    /// Puts the joints of both series into the order of `names`; joints that are not named are left out.
+    ///
+    /// # Errors
+    /// [`ReadError::Content`] when a wanted joint is not in the clip; names both lists.
+    pub fn reorder(mut self, names: &[String]) -> Result<Self, ReadError> {
+        if self.joint_names == names {
+            return Ok(self);
+        }
+        let columns = joint_log::columns(names, &self.joint_names).ok_or_else(|| {
+            let what = format!(
+                "the model's joints are [{}], the recording has [{}]; rename the joints in the model or the recording",
+                names.join(", "),
+                self.joint_names.join(", ")
+            );
+            ReadError::content(&self.file, "joint names", what)
+        })?;
+        self.desired = self.desired.select_columns(&columns);
+        self.measured = self.measured.select_columns(&columns);
+        self.joint_names = names.to_vec();
+        Ok(self)
+    }
+}
+
+/// Joint order that a cell.toml asks for.
+pub(super) fn wanted_joints(cell: &Cell) -> Wanted {
+    match &cell.robot {
+        Some(robot) if !robot.joints.is_empty() => Wanted::Names(robot.joints.clone()),
+        Some(robot) if robot.model.is_some() => Wanted::Model((1..=7).map(|i| format!("fr3_joint{i}")).collect()),
+        _ => Wanted::Any,
+    }
+}
+
+/// Rows of the two joint topics as checked series in one joint order.
+pub(super) struct Joints {
+    pub(super) names: Vec<String>,
+    pub(super) desired: JointSeries,
+    pub(super) measured: JointSeries,
+    pub(super) warnings: Vec<String>,
+}
+
+/// A topic's name and its rows.
+pub(super) struct NamedLog<'a> {
+    pub(super) topic: &'a str,
+    pub(super) log: JointLog,
+}
+
+/// Orders, aligns and checks the two joint topics of a file.
+pub(super) fn joints(
+    path: &Path,
+    measured: NamedLog<'_>,
+    desired: NamedLog<'_>,
+    wanted: &Wanted,
+) -> Result<Joints, ReadError> {
+    let fail = |topic: &str| {
+        let topic = topic.to_owned();
+        move |what: String| ReadError::content(path, &topic, what)
+    };
+    let ordered = measured.log.finish(measured.topic, wanted).map_err(fail(measured.topic))?;
+    let names = ordered.names;
+    let mut warnings = ordered.warnings;
+    let (measured_series, found) =
+        checks::joints(ordered.series, measured.topic, &names).map_err(fail(measured.topic))?;
+    warnings.extend(found);
+    let wanted = match wanted {
+        Wanted::Any => &Wanted::Names(names.clone()),
+        given => given,
+    };
+    let ordered = desired.log.finish(desired.topic, wanted).map_err(fail(desired.topic))?;
+    warnings.extend(ordered.warnings);
+    let (desired_series, found) = checks::joints(ordered.series, desired.topic, &names).map_err(fail(desired.topic))?;
+    warnings.extend(found);
+    warnings.extend(checks::pair(&desired_series, &measured_series));
+    Ok(Joints { names, desired: desired_series, measured: measured_series, warnings })
+}

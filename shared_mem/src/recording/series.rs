@@ -1,0 +1,158 @@
+//! Time series of a clip: joints and object, as plain arrays. Units SI, stamps integer nanoseconds.
+
+use crate::frames::{Base, Object, Pose};
+
+/// Joint positions over time, with velocities and torques where they were logged.
+///
+/// Arrays are row-major, `len() x dof`; `dq` and `tau` are empty when not logged.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct JointSeries {
+    /// One stamp a row, strictly increasing [ns].
+    pub stamps_ns: Vec<u64>,
+    /// Joints in a row.
+    pub dof: usize,
+    /// Positions [rad].
+    pub q: Vec<f64>,
+    /// Velocities [rad/s].
+    pub dq: Vec<f64>,
+    /// Torques [N m]: `tau_J` (with gravity) of a measured series, `tau_J_d` (without) of a desired one.
+    pub tau: Vec<f64>,
+}
+
+impl JointSeries {
+    /// Rows.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.stamps_ns.len()
+    }
+
+    /// True when there are no rows.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.stamps_ns.is_empty()
+    }
+
+    /// Positions of row `i` [rad]; empty beyond the end.
+    #[must_use]
+    pub fn q_row(&self, i: usize) -> &[f64] {
+        row(&self.q, self.dof, i).unwrap_or(&[])
+    }
+
+    /// Velocities of row `i` [rad/s]; `None` when not logged.
+    #[must_use]
+    pub fn dq_row(&self, i: usize) -> Option<&[f64]> {
+        row(&self.dq, self.dof, i)
+    }
+
+    /// Torques of row `i` [N m]; `None` when not logged.
+    #[must_use]
+    pub fn tau_row(&self, i: usize) -> Option<&[f64]> {
+        row(&self.tau, self.dof, i)
+    }
+
+    /// From the first stamp to the last [s].
+    #[must_use]
+    pub fn duration(&self) -> f64 {
+        duration(&self.stamps_ns)
+    }
+
+    /// The same rows with only `columns`, in that order; a column beyond `dof` reads as 0.
+    pub(super) fn select_columns(&self, columns: &[usize]) -> Self {
+        let pick = |values: &[f64]| -> Vec<f64> {
+            let rows = values.chunks_exact(self.dof.max(1));
+            rows.flat_map(|row| columns.iter().map(|&c| row.get(c).copied().unwrap_or(0.0))).collect()
+        };
+        Self {
+            stamps_ns: self.stamps_ns.clone(),
+            dof: columns.len(),
+            q: pick(&self.q),
+            dq: pick(&self.dq),
+            tau: pick(&self.tau),
+        }
+    }
+
+    /// The rows listed in `rows`, in that order.
+    pub(super) fn select_rows(&self, rows: &[usize]) -> Self {
+        let pick = |values: &[f64]| -> Vec<f64> {
+            rows.iter().filter_map(|&i| row(values, self.dof, i)).flatten().copied().collect()
+        };
+        Self {
+            stamps_ns: rows.iter().filter_map(|&i| self.stamps_ns.get(i).copied()).collect(),
+            dof: self.dof,
+            q: pick(&self.q),
+            dq: pick(&self.dq),
+            tau: pick(&self.tau),
+        }
+    }
+}
+
+/// Poses of the object over time.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct ObjectSeries {
+    /// One stamp a pose, strictly increasing [ns].
+    pub stamps_ns: Vec<u64>,
+    /// Geometric centre of the object in the base frame.
+    pub poses: Vec<Pose<Base, Object>>,
+}
+
+impl ObjectSeries {
+    /// Poses.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.stamps_ns.len()
+    }
+
+    /// True when there are no poses.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.stamps_ns.is_empty()
+    }
+
+    /// From the first stamp to the last [s].
+    #[must_use]
+    pub fn duration(&self) -> f64 {
+        duration(&self.stamps_ns)
+    }
+}
+
+fn row(values: &[f64], dof: usize, i: usize) -> Option<&[f64]> {
+    let start = i.checked_mul(dof)?;
+    values.get(start..start.checked_add(dof)?).filter(|row| !row.is_empty())
+}
+
+fn duration(stamps_ns: &[u64]) -> f64 {
+    match (stamps_ns.first(), stamps_ns.last()) {
+        (Some(&first), Some(&last)) => crate::time::seconds_between(first, last),
+        _ => 0.0,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rows_are_found_by_number_and_unlogged_values_are_none() {
+        let series = JointSeries {
+            stamps_ns: vec![0, 500_000_000],
+            dof: 2,
+            q: vec![1.0, 2.0, 3.0, 4.0],
+            dq: vec![],
+            tau: vec![5.0, 6.0, 7.0, 8.0],
+        };
+        assert_eq!(series.q_row(1), [3.0, 4.0]);
+        assert_eq!(series.q_row(2), [0.0; 0]);
+        assert_eq!(series.dq_row(0), None);
+        assert_eq!(series.tau_row(0), Some(&[5.0, 6.0][..]));
+        assert!((series.duration() - 0.5).abs() < 1e-12);
+    }
+
+    #[test]
+    fn columns_and_rows_can_be_picked_in_any_order() {
+        let series =
+            JointSeries { stamps_ns: vec![10, 20], dof: 2, q: vec![1.0, 2.0, 3.0, 4.0], ..JointSeries::default() };
+        assert_eq!(series.select_columns(&[1, 0]).q, [2.0, 1.0, 4.0, 3.0]);
+        let last = series.select_rows(&[1]);
+        assert_eq!((last.stamps_ns, last.q), (vec![20], vec![3.0, 4.0]));
+    }
+}

@@ -1,0 +1,72 @@
+//! A session: a folder with cell.toml and clips, or a single clip beside a cell.toml.
+
+use super::error::ReadError;
+use crate::cell::{Cell, ClipEntry, ClipKind};
+use std::path::{Path, PathBuf};
+
+/// Clips and the cell they were recorded in.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Session {
+    /// Folder that the clips' files are relative to.
+    pub folder: PathBuf,
+    /// What the laboratory knows about its cell.
+    pub cell: Cell,
+    /// Clips, in the order of cell.toml.
+    pub clips: Vec<ClipEntry>,
+}
+
+impl Session {
+    /// Opens a session folder (with cell.toml), or a single clip beside its cell.toml.
+    ///
+    /// # Errors
+    /// [`ReadError`] when there is no cell.toml, it cannot be used, or it lists no clips.
+    pub fn open(path: &Path) -> Result<Self, ReadError> {
+        Self::open_with(path, None)
+    }
+
+    /// The same with a cell.toml that lies elsewhere.
+    ///
+    /// # Errors
+    /// As [`Session::open`].
+    pub fn open_with(path: &Path, cell_toml: Option<&Path>) -> Result<Self, ReadError> {
+        let metadata = std::fs::metadata(path).map_err(ReadError::io(path))?;
+        let is_session = metadata.is_dir() && !super::is_clip_folder(path);
+        if is_session {
+            let cell = Cell::read(&cell_toml.map_or_else(|| path.join("cell.toml"), Path::to_owned))?;
+            if cell.clips.is_empty() {
+                return Err(ReadError::kind(path, "cell.toml lists no clips; add `[[clip]] file = \"...\"` blocks"));
+            }
+            return Ok(Self { folder: path.to_owned(), clips: cell.clips.clone(), cell });
+        }
+        let folder = path.parent().map_or_else(PathBuf::new, Path::to_owned);
+        let beside = folder.join("cell.toml");
+        let cell = match cell_toml {
+            Some(given) => Cell::read(given)?,
+            None if beside.is_file() => Cell::read(&beside)?,
+            None => {
+                return Err(ReadError::kind(path, "has no cell.toml beside it; give one with `--cell cell.toml`"));
+            }
+        };
+        let file = path.file_name().map_or_else(|| path.to_owned(), PathBuf::from);
+        let listed = cell.clips.iter().find(|clip| clip.file == file).cloned();
+        let clip = listed.unwrap_or_else(|| ClipEntry { kind: kind_by_cell(&cell), file });
+        Ok(Self { folder, clips: vec![clip], cell })
+    }
+
+    /// Reads one of the clips.
+    ///
+    /// # Errors
+    /// As [`super::read_clip`].
+    pub fn read(&self, clip: &ClipEntry) -> Result<super::Clip, ReadError> {
+        super::read_clip(&self.folder.join(&clip.file), clip.kind, &self.cell)
+    }
+}
+
+/// What a clip that cell.toml does not list is most likely about.
+fn kind_by_cell(cell: &Cell) -> ClipKind {
+    match (&cell.robot, &cell.object) {
+        (None, _) => ClipKind::FreeMotion,
+        (Some(_), None) => ClipKind::Excitation,
+        (Some(_), Some(_)) => ClipKind::ControlHitSlide,
+    }
+}
