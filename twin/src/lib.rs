@@ -1,1 +1,4 @@
-//! placeholder
+//! The cell in simulation: arm, contact, sensors, live shadow, replay.
+
+pub mod physics;
+pub mod scene;

@@ -1,0 +1,141 @@
+//! The object as it is simulated: shape, inertia, friction. Built from cell.toml's nominal values and overridden by
+//! theta.toml; read by the physics and by the camera. Object frame, SI.
+
+mod mesh_file;
+
+pub use mesh_file::MeshFileError;
+
+use nalgebra::{Point3, Vector3};
+use shared_mem::cell::Cell;
+use shared_mem::theta::{ObjectTheta, Theta};
+
+/// The object with every number a simulation needs.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ObjectModel {
+    /// Its surface.
+    pub shape: ObjectShape,
+    /// Mass [kg].
+    pub mass: f64,
+    /// Centre of mass from the geometric centre, object frame [m].
+    pub centre_of_mass: Vector3<f64>,
+    /// Coulomb friction on the table.
+    pub friction: f64,
+    /// Coulomb friction against the tool.
+    pub tip_friction: f64,
+    /// Restitution against the table, 0 to 1.
+    pub restitution: f64,
+}
+
+/// Surface of the object around its geometric centre [m].
+#[derive(Debug, Clone, PartialEq)]
+pub enum ObjectShape {
+    /// A box.
+    Box {
+        /// Half the edge lengths.
+        half_extents: Vector3<f64>,
+    },
+    /// Triangles, moved so that the middle of their bounding box is the origin. Physics uses their convex hull.
+    Mesh {
+        /// Corners.
+        points: Vec<Point3<f64>>,
+        /// Indices into `points`, counter-clockwise seen from outside.
+        triangles: Vec<[u32; 3]>,
+    },
+}
+
+impl ObjectModel {
+    /// The object of a cell, `None` when the cell has none.
+    ///
+    /// # Errors
+    /// [`MeshFileError`] when the object is a mesh that cannot be used.
+    pub fn new(cell: &Cell, theta: Option<&Theta>) -> Result<Option<Self>, MeshFileError> {
+        let Some(object) = &cell.object else { return Ok(None) };
+        let shape = match (&object.mesh, object.size) {
+            (Some(file), _) => mesh_file::read(&cell.folder.join(file))?,
+            (None, size) => ObjectShape::Box { half_extents: Vector3::from(size.unwrap_or([0.05; 3])) * 0.5 },
+        };
+        let known = theta.and_then(|t| t.object.clone()).unwrap_or_default();
+        let ObjectTheta { friction, mass, centre_of_mass, tip_friction } = known;
+        Ok(Some(Self {
+            shape,
+            mass: mass.unwrap_or_else(|| object.nominal_mass()),
+            centre_of_mass: Vector3::from(centre_of_mass.unwrap_or_default()),
+            friction: friction.unwrap_or_else(|| object.nominal_friction()),
+            tip_friction: tip_friction.unwrap_or_else(|| object.nominal_tip_friction()),
+            restitution: object.nominal_restitution(),
+        }))
+    }
+}
+
+impl ObjectShape {
+    /// Half the size of the bounding box [m].
+    #[must_use]
+    pub fn half_extents(&self) -> Vector3<f64> {
+        match self {
+            Self::Box { half_extents } => *half_extents,
+            Self::Mesh { points, .. } => points.iter().fold(Vector3::zeros(), |m, p| m.sup(&p.coords.abs())),
+        }
+    }
+
+    /// Radius of a sphere around the geometric centre that holds the object [m].
+    #[must_use]
+    pub fn bounding_radius(&self) -> f64 {
+        match self {
+            Self::Box { half_extents } => half_extents.norm(),
+            Self::Mesh { points, .. } => points.iter().map(|p| p.coords.norm()).fold(0.0, f64::max),
+        }
+    }
+
+    /// Corners and triangles of the surface, counter-clockwise seen from outside.
+    #[must_use]
+    pub fn triangles(&self) -> (Vec<Point3<f64>>, Vec<[u32; 3]>) {
+        match self {
+            Self::Box { half_extents } => box_triangles(*half_extents),
+            Self::Mesh { points, triangles } => (points.clone(), triangles.clone()),
+        }
+    }
+}
+
+/// Corner `i` has the sign of bit 0 on x, bit 1 on y, bit 2 on z.
+fn box_triangles(half: Vector3<f64>) -> (Vec<Point3<f64>>, Vec<[u32; 3]>) {
+    let sign = |i: usize, bit: usize| if i >> bit & 1 == 1 { 1.0 } else { -1.0 };
+    let corners =
+        (0..8).map(|i| Point3::from(half.component_mul(&Vector3::new(sign(i, 0), sign(i, 1), sign(i, 2))))).collect();
+    let faces = [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
+    let triangles = faces.iter().flat_map(|[a, b, c, d]| [[*a, *b, *c], [*a, *c, *d]]).collect();
+    (corners, triangles)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_faces_of_a_box_look_outwards_and_enclose_its_volume() {
+        let (points, triangles) = ObjectShape::Box { half_extents: Vector3::new(0.5, 1.0, 1.5) }.triangles();
+        let volume: f64 = triangles
+            .iter()
+            .map(|t| {
+                let [a, b, c] = t.map(|i| points[i as usize].coords);
+                a.dot(&b.cross(&c)) / 6.0
+            })
+            .sum();
+        assert!((volume - 6.0).abs() < 1e-12, "{volume}");
+    }
+
+    #[test]
+    fn what_was_identified_replaces_what_was_assumed() {
+        let cell = Cell {
+            object: Some(shared_mem::cell::Object {
+                size: Some([0.1; 3]),
+                friction_range: Some([0.2, 0.4]),
+                ..Default::default()
+            }),
+            ..Cell::default()
+        };
+        let theta =
+            Theta { object: Some(ObjectTheta { mass: Some(0.7), ..ObjectTheta::default() }), ..Theta::default() };
+        let model = ObjectModel::new(&cell, Some(&theta)).expect("a box").expect("an object");
+        assert_eq!((model.mass, model.friction), (0.7, 0.30000000000000004));
+    }
+}

@@ -1,0 +1,312 @@
+//! Reads the object's mesh from obj, stl (text and binary) or ply (text and little-endian binary): corners and
+//! triangles, nothing else. Lengths in the file are metres.
+
+use super::ObjectShape;
+use nalgebra::{Point3, Vector3};
+use std::path::{Path, PathBuf};
+
+/// Corners and triangles as they stand in a file.
+type Surface = (Vec<Point3<f64>>, Vec<[u32; 3]>);
+
+/// A mesh file cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum MeshFileError {
+    /// Missing or unreadable.
+    #[error("cannot read the mesh {}: {source}; check `object.mesh` in cell.toml", path.display())]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// Not what its name says, or empty.
+    #[error("{}: {what}; use a triangulated obj, stl or ply in metres", path.display())]
+    Content {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        what: String,
+    },
+}
+
+/// Reads a mesh and moves the middle of its bounding box to the origin.
+pub(super) fn read(path: &Path) -> Result<ObjectShape, MeshFileError> {
+    let bytes = std::fs::read(path).map_err(|source| MeshFileError::Read { path: path.to_owned(), source })?;
+    let ending = path.extension().and_then(|e| e.to_str()).unwrap_or("").to_ascii_lowercase();
+    let surface = match ending.as_str() {
+        "obj" => obj(&bytes),
+        "stl" => stl(&bytes),
+        "ply" => ply(&bytes),
+        _ => Err(format!("`.{ending}` is no mesh format known here")),
+    };
+    surface.and_then(centred).map_err(|what| MeshFileError::Content { path: path.to_owned(), what })
+}
+
+fn centred((mut points, triangles): Surface) -> Result<ObjectShape, String> {
+    let count = points.len();
+    if count < 4 || triangles.is_empty() {
+        return Err(format!("it holds {count} corners and {} triangles", triangles.len()));
+    }
+    if triangles.iter().flatten().any(|i| *i as usize >= count) {
+        return Err("a face names a corner that does not exist".into());
+    }
+    if points.iter().any(|p| !p.coords.iter().all(|v| v.is_finite())) {
+        return Err("a corner is not a number".into());
+    }
+    let low = points.iter().fold(Vector3::repeat(f64::INFINITY), |m, p| m.inf(&p.coords));
+    let high = points.iter().fold(Vector3::repeat(f64::NEG_INFINITY), |m, p| m.sup(&p.coords));
+    for p in &mut points {
+        *p -= (low + high) * 0.5;
+    }
+    Ok(ObjectShape::Mesh { points, triangles })
+}
+
+/// Wavefront: `v x y z` and `f a b c ..` with optional `/texture/normal`, from 1 or counted from the end.
+fn obj(bytes: &[u8]) -> Result<Surface, String> {
+    let text = std::str::from_utf8(bytes).map_err(|_| "it is not text")?;
+    let (mut points, mut triangles) = (Vec::new(), Vec::new());
+    for (number, line) in text.lines().enumerate() {
+        let mut words = line.split_whitespace();
+        let bad = || format!("line {} makes no sense", number + 1);
+        match words.next() {
+            Some("v") => points.push(point(&mut words).ok_or_else(bad)?),
+            Some("f") => {
+                let corner = |word: &str| -> Option<u32> {
+                    let index: i64 = word.split('/').next()?.parse().ok()?;
+                    let from_zero = if index < 0 { index + points.len() as i64 } else { index - 1 };
+                    u32::try_from(from_zero).ok()
+                };
+                let face: Vec<u32> = words.map(corner).collect::<Option<_>>().ok_or_else(bad)?;
+                fan(&face, &mut triangles);
+            }
+            _ => {}
+        }
+    }
+    Ok((points, triangles))
+}
+
+/// Stereolithography. The size decides which of the two forms it is: binary files may begin with "solid" too.
+fn stl(bytes: &[u8]) -> Result<Surface, String> {
+    let count = bytes.get(80..84).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]) as usize);
+    let mut corners = Vec::new();
+    if let Some(count) = count
+        && bytes.len() == 84 + 50 * count
+    {
+        for facet in bytes[84..].chunks_exact(50) {
+            corners.extend(facet[12..48].chunks_exact(12).map(|c| {
+                Point3::from([0, 4, 8].map(|o| f64::from(f32::from_le_bytes([c[o], c[o + 1], c[o + 2], c[o + 3]]))))
+            }));
+        }
+    } else {
+        let text = std::str::from_utf8(bytes).map_err(|_| "it is neither a binary nor a text stl")?;
+        for line in text.lines() {
+            let mut words = line.split_whitespace();
+            if words.next() == Some("vertex") {
+                corners.push(point(&mut words).ok_or("a vertex line makes no sense")?);
+            }
+        }
+    }
+    let count = u32::try_from(corners.len() / 3).map_err(|_| "it is too large")?;
+    Ok((corners, (0..count).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect()))
+}
+
+/// One property of a ply element: how many bytes a value takes (text ignores it) and, for lists, a count before it.
+struct Property {
+    name: String,
+    kind: Scalar,
+    list_count: Option<Scalar>,
+}
+
+#[derive(Clone, Copy)]
+enum Scalar {
+    Int(usize),
+    Float(usize),
+}
+
+fn ply(bytes: &[u8]) -> Result<Surface, String> {
+    let marker = b"end_header";
+    let end = bytes.windows(marker.len()).position(|w| w == marker).ok_or("it has no `end_header`")? + marker.len();
+    let header = std::str::from_utf8(&bytes[..end]).map_err(|_| "its header is not text")?;
+    let body_start = end + bytes[end..].iter().position(|b| *b == b'\n').map_or(0, |p| p + 1);
+    let binary = match header.lines().find(|l| l.starts_with("format")).unwrap_or("") {
+        l if l.contains("ascii") => false,
+        l if l.contains("binary_little_endian") => true,
+        _ => return Err("its format is neither ascii nor binary_little_endian".into()),
+    };
+    let mut values = PlyValues { rest: &bytes[body_start..], binary };
+    let (mut points, mut triangles) = (Vec::new(), Vec::new());
+    for (name, count, properties) in ply_elements(header)? {
+        for _ in 0..count {
+            let mut xyz = [0.0; 3];
+            for property in &properties {
+                let length = property.list_count.map_or(Ok(1.0), |kind| values.next(kind))?;
+                let list = (0..length as usize).map(|_| values.next(property.kind)).collect::<Result<Vec<_>, _>>()?;
+                match (name.as_str(), ["x", "y", "z"].iter().position(|axis| *axis == property.name)) {
+                    ("vertex", Some(axis)) => xyz[axis] = list[0],
+                    ("face", None) if property.name.starts_with("vertex_ind") => {
+                        fan(&list.iter().map(|v| *v as u32).collect::<Vec<_>>(), &mut triangles);
+                    }
+                    _ => {}
+                }
+            }
+            if name == "vertex" {
+                points.push(Point3::from(xyz));
+            }
+        }
+    }
+    Ok((points, triangles))
+}
+
+fn ply_elements(header: &str) -> Result<Vec<(String, usize, Vec<Property>)>, String> {
+    let mut elements: Vec<(String, usize, Vec<Property>)> = Vec::new();
+    for line in header.lines() {
+        let words: Vec<&str> = line.split_whitespace().collect();
+        let bad = || format!("its header line `{line}` makes no sense");
+        match words.as_slice() {
+            ["element", name, count] => {
+                elements.push(((*name).to_owned(), count.parse().map_err(|_| bad())?, Vec::new()));
+            }
+            ["property", "list", count, kind, name] => elements.last_mut().ok_or_else(bad)?.2.push(Property {
+                name: (*name).to_owned(),
+                kind: scalar(kind).ok_or_else(bad)?,
+                list_count: Some(scalar(count).ok_or_else(bad)?),
+            }),
+            ["property", kind, name] => elements.last_mut().ok_or_else(bad)?.2.push(Property {
+                name: (*name).to_owned(),
+                kind: scalar(kind).ok_or_else(bad)?,
+                list_count: None,
+            }),
+            _ => {}
+        }
+    }
+    Ok(elements)
+}
+
+fn scalar(name: &str) -> Option<Scalar> {
+    Some(match name {
+        "char" | "uchar" | "int8" | "uint8" => Scalar::Int(1),
+        "short" | "ushort" | "int16" | "uint16" => Scalar::Int(2),
+        "int" | "uint" | "int32" | "uint32" => Scalar::Int(4),
+        "float" | "float32" => Scalar::Float(4),
+        "double" | "float64" => Scalar::Float(8),
+        _ => return None,
+    })
+}
+
+/// The numbers behind a ply header, one after the other.
+struct PlyValues<'a> {
+    rest: &'a [u8],
+    binary: bool,
+}
+
+impl PlyValues<'_> {
+    fn next(&mut self, kind: Scalar) -> Result<f64, String> {
+        let cut = || "it ends in the middle".to_owned();
+        if !self.binary {
+            let start = self.rest.iter().position(|b| !b.is_ascii_whitespace()).ok_or_else(cut)?;
+            let word = &self.rest[start..];
+            let word = &word[..word.iter().position(u8::is_ascii_whitespace).unwrap_or(word.len())];
+            self.rest = &self.rest[start + word.len()..];
+            let text = std::str::from_utf8(word).unwrap_or("");
+            return text.parse().map_err(|_| format!("`{text}` is no number"));
+        }
+        let (Scalar::Int(size) | Scalar::Float(size)) = kind;
+        let (value, rest) = self.rest.split_at_checked(size).ok_or_else(cut)?;
+        self.rest = rest;
+        let mut eight = [0; 8];
+        eight[..size].copy_from_slice(value);
+        Ok(match kind {
+            Scalar::Int(_) => u64::from_le_bytes(eight) as f64, // indices and counts: never negative
+            Scalar::Float(4) => f64::from(f32::from_le_bytes([eight[0], eight[1], eight[2], eight[3]])),
+            Scalar::Float(_) => f64::from_le_bytes(eight),
+        })
+    }
+}
+
+fn point<'a>(words: &mut impl Iterator<Item = &'a str>) -> Option<Point3<f64>> {
+    let mut next = || words.next()?.parse::<f64>().ok();
+    Some(Point3::new(next()?, next()?, next()?))
+}
+
+fn fan(face: &[u32], triangles: &mut Vec<[u32; 3]>) {
+    triangles.extend((2..face.len()).map(|i| [face[0], face[i - 1], face[i]]));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TETRAHEDRON: [[f64; 3]; 4] = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 2.0]];
+    const FACES: [[u32; 3]; 4] = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]];
+
+    fn read_as(name: &str, bytes: &[u8]) -> Result<ObjectShape, String> {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let path = folder.path().join(name);
+        std::fs::write(&path, bytes).expect("a file");
+        read(&path).map_err(|e| e.to_string())
+    }
+
+    fn written_as_obj() -> String {
+        let lines = TETRAHEDRON.iter().map(|[x, y, z]| format!("v {x} {y} {z}\n"));
+        lines.chain(FACES.iter().map(|f| format!("f {}/1 {}/1 {}/1\n", f[0] + 1, f[1] + 1, f[2] + 1))).collect()
+    }
+
+    fn written_as_ply(format: &str) -> Vec<u8> {
+        let mut out = format!(
+            "ply\nformat {format} 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n\
+             element face 4\nproperty list uchar int vertex_indices\nend_header\n"
+        )
+        .into_bytes();
+        for v in TETRAHEDRON {
+            match format {
+                "ascii" => out.extend(format!("{} {} {}\n", v[0], v[1], v[2]).bytes()),
+                _ => out.extend(v.iter().flat_map(|c| (*c as f32).to_le_bytes())),
+            }
+        }
+        for f in FACES {
+            match format {
+                "ascii" => out.extend(format!("3 {} {} {}\n", f[0], f[1], f[2]).bytes()),
+                _ => {
+                    out.push(3);
+                    out.extend(f.iter().flat_map(|i| i.to_le_bytes()));
+                }
+            }
+        }
+        out
+    }
+
+    fn written_as_binary_stl() -> Vec<u8> {
+        let mut out = vec![b' '; 80];
+        out.extend(4u32.to_le_bytes());
+        for f in FACES {
+            out.extend([0; 12]);
+            out.extend(f.iter().flat_map(|i| TETRAHEDRON[*i as usize]).flat_map(|c| (c as f32).to_le_bytes()));
+            out.extend([0; 2]);
+        }
+        out
+    }
+
+    #[test]
+    fn every_format_gives_the_same_centred_body() {
+        let files = [
+            ("a.obj", written_as_obj().into_bytes()),
+            ("a.ply", written_as_ply("ascii")),
+            ("b.ply", written_as_ply("binary_little_endian")),
+            ("a.stl", written_as_binary_stl()),
+        ];
+        for (name, bytes) in files {
+            let shape = read_as(name, &bytes).unwrap_or_else(|e| panic!("{name}: {e}"));
+            assert_eq!(shape.half_extents(), Vector3::new(0.5, 0.5, 1.0), "{name}");
+            assert_eq!(shape.triangles().1.len(), 4, "{name}");
+        }
+    }
+
+    #[test]
+    fn a_cut_file_is_refused_with_a_remedy() {
+        let mut bytes = written_as_ply("binary_little_endian");
+        bytes.truncate(bytes.len() - 3);
+        let error = read_as("cut.ply", &bytes).unwrap_err();
+        assert!(error.contains("ends in the middle") && error.contains("use a triangulated"), "{error}");
+        assert!(read_as("empty.obj", b"").is_err());
+    }
+}
