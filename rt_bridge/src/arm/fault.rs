@@ -106,7 +106,7 @@ pub enum ConnectError {
     },
     /// Somebody answers, in another dialect.
     #[error(
-        "the robot at {host} speaks FCI version {theirs}, this bridge speaks {ours}; update the robot to system image 5.9.0 or later"
+        "the robot at {host} speaks FCI version {theirs}, this bridge speaks {ours} (system image 5.9.0 or later); {remedy}"
     )]
     Version {
         /// Address as given.
@@ -115,6 +115,8 @@ pub enum ConnectError {
         theirs: u16,
         /// Ours.
         ours: u16,
+        /// What theirs belongs to, and what to do.
+        remedy: String,
     },
     /// The machine does not allow what real-time control needs.
     #[error("{what}; run `rt_bridge doctor`, or accept a lesser clock with `--realtime ignore`")]

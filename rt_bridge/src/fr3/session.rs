@@ -1,0 +1,235 @@
+//! The two sockets of one FCI session: commands and their replies over TCP, states and set points over UDP. Owns the
+//! handshake and every deadline; knows nothing of motions. Called by [`super::motion`] and [`super::Fr3`].
+//!
+//! The bytes are `franka-rs`'s (its wire structs and its two channels). Its `Robot` is not used, for three reasons: its
+//! waits for a reply have no deadline, so a server that accepts the connection and says nothing would hang the bridge;
+//! its motion handles cannot be handed to another thread; and it reports a reflex as a printed text rather than as data.
+
+use super::version::{FCI_VERSION, remedy};
+use crate::arm::{ArmFault, ConnectError};
+use franka::FrankaError;
+use franka::network::Network;
+use franka::wire::robot::v10::{Command, ConnectRequest, ConnectResponse, RobotCommand, RobotState};
+use franka::wire::{HeaderLayout, ROBOT_COMMAND_PORT, message_payload, parse_response};
+use std::time::{Duration, Instant};
+use zerocopy::IntoBytes;
+
+/// How long a robot may take to accept the connection, and then to answer the handshake.
+const CONNECT_TIMEOUT: Duration = Duration::from_secs(2);
+/// How long the stream of states may pause before the robot counts as gone. libfranka waits as long.
+const SILENCE: Duration = Duration::from_secs(1);
+/// How often a pause in the stream looks whether the connection was closed meanwhile.
+const SILENCE_CHECK: Duration = Duration::from_millis(50);
+/// How often a reply is looked for. Only while nothing moves or the motion is over already.
+const REPLY_POLL: Duration = Duration::from_micros(200);
+
+/// A connection to a robot that speaks our version and has begun to send states.
+#[derive(Debug)]
+pub(super) struct Session {
+    network: Network,
+    /// Counter of the newest state seen [ms]; a command carries it back.
+    last_id: u64,
+}
+
+/// A request that is on its way.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Ticket(u32);
+
+impl Session {
+    /// Connects, agrees on the version and waits for the first state.
+    pub(super) fn connect(host: &str) -> Result<Self, ConnectError> {
+        let network = Network::connect_with_timeouts(
+            host,
+            ROBOT_COMMAND_PORT,
+            HeaderLayout::Robot,
+            CONNECT_TIMEOUT,
+            SILENCE_CHECK,
+        )
+        .map_err(|e| no_answer(host, reason(&e)))?;
+        let mut session = Self { network, last_id: 0 };
+        session.agree_on_version(host)?;
+        let mut first = RobotState::default();
+        session.receive(&mut first).map_err(|fault| match fault {
+            ArmFault::Silent { .. } => {
+                let port = session.network.udp.port();
+                no_answer(
+                    host,
+                    format!("it accepts us but its states do not arrive at UDP port {port}: a firewall here?"),
+                )
+            }
+            _ => no_answer(host, "it closed the connection after the handshake".into()),
+        })?;
+        Ok(session)
+    }
+
+    fn agree_on_version(&self, host: &str) -> Result<(), ConnectError> {
+        let request = ConnectRequest::new(FCI_VERSION, self.network.udp.port());
+        let reply = self.network.tcp.send_request(Command::Connect.to_u32(), request.as_bytes());
+        let ticket = Ticket(reply.map_err(|e| no_answer(host, reason(&e)))?);
+        let message = self.reply(ticket, CONNECT_TIMEOUT).map_err(|fault| match fault {
+            ArmFault::Silent { .. } => no_answer(
+                host,
+                "it accepts the connection but does not speak: another program may be connected to it already".into(),
+            ),
+            _ => no_answer(host, "it closed the connection during the handshake: is it a robot?".into()),
+        })?;
+        let response: ConnectResponse =
+            parse_response(HeaderLayout::Robot, &message).map_err(|e| no_answer(host, reason(&e)))?;
+        let theirs = response.version.get();
+        if theirs != FCI_VERSION {
+            let host = host.to_owned();
+            return Err(ConnectError::Version { host, theirs, ours: FCI_VERSION, remedy: remedy(theirs) });
+        }
+        if response.status != 0 {
+            let what = format!("the connection (status {})", response.status);
+            return Err(ConnectError::Refused { host: host.to_owned(), what });
+        }
+        Ok(())
+    }
+
+    /// Sends a request; its reply is fetched with [`Self::status`] or [`Self::try_status`].
+    pub(super) fn send(&self, command: Command, payload: &[u8]) -> Result<Ticket, ArmFault> {
+        self.network.tcp.send_request(command.to_u32(), payload).map(Ticket).map_err(|e| connection_fault(&e))
+    }
+
+    /// Waits for the reply to `ticket` and returns its status byte. A request may get several replies, one call each.
+    pub(super) fn status(&self, ticket: Ticket, patience: Duration) -> Result<u8, ArmFault> {
+        self.reply(ticket, patience).map(|message| status_byte(&message))
+    }
+
+    /// The status byte of the reply to `ticket`, if it has arrived.
+    pub(super) fn try_status(&self, ticket: Ticket) -> Result<Option<u8>, ArmFault> {
+        let reply = self.network.tcp.try_receive_response(ticket.0).map_err(|e| connection_fault(&e))?;
+        Ok(reply.map(|message| status_byte(&message)))
+    }
+
+    /// Sends a request that is answered once, and wants status 0.
+    pub(super) fn request(&self, command: Command, payload: &[u8], patience: Duration) -> Result<(), ArmFault> {
+        let ticket = self.send(command, payload)?;
+        match self.status(ticket, patience)? {
+            0 => Ok(()),
+            status => Err(ArmFault::Refused { status }),
+        }
+    }
+
+    fn reply(&self, ticket: Ticket, patience: Duration) -> Result<Vec<u8>, ArmFault> {
+        let begin = Instant::now();
+        loop {
+            match self.network.tcp.try_receive_response(ticket.0) {
+                Ok(Some(message)) => return Ok(message),
+                Ok(None) if begin.elapsed() > patience => return Err(ArmFault::Silent { ms: millis(begin.elapsed()) }),
+                Ok(None) => std::thread::sleep(REPLY_POLL),
+                Err(e) => return Err(connection_fault(&e)),
+            }
+        }
+    }
+
+    /// Sleeps until a state arrives that is newer than the last one, and takes the newest of those that wait: states that
+    /// piled up while the caller was late are dropped, because a command can only answer the newest.
+    ///
+    /// Does not allocate while states arrive. A datagram of another length is not the robot's and is passed over.
+    pub(super) fn receive(&mut self, state: &mut RobotState) -> Result<(), ArmFault> {
+        if self.take_waiting(state)? {
+            return Ok(());
+        }
+        let begin = Instant::now();
+        loop {
+            match self.network.udp.blocking_receive_struct::<RobotState>() {
+                Ok(newer) if self.accept(&newer, state) => return Ok(()),
+                Ok(_) | Err(FrankaError::Protocol(_)) => {}
+                Err(e) if is_timeout(&e) => {
+                    self.network.tcp.throw_if_connection_closed().map_err(|_| ArmFault::Disconnected)?;
+                }
+                Err(e) => return Err(ArmFault::Socket { errno: errno_in(&e) }),
+            }
+            if begin.elapsed() >= SILENCE {
+                return Err(ArmFault::Silent { ms: millis(begin.elapsed()) });
+            }
+        }
+    }
+
+    fn take_waiting(&mut self, state: &mut RobotState) -> Result<bool, ArmFault> {
+        let mut fresh = false;
+        loop {
+            match self.network.udp.try_receive_struct::<RobotState>() {
+                Ok(Some(newer)) => fresh |= self.accept(&newer, state),
+                Ok(None) => return Ok(fresh),
+                Err(FrankaError::Protocol(_)) => {}
+                Err(e) => return Err(ArmFault::Socket { errno: errno_in(&e) }),
+            }
+        }
+    }
+
+    fn accept(&mut self, newer: &RobotState, state: &mut RobotState) -> bool {
+        let id = newer.message_id.get();
+        let fresh = id > self.last_id;
+        if fresh {
+            self.last_id = id;
+            *state = *newer;
+        }
+        fresh
+    }
+
+    /// Sends one set point as the answer to the newest state. Neither blocks nor allocates.
+    pub(super) fn answer(&self, command: &mut RobotCommand) -> Result<(), ArmFault> {
+        command.message_id = self.last_id.into();
+        self.network.send_udp(command.as_bytes()).map_err(|e| ArmFault::Socket { errno: errno_in(&e) })
+    }
+}
+
+fn status_byte(message: &[u8]) -> u8 {
+    // An empty reply cannot mean success; 255 is no status of the protocol.
+    message_payload(HeaderLayout::Robot, message).first().copied().unwrap_or(u8::MAX)
+}
+
+fn no_answer(host: &str, what: String) -> ConnectError {
+    ConnectError::NoAnswer { host: host.to_owned(), what }
+}
+
+/// What the network says, without the prefix of another library.
+fn reason(error: &FrankaError) -> String {
+    let text = error.to_string();
+    if text.contains("refused") {
+        return "connection refused".into();
+    }
+    if text.contains("timeout") {
+        return format!("nobody there within {} s", CONNECT_TIMEOUT.as_secs());
+    }
+    text.trim_start_matches("libfranka: ").trim_start_matches("Connection error: ").to_owned()
+}
+
+fn connection_fault(error: &FrankaError) -> ArmFault {
+    match errno_in(error) {
+        // Orderly ends carry no number; a reset or a broken pipe is the other side's doing as well.
+        0 | libc::ECONNRESET | libc::EPIPE => ArmFault::Disconnected,
+        errno => ArmFault::Socket { errno },
+    }
+}
+
+fn is_timeout(error: &FrankaError) -> bool {
+    matches!(error, FrankaError::Network(text) if text.ends_with("Timeout"))
+}
+
+/// The operating system's number in `franka-rs`'s text, which ends in what `std::io::Error` prints; 0 where there is none.
+fn errno_in(error: &FrankaError) -> i32 {
+    let text = error.to_string();
+    let number = text.rsplit_once("(os error ").and_then(|(_, end)| end.trim_end_matches(')').parse().ok());
+    number.unwrap_or(0)
+}
+
+fn millis(duration: Duration) -> u32 {
+    u32::try_from(duration.as_millis()).unwrap_or(u32::MAX)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_operating_systems_number_survives_the_librarys_text() {
+        let text = std::io::Error::from_raw_os_error(libc::ENETUNREACH).to_string();
+        let error = FrankaError::Network(format!("libfranka: UDP send: {text}"));
+        assert_eq!(errno_in(&error), libc::ENETUNREACH);
+        assert_eq!(errno_in(&FrankaError::Network("libfranka: server closed connection".into())), 0);
+    }
+}
