@@ -3,3 +3,4 @@
 pub mod arm;
 pub mod fr3;
 pub mod rt;
+pub mod safety;

@@ -1,0 +1,271 @@
+//! Plays motions: one set point a cycle out of a queue, each admitted by the guard, with a brake for everything that
+//! goes wrong. Pure logic: chunks go in, set points and remarks come out.
+//!
+//! A motion begins at once when its first chunk arrives and the arm holds. It must start where the arm is *commanded* to
+//! be, to [`START_TOLERANCE`]: a larger step would itself break the acceleration limit (10 rad/s² is 10 urad in 1 ms).
+
+use super::remark::{BrakeReason, Refusal, Remark};
+use crate::safety::{Brake, Guard, Trace};
+use shared_mem::msg::arm::{ArmState, MotionStatus};
+use shared_mem::msg::motion::{CHUNK_LENGTH, MotionChunk, MotionKind, SetPoint};
+use shared_mem::msg::{Joints, MAX_JOINTS};
+
+/// Set points that can wait: 4 s at 1 kHz.
+pub const QUEUE: usize = 4096;
+/// How far a motion's first set point may lie from the commanded position [rad].
+pub const START_TOLERANCE: f64 = 1e-6;
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Activity {
+    Holding,
+    Playing,
+    Braking,
+    Halted,
+}
+
+/// The player. Allocates when made, never after.
+#[derive(Debug)]
+pub struct Player {
+    guard: Guard,
+    brake: Brake,
+    trace: Trace,
+    queue: Queue,
+    activity: Activity,
+    status: MotionStatus,
+    motion: u64,
+    due_index: u32,
+    has_last: bool,
+    played: u32,
+    /// A motion whose further chunks are dropped without a word: it was refused or braked.
+    dropped_motion: u64,
+}
+
+impl Player {
+    /// Holds `q_d`.
+    #[must_use]
+    pub fn new(guard: Guard, q_d: Joints) -> Self {
+        Self {
+            brake: Brake::new(guard.limits, guard.period_s),
+            guard,
+            trace: Trace::at_rest(q_d),
+            queue: Queue::new(),
+            activity: Activity::Holding,
+            status: MotionStatus::None,
+            motion: 0,
+            due_index: 0,
+            has_last: false,
+            played: 0,
+            dropped_motion: 0,
+        }
+    }
+
+    /// Holds `q_d` from now on. Called once, when the arm's pose is known.
+    pub fn hold_at(&mut self, q_d: Joints) {
+        self.trace = Trace::at_rest(q_d);
+    }
+
+    /// `true` when a further chunk fits; else it stays with the sender.
+    #[must_use]
+    pub fn has_room(&self) -> bool {
+        self.queue.len + CHUNK_LENGTH <= QUEUE
+    }
+
+    /// `true` when nothing moves and nothing is about to.
+    #[must_use]
+    pub fn is_at_rest(&self) -> bool {
+        matches!(self.activity, Activity::Holding | Activity::Halted)
+    }
+
+    /// Takes in a chunk. Returns what there is to say about it.
+    pub fn take(&mut self, chunk: &MotionChunk) -> Option<Remark> {
+        if chunk.kind == MotionKind::Stop {
+            return self.stop(BrakeReason::Asked);
+        }
+        if self.activity == Activity::Playing && chunk.motion_id == self.motion {
+            return match self.acceptable(chunk, self.due_index) {
+                Ok(()) => {
+                    self.append(chunk);
+                    None
+                }
+                Err(why) => self.stop(BrakeReason::Chunk(why)),
+            };
+        }
+        if chunk.motion_id != 0 && chunk.motion_id == self.dropped_motion {
+            return None;
+        }
+        match self.startable(chunk) {
+            Ok(()) => {
+                self.motion = chunk.motion_id;
+                (self.due_index, self.played, self.has_last) = (0, 0, false);
+                (self.activity, self.status) = (Activity::Playing, MotionStatus::Playing);
+                self.append(chunk);
+                Some(Remark::Began { motion: self.motion })
+            }
+            Err(why) => {
+                self.dropped_motion = chunk.motion_id;
+                if self.activity == Activity::Holding {
+                    (self.motion, self.played, self.status) = (chunk.motion_id, 0, MotionStatus::Refused);
+                }
+                Some(Remark::Refused { motion: chunk.motion_id, why })
+            }
+        }
+    }
+
+    /// Brakes what is being played; nothing when the arm holds already.
+    pub fn stop(&mut self, why: BrakeReason) -> Option<Remark> {
+        if self.activity != Activity::Playing {
+            return None;
+        }
+        self.queue.clear();
+        self.brake.begin(&self.trace);
+        (self.activity, self.status) = (Activity::Braking, MotionStatus::Braked);
+        self.dropped_motion = self.motion;
+        Some(Remark::Braked { motion: self.motion, why })
+    }
+
+    /// The arm is no longer commanded: forgets what was queued and refuses what comes.
+    pub fn halt(&mut self) -> Option<Remark> {
+        let was_moving = !self.is_at_rest();
+        self.queue.clear();
+        self.activity = Activity::Halted;
+        was_moving.then(|| {
+            self.status = MotionStatus::Braked;
+            Remark::Braked { motion: self.motion, why: BrakeReason::ArmStopped }
+        })
+    }
+
+    /// The set point of this cycle. `tip` gives the tool tip of joint positions, base frame [m].
+    pub fn advance(&mut self, tip: impl Fn(&Joints) -> [f64; 3]) -> (SetPoint, Option<Remark>) {
+        match self.activity {
+            Activity::Holding | Activity::Halted => (self.hold(), None),
+            Activity::Braking => (self.braked(), None),
+            Activity::Playing => self.play(tip),
+        }
+    }
+
+    /// Writes the motion's progress into a state.
+    pub fn report(&self, state: &mut ArmState) {
+        state.motion_id = self.motion;
+        state.motion_played = self.played;
+        state.motion_queued = u32::try_from(self.queue.len).unwrap_or(u32::MAX);
+        state.motion = self.status;
+    }
+
+    fn play(&mut self, tip: impl Fn(&Joints) -> [f64; 3]) -> (SetPoint, Option<Remark>) {
+        let (point, at_end) = match self.queue.pop() {
+            Some(point) => (point, false),
+            None if self.has_last => (SetPoint { q_d: self.trace.q, dq_d: [0.0; MAX_JOINTS] }, true),
+            None => {
+                let remark = self.stop(BrakeReason::Underrun);
+                return (self.braked(), remark);
+            }
+        };
+        match self.guard.check(&self.trace, &point, tip(&point.q_d)) {
+            Ok(_) if at_end => {
+                (self.activity, self.status) = (Activity::Holding, MotionStatus::Done);
+                (self.hold(), Some(Remark::Done { motion: self.motion }))
+            }
+            Ok(next) => {
+                self.trace = next;
+                self.played += 1;
+                (point, None)
+            }
+            Err(violation) => {
+                let why = if at_end { BrakeReason::EndsMoving } else { BrakeReason::Limit(violation) };
+                let remark = self.stop(why);
+                (self.braked(), remark)
+            }
+        }
+    }
+
+    fn braked(&mut self) -> SetPoint {
+        let step = self.brake.step();
+        self.trace = self.trace.after(&step.point.q_d, self.guard.period_s);
+        if step.at_rest {
+            self.activity = Activity::Holding;
+        }
+        step.point
+    }
+
+    fn hold(&mut self) -> SetPoint {
+        self.trace = Trace::at_rest(self.trace.q);
+        SetPoint { q_d: self.trace.q, dq_d: [0.0; MAX_JOINTS] }
+    }
+
+    fn startable(&self, chunk: &MotionChunk) -> Result<(), Refusal> {
+        match self.activity {
+            Activity::Holding => {}
+            Activity::Halted => return Err(Refusal::NotCommanded),
+            Activity::Playing | Activity::Braking => return Err(Refusal::Busy { playing: self.motion }),
+        }
+        if chunk.motion_id == 0 {
+            return Err(Refusal::NoId);
+        }
+        self.acceptable(chunk, 0)?;
+        let first = chunk.set_points[0].q_d;
+        for (i, (first, now)) in first.iter().zip(&self.trace.q).enumerate().take(self.guard.limits.dof) {
+            if (first - now).abs() > START_TOLERANCE {
+                return Err(Refusal::StartsElsewhere { joint: u8::try_from(i + 1).unwrap_or(u8::MAX) });
+            }
+        }
+        Ok(())
+    }
+
+    fn acceptable(&self, chunk: &MotionChunk, due: u32) -> Result<(), Refusal> {
+        let has = u32::try_from(self.guard.limits.dof).unwrap_or(u32::MAX);
+        if chunk.index != due {
+            return Err(Refusal::Gap { due, came: chunk.index });
+        }
+        if chunk.dof != has {
+            return Err(Refusal::Dof { came: chunk.dof, has });
+        }
+        let Some(points) = chunk.set_points.get(..chunk.length as usize) else { return Err(Refusal::Length) };
+        let finite = |values: &Joints| values.iter().all(|x| x.is_finite());
+        if points.iter().all(|p| finite(&p.q_d) && finite(&p.dq_d)) { Ok(()) } else { Err(Refusal::NotFinite) }
+    }
+
+    fn append(&mut self, chunk: &MotionChunk) {
+        for point in chunk.set_points.iter().take(chunk.length as usize) {
+            self.queue.push(point);
+        }
+        self.due_index += 1;
+        self.has_last |= chunk.kind == MotionKind::Last;
+    }
+}
+
+/// First in, first out, in memory set aside once.
+#[derive(Debug)]
+struct Queue {
+    points: Box<[SetPoint]>,
+    head: usize,
+    len: usize,
+}
+
+impl Queue {
+    fn new() -> Self {
+        Self { points: vec![SetPoint::default(); QUEUE].into_boxed_slice(), head: 0, len: 0 }
+    }
+
+    fn push(&mut self, point: &SetPoint) {
+        if self.len < QUEUE
+            && let Some(slot) = self.points.get_mut((self.head + self.len) % QUEUE)
+        {
+            *slot = *point;
+            self.len += 1;
+        }
+    }
+
+    fn pop(&mut self) -> Option<SetPoint> {
+        if self.len == 0 {
+            return None;
+        }
+        let point = self.points.get(self.head).copied();
+        self.head = (self.head + 1) % QUEUE;
+        self.len -= 1;
+        point
+    }
+
+    fn clear(&mut self) {
+        (self.head, self.len) = (0, 0);
+    }
+}

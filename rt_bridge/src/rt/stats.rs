@@ -1,0 +1,147 @@
+//! How well the loop kept time. Histograms are set up in advance, so that recording costs some nanoseconds and no memory.
+//!
+//! | number | from | to |
+//! |---|---|---|
+//! | wake-up latency | the deadline (device-clocked: the earliest arrival the device's own clock allows) | the thread runs |
+//! | execution time | the state is there | the command was handed over and the cycle pushed to the pump |
+//! | period | one cycle's begin | the next one's |
+//! | age | `stamp_ns` of a state | the state lies on shared memory, its readers were woken |
+
+use hdrhistogram::Histogram;
+use serde::Serialize;
+
+/// Longest time told apart: 10 s; longer ones count as this [ns].
+const LONGEST_NS: u64 = 10_000_000_000;
+
+/// A distribution of times [ns], exact to 0.1 %.
+#[derive(Debug, Clone)]
+pub struct Times(Histogram<u64>);
+
+impl Default for Times {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Times {
+    /// Nothing recorded yet. Allocates; `record` does not.
+    ///
+    /// # Panics
+    /// Never: the bounds are constants that the histogram accepts.
+    #[must_use]
+    pub fn new() -> Self {
+        Self(Histogram::new_with_bounds(1, LONGEST_NS, 3).expect("constant bounds are valid"))
+    }
+
+    /// Counts one time [ns].
+    pub fn record(&mut self, ns: u64) {
+        self.0.saturating_record(ns);
+    }
+
+    /// Times counted.
+    #[must_use]
+    pub fn count(&self) -> u64 {
+        self.0.len()
+    }
+
+    /// Percentiles in microseconds; all 0 when nothing was counted.
+    #[must_use]
+    pub fn percentiles(&self) -> Percentiles {
+        let at = |quantile: f64| self.0.value_at_quantile(quantile) as f64 * 1e-3;
+        Percentiles { p50: at(0.5), p99: at(0.99), p999: at(0.999), max: self.0.max() as f64 * 1e-3 }
+    }
+}
+
+/// Percentiles of a distribution of times [us].
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Percentiles {
+    /// Half of all are shorter.
+    pub p50: f64,
+    /// 99 % are shorter.
+    pub p99: f64,
+    /// 99.9 % are shorter.
+    pub p999: f64,
+    /// The longest.
+    pub max: f64,
+}
+
+/// Counts and times of one run of the control thread.
+#[derive(Debug, Clone, Default)]
+pub struct LoopStats {
+    /// States received and answered, or only received after a fault.
+    pub cycles: u64,
+    /// Deadlines that passed unused because the thread woke too late.
+    pub missed_cycles: u64,
+    /// Cycles whose work took longer than a period.
+    pub overruns: u64,
+    /// States that did not come, or that the device's clock shows to be missing.
+    pub lost_packets: u64,
+    /// Cycles that the pump was too slow to take.
+    pub dropped: u64,
+    /// Commands whose torque was held back by its limit or its rate.
+    pub clamped: u64,
+    /// Wake-up latency.
+    pub wake: Times,
+    /// Execution time.
+    pub exec: Times,
+    /// Period.
+    pub period: Times,
+}
+
+/// How late the packets of a device-clocked arm arrive, against the earliest one seen: its clock and ours differ by an
+/// unknown offset and drift, so the reference is the smallest offset of late, forgotten at 50 us a second.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct ArrivalLine {
+    offset_ns: Option<i64>,
+    last_device_ns: u64,
+}
+
+/// Clocks of robot and machine drift apart by less than this [ns of offset per ns].
+const DRIFT: f64 = 50e-6;
+
+impl ArrivalLine {
+    /// How long after the earliest possible moment this packet came [ns].
+    pub fn late_ns(&mut self, arrived_ns: u64, device_ns: u64) -> u64 {
+        let offset = arrived_ns.cast_signed() - device_ns.cast_signed();
+        let elapsed = device_ns.saturating_sub(self.last_device_ns);
+        self.last_device_ns = device_ns;
+        let reference = match self.offset_ns {
+            Some(old) => offset.min(old + (elapsed as f64 * DRIFT) as i64),
+            None => offset,
+        };
+        self.offset_ns = Some(reference);
+        u64::try_from(offset - reference).unwrap_or(0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn percentiles_are_those_of_what_was_recorded() {
+        let mut times = Times::new();
+        for us in 1..=1000_u64 {
+            times.record(us * 1000);
+        }
+        let p = times.percentiles();
+        assert!((p.p50 - 500.0).abs() < 1.0 && (p.p99 - 990.0).abs() < 2.0, "{p:?}");
+        assert!((p.max - 1000.0).abs() < 1.0 && times.count() == 1000);
+    }
+
+    #[test]
+    fn a_time_beyond_the_longest_counts_as_the_longest() {
+        let mut times = Times::new();
+        times.record(u64::MAX);
+        assert!(times.percentiles().max >= 1e7);
+    }
+
+    #[test]
+    fn lateness_is_counted_from_the_earliest_arrival_whatever_the_offset_of_the_clocks() {
+        let mut line = ArrivalLine::default();
+        let ms = 1_000_000;
+        assert_eq!(line.late_ns(900 * ms + 40_000, 5 * ms), 0);
+        assert_eq!(line.late_ns(901 * ms, 6 * ms), 0);
+        assert_eq!(line.late_ns(902 * ms + 250_000, 7 * ms) / 1000, 249);
+    }
+}

@@ -1,0 +1,156 @@
+//! The verdict on the next set point. A set point is admitted when it lies inside every limit *and* braking from it, as
+//! [`super::Brake`] does it, stays inside them too: so whatever comes next, there is always a way to stop.
+
+use super::{JointLimits, Limits, Trace, Workspace};
+use shared_mem::msg::motion::SetPoint;
+use std::fmt;
+
+/// Kept between a commanded position and the joint's end [rad]: covers the last, jerk-limited moment of a stop.
+const END_MARGIN: f64 = 1e-4;
+/// Share of the acceleration limit that stopping counts on; the rest covers the periods being finite.
+const STOPPING_SHARE: f64 = 0.9;
+/// What is forgiven to rounding, as a share of a limit.
+const ROUNDING: f64 = 1e-6;
+
+/// Why a set point was not sent. Joints are counted from 1.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Violation {
+    /// A number is not finite.
+    NotFinite {
+        /// The joint.
+        joint: u8,
+    },
+    /// Too near to the end of the joint's range, or beyond it.
+    Position {
+        /// The joint.
+        joint: u8,
+    },
+    /// Too fast, here or for the way that is left to the end of the range.
+    Velocity {
+        /// The joint.
+        joint: u8,
+    },
+    /// Speeds up or slows down too hard.
+    Acceleration {
+        /// The joint.
+        joint: u8,
+    },
+    /// The acceleration jumps.
+    Jerk {
+        /// The joint.
+        joint: u8,
+    },
+    /// `dq_d` is not the derivative of `q_d`.
+    Inconsistent {
+        /// The joint.
+        joint: u8,
+    },
+    /// The tool tip would leave the space it may be in.
+    Workspace,
+}
+
+impl fmt::Display for Violation {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::NotFinite { joint } => write!(f, "joint {joint}: a number is not finite"),
+            Self::Position { joint } => write!(f, "joint {joint} would leave its range"),
+            Self::Velocity { joint } => write!(f, "joint {joint} would be too fast for where it is"),
+            Self::Acceleration { joint } => write!(f, "joint {joint} would exceed its acceleration limit"),
+            Self::Jerk { joint } => write!(f, "joint {joint} would exceed its jerk limit"),
+            Self::Inconsistent { joint } => write!(f, "joint {joint}: dq_d is not the derivative of q_d"),
+            Self::Workspace => f.write_str("the tool tip would leave its workspace (table or reach)"),
+        }
+    }
+}
+
+/// Limits in force and the control period.
+#[derive(Debug, Clone, Copy)]
+pub struct Guard {
+    /// Joint limits.
+    pub limits: Limits,
+    /// Where the tool tip may be.
+    pub workspace: Workspace,
+    /// Control period [s].
+    pub period_s: f64,
+}
+
+impl Guard {
+    /// Admits `point` after `last`, or says what is wrong with it. `tip` is the tool tip at `point`, base frame [m].
+    ///
+    /// # Errors
+    /// The first [`Violation`] found, joint by joint.
+    pub fn check(&self, last: &Trace, point: &SetPoint, tip: [f64; 3]) -> Result<Trace, Violation> {
+        let next = last.after(&point.q_d, self.period_s);
+        for (i, limits) in self.limits.counted().enumerate() {
+            self.check_joint(i, limits, last, &next, point)?;
+        }
+        if next.q != last.q && !self.workspace.contains(tip) {
+            return Err(Violation::Workspace);
+        }
+        Ok(next)
+    }
+
+    fn check_joint(
+        &self,
+        i: usize,
+        limits: &JointLimits,
+        last: &Trace,
+        next: &Trace,
+        point: &SetPoint,
+    ) -> Result<(), Violation> {
+        let joint = u8::try_from(i + 1).unwrap_or(u8::MAX);
+        let [Some(q), Some(dq), Some(v), Some(a), Some(a_before)] =
+            [point.q_d.get(i), point.dq_d.get(i), next.v.get(i), next.a.get(i), last.a.get(i)]
+        else {
+            return Err(Violation::NotFinite { joint });
+        };
+        let (jerk, slack) = ((a - a_before) / self.period_s, 1.0 + ROUNDING);
+        if !(q.is_finite() && dq.is_finite() && jerk.is_finite()) {
+            return Err(Violation::NotFinite { joint });
+        }
+        if *q == point_before(last, i) && *v == 0.0 && *a == 0.0 {
+            return Ok(()); // holding is always allowed, wherever the arm was when the bridge took over
+        }
+        if jerk.abs() > limits.jerk * slack {
+            return Err(Violation::Jerk { joint });
+        }
+        if a.abs() > limits.acceleration * slack {
+            return Err(Violation::Acceleration { joint });
+        }
+        // The derivative at a sample and the difference before it are half a period apart.
+        if (dq - v).abs() > limits.acceleration * self.period_s {
+            return Err(Violation::Inconsistent { joint });
+        }
+        self.check_stoppable(limits, *q, next.velocity_now(i, self.period_s), *a)
+            .map_err(|at_end| if at_end { Violation::Position { joint } } else { Violation::Velocity { joint } })
+    }
+
+    /// `Ok` when a stop from (q, v, a) stays inside range and speed limits; `Err(true)` when the position is the reason.
+    ///
+    /// Braking first takes the acceleration to the limit's negative (`reaction` seconds, at full jerk). Until then the
+    /// speed stays below `peak` and the way below `peak * reaction`; from there on the speed falls faster than the
+    /// position-dependent limit does.
+    fn check_stoppable(&self, limits: &JointLimits, q: f64, v: f64, a: f64) -> Result<(), bool> {
+        if q < limits.q_min || q > limits.q_max {
+            return Err(true);
+        }
+        let stopping = limits.deceleration.min(STOPPING_SHARE * limits.acceleration);
+        for direction in [1.0, -1.0] {
+            let speeding = (direction * a).max(0.0);
+            let peak = direction * v + speeding * speeding / (2.0 * limits.jerk);
+            if peak <= 0.0 {
+                continue;
+            }
+            let reaction = (speeding + limits.acceleration) / limits.jerk;
+            let ahead = q + direction * (peak * (reaction + self.period_s) + END_MARGIN);
+            if peak > limits.speed_towards(direction, ahead, stopping) {
+                return Err(peak <= limits.speed_towards(direction, q, limits.deceleration));
+            }
+        }
+        Ok(())
+    }
+}
+
+fn point_before(last: &Trace, i: usize) -> f64 {
+    last.q.get(i).copied().unwrap_or(f64::NAN)
+}

@@ -1,0 +1,27 @@
+//! What the bridge never sends, on the real and the simulated arm alike. Pure functions of numbers: no clock, no device.
+//!
+//! | file | owns |
+//! |---|---|
+//! | [`limits`] | how far, fast and hard each joint may go |
+//! | [`trace`] | velocity, acceleration and jerk of what was commanded, as the robot differences it |
+//! | [`guard`] | the verdict on the next set point: it and the braking that may follow it stay inside the limits |
+//! | [`brake`] | from any admitted motion to rest inside the limits |
+//! | [`torque`] | torque and torque rate, clamped |
+//! | [`workspace`] | where the tool tip may be |
+//! | [`watchdog`] | how long silence is borne |
+
+pub mod brake;
+pub mod guard;
+pub mod limits;
+pub mod torque;
+pub mod trace;
+pub mod watchdog;
+pub mod workspace;
+
+pub use brake::Brake;
+pub use guard::{Guard, Violation};
+pub use limits::{JointLimits, Limits};
+pub use torque::TorqueGuard;
+pub use trace::Trace;
+pub use watchdog::Watchdog;
+pub use workspace::Workspace;

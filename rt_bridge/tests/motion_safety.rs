@@ -1,0 +1,236 @@
+//! The player with its guard and brake: whatever is sent, what comes out stays inside the limits and ends at rest.
+#![allow(missing_docs)]
+
+use proptest::prelude::*;
+use rt_bridge::rt::player::Player;
+use rt_bridge::rt::remark::{BrakeReason, Refusal, Remark};
+use rt_bridge::safety::{Guard, Limits, Trace, Violation, Workspace};
+use shared_mem::msg::MAX_JOINTS;
+use shared_mem::msg::arm::{ArmState, MotionStatus};
+use shared_mem::msg::motion::{CHUNK_LENGTH, MotionChunk, MotionKind, SetPoint};
+
+const T: f64 = 1e-3;
+const READY: [f64; MAX_JOINTS] = [0.0, -0.785, 0.0, -2.356, 0.0, 1.571, 0.785, 0.0];
+
+fn guard() -> Guard {
+    Guard { limits: Limits::fr3(), workspace: Workspace { low: [-1.0, -1.0, 0.0], high: [1.0, 1.0, 1.5] }, period_s: T }
+}
+
+fn tip(_: &[f64; MAX_JOINTS]) -> [f64; 3] {
+    [0.5, 0.0, 0.3]
+}
+
+fn chunks(motion_id: u64, points: &[SetPoint]) -> Vec<MotionChunk> {
+    let count = points.len().div_ceil(CHUNK_LENGTH);
+    let mut out = Vec::new();
+    for (index, part) in points.chunks(CHUNK_LENGTH).enumerate() {
+        let mut chunk = MotionChunk {
+            motion_id,
+            kind: if index + 1 == count { MotionKind::Last } else { MotionKind::Play },
+            index: u32::try_from(index).unwrap(),
+            length: u32::try_from(part.len()).unwrap(),
+            dof: 7,
+            ..MotionChunk::default()
+        };
+        chunk.set_points[..part.len()].copy_from_slice(part);
+        out.push(chunk);
+    }
+    out
+}
+
+/// `amplitude * (1 - cos)^2` windows: starts and ends at rest with no acceleration.
+fn swing(start: &[f64; MAX_JOINTS], amplitude: f64, seconds: f64) -> Vec<SetPoint> {
+    let n = (seconds / T) as usize;
+    (0..=n)
+        .map(|k| {
+            let (w, t) = (std::f64::consts::TAU / seconds, k as f64 * T);
+            let (s, ds) = ((1.0 - (w * t).cos()).powi(2), 2.0 * (1.0 - (w * t).cos()) * w * (w * t).sin());
+            let mut point = SetPoint { q_d: *start, dq_d: [0.0; MAX_JOINTS] };
+            for j in 0..7 {
+                point.q_d[j] += amplitude / 4.0 * s;
+                point.dq_d[j] = amplitude / 4.0 * ds;
+            }
+            point
+        })
+        .collect()
+}
+
+/// Runs the player until it rests (at most `cycles`), asserting every limit on what it commands.
+fn run(player: &mut Player, trace: &mut Trace, cycles: usize) -> Vec<Remark> {
+    let mut remarks = Vec::new();
+    for _ in 0..cycles {
+        let (point, remark) = player.advance(tip);
+        remarks.extend(remark);
+        let next = trace.after(&point.q_d, T);
+        for (i, joint) in Limits::fr3().counted().enumerate() {
+            let (q, v) = (next.q[i], next.v[i]);
+            let jerk = (next.a[i] - trace.a[i]) / T;
+            assert!((joint.q_min..=joint.q_max).contains(&q), "joint {i} at {q}");
+            assert!(next.a[i].abs() <= joint.acceleration * 1.0001, "joint {i}: acceleration {}", next.a[i]);
+            assert!(jerk.abs() <= joint.jerk * 1.001, "joint {i}: jerk {jerk}");
+            let bound = joint.speed_towards(v.signum(), q, joint.deceleration);
+            assert!(v == 0.0 || v.abs() <= bound + 1e-9, "joint {i}: {v} rad/s at {q}, bound {bound}");
+            assert!(point.dq_d[i].abs() <= joint.velocity * 1.0001);
+        }
+        *trace = next;
+        if player.is_at_rest() {
+            break;
+        }
+    }
+    remarks
+}
+
+fn status(player: &Player) -> ArmState {
+    let mut state = ArmState::default();
+    player.report(&mut state);
+    state
+}
+
+#[test]
+fn a_smooth_motion_is_played_to_its_end_point_by_point() {
+    let (mut player, mut trace) = (Player::new(guard(), READY), Trace::at_rest(READY));
+    let points = swing(&READY, 0.3, 2.0);
+    let mut remarks = Vec::new();
+    for chunk in chunks(7, &points) {
+        remarks.extend(player.take(&chunk));
+    }
+    assert_eq!(status(&player).motion_queued as usize, points.len());
+    remarks.extend(run(&mut player, &mut trace, 3000));
+    assert_eq!(remarks, [Remark::Began { motion: 7 }, Remark::Done { motion: 7 }]);
+    let end = status(&player);
+    assert_eq!((end.motion, end.motion_played as usize, end.motion_queued), (MotionStatus::Done, points.len(), 0));
+}
+
+#[test]
+fn a_sender_that_dies_leaves_the_arm_braked_and_holding() {
+    let (mut player, mut trace) = (Player::new(guard(), READY), Trace::at_rest(READY));
+    for chunk in chunks(3, &swing(&READY, 0.4, 2.0)).iter().take(9) {
+        player.take(chunk);
+    }
+    let remarks = run(&mut player, &mut trace, 3000);
+    assert_eq!(remarks, [Remark::Braked { motion: 3, why: BrakeReason::Underrun }]);
+    assert!(player.is_at_rest());
+    assert_eq!(status(&player).motion, MotionStatus::Braked);
+    assert_eq!(status(&player).motion_played, 450);
+    let (held, _) = player.advance(tip);
+    assert_eq!(held.q_d, trace.q);
+}
+
+#[test]
+fn a_motion_that_starts_elsewhere_is_refused_and_the_next_one_is_taken() {
+    let mut player = Player::new(guard(), READY);
+    let mut elsewhere = READY;
+    elsewhere[2] += 2e-3;
+    let refused = chunks(5, &swing(&elsewhere, 0.1, 1.0));
+    assert_eq!(
+        player.take(&refused[0]),
+        Some(Remark::Refused { motion: 5, why: Refusal::StartsElsewhere { joint: 3 } })
+    );
+    assert_eq!(player.take(&refused[1]), None);
+    assert_eq!(status(&player).motion, MotionStatus::Refused);
+    assert_eq!(player.take(&chunks(6, &swing(&READY, 0.1, 1.0))[0]), Some(Remark::Began { motion: 6 }));
+}
+
+#[test]
+fn gaps_other_arms_and_second_senders_are_refused() {
+    let mut player = Player::new(guard(), READY);
+    let motion = chunks(1, &swing(&READY, 0.1, 1.0));
+    let why = |remark| match remark {
+        Some(Remark::Refused { why, .. }) => why,
+        other => panic!("{other:?}"),
+    };
+    assert_eq!(why(player.take(&motion[1])), Refusal::Gap { due: 0, came: 1 });
+    assert_eq!(why(player.take(&MotionChunk { motion_id: 2, dof: 6, ..motion[0] })), Refusal::Dof { came: 6, has: 7 });
+    assert_eq!(why(player.take(&MotionChunk { motion_id: 3, length: 51, ..motion[0] })), Refusal::Length);
+    assert_eq!(why(player.take(&MotionChunk { motion_id: 0, ..motion[0] })), Refusal::NoId);
+    assert_eq!(player.take(&MotionChunk { motion_id: 8, ..motion[0] }), Some(Remark::Began { motion: 8 }));
+    assert_eq!(why(player.take(&MotionChunk { motion_id: 9, ..motion[0] })), Refusal::Busy { playing: 8 });
+    assert_eq!(
+        player.take(&MotionChunk { motion_id: 8, ..motion[2] }),
+        Some(Remark::Braked { motion: 8, why: BrakeReason::Chunk(Refusal::Gap { due: 1, came: 2 }) })
+    );
+}
+
+#[test]
+fn a_motion_that_ends_at_speed_is_braked() {
+    let (mut player, mut trace) = (Player::new(guard(), READY), Trace::at_rest(READY));
+    for chunk in chunks(4, &swing(&READY, 0.4, 2.0)[..600]) {
+        player.take(&chunk);
+    }
+    assert_eq!(run(&mut player, &mut trace, 3000), [Remark::Braked { motion: 4, why: BrakeReason::EndsMoving }]);
+}
+
+#[test]
+fn a_tip_outside_its_space_brakes() {
+    let mut player = Player::new(guard(), READY);
+    for chunk in chunks(4, &swing(&READY, 0.4, 2.0)) {
+        player.take(&chunk);
+    }
+    let below = |q: &[f64; MAX_JOINTS]| [0.5, 0.0, if q[0] > 0.1 { -0.01 } else { 0.2 }];
+    let remark = (0..2000).find_map(|_| player.advance(below).1);
+    assert_eq!(remark, Some(Remark::Braked { motion: 4, why: BrakeReason::Limit(Violation::Workspace) }));
+}
+
+#[test]
+fn an_arm_that_stopped_itself_takes_no_motion() {
+    let mut player = Player::new(guard(), READY);
+    let motion = chunks(4, &swing(&READY, 0.4, 2.0));
+    player.take(&motion[0]);
+    assert_eq!(player.halt(), Some(Remark::Braked { motion: 4, why: BrakeReason::ArmStopped }));
+    let again = MotionChunk { motion_id: 5, ..motion[0] };
+    assert_eq!(player.take(&again), Some(Remark::Refused { motion: 5, why: Refusal::NotCommanded }));
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(300))]
+
+    /// Swings of any size and pace, anywhere, stopped at any moment.
+    #[test]
+    fn any_swing_stopped_at_any_moment_stays_inside_the_limits_and_comes_to_rest(
+        place in prop::array::uniform7(0.0..1.0_f64),
+        amplitude in -3.0..3.0_f64,
+        seconds in 0.2..4.0_f64,
+        stop_at in 1_usize..3000,
+    ) {
+        let mut start = READY;
+        for ((q, joint), share) in start.iter_mut().zip(Limits::fr3().counted()).zip(place) {
+            *q = joint.q_min + share * (joint.q_max - joint.q_min);
+        }
+        let (mut player, mut trace) = (Player::new(guard(), start), Trace::at_rest(start));
+        for chunk in chunks(1, &swing(&start, amplitude, seconds)) {
+            player.take(&chunk);
+        }
+        run(&mut player, &mut trace, stop_at);
+        player.take(&MotionChunk { kind: MotionKind::Stop, ..MotionChunk::default() });
+        run(&mut player, &mut trace, 5000);
+        prop_assert!(player.is_at_rest());
+    }
+
+    /// Chunks of nonsense between good ones.
+    #[test]
+    fn no_chunk_whatever_its_content_makes_a_command_beyond_the_limits(
+        amplitude in 0.1..1.0_f64,
+        noise in prop::collection::vec((0_usize..1000, 0_usize..7, prop::num::f64::ANY, any::<bool>()), 0..4),
+        small in prop::collection::vec((0_usize..1000, 0_usize..7, -1e-5..1e-5_f64), 0..8),
+        length in 0_u32..60,
+    ) {
+        let mut points = swing(&READY, amplitude, 1.0);
+        for (k, joint, value, in_velocity) in noise {
+            let point = &mut points[k];
+            if in_velocity { point.dq_d[joint] = value } else { point.q_d[joint] = value }
+        }
+        for (k, joint, offset) in small {
+            points[k].q_d[joint] += offset;
+        }
+        let (mut player, mut trace) = (Player::new(guard(), READY), Trace::at_rest(READY));
+        let mut sent = chunks(1, &points);
+        if let Some(third) = sent.get_mut(2) {
+            third.length = length;
+        }
+        for chunk in sent {
+            player.take(&chunk);
+        }
+        run(&mut player, &mut trace, 5000);
+        prop_assert!(player.is_at_rest());
+    }
+}
