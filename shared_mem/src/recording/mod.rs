@@ -11,6 +11,7 @@
 //! | `bag` | a ROS 2 bag as a clip |
 //! | `joint_log` | joint rows: one publisher, one joint order |
 //! | `checks` | faults that foreign logs have, each told in a sentence |
+//! | `wire`, `writer` | own clips: messages and file |
 //! | `clip`, `series`, `session` | what callers get |
 
 mod bag;
@@ -23,11 +24,14 @@ mod joint_log;
 mod ros2;
 mod series;
 mod session;
+mod wire;
+mod writer;
 
 pub use clip::{Clip, read_clip};
 pub use error::ReadError;
 pub use series::{JointSeries, ObjectSeries};
 pub use session::Session;
+pub use writer::{ClipInfo, ClipWriter, WriteError, WriteSummary};
 
 /// True for a folder that is itself one clip and no session.
 fn is_clip_folder(path: &std::path::Path) -> bool {

@@ -1,0 +1,338 @@
+//! Writes own clips. Called by the recorder of the bridge and by `twin replay --out`.
+//!
+//! The file only grows: a chunk reaches it whole, so a killed writer loses what came after its last [`ClipWriter::flush`]
+//! and nothing else. Reading needs neither the index nor the footer that [`ClipWriter::finish`] adds.
+
+use super::wire::{self, UnixClock, Wire};
+use crate::msg::arm::{ArmCommand, ArmState};
+use crate::msg::event::Event;
+use crate::msg::gripper::GripperState;
+use crate::msg::image::{CameraInfo, ImageHeader};
+use crate::msg::object::ObjectPose;
+use crate::msg::twin::{TwinGap, TwinState};
+use crate::msg::wrench::Wrench;
+use crate::topics::ImageTopic;
+use mcap::records::{MessageHeader, Metadata};
+use mcap::write::NoSeek;
+use mcap::{Attachment, Compression, McapError, WriteOptions};
+use prost::Message as _;
+use std::borrow::Cow;
+use std::collections::{BTreeMap, HashMap};
+use std::fs::File;
+use std::io::{self, BufWriter, Write};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+/// Metadata record and attachment that every own clip carries.
+pub(super) const METADATA: &str = "twinalign";
+pub(super) const CELL_TOML: &str = "cell.toml";
+/// Keys of the metadata record.
+pub(super) const PROGRAM: &str = "program";
+pub(super) const CONFIGURATION: &str = "configuration";
+pub(super) const UNIX_OFFSET_NS: &str = "unix_offset_ns";
+/// A chunk is closed when it holds this much [bytes]: 3 s of one arm, or one to two pictures.
+const CHUNK_SIZE: u64 = 4 << 20;
+
+/// What rides along with a clip.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct ClipInfo {
+    /// Text of the cell.toml in force.
+    pub cell_toml: Option<String>,
+    /// Effective configuration of the program that records, as TOML.
+    pub configuration: String,
+    /// Name and version of that program.
+    pub program: String,
+}
+
+/// What a finished clip holds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct WriteSummary {
+    /// Messages.
+    pub messages: u64,
+    /// Size of the file.
+    pub bytes: u64,
+}
+
+/// A clip cannot be written any further.
+#[derive(Debug, thiserror::Error)]
+pub enum WriteError {
+    /// The file cannot be created.
+    #[error("cannot create {}: {source}; give a new file in a folder that exists and is writable", path.display())]
+    Create {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: io::Error,
+    },
+    /// No room is left.
+    #[error(
+        "the disk is full: {} ends after {bytes} bytes and is readable up to its last flush; free some space and \
+         record again",
+        path.display()
+    )]
+    DiskFull {
+        /// The file.
+        path: PathBuf,
+        /// Bytes that were written.
+        bytes: u64,
+    },
+    /// Writing failed for another reason.
+    #[error("cannot write {} any further ({what}); it is readable up to its last flush; record to another disk", path.display())]
+    Failed {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        what: String,
+    },
+}
+
+/// Counts what reaches the file.
+#[derive(Debug)]
+struct Counted<W> {
+    sink: W,
+    bytes: Arc<AtomicU64>,
+}
+
+impl<W: Write> Write for Counted<W> {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        let written = self.sink.write(bytes)?;
+        self.bytes.fetch_add(written as u64, Ordering::Relaxed);
+        Ok(written)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.sink.flush()
+    }
+}
+
+/// A topic that was written to.
+#[derive(Debug, Clone, Copy)]
+struct Channel {
+    id: u16,
+    sequence: u32,
+}
+
+/// Writes one clip.
+pub struct ClipWriter<W: Write = File> {
+    path: PathBuf,
+    mcap: mcap::Writer<NoSeek<BufWriter<Counted<W>>>>,
+    clock: UnixClock,
+    channels: HashMap<&'static str, Channel>,
+    messages: u64,
+    bytes: Arc<AtomicU64>,
+    /// Encoded message, reused.
+    scratch: Vec<u8>,
+}
+
+impl ClipWriter<File> {
+    /// Creates a clip. An existing file is never overwritten.
+    ///
+    /// # Errors
+    /// [`WriteError::Create`] when the file exists or cannot be created, else as the other methods.
+    pub fn create(path: &Path, info: &ClipInfo) -> Result<Self, WriteError> {
+        let file = File::create_new(path).map_err(|source| WriteError::Create { path: path.to_owned(), source })?;
+        Self::with_sink(file, path, info)
+    }
+}
+
+impl<W: Write> ClipWriter<W> {
+    /// Writes to any sink; `path` only names it in errors.
+    ///
+    /// # Errors
+    /// [`WriteError`] when the sink refuses the first bytes.
+    pub fn with_sink(sink: W, path: &Path, info: &ClipInfo) -> Result<Self, WriteError> {
+        let clock = UnixClock(crate::time::unix_offset_ns());
+        let bytes = Arc::new(AtomicU64::new(0));
+        let failed = |error: McapError| failure(path, &bytes, &error);
+        let counted = Counted { sink, bytes: Arc::clone(&bytes) };
+        let mcap = WriteOptions::new()
+            .library(concat!("twinalign ", env!("CARGO_PKG_VERSION")))
+            .compression(Some(Compression::Lz4))
+            .compression_threads(0)
+            .chunk_size(Some(CHUNK_SIZE))
+            // Chunks are put together in memory: the file never holds one whose header is not true yet.
+            .disable_seeking(true)
+            .create(NoSeek::new(BufWriter::new(counted)))
+            .map_err(failed)?;
+        let channels = HashMap::new();
+        let path = path.to_owned();
+        let mut writer = Self { path, mcap, clock, channels, messages: 0, bytes, scratch: Vec::new() };
+        writer.ride_along(info).map_err(|error| writer.failed(&error))?;
+        Ok(writer)
+    }
+
+    fn ride_along(&mut self, info: &ClipInfo) -> Result<(), McapError> {
+        let pairs = [
+            (PROGRAM, info.program.clone()),
+            (CONFIGURATION, info.configuration.clone()),
+            (UNIX_OFFSET_NS, self.clock.0.to_string()),
+        ];
+        let metadata = pairs.into_iter().map(|(key, value)| (key.to_owned(), value)).collect();
+        self.mcap.write_metadata(&Metadata { name: METADATA.into(), metadata })?;
+        if let Some(text) = &info.cell_toml {
+            let now = self.clock.unix_ns(crate::time::now_ns());
+            self.mcap.attach(&Attachment {
+                log_time: now,
+                create_time: now,
+                name: CELL_TOML.into(),
+                media_type: "application/toml".into(),
+                data: Cow::Borrowed(text.as_bytes()),
+            })?;
+        }
+        self.mcap.flush()
+    }
+
+    /// Records a state of the arm.
+    ///
+    /// # Errors
+    /// [`WriteError`] when the disk is full or fails; what was flushed before stays readable.
+    pub fn arm_state(&mut self, message: &ArmState) -> Result<(), WriteError> {
+        self.message(message)
+    }
+
+    /// Records a command to the arm.
+    ///
+    /// # Errors
+    /// As [`ClipWriter::arm_state`].
+    pub fn arm_command(&mut self, message: &ArmCommand) -> Result<(), WriteError> {
+        self.message(message)
+    }
+
+    /// Records a pose of the object.
+    ///
+    /// # Errors
+    /// As [`ClipWriter::arm_state`].
+    pub fn object_pose(&mut self, message: &ObjectPose) -> Result<(), WriteError> {
+        self.message(message)
+    }
+
+    /// Records intrinsics and pose of the camera.
+    ///
+    /// # Errors
+    /// As [`ClipWriter::arm_state`].
+    pub fn camera_info(&mut self, message: &CameraInfo) -> Result<(), WriteError> {
+        self.message(message)
+    }
+
+    /// Records a force/torque sample.
+    ///
+    /// # Errors
+    /// As [`ClipWriter::arm_state`].
+    pub fn wrench(&mut self, message: &Wrench) -> Result<(), WriteError> {
+        self.message(message)
+    }
+
+    /// Records a state of the gripper.
+    ///
+    /// # Errors
+    /// As [`ClipWriter::arm_state`].
+    pub fn gripper(&mut self, message: &GripperState) -> Result<(), WriteError> {
+        self.message(message)
+    }
+
+    /// Records a state of the twin.
+    ///
+    /// # Errors
+    /// As [`ClipWriter::arm_state`].
+    pub fn twin_state(&mut self, message: &TwinState) -> Result<(), WriteError> {
+        self.message(message)
+    }
+
+    /// Records real against twin.
+    ///
+    /// # Errors
+    /// As [`ClipWriter::arm_state`].
+    pub fn twin_gap(&mut self, message: &TwinGap) -> Result<(), WriteError> {
+        self.message(message)
+    }
+
+    /// Records a remark.
+    ///
+    /// # Errors
+    /// As [`ClipWriter::arm_state`].
+    pub fn event(&mut self, message: &Event) -> Result<(), WriteError> {
+        self.message(message)
+    }
+
+    /// Records a picture: its header and its pixels, rows of `header.stride` bytes.
+    ///
+    /// # Errors
+    /// As [`ClipWriter::arm_state`].
+    pub fn image(&mut self, topic: ImageTopic, header: &ImageHeader, pixels: &[u8]) -> Result<(), WriteError> {
+        self.scratch.clear();
+        wire::image_to_wire(header, pixels, self.clock, &mut self.scratch);
+        self.put(topic.name, "foxglove.RawImage", header.stamp_ns).map_err(|error| self.failed(&error))
+    }
+
+    fn message<T: Wire>(&mut self, message: &T) -> Result<(), WriteError> {
+        self.scratch.clear();
+        let encoded = message.to_wire(self.clock).encode(&mut self.scratch);
+        debug_assert!(encoded.is_ok(), "a vector grows as needed");
+        self.put(T::TOPIC, T::SCHEMA, message.stamp_ns()).map_err(|error| self.failed(&error))
+    }
+
+    /// Writes the scratch buffer as one message.
+    fn put(&mut self, topic: &'static str, schema: &str, stamp_ns: u64) -> Result<(), McapError> {
+        let known = self.channels.get(topic).copied();
+        let mut channel = match known {
+            Some(channel) => channel,
+            None => {
+                let schema_id = self.mcap.add_schema(schema, "protobuf", &wire::descriptor(schema))?;
+                let id = self.mcap.add_channel(schema_id, topic, "protobuf", &BTreeMap::new())?;
+                Channel { id, sequence: 0 }
+            }
+        };
+        let time = self.clock.unix_ns(stamp_ns);
+        let header =
+            MessageHeader { channel_id: channel.id, sequence: channel.sequence, log_time: time, publish_time: time };
+        self.mcap.write_to_known_channel(&header, &self.scratch)?;
+        channel.sequence = channel.sequence.wrapping_add(1);
+        self.channels.insert(topic, channel);
+        self.messages += 1;
+        Ok(())
+    }
+
+    /// Closes the open chunk and hands everything to the operating system: a kill from here on loses only what comes
+    /// later.
+    ///
+    /// # Errors
+    /// As [`ClipWriter::arm_state`].
+    pub fn flush(&mut self) -> Result<(), WriteError> {
+        self.mcap.flush().map_err(|error| self.failed(&error))
+    }
+
+    /// Completes the file with index and footer.
+    ///
+    /// # Errors
+    /// As [`ClipWriter::arm_state`].
+    pub fn finish(mut self) -> Result<WriteSummary, WriteError> {
+        let finished = self.mcap.finish().map(|_| ());
+        finished.map_err(|error| self.failed(&error))?;
+        let (mcap, path, bytes, messages) = (self.mcap, self.path, self.bytes, self.messages);
+        mcap.into_inner().into_inner().flush().map_err(|error| failure(&path, &bytes, &error.into()))?;
+        Ok(WriteSummary { messages, bytes: bytes.load(Ordering::Relaxed) })
+    }
+
+    /// Bytes that reached the file so far; what waits in the open chunk is not among them.
+    #[must_use]
+    pub fn bytes_written(&self) -> u64 {
+        self.bytes.load(Ordering::Relaxed)
+    }
+
+    fn failed(&self, error: &McapError) -> WriteError {
+        failure(&self.path, &self.bytes, error)
+    }
+}
+
+fn failure(path: &Path, bytes: &AtomicU64, error: &McapError) -> WriteError {
+    let path = path.to_owned();
+    match error {
+        McapError::Io(e) if matches!(e.kind(), io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded) => {
+            WriteError::DiskFull { path, bytes: bytes.load(Ordering::Relaxed) }
+        }
+        McapError::Io(e) => WriteError::Failed { path, what: e.to_string() },
+        McapError::AttemptedWriteAfterFailure => WriteError::Failed { path, what: "an earlier write failed".into() },
+        other => WriteError::Failed { path, what: other.to_string() },
+    }
+}
