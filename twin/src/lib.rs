@@ -1,4 +1,5 @@
 //! The cell in simulation: arm, contact, sensors, live shadow, replay.
 
+pub mod arm;
 pub mod physics;
 pub mod scene;

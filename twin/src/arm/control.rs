@@ -1,0 +1,138 @@
+//! From command to torque: the joint controllers that cell.toml names. Evaluated once per millisecond and held in
+//! between, by the bridge on the real or simulated arm and by every rollout.
+
+use super::{ArmModel, JointState, Joints, MAX_JOINTS};
+use shared_mem::cell::{Controller, ControllerKind, Range};
+use shared_mem::msg::joints_from;
+use shared_mem::theta::ArmTheta;
+
+/// A joint controller with its gains.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ControlLaw {
+    /// The equation.
+    pub kind: ControllerKind,
+    /// Stiffness k [N m/rad].
+    pub stiffness: Joints,
+    /// Damping d [N m s/rad].
+    pub damping: Joints,
+    /// Largest torque, gravity included [N m]; infinite where not known.
+    pub torque_limit: Joints,
+}
+
+/// The gains do not fit the arm.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum GainError {
+    /// Nothing is known about the controller.
+    #[error("cell.toml has no [controller] block; add one with `kind` and `stiffness`, `damping` or their ranges")]
+    NoController,
+    /// A gain is given neither by value nor by range.
+    #[error(
+        "cell.toml gives no `controller.{0}`; add it, or `{0}_range = [low, high]`, or pass --parameters theta.toml"
+    )]
+    Unknown(&'static str),
+    /// A vector does not fit the arm.
+    #[error("{key} holds {given} numbers; this arm has {dof} joints: give one for each")]
+    Length {
+        /// The key.
+        key: &'static str,
+        /// Numbers given.
+        given: usize,
+        /// Joints of the arm.
+        dof: usize,
+    },
+}
+
+impl ControlLaw {
+    /// The controller of a cell.toml, with identified gains where there are some.
+    ///
+    /// A stiffness known only by its range is taken at the range's geometric middle; a damping, at critical damping of
+    /// the arm's own inertia in its ready pose, kept inside its range.
+    ///
+    /// # Errors
+    /// [`GainError`] naming the key and the remedy.
+    pub fn new(
+        controller: Option<&Controller>,
+        identified: Option<&ArmTheta>,
+        arm: &ArmModel,
+    ) -> Result<Self, GainError> {
+        let controller = controller.ok_or(GainError::NoController)?;
+        let (stiffness, damping) = match identified {
+            Some(theta) => (
+                exactly("arm.stiffness of theta.toml", &theta.stiffness, arm.dof())?,
+                exactly("arm.damping of theta.toml", &theta.damping, arm.dof())?,
+            ),
+            None => nominal(controller, arm)?,
+        };
+        Ok(Self { kind: controller.kind, stiffness, damping, torque_limit: *arm.torque_limit() })
+    }
+
+    /// Torque for a state and the command in force, gravity included [N m], kept within the torque limit.
+    ///
+    /// `nominal` is the model inside the controller: what it compensates for, which may differ from the arm.
+    #[must_use]
+    #[inline]
+    pub fn torque(&self, nominal: &ArmModel, state: &JointState, q_d: &Joints, dq_d: &Joints) -> Joints {
+        match self.kind {
+            ControllerKind::JointImpedance => self.limited(&self.impedance(state, q_d, dq_d, &nominal.bias(state))),
+            ControllerKind::JointPd => self.limited(&self.servo(state, q_d)),
+        }
+    }
+
+    #[inline(always)]
+    pub(super) fn impedance(&self, state: &JointState, q_d: &Joints, dq_d: &Joints, compensation: &Joints) -> Joints {
+        let mut tau = [0.0; MAX_JOINTS];
+        for i in 0..MAX_JOINTS {
+            tau[i] =
+                self.stiffness[i] * (q_d[i] - state.q[i]) + self.damping[i] * (dq_d[i] - state.dq[i]) + compensation[i];
+        }
+        tau
+    }
+
+    #[inline(always)]
+    pub(super) fn servo(&self, state: &JointState, q_d: &Joints) -> Joints {
+        let mut tau = [0.0; MAX_JOINTS];
+        for i in 0..MAX_JOINTS {
+            tau[i] = self.stiffness[i] * (q_d[i] - state.q[i]) - self.damping[i] * state.dq[i];
+        }
+        tau
+    }
+
+    #[inline(always)]
+    pub(super) fn limited(&self, tau: &Joints) -> Joints {
+        let mut out = *tau;
+        for i in 0..MAX_JOINTS {
+            out[i] = out[i].clamp(-self.torque_limit[i], self.torque_limit[i]);
+        }
+        out
+    }
+}
+
+fn exactly(key: &'static str, values: &[f64], dof: usize) -> Result<Joints, GainError> {
+    if values.len() == dof { Ok(joints_from(values)) } else { Err(GainError::Length { key, given: values.len(), dof }) }
+}
+
+fn nominal(controller: &Controller, arm: &ArmModel) -> Result<(Joints, Joints), GainError> {
+    let mut stiffness = [0.0; MAX_JOINTS];
+    match (&controller.stiffness[..], controller.stiffness_range) {
+        ([], None) => return Err(GainError::Unknown("stiffness")),
+        ([], Some(range)) => stiffness[..arm.dof()].fill(geometric_middle(range)),
+        (values, _) => stiffness = exactly("`controller.stiffness` in cell.toml", values, arm.dof())?,
+    }
+    let mut damping = [0.0; MAX_JOINTS];
+    match (&controller.damping[..], controller.damping_range) {
+        ([], None) => return Err(GainError::Unknown("damping")),
+        ([], Some([lo, hi])) => {
+            let mass = arm.mass_matrix(arm.ready());
+            for i in 0..arm.dof() {
+                damping[i] = (2.0 * (stiffness[i] * mass[i][i]).sqrt()).clamp(lo, hi);
+            }
+        }
+        (values, _) => damping = exactly("`controller.damping` in cell.toml", values, arm.dof())?,
+    }
+    Ok((stiffness, damping))
+}
+
+/// The middle on a ratio scale; half the upper end where the range starts at 0.
+fn geometric_middle([lo, hi]: Range) -> f64 {
+    if lo > 0.0 { (lo * hi).sqrt() } else { 0.5 * hi }
+}

@@ -1,0 +1,129 @@
+//! `M(q) ddq + coriolis(q, dq) + gravity(q) = tau + J' f`: the parts of the equation and its solution.
+//! Called by the controllers (nominal model), the simulation (the arm itself) and the bridge.
+
+use super::kernel::{Chain, factor, filled, first, solve, with_dof};
+use super::spatial::{Spatial, cross};
+use super::{ArmModel, JointState, Joints, MAX_JOINTS};
+
+/// A force on a point of the last link.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PointForce {
+    /// Where it acts, in the base frame [m].
+    pub point: [f64; 3],
+    /// The force on the arm, in the base frame [N].
+    pub force: [f64; 3],
+}
+
+impl ArmModel {
+    /// Torques that hold the arm still against gravity [N m].
+    #[must_use]
+    pub fn gravity(&self, q: &Joints) -> Joints {
+        with_dof!(self, N => {
+            let links = first::<N, _>(&self.links);
+            let chain = Chain::at(links, first(q));
+            filled(&chain.gravity(&chain.bodies(links), self.gravity))
+        })
+    }
+
+    /// Torques of centrifugal and Coriolis forces [N m].
+    #[must_use]
+    pub fn coriolis(&self, state: &JointState) -> Joints {
+        with_dof!(self, N => {
+            let links = first::<N, _>(&self.links);
+            let chain = Chain::at(links, first(&state.q));
+            filled(&chain.bias(&chain.bodies(links), first(&state.dq), [0.0; 3]))
+        })
+    }
+
+    /// `coriolis + gravity`, at the price of one of them [N m].
+    #[must_use]
+    pub fn bias(&self, state: &JointState) -> Joints {
+        with_dof!(self, N => {
+            let links = first::<N, _>(&self.links);
+            let chain = Chain::at(links, first(&state.q));
+            filled(&chain.bias(&chain.bodies(links), first(&state.dq), self.gravity))
+        })
+    }
+
+    /// Mass matrix with rotor inertia on its diagonal [kg m²], `[row][column]`; 0 from `dof` on.
+    #[must_use]
+    pub fn mass_matrix(&self, q: &Joints) -> [Joints; MAX_JOINTS] {
+        let mut out = [[0.0; MAX_JOINTS]; MAX_JOINTS];
+        with_dof!(self, N => {
+            let links = first::<N, _>(&self.links);
+            let chain = Chain::at(links, first(q));
+            let lower = chain.mass_matrix(&chain.bodies(links), links);
+            for i in 0..N {
+                for j in 0..=i {
+                    out[i][j] = lower[i][j];
+                    out[j][i] = lower[i][j];
+                }
+            }
+        });
+        out
+    }
+
+    /// Joint accelerations under joint torques [rad/s²].
+    #[must_use]
+    pub fn accelerations(&self, state: &JointState, tau: &Joints) -> Joints {
+        with_dof!(self, N => filled(&self.solve_for::<N>(first(&state.q), first(&state.dq), first(tau))))
+    }
+
+    /// Joint torques that a force on the last link amounts to [N m]: add them to the motors' torques.
+    #[must_use]
+    pub fn torque_of(&self, q: &Joints, load: &PointForce) -> Joints {
+        let wrench = Spatial { angular: cross(load.point, load.force), linear: load.force };
+        let mut out = [0.0; MAX_JOINTS];
+        for (o, axis) in out.iter_mut().zip(self.axes(q)).take(self.dof) {
+            *o = axis.dot(wrench);
+        }
+        out
+    }
+
+    /// Kinetic energy, rotors included, plus potential energy (0 with all mass in the base's origin plane) [J].
+    #[must_use]
+    pub fn energy(&self, state: &JointState) -> f64 {
+        let mass = self.mass_matrix(&state.q);
+        let mut kinetic = 0.0;
+        for (row, dq) in mass.iter().zip(state.dq) {
+            kinetic += 0.5 * dq * row.iter().zip(state.dq).map(|(m, dq)| m * dq).sum::<f64>();
+        }
+        kinetic + self.potential_energy(&state.q)
+    }
+
+    fn potential_energy(&self, q: &Joints) -> f64 {
+        with_dof!(self, N => {
+            let links = first::<N, _>(&self.links);
+            let bodies = Chain::at(links, first(q)).bodies(links);
+            -bodies.iter().map(|body| super::spatial::dot(body.moment, self.gravity)).sum::<f64>()
+        })
+    }
+
+    /// Accelerations for a number of joints known at compile time.
+    #[inline(always)]
+    pub(super) fn solve_for<const N: usize>(&self, q: &[f64; N], dq: &[f64; N], tau: &[f64; N]) -> [f64; N] {
+        let links = first::<N, _>(&self.links);
+        let chain = Chain::at(links, q);
+        let bodies = chain.bodies(links);
+        let bias = chain.bias(&bodies, dq, self.gravity);
+        let mut mass = chain.mass_matrix(&bodies, links);
+        factor(&mut mass);
+        let mut free = [0.0; N];
+        for i in 0..N {
+            free[i] = tau[i] - bias[i];
+        }
+        solve(&mass, &free)
+    }
+
+    /// The first joint whose inertia, with all joints behind it free to move, is nothing.
+    pub(super) fn first_massless_joint(&self, state: &JointState) -> Option<usize> {
+        with_dof!(self, N => {
+            let links = first::<N, _>(&self.links);
+            let chain = Chain::at(links, first(&state.q));
+            let mut mass = chain.mass_matrix(&chain.bodies(links), links);
+            factor(&mut mass);
+            // The factor's diagonal is the inverse: tiny, negative or NaN inertia all fail this.
+            (0..N).find(|&i| !(mass[i][i] > 0.0 && mass[i][i] < 1e12))
+        })
+    }
+}

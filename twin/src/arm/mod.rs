@@ -1,0 +1,52 @@
+//! Any serial-chain arm: kinematics, equations of motion, the joint controllers of cell.toml, and their step in time.
+//!
+//! Nothing here allocates after construction, so the control thread of the bridge may call all of it. Joint arrays are
+//! [`Joints`]: as long as a message's, of which the first [`ArmModel::dof`] count. Units SI, frames as in
+//! [`shared_mem::frames`]: everything is in the base frame unless a name says otherwise.
+//!
+//! | file | owns |
+//! |---|---|
+//! | `model` | [`ArmModel`]: what an arm is, and how cell.toml, tool and payload make one |
+//! | `fr3` | numbers of the built-in Franka FR3 |
+//! | `urdf` | the way in from a URDF file (the only `urdf-rs` code) |
+//! | `inertia` | mass properties of bodies |
+//! | `kinematics` | flange, Jacobian |
+//! | `dynamics` | gravity, Coriolis, mass matrix, accelerations |
+//! | `control` | [`ControlLaw`]: from command to torque |
+//! | `step` | integration over time |
+//! | `kernel`, `spatial` | the arithmetic below |
+
+mod control;
+mod dynamics;
+mod fr3;
+mod inertia;
+mod kernel;
+mod kinematics;
+mod model;
+mod spatial;
+mod step;
+mod urdf;
+
+pub use control::{ControlLaw, GainError};
+pub use dynamics::PointForce;
+pub use inertia::MassProperties;
+pub use kinematics::Jacobian;
+pub use model::{ArmModel, ModelError};
+pub use shared_mem::msg::{Joints, MAX_JOINTS};
+
+/// Positions and velocities of all joints.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct JointState {
+    /// Positions [rad] (or [m] where a joint slides).
+    pub q: Joints,
+    /// Velocities [rad/s] (or [m/s]).
+    pub dq: Joints,
+}
+
+impl JointState {
+    /// At rest at `q`.
+    #[must_use]
+    pub fn at_rest(q: Joints) -> Self {
+        Self { q, dq: [0.0; MAX_JOINTS] }
+    }
+}

@@ -1,0 +1,327 @@
+//! What an arm is: a chain of joints with bodies, limits and a flange, and how cell.toml, a tool and a payload make one.
+//! Built once by the bridge, the simulation and every rollout; then only read.
+
+use super::inertia::{MassProperties, TenParameters};
+use super::kernel::Link;
+use super::spatial::{Rot3, Vec3};
+use super::{JointState, Joints, MAX_JOINTS, fr3, urdf};
+use nalgebra::{Isometry3, Matrix3, Rotation3, Unit, Vector3};
+use shared_mem::cell::{Cell, Controller, Robot};
+use shared_mem::msg::joints_from;
+use std::path::PathBuf;
+
+/// Standard acceleration of free fall as simulators and the vendor's model use it [m/s²].
+const GRAVITY: Vec3 = [0.0, 0.0, -9.81];
+
+/// Inertia of a joint where no model is known [kg m²]: the reflected rotor of a common hobby servo (Feetech STS3215,
+/// 0.028 after Rhoban's BAM identification). Only its ratio to the gains matters, and those are identified.
+const UNKNOWN_INERTIA: f64 = 0.03;
+
+/// An arm. Cloning copies a few kilobytes and allocates only for names.
+#[derive(Debug, Clone)]
+pub struct ArmModel {
+    pub(super) dof: usize,
+    pub(super) links: [Link; MAX_JOINTS],
+    pub(super) gravity: Vec3,
+    /// The flange in the last link's frame, z along the last joint.
+    pub(super) flange: Isometry3<f64>,
+    pub(super) tool_length: f64,
+    has_geometry: bool,
+    joint_names: Vec<String>,
+    base_frame: String,
+    q_min: Joints,
+    q_max: Joints,
+    velocity_limit: Joints,
+    torque_limit: Joints,
+    ready: Joints,
+}
+
+/// No arm can be made of what was given.
+#[derive(Debug, thiserror::Error)]
+pub enum ModelError {
+    /// cell.toml describes no arm.
+    #[error("cell.toml has no [robot] block; add one, for example `model = \"fr3\"`")]
+    NoRobot,
+    /// The URDF cannot be read.
+    #[error("{}: {what}; give a URDF that a robot_state_publisher accepts (xacro must be expanded first)", path.display())]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// What the reader said.
+        what: String,
+    },
+    /// The URDF describes something else than one serial chain.
+    #[error("{}: {what}", path.display())]
+    Chain {
+        /// The file.
+        path: PathBuf,
+        /// Joint or link, and how to mend it.
+        what: String,
+    },
+    /// More joints than a message carries.
+    #[error("the arm has {0} movable joints; 1 to {MAX_JOINTS} are supported: fix the others in the URDF")]
+    Joints(usize),
+    /// A vector of cell.toml does not fit the arm.
+    #[error("`{key}` in cell.toml holds {given} numbers; this arm has {dof} joints: give one for each")]
+    Length {
+        /// The key.
+        key: &'static str,
+        /// Numbers given.
+        given: usize,
+        /// Joints of the arm.
+        dof: usize,
+    },
+    /// A joint moves nothing.
+    #[error(
+        "joint `{0}` moves no inertia; give its link an <inertial> in the URDF, or `rotor_inertia` in [controller] of cell.toml"
+    )]
+    Massless(String),
+}
+
+/// An arm as its source tells it, before it is laid out for computing.
+pub(super) struct Chain {
+    pub(super) joints: Vec<Joint>,
+    pub(super) base_frame: String,
+    /// The flange in the last link's frame.
+    pub(super) flange: Isometry3<f64>,
+}
+
+/// One movable joint and the body behind it.
+pub(super) struct Joint {
+    pub(super) name: String,
+    pub(super) slides: bool,
+    /// The joint's frame at 0 in the link before.
+    pub(super) origin: Isometry3<f64>,
+    /// In the joint's frame.
+    pub(super) axis: Unit<Vector3<f64>>,
+    /// In the joint's frame, which moves with the link.
+    pub(super) body: MassProperties,
+    pub(super) position: [f64; 2],
+    pub(super) velocity: f64,
+    pub(super) torque: f64,
+    pub(super) rotor_inertia: f64,
+    pub(super) ready: f64,
+}
+
+impl ArmModel {
+    /// The Franka FR3 without a hand.
+    #[must_use]
+    pub fn fr3() -> Self {
+        Self::from_chain(fr3::chain()).expect("the built-in chain has seven joints with inertia")
+    }
+
+    /// The arm of a cell.toml: robot, rotor inertia and torque limits of its controller, tool.
+    ///
+    /// # Errors
+    /// [`ModelError`] naming file, joint or key, and the remedy.
+    pub fn from_cell(cell: &Cell) -> Result<Self, ModelError> {
+        let robot = cell.robot.as_ref().ok_or(ModelError::NoRobot)?;
+        let known = !robot.joints.is_empty();
+        let mut chain = match &robot.urdf {
+            Some(file) => urdf::chain(&cell.folder.join(file))?,
+            None if known => joints_only(robot),
+            None => fr3::chain(),
+        };
+        if let Some(base) = &robot.base_frame {
+            chain.base_frame.clone_from(base);
+        }
+        if let Some(controller) = &cell.controller {
+            apply_controller(&mut chain, controller)?;
+        }
+        let mut arm = Self::from_chain(chain)?;
+        arm.has_geometry = !known;
+        if let Some(tool) = &cell.tool {
+            arm.add_at_flange(&MassProperties::of_tool(tool));
+            arm.tool_length = tool.length;
+        }
+        Ok(arm)
+    }
+
+    pub(super) fn from_chain(chain: Chain) -> Result<Self, ModelError> {
+        let dof = chain.joints.len();
+        if dof == 0 || dof > MAX_JOINTS {
+            return Err(ModelError::Joints(dof));
+        }
+        let per_joint = |value: fn(&Joint) -> f64| {
+            let mut out = [0.0; MAX_JOINTS];
+            for (o, joint) in out.iter_mut().zip(&chain.joints) {
+                *o = value(joint);
+            }
+            out
+        };
+        let (links, last) = lay_out(&chain.joints);
+        let arm = Self {
+            dof,
+            links,
+            gravity: GRAVITY,
+            flange: last.inverse() * chain.flange,
+            tool_length: 0.0,
+            has_geometry: true,
+            q_min: per_joint(|j| j.position[0]),
+            q_max: per_joint(|j| j.position[1]),
+            velocity_limit: per_joint(|j| j.velocity),
+            torque_limit: per_joint(|j| j.torque),
+            ready: per_joint(|j| j.ready),
+            joint_names: chain.joints.into_iter().map(|j| j.name).collect(),
+            base_frame: chain.base_frame,
+        };
+        arm.check_inertia()?;
+        Ok(arm)
+    }
+
+    fn check_inertia(&self) -> Result<(), ModelError> {
+        // A pose off the zero pose: there a chain of pure point masses is regular if it is anywhere.
+        let mut q = self.ready;
+        for (i, q) in q.iter_mut().enumerate() {
+            *q += 0.1 + 0.05 * i as f64;
+        }
+        match self.first_massless_joint(&JointState::at_rest(q)) {
+            Some(joint) => Err(ModelError::Massless(self.joint_names[joint].clone())),
+            None => Ok(()),
+        }
+    }
+
+    /// Hangs a body, given in the flange frame, rigidly on the flange.
+    pub fn add_at_flange(&mut self, body: &MassProperties) {
+        let last = &mut self.links[self.dof - 1];
+        last.body = last.body.plus(&TenParameters::from_properties(&body.seen_from(&self.flange)));
+    }
+
+    /// Number of joints.
+    #[must_use]
+    pub fn dof(&self) -> usize {
+        self.dof
+    }
+
+    /// Names of the joints from base to flange.
+    #[must_use]
+    pub fn joint_names(&self) -> &[String] {
+        &self.joint_names
+    }
+
+    /// Name of the base frame.
+    #[must_use]
+    pub fn base_frame(&self) -> &str {
+        &self.base_frame
+    }
+
+    /// `false` where only joint names are known: then positions in space mean nothing.
+    #[must_use]
+    pub fn has_geometry(&self) -> bool {
+        self.has_geometry
+    }
+
+    /// Lowest joint positions [rad].
+    #[must_use]
+    pub fn q_min(&self) -> &Joints {
+        &self.q_min
+    }
+
+    /// Highest joint positions [rad].
+    #[must_use]
+    pub fn q_max(&self) -> &Joints {
+        &self.q_max
+    }
+
+    /// Highest joint speeds [rad/s]; infinite where not known.
+    #[must_use]
+    pub fn velocity_limit(&self) -> &Joints {
+        &self.velocity_limit
+    }
+
+    /// Largest joint torques [N m]; infinite where not known.
+    #[must_use]
+    pub fn torque_limit(&self) -> &Joints {
+        &self.torque_limit
+    }
+
+    /// A pose to start from, inside the limits [rad].
+    #[must_use]
+    pub fn ready(&self) -> &Joints {
+        &self.ready
+    }
+
+    /// Rotor inertia seen at each joint [kg m²].
+    #[must_use]
+    pub fn rotor_inertia(&self) -> Joints {
+        self.links.map(|link| link.rotor)
+    }
+
+    /// Flange to the end of the tool along the flange's z axis [m]; 0 without a tool.
+    #[must_use]
+    pub fn tool_length(&self) -> f64 {
+        self.tool_length
+    }
+}
+
+/// Turns every joint's frame so that its z axis is the joint's axis. Also returns the last of these frames as it lies
+/// in the frame its source gave it.
+fn lay_out(joints: &[Joint]) -> ([Link; MAX_JOINTS], Isometry3<f64>) {
+    let mut links = [Link::default(); MAX_JOINTS];
+    let mut before = Isometry3::identity();
+    for (link, joint) in links.iter_mut().zip(joints) {
+        let aligned = Isometry3::from_parts(nalgebra::Translation3::identity(), z_onto(&joint.axis).into());
+        let step = before.inverse() * joint.origin * aligned;
+        *link = Link {
+            rotation: rows(&step.rotation.to_rotation_matrix()),
+            translation: step.translation.vector.into(),
+            slides: joint.slides,
+            body: TenParameters::from_properties(&joint.body.seen_from(&aligned.inverse())),
+            rotor: joint.rotor_inertia,
+        };
+        before = aligned;
+    }
+    (links, before)
+}
+
+fn z_onto(axis: &Unit<Vector3<f64>>) -> Rotation3<f64> {
+    Rotation3::rotation_between(&Vector3::z(), axis)
+        .unwrap_or_else(|| Rotation3::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI))
+}
+
+fn rows(r: &Rotation3<f64>) -> Rot3 {
+    let m: &Matrix3<f64> = r.matrix();
+    [0, 1, 2].map(|i| [m[(i, 0)], m[(i, 1)], m[(i, 2)]])
+}
+
+/// One second-order model a joint: all axes through one point, bodies without mass, only rotors.
+fn joints_only(robot: &Robot) -> Chain {
+    let joints = robot
+        .joints
+        .iter()
+        .map(|name| Joint {
+            name: name.clone(),
+            slides: false,
+            origin: Isometry3::identity(),
+            axis: Vector3::z_axis(),
+            body: MassProperties::default(),
+            position: [f64::NEG_INFINITY, f64::INFINITY],
+            velocity: f64::INFINITY,
+            torque: f64::INFINITY,
+            rotor_inertia: UNKNOWN_INERTIA,
+            ready: 0.0,
+        })
+        .collect();
+    Chain { joints, base_frame: "base".into(), flange: Isometry3::identity() }
+}
+
+fn apply_controller(chain: &mut Chain, controller: &Controller) -> Result<(), ModelError> {
+    let dof = chain.joints.len();
+    for (key, values) in
+        [("controller.rotor_inertia", &controller.rotor_inertia), ("controller.torque_limit", &controller.torque_limit)]
+    {
+        if !values.is_empty() && values.len() != dof {
+            return Err(ModelError::Length { key, given: values.len(), dof });
+        }
+    }
+    let (rotor, torque) = (joints_from(&controller.rotor_inertia), joints_from(&controller.torque_limit));
+    for (i, joint) in chain.joints.iter_mut().enumerate().take(MAX_JOINTS) {
+        if !controller.rotor_inertia.is_empty() {
+            joint.rotor_inertia = rotor[i];
+        }
+        if !controller.torque_limit.is_empty() {
+            joint.torque = torque[i];
+        }
+    }
+    Ok(())
+}
