@@ -1,1 +1,10 @@
-//! placeholder
+//! What the scenarios in `tests/` share: the programs as processes in a private domain of shared memory, and a folder for their files.
+//!
+//! The programs are those that `cargo test --workspace` builds beside the tests. Timing figures are never asserted here:
+//! the machine that runs tests is slow and shared.
+
+mod bench;
+mod program;
+
+pub use bench::{Cell, lab_cell};
+pub use program::{Finished, Program, program_path};

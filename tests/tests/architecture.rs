@@ -1,0 +1,134 @@
+//! What the house must look like: one door per big dependency, files that own one idea, a README that tells the truth.
+
+use std::path::{Path, PathBuf};
+
+fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("the workspace").to_owned()
+}
+
+/// Every Rust file below `folder`, with its path from the workspace's root.
+fn sources(folder: &str) -> Vec<(String, String)> {
+    let mut found = Vec::new();
+    let mut folders = vec![root().join(folder)];
+    while let Some(folder) = folders.pop() {
+        let entries = std::fs::read_dir(&folder).unwrap_or_else(|e| panic!("{}: {e}", folder.display()));
+        for entry in entries.map(|e| e.expect("an entry").path()) {
+            if entry.is_dir() {
+                folders.push(entry);
+            } else if entry.extension().is_some_and(|e| e == "rs") {
+                let name = entry.strip_prefix(root()).expect("below the root").display().to_string();
+                found.push((name, std::fs::read_to_string(&entry).expect("a readable source")));
+            }
+        }
+    }
+    found
+}
+
+fn product_sources() -> Vec<(String, String)> {
+    ["shared_mem/src", "twin/src", "rt_bridge/src", "calibration/src"].iter().flat_map(|f| sources(f)).collect()
+}
+
+#[test]
+fn each_big_dependency_has_one_door() {
+    let doors: [(&str, &[&str]); 7] = [
+        ("iceoryx2", &["shared_mem/src/transport/", "shared_mem/src/msg/"]),
+        ("mcap", &["shared_mem/src/recording/"]),
+        ("rapier3d_f64", &["twin/src/physics/"]),
+        ("foxglove", &["twin/src/viewer", "shared_mem/src/recording/"]),
+        ("franka", &["rt_bridge/src/fr3/"]),
+        ("rsruckig", &["rt_bridge/src/motion/", "rt_bridge/src/rt/"]),
+        ("plotters", &["calibration/src/report/"]),
+    ];
+    for (file, text) in product_sources() {
+        for (dependency, allowed) in doors {
+            let enters = text.lines().any(|line| {
+                let line = line.trim_start();
+                !line.starts_with("//")
+                    && (line.contains(&format!("{dependency}::")) || line.contains(&format!("use {dependency};")))
+            });
+            assert!(
+                !enters || allowed.iter().any(|door| file.starts_with(door)),
+                "{file} uses {dependency}; its door is {}",
+                allowed.join(" or ")
+            );
+        }
+    }
+}
+
+#[test]
+fn every_file_says_what_it_owns_and_stays_readable() {
+    for (file, text) in product_sources() {
+        assert!(text.starts_with("//!"), "{file} does not begin by saying what it owns (`//!`)");
+        let lines = text.lines().count();
+        assert!(lines <= 450, "{file} has {lines} lines; split it by idea");
+    }
+}
+
+#[test]
+fn unsafe_code_lives_in_one_file() {
+    for (file, text) in product_sources() {
+        let uses = text.lines().any(|l| {
+            !l.trim_start().starts_with("//")
+                && (l.contains("unsafe {") || l.contains("unsafe fn") || l.contains("unsafe impl"))
+        });
+        assert!(
+            !uses || file == "rt_bridge/src/rt/process.rs",
+            "{file} holds unsafe code; it belongs into rt_bridge/src/rt/process.rs"
+        );
+    }
+}
+
+#[test]
+fn the_control_path_reaches_for_no_files_locks_or_logs() {
+    let forbidden =
+        ["std::fs", "println!", "eprintln!", "tracing::", "Mutex", "RwLock", ".unwrap()", ".expect(", "format!("];
+    for (file, text) in sources("rt_bridge/src/rt").into_iter().chain(sources("rt_bridge/src/safety")) {
+        let product = text.split("#[cfg(test)]").next().unwrap_or("");
+        for word in forbidden {
+            let found = product.lines().any(|l| !l.trim_start().starts_with("//") && l.contains(word));
+            assert!(!found, "{file} uses `{word}`, which the control thread must not");
+        }
+    }
+}
+
+#[test]
+fn dependencies_point_one_way() {
+    let rules: [(&str, &[&str]); 4] = [
+        ("shared_mem", &["twin", "rt_bridge", "calibration"]),
+        ("twin", &["rt_bridge", "calibration"]),
+        ("rt_bridge", &["calibration"]),
+        ("calibration", &["rt_bridge"]),
+    ];
+    for (package, forbidden) in rules {
+        let manifest = std::fs::read_to_string(root().join(package).join("Cargo.toml")).expect("a manifest");
+        for other in forbidden {
+            assert!(
+                !manifest.lines().any(|l| l.starts_with(&format!("{other}.workspace"))),
+                "{package} must not depend on {other}"
+            );
+        }
+    }
+}
+
+#[test]
+fn the_readme_names_every_folder_and_only_existing_files() {
+    let readme = std::fs::read_to_string(root().join("README.md")).expect("README.md");
+    for folder in ["shared_mem/", "twin/", "rt_bridge/", "calibration/", "tests/", "config/"] {
+        assert!(readme.contains(folder), "README.md does not mention {folder}");
+    }
+    let mentioned = readme.split('`').skip(1).step_by(2).filter(|code| {
+        let known = ["shared_mem/", "twin/src", "rt_bridge/src", "calibration/src", "tests/", "config/", "docs/"];
+        known.iter().any(|start| code.starts_with(start)) && !code.contains(' ')
+    });
+    for path in mentioned {
+        assert!(root().join(path).exists(), "README.md names {path}, which does not exist");
+    }
+}
+
+#[test]
+fn ci_and_readme_agree_on_the_test_command() {
+    let command = "cargo test --release --workspace";
+    let readme = std::fs::read_to_string(root().join("README.md")).expect("README.md");
+    let ci = std::fs::read_to_string(root().join(".ci/run")).expect(".ci/run");
+    assert!(readme.contains(command) && ci.contains(command), "README.md and .ci/run must both hold `{command}`");
+}
