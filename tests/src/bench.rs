@@ -3,6 +3,7 @@
 use crate::program::Program;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 /// The cell.toml that ships with the project.
@@ -11,9 +12,11 @@ pub fn lab_cell() -> &'static str {
     include_str!("../../config/fr3_cell.toml")
 }
 
-/// A cell with a folder of its own; gone when dropped.
+/// A cell with a folder of its own; gone when dropped. One at a time in a test program: several real-time loops on a
+/// small machine would disturb each other.
 #[derive(Debug)]
 pub struct Cell {
+    _turn: MutexGuard<'static, ()>,
     folder: tempfile::TempDir,
     domain: String,
 }
@@ -34,11 +37,13 @@ impl Cell {
     /// When the folder cannot be made.
     #[must_use]
     pub fn with(cell_toml: &str) -> Self {
+        static TURN: Mutex<()> = Mutex::new(());
         static NEXT: AtomicU32 = AtomicU32::new(0);
+        let turn = TURN.lock().unwrap_or_else(PoisonError::into_inner); // a failed scenario must not fail the next
         let folder = tempfile::tempdir().expect("a temporary folder");
         std::fs::write(folder.path().join("cell.toml"), cell_toml).expect("cell.toml");
         let domain = format!("t{}-{}", std::process::id(), NEXT.fetch_add(1, Ordering::Relaxed));
-        Self { folder, domain }
+        Self { _turn: turn, folder, domain }
     }
 
     /// Domain of shared memory that its programs meet in.

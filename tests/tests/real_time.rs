@@ -46,6 +46,14 @@ fn median(mut values: Vec<f64>) -> f64 {
     values[values.len() / 2]
 }
 
+fn bridge_and_twin() -> (Value, Value) {
+    let cell = Cell::shipped();
+    let bridge = cell.start_bridge(&["--duration", &(SECONDS + 2).to_string()]);
+    let twin = cell.start("twin", &["shadow", "--cell", "{cell}", "--duration", &SECONDS.to_string(), "--json"]);
+    let twin = twin.wait(Duration::from_secs(60)).succeeded().json();
+    (bridge.wait(Duration::from_secs(60)).succeeded().json(), twin)
+}
+
 fn bare_ping() -> Value {
     let cell = Cell::shipped();
     let receiver = Program::start("ping", cell.domain(), &["receive", &SECONDS.to_string()]);
@@ -59,11 +67,7 @@ fn the_control_loop_wakes_like_cyclictest_and_states_are_as_fresh_as_a_ping() {
     let (mut wakes, mut peers, mut ages, mut pings) = (vec![], vec![], vec![], vec![]);
     for round in 0..ROUNDS {
         let peer = cyclictest_p999();
-        let cell = Cell::shipped();
-        let bridge = cell.start_bridge(&["--duration", &(SECONDS + 2).to_string()]);
-        let twin = cell.start("twin", &["shadow", "--cell", "{cell}", "--duration", &SECONDS.to_string(), "--json"]);
-        let twin = twin.wait(Duration::from_secs(60)).succeeded().json();
-        let bridge = bridge.wait(Duration::from_secs(60)).succeeded().json();
+        let (bridge, twin) = bridge_and_twin();
         let ping = bare_ping();
         let wake = bridge["wake_us"]["p999"].as_f64().expect("wake_us.p999");
         let (age, pinged) = (twin["age_us"]["p99"].as_f64().expect("age_us.p99"), ping["p99"].as_f64().expect("p99"));
