@@ -15,22 +15,16 @@ pub(super) const DOF: usize = 7;
 /// One tick of the robot's counter [ns].
 const TICK_NS: u64 = 1_000_000;
 
-/// Fills all of `state` that the robot knows; the arrival is `stamp_ns` [ns].
-///
-/// `q_d` and `dq_d` are what the robot's own controller follows. Where torques are commanded nothing is followed, so they
-/// are `q` and 0 then: a law that starts from them starts at zero torque.
-pub(super) fn fill_state(wire: &RobotState, interface: CommandInterface, stamp_ns: u64, state: &mut ArmState) {
+/// Fills all of `state` that the robot knows; the arrival is `stamp_ns` [ns]. `q_d` and `dq_d` are what the robot's own
+/// controller follows, or followed last where torques are commanded.
+pub(super) fn fill_state(wire: &RobotState, stamp_ns: u64, state: &mut ArmState) {
     state.stamp_ns = stamp_ns;
     state.device_ns = wire.message_id.get().saturating_mul(TICK_NS);
     state.mode = mode_of(wire);
     state.q = joints_from(&f32s_to_f64(&wire.q));
     state.dq = joints_from(&f32s_to_f64(&wire.dq));
-    (state.q_d, state.dq_d) = match interface {
-        CommandInterface::Torque => (state.q, joints_from(&[])),
-        CommandInterface::JointPosition => {
-            (joints_from(&f32s_to_f64(&wire.q_d)), joints_from(&f32s_to_f64(&wire.dq_d)))
-        }
-    };
+    state.q_d = joints_from(&f32s_to_f64(&wire.q_d));
+    state.dq_d = joints_from(&f32s_to_f64(&wire.dq_d));
     state.tau_J = joints_from(&f32s_to_f64(&wire.tau_J));
     state.tau_J_d = joints_from(&f32s_to_f64(&wire.tau_J_d));
     state.tau_ext = joints_from(&f32s_to_f64(&wire.tau_ext_hat_filtered));

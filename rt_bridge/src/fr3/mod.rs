@@ -62,12 +62,6 @@ struct Fr3 {
     last: RobotCommand,
 }
 
-impl Fr3 {
-    fn interface(&self) -> CommandInterface {
-        self.motion.map_or(CommandInterface::Torque, |motion| motion.interface())
-    }
-}
-
 impl Arm for Fr3 {
     fn dof(&self) -> usize {
         DOF
@@ -95,7 +89,7 @@ impl Arm for Fr3 {
 
     fn read(&mut self, state: &mut ArmState) -> Result<Read, ArmFault> {
         self.session.receive(&mut self.wire)?;
-        fill_state(&self.wire, self.interface(), now_ns(), state);
+        fill_state(&self.wire, now_ns(), state);
         match self.motion {
             Some(motion) if !motion.runs(&self.wire) => {
                 self.motion = None;

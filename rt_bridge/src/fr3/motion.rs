@@ -67,11 +67,6 @@ impl Motion {
         }
     }
 
-    /// Which set points it follows.
-    pub(super) fn interface(&self) -> CommandInterface {
-        self.interface
-    }
-
     /// `true` while the state shows this motion.
     pub(super) fn runs(&self, wire: &RobotState) -> bool {
         let (controller, generator) = match self.interface {

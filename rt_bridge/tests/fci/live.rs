@@ -6,6 +6,7 @@ use crate::allocation::allocations;
 use rt_bridge::arm::{Arm, ArmFault, Read};
 use rt_bridge::fr3;
 use rt_bridge::rt::Realtime;
+use rt_bridge::safety::{Limits, TorqueGuard};
 use shared_mem::cell::Cell;
 use shared_mem::msg::arm::{ArmCommand, ArmMode, ArmState, CommandInterface};
 use std::f64::consts::TAU;
@@ -42,7 +43,10 @@ struct Seen {
 fn sweep(arm: &mut dyn Arm, interface: CommandInterface, amplitude: f64, seconds: f64) -> Result<Seen, ArmFault> {
     let mut state = ArmState::default();
     arm.read(&mut state)?;
-    let (from, begin) = (state.q_d, state.device_ns);
+    let from = if interface == CommandInterface::Torque { state.q } else { state.q_d };
+    let begin = state.device_ns;
+    let limits = Limits::fr3();
+    let mut guard = TorqueGuard::after(&state.tau_J_d, &limits);
     let (mut seen, mut last_ns, before) = (Seen::default(), begin, allocations());
     while last_ns < begin + (seconds * 1e9) as u64 {
         if arm.read(&mut state)? != Read::Fresh {
@@ -62,6 +66,7 @@ fn sweep(arm: &mut dyn Arm, interface: CommandInterface, amplitude: f64, seconds
             command.tau_J_d[j] = STIFFNESS[j] * (command.q_d[j] - state.q[j]) + DAMPING[j] * (slope - state.dq[j]);
             seen.worst_error = seen.worst_error.max((command.q_d[j] - state.q[j]).abs());
         }
+        command.tau_J_d = guard.clamp(&command.tau_J_d, &limits, 1e-3).tau;
         arm.command(&command)?;
         seen.cycles += 1;
         seen.skipped += (state.device_ns - last_ns) / 1_000_000 - 1;
@@ -78,7 +83,7 @@ fn swept(interface: CommandInterface) {
         arm.recover().expect("nothing holds the arm");
         arm.start(interface).expect("it is recovered");
     }
-    let seen = sweep(arm.as_mut(), interface, 0.1, 6.0).expect("no fault");
+    let seen = sweep(arm.as_mut(), interface, 0.1, 6.0).unwrap_or_else(|fault| panic!("{fault}"));
     println!("{interface:?}: {seen:?}");
     arm.stop();
     let mut state = ArmState::default();

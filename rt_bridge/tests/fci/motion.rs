@@ -68,6 +68,8 @@ fn every_field_of_a_state_arrives_where_it_belongs() {
     robot.script().write(at::O_T_EE, &std::array::from_fn::<f32, 16, _>(|i| i as f32));
     robot.script().write(at::SUCCESS_RATE, &[0.75]);
     let mut arm = connected(&robot);
+    let mut idle = ArmState::default();
+    assert_eq!(arm.read(&mut idle), Ok(Read::Fresh));
     assert_eq!(arm.start(CommandInterface::JointPosition), Ok(Desired::Reported));
     let state = cycles(arm.as_mut(), CommandInterface::JointPosition, 3);
     let expected = |k: usize| joints_from(&[0, 1, 2, 3, 4, 5, 6].map(|j| (10 * (k + 1) + j) as f64));
@@ -77,6 +79,7 @@ fn every_field_of_a_state_arrives_where_it_belongs() {
     }
     assert_eq!(state.O_T_EE, std::array::from_fn(|i| i as f64));
     assert_eq!((state.success_rate, state.mode), (0.75, ArmMode::Move));
+    assert_eq!((idle.q_d, idle.mode), (state.q_d, ArmMode::Idle));
     assert_eq!(state.device_ns % 1_000_000, 0);
     assert!(state.device_ns >= 1_000_000_000 && state.stamp_ns > 0);
 }
@@ -93,17 +96,6 @@ fn a_torque_answers_the_state_it_was_made_for_and_fills_no_other_block() {
     assert_eq!(u64::from_le_bytes(last[..8].try_into().expect("eight bytes")) * 1_000_000, state.device_ns);
     assert_eq!(numbers(last, 314, 7), SEVEN);
     assert!(last[8..314].iter().all(|byte| *byte == 0), "the motion generator's block is empty");
-}
-
-#[test]
-fn a_torque_law_starts_from_the_measured_pose_at_rest() {
-    let robot = Robot::new();
-    robot.script().write(at::Q, &[0.5; 7]);
-    robot.script().write(at::Q_D, &[0.4; 7]);
-    let mut arm = connected(&robot);
-    arm.start(CommandInterface::Torque).expect("it is idle");
-    let state = cycles(arm.as_mut(), CommandInterface::Torque, 1);
-    assert_eq!((state.q_d, state.dq_d), (state.q, [0.0; 8]));
 }
 
 #[test]
