@@ -2,4 +2,5 @@
 
 pub mod arm;
 pub mod physics;
+pub mod rollout;
 pub mod scene;

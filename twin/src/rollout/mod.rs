@@ -1,0 +1,97 @@
+//! An arm simulated under a recorded command series: the inner loop of replay and of every identification.
+//!
+//! Time runs on a grid of 1 ms control ticks from the start stamp. At a tick the controller sees the state of that
+//! moment and the newest command, and its torque holds until the next tick. Predictions between ticks are interpolated,
+//! so the recording's stamps may be anything. Stamps are integer nanoseconds, everything else SI in the base frame.
+//!
+//! Nothing is allocated once [`CommandTrack`] stands; the same input gives the same bits on any number of threads.
+
+mod commands;
+mod start;
+
+pub use commands::CommandTrack;
+pub use start::start_state;
+
+use crate::arm::{ArmModel, ControlLaw, JointState, Joints, MAX_JOINTS};
+
+/// Period of the controller [ns].
+pub const TICK_NS: u64 = 1_000_000;
+/// Period of the controller [s].
+pub const TICK: f64 = 1e-3;
+
+/// An arm under its controller.
+#[derive(Debug, Clone, Copy)]
+pub struct ArmRollout<'a> {
+    /// The arm that moves.
+    pub arm: &'a ArmModel,
+    /// The model inside the controller.
+    pub nominal: &'a ArmModel,
+    /// The controller.
+    pub law: &'a ControlLaw,
+}
+
+impl ArmRollout<'_> {
+    /// Simulates from `start` at `start_ns` and writes the state at each of the ascending stamps `at_ns` into `out`.
+    ///
+    /// A stamp before `start_ns` gets the start. Stops when the shorter of `at_ns` and `out` is filled.
+    pub fn run(
+        &self,
+        start: &JointState,
+        start_ns: u64,
+        commands: &CommandTrack,
+        at_ns: &[u64],
+        out: &mut [JointState],
+    ) {
+        let (mut state, mut tick_ns, mut row) = (*start, start_ns, 0);
+        let mut wanted = at_ns.iter().zip(out).peekable();
+        while let Some((_, out)) = wanted.next_if(|(at, _)| **at <= start_ns) {
+            *out = *start;
+        }
+        while wanted.peek().is_some() {
+            row = commands.in_force(tick_ns, row);
+            let tau = self.law.torque(self.nominal, &state, commands.q_d(row), commands.dq_d(row));
+            let before = state;
+            self.arm.step(&mut state, &tau, TICK);
+            while let Some((at, out)) = wanted.next_if(|(at, _)| **at <= tick_ns + TICK_NS) {
+                *out = between(&before, &state, (at - tick_ns) as f64 / TICK_NS as f64);
+            }
+            tick_ns += TICK_NS;
+        }
+    }
+}
+
+/// State between two ticks, `share` of the period after the first: the cubic through both positions and velocities.
+#[must_use]
+pub fn between(before: &JointState, after: &JointState, share: f64) -> JointState {
+    if share >= 1.0 {
+        return *after;
+    }
+    let (s, r) = (share, 1.0 - share);
+    let blend = |i: usize| {
+        let (p, q, u, v) = (before.q[i], after.q[i], before.dq[i] * TICK, after.dq[i] * TICK);
+        let position = r * r * (1.0 + 2.0 * s) * p + s * s * (1.0 + 2.0 * r) * q + r * s * (r * u - s * v);
+        let rate = 6.0 * r * s * (q - p) + r * (r - 2.0 * s) * u + s * (s - 2.0 * r) * v;
+        (position, rate / TICK)
+    };
+    let mut state = JointState::default();
+    for i in 0..MAX_JOINTS {
+        (state.q[i], state.dq[i]) = blend(i);
+    }
+    state
+}
+
+/// Root mean square over the rows of `predicted - measured`, per joint [rad].
+///
+/// `measured` is row-major with `dof` columns; rows beyond the shorter of the two do not count.
+#[must_use]
+pub fn joint_rms(predicted: &[JointState], measured: &[f64], dof: usize) -> Joints {
+    let mut sum = [0.0; MAX_JOINTS];
+    let rows = predicted.iter().zip(measured.chunks_exact(dof.max(1)));
+    let count = rows.len().max(1) as f64;
+    for (state, row) in rows {
+        for ((sum, q), measured) in sum.iter_mut().zip(state.q).zip(row) {
+            *sum += (q - measured).powi(2);
+        }
+    }
+    sum.map(|s| (s / count).sqrt())
+}
