@@ -98,10 +98,22 @@ impl Cell {
     /// # Errors
     /// [`CellError`] with file, key and remedy.
     pub fn read(path: &Path) -> Result<Self, CellError> {
-        let mut cell: Self = toml_file::read(path)?;
-        cell.folder = path.parent().map_or_else(PathBuf::new, Path::to_owned);
-        cell.check().map_err(|what| CellError::Value { path: path.to_owned(), what })?;
-        Ok(cell)
+        toml_file::read::<Self>(path)?.settle(path)
+    }
+
+    /// The same from text, as it rides along with a recording; `path` names it in errors, and relative paths in it
+    /// start in its folder.
+    ///
+    /// # Errors
+    /// As [`Cell::read`].
+    pub fn parse(text: &str, path: &Path) -> Result<Self, CellError> {
+        toml_file::parse::<Self>(text, path)?.settle(path)
+    }
+
+    fn settle(mut self, path: &Path) -> Result<Self, CellError> {
+        self.folder = path.parent().map_or_else(PathBuf::new, Path::to_owned);
+        self.check().map_err(|what| CellError::Value { path: path.to_owned(), what })?;
+        Ok(self)
     }
 
     /// The file's text, every default spelled out where it is in force.

@@ -39,7 +39,7 @@ pub(super) fn read(path: &Path, kind: ClipKind, cell: &Cell) -> Result<Clip, Rea
     let present = messages.present();
     let needs_arm = cell.robot.is_some() && kind != ClipKind::FreeMotion;
     let topics = &cell.topics;
-    let mut clip = empty_clip(path, kind);
+    let mut clip = Clip::empty(path, kind);
     clip.damage = messages.damage().summary();
     if needs_arm || !collected.measured.is_empty() {
         let missing = |topic: &str, role, key| ReadError::Topic {
@@ -75,20 +75,6 @@ pub(super) fn read(path: &Path, kind: ClipKind, cell: &Cell) -> Result<Clip, Rea
     let base_frame = cell.robot.as_ref().and_then(|robot| robot.base_frame.as_deref());
     clip.object = collected.object(path, &topics.object_pose, base_frame, &mut clip.warnings)?;
     Ok(clip)
-}
-
-/// A clip of nothing.
-pub(super) fn empty_clip(path: &Path, kind: ClipKind) -> Clip {
-    Clip {
-        file: path.to_owned(),
-        kind,
-        joint_names: Vec::new(),
-        desired: Default::default(),
-        measured: Default::default(),
-        object: ObjectSeries::default(),
-        warnings: Vec::new(),
-        damage: None,
-    }
 }
 
 impl Collected {

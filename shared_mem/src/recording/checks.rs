@@ -17,14 +17,14 @@ pub(super) fn joints(
     names: &[String],
 ) -> Result<(JointSeries, Vec<String>), String> {
     let mut warnings = Vec::new();
-    unlogged_block(&mut series.dq, topic, "velocities", &mut warnings);
-    unlogged_block(&mut series.tau, topic, "torques", &mut warnings);
+    let moves = (1..series.len()).any(|i| step(&series, 0, i) > 1e-3);
+    unlogged_block(&mut series.dq, moves, topic, "velocities", &mut warnings);
+    unlogged_block(&mut series.tau, true, topic, "torques", &mut warnings);
     series = drop_non_finite(&series, topic, names, &mut warnings)?;
     series = sort(series, topic, &mut warnings);
     series = drop_glitch(series, topic, &mut warnings);
     warnings.extend(interleaved(&series, topic));
     warnings.extend(degrees(&series, topic));
-    warnings.extend(gaps(&series.stamps_ns, topic));
     Ok((series, warnings))
 }
 
@@ -76,14 +76,14 @@ pub(super) fn pair(desired: &JointSeries, measured: &JointSeries) -> Vec<String>
 }
 
 /// A block that its driver never filled in counts as not logged.
-fn unlogged_block(block: &mut Vec<f64>, topic: &str, what: &str, warnings: &mut Vec<String>) {
+fn unlogged_block(block: &mut Vec<f64>, zero_is_odd: bool, topic: &str, what: &str, warnings: &mut Vec<String>) {
     if block.is_empty() {
         return;
     }
     let bad = block.iter().filter(|v| !v.is_finite()).count();
     let why = if bad * 2 > block.len() {
         "mostly not finite"
-    } else if block.iter().all(|v| *v == 0.0) {
+    } else if zero_is_odd && block.iter().all(|v| *v == 0.0) {
         "all exactly 0"
     } else {
         return;
@@ -205,7 +205,8 @@ fn degrees(series: &JointSeries, topic: &str) -> Option<String> {
     })
 }
 
-fn gaps(stamps_ns: &[u64], topic: &str) -> Option<String> {
+/// Samples that did not arrive, by the stamps of those that did.
+pub(super) fn gaps(stamps_ns: &[u64], topic: &str) -> Option<String> {
     let steps: Vec<u64> = stamps_ns.windows(2).filter_map(|w| w.last()?.checked_sub(*w.first()?)).collect();
     let mut sorted = steps.clone();
     sorted.sort_unstable();

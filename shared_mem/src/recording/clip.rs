@@ -1,10 +1,12 @@
 //! A clip as callers see it, whatever it was recorded with.
 
-use super::bag;
 use super::checks;
+use super::container::Messages;
 use super::error::ReadError;
 use super::joint_log::{self, JointLog, Wanted};
+use super::messages::is_own;
 use super::series::{JointSeries, ObjectSeries};
+use super::{bag, own};
 use crate::cell::{Cell, ClipKind};
 use std::path::{Path, PathBuf};
 
@@ -35,10 +37,43 @@ pub struct Clip {
 /// [`ReadError`] when the file is missing, is of no known kind, lacks a topic that `cell` and `kind` ask for, lacks a
 /// joint, or more than 1 % of its rows cannot be used. A cut or partly changed file is no error: see [`Clip::damage`].
 pub fn read_clip(path: &Path, kind: ClipKind, cell: &Cell) -> Result<Clip, ReadError> {
-    bag::read(path, kind, cell)
+    match Source::of(path)? {
+        Source::Own => own::read(path, kind, cell),
+        Source::Bag => bag::read(path, kind, cell),
+    }
+}
+
+/// What a clip was recorded with.
+enum Source {
+    Own,
+    Bag,
+}
+
+impl Source {
+    /// By the first message of a file: its encoding tells who wrote it.
+    fn of(path: &Path) -> Result<Self, ReadError> {
+        let mut messages = Messages::open(path)?;
+        let own = messages.next()?.map(|message| is_own(message.channel));
+        // A recording that was stopped before its first message still says whose it is.
+        Ok(if own.unwrap_or_else(|| own::clip_info(&messages).is_some()) { Self::Own } else { Self::Bag })
+    }
 }
 
 impl Clip {
+    /// A clip of nothing.
+    pub(super) fn empty(path: &Path, kind: ClipKind) -> Self {
+        Self {
+            file: path.to_owned(),
+            kind,
+            joint_names: Vec::new(),
+            desired: JointSeries::default(),
+            measured: JointSeries::default(),
+            object: ObjectSeries::default(),
+            warnings: Vec::new(),
+            damage: None,
+        }
+    }
+
     /// Puts the joints of both series into the order of `names`; joints that are not named are left out.
     ///
     /// # Errors
@@ -110,6 +145,9 @@ pub(super) fn joints(
     warnings.extend(ordered.warnings);
     let (desired_series, found) = checks::joints(ordered.series, desired.topic, &names).map_err(fail(desired.topic))?;
     warnings.extend(found);
+    for (series, topic) in [(&measured_series, measured.topic), (&desired_series, desired.topic)] {
+        warnings.extend(checks::gaps(&series.stamps_ns, topic));
+    }
     warnings.extend(checks::pair(&desired_series, &measured_series));
     Ok(Joints { names, desired: desired_series, measured: measured_series, warnings })
 }

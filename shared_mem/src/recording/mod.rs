@@ -8,6 +8,8 @@
 //! |---|---|
 //! | `container` | MCAP records and messages of a file that may be cut or changed |
 //! | `cdr`, `ros2` | ROS 2 messages |
+//! | `own` | an own recording as a clip |
+//! | `messages`, `picture` | all messages one by one, pictures |
 //! | `bag` | a ROS 2 bag as a clip |
 //! | `joint_log` | joint rows: one publisher, one joint order |
 //! | `checks` | faults that foreign logs have, each told in a sentence |
@@ -21,6 +23,9 @@ mod clip;
 mod container;
 mod error;
 mod joint_log;
+mod messages;
+mod own;
+mod picture;
 mod ros2;
 mod series;
 mod session;
@@ -29,6 +34,9 @@ mod writer;
 
 pub use clip::{Clip, read_clip};
 pub use error::ReadError;
+pub use messages::{ClipMessage, ClipMessages, Payload};
+pub use own::{read_arm_states, read_clip_info};
+pub use picture::Picture;
 pub use series::{JointSeries, ObjectSeries};
 pub use session::Session;
 pub use writer::{ClipInfo, ClipWriter, WriteError, WriteSummary};

@@ -16,7 +16,8 @@ pub struct Session {
 }
 
 impl Session {
-    /// Opens a session folder (with cell.toml), or a single clip beside its cell.toml.
+    /// Opens a session folder (with cell.toml), or a single clip: its cell.toml lies beside it, or is the one that an own
+    /// clip carries.
     ///
     /// # Errors
     /// [`ReadError`] when there is no cell.toml, it cannot be used, or it lists no clips.
@@ -43,9 +44,7 @@ impl Session {
         let cell = match cell_toml {
             Some(given) => Cell::read(given)?,
             None if beside.is_file() => Cell::read(&beside)?,
-            None => {
-                return Err(ReadError::kind(path, "has no cell.toml beside it; give one with `--cell cell.toml`"));
-            }
+            None => carried_cell(path)?,
         };
         let file = path.file_name().map_or_else(|| path.to_owned(), PathBuf::from);
         let listed = cell.clips.iter().find(|clip| clip.file == file).cloned();
@@ -60,6 +59,15 @@ impl Session {
     pub fn read(&self, clip: &ClipEntry) -> Result<super::Clip, ReadError> {
         super::read_clip(&self.folder.join(&clip.file), clip.kind, &self.cell)
     }
+}
+
+/// The cell.toml that an own clip carries.
+fn carried_cell(path: &Path) -> Result<Cell, ReadError> {
+    let info = if path.is_file() { super::read_clip_info(path)? } else { None };
+    let text = info.and_then(|info| info.cell_toml).ok_or_else(|| {
+        ReadError::kind(path, "has no cell.toml beside it and carries none; give one with `--cell cell.toml`")
+    })?;
+    Ok(Cell::parse(&text, path)?)
 }
 
 /// What a clip that cell.toml does not list is most likely about.

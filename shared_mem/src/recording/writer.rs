@@ -262,7 +262,7 @@ impl<W: Write> ClipWriter<W> {
     pub fn image(&mut self, topic: ImageTopic, header: &ImageHeader, pixels: &[u8]) -> Result<(), WriteError> {
         self.scratch.clear();
         wire::image_to_wire(header, pixels, self.clock, &mut self.scratch);
-        self.put(topic.name, "foxglove.RawImage", header.stamp_ns).map_err(|error| self.failed(&error))
+        self.put(topic.name, wire::IMAGE_SCHEMA, header.stamp_ns).map_err(|error| self.failed(&error))
     }
 
     fn message<T: Wire>(&mut self, message: &T) -> Result<(), WriteError> {

@@ -7,7 +7,7 @@ use crate::msg::gripper::GripperState;
 use crate::msg::image::{CameraInfo, ImageHeader, PixelEncoding, StampDomain};
 use crate::msg::object::ObjectPose;
 use crate::msg::wrench::Wrench;
-use crate::topics::{self, ImageTopic};
+use crate::topics;
 use prost::Message as _;
 use prost::encoding::{WireType, encode_key, encode_varint};
 
@@ -217,10 +217,8 @@ impl Wire for Event {
     }
 }
 
-/// The picture topic of that name.
-pub(in super::super) fn image_topic(name: &str) -> Option<ImageTopic> {
-    [topics::CAMERA_COLOR, topics::CAMERA_DEPTH].into_iter().find(|topic| topic.name == name)
-}
+/// Full name of the pictures' schema.
+pub(in super::super) const IMAGE_SCHEMA: &str = "foxglove.RawImage";
 
 /// Appends a picture as `foxglove.RawImage` to `out`. The pixels are copied once: they are appended by hand, because a
 /// message struct would want its own copy.

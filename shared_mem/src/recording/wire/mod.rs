@@ -7,7 +7,7 @@
 mod arm;
 mod devices;
 
-pub(super) use devices::{image_from_wire, image_to_wire, image_topic};
+pub(super) use devices::{IMAGE_SCHEMA, image_from_wire, image_to_wire};
 
 use prost::Message as _;
 use prost_types::{FileDescriptorSet, Timestamp};

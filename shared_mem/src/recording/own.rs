@@ -1,0 +1,159 @@
+//! An own recording as a clip: joints from `/arm/state`, poses from `/object/pose`. Stamps are the monotonic clock of
+//! the machine that recorded.
+
+use super::checks;
+use super::clip::Clip;
+use super::container::Messages;
+use super::error::ReadError;
+use super::messages::decode;
+use super::series::JointSeries;
+use super::wire::Wire;
+use super::writer::{CELL_TOML, CONFIGURATION, ClipInfo, METADATA, PROGRAM};
+use crate::cell::{Cell, ClipKind};
+use crate::msg::arm::ArmState;
+use crate::msg::object::ObjectPose;
+use std::io::{Read, Seek};
+use std::path::Path;
+
+/// What rides along with the clip, as far as it was read; `None` when this is no own clip.
+pub(super) fn clip_info<R: Read + Seek>(messages: &Messages<R>) -> Option<ClipInfo> {
+    let record = messages.metadata.iter().find(|m| m.name == METADATA)?;
+    let text = |key: &str| record.pairs.get(key).cloned().unwrap_or_default();
+    let cell = messages.attachments.iter().find(|a| a.name == CELL_TOML);
+    Some(ClipInfo {
+        cell_toml: cell.map(|a| String::from_utf8_lossy(&a.data).into_owned()),
+        configuration: text(CONFIGURATION),
+        program: text(PROGRAM),
+    })
+}
+
+/// Joint rows as they are collected.
+#[derive(Default)]
+struct Rows {
+    measured: JointSeries,
+    desired: JointSeries,
+    device_ns: Vec<u64>,
+    /// States of another number of joints than the first.
+    odd: usize,
+}
+
+impl Rows {
+    fn push(&mut self, state: &ArmState) {
+        let dof = state.dof as usize;
+        if self.device_ns.is_empty() {
+            self.measured.dof = dof;
+            self.desired.dof = dof;
+        }
+        if dof != self.measured.dof || dof == 0 {
+            self.odd += 1;
+            return;
+        }
+        self.device_ns.push(state.device_ns);
+        let blocks = [
+            (&mut self.measured, [&state.q, &state.dq, &state.tau_J]),
+            (&mut self.desired, [&state.q_d, &state.dq_d, &state.tau_J_d]),
+        ];
+        for (series, [q, dq, tau]) in blocks {
+            series.stamps_ns.push(state.stamp_ns);
+            series.q.extend(q.iter().take(dof));
+            series.dq.extend(dq.iter().take(dof));
+            series.tau.extend(tau.iter().take(dof));
+        }
+    }
+}
+
+/// Reads an own clip.
+pub(super) fn read(path: &Path, kind: ClipKind, cell: &Cell) -> Result<Clip, ReadError> {
+    let mut messages = Messages::open(path)?;
+    let (mut rows, mut poses) = (Rows::default(), Vec::new());
+    while let Some(message) = messages.next()? {
+        let topic = &message.channel.topic;
+        let fail = |what: String| ReadError::content(path, topic, what);
+        match message.channel.type_name() {
+            ArmState::SCHEMA => rows.push(&decode(message.data).map_err(fail)?),
+            ObjectPose::SCHEMA => {
+                let pose: ObjectPose = decode(message.data).map_err(fail)?;
+                poses.push((pose.stamp_ns, pose.pose()));
+            }
+            _ => {}
+        }
+    }
+    let mut clip = Clip::empty(path, kind);
+    clip.damage = messages.damage().summary();
+    let needs_arm = cell.robot.is_some() && kind != ClipKind::FreeMotion;
+    if needs_arm && rows.device_ns.is_empty() {
+        return Err(missing(path, ArmState::TOPIC, &messages.present()));
+    }
+    if kind != ClipKind::Excitation && poses.is_empty() {
+        return Err(missing(path, ObjectPose::TOPIC, &messages.present()));
+    }
+    take_joints(path, cell, rows, &mut clip)?;
+    let fail = |what| ReadError::content(path, ObjectPose::TOPIC, what);
+    let (object, warnings) = checks::object(poses, ObjectPose::TOPIC).map_err(fail)?;
+    clip.object = object;
+    clip.warnings.extend(warnings);
+    Ok(clip)
+}
+
+fn take_joints(path: &Path, cell: &Cell, rows: Rows, clip: &mut Clip) -> Result<(), ReadError> {
+    let topic = ArmState::TOPIC;
+    let fail = |what| ReadError::content(path, topic, what);
+    clip.joint_names = joint_names(cell, rows.measured.dof);
+    if rows.odd > 0 {
+        let what =
+            format!("`{topic}`: {} states of another number of joints left out; record one arm a clip", rows.odd);
+        clip.warnings.push(what);
+    }
+    // The robot's own clock tells lost packets from a late arrival.
+    clip.warnings.extend(checks::gaps(&rows.device_ns, topic));
+    for (series, into) in [(rows.measured, &mut clip.measured), (rows.desired, &mut clip.desired)] {
+        let (series, warnings) = checks::joints(series, topic, &clip.joint_names).map_err(fail)?;
+        *into = series;
+        let new: Vec<String> = warnings.into_iter().filter(|w| !clip.warnings.contains(w)).collect();
+        clip.warnings.extend(new);
+    }
+    Ok(())
+}
+
+fn missing(path: &Path, topic: &str, present: &str) -> ReadError {
+    ReadError::content(path, topic, format!("no messages; the clip has {present}: record with the device switched on"))
+}
+
+/// Names of the joints: own clips number them.
+fn joint_names(cell: &Cell, dof: usize) -> Vec<String> {
+    match &cell.robot {
+        Some(robot) if robot.joints.len() == dof => robot.joints.clone(),
+        Some(robot) if robot.model.is_some() => (1..=dof).map(|i| format!("fr3_joint{i}")).collect(),
+        _ => (1..=dof).map(|i| format!("joint{i}")).collect(),
+    }
+}
+
+/// All arm states of an own clip, in the order they were recorded.
+///
+/// # Errors
+/// [`ReadError`] when the file is missing, is no clip, or holds no arm state.
+pub fn read_arm_states(path: &Path) -> Result<Vec<ArmState>, ReadError> {
+    let mut messages = Messages::open(path)?;
+    let mut states = Vec::new();
+    while let Some(message) = messages.next()? {
+        if message.channel.type_name() == ArmState::SCHEMA {
+            states.push(decode(message.data).map_err(|what| ReadError::content(path, ArmState::TOPIC, what))?);
+        }
+    }
+    if states.is_empty() {
+        return Err(missing(path, ArmState::TOPIC, &messages.present()));
+    }
+    Ok(states)
+}
+
+/// What an own clip says about itself: cell.toml, configuration and program it was recorded with. `None` for the
+/// recording of another program.
+///
+/// # Errors
+/// [`ReadError`] when the file is missing or no MCAP file.
+pub fn read_clip_info(path: &Path) -> Result<Option<ClipInfo>, ReadError> {
+    let mut messages = Messages::open(path)?;
+    // Both records are written before the first message.
+    messages.next()?;
+    Ok(clip_info(&messages))
+}
