@@ -1,1 +1,16 @@
-//! placeholder
+//! What a recorded session says about its cell: capture it, replay it, explain it.
+//!
+//! The robot is reached only through shared memory and the other programs only as processes, so nothing here can tell a
+//! real cell from a simulated one.
+//!
+//! | module | owns |
+//! |---|---|
+//! | [`capture`] | planning a motion, having the bridge play it, recording it into a session folder |
+//! | [`processes`] | the other programs as children |
+//! | [`interrupt`] | Ctrl-C |
+//! | [`progress`] | the bar on stderr |
+
+pub mod capture;
+pub mod interrupt;
+pub mod processes;
+pub mod progress;

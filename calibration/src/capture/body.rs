@@ -1,0 +1,89 @@
+//! What the planner asks of the arm's body: how low it reaches and which torque a movement takes. Base frame, SI.
+//!
+//! Rests on the nominal model of cell.toml; called once for every set point of a plan.
+
+use shared_mem::cell::{Cell, Tool};
+use shared_mem::msg::{Joints, MAX_JOINTS};
+use twin::arm::{ArmModel, JointState, ModelError};
+
+/// The nominal arm with its tool.
+#[derive(Debug, Clone)]
+pub struct Body {
+    model: ArmModel,
+    tool: Option<Tool>,
+}
+
+impl Body {
+    /// The body that cell.toml describes.
+    ///
+    /// # Errors
+    /// [`ModelError`] when it describes no arm.
+    pub fn of(cell: &Cell) -> Result<Self, ModelError> {
+        Ok(Self { model: ArmModel::from_cell(cell)?, tool: cell.tool.clone() })
+    }
+
+    /// The arm.
+    #[must_use]
+    pub fn model(&self) -> &ArmModel {
+        &self.model
+    }
+
+    /// Height of the lowest point of flange and tool above the base frame's origin [m]; infinite where the arm's geometry is not known.
+    #[must_use]
+    pub fn lowest_point(&self, q: &Joints) -> f64 {
+        if !self.model.has_geometry() {
+            return f64::INFINITY;
+        }
+        let flange = self.model.flange(q).isometry();
+        let at = |z: f64| (flange * nalgebra::Point3::new(0.0, 0.0, z)).z;
+        match &self.tool {
+            Some(tool) => at(0.0).min(at(tool.length - tool.radius)) - tool.radius,
+            None => at(0.0),
+        }
+    }
+
+    /// Torque that moves the arm like this, `M(q) ddq + bias(q, dq)` with gravity and rotors [N m].
+    #[must_use]
+    pub fn torque(&self, state: &JointState, ddq: &Joints) -> Joints {
+        let mass = self.model.mass_matrix(&state.q);
+        let mut tau = self.model.bias(state);
+        for (tau, row) in tau.iter_mut().zip(&mass) {
+            *tau += (0..MAX_JOINTS).map(|j| row[j] * ddq[j]).sum::<f64>();
+        }
+        tau
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn shipped() -> Body {
+        let path = std::path::Path::new("fr3_cell.toml");
+        let text = include_str!("../../../config/fr3_cell.toml");
+        let cell = shared_mem::toml_file::parse(text, path).expect("the shipped file");
+        Body::of(&cell).expect("the shipped cell has an arm")
+    }
+
+    #[test]
+    fn the_tool_reaches_its_length_below_the_flange_in_the_ready_pose() {
+        let body = shipped();
+        let q = *body.model().ready();
+        let flange = body.model().flange(&q).isometry().translation.z;
+        // The flange looks straight down there.
+        assert!((flange - body.lowest_point(&q) - 0.16).abs() < 1e-6);
+    }
+
+    #[test]
+    fn standing_still_takes_gravity_and_speeding_up_takes_inertia() {
+        let body = shipped();
+        let state = JointState::at_rest(*body.model().ready());
+        let still = body.torque(&state, &[0.0; MAX_JOINTS]);
+        let gravity = body.model().gravity(&state.q);
+        assert!(still.iter().zip(&gravity).all(|(a, b)| (a - b).abs() < 1e-9), "{still:?} is not {gravity:?}");
+        let mut ddq = [0.0; MAX_JOINTS];
+        ddq[0] = 2.0;
+        let sped_up = body.torque(&state, &ddq);
+        assert!(sped_up[0] - still[0] > 2.0 * 0.195, "the rotor alone takes 0.39 N m, not {}", sped_up[0] - still[0]);
+    }
+}

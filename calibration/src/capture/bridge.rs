@@ -1,0 +1,102 @@
+//! The bridge a capture works through: the one that runs already, or one that is started for it and ended after it.
+
+use super::link::{Link, LinkError};
+use crate::interrupt::Interrupt;
+use crate::processes::{ProcessError, Program, Running, arguments};
+use std::path::Path;
+use std::time::Duration;
+
+/// How long to look for a running bridge.
+const LOOK: Duration = Duration::from_millis(500);
+/// How long a bridge may take to its first arm state: a robot has to be reached and its brakes opened.
+const START: Duration = Duration::from_secs(30);
+/// Arm of a bridge that is started without being told which.
+const DEFAULT_ARM: &str = "sim";
+
+/// No bridge could be had.
+#[derive(Debug, thiserror::Error)]
+pub enum BridgeError {
+    /// Shared memory failed.
+    #[error(transparent)]
+    Link(#[from] LinkError),
+    /// It could not be started, or ended at once.
+    #[error(transparent)]
+    Process(#[from] ProcessError),
+    /// It runs but reports no arm.
+    #[error("the bridge reported no arm state within {} s; check the robot's address and whether it is unlocked, then start again", START.as_secs())]
+    NoState,
+    /// The user gave up first.
+    #[error("ended before the bridge was ready")]
+    Interrupted,
+}
+
+/// The bridge of one capture.
+#[derive(Debug)]
+pub struct Bridge {
+    started: Option<Running>,
+}
+
+impl Bridge {
+    /// Uses the bridge that runs in `domain`, else starts one on `arm` (default: the simulated one). Says which on stderr.
+    ///
+    /// # Errors
+    /// [`BridgeError`] with the remedy.
+    pub fn find_or_start(
+        link: &mut Link,
+        cell: &Path,
+        arm: Option<&str>,
+        domain: Option<&str>,
+        interrupt: &Interrupt,
+    ) -> Result<Self, BridgeError> {
+        if link.wait_for_bridge(LOOK, || interrupt.asked())?.is_some() {
+            match arm {
+                Some(arm) => eprintln!("using the bridge that is running; --arm {arm} has no effect"),
+                None => eprintln!("using the bridge that is running"),
+            }
+            return Ok(Self { started: None });
+        }
+        let arm = arm.unwrap_or(DEFAULT_ARM);
+        eprintln!("no bridge is running: starting `rt_bridge run --arm {arm}` for this capture");
+        let started = Running::start(Program::Bridge, &arguments([&"run", &"--cell", &cell, &"--arm", &arm]), domain)?;
+        let mut bridge = Self { started: Some(started) };
+        bridge.wait_until_alive(link, interrupt)?;
+        Ok(bridge)
+    }
+
+    /// Waits for the first arm state of a bridge that was started.
+    fn wait_until_alive(&mut self, link: &mut Link, interrupt: &Interrupt) -> Result<(), BridgeError> {
+        let mut dead = None;
+        let state = link.wait_for_bridge(START, || {
+            dead = self.check().err();
+            dead.is_some() || interrupt.asked()
+        })?;
+        match (state, dead) {
+            (Some(_), _) => Ok(()),
+            (None, Some(error)) => Err(error.into()),
+            (None, None) if interrupt.asked() => Err(BridgeError::Interrupted),
+            (None, None) => Err(BridgeError::NoState),
+        }
+    }
+
+    /// `true` when it was started for this capture.
+    #[must_use]
+    pub fn is_own(&self) -> bool {
+        self.started.is_some()
+    }
+
+    /// An error, with its last words, when a bridge that was started has ended.
+    ///
+    /// # Errors
+    /// [`ProcessError::Ended`].
+    pub fn check(&mut self) -> Result<(), ProcessError> {
+        self.started.as_mut().map_or(Ok(()), Running::check)
+    }
+
+    /// Ends the bridge if it was started here.
+    ///
+    /// # Errors
+    /// [`ProcessError`] when it fails or has to be killed.
+    pub fn stop(self) -> Result<(), ProcessError> {
+        self.started.map_or(Ok(()), |bridge| bridge.stop().map(drop))
+    }
+}

@@ -1,0 +1,221 @@
+//! The verb `capture excitation`: for each clip plan, record, play, judge, enter into the session.
+
+use super::body::Body;
+use super::bridge::Bridge;
+use super::limits::{self, JointLimits};
+use super::link::Link;
+use super::plan::{Plan, RATE, Request, plan};
+use super::quality::{Quality, Verdict, Watch};
+use super::recorder::{Recorded, Recorder};
+use super::session::Session;
+use super::stream::{Outcome, play};
+use crate::interrupt::Interrupt;
+use crate::progress::Progress;
+use anyhow::Context as _;
+use serde::Serialize;
+use shared_mem::cell::{Cell, ClipKind};
+use std::path::{Path, PathBuf};
+
+/// Flange and tool stay this far above table and object [m]: about twice what a loosely tuned arm strays.
+const CLEARANCE: f64 = 0.05;
+
+/// What is asked for.
+#[derive(Debug, Clone)]
+pub struct Options {
+    /// The laboratory's cell.toml.
+    pub cell: PathBuf,
+    /// Clips to add.
+    pub clips: u32,
+    /// Session folder.
+    pub out: PathBuf,
+    /// Arm of a bridge that has to be started, as `rt_bridge run --arm` takes it.
+    pub arm: Option<String>,
+    /// Length of a clip's motion [s].
+    pub duration: f64,
+    /// Largest excursion of each joint [rad].
+    pub amplitude: f64,
+    /// Seed of the first clip; the others count on from it by their number in the session.
+    pub seed: u64,
+    /// Shared-memory domain; default: the one this process was started in.
+    pub domain: Option<String>,
+}
+
+/// What was done.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Summary {
+    /// Session folder.
+    pub session: PathBuf,
+    /// Clips of this run, in order.
+    pub clips: Vec<ClipSummary>,
+    /// Whether the user ended it early.
+    pub interrupted: bool,
+    /// Whether the bridge was started, and ended, by this run.
+    pub own_bridge: bool,
+}
+
+/// One clip.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ClipSummary {
+    /// File, relative to the session.
+    pub file: PathBuf,
+    /// `true`: entered into cell.toml. A clip that is not stays on disk.
+    pub kept: bool,
+    /// Why not.
+    pub why: Option<String>,
+    /// Largest excursion of each joint [rad].
+    pub amplitude: Vec<f64>,
+    /// What was seen on the way.
+    #[serde(flatten)]
+    pub quality: Quality,
+    /// Messages in the file.
+    pub messages: u64,
+    /// Size of the file [bytes].
+    pub bytes: u64,
+}
+
+/// Captures clips until all are there or the user ends it. `note` is shown beside the progress bar.
+///
+/// # Errors
+/// One line with what happened and what to do; clips that were complete before are in the session.
+pub fn capture(options: &Options, interrupt: &Interrupt, note: &mut dyn FnMut() -> String) -> anyhow::Result<Summary> {
+    let cell = Cell::read(&options.cell)?;
+    let body = Body::of(&cell)?;
+    let session = Session::open(&options.out, &cell)?;
+    let domain = options.domain.as_deref();
+    let mut link = Link::open(domain)?;
+    let mut bridge = Bridge::find_or_start(&mut link, &options.cell, options.arm.as_deref(), domain, interrupt)?;
+    let mut desk = Desk { options, limits: limits::of(&cell, &body), body, floor: floor(&cell), session, interrupt };
+    let mut clips = Vec::new();
+    for count in 1..=options.clips {
+        if interrupt.asked() {
+            break;
+        }
+        let clip = match desk.clip(&mut link, &format!("clip {count} of {}", options.clips), note) {
+            Ok(clip) => clip,
+            // A bridge that died says more than the silence it leaves.
+            Err(error) => return Err(bridge.check().err().map_or(error, anyhow::Error::from)),
+        };
+        clips.extend(clip);
+    }
+    let own_bridge = bridge.is_own();
+    bridge.stop()?;
+    let session = desk.session.folder().to_owned();
+    Ok(Summary { session, clips, interrupted: interrupt.asked(), own_bridge })
+}
+
+/// Lowest height for flange and tool: above the table, and above the object that may stand on it [m].
+fn floor(cell: &Cell) -> f64 {
+    let Some(table) = &cell.table else { return f64::NEG_INFINITY };
+    let object = cell.object.as_ref().and_then(|object| object.size).map_or(0.0, |size| size[2]);
+    table.height + object + CLEARANCE
+}
+
+/// Everything that stays the same from clip to clip.
+struct Desk<'a> {
+    options: &'a Options,
+    limits: Vec<JointLimits>,
+    body: Body,
+    floor: f64,
+    session: Session,
+    interrupt: &'a Interrupt,
+}
+
+impl Desk<'_> {
+    /// One clip. `None`: interrupted before anything was recorded.
+    fn clip(
+        &mut self,
+        link: &mut Link,
+        title: &str,
+        note: &mut dyn FnMut() -> String,
+    ) -> anyhow::Result<Option<ClipSummary>> {
+        let (number, file) = self.session.next_clip()?;
+        let plan = self.plan(link, number)?;
+        let path = self.session.folder().join(&file);
+        let domain = self.options.domain.as_deref();
+        let recorder = Recorder::start(&path, &self.options.cell, domain, self.interrupt)?;
+        if self.interrupt.asked() {
+            recorder.finish()?;
+            return Ok(None);
+        }
+        let (outcome, quality) = self.play(link, &plan, title, note).with_context(|| kept_unfinished(&path))?;
+        let recorded = recorder.finish()?;
+        let why = match (outcome, quality.verdict(plan.peak_speed)) {
+            (Outcome::Stopped, _) => Some("ended by the user".to_owned()),
+            (Outcome::Done, Verdict::Repeat(why)) => Some(why),
+            (Outcome::Done, Verdict::Keep) => None,
+        };
+        if why.is_none() {
+            self.session.enter(&file, ClipKind::Excitation)?;
+        }
+        let clip = summary(file, why, plan, quality, &recorded);
+        eprintln!("{}", clip.line());
+        Ok(Some(clip))
+    }
+
+    /// Plans around the pose that the arm is commanded to hold, and says what had to give.
+    fn plan(&self, link: &mut Link, number: usize) -> anyhow::Result<Plan> {
+        let state = link.ready_state()?;
+        anyhow::ensure!(
+            state.dof as usize == self.limits.len(),
+            "the bridge moves {} joints, cell.toml describes {}; start the bridge with the same --cell",
+            state.dof,
+            self.limits.len()
+        );
+        let Options { amplitude, duration, seed, .. } = *self.options;
+        let seed = seed.wrapping_add(number as u64);
+        let request = Request { start: state.q_d, amplitude, duration, seed, floor: self.floor };
+        let plan = plan(&request, &self.limits, &self.body)?;
+        for (joint, bound_by) in plan.bound_by.iter().enumerate() {
+            if let Some(quantity) = bound_by {
+                let reached = plan.amplitude[joint];
+                eprintln!("  joint {}: {reached:.3} rad instead of {amplitude:.3}, bound by {quantity}", joint + 1);
+            }
+        }
+        Ok(plan)
+    }
+
+    fn play(
+        &self,
+        link: &mut Link,
+        plan: &Plan,
+        title: &str,
+        note: &mut dyn FnMut() -> String,
+    ) -> anyhow::Result<(Outcome, Quality)> {
+        let progress = Progress::new(title, plan.set_points.len() as u64);
+        let mut watch = Watch::default();
+        let outcome = play(link, plan, self.interrupt, |state| {
+            watch.see(state);
+            if state.cycle % (RATE as u64 / 10) == 0 {
+                progress.show(u64::from(state.motion_played), &note());
+            }
+        })?;
+        Ok((outcome, watch.quality()))
+    }
+}
+
+fn kept_unfinished(path: &Path) -> String {
+    format!("{} is kept as far as it was recorded, but not entered into cell.toml", path.display())
+}
+
+fn summary(file: PathBuf, why: Option<String>, plan: Plan, quality: Quality, recorded: &Recorded) -> ClipSummary {
+    let Recorded { messages, bytes } = *recorded;
+    ClipSummary { file, kept: why.is_none(), why, amplitude: plan.amplitude, quality, messages, bytes }
+}
+
+impl ClipSummary {
+    /// The clip's quality in a line.
+    #[must_use]
+    pub fn line(&self) -> String {
+        let Quality { lost_packets, peak_speed, tracking_error, .. } = self.quality;
+        let verdict = match &self.why {
+            None => "keep".to_owned(),
+            Some(why) => format!("repeat: {why} (the file stays, but is not entered into cell.toml)"),
+        };
+        format!(
+            "{}: peak speed {peak_speed:.2} rad/s, follows within {:.1} mrad, {lost_packets} packets lost, {:.1} MB: {verdict}",
+            self.file.display(),
+            1e3 * tracking_error,
+            self.bytes as f64 * 1e-6,
+        )
+    }
+}

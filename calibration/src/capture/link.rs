@@ -1,0 +1,183 @@
+//! The capture's side of shared memory: it reads the arm's state and the bridge's remarks, and hands over motions.
+//!
+//! Knows no physics. A bridge that falls silent or starts anew is an error with its remedy, never a wait without end.
+
+use shared_mem::msg::arm::{ArmMode, ArmState};
+use shared_mem::msg::event::{Event, EventLevel, EventSource};
+use shared_mem::msg::motion::MotionChunk;
+use shared_mem::topics::{ARM_MOTION, ARM_STATE, EVENTS};
+use shared_mem::transport::{Node, Publisher, Subscriber, TransportError};
+use std::time::{Duration, Instant};
+
+/// A bridge that says nothing for this long is gone.
+const SILENCE: Duration = Duration::from_secs(1);
+
+/// The link to a bridge failed, or the bridge cannot be used as it is.
+#[derive(Debug, thiserror::Error)]
+pub enum LinkError {
+    /// Shared memory failed.
+    #[error(transparent)]
+    Transport(#[from] TransportError),
+    /// No state for a second.
+    #[error(
+        "the bridge has fallen silent: no arm state for 1 s{}; start it again (`rt_bridge run --cell ...`) and repeat the clip",
+        said(last_words)
+    )]
+    Silent {
+        /// Its last warning or error, if any.
+        last_words: Option<String>,
+    },
+    /// The bridge is another one than before.
+    #[error("the bridge was started anew while a motion was being played; repeat the clip")]
+    Restarted,
+    /// The robot is in no state to move.
+    #[error("the robot is not ready to move: {what}{}; {remedy}", said(last_words))]
+    NotReady {
+        /// What it is doing.
+        what: &'static str,
+        /// What a person does about it.
+        remedy: &'static str,
+        /// The bridge's last warning or error, if any.
+        last_words: Option<String>,
+    },
+}
+
+fn said(last_words: &Option<String>) -> String {
+    last_words.as_ref().map_or(String::new(), |words| format!(" (the bridge said: {words})"))
+}
+
+/// A seat beside one bridge.
+#[derive(Debug)]
+pub struct Link {
+    states: Subscriber<ArmState>,
+    events: Subscriber<Event>,
+    motions: Publisher<MotionChunk>,
+    newest: Option<ArmState>,
+    heard: Instant,
+    last_words: Option<String>,
+    // Declared last: ports go before the node they belong to.
+    _node: Node,
+}
+
+impl Link {
+    /// Takes the seat in `domain` (default: the one this process was started in).
+    ///
+    /// # Errors
+    /// [`LinkError::Transport`] when shared memory is not usable or another capture is at work.
+    pub fn open(domain: Option<&str>) -> Result<Self, LinkError> {
+        const NAME: &str = "calibration capture";
+        let node = domain.map_or_else(|| Node::open(NAME), |domain| Node::open_in(domain, NAME))?;
+        Ok(Self {
+            states: node.subscriber(ARM_STATE)?,
+            events: node.subscriber(EVENTS)?,
+            motions: node.publisher(ARM_MOTION)?,
+            newest: None,
+            heard: Instant::now(),
+            last_words: None,
+            _node: node,
+        })
+    }
+
+    /// The next state not yet seen, oldest first. `None`: nothing new; ask again in a few milliseconds.
+    ///
+    /// # Errors
+    /// [`LinkError::Silent`] when there was none for a second, [`LinkError::Restarted`] when the bridge is another one.
+    pub fn next_state(&mut self) -> Result<Option<ArmState>, LinkError> {
+        self.listen()?;
+        let Some(state) = self.states.receive()? else {
+            if self.heard.elapsed() > SILENCE {
+                return Err(LinkError::Silent { last_words: self.last_words.clone() });
+            }
+            return Ok(None);
+        };
+        self.heard = Instant::now();
+        if self.newest.replace(state).is_some_and(|before| before.session != state.session) {
+            return Err(LinkError::Restarted);
+        }
+        Ok(Some(state))
+    }
+
+    /// Waits for a sign of life. `None`: nobody there within `patience`, or `give_up` said so.
+    ///
+    /// # Errors
+    /// [`LinkError::Transport`] when shared memory fails.
+    pub fn wait_for_bridge(
+        &mut self,
+        patience: Duration,
+        mut give_up: impl FnMut() -> bool,
+    ) -> Result<Option<ArmState>, LinkError> {
+        let start = Instant::now();
+        while start.elapsed() < patience && !give_up() {
+            if let Some(state) = self.states.newest()? {
+                self.heard = Instant::now();
+                self.newest = Some(state);
+                return Ok(self.newest);
+            }
+            std::thread::sleep(Duration::from_millis(5));
+        }
+        Ok(None)
+    }
+
+    /// The newest state, provided the robot may be moved; remarks of earlier motions are forgotten.
+    ///
+    /// # Errors
+    /// [`LinkError::NotReady`] with the remedy, [`LinkError::Silent`].
+    pub fn ready_state(&mut self) -> Result<ArmState, LinkError> {
+        self.newest = None;
+        self.heard = Instant::now();
+        let state = loop {
+            match self.next_state()? {
+                Some(state) => self.newest = Some(state),
+                None => match self.newest {
+                    Some(state) => break state,
+                    None => std::thread::sleep(Duration::from_millis(2)),
+                },
+            }
+        };
+        let [what, remedy] = match state.mode {
+            ArmMode::Idle | ArmMode::Move => {
+                self.last_words = None;
+                return Ok(state);
+            }
+            ArmMode::Other => ["it reports no known mode", "look at the bridge's messages"],
+            ArmMode::Guiding => ["it is being guided by hand", "release the guiding buttons"],
+            ArmMode::Reflex => {
+                ["it stopped itself", "recover it from its error (restart the bridge), then start again"]
+            }
+            ArmMode::UserStopped => ["the stop button is pressed", "release the button, then start again"],
+            ArmMode::Recovery => ["it is recovering from an error", "wait for it, then start again"],
+        };
+        Err(LinkError::NotReady { what, remedy, last_words: self.last_words.clone() })
+    }
+
+    /// Hands a batch of set points over.
+    ///
+    /// # Errors
+    /// [`LinkError::Transport`] when shared memory fails.
+    pub fn send(&self, chunk: &MotionChunk) -> Result<(), LinkError> {
+        Ok(self.motions.send(chunk)?)
+    }
+
+    /// The bridge's last warning or error since the link was last ready; waits briefly, because remarks and states travel apart.
+    ///
+    /// # Errors
+    /// [`LinkError::Transport`] when shared memory fails.
+    pub fn reason(&mut self) -> Result<String, LinkError> {
+        let start = Instant::now();
+        while self.last_words.is_none() && start.elapsed() < Duration::from_millis(300) {
+            std::thread::sleep(Duration::from_millis(10));
+            self.listen()?;
+        }
+        Ok(self.last_words.clone().unwrap_or_else(|| "the bridge gave no reason".into()))
+    }
+
+    /// Keeps the bridge's last warning or error.
+    fn listen(&mut self) -> Result<(), LinkError> {
+        while let Some(event) = self.events.receive()? {
+            if event.source == EventSource::Bridge && event.level != EventLevel::Info {
+                self.last_words = Some(event.text().to_owned());
+            }
+        }
+        Ok(())
+    }
+}

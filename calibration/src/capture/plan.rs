@@ -1,0 +1,383 @@
+//! Plans one excitation clip: a multi-sine around the pose the arm stands in, as large as asked for or as the limits
+//! of joints, torque and floor allow. Pure: no clock, no shared memory. Units: rad, s, N m, m.
+//!
+//! Called by the capture verb; what it returns is streamed as it is.
+
+use super::body::Body;
+use super::limits::JointLimits;
+use super::multisine::Multisine;
+use shared_mem::msg::motion::SetPoint;
+use shared_mem::msg::{Joints, MAX_JOINTS};
+use std::fmt;
+use twin::arm::JointState;
+
+/// Set points a second: the control rate of the arm.
+pub const RATE: f64 = 1000.0;
+/// Share of each limit a plan may use; the rest is for the arm that does not follow exactly.
+const SHARE: f64 = 0.9;
+/// Distance kept from the stops [rad].
+const STOP_MARGIN: f64 = 0.05;
+/// Smallest amplitude worth recording [rad].
+const SMALLEST: f64 = 0.01;
+/// How much smaller each try is, where limits couple the joints.
+const SHRINK: f64 = 0.95;
+
+/// What is asked for.
+#[derive(Debug, Clone, Copy)]
+pub struct Request {
+    /// Pose to start, move around and end in [rad].
+    pub start: Joints,
+    /// Largest excursion of each joint [rad].
+    pub amplitude: f64,
+    /// Length [s].
+    pub duration: f64,
+    /// Draws frequencies' amplitudes and phases.
+    pub seed: u64,
+    /// Height in the base frame that flange and tool stay above [m].
+    pub floor: f64,
+}
+
+/// A clip's motion.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Plan {
+    /// One set point a control cycle; the first and the last are at rest in the start pose.
+    pub set_points: Vec<SetPoint>,
+    /// Number of joints.
+    pub dof: usize,
+    /// Largest excursion of each joint [rad].
+    pub amplitude: Vec<f64>,
+    /// What made an amplitude smaller than asked for: the last limit met, by joint.
+    pub bound_by: Vec<Option<Quantity>>,
+    /// Largest commanded speed of any joint [rad/s].
+    pub peak_speed: f64,
+}
+
+/// What is limited.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Quantity {
+    /// Joint position [rad].
+    Position,
+    /// Joint speed, which falls towards the stops [rad/s].
+    Speed,
+    /// Joint acceleration [rad/s²].
+    Acceleration,
+    /// Joint jerk [rad/s³].
+    Jerk,
+    /// Joint torque, gravity included [N m].
+    Torque,
+    /// Height of flange and tool [m].
+    Height,
+}
+
+impl Quantity {
+    /// Its unit.
+    #[must_use]
+    pub fn unit(self) -> &'static str {
+        match self {
+            Self::Position => "rad",
+            Self::Speed => "rad/s",
+            Self::Acceleration => "rad/s²",
+            Self::Jerk => "rad/s³",
+            Self::Torque => "N m",
+            Self::Height => "m",
+        }
+    }
+}
+
+impl fmt::Display for Quantity {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Position => "position",
+            Self::Speed => "speed",
+            Self::Acceleration => "acceleration",
+            Self::Jerk => "jerk",
+            Self::Torque => "torque",
+            Self::Height => "height",
+        })
+    }
+}
+
+/// A value beyond its limit.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Excess {
+    /// Joint, from 0; of a height, the joint with the largest say in it is not known: `None`.
+    pub joint: Option<usize>,
+    /// What is too large or too low.
+    pub quantity: Quantity,
+    /// Its value.
+    pub value: f64,
+    /// What it may be at most (position and height: or at least).
+    pub limit: f64,
+}
+
+impl fmt::Display for Excess {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { joint, quantity, value, limit } = self;
+        match joint {
+            Some(joint) => write!(f, "joint {}", joint + 1)?,
+            None => write!(f, "the tool")?,
+        }
+        write!(f, ": {quantity} {value:.4} {unit}, limit {limit:.4} {unit}", unit = quantity.unit())
+    }
+}
+
+/// No motion can be planned.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum PlanError {
+    /// The arm stands where no motion may start.
+    #[error("the arm stands outside the limits ({0}); move it away from there, then start again")]
+    Start(Excess),
+    /// Not even a tiny motion fits.
+    #[error("no motion worth recording fits around this pose ({0}); move the arm away from there, then start again")]
+    NoRoom(Excess),
+}
+
+/// Plans the clip. Amplitudes that do not fit are made smaller, each joint's by its own limits, all of them by torque and height.
+///
+/// # Errors
+/// [`PlanError`] with joint, value and limit when the start pose breaks a limit or leaves no room.
+pub fn plan(request: &Request, limits: &[JointLimits], body: &Body) -> Result<Plan, PlanError> {
+    let dof = limits.len();
+    check_start(request, limits, body)?;
+    let shape = Multisine::draw(dof, request.duration, request.seed);
+    let samples = Samples::of(&shape, dof, request.duration);
+    let mut amplitude = vec![request.amplitude; dof];
+    let mut bound_by = vec![None; dof];
+    for joint in 0..dof {
+        while let Some(excess) = samples.joint_excess(joint, request.start[joint], amplitude[joint], &limits[joint]) {
+            shrink(&mut amplitude[joint], &mut bound_by[joint], excess)?;
+        }
+    }
+    while let Some(excess) = samples.body_excess(request, &amplitude, limits, body) {
+        for joint in 0..dof {
+            shrink(&mut amplitude[joint], &mut bound_by[joint], excess)?;
+        }
+    }
+    let set_points = samples.set_points(&request.start, &amplitude);
+    let peak_speed = set_points.iter().flat_map(|p| p.dq_d).fold(0.0, |peak: f64, dq| peak.max(dq.abs()));
+    Ok(Plan { set_points, dof, amplitude, bound_by, peak_speed })
+}
+
+/// Makes one amplitude smaller and notes why; an error once it is not worth recording.
+fn shrink(amplitude: &mut f64, bound_by: &mut Option<Quantity>, excess: Excess) -> Result<(), PlanError> {
+    *amplitude *= SHRINK;
+    *bound_by = Some(excess.quantity);
+    if *amplitude < SMALLEST { Err(PlanError::NoRoom(excess)) } else { Ok(()) }
+}
+
+/// The start pose, at rest, must itself respect stops, torque and floor.
+fn check_start(request: &Request, limits: &[JointLimits], body: &Body) -> Result<(), PlanError> {
+    for (joint, (&q, limits)) in request.start.iter().zip(limits).enumerate() {
+        if let Some(excess) = position_excess(joint, q, limits) {
+            return Err(PlanError::Start(excess));
+        }
+    }
+    let still = JointState::at_rest(request.start);
+    let excess = pose_excess(&still, &[0.0; MAX_JOINTS], request.floor, limits, body);
+    excess.map_or(Ok(()), |excess| Err(PlanError::Start(excess)))
+}
+
+fn position_excess(joint: usize, q: f64, limits: &JointLimits) -> Option<Excess> {
+    let [lo, hi] = [limits.q_min + STOP_MARGIN, limits.q_max - STOP_MARGIN];
+    let limit = if q < lo { lo } else { hi };
+    (!(lo..=hi).contains(&q)).then_some(Excess { joint: Some(joint), quantity: Quantity::Position, value: q, limit })
+}
+
+/// What torque and floor say about one moment.
+fn pose_excess(state: &JointState, ddq: &Joints, floor: f64, limits: &[JointLimits], body: &Body) -> Option<Excess> {
+    let lowest = body.lowest_point(&state.q);
+    if lowest < floor {
+        return Some(Excess { joint: None, quantity: Quantity::Height, value: lowest, limit: floor });
+    }
+    let torque = body.torque(state, ddq);
+    torque.iter().zip(limits).enumerate().find_map(|(joint, (tau, limits))| {
+        let limit = SHARE * limits.tau_max;
+        (tau.abs() > limit).then_some(Excess {
+            joint: Some(joint),
+            quantity: Quantity::Torque,
+            value: tau.abs(),
+            limit,
+        })
+    })
+}
+
+/// The shape at each control cycle: value, speed, acceleration and jerk by joint, before scaling.
+struct Samples {
+    joints: Vec<Vec<[f64; 4]>>,
+}
+
+impl Samples {
+    fn of(shape: &Multisine, dof: usize, duration: f64) -> Self {
+        let last = (duration * RATE).round() as u32;
+        let joint = |j| (0..=last).map(|i| shape.at(j, f64::from(i) * duration / f64::from(last))).collect();
+        Self { joints: (0..dof).map(joint).collect() }
+    }
+
+    fn len(&self) -> usize {
+        self.joints.first().map_or(0, Vec::len)
+    }
+
+    /// First sample of `joint` beyond its own limits at this amplitude.
+    fn joint_excess(&self, joint: usize, start: f64, amplitude: f64, limits: &JointLimits) -> Option<Excess> {
+        self.joints[joint].iter().find_map(|shape| {
+            let [dx, dq, ddq, dddq] = shape.map(|x| amplitude * x);
+            let q = start + dx;
+            let [slowest, fastest] = limits.speed_bounds(q);
+            let speed_limit = SHARE * if dq < 0.0 { -slowest } else { fastest };
+            let checks = [
+                (Quantity::Speed, dq.abs(), speed_limit),
+                (Quantity::Acceleration, ddq.abs(), SHARE * limits.ddq_max),
+                (Quantity::Jerk, dddq.abs(), SHARE * limits.dddq_max),
+            ];
+            let beyond = checks.into_iter().find(|(_, value, limit)| value > limit);
+            position_excess(joint, q, limits).or(beyond.map(|(quantity, value, limit)| Excess {
+                joint: Some(joint),
+                quantity,
+                value,
+                limit,
+            }))
+        })
+    }
+
+    /// First sample at which the whole arm meets torque or floor.
+    fn body_excess(&self, request: &Request, amplitude: &[f64], limits: &[JointLimits], body: &Body) -> Option<Excess> {
+        (0..self.len()).find_map(|i| {
+            let (state, ddq) = self.moment(i, &request.start, amplitude);
+            pose_excess(&state, &ddq, request.floor, limits, body)
+        })
+    }
+
+    /// Desired state and acceleration of sample `i`.
+    fn moment(&self, i: usize, start: &Joints, amplitude: &[f64]) -> (JointState, Joints) {
+        let (mut state, mut ddq) = (JointState::at_rest(*start), [0.0; MAX_JOINTS]);
+        for (joint, amplitude) in amplitude.iter().enumerate() {
+            let [x, dx, ddx, _] = self.joints[joint][i];
+            state.q[joint] += amplitude * x;
+            state.dq[joint] = amplitude * dx;
+            ddq[joint] = amplitude * ddx;
+        }
+        (state, ddq)
+    }
+
+    fn set_points(&self, start: &Joints, amplitude: &[f64]) -> Vec<SetPoint> {
+        let point = |i| {
+            let (JointState { q, dq }, _) = self.moment(i, start, amplitude);
+            SetPoint { q_d: q, dq_d: dq }
+        };
+        (0..self.len()).map(point).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::limits;
+    use super::*;
+    use proptest::prelude::*;
+    use shared_mem::cell::Cell;
+
+    fn arm() -> (Body, Vec<JointLimits>) {
+        let text = include_str!("../../../config/fr3_cell.toml");
+        let cell: Cell =
+            shared_mem::toml_file::parse(text, std::path::Path::new("cell.toml")).expect("the shipped file");
+        let body = Body::of(&cell).expect("an arm");
+        let limits = limits::of(&cell, &body);
+        (body, limits)
+    }
+
+    fn request(start: Joints) -> Request {
+        Request { start, amplitude: 0.3, duration: 4.0, seed: 1, floor: 0.05 }
+    }
+
+    /// Checks set points as a robot does, by differences from cycle to cycle, against the full limits.
+    fn assert_inside(plan: &Plan, limits: &[JointLimits], body: &Body, floor: f64) {
+        let q = |i: usize, joint: usize| plan.set_points[i].q_d[joint];
+        let speed = |i: usize, joint: usize| (q(i, joint) - q(i - 1, joint)) * RATE;
+        let acceleration = |i: usize, joint: usize| (speed(i, joint) - speed(i - 1, joint)) * RATE;
+        for (joint, limits) in limits.iter().enumerate() {
+            for i in 3..plan.set_points.len() {
+                let [slowest, fastest] = limits.speed_bounds(q(i, joint));
+                let jerk = (acceleration(i, joint) - acceleration(i - 1, joint)) * RATE;
+                assert!((limits.q_min..=limits.q_max).contains(&q(i, joint)), "joint {joint} at {i}: {}", q(i, joint));
+                assert!((slowest..=fastest).contains(&speed(i, joint)), "joint {joint} at {i}: {}", speed(i, joint));
+                assert!(acceleration(i, joint).abs() <= limits.ddq_max, "joint {joint} at {i}");
+                assert!(jerk.abs() <= limits.dddq_max, "joint {joint} at {i}: {jerk}");
+                assert!((plan.set_points[i].dq_d[joint] - speed(i, joint)).abs() < limits.ddq_max / RATE);
+            }
+        }
+        for i in (2..plan.set_points.len()).step_by(7) {
+            let point = &plan.set_points[i];
+            let mut ddq = [0.0; MAX_JOINTS];
+            (0..limits.len()).for_each(|joint| ddq[joint] = acceleration(i, joint));
+            let tau = body.torque(&JointState { q: point.q_d, dq: point.dq_d }, &ddq);
+            assert!(tau.iter().zip(limits).all(|(tau, limits)| tau.abs() <= limits.tau_max), "at {i}: {tau:?}");
+            assert!(body.lowest_point(&point.q_d) >= floor, "at {i}");
+        }
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(48))]
+        #[test]
+        fn every_plan_respects_every_limit_or_says_which_one_it_cannot(
+            seed in any::<u64>(),
+            place in proptest::array::uniform7(0.02..0.98_f64),
+            amplitude in 0.05..1.5_f64,
+            duration in 2.0..6.0_f64,
+        ) {
+            let (body, limits) = arm();
+            let mut start = [0.0; MAX_JOINTS];
+            for (joint, limits) in limits.iter().enumerate() {
+                start[joint] = limits.q_min + place[joint] * (limits.q_max - limits.q_min);
+            }
+            let request = Request { start, amplitude, duration, seed, floor: 0.05 };
+            if let Ok(plan) = plan(&request, &limits, &body) {
+                assert_inside(&plan, &limits, &body, request.floor);
+                let (first, last) = (&plan.set_points[0], &plan.set_points[plan.set_points.len() - 1]);
+                for point in [first, last] {
+                    for joint in 0..limits.len() {
+                        prop_assert!((point.q_d[joint] - start[joint]).abs() < 1e-12);
+                        prop_assert!(point.dq_d[joint].abs() < 1e-9);
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn in_the_ready_pose_a_moderate_motion_is_played_as_asked() {
+        let (body, limits) = arm();
+        let plan = plan(&Request { amplitude: 0.1, duration: 8.0, ..request(*body.model().ready()) }, &limits, &body);
+        let plan = plan.expect("room");
+        assert_eq!(plan.set_points.len(), 8001);
+        assert_eq!(plan.bound_by, [None; 7]);
+        let reached = |joint: usize| {
+            let start = body.model().ready()[joint];
+            plan.set_points.iter().map(|p| (p.q_d[joint] - start).abs()).fold(0.0, f64::max)
+        };
+        assert!((0..7).all(|joint| (reached(joint) - 0.1).abs() < 1e-6));
+    }
+
+    #[test]
+    fn what_is_too_much_is_made_smaller_and_the_limit_named() {
+        let (body, limits) = arm();
+        let plan = plan(&Request { amplitude: 2.0, ..request(*body.model().ready()) }, &limits, &body).expect("room");
+        assert!(plan.amplitude.iter().all(|a| *a < 2.0));
+        assert!(plan.bound_by.iter().all(Option::is_some), "{:?}", plan.bound_by);
+    }
+
+    #[test]
+    fn a_start_beyond_a_stop_is_refused_with_joint_value_and_limit() {
+        let (body, limits) = arm();
+        let mut start = *body.model().ready();
+        start[3] = -0.12;
+        let error = plan(&request(start), &limits, &body).unwrap_err().to_string();
+        assert!(error.contains("joint 4: position -0.1200 rad, limit -0.1669 rad"), "{error}");
+    }
+
+    #[test]
+    fn a_start_below_the_floor_is_refused() {
+        let (body, limits) = arm();
+        let start = *body.model().ready();
+        let error = plan(&Request { floor: 1.0, ..request(start) }, &limits, &body).unwrap_err();
+        assert!(matches!(error, PlanError::Start(Excess { quantity: Quantity::Height, .. })), "{error}");
+    }
+}

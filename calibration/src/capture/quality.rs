@@ -1,0 +1,115 @@
+//! Judges a clip from the states that passed by while it was played. Units: rad, s.
+
+use super::plan::RATE;
+use serde::Serialize;
+use shared_mem::msg::arm::ArmState;
+
+/// Share of lost packets from which a clip is better repeated: lost states leave holes that a fit has to bridge by guessing.
+const LOSS_BEARABLE: f64 = 0.01;
+/// Share of the planned peak speed below which the arm did not do what was asked.
+const SPEED_EXPECTED: f64 = 0.5;
+
+/// Watches one clip.
+#[derive(Debug, Clone, Default)]
+pub struct Watch {
+    last_device_ns: Option<u64>,
+    quality: Quality,
+}
+
+/// What was seen.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+pub struct Quality {
+    /// States received.
+    pub states: u64,
+    /// States missing in the robot's own counter.
+    pub lost_packets: u64,
+    /// Largest measured joint speed [rad/s].
+    pub peak_speed: f64,
+    /// Largest distance between desired and measured joint position [rad].
+    pub tracking_error: f64,
+}
+
+/// Whether a clip is worth keeping.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Verdict {
+    /// It is.
+    Keep,
+    /// It is not, and why.
+    Repeat(String),
+}
+
+impl Watch {
+    /// Takes note of a state.
+    pub fn see(&mut self, state: &ArmState) {
+        let seen = &mut self.quality;
+        seen.states += 1;
+        if let Some(last) = self.last_device_ns {
+            let cycles = (state.device_ns.saturating_sub(last) as f64 * 1e-9 * RATE).round();
+            seen.lost_packets += (cycles as u64).saturating_sub(1);
+        }
+        self.last_device_ns = Some(state.device_ns);
+        let dof = (state.dof as usize).min(state.q.len());
+        for joint in 0..dof {
+            seen.peak_speed = seen.peak_speed.max(state.dq[joint].abs());
+            seen.tracking_error = seen.tracking_error.max((state.q_d[joint] - state.q[joint]).abs());
+        }
+    }
+
+    /// What was seen so far.
+    #[must_use]
+    pub fn quality(&self) -> Quality {
+        self.quality
+    }
+}
+
+impl Quality {
+    /// The verdict, given the peak speed that was planned [rad/s].
+    #[must_use]
+    pub fn verdict(&self, planned_speed: f64) -> Verdict {
+        let expected = self.states + self.lost_packets;
+        let lost = self.lost_packets as f64 / expected.max(1) as f64;
+        if lost > LOSS_BEARABLE {
+            return Verdict::Repeat(format!("{:.1} % of the packets are lost", 100.0 * lost));
+        }
+        if self.peak_speed < SPEED_EXPECTED * planned_speed {
+            let seen = self.peak_speed;
+            return Verdict::Repeat(format!("the arm reached {seen:.2} rad/s of {planned_speed:.2} planned"));
+        }
+        Verdict::Keep
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn states(device_ms: impl IntoIterator<Item = u64>) -> Quality {
+        let mut watch = Watch::default();
+        for ms in device_ms {
+            let mut state = ArmState { device_ns: ms * 1_000_000, dof: 7, ..ArmState::default() };
+            state.dq[2] = -0.8;
+            state.q_d[4] = 0.02;
+            watch.see(&state);
+        }
+        watch.quality()
+    }
+
+    #[test]
+    fn a_complete_clip_is_kept() {
+        let quality = states(0..2000);
+        assert_eq!(quality, Quality { states: 2000, lost_packets: 0, peak_speed: 0.8, tracking_error: 0.02 });
+        assert_eq!(quality.verdict(0.9), Verdict::Keep);
+    }
+
+    #[test]
+    fn gaps_in_the_robots_counter_are_lost_packets() {
+        let quality = states((0..2000).filter(|ms| ms % 50 != 7));
+        assert_eq!(quality.lost_packets, 40);
+        assert!(matches!(quality.verdict(0.9), Verdict::Repeat(why) if why.contains("2.0 %")));
+    }
+
+    #[test]
+    fn an_arm_that_hardly_moved_is_to_be_repeated() {
+        assert!(matches!(states(0..100).verdict(2.0), Verdict::Repeat(_)));
+    }
+}

@@ -1,0 +1,80 @@
+//! The recorder of one clip: `rt_bridge record` as a child, which reads shared memory beside us and never slows the arm.
+
+use crate::interrupt::Interrupt;
+use crate::processes::{ProcessError, Program, Running, arguments};
+use serde::Deserialize;
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+/// How long the recorder may take until its file is there.
+const START: Duration = Duration::from_secs(10);
+/// Still time recorded before and after a motion, so that a fit sees where the arm came from and how it settles.
+const MARGIN: Duration = Duration::from_millis(300);
+
+/// A clip could not be recorded.
+#[derive(Debug, thiserror::Error)]
+pub enum RecordError {
+    /// The recorder failed.
+    #[error(transparent)]
+    Process(#[from] ProcessError),
+    /// The recorder runs but writes nothing.
+    #[error("the recorder did not open {} within {} s; check that the disk has room", file.display(), START.as_secs())]
+    NoFile {
+        /// The clip.
+        file: PathBuf,
+    },
+    /// Its answer is not what was agreed.
+    #[error(
+        "`rt_bridge record` answered {answer:?}, which holds no file, messages and bytes; build all programs from the same version"
+    )]
+    Answer {
+        /// What it wrote.
+        answer: String,
+    },
+}
+
+/// A recording that runs.
+#[derive(Debug)]
+pub struct Recorder {
+    running: Running,
+}
+
+/// What was recorded.
+#[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
+pub struct Recorded {
+    /// Messages in the file.
+    pub messages: u64,
+    /// Size of the file [bytes].
+    pub bytes: u64,
+}
+
+impl Recorder {
+    /// Starts recording `domain` into `clip` and waits until the file is open.
+    ///
+    /// # Errors
+    /// [`RecordError`] when the recorder cannot be started or opens no file.
+    pub fn start(clip: &Path, cell: &Path, domain: Option<&str>, interrupt: &Interrupt) -> Result<Self, RecordError> {
+        let list = arguments([&"record", &"--json", &"--out", &clip, &"--cell", &cell]);
+        let mut running = Running::start(Program::Bridge, &list, domain)?;
+        let start = Instant::now();
+        while !clip.exists() && !interrupt.asked() {
+            running.check()?;
+            if start.elapsed() > START {
+                return Err(RecordError::NoFile { file: clip.to_owned() });
+            }
+            std::thread::sleep(Duration::from_millis(10));
+        }
+        std::thread::sleep(MARGIN);
+        Ok(Self { running })
+    }
+
+    /// Records a moment longer, then closes the file.
+    ///
+    /// # Errors
+    /// [`RecordError`] when the recorder failed or its answer cannot be read.
+    pub fn finish(self) -> Result<Recorded, RecordError> {
+        std::thread::sleep(MARGIN);
+        let answer = self.running.stop()?;
+        serde_json::from_str(&answer).map_err(|_| RecordError::Answer { answer })
+    }
+}

@@ -1,0 +1,304 @@
+//! The other programs of the project as child processes: found, started, watched, ended, and quoted when they fail.
+//!
+//! Each child runs in a process group of its own, so that Ctrl-C on the terminal reaches only this program, which then
+//! ends its children in an order that loses nothing. A child that is dropped is ended. Called by capture and demo.
+
+use rustix::process::{Pid, Signal, kill_process};
+use shared_mem::transport::DOMAIN_VARIABLE;
+use std::collections::VecDeque;
+use std::ffi::OsString;
+use std::io::{BufRead, BufReader, Read};
+use std::os::unix::process::CommandExt;
+use std::path::PathBuf;
+use std::process::{Child, Command, ExitStatus, Stdio};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+/// Lines of a child's stderr kept for an error message.
+const TAIL: usize = 8;
+/// How long a child may take to end after SIGTERM before it is killed.
+const GRACE: Duration = Duration::from_secs(5);
+/// How often a child is looked at while it ends.
+const LOOK: Duration = Duration::from_millis(10);
+
+/// A child process could not be used.
+#[derive(Debug, thiserror::Error)]
+pub enum ProcessError {
+    /// The program is neither beside this one nor on the PATH.
+    #[error(
+        "cannot find the program `{name}`; build it with `cargo build --release -p {package}`, or put its folder on the PATH"
+    )]
+    Missing {
+        /// The program.
+        name: &'static str,
+        /// The package that builds it.
+        package: &'static str,
+    },
+    /// The system would not start or watch it.
+    #[error("cannot run {}: {source}; check that the file is executable", path.display())]
+    Start {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// It ended by itself, or with a failure.
+    #[error("`{name}` ended with {status}; it last said:\n{tail}")]
+    Ended {
+        /// The program and its verb.
+        name: String,
+        /// How.
+        status: ExitStatus,
+        /// Its last lines on stderr, indented.
+        tail: String,
+    },
+    /// It did not end in time and was killed.
+    #[error("`{name}` did not end within {} s and was killed; it last said:\n{tail}", waited.as_secs())]
+    Stuck {
+        /// The program and its verb.
+        name: String,
+        /// How long it was waited for.
+        waited: Duration,
+        /// Its last lines on stderr, indented.
+        tail: String,
+    },
+}
+
+/// A program of this project and the package that builds it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Program {
+    /// `rt_bridge`.
+    Bridge,
+    /// `twin`.
+    Twin,
+}
+
+impl Program {
+    /// The binary's name, which is its package's name too.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Bridge => "rt_bridge",
+            Self::Twin => "twin",
+        }
+    }
+
+    /// The binary: beside this one, one folder up (tests run in `deps`), else on the PATH.
+    ///
+    /// # Errors
+    /// [`ProcessError::Missing`], which says how to build it.
+    pub fn find(self) -> Result<PathBuf, ProcessError> {
+        let here = std::env::current_exe().ok();
+        let beside = here.iter().flat_map(|exe| exe.ancestors().skip(1).take(2)).map(PathBuf::from);
+        let path = std::env::var_os("PATH").unwrap_or_default();
+        let on_path: Vec<PathBuf> = std::env::split_paths(&path).collect();
+        beside
+            .chain(on_path)
+            .map(|folder| folder.join(self.name()))
+            .find(|file| file.is_file())
+            .ok_or(ProcessError::Missing { name: self.name(), package: self.name() })
+    }
+}
+
+/// A running child.
+#[derive(Debug)]
+pub struct Running {
+    name: String,
+    child: Child,
+    answer: Option<JoinHandle<String>>,
+    tail: Arc<Mutex<VecDeque<String>>>,
+    status: Option<ExitStatus>,
+}
+
+/// Arguments from anything that is text or a path.
+#[must_use]
+pub fn arguments<const N: usize>(list: [&dyn AsRef<std::ffi::OsStr>; N]) -> Vec<OsString> {
+    list.iter().map(|a| a.as_ref().to_owned()).collect()
+}
+
+impl Running {
+    /// Starts `program` with `arguments`, in the cell of `domain` (default: the one this process is in).
+    ///
+    /// # Errors
+    /// [`ProcessError::Missing`] or [`ProcessError::Start`].
+    pub fn start(program: Program, arguments: &[OsString], domain: Option<&str>) -> Result<Self, ProcessError> {
+        let path = program.find()?;
+        let mut command = Command::new(&path);
+        command.args(arguments).stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped()).process_group(0);
+        if let Some(domain) = domain {
+            command.env(DOMAIN_VARIABLE, domain);
+        }
+        let verb = arguments.first().map_or(String::new(), |v| format!(" {}", v.to_string_lossy()));
+        Self::spawn(format!("{}{verb}", program.name()), &mut command)
+            .map_err(|source| ProcessError::Start { path, source })
+    }
+
+    fn spawn(name: String, command: &mut Command) -> std::io::Result<Self> {
+        let mut child = command.spawn()?;
+        let tail = Arc::new(Mutex::new(VecDeque::new()));
+        if let Some(stderr) = child.stderr.take() {
+            let tail = Arc::clone(&tail);
+            std::thread::spawn(move || keep_tail(BufReader::new(stderr), &tail));
+        }
+        let answer = child.stdout.take().map(|mut stdout| {
+            std::thread::spawn(move || {
+                let mut text = String::new();
+                // What cannot be read is missed by whoever parses the answer.
+                let _ = stdout.read_to_string(&mut text);
+                text
+            })
+        });
+        tracing::debug!("started {name} as process {}", child.id());
+        Ok(Self { name, child, answer, tail, status: None })
+    }
+
+    /// An error when the child ended although nobody asked it to.
+    ///
+    /// # Errors
+    /// [`ProcessError::Ended`] with its last words.
+    pub fn check(&mut self) -> Result<(), ProcessError> {
+        match self.poll() {
+            None => Ok(()),
+            Some(status) => Err(self.ended(status)),
+        }
+    }
+
+    /// Asks the child to end (SIGTERM) and returns what it wrote to stdout.
+    ///
+    /// # Errors
+    /// [`ProcessError::Ended`] when it fails, [`ProcessError::Stuck`] when it has to be killed.
+    pub fn stop(mut self) -> Result<String, ProcessError> {
+        self.terminate();
+        self.finish(GRACE, || false)
+    }
+
+    /// Waits until the child ends by itself and returns what it wrote to stdout. Asked to give up by `cancelled`, it ends the child first.
+    ///
+    /// # Errors
+    /// [`ProcessError::Ended`] when it fails, [`ProcessError::Stuck`] when it takes longer than `patience`.
+    pub fn finish(mut self, patience: Duration, cancelled: impl Fn() -> bool) -> Result<String, ProcessError> {
+        let start = Instant::now();
+        let mut asked = false;
+        let status = loop {
+            if let Some(status) = self.poll() {
+                break status;
+            }
+            if !asked && cancelled() {
+                self.terminate();
+                asked = true;
+            }
+            if start.elapsed() > patience {
+                self.kill();
+                return Err(ProcessError::Stuck { name: self.name.clone(), waited: patience, tail: self.tail() });
+            }
+            std::thread::sleep(LOOK);
+        };
+        let answer = self.answer.take().and_then(|reader| reader.join().ok()).unwrap_or_default();
+        if status.success() { Ok(answer) } else { Err(self.ended(status)) }
+    }
+
+    fn poll(&mut self) -> Option<ExitStatus> {
+        if self.status.is_none() {
+            self.status = self.child.try_wait().ok().flatten();
+        }
+        self.status
+    }
+
+    fn terminate(&mut self) {
+        if self.poll().is_none()
+            && let Some(pid) = i32::try_from(self.child.id()).ok().and_then(Pid::from_raw)
+            && let Err(error) = kill_process(pid, Signal::TERM)
+        {
+            tracing::warn!("cannot end {}: {error}", self.name);
+        }
+    }
+
+    fn kill(&mut self) {
+        // Fails only when it is gone already, which is what is wanted.
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+
+    fn ended(&self, status: ExitStatus) -> ProcessError {
+        // The reader of stderr may be a moment behind the end of the process.
+        std::thread::sleep(LOOK);
+        ProcessError::Ended { name: self.name.clone(), status, tail: self.tail() }
+    }
+
+    fn tail(&self) -> String {
+        let lines = self.tail.lock().unwrap_or_else(PoisonError::into_inner);
+        if lines.is_empty() {
+            return "  (nothing)".into();
+        }
+        lines.iter().map(|line| format!("  {line}")).collect::<Vec<_>>().join("\n")
+    }
+}
+
+impl Drop for Running {
+    fn drop(&mut self) {
+        self.terminate();
+        let start = Instant::now();
+        while self.poll().is_none() {
+            if start.elapsed() > GRACE {
+                self.kill();
+                return;
+            }
+            std::thread::sleep(LOOK);
+        }
+    }
+}
+
+fn keep_tail(lines: impl BufRead, tail: &Mutex<VecDeque<String>>) {
+    for line in lines.lines().map_while(Result::ok) {
+        let mut kept = tail.lock().unwrap_or_else(PoisonError::into_inner);
+        if kept.len() == TAIL {
+            kept.pop_front();
+        }
+        kept.push_back(line);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn shell(script: &str) -> Running {
+        let mut command = Command::new("sh");
+        command.args(["-c", script]).stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
+        Running::spawn("sh".into(), &mut command).expect("a shell")
+    }
+
+    #[test]
+    fn the_last_words_of_a_child_that_fails_are_quoted() {
+        let error = shell("echo cannot open the robot >&2; exit 1").finish(GRACE, || false).unwrap_err().to_string();
+        assert!(error.contains("exit status: 1") && error.contains("cannot open the robot"), "{error}");
+    }
+
+    #[test]
+    fn a_child_that_ends_unasked_is_noticed() {
+        let mut child = shell("exit 0");
+        std::thread::sleep(Duration::from_millis(200));
+        assert!(matches!(child.check(), Err(ProcessError::Ended { .. })));
+    }
+
+    #[test]
+    fn a_stopped_child_still_gives_its_answer() {
+        let child = shell("trap 'echo done; exit 0' TERM; while true; do sleep 0.01; done");
+        std::thread::sleep(Duration::from_millis(300));
+        assert_eq!(child.stop().expect("a clean end"), "done\n");
+    }
+
+    #[test]
+    fn a_child_that_takes_too_long_is_killed_and_named() {
+        let error = shell("sleep 60").finish(Duration::from_millis(50), || false).unwrap_err();
+        assert!(matches!(error, ProcessError::Stuck { .. }), "{error}");
+    }
+
+    #[test]
+    fn a_cancelled_child_is_ended() {
+        let start = Instant::now();
+        assert!(shell("sleep 60").finish(Duration::from_secs(30), || true).is_err());
+        assert!(start.elapsed() < Duration::from_secs(10));
+    }
+}

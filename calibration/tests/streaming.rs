@@ -1,0 +1,121 @@
+//! A motion goes from plan to bridge over real shared memory, against a bridge that obeys and bridges that do not.
+
+mod fake_bridge;
+
+use calibration::capture::link::{Link, LinkError};
+use calibration::capture::plan::Plan;
+use calibration::capture::stream::{Outcome, StreamError, play};
+use calibration::interrupt::Interrupt;
+use fake_bridge::{FakeBridge, Fault};
+use shared_mem::msg::arm::ArmMode;
+use shared_mem::msg::joints_from;
+use shared_mem::msg::motion::SetPoint;
+use std::time::{Duration, Instant};
+
+const START: [f64; 8] = [0.1, -0.7, 0.0, -2.3, 0.0, 1.5, 0.7, 0.0];
+
+/// Joint 1 swings once, `length` set points long.
+fn swing(length: usize) -> Plan {
+    let omega = std::f64::consts::TAU / (length - 1) as f64;
+    let set_points: Vec<SetPoint> = (0..length)
+        .map(|i| {
+            let (sin, cos) = (omega * i as f64).sin_cos();
+            let mut q_d = START;
+            q_d[0] += 0.1 * (1.0 - cos);
+            SetPoint { q_d, dq_d: joints_from(&[0.1 * omega * sin * 1e3]) }
+        })
+        .collect();
+    Plan { set_points, dof: 7, amplitude: vec![0.2; 7], bound_by: vec![None; 7], peak_speed: 0.1 * omega * 1e3 }
+}
+
+/// A cell of its own for each test.
+fn domain(test: &str) -> String {
+    format!("{test}-{}", std::process::id())
+}
+
+fn attempt(test: &str, mode: ArmMode, fault: Fault, length: usize) -> Result<Outcome, StreamError> {
+    let domain = domain(test);
+    let _bridge = FakeBridge::start(&domain, mode, START, fault);
+    let mut link = Link::open(Some(&domain)).expect("shared memory");
+    play(&mut link, &swing(length), &Interrupt::default(), |_| {})
+}
+
+#[test]
+fn every_set_point_arrives_once_and_in_order() {
+    let domain = domain("order");
+    let bridge = FakeBridge::start(&domain, ArmMode::Move, START, Fault::None);
+    let mut link = Link::open(Some(&domain)).expect("shared memory");
+    let plan = swing(1234);
+    let mut states = 0;
+    for _ in 0..2 {
+        let outcome = play(&mut link, &plan, &Interrupt::default(), |_| states += 1).expect("played");
+        assert_eq!(outcome, Outcome::Done);
+    }
+    let played = bridge.finish();
+    assert_eq!(played.len(), 2 * plan.set_points.len());
+    assert!(played[..1234] == plan.set_points[..] && played[1234..] == plan.set_points[..]);
+    assert!(states >= 2 * 1234, "{states} states were watched");
+}
+
+#[test]
+fn a_refusal_is_told_with_the_bridges_reason() {
+    let error = attempt("refuse", ArmMode::Move, Fault::Refuse, 600).unwrap_err();
+    assert!(matches!(&error, StreamError::Refused { reason } if reason.contains("joint 2")), "{error}");
+}
+
+#[test]
+fn a_brake_is_told_with_the_bridges_reason() {
+    let error = attempt("brake", ArmMode::Move, Fault::BrakeAfter(200), 600).unwrap_err();
+    assert!(matches!(&error, StreamError::Braked { played: 200, reason } if reason.contains("joint 4")), "{error}");
+}
+
+#[test]
+fn a_bridge_that_dies_is_noticed_and_the_remedy_named() {
+    let start = Instant::now();
+    let error = attempt("die", ArmMode::Move, Fault::DieAfter(100), 600).unwrap_err();
+    assert!(matches!(error, StreamError::Link(LinkError::Silent { .. })), "{error}");
+    assert!(error.to_string().contains("rt_bridge run"), "{error}");
+    assert!(start.elapsed() < Duration::from_secs(5));
+}
+
+#[test]
+fn a_bridge_that_restarts_is_noticed() {
+    let error = attempt("restart", ArmMode::Move, Fault::RestartAfter(100), 600).unwrap_err();
+    assert!(matches!(error, StreamError::Link(LinkError::Restarted)), "{error}");
+}
+
+#[test]
+fn a_bridge_that_takes_no_motion_up_is_not_waited_for_forever() {
+    let error = attempt("deaf", ArmMode::Move, Fault::Deaf, 600).unwrap_err();
+    assert!(matches!(error, StreamError::NotTaken), "{error}");
+}
+
+#[test]
+fn a_robot_in_reflex_is_not_moved_and_the_remedy_is_named() {
+    let error = attempt("reflex", ArmMode::Reflex, Fault::None, 600).unwrap_err();
+    assert!(matches!(error, StreamError::Link(LinkError::NotReady { .. })), "{error}");
+    assert!(error.to_string().contains("recover"), "{error}");
+}
+
+#[test]
+fn ctrl_c_brakes_the_arm_and_waits_for_rest() {
+    let domain = domain("ctrl-c");
+    let bridge = FakeBridge::start(&domain, ArmMode::Move, START, Fault::None);
+    let mut link = Link::open(Some(&domain)).expect("shared memory");
+    let interrupt = Interrupt::default();
+    let mut states = 0;
+    let outcome = play(&mut link, &swing(5000), &interrupt, |_| {
+        states += 1;
+        if states == 500 {
+            interrupt.ask();
+        }
+    });
+    assert!(matches!(outcome, Ok(Outcome::Stopped)));
+    assert!(bridge.finish().len() < 2000, "the motion was cut short");
+}
+
+#[test]
+fn without_a_bridge_nobody_waits_long() {
+    let mut link = Link::open(Some(&domain("nobody"))).expect("shared memory");
+    assert!(link.wait_for_bridge(Duration::from_millis(50), || false).expect("shared memory").is_none());
+}
