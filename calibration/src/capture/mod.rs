@@ -5,6 +5,7 @@
 
 pub mod body;
 pub mod bridge;
+pub mod excess;
 pub mod excitation;
 pub mod limits;
 pub mod link;

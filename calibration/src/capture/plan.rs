@@ -4,11 +4,11 @@
 //! Called by the capture verb; what it returns is streamed as it is.
 
 use super::body::Body;
+use super::excess::{Excess, Quantity};
 use super::limits::JointLimits;
 use super::multisine::Multisine;
 use shared_mem::msg::motion::SetPoint;
 use shared_mem::msg::{Joints, MAX_JOINTS};
-use std::fmt;
 use twin::arm::JointState;
 
 /// Set points a second: the control rate of the arm.
@@ -50,75 +50,6 @@ pub struct Plan {
     pub bound_by: Vec<Option<Quantity>>,
     /// Largest commanded speed of any joint [rad/s].
     pub peak_speed: f64,
-}
-
-/// What is limited.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Quantity {
-    /// Joint position [rad].
-    Position,
-    /// Joint speed, which falls towards the stops [rad/s].
-    Speed,
-    /// Joint acceleration [rad/s²].
-    Acceleration,
-    /// Joint jerk [rad/s³].
-    Jerk,
-    /// Joint torque, gravity included [N m].
-    Torque,
-    /// Height of flange and tool [m].
-    Height,
-}
-
-impl Quantity {
-    /// Its unit.
-    #[must_use]
-    pub fn unit(self) -> &'static str {
-        match self {
-            Self::Position => "rad",
-            Self::Speed => "rad/s",
-            Self::Acceleration => "rad/s²",
-            Self::Jerk => "rad/s³",
-            Self::Torque => "N m",
-            Self::Height => "m",
-        }
-    }
-}
-
-impl fmt::Display for Quantity {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Position => "position",
-            Self::Speed => "speed",
-            Self::Acceleration => "acceleration",
-            Self::Jerk => "jerk",
-            Self::Torque => "torque",
-            Self::Height => "height",
-        })
-    }
-}
-
-/// A value beyond its limit.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Excess {
-    /// Joint, from 0; of a height, the joint with the largest say in it is not known: `None`.
-    pub joint: Option<usize>,
-    /// What is too large or too low.
-    pub quantity: Quantity,
-    /// Its value.
-    pub value: f64,
-    /// What it may be at most (position and height: or at least).
-    pub limit: f64,
-}
-
-impl fmt::Display for Excess {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { joint, quantity, value, limit } = self;
-        match joint {
-            Some(joint) => write!(f, "joint {}", joint + 1)?,
-            None => write!(f, "the tool")?,
-        }
-        write!(f, ": {quantity} {value:.4} {unit}, limit {limit:.4} {unit}", unit = quantity.unit())
-    }
 }
 
 /// No motion can be planned.
@@ -333,10 +264,8 @@ mod tests {
                 assert_inside(&plan, &limits, &body, request.floor);
                 let (first, last) = (&plan.set_points[0], &plan.set_points[plan.set_points.len() - 1]);
                 for point in [first, last] {
-                    for joint in 0..limits.len() {
-                        prop_assert!((point.q_d[joint] - start[joint]).abs() < 1e-12);
-                        prop_assert!(point.dq_d[joint].abs() < 1e-9);
-                    }
+                    prop_assert!(point.q_d.iter().zip(&start).all(|(q, start)| (q - start).abs() < 1e-12));
+                    prop_assert!(point.dq_d.iter().all(|dq| dq.abs() < 1e-9));
                 }
             }
         }

@@ -1,0 +1,43 @@
+//! The command line as its users meet it: help that teaches, wrong arguments that are refused.
+
+use std::process::{Command, Output};
+
+fn calibration(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_calibration")).args(arguments).output().expect("the binary runs")
+}
+
+fn text(bytes: &[u8]) -> &str {
+    std::str::from_utf8(bytes).expect("UTF-8")
+}
+
+#[test]
+fn every_verb_teaches_with_an_example() {
+    for verb in [&["capture", "excitation"][..]] {
+        let output = calibration(&[verb, &["--help"]].concat());
+        let example = format!("calibration {}", verb.join(" "));
+        let help = text(&output.stdout);
+        assert!(output.status.success());
+        let examples = help.split_once("Examples:").unwrap_or_else(|| panic!("no examples in:\n{help}")).1;
+        assert!(examples.contains(&example), "no example of `{example}` in:\n{help}");
+    }
+}
+
+#[test]
+fn wrong_arguments_exit_with_2_and_say_what_is_allowed() {
+    let common = ["capture", "excitation", "--cell", "cell.toml", "--out", "session", "--clips"];
+    for (wrong, allowed) in [(&["0"][..], "1..=1000"), (&["1", "--amplitude", "7"][..], "from 0.01 to 1.5")] {
+        let output = calibration(&[&common[..], wrong].concat());
+        assert_eq!(output.status.code(), Some(2));
+        assert!(text(&output.stderr).contains(allowed), "{}", text(&output.stderr));
+    }
+}
+
+#[test]
+fn a_missing_cell_fails_in_one_line_that_names_the_file() {
+    let output =
+        calibration(&["capture", "excitation", "--cell", "nowhere/cell.toml", "--clips", "1", "--out", "session"]);
+    assert_eq!(output.status.code(), Some(1));
+    let said = text(&output.stderr);
+    assert_eq!(said.lines().count(), 1, "{said}");
+    assert!(said.contains("nowhere/cell.toml"), "{said}");
+}
