@@ -74,7 +74,7 @@ impl fmt::Display for ArmFault {
             ),
             Self::NotReady { mode } => write!(
                 f,
-                "the robot is in mode {mode:?} and takes no commands; release the user stop, leave guiding, then start again"
+                "the robot is in mode {mode:?} and takes no commands; unlock its joints and activate FCI in its web page, leave guiding, then start again"
             ),
             Self::Socket { errno } => write!(
                 f,
