@@ -2,5 +2,8 @@
 
 pub mod arm;
 pub mod physics;
+pub mod render;
 pub mod rollout;
 pub mod scene;
+pub mod sensors;
+pub mod sim;

@@ -7,7 +7,22 @@ pub use mesh_file::MeshFileError;
 
 use nalgebra::{Point3, Vector3};
 use shared_mem::cell::Cell;
+use shared_mem::frames::{Base, Object, Pose};
+use shared_mem::msg::Joints;
 use shared_mem::theta::{ObjectTheta, Theta};
+
+/// The cell at one moment, as far as a camera sees it.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct SceneSnapshot {
+    /// Simulated clock [ns].
+    pub time_ns: u64,
+    /// Joints that count.
+    pub dof: usize,
+    /// Joint positions [rad].
+    pub q: Joints,
+    /// The object's geometric centre, where there is an object.
+    pub object: Option<Pose<Base, Object>>,
+}
 
 /// The object with every number a simulation needs.
 #[derive(Debug, Clone, PartialEq)]

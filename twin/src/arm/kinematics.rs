@@ -44,6 +44,18 @@ impl ArmModel {
         out
     }
 
+    /// Origin of every joint's frame in the base frame [m]: on the joint's axis, where the next link begins.
+    #[must_use]
+    pub fn joint_origins(&self, q: &Joints) -> [[f64; 3]; MAX_JOINTS] {
+        with_dof!(self, N => {
+            let mut out = [[0.0; 3]; MAX_JOINTS];
+            for (o, frame) in out.iter_mut().zip(&Chain::<N>::at(first(&self.links), first(q)).frames) {
+                *o = frame.origin;
+            }
+            out
+        })
+    }
+
     fn last_frame(&self, q: &Joints) -> Frame {
         with_dof!(self, N => Chain::<N>::at(first(&self.links), first(q)).frames[N - 1])
     }

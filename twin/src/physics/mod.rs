@@ -9,4 +9,4 @@ pub mod hit;
 mod settings;
 mod table_object;
 
-pub use table_object::{Push, TableObject};
+pub use table_object::{FlatMesh, Push, TableObject};

@@ -1,0 +1,291 @@
+//! A simulated D455: colour and depth of one moment, depth aligned to colour, from the scene's geometry. Table, box or
+//! mesh, arm as capsules between its joints, tool as the capsule it is. The picture has no lens distortion.
+//!
+//! Called by the bridge's camera thread: allocates nothing after it was made.
+
+use super::depth::{self, DepthSensor};
+use super::{camera_clock_ns, generator};
+use crate::arm::{ArmModel, MAX_JOINTS};
+use crate::render::{Mesh, Pinhole, Raster};
+use crate::scene::{ObjectModel, SceneSnapshot};
+use crate::sim::SimError;
+use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
+use shared_mem::cell::{Camera, Cell};
+use shared_mem::msg::image::{CameraInfo, ImageHeader, PixelEncoding, StampDomain};
+
+/// The camera.
+pub struct SimCamera {
+    settings: Camera,
+    camera_from_base: Isometry3<f32>,
+    raster: Raster,
+    depth: DepthSensor,
+    still: Vec<Mesh>,
+    arm: Option<ArmBody>,
+    object: Option<Mesh>,
+    sequence: u64,
+    next_picture_ns: u64,
+}
+
+/// The arm as it is drawn.
+struct ArmBody {
+    model: ArmModel,
+    links: Vec<LinkBody>,
+    tool: Option<Mesh>,
+}
+
+/// A capsule from one of the arm's points to the next: base, joints, flange.
+struct LinkBody {
+    from: usize,
+    mesh: Mesh,
+}
+
+/// Half edges of the drawn table top and its middle in front of the robot [m]; physics knows an endless plane.
+const TABLE_HALF: [f32; 2] = [0.7, 0.8];
+const TABLE_MIDDLE_X: f32 = 0.3;
+/// The floor below the table top [m], and half its edge.
+const FLOOR_BELOW: f32 = 0.75;
+const FLOOR_HALF: f32 = 5.0;
+/// Link radius at the base and at the flange [m]: an FR3's.
+const LINK_RADIUS: [f64; 2] = [0.065, 0.042];
+
+/// Towards the light, base frame: above, on the side that cameras in front of the robot see.
+const LIGHT: [f32; 3] = [0.55, 0.25, 0.8];
+
+const BACKGROUND: [u8; 3] = [168, 186, 204];
+const FLOOR: [u8; 3] = [128, 130, 134];
+const TABLE: [u8; 3] = [196, 172, 140];
+const LINKS: [[u8; 3]; 2] = [[238, 240, 242], [206, 210, 216]];
+const TOOL: [u8; 3] = [92, 100, 116];
+const OBJECT: [u8; 3] = [222, 112, 40];
+
+impl SimCamera {
+    /// The camera of a cell, a D455 where `[camera]` is absent. Without `[object] pose_noise` depth is exact.
+    ///
+    /// # Errors
+    /// [`SimError`] when the arm or the object's mesh cannot be read.
+    pub fn new(cell: &Cell) -> Result<Self, SimError> {
+        let settings = cell.camera.clone().unwrap_or_else(Camera::default);
+        let pinhole = settings.pinhole();
+        let [fx, fy, cx, cy] = [pinhole.fx, pinhole.fy, pinhole.cx, pinhole.cy].map(|v| v as f32);
+        let base_from_camera = settings.base_from_camera().map_or_else(Isometry3::identity, |pose| pose.isometry());
+        let camera_from_base: Isometry3<f32> = base_from_camera.inverse().cast();
+        let light = camera_from_base * Vector3::from(LIGHT);
+        let pinhole = Pinhole { fx, fy, cx, cy };
+        let raster = Raster::new(settings.width as usize, settings.height as usize, pinhole, light);
+        let noisy = cell.object.as_ref().is_none_or(|o| o.pose_noise.is_some());
+        let height = cell.table.map_or(0.0, |t| t.height as f32);
+        let still = vec![
+            Mesh::plate([0.0, 0.0, height - FLOOR_BELOW], [FLOOR_HALF; 2], FLOOR),
+            Mesh::plate([TABLE_MIDDLE_X, 0.0, height], TABLE_HALF, TABLE),
+        ];
+        Ok(Self {
+            camera_from_base,
+            raster,
+            depth: DepthSensor::new(settings.width, settings.height, noisy, generator(cell, 2)),
+            still,
+            arm: cell.robot.as_ref().map(|_| ArmBody::new(cell)).transpose()?,
+            object: ObjectModel::new(cell, None)?.map(|model| Mesh::new(model.shape.triangles(), OBJECT)),
+            sequence: 0,
+            next_picture_ns: 0,
+            settings,
+        })
+    }
+
+    /// Bytes of a colour picture.
+    #[must_use]
+    pub fn color_bytes(&self) -> usize {
+        self.raster.color().len() * 3
+    }
+
+    /// Bytes of a depth picture.
+    #[must_use]
+    pub fn depth_bytes(&self) -> usize {
+        self.raster.color().len() * 2
+    }
+
+    /// Whether the camera takes a picture at this moment of the simulated clock; asked every control period.
+    pub fn is_due(&mut self, time_ns: u64) -> bool {
+        let period_ns = (1e9 / self.settings.rate) as u64;
+        let due = time_ns >= self.next_picture_ns;
+        if due {
+            self.next_picture_ns = (time_ns / period_ns + 1) * period_ns;
+        }
+        due
+    }
+
+    /// Takes a picture: RGB8 into `color`, little-endian millimetres into `depth` (0: nothing measured), row by row
+    /// without padding, [`Self::color_bytes`] and [`Self::depth_bytes`] long. Answers with the headers of both, whose
+    /// `stamp_ns` the host sets.
+    pub fn render(&mut self, scene: &SceneSnapshot, color: &mut [u8], depth: &mut [u8]) -> [ImageHeader; 2] {
+        self.draw(scene);
+        for (rgb, packed) in color.chunks_exact_mut(3).zip(self.raster.color()) {
+            rgb.copy_from_slice(&packed.to_le_bytes()[..3]);
+        }
+        let width = self.settings.width as usize;
+        for (row, inverse_depth) in
+            depth.chunks_exact_mut(2 * width).zip(self.raster.inverse_depth().chunks_exact(width))
+        {
+            self.depth.row(inverse_depth, row);
+        }
+        self.sequence += 1;
+        [(PixelEncoding::Rgb8, 3, 0.0), (PixelEncoding::Depth16, 2, depth::SCALE)].map(
+            |(encoding, bytes, depth_scale)| ImageHeader {
+                stamp_ns: 0,
+                device_ns: camera_clock_ns(scene.time_ns),
+                sequence: self.sequence - 1,
+                exposure_ns: 0,
+                width: self.settings.width,
+                height: self.settings.height,
+                stride: self.settings.width * bytes,
+                encoding,
+                depth_scale,
+                stamp_domain: StampDomain::HardwareClock,
+                reserved: 0,
+            },
+        )
+    }
+
+    /// How this camera projects and where it stands. `stamp_ns` is the host's to set.
+    #[must_use]
+    pub fn info(&self) -> CameraInfo {
+        let pinhole = self.settings.pinhole();
+        CameraInfo {
+            stamp_ns: 0,
+            width: self.settings.width,
+            height: self.settings.height,
+            intrinsics: [pinhole.fx, pinhole.fy, pinhole.cx, pinhole.cy],
+            distortion: [0.0; 5],
+            position: self.settings.pose.position,
+            wxyz: self.settings.pose.orientation,
+        }
+    }
+
+    fn draw(&mut self, scene: &SceneSnapshot) {
+        self.raster.clear(BACKGROUND);
+        for mesh in &self.still {
+            self.raster.draw(mesh, &self.camera_from_base);
+        }
+        if let Some(arm) = &self.arm {
+            arm.draw(&mut self.raster, &self.camera_from_base, scene);
+        }
+        if let (Some(mesh), Some(pose)) = (&self.object, scene.object) {
+            self.raster.draw(mesh, &(self.camera_from_base * pose.isometry().cast::<f32>()));
+        }
+    }
+}
+
+impl ArmBody {
+    fn new(cell: &Cell) -> Result<Self, SimError> {
+        let model = ArmModel::from_cell(cell)?;
+        let count = model.dof() + 2;
+        let (points, _) = arm_points(&model, model.ready());
+        let mut links = Vec::new();
+        for from in 0..count - 1 {
+            let length = (points[from + 1] - points[from]).norm();
+            // Joints whose axes meet in one point have no link between them.
+            if model.has_geometry() && length > 1e-3 {
+                let share = from as f64 / (count - 2) as f64;
+                let radius = LINK_RADIUS[0] * (1.0 - share) + LINK_RADIUS[1] * share;
+                let end = Point3::new(0.0, 0.0, length);
+                links.push(LinkBody { from, mesh: Mesh::capsule(&Point3::origin(), &end, radius, LINKS[from % 2]) });
+            }
+        }
+        let tool = cell.tool.as_ref().filter(|_| model.has_geometry()).map(|tool| {
+            let end = Point3::new(0.0, 0.0, tool.length - tool.radius);
+            Mesh::capsule(&Point3::origin(), &end, tool.radius, TOOL)
+        });
+        Ok(Self { model, links, tool })
+    }
+
+    fn draw(&self, raster: &mut Raster, camera_from_base: &Isometry3<f32>, scene: &SceneSnapshot) {
+        let (points, base_from_flange) = arm_points(&self.model, &scene.q);
+        for LinkBody { from, mesh } in &self.links {
+            let (a, b) = (points[*from], points[from + 1]);
+            // A capsule looks the same from all sides, so any turn that brings z to the link will do.
+            let turn = UnitQuaternion::rotation_between(&Vector3::z(), &(b - a))
+                .unwrap_or_else(|| UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI));
+            let base_from_link = Isometry3::from_parts(Translation3::from(a.coords), turn);
+            raster.draw(mesh, &(camera_from_base * base_from_link.cast::<f32>()));
+        }
+        if let Some(tool) = &self.tool {
+            raster.draw(tool, &(camera_from_base * base_from_flange.cast::<f32>()));
+        }
+    }
+}
+
+/// Base origin, joint origins and flange origin in the base frame, `dof + 2` of them [m]; and the flange's frame.
+fn arm_points(model: &ArmModel, q: &[f64; MAX_JOINTS]) -> ([Point3<f64>; MAX_JOINTS + 2], Isometry3<f64>) {
+    let flange = model.flange(q).isometry();
+    let mut points = [Point3::origin(); MAX_JOINTS + 2];
+    for (point, origin) in points[1..].iter_mut().zip(&model.joint_origins(q)[..model.dof()]) {
+        *point = Point3::from(*origin);
+    }
+    points[model.dof() + 1] = Point3::from(flange.translation.vector);
+    (points, flange)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sim::SimCell;
+    use shared_mem::cell::CameraPose;
+    use std::path::Path;
+
+    fn shipped() -> Cell {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../config/fr3_cell.toml");
+        Cell::read(&path).expect("the shipped cell")
+    }
+
+    fn picture(cell: &Cell, scene: &SceneSnapshot) -> (SimCamera, Vec<u8>, Vec<u16>, [ImageHeader; 2]) {
+        let mut camera = SimCamera::new(cell).expect("a camera");
+        let (mut color, mut depth) = (vec![0; camera.color_bytes()], vec![0; camera.depth_bytes()]);
+        let headers = camera.render(scene, &mut color, &mut depth);
+        let depth = depth.chunks_exact(2).map(|b| u16::from_le_bytes([b[0], b[1]])).collect();
+        (camera, color, depth, headers)
+    }
+
+    #[test]
+    fn the_depth_of_the_box_s_top_is_what_geometry_says() {
+        let mut cell = shipped();
+        cell.object.as_mut().expect("a box").pose_noise = None;
+        // Straight above the box, looking down, 1.1 m over the table: x of the picture along the base's x.
+        let [x, y] = cell.simulation.object_position;
+        cell.camera.as_mut().expect("a camera").pose =
+            CameraPose { position: [x, y, 1.1], orientation: [0.0, 1.0, 0.0, 0.0] };
+        let scene = SimCell::new(&cell, None).expect("a cell").snapshot();
+        let (camera, _, depth, [_, header]) = picture(&cell, &scene);
+        let pinhole = camera.settings.pinhole();
+        let at = |u: f64, v: f64| depth[v.round() as usize * 640 + u.round() as usize];
+        // The top is 1.0 m away and 80 mm by 60 mm wide.
+        for (dx, dy) in [(0.0, 0.0), (0.037, 0.0), (-0.037, 0.027), (0.0, -0.027)] {
+            let seen = at(pinhole.cx + pinhole.fx * dx, pinhole.cy - pinhole.fy * dy);
+            assert!(seen.abs_diff(1000) <= 1, "{seen} mm at {dx} {dy}");
+        }
+        let beside = at(pinhole.cx + pinhole.fx * 0.05, pinhole.cy);
+        assert!(beside.abs_diff(1100) <= 1, "the table beside it: {beside} mm");
+        assert_eq!((header.width, header.stride, header.depth_scale), (640, 1280, 0.001));
+    }
+
+    #[test]
+    fn the_box_and_the_arm_are_in_the_picture() {
+        let cell = shipped();
+        let scene = SimCell::new(&cell, None).expect("a cell").snapshot();
+        let (_, color, _, _) = picture(&cell, &scene);
+        let orange = color.chunks_exact(3).filter(|p| p[0] > 2 * p[2] && p[0] > 80 && p[0] > p[1] + 40).count();
+        let white = color.chunks_exact(3).filter(|p| p.iter().all(|c| *c > 200)).count();
+        assert!((400..8000).contains(&orange), "{orange} pixels of the box");
+        assert!(white > 2000, "{white} pixels of the arm");
+    }
+
+    #[test]
+    fn colour_and_depth_share_number_and_stamp_and_the_clock_is_the_cameras_own() {
+        let cell = shipped();
+        let scene = SceneSnapshot { time_ns: 5_000_000, dof: 7, ..SceneSnapshot::default() };
+        let (mut camera, _, _, [color, depth]) = picture(&cell, &scene);
+        assert_eq!((color.sequence, color.device_ns), (depth.sequence, depth.device_ns));
+        assert_eq!(color.device_ns, camera_clock_ns(5_000_000));
+        assert_eq!(color.stamp_domain, StampDomain::HardwareClock);
+        let due = (0..1000).filter(|t| camera.is_due(t * 1_000_000)).count();
+        assert_eq!(due, 30);
+    }
+}

@@ -1,0 +1,22 @@
+//! What the simulated cell's instruments report: encoders, a depth camera, an object tracker. Each takes the true
+//! state of [`crate::sim::SimCell`] and adds what the real instrument adds: noise, latency, its own clock.
+
+pub mod camera;
+mod depth;
+pub mod joint;
+pub mod tracker;
+
+/// How far the simulated camera's clock is ahead of the simulated robot's [ns]: two devices never share an epoch.
+const CAMERA_EPOCH_NS: u64 = 86_400_123_456_789;
+
+/// The camera's own stamp of a moment of the simulation [ns].
+#[must_use]
+pub fn camera_clock_ns(time_ns: u64) -> u64 {
+    CAMERA_EPOCH_NS + time_ns
+}
+
+/// The generator behind one instrument: the cell's seed, and a stream of its own for each instrument, so that adding
+/// one instrument does not change what another reports.
+fn generator(cell: &shared_mem::cell::Cell, stream: u64) -> rand_pcg::Pcg64 {
+    rand_pcg::Pcg64::new(u128::from(cell.simulation.seed), u128::from(stream))
+}

@@ -1,0 +1,140 @@
+//! One control period of arm and object together: coarse steps while they are apart, fine ones around a contact, whose
+//! force acts on both at the same point with opposite signs.
+
+use super::arm::SimArm;
+use super::{PERIOD, Vector3};
+use crate::arm::PointForce;
+use crate::physics::TableObject;
+use crate::physics::hit::{Capsule, Contact, ContactLaw, Touch};
+use nalgebra::Point3;
+use shared_mem::cell::Cell;
+
+/// Steps of the object in a period without contact: 0.25 ms each.
+const COARSE_STEPS: usize = 4;
+/// Steps of both in a period with contact: 62.5 µs, a ninetieth of the shortest contact's duration. Twice as many
+/// change the object's speed after a hit by less than 2 %: `a_finer_step_changes_the_hit_by_less_than_two_per_cent`.
+const FINE_STEPS: usize = 16;
+/// A gap that is wider than this plus a period's approach stays open for the period [m].
+const MARGIN: f64 = 1e-3;
+
+/// The contact between tool and object.
+pub(super) struct ToolContact {
+    /// Tool and law; `None` without a tool or an object.
+    pair: Option<(Capsule, ContactLaw)>,
+    contact: Contact,
+    fine_steps: usize,
+    mean_force: f64,
+    periods: u64,
+    first_period: Option<u64>,
+}
+
+impl ToolContact {
+    pub(super) fn without_object() -> Self {
+        Self {
+            pair: None,
+            contact: Contact::default(),
+            fine_steps: FINE_STEPS,
+            mean_force: 0.0,
+            periods: 0,
+            first_period: None,
+        }
+    }
+
+    pub(super) fn new(cell: &Cell, tip_friction: f64) -> Self {
+        let pair = cell.tool.as_ref().map(|tool| {
+            (Capsule { segment: tool.length - tool.radius, radius: tool.radius }, ContactLaw::nominal(tip_friction))
+        });
+        Self { pair, ..Self::without_object() }
+    }
+
+    /// Makes the fine steps `times` finer: for the test that they are fine enough.
+    #[cfg(test)]
+    pub(super) fn refine(&mut self, times: usize) {
+        self.fine_steps = FINE_STEPS * times;
+    }
+
+    pub(super) fn mean_force(&self) -> f64 {
+        self.mean_force
+    }
+
+    /// Number of the period in which the first contact began.
+    pub(super) fn first_period(&self) -> Option<u64> {
+        self.first_period
+    }
+
+    /// The object was put somewhere else.
+    pub(super) fn forget(&mut self) {
+        self.contact = Contact::default();
+        self.mean_force = 0.0;
+        self.first_period = None;
+    }
+
+    /// One period of arm and object.
+    pub(super) fn advance(&mut self, arm: &mut SimArm, object: &mut TableObject) {
+        self.mean_force = 0.0;
+        match self.pair.filter(|(tool, _)| arm.model().has_geometry() && may_touch(arm, object, tool)) {
+            Some((tool, law)) => self.advance_finely(arm, object, &tool, &law),
+            None => {
+                self.contact = Contact::default();
+                arm.advance(PERIOD, None);
+                settle(object);
+            }
+        }
+        self.periods += 1;
+    }
+
+    fn advance_finely(&mut self, arm: &mut SimArm, object: &mut TableObject, tool: &Capsule, law: &ContactLaw) {
+        let dt = PERIOD / self.fine_steps as f64;
+        for _ in 0..self.fine_steps {
+            let touch = touch(arm, object, tool);
+            let velocity = tool_velocity(arm, &touch.point);
+            let (push, normal_force) = self.contact.force(law, &touch, &velocity, object, dt);
+            if normal_force > 0.0 {
+                self.first_period.get_or_insert(self.periods);
+                self.mean_force += normal_force / self.fine_steps as f64;
+                let load = PointForce { point: push.point.into(), force: (-push.force).into() };
+                arm.advance(dt, Some(&load));
+                object.step(dt, Some(push));
+            } else {
+                arm.advance(dt, None);
+                object.step(dt, None);
+            }
+        }
+    }
+}
+
+/// One period of the object alone.
+pub(super) fn settle(object: &mut TableObject) {
+    for _ in 0..COARSE_STEPS {
+        object.step(PERIOD / COARSE_STEPS as f64, None);
+    }
+}
+
+/// Whether the gap may close within a period.
+fn may_touch(arm: &SimArm, object: &TableObject, tool: &Capsule) -> bool {
+    let flange = arm.model().flange(&arm.state().q).isometry();
+    let centre = Point3::from(object.pose().isometry().translation.vector);
+    let on_tool = flange.inverse_transform_point(&centre);
+    let nearest = Point3::new(0.0, 0.0, on_tool.z.clamp(0.0, tool.segment));
+    // Half a metre from the surface nothing happens within a millisecond; most periods end here.
+    let rough_gap = (on_tool - nearest).norm() - tool.radius - object.bounding_radius();
+    if rough_gap > 0.5 {
+        return false;
+    }
+    let touch = object.touch(tool, &flange);
+    let approach = (tool_velocity(arm, &touch.point) - object.velocity_at(&touch.point)).norm();
+    -touch.depth < MARGIN + approach * PERIOD
+}
+
+fn touch(arm: &SimArm, object: &TableObject, tool: &Capsule) -> Touch {
+    object.touch(tool, &arm.model().flange(&arm.state().q).isometry())
+}
+
+/// Velocity of the last link's point that is at `point` now [m/s].
+fn tool_velocity(arm: &SimArm, point: &Point3<f64>) -> Vector3<f64> {
+    let columns = arm.model().jacobian(&arm.state().q, (*point).into());
+    columns
+        .iter()
+        .zip(&arm.state().dq)
+        .fold(Vector3::zeros(), |sum, (column, rate)| sum + Vector3::new(column[0], column[1], column[2]) * *rate)
+}

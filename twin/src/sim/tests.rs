@@ -1,0 +1,203 @@
+//! Behaviour of the whole simulated cell.
+#![allow(non_snake_case)]
+
+use super::*;
+use crate::arm::{ControlLaw, JointState};
+use std::path::Path;
+
+/// The shipped cell without noise.
+fn shipped() -> Cell {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../config/fr3_cell.toml");
+    let mut cell = Cell::read(&path).expect("the shipped cell");
+    (cell.simulation.q_noise, cell.simulation.dq_noise) = (0.0, 0.0);
+    cell
+}
+
+/// The shipped cell with the table lifted to 30 mm under the tip and the box 20 mm beside it, so that turning joint 1
+/// strikes it.
+fn striking() -> Cell {
+    let mut cell = shipped();
+    let arm = ArmModel::from_cell(&cell).expect("an FR3");
+    let tip = arm.tip(arm.ready()).position();
+    cell.table = Some(shared_mem::cell::Table { height: tip[2] - 0.03 });
+    cell.simulation.object_position = [tip[0], tip[1] + 0.062];
+    cell
+}
+
+/// Turns joint 1 to 0.6 rad with a smooth start and end within a second, then holds; state and drive after each period.
+fn strike(cell: &mut SimCell, periods: u64, mut each: impl FnMut(&SimCell)) {
+    let start = cell.q();
+    for k in 0..periods {
+        let (share, rate) = smooth(k as f64 * PERIOD);
+        let (mut q_d, mut dq_d) = (start, [0.0; 8]);
+        q_d[0] += 0.6 * share;
+        dq_d[0] = 0.6 * rate;
+        cell.step(&Drive::JointImpedance { q_d, dq_d });
+        each(cell);
+    }
+}
+
+/// From 0 to 1 in a second: position and rate of a quintic.
+fn smooth(t: f64) -> (f64, f64) {
+    let t = t.min(1.0);
+    (t * t * t * (10.0 - 15.0 * t + 6.0 * t * t), 30.0 * t * t * (1.0 - t) * (1.0 - t))
+}
+
+fn object_position(cell: &SimCell) -> Vector3<f64> {
+    Vector3::from(cell.object().expect("a box").position())
+}
+
+#[test]
+fn an_arm_that_is_told_to_stay_stays() {
+    let mut cell = SimCell::new(&shipped(), None).expect("a cell");
+    let (q_d, dq_d) = (cell.q(), [0.0; 8]);
+    for _ in 0..1000 {
+        cell.step(&Drive::JointImpedance { q_d, dq_d });
+    }
+    for (q, q_d) in cell.q().iter().zip(&q_d) {
+        assert!((q - q_d).abs() < 1e-9);
+    }
+    assert_eq!(cell.time_ns(), 1_000_000_000);
+}
+
+#[test]
+fn the_client_s_torque_and_the_robot_s_own_controller_move_the_arm_alike() {
+    let description = shipped();
+    let mut inside = SimCell::new(&description, None).expect("a cell");
+    let mut outside = SimCell::new(&description, None).expect("a cell");
+    let model = ArmModel::from_cell(&description).expect("an FR3");
+    let law = ControlLaw::new(description.controller.as_ref(), None, &model).expect("gains");
+    let start = inside.q();
+    for k in 0..1000 {
+        let (share, rate) = smooth(f64::from(k) * PERIOD);
+        let q_d = std::array::from_fn(|i| start[i] + if i < 7 { 0.2 * share } else { 0.0 });
+        let dq_d = std::array::from_fn(|i| if i < 7 { 0.2 * rate } else { 0.0 });
+        inside.step(&Drive::JointImpedance { q_d, dq_d });
+        let state = JointState { q: outside.q(), dq: outside.dq() };
+        let (tau, gravity) = (law.torque(&model, &state, &q_d, &dq_d), model.gravity(&state.q));
+        outside.step(&Drive::Torque { tau_J_d: std::array::from_fn(|i| tau[i] - gravity[i]) });
+    }
+    for (a, b) in inside.q().iter().zip(&outside.q()) {
+        assert!((a - b).abs() < 1e-10, "{a} and {b}");
+    }
+}
+
+#[test]
+fn a_struck_box_moves_and_the_arm_feels_it() {
+    let description = striking();
+    let mut cell = SimCell::new(&description, None).expect("a cell");
+    let mut alone = SimCell::new(&Cell { object: None, ..description.clone() }, None).expect("a cell");
+    let before = object_position(&cell);
+    let mut state = ArmState::default();
+    let (mut peak, mut felt) = (0.0f64, 0.0f64);
+    strike(&mut cell, 1500, |cell| {
+        peak = peak.max(cell.contact_force());
+    });
+    strike(&mut alone, 1500, |_| {});
+    let moved = object_position(&cell) - before;
+    assert!(moved.y > 0.1, "pushed along the stroke: {moved}");
+    assert!(moved.z.abs() < 0.002, "it stays on the table: {moved}");
+    assert!(peak > 5.0, "{peak} N");
+    assert!(cell.first_contact_ns().is_some_and(|t| (100_000_000..600_000_000).contains(&t)));
+    // The same stroke again, watching the reported torque at the moment of contact.
+    let mut cell = SimCell::new(&description, None).expect("a cell");
+    let mut lag = 0.0f64;
+    let mut free = SimCell::new(&Cell { object: None, ..description }, None).expect("a cell");
+    let mut undisturbed = Vec::new();
+    strike(&mut free, 1000, |cell| undisturbed.push(cell.q()[0]));
+    let mut k = 0;
+    strike(&mut cell, 1000, |cell| {
+        lag = lag.max(undisturbed[k] - cell.q()[0]);
+        k += 1;
+    });
+    assert!(lag > 1e-4, "the box held the arm back by {lag} rad");
+    let start = cell.q();
+    cell.set_arm(&start, &[0.0; 7]);
+    cell.read(&mut state);
+    felt = felt.max(state.tau_ext[0].abs());
+    assert_eq!(felt, 0.0, "nothing touches a cell that was just set");
+}
+
+#[test]
+fn a_finer_step_changes_the_hit_by_less_than_two_per_cent() {
+    let description = striking();
+    let speeds = [1, 2].map(|finer| {
+        let mut cell = SimCell::new(&description, None).expect("a cell");
+        cell.contact.refine(finer);
+        let mut top = 0.0f64;
+        strike(&mut cell, 700, |cell| {
+            top = top.max(cell.object_velocity().expect("a box").0.norm());
+        });
+        (top, object_position(&cell))
+    });
+    let change = (speeds[0].0 / speeds[1].0 - 1.0).abs();
+    assert!(speeds[0].0 > 0.2, "{} m/s", speeds[0].0);
+    assert!(change < 0.02, "{change}");
+    let shift = (speeds[0].1 - speeds[1].1).norm();
+    assert!(shift < 0.003, "{shift} m");
+}
+
+#[test]
+fn a_hidden_gain_changes_the_motion_and_an_unknown_effect_is_refused() {
+    let description = shipped();
+    let controller = description.controller.clone().expect("gains");
+    let theta = Theta {
+        arm: Some(shared_mem::theta::ArmTheta {
+            stiffness: controller.stiffness.iter().map(|k| 0.8 * k).collect(),
+            damping: controller.damping,
+        }),
+        ..Theta::default()
+    };
+    let [nominal, hidden] = [None, Some(&theta)].map(|theta| {
+        let mut cell = SimCell::new(&description, theta).expect("a cell");
+        strike(&mut cell, 500, |_| {});
+        cell.q()[0]
+    });
+    assert!((nominal - hidden).abs() > 1e-4);
+    let effect = shared_mem::theta::EffectTheta { name: "joint_backlash".into(), parameters: Default::default() };
+    let error = SimCell::new(&description, Some(&Theta { effects: vec![effect], ..Theta::default() })).err();
+    assert!(error.is_some_and(|e| e.to_string().contains("joint_backlash")));
+}
+
+#[test]
+fn an_object_without_a_table_is_refused_with_the_remedy() {
+    let error = SimCell::new(&Cell { table: None, ..shipped() }, None).err().expect("refused").to_string();
+    assert!(error.contains("[table]"), "{error}");
+}
+
+#[test]
+fn the_report_is_the_state_with_noise_and_gravity_where_they_belong() {
+    let mut description = shipped();
+    description.simulation.q_noise = 1e-5;
+    let mut cell = SimCell::new(&description, None).expect("a cell");
+    let (q_d, dq_d) = (cell.q(), [0.0; 8]);
+    cell.step(&Drive::JointImpedance { q_d, dq_d });
+    let mut state = ArmState::default();
+    cell.read(&mut state);
+    assert_eq!((state.device_ns, state.dof), (1_000_000, 7));
+    assert!(state.q != cell.q(), "noise");
+    let model = cell.arm_model().expect("an arm");
+    let gravity = model.gravity(&cell.q());
+    for i in 0..7 {
+        assert!((state.tau_J[i] - gravity[i]).abs() < 1e-6, "at rest the sensor carries the arm's weight");
+        assert!(state.tau_J_d[i].abs() < 1e-6, "and the controller asks for nothing beyond it");
+    }
+    assert!((state.O_T_EE[12] - model.flange(&state.q).position()[0]).abs() < 1e-12);
+}
+
+#[test]
+fn a_tossed_object_needs_no_robot() {
+    let mut description = shipped();
+    (description.robot, description.controller, description.tool) = (None, None, None);
+    let mut cell = SimCell::new(&description, None).expect("a cell");
+    let start = Isometry3::new(Vector3::new(0.0, 0.0, 0.4), Vector3::new(0.3, 0.8, 0.1));
+    cell.set_object(&Pose::from_isometry(start), Vector3::new(0.8, 0.0, 0.5), Vector3::new(2.0, 5.0, -3.0));
+    let drive = Drive::Torque { tau_J_d: [0.0; 8] };
+    for _ in 0..3000 {
+        cell.step(&drive);
+    }
+    let (velocity, spin) = cell.object_velocity().expect("a box");
+    assert!(velocity.norm() < 1e-3 && spin.norm() < 1e-2, "at rest after 3 s: {velocity} {spin}");
+    let height = object_position(&cell).z;
+    assert!([0.03, 0.04, 0.05].iter().any(|h| (height - h).abs() < 2e-4), "on one of its faces: {height}");
+}
