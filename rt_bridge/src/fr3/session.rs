@@ -11,6 +11,7 @@ use franka::FrankaError;
 use franka::network::Network;
 use franka::wire::robot::v10::{Command, ConnectRequest, ConnectResponse, RobotCommand, RobotState};
 use franka::wire::{HeaderLayout, ROBOT_COMMAND_PORT, message_payload, parse_response};
+use std::net::{SocketAddr, ToSocketAddrs};
 use std::time::{Duration, Instant};
 use zerocopy::IntoBytes;
 
@@ -38,8 +39,9 @@ pub(super) struct Ticket(u32);
 impl Session {
     /// Connects, agrees on the version and waits for the first state.
     pub(super) fn connect(host: &str) -> Result<Self, ConnectError> {
+        let address = ipv4(host).ok_or_else(|| no_answer(host, "that name has no IPv4 address".into()))?;
         let network = Network::connect_with_timeouts(
-            host,
+            &address.to_string(),
             ROBOT_COMMAND_PORT,
             HeaderLayout::Robot,
             CONNECT_TIMEOUT,
@@ -182,6 +184,12 @@ fn status_byte(message: &[u8]) -> u8 {
     message_payload(HeaderLayout::Robot, message).first().copied().unwrap_or(u8::MAX)
 }
 
+/// Where `host` is. The protocol's state socket is IPv4 only, while `localhost` often means IPv6 first.
+fn ipv4(host: &str) -> Option<SocketAddr> {
+    let found = host.to_socket_addrs().or_else(|_| (host, ROBOT_COMMAND_PORT).to_socket_addrs());
+    found.ok()?.find(SocketAddr::is_ipv4)
+}
+
 fn no_answer(host: &str, what: String) -> ConnectError {
     ConnectError::NoAnswer { host: host.to_owned(), what }
 }
@@ -224,6 +232,14 @@ fn millis(duration: Duration) -> u32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_host_is_a_name_or_an_address_with_the_protocols_port_unless_another_is_given() {
+        assert_eq!(ipv4("127.0.0.1"), Some(SocketAddr::from(([127, 0, 0, 1], 1337))));
+        assert_eq!(ipv4("127.0.0.1:1400"), Some(SocketAddr::from(([127, 0, 0, 1], 1400))));
+        assert_eq!(ipv4("localhost"), Some(SocketAddr::from(([127, 0, 0, 1], 1337))));
+        assert_eq!(ipv4("::1"), None);
+    }
 
     #[test]
     fn the_operating_systems_number_survives_the_librarys_text() {
