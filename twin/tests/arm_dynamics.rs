@@ -44,11 +44,8 @@ proptest! {
     ) {
         let arm = ArmModel::fr3();
         let mass = arm.mass_matrix(&state.q);
-        for v in 0..7 {
-            for w in 0..7 {
-                prop_assert_eq!(mass[v][w], mass[w][v]);
-            }
-        }
+        let transposed: [Joints; MAX_JOINTS] = std::array::from_fn(|i| std::array::from_fn(|j| mass[j][i]));
+        prop_assert_eq!(mass, transposed);
         let energy: f64 = times(&mass, &state.dq).iter().zip(&state.dq).map(|(p, v)| p * v).sum();
         prop_assert!(energy >= 0.074 * state.dq.iter().map(|v| v * v).sum::<f64>());
         let tau = joints_from(&tau);
@@ -195,10 +192,10 @@ fn a_urdf_that_is_no_serial_arm_is_refused_with_joint_and_remedy() {
 
 #[test]
 fn rotor_inertia_of_the_cell_stands_in_for_a_missing_model() {
-    let mut cell = Cell::default();
-    cell.robot = Some(Robot { joints: vec!["pan".into(), "tilt".into()], ..Robot::default() });
-    cell.controller =
-        Some(Controller { kind: ControllerKind::JointPd, rotor_inertia: vec![0.5, 0.25], ..Controller::default() });
+    let robot = Robot { joints: vec!["pan".into(), "tilt".into()], ..Robot::default() };
+    let controller =
+        Controller { kind: ControllerKind::JointPd, rotor_inertia: vec![0.5, 0.25], ..Controller::default() };
+    let mut cell = Cell { robot: Some(robot), controller: Some(controller), ..Cell::default() };
     let arm = ArmModel::from_cell(&cell).expect("joints alone");
     let ddq = arm.accelerations(&JointState::default(), &joints_from(&[1.0, 1.0]));
     assert_eq!((ddq[0], ddq[1], arm.has_geometry()), (2.0, 4.0, false));

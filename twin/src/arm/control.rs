@@ -72,38 +72,26 @@ impl ControlLaw {
     #[must_use]
     #[inline]
     pub fn torque(&self, nominal: &ArmModel, state: &JointState, q_d: &Joints, dq_d: &Joints) -> Joints {
-        match self.kind {
-            ControllerKind::JointImpedance => self.limited(&self.impedance(state, q_d, dq_d, &nominal.bias(state))),
-            ControllerKind::JointPd => self.limited(&self.servo(state, q_d)),
-        }
+        let compensation = match self.kind {
+            ControllerKind::JointImpedance => nominal.bias(state),
+            ControllerKind::JointPd => [0.0; MAX_JOINTS],
+        };
+        self.torque_with(state, q_d, dq_d, &compensation)
     }
 
+    /// The same where the model's `gravity + coriolis` at this state is known already [N m].
     #[inline(always)]
-    pub(super) fn impedance(&self, state: &JointState, q_d: &Joints, dq_d: &Joints, compensation: &Joints) -> Joints {
-        let mut tau = [0.0; MAX_JOINTS];
-        for i in 0..MAX_JOINTS {
-            tau[i] =
-                self.stiffness[i] * (q_d[i] - state.q[i]) + self.damping[i] * (dq_d[i] - state.dq[i]) + compensation[i];
-        }
-        tau
-    }
-
-    #[inline(always)]
-    pub(super) fn servo(&self, state: &JointState, q_d: &Joints) -> Joints {
-        let mut tau = [0.0; MAX_JOINTS];
-        for i in 0..MAX_JOINTS {
-            tau[i] = self.stiffness[i] * (q_d[i] - state.q[i]) - self.damping[i] * state.dq[i];
-        }
-        tau
-    }
-
-    #[inline(always)]
-    pub(super) fn limited(&self, tau: &Joints) -> Joints {
-        let mut out = *tau;
-        for i in 0..MAX_JOINTS {
-            out[i] = out[i].clamp(-self.torque_limit[i], self.torque_limit[i]);
-        }
-        out
+    pub(super) fn torque_with(&self, state: &JointState, q_d: &Joints, dq_d: &Joints, bias: &Joints) -> Joints {
+        // A servo damps the joint's own velocity and compensates nothing.
+        let (follow, compensate) = match self.kind {
+            ControllerKind::JointImpedance => (1.0, 1.0),
+            ControllerKind::JointPd => (0.0, 0.0),
+        };
+        std::array::from_fn(|i| {
+            let spring = self.stiffness[i] * (q_d[i] - state.q[i]);
+            let damper = self.damping[i] * (follow * dq_d[i] - state.dq[i]);
+            (spring + damper + compensate * bias[i]).clamp(-self.torque_limit[i], self.torque_limit[i])
+        })
     }
 }
 

