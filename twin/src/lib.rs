@@ -7,3 +7,4 @@ pub mod rollout;
 pub mod scene;
 pub mod sensors;
 pub mod sim;
+pub mod sliding;

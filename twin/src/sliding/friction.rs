@@ -1,0 +1,29 @@
+//! The seam between the sliding law and what the table is made of: one coefficient for one place and one slip velocity.
+//!
+//! [`Coulomb`] is the nominal table. A table that is rougher along one axis, beyond a line or at low speed is another
+//! type with the same method; the law around it stays as it is.
+
+use nalgebra::Vector2;
+
+/// Coefficient of friction between base and table.
+pub trait SlidingFriction {
+    /// Coefficient where the base slips over `point` (world, on the table [m]) with `velocity` (world [m/s]).
+    ///
+    /// It must be finite and not negative. At rest `velocity` is zero and the coefficient is the one that has to be
+    /// overcome. The friction force always points against `velocity`.
+    fn mu(&self, point: Vector2<f64>, velocity: Vector2<f64>) -> f64;
+}
+
+/// The same everywhere, in all directions, at all speeds.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Coulomb(
+    /// The coefficient.
+    pub f64,
+);
+
+impl SlidingFriction for Coulomb {
+    #[inline]
+    fn mu(&self, _point: Vector2<f64>, _velocity: Vector2<f64>) -> f64 {
+        self.0
+    }
+}

@@ -1,0 +1,249 @@
+//! The step of a sliding body.
+//!
+//! While every loaded place slips clearly, velocities follow explicit midpoint steps, as long as no place turns its
+//! direction of slip by much; near a place that does (a stop, a pivot on one corner) the implicit step of
+//! [`super::impulse`] takes over, and a stop is placed inside the step where the kinetic energy is used up.
+
+use super::friction::SlidingFriction;
+use super::impulse::Moment;
+use super::load::{self, Kappas, Loads, Wrench};
+use super::patch::{MAX_POINTS, Patch};
+use super::planar::{PlanarState, left_of};
+use nalgebra::{Vector2, Vector3};
+
+/// A body that stands with a face on the table.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Slider {
+    /// Mass [kg].
+    pub mass: f64,
+    /// Inertia about the vertical through the centre of mass [kg m²].
+    pub yaw_inertia: f64,
+    /// Centre of mass above the table [m].
+    pub height: f64,
+    /// The base.
+    pub patch: Patch,
+}
+
+/// How a step ended.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Ending {
+    /// At rest, and the friction can hold what acts on the body.
+    Rests,
+    /// In motion.
+    Slides,
+    /// The load would have to pull at an edge: the body lifts or tips. The state stands where that begins, `left`
+    /// seconds before the end of the step.
+    Lifts {
+        /// Time of the step that was not taken [s].
+        left: f64,
+    },
+}
+
+/// An explicit step may change a place's slip by this share of itself.
+const TURN: f64 = 0.25;
+/// Share of the load on places that may turn faster than that: a fine patch always has a few near its centre of rotation.
+const UNRESOLVED: f64 = 0.1;
+/// Shortest explicit and only implicit part of a step.
+const EXPLICIT_PARTS: f64 = 16.0;
+const IMPLICIT_PARTS: f64 = 4.0;
+
+/// What friction does to a body at one instant.
+struct Instant {
+    /// Rates of velocity and yaw rate, world axes.
+    acceleration: Vector2<f64>,
+    yaw_acceleration: f64,
+    /// Longest explicit step [s].
+    horizon: f64,
+}
+
+impl Slider {
+    /// Moves `state` by `dt` seconds under `wrench`, constant meanwhile, world axes.
+    pub fn step(
+        &self,
+        state: &mut PlanarState,
+        wrench: &Wrench,
+        friction: &(impl SlidingFriction + ?Sized),
+        dt: f64,
+    ) -> Ending {
+        let mut left = dt;
+        while left > 1e-12 * dt {
+            if state.is_at_rest() && self.holds(state, wrench, friction) {
+                return Ending::Rests;
+            }
+            let taken = self
+                .explicit(state, wrench, friction, left, dt / EXPLICIT_PARTS)
+                .or_else(|| self.implicit(state, wrench, friction, left.min(dt / IMPLICIT_PARTS)));
+            let Some(taken) = taken else { return Ending::Lifts { left } };
+            left -= taken;
+        }
+        if state.is_at_rest() { Ending::Rests } else { Ending::Slides }
+    }
+
+    /// Kinetic energy of the planar motion [J].
+    #[must_use]
+    pub fn kinetic_energy(&self, state: &PlanarState) -> f64 {
+        0.5 * (self.mass * state.velocity.norm_squared() + self.yaw_inertia * state.yaw_rate * state.yaw_rate)
+    }
+
+    /// Whether friction certainly holds a body at rest: every place pushes back along the force, and the friction that
+    /// is left turns against the moment about the middle of the load. Sufficient; the implicit step decides the rest.
+    fn holds(&self, state: &PlanarState, wrench: &Wrench, friction: &(impl SlidingFriction + ?Sized)) -> bool {
+        let (sin, cos) = state.yaw.sin_cos();
+        let local = wrench.in_turned_axes(cos, sin);
+        let Some(loads) = load::solve_at_rest(&self.patch, self.height, &local) else { return false };
+        let mu = self.coefficients(state, friction, cos, sin);
+        let weight: f64 = loads.iter().sum();
+        let places = || self.patch.points().iter().enumerate();
+        let middle = places().map(|(i, p)| p * loads[i]).sum::<Vector2<f64>>() / weight;
+        let least = places().map(|(i, _)| mu[i]).fold(f64::INFINITY, f64::min);
+        let reach = places().map(|(_, p)| (p - middle).norm()).fold(0.0, f64::max);
+        let turning = places().map(|(i, p)| loads[i] * (p - middle).norm_squared()).sum::<f64>() * least / reach;
+        let push = Vector2::new(local.force.x, local.force.y);
+        let moment = local.moment.z - middle.perp(&push);
+        push.norm() / (least * weight) + moment.abs() / turning <= 1.0
+    }
+
+    /// One explicit step of at most `left`: the time taken, `None` when it would have to be shorter than `shortest` or
+    /// the loads cannot be told from the directions of slip alone. The implicit step decides then.
+    fn explicit(
+        &self,
+        state: &mut PlanarState,
+        wrench: &Wrench,
+        friction: &(impl SlidingFriction + ?Sized),
+        left: f64,
+        shortest: f64,
+    ) -> Option<f64> {
+        if state.is_at_rest() {
+            return None;
+        }
+        let first = self.instant(state, wrench, friction, left)?;
+        if first.horizon < shortest.min(left) {
+            return None;
+        }
+        let taken = first.horizon.min(left);
+        let mut middle = *state;
+        middle.advance(state.velocity, state.yaw_rate, 0.5 * taken);
+        middle.velocity += first.acceleration * (0.5 * taken);
+        middle.yaw_rate += first.yaw_acceleration * (0.5 * taken);
+        let second = self.instant(&middle, wrench, friction, 0.0)?;
+        state.advance(middle.velocity, middle.yaw_rate, taken);
+        state.velocity += second.acceleration * taken;
+        state.yaw_rate += second.yaw_acceleration * taken;
+        Some(taken)
+    }
+
+    fn instant(
+        &self,
+        state: &PlanarState,
+        wrench: &Wrench,
+        friction: &(impl SlidingFriction + ?Sized),
+        wanted: f64,
+    ) -> Option<Instant> {
+        let (sin, cos) = state.yaw.sin_cos();
+        let local = wrench.in_turned_axes(cos, sin);
+        let mut slips = [Vector2::zeros(); MAX_POINTS];
+        let mut kappas: Kappas = [Vector2::zeros(); MAX_POINTS];
+        for (i, point) in self.patch.points().iter().enumerate() {
+            let turned = turn(cos, sin, *point);
+            let slip = state.velocity + left_of(turned) * state.yaw_rate;
+            let (mu, speed) = (friction.mu(state.position + turned, slip), slip.norm());
+            slips[i] = turn(cos, -sin, slip);
+            kappas[i] = if speed > 0.0 { slips[i] * (mu / speed) } else { Vector2::zeros() };
+        }
+        let loads = load::solve(&self.patch, self.height, &local, &kappas)?;
+        let mut total = local.planar();
+        for (i, point) in self.patch.points().iter().enumerate() {
+            let force = kappas[i] * -loads[i];
+            total += Vector3::new(force.x, force.y, point.perp(&force));
+        }
+        let rates = Vector3::new(total.x / self.mass, total.y / self.mass, total.z / self.yaw_inertia);
+        let horizon = self.horizon(&slips, &loads, &rates, state.yaw_rate, wanted);
+        Some(Instant { acceleration: turn(cos, sin, rates.xy()), yaw_acceleration: rates.z, horizon })
+    }
+
+    /// Longest step, `wanted` or a power of two shorter, in which all but [`UNRESOLVED`] of the load keeps its direction.
+    fn horizon(
+        &self,
+        slips: &[Vector2<f64>; MAX_POINTS],
+        loads: &Loads,
+        rates: &Vector3<f64>,
+        yaw_rate: f64,
+        wanted: f64,
+    ) -> f64 {
+        let allowed = UNRESOLVED * loads.iter().sum::<f64>();
+        let mut times = [f64::INFINITY; MAX_POINTS];
+        for (i, point) in self.patch.points().iter().enumerate() {
+            let change = rates.xy() + left_of(*point) * rates.z - point * (yaw_rate * yaw_rate);
+            times[i] = TURN * slips[i].norm() / change.norm();
+        }
+        let mut horizon = wanted;
+        for _ in 0..8 {
+            let fast: f64 = times.iter().zip(loads).filter(|(t, _)| **t < horizon).map(|(_, load)| load).sum();
+            if fast <= allowed {
+                return horizon;
+            }
+            horizon *= 0.5;
+        }
+        0.0
+    }
+
+    /// One implicit step of `dt`: the time taken, `None` when the body lifts.
+    fn implicit(
+        &self,
+        state: &mut PlanarState,
+        wrench: &Wrench,
+        friction: &(impl SlidingFriction + ?Sized),
+        dt: f64,
+    ) -> Option<f64> {
+        let (sin, cos) = state.yaw.sin_cos();
+        let local = wrench.in_turned_axes(cos, sin);
+        let mu = self.coefficients(state, friction, cos, sin);
+        let inertia = Vector3::new(self.mass, self.mass, self.yaw_inertia);
+        let moment = Moment { patch: &self.patch, height: self.height, inertia, wrench: &local, mu: &mu };
+        let velocity = turn(cos, -sin, state.velocity);
+        let start = Vector3::new(velocity.x, velocity.y, state.yaw_rate);
+        let end = moment.after(start, dt)?;
+        let stops = end == Vector3::zeros();
+        let taken = if stops { self.time_to_stop(state, wrench, friction, dt) } else { dt };
+        let after = turn(cos, sin, end.xy());
+        state.advance((state.velocity + after) * 0.5, 0.5 * (state.yaw_rate + end.z), taken);
+        (state.velocity, state.yaw_rate) = (after, end.z);
+        Some(taken)
+    }
+
+    /// When a body that stops within `dt` does so: near its end a motion slows evenly, so its energy, half of momentum
+    /// times speed, lasts for twice the energy over the power that is lost.
+    fn time_to_stop(
+        &self,
+        state: &PlanarState,
+        wrench: &Wrench,
+        friction: &(impl SlidingFriction + ?Sized),
+        dt: f64,
+    ) -> f64 {
+        let Some(now) = self.instant(state, wrench, friction, 0.0) else { return dt };
+        let gain = self.mass * state.velocity.dot(&now.acceleration)
+            + self.yaw_inertia * state.yaw_rate * now.yaw_acceleration;
+        if gain < 0.0 { (-2.0 * self.kinetic_energy(state) / gain).min(dt) } else { dt }
+    }
+
+    fn coefficients(
+        &self,
+        state: &PlanarState,
+        friction: &(impl SlidingFriction + ?Sized),
+        cos: f64,
+        sin: f64,
+    ) -> [f64; MAX_POINTS] {
+        let mut mu = [0.0; MAX_POINTS];
+        for (i, point) in self.patch.points().iter().enumerate() {
+            let turned = turn(cos, sin, *point);
+            mu[i] = friction.mu(state.position + turned, state.velocity + left_of(turned) * state.yaw_rate);
+        }
+        mu
+    }
+}
+
+/// From the patch frame to the world for the angle of (`cos`, `sin`), back for (`cos`, `-sin`).
+#[inline]
+fn turn(cos: f64, sin: f64, v: Vector2<f64>) -> Vector2<f64> {
+    Vector2::new(cos * v.x - sin * v.y, sin * v.x + cos * v.y)
+}
