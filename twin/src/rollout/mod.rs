@@ -87,19 +87,3 @@ pub fn between(before: &JointState, after: &JointState, share: f64) -> JointStat
     }
     state
 }
-
-/// Root mean square over the rows of `predicted - measured`, per joint [rad].
-///
-/// `measured` is row-major with `dof` columns; rows beyond the shorter of the two do not count.
-#[must_use]
-pub fn joint_rms(predicted: &[JointState], measured: &[f64], dof: usize) -> Joints {
-    let mut sum = [0.0; MAX_JOINTS];
-    let rows = predicted.iter().zip(measured.chunks_exact(dof.max(1)));
-    let count = rows.len().max(1) as f64;
-    for (state, row) in rows {
-        for ((sum, q), measured) in sum.iter_mut().zip(state.q).zip(row) {
-            *sum += (q - measured).powi(2);
-        }
-    }
-    sum.map(|s| (s / count).sqrt())
-}

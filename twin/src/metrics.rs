@@ -1,0 +1,144 @@
+//! How far apart two runs are: joints as root mean square, objects as ADD and ADD-S (Hinterstoisser et al. 2012, the
+//! measures of 6-DoF pose estimation). Called by replay, shadow and identification. Metres and radians.
+
+use crate::arm::{JointState, Joints, MAX_JOINTS};
+use crate::scene::ObjectShape;
+use nalgebra::Point3;
+use shared_mem::frames::{Base, Object, Pose};
+
+/// Points on an object's surface: about a centimetre apart on a box of a hand's size.
+const POINTS: u32 = 400;
+
+/// Root mean square over the rows of `predicted - measured`, per joint [rad].
+///
+/// `measured` is row-major with `dof` columns; rows beyond the shorter of the two do not count.
+#[must_use]
+pub fn joint_rms(predicted: &[JointState], measured: &[f64], dof: usize) -> Joints {
+    let mut sum = [0.0; MAX_JOINTS];
+    let rows = predicted.iter().zip(measured.chunks_exact(dof.max(1)));
+    let count = rows.len().max(1) as f64;
+    for (state, row) in rows {
+        for ((sum, q), measured) in sum.iter_mut().zip(state.q).zip(row) {
+            *sum += (q - measured).powi(2);
+        }
+    }
+    sum.map(|s| (s / count).sqrt())
+}
+
+/// Points spread evenly over an object's surface, in the object's frame.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SurfacePoints(Vec<Point3<f64>>);
+
+impl SurfacePoints {
+    /// The same points every time for the same shape.
+    #[must_use]
+    pub fn new(shape: &ObjectShape) -> Self {
+        let (corners, triangles) = shape.triangles();
+        let corner = |i: u32| corners[i as usize];
+        let areas: Vec<f64> = triangles
+            .iter()
+            .map(|&[a, b, c]| 0.5 * (corner(b) - corner(a)).cross(&(corner(c) - corner(a))).norm())
+            .collect();
+        let step = areas.iter().sum::<f64>() / f64::from(POINTS);
+        // Each triangle gets its share of equal steps along the summed area, and within it points of the additive
+        // recurrence by the powers of the plastic number, folded into the triangle: even without being a lattice.
+        let (mut points, mut behind) = (Vec::new(), 0.0);
+        for (&[a, b, c], area) in triangles.iter().zip(areas) {
+            behind += area;
+            while (points.len() as f64 + 0.5) * step < behind {
+                let n = points.len() as f64;
+                let (mut u, mut v) = ((0.754_877_666_246_693 * n).fract(), (0.569_840_290_998_053 * n).fract());
+                if u + v > 1.0 {
+                    (u, v) = (1.0 - u, 1.0 - v);
+                }
+                points.push(corner(a) + (corner(b) - corner(a)) * u + (corner(c) - corner(a)) * v);
+            }
+        }
+        Self(points)
+    }
+
+    /// Points given one by one.
+    #[must_use]
+    pub fn from_points(points: Vec<Point3<f64>>) -> Self {
+        Self(points)
+    }
+
+    /// ADD: mean distance between the same surface points under two poses [m].
+    #[must_use]
+    pub fn add(&self, a: &Pose<Base, Object>, b: &Pose<Base, Object>) -> f64 {
+        self.mean(a, b, |moved, own| (moved - own).norm_squared())
+    }
+
+    /// ADD-S: mean distance from each surface point to the closest one under the other pose, for objects that look the
+    /// same from several sides [m].
+    #[must_use]
+    pub fn add_s(&self, a: &Pose<Base, Object>, b: &Pose<Base, Object>) -> f64 {
+        self.mean(a, b, |moved, _| {
+            self.0.iter().map(|other| (moved - other).norm_squared()).fold(f64::INFINITY, f64::min)
+        })
+    }
+
+    /// Mean root of `square(point moved from pose b's object frame into pose a's, the same point in a's)`.
+    fn mean(
+        &self,
+        a: &Pose<Base, Object>,
+        b: &Pose<Base, Object>,
+        square: impl Fn(Point3<f64>, &Point3<f64>) -> f64,
+    ) -> f64 {
+        let a_from_b = a.isometry().inverse() * b.isometry();
+        let sum: f64 = self.0.iter().map(|own| square(a_from_b * own, own).sqrt()).sum();
+        sum / self.0.len().max(1) as f64
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::{Isometry3, Vector3};
+    use std::f64::consts::PI;
+
+    fn pose(x: f64, turn: f64) -> Pose<Base, Object> {
+        Pose::from_isometry(Isometry3::new(Vector3::new(x, 0.3, 0.0), Vector3::z() * turn))
+    }
+
+    fn square() -> SurfacePoints {
+        let corner = |x, y| Point3::new(x, y, 0.0);
+        SurfacePoints::from_points(vec![corner(1.0, 1.0), corner(-1.0, 1.0), corner(-1.0, -1.0), corner(1.0, -1.0)])
+    }
+
+    #[test]
+    fn a_shift_counts_fully_in_both_measures() {
+        assert!((square().add(&pose(0.0, 0.7), &pose(0.25, 0.7)) - 0.25).abs() < 1e-12);
+        assert!((square().add_s(&pose(0.0, 0.7), &pose(0.25, 0.7)) - 0.25).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_quarter_turn_of_a_square_counts_in_add_and_not_in_add_s() {
+        // Corners lie sqrt(2) from the centre and move along the chord of 90 degrees, which is 2.
+        assert!((square().add(&pose(0.0, 0.0), &pose(0.0, PI / 2.0)) - 2.0).abs() < 1e-12);
+        assert!(square().add_s(&pose(0.0, 0.0), &pose(0.0, PI / 2.0)) < 1e-12);
+    }
+
+    #[test]
+    fn surface_points_lie_evenly_on_the_faces_of_a_box() {
+        let half = Vector3::new(0.04, 0.03, 0.05);
+        let points = SurfacePoints::new(&ObjectShape::Box { half_extents: half });
+        assert_eq!(points.0.len(), POINTS as usize);
+        let on_face = |p: &Point3<f64>, axis: usize| (p[axis].abs() - half[axis]).abs() < 1e-12;
+        assert!(points.0.iter().all(|p| (0..3).any(|axis| on_face(p, axis))));
+        // Faces across z are 8 x 6 of 2 (8 x 6 + 6 x 10 + 8 x 10) cm².
+        let top = points.0.iter().filter(|p| on_face(p, 2) && p.z > 0.0).count();
+        assert!((top as f64 - 400.0 * 48.0 / 376.0).abs() < 2.0, "{top}");
+        // Turned about its centre, the box's mean point moves by about the mean distance from the axis.
+        let moved = points.add(&pose(0.0, 0.0), &pose(0.0, 0.01));
+        let mean_radius = points.0.iter().map(|p| p.x.hypot(p.y)).sum::<f64>() / 400.0;
+        assert!((moved / (0.01 * mean_radius) - 1.0).abs() < 1e-4, "{moved}");
+    }
+
+    #[test]
+    fn joint_rms_is_taken_per_joint_over_the_rows() {
+        let row = |a, b| JointState::at_rest(shared_mem::msg::joints_from(&[a, b]));
+        let rms = joint_rms(&[row(1.0, 0.0), row(2.0, 0.0)], &[1.0, 3.0, 4.0, -4.0], 2);
+        assert!((rms[0] - 2.0_f64.sqrt()).abs() < 1e-12 && (rms[1] - 12.5_f64.sqrt()).abs() < 1e-12, "{rms:?}");
+    }
+}
