@@ -1,6 +1,28 @@
 //! Hardware to shared memory: the 1 kHz loop, its safety, and the devices behind traits.
+//!
+//! Threads of `rt_bridge run`:
+//!
+//! | thread | runs | owns |
+//! |---|---|---|
+//! | control | [`rt`], [`motion`], [`safety`], an [`arm::Arm`] | the arm; neither memory nor locks nor files while it loops |
+//! | pump | [`pump`] | the ports for states, commands, motions and events |
+//! | world | [`sim`] | the simulated cell, with `--arm sim` |
+//! | camera | [`camera`] | the ports for pictures, with `--camera sim` |
+//! | main | [`run`] | duration, Ctrl-C, the recorder's process, the report |
+//!
+//! Rings without locks join control, pump and world. The recorder ([`recorder`]) is a process of its own.
 
 pub mod arm;
+pub mod camera;
+pub mod cli;
+
 pub mod fr3;
+pub mod motion;
+pub mod pump;
+pub mod recorder;
+pub mod replay;
 pub mod rt;
+pub mod run;
 pub mod safety;
+pub mod sim;
+pub mod times;

@@ -2,7 +2,7 @@
 #![allow(missing_docs)]
 
 use proptest::prelude::*;
-use rt_bridge::rt::player::Player;
+use rt_bridge::motion::Player;
 use rt_bridge::rt::remark::{BrakeReason, Refusal, Remark};
 use rt_bridge::safety::{Guard, Limits, Trace, Violation, Workspace};
 use shared_mem::msg::MAX_JOINTS;

@@ -45,6 +45,8 @@ pub enum Desired {
     Commanded,
     /// What `read` filled in stays: the arm reports what its own controller follows.
     Reported,
+    /// The arm is a recording and follows nobody: what `read` filled in is published as state and as command.
+    Recorded,
 }
 
 /// An arm that is commanded once a cycle.

@@ -1,8 +1,22 @@
 //! The control thread: what runs once a millisecond and must never wait for anybody. Nothing below this module
 //! allocates, locks, logs, panics or touches a file while the loop runs.
+//!
+//! | file | owns |
+//! |---|---|
+//! | [`claim`] | what the machine grants |
+//! | [`control`] | the thread: real time, the loop, its end |
+//! | [`cycle`] | one turn: read, check, command, hand to the pump |
+//! | [`deadline`] | the timer's grid |
+//! | [`law`] | the joint-impedance law |
+//! | [`remark`] | what there is to tell, as numbers |
+//! | [`stats`] | how well time was kept |
+//! | [`process`] | what is asked of Linux (the only `unsafe`) |
 
+pub mod claim;
+pub mod control;
+pub mod cycle;
 pub mod deadline;
-pub mod player;
+pub mod law;
 pub mod process;
 pub mod remark;
 pub mod stats;

@@ -67,11 +67,23 @@ pub fn last_core() -> Option<usize> {
 /// Keeps all memory of this process, present and future, in RAM.
 ///
 /// # Errors
-/// The kernel's: "cannot allocate memory" when the limit `memlock` is too low.
+/// The kernel's: "cannot allocate memory" when the limit `memlock` is too low. A finite limit is refused here already:
+/// under it, locking would succeed now and let a later mapping of shared memory fail.
 pub fn lock_memory() -> io::Result<()> {
+    if !may_lock_all_memory() {
+        return Err(io::Error::from_raw_os_error(libc::ENOMEM));
+    }
     // SAFETY: takes flags only.
     let rc = unsafe { libc::mlockall(libc::MCL_CURRENT | libc::MCL_FUTURE) };
     outcome(rc)
+}
+
+/// `true` when no limit stands in the way of locking all memory: the limit is infinite, or the superuser asks.
+#[must_use]
+pub fn may_lock_all_memory() -> bool {
+    // SAFETY: takes nothing and cannot fail.
+    let superuser = unsafe { libc::geteuid() } == 0;
+    superuser || matches!(limit(Limit::LockedMemory), Ok((None, _)))
 }
 
 /// Lets memory be swapped again.

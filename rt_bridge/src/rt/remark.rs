@@ -1,5 +1,6 @@
 //! What the control thread has to tell people: `Copy` values that go through a ring to the pump, which words them.
 
+use super::claim::Claim;
 use crate::arm::ArmFault;
 use crate::safety::Violation;
 use shared_mem::msg::event::EventLevel;
@@ -8,6 +9,8 @@ use std::fmt;
 /// Something worth an event.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Remark {
+    /// The loop runs without some real-time guarantee.
+    LesserClock(Claim),
     /// Commanding ended.
     Fault(ArmFault),
     /// A motion was refused before it began, or its sender's chunks do not count.
@@ -98,7 +101,7 @@ impl Remark {
     pub fn level(&self) -> EventLevel {
         match self {
             Self::Fault(_) => EventLevel::Error,
-            Self::Refused { .. } => EventLevel::Warning,
+            Self::Refused { .. } | Self::LesserClock(_) => EventLevel::Warning,
             Self::Braked { why: BrakeReason::Asked | BrakeReason::RunEnds, .. } => EventLevel::Info,
             Self::Braked { .. } => EventLevel::Warning,
             Self::Began { .. } | Self::Done { .. } => EventLevel::Info,
@@ -109,6 +112,7 @@ impl Remark {
 impl fmt::Display for Remark {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
+            Self::LesserClock(claim) => write!(f, "running without real-time guarantees: {claim}"),
             Self::Fault(fault) => fault.fmt(f),
             Self::Refused { motion, why } => write!(f, "motion {motion} refused: {why}"),
             Self::Began { motion } => write!(f, "motion {motion} began"),

@@ -1,6 +1,7 @@
 //! How far, fast and hard each joint may go. Units: rad, s, N m.
 
 use shared_mem::msg::MAX_JOINTS;
+use twin::arm::ArmModel;
 
 /// Limits of one joint.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -31,9 +32,9 @@ impl JointLimits {
         q_min: f64::NEG_INFINITY,
         q_max: f64::INFINITY,
         velocity: f64::INFINITY,
-        acceleration: 10.0,
-        jerk: 5000.0,
-        deceleration: 10.0,
+        acceleration: ACCELERATION,
+        jerk: JERK,
+        deceleration: ACCELERATION,
         velocity_offset: 0.0,
         torque: f64::INFINITY,
         torque_rate: f64::INFINITY,
@@ -93,6 +94,23 @@ impl Limits {
                 velocity_offset,
                 torque,
                 torque_rate: TORQUE_RATE,
+            };
+        }
+        limits
+    }
+
+    /// What a model knows of its own arm (position, speed, torque); acceleration, jerk and torque rate are an FR3's.
+    #[must_use]
+    pub fn of_model(arm: &ArmModel) -> Self {
+        let mut limits = Self { dof: arm.dof(), joints: [JointLimits::FREE; MAX_JOINTS] };
+        for (i, joint) in limits.joints.iter_mut().enumerate().take(arm.dof()) {
+            *joint = JointLimits {
+                q_min: arm.q_min()[i],
+                q_max: arm.q_max()[i],
+                velocity: arm.velocity_limit()[i],
+                torque: arm.torque_limit()[i],
+                torque_rate: TORQUE_RATE,
+                ..JointLimits::FREE
             };
         }
         limits

@@ -5,12 +5,10 @@
 //! | [`limits`] | how far, fast and hard each joint may go |
 //! | [`trace`] | velocity, acceleration and jerk of what was commanded, as the robot differences it |
 //! | [`guard`] | the verdict on the next set point: it and the braking that may follow it stay inside the limits |
-//! | [`brake`] | from any admitted motion to rest inside the limits |
 //! | [`torque`] | torque and torque rate, clamped |
 //! | [`workspace`] | where the tool tip may be |
 //! | [`watchdog`] | how long silence is borne |
 
-pub mod brake;
 pub mod guard;
 pub mod limits;
 pub mod torque;
@@ -18,7 +16,6 @@ pub mod trace;
 pub mod watchdog;
 pub mod workspace;
 
-pub use brake::Brake;
 pub use guard::{Guard, Violation};
 pub use limits::{JointLimits, Limits};
 pub use torque::TorqueGuard;

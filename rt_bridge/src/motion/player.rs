@@ -4,8 +4,9 @@
 //! A motion begins at once when its first chunk arrives and the arm holds. It must start where the arm is *commanded* to
 //! be, to [`START_TOLERANCE`]: a larger step would itself break the acceleration limit (10 rad/s² is 10 urad in 1 ms).
 
-use super::remark::{BrakeReason, Refusal, Remark};
-use crate::safety::{Brake, Guard, Trace};
+use super::Brake;
+use crate::rt::remark::{BrakeReason, Refusal, Remark};
+use crate::safety::{Guard, Trace};
 use shared_mem::msg::arm::{ArmState, MotionStatus};
 use shared_mem::msg::motion::{CHUNK_LENGTH, MotionChunk, MotionKind, SetPoint};
 use shared_mem::msg::{Joints, MAX_JOINTS};

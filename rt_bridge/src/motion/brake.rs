@@ -3,7 +3,7 @@
 //! Planned once by `rsruckig` (velocity interface, target 0), then sampled each cycle. Should planning fail, the arm is
 //! slowed by a constant deceleration instead: rougher, but it stops.
 
-use super::{Limits, Trace};
+use crate::safety::{Limits, Trace};
 use rsruckig::prelude::*;
 use shared_mem::msg::motion::SetPoint;
 use shared_mem::msg::{Joints, MAX_JOINTS};

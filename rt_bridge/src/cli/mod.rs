@@ -1,0 +1,110 @@
+//! The command line: what can be asked, and what is answered. One file a verb.
+//!
+//! Standard output holds nothing but the answer: one JSON object with `--json`, a few lines without. Everything said on
+//! the way goes to standard error. Exit codes: 0 done, 1 failed, 2 wrong arguments.
+
+mod record;
+mod run;
+
+use clap::{Parser, Subcommand};
+use std::io::{IsTerminal as _, Write as _};
+use std::process::ExitCode;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// Hardware to shared memory: drives a robot arm at 1 kHz and shows everybody on this machine what it does.
+///
+/// The arm may be a Franka Research 3, the simulated cell, or a recording: whoever reads from shared memory cannot tell.
+#[derive(Debug, Parser)]
+#[command(
+    version,
+    after_help = "Examples:\n  \
+        rt_bridge doctor                                               what this machine lacks for real time\n  \
+        rt_bridge run --cell config/fr3_cell.toml --arm sim            hold the simulated arm until Ctrl-C\n  \
+        rt_bridge run --cell cell.toml --arm fci://172.16.0.2 --record clip.mcap\n  \
+        rt_bridge record --out clip.mcap --duration 10                 record what others do\n\n\
+        Processes meet when the environment variable TWINALIGN_DOMAIN agrees (default 0)."
+)]
+struct Arguments {
+    #[command(subcommand)]
+    verb: Verb,
+}
+
+#[derive(Debug, Subcommand)]
+enum Verb {
+    Run(run::RunArguments),
+    Record(record::RecordArguments),
+}
+
+/// Reads the command line and does what it says.
+#[must_use]
+pub fn main() -> ExitCode {
+    let arguments = Arguments::parse();
+    tracing_subscriber::fmt()
+        .with_writer(std::io::stderr)
+        .with_env_filter(
+            tracing_subscriber::EnvFilter::try_from_default_env()
+                .unwrap_or_else(|_| tracing_subscriber::EnvFilter::new("info")),
+        )
+        .with_target(false)
+        .with_ansi(std::io::stderr().is_terminal())
+        .init();
+    let done = match arguments.verb {
+        Verb::Run(run) => run.execute(),
+        Verb::Record(record) => record.execute(),
+    };
+    match done {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error:#}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+/// A flag that Ctrl-C and `SIGTERM` set.
+fn stop_flag() -> anyhow::Result<Arc<AtomicBool>> {
+    let stop = Arc::new(AtomicBool::new(false));
+    let told = stop.clone();
+    ctrlc::set_handler(move || told.store(true, Ordering::Relaxed))?;
+    Ok(stop)
+}
+
+/// Writes the answer to standard output.
+fn answer(text: &str) -> std::io::Result<()> {
+    writeln!(std::io::stdout(), "{text}")
+}
+
+/// `--duration` in seconds.
+fn seconds(text: &str) -> Result<std::time::Duration, String> {
+    let seconds: f64 = text.parse().map_err(|_| "give seconds, for example 60 or 0.5".to_owned())?;
+    if seconds > 0.0 && seconds < 1e8 {
+        Ok(std::time::Duration::from_secs_f64(seconds))
+    } else {
+        Err("give a positive number of seconds".into())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory as _;
+
+    #[test]
+    fn the_command_line_is_consistent_and_every_verb_shows_an_example() {
+        let mut command = Arguments::command();
+        command.clone().debug_assert();
+        for verb in command.get_subcommands_mut() {
+            let help = verb.render_long_help().to_string();
+            assert!(help.contains("Example"), "{} has no example", verb.get_name());
+        }
+    }
+
+    #[test]
+    fn a_duration_is_a_positive_number_of_seconds() {
+        assert_eq!(seconds("0.5"), Ok(std::time::Duration::from_millis(500)));
+        for wrong in ["", "ten", "0", "-1", "nan", "inf"] {
+            assert!(seconds(wrong).is_err(), "{wrong}");
+        }
+    }
+}

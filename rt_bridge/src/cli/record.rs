@@ -1,0 +1,61 @@
+//! `rt_bridge record`.
+
+use super::{answer, seconds, stop_flag};
+use crate::recorder::{Settings, record};
+use anyhow::{Result, bail};
+use clap::Args;
+use shared_mem::cell::Cell;
+use shared_mem::recording::ClipInfo;
+use std::path::PathBuf;
+use std::time::Duration;
+
+/// Record everything on shared memory to a new clip, until Ctrl-C
+///
+/// A process of its own: `rt_bridge run --record` starts one, and it can be started beside a bridge that runs already.
+#[derive(Debug, Args)]
+#[command(after_help = "Example:\n  \
+    rt_bridge record --cell config/fr3_cell.toml --out clip.mcap --duration 10 --json\n\n\
+    JSON: file, messages, bytes, lost (messages overwritten before they could be written), stopped (null, or why it\n\
+    ended early).")]
+pub(super) struct RecordArguments {
+    /// The new file
+    #[arg(long, value_name = "CLIP.mcap")]
+    out: PathBuf,
+    /// Rides along in the file, so that the clip explains itself
+    #[arg(long, value_name = "cell.toml")]
+    cell: Option<PathBuf>,
+    /// Stop after this many seconds
+    #[arg(long, value_name = "S", value_parser = seconds)]
+    duration: Option<Duration>,
+    /// Finish when this process is no longer our parent
+    #[arg(long, hide = true)]
+    parent: Option<u32>,
+    /// Configuration of the program that started us
+    #[arg(long, hide = true, default_value = "")]
+    configuration: String,
+    /// Answer with one JSON object
+    #[arg(long)]
+    json: bool,
+}
+
+impl RecordArguments {
+    pub(super) fn execute(self) -> Result<()> {
+        let stop = stop_flag()?;
+        let info = ClipInfo {
+            cell_toml: self.cell.as_deref().map(Cell::read).transpose()?.map(|cell| cell.to_toml()),
+            configuration: self.configuration,
+            program: concat!("rt_bridge ", env!("CARGO_PKG_VERSION")).into(),
+        };
+        let settings = Settings { out: self.out, duration: self.duration, parent: self.parent, info };
+        let recorded = record(&settings, &stop)?;
+        if self.json {
+            answer(&serde_json::to_string(&recorded)?)?;
+        } else {
+            answer(&recorded.in_words())?;
+        }
+        match recorded.stopped {
+            Some(why) => bail!("{why}"),
+            None => Ok(()),
+        }
+    }
+}

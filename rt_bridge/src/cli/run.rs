@@ -1,0 +1,100 @@
+//! `rt_bridge run`.
+
+use super::{answer, seconds, stop_flag};
+use crate::rt::Realtime;
+use crate::run::{ArmChoice, CameraChoice, ControllerChoice, RunReport, Settings, run};
+use anyhow::{Result, bail};
+use clap::Args;
+use std::path::PathBuf;
+use std::time::Duration;
+
+/// Drive an arm and publish what it does, until Ctrl-C
+///
+/// The arm holds its pose until somebody sends a motion (`calibration capture` does). Every set point passes the
+/// safety limits; a motion that breaks one, or whose sender dies, is braked and held.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:\n  \
+    rt_bridge run --cell config/fr3_cell.toml --arm sim\n  \
+    rt_bridge run --cell config/fr3_cell.toml --arm sim --effects hidden.toml --record clip.mcap --duration 20 --json\n  \
+    rt_bridge run --cell cell.toml --arm fci://172.16.0.2 --controller torque_pd --realtime enforce\n  \
+    rt_bridge run --cell cell.toml --arm replay://clip.mcap\n\n\
+    JSON: cycles, missed_cycles (deadlines that passed unused), overruns (work longer than a period), lost_packets,\n\
+    wake_us (wake-up latency), exec_us, period_us, age_us (a state's arrival to shared memory), recorded, faults.")]
+pub(super) struct RunArguments {
+    /// What the laboratory knows about its cell
+    #[arg(long, value_name = "cell.toml")]
+    cell: PathBuf,
+    /// sim, fci://HOST or replay://CLIP.mcap
+    #[arg(long, value_name = "ARM")]
+    arm: ArmChoice,
+    /// Who computes the torque: the bridge (joint impedance with the gains of cell.toml) or the arm's own controller.
+    /// Default: torque_pd, and joint_impedance where cell.toml describes a servo
+    #[arg(long)]
+    controller: Option<ControllerChoice>,
+    /// Default: sim where the arm is simulated and cell.toml has a [camera], else off
+    #[arg(long)]
+    camera: Option<CameraChoice>,
+    /// Effects of the simulated cell that nobody else is told
+    #[arg(long, value_name = "hidden.toml")]
+    effects: Option<PathBuf>,
+    /// Parameters of the simulated cell that nobody else is told
+    #[arg(long, value_name = "theta.toml")]
+    parameters: Option<PathBuf>,
+    /// Record everything on shared memory to this new file
+    #[arg(long, value_name = "CLIP.mcap")]
+    record: Option<PathBuf>,
+    /// Stop after this many seconds
+    #[arg(long, value_name = "S", value_parser = seconds)]
+    duration: Option<Duration>,
+    /// Refuse to run, or go on and say so, where the machine grants neither SCHED_FIFO nor locked memory.
+    /// Default: enforce with a robot, else ignore
+    #[arg(long)]
+    realtime: Option<Realtime>,
+    /// Answer with one JSON object
+    #[arg(long)]
+    json: bool,
+}
+
+impl RunArguments {
+    pub(super) fn execute(self) -> Result<()> {
+        let default = if matches!(self.arm, ArmChoice::Fci(_)) { Realtime::Enforce } else { Realtime::Ignore };
+        let settings = Settings {
+            cell: self.cell,
+            arm: self.arm,
+            controller: self.controller,
+            camera: self.camera,
+            effects: self.effects,
+            parameters: self.parameters,
+            record: self.record,
+            duration: self.duration,
+            realtime: self.realtime.unwrap_or(default),
+        };
+        let report = run(&settings, &stop_flag()?)?;
+        if self.json {
+            answer(&serde_json::to_string(&report)?)?;
+        } else {
+            answer(&in_words(&report))?;
+        }
+        match report.faults.first() {
+            Some(fault) => bail!("{fault}"),
+            None => Ok(()),
+        }
+    }
+}
+
+fn in_words(report: &RunReport) -> String {
+    let mut text = format!(
+        "{} cycles, {} missed, {} overruns, {} lost packets\nwake-up p99.9 {:.1} us, work p99.9 {:.1} us, age p99 {:.1} us",
+        report.cycles,
+        report.missed_cycles,
+        report.overruns,
+        report.lost_packets,
+        report.wake_us.p999,
+        report.exec_us.p999,
+        report.age_us.p99
+    );
+    if let Some(recorded) = &report.recorded {
+        text += &format!("\n{}", recorded.in_words());
+    }
+    text
+}

@@ -1,0 +1,171 @@
+//! `rt_bridge record`: everything on shared memory into one clip, as a process of its own, so that neither a slow disk
+//! nor a crash here can touch the control loop, and a killed bridge leaves a finished file behind.
+
+pub mod child;
+mod disk;
+mod sources;
+
+use disk::{Room, room};
+use serde::Serialize;
+use shared_mem::msg::event::{Event, EventLevel, EventSource};
+use shared_mem::recording::{ClipInfo, ClipWriter, WriteError, WriteSummary};
+use shared_mem::transport::{Node, TransportError};
+use shared_mem::{time::now_ns, topics};
+use sources::Sources;
+use std::os::unix::process::parent_id;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+/// A killed recorder loses what came after its last flush.
+const FLUSH_EVERY_NS: u64 = 500_000_000;
+/// How long the recorder goes on after the bridge that started it has died, for what the others have to say [ns].
+const ORPHAN_PATIENCE_NS: u64 = 500_000_000;
+
+/// What to record, and until when.
+#[derive(Debug, Clone, Default)]
+pub struct Settings {
+    /// The new file.
+    pub out: PathBuf,
+    /// Stop after this long.
+    pub duration: Option<Duration>,
+    /// The bridge that started this recorder: when it is gone, the file is finished.
+    pub parent: Option<u32>,
+    /// What rides along.
+    pub info: ClipInfo,
+}
+
+/// What was recorded: the JSON answer of `rt_bridge record` and the `recorded` of `rt_bridge run`.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, serde::Deserialize)]
+pub struct Recorded {
+    /// The file.
+    pub file: PathBuf,
+    /// Messages in it.
+    pub messages: u64,
+    /// Its size.
+    pub bytes: u64,
+    /// Messages that were overwritten before they could be recorded.
+    pub lost: u64,
+    /// Why recording ended before it was told to, if it did.
+    pub stopped: Option<String>,
+}
+
+impl Recorded {
+    /// One line for people.
+    #[must_use]
+    pub fn in_words(&self) -> String {
+        let (megabytes, file) = (self.bytes as f64 * 1e-6, self.file.display());
+        format!("recorded {} messages, {megabytes:.1} MB in {file}", self.messages)
+    }
+}
+
+/// Recording cannot begin, or nothing could be kept.
+#[derive(Debug, thiserror::Error)]
+pub enum RecordError {
+    /// Too little room to begin with.
+    #[error(
+        "only {megabytes} MB are free where {} is to be written, less than the {} MB that recording starts with; free some space or record to another disk",
+        path.display(), disk::NEEDED_TO_START / 1_000_000
+    )]
+    NoRoom {
+        /// The file.
+        path: PathBuf,
+        /// Free space.
+        megabytes: u64,
+    },
+    /// The file.
+    #[error(transparent)]
+    Write(#[from] WriteError),
+    /// Shared memory.
+    #[error(transparent)]
+    Transport(#[from] TransportError),
+}
+
+/// Records until `stop` is set, the duration is over, the parent is gone, or the disk fills up.
+///
+/// # Errors
+/// [`RecordError`] when it cannot begin, or shared memory fails. A disk that fills up is no error: what was kept is
+/// reported, with the reason in `stopped`.
+pub fn record(settings: &Settings, stop: &AtomicBool) -> Result<Recorded, RecordError> {
+    let out = &settings.out;
+    if let Room::TooLittleToStart { megabytes } = room(out) {
+        return Err(RecordError::NoRoom { path: out.clone(), megabytes });
+    }
+    let node = Node::open("rt_bridge_recorder")?;
+    let mut sources = Sources::open(&node)?;
+    let events = node.publisher(topics::EVENTS)?;
+    let mut writer = ClipWriter::create(out, &settings.info)?;
+    events.send(&Event::new(EventLevel::Info, EventSource::Recorder, &announcement(out)))?;
+
+    let reason = keep_writing(settings, stop, &mut sources, &mut writer)?;
+    let stopped = match reason {
+        Reason::Told => None,
+        Reason::Failed(what) => {
+            events.send(&Event::new(EventLevel::Error, EventSource::Recorder, &what))?;
+            Some(what)
+        }
+    };
+    let bytes = writer.bytes_written();
+    let WriteSummary { messages, bytes } = match writer.finish() {
+        Ok(summary) => summary,
+        // The file is readable without its index; say how far it got.
+        Err(e) if stopped.is_none() => return Err(e.into()),
+        Err(_) => WriteSummary { messages: sources.taken(), bytes },
+    };
+    Ok(Recorded { file: out.clone(), messages, bytes, lost: sources.lost(), stopped })
+}
+
+/// The event by which others know that `file` is being written.
+fn announcement(file: &Path) -> String {
+    format!("recording to {}", file.display())
+}
+
+enum Reason {
+    Told,
+    Failed(String),
+}
+
+fn keep_writing(
+    settings: &Settings,
+    stop: &AtomicBool,
+    sources: &mut Sources,
+    writer: &mut ClipWriter,
+) -> Result<Reason, RecordError> {
+    let begin_ns = now_ns();
+    let mut flushed_ns = begin_ns;
+    let mut orphan_since = None;
+    loop {
+        // Read before draining: what is sent before a stop was asked for is still recorded.
+        let told = stop.load(Ordering::Relaxed) || over(settings, begin_ns, &mut orphan_since);
+        if let Err(e) = sources.drain_into(writer)? {
+            return Ok(Reason::Failed(e.to_string()));
+        }
+        if told {
+            return Ok(Reason::Told);
+        }
+        if now_ns() - flushed_ns >= FLUSH_EVERY_NS {
+            flushed_ns = now_ns();
+            if let Err(e) = writer.flush() {
+                return Ok(Reason::Failed(e.to_string()));
+            }
+            if let Room::TooLittleToGoOn { megabytes } = room(&settings.out) {
+                return Ok(Reason::Failed(format!(
+                    "recording stopped: only {megabytes} MB are left on the disk of {}; what was recorded is kept, free some space",
+                    settings.out.display()
+                )));
+            }
+        }
+        sources.sleep()?;
+    }
+}
+
+fn over(settings: &Settings, begin_ns: u64, orphan_since: &mut Option<u64>) -> bool {
+    let now = now_ns();
+    if settings.duration.is_some_and(|d| u128::from(now - begin_ns) >= d.as_nanos()) {
+        return true;
+    }
+    if settings.parent.is_some_and(|parent| parent != parent_id()) {
+        return now - *orphan_since.get_or_insert(now) >= ORPHAN_PATIENCE_NS;
+    }
+    false
+}

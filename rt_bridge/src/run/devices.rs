@@ -1,0 +1,177 @@
+//! From the words of the command line to devices that run.
+
+use super::Settings;
+use crate::arm::Arm;
+use crate::fr3;
+use crate::replay::ReplayArm;
+use crate::rt::cycle::Plan;
+use crate::rt::law::TorquePd;
+use crate::safety::Limits;
+use crate::sim::World;
+use anyhow::{Result, bail};
+use rtrb::Consumer;
+use shared_mem::cell::{Cell, ControllerKind};
+use shared_mem::msg::arm::CommandInterface;
+use shared_mem::msg::object::ObjectPose;
+use shared_mem::theta::Theta;
+use std::fmt;
+use std::path::PathBuf;
+use std::str::FromStr;
+use std::time::{SystemTime, UNIX_EPOCH};
+use twin::arm::{ArmModel, ControlLaw};
+use twin::scene::SceneSnapshot;
+
+/// Which arm.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum ArmChoice {
+    /// The simulated cell.
+    Sim,
+    /// A Franka robot at this address.
+    Fci(String),
+    /// A recording.
+    Replay(PathBuf),
+}
+
+impl FromStr for ArmChoice {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text.split_once("://") {
+            None if text == "sim" => Ok(Self::Sim),
+            Some(("fci", host)) if !host.is_empty() => Ok(Self::Fci(host.to_owned())),
+            Some(("replay", path)) if !path.is_empty() => Ok(Self::Replay(path.into())),
+            _ => Err("use sim, fci://HOST (for example fci://172.16.0.2) or replay://CLIP.mcap".into()),
+        }
+    }
+}
+
+impl fmt::Display for ArmChoice {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Sim => f.write_str("sim"),
+            Self::Fci(host) => write!(f, "fci://{host}"),
+            Self::Replay(clip) => write!(f, "replay://{}", clip.display()),
+        }
+    }
+}
+
+/// Who computes the torque.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+#[value(rename_all = "snake_case")]
+pub enum ControllerChoice {
+    /// The bridge: joint impedance with the gains of cell.toml; the arm adds gravity.
+    TorquePd,
+    /// The arm's own controller follows desired positions.
+    JointImpedance,
+}
+
+/// Which camera.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub enum CameraChoice {
+    /// Rendered from the simulated cell.
+    Sim,
+    /// None.
+    Off,
+}
+
+pub(super) struct Devices {
+    pub(super) arm: Box<dyn Arm>,
+    pub(super) plan: Plan,
+    pub(super) world: Option<World>,
+    /// For the simulated camera; none when it is off.
+    pub(super) scenes: Option<Consumer<SceneSnapshot>>,
+    /// From the simulated tracker, which works with the camera off, too.
+    pub(super) poses: Option<Consumer<ObjectPose>>,
+}
+
+impl Devices {
+    pub(super) fn open(settings: &Settings, cell: &Cell) -> Result<Self> {
+        let model = ArmModel::from_cell(cell)?;
+        let plan = plan(settings, cell, &model)?;
+        let wants_camera = match (settings.camera, &settings.arm) {
+            (None, ArmChoice::Sim) => cell.camera.is_some(),
+            (Some(CameraChoice::Sim), ArmChoice::Sim) => true,
+            (Some(CameraChoice::Sim), _) => bail!("--camera sim shows the simulated cell; use it with --arm sim"),
+            (Some(CameraChoice::Off) | None, _) => false,
+        };
+        if settings.arm != ArmChoice::Sim && (settings.effects.is_some() || settings.parameters.is_some()) {
+            bail!("--effects and --parameters change the simulated cell only; use them with --arm sim");
+        }
+        let (arm, simulated): (Box<dyn Arm>, _) = match &settings.arm {
+            ArmChoice::Sim => {
+                let (world, arm, views) = World::start(cell, hidden(settings)?.as_ref())?;
+                (Box::new(arm), Some((world, views)))
+            }
+            ArmChoice::Fci(host) => (fr3::connect(host, settings.realtime, cell)?, None),
+            ArmChoice::Replay(clip) => (Box::new(ReplayArm::open(clip, cell, &model)?), None),
+        };
+        if arm.dof() != model.dof() {
+            bail!(
+                "the arm has {} joints, cell.toml describes {}; correct [robot] in cell.toml",
+                arm.dof(),
+                model.dof()
+            );
+        }
+        let mut devices = Self { arm, plan, world: None, scenes: None, poses: None };
+        if let Some((world, views)) = simulated {
+            devices.world = Some(world);
+            devices.scenes = wants_camera.then_some(views.scenes);
+            devices.poses = cell.object.is_some().then_some(views.poses);
+        }
+        Ok(devices)
+    }
+}
+
+/// Parameters and effects of the simulated cell, which nobody else is told.
+fn hidden(settings: &Settings) -> Result<Option<Theta>> {
+    let mut theta = settings.parameters.as_deref().map(Theta::read).transpose()?;
+    if let Some(path) = &settings.effects {
+        let effects = Theta::read(path)?.effects;
+        theta.get_or_insert_default().effects.extend(effects);
+    }
+    Ok(theta)
+}
+
+fn plan(settings: &Settings, cell: &Cell, model: &ArmModel) -> Result<Plan> {
+    let servo = cell.controller.as_ref().is_some_and(|c| c.kind == ControllerKind::JointPd);
+    let replay = matches!(settings.arm, ArmChoice::Replay(_));
+    let torque = match settings.controller {
+        Some(ControllerChoice::TorquePd) if servo => bail!(
+            "[controller] in cell.toml is a servo (joint_pd), which computes its own torque; use --controller joint_impedance"
+        ),
+        Some(choice) => choice == ControllerChoice::TorquePd,
+        None => !servo,
+    };
+    let law = match torque && !replay {
+        true => Some(TorquePd::new(&ControlLaw::new(cell.controller.as_ref(), None, model)?, model.clone())),
+        false => None,
+    };
+    let limits = match cell.robot.as_ref().and_then(|robot| robot.model.as_deref()) {
+        Some("fr3") => Limits::fr3(),
+        _ => Limits::of_model(model),
+    };
+    let session = SystemTime::now().duration_since(UNIX_EPOCH).map_or(1, |d| d.as_nanos() as u64);
+    Ok(Plan {
+        interface: if law.is_some() { CommandInterface::Torque } else { CommandInterface::JointPosition },
+        law,
+        model: model.clone(),
+        tip_radius: cell.tool.as_ref().map_or(0.0, |tool| tool.radius),
+        limits,
+        session,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_arm_is_named_by_its_kind_and_address() {
+        assert_eq!("sim".parse(), Ok(ArmChoice::Sim));
+        assert_eq!("fci://172.16.0.2".parse(), Ok(ArmChoice::Fci("172.16.0.2".into())));
+        assert_eq!("replay://a/b.mcap".parse(), Ok(ArmChoice::Replay("a/b.mcap".into())));
+        for wrong in ["", "fci://", "simulated", "tcp://x"] {
+            assert!(wrong.parse::<ArmChoice>().is_err(), "{wrong}");
+        }
+    }
+}

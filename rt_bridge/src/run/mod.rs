@@ -1,0 +1,168 @@
+//! `rt_bridge run`: puts arm, control thread, pump, camera and recorder together, watches over them, and takes them down
+//! in the order in which nothing is lost.
+
+mod devices;
+mod report;
+
+pub use devices::{ArmChoice, CameraChoice, ControllerChoice};
+pub use report::RunReport;
+
+use crate::camera::Camera;
+use crate::motion::Player;
+use crate::pump::{Notice, Pump, Rings};
+use crate::recorder::child::{Change, RecorderChild};
+use crate::rt::Realtime;
+use crate::rt::control::{self, Outcome};
+use crate::rt::cycle::{Cycle, Link, Plan};
+use crate::safety::{Guard, Workspace};
+use anyhow::{Context as _, Result};
+use devices::Devices;
+use rtrb::RingBuffer;
+use shared_mem::cell::Cell;
+use shared_mem::msg::event::EventLevel;
+use shared_mem::msg::joints_from;
+use shared_mem::topics;
+use shared_mem::transport::Node;
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc;
+use std::time::{Duration, Instant};
+
+/// Beats that can wait for the pump: 4 s.
+const BEATS: usize = 4096;
+/// Chunks that can wait for the control thread, beside the set points in its own queue.
+const CHUNKS: usize = 16;
+/// Remarks that can wait for the pump.
+const REMARKS: usize = 64;
+/// How often the main thread looks after the others.
+const LOOK_EVERY: Duration = Duration::from_millis(10);
+/// How often it clears away what dead processes left on shared memory.
+const CLEAR_EVERY: Duration = Duration::from_secs(1);
+
+/// What to run.
+#[derive(Debug, Clone)]
+pub struct Settings {
+    /// cell.toml.
+    pub cell: PathBuf,
+    /// The arm.
+    pub arm: ArmChoice,
+    /// Who computes the torque; none: the bridge for `joint_impedance`, the arm itself for a servo.
+    pub controller: Option<ControllerChoice>,
+    /// The camera; none: simulated with the simulated arm where cell.toml has a `[camera]`, else off.
+    pub camera: Option<CameraChoice>,
+    /// Effects of the simulated cell.
+    pub effects: Option<PathBuf>,
+    /// Parameters of the simulated cell.
+    pub parameters: Option<PathBuf>,
+    /// Record to this new file.
+    pub record: Option<PathBuf>,
+    /// Stop after this long.
+    pub duration: Option<Duration>,
+    /// What to do without real-time guarantees.
+    pub realtime: Realtime,
+}
+
+impl Settings {
+    /// What is in force, defaults resolved, as the TOML text that rides along in a recording.
+    fn in_force(&self, plan: &Plan) -> String {
+        let mut text = format!("arm = {:?}\ninterface = {:?}\n", self.arm.to_string(), format!("{:?}", plan.interface));
+        for (key, path) in [("effects", &self.effects), ("parameters", &self.parameters)] {
+            if let Some(path) = path {
+                text += &format!("{key} = {:?}\n", path.display().to_string());
+            }
+        }
+        text + &format!("realtime = {:?}\n", format!("{:?}", self.realtime))
+    }
+}
+
+/// Runs until `stop` is set, the duration is over, the arm is lost or its recording ends.
+///
+/// # Errors
+/// One line with a remedy when the run cannot begin, or shared memory fails on the way. Faults of the arm and of the
+/// recorder are no errors here: they are in the report.
+pub fn run(settings: &Settings, stop: &Arc<AtomicBool>) -> Result<RunReport> {
+    let cell = Cell::read(&settings.cell)?;
+    let devices = Devices::open(settings, &cell)?;
+    let node = Node::open("rt_bridge")?;
+
+    let (to_pump, beats) = RingBuffer::new(BEATS);
+    let (to_words, remarks) = RingBuffer::new(REMARKS);
+    let (to_control, chunks) = RingBuffer::new(CHUNKS);
+    let (notices, told) = mpsc::channel();
+    let pump = Pump::start(Rings { beats, remarks, chunks: to_control, poses: devices.poses, notices: told })?;
+    let recorder = match &settings.record {
+        Some(file) => {
+            let events = node.subscriber(topics::EVENTS)?;
+            Some(RecorderChild::start(file, &settings.cell, settings.in_force(&devices.plan), &events)?)
+        }
+        None => None,
+    };
+    let camera = match devices.scenes {
+        Some(scenes) => Some(Camera::start(&cell, scenes)?),
+        None => None,
+    };
+
+    let guard = Guard { limits: devices.plan.limits, workspace: Workspace::of(&cell), period_s: 1e-3 };
+    let player = Player::new(guard, joints_from(&[]));
+    let link = Link { beats: to_pump, remarks: to_words, chunks, pump: pump.thread() };
+    let cycle = Cycle::new(devices.arm, devices.plan, player, link);
+    let end_control = Arc::new(AtomicBool::new(false));
+    let control = control::spawn(cycle, settings.realtime, end_control.clone()).context("no thread for control")?;
+
+    let mut watch = Watch { node, recorder, notices, faults: Vec::new() };
+    let begin = Instant::now();
+    let mut cleared = begin;
+    while !control.is_finished() {
+        let over = settings.duration.is_some_and(|duration| begin.elapsed() >= duration);
+        if over || stop.load(Ordering::Relaxed) || pump.has_ended() {
+            end_control.store(true, Ordering::Relaxed);
+        }
+        watch.look(&mut cleared);
+        std::thread::sleep(LOOK_EVERY);
+    }
+    let outcome = control.join().map_err(|_| anyhow::anyhow!("the control thread failed; please report this"))?;
+    drop(camera);
+    let pumped = pump.finish();
+    let recorded = watch.recorder.and_then(RecorderChild::finish);
+    if let Some(world) = devices.world {
+        world.finish();
+    }
+    let Outcome { stats, .. } = outcome?;
+    let pumped = pumped?;
+    let faults = pumped.faults.into_iter().chain(watch.faults).collect();
+    Ok(RunReport::new(&stats, &pumped.age, recorded, faults))
+}
+
+/// What the main thread looks after while the control thread runs.
+struct Watch {
+    node: Node,
+    recorder: Option<RecorderChild>,
+    notices: mpsc::Sender<Notice>,
+    faults: Vec<String>,
+}
+
+impl Watch {
+    fn look(&mut self, cleared: &mut Instant) {
+        if let Some(change) = self.recorder.as_mut().and_then(RecorderChild::look) {
+            let notice = match change {
+                Change::Replaced(file) => {
+                    let text = format!(
+                        "the recorder was killed; its file is readable up to its last half second, recording goes on in {}",
+                        file.display()
+                    );
+                    Notice { level: EventLevel::Warning, text }
+                }
+                Change::Ended(why) => {
+                    self.faults.push(why.clone());
+                    Notice { level: EventLevel::Error, text: why }
+                }
+            };
+            let _pump_gone = self.notices.send(notice);
+        }
+        if cleared.elapsed() >= CLEAR_EVERY {
+            *cleared = Instant::now();
+            self.node.clear_dead_nodes();
+        }
+    }
+}

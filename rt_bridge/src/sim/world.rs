@@ -1,0 +1,113 @@
+//! The thread that stands in for the cell: it steps the physics once per command and gives out states, scenes and what
+//! the tracker sees.
+
+use super::SimArm;
+use crate::rt::process;
+use rtrb::{Consumer, Producer, RingBuffer};
+use shared_mem::cell::Cell;
+use shared_mem::msg::arm::{ArmCommand, ArmMode, ArmState, CommandInterface};
+use shared_mem::msg::object::ObjectPose;
+use shared_mem::theta::Theta;
+use std::thread::{self, JoinHandle};
+use std::time::Duration;
+use twin::scene::SceneSnapshot;
+use twin::sensors::tracker::SimTracker;
+use twin::sim::{Drive, SimCell, SimError};
+
+/// States and commands that can be under way: one of each in lock-step.
+const IN_FLIGHT: usize = 2;
+/// Scenes that wait for the camera: a quarter of a second.
+const SCENES: usize = 256;
+
+/// Poses that wait for the pump: more than a second at frame rate.
+const POSES: usize = 64;
+
+/// What the cell gives beside its arm.
+#[derive(Debug)]
+pub struct Views {
+    /// Scenes for a camera, one per period.
+    pub scenes: Consumer<SceneSnapshot>,
+    /// What the tracker sees, as it becomes known; `stamp_ns` is 0.
+    pub poses: Consumer<ObjectPose>,
+}
+
+/// The world's ends of the rings.
+struct Outlets {
+    states: Producer<ArmState>,
+    scenes: Producer<SceneSnapshot>,
+    poses: Producer<ObjectPose>,
+    tracker: SimTracker,
+}
+
+/// The running cell. It ends when its [`SimArm`] is dropped.
+#[derive(Debug)]
+pub struct World {
+    handle: JoinHandle<()>,
+}
+
+impl World {
+    /// Sets the cell up and starts it. `theta` are the *simulated* cell's own parameters and effects, which the twin is
+    /// never told. Returns the arm's end, and what else there is to see.
+    ///
+    /// # Errors
+    /// [`SimError`] when cell or parameters cannot be simulated.
+    ///
+    /// # Panics
+    /// When the operating system cannot make a thread.
+    pub fn start(cell: &Cell, theta: Option<&Theta>) -> Result<(Self, SimArm, Views), SimError> {
+        let tracker = SimTracker::new(cell);
+        let mut cell = SimCell::new(cell, theta)?;
+        let (to_arm, states) = RingBuffer::new(IN_FLIGHT);
+        let (commands, mut from_arm) = RingBuffer::<ArmCommand>::new(IN_FLIGHT);
+        let (to_camera, scenes) = RingBuffer::new(SCENES);
+        let (to_pump, poses) = RingBuffer::new(POSES);
+        let mut out = Outlets { states: to_arm, scenes: to_camera, poses: to_pump, tracker };
+        let dof = cell.arm_model().map_or(0, twin::arm::ArmModel::dof);
+        let body = move || {
+            // It plays the robot, which is always in time; where that is not granted, late states count as lost packets.
+            let _not_granted = process::set_fifo(process::SIMULATION_PRIORITY);
+            out.give(&mut cell);
+            while !from_arm.is_abandoned() {
+                let Ok(command) = from_arm.pop() else {
+                    thread::park_timeout(Duration::from_millis(100));
+                    continue;
+                };
+                cell.step(&drive(&command));
+                out.give(&mut cell);
+            }
+        };
+        let handle = thread::Builder::new().name("world".into()).spawn(body).expect("threads can be made");
+        let arm = SimArm { dof, states, commands, world: handle.thread().clone() };
+        Ok((Self { handle }, arm, Views { scenes, poses }))
+    }
+
+    /// Waits for the thread, after its [`SimArm`] was dropped.
+    ///
+    /// # Panics
+    /// When the simulation panicked.
+    pub fn finish(self) {
+        self.handle.thread().unpark();
+        self.handle.join().expect("the simulation does not panic");
+    }
+}
+
+impl Outlets {
+    fn give(&mut self, cell: &mut SimCell) {
+        let mut state = ArmState { mode: ArmMode::Move, success_rate: 1.0, ..ArmState::default() };
+        cell.read(&mut state);
+        // Lock-step leaves room for the state; a camera or a pump that is late misses something, not the other way round.
+        let _state = self.states.push(state);
+        let scene = cell.snapshot();
+        let _scene = self.scenes.push(scene);
+        if let Some(pose) = self.tracker.observe(&scene) {
+            let _pose = self.poses.push(pose);
+        }
+    }
+}
+
+fn drive(command: &ArmCommand) -> Drive {
+    match command.interface {
+        CommandInterface::Torque => Drive::Torque { tau_J_d: command.tau_J_d },
+        CommandInterface::JointPosition => Drive::JointImpedance { q_d: command.q_d, dq_d: command.dq_d },
+    }
+}
