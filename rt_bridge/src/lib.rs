@@ -16,6 +16,7 @@ pub mod arm;
 pub mod camera;
 pub mod cli;
 
+pub mod doctor;
 pub mod fr3;
 pub mod motion;
 pub mod pump;

@@ -3,6 +3,7 @@
 //! Standard output holds nothing but the answer: one JSON object with `--json`, a few lines without. Everything said on
 //! the way goes to standard error. Exit codes: 0 done, 1 failed, 2 wrong arguments.
 
+mod doctor;
 mod record;
 mod run;
 
@@ -34,6 +35,7 @@ struct Arguments {
 enum Verb {
     Run(run::RunArguments),
     Record(record::RecordArguments),
+    Doctor(doctor::DoctorArguments),
 }
 
 /// Reads the command line and does what it says.
@@ -52,6 +54,7 @@ pub fn main() -> ExitCode {
     let done = match arguments.verb {
         Verb::Run(run) => run.execute(),
         Verb::Record(record) => record.execute(),
+        Verb::Doctor(doctor) => doctor.execute(),
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,

@@ -2,7 +2,7 @@
 //! Python package franka-sim), then: `cargo test --release -p rt_bridge --test fci -- --ignored --test-threads 1 --nocapture`.
 //! `FCI_HOST` names another address than 127.0.0.1.
 
-use crate::allocation::allocations;
+use crate::counting::allocations;
 use rt_bridge::arm::{Arm, ArmFault, Read};
 use rt_bridge::fr3;
 use rt_bridge::rt::Realtime;

@@ -2,6 +2,8 @@
 //! Bytes are laid out by hand from the protocol's offsets, so that the driver is not tested against itself.
 
 mod allocation;
+#[path = "../counting/mod.rs"]
+mod counting;
 mod live;
 mod motion;
 mod refusal;

@@ -1,0 +1,46 @@
+//! `rt_bridge doctor`.
+
+use super::answer;
+use crate::doctor::{Verdict, examine};
+use crate::run::ArmChoice;
+use anyhow::{Result, bail};
+use clap::Args;
+
+/// Explain this machine before a robot moves
+///
+/// Looks at kernel, scheduling, memory lock, processors, shared memory, network and devices, and measures for two seconds
+/// how late a 1 kHz loop wakes. Each line is ok, a warning or a problem, with what to do about it.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:\n  rt_bridge doctor\n  rt_bridge doctor --arm fci://172.16.0.2 --json\n\n\
+    JSON: findings [{check, verdict (ok, warning, problem), found, remedy}], wake_us. Exit code 1 when there is a problem.")]
+pub(super) struct DoctorArguments {
+    /// A robot to reach, fci://HOST
+    #[arg(long, value_name = "ARM")]
+    arm: Option<ArmChoice>,
+    /// Answer with one JSON object
+    #[arg(long)]
+    json: bool,
+}
+
+impl DoctorArguments {
+    pub(super) fn execute(self) -> Result<()> {
+        let host = match &self.arm {
+            Some(ArmChoice::Fci(host)) => Some(host.as_str()),
+            _ => None,
+        };
+        let report = examine(host);
+        if self.json {
+            answer(&serde_json::to_string(&report)?)?;
+        } else {
+            for finding in &report.findings {
+                answer(&finding.to_string())?;
+            }
+        }
+        if report.verdict() == Verdict::Problem {
+            let first = report.findings.iter().find(|f| f.verdict == Verdict::Problem);
+            let [found, remedy] = first.map_or(["", ""], |f| [&f.found, f.remedy.as_deref().unwrap_or("")]);
+            bail!("{found}; {remedy}");
+        }
+        Ok(())
+    }
+}

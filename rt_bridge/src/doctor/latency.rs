@@ -1,0 +1,38 @@
+//! A control loop without an arm: how late it wakes.
+
+use super::Finding;
+use crate::rt::deadline::Grid;
+use crate::rt::process;
+use crate::times::{Percentiles, Times};
+use shared_mem::time::now_ns;
+
+/// Cycles of the test: two seconds.
+const CYCLES: u32 = 2000;
+/// Wake-up latency that leaves a millisecond's work its time [us].
+const GOOD_US: f64 = 150.0;
+
+pub(super) fn examine() -> (Finding, Percentiles) {
+    let times = std::thread::spawn(measure).join().unwrap_or_default();
+    let wake = times.percentiles();
+    let found = format!("wakes {:.0} us late (p99.9 of {CYCLES}), at worst {:.0} us", wake.p999, wake.max);
+    let finding = if wake.p999 <= GOOD_US {
+        Finding::ok("wake-up", found)
+    } else {
+        let remedy = "close other programs; a real-time kernel, the performance governor and an isolated core help, in this order";
+        Finding::warning("wake-up", found, remedy)
+    };
+    (finding, wake)
+}
+
+fn measure() -> Times {
+    let mut times = Times::new();
+    // Where it is not granted, the test shows what the bridge would get.
+    let _granted = process::set_fifo(process::CONTROL_PRIORITY);
+    let _bound = process::last_core().map(process::pin_to);
+    let mut grid = Grid::new(now_ns(), 1_000_000);
+    for _ in 0..CYCLES {
+        process::sleep_until(grid.next_ns());
+        times.record(grid.woke(now_ns()).late_ns);
+    }
+    times
+}
