@@ -7,5 +7,8 @@ pub mod render;
 pub mod rollout;
 pub mod scene;
 pub mod sensors;
+pub mod shadow;
 pub mod sim;
 pub mod sliding;
+#[cfg(feature = "viewer")]
+pub mod viewer;

@@ -1,8 +1,10 @@
 //! The object as it is simulated: shape, inertia, friction. Built from cell.toml's nominal values and overridden by
 //! theta.toml; read by the physics and by the camera. Object frame, SI.
 
+mod arm_outline;
 mod mesh_file;
 
+pub use arm_outline::{ArmOutline, Part};
 pub use mesh_file::MeshFileError;
 
 use nalgebra::{Point3, Vector3};

@@ -1,0 +1,151 @@
+//! `twin shadow`: mirrors a running bridge and publishes the gap.
+
+use anyhow::Context as _;
+use clap::Args;
+use shared_mem::cell::Cell;
+use shared_mem::theta::Theta;
+use std::io::{IsTerminal as _, Write as _};
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+use twin::shadow::live::{Live, Watcher};
+use twin::shadow::{Mirrored, Shadow as Twin};
+
+/// Mirror a running cell in simulation and publish how far the two are apart.
+///
+/// Attaches to `rt_bridge run` through shared memory, whichever of the two is started first, and survives its restarts.
+/// Sends the twin's state on /twin/state and the gap on /twin/gap.
+#[derive(Args)]
+#[command(after_help = "Examples:\n  \
+    twin shadow --cell config/fr3_cell.toml                       until Ctrl-C, gap on the terminal\n  \
+    twin shadow --cell config/fr3_cell.toml --viewer              in Foxglove or Lichtblick: ws://127.0.0.1:8765\n  \
+    twin shadow --cell cell.toml --parameters theta.toml --duration 60 --json")]
+pub(crate) struct Shadow {
+    /// What is known about the cell; the same file the bridge runs with
+    #[arg(long, value_name = "CELL.toml")]
+    cell: PathBuf,
+    /// Identified parameters for the twin
+    #[arg(long, value_name = "THETA.toml")]
+    parameters: Option<PathBuf>,
+    /// Stop after so many seconds; without it, on Ctrl-C
+    #[arg(long, value_name = "SECONDS", value_parser = seconds)]
+    duration: Option<f64>,
+    /// Show robot and twin in 3D: a Foxglove WebSocket on 127.0.0.1:8765
+    #[arg(long)]
+    viewer: bool,
+    /// One JSON object with the figures on stdout at the end
+    #[arg(long)]
+    json: bool,
+}
+
+fn seconds(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(value) if value > 0.0 && value < 1e9 => Ok(value),
+        _ => Err("give a positive number of seconds".into()),
+    }
+}
+
+impl Shadow {
+    /// Runs until its duration is over or a signal asks it to end.
+    pub(crate) fn run(self) -> anyhow::Result<()> {
+        let cell = Cell::read(&self.cell)?;
+        let theta = self.parameters.as_deref().map(Theta::read).transpose()?;
+        let mut shadow = Twin::new(&cell, theta.as_ref())?;
+        let stop = Arc::new(AtomicBool::new(false));
+        let on_signal = Arc::clone(&stop);
+        ctrlc::set_handler(move || on_signal.store(true, Ordering::Relaxed)).context("cannot listen for Ctrl-C")?;
+        let viewer = self.viewer.then(|| viewer(&cell, &stop)).transpose()?;
+        let mut terminal = Terminal::new();
+        let outcome = Live::open()?.run(&mut shadow, self.duration.map(Duration::from_secs_f64), &stop, &mut terminal);
+        terminal.finish();
+        stop.store(true, Ordering::Relaxed);
+        if let Some(viewer) = viewer {
+            viewer.join().map_err(|_| anyhow::anyhow!("the viewer crashed; start without --viewer"))??;
+        }
+        let (busy_s, summary) = (outcome?, shadow.summary());
+        if self.json {
+            writeln!(std::io::stdout(), "{}", summary.json(busy_s))?;
+        } else {
+            eprintln!("{}", summary.text(busy_s));
+        }
+        Ok(())
+    }
+}
+
+type ViewerThread = std::thread::JoinHandle<anyhow::Result<()>>;
+
+#[cfg(feature = "viewer")]
+fn viewer(cell: &Cell, stop: &Arc<AtomicBool>) -> anyhow::Result<ViewerThread> {
+    let viewer = twin::viewer::Viewer::start(cell)?;
+    eprintln!("viewer: open {} in Foxglove or Lichtblick", viewer.address());
+    let stop = Arc::clone(stop);
+    Ok(std::thread::Builder::new().name("viewer".into()).spawn(move || Ok(viewer.run(&stop)?))?)
+}
+
+#[cfg(not(feature = "viewer"))]
+fn viewer(_: &Cell, _: &Arc<AtomicBool>) -> anyhow::Result<ViewerThread> {
+    anyhow::bail!("this program was built without its viewer; build with `--features viewer`, or leave --viewer out")
+}
+
+/// Shows the gap on stderr: one line that is overwritten on a terminal, a line a second elsewhere.
+struct Terminal {
+    overwrites: bool,
+    shown: Instant,
+    line_open: bool,
+}
+
+impl Terminal {
+    fn new() -> Self {
+        Self { overwrites: std::io::stderr().is_terminal(), shown: Instant::now(), line_open: false }
+    }
+
+    fn finish(&mut self) {
+        if std::mem::take(&mut self.line_open) {
+            eprintln!();
+        }
+    }
+}
+
+impl Watcher for Terminal {
+    fn remark(&mut self, text: &str) {
+        self.finish();
+        eprintln!("twin: {text}");
+    }
+
+    fn mirrored(&mut self, mirrored: &Mirrored) {
+        let pause = Duration::from_millis(if self.overwrites { 100 } else { 1000 });
+        if self.shown.elapsed() < pause {
+            return;
+        }
+        self.shown = Instant::now();
+        let line = status_line(mirrored);
+        if self.overwrites {
+            eprint!("\r{line}\x1b[K");
+            self.line_open = true;
+        } else {
+            eprintln!("{line}");
+        }
+    }
+}
+
+/// `cycle 12345  gap 12.3 µrad RMS (joint 2)  object ADD 1.2 mm  contact 0.0 N  age 35 µs`
+fn status_line(mirrored: &Mirrored) -> String {
+    let Mirrored { state, gap, .. } = mirrored;
+    let dof = gap.dof as usize;
+    let (joint, worst) =
+        gap.joint_rms.iter().take(dof).enumerate().fold((0, 0.0), |m, (i, v)| if *v > m.1 { (i, *v) } else { m });
+    let object = if gap.object_add_m.is_nan() {
+        "no object seen".to_owned()
+    } else {
+        format!("object ADD {:.2} mm", gap.object_add_m * 1e3)
+    };
+    format!(
+        "cycle {}  gap {:.1} µrad RMS (joint {})  {object}  contact {:.1} N  age {:.0} µs",
+        gap.cycle,
+        worst * 1e6,
+        joint + 1,
+        state.contact_force,
+        gap.age_ns as f64 * 1e-3,
+    )
+}

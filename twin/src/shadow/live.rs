@@ -1,0 +1,139 @@
+//! The shadow on shared memory: sleeps until the bridge sends a state, mirrors it, sends prediction and gap on. The
+//! bridge may come later, go away and come back; what happens is told to a [`Watcher`].
+
+use super::{MirrorError, Mirrored, ObjectEvent, Shadow};
+use shared_mem::msg::arm::ArmState;
+use shared_mem::msg::object::ObjectPose;
+use shared_mem::msg::twin::{TwinGap, TwinState};
+use shared_mem::time::now_ns;
+use shared_mem::topics::{ARM_STATE, OBJECT_POSE, TWIN_GAP, TWIN_STATE};
+use shared_mem::transport::{Node, Publisher, Subscriber, TransportError, Wake};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+/// A state older than this on arrival means that the twin cannot keep up [ns].
+const TOO_OLD_NS: u64 = 250_000_000;
+/// Without a state for so long the bridge counts as silent.
+const SILENCE: Duration = Duration::from_secs(1);
+/// How long a sleep may last: how soon a stop is noticed.
+const NAP: Duration = Duration::from_millis(100);
+/// How often what dead processes left behind is cleared away.
+const HOUSEKEEPING: Duration = Duration::from_secs(1);
+
+/// Who wants to know what happens.
+pub trait Watcher {
+    /// Something happened that a person should read.
+    fn remark(&mut self, text: &str);
+    /// The newest prediction and gap; called for every state.
+    fn mirrored(&mut self, mirrored: &Mirrored);
+}
+
+/// The shadow stopped because it cannot go on.
+#[derive(Debug, thiserror::Error)]
+pub enum LiveError {
+    /// Shared memory.
+    #[error(transparent)]
+    Transport(#[from] TransportError),
+    /// The bridge drives another arm.
+    #[error(transparent)]
+    Mirror(#[from] MirrorError),
+}
+
+/// The shadow's places on shared memory.
+pub struct Live {
+    node: Node,
+    states: Subscriber<ArmState>,
+    poses: Subscriber<ObjectPose>,
+    wake: Wake,
+    predictions: Publisher<TwinState>,
+    gaps: Publisher<TwinGap>,
+    /// Time spent computing and sending [s].
+    busy_s: f64,
+}
+
+impl Live {
+    /// Takes the places. The bridge need not run yet.
+    ///
+    /// # Errors
+    /// [`TransportError`] when shared memory fails or another shadow runs in this domain.
+    pub fn open() -> Result<Self, TransportError> {
+        let node = Node::open("twin_shadow")?;
+        Ok(Self {
+            states: node.subscriber(ARM_STATE)?,
+            poses: node.subscriber(OBJECT_POSE)?,
+            wake: node.wake_on(ARM_STATE.name)?,
+            predictions: node.publisher(TWIN_STATE)?,
+            gaps: node.publisher(TWIN_GAP)?,
+            node,
+            busy_s: 0.0,
+        })
+    }
+
+    /// Mirrors until `stop` is set or `duration` has passed. Answers with the time spent computing [s].
+    ///
+    /// # Errors
+    /// [`LiveError`] when shared memory fails or the bridge drives another arm.
+    pub fn run(
+        &mut self,
+        shadow: &mut Shadow,
+        duration: Option<Duration>,
+        stop: &AtomicBool,
+        watcher: &mut dyn Watcher,
+    ) -> Result<f64, LiveError> {
+        let start = Instant::now();
+        let (mut heard, mut silent, mut cleaned) = (start, false, start);
+        while !stop.load(Ordering::Relaxed) && duration.is_none_or(|d| start.elapsed() < d) {
+            self.wake.wait(NAP)?;
+            if self.mirror_all(shadow, watcher)? {
+                (heard, silent) = (Instant::now(), false);
+            } else if !silent && heard.elapsed() > SILENCE {
+                silent = true;
+                watcher.remark("no arm state for a second; waiting for `rt_bridge run --cell CELL` on this machine");
+            }
+            if cleaned.elapsed() > HOUSEKEEPING {
+                cleaned = Instant::now();
+                self.node.clear_dead_nodes();
+                self.predictions.greet_new_readers()?;
+                self.gaps.greet_new_readers()?;
+            }
+        }
+        Ok(self.busy_s)
+    }
+
+    /// Everything that has arrived; `false` when there was nothing.
+    fn mirror_all(&mut self, shadow: &mut Shadow, watcher: &mut dyn Watcher) -> Result<bool, LiveError> {
+        let mut any = false;
+        while let Some(state) = self.states.receive()? {
+            any = true;
+            let arrived_ns = now_ns();
+            let age_ns = arrived_ns.saturating_sub(state.stamp_ns);
+            if age_ns > TOO_OLD_NS {
+                shadow.fell_behind(1);
+                continue;
+            }
+            if let Some(mut mirrored) = shadow.on_state(&state, age_ns)? {
+                self.send(&mut mirrored)?;
+                if let Some(event) = mirrored.event {
+                    watcher.remark(&event.to_string());
+                }
+                watcher.mirrored(&mirrored);
+            }
+            while let Some(pose) = self.poses.receive()? {
+                match shadow.on_object(&pose) {
+                    Some(ObjectEvent::Found) => watcher.remark("the object is tracked; the twin's stands where it is"),
+                    Some(ObjectEvent::Rests) => watcher.remark("the object rests; the twin's was set onto it"),
+                    None => {}
+                }
+            }
+            self.busy_s += now_ns().saturating_sub(arrived_ns) as f64 * 1e-9;
+        }
+        Ok(any)
+    }
+
+    fn send(&self, mirrored: &mut Mirrored) -> Result<(), TransportError> {
+        mirrored.state.stamp_ns = now_ns();
+        mirrored.gap.stamp_ns = mirrored.state.stamp_ns;
+        self.predictions.send(&mirrored.state)?;
+        self.gaps.send(&mirrored.gap)
+    }
+}

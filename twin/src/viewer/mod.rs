@@ -1,0 +1,204 @@
+//! The live view: robot and twin in 3D, their joints, the gap as curves, the camera's pictures, as a Foxglove WebSocket
+//! (the only code that knows the foxglove crate). It is one more reader of shared memory, in a thread of its own, so
+//! the shadow's timing does not feel it. Shows at [`FRAME`] the newest of everything and skips the rest.
+
+mod scene;
+
+use crate::arm::ModelError;
+use foxglove::messages::{FrameTransform, FrameTransforms, PoseInFrame, RawImage, SceneUpdate, Timestamp};
+use foxglove::{Channel, ChannelBuilder, FoxgloveError, RawChannel, Schema, WebSocketServer, WebSocketServerHandle};
+use scene::{Look, Scene};
+use shared_mem::cell::Cell;
+use shared_mem::frames::{Base, Object, Pose};
+use shared_mem::msg::image::PixelEncoding;
+use shared_mem::msg::twin::TwinGap;
+use shared_mem::time::unix_offset_ns;
+use shared_mem::topics::{ARM_STATE, CAMERA_COLOR, CAMERA_DEPTH, CAMERA_INFO, OBJECT_POSE, TWIN_GAP, TWIN_STATE};
+use shared_mem::transport::{ImageSubscriber, Node, TransportError};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+/// Where the socket listens. This machine only: whoever wants it elsewhere tunnels it on purpose.
+const HOST: &str = "127.0.0.1";
+const PORT: u16 = 8765;
+/// Time between two pictures of the scene.
+const FRAME: Duration = Duration::from_millis(33);
+
+/// The live view.
+pub struct Viewer {
+    server: WebSocketServerHandle,
+    scene: Scene,
+    scenes: Channel<SceneUpdate>,
+    real_joints: Channel<foxglove::messages::JointStates>,
+    twin_joints: Channel<foxglove::messages::JointStates>,
+    real_object: Channel<PoseInFrame>,
+    twin_object: Channel<PoseInFrame>,
+    transforms: Channel<FrameTransforms>,
+    color: Channel<RawImage>,
+    depth: Channel<RawImage>,
+    gap: Arc<RawChannel>,
+}
+
+/// The live view cannot be shown.
+#[derive(Debug, thiserror::Error)]
+pub enum ViewerError {
+    /// The socket.
+    #[error("cannot listen on {HOST}:{PORT}: {0}; stop the other viewer, or start without --viewer")]
+    Listen(FoxgloveError),
+    /// A channel.
+    #[error("cannot open a channel of the viewer: {0}; start without --viewer")]
+    Channel(FoxgloveError),
+    /// The arm to draw.
+    #[error(transparent)]
+    Arm(#[from] ModelError),
+    /// Shared memory.
+    #[error(transparent)]
+    Transport(#[from] TransportError),
+}
+
+impl Viewer {
+    /// Opens the socket.
+    ///
+    /// # Errors
+    /// [`ViewerError`] when the port is taken or cell.toml describes no arm.
+    pub fn start(cell: &Cell) -> Result<Self, ViewerError> {
+        let scene = Scene::new(cell)?;
+        let server = WebSocketServer::new()
+            .name("twinalign shadow")
+            .bind(HOST, PORT)
+            .start_blocking()
+            .map_err(ViewerError::Listen)?;
+        let schema = r#"{"type":"object","properties":{"joint_error":{"type":"array","items":{"type":"number"}},
+            "joint_rms":{"type":"array","items":{"type":"number"}},"object_add_m":{"type":"number"},
+            "object_add_s_m":{"type":"number"},"age_s":{"type":"number"},"alignments":{"type":"integer"}}}"#;
+        let gap = ChannelBuilder::new(TWIN_GAP.name)
+            .message_encoding("json")
+            .schema(Schema::new("twinalign.Gap", "jsonschema", schema.as_bytes().to_vec()))
+            .build_raw()
+            .map_err(ViewerError::Channel)?;
+        Ok(Self {
+            server,
+            scene,
+            scenes: Channel::new("/scene"),
+            real_joints: Channel::new("/arm/joints"),
+            twin_joints: Channel::new("/twin/joints"),
+            real_object: Channel::new(OBJECT_POSE.name),
+            twin_object: Channel::new("/twin/object"),
+            transforms: Channel::new("/tf"),
+            color: Channel::new(CAMERA_COLOR.name),
+            depth: Channel::new(CAMERA_DEPTH.name),
+            gap,
+        })
+    }
+
+    /// Where a person points Foxglove or Lichtblick.
+    #[must_use]
+    pub fn address(&self) -> String {
+        format!("ws://{HOST}:{}", self.server.port())
+    }
+
+    /// Shows what happens on shared memory until `stop` is set.
+    ///
+    /// # Errors
+    /// [`ViewerError::Transport`] when shared memory fails.
+    pub fn run(self, stop: &AtomicBool) -> Result<(), ViewerError> {
+        let node = Node::open("twin_viewer")?;
+        let (arm, twin) = (node.subscriber(ARM_STATE)?, node.subscriber(TWIN_STATE)?);
+        let (gaps, poses) = (node.subscriber(TWIN_GAP)?, node.subscriber(OBJECT_POSE)?);
+        let info = node.subscriber(CAMERA_INFO)?;
+        let pictures =
+            [(node.image_subscriber(CAMERA_COLOR)?, &self.color), (node.image_subscriber(CAMERA_DEPTH)?, &self.depth)];
+        while !stop.load(Ordering::Relaxed) {
+            let time = timestamp(shared_mem::time::now_ns());
+            if let Some(state) = arm.newest()? {
+                self.real_joints.log(&self.scene.joints(time, &state.q, &state.dq, &state.tau_J));
+                self.scenes.log(&self.scene.arm(time, Look::Real, &state.q));
+            }
+            if let Some(state) = twin.newest()? {
+                self.twin_joints.log(&self.scene.joints(time, &state.q, &state.dq, &state.tau_J));
+                self.scenes.log(&self.scene.arm(time, Look::Twin, &state.q));
+                let pose = Pose::from_parts(state.object_position, state.object_wxyz);
+                self.show_object(time, Look::Twin, pose.filter(|_| state.has_object == 1));
+            }
+            if let Some(pose) = poses.newest()? {
+                self.show_object(time, Look::Real, pose.pose());
+            }
+            if let Some(gap) = gaps.newest()? {
+                self.gap.log(gap_json(&gap).to_string().as_bytes());
+            }
+            if let Some(info) = info.newest()? {
+                self.show_camera_frame(time, info.position, info.wxyz);
+            }
+            for (reader, channel) in &pictures {
+                show_picture(time, reader, channel)?;
+            }
+            std::thread::sleep(FRAME);
+        }
+        self.server.stop().wait_blocking();
+        Ok(())
+    }
+
+    fn show_object(&self, time: Timestamp, look: Look, pose: Option<Pose<Base, Object>>) {
+        let Some(pose) = pose else { return };
+        let channel = if look == Look::Real { &self.real_object } else { &self.twin_object };
+        channel.log(&self.scene.pose_in_base(time, &pose.isometry()));
+        if let Some(update) = self.scene.object(time, look, &pose.isometry()) {
+            self.scenes.log(&update);
+        }
+    }
+
+    fn show_camera_frame(&self, time: Timestamp, position: [f64; 3], wxyz: [f64; 4]) {
+        let Some(pose) = Pose::<Base, shared_mem::frames::Camera>::from_parts(position, wxyz) else { return };
+        let (translation, rotation) = scene::parts(&pose.isometry());
+        self.transforms.log(&FrameTransforms {
+            transforms: vec![FrameTransform {
+                timestamp: Some(time),
+                parent_frame_id: self.scene.base_frame().to_owned(),
+                child_frame_id: "camera".into(),
+                translation: Some(translation),
+                rotation: Some(rotation),
+            }],
+        });
+    }
+}
+
+fn show_picture(time: Timestamp, reader: &ImageSubscriber, channel: &Channel<RawImage>) -> Result<(), TransportError> {
+    let mut newest = None;
+    while let Some(sample) = reader.receive()? {
+        newest = Some(sample);
+    }
+    // Copying a megabyte for nobody would be a waste.
+    if let Some(sample) = newest.filter(|_| channel.has_sinks()) {
+        let header = sample.header();
+        channel.log(&RawImage {
+            timestamp: Some(time),
+            frame_id: "camera".into(),
+            width: header.width,
+            height: header.height,
+            encoding: match header.encoding {
+                PixelEncoding::Rgb8 => "rgb8".into(),
+                PixelEncoding::Depth16 => "16UC1".into(),
+            },
+            step: header.stride,
+            data: sample.bytes().to_vec().into(),
+        });
+    }
+    Ok(())
+}
+
+/// NaN, which JSON lacks, becomes null.
+fn gap_json(gap: &TwinGap) -> serde_json::Value {
+    let dof = gap.dof as usize;
+    serde_json::json!({
+        "joint_error": gap.joint_error[..dof], "joint_rms": gap.joint_rms[..dof],
+        "object_add_m": gap.object_add_m, "object_add_s_m": gap.object_add_s_m,
+        "age_s": gap.age_ns as f64 * 1e-9, "alignments": gap.alignments,
+    })
+}
+
+/// Foxglove shows Unix time.
+fn timestamp(monotonic_ns: u64) -> Timestamp {
+    let unix_ns = monotonic_ns.saturating_add_signed(unix_offset_ns());
+    Timestamp::new((unix_ns / 1_000_000_000) as u32, (unix_ns % 1_000_000_000) as u32)
+}
