@@ -6,7 +6,7 @@ use super::error::ReadError;
 use super::joint_log::{self, JointLog, Wanted};
 use super::messages::is_own;
 use super::series::{JointSeries, ObjectSeries};
-use super::{bag, own};
+use super::{bag, own, twinaligner};
 use crate::cell::{Cell, ClipKind};
 use std::path::{Path, PathBuf};
 
@@ -40,6 +40,7 @@ pub fn read_clip(path: &Path, kind: ClipKind, cell: &Cell) -> Result<Clip, ReadE
     match Source::of(path)? {
         Source::Own => own::read(path, kind, cell),
         Source::Bag => bag::read(path, kind, cell),
+        Source::TwinAligner => twinaligner::read(path, kind, cell),
     }
 }
 
@@ -47,11 +48,20 @@ pub fn read_clip(path: &Path, kind: ClipKind, cell: &Cell) -> Result<Clip, ReadE
 enum Source {
     Own,
     Bag,
+    TwinAligner,
 }
 
 impl Source {
     /// By the first message of a file: its encoding tells who wrote it.
     fn of(path: &Path) -> Result<Self, ReadError> {
+        if path.is_dir() {
+            return if twinaligner::is_clip_folder(path) {
+                Ok(Self::TwinAligner)
+            } else {
+                let what = "is a folder without control.json and frame.json; give a clip file or a TwinAligner folder";
+                Err(ReadError::kind(path, what))
+            };
+        }
         let mut messages = Messages::open(path)?;
         let own = messages.next()?.map(|message| is_own(message.channel));
         // A recording that was stopped before its first message still says whose it is.
@@ -103,6 +113,14 @@ pub(super) fn wanted_joints(cell: &Cell) -> Wanted {
         Some(robot) if !robot.joints.is_empty() => Wanted::Names(robot.joints.clone()),
         Some(robot) if robot.model.is_some() => Wanted::Model((1..=7).map(|i| format!("fr3_joint{i}")).collect()),
         _ => Wanted::Any,
+    }
+}
+
+/// Names for recordings that only number their joints: those of cell.toml where their number fits.
+pub(super) fn numbered_joints(cell: &Cell, dof: usize) -> Vec<String> {
+    match wanted_joints(cell) {
+        Wanted::Names(names) | Wanted::Model(names) if names.len() == dof => names,
+        _ => (1..=dof).map(|i| format!("joint{i}")).collect(),
     }
 }
 

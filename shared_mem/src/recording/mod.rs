@@ -11,9 +11,11 @@
 //! | `own` | an own recording as a clip |
 //! | `messages`, `picture` | all messages one by one, pictures |
 //! | `bag` | a ROS 2 bag as a clip |
+//! | `twinaligner`, `npy` | a TwinAligner folder as a clip |
 //! | `joint_log` | joint rows: one publisher, one joint order |
 //! | `checks` | faults that foreign logs have, each told in a sentence |
 //! | `wire`, `writer` | own clips: messages and file |
+//! | `recover` | a damaged file, rewritten |
 //! | `clip`, `series`, `session` | what callers get |
 
 mod bag;
@@ -24,11 +26,14 @@ mod container;
 mod error;
 mod joint_log;
 mod messages;
+mod npy;
 mod own;
 mod picture;
+mod recover;
 mod ros2;
 mod series;
 mod session;
+mod twinaligner;
 mod wire;
 mod writer;
 
@@ -37,11 +42,7 @@ pub use error::ReadError;
 pub use messages::{ClipMessage, ClipMessages, Payload};
 pub use own::{read_arm_states, read_clip_info};
 pub use picture::Picture;
+pub use recover::{RecoverError, Recovered, recover};
 pub use series::{JointSeries, ObjectSeries};
 pub use session::Session;
 pub use writer::{ClipInfo, ClipWriter, WriteError, WriteSummary};
-
-/// True for a folder that is itself one clip and no session.
-fn is_clip_folder(path: &std::path::Path) -> bool {
-    path.join("control.json").is_file() && path.join("frame.json").is_file()
-}

@@ -2,7 +2,7 @@
 //! the machine that recorded.
 
 use super::checks;
-use super::clip::Clip;
+use super::clip::{Clip, numbered_joints};
 use super::container::Messages;
 use super::error::ReadError;
 use super::messages::decode;
@@ -98,7 +98,7 @@ pub(super) fn read(path: &Path, kind: ClipKind, cell: &Cell) -> Result<Clip, Rea
 fn take_joints(path: &Path, cell: &Cell, rows: Rows, clip: &mut Clip) -> Result<(), ReadError> {
     let topic = ArmState::TOPIC;
     let fail = |what| ReadError::content(path, topic, what);
-    clip.joint_names = joint_names(cell, rows.measured.dof);
+    clip.joint_names = numbered_joints(cell, rows.measured.dof);
     if rows.odd > 0 {
         let what =
             format!("`{topic}`: {} states of another number of joints left out; record one arm a clip", rows.odd);
@@ -117,15 +117,6 @@ fn take_joints(path: &Path, cell: &Cell, rows: Rows, clip: &mut Clip) -> Result<
 
 fn missing(path: &Path, topic: &str, present: &str) -> ReadError {
     ReadError::content(path, topic, format!("no messages; the clip has {present}: record with the device switched on"))
-}
-
-/// Names of the joints: own clips number them.
-fn joint_names(cell: &Cell, dof: usize) -> Vec<String> {
-    match &cell.robot {
-        Some(robot) if robot.joints.len() == dof => robot.joints.clone(),
-        Some(robot) if robot.model.is_some() => (1..=dof).map(|i| format!("fr3_joint{i}")).collect(),
-        _ => (1..=dof).map(|i| format!("joint{i}")).collect(),
-    }
 }
 
 /// All arm states of an own clip, in the order they were recorded.

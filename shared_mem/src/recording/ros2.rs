@@ -178,3 +178,132 @@ fn header<'a>(r: &mut CdrReader<'a>) -> Result<(u64, &'a str), CdrError> {
     let nanoseconds = u64::from(r.u32()?);
     Ok((seconds * 1_000_000_000 + nanoseconds, r.text()?))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    /// Encodes like `rmw` does: every primitive aligned to its size behind the four bytes of the header.
+    #[derive(Default)]
+    struct Encoder {
+        payload: Vec<u8>,
+        big_endian: bool,
+    }
+
+    impl Encoder {
+        fn put<const N: usize>(&mut self, mut bytes: [u8; N]) -> &mut Self {
+            while !self.payload.len().is_multiple_of(N) {
+                self.payload.push(0);
+            }
+            if self.big_endian {
+                bytes.reverse();
+            }
+            self.payload.extend(bytes);
+            self
+        }
+
+        fn u32(&mut self, value: usize) -> &mut Self {
+            self.put(u32::try_from(value).expect("a small number").to_le_bytes())
+        }
+
+        fn text(&mut self, text: &str) -> &mut Self {
+            self.u32(text.len() + 1);
+            self.payload.extend(text.as_bytes());
+            self.payload.push(0);
+            self
+        }
+
+        fn doubles(&mut self, values: &[f64]) -> &mut Self {
+            self.u32(values.len());
+            values.iter().for_each(|v| {
+                self.put(v.to_le_bytes());
+            });
+            self
+        }
+
+        fn message(&self) -> Vec<u8> {
+            let mut message = vec![0, u8::from(!self.big_endian), 0, 0];
+            message.extend(&self.payload);
+            message
+        }
+    }
+
+    fn joint_state(names: &[String], position: &[f64], velocity: &[f64], big_endian: bool) -> Vec<u8> {
+        let mut e = Encoder { big_endian, ..Encoder::default() };
+        e.u32(12).u32(34).text("base").u32(names.len());
+        names.iter().for_each(|name| {
+            e.text(name);
+        });
+        e.doubles(position).doubles(velocity).doubles(&[]);
+        e.message()
+    }
+
+    proptest! {
+        #[test]
+        fn joint_states_come_back_in_either_byte_order_whatever_the_lengths(
+            names in prop::collection::vec("[a-z_0-9]{0,9}", 0..9),
+            position in prop::collection::vec(-10.0..10.0f64, 0..9),
+            velocity in prop::collection::vec(-10.0..10.0f64, 0..9),
+            big_endian in any::<bool>(),
+        ) {
+            let bytes = joint_state(&names, &position, &velocity, big_endian);
+            let state = JointState::decode(&bytes).expect("a whole message");
+            prop_assert_eq!(state.stamp_ns, 12_000_000_034);
+            prop_assert_eq!(state.names, names);
+            prop_assert_eq!(state.position, position);
+            prop_assert_eq!(state.velocity, velocity);
+            prop_assert_eq!(state.effort, Vec::<f64>::new());
+        }
+
+        #[test]
+        fn a_cut_message_is_an_error_and_never_a_panic(cut in 0usize..200) {
+            let bytes = joint_state(&["a".into(), "bc".into()], &[1.0, 2.0], &[3.0, 4.0], false);
+            let cut = cut.min(bytes.len() - 1);
+            prop_assert!(JointState::decode(&bytes[..cut]).is_err());
+        }
+
+        #[test]
+        fn random_bytes_never_panic(
+            mut bytes in prop::collection::vec(any::<u8>(), 0..300), header in any::<bool>(), child in any::<bool>(),
+        ) {
+            if header && bytes.len() >= 4 {
+                bytes[..4].copy_from_slice(&[0, 1, 0, 0]);
+            }
+            let _ = JointState::decode(&bytes);
+            let _ = StampedPose::decode(&bytes, child);
+            let _ = Image::decode(&bytes);
+            let _ = CompressedImage::decode(&bytes);
+            let _ = CameraCalibration::decode(&bytes).map(|c| c.camera_info());
+        }
+    }
+
+    #[test]
+    fn a_pose_has_its_quaternion_turned_round() {
+        let mut e = Encoder::default();
+        e.u32(1).u32(0).text("base");
+        [0.1, 0.2, 0.3, 0.0, 0.0, 0.6, 0.8f64].iter().for_each(|v| {
+            e.put(v.to_le_bytes());
+        });
+        let message = e.message();
+        let pose = StampedPose::decode(&message, false).expect("a whole message");
+        assert_eq!((pose.frame, pose.position), ("base", [0.1, 0.2, 0.3]));
+        assert_eq!(pose.wxyz, [0.8, 0.0, 0.0, 0.6]);
+    }
+
+    #[test]
+    fn a_camera_info_yields_intrinsics_and_refuses_a_fisheye() {
+        let camera = |model, d: Vec<f64>| CameraCalibration {
+            stamp_ns: 5,
+            height: 480,
+            width: 640,
+            model,
+            d,
+            k: [600.0, 0.0, 320.0, 0.0, 610.0, 240.0, 0.0, 0.0, 1.0],
+        };
+        let info = camera("plumb_bob", vec![0.1, 0.2, 0.0, 0.0, 0.3]).camera_info().expect("a pinhole");
+        assert_eq!((info.intrinsics, info.distortion), ([600.0, 610.0, 320.0, 240.0], [0.1, 0.2, 0.0, 0.0, 0.3]));
+        assert!(camera("equidistant", vec![0.1; 4]).camera_info().is_err());
+        assert!(camera("rational_polynomial", vec![0.1; 8]).camera_info().is_err());
+    }
+}

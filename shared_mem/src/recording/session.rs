@@ -31,7 +31,7 @@ impl Session {
     /// As [`Session::open`].
     pub fn open_with(path: &Path, cell_toml: Option<&Path>) -> Result<Self, ReadError> {
         let metadata = std::fs::metadata(path).map_err(ReadError::io(path))?;
-        let is_session = metadata.is_dir() && !super::is_clip_folder(path);
+        let is_session = metadata.is_dir() && !super::twinaligner::is_clip_folder(path);
         if is_session {
             let cell = Cell::read(&cell_toml.map_or_else(|| path.join("cell.toml"), Path::to_owned))?;
             if cell.clips.is_empty() {

@@ -144,7 +144,7 @@ impl<W: Write> ClipWriter<W> {
     pub fn with_sink(sink: W, path: &Path, info: &ClipInfo) -> Result<Self, WriteError> {
         let clock = UnixClock(crate::time::unix_offset_ns());
         let bytes = Arc::new(AtomicU64::new(0));
-        let failed = |error: McapError| failure(path, &bytes, &error);
+        let failed = |error: McapError| WriteError::from_mcap(path, bytes.load(Ordering::Relaxed), &error);
         let counted = Counted { sink, bytes: Arc::clone(&bytes) };
         let mcap = WriteOptions::new()
             .library(concat!("twinalign ", env!("CARGO_PKG_VERSION")))
@@ -310,7 +310,8 @@ impl<W: Write> ClipWriter<W> {
         let finished = self.mcap.finish().map(|_| ());
         finished.map_err(|error| self.failed(&error))?;
         let (mcap, path, bytes, messages) = (self.mcap, self.path, self.bytes, self.messages);
-        mcap.into_inner().into_inner().flush().map_err(|error| failure(&path, &bytes, &error.into()))?;
+        let written = bytes.load(Ordering::Relaxed);
+        mcap.into_inner().into_inner().flush().map_err(|error| WriteError::from_mcap(&path, written, &error.into()))?;
         Ok(WriteSummary { messages, bytes: bytes.load(Ordering::Relaxed) })
     }
 
@@ -321,18 +322,21 @@ impl<W: Write> ClipWriter<W> {
     }
 
     fn failed(&self, error: &McapError) -> WriteError {
-        failure(&self.path, &self.bytes, error)
+        WriteError::from_mcap(&self.path, self.bytes_written(), error)
     }
 }
 
-fn failure(path: &Path, bytes: &AtomicU64, error: &McapError) -> WriteError {
-    let path = path.to_owned();
-    match error {
-        McapError::Io(e) if matches!(e.kind(), io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded) => {
-            WriteError::DiskFull { path, bytes: bytes.load(Ordering::Relaxed) }
+impl WriteError {
+    /// `bytes`: how far the file came.
+    pub(super) fn from_mcap(path: &Path, bytes: u64, error: &McapError) -> Self {
+        let path = path.to_owned();
+        match error {
+            McapError::Io(e) if matches!(e.kind(), io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded) => {
+                Self::DiskFull { path, bytes }
+            }
+            McapError::Io(e) => Self::Failed { path, what: e.to_string() },
+            McapError::AttemptedWriteAfterFailure => Self::Failed { path, what: "an earlier write failed".into() },
+            other => Self::Failed { path, what: other.to_string() },
         }
-        McapError::Io(e) => WriteError::Failed { path, what: e.to_string() },
-        McapError::AttemptedWriteAfterFailure => WriteError::Failed { path, what: "an earlier write failed".into() },
-        other => WriteError::Failed { path, what: other.to_string() },
     }
 }

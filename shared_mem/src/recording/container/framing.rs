@@ -101,8 +101,8 @@ impl<R: Read + Seek> Framing<R> {
                 continue;
             }
             self.read_body(length)?;
-            if opcode == op::MESSAGE_INDEX && !is_message_index(self.body()) {
-                self.skip_to(self.at + PREFIX as u64 + length, "a record's type has changed");
+            if !is_whole(opcode, &self.record, left) {
+                self.resynchronise()?;
                 continue;
             }
             if opcode == op::DATA_END {
@@ -192,9 +192,9 @@ impl<R: Read + Seek> Framing<R> {
         self.ended = true;
     }
 
-    fn skip_to(&mut self, next: u64, why: &str) {
+    fn skip_to(&mut self, next: u64) {
         let lost = next.saturating_sub(self.at);
-        self.damage.add(lost, format!("{why}: bytes {} to {next} are skipped", self.at));
+        self.damage.add(lost, format!("bytes {} to {next} have changed and are skipped", self.at));
         self.at = next;
         self.checksum = None;
     }
@@ -202,7 +202,7 @@ impl<R: Read + Seek> Framing<R> {
     /// The record at `self.at` makes no sense: goes on at the next chunk, or ends.
     fn resynchronise(&mut self) -> io::Result<()> {
         match self.find_chunk(self.at + 1)? {
-            Some(next) => self.skip_to(next, "a record's length has changed"),
+            Some(next) => self.skip_to(next),
             None => {
                 let lost = self.length - self.at;
                 self.end(lost, format!("the file is cut or unreadable from byte {} on ({lost} bytes)", self.at));
@@ -244,9 +244,19 @@ fn believable(opcode: u8, length: u64, left: u64) -> bool {
     known && fits && (opcode != op::DATA_END || length == 4) && opcode != op::FOOTER
 }
 
-fn is_message_index(body: &[u8]) -> bool {
-    let mut fields = Fields(body);
-    fields.u16().is_some() && fields.bytes().is_some_and(|entries| entries.len() % 16 == 0) && fields.0.is_empty()
+/// True when the lengths inside a record fit its own: a changed length must not lead the walk astray.
+fn is_whole(opcode: u8, record: &[u8], left: u64) -> bool {
+    let mut f = Fields(record.get(PREFIX..).unwrap_or(&[]));
+    let read = match opcode {
+        op::CHUNK => return is_chunk_header(record, left),
+        op::SCHEMA => f.u16().and(f.text()).and(f.text()).and(f.bytes()).is_some(),
+        op::CHANNEL => f.u32().and(f.text()).and(f.text()).and(f.bytes()).is_some(),
+        op::MESSAGE_INDEX => f.u16().is_some() && f.bytes().is_some_and(|entries| entries.len() % 16 == 0),
+        op::ATTACHMENT => f.take(16).and(f.text()).and(f.text()).and(f.long_bytes()).and(f.u32()).is_some(),
+        op::METADATA => f.text().is_some() && f.text_map().is_some(),
+        _ => return true,
+    };
+    read && f.0.is_empty()
 }
 
 fn is_chunk_header(prefix: &[u8], left: u64) -> bool {

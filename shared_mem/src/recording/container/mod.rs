@@ -133,21 +133,29 @@ impl<R: Read + Seek> Messages<R> {
 
     /// The next message, `None` behind the last.
     pub(super) fn next(&mut self) -> Result<Option<Message<'_>>, ReadError> {
+        Ok(if self.advance()? { self.current() } else { None })
+    }
+
+    /// Goes to the next message; false behind the last.
+    pub(super) fn advance(&mut self) -> Result<bool, ReadError> {
+        self.next += 1;
         while self.next >= self.entries.len() {
             if !self.load().map_err(ReadError::io(&self.path))? {
-                return Ok(None);
+                return Ok(false);
             }
         }
-        let index = self.next;
-        self.next += 1;
-        let message = self.entries.get(index).map(|entry| Message {
+        Ok(true)
+    }
+
+    /// The message that [`Messages::advance`] went to.
+    pub(super) fn current(&self) -> Option<Message<'_>> {
+        self.entries.get(self.next).map(|entry| Message {
             channel: &entry.channel,
             sequence: entry.sequence,
             log_time_ns: entry.log_time_ns,
             publish_time_ns: entry.publish_time_ns,
             data: self.bytes.get(entry.data.clone()).unwrap_or(&[]),
-        });
-        Ok(message)
+        })
     }
 
     /// What could not be read so far.
@@ -173,18 +181,27 @@ impl<R: Read + Seek> Messages<R> {
         let Some(opcode) = self.framing.advance()? else { return Ok(false) };
         let record = std::mem::take(&mut self.framing.record);
         let body = record.get(PREFIX..).unwrap_or(&[]);
-        let read = match opcode {
-            op::CHUNK => self.chunk(&record, body),
-            op::ATTACHMENT => self.attachment(body).ok_or_else(|| "an attachment has changed".into()),
-            _ => self.record(opcode, body).ok_or_else(|| "a record has changed".into()),
-        };
+        let mut read = self.take_over(opcode, &record, body);
+        if read.is_err() && self.channels_from_summary()? {
+            // The chunk that introduced the topics was lost; now they are known.
+            self.bytes.clear();
+            self.entries.clear();
+            read = self.take_over(opcode, &record, body);
+        }
         self.framing.record = record;
         if let Err(what) = read {
             let lost = self.framing.record.len() as u64;
             self.framing.damage.add(lost, format!("{what}: {lost} bytes are skipped"));
-            self.channels_from_summary()?;
         }
         Ok(true)
+    }
+
+    fn take_over(&mut self, opcode: u8, record: &[u8], body: &[u8]) -> Result<(), String> {
+        match opcode {
+            op::CHUNK => self.chunk(record, body),
+            op::ATTACHMENT => self.attachment(body).ok_or_else(|| "an attachment has changed".into()),
+            _ => self.record(opcode, body).ok_or_else(|| "a record has changed".into()),
+        }
     }
 
     /// Unpacks a chunk and takes its records over, all or, where the chunk has no checksum, up to the first bad one.
@@ -284,8 +301,9 @@ impl<R: Read + Seek> Messages<R> {
         Some(())
     }
 
-    /// The chunk that introduced the topics may be the lost one: a complete file repeats them at its end.
-    fn channels_from_summary(&mut self) -> std::io::Result<()> {
+    /// A complete file repeats its topics at its end; true when some of them were not known.
+    fn channels_from_summary(&mut self) -> std::io::Result<bool> {
+        let known = self.channels.len();
         let summary = self.framing.summary()?;
         let mut fields = Fields(&summary);
         while let (Some(opcode), Some(body)) = (fields.u8(), fields.long_bytes()) {
@@ -293,6 +311,6 @@ impl<R: Read + Seek> Messages<R> {
                 break;
             }
         }
-        Ok(())
+        Ok(self.channels.len() > known)
     }
 }
