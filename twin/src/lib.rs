@@ -4,6 +4,7 @@ pub mod arm;
 pub mod metrics;
 pub mod physics;
 pub mod render;
+pub mod replay;
 pub mod rollout;
 pub mod scene;
 pub mod sensors;

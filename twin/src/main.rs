@@ -4,10 +4,20 @@ mod cli;
 
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;
+use tracing_subscriber::EnvFilter;
 
-/// A robot cell in simulation: mirrors a running one.
+/// A robot cell in simulation: mirrors a running one, replays recordings, and says how far reality is away.
 #[derive(Parser)]
-#[command(version, about, arg_required_else_help = true)]
+#[command(
+    version,
+    about,
+    arg_required_else_help = true,
+    after_help = "\
+Examples:
+  twin shadow --cell config/fr3_cell.toml --viewer
+  twin replay session --parameters theta.toml
+Every verb has its own --help with examples. Logs and progress go to stderr (RUST_LOG=debug for more)."
+)]
 struct Arguments {
     #[command(subcommand)]
     verb: Verb,
@@ -16,11 +26,16 @@ struct Arguments {
 #[derive(Subcommand)]
 enum Verb {
     Shadow(cli::shadow::Shadow),
+    Replay(cli::replay::Replay),
 }
 
 fn main() -> ExitCode {
-    let outcome = match Arguments::parse().verb {
+    let arguments = Arguments::parse();
+    let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new("warn"));
+    tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).init();
+    let outcome = match arguments.verb {
         Verb::Shadow(verb) => verb.run(),
+        Verb::Replay(verb) => verb.run(),
     };
     match outcome {
         Ok(()) => ExitCode::SUCCESS,

@@ -1,3 +1,4 @@
-//! One file a verb.
+//! The verbs of the program `twin`, one file each: arguments and what is printed, nothing that simulates.
 
+pub(crate) mod replay;
 pub(crate) mod shadow;

@@ -1,0 +1,75 @@
+//! `twin replay`: the recorded commands, simulated; real against simulated as a table or as JSON.
+
+use anyhow::{Context, bail};
+use shared_mem::recording::Session;
+use shared_mem::theta::Theta;
+use std::io::Write as _;
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use twin::replay::{Options, replay};
+
+/// Simulates the recorded commands of a session or clip: real against simulated.
+#[derive(clap::Args)]
+#[command(after_help = "\
+The twin starts in the recorded state, gets the recorded commands at their stamps, and is not corrected on the way.
+Joint errors are root mean squares over the clip; ADD and ADD-S are means over the recorded object poses.
+
+A clip that cannot be replayed is named on stderr, with the reason, and the others are replayed; the exit code is 1 only
+when none could be.
+
+Examples:
+  twin replay session
+  twin replay session/clip_00.mcap --out simulated.mcap
+  twin replay session --parameters theta.toml --json")]
+pub(crate) struct Replay {
+    /// Session folder (with cell.toml), or one clip.
+    #[arg(value_name = "SESSION|CLIP")]
+    path: PathBuf,
+    /// What the laboratory knows about its cell [default: cell.toml beside the clips].
+    #[arg(long, value_name = "CELL.TOML")]
+    cell: Option<PathBuf>,
+    /// Identified parameters, as `calibration identify` writes them.
+    #[arg(long, value_name = "THETA.TOML")]
+    parameters: Option<PathBuf>,
+    /// Writes the recording, its simulation and the gap as a new clip; for a session, a folder of clips.
+    #[arg(long, value_name = "CLIP.MCAP")]
+    out: Option<PathBuf>,
+    /// Prints one JSON object on stdout at the end.
+    #[arg(long)]
+    json: bool,
+}
+
+impl Replay {
+    pub(crate) fn run(&self) -> anyhow::Result<()> {
+        let session = Session::open_with(&self.path, self.cell.as_deref())?;
+        let theta = self.parameters.as_deref().map(Theta::read).transpose()?;
+        let interrupted = Arc::new(AtomicBool::new(false));
+        let flag = Arc::clone(&interrupted);
+        ctrlc::set_handler(move || flag.store(true, Ordering::Relaxed)).context("cannot listen for Ctrl-C")?;
+        let gap = replay(&session, &Options { theta, out: self.out.clone() }, &interrupted)?;
+        for clip in &gap.clips {
+            for warning in &clip.warnings {
+                eprintln!("{}: {warning}", clip.file);
+            }
+        }
+        for (file, error) in gap.failures() {
+            eprintln!("{file}: {error}");
+        }
+        let mut stdout = std::io::stdout().lock();
+        if self.json {
+            serde_json::to_writer(&mut stdout, &gap)?;
+            writeln!(stdout)?;
+        } else {
+            write!(stdout, "{gap}")?;
+        }
+        let failed = gap.failures().count();
+        if gap.clips.is_empty() {
+            bail!("none of the {failed} clips could be replayed; the reasons stand above");
+        }
+        if failed > 0 {
+            eprintln!("{failed} of {} clips left out; the reasons stand above", failed + gap.clips.len());
+        }
+        Ok(())
+    }
+}

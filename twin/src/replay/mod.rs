@@ -1,0 +1,23 @@
+//! Recorded clips, simulated: the recorded commands go into the twin, and what it does is held against what was
+//! measured. Called by `twin replay`; identification and diagnosis start from the same [`Replayer`].
+//!
+//! Stamps are those of the recording (integer nanoseconds), everything else SI in the base frame.
+//!
+//! | file | owns |
+//! |---|---|
+//! | `predict` | [`Replayer`]: one clip in the twin |
+//! | `object_start` | where the object was and how it moved when the clip began |
+//! | `report` | the gaps of a session, as JSON and as a table |
+//! | `session` | all clips of a session, on all cores |
+//! | `write` | a simulated clip on disk |
+
+mod object_start;
+mod predict;
+mod report;
+mod session;
+mod write;
+
+pub use predict::{Prediction, ReplayError, Replayer};
+pub use report::{ClipGap, Gap, SessionGap};
+pub use session::{Options, replay};
+pub use write::write_clip;

@@ -1,0 +1,178 @@
+//! Where the object was and how it moved when a clip began, from noisy poses. Base frame, SI.
+
+use crate::scene::{ObjectModel, ObjectShape};
+use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3};
+use shared_mem::cell::Cell;
+use shared_mem::frames::{Base, Object, Pose};
+use shared_mem::recording::ObjectSeries;
+
+/// Acceleration of free fall [m/s²].
+const GRAVITY: f64 = 9.81;
+/// Noise of the tracker where cell.toml does not tell it, one sigma [m].
+const POSITION_NOISE: f64 = 1e-3;
+/// An object has begun to move when it is this many sigmas away: 1 of 100 000 resting poses is.
+const MOVED_SIGMAS: f64 = 5.0;
+/// A face that looks down within this angle [rad] is what a resting object stands on.
+const UPRIGHT: f64 = 0.1;
+/// Poses that a start in motion is estimated from: about 70 ms at the frame rate of a fast tracker.
+const FLIGHT_POSES: usize = 10;
+/// Below this clearance the table may have touched the object already [m].
+const CLEARANCE: f64 = 3e-3;
+
+/// How the object moved at the first pose.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Motion {
+    pub(super) pose: Pose<Base, Object>,
+    /// Of the geometric centre [m/s].
+    pub(super) velocity: Vector3<f64>,
+    /// In the base frame [rad/s].
+    pub(super) angular_velocity: Vector3<f64>,
+}
+
+/// Mean of the poses before the object first moves, set down flat on the table. `None` without poses.
+pub(super) fn resting(series: &ObjectSeries, object: &ObjectModel, cell: &Cell) -> Option<Pose<Base, Object>> {
+    let noise = cell.object.as_ref().and_then(|o| o.pose_noise).map_or(POSITION_NOISE, |n| n.position);
+    let poses = &series.poses[..still(series, noise)];
+    let mean = mean_pose(poses)?;
+    let Some(table) = cell.table else { return Some(Pose::from_isometry(mean)) };
+    let upright = set_upright(&mean.rotation);
+    let mut place = mean.translation.vector;
+    place.z += table.height - lowest(&object.shape, &Isometry3::from_parts(mean.translation, upright));
+    Some(Pose::from_isometry(Isometry3::from_parts(place.into(), upright)))
+}
+
+/// Number of poses, at least one, until the object first leaves the mean of those before.
+fn still(series: &ObjectSeries, noise: f64) -> usize {
+    let place = |pose: &Pose<Base, Object>| Vector3::from(pose.position());
+    let mut sum = Vector3::zeros();
+    for (n, pose) in series.poses.iter().enumerate() {
+        if n > 0 && (place(pose) - sum / n as f64).norm() > MOVED_SIGMAS * noise * 3.0_f64.sqrt() {
+            return n;
+        }
+        sum += place(pose);
+    }
+    series.poses.len()
+}
+
+fn mean_pose(poses: &[Pose<Base, Object>]) -> Option<Isometry3<f64>> {
+    let first = poses.first()?.isometry().rotation;
+    let (mut place, mut turn) = (Vector3::zeros(), Quaternion::new(0.0, 0.0, 0.0, 0.0));
+    for pose in poses.iter().map(Pose::isometry) {
+        place += pose.translation.vector / poses.len() as f64;
+        // A quaternion and its negative are one rotation; near each other their mean is the mean rotation.
+        let sign = if first.coords.dot(&pose.rotation.coords) < 0.0 { -1.0 } else { 1.0 };
+        turn += pose.rotation.into_inner() * sign;
+    }
+    Some(Isometry3::from_parts(Translation3::from(place), UnitQuaternion::from_quaternion(turn)))
+}
+
+/// Turns the object by the small angle that makes the axis nearest to the vertical exactly vertical.
+fn set_upright(rotation: &UnitQuaternion<f64>) -> UnitQuaternion<f64> {
+    let axes = [Vector3::x(), Vector3::y(), Vector3::z()].map(|axis| rotation * axis);
+    let [x, y, z] = axes;
+    let axis = [y, z].into_iter().fold(x, |best, axis| if axis.z.abs() > best.z.abs() { axis } else { best });
+    let vertical = Vector3::z() * axis.z.signum();
+    match UnitQuaternion::rotation_between(&axis, &vertical) {
+        Some(small) if small.angle() < UPRIGHT => small * rotation,
+        _ => *rotation,
+    }
+}
+
+/// Height of the object's lowest point [m].
+fn lowest(shape: &ObjectShape, pose: &Isometry3<f64>) -> f64 {
+    shape.triangles().0.iter().map(|corner| (pose * corner).z).fold(f64::INFINITY, f64::min)
+}
+
+/// Pose and velocities at the first pose, by straight lines through the first poses, free fall taken out while the
+/// object flies. `None` with fewer than three poses.
+pub(super) fn moving(series: &ObjectSeries, object: &ObjectModel, cell: &Cell) -> Option<Motion> {
+    let table = cell.table.map_or(f64::NEG_INFINITY, |t| t.height);
+    let clear = |pose: &Pose<Base, Object>| lowest(&object.shape, &pose.isometry()) > table + CLEARANCE;
+    let flying = series.poses.iter().take_while(|pose| clear(pose)).count();
+    let (poses, fall) = if flying >= 3 { (flying.min(FLIGHT_POSES), GRAVITY) } else { (FLIGHT_POSES, 0.0) };
+    let poses = &series.poses[..poses.min(series.len())];
+    let middle = poses.get(poses.len() / 2).filter(|_| poses.len() >= 3)?.isometry().rotation;
+    let seconds = |i: usize| (series.stamps_ns[i] - series.stamps_ns[0]) as f64 * 1e-9;
+    let rows = poses.iter().map(Pose::isometry).enumerate();
+    let places = rows.clone().map(|(i, pose)| {
+        let fallen = 0.5 * fall * seconds(i).powi(2);
+        (seconds(i), pose.translation.vector + Vector3::z() * fallen)
+    });
+    let turns = rows.map(|(i, pose)| (seconds(i), (pose.rotation * middle.inverse()).scaled_axis()));
+    let (place, velocity) = line(&places.collect::<Vec<_>>());
+    let (turn, angular_velocity) = line(&turns.collect::<Vec<_>>());
+    let rotation = UnitQuaternion::from_scaled_axis(turn) * middle;
+    let pose = Pose::from_isometry(Isometry3::from_parts(Translation3::from(place), rotation));
+    Some(Motion { pose, velocity, angular_velocity })
+}
+
+/// Value at time 0 and slope of the straight line through points over time.
+fn line(points: &[(f64, Vector3<f64>)]) -> (Vector3<f64>, Vector3<f64>) {
+    let n = points.len() as f64;
+    let time = points.iter().map(|p| p.0).sum::<f64>() / n;
+    let value = points.iter().map(|p| p.1).sum::<Vector3<f64>>() / n;
+    let spread = points.iter().map(|p| (p.0 - time).powi(2)).sum::<f64>();
+    let slope = points.iter().map(|p| (p.1 - value) * (p.0 - time)).sum::<Vector3<f64>>() / spread;
+    (value - slope * time, slope)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use shared_mem::cell::Table;
+
+    fn box_on_table() -> (ObjectModel, Cell) {
+        let shape = ObjectShape::Box { half_extents: Vector3::new(0.04, 0.03, 0.05) };
+        let object = ObjectModel {
+            shape,
+            mass: 0.3,
+            centre_of_mass: Vector3::zeros(),
+            friction: 0.3,
+            tip_friction: 0.2,
+            restitution: 0.0,
+        };
+        (object, Cell { table: Some(Table { height: 0.1 }), ..Cell::default() })
+    }
+
+    fn series(poses: impl Iterator<Item = Isometry3<f64>>) -> ObjectSeries {
+        let poses: Vec<_> = poses.map(Pose::from_isometry).collect();
+        ObjectSeries { stamps_ns: (0..poses.len() as u64).map(|i| 5 + i * 10_000_000).collect(), poses }
+    }
+
+    #[test]
+    fn a_resting_object_stands_flat_on_the_table_where_the_poses_before_its_motion_put_it() {
+        let (object, cell) = box_on_table();
+        let noise = |i: usize| 1e-3 * if i.is_multiple_of(2) { 1.0 } else { -1.0 };
+        let poses = (0..40).map(|i| {
+            let gone = if i < 20 { 0.0 } else { 0.02 * (i - 19) as f64 };
+            let turn = UnitQuaternion::from_euler_angles(5.0 * noise(i), 0.0, 0.4);
+            Isometry3::from_parts(Translation3::new(0.5 + gone + noise(i), 0.0, 0.15 + noise(i)), turn)
+        });
+        let start = resting(&series(poses), &object, &cell).expect("poses").isometry();
+        assert!((start.translation.vector - Vector3::new(0.5, 0.0, 0.15)).norm() < 1e-6, "{start}");
+        assert!(start.rotation.angle_to(&UnitQuaternion::from_euler_angles(0.0, 0.0, 0.4)) < 1e-6);
+    }
+
+    #[test]
+    fn a_toss_is_continued_from_its_first_poses() {
+        let (object, cell) = box_on_table();
+        let (velocity, spin) = (Vector3::new(1.0, -0.5, 0.3), Vector3::new(2.0, 4.0, -1.0));
+        let first = UnitQuaternion::from_euler_angles(0.3, 0.5, 1.0);
+        let poses = (0..30).map(|i| {
+            let t = f64::from(i) * 0.01;
+            let place = Vector3::new(0.1, 0.2, 0.4) + velocity * t - Vector3::z() * (0.5 * GRAVITY * t * t);
+            Isometry3::from_parts(place.into(), UnitQuaternion::from_scaled_axis(spin * t) * first)
+        });
+        let motion = moving(&series(poses), &object, &cell).expect("poses");
+        assert!((motion.velocity - velocity).norm() < 1e-9, "{}", motion.velocity);
+        assert!((motion.angular_velocity - spin).norm() < 1e-9, "{}", motion.angular_velocity);
+        assert!(motion.pose.isometry().rotation.angle_to(&first) < 1e-9);
+        assert!((motion.pose.position()[2] - 0.4).abs() < 1e-9);
+    }
+
+    #[test]
+    fn two_poses_are_no_motion() {
+        let (object, cell) = box_on_table();
+        assert_eq!(moving(&series((0..2).map(|_| Isometry3::translation(0.0, 0.0, 1.0))), &object, &cell), None);
+    }
+}

@@ -1,0 +1,284 @@
+//! One clip in the twin: the arm alone, the arm hitting the object, or the object alone.
+
+use super::object_start::{self, Motion};
+use super::report::{ClipGap, Gap};
+use crate::arm::{ArmModel, ControlLaw, GainError, JointState, ModelError};
+use crate::metrics::{SurfacePoints, joint_rms};
+use crate::rollout::{ArmRollout, CommandTrack, between, start_state};
+use crate::scene::{MeshFileError, ObjectModel};
+use crate::sim::{Drive, PERIOD_NS, SimCell, SimError};
+use nalgebra::Vector3;
+use shared_mem::cell::{Cell, ClipKind};
+use shared_mem::frames::{Base, Object, Pose};
+use shared_mem::msg::MAX_JOINTS;
+use shared_mem::recording::{Clip, ReadError};
+use shared_mem::theta::Theta;
+
+/// The twin of a cell, ready to replay its clips.
+#[derive(Debug, Clone)]
+pub struct Replayer {
+    cell: Cell,
+    theta: Option<Theta>,
+    arm: Option<(ArmModel, ControlLaw)>,
+    object: Option<(ObjectModel, SurfacePoints)>,
+}
+
+/// What the twin did under the commands of a clip.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Prediction {
+    /// Joint states, one for each measured row. Empty without an arm.
+    pub joints: Vec<JointState>,
+    /// Object poses, one for each recorded pose. Empty where the object was not simulated.
+    pub object: Vec<Pose<Base, Object>>,
+    /// From the first measured row to the first touch of tool and object [s]; `None` when they did not touch.
+    pub contact_time: Option<f64>,
+}
+
+/// A clip or a session cannot be replayed.
+#[derive(Debug, thiserror::Error)]
+pub enum ReplayError {
+    /// It cannot be read.
+    #[error(transparent)]
+    Read(#[from] ReadError),
+    /// The arm.
+    #[error(transparent)]
+    Arm(#[from] ModelError),
+    /// Its controller.
+    #[error(transparent)]
+    Gains(#[from] GainError),
+    /// The object's mesh.
+    #[error(transparent)]
+    Mesh(#[from] MeshFileError),
+    /// The cell.
+    #[error(transparent)]
+    Cell(#[from] SimError),
+    /// The clip's kind asks for an arm.
+    #[error("{0}: the clip needs an arm; add a [robot] block to cell.toml, or set the clip's kind to \"free_motion\"")]
+    NoArm(String),
+    /// The clip's kind asks for an object.
+    #[error("{0}: the clip needs an object; add an [object] block to cell.toml")]
+    NoObject(String),
+    /// Too little was recorded.
+    #[error("{0}: too short to replay: it holds {1}; record it again or remove it from cell.toml")]
+    TooShort(String, &'static str),
+    /// The simulation left all bounds.
+    #[error(
+        "{0}: the simulated arm diverges; the damping may be too large for a 1 kHz controller or the inertia too small: check `damping` and `rotor_inertia`"
+    )]
+    Diverged(String),
+}
+
+impl Replayer {
+    /// The twin of a cell, with identified parameters where there are some.
+    ///
+    /// # Errors
+    /// [`ReplayError`] naming key or file and the remedy; an effect in `theta` that this version does not know is one.
+    pub fn new(cell: &Cell, theta: Option<&Theta>) -> Result<Self, ReplayError> {
+        if let Some(effect) = theta.and_then(|t| t.effects.first()) {
+            return Err(SimError::Effect(effect.name.clone()).into());
+        }
+        let arm = match &cell.robot {
+            None => None,
+            Some(_) => {
+                let model = ArmModel::from_cell(cell)?;
+                let gains = theta.and_then(|t| t.arm.as_ref());
+                let law = ControlLaw::new(cell.controller.as_ref(), gains, &model)?;
+                Some((model, law))
+            }
+        };
+        let object = ObjectModel::new(cell, theta)?.map(|model| {
+            let surface = SurfacePoints::new(&model.shape);
+            (model, surface)
+        });
+        Ok(Self { cell: cell.clone(), theta: theta.cloned(), arm, object })
+    }
+
+    /// What is known about the cell.
+    #[must_use]
+    pub fn cell(&self) -> &Cell {
+        &self.cell
+    }
+
+    /// The identified parameters in force.
+    #[must_use]
+    pub fn theta(&self) -> Option<&Theta> {
+        self.theta.as_ref()
+    }
+
+    /// Points on the object's surface, where there is an object.
+    #[must_use]
+    pub fn surface(&self) -> Option<&SurfacePoints> {
+        self.object.as_ref().map(|(_, surface)| surface)
+    }
+
+    /// Simulates a clip and holds it against what was measured.
+    ///
+    /// # Errors
+    /// [`ReplayError`] naming the clip and the remedy.
+    pub fn replay(&self, clip: Clip) -> Result<(Clip, Prediction, ClipGap), ReplayError> {
+        let clip = self.in_model_order(clip)?;
+        let prediction = self.predict(&clip)?;
+        let gap = self.gap(&clip, &prediction);
+        let finite = gap.joint_rms_rad.iter().flatten().chain(&gap.object_add_m).all(|v| v.is_finite());
+        if !finite {
+            return Err(ReplayError::Diverged(name(&clip)));
+        }
+        let mut warnings = clip.warnings.clone();
+        warnings.extend(clip.damage.clone());
+        let report = ClipGap { file: name(&clip), gap, warnings };
+        Ok((clip, prediction, report))
+    }
+
+    /// Joints in the model's order. Own recordings of an arm whose joints have no names of their own number them.
+    fn in_model_order(&self, mut clip: Clip) -> Result<Clip, ReplayError> {
+        let Some((arm, _)) = &self.arm else { return Ok(clip) };
+        let numbered = (1..=arm.dof()).map(|i| format!("joint{i}"));
+        if clip.joint_names.iter().eq(numbered.collect::<Vec<_>>().iter()) {
+            clip.joint_names = arm.joint_names().to_vec();
+        }
+        if clip.measured.is_empty() { Ok(clip) } else { Ok(clip.reorder(arm.joint_names())?) }
+    }
+
+    fn predict(&self, clip: &Clip) -> Result<Prediction, ReplayError> {
+        match clip.kind {
+            ClipKind::Excitation => self.arm_alone(clip),
+            ClipKind::ControlHitSlide => self.arm_and_object(clip),
+            ClipKind::FreeMotion => self.object_alone(clip),
+        }
+    }
+
+    fn arm_alone(&self, clip: &Clip) -> Result<Prediction, ReplayError> {
+        let (arm, law) = self.arm.as_ref().ok_or_else(|| ReplayError::NoArm(name(clip)))?;
+        let (start, commands) = arm_inputs(clip)?;
+        let stamps = &clip.measured.stamps_ns;
+        let mut joints = vec![JointState::default(); stamps.len()];
+        ArmRollout { arm, nominal: arm, law }.run(&start, stamps[0], &commands, stamps, &mut joints);
+        Ok(Prediction { joints, ..Prediction::default() })
+    }
+
+    fn arm_and_object(&self, clip: &Clip) -> Result<Prediction, ReplayError> {
+        if self.arm.is_none() {
+            return Err(ReplayError::NoArm(name(clip)));
+        }
+        let (object, _) = self.object.as_ref().ok_or_else(|| ReplayError::NoObject(name(clip)))?;
+        let (start, commands) = arm_inputs(clip)?;
+        let mut cell = SimCell::new(&self.cell, self.theta.as_ref())?;
+        cell.set_arm(&start.q, &start.dq);
+        let resting = object_start::resting(&clip.object, object, &self.cell)
+            .ok_or_else(|| ReplayError::TooShort(name(clip), "no object poses"))?;
+        cell.set_object(&resting, Vector3::zeros(), Vector3::zeros());
+        let mut run = CellRun::new(cell, clip, clip.measured.stamps_ns[0]);
+        let mut row = 0;
+        while run.unfinished() {
+            row = commands.in_force(run.now_ns, row);
+            run.period(&Drive::JointImpedance { q_d: *commands.q_d(row), dq_d: *commands.dq_d(row) });
+        }
+        let contact_time = run.cell.first_contact_ns().map(|ns| ns as f64 * 1e-9);
+        Ok(Prediction { joints: run.joints, object: run.object, contact_time })
+    }
+
+    fn object_alone(&self, clip: &Clip) -> Result<Prediction, ReplayError> {
+        let (object, _) = self.object.as_ref().ok_or_else(|| ReplayError::NoObject(name(clip)))?;
+        let Motion { pose, velocity, angular_velocity } = object_start::moving(&clip.object, object, &self.cell)
+            .ok_or_else(|| ReplayError::TooShort(name(clip), "fewer than three object poses"))?;
+        let alone = Cell { robot: None, controller: None, tool: None, ..self.cell.clone() };
+        let mut cell = SimCell::new(&alone, self.theta.as_ref())?;
+        cell.set_object(&pose, velocity, angular_velocity);
+        let mut run = CellRun::new(cell, clip, clip.object.stamps_ns[0]);
+        while run.unfinished() {
+            run.period(&Drive::Torque { tau_J_d: [0.0; MAX_JOINTS] });
+        }
+        Ok(Prediction { object: run.object, ..Prediction::default() })
+    }
+
+    fn gap(&self, clip: &Clip, prediction: &Prediction) -> Gap {
+        let dof = clip.measured.dof;
+        let joints = || joint_rms(&prediction.joints, &clip.measured.q, dof)[..dof].to_vec();
+        let poses = || prediction.object.iter().zip(&clip.object.poses);
+        let surface = self.surface().filter(|_| poses().len() > 0);
+        let mean = |distance: Distance| {
+            surface.map(|surface| poses().map(|(a, b)| distance(surface, a, b)).sum::<f64>() / poses().len() as f64)
+        };
+        Gap {
+            joint_rms_rad: (!prediction.joints.is_empty()).then(joints),
+            object_add_m: mean(SurfacePoints::add),
+            object_add_s_m: mean(SurfacePoints::add_s),
+            contact_time_s: prediction.contact_time,
+        }
+    }
+}
+
+/// ADD or ADD-S.
+type Distance = fn(&SurfacePoints, &Pose<Base, Object>, &Pose<Base, Object>) -> f64;
+
+/// A cell on its way through a clip: keeps what it does at the clip's stamps.
+struct CellRun<'a> {
+    cell: SimCell,
+    clip: &'a Clip,
+    now_ns: u64,
+    joints: Vec<JointState>,
+    object: Vec<Pose<Base, Object>>,
+}
+
+impl<'a> CellRun<'a> {
+    /// Stamps up to the start get the start.
+    fn new(cell: SimCell, clip: &'a Clip, start_ns: u64) -> Self {
+        let (joints, object) = (Vec::with_capacity(clip.measured.len()), Vec::with_capacity(clip.object.len()));
+        let mut run = Self { cell, clip, now_ns: start_ns, joints, object };
+        let (state, pose) = (run.joint_state(), run.cell.object());
+        run.keep(start_ns, |_| state, |_| pose);
+        run
+    }
+
+    fn unfinished(&self) -> bool {
+        self.joints.len() < self.clip.measured.len() || self.object.len() < self.clip.object.len()
+    }
+
+    fn period(&mut self, drive: &Drive) {
+        let (before, pose_before, start_ns) = (self.joint_state(), self.cell.object(), self.now_ns);
+        self.cell.step(drive);
+        self.now_ns += PERIOD_NS;
+        let (after, pose_after) = (self.joint_state(), self.cell.object());
+        let share = |stamp: u64| (stamp - start_ns) as f64 / PERIOD_NS as f64;
+        self.keep(
+            start_ns + PERIOD_NS,
+            |stamp| between(&before, &after, share(stamp)),
+            |stamp| {
+                let (a, b) = (pose_before?.isometry(), pose_after?.isometry());
+                Some(Pose::from_isometry(a.lerp_slerp(&b, share(stamp))))
+            },
+        );
+    }
+
+    /// Keeps the prediction for every stamp up to `until_ns` that has none yet.
+    fn keep(
+        &mut self,
+        until_ns: u64,
+        joints: impl Fn(u64) -> JointState,
+        object: impl Fn(u64) -> Option<Pose<Base, Object>>,
+    ) {
+        let Clip { measured, object: poses, .. } = self.clip;
+        while let Some(stamp) = measured.stamps_ns.get(self.joints.len()).filter(|s| **s <= until_ns) {
+            self.joints.push(joints(*stamp));
+        }
+        while let Some(pose) =
+            poses.stamps_ns.get(self.object.len()).filter(|s| **s <= until_ns).and_then(|s| object(*s))
+        {
+            self.object.push(pose);
+        }
+    }
+
+    fn joint_state(&self) -> JointState {
+        JointState { q: self.cell.q(), dq: self.cell.dq() }
+    }
+}
+
+fn arm_inputs(clip: &Clip) -> Result<(JointState, CommandTrack), ReplayError> {
+    let start = start_state(&clip.measured).ok_or_else(|| ReplayError::TooShort(name(clip), "no measured joints"))?;
+    let commands = CommandTrack::new(&clip.desired).ok_or_else(|| ReplayError::TooShort(name(clip), "no commands"))?;
+    Ok((start, commands))
+}
+
+fn name(clip: &Clip) -> String {
+    clip.file.file_name().unwrap_or(clip.file.as_os_str()).to_string_lossy().into_owned()
+}

@@ -1,0 +1,91 @@
+//! All clips of a session, on all cores. A clip that cannot be used is told and left out; the others are replayed.
+
+use super::predict::{ReplayError, Replayer};
+use super::report::{ClipGap, Failure, SessionGap};
+use super::write::write_clip;
+use indicatif::{ProgressBar, ProgressStyle};
+use rayon::prelude::*;
+use shared_mem::cell::ClipEntry;
+use shared_mem::recording::{Session, WriteError};
+use shared_mem::theta::Theta;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// How a session is replayed.
+#[derive(Debug, Clone, Default)]
+pub struct Options {
+    /// Identified parameters.
+    pub theta: Option<Theta>,
+    /// Where simulated clips go: a file for a single clip, else a folder.
+    pub out: Option<PathBuf>,
+}
+
+/// One clip failed.
+#[derive(Debug, thiserror::Error)]
+enum ClipError {
+    #[error(transparent)]
+    Replay(#[from] ReplayError),
+    #[error(transparent)]
+    Write(#[from] WriteError),
+    #[error("not replayed: interrupted")]
+    Interrupted,
+}
+
+/// Replays every clip of a session; clips that have not begun when `interrupted` turns true are left out.
+///
+/// # Errors
+/// [`ReplayError`] when cell.toml or the parameters cannot be used for any clip. What is wrong with a single clip is
+/// found in [`SessionGap::failures`].
+pub fn replay(session: &Session, options: &Options, interrupted: &AtomicBool) -> Result<SessionGap, ReplayError> {
+    let replayer = Replayer::new(&session.cell, options.theta.as_ref())?;
+    let template = "replay [{bar:30}] {pos}/{len} clips {eta}";
+    let style = ProgressStyle::with_template(template).expect("a valid template").progress_chars("=> ");
+    let bar = ProgressBar::new(session.clips.len() as u64).with_style(style);
+    let single = session.clips.len() == 1;
+    let results: Vec<_> = session
+        .clips
+        .par_iter()
+        .map(|entry| {
+            let out = options.out.as_deref().map(|out| if single { out.to_owned() } else { place(out, entry) });
+            let result = one(&replayer, session, entry, out.as_deref(), interrupted);
+            bar.inc(1);
+            (entry, result)
+        })
+        .collect();
+    bar.finish_and_clear();
+    let (mut clips, mut failed) = (Vec::new(), Vec::new());
+    for (entry, result) in results {
+        match result {
+            Ok(gap) => clips.push(gap),
+            Err(error) => {
+                failed.push(Failure { file: entry.file.to_string_lossy().into_owned(), error: error.to_string() });
+            }
+        }
+    }
+    Ok(SessionGap::new(clips, failed))
+}
+
+/// File of a simulated clip in the folder `out`.
+fn place(out: &Path, entry: &ClipEntry) -> PathBuf {
+    let name = entry.file.file_stem().unwrap_or(entry.file.as_os_str());
+    out.join(name).with_extension("mcap")
+}
+
+fn one(
+    replayer: &Replayer,
+    session: &Session,
+    entry: &ClipEntry,
+    out: Option<&Path>,
+    interrupted: &AtomicBool,
+) -> Result<ClipGap, ClipError> {
+    if interrupted.load(Ordering::Relaxed) {
+        return Err(ClipError::Interrupted);
+    }
+    let clip = session.read(entry).map_err(ReplayError::from)?;
+    let (clip, prediction, mut gap) = replayer.replay(clip)?;
+    gap.file = entry.file.to_string_lossy().into_owned();
+    if let Some(out) = out {
+        write_clip(out, replayer, &clip, &prediction)?;
+    }
+    Ok(gap)
+}
