@@ -6,11 +6,15 @@
 //! | module | owns |
 //! |---|---|
 //! | [`capture`] | planning a motion, having the bridge play it, recording it into a session folder |
+//! | [`demo`] | the whole story on the simulated cell, in one command |
+//! | [`report`] | pages with plots |
 //! | [`processes`] | the other programs as children |
 //! | [`interrupt`] | Ctrl-C |
 //! | [`progress`] | the bar on stderr |
 
 pub mod capture;
+pub mod demo;
 pub mod interrupt;
 pub mod processes;
 pub mod progress;
+pub mod report;

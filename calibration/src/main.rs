@@ -1,6 +1,7 @@
 //! The program `calibration`: reads the command line, runs a verb, prints one JSON object if asked, one line if it fails.
 
 use calibration::capture::excitation;
+use calibration::demo;
 use calibration::interrupt::Interrupt;
 use clap::{Parser, Subcommand};
 use serde::Serialize;
@@ -16,6 +17,7 @@ use tracing_subscriber::EnvFilter;
     arg_required_else_help = true,
     after_help = "\
 Examples:
+  calibration demo --out demo
   calibration capture excitation --cell config/fr3_cell.toml --clips 4 --out session
 Every verb has its own --help with an example. Logs and progress go to stderr (RUST_LOG=debug for more)."
 )]
@@ -29,6 +31,8 @@ enum Verb {
     /// Moves the arm through a running bridge (or starts one) and records clips into a session folder.
     #[command(subcommand)]
     Capture(Capture),
+    /// The whole story on the simulated cell: shadow, record, replay, explain.
+    Demo(DemoArguments),
 }
 
 #[derive(Debug, Subcommand)]
@@ -75,6 +79,29 @@ struct ExcitationArguments {
     json: bool,
 }
 
+#[derive(Debug, clap::Args)]
+#[command(after_help = "\
+Starts a simulated robot with hidden gains and its twin as two processes, records a session while the twin shadows the
+robot, replays it with the gains of cell.toml and with the true ones, and writes FOLDER/report.html. Takes less than a minute.
+
+Examples:
+  calibration demo --out demo
+  calibration demo --out demo7 --seed 7 --clips 4 --json")]
+struct DemoArguments {
+    /// Folder to create.
+    #[arg(long, value_name = "FOLDER", default_value = "demo")]
+    out: PathBuf,
+    /// Draws the hidden gains and the motions.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Clips to record.
+    #[arg(long, value_name = "N", default_value_t = 2, value_parser = clap::value_parser!(u32).range(1..=100))]
+    clips: u32,
+    /// Prints one JSON object on stdout at the end.
+    #[arg(long)]
+    json: bool,
+}
+
 /// A number from `LO / UNIT` to `HI / UNIT`.
 fn between<const LO: u32, const HI: u32, const UNIT: u32>(text: &str) -> Result<f64, String> {
     let [lo, hi] = [LO, HI].map(|bound| f64::from(bound) / f64::from(UNIT));
@@ -101,6 +128,7 @@ fn run(verb: Verb) -> anyhow::Result<()> {
     let interrupt = Interrupt::listen()?;
     match verb {
         Verb::Capture(Capture::Excitation(arguments)) => capture(arguments, &interrupt),
+        Verb::Demo(arguments) => show(arguments, &interrupt),
     }
 }
 
@@ -111,6 +139,13 @@ fn capture(arguments: ExcitationArguments, interrupt: &Interrupt) -> anyhow::Res
     let kept = summary.clips.iter().filter(|clip| clip.kept).count();
     eprintln!("{}: {kept} of {} clips kept", summary.session.display(), options.clips);
     if json { print_json(&summary) } else { Ok(()) }
+}
+
+fn show(arguments: DemoArguments, interrupt: &Interrupt) -> anyhow::Result<()> {
+    let DemoArguments { out, seed, clips, json } = arguments;
+    let finding = demo::demo(&demo::Options { out, seed, clips }, interrupt)?;
+    eprintln!("{}", finding.table());
+    if json { print_json(&finding) } else { Ok(()) }
 }
 
 fn print_json(answer: &impl Serialize) -> anyhow::Result<()> {

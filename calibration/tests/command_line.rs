@@ -12,7 +12,7 @@ fn text(bytes: &[u8]) -> &str {
 
 #[test]
 fn every_verb_teaches_with_an_example() {
-    for verb in [&["capture", "excitation"][..]] {
+    for verb in [&["capture", "excitation"][..], &["demo"]] {
         let output = calibration(&[verb, &["--help"]].concat());
         let example = format!("calibration {}", verb.join(" "));
         let help = text(&output.stdout);

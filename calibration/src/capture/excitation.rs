@@ -139,10 +139,11 @@ impl Desk<'_> {
         }
         let (outcome, quality) = self.play(link, &plan, title, note).with_context(|| kept_unfinished(&path))?;
         let recorded = recorder.finish()?;
-        let why = match (outcome, quality.verdict(plan.peak_speed)) {
-            (Outcome::Stopped, _) => Some("ended by the user".to_owned()),
-            (Outcome::Done, Verdict::Repeat(why)) => Some(why),
-            (Outcome::Done, Verdict::Keep) => None,
+        let why = match (outcome, &recorded.stopped, quality.verdict(plan.peak_speed)) {
+            (Outcome::Stopped, ..) => Some("ended by the user".to_owned()),
+            (Outcome::Done, Some(why), _) => Some(why.clone()),
+            (Outcome::Done, None, Verdict::Repeat(why)) => Some(why),
+            (Outcome::Done, None, Verdict::Keep) => None,
         };
         if why.is_none() {
             self.session.enter(&file, ClipKind::Excitation)?;
@@ -198,7 +199,7 @@ fn kept_unfinished(path: &Path) -> String {
 }
 
 fn summary(file: PathBuf, why: Option<String>, plan: Plan, quality: Quality, recorded: &Recorded) -> ClipSummary {
-    let Recorded { messages, bytes } = *recorded;
+    let Recorded { messages, bytes, .. } = *recorded;
     ClipSummary { file, kept: why.is_none(), why, amplitude: plan.amplitude, quality, messages, bytes }
 }
 

@@ -46,6 +46,9 @@ pub struct Recorded {
     pub messages: u64,
     /// Size of the file [bytes].
     pub bytes: u64,
+    /// Why recording ended before it was told to, if it did.
+    #[serde(default)]
+    pub stopped: Option<String>,
 }
 
 impl Recorder {
@@ -54,7 +57,8 @@ impl Recorder {
     /// # Errors
     /// [`RecordError`] when the recorder cannot be started or opens no file.
     pub fn start(clip: &Path, cell: &Path, domain: Option<&str>, interrupt: &Interrupt) -> Result<Self, RecordError> {
-        let list = arguments([&"record", &"--json", &"--out", &clip, &"--cell", &cell]);
+        let own_id = std::process::id().to_string();
+        let list = arguments([&"record", &"--json", &"--out", &clip, &"--cell", &cell, &"--parent", &own_id]);
         let mut running = Running::start(Program::Bridge, &list, domain)?;
         let start = Instant::now();
         while !clip.exists() && !interrupt.asked() {

@@ -1,0 +1,33 @@
+//! The truth that the demo hides from its twin: gains that differ from cell.toml as much as a laboratory admits.
+
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64Mcg;
+use shared_mem::cell::Controller;
+use shared_mem::theta::{ArmTheta, Theta};
+
+/// Gains lie within this share of the nominal ones: what cell.toml promises unless it says otherwise.
+const WITHIN: f64 = 0.2;
+
+/// Draws every stiffness and damping of the robot by `seed`.
+#[must_use]
+pub(super) fn gains(nominal: &Controller, seed: u64) -> Theta {
+    let mut rng = Pcg64Mcg::seed_from_u64(seed);
+    let mut draw = |values: &[f64]| values.iter().map(|v| v * rng.random_range(1.0 - WITHIN..1.0 + WITHIN)).collect();
+    let arm = ArmTheta { stiffness: draw(&nominal.stiffness), damping: draw(&nominal.damping) };
+    Theta { arm: Some(arm), ..Theta::default() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_gain_is_hidden_within_a_fifth_and_the_seed_decides_where() {
+        let nominal = Controller { stiffness: vec![600.0; 7], damping: vec![50.0; 7], ..Controller::default() };
+        let arm = gains(&nominal, 4).arm.expect("an arm");
+        assert!(arm.stiffness.iter().all(|k| (480.0..720.0).contains(k) && *k != 600.0));
+        assert!(arm.damping.iter().all(|d| (40.0..60.0).contains(d) && *d != 50.0));
+        assert_eq!(gains(&nominal, 4), gains(&nominal, 4));
+        assert_ne!(gains(&nominal, 4), gains(&nominal, 5));
+    }
+}
