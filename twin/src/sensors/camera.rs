@@ -54,7 +54,7 @@ impl SimCamera {
     /// # Errors
     /// [`SimError`] when the arm or the object's mesh cannot be read.
     pub fn new(cell: &Cell) -> Result<Self, SimError> {
-        let settings = cell.camera.clone().unwrap_or_else(Camera::default);
+        let settings = cell.camera.clone().unwrap_or_default();
         let pinhole = settings.pinhole();
         let [fx, fy, cx, cy] = [pinhole.fx, pinhole.fy, pinhole.cx, pinhole.cy].map(|v| v as f32);
         let base_from_camera = settings.base_from_camera().map_or_else(Isometry3::identity, |pose| pose.isometry());

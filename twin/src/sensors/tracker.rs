@@ -5,7 +5,7 @@ use super::{camera_clock_ns, generator};
 use crate::scene::SceneSnapshot;
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use rand_distr::{Distribution as _, StandardNormal};
-use shared_mem::cell::{Camera, Cell, PoseNoise};
+use shared_mem::cell::{Cell, PoseNoise};
 use shared_mem::frames::{Base, Object, Pose};
 use shared_mem::msg::object::ObjectPose;
 use std::collections::VecDeque;
@@ -27,7 +27,7 @@ impl SimTracker {
     /// The tracker of a cell: rate and latency of its camera, noise of its object. Without `[camera]` those of a D455 at 30 Hz.
     #[must_use]
     pub fn new(cell: &Cell) -> Self {
-        let camera = cell.camera.clone().unwrap_or_else(Camera::default);
+        let camera = cell.camera.clone().unwrap_or_default();
         let exact = PoseNoise { position: 0.0, rotation: 0.0 };
         Self {
             period_ns: (1e9 / camera.rate) as u64,
@@ -88,6 +88,7 @@ impl SimTracker {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use shared_mem::cell::Camera;
 
     fn cell(latency: f64) -> Cell {
         Cell {
