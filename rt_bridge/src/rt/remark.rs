@@ -91,7 +91,7 @@ pub enum BrakeReason {
     EndsMoving,
     /// A later chunk of the motion cannot be played.
     Chunk(Refusal),
-    /// The arm stopped itself.
+    /// The arm stopped itself, or was lost.
     ArmStopped,
 }
 
@@ -153,7 +153,7 @@ impl fmt::Display for BrakeReason {
             Self::Limit(violation) => write!(f, "{violation}"),
             Self::EndsMoving => f.write_str("its last set point is not at rest"),
             Self::Chunk(refusal) => refusal.fmt(f),
-            Self::ArmStopped => f.write_str("the arm stopped itself"),
+            Self::ArmStopped => f.write_str("the arm is no longer under command"),
         }
     }
 }

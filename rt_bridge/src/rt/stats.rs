@@ -32,28 +32,33 @@ pub struct LoopStats {
     pub period: Times,
 }
 
-/// How late the packets of a device-clocked arm arrive, against the earliest one seen: its clock and ours differ by an
-/// unknown offset and drift, so the reference is the smallest offset of late, forgotten at 50 us a second.
+/// How late the packets of a device-clocked arm arrive. The clocks of device and machine have an unknown offset, and may
+/// drift (a simulated robot that falls behind does so by per cents), so the reference is the earliest arrival among the
+/// last 50 to 100 packets.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct ArrivalLine {
-    offset_ns: Option<i64>,
-    last_device_ns: u64,
+    /// Smallest `arrival - device clock` of the half window before [ns].
+    before_ns: Option<i64>,
+    /// The same of the half window under way [ns].
+    now_ns: Option<i64>,
+    /// Packets in the half window under way.
+    count: u32,
 }
 
-/// Clocks of robot and machine drift apart by less than this [ns of offset per ns].
-const DRIFT: f64 = 50e-6;
+/// Packets in half a window.
+const HALF_WINDOW: u32 = 50;
 
 impl ArrivalLine {
     /// How long after the earliest possible moment this packet came [ns].
     pub fn late_ns(&mut self, arrived_ns: u64, device_ns: u64) -> u64 {
         let offset = arrived_ns.cast_signed() - device_ns.cast_signed();
-        let elapsed = device_ns.saturating_sub(self.last_device_ns);
-        self.last_device_ns = device_ns;
-        let reference = match self.offset_ns {
-            Some(old) => offset.min(old + (elapsed as f64 * DRIFT) as i64),
-            None => offset,
-        };
-        self.offset_ns = Some(reference);
+        if self.count == HALF_WINDOW {
+            *self = Self { before_ns: self.now_ns, now_ns: None, count: 0 };
+        }
+        self.count += 1;
+        let smallest = self.now_ns.map_or(offset, |smallest| smallest.min(offset));
+        self.now_ns = Some(smallest);
+        let reference = self.before_ns.map_or(smallest, |before| before.min(smallest));
         u64::try_from(offset - reference).unwrap_or(0)
     }
 }
@@ -68,6 +73,14 @@ mod tests {
         let ms = 1_000_000;
         assert_eq!(line.late_ns(900 * ms + 40_000, 5 * ms), 0);
         assert_eq!(line.late_ns(901 * ms, 6 * ms), 0);
-        assert_eq!(line.late_ns(902 * ms + 250_000, 7 * ms) / 1000, 249);
+        assert_eq!(line.late_ns(902 * ms + 250_000, 7 * ms), 250_000);
+    }
+
+    #[test]
+    fn a_device_whose_clock_falls_behind_is_not_ever_later() {
+        let mut line = ArrivalLine::default();
+        // One per mille slow: each packet a microsecond later than its counter says.
+        let worst = (0..10_000).map(|k| line.late_ns(1_001_000 * k, 1_000_000 * k)).max();
+        assert!(worst < Some(101_000), "{worst:?}");
     }
 }
