@@ -1,5 +1,6 @@
 //! A z-buffer: nearest surface and its colour for every pixel. One triangle is one plane, so `1/z` is linear in the
-//! picture and a row of pixels is a straight run that the compiler turns into vector code. Allocates only when made.
+//! picture and a row of pixels is a straight run that the compiler turns into vector code. Allocates when made, and for
+//! the first mesh that is larger than all before.
 
 use super::Mesh;
 use nalgebra::{Isometry3, Point3, Vector3};

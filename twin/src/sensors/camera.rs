@@ -1,7 +1,7 @@
 //! A simulated D455: colour and depth of one moment, depth aligned to colour, from the scene's geometry. Table, box or
 //! mesh, arm as capsules between its joints, tool as the capsule it is. The picture has no lens distortion.
 //!
-//! Called by the bridge's camera thread: allocates nothing after it was made.
+//! Called by the camera thread of the bridge: allocates nothing after its first picture.
 
 use super::depth::{self, DepthSensor};
 use super::{camera_clock_ns, generator};
