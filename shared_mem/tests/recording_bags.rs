@@ -174,11 +174,19 @@ fn a_missing_joint_is_an_error_that_lists_both_sides() {
 
 #[test]
 fn one_row_of_nan_is_left_out_and_told_many_are_an_error() {
-    let clip = read(excitation(|i, _, row| if i == 60 { row[1] = f64::NAN }));
+    let clip = read(excitation(|i, _, row| {
+        if i == 60 {
+            row[1] = f64::NAN
+        }
+    }));
     assert_eq!(clip.measured.len(), 199);
     let told = clip.warnings.iter().find(|w| w.contains("not finite")).expect("a warning");
     assert!(told.contains(MEASURED) && told.contains("row 60") && told.contains("`elbow`"), "{told}");
-    let bag = excitation(|i, _, row| if i % 50 == 0 { row[0] = f64::INFINITY });
+    let bag = excitation(|i, _, row| {
+        if i % 50 == 0 {
+            row[0] = f64::INFINITY
+        }
+    });
     let error = bag.read(ClipKind::Excitation, &cell()).unwrap_err();
     for part in ["bag.mcap", MEASURED, "row 0", "`shoulder`", "4 of 200", "record again"] {
         assert!(error.contains(part), "{error}");
@@ -199,7 +207,11 @@ fn stamps_that_go_back_or_repeat_are_sorted_and_told() {
 
 #[test]
 fn a_glitch_in_the_first_row_is_left_out_and_told() {
-    let clip = read(excitation(|i, _, row| if i == 0 { *row = [0.0, 0.0] }));
+    let clip = read(excitation(|i, _, row| {
+        if i == 0 {
+            *row = [0.0, 0.0]
+        }
+    }));
     assert_eq!(clip.measured.stamps_ns[0], 3_001_000_000);
     assert!(clip.warnings.iter().any(|w| w.contains("first row")), "{:?}", clip.warnings);
 }
@@ -224,7 +236,11 @@ fn a_topic_in_degrees_is_told() {
 
 #[test]
 fn two_publishers_on_one_topic_are_told() {
-    let clip = read(excitation(|i, _, row| if i % 2 == 0 { row[0] += 0.7 }));
+    let clip = read(excitation(|i, _, row| {
+        if i % 2 == 0 {
+            row[0] += 0.7
+        }
+    }));
     assert!(clip.warnings.iter().any(|w| w.contains("two nodes")), "{:?}", clip.warnings);
 }
 
@@ -291,7 +307,10 @@ fn pictures_and_calibrations_of_a_bag_are_iterated_in_order() {
     bag.put("/camera_info", "sensor_msgs/msg/CameraInfo", 3, &info.numbers(&k).numbers(&[0.0; 21]).message());
     bag.mcap.finish().expect("room");
     let messages: Vec<_> = ClipMessages::open(&bag.path, &[]).expect("a bag").map(|m| m.expect("decodes")).collect();
-    assert_eq!(messages.iter().map(|m| m.topic.as_str()).collect::<Vec<_>>(), ["/image", "/image/compressed", "/camera_info"]);
+    assert_eq!(
+        messages.iter().map(|m| m.topic.as_str()).collect::<Vec<_>>(),
+        ["/image", "/image/compressed", "/camera_info"]
+    );
     match &messages[0].payload {
         Payload::Picture(Picture::Pixels { header, pixels }) => {
             assert_eq!((header.stamp_ns, header.width, pixels.as_slice()), (5, 2, &[1, 2, 3, 4, 5, 6][..]));

@@ -119,6 +119,11 @@ fn a_live_robot_is_moved_for_a_minute_without_a_fault() {
         assert!(done, "the excitation did not come to its end");
         assert_eq!(answer["faults"], Value::Array(Vec::new()));
         assert_eq!(seen.moving, seen.states);
+        // A lost command goes untold only where another one leaves the window in the same cycle.
+        assert!(
+            seen.skipped as f64 <= 1.2 * seen.told + 5.0,
+            "states are missing that the robot knows nothing of: {seen:?}"
+        );
         assert!(seen.swing > 0.05, "the arm was not moved: {seen:?}");
         let clip = read_clip(&cell.path("live.mcap"), ClipKind::Excitation, &CellToml::default()).expect("readable");
         let cycles = usize::try_from(answer["cycles"].as_u64().expect("cycles")).expect("a count");
