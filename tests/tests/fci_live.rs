@@ -115,7 +115,7 @@ fn a_live_robot_is_moved_for_a_minute_without_a_fault() {
         let seen = watch(&cell, Duration::from_secs(55));
         let done = !capture.is_running();
         let answer = bridge.wait(Duration::from_secs(20)).succeeded().json();
-        println!("{controller}: {seen:?}\n{answer}");
+        eprintln!("{controller}: {seen:?}\n{answer}");
         assert!(done, "the excitation did not come to its end");
         assert_eq!(answer["faults"], Value::Array(Vec::new()));
         assert_eq!(seen.moving, seen.states);
@@ -142,7 +142,7 @@ fn a_robot_that_dies_mid_motion_is_told_of_and_the_recording_is_kept() {
     assert!(before.swing > 0.01, "it was not mid-motion: {before:?}");
     server.kill_without_warning();
     let end = bridge.wait(Duration::from_secs(20));
-    println!("took {:?}: {}\n{}", end.took, end.stdout.trim_end(), end.stderr.trim_end());
+    eprintln!("took {:?}: {}\n{}", end.took, end.stdout.trim_end(), end.stderr.trim_end());
     assert!(end.took < Duration::from_secs(2), "{:?}", end.took);
     assert!(end.complaint().contains("closed the connection"), "{}", end.stderr);
     assert_eq!(end.json()["faults"].as_array().map(Vec::len), Some(1));

@@ -1,44 +1,76 @@
 //! The way to the robot, and other devices that are plugged in.
 
 use super::Finding;
+use crate::arm::{Arm, ArmFault, Read};
+use crate::fr3;
+use crate::rt::Realtime;
+use crate::rt::stats::ArrivalLine;
+use crate::times::Times;
+use shared_mem::cell::Cell;
+use shared_mem::msg::arm::{ArmMode, ArmState};
 use std::fs;
-use std::net::{TcpStream, ToSocketAddrs as _};
-use std::time::{Duration, Instant};
 
-/// The robot's command port.
-const COMMAND_PORT: u16 = 1337;
-/// How long an answer may take.
-const PATIENCE: Duration = Duration::from_secs(2);
-/// Connections that are timed.
-const TRIES: u32 = 5;
-/// A round trip that leaves the control loop its share of the millisecond.
-const GOOD: Duration = Duration::from_micros(400);
+/// States that are watched: one second.
+const STATES: u32 = 1000;
+/// Lateness that leaves the control loop its share of the millisecond [us].
+const GOOD_US: f64 = 400.0;
 
-/// Opens and closes the robot's command port a few times, without a word.
+/// Connects as `run` does and watches the robot's states for a second, without commanding it.
 pub(super) fn robot(host: &str) -> Finding {
-    let with_port = if host.contains(':') { host.to_owned() } else { format!("{host}:{COMMAND_PORT}") };
-    let address = match with_port.to_socket_addrs().map(|mut found| found.next()) {
-        Ok(Some(address)) => address,
-        _ => return Finding::problem("robot", format!("{host} is no address"), "give the robot's IP address"),
-    };
-    let mut worst = Duration::ZERO;
-    for _ in 0..TRIES {
-        let begin = Instant::now();
-        if let Err(e) = TcpStream::connect_timeout(&address, PATIENCE) {
-            return Finding::problem(
-                "robot",
-                format!("{address} does not answer ({e})"),
-                "check the cable and this machine's address in the robot's network, and activate FCI in its web page",
-            );
+    let watched = fr3::connect(host, Realtime::Ignore, &Cell::default())
+        .map_err(|e| e.to_string())
+        .and_then(|mut arm| watch(arm.as_mut()).map_err(|e| e.to_string()));
+    match watched {
+        Ok(line) => line.finding(host),
+        Err(text) => {
+            let (found, remedy) = text.split_once("; ").unwrap_or((&text, "look at the robot's web page"));
+            Finding::problem("robot", found, remedy)
         }
-        worst = worst.max(begin.elapsed());
     }
-    let found = format!("{address} answers within {} us (worst of {TRIES})", worst.as_micros());
-    if worst <= GOOD {
-        return Finding::ok("robot", found);
+}
+
+/// What the states of a second say about the line.
+struct Line {
+    mode: ArmMode,
+    lost: u64,
+    late: Times,
+}
+
+fn watch(arm: &mut dyn Arm) -> Result<Line, ArmFault> {
+    let (mut state, mut arrival, mut last_ns) = (ArmState::default(), ArrivalLine::default(), 0);
+    let mut line = Line { mode: ArmMode::Other, lost: 0, late: Times::new() };
+    for _ in 0..STATES {
+        if arm.read(&mut state)? != Read::Fresh {
+            continue;
+        }
+        if last_ns != 0 {
+            line.lost += (state.device_ns.saturating_sub(last_ns) / 1_000_000).saturating_sub(1);
+        }
+        last_ns = state.device_ns;
+        line.mode = state.mode;
+        line.late.record(arrival.late_ns(state.stamp_ns, state.device_ns));
     }
-    let remedy = "connect it directly, without switch or Wi-Fi: state, computing and command share one millisecond";
-    Finding::warning("robot", found, remedy)
+    Ok(line)
+}
+
+impl Line {
+    fn finding(&self, host: &str) -> Finding {
+        let late = self.late.percentiles();
+        let found = format!(
+            "{host} speaks FCI version 10, is in mode {:?}; {STATES} states, {} lost, {:.0} us late (p99), at worst {:.0} us",
+            self.mode, self.lost, late.p99, late.max
+        );
+        if !matches!(self.mode, ArmMode::Idle | ArmMode::Move) {
+            let remedy = "release the user stop, unlock the joints and activate FCI in the robot's web page";
+            return Finding::warning("robot", found, remedy);
+        }
+        if self.lost > 0 || late.p99 > GOOD_US {
+            let remedy =
+                "connect it directly, without switch or Wi-Fi: state, computing and command share one millisecond";
+            return Finding::warning("robot", found, remedy);
+        }
+        Finding::ok("robot", found)
+    }
 }
 
 /// Cameras, serial ports and CAN interfaces.

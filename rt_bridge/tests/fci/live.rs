@@ -84,7 +84,7 @@ fn swept(interface: CommandInterface) {
         arm.start(interface).expect("it is recovered");
     }
     let seen = sweep(arm.as_mut(), interface, 0.1, 6.0).unwrap_or_else(|fault| panic!("{fault}"));
-    println!("{interface:?}: {seen:?}");
+    eprintln!("{interface:?}: {seen:?}");
     arm.stop();
     let mut state = ArmState::default();
     arm.read(&mut state).expect("states go on after the motion");
