@@ -116,9 +116,9 @@ fn may_touch(arm: &SimArm, object: &TableObject, tool: &Capsule) -> bool {
     let centre = Point3::from(object.pose().isometry().translation.vector);
     let on_tool = flange.inverse_transform_point(&centre);
     let nearest = Point3::new(0.0, 0.0, on_tool.z.clamp(0.0, tool.segment));
-    // Half a metre from the surface nothing happens within a millisecond; most periods end here.
+    // Nothing closes a gap of 20 mm within a millisecond; most periods end here.
     let rough_gap = (on_tool - nearest).norm() - tool.radius - object.bounding_radius();
-    if rough_gap > 0.5 {
+    if rough_gap > 0.02 {
         return false;
     }
     let touch = object.touch(tool, &flange);

@@ -2,6 +2,7 @@
 //! robot, `twin shadow` and `twin replay` are all this one; called from their threads, never from a control thread
 //! (rapier allocates).
 //!
+//! The arm meets nothing but the object, and that with its tool alone: it passes through the table and through itself.
 //! Units SI, everything in the base frame. Deterministic: the same cell, parameters and drives give the same numbers.
 #![allow(non_snake_case)] // tau_J is the Franka Control Interface's own symbol
 

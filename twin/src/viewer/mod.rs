@@ -1,6 +1,6 @@
 //! The live view: robot and twin in 3D, their joints, the gap as curves, the camera's pictures, as a Foxglove WebSocket
 //! (the only code that knows the foxglove crate). It is one more reader of shared memory, in a thread of its own, so
-//! the shadow's timing does not feel it. Shows at [`FRAME`] the newest of everything and skips the rest.
+//! the shadow's timing does not feel it. Thirty times a second it shows the newest of everything and skips the rest.
 
 mod scene;
 
