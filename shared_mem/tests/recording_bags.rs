@@ -82,7 +82,8 @@ impl Bag {
     }
 
     fn joints(&mut self, topic: &str, stamp_ns: u64, names: &[&str], q: &[f64]) {
-        self.put(topic, JOINT_STATE, stamp_ns, &joint_state(stamp_ns, names, q, &[0.1, 0.2]));
+        let dq: Vec<f64> = q.iter().map(|q| 0.1 * q).collect();
+        self.put(topic, JOINT_STATE, stamp_ns, &joint_state(stamp_ns, names, q, &dq));
     }
 
     fn read(mut self, kind: ClipKind, cell: &Cell) -> Result<Clip, String> {
@@ -123,7 +124,7 @@ fn a_clean_bag_loads_without_a_word() {
     let clip = read(excitation(|_, _, _| {}));
     assert_eq!((clip.measured.len(), clip.desired.len(), clip.measured.dof), (200, 200, 2));
     assert_eq!(clip.measured.q_row(7), [q(7, 0), q(7, 1)]);
-    assert_eq!(clip.measured.dq_row(7), Some(&[0.1, 0.2][..]));
+    assert_eq!(clip.measured.dq_row(7), Some(&[0.1 * q(7, 0), 0.1 * q(7, 1)][..]));
     assert_eq!(clip.measured.tau_row(7), None);
     assert_eq!((clip.warnings, clip.damage), (vec![], None));
 }
@@ -251,7 +252,7 @@ fn columns_that_a_driver_never_filled_in_count_as_not_logged() {
         let stamp = i * 1_000_000 + 1;
         let row = [q(i, 0), q(i, 1)];
         bag.put(MEASURED, JOINT_STATE, stamp, &joint_state(stamp, &NAMES, &row, &[f64::NAN, f64::NAN]));
-        bag.put(DESIRED, JOINT_STATE, stamp, &joint_state(stamp, &NAMES, &row, &[0.0, 0.0]));
+        bag.put(DESIRED, JOINT_STATE, stamp, &joint_state(stamp, &NAMES, &row, &[0.0, 0.7]));
     }
     let clip = read(bag);
     assert!(clip.measured.dq.is_empty() && clip.desired.dq.is_empty());
@@ -293,6 +294,19 @@ fn poses_in_another_frame_than_the_base_are_told() {
     bag.put("/object/pose", "geometry_msgs/msg/PoseStamped", 5, &pose(5, "camera_link", [0.0, 0.0, 0.0, 1.0]));
     let clip = bag.read(ClipKind::ControlHitSlide, &cell()).unwrap_or_else(|e| panic!("{e}"));
     assert!(clip.warnings.iter().any(|w| w.contains("camera_link") && w.contains("base_frame")), "{:?}", clip.warnings);
+}
+
+#[test]
+fn poses_in_millimetres_and_quaternions_with_w_first_are_told() {
+    let free = Cell::parse("[table]\nheight = 0.0\n", Path::new("cell.toml")).expect("a valid cell");
+    let mut bag = Bag::new();
+    for i in 0..20u64 {
+        let cdr = Cdr::default().header(i * 7_000_000, "base").numbers(&[512.0, 100.0, 50.0]);
+        bag.put("/object/pose", "geometry_msgs/msg/PoseStamped", i, &cdr.numbers(&[1.0, 0.0, 0.0, 0.0]).message());
+    }
+    let warnings = bag.read(ClipKind::FreeMotion, &free).unwrap_or_else(|e| panic!("{e}")).warnings;
+    assert!(warnings.iter().any(|w| w.contains("millimetres")), "{warnings:?}");
+    assert!(warnings.iter().any(|w| w.contains("w first")), "{warnings:?}");
 }
 
 #[test]

@@ -287,3 +287,28 @@ fn a_full_disk_is_told_and_what_was_flushed_stays_readable() {
     assert!(flushed > 50, "{flushed}");
     assert_eq!(read_arm_states(&path).expect("a readable clip"), (0..flushed).map(state).collect::<Vec<_>>());
 }
+
+#[test]
+#[cfg(target_os = "linux")]
+fn the_systems_own_word_for_a_full_disk_is_understood() {
+    let device = std::fs::OpenOptions::new().write(true).open("/dev/full").expect("Linux has a full device");
+    let error = ClipWriter::with_sink(device, Path::new("/dev/full"), &info()).err().expect("no room at all");
+    assert!(matches!(error, WriteError::DiskFull { bytes: 0, .. }), "{error:?}");
+}
+
+#[test]
+#[ignore = "needs TWINALIGN_SMALL_DISK=<folder on a file system of a few MB, say a tmpfs>"]
+fn a_file_system_that_fills_up_leaves_a_readable_clip() {
+    let folder = std::env::var_os("TWINALIGN_SMALL_DISK").expect("TWINALIGN_SMALL_DISK names a folder");
+    let path = Path::new(&folder).join("clip.mcap");
+    let _ = std::fs::remove_file(&path);
+    let mut writer = ClipWriter::create(&path, &info()).expect("room for the start");
+    let error = (0..10_000_000u64).find_map(|i| {
+        let written = writer.arm_state(&state(i));
+        written.and_then(|()| if i % 500 == 499 { writer.flush() } else { Ok(()) }).err()
+    });
+    assert!(matches!(error, Some(WriteError::DiskFull { .. })), "{error:?}");
+    drop(writer);
+    let states = read_arm_states(&path).expect("a readable clip");
+    assert!(states.len() >= 500 && states.len().is_multiple_of(500), "{} states", states.len());
+}

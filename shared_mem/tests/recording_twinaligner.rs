@@ -35,7 +35,8 @@ fn write_folder(folder: &Path) {
     npy.extend(header.as_bytes());
     for i in 0..5u8 {
         let x = 0.01 * f32::from(i);
-        let pose = [1.0, 0.0, 0.0, x, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.4, 0.0, 0.0, 0.0, 1.0f32];
+        // It stands upright below a camera that looks down.
+        let pose = [1.0, 0.0, 0.0, x, 0.0, -1.0, 0.0, 0.0, 0.0, 0.0, -1.0, 0.4, 0.0, 0.0, 0.0, 1.0f32];
         npy.extend(pose.iter().flat_map(|v| v.to_le_bytes()));
     }
     std::fs::write(folder.join("pose.npy"), npy).expect("room");

@@ -9,6 +9,7 @@ use super::ros2::{JointState, StampedPose};
 use super::series::ObjectSeries;
 use crate::cell::{Cell, ClipKind, Topics};
 use crate::frames::{Base, Object, Pose};
+use std::io::{Read, Seek};
 use std::path::Path;
 
 /// A stamp [ns] and the pose, `None` where its numbers are no pose.
@@ -28,8 +29,12 @@ struct Collected {
 }
 
 /// Reads a bag.
-pub(super) fn read(path: &Path, kind: ClipKind, cell: &Cell) -> Result<Clip, ReadError> {
-    let mut messages = Messages::open(path)?;
+pub(super) fn read<R: Read + Seek>(
+    path: &Path,
+    mut messages: Messages<R>,
+    kind: ClipKind,
+    cell: &Cell,
+) -> Result<Clip, ReadError> {
     let mut collected = Collected::default();
     while let Some(message) = messages.next()? {
         collected

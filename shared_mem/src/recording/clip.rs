@@ -37,35 +37,20 @@ pub struct Clip {
 /// [`ReadError`] when the file is missing, is of no known kind, lacks a topic that `cell` and `kind` ask for, lacks a
 /// joint, or more than 1 % of its rows cannot be used. A cut or partly changed file is no error: see [`Clip::damage`].
 pub fn read_clip(path: &Path, kind: ClipKind, cell: &Cell) -> Result<Clip, ReadError> {
-    match Source::of(path)? {
-        Source::Own => own::read(path, kind, cell),
-        Source::Bag => bag::read(path, kind, cell),
-        Source::TwinAligner => twinaligner::read(path, kind, cell),
-    }
-}
-
-/// What a clip was recorded with.
-enum Source {
-    Own,
-    Bag,
-    TwinAligner,
-}
-
-impl Source {
-    /// By the first message of a file: its encoding tells who wrote it.
-    fn of(path: &Path) -> Result<Self, ReadError> {
-        if path.is_dir() {
-            return if twinaligner::is_clip_folder(path) {
-                Ok(Self::TwinAligner)
-            } else {
-                let what = "is a folder without control.json and frame.json; give a clip file or a TwinAligner folder";
-                Err(ReadError::kind(path, what))
-            };
+    if path.is_dir() {
+        if twinaligner::is_clip_folder(path) {
+            return twinaligner::read(path, kind, cell);
         }
-        let mut messages = Messages::open(path)?;
-        let own = messages.next()?.map(|message| is_own(message.channel));
-        // A recording that was stopped before its first message still says whose it is.
-        Ok(if own.unwrap_or_else(|| own::clip_info(&messages).is_some()) { Self::Own } else { Self::Bag })
+        let what = "is a folder without control.json and frame.json; give a clip file or a TwinAligner folder";
+        return Err(ReadError::kind(path, what));
+    }
+    let mut messages = Messages::open(path)?;
+    let own = messages.peek()?.map(|message| is_own(message.channel));
+    // A recording that was stopped before its first message still says whose it is.
+    if own.unwrap_or_else(|| own::clip_info(&messages).is_some()) {
+        own::read(path, messages, kind, cell)
+    } else {
+        bag::read(path, messages, kind, cell)
     }
 }
 

@@ -63,8 +63,12 @@ impl Rows {
 }
 
 /// Reads an own clip.
-pub(super) fn read(path: &Path, kind: ClipKind, cell: &Cell) -> Result<Clip, ReadError> {
-    let mut messages = Messages::open(path)?;
+pub(super) fn read<R: Read + Seek>(
+    path: &Path,
+    mut messages: Messages<R>,
+    kind: ClipKind,
+    cell: &Cell,
+) -> Result<Clip, ReadError> {
     let (mut rows, mut poses) = (Rows::default(), Vec::new());
     while let Some(message) = messages.next()? {
         let topic = &message.channel.topic;

@@ -138,18 +138,28 @@ impl<R: Read + Seek> Messages<R> {
 
     /// Goes to the next message; false behind the last.
     pub(super) fn advance(&mut self) -> Result<bool, ReadError> {
-        self.next += 1;
-        while self.next >= self.entries.len() {
-            if !self.load().map_err(ReadError::io(&self.path))? {
-                return Ok(false);
-            }
-        }
-        Ok(true)
+        let there = self.peek()?.is_some();
+        self.next += usize::from(there);
+        Ok(there)
     }
 
     /// The message that [`Messages::advance`] went to.
     pub(super) fn current(&self) -> Option<Message<'_>> {
-        self.entries.get(self.next).map(|entry| Message {
+        self.message(self.next.checked_sub(1)?)
+    }
+
+    /// The message that [`Messages::advance`] will go to.
+    pub(super) fn peek(&mut self) -> Result<Option<Message<'_>>, ReadError> {
+        while self.next >= self.entries.len() {
+            if !self.load().map_err(ReadError::io(&self.path))? {
+                return Ok(None);
+            }
+        }
+        Ok(self.message(self.next))
+    }
+
+    fn message(&self, index: usize) -> Option<Message<'_>> {
+        self.entries.get(index).map(|entry| Message {
             channel: &entry.channel,
             sequence: entry.sequence,
             log_time_ns: entry.log_time_ns,

@@ -2,7 +2,12 @@
 //!
 //! Units: rad, rad/s, N m, ns. Called for every series that was read from a file.
 
-use super::series::{JointSeries, ObjectSeries};
+mod object;
+mod wraps;
+
+pub(super) use object::object;
+
+use super::series::JointSeries;
 use std::f64::consts::TAU;
 
 /// Largest share of rows that may be left out before reading fails.
@@ -18,37 +23,16 @@ pub(super) fn joints(
 ) -> Result<(JointSeries, Vec<String>), String> {
     let mut warnings = Vec::new();
     let moves = (1..series.len()).any(|i| step(&series, 0, i) > 1e-3);
-    unlogged_block(&mut series.dq, moves, topic, "velocities", &mut warnings);
-    unlogged_block(&mut series.tau, true, topic, "torques", &mut warnings);
+    let dof = series.dof;
+    unlogged_block(&mut series.dq, (dof, moves), topic, "velocities", &mut warnings);
+    unlogged_block(&mut series.tau, (dof, moves), topic, "torques", &mut warnings);
     series = drop_non_finite(&series, topic, names, &mut warnings)?;
     series = sort(series, topic, &mut warnings);
     series = drop_glitch(series, topic, &mut warnings);
+    series = wraps::unwrap(series, topic, &mut warnings);
     warnings.extend(interleaved(&series, topic));
     warnings.extend(degrees(&series, topic));
     Ok((series, warnings))
-}
-
-/// Mends an object series of `rows` stamps and poses, where `None` is a pose that makes no sense.
-pub(super) fn object(
-    rows: Vec<(u64, Option<crate::frames::Pose<crate::frames::Base, crate::frames::Object>>)>,
-    topic: &str,
-) -> Result<(ObjectSeries, Vec<String>), String> {
-    let mut warnings = Vec::new();
-    let total = rows.len();
-    let first_bad = rows.iter().position(|(_, pose)| pose.is_none());
-    let mut good: Vec<_> = rows.into_iter().filter_map(|(stamp, pose)| Some((stamp, pose?))).collect();
-    if let Some(first) = first_bad {
-        let what = format!("the pose of row {first} is not finite or its quaternion has no direction");
-        warnings.push(left_out(topic, total - good.len(), total, &what)?);
-    }
-    let unsorted = good.windows(2).filter(|w| matches!(w, [a, b] if b.0 < a.0)).count();
-    good.sort_by_key(|(stamp, _)| *stamp);
-    let sorted = good.len();
-    good.dedup_by_key(|(stamp, _)| *stamp);
-    warnings.extend(order_sentence(topic, unsorted, sorted - good.len()));
-    let (stamps_ns, poses): (Vec<u64>, Vec<_>) = good.into_iter().unzip();
-    warnings.extend(gaps(&stamps_ns, topic));
-    Ok((ObjectSeries { stamps_ns, poses }, warnings))
 }
 
 /// Faults that only show when the two topics are laid side by side.
@@ -75,16 +59,21 @@ pub(super) fn pair(desired: &JointSeries, measured: &JointSeries) -> Vec<String>
     warnings
 }
 
-/// A block that its driver never filled in counts as not logged.
-fn unlogged_block(block: &mut Vec<f64>, zero_is_odd: bool, topic: &str, what: &str, warnings: &mut Vec<String>) {
-    if block.is_empty() {
-        return;
-    }
+/// A block that its driver never filled in counts as not logged. `(joints, whether the arm moves)`: while it moves, no
+/// velocity and no torque stays the same to the last bit.
+fn unlogged_block(
+    block: &mut Vec<f64>,
+    (dof, moves): (usize, bool),
+    topic: &str,
+    what: &str,
+    warnings: &mut Vec<String>,
+) {
     let bad = block.iter().filter(|v| !v.is_finite()).count();
+    let constant = block.iter().zip(block.iter().skip(dof)).all(|(a, b)| a == b);
     let why = if bad * 2 > block.len() {
         "mostly not finite"
-    } else if zero_is_odd && block.iter().all(|v| *v == 0.0) {
-        "all exactly 0"
+    } else if moves && !block.is_empty() && constant {
+        "the same in every row while the arm moves"
     } else {
         return;
     };
