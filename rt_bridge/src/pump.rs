@@ -1,7 +1,9 @@
-//! From the control thread's rings to shared memory and back, at ordinary priority: the only thread of a run that owns
-//! the arm's ports. It is woken by each beat, and looks by itself every few milliseconds for motions to hand on.
+//! From the control thread's rings to shared memory and back, below the priorities of control and simulation: the only
+//! thread of a run that owns the arm's ports. It is woken by each beat, and looks by itself every few milliseconds for
+//! motions to hand on.
 
 use crate::rt::cycle::Beat;
+use crate::rt::process;
 use crate::rt::remark::Remark;
 use crate::times::Times;
 use rtrb::{Consumer, Producer};
@@ -82,6 +84,9 @@ impl Pump {
         let (opened, wait) = mpsc::channel();
         let told = stop.clone();
         let body = move || {
+            // Just above ordinary threads: the camera's rendering would make states late by milliseconds otherwise. Where
+            // it is not granted, states are as fresh as the scheduler lets them be.
+            let _not_granted = process::set_fifo(process::PUMP_PRIORITY);
             // iceoryx2's ports belong to the thread that makes them.
             let (node, ports) = match open(rings.poses.is_some()) {
                 Ok(open) => open,

@@ -3,36 +3,92 @@
 
 use crate::arm::{Arm, ArmFault, Clock, Desired, Read};
 use crate::rt::process::sleep_until;
+use rtrb::{Consumer, Producer, RingBuffer};
 use shared_mem::cell::{Cell, ClipKind};
 use shared_mem::msg::arm::{ArmCommand, ArmMode, ArmState, CommandInterface};
 use shared_mem::msg::joints_from;
+use shared_mem::msg::object::ObjectPose;
 use shared_mem::recording::{Clip, ReadError, read_clip};
 use shared_mem::time::now_ns;
 use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 use twin::arm::ArmModel;
+
+/// When the replay of a clip began: turns its stamps into moments of now. Shared by its arm and its camera.
+#[derive(Debug, Clone, Default)]
+pub struct ReplayClock(Arc<AtomicU64>);
+
+impl ReplayClock {
+    /// When a recorded stamp is replayed: monotonic clock [ns]; `None` before the arm has begun.
+    #[must_use]
+    pub fn moment_of(&self, stamp_ns: u64) -> Option<u64> {
+        // Wrapping: a bag's stamps are Unix time, far ahead of the monotonic clock.
+        match self.0.load(Ordering::Relaxed) {
+            0 => None,
+            shift_ns => Some(stamp_ns.wrapping_add(shift_ns)),
+        }
+    }
+
+    fn begin(&self, first_stamp_ns: u64) {
+        self.0.store(now_ns().wrapping_sub(first_stamp_ns), Ordering::Relaxed);
+    }
+}
+
+/// Poses that wait for the pump.
+const POSES: usize = 256;
 
 /// The recording.
 #[derive(Debug)]
 pub struct ReplayArm {
     clip: Clip,
     next: usize,
+    /// Next pose of the object to give out.
+    next_pose: usize,
+    poses: Producer<ObjectPose>,
     /// Row of the desired series in force.
     desired: usize,
-    /// What is added to a recorded stamp to get the moment of its replay [ns].
-    shift_ns: Option<u64>,
+    clock: ReplayClock,
 }
 
 impl ReplayArm {
-    /// Reads a clip of the arm that `model` describes.
+    /// Reads a clip of the arm that `model` describes. Also returns the poses of its object, as their moment comes, and
+    /// the clock of the replay.
     ///
     /// # Errors
     /// [`ReadError`] when it cannot be read, or its joints are not the model's.
-    pub fn open(path: &Path, cell: &Cell, model: &ArmModel) -> Result<Self, ReadError> {
+    pub fn open(
+        path: &Path,
+        cell: &Cell,
+        model: &ArmModel,
+    ) -> Result<(Self, Consumer<ObjectPose>, ReplayClock), ReadError> {
         let clip = read_clip(path, ClipKind::Excitation, cell)?.reorder(model.joint_names())?;
         for warning in clip.warnings.iter().chain(&clip.damage) {
             tracing::warn!("{}: {warning}", path.display());
         }
-        Ok(Self { clip, next: 0, desired: 0, shift_ns: None })
+        let (to_pump, poses) = RingBuffer::new(POSES);
+        let clock = ReplayClock::default();
+        let arm = Self { clip, next: 0, next_pose: 0, poses: to_pump, desired: 0, clock: clock.clone() };
+        Ok((arm, poses, clock))
+    }
+
+    /// Gives out the poses that were recorded up to `stamp_ns`.
+    fn give_poses(&mut self, stamp_ns: u64) {
+        let object = &self.clip.object;
+        while let (Some(stamp), Some(pose)) = (object.stamps_ns.get(self.next_pose), object.poses.get(self.next_pose))
+            && *stamp <= stamp_ns
+        {
+            let message = ObjectPose {
+                device_ns: *stamp,
+                sequence: self.next_pose as u64,
+                position: pose.position(),
+                wxyz: pose.wxyz(),
+                ..ObjectPose::default()
+            };
+            // A pump that is late loses poses, not states.
+            let _full = self.poses.push(message);
+            self.next_pose += 1;
+        }
     }
 
     /// Row of the desired series in force at `stamp_ns`: the newest that is not later.
@@ -60,8 +116,11 @@ impl Arm for ReplayArm {
 
     fn read(&mut self, state: &mut ArmState) -> Result<Read, ArmFault> {
         let Some(stamp_ns) = self.clip.measured.stamps_ns.get(self.next).copied() else { return Ok(Read::End) };
-        let shift_ns = *self.shift_ns.get_or_insert_with(|| now_ns().wrapping_sub(stamp_ns));
-        sleep_until(stamp_ns.wrapping_add(shift_ns));
+        match self.clock.moment_of(stamp_ns) {
+            Some(moment_ns) => sleep_until(moment_ns),
+            None => self.clock.begin(stamp_ns),
+        }
+        self.give_poses(stamp_ns);
         let desired = self.desired_at(stamp_ns);
         let row = self.next;
         self.next += 1;

@@ -25,7 +25,7 @@ fn every_verb_explains_itself_with_an_example() {
 fn wrong_arguments_exit_with_two_and_name_what_there_is() {
     let camera = rt_bridge(&["run", "--cell", "cell.toml", "--arm", "sim", "--camera", "realsense"]);
     assert_eq!(camera.status.code(), Some(2));
-    assert!(text(&camera.stderr).contains("possible values: sim, off"), "{}", text(&camera.stderr));
+    assert!(text(&camera.stderr).contains("possible values: sim, replay, off"), "{}", text(&camera.stderr));
     let arm = rt_bridge(&["run", "--cell", "cell.toml", "--arm", "172.16.0.2"]);
     assert_eq!(arm.status.code(), Some(2));
     assert!(text(&arm.stderr).contains("fci://172.16.0.2"), "{}", text(&arm.stderr));

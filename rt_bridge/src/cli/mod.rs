@@ -59,7 +59,8 @@ pub fn main() -> ExitCode {
     match done {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("error: {error:#}");
+            // Every error is one sentence that holds its cause; the chain below would say it twice.
+            eprintln!("error: {error}");
             ExitCode::FAILURE
         }
     }

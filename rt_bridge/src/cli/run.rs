@@ -31,7 +31,7 @@ pub(super) struct RunArguments {
     /// Default: torque_pd, and joint_impedance where cell.toml describes a servo
     #[arg(long)]
     controller: Option<ControllerChoice>,
-    /// Default: sim where the arm is simulated and cell.toml has a [camera], else off
+    /// Default: sim where the arm is simulated and cell.toml has a [camera], replay with a recording, else off
     #[arg(long)]
     camera: Option<CameraChoice>,
     /// Effects of the simulated cell that nobody else is told

@@ -8,6 +8,8 @@ use std::mem::MaybeUninit;
 pub const CONTROL_PRIORITY: i32 = 80;
 /// Priority of the thread that stands in for the robot: it has to answer within a cycle, but never delays the control thread.
 pub const SIMULATION_PRIORITY: i32 = 60;
+/// Priority of the pump: it publishes within the cycle, but never delays the two above.
+pub const PUMP_PRIORITY: i32 = 40;
 /// Stack that is touched in advance, so that no page is missing while the loop runs [bytes].
 const STACK_PREFAULT: usize = 256 * 1024;
 

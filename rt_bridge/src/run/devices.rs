@@ -3,7 +3,7 @@
 use super::Settings;
 use crate::arm::Arm;
 use crate::fr3;
-use crate::replay::ReplayArm;
+use crate::replay::{ReplayArm, ReplayClock};
 use crate::rt::cycle::Plan;
 use crate::rt::law::TorquePd;
 use crate::safety::Limits;
@@ -70,6 +70,8 @@ pub enum ControllerChoice {
 pub enum CameraChoice {
     /// Rendered from the simulated cell.
     Sim,
+    /// The pictures of the recording.
+    Replay,
     /// None.
     Off,
 }
@@ -78,47 +80,66 @@ pub(super) struct Devices {
     pub(super) arm: Box<dyn Arm>,
     pub(super) plan: Plan,
     pub(super) world: Option<World>,
-    /// For the simulated camera; none when it is off.
-    pub(super) scenes: Option<Consumer<SceneSnapshot>>,
-    /// From the simulated tracker, which works with the camera off, too.
+    pub(super) pictures: Pictures,
+    /// From the simulated tracker, or of the recording. They come with the camera off, too.
     pub(super) poses: Option<Consumer<ObjectPose>>,
+}
+
+/// Where pictures come from.
+pub(super) enum Pictures {
+    None,
+    Scenes(Consumer<SceneSnapshot>),
+    Clip(PathBuf, ReplayClock),
 }
 
 impl Devices {
     pub(super) fn open(settings: &Settings, cell: &Cell) -> Result<Self> {
         let model = ArmModel::from_cell(cell)?;
         let plan = plan(settings, cell, &model)?;
-        let wants_camera = match (settings.camera, &settings.arm) {
-            (None, ArmChoice::Sim) => cell.camera.is_some(),
-            (Some(CameraChoice::Sim), ArmChoice::Sim) => true,
-            (Some(CameraChoice::Sim), _) => bail!("--camera sim shows the simulated cell; use it with --arm sim"),
-            (Some(CameraChoice::Off) | None, _) => false,
-        };
         if settings.arm != ArmChoice::Sim && (settings.effects.is_some() || settings.parameters.is_some()) {
             bail!("--effects and --parameters change the simulated cell only; use them with --arm sim");
         }
-        let (arm, simulated): (Box<dyn Arm>, _) = match &settings.arm {
+        let camera = camera(settings, cell)?;
+        let devices = match &settings.arm {
             ArmChoice::Sim => {
                 let (world, arm, views) = World::start(cell, hidden(settings)?.as_ref())?;
-                (Box::new(arm), Some((world, views)))
+                Self {
+                    arm: Box::new(arm),
+                    plan,
+                    world: Some(world),
+                    pictures: if camera { Pictures::Scenes(views.scenes) } else { Pictures::None },
+                    poses: cell.object.is_some().then_some(views.poses),
+                }
             }
-            ArmChoice::Fci(host) => (fr3::connect(host, settings.realtime, cell)?, None),
-            ArmChoice::Replay(clip) => (Box::new(ReplayArm::open(clip, cell, &model)?), None),
+            ArmChoice::Fci(host) => {
+                let arm = fr3::connect(host, settings.realtime, cell)?;
+                Self { arm, plan, world: None, pictures: Pictures::None, poses: None }
+            }
+            ArmChoice::Replay(clip) => {
+                let (arm, poses, clock) = ReplayArm::open(clip, cell, &model)?;
+                let pictures = if camera { Pictures::Clip(clip.clone(), clock) } else { Pictures::None };
+                Self { arm: Box::new(arm), plan, world: None, pictures, poses: Some(poses) }
+            }
         };
-        if arm.dof() != model.dof() {
-            bail!(
-                "the arm has {} joints, cell.toml describes {}; correct [robot] in cell.toml",
-                arm.dof(),
-                model.dof()
-            );
-        }
-        let mut devices = Self { arm, plan, world: None, scenes: None, poses: None };
-        if let Some((world, views)) = simulated {
-            devices.world = Some(world);
-            devices.scenes = wants_camera.then_some(views.scenes);
-            devices.poses = cell.object.is_some().then_some(views.poses);
+        let (has, described) = (devices.arm.dof(), model.dof());
+        if has != described {
+            bail!("the arm has {has} joints, cell.toml describes {described}; correct [robot] in cell.toml");
         }
         Ok(devices)
+    }
+}
+
+/// Whether there is to be a camera, and whether that goes with the arm.
+fn camera(settings: &Settings, cell: &Cell) -> Result<bool> {
+    match (settings.camera, &settings.arm) {
+        (None, ArmChoice::Sim) => Ok(cell.camera.is_some()),
+        (Some(CameraChoice::Sim), ArmChoice::Sim) | (Some(CameraChoice::Replay), ArmChoice::Replay(_)) => Ok(true),
+        (Some(CameraChoice::Sim), _) => bail!("--camera sim shows the simulated cell; use it with --arm sim"),
+        (Some(CameraChoice::Replay), _) => {
+            bail!("--camera replay shows a recording's pictures; use it with --arm replay://CLIP.mcap")
+        }
+        (Some(CameraChoice::Off), _) | (None, ArmChoice::Fci(_)) => Ok(false),
+        (None, ArmChoice::Replay(_)) => Ok(true),
     }
 }
 
@@ -147,7 +168,7 @@ fn plan(settings: &Settings, cell: &Cell, model: &ArmModel) -> Result<Plan> {
         false => None,
     };
     let limits = match cell.robot.as_ref().and_then(|robot| robot.model.as_deref()) {
-        Some("fr3") => Limits::fr3(),
+        Some("fr3") => Limits::fr3().with_torque_of(model),
         _ => Limits::of_model(model),
     };
     let session = SystemTime::now().duration_since(UNIX_EPOCH).map_or(1, |d| d.as_nanos() as u64);

@@ -15,8 +15,8 @@ use crate::rt::Realtime;
 use crate::rt::control::{self, Outcome};
 use crate::rt::cycle::{Cycle, Link, Plan};
 use crate::safety::{Guard, Workspace};
-use anyhow::{Context as _, Result};
-use devices::Devices;
+use anyhow::Result;
+use devices::{Devices, Pictures};
 use rtrb::RingBuffer;
 use shared_mem::cell::Cell;
 use shared_mem::msg::event::EventLevel;
@@ -49,7 +49,8 @@ pub struct Settings {
     pub arm: ArmChoice,
     /// Who computes the torque; none: the bridge for `joint_impedance`, the arm itself for a servo.
     pub controller: Option<ControllerChoice>,
-    /// The camera; none: simulated with the simulated arm where cell.toml has a `[camera]`, else off.
+    /// The camera; none: simulated with the simulated arm where cell.toml has a `[camera]`, the recording's with a
+    /// recording, else off.
     pub camera: Option<CameraChoice>,
     /// Effects of the simulated cell.
     pub effects: Option<PathBuf>,
@@ -98,9 +99,10 @@ pub fn run(settings: &Settings, stop: &Arc<AtomicBool>) -> Result<RunReport> {
         }
         None => None,
     };
-    let camera = match devices.scenes {
-        Some(scenes) => Some(Camera::start(&cell, scenes)?),
-        None => None,
+    let camera = match devices.pictures {
+        Pictures::Scenes(scenes) => Some(Camera::simulated(&cell, scenes)?),
+        Pictures::Clip(clip, clock) => Some(Camera::replayed(&clip, clock)?),
+        Pictures::None => None,
     };
 
     let guard = Guard { limits: devices.plan.limits, workspace: Workspace::of(&cell), period_s: 1e-3 };
@@ -108,7 +110,8 @@ pub fn run(settings: &Settings, stop: &Arc<AtomicBool>) -> Result<RunReport> {
     let link = Link { beats: to_pump, remarks: to_words, chunks, pump: pump.thread() };
     let cycle = Cycle::new(devices.arm, devices.plan, player, link);
     let end_control = Arc::new(AtomicBool::new(false));
-    let control = control::spawn(cycle, settings.realtime, end_control.clone()).context("no thread for control")?;
+    let control = control::spawn(cycle, settings.realtime, end_control.clone())?;
+    tracing::info!("driving {}; it holds its pose until a motion is sent", settings.arm);
 
     let mut watch = Watch { node, recorder, notices, faults: Vec::new() };
     let begin = Instant::now();

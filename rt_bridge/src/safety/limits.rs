@@ -116,6 +116,15 @@ impl Limits {
         limits
     }
 
+    /// The same with torques no larger than those of `arm`, which cell.toml may have lowered.
+    #[must_use]
+    pub fn with_torque_of(mut self, arm: &ArmModel) -> Self {
+        for (joint, torque) in self.joints.iter_mut().zip(arm.torque_limit()).take(self.dof) {
+            joint.torque = joint.torque.min(*torque);
+        }
+        self
+    }
+
     /// The joints that count.
     pub fn counted(&self) -> impl Iterator<Item = &JointLimits> {
         self.joints.iter().take(self.dof)

@@ -1,16 +1,13 @@
-//! The camera thread: renders the simulated cell straight into shared memory, colour and depth of one moment, at the
-//! pace of the simulated camera. Intrinsics and pose go out once a second.
+//! The simulated camera: renders the simulated cell straight into shared memory, colour and depth of one moment, at the
+//! pace and with the latency of the camera in cell.toml. Intrinsics and pose go out once a second.
 
 use rtrb::Consumer;
-use shared_mem::cell::Cell;
 use shared_mem::msg::image::CameraInfo;
 use shared_mem::time::now_ns;
 use shared_mem::topics;
 use shared_mem::transport::{ImagePublisher, Node, Publisher, TransportError};
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc;
-use std::thread::{self, JoinHandle};
+use std::thread;
 use std::time::Duration;
 use twin::scene::SceneSnapshot;
 use twin::sensors::camera::SimCamera;
@@ -20,75 +17,15 @@ const LOOK_EVERY: Duration = Duration::from_millis(2);
 /// How often intrinsics and pose are sent [ns].
 const INFO_EVERY_NS: u64 = 1_000_000_000;
 
-/// The running camera. Dropping it ends the thread.
-#[derive(Debug)]
-pub struct Camera {
-    stop: Arc<AtomicBool>,
-    handle: Option<JoinHandle<()>>,
-}
-
-/// The camera cannot be simulated, or its topics are taken.
-#[derive(Debug, thiserror::Error)]
-pub enum CameraError {
-    /// The cell.
-    #[error(transparent)]
-    Cell(#[from] twin::sim::SimError),
-    /// Shared memory.
-    #[error(transparent)]
-    Transport(#[from] TransportError),
-}
-
-struct Ports {
+/// The topics of a camera.
+pub(super) struct Ports {
     color: ImagePublisher,
     depth: ImagePublisher,
     info: Publisher<CameraInfo>,
 }
 
-impl Camera {
-    /// Starts the camera on the scenes of a simulated cell.
-    ///
-    /// # Errors
-    /// [`CameraError`] when the cell cannot be drawn or another camera runs.
-    ///
-    /// # Panics
-    /// When the operating system cannot make a thread.
-    pub fn start(cell: &Cell, scenes: Consumer<SceneSnapshot>) -> Result<Self, CameraError> {
-        let camera = SimCamera::new(cell)?;
-        let latency_ns = cell.camera.as_ref().map_or(0, |camera| (camera.latency * 1e9) as u64);
-        let stop = Arc::new(AtomicBool::new(false));
-        let (opened, wait) = mpsc::channel();
-        let told = stop.clone();
-        let body = move || {
-            // iceoryx2's ports belong to the thread that makes them.
-            let (_node, ports) = match open(&camera) {
-                Ok(open) => open,
-                Err(e) => {
-                    let _gone = opened.send(Err(e));
-                    return;
-                }
-            };
-            let _gone = opened.send(Ok(()));
-            if let Err(e) = film(camera, scenes, &ports, latency_ns, &told) {
-                tracing::error!("the camera stopped: {e}");
-            }
-        };
-        let handle = thread::Builder::new().name("camera".into()).spawn(body).expect("threads can be made");
-        let camera = Self { stop, handle: Some(handle) };
-        wait.recv().expect("the camera answers before it ends")?;
-        Ok(camera)
-    }
-}
-
-impl Drop for Camera {
-    fn drop(&mut self) {
-        self.stop.store(true, Ordering::Relaxed);
-        if let Some(handle) = self.handle.take() {
-            let _panicked = handle.join();
-        }
-    }
-}
-
-fn open(camera: &SimCamera) -> Result<(Node, Ports), TransportError> {
+/// Opens the topics, in the thread that will use them.
+pub(super) fn open(camera: &SimCamera) -> Result<(Node, Ports), TransportError> {
     let node = Node::open("rt_bridge_camera")?;
     let ports = Ports {
         color: node.image_publisher(topics::CAMERA_COLOR, camera.color_bytes())?,
@@ -98,7 +35,8 @@ fn open(camera: &SimCamera) -> Result<(Node, Ports), TransportError> {
     Ok((node, ports))
 }
 
-fn film(
+/// Takes pictures until `stop`.
+pub(super) fn film(
     mut camera: SimCamera,
     mut scenes: Consumer<SceneSnapshot>,
     ports: &Ports,

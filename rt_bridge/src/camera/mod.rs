@@ -1,0 +1,110 @@
+//! The camera thread: pictures of the simulated cell, or of a recording, onto shared memory.
+
+mod replay;
+mod sim;
+
+use crate::replay::ReplayClock;
+use rtrb::Consumer;
+use shared_mem::cell::Cell;
+use shared_mem::recording::{ClipMessages, ReadError};
+use shared_mem::topics;
+use shared_mem::transport::{Node, TransportError};
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{self, Sender};
+use std::thread::{self, JoinHandle};
+use twin::scene::SceneSnapshot;
+use twin::sensors::camera::SimCamera;
+
+/// The running camera. Dropping it ends the thread.
+#[derive(Debug)]
+pub struct Camera {
+    stop: Arc<AtomicBool>,
+    handle: Option<JoinHandle<()>>,
+}
+
+/// There are no pictures to be had, or their topics are taken.
+#[derive(Debug, thiserror::Error)]
+pub enum CameraError {
+    /// The cell cannot be drawn.
+    #[error(transparent)]
+    Cell(#[from] twin::sim::SimError),
+    /// The recording.
+    #[error(transparent)]
+    Clip(#[from] ReadError),
+    /// Shared memory.
+    #[error(transparent)]
+    Transport(#[from] TransportError),
+}
+
+impl Camera {
+    /// Starts the simulated camera on the scenes of a simulated cell.
+    ///
+    /// # Errors
+    /// [`CameraError`] when the cell cannot be drawn or another camera runs.
+    pub fn simulated(cell: &Cell, scenes: Consumer<SceneSnapshot>) -> Result<Self, CameraError> {
+        let camera = SimCamera::new(cell)?;
+        let latency_ns = cell.camera.as_ref().map_or(0, |camera| (camera.latency * 1e9) as u64);
+        Ok(Self::start(move |opened, stop| {
+            let (_node, ports) = match sim::open(&camera) {
+                Ok(open) => open,
+                Err(e) => return answer(&opened, Err(e)),
+            };
+            answer(&opened, Ok(()));
+            complain(sim::film(camera, scenes, &ports, latency_ns, stop));
+        })?)
+    }
+
+    /// Starts to show the pictures of a clip, in step with its replayed arm.
+    ///
+    /// # Errors
+    /// [`CameraError`] when the clip cannot be read or shared memory fails.
+    pub fn replayed(clip: &Path, clock: ReplayClock) -> Result<Self, CameraError> {
+        let pictures = [topics::CAMERA_COLOR.name, topics::CAMERA_DEPTH.name, topics::CAMERA_INFO.name];
+        let messages = ClipMessages::open(clip, &pictures)?;
+        Ok(Self::start(move |opened, stop| {
+            let node = match Node::open("rt_bridge_camera") {
+                Ok(node) => node,
+                Err(e) => return answer(&opened, Err(e)),
+            };
+            answer(&opened, Ok(()));
+            complain(replay::show(&node, messages, &clock, stop));
+        })?)
+    }
+
+    /// Starts the thread and waits until it says whether its topics are open: iceoryx2's ports belong to the thread that
+    /// makes them.
+    fn start(
+        body: impl FnOnce(Sender<Result<(), TransportError>>, &AtomicBool) + Send + 'static,
+    ) -> Result<Self, TransportError> {
+        let stop = Arc::new(AtomicBool::new(false));
+        let (opened, wait) = mpsc::channel();
+        let told = stop.clone();
+        let body = move || body(opened, &told);
+        let handle = thread::Builder::new().name("camera".into()).spawn(body).expect("threads can be made");
+        let camera = Self { stop, handle: Some(handle) };
+        wait.recv().expect("the camera answers before it ends")?;
+        Ok(camera)
+    }
+}
+
+impl Drop for Camera {
+    fn drop(&mut self) {
+        self.stop.store(true, Ordering::Relaxed);
+        if let Some(handle) = self.handle.take() {
+            let _panicked = handle.join();
+        }
+    }
+}
+
+fn answer(opened: &Sender<Result<(), TransportError>>, outcome: Result<(), TransportError>) {
+    // The starter waits for this; it cannot be gone.
+    let _gone = opened.send(outcome);
+}
+
+fn complain(outcome: Result<(), TransportError>) {
+    if let Err(e) = outcome {
+        tracing::error!("the camera stopped: {e}");
+    }
+}

@@ -1,0 +1,80 @@
+//! A whole run of the program on the simulated cell: what it records can be read and replayed, a second bridge is refused,
+//! and Ctrl-C ends it in order. Each test has its own domain of shared memory.
+#![allow(missing_docs)]
+
+use rt_bridge::rt::process::ask_to_end;
+use serde_json::Value;
+use shared_mem::recording::{ClipMessages, Payload, read_arm_states};
+use std::path::Path;
+use std::process::{Child, Command, Output, Stdio};
+use std::time::Duration;
+
+const CELL: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../config/fr3_cell.toml");
+
+fn start(domain: &str, arguments: &[&str]) -> Child {
+    Command::new(env!("CARGO_BIN_EXE_rt_bridge"))
+        .env("TWINALIGN_DOMAIN", format!("{domain}{}", std::process::id()))
+        .args(["run", "--cell", CELL, "--realtime", "ignore", "--json"])
+        .args(arguments)
+        .stdin(Stdio::null())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("the program starts")
+}
+
+fn end(child: Child) -> (Output, Value) {
+    let output = child.wait_with_output().expect("the program ends");
+    let answer = serde_json::from_slice(&output.stdout).unwrap_or(Value::Null);
+    (output, answer)
+}
+
+fn said(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+fn replay(clip: &Path) {
+    let (output, answer) = end(start("replay", &["--arm", &format!("replay://{}", clip.display())]));
+    assert!(output.status.success(), "{}", said(&output));
+    assert!(answer["cycles"].as_u64() > Some(1000), "{answer}");
+}
+
+#[test]
+fn what_was_recorded_holds_every_cycle_pictures_and_poses_and_can_be_replayed() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let clip = folder.path().join("clip.mcap");
+    let arguments = ["--arm", "sim", "--duration", "2", "--record", clip.to_str().expect("a path")];
+    let (output, answer) = end(start("record", &arguments));
+    assert!(output.status.success(), "{}", said(&output));
+    assert_eq!(answer["recorded"]["lost"], 0, "{answer}");
+    let states = read_arm_states(&clip).expect("a clip");
+    assert!(states.len() as u64 == answer["cycles"], "{} states of {answer}", states.len());
+    assert!(states.windows(2).all(|pair| pair[1].cycle == pair[0].cycle + 1));
+    // The arm holds its pose: where it was told to be, within the sag of its gains.
+    assert!(states.iter().all(|s| (0..7).all(|j| (s.q[j] - s.q_d[j]).abs() < 1e-3)));
+    let count = |wanted: fn(&Payload) -> bool| {
+        let messages = ClipMessages::open(&clip, &[]).expect("a clip");
+        messages.filter(|m| m.as_ref().is_ok_and(|m| wanted(&m.payload))).count()
+    };
+    assert!(count(|p| matches!(p, Payload::Picture(_))) > 20);
+    assert!(count(|p| matches!(p, Payload::ObjectPose(_))) > 20);
+    assert!(count(|p| matches!(p, Payload::CameraInfo(_))) > 0);
+    replay(&clip);
+}
+
+#[test]
+fn a_second_bridge_is_refused_in_one_line_and_the_first_goes_on() {
+    let first = start("second", &["--arm", "sim", "--camera", "off"]);
+    std::thread::sleep(Duration::from_millis(800));
+    let (output, _) = end(start("second", &["--arm", "sim", "--camera", "off", "--duration", "1"]));
+    assert_eq!(output.status.code(), Some(1));
+    assert!(
+        said(&output).contains("another rt_bridge is running; stop it, or set TWINALIGN_DOMAIN"),
+        "{}",
+        said(&output)
+    );
+    ask_to_end(first.id()).expect("it still runs");
+    let (output, answer) = end(first);
+    assert!(output.status.success(), "{}", said(&output));
+    assert!(answer["cycles"].as_u64() > Some(500), "{answer}");
+}
