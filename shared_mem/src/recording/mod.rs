@@ -23,6 +23,7 @@ mod cdr;
 mod checks;
 mod clip;
 mod container;
+mod device_clock;
 mod error;
 mod joint_log;
 mod messages;

@@ -1,9 +1,10 @@
-//! An own recording as a clip: joints from `/arm/state`, poses from `/object/pose`. Stamps are the monotonic clock of
-//! the machine that recorded.
+//! An own recording as a clip: joints from `/arm/state`, poses from `/object/pose`. Stamps begin at the monotonic clock
+//! of the machine that recorded and go on by the robot's clock; a pose is stamped with its picture's time.
 
 use super::checks;
 use super::clip::{Clip, numbered_joints};
 use super::container::Messages;
+use super::device_clock::DeviceClock;
 use super::error::ReadError;
 use super::messages::decode;
 use super::series::JointSeries;
@@ -60,6 +61,16 @@ impl Rows {
             series.tau.extend(tau.iter().take(dof));
         }
     }
+
+    fn use_device_clock(&mut self) -> DeviceClock {
+        let clock = DeviceClock::new(&self.measured.stamps_ns, &self.device_ns);
+        if let Some(stamps_ns) = clock.stamps() {
+            for series in [&mut self.measured, &mut self.desired] {
+                series.stamps_ns = stamps_ns.to_vec();
+            }
+        }
+        clock
+    }
 }
 
 /// Reads an own clip.
@@ -90,6 +101,12 @@ pub(super) fn read<R: Read + Seek>(
     }
     if kind != ClipKind::Excitation && poses.is_empty() {
         return Err(missing(path, ObjectPose::TOPIC, &messages.present()));
+    }
+    let clock = rows.use_device_clock();
+    // A pose is stamped when it became known, one camera latency after its picture.
+    let latency_ns = cell.camera.as_ref().map_or(0, |camera| (camera.latency * 1e9) as u64);
+    for (stamp_ns, _) in &mut poses {
+        *stamp_ns = clock.map(stamp_ns.saturating_sub(latency_ns));
     }
     take_joints(path, cell, rows, &mut clip)?;
     let fail = |what| ReadError::content(path, ObjectPose::TOPIC, what);

@@ -4,7 +4,7 @@ use super::object_start::{self, Motion};
 use super::report::{ClipGap, Gap};
 use crate::arm::{ArmModel, ControlLaw, GainError, JointState, ModelError};
 use crate::metrics::{SurfacePoints, joint_rms};
-use crate::rollout::{ArmRollout, CommandTrack, between, start_state};
+use crate::rollout::{ArmRollout, CommandTrack, between};
 use crate::scene::{MeshFileError, ObjectModel};
 use crate::sim::{Drive, PERIOD_NS, SimCell, SimError};
 use nalgebra::Vector3;
@@ -148,20 +148,16 @@ impl Replayer {
     }
 
     fn arm_alone(&self, clip: &Clip) -> Result<Prediction, ReplayError> {
-        let (arm, law) = self.arm.as_ref().ok_or_else(|| ReplayError::NoArm(name(clip)))?;
-        let (start, commands) = arm_inputs(clip)?;
+        let (rollout, start, commands) = self.arm_inputs(clip)?;
         let stamps = &clip.measured.stamps_ns;
         let mut joints = vec![JointState::default(); stamps.len()];
-        ArmRollout { arm, nominal: arm, law }.run(&start, stamps[0], &commands, stamps, &mut joints);
+        rollout.run(&start, stamps[0], &commands, stamps, &mut joints);
         Ok(Prediction { joints, ..Prediction::default() })
     }
 
     fn arm_and_object(&self, clip: &Clip) -> Result<Prediction, ReplayError> {
-        if self.arm.is_none() {
-            return Err(ReplayError::NoArm(name(clip)));
-        }
+        let (_, start, commands) = self.arm_inputs(clip)?;
         let (object, _) = self.object.as_ref().ok_or_else(|| ReplayError::NoObject(name(clip)))?;
-        let (start, commands) = arm_inputs(clip)?;
         let mut cell = SimCell::new(&self.cell, self.theta.as_ref())?;
         cell.set_arm(&start.q, &start.dq);
         let resting = object_start::resting(&clip.object, object, &self.cell)
@@ -175,6 +171,17 @@ impl Replayer {
         }
         let contact_time = run.cell.first_contact_ns().map(|ns| ns as f64 * 1e-9);
         Ok(Prediction { joints: run.joints, object: run.object, contact_time })
+    }
+
+    fn arm_inputs(&self, clip: &Clip) -> Result<(ArmRollout<'_>, JointState, CommandTrack), ReplayError> {
+        let (arm, law) = self.arm.as_ref().ok_or_else(|| ReplayError::NoArm(name(clip)))?;
+        let commands =
+            CommandTrack::new(&clip.desired).ok_or_else(|| ReplayError::TooShort(name(clip), "no commands"))?;
+        let rollout = ArmRollout { arm, nominal: arm, law };
+        let start = rollout
+            .start_state(&clip.measured, &commands)
+            .ok_or_else(|| ReplayError::TooShort(name(clip), "no measured joints"))?;
+        Ok((rollout, start, commands))
     }
 
     fn object_alone(&self, clip: &Clip) -> Result<Prediction, ReplayError> {
@@ -271,12 +278,6 @@ impl<'a> CellRun<'a> {
     fn joint_state(&self) -> JointState {
         JointState { q: self.cell.q(), dq: self.cell.dq() }
     }
-}
-
-fn arm_inputs(clip: &Clip) -> Result<(JointState, CommandTrack), ReplayError> {
-    let start = start_state(&clip.measured).ok_or_else(|| ReplayError::TooShort(name(clip), "no measured joints"))?;
-    let commands = CommandTrack::new(&clip.desired).ok_or_else(|| ReplayError::TooShort(name(clip), "no commands"))?;
-    Ok((start, commands))
 }
 
 fn name(clip: &Clip) -> String {

@@ -29,8 +29,9 @@ pub fn write_clip(path: &Path, replayer: &Replayer, clip: &Clip, prediction: &Pr
         program: concat!("twin ", env!("CARGO_PKG_VERSION"), " replay").to_owned(),
     };
     let mut writer = ClipWriter::create(path, &info)?;
-    let mut simulated = Simulated { writer: &mut writer, replayer, clip, prediction, offset_ns: offset(clip), pose: 0 };
-    simulated.write()?;
+    let latency_ns = replayer.cell().camera.as_ref().map_or(0, |camera| (camera.latency * 1e9) as u64);
+    let offset_ns = offset(clip);
+    Simulated { writer: &mut writer, replayer, clip, prediction, offset_ns, latency_ns, pose: 0 }.write()?;
     writer.finish()?;
     Ok(())
 }
@@ -47,6 +48,8 @@ struct Simulated<'a> {
     clip: &'a Clip,
     prediction: &'a Prediction,
     offset_ns: i64,
+    /// A pose becomes known one camera latency after its picture, and own clips stamp it then [ns].
+    latency_ns: u64,
     /// Recorded poses written so far.
     pose: usize,
 }
@@ -70,7 +73,7 @@ impl Simulated<'_> {
         while let Some(recorded_ns) = self.clip.object.stamps_ns.get(self.pose).filter(|stamp| **stamp <= until_ns) {
             let pose = &self.clip.object.poses[self.pose];
             let message = ObjectPose {
-                stamp_ns: self.stamp(*recorded_ns),
+                stamp_ns: self.stamp(*recorded_ns) + self.latency_ns,
                 device_ns: *recorded_ns,
                 sequence: self.pose as u64,
                 position: pose.position(),

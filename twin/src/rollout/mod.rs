@@ -10,7 +10,6 @@ mod commands;
 mod start;
 
 pub use commands::CommandTrack;
-pub use start::start_state;
 
 use crate::arm::{ArmModel, ControlLaw, JointState, Joints, MAX_JOINTS};
 

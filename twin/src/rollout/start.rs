@@ -1,35 +1,60 @@
 //! The state an arm was in when its recording begins, from noisy rows.
 
-use crate::arm::JointState;
+use super::{ArmRollout, CommandTrack};
+use crate::arm::{JointState, MAX_JOINTS};
 use shared_mem::msg::joints_from;
 use shared_mem::recording::JointSeries;
 
 /// Rows within this time of the first one count [ns]: long enough to average noise, short against a joint's response.
 const WINDOW_NS: u64 = 20_000_000;
+/// With fewer rows in the window a resolver's steps would pass for velocity, and the logged velocity is better.
+const ENOUGH_ROWS: usize = 10;
+/// Each pass corrects the start by what the pass before left over; three leave less than 1e-7 rad.
+const PASSES: usize = 3;
 
-/// Position of the first row; velocity at it by a straight line through the velocities of the first 20 ms, or through
-/// the positions where no velocities were logged. `None` when the series is empty.
-#[must_use]
-pub fn start_state(measured: &JointSeries) -> Option<JointState> {
-    let first = *measured.stamps_ns.first()?;
-    let rows = measured.stamps_ns.iter().take_while(|stamp| **stamp - first <= WINDOW_NS).count();
-    let seconds = |i: usize| (measured.stamps_ns[i] - first) as f64 * 1e-9;
-    let mut state = JointState::at_rest(joints_from(measured.q_row(0)));
-    for (joint, dq) in state.dq.iter_mut().enumerate().take(measured.dof) {
-        let logged = (0..rows).map(|i| measured.dq_row(i).map(|row| (seconds(i), row[joint])));
-        *dq = match logged.collect::<Option<Vec<_>>>() {
-            Some(velocities) => line(&velocities).0,
-            None => {
-                line(
-                    &(0..rows.max(2).min(measured.len()))
-                        .map(|i| (seconds(i), measured.q_row(i)[joint]))
-                        .collect::<Vec<_>>(),
-                )
-                .1
+impl ArmRollout<'_> {
+    /// Where the arm was and how fast when `measured` begins; `None` when the series is empty.
+    ///
+    /// A first guess, the first row, is simulated for 20 ms; the straight line through what the measurement is ahead of
+    /// the simulation corrects position and velocity. So a motion that sets off within these 20 ms does not pass for
+    /// initial velocity.
+    #[must_use]
+    pub fn start_state(&self, measured: &JointSeries, commands: &CommandTrack) -> Option<JointState> {
+        let first = *measured.stamps_ns.first()?;
+        let rows = measured.stamps_ns.iter().take_while(|stamp| **stamp - first <= WINDOW_NS).count();
+        let stamps_ns = &measured.stamps_ns[..rows];
+        let mut start = first_guess(measured);
+        if rows < ENOUGH_ROWS {
+            return Some(start);
+        }
+        let mut simulated = vec![JointState::default(); rows];
+        for _ in 0..PASSES {
+            self.run(&start, first, commands, stamps_ns, &mut simulated);
+            for joint in 0..measured.dof.min(MAX_JOINTS) {
+                let ahead = simulated.iter().zip(stamps_ns).enumerate().map(|(row, (state, stamp))| {
+                    ((stamp - first) as f64 * 1e-9, measured.q_row(row)[joint] - state.q[joint])
+                });
+                let (position, velocity) = line(&ahead.collect::<Vec<_>>());
+                start.q[joint] += position;
+                start.dq[joint] += velocity;
             }
-        };
+        }
+        Some(start)
     }
-    Some(state)
+}
+
+/// The first row; where no velocities were logged, the slope to the second one.
+fn first_guess(measured: &JointSeries) -> JointState {
+    let mut state = JointState::at_rest(joints_from(measured.q_row(0)));
+    if let Some(dq) = measured.dq_row(0) {
+        state.dq = joints_from(dq);
+    } else if let [a, b, ..] = measured.stamps_ns[..] {
+        let dt = (b - a) as f64 * 1e-9;
+        for (joint, dq) in state.dq.iter_mut().enumerate().take(measured.dof) {
+            *dq = (measured.q_row(1)[joint] - measured.q_row(0)[joint]) / dt;
+        }
+    }
+    state
 }
 
 /// Value at 0 and slope of the straight line through points `(t, y)`; slope 0 through a single one.
