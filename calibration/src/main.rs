@@ -65,6 +65,9 @@ struct ExcitationArguments {
     /// Arm for the bridge that is started when none runs: sim or fci://HOST [default: sim].
     #[arg(long)]
     arm: Option<String>,
+    /// Whether that bridge refuses to run without real-time guarantees: enforce or ignore [default: the bridge's own].
+    #[arg(long, value_parser = ["enforce", "ignore"])]
+    realtime: Option<String>,
     /// Length of each clip's motion [s], 2 to 600.
     #[arg(long, value_name = "S", default_value_t = 8.0, value_parser = between::<2, 600, 1>)]
     duration: f64,
@@ -133,8 +136,8 @@ fn run(verb: Verb) -> anyhow::Result<()> {
 }
 
 fn capture(arguments: ExcitationArguments, interrupt: &Interrupt) -> anyhow::Result<()> {
-    let ExcitationArguments { cell, clips, out, arm, duration, amplitude, seed, json } = arguments;
-    let options = excitation::Options { cell, clips, out, arm, duration, amplitude, seed, domain: None };
+    let ExcitationArguments { cell, clips, out, arm, realtime, duration, amplitude, seed, json } = arguments;
+    let options = excitation::Options { cell, clips, out, arm, realtime, duration, amplitude, seed, domain: None };
     let summary = excitation::capture(&options, interrupt, &mut String::new)?;
     let kept = summary.clips.iter().filter(|clip| clip.kept).count();
     eprintln!("{}: {kept} of {} clips kept", summary.session.display(), options.clips);

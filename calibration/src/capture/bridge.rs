@@ -30,6 +30,19 @@ pub enum BridgeError {
     Interrupted,
 }
 
+/// Which bridge to start where none runs.
+#[derive(Debug, Clone, Copy)]
+pub struct Wanted<'a> {
+    /// cell.toml.
+    pub cell: &'a Path,
+    /// The arm; default: the simulated one.
+    pub arm: Option<&'a str>,
+    /// Whether it insists on real time; default: its own.
+    pub realtime: Option<&'a str>,
+    /// Shared-memory domain; default: the one this process was started in.
+    pub domain: Option<&'a str>,
+}
+
 /// The bridge of one capture.
 #[derive(Debug)]
 pub struct Bridge {
@@ -37,27 +50,23 @@ pub struct Bridge {
 }
 
 impl Bridge {
-    /// Uses the bridge that runs in `domain`, else starts one on `arm` (default: the simulated one). Says which on stderr.
+    /// Uses the bridge that runs, else starts one as `wanted`. Says which on stderr.
     ///
     /// # Errors
     /// [`BridgeError`] with the remedy.
-    pub fn find_or_start(
-        link: &mut Link,
-        cell: &Path,
-        arm: Option<&str>,
-        domain: Option<&str>,
-        interrupt: &Interrupt,
-    ) -> Result<Self, BridgeError> {
+    pub fn find_or_start(link: &mut Link, wanted: &Wanted, interrupt: &Interrupt) -> Result<Self, BridgeError> {
         if link.wait_for_bridge(LOOK, || interrupt.asked())?.is_some() {
-            match arm {
+            match wanted.arm {
                 Some(arm) => eprintln!("using the bridge that is running; --arm {arm} has no effect"),
                 None => eprintln!("using the bridge that is running"),
             }
             return Ok(Self { started: None });
         }
-        let arm = arm.unwrap_or(DEFAULT_ARM);
+        let arm = wanted.arm.unwrap_or(DEFAULT_ARM);
         eprintln!("no bridge is running: starting `rt_bridge run --arm {arm}` for this capture");
-        let started = Running::start(Program::Bridge, &arguments([&"run", &"--cell", &cell, &"--arm", &arm]), domain)?;
+        let mut list = arguments([&"run", &"--cell", &wanted.cell, &"--arm", &arm]);
+        list.extend(wanted.realtime.into_iter().flat_map(|way| arguments([&"--realtime", &way])));
+        let started = Running::start(Program::Bridge, &list, wanted.domain)?;
         let mut bridge = Self { started: Some(started) };
         bridge.wait_until_alive(link, interrupt)?;
         Ok(bridge)

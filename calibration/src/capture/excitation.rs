@@ -1,7 +1,7 @@
 //! The verb `capture excitation`: for each clip plan, record, play, judge, enter into the session.
 
 use super::body::Body;
-use super::bridge::Bridge;
+use super::bridge::{Bridge, Wanted};
 use super::limits::{self, JointLimits};
 use super::link::Link;
 use super::plan::{Plan, RATE, Request, plan};
@@ -11,7 +11,6 @@ use super::session::Session;
 use super::stream::{Outcome, play};
 use crate::interrupt::Interrupt;
 use crate::progress::Progress;
-use anyhow::Context as _;
 use serde::Serialize;
 use shared_mem::cell::{Cell, ClipKind};
 use std::path::{Path, PathBuf};
@@ -30,6 +29,8 @@ pub struct Options {
     pub out: PathBuf,
     /// Arm of a bridge that has to be started, as `rt_bridge run --arm` takes it.
     pub arm: Option<String>,
+    /// Whether that bridge insists on real time, as `rt_bridge run --realtime` takes it; default: the bridge's own.
+    pub realtime: Option<String>,
     /// Length of a clip's motion [s].
     pub duration: f64,
     /// Largest excursion of each joint [rad].
@@ -83,7 +84,9 @@ pub fn capture(options: &Options, interrupt: &Interrupt, note: &mut dyn FnMut() 
     let session = Session::open(&options.out, &cell)?;
     let domain = options.domain.as_deref();
     let mut link = Link::open(domain)?;
-    let mut bridge = Bridge::find_or_start(&mut link, &options.cell, options.arm.as_deref(), domain, interrupt)?;
+    let wanted =
+        Wanted { cell: &options.cell, arm: options.arm.as_deref(), realtime: options.realtime.as_deref(), domain };
+    let mut bridge = Bridge::find_or_start(&mut link, &wanted, interrupt)?;
     let mut desk = Desk { options, limits: limits::of(&cell, &body), body, floor: floor(&cell), session, interrupt };
     let mut clips = Vec::new();
     for count in 1..=options.clips {
@@ -137,10 +140,11 @@ impl Desk<'_> {
             recorder.finish()?;
             return Ok(None);
         }
-        let (outcome, quality) = self.play(link, &plan, title, note).with_context(|| kept_unfinished(&path))?;
+        let (outcome, quality) =
+            self.play(link, &plan, title, note).inspect_err(|_| eprintln!("{}", kept_unfinished(&path)))?;
         let recorded = recorder.finish()?;
         let why = match (outcome, &recorded.stopped, quality.verdict(plan.peak_speed)) {
-            (Outcome::Stopped, ..) => Some("ended by the user".to_owned()),
+            (Outcome::Stopped, ..) => Some("it was ended by the user".to_owned()),
             (Outcome::Done, Some(why), _) => Some(why.clone()),
             (Outcome::Done, None, Verdict::Repeat(why)) => Some(why),
             (Outcome::Done, None, Verdict::Keep) => None,
@@ -195,7 +199,10 @@ impl Desk<'_> {
 }
 
 fn kept_unfinished(path: &Path) -> String {
-    format!("{} is kept as far as it was recorded, but not entered into cell.toml", path.display())
+    format!(
+        "{}: the motion failed; the file stays as far as it goes, but is not entered into cell.toml",
+        path.display()
+    )
 }
 
 fn summary(file: PathBuf, why: Option<String>, plan: Plan, quality: Quality, recorded: &Recorded) -> ClipSummary {
@@ -210,7 +217,7 @@ impl ClipSummary {
         let Quality { lost_packets, peak_speed, tracking_error, .. } = self.quality;
         let verdict = match &self.why {
             None => "keep".to_owned(),
-            Some(why) => format!("repeat: {why} (the file stays, but is not entered into cell.toml)"),
+            Some(why) => format!("repeat, because {why}; the file stays, but is not entered into cell.toml"),
         };
         format!(
             "{}: peak speed {peak_speed:.2} rad/s, follows within {:.1} mrad, {lost_packets} packets lost, {:.1} MB: {verdict}",

@@ -139,6 +139,7 @@ fn record(options: &Options, files: &Files, interrupt: &Interrupt) -> anyhow::Re
         clips: options.clips,
         out: files.session.clone(),
         arm: None,
+        realtime: None,
         duration: DURATION,
         amplitude: AMPLITUDE,
         seed: options.seed,
@@ -164,14 +165,14 @@ fn compare(
     live: Vec<f64>,
     interrupt: &Interrupt,
 ) -> anyhow::Result<Story> {
-    let session = |truth| -> anyhow::Result<Replay> { replay(&files.session, &files.cell, truth, None, interrupt) };
+    let session = |truth| -> anyhow::Result<Replay> { replay(&files.session, truth, None, interrupt) };
     let truth = Some(files.hidden.as_path());
     let [before, after] = [session(None)?, session(truth)?].map(|replay| replay.mean.joint_rms_rad);
     let (joint, _) = worst(&before);
     let follow = |name: &str, truth| -> anyhow::Result<Trace> {
         let simulated = files.out.join(name);
-        replay(clip, &files.cell, truth, Some(&simulated), interrupt)?;
-        trace(clip, &simulated, joint)
+        replay(clip, truth, Some(&simulated), interrupt)?;
+        trace(&simulated, joint)
     };
     let by_cell = follow("twin_cell.mcap", None)?;
     let by_truth = follow("twin_true.mcap", truth)?;

@@ -4,9 +4,9 @@ use crate::interrupt::Interrupt;
 use crate::processes::{Program, Running, arguments};
 use anyhow::{Context as _, ensure};
 use serde::Deserialize;
-use shared_mem::recording::{ClipMessages, Payload, read_arm_states};
-use shared_mem::topics::TWIN_STATE;
-use std::collections::HashMap;
+use shared_mem::recording::{ClipMessages, Payload};
+use shared_mem::time::seconds_between;
+use shared_mem::topics::{ARM_STATE, TWIN_GAP};
 use std::path::Path;
 use std::time::Duration;
 
@@ -42,12 +42,11 @@ pub(super) struct Trace {
 /// When `twin replay` fails or answers something else than agreed.
 pub(super) fn replay(
     what: &Path,
-    cell: &Path,
     parameters: Option<&Path>,
     out: Option<&Path>,
     interrupt: &Interrupt,
 ) -> anyhow::Result<Replay> {
-    let mut list = arguments([&"replay", &what, &"--cell", &cell, &"--json"]);
+    let mut list = arguments([&"replay", &what, &"--json"]);
     for (flag, path) in [("--parameters", parameters), ("--out", out)] {
         list.extend(path.into_iter().flat_map(|path| arguments([&flag, &path])));
     }
@@ -55,31 +54,24 @@ pub(super) fn replay(
     serde_json::from_str(&answer).with_context(|| format!("`twin replay --json` answered {answer:?}"))
 }
 
-/// The path of `joint` in `clip`, and the twin's in `simulated`, the clip that `twin replay --out` wrote.
+/// The path of `joint` and the twin's distance from it, out of a clip that `twin replay --out` wrote.
 ///
 /// # Errors
-/// When a file cannot be read, or the two have no moment in common.
-pub(super) fn trace(clip: &Path, simulated: &Path, joint: usize) -> anyhow::Result<Trace> {
-    let states = read_arm_states(clip)?;
-    let mut twin = HashMap::new();
-    for message in ClipMessages::open(simulated, &[TWIN_STATE.name])? {
-        if let Payload::TwinState(state) = message?.payload {
-            twin.insert(state.mirrors_ns, state.q[joint]);
-        }
-    }
-    let first = states.first().map_or(0, |state| state.stamp_ns);
+/// When the file cannot be read or holds no gap.
+pub(super) fn trace(simulated: &Path, joint: usize) -> anyhow::Result<Trace> {
     let mut trace = Trace { real: Vec::new(), error: Vec::new() };
-    for state in &states {
-        let t = (state.stamp_ns - first) as f64 * 1e-9;
-        trace.real.push([t, state.q[joint]]);
-        if let Some(predicted) = twin.get(&state.stamp_ns) {
-            trace.error.push([t, predicted - state.q[joint]]);
+    let mut first = None;
+    let mut seconds = |stamp_ns| seconds_between(*first.get_or_insert(stamp_ns), stamp_ns);
+    for message in ClipMessages::open(simulated, &[ARM_STATE.name, TWIN_GAP.name])? {
+        match message?.payload {
+            Payload::ArmState(state) => trace.real.push([seconds(state.stamp_ns), state.q[joint]]),
+            Payload::TwinGap(gap) => trace.error.push([seconds(gap.stamp_ns), gap.joint_error[joint]]),
+            _ => {}
         }
     }
     ensure!(
-        !trace.error.is_empty(),
-        "{} and {} have no moment in common; both must come from one clip",
-        clip.display(),
+        !trace.error.is_empty() && !trace.real.is_empty(),
+        "{} holds no gap between robot and twin; build all programs from the same version",
         simulated.display()
     );
     Ok(trace)

@@ -37,8 +37,9 @@ impl Stage {
     /// When a program is missing, ends, or the twin does not begin to shadow; the line holds its last words.
     pub(super) fn start(cell: &Path, hidden: &Path, domain: &str, interrupt: &Interrupt) -> anyhow::Result<Self> {
         let run = [&"run" as &dyn AsRef<std::ffi::OsStr>, &"--cell", &cell, &"--arm", &"sim", &"--camera", &"sim"];
+        // The robot's own controller, whose gains are the hidden ones, and not the bridge's, which follows cell.toml.
         let mut list = arguments(run);
-        list.extend(arguments([&"--parameters", &hidden, &"--realtime", &"ignore", &"--json"]));
+        list.extend(arguments([&"--parameters", &hidden, &"--controller", &"joint_impedance", &"--json"]));
         let bridge = Running::start(Program::Bridge, &list, Some(domain))?;
         let twin = Running::start(Program::Twin, &arguments([&"shadow", &"--cell", &cell, &"--json"]), Some(domain))?;
         let mut stage = Self { twin, bridge, gap: LiveGap::open(domain)? };
