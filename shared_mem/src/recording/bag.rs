@@ -47,35 +47,10 @@ pub(super) fn read<R: Read + Seek>(
     let mut clip = Clip::empty(path, kind);
     clip.damage = messages.damage().summary();
     if needs_arm || !collected.measured.is_empty() {
-        let missing = |topic: &str, role, key| ReadError::Topic {
-            path: path.to_owned(),
-            topic: topic.to_owned(),
-            role,
-            key,
-            present: present.clone(),
-        };
-        if collected.measured.is_empty() {
-            return Err(missing(&topics.measured, "measured joints", "measured"));
-        }
-        if collected.desired.is_empty() {
-            return Err(missing(&topics.desired, "desired joints", "desired"));
-        }
-        let measured = NamedLog { topic: &topics.measured, log: std::mem::take(&mut collected.measured) };
-        let desired = NamedLog { topic: &topics.desired, log: std::mem::take(&mut collected.desired) };
-        let joints = clip::joints(path, measured, desired, &clip::wanted_joints(cell))?;
-        clip.joint_names = joints.names;
-        clip.measured = joints.measured;
-        clip.desired = joints.desired;
-        clip.warnings.extend(joints.warnings);
+        collected.joints(&present, cell, &mut clip)?;
     }
     if kind != ClipKind::Excitation && collected.poses.is_empty() {
-        return Err(ReadError::Topic {
-            path: path.to_owned(),
-            topic: topics.object_pose.clone(),
-            role: "object poses",
-            key: "object_pose",
-            present,
-        });
+        return Err(missing(path, &topics.object_pose, ("object poses", "object_pose"), &present));
     }
     let base_frame = cell.robot.as_ref().and_then(|robot| robot.base_frame.as_deref());
     clip.object = collected.object(path, &topics.object_pose, base_frame, &mut clip.warnings)?;
@@ -102,6 +77,25 @@ impl Collected {
             }
             self.poses.push((pose.stamp_ns, Pose::from_parts(pose.position, pose.wxyz)));
         }
+        Ok(())
+    }
+
+    /// Puts the rows of the two joint topics into `clip`.
+    fn joints(&mut self, present: &str, cell: &Cell, clip: &mut Clip) -> Result<(), ReadError> {
+        let (path, topics) = (clip.file.clone(), &cell.topics);
+        if self.measured.is_empty() {
+            return Err(missing(&path, &topics.measured, ("measured joints", "measured"), present));
+        }
+        if self.desired.is_empty() {
+            return Err(missing(&path, &topics.desired, ("desired joints", "desired"), present));
+        }
+        let measured = NamedLog { topic: &topics.measured, log: std::mem::take(&mut self.measured) };
+        let desired = NamedLog { topic: &topics.desired, log: std::mem::take(&mut self.desired) };
+        let joints = clip::joints(&path, measured, desired, &clip::wanted_joints(cell))?;
+        clip.joint_names = joints.names;
+        clip.measured = joints.measured;
+        clip.desired = joints.desired;
+        clip.warnings.extend(joints.warnings);
         Ok(())
     }
 
@@ -132,6 +126,11 @@ impl Collected {
         warnings.extend(found);
         Ok(series)
     }
+}
+
+/// A topic that is not there: what it should hold, and the key of `[topics]` that names it.
+fn missing(path: &Path, topic: &str, (role, key): (&'static str, &'static str), present: &str) -> ReadError {
+    ReadError::Topic { path: path.to_owned(), topic: topic.to_owned(), role, key, present: present.to_owned() }
 }
 
 fn expect_type(message: &Message<'_>, wanted: &[&str]) -> Result<(), String> {

@@ -31,8 +31,8 @@ pub(super) struct CdrReader<'a> {
 impl<'a> CdrReader<'a> {
     /// Starts behind the four bytes that name the encoding.
     pub(super) fn new(message: &'a [u8]) -> Result<Self, CdrError> {
-        let (header, payload) = message.split_first_chunk::<4>().ok_or(CdrError::Short(message.len()))?;
-        let encoding = u16::from_be_bytes([header[0], header[1]]);
+        let (&[first, second, ..], payload) = message.split_first_chunk::<4>().ok_or(CdrError::Short(message.len()))?;
+        let encoding = u16::from_be_bytes([first, second]);
         let (big_endian, largest_alignment) = match encoding {
             0x0000 => (true, 8),
             0x0001 => (false, 8),
