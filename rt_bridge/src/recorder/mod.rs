@@ -88,7 +88,7 @@ pub enum RecordError {
 /// reported, with the reason in `stopped`.
 pub fn record(settings: &Settings, stop: &AtomicBool) -> Result<Recorded, RecordError> {
     let out = &settings.out;
-    if let Room::TooLittleToStart { megabytes } = room(out) {
+    if let Room::TooLittleToStart { megabytes } | Room::TooLittleToGoOn { megabytes } = room(out) {
         return Err(RecordError::NoRoom { path: out.clone(), megabytes });
     }
     let node = Node::open("rt_bridge_recorder")?;
