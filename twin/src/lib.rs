@@ -1,6 +1,7 @@
 //! The cell in simulation: arm, contact, sensors, live shadow, replay.
 
 pub mod arm;
+pub mod effects;
 pub mod metrics;
 pub mod physics;
 pub mod render;

@@ -14,6 +14,7 @@
 //! | `dynamics` | gravity, Coriolis, mass matrix, accelerations |
 //! | `control` | [`ControlLaw`]: from command to torque |
 //! | `step` | integration over time |
+//! | `transmission` | the same with friction, yielding and play between motor and link |
 //! | `kernel`, `spatial` | the arithmetic below |
 
 mod control;
@@ -25,6 +26,7 @@ mod kinematics;
 mod model;
 mod spatial;
 mod step;
+mod transmission;
 mod urdf;
 
 pub use control::{ControlLaw, GainError};
@@ -33,6 +35,7 @@ pub use inertia::MassProperties;
 pub use kinematics::Jacobian;
 pub use model::{ArmModel, ModelError};
 pub use shared_mem::msg::{Joints, MAX_JOINTS};
+pub use transmission::{Spring, Transmission};
 
 /// Positions and velocities of all joints.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]

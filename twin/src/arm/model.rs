@@ -187,6 +187,19 @@ impl ArmModel {
         last.body = last.body.plus(&TenParameters::from_properties(&body.seen_from(&self.flange)));
     }
 
+    /// Adds to the rotor inertia seen at each joint [kg m²]; what would be negative becomes 0.
+    pub fn add_rotor_inertia(&mut self, more: &Joints) {
+        for (link, more) in self.links.iter_mut().zip(more).take(self.dof) {
+            link.rotor = (link.rotor + more).max(0.0);
+        }
+    }
+
+    /// Leans the base: `turn` is the rotation of the base frame against the level [rad].
+    pub fn lean_base(&mut self, turn: Vector3<f64>) {
+        let level = Rotation3::new(turn).inverse() * Vector3::from(self.gravity);
+        self.gravity = level.into();
+    }
+
     /// Number of joints.
     #[must_use]
     pub fn dof(&self) -> usize {

@@ -3,6 +3,7 @@
 use super::object_start::{self, Motion};
 use super::report::{ClipGap, Gap};
 use crate::arm::{ArmModel, ControlLaw, GainError, JointState, ModelError};
+use crate::effects::{CameraEffects, CameraMemory, EffectError, Effects};
 use crate::metrics::{SurfacePoints, joint_rms};
 use crate::rollout::{ArmRollout, CommandTrack, between};
 use crate::scene::{MeshFileError, ObjectModel};
@@ -11,7 +12,7 @@ use nalgebra::Vector3;
 use shared_mem::cell::{Cell, ClipKind};
 use shared_mem::frames::{Base, Object, Pose};
 use shared_mem::msg::MAX_JOINTS;
-use shared_mem::recording::{Clip, ReadError};
+use shared_mem::recording::{Clip, ObjectSeries, ReadError};
 use shared_mem::theta::Theta;
 
 /// The twin of a cell, ready to replay its clips.
@@ -20,6 +21,9 @@ pub struct Replayer {
     cell: Cell,
     theta: Option<Theta>,
     arm: Option<(ArmModel, ControlLaw)>,
+    /// The arm that moves, where it is another than the controller's.
+    real_arm: Option<ArmModel>,
+    effects: Effects,
     object: Option<(ObjectModel, SurfacePoints)>,
 }
 
@@ -46,6 +50,9 @@ pub enum ReplayError {
     /// Its controller.
     #[error(transparent)]
     Gains(#[from] GainError),
+    /// An effect.
+    #[error(transparent)]
+    Effect(#[from] EffectError),
     /// The object's mesh.
     #[error(transparent)]
     Mesh(#[from] MeshFileError),
@@ -74,9 +81,6 @@ impl Replayer {
     /// # Errors
     /// [`ReplayError`] naming key or file and the remedy; an effect in `theta` that this version does not know is one.
     pub fn new(cell: &Cell, theta: Option<&Theta>) -> Result<Self, ReplayError> {
-        if let Some(effect) = theta.and_then(|t| t.effects.first()) {
-            return Err(SimError::Effect(effect.name.clone()).into());
-        }
         let arm = match &cell.robot {
             None => None,
             Some(_) => {
@@ -90,7 +94,10 @@ impl Replayer {
             let surface = SurfacePoints::new(&model.shape);
             (model, surface)
         });
-        Ok(Self { cell: cell.clone(), theta: theta.cloned(), arm, object })
+        let dof = arm.as_ref().map_or(0, |(model, _)| model.dof());
+        let effects = Effects::from_theta(theta.map_or(&[], |t| &t.effects), dof)?;
+        let real_arm = arm.as_ref().filter(|_| !effects.arm.is_none()).map(|(model, _)| effects.arm.real_arm(model));
+        Ok(Self { cell: cell.clone(), theta: theta.cloned(), arm, real_arm, effects, object })
     }
 
     /// What is known about the cell.
@@ -160,10 +167,10 @@ impl Replayer {
         let (object, _) = self.object.as_ref().ok_or_else(|| ReplayError::NoObject(name(clip)))?;
         let mut cell = SimCell::new(&self.cell, self.theta.as_ref())?;
         cell.set_arm(&start.q, &start.dq);
-        let resting = object_start::resting(&clip.object, object, &self.cell)
+        let resting = object_start::resting(&self.undistorted(&clip.object), object, &self.cell)
             .ok_or_else(|| ReplayError::TooShort(name(clip), "no object poses"))?;
         cell.set_object(&resting, Vector3::zeros(), Vector3::zeros());
-        let mut run = CellRun::new(cell, clip, clip.measured.stamps_ns[0]);
+        let mut run = CellRun::new(cell, clip, clip.measured.stamps_ns[0], &self.effects.camera);
         let mut row = 0;
         while run.unfinished() {
             row = commands.in_force(run.now_ns, row);
@@ -174,10 +181,14 @@ impl Replayer {
     }
 
     fn arm_inputs(&self, clip: &Clip) -> Result<(ArmRollout<'_>, JointState, CommandTrack), ReplayError> {
-        let (arm, law) = self.arm.as_ref().ok_or_else(|| ReplayError::NoArm(name(clip)))?;
+        let (nominal, law) = self.arm.as_ref().ok_or_else(|| ReplayError::NoArm(name(clip)))?;
+        let (arm, effects) = match &self.real_arm {
+            Some(real) => (real, Some(&self.effects.arm)),
+            None => (nominal, None),
+        };
         let commands =
             CommandTrack::new(&clip.desired).ok_or_else(|| ReplayError::TooShort(name(clip), "no commands"))?;
-        let rollout = ArmRollout { arm, nominal: arm, law };
+        let rollout = ArmRollout { arm, nominal, law, effects };
         let start = rollout
             .start_state(&clip.measured, &commands)
             .ok_or_else(|| ReplayError::TooShort(name(clip), "no measured joints"))?;
@@ -186,16 +197,28 @@ impl Replayer {
 
     fn object_alone(&self, clip: &Clip) -> Result<Prediction, ReplayError> {
         let (object, _) = self.object.as_ref().ok_or_else(|| ReplayError::NoObject(name(clip)))?;
-        let Motion { pose, velocity, angular_velocity } = object_start::moving(&clip.object, object, &self.cell)
-            .ok_or_else(|| ReplayError::TooShort(name(clip), "fewer than three object poses"))?;
+        let Motion { pose, velocity, angular_velocity } =
+            object_start::moving(&self.undistorted(&clip.object), object, &self.cell)
+                .ok_or_else(|| ReplayError::TooShort(name(clip), "fewer than three object poses"))?;
         let alone = Cell { robot: None, controller: None, tool: None, ..self.cell.clone() };
         let mut cell = SimCell::new(&alone, self.theta.as_ref())?;
         cell.set_object(&pose, velocity, angular_velocity);
-        let mut run = CellRun::new(cell, clip, clip.object.stamps_ns[0]);
+        let mut run = CellRun::new(cell, clip, clip.object.stamps_ns[0], &self.effects.camera);
         while run.unfinished() {
             run.period(&Drive::Torque { tau_J_d: [0.0; MAX_JOINTS] });
         }
         Ok(Prediction { object: run.object, ..Prediction::default() })
+    }
+
+    /// The poses as they were, under effects that report them elsewhere.
+    fn undistorted(&self, poses: &ObjectSeries) -> ObjectSeries {
+        let mut poses = poses.clone();
+        if !self.effects.camera.is_none() {
+            for pose in &mut poses.poses {
+                *pose = Pose::from_isometry(self.effects.camera.undistorted(&pose.isometry()));
+            }
+        }
+        poses
     }
 
     fn gap(&self, clip: &Clip, prediction: &Prediction) -> Gap {
@@ -223,15 +246,18 @@ struct CellRun<'a> {
     cell: SimCell,
     clip: &'a Clip,
     now_ns: u64,
+    camera: &'a CameraEffects,
+    reported: CameraMemory,
     joints: Vec<JointState>,
     object: Vec<Pose<Base, Object>>,
 }
 
 impl<'a> CellRun<'a> {
     /// Stamps up to the start get the start.
-    fn new(cell: SimCell, clip: &'a Clip, start_ns: u64) -> Self {
+    fn new(cell: SimCell, clip: &'a Clip, start_ns: u64, camera: &'a CameraEffects) -> Self {
         let (joints, object) = (Vec::with_capacity(clip.measured.len()), Vec::with_capacity(clip.object.len()));
-        let mut run = Self { cell, clip, now_ns: start_ns, joints, object };
+        let reported = CameraMemory::default();
+        let mut run = Self { cell, clip, now_ns: start_ns, camera, reported, joints, object };
         let (state, pose) = (run.joint_state(), run.cell.object());
         run.keep(start_ns, |_| state, |_| pose);
         run
@@ -246,7 +272,7 @@ impl<'a> CellRun<'a> {
         self.cell.step(drive);
         self.now_ns += PERIOD_NS;
         let (after, pose_after) = (self.joint_state(), self.cell.object());
-        let share = |stamp: u64| (stamp - start_ns) as f64 / PERIOD_NS as f64;
+        let share = |stamp: u64| stamp.saturating_sub(start_ns) as f64 / PERIOD_NS as f64;
         self.keep(
             start_ns + PERIOD_NS,
             |stamp| between(&before, &after, share(stamp)),
@@ -268,15 +294,16 @@ impl<'a> CellRun<'a> {
         while let Some(stamp) = measured.stamps_ns.get(self.joints.len()).filter(|s| **s <= until_ns) {
             self.joints.push(joints(*stamp));
         }
-        while let Some(pose) =
-            poses.stamps_ns.get(self.object.len()).filter(|s| **s <= until_ns).and_then(|s| object(*s))
+        let latency = self.camera.latency_ns();
+        while let Some(stamp) = poses.stamps_ns.get(self.object.len()).filter(|s| s.saturating_sub(latency) <= until_ns)
         {
-            self.object.push(pose);
+            let Some(pose) = object(stamp.saturating_sub(latency)) else { break };
+            self.object.push(self.camera.seen(&mut self.reported, *stamp, pose));
         }
     }
 
     fn joint_state(&self) -> JointState {
-        JointState { q: self.cell.q(), dq: self.cell.dq() }
+        self.cell.joint_reading()
     }
 }
 

@@ -12,6 +12,7 @@ mod start;
 pub use commands::CommandTrack;
 
 use crate::arm::{ArmModel, ControlLaw, JointState, Joints, MAX_JOINTS};
+use crate::effects::{ArmEffects, ArmMemory};
 
 /// Period of the controller [ns].
 pub const TICK_NS: u64 = 1_000_000;
@@ -27,12 +28,15 @@ pub struct ArmRollout<'a> {
     pub nominal: &'a ArmModel,
     /// The controller.
     pub law: &'a ControlLaw,
+    /// What acts besides; `arm` is then the real arm that they make of `nominal`.
+    pub effects: Option<&'a ArmEffects>,
 }
 
 impl ArmRollout<'_> {
     /// Simulates from `start` at `start_ns` and writes the state at each of the ascending stamps `at_ns` into `out`.
     ///
-    /// A stamp before `start_ns` gets the start. Stops when the shorter of `at_ns` and `out` is filled.
+    /// States are what the encoders read, the start's too. Commands from before `start_ns` are taken into account where
+    /// the command comes late. A stamp before `start_ns` gets the start. Stops when the shorter of `at_ns` and `out` is filled.
     pub fn run(
         &self,
         start: &JointState,
@@ -40,6 +44,34 @@ impl ArmRollout<'_> {
         commands: &CommandTrack,
         at_ns: &[u64],
         out: &mut [JointState],
+    ) {
+        match self.effects {
+            None => {
+                let mut state = *start;
+                self.sample(start, start_ns, commands, at_ns, out, |q_d, dq_d| {
+                    self.tick(&mut state, q_d, dq_d);
+                    state
+                });
+            }
+            Some(effects) => {
+                let (mut state, mut memory) = effects.start(self.arm, start, commands.q_d(0), commands.dq_d(0));
+                self.catch_up(effects, &mut memory, start_ns, commands);
+                self.sample(start, start_ns, commands, at_ns, out, |q_d, dq_d| {
+                    self.tick_with(effects, &mut memory, &mut state, q_d, dq_d)
+                });
+            }
+        }
+    }
+
+    /// Lets `tick` pass for every control period and writes what it answers, interpolated, into `out`.
+    fn sample(
+        &self,
+        start: &JointState,
+        start_ns: u64,
+        commands: &CommandTrack,
+        at_ns: &[u64],
+        out: &mut [JointState],
+        mut tick: impl FnMut(&Joints, &Joints) -> JointState,
     ) {
         let (mut state, mut tick_ns, mut row) = (*start, start_ns, 0);
         let mut wanted = at_ns.iter().zip(out).peekable();
@@ -49,7 +81,7 @@ impl ArmRollout<'_> {
         while wanted.peek().is_some() {
             row = commands.in_force(tick_ns, row);
             let before = state;
-            self.tick(&mut state, commands.q_d(row), commands.dq_d(row));
+            state = tick(commands.q_d(row), commands.dq_d(row));
             while let Some((at, out)) = wanted.next_if(|(at, _)| **at <= tick_ns + TICK_NS) {
                 *out = between(&before, &state, (at - tick_ns) as f64 / TICK_NS as f64);
             }
@@ -63,6 +95,33 @@ impl ArmRollout<'_> {
         } else {
             let tau = self.law.torque(self.nominal, state, q_d, dq_d);
             self.arm.step(state, &tau, TICK);
+        }
+    }
+
+    /// One control period under effects; answers what the encoders read at its end.
+    fn tick_with(
+        &self,
+        effects: &ArmEffects,
+        memory: &mut ArmMemory,
+        state: &mut JointState,
+        q_d: &Joints,
+        dq_d: &Joints,
+    ) -> JointState {
+        let (q_d, dq_d) = effects.command(memory, q_d, dq_d);
+        let reading = effects.measured(memory, state);
+        let asked = self.law.torque(self.nominal, &reading, &q_d, &dq_d);
+        let tau = effects.motor_torque(memory, &asked);
+        effects.advance(memory, self.arm, state, (&tau, &[0.0; MAX_JOINTS]), TICK);
+        effects.measured(memory, state)
+    }
+
+    /// Lets the commands of the time before `start_ns` that may still be on their way pass.
+    fn catch_up(&self, effects: &ArmEffects, memory: &mut ArmMemory, start_ns: u64, commands: &CommandTrack) {
+        let mut row = 0;
+        for tick in (1..=effects.command_ticks()).rev() {
+            let Some(tick_ns) = start_ns.checked_sub(tick * TICK_NS) else { continue };
+            row = commands.in_force(tick_ns, row);
+            let _ = effects.command(memory, commands.q_d(row), commands.dq_d(row));
         }
     }
 }

@@ -3,6 +3,7 @@
 
 use super::SimError;
 use crate::arm::{ArmModel, ControlLaw, JointState, Joints, MAX_JOINTS, PointForce};
+use crate::effects::{ArmEffects, ArmMemory};
 use crate::sensors::joint::JointNoise;
 use shared_mem::cell::Cell;
 use shared_mem::msg::arm::{ArmMode, ArmState};
@@ -26,8 +27,18 @@ pub enum Drive {
     },
 }
 
+/// What the arm has that its controller does not know.
+struct Hidden {
+    effects: ArmEffects,
+    memory: ArmMemory,
+    /// The model inside the controller.
+    nominal: ArmModel,
+}
+
 pub(super) struct SimArm {
     model: ArmModel,
+    /// `None` for an arm that is as cell.toml says.
+    hidden: Option<Hidden>,
     law: ControlLaw,
     state: JointState,
     noise: JointNoise,
@@ -41,20 +52,34 @@ pub(super) struct SimArm {
 }
 
 impl SimArm {
-    pub(super) fn new(cell: &Cell, theta: Option<&Theta>) -> Result<Self, SimError> {
-        let model = ArmModel::from_cell(cell)?;
-        let law = ControlLaw::new(cell.controller.as_ref(), theta.and_then(|t| t.arm.as_ref()), &model)?;
+    pub(super) fn new(
+        cell: &Cell,
+        nominal: ArmModel,
+        theta: Option<&Theta>,
+        effects: &ArmEffects,
+    ) -> Result<Self, SimError> {
+        let law = ControlLaw::new(cell.controller.as_ref(), theta.and_then(|t| t.arm.as_ref()), &nominal)?;
         let given = cell.simulation.q.len();
-        if given != 0 && given != model.dof() {
-            return Err(SimError::StartPose { given, dof: model.dof() });
+        if given != 0 && given != nominal.dof() {
+            return Err(SimError::StartPose { given, dof: nominal.dof() });
         }
-        let q = if given == 0 { *model.ready() } else { joints_from(&cell.simulation.q) };
-        let motor = model.gravity(&q);
+        let q = if given == 0 { *nominal.ready() } else { joints_from(&cell.simulation.q) };
         let zero = [0.0; MAX_JOINTS];
+        let mut state = JointState::at_rest(q);
+        let motor = nominal.gravity(&q);
+        let (model, hidden) = if effects.is_none() {
+            (nominal, None)
+        } else {
+            let real = effects.real_arm(&nominal);
+            let (started, memory) = effects.start(&real, &state, &q, &zero);
+            state = started;
+            (real, Some(Hidden { effects: effects.clone(), memory, nominal }))
+        };
         Ok(Self {
             model,
+            hidden,
             law,
-            state: JointState::at_rest(q),
+            state,
             noise: JointNoise::new(cell),
             q_d: q,
             dq_d: zero,
@@ -66,39 +91,64 @@ impl SimArm {
 
     /// Evaluates the controller once for the coming period, from the state at its start.
     pub(super) fn begin_period(&mut self, drive: &Drive) {
-        let gravity = self.model.gravity(&self.state.q);
-        self.motor = match drive {
+        let reading = self.reading();
+        let gravity = self.nominal().gravity(&reading.q);
+        let asked = match drive {
             Drive::JointImpedance { q_d, dq_d } => {
                 (self.q_d, self.dq_d) = (*q_d, *dq_d);
-                self.law.torque(&self.model, &self.state, q_d, dq_d)
+                let (q_d, dq_d) = match &mut self.hidden {
+                    Some(hidden) => hidden.effects.command(&mut hidden.memory, q_d, dq_d),
+                    None => (*q_d, *dq_d),
+                };
+                self.law.torque(self.nominal(), &reading, &q_d, &dq_d)
             }
             Drive::Torque { tau_J_d } => {
                 let limit = &self.law.torque_limit;
                 std::array::from_fn(|i| (tau_J_d[i] + gravity[i]).clamp(-limit[i], limit[i]))
             }
         };
-        self.tau_J_d = std::array::from_fn(|i| self.motor[i] - gravity[i]);
+        self.tau_J_d = std::array::from_fn(|i| asked[i] - gravity[i]);
+        self.motor = match &mut self.hidden {
+            Some(hidden) => hidden.effects.motor_torque(&mut hidden.memory, &asked),
+            None => asked,
+        };
         self.external = [0.0; MAX_JOINTS];
     }
 
     /// Moves on by `dt` under the period's motor torque and, perhaps, a force on the tool.
     pub(super) fn advance(&mut self, dt: f64, load: Option<&PointForce>) {
+        let external = load.map_or([0.0; MAX_JOINTS], |load| self.model.torque_of(&self.state.q, load));
         let mut tau = self.motor;
-        if let Some(load) = load {
-            let external = self.model.torque_of(&self.state.q, load);
-            for i in 0..MAX_JOINTS {
-                tau[i] += external[i];
-                self.external[i] += external[i] * (dt / super::PERIOD);
+        for i in 0..MAX_JOINTS {
+            tau[i] += external[i];
+            self.external[i] += external[i] * (dt / super::PERIOD);
+        }
+        match &mut self.hidden {
+            None => self.model.step(&mut self.state, &tau, dt),
+            Some(Hidden { effects, memory, .. }) => {
+                effects.advance(memory, &self.model, &mut self.state, (&self.motor, &external), dt);
             }
         }
-        self.model.step(&mut self.state, &tau, dt);
     }
 
     pub(super) fn set(&mut self, q: &[f64], dq: &[f64]) {
         self.state = JointState { q: joints_from(q), dq: joints_from(dq) };
         (self.q_d, self.dq_d) = (self.state.q, self.state.dq);
-        self.motor = self.model.gravity(&self.state.q);
+        self.motor = self.nominal().gravity(&self.state.q);
         self.external = [0.0; MAX_JOINTS];
+        if let Some(Hidden { effects, memory, .. }) = &mut self.hidden {
+            (self.state, *memory) = effects.start(&self.model, &self.state, &self.q_d, &self.dq_d);
+        }
+    }
+
+    /// What encoders without noise read.
+    pub(super) fn reading(&self) -> JointState {
+        self.hidden.as_ref().map_or(self.state, |hidden| hidden.effects.measured(&hidden.memory, &self.state))
+    }
+
+    /// The model inside the controller.
+    fn nominal(&self) -> &ArmModel {
+        self.hidden.as_ref().map_or(&self.model, |hidden| &hidden.nominal)
     }
 
     pub(super) fn state(&self) -> &JointState {
@@ -111,6 +161,9 @@ impl SimArm {
 
     /// What a sensor between gear and link reads: the motor's torque less what turns the rotor.
     pub(super) fn tau_J(&self) -> Joints {
+        if let Some(hidden) = &self.hidden {
+            return hidden.effects.tau_J(&hidden.memory);
+        }
         let total = std::array::from_fn(|i| self.motor[i] + self.external[i]);
         let acceleration = self.model.accelerations(&self.state, &total);
         let rotor = self.model.rotor_inertia();
@@ -121,7 +174,8 @@ impl SimArm {
         let dof = self.model.dof();
         out.dof = u32::try_from(dof).unwrap_or(0);
         out.mode = ArmMode::Move;
-        (out.q, out.dq) = (self.state.q, self.state.dq);
+        let reading = self.reading();
+        (out.q, out.dq) = (reading.q, reading.dq);
         self.noise.add(dof, &mut out.q, &mut out.dq);
         (out.q_d, out.dq_d) = (self.q_d, self.dq_d);
         out.tau_J = self.tau_J();

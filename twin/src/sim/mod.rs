@@ -13,7 +13,8 @@ mod tests;
 
 pub use arm::Drive;
 
-use crate::arm::{ArmModel, GainError, Joints, ModelError};
+use crate::arm::{ArmModel, GainError, JointState, Joints, ModelError};
+use crate::effects::{EffectError, Effects};
 use crate::physics::{FlatMesh, TableObject};
 use crate::scene::{MeshFileError, ObjectModel, SceneSnapshot};
 use arm::SimArm;
@@ -63,9 +64,9 @@ pub enum SimError {
         /// Joints of the arm.
         dof: usize,
     },
-    /// An effect was asked for that this program cannot simulate.
-    #[error("effect `{0}` cannot be simulated by this version; remove its [[effect]] block")]
-    Effect(String),
+    /// An effect is not known or its parameters do not fit.
+    #[error(transparent)]
+    Effect(#[from] EffectError),
 }
 
 impl SimCell {
@@ -75,10 +76,10 @@ impl SimCell {
     /// # Errors
     /// [`SimError`] naming the key or file and the remedy.
     pub fn new(cell: &Cell, theta: Option<&Theta>) -> Result<Self, SimError> {
-        if let Some(effect) = theta.and_then(|t| t.effects.first()) {
-            return Err(SimError::Effect(effect.name.clone()));
-        }
-        let arm = cell.robot.as_ref().map(|_| SimArm::new(cell, theta)).transpose()?;
+        let model = cell.robot.as_ref().map(|_| ArmModel::from_cell(cell)).transpose()?;
+        let blocks = theta.map_or(&[][..], |t| &t.effects);
+        let effects = Effects::from_theta(blocks, model.as_ref().map_or(0, ArmModel::dof))?;
+        let arm = model.map(|model| SimArm::new(cell, model, theta, &effects.arm)).transpose()?;
         let (object, contact) = match ObjectModel::new(cell, theta)? {
             None => (None, ToolContact::without_object()),
             Some(model) => {
@@ -134,6 +135,12 @@ impl SimCell {
     #[must_use]
     pub fn dq(&self) -> Joints {
         self.arm.as_ref().map_or([0.0; 8], |arm| arm.state().dq)
+    }
+
+    /// What the arm's encoders would read without noise: not the true positions where an effect parts the two.
+    #[must_use]
+    pub fn joint_reading(&self) -> JointState {
+        self.arm.as_ref().map(SimArm::reading).unwrap_or_default()
     }
 
     /// Torque behind the gear, with gravity [N m]; zeros without an arm.

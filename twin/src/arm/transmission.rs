@@ -1,0 +1,312 @@
+//! The arm's step in time where torque is lost or stored between motor and link: dry friction that sticks exactly, gears
+//! that yield or have play. Called by the effects; an arm with ideal joints steps in [`super::step`].
+//!
+//! Motor `B db = drive - f - s`, links `M a = s + external - bias`, with `f` the dry friction at the motor and `s` the
+//! torque behind the gear. A rigid gear moves motor and link as one. A gear that yields is a spring over the twist
+//! `motor - link`; its force is taken implicitly, so no stiffness is too high for the step. Dry friction is a bound:
+//! whatever up to it brings the motor to rest or keeps it there, the bound itself against the motion otherwise. Which of
+//! the two holds in which joint is found by least-index pivoting (Murty 1974), which ends because `M` is positive
+//! definite. Explicit midpoint rule around it, as in [`super::step`].
+
+use super::kernel::{Chain, factor, filled, first, solve, with_dof};
+use super::{ArmModel, JointState, Joints};
+
+/// A gear that yields.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Spring {
+    /// Torque per twist [N m/rad].
+    pub stiffness: f64,
+    /// Torque per rate of twist [N m s/rad].
+    pub damping: f64,
+    /// Twist from one flank to the other without any torque [rad].
+    pub play: f64,
+}
+
+/// What lies between the motors and the links.
+pub trait Transmission {
+    /// How the gear of a joint yields; `None` where it is rigid.
+    fn spring(&self, joint: usize) -> Option<Spring>;
+
+    /// Largest dry friction of a joint [N m] at a motor speed [rad/s] and motor torque [N m].
+    fn dry_friction(&self, joint: usize, speed: f64, motor_torque: f64) -> f64;
+
+    /// Torque that a motor loses otherwise [N m], at its position [rad] and velocity [rad/s].
+    fn drag(&self, joint: usize, q: f64, dq: f64) -> f64;
+}
+
+/// Pivots before the last pattern is kept: seven joints need at most a dozen.
+const PIVOTS: usize = 40;
+/// Inertia of a link that weighs nothing, as seen by a gear that yields [kg m²].
+const LEAST_INERTIA: f64 = 1e-6;
+
+/// Whether the motor moves against its dry friction.
+#[derive(Clone, Copy, PartialEq)]
+enum Dry {
+    /// It moves, or would, with this sign; 0 without friction.
+    Slips(f64),
+    Sticks,
+}
+
+/// What the gear passes on.
+#[derive(Clone, Copy, PartialEq)]
+enum Gear {
+    Rigid,
+    /// The spring is loaded, on this flank where there is play (0: there is none).
+    Loaded(f64),
+    /// Inside the play.
+    Free,
+}
+
+/// One joint during one stage.
+#[derive(Clone, Copy)]
+struct Side {
+    link_speed: f64,
+    motor_speed: f64,
+    twist: f64,
+    rotor: f64,
+    drive: f64,
+    dry: f64,
+    spring: Option<Spring>,
+}
+
+/// Equations of one stage of length `dt`: everything but the unknown accelerations.
+struct Stage<'a, const N: usize> {
+    dt: f64,
+    /// Lower triangle, rotors of rigid joints on the diagonal.
+    mass: [[f64; N]; N],
+    /// External torque less bias.
+    force: [f64; N],
+    sides: &'a [Side; N],
+}
+
+/// Accelerations of links and motors, and the torque behind the gears.
+struct Answer<const N: usize> {
+    link: [f64; N],
+    motor: [f64; N],
+    gear: [f64; N],
+}
+
+impl ArmModel {
+    /// Moves `link` and `motor` on by `dt` seconds under constant motor torques `tau` and external torques at the links,
+    /// and returns the mean torque behind the gears [N m]. Where the gear is rigid, `motor` follows `link`.
+    pub fn step_through(
+        &self,
+        transmission: &impl Transmission,
+        (link, motor): (&mut JointState, &mut JointState),
+        (tau, external): (&Joints, &Joints),
+        dt: f64,
+    ) -> Joints {
+        with_dof!(self, N => {
+            let sides = |at: &JointState| self.sides::<N>(transmission, (link, motor), at, tau);
+            let mut modes = None;
+            let half = self.stage(link, &sides(motor), external, 0.5 * dt).answer(&mut modes);
+            let middle = |state: &JointState, acceleration: &[f64; N]| {
+                let mut out = *state;
+                for (i, acceleration) in acceleration.iter().enumerate() {
+                    out.q[i] += 0.5 * dt * state.dq[i];
+                    out.dq[i] += 0.5 * dt * acceleration;
+                }
+                out
+            };
+            let sides = sides(&middle(motor, &half.motor));
+            let answer = self.stage(&middle(link, &half.link), &sides, external, dt).answer(&mut modes);
+            let modes = modes.expect("an answer leaves its pattern");
+            for (i, (dry, gear)) in modes.into_iter().enumerate() {
+                let sticks = dry == Dry::Sticks;
+                advance(link, i, answer.link[i], sticks && gear == Gear::Rigid, dt);
+                match gear {
+                    Gear::Rigid => (motor.q[i], motor.dq[i]) = (link.q[i], link.dq[i]),
+                    _ => advance(motor, i, answer.motor[i], sticks, dt),
+                }
+            }
+            filled(&answer.gear)
+        })
+    }
+
+    fn sides<const N: usize>(
+        &self,
+        transmission: &impl Transmission,
+        (link, motor): (&JointState, &JointState),
+        at: &JointState,
+        tau: &Joints,
+    ) -> [Side; N] {
+        std::array::from_fn(|i| Side {
+            link_speed: link.dq[i],
+            motor_speed: motor.dq[i],
+            twist: motor.q[i] - link.q[i],
+            rotor: self.links[i].rotor,
+            drive: tau[i] - transmission.drag(i, at.q[i], at.dq[i]),
+            dry: transmission.dry_friction(i, at.dq[i].abs(), tau[i]),
+            // Without a rotor nothing could turn on the motor's side of a spring.
+            spring: transmission.spring(i).filter(|_| self.links[i].rotor > 0.0),
+        })
+    }
+
+    fn stage<'a, const N: usize>(
+        &self,
+        at: &JointState,
+        sides: &'a [Side; N],
+        external: &Joints,
+        dt: f64,
+    ) -> Stage<'a, N> {
+        let links = first::<N, _>(&self.links);
+        let chain = Chain::at(links, first(&at.q));
+        let bodies = chain.bodies(links);
+        let bias = chain.bias(&bodies, first(&at.dq), self.gravity);
+        let mut mass = chain.mass_matrix(&bodies, links);
+        for i in 0..N {
+            if sides[i].spring.is_some() {
+                mass[i][i] = (mass[i][i] - sides[i].rotor).max(LEAST_INERTIA);
+            }
+        }
+        Stage { dt, mass, force: std::array::from_fn(|i| external[i] - bias[i]), sides }
+    }
+}
+
+/// Moves joint `i` with constant acceleration; one that stops, stops exactly.
+fn advance(state: &mut JointState, i: usize, acceleration: f64, stops: bool, dt: f64) {
+    let before = state.dq[i];
+    state.dq[i] = if stops { 0.0 } else { before + dt * acceleration };
+    state.q[i] += 0.5 * dt * (before + state.dq[i]);
+}
+
+impl<const N: usize> Stage<'_, N> {
+    /// Solves for the pattern of sticking and loaded joints that contradicts itself nowhere, starting from `modes`.
+    fn answer(&self, modes: &mut Option<[(Dry, Gear); N]>) -> Answer<N> {
+        let modes = modes.get_or_insert_with(|| self.sides.map(|side| side.likely()));
+        let mut answer = self.solve(modes);
+        for _ in 0..PIVOTS {
+            let wrong = (0..N).find_map(|i| {
+                let mode = self.sides[i].corrected(modes[i], answer.link[i], answer.motor[i], answer.gear[i], self.dt);
+                (mode != modes[i]).then_some((i, mode))
+            });
+            let Some((i, mode)) = wrong else { break };
+            modes[i] = mode;
+            answer = self.solve(modes);
+        }
+        answer
+    }
+
+    fn solve(&self, modes: &[(Dry, Gear); N]) -> Answer<N> {
+        let mut mass = self.mass;
+        let mut force = self.force;
+        let locked: [Option<f64>; N] = std::array::from_fn(|i| {
+            (modes[i] == (Dry::Sticks, Gear::Rigid)).then_some(-self.sides[i].link_speed / self.dt)
+        });
+        for i in 0..N {
+            let (inertia, torque) = self.sides[i].seen_by_link(modes[i], self.dt);
+            mass[i][i] += inertia;
+            force[i] += torque;
+        }
+        let symmetric = |i: usize, j: usize| if j <= i { mass[i][j] } else { mass[j][i] };
+        let (mut reduced, mut right) = (mass, force);
+        for (j, acceleration) in locked.iter().enumerate().filter_map(|(j, a)| a.map(|a| (j, a))) {
+            for i in (0..N).filter(|&i| i != j) {
+                right[i] -= symmetric(i, j) * acceleration;
+                reduced[i.max(j)][i.min(j)] = 0.0;
+            }
+            reduced[j][j] = 1.0;
+        }
+        for (right, acceleration) in right.iter_mut().zip(locked) {
+            *right = acceleration.unwrap_or(*right);
+        }
+        factor(&mut reduced);
+        let link = solve(&reduced, &right);
+        let passed = |i: usize| (0..N).map(|j| symmetric(i, j) * link[j]).sum::<f64>() - self.force[i];
+        let mut answer = Answer { link, motor: link, gear: [0.0; N] };
+        for i in 0..N {
+            let side = &self.sides[i];
+            (answer.motor[i], answer.gear[i]) = match modes[i].1 {
+                // The diagonal holds the rotor, which lies before the gear.
+                Gear::Rigid => (link[i], passed(i) - side.rotor * link[i]),
+                _ => side.motor_and_gear(modes[i], link[i], self.dt),
+            };
+        }
+        answer
+    }
+}
+
+impl Side {
+    /// What will hold unless the step turns it around.
+    fn likely(self) -> (Dry, Gear) {
+        let dry = match self.dry > 0.0 {
+            true if self.motor_speed == 0.0 => Dry::Sticks,
+            true => Dry::Slips(self.motor_speed.signum()),
+            false => Dry::Slips(0.0),
+        };
+        let gear = match self.spring {
+            None => Gear::Rigid,
+            Some(spring) if spring.play <= 0.0 => Gear::Loaded(0.0),
+            Some(spring) if self.twist.abs() > 0.5 * spring.play => Gear::Loaded(self.twist.signum()),
+            Some(_) => Gear::Free,
+        };
+        (dry, gear)
+    }
+
+    /// Spring torque `s = s0 + g (motor acceleration - link acceleration)`: at the middle of the stage, or at its end
+    /// where there is play, so that a flank is loaded exactly when it is reached.
+    fn spring_law(&self, gear: Gear, dt: f64) -> (f64, f64) {
+        let (Some(spring), Gear::Loaded(flank)) = (self.spring, gear) else { return (0.0, 0.0) };
+        let rate = self.motor_speed - self.link_speed;
+        let share = if flank == 0.0 { 0.5 } else { 1.0 };
+        let twist = self.twist - 0.5 * flank * spring.play + share * dt * rate;
+        let g = 0.5 * share * spring.stiffness * dt * dt + 0.5 * spring.damping * dt;
+        (spring.stiffness * twist + spring.damping * rate, g)
+    }
+
+    /// Inertia and torque that the link feels from motor and gear.
+    fn seen_by_link(&self, (dry, gear): (Dry, Gear), dt: f64) -> (f64, f64) {
+        let (s0, g) = self.spring_law(gear, dt);
+        match (dry, gear) {
+            (Dry::Slips(sign), Gear::Rigid) => (0.0, self.drive - sign * self.dry),
+            (Dry::Sticks, Gear::Rigid) => (0.0, 0.0),
+            (Dry::Slips(sign), _) => {
+                let share = self.rotor / (self.rotor + g);
+                (g * share, s0 * share + (self.drive - sign * self.dry) * (1.0 - share))
+            }
+            (Dry::Sticks, _) => (g, s0 - g * self.motor_speed / dt),
+        }
+    }
+
+    /// Motor acceleration and spring torque that go with a link acceleration.
+    fn motor_and_gear(&self, (dry, gear): (Dry, Gear), link: f64, dt: f64) -> (f64, f64) {
+        let (s0, g) = self.spring_law(gear, dt);
+        match dry {
+            Dry::Slips(sign) => {
+                let drive = self.drive - sign * self.dry;
+                let torque = (self.rotor * s0 + g * (drive - self.rotor * link)) / (self.rotor + g);
+                ((drive - torque) / self.rotor, torque)
+            }
+            Dry::Sticks => {
+                let motor = -self.motor_speed / dt;
+                (motor, s0 + g * (motor - link))
+            }
+        }
+    }
+
+    /// The mode that the answer demands; the same one where it contradicts nothing.
+    fn corrected(&self, (dry, gear): (Dry, Gear), link: f64, motor: f64, torque: f64, dt: f64) -> (Dry, Gear) {
+        let dry = match dry {
+            Dry::Slips(sign) if sign * (self.motor_speed + dt * motor) < 0.0 => Dry::Sticks,
+            Dry::Sticks => {
+                let needed = self.drive - torque - self.rotor * motor;
+                if needed.abs() > self.dry { Dry::Slips(needed.signum()) } else { dry }
+            }
+            Dry::Slips(_) => dry,
+        };
+        (dry, self.corrected_gear(gear, link, motor, torque, dt))
+    }
+
+    fn corrected_gear(&self, gear: Gear, link: f64, motor: f64, torque: f64, dt: f64) -> Gear {
+        let Some(spring) = self.spring.filter(|s| s.play > 0.0) else { return gear };
+        match gear {
+            Gear::Loaded(flank) if flank * torque < 0.0 => Gear::Free,
+            Gear::Free => {
+                let rate = self.motor_speed - self.link_speed + 0.5 * dt * (motor - link);
+                let end = self.twist + dt * rate;
+                if end.abs() > 0.5 * spring.play { Gear::Loaded(end.signum()) } else { gear }
+            }
+            _ => gear,
+        }
+    }
+}

@@ -1,0 +1,66 @@
+//! The gears have play: within it the motor turns and the link does not feel it.
+//!
+//! - Equation: `tau_J = 0` while `|theta - q| < play / 2`; beyond, a stiff spring, or that of `joint_elasticity`. A flank
+//!   only pushes.
+//! - Source: Nordin, Gutman 2002 (dead zone with damping).
+//! - Unit: rad, from flank to flank at the joint. Plausible: 0 to 1e-3 on an arm of this class, to 0.03 on hobby servos.
+//! - Signature (C18): motion lost at each reversal of the torque, not of the velocity; chatter near no load.
+//! - Confused with: Coulomb and Stribeck friction; a load that keeps one flank pressed makes it vanish.
+
+use crate::arm::{Joints, Spring};
+use crate::effects::registry::{EffectInfo, Parameter, Place, Stage};
+
+pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
+    name: "joint_backlash",
+    stage: Stage::Control,
+    acts_on: Place::Joint,
+    parameters: &[Parameter::size("play", "rad", [0.0, 0.03], 0.0).per_joint().within(0.0, 1.0)],
+    confusable_with: &["joint_coulomb_friction", "joint_stribeck_friction"],
+    install: |values, effects| effects.arm.joint_backlash = Some(JointBacklash { play: values.joints("play") }),
+};
+
+/// Stiffness of a flank where no elasticity is given [N m/rad]: ten times that of a harmonic drive.
+const FLANK_STIFFNESS: f64 = 1e5;
+/// Damping of a flank [N m s/rad]: light links part again with little speed.
+const FLANK_DAMPING: f64 = 10.0;
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(in crate::effects) struct JointBacklash {
+    play: Joints,
+}
+
+impl JointBacklash {
+    pub(super) fn spring(&self, joint: usize) -> Option<Spring> {
+        let play = self.play[joint];
+        (play > 0.0).then_some(Spring { stiffness: FLANK_STIFFNESS, damping: FLANK_DAMPING, play })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::test_arm::{ROTOR, effects, first, joint};
+    use crate::arm::JointState;
+
+    const BLOCK: &str = "[[effect]]\nname = \"joint_backlash\"\nplay = 0.01";
+
+    #[test]
+    fn the_motor_crosses_the_play_alone_and_then_takes_the_link_along() {
+        let (arm, effects) = (joint(0.07), effects(BLOCK));
+        let (mut state, mut memory) = effects.start(&arm, &JointState::default(), &[0.0; 8], &[0.0; 8]);
+        let crossing = (2.0f64 * 0.005 * ROTOR / 0.3).sqrt();
+        for tick in 1..=200 {
+            effects.advance(&mut memory, &arm, &mut state, (&first(0.3), &[0.0; 8]), 1e-3);
+            if f64::from(tick) * 1e-3 < crossing - 1e-3 {
+                assert_eq!(state.q[0], 0.0, "the link stands until the flank is reached at {crossing} s");
+            }
+        }
+        // Whatever the bounces were, momentum is the torque's impulse, and in the end the two move as one.
+        let momentum = ROTOR * memory.motor.dq[0] + 0.07 * state.dq[0];
+        assert!((momentum - 0.3 * 0.2).abs() < 1e-9, "{momentum}");
+        for _ in 0..300 {
+            effects.advance(&mut memory, &arm, &mut state, (&first(0.3), &[0.0; 8]), 1e-3);
+        }
+        let twist = memory.motor.q[0] - state.q[0];
+        assert!((twist - 0.005 - 0.3 * 0.07 / (ROTOR + 0.07) / 1e5).abs() < 1e-6, "{twist}");
+    }
+}

@@ -1,0 +1,76 @@
+//! Dry friction of a joint, the same at all speeds.
+//!
+//! - Equation: `tau_f = coulomb sgn(dq)` in motion; at rest whatever up to `coulomb` keeps the joint at rest.
+//! - Source: Armstrong-Helouvry, Dupont, Canudas de Wit 1994, section 2.1; sizes: Gaz et al. 2019 on the Panda.
+//! - Unit: N m at the joint, before the torque sensor. Plausible: 0 to 1.2 (Panda 0.15 to 1.2).
+//! - Signature (C1): odd in velocity and flat over it; `2 coulomb / stiffness` lost at each reversal; odd harmonics.
+//! - Confused with: load friction (alike in one pose), backlash (lost motion too), Stribeck friction (needs creep).
+
+use crate::arm::Joints;
+use crate::effects::registry::{EffectInfo, Parameter, Place, Stage};
+
+pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
+    name: "joint_coulomb_friction",
+    stage: Stage::Control,
+    acts_on: Place::Joint,
+    parameters: &[Parameter::size("coulomb", "N m", [0.0, 1.2], 0.0).per_joint().within(0.0, f64::MAX)],
+    confusable_with: &["joint_load_friction", "joint_stribeck_friction", "joint_backlash"],
+    install: |values, effects| {
+        effects.arm.joint_coulomb_friction = Some(JointCoulombFriction { coulomb: values.joints("coulomb") });
+    },
+};
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(in crate::effects) struct JointCoulombFriction {
+    pub(super) coulomb: Joints,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::test_arm::{ROTOR, effects, joint, run, turning};
+    use crate::arm::JointState;
+
+    const BLOCK: &str = "[[effect]]\nname = \"joint_coulomb_friction\"\ncoulomb = [0.3]";
+
+    #[test]
+    fn a_free_joint_stops_after_half_its_energy_over_friction_and_stays() {
+        let inertia = ROTOR + 0.07;
+        let states = run(&joint(0.07), &effects(BLOCK), turning(0.6), 400, |_, _| 0.0);
+        let stop = inertia * 0.6 / 0.3;
+        let at_100_ms = &states[100];
+        assert!((at_100_ms.dq[0] - (0.6 - 0.1 * 0.3 / inertia)).abs() < 1e-12, "{at_100_ms:?}");
+        let angle = 0.5 * inertia * 0.36 / 0.3;
+        let last = states[400];
+        assert!((last.q[0] - angle).abs() < 1e-6, "stops at {} after {stop} s, not at {angle}", last.q[0]);
+        assert_eq!((last.dq[0], last.q[0]), (0.0, states[250].q[0]), "creeps");
+    }
+
+    #[test]
+    fn a_joint_at_rest_moves_only_beyond_the_friction() {
+        let (arm, effects) = (joint(0.07), effects(BLOCK));
+        let held = run(&arm, &effects, JointState::default(), 1000, |_, _| 0.2999)[1000];
+        assert_eq!(held, JointState::default());
+        let moved = run(&arm, &effects, JointState::default(), 1000, |_, _| -0.31)[1000];
+        assert!((moved.dq[0] + 0.01 / 0.1).abs() < 1e-9, "{}", moved.dq[0]);
+    }
+
+    #[test]
+    fn a_driven_arm_sticks_in_the_joints_that_friction_holds_and_in_no_other() {
+        let arm = crate::arm::ArmModel::fr3();
+        let theta = "[[effect]]\nname = \"joint_coulomb_friction\"\ncoulomb = [0.9, 0.9, 0.9, 0.9, 0.6, 0.4, 0.3]";
+        let theta: shared_mem::theta::Theta =
+            shared_mem::toml_file::parse(theta, std::path::Path::new("theta.toml")).expect("a theta.toml");
+        let effects = crate::effects::Effects::from_theta(&theta.effects, 7).expect("a known effect").arm;
+        let start = JointState::at_rest(*arm.ready());
+        let (mut state, mut memory) = effects.start(&arm, &start, &start.q, &[0.0; 8]);
+        for _ in 0..200 {
+            let mut tau = arm.bias(&state);
+            tau[3] += 3.0;
+            effects.advance(&mut memory, &arm, &mut state, (&tau, &[0.0; 8]), 1e-3);
+        }
+        assert!(state.dq[3] > 0.1, "{:?}", state.dq);
+        // Joint 4's motion pulls hard at joint 2 and not at all at joint 1, in the plane of the ready pose.
+        assert_eq!((state.dq[0], state.q[0]), (0.0, start.q[0]));
+        assert!(state.dq[1] != 0.0, "{:?}", state.dq);
+    }
+}

@@ -1,0 +1,41 @@
+//! The encoders' zeros are off.
+//!
+//! - Equation: `q_measured = q + offset`. The controller sees the measured position, and so does its gravity compensation.
+//! - Source: kinematic calibration literature; a Franka's joints repeat to 0.1 mrad and are off by up to some mrad.
+//! - Unit: rad. Plausible: -3e-3 to 3e-3.
+//! - Signature (C21): the tip is off by a fixed amount in joint space; the encoders themselves never tell.
+//! - Confused with: camera extrinsics, tool offset, joint elasticity (follows the load).
+
+use crate::arm::Joints;
+use crate::effects::registry::{EffectInfo, Parameter, Place, Stage};
+
+pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
+    name: "joint_encoder_offset",
+    stage: Stage::Control,
+    acts_on: Place::JointSensing,
+    parameters: &[Parameter::size("offset", "rad", [-3e-3, 3e-3], 0.0).per_joint()],
+    confusable_with: &["camera_extrinsic_rotation", "camera_extrinsic_translation", "tool_offset", "joint_elasticity"],
+    install: |values, effects| {
+        effects.arm.joint_encoder_offset = Some(JointEncoderOffset { offset: values.joints("offset") });
+    },
+};
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(in crate::effects) struct JointEncoderOffset {
+    pub(super) offset: Joints,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::test_arm::{effects, joint};
+    use crate::arm::JointState;
+
+    #[test]
+    fn the_arm_is_where_the_reading_less_the_offset_says() {
+        let effects = effects("[[effect]]\nname = \"joint_encoder_offset\"\noffset = 0.25");
+        let reading = JointState { q: [0.75; 8], dq: [0.5; 8] };
+        let (state, memory) = effects.start(&joint(0.07), &reading, &reading.q, &reading.dq);
+        assert_eq!((state.q[0], state.dq[0]), (0.5, 0.5));
+        assert_eq!(effects.measured(&memory, &state), reading);
+    }
+}

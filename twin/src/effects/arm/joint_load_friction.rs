@@ -1,0 +1,48 @@
+//! Dry friction of a gear that grows with the torque it transmits.
+//!
+//! - Equation: `tau_f = coefficient |tau_motor| sgn(dq)`; at rest up to that. The motor's torque stands for the gear's
+//!   load; the two differ by the friction itself and what turns the rotor.
+//! - Source: Dohring et al. 1993; load-dependent term of Rhoban's BAM actuator models.
+//! - Unit: 1. Plausible: 0.01 to 0.25 (hobby servos the upper end).
+//! - Signature (C6): odd in velocity; its size follows the gravity torque over the pose.
+//! - Confused with: Coulomb friction (alike in one pose), torque gain, payload.
+
+use crate::arm::Joints;
+use crate::effects::registry::{EffectInfo, Parameter, Place, Stage};
+
+pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
+    name: "joint_load_friction",
+    stage: Stage::Control,
+    acts_on: Place::Joint,
+    parameters: &[Parameter::size("coefficient", "1", [0.0, 0.25], 0.0).per_joint().within(0.0, 1.0)],
+    confusable_with: &["joint_coulomb_friction", "torque_gain", "payload"],
+    install: |values, effects| {
+        effects.arm.joint_load_friction = Some(JointLoadFriction { coefficient: values.joints("coefficient") });
+    },
+};
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(in crate::effects) struct JointLoadFriction {
+    coefficient: Joints,
+}
+
+impl JointLoadFriction {
+    /// Dry friction under a motor torque [N m].
+    pub(super) fn level(&self, joint: usize, motor_torque: f64) -> f64 {
+        self.coefficient[joint] * motor_torque.abs()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::test_arm::{ROTOR, effects, joint, run, turning};
+
+    #[test]
+    fn a_share_of_the_torque_is_lost_in_motion_and_nothing_without_load() {
+        let effects = effects("[[effect]]\nname = \"joint_load_friction\"\ncoefficient = 0.2");
+        let driven = run(&joint(0.07), &effects, turning(0.1), 100, |_, _| 0.5)[100];
+        assert!((driven.dq[0] - (0.1 + 0.8 * 0.5 / (ROTOR + 0.07) * 0.1)).abs() < 1e-9, "{}", driven.dq[0]);
+        let free = run(&joint(0.07), &effects, turning(0.1), 100, |_, _| 0.0)[100];
+        assert!((free.dq[0] - 0.1).abs() < 1e-12, "{}", free.dq[0]);
+    }
+}

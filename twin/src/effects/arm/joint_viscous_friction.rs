@@ -1,0 +1,40 @@
+//! Friction of a joint in proportion to its speed.
+//!
+//! - Equation: `tau_f = viscous dq`.
+//! - Source: Armstrong-Helouvry et al. 1994, section 2.1; sizes: Gaz et al. 2019 on the Panda.
+//! - Unit: N m s/rad at the joint, before the torque sensor. Plausible: 0 to 0.3 on a Panda, to 2 on hobby servos.
+//! - Signature (C2): odd in velocity and linear in it; no harmonics.
+//! - Confused with: the controller's damping (exactly, where only encoders are logged and the command rests), torque
+//!   delay (takes damping away), command delay.
+
+use crate::arm::Joints;
+use crate::effects::registry::{EffectInfo, Parameter, Place, Stage};
+
+pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
+    name: "joint_viscous_friction",
+    stage: Stage::Control,
+    acts_on: Place::Joint,
+    parameters: &[Parameter::size("viscous", "N m s/rad", [0.0, 2.0], 0.0).per_joint().within(0.0, f64::MAX)],
+    confusable_with: &["torque_delay", "command_delay"],
+    install: |values, effects| {
+        effects.arm.joint_viscous_friction = Some(JointViscousFriction { viscous: values.joints("viscous") });
+    },
+};
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(in crate::effects) struct JointViscousFriction {
+    pub(super) viscous: Joints,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::test_arm::{ROTOR, effects, joint, run, turning};
+
+    #[test]
+    fn a_free_joint_slows_down_exponentially() {
+        let effects = effects("[[effect]]\nname = \"joint_viscous_friction\"\nviscous = 0.2");
+        let last = run(&joint(0.07), &effects, turning(2.0), 500, |_, _| 0.0)[500];
+        let expected = 2.0 * (-0.2 / (ROTOR + 0.07) * 0.5f64).exp();
+        assert!((last.dq[0] / expected - 1.0).abs() < 1e-6, "{} instead of {expected}", last.dq[0]);
+    }
+}

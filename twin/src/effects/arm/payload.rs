@@ -1,0 +1,56 @@
+//! The flange carries more than cell.toml says.
+//!
+//! - Equation: `tau = Y(q, dq, ddq) dpi` of a point mass on the flange: it is added to the arm, not to the controller's model.
+//! - Source: Gautier, Khalil 1990 (inertial parameters enter linearly).
+//! - Units: mass kg; centre m in the flange frame. Plausible: mass 0 to 0.5, centre within 0.03 across and 0 to 0.15 along z.
+//! - Signature (C10): sags in rest with the gravity regressor over the pose; grows with the square of the frequency too.
+//! - Confused with: torque gain, friction asymmetry (the same in every pose), base tilt.
+
+use crate::arm::{ArmModel, MassProperties};
+use crate::effects::registry::{EffectInfo, Parameter, Place, Stage};
+
+pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
+    name: "payload",
+    stage: Stage::Control,
+    acts_on: Place::ArmModel,
+    parameters: &[
+        Parameter::size("mass", "kg", [0.0, 0.5], 0.0).within(0.0, 100.0),
+        Parameter::form("centre", "m", [-0.03, 0.15], 0.0).vector(3),
+    ],
+    confusable_with: &["torque_gain", "joint_friction_asymmetry", "base_tilt"],
+    install: |values, effects| {
+        effects.arm.payload = Some(Payload { mass: values.number("mass"), centre: values.vector("centre") });
+    },
+};
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(in crate::effects) struct Payload {
+    mass: f64,
+    centre: [f64; 3],
+}
+
+impl Payload {
+    pub(super) fn apply(&self, arm: &mut ArmModel) {
+        arm.add_at_flange(&MassProperties::new(self.mass, self.centre, [0.0; 6]));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::test_arm::effects;
+    use crate::arm::{ArmModel, PointForce};
+
+    #[test]
+    fn it_weighs_on_the_joints_like_a_force_at_its_centre() {
+        let effects = effects("[[effect]]\nname = \"payload\"\nmass = 0.4\ncentre = [0.01, -0.02, 0.1]");
+        let arm = ArmModel::fr3();
+        let q = *arm.ready();
+        let point = arm.flange(&q).isometry() * nalgebra::Point3::new(0.01, -0.02, 0.1);
+        let weight = PointForce { point: point.into(), force: [0.0, 0.0, -0.4 * 9.81] };
+        let (more, torque) = (effects.real_arm(&arm).gravity(&q), arm.torque_of(&q, &weight));
+        for i in 0..7 {
+            let added = more[i] - arm.gravity(&q)[i];
+            assert!((added + torque[i]).abs() < 1e-12, "joint {i}: {added} instead of {}", -torque[i]);
+        }
+    }
+}

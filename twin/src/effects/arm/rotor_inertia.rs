@@ -1,0 +1,46 @@
+//! The rotors are heavier to turn than cell.toml says.
+//!
+//! - Equation: `tau_f = extra ddq` at each joint, on top of the nominal rotor inertia.
+//! - Source: reflected inertia `n^2 J` of motor and gear; `n` the gear ratio, `J` at the motor.
+//! - Unit: kg m^2 at the joint. Plausible: -0.1 to 0.2; what would be negative in total becomes 0.
+//! - Signature (C9): grows with the square of the frequency, even in velocity, the same in every pose.
+//! - Confused with: payload (depends on the pose), joint elasticity, a stiffness at one frequency.
+
+use crate::arm::{ArmModel, Joints};
+use crate::effects::registry::{EffectInfo, Parameter, Place, Stage};
+
+pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
+    name: "rotor_inertia",
+    stage: Stage::Control,
+    acts_on: Place::ArmModel,
+    parameters: &[Parameter::size("extra", "kg m^2", [-0.1, 0.2], 0.0).per_joint()],
+    confusable_with: &["payload", "joint_elasticity"],
+    install: |values, effects| effects.arm.rotor_inertia = Some(RotorInertia { extra: values.joints("extra") }),
+};
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(in crate::effects) struct RotorInertia {
+    extra: Joints,
+}
+
+impl RotorInertia {
+    pub(super) fn apply(&self, arm: &mut ArmModel) {
+        arm.add_rotor_inertia(&self.extra);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::test_arm::{ROTOR, effects, joint, run, turning};
+
+    #[test]
+    fn the_joint_accelerates_less_and_gravity_stays() {
+        let effects = effects("[[effect]]\nname = \"rotor_inertia\"\nextra = 0.05");
+        let real = effects.real_arm(&joint(0.07));
+        let last = run(&real, &effects, turning(0.0), 100, |_, _| 0.3)[100];
+        let expected = 0.3 * 0.1 / (ROTOR + 0.07 + 0.05);
+        assert!((last.dq[0] - expected).abs() < 1e-12, "{} instead of {expected}", last.dq[0]);
+        let arm = crate::arm::ArmModel::fr3();
+        assert_eq!(effects.real_arm(&arm).gravity(arm.ready()), arm.gravity(arm.ready()));
+    }
+}

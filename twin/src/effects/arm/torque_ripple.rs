@@ -1,0 +1,65 @@
+//! The motors' torque varies with their position.
+//!
+//! - Equation: `tau_f = amplitude sin(order q + phase)` at each joint.
+//! - Source: cogging and wave-generator ripple of harmonic drives (twice a motor turn: order = twice the gear ratio).
+//! - Units: amplitude N m at the joint; order 1 (periods per radian, times 1); phase rad. Plausible: amplitude 0 to 0.5,
+//!   order 1 to 400, phase -pi to pi.
+//! - Signature (C7): locked to the position, so its frequency is proportional to the speed.
+//! - Confused with: joint elasticity (a fixed frequency), noise.
+
+use crate::arm::Joints;
+use crate::effects::registry::{EffectInfo, Parameter, Place, Stage};
+use std::f64::consts::PI;
+
+pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
+    name: "torque_ripple",
+    stage: Stage::Control,
+    acts_on: Place::Joint,
+    parameters: &[
+        Parameter::size("amplitude", "N m", [0.0, 0.5], 0.0).per_joint(),
+        Parameter::form("order", "1", [1.0, 400.0], 200.0).per_joint(),
+        Parameter::form("phase", "rad", [-PI, PI], 0.0).per_joint(),
+    ],
+    confusable_with: &["joint_elasticity", "joint_coulomb_friction"],
+    install: |values, effects| {
+        effects.arm.torque_ripple = Some(TorqueRipple {
+            amplitude: values.joints("amplitude"),
+            order: values.joints("order"),
+            phase: values.joints("phase"),
+        });
+    },
+};
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(in crate::effects) struct TorqueRipple {
+    amplitude: Joints,
+    order: Joints,
+    phase: Joints,
+}
+
+impl TorqueRipple {
+    /// Torque lost at a position [N m].
+    pub(super) fn torque(&self, joint: usize, q: f64) -> f64 {
+        self.amplitude[joint] * (self.order[joint] * q + self.phase[joint]).sin()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::test_arm::{ROTOR, effects, first, joint, run, turning};
+    use crate::arm::JointState;
+
+    #[test]
+    fn a_joint_rests_in_a_trough_and_keeps_its_energy_over_the_ripple() {
+        let effects =
+            effects("[[effect]]\nname = \"torque_ripple\"\namplitude = 0.1\norder = 20.0\nphase = 1.5707963267948966");
+        let arm = joint(0.07);
+        // cos(20 q) = 0 with a restoring slope: at q = -pi/40.
+        let trough = JointState { q: first(-std::f64::consts::PI / 40.0), dq: [0.0; 8] };
+        assert!((run(&arm, &effects, trough, 100, |_, _| 0.0)[100].q[0] - trough.q[0]).abs() < 1e-12);
+        let inertia = ROTOR + 0.07;
+        let energy = |s: &JointState| 0.5 * inertia * s.dq[0].powi(2) + 0.1 / 20.0 * (20.0 * s.q[0]).sin();
+        let states = run(&arm, &effects, turning(1.0), 1000, |_, _| 0.0);
+        assert!((energy(&states[1000]) / energy(&states[0]) - 1.0).abs() < 1e-4);
+    }
+}

@@ -1,0 +1,77 @@
+//! All effects between motor and link together: dry frictions add up to one bound, the other losses to one drag, and
+//! elasticity and backlash to one spring with play.
+
+use super::ArmEffects;
+use crate::arm::{ArmModel, JointState, Joints, MAX_JOINTS, Spring, Transmission};
+
+/// Longest step of a gear that yields [s]: a wrist link on its spring rings at up to 200 Hz.
+const LONGEST_STEP: f64 = 2.5e-4;
+
+impl ArmEffects {
+    pub(super) fn acts_in_joints(&self) -> bool {
+        self.joint_coulomb_friction.is_some()
+            || self.joint_viscous_friction.is_some()
+            || self.joint_stribeck_friction.is_some()
+            || self.joint_friction_asymmetry.is_some()
+            || self.joint_load_friction.is_some()
+            || self.torque_ripple.is_some()
+            || self.yields()
+    }
+
+    /// Whether motor and link of a joint may be at different positions.
+    pub(super) fn yields(&self) -> bool {
+        self.joint_elasticity.is_some() || self.joint_backlash.is_some()
+    }
+
+    /// Twist at rest under a load [rad].
+    pub(super) fn twist_under(&self, joint: usize, torque: f64) -> f64 {
+        self.spring(joint).map_or(0.0, |spring| {
+            let flank = if torque == 0.0 { 0.0 } else { torque.signum() };
+            torque / spring.stiffness + 0.5 * spring.play * flank
+        })
+    }
+
+    /// [`ArmEffects::advance`] where something acts in the joints; returns the mean torque behind the gears.
+    pub(super) fn advance_through(
+        &self,
+        motor: &mut JointState,
+        arm: &ArmModel,
+        state: &mut JointState,
+        torques: (&Joints, &Joints),
+        dt: f64,
+    ) -> Joints {
+        if !self.yields() {
+            *motor = *state;
+            return arm.step_through(self, (state, motor), torques, dt);
+        }
+        let steps = (dt / LONGEST_STEP - 1e-9).ceil().max(1.0);
+        let mut mean = [0.0; MAX_JOINTS];
+        for _ in 0..steps as usize {
+            let gear = arm.step_through(self, (state, motor), torques, dt / steps);
+            mean = std::array::from_fn(|i| mean[i] + gear[i] / steps);
+        }
+        mean
+    }
+}
+
+impl Transmission for ArmEffects {
+    fn spring(&self, joint: usize) -> Option<Spring> {
+        let elastic = self.joint_elasticity.and_then(|effect| effect.spring(joint));
+        match self.joint_backlash.and_then(|effect| effect.spring(joint)) {
+            None => elastic,
+            Some(backlash) => Some(elastic.map_or(backlash, |spring| Spring { play: backlash.play, ..spring })),
+        }
+    }
+
+    fn dry_friction(&self, joint: usize, speed: f64, motor_torque: f64) -> f64 {
+        self.joint_coulomb_friction.map_or(0.0, |effect| effect.coulomb[joint])
+            + self.joint_stribeck_friction.map_or(0.0, |effect| effect.level(joint, speed))
+            + self.joint_load_friction.map_or(0.0, |effect| effect.level(joint, motor_torque))
+    }
+
+    fn drag(&self, joint: usize, q: f64, dq: f64) -> f64 {
+        self.joint_viscous_friction.map_or(0.0, |effect| effect.viscous[joint] * dq)
+            + self.joint_friction_asymmetry.map_or(0.0, |effect| effect.offset[joint])
+            + self.torque_ripple.map_or(0.0, |effect| effect.torque(joint, q))
+    }
+}

@@ -1,0 +1,60 @@
+//! The camera looks into another direction than its calibration says.
+//!
+//! - Equation: `pose_reported = R(rotation) pose`, about the base's origin; about the camera instead it differs by a
+//!   constant shift, which is `camera_extrinsic_translation`.
+//! - Source: hand-eye calibration error.
+//! - Unit: rad, rotation vector in the base frame. Plausible: -0.02 to 0.02 (1 degree).
+//! - Signature (V1): poses at rest are wrong too, by as much more as they are further away; all clips alike.
+//! - Confused with: table tilt (a yaw bends nothing), encoder offset, tool offset.
+
+use crate::effects::registry::{EffectInfo, Parameter, Place, Stage};
+use nalgebra::{Isometry3, UnitQuaternion, Vector3};
+
+pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
+    name: "camera_extrinsic_rotation",
+    stage: Stage::Camera,
+    acts_on: Place::ObjectObservation,
+    parameters: &[Parameter::size("rotation", "rad", [-0.02, 0.02], 0.0).vector(3).within(-3.2, 3.2)],
+    confusable_with: &["camera_extrinsic_translation", "joint_encoder_offset", "tool_offset", "table_tilt"],
+    install: |values, effects| {
+        effects.camera.camera_extrinsic_rotation =
+            Some(CameraExtrinsicRotation { rotation: values.vector("rotation") });
+    },
+};
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(in crate::effects) struct CameraExtrinsicRotation {
+    rotation: [f64; 3],
+}
+
+impl CameraExtrinsicRotation {
+    pub(super) fn apply(&self, pose: &mut Isometry3<f64>) {
+        *pose = self.turn() * *pose;
+    }
+
+    pub(super) fn undo(&self, pose: &mut Isometry3<f64>) {
+        *pose = self.turn().inverse() * *pose;
+    }
+
+    fn turn(&self) -> UnitQuaternion<f64> {
+        UnitQuaternion::from_scaled_axis(Vector3::from(self.rotation))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::CameraMemory;
+    use super::super::test_camera::effects;
+    use nalgebra::{Isometry3, Vector3};
+
+    #[test]
+    fn a_yaw_moves_poses_around_the_base_and_turns_them() {
+        let effects = effects("[[effect]]\nname = \"camera_extrinsic_rotation\"\nrotation = [0.0, 0.0, 0.02]");
+        let pose = Isometry3::new(Vector3::new(0.5, 0.0, 0.05), Vector3::z() * 0.3);
+        let seen = effects.report(&mut CameraMemory::default(), 0, &pose);
+        let expected =
+            Isometry3::new(Vector3::new(0.5 * 0.02f64.cos(), 0.5 * 0.02f64.sin(), 0.05), Vector3::z() * 0.32);
+        assert!((seen.translation.vector - expected.translation.vector).norm() < 1e-15);
+        assert!(seen.rotation.angle_to(&expected.rotation) < 1e-7);
+    }
+}

@@ -1,0 +1,52 @@
+//! The camera stands elsewhere than its calibration says.
+//!
+//! - Equation: `pose_reported = pose + translation` in the base frame.
+//! - Source: hand-eye calibration error.
+//! - Unit: m. Plausible: -0.01 to 0.01.
+//! - Signature (V1): every pose is off by the same, at rest too.
+//! - Confused with: encoder offset, tool offset, a rotation seen over a small table.
+
+use crate::effects::registry::{EffectInfo, Parameter, Place, Stage};
+use nalgebra::{Isometry3, Vector3};
+
+pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
+    name: "camera_extrinsic_translation",
+    stage: Stage::Camera,
+    acts_on: Place::ObjectObservation,
+    parameters: &[Parameter::size("translation", "m", [-0.01, 0.01], 0.0).vector(3)],
+    confusable_with: &["camera_extrinsic_rotation", "joint_encoder_offset", "tool_offset"],
+    install: |values, effects| {
+        effects.camera.camera_extrinsic_translation =
+            Some(CameraExtrinsicTranslation { translation: values.vector("translation") });
+    },
+};
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(in crate::effects) struct CameraExtrinsicTranslation {
+    translation: [f64; 3],
+}
+
+impl CameraExtrinsicTranslation {
+    pub(super) fn apply(&self, pose: &mut Isometry3<f64>) {
+        pose.translation.vector += Vector3::from(self.translation);
+    }
+
+    pub(super) fn undo(&self, pose: &mut Isometry3<f64>) {
+        pose.translation.vector -= Vector3::from(self.translation);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::CameraMemory;
+    use super::super::test_camera::effects;
+    use nalgebra::{Isometry3, Vector3};
+
+    #[test]
+    fn every_pose_is_shifted_and_none_turned() {
+        let effects = effects("[[effect]]\nname = \"camera_extrinsic_translation\"\ntranslation = [0.0, 0.25, -0.5]");
+        let pose = Isometry3::new(Vector3::new(0.5, 0.25, 0.5), Vector3::z() * 0.3);
+        let seen = effects.report(&mut CameraMemory::default(), 0, &pose);
+        assert_eq!(seen, Isometry3::new(Vector3::new(0.5, 0.5, 0.0), Vector3::z() * 0.3));
+    }
+}

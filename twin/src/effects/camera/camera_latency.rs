@@ -1,0 +1,42 @@
+//! The object was there earlier than the stamp of its pose says.
+//!
+//! - Equation: `pose_reported(t) = pose(t - latency)`, on top of the latency that cell.toml knows.
+//! - Source: exposure, transfer and estimation take time; 9 to 70 ms on depth cameras.
+//! - Unit: s. Plausible: 0 to 0.1.
+//! - Signature (V4): error of `latency v`, none at rest; contact seems late.
+//! - Confused with: command delay (moves the contact too), tracker smoothing.
+
+use crate::effects::registry::{EffectInfo, Parameter, Place, Stage};
+
+pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
+    name: "camera_latency",
+    stage: Stage::Camera,
+    acts_on: Place::ObjectObservation,
+    parameters: &[Parameter::size("latency", "s", [0.0, 0.1], 0.0).within(0.0, 10.0)],
+    confusable_with: &["command_delay", "tracker_smoothing"],
+    install: |values, effects| {
+        effects.camera.camera_latency = Some(CameraLatency { latency: values.number("latency") })
+    },
+};
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(in crate::effects) struct CameraLatency {
+    /// [s]
+    latency: f64,
+}
+
+impl CameraLatency {
+    pub(super) fn nanoseconds(&self) -> u64 {
+        (self.latency * 1e9).round() as u64
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::test_camera::effects;
+
+    #[test]
+    fn a_pose_is_older_than_its_stamp_by_the_latency() {
+        assert_eq!(effects("[[effect]]\nname = \"camera_latency\"\nlatency = 0.04").latency_ns(), 40_000_000);
+    }
+}

@@ -1,0 +1,32 @@
+//! Tip and object part faster or slower than assumed.
+//!
+//! - Equation: `v_after = -e v_before` of the two surfaces along the normal.
+//! - Source: Newton's law of restitution; realised by the dissipation of [`crate::physics::hit`].
+//! - Unit: 1. Plausible: 0.02 to 0.9; neutral: the nominal contact's.
+//! - Signature (H1): the same ratio of speeds after and before at all speeds.
+//! - Confused with: the object's mass and inertia, contact compliance (depends on speed and gains), tip friction.
+
+use crate::effects::registry::{EffectInfo, Parameter, Place, Stage};
+use crate::physics::hit::{ContactLaw, RESTITUTION};
+
+pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
+    name: "restitution",
+    stage: Stage::Hit,
+    acts_on: Place::ToolContact,
+    parameters: &[Parameter::size("restitution", "1", [0.02, 0.9], RESTITUTION).within(0.0, 1.0)],
+    confusable_with: &["object_inertia", "contact_compliance", "tip_friction"],
+    install: |values, effects| {
+        effects.hit.restitution = Some(Restitution { restitution: values.number("restitution") });
+    },
+};
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(in crate::effects) struct Restitution {
+    restitution: f64,
+}
+
+impl Restitution {
+    pub(super) fn apply(&self, law: &mut ContactLaw) {
+        law.restitution = self.restitution;
+    }
+}

@@ -1,0 +1,30 @@
+//! The tip grips the object more or less than assumed.
+//!
+//! - Equation: `|F_t| <= (mu_tip + change) F_n`, never below 0.
+//! - Source: Coulomb.
+//! - Unit: 1. Plausible: -0.3 to 0.3.
+//! - Signature (H5): oblique hits deflect and spin the object more or less, up to a limit.
+//! - Confused with: tool offset (turns off-centre hits), restitution.
+
+use crate::effects::registry::{EffectInfo, Parameter, Place, Stage};
+use crate::physics::hit::ContactLaw;
+
+pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
+    name: "tip_friction",
+    stage: Stage::Hit,
+    acts_on: Place::ToolContact,
+    parameters: &[Parameter::size("change", "1", [-0.3, 0.3], 0.0).within(-10.0, 10.0)],
+    confusable_with: &["tool_offset", "restitution", "object_inertia"],
+    install: |values, effects| effects.hit.tip_friction = Some(TipFriction { change: values.number("change") }),
+};
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(in crate::effects) struct TipFriction {
+    change: f64,
+}
+
+impl TipFriction {
+    pub(super) fn apply(&self, law: &mut ContactLaw) {
+        law.friction = (law.friction + self.change).max(0.0);
+    }
+}

@@ -1,0 +1,70 @@
+//! Everything the nominal cell lacks: effects that a real cell has and that a simulated cell can be given.
+//!
+//! One effect is one file: its equation, source, plausible range, signature, what it is confused with, its code and its
+//! test. [`registry()`] lists them all. A new effect is a new file, its line in the registry, and a field in the struct
+//! of its stage. Effects combine freely; one whose sizes are all neutral is not installed, so it changes no bit.
+//!
+//! | folder | acts on | read by |
+//! |---|---|---|
+//! | `arm` | commands, torques, joints, joint sensing, the arm's bodies | [`crate::rollout`], [`crate::sim`] |
+//! | `hit` | the contact of tool and object, the object's inertia | [`crate::sim`] |
+//! | `slide` | friction and pressure under the object, the table's lean | [`crate::physics`] |
+//! | `camera` | what the tracker reports | [`crate::sensors`], replay |
+//!
+//! Numbers in the signatures (C1 to V10) are those of the catalogue of sim-to-real gaps that `docs/effects.md` cites.
+
+mod arm;
+mod camera;
+mod hit;
+mod registry;
+mod slide;
+mod values;
+
+pub use arm::{ArmEffects, ArmMemory};
+pub use camera::{CameraEffects, CameraMemory};
+pub use hit::HitEffects;
+pub use registry::{EffectInfo, Parameter, Place, Role, Shape, Stage, find, registry};
+pub use slide::{SlideEffects, TableFriction};
+pub use values::EffectError;
+
+use shared_mem::theta::EffectTheta;
+use values::Values;
+
+/// The effects of one cell, sorted by where they act.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Effects {
+    /// On the arm.
+    pub arm: ArmEffects,
+    /// On the hit.
+    pub hit: HitEffects,
+    /// On the slide.
+    pub slide: SlideEffects,
+    /// On the report of the object's pose.
+    pub camera: CameraEffects,
+}
+
+impl Effects {
+    /// The effects of a theta.toml, for an arm of `dof` joints.
+    ///
+    /// # Errors
+    /// [`EffectError`] naming the effect, the parameter and the remedy.
+    pub fn from_theta(blocks: &[EffectTheta], dof: usize) -> Result<Self, EffectError> {
+        let mut effects = Self::default();
+        for (i, block) in blocks.iter().enumerate() {
+            if blocks[..i].iter().any(|earlier| earlier.name == block.name) {
+                return Err(EffectError::Twice(block.name.clone()));
+            }
+            let values = Values::read(block, dof)?;
+            if !values.are_neutral() {
+                (values.effect().install)(&values, &mut effects);
+            }
+        }
+        Ok(effects)
+    }
+
+    /// Whether there is none at all.
+    #[must_use]
+    pub fn is_none(&self) -> bool {
+        *self == Self::default()
+    }
+}

@@ -1,0 +1,203 @@
+//! What an effect says about itself, and the list of all effects. The list is the single place that knows them all:
+//! theta.toml is read by it, the diagnosis takes its candidates from it, the documentation its table.
+
+use super::{Effects, arm, camera, hit, slide, values::Values};
+
+/// Part of a clip in which an effect shows first.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Stage {
+    /// The arm follows its command.
+    Control,
+    /// The tool hits the object.
+    Hit,
+    /// The object slides.
+    Slide,
+    /// The camera reports.
+    Camera,
+}
+
+/// Where in the simulation an effect acts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Place {
+    /// Between the log of the command and the controller.
+    CommandPath,
+    /// Between the controller and the motors.
+    TorquePath,
+    /// Between the motors and the links.
+    Joint,
+    /// Bodies of the arm, and gravity.
+    ArmModel,
+    /// What the arm reports about itself.
+    JointSensing,
+    /// Contact of tool and object.
+    ToolContact,
+    /// The object's body.
+    Object,
+    /// Friction between object and table, and what else acts on the object there.
+    Table,
+    /// What is reported about the object's pose.
+    ObjectObservation,
+}
+
+/// How many numbers a parameter holds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Shape {
+    /// One.
+    Number,
+    /// One for each joint; a single number stands for all joints.
+    PerJoint,
+    /// As many as stated.
+    Vector(usize),
+}
+
+/// Whether the effect vanishes with a parameter.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Role {
+    /// How strong the effect is. It must be given; where all sizes are neutral, nothing is changed at all.
+    Size {
+        /// The value that changes nothing.
+        neutral: f64,
+    },
+    /// Where or how it acts.
+    Form {
+        /// Taken when the parameter is not given.
+        default: f64,
+    },
+}
+
+/// One parameter of an effect.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Parameter {
+    /// Key in an `[[effect]]` block.
+    pub name: &'static str,
+    /// SI unit; `1` without.
+    pub unit: &'static str,
+    /// How many numbers.
+    pub shape: Shape,
+    /// Values that are met in practice: the range of a search.
+    pub plausible: [f64; 2],
+    /// Values that have a meaning.
+    pub possible: [f64; 2],
+    /// What it does to the effect.
+    pub role: Role,
+}
+
+/// One effect: what the nominal cell lacks.
+#[derive(Debug, Clone, Copy)]
+pub struct EffectInfo {
+    /// Name in files and reports.
+    pub name: &'static str,
+    /// Where it shows first.
+    pub stage: Stage,
+    /// Where it acts.
+    pub acts_on: Place,
+    /// Its parameters.
+    pub parameters: &'static [Parameter],
+    /// Names of effects that look alike in some recordings.
+    pub confusable_with: &'static [&'static str],
+    /// Adds the effect with these parameters.
+    pub(super) install: fn(&Values, &mut Effects),
+}
+
+impl Stage {
+    /// Name in reports.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Control => "control",
+            Self::Hit => "hit",
+            Self::Slide => "slide",
+            Self::Camera => "camera",
+        }
+    }
+}
+
+impl Parameter {
+    /// A single number that is the effect's strength; any finite value means something.
+    pub(super) const fn size(name: &'static str, unit: &'static str, plausible: [f64; 2], neutral: f64) -> Self {
+        Self {
+            name,
+            unit,
+            shape: Shape::Number,
+            plausible,
+            possible: [f64::MIN, f64::MAX],
+            role: Role::Size { neutral },
+        }
+    }
+
+    /// A single number that says how the effect acts.
+    pub(super) const fn form(name: &'static str, unit: &'static str, plausible: [f64; 2], default: f64) -> Self {
+        Self { role: Role::Form { default }, ..Self::size(name, unit, plausible, default) }
+    }
+
+    pub(super) const fn per_joint(self) -> Self {
+        Self { shape: Shape::PerJoint, ..self }
+    }
+
+    pub(super) const fn vector(self, numbers: usize) -> Self {
+        Self { shape: Shape::Vector(numbers), ..self }
+    }
+
+    pub(super) const fn within(self, lowest: f64, highest: f64) -> Self {
+        Self { possible: [lowest, highest], ..self }
+    }
+
+    /// The value that changes nothing, or the default of a parameter that says how.
+    #[must_use]
+    pub fn resting_value(&self) -> f64 {
+        match self.role {
+            Role::Size { neutral } => neutral,
+            Role::Form { default } => default,
+        }
+    }
+}
+
+/// Every effect, stage by stage.
+#[must_use]
+pub fn registry() -> &'static [EffectInfo] {
+    EFFECTS
+}
+
+/// The effect with this name.
+#[must_use]
+pub fn find(name: &str) -> Option<&'static EffectInfo> {
+    EFFECTS.iter().find(|effect| effect.name == name)
+}
+
+static EFFECTS: &[EffectInfo] = &[
+    arm::joint_coulomb_friction::EFFECT,
+    arm::joint_viscous_friction::EFFECT,
+    arm::joint_stribeck_friction::EFFECT,
+    arm::joint_friction_asymmetry::EFFECT,
+    arm::joint_load_friction::EFFECT,
+    arm::command_delay::EFFECT,
+    arm::command_lag::EFFECT,
+    arm::torque_delay::EFFECT,
+    arm::rotor_inertia::EFFECT,
+    arm::payload::EFFECT,
+    arm::torque_gain::EFFECT,
+    arm::joint_elasticity::EFFECT,
+    arm::joint_backlash::EFFECT,
+    arm::joint_encoder_offset::EFFECT,
+    arm::torque_saturation::EFFECT,
+    arm::torque_ripple::EFFECT,
+    arm::torque_sensor_bias::EFFECT,
+    arm::base_tilt::EFFECT,
+    hit::restitution::EFFECT,
+    hit::contact_compliance::EFFECT,
+    hit::tip_friction::EFFECT,
+    hit::tool_offset::EFFECT,
+    hit::object_inertia::EFFECT,
+    slide::anisotropic_friction::EFFECT,
+    slide::stribeck_sliding_friction::EFFECT,
+    slide::velocity_dependent_friction::EFFECT,
+    slide::viscous_sliding_drag::EFFECT,
+    slide::table_tilt::EFFECT,
+    slide::friction_patch::EFFECT,
+    slide::pressure_distribution::EFFECT,
+    camera::camera_latency::EFFECT,
+    camera::camera_extrinsic_rotation::EFFECT,
+    camera::camera_extrinsic_translation::EFFECT,
+    camera::camera_scale::EFFECT,
+    camera::tracker_smoothing::EFFECT,
+];

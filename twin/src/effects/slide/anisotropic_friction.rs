@@ -1,0 +1,65 @@
+//! The table is rougher along one axis than across it.
+//!
+//! - Equation: `mu (1 + size cos 2(phi - axis))`, `phi` the heading of the slip.
+//! - Source: first even harmonic of direction-dependent friction; the force stays against the slip.
+//! - Units: size 1; axis rad from the base's x axis. Plausible: size 0 to 0.2, axis -pi/2 to pi/2. At rest the mean counts.
+//! - Signature (S7): deceleration repeats twice over a full turn of the heading.
+//! - Confused with: table tilt (repeats once), friction patch (follows the place).
+
+use crate::effects::registry::{EffectInfo, Parameter, Place, Stage};
+use nalgebra::Vector2;
+use std::f64::consts::FRAC_PI_2;
+
+pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
+    name: "anisotropic_friction",
+    stage: Stage::Slide,
+    acts_on: Place::Table,
+    parameters: &[
+        Parameter::size("size", "1", [0.0, 0.2], 0.0).within(-1.0, 1.0),
+        Parameter::form("axis", "rad", [-FRAC_PI_2, FRAC_PI_2], 0.0),
+    ],
+    confusable_with: &["table_tilt", "friction_patch"],
+    install: |values, effects| {
+        let (size, axis) = (values.number("size"), values.number("axis"));
+        effects.slide.anisotropic_friction = Some(AnisotropicFriction { size, axis: [axis.cos(), axis.sin()] });
+    },
+};
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(in crate::effects) struct AnisotropicFriction {
+    size: f64,
+    /// Unit vector.
+    axis: [f64; 2],
+}
+
+impl AnisotropicFriction {
+    #[inline]
+    pub(super) fn factor(&self, velocity: Vector2<f64>) -> f64 {
+        let squared = velocity.norm_squared();
+        if squared == 0.0 {
+            return 1.0;
+        }
+        let along = velocity.dot(&Vector2::from(self.axis));
+        // cos 2a = 2 cos^2 a - 1
+        1.0 + self.size * (2.0 * along * along / squared - 1.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::test_slide::mu;
+
+    #[test]
+    fn friction_is_most_along_the_axis_both_ways_and_least_across() {
+        let at = |heading: f64| {
+            let block = "[[effect]]\nname = \"anisotropic_friction\"\nsize = 0.1\naxis = 0.4";
+            mu(block, [0.0; 2], [0.7 * heading.cos(), 0.7 * heading.sin()])
+        };
+        for (heading, expected) in
+            [(0.4, 0.33), (0.4 + std::f64::consts::PI, 0.33), (0.4 + std::f64::consts::FRAC_PI_2, 0.27)]
+        {
+            assert!((at(heading) - expected).abs() < 1e-12, "{heading}: {}", at(heading));
+        }
+        assert!((at(1.0) - 0.3 * (1.0 + 0.1 * 1.2f64.cos())).abs() < 1e-12);
+    }
+}

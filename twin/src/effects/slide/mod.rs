@@ -1,0 +1,102 @@
+//! Effects on the slide: what the table's friction depends on, where the base presses, what else pushes the object.
+//! Asked once when a cell is made, but for the friction itself: [`TableFriction`] is asked for every place and slip.
+
+pub(super) mod anisotropic_friction;
+pub(super) mod friction_patch;
+pub(super) mod pressure_distribution;
+pub(super) mod stribeck_sliding_friction;
+pub(super) mod table_tilt;
+pub(super) mod velocity_dependent_friction;
+pub(super) mod viscous_sliding_drag;
+
+use crate::sliding::SlidingFriction;
+use nalgebra::{Vector2, Vector3};
+
+/// The effects on a slide that are installed.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct SlideEffects {
+    pub(super) anisotropic_friction: Option<anisotropic_friction::AnisotropicFriction>,
+    pub(super) stribeck_sliding_friction: Option<stribeck_sliding_friction::StribeckSlidingFriction>,
+    pub(super) velocity_dependent_friction: Option<velocity_dependent_friction::VelocityDependentFriction>,
+    pub(super) viscous_sliding_drag: Option<viscous_sliding_drag::ViscousSlidingDrag>,
+    pub(super) table_tilt: Option<table_tilt::TableTilt>,
+    pub(super) friction_patch: Option<friction_patch::FrictionPatch>,
+    pub(super) pressure_distribution: Option<pressure_distribution::PressureDistribution>,
+}
+
+impl SlideEffects {
+    /// Gravity on the object, in the table's own axes [m/s^2]; `g` is its size.
+    #[must_use]
+    pub fn gravity(&self, g: f64) -> Vector3<f64> {
+        let level = Vector3::new(0.0, 0.0, -g);
+        self.table_tilt.map_or(level, |effect| effect.gravity(level))
+    }
+
+    /// Force against the velocity of the base's middle over that velocity [N s/m]; 0 without a viscous film.
+    #[must_use]
+    pub fn drag(&self) -> f64 {
+        self.viscous_sliding_drag.map_or(0.0, |effect| effect.drag)
+    }
+
+    /// Reach of the pressure from the middle of the base, over the nominal one.
+    #[must_use]
+    pub fn pressure_reach(&self) -> f64 {
+        self.pressure_distribution.map_or(1.0, |effect| effect.reach)
+    }
+}
+
+/// Friction of the real table: a coefficient and what it depends on.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TableFriction {
+    /// The coefficient without any effect.
+    pub nominal: f64,
+    /// What changes it; `None` saves asking.
+    pub effects: Option<SlideEffects>,
+}
+
+impl SlidingFriction for TableFriction {
+    #[inline]
+    fn mu(&self, point: Vector2<f64>, velocity: Vector2<f64>) -> f64 {
+        self.effects.as_ref().map_or(self.nominal, |effects| effects.mu(self.nominal, point, velocity))
+    }
+}
+
+impl SlideEffects {
+    fn mu(&self, nominal: f64, point: Vector2<f64>, velocity: Vector2<f64>) -> f64 {
+        let speed = velocity.norm();
+        let mut mu = nominal
+            + self.stribeck_sliding_friction.map_or(0.0, |effect| effect.more(speed))
+            + self.velocity_dependent_friction.map_or(0.0, |effect| effect.more(speed));
+        if let Some(effect) = &self.anisotropic_friction {
+            mu *= effect.factor(velocity);
+        }
+        if let Some(effect) = &self.friction_patch {
+            mu *= effect.factor(point);
+        }
+        mu.max(0.0)
+    }
+}
+
+#[cfg(test)]
+mod test_slide {
+    //! A box that stands on its corners, to try effects on.
+
+    use super::{SlideEffects, TableFriction};
+    use crate::effects::Effects;
+    use crate::sliding::SlidingFriction as _;
+    use nalgebra::Vector2;
+    use shared_mem::theta::Theta;
+    use std::path::Path;
+
+    /// The effects of `[[effect]]` blocks.
+    pub(super) fn effects(blocks: &str) -> SlideEffects {
+        let theta: Theta = shared_mem::toml_file::parse(blocks, Path::new("theta.toml")).expect("a theta.toml");
+        Effects::from_theta(&theta.effects, 7).expect("known effects").slide
+    }
+
+    /// Coefficient on a table of 0.3.
+    pub(super) fn mu(blocks: &str, point: [f64; 2], velocity: [f64; 2]) -> f64 {
+        let friction = TableFriction { nominal: 0.3, effects: Some(effects(blocks)) };
+        friction.mu(Vector2::from(point), Vector2::from(velocity))
+    }
+}

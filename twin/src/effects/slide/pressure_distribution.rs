@@ -1,0 +1,25 @@
+//! The base presses nearer to its middle, or further out, than cell.toml's `support` says.
+//!
+//! - Equation: each place of pressure at `reach` times its distance from the middle of the base.
+//! - Source: radius of the limit surface (Goyal, Ruina, Papadopoulos 1991): 2/3 of the rim's for even pressure.
+//! - Unit: 1. Plausible: 0.4 to 1.2. Even pressure on a square base is about 0.54 of its corners.
+//! - Signature (S10): spin decays slower with less reach; travel without spin stays.
+//! - Confused with: object inertia (spin too, but at the hit already), the object's friction.
+
+use crate::effects::registry::{EffectInfo, Parameter, Place, Stage};
+
+pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
+    name: "pressure_distribution",
+    stage: Stage::Slide,
+    acts_on: Place::Table,
+    parameters: &[Parameter::size("reach", "1", [0.4, 1.2], 1.0).within(0.01, 2.0)],
+    confusable_with: &["object_inertia", "tool_offset"],
+    install: |values, effects| {
+        effects.slide.pressure_distribution = Some(PressureDistribution { reach: values.number("reach") });
+    },
+};
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(in crate::effects) struct PressureDistribution {
+    pub(super) reach: f64,
+}
