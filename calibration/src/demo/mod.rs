@@ -187,6 +187,7 @@ fn compare(
         live,
         joint,
         real: by_cell.real,
+        twin: by_cell.twin,
         error_before: by_cell.error,
         error_after: by_truth.error,
     })

@@ -6,7 +6,7 @@ use anyhow::{Context as _, ensure};
 use serde::Deserialize;
 use shared_mem::recording::{ClipMessages, Payload};
 use shared_mem::time::seconds_between;
-use shared_mem::topics::{ARM_STATE, TWIN_GAP};
+use shared_mem::topics::{ARM_STATE, TWIN_GAP, TWIN_STATE};
 use std::path::Path;
 use std::time::Duration;
 
@@ -32,6 +32,8 @@ pub(super) struct Mean {
 pub(super) struct Trace {
     /// Seconds from the clip's first row, and the measured position [rad].
     pub(super) real: Vec<[f64; 2]>,
+    /// Seconds, and the twin's position [rad].
+    pub(super) twin: Vec<[f64; 2]>,
     /// Seconds, and twin minus robot [rad].
     pub(super) error: Vec<[f64; 2]>,
 }
@@ -59,12 +61,13 @@ pub(super) fn replay(
 /// # Errors
 /// When the file cannot be read or holds no gap.
 pub(super) fn trace(simulated: &Path, joint: usize) -> anyhow::Result<Trace> {
-    let mut trace = Trace { real: Vec::new(), error: Vec::new() };
+    let mut trace = Trace { real: Vec::new(), twin: Vec::new(), error: Vec::new() };
     let mut first = None;
     let mut seconds = |stamp_ns| seconds_between(*first.get_or_insert(stamp_ns), stamp_ns);
-    for message in ClipMessages::open(simulated, &[ARM_STATE.name, TWIN_GAP.name])? {
+    for message in ClipMessages::open(simulated, &[ARM_STATE.name, TWIN_STATE.name, TWIN_GAP.name])? {
         match message?.payload {
             Payload::ArmState(state) => trace.real.push([seconds(state.stamp_ns), state.q[joint]]),
+            Payload::TwinState(state) => trace.twin.push([seconds(state.stamp_ns), state.q[joint]]),
             Payload::TwinGap(gap) => trace.error.push([seconds(gap.stamp_ns), gap.joint_error[joint]]),
             _ => {}
         }

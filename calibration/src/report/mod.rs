@@ -23,7 +23,9 @@ pub struct Story {
     pub joint: usize,
     /// Its measured path.
     pub real: Vec<[f64; 2]>,
-    /// Twin minus robot along it, with what cell.toml says.
+    /// The twin's path, with what cell.toml says.
+    pub twin: Vec<[f64; 2]>,
+    /// Twin minus robot, with what cell.toml says.
     pub error_before: Vec<[f64; 2]>,
     /// The same with the true gains.
     pub error_after: Vec<[f64; 2]>,
@@ -36,7 +38,7 @@ impl Story {
         let [before, after] = [&self.before, &self.after].map(|gap| 1e3 * root_mean_square(gap));
         let explained = if before > 0.0 { 100.0 * (1.0 - (after / before).powi(2)) } else { 0.0 };
         format!(
-            "With the gains of cell.toml the twin misses the robot by {before:.2} mrad; with the robot's true gains {after:.3} mrad are left: the gains explain {explained:.1} % of the squared gap."
+            "With the gains of cell.toml the twin misses the robot by {before:.2} mrad (RMS over all joints); with the robot's true gains {after:.3} mrad are left: the gains explain {explained:.1} % of the squared gap."
         )
     }
 }
@@ -60,6 +62,7 @@ mod tests {
             live: vec![1.5e-3, 3.5e-3],
             joint: 1,
             real: vec![[0.0, 0.1], [1.0, 0.2]],
+            twin: vec![[0.0, 0.1], [1.0, 0.203]],
             error_before: vec![[0.0, 0.0], [1.0, 0.003]],
             error_after: vec![[0.0, 0.0], [1.0, 0.000_002]],
         }
@@ -69,7 +72,10 @@ mod tests {
     fn the_page_says_the_finding_first_and_shows_it() {
         let html = page(&story()).expect("a page");
         let heading = html.split_once("<h1>").and_then(|(_, rest)| rest.split_once("</h1>")).expect("a heading").0;
-        assert!(heading.contains("misses the robot by 2.24 mrad") && heading.contains("0.002 mrad"), "{heading}");
+        assert!(
+            heading.contains("misses the robot by 2.24 mrad") && heading.contains("0.002 mrad are left"),
+            "{heading}"
+        );
         assert_eq!(html.matches("<svg").count(), 3);
         assert!(html.contains("<td>2</td><td>3.500</td><td>3.000</td><td>0.002</td>"), "{html}");
         assert!(html.contains("Joint 2, where the gap is largest"));

@@ -36,7 +36,7 @@ pub fn page(story: &Story) -> Result<String, PlotError> {
                 p.lead { (story.setting) }
                 h2 { "Gap by joint: RMS of twin minus robot" }
                 (PreEscaped(gap_bars(story)?))
-                h2 { "Joint " (joint) ", where the gap is largest: what the robot did" }
+                h2 { "Joint " (joint) ", where the gap is largest: robot and twin" }
                 (PreEscaped(motion(story)?))
                 h2 { "Joint " (joint) ": how far off the twin is" }
                 (PreEscaped(error(story)?))
@@ -63,15 +63,19 @@ fn gap_bars(story: &Story) -> Result<String, PlotError> {
 }
 
 fn motion(story: &Story) -> Result<String, PlotError> {
-    plots::lines(&[Line { name: "measured position", color: REAL, points: &story.real }], "rad")
+    let lines = [
+        Line { name: "twin with the gains of cell.toml", color: BEFORE, width: 12, points: &story.twin },
+        Line { name: "robot", color: REAL, width: 4, points: &story.real },
+    ];
+    plots::lines(&lines, "rad")
 }
 
 fn error(story: &Story) -> Result<String, PlotError> {
     let scale = |points: &[[f64; 2]]| -> Vec<[f64; 2]> { points.iter().map(|[t, e]| [*t, 1e3 * e]).collect() };
     let (before, after) = (scale(&story.error_before), scale(&story.error_after));
     let lines = [
-        Line { name: "twin with the gains of cell.toml", color: BEFORE, points: &before },
-        Line { name: "twin with the true gains", color: AFTER, points: &after },
+        Line { name: "twin with the gains of cell.toml", color: BEFORE, width: 6, points: &before },
+        Line { name: "twin with the true gains", color: AFTER, width: 6, points: &after },
     ];
     plots::lines(&lines, "mrad")
 }

@@ -10,8 +10,8 @@ pub(super) const BEFORE: RGBColor = RGBColor(213, 94, 0);
 /// The twin with the true parameters.
 pub(super) const AFTER: RGBColor = RGBColor(0, 114, 178);
 
-/// Size of a plot [px]; the page scales it.
-const SIZE: (u32, u32) = (900, 300);
+/// Size of a plot; the page scales it down, because coordinates are whole numbers and would show as steps otherwise.
+const SIZE: (u32, u32) = (2700, 900);
 /// Fonts of a plot: whatever the reader's system calls sans-serif.
 const FONT: &str = "sans-serif";
 /// Most points of a line: more than a screen shows only makes the page heavy.
@@ -42,6 +42,8 @@ pub(super) struct Line<'a> {
     pub(super) name: &'a str,
     /// Colour.
     pub(super) color: RGBColor,
+    /// Width; about three make one on the screen.
+    pub(super) width: u32,
     /// Time [s] and value.
     pub(super) points: &'a [[f64; 2]],
 }
@@ -55,23 +57,23 @@ pub(super) fn bars(groups: &[Bars], unit: &str) -> Result<String, PlotError> {
     let [_, top] = span(groups.iter().flat_map(|group| group.values).copied().chain([0.0]));
     draw(|root| {
         let mut chart = ChartBuilder::on(root)
-            .margin(12)
-            .x_label_area_size(32)
-            .y_label_area_size(64)
+            .margin(30)
+            .x_label_area_size(70)
+            .y_label_area_size(170)
             .build_cartesian_2d(0.0..joints as f64, 0.0..1.18 * top)?;
         chart
             .configure_mesh()
             .disable_x_mesh()
             .disable_x_axis()
             .light_line_style(TRANSPARENT)
-            .bold_line_style(INK.mix(0.15))
-            .axis_style(INK.mix(0.6))
-            .label_style((FONT, 14, &INK))
+            .bold_line_style(INK.mix(0.15).stroke_width(3))
+            .axis_style(INK.mix(0.6).stroke_width(3))
+            .label_style((FONT, 42, &INK))
             .y_desc(unit)
             .y_labels(5)
             .draw()?;
         let width = 0.76 / groups.len().max(1) as f64;
-        let number = (FONT, 12).into_font().color(&INK).pos(Pos::new(HPos::Center, VPos::Bottom));
+        let number = (FONT, 36).into_font().color(&INK).pos(Pos::new(HPos::Center, VPos::Bottom));
         for (place, group) in groups.iter().enumerate() {
             let left = |joint: usize| joint as f64 + 0.12 + width * place as f64;
             let boxes = group.values.iter().enumerate().map(|(joint, v)| {
@@ -82,10 +84,10 @@ pub(super) fn bars(groups: &[Bars], unit: &str) -> Result<String, PlotError> {
                 Text::new(short(*v), (left(joint) + 0.47 * width, *v + 0.015 * top), number.clone())
             }))?;
         }
-        let name = (FONT, 14).into_font().color(&INK).pos(Pos::new(HPos::Center, VPos::Top));
+        let name = (FONT, 42).into_font().color(&INK).pos(Pos::new(HPos::Center, VPos::Top));
         for joint in 0..joints {
             let (x, y) = chart.backend_coord(&(joint as f64 + 0.5, 0.0));
-            root.draw(&Text::new(format!("joint {}", joint + 1), (x, y + 8), name.clone()))?;
+            root.draw(&Text::new(format!("joint {}", joint + 1), (x, y + 24), name.clone()))?;
         }
         legend(&mut chart)
     })
@@ -102,16 +104,16 @@ pub(super) fn lines(lines: &[Line], unit: &str) -> Result<String, PlotError> {
     let room = 0.12 * (hi - lo);
     draw(|root| {
         let mut chart = ChartBuilder::on(root)
-            .margin(12)
-            .x_label_area_size(40)
-            .y_label_area_size(64)
+            .margin(30)
+            .x_label_area_size(110)
+            .y_label_area_size(170)
             .build_cartesian_2d(begin..end, lo - room..hi + 2.0 * room)?;
         chart
             .configure_mesh()
             .light_line_style(TRANSPARENT)
-            .bold_line_style(INK.mix(0.15))
-            .axis_style(INK.mix(0.6))
-            .label_style((FONT, 14, &INK))
+            .bold_line_style(INK.mix(0.15).stroke_width(3))
+            .axis_style(INK.mix(0.6).stroke_width(3))
+            .label_style((FONT, 42, &INK))
             .x_desc("time [s]")
             .y_desc(unit)
             .x_labels(10)
@@ -121,7 +123,7 @@ pub(super) fn lines(lines: &[Line], unit: &str) -> Result<String, PlotError> {
             let step = line.points.len().div_ceil(MOST_POINTS).max(1);
             let thinned = line.points.iter().step_by(step).map(|p| (p[0], p[1]));
             chart
-                .draw_series(LineSeries::new(thinned, line.color.stroke_width(2)))?
+                .draw_series(LineSeries::new(thinned, line.color.stroke_width(line.width)))?
                 .label(line.name)
                 .legend(swatch(line.color));
         }
@@ -158,7 +160,7 @@ fn draw(paint: impl FnOnce(&DrawingArea<SVGBackend, plotters::coord::Shift>) -> 
 }
 
 fn swatch(color: RGBColor) -> impl Fn((i32, i32)) -> Rectangle<(i32, i32)> {
-    move |(x, y)| Rectangle::new([(x, y - 5), (x + 14, y + 5)], color.filled())
+    move |(x, y)| Rectangle::new([(x, y - 15), (x + 42, y + 15)], color.filled())
 }
 
 fn legend<'a, 'b: 'a>(chart: &mut Chart<'a, 'b>) -> Drawn {
@@ -166,7 +168,9 @@ fn legend<'a, 'b: 'a>(chart: &mut Chart<'a, 'b>) -> Drawn {
         .configure_series_labels()
         .position(SeriesLabelPosition::UpperRight)
         .background_style(WHITE.mix(0.85))
-        .label_font((FONT, 14, &INK))
+        .legend_area_size(60)
+        .margin(20)
+        .label_font((FONT, 42, &INK))
         .draw()?;
     Ok(())
 }
@@ -200,13 +204,13 @@ mod tests {
     #[test]
     fn a_long_recording_makes_no_heavy_plot() {
         let points: Vec<[f64; 2]> = (0..60_000).map(|i| [f64::from(i) * 1e-3, f64::from(i).sin()]).collect();
-        let svg = lines(&[Line { name: "real", color: REAL, points: &points }], "rad").expect("a plot");
+        let svg = lines(&[Line { name: "real", color: REAL, width: 5, points: &points }], "rad").expect("a plot");
         assert!(svg.len() < 40_000, "{} bytes", svg.len());
     }
 
     #[test]
     fn nothing_to_show_is_still_a_plot() {
         assert!(bars(&[], "mrad").is_ok());
-        assert!(lines(&[Line { name: "real", color: REAL, points: &[] }], "rad").is_ok());
+        assert!(lines(&[Line { name: "real", color: REAL, width: 5, points: &[] }], "rad").is_ok());
     }
 }
