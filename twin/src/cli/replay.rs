@@ -12,10 +12,11 @@ use twin::replay::{Options, replay};
 /// Simulates the recorded commands of a session or clip: real against simulated.
 #[derive(clap::Args)]
 #[command(after_help = "\
-The twin starts in the recorded state, gets the recorded commands at their stamps, and is not corrected on the way.
+The twin starts in the recorded state, gets the recorded commands at their stamps, and is not corrected on the way (but
+behind a hole in the commands it starts again; that is told).
 Joint errors are root mean squares over the clip; ADD and ADD-S are means over the recorded object poses.
 
-A clip that cannot be replayed is named on stderr, with the reason, and the others are replayed; the exit code is 1 only
+A clip that cannot be replayed is named on stderr, with the reason, and the others are replayed. The exit code is 1 only
 when none could be.
 
 Examples:

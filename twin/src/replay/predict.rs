@@ -5,7 +5,7 @@ use super::report::{ClipGap, Gap};
 use crate::arm::{ArmModel, ControlLaw, GainError, JointState, ModelError};
 use crate::effects::{CameraEffects, CameraMemory, EffectError, Effects};
 use crate::metrics::{SurfacePoints, joint_rms};
-use crate::rollout::{ArmRollout, CommandTrack, between};
+use crate::rollout::{ArmRollout, CommandTrack, Hole, between};
 use crate::scene::{MeshFileError, ObjectModel};
 use crate::sim::{Drive, PERIOD_NS, SimCell, SimError};
 use nalgebra::Vector3;
@@ -14,6 +14,7 @@ use shared_mem::frames::{Base, Object, Pose};
 use shared_mem::msg::MAX_JOINTS;
 use shared_mem::recording::{Clip, ObjectSeries, ReadError};
 use shared_mem::theta::Theta;
+use shared_mem::time::seconds_between;
 
 /// The twin of a cell, ready to replay its clips.
 #[derive(Debug, Clone)]
@@ -36,6 +37,8 @@ pub struct Prediction {
     pub object: Vec<Pose<Base, Object>>,
     /// From the first measured row to the first touch of tool and object [s]; `None` when they did not touch.
     pub contact_time: Option<f64>,
+    /// What a reader of the figures has to know, one sentence each.
+    pub warnings: Vec<String>,
 }
 
 /// A clip or a session cannot be replayed.
@@ -131,7 +134,7 @@ impl Replayer {
             return Err(ReplayError::Diverged(name(&clip)));
         }
         let mut warnings = clip.warnings.clone();
-        warnings.extend(clip.damage.clone());
+        warnings.extend(clip.damage.iter().chain(&prediction.warnings).cloned());
         let report = ClipGap { file: name(&clip), gap, warnings };
         Ok((clip, prediction, report))
     }
@@ -155,32 +158,45 @@ impl Replayer {
     }
 
     fn arm_alone(&self, clip: &Clip) -> Result<Prediction, ReplayError> {
-        let (rollout, start, commands) = self.arm_inputs(clip)?;
-        let stamps = &clip.measured.stamps_ns;
-        let mut joints = vec![JointState::default(); stamps.len()];
-        rollout.run(&start, stamps[0], &commands, stamps, &mut joints);
-        Ok(Prediction { joints, ..Prediction::default() })
+        let (rollout, commands) = self.arm_inputs(clip)?;
+        let stamps_ns = &clip.measured.stamps_ns;
+        let mut joints = vec![JointState::default(); stamps_ns.len()];
+        let starts = starts(clip, &commands);
+        for (i, &from) in starts.iter().enumerate() {
+            let to = starts.get(i + 1).copied().unwrap_or(stamps_ns.len());
+            let start = start_state(&rollout, clip, from, &commands)?;
+            rollout.run(&start, stamps_ns[from], &commands, &stamps_ns[from..to], &mut joints[from..to]);
+        }
+        Ok(Prediction { joints, warnings: hole_warnings(clip, &commands), ..Prediction::default() })
     }
 
     fn arm_and_object(&self, clip: &Clip) -> Result<Prediction, ReplayError> {
-        let (_, start, commands) = self.arm_inputs(clip)?;
+        let (rollout, commands) = self.arm_inputs(clip)?;
         let (object, _) = self.object.as_ref().ok_or_else(|| ReplayError::NoObject(name(clip)))?;
         let mut cell = SimCell::new(&self.cell, self.theta.as_ref())?;
+        let start = start_state(&rollout, clip, 0, &commands)?;
         cell.set_arm(&start.q, &start.dq);
         let resting = object_start::resting(&self.undistorted(&clip.object), object, &self.cell)
             .ok_or_else(|| ReplayError::TooShort(name(clip), "no object poses"))?;
         cell.set_object(&resting, Vector3::zeros(), Vector3::zeros());
-        let mut run = CellRun::new(cell, clip, clip.measured.stamps_ns[0], &self.effects.camera);
-        let mut row = 0;
+        let stamps_ns = &clip.measured.stamps_ns;
+        let mut run = CellRun::new(cell, clip, stamps_ns[0], &self.effects.camera);
+        let mut restarts = starts(clip, &commands).into_iter().skip(1).peekable();
+        let mut command = 0;
         while run.unfinished() {
-            row = commands.in_force(run.now_ns, row);
-            run.period(&Drive::JointImpedance { q_d: *commands.q_d(row), dq_d: *commands.dq_d(row) });
+            if let Some(row) = restarts.next_if(|row| stamps_ns[*row] <= run.now_ns) {
+                let state = start_state(&rollout, clip, row, &commands)?;
+                run.cell.set_arm(&state.q, &state.dq);
+            }
+            command = commands.in_force(run.now_ns, command);
+            run.period(&Drive::JointImpedance { q_d: *commands.q_d(command), dq_d: *commands.dq_d(command) });
         }
         let contact_time = run.cell.first_contact_ns().map(|ns| ns as f64 * 1e-9);
-        Ok(Prediction { joints: run.joints, object: run.object, contact_time })
+        let warnings = hole_warnings(clip, &commands);
+        Ok(Prediction { joints: run.joints, object: run.object, contact_time, warnings })
     }
 
-    fn arm_inputs(&self, clip: &Clip) -> Result<(ArmRollout<'_>, JointState, CommandTrack), ReplayError> {
+    fn arm_inputs(&self, clip: &Clip) -> Result<(ArmRollout<'_>, CommandTrack), ReplayError> {
         let (nominal, law) = self.arm.as_ref().ok_or_else(|| ReplayError::NoArm(name(clip)))?;
         let (arm, effects) = match &self.real_arm {
             Some(real) => (real, Some(&self.effects.arm)),
@@ -188,11 +204,7 @@ impl Replayer {
         };
         let commands =
             CommandTrack::new(&clip.desired).ok_or_else(|| ReplayError::TooShort(name(clip), "no commands"))?;
-        let rollout = ArmRollout { arm, nominal, law, effects };
-        let start = rollout
-            .start_state(&clip.measured, &commands)
-            .ok_or_else(|| ReplayError::TooShort(name(clip), "no measured joints"))?;
-        Ok((rollout, start, commands))
+        Ok((ArmRollout { arm, nominal, law, effects }, commands))
     }
 
     fn object_alone(&self, clip: &Clip) -> Result<Prediction, ReplayError> {
@@ -305,6 +317,35 @@ impl<'a> CellRun<'a> {
     fn joint_state(&self) -> JointState {
         self.cell.joint_reading()
     }
+}
+
+/// Measured rows at which the twin is set onto the robot: the first, and the first behind each hole in the commands.
+fn starts(clip: &Clip, commands: &CommandTrack) -> Vec<usize> {
+    let stamps_ns = &clip.measured.stamps_ns;
+    let behind = commands.holes().iter().map(|hole| stamps_ns.partition_point(|stamp| *stamp < hole.to_ns));
+    let mut rows: Vec<usize> = std::iter::once(0).chain(behind.filter(|row| *row < stamps_ns.len())).collect();
+    rows.dedup();
+    rows
+}
+
+fn start_state(
+    rollout: &ArmRollout<'_>,
+    clip: &Clip,
+    from: usize,
+    commands: &CommandTrack,
+) -> Result<JointState, ReplayError> {
+    rollout
+        .start_state(&clip.measured, from, commands)
+        .ok_or_else(|| ReplayError::TooShort(name(clip), "no measured joints"))
+}
+
+fn hole_warnings(clip: &Clip, commands: &CommandTrack) -> Vec<String> {
+    let first = clip.measured.stamps_ns.first().copied().unwrap_or(0);
+    let sentence = |hole: &Hole| {
+        let (at, long) = (seconds_between(first, hole.from_ns), seconds_between(hole.from_ns, hole.to_ns));
+        format!("no commands for {long:.3} s from {at:.3} s on; the twin was set back onto the robot behind the hole")
+    };
+    commands.holes().iter().map(sentence).collect()
 }
 
 fn name(clip: &Clip) -> String {

@@ -9,7 +9,7 @@
 mod commands;
 mod start;
 
-pub use commands::CommandTrack;
+pub use commands::{CommandTrack, Hole};
 
 use crate::arm::{ArmModel, ControlLaw, JointState, Joints, MAX_JOINTS};
 use crate::effects::{ArmEffects, ArmMemory};

@@ -13,17 +13,17 @@ const ENOUGH_ROWS: usize = 10;
 const PASSES: usize = 3;
 
 impl ArmRollout<'_> {
-    /// Where the arm was and how fast when `measured` begins; `None` when the series is empty.
+    /// Where the arm was and how fast at row `from` of `measured`; `None` when there is no such row.
     ///
-    /// A first guess, the first row, is simulated for 20 ms; the straight line through what the measurement is ahead of
+    /// A first guess, the row itself, is simulated for 20 ms; the straight line through what the measurement is ahead of
     /// the simulation corrects position and velocity. So a motion that sets off within these 20 ms does not pass for
     /// initial velocity.
     #[must_use]
-    pub fn start_state(&self, measured: &JointSeries, commands: &CommandTrack) -> Option<JointState> {
-        let first = *measured.stamps_ns.first()?;
-        let rows = measured.stamps_ns.iter().take_while(|stamp| **stamp - first <= WINDOW_NS).count();
-        let stamps_ns = &measured.stamps_ns[..rows];
-        let mut start = first_guess(measured);
+    pub fn start_state(&self, measured: &JointSeries, from: usize, commands: &CommandTrack) -> Option<JointState> {
+        let first = *measured.stamps_ns.get(from)?;
+        let rows = measured.stamps_ns[from..].iter().take_while(|stamp| **stamp - first <= WINDOW_NS).count();
+        let stamps_ns = &measured.stamps_ns[from..from + rows];
+        let mut start = first_guess(measured, from);
         if rows < ENOUGH_ROWS {
             return Some(start);
         }
@@ -32,7 +32,7 @@ impl ArmRollout<'_> {
             self.run(&start, first, commands, stamps_ns, &mut simulated);
             for joint in 0..measured.dof.min(MAX_JOINTS) {
                 let ahead = simulated.iter().zip(stamps_ns).enumerate().map(|(row, (state, stamp))| {
-                    ((stamp - first) as f64 * 1e-9, measured.q_row(row)[joint] - state.q[joint])
+                    ((stamp - first) as f64 * 1e-9, measured.q_row(from + row)[joint] - state.q[joint])
                 });
                 let (position, velocity) = line(&ahead.collect::<Vec<_>>());
                 start.q[joint] += position;
@@ -43,15 +43,15 @@ impl ArmRollout<'_> {
     }
 }
 
-/// The first row; where no velocities were logged, the slope to the second one.
-fn first_guess(measured: &JointSeries) -> JointState {
-    let mut state = JointState::at_rest(joints_from(measured.q_row(0)));
-    if let Some(dq) = measured.dq_row(0) {
+/// The row itself; where no velocities were logged, the slope to the next one.
+fn first_guess(measured: &JointSeries, from: usize) -> JointState {
+    let mut state = JointState::at_rest(joints_from(measured.q_row(from)));
+    if let Some(dq) = measured.dq_row(from) {
         state.dq = joints_from(dq);
-    } else if let [a, b, ..] = measured.stamps_ns[..] {
+    } else if let [a, b, ..] = measured.stamps_ns[from..] {
         let dt = (b - a) as f64 * 1e-9;
         for (joint, dq) in state.dq.iter_mut().enumerate().take(measured.dof) {
-            *dq = (measured.q_row(1)[joint] - measured.q_row(0)[joint]) / dt;
+            *dq = (measured.q_row(from + 1)[joint] - measured.q_row(from)[joint]) / dt;
         }
     }
     state
