@@ -248,7 +248,7 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(48))]
         #[test]
-        fn every_plan_respects_every_limit_or_says_which_one_it_cannot(
+        fn every_plan_respects_every_limit(
             seed in any::<u64>(),
             place in proptest::array::uniform7(0.02..0.98_f64),
             amplitude in 0.05..1.5_f64,
@@ -260,13 +260,13 @@ mod tests {
                 start[joint] = limits.q_min + place[joint] * (limits.q_max - limits.q_min);
             }
             let request = Request { start, amplitude, duration, seed, floor: 0.05 };
-            if let Ok(plan) = plan(&request, &limits, &body) {
-                assert_inside(&plan, &limits, &body, request.floor);
-                let (first, last) = (&plan.set_points[0], &plan.set_points[plan.set_points.len() - 1]);
-                for point in [first, last] {
-                    prop_assert!(point.q_d.iter().zip(&start).all(|(q, start)| (q - start).abs() < 1e-12));
-                    prop_assert!(point.dq_d.iter().all(|dq| dq.abs() < 1e-9));
-                }
+            // Too many refusals fail the test: then it would show nothing.
+            let Ok(plan) = plan(&request, &limits, &body) else { return Err(TestCaseError::reject("no room")) };
+            assert_inside(&plan, &limits, &body, request.floor);
+            let (first, last) = (&plan.set_points[0], &plan.set_points[plan.set_points.len() - 1]);
+            for point in [first, last] {
+                prop_assert!(point.q_d.iter().zip(&start).all(|(q, start)| (q - start).abs() < 1e-12));
+                prop_assert!(point.dq_d.iter().all(|dq| dq.abs() < 1e-9));
             }
         }
     }
