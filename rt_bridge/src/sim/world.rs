@@ -57,6 +57,7 @@ impl World {
     pub fn start(cell: &Cell, theta: Option<&Theta>) -> Result<(Self, SimArm, Views), SimError> {
         let tracker = SimTracker::new(cell);
         let mut cell = SimCell::new(cell, theta)?;
+        let tracker = tracker.with_effects(cell.camera_effects());
         let (to_arm, states) = RingBuffer::new(IN_FLIGHT);
         let (commands, mut from_arm) = RingBuffer::<ArmCommand>::new(IN_FLIGHT);
         let (to_camera, scenes) = RingBuffer::new(SCENES);

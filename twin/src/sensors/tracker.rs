@@ -2,6 +2,7 @@
 //! later, with noise. Base frame.
 
 use super::{camera_clock_ns, generator};
+use crate::effects::{CameraEffects, CameraMemory};
 use crate::scene::SceneSnapshot;
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use rand_distr::{Distribution as _, StandardNormal};
@@ -16,6 +17,8 @@ pub struct SimTracker {
     period_ns: u64,
     latency_ns: u64,
     noise: PoseNoise,
+    effects: CameraEffects,
+    reported: CameraMemory,
     generator: rand_pcg::Pcg64,
     sequence: u64,
     next_picture_ns: u64,
@@ -33,11 +36,19 @@ impl SimTracker {
             period_ns: (1e9 / camera.rate) as u64,
             latency_ns: (camera.latency * 1e9) as u64,
             noise: cell.object.as_ref().and_then(|o| o.pose_noise).unwrap_or(exact),
+            effects: CameraEffects::default(),
+            reported: CameraMemory::default(),
             generator: generator(cell, 3),
             sequence: 0,
             next_picture_ns: 0,
             pending: VecDeque::with_capacity(64),
         }
+    }
+
+    /// The same tracker under effects that nobody is told: its poses are then older than their stamps say, or elsewhere.
+    #[must_use]
+    pub fn with_effects(self, effects: CameraEffects) -> Self {
+        Self { effects, ..self }
     }
 
     /// Shows the tracker the scene; called every control period. Answers with a pose when one becomes known at that
@@ -47,7 +58,7 @@ impl SimTracker {
             self.next_picture_ns = (scene.time_ns / self.period_ns + 1) * self.period_ns;
             if let Some(object) = scene.object {
                 let pose = self.measure(&object, scene.time_ns);
-                self.pending.push_back((scene.time_ns + self.latency_ns, pose));
+                self.pending.push_back((scene.time_ns + self.latency_ns + self.effects.latency_ns(), pose));
             }
         }
         let (known_at, _) = self.pending.front()?;
@@ -60,10 +71,9 @@ impl SimTracker {
         let shift = draw(position);
         let turn = UnitQuaternion::from_scaled_axis(draw(rotation));
         let true_pose = object.isometry();
-        let seen = Pose::<Base, Object>::from_isometry(Isometry3::from_parts(
-            (true_pose.translation.vector + shift).into(),
-            turn * true_pose.rotation,
-        ));
+        let noisy = Isometry3::from_parts((true_pose.translation.vector + shift).into(), turn * true_pose.rotation);
+        let stamp_ns = time_ns + self.effects.latency_ns();
+        let seen = self.effects.seen(&mut self.reported, stamp_ns, Pose::<Base, Object>::from_isometry(noisy));
         let mut covariance = [0.0; 36];
         for axis in 0..3 {
             covariance[7 * axis] = position * position;
@@ -72,7 +82,7 @@ impl SimTracker {
         self.sequence += 1;
         ObjectPose {
             stamp_ns: 0,
-            device_ns: camera_clock_ns(time_ns),
+            device_ns: camera_clock_ns(stamp_ns),
             sequence: self.sequence - 1,
             position: seen.position(),
             wxyz: seen.wxyz(),
@@ -119,6 +129,25 @@ mod tests {
             assert_eq!(pose.device_ns, camera_clock_ns((t - 30) * 1_000_000));
             let late = *t as f64 * 1e-3 - pose.position[0];
             assert!((late - 0.030).abs() < 0.005, "{late} s late");
+        }
+    }
+
+    #[test]
+    fn an_unknown_latency_makes_poses_late_and_their_stamps_too() {
+        let blocks = "[[effect]]\nname = \"camera_latency\"\nlatency = 0.04";
+        let theta: shared_mem::theta::Theta =
+            shared_mem::toml_file::parse(blocks, std::path::Path::new("theta.toml")).expect("a theta.toml");
+        let effects = crate::effects::Effects::from_theta(&theta.effects, 7).expect("a known effect").camera;
+        let mut exact = cell(0.030);
+        exact.object.as_mut().expect("an object").pose_noise = None;
+        let mut tracker = SimTracker::new(&exact).with_effects(effects);
+        let told: Vec<(u64, ObjectPose)> =
+            (0..200).filter_map(|t| tracker.observe(&scene(t)).map(|pose| (t, pose))).collect();
+        assert_eq!(told[0].0, 70, "30 ms that are known and 40 ms that are not");
+        for (t, pose) in told {
+            let stamped = (t - 30) as f64 * 1e-3;
+            assert_eq!(pose.device_ns, camera_clock_ns((t - 30) * 1_000_000));
+            assert!((stamped - pose.position[0] - 0.04).abs() < 1e-12, "{} at {stamped} s", pose.position[0]);
         }
     }
 

@@ -4,9 +4,10 @@
 use super::arm::SimArm;
 use super::{PERIOD, Vector3};
 use crate::arm::PointForce;
+use crate::effects::HitEffects;
 use crate::physics::TableObject;
-use crate::physics::hit::{Capsule, Contact, ContactLaw, Touch};
-use nalgebra::Point3;
+use crate::physics::hit::{Capsule, Contact, ContactLaw};
+use nalgebra::{Isometry3, Point3, Translation3};
 use shared_mem::cell::Cell;
 
 /// Steps of the object in a period without contact: 0.25 ms each.
@@ -21,6 +22,8 @@ const MARGIN: f64 = 1e-3;
 pub(super) struct ToolContact {
     /// Tool and law; `None` without a tool or an object.
     pair: Option<(Capsule, ContactLaw)>,
+    /// From where the flange should hold the tool to where it does, in the flange frame.
+    tool_shift: Option<Translation3<f64>>,
     contact: Contact,
     fine_steps: usize,
     mean_force: f64,
@@ -32,6 +35,7 @@ impl ToolContact {
     pub(super) fn without_object() -> Self {
         Self {
             pair: None,
+            tool_shift: None,
             contact: Contact::default(),
             fine_steps: FINE_STEPS,
             mean_force: 0.0,
@@ -40,11 +44,11 @@ impl ToolContact {
         }
     }
 
-    pub(super) fn new(cell: &Cell, tip_friction: f64) -> Self {
-        let pair = cell.tool.as_ref().map(|tool| {
-            (Capsule { segment: tool.length - tool.radius, radius: tool.radius }, ContactLaw::nominal(tip_friction))
-        });
-        Self { pair, ..Self::without_object() }
+    pub(super) fn new(cell: &Cell, tip_friction: f64, effects: &HitEffects) -> Self {
+        let law = effects.real_law(ContactLaw::nominal(tip_friction));
+        let pair =
+            cell.tool.as_ref().map(|tool| (Capsule { segment: tool.length - tool.radius, radius: tool.radius }, law));
+        Self { pair, tool_shift: effects.tool_shift(), ..Self::without_object() }
     }
 
     /// Makes the fine steps `times` finer: for the test that they are fine enough.
@@ -72,7 +76,8 @@ impl ToolContact {
     /// One period of arm and object.
     pub(super) fn advance(&mut self, arm: &mut SimArm, object: &mut TableObject) {
         self.mean_force = 0.0;
-        match self.pair.filter(|(tool, _)| arm.model().has_geometry() && may_touch(arm, object, tool)) {
+        let near = |tool: &Capsule| may_touch(arm, &self.tool_frame(arm), object, tool);
+        match self.pair.filter(|(tool, _)| arm.model().has_geometry() && near(tool)) {
             Some((tool, law)) => self.advance_finely(arm, object, &tool, &law),
             None => {
                 self.contact = Contact::default();
@@ -86,7 +91,7 @@ impl ToolContact {
     fn advance_finely(&mut self, arm: &mut SimArm, object: &mut TableObject, tool: &Capsule, law: &ContactLaw) {
         let dt = PERIOD / self.fine_steps as f64;
         for _ in 0..self.fine_steps {
-            let touch = touch(arm, object, tool);
+            let touch = object.touch(tool, &self.tool_frame(arm));
             let velocity = tool_velocity(arm, &touch.point);
             let (push, normal_force) = self.contact.force(law, &touch, &velocity, object, dt);
             if normal_force > 0.0 {
@@ -101,6 +106,12 @@ impl ToolContact {
             }
         }
     }
+
+    /// Where the flange holds the tool, in the base frame.
+    fn tool_frame(&self, arm: &SimArm) -> Isometry3<f64> {
+        let flange = arm.model().flange(&arm.state().q).isometry();
+        self.tool_shift.map_or(flange, |shift| flange * shift)
+    }
 }
 
 /// One period of the object alone.
@@ -111,23 +122,18 @@ pub(super) fn settle(object: &mut TableObject) {
 }
 
 /// Whether the gap may close within a period.
-fn may_touch(arm: &SimArm, object: &TableObject, tool: &Capsule) -> bool {
-    let flange = arm.model().flange(&arm.state().q).isometry();
+fn may_touch(arm: &SimArm, held: &Isometry3<f64>, object: &TableObject, tool: &Capsule) -> bool {
     let centre = Point3::from(object.pose().isometry().translation.vector);
-    let on_tool = flange.inverse_transform_point(&centre);
+    let on_tool = held.inverse_transform_point(&centre);
     let nearest = Point3::new(0.0, 0.0, on_tool.z.clamp(0.0, tool.segment));
     // Nothing closes a gap of 20 mm within a millisecond; most periods end here.
     let rough_gap = (on_tool - nearest).norm() - tool.radius - object.bounding_radius();
     if rough_gap > 0.02 {
         return false;
     }
-    let touch = object.touch(tool, &flange);
+    let touch = object.touch(tool, held);
     let approach = (tool_velocity(arm, &touch.point) - object.velocity_at(&touch.point)).norm();
     -touch.depth < MARGIN + approach * PERIOD
-}
-
-fn touch(arm: &SimArm, object: &TableObject, tool: &Capsule) -> Touch {
-    object.touch(tool, &arm.model().flange(&arm.state().q).isometry())
 }
 
 /// Velocity of the last link's point that is at `point` now [m/s].

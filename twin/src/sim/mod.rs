@@ -14,7 +14,7 @@ mod tests;
 pub use arm::Drive;
 
 use crate::arm::{ArmModel, GainError, JointState, Joints, ModelError};
-use crate::effects::{EffectError, Effects};
+use crate::effects::{CameraEffects, EffectError, Effects};
 use crate::physics::{FlatMesh, TableObject};
 use crate::scene::{MeshFileError, ObjectModel, SceneSnapshot};
 use arm::SimArm;
@@ -35,6 +35,7 @@ pub struct SimCell {
     arm: Option<SimArm>,
     object: Option<TableObject>,
     contact: ToolContact,
+    camera: CameraEffects,
     time_ns: u64,
 }
 
@@ -89,10 +90,10 @@ impl SimCell {
                 let place = Vector3::new(x, y, table + model.shape.half_extents().z);
                 let start = Isometry3::new(place, Vector3::z() * cell.simulation.object_yaw);
                 object.set(&Pose::from_isometry(start), Vector3::zeros(), Vector3::zeros());
-                (Some(object), ToolContact::new(cell, model.tip_friction))
+                (Some(object), ToolContact::new(cell, model.tip_friction, &effects.hit))
             }
         };
-        Ok(Self { arm, object, contact, time_ns: 0 })
+        Ok(Self { arm, object, contact, camera: effects.camera, time_ns: 0 })
     }
 
     /// Lets one control period of 1 ms pass. Where the cell has no arm, `drive` moves nothing.
@@ -167,6 +168,12 @@ impl SimCell {
         let object = self.object.as_ref()?;
         let centre = object.pose().isometry().translation.vector.into();
         Some((object.velocity_at(&centre), object.angular_velocity()))
+    }
+
+    /// Effects on what a tracker reports about the object: for the [`crate::sensors::tracker::SimTracker`] of this cell.
+    #[must_use]
+    pub fn camera_effects(&self) -> CameraEffects {
+        self.camera
     }
 
     /// Normal force between tool and object, mean over the last period [N].

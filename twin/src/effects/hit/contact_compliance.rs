@@ -30,3 +30,18 @@ impl ContactCompliance {
         law.stiffness = 1.0 / (1.0 / law.stiffness + self.compliance);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::test_hit::effects;
+    use crate::physics::hit::ContactLaw;
+
+    #[test]
+    fn a_compliance_equal_to_the_nominal_one_halves_the_stiffness() {
+        let nominal = ContactLaw::nominal(0.2);
+        let block = format!("[[effect]]\nname = \"contact_compliance\"\ncompliance = {:?}", 1.0 / nominal.stiffness);
+        let law = effects(&block).real_law(nominal);
+        assert!((law.stiffness / nominal.stiffness - 0.5).abs() < 1e-12, "{}", law.stiffness);
+        assert_eq!(law, ContactLaw { stiffness: law.stiffness, ..nominal });
+    }
+}

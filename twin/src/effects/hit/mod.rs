@@ -4,6 +4,8 @@
 pub(super) mod contact_compliance;
 pub(super) mod object_inertia;
 pub(super) mod restitution;
+#[cfg(test)]
+mod test_hit;
 pub(super) mod tip_friction;
 pub(super) mod tool_offset;
 

@@ -30,3 +30,16 @@ impl Restitution {
         law.restitution = self.restitution;
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::test_hit::effects;
+    use crate::physics::hit::ContactLaw;
+
+    #[test]
+    fn it_takes_the_place_of_the_nominal_one_and_leaves_the_rest() {
+        let nominal = ContactLaw::nominal(0.2);
+        let law = effects("[[effect]]\nname = \"restitution\"\nrestitution = 0.6").real_law(nominal);
+        assert_eq!(law, ContactLaw { restitution: 0.6, ..nominal });
+    }
+}

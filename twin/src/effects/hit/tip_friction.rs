@@ -28,3 +28,18 @@ impl TipFriction {
         law.friction = (law.friction + self.change).max(0.0);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::test_hit::effects;
+    use crate::physics::hit::ContactLaw;
+
+    #[test]
+    fn it_adds_to_the_known_friction_and_never_makes_it_negative() {
+        let law = |change: &str| {
+            let block = format!("[[effect]]\nname = \"tip_friction\"\nchange = {change}");
+            effects(&block).real_law(ContactLaw::nominal(0.25)).friction
+        };
+        assert_eq!((law("0.25"), law("-0.125"), law("-0.3")), (0.5, 0.125, 0.0));
+    }
+}

@@ -28,3 +28,19 @@ impl ToolOffset {
         Translation3::from(self.offset)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::test_hit::{first_contact, flange_rotation};
+    use nalgebra::Vector3;
+
+    #[test]
+    fn a_tip_that_stands_out_ahead_touches_while_the_arm_is_still_that_far_away() {
+        let ahead = flange_rotation().inverse() * Vector3::new(0.0, 0.005, 0.0);
+        let block =
+            format!("[[effect]]\nname = \"tool_offset\"\noffset = [{:?}, {:?}, {:?}]", ahead.x, ahead.y, ahead.z);
+        let ((nominal, speed), (shifted, _)) = (first_contact(""), first_contact(&block));
+        let gained = nominal.y - shifted.y;
+        assert!((gained - 0.005).abs() < 1.5e-3 * speed, "{gained} m at {speed} m/s");
+    }
+}
