@@ -16,15 +16,6 @@ use std::thread::JoinHandle;
 /// Longest time an orderly stop may take [ns]: braking takes at most half a second.
 const STOP_PATIENCE_NS: u64 = 2_000_000_000;
 
-/// How the control thread ended.
-#[derive(Debug)]
-pub struct Outcome {
-    /// What was measured.
-    pub stats: LoopStats,
-    /// `true` when the arm was lost: nothing more could be read.
-    pub lost: bool,
-}
-
 /// Real time was demanded and not granted.
 #[derive(Debug, thiserror::Error)]
 #[error(
@@ -32,7 +23,7 @@ pub struct Outcome {
 )]
 pub struct NotRealtime(Claim);
 
-/// Starts the thread. It runs until `stop` is set, the arm is lost or its recording ends.
+/// Starts the thread, which returns what it measured. It runs until `stop` is set, the arm is lost or its recording ends.
 ///
 /// # Errors
 /// The operating system's, when no thread can be made.
@@ -40,7 +31,7 @@ pub fn spawn(
     mut cycle: Cycle,
     realtime: Realtime,
     stop: Arc<AtomicBool>,
-) -> std::io::Result<JoinHandle<Result<Outcome, NotRealtime>>> {
+) -> std::io::Result<JoinHandle<Result<LoopStats, NotRealtime>>> {
     std::thread::Builder::new().name("control".into()).spawn(move || {
         let claim = Claim::make();
         if realtime == Realtime::Enforce && !claim.is_complete() {
@@ -54,7 +45,7 @@ pub fn spawn(
     })
 }
 
-fn run(mut cycle: Cycle, stop: &AtomicBool) -> Outcome {
+fn run(mut cycle: Cycle, stop: &AtomicBool) -> LoopStats {
     let mut turn = cycle.take_command();
     let mut grid = match cycle.clock() {
         Clock::Timer { period_ns } => Some(Grid::new(now_ns(), period_ns)),
@@ -77,5 +68,5 @@ fn run(mut cycle: Cycle, stop: &AtomicBool) -> Outcome {
         });
         turn = cycle.turn(wake);
     }
-    Outcome { lost: turn == Turn::Lost, stats: cycle.finish() }
+    cycle.finish()
 }

@@ -48,10 +48,8 @@ pub struct Link {
 pub enum Turn {
     /// It does.
     Continue,
-    /// A recording is played through.
+    /// Nothing more will come from the arm: it was lost, or a recording is played through.
     End,
-    /// Nothing more will come from the arm.
-    Lost,
 }
 
 /// What the loop needs to know about the cell.
@@ -318,7 +316,7 @@ impl Cycle {
             self.tell(remark);
         }
         if fault.is_final() {
-            return Turn::Lost;
+            return Turn::End;
         }
         Turn::Continue
     }

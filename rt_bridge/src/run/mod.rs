@@ -12,8 +12,9 @@ use crate::motion::Player;
 use crate::pump::{Notice, Pump, Rings};
 use crate::recorder::child::{Change, RecorderChild};
 use crate::rt::Realtime;
-use crate::rt::control::{self, Outcome};
+use crate::rt::control;
 use crate::rt::cycle::{Cycle, Link, Plan};
+use crate::rt::stats::LoopStats;
 use crate::safety::{Guard, Workspace};
 use anyhow::Result;
 use devices::{Devices, Pictures};
@@ -109,32 +110,18 @@ pub fn run(settings: &Settings, stop: &Arc<AtomicBool>) -> Result<RunReport> {
     let player = Player::new(guard, joints_from(&[]));
     let link = Link { beats: to_pump, remarks: to_words, chunks, pump: pump.thread() };
     let cycle = Cycle::new(devices.arm, devices.plan, player, link);
-    let end_control = Arc::new(AtomicBool::new(false));
-    let control = control::spawn(cycle, settings.realtime, end_control.clone())?;
-    tracing::info!("driving {}; it holds its pose until a motion is sent", settings.arm);
 
     let mut watch = Watch { node, recorder, notices, faults: Vec::new() };
-    let begin = Instant::now();
-    let mut cleared = begin;
-    while !control.is_finished() {
-        let over = settings.duration.is_some_and(|duration| begin.elapsed() >= duration);
-        if over || stop.load(Ordering::Relaxed) || pump.has_ended() {
-            end_control.store(true, Ordering::Relaxed);
-        }
-        watch.look(&mut cleared);
-        std::thread::sleep(LOOK_EVERY);
-    }
-    let outcome = control.join().map_err(|_| anyhow::anyhow!("the control thread failed; please report this"))?;
+    let measured = watch.over(settings, cycle, stop, &pump)?;
     drop(camera);
     let pumped = pump.finish();
     let recorded = watch.recorder.and_then(RecorderChild::finish);
     if let Some(world) = devices.world {
         world.finish();
     }
-    let Outcome { stats, .. } = outcome?;
     let pumped = pumped?;
     let faults = pumped.faults.into_iter().chain(watch.faults).collect();
-    Ok(RunReport::new(&stats, &pumped.age, recorded, faults))
+    Ok(RunReport::new(&measured, &pumped.age, recorded, faults))
 }
 
 /// What the main thread looks after while the control thread runs.
@@ -146,6 +133,25 @@ struct Watch {
 }
 
 impl Watch {
+    /// Starts the control thread and stays until it has ended.
+    fn over(&mut self, settings: &Settings, cycle: Cycle, stop: &AtomicBool, pump: &Pump) -> Result<LoopStats> {
+        let end_control = Arc::new(AtomicBool::new(false));
+        let control = control::spawn(cycle, settings.realtime, end_control.clone())?;
+        tracing::info!("driving {}; it holds its pose until a motion is sent", settings.arm);
+        let begin = Instant::now();
+        let mut cleared = begin;
+        while !control.is_finished() {
+            let over = settings.duration.is_some_and(|duration| begin.elapsed() >= duration);
+            if over || stop.load(Ordering::Relaxed) || pump.has_ended() {
+                end_control.store(true, Ordering::Relaxed);
+            }
+            self.look(&mut cleared);
+            std::thread::sleep(LOOK_EVERY);
+        }
+        let ended = control.join().map_err(|_| anyhow::anyhow!("the control thread failed; please report this"))?;
+        Ok(ended?)
+    }
+
     fn look(&mut self, cleared: &mut Instant) {
         if let Some(change) = self.recorder.as_mut().and_then(RecorderChild::look) {
             let notice = match change {
