@@ -107,6 +107,48 @@ fn neutral_effects_are_no_effects() {
 }
 
 #[test]
+fn an_effect_fades_out_towards_neutral() {
+    let nominal = swing(&Effects::default());
+    for block in every_effect(1e-7) {
+        let name = block.name.clone();
+        let effects = Effects::from_theta(&[block], 7).expect("a known effect");
+        assert!(!effects.is_none(), "{name}");
+        let near = swing(&effects);
+        let change = near.q.iter().zip(nominal.q).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        assert!(change < 2e-6, "{name} moves the arm by {change} rad");
+    }
+}
+
+#[test]
+fn the_documentation_lists_every_effect_with_its_parameters() {
+    let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/effects.md");
+    let text = std::fs::read_to_string(path).expect("docs/effects.md");
+    let rows: Vec<&str> = text.lines().filter(|line| line.starts_with("| `")).collect();
+    let expected: Vec<String> = registry().iter().map(row).collect();
+    assert_eq!(rows, expected, "docs/effects.md should hold:\n{}\n", expected.join("\n"));
+}
+
+/// An effect as docs/effects.md lists it.
+fn row(effect: &twin::effects::EffectInfo) -> String {
+    let parameter = |p: &twin::effects::Parameter| {
+        let count = match p.shape {
+            Shape::Number => String::new(),
+            Shape::PerJoint => " per joint".into(),
+            Shape::Vector(n) => format!(" x {n}"),
+        };
+        let rest = match p.role {
+            Role::Size { neutral } => format!("neutral {neutral}"),
+            Role::Form { default } => format!("default {default}"),
+        };
+        let [low, high] = p.plausible.map(|v| format!("{}", (v * 1e4).round() / 1e4));
+        format!("`{}` [{}]{count}: {low} to {high}, {rest}", p.name, p.unit)
+    };
+    let parameters: Vec<String> = effect.parameters.iter().map(parameter).collect();
+    let others = effect.confusable_with.join(", ");
+    format!("| `{}` | {} | {} | {others} |", effect.name, effect.stage.name(), parameters.join("<br>"))
+}
+
+#[test]
 fn all_effects_may_act_at_once() {
     let effects = Effects::from_theta(&every_effect(0.5), 7).expect("known effects");
     assert!(!effects.is_none());

@@ -2,7 +2,7 @@
 //!
 //! - Equation: `gravity_base = R(tilt)^-1 (0, 0, -g)`, `tilt` turning the base frame about its x and y axes.
 //! - Source: the gravity term of the equations of motion.
-//! - Unit: rad. Plausible: -0.02 to 0.02 (1 degree).
+//! - Unit: rad. Plausible: -0.1 to 0.1 (a careful installation: 0.01).
 //! - Signature: static, in proportion to the horizontal levers of the arm's mass; joint 1 feels it only here.
 //! - Confused with: payload, friction asymmetry, torque gain.
 
@@ -14,7 +14,7 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     name: "base_tilt",
     stage: Stage::Control,
     acts_on: Place::ArmModel,
-    parameters: &[Parameter::size("tilt", "rad", [-0.02, 0.02], 0.0).vector(2).within(-0.5, 0.5)],
+    parameters: &[Parameter::size("tilt", "rad", [-0.1, 0.1], 0.0).vector(2).within(-0.5, 0.5)],
     confusable_with: &["payload", "joint_friction_asymmetry", "torque_gain"],
     install: |values, effects| effects.arm.base_tilt = Some(BaseTilt { tilt: values.vector("tilt") }),
 };

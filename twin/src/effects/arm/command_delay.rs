@@ -2,7 +2,7 @@
 //!
 //! - Equation: `q_d(t) -> q_d(t - delay)`, `dq_d` alike; a fraction of a tick lies on the straight line between two ticks.
 //! - Source: transport delay of network and application layers; 1 to 10 ms on a Franka, 10 to 550 ms in application layers.
-//! - Unit: s. Plausible: 0 to 0.05. Possible: up to 2.
+//! - Unit: s. Plausible: 0 to 0.1. Possible: up to 2.
 //! - Signature (C13): phase lag linear in frequency, no change of gain; error of about `delay dq`.
 //! - Confused with: command lag (in slow motion exactly), viscous friction, camera latency (where only the camera sees the arm).
 
@@ -12,7 +12,7 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     name: "command_delay",
     stage: Stage::Control,
     acts_on: Place::CommandPath,
-    parameters: &[Parameter::size("delay", "s", [0.0, 0.05], 0.0).within(0.0, 2.0)],
+    parameters: &[Parameter::size("delay", "s", [0.0, 0.1], 0.0).within(0.0, 2.0)],
     confusable_with: &["command_lag", "joint_viscous_friction", "camera_latency"],
     install: |values, effects| effects.arm.command_delay = Some(CommandDelay { delay: values.number("delay") }),
 };

@@ -19,9 +19,9 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     install: |values, effects| effects.arm.joint_backlash = Some(JointBacklash { play: values.joints("play") }),
 };
 
-/// Stiffness of a flank where no elasticity is given [N m/rad]: ten times that of a harmonic drive.
-const FLANK_STIFFNESS: f64 = 1e5;
-/// Damping of a flank [N m s/rad]: light links part again with little speed.
+/// Stiffness of a flank where no elasticity is given [N m/rad]: rigid, a full load twists it by 10 microrad.
+const FLANK_STIFFNESS: f64 = 1e7;
+/// Damping of a flank [N m s/rad]: links part again with little speed.
 const FLANK_DAMPING: f64 = 10.0;
 
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -61,6 +61,6 @@ mod tests {
             effects.advance(&mut memory, &arm, &mut state, (&first(0.3), &[0.0; 8]), 1e-3);
         }
         let twist = memory.motor.q[0] - state.q[0];
-        assert!((twist - 0.005 - 0.3 * 0.07 / (ROTOR + 0.07) / 1e5).abs() < 1e-6, "{twist}");
+        assert!((twist - 0.005 - 0.3 * 0.07 / (ROTOR + 0.07) / 1e7).abs() < 1e-9, "{twist}");
     }
 }

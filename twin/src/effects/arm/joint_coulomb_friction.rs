@@ -2,7 +2,7 @@
 //!
 //! - Equation: `tau_f = coulomb sgn(dq)` in motion; at rest whatever up to `coulomb` keeps the joint at rest.
 //! - Source: Armstrong-Helouvry, Dupont, Canudas de Wit 1994, section 2.1; sizes: Gaz et al. 2019 on the Panda.
-//! - Unit: N m at the joint, before the torque sensor. Plausible: 0 to 1.2 (Panda 0.15 to 1.2).
+//! - Unit: N m at the joint, before the torque sensor. Plausible: 0 to 3 (Panda 0.15 to 1.2).
 //! - Signature (C1): odd in velocity and flat over it; `2 coulomb / stiffness` lost at each reversal; odd harmonics.
 //! - Confused with: load friction (alike in one pose), backlash (lost motion too), Stribeck friction (needs creep).
 
@@ -13,7 +13,7 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     name: "joint_coulomb_friction",
     stage: Stage::Control,
     acts_on: Place::Joint,
-    parameters: &[Parameter::size("coulomb", "N m", [0.0, 1.2], 0.0).per_joint().within(0.0, f64::MAX)],
+    parameters: &[Parameter::size("coulomb", "N m", [0.0, 3.0], 0.0).per_joint().within(0.0, f64::MAX)],
     confusable_with: &["joint_load_friction", "joint_stribeck_friction", "joint_backlash"],
     install: |values, effects| {
         effects.arm.joint_coulomb_friction = Some(JointCoulombFriction { coulomb: values.joints("coulomb") });

@@ -3,7 +3,7 @@
 //! - Equation: `tau_J = stiffness (theta - q) + damping (dtheta - dq)`; the rotor inertia lies on the motor's side. The
 //!   encoders sit on the motors, as on a Franka.
 //! - Source: Spong 1987, reduced model of the elastic joint. Integrated implicitly: [`crate::arm::Transmission`].
-//! - Units: stiffness N m/rad; damping N m s/rad. Plausible: stiffness 3e3 to 2e4 (a first mode of 8 to 40 Hz), neutral
+//! - Units: stiffness N m/rad; damping N m s/rad. Plausible: stiffness 1e3 to 2e4 (a first mode of 5 to 40 Hz), neutral
 //!   without bound (`inf`); damping 0 to 10. A joint without rotor inertia stays rigid.
 //! - Signature (C17): sags by `tau_J / stiffness`, seen by a camera and not by the encoders; a resonance.
 //! - Confused with: payload and camera extrinsics (static sag), torque delay (rings too), rotor inertia below resonance.
@@ -16,7 +16,7 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     stage: Stage::Control,
     acts_on: Place::Joint,
     parameters: &[
-        Parameter::size("stiffness", "N m/rad", [3e3, 2e4], f64::INFINITY).per_joint().within(1.0, f64::MAX),
+        Parameter::size("stiffness", "N m/rad", [1e3, 2e4], f64::INFINITY).per_joint().within(1.0, f64::MAX),
         Parameter::form("damping", "N m s/rad", [0.0, 10.0], 2.0).per_joint().within(0.0, f64::MAX),
     ],
     confusable_with: &["payload", "rotor_inertia", "torque_delay", "camera_extrinsic_rotation"],

@@ -2,7 +2,7 @@
 //!
 //! - Equation: `q_measured = q + offset`. The controller sees the measured position, and so does its gravity compensation.
 //! - Source: kinematic calibration literature; a Franka's joints repeat to 0.1 mrad and are off by up to some mrad.
-//! - Unit: rad. Plausible: -3e-3 to 3e-3.
+//! - Unit: rad. Plausible: -0.02 to 0.02 (3e-3 on a calibrated arm).
 //! - Signature (C21): the tip is off by a fixed amount in joint space; the encoders themselves never tell.
 //! - Confused with: camera extrinsics, tool offset, joint elasticity (follows the load).
 
@@ -13,7 +13,7 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     name: "joint_encoder_offset",
     stage: Stage::Control,
     acts_on: Place::JointSensing,
-    parameters: &[Parameter::size("offset", "rad", [-3e-3, 3e-3], 0.0).per_joint()],
+    parameters: &[Parameter::size("offset", "rad", [-0.02, 0.02], 0.0).per_joint()],
     confusable_with: &["camera_extrinsic_rotation", "camera_extrinsic_translation", "tool_offset", "joint_elasticity"],
     install: |values, effects| {
         effects.arm.joint_encoder_offset = Some(JointEncoderOffset { offset: values.joints("offset") });

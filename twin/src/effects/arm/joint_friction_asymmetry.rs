@@ -3,7 +3,7 @@
 //! - Equation: `tau_f = offset`, whatever the direction: with Coulomb friction beside it, `coulomb + offset` one way and
 //!   `coulomb - offset` the other.
 //! - Source: the friction offset of Gaz et al. 2019, equation of the Panda's joint friction.
-//! - Unit: N m at the joint, before the torque sensor. Plausible: -0.3 to 0.3.
+//! - Unit: N m at the joint, before the torque sensor. Plausible: -1 to 1 (Panda -0.3 to 0.3).
 //! - Signature (C5): even in velocity, flat over speed and over pose.
 //! - Confused with: payload and base tilt (even as well, but follow the pose), torque sensor bias (leaves the motion alone).
 
@@ -14,7 +14,7 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     name: "joint_friction_asymmetry",
     stage: Stage::Control,
     acts_on: Place::Joint,
-    parameters: &[Parameter::size("offset", "N m", [-0.3, 0.3], 0.0).per_joint()],
+    parameters: &[Parameter::size("offset", "N m", [-1.0, 1.0], 0.0).per_joint()],
     confusable_with: &["payload", "base_tilt", "torque_sensor_bias"],
     install: |values, effects| {
         effects.arm.joint_friction_asymmetry = Some(JointFrictionAsymmetry { offset: values.joints("offset") });

@@ -2,8 +2,8 @@
 //!
 //! - Equation: `tau_f = (coulomb + excess exp(-(dq / velocity)^2)) sgn(dq)`; at rest up to `coulomb + excess`.
 //! - Source: Armstrong-Helouvry et al. 1994, section 2.1 (Stribeck curve, Gaussian form).
-//! - Units: coulomb, excess N m at the joint, before the torque sensor; velocity rad/s. Plausible: excess up to once
-//!   coulomb's 1.2; velocity 0.01 to 0.2.
+//! - Units: coulomb, excess N m at the joint, before the torque sensor; velocity rad/s. Plausible: coulomb and
+//!   excess 0 to 3, an excess up to once coulomb; velocity 0.01 to 0.2.
 //! - Signature (C3): what Coulomb friction does not explain lies below three times `velocity`; stick-slip at creep.
 //! - Confused with: Coulomb friction (its limit at no excess), backlash, encoder quantisation.
 
@@ -15,8 +15,8 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     stage: Stage::Control,
     acts_on: Place::Joint,
     parameters: &[
-        Parameter::size("coulomb", "N m", [0.0, 1.2], 0.0).per_joint().within(0.0, f64::MAX),
-        Parameter::size("excess", "N m", [0.0, 1.2], 0.0).per_joint().within(0.0, f64::MAX),
+        Parameter::size("coulomb", "N m", [0.0, 3.0], 0.0).per_joint().within(0.0, f64::MAX),
+        Parameter::size("excess", "N m", [0.0, 3.0], 0.0).per_joint().within(0.0, f64::MAX),
         Parameter::form("velocity", "rad/s", [0.01, 0.2], 0.05).per_joint().within(1e-6, f64::MAX),
     ],
     confusable_with: &["joint_coulomb_friction", "joint_backlash"],

@@ -2,7 +2,8 @@
 //!
 //! - Equation: `tau_f = viscous dq`.
 //! - Source: Armstrong-Helouvry et al. 1994, section 2.1; sizes: Gaz et al. 2019 on the Panda.
-//! - Unit: N m s/rad at the joint, before the torque sensor. Plausible: 0 to 0.3 on a Panda, to 2 on hobby servos.
+//! - Unit: N m s/rad at the joint, before the torque sensor. Plausible: 0 to 10 (Panda 0 to 0.3, worn
+//!   or cold gears and hobby servos more).
 //! - Signature (C2): odd in velocity and linear in it; no harmonics.
 //! - Confused with: the controller's damping (exactly, where only encoders are logged and the command rests), torque
 //!   delay (takes damping away), command delay.
@@ -14,7 +15,7 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     name: "joint_viscous_friction",
     stage: Stage::Control,
     acts_on: Place::Joint,
-    parameters: &[Parameter::size("viscous", "N m s/rad", [0.0, 2.0], 0.0).per_joint().within(0.0, f64::MAX)],
+    parameters: &[Parameter::size("viscous", "N m s/rad", [0.0, 10.0], 0.0).per_joint().within(0.0, f64::MAX)],
     confusable_with: &["torque_delay", "command_delay"],
     install: |values, effects| {
         effects.arm.joint_viscous_friction = Some(JointViscousFriction { viscous: values.joints("viscous") });

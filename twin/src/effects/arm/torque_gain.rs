@@ -2,7 +2,7 @@
 //!
 //! - Equation: `tau = gain tau_controller`, gravity compensation included.
 //! - Source: torque constant and gear ratio off by some per cent.
-//! - Unit: 1. Plausible: 0.95 to 1.05.
+//! - Unit: 1. Plausible: 0.8 to 1.2 (calibrated drives 0.95 to 1.05).
 //! - Signature (C11): in proportion to the total torque; sags or rises with the gravity torque of the pose.
 //! - Confused with: payload, and a stiffness where gravity does not act.
 
@@ -13,7 +13,7 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     name: "torque_gain",
     stage: Stage::Control,
     acts_on: Place::TorquePath,
-    parameters: &[Parameter::size("gain", "1", [0.9, 1.1], 1.0).per_joint().within(0.0, 10.0)],
+    parameters: &[Parameter::size("gain", "1", [0.8, 1.2], 1.0).per_joint().within(0.0, 10.0)],
     confusable_with: &["payload", "joint_load_friction"],
     install: |values, effects| effects.arm.torque_gain = Some(TorqueGain { gain: values.joints("gain") }),
 };

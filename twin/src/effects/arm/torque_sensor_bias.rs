@@ -2,7 +2,7 @@
 //!
 //! - Equation: `tau_J_measured = tau_J + bias`.
 //! - Source: drift of strain gauges. On a Franka the controller inside uses the sensor; here the motion does not feel it.
-//! - Unit: N m. Plausible: -0.5 to 0.5.
+//! - Unit: N m. Plausible: -2 to 2 (0.5 after calibration).
 //! - Signature (C22): constant in every pose and at every speed; the motion stays.
 //! - Confused with: friction asymmetry and payload (change the motion).
 
@@ -13,7 +13,7 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     name: "torque_sensor_bias",
     stage: Stage::Control,
     acts_on: Place::JointSensing,
-    parameters: &[Parameter::size("bias", "N m", [-0.5, 0.5], 0.0).per_joint()],
+    parameters: &[Parameter::size("bias", "N m", [-2.0, 2.0], 0.0).per_joint()],
     confusable_with: &["joint_friction_asymmetry", "payload"],
     install: |values, effects| effects.arm.torque_sensor_bias = Some(TorqueSensorBias { bias: values.joints("bias") }),
 };

@@ -3,7 +3,7 @@
 //! - Equation: `pose_reported = R(rotation) pose`, about the base's origin; about the camera instead it differs by a
 //!   constant shift, which is `camera_extrinsic_translation`.
 //! - Source: hand-eye calibration error.
-//! - Unit: rad, rotation vector in the base frame. Plausible: -0.02 to 0.02 (1 degree).
+//! - Unit: rad, rotation vector in the base frame. Plausible: -0.1 to 0.1 (0.02 after calibration).
 //! - Signature (V1): poses at rest are wrong too, by as much more as they are further away; all clips alike.
 //! - Confused with: table tilt (a yaw bends nothing), encoder offset, tool offset.
 
@@ -14,7 +14,7 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     name: "camera_extrinsic_rotation",
     stage: Stage::Camera,
     acts_on: Place::ObjectObservation,
-    parameters: &[Parameter::size("rotation", "rad", [-0.02, 0.02], 0.0).vector(3).within(-3.2, 3.2)],
+    parameters: &[Parameter::size("rotation", "rad", [-0.1, 0.1], 0.0).vector(3).within(-3.2, 3.2)],
     confusable_with: &["camera_extrinsic_translation", "joint_encoder_offset", "tool_offset", "table_tilt"],
     install: |values, effects| {
         effects.camera.camera_extrinsic_rotation =

@@ -2,7 +2,7 @@
 //!
 //! - Equation: `pose_reported = pose + translation` in the base frame.
 //! - Source: hand-eye calibration error.
-//! - Unit: m. Plausible: -0.01 to 0.01.
+//! - Unit: m. Plausible: -0.03 to 0.03 (0.005 after calibration).
 //! - Signature (V1): every pose is off by the same, at rest too.
 //! - Confused with: encoder offset, tool offset, a rotation seen over a small table.
 
@@ -13,7 +13,7 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     name: "camera_extrinsic_translation",
     stage: Stage::Camera,
     acts_on: Place::ObjectObservation,
-    parameters: &[Parameter::size("translation", "m", [-0.01, 0.01], 0.0).vector(3)],
+    parameters: &[Parameter::size("translation", "m", [-0.03, 0.03], 0.0).vector(3)],
     confusable_with: &["camera_extrinsic_rotation", "joint_encoder_offset", "tool_offset"],
     install: |values, effects| {
         effects.camera.camera_extrinsic_translation =

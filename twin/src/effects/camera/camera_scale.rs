@@ -3,7 +3,7 @@
 //! - Equation: `position_reported = (1 + scale) position` about the base's origin; about the camera instead it differs by a
 //!   constant shift, which is `camera_extrinsic_translation`.
 //! - Source: focal length, depth scale or marker size off.
-//! - Unit: 1. Plausible: -0.02 to 0.02.
+//! - Unit: 1. Plausible: -0.1 to 0.1 (0.02 after calibration).
 //! - Signature (V2): in proportion to the distance, at rest too; speeds and decelerations grow alike.
 //! - Confused with: restitution and friction together, an extrinsic translation where the object hardly moves.
 
@@ -14,7 +14,7 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     name: "camera_scale",
     stage: Stage::Camera,
     acts_on: Place::ObjectObservation,
-    parameters: &[Parameter::size("scale", "1", [-0.02, 0.02], 0.0).within(-0.99, 100.0)],
+    parameters: &[Parameter::size("scale", "1", [-0.1, 0.1], 0.0).within(-0.99, 100.0)],
     confusable_with: &["camera_extrinsic_translation", "restitution"],
     install: |values, effects| effects.camera.camera_scale = Some(CameraScale { scale: values.number("scale") }),
 };

@@ -2,7 +2,7 @@
 //!
 //! - Equation: `time_constant dy/dt + y = pose`, taken exactly from picture to picture; rotations along the shorter arc.
 //! - Source: first-order filters of object trackers, one to three pictures long.
-//! - Unit: s. Plausible: 0 to 0.1.
+//! - Unit: s. Plausible: 0 to 0.2.
 //! - Signature (V10): lags in motion, rounds the corner at the impact and the stop; none at rest.
 //! - Confused with: camera latency (no rounding), command lag, contact compliance.
 
@@ -13,7 +13,7 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     name: "tracker_smoothing",
     stage: Stage::Camera,
     acts_on: Place::ObjectObservation,
-    parameters: &[Parameter::size("time_constant", "s", [0.0, 0.1], 0.0).within(0.0, 10.0)],
+    parameters: &[Parameter::size("time_constant", "s", [0.0, 0.2], 0.0).within(0.0, 10.0)],
     confusable_with: &["camera_latency", "command_lag", "contact_compliance"],
     install: |values, effects| {
         effects.camera.tracker_smoothing = Some(TrackerSmoothing { time_constant: values.number("time_constant") });

@@ -2,7 +2,7 @@
 //!
 //! - Equation: `I_zz = factor I_zz,homogeneous` about the object's z axis through the centre of mass.
 //! - Source: rigid-body dynamics; a hollow box has up to 1.7, a core in the middle less than 1.
-//! - Unit: 1. Plausible: 0.5 to 1.7.
+//! - Unit: 1. Plausible: 0.4 to 2.
 //! - Signature (H11): less or more spin after an off-centre hit, and a spin that lasts longer or shorter.
 //! - Confused with: tool offset and tip friction (spin after the hit), pressure distribution (decay of spin).
 
@@ -12,7 +12,7 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     name: "object_inertia",
     stage: Stage::Hit,
     acts_on: Place::Object,
-    parameters: &[Parameter::size("factor", "1", [0.5, 1.7], 1.0).within(0.01, 100.0)],
+    parameters: &[Parameter::size("factor", "1", [0.4, 2.0], 1.0).within(0.01, 100.0)],
     confusable_with: &["tool_offset", "tip_friction", "pressure_distribution"],
     install: |values, effects| effects.hit.object_inertia = Some(ObjectInertia { factor: values.number("factor") }),
 };

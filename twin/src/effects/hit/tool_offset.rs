@@ -2,7 +2,7 @@
 //!
 //! - Equation: `tool_real = flange + offset` in the flange frame; the arm's bodies stay.
 //! - Source: mounting and tool-centre calibration errors.
-//! - Unit: m. Plausible: -0.005 to 0.005.
+//! - Unit: m. Plausible: -0.02 to 0.02 (0.005 after calibration).
 //! - Signature (H6, H7): spin after the hit in proportion to the speed; contact earlier or later.
 //! - Confused with: tip friction, encoder offset, camera extrinsics.
 
@@ -13,7 +13,7 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     name: "tool_offset",
     stage: Stage::Hit,
     acts_on: Place::ToolContact,
-    parameters: &[Parameter::size("offset", "m", [-0.005, 0.005], 0.0).vector(3).within(-1.0, 1.0)],
+    parameters: &[Parameter::size("offset", "m", [-0.02, 0.02], 0.0).vector(3).within(-1.0, 1.0)],
     confusable_with: &["tip_friction", "joint_encoder_offset", "camera_extrinsic_translation"],
     install: |values, effects| effects.hit.tool_offset = Some(ToolOffset { offset: values.vector("offset") }),
 };

@@ -2,7 +2,7 @@
 //!
 //! - Equation: `mu (1 + size cos 2(phi - axis))`, `phi` the heading of the slip.
 //! - Source: first even harmonic of direction-dependent friction; the force stays against the slip.
-//! - Units: size 1; axis rad from the base's x axis. Plausible: size 0 to 0.2, axis -pi/2 to pi/2. At rest the mean counts.
+//! - Units: size 1; axis rad from the base's x axis. Plausible: size 0 to 0.5, axis -pi/2 to pi/2. At rest the mean counts.
 //! - Signature (S7): deceleration repeats twice over a full turn of the heading.
 //! - Confused with: table tilt (repeats once), friction patch (follows the place).
 
@@ -15,7 +15,7 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     stage: Stage::Slide,
     acts_on: Place::Table,
     parameters: &[
-        Parameter::size("size", "1", [0.0, 0.2], 0.0).within(-1.0, 1.0),
+        Parameter::size("size", "1", [0.0, 0.5], 0.0).within(-1.0, 1.0),
         Parameter::form("axis", "rad", [-FRAC_PI_2, FRAC_PI_2], 0.0),
     ],
     confusable_with: &["table_tilt", "friction_patch"],

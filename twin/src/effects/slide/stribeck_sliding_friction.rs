@@ -2,7 +2,7 @@
 //!
 //! - Equation: `mu + excess exp(-(v / velocity)^2)`; at rest `mu + excess`.
 //! - Source: Stribeck curve in Gaussian form, as for joints.
-//! - Units: excess 1; velocity m/s. Plausible: excess -0.1 to 0.1; velocity 0.02 to 0.2.
+//! - Units: excess 1; velocity m/s. Plausible: excess -0.2 to 0.2; velocity 0.02 to 0.3.
 //! - Signature (S3): only the last centimetres of a slide are shorter.
 //! - Confused with: the object's friction, tracker smoothing (rounds the stop), velocity-dependent friction.
 
@@ -13,8 +13,8 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     stage: Stage::Slide,
     acts_on: Place::Table,
     parameters: &[
-        Parameter::size("excess", "1", [-0.1, 0.1], 0.0).within(-10.0, 10.0),
-        Parameter::form("velocity", "m/s", [0.02, 0.2], 0.1).within(1e-6, f64::MAX),
+        Parameter::size("excess", "1", [-0.2, 0.2], 0.0).within(-10.0, 10.0),
+        Parameter::form("velocity", "m/s", [0.02, 0.3], 0.1).within(1e-6, f64::MAX),
     ],
     confusable_with: &["velocity_dependent_friction", "tracker_smoothing"],
     install: |values, effects| {

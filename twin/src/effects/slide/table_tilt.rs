@@ -2,7 +2,7 @@
 //!
 //! - Equation: `gravity = R(tilt)^-1 (0, 0, -g)`, `tilt` turning the table about the base's x and y axes.
 //! - Source: geometry.
-//! - Unit: rad. Plausible: -0.01 to 0.01 (half a degree: 0.09 m/s^2).
+//! - Unit: rad. Plausible: -0.1 to 0.1 (a careful set-up: 0.01, which is 0.1 m/s^2).
 //! - Signature (S6): faster one way and slower the other; paths across bend.
 //! - Confused with: a yaw of the camera, anisotropic friction (repeats after half a turn), friction patch.
 
@@ -13,7 +13,7 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     name: "table_tilt",
     stage: Stage::Slide,
     acts_on: Place::Table,
-    parameters: &[Parameter::size("tilt", "rad", [-0.01, 0.01], 0.0).vector(2).within(-1.5, 1.5)],
+    parameters: &[Parameter::size("tilt", "rad", [-0.1, 0.1], 0.0).vector(2).within(-1.5, 1.5)],
     confusable_with: &["camera_extrinsic_rotation", "anisotropic_friction", "friction_patch"],
     install: |values, effects| effects.slide.table_tilt = Some(TableTilt { tilt: values.vector("tilt") }),
 };

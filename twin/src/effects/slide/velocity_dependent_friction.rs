@@ -2,7 +2,7 @@
 //!
 //! - Equation: `mu0 + slope v`, never below 0.
 //! - Source: first order of any smooth dependence.
-//! - Unit: s/m. Plausible: -0.1 to 0.1.
+//! - Unit: s/m. Plausible: -0.3 to 0.3.
 //! - Signature (S2): deceleration bends over speed; the same for light and heavy objects.
 //! - Confused with: viscous sliding drag (the same for one mass), Stribeck friction, camera distortion.
 
@@ -12,7 +12,7 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     name: "velocity_dependent_friction",
     stage: Stage::Slide,
     acts_on: Place::Table,
-    parameters: &[Parameter::size("slope", "s/m", [-0.1, 0.1], 0.0)],
+    parameters: &[Parameter::size("slope", "s/m", [-0.3, 0.3], 0.0)],
     confusable_with: &["viscous_sliding_drag", "stribeck_sliding_friction"],
     install: |values, effects| {
         effects.slide.velocity_dependent_friction = Some(VelocityDependentFriction { slope: values.number("slope") });
