@@ -30,7 +30,7 @@ pub(crate) struct Replay {
     /// What the laboratory knows about its cell [default: cell.toml beside the clips].
     #[arg(long, value_name = "CELL.TOML")]
     cell: Option<PathBuf>,
-    /// Identified parameters, as `calibration identify` writes them.
+    /// Identified parameters; what they do not name keeps the value of cell.toml.
     #[arg(long, value_name = "THETA.TOML")]
     parameters: Option<PathBuf>,
     /// Writes the recording, its simulation and the gap as a new clip; for a session, a folder of clips.
@@ -54,7 +54,9 @@ impl Replay {
                 eprintln!("{}: {warning}", clip.file);
             }
         }
-        for (file, error) in gap.failures() {
+        // The reason of a lone clip is the whole answer: `bail!` below says it, once.
+        let lone = gap.clips.is_empty() && gap.failures().count() == 1;
+        for (file, error) in gap.failures().filter(|_| !lone) {
             eprintln!("{file}: {error}");
         }
         let mut stdout = std::io::stdout().lock();
@@ -65,6 +67,9 @@ impl Replay {
             write!(stdout, "{gap}")?;
         }
         let failed = gap.failures().count();
+        if let (true, Some((file, error))) = (lone, gap.failures().next()) {
+            bail!("{file}: {error}");
+        }
         if gap.clips.is_empty() {
             bail!("none of the {failed} clips could be replayed; the reasons stand above");
         }
