@@ -87,6 +87,9 @@ impl Pump {
             // Just above ordinary threads: the camera's rendering would make states late by milliseconds otherwise. Where
             // it is not granted, states are as fresh as the scheduler lets them be.
             let _not_granted = process::set_fifo(process::PUMP_PRIORITY);
+            // On the control thread's core it starts the moment that thread sleeps: waking another core takes longer,
+            // and there the simulated world would be in its way.
+            let _bound = process::last_core().map(process::pin_to);
             // iceoryx2's ports belong to the thread that makes them.
             let (node, ports) = match open(rings.poses.is_some()) {
                 Ok(open) => open,

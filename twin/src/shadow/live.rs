@@ -10,6 +10,7 @@ use shared_mem::topics::{ARM_STATE, OBJECT_POSE, TWIN_GAP, TWIN_STATE};
 use shared_mem::transport::{Node, Publisher, Subscriber, TransportError, Wake};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
+use thread_priority::{RealtimeThreadSchedulePolicy, ThreadPriority, ThreadPriorityValue, ThreadSchedulePolicy};
 
 /// A state older than this on arrival means that the twin cannot keep up [ns].
 const TOO_OLD_NS: u64 = 250_000_000;
@@ -19,6 +20,9 @@ const SILENCE: Duration = Duration::from_secs(1);
 const NAP: Duration = Duration::from_millis(100);
 /// How often what dead processes left behind is cleared away.
 const HOUSEKEEPING: Duration = Duration::from_secs(1);
+
+/// Priority under `SCHED_FIFO`: below everything in the bridge (40 and more), above a camera that renders.
+const PRIORITY: u8 = 20;
 
 /// Who wants to know what happens.
 pub trait Watcher {
@@ -80,6 +84,7 @@ impl Live {
         stop: &AtomicBool,
         watcher: &mut dyn Watcher,
     ) -> Result<f64, LiveError> {
+        ask_for_priority();
         let start = Instant::now();
         let (mut heard, mut silent, mut cleaned) = (start, false, start);
         while !stop.load(Ordering::Relaxed) && duration.is_none_or(|d| start.elapsed() < d) {
@@ -136,4 +141,15 @@ impl Live {
         self.predictions.send(&mirrored.state)?;
         self.gaps.send(&mirrored.gap)
     }
+}
+
+/// Mirrors the newest state before ordinary threads go on with what they do. Where the machine refuses, states are
+/// mirrored as soon as the scheduler allows, and the age in the gap shows it.
+fn ask_for_priority() {
+    let Ok(value) = ThreadPriorityValue::try_from(PRIORITY) else { return };
+    let _refused = thread_priority::set_thread_priority_and_policy(
+        thread_priority::thread_native_id(),
+        ThreadPriority::Crossplatform(value),
+        ThreadSchedulePolicy::Realtime(RealtimeThreadSchedulePolicy::Fifo),
+    );
 }
