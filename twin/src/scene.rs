@@ -8,7 +8,7 @@ pub use arm_outline::{ArmOutline, Part};
 pub use mesh_file::MeshFileError;
 
 use nalgebra::{Point3, Vector3};
-use shared_mem::cell::Cell;
+use shared_mem::cell::{Cell, Support};
 use shared_mem::frames::{Base, Object, Pose};
 use shared_mem::msg::Joints;
 use shared_mem::theta::{ObjectTheta, Theta};
@@ -41,6 +41,8 @@ pub struct ObjectModel {
     pub tip_friction: f64,
     /// Restitution against the table, 0 to 1.
     pub restitution: f64,
+    /// How its base carries the load.
+    pub support: Support,
 }
 
 /// Surface of the object around its geometric centre [m].
@@ -80,6 +82,7 @@ impl ObjectModel {
             friction: friction.unwrap_or_else(|| object.nominal_friction()),
             tip_friction: tip_friction.unwrap_or_else(|| object.nominal_tip_friction()),
             restitution: object.nominal_restitution(),
+            support: object.support,
         }))
     }
 }

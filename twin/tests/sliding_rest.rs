@@ -173,6 +173,7 @@ fn solid() -> Solid<'static> {
         mass: MASS,
         inertia: Matrix3::from_diagonal(&Vector3::new(3.4e-4, 4.1e-4, 2.5e-4)),
         support: Support::Corners,
+        pressure_reach: 1.0,
     }
 }
 

@@ -12,6 +12,8 @@ const GRAVITY: f64 = 9.81;
 const POSITION_NOISE: f64 = 1e-3;
 /// An object has begun to move when it is this many sigmas away: 1 of 100 000 resting poses is.
 const MOVED_SIGMAS: f64 = 5.0;
+/// Poses before that one which may show the first of the motion already: at 0.2 m/s it takes two of 60 Hz to be noticed.
+const SLOW_START: usize = 2;
 /// A face that looks down within this angle [rad] is what a resting object stands on.
 const UPRIGHT: f64 = 0.1;
 /// Poses that a start in motion is estimated from: about 70 ms at the frame rate of a fast tracker.
@@ -47,7 +49,7 @@ fn still(series: &ObjectSeries, noise: f64) -> usize {
     let mut sum = Vector3::zeros();
     for (n, pose) in series.poses.iter().enumerate() {
         if n > 0 && (place(pose) - sum / n as f64).norm() > MOVED_SIGMAS * noise * 3.0_f64.sqrt() {
-            return n;
+            return n.saturating_sub(SLOW_START).max(1);
         }
         sum += place(pose);
     }
@@ -130,6 +132,7 @@ mod tests {
             friction: 0.3,
             tip_friction: 0.2,
             restitution: 0.0,
+            support: shared_mem::cell::Support::Corners,
         };
         (object, Cell { table: Some(Table { height: 0.1 }), ..Cell::default() })
     }

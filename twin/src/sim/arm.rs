@@ -115,9 +115,13 @@ impl SimArm {
         self.external = [0.0; MAX_JOINTS];
     }
 
-    /// Moves on by `dt` under the period's motor torque and, perhaps, a force on the tool.
-    pub(super) fn advance(&mut self, dt: f64, load: Option<&PointForce>) {
-        let external = load.map_or([0.0; MAX_JOINTS], |load| self.model.torque_of(&self.state.q, load));
+    /// Moves on by `dt` under the period's motor torque and, perhaps, forces on the tool.
+    pub(super) fn advance(&mut self, dt: f64, loads: &[PointForce]) {
+        let mut external = [0.0; MAX_JOINTS];
+        for load in loads {
+            let torque = self.model.torque_of(&self.state.q, load);
+            external.iter_mut().zip(torque).for_each(|(sum, torque)| *sum += torque);
+        }
         let mut tau = self.motor;
         for i in 0..MAX_JOINTS {
             tau[i] += external[i];

@@ -6,14 +6,15 @@ use super::{PERIOD, Vector3};
 use crate::arm::PointForce;
 use crate::effects::HitEffects;
 use crate::physics::TableObject;
-use crate::physics::hit::{Capsule, Contact, ContactLaw};
+use crate::physics::hit::{ContactLaw, Press};
+use crate::physics::touch::Capsule;
 use nalgebra::{Isometry3, Point3, Translation3};
 use shared_mem::cell::Cell;
 
 /// Steps of the object in a period without contact: 0.25 ms each.
 const COARSE_STEPS: usize = 4;
-/// Steps of both in a period with contact: 62.5 µs, a ninetieth of the shortest contact's duration. Twice as many
-/// change the object's speed after a hit by less than 2 %: `a_finer_step_changes_the_hit_by_less_than_two_per_cent`.
+/// Steps of both in a period with contact: 62.5 µs, a twentieth of a contact's duration. Twice as many change the
+/// object's speed after a hit by less than 2 %: `a_finer_step_changes_the_hit_by_less_than_two_per_cent`.
 const FINE_STEPS: usize = 16;
 /// A gap that is wider than this plus a period's approach stays open for the period [m].
 const MARGIN: f64 = 1e-3;
@@ -24,7 +25,6 @@ pub(super) struct ToolContact {
     pair: Option<(Capsule, ContactLaw)>,
     /// From where the flange should hold the tool to where it does, in the flange frame.
     tool_shift: Option<Translation3<f64>>,
-    contact: Contact,
     fine_steps: usize,
     mean_force: f64,
     periods: u64,
@@ -33,15 +33,7 @@ pub(super) struct ToolContact {
 
 impl ToolContact {
     pub(super) fn without_object() -> Self {
-        Self {
-            pair: None,
-            tool_shift: None,
-            contact: Contact::default(),
-            fine_steps: FINE_STEPS,
-            mean_force: 0.0,
-            periods: 0,
-            first_period: None,
-        }
+        Self { pair: None, tool_shift: None, fine_steps: FINE_STEPS, mean_force: 0.0, periods: 0, first_period: None }
     }
 
     pub(super) fn new(cell: &Cell, tip_friction: f64, effects: &HitEffects) -> Self {
@@ -68,7 +60,6 @@ impl ToolContact {
 
     /// The object was put somewhere else.
     pub(super) fn forget(&mut self) {
-        self.contact = Contact::default();
         self.mean_force = 0.0;
         self.first_period = None;
     }
@@ -80,8 +71,7 @@ impl ToolContact {
         match self.pair.filter(|(tool, _)| arm.model().has_geometry() && near(tool)) {
             Some((tool, law)) => self.advance_finely(arm, object, &tool, &law),
             None => {
-                self.contact = Contact::default();
-                arm.advance(PERIOD, None);
+                arm.advance(PERIOD, &[]);
                 settle(object);
             }
         }
@@ -91,19 +81,17 @@ impl ToolContact {
     fn advance_finely(&mut self, arm: &mut SimArm, object: &mut TableObject, tool: &Capsule, law: &ContactLaw) {
         let dt = PERIOD / self.fine_steps as f64;
         for _ in 0..self.fine_steps {
-            let touch = object.touch(tool, &self.tool_frame(arm));
-            let velocity = tool_velocity(arm, &touch.point);
-            let (push, normal_force) = self.contact.force(law, &touch, &velocity, object, dt);
-            if normal_force > 0.0 {
+            let touches = object.touches(tool, &self.tool_frame(arm));
+            let presses =
+                touches.map(|touch| Press { touch, tool_velocity: tool_velocity(arm, &touch.point), law: *law });
+            let forces = object.step(dt, &presses);
+            let pressing: f64 = touches.iter().zip(&forces).map(|(touch, force)| force.dot(&touch.normal)).sum();
+            if pressing > 0.0 {
                 self.first_period.get_or_insert(self.periods);
-                self.mean_force += normal_force / self.fine_steps as f64;
-                let load = PointForce { point: push.point.into(), force: (-push.force).into() };
-                arm.advance(dt, Some(&load));
-                object.step(dt, Some(push));
-            } else {
-                arm.advance(dt, None);
-                object.step(dt, None);
+                self.mean_force += pressing / self.fine_steps as f64;
             }
+            let loads = [0, 1].map(|i| PointForce { point: touches[i].point.into(), force: (-forces[i]).into() });
+            arm.advance(dt, if pressing > 0.0 { &loads } else { &[] });
         }
     }
 
@@ -117,7 +105,7 @@ impl ToolContact {
 /// One period of the object alone.
 pub(super) fn settle(object: &mut TableObject) {
     for _ in 0..COARSE_STEPS {
-        object.step(PERIOD / COARSE_STEPS as f64, None);
+        object.step(PERIOD / COARSE_STEPS as f64, &[]);
     }
 }
 

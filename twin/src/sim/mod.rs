@@ -85,7 +85,7 @@ impl SimCell {
             None => (None, ToolContact::without_object()),
             Some(model) => {
                 let table = cell.table.ok_or(SimError::NoTable)?.height;
-                let mut object = TableObject::new(&model, Some(table))?;
+                let mut object = TableObject::new(&model, Some(table), &effects)?;
                 let [x, y] = cell.simulation.object_position;
                 let place = Vector3::new(x, y, table + model.shape.half_extents().z);
                 let start = Isometry3::new(place, Vector3::z() * cell.simulation.object_yaw);
@@ -104,7 +104,7 @@ impl SimCell {
         }
         match (arm, object) {
             (Some(arm), Some(object)) => contact.advance(arm, object),
-            (Some(arm), None) => arm.advance(PERIOD, None),
+            (Some(arm), None) => arm.advance(PERIOD, &[]),
             (None, Some(object)) => contact::settle(object),
             (None, None) => {}
         }

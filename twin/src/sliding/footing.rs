@@ -33,6 +33,8 @@ pub struct Solid<'a> {
     pub inertia: Matrix3<f64>,
     /// How the base carries the load.
     pub support: Support,
+    /// Distance of each place of pressure from the middle of the base, over that of `support`.
+    pub pressure_reach: f64,
 }
 
 /// A body that stands with a face on the table.
@@ -100,7 +102,7 @@ impl Footing {
             mass: solid.mass,
             yaw_inertia: (turned * solid.inertia * turned.transpose())[(2, 2)],
             height: -lowest,
-            patch: Patch::of_hull(&hull, solid.support),
+            patch: Patch::of_hull(&hull, solid.support).reaching(solid.pressure_reach),
         };
         Some(Self { slider, upright, table_height })
     }

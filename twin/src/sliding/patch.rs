@@ -69,6 +69,14 @@ impl Patch {
         patch
     }
 
+    /// The same places at `reach` times their distance from the middle of an even pressure.
+    #[must_use]
+    pub fn reaching(mut self, reach: f64) -> Self {
+        let middle = self.places().map(|(point, share)| point * share).sum::<Vector2<f64>>();
+        self.points[..self.count].iter_mut().for_each(|point| *point = middle + (*point - middle) * reach);
+        self
+    }
+
     /// Number of places.
     #[must_use]
     pub fn len(&self) -> usize {

@@ -1,0 +1,214 @@
+//! Where the tool meets the object: a capsule against a convex body, as the two ends of the line they share.
+//!
+//! A tool that lies against a face or along an edge touches along a line, and a rigid line of contact is carried by its
+//! ends: both press, or one lifts and the other presses alone. One point in the middle could not hold the object upright
+//! against the tool. Where the two meet in a point, both ends are that point.
+
+use super::{TableObject, convert};
+use nalgebra::{Isometry3, Point3, Vector3};
+
+/// The tool: a segment along the flange's z axis with a radius around it [m].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Capsule {
+    /// Flange to the far end of the segment: tool length minus radius.
+    pub segment: f64,
+    /// Radius.
+    pub radius: f64,
+}
+
+/// One place where the tool presses into the object.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Touch {
+    /// On the object's surface, base frame.
+    pub point: Point3<f64>,
+    /// Unit vector from the tool into the object.
+    pub normal: Vector3<f64>,
+    /// How deep [m]; negative is the gap between the two.
+    pub depth: f64,
+}
+
+/// Narrowings of the search for the nearest place: 0.3 µm on a tool of 0.15 m.
+const NARROWINGS: usize = 28;
+/// Halvings in the search for an end of the line: 5 µm.
+const HALVINGS: usize = 15;
+/// Directions towards the surface count as one below this angle's cosine: 8 degrees.
+const PARALLEL: f64 = 0.99;
+
+/// The tool's axis and the object, in the object's frame.
+struct Approach<'a> {
+    object: &'a TableObject,
+    object_from_flange: Isometry3<f64>,
+    tool: Capsule,
+}
+
+impl TableObject {
+    /// Where the tool touches the object deepest or comes nearest, for a flange at `base_from_flange`.
+    #[must_use]
+    pub fn touch(&self, tool: &Capsule, base_from_flange: &Isometry3<f64>) -> Touch {
+        let approach = Approach::new(self, tool, base_from_flange);
+        approach.at(approach.nearest())
+    }
+
+    /// The two ends of the line along which tool and object touch, the flange's side first.
+    #[must_use]
+    pub fn touches(&self, tool: &Capsule, base_from_flange: &Isometry3<f64>) -> [Touch; 2] {
+        let approach = Approach::new(self, tool, base_from_flange);
+        let nearest = approach.nearest();
+        let deepest = approach.at(nearest);
+        if deepest.depth <= 0.0 {
+            return [deepest; 2];
+        }
+        approach.shared_stretch().map(|end| approach.at(approach.end_of_line(nearest, end)))
+    }
+}
+
+impl<'a> Approach<'a> {
+    fn new(object: &'a TableObject, tool: &Capsule, base_from_flange: &Isometry3<f64>) -> Self {
+        Self { object, object_from_flange: object.isometry().inverse() * base_from_flange, tool: *tool }
+    }
+
+    fn on_axis(&self, share: f64) -> Point3<f64> {
+        self.object_from_flange * Point3::new(0.0, 0.0, self.tool.segment * share)
+    }
+
+    fn at(&self, share: f64) -> Touch {
+        let (distance, surface, outwards) = self.object.signed_distance(&self.on_axis(share));
+        let base_from_object = self.object.isometry();
+        Touch {
+            point: base_from_object * surface,
+            normal: base_from_object.rotation * -outwards,
+            depth: self.tool.radius - distance,
+        }
+    }
+
+    /// Share of the axis where it is nearest: the distance to a convex body is convex along a line (golden section).
+    fn nearest(&self) -> f64 {
+        const GOLDEN: f64 = 0.618_033_988_749_894_9;
+        let distance = |share: f64| self.object.signed_distance(&self.on_axis(share)).0;
+        let (mut low, mut high) = (0.0, 1.0);
+        let (mut a, mut b) = (1.0 - GOLDEN, GOLDEN);
+        let (mut at_a, mut at_b) = (distance(a), distance(b));
+        for _ in 0..NARROWINGS {
+            if at_a <= at_b {
+                (high, b, at_b) = (b, a, at_a);
+                a = high - GOLDEN * (high - low);
+                at_a = distance(a);
+            } else {
+                (low, a, at_a) = (a, b, at_b);
+                b = low + GOLDEN * (high - low);
+                at_b = distance(b);
+            }
+        }
+        // The search never looks at the ends themselves, and a tool most often touches with its tip.
+        [0.5 * (low + high), 0.0, 1.0].into_iter().min_by(|x, y| distance(*x).total_cmp(&distance(*y))).unwrap_or(1.0)
+    }
+
+    /// Shares between which the object lies beside the axis.
+    fn shared_stretch(&self) -> [f64; 2] {
+        let along = self.object_from_flange.rotation * Vector3::z() / self.tool.segment;
+        let origin = self.object_from_flange.translation.vector;
+        let shares = self.object.corners().iter().map(|corner| along.dot(&(corner.coords - origin)));
+        let (low, high) =
+            shares.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), share| (low.min(share), high.max(share)));
+        [low, high].map(|share| share.clamp(0.0, 1.0))
+    }
+
+    /// How far the line of contact reaches from `nearest` towards `limit`: as long as the surface lies the same way.
+    fn end_of_line(&self, nearest: f64, limit: f64) -> f64 {
+        let way = |share: f64| self.object.signed_distance(&self.on_axis(share)).2;
+        let there = way(nearest);
+        if way(limit).dot(&there) > PARALLEL {
+            return limit;
+        }
+        let (mut on, mut off) = (nearest, limit);
+        for _ in 0..HALVINGS {
+            let middle = 0.5 * (on + off);
+            if way(middle).dot(&there) > PARALLEL { on = middle } else { off = middle }
+        }
+        on
+    }
+}
+
+impl TableObject {
+    /// Distance from the object's surface (negative inside), nearest point of it, and the outward direction; object frame.
+    fn signed_distance(&self, point: &Point3<f64>) -> (f64, Point3<f64>, Vector3<f64>) {
+        let projection = self.shape().project_local_point(convert::point(point), false);
+        let surface = Point3::from(convert::to_vector(projection.point));
+        let outwards = if projection.is_inside { surface - point } else { point - surface };
+        let distance = outwards.norm();
+        let unit = if distance > 1e-12 { outwards / distance } else { Vector3::z() };
+        (if projection.is_inside { -distance } else { distance }, surface, unit)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::effects::Effects;
+    use crate::scene::{ObjectModel, ObjectShape};
+    use shared_mem::cell::Support;
+    use shared_mem::frames::Pose;
+
+    const TOOL: Capsule = Capsule { segment: 0.148, radius: 0.012 };
+
+    fn floating_box() -> TableObject {
+        let model = ObjectModel {
+            shape: ObjectShape::Box { half_extents: Vector3::new(0.04, 0.03, 0.05) },
+            mass: 0.3,
+            centre_of_mass: Vector3::zeros(),
+            friction: 0.3,
+            tip_friction: 0.2,
+            restitution: 0.0,
+            support: Support::Corners,
+        };
+        TableObject::new(&model, None, &Effects::default()).expect("a box")
+    }
+
+    /// An upright tool, `tip` being the end of its segment.
+    fn upright(tip: Point3<f64>) -> Isometry3<f64> {
+        let turn = nalgebra::UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI);
+        Isometry3::from_parts((tip.coords + Vector3::z() * TOOL.segment).into(), turn)
+    }
+
+    #[test]
+    fn a_tool_flat_against_a_face_presses_at_both_ends_of_what_it_covers() {
+        let object = floating_box();
+        // Segment from 0.02 below the centre upwards beyond the top at 0.05.
+        let [top, tip] = object.touches(&TOOL, &upright(Point3::new(-0.0515, 0.0, -0.02)));
+        for touch in [top, tip] {
+            assert!((touch.depth - 0.0005).abs() < 1e-9, "{}", touch.depth);
+            assert!((touch.normal - Vector3::x()).norm() < 1e-6);
+        }
+        assert!((top.point - Point3::new(-0.04, 0.0, 0.05)).norm() < 1e-6, "{}", top.point);
+        assert!((tip.point - Point3::new(-0.04, 0.0, -0.02)).norm() < 1e-6, "{}", tip.point);
+    }
+
+    #[test]
+    fn a_leaning_tool_presses_with_one_end_only() {
+        let object = floating_box();
+        let lean = Isometry3::rotation(Vector3::y() * -0.05);
+        let tip = Point3::new(-0.0515, 0.0, -0.02);
+        let held = Isometry3::translation(tip.x, tip.y, tip.z) * lean * upright(Point3::origin());
+        let [top, tip] = object.touches(&TOOL, &held);
+        assert!(top.depth < 0.0 && tip.depth > 0.0, "{} {}", top.depth, tip.depth);
+        assert!((tip.point.z + 0.02).abs() < 1e-3, "{}", tip.point);
+    }
+
+    #[test]
+    fn a_tool_along_an_edge_presses_at_both_ends_even_when_it_leans_a_little() {
+        let object = floating_box();
+        let lean = Isometry3::rotation(Vector3::new(0.003, 0.0, 0.0));
+        let tip = Point3::new(-0.048, -0.0385, -0.01);
+        let held = Isometry3::translation(tip.x, tip.y, tip.z) * lean * upright(Point3::origin());
+        let [top, tip] = object.touches(&TOOL, &held);
+        assert!((top.point.z - 0.05).abs() < 1e-4 && (tip.point.z + 0.01).abs() < 1e-4, "{} {}", top.point, tip.point);
+    }
+
+    #[test]
+    fn a_tool_away_from_the_object_reports_the_gap() {
+        let mut object = floating_box();
+        object.set(&Pose::from_isometry(Isometry3::translation(0.5, 0.0, 0.0)), Vector3::zeros(), Vector3::zeros());
+        let touch = object.touch(&TOOL, &upright(Point3::new(0.348, 0.0, 0.0)));
+        assert!((touch.depth + 0.1).abs() < 1e-9, "{}", touch.depth);
+    }
+}
