@@ -27,14 +27,9 @@ pub struct TableObject {
     /// Viscous drag over the speed of the base's middle [N s/m].
     drag: f64,
     tumbling: Tumbling,
-    state: State,
-}
-
-/// Who carries the motion.
-#[derive(Debug, Clone, Copy)]
-enum State {
-    Free(FreeBody),
-    Stands(Footing, PlanarState),
+    body: FreeBody,
+    /// How the body stands while it stands: its motion is this one's then.
+    standing: Option<(Footing, PlanarState)>,
 }
 
 /// Gravity [m/s²]; the value the arm model uses too.
@@ -78,55 +73,62 @@ impl TableObject {
             pressure_reach: slide.pressure_reach(),
             drag: slide.drag(),
             tumbling,
-            state: State::Free(FreeBody {
+            body: FreeBody {
                 centre: Point3::from(model.centre_of_mass),
                 rotation: nalgebra::UnitQuaternion::identity(),
                 velocity: Vector3::zeros(),
                 angular_velocity: Vector3::zeros(),
-            }),
+            },
+            standing: None,
         })
     }
 
     /// Lets `dt` seconds pass under gravity, the table and the tool's presses, of which those without depth do nothing;
     /// mean force of each press on the object [N].
     pub fn step(&mut self, dt: f64, presses: &[Press]) -> [Vector3<f64>; 2] {
-        let mut forces = [Vector3::zeros(); 2];
-        let (mut body, mut left) = (self.free(), dt);
+        let (mut body, mut left, mut forces) = (self.body, dt, [Vector3::zeros(); 2]);
         let pressing = presses.iter().any(|press| press.touch.depth > 0.0);
         if pressing {
             forces = self.tumbling.step(&mut body, presses, dt);
+            left = 0.0;
         }
-        if let State::Stands(footing, mut state) = self.state {
-            match footing.slider.step(
-                &mut state,
-                &self.wrench(&self.free(), presses, &forces),
-                &self.tumbling.friction,
-                dt,
-            ) {
+        if let Some((footing, mut state)) = self.standing {
+            let wrench = self.wrench(&self.body, presses, &forces);
+            match footing.slider.step(&mut state, &wrench, &self.tumbling.friction, dt) {
                 Ending::Rests | Ending::Slides => {
-                    self.state = State::Stands(footing, state);
+                    self.standing = Some((footing, state));
+                    self.body = footing.release(&state);
                     return forces;
                 }
                 Ending::Lifts { .. } if pressing => {}
                 Ending::Lifts { left: rest } => (body, left) = (footing.release(&state), rest),
             }
         }
-        if !pressing {
-            let parts = (left / FREE_STEP).ceil();
-            for _ in 0..parts as usize {
-                self.tumbling.step(&mut body, &[], left / parts);
-            }
+        let parts = (left / FREE_STEP).ceil();
+        for _ in 0..parts as usize {
+            self.tumbling.step(&mut body, &[], left / parts);
         }
-        self.state = self.standing(&body, presses, &forces, dt).unwrap_or(State::Free(body));
+        self.settle(body, presses, &forces, dt);
         forces
     }
 
-    /// The state of a body that stands and under these forces goes on standing.
-    fn standing(&self, body: &FreeBody, presses: &[Press], forces: &[Vector3<f64>; 2], dt: f64) -> Option<State> {
+    /// Takes over the state of a free body; as a standing one, if it stands and under these forces goes on standing.
+    fn settle(&mut self, body: FreeBody, presses: &[Press], forces: &[Vector3<f64>; 2], dt: f64) {
+        self.standing = self.standing(&body, presses, forces, dt);
+        self.body = self.standing.as_ref().map_or(body, |(footing, state)| footing.release(state));
+    }
+
+    fn standing(
+        &self,
+        body: &FreeBody,
+        presses: &[Press],
+        forces: &[Vector3<f64>; 2],
+        dt: f64,
+    ) -> Option<(Footing, PlanarState)> {
         let (footing, state) = Footing::find(&self.solid(), body, self.tumbling.table_height?)?;
         let wrench = self.wrench(body, presses, forces);
         let ending = footing.slider.step(&mut { state }, &wrench, &self.tumbling.friction, dt);
-        (!matches!(ending, Ending::Lifts { .. })).then_some(State::Stands(footing, state))
+        (!matches!(ending, Ending::Lifts { .. })).then_some((footing, state))
     }
 
     /// What acts on a standing body but for the table's answer.
@@ -156,7 +158,7 @@ impl TableObject {
             velocity: velocity + angular_velocity.cross(&centre_to_mass),
             angular_velocity,
         };
-        self.state = self.standing(&body, &[], &Default::default(), FREE_STEP).unwrap_or(State::Free(body));
+        self.settle(body, &[], &Default::default(), FREE_STEP);
     }
 
     /// Geometric centre in the base frame.
@@ -168,14 +170,13 @@ impl TableObject {
     /// Velocity of the body's point that is at `point` now, base frame [m/s].
     #[must_use]
     pub fn velocity_at(&self, point: &Point3<f64>) -> Vector3<f64> {
-        let body = self.free();
-        body.velocity + body.angular_velocity.cross(&(point - body.centre))
+        self.body.velocity + self.body.angular_velocity.cross(&(point - self.body.centre))
     }
 
     /// Angular velocity, base frame [rad/s].
     #[must_use]
     pub fn angular_velocity(&self) -> Vector3<f64> {
-        self.free().angular_velocity
+        self.body.angular_velocity
     }
 
     /// Radius of a sphere around the geometric centre that holds the object [m].
@@ -185,7 +186,7 @@ impl TableObject {
     }
 
     pub(super) fn isometry(&self) -> Isometry3<f64> {
-        self.isometry_of(&self.free())
+        self.isometry_of(&self.body)
     }
 
     pub(super) fn corners(&self) -> &[Point3<f64>] {
@@ -198,13 +199,6 @@ impl TableObject {
 
     fn isometry_of(&self, body: &FreeBody) -> Isometry3<f64> {
         Isometry3::from_parts((body.centre - body.rotation * self.centre_of_mass).into(), body.rotation)
-    }
-
-    fn free(&self) -> FreeBody {
-        match &self.state {
-            State::Free(body) => *body,
-            State::Stands(footing, state) => footing.release(state),
-        }
     }
 
     fn solid(&self) -> Solid<'_> {
