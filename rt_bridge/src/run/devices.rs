@@ -102,7 +102,7 @@ impl Devices {
         let camera = camera(settings, cell)?;
         let devices = match &settings.arm {
             ArmChoice::Sim => {
-                let (world, arm, views) = World::start(cell, hidden(settings)?.as_ref())?;
+                let (world, arm, views) = World::start(cell, hidden(settings, plan.interface)?.as_ref())?;
                 Self {
                     arm: Box::new(arm),
                     plan,
@@ -144,11 +144,16 @@ fn camera(settings: &Settings, cell: &Cell) -> Result<bool> {
 }
 
 /// Parameters and effects of the simulated cell, which nobody else is told.
-fn hidden(settings: &Settings) -> Result<Option<Theta>> {
+fn hidden(settings: &Settings, interface: CommandInterface) -> Result<Option<Theta>> {
     let mut theta = settings.parameters.as_deref().map(Theta::read).transpose()?;
     if let Some(path) = &settings.effects {
         let effects = Theta::read(path)?.effects;
         theta.get_or_insert_default().effects.extend(effects);
+    }
+    if interface == CommandInterface::Torque && theta.as_ref().is_some_and(|theta| theta.arm.is_some()) {
+        tracing::warn!(
+            "the gains in --parameters are those of the arm's own controller, which does not act: add --controller joint_impedance"
+        );
     }
     Ok(theta)
 }
