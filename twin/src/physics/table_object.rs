@@ -24,7 +24,7 @@ pub struct TableObject {
     centre_of_mass: Vector3<f64>,
     support: Support,
     pressure_reach: f64,
-    /// Viscous drag over the speed of the base's middle [N s/m].
+    /// Drag of a viscous film under the base over its speed [N s/m].
     drag: f64,
     tumbling: Tumbling,
     body: FreeBody,
@@ -93,7 +93,7 @@ impl TableObject {
             left = 0.0;
         }
         if let Some((footing, mut state)) = self.standing {
-            let wrench = self.wrench(&self.body, presses, &forces);
+            let wrench = self.wrench(&footing, &self.body, presses, &forces);
             match footing.slider.step(&mut state, &wrench, &self.tumbling.friction, dt) {
                 Ending::Rests | Ending::Slides => {
                     self.standing = Some((footing, state));
@@ -126,13 +126,13 @@ impl TableObject {
         dt: f64,
     ) -> Option<(Footing, PlanarState)> {
         let (footing, state) = Footing::find(&self.solid(), body, self.tumbling.table_height?)?;
-        let wrench = self.wrench(body, presses, forces);
+        let wrench = self.wrench(&footing, body, presses, forces);
         let ending = footing.slider.step(&mut { state }, &wrench, &self.tumbling.friction, dt);
         (!matches!(ending, Ending::Lifts { .. })).then_some((footing, state))
     }
 
     /// What acts on a standing body but for the table's answer.
-    fn wrench(&self, body: &FreeBody, presses: &[Press], forces: &[Vector3<f64>; 2]) -> Wrench {
+    fn wrench(&self, footing: &Footing, body: &FreeBody, presses: &[Press], forces: &[Vector3<f64>; 2]) -> Wrench {
         let weight = Wrench::weight(self.tumbling.mass, self.tumbling.gravity);
         let pushed = presses
             .iter()
@@ -142,7 +142,10 @@ impl TableObject {
             Some(height) if self.drag > 0.0 => {
                 let middle = self.isometry_of(body).translation.vector - body.centre.coords;
                 let lever = Vector3::new(middle.x, middle.y, height - body.centre.z);
-                pushed.with_force((body.velocity + body.angular_velocity.cross(&lever)) * -self.drag, lever)
+                let velocity = body.velocity + body.angular_velocity.cross(&lever);
+                let mut dragged = pushed.with_force(velocity * -self.drag, lever);
+                dragged.moment.z -= self.drag * footing.slider.patch.gyration_squared() * body.angular_velocity.z;
+                dragged
             }
             _ => pushed,
         }

@@ -245,7 +245,7 @@ impl Shadow {
     }
 
     fn compare(&mut self, state: &ArmState, age_ns: u64) -> TwinGap {
-        let predicted = self.cell.q();
+        let predicted = self.cell.joint_reading().q;
         let mut joint_error = [0.0; MAX_JOINTS];
         for i in 0..self.dof {
             joint_error[i] = predicted[i] - state.q[i];

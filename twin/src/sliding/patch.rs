@@ -77,6 +77,13 @@ impl Patch {
         self
     }
 
+    /// Mean squared distance of an even pressure from its middle [m²].
+    #[must_use]
+    pub fn gyration_squared(&self) -> f64 {
+        let middle = self.places().map(|(point, share)| point * share).sum::<Vector2<f64>>();
+        self.places().map(|(point, share)| share * (point - middle).norm_squared()).sum()
+    }
+
     /// Number of places.
     #[must_use]
     pub fn len(&self) -> usize {

@@ -21,3 +21,15 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
 pub(in crate::effects) struct ObjectInertia {
     pub(super) factor: f64,
 }
+
+#[cfg(test)]
+mod tests {
+    use crate::effects::slide::test_slide::slid;
+
+    #[test]
+    fn a_spin_lasts_in_proportion_to_the_inertia() {
+        let more = slid("[[effect]]\nname = \"object_inertia\"\nfactor = 1.5", 0.3, 0.0, 8.0, 1.0).1;
+        let ratio = more / slid("", 0.3, 0.0, 8.0, 1.0).1;
+        assert!((ratio - 1.5).abs() < 0.01, "{ratio}");
+    }
+}

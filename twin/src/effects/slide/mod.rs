@@ -6,6 +6,8 @@ pub(super) mod friction_patch;
 pub(super) mod pressure_distribution;
 pub(super) mod stribeck_sliding_friction;
 pub(super) mod table_tilt;
+#[cfg(test)]
+pub(super) mod test_slide;
 pub(super) mod velocity_dependent_friction;
 pub(super) mod viscous_sliding_drag;
 
@@ -32,7 +34,7 @@ impl SlideEffects {
         self.table_tilt.map_or(level, |effect| effect.gravity(level))
     }
 
-    /// Force against the velocity of the base's middle over that velocity [N s/m]; 0 without a viscous film.
+    /// Force of a viscous film under the whole base over the base's velocity [N s/m]; 0 without one.
     #[must_use]
     pub fn drag(&self) -> f64 {
         self.viscous_sliding_drag.map_or(0.0, |effect| effect.drag)
@@ -74,29 +76,5 @@ impl SlideEffects {
             mu *= effect.factor(point);
         }
         mu.max(0.0)
-    }
-}
-
-#[cfg(test)]
-mod test_slide {
-    //! A box that stands on its corners, to try effects on.
-
-    use super::{SlideEffects, TableFriction};
-    use crate::effects::Effects;
-    use crate::sliding::SlidingFriction as _;
-    use nalgebra::Vector2;
-    use shared_mem::theta::Theta;
-    use std::path::Path;
-
-    /// The effects of `[[effect]]` blocks.
-    pub(super) fn effects(blocks: &str) -> SlideEffects {
-        let theta: Theta = shared_mem::toml_file::parse(blocks, Path::new("theta.toml")).expect("a theta.toml");
-        Effects::from_theta(&theta.effects, 7).expect("known effects").slide
-    }
-
-    /// Coefficient on a table of 0.3.
-    pub(super) fn mu(blocks: &str, point: [f64; 2], velocity: [f64; 2]) -> f64 {
-        let friction = TableFriction { nominal: 0.3, effects: Some(effects(blocks)) };
-        friction.mu(Vector2::from(point), Vector2::from(velocity))
     }
 }

@@ -23,3 +23,17 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
 pub(in crate::effects) struct PressureDistribution {
     pub(super) reach: f64,
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::test_slide::slid;
+
+    #[test]
+    fn with_half_the_reach_a_spin_lasts_twice_as_long_and_a_slide_as_long_as_before() {
+        let half = "[[effect]]\nname = \"pressure_distribution\"\nreach = 0.5";
+        let ratio = slid(half, 0.3, 0.0, 8.0, 1.0).1 / slid("", 0.3, 0.0, 8.0, 1.0).1;
+        assert!((ratio - 2.0).abs() < 0.01, "{ratio}");
+        let [with, without] = [half, ""].map(|blocks| slid(blocks, 0.3, 0.5, 0.0, 1.0).0.x);
+        assert!((with / without - 1.0).abs() < 1e-3, "{with} {without}");
+    }
+}

@@ -29,3 +29,21 @@ impl TableTilt {
         Rotation3::new(Vector3::new(self.tilt[0], self.tilt[1], 0.0)).inverse() * level
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::test_slide::slid;
+
+    #[test]
+    fn the_box_slides_down_from_the_friction_angle_on_and_stays_exactly_below_it() {
+        let on = |tilt: f64| {
+            slid(&format!("[[effect]]\nname = \"table_tilt\"\ntilt = [0.0, {tilt:?}]"), 0.3, 0.0, 0.0, 0.5).0
+        };
+        let limit = 0.3f64.atan();
+        assert_eq!(on(0.99 * limit), nalgebra::Vector3::zeros());
+        let down = on(1.1 * limit);
+        let expected = 0.5 * 9.81 * ((1.1 * limit).sin() - 0.3 * (1.1 * limit).cos()) * 0.25;
+        assert!((down.x / expected - 1.0).abs() < 5e-3, "{} m instead of {expected} m", down.x);
+        assert!(down.y.abs() < 1e-6, "{down}");
+    }
+}
