@@ -27,8 +27,19 @@ pub struct Press {
     pub touch: Touch,
     /// Of the tool's point there [m/s].
     pub tool_velocity: Vector3<f64>,
-    /// The law.
-    pub law: ContactLaw,
+    /// What the law asks.
+    pub motion: ContactMotion,
+}
+
+/// The law for one object: the oscillator that the depth follows.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ContactMotion {
+    /// `w` [rad/s].
+    frequency: f64,
+    /// `zeta`.
+    damping_ratio: f64,
+    /// Coulomb friction between tool and object.
+    pub(super) friction: f64,
 }
 
 /// A hard tip on a hard box: 0.3 kg part from the tool after 1 to 2 ms. Half or twice as much moves the mean gap of the
@@ -44,13 +55,24 @@ impl ContactLaw {
         Self { stiffness: STIFFNESS, restitution: RESTITUTION, friction }
     }
 
-    /// Approach speed after `dt`, from depth [m] and approach speed [m/s] before, for an object of `mass`.
-    pub(super) fn approach_after(&self, depth: f64, rate: f64, mass: f64, dt: f64) -> f64 {
-        let frequency = (self.stiffness / mass).sqrt();
-        let damping = damping_ratio(self.restitution) * frequency * dt;
+    /// What it asks of an object of `mass` [kg].
+    #[must_use]
+    pub fn motion(&self, mass: f64) -> ContactMotion {
+        ContactMotion {
+            frequency: (self.stiffness / mass).sqrt(),
+            damping_ratio: damping_ratio(self.restitution),
+            friction: self.friction,
+        }
+    }
+}
+
+impl ContactMotion {
+    /// Approach speed after `dt`, from depth [m] and approach speed [m/s] before.
+    pub(super) fn approach_after(&self, depth: f64, rate: f64, dt: f64) -> f64 {
+        let damping = self.damping_ratio * self.frequency * dt;
         // Spring by the depth before, damper by the mean speed: together with the depth that follows from the new speed
         // this neither feeds nor drains the oscillator.
-        (rate * (1.0 - damping) - frequency * frequency * depth * dt) / (1.0 + damping)
+        (rate * (1.0 - damping) - self.frequency * self.frequency * depth * dt) / (1.0 + damping)
     }
 }
 
@@ -125,7 +147,7 @@ mod tests {
         while time < 0.03 {
             let tool_velocity = velocity - Vector3::z() * fallen;
             let touches = object.touches(&TOOL, &upright(tip));
-            let presses = touches.map(|touch| Press { touch, tool_velocity, law });
+            let presses = touches.map(|touch| Press { touch, tool_velocity, motion: law.motion(0.3) });
             let forces = object.step(dt, &presses);
             velocity -= (forces[0] + forces[1]) * (dt / TOOL_MASS);
             fallen += 9.81 * dt;
@@ -190,7 +212,8 @@ mod tests {
         let peak = |table: Option<f64>| {
             let mut object = TableObject::new(&box_model(), table, &Effects::default()).expect("a box");
             let touch = object.touch(&TOOL, &upright(Point3::new(-0.0519, 0.0, 0.04)));
-            let press = Press { touch, tool_velocity: Vector3::x() * 0.5, law: ContactLaw::nominal(0.0) };
+            let press =
+                Press { touch, tool_velocity: Vector3::x() * 0.5, motion: ContactLaw::nominal(0.0).motion(0.3) };
             object.step(FINE, &[press])[0].x
         };
         assert!(peak(Some(-0.05)) > 1.5 * peak(None), "{} {}", peak(Some(-0.05)), peak(None));

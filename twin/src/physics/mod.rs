@@ -2,8 +2,8 @@
 //!
 //! Each law stands in its own file: where tool and object touch ([`touch`], on parry's distances), how they part
 //! ([`hit`]), how the object tumbles (`tumble`), and, outside, how it slides ([`crate::sliding`]); [`TableObject`] puts
-//! them together. rapier's own solver is not used: it slides a spinning box 32 % off in yaw and gave a struck one twice
-//! the error of the solver here. Called by [`crate::sim`].
+//! them together. rapier's own solver is not used: it slides a spinning box 32 % off in yaw, and it cannot answer a tool
+//! that belongs to an arm outside of it and the table in one solve. Called by [`crate::sim`].
 
 mod convert;
 pub mod hit;

@@ -59,7 +59,7 @@ struct Contact {
     /// Least speed along the normal, relative to the surface, after the step [m/s].
     least_parting: f64,
     friction: f64,
-    /// Velocity gained for one unit of impulse: along the normal, and across it (an upper bound over directions).
+    /// Velocity gained for one unit of impulse: along the normal, and across it in the most mobile direction.
     normal_mobility: f64,
     slip_mobility: f64,
     impulse: Vector3<f64>,
@@ -88,7 +88,7 @@ impl Tumbling {
         for press in presses {
             let lever = press.touch.point - motion.body.centre;
             let before = velocity + spin.cross(&lever);
-            motion.add(press.contact(lever, before, self.mass, dt));
+            motion.add(press.contact(lever, before, dt));
         }
         self.add_corners(&mut motion, &turn, dt);
         motion.settle();
@@ -126,7 +126,7 @@ impl Tumbling {
 }
 
 impl Press {
-    fn contact(&self, lever: Vector3<f64>, velocity: Vector3<f64>, mass: f64, dt: f64) -> Contact {
+    fn contact(&self, lever: Vector3<f64>, velocity: Vector3<f64>, dt: f64) -> Contact {
         let touches = self.touch.depth > 0.0;
         let rate = (self.tool_velocity - velocity).dot(&self.touch.normal);
         Contact {
@@ -135,11 +135,11 @@ impl Press {
             surface_velocity: self.tool_velocity,
             // A place that does not touch may approach at any speed: it keeps its row, and its force is zero.
             least_parting: if touches {
-                -self.law.approach_after(self.touch.depth, rate, mass, dt)
+                -self.motion.approach_after(self.touch.depth, rate, dt)
             } else {
                 f64::NEG_INFINITY
             },
-            friction: self.law.friction,
+            friction: self.motion.friction,
             ..Contact::NONE
         }
     }
@@ -167,12 +167,19 @@ impl Motion<'_> {
         if self.count == MOST_CONTACTS {
             return;
         }
-        let turning = contact.lever.cross(&contact.normal);
-        let normal_mobility = self.inverse_mass + turning.dot(&(self.inverse_inertia * turning));
-        // The trace over all three directions less the normal's is the sum of both across it: a bound for either.
         let cross = contact.lever.cross_matrix();
-        let trace = (cross.transpose() * self.inverse_inertia * cross).trace() + 3.0 * self.inverse_mass;
-        let slip_mobility = trace - normal_mobility - self.inverse_mass;
+        let mobility =
+            cross.transpose() * self.inverse_inertia * cross + Matrix3::from_diagonal_element(self.inverse_mass);
+        let normal_mobility = contact.normal.dot(&(mobility * contact.normal));
+        // The larger eigenvalue of the mobility across the normal, from trace and determinant of that 2 x 2 block.
+        let [x, y, z] = [mobility.column(0), mobility.column(1), mobility.column(2)];
+        let cofactors = Vector3::new(
+            contact.normal.dot(&y.cross(&z)),
+            contact.normal.dot(&z.cross(&x)),
+            contact.normal.dot(&x.cross(&y)),
+        );
+        let (half_trace, determinant) = (0.5 * (mobility.trace() - normal_mobility), contact.normal.dot(&cofactors));
+        let slip_mobility = half_trace + (half_trace * half_trace - determinant).max(0.0).sqrt();
         self.contacts[self.count] = Contact { normal_mobility, slip_mobility, ..contact };
         self.count += 1;
     }

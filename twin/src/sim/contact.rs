@@ -6,10 +6,11 @@ use super::{PERIOD, Vector3};
 use crate::arm::PointForce;
 use crate::effects::HitEffects;
 use crate::physics::TableObject;
-use crate::physics::hit::{ContactLaw, Press};
+use crate::physics::hit::{ContactLaw, ContactMotion, Press};
 use crate::physics::touch::Capsule;
+use crate::scene::ObjectModel;
 use nalgebra::{Isometry3, Point3, Translation3};
-use shared_mem::cell::Cell;
+use shared_mem::cell::{Cell, Tool};
 
 /// Steps of the object in a period without contact: 0.25 ms each.
 const COARSE_STEPS: usize = 4;
@@ -21,8 +22,8 @@ const MARGIN: f64 = 1e-3;
 
 /// The contact between tool and object.
 pub(super) struct ToolContact {
-    /// Tool and law; `None` without a tool or an object.
-    pair: Option<(Capsule, ContactLaw)>,
+    /// Tool and what the law asks of the object; `None` without a tool or an object.
+    pair: Option<(Capsule, ContactMotion)>,
     /// From where the flange should hold the tool to where it does, in the flange frame.
     tool_shift: Option<Translation3<f64>>,
     fine_steps: usize,
@@ -36,10 +37,10 @@ impl ToolContact {
         Self { pair: None, tool_shift: None, fine_steps: FINE_STEPS, mean_force: 0.0, periods: 0, first_period: None }
     }
 
-    pub(super) fn new(cell: &Cell, tip_friction: f64, effects: &HitEffects) -> Self {
-        let law = effects.real_law(ContactLaw::nominal(tip_friction));
-        let pair =
-            cell.tool.as_ref().map(|tool| (Capsule { segment: tool.length - tool.radius, radius: tool.radius }, law));
+    pub(super) fn new(cell: &Cell, object: &ObjectModel, effects: &HitEffects) -> Self {
+        let motion = effects.real_law(ContactLaw::nominal(object.tip_friction)).motion(object.mass);
+        let capsule = |tool: &Tool| Capsule { segment: tool.length - tool.radius, radius: tool.radius };
+        let pair = cell.tool.as_ref().map(|tool| (capsule(tool), motion));
         Self { pair, tool_shift: effects.tool_shift(), ..Self::without_object() }
     }
 
@@ -69,7 +70,7 @@ impl ToolContact {
         self.mean_force = 0.0;
         let near = |tool: &Capsule| may_touch(arm, &self.tool_frame(arm), object, tool);
         match self.pair.filter(|(tool, _)| arm.model().has_geometry() && near(tool)) {
-            Some((tool, law)) => self.advance_finely(arm, object, &tool, &law),
+            Some((tool, motion)) => self.advance_finely(arm, object, &tool, &motion),
             None => {
                 arm.advance(PERIOD, &[]);
                 settle(object);
@@ -78,12 +79,12 @@ impl ToolContact {
         self.periods += 1;
     }
 
-    fn advance_finely(&mut self, arm: &mut SimArm, object: &mut TableObject, tool: &Capsule, law: &ContactLaw) {
+    fn advance_finely(&mut self, arm: &mut SimArm, object: &mut TableObject, tool: &Capsule, motion: &ContactMotion) {
         let dt = PERIOD / self.fine_steps as f64;
         for _ in 0..self.fine_steps {
             let touches = object.touches(tool, &self.tool_frame(arm));
             let presses =
-                touches.map(|touch| Press { touch, tool_velocity: tool_velocity(arm, &touch.point), law: *law });
+                touches.map(|touch| Press { touch, tool_velocity: tool_velocity(arm, &touch.point), motion: *motion });
             let forces = object.step(dt, &presses);
             let pressing: f64 = touches.iter().zip(&forces).map(|(touch, force)| force.dot(&touch.normal)).sum();
             if pressing > 0.0 {

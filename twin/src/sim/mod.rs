@@ -90,7 +90,7 @@ impl SimCell {
                 let place = Vector3::new(x, y, table + model.shape.half_extents().z);
                 let start = Isometry3::new(place, Vector3::z() * cell.simulation.object_yaw);
                 object.set(&Pose::from_isometry(start), Vector3::zeros(), Vector3::zeros());
-                (Some(object), ToolContact::new(cell, model.tip_friction, &effects.hit))
+                (Some(object), ToolContact::new(cell, &model, &effects.hit))
             }
         };
         Ok(Self { arm, object, contact, camera: effects.camera, time_ns: 0 })
