@@ -64,7 +64,10 @@ fn spin_lengthens_the_travel_and_the_pressure_under_the_base_decides_how_far_it_
 
 #[test]
 fn a_six_cornered_base_slides_as_far_and_spins_down_with_its_own_lever_arms() {
-    let corner = |i: i32| Vector2::new((f64::from(i) * 1.0472).cos(), (f64::from(i) * 1.0472).sin()) * 0.04;
+    let corner = |i: i32| {
+        let (sin, cos) = (f64::from(i) * std::f64::consts::FRAC_PI_3).sin_cos();
+        Vector2::new(cos, sin) * 0.04
+    };
     // A ring of radius r and an even disc brake a spin with the lever r and 2/3 r; a hexagon lies a little inside.
     for (support, lever) in [(Support::Corners, 0.04), (Support::Ring, 0.0366), (Support::Uniform, 0.0243)] {
         let base = (0..6).map(corner);
