@@ -33,7 +33,7 @@ fn each_big_dependency_has_one_door() {
     let doors: [(&str, &[&str]); 7] = [
         ("iceoryx2", &["shared_mem/src/transport/", "shared_mem/src/msg/"]),
         ("mcap", &["shared_mem/src/recording/"]),
-        ("rapier3d_f64", &["twin/src/physics/"]),
+        ("parry3d_f64", &["twin/src/physics/"]),
         ("foxglove", &["twin/src/viewer", "shared_mem/src/recording/"]),
         ("franka", &["rt_bridge/src/fr3/"]),
         ("rsruckig", &["rt_bridge/src/motion/", "rt_bridge/src/rt/"]),

@@ -1,7 +1,7 @@
-//! nalgebra (the project's vectors) to and from glam (rapier's). Nothing else converts.
+//! nalgebra (the project's vectors) to and from glam (parry's). Nothing else converts.
 
 use nalgebra::{Matrix3, Point3, Vector3};
-use rapier3d_f64::math::{Matrix, Vector};
+use parry3d_f64::math::{Matrix, Vector};
 
 pub(super) fn vector(v: &Vector3<f64>) -> Vector {
     Vector::new(v.x, v.y, v.z)

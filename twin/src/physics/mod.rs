@@ -1,9 +1,9 @@
-//! Rigid bodies and contact: the only code that knows rapier and parry. World frame = the robot's base frame, SI.
+//! Rigid bodies and contact: the only code that knows parry. World frame = the robot's base frame, SI.
 //!
 //! Each law stands in its own file: where tool and object touch ([`touch`], on parry's distances), how they part
 //! ([`hit`]), how the object tumbles (`tumble`), and, outside, how it slides ([`crate::sliding`]); [`TableObject`] puts
-//! them together. rapier's own solver is not used: it slides a spinning box 32 % off in yaw, and it cannot answer a tool
-//! that belongs to an arm outside of it and the table in one solve. Called by [`crate::sim`].
+//! them together. There is no engine below: rapier slides a spinning box 32 % off in yaw, and cannot solve a tool that belongs
+//! to an arm outside of it together with the table. Called by [`crate::sim`].
 
 mod convert;
 pub mod hit;

@@ -11,7 +11,8 @@ use crate::effects::{Effects, TableFriction};
 use crate::scene::{ObjectModel, ObjectShape};
 use crate::sliding::{Ending, Footing, FreeBody, PlanarState, Solid, Wrench};
 use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
-use rapier3d_f64::prelude::{SharedShape, Vector};
+use parry3d_f64::math::Vector;
+use parry3d_f64::shape::SharedShape;
 use shared_mem::cell::Support;
 use shared_mem::frames::{Base, Object, Pose};
 
@@ -196,7 +197,7 @@ impl TableObject {
         &self.corners
     }
 
-    pub(super) fn shape(&self) -> &dyn rapier3d_f64::parry::shape::Shape {
+    pub(super) fn shape(&self) -> &dyn parry3d_f64::shape::Shape {
         &*self.shape.0
     }
 
@@ -360,7 +361,7 @@ mod tests {
 
     #[test]
     fn a_bounce_returns_the_restitution() {
-        // On a corner right below the centre of mass: a flat landing has four impacts in one step, which rapier adds up.
+        // On a corner right below the centre of mass: a flat landing has four impacts in one step, which act together.
         let mut model = box_model(0.0, 0.5);
         model.centre_of_mass = Vector3::zeros();
         let corner = -Vector3::new(0.04, 0.03, 0.05);

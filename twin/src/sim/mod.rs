@@ -1,6 +1,6 @@
 //! The simulated cell: arm, tool, table and object, moved on by one control period at a time. The bridge's simulated
 //! robot, `twin shadow` and `twin replay` are all this one; called from their threads, never from a control thread
-//! (rapier allocates).
+//! (a contact takes too long for one).
 //!
 //! The arm meets nothing but the object, and that with its tool alone: it passes through the table and through itself.
 //! Units SI, everything in the base frame. Deterministic: the same cell, parameters and drives give the same numbers.
