@@ -94,6 +94,8 @@ pub(super) struct Messages<R> {
     framing: Framing<R>,
     schemas: HashMap<u16, Arc<Schema>>,
     channels: HashMap<u16, Arc<Channel>>,
+    /// A chunk was seen.
+    chunked: bool,
     /// Message bytes of the current chunk, one after the other.
     bytes: Vec<u8>,
     entries: Vec<Entry>,
@@ -123,6 +125,7 @@ impl<R: Read + Seek> Messages<R> {
             framing,
             schemas: HashMap::new(),
             channels: HashMap::new(),
+            chunked: false,
             bytes: Vec::new(),
             entries: Vec::new(),
             next: 0,
@@ -208,8 +211,15 @@ impl<R: Read + Seek> Messages<R> {
 
     fn take_over(&mut self, opcode: u8, record: &[u8], body: &[u8]) -> Result<(), String> {
         match opcode {
-            op::CHUNK => self.chunk(record, body),
+            op::CHUNK => {
+                self.chunked = true;
+                self.chunk(record, body)
+            }
             op::ATTACHMENT => self.attachment(body).ok_or_else(|| "an attachment has changed".into()),
+            // Files have chunks or they have not: beside chunks, this is a chunk's inside laid bare by a changed length,
+            // without the checksum that vouched for it.
+            op::MESSAGE if self.chunked => Err("a message outside of the chunks".into()),
+            op::SCHEMA | op::CHANNEL if self.chunked => Ok(()),
             _ => self.record(opcode, body).ok_or_else(|| "a record has changed".into()),
         }
     }
