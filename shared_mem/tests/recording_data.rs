@@ -22,7 +22,7 @@ fn sessions(root: &Path) -> Vec<PathBuf> {
 }
 
 #[test]
-#[ignore = "needs TWINALIGN_DATA=<folder of recorded sessions>"]
+#[ignore = "needs recorded sessions: TWINALIGN_DATA=FOLDER cargo test --release -p shared_mem --test recording_data -- --ignored --nocapture"]
 fn every_clip_of_every_session_loads() {
     let root = std::env::var_os("TWINALIGN_DATA").expect("TWINALIGN_DATA names a folder of recorded sessions");
     let folders = sessions(Path::new(&root));

@@ -297,7 +297,7 @@ fn the_systems_own_word_for_a_full_disk_is_understood() {
 }
 
 #[test]
-#[ignore = "needs TWINALIGN_SMALL_DISK=<folder on a file system of a few MB, say a tmpfs>"]
+#[ignore = "needs a file system of a few MB, say a tmpfs: TWINALIGN_SMALL_DISK=FOLDER cargo test --release -p shared_mem --test recording_own_clips -- --ignored"]
 fn a_file_system_that_fills_up_leaves_a_readable_clip() {
     let folder = std::env::var_os("TWINALIGN_SMALL_DISK").expect("TWINALIGN_SMALL_DISK names a folder");
     let path = Path::new(&folder).join("clip.mcap");

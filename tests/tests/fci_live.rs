@@ -106,7 +106,7 @@ fn watch(cell: &Cell, duration: Duration) -> Seen {
 }
 
 #[test]
-#[ignore = "needs FRANKA_SIM=<run-franka-sim-server> FR3_MJCF=<fr3.xml>"]
+#[ignore = "needs a simulated robot: FRANKA_SIM=PATH/run-franka-sim-server FR3_MJCF=PATH/fr3.xml cargo test --release --workspace --test fci_live -- --ignored --nocapture"]
 fn a_live_robot_is_moved_for_a_minute_without_a_fault() {
     for controller in ["torque_pd", "joint_impedance"] {
         let (cell, server) = (Cell::shipped(), Server::start());
@@ -133,7 +133,7 @@ fn a_live_robot_is_moved_for_a_minute_without_a_fault() {
 }
 
 #[test]
-#[ignore = "needs FRANKA_SIM=<run-franka-sim-server> FR3_MJCF=<fr3.xml>"]
+#[ignore = "needs a simulated robot: FRANKA_SIM=PATH/run-franka-sim-server FR3_MJCF=PATH/fr3.xml cargo test --release --workspace --test fci_live -- --ignored --nocapture"]
 fn a_robot_that_dies_mid_motion_is_told_of_and_the_recording_is_kept() {
     let (cell, mut server) = (Cell::shipped(), Server::start());
     let bridge = start_bridge(&cell, &server, &["--duration", "60"]);

@@ -23,7 +23,7 @@ fn gap(name: &str, blocks: &str) -> f64 {
 }
 
 #[test]
-#[ignore = "needs TWINALIGN_DATA=<folder of recorded sessions>"]
+#[ignore = "needs recorded sessions: TWINALIGN_DATA=FOLDER cargo test --release -p twin --test effects_clips -- --ignored --nocapture"]
 fn a_known_command_delay_closes_the_gap_down_to_the_noise() {
     let closed = gap("command_delay", "[[effect]]\nname = \"command_delay\"\ndelay = 0.012");
     assert!(gap("command_delay", "") > 2e-3);
@@ -31,7 +31,7 @@ fn a_known_command_delay_closes_the_gap_down_to_the_noise() {
 }
 
 #[test]
-#[ignore = "needs TWINALIGN_DATA=<folder of recorded sessions>"]
+#[ignore = "needs recorded sessions: TWINALIGN_DATA=FOLDER cargo test --release -p twin --test effects_clips -- --ignored --nocapture"]
 fn known_dry_friction_closes_nineteen_twentieths_of_the_gap() {
     // That engine's friction creeps by some mrad/s where this one holds, hence not down to the noise.
     let block = "[[effect]]\nname = \"joint_coulomb_friction\"\ncoulomb = [1.1, 1.1, 1.1, 1.1, 0.66, 0.44, 0.275]";

@@ -27,7 +27,7 @@ fn true_gains(session: &Path) -> ArmTheta {
 }
 
 #[test]
-#[ignore = "needs TWINALIGN_DATA=<folder of recorded sessions>"]
+#[ignore = "needs recorded sessions: TWINALIGN_DATA=FOLDER cargo test --release -p twin --test replay_data -- --ignored --nocapture"]
 fn with_the_true_gains_every_joint_stays_within_20_microrad_of_another_engine() {
     let session = data().join("gap_dev/none_robot");
     let theta = Theta { arm: Some(true_gains(&session)), ..Theta::default() };
@@ -42,7 +42,7 @@ fn with_the_true_gains_every_joint_stays_within_20_microrad_of_another_engine() 
 }
 
 #[test]
-#[ignore = "needs TWINALIGN_DATA=<folder of recorded sessions>"]
+#[ignore = "needs recorded sessions: TWINALIGN_DATA=FOLDER cargo test --release -p twin --test replay_data -- --ignored --nocapture"]
 fn every_session_replays_with_a_figure_for_every_clip() {
     let mut sessions = 0;
     for group in ["gap_dev", "real"] {

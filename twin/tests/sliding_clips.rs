@@ -46,7 +46,7 @@ fn gap(name: &str, effects: Vec<EffectTheta>) -> [f64; 3] {
 }
 
 #[test]
-#[ignore = "needs TWINALIGN_DATA=<folder of recorded sessions>"]
+#[ignore = "needs recorded sessions: TWINALIGN_DATA=FOLDER cargo test --release -p twin --test sliding_clips -- --ignored --nocapture"]
 fn strokes_of_another_engine_are_reproduced_to_a_few_millimetres() {
     let sessions = [
         ("none_slide", ""),
