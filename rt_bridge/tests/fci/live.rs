@@ -94,13 +94,13 @@ fn swept(interface: CommandInterface) {
 }
 
 #[test]
-#[ignore = "needs an FCI server at 127.0.0.1: cargo test --release -p rt_bridge --test fci -- --ignored --nocapture"]
+#[ignore = "needs an FCI server at 127.0.0.1: cargo test --release -p rt_bridge --test fci -- --ignored --test-threads 1 --nocapture"]
 fn torques_sweep_a_live_robot_and_leave_it_idle() {
     swept(CommandInterface::Torque);
 }
 
 #[test]
-#[ignore = "needs an FCI server at 127.0.0.1: cargo test --release -p rt_bridge --test fci -- --ignored --nocapture"]
+#[ignore = "needs an FCI server at 127.0.0.1: cargo test --release -p rt_bridge --test fci -- --ignored --test-threads 1 --nocapture"]
 fn positions_sweep_a_live_robot_and_leave_it_idle() {
     swept(CommandInterface::JointPosition);
 }
