@@ -1,0 +1,127 @@
+//! One clip around one point: residuals, their slopes, and what is left once the clip's own numbers are eliminated.
+//!
+//! With residuals `r`, slopes `A` by the shared and `B` by the own numbers `u`, and their prior precision `L`, the own
+//! numbers follow the shared ones: `du = -(B'B + L)^-1 (B'r + L u + B'A dx)`. What remains for the shared ones is the
+//! Schur complement. Its log-likelihood is that of a Gaussian whose covariance is `1 + B L^-1 B'`.
+
+use super::problem::{ClipModel, Impossible, Random, Unknown};
+use nalgebra::{Cholesky, DMatrix, DVector, DVectorViewMut};
+
+/// A clip, linearised. `P` shared numbers, `Q` own ones.
+#[derive(Debug, Clone)]
+pub struct ClipFit {
+    /// Number of residuals.
+    pub rows: usize,
+    /// Sum of squared residuals.
+    pub chi2: f64,
+    /// The clip's own numbers there, `Q`.
+    pub own: Vec<f64>,
+    /// Their covariance given the shared ones, `Q x Q`.
+    pub own_covariance: DMatrix<f64>,
+    /// `-2 ln` of the clip's likelihood with the own numbers integrated out, without the constant of the noise.
+    pub deviance: f64,
+    /// Half the slope of [`Self::deviance`] by the shared numbers, `P` (the volume term taken as constant).
+    pub gradient: DVector<f64>,
+    /// Information on the shared numbers, `P x P`.
+    pub information: DMatrix<f64>,
+    /// How the own numbers answer to the shared ones and where they want to go: [`ClipFit::own_after`].
+    own_step: DVector<f64>,
+    own_answer: DMatrix<f64>,
+}
+
+impl ClipFit {
+    /// Linearises a clip at (`shared`, `own`). Costs `1 + P + Q` evaluations, `Q` counting only random effects that scatter.
+    ///
+    /// # Errors
+    /// [`Impossible`] when the model has no answer at the point itself. A step without an answer is tried the other way,
+    /// and then counts as one that changes nothing.
+    pub fn at(
+        model: &impl ClipModel,
+        clip: usize,
+        (unknowns, shared): (&[Unknown], &[f64]),
+        (random, own): (&[Random], &[f64]),
+    ) -> Result<Self, Impossible> {
+        let mut base = Vec::new();
+        model.residuals(clip, shared, own, &mut base)?;
+        let mut moved = shared.to_vec();
+        let mut a = DMatrix::zeros(base.len(), unknowns.len());
+        for (k, unknown) in unknowns.iter().enumerate() {
+            let step = if unknown.upper - shared[k] < unknown.step { -unknown.step } else { unknown.step };
+            let column = a.column_mut(k);
+            difference(&base, column, (k, step), &mut moved, |moved, out| model.residuals(clip, moved, own, out));
+        }
+        let mut moved = own.to_vec();
+        let mut b = DMatrix::zeros(base.len(), random.len());
+        for (k, effect) in random.iter().enumerate().filter(|(_, effect)| effect.sigma > 0.0) {
+            let column = b.column_mut(k);
+            difference(&base, column, (k, effect.step), &mut moved, |moved, out| {
+                model.residuals(clip, shared, moved, out)
+            });
+        }
+        Ok(Self::eliminate(&DVector::from_vec(base), &a, &b, random, own))
+    }
+
+    fn eliminate(r: &DVector<f64>, a: &DMatrix<f64>, b: &DMatrix<f64>, random: &[Random], own: &[f64]) -> Self {
+        // A number that does not scatter has no slope and any precision: 1 keeps it where it is.
+        let precision = DVector::from_iterator(
+            random.len(),
+            random.iter().map(|effect| if effect.sigma > 0.0 { effect.sigma.powi(-2) } else { 1.0 }),
+        );
+        let u = DVector::from_column_slice(own);
+        let pull = precision.component_mul(&u);
+        let mut inner = b.tr_mul(b);
+        inner.set_diagonal(&(inner.diagonal() + &precision));
+        let inner = Cholesky::new(inner).expect("a Gram matrix plus positive precisions is positive definite");
+        let (ba, br) = (b.tr_mul(a), b.tr_mul(r) + &pull);
+        let own_step = -inner.solve(&br);
+        let own_answer = -inner.solve(&ba);
+        let log_volume: f64 = inner.ln_determinant() - precision.iter().map(|precision| precision.ln()).sum::<f64>();
+        Self {
+            rows: r.len(),
+            chi2: r.norm_squared(),
+            own: own.to_vec(),
+            deviance: r.norm_squared() + pull.dot(&u) + log_volume,
+            gradient: a.tr_mul(r) + ba.tr_mul(&own_step),
+            information: a.tr_mul(a) + ba.tr_mul(&own_answer),
+            own_covariance: inner.inverse(),
+            own_step,
+            own_answer,
+        }
+    }
+
+    /// Where the own numbers want to go with the shared ones held.
+    #[must_use]
+    pub fn own_way(&self) -> &DVector<f64> {
+        &self.own_step
+    }
+
+    /// The own numbers that go with a step `dx` of the shared ones.
+    #[must_use]
+    pub fn own_after(&self, dx: &DVector<f64>) -> Vec<f64> {
+        let step = &self.own_step + &self.own_answer * dx;
+        self.own.iter().zip(step.iter()).map(|(own, step)| own + step).collect()
+    }
+}
+
+/// Slope of the residuals by `moved[k]`, by a step forward or, where that has no answer, backward.
+fn difference(
+    base: &[f64],
+    mut column: DVectorViewMut<'_, f64>,
+    (k, step): (usize, f64),
+    moved: &mut [f64],
+    evaluate: impl Fn(&[f64], &mut Vec<f64>) -> Result<(), Impossible>,
+) {
+    let mut out = Vec::with_capacity(base.len());
+    let kept = moved[k];
+    for step in [step, -step] {
+        moved[k] = kept + step;
+        // What rounding left of the step.
+        let step = moved[k] - kept;
+        let answer = evaluate(moved, &mut out);
+        moved[k] = kept;
+        if answer.is_ok() && out.len() == base.len() {
+            column.iter_mut().zip(&out).zip(base).for_each(|((slope, out), base)| *slope = (out - base) / step);
+            return;
+        }
+    }
+}

@@ -1,0 +1,22 @@
+//! Estimation over clips: what a set of numbers makes of every clip, which numbers fit best, and how sure that is.
+//!
+//! The clip is the unit of evidence. Samples within a clip share its friction, its start, its clock, so they are no
+//! independent witnesses; whatever varies from clip to clip is a number *of its own* for every clip with a prior of zero
+//! mean (a random effect), eliminated clip by clip. What is asked for is *shared* by all clips.
+//!
+//! | module | owns |
+//! |---|---|
+//! | [`problem`] | the two kinds of unknowns, and the question a model answers: residuals of one clip |
+//! | [`linear`] | one clip linearised, its own numbers eliminated |
+//! | [`least_squares`] | bounded Levenberg-Marquardt on all clips |
+//!
+//! Residuals are in units of their standard deviation. Everything is deterministic: clips are worked on by many threads,
+//! but always summed in their order.
+
+pub mod least_squares;
+pub mod linear;
+pub mod problem;
+
+pub use least_squares::{Fit, Options, fit, fit_from, score};
+pub use linear::ClipFit;
+pub use problem::{ClipModel, Impossible, Random, Unknown};

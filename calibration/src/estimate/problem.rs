@@ -1,0 +1,47 @@
+//! What is asked of a set of clips, in numbers.
+
+/// A number that all clips share and that is to be found.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Unknown {
+    /// Name in reports: `stiffness[2]`, `friction`, `command_delay.delay`.
+    pub name: String,
+    /// Where the search begins; inside the bounds.
+    pub start: f64,
+    /// Lowest value of the search.
+    pub lower: f64,
+    /// Highest value of the search.
+    pub upper: f64,
+    /// Difference step: small against the scale on which the answer bends, large against rounding and events.
+    pub step: f64,
+}
+
+/// A number of which every clip has its own, scattered around zero.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Random {
+    /// Name in reports: `ln friction`, `start x`.
+    pub name: String,
+    /// One sigma of its scatter from clip to clip; 0 holds it at zero.
+    pub sigma: f64,
+    /// Difference step.
+    pub step: f64,
+}
+
+/// The model has no answer there: the simulation left all bounds, or a number has no meaning.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{0}")]
+pub struct Impossible(pub String);
+
+/// Clips and what a model says about them.
+pub trait ClipModel: Sync {
+    /// How many clips there are.
+    fn clips(&self) -> usize;
+
+    /// Measured less predicted of clip `clip`, every row divided by its standard deviation, into `out` (cleared first).
+    ///
+    /// `shared` in the order of the unknowns, `own` in the order of the random effects. The same number of rows in
+    /// the same order on every call for a clip; the same bits for the same input on whatever thread.
+    ///
+    /// # Errors
+    /// [`Impossible`] where the model has no answer.
+    fn residuals(&self, clip: usize, shared: &[f64], own: &[f64], out: &mut Vec<f64>) -> Result<(), Impossible>;
+}
