@@ -1,6 +1,6 @@
 //! Capture: plan a motion, have the bridge play it, record it into a session folder.
 //!
-//! Planning is pure ([`plan`], on [`multisine`], [`limits`], [`body`]); playing goes through shared memory only
+//! Planning is pure ([`plan`] for excitation, [`stroke`] for Control-Hit-Slide, on [`multisine`], [`line`], [`limits`], [`body`]); playing goes through shared memory only
 //! ([`stream`], [`link`]); recording is a process beside us ([`recorder`]); [`excitation`] is the verb that binds them.
 
 pub mod body;
@@ -8,6 +8,7 @@ pub mod bridge;
 pub mod excess;
 pub mod excitation;
 pub mod limits;
+pub mod line;
 pub mod link;
 pub mod multisine;
 pub mod plan;
@@ -15,3 +16,4 @@ pub mod quality;
 pub mod recorder;
 pub mod session;
 pub mod stream;
+pub mod stroke;
