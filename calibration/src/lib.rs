@@ -13,6 +13,7 @@
 //! | [`interrupt`] | Ctrl-C |
 //! | [`progress`] | the bar on stderr |
 
+pub mod benchmark;
 pub mod capture;
 pub mod demo;
 pub mod estimate;
