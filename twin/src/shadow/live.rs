@@ -143,13 +143,28 @@ impl Live {
     }
 }
 
-/// Mirrors the newest state before ordinary threads go on with what they do. Where the machine refuses, states are
-/// mirrored as soon as the scheduler allows, and the age in the gap shows it.
+/// Mirrors the newest state before ordinary threads go on with what they do, on the core on which the bridge publishes
+/// (the last one): waking a thread there takes a few microseconds, on another core, when that one sleeps, tens of them.
+/// Where the machine refuses, states are mirrored as soon as the scheduler allows, and the age in the gap shows it.
 fn ask_for_priority() {
     let Ok(value) = ThreadPriorityValue::try_from(PRIORITY) else { return };
-    let _refused = thread_priority::set_thread_priority_and_policy(
+    let raised = thread_priority::set_thread_priority_and_policy(
         thread_priority::thread_native_id(),
         ThreadPriority::Crossplatform(value),
         ThreadSchedulePolicy::Realtime(RealtimeThreadSchedulePolicy::Fifo),
     );
+    // Without a real-time priority it would wait there behind the bridge and everything else.
+    if raised.is_ok() {
+        let _bound = bind_to_last_core();
+    }
+}
+
+fn bind_to_last_core() -> rustix::io::Result<()> {
+    let allowed = rustix::thread::sched_getaffinity(None)?;
+    let mut last = rustix::thread::CpuSet::new();
+    if let Some(core) = (0..rustix::thread::CpuSet::MAX_CPU).rev().find(|core| allowed.is_set(*core)) {
+        last.set(core);
+        rustix::thread::sched_setaffinity(None, &last)?;
+    }
+    Ok(())
 }
