@@ -8,6 +8,7 @@
 //! | [`capture`] | planning a motion, having the bridge play it, recording it into a session folder |
 //! | [`demo`] | the whole story on the simulated cell, in one command |
 //! | [`estimate`] | fits over clips: what all clips share, what varies from clip to clip |
+//! | [`forward`] | what the twin makes of recorded clips, as residuals |
 //! | [`report`] | pages with plots |
 //! | [`processes`] | the other programs as children |
 //! | [`interrupt`] | Ctrl-C |
@@ -17,6 +18,7 @@ pub mod benchmark;
 pub mod capture;
 pub mod demo;
 pub mod estimate;
+pub mod forward;
 pub mod interrupt;
 pub mod processes;
 pub mod progress;

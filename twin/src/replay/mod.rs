@@ -11,7 +11,7 @@
 //! | `session` | all clips of a session, on all cores |
 //! | `write` | a simulated clip on disk |
 
-mod object_start;
+pub mod object_start;
 mod predict;
 mod report;
 mod session;

@@ -23,16 +23,17 @@ const CLEARANCE: f64 = 3e-3;
 
 /// How the object moved at the first pose.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Motion {
-    pub(super) pose: Pose<Base, Object>,
+pub struct Motion {
+    /// Its pose.
+    pub pose: Pose<Base, Object>,
     /// Of the geometric centre [m/s].
-    pub(super) velocity: Vector3<f64>,
+    pub velocity: Vector3<f64>,
     /// In the base frame [rad/s].
-    pub(super) angular_velocity: Vector3<f64>,
+    pub angular_velocity: Vector3<f64>,
 }
 
 /// Mean of the poses before the object first moves, set down flat on the table. `None` without poses.
-pub(super) fn resting(series: &ObjectSeries, object: &ObjectModel, cell: &Cell) -> Option<Pose<Base, Object>> {
+pub fn resting(series: &ObjectSeries, object: &ObjectModel, cell: &Cell) -> Option<Pose<Base, Object>> {
     let noise = cell.object.as_ref().and_then(|o| o.pose_noise).map_or(POSITION_NOISE, |n| n.position);
     let poses = &series.poses[..still(series, noise)];
     let mean = mean_pose(poses)?;
@@ -87,7 +88,7 @@ fn lowest(shape: &ObjectShape, pose: &Isometry3<f64>) -> f64 {
 
 /// Pose and velocities at the first pose, by straight lines through the first poses, free fall taken out while the
 /// object flies. `None` with fewer than three poses.
-pub(super) fn moving(series: &ObjectSeries, object: &ObjectModel, cell: &Cell) -> Option<Motion> {
+pub fn moving(series: &ObjectSeries, object: &ObjectModel, cell: &Cell) -> Option<Motion> {
     let table = cell.table.map_or(f64::NEG_INFINITY, |t| t.height);
     let clear = |pose: &Pose<Base, Object>| lowest(&object.shape, &pose.isometry()) > table + CLEARANCE;
     let flying = series.poses.iter().take_while(|pose| clear(pose)).count();
