@@ -8,8 +8,8 @@ pub use arm_outline::{ArmOutline, Part};
 pub use mesh_file::MeshFileError;
 
 use nalgebra::{Point3, Vector3};
-use shared_mem::cell::{Cell, Support};
-use shared_mem::frames::{Base, Object, Pose};
+use shared_mem::cell::{Cell, Object, Support};
+use shared_mem::frames::{Base, Pose};
 use shared_mem::msg::Joints;
 use shared_mem::theta::{ObjectTheta, Theta};
 
@@ -23,7 +23,7 @@ pub struct SceneSnapshot {
     /// Joint positions [rad].
     pub q: Joints,
     /// The object's geometric centre, where there is an object.
-    pub object: Option<Pose<Base, Object>>,
+    pub object: Option<Pose<Base, shared_mem::frames::Object>>,
 }
 
 /// The object with every number a simulation needs.
@@ -43,6 +43,21 @@ pub struct ObjectModel {
     pub restitution: f64,
     /// How its base carries the load.
     pub support: Support,
+}
+
+/// What can be identified about an object, and its restitution.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ObjectParameters {
+    /// Mass [kg].
+    pub mass: f64,
+    /// Centre of mass from the geometric centre, object frame [m].
+    pub centre_of_mass: Vector3<f64>,
+    /// Coulomb friction on the table.
+    pub friction: f64,
+    /// Coulomb friction against the tool.
+    pub tip_friction: f64,
+    /// Restitution against the table, 0 to 1.
+    pub restitution: f64,
 }
 
 /// Surface of the object around its geometric centre [m].
@@ -73,17 +88,32 @@ impl ObjectModel {
             (Some(file), _) => mesh_file::read(&cell.folder.join(file))?,
             (None, size) => ObjectShape::Box { half_extents: Vector3::from(size.unwrap_or([0.05; 3])) * 0.5 },
         };
-        let known = theta.and_then(|t| t.object.clone()).unwrap_or_default();
-        let ObjectTheta { friction, mass, centre_of_mass, tip_friction } = known;
-        Ok(Some(Self {
-            shape,
-            mass: mass.unwrap_or_else(|| object.nominal_mass()),
-            centre_of_mass: Vector3::from(centre_of_mass.unwrap_or_default()),
-            friction: friction.unwrap_or_else(|| object.nominal_friction()),
-            tip_friction: tip_friction.unwrap_or_else(|| object.nominal_tip_friction()),
+        let ObjectParameters { mass, centre_of_mass, friction, tip_friction, restitution } =
+            ObjectParameters::new(object, theta);
+        Ok(Some(Self { shape, mass, centre_of_mass, friction, tip_friction, restitution, support: object.support }))
+    }
+
+    /// Its parameters.
+    #[must_use]
+    pub fn parameters(&self) -> ObjectParameters {
+        let Self { mass, centre_of_mass, friction, tip_friction, restitution, .. } = *self;
+        ObjectParameters { mass, centre_of_mass, friction, tip_friction, restitution }
+    }
+}
+
+impl ObjectParameters {
+    /// What `theta` knows, else the nominal values of cell.toml.
+    #[must_use]
+    pub fn new(object: &Object, theta: Option<&Theta>) -> Self {
+        let known = theta.and_then(|t| t.object.as_ref());
+        let of = |value: fn(&ObjectTheta) -> Option<f64>| known.and_then(value);
+        Self {
+            mass: of(|o| o.mass).unwrap_or_else(|| object.nominal_mass()),
+            centre_of_mass: Vector3::from(known.and_then(|o| o.centre_of_mass).unwrap_or_default()),
+            friction: of(|o| o.friction).unwrap_or_else(|| object.nominal_friction()),
+            tip_friction: of(|o| o.tip_friction).unwrap_or_else(|| object.nominal_tip_friction()),
             restitution: object.nominal_restitution(),
-            support: object.support,
-        }))
+        }
     }
 }
 

@@ -14,6 +14,14 @@ pub struct PointForce {
     pub force: [f64; 3],
 }
 
+/// An arm under a torque.
+pub(super) struct Response<const N: usize> {
+    pub(super) acceleration: [f64; N],
+    pub(super) tau: [f64; N],
+    /// What of the torque holds the arm against gravity.
+    pub(super) gravity: [f64; N],
+}
+
 impl ArmModel {
     /// Torques that hold the arm still against gravity [N m].
     #[must_use]
@@ -66,7 +74,7 @@ impl ArmModel {
     /// Joint accelerations under joint torques [rad/s²].
     #[must_use]
     pub fn accelerations(&self, state: &JointState, tau: &Joints) -> Joints {
-        with_dof!(self, N => filled(&self.respond::<N>(first(&state.q), first(&state.dq), |_| *first(tau)).0))
+        with_dof!(self, N => filled(&self.respond::<N>(first(&state.q), first(&state.dq), |_| *first(tau)).acceleration))
     }
 
     /// Joint torques that a force on the last link amounts to [N m]: add them to the motors' torques.
@@ -99,14 +107,14 @@ impl ArmModel {
         })
     }
 
-    /// Accelerations under the torque that `torque` answers for the bias of this state, and that torque.
+    /// What happens under the torque that `torque` answers for the bias of this state.
     #[inline(always)]
     pub(super) fn respond<const N: usize>(
         &self,
         q: &[f64; N],
         dq: &[f64; N],
         torque: impl FnOnce(&[f64; N]) -> [f64; N],
-    ) -> ([f64; N], [f64; N]) {
+    ) -> Response<N> {
         let links = first::<N, _>(&self.links);
         let chain = Chain::at(links, q);
         let bodies = chain.bodies(links);
@@ -118,7 +126,7 @@ impl ArmModel {
         for i in 0..N {
             free[i] -= bias[i];
         }
-        (solve(&mass, &free), tau)
+        Response { acceleration: solve(&mass, &free), tau, gravity: chain.gravity(&bodies, self.gravity) }
     }
 
     /// The first joint whose inertia, with all joints behind it free to move, is nothing.

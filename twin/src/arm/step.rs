@@ -5,6 +5,7 @@
 //! simulators use needs 1/16 ms for 5e-5 rad. Called by [`crate::rollout`], the simulated cell and the shadow.
 
 use super::control::ControlLaw;
+use super::dynamics::Response;
 use super::kernel::{filled, first, with_dof};
 use super::{ArmModel, JointState, Joints};
 
@@ -18,7 +19,7 @@ impl ArmModel {
     }
 
     /// Evaluates the controller at `state`, moves `state` on by `dt` seconds under the torque it asks for, and returns
-    /// that torque [N m].
+    /// that torque and the gravity it contains [N m].
     ///
     /// The model inside the controller is this arm itself, so its compensation costs nothing extra. Where the two
     /// differ, use [`ControlLaw::torque`] and [`ArmModel::step`].
@@ -29,33 +30,35 @@ impl ArmModel {
         q_d: &Joints,
         dq_d: &Joints,
         dt: f64,
-    ) -> Joints {
+    ) -> (Joints, Joints) {
         let before = *state;
         with_dof!(self, N => {
-            filled(&self.midpoint::<N>(state, dt, |bias| *first(&law.torque_with(&before, q_d, dq_d, &filled(bias)))))
+            let torque = |bias: &[f64; N]| *first(&law.torque_with(&before, q_d, dq_d, &filled(bias)));
+            let (tau, gravity) = self.midpoint::<N>(state, dt, torque);
+            (filled(&tau), filled(&gravity))
         })
     }
 
-    /// One step under the torque that `torque` answers for the bias at the start; returns that torque.
+    /// One step under the torque that `torque` answers for the bias at the start; returns that torque and the gravity.
     #[inline(always)]
     fn midpoint<const N: usize>(
         &self,
         state: &mut JointState,
         dt: f64,
         torque: impl FnOnce(&[f64; N]) -> [f64; N],
-    ) -> [f64; N] {
+    ) -> ([f64; N], [f64; N]) {
         let (q, dq) = (*first::<N, _>(&state.q), *first::<N, _>(&state.dq));
-        let (start, tau) = self.respond(&q, &dq, torque);
+        let Response { acceleration: start, tau, gravity } = self.respond(&q, &dq, torque);
         let (mut q_mid, mut dq_mid) = (q, dq);
         for i in 0..N {
             q_mid[i] += 0.5 * dt * dq[i];
             dq_mid[i] += 0.5 * dt * start[i];
         }
-        let (middle, _) = self.respond(&q_mid, &dq_mid, |_| tau);
+        let middle = self.respond(&q_mid, &dq_mid, |_| tau).acceleration;
         for i in 0..N {
             state.q[i] += dt * dq_mid[i];
             state.dq[i] += dt * middle[i];
         }
-        tau
+        (tau, gravity)
     }
 }

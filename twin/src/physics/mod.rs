@@ -7,8 +7,10 @@
 
 mod convert;
 pub mod hit;
+mod shape;
 mod table_object;
 pub mod touch;
 mod tumble;
 
-pub use table_object::{FlatMesh, TableObject};
+pub use shape::FlatMesh;
+pub use table_object::{ObjectMotion, TableObject};

@@ -4,44 +4,49 @@
 //! corners ([`super::tumble`]). What the outside sees is the body's pose, its velocities and what the tool presses on it;
 //! which of the two carries the state shows nowhere else.
 
-use super::convert;
 use super::hit::Press;
+use super::shape::{CollisionShape, FlatMesh};
 use super::tumble::Tumbling;
-use crate::effects::{Effects, TableFriction};
-use crate::scene::{ObjectModel, ObjectShape};
+use crate::effects::{Effects, SlideEffects, TableFriction};
+use crate::scene::{ObjectModel, ObjectParameters};
 use crate::sliding::{Ending, Footing, FreeBody, PlanarState, Solid, Wrench};
-use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
-use parry3d_f64::math::Vector;
-use parry3d_f64::shape::SharedShape;
+use nalgebra::{Isometry3, Matrix3, Point3, UnitQuaternion, Vector3};
 use shared_mem::cell::Support;
 use shared_mem::frames::{Base, Object, Pose};
 
 /// The object, its table and the time step between them.
+#[derive(Clone)]
 pub struct TableObject {
-    shape: SharedShape,
-    bounding_radius: f64,
-    /// Corners of the convex hull, object frame.
-    corners: Vec<Point3<f64>>,
-    centre_of_mass: Vector3<f64>,
+    shape: CollisionShape,
     support: Support,
-    pressure_reach: f64,
+    made_of: Material,
     /// Drag of a viscous film under the base over its speed [N s/m].
     drag: f64,
     tumbling: Tumbling,
+    motion: ObjectMotion,
+}
+
+/// Everything about an object's physics that is not its shape.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Material {
+    parameters: ObjectParameters,
+    yaw_factor: f64,
+    slide: SlideEffects,
+}
+
+/// Everything about an object that changes over time.
+#[derive(Debug, Clone, Copy)]
+pub struct ObjectMotion {
     body: FreeBody,
     /// How the body stands while it stands: its motion is this one's then.
     standing: Option<(Footing, PlanarState)>,
+    made_of: Material,
 }
 
 /// Gravity [m/s²]; the value the arm model uses too.
 const GRAVITY: f64 = 9.81;
 /// Longest step of a free body [s]: steps of a twelfth move the resting place of a tossed box by less than 0.2 mm.
 const FREE_STEP: f64 = 1.25e-4;
-
-/// The mesh encloses no volume, so it cannot be a body.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("the object's mesh is flat or empty; give a mesh that encloses a volume")]
-pub struct FlatMesh;
 
 impl TableObject {
     /// The object at the origin, at rest. Without `table_height` there is no table and it falls. Of `effects` those on
@@ -50,55 +55,92 @@ impl TableObject {
     /// # Errors
     /// [`FlatMesh`] when the object's mesh has no convex hull.
     pub fn new(model: &ObjectModel, table_height: Option<f64>, effects: &Effects) -> Result<Self, FlatMesh> {
-        let shape = collision_shape(&model.shape)?;
-        let corners = hull_corners(&shape);
-        let inertia = homogeneous_inertia(&shape, model.mass, effects.hit.yaw_inertia_factor());
-        let slide = effects.slide;
-        let hidden = (slide != Default::default()).then_some(slide);
+        let shape = CollisionShape::new(&model.shape)?;
+        let made_of = Material::new(model.parameters(), effects);
         let tumbling = Tumbling {
-            corners: corners.iter().map(|corner| corner.coords - model.centre_of_mass).collect(),
-            mass: model.mass,
-            inertia,
-            inverse_inertia: inertia.try_inverse().ok_or(FlatMesh)?,
+            corners: vec![Vector3::zeros(); shape.corners.len()],
+            mass: 1.0,
+            inertia: Matrix3::identity(),
+            inverse_inertia: Matrix3::identity(),
             table_height,
-            friction: TableFriction { nominal: model.friction, effects: hidden },
-            restitution: model.restitution,
-            gravity: slide.gravity(GRAVITY),
+            friction: TableFriction { nominal: 0.0, effects: None },
+            restitution: 0.0,
+            gravity: Vector3::zeros(),
         };
-        Ok(Self {
-            shape,
-            bounding_radius: model.shape.bounding_radius(),
-            corners,
-            centre_of_mass: model.centre_of_mass,
-            support: model.support,
-            pressure_reach: slide.pressure_reach(),
-            drag: slide.drag(),
-            tumbling,
-            body: FreeBody {
-                centre: Point3::from(model.centre_of_mass),
-                rotation: nalgebra::UnitQuaternion::identity(),
-                velocity: Vector3::zeros(),
-                angular_velocity: Vector3::zeros(),
-            },
-            standing: None,
-        })
+        let body = FreeBody {
+            centre: Point3::from(model.centre_of_mass),
+            rotation: UnitQuaternion::identity(),
+            velocity: Vector3::zeros(),
+            angular_velocity: Vector3::zeros(),
+        };
+        let motion = ObjectMotion { body, standing: None, made_of };
+        let mut object = Self { shape, support: model.support, made_of, drag: 0.0, tumbling, motion };
+        object.take(made_of);
+        Ok(object)
+    }
+
+    /// The same shape made of something else. Pose and velocity stay those of the geometric centre.
+    pub fn set_parameters(&mut self, parameters: ObjectParameters, effects: &Effects) {
+        let made_of = Material::new(parameters, effects);
+        if made_of != self.made_of {
+            let (pose, velocity, spin) = (self.pose(), self.centre_velocity(), self.angular_velocity());
+            self.take(made_of);
+            self.set(&pose, velocity, spin);
+        }
+    }
+
+    fn take(&mut self, made_of: Material) {
+        let Material { parameters, yaw_factor, slide } = made_of;
+        let mut inertia = self.shape.unit_inertia * parameters.mass;
+        inertia[(2, 2)] *= yaw_factor;
+        let tumbling = &mut self.tumbling;
+        for (corner, place) in tumbling.corners.iter_mut().zip(&self.shape.corners) {
+            *corner = place.coords - parameters.centre_of_mass;
+        }
+        (tumbling.mass, tumbling.inertia) = (parameters.mass, inertia);
+        tumbling.inverse_inertia = inertia.try_inverse().unwrap_or_else(Matrix3::identity);
+        let effects = (slide != SlideEffects::default()).then_some(slide);
+        tumbling.friction = TableFriction { nominal: parameters.friction, effects };
+        tumbling.restitution = parameters.restitution;
+        tumbling.gravity = slide.gravity(GRAVITY);
+        self.drag = slide.drag();
+        self.made_of = made_of;
+    }
+
+    /// What it does now, to go on from later.
+    #[must_use]
+    pub fn motion(&self) -> &ObjectMotion {
+        &self.motion
+    }
+
+    /// Goes on from a motion of this shape: bit by bit when it is made of the same as then, else from the same pose and
+    /// velocity of its geometric centre.
+    pub fn resume(&mut self, motion: &ObjectMotion) {
+        if motion.made_of == self.made_of {
+            self.motion = *motion;
+            return;
+        }
+        let FreeBody { centre, rotation, velocity, angular_velocity } = motion.body;
+        let from_mass = rotation * -motion.made_of.parameters.centre_of_mass;
+        let pose = Pose::from_isometry(Isometry3::from_parts((centre + from_mass).into(), rotation));
+        self.set(&pose, velocity + angular_velocity.cross(&from_mass), angular_velocity);
     }
 
     /// Lets `dt` seconds pass under gravity, the table and the tool's presses, of which those without depth do nothing;
     /// mean force of each press on the object [N].
     pub fn step(&mut self, dt: f64, presses: &[Press]) -> [Vector3<f64>; 2] {
-        let (mut body, mut left, mut forces) = (self.body, dt, [Vector3::zeros(); 2]);
+        let (mut body, mut left, mut forces) = (self.motion.body, dt, [Vector3::zeros(); 2]);
         let pressing = presses.iter().any(|press| press.touch.depth > 0.0);
         if pressing {
             forces = self.tumbling.step(&mut body, presses, dt);
             left = 0.0;
         }
-        if let Some((footing, mut state)) = self.standing {
-            let wrench = self.wrench(&footing, &self.body, presses, &forces);
+        if let Some((footing, mut state)) = self.motion.standing {
+            let wrench = self.wrench(&footing, &self.motion.body, presses, &forces);
             match footing.slider.step(&mut state, &wrench, &self.tumbling.friction, dt) {
                 Ending::Rests | Ending::Slides => {
-                    self.standing = Some((footing, state));
-                    self.body = footing.release(&state);
+                    self.motion.standing = Some((footing, state));
+                    self.motion.body = footing.release(&state);
                     return forces;
                 }
                 Ending::Lifts { .. } if pressing => {}
@@ -115,8 +157,8 @@ impl TableObject {
 
     /// Takes over the state of a free body; as a standing one, if it stands and under these forces goes on standing.
     fn settle(&mut self, body: FreeBody, presses: &[Press], forces: &[Vector3<f64>; 2], dt: f64) {
-        self.standing = self.standing(&body, presses, forces, dt);
-        self.body = self.standing.as_ref().map_or(body, |(footing, state)| footing.release(state));
+        self.motion.standing = self.standing(&body, presses, forces, dt);
+        self.motion.body = self.motion.standing.as_ref().map_or(body, |(footing, state)| footing.release(state));
     }
 
     fn standing(
@@ -155,7 +197,7 @@ impl TableObject {
     /// Puts the object somewhere: pose of its geometric centre, velocity of that point [m/s], angular velocity [rad/s], base frame.
     pub fn set(&mut self, pose: &Pose<Base, Object>, velocity: Vector3<f64>, angular_velocity: Vector3<f64>) {
         let isometry = pose.isometry();
-        let centre_to_mass = isometry.rotation * self.centre_of_mass;
+        let centre_to_mass = isometry.rotation * self.made_of.parameters.centre_of_mass;
         let body = FreeBody {
             centre: Point3::from(isometry.translation.vector + centre_to_mass),
             rotation: isometry.rotation,
@@ -174,86 +216,68 @@ impl TableObject {
     /// Velocity of the body's point that is at `point` now, base frame [m/s].
     #[must_use]
     pub fn velocity_at(&self, point: &Point3<f64>) -> Vector3<f64> {
-        self.body.velocity + self.body.angular_velocity.cross(&(point - self.body.centre))
+        self.motion.body.velocity + self.motion.body.angular_velocity.cross(&(point - self.motion.body.centre))
+    }
+
+    /// Velocity of the geometric centre, base frame [m/s].
+    #[must_use]
+    pub fn centre_velocity(&self) -> Vector3<f64> {
+        self.velocity_at(&Point3::from(self.isometry().translation.vector))
     }
 
     /// Angular velocity, base frame [rad/s].
     #[must_use]
     pub fn angular_velocity(&self) -> Vector3<f64> {
-        self.body.angular_velocity
+        self.motion.body.angular_velocity
     }
 
     /// Radius of a sphere around the geometric centre that holds the object [m].
     #[must_use]
     pub fn bounding_radius(&self) -> f64 {
-        self.bounding_radius
+        self.shape.bounding_radius
     }
 
     pub(super) fn isometry(&self) -> Isometry3<f64> {
-        self.isometry_of(&self.body)
+        self.isometry_of(&self.motion.body)
     }
 
     pub(super) fn corners(&self) -> &[Point3<f64>] {
-        &self.corners
+        &self.shape.corners
     }
 
     pub(super) fn shape(&self) -> &dyn parry3d_f64::shape::Shape {
-        &*self.shape.0
+        &*self.shape.shape.0
     }
 
     fn isometry_of(&self, body: &FreeBody) -> Isometry3<f64> {
-        Isometry3::from_parts((body.centre - body.rotation * self.centre_of_mass).into(), body.rotation)
+        Isometry3::from_parts(
+            (body.centre - body.rotation * self.made_of.parameters.centre_of_mass).into(),
+            body.rotation,
+        )
     }
 
     fn solid(&self) -> Solid<'_> {
         Solid {
-            corners: &self.corners,
-            centre_of_mass: self.centre_of_mass,
+            corners: &self.shape.corners,
+            centre_of_mass: self.made_of.parameters.centre_of_mass,
             mass: self.tumbling.mass,
             inertia: self.tumbling.inertia,
             support: self.support,
-            pressure_reach: self.pressure_reach,
+            pressure_reach: self.made_of.slide.pressure_reach(),
         }
     }
 }
 
-fn collision_shape(shape: &ObjectShape) -> Result<SharedShape, FlatMesh> {
-    match shape {
-        ObjectShape::Box { half_extents: h } => Ok(SharedShape::cuboid(h.x, h.y, h.z)),
-        ObjectShape::Mesh { points, .. } => {
-            let points: Vec<Vector> = points.iter().map(convert::point).collect();
-            SharedShape::convex_hull(&points).ok_or(FlatMesh)
-        }
+impl Material {
+    fn new(parameters: ObjectParameters, effects: &Effects) -> Self {
+        Self { parameters, yaw_factor: effects.hit.yaw_inertia_factor(), slide: effects.slide }
     }
-}
-
-/// Corners of a cuboid or convex hull.
-fn hull_corners(shape: &SharedShape) -> Vec<Point3<f64>> {
-    let corner = |p: &Vector| Point3::from(convert::to_vector(*p));
-    match (shape.as_cuboid(), shape.as_convex_polyhedron()) {
-        (Some(cuboid), _) => {
-            let h = convert::to_vector(cuboid.half_extents);
-            let sign = |i: u32, axis: u32| if i >> axis & 1 == 0 { -1.0 } else { 1.0 };
-            (0..8).map(|i| Point3::new(sign(i, 0) * h.x, sign(i, 1) * h.y, sign(i, 2) * h.z)).collect()
-        }
-        (None, Some(hull)) => hull.points().iter().map(corner).collect(),
-        (None, None) => Vec::new(),
-    }
-}
-
-/// The homogeneous body's inertia, about the centre of mass wherever that was found to be; `yaw_factor` for its z axis.
-fn homogeneous_inertia(shape: &SharedShape, mass: f64, yaw_factor: f64) -> Matrix3<f64> {
-    let mut properties = shape.mass_properties(1.0);
-    properties.set_mass(mass, true);
-    let mut inertia = convert::to_matrix(&properties.reconstruct_inertia_matrix());
-    inertia[(2, 2)] *= yaw_factor;
-    inertia
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use nalgebra::UnitQuaternion;
+    use crate::scene::ObjectShape;
 
     const STEP: f64 = 2.5e-4;
 

@@ -1,5 +1,6 @@
 //! Where the object was and how it moved when a clip began, from noisy poses. Base frame, SI.
 
+use crate::rollout::ObjectState;
 use crate::scene::{ObjectModel, ObjectShape};
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3};
 use shared_mem::cell::Cell;
@@ -20,17 +21,6 @@ const UPRIGHT: f64 = 0.1;
 const FLIGHT_POSES: usize = 10;
 /// Below this clearance the table may have touched the object already [m].
 const CLEARANCE: f64 = 3e-3;
-
-/// How the object moved at the first pose.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Motion {
-    /// Its pose.
-    pub pose: Pose<Base, Object>,
-    /// Of the geometric centre [m/s].
-    pub velocity: Vector3<f64>,
-    /// In the base frame [rad/s].
-    pub angular_velocity: Vector3<f64>,
-}
 
 /// Mean of the poses before the object first moves, set down flat on the table. `None` without poses.
 pub fn resting(series: &ObjectSeries, object: &ObjectModel, cell: &Cell) -> Option<Pose<Base, Object>> {
@@ -88,7 +78,7 @@ fn lowest(shape: &ObjectShape, pose: &Isometry3<f64>) -> f64 {
 
 /// Pose and velocities at the first pose, by straight lines through the first poses, free fall taken out while the
 /// object flies. `None` with fewer than three poses.
-pub fn moving(series: &ObjectSeries, object: &ObjectModel, cell: &Cell) -> Option<Motion> {
+pub fn moving(series: &ObjectSeries, object: &ObjectModel, cell: &Cell) -> Option<ObjectState> {
     let table = cell.table.map_or(f64::NEG_INFINITY, |t| t.height);
     let clear = |pose: &Pose<Base, Object>| lowest(&object.shape, &pose.isometry()) > table + CLEARANCE;
     let flying = series.poses.iter().take_while(|pose| clear(pose)).count();
@@ -106,7 +96,7 @@ pub fn moving(series: &ObjectSeries, object: &ObjectModel, cell: &Cell) -> Optio
     let (turn, angular_velocity) = line(&turns.collect::<Vec<_>>());
     let rotation = UnitQuaternion::from_scaled_axis(turn) * middle;
     let pose = Pose::from_isometry(Isometry3::from_parts(Translation3::from(place), rotation));
-    Some(Motion { pose, velocity, angular_velocity })
+    Some(ObjectState { pose, velocity, angular_velocity })
 }
 
 /// Value at time 0 and slope of the straight line through points over time.

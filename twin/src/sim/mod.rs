@@ -11,16 +11,17 @@ mod contact;
 #[cfg(test)]
 mod tests;
 
-pub use arm::Drive;
+pub use crate::rollout::Drive;
 
 use crate::arm::{ArmModel, GainError, JointState, Joints, ModelError};
 use crate::effects::{CameraEffects, EffectError, Effects};
-use crate::physics::{FlatMesh, TableObject};
-use crate::scene::{MeshFileError, ObjectModel, SceneSnapshot};
+use crate::physics::{FlatMesh, ObjectMotion, TableObject};
+use crate::rollout::{ArmMotion, CommandTrack, Plant, Reading};
+use crate::scene::{MeshFileError, ObjectModel, ObjectParameters, SceneSnapshot};
 use arm::SimArm;
-use contact::ToolContact;
+use contact::{ContactRecord, ToolContact};
 use nalgebra::{Isometry3, Vector3};
-use shared_mem::cell::Cell;
+use shared_mem::cell::{Cell, Controller, Tool};
 use shared_mem::frames::{Base, Object, Pose};
 use shared_mem::msg::arm::ArmState;
 use shared_mem::theta::Theta;
@@ -31,12 +32,53 @@ pub const PERIOD_NS: u64 = 1_000_000;
 pub const PERIOD: f64 = 1e-3;
 
 /// The simulated cell.
+#[derive(Clone)]
 pub struct SimCell {
+    description: Description,
     arm: Option<SimArm>,
     object: Option<TableObject>,
     contact: ToolContact,
     camera: CameraEffects,
+    takes_part: TakesPart,
     time_ns: u64,
+}
+
+/// Who is there at all: an arm or object that is taken out neither moves nor touches anything.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct TakesPart {
+    arm: bool,
+    object: bool,
+}
+
+/// What is left to know about a cell when other parameters come.
+#[derive(Clone)]
+struct Description {
+    controller: Option<Controller>,
+    tool: Option<Tool>,
+    object: Option<shared_mem::cell::Object>,
+}
+
+/// The whole state of a cell at one moment, without the noise of its sensors.
+#[derive(Debug)]
+pub struct SimState {
+    arm: Option<ArmMotion>,
+    object: Option<ObjectMotion>,
+    contact: ContactRecord,
+    takes_part: TakesPart,
+    time_ns: u64,
+}
+
+impl Clone for SimState {
+    fn clone(&self) -> Self {
+        Self { arm: self.arm.clone(), ..*self }
+    }
+
+    /// Keeps the memory it has.
+    fn clone_from(&mut self, source: &Self) {
+        let mut arm = self.arm.take();
+        arm.clone_from(&source.arm);
+        *self = Self { arm, ..*source };
+    }
 }
 
 /// No cell can be simulated from what was given.
@@ -90,21 +132,86 @@ impl SimCell {
                 let place = Vector3::new(x, y, table + model.shape.half_extents().z);
                 let start = Isometry3::new(place, Vector3::z() * cell.simulation.object_yaw);
                 object.set(&Pose::from_isometry(start), Vector3::zeros(), Vector3::zeros());
-                (Some(object), ToolContact::new(cell, &model, &effects.hit))
+                (Some(object), ToolContact::new(cell.tool.as_ref(), &model.parameters(), &effects.hit))
             }
         };
-        Ok(Self { arm, object, contact, camera: effects.camera, time_ns: 0 })
+        let Cell { controller, tool, object: described, .. } = cell.clone();
+        let description = Description { controller, tool, object: described };
+        Ok(Self {
+            description,
+            arm,
+            object,
+            contact,
+            camera: effects.camera,
+            takes_part: TakesPart { arm: true, object: true },
+            time_ns: 0,
+        })
+    }
+
+    /// Gives the same cell other gains, object parameters and effects: what `theta` does not know returns to cell.toml's
+    /// nominal values. Meshes and hulls stay. Put the arm somewhere afterwards, or resume a state: an arm with other
+    /// effects has nothing to remember yet.
+    ///
+    /// # Errors
+    /// [`SimError`] naming the key and the remedy.
+    pub fn set_parameters(&mut self, theta: &Theta) -> Result<(), SimError> {
+        let dof = self.arm.as_ref().map_or(0, |arm| arm.model().dof());
+        let effects = Effects::from_theta(&theta.effects, dof)?;
+        let Description { controller, tool, object: described } = &self.description;
+        if let Some(arm) = &mut self.arm {
+            arm.set_parameters(controller.as_ref(), theta, &effects.arm)?;
+        }
+        if let (Some(object), Some(described)) = (&mut self.object, described) {
+            let parameters = ObjectParameters::new(described, Some(theta));
+            object.set_parameters(parameters, &effects);
+            self.contact.set_parameters(tool.as_ref(), &parameters, &effects.hit);
+        }
+        self.camera = effects.camera;
+        Ok(())
+    }
+
+    /// What the cell does now, to go on from later.
+    #[must_use]
+    pub fn state(&self) -> SimState {
+        SimState {
+            arm: self.arm.as_ref().map(|arm| arm.motion.clone()),
+            object: self.object.as_ref().map(|object| *object.motion()),
+            contact: self.contact.record,
+            takes_part: self.takes_part,
+            time_ns: self.time_ns,
+        }
+    }
+
+    /// [`SimCell::state`] into a state of this cell, without allocating.
+    pub fn state_into(&self, out: &mut SimState) {
+        match (&mut out.arm, &self.arm) {
+            (Some(out), Some(arm)) => out.clone_from(&arm.motion),
+            (out, arm) => *out = arm.as_ref().map(|arm| arm.motion.clone()),
+        }
+        out.object = self.object.as_ref().map(|object| *object.motion());
+        (out.contact, out.takes_part, out.time_ns) = (self.contact.record, self.takes_part, self.time_ns);
+    }
+
+    /// Goes on from a state of this cell: bit by bit under the parameters of then. Under other parameters of object,
+    /// contact, table and camera from the same poses and velocities; under other ones of the arm what it remembers of
+    /// its commands is that of then.
+    pub fn resume(&mut self, state: &SimState) {
+        if let (Some(arm), Some(motion)) = (&mut self.arm, &state.arm) {
+            arm.motion.clone_from(motion);
+        }
+        if let (Some(object), Some(motion)) = (&mut self.object, &state.object) {
+            object.resume(motion);
+        }
+        (self.contact.record, self.takes_part, self.time_ns) = (state.contact, state.takes_part, state.time_ns);
     }
 
     /// Lets one control period of 1 ms pass. Where the cell has no arm, `drive` moves nothing.
     pub fn step(&mut self, drive: &Drive) {
-        let Self { arm, object, contact, .. } = self;
-        if let Some(arm) = arm {
-            arm.begin_period(drive);
-        }
+        let Self { arm, object, contact, takes_part, .. } = self;
+        let (arm, object) = (arm.as_mut().filter(|_| takes_part.arm), object.as_mut().filter(|_| takes_part.object));
         match (arm, object) {
-            (Some(arm), Some(object)) => contact.advance(arm, object),
-            (Some(arm), None) => arm.advance(PERIOD, &[]),
+            (Some(arm), Some(object)) => contact.advance(arm, object, drive, self.time_ns),
+            (Some(arm), None) => arm.period(drive),
             (None, Some(object)) => contact::settle(object),
             (None, None) => {}
         }
@@ -120,7 +227,7 @@ impl SimCell {
         }
     }
 
-    /// Simulated time since the cell was made [ns].
+    /// Simulated time [ns], from 0 when the cell was made.
     #[must_use]
     pub fn time_ns(&self) -> u64 {
         self.time_ns
@@ -141,13 +248,31 @@ impl SimCell {
     /// What the arm's encoders would read without noise: not the true positions where an effect parts the two.
     #[must_use]
     pub fn joint_reading(&self) -> JointState {
+        self.reading().state
+    }
+
+    /// What all of the arm's sensors would read without noise; zeros without an arm.
+    #[must_use]
+    pub fn reading(&self) -> Reading {
         self.arm.as_ref().map(SimArm::reading).unwrap_or_default()
     }
 
-    /// Torque behind the gear, with gravity [N m]; zeros without an arm.
+    /// Torque behind the gear, gravity included, mean over the last period [N m]; zeros without an arm.
     #[must_use]
     pub fn tau_J(&self) -> Joints {
-        self.arm.as_ref().map_or([0.0; 8], SimArm::tau_J)
+        self.reading().tau_J
+    }
+
+    /// The command in force: what an arm goes on with that is told nothing new. No torque without an arm.
+    #[must_use]
+    pub fn command(&self) -> Drive {
+        self.arm.as_ref().map_or(Drive::Torque { tau_J_d: [0.0; 8] }, SimArm::command)
+    }
+
+    /// The arm with its controller and effects, where there is an arm.
+    #[must_use]
+    pub fn plant(&self) -> Option<&Plant> {
+        self.arm.as_ref().map(SimArm::plant)
     }
 
     /// The arm's model, where there is an arm.
@@ -159,15 +284,14 @@ impl SimCell {
     /// The object's geometric centre, where there is an object.
     #[must_use]
     pub fn object(&self) -> Option<Pose<Base, Object>> {
-        self.object.as_ref().map(TableObject::pose)
+        self.object.as_ref().filter(|_| self.takes_part.object).map(TableObject::pose)
     }
 
     /// The object's velocity at its geometric centre [m/s] and its angular velocity [rad/s].
     #[must_use]
     pub fn object_velocity(&self) -> Option<(Vector3<f64>, Vector3<f64>)> {
-        let object = self.object.as_ref()?;
-        let centre = object.pose().isometry().translation.vector.into();
-        Some((object.velocity_at(&centre), object.angular_velocity()))
+        let object = self.object.as_ref().filter(|_| self.takes_part.object)?;
+        Some((object.centre_velocity(), object.angular_velocity()))
     }
 
     /// Effects on what a tracker reports about the object: for the [`crate::sensors::tracker::SimTracker`] of this cell.
@@ -176,16 +300,33 @@ impl SimCell {
         self.camera
     }
 
+    /// Whether tool and object may touch within the next period.
+    #[must_use]
+    pub fn may_touch(&self) -> bool {
+        match (&self.arm, &self.object) {
+            (Some(arm), Some(object)) if self.takes_part.arm && self.takes_part.object => {
+                self.contact.may_touch(arm, object)
+            }
+            _ => false,
+        }
+    }
+
     /// Normal force between tool and object, mean over the last period [N].
     #[must_use]
     pub fn contact_force(&self) -> f64 {
-        self.contact.mean_force()
+        self.contact.record.mean_force
     }
 
     /// When tool and object touched first since the cell was made or the object was last set [ns of simulated time].
     #[must_use]
     pub fn first_contact_ns(&self) -> Option<u64> {
-        self.contact.first_period().map(|periods| periods * PERIOD_NS)
+        self.contact.record.span.map(|(first, _)| first)
+    }
+
+    /// When the last touch of tool and object ended, or the end of the last period if they touch still [ns of simulated time].
+    #[must_use]
+    pub fn last_contact_ns(&self) -> Option<u64> {
+        self.contact.record.span.map(|(_, last)| last)
     }
 
     /// Puts the arm somewhere: positions [rad], velocities [rad/s], one a joint; what is missing is 0.
@@ -193,14 +334,41 @@ impl SimCell {
         if let Some(arm) = &mut self.arm {
             arm.set(q, dq);
         }
+        self.takes_part.arm = true;
+    }
+
+    /// Takes the arm out until it is set or started again.
+    pub fn remove_arm(&mut self) {
+        self.takes_part.arm = false;
+    }
+
+    /// Takes the object out until it is set again.
+    pub fn remove_object(&mut self) {
+        self.contact.record = ContactRecord::default();
+        self.takes_part.object = false;
+    }
+
+    /// Sets the simulated clock [ns].
+    pub fn set_time_ns(&mut self, time_ns: u64) {
+        self.time_ns = time_ns;
+    }
+
+    /// Puts the arm where its encoders read `reading` at the stamp `at_ns` of a command series; commands of the time
+    /// before that are still on their way count.
+    pub fn start_arm(&mut self, reading: &JointState, at_ns: u64, commands: &CommandTrack) {
+        if let Some(arm) = &mut self.arm {
+            arm.start(reading, at_ns, commands);
+        }
+        self.takes_part.arm = true;
     }
 
     /// Puts the object somewhere: pose and velocity [m/s] of its geometric centre, angular velocity [rad/s].
     pub fn set_object(&mut self, pose: &Pose<Base, Object>, velocity: Vector3<f64>, angular_velocity: Vector3<f64>) {
         if let Some(object) = &mut self.object {
             object.set(pose, velocity, angular_velocity);
-            self.contact.forget();
+            self.contact.record = ContactRecord::default();
         }
+        self.takes_part.object = true;
     }
 
     /// The cell as a camera sees it now.

@@ -5,7 +5,7 @@ use crate::rollout::TICK;
 
 /// Values of the last ticks. A fraction of a tick is a straight line between two of them: the mean of a held signal over
 /// a tick, and continuous in the delay.
-#[derive(Debug, Clone)]
+#[derive(Debug)]
 pub(super) struct DelayLine {
     past: Vec<Joints>,
     newest: usize,
@@ -15,13 +15,36 @@ pub(super) struct DelayLine {
     started: bool,
 }
 
+impl Clone for DelayLine {
+    fn clone(&self) -> Self {
+        Self { past: self.past.clone(), ..*self }
+    }
+
+    /// Keeps the memory it has.
+    fn clone_from(&mut self, source: &Self) {
+        let mut past = std::mem::take(&mut self.past);
+        past.clone_from(&source.past);
+        *self = Self { past, ..*source };
+    }
+}
+
 impl DelayLine {
     /// A line of `delay` seconds that has carried `before` for ever.
     pub(super) fn new(delay: f64, before: &Joints) -> Self {
         let mut line = Self::empty(delay);
-        line.past.fill(*before);
-        line.started = true;
+        line.restart(before);
         line
+    }
+
+    /// As if it had carried `before` for ever.
+    pub(super) fn restart(&mut self, before: &Joints) {
+        self.past.fill(*before);
+        self.started = true;
+    }
+
+    /// As if nothing had come yet.
+    pub(super) fn clear(&mut self) {
+        self.started = false;
     }
 
     /// A line of `delay` seconds that takes its first value for what came before.

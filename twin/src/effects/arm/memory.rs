@@ -6,7 +6,7 @@ use super::delay_line::DelayLine;
 use crate::arm::{JointState, Joints};
 
 /// Past commands and torques, and the motors' own positions. Made by [`ArmEffects::start`].
-#[derive(Debug, Clone)]
+#[derive(Debug)]
 pub struct ArmMemory {
     pub(super) q_d: DelayLine,
     pub(super) dq_d: DelayLine,
@@ -18,7 +18,30 @@ pub struct ArmMemory {
     pub(super) tau_J: Joints,
 }
 
+impl Clone for ArmMemory {
+    fn clone(&self) -> Self {
+        let (q_d, dq_d, torque) = (self.q_d.clone(), self.dq_d.clone(), self.torque.clone());
+        Self { q_d, dq_d, torque, ..*self }
+    }
+
+    /// Keeps the memory it has.
+    fn clone_from(&mut self, source: &Self) {
+        self.q_d.clone_from(&source.q_d);
+        self.dq_d.clone_from(&source.dq_d);
+        self.torque.clone_from(&source.torque);
+        (self.lagging, self.motor, self.tau_J) = (source.lagging, source.motor, source.tau_J);
+    }
+}
+
 impl ArmMemory {
+    /// As if the arm had had this command for long.
+    pub(super) fn restart(&mut self, q_d: &Joints, dq_d: &Joints) {
+        self.q_d.restart(q_d);
+        self.dq_d.restart(dq_d);
+        self.torque.clear();
+        self.lagging = JointState { q: *q_d, dq: *dq_d };
+    }
+
     pub(super) fn new(effects: &ArmEffects, q_d: &Joints, dq_d: &Joints) -> Self {
         let command = effects.command_delay.map_or(0.0, |effect| effect.delay);
         let torque = effects.torque_delay.map_or(0.0, |effect| effect.delay);

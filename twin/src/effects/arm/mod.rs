@@ -86,6 +86,21 @@ impl ArmEffects {
     #[must_use]
     pub fn start(&self, arm: &ArmModel, reading: &JointState, q_d: &Joints, dq_d: &Joints) -> (JointState, ArmMemory) {
         let mut memory = ArmMemory::new(self, q_d, dq_d);
+        let state = self.restart(&mut memory, arm, reading, q_d, dq_d);
+        (state, memory)
+    }
+
+    /// [`ArmEffects::start`] in a memory that was made by these effects, without allocating.
+    #[must_use]
+    pub fn restart(
+        &self,
+        memory: &mut ArmMemory,
+        arm: &ArmModel,
+        reading: &JointState,
+        q_d: &Joints,
+        dq_d: &Joints,
+    ) -> JointState {
+        memory.restart(q_d, dq_d);
         let mut state = *reading;
         if let Some(effect) = &self.joint_encoder_offset {
             state.q = std::array::from_fn(|i| state.q[i] - effect.offset[i]);
@@ -95,7 +110,7 @@ impl ArmEffects {
         for i in 0..arm.dof() {
             state.q[i] -= self.twist_under(i, memory.tau_J[i]);
         }
-        (state, memory)
+        state
     }
 
     /// The command as it reaches the controller, one tick after the other.

@@ -1,0 +1,190 @@
+//! One control period of an arm: the controller is evaluated once, its torque holds, the arm moves. Whatever simulates an
+//! arm (a rollout, the simulated cell, the shadow) comes through here. SI, joint arrays as in [`crate::arm`].
+#![allow(non_snake_case)] // the Franka Control Interface's own symbols
+
+use super::{ArmRollout, CommandTrack, TICK, TICK_NS};
+use crate::arm::{JointState, Joints, MAX_JOINTS};
+use crate::effects::ArmMemory;
+
+/// What an arm is told for one control period.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Drive {
+    /// The controller of cell.toml runs inside the robot and follows these.
+    JointImpedance {
+        /// Desired positions [rad].
+        q_d: Joints,
+        /// Desired velocities [rad/s].
+        dq_d: Joints,
+    },
+    /// The client runs the controller. As on a Franka, the robot adds gravity, and the client whatever else it wants.
+    Torque {
+        /// Desired torques without gravity [N m].
+        tau_J_d: Joints,
+    },
+}
+
+/// What an arm's sensors tell, without noise.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Reading {
+    /// What the encoders read.
+    pub state: JointState,
+    /// Torque behind the gears, gravity included, mean over the period that ends here [N m].
+    pub tau_J: Joints,
+    /// Torque that the controller asked for in that period, without gravity [N m].
+    pub tau_J_d: Joints,
+}
+
+/// An arm on its way: everything about it that changes over time.
+#[derive(Debug)]
+pub(crate) struct ArmMotion {
+    /// True state of the links.
+    pub(crate) state: JointState,
+    /// What the effects remember; `None` for an arm without.
+    pub(crate) memory: Option<ArmMemory>,
+    /// Torque of the motors, gravity included, constant over a period [N m].
+    pub(crate) motor: Joints,
+    /// What forces on the tool add, mean over the last period [N m].
+    pub(crate) external: Joints,
+    /// Torque behind the gears, mean over the last period [N m].
+    pub(crate) tau_J: Joints,
+    /// Asked for in the last period, without gravity [N m].
+    pub(crate) tau_J_d: Joints,
+}
+
+impl Clone for ArmMotion {
+    fn clone(&self) -> Self {
+        Self { memory: self.memory.clone(), ..*self }
+    }
+
+    /// Reuses what the memory holds already: a checkpoint is taken and resumed without allocating.
+    fn clone_from(&mut self, source: &Self) {
+        let memory = match (self.memory.take(), &source.memory) {
+            (Some(mut memory), Some(from)) => {
+                memory.clone_from(from);
+                Some(memory)
+            }
+            (_, from) => from.clone(),
+        };
+        *self = Self { memory, ..*source };
+    }
+}
+
+impl ArmMotion {
+    /// An arm that is about to be started.
+    pub(crate) fn unstarted() -> Self {
+        let (state, zero) = (JointState::default(), [0.0; MAX_JOINTS]);
+        Self { state, memory: None, motor: zero, external: zero, tau_J: zero, tau_J_d: zero }
+    }
+}
+
+impl ArmRollout<'_> {
+    /// Puts `motion` where the encoders read `reading`, the arm having been there with the command `q_d`, `dq_d` for long.
+    pub(crate) fn put(&self, motion: &mut ArmMotion, reading: &JointState, q_d: &Joints, dq_d: &Joints) {
+        motion.state = *reading;
+        match (self.effects, &mut motion.memory) {
+            (None, memory) => *memory = None,
+            (Some(effects), Some(memory)) => motion.state = effects.restart(memory, self.arm, reading, q_d, dq_d),
+            (Some(effects), memory) => {
+                let (state, fresh) = effects.start(self.arm, reading, q_d, dq_d);
+                (motion.state, *memory) = (state, Some(fresh));
+            }
+        }
+        let gravity = self.nominal.gravity(&reading.q);
+        (motion.motor, motion.tau_J) = (gravity, gravity);
+        (motion.external, motion.tau_J_d) = ([0.0; MAX_JOINTS], [0.0; MAX_JOINTS]);
+    }
+
+    /// The same at the stamp `at_ns` of a command series: commands of the time before that are still on their way count.
+    pub(crate) fn start(&self, motion: &mut ArmMotion, reading: &JointState, at_ns: u64, commands: &CommandTrack) {
+        self.put(motion, reading, commands.q_d(0), commands.dq_d(0));
+        let (Some(effects), Some(memory)) = (self.effects, &mut motion.memory) else { return };
+        let mut row = 0;
+        for tick in (1..=effects.command_ticks()).rev() {
+            let Some(tick_ns) = at_ns.checked_sub(tick * TICK_NS) else { continue };
+            row = commands.in_force(tick_ns, row);
+            let _ = effects.command(memory, commands.q_d(row), commands.dq_d(row));
+        }
+    }
+
+    /// Lets one control period pass without anything touching the arm.
+    pub(crate) fn period(&self, motion: &mut ArmMotion, drive: &Drive) {
+        if let (Drive::JointImpedance { q_d, dq_d }, true) = (drive, std::ptr::eq(self.arm, self.nominal)) {
+            let before = motion.state.dq;
+            let (tau, gravity) = self.arm.controlled_step(&mut motion.state, self.law, q_d, dq_d, TICK);
+            motion.motor = tau;
+            motion.tau_J_d = std::array::from_fn(|i| tau[i] - gravity[i]);
+            motion.external = [0.0; MAX_JOINTS];
+            self.sense(motion, &before);
+            return;
+        }
+        self.begin(motion, drive);
+        let before = motion.state.dq;
+        self.advance(motion, &[0.0; MAX_JOINTS], TICK);
+        self.sense(motion, &before);
+    }
+
+    /// Evaluates the controller for the coming period, from what the encoders read at its start.
+    pub(crate) fn begin(&self, motion: &mut ArmMotion, drive: &Drive) {
+        let reading = self.encoders(motion);
+        let gravity = self.nominal.gravity(&reading.q);
+        let asked = match drive {
+            Drive::JointImpedance { q_d, dq_d } => {
+                let (q_d, dq_d) = match (self.effects, &mut motion.memory) {
+                    (Some(effects), Some(memory)) => effects.command(memory, q_d, dq_d),
+                    _ => (*q_d, *dq_d),
+                };
+                self.law.torque(self.nominal, &reading, &q_d, &dq_d)
+            }
+            Drive::Torque { tau_J_d } => {
+                let limit = &self.law.torque_limit;
+                std::array::from_fn(|i| (tau_J_d[i] + gravity[i]).clamp(-limit[i], limit[i]))
+            }
+        };
+        motion.tau_J_d = std::array::from_fn(|i| asked[i] - gravity[i]);
+        motion.motor = match (self.effects, &mut motion.memory) {
+            (Some(effects), Some(memory)) => effects.motor_torque(memory, &asked),
+            _ => asked,
+        };
+        motion.external = [0.0; MAX_JOINTS];
+    }
+
+    /// Moves on by `dt` under the period's motor torque and torques from outside [N m].
+    pub(crate) fn advance(&self, motion: &mut ArmMotion, external: &Joints, dt: f64) {
+        for (sum, torque) in motion.external.iter_mut().zip(external) {
+            *sum += torque * (dt / TICK);
+        }
+        match (self.effects, &mut motion.memory) {
+            (Some(effects), Some(memory)) => {
+                effects.advance(memory, self.arm, &mut motion.state, (&motion.motor, external), dt);
+            }
+            _ => {
+                let total = std::array::from_fn(|i| motion.motor[i] + external[i]);
+                self.arm.step(&mut motion.state, &total, dt);
+            }
+        }
+    }
+
+    /// Notes what the sensors behind the gears tell about the period that began with velocities `before`.
+    pub(crate) fn sense(&self, motion: &mut ArmMotion, before: &Joints) {
+        motion.tau_J = match (self.effects, &motion.memory) {
+            (Some(effects), Some(memory)) => effects.tau_J(memory),
+            _ => {
+                let rotor = self.arm.rotor_inertia();
+                std::array::from_fn(|i| motion.motor[i] - rotor[i] * (motion.state.dq[i] - before[i]) / TICK)
+            }
+        };
+    }
+
+    /// What encoders without noise read.
+    pub(crate) fn encoders(&self, motion: &ArmMotion) -> JointState {
+        match (self.effects, &motion.memory) {
+            (Some(effects), Some(memory)) => effects.measured(memory, &motion.state),
+            _ => motion.state,
+        }
+    }
+
+    /// What all sensors without noise read.
+    pub(crate) fn reading(&self, motion: &ArmMotion) -> Reading {
+        Reading { state: self.encoders(motion), tau_J: motion.tau_J, tau_J_d: motion.tau_J_d }
+    }
+}

@@ -1,0 +1,81 @@
+//! The arm of a cell with its controller and with what the controller does not know about it.
+
+use super::ArmRollout;
+use crate::arm::{ArmModel, ControlLaw, GainError};
+use crate::effects::ArmEffects;
+use shared_mem::cell::{Cell, Controller};
+use shared_mem::theta::Theta;
+
+/// Arm, controller and hidden effects. Constant over time.
+#[derive(Debug, Clone)]
+pub struct Plant {
+    /// The model inside the controller.
+    nominal: ArmModel,
+    law: ControlLaw,
+    /// Effects and the arm that they make; `None` for an arm that is as cell.toml says.
+    hidden: Option<(ArmEffects, ArmModel)>,
+}
+
+impl Plant {
+    /// The arm `nominal` of a cell under its controller, with the identified gains of `theta` and with `effects`.
+    ///
+    /// # Errors
+    /// [`GainError`] naming the key and the remedy.
+    pub fn new(cell: &Cell, nominal: ArmModel, theta: Option<&Theta>, effects: &ArmEffects) -> Result<Self, GainError> {
+        let law = law(cell.controller.as_ref(), theta, &nominal)?;
+        let mut plant = Self { nominal, law, hidden: None };
+        plant.hide(effects);
+        Ok(plant)
+    }
+
+    /// The same arm with other gains and effects.
+    ///
+    /// # Errors
+    /// [`GainError`] naming the key and the remedy; the plant is as before then.
+    pub fn set(
+        &mut self,
+        controller: Option<&Controller>,
+        theta: Option<&Theta>,
+        effects: &ArmEffects,
+    ) -> Result<(), GainError> {
+        self.law = law(controller, theta, &self.nominal)?;
+        self.hide(effects);
+        Ok(())
+    }
+
+    fn hide(&mut self, effects: &ArmEffects) {
+        let known = match &self.hidden {
+            Some((now, _)) => now == effects,
+            None => effects.is_none(),
+        };
+        if !known {
+            self.hidden = (!effects.is_none()).then(|| (effects.clone(), effects.real_arm(&self.nominal)));
+        }
+    }
+
+    /// What a rollout of the arm alone takes.
+    #[must_use]
+    pub fn rollout(&self) -> ArmRollout<'_> {
+        let (arm, effects) = match &self.hidden {
+            Some((effects, arm)) => (arm, Some(effects)),
+            None => (&self.nominal, None),
+        };
+        ArmRollout { arm, nominal: &self.nominal, law: &self.law, effects }
+    }
+
+    /// The arm that moves.
+    #[must_use]
+    pub fn arm(&self) -> &ArmModel {
+        self.rollout().arm
+    }
+
+    /// The model inside the controller.
+    #[must_use]
+    pub fn nominal(&self) -> &ArmModel {
+        &self.nominal
+    }
+}
+
+fn law(controller: Option<&Controller>, theta: Option<&Theta>, nominal: &ArmModel) -> Result<ControlLaw, GainError> {
+    ControlLaw::new(controller, theta.and_then(|t| t.arm.as_ref()), nominal)
+}
