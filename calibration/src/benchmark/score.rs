@@ -105,7 +105,9 @@ impl Scores {
     #[must_use]
     pub fn of(cases: &[Case]) -> Self {
         let testable = |n: usize| {
-            cases.iter().filter(move |case| case.detectability >= TESTABLE && case.effects().is_some_and(|e| e.len() == n))
+            cases
+                .iter()
+                .filter(move |case| case.detectability >= TESTABLE && case.effects().is_some_and(|e| e.len() == n))
         };
         let mut by_effect: BTreeMap<String, Vec<bool>> = BTreeMap::new();
         for case in testable(1) {
@@ -237,8 +239,7 @@ mod tests {
 
     fn case(truth: Truth, verdict: &str, effects: &[&str], confidence: f64) -> Case {
         let effects: Vec<String> = effects.iter().map(|e| (*e).to_owned()).collect();
-        let said =
-            Said { verdict: verdict.into(), ranking: effects.clone(), effects, confidence, shrink: 0.45 };
+        let said = Said { verdict: verdict.into(), ranking: effects.clone(), effects, confidence, shrink: 0.45 };
         Case { world: 0, truth, detectability: 10.0, oracle_shrink: 0.5, said }
     }
 

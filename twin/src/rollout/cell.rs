@@ -90,6 +90,12 @@ impl CellRollout {
         }
     }
 
+    /// Gives the object, and nothing else, another state now: what a hit is known to have left behind. The contact so
+    /// far stays on record.
+    pub fn put_object(&mut self, object: &ObjectState) {
+        self.cell.move_object(&object.pose, object.velocity, object.angular_velocity);
+    }
+
     /// The whole state now. Allocates; [`CellRollout::checkpoint_into`] does not.
     #[must_use]
     pub fn checkpoint(&self) -> Checkpoint {
@@ -131,25 +137,29 @@ impl CellRollout {
         self.advance(course, out, Until::Contact).then(|| self.now_ns())
     }
 
-    fn drive(&self, commands: Option<&CommandTrack>, row: &mut usize) -> Drive {
-        let Some(commands) = commands else { return self.cell.command() };
-        *row = commands.in_force(self.cell.time_ns(), *row);
-        Drive::JointImpedance { q_d: *commands.q_d(*row), dq_d: *commands.dq_d(*row) }
+    /// Lets one control period pass, for callers that look at every tick themselves.
+    pub fn tick(&mut self, commands: Option<&CommandTrack>) {
+        let drive = match commands {
+            Some(commands) => {
+                let row = commands.at(self.cell.time_ns());
+                Drive::JointImpedance { q_d: *commands.q_d(row), dq_d: *commands.dq_d(row) }
+            }
+            None => self.cell.command(),
+        };
+        self.cell.step(&drive);
     }
 
     /// Whether it stopped before a touch.
     fn advance(&mut self, course: &Course<'_>, out: &mut CellTrace, until: Until) -> bool {
         let mut before = (self.reading(), self.cell.object());
         self.keep(course, out, &before, &before, 0);
-        let mut row = 0;
         while self.goes_on(course, out, until) {
             let start_ns = self.cell.time_ns();
-            let drive = self.drive(course.commands, &mut row);
             let may_stop = until == Until::Contact && self.contact().is_none() && self.cell.may_touch();
             if may_stop {
                 self.cell.state_into(&mut self.before.cell);
             }
-            self.cell.step(&drive);
+            self.tick(course.commands);
             if may_stop && self.contact().is_some() {
                 self.cell.resume(&self.before.cell);
                 return true;

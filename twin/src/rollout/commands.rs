@@ -101,6 +101,12 @@ impl CommandTrack {
         row
     }
 
+    /// [`CommandTrack::in_force`] without knowing where to begin.
+    #[must_use]
+    pub fn at(&self, now_ns: u64) -> usize {
+        self.stamps_ns.partition_point(|stamp| *stamp <= now_ns + TICK_NS / 2).saturating_sub(1)
+    }
+
     /// Desired positions of a row [rad].
     #[must_use]
     #[inline]
@@ -150,6 +156,14 @@ mod tests {
     fn a_command_acts_from_the_tick_nearest_to_its_stamp() {
         let track = track(&[0, 1, 2, 3]);
         assert_eq!([600, 1_400, 1_600].map(|us| in_force(&track, us)), [1.0, 1.0, 2.0]);
+    }
+
+    #[test]
+    fn searching_from_anywhere_finds_the_same_row() {
+        let track = track(&[0, 1, 2, 6, 7, 8, 108, 109]);
+        for at_ns in (4_999_000_000u64..5_111_000_000).step_by(250_000) {
+            assert_eq!(track.at(at_ns), track.in_force(at_ns, 0));
+        }
     }
 
     #[test]

@@ -364,11 +364,16 @@ impl SimCell {
 
     /// Puts the object somewhere: pose and velocity [m/s] of its geometric centre, angular velocity [rad/s].
     pub fn set_object(&mut self, pose: &Pose<Base, Object>, velocity: Vector3<f64>, angular_velocity: Vector3<f64>) {
+        self.contact.record = ContactRecord::default();
+        self.takes_part.object = true;
+        self.move_object(pose, velocity, angular_velocity);
+    }
+
+    /// The same for an object that has been touched: when that was stays on record.
+    pub fn move_object(&mut self, pose: &Pose<Base, Object>, velocity: Vector3<f64>, angular_velocity: Vector3<f64>) {
         if let Some(object) = &mut self.object {
             object.set(pose, velocity, angular_velocity);
-            self.contact.record = ContactRecord::default();
         }
-        self.takes_part.object = true;
     }
 
     /// The cell as a camera sees it now.
