@@ -2,6 +2,10 @@
 //!
 //! | module | owns |
 //! |---|---|
+//! | [`setting`] | from a vector of numbers to the parameters of a cell |
 //! | [`object`] | clips with an object: poses |
 
 pub mod object;
+pub mod setting;
+
+pub use setting::{Setting, Settings};

@@ -1,0 +1,394 @@
+//! From a vector of numbers to the parameters of a cell: what a search may turn, how far, and where it begins.
+//!
+//! A parameter whose neutral value is infinite (the stiffness of a gear) is turned as its inverse, so that every effect has
+//! a finite neutral point at which its slope can be taken. Units SI.
+
+use crate::estimate::Unknown;
+use shared_mem::cell::{Cell, Range};
+use shared_mem::theta::{ArmTheta, EffectTheta, ObjectTheta, Theta};
+use std::collections::BTreeMap;
+use toml::Value;
+use twin::arm::{ArmModel, ControlLaw, GainError, ModelError};
+use twin::effects::{EffectInfo, Parameter, Role, Shape, find};
+use twin::scene::{MeshFileError, ObjectModel};
+
+/// One number of a [`Theta`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Setting {
+    /// Stiffness of a joint [N m/rad].
+    Stiffness(usize),
+    /// Damping of a joint [N m s/rad].
+    Damping(usize),
+    /// Friction between object and table.
+    Friction,
+    /// Mass of the object [kg].
+    Mass,
+    /// An element of the object's centre of mass from the geometric centre [m].
+    CentreOfMass(usize),
+    /// Friction between tool and object.
+    TipFriction,
+    /// A parameter of an effect of the registry, in its unit.
+    Effect {
+        /// The effect.
+        name: &'static str,
+        /// Its parameter.
+        parameter: &'static str,
+        /// Joint, or element of a vector; none for a single number, which stands for all joints.
+        index: Option<usize>,
+        /// Whether the number is 1 / parameter.
+        inverse: bool,
+    },
+}
+
+/// The cell cannot be completed to a full set of parameters.
+#[derive(Debug, thiserror::Error)]
+pub enum BaseError {
+    /// The arm.
+    #[error(transparent)]
+    Arm(#[from] ModelError),
+    /// Its gains.
+    #[error(transparent)]
+    Gains(#[from] GainError),
+    /// The object.
+    #[error(transparent)]
+    Mesh(#[from] MeshFileError),
+}
+
+impl Setting {
+    /// Name in reports: `stiffness[2]`, `command_delay.delay`, `1/joint_elasticity.stiffness[0]`.
+    #[must_use]
+    pub fn name(&self) -> String {
+        match self {
+            Self::Stiffness(joint) => format!("stiffness[{joint}]"),
+            Self::Damping(joint) => format!("damping[{joint}]"),
+            Self::Friction => "friction".into(),
+            Self::Mass => "mass".into(),
+            Self::CentreOfMass(axis) => format!("centre_of_mass[{axis}]"),
+            Self::TipFriction => "tip_friction".into(),
+            Self::Effect { name, parameter, index, inverse } => {
+                let index = index.map_or_else(String::new, |index| format!("[{index}]"));
+                format!("{}{name}.{parameter}{index}", if *inverse { "1/" } else { "" })
+            }
+        }
+    }
+
+    /// SI unit of the number itself; `1` without.
+    #[must_use]
+    pub fn unit(&self) -> String {
+        match self {
+            Self::Stiffness(_) => "N m/rad".into(),
+            Self::Damping(_) => "N m s/rad".into(),
+            Self::Friction | Self::TipFriction => "1".into(),
+            Self::Mass => "kg".into(),
+            Self::CentreOfMass(_) => "m".into(),
+            Self::Effect { name, parameter, inverse, .. } => {
+                let unit = parameter_of(name, parameter).map_or("1", |p| p.unit);
+                if *inverse { format!("1/({unit})") } else { unit.into() }
+            }
+        }
+    }
+
+    fn write(&self, theta: &mut Theta, value: f64, dof: usize) {
+        let arm = |theta: &mut Theta, joint: usize, gains: fn(&mut ArmTheta) -> &mut Vec<f64>| {
+            if let Some(gain) = theta.arm.as_mut().and_then(|arm| gains(arm).get_mut(joint)) {
+                *gain = value;
+            }
+        };
+        let object = theta.object.get_or_insert_with(ObjectTheta::default);
+        match *self {
+            Self::Stiffness(joint) => arm(theta, joint, |arm| &mut arm.stiffness),
+            Self::Damping(joint) => arm(theta, joint, |arm| &mut arm.damping),
+            Self::Friction => object.friction = Some(value),
+            Self::Mass => object.mass = Some(value),
+            Self::CentreOfMass(axis) => object.centre_of_mass.get_or_insert_default()[axis] = value,
+            Self::TipFriction => object.tip_friction = Some(value),
+            Self::Effect { name, parameter, index, inverse } => {
+                let value = if inverse { value.recip() } else { value };
+                write_effect(&mut theta.effects, (name, parameter, index), value, dof);
+            }
+        }
+    }
+}
+
+/// Which numbers of a theta are turned; all others stay as they are in the base.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Settings {
+    base: Theta,
+    settings: Vec<Setting>,
+    dof: usize,
+}
+
+impl Settings {
+    /// `base`: a complete theta, as [`complete`] makes it.
+    #[must_use]
+    pub fn new(base: Theta, settings: Vec<Setting>) -> Self {
+        let dof = base.arm.as_ref().map_or(0, |arm| arm.stiffness.len());
+        Self { base, settings, dof }
+    }
+
+    /// What is turned, in the order of the numbers.
+    #[must_use]
+    pub fn settings(&self) -> &[Setting] {
+        &self.settings
+    }
+
+    /// The parameters that are not turned, and where the others begin.
+    #[must_use]
+    pub fn base(&self) -> &Theta {
+        &self.base
+    }
+
+    /// The parameters that go with these numbers.
+    #[must_use]
+    pub fn theta(&self, shared: &[f64]) -> Theta {
+        let mut theta = self.base.clone();
+        let objectless = theta.object.is_none();
+        for (setting, value) in self.settings.iter().zip(shared) {
+            setting.write(&mut theta, *value, self.dof);
+        }
+        if objectless && theta.object.as_ref() == Some(&ObjectTheta::default()) {
+            theta.object = None;
+        }
+        theta
+    }
+}
+
+/// All parameters of a cell: what is given, completed by the nominal values of cell.toml.
+///
+/// # Errors
+/// [`BaseError`] naming the key that is missing and the remedy.
+pub fn complete(cell: &Cell, given: Option<&Theta>) -> Result<Theta, BaseError> {
+    let mut theta = given.cloned().unwrap_or_default();
+    if cell.robot.is_some() && cell.controller.is_some() {
+        let arm = ArmModel::from_cell(cell)?;
+        let law = ControlLaw::new(cell.controller.as_ref(), theta.arm.as_ref(), &arm)?;
+        let of = |gains: &[f64]| gains[..arm.dof()].to_vec();
+        theta.arm = Some(ArmTheta { stiffness: of(&law.stiffness), damping: of(&law.damping) });
+    }
+    if let Some(object) = ObjectModel::new(cell, Some(&theta))? {
+        theta.object = Some(ObjectTheta {
+            friction: Some(object.friction),
+            mass: Some(object.mass),
+            centre_of_mass: Some(object.centre_of_mass.into()),
+            tip_friction: Some(object.tip_friction),
+        });
+    }
+    Ok(theta)
+}
+
+/// Gains stated by value are searched this far: the values are right to 20 %, and a bound must not be mistaken for them.
+const GAIN_FACTOR: f64 = 2.0;
+/// Difference step of a gain over the gain.
+const GAIN_STEP: f64 = 1e-4;
+
+/// Stiffness and damping of every joint, beginning at the base's.
+#[must_use]
+pub fn gains(cell: &Cell, base: &Theta) -> Vec<(Setting, Unknown)> {
+    let (Some(controller), Some(arm)) = (&cell.controller, &base.arm) else { return Vec::new() };
+    type Kind = fn(usize) -> Setting;
+    let kinds: [(&[f64], &[f64], Option<Range>, Kind); 2] = [
+        (&arm.stiffness, &controller.stiffness, controller.stiffness_range, Setting::Stiffness),
+        (&arm.damping, &controller.damping, controller.damping_range, Setting::Damping),
+    ];
+    let mut all = Vec::new();
+    for (starts, nominal, range, kind) in kinds {
+        for (joint, start) in starts.iter().enumerate() {
+            let around = nominal.get(joint).copied().unwrap_or(*start).max(f64::MIN_POSITIVE);
+            let [lower, upper] = range.unwrap_or([around / GAIN_FACTOR, around * GAIN_FACTOR]);
+            let scale = start.max(0.05 * (upper - lower));
+            all.push(unknown(kind(joint), *start, [lower, upper], GAIN_STEP * scale));
+        }
+    }
+    all
+}
+
+/// Ranges of the object's parameters where cell.toml tells none: friction, mass over the nominal one, friction of the tip.
+const FRICTION: Range = [0.02, 1.5];
+const MASS_FACTOR: f64 = 5.0;
+const TIP_FRICTION: Range = [0.0, 1.0];
+/// The centre of mass lies within this share of the half extents.
+const CENTRE_SHARE: f64 = 0.5;
+
+/// Friction, mass, centre of mass and tip friction of the object, beginning at the base's.
+#[must_use]
+pub fn object_parameters(cell: &Cell, base: &Theta) -> Vec<(Setting, Unknown)> {
+    let (Some(object), Some(start)) = (&cell.object, &base.object) else { return Vec::new() };
+    let mass = start.mass.unwrap_or_else(|| object.nominal_mass());
+    let half = match ObjectModel::new(cell, Some(base)) {
+        Ok(Some(model)) => model.shape.half_extents().into(),
+        _ => [0.05; 3],
+    };
+    let centres = object.centre_of_mass_range.unwrap_or_else(|| half.map(|h| [-CENTRE_SHARE * h, CENTRE_SHARE * h]));
+    let masses = object.mass_range.unwrap_or([mass / MASS_FACTOR, mass * MASS_FACTOR]);
+    let friction = start.friction.unwrap_or_else(|| object.nominal_friction());
+    let tip = start.tip_friction.unwrap_or_else(|| object.nominal_tip_friction());
+    let mut all = vec![
+        unknown(Setting::Friction, friction, object.friction_range.unwrap_or(FRICTION), 2e-3 * friction.max(0.05)),
+        unknown(Setting::Mass, mass, masses, 5e-3 * mass),
+    ];
+    for (axis, range) in centres.into_iter().enumerate() {
+        let value = start.centre_of_mass.unwrap_or_default()[axis];
+        all.push(unknown(Setting::CentreOfMass(axis), value, range, 2e-3 * 2.0 * half[axis]));
+    }
+    all.push(unknown(Setting::TipFriction, tip, object.tip_friction_range.unwrap_or(TIP_FRICTION), 2e-3));
+    all
+}
+
+/// How far beyond what is met in practice an effect is searched, over the width of that range.
+const WIDENED: f64 = 0.5;
+/// Difference step over the width of what is met in practice.
+const EFFECT_STEP: f64 = 2e-3;
+
+/// Every number of an effect, for an arm of `dof` joints, beginning where the effect changes nothing.
+#[must_use]
+pub fn effect_settings(info: &'static EffectInfo, dof: usize) -> Vec<(Setting, Unknown)> {
+    let mut all = Vec::new();
+    for parameter in info.parameters {
+        let indices: Vec<Option<usize>> = match parameter.shape {
+            Shape::Number => vec![None],
+            Shape::PerJoint => (0..dof).map(Some).collect(),
+            Shape::Vector(n) => (0..n).map(Some).collect(),
+        };
+        let inverse = parameter.resting_value().is_infinite();
+        let [lo, hi] = searched(parameter, inverse);
+        let step = EFFECT_STEP * width(parameter, inverse);
+        let start = if inverse { 0.0 } else { parameter.resting_value() };
+        for index in indices {
+            let setting = Setting::Effect { name: info.name, parameter: parameter.name, index, inverse };
+            all.push(unknown(setting, start, [lo, hi], step));
+        }
+    }
+    all
+}
+
+/// The range of the number that is turned.
+fn searched(parameter: &Parameter, inverse: bool) -> Range {
+    let [lo, hi] = parameter.plausible;
+    if inverse {
+        return [0.0, (1.0 + WIDENED) / lo];
+    }
+    let more = WIDENED * (hi - lo);
+    let rest = parameter.resting_value();
+    let [least, most] = parameter.possible;
+    // A form like an angle wraps around: no more of it makes sense.
+    let more = if matches!(parameter.role, Role::Form { .. }) { 0.0 } else { more };
+    [(lo - more).max(least).min(rest), (hi + more).min(most).max(rest)]
+}
+
+fn width(parameter: &Parameter, inverse: bool) -> f64 {
+    let [lo, hi] = parameter.plausible;
+    if inverse { lo.recip() } else { hi - lo }
+}
+
+fn unknown(setting: Setting, start: f64, [lower, upper]: Range, step: f64) -> (Setting, Unknown) {
+    (setting, Unknown { name: setting.name(), start: start.clamp(lower, upper), lower, upper, step })
+}
+
+fn parameter_of(effect: &str, parameter: &str) -> Option<&'static Parameter> {
+    find(effect)?.parameters.iter().find(|p| p.name == parameter)
+}
+
+fn write_effect(
+    blocks: &mut Vec<EffectTheta>,
+    (name, parameter, index): (&'static str, &'static str, Option<usize>),
+    value: f64,
+    dof: usize,
+) {
+    let at = blocks.iter().position(|block| block.name == name).unwrap_or_else(|| {
+        blocks.push(EffectTheta { name: name.into(), parameters: resting(name, dof) });
+        blocks.len() - 1
+    });
+    let held = blocks[at].parameters.entry(parameter.to_owned()).or_insert(Value::Float(0.0));
+    let Some(index) = index else {
+        *held = Value::Float(value);
+        return;
+    };
+    // A single number stands for all joints until one of them is turned alone.
+    if let Value::Float(_) | Value::Integer(_) = held {
+        *held = Value::Array(vec![held.clone(); dof]);
+    }
+    if let Value::Array(elements) = held
+        && let Some(element) = elements.get_mut(index)
+    {
+        *element = Value::Float(value);
+    }
+}
+
+/// The block of an effect that changes nothing.
+fn resting(name: &str, dof: usize) -> BTreeMap<String, Value> {
+    let parameters = find(name).map_or(&[][..], |effect| effect.parameters);
+    let at_rest = |parameter: &Parameter| {
+        let number = Value::Float(parameter.resting_value());
+        match parameter.shape {
+            Shape::Number => number,
+            Shape::PerJoint => Value::Array(vec![number; dof]),
+            Shape::Vector(n) => Value::Array(vec![number; n]),
+        }
+    };
+    parameters.iter().map(|parameter| (parameter.name.to_owned(), at_rest(parameter))).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use shared_mem::cell::{Controller, Robot};
+    use std::path::Path;
+    use twin::effects::{Effects, registry};
+
+    fn cell() -> Cell {
+        let text = include_str!("../../../config/fr3_cell.toml");
+        Cell::parse(text, Path::new("cell.toml")).expect("the shipped cell")
+    }
+
+    #[test]
+    fn every_effect_can_be_turned_from_neutral_and_is_accepted_at_both_ends() {
+        let base = complete(&cell(), None).expect("a complete cell");
+        for info in registry() {
+            let (settings, unknowns): (Vec<_>, Vec<_>) = effect_settings(info, 7).into_iter().unzip();
+            let settings = Settings::new(base.clone(), settings);
+            let at = |of: fn(&Unknown) -> f64| {
+                let theta = settings.theta(&unknowns.iter().map(of).collect::<Vec<_>>());
+                Effects::from_theta(&theta.effects, 7).unwrap_or_else(|error| panic!("{}: {error}", info.name))
+            };
+            assert!(at(|u| u.start).is_none(), "{} at rest", info.name);
+            let changed = [at(|u| u.lower), at(|u| u.upper)].iter().any(|effects| !effects.is_none());
+            assert!(changed, "{} at its bounds", info.name);
+            assert!(unknowns.iter().all(|u| u.lower <= u.start && u.start <= u.upper && u.step > 0.0), "{unknowns:?}");
+        }
+    }
+
+    #[test]
+    fn numbers_land_where_their_settings_say() {
+        let base = complete(&cell(), None).expect("a complete cell");
+        let elasticity =
+            Setting::Effect { name: "joint_elasticity", parameter: "stiffness", index: Some(2), inverse: true };
+        let settings = [Setting::Stiffness(1), Setting::Damping(6), Setting::CentreOfMass(2), elasticity];
+        let theta = Settings::new(base, settings.to_vec()).theta(&[500.0, 12.0, 0.01, 1e-4]);
+        let arm = theta.arm.expect("gains");
+        assert_eq!((arm.stiffness[1], arm.damping[6], arm.stiffness[0]), (500.0, 12.0, 600.0));
+        assert_eq!(theta.object.expect("an object").centre_of_mass, Some([0.0, 0.0, 0.01]));
+        let Value::Array(stiffness) = &theta.effects[0].parameters["stiffness"] else { panic!("no array") };
+        let of = |joint: usize| stiffness[joint].as_float().expect("a number");
+        assert!((of(2) - 1e4).abs() < 1e-6 && of(0).is_infinite());
+    }
+
+    #[test]
+    fn gains_known_by_their_range_are_searched_in_it_and_gains_known_by_value_around_it() {
+        let nominal = cell();
+        let base = complete(&nominal, None).expect("a complete cell");
+        let (_, first) = &gains(&nominal, &base)[0];
+        assert_eq!((first.lower, first.start, first.upper), (300.0, 600.0, 1200.0));
+        let ranged = Cell {
+            robot: Some(Robot { joints: vec!["a".into()], ..Robot::default() }),
+            controller: Some(Controller {
+                stiffness_range: Some([1.0, 100.0]),
+                damping_range: Some([0.0, 5.0]),
+                ..Controller::default()
+            }),
+            ..Cell::default()
+        };
+        let base = complete(&ranged, None).expect("a complete cell");
+        let both = gains(&ranged, &base);
+        assert_eq!(both.iter().map(|(_, u)| [u.lower, u.upper]).collect::<Vec<_>>(), [[1.0, 100.0], [0.0, 5.0]]);
+    }
+}
