@@ -104,7 +104,7 @@ impl TableObject {
         tumbling.restitution = parameters.restitution;
         tumbling.gravity = slide.gravity(GRAVITY);
         self.drag = slide.drag();
-        self.made_of = made_of;
+        (self.made_of, self.motion.made_of) = (made_of, made_of);
     }
 
     /// What it does now, to go on from later.
@@ -321,6 +321,21 @@ mod tests {
         run(&mut object, 2.0);
         let crept = (before.inverse() * object.isometry()).translation.vector.norm();
         assert!(crept < 1e-6, "settled, then crept {crept} m");
+    }
+
+    #[test]
+    fn what_is_resumed_under_other_parameters_is_where_it_was() {
+        let start = Isometry3::new(Vector3::new(0.5, 0.1, 0.05), Vector3::z() * 0.3);
+        let mut object = placed(&box_model(0.3, 0.0), start, Vector3::x() * 0.2);
+        let other = ObjectModel { mass: 0.5, centre_of_mass: Vector3::new(-0.01, 0.0, 0.0), ..box_model(0.3, 0.0) };
+        for model in [other, box_model(0.3, 0.0)] {
+            object.set_parameters(model.parameters(), &Effects::default());
+            let motion = *object.motion();
+            object.resume(&motion);
+            let moved = start.inverse() * object.isometry();
+            assert!(moved.translation.vector.norm() < 1e-9, "{}", moved.translation.vector);
+            assert!((object.centre_velocity() - Vector3::x() * 0.2).norm() < 1e-9, "{}", object.centre_velocity());
+        }
     }
 
     #[test]
