@@ -1,32 +1,68 @@
-//! One recorded clip with an object, prepared for being held against the twin: what the tracker said wrongly taken out,
-//! when the object last moved. Base frame, SI, stamps of the recording.
+//! One recorded clip with an object, prepared for being held against the twin: when its object was hit, let go and came
+//! to rest, and where the arm is looked at. Base frame, SI, stamps of the recording.
 
 use nalgebra::Vector3;
+use shared_mem::cell::Cell;
 use shared_mem::frames::{Base, Object, Pose};
+use shared_mem::msg::joints_from;
 use shared_mem::recording::{Clip, ObjectSeries};
-use twin::effects::CameraEffects;
+use twin::arm::ArmModel;
+use twin::effects::{CameraEffects, Effects};
+use twin::physics::TableObject;
+use twin::physics::touch::Capsule;
+use twin::rollout::CommandTrack;
+use twin::scene::ObjectModel;
 
-/// Poses this far from the last one still move, in sigmas of the noise: 1 of 100 000 resting poses is.
+/// Poses this far from the last (or first) ones move, in sigmas of the noise: 1 of 100 000 resting poses is.
 const MOVING_SIGMAS: f64 = 8.0;
+/// Tool and object are apart when the tracked gap is wider than this [m]: several sigmas of any usable tracker.
+const APART: f64 = 4e-3;
+/// The arm is looked at so often from a moment before the hit until the object rests [ns].
+const ARM_EVERY_NS: u64 = 10_000_000;
+/// That moment: two poses of a 60 Hz tracker [ns].
+const BEFORE_HIT_NS: u64 = 40_000_000;
 
 /// A clip with an object.
 #[derive(Debug, Clone)]
 pub(super) struct ObjectClip {
     pub(super) recorded: Clip,
-    /// When the last pose was taken that is not where the object came to rest.
+    pub(super) commands: Option<CommandTrack>,
+    /// When the last pose was taken that is still where the object stood at first.
+    pub(super) onset_ns: u64,
+    /// When the tool has let go for good.
+    pub(super) free_ns: u64,
+    /// When the last pose was taken that is not yet where the object came to rest.
     pub(super) rest_ns: u64,
     /// Stamp of the last pose.
     pub(super) end_ns: u64,
+    /// Measured rows of the arm that count.
+    pub(super) arm_rows: Vec<usize>,
+    /// Their stamps.
+    pub(super) arm_ns: Vec<u64>,
 }
 
 impl ObjectClip {
     /// `None` when no pose was recorded. `noise`: one sigma of a coordinate [m].
-    pub(super) fn new(recorded: Clip, noise: f64) -> Option<Self> {
+    pub(super) fn new(recorded: Clip, cell: &Cell, noise: f64) -> Option<Self> {
         let ObjectSeries { stamps_ns, poses } = &recorded.object;
-        let (end_ns, last) = (*stamps_ns.last()?, place(poses.last()?));
-        let away = |pose: &Pose<Base, Object>| (place(pose) - last).norm() > MOVING_SIGMAS * noise;
-        let rest_ns = poses.iter().rposition(away).map_or(stamps_ns[0], |row| stamps_ns[row]);
-        Some(Self { recorded, rest_ns, end_ns })
+        let (end_ns, first, last) = (*stamps_ns.last()?, place(poses.first()?), place(poses.last()?));
+        let away =
+            |from: Vector3<f64>| move |pose: &Pose<Base, Object>| (place(pose) - from).norm() > MOVING_SIGMAS * noise;
+        let onset = poses.iter().position(away(first)).map_or(0, |row| row.saturating_sub(1));
+        let rest = poses.iter().rposition(away(last)).unwrap_or(0);
+        let (onset_ns, rest_ns) = (stamps_ns[onset], stamps_ns[rest]);
+        let free_ns = let_go(&recorded, cell, onset, rest).map_or(rest_ns, |row| stamps_ns[row]);
+        let (mut arm_rows, mut arm_ns) = (Vec::new(), Vec::new());
+        let mut next_ns = onset_ns.saturating_sub(BEFORE_HIT_NS);
+        for (row, &stamp) in recorded.measured.stamps_ns.iter().enumerate() {
+            if stamp >= next_ns && stamp <= rest_ns {
+                arm_rows.push(row);
+                arm_ns.push(stamp);
+                next_ns = stamp + ARM_EVERY_NS;
+            }
+        }
+        let commands = CommandTrack::new(&recorded.desired);
+        Some(Self { recorded, commands, onset_ns, free_ns, rest_ns, end_ns, arm_rows, arm_ns })
     }
 
     /// The poses as they were, under effects that report them elsewhere.
@@ -39,6 +75,25 @@ impl ObjectClip {
         }
         series
     }
+}
+
+/// First pose between `onset` and `rest` from which on the tool stays away from the object.
+fn let_go(clip: &Clip, cell: &Cell, onset: usize, rest: usize) -> Option<usize> {
+    let arm = ArmModel::from_cell(cell).ok()?;
+    let tool = cell.tool.as_ref()?;
+    let capsule = Capsule { segment: tool.length - tool.radius, radius: tool.radius };
+    let model = ObjectModel::new(cell, None).ok()??;
+    let mut object = TableObject::new(&model, None, &Effects::default()).ok()?;
+    let names = arm.joint_names().to_vec();
+    let measured = clip.clone().reorder(&names).ok()?.measured;
+    let mut apart = |row: usize| {
+        let at = measured.stamps_ns.partition_point(|stamp| *stamp < clip.object.stamps_ns[row]);
+        let q = joints_from(measured.q_row(at.min(measured.len() - 1)));
+        object.set(&clip.object.poses[row], Vector3::zeros(), Vector3::zeros());
+        -object.touch(&capsule, &arm.flange(&q).isometry()).depth > APART
+    };
+    let touching = (onset..=rest).rev().find(|row| !apart(*row))?;
+    Some((touching + 1).min(rest))
 }
 
 pub(super) fn place(pose: &Pose<Base, Object>) -> Vector3<f64> {

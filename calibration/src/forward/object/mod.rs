@@ -1,114 +1,210 @@
-//! Clips with an object: what the twin makes of every clip under any parameters, and how far that is from the poses that
-//! were recorded. Called by identification and by the diagnosis.
+//! Clips with an object: what the twin makes of every clip under any parameters, and how far that is from what was
+//! recorded. Called by identification and by the diagnosis.
 //!
 //! A clip's rows are its poses: position along x, y, z and rotation vector about them, measured less predicted, each in
-//! sigmas of the tracker's noise, base frame. Every clip has numbers of its own ([`Own`]): the hit above all differs a
-//! little from any simulated one, and read as structure that little would be taken for an effect that is not there.
+//! sigmas of the tracker's noise, base frame; and, where asked for, the joints from the hit on: the blow that the arm
+//! takes says how heavy the object is. Every clip has numbers of its own ([`Own`]): the hit above all differs a little
+//! from any simulated one, and read as structure that little would be taken for an effect that is not there.
 //!
 //! | file | owns |
 //! |---|---|
 //! | `own` | the numbers of a clip's own |
 //! | `clip` | a recorded clip, prepared |
 //! | `rollout` | a clip in the twin |
+//! | `cache` | what of it can be used again |
+//! | `rows` | what every residual is about |
 
+mod cache;
 mod clip;
 mod own;
 mod rollout;
+mod rows;
 
 pub use own::{ALL, Axis, Own, Values};
+pub use rows::{Channel, Part, Row};
 
+use super::Settings;
 use crate::estimate::{ClipModel, Impossible, Random};
+use cache::ClipCache;
 use clip::ObjectClip;
 use nalgebra::Isometry3;
-use rollout::Trace;
+use rollout::{Job, Outcome};
 use shared_mem::cell::{Cell, PoseNoise};
 use shared_mem::frames::{Base, Object, Pose};
 use shared_mem::recording::Clip;
-use shared_mem::theta::Theta;
+use std::sync::Mutex;
 use twin::effects::CameraMemory;
+use twin::rollout::CellRollout;
+use twin::sim::SimError;
 
 /// What the tracker's noise is taken for where cell.toml does not tell it, one sigma.
 const NOISE: PoseNoise = PoseNoise { position: 1e-3, rotation: 5e-3 };
 
-/// Residuals of a pose.
-pub const ROWS: usize = 6;
+/// Rows of a pose.
+const POSE_ROWS: usize = 6;
 
 fn noise_of(cell: &Cell) -> PoseNoise {
     cell.object.as_ref().and_then(|object| object.pose_noise).unwrap_or(NOISE)
 }
 
-/// Clips with an object, and what numbers mean for the cell.
-pub struct ObjectClips<F> {
-    cell: Cell,
-    noise: PoseNoise,
-    clips: Vec<ObjectClip>,
-    theta: F,
+/// How far a residual may be off for other reasons than noise, one sigma.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ModelError {
+    /// Of poses between the first touch and the moment the tool lets go [m].
+    pub position: f64,
+    /// The same [rad].
+    pub rotation: f64,
+    /// Of the joints from the hit on [rad]; `None` leaves the arm out.
+    pub joints: Option<f64>,
 }
 
-impl<F: Fn(&[f64]) -> Theta + Sync> ObjectClips<F> {
-    /// Clips of a cell, in their order; those without poses are left out. `theta` gives the parameters that go with
-    /// shared numbers.
-    pub fn new(cell: &Cell, clips: Vec<Clip>, theta: F) -> Self {
+impl Default for ModelError {
+    fn default() -> Self {
+        Self { position: 3e-3, rotation: 0.03, joints: None }
+    }
+}
+
+/// Clips with an object, and what numbers mean for the cell.
+pub struct ObjectClips {
+    cell: Cell,
+    noise: PoseNoise,
+    error: ModelError,
+    clips: Vec<ObjectClip>,
+    caches: Vec<Mutex<ClipCache>>,
+    /// Idle workers; as many as threads were ever at work.
+    workers: Mutex<Vec<CellRollout>>,
+    worker: CellRollout,
+    settings: Settings,
+}
+
+/// What the twin makes of a clip.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Prediction {
+    /// The poses that the tracker would have reported, one for each recorded one.
+    pub poses: Vec<Pose<Base, Object>>,
+    /// Stamp of the first touch; `None` where tool and object did not touch.
+    pub contact_ns: Option<u64>,
+}
+
+impl ObjectClips {
+    /// Clips of a cell, in their order; those without poses are left out.
+    ///
+    /// # Errors
+    /// [`SimError`] when the cell cannot be simulated.
+    pub fn new(cell: &Cell, clips: Vec<Clip>, settings: Settings) -> Result<Self, SimError> {
         let noise = noise_of(cell);
-        let clips = clips.into_iter().filter_map(|clip| ObjectClip::new(clip, noise.position)).collect();
-        Self { cell: cell.clone(), noise, clips, theta }
+        let prepared = |clip| ObjectClip::new(clip, cell, noise.position);
+        let clips: Vec<_> = clips.into_iter().filter_map(prepared).collect();
+        let caches = clips.iter().map(|_| Mutex::default()).collect();
+        let worker = CellRollout::new(cell, None)?;
+        let (error, workers) = (ModelError::default(), Mutex::default());
+        Ok(Self { cell: cell.clone(), noise, error, clips, caches, workers, worker, settings })
+    }
+
+    /// The same clips, other numbers to turn.
+    pub fn set_settings(&mut self, settings: Settings) {
+        self.settings = settings;
+    }
+
+    /// How far residuals may be off for other reasons than noise.
+    pub fn set_model_error(&mut self, error: ModelError) {
+        self.error = error;
     }
 
     /// What varies from clip to clip, in the order of [`ALL`], with the scatter that is assumed until it is estimated;
     /// 0 where it means nothing in any of these clips.
     pub fn random(&self) -> Vec<Random> {
-        let acts = |own: Own| self.clips.iter().any(|clip| own.acts_in(clip.recorded.kind));
-        let of = |own: Own| Random { sigma: if acts(own) { own.sigma(&self.cell) } else { 0.0 }, ..own.random() };
-        ALL.map(of).to_vec()
+        let kinds = || self.clips.iter().map(|clip| clip.recorded.kind);
+        let sigma = |own: Own| {
+            let acting = kinds().filter(|kind| own.acts_in(*kind));
+            acting.map(|kind| own.sigma(&self.cell, kind)).fold(0.0, f64::max)
+        };
+        ALL.map(|own| Random { sigma: sigma(own), ..own.random() }).to_vec()
     }
 
-    /// The poses that the tracker would have reported, one for each recorded one.
+    /// What the twin makes of a clip.
     ///
     /// # Errors
     /// [`Impossible`] when the cell cannot be simulated with these numbers.
-    pub fn predict(&self, clip: usize, shared: &[f64], own: &[f64]) -> Result<Vec<Pose<Base, Object>>, Impossible> {
-        let clip = &self.clips[clip];
-        let own = Values::new(own, clip.recorded.kind);
-        let trace = rollout::run(&self.cell, clip, &(self.theta)(shared), &own)?;
-        Ok(reported(&trace, clip, &own))
+    pub fn predict(&self, clip: usize, shared: &[f64], own: &[f64]) -> Result<Prediction, Impossible> {
+        let own = Values::new(own, self.clips[clip].recorded.kind);
+        let outcome = self.outcome(clip, shared, &own)?;
+        Ok(Prediction { poses: reported(&outcome, &self.clips[clip], &own), contact_ns: outcome.contact_ns })
+    }
+
+    /// What every residual of a clip is about.
+    pub fn rows(&self, clip: usize) -> Vec<Row> {
+        rows::rows(&self.clips[clip], self.error.joints.is_some())
     }
 
     /// A recorded clip.
     pub fn clip(&self, clip: usize) -> &Clip {
         &self.clips[clip].recorded
     }
+
+    fn outcome(&self, clip: usize, shared: &[f64], own: &Values) -> Result<Outcome, Impossible> {
+        let idle = self.workers.lock().expect("no rollout has panicked").pop();
+        let mut worker = idle.unwrap_or_else(|| self.worker.clone());
+        let theta = self.settings.theta(shared);
+        let outcome = {
+            let mut cache = self.caches[clip].lock().expect("no rollout has panicked");
+            let clip = &self.clips[clip];
+            Job { cell: &self.cell, clip, theta: &theta, own, worker: &mut worker, cache: &mut cache }.run()
+        };
+        self.workers.lock().expect("no rollout has panicked").push(worker);
+        outcome
+    }
+
+    /// One sigma of a pose's rows at a stamp.
+    fn sigma(&self, clip: &ObjectClip, stamp_ns: u64) -> PoseNoise {
+        if clip.commands.is_none() || stamp_ns <= clip.onset_ns || stamp_ns >= clip.free_ns {
+            return self.noise;
+        }
+        let PoseNoise { position, rotation } = self.noise;
+        PoseNoise { position: position.hypot(self.error.position), rotation: rotation.hypot(self.error.rotation) }
+    }
 }
 
-fn reported(trace: &Trace, clip: &ObjectClip, own: &Values) -> Vec<Pose<Base, Object>> {
-    let camera = &trace.effects.camera;
-    let late = camera.latency_ns() as f64 + own.of(Own::Clock) * 1e9;
+fn reported(outcome: &Outcome, clip: &ObjectClip, own: &Values) -> Vec<Pose<Base, Object>> {
+    let late = outcome.camera.latency_ns() as f64 + own.of(Own::Clock) * 1e9;
     let mut memory = CameraMemory::default();
     let stamps = clip.recorded.object.stamps_ns.iter();
     let seen = |stamp: &u64| {
-        let pose = Pose::from_isometry(trace.at(*stamp as f64 - late));
-        camera.seen(&mut memory, *stamp, pose)
+        let pose = Pose::from_isometry(outcome.object.at(*stamp as f64 - late));
+        outcome.camera.seen(&mut memory, *stamp, pose)
     };
     stamps.map(seen).collect()
 }
 
-impl<F: Fn(&[f64]) -> Theta + Sync> ClipModel for ObjectClips<F> {
+impl ClipModel for ObjectClips {
     fn clips(&self) -> usize {
         self.clips.len()
     }
 
     fn residuals(&self, clip: usize, shared: &[f64], own: &[f64], out: &mut Vec<f64>) -> Result<(), Impossible> {
-        let predicted = self.predict(clip, shared, own)?;
+        let own = Values::new(own, self.clips[clip].recorded.kind);
+        let outcome = self.outcome(clip, shared, &own)?;
+        let clip = &self.clips[clip];
+        let object = &clip.recorded.object;
         out.clear();
-        for (measured, predicted) in self.clip(clip).object.poses.iter().zip(&predicted) {
-            out.extend(difference(&measured.isometry(), &predicted.isometry(), self.noise));
+        for ((measured, stamp), predicted) in
+            object.poses.iter().zip(&object.stamps_ns).zip(reported(&outcome, clip, &own))
+        {
+            out.extend(difference(&measured.isometry(), &predicted.isometry(), self.sigma(clip, *stamp)));
+        }
+        if let Some(sigma) = self.error.joints {
+            let measured = &clip.recorded.measured;
+            for (row, predicted) in clip.arm_rows.iter().zip(&outcome.joints) {
+                out.extend(measured.q_row(*row).iter().zip(predicted).map(|(q, predicted)| (q - predicted) / sigma));
+            }
         }
         Ok(())
     }
 }
 
 /// Measured less predicted in sigmas: position along x, y, z, rotation vector about them, base frame.
-fn difference(measured: &Isometry3<f64>, predicted: &Isometry3<f64>, noise: PoseNoise) -> [f64; ROWS] {
-    let shift = (measured.translation.vector - predicted.translation.vector) / noise.position;
-    let turn = (measured.rotation * predicted.rotation.inverse()).scaled_axis() / noise.rotation;
+fn difference(measured: &Isometry3<f64>, predicted: &Isometry3<f64>, sigma: PoseNoise) -> [f64; POSE_ROWS] {
+    let shift = (measured.translation.vector - predicted.translation.vector) / sigma.position;
+    let turn = (measured.rotation * predicted.rotation.inverse()).scaled_axis() / sigma.rotation;
     [shift.x, shift.y, shift.z, turn.x, turn.y, turn.z]
 }

@@ -1,5 +1,6 @@
-//! Numbers that every clip with an object has of its own: how its friction, its start, its clock and its hit differ from
-//! what all clips share. Read by [`super::ObjectClips`]; their scatter is estimated by [`crate::estimate::scatter`].
+//! Numbers that every clip with an object has of its own: how its friction, its start, its clock and what its hit left
+//! behind differ from what all clips share. Read by [`super::ObjectClips`]; their scatter is estimated by
+//! [`crate::estimate::scatter`].
 
 use crate::estimate::Random;
 use shared_mem::cell::{Cell, ClipKind};
@@ -7,21 +8,21 @@ use shared_mem::cell::{Cell, ClipKind};
 /// A number of a clip's own, zero where the clip is like all others.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Own {
-    /// Logarithm of this clip's friction over the shared one.
+    /// Logarithm of this clip's friction over the shared one, once the tool has let go.
     LnFriction,
-    /// True start of the object less where the rest frames put it: x [m].
-    StartX,
-    /// The same along y [m].
-    StartY,
-    /// The same about the vertical [rad].
-    StartYaw,
     /// How much later than the arm's clock says the poses were taken [s].
     Clock,
-    /// Logarithm of the object's speed and spin when the tool lets go over what the simulated hit gives.
-    ReleaseSpeed,
-    /// Turn of its velocity there about the vertical [rad].
-    ReleaseHeading,
-    /// Spin about the vertical that the simulated hit lacks [rad/s].
+    /// True place of the object before the hit less where the rest frames put it [m]; x or y.
+    Start(Axis),
+    /// The same about the vertical [rad].
+    StartYaw,
+    /// Place of the object when the tool lets go less the simulated one [m]; x or y.
+    Release(Axis),
+    /// The same about the vertical [rad].
+    ReleaseYaw,
+    /// Velocity of the object there less the simulated one [m/s]; x or y.
+    ReleaseVelocity(Axis),
+    /// The same about the vertical [rad/s].
     ReleaseSpin,
     /// Of an object that was let go: its first velocity less the one read off the first poses [m/s].
     Velocity(Axis),
@@ -41,14 +42,17 @@ pub enum Axis {
 }
 
 /// All, in the order of [`Values`].
-pub const ALL: [Own; 14] = [
+pub const ALL: [Own; 17] = [
     Own::LnFriction,
-    Own::StartX,
-    Own::StartY,
-    Own::StartYaw,
     Own::Clock,
-    Own::ReleaseSpeed,
-    Own::ReleaseHeading,
+    Own::Start(Axis::X),
+    Own::Start(Axis::Y),
+    Own::StartYaw,
+    Own::Release(Axis::X),
+    Own::Release(Axis::Y),
+    Own::ReleaseYaw,
+    Own::ReleaseVelocity(Axis::X),
+    Own::ReleaseVelocity(Axis::Y),
     Own::ReleaseSpin,
     Own::Velocity(Axis::X),
     Own::Velocity(Axis::Y),
@@ -58,25 +62,29 @@ pub const ALL: [Own; 14] = [
     Own::Spin(Axis::Z),
 ];
 
+/// Scatter of friction from clip to clip where cell.toml does not tell it, one sigma of ln(mu).
+const FRICTION_SCATTER: f64 = 0.03;
+
 impl Own {
     /// Name in reports.
     #[must_use]
-    pub fn name(self) -> &'static str {
+    pub fn name(self) -> String {
+        let axis = |axis| match axis {
+            Axis::X => "x",
+            Axis::Y => "y",
+            Axis::Z => "z",
+        };
         match self {
-            Self::LnFriction => "ln friction",
-            Self::StartX => "start x",
-            Self::StartY => "start y",
-            Self::StartYaw => "start yaw",
-            Self::Clock => "clock",
-            Self::ReleaseSpeed => "ln release speed",
-            Self::ReleaseHeading => "release heading",
-            Self::ReleaseSpin => "release spin",
-            Self::Velocity(Axis::X) => "first velocity x",
-            Self::Velocity(Axis::Y) => "first velocity y",
-            Self::Velocity(Axis::Z) => "first velocity z",
-            Self::Spin(Axis::X) => "first spin x",
-            Self::Spin(Axis::Y) => "first spin y",
-            Self::Spin(Axis::Z) => "first spin z",
+            Self::LnFriction => "ln friction".into(),
+            Self::Clock => "clock".into(),
+            Self::Start(a) => format!("start {}", axis(a)),
+            Self::StartYaw => "start yaw".into(),
+            Self::Release(a) => format!("release {}", axis(a)),
+            Self::ReleaseYaw => "release yaw".into(),
+            Self::ReleaseVelocity(a) => format!("release velocity {}", axis(a)),
+            Self::ReleaseSpin => "release spin".into(),
+            Self::Velocity(a) => format!("first velocity {}", axis(a)),
+            Self::Spin(a) => format!("first spin {}", axis(a)),
         }
     }
 
@@ -84,25 +92,44 @@ impl Own {
     #[must_use]
     pub fn acts_in(self, kind: ClipKind) -> bool {
         match self {
-            Self::LnFriction | Self::StartX | Self::StartY | Self::StartYaw | Self::Clock => true,
-            Self::ReleaseSpeed | Self::ReleaseHeading | Self::ReleaseSpin => kind == ClipKind::ControlHitSlide,
+            Self::LnFriction | Self::Start(_) | Self::StartYaw => true,
+            Self::Clock | Self::Release(_) | Self::ReleaseYaw | Self::ReleaseVelocity(_) | Self::ReleaseSpin => {
+                kind == ClipKind::ControlHitSlide
+            }
             Self::Velocity(_) | Self::Spin(_) => kind == ClipKind::FreeMotion,
         }
     }
 
     /// One sigma of its scatter that is assumed until it is estimated.
+    ///
+    /// The start is held where many rest frames put it: what is left of its error shows at the release, and there it has
+    /// its place.
     #[must_use]
-    pub fn sigma(self, cell: &Cell) -> f64 {
+    pub fn sigma(self, cell: &Cell, kind: ClipKind) -> f64 {
         let noise = super::noise_of(cell);
+        let alone = kind == ClipKind::FreeMotion;
         match self {
             Self::LnFriction => {
                 cell.object.as_ref().and_then(|object| object.friction_scatter).unwrap_or(FRICTION_SCATTER)
             }
-            // Wide: the rest frames are residuals too and say where the object stood.
-            Self::StartX | Self::StartY => 3.0 * noise.position,
-            Self::StartYaw => 3.0 * noise.rotation,
             Self::Clock => 1e-3,
-            Self::ReleaseSpeed | Self::ReleaseHeading => 0.03,
+            Self::Start(_) => {
+                if alone {
+                    3.0 * noise.position
+                } else {
+                    0.0
+                }
+            }
+            Self::StartYaw => {
+                if alone {
+                    3.0 * noise.rotation
+                } else {
+                    0.0
+                }
+            }
+            Self::Release(_) => 3e-3,
+            Self::ReleaseYaw => 0.03,
+            Self::ReleaseVelocity(_) => 0.03,
             Self::ReleaseSpin => 0.3,
             Self::Velocity(_) => 0.05,
             Self::Spin(_) => 0.5,
@@ -113,17 +140,14 @@ impl Own {
     #[must_use]
     pub fn random(self) -> Random {
         let step = match self {
-            Self::StartX | Self::StartY => 1e-4,
-            Self::StartYaw | Self::Clock | Self::Velocity(_) => 1e-3,
-            Self::LnFriction | Self::ReleaseSpeed | Self::ReleaseHeading => 2e-3,
+            Self::Start(_) | Self::Release(_) => 1e-4,
+            Self::StartYaw | Self::ReleaseYaw | Self::Clock | Self::ReleaseVelocity(_) | Self::Velocity(_) => 1e-3,
+            Self::LnFriction => 2e-3,
             Self::Spin(_) | Self::ReleaseSpin => 2e-2,
         };
-        Random { name: self.name().to_owned(), sigma: 0.0, step }
+        Random { name: self.name(), sigma: 0.0, step }
     }
 }
-
-/// Scatter of friction from clip to clip where cell.toml does not tell it, one sigma of ln(mu).
-const FRICTION_SCATTER: f64 = 0.03;
 
 /// The own numbers of one clip.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -146,5 +170,10 @@ impl Values {
     #[must_use]
     pub fn of(&self, own: Own) -> f64 {
         ALL.iter().position(|other| *other == own).map_or(0.0, |i| self.0[i])
+    }
+
+    /// Those along an axis, as a vector.
+    pub(super) fn vector(&self, own: impl Fn(Axis) -> Own) -> nalgebra::Vector3<f64> {
+        nalgebra::Vector3::from([Axis::X, Axis::Y, Axis::Z].map(|axis| self.of(own(axis))))
     }
 }

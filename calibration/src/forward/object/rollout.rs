@@ -1,37 +1,49 @@
 //! One clip in the twin: the arm comes, hits, the object slides until it rests. Base frame, SI, stamps of the recording.
+//!
+//! A run has three parts, and the first two are kept: until the first touch nothing but the arm and the place of the
+//! object counts; until the tool lets go the clip's own numbers do not. So what differs by friction from clip to clip
+//! costs the last part alone.
 
+use super::cache::{Approach, ArmKey, ClipCache, Hit};
 use super::clip::ObjectClip;
-use super::own::{Axis, Own, Values};
+use super::own::{Own, Values};
 use crate::estimate::Impossible;
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use shared_mem::cell::{Cell, ClipKind};
 use shared_mem::frames::Pose;
-use shared_mem::msg::MAX_JOINTS;
 use shared_mem::theta::{ObjectTheta, Theta};
-use twin::arm::{ArmModel, ControlLaw, JointState};
-use twin::effects::Effects;
+use twin::arm::Joints;
+use twin::effects::CameraEffects;
 use twin::replay::object_start;
-use twin::rollout::{ArmRollout, CommandTrack};
+use twin::rollout::{CellRollout, CellTrace, Course, ObjectState, TICK_NS};
 use twin::scene::ObjectModel;
-use twin::sim::{Drive, PERIOD_NS, SimCell};
 
 /// The simulation ends when the object has rested for so many periods and no recorded pose moves any more.
 const REST_PERIODS: usize = 50;
 
-/// The object over time, one pose a period from `start_ns` on; after the last it rests there.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) struct Trace {
-    pub(super) start_ns: u64,
-    pub(super) poses: Vec<Isometry3<f64>>,
-    /// From the clip's start to the first touch [s].
-    pub(super) contact_time: Option<f64>,
-    pub(super) effects: Effects,
+/// What the twin did in a clip.
+#[derive(Debug, Clone)]
+pub(super) struct Outcome {
+    /// The object from the first touch on, one pose a period.
+    pub(super) object: Path,
+    /// What the encoders read at the clip's arm stamps [rad].
+    pub(super) joints: Vec<Joints>,
+    /// Stamp of the first touch.
+    pub(super) contact_ns: Option<u64>,
+    pub(super) camera: CameraEffects,
 }
 
-impl Trace {
+/// Poses a period apart; before the first and after the last the object rests.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Path {
+    pub(super) start_ns: u64,
+    pub(super) poses: Vec<Isometry3<f64>>,
+}
+
+impl Path {
     /// The pose at a time, between periods on the straight way.
     pub(super) fn at(&self, stamp_ns: f64) -> Isometry3<f64> {
-        let along = (stamp_ns - self.start_ns as f64) / PERIOD_NS as f64;
+        let along = (stamp_ns - self.start_ns as f64) / TICK_NS as f64;
         let last = self.poses.len() - 1;
         if along <= 0.0 {
             return self.poses[0];
@@ -44,133 +56,168 @@ impl Trace {
     }
 }
 
-/// Simulates a clip with its own numbers.
-pub(super) fn run(cell: &Cell, clip: &ObjectClip, theta: &Theta, own: &Values) -> Result<Trace, Impossible> {
-    let fail = |error: &dyn std::fmt::Display| Impossible(error.to_string());
-    let theta = with_own_friction(cell, theta, own).map_err(|e| fail(&e))?;
-    let object = ObjectModel::new(cell, Some(&theta)).map_err(|e| fail(&e))?;
-    let object = object.ok_or_else(|| Impossible("the cell has no object".into()))?;
-    match clip.recorded.kind {
-        ClipKind::FreeMotion => alone(cell, clip, &theta, &object, own),
-        ClipKind::ControlHitSlide | ClipKind::Excitation => hit(cell, clip, &theta, &object, own),
+/// What a simulation of one clip needs.
+pub(super) struct Job<'a> {
+    pub(super) cell: &'a Cell,
+    pub(super) clip: &'a ObjectClip,
+    pub(super) theta: &'a Theta,
+    pub(super) own: &'a Values,
+    pub(super) worker: &'a mut CellRollout,
+    pub(super) cache: &'a mut ClipCache,
+}
+
+fn impossible(error: impl std::fmt::Display) -> Impossible {
+    Impossible(error.to_string())
+}
+
+impl Job<'_> {
+    /// Simulates the clip.
+    pub(super) fn run(mut self) -> Result<Outcome, Impossible> {
+        self.worker.set_parameters(self.theta).map_err(impossible)?;
+        let object = ObjectModel::new(self.cell, Some(self.theta)).map_err(impossible)?;
+        let object = object.ok_or_else(|| impossible("the cell has no object"))?;
+        match self.clip.recorded.kind {
+            ClipKind::FreeMotion => self.let_go(&object),
+            ClipKind::ControlHitSlide | ClipKind::Excitation => self.hit(&object),
+        }
     }
-}
 
-fn with_own_friction(cell: &Cell, theta: &Theta, own: &Values) -> Result<Theta, twin::scene::MeshFileError> {
-    let mut theta = theta.clone();
-    let friction = ObjectModel::new(cell, Some(&theta))?.map_or(0.0, |object| object.friction);
-    let object = theta.object.get_or_insert_with(ObjectTheta::default);
-    object.friction = Some(friction * own.of(Own::LnFriction).exp());
-    Ok(theta)
-}
-
-fn hit(cell: &Cell, clip: &ObjectClip, theta: &Theta, object: &ObjectModel, own: &Values) -> Result<Trace, Impossible> {
-    let fail = |error: &dyn std::fmt::Display| Impossible(error.to_string());
-    let effects = effects(cell, theta)?;
-    let commands = CommandTrack::new(&clip.recorded.desired).ok_or_else(|| Impossible("no commands".into()))?;
-    let start = arm_start(cell, clip, theta, &effects, &commands)?;
-    let mut sim = SimCell::new(cell, Some(theta)).map_err(|e| fail(&e))?;
-    sim.set_arm(&start.q, &start.dq);
-    let series = clip.undistorted(&effects.camera);
-    let pose = object_start::resting(&series, object, cell).ok_or_else(|| Impossible("no poses".into()))?;
-    let moved = moved(&pose.isometry(), own);
-    sim.set_object(&Pose::from_isometry(moved), Vector3::zeros(), Vector3::zeros());
-    let start_ns = clip.recorded.measured.stamps_ns[0];
-    let mut trace = Trace { start_ns, poses: vec![moved], contact_time: None, effects };
-    let (mut now_ns, mut row, mut rested, mut kicked) = (start_ns, 0, 0, false);
-    while now_ns < clip.end_ns && !(rested > REST_PERIODS && now_ns > clip.rest_ns) {
-        row = commands.in_force(now_ns, row);
-        sim.step(&Drive::JointImpedance { q_d: *commands.q_d(row), dq_d: *commands.dq_d(row) });
-        now_ns += PERIOD_NS;
-        if let (Some(first), false) = (sim.first_contact_ns(), kicked) {
-            trace.contact_time = Some(first as f64 * 1e-9);
-            if sim.contact_force() == 0.0 {
-                kick(&mut sim, own);
-                kicked = true;
+    fn hit(&mut self, object: &ObjectModel) -> Result<Outcome, Impossible> {
+        let camera = self.worker.cell().camera_effects();
+        let series = self.clip.undistorted(&camera);
+        let rest = object_start::resting(&series, object, self.cell).ok_or_else(|| impossible("no object poses"))?;
+        let start = self.moved(&rest.isometry());
+        let hit = self.until_release(start)?;
+        let Hit { mut path, mut joints, checkpoint, contact_ns, .. } = hit;
+        if let Some(checkpoint) = checkpoint {
+            self.with_own_friction(object)?;
+            self.worker.resume(&checkpoint);
+            self.leave_behind();
+            let mut rested = 0;
+            let clip = self.clip;
+            while self.worker.now_ns() < clip.end_ns
+                && !(rested > REST_PERIODS
+                    && self.worker.now_ns() > clip.rest_ns
+                    && joints.joints.len() == clip.arm_ns.len())
+            {
+                self.tick(&mut joints);
+                let still = self.keep(&mut path)?;
+                rested = if still { rested + 1 } else { 0 };
             }
         }
-        trace.poses.push(object_pose(&sim)?);
-        let still = sim.object_velocity().is_some_and(|(v, w)| v == Vector3::zeros() && w == Vector3::zeros());
-        rested = if still && kicked { rested + 1 } else { 0 };
+        let joints = joints.joints.iter().map(|reading| reading.state.q).collect();
+        Ok(Outcome { object: path, joints, contact_ns, camera })
     }
-    Ok(trace)
-}
 
-fn alone(
-    cell: &Cell,
-    clip: &ObjectClip,
-    theta: &Theta,
-    object: &ObjectModel,
-    own: &Values,
-) -> Result<Trace, Impossible> {
-    let effects = effects(cell, theta)?;
-    let series = clip.undistorted(&effects.camera);
-    let motion = object_start::moving(&series, object, cell).ok_or_else(|| Impossible("too few poses".into()))?;
-    let cell = Cell { robot: None, controller: None, tool: None, ..cell.clone() };
-    let mut sim = SimCell::new(&cell, Some(theta)).map_err(|e| Impossible(e.to_string()))?;
-    let axes = [Axis::X, Axis::Y, Axis::Z];
-    let velocity = motion.velocity + Vector3::from(axes.map(|axis| own.of(Own::Velocity(axis))));
-    let spin = motion.angular_velocity + Vector3::from(axes.map(|axis| own.of(Own::Spin(axis))));
-    let pose = moved(&motion.pose.isometry(), own);
-    sim.set_object(&Pose::from_isometry(pose), velocity, spin);
-    let start_ns = clip.recorded.object.stamps_ns[0];
-    let mut trace = Trace { start_ns, poses: vec![pose], contact_time: None, effects };
-    let (mut now_ns, mut rested) = (start_ns, 0);
-    while now_ns < clip.end_ns && rested <= REST_PERIODS {
-        sim.step(&Drive::Torque { tau_J_d: [0.0; MAX_JOINTS] });
-        now_ns += PERIOD_NS;
-        trace.poses.push(object_pose(&sim)?);
-        let still = sim.object_velocity().is_some_and(|(v, w)| v == Vector3::zeros() && w == Vector3::zeros());
-        rested = if still { rested + 1 } else { 0 };
+    /// From the start, or from what is kept, to the moment at which the tool has let go.
+    fn until_release(&mut self, start: Isometry3<f64>) -> Result<Hit, Impossible> {
+        if let Some(hit) = self.cache.hit(self.theta, &start) {
+            return Ok(hit.clone());
+        }
+        let key = ArmKey::new(self.theta, start);
+        if self.cache.approach(&key).is_none() {
+            let approach = self.approach(key.clone(), &start)?;
+            self.cache.keep_approach(approach);
+        }
+        let approach = self.cache.approach(&key).ok_or_else(|| impossible("no memory for the approach"))?;
+        let mut joints = approach.joints.clone();
+        let mut path = Path { start_ns: approach.contact_ns.unwrap_or(0), poses: vec![start] };
+        let (contact_ns, from) = (approach.contact_ns, approach.checkpoint.clone());
+        let mut checkpoint = None;
+        if let Some(from) = from {
+            self.worker.resume(&from);
+            while self.worker.now_ns() < self.clip.free_ns {
+                self.tick(&mut joints);
+                self.keep(&mut path)?;
+            }
+            checkpoint = Some(self.worker.checkpoint());
+        }
+        let hit = Hit { theta: self.theta.clone(), start, path, joints, checkpoint, contact_ns };
+        self.cache.keep_hit(hit.clone());
+        Ok(hit)
     }
-    Ok(trace)
-}
 
-fn effects(cell: &Cell, theta: &Theta) -> Result<Effects, Impossible> {
-    let dof = match &cell.robot {
-        None => 0,
-        Some(_) => ArmModel::from_cell(cell).map_err(|e| Impossible(e.to_string()))?.dof(),
-    };
-    Effects::from_theta(&theta.effects, dof).map_err(|e| Impossible(e.to_string()))
-}
-
-fn arm_start(
-    cell: &Cell,
-    clip: &ObjectClip,
-    theta: &Theta,
-    effects: &Effects,
-    commands: &CommandTrack,
-) -> Result<JointState, Impossible> {
-    let nominal = ArmModel::from_cell(cell).map_err(|e| Impossible(e.to_string()))?;
-    let law = ControlLaw::new(cell.controller.as_ref(), theta.arm.as_ref(), &nominal);
-    let law = law.map_err(|e| Impossible(e.to_string()))?;
-    let real = effects.arm.real_arm(&nominal);
-    let hidden = (!effects.arm.is_none()).then_some(&effects.arm);
-    let arm = if hidden.is_some() { &real } else { &nominal };
-    ArmRollout { arm, nominal: &nominal, law: &law, effects: hidden }
-        .start_state(&clip.recorded.measured, 0, commands)
-        .ok_or_else(|| Impossible("no measured joints".into()))
-}
-
-fn object_pose(sim: &SimCell) -> Result<Isometry3<f64>, Impossible> {
-    let pose = sim.object().ok_or_else(|| Impossible("the cell has no object".into()))?.isometry();
-    let sane = pose.translation.vector.iter().all(|v| v.abs() < 1e3);
-    if sane { Ok(pose) } else { Err(Impossible("the simulated object flew away".into())) }
-}
-
-fn moved(pose: &Isometry3<f64>, own: &Values) -> Isometry3<f64> {
-    let shift = Vector3::new(own.of(Own::StartX), own.of(Own::StartY), 0.0);
-    let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), own.of(Own::StartYaw));
-    Isometry3::from_parts((pose.translation.vector + shift).into(), turn * pose.rotation)
-}
-
-/// What the real hit gave besides the simulated one.
-fn kick(sim: &mut SimCell, own: &Values) {
-    let [speed, heading, spin] = [Own::ReleaseSpeed, Own::ReleaseHeading, Own::ReleaseSpin].map(|o| own.of(o));
-    let (Some(pose), Some((velocity, angular))) = (sim.object(), sim.object_velocity()) else { return };
-    if [speed, heading, spin] == [0.0; 3] {
-        return;
+    fn approach(&mut self, key: ArmKey, start: &Isometry3<f64>) -> Result<Approach, Impossible> {
+        let commands = self.clip.commands.as_ref().ok_or_else(|| impossible("no commands"))?;
+        let measured = &self.clip.recorded.measured;
+        let arm = self.worker.arm().ok_or_else(|| impossible("the cell has no arm"))?;
+        let first = arm.start_state(measured, 0, commands).ok_or_else(|| impossible("no measured joints"))?;
+        let object = ObjectState::at_rest(Pose::from_isometry(*start));
+        self.worker.start(measured.stamps_ns[0], Some(&first), Some(&object), Some(commands));
+        let mut joints = CellTrace::default();
+        let course = Course { commands: Some(commands), joints_ns: &self.clip.arm_ns, poses_ns: &[] };
+        let contact_ns = self.worker.run_until_contact(&course, &mut joints);
+        let checkpoint = contact_ns.map(|_| self.worker.checkpoint());
+        Ok(Approach { key, joints, checkpoint, contact_ns })
     }
-    let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), heading);
-    sim.set_object(&pose, turn * velocity * speed.exp(), angular * speed.exp() + Vector3::z() * spin);
+
+    /// An object that somebody let go.
+    fn let_go(&mut self, object: &ObjectModel) -> Result<Outcome, Impossible> {
+        let camera = self.worker.cell().camera_effects();
+        let series = self.clip.undistorted(&camera);
+        let motion = object_start::moving(&series, object, self.cell).ok_or_else(|| impossible("too few poses"))?;
+        let pose = self.moved(&motion.pose.isometry());
+        let state = ObjectState {
+            pose: Pose::from_isometry(pose),
+            velocity: motion.velocity + self.own.vector(Own::Velocity),
+            angular_velocity: motion.angular_velocity + self.own.vector(Own::Spin),
+        };
+        self.with_own_friction(object)?;
+        let start_ns = self.clip.recorded.object.stamps_ns[0];
+        self.worker.start(start_ns, None, Some(&state), None);
+        let (mut path, mut rested) = (Path { start_ns, poses: vec![pose] }, 0);
+        while self.worker.now_ns() < self.clip.end_ns && rested <= REST_PERIODS {
+            self.worker.tick(None);
+            rested = if self.keep(&mut path)? { rested + 1 } else { 0 };
+        }
+        Ok(Outcome { object: path, joints: Vec::new(), contact_ns: None, camera })
+    }
+
+    fn tick(&mut self, joints: &mut CellTrace) {
+        let course = Course { commands: self.clip.commands.as_ref(), joints_ns: &self.clip.arm_ns, poses_ns: &[] };
+        self.worker.run_until(self.worker.now_ns() + TICK_NS, &course, joints);
+    }
+
+    /// Notes where the object is; whether it rests.
+    fn keep(&self, path: &mut Path) -> Result<bool, Impossible> {
+        let state = self.worker.object().ok_or_else(|| impossible("the cell has no object"))?;
+        let pose = state.pose.isometry();
+        if !pose.translation.vector.iter().all(|v| v.abs() < 1e3) {
+            return Err(impossible("the simulated object flew away"));
+        }
+        path.poses.push(pose);
+        Ok(state.velocity == Vector3::zeros() && state.angular_velocity == Vector3::zeros())
+    }
+
+    fn moved(&self, pose: &Isometry3<f64>) -> Isometry3<f64> {
+        let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), self.own.of(Own::StartYaw));
+        let shift = self.own.vector(Own::Start);
+        Isometry3::from_parts((pose.translation.vector + shift).into(), turn * pose.rotation)
+    }
+
+    fn with_own_friction(&mut self, object: &ObjectModel) -> Result<(), Impossible> {
+        let factor = self.own.of(Own::LnFriction).exp();
+        let mut theta = self.theta.clone();
+        theta.object.get_or_insert_with(ObjectTheta::default).friction = Some(object.friction * factor);
+        self.worker.set_parameters(&theta).map_err(impossible)
+    }
+
+    /// What the real hit left behind besides the simulated one.
+    fn leave_behind(&mut self) {
+        let [shift, velocity] = [self.own.vector(Own::Release), self.own.vector(Own::ReleaseVelocity)];
+        let [yaw, spin] = [Own::ReleaseYaw, Own::ReleaseSpin].map(|own| self.own.of(own));
+        let nothing = Vector3::zeros();
+        let Some(mut state) =
+            self.worker.object().filter(|_| (shift, velocity, yaw, spin) != (nothing, nothing, 0.0, 0.0))
+        else {
+            return;
+        };
+        let pose = state.pose.isometry();
+        let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), yaw);
+        let pose = Isometry3::from_parts((pose.translation.vector + shift).into(), turn * pose.rotation);
+        state.pose = Pose::from_isometry(pose);
+        state.velocity += velocity;
+        state.angular_velocity += Vector3::z() * spin;
+        self.worker.put_object(&state);
+    }
 }
