@@ -30,14 +30,13 @@ fn product_sources() -> Vec<(String, String)> {
 
 #[test]
 fn each_big_dependency_has_one_door() {
-    let doors: [(&str, &[&str]); 7] = [
+    let doors: [(&str, &[&str]); 6] = [
         ("iceoryx2", &["shared_mem/src/transport/", "shared_mem/src/msg/"]),
         ("mcap", &["shared_mem/src/recording/"]),
         ("parry3d_f64", &["twin/src/physics/"]),
         ("foxglove", &["twin/src/viewer", "shared_mem/src/recording/"]),
         ("franka", &["rt_bridge/src/fr3/"]),
         ("rsruckig", &["rt_bridge/src/motion/", "rt_bridge/src/rt/"]),
-        ("plotters", &["calibration/src/report/"]),
     ];
     for (file, text) in product_sources() {
         for (dependency, allowed) in doors {

@@ -7,7 +7,7 @@ mod stage;
 
 use crate::capture::excitation::{self, Summary};
 use crate::interrupt::Interrupt;
-use crate::report::{self, Story};
+use crate::report::Story;
 use anyhow::{Context as _, bail};
 use replay::{Replay, Trace, replay, trace};
 use serde::Serialize;
@@ -98,7 +98,7 @@ pub fn demo(options: &Options, interrupt: &Interrupt) -> anyhow::Result<Finding>
     eprintln!("replaying with the gains of cell.toml and with the true ones");
     let story = compare(options, &files, &files.session.join(first), live, interrupt)?;
     let report = files.out.join("report.html");
-    std::fs::write(&report, report::page(&story)?).with_context(|| format!("cannot write {}", report.display()))?;
+    std::fs::write(&report, story.page()).with_context(|| format!("cannot write {}", report.display()))?;
     Ok(Finding {
         text: story.sentence(),
         report,

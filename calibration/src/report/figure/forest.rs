@@ -1,0 +1,171 @@
+//! Parameters with their intervals, each on its own scale from bound to bound or around what was believed before.
+
+use crate::report::canvas::{Anchor, Canvas, WIDTH};
+use crate::report::quantity::Unit;
+use crate::report::scale::{Scale, span};
+use maud::Markup;
+
+/// Parameters of one kind, which share an axis.
+#[derive(Debug, Clone, PartialEq)]
+pub(in crate::report) struct Group<'a> {
+    /// What they are.
+    pub(in crate::report) name: &'a str,
+    /// SI unit.
+    pub(in crate::report) unit: &'a str,
+    /// The parameters.
+    pub(in crate::report) rows: Vec<Row>,
+}
+
+/// One number.
+#[derive(Debug, Clone, PartialEq)]
+pub(in crate::report) struct Row {
+    /// Which of them.
+    pub(in crate::report) name: String,
+    /// Value found.
+    pub(in crate::report) value: f64,
+    /// Its interval.
+    pub(in crate::report) interval: [f64; 2],
+    /// What cell.toml says.
+    pub(in crate::report) nominal: Option<f64>,
+    /// A remark: `at its bound`, `cannot be told`.
+    pub(in crate::report) warning: Option<String>,
+}
+
+const LEFT: f64 = 150.0;
+const PLOT: f64 = 390.0;
+const ROW: f64 = 25.0;
+/// Room for a remark under a row.
+const WARNING: f64 = 13.0;
+
+/// The plot. A group in which every row has a nominal value other than 0 is laid out in percent of it.
+pub(in crate::report) fn forest(groups: &[Group]) -> Markup {
+    let mut canvas = Canvas::new();
+    let mut y = 4.0;
+    for group in groups {
+        y = draw_group(&mut canvas, group, y);
+    }
+    canvas.finish([WIDTH, f64::max(y, 20.0)], "parameters with intervals")
+}
+
+/// Maps a row's values to its axis.
+#[derive(Debug, Clone)]
+enum Axis {
+    /// Percent above the nominal value.
+    Relative,
+    /// The value itself.
+    Absolute(Unit),
+}
+
+impl Axis {
+    fn of(group: &Group) -> Self {
+        let relative = !group.rows.is_empty() && group.rows.iter().all(|row| row.nominal.is_some_and(|n| n != 0.0));
+        if relative { Self::Relative } else { Self::Absolute(unit(group)) }
+    }
+
+    fn place(&self, row: &Row, value: f64) -> f64 {
+        match self {
+            Self::Relative => 100.0 * (value / row.nominal.unwrap_or(1.0) - 1.0),
+            Self::Absolute(unit) => unit.scaled(value),
+        }
+    }
+
+    fn title(&self) -> String {
+        match self {
+            Self::Relative => "difference from cell.toml [%]".into(),
+            Self::Absolute(unit) if unit.name().is_empty() => String::new(),
+            Self::Absolute(unit) => format!("[{}]", unit.name()),
+        }
+    }
+}
+
+fn unit(group: &Group) -> Unit {
+    let [lo, hi] = span(group.rows.iter().flat_map(|row| row.interval.into_iter().chain([row.value])));
+    Unit::suited(group.unit, lo.abs().max(hi.abs()))
+}
+
+/// One group; where the next one begins.
+fn draw_group(canvas: &mut Canvas, group: &Group, top: f64) -> f64 {
+    let (axis, unit) = (Axis::of(group), unit(group));
+    let values = group.rows.iter().flat_map(|row| {
+        row.interval.into_iter().chain([row.value]).chain(row.nominal).map(|value| axis.place(row, value))
+    });
+    let [lo, hi] = span(values);
+    let room = 0.06 * (hi - lo);
+    let scale = Scale::new([lo - room, hi + room], [LEFT, LEFT + PLOT]);
+    canvas.text_within("strong", [0.0, top + 14.0], Anchor::Start, group.name, LEFT - 10.0);
+    canvas.text("small", [LEFT + 0.5 * PLOT, top + 14.0], Anchor::Middle, &axis.title());
+    let first = top + 22.0;
+    let height = |row: &Row| if row.warning.is_some() { ROW + WARNING } else { ROW };
+    let bottom = first + group.rows.iter().map(height).sum::<f64>();
+    for (value, name) in scale.ticks(6) {
+        canvas.line("grid", [scale.at(value), first], [scale.at(value), bottom]);
+        canvas.text("small", [scale.at(value), bottom + 14.0], Anchor::Middle, &name);
+    }
+    let mut y = first;
+    for row in &group.rows {
+        draw_row(canvas, row, (&axis, &unit, &scale), y + 0.5 * ROW);
+        y += height(row);
+    }
+    bottom + 34.0
+}
+
+fn draw_row(canvas: &mut Canvas, row: &Row, (axis, unit, scale): (&Axis, &Unit, &Scale), y: f64) {
+    canvas.text_within("", [LEFT - 12.0, y + 4.5], Anchor::End, &row.name, LEFT - 14.0);
+    let at = |value: f64| scale.at(axis.place(row, value));
+    if let Some(nominal) = row.nominal {
+        canvas.line("nominal", [at(nominal), y - 10.0], [at(nominal), y + 10.0]);
+    }
+    let [lo, hi] = row.interval;
+    if lo.is_finite() && hi.is_finite() {
+        canvas.line("whisker", [at(lo), y], [at(hi), y]);
+    }
+    let right = LEFT + PLOT + 16.0;
+    let room = WIDTH - right;
+    canvas.circle(if row.warning.is_some() { "hit" } else { "dot" }, [at(row.value), y], 4.5);
+    let words = unit.interval(row.value, row.interval);
+    canvas.text_within("", [right, y + 4.5], Anchor::Start, &words, room);
+    if let Some(warning) = &row.warning {
+        canvas.text_within("warn", [right, y + 19.0], Anchor::Start, &format!("\u{25b2} {warning}"), room);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::canvas::tests::assert_well_formed;
+
+    fn row(value: f64, nominal: Option<f64>, warning: Option<&str>) -> Row {
+        let interval = [value - 0.01 * value.abs(), value + 0.01 * value.abs()];
+        Row { name: "joint 1".into(), value, interval, nominal, warning: warning.map(str::to_owned) }
+    }
+
+    #[test]
+    fn gains_are_laid_out_in_percent_of_what_was_believed() {
+        let rows = vec![row(660.0, Some(600.0), None), row(40.0, Some(50.0), Some("at its lower bound"))];
+        let svg = forest(&[Group { name: "stiffness", unit: "N m/rad", rows }]).into_string();
+        assert_well_formed(&svg);
+        for text in ["difference from cell.toml [%]", "660 [653, 667] N m/rad", "\u{25b2} at its lower bound", ">-20<"]
+        {
+            assert!(svg.contains(text), "no {text} in {svg}");
+        }
+    }
+
+    #[test]
+    fn a_centre_of_mass_is_laid_out_in_millimetres() {
+        let rows = vec![row(0.0051, Some(0.0), None), row(-0.002, Some(0.0), None)];
+        let svg = forest(&[Group { name: "centre of mass", unit: "m", rows }]).into_string();
+        assert_well_formed(&svg);
+        assert!(svg.contains(">[mm]<") && svg.contains("5.10 [5.05, 5.15] mm"), "{svg}");
+    }
+
+    #[test]
+    fn neither_long_words_nor_missing_intervals_break_the_plot() {
+        let mut strange =
+            row(1.0, None, Some("the arm is so much heavier than the object that nothing of its mass can be seen"));
+        strange.name = "joint_elasticity.stiffness of the second joint".into();
+        strange.interval = [f64::NAN, f64::INFINITY];
+        let group = Group { name: "something with a very long name indeed", unit: "N m s/rad", rows: vec![strange] };
+        assert_well_formed(&forest(&[group, Group { name: "none", unit: "1", rows: vec![] }]).into_string());
+        assert_well_formed(&forest(&[]).into_string());
+    }
+}

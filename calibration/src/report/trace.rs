@@ -1,0 +1,104 @@
+//! What is left between robot and twin over a clip, before and after: the part of the evidence that eyes can judge.
+
+use super::figure::chart::{Chart, Line};
+use super::frame::legend;
+use maud::{Markup, html};
+
+/// Measured less predicted of one channel through one clip.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Trace {
+    /// File of the clip.
+    pub clip: String,
+    /// What was measured: `joint2`, `x`, `yaw`.
+    pub channel: String,
+    /// SI unit of the values, or `σ` where they are in units of the noise.
+    pub unit: String,
+    /// One sigma of the noise, in that unit.
+    pub sigma: f64,
+    /// Seconds from the clip's start and the residual, before.
+    pub before: Vec<[f64; 2]>,
+    /// The same after.
+    pub after: Vec<[f64; 2]>,
+}
+
+/// Half the width of the grey band, in sigma: noise alone stays inside 95 % of the time.
+const BAND: f64 = 2.0;
+/// Width and height of one picture; two stand side by side.
+const SIZE: [f64; 2] = [445.0, 165.0];
+
+impl Trace {
+    /// Root mean square of the residual before, in sigma.
+    fn size(&self) -> f64 {
+        let squares = self.before.iter().map(|[_, value]| value * value);
+        let mean = squares.sum::<f64>() / self.before.len().max(1) as f64;
+        mean.sqrt() / if self.sigma > 0.0 { self.sigma } else { 1.0 }
+    }
+
+    fn draw(&self) -> Markup {
+        let lines = [Line { class: "before", points: &self.before }, Line { class: "after", points: &self.after }];
+        // A residual that stays as it was shows one line, not two on top of each other.
+        let lines = if self.after.is_empty() || self.after == self.before { &lines[..1] } else { &lines[..] };
+        let title = format!("{}, {}", self.clip.trim_end_matches(".mcap"), self.channel);
+        let band = (self.sigma > 0.0).then_some(BAND * self.sigma);
+        Chart { title: &title, x: "time [s]", unit: &self.unit, lines, band, logarithmic: false, size: SIZE }.draw()
+    }
+}
+
+/// The worst channel of each of the worst `clips` clips, worst first.
+#[must_use]
+pub fn worst_first(traces: &[Trace], clips: usize) -> Vec<&Trace> {
+    let mut sorted: Vec<&Trace> = traces.iter().collect();
+    sorted.sort_by(|a, b| b.size().total_cmp(&a.size()));
+    let mut chosen: Vec<&Trace> = Vec::new();
+    for trace in sorted {
+        if chosen.len() < clips && chosen.iter().all(|other| other.clip != trace.clip) {
+            chosen.push(trace);
+        }
+    }
+    chosen
+}
+
+/// Pictures of the worst clips with a legend; `names` of before and after.
+pub(super) fn gallery(traces: &[Trace], clips: usize, [before, after]: [&str; 2]) -> Markup {
+    let worst = worst_first(traces, clips);
+    html! {
+        (legend(&[("before", before), ("after", after), ("band", "\u{b1}2\u{3c3} of the noise")]))
+        div.pair { @for trace in worst { (trace.draw()) } }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::canvas::tests::assert_well_formed;
+
+    fn trace(clip: &str, channel: &str, size: f64) -> Trace {
+        let before = (0..50).map(|i| [0.1 * f64::from(i), size * f64::from(i).sin()]).collect();
+        let channel = channel.into();
+        Trace { clip: clip.into(), channel, unit: "rad".into(), sigma: 1e-4, before, after: vec![] }
+    }
+
+    #[test]
+    fn the_worst_channel_of_the_worst_clips_is_shown() {
+        let traces = [
+            trace("a.mcap", "joint1", 1e-4),
+            trace("b.mcap", "joint1", 5e-4),
+            trace("b.mcap", "joint2", 9e-4),
+            trace("c.mcap", "joint7", 3e-4),
+        ];
+        let chosen: Vec<(&str, &str)> =
+            worst_first(&traces, 2).iter().map(|t| (t.clip.as_str(), t.channel.as_str())).collect();
+        assert_eq!(chosen, [("b.mcap", "joint2"), ("c.mcap", "joint7")]);
+    }
+
+    #[test]
+    fn a_trace_shows_both_lines_and_the_noise() {
+        let mut both = trace("clip_05.mcap", "joint2", 2e-3);
+        both.after = both.before.iter().map(|[t, value]| [*t, 0.1 * value]).collect();
+        let svg = both.draw().into_string();
+        assert_well_formed(&svg);
+        assert!(svg.contains("line before") && svg.contains("line after") && svg.contains("clip_05, joint2 [mrad]"));
+        assert!(!trace("a", "b", 1.0).draw().into_string().contains("line after"));
+        assert_well_formed(&Trace::default().draw().into_string());
+    }
+}
