@@ -7,6 +7,7 @@
 //! |---|---|
 //! | [`capture`] | planning a motion, having the bridge play it, recording it into a session folder |
 //! | [`demo`] | the whole story on the simulated cell, in one command |
+//! | [`diagnose`] | where the gap lies, what causes it, how far it shrinks |
 //! | [`estimate`] | fits over clips: what all clips share, what varies from clip to clip |
 //! | [`forward`] | what the twin makes of recorded clips, as residuals |
 //! | [`report`] | pages with plots |
@@ -17,6 +18,7 @@
 pub mod benchmark;
 pub mod capture;
 pub mod demo;
+pub mod diagnose;
 pub mod estimate;
 pub mod forward;
 pub mod interrupt;

@@ -194,15 +194,22 @@ fn median(mut values: Vec<f64>) -> f64 {
     values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
 }
 
-/// Mean distance of confidence from the share of true verdicts, over ten bins of confidence, weighted by cases (Naeini 2015).
-fn calibration_error(cases: &[Case]) -> f64 {
-    let mut bins = [(0.0, 0.0); 10];
+/// Mean confidence and share of true verdicts in each of ten bins of confidence that holds any, lowest first.
+#[must_use]
+pub fn reliability(cases: &[Case]) -> Vec<(f64, Rate)> {
+    let mut bins: [Vec<&Case>; 10] = Default::default();
     for case in cases {
-        let bin = ((case.said.confidence * 10.0) as usize).min(9);
-        bins[bin].0 += case.said.confidence;
-        bins[bin].1 += f64::from(u8::from(case.right()));
+        bins[((case.said.confidence * 10.0) as usize).min(9)].push(case);
     }
-    bins.iter().map(|(confidence, right)| (confidence - right).abs()).sum::<f64>() / cases.len().max(1) as f64
+    let mean = |bin: &[&Case]| bin.iter().map(|case| case.said.confidence).sum::<f64>() / bin.len() as f64;
+    let filled = bins.iter().filter(|bin| !bin.is_empty());
+    filled.map(|bin| (mean(bin), Rate::count(bin.iter().map(|case| case.right())))).collect()
+}
+
+/// Mean distance of confidence from the share of true verdicts, over the bins, weighted by cases (Naeini 2015).
+fn calibration_error(cases: &[Case]) -> f64 {
+    let distance = |(confidence, right): (f64, Rate)| right.of as f64 * (confidence - right.value()).abs();
+    reliability(cases).into_iter().map(distance).sum::<f64>() / cases.len().max(1) as f64
 }
 
 /// The rate at which `hits` or more of `of` come about with probability `tail`, by bisection on the binomial sum.

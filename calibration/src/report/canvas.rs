@@ -87,6 +87,13 @@ impl Canvas {
         ));
     }
 
+    /// A text that is read from below, from `at` upwards, within `room`.
+    pub(super) fn text_upwards(&mut self, class: &str, [x, y]: [f64; 2], text: &str, room: f64) {
+        self.element(format_args!("<g transform=\"translate({} {}) rotate(-90)\">", n(x), n(y)));
+        self.text_within(class, [0.0, 0.0], Anchor::Start, text, room);
+        self.element(format_args!("</g>"));
+    }
+
     /// A text that takes at most `room`: shortened if need be, and then whole under the pointer.
     pub(super) fn text_within(&mut self, class: &str, at: [f64; 2], anchor: Anchor, text: &str, room: f64) {
         let most = (room / CHARACTER).max(1.0) as usize;

@@ -2,23 +2,28 @@
 //!
 //! | module | owns |
 //! |---|---|
+//! | [`diagnosis`] | the page of a diagnosis |
+//! | [`benchmark`] | the page of how good the diagnosis is |
 //! | [`demo_page`] | the page of the demo |
 //! | [`identification`] | the page of what was identified about arm or object |
-//! | [`terminal`] | the same in a few lines for a terminal |
+//! | [`terminal`] | diagnosis and identification in a few lines for a terminal |
 //! | [`trace`] | what is left between robot and twin through a clip |
 //! | `frame` | what all pages share: style, headings, legends |
 //! | `figure` | pictures of plain numbers: bars, map, lines, intervals, matrix |
 //! | `canvas`, `scale` | SVG, axes |
-//! | `quantity` | numbers and units as people read them |
+//! | `quantity`, `share`, `parameters` | numbers, units, shares and intervals as people read them |
 
+pub mod benchmark;
 mod canvas;
 pub mod demo_page;
+pub mod diagnosis;
 mod figure;
 mod frame;
 pub mod identification;
 mod parameters;
 mod quantity;
 mod scale;
+mod share;
 pub mod terminal;
 pub mod trace;
 

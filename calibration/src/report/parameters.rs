@@ -1,6 +1,7 @@
-//! Parameters with their intervals as a picture: one number, or one a joint or axis.
+//! Parameters with their intervals in words and as a picture: one number, or one a joint or axis.
 
 use super::figure::forest::{Group, Row};
+use super::quantity::Unit;
 
 /// A parameter of one or several numbers.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -15,7 +16,23 @@ pub(super) struct Numbers<'a> {
     pub(super) intervals: &'a [[f64; 2]],
 }
 
+/// Most numbers that a line names one by one.
+const MOST: usize = 3;
+
 impl Numbers<'_> {
+    /// The parameter in a line: `delay 11.9 [11.2, 12.6] ms`, `coulomb 0.28 to 1.10 N m over 7 joints`.
+    pub(super) fn line(&self) -> String {
+        let name = self.name.replace('_', " ");
+        let unit = self.shown();
+        if self.values.len() <= MOST {
+            let numbers: Vec<String> = self.pairs().map(|(value, interval)| unit.interval(value, interval)).collect();
+            return format!("{name} {}", numbers.join(", "));
+        }
+        let [lo, hi] = super::scale::span(self.values.iter().copied());
+        let many = self.values.len();
+        format!("{name} {} to {} over {many} joints", super::quantity::short(unit.scaled(lo)), unit.with_unit(hi))
+    }
+
     /// The parameter as rows of a picture; `nominal`: what was believed of each number.
     pub(super) fn group<'a>(
         &'a self,
@@ -37,6 +54,11 @@ impl Numbers<'_> {
         let intervals = self.intervals.iter().copied().chain(std::iter::repeat([f64::NAN; 2]));
         self.values.iter().copied().zip(intervals)
     }
+
+    fn shown(&self) -> Unit {
+        let [lo, hi] = super::scale::span(self.values.iter().copied());
+        Unit::suited(self.unit, lo.abs().max(hi.abs()))
+    }
 }
 
 /// What the `k`-th of `count` numbers belongs to; empty for the only one.
@@ -53,11 +75,15 @@ mod tests {
     use super::*;
 
     #[test]
-    fn numbers_are_named_by_joint_or_axis() {
+    fn few_numbers_are_named_and_many_are_spanned() {
+        let delay = Numbers { name: "delay", unit: "s", values: &[0.0119], intervals: &[[0.0112, 0.0126]] };
+        assert_eq!(delay.line(), "delay 11.9 [11.2, 12.6] ms");
         let gains = [600.0, 597.0, 500.0, 668.9];
         let stiffness = Numbers { name: "stiffness", unit: "N m/rad", values: &gains, intervals: &[] };
+        assert_eq!(stiffness.line(), "stiffness 500 to 669 N m/rad over 4 joints");
         assert_eq!(stiffness.group("stiffness", &[600.0], |_| None).rows[3].name, "joint 4");
         let centre = Numbers { name: "centre_of_mass", unit: "m", values: &[0.001, -0.002], intervals: &[] };
+        assert_eq!(centre.line(), "centre of mass 1.00 mm, -2.00 mm");
         assert_eq!(centre.group("centre of mass", &[0.0; 2], |_| None).rows[1].name, "y");
     }
 }

@@ -8,11 +8,12 @@ pub(super) struct Unit {
 }
 
 impl Unit {
-    /// The prefix that suits values up to `largest` (in SI): `rad` becomes `mrad`, `m` becomes `mm`, `s` becomes `ms`.
+    /// The prefix that suits values up to `largest` (in SI): `rad` becomes `mrad`, `m` becomes `mm`, `s` becomes `ms`; shares are asked for by `%`.
     pub(super) fn suited(si: &str, largest: f64) -> Self {
         let largest = largest.abs();
         let name = si.to_owned();
         match si {
+            "%" => Self { factor: 100.0, name },
             "1" | "" => Self { factor: 1.0, name: String::new() },
             "rad" | "m" | "s" if largest > 0.0 && largest < 1e-4 => Self { factor: 1e6, name: format!("\u{b5}{si}") },
             "rad" | "m" | "s" if largest < 0.4 => Self { factor: 1e3, name: format!("m{si}") },

@@ -1,8 +1,14 @@
 //! What verbs print on stderr for a person: a short table, aligned, and the sentence at the end, where eyes are.
 
+use super::diagnosis::{has_effects, sizes, verdict_words, words};
 use super::identification::{Parameter, Sheet};
 use super::quantity::{Unit, short};
 use super::scale::span;
+use super::share::{percent, percent_interval, probability};
+use crate::diagnose::{Candidate, Diagnosis, Status};
+
+/// Places of the gap that are named.
+const SHOWN_PLACES: usize = 3;
 
 /// An identification: each number with its interval and what was believed, the errors, what cannot be told, what to do next.
 #[must_use]
@@ -17,6 +23,67 @@ pub fn identification(sheet: &Sheet) -> String {
     lines.extend(sheet.advice.iter().map(|advice| format!("next: {advice}")));
     lines.push(sheet.sentence.clone());
     lines.join("\n")
+}
+
+/// A diagnosis: gap, place, candidates in question, how many others, what to do next, and the verdict.
+#[must_use]
+pub fn diagnosis(diagnosis: &Diagnosis) -> String {
+    let mut lines = gap(diagnosis);
+    let mut places: Vec<_> = diagnosis.places.iter().collect();
+    places.sort_by(|a, b| b.share.total_cmp(&a.share));
+    let places: Vec<String> = places
+        .iter()
+        .take(SHOWN_PLACES)
+        .map(|place| format!("{} {} {} {}", place.stage, place.channel, place.regime, percent(place.share)))
+        .collect();
+    if !places.is_empty() {
+        lines.push(format!("where: {}", places.join(", ")));
+    }
+    lines.extend(table(diagnosis.candidates.iter().filter_map(candidate).collect()));
+    let count = |status| diagnosis.candidates.iter().filter(|candidate| candidate.status == status).count();
+    lines.push(format!("{} ruled out, {} not testable", count(Status::RuledOut), count(Status::NotTestable)));
+    if !diagnosis.next_experiment.is_empty() {
+        lines.push(format!("next clip: {}", diagnosis.next_experiment));
+    }
+    let verdict = &diagnosis.verdict;
+    let sure = probability(verdict.confidence);
+    lines.push(format!("{} (confidence {sure}): {}", verdict_words(verdict.kind), verdict.text));
+    lines.join("\n")
+}
+
+/// The gap, in sigma and in units of the hand.
+fn gap(diagnosis: &Diagnosis) -> Vec<String> {
+    let gap = &diagnosis.gap;
+    let both = has_effects(diagnosis);
+    let arrow = |unit: &Unit, before: f64, after: f64| {
+        let before_only = unit.with_unit(before);
+        if both { format!("{} -> {}", short(unit.scaled(before)), unit.with_unit(after)) } else { before_only }
+    };
+    let sigma = Unit::suited("sigma^2", gap.before);
+    let closed =
+        if both { format!(", closed {}", percent_interval(gap.shrink.value, gap.shrink.ci90)) } else { String::new() };
+    let noise = short(gap.floor);
+    let mut lines = vec![format!("gap: {} (noise alone {noise}){closed}", arrow(&sigma, gap.before, gap.after))];
+    let human =
+        [("joints", "rad", gap.joint_rms_rad), ("ADD", "m", gap.object_add_m), ("ADD-S", "m", gap.object_add_s_m)];
+    for (name, si, change) in human {
+        if let (Some(before), Some(after)) = (change.before, change.after) {
+            lines.push(format!("{name}: {}", arrow(&Unit::suited(si, before), before, after)));
+        }
+    }
+    lines
+}
+
+/// A row for a candidate that is named or possible.
+fn candidate(candidate: &Candidate) -> Option<Vec<String>> {
+    let status = match candidate.status {
+        Status::Named => "named",
+        Status::Possible => "possible",
+        Status::RuledOut | Status::NotTestable => return None,
+    };
+    let closes = format!("closes {}", percent_interval(candidate.shrink.value, candidate.shrink.ci90));
+    let sizes = sizes(candidate).join("; ");
+    Some(vec![words(&candidate.effect), status.to_owned(), probability(candidate.probability), closes, sizes])
 }
 
 /// Rows of a parameter: name, value with interval, what was believed, remark.
@@ -84,5 +151,21 @@ ADD, held-out clips: 13.9 -> 2.00 mm
 cannot tell mass: the arm is much heavier; weigh it
 The object is known.";
         assert_eq!(identification(&sheet), expected);
+    }
+
+    #[test]
+    fn a_diagnosis_fits_a_screen_and_ends_with_the_verdict() {
+        let text = diagnosis(&crate::report::diagnosis::tests::named());
+        let expected = "\
+gap: 38.4 -> 1.40 sigma^2 (noise alone 1.00), closed 96.3 [95.1, 97.2] %
+joints: 2.13 -> 0.180 mrad
+ADD: 13.9 -> 1.20 mm
+where: control joint2 reversal 41 %
+command lag     possible   2 %    closes 81 [76, 85] %   delay 11.9 [11.2, 12.6] ms
+command delay   named      97 %   closes 81 [76, 85] %   delay 11.9 [11.2, 12.6] ms
+1 ruled out, 1 not testable
+next clip: Play a chirp up to 10 Hz.
+cause named (confidence 97 %): Commands reach the robot 12 ms late <here>.";
+        assert_eq!(text, expected);
     }
 }

@@ -1,6 +1,6 @@
 //! Parameters with their intervals, each on its own scale from bound to bound or around what was believed before.
 
-use crate::report::canvas::{Anchor, Canvas, WIDTH};
+use crate::report::canvas::{Anchor, Canvas, WIDTH, width_of};
 use crate::report::quantity::Unit;
 use crate::report::scale::{Scale, span};
 use maud::Markup;
@@ -31,8 +31,10 @@ pub(in crate::report) struct Row {
     pub(in crate::report) warning: Option<String>,
 }
 
-const LEFT: f64 = 150.0;
-const PLOT: f64 = 390.0;
+/// Room for names, at least and at most.
+const NAMES: [f64; 2] = [150.0, 300.0];
+/// Where the axis ends.
+const END: f64 = 560.0;
 const ROW: f64 = 25.0;
 /// Room for a remark under a row.
 const WARNING: f64 = 13.0;
@@ -40,9 +42,11 @@ const WARNING: f64 = 13.0;
 /// The plot. A group in which every row has a nominal value other than 0 is laid out in percent of it.
 pub(in crate::report) fn forest(groups: &[Group]) -> Markup {
     let mut canvas = Canvas::new();
+    let names = groups.iter().flat_map(|group| &group.rows).map(|row| width_of(&row.name) + 20.0);
+    let left = names.fold(NAMES[0], f64::max).min(NAMES[1]);
     let mut y = 4.0;
     for group in groups {
-        y = draw_group(&mut canvas, group, y);
+        y = draw_group(&mut canvas, group, [left, y]);
     }
     canvas.finish([WIDTH, f64::max(y, 20.0)], "parameters with intervals")
 }
@@ -84,16 +88,16 @@ fn unit(group: &Group) -> Unit {
 }
 
 /// One group; where the next one begins.
-fn draw_group(canvas: &mut Canvas, group: &Group, top: f64) -> f64 {
+fn draw_group(canvas: &mut Canvas, group: &Group, [left, top]: [f64; 2]) -> f64 {
     let (axis, unit) = (Axis::of(group), unit(group));
     let values = group.rows.iter().flat_map(|row| {
         row.interval.into_iter().chain([row.value]).chain(row.nominal).map(|value| axis.place(row, value))
     });
     let [lo, hi] = span(values);
     let room = 0.06 * (hi - lo);
-    let scale = Scale::new([lo - room, hi + room], [LEFT, LEFT + PLOT]);
-    canvas.text_within("strong", [0.0, top + 14.0], Anchor::Start, group.name, LEFT - 10.0);
-    canvas.text("small", [LEFT + 0.5 * PLOT, top + 14.0], Anchor::Middle, &axis.title());
+    let scale = Scale::new([lo - room, hi + room], [left, END]);
+    canvas.text_within("strong", [0.0, top + 14.0], Anchor::Start, group.name, left - 10.0);
+    canvas.text("small", [0.5 * (left + END), top + 14.0], Anchor::Middle, &axis.title());
     let first = top + 22.0;
     let height = |row: &Row| if row.warning.is_some() { ROW + WARNING } else { ROW };
     let bottom = first + group.rows.iter().map(height).sum::<f64>();
@@ -103,14 +107,14 @@ fn draw_group(canvas: &mut Canvas, group: &Group, top: f64) -> f64 {
     }
     let mut y = first;
     for row in &group.rows {
-        draw_row(canvas, row, (&axis, &unit, &scale), y + 0.5 * ROW);
+        draw_row(canvas, row, (&axis, &unit, &scale), [left, y + 0.5 * ROW]);
         y += height(row);
     }
     bottom + 34.0
 }
 
-fn draw_row(canvas: &mut Canvas, row: &Row, (axis, unit, scale): (&Axis, &Unit, &Scale), y: f64) {
-    canvas.text_within("", [LEFT - 12.0, y + 4.5], Anchor::End, &row.name, LEFT - 14.0);
+fn draw_row(canvas: &mut Canvas, row: &Row, (axis, unit, scale): (&Axis, &Unit, &Scale), [left, y]: [f64; 2]) {
+    canvas.text_within("", [left - 12.0, y + 4.5], Anchor::End, &row.name, left - 14.0);
     let at = |value: f64| scale.at(axis.place(row, value));
     if let Some(nominal) = row.nominal {
         canvas.line("nominal", [at(nominal), y - 10.0], [at(nominal), y + 10.0]);
@@ -119,7 +123,7 @@ fn draw_row(canvas: &mut Canvas, row: &Row, (axis, unit, scale): (&Axis, &Unit, 
     if lo.is_finite() && hi.is_finite() {
         canvas.line("whisker", [at(lo), y], [at(hi), y]);
     }
-    let right = LEFT + PLOT + 16.0;
+    let right = END + 16.0;
     let room = WIDTH - right;
     canvas.circle(if row.warning.is_some() { "hit" } else { "dot" }, [at(row.value), y], 4.5);
     let words = unit.interval(row.value, row.interval);

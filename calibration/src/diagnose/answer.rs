@@ -1,0 +1,212 @@
+//! The answer of a diagnosis, as it is written to diagnosis.json and shown on the page.
+
+use crate::report::Trace;
+use serde::ser::{Serialize, SerializeStruct, Serializer};
+use shared_mem::theta::Theta;
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
+/// What was found about a session.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct Diagnosis {
+    /// The finding.
+    pub verdict: Verdict,
+    /// How large the gap is.
+    pub gap: Gap,
+    /// Where it lies; shares sum to 1 over everything that was measured.
+    #[serde(rename = "where")]
+    pub places: Vec<Place>,
+    /// Every effect that was tested, likeliest first.
+    pub candidates: Vec<Candidate>,
+    /// The one clip that separates the leaders; empty where nothing is left to separate.
+    pub next_experiment: String,
+    /// Which clips were used for what.
+    pub clips: Clips,
+    /// Wall-clock time [s].
+    pub seconds: f64,
+    /// The session's folder.
+    pub session: String,
+    /// What everything random was drawn from.
+    pub seed: u64,
+    /// The parameters identified first, and the effects named.
+    pub theta: Theta,
+    /// Where [`Self::theta`] was written.
+    pub theta_file: Option<PathBuf>,
+    /// Residuals of the confirm clips without and with the effects, for the page.
+    #[serde(skip)]
+    pub traces: Vec<Trace>,
+}
+
+/// The finding.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct Verdict {
+    /// Which of the five it is.
+    pub kind: Kind,
+    /// Effects named, or the members of the class.
+    pub effects: Vec<String>,
+    /// How sure, 0 to 1.
+    pub confidence: f64,
+    /// One sentence that a person understands.
+    pub text: String,
+}
+
+/// The five verdicts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Kind {
+    /// No gap beyond the noise.
+    None,
+    /// One to four effects cause it.
+    Named,
+    /// One of several effects causes it, and the clips cannot tell which.
+    Class,
+    /// There is a gap that no effect of the library explains.
+    Unexplained,
+    /// The clips cannot tell.
+    NotTestable,
+}
+
+/// The gap on the confirm clips.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct Gap {
+    /// `sigma`: [`Self::before`], [`Self::after`] and [`Self::floor`] are mean squares of residuals in units of their noise.
+    pub unit: &'static str,
+    /// With the paper's parameters identified.
+    pub before: f64,
+    /// With the effects too.
+    pub after: f64,
+    /// What noise and scatter alone leave.
+    pub floor: f64,
+    /// `1 - after / before`.
+    pub shrink: Share,
+    /// `(before - after) / (before - floor)`.
+    pub explainable_fraction: f64,
+    /// Root mean square over joints and time [rad].
+    pub joint_rms_rad: Change,
+    /// Mean ADD [m].
+    pub object_add_m: Change,
+    /// Mean ADD-S [m].
+    pub object_add_s_m: Change,
+}
+
+/// A share with its 90 % interval.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+pub struct Share {
+    /// The share.
+    pub value: f64,
+    /// Its interval over clips.
+    pub ci90: [f64; 2],
+}
+
+/// A quantity before and after; none where it was not measured.
+#[derive(Debug, Clone, Copy, Default, PartialEq, serde::Serialize)]
+pub struct Change {
+    /// Without the effects.
+    pub before: Option<f64>,
+    /// With them.
+    pub after: Option<f64>,
+}
+
+/// A cell of the map of where the gap lies.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct Place {
+    /// `control`, `hit`, `slide`, `rest` or `camera`.
+    pub stage: String,
+    /// `joint2`, `x`, `yaw`.
+    pub channel: String,
+    /// What was going on.
+    pub regime: String,
+    /// Share of the squared gap beyond the noise.
+    pub share: f64,
+}
+
+/// What became of one effect.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct Candidate {
+    /// Name of the registry.
+    pub effect: String,
+    /// Calibrated probability that it acts.
+    pub probability: f64,
+    /// Its parameters, by name; empty where it was not fitted.
+    pub parameters: BTreeMap<String, Size>,
+    /// Share of the gap that it closes alone.
+    pub shrink: Share,
+    /// Effects that these clips cannot tell from it.
+    pub confusable_with: Vec<String>,
+    /// What became of it.
+    pub status: Status,
+    /// The reason, in words.
+    pub why: String,
+}
+
+/// What became of a candidate.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Status {
+    /// It acts.
+    Named,
+    /// It may act.
+    Possible,
+    /// It does not act, or too weakly to be seen.
+    RuledOut,
+    /// It could not have been seen.
+    NotTestable,
+}
+
+/// A parameter of one or several numbers, in SI.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Size {
+    /// The numbers.
+    pub values: Vec<f64>,
+    /// A 90 % interval each.
+    pub ci90: Vec<[f64; 2]>,
+    /// SI unit; `1` without.
+    pub unit: String,
+}
+
+impl Serialize for Size {
+    /// `{"value", "ci90", "unit"}`: a single number stands by itself, several as lists.
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let mut out = serializer.serialize_struct("Size", 3)?;
+        if let ([value], [interval]) = (&self.values[..], &self.ci90[..]) {
+            out.serialize_field("value", value)?;
+            out.serialize_field("ci90", interval)?;
+        } else {
+            out.serialize_field("value", &self.values)?;
+            out.serialize_field("ci90", &self.ci90)?;
+        }
+        out.serialize_field("unit", &self.unit)?;
+        out.end()
+    }
+}
+
+/// Files of the clips by use.
+#[derive(Debug, Clone, Default, PartialEq, serde::Serialize)]
+pub struct Clips {
+    /// Fitted.
+    pub train: Vec<String>,
+    /// Chose between effects.
+    pub choose: Vec<String>,
+    /// Opened once, at the end.
+    pub confirm: Vec<String>,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn one_number_stands_by_itself_and_several_as_lists() {
+        let text = |size: &Size| serde_json::to_string(size).expect("JSON");
+        let delay = Size { values: vec![0.012], ci90: vec![[0.011, 0.013]], unit: "s".into() };
+        assert_eq!(text(&delay), r#"{"value":0.012,"ci90":[0.011,0.013],"unit":"s"}"#);
+        let offset = Size { values: vec![1.0, 2.0], ci90: vec![[0.0, 2.0], [1.0, 3.0]], unit: "m".into() };
+        assert_eq!(text(&offset), r#"{"value":[1.0,2.0],"ci90":[[0.0,2.0],[1.0,3.0]],"unit":"m"}"#);
+    }
+
+    #[test]
+    fn verdicts_are_written_as_others_read_them() {
+        assert_eq!(serde_json::to_string(&Kind::NotTestable).expect("JSON"), "\"not_testable\"");
+        assert_eq!(serde_json::to_string(&Status::RuledOut).expect("JSON"), "\"ruled_out\"");
+    }
+}

@@ -1,0 +1,45 @@
+//! The gap in numbers: before, after, and what noise alone leaves.
+
+use super::has_effects;
+use crate::diagnose::Diagnosis;
+use crate::report::figure::bars::{Row, bars};
+use crate::report::frame::legend;
+use maud::{Markup, html};
+
+/// How to read the bars.
+pub(super) fn reading(diagnosis: &Diagnosis) -> &'static str {
+    if has_effects(diagnosis) {
+        "On clips that were used for nothing else. What lies beyond the dashed line can be explained."
+    } else {
+        "On clips that were used for nothing else. What lies beyond the dashed line is more than noise."
+    }
+}
+
+/// Bars: the gap in sigma with the floor, then in units of the hand.
+pub(super) fn picture(diagnosis: &Diagnosis) -> Markup {
+    let gap = &diagnosis.gap;
+    let both = has_effects(diagnosis);
+    let values = |before: f64, after: f64| if both { vec![before, after] } else { vec![before] };
+    let mut rows = vec![Row {
+        name: "mean square, in sigma",
+        unit: "\u{3c3}\u{b2}",
+        values: values(gap.before, gap.after),
+        floor: Some(gap.floor),
+    }];
+    let human = [
+        ("joints, RMS", "rad", gap.joint_rms_rad),
+        ("object, ADD", "m", gap.object_add_m),
+        ("object, ADD-S", "m", gap.object_add_s_m),
+    ];
+    for (name, unit, change) in human {
+        if let (Some(before), Some(after)) = (change.before, change.after) {
+            rows.push(Row { name, unit, values: values(before, after), floor: None });
+        }
+    }
+    let entries =
+        [("before", "parameters identified first"), ("after", "with the effect"), ("floor", "what noise alone leaves")];
+    html! {
+        @if both { (legend(&entries)) } @else { (legend(&[entries[0], entries[2]])) }
+        (bars(&["before", "after"], &rows))
+    }
+}

@@ -1,0 +1,238 @@
+//! The page of a diagnosis: what a tired engineer reads in a minute, from the sentence down to where every number came from.
+
+mod candidates;
+mod gap;
+
+pub(super) use candidates::sizes;
+
+use super::figure::where_map::{Cell, where_map};
+use super::frame::{facts, figure, frame, unbroken};
+use super::share::{percent, percent_interval, probability};
+use super::trace::gallery;
+use crate::diagnose::{Diagnosis, Kind};
+use maud::{Markup, html};
+
+/// Clips whose residuals are shown.
+const SHOWN_CLIPS: usize = 4;
+
+/// The page.
+#[must_use]
+pub fn page(diagnosis: &Diagnosis) -> String {
+    let bars =
+        figure("How large the gap is, and how much of it goes", gap::reading(diagnosis), &gap::picture(diagnosis));
+    let body = html! {
+        (head(diagnosis))
+        (bars)
+        @if !diagnosis.places.is_empty() {
+            (figure("Where it lies", "Share of the squared gap in each stage, channel and regime.", &map(diagnosis)))
+        }
+        @if !diagnosis.traces.is_empty() { (residuals(diagnosis)) }
+        (candidates::sections(&diagnosis.candidates))
+        @if !diagnosis.next_experiment.is_empty() {
+            section { h2 { "The next clip" } p.next { (diagnosis.next_experiment) } }
+        }
+        (origin(diagnosis))
+    };
+    let command = format!("calibration diagnose {} --seed {}", diagnosis.session, diagnosis.seed);
+    frame(&format!("diagnosis of {}", diagnosis.session), &command, &body)
+}
+
+/// The verdict in a few words.
+pub(super) fn verdict_words(kind: Kind) -> &'static str {
+    match kind {
+        Kind::None => "no gap beyond the noise",
+        Kind::Named => "cause named",
+        Kind::Class => "one of several causes",
+        Kind::Unexplained => "cause unknown",
+        Kind::NotTestable => "cannot be told",
+    }
+}
+
+/// An effect's name as words.
+pub(super) fn words(effect: &str) -> String {
+    effect.replace('_', " ")
+}
+
+/// Whether an effect was added, so that there is an after.
+pub(super) fn has_effects(diagnosis: &Diagnosis) -> bool {
+    matches!(diagnosis.verdict.kind, Kind::Named | Kind::Class) && !diagnosis.verdict.effects.is_empty()
+}
+
+fn head(diagnosis: &Diagnosis) -> Markup {
+    let (verdict, gap) = (&diagnosis.verdict, &diagnosis.gap);
+    let mut entries = vec![(probability(verdict.confidence), "confidence in this verdict")];
+    if has_effects(diagnosis) {
+        let closed = percent_interval(gap.shrink.value, gap.shrink.ci90);
+        entries.push((closed, "of the squared gap closed (90 % interval)"));
+        entries.push((percent(gap.explainable_fraction), "of what can be explained"));
+    }
+    html! {
+        p.kicker { "Diagnosis of " b { (diagnosis.session) } ": " (verdict_words(verdict.kind)) }
+        h1 { (unbroken(&verdict.text)) }
+        (facts(&entries))
+    }
+}
+
+fn map(diagnosis: &Diagnosis) -> Markup {
+    let cells: Vec<Cell> = diagnosis
+        .places
+        .iter()
+        .map(|place| Cell { stage: &place.stage, channel: &place.channel, regime: &place.regime, share: place.share })
+        .collect();
+    where_map(&cells)
+}
+
+fn residuals(diagnosis: &Diagnosis) -> Markup {
+    let names: Vec<String> = diagnosis.verdict.effects.iter().map(|effect| words(effect)).collect();
+    let added =
+        format!("with {}", if names.is_empty() { "the best candidate".to_owned() } else { names.join(" and ") });
+    let pictures = gallery(&diagnosis.traces, SHOWN_CLIPS, ["parameters identified first", &added]);
+    figure("Clips never used: measured less predicted", "The worst channel of the worst clips.", &pictures)
+}
+
+fn origin(diagnosis: &Diagnosis) -> Markup {
+    let clips = &diagnosis.clips;
+    let used = [("fitted on", &clips.train), ("chosen on", &clips.choose), ("confirmed on", &clips.confirm)];
+    html! {
+        section {
+            h2 { "Where this comes from" }
+            dl {
+                dt { "session" } dd { code { (diagnosis.session) } }
+                @for (what, clips) in used { dt { (what) } dd { (clip_list(clips)) } }
+                dt { "seed" } dd { (diagnosis.seed) }
+                dt { "took" } dd { (format!("{:.0} s", diagnosis.seconds)) }
+            }
+            @if let Some(file) = &diagnosis.theta_file {
+                p { "The parameters are in " code { (file.display()) } ". The gap with them, clip by clip:" }
+                pre { code { "twin replay " (diagnosis.session) " --parameters " (file.display()) } }
+            }
+            details { summary { "theta.toml" } pre { code { (diagnosis.theta.to_toml()) } } }
+        }
+    }
+}
+
+/// How many clips, and which.
+fn clip_list(clips: &[String]) -> String {
+    let names: Vec<&str> = clips.iter().map(|clip| clip.trim_end_matches(".mcap")).collect();
+    match names.len() {
+        0 => "none".to_owned(),
+        1 => names.join(", "),
+        count => format!("{count} clips: {}", names.join(", ")),
+    }
+}
+
+#[cfg(test)]
+pub(super) mod tests {
+    use super::*;
+    use crate::diagnose::{Candidate, Change, Clips, Gap, Place, Share, Size, Status, Verdict};
+    use crate::report::Trace;
+    use shared_mem::theta::Theta;
+    use std::collections::BTreeMap;
+
+    fn candidate(effect: &str, probability: f64, status: Status) -> Candidate {
+        let delay = Size { values: vec![0.0119], ci90: vec![[0.0112, 0.0126]], unit: "s".into() };
+        Candidate {
+            effect: effect.into(),
+            probability,
+            parameters: BTreeMap::from([("delay".to_owned(), delay)]),
+            shrink: Share { value: 0.81, ci90: [0.76, 0.85] },
+            confusable_with: vec!["camera_latency".into()],
+            status,
+            why: format!("the reason of {effect}"),
+        }
+    }
+
+    /// A diagnosis that names one effect.
+    pub(in crate::report) fn named() -> Diagnosis {
+        let before = (0..30).map(|i| [0.1 * f64::from(i), 2.0 + f64::from(i).sin()]).collect();
+        let trace = Trace {
+            clip: "clip_05.mcap".into(),
+            channel: "joint2".into(),
+            unit: "rad".into(),
+            sigma: 1.0,
+            before,
+            after: vec![[0.0, 0.1], [2.9, -0.1]],
+        };
+        Diagnosis {
+            verdict: Verdict {
+                kind: Kind::Named,
+                effects: vec!["command_delay".into()],
+                confidence: 0.97,
+                text: "Commands reach the robot 12 ms late <here>.".into(),
+            },
+            gap: Gap {
+                unit: "sigma",
+                before: 38.4,
+                after: 1.4,
+                floor: 1.0,
+                shrink: Share { value: 0.963, ci90: [0.951, 0.972] },
+                explainable_fraction: 0.989,
+                joint_rms_rad: Change { before: Some(0.00213), after: Some(0.00018) },
+                object_add_m: Change { before: Some(0.0139), after: Some(0.0012) },
+                object_add_s_m: Change::default(),
+            },
+            places: vec![Place {
+                stage: "control".into(),
+                channel: "joint2".into(),
+                regime: "reversal".into(),
+                share: 0.41,
+            }],
+            candidates: vec![
+                candidate("command_lag", 0.02, Status::Possible),
+                candidate("command_delay", 0.97, Status::Named),
+                candidate("payload", 0.0, Status::RuledOut),
+                candidate("camera_latency", 0.0, Status::NotTestable),
+            ],
+            next_experiment: "Play a chirp up to 10 Hz.".into(),
+            clips: Clips { train: vec!["clip_00.mcap".into(), "clip_01.mcap".into()], ..Clips::default() },
+            seconds: 83.2,
+            session: "monday".into(),
+            seed: 7,
+            theta: Theta::default(),
+            theta_file: Some("theta.toml".into()),
+            traces: vec![trace],
+        }
+    }
+
+    #[test]
+    fn the_page_answers_what_where_why_how_sure_and_what_next() {
+        let html = page(&named());
+        let place = |text: &str| html.find(text).unwrap_or_else(|| panic!("no {text} in {html}"));
+        let order = [
+            "<h1>Commands reach the robot 12\u{a0}ms late &lt;here&gt;.</h1>",
+            "97 %",
+            "96.3 [95.1, 97.2] %",
+            "38.4 \u{3c3}\u{b2}",
+            "noise alone: 1.00 \u{3c3}\u{b2}",
+            "13.9 mm",
+            ">reversal<",
+            "clip_05, joint2",
+            "\u{25cf} named",
+            "delay 11.9 [11.2, 12.6] ms",
+            "\u{25cb} possible",
+            "1 ruled out",
+            "the reason of payload",
+            "could not have shown",
+            "the reason of camera_latency",
+            "Play a chirp",
+            "2 clips: clip_00, clip_01",
+            "twin replay monday --parameters theta.toml",
+        ];
+        for pair in order.windows(2) {
+            assert!(place(pair[0]) < place(pair[1]), "{} comes after {}", pair[0], pair[1]);
+        }
+        assert!(!html.contains("ADD-S"), "what was not measured is not shown");
+    }
+
+    #[test]
+    fn a_page_without_a_cause_shows_no_after() {
+        let mut diagnosis = named();
+        diagnosis.verdict = Verdict { kind: Kind::None, effects: vec![], confidence: 0.99, text: "No gap.".into() };
+        diagnosis.candidates.clear();
+        diagnosis.places.clear();
+        diagnosis.traces.clear();
+        let html = page(&diagnosis);
+        assert!(html.contains("no gap beyond the noise") && !html.contains("1.40 \u{3c3}"), "{html}");
+        assert!(html.contains("None of them is named or still possible"));
+    }
+}
