@@ -2,5 +2,4 @@
 
 pub mod draw;
 pub mod score;
-pub mod session;
 pub mod world;

@@ -69,7 +69,7 @@ impl ArmModel {
     }
 }
 
-fn isometry(frame: &Frame) -> Isometry3<f64> {
+pub(super) fn isometry(frame: &Frame) -> Isometry3<f64> {
     let [x, y, z] = &frame.rotation;
     let matrix = Matrix3::new(x[0], x[1], x[2], y[0], y[1], y[2], z[0], z[1], z[2]);
     let rotation = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(matrix));

@@ -14,6 +14,7 @@
 //! | `dynamics` | gravity, Coriolis, mass matrix, accelerations |
 //! | `control` | [`ControlLaw`]: from command to torque |
 //! | `step` | integration over time |
+//! | `yielding` | how the flange moves and gives way to a push |
 //! | `transmission` | the same with friction, yielding and play between motor and link |
 //! | `kernel`, `spatial` | the arithmetic below |
 
@@ -28,6 +29,7 @@ mod spatial;
 mod step;
 mod transmission;
 mod urdf;
+mod yielding;
 
 pub use control::{ControlLaw, GainError};
 pub use dynamics::PointForce;
@@ -36,6 +38,7 @@ pub use kinematics::Jacobian;
 pub use model::{ArmModel, ModelError};
 pub use shared_mem::msg::{Joints, MAX_JOINTS};
 pub use transmission::{Spring, Transmission};
+pub use yielding::{FlangeMotion, Yielding};
 
 /// Positions and velocities of all joints.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]

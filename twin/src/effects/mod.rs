@@ -21,6 +21,7 @@ mod registry;
 mod slide;
 mod values;
 
+pub(crate) use arm::JointMemory;
 pub use arm::{ArmEffects, ArmMemory};
 pub use camera::{CameraEffects, CameraMemory};
 pub use hit::HitEffects;

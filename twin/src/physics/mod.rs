@@ -7,6 +7,7 @@
 
 mod convert;
 pub mod hit;
+mod push;
 mod shape;
 mod table_object;
 pub mod touch;

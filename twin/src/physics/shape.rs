@@ -14,7 +14,9 @@ pub struct FlatMesh;
 /// Shape and what follows from it alone: made once, shared by clones.
 #[derive(Clone)]
 pub(super) struct CollisionShape {
-    pub(super) shape: SharedShape,
+    shape: SharedShape,
+    /// Half the edge lengths of a box; `None` for a hull.
+    pub(super) half_extents: Option<Vector3<f64>>,
     /// Radius of a sphere around the geometric centre that holds the object [m].
     pub(super) bounding_radius: f64,
     /// Corners of the convex hull.
@@ -39,8 +41,46 @@ impl CollisionShape {
         let unit_inertia = convert::to_matrix(&properties.reconstruct_inertia_matrix());
         unit_inertia.try_inverse().ok_or(FlatMesh)?;
         let corners = hull_corners(&shape);
-        Ok(Self { shape, bounding_radius: outline.bounding_radius(), corners, unit_inertia })
+        let half_extents = shape.as_cuboid().map(|cuboid| convert::to_vector(cuboid.half_extents));
+        Ok(Self { shape, half_extents, bounding_radius: outline.bounding_radius(), corners, unit_inertia })
     }
+}
+
+impl CollisionShape {
+    /// Distance of a point from the surface (negative inside), the surface's nearest point, and the outward direction.
+    #[inline]
+    pub(super) fn signed_distance(&self, point: &Point3<f64>) -> (f64, Point3<f64>, Vector3<f64>) {
+        match &self.half_extents {
+            Some(half) => distance_from_box(half, &point.coords),
+            None => self.distance_from_hull(point),
+        }
+    }
+
+    fn distance_from_hull(&self, point: &Point3<f64>) -> (f64, Point3<f64>, Vector3<f64>) {
+        let projection = self.shape.project_local_point(convert::point(point), false);
+        let surface = Point3::from(convert::to_vector(projection.point));
+        let outwards = if projection.is_inside { surface - point } else { point - surface };
+        let distance = outwards.norm();
+        let unit = if distance > 1e-12 { outwards / distance } else { Vector3::z() };
+        (if projection.is_inside { -distance } else { distance }, surface, unit)
+    }
+}
+
+/// The same for a box.
+#[inline]
+fn distance_from_box(half: &Vector3<f64>, p: &Vector3<f64>) -> (f64, Point3<f64>, Vector3<f64>) {
+    let nearest = Vector3::new(p.x.clamp(-half.x, half.x), p.y.clamp(-half.y, half.y), p.z.clamp(-half.z, half.z));
+    let outwards = p - nearest;
+    let distance = outwards.norm();
+    if distance > 1e-12 {
+        return (distance, nearest.into(), outwards / distance);
+    }
+    let beyond = p.abs() - half;
+    let axis = beyond.imax();
+    let (mut surface, mut unit) = (*p, Vector3::zeros());
+    let side = if p[axis] < 0.0 { -1.0 } else { 1.0 };
+    (surface[axis], unit[axis]) = (side * half[axis], side);
+    (beyond[axis], surface.into(), unit)
 }
 
 /// Corners of a cuboid or convex hull.
@@ -54,5 +94,25 @@ fn hull_corners(shape: &SharedShape) -> Vec<Point3<f64>> {
         }
         (None, Some(hull)) => hull.points().iter().map(corner).collect(),
         (None, None) => Vec::new(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_distance_from_a_box_is_the_same_as_that_of_its_hull() {
+        let half = Vector3::new(0.04, 0.03, 0.05);
+        let boxed = CollisionShape::new(&ObjectShape::Box { half_extents: half }).expect("a box");
+        for i in 0..4000u32 {
+            // A lattice that no symmetry of the box meets.
+            let share = |step: f64| ((f64::from(i) * step).fract() - 0.5) * 0.15;
+            let point = Point3::new(share(0.618_034), share(0.414_214), share(0.732_051));
+            let (a, surface_a, unit_a) = boxed.signed_distance(&point);
+            let (b, surface_b, unit_b) = boxed.distance_from_hull(&point);
+            assert!((a - b).abs() < 1e-12, "{point}: {a} {b}");
+            assert!((surface_a - surface_b).norm() < 1e-9 && (unit_a - unit_b).norm() < 1e-6, "{point}");
+        }
     }
 }

@@ -5,6 +5,7 @@
 //! which of the two carries the state shows nowhere else.
 
 use super::hit::Press;
+use super::push::Pushed;
 use super::shape::{CollisionShape, FlatMesh};
 use super::tumble::Tumbling;
 use crate::effects::{Effects, SlideEffects, TableFriction};
@@ -40,6 +41,8 @@ pub struct ObjectMotion {
     body: FreeBody,
     /// How the body stands while it stands: its motion is this one's then.
     standing: Option<(Footing, PlanarState)>,
+    /// It stands still and does so until something touches it.
+    rests: bool,
     made_of: Material,
 }
 
@@ -47,6 +50,8 @@ pub struct ObjectMotion {
 const GRAVITY: f64 = 9.81;
 /// Longest step of a free body [s]: steps of a twelfth move the resting place of a tossed box by less than 0.2 mm.
 const FREE_STEP: f64 = 1.25e-4;
+/// Longest step under a film's drag [s].
+const DRAG_STEP: f64 = 2.5e-4;
 
 impl TableObject {
     /// The object at the origin, at rest. Without `table_height` there is no table and it falls. Of `effects` those on
@@ -73,7 +78,7 @@ impl TableObject {
             velocity: Vector3::zeros(),
             angular_velocity: Vector3::zeros(),
         };
-        let motion = ObjectMotion { body, standing: None, made_of };
+        let motion = ObjectMotion { body, standing: None, rests: false, made_of };
         let mut object = Self { shape, support: model.support, made_of, drag: 0.0, tumbling, motion };
         object.take(made_of);
         Ok(object)
@@ -127,25 +132,46 @@ impl TableObject {
     }
 
     /// Lets `dt` seconds pass under gravity, the table and the tool's presses, of which those without depth do nothing;
-    /// mean force of each press on the object [N].
+    /// mean force of each press on the object [N]. A standing object takes a millisecond without presses in one go, a
+    /// free one in steps of its own.
     pub fn step(&mut self, dt: f64, presses: &[Press]) -> [Vector3<f64>; 2] {
-        let (mut body, mut left, mut forces) = (self.motion.body, dt, [Vector3::zeros(); 2]);
-        let pressing = presses.iter().any(|press| press.touch.depth > 0.0);
-        if pressing {
-            forces = self.tumbling.step(&mut body, presses, dt);
-            left = 0.0;
+        // The film's drag is taken from the velocity at the start of a step.
+        let parts = if self.drag > 0.0 { (dt / DRAG_STEP).ceil() } else { 1.0 };
+        let mut forces = [Vector3::zeros(); 2];
+        for _ in 0..parts as usize {
+            let now = self.step_once(dt / parts, presses);
+            forces = [0, 1].map(|i| forces[i] + now[i] / parts);
         }
-        if let Some((footing, mut state)) = self.motion.standing {
-            let wrench = self.wrench(&footing, &self.motion.body, presses, &forces);
-            match footing.slider.step(&mut state, &wrench, &self.tumbling.friction, dt) {
+        forces
+    }
+
+    fn step_once(&mut self, dt: f64, presses: &[Press]) -> [Vector3<f64>; 2] {
+        let pressing = presses.iter().any(|press| press.touch.depth > 0.0);
+        if self.motion.rests && !pressing {
+            return [Vector3::zeros(); 2];
+        }
+        self.motion.rests = false;
+        let (mut body, mut left) = (self.motion.body, dt);
+        if let Some((footing, mut state)) = self.motion.standing
+            && let Some(forces) = self.push(&footing, presses, pressing, dt)
+        {
+            let wrench = self.wrench(&footing, &body, presses, &forces);
+            let ending = footing.slider.step(&mut state, &wrench, &self.tumbling.friction, dt);
+            match ending {
                 Ending::Rests | Ending::Slides => {
                     self.motion.standing = Some((footing, state));
                     self.motion.body = footing.release(&state);
+                    self.motion.rests = ending == Ending::Rests && !pressing;
                     return forces;
                 }
                 Ending::Lifts { .. } if pressing => {}
                 Ending::Lifts { left: rest } => (body, left) = (footing.release(&state), rest),
             }
+        }
+        let mut forces = [Vector3::zeros(); 2];
+        if pressing {
+            forces = self.tumbling.step(&mut body, presses, dt);
+            left = 0.0;
         }
         let parts = (left / FREE_STEP).ceil();
         for _ in 0..parts as usize {
@@ -153,6 +179,15 @@ impl TableObject {
         }
         self.settle(body, presses, &forces, dt);
         forces
+    }
+
+    /// The presses' forces on a body that goes on standing; `None` when such a one could not give way to them.
+    fn push(&self, footing: &Footing, presses: &[Press], pressing: bool, dt: f64) -> Option<[Vector3<f64>; 2]> {
+        if !pressing {
+            return Some([Vector3::zeros(); 2]);
+        }
+        let Footing { slider, .. } = footing;
+        Pushed { body: &self.motion.body, mass: slider.mass, yaw_inertia: slider.yaw_inertia }.forces(presses, dt)
     }
 
     /// Takes over the state of a free body; as a standing one, if it stands and under these forces goes on standing.
@@ -204,6 +239,7 @@ impl TableObject {
             velocity: velocity + angular_velocity.cross(&centre_to_mass),
             angular_velocity,
         };
+        self.motion.rests = false;
         self.settle(body, &[], &Default::default(), FREE_STEP);
     }
 
@@ -245,8 +281,13 @@ impl TableObject {
         &self.shape.corners
     }
 
-    pub(super) fn shape(&self) -> &dyn parry3d_f64::shape::Shape {
-        &*self.shape.shape.0
+    pub(super) fn half_extents(&self) -> Option<&Vector3<f64>> {
+        self.shape.half_extents.as_ref()
+    }
+
+    /// Distance from the surface (negative inside), nearest point of it, and the outward direction; object frame.
+    pub(super) fn signed_distance(&self, point: &Point3<f64>) -> (f64, Point3<f64>, Vector3<f64>) {
+        self.shape.signed_distance(point)
     }
 
     fn isometry_of(&self, body: &FreeBody) -> Isometry3<f64> {

@@ -4,7 +4,7 @@
 //! ends: both press, or one lifts and the other presses alone. One point in the middle could not hold the object upright
 //! against the tool. Where the two meet in a point, both ends are that point.
 
-use super::{TableObject, convert};
+use super::TableObject;
 use nalgebra::{Isometry3, Point3, Vector3};
 
 /// The tool: a segment along the flange's z axis with a radius around it [m].
@@ -81,8 +81,55 @@ impl<'a> Approach<'a> {
         }
     }
 
-    /// Share of the axis where it is nearest: the distance to a convex body is convex along a line (golden section).
+    /// Share of the axis where it is nearest.
     fn nearest(&self) -> f64 {
+        match self.object.half_extents() {
+            Some(half) => self.nearest_to_box(half),
+            None => self.nearest_by_search(),
+        }
+    }
+
+    /// Squared distance from a box is, along a line, a parabola between the shares at which the line crosses one of the
+    /// six planes of its faces; the derivative only rises, so the minimum lies where it changes its sign.
+    fn nearest_to_box(&self, half: &Vector3<f64>) -> f64 {
+        let start = self.on_axis(0.0).coords;
+        let along = self.on_axis(1.0).coords - start;
+        let slope = |share: f64| -> f64 {
+            (0..3)
+                .map(|i| {
+                    let p = start[i] + share * along[i];
+                    along[i] * (p - p.clamp(-half[i], half[i]))
+                })
+                .sum()
+        };
+        let (mut low, mut high) = (0.0, 1.0);
+        if slope(low) >= 0.0 && slope(high) > 0.0 {
+            return low;
+        }
+        if slope(high) <= 0.0 && slope(low) < 0.0 {
+            return high;
+        }
+        for i in 0..3 {
+            for side in [-half[i], half[i]] {
+                let crossing = (side - start[i]) / along[i];
+                if crossing > low && crossing < high {
+                    if slope(crossing) > 0.0 { high = crossing } else { low = crossing }
+                }
+            }
+        }
+        let (falls, rises) = (slope(low), slope(high));
+        if falls < 0.0 && rises > falls {
+            return low + (high - low) * (falls / (falls - rises)).min(1.0);
+        }
+        // Level all along: beside a face any place is as near as the other, inside the box the search tells.
+        if falls == 0.0 && rises == 0.0 && self.object.signed_distance(&self.on_axis(low)).0 < 0.0 {
+            return self.nearest_by_search();
+        }
+        low
+    }
+
+    /// The same for any convex body: the distance is convex along a line (golden section).
+    fn nearest_by_search(&self) -> f64 {
         const GOLDEN: f64 = 0.618_033_988_749_894_9;
         let distance = |share: f64| self.object.signed_distance(&self.on_axis(share)).0;
         let (mut low, mut high) = (0.0, 1.0);
@@ -106,6 +153,11 @@ impl<'a> Approach<'a> {
     /// Shares between which the object lies beside the axis.
     fn shared_stretch(&self) -> [f64; 2] {
         let along = self.object_from_flange.rotation * Vector3::z() / self.tool.segment;
+        if let Some(half) = self.object.half_extents() {
+            // The box's own shadow on the line: no need to ask all of its corners.
+            let (middle, reach) = (-along.dot(&self.object_from_flange.translation.vector), along.abs().dot(half));
+            return [middle - reach, middle + reach].map(|share| share.clamp(0.0, 1.0));
+        }
         let origin = self.object_from_flange.translation.vector;
         let shares = self.object.corners().iter().map(|corner| along.dot(&(corner.coords - origin)));
         let (low, high) =
@@ -126,18 +178,6 @@ impl<'a> Approach<'a> {
             if way(middle).dot(&there) > PARALLEL { on = middle } else { off = middle }
         }
         on
-    }
-}
-
-impl TableObject {
-    /// Distance from the object's surface (negative inside), nearest point of it, and the outward direction; object frame.
-    fn signed_distance(&self, point: &Point3<f64>) -> (f64, Point3<f64>, Vector3<f64>) {
-        let projection = self.shape().project_local_point(convert::point(point), false);
-        let surface = Point3::from(convert::to_vector(projection.point));
-        let outwards = if projection.is_inside { surface - point } else { point - surface };
-        let distance = outwards.norm();
-        let unit = if distance > 1e-12 { outwards / distance } else { Vector3::z() };
-        (if projection.is_inside { -distance } else { distance }, surface, unit)
     }
 }
 

@@ -127,18 +127,11 @@ impl Tumbling {
 
 impl Press {
     fn contact(&self, lever: Vector3<f64>, velocity: Vector3<f64>, dt: f64) -> Contact {
-        let touches = self.touch.depth > 0.0;
-        let rate = (self.tool_velocity - velocity).dot(&self.touch.normal);
         Contact {
             lever,
             normal: self.touch.normal,
             surface_velocity: self.tool_velocity,
-            // A place that does not touch may approach at any speed: it keeps its row, and its force is zero.
-            least_parting: if touches {
-                -self.motion.approach_after(self.touch.depth, rate, dt)
-            } else {
-                f64::NEG_INFINITY
-            },
+            least_parting: self.least_parting(&velocity, dt),
             friction: self.motion.friction,
             ..Contact::NONE
         }

@@ -1,7 +1,7 @@
 //! The arm of a cell with its controller and with what the controller does not know about it.
 
 use super::ArmRollout;
-use crate::arm::{ArmModel, ControlLaw, GainError};
+use crate::arm::{ArmModel, ControlLaw, GainError, Joints, Transmission, Yielding};
 use crate::effects::ArmEffects;
 use shared_mem::cell::{Cell, Controller};
 use shared_mem::theta::Theta;
@@ -67,6 +67,17 @@ impl Plant {
     #[must_use]
     pub fn arm(&self) -> &ArmModel {
         self.rollout().arm
+    }
+
+    /// Whether friction or a gear that yields lies between motors and links.
+    pub(crate) fn acts_in_joints(&self) -> bool {
+        self.hidden.as_ref().is_some_and(|(effects, _)| effects.acts_in_joints())
+    }
+
+    /// How the arm gives way to a push at `q`.
+    pub(crate) fn yielding(&self, q: &Joints) -> Yielding {
+        let effects = self.hidden.as_ref().map(|(effects, _)| effects);
+        self.arm().yielding(q, |joint| effects.is_some_and(|effects| effects.spring(joint).is_some()))
     }
 
     /// The model inside the controller.

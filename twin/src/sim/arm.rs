@@ -2,9 +2,10 @@
 #![allow(non_snake_case)] // the Franka Control Interface's own symbols
 
 use super::SimError;
-use crate::arm::{ArmModel, JointState, Joints, MAX_JOINTS, PointForce};
-use crate::effects::ArmEffects;
-use crate::rollout::{ArmMotion, CommandTrack, Drive, Plant, Reading};
+use super::tool_path::{Reaction, ToolPath};
+use crate::arm::{ArmModel, JointState, Joints, MAX_JOINTS};
+use crate::effects::{ArmEffects, ArmMemory, JointMemory};
+use crate::rollout::{ArmMotion, CommandTrack, Drive, Plant, Reading, TICK};
 use crate::sensors::joint::JointNoise;
 use shared_mem::cell::{Cell, Controller};
 use shared_mem::msg::arm::{ArmMode, ArmState};
@@ -20,6 +21,16 @@ pub(super) struct SimArm {
     dq_d: Joints,
     /// Velocities at the start of the period [rad/s].
     before: Joints,
+    /// Torque behind the gears in this period so far, times the share of it that has passed [N m].
+    sensed: Joints,
+    start: StretchStart,
+}
+
+/// The arm at the start of a stretch.
+#[derive(Clone, Default)]
+struct StretchStart {
+    state: JointState,
+    joints: Option<JointMemory>,
 }
 
 impl SimArm {
@@ -37,7 +48,16 @@ impl SimArm {
         let zero = [0.0; MAX_JOINTS];
         let plant = Plant::new(cell, nominal, theta, effects)?;
         let (motion, noise) = (ArmMotion::unstarted(), JointNoise::new(cell));
-        let mut arm = Self { plant, motion, noise, q_d: q, dq_d: zero, before: zero };
+        let mut arm = Self {
+            plant,
+            motion,
+            noise,
+            q_d: q,
+            dq_d: zero,
+            before: zero,
+            sensed: zero,
+            start: StretchStart::default(),
+        };
         arm.set(&q, &zero);
         Ok(arm)
     }
@@ -61,18 +81,57 @@ impl SimArm {
         self.plant.rollout().begin(&mut self.motion, drive);
     }
 
-    /// Moves on by `dt` under the period's motor torque and, perhaps, forces on the tool.
-    pub(super) fn advance(&mut self, dt: f64, loads: &[PointForce]) {
-        let mut external = [0.0; MAX_JOINTS];
-        for load in loads {
-            let torque = self.plant.arm().torque_of(&self.motion.state.q, load);
-            external.iter_mut().zip(torque).for_each(|(sum, torque)| *sum += torque);
+    /// Parts of a period in which the arm's way may be corrected after the contact: joints that stick or yield do not
+    /// answer to a force as the path takes it, so it must be short for them.
+    pub(super) fn stretches(&self) -> usize {
+        if self.plant.acts_in_joints() { 4 } else { 1 }
+    }
+
+    /// Moves the arm on by `length` seconds as if nothing touched it; the tool's way there.
+    pub(super) fn path(&mut self, length: f64) -> ToolPath {
+        let from = self.model().flange_motion(&self.motion.state);
+        let yielding = self.plant.yielding(&self.motion.state.q);
+        self.start =
+            StretchStart { state: self.motion.state, joints: self.motion.memory.as_ref().map(ArmMemory::joints) };
+        self.plant.rollout().advance(&mut self.motion, &[0.0; MAX_JOINTS], length);
+        ToolPath::new(from, self.model().flange_motion(&self.motion.state), length, yielding)
+    }
+
+    /// What the contact along the path did to the arm.
+    pub(super) fn end_path(&mut self, path: &ToolPath) {
+        let rollout = self.plant.rollout();
+        let share = path.length() / TICK;
+        if path.was_pushed() {
+            let Reaction { torque, dq, q } = path.reaction();
+            if let (Some(memory), Some(joints)) = (&mut self.motion.memory, &self.start.joints) {
+                memory.set_joints(joints);
+                self.motion.state = self.start.state;
+                rollout.advance(&mut self.motion, &torque, path.length());
+                if !self.plant.acts_in_joints() {
+                    // The force acted early or late in the stretch, not evenly.
+                    for i in 0..MAX_JOINTS {
+                        self.motion.state.q[i] += q[i] - 0.5 * path.length() * dq[i];
+                    }
+                }
+            } else {
+                for i in 0..MAX_JOINTS {
+                    self.motion.state.q[i] += q[i];
+                    self.motion.state.dq[i] += dq[i];
+                    self.motion.external[i] += torque[i] * share;
+                }
+            }
         }
-        self.plant.rollout().advance(&mut self.motion, &external, dt);
+        rollout.sense(&mut self.motion, &self.before);
+        for (sum, torque) in self.sensed.iter_mut().zip(&self.motion.tau_J) {
+            *sum += torque * share;
+        }
     }
 
     pub(super) fn end_period(&mut self) {
-        self.plant.rollout().sense(&mut self.motion, &self.before);
+        match self.motion.memory {
+            Some(_) => self.motion.tau_J = self.sensed,
+            None => self.plant.rollout().sense(&mut self.motion, &self.before),
+        }
     }
 
     /// A whole period in which nothing touches the arm.
@@ -86,6 +145,7 @@ impl SimArm {
             (self.q_d, self.dq_d) = (*q_d, *dq_d);
         }
         self.before = self.motion.state.dq;
+        self.sensed = [0.0; MAX_JOINTS];
     }
 
     pub(super) fn set(&mut self, q: &[f64], dq: &[f64]) {

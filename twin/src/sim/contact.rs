@@ -1,24 +1,26 @@
-//! One control period of arm and object together: coarse steps while they are apart, fine ones around a contact, whose
-//! force acts on both at the same point with opposite signs.
+//! One control period of arm and object together. While they are apart the object moves in one go and the arm in
+//! another; a touch begins inside the period where the gap closes, is followed in short steps, and its force acts on both
+//! at the same point with opposite signs.
 
 use super::arm::SimArm;
-use super::{Drive, PERIOD, PERIOD_NS, Vector3};
-use crate::arm::PointForce;
+use super::tool_path::{ToolMotion, ToolPath};
+use super::{Drive, PERIOD};
 use crate::effects::HitEffects;
 use crate::physics::TableObject;
 use crate::physics::hit::{ContactLaw, ContactMotion, Press};
-use crate::physics::touch::Capsule;
+use crate::physics::touch::{Capsule, Touch};
 use crate::scene::ObjectParameters;
 use nalgebra::{Isometry3, Point3, Translation3};
 use shared_mem::cell::Tool;
 
-/// Steps of the object in a period without contact: 0.25 ms each.
-const COARSE_STEPS: usize = 4;
-/// Steps of both in a period with contact: 62.5 µs, a twentieth of a contact's duration. Twice as many change the
-/// object's speed after a hit by less than 2 %: `a_finer_step_changes_the_hit_by_less_than_two_per_cent`.
-const FINE_STEPS: usize = 16;
 /// A gap that is wider than this plus a period's approach stays open for the period [m].
 const MARGIN: f64 = 1e-3;
+/// Longest step between two looks at the gap [s].
+const LOOK: f64 = 2.5e-4;
+/// A step that closes the gap goes on for so long, so that it ends in touch [s].
+const INTO: f64 = 2e-7;
+/// Nothing closes a gap of this width within a millisecond [m].
+const NEAR: f64 = 0.02;
 
 /// The contact between tool and object.
 #[derive(Clone)]
@@ -27,7 +29,8 @@ pub(super) struct ToolContact {
     pair: Option<(Capsule, ContactMotion)>,
     /// From where the flange should hold the tool to where it does, in the flange frame.
     tool_shift: Option<Translation3<f64>>,
-    fine_steps: usize,
+    /// Steps in touch are so many times shorter than the law asks for.
+    refinement: f64,
     pub(super) record: ContactRecord,
 }
 
@@ -42,7 +45,7 @@ pub(super) struct ContactRecord {
 
 impl ToolContact {
     pub(super) fn without_object() -> Self {
-        Self { pair: None, tool_shift: None, fine_steps: FINE_STEPS, record: ContactRecord::default() }
+        Self { pair: None, tool_shift: None, refinement: 1.0, record: ContactRecord::default() }
     }
 
     pub(super) fn new(tool: Option<&Tool>, object: &ObjectParameters, effects: &HitEffects) -> Self {
@@ -54,93 +57,109 @@ impl ToolContact {
 
     /// Other parameters of the same pair; what is on record stays.
     pub(super) fn set_parameters(&mut self, tool: Option<&Tool>, object: &ObjectParameters, effects: &HitEffects) {
-        *self = Self { record: self.record, fine_steps: self.fine_steps, ..Self::new(tool, object, effects) };
+        *self = Self { record: self.record, refinement: self.refinement, ..Self::new(tool, object, effects) };
     }
 
-    /// Makes the fine steps `times` finer: for the test that they are fine enough.
+    /// Makes the steps in touch `times` shorter: for the test that they are short enough.
     #[cfg(test)]
-    pub(super) fn refine(&mut self, times: usize) {
-        self.fine_steps = FINE_STEPS * times;
+    pub(super) fn refine(&mut self, times: f64) {
+        self.refinement = times;
     }
 
     /// One period of arm and object from the simulated time `now_ns` on.
     pub(super) fn advance(&mut self, arm: &mut SimArm, object: &mut TableObject, drive: &Drive, now_ns: u64) {
         self.record.mean_force = 0.0;
         match self.pair.filter(|_| self.may_touch(arm, object)) {
-            Some((tool, motion)) => {
-                arm.begin_period(drive);
-                self.advance_finely(arm, object, &tool, &motion, now_ns);
-                arm.end_period();
-            }
             None => {
                 arm.period(drive);
-                settle(object);
+                object.step(PERIOD, &[]);
             }
-        }
-    }
-
-    fn advance_finely(
-        &mut self,
-        arm: &mut SimArm,
-        object: &mut TableObject,
-        tool: &Capsule,
-        motion: &ContactMotion,
-        now_ns: u64,
-    ) {
-        let dt = PERIOD / self.fine_steps as f64;
-        let stamp = |step: usize| now_ns + PERIOD_NS * step as u64 / self.fine_steps as u64;
-        for step in 0..self.fine_steps {
-            let touches = object.touches(tool, &self.tool_frame(arm));
-            let presses =
-                touches.map(|touch| Press { touch, tool_velocity: tool_velocity(arm, &touch.point), motion: *motion });
-            let forces = object.step(dt, &presses);
-            let pressing: f64 = touches.iter().zip(&forces).map(|(touch, force)| force.dot(&touch.normal)).sum();
-            if pressing > 0.0 {
-                let start = self.record.span.map_or_else(|| stamp(step), |(start, _)| start);
-                self.record.span = Some((start, stamp(step + 1)));
-                self.record.mean_force += pressing / self.fine_steps as f64;
+            Some((tool, motion)) => {
+                arm.begin_period(drive);
+                let stretches = arm.stretches();
+                let length = PERIOD / stretches as f64;
+                for stretch in 0..stretches {
+                    let mut close = Close { contact: self, object, tool: &tool, motion: &motion };
+                    let mut path = arm.path(length);
+                    close.follow(&mut path, now_ns, length * stretch as f64);
+                    arm.end_path(&path);
+                }
+                arm.end_period();
             }
-            let loads = [0, 1].map(|i| PointForce { point: touches[i].point.into(), force: (-forces[i]).into() });
-            arm.advance(dt, if pressing > 0.0 { &loads } else { &[] });
         }
     }
 
     /// Whether the gap may close within a period.
     pub(super) fn may_touch(&self, arm: &SimArm, object: &TableObject) -> bool {
         let Some((tool, _)) = self.pair.as_ref().filter(|_| arm.model().has_geometry()) else { return false };
-        let held = self.tool_frame(arm);
+        let flange = arm.model().flange(&arm.state().q).isometry();
+        let held = self.held(&flange);
         let centre = Point3::from(object.pose().isometry().translation.vector);
         let on_tool = held.inverse_transform_point(&centre);
         let nearest = Point3::new(0.0, 0.0, on_tool.z.clamp(0.0, tool.segment));
-        // Nothing closes a gap of 20 mm within a millisecond; most periods end here.
-        let rough_gap = (on_tool - nearest).norm() - tool.radius - object.bounding_radius();
-        if rough_gap > 0.02 {
+        // Most periods end here.
+        if (on_tool - nearest).norm() - tool.radius - object.bounding_radius() > NEAR {
             return false;
         }
         let touch = object.touch(tool, &held);
-        let approach = (tool_velocity(arm, &touch.point) - object.velocity_at(&touch.point)).norm();
+        let moving = ToolMotion::from(arm.model().flange_motion(arm.state()));
+        let approach = (moving.velocity_at(&touch.point) - object.velocity_at(&touch.point)).norm();
         -touch.depth < MARGIN + approach * PERIOD
     }
 
-    /// Where the flange holds the tool, in the base frame.
-    fn tool_frame(&self, arm: &SimArm) -> Isometry3<f64> {
-        let flange = arm.model().flange(&arm.state().q).isometry();
-        self.tool_shift.map_or(flange, |shift| flange * shift)
+    /// Where the tool is that should be at the flange.
+    fn held(&self, flange: &Isometry3<f64>) -> Isometry3<f64> {
+        self.tool_shift.map_or(*flange, |shift| flange * shift)
     }
 }
 
-/// One period of the object alone.
-pub(super) fn settle(object: &mut TableObject) {
-    for _ in 0..COARSE_STEPS {
-        object.step(PERIOD / COARSE_STEPS as f64, &[]);
-    }
+/// Tool and object close to each other.
+struct Close<'a> {
+    contact: &'a mut ToolContact,
+    object: &'a mut TableObject,
+    tool: &'a Capsule,
+    motion: &'a ContactMotion,
 }
 
-/// Velocity of the last link's point that is at `point` now [m/s].
-fn tool_velocity(arm: &SimArm, point: &Point3<f64>) -> Vector3<f64> {
-    let columns = arm.model().jacobian(&arm.state().q, (*point).into());
-    columns
-        .iter()
-        .zip(&arm.state().dq)
-        .fold(Vector3::zeros(), |sum, (column, rate)| sum + Vector3::new(column[0], column[1], column[2]) * *rate)
+impl Close<'_> {
+    /// Follows the tool along its path, `since` seconds after `now_ns`.
+    fn follow(&mut self, path: &mut ToolPath, now_ns: u64, since: f64) {
+        while path.left() > INTO {
+            let tool = path.now();
+            let touches = self.object.touches(self.tool, &self.contact.held(&tool.pose));
+            if touches.iter().all(|touch| touch.depth <= 0.0) {
+                let dt = self.until_touch(&tool, &touches[0], path.left());
+                self.object.step(dt, &[]);
+                path.advance(dt, &[], &tool.pose.translation.vector);
+            } else {
+                let before = path.time();
+                self.press(path, &tool, &touches);
+                let at = |time: f64| now_ns + ((since + time) * 1e9).round() as u64;
+                let (start, end) = (at(before), at(path.time()));
+                let first = self.contact.record.span.map_or(start, |(first, _)| first);
+                self.contact.record.span = Some((first, end));
+            }
+        }
+    }
+
+    /// How long the gap stays open for certain, or a step that ends in touch.
+    fn until_touch(&self, tool: &ToolMotion, nearest: &Touch, left: f64) -> f64 {
+        let approach = tool.velocity_at(&nearest.point) - self.object.velocity_at(&nearest.point);
+        let closing = approach.dot(&nearest.normal);
+        let open = if closing > 0.0 { -nearest.depth / closing + INTO } else { LOOK };
+        open.min(LOOK).min(left)
+    }
+
+    /// One step in touch.
+    fn press(&mut self, path: &mut ToolPath, tool: &ToolMotion, touches: &[Touch; 2]) {
+        let left = path.left();
+        let dt = left / (left * self.contact.refinement / self.motion.step()).ceil();
+        let presses =
+            touches.map(|touch| Press { touch, tool_velocity: tool.velocity_at(&touch.point), motion: *self.motion });
+        let forces = self.object.step(dt, &presses);
+        let pressing: f64 = touches.iter().zip(&forces).map(|(touch, force)| force.dot(&touch.normal)).sum();
+        self.contact.record.mean_force += pressing * dt / PERIOD;
+        let on_tool = [0, 1].map(|i| (touches[i].point, -forces[i]));
+        path.advance(dt, &on_tool, &tool.pose.translation.vector);
+    }
 }

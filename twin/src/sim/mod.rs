@@ -10,6 +10,7 @@ mod arm;
 mod contact;
 #[cfg(test)]
 mod tests;
+mod tool_path;
 
 pub use crate::rollout::Drive;
 
@@ -212,7 +213,7 @@ impl SimCell {
         match (arm, object) {
             (Some(arm), Some(object)) => contact.advance(arm, object, drive, self.time_ns),
             (Some(arm), None) => arm.period(drive),
-            (None, Some(object)) => contact::settle(object),
+            (None, Some(object)) => drop(object.step(PERIOD, &[])),
             (None, None) => {}
         }
         self.time_ns += PERIOD_NS;

@@ -112,7 +112,7 @@ fn a_struck_box_moves_and_the_arm_feels_it() {
 #[test]
 fn a_finer_step_changes_the_hit_by_less_than_two_per_cent() {
     let description = striking();
-    let speeds = [1, 2].map(|finer| {
+    let speeds = [1.0, 2.0].map(|finer| {
         let mut cell = SimCell::new(&description, None).expect("a cell");
         cell.contact.refine(finer);
         let mut top = 0.0f64;

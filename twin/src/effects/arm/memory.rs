@@ -33,7 +33,24 @@ impl Clone for ArmMemory {
     }
 }
 
+/// The part of a memory that a step of the arm changes.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct JointMemory {
+    motor: JointState,
+    tau_J: Joints,
+}
+
 impl ArmMemory {
+    /// What a step of the arm changes.
+    pub(crate) fn joints(&self) -> JointMemory {
+        JointMemory { motor: self.motor, tau_J: self.tau_J }
+    }
+
+    /// Takes a step of the arm back.
+    pub(crate) fn set_joints(&mut self, joints: &JointMemory) {
+        (self.motor, self.tau_J) = (joints.motor, joints.tau_J);
+    }
+
     /// As if the arm had had this command for long.
     pub(super) fn restart(&mut self, q_d: &Joints, dq_d: &Joints) {
         self.q_d.restart(q_d);

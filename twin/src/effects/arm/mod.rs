@@ -30,6 +30,7 @@ pub(super) mod torque_sensor_bias;
 mod transmission;
 
 pub use memory::ArmMemory;
+pub(crate) use memory::JointMemory;
 
 use crate::arm::{ArmModel, JointState, Joints};
 use crate::rollout::TICK;

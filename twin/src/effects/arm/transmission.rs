@@ -8,7 +8,8 @@ use crate::arm::{ArmModel, JointState, Joints, MAX_JOINTS, Spring, Transmission}
 const LONGEST_STEP: f64 = 2.5e-4;
 
 impl ArmEffects {
-    pub(super) fn acts_in_joints(&self) -> bool {
+    /// Whether friction or a gear that yields lies between motors and links.
+    pub(crate) fn acts_in_joints(&self) -> bool {
         self.joint_coulomb_friction.is_some()
             || self.joint_viscous_friction.is_some()
             || self.joint_stribeck_friction.is_some()

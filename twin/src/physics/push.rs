@@ -1,0 +1,95 @@
+//! What a tool presses on a body that stands: the law of the hit, solved for a body that can only slide and turn on its
+//! base. Whether it goes on standing under these forces is for the load to tell; where it does not, [`super::tumble`] solves
+//! all six freedoms. Base frame, SI. Called by [`super::TableObject`].
+
+use super::hit::Press;
+use crate::sliding::FreeBody;
+use nalgebra::Vector3;
+
+/// Sweeps over the two places, and the change of impulse over mass [m/s] below which they end early.
+const SWEEPS: usize = 40;
+const SETTLED: f64 = 1e-7;
+/// A push steeper than this against the table is none that a sliding body could give way to: the sine of 18 degrees.
+const STEEPEST: f64 = 0.95;
+
+/// A standing body that is pushed.
+pub(super) struct Pushed<'a> {
+    pub(super) body: &'a FreeBody,
+    pub(super) mass: f64,
+    pub(super) yaw_inertia: f64,
+}
+
+/// One place under the tool.
+struct Place {
+    lever: Vector3<f64>,
+    normal: Vector3<f64>,
+    surface_velocity: Vector3<f64>,
+    least_parting: f64,
+    friction: f64,
+    normal_mobility: f64,
+    slip_mobility: f64,
+    impulse: Vector3<f64>,
+}
+
+impl Pushed<'_> {
+    /// Mean force of each press on the body over `dt` [N]; `None` when a press is too steep for a body that slides.
+    pub(super) fn forces(&self, presses: &[Press], dt: f64) -> Option<[Vector3<f64>; 2]> {
+        if presses.iter().any(|press| press.touch.normal.z.abs() > STEEPEST) {
+            return None;
+        }
+        let (mut velocity, mut spin) = (self.body.velocity, self.body.angular_velocity.z);
+        let mut places = [0, 1].map(|i| presses.get(i).map(|press| self.place(press, dt)));
+        for _ in 0..SWEEPS {
+            let mut largest: f64 = 0.0;
+            for place in places.iter_mut().flatten() {
+                let change = place.relax(&at(&place.lever, &velocity, spin));
+                velocity += Vector3::new(change.x, change.y, 0.0) / self.mass;
+                spin += (place.lever.x * change.y - place.lever.y * change.x) / self.yaw_inertia;
+                largest = largest.max(change.amax() / self.mass);
+            }
+            if largest < SETTLED {
+                break;
+            }
+        }
+        Some(places.map(|place| place.map_or_else(Vector3::zeros, |place| place.impulse / dt)))
+    }
+
+    fn place(&self, press: &Press, dt: f64) -> Place {
+        let (lever, normal) = (press.touch.point - self.body.centre, press.touch.normal);
+        let (along, turning) = (normal.xy().norm_squared(), lever.x * normal.y - lever.y * normal.x);
+        let before = at(&lever, &self.body.velocity, self.body.angular_velocity.z);
+        Place {
+            lever,
+            normal,
+            surface_velocity: press.tool_velocity,
+            least_parting: press.least_parting(&before, dt),
+            friction: press.motion.friction,
+            normal_mobility: along / self.mass + turning * turning / self.yaw_inertia,
+            slip_mobility: 1.0 / self.mass + lever.xy().norm_squared() / self.yaw_inertia,
+            impulse: Vector3::zeros(),
+        }
+    }
+}
+
+impl Place {
+    /// Makes the place give way as it must and rub as it can; the change of its impulse [N s].
+    fn relax(&mut self, velocity: &Vector3<f64>) -> Vector3<f64> {
+        let relative = velocity - self.surface_velocity;
+        let parting = relative.dot(&self.normal);
+        let before = self.impulse.dot(&self.normal);
+        let normal = (before + (self.least_parting - parting) / self.normal_mobility).max(0.0);
+        let slip = relative - self.normal * parting;
+        let wanted = self.impulse - self.normal * before - slip / self.slip_mobility;
+        let (limit, length) = (self.friction * normal, wanted.norm());
+        let rubbing = if length > limit { wanted * (limit / length) } else { wanted };
+        let impulse = self.normal * normal + rubbing;
+        let change = impulse - self.impulse;
+        self.impulse = impulse;
+        change
+    }
+}
+
+/// Velocity of a standing body's point.
+fn at(lever: &Vector3<f64>, velocity: &Vector3<f64>, spin: f64) -> Vector3<f64> {
+    Vector3::new(velocity.x - spin * lever.y, velocity.y + spin * lever.x, 0.0)
+}
