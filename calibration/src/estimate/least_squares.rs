@@ -2,16 +2,17 @@
 
 use super::linear::ClipFit;
 use super::problem::{ClipModel, Impossible, Random, Unknown};
+use super::views::{Counted, Given, Subset};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
-use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// When to stop.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Options {
     /// At most so many linearisations.
     pub iterations: usize,
-    /// Converged once a step promises to lower the deviance by less than this; 1 is what noise alone moves.
+    /// Converged once a step promises to lower the deviance by less than this; 1 is what noise alone moves. Where the
+    /// residuals are larger than their sigmas, what they alone move is larger, and so is this.
     pub tolerance: f64,
 }
 
@@ -28,7 +29,7 @@ pub struct Fit {
     pub shared: Vec<f64>,
     /// The clips there.
     pub clips: Vec<ClipFit>,
-    /// Whether the last step was small; otherwise the iterations ran out or the caller stopped it.
+    /// Whether the last step was small; otherwise the iterations ran out, no step led down, or the caller stopped it.
     pub converged: bool,
     /// Calls of the model: one is one clip simulated.
     pub evaluations: usize,
@@ -43,6 +44,13 @@ impl Fit {
         self.clips.iter().map(|clip| clip.deviance).sum()
     }
 
+    /// Mean squared residual, at least 1: by how much the residuals exceed their sigmas.
+    #[must_use]
+    pub fn misfit(&self) -> f64 {
+        let (chi2, rows) = self.clips.iter().fold((0.0, 0), |(chi2, rows), c| (chi2 + c.chi2, rows + c.rows));
+        (chi2 / rows.max(1) as f64).max(1.0)
+    }
+
     /// Information on the shared numbers from all clips, `P x P`.
     #[must_use]
     pub fn information(&self) -> DMatrix<f64> {
@@ -50,7 +58,7 @@ impl Fit {
         parts.fold(DMatrix::zeros(self.shared.len(), self.shared.len()), |sum, part| sum + part)
     }
 
-    fn gradient(&self) -> DVector<f64> {
+    pub(super) fn gradient(&self) -> DVector<f64> {
         self.clips.iter().fold(DVector::zeros(self.shared.len()), |sum, clip| sum + &clip.gradient)
     }
 }
@@ -85,7 +93,7 @@ pub fn fit_from(
     options: &Options,
     watch: impl Fn(f64, &[f64]) -> bool,
 ) -> Result<Fit, Impossible> {
-    let counted = Counted { model, calls: AtomicUsize::new(0) };
+    let counted = Counted::new(model);
     let clips = linearise(&counted, unknowns, random, &shared, &own)?;
     let mut best = Fit { shared, clips, converged: false, evaluations: 0, history: Vec::new() };
     best.history.push(best.deviance());
@@ -100,9 +108,10 @@ pub fn fit_from(
                 best.converged = true;
                 break;
             }
+            Progress::Stuck => break,
         }
     }
-    best.evaluations = counted.calls.into_inner();
+    best.evaluations = counted.calls();
     Ok(best)
 }
 
@@ -122,7 +131,7 @@ pub fn score(
     clips
         .into_par_iter()
         .map(|clip| {
-            let one = One { model: &fixed, clip };
+            let one = Subset { model: &fixed, clips: &[clip] };
             fit(&one, &[], random, options, |_, _| true).map(|mut fit| fit.clips.swap_remove(0))
         })
         .collect()
@@ -131,10 +140,13 @@ pub fn score(
 enum Progress {
     Better,
     Arrived,
+    Stuck,
 }
 
-/// Most trials with growing damping before a point counts as the best there is.
+/// Most trials with growing damping before the search is stuck.
 const TRIALS: usize = 12;
+/// So many trials shorten the way of the shared numbers alone; then that of the clips' own ones too.
+const SHARED_TRIALS: usize = 3;
 
 fn improve<M: ClipModel>(
     model: &Counted<'_, M>,
@@ -145,49 +157,28 @@ fn improve<M: ClipModel>(
     tolerance: f64,
 ) -> Result<Progress, Impossible> {
     let (information, gradient) = (best.information(), best.gradient());
-    for _ in 0..TRIALS {
+    let here = current(best, random);
+    let whole = bounded_step(unknowns, &best.shared, &information, &gradient, 0.0);
+    if promised(best, &whole) < tolerance * best.misfit() {
+        return Ok(Progress::Arrived);
+    }
+    for trial in 0..TRIALS {
         let step = bounded_step(unknowns, &best.shared, &information, &gradient, *damping);
-        let own: Vec<Vec<f64>> = best.clips.iter().map(|clip| clip.own_after(&step)).collect();
-        if promised(best, &step) < tolerance {
-            return Ok(Progress::Arrived);
-        }
+        let held = if unknowns.is_empty() { 0 } else { SHARED_TRIALS };
+        let share = 0.5_f64.powi(i32::try_from(trial.saturating_sub(held)).unwrap_or(i32::MAX));
+        let own: Vec<Vec<f64>> = best.clips.iter().map(|clip| clip.own_part_way(&step, share)).collect();
         let shared: Vec<f64> = (best.shared.iter().zip(unknowns).zip(step.iter()))
             .map(|((value, unknown), step)| (value + step).clamp(unknown.lower, unknown.upper))
             .collect();
-        if cost(model, random, &shared, &own).is_some_and(|cost| cost < current(best, random)) {
+        if cost(model, random, &shared, &own).is_some_and(|cost| cost < here) {
             *damping = (*damping * 0.1).max(1e-9);
             best.clips = linearise(model, unknowns, random, &shared, &own)?;
             best.shared = shared;
             return Ok(Progress::Better);
         }
         *damping = (*damping * 10.0).max(1e-4);
-        // The own numbers alone may be what overshoots, and damping the shared ones does not shorten their way.
-        if unknowns.is_empty() {
-            return Ok(halved_own(model, random, best, &own)?.map_or(Progress::Arrived, |()| Progress::Better));
-        }
     }
-    Ok(Progress::Arrived)
-}
-
-/// The way of the own numbers, halved until it leads down.
-fn halved_own<M: ClipModel>(
-    model: &Counted<'_, M>,
-    random: &[Random],
-    best: &mut Fit,
-    target: &[Vec<f64>],
-) -> Result<Option<()>, Impossible> {
-    let mut share = 0.5;
-    for _ in 0..TRIALS {
-        let own: Vec<Vec<f64>> = (best.clips.iter().zip(target))
-            .map(|(clip, to)| clip.own.iter().zip(to).map(|(from, to)| from + share * (to - from)).collect())
-            .collect();
-        if cost(model, random, &best.shared, &own).is_some_and(|cost| cost < current(best, random)) {
-            best.clips = linearise(model, &[], random, &best.shared, &own)?;
-            return Ok(Some(()));
-        }
-        share *= 0.5;
-    }
-    Ok(None)
+    Ok(Progress::Stuck)
 }
 
 /// A damped Newton step that keeps numbers at a bound there when they are pushed against it.
@@ -198,31 +189,48 @@ fn bounded_step(
     gradient: &DVector<f64>,
     damping: f64,
 ) -> DVector<f64> {
-    let mut held = vec![false; unknowns.len()];
+    let mut free: Vec<usize> = (0..unknowns.len()).collect();
     loop {
-        let free: Vec<usize> = (0..unknowns.len()).filter(|k| !held[*k]).collect();
-        let mut h = DMatrix::from_fn(free.len(), free.len(), |i, j| information[(free[i], free[j])]);
-        for i in 0..free.len() {
-            // A number that nothing depends on stays where it is.
-            h[(i, i)] += damping * h[(i, i)] + f64::MIN_POSITIVE.sqrt();
-        }
-        let g = DVector::from_fn(free.len(), |i, _| gradient[free[i]]);
-        let solved = h.clone().cholesky().map_or_else(|| &g * 0.0, |h| h.solve(&g));
-        let mut step = DVector::zeros(unknowns.len());
-        free.iter().zip(solved.iter()).for_each(|(k, solved)| step[*k] = -solved);
-        let leaves = |k: usize| {
-            let (value, to) = (shared[k], shared[k] + step[k]);
-            (value <= unknowns[k].lower && to < value) || (value >= unknowns[k].upper && to > value)
+        let step = solve(information, gradient, &free, damping);
+        let leaves = |k: &usize| {
+            let (value, to) = (shared[*k], shared[*k] + step[*k]);
+            (value <= unknowns[*k].lower && to < value) || (value >= unknowns[*k].upper && to > value)
         };
-        let newly: Vec<usize> = free.into_iter().filter(|k| leaves(*k)).collect();
-        if newly.is_empty() {
-            for (k, unknown) in unknowns.iter().enumerate() {
-                step[k] = step[k].clamp(unknown.lower - shared[k], unknown.upper - shared[k]);
-            }
-            return step;
+        let staying: Vec<usize> = free.iter().copied().filter(|k| !leaves(k)).collect();
+        if staying.len() == free.len() {
+            return DVector::from_fn(unknowns.len(), |k, _| {
+                step[k].clamp(unknowns[k].lower - shared[k], unknowns[k].upper - shared[k])
+            });
         }
-        newly.into_iter().for_each(|k| held[k] = true);
+        free = staying;
     }
+}
+
+/// Ridge over the scaled information that rounding cannot undo.
+const RIDGE: f64 = 1e-12;
+
+/// `-(H + damping diag H)^-1 g` in the free numbers; a number that nothing depends on stays where it is.
+fn solve(h: &DMatrix<f64>, g: &DVector<f64>, free: &[usize], damping: f64) -> DVector<f64> {
+    let scale: Vec<f64> = free.iter().map(|k| h[(*k, *k)].max(0.0).sqrt()).collect();
+    let used: Vec<usize> = (0..free.len()).filter(|i| scale[*i] > 0.0).collect();
+    let n = used.len();
+    let scaled = DMatrix::from_fn(n, n, |i, j| {
+        let (i, j) = (used[i], used[j]);
+        h[(free[i], free[j])] / (scale[i] * scale[j])
+    });
+    let right = DVector::from_fn(n, |i, _| g[free[used[i]]] / scale[used[i]]);
+    let mut step = DVector::zeros(g.len());
+    let mut ridge = damping + RIDGE;
+    // Rounding may leave the scaled information a little indefinite: then a larger ridge is what it allows.
+    while ridge < 1e3 {
+        if let Some(factor) = (&scaled + DMatrix::identity(n, n) * ridge).cholesky() {
+            let solved = factor.solve(&right);
+            used.iter().zip(solved.iter()).for_each(|(i, x)| step[free[*i]] = -x / scale[*i]);
+            break;
+        }
+        ridge *= 10.0;
+    }
+    step
 }
 
 /// By how much a step lowers the deviance if the clips are as linear as they look.
@@ -267,55 +275,6 @@ fn linearise(
 ) -> Result<Vec<ClipFit>, Impossible> {
     let at = |clip| ClipFit::at(model, clip, (unknowns, shared), (random, &own[clip]));
     (0..model.clips()).into_par_iter().map(at).collect()
-}
-
-/// Counts the calls.
-struct Counted<'a, M> {
-    model: &'a M,
-    calls: AtomicUsize,
-}
-
-impl<M: ClipModel> ClipModel for Counted<'_, M> {
-    fn clips(&self) -> usize {
-        self.model.clips()
-    }
-
-    fn residuals(&self, clip: usize, shared: &[f64], own: &[f64], out: &mut Vec<f64>) -> Result<(), Impossible> {
-        self.calls.fetch_add(1, Ordering::Relaxed);
-        self.model.residuals(clip, shared, own, out)
-    }
-}
-
-/// A model whose shared numbers are given.
-struct Given<'a, M> {
-    model: &'a M,
-    shared: &'a [f64],
-}
-
-impl<M: ClipModel> ClipModel for Given<'_, M> {
-    fn clips(&self) -> usize {
-        self.model.clips()
-    }
-
-    fn residuals(&self, clip: usize, _: &[f64], own: &[f64], out: &mut Vec<f64>) -> Result<(), Impossible> {
-        self.model.residuals(clip, self.shared, own, out)
-    }
-}
-
-/// One clip of a model.
-struct One<'a, M> {
-    model: &'a M,
-    clip: usize,
-}
-
-impl<M: ClipModel> ClipModel for One<'_, M> {
-    fn clips(&self) -> usize {
-        1
-    }
-
-    fn residuals(&self, _: usize, shared: &[f64], own: &[f64], out: &mut Vec<f64>) -> Result<(), Impossible> {
-        self.model.residuals(self.clip, shared, own, out)
-    }
 }
 
 #[cfg(test)]

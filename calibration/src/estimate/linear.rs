@@ -5,7 +5,8 @@
 //! Schur complement. Its log-likelihood is that of a Gaussian whose covariance is `1 + B L^-1 B'`.
 
 use super::problem::{ClipModel, Impossible, Random, Unknown};
-use nalgebra::{Cholesky, DMatrix, DVector, DVectorViewMut};
+use nalgebra::{Cholesky, DMatrix, DVector};
+use rayon::prelude::*;
 
 /// A clip, linearised. `P` shared numbers, `Q` own ones.
 #[derive(Debug, Clone)]
@@ -24,7 +25,9 @@ pub struct ClipFit {
     pub gradient: DVector<f64>,
     /// Information on the shared numbers, `P x P`.
     pub information: DMatrix<f64>,
-    /// How the own numbers answer to the shared ones and where they want to go: [`ClipFit::own_after`].
+    /// What each stretch of the clip adds to [`Self::gradient`]; a single one where the model tells no stretches.
+    pub scores: Vec<DVector<f64>>,
+    /// How the own numbers answer to the shared ones and where they want to go: [`ClipFit::own_part_way`].
     own_step: DVector<f64>,
     own_answer: DMatrix<f64>,
 }
@@ -43,25 +46,20 @@ impl ClipFit {
     ) -> Result<Self, Impossible> {
         let mut base = Vec::new();
         model.residuals(clip, shared, own, &mut base)?;
-        let mut moved = shared.to_vec();
-        let mut a = DMatrix::zeros(base.len(), unknowns.len());
-        for (k, unknown) in unknowns.iter().enumerate() {
-            let step = if unknown.upper - shared[k] < unknown.step { -unknown.step } else { unknown.step };
-            let column = a.column_mut(k);
-            difference(&base, column, (k, step), &mut moved, |moved, out| model.residuals(clip, moved, own, out));
-        }
-        let mut moved = own.to_vec();
-        let mut b = DMatrix::zeros(base.len(), random.len());
-        for (k, effect) in random.iter().enumerate().filter(|(_, effect)| effect.sigma > 0.0) {
-            let column = b.column_mut(k);
-            difference(&base, column, (k, effect.step), &mut moved, |moved, out| {
-                model.residuals(clip, shared, moved, out)
-            });
-        }
-        Ok(Self::eliminate(&DVector::from_vec(base), &a, &b, random, own))
+        let a = slopes(&base, shared, unknowns.iter().map(|unknown| (unknown.step, unknown.upper)), |moved, out| {
+            model.residuals(clip, moved, own, out)
+        });
+        let steps = random.iter().map(|effect| (if effect.sigma > 0.0 { effect.step } else { 0.0 }, f64::INFINITY));
+        let b = slopes(&base, own, steps, |moved, out| model.residuals(clip, shared, moved, out));
+        Ok(Self::eliminate(&DVector::from_vec(base), (&a, &b), (random, own), &model.stretches(clip)))
     }
 
-    fn eliminate(r: &DVector<f64>, a: &DMatrix<f64>, b: &DMatrix<f64>, random: &[Random], own: &[f64]) -> Self {
+    fn eliminate(
+        r: &DVector<f64>,
+        (a, b): (&DMatrix<f64>, &DMatrix<f64>),
+        (random, own): (&[Random], &[f64]),
+        stretches: &[usize],
+    ) -> Self {
         // A number that does not scatter has no slope and any precision: 1 keeps it where it is.
         let precision = DVector::from_iterator(
             random.len(),
@@ -75,6 +73,15 @@ impl ClipFit {
         let (ba, br) = (b.tr_mul(a), b.tr_mul(r) + &pull);
         let own_step = -inner.solve(&br);
         let own_answer = -inner.solve(&ba);
+        let starts = std::iter::once(&0).chain(stretches);
+        let all = r.len();
+        let ends = stretches.iter().filter(|end| **end < all).chain(std::iter::once(&all));
+        let score = |(start, end): (&usize, &usize)| {
+            let (rows, first) = (end - start, *start);
+            let r = r.rows(first, rows);
+            a.rows(first, rows).tr_mul(&r) + own_answer.tr_mul(&b.rows(first, rows).tr_mul(&r))
+        };
+        let scores = starts.zip(ends).map(score).collect();
         let log_volume: f64 = inner.ln_determinant() - precision.iter().map(|precision| precision.ln()).sum::<f64>();
         Self {
             rows: r.len(),
@@ -83,6 +90,7 @@ impl ClipFit {
             deviance: r.norm_squared() + pull.dot(&u) + log_volume,
             gradient: a.tr_mul(r) + ba.tr_mul(&own_step),
             information: a.tr_mul(a) + ba.tr_mul(&own_answer),
+            scores,
             own_covariance: inner.inverse(),
             own_step,
             own_answer,
@@ -95,31 +103,50 @@ impl ClipFit {
         &self.own_step
     }
 
-    /// The own numbers that go with a step `dx` of the shared ones.
+    /// The own numbers `share` of the way to where a step `dx` of the shared ones brings them.
     #[must_use]
-    pub fn own_after(&self, dx: &DVector<f64>) -> Vec<f64> {
+    pub fn own_part_way(&self, dx: &DVector<f64>, share: f64) -> Vec<f64> {
         let step = &self.own_step + &self.own_answer * dx;
-        self.own.iter().zip(step.iter()).map(|(own, step)| own + step).collect()
+        self.own.iter().zip(step.iter()).map(|(own, step)| own + share * step).collect()
     }
 }
 
-/// Slope of the residuals by `moved[k]`, by a step forward or, where that has no answer, backward.
-fn difference(
+/// Slopes of the residuals by each number, from its step and its upper bound. A step of 0 has no slope.
+fn slopes(
     base: &[f64],
-    mut column: DVectorViewMut<'_, f64>,
+    at: &[f64],
+    steps: impl Iterator<Item = (f64, f64)>,
+    evaluate: impl Fn(&[f64], &mut Vec<f64>) -> Result<(), Impossible> + Sync,
+) -> DMatrix<f64> {
+    let steps: Vec<(f64, f64)> = steps.collect();
+    let mut slopes = DMatrix::zeros(base.len(), steps.len());
+    if base.is_empty() {
+        return slopes;
+    }
+    slopes.as_mut_slice().par_chunks_exact_mut(base.len()).enumerate().for_each(|(k, column)| {
+        let (step, upper) = steps[k];
+        let step = if upper - at[k] < step { -step } else { step };
+        if step != 0.0 {
+            slope(base, column, at, (k, step), &evaluate);
+        }
+    });
+    slopes
+}
+
+/// Slope of the residuals by number `k`, by a step forward or, where that has no answer, backward.
+fn slope(
+    base: &[f64],
+    column: &mut [f64],
+    at: &[f64],
     (k, step): (usize, f64),
-    moved: &mut [f64],
-    evaluate: impl Fn(&[f64], &mut Vec<f64>) -> Result<(), Impossible>,
+    evaluate: &impl Fn(&[f64], &mut Vec<f64>) -> Result<(), Impossible>,
 ) {
-    let mut out = Vec::with_capacity(base.len());
-    let kept = moved[k];
+    let (mut out, mut moved) = (Vec::with_capacity(base.len()), at.to_vec());
     for step in [step, -step] {
-        moved[k] = kept + step;
+        moved[k] = at[k] + step;
         // What rounding left of the step.
-        let step = moved[k] - kept;
-        let answer = evaluate(moved, &mut out);
-        moved[k] = kept;
-        if answer.is_ok() && out.len() == base.len() {
+        let step = moved[k] - at[k];
+        if evaluate(&moved, &mut out).is_ok() && out.len() == base.len() {
             column.iter_mut().zip(&out).zip(base).for_each(|((slope, out), base)| *slope = (out - base) / step);
             return;
         }

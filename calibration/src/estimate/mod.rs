@@ -9,14 +9,28 @@
 //! | [`problem`] | the two kinds of unknowns, and the question a model answers: residuals of one clip |
 //! | [`linear`] | one clip linearised, its own numbers eliminated |
 //! | [`least_squares`] | bounded Levenberg-Marquardt on all clips |
+//! | [`interval`] | how sure the shared numbers are |
+//! | [`search`] | search without slopes, and its loop |
+//! | [`swarm`], [`evolution`] | two of them |
+//! | `views` | a model with its calls counted, with numbers given, with some of its clips |
 //!
 //! Residuals are in units of their standard deviation. Everything is deterministic: clips are worked on by many threads,
 //! but always summed in their order.
 
+pub mod evolution;
+pub mod interval;
 pub mod least_squares;
 pub mod linear;
 pub mod problem;
+pub mod search;
+pub mod swarm;
+mod views;
 
+pub use evolution::Evolution;
+pub use interval::{Intervals, at_bounds};
 pub use least_squares::{Fit, Options, fit, fit_from, score};
 pub use linear::ClipFit;
 pub use problem::{ClipModel, Impossible, Random, Unknown};
+pub use search::{Found, Search, minimise};
+pub use swarm::Swarm;
+pub use views::Subset;

@@ -44,4 +44,10 @@ pub trait ClipModel: Sync {
     /// # Errors
     /// [`Impossible`] where the model has no answer.
     fn residuals(&self, clip: usize, shared: &[f64], own: &[f64], out: &mut Vec<f64>) -> Result<(), Impossible>;
+
+    /// Where the stretches of a clip's rows end that are witnesses of their own: so long that what residuals of
+    /// neighbouring rows share has died away from one stretch to the next. Empty: the clip is a single witness.
+    fn stretches(&self, _clip: usize) -> Vec<usize> {
+        Vec::new()
+    }
 }

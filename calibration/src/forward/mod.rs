@@ -3,8 +3,10 @@
 //! | module | owns |
 //! |---|---|
 //! | [`setting`] | from a vector of numbers to the parameters of a cell |
+//! | [`arm`] | what an arm's sensors log |
 //! | [`object`] | clips with an object: poses |
 
+pub mod arm;
 pub mod object;
 pub mod setting;
 

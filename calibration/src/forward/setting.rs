@@ -89,24 +89,26 @@ impl Setting {
     }
 
     fn write(&self, theta: &mut Theta, value: f64, dof: usize) {
-        let arm = |theta: &mut Theta, joint: usize, gains: fn(&mut ArmTheta) -> &mut Vec<f64>| {
-            if let Some(gain) = theta.arm.as_mut().and_then(|arm| gains(arm).get_mut(joint)) {
-                *gain = value;
-            }
-        };
-        let object = theta.object.get_or_insert_with(ObjectTheta::default);
         match *self {
-            Self::Stiffness(joint) => arm(theta, joint, |arm| &mut arm.stiffness),
-            Self::Damping(joint) => arm(theta, joint, |arm| &mut arm.damping),
-            Self::Friction => object.friction = Some(value),
-            Self::Mass => object.mass = Some(value),
-            Self::CentreOfMass(axis) => object.centre_of_mass.get_or_insert_default()[axis] = value,
-            Self::TipFriction => object.tip_friction = Some(value),
+            Self::Stiffness(joint) => write_gain(theta.arm.as_mut().map(|arm| &mut arm.stiffness), joint, value),
+            Self::Damping(joint) => write_gain(theta.arm.as_mut().map(|arm| &mut arm.damping), joint, value),
+            Self::Friction => theta.object.get_or_insert_default().friction = Some(value),
+            Self::Mass => theta.object.get_or_insert_default().mass = Some(value),
+            Self::CentreOfMass(axis) => {
+                theta.object.get_or_insert_default().centre_of_mass.get_or_insert_default()[axis] = value;
+            }
+            Self::TipFriction => theta.object.get_or_insert_default().tip_friction = Some(value),
             Self::Effect { name, parameter, index, inverse } => {
                 let value = if inverse { value.recip() } else { value };
                 write_effect(&mut theta.effects, (name, parameter, index), value, dof);
             }
         }
+    }
+}
+
+fn write_gain(gains: Option<&mut Vec<f64>>, joint: usize, value: f64) {
+    if let Some(gain) = gains.and_then(|gains| gains.get_mut(joint)) {
+        *gain = value;
     }
 }
 
@@ -142,12 +144,8 @@ impl Settings {
     #[must_use]
     pub fn theta(&self, shared: &[f64]) -> Theta {
         let mut theta = self.base.clone();
-        let objectless = theta.object.is_none();
         for (setting, value) in self.settings.iter().zip(shared) {
             setting.write(&mut theta, *value, self.dof);
-        }
-        if objectless && theta.object.as_ref() == Some(&ObjectTheta::default()) {
-            theta.object = None;
         }
         theta
     }
@@ -185,21 +183,29 @@ const GAIN_STEP: f64 = 1e-4;
 #[must_use]
 pub fn gains(cell: &Cell, base: &Theta) -> Vec<(Setting, Unknown)> {
     let (Some(controller), Some(arm)) = (&cell.controller, &base.arm) else { return Vec::new() };
-    type Kind = fn(usize) -> Setting;
-    let kinds: [(&[f64], &[f64], Option<Range>, Kind); 2] = [
-        (&arm.stiffness, &controller.stiffness, controller.stiffness_range, Setting::Stiffness),
-        (&arm.damping, &controller.damping, controller.damping_range, Setting::Damping),
-    ];
-    let mut all = Vec::new();
-    for (starts, nominal, range, kind) in kinds {
-        for (joint, start) in starts.iter().enumerate() {
-            let around = nominal.get(joint).copied().unwrap_or(*start).max(f64::MIN_POSITIVE);
-            let [lower, upper] = range.unwrap_or([around / GAIN_FACTOR, around * GAIN_FACTOR]);
-            let scale = start.max(0.05 * (upper - lower));
-            all.push(unknown(kind(joint), *start, [lower, upper], GAIN_STEP * scale));
-        }
-    }
+    let stiffness = Gain { starts: &arm.stiffness, nominal: &controller.stiffness, range: controller.stiffness_range };
+    let damping = Gain { starts: &arm.damping, nominal: &controller.damping, range: controller.damping_range };
+    let mut all = stiffness.unknowns(Setting::Stiffness);
+    all.extend(damping.unknowns(Setting::Damping));
     all
+}
+
+/// One kind of gain, joint by joint.
+struct Gain<'a> {
+    starts: &'a [f64],
+    nominal: &'a [f64],
+    range: Option<Range>,
+}
+
+impl Gain<'_> {
+    fn unknowns(&self, setting: fn(usize) -> Setting) -> Vec<(Setting, Unknown)> {
+        let of = |(joint, start): (usize, &f64)| {
+            let around = self.nominal.get(joint).copied().unwrap_or(*start).max(f64::MIN_POSITIVE);
+            let [lower, upper] = self.range.unwrap_or([around / GAIN_FACTOR, around * GAIN_FACTOR]);
+            unknown(setting(joint), *start, [lower, upper], GAIN_STEP * start.max(0.05 * around).max(1e-3))
+        };
+        self.starts.iter().enumerate().map(of).collect()
+    }
 }
 
 /// Ranges of the object's parameters where cell.toml tells none: friction, mass over the nominal one, friction of the tip.

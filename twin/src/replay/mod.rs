@@ -17,7 +17,7 @@ mod report;
 mod session;
 mod write;
 
-pub use predict::{Prediction, ReplayError, Replayer};
+pub use predict::{Prediction, ReplayError, Replayer, in_model_order};
 pub use report::{ClipGap, Gap, SessionGap};
 pub use session::{Options, replay};
 pub use write::write_clip;

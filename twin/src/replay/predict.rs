@@ -2,7 +2,7 @@
 
 use super::object_start;
 use super::report::{ClipGap, Gap};
-use crate::arm::JointState;
+use crate::arm::{ArmModel, JointState};
 use crate::effects::CameraEffects;
 use crate::metrics::{SurfacePoints, joint_rms};
 use crate::rollout::{CellRollout, CellTrace, CommandTrack, Course, Hole, ObjectState};
@@ -103,7 +103,10 @@ impl Replayer {
     /// # Errors
     /// [`ReplayError`] naming the clip and the remedy.
     pub fn replay(&self, clip: Clip) -> Result<(Clip, Prediction, ClipGap), ReplayError> {
-        let clip = self.in_model_order(clip)?;
+        let clip = match self.rollout.cell().arm_model() {
+            Some(arm) => in_model_order(clip, arm)?,
+            None => clip,
+        };
         let prediction = self.predict(&clip)?;
         let gap = self.gap(&clip, &prediction);
         let finite = gap.joint_rms_rad.iter().flatten().chain(&gap.object_add_m).all(|v| v.is_finite());
@@ -114,16 +117,6 @@ impl Replayer {
         warnings.extend(clip.damage.iter().chain(&prediction.warnings).cloned());
         let report = ClipGap { file: name(&clip), gap, warnings };
         Ok((clip, prediction, report))
-    }
-
-    /// Joints in the model's order. Own recordings of an arm whose joints have no names of their own number them.
-    fn in_model_order(&self, mut clip: Clip) -> Result<Clip, ReplayError> {
-        let Some(arm) = self.rollout.cell().arm_model() else { return Ok(clip) };
-        let numbered = (1..=arm.dof()).map(|i| format!("joint{i}"));
-        if clip.joint_names.iter().eq(numbered.collect::<Vec<_>>().iter()) {
-            clip.joint_names = arm.joint_names().to_vec();
-        }
-        if clip.measured.is_empty() { Ok(clip) } else { Ok(clip.reorder(arm.joint_names())?) }
     }
 
     fn predict(&self, clip: &Clip) -> Result<Prediction, ReplayError> {
@@ -200,6 +193,19 @@ impl Replayer {
             contact_time_s: prediction.contact_time,
         }
     }
+}
+
+/// A clip with its joints in the model's order. Own recordings of an arm whose joints have no names of their own number
+/// them.
+///
+/// # Errors
+/// [`ReadError`] naming the joints when the clip has others.
+pub fn in_model_order(mut clip: Clip, arm: &ArmModel) -> Result<Clip, ReadError> {
+    let numbered = (1..=arm.dof()).map(|i| format!("joint{i}"));
+    if clip.joint_names.iter().eq(numbered.collect::<Vec<_>>().iter()) {
+        clip.joint_names = arm.joint_names().to_vec();
+    }
+    if clip.measured.is_empty() { Ok(clip) } else { clip.reorder(arm.joint_names()) }
 }
 
 /// ADD or ADD-S.

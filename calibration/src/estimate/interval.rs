@@ -1,0 +1,199 @@
+//! How sure the shared numbers are, in a way that residuals which depend on each other do not fool.
+//!
+//! The information of a fit is right where residuals are independent and as large as their sigmas. They are neither: a
+//! model that is a little wrong leaves residuals that last. So the scores of whole stretches of clips are taken as
+//! witnesses (a sandwich, Liang & Zeger 1986) with the correction and Student's t for their number, and of the two the
+//! wider interval counts.
+
+use super::least_squares::Fit;
+use super::problem::Unknown;
+use nalgebra::{DMatrix, DVector};
+
+/// How sure a fit is about its shared numbers.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Intervals {
+    /// Half the 95 % interval of each number; infinite where the clips say nothing about it.
+    pub half_width: Vec<f64>,
+    /// Correlation of the estimates, `P x P`; zero in rows of numbers that the clips say nothing about.
+    pub correlation: DMatrix<f64>,
+    /// One sigma of each number if residuals were independent and as large as their sigmas.
+    pub model_sigma: Vec<f64>,
+    /// One sigma of each number by the scatter of the witnesses' scores.
+    pub witness_sigma: Vec<f64>,
+    /// Number of witnesses.
+    pub witnesses: usize,
+}
+
+/// Below this share of its own information a number is what the others make of it.
+const COLLINEAR: f64 = 1e-10;
+/// Two-sided 95 % of a normal distribution, in sigmas.
+const NORMAL_95: f64 = 1.959_964;
+
+impl Intervals {
+    /// At the fit's numbers. Those in `held` were not free: they rest on a bound, or nothing depends on them.
+    #[must_use]
+    pub fn new(fit: &Fit, held: &[bool]) -> Self {
+        let n = fit.shared.len();
+        let information = fit.information();
+        let free: Vec<usize> = (0..n).filter(|k| !held[*k] && information[(*k, *k)] > 0.0).collect();
+        let inverse = spread(&inverse(&information, &free), &free, n);
+        let scores: Vec<&DVector<f64>> = fit.clips.iter().flat_map(|clip| &clip.scores).collect();
+        let middle = scores.iter().fold(DMatrix::zeros(n, n), |sum, score| sum + *score * score.transpose());
+        let witnesses = scores.len();
+        let correction = witnesses as f64 / (witnesses.max(2) - 1) as f64;
+        let sandwich = &inverse * middle * &inverse * correction;
+        let known = |k: usize| inverse[(k, k)] > 0.0;
+        let sigma = |m: &DMatrix<f64>| (0..n).map(|k| m[(k, k)].max(0.0).sqrt()).collect::<Vec<_>>();
+        let (model_sigma, witness_sigma) = (sigma(&inverse), sigma(&sandwich));
+        let t = student_95(witnesses.saturating_sub(1));
+        let half_width = (0..n)
+            .map(|k| if known(k) { (NORMAL_95 * model_sigma[k]).max(t * witness_sigma[k]) } else { f64::INFINITY })
+            .collect();
+        let correlation = DMatrix::from_fn(n, n, |i, j| {
+            if known(i) && known(j) { inverse[(i, j)] / (model_sigma[i] * model_sigma[j]) } else { 0.0 }
+        });
+        Self { half_width, correlation, model_sigma, witness_sigma, witnesses }
+    }
+
+    /// Half the 95 % intervals if clips that add `more` information were recorded besides.
+    #[must_use]
+    pub fn with_more(&self, fit: &Fit, more: &DMatrix<f64>) -> Vec<f64> {
+        let n = self.half_width.len();
+        let free: Vec<usize> = (0..n).filter(|k| self.half_width[*k].is_finite()).collect();
+        let after = spread(&inverse(&(fit.information() + more), &free), &free, n);
+        (0..n)
+            .map(|k| {
+                if self.model_sigma[k] > 0.0 {
+                    self.half_width[k] * (after[(k, k)].max(0.0).sqrt() / self.model_sigma[k]).min(1.0)
+                } else {
+                    f64::INFINITY
+                }
+            })
+            .collect()
+    }
+}
+
+/// Which numbers rest on a bound of their search.
+#[must_use]
+pub fn at_bounds(unknowns: &[Unknown], shared: &[f64]) -> Vec<bool> {
+    let near = |u: &Unknown, value: f64| {
+        let tolerance = 1e-6 * (u.upper - u.lower);
+        value - u.lower <= tolerance || u.upper - value <= tolerance
+    };
+    unknowns.iter().zip(shared).map(|(unknown, value)| near(unknown, *value)).collect()
+}
+
+/// Inverse of the free part of the information, scaled; directions that rounding owns are left out of the inverse of
+/// their numbers, which then have variance 0 and count as not known.
+fn inverse(information: &DMatrix<f64>, free: &[usize]) -> DMatrix<f64> {
+    let n = free.len();
+    let scale: Vec<f64> = free.iter().map(|k| information[(*k, *k)].sqrt()).collect();
+    let scaled = DMatrix::from_fn(n, n, |i, j| information[(free[i], free[j])] / (scale[i] * scale[j]));
+    let eigen = scaled.symmetric_eigen();
+    let lost: Vec<bool> = (0..n)
+        .map(|i| (0..n).any(|e| eigen.eigenvalues[e] < COLLINEAR && eigen.eigenvectors[(i, e)].abs() > 0.1))
+        .collect();
+    DMatrix::from_fn(n, n, |i, j| {
+        if lost[i] || lost[j] {
+            return 0.0;
+        }
+        let parts = (0..n).filter(|e| eigen.eigenvalues[*e] >= COLLINEAR);
+        let sum: f64 =
+            parts.map(|e| eigen.eigenvectors[(i, e)] * eigen.eigenvectors[(j, e)] / eigen.eigenvalues[e]).sum();
+        sum / (scale[i] * scale[j])
+    })
+}
+
+fn spread(part: &DMatrix<f64>, free: &[usize], n: usize) -> DMatrix<f64> {
+    let mut whole = DMatrix::zeros(n, n);
+    for (i, row) in free.iter().enumerate() {
+        for (j, column) in free.iter().enumerate() {
+            whole[(*row, *column)] = part[(i, j)];
+        }
+    }
+    whole
+}
+
+/// Two-sided 95 % quantile of Student's t (Abramowitz & Stegun 26.7.5, right to 1 % from 3 degrees of freedom on).
+fn student_95(degrees: usize) -> f64 {
+    match degrees {
+        0 => f64::INFINITY,
+        1 => 12.706,
+        2 => 4.303,
+        _ => {
+            let (z, n) = (NORMAL_95, degrees as f64);
+            let (z3, z5, z7) = (z.powi(3), z.powi(5), z.powi(7));
+            z + (z3 + z) / (4.0 * n)
+                + (5.0 * z5 + 16.0 * z3 + 3.0 * z) / (96.0 * n * n)
+                + (3.0 * z7 + 19.0 * z5 + 17.0 * z3 - 15.0 * z) / (384.0 * n.powi(3))
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{ClipModel, Impossible, Options, fit};
+    use super::*;
+    use rand::{RngExt as _, SeedableRng as _};
+    use rand_distr::StandardNormal;
+
+    /// Straight lines through noise that lasts for `lasting` rows; every stretch of 20 rows is a witness.
+    struct Line {
+        noise: Vec<f64>,
+    }
+
+    const CLIPS: usize = 4;
+    const ROWS: usize = 200;
+
+    impl Line {
+        fn new(seed: u64, lasting: usize) -> Self {
+            let mut random = rand_pcg::Pcg64::seed_from_u64(seed);
+            let drawn: Vec<f64> = (0..CLIPS * ROWS / lasting).map(|_| random.sample(StandardNormal)).collect();
+            Self { noise: (0..CLIPS * ROWS).map(|i| drawn[i / lasting]).collect() }
+        }
+    }
+
+    impl ClipModel for Line {
+        fn clips(&self) -> usize {
+            CLIPS
+        }
+
+        fn residuals(&self, clip: usize, shared: &[f64], _: &[f64], out: &mut Vec<f64>) -> Result<(), Impossible> {
+            out.clear();
+            let row = |i: usize| self.noise[clip * ROWS + i] - shared[0] - shared[1] * (i as f64 / ROWS as f64 - 0.5);
+            out.extend((0..ROWS).map(row));
+            Ok(())
+        }
+
+        fn stretches(&self, _: usize) -> Vec<usize> {
+            (1..=ROWS / 20).map(|i| i * 20).collect()
+        }
+    }
+
+    fn covered(lasting: usize) -> f64 {
+        let unknown = |name: &str| Unknown { name: name.into(), start: 0.0, lower: -10.0, upper: 10.0, step: 1e-4 };
+        let unknowns = [unknown("a"), unknown("b")];
+        let inside = |seed| {
+            let fit = fit(&Line::new(seed, lasting), &unknowns, &[], &Options::default(), |_, _| true);
+            let fit = fit.expect("an answer");
+            let intervals = Intervals::new(&fit, &[false; 2]);
+            (0..2).filter(|k| fit.shared[*k].abs() < intervals.half_width[*k]).count() as f64
+        };
+        (0..200).map(inside).sum::<f64>() / 400.0
+    }
+
+    #[test]
+    fn intervals_hold_the_truth_as_often_as_they_say_whether_noise_lasts_or_not() {
+        for lasting in [1, 10] {
+            let share = covered(lasting);
+            assert!((0.92..0.995).contains(&share), "noise that lasts {lasting} rows: {share}");
+        }
+    }
+
+    #[test]
+    fn quantiles_are_those_of_the_tables() {
+        for (degrees, table) in [(1, 12.706), (4, 2.776), (10, 2.228), (60, 2.000)] {
+            assert!((student_95(degrees) / table - 1.0).abs() < 0.01, "{degrees}: {}", student_95(degrees));
+        }
+    }
+}

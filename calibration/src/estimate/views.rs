@@ -1,0 +1,77 @@
+//! A model seen another way: its calls counted, its shared numbers given, some of its clips alone.
+
+use super::problem::{ClipModel, Impossible};
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+/// Counts the calls.
+pub(super) struct Counted<'a, M> {
+    model: &'a M,
+    calls: AtomicUsize,
+}
+
+impl<'a, M> Counted<'a, M> {
+    pub(super) fn new(model: &'a M) -> Self {
+        Self { model, calls: AtomicUsize::new(0) }
+    }
+
+    pub(super) fn calls(&self) -> usize {
+        self.calls.load(Ordering::Relaxed)
+    }
+}
+
+impl<M: ClipModel> ClipModel for Counted<'_, M> {
+    fn clips(&self) -> usize {
+        self.model.clips()
+    }
+
+    fn residuals(&self, clip: usize, shared: &[f64], own: &[f64], out: &mut Vec<f64>) -> Result<(), Impossible> {
+        self.calls.fetch_add(1, Ordering::Relaxed);
+        self.model.residuals(clip, shared, own, out)
+    }
+
+    fn stretches(&self, clip: usize) -> Vec<usize> {
+        self.model.stretches(clip)
+    }
+}
+
+/// A model whose shared numbers are given.
+pub(super) struct Given<'a, M> {
+    pub(super) model: &'a M,
+    pub(super) shared: &'a [f64],
+}
+
+impl<M: ClipModel> ClipModel for Given<'_, M> {
+    fn clips(&self) -> usize {
+        self.model.clips()
+    }
+
+    fn residuals(&self, clip: usize, _: &[f64], own: &[f64], out: &mut Vec<f64>) -> Result<(), Impossible> {
+        self.model.residuals(clip, self.shared, own, out)
+    }
+
+    fn stretches(&self, clip: usize) -> Vec<usize> {
+        self.model.stretches(clip)
+    }
+}
+
+/// Some clips of a model.
+pub struct Subset<'a, M> {
+    /// The model.
+    pub model: &'a M,
+    /// Which of its clips, in the order they get here.
+    pub clips: &'a [usize],
+}
+
+impl<M: ClipModel> ClipModel for Subset<'_, M> {
+    fn clips(&self) -> usize {
+        self.clips.len()
+    }
+
+    fn residuals(&self, clip: usize, shared: &[f64], own: &[f64], out: &mut Vec<f64>) -> Result<(), Impossible> {
+        self.model.residuals(self.clips[clip], shared, own, out)
+    }
+
+    fn stretches(&self, clip: usize) -> Vec<usize> {
+        self.model.stretches(self.clips[clip])
+    }
+}

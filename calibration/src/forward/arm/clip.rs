@@ -1,0 +1,226 @@
+//! One recorded clip, prepared for being held against the twin: joints in the model's order, stretches that can be
+//! simulated, rows that are averaged, joints that are dead. Stamps of the recording, SI.
+
+use shared_mem::cell::{Cell, ClipKind, PoseNoise};
+use shared_mem::msg::MAX_JOINTS;
+use shared_mem::recording::{Clip, JointSeries, ReadError};
+use shared_mem::time::seconds_between;
+use std::ops::Range;
+use twin::arm::ArmModel;
+use twin::replay::in_model_order;
+use twin::rollout::CommandTrack;
+
+/// Rows within this time are averaged: no motion of an arm is that fast, and the average of white noise loses nothing [ns].
+const AVERAGED_NS: u64 = 5_000_000;
+/// A log slower than this does not show how a joint follows its command [Hz].
+const SLOWEST: f64 = 28.0;
+/// A clip shorter than this says nothing [s].
+const SHORTEST: f64 = 0.5;
+/// A stretch that counts as a witness of its own: several times as long as a joint remembers [s].
+const STRETCH: f64 = 0.7;
+/// The tool may touch the object this long before its poses show it: a slow camera's latency [ns].
+const BEFORE_MOTION_NS: u64 = 150_000_000;
+/// An object moves when a pose is so many sigmas from the first ones.
+const MOVED_SIGMAS: f64 = 6.0;
+/// What the tracker's noise is taken for where cell.toml does not tell it [m].
+const POSE_NOISE: f64 = 1e-3;
+/// A command that moves a joint this far should show [rad].
+const COMMANDED: f64 = 0.02;
+/// A joint that follows less than this share of its command is dead.
+const DEAD: f64 = 0.01;
+
+/// A clip cannot be used for the arm.
+#[derive(Debug, thiserror::Error)]
+pub enum ArmClipError {
+    /// Other joints than the model's.
+    #[error(transparent)]
+    Joints(#[from] ReadError),
+    /// Nothing was logged.
+    #[error("it holds no {0}; record it again")]
+    Empty(&'static str),
+    /// The log is too slow.
+    #[error("it is logged at {0:.0} Hz; below 30 Hz a log does not show how a joint follows: record at 100 Hz or more")]
+    Slow(f64),
+    /// Too little is left.
+    #[error("only {0:.2} s of it can be simulated; at least {SHORTEST} s are needed")]
+    Short(f64),
+    /// No joint moves.
+    #[error("no joint moves though commands ask for it; look whether the arm was enabled")]
+    Dead,
+}
+
+/// A prepared clip.
+#[derive(Debug, Clone)]
+pub(super) struct ArmClip {
+    pub(super) recorded: Clip,
+    pub(super) commands: CommandTrack,
+    /// Measured rows that are simulated in one go, each stretch from its own start.
+    pub(super) runs: Vec<Range<usize>>,
+    /// Measured rows that are averaged, ascending.
+    pub(super) bins: Vec<Range<usize>>,
+    /// Joints that do not follow.
+    pub(super) dead: [bool; MAX_JOINTS],
+    /// Row of the desired series at each measured row, where one was logged at that time.
+    pub(super) desired_rows: Vec<Option<usize>>,
+    /// What a reader has to know, one sentence each.
+    pub(super) warnings: Vec<String>,
+    /// Bins of a witness.
+    pub(super) stretch: usize,
+}
+
+impl ArmClip {
+    pub(super) fn new(recorded: Clip, cell: &Cell, arm: &ArmModel) -> Result<Self, ArmClipError> {
+        let mut recorded = in_model_order(recorded, arm)?;
+        if recorded.measured.len() < 2 {
+            return Err(ArmClipError::Empty("measured joints"));
+        }
+        if recorded.desired.is_empty() {
+            return Err(ArmClipError::Empty("commands"));
+        }
+        let step_ns = usual_step(&recorded.measured.stamps_ns);
+        let rate = 1e9 / step_ns as f64;
+        if rate < SLOWEST {
+            return Err(ArmClipError::Slow(rate));
+        }
+        let dead = dead_joints(&recorded);
+        if dead.iter().take(arm.dof()).all(|dead| *dead) {
+            return Err(ArmClipError::Dead);
+        }
+        hold_dead(&mut recorded, &dead);
+        let commands = CommandTrack::new(&recorded.desired).ok_or(ArmClipError::Empty("commands"))?;
+        let mut warnings = warnings(&recorded, &commands, &dead);
+        let runs = runs(&recorded, &commands, contact_ns(&recorded, cell));
+        let bins = bins(&recorded.measured.stamps_ns, &runs, step_ns);
+        let left = bins.iter().map(Range::len).sum::<usize>() as f64 / rate;
+        if left < SHORTEST {
+            return Err(ArmClipError::Short(left));
+        }
+        let lost = recorded.measured.duration() - left;
+        if lost > 0.1 * recorded.measured.duration() && recorded.kind == ClipKind::Excitation {
+            warnings.push(format!("{lost:.2} s of it cannot be simulated and were left out"));
+        }
+        let stretches = (left / STRETCH).round().max(1.0) as usize;
+        let desired_rows = desired_rows(&recorded, step_ns);
+        let stretch = bins.len().div_ceil(stretches);
+        Ok(Self { recorded, commands, runs, bins, dead, desired_rows, warnings, stretch })
+    }
+
+    /// The last row that is simulated in one go with this one.
+    pub(super) fn last_row(&self, row: usize) -> usize {
+        self.runs.iter().find(|run| run.contains(&row)).map_or(row, |run| run.end - 1)
+    }
+
+    pub(super) fn name(&self) -> String {
+        let file = &self.recorded.file;
+        file.file_name().unwrap_or(file.as_os_str()).to_string_lossy().into_owned()
+    }
+}
+
+/// Median distance of the stamps [ns].
+pub(super) fn usual_step(stamps_ns: &[u64]) -> u64 {
+    let mut steps: Vec<u64> = stamps_ns.windows(2).map(|w| w[1] - w[0]).collect();
+    steps.sort_unstable();
+    steps.get(steps.len() / 2).copied().unwrap_or(1).max(1)
+}
+
+/// Distance between the lowest and highest value of a joint.
+fn travel(series: &JointSeries, joint: usize) -> f64 {
+    let values = series.q.iter().skip(joint).step_by(series.dof.max(1));
+    let (lo, hi) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(lo, hi), q| (lo.min(*q), hi.max(*q)));
+    (hi - lo).max(0.0)
+}
+
+fn dead_joints(clip: &Clip) -> [bool; MAX_JOINTS] {
+    std::array::from_fn(|joint| {
+        let commanded = travel(&clip.desired, joint);
+        joint < clip.measured.dof && commanded > COMMANDED && travel(&clip.measured, joint) < DEAD * commanded
+    })
+}
+
+/// A dead joint is told to stay where it is, so that the others feel it as it was.
+fn hold_dead(clip: &mut Clip, dead: &[bool; MAX_JOINTS]) {
+    let dof = clip.desired.dof;
+    for joint in (0..dof).filter(|joint| dead[*joint]) {
+        let stays = clip.measured.q_row(0)[joint];
+        clip.desired.q.iter_mut().skip(joint).step_by(dof).for_each(|q| *q = stays);
+        clip.desired.dq.iter_mut().skip(joint).step_by(dof).for_each(|dq| *dq = 0.0);
+    }
+}
+
+fn warnings(clip: &Clip, commands: &CommandTrack, dead: &[bool; MAX_JOINTS]) -> Vec<String> {
+    let mut warnings = clip.warnings.clone();
+    warnings.extend(clip.damage.clone());
+    let first = clip.measured.stamps_ns[0];
+    for hole in commands.holes() {
+        let (at, long) = (seconds_between(first, hole.from_ns), seconds_between(hole.from_ns, hole.to_ns));
+        warnings.push(format!("no commands for {long:.3} s from {at:.3} s on: left out, and started anew behind it"));
+    }
+    for joint in (0..clip.measured.dof).filter(|joint| dead[*joint]) {
+        let name = clip.joint_names.get(joint).map_or("", String::as_str);
+        warnings.push(format!("joint {} `{name}` does not move though it is commanded: it is not fitted", joint + 1));
+    }
+    warnings
+}
+
+/// When the tool may first touch the object; never, in a clip without.
+fn contact_ns(clip: &Clip, cell: &Cell) -> u64 {
+    let poses = &clip.object.poses;
+    let (ClipKind::ControlHitSlide, Some(first)) = (clip.kind, poses.first()) else { return u64::MAX };
+    let noise = cell.object.as_ref().and_then(|object| object.pose_noise);
+    let sigma = noise.map_or(POSE_NOISE, |PoseNoise { position, .. }| position);
+    let away = |i: &usize| {
+        let (a, b) = (poses[*i].position(), first.position());
+        // The first pose is as noisy as the others.
+        a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt() > MOVED_SIGMAS * sigma * 6.0_f64.sqrt()
+    };
+    let moved = (0..poses.len()).find(away);
+    moved.map_or(u64::MAX, |i| clip.object.stamps_ns[i].saturating_sub(BEFORE_MOTION_NS))
+}
+
+/// From the first row with a command on to the last; behind every hole anew.
+fn runs(clip: &Clip, commands: &CommandTrack, until_ns: u64) -> Vec<Range<usize>> {
+    let (rows, desired) = (&clip.measured.stamps_ns, &clip.desired.stamps_ns);
+    let (Some(first), Some(last)) = (desired.first(), desired.last()) else { return Vec::new() };
+    // The last command holds as long as commands usually do.
+    let last = (last + usual_step(desired)).min(until_ns);
+    let mut from_ns = *first;
+    let mut runs = Vec::new();
+    let mut push = |from_ns: u64, to_ns: u64| {
+        let range = rows.partition_point(|stamp| *stamp < from_ns)..rows.partition_point(|stamp| *stamp <= to_ns);
+        if range.len() > 1 {
+            runs.push(range);
+        }
+    };
+    for hole in commands.holes() {
+        push(from_ns, hole.from_ns.min(last));
+        from_ns = hole.to_ns;
+    }
+    push(from_ns, last);
+    runs
+}
+
+fn bins(stamps_ns: &[u64], runs: &[Range<usize>], step_ns: u64) -> Vec<Range<usize>> {
+    let rows = ((AVERAGED_NS + step_ns / 2) / step_ns).max(1) as usize;
+    let mut bins = Vec::new();
+    for run in runs {
+        let mut from = run.start;
+        while from < run.end {
+            let together = |row: &usize| stamps_ns[*row] - stamps_ns[from] < AVERAGED_NS;
+            let to = (from + 1..run.end.min(from + rows)).take_while(together).last().unwrap_or(from) + 1;
+            bins.push(from..to);
+            from = to;
+        }
+    }
+    bins
+}
+
+fn desired_rows(clip: &Clip, step_ns: u64) -> Vec<Option<usize>> {
+    let desired = &clip.desired.stamps_ns;
+    let row_at = |stamp: &u64| {
+        let after = desired.partition_point(|other| other < stamp);
+        let near = [after.checked_sub(1), Some(after)].into_iter().flatten().filter(|row| *row < desired.len());
+        near.min_by_key(|row| desired[*row].abs_diff(*stamp))
+            .filter(|row| desired[*row].abs_diff(*stamp) * 2 <= step_ns)
+    };
+    clip.measured.stamps_ns.iter().map(row_at).collect()
+}

@@ -1,0 +1,49 @@
+//! How noisy a logged signal is, from the signal itself.
+
+/// Third differences of white noise of one sigma have this variance: 1 + 9 + 9 + 1.
+const THIRD_DIFFERENCE: f64 = 20.0;
+/// Median of the absolute value of a normal variable, in sigmas.
+const MEDIAN_ABSOLUTE: f64 = 0.674_49;
+
+/// One sigma of the noise of an evenly sampled signal. Third differences take out the motion; their median takes out
+/// events. Never less than what its resolution leaves unknown.
+pub(super) fn sigma(signal: &[f64]) -> f64 {
+    let mut thirds: Vec<f64> =
+        signal.windows(4).map(|w| (w[3] - 3.0 * w[2] + 3.0 * w[1] - w[0]).abs()).filter(|d| d.is_finite()).collect();
+    if thirds.is_empty() {
+        return 0.0;
+    }
+    let middle = thirds.len() / 2;
+    let (_, median, _) = thirds.select_nth_unstable_by(middle, f64::total_cmp);
+    let white = *median / MEDIAN_ABSOLUTE / THIRD_DIFFERENCE.sqrt();
+    white.max(resolution(signal) / 12.0_f64.sqrt())
+}
+
+/// Smallest step between neighbouring samples; 0 where nothing ever changes.
+fn resolution(signal: &[f64]) -> f64 {
+    let steps = signal.windows(2).map(|w| (w[1] - w[0]).abs()).filter(|step| *step > 0.0);
+    let smallest = steps.fold(f64::INFINITY, f64::min);
+    if smallest.is_finite() { smallest } else { 0.0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::{RngExt as _, SeedableRng as _};
+    use rand_distr::StandardNormal;
+
+    #[test]
+    fn noise_on_a_fast_motion_is_told_from_the_motion() {
+        let mut random = rand_pcg::Pcg64::seed_from_u64(1);
+        let motion = |i: usize| 0.3 * (i as f64 * 1e-3 * 6.0).sin();
+        let mut noise = || 4e-6 * random.sample::<f64, _>(StandardNormal);
+        let signal: Vec<f64> = (0..4000).map(|i| motion(i) + noise()).collect();
+        assert!((sigma(&signal) / 4e-6 - 1.0).abs() < 0.1, "{}", sigma(&signal));
+    }
+
+    #[test]
+    fn a_coarse_encoder_is_no_better_than_its_steps() {
+        let signal: Vec<f64> = (0..1000).map(|i| (i as f64 * 1e-4 / 1.5e-3).round() * 1.5e-3).collect();
+        assert!((sigma(&signal) - 1.5e-3 / 12.0_f64.sqrt()).abs() < 1e-6, "{}", sigma(&signal));
+    }
+}
