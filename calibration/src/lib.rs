@@ -10,7 +10,9 @@
 //! | [`diagnose`] | where the gap lies, what causes it, how far it shrinks |
 //! | [`estimate`] | fits over clips: what all clips share, what varies from clip to clip |
 //! | [`forward`] | what the twin makes of recorded clips, as residuals |
-//! | [`report`] | pages with plots |
+//! | [`identify`] | the parameters of arm and object, with intervals |
+//! | [`numbers`] | estimated numbers as answers write them |
+//! | [`report`] | pages with pictures |
 //! | [`processes`] | the other programs as children |
 //! | [`interrupt`] | Ctrl-C |
 //! | [`progress`] | the bar on stderr |
@@ -21,7 +23,9 @@ pub mod demo;
 pub mod diagnose;
 pub mod estimate;
 pub mod forward;
+pub mod identify;
 pub mod interrupt;
+pub mod numbers;
 pub mod processes;
 pub mod progress;
 pub mod report;

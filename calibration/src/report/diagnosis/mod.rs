@@ -84,8 +84,11 @@ fn map(diagnosis: &Diagnosis) -> Markup {
 
 fn residuals(diagnosis: &Diagnosis) -> Markup {
     let names: Vec<String> = diagnosis.verdict.effects.iter().map(|effect| words(effect)).collect();
-    let added =
-        format!("with {}", if names.is_empty() { "the best candidate".to_owned() } else { names.join(" and ") });
+    let added = match diagnosis.verdict.kind {
+        _ if names.is_empty() => "with the best candidate".to_owned(),
+        Kind::Class => format!("with {}", names.join(" or ")),
+        _ => format!("with {}", names.join(" and ")),
+    };
     let pictures = gallery(&diagnosis.traces, SHOWN_CLIPS, ["parameters identified first", &added]);
     figure("Clips never used: measured less predicted", "The worst channel of the worst clips.", &pictures)
 }
@@ -124,13 +127,20 @@ fn clip_list(clips: &[String]) -> String {
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
-    use crate::diagnose::{Candidate, Change, Clips, Gap, Place, Share, Size, Status, Verdict};
+    use crate::diagnose::{Candidate, Change, Clips, Gap, Place, Share, Status, Verdict};
+    use crate::numbers::{Level, Numbers, Per};
     use crate::report::Trace;
     use shared_mem::theta::Theta;
     use std::collections::BTreeMap;
 
     fn candidate(effect: &str, probability: f64, status: Status) -> Candidate {
-        let delay = Size { values: vec![0.0119], ci90: vec![[0.0112, 0.0126]], unit: "s".into() };
+        let delay = Numbers {
+            values: vec![0.0119],
+            intervals: vec![[0.0112, 0.0126]],
+            level: Level::Ci90,
+            unit: "s".into(),
+            per: Per::Cell,
+        };
         Candidate {
             effect: effect.into(),
             probability,
