@@ -10,9 +10,7 @@
 //! | [`diagnose`] | where the gap lies, what causes it, how far it shrinks |
 //! | [`estimate`] | fits over clips: what all clips share, what varies from clip to clip |
 //! | [`forward`] | what the twin makes of recorded clips, as residuals |
-//! | [`identify`] | the parameters of arm and object, with intervals |
-//! | [`numbers`] | estimated numbers as answers write them |
-//! | [`report`] | pages with pictures |
+//! | [`report`] | pages with plots |
 //! | [`processes`] | the other programs as children |
 //! | [`interrupt`] | Ctrl-C |
 //! | [`progress`] | the bar on stderr |
@@ -23,9 +21,7 @@ pub mod demo;
 pub mod diagnose;
 pub mod estimate;
 pub mod forward;
-pub mod identify;
 pub mod interrupt;
-pub mod numbers;
 pub mod processes;
 pub mod progress;
 pub mod report;

@@ -1,14 +1,13 @@
 //! The answer of a diagnosis, as it is written to diagnosis.json and shown on the page.
 
-use crate::numbers::Numbers;
 use crate::report::Trace;
-use serde::Serialize;
+use serde::ser::{Serialize, SerializeStruct, Serializer};
 use shared_mem::theta::Theta;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 /// What was found about a session.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct Diagnosis {
     /// The finding.
     pub verdict: Verdict,
@@ -39,7 +38,7 @@ pub struct Diagnosis {
 }
 
 /// The finding.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct Verdict {
     /// Which of the five it is.
     pub kind: Kind,
@@ -52,7 +51,7 @@ pub struct Verdict {
 }
 
 /// The five verdicts.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Kind {
     /// No gap beyond the noise.
@@ -68,7 +67,7 @@ pub enum Kind {
 }
 
 /// The gap on the confirm clips.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct Gap {
     /// `sigma`: [`Self::before`], [`Self::after`] and [`Self::floor`] are mean squares of residuals in units of their noise.
     pub unit: &'static str,
@@ -91,7 +90,7 @@ pub struct Gap {
 }
 
 /// A share with its 90 % interval.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct Share {
     /// The share.
     pub value: f64,
@@ -100,7 +99,7 @@ pub struct Share {
 }
 
 /// A quantity before and after; none where it was not measured.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, serde::Serialize)]
 pub struct Change {
     /// Without the effects.
     pub before: Option<f64>,
@@ -109,7 +108,7 @@ pub struct Change {
 }
 
 /// A cell of the map of where the gap lies.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct Place {
     /// `control`, `hit`, `slide`, `rest` or `camera`.
     pub stage: String,
@@ -122,14 +121,14 @@ pub struct Place {
 }
 
 /// What became of one effect.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct Candidate {
     /// Name of the registry.
     pub effect: String,
     /// Calibrated probability that it acts.
     pub probability: f64,
-    /// Its parameters, by name, with 90 % intervals; empty where it was not fitted.
-    pub parameters: BTreeMap<String, Numbers>,
+    /// Its parameters, by name; empty where it was not fitted.
+    pub parameters: BTreeMap<String, Size>,
     /// Share of the gap that it closes alone.
     pub shrink: Share,
     /// Effects that these clips cannot tell from it.
@@ -141,7 +140,7 @@ pub struct Candidate {
 }
 
 /// What became of a candidate.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Status {
     /// It acts.
@@ -154,8 +153,35 @@ pub enum Status {
     NotTestable,
 }
 
+/// A parameter of one or several numbers, in SI.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Size {
+    /// The numbers.
+    pub values: Vec<f64>,
+    /// A 90 % interval each.
+    pub ci90: Vec<[f64; 2]>,
+    /// SI unit; `1` without.
+    pub unit: String,
+}
+
+impl Serialize for Size {
+    /// `{"value", "ci90", "unit"}`: a single number stands by itself, several as lists.
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let mut out = serializer.serialize_struct("Size", 3)?;
+        if let ([value], [interval]) = (&self.values[..], &self.ci90[..]) {
+            out.serialize_field("value", value)?;
+            out.serialize_field("ci90", interval)?;
+        } else {
+            out.serialize_field("value", &self.values)?;
+            out.serialize_field("ci90", &self.ci90)?;
+        }
+        out.serialize_field("unit", &self.unit)?;
+        out.end()
+    }
+}
+
 /// Files of the clips by use.
-#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+#[derive(Debug, Clone, Default, PartialEq, serde::Serialize)]
 pub struct Clips {
     /// Fitted.
     pub train: Vec<String>,
@@ -168,6 +194,15 @@ pub struct Clips {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn one_number_stands_by_itself_and_several_as_lists() {
+        let text = |size: &Size| serde_json::to_string(size).expect("JSON");
+        let delay = Size { values: vec![0.012], ci90: vec![[0.011, 0.013]], unit: "s".into() };
+        assert_eq!(text(&delay), r#"{"value":0.012,"ci90":[0.011,0.013],"unit":"s"}"#);
+        let offset = Size { values: vec![1.0, 2.0], ci90: vec![[0.0, 2.0], [1.0, 3.0]], unit: "m".into() };
+        assert_eq!(text(&offset), r#"{"value":[1.0,2.0],"ci90":[[0.0,2.0],[1.0,3.0]],"unit":"m"}"#);
+    }
 
     #[test]
     fn verdicts_are_written_as_others_read_them() {

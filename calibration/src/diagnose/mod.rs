@@ -2,4 +2,4 @@
 
 pub mod answer;
 
-pub use answer::{Candidate, Change, Clips, Diagnosis, Gap, Kind, Place, Share, Status, Verdict};
+pub use answer::{Candidate, Change, Clips, Diagnosis, Gap, Kind, Place, Share, Size, Status, Verdict};

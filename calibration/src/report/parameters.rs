@@ -1,46 +1,73 @@
-//! Estimated numbers in a line of words, and as rows of a picture.
+//! Parameters with their intervals in words and as a picture: one number, or one a joint or axis.
 
 use super::figure::forest::{Group, Row};
-use super::quantity::{Unit, short};
-use super::scale::span;
-use crate::numbers::{Numbers, Per};
+use super::quantity::Unit;
+
+/// A parameter of one or several numbers.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub(super) struct Numbers<'a> {
+    /// Name in files: `stiffness`, `centre_of_mass`, `delay`.
+    pub(super) name: &'a str,
+    /// SI unit.
+    pub(super) unit: &'a str,
+    /// The numbers.
+    pub(super) values: &'a [f64],
+    /// An interval each.
+    pub(super) intervals: &'a [[f64; 2]],
+}
 
 /// Most numbers that a line names one by one.
 const MOST: usize = 3;
 
-/// The unit in which all the numbers are told.
-pub(super) fn unit(numbers: &Numbers) -> Unit {
-    let [lo, hi] = span(numbers.values.iter().copied());
-    Unit::suited(&numbers.unit, lo.abs().max(hi.abs()))
-}
-
-/// A parameter in a line: `delay 11.9 [11.2, 12.6] ms`, `coulomb 0.28 to 1.10 N m over 7 joints`.
-pub(super) fn line(name: &str, numbers: &Numbers) -> String {
-    let (name, unit) = (name.replace('_', " "), unit(numbers));
-    if numbers.values.len() <= MOST {
-        let each: Vec<String> = numbers.pairs().map(|(value, interval)| unit.interval(value, interval)).collect();
-        return format!("{name} {}", each.join(", "));
+impl Numbers<'_> {
+    /// The parameter in a line: `delay 11.9 [11.2, 12.6] ms`, `coulomb 0.28 to 1.10 N m over 7 joints`.
+    pub(super) fn line(&self) -> String {
+        let name = self.name.replace('_', " ");
+        let unit = self.shown();
+        if self.values.len() <= MOST {
+            let numbers: Vec<String> = self.pairs().map(|(value, interval)| unit.interval(value, interval)).collect();
+            return format!("{name} {}", numbers.join(", "));
+        }
+        let [lo, hi] = super::scale::span(self.values.iter().copied());
+        let many = self.values.len();
+        format!("{name} {} to {} over {many} joints", super::quantity::short(unit.scaled(lo)), unit.with_unit(hi))
     }
-    let [lo, hi] = span(numbers.values.iter().copied());
-    let per = if numbers.per == Per::Joint { "joints" } else { "numbers" };
-    format!("{name} {} to {} over {} {per}", short(unit.scaled(lo)), unit.with_unit(hi), numbers.values.len())
+
+    /// The parameter as rows of a picture; `nominal`: what was believed of each number.
+    pub(super) fn group<'a>(
+        &'a self,
+        heading: &'a str,
+        nominal: &[f64],
+        warning: impl Fn(usize) -> Option<String>,
+    ) -> Group<'a> {
+        let row = |(k, (value, interval)): (usize, (f64, [f64; 2]))| Row {
+            name: part(self.values.len(), k),
+            value,
+            interval,
+            nominal: nominal.get(k).copied(),
+            warning: warning(k),
+        };
+        Group { name: heading, unit: self.unit, rows: self.pairs().enumerate().map(row).collect() }
+    }
+
+    fn pairs(&self) -> impl Iterator<Item = (f64, [f64; 2])> {
+        let intervals = self.intervals.iter().copied().chain(std::iter::repeat([f64::NAN; 2]));
+        self.values.iter().copied().zip(intervals)
+    }
+
+    fn shown(&self) -> Unit {
+        let [lo, hi] = super::scale::span(self.values.iter().copied());
+        Unit::suited(self.unit, lo.abs().max(hi.abs()))
+    }
 }
 
-/// A parameter as rows of a picture; `nominal`: what was believed of each number; `warning`: a remark on each.
-pub(super) fn group<'a>(
-    heading: &'a str,
-    numbers: &'a Numbers,
-    nominal: &[f64],
-    warning: impl Fn(usize) -> Option<String>,
-) -> Group<'a> {
-    let row = |(k, (value, interval)): (usize, (f64, [f64; 2]))| Row {
-        name: numbers.part(k),
-        value,
-        interval,
-        nominal: nominal.get(k).copied(),
-        warning: warning(k),
-    };
-    Group { name: heading, unit: &numbers.unit, rows: numbers.pairs().enumerate().map(row).collect() }
+/// What the `k`-th of `count` numbers belongs to; empty for the only one.
+pub(super) fn part(count: usize, k: usize) -> String {
+    match count {
+        1 => String::new(),
+        2 | 3 => ["x", "y", "z"].get(k).map_or_else(String::new, |axis| (*axis).to_owned()),
+        _ => format!("joint {}", k + 1),
+    }
 }
 
 #[cfg(test)]
@@ -49,19 +76,14 @@ mod tests {
 
     #[test]
     fn few_numbers_are_named_and_many_are_spanned() {
-        let numbers = |values: &[f64], unit: &str, per| Numbers {
-            values: values.to_vec(),
-            intervals: vec![],
-            unit: unit.into(),
-            per,
-            ..Numbers::default()
-        };
-        let delay = Numbers { intervals: vec![[0.0112, 0.0126]], ..numbers(&[0.0119], "s", Per::Cell) };
-        assert_eq!(line("delay", &delay), "delay 11.9 [11.2, 12.6] ms");
-        let stiffness = numbers(&[600.0, 597.0, 500.0, 668.9], "N m/rad", Per::Joint);
-        assert_eq!(line("stiffness", &stiffness), "stiffness 500 to 669 N m/rad over 4 joints");
-        assert_eq!(group("stiffness", &stiffness, &[600.0], |_| None).rows[3].name, "joint 4");
-        let centre = numbers(&[0.001, -0.002], "m", Per::Axis);
-        assert_eq!(line("centre_of_mass", &centre), "centre of mass 1.00 mm, -2.00 mm");
+        let delay = Numbers { name: "delay", unit: "s", values: &[0.0119], intervals: &[[0.0112, 0.0126]] };
+        assert_eq!(delay.line(), "delay 11.9 [11.2, 12.6] ms");
+        let gains = [600.0, 597.0, 500.0, 668.9];
+        let stiffness = Numbers { name: "stiffness", unit: "N m/rad", values: &gains, intervals: &[] };
+        assert_eq!(stiffness.line(), "stiffness 500 to 669 N m/rad over 4 joints");
+        assert_eq!(stiffness.group("stiffness", &[600.0], |_| None).rows[3].name, "joint 4");
+        let centre = Numbers { name: "centre_of_mass", unit: "m", values: &[0.001, -0.002], intervals: &[] };
+        assert_eq!(centre.line(), "centre of mass 1.00 mm, -2.00 mm");
+        assert_eq!(centre.group("centre of mass", &[0.0; 2], |_| None).rows[1].name, "y");
     }
 }

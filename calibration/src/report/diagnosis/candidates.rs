@@ -1,11 +1,10 @@
 //! The candidates: those in question as a table, those ruled out folded away, those that could not have been seen by name.
 
 use super::words;
-use crate::diagnose::{Candidate, Status};
-use crate::numbers::Numbers;
+use crate::diagnose::{Candidate, Size, Status};
 use crate::report::canvas::Canvas;
 use crate::report::figure::forest::{Group, forest};
-use crate::report::parameters::{group, line};
+use crate::report::parameters::Numbers;
 use crate::report::share::{percent_interval, probability};
 use maud::{Markup, html};
 
@@ -53,9 +52,14 @@ fn table(candidates: &[&Candidate]) -> Markup {
 
 /// The numbers of a named effect one by one, where they are many.
 fn joints(candidate: &Candidate) -> Markup {
-    let many = candidate.parameters.iter().filter(|(_, numbers)| numbers.values.len() > 1);
-    let named: Vec<(String, &Numbers)> = many.map(|(name, numbers)| (name.replace('_', " "), numbers)).collect();
-    let groups: Vec<Group> = named.iter().map(|(heading, numbers)| group(heading, numbers, &[], |_| None)).collect();
+    let many = candidate.parameters.iter().filter(|(_, size)| size.values.len() > 1);
+    let named: Vec<(String, Numbers)> = many
+        .map(|(name, size)| {
+            let numbers = Numbers { name, unit: &size.unit, values: &size.values, intervals: &size.ci90 };
+            (name.replace('_', " "), numbers)
+        })
+        .collect();
+    let groups: Vec<Group> = named.iter().map(|(heading, numbers)| numbers.group(heading, &[], |_| None)).collect();
     html! {
         @if !groups.is_empty() {
             figure { figcaption { "Size of " (words(&candidate.effect)) } (forest(&groups)) }
@@ -65,7 +69,10 @@ fn joints(candidate: &Candidate) -> Markup {
 
 /// The parameters of a candidate, one a line.
 pub(in crate::report) fn sizes(candidate: &Candidate) -> Vec<String> {
-    candidate.parameters.iter().map(|(name, numbers)| line(name, numbers)).collect()
+    let line = |(name, size): (&String, &Size)| {
+        Numbers { name, unit: &size.unit, values: &size.values, intervals: &size.ci90 }.line()
+    };
+    candidate.parameters.iter().map(line).collect()
 }
 
 fn mark(status: Status) -> Markup {

@@ -127,20 +127,13 @@ fn clip_list(clips: &[String]) -> String {
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
-    use crate::diagnose::{Candidate, Change, Clips, Gap, Place, Share, Status, Verdict};
-    use crate::numbers::{Level, Numbers, Per};
+    use crate::diagnose::{Candidate, Change, Clips, Gap, Place, Share, Size, Status, Verdict};
     use crate::report::Trace;
     use shared_mem::theta::Theta;
     use std::collections::BTreeMap;
 
     fn candidate(effect: &str, probability: f64, status: Status) -> Candidate {
-        let delay = Numbers {
-            values: vec![0.0119],
-            intervals: vec![[0.0112, 0.0126]],
-            level: Level::Ci90,
-            unit: "s".into(),
-            per: Per::Cell,
-        };
+        let delay = Size { values: vec![0.0119], ci90: vec![[0.0112, 0.0126]], unit: "s".into() };
         Candidate {
             effect: effect.into(),
             probability,
