@@ -4,8 +4,9 @@
 //! Motor `B db = drive - f - s`, links `M a = s + external - bias`, with `f` the dry friction at the motor and `s` the
 //! torque behind the gear. A rigid gear moves motor and link as one. A gear that yields is a spring over the twist
 //! `motor - link`; its force is taken implicitly, so no stiffness is too high for the step. Dry friction is a bound:
-//! whatever up to it brings the motor to rest or keeps it there, the bound itself against the motion otherwise. Which of
-//! the two holds in which joint is found by least-index pivoting (Murty 1974), which ends because `M` is positive
+//! whatever up to it brings the motor to rest or keeps it there, the bound itself against the motion otherwise. A joint that
+//! creeps under it does not rest: below its creep speed the friction is in proportion to the speed, taken implicitly. Which
+//! of the two holds in which joint is found by least-index pivoting (Murty 1974), which ends because `M` is positive
 //! definite. Explicit midpoint rule around it, as in [`super::step`].
 
 use super::kernel::{Chain, factor, filled, first, solve, with_dof};
@@ -30,6 +31,9 @@ pub trait Transmission {
     /// Largest dry friction of a joint [N m] at a motor speed [rad/s] and motor torque [N m].
     fn dry_friction(&self, joint: usize, speed: f64, motor_torque: f64) -> f64;
 
+    /// Motor speed up to which dry friction is in proportion to the speed [rad/s]; 0 where a joint sticks exactly.
+    fn creep(&self, joint: usize) -> f64;
+
     /// Torque that a motor loses otherwise [N m], at its position [rad] and velocity [rad/s].
     fn drag(&self, joint: usize, q: f64, dq: f64) -> f64;
 }
@@ -44,6 +48,7 @@ const LEAST_INERTIA: f64 = 1e-6;
 enum Dry {
     /// It moves, or would, with this sign; 0 without friction.
     Slips(f64),
+    /// It rests, or creeps.
     Sticks,
 }
 
@@ -66,6 +71,7 @@ struct Side {
     rotor: f64,
     drive: f64,
     dry: f64,
+    creep: f64,
     spring: Option<Spring>,
 }
 
@@ -112,7 +118,7 @@ impl ArmModel {
             let answer = self.stage(&middle(link, &half.link), &sides, external, dt).answer(&mut modes);
             let modes = modes.expect("an answer leaves its pattern");
             for (i, (dry, gear)) in modes.into_iter().enumerate() {
-                let sticks = dry == Dry::Sticks;
+                let sticks = dry == Dry::Sticks && transmission.creep(i) <= 0.0;
                 advance(link, i, answer.link[i], sticks && gear == Gear::Rigid, dt);
                 match gear {
                     Gear::Rigid => (motor.q[i], motor.dq[i]) = (link.q[i], link.dq[i]),
@@ -137,6 +143,7 @@ impl ArmModel {
             rotor: self.links[i].rotor,
             drive: tau[i] - transmission.drag(i, at.q[i], at.dq[i]),
             dry: transmission.dry_friction(i, at.dq[i].abs(), tau[i]),
+            creep: transmission.creep(i),
             // Without a rotor nothing could turn on the motor's side of a spring.
             spring: transmission.spring(i).filter(|_| self.links[i].rotor > 0.0),
         })
@@ -191,7 +198,8 @@ impl<const N: usize> Stage<'_, N> {
         let mut mass = self.mass;
         let mut force = self.force;
         let locked: [Option<f64>; N] = std::array::from_fn(|i| {
-            (modes[i] == (Dry::Sticks, Gear::Rigid)).then_some(-self.sides[i].link_speed / self.dt)
+            let side = &self.sides[i];
+            (modes[i] == (Dry::Sticks, Gear::Rigid) && side.creep <= 0.0).then_some(-side.link_speed / self.dt)
         });
         for i in 0..N {
             let (inertia, torque) = self.sides[i].seen_by_link(modes[i], self.dt);
@@ -217,8 +225,8 @@ impl<const N: usize> Stage<'_, N> {
         for i in 0..N {
             let side = &self.sides[i];
             (answer.motor[i], answer.gear[i]) = match modes[i].1 {
-                // The diagonal holds the rotor, which lies before the gear.
-                Gear::Rigid => (link[i], passed(i) - side.rotor * link[i]),
+                // The diagonal holds the rotor and what creep adds to it, which lie before the gear.
+                Gear::Rigid => (link[i], passed(i) - (side.rotor + side.seen_by_link(modes[i], self.dt).0) * link[i]),
                 _ => side.motor_and_gear(modes[i], link[i], self.dt),
             };
         }
@@ -230,7 +238,7 @@ impl Side {
     /// What will hold unless the step turns it around.
     fn likely(self) -> (Dry, Gear) {
         let dry = match self.dry > 0.0 {
-            true if self.motor_speed == 0.0 => Dry::Sticks,
+            true if self.motor_speed.abs() <= self.creep => Dry::Sticks,
             true => Dry::Slips(self.motor_speed.signum()),
             false => Dry::Slips(0.0),
         };
@@ -254,30 +262,41 @@ impl Side {
         (spring.stiffness * twist + spring.damping * rate, g)
     }
 
-    /// Inertia and torque that the link feels from motor and gear.
+    /// The motor by itself: its inertia and torque, with the friction in them; `None` where it is held at rest.
+    fn motor(&self, dry: Dry, dt: f64) -> Option<(f64, f64)> {
+        match dry {
+            Dry::Slips(sign) => Some((self.rotor, self.drive - sign * self.dry)),
+            Dry::Sticks if self.creep > 0.0 => {
+                let viscosity = self.dry / self.creep;
+                Some((self.rotor + viscosity * dt, self.drive - viscosity * self.motor_speed))
+            }
+            Dry::Sticks => None,
+        }
+    }
+
+    /// Inertia (beyond the rotor, where the gear is rigid) and torque that the link feels from motor and gear.
     fn seen_by_link(&self, (dry, gear): (Dry, Gear), dt: f64) -> (f64, f64) {
         let (s0, g) = self.spring_law(gear, dt);
-        match (dry, gear) {
-            (Dry::Slips(sign), Gear::Rigid) => (0.0, self.drive - sign * self.dry),
-            (Dry::Sticks, Gear::Rigid) => (0.0, 0.0),
-            (Dry::Slips(sign), _) => {
-                let share = self.rotor / (self.rotor + g);
-                (g * share, s0 * share + (self.drive - sign * self.dry) * (1.0 - share))
+        match (self.motor(dry, dt), gear) {
+            (Some((inertia, torque)), Gear::Rigid) => (inertia - self.rotor, torque),
+            (None, Gear::Rigid) => (0.0, 0.0),
+            (Some((inertia, torque)), _) => {
+                let share = inertia / (inertia + g);
+                (g * share, s0 * share + torque * (1.0 - share))
             }
-            (Dry::Sticks, _) => (g, s0 - g * self.motor_speed / dt),
+            (None, _) => (g, s0 - g * self.motor_speed / dt),
         }
     }
 
     /// Motor acceleration and spring torque that go with a link acceleration.
     fn motor_and_gear(&self, (dry, gear): (Dry, Gear), link: f64, dt: f64) -> (f64, f64) {
         let (s0, g) = self.spring_law(gear, dt);
-        match dry {
-            Dry::Slips(sign) => {
-                let drive = self.drive - sign * self.dry;
-                let torque = (self.rotor * s0 + g * (drive - self.rotor * link)) / (self.rotor + g);
-                ((drive - torque) / self.rotor, torque)
+        match self.motor(dry, dt) {
+            Some((inertia, drive)) => {
+                let torque = (inertia * s0 + g * (drive - inertia * link)) / (inertia + g);
+                ((drive - torque) / inertia, torque)
             }
-            Dry::Sticks => {
+            None => {
                 let motor = -self.motor_speed / dt;
                 (motor, s0 + g * (motor - link))
             }
@@ -287,7 +306,7 @@ impl Side {
     /// The mode that the answer demands; the same one where it contradicts nothing.
     fn corrected(&self, (dry, gear): (Dry, Gear), link: f64, motor: f64, torque: f64, dt: f64) -> (Dry, Gear) {
         let dry = match dry {
-            Dry::Slips(sign) if sign * (self.motor_speed + dt * motor) < 0.0 => Dry::Sticks,
+            Dry::Slips(sign) if sign != 0.0 && sign * (self.motor_speed + dt * motor) < self.creep => Dry::Sticks,
             Dry::Sticks => {
                 let needed = self.drive - torque - self.rotor * motor;
                 if needed.abs() > self.dry { Dry::Slips(needed.signum()) } else { dry }

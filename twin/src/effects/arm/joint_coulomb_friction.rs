@@ -1,8 +1,10 @@
 //! Dry friction of a joint, the same at all speeds.
 //!
-//! - Equation: `tau_f = coulomb sgn(dq)` in motion; at rest whatever up to `coulomb` keeps the joint at rest.
+//! - Equation: `tau_f = coulomb sgn(dq)` in motion; at rest whatever up to `coulomb` keeps the joint at rest. With
+//!   `creep` above 0: `tau_f = coulomb dq / creep` up to that speed, and no rest under a load.
 //! - Source: Armstrong-Helouvry, Dupont, Canudas de Wit 1994, section 2.1; sizes: Gaz et al. 2019 on the Panda.
-//! - Unit: N m at the joint, before the torque sensor. Plausible: 0 to 3 (Panda 0.15 to 1.2).
+//! - Units: coulomb N m at the joint, before the torque sensor; creep rad/s. Plausible: coulomb 0 to 3 (Panda 0.15 to
+//!   1.2); creep 0 to 0.02.
 //! - Signature (C1): odd in velocity and flat over it; `2 coulomb / stiffness` lost at each reversal; odd harmonics.
 //! - Confused with: load friction (alike in one pose), backlash (lost motion too), Stribeck friction (needs creep).
 
@@ -13,17 +15,24 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     name: "joint_coulomb_friction",
     stage: Stage::Control,
     acts_on: Place::Joint,
-    parameters: &[Parameter::size("coulomb", "N m", [0.0, 3.0], 0.0).per_joint().within(0.0, f64::MAX)],
+    parameters: &[Parameter::size("coulomb", "N m", [0.0, 3.0], 0.0).per_joint().within(0.0, f64::MAX), CREEP],
     confusable_with: &["joint_load_friction", "joint_stribeck_friction", "joint_backlash"],
     install: |values, effects| {
-        effects.arm.joint_coulomb_friction = Some(JointCoulombFriction { coulomb: values.joints("coulomb") });
+        effects.arm.joint_coulomb_friction =
+            Some(JointCoulombFriction { coulomb: values.joints("coulomb"), creep: values.joints("creep") });
     },
 };
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(in crate::effects) struct JointCoulombFriction {
     pub(super) coulomb: Joints,
+    pub(super) creep: Joints,
 }
+
+/// Of every dry friction: speed up to which it is in proportion to the speed. Gears creep before they break loose, and
+/// so do joints in engines that soften friction.
+pub(super) const CREEP: Parameter =
+    Parameter::form("creep", "rad/s", [0.0, 0.02], 0.0).per_joint().within(0.0, f64::MAX);
 
 #[cfg(test)]
 mod tests {
@@ -52,6 +61,17 @@ mod tests {
         assert_eq!(held, JointState::default());
         let moved = run(&arm, &effects, JointState::default(), 1000, |_, _| -0.31)[1000];
         assert!((moved.dq[0] + 0.01 / 0.1).abs() < 1e-9, "{}", moved.dq[0]);
+    }
+
+    #[test]
+    fn a_joint_that_creeps_moves_under_a_load_in_proportion_to_it() {
+        let creeping = effects(&format!("{BLOCK}\ncreep = [0.002]"));
+        let at = |tau: f64| run(&joint(0.07), &creeping, JointState::default(), 1000, |_, _| tau)[1000].dq[0];
+        assert!((at(0.15) - 0.001).abs() < 1e-9, "{}", at(0.15));
+        assert!((at(-0.3) + 0.002).abs() < 1e-6, "{}", at(-0.3));
+        let (arm, exact) = (joint(0.07), effects(BLOCK));
+        let slipping = |effects| run(&arm, effects, turning(0.6), 100, |_, _| 0.0)[100];
+        assert_eq!(slipping(&creeping), slipping(&exact), "friction in motion is the same");
     }
 
     #[test]

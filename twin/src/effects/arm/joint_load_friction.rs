@@ -1,12 +1,14 @@
 //! Dry friction of a gear that grows with the torque it transmits.
 //!
-//! - Equation: `tau_f = coefficient |tau_motor| sgn(dq)`; at rest up to that. The motor's torque stands for the gear's
+//! - Equation: `tau_f = coefficient |tau_motor| sgn(dq)`; at rest up to that;
+//!   `creep` as in Coulomb friction. The motor's torque stands for the gear's
 //!   load; the two differ by the friction itself and what turns the rotor.
 //! - Source: Dohring et al. 1993; load-dependent term of Rhoban's BAM actuator models.
 //! - Unit: 1. Plausible: 0.01 to 0.25 (hobby servos the upper end).
 //! - Signature (C6): odd in velocity; its size follows the gravity torque over the pose.
 //! - Confused with: Coulomb friction (alike in one pose), torque gain, payload.
 
+use super::joint_coulomb_friction::CREEP;
 use crate::arm::Joints;
 use crate::effects::registry::{EffectInfo, Parameter, Place, Stage};
 
@@ -14,16 +16,18 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     name: "joint_load_friction",
     stage: Stage::Control,
     acts_on: Place::Joint,
-    parameters: &[Parameter::size("coefficient", "1", [0.0, 0.25], 0.0).per_joint().within(0.0, 1.0)],
+    parameters: &[Parameter::size("coefficient", "1", [0.0, 0.25], 0.0).per_joint().within(0.0, 1.0), CREEP],
     confusable_with: &["joint_coulomb_friction", "torque_gain", "payload"],
     install: |values, effects| {
-        effects.arm.joint_load_friction = Some(JointLoadFriction { coefficient: values.joints("coefficient") });
+        effects.arm.joint_load_friction =
+            Some(JointLoadFriction { coefficient: values.joints("coefficient"), creep: values.joints("creep") });
     },
 };
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(in crate::effects) struct JointLoadFriction {
     coefficient: Joints,
+    pub(super) creep: Joints,
 }
 
 impl JointLoadFriction {

@@ -1,12 +1,14 @@
 //! Dry friction of a joint that is larger at creep than in motion.
 //!
 //! - Equation: `tau_f = (coulomb + excess exp(-(dq / velocity)^2)) sgn(dq)`; at rest up to `coulomb + excess`.
+//!   `creep` as in Coulomb friction.
 //! - Source: Armstrong-Helouvry et al. 1994, section 2.1 (Stribeck curve, Gaussian form).
 //! - Units: coulomb, excess N m at the joint, before the torque sensor; velocity rad/s. Plausible: coulomb and
 //!   excess 0 to 3, an excess up to once coulomb; velocity 0.01 to 0.2.
 //! - Signature (C3): what Coulomb friction does not explain lies below three times `velocity`; stick-slip at creep.
 //! - Confused with: Coulomb friction (its limit at no excess), backlash, encoder quantisation.
 
+use super::joint_coulomb_friction::CREEP;
 use crate::arm::Joints;
 use crate::effects::registry::{EffectInfo, Parameter, Place, Stage};
 
@@ -18,6 +20,7 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
         Parameter::size("coulomb", "N m", [0.0, 3.0], 0.0).per_joint().within(0.0, f64::MAX),
         Parameter::size("excess", "N m", [0.0, 3.0], 0.0).per_joint().within(0.0, f64::MAX),
         Parameter::form("velocity", "rad/s", [0.01, 0.2], 0.05).per_joint().within(1e-6, f64::MAX),
+        CREEP,
     ],
     confusable_with: &["joint_coulomb_friction", "joint_backlash"],
     install: |values, effects| {
@@ -25,6 +28,7 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
             coulomb: values.joints("coulomb"),
             excess: values.joints("excess"),
             velocity: values.joints("velocity"),
+            creep: values.joints("creep"),
         });
     },
 };
@@ -34,6 +38,7 @@ pub(in crate::effects) struct JointStribeckFriction {
     coulomb: Joints,
     excess: Joints,
     velocity: Joints,
+    pub(super) creep: Joints,
 }
 
 impl JointStribeckFriction {

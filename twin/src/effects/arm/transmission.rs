@@ -1,4 +1,5 @@
-//! All effects between motor and link together: dry frictions add up to one bound, the other losses to one drag, and
+//! All effects between motor and link together: dry frictions add up to one bound (that creeps as the one
+//! that creeps most), the other losses to one drag, and
 //! elasticity and backlash to one spring with play.
 
 use super::ArmEffects;
@@ -68,6 +69,13 @@ impl Transmission for ArmEffects {
         self.joint_coulomb_friction.map_or(0.0, |effect| effect.coulomb[joint])
             + self.joint_stribeck_friction.map_or(0.0, |effect| effect.level(joint, speed))
             + self.joint_load_friction.map_or(0.0, |effect| effect.level(joint, motor_torque))
+    }
+
+    fn creep(&self, joint: usize) -> f64 {
+        let coulomb = self.joint_coulomb_friction.map_or(0.0, |effect| effect.creep[joint]);
+        let stribeck = self.joint_stribeck_friction.map_or(0.0, |effect| effect.creep[joint]);
+        let load = self.joint_load_friction.map_or(0.0, |effect| effect.creep[joint]);
+        coulomb.max(stribeck).max(load)
     }
 
     fn drag(&self, joint: usize, q: f64, dq: f64) -> f64 {
