@@ -5,7 +5,7 @@
 //! torque behind the gear. A rigid gear moves motor and link as one. A gear that yields is a spring over the twist
 //! `motor - link`; its force is taken implicitly, so no stiffness is too high for the step. Dry friction is a bound:
 //! whatever up to it brings the motor to rest or keeps it there, the bound itself against the motion otherwise. A joint that
-//! creeps under it does not rest: below its creep speed the friction is in proportion to the speed, taken implicitly. Which
+//! creeps under it does not rest: its friction is `bound tanh(speed / creep)` at the end of the step, found by secants. Which
 //! of the two holds in which joint is found by least-index pivoting (Murty 1974), which ends because `M` is positive
 //! definite. Explicit midpoint rule around it, as in [`super::step`].
 
@@ -31,7 +31,7 @@ pub trait Transmission {
     /// Largest dry friction of a joint [N m] at a motor speed [rad/s] and motor torque [N m].
     fn dry_friction(&self, joint: usize, speed: f64, motor_torque: f64) -> f64;
 
-    /// Motor speed up to which dry friction is in proportion to the speed [rad/s]; 0 where a joint sticks exactly.
+    /// Motor speed at which dry friction is `tanh(1)` of its bound [rad/s]; 0 where a joint sticks exactly.
     fn creep(&self, joint: usize) -> f64;
 
     /// Torque that a motor loses otherwise [N m], at its position [rad] and velocity [rad/s].
@@ -40,6 +40,10 @@ pub trait Transmission {
 
 /// Pivots before the last pattern is kept: seven joints need at most a dozen.
 const PIVOTS: usize = 40;
+/// Secants to the friction of a creeping joint: each halves what the one before left, or better.
+const SECANTS: usize = 5;
+/// A creeping joint's speed at the end of the step is known when it changes the friction by less than this share.
+const SETTLED: f64 = 1e-4;
 /// Inertia of a link that weighs nothing, as seen by a gear that yields [kg m²].
 const LEAST_INERTIA: f64 = 1e-6;
 
@@ -72,17 +76,19 @@ struct Side {
     drive: f64,
     dry: f64,
     creep: f64,
+    /// Of a creeping joint's friction: the secant from rest to some speed [N m s/rad].
+    viscosity: f64,
     spring: Option<Spring>,
 }
 
 /// Equations of one stage of length `dt`: everything but the unknown accelerations.
-struct Stage<'a, const N: usize> {
+struct Stage<const N: usize> {
     dt: f64,
     /// Lower triangle, rotors of rigid joints on the diagonal.
     mass: [[f64; N]; N],
     /// External torque less bias.
     force: [f64; N],
-    sides: &'a [Side; N],
+    sides: [Side; N],
 }
 
 /// Accelerations of links and motors, and the torque behind the gears.
@@ -105,7 +111,7 @@ impl ArmModel {
         with_dof!(self, N => {
             let sides = |at: &JointState| self.sides::<N>(transmission, (link, motor), at, tau);
             let mut modes = None;
-            let half = self.stage(link, &sides(motor), external, 0.5 * dt).answer(&mut modes);
+            let half = self.stage(link, sides(motor), external, 0.5 * dt).answer(&mut modes);
             let middle = |state: &JointState, acceleration: &[f64; N]| {
                 let mut out = *state;
                 for (i, acceleration) in acceleration.iter().enumerate() {
@@ -115,7 +121,7 @@ impl ArmModel {
                 out
             };
             let sides = sides(&middle(motor, &half.motor));
-            let answer = self.stage(&middle(link, &half.link), &sides, external, dt).answer(&mut modes);
+            let answer = self.stage(&middle(link, &half.link), sides, external, dt).answer(&mut modes);
             let modes = modes.expect("an answer leaves its pattern");
             for (i, (dry, gear)) in modes.into_iter().enumerate() {
                 let sticks = dry == Dry::Sticks && transmission.creep(i) <= 0.0;
@@ -136,7 +142,8 @@ impl ArmModel {
         at: &JointState,
         tau: &Joints,
     ) -> [Side; N] {
-        std::array::from_fn(|i| Side {
+        let side = |i: usize| Side {
+            viscosity: 0.0,
             link_speed: link.dq[i],
             motor_speed: motor.dq[i],
             twist: motor.q[i] - link.q[i],
@@ -146,16 +153,11 @@ impl ArmModel {
             creep: transmission.creep(i),
             // Without a rotor nothing could turn on the motor's side of a spring.
             spring: transmission.spring(i).filter(|_| self.links[i].rotor > 0.0),
-        })
+        };
+        std::array::from_fn(|i| side(i).creeping_at(at.dq[i]))
     }
 
-    fn stage<'a, const N: usize>(
-        &self,
-        at: &JointState,
-        sides: &'a [Side; N],
-        external: &Joints,
-        dt: f64,
-    ) -> Stage<'a, N> {
+    fn stage<const N: usize>(&self, at: &JointState, sides: [Side; N], external: &Joints, dt: f64) -> Stage<N> {
         let links = first::<N, _>(&self.links);
         let chain = Chain::at(links, first(&at.q));
         let bodies = chain.bodies(links);
@@ -177,9 +179,29 @@ fn advance(state: &mut JointState, i: usize, acceleration: f64, stops: bool, dt:
     state.q[i] += 0.5 * dt * (before + state.dq[i]);
 }
 
-impl<const N: usize> Stage<'_, N> {
+impl<const N: usize> Stage<N> {
+    /// Solves for the pattern and for the speeds of creeping joints.
+    fn answer(&mut self, modes: &mut Option<[(Dry, Gear); N]>) -> Answer<N> {
+        let mut answer = self.pattern(modes);
+        for _ in 0..SECANTS {
+            let mut settled = true;
+            for (side, motor) in self.sides.iter_mut().zip(&answer.motor) {
+                let speed = side.motor_speed + self.dt * motor;
+                let before = side.viscosity;
+                *side = side.creeping_at(speed);
+                // What the friction was taken for, in speeds, differs by this much from what it is.
+                settled &= ((side.viscosity - before) * speed).abs() <= SETTLED * side.dry;
+            }
+            if settled {
+                break;
+            }
+            answer = self.pattern(modes);
+        }
+        answer
+    }
+
     /// Solves for the pattern of sticking and loaded joints that contradicts itself nowhere, starting from `modes`.
-    fn answer(&self, modes: &mut Option<[(Dry, Gear); N]>) -> Answer<N> {
+    fn pattern(&self, modes: &mut Option<[(Dry, Gear); N]>) -> Answer<N> {
         let modes = modes.get_or_insert_with(|| self.sides.map(|side| side.likely()));
         let mut answer = self.solve(modes);
         for _ in 0..PIVOTS {
@@ -238,7 +260,7 @@ impl Side {
     /// What will hold unless the step turns it around.
     fn likely(self) -> (Dry, Gear) {
         let dry = match self.dry > 0.0 {
-            true if self.motor_speed.abs() <= self.creep => Dry::Sticks,
+            true if self.motor_speed == 0.0 || self.creep > 0.0 => Dry::Sticks,
             true => Dry::Slips(self.motor_speed.signum()),
             false => Dry::Slips(0.0),
         };
@@ -249,6 +271,18 @@ impl Side {
             Some(_) => Gear::Free,
         };
         (dry, gear)
+    }
+
+    /// The same with the friction of a creeping joint as it is at `speed`.
+    fn creeping_at(self, speed: f64) -> Self {
+        let viscosity = if self.creep <= 0.0 {
+            0.0
+        } else if speed.abs() < 1e-3 * self.creep {
+            self.dry / self.creep
+        } else {
+            self.dry * (speed / self.creep).tanh() / speed
+        };
+        Self { viscosity, ..self }
     }
 
     /// Spring torque `s = s0 + g (motor acceleration - link acceleration)`: at the middle of the stage, or at its end
@@ -267,8 +301,7 @@ impl Side {
         match dry {
             Dry::Slips(sign) => Some((self.rotor, self.drive - sign * self.dry)),
             Dry::Sticks if self.creep > 0.0 => {
-                let viscosity = self.dry / self.creep;
-                Some((self.rotor + viscosity * dt, self.drive - viscosity * self.motor_speed))
+                Some((self.rotor + self.viscosity * dt, self.drive - self.viscosity * self.motor_speed))
             }
             Dry::Sticks => None,
         }
@@ -306,12 +339,12 @@ impl Side {
     /// The mode that the answer demands; the same one where it contradicts nothing.
     fn corrected(&self, (dry, gear): (Dry, Gear), link: f64, motor: f64, torque: f64, dt: f64) -> (Dry, Gear) {
         let dry = match dry {
-            Dry::Slips(sign) if sign != 0.0 && sign * (self.motor_speed + dt * motor) < self.creep => Dry::Sticks,
-            Dry::Sticks => {
+            Dry::Slips(sign) if sign * (self.motor_speed + dt * motor) < 0.0 => Dry::Sticks,
+            Dry::Sticks if self.creep <= 0.0 => {
                 let needed = self.drive - torque - self.rotor * motor;
                 if needed.abs() > self.dry { Dry::Slips(needed.signum()) } else { dry }
             }
-            Dry::Slips(_) => dry,
+            Dry::Slips(_) | Dry::Sticks => dry,
         };
         (dry, self.corrected_gear(gear, link, motor, torque, dt))
     }

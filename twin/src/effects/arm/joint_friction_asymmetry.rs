@@ -34,7 +34,7 @@ mod tests {
     fn the_two_directions_differ_by_twice_the_offset() {
         let effects = effects(
             "[[effect]]\nname = \"joint_friction_asymmetry\"\noffset = 0.1\n\
-             [[effect]]\nname = \"joint_coulomb_friction\"\ncoulomb = 0.3",
+             [[effect]]\nname = \"joint_coulomb_friction\"\ncoulomb = 0.3\ncreep = 0.0",
         );
         let slowed = |dq: f64| (dq - run(&joint(0.07), &effects, turning(dq), 50, |_, _| 0.0)[50].dq[0]).abs();
         let torque = |dq: f64| slowed(dq) * (ROTOR + 0.07) / 0.05;

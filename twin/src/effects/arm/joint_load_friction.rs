@@ -43,7 +43,7 @@ mod tests {
 
     #[test]
     fn a_share_of_the_torque_is_lost_in_motion_and_nothing_without_load() {
-        let effects = effects("[[effect]]\nname = \"joint_load_friction\"\ncoefficient = 0.2");
+        let effects = effects("[[effect]]\nname = \"joint_load_friction\"\ncoefficient = 0.2\ncreep = 0.0");
         let driven = run(&joint(0.07), &effects, turning(0.1), 100, |_, _| 0.5)[100];
         assert!((driven.dq[0] - (0.1 + 0.8 * 0.5 / (ROTOR + 0.07) * 0.1)).abs() < 1e-9, "{}", driven.dq[0]);
         let free = run(&joint(0.07), &effects, turning(0.1), 100, |_, _| 0.0)[100];
