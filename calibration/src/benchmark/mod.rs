@@ -2,4 +2,5 @@
 
 pub mod draw;
 pub mod score;
+pub mod session;
 pub mod world;
