@@ -5,7 +5,7 @@ use super::figure::chart::{Chart, Line};
 use super::figure::forest::forest;
 use super::figure::matrix::correlations;
 use super::frame::{facts, figure, frame, legend, unbroken};
-use super::parameters::{Numbers, part};
+use super::parameters::{Numbers, of_joints, part};
 use super::quantity::{Unit, short};
 use super::trace::{Trace, gallery};
 use maud::{Markup, html};
@@ -237,11 +237,12 @@ impl Sheet {
 impl Parameter {
     /// What the `k`-th number belongs to: a joint, an axis; empty for the only one.
     pub(super) fn part(&self, k: usize) -> String {
-        part(self.values.len(), k)
+        part(of_joints(&self.name), self.values.len(), k)
     }
 
     fn numbers(&self) -> Numbers<'_> {
-        Numbers { name: &self.name, unit: &self.unit, values: &self.values, intervals: &self.intervals }
+        let joints = of_joints(&self.name);
+        Numbers { name: &self.name, joints, unit: &self.unit, values: &self.values, intervals: &self.intervals }
     }
 }
 

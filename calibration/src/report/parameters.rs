@@ -2,12 +2,15 @@
 
 use super::figure::forest::{Group, Row};
 use super::quantity::Unit;
+use twin::effects::{Shape, find};
 
 /// A parameter of one or several numbers.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(super) struct Numbers<'a> {
     /// Name in files: `stiffness`, `centre_of_mass`, `delay`.
     pub(super) name: &'a str,
+    /// Whether there is one number a joint.
+    pub(super) joints: bool,
     /// SI unit.
     pub(super) unit: &'a str,
     /// The numbers.
@@ -29,8 +32,8 @@ impl Numbers<'_> {
             return format!("{name} {}", numbers.join(", "));
         }
         let [lo, hi] = super::scale::span(self.values.iter().copied());
-        let many = self.values.len();
-        format!("{name} {} to {} over {many} joints", super::quantity::short(unit.scaled(lo)), unit.with_unit(hi))
+        let many = format!("{} {}", self.values.len(), if self.joints { "joints" } else { "numbers" });
+        format!("{name} {} to {} over {many}", super::quantity::short(unit.scaled(lo)), unit.with_unit(hi))
     }
 
     /// The parameter as rows of a picture; `nominal`: what was believed of each number.
@@ -41,7 +44,7 @@ impl Numbers<'_> {
         warning: impl Fn(usize) -> Option<String>,
     ) -> Group<'a> {
         let row = |(k, (value, interval)): (usize, (f64, [f64; 2]))| Row {
-            name: part(self.values.len(), k),
+            name: part(self.joints, self.values.len(), k),
             value,
             interval,
             nominal: nominal.get(k).copied(),
@@ -61,12 +64,21 @@ impl Numbers<'_> {
     }
 }
 
-/// What the `k`-th of `count` numbers belongs to; empty for the only one.
-pub(super) fn part(count: usize, k: usize) -> String {
-    match count {
-        1 => String::new(),
-        2 | 3 => ["x", "y", "z"].get(k).map_or_else(String::new, |axis| (*axis).to_owned()),
-        _ => format!("joint {}", k + 1),
+/// Whether a parameter, `stiffness` or `effect.parameter`, holds one number a joint.
+pub(super) fn of_joints(name: &str) -> bool {
+    let Some((effect, parameter)) = name.split_once('.') else { return matches!(name, "stiffness" | "damping") };
+    let effect = find(effect.trim_start_matches("1/"));
+    let parameter = effect.and_then(|effect| effect.parameters.iter().find(|known| known.name == parameter));
+    parameter.is_some_and(|parameter| parameter.shape == Shape::PerJoint)
+}
+
+/// What the `k`-th of `count` numbers belongs to, a joint or an axis; empty for the only one.
+pub(super) fn part(joints: bool, count: usize, k: usize) -> String {
+    match ["x", "y", "z"].get(k) {
+        _ if joints => format!("joint {}", k + 1),
+        Some(axis) if count > 1 => (*axis).to_owned(),
+        _ if count > 1 => (k + 1).to_string(),
+        _ => String::new(),
     }
 }
 
@@ -75,14 +87,29 @@ mod tests {
     use super::*;
 
     #[test]
+    fn the_registry_tells_what_belongs_to_joints() {
+        assert!(of_joints("damping") && of_joints("joint_coulomb_friction.coulomb"));
+        assert!(!of_joints("centre_of_mass") && !of_joints("command_delay.delay") && !of_joints("no.such"));
+        assert_eq!([part(true, 1, 0), part(false, 3, 2), part(false, 1, 0)], ["joint 1", "z", ""]);
+    }
+
+    #[test]
     fn few_numbers_are_named_and_many_are_spanned() {
-        let delay = Numbers { name: "delay", unit: "s", values: &[0.0119], intervals: &[[0.0112, 0.0126]] };
+        let delay =
+            Numbers { name: "delay", joints: false, unit: "s", values: &[0.0119], intervals: &[[0.0112, 0.0126]] };
         assert_eq!(delay.line(), "delay 11.9 [11.2, 12.6] ms");
         let gains = [600.0, 597.0, 500.0, 668.9];
-        let stiffness = Numbers { name: "stiffness", unit: "N m/rad", values: &gains, intervals: &[] };
+        let stiffness = Numbers {
+            name: "stiffness",
+            joints: of_joints("stiffness"),
+            unit: "N m/rad",
+            values: &gains,
+            intervals: &[],
+        };
         assert_eq!(stiffness.line(), "stiffness 500 to 669 N m/rad over 4 joints");
         assert_eq!(stiffness.group("stiffness", &[600.0], |_| None).rows[3].name, "joint 4");
-        let centre = Numbers { name: "centre_of_mass", unit: "m", values: &[0.001, -0.002], intervals: &[] };
+        let centre =
+            Numbers { name: "centre_of_mass", joints: false, unit: "m", values: &[0.001, -0.002], intervals: &[] };
         assert_eq!(centre.line(), "centre of mass 1.00 mm, -2.00 mm");
         assert_eq!(centre.group("centre of mass", &[0.0; 2], |_| None).rows[1].name, "y");
     }

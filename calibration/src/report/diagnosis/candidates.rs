@@ -4,7 +4,7 @@ use super::words;
 use crate::diagnose::{Candidate, Size, Status};
 use crate::report::canvas::Canvas;
 use crate::report::figure::forest::{Group, forest};
-use crate::report::parameters::Numbers;
+use crate::report::parameters::{Numbers, of_joints};
 use crate::report::share::{percent_interval, probability};
 use maud::{Markup, html};
 
@@ -53,12 +53,8 @@ fn table(candidates: &[&Candidate]) -> Markup {
 /// The numbers of a named effect one by one, where they are many.
 fn joints(candidate: &Candidate) -> Markup {
     let many = candidate.parameters.iter().filter(|(_, size)| size.values.len() > 1);
-    let named: Vec<(String, Numbers)> = many
-        .map(|(name, size)| {
-            let numbers = Numbers { name, unit: &size.unit, values: &size.values, intervals: &size.ci90 };
-            (name.replace('_', " "), numbers)
-        })
-        .collect();
+    let named: Vec<(String, Numbers)> =
+        many.map(|(name, size)| (name.replace('_', " "), numbers(&candidate.effect, name, size))).collect();
     let groups: Vec<Group> = named.iter().map(|(heading, numbers)| numbers.group(heading, &[], |_| None)).collect();
     html! {
         @if !groups.is_empty() {
@@ -69,10 +65,12 @@ fn joints(candidate: &Candidate) -> Markup {
 
 /// The parameters of a candidate, one a line.
 pub(in crate::report) fn sizes(candidate: &Candidate) -> Vec<String> {
-    let line = |(name, size): (&String, &Size)| {
-        Numbers { name, unit: &size.unit, values: &size.values, intervals: &size.ci90 }.line()
-    };
-    candidate.parameters.iter().map(line).collect()
+    candidate.parameters.iter().map(|(name, size)| numbers(&candidate.effect, name, size).line()).collect()
+}
+
+fn numbers<'a>(effect: &str, name: &'a str, size: &'a Size) -> Numbers<'a> {
+    let joints = of_joints(&format!("{effect}.{name}"));
+    Numbers { name, joints, unit: &size.unit, values: &size.values, intervals: &size.ci90 }
 }
 
 fn mark(status: Status) -> Markup {
