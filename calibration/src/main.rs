@@ -2,6 +2,7 @@
 
 use calibration::capture::excitation;
 use calibration::demo;
+use calibration::diagnose;
 use calibration::interrupt::Interrupt;
 use clap::{Parser, Subcommand};
 use serde::Serialize;
@@ -19,6 +20,7 @@ use tracing_subscriber::EnvFilter;
 Examples:
   calibration demo --out demo
   calibration capture excitation --cell config/fr3_cell.toml --clips 4 --out session
+  calibration diagnose session --report report.html
 Every verb has its own --help with an example. Logs and progress go to stderr (RUST_LOG=debug for more)."
 )]
 struct Arguments {
@@ -31,6 +33,8 @@ enum Verb {
     /// Moves the arm through a running bridge (or starts one) and records clips into a session folder.
     #[command(subcommand)]
     Capture(Capture),
+    /// Where the twin differs from the cell, which effect causes it, and how far the gap shrinks with it.
+    Diagnose(diagnose::command::Arguments),
     /// The whole story on the simulated cell: shadow, record, replay, explain.
     Demo(DemoArguments),
 }
@@ -131,6 +135,10 @@ fn run(verb: Verb) -> anyhow::Result<()> {
     let interrupt = Interrupt::listen()?;
     match verb {
         Verb::Capture(Capture::Excitation(arguments)) => capture(arguments, &interrupt),
+        Verb::Diagnose(arguments) => {
+            let found = diagnose::command::run(&arguments, &interrupt)?;
+            if arguments.json { print_json(&found) } else { Ok(()) }
+        }
         Verb::Demo(arguments) => show(arguments, &interrupt),
     }
 }

@@ -1,5 +1,154 @@
 //! Where the twin differs from the cell, which effect causes it, and how far the gap shrinks with it.
+//!
+//! The baseline is the twin with the paper's own parameters identified. Every effect of the registry is a candidate, alone
+//! and with others. Clips are split by command: parameters are fitted on some, effects chosen on others, and the shrink is
+//! measured on the rest, which are opened once. The clip is the unit of evidence throughout.
+//!
+//! | module | step |
+//! |---|---|
+//! | [`admit`] | can the clips be diagnosed at all |
+//! | [`split`] | which clips are for what |
+//! | [`evidence`], [`arm_clips`], [`cell_clips`] | what is measured against the twin, and where in a clip |
+//! | [`library`] | the candidates as numbers |
+//! | [`noise`], [`floor`] | how far residuals can be trusted |
+//! | [`sweep`], [`quadratic`] | every candidate's signature, linearised once |
+//! | [`shortlist`] | which candidates are worth fitting |
+//! | [`fit`] | hypotheses fitted |
+//! | [`score`] | how well they foretell clips |
+//! | [`combine`] | which effects act together |
+//! | [`leftovers`] | what they leave |
+//! | [`gap`], [`localise`] | how large the gap is, and where |
+//! | [`parameters`], [`confidence`], [`verdict`], [`advice`] | what is said about it |
+//! | [`conclude`], [`answer`] | the answer |
+//! | [`command`] | the verb |
 
+pub mod admit;
+pub mod advice;
 pub mod answer;
+pub mod arm_clips;
+pub mod cell_clips;
+pub mod combine;
+pub mod command;
+pub mod conclude;
+pub mod confidence;
+pub mod evidence;
+pub mod fit;
+pub mod floor;
+pub mod gap;
+pub mod leftovers;
+pub mod library;
+pub mod localise;
+pub mod noise;
+pub mod parameters;
+pub mod quadratic;
+pub mod score;
+pub mod shortlist;
+pub mod split;
+pub mod sweep;
+pub mod verdict;
 
 pub use answer::{Candidate, Change, Clips, Diagnosis, Gap, Kind, Place, Share, Size, Status, Verdict};
+
+use crate::forward::object::ObjectClips;
+use crate::forward::setting::{self, BaseError};
+use crate::interrupt::Interrupt;
+use crate::progress::Progress;
+use admit::{Admitted, Refused, admit};
+use arm_clips::ArmClips;
+use cell_clips::CellClips;
+use evidence::Evidence;
+use fit::{Bench, Effort};
+use library::Library;
+use shared_mem::recording::Session;
+use shared_mem::theta::Theta;
+use split::Split;
+use std::time::Instant;
+use sweep::Precision;
+use twin::replay::ReplayError;
+use twin::sim::SimError;
+
+/// How a session is diagnosed.
+#[derive(Debug, Clone, Default)]
+pub struct Options {
+    /// Parameters that are known already; effects among them act in the baseline.
+    pub theta: Option<Theta>,
+    /// Draws the split and the bootstrap.
+    pub seed: u64,
+}
+
+/// A session cannot be diagnosed.
+#[derive(Debug, thiserror::Error)]
+pub enum DiagnoseError {
+    /// The session cannot be used.
+    #[error(transparent)]
+    Refused(#[from] Refused),
+    /// The cell's parameters.
+    #[error(transparent)]
+    Base(#[from] BaseError),
+    /// The cell.
+    #[error(transparent)]
+    Cell(#[from] SimError),
+    /// A replay at the end.
+    #[error(transparent)]
+    Replay(#[from] ReplayError),
+    /// The twin has no answer even where nothing is wrong.
+    #[error(
+        "the twin cannot follow the clips with the parameters of cell.toml; try `twin replay` and follow its advice"
+    )]
+    NoBaseline,
+    /// Ctrl-C.
+    #[error("interrupted; nothing was written, start again")]
+    Interrupted,
+}
+
+/// Diagnoses a session.
+///
+/// # Errors
+/// [`DiagnoseError`]. Clips that do not say enough are no error but a verdict.
+pub fn diagnose(session: &Session, options: &Options, interrupt: &Interrupt) -> Result<Diagnosis, DiagnoseError> {
+    let began = Instant::now();
+    let base = setting::complete(&session.cell, options.theta.as_ref())?;
+    let admitted = match admit(session) {
+        Err(Refused::NotTestable(why)) => return Ok(conclude::not_testable(session, options, base, &why)),
+        other => other?,
+    };
+    let library = Library::new(&session.cell, &base, admitted.with_object);
+    let theta = |numbers: &[f64]| library.theta(numbers);
+    let mut diagnosis = if admitted.with_object {
+        let arm = ArmClips::new(&session.cell, &admitted.clips, theta).map_err(Refused::from)?;
+        let object = ObjectClips::new(&session.cell, admitted.clips.clone(), library.settings.clone())?;
+        let evidence = CellClips::new(Some(arm), object);
+        examine(&evidence, &library, session, &admitted, options, interrupt)?
+    } else {
+        let evidence = ArmClips::new(&session.cell, &admitted.clips, theta).map_err(Refused::from)?;
+        examine(&evidence, &library, session, &admitted, options, interrupt)?
+    };
+    diagnosis.seconds = began.elapsed().as_secs_f64();
+    Ok(diagnosis)
+}
+
+/// The baseline alone is followed for so many linearisations.
+const BASELINE: Effort = Effort { iterations: 12, precision: Precision::Joints };
+
+fn examine<E: Evidence>(
+    evidence: &E,
+    library: &Library,
+    session: &Session,
+    admitted: &Admitted,
+    options: &Options,
+    interrupt: &Interrupt,
+) -> Result<Diagnosis, DiagnoseError> {
+    let bench = Bench { evidence, library, random: evidence.random(), interrupt };
+    let split = Split::new(&admitted.groups, options.seed);
+    let bar = Progress::new("diagnose", 100);
+    bar.show(0, "baseline");
+    let even = vec![1.0; evidence.channels().len()];
+    let baseline = bench.fit((&[], library.start()), &split.train, &even, None, BASELINE);
+    let baseline = baseline.ok_or(DiagnoseError::NoBaseline)?;
+    let found = combine::search(&bench, &split, baseline, &bar).ok_or(DiagnoseError::NoBaseline)?;
+    if interrupt.asked() {
+        return Err(DiagnoseError::Interrupted);
+    }
+    bar.show(97, "confirm");
+    conclude::conclude(&bench, &split, &found, session, admitted, options)
+}

@@ -1,0 +1,210 @@
+//! Clips of an arm as evidence: positions, velocities and both torques of every joint against the twin's, in sigmas of the
+//! sensors. In clips with an object only what comes before the touch counts: the arm alone is simulated.
+#![allow(non_snake_case)] // the Franka Control Interface's own symbols
+
+use super::evidence::{Channel, Evidence, Row, StageName};
+use super::noise;
+use crate::estimate::{ClipModel, Impossible, Random};
+use shared_mem::cell::{Cell, ClipKind};
+use shared_mem::recording::{Clip, JointSeries};
+use shared_mem::theta::Theta;
+use twin::arm::{ArmModel, ModelError};
+use twin::effects::Effects;
+use twin::rollout::{CommandTrack, Plant, Reading, TICK_NS};
+
+/// At most so many moments of a clip count; more would cost time and, in smooth motion, tell little.
+const MOMENTS: usize = 250;
+/// Before the object is seen to move, the tool has touched it already for at most this long [ns].
+const TOUCH_MARGIN_NS: u64 = 60_000_000;
+/// A joint slower than this stands [rad/s].
+const STILL: f64 = 0.02;
+/// Share of a joint's top speed from which on it is fast.
+const FAST: f64 = 0.5;
+
+/// The four quantities, in the order of their rows.
+const QUANTITIES: [&str; 4] = ["q", "dq", "tau_J", "tau_J_d"];
+
+/// Arm clips and what numbers mean for the cell.
+pub struct ArmClips<F> {
+    cell: Cell,
+    nominal: ArmModel,
+    channels: Vec<Channel>,
+    /// One sigma of each channel's sensor.
+    sigma: Vec<f64>,
+    clips: Vec<Prepared>,
+    theta: F,
+}
+
+struct Prepared {
+    recorded: Clip,
+    commands: CommandTrack,
+    /// Measured rows that count, and their stamps.
+    kept: Vec<usize>,
+    /// Each followed by the one a control period later: a torque logged at a tick acts in the period after it.
+    stamps_ns: Vec<u64>,
+    rows: Vec<Row>,
+}
+
+impl<F: Fn(&[f64]) -> Theta + Sync> ArmClips<F> {
+    /// Clips of a cell in their order, joints in the model's order. `theta` gives the parameters that go with numbers.
+    ///
+    /// # Errors
+    /// [`ModelError`] when the cell has no usable arm.
+    pub fn new(cell: &Cell, clips: &[Clip], theta: F) -> Result<Self, ModelError> {
+        let nominal = ArmModel::from_cell(cell)?;
+        let dof = nominal.dof();
+        let logged = |has: fn(&Clip) -> bool| clips.iter().all(has);
+        let quantities = QUANTITIES.into_iter().filter(|quantity| match *quantity {
+            "dq" => logged(|clip| !clip.measured.dq.is_empty()),
+            "tau_J" => logged(|clip| !clip.measured.tau.is_empty()),
+            "tau_J_d" => logged(|clip| !clip.desired.tau.is_empty()),
+            _ => true,
+        });
+        let joints = |quantity| {
+            (0..dof).map(move |joint| Channel { quantity, place: format!("joint{}", joint + 1), joint: Some(joint) })
+        };
+        let channels: Vec<Channel> = quantities.flat_map(joints).collect();
+        let sigma = (0..channels.len()).map(|channel| sensor_sigma(clips, &channels[channel], channel % dof)).collect();
+        let top = top_speeds(clips, dof);
+        let clips = clips.iter().filter_map(|clip| Prepared::new(clip.clone(), &channels, &top)).collect();
+        Ok(Self { cell: cell.clone(), nominal, channels, sigma, clips, theta })
+    }
+
+    /// One sigma of each channel's sensor, in its unit.
+    pub fn sigma(&self) -> &[f64] {
+        &self.sigma
+    }
+}
+
+/// Columns of a recorded series that belong to a channel.
+fn series<'a>(clip: &'a Clip, channel: &Channel) -> (&'a JointSeries, &'a [f64]) {
+    match channel.quantity {
+        "dq" => (&clip.measured, &clip.measured.dq),
+        "tau_J" => (&clip.measured, &clip.measured.tau),
+        "tau_J_d" => (&clip.desired, &clip.desired.tau),
+        _ => (&clip.measured, &clip.measured.q),
+    }
+}
+
+fn sensor_sigma(clips: &[Clip], channel: &Channel, joint: usize) -> f64 {
+    let of = |clip: &Clip| {
+        let (log, values) = series(clip, channel);
+        noise::white_sigma(values.iter().skip(joint).step_by(log.dof.max(1)).copied())
+    };
+    let each: Vec<f64> = clips.iter().map(of).collect();
+    // A sensor without noise does not exist: below this a log was computed, not measured.
+    let least = if channel.quantity.starts_with("tau") { 1e-3 } else { 1e-6 };
+    noise::median(&each).max(least)
+}
+
+fn top_speeds(clips: &[Clip], dof: usize) -> Vec<f64> {
+    let speed = |joint: usize| {
+        let rows = clips.iter().flat_map(|clip| {
+            (0..clip.desired.len()).filter_map(move |row| clip.desired.dq_row(row).map(|dq| dq[joint].abs()))
+        });
+        rows.fold(0.0, f64::max)
+    };
+    (0..dof).map(speed).collect()
+}
+
+impl Prepared {
+    fn new(recorded: Clip, channels: &[Channel], top: &[f64]) -> Option<Self> {
+        let commands = CommandTrack::new(&recorded.desired)?;
+        let end_ns = end_of_arm_alone(&recorded);
+        let stamps = &recorded.measured.stamps_ns;
+        let used = stamps.partition_point(|stamp| *stamp < end_ns).min(recorded.desired.len());
+        let stride = used.div_ceil(MOMENTS).max(1);
+        let kept: Vec<usize> = (0..used).step_by(stride).collect();
+        let stamps_ns: Vec<u64> = kept.iter().flat_map(|row| [stamps[*row], stamps[*row] + TICK_NS]).collect();
+        let first = *stamps_ns.first()?;
+        let dof = recorded.measured.dof;
+        let mut rows = Vec::with_capacity(channels.len() * kept.len());
+        for channel in 0..channels.len() {
+            for row in &kept {
+                let dq = recorded.desired.dq_row(*row).map_or(0.0, |dq| dq[channel % dof]);
+                let time = (stamps[*row] - first) as f64 * 1e-9;
+                rows.push(Row { channel, stage: StageName::Control, regime: regime(dq, top[channel % dof]), time });
+            }
+        }
+        Some(Self { recorded, commands, kept, stamps_ns, rows })
+    }
+}
+
+/// What a joint does that is told to move at `dq`.
+fn regime(dq: f64, top: f64) -> &'static str {
+    match dq {
+        _ if dq.abs() < STILL => "standing or turning round",
+        _ if dq > FAST * top => "fast forward",
+        _ if dq < -FAST * top => "fast backward",
+        _ if dq > 0.0 => "slow forward",
+        _ => "slow backward",
+    }
+}
+
+/// When the tool may have touched the object; beyond the end where there is none.
+fn end_of_arm_alone(clip: &Clip) -> u64 {
+    if clip.kind == ClipKind::Excitation || clip.object.is_empty() {
+        return u64::MAX;
+    }
+    let place = |row: usize| nalgebra::Vector3::from(clip.object.poses[row].position());
+    let start = place(0);
+    let moved = (0..clip.object.len()).find(|row| (place(*row) - start).norm() > 0.006);
+    moved.map_or(u64::MAX, |row| clip.object.stamps_ns[row].saturating_sub(TOUCH_MARGIN_NS))
+}
+
+impl<F: Fn(&[f64]) -> Theta + Sync> ClipModel for ArmClips<F> {
+    fn clips(&self) -> usize {
+        self.clips.len()
+    }
+
+    fn residuals(&self, clip: usize, shared: &[f64], _own: &[f64], out: &mut Vec<f64>) -> Result<(), Impossible> {
+        let fail = |error: &dyn std::fmt::Display| Impossible(error.to_string());
+        let clip = &self.clips[clip];
+        let theta = (self.theta)(shared);
+        let effects = Effects::from_theta(&theta.effects, self.nominal.dof()).map_err(|e| fail(&e))?;
+        let plant = Plant::new(&self.cell, self.nominal.clone(), Some(&theta), &effects.arm).map_err(|e| fail(&e))?;
+        let rollout = plant.rollout();
+        let start = rollout.start_state(&clip.recorded.measured, 0, &clip.commands);
+        let start = start.ok_or_else(|| Impossible("no measured joints".into()))?;
+        let first = clip.stamps_ns[0];
+        let mut readings = vec![Reading::default(); clip.stamps_ns.len()];
+        rollout.readings(&start, first, &clip.commands, &clip.stamps_ns, &mut readings);
+        self.compare(clip, &readings, out)
+    }
+}
+
+impl<F> ArmClips<F> {
+    fn compare(&self, clip: &Prepared, readings: &[Reading], out: &mut Vec<f64>) -> Result<(), Impossible> {
+        let dof = self.nominal.dof();
+        out.clear();
+        for (channel, (info, sigma)) in self.channels.iter().zip(&self.sigma).enumerate() {
+            let joint = channel % dof;
+            let (log, values) = series(&clip.recorded, info);
+            for (moment, row) in clip.kept.iter().enumerate() {
+                let predicted = match info.quantity {
+                    "q" => readings[2 * moment].state.q[joint],
+                    "dq" => readings[2 * moment].state.dq[joint],
+                    "tau_J" => readings[2 * moment + 1].tau_J[joint],
+                    _ => readings[2 * moment + 1].tau_J_d[joint],
+                };
+                out.push((values[row * log.dof + joint] - predicted) / sigma);
+            }
+        }
+        let sane = out.iter().all(|residual| residual.is_finite());
+        if sane { Ok(()) } else { Err(Impossible("the simulated arm left all bounds".into())) }
+    }
+}
+
+impl<F: Fn(&[f64]) -> Theta + Sync> Evidence for ArmClips<F> {
+    fn channels(&self) -> &[Channel] {
+        &self.channels
+    }
+
+    fn rows(&self, clip: usize) -> &[Row] {
+        &self.clips[clip].rows
+    }
+
+    fn random(&self) -> Vec<Random> {
+        Vec::new()
+    }
+}

@@ -1,0 +1,270 @@
+//! From what the search found to the answer: the confirm clips are opened here, and only here.
+
+use super::admit::Admitted;
+use super::answer::{Candidate, Change, Clips, Diagnosis, Gap, Place, Share, Status};
+use super::combine::{Found, Step};
+use super::evidence::Evidence;
+use super::fit::{Bench, Hypothesis};
+use super::gap::Residuals;
+use super::leftovers::{self, Left};
+use super::shortlist::TESTABLE;
+use super::split::Split;
+use super::verdict::{self, Finding};
+use super::{DiagnoseError, Kind, Options, advice, confidence, localise, parameters};
+use crate::report::Trace;
+use shared_mem::recording::Session;
+use shared_mem::theta::Theta;
+use twin::replay::{ReplayError, Replayer};
+
+/// What noise alone leaves: residuals are in sigmas of the sensors.
+const FLOOR: f64 = 1.0;
+/// So many traces are shown.
+const TRACES: usize = 12;
+
+/// The answer where the clips do not say enough.
+#[must_use]
+pub fn not_testable(session: &Session, options: &Options, theta: Theta, why: &str) -> Diagnosis {
+    let nothing = Share { value: 0.0, ci90: [0.0; 2] };
+    Diagnosis {
+        verdict: verdict::not_testable(why),
+        gap: Gap {
+            unit: "sigma",
+            before: 0.0,
+            after: 0.0,
+            floor: FLOOR,
+            shrink: nothing,
+            explainable_fraction: 0.0,
+            joint_rms_rad: Change::default(),
+            object_add_m: Change::default(),
+            object_add_s_m: Change::default(),
+        },
+        places: Vec::new(),
+        candidates: Vec::new(),
+        next_experiment: format!("Record a session that has what this one lacks: {why}."),
+        clips: Clips::default(),
+        seconds: 0.0,
+        session: session.folder.display().to_string(),
+        seed: options.seed,
+        theta,
+        theta_file: None,
+        traces: Vec::new(),
+    }
+}
+
+/// Opens the confirm clips and says what was found.
+///
+/// # Errors
+/// [`DiagnoseError`] when the twin has no answer on them.
+pub fn conclude<E: Evidence>(
+    bench: &Bench<'_, E>,
+    split: &Split,
+    found: &Found,
+    session: &Session,
+    admitted: &Admitted,
+    options: &Options,
+) -> Result<Diagnosis, DiagnoseError> {
+    let (first, weights) = (&found.steps[0], &found.steps[found.steps.len() - 1].weights);
+    let before = Residuals::at(bench, &first.from, &split.confirm, weights).ok_or(DiagnoseError::NoBaseline)?;
+    let after = Residuals::at(bench, &found.last, &split.confirm, weights).ok_or(DiagnoseError::NoBaseline)?;
+    let (places, rest) = (localise::localise(bench.evidence, &before), localise::localise(bench.evidence, &after));
+    let finding = finding(bench, found, (&before, &after), &rest);
+    let verdict = finding.verdict();
+    let believed = matches!(verdict.kind, Kind::Named | Kind::Class);
+    let kept = if believed { &found.last } else { &first.from };
+    let shown = if believed { &after } else { &before };
+    let [joints, add, add_s] = replayed(bench, [&first.from, kept], session, (admitted, split))?;
+    let gap = Gap {
+        unit: "sigma",
+        before: before.mean_square(),
+        after: shown.mean_square(),
+        floor: FLOOR,
+        shrink: shown.shrink(&before, options.seed),
+        explainable_fraction: Left { before: before.mean_square(), after: shown.mean_square(), floor: FLOOR }
+            .explained(),
+        joint_rms_rad: joints,
+        object_add_m: add,
+        object_add_s_m: add_s,
+    };
+    let names = |set: &[usize]| set.iter().map(|clip| admitted.files[*clip].clone()).collect();
+    let largest = rest.first().map(|place| (place.channel.as_str(), place.regime.as_str()));
+    Ok(Diagnosis {
+        gap,
+        candidates: candidates(bench, found, split, (&before, &finding), verdict.kind, options.seed),
+        next_experiment: match verdict.kind {
+            Kind::Unexplained => advice::unexplained(largest),
+            Kind::None => "Nothing is open; record the next session as usual.".into(),
+            _ => advice::separating(&verdict.effects.iter().map(String::as_str).collect::<Vec<_>>()),
+        },
+        verdict,
+        places,
+        clips: Clips { train: names(&split.train), choose: names(&split.choose), confirm: names(&split.confirm) },
+        seconds: 0.0,
+        session: session.folder.display().to_string(),
+        seed: options.seed,
+        theta: bench.library.theta(&kept.full),
+        theta_file: None,
+        traces: traces(bench.evidence, (&before, shown), &admitted.files),
+    })
+}
+
+fn finding<'a, E: Evidence>(
+    bench: &Bench<'a, E>,
+    found: &Found,
+    (before, after): (&Residuals, &Residuals),
+    rest: &[Place],
+) -> Finding<'a> {
+    let name = |effect: &usize| bench.library.candidates[*effect].effect.name;
+    let mut rivals = Vec::new();
+    let mut sure: f64 = 1.0;
+    for (step, effect) in steps_of(found) {
+        let others = confidence::rivals(step, effect);
+        rivals.extend(others.iter().filter(|other| !found.last.effects.contains(other)).map(name));
+        let all = confidence::probabilities(step, false);
+        sure = sure.min(all.iter().find(|(candidate, _)| *candidate == effect).map_or(0.5, |(_, p)| *p));
+    }
+    Finding {
+        effects: found.last.effects.iter().map(name).collect(),
+        rivals,
+        confidence: sure,
+        left: Left { before: before.mean_square(), after: after.mean_square(), floor: FLOOR },
+        at_bounds: !leftovers::at_bounds(bench, &found.last).is_empty(),
+        place: rest.first().map_or_else(String::new, |place| format!("{} ({})", place.channel, place.regime)),
+    }
+}
+
+/// The steps in which the effects that were kept were added.
+fn steps_of(found: &Found) -> impl Iterator<Item = (&Step, usize)> {
+    found.steps.windows(2).filter_map(|pair| {
+        let added = pair[1].from.effects.iter().find(|effect| !pair[0].from.effects.contains(effect))?;
+        found.last.effects.contains(added).then_some((&pair[0], *added))
+    })
+}
+
+/// Mean joint error, ADD and ADD-S of the confirm clips at two hypotheses, by the code of `twin replay`.
+fn replayed<E: Evidence>(
+    bench: &Bench<'_, E>,
+    hypotheses: [&Hypothesis; 2],
+    session: &Session,
+    (admitted, split): (&Admitted, &Split),
+) -> Result<[Change; 3], DiagnoseError> {
+    let mut changes = [Change::default(); 3];
+    for (place, hypothesis) in hypotheses.into_iter().enumerate() {
+        let replayer = Replayer::new(&session.cell, Some(&bench.library.theta(&hypothesis.full)))?;
+        let gaps: Result<Vec<_>, ReplayError> =
+            split.confirm.iter().map(|clip| replayer.replay(admitted.clips[*clip].clone())).collect();
+        let gaps: Vec<_> = gaps?.into_iter().map(|(_, _, report)| report.gap).collect();
+        let mean = |values: Vec<f64>| (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64);
+        let squares = gaps.iter().filter_map(|gap| gap.joint_rms_rad.as_ref()).flatten().map(|rms| rms * rms).collect();
+        let figures = [
+            mean(squares).map(f64::sqrt),
+            mean(gaps.iter().filter_map(|gap| gap.object_add_m).collect()),
+            mean(gaps.iter().filter_map(|gap| gap.object_add_s_m).collect()),
+        ];
+        for (change, figure) in changes.iter_mut().zip(figures) {
+            if place == 0 { change.before = figure } else { change.after = figure }
+        }
+    }
+    Ok(changes)
+}
+
+fn candidates<E: Evidence>(
+    bench: &Bench<'_, E>,
+    found: &Found,
+    split: &Split,
+    (before, finding): (&Residuals, &Finding<'_>),
+    kind: Kind,
+    seed: u64,
+) -> Vec<Candidate> {
+    let first = &found.steps[0];
+    let likely = confidence::probabilities(first, found.last.effects.is_empty());
+    let weights = &found.steps[found.steps.len() - 1].weights;
+    let mut all: Vec<Candidate> = first
+        .trials
+        .iter()
+        .map(|trial| {
+            let effect = trial.scored.candidate;
+            let name = bench.library.candidates[effect].effect.name;
+            let kept = found.last.effects.contains(&effect) && matches!(kind, Kind::Named | Kind::Class);
+            let fit = if kept { Some(&found.last) } else { trial.fitted.as_ref().map(|(fit, _)| fit) };
+            let alone = trial.fitted.as_ref().and_then(|(fit, _)| Residuals::at(bench, fit, &split.confirm, weights));
+            let probability = likely.iter().find(|(candidate, _)| *candidate == effect).map_or(0.0, |(_, p)| *p);
+            let status = status(&trial.scored, kept, finding.rivals.contains(&name), kind);
+            Candidate {
+                effect: name.into(),
+                probability: if kept { probability.max(finding.confidence) } else { probability },
+                parameters: fit.map(|fit| parameters::of_effect(bench, fit, effect)).unwrap_or_default(),
+                shrink: alone.map_or(Share { value: 0.0, ci90: [0.0; 2] }, |alone| alone.shrink(before, seed)),
+                confusable_with: confusable(first, effect, bench),
+                status,
+                why: why(trial, status),
+            }
+        })
+        .collect();
+    all.sort_by(|a, b| {
+        let key = |c: &Candidate| (c.status != Status::Named, c.status != Status::Possible, -c.probability);
+        key(a).partial_cmp(&key(b)).unwrap_or(std::cmp::Ordering::Equal)
+    });
+    all
+}
+
+fn status(scored: &super::shortlist::Scored, kept: bool, rival: bool, kind: Kind) -> Status {
+    match kind {
+        Kind::Named if kept => Status::Named,
+        Kind::Class if kept || rival => Status::Possible,
+        _ if scored.signal < TESTABLE => Status::NotTestable,
+        _ => Status::RuledOut,
+    }
+}
+
+fn confusable<E: Evidence>(first: &Step, effect: usize, bench: &Bench<'_, E>) -> Vec<String> {
+    let near = confidence::rivals(first, effect);
+    near.iter().map(|other| bench.library.candidates[*other].effect.name.to_owned()).collect()
+}
+
+fn why(trial: &super::combine::Trial, status: Status) -> String {
+    let scored = &trial.scored;
+    match (&trial.fitted, status) {
+        (_, Status::NotTestable) => format!(
+            "even at its largest it would show by {:.1} sigma beyond what the other parameters can imitate",
+            scored.signal
+        ),
+        (Some((_, advantage)), _) => format!(
+            "foretells the clips better by {:.0} +- {:.0} nats, in {:.0} % of them, for {} numbers",
+            advantage.nats,
+            advantage.error,
+            100.0 * advantage.share,
+            scored.cost
+        ),
+        (None, _) => {
+            format!("its signature explains {:.1} % of what the baseline leaves", 100.0 * scored.cosine.powi(2))
+        }
+    }
+}
+
+/// Residuals of the channels with the largest gap, before and after, on the confirm clips.
+fn traces(evidence: &impl Evidence, (before, after): (&Residuals, &Residuals), files: &[String]) -> Vec<Trace> {
+    let mut sized: Vec<(f64, usize, usize)> = Vec::new();
+    for (place, (clip, residuals)) in before.clips.iter().enumerate() {
+        for channel in 0..evidence.channels().len() {
+            let rows = evidence.rows(*clip).iter().zip(residuals).filter(|(row, _)| row.channel == channel);
+            sized.push((rows.map(|(_, r)| r * r).sum(), place, channel));
+        }
+    }
+    sized.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let trace = |(_, place, channel): (f64, usize, usize)| {
+        let (clip, info) = (before.clips[place].0, &evidence.channels()[channel]);
+        let points = |residuals: &[f64]| {
+            let rows = evidence.rows(clip).iter().zip(residuals).filter(|(row, _)| row.channel == channel);
+            rows.map(|(row, residual)| [row.time, *residual]).collect::<Vec<_>>()
+        };
+        Trace {
+            clip: files[clip].clone(),
+            channel: format!("{} of {}", info.quantity, info.place),
+            unit: "σ".into(),
+            sigma: 1.0,
+            before: points(&before.clips[place].1),
+            after: points(&after.clips[place].1),
+        }
+    };
+    sized.into_iter().take(TRACES).map(trace).collect()
+}

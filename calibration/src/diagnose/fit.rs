@@ -1,0 +1,305 @@
+//! Hypotheses fitted to clips: the baseline's numbers and those of the effects that act, together, by bounded Gauss-Newton
+//! steps over the sweeps of [`super::sweep`].
+
+use super::evidence::{Evidence, Selected};
+use super::library::Library;
+use super::quadratic;
+use super::shortlist::{Scored, hold_numbers};
+use super::sweep::{Point, Precision, Reduced, Swept, sweep};
+use crate::estimate::{ClipModel, Options, Random, score};
+use crate::interrupt::Interrupt;
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+
+/// What every step of the diagnosis is given.
+pub struct Bench<'a, E> {
+    /// The clips.
+    pub evidence: &'a E,
+    /// The candidates.
+    pub library: &'a Library,
+    /// What varies from clip to clip.
+    pub random: Vec<Random>,
+    /// Whether the user asked for the end.
+    pub interrupt: &'a Interrupt,
+}
+
+/// A clip at a hypothesis.
+#[derive(Debug, Clone)]
+pub struct FittedClip {
+    /// Index of the clip.
+    pub clip: usize,
+    /// Its own numbers.
+    pub own: Vec<f64>,
+    /// Over (residual, free numbers), weighted, own numbers eliminated.
+    pub reduced: Reduced,
+}
+
+/// A hypothesis with its numbers.
+#[derive(Debug, Clone)]
+pub struct Hypothesis {
+    /// Candidates that act, in the order in which they were found.
+    pub effects: Vec<usize>,
+    /// All numbers.
+    pub full: Vec<f64>,
+    /// Indices of the free ones.
+    pub free: Vec<usize>,
+    /// Clips it was fitted to.
+    pub fitted: Vec<FittedClip>,
+}
+
+impl Hypothesis {
+    /// `-2 ln` of the likelihood of the clips it was fitted to.
+    #[must_use]
+    pub fn deviance(&self) -> f64 {
+        self.fitted.iter().map(|clip| clip.reduced.form[(0, 0)] + clip.reduced.volume).sum()
+    }
+
+    /// A clip's own numbers where it was fitted, else at rest.
+    #[must_use]
+    pub fn own(&self, clip: usize, count: usize) -> Vec<f64> {
+        let fitted = self.fitted.iter().find(|fitted| fitted.clip == clip);
+        fitted.map_or_else(|| vec![0.0; count], |fitted| fitted.own.clone())
+    }
+}
+
+/// How a fit is made.
+#[derive(Debug, Clone, Copy)]
+pub struct Effort {
+    /// At most so many linearisations.
+    pub iterations: usize,
+    /// How they are taken.
+    pub precision: Precision,
+}
+
+/// A fit has converged when a step promises less than this of the deviance: a fiftieth of a nat decides nothing.
+const TOLERANCE: f64 = 0.05;
+/// An effect weaker than this share of the strongest that is met in practice is none: two engines with other steps and other
+/// rules of integration differ by as much (0.04 % of a rotor's inertia and 0.02 % of viscous friction, measured).
+const NEGLIGIBLE: f64 = 0.003;
+/// Most trials with growing damping before a point counts as the best there is.
+const TRIALS: usize = 6;
+
+impl<E: Evidence> Bench<'_, E> {
+    /// Numbers that are free when these effects act.
+    #[must_use]
+    pub fn free(&self, effects: &[usize]) -> Vec<usize> {
+        let of_effects = effects.iter().flat_map(|effect| self.library.candidates[*effect].numbers.clone());
+        self.library.baseline.clone().chain(of_effects).collect()
+    }
+
+    /// Fits effects on clips from `full` on, each clip's own numbers from `near` on.
+    ///
+    /// `None` when the twin has no answer at the start.
+    #[must_use]
+    pub fn fit(
+        &self,
+        (effects, mut full): (&[usize], Vec<f64>),
+        clips: &[usize],
+        weights: &[f64],
+        near: Option<&Hypothesis>,
+        effort: Effort,
+    ) -> Option<Hypothesis> {
+        let free = self.free(effects);
+        let count = self.random.len();
+        let own = |clip: &usize| (*clip, near.map_or_else(|| vec![0.0; count], |near| near.own(*clip, count)));
+        let mut clips: Vec<(usize, Vec<f64>)> = clips.iter().map(own).collect();
+        let mut damping = 1e-4;
+        let mut at = self.linearise(&full, &free, &clips, effort.precision)?;
+        for _ in 1..effort.iterations {
+            if self.interrupt.asked() {
+                break;
+            }
+            let forms = at.reduced(self.evidence, weights);
+            let Some((to, to_own)) = self.improved(&full, &free, (&at, &forms), weights, &mut damping) else { break };
+            (full, clips) = (to, to_own);
+            at = self.linearise(&full, &free, &clips, effort.precision)?;
+        }
+        let forms = at.reduced(self.evidence, weights);
+        let fitted = clips.into_iter().zip(forms).map(|((clip, own), reduced)| FittedClip { clip, own, reduced });
+        Some(Hypothesis { effects: effects.to_vec(), full, free, fitted: fitted.collect() })
+    }
+
+    fn linearise(
+        &self,
+        full: &[f64],
+        free: &[usize],
+        clips: &[(usize, Vec<f64>)],
+        precision: Precision,
+    ) -> Option<Swept> {
+        let point = Point { full, free, probed: &[], clips, precision };
+        sweep(self.evidence, self.library, &point, &self.random, &|| ()).ok()
+    }
+
+    /// A point with a lower cost, along damped steps; `None` when there is none that is worth it.
+    #[allow(clippy::type_complexity)] // the numbers, and each clip with its own
+    fn improved(
+        &self,
+        full: &[f64],
+        free: &[usize],
+        (at, forms): (&Swept, &[Reduced]),
+        weights: &[f64],
+        damping: &mut f64,
+    ) -> Option<(Vec<f64>, Vec<(usize, Vec<f64>)>)> {
+        let size = 1 + free.len();
+        let sum = forms.iter().fold(DMatrix::zeros(size, size), |sum, reduced| sum + &reduced.form);
+        let kept: Vec<(usize, Vec<f64>)> = at.clips.iter().map(|clip| (clip.clip, clip.own.clone())).collect();
+        let now = self.cost(full, &kept, weights)?;
+        for _ in 0..TRIALS {
+            let step = self.bounded_step(full, free, &sum, *damping);
+            let promised = sum[(0, 0)] - quadratic::value(&sum, &(1..size).collect::<Vec<_>>(), step.as_slice());
+            let mut to = full.to_vec();
+            free.iter().zip(step.iter()).for_each(|(k, step)| to[*k] += step);
+            let own = |clip: &super::sweep::SweptClip| (clip.clip, at.own_after(clip, self.evidence, weights, &step));
+            let to_own: Vec<(usize, Vec<f64>)> = at.clips.iter().map(own).collect();
+            if self.cost(&to, &to_own, weights).is_some_and(|cost| cost < now) {
+                *damping = (*damping * 0.1).max(1e-9);
+                return Some((to, to_own));
+            }
+            if promised < TOLERANCE {
+                return None;
+            }
+            *damping = (*damping * 20.0).max(1e-3);
+        }
+        None
+    }
+
+    /// A damped step that keeps numbers at a bound there when they are pushed against it.
+    fn bounded_step(&self, full: &[f64], free: &[usize], sum: &DMatrix<f64>, damping: f64) -> DVector<f64> {
+        let mut form = sum.clone();
+        for k in 1..form.ncols() {
+            form[(k, k)] *= 1.0 + damping;
+        }
+        let room = |i: usize| {
+            let unknown = &self.library.unknowns[free[i]];
+            (unknown.lower - full[free[i]], unknown.upper - full[free[i]])
+        };
+        let mut step = DVector::zeros(free.len());
+        let mut held = vec![false; free.len()];
+        loop {
+            let moving: Vec<usize> = (0..free.len()).filter(|i| !held[*i]).collect();
+            // What is held at a bound pulls on the others: its share of the slope moves into the constant column.
+            let fixed: Vec<usize> = (0..free.len()).filter(|i| held[*i]).collect();
+            let mut pulled = form.clone();
+            for j in 0..form.ncols() {
+                let pull: f64 = fixed.iter().map(|i| form[(j, i + 1)] * step[*i]).sum();
+                pulled[(j, 0)] += pull;
+            }
+            let found = quadratic::minimum(&pulled, &moving.iter().map(|i| i + 1).collect::<Vec<_>>());
+            let mut newly = false;
+            for (i, value) in moving.iter().zip(&found.at) {
+                let (low, high) = room(*i);
+                step[*i] = value.clamp(low, high);
+                if *value < low || *value > high {
+                    held[*i] = true;
+                    newly = true;
+                }
+            }
+            if !newly {
+                return step;
+            }
+        }
+    }
+
+    /// Sum of squared weighted residuals and of the own numbers in their sigmas.
+    fn cost(&self, full: &[f64], clips: &[(usize, Vec<f64>)], weights: &[f64]) -> Option<f64> {
+        let one = |(clip, own): &(usize, Vec<f64>)| {
+            let selected =
+                Selected { evidence: self.evidence, full: full.to_vec(), free: vec![], clips: vec![*clip], weights };
+            let mut out = Vec::new();
+            selected.residuals(0, &[], own, &mut out).ok()?;
+            let scattered = self.random.iter().zip(own).filter(|(effect, _)| effect.sigma > 0.0);
+            let penalty: f64 = scattered.map(|(effect, own)| (own / effect.sigma).powi(2)).sum();
+            Some(out.iter().map(|r| r * r).sum::<f64>() + penalty)
+        };
+        let costs: Vec<Option<f64>> = clips.par_iter().map(one).collect();
+        costs.into_iter().sum::<Option<f64>>().filter(|cost| cost.is_finite())
+    }
+
+    /// Adds a candidate, as the score test sees it, to a hypothesis and fits both.
+    #[must_use]
+    pub fn extend(
+        &self,
+        from: &Hypothesis,
+        scored: &Scored,
+        clips: &[usize],
+        weights: &[f64],
+        effort: Effort,
+    ) -> Option<Hypothesis> {
+        let mut effects = from.effects.clone();
+        effects.push(scored.candidate);
+        self.fit((&effects, self.begun(from.full.clone(), scored)), clips, weights, Some(from), effort)
+    }
+
+    /// `full` with the candidate as strong as the score test says, within what is met in practice.
+    #[must_use]
+    pub fn begun(&self, mut full: Vec<f64>, scored: &Scored) -> Vec<f64> {
+        let alternative = &self.library.candidates[scored.candidate].alternatives[scored.alternative];
+        for (k, value) in &alternative.form {
+            full[*k] = *value;
+        }
+        let mut vectors: Vec<Polar> = Vec::new();
+        for (probe, units) in alternative.probes.iter().zip(&scored.units) {
+            let [(size, value), rest @ ..] = &probe.moves[..] else { continue };
+            let resting = self.library.unknowns[*size].start;
+            let strength = units.clamp(-probe.largest, probe.largest) * (value - resting);
+            match (rest, vectors.iter_mut().find(|polar| polar.size == *size)) {
+                ([(_, quarter)], Some(polar)) => (polar.across, polar.quarter) = (strength, *quarter),
+                ([(angle, _)], None) => {
+                    vectors.push(Polar { size: *size, angle: *angle, along: strength, across: 0.0, quarter: 0.0 });
+                }
+                _ => full[*size] = resting + strength,
+            }
+        }
+        for Polar { size, angle, along, across, quarter } in vectors {
+            full[size] = along.hypot(across);
+            full[angle] = across.atan2(along) * quarter / std::f64::consts::FRAC_PI_2;
+        }
+        for k in self.library.candidates[scored.candidate].numbers.clone() {
+            let unknown = &self.library.unknowns[k];
+            full[k] = full[k].clamp(unknown.lower, unknown.upper);
+        }
+        full
+    }
+
+    /// Clips that were not fitted, at a hypothesis' numbers: their own numbers at their best, and their deviances.
+    #[must_use]
+    pub fn judge(&self, hypothesis: &Hypothesis, clips: &[usize], weights: &[f64]) -> Option<Vec<(Vec<f64>, f64)>> {
+        let full = hypothesis.full.clone();
+        let selected = Selected { evidence: self.evidence, full, free: Vec::new(), clips: clips.to_vec(), weights };
+        let judged = score(&selected, &[], &self.random, &Options { iterations: 10, tolerance: TOLERANCE }).ok()?;
+        Some(judged.into_iter().map(|clip| (clip.own, clip.deviance)).collect())
+    }
+
+    /// Whether an effect of a hypothesis is so weak that any two simulations differ as much.
+    #[must_use]
+    pub fn negligible(&self, effect: usize, full: &[f64]) -> bool {
+        let candidate = &self.library.candidates[effect];
+        let probes = candidate.alternatives.iter().flat_map(|alternative| &alternative.probes);
+        let strongest = probes.map(|probe| {
+            let (size, value) = probe.moves[0];
+            let resting = self.library.unknowns[size].start;
+            ((full[size] - resting) / (probe.largest * (value - resting))).abs()
+        });
+        strongest.fold(0.0, f64::max) < NEGLIGIBLE
+    }
+
+    /// The sum of fitted clips' forms, numbers held to their known ranges.
+    #[must_use]
+    pub fn held(&self, hypothesis: &Hypothesis) -> DMatrix<f64> {
+        let size = 1 + hypothesis.free.len();
+        let mut sum = hypothesis.fitted.iter().fold(DMatrix::zeros(size, size), |sum, clip| sum + &clip.reduced.form);
+        let columns: Vec<_> = hypothesis.free.iter().map(|k| super::sweep::Column::Number(*k)).collect();
+        hold_numbers(&mut sum, &columns, self.library);
+        sum
+    }
+}
+
+/// Two probes that turn the same size, along and across: length and angle of a vector.
+struct Polar {
+    size: usize,
+    angle: usize,
+    along: f64,
+    across: f64,
+    /// The angle at which the size acts across.
+    quarter: f64,
+}

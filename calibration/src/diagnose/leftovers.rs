@@ -1,0 +1,71 @@
+//! What the named effects leave: whether it is small enough to believe that they are the cause.
+//!
+//! A substitute for a cause that the library does not know fits a part of it, drifts to a bound, or helps on some clips
+//! and harms on others. What is left is then more than another engine's way of integrating leaves.
+
+use super::evidence::Evidence;
+use super::fit::{Bench, Hypothesis};
+
+/// Excess over the noise that any twin leaves, in squared sigmas: numerics, not physics.
+pub const NUMERICS: f64 = 3.0;
+/// A cause leaves no more than this share of the gap it closes.
+pub const SUBSTITUTE: f64 = 0.03;
+
+/// The gap in squared sigmas on clips that were not fitted.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Left {
+    /// Of the baseline.
+    pub before: f64,
+    /// Of the hypothesis.
+    pub after: f64,
+    /// What noise alone would leave.
+    pub floor: f64,
+}
+
+impl Left {
+    /// Whether something structured remains that is no numerics.
+    #[must_use]
+    pub fn too_much(&self) -> bool {
+        let excess = self.after - self.floor;
+        excess > NUMERICS && excess > SUBSTITUTE * (self.before - self.floor)
+    }
+
+    /// Share of the excess that is explained.
+    #[must_use]
+    pub fn explained(&self) -> f64 {
+        let excess = self.before - self.floor;
+        if excess <= 0.0 { 0.0 } else { ((self.before - self.after) / excess).clamp(0.0, 1.0) }
+    }
+}
+
+/// Effects of a hypothesis that were pushed against the bound of what is met in practice.
+#[must_use]
+pub fn at_bounds<E: Evidence>(bench: &Bench<'_, E>, hypothesis: &Hypothesis) -> Vec<usize> {
+    let at_bound = |k: &usize| {
+        let (value, unknown) = (hypothesis.full[*k], &bench.library.unknowns[*k]);
+        let room = 1e-3 * (unknown.upper - unknown.lower);
+        let resting = unknown.start;
+        let far = (value - resting).abs() > room;
+        far && (value > unknown.upper - room || value < unknown.lower + room)
+    };
+    let pushed = |effect: &usize| bench.library.candidates[*effect].sizes.iter().any(at_bound);
+    hypothesis.effects.iter().copied().filter(pushed).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_gap_that_closes_to_a_hundredth_is_explained_and_one_that_halves_is_not() {
+        let left = |after| Left { before: 1000.0, after, floor: 1.0 };
+        assert!(!left(12.0).too_much());
+        assert!(left(500.0).too_much());
+        assert!((left(500.0).explained() - 0.5005).abs() < 1e-3);
+    }
+
+    #[test]
+    fn what_numerics_leave_is_no_leftover() {
+        assert!(!Left { before: 2.0, after: 2.0, floor: 1.0 }.too_much());
+    }
+}

@@ -1,0 +1,222 @@
+//! The candidates: every effect of the registry that can show in the clips, as numbers a search may turn, with the probes
+//! by which its signature is taken.
+//!
+//! A signature is a difference over a finite step of the size that is met in practice, not a slope at zero: dry friction,
+//! play and saturation have no slope there. An effect with a form beside its size (a place, an axis, a speed) has one
+//! alternative for each of a few forms.
+
+use crate::estimate::Unknown;
+use crate::forward::setting::{self, Setting, Settings};
+use shared_mem::cell::Cell;
+use shared_mem::theta::Theta;
+use std::ops::Range;
+use twin::effects::{EffectInfo, Role, Shape, Stage, find, registry};
+
+/// All numbers of all hypotheses.
+#[derive(Debug, Clone)]
+pub struct Library {
+    /// From numbers to parameters of the cell.
+    pub settings: Settings,
+    /// Bounds, steps, and where the baseline begins; effects rest.
+    pub unknowns: Vec<Unknown>,
+    /// The joint that each number belongs to, from 0; `None` for numbers of the whole arm and of the object.
+    pub joints: Vec<Option<usize>>,
+    /// The baseline's numbers: gains, and the object's parameters.
+    pub baseline: Range<usize>,
+    /// Effects.
+    pub candidates: Vec<Candidate>,
+}
+
+/// One effect as a hypothesis.
+#[derive(Debug, Clone)]
+pub struct Candidate {
+    /// The effect.
+    pub effect: &'static EffectInfo,
+    /// Its numbers.
+    pub numbers: Range<usize>,
+    /// Those of them that say how strong it is.
+    pub sizes: Vec<usize>,
+    /// Forms to try.
+    pub alternatives: Vec<Alternative>,
+}
+
+/// An effect in one form.
+#[derive(Debug, Clone)]
+pub struct Alternative {
+    /// Numbers of the form.
+    pub form: Vec<(usize, f64)>,
+    /// Directions of its strength.
+    pub probes: Vec<Probe>,
+}
+
+/// One direction of an effect's strength: numbers and their values at one unit of it.
+#[derive(Debug, Clone)]
+pub struct Probe {
+    /// Number and value at one unit.
+    pub moves: Vec<(usize, f64)>,
+    /// Whether it acts one way only.
+    pub one_sided: bool,
+    /// Units at the strongest that is met in practice.
+    pub largest: f64,
+}
+
+impl Library {
+    /// The library of a cell: with effects on the arm, and with those on hit, slide and camera where clips have an object.
+    /// `base`: a complete theta whose effects act in the baseline already and are no candidates.
+    #[must_use]
+    pub fn new(cell: &Cell, base: &Theta, with_object: bool) -> Self {
+        let dof = base.arm.as_ref().map_or(0, |arm| arm.stiffness.len());
+        let mut numbers = setting::gains(cell, base);
+        if with_object {
+            numbers.extend(setting::object_parameters(cell, base));
+        }
+        for (_, unknown) in &mut numbers {
+            keep_known_gains(cell, unknown);
+        }
+        let baseline = 0..numbers.len();
+        let mut candidates = Vec::new();
+        let fits = |effect: &&EffectInfo| {
+            let known = base.effects.iter().any(|given| given.name == effect.name);
+            let visible = if effect.stage == Stage::Control { dof > 0 } else { with_object };
+            visible && !known
+        };
+        for effect in registry().iter().filter(fits) {
+            let at = numbers.len();
+            numbers.extend(setting::effect_settings(effect, dof));
+            candidates.push(Candidate::new(effect, at, &numbers));
+        }
+        let joints = numbers.iter().map(|(setting, _)| joint_of(setting)).collect();
+        let (all, unknowns): (Vec<Setting>, Vec<Unknown>) = numbers.into_iter().unzip();
+        Self { settings: Settings::new(base.clone(), all), unknowns, joints, baseline, candidates }
+    }
+
+    /// Where every search begins: the baseline's values, all effects at rest.
+    #[must_use]
+    pub fn start(&self) -> Vec<f64> {
+        self.unknowns.iter().map(|unknown| unknown.start).collect()
+    }
+
+    /// The parameters that go with these numbers, without effects that change nothing.
+    #[must_use]
+    pub fn theta(&self, numbers: &[f64]) -> Theta {
+        let mut theta = self.settings.theta(numbers);
+        let resting: Vec<&str> = (self.candidates.iter())
+            .filter(|candidate| candidate.sizes.iter().all(|k| numbers[*k] == self.unknowns[*k].start))
+            .map(|candidate| candidate.effect.name)
+            .collect();
+        theta.effects.retain(|effect| !resting.contains(&effect.name.as_str()));
+        theta
+    }
+
+    /// Index of the candidate with this name.
+    #[must_use]
+    pub fn find(&self, name: &str) -> Option<usize> {
+        self.candidates.iter().position(|candidate| candidate.effect.name == name)
+    }
+}
+
+fn joint_of(setting: &Setting) -> Option<usize> {
+    match *setting {
+        Setting::Stiffness(joint) | Setting::Damping(joint) => Some(joint),
+        Setting::Effect { name, parameter, index, .. } => {
+            let info = find(name)?.parameters.iter().find(|p| p.name == parameter)?;
+            if info.shape == Shape::PerJoint { index } else { None }
+        }
+        _ => None,
+    }
+}
+
+/// How far gains stated by value may be off: cell.toml's own statement, and a quarter more.
+const GAIN_TOLERANCE: f64 = 0.25;
+
+/// Gains that cell.toml states by value are right to 20 %: without that, viscous friction is a damping that is off.
+fn keep_known_gains(cell: &Cell, unknown: &mut Unknown) {
+    let Some(controller) = &cell.controller else { return };
+    let stated = (unknown.name.starts_with("stiffness") && controller.stiffness_range.is_none())
+        || (unknown.name.starts_with("damping") && controller.damping_range.is_none());
+    if stated {
+        // The bounds are symmetric in the logarithm around the stated value.
+        let nominal = (unknown.lower * unknown.upper).sqrt();
+        unknown.lower = nominal * (1.0 - GAIN_TOLERANCE);
+        unknown.upper = nominal * (1.0 + GAIN_TOLERANCE);
+        unknown.start = unknown.start.clamp(unknown.lower, unknown.upper);
+    }
+}
+
+impl Candidate {
+    fn new(effect: &'static EffectInfo, at: usize, numbers: &[(Setting, Unknown)]) -> Self {
+        let is_size = |setting: &Setting| match setting {
+            Setting::Effect { parameter, .. } => {
+                effect.parameters.iter().any(|p| p.name == *parameter && matches!(p.role, Role::Size { .. }))
+            }
+            _ => false,
+        };
+        let sizes: Vec<usize> = (at..numbers.len()).filter(|k| is_size(&numbers[*k].0)).collect();
+        let alternatives = alternatives(effect, at, &sizes, numbers);
+        Self { effect, numbers: at..numbers.len(), sizes, alternatives }
+    }
+}
+
+/// The step of a probe as a share of what is met in practice.
+const PROBE_SHARE: f64 = 0.1;
+
+fn alternatives(effect: &EffectInfo, at: usize, sizes: &[usize], numbers: &[(Setting, Unknown)]) -> Vec<Alternative> {
+    let probes: Vec<Probe> = sizes.iter().map(|k| probe(effect, *k, &numbers[*k])).collect();
+    let index = |parameter: &str| -> Vec<usize> {
+        let is = |setting: &Setting| matches!(setting, Setting::Effect { parameter: p, .. } if *p == parameter);
+        (at..numbers.len()).filter(|k| is(&numbers[*k].0)).collect()
+    };
+    let with = |form: Vec<(usize, f64)>| Alternative { form, probes: probes.clone() };
+    let set = |parameter: &str, value: f64| index(parameter).into_iter().map(|k| (k, value)).collect::<Vec<_>>();
+    match effect.name {
+        "joint_stribeck_friction" => [0.03, 0.1].map(|v| with(set("velocity", v))).to_vec(),
+        "stribeck_sliding_friction" => [0.05, 0.1, 0.2].map(|v| with(set("velocity", v))).to_vec(),
+        "payload" => [0.0, 0.06].map(|z| with(vec![(index("centre")[2], z)])).to_vec(),
+        "anisotropic_friction" => {
+            let (size, axis) = (sizes[0], index("axis")[0]);
+            let turned = |angle: f64| Probe { moves: vec![(size, 0.1), (axis, angle)], one_sided: false, largest: 5.0 };
+            vec![Alternative { form: Vec::new(), probes: vec![turned(0.0), turned(std::f64::consts::FRAC_PI_4)] }]
+        }
+        "friction_patch" => {
+            let (direction, distance) = (index("direction")[0], index("distance")[0]);
+            let lines = (0..8).flat_map(|eighth| {
+                let angle = f64::from(eighth) * std::f64::consts::FRAC_PI_4 - 3.0;
+                // Lines through the middle of a table half a metre in front of the robot, and beside it.
+                let middle = 0.5 * angle.cos();
+                [0.0, 0.06].map(|aside| vec![(direction, angle), (distance, middle + aside)])
+            });
+            lines.map(with).collect()
+        }
+        "torque_ripple" => {
+            let (order, phase) = (index("order"), index("phase"));
+            let orders = [10.0, 20.0, 40.0, 60.0, 100.0, 200.0];
+            orders.map(|k| ripple(sizes, (&order, k), &phase)).to_vec()
+        }
+        _ => vec![with(Vec::new())],
+    }
+}
+
+/// Sine and cosine of every joint's ripple.
+fn ripple(sizes: &[usize], (order, k): (&[usize], f64), phase: &[usize]) -> Alternative {
+    let quarter = |angle: f64| {
+        let of = move |(size, phase): (&usize, &usize)| Probe {
+            moves: vec![(*size, 0.1), (*phase, angle)],
+            one_sided: false,
+            largest: 5.0,
+        };
+        sizes.iter().zip(phase).map(of).collect::<Vec<_>>()
+    };
+    let probes = [quarter(0.0), quarter(std::f64::consts::FRAC_PI_2)].concat();
+    Alternative { form: order.iter().map(|index| (*index, k)).collect(), probes }
+}
+
+fn probe(effect: &EffectInfo, number: usize, (setting, unknown): &(Setting, Unknown)) -> Probe {
+    let Setting::Effect { parameter, inverse, .. } = setting else { unreachable!("sizes belong to effects") };
+    let info = effect.parameters.iter().find(|p| p.name == *parameter).expect("a size is a parameter");
+    let [lo, hi] = info.plausible;
+    let reach = if *inverse { lo.recip() } else { (hi - unknown.start).max(unknown.start - lo) };
+    let one_sided = *inverse || unknown.lower >= unknown.start || unknown.upper <= unknown.start;
+    let way = if unknown.upper > unknown.start { 1.0 } else { -1.0 };
+    let share = if info.shape == Shape::PerJoint || *inverse { PROBE_SHARE } else { 0.5 * PROBE_SHARE };
+    Probe { moves: vec![(number, unknown.start + way * share * reach)], one_sided, largest: 1.0 / share }
+}

@@ -1,0 +1,94 @@
+//! How well a hypothesis foretells clips: `-2 ln` of the likelihood of each clip at numbers that were not fitted to it.
+//!
+//! Clips of the choosing set were not fitted. Those of the training set are foretold by the numbers the others give: one
+//! Newton step away from the joint fit, which the linearised clips know already.
+
+use super::evidence::Evidence;
+use super::fit::{Bench, FittedClip, Hypothesis};
+use super::quadratic::{minimum, value};
+
+/// Deviance of every judged clip out of sample, and what it says about numbers.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Foretold {
+    /// Clip and deviance, training clips first.
+    pub clips: Vec<(usize, f64)>,
+}
+
+/// What one hypothesis is worth over another.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Advantage {
+    /// Sum over clips of the gain in ln of the likelihood [nats].
+    pub nats: f64,
+    /// Its standard error from the scatter between clips.
+    pub error: f64,
+    /// Share of the clips that gain.
+    pub share: f64,
+}
+
+/// Foretells training and choosing clips.
+#[must_use]
+pub fn foretell<E: Evidence>(
+    bench: &Bench<'_, E>,
+    hypothesis: &Hypothesis,
+    choose: &[usize],
+    weights: &[f64],
+) -> Option<Foretold> {
+    let mut clips = left_out(bench, hypothesis);
+    let judged = bench.judge(hypothesis, choose, weights)?;
+    clips.extend(choose.iter().copied().zip(judged.into_iter().map(|(_, deviance)| deviance)));
+    Some(Foretold { clips })
+}
+
+fn left_out<E: Evidence>(bench: &Bench<'_, E>, hypothesis: &Hypothesis) -> Vec<(usize, f64)> {
+    let all: Vec<usize> = (1..=hypothesis.free.len()).collect();
+    let total = bench.held(hypothesis);
+    let one = |clip: &FittedClip| {
+        let form = &clip.reduced.form;
+        let shift = bounded(bench, hypothesis, &minimum(&(&total - form), &all).at);
+        (clip.clip, value(form, &all, &shift) + clip.reduced.volume)
+    };
+    hypothesis.fitted.iter().map(one).collect()
+}
+
+fn bounded<E: Evidence>(bench: &Bench<'_, E>, hypothesis: &Hypothesis, shift: &[f64]) -> Vec<f64> {
+    let within = |(index, shift): (&usize, &f64)| {
+        let (value, unknown) = (hypothesis.full[*index], &bench.library.unknowns[*index]);
+        (value + shift).clamp(unknown.lower, unknown.upper) - value
+    };
+    hypothesis.free.iter().zip(shift).map(within).collect()
+}
+
+impl Foretold {
+    /// Sum of the deviances.
+    #[must_use]
+    pub fn deviance(&self) -> f64 {
+        self.clips.iter().map(|(_, deviance)| deviance).sum()
+    }
+
+    /// What this hypothesis is worth over another on the same clips.
+    #[must_use]
+    pub fn over(&self, other: &Self) -> Advantage {
+        let gains: Vec<f64> = self.clips.iter().zip(&other.clips).map(|((_, a), (_, b))| 0.5 * (b - a)).collect();
+        let count = gains.len() as f64;
+        let nats: f64 = gains.iter().sum();
+        let mean = nats / count;
+        let variance = gains.iter().map(|gain| (gain - mean).powi(2)).sum::<f64>() / (count - 1.0).max(1.0);
+        let share = gains.iter().filter(|gain| **gain > 0.0).count() as f64 / count;
+        Advantage { nats, error: (variance * count).sqrt(), share }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_advantage_that_one_clip_alone_gives_is_uncertain() {
+        let before = Foretold { clips: (0..6).map(|clip| (clip, 100.0)).collect() };
+        let even = Foretold { clips: (0..6).map(|clip| (clip, 90.0 + clip as f64 * 0.1)).collect() };
+        let one = Foretold { clips: (0..6).map(|clip| (clip, if clip == 3 { 40.0 } else { 100.0 })).collect() };
+        let [even, one] = [even.over(&before), one.over(&before)];
+        assert!(even.nats > 25.0 && even.nats > 10.0 * even.error && even.share == 1.0, "{even:?}");
+        assert!((one.nats - 30.0).abs() < 1e-9 && one.nats < 2.0 * one.error, "{one:?}");
+    }
+}

@@ -1,0 +1,90 @@
+//! Which clips are for what: fitting, choosing among hypotheses, and confirming, which is looked at once.
+//!
+//! Clips of the same command stay together: what was fitted on one would be known on the other.
+
+use shared_mem::recording::Clip;
+
+/// The three sets, as indices of clips in ascending order.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Split {
+    /// Parameters are fitted here.
+    pub train: Vec<usize>,
+    /// Hypotheses are chosen here.
+    pub choose: Vec<usize>,
+    /// The shrink is measured here.
+    pub confirm: Vec<usize>,
+}
+
+impl Split {
+    /// Half of the command groups for training, a quarter each for choosing and confirming, interleaved so that all three
+    /// see the whole session. `seed` turns the order.
+    #[must_use]
+    pub fn new(groups: &[Vec<usize>], seed: u64) -> Self {
+        let mut split = Self::default();
+        let offset = usize::try_from(seed % 4).unwrap_or(0);
+        for (place, group) in groups.iter().enumerate() {
+            let set = match (place + offset) % 4 {
+                1 => &mut split.choose,
+                3 => &mut split.confirm,
+                _ => &mut split.train,
+            };
+            set.extend(group);
+        }
+        for set in [&mut split.train, &mut split.choose, &mut split.confirm] {
+            set.sort_unstable();
+        }
+        split
+    }
+
+    /// Clips on which hypotheses may be judged: all but those for confirming.
+    #[must_use]
+    pub fn open(&self) -> Vec<usize> {
+        let mut open = [self.train.clone(), self.choose.clone()].concat();
+        open.sort_unstable();
+        open
+    }
+}
+
+/// Commands that differ by less than this everywhere are the same [rad].
+const SAME: f64 = 1e-4;
+
+/// Clips grouped by their commands, groups in the order of their first clips.
+#[must_use]
+pub fn by_command(clips: &[Clip]) -> Vec<Vec<usize>> {
+    let mut groups: Vec<Vec<usize>> = Vec::new();
+    for (index, clip) in clips.iter().enumerate() {
+        match groups.iter_mut().find(|group| same_command(&clips[group[0]], clip)) {
+            Some(group) => group.push(index),
+            None => groups.push(vec![index]),
+        }
+    }
+    groups
+}
+
+fn same_command(a: &Clip, b: &Clip) -> bool {
+    let (a, b) = (&a.desired, &b.desired);
+    !a.q.is_empty() && a.q.len() == b.q.len() && a.q.iter().zip(&b.q).all(|(a, b)| (a - b).abs() < SAME)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_clip_is_in_one_set_and_clips_of_one_command_are_in_the_same() {
+        let groups = vec![vec![0, 4], vec![1], vec![2, 7], vec![3], vec![5], vec![6]];
+        for seed in 0..4 {
+            let split = Split::new(&groups, seed);
+            let mut all = [split.train.clone(), split.choose.clone(), split.confirm.clone()].concat();
+            all.sort_unstable();
+            assert_eq!(all, (0..8).collect::<Vec<_>>());
+            for set in [&split.train, &split.choose, &split.confirm] {
+                for group in &groups {
+                    assert!(
+                        group.iter().all(|clip| set.contains(clip)) || group.iter().all(|clip| !set.contains(clip))
+                    );
+                }
+            }
+        }
+    }
+}

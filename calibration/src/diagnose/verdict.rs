@@ -1,0 +1,106 @@
+//! The finding: one of five verdicts, in a sentence, with the effects and how sure it is.
+
+use super::answer::{Kind, Verdict};
+use super::leftovers::{Left, NUMERICS};
+
+/// What a verdict is drawn from.
+#[derive(Debug, Clone)]
+pub struct Finding<'a> {
+    /// Effects that were found, in the order in which they were.
+    pub effects: Vec<&'a str>,
+    /// Effects that would do as well as one of them.
+    pub rivals: Vec<&'a str>,
+    /// How sure the weakest of them is.
+    pub confidence: f64,
+    /// The gap before and after.
+    pub left: Left,
+    /// Whether an effect was pushed to the bound of what is met in practice.
+    pub at_bounds: bool,
+    /// Where the gap, or what is left of it, is largest.
+    pub place: String,
+}
+
+/// Confidence of a finding that rests on nothing being there, or on something unknown being there.
+const NEGATIVE: f64 = 0.9;
+
+impl Finding<'_> {
+    /// The verdict.
+    #[must_use]
+    pub fn verdict(&self) -> Verdict {
+        let excess = self.left.before - self.left.floor;
+        if self.effects.is_empty() {
+            return if excess > NUMERICS { self.unexplained() } else { self.none() };
+        }
+        if self.at_bounds || self.left.too_much() {
+            return self.unexplained();
+        }
+        if self.rivals.is_empty() { self.named() } else { self.class() }
+    }
+
+    fn none(&self) -> Verdict {
+        let text = "No gap: with the parameters identified, the twin differs from the cell by noise alone.".into();
+        Verdict { kind: Kind::None, effects: Vec::new(), confidence: NEGATIVE, text }
+    }
+
+    fn named(&self) -> Verdict {
+        let names = self.effects.iter().map(|name| (*name).to_owned()).collect::<Vec<_>>();
+        let share = 100.0 * self.left.explained();
+        let verb = if names.len() == 1 { "causes" } else { "together cause" };
+        let text = format!(
+            "{} {verb} the gap: with it the twin closes {share:.0} % of what is not noise.",
+            names.join(" and ")
+        );
+        Verdict { kind: Kind::Named, effects: names, confidence: self.confidence, text }
+    }
+
+    fn class(&self) -> Verdict {
+        let all: Vec<String> = self.effects.iter().chain(&self.rivals).map(|name| (*name).to_owned()).collect();
+        let text = format!("One of {} causes the gap; these clips cannot tell which.", all.join(", "));
+        Verdict { kind: Kind::Class, effects: all, confidence: NEGATIVE, text }
+    }
+
+    fn unexplained(&self) -> Verdict {
+        let nearest = match &self.effects[..] {
+            [] => String::new(),
+            names => format!("; {} comes nearest and leaves too much", names.join(" with ")),
+        };
+        let text = format!(
+            "Nothing in the library explains the gap; it is largest in {}{nearest}.",
+            if self.place.is_empty() { "no single place" } else { &self.place }
+        );
+        Verdict { kind: Kind::Unexplained, effects: Vec::new(), confidence: NEGATIVE, text }
+    }
+}
+
+/// The verdict when the clips do not say enough.
+#[must_use]
+pub fn not_testable(why: &str) -> Verdict {
+    Verdict { kind: Kind::NotTestable, effects: Vec::new(), confidence: 1.0, text: format!("Not testable: {why}.") }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn finding<'a>(effects: Vec<&'a str>, before: f64, after: f64) -> Finding<'a> {
+        let left = Left { before, after, floor: 1.0 };
+        Finding { effects, rivals: Vec::new(), confidence: 0.95, left, at_bounds: false, place: "joint2".into() }
+    }
+
+    #[test]
+    fn the_five_verdicts() {
+        assert_eq!(finding(vec![], 1.5, 1.5).verdict().kind, Kind::None);
+        assert_eq!(finding(vec![], 500.0, 500.0).verdict().kind, Kind::Unexplained);
+        assert_eq!(finding(vec!["payload"], 500.0, 1.5).verdict().kind, Kind::Named);
+        assert_eq!(finding(vec!["payload"], 500.0, 200.0).verdict().kind, Kind::Unexplained);
+        let class = Finding { rivals: vec!["base_tilt"], ..finding(vec!["payload"], 500.0, 1.5) }.verdict();
+        assert_eq!((class.kind, class.effects.len()), (Kind::Class, 2));
+        assert_eq!(not_testable("one clip").kind, Kind::NotTestable);
+    }
+
+    #[test]
+    fn an_effect_beyond_what_is_met_in_practice_is_a_substitute() {
+        let pushed = Finding { at_bounds: true, ..finding(vec!["payload"], 500.0, 1.5) };
+        assert_eq!(pushed.verdict().kind, Kind::Unexplained);
+    }
+}
