@@ -48,21 +48,23 @@ pub fn sentence(scores: &Scores) -> String {
 }
 
 /// One of the rates.
-type Pick = fn(&Scores) -> Rate;
+pub(super) type Pick = fn(&Scores) -> Rate;
+
+/// The rates, in words.
+pub(super) const RATES: [(&str, Pick); 6] = [
+    ("effect named exactly", |s| s.top1),
+    ("named, or in the class", |s| s.top1_or_class),
+    ("among the first three", |s| s.top3),
+    ("both of two named", |s| s.exact_pair),
+    ("false alarms", |s| s.false_alarms),
+    ("unknown causes refused", |s| s.refusals),
+];
 
 fn table(scores: &[(&str, Scores)]) -> Markup {
-    let rates: [(&str, Pick); 6] = [
-        ("effect named exactly", |s| s.top1),
-        ("named, or in the class", |s| s.top1_or_class),
-        ("among the first three", |s| s.top3),
-        ("both of two named", |s| s.exact_pair),
-        ("false alarms", |s| s.false_alarms),
-        ("unknown causes refused", |s| s.refusals),
-    ];
     html! {
         table {
             tr { th { "" } @for (name, _) in scores { th { (name) } } }
-            @for (what, rate) in rates {
+            @for (what, rate) in RATES {
                 tr { td { (what) } @for (_, scores) in scores { td.nowrap { (cell(rate(scores))) } } }
             }
             tr { td { "gap closed, of what the true effect closes (median)" } @for (_, s) in scores { td { (percent(s.shrink_of_oracle)) } } }
@@ -116,7 +118,7 @@ fn curve(cases: &[Case]) -> Markup {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use crate::benchmark::score::{Said, Truth};
 
@@ -126,15 +128,20 @@ mod tests {
         Case { world: 1, truth, detectability: 20.0, oracle_shrink: 0.95, said }
     }
 
-    #[test]
-    fn the_page_tells_rates_confusions_and_calibration() {
+    /// One world of each kind, and one taken for another.
+    pub(in crate::report) fn cases() -> Vec<Case> {
         let one = |name: &str| Truth::Effects(vec![name.to_owned()]);
-        let cases = vec![
+        vec![
             case(one("payload"), "named", &["payload"]),
             case(one("payload"), "named", &["base_tilt"]),
             case(Truth::Nothing, "none", &[]),
             case(Truth::Outside("wear".into()), "unexplained", &[]),
-        ];
+        ]
+    }
+
+    #[test]
+    fn the_page_tells_rates_confusions_and_calibration() {
+        let cases = cases();
         let rule = Method { name: "largest RMSE".into(), cases: cases.clone() };
         let html = page(&[Method { name: "twinalign".into(), cases }, rule], "calibration benchmark");
         assert!(html.contains("The true effect was named in 50\u{a0}% of 2\u{a0}worlds"), "{html}");

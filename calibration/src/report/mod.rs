@@ -6,7 +6,7 @@
 //! | [`benchmark`] | the page of how good the diagnosis is |
 //! | [`demo_page`] | the page of the demo |
 //! | [`identification`] | the page of what was identified about arm or object |
-//! | [`terminal`] | diagnosis and identification in a few lines for a terminal |
+//! | [`terminal`] | diagnosis, identification and benchmark in a few lines for a terminal |
 //! | [`trace`] | what is left between robot and twin through a clip |
 //! | `frame` | what all pages share: style, headings, legends |
 //! | `figure` | pictures of plain numbers: bars, map, lines, intervals, matrix |

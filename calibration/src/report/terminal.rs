@@ -1,10 +1,12 @@
 //! What verbs print on stderr for a person: a short table, aligned, and the sentence at the end, where eyes are.
 
-use super::diagnosis::{has_effects, sizes, verdict_words, words};
+use super::benchmark::{Method, RATES};
+use super::diagnosis::{has_effects, is_known, sizes, verdict_words, words};
 use super::identification::{Parameter, Sheet};
 use super::quantity::{Unit, short};
 use super::scale::span;
 use super::share::{percent, percent_interval, probability};
+use crate::benchmark::score::Scores;
 use crate::diagnose::{Candidate, Diagnosis, Status};
 
 /// Places of the gap that are named.
@@ -28,7 +30,7 @@ pub fn identification(sheet: &Sheet) -> String {
 /// A diagnosis: gap, place, candidates in question, how many others, what to do next, and the verdict.
 #[must_use]
 pub fn diagnosis(diagnosis: &Diagnosis) -> String {
-    let mut lines = gap(diagnosis);
+    let mut lines = if is_known(diagnosis) { gap(diagnosis) } else { Vec::new() };
     let mut places: Vec<_> = diagnosis.places.iter().collect();
     places.sort_by(|a, b| b.share.total_cmp(&a.share));
     let places: Vec<String> = places
@@ -40,8 +42,9 @@ pub fn diagnosis(diagnosis: &Diagnosis) -> String {
         lines.push(format!("where: {}", places.join(", ")));
     }
     lines.extend(table(diagnosis.candidates.iter().filter_map(candidate).collect()));
-    let count = |status| diagnosis.candidates.iter().filter(|candidate| candidate.status == status).count();
-    lines.push(format!("{} ruled out, {} not testable", count(Status::RuledOut), count(Status::NotTestable)));
+    if !diagnosis.candidates.is_empty() {
+        lines.push(others(&diagnosis.candidates));
+    }
     if !diagnosis.next_experiment.is_empty() {
         lines.push(format!("next clip: {}", diagnosis.next_experiment));
     }
@@ -49,6 +52,12 @@ pub fn diagnosis(diagnosis: &Diagnosis) -> String {
     let sure = probability(verdict.confidence);
     lines.push(format!("{} (confidence {sure}): {}", verdict_words(verdict.kind), verdict.text));
     lines.join("\n")
+}
+
+/// How many candidates are out of the question.
+fn others(candidates: &[Candidate]) -> String {
+    let count = |status| candidates.iter().filter(|candidate| candidate.status == status).count();
+    format!("{} ruled out, {} not testable", count(Status::RuledOut), count(Status::NotTestable))
 }
 
 /// The gap, in sigma and in units of the hand.
@@ -103,6 +112,24 @@ fn numbers(parameter: &Parameter) -> Vec<Vec<String>> {
         vec![name, unit.interval(*value, interval), nominal, warning]
     };
     parameter.values.iter().enumerate().map(row).collect()
+}
+
+/// A benchmark: each rate of each method, and the finding.
+#[must_use]
+pub fn benchmark(methods: &[Method]) -> String {
+    let scores: Vec<Scores> = methods.iter().map(|method| Scores::of(&method.cases)).collect();
+    let head = std::iter::once(String::new()).chain(methods.iter().map(|method| method.name.clone()));
+    let mut rows = vec![head.collect()];
+    rows.extend(RATES.iter().map(|(what, rate)| {
+        let cells = scores.iter().map(rate).map(|rate| match rate.of {
+            0 => "-".to_owned(),
+            of => format!("{} ({} of {of})", percent_interval(rate.value(), rate.ci95), rate.hits),
+        });
+        std::iter::once((*what).to_owned()).chain(cells).collect()
+    }));
+    let mut lines = table(rows);
+    lines.extend(scores.first().map(super::benchmark::sentence));
+    lines.join("\n")
 }
 
 /// Lines with their columns one under the other.
@@ -167,5 +194,17 @@ command delay   named      97 %   closes 81 [76, 85] %   delay 11.9 [11.2, 12.6]
 next clip: Play a chirp up to 10 Hz.
 cause named (confidence 97 %): Commands reach the robot 12 ms late <here>.";
         assert_eq!(text, expected);
+    }
+
+    #[test]
+    fn a_benchmark_shows_methods_side_by_side() {
+        let cases = crate::report::benchmark::tests::cases();
+        let text =
+            benchmark(&["twinalign", "largest RMSE"].map(|name| Method { name: name.into(), cases: cases.clone() }));
+        assert!(text.contains("twinalign") && text.contains("50 [1, 99] % (1 of 2)"), "{text}");
+        assert!(
+            text.lines().last().is_some_and(|line| line.starts_with("The true effect was named in 50 %")),
+            "{text}"
+        );
     }
 }

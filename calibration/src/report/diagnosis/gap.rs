@@ -6,6 +6,11 @@ use crate::report::figure::bars::{Row, bars};
 use crate::report::frame::legend;
 use maud::{Markup, html};
 
+/// Whether there were clips to measure the gap on.
+pub(in crate::report) fn is_known(diagnosis: &Diagnosis) -> bool {
+    diagnosis.gap.before > 0.0
+}
+
 /// How to read the bars.
 pub(super) fn reading(diagnosis: &Diagnosis) -> &'static str {
     if has_effects(diagnosis) {

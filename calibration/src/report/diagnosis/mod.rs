@@ -4,6 +4,7 @@ mod candidates;
 mod gap;
 
 pub(super) use candidates::sizes;
+pub(super) use gap::is_known;
 
 use super::figure::where_map::{Cell, where_map};
 use super::frame::{facts, figure, frame, unbroken};
@@ -18,16 +19,16 @@ const SHOWN_CLIPS: usize = 4;
 /// The page.
 #[must_use]
 pub fn page(diagnosis: &Diagnosis) -> String {
-    let bars =
-        figure("How large the gap is, and how much of it goes", gap::reading(diagnosis), &gap::picture(diagnosis));
     let body = html! {
         (head(diagnosis))
-        (bars)
+        @if gap::is_known(diagnosis) {
+            (figure("How large the gap is, and how much of it goes", gap::reading(diagnosis), &gap::picture(diagnosis)))
+        }
         @if !diagnosis.places.is_empty() {
             (figure("Where it lies", "Share of the squared gap in each stage, channel and regime.", &map(diagnosis)))
         }
         @if !diagnosis.traces.is_empty() { (residuals(diagnosis)) }
-        (candidates::sections(&diagnosis.candidates))
+        @if !diagnosis.candidates.is_empty() { (candidates::sections(&diagnosis.candidates)) }
         @if !diagnosis.next_experiment.is_empty() {
             section { h2 { "The next clip" } p.next { (diagnosis.next_experiment) } }
         }
@@ -231,11 +232,24 @@ pub(super) mod tests {
     fn a_page_without_a_cause_shows_no_after() {
         let mut diagnosis = named();
         diagnosis.verdict = Verdict { kind: Kind::None, effects: vec![], confidence: 0.99, text: "No gap.".into() };
-        diagnosis.candidates.clear();
+        diagnosis.candidates.retain(|candidate| candidate.status == Status::RuledOut);
         diagnosis.places.clear();
         diagnosis.traces.clear();
         let html = page(&diagnosis);
         assert!(html.contains("no gap beyond the noise") && !html.contains("1.40 \u{3c3}"), "{html}");
         assert!(html.contains("None of them is named or still possible"));
+    }
+
+    #[test]
+    fn what_could_not_be_tested_shows_no_gap_of_zero() {
+        let mut diagnosis = named();
+        diagnosis.verdict.kind = Kind::NotTestable;
+        diagnosis.gap.before = 0.0;
+        diagnosis.candidates.clear();
+        diagnosis.places.clear();
+        let html = page(&diagnosis);
+        assert!(
+            html.contains("cannot be told") && !html.contains("How large the gap is") && !html.contains("Candidates")
+        );
     }
 }

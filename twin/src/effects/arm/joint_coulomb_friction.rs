@@ -78,7 +78,8 @@ mod tests {
     #[test]
     fn a_driven_arm_sticks_in_the_joints_that_friction_holds_and_in_no_other() {
         let arm = crate::arm::ArmModel::fr3();
-        let theta = "[[effect]]\nname = \"joint_coulomb_friction\"\ncoulomb = [0.9, 0.9, 0.9, 0.9, 0.6, 0.4, 0.3]\ncreep = 0.0";
+        let theta =
+            "[[effect]]\nname = \"joint_coulomb_friction\"\ncoulomb = [0.9, 0.9, 0.9, 0.9, 0.6, 0.4, 0.3]\ncreep = 0.0";
         let theta: shared_mem::theta::Theta =
             shared_mem::toml_file::parse(theta, std::path::Path::new("theta.toml")).expect("a theta.toml");
         let effects = crate::effects::Effects::from_theta(&theta.effects, 7).expect("a known effect").arm;

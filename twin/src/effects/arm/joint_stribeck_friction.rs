@@ -54,7 +54,8 @@ mod tests {
     use super::super::test_arm::{ROTOR, effects, joint, run, turning};
     use crate::arm::JointState;
 
-    const BLOCK: &str = "[[effect]]\nname = \"joint_stribeck_friction\"\ncoulomb = 0.2\nexcess = 0.15\nvelocity = 0.05\ncreep = 0.0";
+    const BLOCK: &str =
+        "[[effect]]\nname = \"joint_stribeck_friction\"\ncoulomb = 0.2\nexcess = 0.15\nvelocity = 0.05\ncreep = 0.0";
 
     #[test]
     fn breaking_loose_takes_the_excess_and_fast_motion_does_not_feel_it() {
