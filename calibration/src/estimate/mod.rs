@@ -13,6 +13,7 @@
 //! | [`search`] | search without slopes, and its loop |
 //! | [`swarm`], [`evolution`] | two of them |
 //! | `views` | a model with its calls counted, with numbers given, with some of its clips |
+//! | [`scatter`] | how much own numbers scatter, from the clips |
 //!
 //! Residuals are in units of their standard deviation. Everything is deterministic: clips are worked on by many threads,
 //! but always summed in their order.
@@ -22,6 +23,7 @@ pub mod interval;
 pub mod least_squares;
 pub mod linear;
 pub mod problem;
+pub mod scatter;
 pub mod search;
 pub mod swarm;
 mod views;

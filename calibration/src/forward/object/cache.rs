@@ -4,6 +4,7 @@ use super::rollout::Path;
 use nalgebra::Isometry3;
 use shared_mem::theta::{ArmTheta, EffectTheta, Theta};
 use std::collections::VecDeque;
+use std::sync::{Arc, Mutex, PoisonError};
 use twin::effects::{self, Place};
 use twin::rollout::{CellTrace, Checkpoint};
 
@@ -31,7 +32,7 @@ pub(super) struct Approach {
 }
 
 /// The hit, to the moment at which the tool has let go.
-#[derive(Debug, Clone)]
+#[derive(Debug)]
 pub(super) struct Hit {
     pub(super) theta: Theta,
     pub(super) start: Isometry3<f64>,
@@ -41,11 +42,17 @@ pub(super) struct Hit {
     pub(super) contact_ns: Option<u64>,
 }
 
-/// What is kept of one clip, the oldest given up first.
+/// What is kept of one clip, the oldest given up first. It may be asked by many threads; two that miss the same at the
+/// same time both simulate it, and find the same.
 #[derive(Debug, Default)]
 pub(super) struct ClipCache {
-    approaches: VecDeque<Approach>,
-    hits: VecDeque<Hit>,
+    kept: Mutex<Kept>,
+}
+
+#[derive(Debug, Default)]
+struct Kept {
+    approaches: VecDeque<Arc<Approach>>,
+    hits: VecDeque<Arc<Hit>>,
 }
 
 impl ArmKey {
@@ -59,21 +66,33 @@ impl ArmKey {
 }
 
 impl ClipCache {
-    pub(super) fn approach(&self, key: &ArmKey) -> Option<&Approach> {
-        self.approaches.iter().find(|approach| approach.key == *key)
+    pub(super) fn approach(&self, key: &ArmKey) -> Option<Arc<Approach>> {
+        self.with(|kept| kept.approaches.iter().find(|approach| approach.key == *key).cloned())
     }
 
-    pub(super) fn keep_approach(&mut self, approach: Approach) {
-        self.approaches.truncate(APPROACHES - 1);
-        self.approaches.push_front(approach);
+    pub(super) fn keep_approach(&self, approach: Approach) -> Arc<Approach> {
+        let approach = Arc::new(approach);
+        self.with(|kept| {
+            kept.approaches.truncate(APPROACHES - 1);
+            kept.approaches.push_front(Arc::clone(&approach));
+        });
+        approach
     }
 
-    pub(super) fn hit(&self, theta: &Theta, start: &Isometry3<f64>) -> Option<&Hit> {
-        self.hits.iter().find(|hit| hit.start == *start && hit.theta == *theta)
+    pub(super) fn hit(&self, theta: &Theta, start: &Isometry3<f64>) -> Option<Arc<Hit>> {
+        self.with(|kept| kept.hits.iter().find(|hit| hit.start == *start && hit.theta == *theta).cloned())
     }
 
-    pub(super) fn keep_hit(&mut self, hit: Hit) {
-        self.hits.truncate(HITS - 1);
-        self.hits.push_front(hit);
+    pub(super) fn keep_hit(&self, hit: Hit) -> Arc<Hit> {
+        let hit = Arc::new(hit);
+        self.with(|kept| {
+            kept.hits.truncate(HITS - 1);
+            kept.hits.push_front(Arc::clone(&hit));
+        });
+        hit
+    }
+
+    fn with<T>(&self, look: impl FnOnce(&mut Kept) -> T) -> T {
+        look(&mut self.kept.lock().unwrap_or_else(PoisonError::into_inner))
     }
 }

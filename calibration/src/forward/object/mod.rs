@@ -40,9 +40,6 @@ use twin::sim::SimError;
 /// What the tracker's noise is taken for where cell.toml does not tell it, one sigma.
 const NOISE: PoseNoise = PoseNoise { position: 1e-3, rotation: 5e-3 };
 
-/// Rows of a pose.
-const POSE_ROWS: usize = 6;
-
 fn noise_of(cell: &Cell) -> PoseNoise {
     cell.object.as_ref().and_then(|object| object.pose_noise).unwrap_or(NOISE)
 }
@@ -50,17 +47,19 @@ fn noise_of(cell: &Cell) -> PoseNoise {
 /// How far a residual may be off for other reasons than noise, one sigma.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ModelError {
-    /// Of poses between the first touch and the moment the tool lets go [m].
-    pub position: f64,
-    /// The same [rad].
-    pub rotation: f64,
+    /// Of poses between the first touch and the moment the tool lets go [m, rad].
+    pub hit: PoseNoise,
+    /// Of poses from then on [m, rad]: one error of the whole rest, however many poses show it. Zero where own numbers
+    /// take what the hit leaves behind.
+    pub rest: PoseNoise,
     /// Of the joints from the hit on [rad]; `None` leaves the arm out.
     pub joints: Option<f64>,
 }
 
 impl Default for ModelError {
     fn default() -> Self {
-        Self { position: 3e-3, rotation: 0.03, joints: None }
+        let none = PoseNoise { position: 0.0, rotation: 0.0 };
+        Self { hit: PoseNoise { position: 3e-3, rotation: 0.03 }, rest: none, joints: None }
     }
 }
 
@@ -70,7 +69,7 @@ pub struct ObjectClips {
     noise: PoseNoise,
     error: ModelError,
     clips: Vec<ObjectClip>,
-    caches: Vec<Mutex<ClipCache>>,
+    caches: Vec<ClipCache>,
     /// Idle workers; as many as threads were ever at work.
     workers: Mutex<Vec<CellRollout>>,
     worker: CellRollout,
@@ -95,7 +94,7 @@ impl ObjectClips {
         let noise = noise_of(cell);
         let prepared = |clip| ObjectClip::new(clip, cell, noise.position);
         let clips: Vec<_> = clips.into_iter().filter_map(prepared).collect();
-        let caches = clips.iter().map(|_| Mutex::default()).collect();
+        let caches = clips.iter().map(|_| ClipCache::default()).collect();
         let worker = CellRollout::new(cell, None)?;
         let (error, workers) = (ModelError::default(), Mutex::default());
         Ok(Self { cell: cell.clone(), noise, error, clips, caches, workers, worker, settings })
@@ -107,6 +106,16 @@ impl ObjectClips {
     }
 
     /// How far residuals may be off for other reasons than noise.
+    pub fn model_error(&self) -> ModelError {
+        self.error
+    }
+
+    /// The tracker's noise that poses are held against.
+    pub fn noise(&self) -> PoseNoise {
+        self.noise
+    }
+
+    /// Changes [`Self::model_error`].
     pub fn set_model_error(&mut self, error: ModelError) {
         self.error = error;
     }
@@ -146,22 +155,49 @@ impl ObjectClips {
         let idle = self.workers.lock().expect("no rollout has panicked").pop();
         let mut worker = idle.unwrap_or_else(|| self.worker.clone());
         let theta = self.settings.theta(shared);
-        let outcome = {
-            let mut cache = self.caches[clip].lock().expect("no rollout has panicked");
-            let clip = &self.clips[clip];
-            Job { cell: &self.cell, clip, theta: &theta, own, worker: &mut worker, cache: &mut cache }.run()
-        };
+        let (clip, cache) = (&self.clips[clip], &self.caches[clip]);
+        let outcome = Job { cell: &self.cell, clip, theta: &theta, own, worker: &mut worker, cache }.run();
         self.workers.lock().expect("no rollout has panicked").push(worker);
         outcome
     }
 
-    /// One sigma of a pose's rows at a stamp.
-    fn sigma(&self, clip: &ObjectClip, stamp_ns: u64) -> PoseNoise {
-        if clip.commands.is_none() || stamp_ns <= clip.onset_ns || stamp_ns >= clip.free_ns {
-            return self.noise;
+    /// Measured less predicted, row by row as [`Self::rows`] says [m, rad].
+    ///
+    /// # Errors
+    /// [`Impossible`] when the cell cannot be simulated with these numbers.
+    pub fn errors(&self, clip: usize, shared: &[f64], own: &[f64]) -> Result<Vec<f64>, Impossible> {
+        let own = Values::new(own, self.clips[clip].recorded.kind);
+        let outcome = self.outcome(clip, shared, &own)?;
+        let clip = &self.clips[clip];
+        let poses = clip.recorded.object.poses.iter().zip(reported(&outcome, clip, &own));
+        let mut errors: Vec<f64> = poses.flat_map(|(a, b)| difference(&a.isometry(), &b.isometry())).collect();
+        if self.error.joints.is_some() {
+            let measured = &clip.recorded.measured;
+            for (row, predicted) in clip.arm_rows.iter().zip(&outcome.joints) {
+                errors.extend(measured.q_row(*row).iter().zip(predicted).map(|(q, predicted)| q - predicted));
+            }
         }
-        let PoseNoise { position, rotation } = self.noise;
-        PoseNoise { position: position.hypot(self.error.position), rotation: rotation.hypot(self.error.rotation) }
+        Ok(errors)
+    }
+
+    /// One sigma of every row.
+    fn sigmas(&self, clip: usize) -> Vec<f64> {
+        let (noise, error, rows) = (self.noise, self.error, self.rows(clip));
+        let poses = |part| rows.iter().filter(|row| row.part == part && row.channel == Channel::Position(0)).count();
+        // What all resting poses share counts once.
+        let many = (poses(Part::After).max(1) as f64).sqrt();
+        let of = |row: &Row, noise: f64, hit: f64, rest: f64| match row.part {
+            Part::Before => noise,
+            Part::Hit => noise.hypot(hit),
+            Part::Slide => noise.hypot(rest),
+            Part::After => noise.hypot(rest * many),
+        };
+        let sigma = |row: &Row| match row.channel {
+            Channel::Position(_) => of(row, noise.position, error.hit.position, error.rest.position),
+            Channel::Rotation(_) => of(row, noise.rotation, error.hit.rotation, error.rest.rotation),
+            Channel::Joint(_) => error.joints.unwrap_or(1.0),
+        };
+        rows.iter().map(sigma).collect()
     }
 }
 
@@ -182,29 +218,15 @@ impl ClipModel for ObjectClips {
     }
 
     fn residuals(&self, clip: usize, shared: &[f64], own: &[f64], out: &mut Vec<f64>) -> Result<(), Impossible> {
-        let own = Values::new(own, self.clips[clip].recorded.kind);
-        let outcome = self.outcome(clip, shared, &own)?;
-        let clip = &self.clips[clip];
-        let object = &clip.recorded.object;
-        out.clear();
-        for ((measured, stamp), predicted) in
-            object.poses.iter().zip(&object.stamps_ns).zip(reported(&outcome, clip, &own))
-        {
-            out.extend(difference(&measured.isometry(), &predicted.isometry(), self.sigma(clip, *stamp)));
-        }
-        if let Some(sigma) = self.error.joints {
-            let measured = &clip.recorded.measured;
-            for (row, predicted) in clip.arm_rows.iter().zip(&outcome.joints) {
-                out.extend(measured.q_row(*row).iter().zip(predicted).map(|(q, predicted)| (q - predicted) / sigma));
-            }
-        }
+        *out = self.errors(clip, shared, own)?;
+        out.iter_mut().zip(self.sigmas(clip)).for_each(|(error, sigma)| *error /= sigma);
         Ok(())
     }
 }
 
-/// Measured less predicted in sigmas: position along x, y, z, rotation vector about them, base frame.
-fn difference(measured: &Isometry3<f64>, predicted: &Isometry3<f64>, sigma: PoseNoise) -> [f64; POSE_ROWS] {
-    let shift = (measured.translation.vector - predicted.translation.vector) / sigma.position;
-    let turn = (measured.rotation * predicted.rotation.inverse()).scaled_axis() / sigma.rotation;
+/// Measured less predicted: position along x, y, z [m], rotation vector about them [rad], base frame.
+fn difference(measured: &Isometry3<f64>, predicted: &Isometry3<f64>) -> [f64; 6] {
+    let shift = measured.translation.vector - predicted.translation.vector;
+    let turn = (measured.rotation * predicted.rotation.inverse()).scaled_axis();
     [shift.x, shift.y, shift.z, turn.x, turn.y, turn.z]
 }

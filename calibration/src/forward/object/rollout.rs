@@ -12,6 +12,7 @@ use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use shared_mem::cell::{Cell, ClipKind};
 use shared_mem::frames::Pose;
 use shared_mem::theta::{ObjectTheta, Theta};
+use std::sync::Arc;
 use twin::arm::Joints;
 use twin::effects::CameraEffects;
 use twin::replay::object_start;
@@ -63,7 +64,7 @@ pub(super) struct Job<'a> {
     pub(super) theta: &'a Theta,
     pub(super) own: &'a Values,
     pub(super) worker: &'a mut CellRollout,
-    pub(super) cache: &'a mut ClipCache,
+    pub(super) cache: &'a ClipCache,
 }
 
 fn impossible(error: impl std::fmt::Display) -> Impossible {
@@ -88,10 +89,10 @@ impl Job<'_> {
         let rest = object_start::resting(&series, object, self.cell).ok_or_else(|| impossible("no object poses"))?;
         let start = self.moved(&rest.isometry());
         let hit = self.until_release(start)?;
-        let Hit { mut path, mut joints, checkpoint, contact_ns, .. } = hit;
-        if let Some(checkpoint) = checkpoint {
+        let (mut path, mut joints) = (hit.path.clone(), hit.joints.clone());
+        if let Some(checkpoint) = &hit.checkpoint {
             self.with_own_friction(object)?;
-            self.worker.resume(&checkpoint);
+            self.worker.resume(checkpoint);
             self.leave_behind();
             let mut rested = 0;
             let clip = self.clip;
@@ -106,35 +107,33 @@ impl Job<'_> {
             }
         }
         let joints = joints.joints.iter().map(|reading| reading.state.q).collect();
-        Ok(Outcome { object: path, joints, contact_ns, camera })
+        Ok(Outcome { object: path, joints, contact_ns: hit.contact_ns, camera })
     }
 
     /// From the start, or from what is kept, to the moment at which the tool has let go.
-    fn until_release(&mut self, start: Isometry3<f64>) -> Result<Hit, Impossible> {
+    fn until_release(&mut self, start: Isometry3<f64>) -> Result<Arc<Hit>, Impossible> {
         if let Some(hit) = self.cache.hit(self.theta, &start) {
-            return Ok(hit.clone());
+            return Ok(hit);
         }
         let key = ArmKey::new(self.theta, start);
-        if self.cache.approach(&key).is_none() {
-            let approach = self.approach(key.clone(), &start)?;
-            self.cache.keep_approach(approach);
-        }
-        let approach = self.cache.approach(&key).ok_or_else(|| impossible("no memory for the approach"))?;
+        let approach = match self.cache.approach(&key) {
+            Some(approach) => approach,
+            None => self.cache.keep_approach(self.approach(key, &start)?),
+        };
         let mut joints = approach.joints.clone();
         let mut path = Path { start_ns: approach.contact_ns.unwrap_or(0), poses: vec![start] };
-        let (contact_ns, from) = (approach.contact_ns, approach.checkpoint.clone());
         let mut checkpoint = None;
-        if let Some(from) = from {
-            self.worker.resume(&from);
+        if let Some(from) = &approach.checkpoint {
+            self.worker.resume(from);
             while self.worker.now_ns() < self.clip.free_ns {
                 self.tick(&mut joints);
                 self.keep(&mut path)?;
             }
             checkpoint = Some(self.worker.checkpoint());
         }
+        let contact_ns = approach.contact_ns;
         let hit = Hit { theta: self.theta.clone(), start, path, joints, checkpoint, contact_ns };
-        self.cache.keep_hit(hit.clone());
-        Ok(hit)
+        Ok(self.cache.keep_hit(hit))
     }
 
     fn approach(&mut self, key: ArmKey, start: &Isometry3<f64>) -> Result<Approach, Impossible> {
@@ -163,7 +162,8 @@ impl Job<'_> {
             angular_velocity: motion.angular_velocity + self.own.vector(Own::Spin),
         };
         self.with_own_friction(object)?;
-        let start_ns = self.clip.recorded.object.stamps_ns[0];
+        // What is reported first was one latency earlier.
+        let start_ns = self.clip.recorded.object.stamps_ns[0].saturating_sub(camera.latency_ns());
         self.worker.start(start_ns, None, Some(&state), None);
         let (mut path, mut rested) = (Path { start_ns, poses: vec![pose] }, 0);
         while self.worker.now_ns() < self.clip.end_ns && rested <= REST_PERIODS {
