@@ -10,6 +10,7 @@
 //! | [`diagnose`] | where the gap lies, what causes it, how far it shrinks |
 //! | [`estimate`] | fits over clips: what all clips share, what varies from clip to clip |
 //! | [`forward`] | what the twin makes of recorded clips, as residuals |
+//! | [`identify`] | the parameters that a session tells, and what it cannot tell |
 //! | [`report`] | pages with plots |
 //! | [`processes`] | the other programs as children |
 //! | [`interrupt`] | Ctrl-C |
@@ -21,6 +22,7 @@ pub mod demo;
 pub mod diagnose;
 pub mod estimate;
 pub mod forward;
+pub mod identify;
 pub mod interrupt;
 pub mod processes;
 pub mod progress;

@@ -88,6 +88,31 @@ impl Setting {
         }
     }
 
+    /// Name of the parameter that the number is one of: `stiffness`, `command_delay.delay`.
+    #[must_use]
+    pub fn parameter(&self) -> String {
+        match self {
+            Self::Effect { name, parameter, .. } => format!("{name}.{parameter}"),
+            other => other.name().split('[').next().unwrap_or_default().to_owned(),
+        }
+    }
+
+    /// The parameter's value for a value of the number.
+    #[must_use]
+    pub fn physical(&self, number: f64) -> f64 {
+        // An inverse below 0 has no meaning: as stiff as can be.
+        if matches!(self, Self::Effect { inverse: true, .. }) { number.max(0.0).recip() } else { number }
+    }
+
+    /// The parameter's SI unit; `1` without.
+    #[must_use]
+    pub fn physical_unit(&self) -> String {
+        match self {
+            Self::Effect { name, parameter, .. } => parameter_of(name, parameter).map_or("1", |p| p.unit).into(),
+            other => other.unit(),
+        }
+    }
+
     fn write(&self, theta: &mut Theta, value: f64, dof: usize) {
         match *self {
             Self::Stiffness(joint) => write_gain(theta.arm.as_mut().map(|arm| &mut arm.stiffness), joint, value),

@@ -1,0 +1,36 @@
+//! `calibration demo`.
+
+use super::print_json;
+use calibration::demo;
+use calibration::interrupt::Interrupt;
+use std::path::PathBuf;
+
+#[derive(Debug, clap::Args)]
+#[command(after_help = "\
+Starts a simulated robot with hidden gains and its twin as two processes, records a session while the twin shadows the
+robot, replays it with the gains of cell.toml and with the true ones, and writes FOLDER/report.html. Takes less than a minute.
+
+Examples:
+  calibration demo --out demo
+  calibration demo --out demo7 --seed 7 --clips 4 --json")]
+pub(super) struct DemoArguments {
+    /// Folder to create.
+    #[arg(long, value_name = "FOLDER", default_value = "demo")]
+    out: PathBuf,
+    /// Draws the hidden gains and the motions.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Clips to record.
+    #[arg(long, value_name = "N", default_value_t = 2, value_parser = clap::value_parser!(u32).range(1..=100))]
+    clips: u32,
+    /// Prints one JSON object on stdout at the end.
+    #[arg(long)]
+    json: bool,
+}
+
+pub(super) fn run(arguments: DemoArguments, interrupt: &Interrupt) -> anyhow::Result<()> {
+    let DemoArguments { out, seed, clips, json } = arguments;
+    let finding = demo::demo(&demo::Options { out, seed, clips }, interrupt)?;
+    eprintln!("{}", finding.table());
+    if json { print_json(&finding) } else { Ok(()) }
+}

@@ -1,0 +1,98 @@
+//! `calibration identify`.
+
+use super::print_json;
+use anyhow::Context as _;
+use calibration::identify::{Identification, Optimizer, arm};
+use calibration::interrupt::Interrupt;
+use calibration::report::terminal;
+use clap::{Subcommand, ValueEnum};
+use std::path::{Path, PathBuf};
+
+#[derive(Debug, Subcommand)]
+pub(super) enum Identify {
+    /// Stiffness and damping of every joint, and effects on request, from clips in which the arm moves.
+    Arm(ArmArguments),
+}
+
+#[derive(Debug, clap::Args)]
+#[command(after_help = "\
+The recorded commands are simulated until the twin's joints move as the robot's did. A quarter of the motions is held
+out: the error on them is what the twin is worth. What the clips cannot tell is said, with the reason.
+
+Ctrl-C keeps what was found so far beside --out; the same command goes on from there.
+
+Examples:
+  calibration identify arm monday --out theta.toml --report page.html
+  calibration identify arm monday --also command_delay,joint_coulomb_friction --out theta.toml
+  calibration identify arm monday --optimizer pso --json")]
+pub(super) struct ArmArguments {
+    /// Session folder, or one clip beside a cell.toml.
+    #[arg(value_name = "SESSION")]
+    session: PathBuf,
+    /// The way of searching.
+    #[arg(long, value_enum, default_value_t = Way::LeastSquares)]
+    optimizer: Way,
+    /// Where the parameters go: a theta.toml that every other command takes.
+    #[arg(long, value_name = "THETA.TOML")]
+    out: Option<PathBuf>,
+    /// Parameters that are known already.
+    #[arg(long, value_name = "THETA.TOML")]
+    parameters: Option<PathBuf>,
+    /// Effects to search besides, by the names of docs/effects.md: command_delay,rotor_inertia,payload,...
+    #[arg(long, value_name = "NAME,...", value_delimiter = ',')]
+    also: Vec<String>,
+    /// Points that pso and cma may try.
+    #[arg(long, value_name = "N", default_value_t = 4000, value_parser = clap::value_parser!(u32).range(1..))]
+    budget: u32,
+    /// Draws the clips that are held out, and the searches.
+    #[arg(long, default_value_t = 0)]
+    seed: u64,
+    /// Prints one JSON object on stdout at the end.
+    #[arg(long)]
+    json: bool,
+    /// Writes a page with pictures.
+    #[arg(long, value_name = "PAGE.HTML")]
+    report: Option<PathBuf>,
+}
+
+/// Ways of searching, by their names on the command line.
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum Way {
+    /// Bounded least squares on rollouts: the fastest.
+    LeastSquares,
+    /// A particle swarm.
+    Pso,
+    /// Covariance matrix adaptation.
+    Cma,
+}
+
+impl Way {
+    fn optimizer(self) -> Optimizer {
+        match self {
+            Self::LeastSquares => Optimizer::LeastSquares,
+            Self::Pso => Optimizer::Swarm,
+            Self::Cma => Optimizer::Evolution,
+        }
+    }
+}
+
+pub(super) fn run(identify: Identify, interrupt: &Interrupt) -> anyhow::Result<()> {
+    match identify {
+        Identify::Arm(arguments) => {
+            let ArmArguments { session, optimizer, out, parameters, also, budget, seed, json, report } = arguments;
+            let (optimizer, budget) = (optimizer.optimizer(), budget as usize);
+            let options = arm::Options { session, optimizer, out, parameters, also, budget, seed };
+            tell(&arm::identify(&options, interrupt)?, report.as_deref(), json)
+        }
+    }
+}
+
+fn tell(found: &Identification, report: Option<&Path>, json: bool) -> anyhow::Result<()> {
+    let sheet = found.sheet();
+    if let Some(report) = report {
+        std::fs::write(report, sheet.page())
+            .with_context(|| format!("{}; give --report a place that can be written", report.display()))?;
+    }
+    eprintln!("{}", terminal::identification(&sheet));
+    if json { print_json(found) } else { Ok(()) }
+}

@@ -1,0 +1,76 @@
+//! The command line of `calibration`: one file a verb.
+
+mod capture;
+mod demo;
+mod identify;
+
+use calibration::diagnose;
+use calibration::interrupt::Interrupt;
+use clap::{Parser, Subcommand};
+use serde::Serialize;
+use std::io::Write as _;
+
+/// Records how a robot cell moves, and says where its twin differs.
+#[derive(Debug, Parser)]
+#[command(
+    version,
+    arg_required_else_help = true,
+    after_help = "\
+Examples:
+  calibration demo --out demo
+  calibration capture excitation --cell config/fr3_cell.toml --clips 4 --out session
+  calibration identify arm session --out theta.toml --report page.html
+  calibration diagnose session --report report.html
+Every verb has its own --help with an example. Logs and progress go to stderr (RUST_LOG=debug for more)."
+)]
+pub(crate) struct Arguments {
+    #[command(subcommand)]
+    verb: Verb,
+}
+
+#[derive(Debug, Subcommand)]
+enum Verb {
+    /// Moves the arm through a running bridge (or starts one) and records clips into a session folder.
+    #[command(subcommand)]
+    Capture(capture::Capture),
+    /// Finds the parameters of controller or object from a session, with intervals, and says what it cannot tell.
+    #[command(subcommand)]
+    Identify(identify::Identify),
+    /// Where the twin differs from the cell, which effect causes it, and how far the gap shrinks with it.
+    Diagnose(diagnose::command::Arguments),
+    /// The whole story on the simulated cell: shadow, record, replay, explain.
+    Demo(demo::DemoArguments),
+}
+
+/// Runs the verb.
+///
+/// # Errors
+/// One line: what happened, and what to do.
+pub(crate) fn run(arguments: Arguments) -> anyhow::Result<()> {
+    let interrupt = Interrupt::listen()?;
+    match arguments.verb {
+        Verb::Capture(capture) => capture::run(capture, &interrupt),
+        Verb::Identify(identify) => identify::run(identify, &interrupt),
+        Verb::Diagnose(arguments) => {
+            let found = diagnose::command::run(&arguments, &interrupt)?;
+            if arguments.json { print_json(&found) } else { Ok(()) }
+        }
+        Verb::Demo(arguments) => demo::run(arguments, &interrupt),
+    }
+}
+
+/// A number from `LO / UNIT` to `HI / UNIT`.
+fn between<const LO: u32, const HI: u32, const UNIT: u32>(text: &str) -> Result<f64, String> {
+    let [lo, hi] = [LO, HI].map(|bound| f64::from(bound) / f64::from(UNIT));
+    match text.parse::<f64>() {
+        Ok(value) if (lo..=hi).contains(&value) => Ok(value),
+        _ => Err(format!("give a number from {lo} to {hi}")),
+    }
+}
+
+fn print_json(answer: &impl Serialize) -> anyhow::Result<()> {
+    let mut stdout = std::io::stdout().lock();
+    serde_json::to_writer(&mut stdout, answer)?;
+    writeln!(stdout)?;
+    Ok(())
+}

@@ -1,0 +1,143 @@
+//! How far the twin is off: clip by clip and for each set of clips, with what was found and with what was known before.
+
+use super::session::Used;
+use super::{ArmError, Model};
+use crate::estimate::{Options, Random, Subset, score};
+use crate::forward::arm::Channel;
+use crate::identify::answer::{ClipGap, Figures, Gap, Identification};
+use crate::identify::run::RunError;
+use crate::report::Trace;
+use rayon::prelude::*;
+
+/// Points of a picture's line.
+const POINTS: usize = 400;
+/// A clip whose error is so many times the usual one is odd: a clock that jumped, a hand on the arm.
+const ODD: f64 = 5.0;
+/// A use of a clip.
+const FITTED: &str = "fitted";
+const HELD_OUT: &str = "held out";
+
+/// Measured less predicted positions at the rows that count.
+struct Errors {
+    /// Seconds from the first row.
+    times: Vec<f64>,
+    /// Joints, row by row [rad].
+    rows: Vec<Vec<f64>>,
+}
+
+/// Fills in errors, their pictures, and which clips are odd. `numbers`: before and after.
+pub(super) fn fill(
+    answer: &mut Identification,
+    model: &Model<'_>,
+    clips: &Used,
+    random: &[Random],
+    numbers: [&[f64]; 2],
+) -> Result<(), ArmError> {
+    let train = clips.split.train.iter().map(|clip| (*clip, FITTED));
+    let jobs: Vec<(usize, &str)> = train.chain(clips.split.holdout.iter().map(|clip| (*clip, HELD_OUT))).collect();
+    let done: Vec<(ClipGap, Trace)> = jobs
+        .par_iter()
+        .map(|(clip, used)| one(model, *clip, used, random, numbers))
+        .collect::<Result<_, RunError>>()?;
+    let mean = |used: &str, of: fn(&ClipGap) -> Figures| {
+        let figures: Vec<Figures> = done.iter().filter(|(gap, _)| gap.used == used).map(|(gap, _)| of(gap)).collect();
+        Figures::mean(&figures)
+    };
+    answer.gap = Gap {
+        train: mean(FITTED, |gap| gap.after),
+        holdout: mean(HELD_OUT, |gap| gap.after),
+        train_before: mean(FITTED, |gap| gap.before),
+        holdout_before: mean(HELD_OUT, |gap| gap.before),
+    };
+    (answer.by_clip, answer.traces) = done.into_iter().unzip();
+    answer.warnings.extend(odd_clips(&answer.by_clip));
+    Ok(())
+}
+
+fn odd_clips(clips: &[ClipGap]) -> Vec<String> {
+    let error = |clip: &ClipGap| clip.after.joint_rms_rad.unwrap_or(0.0);
+    let mut sorted: Vec<f64> = clips.iter().map(error).collect();
+    sorted.sort_unstable_by(f64::total_cmp);
+    let usual = sorted.get(sorted.len() / 2).copied().unwrap_or(0.0);
+    let odd = clips.iter().filter(|clip| clips.len() > 2 && error(clip) > ODD * usual);
+    odd.map(|clip| {
+        format!(
+            "{}: its error is {:.0} times the usual one: look at its clock, its load and who touched the arm, and \
+             identify without it",
+            clip.file,
+            error(clip) / usual
+        )
+    })
+    .collect()
+}
+
+fn one(
+    model: &Model<'_>,
+    clip: usize,
+    used: &str,
+    random: &[Random],
+    [before, after]: [&[f64]; 2],
+) -> Result<(ClipGap, Trace), RunError> {
+    // What was known before may be beyond what can be simulated: then there is no figure.
+    let before = errors(model, clip, random, before).ok();
+    let after = errors(model, clip, random, after)?;
+    let joint_rms_rad = joint_rms(&after);
+    let worst = (0..joint_rms_rad.len()).max_by(|a, b| joint_rms_rad[*a].total_cmp(&joint_rms_rad[*b])).unwrap_or(0);
+    let trace = Trace {
+        clip: model.name(clip),
+        channel: format!("joint{}", worst + 1),
+        unit: "rad".into(),
+        sigma: model.sigma(Channel::Position, worst),
+        before: before.as_ref().map_or_else(Vec::new, |errors| line(errors, worst)),
+        after: line(&after, worst),
+    };
+    let gap = ClipGap {
+        file: model.name(clip),
+        used: used.into(),
+        before: before.as_ref().map_or_else(Figures::default, figures),
+        after: figures(&after),
+        joint_rms_rad,
+        warnings: model.warnings(clip).to_vec(),
+    };
+    Ok((gap, trace))
+}
+
+fn errors(model: &Model<'_>, clip: usize, random: &[Random], numbers: &[f64]) -> Result<Errors, RunError> {
+    let own = if random.iter().any(|effect| effect.sigma > 0.0) {
+        let alone = Subset { model, clips: &[clip] };
+        score(&alone, numbers, random, &Options::default())?.swap_remove(0).own
+    } else {
+        Vec::new()
+    };
+    let predicted = model.predict(clip, numbers, &own)?;
+    let measured = &model.clip(clip).measured;
+    let (mut times, mut rows) = (Vec::new(), Vec::new());
+    for row in model.averaged(clip).iter().flat_map(Clone::clone) {
+        times.push((measured.stamps_ns[row] - measured.stamps_ns[0]) as f64 * 1e-9);
+        let pairs = measured.q_row(row).iter().zip(&predicted[row].state.q).enumerate();
+        rows.push(pairs.map(|(joint, (q, p))| if model.is_dead(clip, joint) { 0.0 } else { q - p }).collect());
+    }
+    Ok(Errors { times, rows })
+}
+
+fn joint_rms(errors: &Errors) -> Vec<f64> {
+    let count = errors.rows.len().max(1) as f64;
+    let mut sums = vec![0.0; errors.rows.first().map_or(0, Vec::len)];
+    for row in &errors.rows {
+        sums.iter_mut().zip(row).for_each(|(sum, error)| *sum += error * error);
+    }
+    sums.into_iter().map(|sum| (sum / count).sqrt()).collect()
+}
+
+fn figures(errors: &Errors) -> Figures {
+    let squares = |row: &Vec<f64>| row.iter().map(|error| error * error).sum::<f64>();
+    let values = errors.rows.iter().map(Vec::len).sum::<usize>().max(1) as f64;
+    let rms = (errors.rows.iter().map(squares).sum::<f64>() / values).sqrt();
+    let norm = errors.rows.iter().map(|row| squares(row).sqrt()).sum::<f64>() / errors.rows.len().max(1) as f64;
+    Figures { joint_rms_rad: Some(rms), joint_norm_rad: Some(norm), ..Figures::default() }
+}
+
+fn line(errors: &Errors, joint: usize) -> Vec<[f64; 2]> {
+    let every = errors.times.len().div_ceil(POINTS).max(1);
+    errors.times.iter().zip(&errors.rows).step_by(every).map(|(time, row)| [*time, row[joint]]).collect()
+}

@@ -1,0 +1,191 @@
+//! The arm: stiffness and damping of every joint, and effects on request, from clips of any kind in which it moves.
+//!
+//! | file | owns |
+//! |---|---|
+//! | `session` | which clips of a session can be used, and for what |
+//! | `start` | where the search begins when little is known |
+//! | `finding` | what a fit tells, number by number |
+//! | `figures` | how far the twin is off |
+//! | `verdict` | what the clips cannot tell, and why |
+//! | `advice` | what to record next |
+
+mod advice;
+mod figures;
+mod finding;
+mod session;
+mod start;
+mod verdict;
+
+use super::answer::Identification;
+use super::run::{Optimizer, Outcome, Run, RunError};
+use crate::estimate::{Random, Subset, Unknown};
+use crate::forward::arm::ArmClips;
+use crate::forward::setting::{BaseError, complete, effect_settings, gains};
+use crate::forward::{Setting, Settings};
+use crate::interrupt::Interrupt;
+use finding::Finding;
+use session::Material;
+use shared_mem::cell::Cell;
+use shared_mem::recording::ReadError;
+use shared_mem::theta::Theta;
+use shared_mem::toml_file::TomlFileError;
+use std::path::PathBuf;
+use std::time::Instant;
+use twin::arm::ModelError;
+use twin::effects::{EffectInfo, Stage, find, registry};
+
+/// What to identify, and how.
+#[derive(Debug, Clone, Default)]
+pub struct Options {
+    /// The session's folder, or a clip beside a cell.toml.
+    pub session: PathBuf,
+    /// The way of searching.
+    pub optimizer: Optimizer,
+    /// Where the parameters go.
+    pub out: Option<PathBuf>,
+    /// Parameters that are known already.
+    pub parameters: Option<PathBuf>,
+    /// Effects whose parameters are searched besides.
+    pub also: Vec<String>,
+    /// Points whose cost a search without slopes may ask for.
+    pub budget: usize,
+    /// Draws the clips that are held out, and the searches.
+    pub seed: u64,
+}
+
+/// The arm cannot be identified.
+#[derive(Debug, thiserror::Error)]
+pub enum ArmError {
+    /// The session.
+    #[error(transparent)]
+    Read(#[from] ReadError),
+    /// The parameters that are known already.
+    #[error(transparent)]
+    Theta(#[from] TomlFileError),
+    /// The cell.
+    #[error(transparent)]
+    Base(#[from] BaseError),
+    /// The arm's model.
+    #[error(transparent)]
+    Model(#[from] ModelError),
+    /// There is nothing to identify.
+    #[error("cell.toml has no {0} block; add it, or identify the object")]
+    NoArm(&'static str),
+    /// No such effect on an arm.
+    #[error("--also {given}: no effect on the arm is called so; there are {known}")]
+    Effect {
+        /// The name given.
+        given: String,
+        /// The names there are.
+        known: String,
+    },
+    /// Nothing can be used.
+    #[error("{session}: no clip can be used for the arm: {why}")]
+    NoClip {
+        /// The session.
+        session: String,
+        /// Reasons, clip by clip.
+        why: String,
+    },
+    /// The search.
+    #[error(transparent)]
+    Run(#[from] RunError),
+    /// The answer cannot be written.
+    #[error("{path}: {source}; give --out a place that can be written")]
+    Write {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+}
+
+/// What a clip's prediction takes from a vector of numbers.
+type Numbers<'a> = Box<dyn Fn(&[f64]) -> Theta + Sync + 'a>;
+/// Clips, and what the twin makes of them.
+type Model<'a> = ArmClips<Numbers<'a>>;
+
+/// Identifies the arm; writes theta.toml where `out` says, with everything that was known before.
+///
+/// # Errors
+/// [`ArmError`] naming file, key or clip, and the remedy.
+pub fn identify(options: &Options, interrupt: &Interrupt) -> Result<Identification, ArmError> {
+    let began = Instant::now();
+    let Material { session, clips, left_out } = session::open(&options.session)?;
+    let cell = &session.cell;
+    if cell.robot.is_none() || cell.controller.is_none() {
+        return Err(ArmError::NoArm(if cell.robot.is_none() { "[robot]" } else { "[controller]" }));
+    }
+    let given = options.parameters.as_deref().map(Theta::read).transpose()?;
+    let base = complete(cell, given.as_ref())?;
+    let (settings, mut unknowns): (Vec<_>, Vec<_>) = searched(cell, &base, &options.also)?.into_iter().unzip();
+    let settings = Settings::new(base, settings);
+    let numbers: Numbers<'_> = Box::new(|shared| settings.theta(shared));
+    let (model, unusable) = ArmClips::new(cell, clips, session::CHANNELS, numbers)?;
+    let clips = session::used(&options.session, &model, left_out, unusable, options.seed)?;
+    session::hold_dead(&model, &clips, settings.settings(), &mut unknowns);
+    let before: Vec<f64> = unknowns.iter().map(|unknown| unknown.start).collect();
+    start::improve(cell, &model, &clips.split.train, settings.settings(), &mut unknowns, interrupt);
+    let random = model.random();
+    let outcome = search(options, &model, &clips, (&unknowns, &random), interrupt)?;
+    let finding = Finding::new(&settings, &unknowns, &outcome);
+    let mut answer = finding.answer(&before);
+    answer.session = options.session.display().to_string();
+    answer.optimizer = options.optimizer.name().into();
+    figures::fill(&mut answer, &model, &clips, &random, [&before, &outcome.fit.shared])?;
+    answer.not_identifiable = verdict::untold(&finding, &model, &clips);
+    answer.advice = advice::next(&finding, &clips);
+    clips.fill(&mut answer);
+    if let Some(out) = &options.out {
+        let text = settings.theta(&outcome.fit.shared).to_toml();
+        std::fs::write(out, text).map_err(|source| ArmError::Write { path: out.clone(), source })?;
+        answer.theta_file = out.display().to_string();
+    }
+    answer.seconds = began.elapsed().as_secs_f64();
+    Ok(answer)
+}
+
+/// Gains, and the parameters of the effects that were asked for.
+fn searched(cell: &Cell, base: &Theta, also: &[String]) -> Result<Vec<(Setting, Unknown)>, ArmError> {
+    let mut all = gains(cell, base);
+    let dof = base.arm.as_ref().map_or(0, |arm| arm.stiffness.len());
+    for name in also {
+        let on_arm = |effect: &&EffectInfo| effect.stage == Stage::Control;
+        let effect = find(name).filter(|effect| on_arm(effect)).ok_or_else(|| {
+            let known: Vec<&str> = registry().iter().filter(on_arm).map(|effect| effect.name).collect();
+            ArmError::Effect { given: name.clone(), known: known.join(", ") }
+        })?;
+        all.extend(effect_settings(effect, dof));
+    }
+    Ok(all)
+}
+
+fn search(
+    options: &Options,
+    model: &Model<'_>,
+    clips: &session::Used,
+    (unknowns, random): (&[Unknown], &[Random]),
+    interrupt: &Interrupt,
+) -> Result<Outcome, ArmError> {
+    let state = options.out.as_ref().map(|out| {
+        let mut name = out.clone().into_os_string();
+        name.push(".state.json");
+        PathBuf::from(name)
+    });
+    let names: Vec<&str> = unknowns.iter().map(|unknown| unknown.name.as_str()).collect();
+    let run = Run {
+        unknowns,
+        random,
+        optimizer: options.optimizer,
+        seed: options.seed,
+        budget: options.budget,
+        fingerprint: format!("{} {} {names:?} {:?}", options.optimizer.name(), options.seed, clips.fitted()),
+        state: state.as_deref(),
+        interrupt,
+    };
+    let train = &clips.split.train;
+    let all = Subset { model, clips: train };
+    // A rough fit to a third of the clips brings the rest near for a third of the price.
+    let first = Subset { model, clips: &train[..train.len().div_ceil(3)] };
+    Ok(run.search(&all, &first)?)
+}

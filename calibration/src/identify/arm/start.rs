@@ -1,0 +1,107 @@
+//! Where the search begins when cell.toml tells gains only by wide ranges, or a delay is searched: least squares find the
+//! bottom of a valley, not the valley.
+
+use super::Model;
+use super::session::joint_of;
+use crate::estimate::{ClipModel as _, Unknown};
+use crate::forward::Setting;
+use crate::forward::arm::Row;
+use crate::interrupt::Interrupt;
+use rayon::prelude::*;
+use shared_mem::cell::Cell;
+use shared_mem::msg::{Joints, MAX_JOINTS};
+
+/// Gains are tried at these powers of two times where they begin.
+const POWERS: std::ops::RangeInclusive<i32> = -4..=4;
+/// Delays that are tried [s].
+const DELAYS: [f64; 6] = [0.0, 0.005, 0.01, 0.02, 0.04, 0.08];
+/// So many clips tell where the valley is.
+const CLIPS: usize = 3;
+
+/// One place of the coarse grid: what was tried, and each joint's sum of squares there.
+struct Tried {
+    delay: f64,
+    numbers: Vec<f64>,
+    costs: Joints,
+}
+
+/// Moves the starts of gains that are known by range alone, joint by joint, and of a delay, to the best of a coarse grid.
+pub(super) fn improve(
+    cell: &Cell,
+    model: &Model<'_>,
+    train: &[usize],
+    settings: &[Setting],
+    unknowns: &mut [Unknown],
+    interrupt: &Interrupt,
+) {
+    let controller = cell.controller.as_ref();
+    let ranged = controller.is_some_and(|c| c.stiffness_range.is_some() || c.damping_range.is_some());
+    let delayed = settings.iter().any(is_delay);
+    if !ranged && !delayed {
+        return;
+    }
+    let powers: Vec<i32> = if ranged { POWERS.collect() } else { vec![0] };
+    let delays = if delayed { &DELAYS[..] } else { &DELAYS[..1] };
+    let grid: Vec<(f64, i32)> = delays.iter().flat_map(|delay| powers.iter().map(|power| (*delay, *power))).collect();
+    let clips = &train[..train.len().min(CLIPS)];
+    let all: Vec<Tried> = grid
+        .par_iter()
+        .map(|(delay, power)| {
+            let numbers = place(settings, unknowns, *delay, *power);
+            let costs = if interrupt.asked() { [f64::INFINITY; MAX_JOINTS] } else { costs(model, clips, &numbers) };
+            Tried { delay: *delay, numbers, costs }
+        })
+        .collect();
+    choose(model.arm().dof(), &all, settings, unknowns);
+}
+
+fn is_delay(setting: &Setting) -> bool {
+    matches!(setting, Setting::Effect { name: "command_delay", .. })
+}
+
+fn place(settings: &[Setting], unknowns: &[Unknown], delay: f64, power: i32) -> Vec<f64> {
+    let number = |(unknown, setting): (&Unknown, &Setting)| {
+        let value = match setting {
+            Setting::Stiffness(_) => unknown.start * 2.0_f64.powi(power),
+            // The damping follows so that the joint stays as damped as it was.
+            Setting::Damping(_) => unknown.start * 2.0_f64.powi(power).sqrt(),
+            setting if is_delay(setting) => delay,
+            _ => unknown.start,
+        };
+        value.clamp(unknown.lower, unknown.upper)
+    };
+    unknowns.iter().zip(settings).map(number).collect()
+}
+
+/// Of the delay that is best for all joints together, each joint takes the gains that are best for it.
+fn choose(dof: usize, all: &[Tried], settings: &[Setting], unknowns: &mut [Unknown]) {
+    let best = |delay: f64, joint: usize| {
+        let with = all.iter().filter(|tried| tried.delay == delay);
+        with.min_by(|a, b| a.costs[joint].total_cmp(&b.costs[joint]))
+    };
+    let total =
+        |delay: f64| (0..dof).map(|joint| best(delay, joint).map_or(f64::INFINITY, |t| t.costs[joint])).sum::<f64>();
+    let delays = all.iter().map(|tried| tried.delay);
+    let Some(delay) = delays.min_by(|a, b| total(*a).total_cmp(&total(*b))) else { return };
+    for (k, (setting, unknown)) in settings.iter().zip(unknowns).enumerate() {
+        let joint = joint_of(setting).unwrap_or(0);
+        if let Some(tried) = best(delay, joint).filter(|tried| tried.costs[joint].is_finite()) {
+            unknown.start = tried.numbers[k];
+        }
+    }
+}
+
+/// Sum of squared residuals of each joint; infinite where the twin cannot be simulated.
+fn costs(model: &Model<'_>, clips: &[usize], numbers: &[f64]) -> Joints {
+    let mut sums = [0.0; MAX_JOINTS];
+    let mut out = Vec::new();
+    for clip in clips {
+        if model.residuals(*clip, numbers, &[], &mut out).is_err() {
+            return [f64::INFINITY; MAX_JOINTS];
+        }
+        for (Row { joint, .. }, residual) in model.rows(*clip).zip(&out) {
+            sums[joint] += residual * residual;
+        }
+    }
+    sums
+}

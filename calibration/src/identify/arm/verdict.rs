@@ -1,0 +1,101 @@
+//! What the clips cannot tell, and why, number by number.
+
+use super::Model;
+use super::finding::Finding;
+use super::session::{Used, joint_of};
+use crate::forward::Setting;
+use crate::identify::answer::Untold;
+use twin::effects::find;
+
+/// A gain whose 95 % interval is wider than this share of it, to either side, is not told.
+const GAIN_SHARE: f64 = 0.25;
+/// A parameter of an effect whose interval is wider than this share of what is met in practice is not told.
+const EFFECT_SHARE: f64 = 0.5;
+/// Estimates that move together this closely are told apart badly.
+const TOGETHER: f64 = 0.95;
+/// An effect this near to neutral is absent, as a share of its search.
+const ABSENT: f64 = 1e-9;
+
+pub(super) fn untold(finding: &Finding<'_>, model: &Model<'_>, clips: &Used) -> Vec<Untold> {
+    let all = 0..finding.unknowns.len();
+    all.filter_map(|k| {
+        let why = why(finding, k, model, clips)?;
+        Some(Untold { parameter: finding.unknowns[k].name.clone(), why })
+    })
+    .collect()
+}
+
+fn why(finding: &Finding<'_>, k: usize, model: &Model<'_>, clips: &Used) -> Option<String> {
+    let (unknown, setting) = (&finding.unknowns[k], &finding.settings.settings()[k]);
+    if unknown.lower >= unknown.upper {
+        let joint = joint_of(setting).map_or(0, |joint| joint + 1);
+        return Some(format!("joint {joint} follows its command in no clip: look at the joint, then record again"));
+    }
+    let moves = match joint_of(setting) {
+        Some(joint) => format!("commands move joint {} by {:.3} rad", joint + 1, commanded(joint, model, clips)),
+        None => "the clips move the arm too little or too slowly".into(),
+    };
+    if finding.outcome.fit.information()[(k, k)] <= 0.0 {
+        return Some(format!("nothing in these clips depends on it: {moves}"));
+    }
+    if finding.held[k] {
+        return at_bound(finding, k);
+    }
+    let half = finding.intervals.half_width[k];
+    if half.is_infinite() {
+        return Some("it cannot be told from other numbers: only a combination of them shows".into());
+    }
+    let (size, share) = match setting {
+        Setting::Stiffness(_) | Setting::Damping(_) => (finding.outcome.fit.shared[k].abs(), GAIN_SHARE),
+        _ => (plausible(setting).unwrap_or(unknown.upper - unknown.lower), EFFECT_SHARE),
+    };
+    if half <= share * size {
+        return None;
+    }
+    let percent = 100.0 * half / size;
+    let together = partner(finding, k)
+        .map_or_else(String::new, |(name, r)| format!(" it moves together with {name} (correlation {r:.2}) and"));
+    Some(format!("its 95 % interval is ±{percent:.0} %:{together} {moves}; record larger and faster motions"))
+}
+
+/// A bound where an effect is absent is an answer; any other is the end of the search.
+fn at_bound(finding: &Finding<'_>, k: usize) -> Option<String> {
+    let (unknown, value) = (&finding.unknowns[k], finding.outcome.fit.shared[k]);
+    let setting = &finding.settings.settings()[k];
+    if matches!(setting, Setting::Effect { .. }) && value.abs() <= ABSENT * (unknown.upper - unknown.lower) {
+        return None;
+    }
+    let end = if value - unknown.lower < unknown.upper - value { "lower" } else { "upper" };
+    let remedy = match setting {
+        Setting::Stiffness(_) => "widen `stiffness_range` in cell.toml, or ask `calibration diagnose` what else acts",
+        Setting::Damping(_) => "widen `damping_range` in cell.toml, or ask `calibration diagnose` what else acts",
+        _ => "that is beyond what is met in practice, so something else acts",
+    };
+    Some(format!("the best value lies at or beyond {value:.4}, the {end} bound of the search: {remedy}"))
+}
+
+/// The number that this one moves together with most closely, and their correlation.
+fn partner<'a>(finding: &'a Finding<'_>, k: usize) -> Option<(&'a str, f64)> {
+    let correlation = &finding.intervals.correlation;
+    let others = (0..correlation.ncols()).filter(|other| *other != k).map(|other| (other, correlation[(k, other)]));
+    let (other, r) = others.max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()))?;
+    (r.abs() > TOGETHER).then(|| (finding.unknowns[other].name.as_str(), r))
+}
+
+/// Farthest travel of a joint's command in a clip that was fitted [rad].
+fn commanded(joint: usize, model: &Model<'_>, clips: &Used) -> f64 {
+    let travel = |clip: &usize| {
+        let desired = &model.clip(*clip).desired;
+        let values = desired.q.iter().skip(joint).step_by(desired.dof.max(1));
+        let (lo, hi) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(lo, hi), q| (lo.min(*q), hi.max(*q)));
+        hi - lo
+    };
+    clips.split.train.iter().map(travel).fold(0.0, f64::max)
+}
+
+/// Width of what is met in practice.
+fn plausible(setting: &Setting) -> Option<f64> {
+    let Setting::Effect { name, parameter, inverse, .. } = setting else { return None };
+    let [lo, hi] = find(name)?.parameters.iter().find(|p| p.name == *parameter)?.plausible;
+    Some(if *inverse { lo.recip() } else { hi - lo })
+}

@@ -1,0 +1,17 @@
+//! Identification: what a recorded session says about the parameters that cell.toml leaves open, how sure that is, and
+//! what it cannot say. Called by `calibration identify`. SI units, base frame.
+//!
+//! | module | owns |
+//! |---|---|
+//! | [`arm`] | gains of the controller, and arm effects on request |
+//! | [`split`] | which clips are fitted and which are held out |
+//! | [`answer`] | what is found, as JSON, as a page, as lines for a terminal |
+//! | `run` | the way of searching, its progress, its interruption and resumption |
+
+pub mod answer;
+pub mod arm;
+mod run;
+pub mod split;
+
+pub use answer::Identification;
+pub use run::Optimizer;
