@@ -1,5 +1,6 @@
 //! The command line of `calibration`: one file a verb.
 
+mod benchmark;
 mod capture;
 mod demo;
 mod identify;
@@ -38,6 +39,8 @@ enum Verb {
     Identify(identify::Identify),
     /// Where the twin differs from the cell, which effect causes it, and how far the gap shrinks with it.
     Diagnose(diagnose::command::Arguments),
+    /// How often the diagnosis is right, on simulated worlds of which the truth is known.
+    Benchmark(benchmark::BenchmarkArguments),
     /// The whole story on the simulated cell: shadow, record, replay, explain.
     Demo(demo::DemoArguments),
 }
@@ -55,6 +58,7 @@ pub(crate) fn run(arguments: Arguments) -> anyhow::Result<()> {
             let found = diagnose::command::run(&arguments, &interrupt)?;
             if arguments.json { print_json(&found) } else { Ok(()) }
         }
+        Verb::Benchmark(arguments) => benchmark::run(arguments, &interrupt),
         Verb::Demo(arguments) => demo::run(arguments, &interrupt),
     }
 }

@@ -106,22 +106,37 @@ pub enum DiagnoseError {
 /// # Errors
 /// [`DiagnoseError`]. Clips that do not say enough are no error but a verdict.
 pub fn diagnose(session: &Session, options: &Options, interrupt: &Interrupt) -> Result<Diagnosis, DiagnoseError> {
+    match admit(session) {
+        Err(Refused::NotTestable(why)) => {
+            let base = setting::complete(&session.cell, options.theta.as_ref())?;
+            Ok(conclude::not_testable(session, options, base, &why))
+        }
+        admitted => diagnose_clips(session, &admitted?, options, interrupt),
+    }
+}
+
+/// Diagnoses clips that were admitted already; of the session only the cell and the name count.
+///
+/// # Errors
+/// [`DiagnoseError`].
+pub fn diagnose_clips(
+    session: &Session,
+    admitted: &Admitted,
+    options: &Options,
+    interrupt: &Interrupt,
+) -> Result<Diagnosis, DiagnoseError> {
     let began = Instant::now();
     let base = setting::complete(&session.cell, options.theta.as_ref())?;
-    let admitted = match admit(session) {
-        Err(Refused::NotTestable(why)) => return Ok(conclude::not_testable(session, options, base, &why)),
-        other => other?,
-    };
     let library = Library::new(&session.cell, &base, admitted.with_object);
     let theta = |numbers: &[f64]| library.theta(numbers);
     let mut diagnosis = if admitted.with_object {
         let arm = ArmClips::new(&session.cell, &admitted.clips, theta).map_err(Refused::from)?;
         let object = ObjectClips::new(&session.cell, admitted.clips.clone(), library.settings.clone())?;
         let evidence = CellClips::new(Some(arm), object);
-        examine(&evidence, &library, session, &admitted, options, interrupt)?
+        examine(&evidence, &library, session, admitted, options, interrupt)?
     } else {
         let evidence = ArmClips::new(&session.cell, &admitted.clips, theta).map_err(Refused::from)?;
-        examine(&evidence, &library, session, &admitted, options, interrupt)?
+        examine(&evidence, &library, session, admitted, options, interrupt)?
     };
     diagnosis.seconds = began.elapsed().as_secs_f64();
     Ok(diagnosis)

@@ -113,6 +113,22 @@ impl Setting {
         }
     }
 
+    fn read(&self, theta: &Theta) -> Option<f64> {
+        let (arm, object) = (theta.arm.as_ref(), theta.object.as_ref());
+        match *self {
+            Self::Stiffness(joint) => arm?.stiffness.get(joint).copied(),
+            Self::Damping(joint) => arm?.damping.get(joint).copied(),
+            Self::Friction => object?.friction,
+            Self::Mass => object?.mass,
+            Self::CentreOfMass(axis) => object?.centre_of_mass.map(|centre| centre[axis]),
+            Self::TipFriction => object?.tip_friction,
+            Self::Effect { name, parameter, index, inverse } => {
+                let value = read_effect(&theta.effects, (name, parameter, index))?;
+                Some(if inverse { value.recip() } else { value })
+            }
+        }
+    }
+
     fn write(&self, theta: &mut Theta, value: f64, dof: usize) {
         match *self {
             Self::Stiffness(joint) => write_gain(theta.arm.as_mut().map(|arm| &mut arm.stiffness), joint, value),
@@ -128,6 +144,16 @@ impl Setting {
                 write_effect(&mut theta.effects, (name, parameter, index), value, dof);
             }
         }
+    }
+}
+
+fn read_effect(effects: &[EffectTheta], (name, parameter, index): (&str, &str, Option<usize>)) -> Option<f64> {
+    let value = effects.iter().find(|effect| effect.name == name)?.parameters.get(parameter)?;
+    let number = |value: &Value| value.as_float().or_else(|| value.as_integer().map(|value| value as f64));
+    match (value, index) {
+        // A single number stands for all joints.
+        (Value::Array(values), Some(index)) => values.get(index).and_then(number),
+        _ => number(value),
     }
 }
 
@@ -173,6 +199,12 @@ impl Settings {
             setting.write(&mut theta, *value, self.dof);
         }
         theta
+    }
+
+    /// The numbers that go with parameters; `None` for those that `theta` does not hold.
+    #[must_use]
+    pub fn numbers(&self, theta: &Theta) -> Vec<Option<f64>> {
+        self.settings.iter().map(|setting| setting.read(theta)).collect()
     }
 }
 
@@ -394,7 +426,9 @@ mod tests {
         let elasticity =
             Setting::Effect { name: "joint_elasticity", parameter: "stiffness", index: Some(2), inverse: true };
         let settings = [Setting::Stiffness(1), Setting::Damping(6), Setting::CentreOfMass(2), elasticity];
-        let theta = Settings::new(base, settings.to_vec()).theta(&[500.0, 12.0, 0.01, 1e-4]);
+        let (settings, numbers) = (Settings::new(base, settings.to_vec()), [500.0, 12.0, 0.01, 1e-4]);
+        let theta = settings.theta(&numbers);
+        assert_eq!(settings.numbers(&theta), numbers.map(Some));
         let arm = theta.arm.expect("gains");
         assert_eq!((arm.stiffness[1], arm.damping[6], arm.stiffness[0]), (500.0, 12.0, 600.0));
         assert_eq!(theta.object.expect("an object").centre_of_mass, Some([0.0, 0.0, 0.01]));

@@ -1,0 +1,112 @@
+//! A whole benchmark: draws the worlds, records their sessions, has them diagnosed.
+
+use super::rules;
+use super::world::{Fault, Kind, Outside, World};
+use super::{draw, session, trial};
+use crate::interrupt::Interrupt;
+use crate::progress::Progress;
+use crate::report::benchmark::Method;
+use shared_mem::cell::Cell;
+
+/// Which worlds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Extent {
+    /// A dozen of all sorts.
+    Short,
+    /// Every effect so many times in each kind of session, and as many of the other sorts.
+    Full(u64),
+    /// So many without anything wrong.
+    Null(u64),
+}
+
+/// What is drawn.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Plan {
+    /// Which worlds.
+    pub extent: Extent,
+    /// Clips in each session.
+    pub clips: usize,
+    /// Number of the first world.
+    pub seed: u64,
+}
+
+/// What came of it.
+#[derive(Debug)]
+pub struct Outcome {
+    /// What each method said; the diagnosis first.
+    pub methods: Vec<Method>,
+    /// Worlds that gave no session or could not be diagnosed, with the reason.
+    pub left_out: Vec<String>,
+}
+
+/// Runs the benchmark. Ctrl-C ends it after the world in hand.
+#[must_use]
+pub fn run(plan: &Plan, cell: &Cell, interrupt: &Interrupt) -> Outcome {
+    let worlds = plan.worlds();
+    let bar = Progress::new("benchmark", worlds.len() as u64);
+    let names = std::iter::once("this diagnosis").chain(rules::NAMES);
+    let mut methods: Vec<Method> = names.map(|name| Method { name: name.into(), cases: Vec::new() }).collect();
+    let mut left_out = Vec::new();
+    for (done, (number, kind, fault)) in worlds.into_iter().enumerate() {
+        if interrupt.asked() {
+            break;
+        }
+        let world = World::draw(number, kind, fault, cell);
+        bar.show(done as u64, &format!("world {number}"));
+        match judged(&world, plan.clips, interrupt) {
+            Ok(cases) => methods.iter_mut().zip(cases).for_each(|(method, case)| method.cases.push(case)),
+            Err(error) => left_out.push(format!("world {number}: {error}")),
+        }
+    }
+    Outcome { methods, left_out }
+}
+
+fn judged(world: &World, clips: usize, interrupt: &Interrupt) -> anyhow::Result<Vec<super::score::Case>> {
+    Ok(trial::examine(world, session::record(world, clips)?, interrupt)?)
+}
+
+impl Plan {
+    /// Number, kind and fault of every world.
+    fn worlds(&self) -> Vec<(u64, Kind, Fault)> {
+        let mut faults = Vec::new();
+        for kind in [Kind::Excitation, Kind::Strokes] {
+            let (all, outside) = (draw::candidates(kind == Kind::Strokes).len(), Outside::of(kind));
+            let (singles, outside, pairs, nothing): (Vec<usize>, &[Outside], _, _) = match self.extent {
+                Extent::Short => ((1..all).step_by(all / 2).collect(), &outside[..1], 1, 2),
+                Extent::Full(rounds) => {
+                    let rounds = usize::try_from(rounds).unwrap_or(1);
+                    ((0..all * rounds).collect(), outside, all * rounds / 2, all * rounds)
+                }
+                Extent::Null(worlds) => (Vec::new(), &[], 0, usize::try_from(worlds / 2).unwrap_or(1)),
+            };
+            faults.extend(singles.into_iter().map(|which| (kind, Fault::Single(which))));
+            faults.extend(outside.iter().map(|outside| (kind, Fault::Outside(*outside))));
+            faults.extend((0..pairs).map(|_| (kind, Fault::Pair)));
+            faults.extend((0..nothing).map(|_| (kind, Fault::Nothing)));
+        }
+        (self.seed..).zip(faults).map(|(number, (kind, fault))| (number, kind, fault)).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_short_form_meets_every_sort_of_world_in_both_kinds_of_session() {
+        let worlds = Plan { extent: Extent::Short, clips: 8, seed: 1 }.worlds();
+        assert!((8..=16).contains(&worlds.len()), "{}", worlds.len());
+        for kind in [Kind::Excitation, Kind::Strokes] {
+            let has = |sort: fn(&Fault) -> bool| worlds.iter().any(|(_, k, fault)| *k == kind && sort(fault));
+            assert!(has(|fault| matches!(fault, Fault::Single(_))) && has(|fault| *fault == Fault::Pair));
+            assert!(has(|fault| matches!(fault, Fault::Outside(_))) && has(|fault| *fault == Fault::Nothing));
+        }
+    }
+
+    #[test]
+    fn the_full_form_meets_every_effect() {
+        let worlds = Plan { extent: Extent::Full(1), clips: 8, seed: 1 }.worlds();
+        let singles = worlds.iter().filter(|(_, _, fault)| matches!(fault, Fault::Single(_))).count();
+        assert_eq!(singles, draw::candidates(false).len() + draw::candidates(true).len());
+    }
+}

@@ -1,0 +1,127 @@
+//! One world on trial: what the diagnosis says of its session, what knowing the truth would gain, and what the simple rules
+//! say of the very same clips.
+
+use super::rules;
+use super::score::{Case, Said, Truth};
+use super::world::World;
+use crate::diagnose::admit::{Admitted, Refused};
+use crate::diagnose::arm_clips::ArmClips;
+use crate::diagnose::cell_clips::CellClips;
+use crate::diagnose::evidence::Evidence;
+use crate::diagnose::fit::{Bench, Effort, Hypothesis};
+use crate::diagnose::gap::Residuals;
+use crate::diagnose::library::Library;
+use crate::diagnose::split::{self, Split};
+use crate::diagnose::sweep::Precision;
+use crate::diagnose::{DiagnoseError, Diagnosis, Kind, Options, diagnose_clips};
+use crate::forward::object::ObjectClips;
+use crate::forward::setting;
+use crate::interrupt::Interrupt;
+use shared_mem::cell::{ClipEntry, ClipKind};
+use shared_mem::recording::{Clip, Session};
+
+/// Linearisations of the fits that the oracle and the rules rest on.
+const EFFORT: Effort = Effort { iterations: 8, precision: Precision::Joints };
+
+/// What the diagnosis and then each of the rules said of a world, the diagnosis first.
+///
+/// # Errors
+/// [`DiagnoseError`] when the session cannot be diagnosed at all.
+pub fn examine(world: &World, clips: Vec<Clip>, interrupt: &Interrupt) -> Result<Vec<Case>, DiagnoseError> {
+    let files: Vec<String> = clips.iter().map(|clip| clip.file.display().to_string()).collect();
+    let entry = |clip: &Clip| ClipEntry { file: clip.file.clone(), kind: clip.kind };
+    let session = Session {
+        folder: format!("world {}", world.number).into(),
+        cell: world.cell.clone(),
+        clips: clips.iter().map(entry).collect(),
+    };
+    let with_object = clips.iter().all(|clip| clip.kind == ClipKind::ControlHitSlide);
+    let admitted = Admitted { groups: split::by_command(&clips), clips, files, with_object };
+    let options = Options { theta: None, seed: world.number };
+    let found = diagnose_clips(&session, &admitted, &options, interrupt)?;
+    let base = setting::complete(&world.cell, None)?;
+    let library = Library::new(&world.cell, &base, with_object);
+    let theta = |numbers: &[f64]| library.theta(numbers);
+    let arm = ArmClips::new(&world.cell, &admitted.clips, theta).map_err(Refused::from)?;
+    let court = Court { world, library: &library, split: Split::new(&admitted.groups, options.seed), interrupt };
+    if with_object {
+        let object = ObjectClips::new(&world.cell, admitted.clips.clone(), library.settings.clone())?;
+        court.cases(&CellClips::new(Some(arm), object), &found)
+    } else {
+        court.cases(&arm, &found)
+    }
+}
+
+struct Court<'a> {
+    world: &'a World,
+    library: &'a Library,
+    split: Split,
+    interrupt: &'a Interrupt,
+}
+
+impl Court<'_> {
+    fn cases<E: Evidence>(&self, evidence: &E, found: &Diagnosis) -> Result<Vec<Case>, DiagnoseError> {
+        let bench = Bench { evidence, library: self.library, random: evidence.random(), interrupt: self.interrupt };
+        let even = vec![1.0; evidence.channels().len()];
+        let start = (&[][..], self.library.start());
+        let baseline = bench.fit(start, &self.split.train, &even, None, EFFORT).ok_or(DiagnoseError::NoBaseline)?;
+        let (detectability, oracle_shrink) = self.oracle(&bench, &baseline, &even);
+        let case = |said| Case {
+            world: self.world.number,
+            truth: self.world.truth.clone(),
+            detectability,
+            oracle_shrink,
+            said,
+        };
+        let mut cases = vec![case(said(found))];
+        cases.extend(rules::all(&bench, &self.split, &baseline).into_iter().map(case));
+        Ok(cases)
+    }
+
+    /// What the true structure, fitted from its true numbers on, gains on clips never used: detectability and shrink.
+    fn oracle<E: Evidence>(&self, bench: &Bench<'_, E>, baseline: &Hypothesis, even: &[f64]) -> (f64, f64) {
+        let Truth::Effects(names) = &self.world.truth else { return (0.0, 0.0) };
+        let candidate = |name: &String| self.library.candidates.iter().position(|c| c.effect.name == name);
+        let effects: Vec<usize> = names.iter().filter_map(candidate).collect();
+        let full = self.true_numbers(baseline);
+        let judged = || {
+            let truth = bench.fit((&effects, full), &self.split.train, even, Some(baseline), EFFORT)?;
+            let deviance = |hypothesis: &Hypothesis| -> Option<f64> {
+                Some(bench.judge(hypothesis, &self.split.confirm, even)?.iter().map(|(_, deviance)| deviance).sum())
+            };
+            let gain = deviance(baseline)? - deviance(&truth)?;
+            let [before, after] =
+                [baseline, &truth].map(|hypothesis| Residuals::at(bench, hypothesis, &self.split.confirm, even));
+            Some((gain.max(0.0).sqrt(), 1.0 - after?.mean_square() / before?.mean_square()))
+        };
+        judged().unwrap_or((0.0, 0.0))
+    }
+
+    /// The baseline's numbers, those of the effects that act set to the truth.
+    fn true_numbers(&self, baseline: &Hypothesis) -> Vec<f64> {
+        let mut full = baseline.full.clone();
+        for (number, value) in full.iter_mut().zip(self.library.settings.numbers(&self.world.hidden)) {
+            if let Some(value) = value {
+                *number = value;
+            }
+        }
+        full
+    }
+}
+
+fn said(found: &Diagnosis) -> Said {
+    let kind = match found.verdict.kind {
+        Kind::None => "none",
+        Kind::Named => "named",
+        Kind::Class => "class",
+        Kind::Unexplained => "unexplained",
+        Kind::NotTestable => "not_testable",
+    };
+    Said {
+        verdict: kind.to_owned(),
+        effects: found.verdict.effects.clone(),
+        ranking: found.candidates.iter().map(|candidate| candidate.effect.clone()).collect(),
+        confidence: found.verdict.confidence,
+        shrink: found.gap.shrink.value,
+    }
+}

@@ -1,0 +1,83 @@
+//! `calibration benchmark`.
+
+use super::print_json;
+use anyhow::Context as _;
+use calibration::benchmark::run::{Extent, Outcome, Plan, run as judge};
+use calibration::benchmark::score::Scores;
+use calibration::interrupt::Interrupt;
+use calibration::report::benchmark::page;
+use calibration::report::terminal;
+use serde_json::json;
+use shared_mem::cell::Cell;
+use std::path::PathBuf;
+use std::time::Instant;
+
+#[derive(Debug, clap::Args)]
+#[command(after_help = "\
+Worlds are drawn from their numbers: gains, object, motions, scatter, and what is wrong. Nothing of it is told to the
+diagnosis. With --size 1 every effect is met once in each kind of session, beside as many worlds without any, pairs of
+effects, and disturbances that no effect describes; a larger size repeats that with other numbers.
+
+Ctrl-C scores the worlds that are done.
+
+Examples:
+  calibration benchmark --short
+  calibration benchmark --null 300 --json > null.json
+  calibration benchmark --size 2 --report benchmark.html")]
+pub(super) struct BenchmarkArguments {
+    /// Cell that all worlds share.
+    #[arg(long, value_name = "CELL.TOML", default_value = "config/fr3_cell.toml")]
+    cell: PathBuf,
+    /// How often every effect is met.
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..=100))]
+    size: u64,
+    /// A dozen worlds instead, in minutes.
+    #[arg(long, conflicts_with = "size")]
+    short: bool,
+    /// So many worlds without anything wrong instead: how often is an effect named without cause?
+    #[arg(long, value_name = "N", conflicts_with_all = ["size", "short"])]
+    null: Option<u64>,
+    /// Clips in each session, 8 to 64.
+    #[arg(long, value_name = "N", default_value_t = 8, value_parser = clap::value_parser!(u64).range(8..=64))]
+    clips: u64,
+    /// Number of the first world.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Where the page goes.
+    #[arg(long, value_name = "REPORT.HTML")]
+    report: Option<PathBuf>,
+    /// Prints one JSON object on stdout at the end.
+    #[arg(long)]
+    json: bool,
+}
+
+pub(super) fn run(arguments: BenchmarkArguments, interrupt: &Interrupt) -> anyhow::Result<()> {
+    let began = Instant::now();
+    let cell = Cell::read(&arguments.cell)?;
+    let extent = match (arguments.short, arguments.null) {
+        (true, _) => Extent::Short,
+        (false, Some(worlds)) => Extent::Null(worlds),
+        (false, None) => Extent::Full(arguments.size),
+    };
+    let plan = Plan { extent, clips: usize::try_from(arguments.clips)?, seed: arguments.seed };
+    let Outcome { methods, left_out } = judge(&plan, &cell, interrupt);
+    let seconds = began.elapsed().as_secs_f64();
+    if let Some(file) = &arguments.report {
+        let worlds = methods.first().map_or(0, |method| method.cases.len());
+        let origin =
+            format!("calibration benchmark: {worlds} worlds from number {} on, {seconds:.0} s", arguments.seed);
+        std::fs::write(file, page(&methods, &origin))
+            .with_context(|| format!("{} cannot be written; give another place", file.display()))?;
+    }
+    left_out.iter().for_each(|world| eprintln!("left out: {world}"));
+    eprintln!("{}", terminal::benchmark(&methods));
+    if arguments.json {
+        let scores: Vec<_> = methods
+            .iter()
+            .map(|method| json!({ "method": method.name, "scores": Scores::of(&method.cases) }))
+            .collect();
+        let cases = methods.first().map(|method| &method.cases);
+        print_json(&json!({ "scores": scores, "cases": cases, "left_out": left_out, "seconds": seconds }))?;
+    }
+    Ok(())
+}
