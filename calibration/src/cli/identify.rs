@@ -2,7 +2,7 @@
 
 use super::print_json;
 use anyhow::Context as _;
-use calibration::identify::{Identification, Optimizer, arm};
+use calibration::identify::{Identification, Optimizer, arm, object};
 use calibration::interrupt::Interrupt;
 use calibration::report::terminal;
 use clap::{Subcommand, ValueEnum};
@@ -12,6 +12,8 @@ use std::path::{Path, PathBuf};
 pub(super) enum Identify {
     /// Stiffness and damping of every joint, and effects on request, from clips in which the arm moves.
     Arm(ArmArguments),
+    /// Friction, mass, centre of mass and tip friction of the object, from clips in which the arm hits it.
+    Object(ObjectArguments),
 }
 
 #[derive(Debug, clap::Args)]
@@ -55,6 +57,44 @@ pub(super) struct ArmArguments {
     report: Option<PathBuf>,
 }
 
+#[derive(Debug, clap::Args)]
+#[command(after_help = "\
+The recorded commands are simulated, hit and slide included, until object and arm move as they did. The arm's gains are
+found first, from the way to the object in the same clips, unless --parameters brings them. A quarter of the strokes is
+held out. Clips in which the object topples, is lost or not hit are left out, and that is said; so is what cannot be told.
+
+Ctrl-C keeps what was found so far beside --out; the same command goes on from there.
+
+Examples:
+  calibration identify object strokes --out theta.toml --report page.html
+  calibration identify object strokes --parameters arm.toml --optimizer pso --budget 1200 --json")]
+pub(super) struct ObjectArguments {
+    /// Session folder, or one clip beside a cell.toml.
+    #[arg(value_name = "SESSION")]
+    session: PathBuf,
+    /// The way of searching; pso and cma go by ADD + ADD-S.
+    #[arg(long, value_enum, default_value_t = Way::LeastSquares)]
+    optimizer: Way,
+    /// Where the parameters go: a theta.toml that every other command takes.
+    #[arg(long, value_name = "THETA.TOML")]
+    out: Option<PathBuf>,
+    /// Parameters that are known already: the arm's gains, effects.
+    #[arg(long, value_name = "THETA.TOML")]
+    parameters: Option<PathBuf>,
+    /// Points that pso and cma may try.
+    #[arg(long, value_name = "N", default_value_t = 1200, value_parser = clap::value_parser!(u32).range(1..))]
+    budget: u32,
+    /// Draws the clips that are held out, and the searches.
+    #[arg(long, default_value_t = 0)]
+    seed: u64,
+    /// Prints one JSON object on stdout at the end.
+    #[arg(long)]
+    json: bool,
+    /// Writes a page with pictures.
+    #[arg(long, value_name = "PAGE.HTML")]
+    report: Option<PathBuf>,
+}
+
 /// Ways of searching, by their names on the command line.
 #[derive(Debug, Clone, Copy, ValueEnum)]
 enum Way {
@@ -83,6 +123,12 @@ pub(super) fn run(identify: Identify, interrupt: &Interrupt) -> anyhow::Result<(
             let (optimizer, budget) = (optimizer.optimizer(), budget as usize);
             let options = arm::Options { session, optimizer, out, parameters, also, budget, seed };
             tell(&arm::identify(&options, interrupt)?, report.as_deref(), json)
+        }
+        Identify::Object(arguments) => {
+            let ObjectArguments { session, optimizer, out, parameters, budget, seed, json, report } = arguments;
+            let (optimizer, budget) = (optimizer.optimizer(), budget as usize);
+            let options = object::Options { session, optimizer, out, parameters, budget, seed };
+            tell(&object::identify(&options, interrupt)?, report.as_deref(), json)
         }
     }
 }

@@ -2,7 +2,8 @@
 
 use crate::report::Trace;
 use crate::report::identification::{Clip as SheetClip, Error as SheetError, Parameter as SheetParameter, Sheet};
-use serde::Serialize;
+use serde::ser::SerializeStruct as _;
+use serde::{Serialize, Serializer};
 use std::collections::BTreeMap;
 
 /// An identification; what is not marked as an index is in SI units.
@@ -54,8 +55,8 @@ pub struct Identification {
     pub theta_file: String,
 }
 
-/// One parameter of one or several numbers.
-#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+/// One parameter of one or several numbers. As JSON, a single number is a number and no list.
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct Parameter {
     /// The numbers.
     pub value: Vec<f64>,
@@ -65,6 +66,25 @@ pub struct Parameter {
     pub unit: String,
     /// Where the search began: cell.toml's or the given parameters' values.
     pub start: Vec<f64>,
+    /// Whether it is a single number by its nature, not a list that happens to hold one.
+    pub single: bool,
+}
+
+impl Serialize for Parameter {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let mut fields = serializer.serialize_struct("Parameter", 4)?;
+        if let (true, [value], [ci95], [start]) = (self.single, &self.value[..], &self.ci95[..], &self.start[..]) {
+            fields.serialize_field("value", value)?;
+            fields.serialize_field("ci95", ci95)?;
+            fields.serialize_field("start", start)?;
+        } else {
+            fields.serialize_field("value", &self.value)?;
+            fields.serialize_field("ci95", &self.ci95)?;
+            fields.serialize_field("start", &self.start)?;
+        }
+        fields.serialize_field("unit", &self.unit)?;
+        fields.end()
+    }
 }
 
 /// A number that the clips cannot tell.

@@ -4,12 +4,14 @@
 //! | module | owns |
 //! |---|---|
 //! | [`arm`] | gains of the controller, and arm effects on request |
+//! | [`object`] | friction, mass, centre of mass and tip friction of the object |
 //! | [`split`] | which clips are fitted and which are held out |
 //! | [`answer`] | what is found, as JSON, as a page, as lines for a terminal |
 //! | `run` | the way of searching, its progress, its interruption and resumption |
 
 pub mod answer;
 pub mod arm;
+pub mod object;
 mod run;
 pub mod split;
 

@@ -220,6 +220,29 @@ impl Run<'_> {
         sum / rows.max(1) as f64
     }
 
+    /// The numbers that an interrupted search of another kind kept.
+    pub(super) fn kept_numbers(&self) -> Option<Vec<f64>> {
+        self.read_state().shared.filter(|shared| shared.len() == self.unknowns.len())
+    }
+
+    /// Keeps numbers for [`Run::kept_numbers`].
+    pub(super) fn keep_numbers(&self, shared: &[f64]) -> Result<(), RunError> {
+        let shared = Some(shared.to_vec());
+        self.keep(&State { shared, told: Vec::new(), fingerprint: self.fingerprint.clone() })
+    }
+
+    /// The end of a search of another kind: its state is not needed any more, unless it was interrupted.
+    pub(super) fn finished(&self) -> Result<(), RunError> {
+        if self.interrupt.asked() {
+            return Err(RunError::Interrupted(self.state.map(Path::to_owned)));
+        }
+        if let Some(path) = self.state {
+            // A state that is not there need not be removed.
+            let _ = std::fs::remove_file(path);
+        }
+        Ok(())
+    }
+
     fn read_state(&self) -> State {
         let read = || -> Option<State> { serde_json::from_slice(&std::fs::read(self.state?).ok()?).ok() };
         read().filter(|state| state.fingerprint == self.fingerprint).unwrap_or_default()

@@ -146,6 +146,11 @@ impl ObjectClips {
         rows::rows(&self.clips[clip], self.error.joints.is_some())
     }
 
+    /// What is known about the cell.
+    pub fn cell(&self) -> &Cell {
+        &self.cell
+    }
+
     /// A recorded clip.
     pub fn clip(&self, clip: usize) -> &Clip {
         &self.clips[clip].recorded

@@ -1,0 +1,180 @@
+//! The likelihood fit: shared numbers by least squares, and between its rounds how wrong the simulated hit is, from the
+//! clips themselves.
+//!
+//! A hit is rough: where tool and object part by a hair's breadth, a little more of any number moves the resting place by
+//! millimetres. Slopes are therefore taken over wide steps, the error of the hit is part of the likelihood (one error of
+//! a clip's whole rest, not one of each pose), and a clip that nothing fits counts less. What the arm felt counts as well:
+//! the blow that it takes says how heavy the object is.
+
+use super::step::{Linearised, Question};
+use crate::estimate::{ClipModel as _, Impossible, Random, Unknown};
+use crate::forward::Setting;
+use crate::forward::object::{ALL, Channel, ModelError, ObjectClips, Own, Part};
+use rayon::prelude::*;
+use shared_mem::cell::PoseNoise;
+
+/// A fit, and what it assumed at last.
+#[derive(Debug, Clone)]
+pub(super) struct ObjectFit {
+    /// The numbers, linearised there.
+    pub(super) at: Linearised,
+    /// Calls of the model: clips simulated, wholly or from the release on.
+    pub(super) evaluations: usize,
+    /// Clips simulated so far, and the deviance per row then.
+    pub(super) convergence: Vec<[f64; 2]>,
+    /// Whether the last step was small.
+    pub(super) converged: bool,
+}
+
+/// What the search trusts a simulated clip to at first: poses as far as their noise, so that the resting places lead.
+const FIRST_ERROR: ModelError = ModelError {
+    hit: PoseNoise { position: 0.02, rotation: 0.2 },
+    rest: PoseNoise { position: 0.0, rotation: 0.0 },
+    joints: Some(1e-4),
+};
+/// Most steps of the first way.
+const FIRST_STEPS: usize = 12;
+/// Rounds after it, each with the error that the round before left.
+const ROUNDS: usize = 4;
+/// Poses of a moving object, and rows of the arm, of which one is a witness: their errors last.
+const ROWS_ALIKE: f64 = 5.0;
+/// Smallest error of the simulated joints: some steps of an encoder [rad].
+const LEAST_JOINT_ERROR: f64 = 2e-5;
+
+/// Difference step of an object's number over which the roughness of hits averages out.
+#[must_use]
+pub(super) fn wide_step(setting: &Setting, unknown: &Unknown) -> f64 {
+    let range = unknown.upper - unknown.lower;
+    let step = match setting {
+        Setting::Friction => 0.05 * unknown.start,
+        Setting::Mass => 0.08 * unknown.start,
+        Setting::CentreOfMass(_) => 1.5e-3,
+        Setting::TipFriction => 0.06,
+        _ => unknown.step,
+    };
+    step.min(0.2 * range).max(unknown.step.min(range))
+}
+
+/// Clips that are usually simulated until the end: for a bar alone.
+#[must_use]
+pub(super) fn usual_evaluations(clips: &ObjectClips, unknowns: &[Unknown]) -> usize {
+    2 * (FIRST_STEPS + ROUNDS) * (2 + unknowns.len()) * clips.clips()
+}
+
+/// Fits from `start` on. `watch` sees numbers and evaluations after every step; `false` ends the fit there.
+///
+/// # Errors
+/// [`Impossible`] when the cell cannot be simulated at the start.
+pub(super) fn fit_object(
+    clips: &mut ObjectClips,
+    unknowns: &[Unknown],
+    start: &[f64],
+    watch: impl Fn(&[f64], usize) -> bool,
+) -> Result<ObjectFit, Impossible> {
+    clips.set_model_error(FIRST_ERROR);
+    let mut random = held(clips);
+    let own = vec![vec![0.0; random.len()]; clips.clips()];
+    let mut search = Search { convergence: Vec::new(), evaluations: 0, watch: &watch, stopped: false };
+    let mut at = search.steps(Question { clips, unknowns, random: &random }, (start, &own), FIRST_STEPS)?;
+    random = scattered(clips);
+    for _ in 0..ROUNDS {
+        if search.stopped {
+            break;
+        }
+        clips.set_model_error(model_error(clips, &at)?);
+        let (shared, own) = (at.shared.clone(), at.own());
+        at = search.steps(Question { clips, unknowns, random: &random }, (&shared, &own), 2)?;
+    }
+    let Search { evaluations, convergence, stopped, .. } = search;
+    Ok(ObjectFit { converged: at.small && !stopped, at, evaluations, convergence })
+}
+
+/// The clips at numbers that were found otherwise, with the error of hits that they leave.
+///
+/// # Errors
+/// [`Impossible`] when the cell cannot be simulated there.
+pub(super) fn linearise_object(
+    clips: &mut ObjectClips,
+    unknowns: &[Unknown],
+    at: &[f64],
+) -> Result<Linearised, Impossible> {
+    clips.set_model_error(FIRST_ERROR);
+    let random = scattered(clips);
+    let own = vec![vec![0.0; random.len()]; clips.clips()];
+    let first = Question { clips, unknowns, random: &random }.here(at, &own)?;
+    clips.set_model_error(model_error(clips, &first)?);
+    Question { clips, unknowns, random: &random }.here(at, &first.own())
+}
+
+struct Search<'a, W> {
+    convergence: Vec<[f64; 2]>,
+    evaluations: usize,
+    watch: &'a W,
+    stopped: bool,
+}
+
+impl<W: Fn(&[f64], usize) -> bool> Search<'_, W> {
+    fn steps(
+        &mut self,
+        question: Question<'_>,
+        (shared, own): (&[f64], &[Vec<f64>]),
+        most: usize,
+    ) -> Result<Linearised, Impossible> {
+        let mut at = question.improved(shared, own)?;
+        for step in 1.. {
+            self.evaluations += at.evaluations;
+            let rows: usize = at.clips.iter().map(|clip| clip.rows).sum();
+            self.convergence.push([self.evaluations as f64, at.deviance() / rows.max(1) as f64]);
+            self.stopped = !(self.watch)(&at.shared, self.evaluations);
+            if at.small || self.stopped || step >= most {
+                break;
+            }
+            at = question.improved(&at.shared, &at.own())?;
+        }
+        Ok(at)
+    }
+}
+
+/// All own numbers held.
+fn held(clips: &ObjectClips) -> Vec<Random> {
+    clips.random().into_iter().map(|effect| Random { sigma: 0.0, ..effect }).collect()
+}
+
+/// Friction, clock and, of an object that was let go, its first motion vary from clip to clip; what a hit leaves behind
+/// is in the model's error.
+fn scattered(clips: &ObjectClips) -> Vec<Random> {
+    let counts =
+        |own: Own| !matches!(own, Own::Release(_) | Own::ReleaseYaw | Own::ReleaseVelocity(_) | Own::ReleaseSpin);
+    let sigma = |(effect, own): (Random, Own)| if counts(own) { effect } else { Random { sigma: 0.0, ..effect } };
+    clips.random().into_iter().zip(ALL).map(sigma).collect()
+}
+
+/// What is left of hits and rests with every clip's own numbers at their best. Of a clip that nothing fits, as much as
+/// it counts.
+fn model_error(clips: &ObjectClips, at: &Linearised) -> Result<ModelError, Impossible> {
+    let own = at.own();
+    let errors: Vec<Vec<f64>> = (0..own.len())
+        .into_par_iter()
+        .map(|clip| clips.errors(clip, &at.shared, &own[clip]))
+        .collect::<Result<_, _>>()?;
+    let rms = |counts: &dyn Fn(Channel, Part) -> bool| {
+        let (mut sum, mut count) = (0.0, 0.0);
+        for (clip, errors) in errors.iter().enumerate() {
+            for (_, error) in clips.rows(clip).iter().zip(errors).filter(|(row, _)| counts(row.channel, row.part)) {
+                sum += at.weights[clip] * error * error;
+                count += at.weights[clip];
+            }
+        }
+        if count > 0.0 { (sum / count).sqrt() } else { 0.0 }
+    };
+    let noise = clips.noise();
+    let pose = |part: Part, alike: f64| {
+        let place = rms(&|channel, of| of == part && matches!(channel, Channel::Position(0 | 1)));
+        let turn = rms(&|channel, of| of == part && channel == Channel::Rotation(2));
+        let beyond = |rms: f64, noise: f64| (rms * rms - noise * noise).max(0.01 * noise * noise).sqrt() * alike;
+        PoseNoise { position: beyond(place, noise.position), rotation: beyond(turn, noise.rotation) }
+    };
+    let joints = rms(&|channel, _| matches!(channel, Channel::Joint(_)));
+    let joints = Some(joints.max(LEAST_JOINT_ERROR) * ROWS_ALIKE.sqrt());
+    Ok(ModelError { hit: pose(Part::Hit, ROWS_ALIKE.sqrt()), rest: pose(Part::After, 1.0), joints })
+}

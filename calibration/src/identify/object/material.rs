@@ -1,0 +1,87 @@
+//! A session's clips with an object, sorted by their use.
+
+use super::ObjectError;
+use super::screen::screened;
+use crate::identify::answer::{Clips, LeftOut};
+use crate::identify::split::{Split, split};
+use rayon::prelude::*;
+use shared_mem::cell::{Cell, ClipKind};
+use shared_mem::recording::{Clip, Session};
+use std::path::Path;
+
+/// A clip that can be used.
+pub(super) struct Usable {
+    /// Its file, as cell.toml lists it.
+    pub(super) file: String,
+    pub(super) clip: Clip,
+    /// What is odd about it.
+    pub(super) remarks: Vec<String>,
+}
+
+/// A session in memory.
+pub(super) struct Material {
+    pub(super) cell: Cell,
+    pub(super) usable: Vec<Usable>,
+    pub(super) split: Split,
+    pub(super) left_out: Vec<LeftOut>,
+}
+
+impl Material {
+    pub(super) fn open(path: &Path, seed: u64) -> Result<Self, ObjectError> {
+        let session = Session::open(path)?;
+        if session.cell.object.is_none() {
+            return Err(ObjectError::NoObject);
+        }
+        let entries: Vec<_> = session.clips.iter().filter(|clip| clip.kind != ClipKind::Excitation).collect();
+        let read: Vec<_> = entries
+            .par_iter()
+            .map(|entry| {
+                let clip = session.read(entry).map_err(|error| error.to_string());
+                (entry.file.display().to_string(), clip.map(|clip| screened(clip, &session.cell)))
+            })
+            .collect();
+        let (mut usable, mut left_out) = (Vec::new(), Vec::new());
+        for (file, answer) in read {
+            match answer {
+                Ok((clip, remarks, None)) => usable.push(Usable { file, clip, remarks }),
+                Ok((_, _, Some(why))) | Err(why) => left_out.push(LeftOut { file, why }),
+            }
+        }
+        if usable.is_empty() {
+            let reasons: Vec<String> = left_out.iter().map(|clip| format!("{}: {}", clip.file, clip.why)).collect();
+            let why = if reasons.is_empty() { "it lists none with an object".into() } else { reasons.join("; ") };
+            return Err(ObjectError::NoClip { session: path.display().to_string(), why });
+        }
+        let clips: Vec<&Clip> = usable.iter().map(|usable| &usable.clip).collect();
+        let split = split(&clips, seed);
+        Ok(Self { cell: session.cell, split, usable, left_out })
+    }
+
+    /// The clips that are fitted.
+    pub(super) fn train(&self) -> Vec<Clip> {
+        self.split.train.iter().map(|i| self.usable[*i].clip.clone()).collect()
+    }
+
+    /// Files by their use.
+    pub(super) fn clips(&self) -> Clips {
+        let files = |numbers: &[usize]| numbers.iter().map(|i| self.usable[*i].file.clone()).collect();
+        Clips { train: files(&self.split.train), holdout: files(&self.split.holdout), left_out: self.left_out.clone() }
+    }
+
+    /// What a reader of the answer has to know about the clips.
+    pub(super) fn warnings(&self) -> Vec<String> {
+        let mut warnings = Vec::new();
+        if self.split.holdout.is_empty() {
+            warnings.push(
+                "there is a single motion, so nothing could be held out: how far off the twin is elsewhere is not known; \
+                 record strokes at other places and speeds"
+                    .into(),
+            );
+        }
+        if !self.left_out.is_empty() {
+            let all = self.left_out.len() + self.usable.len();
+            warnings.push(format!("{} of {all} clips were left out", self.left_out.len()));
+        }
+        warnings
+    }
+}

@@ -1,0 +1,230 @@
+//! The object: friction, mass, centre of mass and tip friction, from clips in which the arm hits it or it was let go.
+//!
+//! First the arm's gains from the way to the object in the same clips, unless they are known; then the object's numbers.
+//!
+//! | file | owns |
+//! |---|---|
+//! | `screen` | which recorded clips can be used |
+//! | `material` | a session's clips, sorted by their use |
+//! | `fit` | the likelihood fit |
+//! | `step` | one step of it |
+//! | `paper` | the loss on the object's surface, for searches without slopes |
+//! | `finding` | what a fit tells, number by number, and what it cannot tell |
+//! | `figures` | how far the twin is off |
+
+mod figures;
+mod finding;
+mod fit;
+mod material;
+mod paper;
+mod screen;
+mod step;
+
+use super::answer::Identification;
+use super::run::{Optimizer, Run, RunError};
+use crate::estimate::{Impossible, Options as FitOptions, Unknown, fit as fit_clips};
+use crate::forward::arm::{ArmClips, Channel};
+use crate::forward::object::ObjectClips;
+use crate::forward::setting::{BaseError, complete, gains, object_parameters};
+use crate::forward::{Setting, Settings};
+use crate::interrupt::Interrupt;
+use crate::progress::Progress;
+use finding::Finding;
+use fit::{ObjectFit, fit_object, linearise_object, wide_step};
+use material::Material;
+use paper::SurfaceLoss;
+use shared_mem::cell::{Cell, ClipKind};
+use shared_mem::recording::{Clip, ReadError};
+use shared_mem::theta::Theta;
+use shared_mem::toml_file::TomlFileError;
+use std::path::PathBuf;
+use std::time::Instant;
+use twin::arm::ModelError;
+use twin::replay::ReplayError;
+use twin::scene::{MeshFileError, ObjectModel};
+use twin::sim::SimError;
+
+/// What to identify, and how.
+#[derive(Debug, Clone, Default)]
+pub struct Options {
+    /// The session's folder, or a clip beside a cell.toml.
+    pub session: PathBuf,
+    /// The way of searching.
+    pub optimizer: Optimizer,
+    /// Where the parameters go.
+    pub out: Option<PathBuf>,
+    /// Parameters that are known already: gains, which are then not searched, effects.
+    pub parameters: Option<PathBuf>,
+    /// Points whose cost a search without slopes may ask for.
+    pub budget: usize,
+    /// Draws the clips that are held out, and the searches.
+    pub seed: u64,
+}
+
+/// The object cannot be identified.
+#[derive(Debug, thiserror::Error)]
+pub enum ObjectError {
+    /// The session.
+    #[error(transparent)]
+    Read(#[from] ReadError),
+    /// The parameters that are known already.
+    #[error(transparent)]
+    Theta(#[from] TomlFileError),
+    /// The cell.
+    #[error(transparent)]
+    Base(#[from] BaseError),
+    /// The arm's model.
+    #[error(transparent)]
+    Model(#[from] ModelError),
+    /// The object's mesh.
+    #[error(transparent)]
+    Mesh(#[from] MeshFileError),
+    /// The cell cannot be simulated.
+    #[error(transparent)]
+    Cell(#[from] SimError),
+    /// A clip cannot be replayed.
+    #[error(transparent)]
+    Replay(#[from] ReplayError),
+    /// There is nothing to identify.
+    #[error("cell.toml has no [object] block; add it, or identify the arm")]
+    NoObject,
+    /// Nothing can be used.
+    #[error("{session}: no clip can be used for the object: {why}")]
+    NoClip {
+        /// The session.
+        session: String,
+        /// Reasons, clip by clip.
+        why: String,
+    },
+    /// The search.
+    #[error(transparent)]
+    Run(#[from] RunError),
+    /// The twin has no answer.
+    #[error("the twin cannot be simulated: {0}")]
+    Impossible(#[from] Impossible),
+    /// The answer cannot be written.
+    #[error("{path}: {source}; give --out a place that can be written")]
+    Write {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+}
+
+/// Identifies the object; writes theta.toml where `out` says, with everything that was known before.
+///
+/// # Errors
+/// [`ObjectError`] naming what is wrong and the remedy.
+pub fn identify(options: &Options, interrupt: &Interrupt) -> Result<Identification, ObjectError> {
+    let began = Instant::now();
+    let material = Material::open(&options.session, options.seed)?;
+    let problem = Problem::new(&material, options, interrupt)?;
+    let mut clips = ObjectClips::new(&material.cell, material.train(), problem.settings.clone())?;
+    let found = problem.search(&mut clips, options, interrupt)?;
+    let finding = Finding::new(&problem.settings, &problem.unknowns, &found);
+    let theta = problem.settings.theta(&found.at.shared);
+    let mut answer = finding.answer(&material);
+    answer.session = options.session.display().to_string();
+    answer.optimizer = options.optimizer.name().into();
+    answer.warnings.extend(problem.warnings.iter().cloned());
+    figures::fill(&mut answer, &material, [problem.settings.base(), &theta])?;
+    if let Some(out) = &options.out {
+        std::fs::write(out, theta.to_toml()).map_err(|source| ObjectError::Write { path: out.clone(), source })?;
+        answer.theta_file = out.display().to_string();
+    }
+    answer.seconds = began.elapsed().as_secs_f64();
+    Ok(answer)
+}
+
+/// What is searched, and what is known.
+struct Problem {
+    settings: Settings,
+    unknowns: Vec<Unknown>,
+    warnings: Vec<String>,
+}
+
+impl Problem {
+    fn new(material: &Material, options: &Options, interrupt: &Interrupt) -> Result<Self, ObjectError> {
+        let mut given = options.parameters.as_deref().map(Theta::read).transpose()?.unwrap_or_default();
+        let mut warnings = Vec::new();
+        if given.arm.is_none() && material.cell.robot.is_some() {
+            let clips = material.train();
+            let hits: Vec<Clip> = clips.into_iter().filter(|clip| clip.kind == ClipKind::ControlHitSlide).collect();
+            if !hits.is_empty() {
+                warnings.push("the arm's gains were found first, from the way to the object in the same clips".into());
+                given = with_gains(&material.cell, &given, hits, interrupt)?;
+            }
+        }
+        let base = complete(&material.cell, Some(&given))?;
+        let (settings, mut unknowns): (Vec<Setting>, Vec<Unknown>) =
+            object_parameters(&material.cell, &base).into_iter().unzip();
+        for (setting, unknown) in settings.iter().zip(&mut unknowns) {
+            unknown.step = wide_step(setting, unknown);
+        }
+        Ok(Self { settings: Settings::new(base, settings), unknowns, warnings })
+    }
+
+    fn search(
+        &self,
+        clips: &mut ObjectClips,
+        options: &Options,
+        interrupt: &Interrupt,
+    ) -> Result<ObjectFit, ObjectError> {
+        let state = options.out.as_ref().map(|out| {
+            let mut name = out.clone().into_os_string();
+            name.push(".state.json");
+            PathBuf::from(name)
+        });
+        let run = Run {
+            unknowns: &self.unknowns,
+            random: &[],
+            optimizer: options.optimizer,
+            seed: options.seed,
+            budget: options.budget,
+            fingerprint: format!("object {} {} {:?}", options.optimizer.name(), options.seed, options.session),
+            state: state.as_deref(),
+            interrupt,
+        };
+        if options.optimizer == Optimizer::LeastSquares {
+            return self.least_squares(clips, &run);
+        }
+        let shape = self.shape(clips)?;
+        let outcome = {
+            let loss = SurfaceLoss::new(clips, &shape);
+            run.search(&loss, &loss)?
+        };
+        let at = linearise_object(clips, &self.unknowns, &outcome.fit.shared)?;
+        let evaluations = outcome.simulated;
+        Ok(ObjectFit { at, evaluations, convergence: outcome.convergence, converged: outcome.arrived })
+    }
+
+    fn least_squares(&self, clips: &mut ObjectClips, run: &Run<'_>) -> Result<ObjectFit, ObjectError> {
+        let start: Vec<f64> = self.unknowns.iter().map(|unknown| unknown.start).collect();
+        let start = run.kept_numbers().unwrap_or(start);
+        let bar = Progress::new("identify", fit::usual_evaluations(clips, &self.unknowns) as u64);
+        let kept = std::sync::Mutex::new(Ok(()));
+        let found = fit_object(clips, &self.unknowns, &start, |numbers, evaluations| {
+            bar.show(evaluations as u64, &format!("{evaluations} clips simulated"));
+            *kept.lock().expect("no holder panics") = run.keep_numbers(numbers);
+            !run.interrupt.asked()
+        })?;
+        kept.into_inner().expect("no holder panics")?;
+        run.finished()?;
+        Ok(found)
+    }
+
+    fn shape(&self, clips: &ObjectClips) -> Result<twin::scene::ObjectShape, ObjectError> {
+        Ok(ObjectModel::new(clips.cell(), Some(self.settings.base()))?.ok_or(ObjectError::NoObject)?.shape)
+    }
+}
+
+/// The gains that fit the arm's way to the object.
+fn with_gains(cell: &Cell, given: &Theta, clips: Vec<Clip>, interrupt: &Interrupt) -> Result<Theta, ObjectError> {
+    let base = complete(cell, Some(given))?;
+    let (settings, unknowns): (Vec<Setting>, Vec<Unknown>) = gains(cell, &base).into_iter().unzip();
+    let settings = Settings::new(base, settings);
+    let (clips, _) = ArmClips::new(cell, clips, &[Channel::Position], |numbers: &[f64]| settings.theta(numbers))?;
+    let fit = fit_clips(&clips, &unknowns, &clips.random(), &FitOptions::default(), |_, _| !interrupt.asked())?;
+    Ok(Theta { arm: settings.theta(&fit.shared).arm, ..given.clone() })
+}

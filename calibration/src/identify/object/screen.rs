@@ -1,0 +1,179 @@
+//! Which recorded clips can be held against the twin: an object that topples, is lost by its tracker, is never hit or lies
+//! elsewhere than the tool is noticed here, mended where that is safe, and told. Base frame, SI.
+
+use nalgebra::{Isometry3, UnitQuaternion, Vector3};
+use shared_mem::cell::{Cell, ClipKind};
+use shared_mem::frames::Pose;
+use shared_mem::msg::joints_from;
+use shared_mem::recording::{Clip, ObjectSeries};
+use twin::arm::ArmModel;
+use twin::effects::Effects;
+use twin::physics::TableObject;
+use twin::physics::touch::Capsule;
+use twin::scene::{ObjectModel, ObjectShape};
+
+/// A pose this far from the middle of its neighbours, and they nearer to each other, is the tracker's mistake [m].
+const JUMP: f64 = 0.04;
+/// An object that moves this far from one pose to the next...
+const STEP: f64 = 0.05;
+/// ...and faster than any arm hits was lost [m/s].
+const FASTEST: f64 = 4.0;
+/// Share of poses that may be mistakes.
+const MOST_MISTAKES: f64 = 0.1;
+/// Longest time without a pose while the object moves [s].
+const LONGEST_GAP: f64 = 0.2;
+/// An object leans no further while it slides [rad].
+const TOPPLED: f64 = 0.35;
+/// An object that went no farther was not hit [m].
+const NOT_HIT: f64 = 5e-3;
+/// A tool that came no nearer while the object moved does not push it: the poses are in another frame [m].
+const ELSEWHERE: f64 = 0.03;
+/// Fewest poses a second that show a slide.
+const SLOWEST_TRACKER: f64 = 20.0;
+/// Turns by nearly half about an axis from one pose to the next are a box taken for itself turned over [rad].
+const FLIP: f64 = 2.6;
+
+/// The clip with what could be mended mended, remarks on it, and the reason why it cannot be used, if there is one.
+pub(super) fn screened(clip: Clip, cell: &Cell) -> (Clip, Vec<String>, Option<String>) {
+    let mut remarks: Vec<String> = clip.warnings.iter().chain(&clip.damage).cloned().collect();
+    let (clip, mended) = mended(clip, cell);
+    remarks.extend(mended);
+    let why = unusable(&clip, cell);
+    if let Some(rate) = rate(&clip.object).filter(|rate| *rate < SLOWEST_TRACKER) {
+        remarks.push(format!(
+            "the object was tracked at {rate:.0} Hz: a slide shows in a few poses, and intervals are wide; track at 30 Hz \
+             or more"
+        ));
+    }
+    (clip, remarks, why)
+}
+
+/// Poses that are the tracker's mistakes left out, a symmetric box turned back.
+fn mended(mut clip: Clip, cell: &Cell) -> (Clip, Vec<String>) {
+    let mut remarks = Vec::new();
+    let flips = turn_back(&mut clip.object, cell);
+    if flips > 0 {
+        remarks.push(format!(
+            "the tracker took the box for itself turned by half in {flips} poses; they were turned back to the first one's side"
+        ));
+    }
+    let all = clip.object.len();
+    let place = |row: usize| clip.object.poses[row].isometry().translation.vector;
+    let mistake = |row: usize| {
+        if row == 0 || row + 1 >= all {
+            return false;
+        }
+        let (before, after) = (place(row - 1), place(row + 1));
+        let off = (place(row) - (before + after) * 0.5).norm();
+        off > JUMP && (after - before).norm() < off
+    };
+    let good: Vec<usize> = (0..all).filter(|row| !mistake(*row)).collect();
+    if good.len() < all {
+        remarks.push(format!(
+            "{} of {all} poses jump away and back by more than {:.0} mm; they were left out",
+            all - good.len(),
+            JUMP * 1e3
+        ));
+        let ObjectSeries { stamps_ns, poses } = &clip.object;
+        clip.object = ObjectSeries {
+            stamps_ns: good.iter().map(|row| stamps_ns[*row]).collect(),
+            poses: good.iter().map(|row| poses[*row]).collect(),
+        };
+    }
+    (clip, remarks)
+}
+
+/// Turns poses of a box that flip by half against the pose before; how many.
+fn turn_back(series: &mut ObjectSeries, cell: &Cell) -> usize {
+    let is_box =
+        matches!(ObjectModel::new(cell, None), Ok(Some(model)) if matches!(model.shape, ObjectShape::Box { .. }));
+    let halves = [Vector3::x_axis(), Vector3::y_axis(), Vector3::z_axis()]
+        .map(|axis| UnitQuaternion::from_axis_angle(&axis, std::f64::consts::PI));
+    let mut flips = 0;
+    for row in 1..series.len() {
+        let before = series.poses[row - 1].isometry().rotation;
+        let pose = series.poses[row].isometry();
+        if is_box && before.angle_to(&pose.rotation) > FLIP {
+            let nearest = halves
+                .map(|half| pose.rotation * half)
+                .into_iter()
+                .min_by(|a, b| before.angle_to(a).total_cmp(&before.angle_to(b)))
+                .unwrap_or(pose.rotation);
+            series.poses[row] = Pose::from_isometry(Isometry3::from_parts(pose.translation, nearest));
+            flips += 1;
+        }
+    }
+    flips
+}
+
+fn unusable(clip: &Clip, cell: &Cell) -> Option<String> {
+    let ObjectSeries { stamps_ns, poses } = &clip.object;
+    if poses.len() < 10 {
+        return Some(format!("it holds {} object poses; the tracker has to see the whole slide", poses.len()));
+    }
+    let place = |row: usize| poses[row].isometry().translation.vector;
+    let seconds = |a: usize, b: usize| (stamps_ns[b] - stamps_ns[a]) as f64 * 1e-9;
+    let step = |row: &usize| (place(*row) - place(row - 1)).norm();
+    if let Some(row) = (1..poses.len()).find(|row| step(row) > STEP && step(row) / seconds(row - 1, *row) > FASTEST) {
+        let (at, far) = (seconds(0, row), step(&row) * 1e3);
+        return Some(format!(
+            "the tracker lost the object: its pose jumps by {far:.0} mm at {at:.2} s and stays there"
+        ));
+    }
+    let missing = poses.len() as f64 / (seconds(0, poses.len() - 1) * rate(&clip.object)?).max(1.0);
+    if missing < 1.0 - MOST_MISTAKES {
+        return Some(format!("{:.0} % of its poses are missing", 100.0 * (1.0 - missing)));
+    }
+    let moving: Vec<usize> = (1..poses.len()).filter(|row| step(row) > 1.5e-3).collect();
+    if let Some(row) = moving.iter().find(|row| seconds(**row - 1, **row) > LONGEST_GAP) {
+        return Some(format!("the object was not seen for {:.2} s while it moved", seconds(row - 1, *row)));
+    }
+    if clip.kind == ClipKind::FreeMotion {
+        return None;
+    }
+    let far = (0..poses.len()).map(|row| (place(row) - place(0)).norm()).fold(0.0, f64::max);
+    if far < NOT_HIT {
+        return Some(format!("the object was not hit: it moved by {:.1} mm", far * 1e3));
+    }
+    let up = |row: usize| poses[row].isometry().rotation * poses[0].isometry().rotation.inverse() * Vector3::z();
+    let lean = (0..poses.len()).map(|row| up(row).z.clamp(-1.0, 1.0).acos()).fold(0.0, f64::max);
+    if lean > TOPPLED {
+        return Some(format!(
+            "the object toppled: it leaned by {:.0} degrees; hit it lower or slower",
+            lean.to_degrees()
+        ));
+    }
+    apart(clip, cell)
+}
+
+/// Tool and object never come near each other although the object moves.
+fn apart(clip: &Clip, cell: &Cell) -> Option<String> {
+    let arm = ArmModel::from_cell(cell).ok()?;
+    let tool = cell.tool.as_ref()?;
+    let capsule = Capsule { segment: tool.length - tool.radius, radius: tool.radius };
+    let model = ObjectModel::new(cell, None).ok()??;
+    let mut object = TableObject::new(&model, None, &Effects::default()).ok()?;
+    let measured = &clip.measured;
+    let gap = |row: usize| {
+        let at = measured.stamps_ns.partition_point(|stamp| *stamp < clip.object.stamps_ns[row]);
+        let q = joints_from(measured.q_row(at.min(measured.len().saturating_sub(1))));
+        object.set(&clip.object.poses[row], Vector3::zeros(), Vector3::zeros());
+        -object.touch(&capsule, &arm.flange(&q).isometry()).depth
+    };
+    let nearest = (0..clip.object.len()).map(gap).fold(f64::INFINITY, f64::min);
+    (nearest > ELSEWHERE).then(|| {
+        format!(
+            "the object moves, but the tool never comes nearer than {:.0} mm: the poses are not in `{}`, or tool and table in \
+             cell.toml are not this cell's",
+            nearest * 1e3,
+            cell.robot.as_ref().and_then(|robot| robot.base_frame.as_deref()).unwrap_or("the base frame")
+        )
+    })
+}
+
+/// Usual number of poses a second.
+fn rate(series: &ObjectSeries) -> Option<f64> {
+    let mut steps: Vec<u64> = series.stamps_ns.windows(2).map(|w| w[1] - w[0]).collect();
+    steps.sort_unstable();
+    steps.get(steps.len() / 2).map(|step| 1e9 / *step as f64)
+}

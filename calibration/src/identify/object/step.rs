@@ -1,0 +1,205 @@
+//! One step of the shared numbers, every clip's own ones at their best before and after it.
+//!
+//! Own numbers are cheap (they cost a slide, not a hit) and must not hold up the shared ones: a clip whose slide begins
+//! elsewhere than simulated finds its own way first. A clip that nothing fits counts less, so that it does not steer
+//! the others.
+
+use crate::estimate::{ClipFit, ClipModel, Impossible, Options, Random, Unknown, fit_from};
+use crate::forward::object::ObjectClips;
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+
+/// What is asked of the clips.
+#[derive(Clone, Copy)]
+pub(super) struct Question<'a> {
+    /// The clips.
+    pub(super) clips: &'a ObjectClips,
+    /// The shared numbers.
+    pub(super) unknowns: &'a [Unknown],
+    /// The own ones.
+    pub(super) random: &'a [Random],
+}
+
+/// All clips around one point, own numbers at their best.
+#[derive(Debug, Clone)]
+pub(super) struct Linearised {
+    /// The shared numbers.
+    pub(super) shared: Vec<f64>,
+    /// The clips there.
+    pub(super) clips: Vec<ClipFit>,
+    /// How much each counts: 1, less where nothing fits.
+    pub(super) weights: Vec<f64>,
+    /// Whether the step that led here was small against what the clips can tell.
+    pub(super) small: bool,
+    /// Calls of the model that led here.
+    pub(super) evaluations: usize,
+}
+
+/// Steps of the own numbers at most.
+const OWN: Options = Options { iterations: 2, tolerance: 0.3 };
+/// Trials with growing damping.
+const TRIALS: usize = 5;
+/// A step is small when it promises less than this [nats of -2 ln likelihood].
+const SMALL: f64 = 0.3;
+/// A clip counts less from so many times the usual misfit on.
+const MISFIT: f64 = 4.0;
+
+impl Linearised {
+    /// `-2 ln` of the likelihood of all clips.
+    #[must_use]
+    pub(super) fn deviance(&self) -> f64 {
+        self.clips.iter().zip(&self.weights).map(|(clip, weight)| weight * clip.deviance).sum()
+    }
+
+    /// The clips' own numbers.
+    #[must_use]
+    pub(super) fn own(&self) -> Vec<Vec<f64>> {
+        self.clips.iter().map(|clip| clip.own.clone()).collect()
+    }
+
+    /// Information on the shared numbers.
+    #[must_use]
+    pub(super) fn information(&self) -> DMatrix<f64> {
+        let n = self.shared.len();
+        let parts = self.clips.iter().zip(&self.weights);
+        parts.fold(DMatrix::zeros(n, n), |sum, (clip, weight)| sum + &clip.information * *weight)
+    }
+
+    fn gradient(&self) -> DVector<f64> {
+        let parts = self.clips.iter().zip(&self.weights);
+        parts.fold(DVector::zeros(self.shared.len()), |sum, (clip, weight)| sum + &clip.gradient * *weight)
+    }
+}
+
+/// One clip at shared numbers that are given.
+struct OneClip<'a> {
+    clips: &'a ObjectClips,
+    clip: usize,
+    shared: &'a [f64],
+}
+
+impl ClipModel for OneClip<'_> {
+    fn clips(&self) -> usize {
+        1
+    }
+
+    fn residuals(&self, _: usize, _: &[f64], own: &[f64], out: &mut Vec<f64>) -> Result<(), Impossible> {
+        self.clips.residuals(self.clip, self.shared, own, out)
+    }
+}
+
+/// Own numbers at their best, their cost, calls of the model.
+type Profiled = (Vec<f64>, f64, usize);
+
+impl Question<'_> {
+    /// The clips linearised after one step from `shared` with `own`; where no step leads down, there.
+    ///
+    /// # Errors
+    /// [`Impossible`] when a clip cannot be simulated there.
+    pub(super) fn improved(&self, shared: &[f64], own: &[Vec<f64>]) -> Result<Linearised, Impossible> {
+        let here = self.profiled(shared, own)?;
+        let at = self.linearised(shared, &here)?;
+        let (information, gradient, cost) = (at.information(), at.gradient(), weighted(&here, &at.weights));
+        let mut damping = 1e-3;
+        let mut evaluations = at.evaluations;
+        for _ in 0..TRIALS {
+            let step = self.step(shared, &information, &gradient, damping);
+            let promised = -(2.0 * gradient.dot(&step) + step.dot(&(&information * &step)));
+            if promised < SMALL {
+                break;
+            }
+            let to: Vec<f64> = shared.iter().zip(step.iter()).map(|(x, dx)| x + dx).collect();
+            let start: Vec<Vec<f64>> = here.iter().map(|(own, ..)| own.clone()).collect();
+            if let Ok(there) = self.profiled(&to, &start) {
+                evaluations += there.iter().map(|(.., calls)| calls).sum::<usize>();
+                if weighted(&there, &at.weights) < cost {
+                    let mut after = self.linearised(&to, &there)?;
+                    after.evaluations += evaluations;
+                    return Ok(after);
+                }
+            }
+            damping = (damping * 10.0).max(1e-1);
+        }
+        Ok(Linearised { small: true, evaluations, ..at })
+    }
+
+    /// The clips linearised at `shared`, own numbers at their best.
+    ///
+    /// # Errors
+    /// As [`Self::improved`].
+    pub(super) fn here(&self, shared: &[f64], own: &[Vec<f64>]) -> Result<Linearised, Impossible> {
+        self.linearised(shared, &self.profiled(shared, own)?)
+    }
+
+    fn profiled(&self, shared: &[f64], own: &[Vec<f64>]) -> Result<Vec<Profiled>, Impossible> {
+        let one = |(clip, own): (usize, &Vec<f64>)| {
+            let model = OneClip { clips: self.clips, clip, shared };
+            let fit = fit_from(&model, &[], self.random, (Vec::new(), vec![own.clone()]), &OWN, |_, _| true)?;
+            let [clip] = &fit.clips[..] else { return Err(Impossible("no clip".into())) };
+            Ok((clip.own.clone(), clip.chi2 + penalty(self.random, &clip.own), fit.evaluations))
+        };
+        own.par_iter().enumerate().map(one).collect()
+    }
+
+    fn linearised(&self, shared: &[f64], at: &[Profiled]) -> Result<Linearised, Impossible> {
+        let one = |(clip, (own, ..)): (usize, &Profiled)| {
+            ClipFit::at(self.clips, clip, (self.unknowns, shared), (self.random, own))
+        };
+        let clips: Vec<ClipFit> = at.par_iter().enumerate().map(one).collect::<Result<_, _>>()?;
+        let each = 1 + self.unknowns.len() + self.random.iter().filter(|effect| effect.sigma > 0.0).count();
+        let evaluations = at.iter().map(|(.., calls)| calls + each).sum();
+        let weights = weights(&clips);
+        Ok(Linearised { shared: shared.to_vec(), clips, weights, small: false, evaluations })
+    }
+
+    fn step(&self, shared: &[f64], h: &DMatrix<f64>, g: &DVector<f64>, damping: f64) -> DVector<f64> {
+        let n = shared.len();
+        let (mut held, mut step) = (vec![false; n], DVector::zeros(n));
+        for _ in 0..=n {
+            let mut h = h.clone();
+            let mut g = g.clone();
+            for k in 0..n {
+                h[(k, k)] *= 1.0 + damping;
+                if held[k] {
+                    h.row_mut(k).fill(0.0);
+                    h.column_mut(k).fill(0.0);
+                    g[k] = 0.0;
+                }
+                if h[(k, k)] <= 0.0 {
+                    h[(k, k)] = 1.0;
+                }
+            }
+            step = h.cholesky().map_or_else(|| DVector::zeros(n), |h| -h.solve(&g));
+            let mut more = false;
+            for (k, unknown) in self.unknowns.iter().enumerate() {
+                let leaves =
+                    (shared[k] <= unknown.lower && step[k] < 0.0) || (shared[k] >= unknown.upper && step[k] > 0.0);
+                more |= leaves && !held[k];
+                held[k] |= leaves;
+            }
+            if !more {
+                break;
+            }
+        }
+        DVector::from_fn(n, |k, _| {
+            step[k].clamp(self.unknowns[k].lower - shared[k], self.unknowns[k].upper - shared[k])
+        })
+    }
+}
+
+fn weighted(clips: &[Profiled], weights: &[f64]) -> f64 {
+    clips.iter().zip(weights).map(|((_, cost, _), weight)| cost * weight).sum()
+}
+
+fn penalty(random: &[Random], own: &[f64]) -> f64 {
+    random.iter().zip(own).filter(|(effect, _)| effect.sigma > 0.0).map(|(effect, u)| (u / effect.sigma).powi(2)).sum()
+}
+
+/// 1 for clips whose misfit is usual, in inverse proportion to it beyond.
+fn weights(clips: &[ClipFit]) -> Vec<f64> {
+    let misfits: Vec<f64> = clips.iter().map(|clip| clip.chi2 / clip.rows.max(1) as f64).collect();
+    let mut sorted = misfits.clone();
+    sorted.sort_by(f64::total_cmp);
+    let usual = sorted.get(sorted.len() / 2).copied().unwrap_or(1.0).max(0.25);
+    misfits.into_iter().map(|misfit| (MISFIT * usual / misfit).min(1.0)).collect()
+}
