@@ -11,7 +11,7 @@ use super::trace::{Trace, gallery};
 use maud::{Markup, html};
 
 /// Clips whose residuals are shown.
-const SHOWN_CLIPS: usize = 6;
+const SHOWN_CLIPS: usize = 3;
 
 /// Everything the page tells. SI units.
 #[derive(Debug, Clone, Default, PartialEq)]

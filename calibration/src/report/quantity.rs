@@ -16,7 +16,7 @@ impl Unit {
             "%" => Self { factor: 100.0, name },
             "1" | "" => Self { factor: 1.0, name: String::new() },
             "rad" | "m" | "s" if largest > 0.0 && largest < 1e-4 => Self { factor: 1e6, name: format!("\u{b5}{si}") },
-            "rad" | "m" | "s" if largest < 0.4 => Self { factor: 1e3, name: format!("m{si}") },
+            "rad" | "m" | "s" | "rad/s" | "m/s" if largest < 0.4 => Self { factor: 1e3, name: format!("m{si}") },
             _ => Self { factor: 1.0, name },
         }
     }
@@ -42,8 +42,13 @@ impl Unit {
         if !(lo.is_finite() && hi.is_finite() && hi > lo) {
             return self.attach(&short(value));
         }
-        let digits = digits_for(hi - lo);
-        self.attach(&format!("{} [{}, {}]", fixed(value, digits), fixed(lo, digits), fixed(hi, digits)))
+        // Numbers far from 1 share a power of ten: `1.45 [1.07, 2.23]` and the power.
+        let exponent = value.abs().max(lo.abs()).log10().floor();
+        let exponent = if (-4.0..5.0).contains(&exponent) || !exponent.is_finite() { 0.0 } else { exponent };
+        let [value, lo, hi] = [value, lo, hi].map(|x| x / 10_f64.powf(exponent));
+        let digits = digits_for((hi - lo).min(value.abs().max(lo.abs())));
+        let text = format!("{} [{}, {}]", fixed(value, digits), fixed(lo, digits), fixed(hi, digits));
+        self.attach(&if exponent == 0.0 { text } else { format!("{text}{}", times_ten_to(exponent as i32)) })
     }
 
     fn attach(&self, text: &str) -> String {
@@ -59,7 +64,7 @@ pub(super) fn short(value: f64) -> String {
     let size = value.abs();
     match size {
         0.0 => "0".into(),
-        _ if !(1e-5..1e7).contains(&size) => power(value),
+        _ if !(1e-5..1e6).contains(&size) => power(value),
         _ if size < 0.1 => fixed(value, (1.0 - size.log10().floor()) as usize),
         _ => fixed(value, (2.0 - size.log10().floor()).max(0.0) as usize),
     }
@@ -78,17 +83,26 @@ fn fixed(value: f64, digits: usize) -> String {
 }
 
 /// `1.2e-7` as `1.2\u{b7}10\u{207b}\u{2077}`.
-fn power(value: f64) -> String {
+pub(super) fn power(value: f64) -> String {
     let text = format!("{value:.1e}");
     let (mantissa, exponent) = text.split_once('e').unwrap_or((&text, "0"));
-    let raised = exponent.chars().map(|c| match c {
-        '-' => '\u{207b}',
-        '1' => '\u{b9}',
-        '2' => '\u{b2}',
-        '3' => '\u{b3}',
-        digit => char::from_u32(0x2070 + digit.to_digit(10).unwrap_or(0)).unwrap_or(digit),
-    });
-    format!("{mantissa}\u{b7}10{}", raised.collect::<String>())
+    format!("{}{}", mantissa.trim_end_matches(".0"), times_ten_to(exponent.parse().unwrap_or(0)))
+}
+
+/// `\u{b7}10\u{207b}\u{2077}`.
+fn times_ten_to(exponent: i32) -> String {
+    let raised = exponent
+        .to_string()
+        .chars()
+        .map(|c| match c {
+            '-' => '\u{207b}',
+            '1' => '\u{b9}',
+            '2' => '\u{b2}',
+            '3' => '\u{b3}',
+            digit => char::from_u32(0x2070 + digit.to_digit(10).unwrap_or(0)).unwrap_or(digit),
+        })
+        .collect::<String>();
+    format!("\u{b7}10{raised}")
 }
 
 #[cfg(test)]
@@ -110,6 +124,8 @@ mod tests {
         let ms = Unit::suited("s", 0.012);
         assert_eq!(ms.interval(0.011_93, [0.011_21, 0.012_58]), "11.9 [11.2, 12.6] ms");
         assert_eq!(Unit::suited("N m/rad", 600.0).interval(597.8, [560.0, 640.0]), "598 [560, 640] N m/rad");
+        let stiff = Unit::suited("N m/rad", 1e6).interval(1.4499e6, [1.0747e6, 2.2273e6]);
+        assert_eq!(stiff, "1.4 [1.1, 2.2]\u{b7}10\u{2076} N m/rad");
         assert_eq!(ms.interval(0.012, [f64::NAN, 0.013]), "12.0 ms");
         assert_eq!(Unit::suited("m", 0.001).interval(-0.000_001, [-0.001, 0.001]), "0.0 [-1.0, 1.0] mm");
     }

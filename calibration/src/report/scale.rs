@@ -1,5 +1,7 @@
 //! Axes: from values to places, and the round numbers to mark.
 
+use super::quantity::power;
+
 /// A stretch of values laid along a stretch of the picture.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Scale {
@@ -30,14 +32,18 @@ impl Scale {
     pub(super) fn ticks(&self, count: usize) -> Vec<(f64, String)> {
         let [lo, hi] = self.from;
         let rough = (hi - lo) / count.max(1) as f64;
-        let power = 10_f64.powf(rough.log10().floor());
-        let step = power * [1.0, 2.0, 5.0, 10.0].into_iter().find(|m| m * power >= rough * 0.999).unwrap_or(10.0);
+        let decade = 10_f64.powf(rough.log10().floor());
+        let step = decade * [1.0, 2.0, 5.0, 10.0].into_iter().find(|m| m * decade >= rough * 0.999).unwrap_or(10.0);
         let digits = (-step.log10().floor()).clamp(0.0, 9.0) as usize;
         let first = (lo / step - 1e-9).ceil() as i64;
         let last = (hi / step + 1e-9).floor() as i64;
         (first..=last)
             .map(|k| k as f64 * step)
-            .map(|tick| (tick, format!("{:.digits$}", if tick == 0.0 { 0.0 } else { tick })))
+            .map(|tick| match tick {
+                0.0 => (tick, format!("{:.digits$}", 0.0)),
+                _ if step >= 1e4 => (tick, power(tick)),
+                _ => (tick, format!("{tick:.digits$}")),
+            })
             .collect()
     }
 }
@@ -60,6 +66,7 @@ mod tests {
         let names = |scale: Scale| scale.ticks(4).into_iter().map(|(_, name)| name).collect::<Vec<_>>();
         assert_eq!(names(Scale::new([0.0, 9.3], [0.0, 1.0])), ["0", "5"]);
         assert_eq!(names(Scale::new([-0.11, 0.12], [0.0, 1.0])), ["-0.1", "0.0", "0.1"]);
+        assert_eq!(names(Scale::new([0.0, 9e8], [0.0, 1.0])), ["0", "5\u{b7}10\u{2078}"]);
         assert_eq!(names(Scale::new([0.0, 0.0], [0.0, 1.0])), ["0.0", "0.5", "1.0"]);
     }
 

@@ -2,8 +2,14 @@
 
 use super::quantity::Unit;
 
+/// Above this a share is told as more than it.
+const NEARLY_ALL: f64 = 0.9999;
+
 /// A share as percent: `41 %`, `0.4 %`, `99.97 %`.
 pub(super) fn percent(share: f64) -> String {
+    if share > NEARLY_ALL && share < 1.0 {
+        return "> 99.99 %".into();
+    }
     let value = 100.0 * share;
     let rest = (100.0 - value).abs();
     match value.abs() {
@@ -19,6 +25,9 @@ pub(super) fn percent(share: f64) -> String {
 
 /// A share with its interval: `81 [76, 85] %`.
 pub(super) fn percent_interval(share: f64, interval: [f64; 2]) -> String {
+    if interval[0] > NEARLY_ALL && share < 1.0 {
+        return percent(share);
+    }
     if interval.iter().all(|end| end.is_finite()) && interval[1] > interval[0] {
         Unit::suited("%", share).interval(share, interval)
     } else {
@@ -45,7 +54,9 @@ mod tests {
         assert_eq!(percent(0.4123), "41 %");
         assert_eq!(percent(0.9997), "99.97 %");
         assert_eq!(percent(0.0001), "< 0.1 %");
-        assert_eq!(percent(1.0), "100 %");
+        assert_eq!((percent(1.0), percent(0.999_99)), ("100 %".into(), "> 99.99 %".into()));
+        assert_eq!(percent_interval(0.999_989, [0.999_988, 0.999_99]), "> 99.99 %");
+        assert_eq!(percent_interval(0.994, [0.993, 0.995]), "99.40 [99.30, 99.50] %");
         assert_eq!(percent_interval(0.81, [0.76, 0.85]), "81 [76, 85] %");
         assert_eq!((probability(1.0), probability(0.0)), ("> 99 %".into(), "< 1 %".into()));
     }

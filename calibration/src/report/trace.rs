@@ -34,13 +34,20 @@ impl Trace {
         mean.sqrt() / if self.sigma > 0.0 { self.sigma } else { 1.0 }
     }
 
+    /// Before and after, and after alone beside it: what is left is often too small to be seen next to what was there.
     fn draw(&self) -> Markup {
         let lines = [Line { class: "before", points: &self.before }, Line { class: "after", points: &self.after }];
-        // A residual that stays as it was shows one line, not two on top of each other.
-        let lines = if self.after.is_empty() || self.after == self.before { &lines[..1] } else { &lines[..] };
         let title = format!("{}, {}", self.clip.trim_end_matches(".mcap"), self.channel);
+        // A residual that stays as it was shows one line, not two on top of each other.
+        if self.after.is_empty() || self.after == self.before {
+            return self.chart(&title, &lines[..1]);
+        }
+        html! { (self.chart(&title, &lines)) (self.chart("after alone", &lines[1..])) }
+    }
+
+    fn chart(&self, title: &str, lines: &[Line]) -> Markup {
         let band = (self.sigma > 0.0).then_some(BAND * self.sigma);
-        Chart { title: &title, x: "time [s]", unit: &self.unit, lines, band, logarithmic: false, size: SIZE }.draw()
+        Chart { title, x: "time [s]", unit: &self.unit, lines, band, logarithmic: false, size: SIZE }.draw()
     }
 }
 
@@ -95,8 +102,11 @@ mod tests {
     fn a_trace_shows_both_lines_and_the_noise() {
         let mut both = trace("clip_05.mcap", "joint2", 2e-3);
         both.after = both.before.iter().map(|[t, value]| [*t, 0.1 * value]).collect();
-        let svg = both.draw().into_string();
-        assert_well_formed(&svg);
+        let html = both.draw().into_string();
+        let (svg, alone) = html.split_at(html.rfind("<svg").expect("two pictures"));
+        assert_well_formed(svg);
+        assert_well_formed(alone);
+        assert!(alone.contains("after alone") && !alone.contains("line before"));
         assert!(svg.contains("line before") && svg.contains("line after") && svg.contains("clip_05, joint2 [mrad]"));
         assert!(!trace("a", "b", 1.0).draw().into_string().contains("line after"));
         assert_well_formed(&Trace::default().draw().into_string());

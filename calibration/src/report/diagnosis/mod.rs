@@ -14,7 +14,7 @@ use crate::diagnose::{Diagnosis, Kind};
 use maud::{Markup, html};
 
 /// Clips whose residuals are shown.
-const SHOWN_CLIPS: usize = 4;
+const SHOWN_CLIPS: usize = 3;
 
 /// The page.
 #[must_use]

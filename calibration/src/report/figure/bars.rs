@@ -1,6 +1,6 @@
 //! Before and after, as pairs of bars; a dashed line where noise alone would end.
 
-use crate::report::canvas::{Anchor, Canvas, WIDTH};
+use crate::report::canvas::{Anchor, Canvas, WIDTH, width_of};
 use crate::report::quantity::Unit;
 use crate::report::scale::{Scale, span};
 use maud::Markup;
@@ -19,7 +19,8 @@ pub(in crate::report) struct Row<'a> {
     pub(in crate::report) floor: Option<f64>,
 }
 
-const LEFT: f64 = 200.0;
+/// Room for names, at least and at most.
+const NAMES: [f64; 2] = [170.0, 300.0];
 const RIGHT: f64 = 150.0;
 const BAR: f64 = 15.0;
 const GAP: f64 = 14.0;
@@ -29,19 +30,21 @@ const WORDS: f64 = 20.0;
 /// Rows of bars, one bar a class: `before` is orange, `after` blue, `track` grey.
 pub(in crate::report) fn bars(classes: &[&str], rows: &[Row]) -> Markup {
     let mut canvas = Canvas::new();
-    let scales = scales(rows);
+    let names = rows.iter().map(|row| width_of(row.name) + 16.0);
+    let left = names.fold(NAMES[0], f64::max).min(NAMES[1]);
+    let scales = scales(rows, left);
     let mut y = 6.0;
     for row in rows {
         let (unit, scale) = &scales[row.unit];
         let height = BAR * row.values.len() as f64;
-        canvas.text_within("", [LEFT - 12.0, y + 0.5 * height + 4.5], Anchor::End, row.name, LEFT - 14.0);
+        canvas.text_within("", [left - 12.0, y + 0.5 * height + 4.5], Anchor::End, row.name, left - 14.0);
         for (place, (class, value)) in classes.iter().zip(&row.values).enumerate() {
             let top = y + BAR * place as f64;
-            let end = if value.is_finite() { scale.at(unit.scaled(*value)) } else { LEFT };
-            canvas.rect(class, [LEFT, top], [(end - LEFT).max(1.0), BAR - 2.0]);
+            let end = if value.is_finite() { scale.at(unit.scaled(*value)) } else { left };
+            canvas.rect(class, [left, top], [(end - left).max(1.0), BAR - 2.0]);
             canvas.text("", [end + 7.0, top + BAR - 4.0], Anchor::Start, &unit.with_unit(*value));
         }
-        canvas.line("axis", [LEFT, y - 3.0], [LEFT, y + height + 1.0]);
+        canvas.line("axis", [left, y - 3.0], [left, y + height + 1.0]);
         if let Some(floor) = row.floor {
             draw_floor(&mut canvas, (unit, scale), (y, height), floor);
             y += WORDS;
@@ -59,7 +62,7 @@ fn draw_floor(canvas: &mut Canvas, (unit, scale): (&Unit, &Scale), (y, height): 
     canvas.text("small", [x.min(WIDTH - RIGHT), y + height + 17.0], Anchor::Start, &words);
 }
 
-fn scales<'a>(rows: &'a [Row]) -> BTreeMap<&'a str, (Unit, Scale)> {
+fn scales<'a>(rows: &'a [Row], left: f64) -> BTreeMap<&'a str, (Unit, Scale)> {
     let mut largest: BTreeMap<&str, f64> = BTreeMap::new();
     for row in rows {
         let [_, top] = span(row.values.iter().copied().chain(row.floor).chain([0.0]));
@@ -68,7 +71,7 @@ fn scales<'a>(rows: &'a [Row]) -> BTreeMap<&'a str, (Unit, Scale)> {
     }
     let scale = |(si, top): (&'a str, f64)| {
         let unit = Unit::suited(si, top);
-        let scale = Scale::new([0.0, unit.scaled(top)], [LEFT, WIDTH - RIGHT]);
+        let scale = Scale::new([0.0, unit.scaled(top)], [left, WIDTH - RIGHT]);
         (si, (unit, scale))
     };
     largest.into_iter().map(scale).collect()

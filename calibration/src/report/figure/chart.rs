@@ -33,7 +33,7 @@ pub(in crate::report) struct Chart<'a> {
     pub(in crate::report) lines: &'a [Line<'a>],
     /// Half the width of the grey band around zero, in SI.
     pub(in crate::report) band: Option<f64>,
-    /// Whether values are laid out by their logarithm.
+    /// Whether values are laid out by their logarithm, where they span more than one power of ten.
     pub(in crate::report) logarithmic: bool,
     /// Width and height.
     pub(in crate::report) size: [f64; 2],
@@ -45,8 +45,9 @@ impl Chart<'_> {
         let [width, height] = self.size;
         let [lo, hi] = self.values();
         let unit = Unit::suited(self.unit, lo.abs().max(hi.abs()));
-        let shown = |value: f64| if self.logarithmic { value.log10() } else { unit.scaled(value) };
-        let room = if self.logarithmic { 0.0 } else { 0.06 * (hi - lo) };
+        let decades = self.spans_decades();
+        let shown = |value: f64| if decades { value.log10() } else { unit.scaled(value) };
+        let room = if decades { 0.0 } else { 0.06 * (hi - lo) };
         let x = Scale::new(span(self.points().map(|p| p[0])), [LEFT, width - 10.0]);
         let y = Scale::new([shown(lo - room), shown(hi + room)], [height - BOTTOM, TOP + 6.0]);
         let mut canvas = Canvas::new();
@@ -68,7 +69,7 @@ impl Chart<'_> {
         let title = if unit.is_empty() { self.title.to_owned() } else { format!("{} [{unit}]", self.title) };
         canvas.text_within("strong", [0.0, 14.0], Anchor::Start, &title, width);
         for (value, name) in y.ticks(4) {
-            let name = if self.logarithmic { power_of_ten(value) } else { Some(name) };
+            let name = if self.spans_decades() { power_of_ten(value) } else { Some(name) };
             canvas.line("grid", [LEFT, y.at(value)], [width - 10.0, y.at(value)]);
             canvas.text("small", [LEFT - 6.0, y.at(value) + 4.0], Anchor::End, &name.unwrap_or_default());
         }
@@ -84,12 +85,13 @@ impl Chart<'_> {
         self.lines.iter().flat_map(|line| line.points)
     }
 
+    fn spans_decades(&self) -> bool {
+        let [lo, hi] = span(self.points().map(|p| p[1]));
+        self.logarithmic && lo > 0.0 && hi > 10.0 * lo
+    }
+
     /// What the axis must span, in SI.
     fn values(&self) -> [f64; 2] {
-        if self.logarithmic {
-            let [lo, hi] = span(self.points().map(|p| p[1]).filter(|value| *value > 0.0));
-            return if lo > 0.0 { [lo, hi.max(10.0 * lo)] } else { [0.1, 1.0] };
-        }
         let band = self.band.into_iter().flat_map(|band| [band, -band]);
         span(self.points().map(|p| p[1]).chain(band))
     }

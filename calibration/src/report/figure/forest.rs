@@ -1,7 +1,7 @@
 //! Parameters with their intervals, each on its own scale from bound to bound or around what was believed before.
 
 use crate::report::canvas::{Anchor, Canvas, WIDTH, width_of};
-use crate::report::quantity::Unit;
+use crate::report::quantity::{Unit, short};
 use crate::report::scale::{Scale, span};
 use maud::Markup;
 
@@ -36,8 +36,17 @@ const NAMES: [f64; 2] = [150.0, 300.0];
 /// Where the axis ends.
 const END: f64 = 560.0;
 const ROW: f64 = 25.0;
+/// From this ratio on, values are laid out by their powers of ten.
+const DECADES: f64 = 50.0;
 /// Room for a remark under a row.
 const WARNING: f64 = 13.0;
+
+impl Row {
+    /// Value and ends of the interval.
+    fn ends(&self) -> impl Iterator<Item = f64> {
+        self.interval.into_iter().chain([self.value])
+    }
+}
 
 /// The plot. A group in which every row has a nominal value other than 0 is laid out in percent of it.
 pub(in crate::report) fn forest(groups: &[Group]) -> Markup {
@@ -58,32 +67,49 @@ enum Axis {
     Relative,
     /// The value itself.
     Absolute(Unit),
+    /// The power of ten of a value that spans decades.
+    Logarithmic(Unit),
 }
 
 impl Axis {
     fn of(group: &Group) -> Self {
         let relative = !group.rows.is_empty() && group.rows.iter().all(|row| row.nominal.is_some_and(|n| n != 0.0));
-        if relative { Self::Relative } else { Self::Absolute(unit(group)) }
+        let [lo, hi] = span(group.rows.iter().flat_map(Row::ends));
+        match relative {
+            true => Self::Relative,
+            false if lo > 0.0 && hi > DECADES * lo => Self::Logarithmic(unit(group)),
+            false => Self::Absolute(unit(group)),
+        }
     }
 
     fn place(&self, row: &Row, value: f64) -> f64 {
         match self {
             Self::Relative => 100.0 * (value / row.nominal.unwrap_or(1.0) - 1.0),
             Self::Absolute(unit) => unit.scaled(value),
+            Self::Logarithmic(unit) => unit.scaled(value).log10(),
+        }
+    }
+
+    /// The name of a tick at a place; none where it would be no round number.
+    fn tick(&self, place: f64, name: String) -> Option<String> {
+        match self {
+            Self::Logarithmic(_) if place.fract() != 0.0 => None,
+            Self::Logarithmic(_) => Some(short(10_f64.powf(place))),
+            _ => Some(name),
         }
     }
 
     fn title(&self) -> String {
         match self {
             Self::Relative => "difference from cell.toml [%]".into(),
-            Self::Absolute(unit) if unit.name().is_empty() => String::new(),
-            Self::Absolute(unit) => format!("[{}]", unit.name()),
+            Self::Absolute(unit) | Self::Logarithmic(unit) if unit.name().is_empty() => String::new(),
+            Self::Absolute(unit) | Self::Logarithmic(unit) => format!("[{}]", unit.name()),
         }
     }
 }
 
 fn unit(group: &Group) -> Unit {
-    let [lo, hi] = span(group.rows.iter().flat_map(|row| row.interval.into_iter().chain([row.value])));
+    let [lo, hi] = span(group.rows.iter().flat_map(Row::ends));
     Unit::suited(group.unit, lo.abs().max(hi.abs()))
 }
 
@@ -101,7 +127,7 @@ fn draw_group(canvas: &mut Canvas, group: &Group, [left, top]: [f64; 2]) -> f64 
     let first = top + 22.0;
     let height = |row: &Row| if row.warning.is_some() { ROW + WARNING } else { ROW };
     let bottom = first + group.rows.iter().map(height).sum::<f64>();
-    for (value, name) in scale.ticks(6) {
+    for (value, name) in scale.ticks(6).into_iter().filter_map(|(at, name)| Some((at, axis.tick(at, name)?))) {
         canvas.line("grid", [scale.at(value), first], [scale.at(value), bottom]);
         canvas.text("small", [scale.at(value), bottom + 14.0], Anchor::Middle, &name);
     }
@@ -160,6 +186,14 @@ mod tests {
         let svg = forest(&[Group { name: "centre of mass", unit: "m", rows }]).into_string();
         assert_well_formed(&svg);
         assert!(svg.contains(">[mm]<") && svg.contains("5.10 [5.05, 5.15] mm"), "{svg}");
+    }
+
+    #[test]
+    fn what_spans_decades_is_laid_out_by_powers_of_ten() {
+        let rows = vec![row(3e4, None, None), row(2e7, None, None)];
+        let svg = forest(&[Group { name: "stiffness", unit: "N m/rad", rows }]).into_string();
+        assert_well_formed(&svg);
+        assert!(svg.contains(">100000<") && svg.contains(">1\u{b7}10\u{2076}<"), "{svg}");
     }
 
     #[test]

@@ -21,7 +21,7 @@ pub(in crate::report) struct Cell<'a> {
 const STAGES: [&str; 5] = ["control", "hit", "slide", "rest", "camera"];
 const LEFT: f64 = 230.0;
 /// Room for the sum of a row.
-const RIGHT: f64 = 70.0;
+const RIGHT: f64 = 90.0;
 const ROW: f64 = 30.0;
 const WIDEST: f64 = 86.0;
 
