@@ -1,11 +1,18 @@
-//! What one control period of 1 ms costs: the simulated cell with the tool far from the object and in contact, and a
-//! whole cycle of the shadow. Real-time factor = 1 ms over the time shown.
+//! What one control period of 1 ms costs: the simulated cell with the tool far from the object and in contact, a whole
+//! stroke (the arm comes, hits the box, the box slides to rest), and a cycle of the shadow. Real-time factor = 1 ms over
+//! the time shown.
+//!
+//! A stroke's time is that of all its 2500 periods: microseconds a step are its milliseconds over 2.5.
+
+#[path = "../tests/stroke/mod.rs"]
+mod stroke;
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use shared_mem::cell::{Cell, Table};
 use shared_mem::msg::arm::ArmState;
 use std::hint::black_box;
 use std::path::Path;
+use stroke::{Stroke, theta};
 use twin::arm::ArmModel;
 use twin::shadow::Shadow;
 use twin::sim::{Drive, PERIOD_NS, SimCell};
@@ -42,6 +49,38 @@ fn periods(criterion: &mut Criterion) {
     });
 }
 
+/// 2500 steps of 1 ms each: the arm alone, and arm, tool and box in hit and slide.
+fn strokes(criterion: &mut Criterion) {
+    let stroke = Stroke::new();
+    let mut worker = stroke.worker(None);
+    let mut trace = stroke.run(&mut worker);
+    assert!(trace.contact.is_some());
+    criterion.bench_function("2500 periods of the arm alone", |bencher| {
+        bencher.iter(|| {
+            worker.start(stroke.joints_ns[0], Some(&stroke.arm), None, Some(&stroke.commands));
+            trace.clear();
+            worker.run(&stroke.course(), &mut trace);
+        });
+    });
+    criterion.bench_function("2500 periods of arm, tool and box in hit and slide", |bencher| {
+        bencher.iter(|| {
+            stroke.start(&mut worker);
+            trace.clear();
+            worker.run(&stroke.course(), &mut trace);
+        });
+    });
+    let mut worker = stroke.worker(Some(&theta(
+        "[[effect]]\nname = \"joint_coulomb_friction\"\ncoulomb = 0.8\n[[effect]]\nname = \"command_delay\"\ndelay = 0.004",
+    )));
+    criterion.bench_function("the same with dry friction in the joints and a late command", |bencher| {
+        bencher.iter(|| {
+            stroke.start(&mut worker);
+            trace.clear();
+            worker.run(&stroke.course(), &mut trace);
+        });
+    });
+}
+
 fn shadow(criterion: &mut Criterion) {
     let description = shipped();
     let mut robot = SimCell::new(&description, None).expect("a cell");
@@ -58,5 +97,5 @@ fn shadow(criterion: &mut Criterion) {
     });
 }
 
-criterion_group!(benches, periods, shadow);
+criterion_group!(benches, periods, strokes, shadow);
 criterion_main!(benches);

@@ -101,7 +101,40 @@ impl ObjectModel {
     }
 }
 
+/// A number of an object that no body can have.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[error("the object's {name} cannot be {value}; give {wanted}, in cell.toml or theta.toml")]
+pub struct ParameterError {
+    /// Which one.
+    pub name: &'static str,
+    /// Its value.
+    pub value: f64,
+    /// What would do.
+    pub wanted: &'static str,
+}
+
 impl ObjectParameters {
+    /// # Errors
+    /// [`ParameterError`] for what is negative, without bound or not a number, and for a mass of zero.
+    pub fn check(&self) -> Result<(), ParameterError> {
+        let fault = |name, value, wanted| Err(ParameterError { name, value, wanted });
+        if !(self.mass > 0.0 && self.mass.is_finite()) {
+            return fault("mass", self.mass, "a positive number of kilograms");
+        }
+        if let Some(far) = self.centre_of_mass.iter().find(|v| v.is_nan() || v.abs() > 10.0) {
+            return fault("centre of mass", *far, "three numbers in metres from the geometric centre");
+        }
+        for (name, value) in [("friction", self.friction), ("tip friction", self.tip_friction)] {
+            if !(0.0..=100.0).contains(&value) {
+                return fault(name, value, "0 or a positive number below 100");
+            }
+        }
+        if !(0.0..=1.0).contains(&self.restitution) {
+            return fault("restitution", self.restitution, "0 to 1");
+        }
+        Ok(())
+    }
+
     /// What `theta` knows, else the nominal values of cell.toml.
     #[must_use]
     pub fn new(object: &Object, theta: Option<&Theta>) -> Self {
@@ -171,6 +204,31 @@ mod tests {
             })
             .sum();
         assert!((volume - 6.0).abs() < 1e-12, "{volume}");
+    }
+
+    #[test]
+    fn a_number_that_no_body_can_have_is_refused_in_one_line() {
+        let fine = ObjectParameters {
+            mass: 0.3,
+            centre_of_mass: Vector3::zeros(),
+            friction: 0.0,
+            tip_friction: 0.2,
+            restitution: 1.0,
+        };
+        assert_eq!(fine.check(), Ok(()));
+        let faults = [
+            (ObjectParameters { mass: 0.0, ..fine }, "mass cannot be 0"),
+            (ObjectParameters { mass: -1.0, ..fine }, "mass cannot be -1"),
+            (ObjectParameters { mass: f64::NAN, ..fine }, "mass cannot be NaN"),
+            (ObjectParameters { friction: -0.1, ..fine }, "friction cannot be -0.1"),
+            (ObjectParameters { tip_friction: f64::NAN, ..fine }, "tip friction cannot be NaN"),
+            (ObjectParameters { restitution: 1.5, ..fine }, "restitution cannot be 1.5"),
+            (ObjectParameters { centre_of_mass: Vector3::new(0.0, f64::NAN, 0.0), ..fine }, "centre of mass cannot be"),
+        ];
+        for (parameters, told) in faults {
+            let error = parameters.check().expect_err(told).to_string();
+            assert!(error.contains(told) && error.contains("give") && !error.contains('\n'), "{error}");
+        }
     }
 
     #[test]

@@ -188,3 +188,18 @@ fn who_takes_no_part_is_not_there() {
         (alone.poses[1].isometry().translation.vector - stroke.object.pose.isometry().translation.vector).norm() < 1e-6
     );
 }
+
+#[test]
+fn who_asks_for_poses_alone_gets_the_same_ones_sooner() {
+    let stroke = Stroke::new();
+    for theta in [None, Some(theta(EFFECTS))] {
+        let mut worker = stroke.worker(theta.as_ref());
+        let whole = stroke.run(&mut worker);
+        let whole_end = worker.now_ns();
+        stroke.start(&mut worker);
+        let mut poses = CellTrace::default();
+        worker.run(&twin::rollout::Course { joints_ns: &[], ..stroke.course() }, &mut poses);
+        assert!(poses.poses == whole.poses && poses.contact == whole.contact);
+        assert!(worker.now_ns() + 300_000_000 < whole_end, "{} {whole_end}", worker.now_ns());
+    }
+}

@@ -16,13 +16,26 @@ pub struct Simulation {
     pub q_noise: f64,
     /// Noise of a measured joint velocity, one sigma [rad/s].
     pub dq_noise: f64,
+    /// Step of a measured joint position [rad]: what one count of the encoder amounts to; 0: none.
+    pub q_step: f64,
+    /// Step of a measured joint velocity [rad/s]; 0: none.
+    pub dq_step: f64,
     /// Seed of all noise.
     pub seed: u64,
 }
 
 impl Default for Simulation {
     fn default() -> Self {
-        Self { q: Vec::new(), object_position: [0.5, 0.0], object_yaw: 0.0, q_noise: 0.0, dq_noise: 0.0, seed: 0 }
+        Self {
+            q: Vec::new(),
+            object_position: [0.5, 0.0],
+            object_yaw: 0.0,
+            q_noise: 0.0,
+            dq_noise: 0.0,
+            q_step: 0.0,
+            dq_step: 0.0,
+            seed: 0,
+        }
     }
 }
 

@@ -10,7 +10,7 @@ use super::touch::Touch;
 use nalgebra::Vector3;
 
 /// Angle of the oscillator in a step [rad]. Half of it changes the object's speed after a hit by less than half a per cent.
-const STEP_ANGLE: f64 = 0.15;
+const STEP_ANGLE: f64 = 0.1;
 
 /// The law's numbers.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -3,20 +3,21 @@
 //! all six freedoms. Base frame, SI. Called by [`super::TableObject`].
 
 use super::hit::Press;
-use crate::sliding::FreeBody;
+use super::tumble::Tumbling;
+use crate::sliding::{Footing, FreeBody, Wrench};
 use nalgebra::Vector3;
 
 /// Sweeps over the two places, and the change of impulse over mass [m/s] below which they end early.
 const SWEEPS: usize = 40;
-const SETTLED: f64 = 1e-7;
+const SETTLED: f64 = 1e-6;
 /// A push steeper than this against the table is none that a sliding body could give way to: the sine of 18 degrees.
 const STEEPEST: f64 = 0.95;
 
 /// A standing body that is pushed.
-pub(super) struct Pushed<'a> {
-    pub(super) body: &'a FreeBody,
-    pub(super) mass: f64,
-    pub(super) yaw_inertia: f64,
+struct Pushed<'a> {
+    body: &'a FreeBody,
+    mass: f64,
+    yaw_inertia: f64,
 }
 
 /// One place under the tool.
@@ -31,9 +32,47 @@ struct Place {
     impulse: Vector3<f64>,
 }
 
+impl Tumbling {
+    /// The presses' forces on a body that goes on standing [N]; `None` when such a one could not give way to them.
+    pub(super) fn push(
+        &self,
+        footing: &Footing,
+        body: &FreeBody,
+        presses: &[Press],
+        dt: f64,
+    ) -> Option<[Vector3<f64>; 2]> {
+        if presses.iter().all(|press| press.touch.depth <= 0.0) {
+            return Some([Vector3::zeros(); 2]);
+        }
+        Pushed { body, mass: self.mass, yaw_inertia: footing.slider.yaw_inertia }.forces(presses, dt)
+    }
+
+    /// What acts on a standing body but for the table's answer.
+    pub(super) fn wrench(
+        &self,
+        footing: &Footing,
+        body: &FreeBody,
+        presses: &[Press],
+        forces: &[Vector3<f64>; 2],
+    ) -> Wrench {
+        let weight = Wrench::weight(self.mass, self.gravity);
+        let pushed = presses
+            .iter()
+            .zip(forces)
+            .fold(weight, |sum, (press, force)| sum.with_force(*force, press.touch.point - body.centre));
+        let Some(height) = self.table_height.filter(|_| self.drag > 0.0) else { return pushed };
+        let middle = body.rotation * self.middle;
+        let lever = Vector3::new(middle.x, middle.y, height - body.centre.z);
+        let velocity = body.velocity + body.angular_velocity.cross(&lever);
+        let mut dragged = pushed.with_force(velocity * -self.drag, lever);
+        dragged.moment.z -= self.drag * footing.slider.patch.gyration_squared() * body.angular_velocity.z;
+        dragged
+    }
+}
+
 impl Pushed<'_> {
     /// Mean force of each press on the body over `dt` [N]; `None` when a press is too steep for a body that slides.
-    pub(super) fn forces(&self, presses: &[Press], dt: f64) -> Option<[Vector3<f64>; 2]> {
+    fn forces(&self, presses: &[Press], dt: f64) -> Option<[Vector3<f64>; 2]> {
         if presses.iter().any(|press| press.touch.normal.z.abs() > STEEPEST) {
             return None;
         }

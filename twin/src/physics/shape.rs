@@ -11,6 +11,10 @@ use parry3d_f64::shape::SharedShape;
 #[error("the object's mesh is flat or empty; give a mesh that encloses a volume")]
 pub struct FlatMesh;
 
+/// Corners of a mesh that are all asked for, and directions in which the outermost are looked for where it has more.
+const MOST_POINTS: usize = 500;
+const DIRECTIONS: usize = 300;
+
 /// Shape and what follows from it alone: made once, shared by clones.
 #[derive(Clone)]
 pub(super) struct CollisionShape {
@@ -32,7 +36,7 @@ impl CollisionShape {
         let shape = match outline {
             ObjectShape::Box { half_extents: h } => SharedShape::cuboid(h.x, h.y, h.z),
             ObjectShape::Mesh { points, .. } => {
-                let points: Vec<Vector> = points.iter().map(convert::point).collect();
+                let points: Vec<Vector> = outermost(points).iter().map(convert::point).collect();
                 SharedShape::convex_hull(&points).ok_or(FlatMesh)?
             }
         };
@@ -44,6 +48,29 @@ impl CollisionShape {
         let half_extents = shape.as_cuboid().map(|cuboid| convert::to_vector(cuboid.half_extents));
         Ok(Self { shape, half_extents, bounding_radius: outline.bounding_radius(), corners, unit_inertia })
     }
+}
+
+/// The corners that lie farthest in one of many directions; all of them where they are few. A scan's million corners make
+/// a hull of thousands, of which a step would have to ask each one.
+fn outermost(points: &[Point3<f64>]) -> Vec<Point3<f64>> {
+    if points.len() <= MOST_POINTS {
+        return points.to_vec();
+    }
+    let farthest = |direction: Vector3<f64>| {
+        points.iter().max_by(|a, b| direction.dot(&a.coords).total_cmp(&direction.dot(&b.coords))).copied()
+    };
+    // Directions spread evenly over the sphere along a golden spiral.
+    let spiral = (0..DIRECTIONS).map(|i| {
+        let height = 1.0 - (2 * i + 1) as f64 / DIRECTIONS as f64;
+        let (sin, cos) = (i as f64 * 2.399_963_229_728_653).sin_cos();
+        let across = (1.0 - height * height).sqrt();
+        Vector3::new(across * cos, across * sin, height)
+    });
+    let mut kept: Vec<Point3<f64>> = spiral.filter_map(farthest).collect();
+    kept.sort_by(|a, b| (a.x, a.y, a.z).partial_cmp(&(b.x, b.y, b.z)).unwrap_or(std::cmp::Ordering::Equal));
+    kept.dedup();
+    tracing::warn!("the object's mesh has {} corners; the physics takes the {} outermost", points.len(), kept.len());
+    kept
 }
 
 impl CollisionShape {
@@ -100,6 +127,27 @@ fn hull_corners(shape: &SharedShape) -> Vec<Point3<f64>> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_ball_of_a_million_faces_keeps_its_size_with_a_few_hundred_corners() {
+        let points: Vec<Point3<f64>> = (0..500_000)
+            .map(|i| {
+                let height = 1.0 - 2.0 * (f64::from(i) + 0.5) / 500_000.0;
+                let (sin, cos) = (f64::from(i) * 2.4).sin_cos();
+                Point3::from(
+                    Vector3::new(
+                        (1.0f64 - height * height).sqrt() * cos,
+                        (1.0f64 - height * height).sqrt() * sin,
+                        height,
+                    ) * 0.05,
+                )
+            })
+            .collect();
+        let ball = CollisionShape::new(&ObjectShape::Mesh { points, triangles: Vec::new() }).expect("a body");
+        assert!(ball.corners.len() <= DIRECTIONS, "{}", ball.corners.len());
+        let inertia = 0.4 * 0.05 * 0.05;
+        assert!((ball.unit_inertia[(0, 0)] / inertia - 1.0).abs() < 0.03, "{}", ball.unit_inertia);
+    }
 
     #[test]
     fn the_distance_from_a_box_is_the_same_as_that_of_its_hull() {

@@ -32,6 +32,10 @@ pub(super) struct Tumbling {
     pub(super) restitution: f64,
     /// In the table's axes [m/s²].
     pub(super) gravity: Vector3<f64>,
+    /// Drag of a viscous film under a standing body's base over its speed [N s/m].
+    pub(super) drag: f64,
+    /// The geometric centre from the centre of mass, object axes [m].
+    pub(super) middle: Vector3<f64>,
 }
 
 /// Places that touch at one time; a flat base has more only on meshes finer than needed.

@@ -120,7 +120,8 @@ impl CellRollout {
     ///
     /// `out` holds the answers of the course's first stamps, as many as its vectors are long: clear it before a start,
     /// keep it (or restore a clone of it) to go on. Stamps before the present get the present. A pose's stamp is the
-    /// camera's: it shows the object one latency before.
+    /// camera's: it shows the object one latency before. Once the joints are answered (or none are asked for) and the
+    /// object rests where nothing will touch it again, the poses that are left are those of now.
     pub fn run(&mut self, course: &Course<'_>, out: &mut CellTrace) {
         self.advance(course, out, Until::Answered);
     }
@@ -149,9 +150,19 @@ impl CellRollout {
         self.cell.step(&drive);
     }
 
+    /// Answers what is left when the object stays where it is.
+    fn rest(&mut self, course: &Course<'_>, out: &mut CellTrace) {
+        let Some(pose) = self.cell.object() else { return };
+        let effects = self.cell.camera_effects();
+        while let Some(stamp) = course.poses_ns.get(out.poses.len()) {
+            out.poses.push(effects.seen(&mut self.camera, *stamp, pose));
+        }
+    }
+
     /// Whether it stopped before a touch.
     fn advance(&mut self, course: &Course<'_>, out: &mut CellTrace, until: Until) -> bool {
         let mut before = (self.reading(), self.cell.object());
+        let mut ticks = 0u64;
         self.keep(course, out, &before, &before, 0);
         while self.goes_on(course, out, until) {
             let start_ns = self.cell.time_ns();
@@ -167,8 +178,33 @@ impl CellRollout {
             let after = (self.reading(), self.cell.object());
             self.keep(course, out, &before, &after, start_ns);
             before = after;
+            ticks += 1;
+            if until == Until::Answered
+                && out.joints.len() == course.joints_ns.len()
+                && ticks.is_multiple_of(LOOK_TICKS)
+            {
+                let end_ns = course.poses_ns.last().copied().unwrap_or(0);
+                if self.stays(course.commands, end_ns) {
+                    self.rest(course, out);
+                }
+            }
         }
         false
+    }
+
+    /// Whether the object stays where it is until `until_ns`: it rests, and the tool is led past it at a distance that no
+    /// tracking error bridges.
+    fn stays(&self, commands: Option<&CommandTrack>, until_ns: u64) -> bool {
+        if !self.cell.object_rests() {
+            return false;
+        }
+        let q = self.cell.q();
+        let Some(commands) = commands else { return self.cell.gap_at(&q) > CLEAR };
+        let now_ns = self.now_ns();
+        let asked = |ns: u64| self.cell.gap_at(commands.q_d(commands.at(ns)));
+        let behind = (asked(now_ns) - self.cell.gap_at(&q)).abs();
+        let looks = (now_ns.saturating_sub(LATEST_NS)..until_ns + LOOK_NS).step_by(LOOK_NS as usize);
+        looks.map(asked).all(|gap| gap > CLEAR + 2.0 * behind)
     }
 
     fn goes_on(&self, course: &Course<'_>, out: &CellTrace, until: Until) -> bool {
@@ -196,7 +232,8 @@ impl CellRollout {
             let due = |stamp: &&u64| stamp.saturating_sub(latency) <= now_ns;
             while let Some(stamp) = course.poses_ns.get(out.poses.len()).filter(due) {
                 let share = share(stamp.saturating_sub(latency)).min(1.0);
-                let pose = Pose::from_isometry(a.isometry().lerp_slerp(&b.isometry(), share));
+                // An object at rest is reported bit by bit where it is.
+                let pose = if a == b { *b } else { Pose::from_isometry(a.isometry().lerp_slerp(&b.isometry(), share)) };
                 out.poses.push(effects.seen(&mut self.camera, *stamp, pose));
             }
         }
@@ -241,6 +278,14 @@ impl CellRollout {
         &self.cell
     }
 }
+
+/// A tool that stays so far from an object [m], and twice its tracking error more, does not touch it.
+const CLEAR: f64 = 0.02;
+/// Ticks between two looks whether all is over, and time between two places of the tool that are looked at [ns].
+const LOOK_TICKS: u64 = 32;
+const LOOK_NS: u64 = 8_000_000;
+/// A command that came earlier than this has arrived [ns].
+const LATEST_NS: u64 = 500_000_000;
 
 /// Where a run ends.
 #[derive(Clone, Copy, PartialEq)]

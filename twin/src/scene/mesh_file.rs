@@ -3,7 +3,12 @@
 
 use super::ObjectShape;
 use nalgebra::{Point3, Vector3};
+use std::collections::HashMap;
 use std::path::{Path, PathBuf};
+
+/// Sizes that an object on a table can have [m]; what lies outside was drawn in another unit.
+const LARGEST: f64 = 10.0;
+const SMALLEST: f64 = 1e-3;
 
 /// Corners and triangles as they stand in a file.
 type Surface = (Vec<Point3<f64>>, Vec<[u32; 3]>);
@@ -55,10 +60,45 @@ fn centred((mut points, triangles): Surface) -> Result<ObjectShape, String> {
     }
     let low = points.iter().fold(Vector3::repeat(f64::INFINITY), |m, p| m.inf(&p.coords));
     let high = points.iter().fold(Vector3::repeat(f64::NEG_INFINITY), |m, p| m.sup(&p.coords));
+    let largest = (high - low).max();
+    if largest > LARGEST {
+        return Err(format!("it is {largest:.0} m large; was it drawn in millimetres? scale it by 0.001"));
+    }
+    if largest < SMALLEST {
+        return Err(format!("it is {:.3} mm large; scale it to metres", largest * 1e3));
+    }
     for p in &mut points {
         *p -= (low + high) * 0.5;
     }
+    let mut triangles = triangles;
+    if volume(&points, &triangles) < 0.0 {
+        tracing::warn!("the mesh is inside out; its faces are turned around");
+        triangles.iter_mut().for_each(|[_, b, c]| std::mem::swap(b, c));
+    }
+    let gaps = open_edges(&points, &triangles);
+    if gaps > 0 {
+        tracing::warn!("the mesh is open at {gaps} edges; the physics takes its convex hull, which is closed");
+    }
     Ok(ObjectShape::Mesh { points, triangles })
+}
+
+/// Volume inside a closed surface [m³]; negative when its faces look inwards.
+fn volume(points: &[Point3<f64>], triangles: &[[u32; 3]]) -> f64 {
+    let corners = |t: &[u32; 3]| t.map(|i| points[i as usize].coords);
+    triangles.iter().map(corners).map(|[a, b, c]| a.dot(&b.cross(&c)) / 6.0).sum()
+}
+
+/// Edges that belong to an odd number of faces. Corners at one place are one corner: an stl repeats them.
+fn open_edges(points: &[Point3<f64>], triangles: &[[u32; 3]]) -> usize {
+    let place = |i: u32| points[i as usize].coords.map(|v| (v * 1e7).round() as i64);
+    let mut edges: HashMap<[[i64; 3]; 2], usize> = HashMap::new();
+    for triangle in triangles {
+        for i in 0..3 {
+            let (a, b) = (place(triangle[i]).into(), place(triangle[(i + 1) % 3]).into());
+            *edges.entry(if a < b { [a, b] } else { [b, a] }).or_default() += 1;
+        }
+    }
+    edges.values().filter(|count| !count.is_multiple_of(2)).count()
 }
 
 /// Wavefront: `v x y z` and `f a b c ..` with optional `/texture/normal`, from 1 or counted from the end.
@@ -299,6 +339,23 @@ mod tests {
             assert_eq!(shape.half_extents(), Vector3::new(0.5, 0.5, 1.0), "{name}");
             assert_eq!(shape.triangles().1.len(), 4, "{name}");
         }
+    }
+
+    #[test]
+    fn a_mesh_inside_out_is_turned_around_and_its_open_edges_are_counted() {
+        let inverted: String = FACES.iter().map(|f| format!("f {} {} {}\n", f[1] + 1, f[0] + 1, f[2] + 1)).collect();
+        let corners: String = TETRAHEDRON.iter().map(|[x, y, z]| format!("v {x} {y} {z}\n")).collect();
+        let (points, triangles) = read_as("a.obj", (corners + &inverted).as_bytes()).expect("a body").triangles();
+        assert!((volume(&points, &triangles) - 1.0 / 3.0).abs() < 1e-12);
+        assert_eq!(open_edges(&points, &triangles), 0);
+        assert_eq!(open_edges(&points, &triangles[1..]), 3);
+    }
+
+    #[test]
+    fn a_mesh_in_millimetres_is_refused_with_the_factor() {
+        let text = written_as_obj().replace("v 0 0 2", "v 0 0 2000");
+        let error = read_as("a.obj", text.as_bytes()).unwrap_err();
+        assert!(error.contains("2000 m large") && error.contains("0.001"), "{error}");
     }
 
     #[test]

@@ -5,6 +5,7 @@
 use super::arm::SimArm;
 use super::tool_path::{ToolMotion, ToolPath};
 use super::{Drive, PERIOD};
+use crate::arm::Joints;
 use crate::effects::HitEffects;
 use crate::physics::TableObject;
 use crate::physics::hit::{ContactLaw, ContactMotion, Press};
@@ -105,6 +106,12 @@ impl ToolContact {
         let moving = ToolMotion::from(arm.model().flange_motion(arm.state()));
         let approach = (moving.velocity_at(&touch.point) - object.velocity_at(&touch.point)).norm();
         -touch.depth < MARGIN + approach * PERIOD
+    }
+
+    /// Gap between object and tool for an arm at `q` [m]; without bound where there is no tool.
+    pub(super) fn gap_at(&self, arm: &SimArm, q: &Joints, object: &TableObject) -> f64 {
+        let Some((tool, _)) = self.pair.as_ref().filter(|_| arm.model().has_geometry()) else { return f64::INFINITY };
+        -object.touch(tool, &self.held(&arm.model().flange(q).isometry())).depth
     }
 
     /// Where the tool is that should be at the flange.

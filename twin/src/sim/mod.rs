@@ -8,17 +8,19 @@
 
 mod arm;
 mod contact;
+mod state;
 #[cfg(test)]
 mod tests;
 mod tool_path;
 
 pub use crate::rollout::Drive;
+pub use state::SimState;
 
 use crate::arm::{ArmModel, GainError, JointState, Joints, ModelError};
 use crate::effects::{CameraEffects, EffectError, Effects};
-use crate::physics::{FlatMesh, ObjectMotion, TableObject};
-use crate::rollout::{ArmMotion, CommandTrack, Plant, Reading};
-use crate::scene::{MeshFileError, ObjectModel, ObjectParameters, SceneSnapshot};
+use crate::physics::{FlatMesh, TableObject};
+use crate::rollout::{CommandTrack, Plant, Reading};
+use crate::scene::{MeshFileError, ObjectModel, ObjectParameters, ParameterError, SceneSnapshot};
 use arm::SimArm;
 use contact::{ContactRecord, ToolContact};
 use nalgebra::{Isometry3, Vector3};
@@ -59,29 +61,6 @@ struct Description {
     object: Option<shared_mem::cell::Object>,
 }
 
-/// The whole state of a cell at one moment, without the noise of its sensors.
-#[derive(Debug)]
-pub struct SimState {
-    arm: Option<ArmMotion>,
-    object: Option<ObjectMotion>,
-    contact: ContactRecord,
-    takes_part: TakesPart,
-    time_ns: u64,
-}
-
-impl Clone for SimState {
-    fn clone(&self) -> Self {
-        Self { arm: self.arm.clone(), ..*self }
-    }
-
-    /// Keeps the memory it has.
-    fn clone_from(&mut self, source: &Self) {
-        let mut arm = self.arm.take();
-        arm.clone_from(&source.arm);
-        *self = Self { arm, ..*source };
-    }
-}
-
 /// No cell can be simulated from what was given.
 #[derive(Debug, thiserror::Error)]
 pub enum SimError {
@@ -97,6 +76,9 @@ pub enum SimError {
     /// The object's mesh encloses nothing.
     #[error(transparent)]
     FlatMesh(#[from] FlatMesh),
+    /// A number of the object that no body can have.
+    #[error(transparent)]
+    Object(#[from] ParameterError),
     /// An object, and nothing to put it on.
     #[error("cell.toml has an [object] but no [table]; add `[table]` with `height = ` in metres over the base frame")]
     NoTable,
@@ -127,6 +109,7 @@ impl SimCell {
         let (object, contact) = match ObjectModel::new(cell, theta)? {
             None => (None, ToolContact::without_object()),
             Some(model) => {
+                model.parameters().check()?;
                 let table = cell.table.ok_or(SimError::NoTable)?.height;
                 let mut object = TableObject::new(&model, Some(table), &effects)?;
                 let [x, y] = cell.simulation.object_position;
@@ -159,51 +142,17 @@ impl SimCell {
         let dof = self.arm.as_ref().map_or(0, |arm| arm.model().dof());
         let effects = Effects::from_theta(&theta.effects, dof)?;
         let Description { controller, tool, object: described } = &self.description;
+        let parameters = described.as_ref().map(|object| ObjectParameters::new(object, Some(theta)));
+        parameters.map_or(Ok(()), |parameters| parameters.check())?;
         if let Some(arm) = &mut self.arm {
             arm.set_parameters(controller.as_ref(), theta, &effects.arm)?;
         }
-        if let (Some(object), Some(described)) = (&mut self.object, described) {
-            let parameters = ObjectParameters::new(described, Some(theta));
+        if let (Some(object), Some(parameters)) = (&mut self.object, parameters) {
             object.set_parameters(parameters, &effects);
             self.contact.set_parameters(tool.as_ref(), &parameters, &effects.hit);
         }
         self.camera = effects.camera;
         Ok(())
-    }
-
-    /// What the cell does now, to go on from later.
-    #[must_use]
-    pub fn state(&self) -> SimState {
-        SimState {
-            arm: self.arm.as_ref().map(|arm| arm.motion.clone()),
-            object: self.object.as_ref().map(|object| *object.motion()),
-            contact: self.contact.record,
-            takes_part: self.takes_part,
-            time_ns: self.time_ns,
-        }
-    }
-
-    /// [`SimCell::state`] into a state of this cell, without allocating.
-    pub fn state_into(&self, out: &mut SimState) {
-        match (&mut out.arm, &self.arm) {
-            (Some(out), Some(arm)) => out.clone_from(&arm.motion),
-            (out, arm) => *out = arm.as_ref().map(|arm| arm.motion.clone()),
-        }
-        out.object = self.object.as_ref().map(|object| *object.motion());
-        (out.contact, out.takes_part, out.time_ns) = (self.contact.record, self.takes_part, self.time_ns);
-    }
-
-    /// Goes on from a state of this cell: bit by bit under the parameters of then. Under other parameters of object,
-    /// contact, table and camera from the same poses and velocities; under other ones of the arm what it remembers of
-    /// its commands is that of then.
-    pub fn resume(&mut self, state: &SimState) {
-        if let (Some(arm), Some(motion)) = (&mut self.arm, &state.arm) {
-            arm.motion.clone_from(motion);
-        }
-        if let (Some(object), Some(motion)) = (&mut self.object, &state.object) {
-            object.resume(motion);
-        }
-        (self.contact.record, self.takes_part, self.time_ns) = (state.contact, state.takes_part, state.time_ns);
     }
 
     /// Lets one control period of 1 ms pass. Where the cell has no arm, `drive` moves nothing.
@@ -309,6 +258,23 @@ impl SimCell {
                 self.contact.may_touch(arm, object)
             }
             _ => false,
+        }
+    }
+
+    /// Whether the object stands still and does so until something touches it. True where there is none.
+    #[must_use]
+    pub fn object_rests(&self) -> bool {
+        self.object.as_ref().filter(|_| self.takes_part.object).is_none_or(TableObject::rests)
+    }
+
+    /// Gap between tool and object if the arm were at `q` [m]; without bound where one of them takes no part.
+    #[must_use]
+    pub fn gap_at(&self, q: &Joints) -> f64 {
+        match (&self.arm, &self.object) {
+            (Some(arm), Some(object)) if self.takes_part.arm && self.takes_part.object => {
+                self.contact.gap_at(arm, q, object)
+            }
+            _ => f64::INFINITY,
         }
     }
 

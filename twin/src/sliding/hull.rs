@@ -14,8 +14,14 @@ pub(super) struct Hull {
 const SAME: f64 = 1e-7;
 
 impl Hull {
-    /// The hull by wrapping; `None` when the points span no area or the hull has more corners than fit.
+    /// The hull; `None` when the points span no area. Of a round base, which has more corners than fit, those that lie
+    /// outermost in directions all around are kept.
     pub(super) fn of(points: impl Iterator<Item = Vector2<f64>> + Clone) -> Option<Self> {
+        Self::wrapped(points.clone()).or_else(|| Self::wrapped(outermost(points)?.into_iter()))
+    }
+
+    /// The hull by wrapping; `None` too when it has more corners than fit.
+    fn wrapped(points: impl Iterator<Item = Vector2<f64>> + Clone) -> Option<Self> {
         let start = points.clone().min_by(|a, b| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)))?;
         let mut hull = Self { corners: [Vector2::zeros(); MAX_POINTS], count: 0 };
         let mut corner = start;
@@ -58,6 +64,16 @@ impl Hull {
     }
 }
 
+/// The point farthest in each of [`MAX_POINTS`] - 1 directions around.
+fn outermost(points: impl Iterator<Item = Vector2<f64>> + Clone) -> Option<[Vector2<f64>; MAX_POINTS - 1]> {
+    let first = points.clone().next()?;
+    Some(std::array::from_fn(|i| {
+        let (sin, cos) = (i as f64 * std::f64::consts::TAU / (MAX_POINTS - 1) as f64).sin_cos();
+        let reach = |p: &Vector2<f64>| cos * p.x + sin * p.y;
+        points.clone().max_by(|a, b| reach(a).total_cmp(&reach(b))).unwrap_or(first)
+    }))
+}
+
 /// The point that has all others on the left of the line from `from`; of several on that line the farthest.
 fn next(from: Vector2<f64>, points: impl Iterator<Item = Vector2<f64>>) -> Option<Vector2<f64>> {
     points.filter(|p| (p - from).norm() >= SAME).reduce(|best, p| {
@@ -81,6 +97,16 @@ mod tests {
         assert!((hull.area() - 2.0).abs() < 1e-12 && (hull.perimeter() - 6.0).abs() < 1e-12);
         assert!((hull.centroid() - Vector2::new(1.0, 0.5)).norm() < 1e-12);
         assert!(hull.holds(Vector2::new(0.1, 0.5), 0.09) && !hull.holds(Vector2::new(0.1, 0.5), 0.11));
+    }
+
+    #[test]
+    fn a_round_base_of_many_corners_is_taken_as_one_of_a_few() {
+        let circle = (0..500).map(|i| {
+            let (sin, cos) = (f64::from(i) * std::f64::consts::TAU / 500.0).sin_cos();
+            Vector2::new(cos, sin)
+        });
+        let hull = Hull::of(circle).expect("an area");
+        assert!(hull.corners().len() < MAX_POINTS && (hull.area() / std::f64::consts::PI - 1.0).abs() < 0.01);
     }
 
     #[test]

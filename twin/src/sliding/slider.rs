@@ -70,13 +70,23 @@ impl Slider {
             if state.is_at_rest() && self.holds(state, wrench, friction) {
                 return Ending::Rests;
             }
-            let taken = self
-                .explicit(state, wrench, friction, left, dt / EXPLICIT_PARTS)
-                .or_else(|| self.implicit(state, wrench, friction, left.min(dt / IMPLICIT_PARTS)));
+            let explicit = self.explicit(state, wrench, friction, left, dt / EXPLICIT_PARTS);
+            if explicit.is_none() && self.surely_lifts(state, wrench, friction, dt) {
+                return Ending::Lifts { left };
+            }
+            let taken = explicit.or_else(|| self.implicit(state, wrench, friction, left.min(dt / IMPLICIT_PARTS)));
             let Some(taken) = taken else { return Ending::Lifts { left } };
             left -= taken;
         }
         if state.is_at_rest() { Ending::Rests } else { Ending::Slides }
+    }
+
+    /// Turns what a wrench accelerates within `dt` into velocity at once; what is left of it only shifts the load.
+    pub fn kick(&self, state: &mut PlanarState, wrench: &mut Wrench, dt: f64) {
+        let planar = wrench.planar() * dt;
+        state.velocity += planar.xy() / self.mass;
+        state.yaw_rate += planar.z / self.yaw_inertia;
+        (wrench.force.x, wrench.force.y, wrench.moment.z) = (0.0, 0.0, 0.0);
     }
 
     /// Kinetic energy of the planar motion [J].
@@ -132,6 +142,32 @@ impl Slider {
         Some(taken)
     }
 
+    /// Whether the body lifts although every place slips so fast that friction cannot turn its direction within `dt`:
+    /// then the implicit step would find nothing else.
+    fn surely_lifts(
+        &self,
+        state: &PlanarState,
+        wrench: &Wrench,
+        friction: &(impl SlidingFriction + ?Sized),
+        dt: f64,
+    ) -> bool {
+        let (sin, cos) = state.yaw.sin_cos();
+        let local = wrench.in_turned_axes(cos, sin);
+        let (planar, weight) = (local.planar(), -local.force.z);
+        let mut kappas: Kappas = [Vector2::zeros(); MAX_POINTS];
+        let (mut slowest, mut fastest_change) = (f64::INFINITY, 0.0_f64);
+        for (i, point) in self.patch.points().iter().enumerate() {
+            let turned = turn(cos, sin, *point);
+            let slip = state.velocity + left_of(turned) * state.yaw_rate;
+            let (mu, speed, reach) = (friction.mu(state.position + turned, slip), slip.norm(), point.norm());
+            kappas[i] = turn(cos, -sin, slip) * (mu / speed);
+            let (force, moment) = (planar.xy().norm() + mu * weight, planar.z.abs() + mu * weight * reach);
+            let change = force / self.mass + moment * reach / self.yaw_inertia + reach * state.yaw_rate.powi(2);
+            (slowest, fastest_change) = (slowest.min(speed), fastest_change.max(change));
+        }
+        TURN * slowest > fastest_change * dt && load::solve(&self.patch, self.height, &local, &kappas).is_none()
+    }
+
     fn instant(
         &self,
         state: &PlanarState,
@@ -170,12 +206,14 @@ impl Slider {
         yaw_rate: f64,
         wanted: f64,
     ) -> f64 {
-        let allowed = UNRESOLVED * loads.iter().sum::<f64>();
+        let count = self.patch.len();
         let mut times = [f64::INFINITY; MAX_POINTS];
+        let (times, loads) = (&mut times[..count], &loads[..count]);
         for (i, point) in self.patch.points().iter().enumerate() {
             let change = rates.xy() + left_of(*point) * rates.z - point * (yaw_rate * yaw_rate);
             times[i] = TURN * slips[i].norm() / change.norm();
         }
+        let allowed = UNRESOLVED * loads.iter().sum::<f64>();
         let mut horizon = wanted;
         for _ in 0..8 {
             let fast: f64 = times.iter().zip(loads).filter(|(t, _)| **t < horizon).map(|(_, load)| load).sum();
