@@ -206,9 +206,9 @@ impl Identification {
                     errors.push(SheetError { name: format!("{what}, {set}"), unit: unit.into(), before, after });
                 }
             };
-            push("joint error (RMS)", "rad", before.joint_rms_rad, after.joint_rms_rad);
             push("ADD", "m", before.object_add_m, after.object_add_m);
             push("ADD-S", "m", before.object_add_s_m, after.object_add_s_m);
+            push("joint error (RMS)", "rad", before.joint_rms_rad, after.joint_rms_rad);
         }
         let clip = |clip: &ClipGap| SheetClip {
             file: clip.file.clone(),
@@ -230,11 +230,13 @@ impl Identification {
             not_identifiable: self.not_identifiable.iter().map(|u| [u.parameter.clone(), u.why.clone()]).collect(),
             errors,
             clips: self.by_clip.iter().map(clip).chain(self.clips.left_out.iter().map(left_out)).collect(),
+            clip_error: if self.gap.train.object_add_m.is_some() { ["ADD", "m"] } else { ["joint error (RMS)", "rad"] },
             traces: self.traces.clone(),
             convergence: self.convergence.clone(),
             names: self.names.clone(),
             correlation: self.correlation.clone(),
-            advice: self.advice.iter().map(Advice::sentence).chain(self.warnings.iter().cloned()).collect(),
+            advice: self.advice.iter().map(Advice::sentence).collect(),
+            notes: self.warnings.clone(),
             provenance: vec![
                 ["way of searching".into(), self.optimizer.clone()],
                 ["clips simulated".into(), self.evaluations.to_string()],

@@ -12,6 +12,8 @@ use maud::{Markup, html};
 
 /// Clips whose residuals are shown.
 const SHOWN_CLIPS: usize = 3;
+/// Errors told under the sentence.
+const SHOWN_ERRORS: usize = 3;
 
 /// Everything the page tells. SI units.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -30,6 +32,8 @@ pub struct Sheet {
     pub errors: Vec<Error>,
     /// The same by clip.
     pub clips: Vec<Clip>,
+    /// Which error is told by clip, and its SI unit.
+    pub clip_error: [&'static str; 2],
     /// Residuals by clip and channel.
     pub traces: Vec<Trace>,
     /// Evaluations so far, and the best loss then.
@@ -40,6 +44,8 @@ pub struct Sheet {
     pub correlation: Vec<Vec<f64>>,
     /// What to record next.
     pub advice: Vec<String>,
+    /// What a reader has to know.
+    pub notes: Vec<String>,
     /// Facts about the run: what, and its value.
     pub provenance: Vec<[String; 2]>,
     /// Where the parameters were written.
@@ -83,7 +89,7 @@ pub struct Clip {
     pub file: String,
     /// What it was used for: `fitted`, `held out`, `left out`.
     pub used: String,
-    /// The main error with what cell.toml says, and with what was found; in the unit of the first of [`Sheet::errors`].
+    /// The main error with what cell.toml says, and with what was found; see [`Sheet::clip_error`].
     pub error: [Option<f64>; 2],
     /// What is odd about it; empty where nothing is.
     pub remark: String,
@@ -97,12 +103,15 @@ impl Sheet {
             p.kicker { "Identification of the " (self.target) " from " b { (self.session) } }
             h1 { (unbroken(&self.sentence)) }
             (self.facts())
-            (figure("What was found", "Dot and bar: value and 95 % interval. Upright line: cell.toml.", &self.forest()))
+            (figure("What was found", "Dot and bar: value and 95 % interval. Upright line: cell.toml, or the middle of its range.", &self.forest()))
             (self.untold())
             (figure("How far off the twin is", "", &self.bars()))
             @if !self.traces.is_empty() { (self.residuals()) }
             (self.table())
             @if !self.advice.is_empty() { (self.next()) }
+            @if !self.notes.is_empty() {
+                section { h2 { "Worth knowing" } @for note in &self.notes { p { (note) } } }
+            }
             (self.search())
             (self.origin())
         };
@@ -114,6 +123,7 @@ impl Sheet {
         let entries: Vec<(String, &str)> = self
             .errors
             .iter()
+            .take(SHOWN_ERRORS)
             .map(|error| {
                 let unit = Unit::suited(&error.unit, error.before.unwrap_or(error.after));
                 let before =
@@ -171,14 +181,14 @@ impl Sheet {
     }
 
     fn table(&self) -> Markup {
-        let unit = self.errors.first().map_or("1", |error| &error.unit);
+        let [what, unit] = self.clip_error;
         let largest = super::scale::span(self.clips.iter().flat_map(|clip| clip.error).flatten())[1];
         let unit = Unit::suited(unit, largest);
         let shown = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), |value| unit.with_unit(value));
         html! {
             @if !self.clips.is_empty() {
                 details open {
-                    summary { (self.clips.len()) " clips" }
+                    summary { "Clip by clip: " (what) }
                     table {
                         tr { th { "clip" } th { "used" } th.n { "cell.toml" } th.n { "found" } th { "remark" } }
                         @for clip in &self.clips {
@@ -275,7 +285,9 @@ mod tests {
             convergence: vec![[15.0, 4e4], [60.0, 900.0]],
             names: vec!["stiffness 1".into(), "damping 1".into()],
             correlation: vec![vec![1.0, -0.4], vec![-0.4, 1.0]],
+            clip_error: ["joint error (RMS)", "rad"],
             advice: vec!["Move joint 7 faster.".into()],
+            notes: vec!["The clock of clip_03 jumped.".into()],
             provenance: vec![["optimiser".into(), "least squares".into()]],
             theta_file: "theta.toml".into(),
             traces: vec![Trace { clip: "clip_07.mcap".into(), channel: "joint7".into(), ..Trace::default() }],
@@ -292,7 +304,9 @@ mod tests {
             "no clip holds still under load",
             "0.100 mrad",
             "<td>held out</td>",
+            "Clip by clip: joint error (RMS)",
             "Move joint 7 faster.",
+            "The clock of clip_03 jumped.",
             "twin replay monday &amp; &lt;co&gt; --parameters theta.toml",
         ] {
             assert!(page.contains(text), "no {text}");

@@ -22,6 +22,7 @@ pub fn identification(sheet: &Sheet) -> String {
         format!("{}: {before}{}", error.name, unit.with_unit(error.after))
     }));
     lines.extend(sheet.not_identifiable.iter().map(|[name, why]| format!("cannot tell {name}: {why}")));
+    lines.extend(sheet.notes.iter().map(|note| format!("note: {note}")));
     lines.extend(sheet.advice.iter().map(|advice| format!("next: {advice}")));
     lines.push(sheet.sentence.clone());
     lines.join("\n")
@@ -107,7 +108,7 @@ fn numbers(parameter: &Parameter) -> Vec<Vec<String>> {
         };
         let interval = parameter.intervals.get(k).copied().unwrap_or([f64::NAN; 2]);
         let nominal =
-            parameter.nominal.get(k).map_or_else(String::new, |x| format!("cell.toml {}", short(unit.scaled(*x))));
+            parameter.nominal.get(k).map_or_else(String::new, |x| format!("began at {}", short(unit.scaled(*x))));
         let warning = parameter.warnings.get(k).cloned().flatten().unwrap_or_default();
         vec![name, unit.interval(*value, interval), nominal, warning]
     };
@@ -172,8 +173,8 @@ mod tests {
             ..Sheet::default()
         };
         let expected = "\
-centre of mass, x   5.1 [4.2, 6.0] mm      cell.toml 0
-centre of mass, y   -2.0 [-3.0, -1.0] mm   cell.toml 0   at its lower bound
+centre of mass, x   5.1 [4.2, 6.0] mm      began at 0
+centre of mass, y   -2.0 [-3.0, -1.0] mm   began at 0   at its lower bound
 ADD, held-out clips: 13.9 -> 2.00 mm
 cannot tell mass: the arm is much heavier; weigh it
 The object is known.";

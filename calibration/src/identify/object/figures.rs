@@ -3,9 +3,15 @@
 use super::ObjectError;
 use super::material::Material;
 use crate::identify::answer::{ClipGap, Figures, Identification};
+use crate::report::Trace;
 use rayon::prelude::*;
+use shared_mem::recording::Clip;
 use shared_mem::theta::Theta;
-use twin::replay::{Gap, Replayer};
+use shared_mem::time::seconds_between;
+use twin::replay::{Gap, Prediction, Replayer};
+
+/// Measured less predicted position of the object, along x and y of the base frame.
+type Path = [Vec<[f64; 2]>; 2];
 
 /// Figures of every clip before and after, and their means over clips fitted and held out.
 pub(super) fn fill(
@@ -13,12 +19,19 @@ pub(super) fn fill(
     material: &Material,
     [before, after]: [&Theta; 2],
 ) -> Result<(), ObjectError> {
-    let gaps = |theta: &Theta| -> Result<Vec<Gap>, ObjectError> {
+    let gaps = |theta: &Theta| -> Result<(Vec<Gap>, Vec<Path>), ObjectError> {
         let replayer = Replayer::new(&material.cell, Some(theta))?;
-        let gap = |usable: &super::material::Usable| Ok(replayer.replay(usable.clip.clone())?.2.gap);
-        material.usable.par_iter().map(gap).collect()
+        let gap = |usable: &super::material::Usable| -> Result<(Gap, Path), ObjectError> {
+            let (clip, prediction, report) = replayer.replay(usable.clip.clone())?;
+            Ok((report.gap, path(&clip, &prediction)))
+        };
+        let done: Vec<(Gap, Path)> = material.usable.par_iter().map(gap).collect::<Result<_, _>>()?;
+        Ok(done.into_iter().unzip())
     };
-    let (before, after) = (gaps(before)?, gaps(after)?);
+    let ((before, paths_before), (after, paths_after)) = (gaps(before)?, gaps(after)?);
+    let files = material.usable.iter().map(|usable| usable.file.as_str());
+    let paths = paths_before.into_iter().zip(paths_after);
+    answer.traces = files.zip(paths).flat_map(|(file, paths)| traces(file, material, paths)).collect();
     for (clip, usable) in material.usable.iter().enumerate() {
         let held_out = material.split.holdout.contains(&clip);
         answer.by_clip.push(ClipGap {
@@ -37,6 +50,30 @@ pub(super) fn fill(
     (answer.gap.train, answer.gap.train_before) = (mean(train, &after), mean(train, &before));
     (answer.gap.holdout, answer.gap.holdout_before) = (mean(holdout, &after), mean(holdout, &before));
     Ok(())
+}
+
+fn path(clip: &Clip, prediction: &Prediction) -> Path {
+    let along = |axis: usize| {
+        let poses = clip.object.poses.iter().zip(&prediction.object);
+        let distance = poses.map(|(measured, predicted)| measured.position()[axis] - predicted.position()[axis]);
+        let seconds = clip.object.stamps_ns.iter().map(|stamp| seconds_between(clip.object.stamps_ns[0], *stamp));
+        seconds.zip(distance).map(|(at, distance)| [at, distance]).collect()
+    };
+    [along(0), along(1)]
+}
+
+fn traces(file: &str, material: &Material, (before, after): (Path, Path)) -> impl Iterator<Item = Trace> {
+    let noise = material.cell.object.as_ref().and_then(|object| object.pose_noise.as_ref());
+    let sigma = noise.map_or(0.0, |noise| noise.position);
+    let file = file.to_owned();
+    ["x", "y"].into_iter().zip(before.into_iter().zip(after)).map(move |(axis, (before, after))| Trace {
+        clip: file.clone(),
+        channel: axis.into(),
+        unit: "m".into(),
+        sigma,
+        before,
+        after,
+    })
 }
 
 fn figures(gap: &Gap) -> Figures {
