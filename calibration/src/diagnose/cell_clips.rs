@@ -1,7 +1,7 @@
 //! Clips with an object as evidence: the arm before the touch ([`ArmClips`]) and the object's poses ([`ObjectClips`]).
 
 use super::arm_clips::ArmClips;
-use super::evidence::{Channel, Evidence, Row, StageName};
+use super::evidence::{Channel, Evidence, Reach, Row, StageName};
 use crate::estimate::{ClipModel, Impossible, Random};
 use crate::forward::object::{self, ObjectClips, Part};
 use shared_mem::theta::Theta;
@@ -81,6 +81,31 @@ impl<F: Fn(&[f64]) -> Theta + Sync> ClipModel for CellClips<F> {
 }
 
 impl<F: Fn(&[f64]) -> Theta + Sync> Evidence for CellClips<F> {
+    fn changed(
+        &self,
+        clip: usize,
+        (shared, own): (&[f64], &[f64]),
+        (reach, base): (Reach, &[f64]),
+        out: &mut Vec<f64>,
+    ) -> Result<(), Impossible> {
+        let of_arm = self.arm.as_ref().map_or(0, |arm| arm.rows(clip).len());
+        match (reach, &self.arm) {
+            (Reach::Arm, Some(arm)) => {
+                arm.residuals(clip, shared, &[], out)?;
+                out.extend(&base[of_arm..]);
+            }
+            (Reach::Object, _) => {
+                let mut poses = Vec::new();
+                self.object.residuals(clip, shared, own, &mut poses)?;
+                out.clear();
+                out.extend(&base[..of_arm]);
+                out.extend(poses);
+            }
+            _ => self.residuals(clip, shared, own, out)?,
+        }
+        Ok(())
+    }
+
     fn channels(&self) -> &[Channel] {
         &self.channels
     }

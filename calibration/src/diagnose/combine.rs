@@ -15,10 +15,10 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 /// At most so many effects are named.
 pub const MOST: usize = 4;
 /// So many candidates are fitted at each step.
-const FITTED: usize = 6;
+const FITTED: usize = 5;
 /// A fit from a candidate's signature gets so many linearisations, and the winner so many more.
-const FIRST_PASS: Effort = Effort { iterations: 6, precision: Precision::Joints };
-const LAST_PASS: Effort = Effort { iterations: 6, precision: Precision::Exact };
+const FIRST_PASS: Effort = Effort { iterations: 5, precision: Precision::Joints };
+const LAST_PASS: Effort = Effort { iterations: 4, precision: Precision::Exact };
 /// A new effect must be worth at least this [nats], more than twice its error, and more than its numbers cost.
 const LEAST: f64 = 4.0;
 /// ... and explain this share of what is left.
@@ -82,7 +82,13 @@ pub fn search<E: Evidence>(bench: &Bench<'_, E>, split: &Split, baseline: Hypoth
         steps.push(step);
         match best {
             Some(best) if now.effects.len() < MOST && !bench.interrupt.asked() => {
-                now = bench.fit((&best.effects, best.full.clone()), &split.train, &weights, Some(&best), LAST_PASS)?;
+                now = bench.fit(
+                    (&best.effects, best.full.clone()),
+                    &split.train,
+                    &weights,
+                    Some(&best),
+                    last_pass(bench),
+                )?;
             }
             _ => break,
         }
@@ -102,6 +108,11 @@ impl Step {
             .filter(|(trial, fit, _)| !bench.negligible(trial.scored.candidate, &fit.full))
             .max_by(|a, b| net(a.2, a.0.scored.cost).total_cmp(&net(b.2, b.0.scored.cost)))
     }
+}
+
+/// Clips with an object take a simulation for each number of their own; joints one by one besides would take too long.
+fn last_pass<E: Evidence>(bench: &Bench<'_, E>) -> Effort {
+    if bench.random.is_empty() { LAST_PASS } else { Effort { precision: Precision::Joints, ..LAST_PASS } }
 }
 
 /// Drops effects that the others make superfluous, one after the other.

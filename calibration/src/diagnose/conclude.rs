@@ -126,7 +126,9 @@ fn finding<'a, E: Evidence>(
         effects: found.last.effects.iter().map(name).collect(),
         rivals,
         confidence: sure,
-        left: Left { before: before.mean_square(), after: after.mean_square(), floor: FLOOR },
+        left: (before.groups().into_iter().zip(after.groups()))
+            .map(|(before, after)| Left { before, after, floor: FLOOR })
+            .collect(),
         at_bounds: !leftovers::at_bounds(bench, &found.last).is_empty(),
         place: rest.first().map_or_else(String::new, |place| format!("{} ({})", place.channel, place.regime)),
     }

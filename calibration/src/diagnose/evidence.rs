@@ -55,8 +55,34 @@ pub struct Row {
     pub time: f64,
 }
 
+/// What a number can change of a clip.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Reach {
+    /// Anything.
+    All,
+    /// The arm's residuals; what it does to the object by way of the arm is left out.
+    Arm,
+    /// The object's residuals alone.
+    Object,
+}
+
 /// Clips that tell what each of their residuals is.
 pub trait Evidence: ClipModel {
+    /// [`ClipModel::residuals`] where only some can have changed from `base`: the others may be taken from there, which saves
+    /// their simulation.
+    ///
+    /// # Errors
+    /// As [`ClipModel::residuals`].
+    fn changed(
+        &self,
+        clip: usize,
+        (shared, own): (&[f64], &[f64]),
+        (_reach, _base): (Reach, &[f64]),
+        out: &mut Vec<f64>,
+    ) -> Result<(), Impossible> {
+        self.residuals(clip, shared, own, out)
+    }
+
     /// All measured quantities.
     fn channels(&self) -> &[Channel];
     /// The residuals of a clip, in the order of [`ClipModel::residuals`]; rows of one channel ascend in time.

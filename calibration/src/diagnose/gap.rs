@@ -11,6 +11,8 @@ use rand_pcg::Pcg64;
 pub struct Residuals {
     /// Clip and residuals.
     pub clips: Vec<(usize, Vec<f64>)>,
+    /// For each clip and group of sensors (arm, object; those that there are) the sum of squares and the number of residuals.
+    sums: Vec<Vec<(f64, f64)>>,
 }
 
 impl Residuals {
@@ -28,24 +30,28 @@ impl Residuals {
             bench.evidence.residuals(*clip, &hypothesis.full, &own, &mut out).ok()?;
             Some((*clip, out))
         };
-        clips.iter().zip(judged).map(one).collect::<Option<_>>().map(|clips| Self { clips })
+        let clips: Vec<(usize, Vec<f64>)> = clips.iter().zip(judged).map(one).collect::<Option<_>>()?;
+        let sums = clips.iter().map(|(clip, residuals)| sums(bench.evidence, *clip, residuals)).collect();
+        Some(Self { clips, sums })
     }
 
-    /// Mean square.
+    /// Mean square: the mean over the groups of sensors, so that a thousand encoder rows do not drown the object.
     #[must_use]
     pub fn mean_square(&self) -> f64 {
-        mean(&self.sums(), &(0..self.clips.len()).collect::<Vec<_>>())
+        mean(&self.sums, &(0..self.clips.len()).collect::<Vec<_>>())
     }
 
-    fn sums(&self) -> Vec<(f64, f64)> {
-        self.clips.iter().map(|(_, r)| (r.iter().map(|r| r * r).sum(), r.len() as f64)).collect()
+    /// Mean square of every group of sensors.
+    #[must_use]
+    pub fn groups(&self) -> Vec<f64> {
+        group_means(&self.sums, &(0..self.clips.len()).collect::<Vec<_>>())
     }
 
     /// Share by which the mean square shrinks from `before` to this, with an interval from drawing clips anew.
     #[must_use]
     pub fn shrink(&self, before: &Self, seed: u64) -> Share {
-        let (before, after) = (before.sums(), self.sums());
-        let of = |drawn: &[usize]| 1.0 - mean(&after, drawn) / mean(&before, drawn).max(f64::MIN_POSITIVE);
+        let (before, after) = (&before.sums, &self.sums);
+        let of = |drawn: &[usize]| 1.0 - mean(after, drawn) / mean(before, drawn).max(f64::MIN_POSITIVE);
         let all: Vec<usize> = (0..after.len()).collect();
         let mut rng = Pcg64::seed_from_u64(seed);
         let mut drawn: Vec<f64> =
@@ -58,9 +64,28 @@ impl Residuals {
 /// Draws of the bootstrap.
 const DRAWS: usize = 1000;
 
-fn mean(sums: &[(f64, f64)], drawn: &[usize]) -> f64 {
-    let (sum, count) = drawn.iter().fold((0.0, 0.0), |(sum, count), k| (sum + sums[*k].0, count + sums[*k].1));
-    sum / f64::max(count, 1.0)
+fn sums(evidence: &impl Evidence, clip: usize, residuals: &[f64]) -> Vec<(f64, f64)> {
+    let mut sums = vec![(0.0, 0.0); 2];
+    for (row, residual) in evidence.rows(clip).iter().zip(residuals) {
+        let group = &mut sums[usize::from(evidence.channels()[row.channel].joint.is_none())];
+        *group = (group.0 + residual * residual, group.1 + 1.0);
+    }
+    sums
+}
+
+fn group_means(sums: &[Vec<(f64, f64)>], drawn: &[usize]) -> Vec<f64> {
+    let groups = sums.first().map_or(0, Vec::len);
+    let of = |group: usize| {
+        let add = |(sum, count): (f64, f64), k: &usize| (sum + sums[*k][group].0, count + sums[*k][group].1);
+        let (sum, count) = drawn.iter().fold((0.0, 0.0), add);
+        (count > 0.0).then(|| sum / count)
+    };
+    (0..groups).filter_map(of).collect()
+}
+
+fn mean(sums: &[Vec<(f64, f64)>], drawn: &[usize]) -> f64 {
+    let means = group_means(sums, drawn);
+    means.iter().sum::<f64>() / means.len().max(1) as f64
 }
 
 #[cfg(test)]
@@ -68,7 +93,8 @@ mod tests {
     use super::*;
 
     fn residuals(sizes: &[f64]) -> Residuals {
-        Residuals { clips: sizes.iter().enumerate().map(|(clip, size)| (clip, vec![*size; 10])).collect() }
+        let clips = sizes.iter().enumerate().map(|(clip, size)| (clip, vec![*size; 10])).collect();
+        Residuals { clips, sums: sizes.iter().map(|size| vec![(10.0 * size * size, 10.0), (0.0, 0.0)]).collect() }
     }
 
     #[test]

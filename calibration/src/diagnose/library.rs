@@ -21,6 +21,8 @@ pub struct Library {
     pub unknowns: Vec<Unknown>,
     /// The joint that each number belongs to, from 0; `None` for numbers of the whole arm and of the object.
     pub joints: Vec<Option<usize>>,
+    /// Whether each number leaves the arm as it is.
+    pub object_only: Vec<bool>,
     /// The baseline's numbers: gains, and the object's parameters.
     pub baseline: Range<usize>,
     /// Effects.
@@ -34,6 +36,8 @@ pub struct Candidate {
     pub effect: &'static EffectInfo,
     /// Its numbers.
     pub numbers: Range<usize>,
+    /// Those of them that are fitted.
+    pub turned: Vec<usize>,
     /// Those of them that say how strong it is.
     pub sizes: Vec<usize>,
     /// Forms to try.
@@ -86,8 +90,9 @@ impl Library {
             candidates.push(Candidate::new(effect, at, &numbers));
         }
         let joints = numbers.iter().map(|(setting, _)| joint_of(setting)).collect();
+        let object_only = numbers.iter().map(|(setting, _)| leaves_arm(setting)).collect();
         let (all, unknowns): (Vec<Setting>, Vec<Unknown>) = numbers.into_iter().unzip();
-        Self { settings: Settings::new(base.clone(), all), unknowns, joints, baseline, candidates }
+        Self { settings: Settings::new(base.clone(), all), unknowns, joints, object_only, baseline, candidates }
     }
 
     /// Where every search begins: the baseline's values, all effects at rest.
@@ -126,6 +131,14 @@ fn joint_of(setting: &Setting) -> Option<usize> {
     }
 }
 
+fn leaves_arm(setting: &Setting) -> bool {
+    match *setting {
+        Setting::Stiffness(_) | Setting::Damping(_) => false,
+        Setting::Effect { name, .. } => find(name).is_some_and(|effect| effect.stage != Stage::Control),
+        _ => true,
+    }
+}
+
 /// How far gains stated by value may be off: cell.toml's own statement, and a quarter more.
 const GAIN_TOLERANCE: f64 = 0.25;
 
@@ -152,10 +165,15 @@ impl Candidate {
             _ => false,
         };
         let sizes: Vec<usize> = (at..numbers.len()).filter(|k| is_size(&numbers[*k].0)).collect();
+        let kept = |setting: &Setting| matches!(setting, Setting::Effect { parameter, .. } if KEPT.contains(parameter));
+        let turned = (at..numbers.len()).filter(|k| !kept(&numbers[*k].0)).collect();
         let alternatives = alternatives(effect, at, &sizes, numbers);
-        Self { effect, numbers: at..numbers.len(), sizes, alternatives }
+        Self { effect, numbers: at..numbers.len(), turned, sizes, alternatives }
     }
 }
+
+/// Forms that no clip shows well enough to be worth their numbers; they keep the registry's default.
+const KEPT: [&str; 1] = ["creep"];
 
 /// The step of a probe as a share of what is met in practice.
 const PROBE_SHARE: f64 = 0.1;
@@ -215,6 +233,8 @@ fn probe(effect: &EffectInfo, number: usize, (setting, unknown): &(Setting, Unkn
     let info = effect.parameters.iter().find(|p| p.name == *parameter).expect("a size is a parameter");
     let [lo, hi] = info.plausible;
     let reach = if *inverse { lo.recip() } else { (hi - unknown.start).max(unknown.start - lo) };
+    // The registry's range reaches to hobby servos; gears of an arm have a tenth of that play.
+    let reach = if effect.name == "joint_backlash" { 0.1 * reach } else { reach };
     let one_sided = *inverse || unknown.lower >= unknown.start || unknown.upper <= unknown.start;
     let way = if unknown.upper > unknown.start { 1.0 } else { -1.0 };
     let share = if info.shape == Shape::PerJoint || *inverse { PROBE_SHARE } else { 0.5 * PROBE_SHARE };

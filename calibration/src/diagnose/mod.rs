@@ -143,7 +143,7 @@ pub fn diagnose_clips(
 }
 
 /// The baseline alone is followed for so many linearisations.
-const BASELINE: Effort = Effort { iterations: 12, precision: Precision::Joints };
+const BASELINE: Effort = Effort { iterations: 8, precision: Precision::Joints };
 
 fn examine<E: Evidence>(
     evidence: &E,

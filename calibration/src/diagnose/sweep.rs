@@ -9,7 +9,7 @@
 //! ([`Precision::Joints`]): a stiff controller leaves little of one joint in another. That costs a seventh of turning
 //! them one by one ([`Precision::Exact`]).
 
-use super::evidence::Evidence;
+use super::evidence::{Evidence, Reach};
 use super::library::{Alternative, Library};
 use crate::estimate::{Impossible, Random};
 use nalgebra::{Cholesky, DMatrix, DVector};
@@ -177,7 +177,9 @@ impl<E: Evidence> Work<'_, E> {
         let mut numbers = self.full.to_vec();
         let units: Vec<f64> = batch.iter().map(|k| self.turn(&mut numbers, self.columns[*k])).collect();
         let mut out = Vec::with_capacity(base.len());
-        let answered = self.evidence.residuals(clip, &numbers, own, &mut out).is_ok() && out.len() == base.len();
+        let reach = self.reach(batch);
+        let answer = self.evidence.changed(clip, (&numbers, own), (reach, base), &mut out);
+        let answered = answer.is_ok() && out.len() == base.len();
         if !answered {
             return Vec::new();
         }
@@ -191,6 +193,19 @@ impl<E: Evidence> Work<'_, E> {
             (*k, out.iter().zip(base).zip(rows).map(slope).collect())
         };
         batch.iter().zip(&units).map(column).collect()
+    }
+
+    /// What the columns of a batch can change; several joints at once are told apart by the arm alone.
+    fn reach(&self, batch: &[usize]) -> Reach {
+        let number = |k: &usize| match self.columns[*k] {
+            Column::Number(k) => k,
+            Column::Probe(candidate, a, p) => self.library.candidates[candidate].alternatives[a].probes[p].moves[0].0,
+        };
+        match batch {
+            [_, _, ..] => Reach::Arm,
+            _ if batch.iter().all(|k| self.library.object_only[number(k)]) => Reach::Object,
+            _ => Reach::All,
+        }
     }
 
     /// Moves numbers one step along a column; by how many of its units.
@@ -217,7 +232,8 @@ impl<E: Evidence> Work<'_, E> {
         let effect = &self.random[k];
         let (mut moved, mut out) = (own.to_vec(), Vec::new());
         moved[k] += effect.step;
-        let turned = effect.sigma > 0.0 && self.evidence.residuals(clip, self.full, &moved, &mut out).is_ok();
+        let changed = |out: &mut Vec<f64>| self.evidence.changed(clip, (self.full, &moved), (Reach::Object, base), out);
+        let turned = effect.sigma > 0.0 && changed(&mut out).is_ok();
         if !turned || out.len() != base.len() {
             return vec![0.0; base.len()];
         }

@@ -12,8 +12,8 @@ pub struct Finding<'a> {
     pub rivals: Vec<&'a str>,
     /// How sure the weakest of them is.
     pub confidence: f64,
-    /// The gap before and after.
-    pub left: Left,
+    /// The gap before and after, of every group of sensors.
+    pub left: Vec<Left>,
     /// Whether an effect was pushed to the bound of what is met in practice.
     pub at_bounds: bool,
     /// Where the gap, or what is left of it, is largest.
@@ -27,11 +27,11 @@ impl Finding<'_> {
     /// The verdict.
     #[must_use]
     pub fn verdict(&self) -> Verdict {
-        let excess = self.left.before - self.left.floor;
         if self.effects.is_empty() {
-            return if excess > NUMERICS { self.unexplained() } else { self.none() };
+            let gap = self.left.iter().any(|left| left.before - left.floor > NUMERICS);
+            return if gap { self.unexplained() } else { self.none() };
         }
-        if self.at_bounds || self.left.too_much() {
+        if self.at_bounds || self.left.iter().any(Left::too_much) {
             return self.unexplained();
         }
         if self.rivals.is_empty() { self.named() } else { self.class() }
@@ -44,7 +44,7 @@ impl Finding<'_> {
 
     fn named(&self) -> Verdict {
         let names = self.effects.iter().map(|name| (*name).to_owned()).collect::<Vec<_>>();
-        let share = 100.0 * self.left.explained();
+        let share = 100.0 * self.left.iter().map(Left::explained).fold(0.0, f64::max);
         let verb = if names.len() == 1 { "causes" } else { "together cause" };
         let text = format!(
             "{} {verb} the gap: with it the twin closes {share:.0} % of what is not noise.",
@@ -83,7 +83,7 @@ mod tests {
     use super::*;
 
     fn finding<'a>(effects: Vec<&'a str>, before: f64, after: f64) -> Finding<'a> {
-        let left = Left { before, after, floor: 1.0 };
+        let left = vec![Left { before, after, floor: 1.0 }];
         Finding { effects, rivals: Vec::new(), confidence: 0.95, left, at_bounds: false, place: "joint2".into() }
     }
 
