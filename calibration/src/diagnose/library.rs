@@ -189,6 +189,8 @@ fn alternatives(effect: &EffectInfo, at: usize, sizes: &[usize], numbers: &[(Set
     match effect.name {
         "joint_stribeck_friction" => [0.03, 0.1].map(|v| with(set("velocity", v))).to_vec(),
         "stribeck_sliding_friction" => [0.05, 0.1, 0.2].map(|v| with(set("velocity", v))).to_vec(),
+        // About the base, or about the middle of a table in front of it.
+        "camera_scale" => [0.0, 0.5].map(|x| with(vec![(index("centre")[0], x)])).to_vec(),
         "payload" => [0.0, 0.06].map(|z| with(vec![(index("centre")[2], z)])).to_vec(),
         "anisotropic_friction" => {
             let (size, axis) = (sizes[0], index("axis")[0]);

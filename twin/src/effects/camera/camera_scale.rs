@@ -1,36 +1,44 @@
 //! Lengths in the camera's picture are off by a factor.
 //!
-//! - Equation: `position_reported = (1 + scale) position` about the base's origin; about the camera instead it differs by a
-//!   constant shift, which is `camera_extrinsic_translation`.
+//! - Equation: `position_reported = centre + (1 + scale) (position - centre)`; the place that stays where it is is the
+//!   base's origin, or wherever the camera was aligned.
 //! - Source: focal length, depth scale or marker size off.
-//! - Unit: 1. Plausible: -0.1 to 0.1 (0.02 after calibration).
+//! - Units: scale 1; centre m, in the base frame. Plausible: scale -0.1 to 0.1 (0.02 after calibration); centre within
+//!   a metre of the base.
 //! - Signature (V2): in proportion to the distance, at rest too; speeds and decelerations grow alike.
 //! - Confused with: restitution and friction together, an extrinsic translation where the object hardly moves.
 
 use crate::effects::registry::{EffectInfo, Parameter, Place, Stage};
-use nalgebra::Isometry3;
+use nalgebra::{Isometry3, Vector3};
 
 pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     name: "camera_scale",
     stage: Stage::Camera,
     acts_on: Place::ObjectObservation,
-    parameters: &[Parameter::size("scale", "1", [-0.1, 0.1], 0.0).within(-0.99, 100.0)],
+    parameters: &[
+        Parameter::size("scale", "1", [-0.1, 0.1], 0.0).within(-0.99, 100.0),
+        Parameter::form("centre", "m", [-1.0, 1.0], 0.0).vector(3),
+    ],
     confusable_with: &["camera_extrinsic_translation", "restitution"],
-    install: |values, effects| effects.camera.camera_scale = Some(CameraScale { scale: values.number("scale") }),
+    install: |values, effects| {
+        let centre: [f64; 3] = values.vector("centre");
+        effects.camera.camera_scale = Some(CameraScale { scale: values.number("scale"), centre: centre.into() });
+    },
 };
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(in crate::effects) struct CameraScale {
     scale: f64,
+    centre: Vector3<f64>,
 }
 
 impl CameraScale {
     pub(super) fn apply(&self, pose: &mut Isometry3<f64>) {
-        pose.translation.vector *= 1.0 + self.scale;
+        pose.translation.vector += (pose.translation.vector - self.centre) * self.scale;
     }
 
     pub(super) fn undo(&self, pose: &mut Isometry3<f64>) {
-        pose.translation.vector /= 1.0 + self.scale;
+        pose.translation.vector = self.centre + (pose.translation.vector - self.centre) / (1.0 + self.scale);
     }
 }
 
@@ -49,5 +57,15 @@ mod tests {
         };
         assert_eq!((see(0.8).translation.vector - see(0.4).translation.vector).x, 0.5);
         assert_eq!(see(0.8).rotation, see(0.4).rotation);
+    }
+
+    #[test]
+    fn the_centre_stays_where_it_is() {
+        let effects = effects("[[effect]]\nname = \"camera_scale\"\nscale = 0.25\ncentre = [0.5, 0.0, 0.0]");
+        let see = |x: f64| {
+            let pose = Isometry3::new(Vector3::new(x, 0.0, 0.0), Vector3::zeros());
+            effects.report(&mut CameraMemory::default(), 0, &pose).translation.vector.x
+        };
+        assert_eq!((see(0.5), see(0.9)), (0.5, 1.0));
     }
 }
