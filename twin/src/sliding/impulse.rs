@@ -39,6 +39,11 @@ const NEWTON: usize = 8;
 /// Rounds at the last rounding until loads and friction agree.
 const SETTLE: usize = 6;
 
+/// Length of a slip whose kink at zero is rounded off.
+fn rounded(slip: &Vector2<f64>, rounding: f64) -> f64 {
+    (slip.norm_squared() + rounding * rounding).sqrt()
+}
+
 impl Moment<'_> {
     /// Velocity after `dt`, starting from `start`; exactly zero when the body ends at rest. `None` when it lifts.
     pub(super) fn after(&self, start: Vector3<f64>, dt: f64) -> Option<Vector3<f64>> {
@@ -88,7 +93,7 @@ impl Moment<'_> {
         let mut kappas = [Vector2::zeros(); MAX_POINTS];
         for (i, point) in self.patch.points().iter().enumerate() {
             let slip = Self::slip(u, *point);
-            kappas[i] = slip * (self.mu[i] / slip.norm().hypot(rounding));
+            kappas[i] = slip * (self.mu[i] / rounded(&slip, rounding));
         }
         kappas
     }
@@ -130,7 +135,7 @@ impl Moment<'_> {
     fn cost(&self, u: &Vector3<f64>, free: &Vector3<f64>, loads: &Loads, rounding: f64, dt: f64) -> f64 {
         let off = u - free;
         let slips = self.patch.points().iter().enumerate();
-        let braking: f64 = slips.map(|(i, p)| self.mu[i] * loads[i] * Self::slip(u, *p).norm().hypot(rounding)).sum();
+        let braking: f64 = slips.map(|(i, p)| self.mu[i] * loads[i] * rounded(&Self::slip(u, *p), rounding)).sum();
         0.5 * off.component_mul(&self.inertia).dot(&off) + dt * braking
     }
 
@@ -146,7 +151,7 @@ impl Moment<'_> {
         let mut curvature = Matrix3::from_diagonal(&self.inertia);
         for (i, point) in self.patch.points().iter().enumerate().filter(|(i, _)| loads[*i] > 0.0) {
             let slip = Self::slip(u, *point);
-            let (speed, arm) = (slip.norm().hypot(rounding), left_of(*point));
+            let (speed, arm) = (rounded(&slip, rounding), left_of(*point));
             let (unit, pull) = (slip / speed, dt * self.mu[i] * loads[i]);
             gradient += Vector3::new(unit.x, unit.y, arm.dot(&unit)) * pull;
             let stiffness = pull / speed;
