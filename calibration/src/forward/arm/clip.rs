@@ -29,6 +29,13 @@ const COMMANDED: f64 = 0.02;
 /// A joint that follows less than this share of its command is dead.
 const DEAD: f64 = 0.01;
 
+/// So many usual steps between two rows may be a jump of the clock.
+const JUMP_STEPS: u64 = 10;
+/// Rows before it tell how fast the arm was.
+const BEFORE_JUMP: usize = 5;
+/// The arm went on by a step rather than by the gap when that leaves less than this share of the other's error.
+const JUMP_SHARE: f64 = 0.2;
+
 /// A clip cannot be used for the arm.
 #[derive(Debug, thiserror::Error)]
 pub enum ArmClipError {
@@ -89,15 +96,18 @@ impl ArmClip {
         hold_dead(&mut recorded, &dead);
         let commands = CommandTrack::new(&recorded.desired).ok_or(ArmClipError::Empty("commands"))?;
         let mut warnings = warnings(&recorded, &commands, &dead);
-        let runs = runs(&recorded, &commands, contact_ns(&recorded, cell));
+        let jump = clock_jump(&recorded.measured, step_ns);
+        let until_ns = jump.map_or(u64::MAX, |row| recorded.measured.stamps_ns[row]);
+        if let Some(row) = jump {
+            let stamps = &recorded.measured.stamps_ns;
+            let (at, by) = (seconds_between(stamps[0], stamps[row]), seconds_between(stamps[row], stamps[row + 1]));
+            warnings.push(format!("the robot's clock jumps by {by:.3} s at {at:.3} s: what follows was left out"));
+        }
+        let runs = runs(&recorded, &commands, contact_ns(&recorded, cell).min(until_ns));
         let bins = bins(&recorded.measured.stamps_ns, &runs, step_ns);
         let left = bins.iter().map(Range::len).sum::<usize>() as f64 / rate;
         if left < SHORTEST {
             return Err(ArmClipError::Short(left));
-        }
-        let lost = recorded.measured.duration() - left;
-        if lost > 0.1 * recorded.measured.duration() && recorded.kind == ClipKind::Excitation {
-            warnings.push(format!("{lost:.2} s of it cannot be simulated and were left out"));
         }
         let stretches = (left / STRETCH).round().max(1.0) as usize;
         let desired_rows = desired_rows(&recorded, step_ns);
@@ -121,6 +131,27 @@ pub(super) fn usual_step(stamps_ns: &[u64]) -> u64 {
     let mut steps: Vec<u64> = stamps_ns.windows(2).map(|w| w[1] - w[0]).collect();
     steps.sort_unstable();
     steps.get(steps.len() / 2).copied().unwrap_or(1).max(1)
+}
+
+/// The last row before stamps go on by many steps while the arm went on by one: a clock that jumped, not rows that were
+/// lost.
+fn clock_jump(measured: &JointSeries, step_ns: u64) -> Option<usize> {
+    let stamps = &measured.stamps_ns;
+    (BEFORE_JUMP..stamps.len() - 1).find(|&row| {
+        let gap_ns = stamps[row + 1] - stamps[row];
+        if gap_ns < JUMP_STEPS * step_ns {
+            return false;
+        }
+        let before_ns = (stamps[row] - stamps[row - BEFORE_JUMP]).max(1) as f64;
+        let (mut by_clock, mut by_step) = (0.0, 0.0);
+        let rows = measured.q_row(row - BEFORE_JUMP).iter().zip(measured.q_row(row)).zip(measured.q_row(row + 1));
+        for ((earlier, last), next) in rows {
+            let rate = (last - earlier) / before_ns;
+            by_clock += (next - last - rate * gap_ns as f64).abs();
+            by_step += (next - last - rate * step_ns as f64).abs();
+        }
+        by_step < JUMP_SHARE * by_clock
+    })
 }
 
 /// Distance between the lowest and highest value of a joint.

@@ -1,10 +1,14 @@
 //! What a fit tells about the arm, number by number: values, intervals, correlations.
 
 use crate::estimate::{Intervals, Unknown, at_bounds};
-use crate::forward::Settings;
+use crate::forward::{Setting, Settings};
 use crate::identify::answer::{Identification, Parameter};
 use crate::identify::run::Outcome;
 use std::collections::BTreeMap;
+
+/// What the twin's time step of 1 ms does to an identified gain, as a share of it: measured on arms simulated with a
+/// quarter of that step, where no gain is off by more than 1.5 times as much.
+const TIME_STEP: f64 = 1e-4;
 
 /// Everything that a fit tells.
 pub(super) struct Finding<'a> {
@@ -19,7 +23,14 @@ pub(super) struct Finding<'a> {
 impl<'a> Finding<'a> {
     pub(super) fn new(settings: &'a Settings, unknowns: &'a [Unknown], outcome: &'a Outcome) -> Self {
         let held = at_bounds(unknowns, &outcome.fit.shared);
-        let intervals = Intervals::new(&outcome.fit, &held);
+        let mut intervals = Intervals::new(&outcome.fit, &held);
+        for ((half, value), setting) in
+            intervals.half_width.iter_mut().zip(&outcome.fit.shared).zip(settings.settings())
+        {
+            if matches!(setting, Setting::Stiffness(_) | Setting::Damping(_)) {
+                *half = half.hypot(TIME_STEP * value);
+            }
+        }
         Self { settings, unknowns, held, outcome, intervals }
     }
 
@@ -28,6 +39,8 @@ impl<'a> Finding<'a> {
         let rests =
             |(unknown, held): (&Unknown, &bool)| (*held && unknown.upper > unknown.lower).then(|| unknown.name.clone());
         let correlation = &self.intervals.correlation;
+        let unfinished = "the search ended before it arrived: values and intervals are those of the place where it \
+                          stopped; give more budget, or search for what else acts";
         Identification {
             target: "arm".into(),
             parameters: self.parameters(before),
@@ -39,6 +52,7 @@ impl<'a> Finding<'a> {
             convergence: self.outcome.convergence.clone(),
             witnesses: self.intervals.witnesses,
             misfit: self.outcome.fit.misfit().sqrt(),
+            warnings: (!self.outcome.arrived).then(|| unfinished.to_owned()).into_iter().collect(),
             ..Identification::default()
         }
     }

@@ -26,10 +26,10 @@ use crate::interrupt::Interrupt;
 use finding::Finding;
 use session::Material;
 use shared_mem::cell::Cell;
-use shared_mem::recording::ReadError;
+use shared_mem::recording::{Clip, ReadError};
 use shared_mem::theta::Theta;
 use shared_mem::toml_file::TomlFileError;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 use twin::arm::ModelError;
 use twin::effects::{EffectInfo, Stage, find, registry};
@@ -105,27 +105,46 @@ type Numbers<'a> = Box<dyn Fn(&[f64]) -> Theta + Sync + 'a>;
 /// Clips, and what the twin makes of them.
 type Model<'a> = ArmClips<Numbers<'a>>;
 
-/// Identifies the arm; writes theta.toml where `out` says, with everything that was known before.
+/// Identifies the arm of a session; writes theta.toml where `out` says, with everything that was known before.
 ///
 /// # Errors
 /// [`ArmError`] naming file, key or clip, and the remedy.
 pub fn identify(options: &Options, interrupt: &Interrupt) -> Result<Identification, ArmError> {
+    identify_material(session::open(&options.session)?, options, interrupt)
+}
+
+/// The same from clips in memory.
+///
+/// # Errors
+/// As [`identify`].
+pub fn identify_clips(
+    cell: &Cell,
+    clips: Vec<Clip>,
+    options: &Options,
+    interrupt: &Interrupt,
+) -> Result<Identification, ArmError> {
+    identify_material(Material { cell: cell.clone(), clips, left_out: Vec::new() }, options, interrupt)
+}
+
+fn identify_material(
+    Material { cell, clips, left_out }: Material,
+    options: &Options,
+    interrupt: &Interrupt,
+) -> Result<Identification, ArmError> {
     let began = Instant::now();
-    let Material { session, clips, left_out } = session::open(&options.session)?;
-    let cell = &session.cell;
     if cell.robot.is_none() || cell.controller.is_none() {
         return Err(ArmError::NoArm(if cell.robot.is_none() { "[robot]" } else { "[controller]" }));
     }
     let given = options.parameters.as_deref().map(Theta::read).transpose()?;
-    let base = complete(cell, given.as_ref())?;
-    let (settings, mut unknowns): (Vec<_>, Vec<_>) = searched(cell, &base, &options.also)?.into_iter().unzip();
+    let base = complete(&cell, given.as_ref())?;
+    let (settings, mut unknowns): (Vec<_>, Vec<_>) = searched(&cell, &base, &options.also)?.into_iter().unzip();
     let settings = Settings::new(base, settings);
     let numbers: Numbers<'_> = Box::new(|shared| settings.theta(shared));
-    let (model, unusable) = ArmClips::new(cell, clips, session::CHANNELS, numbers)?;
+    let (model, unusable) = ArmClips::new(&cell, clips, session::CHANNELS, numbers)?;
     let clips = session::used(&options.session, &model, left_out, unusable, options.seed)?;
     session::hold_dead(&model, &clips, settings.settings(), &mut unknowns);
     let before: Vec<f64> = unknowns.iter().map(|unknown| unknown.start).collect();
-    start::improve(cell, &model, &clips.split.train, settings.settings(), &mut unknowns, interrupt);
+    start::improve(&cell, &model, &clips.split.train, settings.settings(), &mut unknowns, interrupt);
     let random = model.random();
     let outcome = search(options, &model, &clips, (&unknowns, &random), interrupt)?;
     let finding = Finding::new(&settings, &unknowns, &outcome);
@@ -137,12 +156,15 @@ pub fn identify(options: &Options, interrupt: &Interrupt) -> Result<Identificati
     answer.advice = advice::next(&finding, &clips);
     clips.fill(&mut answer);
     if let Some(out) = &options.out {
-        let text = settings.theta(&outcome.fit.shared).to_toml();
-        std::fs::write(out, text).map_err(|source| ArmError::Write { path: out.clone(), source })?;
+        write(&settings.theta(&outcome.fit.shared), out)?;
         answer.theta_file = out.display().to_string();
     }
     answer.seconds = began.elapsed().as_secs_f64();
     Ok(answer)
+}
+
+fn write(theta: &Theta, out: &Path) -> Result<(), ArmError> {
+    std::fs::write(out, theta.to_toml()).map_err(|source| ArmError::Write { path: out.to_owned(), source })
 }
 
 /// Gains, and the parameters of the effects that were asked for.

@@ -7,7 +7,7 @@ use crate::forward::arm::{Channel, LeftOut};
 use crate::identify::answer::{self, Clips, Identification};
 use crate::identify::split::{Split, split};
 use rayon::prelude::*;
-use shared_mem::cell::ClipKind;
+use shared_mem::cell::{Cell, ClipKind};
 use shared_mem::recording::{Clip, ReadError, Session};
 use std::path::Path;
 
@@ -16,7 +16,7 @@ pub(super) const CHANNELS: &[Channel] = &[Channel::Position];
 
 /// A session in memory.
 pub(super) struct Material {
-    pub(super) session: Session,
+    pub(super) cell: Cell,
     pub(super) clips: Vec<Clip>,
     pub(super) left_out: Vec<answer::LeftOut>,
 }
@@ -41,7 +41,7 @@ pub(super) fn open(path: &Path) -> Result<Material, ReadError> {
             Err(error) => left_out.push(answer::LeftOut { file: file.display().to_string(), why: error.to_string() }),
         }
     }
-    Ok(Material { session, clips, left_out })
+    Ok(Material { cell: session.cell, clips, left_out })
 }
 
 pub(super) fn used(
