@@ -34,12 +34,16 @@ impl Trace {
         mean.sqrt() / if self.sigma > 0.0 { self.sigma } else { 1.0 }
     }
 
+    /// Whether there is an after. A residual that stays as it was shows one line, not two on top of each other.
+    fn changes(&self) -> bool {
+        !self.after.is_empty() && self.after != self.before
+    }
+
     /// Before and after, and after alone beside it: what is left is often too small to be seen next to what was there.
     fn draw(&self) -> Markup {
         let lines = [Line { class: "before", points: &self.before }, Line { class: "after", points: &self.after }];
         let title = format!("{}, {}", self.clip.trim_end_matches(".mcap"), self.channel);
-        // A residual that stays as it was shows one line, not two on top of each other.
-        if self.after.is_empty() || self.after == self.before {
+        if !self.changes() {
             return self.chart(&title, &lines[..1]);
         }
         html! { (self.chart(&title, &lines)) (self.chart("after alone", &lines[1..])) }
@@ -68,8 +72,10 @@ pub fn worst_first(traces: &[Trace], clips: usize) -> Vec<&Trace> {
 /// Pictures of the worst clips with a legend; `names` of before and after.
 pub(super) fn gallery(traces: &[Trace], clips: usize, [before, after]: [&str; 2]) -> Markup {
     let worst = worst_first(traces, clips);
+    let mut entries = vec![("before", before), ("after", after), ("band", "\u{b1}2\u{3c3} of the noise")];
+    entries.retain(|(class, _)| *class != "after" || worst.iter().any(|trace| trace.changes()));
     html! {
-        (legend(&[("before", before), ("after", after), ("band", "\u{b1}2\u{3c3} of the noise")]))
+        (legend(&entries))
         div.pair { @for trace in worst { (trace.draw()) } }
     }
 }
