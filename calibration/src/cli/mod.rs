@@ -2,6 +2,7 @@
 
 mod benchmark;
 mod capture;
+mod compare;
 mod demo;
 mod identify;
 
@@ -37,6 +38,8 @@ enum Verb {
     /// Finds the parameters of controller or object from a session, with intervals, and says what it cannot tell.
     #[command(subcommand)]
     Identify(identify::Identify),
+    /// Ways of finding an object's parameters side by side: error, and what it cost.
+    Compare(compare::CompareArguments),
     /// Where the twin differs from the cell, which effect causes it, and how far the gap shrinks with it.
     Diagnose(diagnose::command::Arguments),
     /// How often the diagnosis is right, on simulated worlds of which the truth is known.
@@ -54,6 +57,7 @@ pub(crate) fn run(arguments: Arguments) -> anyhow::Result<()> {
     match arguments.verb {
         Verb::Capture(capture) => capture::run(capture, &interrupt),
         Verb::Identify(identify) => identify::run(identify, &interrupt),
+        Verb::Compare(arguments) => compare::run(arguments, &interrupt),
         Verb::Diagnose(arguments) => {
             let found = diagnose::command::run(&arguments, &interrupt)?;
             if arguments.json { print_json(&found) } else { Ok(()) }

@@ -11,7 +11,7 @@ use shared_mem::time::seconds_between;
 use twin::replay::{Gap, Prediction, Replayer};
 
 /// Measured less predicted position of the object, along x and y of the base frame.
-type Path = [Vec<[f64; 2]>; 2];
+pub(super) type Path = [Vec<[f64; 2]>; 2];
 
 /// Figures of every clip before and after, and their means over clips fitted and held out.
 pub(super) fn fill(
@@ -19,16 +19,7 @@ pub(super) fn fill(
     material: &Material,
     [before, after]: [&Theta; 2],
 ) -> Result<(), ObjectError> {
-    let gaps = |theta: &Theta| -> Result<(Vec<Gap>, Vec<Path>), ObjectError> {
-        let replayer = Replayer::new(&material.cell, Some(theta))?;
-        let gap = |usable: &super::material::Usable| -> Result<(Gap, Path), ObjectError> {
-            let (clip, prediction, report) = replayer.replay(usable.clip.clone())?;
-            Ok((report.gap, path(&clip, &prediction)))
-        };
-        let done: Vec<(Gap, Path)> = material.usable.par_iter().map(gap).collect::<Result<_, _>>()?;
-        Ok(done.into_iter().unzip())
-    };
-    let ((before, paths_before), (after, paths_after)) = (gaps(before)?, gaps(after)?);
+    let ((before, paths_before), (after, paths_after)) = (gaps(material, before)?, gaps(material, after)?);
     let files = material.usable.iter().map(|usable| usable.file.as_str());
     let paths = paths_before.into_iter().zip(paths_after);
     answer.traces = files.zip(paths).flat_map(|(file, paths)| traces(file, material, paths)).collect();
@@ -76,7 +67,19 @@ fn traces(file: &str, material: &Material, (before, after): (Path, Path)) -> imp
     })
 }
 
-fn figures(gap: &Gap) -> Figures {
+/// Gap of every clip, and what is left of its object's path.
+pub(super) fn gaps(material: &Material, theta: &Theta) -> Result<(Vec<Gap>, Vec<Path>), ObjectError> {
+    let replayer = Replayer::new(&material.cell, Some(theta))?;
+    let gap = |usable: &super::material::Usable| -> Result<(Gap, Path), ObjectError> {
+        let (clip, prediction, report) = replayer.replay(usable.clip.clone())?;
+        Ok((report.gap, path(&clip, &prediction)))
+    };
+    let done: Vec<(Gap, Path)> = material.usable.par_iter().map(gap).collect::<Result<_, _>>()?;
+    Ok(done.into_iter().unzip())
+}
+
+/// The figures of a gap.
+pub(super) fn figures(gap: &Gap) -> Figures {
     let rms = |joints: &Vec<f64>| (joints.iter().map(|v| v * v).sum::<f64>() / joints.len().max(1) as f64).sqrt();
     Figures {
         joint_rms_rad: gap.joint_rms_rad.as_ref().map(rms),

@@ -43,7 +43,8 @@ impl<'a> Finding<'a> {
             clip.scores.iter_mut().for_each(|score| *score *= *weight);
         }
         let held = at_bounds(unknowns, &fit.shared);
-        let intervals = Intervals::new(&fit, &held);
+        let mut intervals = Intervals::new(&fit, &held);
+        intervals.half_width.iter_mut().zip(&found.widths).for_each(|(half, width)| *half *= width);
         Self { settings, unknowns, found, fit, held, intervals }
     }
 

@@ -18,6 +18,8 @@ use shared_mem::cell::PoseNoise;
 pub(super) struct ObjectFit {
     /// The numbers, linearised there.
     pub(super) at: Linearised,
+    /// By how much wider than information says each number's interval is.
+    pub(super) widths: Vec<f64>,
     /// Calls of the model: clips simulated, wholly or from the release on.
     pub(super) evaluations: usize,
     /// Clips simulated so far, and the deviance per row then.
@@ -86,10 +88,12 @@ pub(super) fn fit_object(
         at = search.steps(Question { clips, unknowns, random: &random }, (&shared, &own), 2)?;
     }
     let Search { evaluations, convergence, stopped, .. } = search;
-    Ok(ObjectFit { converged: at.small && !stopped, at, evaluations, convergence })
+    let (widths, looks) = Question { clips, unknowns, random: &random }.widths(&at)?;
+    let evaluations = evaluations + looks;
+    Ok(ObjectFit { converged: at.small && !stopped, at, widths, evaluations, convergence })
 }
 
-/// The clips at numbers that were found otherwise, with the error of hits that they leave.
+/// The clips at numbers that were found otherwise, with the error of hits that they leave, and [`Question::widths`].
 ///
 /// # Errors
 /// [`Impossible`] when the cell cannot be simulated there.
@@ -97,13 +101,16 @@ pub(super) fn linearise_object(
     clips: &mut ObjectClips,
     unknowns: &[Unknown],
     at: &[f64],
-) -> Result<Linearised, Impossible> {
+) -> Result<(Linearised, Vec<f64>), Impossible> {
     clips.set_model_error(FIRST_ERROR);
     let random = scattered(clips);
     let own = vec![vec![0.0; random.len()]; clips.clips()];
     let first = Question { clips, unknowns, random: &random }.here(at, &own)?;
     clips.set_model_error(model_error(clips, &first)?);
-    Question { clips, unknowns, random: &random }.here(at, &first.own())
+    let question = Question { clips, unknowns, random: &random };
+    let there = question.here(at, &first.own())?;
+    let (widths, _) = question.widths(&there)?;
+    Ok((there, widths))
 }
 
 struct Search<'a, W> {

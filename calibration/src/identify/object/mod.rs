@@ -10,8 +10,10 @@
 //! | `step` | one step of it |
 //! | `paper` | the loss on the object's surface, for searches without slopes |
 //! | `finding` | what a fit tells, number by number, and what it cannot tell |
+//! | [`compare`] | ways of searching side by side |
 //! | `figures` | how far the twin is off |
 
+pub mod compare;
 mod figures;
 mod finding;
 mod fit;
@@ -21,7 +23,7 @@ mod screen;
 mod step;
 
 use super::answer::Identification;
-use super::run::{Optimizer, Run, RunError};
+use super::run::{Optimizer, Outcome, Run, RunError};
 use crate::estimate::{Impossible, Options as FitOptions, Unknown, fit as fit_clips};
 use crate::forward::arm::{ArmClips, Channel};
 use crate::forward::object::ObjectClips;
@@ -157,8 +159,11 @@ impl Problem {
             }
         }
         let base = complete(&material.cell, Some(&given))?;
+        // A mass that was weighed is not searched.
+        let weighed = material.cell.object.as_ref().is_some_and(|o| o.mass.is_some() && o.mass_range.is_none());
+        let searched = object_parameters(&material.cell, &base).into_iter();
         let (settings, mut unknowns): (Vec<Setting>, Vec<Unknown>) =
-            object_parameters(&material.cell, &base).into_iter().unzip();
+            searched.filter(|(setting, _)| !(weighed && *setting == Setting::Mass)).unzip();
         for (setting, unknown) in settings.iter().zip(&mut unknowns) {
             unknown.step = wide_step(setting, unknown);
         }
@@ -194,9 +199,9 @@ impl Problem {
             let loss = SurfaceLoss::new(clips, &shape);
             run.search(&loss, &loss)?
         };
-        let at = linearise_object(clips, &self.unknowns, &outcome.fit.shared)?;
-        let evaluations = outcome.simulated;
-        Ok(ObjectFit { at, evaluations, convergence: outcome.convergence, converged: outcome.arrived })
+        let (at, widths) = linearise_object(clips, &self.unknowns, &outcome.fit.shared)?;
+        let Outcome { simulated: evaluations, convergence, arrived: converged, .. } = outcome;
+        Ok(ObjectFit { at, widths, evaluations, convergence, converged })
     }
 
     fn least_squares(&self, clips: &mut ObjectClips, run: &Run<'_>) -> Result<ObjectFit, ObjectError> {

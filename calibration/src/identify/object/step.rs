@@ -35,6 +35,9 @@ pub(super) struct Linearised {
     pub(super) evaluations: usize,
 }
 
+/// How far away the deviance is looked at, in sigmas, and how much wider an interval may get by that.
+const AWAY: f64 = 3.0;
+const WIDEST: f64 = 6.0;
 /// Steps of the own numbers at most.
 const OWN: Options = Options { iterations: 2, tolerance: 0.3 };
 /// Trials with growing damping.
@@ -129,6 +132,36 @@ impl Question<'_> {
     /// As [`Self::improved`].
     pub(super) fn here(&self, shared: &[f64], own: &[Vec<f64>]) -> Result<Linearised, Impossible> {
         self.linearised(shared, &self.profiled(shared, own)?)
+    }
+
+    /// By how much wider than information says the clips leave each number, 1 to [`WIDEST`]: the deviance is looked at
+    /// three sigmas away to both sides, the other numbers following. A hit's roughness makes slopes, and so information,
+    /// larger than what the clips can really tell.
+    ///
+    /// # Errors
+    /// As [`Self::improved`].
+    pub(super) fn widths(&self, at: &Linearised) -> Result<(Vec<f64>, usize), Impossible> {
+        let n = at.shared.len();
+        let (own, mut evaluations) = (at.own(), 0);
+        let Some(covariance) = at.information().try_inverse() else { return Ok((vec![1.0; n], 0)) };
+        let here = weighted(&self.profiled(&at.shared, &own)?, &at.weights);
+        let mut widths = vec![1.0; n];
+        for (k, width) in widths.iter_mut().enumerate().filter(|(k, _)| covariance[(*k, *k)] > 0.0) {
+            let way = covariance.column(k) * (AWAY / covariance[(k, k)].sqrt());
+            let mut rises = Vec::new();
+            for side in [-1.0, 1.0] {
+                let inside =
+                    |j: usize| (at.shared[j] + side * way[j]).clamp(self.unknowns[j].lower, self.unknowns[j].upper);
+                let to: Vec<f64> = (0..n).map(inside).collect();
+                if let Ok(there) = self.profiled(&to, &own) {
+                    evaluations += there.iter().map(|(.., calls)| calls).sum::<usize>();
+                    rises.push(weighted(&there, &at.weights) - here);
+                }
+            }
+            let rise = rises.iter().copied().fold(f64::INFINITY, f64::min);
+            *width = (AWAY / rise.max(1e-9).sqrt()).clamp(1.0, WIDEST);
+        }
+        Ok((widths, evaluations))
     }
 
     fn profiled(&self, shared: &[f64], own: &[Vec<f64>]) -> Result<Vec<Profiled>, Impossible> {

@@ -1,0 +1,218 @@
+//! Ways of searching side by side, on the same clips and by the same loss: least squares, the particle swarm and CMA-ES
+//! on the surface's points, and least squares without the centre of mass, the set of numbers that gradients through a
+//! differentiable simulator were used for (PIN-WM).
+
+use super::figures::{figures, gaps};
+use super::fit::fit_object;
+use super::material::Material;
+use super::paper::SurfaceLoss;
+use super::{ObjectError, Options, Problem};
+use crate::estimate::{ClipModel as _, Unknown};
+use crate::forward::object::ObjectClips;
+use crate::forward::{Setting, Settings};
+use crate::identify::answer::Figures;
+use crate::identify::run::{Optimizer, Run};
+use crate::interrupt::Interrupt;
+use rayon::prelude::*;
+use serde::Serialize;
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+use std::sync::Mutex;
+use std::time::Instant;
+
+/// What the comparison found. SI units.
+#[derive(Debug, Clone, Default, Serialize)]
+pub struct Comparison {
+    /// The session's folder.
+    pub session: String,
+    /// Ways of searching, in the order of the table's columns.
+    pub methods: Vec<Method>,
+    /// Loss that the swarm ended with, ADD + ADD-S on the clips fitted [m].
+    pub target_loss_m: f64,
+    /// Clips that the swarm simulated over those that least squares took to the same loss; none where they never did.
+    pub fewer: Option<f64>,
+}
+
+/// One way of searching.
+#[derive(Debug, Clone, Default, Serialize)]
+pub struct Method {
+    /// Its name.
+    pub name: String,
+    /// What it found.
+    pub parameters: BTreeMap<String, f64>,
+    /// Clips simulated until it ended.
+    pub evaluations: usize,
+    /// Wall time until then [s].
+    pub seconds: f64,
+    /// ADD + ADD-S on the clips fitted [m].
+    pub loss_m: f64,
+    /// Clips simulated and wall time [s] when its loss was first as low as the swarm's at last; none where it never was.
+    pub to_target: Option<(usize, f64)>,
+    /// On clips held out.
+    pub holdout: Figures,
+    /// On clips fitted.
+    pub train: Figures,
+    /// Clips held out, one by one: file, ADD, ADD-S [m].
+    pub clips: Vec<(String, f64, f64)>,
+    /// Clips simulated, wall time [s] and loss [m] along the way.
+    pub way: Vec<(usize, f64, f64)>,
+}
+
+/// Runs all of them.
+///
+/// # Errors
+/// [`ObjectError`] naming what is wrong and the remedy.
+pub fn compare(options: &Options, interrupt: &Interrupt) -> Result<Comparison, ObjectError> {
+    let material = Material::open(&options.session, options.seed)?;
+    let problem = Problem::new(&material, options, interrupt)?;
+    let without: Vec<usize> = (0..problem.unknowns.len())
+        .filter(|k| !matches!(problem.settings.settings()[*k], Setting::CentreOfMass(_)))
+        .collect();
+    let pin = problem.of(&without);
+    let mut methods = vec![
+        squares("least squares", &problem, &material, interrupt)?,
+        slopeless("particle swarm", Optimizer::Swarm, &problem, &material, options, interrupt)?,
+        slopeless("CMA-ES", Optimizer::Evolution, &problem, &material, options, interrupt)?,
+        squares("gradient without centre of mass", &pin, &material, interrupt)?,
+    ];
+    let target = methods[1].loss_m;
+    for method in &mut methods {
+        method.to_target = method.way.iter().find(|(.., loss)| *loss <= target).map(|(n, seconds, _)| (*n, *seconds));
+    }
+    let [least, swarm] = [0, 1].map(|k| methods[k].to_target.map(|(n, _)| n as f64));
+    let fewer = least.zip(swarm).map(|(least, swarm)| swarm / least);
+    Ok(Comparison { session: options.session.display().to_string(), methods, target_loss_m: target, fewer })
+}
+
+impl Problem {
+    /// The same with some of its numbers; the others stay where the search begins.
+    fn of(&self, numbers: &[usize]) -> Self {
+        let settings = numbers.iter().map(|k| self.settings.settings()[*k]).collect();
+        Self {
+            settings: Settings::new(self.settings.base().clone(), settings),
+            unknowns: numbers.iter().map(|k| self.unknowns[*k].clone()).collect(),
+            warnings: self.warnings.clone(),
+        }
+    }
+}
+
+fn squares(name: &str, problem: &Problem, material: &Material, interrupt: &Interrupt) -> Result<Method, ObjectError> {
+    let mut clips = ObjectClips::new(&material.cell, material.train(), problem.settings.clone())?;
+    let start: Vec<f64> = problem.unknowns.iter().map(|unknown| unknown.start).collect();
+    let (began, steps) = (Instant::now(), Mutex::new(Vec::new()));
+    let found = fit_object(&mut clips, &problem.unknowns, &start, |numbers, evaluations| {
+        steps.lock().expect("no holder panics").push((numbers.to_vec(), evaluations, began.elapsed().as_secs_f64()));
+        !interrupt.asked()
+    })?;
+    let seconds = began.elapsed().as_secs_f64();
+    let shape = problem.shape(&clips)?;
+    let loss = SurfaceLoss::new(&clips, &shape);
+    let way = steps.into_inner().expect("no holder panics");
+    let way = way.into_iter().map(|(numbers, n, at)| Ok((n, at, mean_loss(&loss, &numbers)?)));
+    let way = way.collect::<Result<Vec<_>, ObjectError>>()?;
+    let last = mean_loss(&loss, &found.at.shared)?;
+    finished(name, problem, material, &found.at.shared, (found.evaluations, seconds, last, way))
+}
+
+fn slopeless(
+    name: &str,
+    optimizer: Optimizer,
+    problem: &Problem,
+    material: &Material,
+    options: &Options,
+    interrupt: &Interrupt,
+) -> Result<Method, ObjectError> {
+    let clips = ObjectClips::new(&material.cell, material.train(), problem.settings.clone())?;
+    let shape = problem.shape(&clips)?;
+    let loss = SurfaceLoss::new(&clips, &shape);
+    let run = Run {
+        unknowns: &problem.unknowns,
+        random: &[],
+        optimizer,
+        seed: options.seed,
+        budget: options.budget,
+        fingerprint: String::new(),
+        state: None,
+        interrupt,
+    };
+    let began = Instant::now();
+    let outcome = run.search(&loss, &loss)?;
+    let seconds = began.elapsed().as_secs_f64();
+    let all = outcome.simulated.max(1) as f64;
+    let way = outcome.convergence.iter().map(|[n, loss]| (*n as usize, seconds * n / all, *loss)).collect();
+    let numbers = &outcome.fit.shared;
+    finished(name, problem, material, numbers, (outcome.simulated, seconds, mean_loss(&loss, numbers)?, way))
+}
+
+/// Clips simulated, wall time, last loss, and the way there.
+type Course = (usize, f64, f64, Vec<(usize, f64, f64)>);
+
+fn finished(
+    name: &str,
+    problem: &Problem,
+    material: &Material,
+    numbers: &[f64],
+    (evaluations, seconds, loss_m, way): Course,
+) -> Result<Method, ObjectError> {
+    let (gaps, _) = gaps(material, &problem.settings.theta(numbers))?;
+    let mean = |of: &[usize]| Figures::mean(&of.iter().map(|clip| figures(&gaps[*clip])).collect::<Vec<_>>());
+    let named = |(unknown, value): (&Unknown, &f64)| (unknown.name.clone(), *value);
+    let clip = |clip: &usize| {
+        let gap = &gaps[*clip];
+        let [add, add_s] = [gap.object_add_m, gap.object_add_s_m].map(Option::unwrap_or_default);
+        (material.usable[*clip].file.clone(), add, add_s)
+    };
+    Ok(Method {
+        name: name.into(),
+        parameters: problem.unknowns.iter().zip(numbers).map(named).collect(),
+        evaluations,
+        seconds,
+        loss_m,
+        to_target: None,
+        holdout: mean(&material.split.holdout),
+        train: mean(&material.split.train),
+        clips: material.split.holdout.iter().map(clip).collect(),
+        way,
+    })
+}
+
+/// Mean over all poses of the clips [m].
+fn mean_loss(loss: &SurfaceLoss<'_>, numbers: &[f64]) -> Result<f64, ObjectError> {
+    let one = |clip: usize| {
+        let mut out = Vec::new();
+        loss.residuals(clip, numbers, &[], &mut out)?;
+        Ok((out.iter().map(|r| r * r).sum::<f64>(), out.len()))
+    };
+    let all: Vec<(f64, usize)> = (0..loss.clips()).into_par_iter().map(one).collect::<Result<_, ObjectError>>()?;
+    let (sum, rows) = all.iter().fold((0.0, 0), |(sum, rows), one| (sum + one.0, rows + one.1));
+    Ok(sum / rows.max(1) as f64)
+}
+
+impl Comparison {
+    /// Two tables: errors on clips held out, a row a clip and their mean, a column a way of searching; and what each cost.
+    #[must_use]
+    pub fn table(&self) -> String {
+        let mut out = String::new();
+        let names: Vec<&str> = self.methods.iter().map(|method| method.name.as_str()).collect();
+        let _ = writeln!(out, "{:<16} ADD [cm] / ADD-S [cm] on clips held out: {}", "clip", names.join(" | "));
+        let cell = |add: f64, add_s: f64| format!("{:>7.2} /{:>5.2}", add * 1e2, add_s * 1e2);
+        for (row, (file, ..)) in self.methods.first().map_or(&[][..], |m| &m.clips[..]).iter().enumerate() {
+            let cells = self.methods.iter().map(|m| cell(m.clips[row].1, m.clips[row].2)).collect::<Vec<_>>();
+            let _ = writeln!(out, "{file:<16} {}", cells.join(" |"));
+        }
+        let mean =
+            |m: &Method| cell(m.holdout.object_add_m.unwrap_or(f64::NAN), m.holdout.object_add_s_m.unwrap_or(f64::NAN));
+        let means: Vec<String> = self.methods.iter().map(mean).collect();
+        let _ = writeln!(out, "{:<16} {}\n", "mean", means.join(" |"));
+        let _ = writeln!(out, "{:<32}{:>10}{:>9}{:>12}   to the swarm's loss", "way", "clips", "s", "loss [mm]");
+        for m in &self.methods {
+            let to = m.to_target.map_or("never".into(), |(n, s)| format!("{n} clips, {s:.1} s"));
+            let _ =
+                writeln!(out, "{:<32}{:>10}{:>9.1}{:>12.3}   {to}", m.name, m.evaluations, m.seconds, m.loss_m * 1e3);
+        }
+        if let Some(fewer) = self.fewer {
+            let _ = writeln!(out, "least squares took {fewer:.1} times fewer clips than the swarm to the same loss");
+        }
+        out
+    }
+}
