@@ -177,3 +177,87 @@ fn rate(series: &ObjectSeries) -> Option<f64> {
     steps.sort_unstable();
     steps.get(steps.len() / 2).map(|step| 1e9 / *step as f64)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use shared_mem::frames::{Base, Object};
+    use shared_mem::recording::JointSeries;
+    use shared_mem::toml_file;
+    use std::path::Path;
+
+    fn cell() -> Cell {
+        let text = "[table]\nheight = 0.0\n[object]\nshape = \"box\"\nsize = [0.08, 0.06, 0.1]\n";
+        toml_file::parse(text, Path::new("cell.toml")).expect("a cell.toml")
+    }
+
+    /// A box that stands for half a second, slides 0.1 m and rests, seen at 60 Hz.
+    fn clip(change: impl Fn(usize, &mut Isometry3<f64>)) -> Clip {
+        let poses = (0..90).map(|row| {
+            let along = ((row as f64 - 30.0) / 20.0).clamp(0.0, 1.0);
+            let mut pose = Isometry3::translation(0.5 + 0.1 * along, 0.0, 0.05);
+            change(row, &mut pose);
+            Pose::<Base, Object>::from_isometry(pose)
+        });
+        let object = ObjectSeries { poses: poses.collect(), stamps_ns: (0..90).map(|row| row * 16_666_667).collect() };
+        Clip {
+            file: "clip.mcap".into(),
+            kind: ClipKind::ControlHitSlide,
+            joint_names: Vec::new(),
+            desired: JointSeries::default(),
+            measured: JointSeries::default(),
+            object,
+            warnings: Vec::new(),
+            damage: None,
+        }
+    }
+
+    fn why(change: impl Fn(usize, &mut Isometry3<f64>)) -> Option<String> {
+        screened(clip(change), &cell()).2
+    }
+
+    #[test]
+    fn a_plain_slide_is_used_without_a_remark() {
+        let (clip, remarks, why) = screened(clip(|_, _| {}), &cell());
+        assert_eq!((clip.object.len(), remarks.len(), why), (90, 0, None));
+    }
+
+    #[test]
+    fn single_poses_that_jump_away_are_left_out_and_told() {
+        let far = |row: usize, pose: &mut Isometry3<f64>| {
+            if row == 40 || row == 70 {
+                pose.translation.vector.y += 0.05;
+            }
+        };
+        let (clip, remarks, why) = screened(clip(far), &cell());
+        assert_eq!((clip.object.len(), why), (88, None));
+        assert!(remarks[0].contains("2 of 90 poses jump"), "{remarks:?}");
+    }
+
+    #[test]
+    fn an_object_that_is_lost_is_not_hit_or_topples_is_left_out_with_the_reason() {
+        let lost = why(|row, pose| pose.translation.vector.y += if row > 60 { 0.3 } else { 0.0 });
+        assert!(lost.as_deref().is_some_and(|why| why.contains("lost the object")), "{lost:?}");
+        let still = why(|_, pose| pose.translation.vector.x = 0.5);
+        assert!(still.as_deref().is_some_and(|why| why.contains("not hit")), "{still:?}");
+        let toppled = why(|row, pose| {
+            let lean = Vector3::y() * ((row as f64 - 40.0) / 10.0).clamp(0.0, 1.57);
+            pose.rotation = UnitQuaternion::from_scaled_axis(lean);
+        });
+        assert!(toppled.as_deref().is_some_and(|why| why.contains("toppled")), "{toppled:?}");
+    }
+
+    #[test]
+    fn a_box_that_is_taken_for_itself_turned_over_is_turned_back() {
+        let flip = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), std::f64::consts::PI);
+        let flipped = |row: usize, pose: &mut Isometry3<f64>| {
+            if (35..45).contains(&row) {
+                pose.rotation *= flip;
+            }
+        };
+        let (clip, remarks, why) = screened(clip(flipped), &cell());
+        assert_eq!(why, None);
+        assert!(clip.object.poses.iter().all(|pose| pose.isometry().rotation.angle() < 1e-6));
+        assert!(remarks[0].contains("turned by half"), "{remarks:?}");
+    }
+}

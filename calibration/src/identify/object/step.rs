@@ -158,7 +158,8 @@ impl Question<'_> {
                     rises.push(weighted(&there, &at.weights) - here);
                 }
             }
-            let rise = rises.iter().copied().fold(f64::INFINITY, f64::min);
+            // One side alone may fall by chance where the hit is rough.
+            let rise = rises.iter().sum::<f64>() / rises.len().max(1) as f64;
             *width = (AWAY / rise.max(1e-9).sqrt()).clamp(1.0, WIDEST);
         }
         Ok((widths, evaluations))

@@ -1,0 +1,93 @@
+//! The object from simulated strokes of which the truth is known, and from recordings of another engine.
+
+use calibration::benchmark::session::record;
+use calibration::benchmark::world::{Fault, Kind, World};
+use calibration::estimate::ClipModel as _;
+use calibration::forward::Settings;
+use calibration::forward::object::{ModelError, ObjectClips, Own};
+use calibration::forward::setting::{complete, object_parameters};
+use calibration::identify::object::{Options, identify};
+use calibration::identify::{Identification, Optimizer};
+use calibration::interrupt::Interrupt;
+use std::path::{Path, PathBuf};
+
+fn world(number: u64) -> World {
+    let text = include_str!("../../config/fr3_cell.toml");
+    let cell = shared_mem::toml_file::parse(text, Path::new("fr3_cell.toml")).expect("the shipped file");
+    World::draw(number, Kind::Strokes, Fault::Nothing, &cell)
+}
+
+fn strokes(world: &World, count: usize) -> ObjectClips {
+    let clips = record(world, count).expect("a session");
+    let base = complete(&world.cell, Some(&world.hidden)).expect("a cell");
+    let settings = object_parameters(&world.cell, &base).into_iter().map(|(setting, _)| setting).collect();
+    ObjectClips::new(&world.cell, clips, Settings::new(base, settings)).expect("a cell that can be simulated")
+}
+
+fn truth(world: &World) -> Vec<f64> {
+    let base = complete(&world.cell, Some(&world.hidden)).expect("a cell");
+    object_parameters(&world.cell, &base).into_iter().map(|(_, unknown)| unknown.start).collect()
+}
+
+#[test]
+fn at_the_true_numbers_strokes_are_predicted_to_a_few_millimetres() {
+    let world = world(3);
+    let (clips, truth) = (strokes(&world, 3), truth(&world));
+    for clip in 0..clips.clips() {
+        let predicted = clips.predict(clip, &truth, &[]).expect("an answer");
+        let (end, measured) = (predicted.poses.last(), clips.clip(clip).object.poses.last());
+        let place = |pose: Option<&shared_mem::frames::Pose<_, _>>| {
+            nalgebra::Vector3::from(pose.map(shared_mem::frames::Pose::position).expect("a pose"))
+        };
+        let off = (place(end) - place(measured)).norm();
+        assert!(predicted.contact_ns.is_some(), "clip {clip} is not hit");
+        assert!(off < 0.03, "clip {clip} ends {off} m off");
+    }
+}
+
+#[test]
+fn what_is_kept_of_a_clip_gives_the_same_bits_as_simulating_it_anew() {
+    let world = world(3);
+    let truth = truth(&world);
+    let mut heavier = truth.clone();
+    heavier[1] *= 1.1;
+    let (kept, fresh) = (strokes(&world, 1), strokes(&world, 1));
+    let first = kept.predict(0, &truth, &[]).expect("an answer");
+    kept.predict(0, &heavier, &[]).expect("an answer");
+    assert!(kept.predict(0, &truth, &[]).expect("an answer") == first, "from memory");
+    assert!(fresh.predict(0, &heavier, &[]).expect("an answer") == kept.predict(0, &heavier, &[]).expect("an answer"));
+}
+
+#[test]
+fn a_place_left_by_the_hit_moves_the_resting_place_by_as_much() {
+    let world = world(3);
+    let (mut clips, truth) = (strokes(&world, 1), truth(&world));
+    clips.set_model_error(ModelError::default());
+    let mut own = vec![0.0; calibration::forward::object::ALL.len()];
+    let along_x = Own::Release(calibration::forward::object::Axis::X);
+    own[calibration::forward::object::ALL.iter().position(|own| *own == along_x).expect("listed")] = 0.002;
+    let end = |own: &[f64]| clips.predict(0, &truth, own).expect("an answer").poses.last().map(|p| p.position()[0]);
+    let (plain, moved) = (end(&[]).expect("a pose"), end(&own).expect("a pose"));
+    assert!((moved - plain - 0.002).abs() < 1e-3, "{plain} {moved}");
+}
+
+/// Sessions of another engine and their truth.
+fn recorded(name: &str, parameters: Option<PathBuf>) -> Identification {
+    let data = PathBuf::from(std::env::var_os("TWINALIGN_DATA").expect("TWINALIGN_DATA"));
+    let optimizer = Optimizer::LeastSquares;
+    let session = data.join("gap_dev").join(name);
+    let options = Options { session, optimizer, parameters, ..Options::default() };
+    identify(&options, &Interrupt::listen().expect("signals")).expect("an answer")
+}
+
+#[test]
+#[ignore = "needs TWINALIGN_DATA=<folder of recorded sessions>"]
+fn strokes_of_another_engine_tell_friction_mass_and_centre_of_mass() {
+    let found = recorded("none_slide", None);
+    let value = |name: &str| found.parameters[name].value.clone();
+    assert!((value("friction")[0] / 0.278_044 - 1.0).abs() < 0.03, "{:?}", value("friction"));
+    assert!((value("mass")[0] / 0.306_635 - 1.0).abs() < 0.15, "{:?}", value("mass"));
+    let centre = value("centre_of_mass");
+    assert!((centre[0] + 0.007_316).abs() < 1.5e-3 && (centre[1] - 0.001_015).abs() < 1.5e-3, "{centre:?}");
+    assert!(found.gap.holdout.object_add_m.is_some_and(|add| add < 3e-3), "{:?}", found.gap.holdout);
+}
