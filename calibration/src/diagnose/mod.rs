@@ -57,7 +57,7 @@ use admit::{Admitted, Refused, admit};
 use arm_clips::ArmClips;
 use cell_clips::CellClips;
 use evidence::Evidence;
-use fit::{Bench, Effort};
+use fit::{Bench, Effort, Hypothesis};
 use library::Library;
 use shared_mem::recording::Session;
 use shared_mem::theta::Theta;
@@ -157,13 +157,24 @@ fn examine<E: Evidence>(
     let split = Split::new(&admitted.groups, options.seed);
     let bar = Progress::new("diagnose", 100);
     bar.show(0, "baseline");
-    let even = vec![1.0; evidence.channels().len()];
-    let baseline = bench.fit((&[], library.start()), &split.train, &even, None, BASELINE);
-    let baseline = baseline.ok_or(DiagnoseError::NoBaseline)?;
+    let baseline = identify(&bench, &split).ok_or(DiagnoseError::NoBaseline)?;
     let found = combine::search(&bench, &split, baseline, &bar).ok_or(DiagnoseError::NoBaseline)?;
     if interrupt.asked() {
         return Err(DiagnoseError::Interrupted);
     }
     bar.show(97, "confirm");
     conclude::conclude(&bench, &split, &found, session, admitted, options)
+}
+
+/// The baseline, fitted: the arm by itself first, then all. A gain that is off moves the hit, and a hit elsewhere tells
+/// nothing about the gain.
+fn identify<E: Evidence>(bench: &Bench<'_, E>, split: &Split) -> Option<Hypothesis> {
+    let channels = bench.evidence.channels();
+    let of_arm: Vec<f64> = channels.iter().map(|channel| if channel.joint.is_some() { 1.0 } else { 0.0 }).collect();
+    let all = vec![1.0; channels.len()];
+    let arm = bench.fit((&[], bench.library.start()), &split.train, &of_arm, None, BASELINE)?;
+    if of_arm == all {
+        return Some(arm);
+    }
+    bench.fit((&[], arm.full.clone()), &split.train, &all, Some(&arm), BASELINE)
 }
