@@ -10,6 +10,7 @@
 //! | [`split`] | which clips are for what |
 //! | [`evidence`], [`arm_clips`], [`cell_clips`] | what is measured against the twin, and where in a clip |
 //! | [`library`] | the candidates as numbers |
+//! | [`baseline`] | the paper's parameters identified |
 //! | [`noise`], [`floor`] | how far residuals can be trusted |
 //! | [`sweep`], [`quadratic`] | every candidate's signature, linearised once |
 //! | [`shortlist`] | which candidates are worth fitting |
@@ -26,6 +27,7 @@ pub mod admit;
 pub mod advice;
 pub mod answer;
 pub mod arm_clips;
+pub mod baseline;
 pub mod cell_clips;
 pub mod combine;
 pub mod command;
@@ -57,13 +59,12 @@ use admit::{Admitted, Refused, admit};
 use arm_clips::ArmClips;
 use cell_clips::CellClips;
 use evidence::Evidence;
-use fit::{Bench, Effort, Hypothesis};
+use fit::Bench;
 use library::Library;
 use shared_mem::recording::Session;
 use shared_mem::theta::Theta;
 use split::Split;
 use std::time::Instant;
-use sweep::Precision;
 use twin::replay::ReplayError;
 use twin::sim::SimError;
 
@@ -142,9 +143,6 @@ pub fn diagnose_clips(
     Ok(diagnosis)
 }
 
-/// The baseline alone is followed for so many linearisations.
-const BASELINE: Effort = Effort { iterations: 8, precision: Precision::Joints };
-
 fn examine<E: Evidence>(
     evidence: &E,
     library: &Library,
@@ -157,24 +155,11 @@ fn examine<E: Evidence>(
     let split = Split::new(&admitted.groups, options.seed);
     let bar = Progress::new("diagnose", 100);
     bar.show(0, "baseline");
-    let baseline = identify(&bench, &split).ok_or(DiagnoseError::NoBaseline)?;
+    let baseline = baseline::identify(&bench, &split, &session.cell, admitted).ok_or(DiagnoseError::NoBaseline)?;
     let found = combine::search(&bench, &split, baseline, &bar).ok_or(DiagnoseError::NoBaseline)?;
     if interrupt.asked() {
         return Err(DiagnoseError::Interrupted);
     }
     bar.show(97, "confirm");
     conclude::conclude(&bench, &split, &found, session, admitted, options)
-}
-
-/// The baseline, fitted: the arm by itself first, then all. A gain that is off moves the hit, and a hit elsewhere tells
-/// nothing about the gain.
-fn identify<E: Evidence>(bench: &Bench<'_, E>, split: &Split) -> Option<Hypothesis> {
-    let channels = bench.evidence.channels();
-    let of_arm: Vec<f64> = channels.iter().map(|channel| if channel.joint.is_some() { 1.0 } else { 0.0 }).collect();
-    let all = vec![1.0; channels.len()];
-    let arm = bench.fit((&[], bench.library.start()), &split.train, &of_arm, None, BASELINE)?;
-    if of_arm == all {
-        return Some(arm);
-    }
-    bench.fit((&[], arm.full.clone()), &split.train, &all, Some(&arm), BASELINE)
 }

@@ -159,15 +159,8 @@ impl Problem {
             }
         }
         let base = complete(&material.cell, Some(&given))?;
-        // A mass that was weighed is not searched.
-        let weighed = material.cell.object.as_ref().is_some_and(|o| o.mass.is_some() && o.mass_range.is_none());
-        let searched = object_parameters(&material.cell, &base).into_iter();
-        let (settings, mut unknowns): (Vec<Setting>, Vec<Unknown>) =
-            searched.filter(|(setting, _)| !(weighed && *setting == Setting::Mass)).unzip();
-        for (setting, unknown) in settings.iter().zip(&mut unknowns) {
-            unknown.step = wide_step(setting, unknown);
-        }
-        Ok(Self { settings: Settings::new(base, settings), unknowns, warnings })
+        let (settings, unknowns) = searched(&material.cell, base);
+        Ok(Self { settings, unknowns, warnings })
     }
 
     fn search(
@@ -222,6 +215,31 @@ impl Problem {
     fn shape(&self, clips: &ObjectClips) -> Result<twin::scene::ObjectShape, ObjectError> {
         Ok(ObjectModel::new(clips.cell(), Some(self.settings.base()))?.ok_or(ObjectError::NoObject)?.shape)
     }
+}
+
+/// What is searched of an object.
+fn searched(cell: &Cell, base: Theta) -> (Settings, Vec<Unknown>) {
+    // A mass that was weighed is not searched.
+    let weighed = cell.object.as_ref().is_some_and(|o| o.mass.is_some() && o.mass_range.is_none());
+    let searched = object_parameters(cell, &base).into_iter();
+    let (settings, mut unknowns): (Vec<Setting>, Vec<Unknown>) =
+        searched.filter(|(setting, _)| !(weighed && *setting == Setting::Mass)).unzip();
+    for (setting, unknown) in settings.iter().zip(&mut unknowns) {
+        unknown.step = wide_step(setting, unknown);
+    }
+    (Settings::new(base, settings), unknowns)
+}
+
+/// `base` with the object's parameters that fit strokes best under its gains and effects: where a diagnosis begins.
+///
+/// # Errors
+/// [`ObjectError`] when the cell cannot be simulated with `base`.
+pub fn refine(cell: &Cell, clips: Vec<Clip>, base: &Theta, interrupt: &Interrupt) -> Result<Theta, ObjectError> {
+    let (settings, unknowns) = searched(cell, base.clone());
+    let mut clips = ObjectClips::new(cell, clips, settings.clone())?;
+    let start: Vec<f64> = unknowns.iter().map(|unknown| unknown.start).collect();
+    let found = fit_object(&mut clips, &unknowns, &start, |_, _| !interrupt.asked())?;
+    Ok(settings.theta(&found.at.shared))
 }
 
 /// The gains that fit the arm's way to the object.

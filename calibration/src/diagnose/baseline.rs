@@ -1,0 +1,45 @@
+//! Where the search begins: the paper's parameters identified on the clips for fitting.
+//!
+//! In order: the arm by itself, since a gain that is off moves the hit, and a hit elsewhere tells nothing about the gain;
+//! then the object's parameters under that arm, by the identification's own way over rough hits; then all together.
+
+use super::admit::Admitted;
+use super::evidence::Evidence;
+use super::fit::{Bench, Effort, Hypothesis};
+use super::split::Split;
+use super::sweep::Precision;
+use crate::identify::object;
+use shared_mem::cell::Cell;
+use shared_mem::recording::Clip;
+
+/// The way there, and the last steps.
+const WAY: Effort = Effort { iterations: 8, precision: Precision::Joints };
+const LAST: Effort = Effort { iterations: 8, precision: Precision::Exact };
+
+/// Identifies; `None` when the twin has no answer at the nominal parameters.
+#[must_use]
+pub fn identify<E: Evidence>(
+    bench: &Bench<'_, E>,
+    split: &Split,
+    cell: &Cell,
+    admitted: &Admitted,
+) -> Option<Hypothesis> {
+    let channels = bench.evidence.channels();
+    let of_arm: Vec<f64> = channels.iter().map(|channel| f64::from(u8::from(channel.joint.is_some()))).collect();
+    let arm = bench.fit((&[], bench.library.start()), &split.train, &of_arm, None, WAY)?;
+    let arm = bench.fit((&[], arm.full.clone()), &split.train, &of_arm, Some(&arm), LAST)?;
+    if !admitted.with_object {
+        return Some(arm);
+    }
+    let mut full = arm.full.clone();
+    let clips: Vec<Clip> = split.train.iter().map(|clip| admitted.clips[*clip].clone()).collect();
+    // Where strokes tell nothing about the object, what cell.toml says of it stands.
+    if let Ok(theta) = object::refine(cell, clips, &bench.library.theta(&full), bench.interrupt) {
+        let numbers = bench.library.settings.numbers(&theta);
+        for k in bench.library.baseline.clone() {
+            full[k] = numbers[k].unwrap_or(full[k]);
+        }
+    }
+    let all = vec![1.0; channels.len()];
+    bench.fit((&[], full), &split.train, &all, Some(&arm), LAST)
+}
