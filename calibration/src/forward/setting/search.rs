@@ -1,0 +1,124 @@
+//! What is searched, from where and how far: gains, the object's parameters, the parameters of an effect. SI units.
+
+use super::Setting;
+use crate::estimate::Unknown;
+use shared_mem::cell::{Cell, Range};
+use shared_mem::theta::Theta;
+use twin::effects::{EffectInfo, Parameter, Role, Shape};
+use twin::scene::ObjectModel;
+
+/// Gains stated by value are searched this far: the values are right to 20 %, and a bound must not be mistaken for them.
+const GAIN_FACTOR: f64 = 2.0;
+/// Difference step of a gain over the gain.
+const GAIN_STEP: f64 = 1e-4;
+
+/// Stiffness and damping of every joint, beginning at the base's.
+#[must_use]
+pub fn gains(cell: &Cell, base: &Theta) -> Vec<(Setting, Unknown)> {
+    let (Some(controller), Some(arm)) = (&cell.controller, &base.arm) else { return Vec::new() };
+    let stiffness = Gain { starts: &arm.stiffness, nominal: &controller.stiffness, range: controller.stiffness_range };
+    let damping = Gain { starts: &arm.damping, nominal: &controller.damping, range: controller.damping_range };
+    let mut all = stiffness.unknowns(Setting::Stiffness);
+    all.extend(damping.unknowns(Setting::Damping));
+    all
+}
+
+/// One kind of gain, joint by joint.
+struct Gain<'a> {
+    starts: &'a [f64],
+    nominal: &'a [f64],
+    range: Option<Range>,
+}
+
+impl Gain<'_> {
+    fn unknowns(&self, setting: fn(usize) -> Setting) -> Vec<(Setting, Unknown)> {
+        let of = |(joint, start): (usize, &f64)| {
+            let around = self.nominal.get(joint).copied().unwrap_or(*start).max(f64::MIN_POSITIVE);
+            let [lower, upper] = self.range.unwrap_or([around / GAIN_FACTOR, around * GAIN_FACTOR]);
+            unknown(setting(joint), *start, [lower, upper], GAIN_STEP * start.max(0.05 * around).max(1e-3))
+        };
+        self.starts.iter().enumerate().map(of).collect()
+    }
+}
+
+/// Ranges of the object's parameters where cell.toml tells none: friction, mass over the nominal one, friction of the tip.
+const FRICTION: Range = [0.02, 1.5];
+const MASS_FACTOR: f64 = 5.0;
+const TIP_FRICTION: Range = [0.0, 1.0];
+/// The centre of mass lies within this share of the half extents.
+const CENTRE_SHARE: f64 = 0.5;
+
+/// Friction, mass, centre of mass and tip friction of the object, beginning at the base's.
+#[must_use]
+pub fn object_parameters(cell: &Cell, base: &Theta) -> Vec<(Setting, Unknown)> {
+    let (Some(object), Some(start)) = (&cell.object, &base.object) else { return Vec::new() };
+    let mass = start.mass.unwrap_or_else(|| object.nominal_mass());
+    let half = match ObjectModel::new(cell, Some(base)) {
+        Ok(Some(model)) => model.shape.half_extents().into(),
+        _ => [0.05; 3],
+    };
+    let centres = object.centre_of_mass_range.unwrap_or_else(|| half.map(|h| [-CENTRE_SHARE * h, CENTRE_SHARE * h]));
+    let masses = object.mass_range.unwrap_or([mass / MASS_FACTOR, mass * MASS_FACTOR]);
+    let friction = start.friction.unwrap_or_else(|| object.nominal_friction());
+    let tip = start.tip_friction.unwrap_or_else(|| object.nominal_tip_friction());
+    let mut all = vec![
+        unknown(Setting::Friction, friction, object.friction_range.unwrap_or(FRICTION), 2e-3 * friction.max(0.05)),
+        unknown(Setting::Mass, mass, masses, 5e-3 * mass),
+    ];
+    for (axis, range) in centres.into_iter().enumerate() {
+        let value = start.centre_of_mass.unwrap_or_default()[axis];
+        all.push(unknown(Setting::CentreOfMass(axis), value, range, 2e-3 * 2.0 * half[axis]));
+    }
+    all.push(unknown(Setting::TipFriction, tip, object.tip_friction_range.unwrap_or(TIP_FRICTION), 2e-3));
+    all
+}
+
+/// How far beyond what is met in practice an effect is searched, over the width of that range.
+const WIDENED: f64 = 0.5;
+/// Difference step over the width of what is met in practice.
+const EFFECT_STEP: f64 = 2e-3;
+
+/// Every number of an effect, for an arm of `dof` joints, beginning where the effect changes nothing.
+#[must_use]
+pub fn effect_settings(info: &'static EffectInfo, dof: usize) -> Vec<(Setting, Unknown)> {
+    let mut all = Vec::new();
+    for parameter in info.parameters {
+        let indices: Vec<Option<usize>> = match parameter.shape {
+            Shape::Number => vec![None],
+            Shape::PerJoint => (0..dof).map(Some).collect(),
+            Shape::Vector(n) => (0..n).map(Some).collect(),
+        };
+        let inverse = parameter.resting_value().is_infinite();
+        let [lo, hi] = searched(parameter, inverse);
+        let step = EFFECT_STEP * width(parameter, inverse);
+        let start = if inverse { 0.0 } else { parameter.resting_value() };
+        for index in indices {
+            let setting = Setting::Effect { name: info.name, parameter: parameter.name, index, inverse };
+            all.push(unknown(setting, start, [lo, hi], step));
+        }
+    }
+    all
+}
+
+/// The range of the number that is turned.
+fn searched(parameter: &Parameter, inverse: bool) -> Range {
+    let [lo, hi] = parameter.plausible;
+    if inverse {
+        return [0.0, (1.0 + WIDENED) / lo];
+    }
+    let more = WIDENED * (hi - lo);
+    let rest = parameter.resting_value();
+    let [least, most] = parameter.possible;
+    // A form like an angle wraps around: no more of it makes sense.
+    let more = if matches!(parameter.role, Role::Form { .. }) { 0.0 } else { more };
+    [(lo - more).max(least).min(rest), (hi + more).min(most).max(rest)]
+}
+
+fn width(parameter: &Parameter, inverse: bool) -> f64 {
+    let [lo, hi] = parameter.plausible;
+    if inverse { lo.recip() } else { hi - lo }
+}
+
+fn unknown(setting: Setting, start: f64, [lower, upper]: Range, step: f64) -> (Setting, Unknown) {
+    (setting, Unknown { name: setting.name(), start: start.clamp(lower, upper), lower, upper, step })
+}
