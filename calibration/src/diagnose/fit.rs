@@ -10,6 +10,7 @@ use crate::estimate::{ClipModel, Options, Random, score};
 use crate::interrupt::Interrupt;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
+use twin::effects::{EffectInfo, Role};
 
 /// What every step of the diagnosis is given.
 pub struct Bench<'a, E> {
@@ -77,10 +78,22 @@ const TOLERANCE: f64 = 0.05;
 /// rules of integration differ by as much (0.35 % of a rotor's inertia and 0.02 % of viscous friction, measured on sessions
 /// of another engine with nothing wrong).
 const NEGLIGIBLE: f64 = 0.008;
-/// ... or when one gains less than this share of it.
+/// A fit also stops when a step gains less than this share of the deviance.
 const STALLED: f64 = 3e-5;
 /// Most trials with growing damping before a point counts as the best there is.
 const TRIALS: usize = 6;
+
+/// Share of the strongest from which on an effect counts. What fades out towards infinity, as a gear's stiffness, is met
+/// in practice from the far end of its plausible range on; beyond, it is the ordinary stiffness of anything.
+fn least(effect: &EffectInfo) -> f64 {
+    let fades = effect.parameters.iter().find(|parameter| parameter.resting_value().is_infinite());
+    match fades {
+        Some(parameter) if matches!(parameter.role, Role::Size { .. }) => {
+            parameter.plausible[0] / parameter.plausible[1]
+        }
+        _ => NEGLIGIBLE,
+    }
+}
 
 impl<E: Evidence> Bench<'_, E> {
     /// Numbers that are free when these effects act.
@@ -287,7 +300,7 @@ impl<E: Evidence> Bench<'_, E> {
             let resting = self.library.unknowns[size].start;
             ((full[size] - resting) / (probe.largest * (value - resting))).abs()
         });
-        strongest.fold(0.0, f64::max) < NEGLIGIBLE
+        strongest.fold(0.0, f64::max) < least(candidate.effect)
     }
 
     /// The sum of fitted clips' forms, numbers held to their known ranges.
