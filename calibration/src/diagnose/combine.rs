@@ -17,8 +17,8 @@ pub const MOST: usize = 4;
 /// So many candidates are fitted at each step.
 const FITTED: usize = 5;
 /// A fit from a candidate's signature gets so many linearisations, and the winner so many more.
-const FIRST_PASS: Effort = Effort { iterations: 5, precision: Precision::Joints };
-const LAST_PASS: Effort = Effort { iterations: 4, precision: Precision::Exact };
+const FIRST_PASS: Effort = Effort { iterations: 6, precision: Precision::Joints };
+const LAST_PASS: Effort = Effort { iterations: 6, precision: Precision::Exact };
 /// A new effect must be worth at least this [nats], more than twice its error, and more than its numbers cost.
 const LEAST: f64 = 4.0;
 /// ... and explain this share of what is left.

@@ -78,8 +78,6 @@ const TOLERANCE: f64 = 0.05;
 /// rules of integration differ by as much (0.35 % of a rotor's inertia and 0.02 % of viscous friction, measured on sessions
 /// of another engine with nothing wrong).
 const NEGLIGIBLE: f64 = 0.008;
-/// A fit also stops when a step gains less than this share of the deviance.
-const STALLED: f64 = 3e-5;
 /// Most trials with growing damping before a point counts as the best there is.
 const TRIALS: usize = 6;
 
@@ -167,11 +165,7 @@ impl<E: Evidence> Bench<'_, E> {
             free.iter().zip(step.iter()).for_each(|(k, step)| to[*k] += step);
             let own = |clip: &super::sweep::SweptClip| (clip.clip, at.own_after(clip, self.evidence, weights, &step));
             let to_own: Vec<(usize, Vec<f64>)> = at.clips.iter().map(own).collect();
-            let cost = self.cost(&to, &to_own, weights).filter(|cost| *cost < now);
-            if cost.is_some_and(|cost| now - cost < TOLERANCE.max(STALLED * now)) {
-                return None;
-            }
-            if cost.is_some() {
+            if self.cost(&to, &to_own, weights).is_some_and(|cost| cost < now) {
                 *damping = (*damping * 0.1).max(1e-9);
                 return Some((to, to_own));
             }
