@@ -4,6 +4,8 @@
 use super::evidence::Evidence;
 use super::fit::{Bench, Effort, Hypothesis};
 use super::floor;
+use super::gap::Residuals;
+use super::leftovers::NUMERICS;
 use super::score::{Advantage, Foretold, foretell};
 use super::shortlist::{self, Scored};
 use super::split::Split;
@@ -25,6 +27,9 @@ const LEAST: f64 = 4.0;
 const WORTHWHILE: f64 = 0.005;
 /// Candidates whose signature explains less than this share of what the best one does are not fitted.
 const CLOSE: f64 = 0.1;
+
+/// Engines integrate one and the same effect differently by a hundredth of it, so by this share of the squared gap.
+const NUMERICS_SHARE: f64 = 1e-4;
 
 /// A candidate tried on top of a hypothesis.
 #[derive(Debug, Clone)]
@@ -81,7 +86,7 @@ pub fn search<E: Evidence>(bench: &Bench<'_, E>, split: &Split, baseline: Hypoth
         let weights = step.weights.clone();
         steps.push(step);
         match best {
-            Some(best) if now.effects.len() < MOST && !bench.interrupt.asked() => {
+            Some(best) if now.effects.len() < MOST && !bench.interrupt.asked() && !spent(bench, split, &steps) => {
                 now = bench.fit(
                     (&best.effects, best.full.clone()),
                     &split.train,
@@ -95,6 +100,15 @@ pub fn search<E: Evidence>(bench: &Bench<'_, E>, split: &Split, baseline: Hypoth
     }
     let last = without_superfluous(bench, split, now, &steps.last()?.weights);
     Some(Found { steps, last })
+}
+
+/// Whether the effects found so far leave no more than numerics do: a further one would only name how engines differ. The
+/// first effect is never held back by this.
+fn spent<E: Evidence>(bench: &Bench<'_, E>, split: &Split, steps: &[Step]) -> bool {
+    let [first, .., now] = steps else { return false };
+    let groups = |step: &Step| Residuals::at(bench, &step.from, &split.choose, &now.weights).map(|left| left.groups());
+    let (Some(before), Some(after)) = (groups(first), groups(now)) else { return false };
+    before.iter().zip(&after).all(|(before, after)| after - 1.0 <= NUMERICS.max(NUMERICS_SHARE * (before - 1.0)))
 }
 
 impl Step {
