@@ -139,6 +139,7 @@ impl Job<'_> {
     fn approach(&mut self, key: ArmKey, start: &Isometry3<f64>) -> Result<Approach, Impossible> {
         let commands = self.clip.commands.as_ref().ok_or_else(|| impossible("no commands"))?;
         let measured = &self.clip.recorded.measured;
+        self.worker.set_parameters(&key.theta()).map_err(impossible)?;
         let arm = self.worker.arm().ok_or_else(|| impossible("the cell has no arm"))?;
         let first = arm.start_state(measured, 0, commands).ok_or_else(|| impossible("no measured joints"))?;
         let object = ObjectState::at_rest(Pose::from_isometry(*start));
@@ -147,6 +148,7 @@ impl Job<'_> {
         let course = Course { commands: Some(commands), joints_ns: &self.clip.arm_ns, poses_ns: &[] };
         let contact_ns = self.worker.run_until_contact(&course, &mut joints);
         let checkpoint = contact_ns.map(|_| self.worker.checkpoint());
+        self.worker.set_parameters(self.theta).map_err(impossible)?;
         Ok(Approach { key, joints, checkpoint, contact_ns })
     }
 
