@@ -63,12 +63,19 @@ fn a_place_left_by_the_hit_moves_the_resting_place_by_as_much() {
     let world = world(3);
     let (mut clips, truth) = (strokes(&world, 1), truth(&world));
     clips.set_model_error(ModelError::default());
-    let mut own = vec![0.0; calibration::forward::object::ALL.len()];
     let along_x = Own::Release(calibration::forward::object::Axis::X);
-    own[calibration::forward::object::ALL.iter().position(|own| *own == along_x).expect("listed")] = 0.002;
-    let end = |own: &[f64]| clips.predict(0, &truth, own).expect("an answer").poses.last().map(|p| p.position()[0]);
-    let (plain, moved) = (end(&[]).expect("a pose"), end(&own).expect("a pose"));
-    assert!((moved - plain - 0.002).abs() < 1e-3, "{plain} {moved}");
+    let along_x = calibration::forward::object::ALL.iter().position(|own| *own == along_x).expect("listed");
+    let ends = |own: &[f64]| {
+        let poses = clips.predict(0, &truth, own).expect("an answer").poses;
+        [poses.first(), poses.last()].map(|pose| pose.expect("a pose").position()[0])
+    };
+    let [start, plain] = ends(&[]);
+    // Away from the tool: into it, the tool would have the last word.
+    let shift = 0.002 * (plain - start).signum();
+    let mut own = vec![0.0; calibration::forward::object::ALL.len()];
+    own[along_x] = shift;
+    let [_, moved] = ends(&own);
+    assert!((moved - plain - shift).abs() < 1e-3, "{plain} {moved}");
 }
 
 /// Sessions of another engine and their truth.
