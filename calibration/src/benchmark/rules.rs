@@ -10,10 +10,10 @@ use super::score::Said;
 use crate::diagnose::evidence::Evidence;
 use crate::diagnose::fit::{Bench, Hypothesis};
 use crate::diagnose::quadratic::minimum;
+use crate::diagnose::scatter::Scatter;
 use crate::diagnose::shortlist;
 use crate::diagnose::split::Split;
 use crate::diagnose::sweep::{Column, Point, Precision, Swept, sweep};
-use crate::estimate::Random;
 use nalgebra::DMatrix;
 
 /// Names in the order of [`all`].
@@ -23,13 +23,12 @@ const SIGNIFICANT: f64 = 3.0;
 
 /// What each rule says.
 pub fn all<E: Evidence>(bench: &Bench<'_, E>, split: &Split, baseline: &Hypothesis) -> Vec<Said> {
-    let still: Vec<Random> = bench.random.iter().map(|random| Random { sigma: 0.0, ..random.clone() }).collect();
-    let clips: Vec<(usize, Vec<f64>)> = split.train.iter().map(|clip| (*clip, vec![0.0; still.len()])).collect();
+    let clips: Vec<(usize, Vec<f64>)> = split.train.iter().map(|clip| (*clip, Vec::new())).collect();
     let probed: Vec<usize> = (0..bench.library.candidates.len()).collect();
     let (full, free) = (&baseline.full[..], &baseline.free[..]);
     let point = Point { full, free, probed: &probed, clips: &clips, precision: Precision::Joints };
     let nothing = || said(&[]);
-    let Ok(swept) = sweep(bench.evidence, bench.library, &point, &still, &|| {}) else {
+    let Ok(swept) = sweep(bench.evidence, bench.library, &point, &Scatter::default(), &|| {}) else {
         return NAMES.map(|_| nothing()).to_vec();
     };
     let even = vec![1.0; bench.evidence.channels().len()];

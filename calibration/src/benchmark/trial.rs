@@ -46,7 +46,7 @@ pub fn examine(world: &World, clips: Vec<Clip>, interrupt: &Interrupt) -> Result
     let court = Court { world, library: &library, split: Split::new(&admitted.groups, options.seed), interrupt };
     if with_object {
         let object = ObjectClips::new(&world.cell, admitted.clips.clone(), library.settings.clone())?;
-        court.cases(&CellClips::new(Some(arm), object), &found)
+        court.cases(&CellClips::new(Some(arm), object, &library), &found)
     } else {
         court.cases(&arm, &found)
     }
@@ -61,7 +61,7 @@ struct Court<'a> {
 
 impl Court<'_> {
     fn cases<E: Evidence>(&self, evidence: &E, found: &Diagnosis) -> Result<Vec<Case>, DiagnoseError> {
-        let bench = Bench { evidence, library: self.library, random: evidence.random(), interrupt: self.interrupt };
+        let bench = Bench { evidence, library: self.library, scatter: evidence.scatter(), interrupt: self.interrupt };
         let even = vec![1.0; evidence.channels().len()];
         let start = (&[][..], self.library.start());
         let baseline = bench.fit(start, &self.split.train, &even, None, EFFORT).ok_or(DiagnoseError::NoBaseline)?;
@@ -91,7 +91,7 @@ impl Court<'_> {
             };
             let gain = deviance(baseline)? - deviance(&truth)?;
             let [before, after] =
-                [baseline, &truth].map(|hypothesis| Residuals::at(bench, hypothesis, &self.split.confirm, even));
+                [baseline, &truth].map(|hypothesis| Residuals::at(bench, hypothesis, &self.split.confirm));
             Some((gain.max(0.0).sqrt(), 1.0 - after?.mean_square() / before?.mean_square()))
         };
         judged().unwrap_or((0.0, 0.0))

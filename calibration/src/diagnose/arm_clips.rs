@@ -4,7 +4,9 @@
 
 use super::evidence::{Channel, Evidence, Row, StageName};
 use super::noise;
-use crate::estimate::{ClipModel, Impossible, Random};
+use super::scatter::Scatter;
+use crate::estimate::{ClipModel, Impossible};
+use crate::forward::object;
 use shared_mem::cell::{Cell, ClipKind};
 use shared_mem::recording::{Clip, JointSeries};
 use shared_mem::theta::Theta;
@@ -66,7 +68,7 @@ impl<F: Fn(&[f64]) -> Theta + Sync> ArmClips<F> {
         let channels: Vec<Channel> = quantities.flat_map(joints).collect();
         let sigma = (0..channels.len()).map(|channel| sensor_sigma(clips, &channels[channel], channel % dof)).collect();
         let top = top_speeds(clips, dof);
-        let clips = clips.iter().filter_map(|clip| Prepared::new(clip.clone(), &channels, &top)).collect();
+        let clips = clips.iter().filter_map(|clip| Prepared::new(clip.clone(), cell, &channels, &top)).collect();
         Ok(Self { cell: cell.clone(), nominal, channels, sigma, clips, theta })
     }
 
@@ -108,9 +110,9 @@ fn top_speeds(clips: &[Clip], dof: usize) -> Vec<f64> {
 }
 
 impl Prepared {
-    fn new(recorded: Clip, channels: &[Channel], top: &[f64]) -> Option<Self> {
+    fn new(recorded: Clip, cell: &Cell, channels: &[Channel], top: &[f64]) -> Option<Self> {
         let commands = CommandTrack::new(&recorded.desired)?;
-        let end_ns = end_of_arm_alone(&recorded);
+        let end_ns = end_of_arm_alone(&recorded, cell);
         let stamps = &recorded.measured.stamps_ns;
         let used = stamps.partition_point(|stamp| *stamp < end_ns).min(recorded.desired.len());
         let stride = used.div_ceil(MOMENTS).max(1);
@@ -141,15 +143,17 @@ fn regime(dq: f64, top: f64) -> &'static str {
     }
 }
 
-/// When the tool may have touched the object; beyond the end where there is none.
-fn end_of_arm_alone(clip: &Clip) -> u64 {
+/// When the tool may have touched the object; beyond the end where there is none. Encoders and the object's first place
+/// tell it to the millisecond, unless the camera sees the object elsewhere; then it is seen to move.
+fn end_of_arm_alone(clip: &Clip, cell: &Cell) -> u64 {
     if clip.kind == ClipKind::Excitation || clip.object.is_empty() {
         return u64::MAX;
     }
     let place = |row: usize| nalgebra::Vector3::from(clip.object.poses[row].position());
     let start = place(0);
     let moved = (0..clip.object.len()).find(|row| (place(*row) - start).norm() > 0.006);
-    moved.map_or(u64::MAX, |row| clip.object.stamps_ns[row].saturating_sub(TOUCH_MARGIN_NS))
+    let seen = moved.map_or(u64::MAX, |row| clip.object.stamps_ns[row].saturating_sub(TOUCH_MARGIN_NS));
+    object::first_near(cell, clip).map_or(seen, |near| near.min(seen))
 }
 
 impl<F: Fn(&[f64]) -> Theta + Sync> ClipModel for ArmClips<F> {
@@ -204,7 +208,7 @@ impl<F: Fn(&[f64]) -> Theta + Sync> Evidence for ArmClips<F> {
         &self.clips[clip].rows
     }
 
-    fn random(&self) -> Vec<Random> {
-        Vec::new()
+    fn scatter(&self) -> Scatter {
+        Scatter::default()
     }
 }

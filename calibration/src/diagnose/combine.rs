@@ -1,30 +1,44 @@
 //! Which effects act together: effects are added while that foretells clips better, and dropped or swapped when they are
 //! not needed any more.
 
-use super::evidence::Evidence;
+use super::evidence::{Evidence, Row};
 use super::fit::{Bench, Effort, Hypothesis};
 use super::floor;
 use super::gap::Residuals;
-use super::leftovers::NUMERICS;
+use super::leftovers::{Left, ROUGHNESS};
 use super::score::{Advantage, Foretold, foretell};
-use super::shortlist::{self, Scored};
+use super::shortlist::{self, Scored, TESTABLE};
 use super::split::Split;
 use super::sweep::{Point, Precision, Swept, sweep};
 use crate::progress::Progress;
 use nalgebra::DMatrix;
 use std::sync::atomic::{AtomicUsize, Ordering};
+use twin::effects::Stage;
 
 /// At most so many effects are named.
 pub const MOST: usize = 4;
 /// So many candidates are fitted at each step.
 const FITTED: usize = 5;
-/// A fit from a candidate's signature gets so many linearisations, and the winner so many more.
+/// Every candidate's fit gets so many linearisations from its signature on; those that come near the best get more, and the
+/// winner so many more again.
+const HEAT: Effort = Effort { iterations: 3, precision: Precision::Joints };
 const FIRST_PASS: Effort = Effort { iterations: 6, precision: Precision::Joints };
 const LAST_PASS: Effort = Effort { iterations: 6, precision: Precision::Exact };
+/// Other starts of a fit are this share of the strongest that is met in practice away.
+const ASIDE: f64 = 0.3;
+/// Near is this far from the best deviance, or this share of what the best gains.
+const NEAR: f64 = 40.0;
+const NEAR_SHARE: f64 = 0.4;
 /// A new effect must be worth at least this [nats], more than twice its error, and more than its numbers cost.
 const LEAST: f64 = 4.0;
-/// ... and explain this share of what is left.
-const WORTHWHILE: f64 = 0.005;
+/// ... of the arm more than this for each of its residuals: there are so many that the least numerics add up.
+const WORTHWHILE: f64 = 0.0025;
+/// ... and close at least this share of the gap: what helps only beside numbers that clips have of their own is no cause.
+const CLOSES: f64 = 0.1;
+/// A gap smaller than this, over its floor, is taken for this size.
+const LEAST_GAP: f64 = 1.2;
+/// A gap widened by less than this share is chance.
+const HARM: f64 = 0.1;
 /// Candidates whose signature explains less than this share of what the best one does are not fitted.
 const CLOSE: f64 = 0.1;
 
@@ -38,6 +52,9 @@ pub struct Trial {
     pub scored: Scored,
     /// Fitted, where that was worth it.
     pub fitted: Option<(Hypothesis, Advantage)>,
+    /// Share of the gap between twin and clips, on a logarithmic scale, that it closes when nothing of a clip's own is fitted, on
+    /// all clips but those for confirming; 0 where it widens the gap on clips it was not fitted to.
+    pub closes: f64,
 }
 
 /// One step of the search.
@@ -51,6 +68,8 @@ pub struct Step {
     pub trials: Vec<Trial>,
     /// Weights of the channels in this step.
     pub weights: Vec<f64>,
+    /// How many residuals of the arm the judged clips have.
+    pub arm_rows: usize,
 }
 
 /// What the search found.
@@ -66,7 +85,7 @@ pub struct Found {
 #[must_use]
 pub fn convincing(advantage: &Advantage, cost: usize) -> bool {
     let price = LEAST.max(cost as f64);
-    advantage.nats > price && advantage.nats > 2.0 * advantage.error
+    advantage.nats > price && advantage.nats > 2.0 * advantage.error && advantage.share > 0.5
 }
 
 /// Advantage less what numbers gain by chance: what trials are ranked by.
@@ -106,9 +125,11 @@ pub fn search<E: Evidence>(bench: &Bench<'_, E>, split: &Split, baseline: Hypoth
 /// first effect is never held back by this.
 fn spent<E: Evidence>(bench: &Bench<'_, E>, split: &Split, steps: &[Step]) -> bool {
     let [first, .., now] = steps else { return false };
-    let groups = |step: &Step| Residuals::at(bench, &step.from, &split.choose, &now.weights).map(|left| left.groups());
-    let (Some(before), Some(after)) = (groups(first), groups(now)) else { return false };
-    before.iter().zip(&after).all(|(before, after)| after - 1.0 <= NUMERICS.max(NUMERICS_SHARE * (before - 1.0)))
+    let typical = |step: &Step| Residuals::at(bench, &step.from, &split.choose).map(|left| left.typical());
+    let (Some(before), Some(after)) = (typical(first), typical(now)) else { return false };
+    Left::of_groups(&before, &after)
+        .iter()
+        .all(|left| left.after - left.floor <= left.numerics.max(NUMERICS_SHARE * (left.before - left.floor)))
 }
 
 impl Step {
@@ -118,7 +139,11 @@ impl Step {
         (self.trials.iter())
             .filter_map(|trial| trial.fitted.as_ref().map(|(fit, advantage)| (trial, fit, advantage)))
             .filter(|(trial, _, advantage)| convincing(advantage, trial.scored.cost))
-            .filter(|(_, _, advantage)| 2.0 * advantage.nats > WORTHWHILE * self.foretold.deviance())
+            .filter(|(trial, _, advantage)| {
+                let of_arm = bench.library.candidates[trial.scored.candidate].effect.stage == Stage::Control;
+                !of_arm || advantage.nats > WORTHWHILE * self.arm_rows as f64
+            })
+            .filter(|(trial, _, _)| trial.closes > CLOSES)
             .filter(|(trial, fit, _)| !bench.negligible(trial.scored.candidate, &fit.full))
             .max_by(|a, b| net(a.2, a.0.scored.cost).total_cmp(&net(b.2, b.0.scored.cost)))
     }
@@ -126,7 +151,7 @@ impl Step {
 
 /// Clips with an object take a simulation for each number of their own; joints one by one besides would take too long.
 fn last_pass<E: Evidence>(bench: &Bench<'_, E>) -> Effort {
-    if bench.random.is_empty() { LAST_PASS } else { Effort { precision: Precision::Joints, ..LAST_PASS } }
+    if bench.scatter.count() == 0 { LAST_PASS } else { Effort { precision: Precision::Joints, ..LAST_PASS } }
 }
 
 /// Drops effects that the others make superfluous, one after the other.
@@ -172,39 +197,92 @@ fn step<E: Evidence>(bench: &Bench<'_, E>, split: &Split, from: &Hypothesis, bar
     drop(swept);
     let from = bench.fit((&from.effects, from.full.clone()), &split.train, &weights, Some(from), FIRST_PASS)?;
     let foretold = foretell(bench, &from, &split.choose, &weights)?;
-    let worthy = worthy(bench, &from, &scored);
-    let mut trials = Vec::with_capacity(scored.len());
-    for scored in scored {
-        bar.show(50 + (trials.len() as u64 * 5).min(45), bench.library.candidates[scored.candidate].effect.name);
+    let worthy = worthy(bench, split, &from, &scored);
+    let mut fits: Vec<Option<Hypothesis>> = Vec::with_capacity(scored.len());
+    for scored in &scored {
+        bar.show(50 + (fits.len() as u64 * 5).min(45), bench.library.candidates[scored.candidate].effect.name);
         let wanted = worthy.contains(&scored.candidate) && !bench.interrupt.asked();
-        let fit = if wanted { bench.extend(&from, &scored, &split.train, &weights, FIRST_PASS) } else { None };
+        let starts = if wanted { starts(bench, scored) } else { Vec::new() };
+        let heats = starts.iter().filter_map(|start| bench.extend(&from, start, &split.train, &weights, HEAT));
+        fits.push(heats.min_by(|a, b| a.deviance().total_cmp(&b.deviance())));
+    }
+    let best = fits.iter().flatten().map(Hypothesis::deviance).fold(from.deviance(), f64::min);
+    let near = best + NEAR.max(NEAR_SHARE * (from.deviance() - best));
+    let trial = |(scored, fit): (Scored, Option<Hypothesis>)| {
+        let fit = fit.map(|fit| match fit.deviance() < near {
+            true => bench
+                .fit((&fit.effects, fit.full.clone()), &split.train, &weights, Some(&fit), FIRST_PASS)
+                .unwrap_or(fit),
+            false => fit,
+        });
         let judged = fit.and_then(|fit| {
             let ahead = foretell(bench, &fit, &split.choose, &weights)?;
             Some((fit, ahead.over(&foretold)))
         });
-        trials.push(Trial { scored, fitted: judged });
-    }
-    Some(Step { from, foretold, trials, weights })
+        let closes = judged.as_ref().map_or(0.0, |(fit, _)| closes(bench, split, &from, fit));
+        Trial { scored, fitted: judged, closes }
+    };
+    let trials = scored.into_iter().zip(fits).map(trial).collect();
+    let of_arm = |row: &&Row| bench.evidence.channels()[row.channel].joint.is_some();
+    let arm_rows = split.open().iter().map(|clip| bench.evidence.rows(*clip).iter().filter(of_arm).count()).sum();
+    Some(Step { from, foretold, trials, weights, arm_rows })
 }
 
-/// Candidates worth a fit: those that the score test cannot rule out, the best first; of the others only partners that the
-/// best is easily taken for.
-fn worthy<E: Evidence>(bench: &Bench<'_, E>, from: &Hypothesis, scored: &[Scored]) -> Vec<usize> {
-    let Some(best) = scored.first() else { return Vec::new() };
-    let likely = |s: &&Scored| {
-        let visible = !bench.negligible(s.candidate, &bench.begun(from.full.clone(), s));
-        s.p < 0.2 && s.gain > CLOSE * best.gain && visible
+/// Where fits of a candidate begin: where the score test points; for effects on the hit, whose slope at one point tells
+/// little, also some way to either side.
+fn starts<E: Evidence>(bench: &Bench<'_, E>, scored: &Scored) -> Vec<Scored> {
+    let candidate = &bench.library.candidates[scored.candidate];
+    let [probe] = &candidate.alternatives[scored.alternative].probes[..] else { return vec![scored.clone()] };
+    let mut starts = vec![scored.clone()];
+    if candidate.effect.stage == Stage::Hit {
+        let sides = [ASIDE, -ASIDE].into_iter().filter(|side| *side > 0.0 || !probe.one_sided);
+        starts.extend(sides.map(|side| Scored { units: vec![side * probe.largest], ..scored.clone() }));
+    }
+    starts
+}
+
+/// [`Trial::closes`]: of the group of sensors on which it closes most.
+fn closes<E: Evidence>(bench: &Bench<'_, E>, split: &Split, from: &Hypothesis, to: &Hypothesis) -> f64 {
+    let on = |clips: &[usize]| -> Option<Vec<f64>> {
+        let [before, after] = [from, to].map(|hypothesis| Residuals::at(bench, hypothesis, clips));
+        let left = Left::of_groups(&before?.typical(), &after?.typical());
+        let share = |left: &Left| (left.before / left.after).ln() / (left.before / left.floor).max(LEAST_GAP).ln();
+        Some(left.iter().map(share).collect())
     };
-    let partners = bench.library.candidates[best.candidate].effect.confusable_with;
-    let name = |s: &Scored| bench.library.candidates[s.candidate].effect.name;
-    let first = scored.iter().filter(likely).take(FITTED);
-    let confusable =
-        scored.iter().filter(|s| partners.contains(&name(s)) && s.p < 0.2 && s.gain > 0.5 * CLOSE * best.gain);
-    first.chain(confusable).map(|s| s.candidate).collect()
+    let (Some(open), Some(choose)) = (on(&split.open()), on(&split.choose)) else { return 0.0 };
+    let harmless = |(_, choose): &(&f64, &f64)| **choose > -HARM;
+    open.iter().zip(&choose).filter(harmless).map(|(open, _)| *open).fold(0.0, f64::max)
+}
+
+/// Candidates worth a fit, the arm's and the object's each among themselves: those that the score test cannot rule out, the
+/// best first; of the others only partners that the best is easily taken for. Where the object's gap is large all effects on
+/// the hit are fitted: a blow answers so unevenly that its slope at one point tells little.
+fn worthy<E: Evidence>(bench: &Bench<'_, E>, split: &Split, from: &Hypothesis, scored: &[Scored]) -> Vec<usize> {
+    let effect = |s: &Scored| bench.library.candidates[s.candidate].effect;
+    let mut all = Vec::new();
+    for of_arm in [true, false] {
+        let group: Vec<&Scored> = scored.iter().filter(|s| (effect(s).stage == Stage::Control) == of_arm).collect();
+        let Some(best) = group.first() else { continue };
+        let likely = |s: &&&Scored| {
+            let visible = !bench.negligible(s.candidate, &bench.begun(from.full.clone(), s));
+            s.p < 0.2 && s.gain > CLOSE * best.gain && visible
+        };
+        let partners = effect(best).confusable_with;
+        let first = group.iter().filter(likely).take(FITTED);
+        let confusable = (group.iter())
+            .filter(|s| partners.contains(&effect(s).name) && s.p < 0.2 && s.gain > 0.5 * CLOSE * best.gain);
+        all.extend(first.chain(confusable).map(|s| s.candidate));
+    }
+    let on_hit = scored.iter().filter(|s| effect(s).stage == Stage::Hit && s.signal > TESTABLE);
+    let left = Residuals::at(bench, from, &split.open()).map(|left| left.typical()).unwrap_or_default();
+    if left.iter().any(|group| group.of_object && group.mean_square - group.floor > ROUGHNESS) {
+        all.extend(on_hit.map(|s| s.candidate));
+    }
+    all
 }
 
 fn swept<E: Evidence>(bench: &Bench<'_, E>, split: &Split, from: &Hypothesis, bar: &Progress) -> Option<Swept> {
-    let count = bench.random.len();
+    let count = bench.scatter.count();
     let clips: Vec<(usize, Vec<f64>)> = split.train.iter().map(|clip| (*clip, from.own(*clip, count))).collect();
     let probed: Vec<usize> = (0..bench.library.candidates.len()).filter(|k| !from.effects.contains(k)).collect();
     let point =
@@ -214,5 +292,5 @@ fn swept<E: Evidence>(bench: &Bench<'_, E>, split: &Split, from: &Hypothesis, ba
         let done = done.fetch_add(1, Ordering::Relaxed) + 1;
         bar.show((50 * done / clips.len()) as u64, "signatures");
     };
-    sweep(bench.evidence, bench.library, &point, &bench.random, &told).ok()
+    sweep(bench.evidence, bench.library, &point, &bench.scatter, &told).ok()
 }

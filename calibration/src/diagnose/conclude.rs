@@ -63,11 +63,16 @@ pub fn conclude<E: Evidence>(
     admitted: &Admitted,
     options: &Options,
 ) -> Result<Diagnosis, DiagnoseError> {
-    let (first, weights) = (&found.steps[0], &found.steps[found.steps.len() - 1].weights);
-    let before = Residuals::at(bench, &first.from, &split.confirm, weights).ok_or(DiagnoseError::NoBaseline)?;
-    let after = Residuals::at(bench, &found.last, &split.confirm, weights).ok_or(DiagnoseError::NoBaseline)?;
+    let first = &found.steps[0];
+    let before = Residuals::at(bench, &first.from, &split.confirm).ok_or(DiagnoseError::NoBaseline)?;
+    let after = Residuals::at(bench, &found.last, &split.confirm).ok_or(DiagnoseError::NoBaseline)?;
     let (places, rest) = (localise::localise(bench.evidence, &before), localise::localise(bench.evidence, &after));
-    let finding = finding(bench, found, (&before, &after), &rest);
+    let all: Vec<usize> = (0..admitted.clips.len()).collect();
+    let typical = |hypothesis| Residuals::at(bench, hypothesis, &all).map(|left| left.typical());
+    let left = (typical(&first.from).zip(typical(&found.last)))
+        .map(|(before, after)| Left::of_groups(&before, &after))
+        .ok_or(DiagnoseError::NoBaseline)?;
+    let finding = finding(bench, found, left, &rest);
     let verdict = finding.verdict();
     let believed = matches!(verdict.kind, Kind::Named | Kind::Class);
     let kept = if believed { &found.last } else { &first.from };
@@ -77,10 +82,9 @@ pub fn conclude<E: Evidence>(
         unit: "sigma",
         before: before.mean_square(),
         after: shown.mean_square(),
-        floor: FLOOR,
+        floor: before.floor(),
         shrink: shown.shrink(&before, options.seed),
-        explainable_fraction: Left { before: before.mean_square(), after: shown.mean_square(), floor: FLOOR }
-            .explained(),
+        explainable_fraction: leftovers::explained(before.mean_square(), shown.mean_square(), before.floor()),
         joint_rms_rad: joints,
         object_add_m: add,
         object_add_s_m: add_s,
@@ -107,12 +111,7 @@ pub fn conclude<E: Evidence>(
     })
 }
 
-fn finding<'a, E: Evidence>(
-    bench: &Bench<'a, E>,
-    found: &Found,
-    (before, after): (&Residuals, &Residuals),
-    rest: &[Place],
-) -> Finding<'a> {
+fn finding<'a, E: Evidence>(bench: &Bench<'a, E>, found: &Found, left: Vec<Left>, rest: &[Place]) -> Finding<'a> {
     let name = |effect: &usize| bench.library.candidates[*effect].effect.name;
     let mut rivals = Vec::new();
     let mut sure: f64 = 1.0;
@@ -126,9 +125,7 @@ fn finding<'a, E: Evidence>(
         effects: found.last.effects.iter().map(name).collect(),
         rivals,
         confidence: sure,
-        left: (before.groups().into_iter().zip(after.groups()))
-            .map(|(before, after)| Left { before, after, floor: FLOOR })
-            .collect(),
+        left,
         at_bounds: !leftovers::at_bounds(bench, &found.last).is_empty(),
         place: rest.first().map_or_else(String::new, |place| format!("{} ({})", place.channel, place.regime)),
     }
@@ -179,7 +176,6 @@ fn candidates<E: Evidence>(
 ) -> Vec<Candidate> {
     let first = &found.steps[0];
     let likely = confidence::probabilities(first, found.last.effects.is_empty());
-    let weights = &found.steps[found.steps.len() - 1].weights;
     let mut all: Vec<Candidate> = first
         .trials
         .iter()
@@ -188,7 +184,7 @@ fn candidates<E: Evidence>(
             let name = bench.library.candidates[effect].effect.name;
             let kept = found.last.effects.contains(&effect) && matches!(kind, Kind::Named | Kind::Class);
             let fit = if kept { Some(&found.last) } else { trial.fitted.as_ref().map(|(fit, _)| fit) };
-            let alone = trial.fitted.as_ref().and_then(|(fit, _)| Residuals::at(bench, fit, &split.confirm, weights));
+            let alone = trial.fitted.as_ref().and_then(|(fit, _)| Residuals::at(bench, fit, &split.confirm));
             let probability = likely.iter().find(|(candidate, _)| *candidate == effect).map_or(0.0, |(_, p)| *p);
             let status = status(&trial.scored, kept, finding.rivals.contains(&name), kind);
             Candidate {
@@ -231,11 +227,13 @@ fn why(trial: &super::combine::Trial, status: Status) -> String {
             scored.signal
         ),
         (Some((_, advantage)), _) => format!(
-            "foretells the clips better by {:.0} +- {:.0} nats, in {:.0} % of them, for {} numbers",
+            "foretells the clips better by {:.0} ± {:.0} nats, in {:.0} % of them, for {} numbers; alone it closes {:.0} % \
+             of the gap",
             advantage.nats,
             advantage.error,
             100.0 * advantage.share,
-            scored.cost
+            scored.cost,
+            100.0 * trial.closes.clamp(0.0, 1.0)
         ),
         (None, _) => {
             format!("its signature explains {:.1} % of what the baseline leaves", 100.0 * scored.cosine.powi(2))

@@ -3,7 +3,8 @@
 //! One vector holds the baseline's numbers and those of every effect of the library, each effect resting where it changes
 //! nothing. A hypothesis is a choice of which numbers are free; [`Selected`] makes it a [`ClipModel`] of its own.
 
-use crate::estimate::{ClipModel, Impossible, Random, Unknown};
+use super::scatter::Scatter;
+use crate::estimate::{ClipModel, Impossible, Unknown};
 
 /// Part of a clip to which a channel's gap is counted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -88,7 +89,11 @@ pub trait Evidence: ClipModel {
     /// The residuals of a clip, in the order of [`ClipModel::residuals`]; rows of one channel ascend in time.
     fn rows(&self, clip: usize) -> &[Row];
     /// What varies from clip to clip.
-    fn random(&self) -> Vec<Random>;
+    fn scatter(&self) -> Scatter;
+    /// The slopes of a clip's residuals by a number of its own, where they are known without a simulation.
+    fn own_slope(&self, _clip: usize, _own: usize) -> Option<&[f64]> {
+        None
+    }
 }
 
 /// A hypothesis on some of the clips: `free` numbers of `full`, every residual times the weight of its channel.

@@ -4,9 +4,10 @@
 use super::evidence::{Evidence, Selected};
 use super::library::Library;
 use super::quadratic;
+use super::scatter::Scatter;
 use super::shortlist::{Scored, hold_numbers};
 use super::sweep::{Point, Precision, Reduced, Swept, sweep};
-use crate::estimate::{ClipModel, Options, Random, score};
+use crate::estimate::ClipModel;
 use crate::interrupt::Interrupt;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -19,7 +20,7 @@ pub struct Bench<'a, E> {
     /// The candidates.
     pub library: &'a Library,
     /// What varies from clip to clip.
-    pub random: Vec<Random>,
+    pub scatter: Scatter,
     /// Whether the user asked for the end.
     pub interrupt: &'a Interrupt,
 }
@@ -78,6 +79,8 @@ const TOLERANCE: f64 = 0.05;
 /// rules of integration differ by as much (0.35 % of a rotor's inertia and 0.02 % of viscous friction, measured on sessions
 /// of another engine with nothing wrong).
 const NEGLIGIBLE: f64 = 0.008;
+/// Steps in which a clip finds its own numbers.
+const OWN_STEPS: usize = 2;
 /// Most trials with growing damping before a point counts as the best there is.
 const TRIALS: usize = 6;
 
@@ -114,9 +117,9 @@ impl<E: Evidence> Bench<'_, E> {
         effort: Effort,
     ) -> Option<Hypothesis> {
         let free = self.free(effects);
-        let count = self.random.len();
+        let count = self.scatter.count();
         let own = |clip: &usize| (*clip, near.map_or_else(|| vec![0.0; count], |near| near.own(*clip, count)));
-        let mut clips: Vec<(usize, Vec<f64>)> = clips.iter().map(own).collect();
+        let mut clips = self.settled(&full, clips.iter().map(own).collect(), weights)?;
         let mut damping = 1e-4;
         let mut at = self.linearise(&full, &free, &clips, effort.precision)?;
         for _ in 1..effort.iterations {
@@ -141,7 +144,7 @@ impl<E: Evidence> Bench<'_, E> {
         precision: Precision,
     ) -> Option<Swept> {
         let point = Point { full, free, probed: &[], clips, precision };
-        sweep(self.evidence, self.library, &point, &self.random, &|| ()).ok()
+        sweep(self.evidence, self.library, &point, &self.scatter, &|| ()).ok()
     }
 
     /// A point with a lower cost, along damped steps; `None` when there is none that is worth it.
@@ -164,7 +167,11 @@ impl<E: Evidence> Bench<'_, E> {
             let mut to = full.to_vec();
             free.iter().zip(step.iter()).for_each(|(k, step)| to[*k] += step);
             let own = |clip: &super::sweep::SweptClip| (clip.clip, at.own_after(clip, self.evidence, weights, &step));
-            let to_own: Vec<(usize, Vec<f64>)> = at.clips.iter().map(own).collect();
+            let to_own = at.clips.iter().map(own).collect();
+            let Some(to_own) = self.settled(&to, to_own, weights) else {
+                *damping = (*damping * 20.0).max(1e-3);
+                continue;
+            };
             if self.cost(&to, &to_own, weights).is_some_and(|cost| cost < now) {
                 *damping = (*damping * 0.1).max(1e-9);
                 return Some((to, to_own));
@@ -221,9 +228,7 @@ impl<E: Evidence> Bench<'_, E> {
                 Selected { evidence: self.evidence, full: full.to_vec(), free: vec![], clips: vec![*clip], weights };
             let mut out = Vec::new();
             selected.residuals(0, &[], own, &mut out).ok()?;
-            let scattered = self.random.iter().zip(own).filter(|(effect, _)| effect.sigma > 0.0);
-            let penalty: f64 = scattered.map(|(effect, own)| (own / effect.sigma).powi(2)).sum();
-            Some(out.iter().map(|r| r * r).sum::<f64>() + penalty)
+            Some(out.iter().map(|r| r * r).sum::<f64>() + self.scatter.penalty(own))
         };
         let costs: Vec<Option<f64>> = clips.par_iter().map(one).collect();
         costs.into_iter().sum::<Option<f64>>().filter(|cost| cost.is_finite())
@@ -278,10 +283,29 @@ impl<E: Evidence> Bench<'_, E> {
     /// Clips that were not fitted, at a hypothesis' numbers: their own numbers at their best, and their deviances.
     #[must_use]
     pub fn judge(&self, hypothesis: &Hypothesis, clips: &[usize], weights: &[f64]) -> Option<Vec<(Vec<f64>, f64)>> {
-        let full = hypothesis.full.clone();
-        let selected = Selected { evidence: self.evidence, full, free: Vec::new(), clips: clips.to_vec(), weights };
-        let judged = score(&selected, &[], &self.random, &Options { iterations: 10, tolerance: TOLERANCE }).ok()?;
-        Some(judged.into_iter().map(|clip| (clip.own, clip.deviance)).collect())
+        let nothing = vec![0.0; self.scatter.count()];
+        let clips = clips.iter().map(|clip| (*clip, nothing.clone())).collect();
+        let at = self.settled(&hypothesis.full, clips, weights)?;
+        let swept = self.linearise(&hypothesis.full, &[], &at, Precision::Exact)?;
+        let deviances = swept.reduced(self.evidence, weights).into_iter().map(|clip| clip.form[(0, 0)] + clip.volume);
+        Some(at.into_iter().map(|(_, own)| own).zip(deviances).collect())
+    }
+
+    /// Clips with their own numbers at their best for shared ones that are given.
+    fn settled(
+        &self,
+        full: &[f64],
+        mut clips: Vec<(usize, Vec<f64>)>,
+        weights: &[f64],
+    ) -> Option<Vec<(usize, Vec<f64>)>> {
+        let steps = if self.scatter.count() == 0 { 0 } else { OWN_STEPS };
+        for _ in 0..steps {
+            let swept = self.linearise(full, &[], &clips, Precision::Exact)?;
+            let nothing = DVector::zeros(0);
+            let own = |clip: &super::sweep::SweptClip| swept.own_after(clip, self.evidence, weights, &nothing);
+            clips = swept.clips.iter().map(|clip| (clip.clip, own(clip))).collect();
+        }
+        Some(clips)
     }
 
     /// Whether an effect of a hypothesis is so weak that any two simulations differ as much.

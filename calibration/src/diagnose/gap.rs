@@ -5,46 +5,78 @@ use super::evidence::Evidence;
 use super::fit::{Bench, Hypothesis};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
+use rayon::prelude::*;
 
-/// Residuals of clips at a hypothesis, each clip's own numbers at their best; not weighted.
+/// Residuals of clips as the twin alone foretells them, not weighted: what a clip has of its own is not fitted, it is part
+/// of the floor.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Residuals {
     /// Clip and residuals.
     pub clips: Vec<(usize, Vec<f64>)>,
     /// For each clip and group of sensors (arm, object; those that there are) the sum of squares and the number of residuals.
     sums: Vec<Vec<(f64, f64)>>,
+    /// The same of what noise and straying alone would leave.
+    floors: Vec<Vec<(f64, f64)>>,
 }
+
+/// A group of sensors in a clip like most.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Typical {
+    /// Geometric mean over clips of the mean square of the residuals.
+    pub mean_square: f64,
+    /// What noise and straying alone would leave of it.
+    pub floor: f64,
+    /// Whether it is the object's group; else the arm's.
+    pub of_object: bool,
+}
+
+/// Place of the object's group of sensors.
+const OBJECT: usize = 1;
 
 impl Residuals {
     /// Of clips that were not fitted.
     #[must_use]
-    pub fn at<E: Evidence>(
-        bench: &Bench<'_, E>,
-        hypothesis: &Hypothesis,
-        clips: &[usize],
-        weights: &[f64],
-    ) -> Option<Self> {
-        let judged = bench.judge(hypothesis, clips, weights)?;
-        let one = |(clip, (own, _)): (&usize, (Vec<f64>, f64))| {
+    pub fn at<E: Evidence>(bench: &Bench<'_, E>, hypothesis: &Hypothesis, clips: &[usize]) -> Option<Self> {
+        let nothing = vec![0.0; bench.scatter.count()];
+        let one = |clip: &usize| {
             let mut out = Vec::new();
-            bench.evidence.residuals(*clip, &hypothesis.full, &own, &mut out).ok()?;
+            bench.evidence.residuals(*clip, &hypothesis.full, &nothing, &mut out).ok()?;
             Some((*clip, out))
         };
-        let clips: Vec<(usize, Vec<f64>)> = clips.iter().zip(judged).map(one).collect::<Option<_>>()?;
+        let clips: Vec<(usize, Vec<f64>)> = clips.par_iter().map(one).collect::<Option<_>>()?;
         let sums = clips.iter().map(|(clip, residuals)| sums(bench.evidence, *clip, residuals)).collect();
-        Some(Self { clips, sums })
+        let floors = clips.iter().map(|(clip, _)| sums_of_noise(bench, *clip)).collect();
+        Some(Self { clips, sums, floors })
+    }
+
+    /// What noise and straying alone would leave of [`Self::mean_square`].
+    #[must_use]
+    pub fn floor(&self) -> f64 {
+        mean(&self.floors, &(0..self.clips.len()).collect::<Vec<_>>())
+    }
+
+    /// Of every group of sensors, the geometric mean over clips of their mean squares: one stroke that went its own way
+    /// decides little, and a cause that shows in some clips only is seen.
+    #[must_use]
+    pub fn typical(&self) -> Vec<Typical> {
+        let groups = self.sums.first().map_or(0, Vec::len);
+        let usual = |sums: &[Vec<(f64, f64)>], group: usize| {
+            let of = |clip: &Vec<(f64, f64)>| (clip[group].1 > 0.0).then(|| clip[group].0 / clip[group].1);
+            let values: Vec<f64> = sums.iter().filter_map(of).collect();
+            let logarithms = values.iter().map(|value| value.max(f64::MIN_POSITIVE).ln());
+            (!values.is_empty()).then(|| (logarithms.sum::<f64>() / values.len() as f64).exp())
+        };
+        let of = |group: usize| {
+            let (mean_square, floor) = (usual(&self.sums, group)?, usual(&self.floors, group)?);
+            Some(Typical { mean_square, floor, of_object: group == OBJECT })
+        };
+        (0..groups).filter_map(of).collect()
     }
 
     /// Mean square: the mean over the groups of sensors, so that a thousand encoder rows do not drown the object.
     #[must_use]
     pub fn mean_square(&self) -> f64 {
         mean(&self.sums, &(0..self.clips.len()).collect::<Vec<_>>())
-    }
-
-    /// Mean square of every group of sensors.
-    #[must_use]
-    pub fn groups(&self) -> Vec<f64> {
-        group_means(&self.sums, &(0..self.clips.len()).collect::<Vec<_>>())
     }
 
     /// Share by which the mean square shrinks from `before` to this, with an interval from drawing clips anew.
@@ -73,6 +105,17 @@ fn sums(evidence: &impl Evidence, clip: usize, residuals: &[f64]) -> Vec<(f64, f
     sums
 }
 
+/// The sums that noise of one sigma and own numbers that stray as assumed would give.
+fn sums_of_noise<E: Evidence>(bench: &Bench<'_, E>, clip: usize) -> Vec<(f64, f64)> {
+    let rows = bench.evidence.rows(clip);
+    let mut squares = vec![1.0; rows.len()];
+    for (k, random) in bench.scatter.random.iter().enumerate() {
+        let slopes = bench.evidence.own_slope(clip, k).unwrap_or_default();
+        squares.iter_mut().zip(slopes).for_each(|(square, slope)| *square += (slope * random.sigma).powi(2));
+    }
+    sums(bench.evidence, clip, &squares.into_iter().map(f64::sqrt).collect::<Vec<_>>())
+}
+
 fn group_means(sums: &[Vec<(f64, f64)>], drawn: &[usize]) -> Vec<f64> {
     let groups = sums.first().map_or(0, Vec::len);
     let of = |group: usize| {
@@ -94,7 +137,14 @@ mod tests {
 
     fn residuals(sizes: &[f64]) -> Residuals {
         let clips = sizes.iter().enumerate().map(|(clip, size)| (clip, vec![*size; 10])).collect();
-        Residuals { clips, sums: sizes.iter().map(|size| vec![(10.0 * size * size, 10.0), (0.0, 0.0)]).collect() }
+        let sums = |size: &f64| vec![(10.0 * size * size, 10.0), (0.0, 0.0)];
+        Residuals { clips, sums: sizes.iter().map(sums).collect(), floors: sizes.iter().map(|_| sums(&1.0)).collect() }
+    }
+
+    #[test]
+    fn one_clip_that_went_its_own_way_does_not_make_the_typical_one() {
+        let [typical] = residuals(&[1.0, 1.0, 1.0, 30.0]).typical()[..] else { panic!("one group") };
+        assert!((typical.mean_square - 30f64.sqrt()).abs() < 1e-9 && typical.floor == 1.0, "{typical:?}");
     }
 
     #[test]

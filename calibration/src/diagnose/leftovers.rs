@@ -5,10 +5,14 @@
 
 use super::evidence::Evidence;
 use super::fit::{Bench, Hypothesis};
+use super::gap::Typical;
 
 /// Excess over the noise that any twin leaves, in squared sigmas: numerics, not physics. Sessions of another engine with
 /// nothing wrong leave 1.1 (excitations) and 3.4 (the arm on its way into strokes, whose impact reaches it a moment early).
 pub const NUMERICS: f64 = 6.0;
+/// The same of an object's poses: what one engine's strokes leave in another's twin in a clip like most, where the
+/// paths end 2 mm and 2 degrees apart.
+pub const ROUGHNESS: f64 = 9.0;
 /// A cause leaves no more than this share of the gap it closes.
 pub const SUBSTITUTE: f64 = 0.03;
 
@@ -21,22 +25,42 @@ pub struct Left {
     pub after: f64,
     /// What noise alone would leave.
     pub floor: f64,
+    /// What other reasons than a cause leave beyond that.
+    pub numerics: f64,
 }
 
 impl Left {
+    /// Of every group of sensors, in a clip like most.
+    #[must_use]
+    pub fn of_groups(before: &[Typical], after: &[Typical]) -> Vec<Self> {
+        let one = |(before, after): (&Typical, &Typical)| Self {
+            before: before.mean_square,
+            after: after.mean_square,
+            floor: before.floor,
+            numerics: if before.of_object { ROUGHNESS } else { NUMERICS },
+        };
+        before.iter().zip(after).map(one).collect()
+    }
+
     /// Whether something structured remains that is no numerics.
     #[must_use]
     pub fn too_much(&self) -> bool {
         let excess = self.after - self.floor;
-        excess > NUMERICS && excess > SUBSTITUTE * (self.before - self.floor)
+        excess > self.numerics && excess > SUBSTITUTE * (self.before - self.floor)
     }
 
     /// Share of the excess that is explained.
     #[must_use]
     pub fn explained(&self) -> f64 {
-        let excess = self.before - self.floor;
-        if excess <= 0.0 { 0.0 } else { ((self.before - self.after) / excess).clamp(0.0, 1.0) }
+        explained(self.before, self.after, self.floor)
     }
+}
+
+/// Share of what a gap has beyond the noise that is explained.
+#[must_use]
+pub fn explained(before: f64, after: f64, floor: f64) -> f64 {
+    let excess = before - floor;
+    if excess <= 0.0 { 0.0 } else { ((before - after) / excess).clamp(0.0, 1.0) }
 }
 
 /// Effects of a hypothesis that were pushed against the bound of what is met in practice.
@@ -59,7 +83,7 @@ mod tests {
 
     #[test]
     fn a_gap_that_closes_to_a_hundredth_is_explained_and_one_that_halves_is_not() {
-        let left = |after| Left { before: 1000.0, after, floor: 1.0 };
+        let left = |after| Left { before: 1000.0, after, floor: 1.0, numerics: NUMERICS };
         assert!(!left(12.0).too_much());
         assert!(left(500.0).too_much());
         assert!((left(500.0).explained() - 0.5005).abs() < 1e-3);
@@ -67,6 +91,6 @@ mod tests {
 
     #[test]
     fn what_numerics_leave_is_no_leftover() {
-        assert!(!Left { before: 2.0, after: 2.0, floor: 1.0 }.too_much());
+        assert!(!Left { before: 2.0, after: 2.0, floor: 1.0, numerics: NUMERICS }.too_much());
     }
 }

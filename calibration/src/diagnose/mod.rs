@@ -9,6 +9,7 @@
 //! | [`admit`] | can the clips be diagnosed at all |
 //! | [`split`] | which clips are for what |
 //! | [`evidence`], [`arm_clips`], [`cell_clips`] | what is measured against the twin, and where in a clip |
+//! | [`scatter`] | what every clip has of its own |
 //! | [`library`] | the candidates as numbers |
 //! | [`baseline`] | the paper's parameters identified |
 //! | [`noise`], [`floor`] | how far residuals can be trusted |
@@ -43,6 +44,7 @@ pub mod localise;
 pub mod noise;
 pub mod parameters;
 pub mod quadratic;
+pub mod scatter;
 pub mod score;
 pub mod shortlist;
 pub mod split;
@@ -133,7 +135,7 @@ pub fn diagnose_clips(
     let mut diagnosis = if admitted.with_object {
         let arm = ArmClips::new(&session.cell, &admitted.clips, theta).map_err(Refused::from)?;
         let object = ObjectClips::new(&session.cell, admitted.clips.clone(), library.settings.clone())?;
-        let evidence = CellClips::new(Some(arm), object);
+        let evidence = CellClips::new(Some(arm), object, &library);
         examine(&evidence, &library, session, admitted, options, interrupt)?
     } else {
         let evidence = ArmClips::new(&session.cell, &admitted.clips, theta).map_err(Refused::from)?;
@@ -151,7 +153,7 @@ fn examine<E: Evidence>(
     options: &Options,
     interrupt: &Interrupt,
 ) -> Result<Diagnosis, DiagnoseError> {
-    let bench = Bench { evidence, library, random: evidence.random(), interrupt };
+    let bench = Bench { evidence, library, scatter: evidence.scatter(), interrupt };
     let split = Split::new(&admitted.groups, options.seed);
     let bar = Progress::new("diagnose", 100);
     bar.show(0, "baseline");

@@ -11,7 +11,8 @@
 
 use super::evidence::{Evidence, Reach};
 use super::library::{Alternative, Library};
-use crate::estimate::{Impossible, Random};
+use super::scatter::Scatter;
+use crate::estimate::Impossible;
 use nalgebra::{Cholesky, DMatrix, DVector};
 use rayon::prelude::*;
 
@@ -50,7 +51,7 @@ pub struct Swept {
     /// What the columns are.
     pub columns: Vec<Column>,
     /// What varies from clip to clip.
-    pub random: Vec<Random>,
+    pub scatter: Scatter,
     /// Clips.
     pub clips: Vec<SweptClip>,
 }
@@ -89,7 +90,7 @@ pub fn sweep(
     evidence: &impl Evidence,
     library: &Library,
     point: &Point<'_>,
-    random: &[Random],
+    scatter: &Scatter,
     done: &(impl Fn() + Sync),
 ) -> Result<Swept, Impossible> {
     let mut columns: Vec<Column> = point.free.iter().map(|k| Column::Number(*k)).collect();
@@ -100,13 +101,13 @@ pub fn sweep(
     }
     let batches = batches(library, &columns, point.precision);
     let one = |(clip, own): &(usize, Vec<f64>)| {
-        let work = Work { evidence, library, full: point.full, columns: &columns, batches: &batches, random };
+        let work = Work { evidence, library, full: point.full, columns: &columns, batches: &batches, scatter };
         let swept = work.clip(*clip, own);
         done();
         swept
     };
     let clips = point.clips.par_iter().map(one).collect::<Result<_, _>>()?;
-    Ok(Swept { columns, random: random.to_vec(), clips })
+    Ok(Swept { columns, scatter: scatter.clone(), clips })
 }
 
 /// Neighbouring columns that belong to different joints and to one form go together.
@@ -149,7 +150,7 @@ struct Work<'a, E> {
     full: &'a [f64],
     columns: &'a [Column],
     batches: &'a [Batch],
-    random: &'a [Random],
+    scatter: &'a Scatter,
 }
 
 impl<E: Evidence> Work<'_, E> {
@@ -159,7 +160,7 @@ impl<E: Evidence> Work<'_, E> {
         let shared: Vec<Vec<(usize, Vec<f64>)>> =
             self.batches.par_iter().map(|batch| self.batch(batch, clip, own, &base)).collect();
         let owns: Vec<Vec<f64>> =
-            (0..self.random.len()).into_par_iter().map(|k| self.own(k, clip, own, &base)).collect();
+            (0..self.scatter.count()).into_par_iter().map(|k| self.own(k, clip, own, &base)).collect();
         let count = 1 + self.columns.len();
         let mut matrix = DMatrix::zeros(base.len(), count + owns.len());
         matrix.column_mut(0).copy_from_slice(&base);
@@ -229,7 +230,10 @@ impl<E: Evidence> Work<'_, E> {
 
     /// The slope by a number of the clip's own.
     fn own(&self, k: usize, clip: usize, own: &[f64], base: &[f64]) -> Vec<f64> {
-        let effect = &self.random[k];
+        if let Some(slope) = self.evidence.own_slope(clip, k) {
+            return slope.to_vec();
+        }
+        let effect = &self.scatter.random[k];
         let (mut moved, mut out) = (own.to_vec(), Vec::new());
         moved[k] += effect.step;
         let changed = |out: &mut Vec<f64>| self.evidence.changed(clip, (self.full, &moved), (Reach::Object, base), out);
@@ -252,7 +256,7 @@ impl Swept {
         let gram = gram(clip, evidence, weights);
         let kept = 1 + self.columns.len();
         let outer = gram.view((0, 0), (kept, kept)).into_owned();
-        if self.random.is_empty() {
+        if self.scatter.count() == 0 {
             return Reduced { form: outer, volume: 0.0 };
         }
         let (inner, cross, precision) = self.own_part(clip, &gram);
@@ -260,16 +264,15 @@ impl Swept {
         let inner = Cholesky::new(inner).expect("a Gram matrix plus positive precisions is positive definite");
         let mut form = outer - cross.tr_mul(&inner.solve(&cross));
         form[(0, 0)] += constant;
-        Reduced { form, volume: inner.ln_determinant() - precision.iter().map(|p| p.ln()).sum::<f64>() }
+        let volume = inner.ln_determinant() - precision.iter().map(|p| p.ln()).sum::<f64>();
+        Reduced { form, volume: volume + self.scatter.correction(&clip.own) }
     }
 
     fn own_part(&self, clip: &SweptClip, gram: &DMatrix<f64>) -> (DMatrix<f64>, DMatrix<f64>, Vec<f64>) {
-        let (kept, own) = (1 + self.columns.len(), self.random.len());
+        let (kept, own) = (1 + self.columns.len(), self.scatter.count());
         let mut inner = gram.view((kept, kept), (own, own)).into_owned();
         let mut cross = gram.view((kept, 0), (own, kept)).into_owned();
-        // What does not scatter has no slope, and any precision keeps it in place.
-        let precision: Vec<f64> =
-            self.random.iter().map(|effect| if effect.sigma > 0.0 { effect.sigma.powi(-2) } else { 1.0 }).collect();
+        let precision = self.scatter.precision(&clip.own);
         for (k, precision) in precision.iter().enumerate() {
             inner[(k, k)] += precision;
             cross[(k, 0)] += precision * clip.own[k];
@@ -286,7 +289,7 @@ impl Swept {
         weights: &[f64],
         at: &DVector<f64>,
     ) -> Vec<f64> {
-        if self.random.is_empty() {
+        if self.scatter.count() == 0 {
             return Vec::new();
         }
         let (inner, cross, _) = self.own_part(clip, &gram(clip, evidence, weights));

@@ -1,7 +1,7 @@
 //! The finding: one of five verdicts, in a sentence, with the effects and how sure it is.
 
 use super::answer::{Kind, Verdict};
-use super::leftovers::{Left, NUMERICS};
+use super::leftovers::Left;
 
 /// What a verdict is drawn from.
 #[derive(Debug, Clone)]
@@ -28,7 +28,7 @@ impl Finding<'_> {
     #[must_use]
     pub fn verdict(&self) -> Verdict {
         if self.effects.is_empty() {
-            let gap = self.left.iter().any(|left| left.before - left.floor > NUMERICS);
+            let gap = self.left.iter().any(|left| left.before - left.floor > left.numerics);
             return if gap { self.unexplained() } else { self.none() };
         }
         if self.at_bounds || self.left.iter().any(Left::too_much) {
@@ -80,10 +80,11 @@ pub fn not_testable(why: &str) -> Verdict {
 
 #[cfg(test)]
 mod tests {
+    use super::super::leftovers::NUMERICS;
     use super::*;
 
     fn finding<'a>(effects: Vec<&'a str>, before: f64, after: f64) -> Finding<'a> {
-        let left = vec![Left { before, after, floor: 1.0 }];
+        let left = vec![Left { before, after, floor: 1.0, numerics: NUMERICS }];
         Finding { effects, rivals: Vec::new(), confidence: 0.95, left, at_bounds: false, place: "joint2".into() }
     }
 

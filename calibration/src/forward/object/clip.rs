@@ -1,22 +1,16 @@
 //! One recorded clip with an object, prepared for being held against the twin: when its object was hit, let go and came
 //! to rest, and where the arm is looked at. Base frame, SI, stamps of the recording.
 
+use super::clearance::Clearance;
 use nalgebra::Vector3;
 use shared_mem::cell::Cell;
 use shared_mem::frames::{Base, Object, Pose};
-use shared_mem::msg::joints_from;
 use shared_mem::recording::{Clip, ObjectSeries};
-use twin::arm::ArmModel;
-use twin::effects::{CameraEffects, Effects};
-use twin::physics::TableObject;
-use twin::physics::touch::Capsule;
+use twin::effects::CameraEffects;
 use twin::rollout::CommandTrack;
-use twin::scene::ObjectModel;
 
 /// Poses this far from the last (or first) ones move, in sigmas of the noise: 1 of 100 000 resting poses is.
 const MOVING_SIGMAS: f64 = 8.0;
-/// Tool and object are apart when the tracked gap is wider than this [m]: several sigmas of any usable tracker.
-const APART: f64 = 4e-3;
 /// The arm is looked at so often from a moment before the hit until the object rests [ns].
 const ARM_EVERY_NS: u64 = 10_000_000;
 /// That moment: two poses of a 60 Hz tracker [ns].
@@ -79,18 +73,11 @@ impl ObjectClip {
 
 /// First pose between `onset` and `rest` from which on the tool stays away from the object.
 fn let_go(clip: &Clip, cell: &Cell, onset: usize, rest: usize) -> Option<usize> {
-    let arm = ArmModel::from_cell(cell).ok()?;
-    let tool = cell.tool.as_ref()?;
-    let capsule = Capsule { segment: tool.length - tool.radius, radius: tool.radius };
-    let model = ObjectModel::new(cell, None).ok()??;
-    let mut object = TableObject::new(&model, None, &Effects::default()).ok()?;
-    let names = arm.joint_names().to_vec();
-    let measured = clip.clone().reorder(&names).ok()?.measured;
+    let mut clearance = Clearance::new(cell)?;
+    let measured = clearance.in_order(clip)?.measured;
     let mut apart = |row: usize| {
         let at = measured.stamps_ns.partition_point(|stamp| *stamp < clip.object.stamps_ns[row]);
-        let q = joints_from(measured.q_row(at.min(measured.len() - 1)));
-        object.set(&clip.object.poses[row], Vector3::zeros(), Vector3::zeros());
-        -object.touch(&capsule, &arm.flange(&q).isometry()).depth > APART
+        clearance.apart(measured.q_row(at.min(measured.len() - 1)), &clip.object.poses[row])
     };
     let touching = (onset..=rest).rev().find(|row| !apart(*row))?;
     Some((touching + 1).min(rest))

@@ -10,16 +10,19 @@
 //! |---|---|
 //! | `own` | the numbers of a clip's own |
 //! | `clip` | a recorded clip, prepared |
+//! | `clearance` | how far tool and object are apart |
 //! | `rollout` | a clip in the twin |
 //! | `cache` | what of it can be used again |
 //! | `rows` | what every residual is about |
 
 mod cache;
+mod clearance;
 mod clip;
 mod own;
 mod rollout;
 mod rows;
 
+pub use clearance::first_near;
 pub use own::{ALL, Axis, Own, Values};
 pub use rows::{Channel, Part, Row};
 

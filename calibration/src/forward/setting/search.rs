@@ -4,7 +4,7 @@ use super::Setting;
 use crate::estimate::Unknown;
 use shared_mem::cell::{Cell, Range};
 use shared_mem::theta::Theta;
-use twin::effects::{EffectInfo, Parameter, Role, Shape};
+use twin::effects::{EffectInfo, Parameter, Role, Shape, Stage};
 use twin::scene::ObjectModel;
 
 /// Gains stated by value are searched this far: the values are right to 20 %, and a bound must not be mistaken for them.
@@ -48,7 +48,9 @@ const TIP_FRICTION: Range = [0.0, 1.0];
 /// The centre of mass lies within this share of the half extents.
 const CENTRE_SHARE: f64 = 0.5;
 
-/// Friction, mass, centre of mass and tip friction of the object, beginning at the base's.
+/// Friction, mass, centre of mass and tip friction of the object, beginning at the base's. Difference steps are wide: where
+/// tool and object part by a hair's breadth, a little more of any number moves the resting place, and over such a step
+/// that roughness averages out.
 #[must_use]
 pub fn object_parameters(cell: &Cell, base: &Theta) -> Vec<(Setting, Unknown)> {
     let (Some(object), Some(start)) = (&cell.object, &base.object) else { return Vec::new() };
@@ -61,15 +63,20 @@ pub fn object_parameters(cell: &Cell, base: &Theta) -> Vec<(Setting, Unknown)> {
     let masses = object.mass_range.unwrap_or([mass / MASS_FACTOR, mass * MASS_FACTOR]);
     let friction = start.friction.unwrap_or_else(|| object.nominal_friction());
     let tip = start.tip_friction.unwrap_or_else(|| object.nominal_tip_friction());
+    let wide = |setting, start, range: Range, step: f64| {
+        let room = range[1] - range[0];
+        unknown(setting, start, range, step.min(0.2 * room).max(1e-3 * room))
+    };
+    let frictions = object.friction_range.unwrap_or(FRICTION);
     let mut all = vec![
-        unknown(Setting::Friction, friction, object.friction_range.unwrap_or(FRICTION), 2e-3 * friction.max(0.05)),
-        unknown(Setting::Mass, mass, masses, 5e-3 * mass),
+        wide(Setting::Friction, friction, frictions, 0.05 * friction.max(0.05)),
+        wide(Setting::Mass, mass, masses, 0.08 * mass),
     ];
     for (axis, range) in centres.into_iter().enumerate() {
         let value = start.centre_of_mass.unwrap_or_default()[axis];
-        all.push(unknown(Setting::CentreOfMass(axis), value, range, 2e-3 * 2.0 * half[axis]));
+        all.push(wide(Setting::CentreOfMass(axis), value, range, 1.5e-3));
     }
-    all.push(unknown(Setting::TipFriction, tip, object.tip_friction_range.unwrap_or(TIP_FRICTION), 2e-3));
+    all.push(wide(Setting::TipFriction, tip, object.tip_friction_range.unwrap_or(TIP_FRICTION), 0.06));
     all
 }
 
@@ -77,6 +84,8 @@ pub fn object_parameters(cell: &Cell, base: &Theta) -> Vec<(Setting, Unknown)> {
 const WIDENED: f64 = 0.5;
 /// Difference step over the width of what is met in practice.
 const EFFECT_STEP: f64 = 2e-3;
+/// The same where a hit lies between the number and what is seen: over this step its roughness averages out.
+const ROUGH_STEP: f64 = 2e-2;
 
 /// Every number of an effect, for an arm of `dof` joints, beginning where the effect changes nothing.
 #[must_use]
@@ -90,7 +99,8 @@ pub fn effect_settings(info: &'static EffectInfo, dof: usize) -> Vec<(Setting, U
         };
         let inverse = parameter.resting_value().is_infinite();
         let [lo, hi] = searched(parameter, inverse);
-        let step = EFFECT_STEP * width(parameter, inverse);
+        let share = if info.stage == Stage::Control { EFFECT_STEP } else { ROUGH_STEP };
+        let step = share * width(parameter, inverse);
         let start = if inverse { 0.0 } else { parameter.resting_value() };
         for index in indices {
             let setting = Setting::Effect { name: info.name, parameter: parameter.name, index, inverse };

@@ -8,7 +8,6 @@
 
 use super::step::{Linearised, Question};
 use crate::estimate::{ClipModel as _, Impossible, Random, Unknown};
-use crate::forward::Setting;
 use crate::forward::object::{ALL, Channel, ModelError, ObjectClips, Own, Part};
 use rayon::prelude::*;
 use shared_mem::cell::PoseNoise;
@@ -42,20 +41,6 @@ const ROUNDS: usize = 4;
 const ROWS_ALIKE: f64 = 5.0;
 /// Smallest error of the simulated joints: some steps of an encoder [rad].
 const LEAST_JOINT_ERROR: f64 = 2e-5;
-
-/// Difference step of an object's number over which the roughness of hits averages out.
-#[must_use]
-pub(super) fn wide_step(setting: &Setting, unknown: &Unknown) -> f64 {
-    let range = unknown.upper - unknown.lower;
-    let step = match setting {
-        Setting::Friction => 0.05 * unknown.start,
-        Setting::Mass => 0.08 * unknown.start,
-        Setting::CentreOfMass(_) => 1.5e-3,
-        Setting::TipFriction => 0.06,
-        _ => unknown.step,
-    };
-    step.min(0.2 * range).max(unknown.step.min(range))
-}
 
 /// Clips that are usually simulated until the end: for a bar alone.
 #[must_use]

@@ -32,7 +32,7 @@ use crate::forward::{Setting, Settings};
 use crate::interrupt::Interrupt;
 use crate::progress::Progress;
 use finding::Finding;
-use fit::{ObjectFit, fit_object, linearise_object, wide_step};
+use fit::{ObjectFit, fit_object, linearise_object};
 use material::Material;
 use paper::SurfaceLoss;
 use shared_mem::cell::{Cell, ClipKind};
@@ -222,11 +222,8 @@ fn searched(cell: &Cell, base: Theta) -> (Settings, Vec<Unknown>) {
     // A mass that was weighed is not searched.
     let weighed = cell.object.as_ref().is_some_and(|o| o.mass.is_some() && o.mass_range.is_none());
     let searched = object_parameters(cell, &base).into_iter();
-    let (settings, mut unknowns): (Vec<Setting>, Vec<Unknown>) =
+    let (settings, unknowns): (Vec<Setting>, Vec<Unknown>) =
         searched.filter(|(setting, _)| !(weighed && *setting == Setting::Mass)).unzip();
-    for (setting, unknown) in settings.iter().zip(&mut unknowns) {
-        unknown.step = wide_step(setting, unknown);
-    }
     (Settings::new(base, settings), unknowns)
 }
 
