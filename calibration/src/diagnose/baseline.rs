@@ -11,6 +11,7 @@ use super::sweep::Precision;
 use crate::identify::object;
 use shared_mem::cell::Cell;
 use shared_mem::recording::Clip;
+use shared_mem::theta::ObjectTheta;
 
 /// The way there, and the last steps.
 const WAY: Effort = Effort { iterations: 8, precision: Precision::Joints };
@@ -31,15 +32,36 @@ pub fn identify<E: Evidence>(
     if !admitted.with_object {
         return Some(arm);
     }
-    let mut full = arm.full.clone();
-    let clips: Vec<Clip> = split.train.iter().map(|clip| admitted.clips[*clip].clone()).collect();
-    // Where strokes tell nothing about the object, what cell.toml says of it stands.
-    if let Ok(theta) = object::refine(cell, clips, &bench.library.theta(&full), bench.interrupt) {
-        let numbers = bench.library.settings.numbers(&theta);
-        for k in bench.library.baseline.clone() {
-            full[k] = numbers[k].unwrap_or(full[k]);
-        }
-    }
+    let full = refined(bench, split, cell, admitted, &arm.full).unwrap_or_else(|| arm.full.clone());
     let all = vec![1.0; channels.len()];
     bench.fit((&[], full), &split.train, &all, Some(&arm), LAST)
+}
+
+/// Numbers with the object's parameters that fit the strokes best under the arm and the effects that are given, by
+/// identification's own way over rough hits; `None` where strokes tell nothing about the object.
+#[must_use]
+pub fn refined<E: Evidence>(
+    bench: &Bench<'_, E>,
+    split: &Split,
+    cell: &Cell,
+    admitted: &Admitted,
+    given: &[f64],
+) -> Option<Vec<f64>> {
+    if !admitted.with_object {
+        return None;
+    }
+    let clips: Vec<Clip> = split.train.iter().map(|clip| admitted.clips[*clip].clone()).collect();
+    let mut base = bench.library.theta(given);
+    // What stood in for an effect leads astray once that effect acts: only the friction is where it was.
+    let nominal = bench.library.theta(&bench.library.start()).object;
+    if let (Some(object), Some(nominal)) = (&mut base.object, nominal) {
+        *object = ObjectTheta { friction: object.friction, ..nominal };
+    }
+    let theta = object::refine(cell, clips, &base, bench.interrupt).ok()?;
+    let numbers = bench.library.settings.numbers(&theta);
+    let mut full = given.to_vec();
+    for k in bench.library.baseline.clone() {
+        full[k] = numbers[k].unwrap_or(full[k]);
+    }
+    Some(full)
 }

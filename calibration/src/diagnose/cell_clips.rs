@@ -14,6 +14,8 @@ use crate::forward::Setting;
 use crate::forward::object::{self, ALL, ObjectClips, Own, Part};
 use shared_mem::cell::{ClipKind, PoseNoise};
 use shared_mem::theta::Theta;
+use std::collections::VecDeque;
+use std::sync::{Arc, Mutex, PoisonError};
 
 /// Coordinates of a pose.
 const COORDINATES: [(&str, &str); 6] = [
@@ -91,7 +93,16 @@ pub struct CellClips<F> {
     friction: Option<usize>,
     /// Index of the object's first channel.
     first: usize,
+    /// Which numbers the arm feels, and for each clip the last of them with the arm's residuals there: most of what a search
+    /// turns is the object's.
+    of_arm: Vec<bool>,
+    arm_alone: Vec<Mutex<VecDeque<Arm>>>,
 }
+
+/// The arm's numbers, and its residuals there.
+type Arm = (Vec<f64>, Arc<Vec<f64>>);
+/// Kept for a clip.
+const ARMS: usize = 3;
 
 impl<F: Fn(&[f64]) -> Theta + Sync> CellClips<F> {
     /// Both on the same clips in the same order.
@@ -110,7 +121,27 @@ impl<F: Fn(&[f64]) -> Theta + Sync> CellClips<F> {
         }
         let friction = library.settings.settings().iter().position(|setting| *setting == Setting::Friction);
         let scatter = scatter(&object);
-        Self { arm, object, channels, rows, straying, scatter, friction, first }
+        let of_arm = library.object_only.iter().map(|object_only| !object_only).collect();
+        let arm_alone = rows.iter().map(|_| Mutex::default()).collect();
+        Self { arm, object, channels, rows, straying, scatter, friction, first, of_arm, arm_alone }
+    }
+
+    /// The arm's residuals at numbers; none where there is no arm.
+    fn arm(&self, clip: usize, shared: &[f64]) -> Result<Arc<Vec<f64>>, Impossible> {
+        let Some(arm) = &self.arm else { return Ok(Arc::default()) };
+        let felt = shared.iter().zip(&self.of_arm).filter(|(_, of_arm)| **of_arm).map(|(value, _)| *value);
+        let felt: Vec<f64> = felt.collect();
+        let kept = || self.arm_alone[clip].lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((_, residuals)) = kept().iter().find(|(numbers, _)| *numbers == felt) {
+            return Ok(Arc::clone(residuals));
+        }
+        let mut residuals = Vec::new();
+        arm.residuals(clip, shared, &[], &mut residuals)?;
+        let residuals = Arc::new(residuals);
+        let mut kept = kept();
+        kept.truncate(ARMS - 1);
+        kept.push_front((felt, Arc::clone(&residuals)));
+        Ok(residuals)
     }
 
     /// The poses' residuals at numbers, a clip's own among them.
@@ -226,10 +257,8 @@ impl<F: Fn(&[f64]) -> Theta + Sync> ClipModel for CellClips<F> {
 
     fn residuals(&self, clip: usize, shared: &[f64], own: &[f64], out: &mut Vec<f64>) -> Result<(), Impossible> {
         let poses = self.poses(clip, shared, own)?;
-        match &self.arm {
-            Some(arm) => arm.residuals(clip, shared, &[], out)?,
-            None => out.clear(),
-        }
+        out.clear();
+        out.extend_from_slice(&self.arm(clip, shared)?);
         out.extend(poses);
         Ok(())
     }
@@ -245,8 +274,9 @@ impl<F: Fn(&[f64]) -> Theta + Sync> Evidence for CellClips<F> {
     ) -> Result<(), Impossible> {
         let of_arm = self.arm.as_ref().map_or(0, |arm| arm.rows(clip).len());
         match (reach, &self.arm) {
-            (Reach::Arm, Some(arm)) => {
-                arm.residuals(clip, shared, &[], out)?;
+            (Reach::Arm, Some(_)) => {
+                out.clear();
+                out.extend_from_slice(&self.arm(clip, shared)?);
                 out.extend(&base[of_arm..]);
             }
             (Reach::Object, _) => {

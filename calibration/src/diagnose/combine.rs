@@ -39,6 +39,8 @@ const CLOSES: f64 = 0.1;
 const LEAST_GAP: f64 = 1.2;
 /// A gap widened by less than this share is chance.
 const HARM: f64 = 0.1;
+/// An arm that strays from the twin by less than this in squared sigmas is not the cause of what an object does.
+const QUIET: f64 = 0.5;
 /// Candidates whose signature explains less than this share of what the best one does are not fitted.
 const CLOSE: f64 = 0.1;
 
@@ -94,8 +96,15 @@ pub fn net(advantage: &Advantage, cost: usize) -> f64 {
     advantage.nats - 0.5 * cost as f64
 }
 
-/// Searches from a baseline.
-pub fn search<E: Evidence>(bench: &Bench<'_, E>, split: &Split, baseline: Hypothesis, bar: &Progress) -> Option<Found> {
+/// Searches from a baseline; `refined` gives numbers whose object is found anew under the effects in them, where there is
+/// one.
+pub fn search<E: Evidence>(
+    bench: &Bench<'_, E>,
+    split: &Split,
+    baseline: Hypothesis,
+    refined: &impl Fn(&[f64]) -> Option<Vec<f64>>,
+    bar: &Progress,
+) -> Option<Found> {
     let mut steps: Vec<Step> = Vec::new();
     let mut now = baseline;
     loop {
@@ -106,13 +115,12 @@ pub fn search<E: Evidence>(bench: &Bench<'_, E>, split: &Split, baseline: Hypoth
         steps.push(step);
         match best {
             Some(best) if now.effects.len() < MOST && !bench.interrupt.asked() && !spent(bench, split, &steps) => {
-                now = bench.fit(
-                    (&best.effects, best.full.clone()),
-                    &split.train,
-                    &weights,
-                    Some(&best),
-                    last_pass(bench),
-                )?;
+                let settled =
+                    |full| bench.fit((&best.effects, full), &split.train, &weights, Some(&best), last_pass(bench));
+                // An effect frees the object's parameters from what they stood in for: they are found anew under it.
+                let anew = refined(&best.full).and_then(settled);
+                let near = settled(best.full.clone())?;
+                now = anew.filter(|anew| anew.deviance() < near.deviance()).unwrap_or(near);
             }
             _ => break,
         }
@@ -228,13 +236,20 @@ fn step<E: Evidence>(bench: &Bench<'_, E>, split: &Split, from: &Hypothesis, bar
     Some(Step { from, foretold, trials, weights, arm_rows })
 }
 
-/// Where fits of a candidate begin: where the score test points; for effects on the hit, whose slope at one point tells
-/// little, also some way to either side.
+/// Where fits of a candidate begin: where the score test points. Of an effect with many forms (a place on the table) also
+/// the forms next to the best; of an effect on the hit, whose slope at one point tells little, also some way to either side.
 fn starts<E: Evidence>(bench: &Bench<'_, E>, scored: &Scored) -> Vec<Scored> {
     let candidate = &bench.library.candidates[scored.candidate];
-    let [probe] = &candidate.alternatives[scored.alternative].probes[..] else { return vec![scored.clone()] };
     let mut starts = vec![scored.clone()];
-    if candidate.effect.stage == Stage::Hit {
+    if candidate.effect.stage == Stage::Slide {
+        let form = |(alternative, units): &(usize, Vec<f64>)| Scored {
+            alternative: *alternative,
+            units: units.clone(),
+            ..scored.clone()
+        };
+        starts.extend(scored.next.iter().map(form));
+    }
+    if let (Stage::Hit, [probe]) = (candidate.effect.stage, &candidate.alternatives[scored.alternative].probes[..]) {
         let sides = [ASIDE, -ASIDE].into_iter().filter(|side| *side > 0.0 || !probe.one_sided);
         starts.extend(sides.map(|side| Scored { units: vec![side * probe.largest], ..scored.clone() }));
     }
@@ -260,7 +275,13 @@ fn closes<E: Evidence>(bench: &Bench<'_, E>, split: &Split, from: &Hypothesis, t
 fn worthy<E: Evidence>(bench: &Bench<'_, E>, split: &Split, from: &Hypothesis, scored: &[Scored]) -> Vec<usize> {
     let effect = |s: &Scored| bench.library.candidates[s.candidate].effect;
     let mut all = Vec::new();
-    for of_arm in [true, false] {
+    let left = Residuals::at(bench, from, &split.open()).map(|left| left.typical()).unwrap_or_default();
+    let beyond = |of_object: bool| {
+        let group = left.iter().find(|group| group.of_object == of_object);
+        group.map_or(0.0, |group| group.mean_square - group.floor)
+    };
+    let quiet = left.len() > 1 && beyond(false) < QUIET;
+    for of_arm in [true, false].into_iter().filter(|of_arm| !(*of_arm && quiet)) {
         let group: Vec<&Scored> = scored.iter().filter(|s| (effect(s).stage == Stage::Control) == of_arm).collect();
         let Some(best) = group.first() else { continue };
         let likely = |s: &&&Scored| {
@@ -274,8 +295,7 @@ fn worthy<E: Evidence>(bench: &Bench<'_, E>, split: &Split, from: &Hypothesis, s
         all.extend(first.chain(confusable).map(|s| s.candidate));
     }
     let on_hit = scored.iter().filter(|s| effect(s).stage == Stage::Hit && s.signal > TESTABLE);
-    let left = Residuals::at(bench, from, &split.open()).map(|left| left.typical()).unwrap_or_default();
-    if left.iter().any(|group| group.of_object && group.mean_square - group.floor > ROUGHNESS) {
+    if beyond(true) > ROUGHNESS {
         all.extend(on_hit.map(|s| s.candidate));
     }
     all

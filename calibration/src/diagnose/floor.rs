@@ -5,7 +5,7 @@
 //! many times over. Taken at face value it would make any two hypotheses differ by thousands of nats.
 
 use super::evidence::Evidence;
-use super::noise::correlation_length;
+use super::noise::{correlation_length, median};
 use super::quadratic::minimum;
 use super::sweep::{Column, Swept};
 use super::{library::Library, shortlist};
@@ -19,23 +19,26 @@ pub fn weights(evidence: &impl Evidence, clips: &[(usize, Vec<f64>)]) -> Vec<f64
 }
 
 fn weight(evidence: &impl Evidence, clips: &[(usize, Vec<f64>)], channel: usize) -> f64 {
-    let (mut power, mut count, mut length) = (0.0, 0.0, 0.0);
-    for (clip, residuals) in clips {
+    let of_clip = |(clip, residuals): &(usize, Vec<f64>)| {
         let of_channel: Vec<f64> = (evidence.rows(*clip).iter().zip(residuals))
             .filter(|(row, _)| row.channel == channel)
             .map(|(_, residual)| *residual)
             .collect();
-        power += of_channel.iter().map(|r| r * r).sum::<f64>();
-        length += correlation_length(&of_channel) * of_channel.len() as f64;
-        count += of_channel.len() as f64;
-    }
-    if count == 0.0 {
+        let count = of_channel.len() as f64;
+        let power = of_channel.iter().map(|r| r * r).sum::<f64>() / count;
+        (count > 0.0).then(|| (power, correlation_length(&of_channel)))
+    };
+    let (powers, lengths): (Vec<f64>, Vec<f64>) = clips.iter().filter_map(of_clip).unzip();
+    if powers.is_empty() {
         return 0.0;
     }
-    let (variance, length) = ((power / count).max(1.0), (length / count).max(1.0));
+    let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
+    // Some strokes go their own way, and where a hit is linearised some clips tell nothing: they must not silence the others.
+    let power = if evidence.channels()[channel].joint.is_some() { mean(&powers) } else { median(&powers) };
+    let (power, length) = (power.max(1.0), mean(&lengths).max(1.0));
     // White residuals of a channel have a length a little above one by chance.
     let length = if length < 1.5 { 1.0 } else { length };
-    (variance * length).sqrt().recip()
+    (power * length).sqrt().recip()
 }
 
 /// What the richest hypothesis leaves: all numbers and every candidate's best form at once, each clip's own numbers at

@@ -12,7 +12,7 @@ use super::gap::Typical;
 pub const NUMERICS: f64 = 6.0;
 /// The same of an object's poses: what one engine's strokes leave in another's twin in a clip like most, where the
 /// paths end 2 mm and 2 degrees apart.
-pub const ROUGHNESS: f64 = 9.0;
+pub const ROUGHNESS: f64 = 14.0;
 /// A cause leaves no more than this share of the gap it closes.
 pub const SUBSTITUTE: f64 = 0.03;
 

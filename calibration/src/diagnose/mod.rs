@@ -158,7 +158,8 @@ fn examine<E: Evidence>(
     let bar = Progress::new("diagnose", 100);
     bar.show(0, "baseline");
     let baseline = baseline::identify(&bench, &split, &session.cell, admitted).ok_or(DiagnoseError::NoBaseline)?;
-    let found = combine::search(&bench, &split, baseline, &bar).ok_or(DiagnoseError::NoBaseline)?;
+    let refined = |full: &[f64]| baseline::refined(&bench, &split, &session.cell, admitted, full);
+    let found = combine::search(&bench, &split, baseline, &refined, &bar).ok_or(DiagnoseError::NoBaseline)?;
     if interrupt.asked() {
         return Err(DiagnoseError::Interrupted);
     }

@@ -1,7 +1,8 @@
 //! The numbers of an effect as a person reads them: in the effect's own units, each with a 90 % interval.
 //!
 //! An interval is the wider of two: from the curvature of the weighted deviance, and from how the number moves when clips are
-//! left out one by one (jackknife).
+//! left out one by one (jackknife). Where a hit lies between a number and what is seen, the step over which its slope was
+//! taken comes on top: the answer to less than that is rough.
 
 use super::answer::Size;
 use super::evidence::Evidence;
@@ -10,7 +11,7 @@ use super::quadratic::minimum;
 use crate::forward::setting::Setting;
 use nalgebra::DMatrix;
 use std::collections::BTreeMap;
-use twin::effects::{Role, Shape};
+use twin::effects::{Role, Shape, Stage};
 
 /// Half the width of a 90 % interval of a normal number, in sigmas.
 const NINETY: f64 = 1.645;
@@ -20,6 +21,7 @@ const NINETY: f64 = 1.645;
 pub fn of_effect<E: Evidence>(bench: &Bench<'_, E>, hypothesis: &Hypothesis, effect: usize) -> BTreeMap<String, Size> {
     let spread = spread(bench, hypothesis);
     let candidate = &bench.library.candidates[effect];
+    let rough = candidate.effect.stage != Stage::Control;
     let mut sizes = BTreeMap::new();
     for parameter in candidate.effect.parameters {
         let mut size = Size { values: Vec::new(), ci90: Vec::new(), unit: parameter.unit.to_owned() };
@@ -32,6 +34,7 @@ pub fn of_effect<E: Evidence>(bench: &Bench<'_, E>, hypothesis: &Hypothesis, eff
             }
             let value = hypothesis.full[k];
             let sigma = hypothesis.free.iter().position(|free| *free == k).map_or(0.0, |place| spread[place]);
+            let sigma = if rough && sigma > 0.0 { sigma.hypot(bench.library.unknowns[k].step) } else { sigma };
             let interval = [value - NINETY * sigma, value + NINETY * sigma];
             let (value, interval) = readable(value, interval, inverse, parameter.possible);
             size.values.push(value);

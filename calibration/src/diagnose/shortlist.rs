@@ -14,6 +14,8 @@ pub struct Scored {
     pub alternative: usize,
     /// Units of that form's probes.
     pub units: Vec<f64>,
+    /// The forms next to the best, with their units.
+    pub next: Vec<(usize, Vec<f64>)>,
     /// By how much the deviance would fall.
     pub gain: f64,
     /// Numbers that the gain costs.
@@ -28,6 +30,9 @@ pub struct Scored {
 
 /// Below this projected signal the clips cannot show a candidate [sigma].
 pub const TESTABLE: f64 = 3.0;
+
+/// So many forms next to the best are remembered.
+const NEXT: usize = 3;
 
 /// Prior precision that keeps baseline numbers within their known ranges, added to a form's diagonal.
 pub fn hold_numbers(form: &mut DMatrix<f64>, columns: &[Column], library: &Library) {
@@ -67,9 +72,16 @@ pub fn score(swept: &Swept, sum: &DMatrix<f64>, library: &Library) -> Vec<Scored
             let cost = free.len() + alternative.form.len().min(1);
             let cosine = (found.gain.max(0.0) / left[(0, 0)].max(f64::MIN_POSITIVE)).sqrt().min(1.0);
             let p = chance(found.gain, cost);
-            Some(Scored { candidate, alternative: a, units: found.at, gain: found.gain, cost, cosine, signal, p })
+            let (units, next) = (found.at, Vec::new());
+            Some(Scored { candidate, alternative: a, units, next, gain: found.gain, cost, cosine, signal, p })
         });
-        scored.extend(forms.max_by(|a, b| a.gain.total_cmp(&b.gain)));
+        let mut forms: Vec<Scored> = forms.collect();
+        forms.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+        let mut forms = forms.into_iter();
+        if let Some(best) = forms.next() {
+            let next = forms.take(NEXT).map(|form| (form.alternative, form.units)).collect();
+            scored.push(Scored { next, ..best });
+        }
     }
     scored.sort_by(|a, b| worth(b).total_cmp(&worth(a)));
     scored

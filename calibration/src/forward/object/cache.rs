@@ -1,6 +1,7 @@
-//! What was simulated of a clip and can be used again: the arm's way to the object, and the hit.
+//! What was simulated of a clip and can be used again: the arm's way to the object, the hit, and the whole.
 
-use super::rollout::Path;
+use super::own::Values;
+use super::rollout::{Outcome, Path};
 use nalgebra::Isometry3;
 use shared_mem::theta::{ArmTheta, EffectTheta, Theta};
 use std::collections::VecDeque;
@@ -12,6 +13,8 @@ use twin::rollout::{CellTrace, Checkpoint};
 const HITS: usize = 32;
 /// Approaches kept for a clip.
 const APPROACHES: usize = 4;
+/// Whole runs kept for a clip: a search asks again where it has just been, or with another clock.
+const OUTCOMES: usize = 12;
 
 /// All that counts until the tool touches the object.
 #[derive(Debug, Clone, PartialEq)]
@@ -53,6 +56,15 @@ pub(super) struct ClipCache {
 struct Kept {
     approaches: VecDeque<Arc<Approach>>,
     hits: VecDeque<Arc<Hit>>,
+    outcomes: VecDeque<Arc<Run>>,
+}
+
+/// A whole run: its parameters, the clip's own numbers that a simulation feels, what came of it.
+#[derive(Debug)]
+struct Run {
+    theta: Theta,
+    own: Values,
+    outcome: Arc<Outcome>,
 }
 
 impl ArmKey {
@@ -96,6 +108,22 @@ impl ClipCache {
             kept.hits.push_front(Arc::clone(&hit));
         });
         hit
+    }
+
+    pub(super) fn outcome(&self, theta: &Theta, own: &Values) -> Option<Arc<Outcome>> {
+        let own = own.felt();
+        let same = |run: &&Arc<Run>| run.own == own && run.theta == *theta;
+        self.with(|kept| kept.outcomes.iter().find(same).map(|run| Arc::clone(&run.outcome)))
+    }
+
+    pub(super) fn keep_outcome(&self, theta: Theta, own: &Values, outcome: Outcome) -> Arc<Outcome> {
+        let outcome = Arc::new(outcome);
+        let run = Arc::new(Run { theta, own: own.felt(), outcome: Arc::clone(&outcome) });
+        self.with(|kept| {
+            kept.outcomes.truncate(OUTCOMES - 1);
+            kept.outcomes.push_front(run);
+        });
+        outcome
     }
 
     fn with<T>(&self, look: impl FnOnce(&mut Kept) -> T) -> T {

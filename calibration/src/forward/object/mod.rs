@@ -35,7 +35,7 @@ use rollout::{Job, Outcome};
 use shared_mem::cell::{Cell, PoseNoise};
 use shared_mem::frames::{Base, Object, Pose};
 use shared_mem::recording::Clip;
-use std::sync::Mutex;
+use std::sync::{Arc, Mutex};
 use twin::effects::CameraMemory;
 use twin::rollout::CellRollout;
 use twin::sim::SimError;
@@ -159,14 +159,17 @@ impl ObjectClips {
         &self.clips[clip].recorded
     }
 
-    fn outcome(&self, clip: usize, shared: &[f64], own: &Values) -> Result<Outcome, Impossible> {
-        let idle = self.workers.lock().expect("no rollout has panicked").pop();
-        let mut worker = idle.unwrap_or_else(|| self.worker.clone());
+    fn outcome(&self, clip: usize, shared: &[f64], own: &Values) -> Result<Arc<Outcome>, Impossible> {
         let theta = self.settings.theta(shared);
         let (clip, cache) = (&self.clips[clip], &self.caches[clip]);
+        if let Some(outcome) = cache.outcome(&theta, own) {
+            return Ok(outcome);
+        }
+        let idle = self.workers.lock().expect("no rollout has panicked").pop();
+        let mut worker = idle.unwrap_or_else(|| self.worker.clone());
         let outcome = Job { cell: &self.cell, clip, theta: &theta, own, worker: &mut worker, cache }.run();
         self.workers.lock().expect("no rollout has panicked").push(worker);
-        outcome
+        Ok(cache.keep_outcome(theta, own, outcome?))
     }
 
     /// Measured less predicted, row by row as [`Self::rows`] says [m, rad].

@@ -172,6 +172,13 @@ impl Values {
         ALL.iter().position(|other| *other == own).map_or(0.0, |i| self.0[i])
     }
 
+    /// Those that a simulation feels: all but the clock, which only says when it is looked at.
+    pub(super) fn felt(&self) -> Self {
+        let mut felt = *self;
+        ALL.iter().zip(&mut felt.0).filter(|(own, _)| **own == Own::Clock).for_each(|(_, value)| *value = 0.0);
+        felt
+    }
+
     /// Those along an axis, as a vector.
     pub(super) fn vector(&self, own: impl Fn(Axis) -> Own) -> nalgebra::Vector3<f64> {
         nalgebra::Vector3::from([Axis::X, Axis::Y, Axis::Z].map(|axis| self.of(own(axis))))
