@@ -5,7 +5,7 @@ use super::evidence::{Evidence, Row};
 use super::fit::{Bench, Effort, Hypothesis};
 use super::floor;
 use super::gap::Residuals;
-use super::leftovers::{Left, ROUGHNESS};
+use super::leftovers::{Left, NUMERICS, ROUGHNESS};
 use super::score::{Advantage, Foretold, foretell};
 use super::shortlist::{self, Scored, TESTABLE};
 use super::split::Split;
@@ -137,7 +137,7 @@ fn spent<E: Evidence>(bench: &Bench<'_, E>, split: &Split, steps: &[Step]) -> bo
     let (Some(before), Some(after)) = (typical(first), typical(now)) else { return false };
     Left::of_groups(&before, &after)
         .iter()
-        .all(|left| left.after - left.floor <= left.numerics.max(NUMERICS_SHARE * (left.before - left.floor)))
+        .all(|left| left.after - left.floor <= NUMERICS.max(NUMERICS_SHARE * (left.before - left.floor)))
 }
 
 impl Step {
