@@ -80,11 +80,11 @@ pub fn not_testable(why: &str) -> Verdict {
 
 #[cfg(test)]
 mod tests {
-    use super::super::leftovers::NUMERICS;
+    use super::super::leftovers::{NUMERICS, SUBSTITUTE};
     use super::*;
 
     fn finding<'a>(effects: Vec<&'a str>, before: f64, after: f64) -> Finding<'a> {
-        let left = vec![Left { before, after, floor: 1.0, numerics: NUMERICS }];
+        let left = vec![Left { before, after, floor: 1.0, numerics: NUMERICS, substitute: SUBSTITUTE }];
         Finding { effects, rivals: Vec::new(), confidence: 0.95, left, at_bounds: false, place: "joint2".into() }
     }
 
