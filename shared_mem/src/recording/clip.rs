@@ -137,7 +137,7 @@ pub(super) fn joints(
     let ordered = measured.log.finish(measured.topic, wanted).map_err(fail(measured.topic))?;
     let names = ordered.names;
     let mut warnings = ordered.warnings;
-    let (measured_series, found) =
+    let (mut measured_series, found) =
         checks::joints(ordered.series, measured.topic, &names).map_err(fail(measured.topic))?;
     warnings.extend(found);
     let wanted = match wanted {
@@ -146,11 +146,12 @@ pub(super) fn joints(
     };
     let ordered = desired.log.finish(desired.topic, wanted).map_err(fail(desired.topic))?;
     warnings.extend(ordered.warnings);
-    let (desired_series, found) = checks::joints(ordered.series, desired.topic, &names).map_err(fail(desired.topic))?;
+    let (mut desired_series, found) =
+        checks::joints(ordered.series, desired.topic, &names).map_err(fail(desired.topic))?;
     warnings.extend(found);
     for (series, topic) in [(&measured_series, measured.topic), (&desired_series, desired.topic)] {
         warnings.extend(checks::gaps(&series.stamps_ns, topic));
     }
-    warnings.extend(checks::pair(&desired_series, &measured_series));
+    warnings.extend(checks::pair(&mut desired_series, &mut measured_series));
     Ok(Joints { names, desired: desired_series, measured: measured_series, warnings })
 }

@@ -2,18 +2,17 @@
 //!
 //! Units: rad, rad/s, N m, ns. Called for every series that was read from a file.
 
+mod clocks;
+mod degrees;
 mod object;
 mod wraps;
 
 pub(super) use object::object;
 
 use super::series::JointSeries;
-use std::f64::consts::TAU;
 
 /// Largest share of rows that may be left out before reading fails.
 const LARGEST_BAD_SHARE: f64 = 0.01;
-/// Beyond this a joint position is no plausible angle in radians [rad].
-const LARGEST_ANGLE: f64 = 1.5 * TAU;
 
 /// Mends a joint series and tells what was found; fails with a sentence when too much of it is unusable.
 pub(super) fn joints(
@@ -27,26 +26,21 @@ pub(super) fn joints(
     unlogged_block(&mut series.dq, (dof, moves), topic, "velocities", &mut warnings);
     unlogged_block(&mut series.tau, (dof, moves), topic, "torques", &mut warnings);
     series = drop_non_finite(&series, topic, names, &mut warnings)?;
+    if let Some((kept, told)) = clocks::one_time(&series.stamps_ns, topic) {
+        series = series.select_rows(&kept.collect::<Vec<_>>());
+        warnings.push(told);
+    }
     series = sort(series, topic, &mut warnings);
     series = drop_glitch(series, topic, &mut warnings);
     series = wraps::unwrap(series, topic, &mut warnings);
     warnings.extend(interleaved(&series, topic));
-    warnings.extend(degrees(&series, topic));
+    warnings.extend(degrees::beyond_turns(&series, topic));
     Ok((series, warnings))
 }
 
 /// Faults that only show when the two topics are laid side by side.
-pub(super) fn pair(desired: &JointSeries, measured: &JointSeries) -> Vec<String> {
-    let mut warnings = Vec::new();
-    let rms = |series: &JointSeries| (series.q.iter().map(|v| v * v).sum::<f64>() / series.q.len() as f64).sqrt();
-    let ratio = rms(desired) / rms(measured);
-    for (ratio, which) in [(ratio, "desired"), (1.0 / ratio, "measured")] {
-        if (40.0..80.0).contains(&ratio) {
-            warnings.push(format!(
-                "the {which} positions are {ratio:.0} times the others: that topic is in degrees; record radians"
-            ));
-        }
-    }
+pub(super) fn pair(desired: &mut JointSeries, measured: &mut JointSeries) -> Vec<String> {
+    let mut warnings: Vec<String> = degrees::against_each_other(desired, measured).into_iter().collect();
     let (Some(d0), Some(d1)) = (desired.stamps_ns.first(), desired.stamps_ns.last()) else { return warnings };
     let (Some(m0), Some(m1)) = (measured.stamps_ns.first(), measured.stamps_ns.last()) else { return warnings };
     if d1 < m0 || m1 < d0 {
@@ -179,17 +173,6 @@ fn interleaved(series: &JointSeries, topic: &str) -> Option<String> {
         format!(
             "`{topic}`: positions jump there and back in {worst} of {n} rows: two nodes publish on it; record one of \
              them only"
-        )
-    })
-}
-
-fn degrees(series: &JointSeries, topic: &str) -> Option<String> {
-    let beyond = (0..series.len()).filter(|&i| series.q_row(i).iter().any(|q| q.abs() > LARGEST_ANGLE)).count();
-    (series.len() > 1 && beyond * 2 > series.len()).then(|| {
-        format!(
-            "`{topic}`: {beyond} of {} rows hold positions beyond {LARGEST_ANGLE:.1} rad: probably degrees; record \
-             radians",
-            series.len()
         )
     })
 }

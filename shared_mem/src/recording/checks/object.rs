@@ -1,6 +1,6 @@
 //! Checks of the object's poses. Base frame, metres.
 
-use super::{gaps, left_out, order_sentence};
+use super::{clocks, gaps, left_out, order_sentence};
 use crate::frames::{Base, Object, Pose};
 use crate::recording::series::ObjectSeries;
 
@@ -20,6 +20,10 @@ pub(in super::super) fn object(
     if let Some(first) = first_bad {
         let what = format!("the pose of row {first} is not finite or no rotation");
         warnings.push(left_out(topic, total - good.len(), total, &what)?);
+    }
+    if let Some((kept, told)) = clocks::one_time(&good.iter().map(|(stamp, _)| *stamp).collect::<Vec<_>>(), topic) {
+        good = good.get(kept).map(<[_]>::to_vec).unwrap_or_default();
+        warnings.push(told);
     }
     let unsorted = good.windows(2).filter(|w| matches!(w, [a, b] if b.0 < a.0)).count();
     good.sort_by_key(|(stamp, _)| *stamp);
