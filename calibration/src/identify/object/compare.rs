@@ -188,31 +188,105 @@ fn mean_loss(loss: &SurfaceLoss<'_>, numbers: &[f64]) -> Result<f64, ObjectError
     Ok(sum / rows.max(1) as f64)
 }
 
+/// Width of a column that holds the name of a way of searching.
+const COLUMN: usize = 34;
+
 impl Comparison {
-    /// Two tables: errors on clips held out, a row a clip and their mean, a column a way of searching; and what each cost.
+    /// Three tables: ADD and ADD-S on clips held out, a row a clip and their mean, a column a way of searching; and what
+    /// each way cost.
     #[must_use]
     pub fn table(&self) -> String {
         let mut out = String::new();
-        let names: Vec<&str> = self.methods.iter().map(|method| method.name.as_str()).collect();
-        let _ = writeln!(out, "{:<16} ADD [cm] / ADD-S [cm] on clips held out: {}", "clip", names.join(" | "));
-        let cell = |add: f64, add_s: f64| format!("{:>7.2} /{:>5.2}", add * 1e2, add_s * 1e2);
-        for (row, (file, ..)) in self.methods.first().map_or(&[][..], |m| &m.clips[..]).iter().enumerate() {
-            let cells = self.methods.iter().map(|m| cell(m.clips[row].1, m.clips[row].2)).collect::<Vec<_>>();
-            let _ = writeln!(out, "{file:<16} {}", cells.join(" |"));
-        }
-        let mean =
-            |m: &Method| cell(m.holdout.object_add_m.unwrap_or(f64::NAN), m.holdout.object_add_s_m.unwrap_or(f64::NAN));
-        let means: Vec<String> = self.methods.iter().map(mean).collect();
-        let _ = writeln!(out, "{:<16} {}\n", "mean", means.join(" |"));
-        let _ = writeln!(out, "{:<32}{:>10}{:>9}{:>12}   to the swarm's loss", "way", "clips", "s", "loss [mm]");
+        self.errors(&mut out, "ADD", |figures| figures.object_add_m, |clip| clip.1);
+        self.errors(&mut out, "ADD-S", |figures| figures.object_add_s_m, |clip| clip.2);
+        let _ = writeln!(
+            out,
+            "{:<COLUMN$}{:>9}{:>9}{:>12}   to the swarm's loss",
+            "what it cost", "clips", "s", "loss [mm]"
+        );
         for m in &self.methods {
             let to = m.to_target.map_or("never".into(), |(n, s)| format!("{n} clips, {s:.1} s"));
-            let _ =
-                writeln!(out, "{:<32}{:>10}{:>9.1}{:>12.3}   {to}", m.name, m.evaluations, m.seconds, m.loss_m * 1e3);
+            let _ = writeln!(
+                out,
+                "{:<COLUMN$}{:>9}{:>9.1}{:>12.3}   {to}",
+                m.name,
+                m.evaluations,
+                m.seconds,
+                m.loss_m * 1e3
+            );
         }
-        if let Some(fewer) = self.fewer {
-            let _ = writeln!(out, "least squares took {fewer:.1} times fewer clips than the swarm to the same loss");
-        }
+        let _ = match self.fewer {
+            Some(fewer) => {
+                writeln!(out, "least squares simulated {fewer:.1} times fewer clips than the swarm for the same loss")
+            }
+            None => writeln!(out, "least squares did not come down to the swarm's loss"),
+        };
         out
+    }
+
+    /// One error: a row a clip, a column a way of searching.
+    fn errors(
+        &self,
+        out: &mut String,
+        name: &str,
+        mean: impl Fn(&Figures) -> Option<f64>,
+        of: impl Fn(&(String, f64, f64)) -> f64,
+    ) {
+        let widths: Vec<usize> = self.methods.iter().map(|m| m.name.len() + 2).collect();
+        let mut line = |title: &str, cells: Vec<String>| {
+            let cells: String = cells.iter().zip(&widths).map(|(cell, width)| format!("{cell:>width$}")).collect();
+            let _ = writeln!(out, "{title:<COLUMN$}{cells}");
+        };
+        let centimetres = |metres: f64| format!("{:.3}", metres * 1e2);
+        line(&format!("{name} on clips held out [cm]"), self.methods.iter().map(|m| m.name.clone()).collect());
+        let clips = self.methods.first().map_or(&[][..], |m| &m.clips[..]);
+        for (row, (file, ..)) in clips.iter().enumerate() {
+            line(
+                file,
+                self.methods
+                    .iter()
+                    .map(|m| m.clips.get(row).map_or_else(String::new, |c| centimetres(of(c))))
+                    .collect(),
+            );
+        }
+        let means = self.methods.iter().map(|m| mean(&m.holdout).map_or_else(|| "-".into(), centimetres));
+        line("mean", means.collect());
+        out.push('\n');
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn errors_stand_under_the_way_they_belong_to() {
+        let method = |name: &str, add: f64, to_target| Method {
+            name: name.into(),
+            evaluations: 120,
+            seconds: 1.5,
+            loss_m: 0.005,
+            to_target,
+            holdout: Figures { object_add_m: Some(add), object_add_s_m: Some(0.5 * add), ..Figures::default() },
+            clips: vec![("clip_03.mcap".into(), add, 0.5 * add)],
+            ..Method::default()
+        };
+        let methods = vec![method("least squares", 0.0028, Some((40, 0.5))), method("particle swarm", 0.0139, None)];
+        let table = Comparison { methods, fewer: Some(12.0), ..Comparison::default() }.table();
+        let expected = "\
+ADD on clips held out [cm]          least squares  particle swarm
+clip_03.mcap                                0.280           1.390
+mean                                        0.280           1.390
+
+ADD-S on clips held out [cm]        least squares  particle swarm
+clip_03.mcap                                0.140           0.695
+mean                                        0.140           0.695
+
+what it cost                          clips        s   loss [mm]   to the swarm's loss
+least squares                           120      1.5       5.000   40 clips, 0.5 s
+particle swarm                          120      1.5       5.000   never
+least squares simulated 12.0 times fewer clips than the swarm for the same loss
+";
+        assert_eq!(table, expected);
     }
 }
