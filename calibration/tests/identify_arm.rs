@@ -155,6 +155,43 @@ fn what_follows_a_jump_of_the_robots_clock_is_left_out_and_told() {
 }
 
 #[test]
+fn rows_of_another_clock_are_left_out_with_the_remedy() {
+    let cell = cell();
+    let truth = hidden(&cell, 12);
+    let mut recorded = clips(&cell, &truth, 3, SECONDS, 12);
+    recorded[1].measured.stamps_ns.iter_mut().for_each(|stamp| *stamp += 3_600_000_000_000);
+    let found = identify(&cell, recorded).expect("an answer");
+    let told = |warning: &String| warning.contains("clip_01.mcap: commands and measured joints do not overlap in time");
+    assert!(found.warnings.iter().any(told), "{:?}", found.warnings);
+    assert!(judge(&found, &truth).2 < 1e-2);
+}
+
+#[test]
+fn clips_of_two_robots_are_told_from_those_of_one() {
+    let cell = cell();
+    let truths = [13, 14].map(|seed| hidden(&cell, seed));
+    let told = |found: &Identification| found.warnings.iter().any(|warning| warning.contains("not of one robot"));
+    let one = clips(&cell, &truths[0], 4, SECONDS, 13);
+    let mut both = clips(&cell, &truths[1], 6, SECONDS, 14);
+    both.splice(..3, one[..3].iter().cloned());
+    assert!(told(&identify(&cell, both).expect("an answer")));
+    assert!(!told(&identify(&cell, one).expect("an answer")));
+}
+
+#[test]
+fn joints_that_come_late_as_a_whole_are_told_with_the_effect_to_search() {
+    let cell = cell();
+    let truth = hidden(&cell, 15);
+    let mut recorded = clips(&cell, &truth, 3, SECONDS, 15);
+    for clip in &mut recorded {
+        clip.desired.stamps_ns.iter_mut().for_each(|stamp| *stamp -= 12_000_000);
+    }
+    let found = identify(&cell, recorded).expect("an answer");
+    let told = |warning: &String| warning.contains("--also command_delay");
+    assert!(found.warnings.iter().any(told), "{:?}", found.warnings);
+}
+
+#[test]
 fn a_swarm_and_an_evolution_strategy_lower_the_loss_within_their_budget() {
     let cell = cell();
     let truth = hidden(&cell, 9);

@@ -36,7 +36,7 @@ pub fn examine(world: &World, clips: Vec<Clip>, interrupt: &Interrupt) -> Result
         clips: clips.iter().map(entry).collect(),
     };
     let with_object = clips.iter().all(|clip| clip.kind == ClipKind::ControlHitSlide);
-    let admitted = Admitted { groups: split::by_command(&clips), clips, files, with_object };
+    let admitted = Admitted { groups: split::by_command(&clips), clips, files, with_object, warnings: Vec::new() };
     let options = Options { theta: None, seed: world.number };
     let found = diagnose_clips(&session, &admitted, &options, interrupt)?;
     let base = setting::complete(&world.cell, None)?;

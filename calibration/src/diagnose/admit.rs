@@ -1,7 +1,10 @@
 //! Whether the recorded clips can be diagnosed at all; if not, what is missing.
 
 use super::split;
-use shared_mem::cell::ClipKind;
+use crate::forward::arm::one_piece;
+use crate::identify::object::screen::{Screened, screened};
+use crate::identify::remarks::grouped;
+use shared_mem::cell::{Cell, ClipKind};
 use shared_mem::recording::{Clip, ReadError, Session};
 use twin::arm::{ArmModel, ModelError};
 
@@ -16,6 +19,8 @@ pub struct Admitted {
     pub groups: Vec<Vec<usize>>,
     /// Whether every clip has an object.
     pub with_object: bool,
+    /// What a reader has to know about the clips, one sentence each.
+    pub warnings: Vec<String>,
 }
 
 /// Why a session cannot be diagnosed.
@@ -41,41 +46,64 @@ const FEWEST: usize = 4;
 /// [`Refused`] with what is missing.
 pub fn admit(session: &Session) -> Result<Admitted, Refused> {
     let arm = session.cell.robot.as_ref().map(|_| ArmModel::from_cell(&session.cell)).transpose()?;
-    let (mut clips, mut files, mut broken) = (Vec::new(), Vec::new(), Vec::new());
+    let (mut clips, mut files, mut out, mut remarks) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
     for entry in &session.clips {
         let file = entry.file.to_string_lossy().into_owned();
-        match session.read(entry).and_then(|clip| in_model_order(clip, arm.as_ref())) {
-            Ok(clip) => {
+        let read = session.read(entry).map_err(|error| error.to_string());
+        match read.and_then(|clip| looked_at(clip, &session.cell, arm.as_ref())) {
+            Ok((clip, odd)) => {
                 clips.push(clip);
+                remarks.extend(odd.into_iter().map(|remark| (file.clone(), remark)));
                 files.push(file);
             }
-            Err(error) => broken.push(format!("{file}: {error}")),
+            Err(why) => out.push((file, why)),
         }
     }
-    if clips.is_empty() && !broken.is_empty() {
-        return Err(Refused::NotTestable(format!("no clip can be read: {}", broken.join("; "))));
+    let reasons = grouped(out.iter().map(|(file, why)| (file.as_str(), why.as_str()))).join("; ");
+    if clips.is_empty() && !out.is_empty() {
+        return Err(Refused::NotTestable(format!("no clip can be used: {reasons}")));
     }
     check_channels(&clips)?;
     let groups = split::by_command(&clips);
     if groups.len() < FEWEST {
+        let without = if out.is_empty() { String::new() } else { format!(" (left out: {reasons})") };
         return Err(Refused::NotTestable(format!(
-            "{} clips with {} different commands: at least {FEWEST} different commands are needed to fit, to choose and to \
-             confirm on clips of their own; record more clips with other motions",
+            "{} clips with {} different commands{without}: at least {FEWEST} different commands are needed to fit, to \
+             choose and to confirm on clips of their own; record more clips with other motions",
             clips.len(),
             groups.len()
         )));
     }
+    let mut warnings = grouped(remarks.iter().map(|(file, remark)| (file.as_str(), remark.as_str())));
+    if !out.is_empty() {
+        let all = out.len() + clips.len();
+        warnings.insert(0, format!("{} of {all} clips were left out: {reasons}", out.len()));
+    }
     let with_object = clips.iter().all(|clip| clip.kind == ClipKind::ControlHitSlide);
-    Ok(Admitted { clips, files, groups, with_object })
+    Ok(Admitted { clips, files, groups, with_object, warnings })
 }
 
-fn in_model_order(mut clip: Clip, arm: Option<&ArmModel>) -> Result<Clip, ReadError> {
-    let Some(arm) = arm else { return Ok(clip) };
-    // Own recordings of an arm whose joints have no names number them.
-    if clip.joint_names.iter().enumerate().all(|(i, name)| *name == format!("joint{}", i + 1)) {
-        clip.joint_names = arm.joint_names().to_vec();
+/// The clip with what could be mended mended and its joints in the model's order, and what is odd about it; the reason why
+/// it cannot be used otherwise.
+fn looked_at(mut clip: Clip, cell: &Cell, arm: Option<&ArmModel>) -> Result<(Clip, Vec<String>), String> {
+    let mut remarks: Vec<String> = clip.warnings.iter().chain(&clip.damage).cloned().collect();
+    // What a session lacks as a whole is said of the session.
+    let complete = !clip.measured.is_empty() && !clip.desired.is_empty();
+    if let Some(arm) = arm.filter(|_| complete) {
+        // Own recordings of an arm whose joints have no names number them.
+        if clip.joint_names.iter().enumerate().all(|(i, name)| *name == format!("joint{}", i + 1)) {
+            clip.joint_names = arm.joint_names().to_vec();
+        }
+        (clip, remarks) = one_piece(clip, cell, arm).map_err(|why| why.to_string())?;
     }
-    if clip.measured.is_empty() { Ok(clip) } else { clip.reorder(arm.joint_names()) }
+    if clip.kind == ClipKind::Excitation || clip.object.is_empty() {
+        return Ok((clip, remarks));
+    }
+    (clip.warnings, clip.damage) = (Vec::new(), None);
+    let Screened { clip, remarks: odd, unusable, elsewhere } = screened(clip, cell);
+    // Poses elsewhere than the tool may be what is to be found: a camera that looks from another place.
+    remarks.extend(odd.into_iter().chain(elsewhere));
+    unusable.map_or(Ok((clip, remarks)), Err)
 }
 
 fn check_channels(clips: &[Clip]) -> Result<(), Refused> {
@@ -91,4 +119,74 @@ fn check_channels(clips: &[Clip]) -> Result<(), Refused> {
         return lacks("object poses", "log the object's pose, or set the clips' kind to \"excitation\"");
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::benchmark::session::record;
+    use crate::benchmark::world::{Fault, Kind, World};
+    use nalgebra::Translation3;
+    use shared_mem::frames::Pose;
+    use shared_mem::toml_file;
+    use std::path::Path;
+
+    fn recorded(kind: Kind) -> (Cell, ArmModel, Clip) {
+        let text = include_str!("../../../config/fr3_cell.toml");
+        let cell = toml_file::parse(text, Path::new("fr3_cell.toml")).expect("the shipped file");
+        let world = World::draw(3, kind, Fault::Nothing, &cell);
+        let clip = record(&world, 1).expect("a session").swap_remove(0);
+        let arm = ArmModel::from_cell(&world.cell).expect("an arm");
+        (world.cell, arm, clip)
+    }
+
+    fn without_commands(clip: &mut Clip, rows: std::ops::Range<usize>) {
+        let dof = clip.desired.dof;
+        let desired = &mut clip.desired;
+        desired.stamps_ns.drain(rows.clone());
+        for values in [&mut desired.q, &mut desired.dq, &mut desired.tau] {
+            if !values.is_empty() {
+                values.drain(rows.start * dof..rows.end * dof);
+            }
+        }
+    }
+
+    #[test]
+    fn a_clip_without_faults_is_taken_as_it_is() {
+        for kind in [Kind::Excitation, Kind::Strokes] {
+            let (cell, arm, clip) = recorded(kind);
+            let (taken, remarks) = looked_at(clip.clone(), &cell, Some(&arm)).expect("a usable clip");
+            assert_eq!((&taken.measured, &taken.object), (&clip.measured, &clip.object));
+            assert!(remarks.is_empty(), "{remarks:?}");
+        }
+    }
+
+    #[test]
+    fn of_a_motion_with_a_hole_in_its_commands_the_longest_piece_is_taken_and_a_stroke_is_left_out() {
+        let (cell, arm, mut clip) = recorded(Kind::Excitation);
+        let rows = clip.desired.len();
+        without_commands(&mut clip, rows / 4..rows / 4 + 200);
+        let (taken, remarks) = looked_at(clip, &cell, Some(&arm)).expect("a usable clip");
+        assert!((rows / 2..rows * 3 / 4).contains(&taken.measured.len()), "{} of {rows}", taken.measured.len());
+        assert!(remarks.iter().any(|remark| remark.contains("no commands for 0.20")), "{remarks:?}");
+        let (cell, arm, mut clip) = recorded(Kind::Strokes);
+        without_commands(&mut clip, rows / 4..rows / 4 + 200);
+        let why = looked_at(clip, &cell, Some(&arm)).expect_err("a reason");
+        assert!(why.contains("no commands for 0.20") && why.contains("record it again"), "{why}");
+    }
+
+    #[test]
+    fn a_dead_joint_is_a_reason_and_poses_elsewhere_are_a_remark() {
+        let (cell, arm, mut clip) = recorded(Kind::Excitation);
+        let stays = clip.measured.q[3];
+        clip.measured.q.iter_mut().skip(3).step_by(7).for_each(|q| *q = stays);
+        let why = looked_at(clip, &cell, Some(&arm)).expect_err("a reason");
+        assert!(why.contains("joint 4") && why.contains("enabled"), "{why}");
+        let (cell, arm, mut clip) = recorded(Kind::Strokes);
+        for pose in &mut clip.object.poses {
+            *pose = Pose::from_isometry(Translation3::new(0.0, 0.4, 0.0) * pose.isometry());
+        }
+        let (_, remarks) = looked_at(clip, &cell, Some(&arm)).expect("a clip");
+        assert!(remarks.iter().any(|remark| remark.contains("never comes nearer")), "{remarks:?}");
+    }
 }

@@ -22,6 +22,8 @@ pub struct Diagnosis {
     pub next_experiment: String,
     /// Which clips were used for what.
     pub clips: Clips,
+    /// What a reader has to know about the clips, one sentence each.
+    pub warnings: Vec<String>,
     /// Wall-clock time [s].
     pub seconds: f64,
     /// The session's folder.

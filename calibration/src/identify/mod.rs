@@ -7,11 +7,13 @@
 //! | [`object`] | friction, mass, centre of mass and tip friction of the object |
 //! | [`split`] | which clips are fitted and which are held out |
 //! | [`answer`] | what is found, as JSON, as a page, as lines for a terminal |
+//! | `remarks` | what is odd about clips, told once for all that share it |
 //! | `run` | the way of searching, its progress, its interruption and resumption |
 
 pub mod answer;
 pub mod arm;
 pub mod object;
+pub(crate) mod remarks;
 mod run;
 pub mod split;
 

@@ -21,11 +21,23 @@ pub fn identification(sheet: &Sheet) -> String {
         let before = error.before.map_or_else(String::new, |before| format!("{} -> ", short(unit.scaled(before))));
         format!("{}: {before}{}", error.name, unit.with_unit(error.after))
     }));
-    lines.extend(sheet.not_identifiable.iter().map(|[name, why]| format!("cannot tell {name}: {why}")));
+    lines.extend(untold(&sheet.not_identifiable));
     lines.extend(sheet.notes.iter().map(|note| format!("note: {note}")));
     lines.extend(sheet.advice.iter().map(|advice| format!("next: {advice}")));
     lines.push(sheet.sentence.clone());
     lines.join("\n")
+}
+
+/// What cannot be told, a line a reason.
+fn untold(all: &[[String; 2]]) -> Vec<String> {
+    let mut reasons: Vec<(&str, Vec<&str>)> = Vec::new();
+    for [name, why] in all {
+        match reasons.iter_mut().find(|(known, _)| known == why) {
+            Some((_, names)) => names.push(name),
+            None => reasons.push((why, vec![name])),
+        }
+    }
+    reasons.into_iter().map(|(why, names)| format!("cannot tell {}: {why}", names.join(", "))).collect()
 }
 
 /// A diagnosis: gap, place, candidates in question, how many others, what to do next, and the verdict.
@@ -46,6 +58,7 @@ pub fn diagnosis(diagnosis: &Diagnosis) -> String {
     if !diagnosis.candidates.is_empty() {
         lines.push(others(&diagnosis.candidates));
     }
+    lines.extend(diagnosis.warnings.iter().map(|warning| format!("note: {warning}")));
     if !diagnosis.next_experiment.is_empty() {
         lines.push(format!("next clip: {}", diagnosis.next_experiment));
     }
@@ -168,7 +181,9 @@ mod tests {
                 before: Some(0.0139),
                 after: 0.002,
             }],
-            not_identifiable: vec![["mass".into(), "the arm is much heavier; weigh it".into()]],
+            not_identifiable: ["mass", "load"]
+                .map(|name| [name.into(), "the arm is much heavier; weigh it".into()])
+                .into(),
             sentence: "The object is known.".into(),
             ..Sheet::default()
         };
@@ -176,7 +191,7 @@ mod tests {
 centre of mass, x   5.1 [4.2, 6.0] mm      began at 0
 centre of mass, y   -2.0 [-3.0, -1.0] mm   began at 0   at its lower bound
 ADD, held-out clips: 13.9 -> 2.00 mm
-cannot tell mass: the arm is much heavier; weigh it
+cannot tell mass, load: the arm is much heavier; weigh it
 The object is known.";
         assert_eq!(identification(&sheet), expected);
     }

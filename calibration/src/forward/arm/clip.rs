@@ -5,7 +5,7 @@ use shared_mem::cell::{Cell, ClipKind, PoseNoise};
 use shared_mem::msg::MAX_JOINTS;
 use shared_mem::recording::{Clip, JointSeries, ReadError};
 use shared_mem::time::seconds_between;
-use std::ops::Range;
+use std::ops::{Range, RangeInclusive};
 use twin::arm::ArmModel;
 use twin::replay::in_model_order;
 use twin::rollout::CommandTrack;
@@ -51,6 +51,22 @@ pub enum ArmClipError {
     /// Too little is left.
     #[error("only {0:.2} s of it can be simulated; at least {SHORTEST} s are needed")]
     Short(f64),
+    /// Commands and measurements are of different times.
+    #[error("commands and measured joints do not overlap in time: let one machine stamp both, then record again")]
+    Apart,
+    /// A joint does not follow.
+    #[error(
+        "joint {joint} `{name}` does not move though it is commanded; look whether it is enabled, then record again"
+    )]
+    DeadJoint {
+        /// Its number, from 1.
+        joint: usize,
+        /// Its name.
+        name: String,
+    },
+    /// It falls into pieces.
+    #[error("{0}; a stroke has to be recorded in one piece: record it again")]
+    Broken(String),
     /// No joint moves.
     #[error("no joint moves though commands ask for it; look whether the arm was enabled")]
     Dead,
@@ -73,6 +89,10 @@ pub(super) struct ArmClip {
     pub(super) warnings: Vec<String>,
     /// Bins of a witness.
     pub(super) stretch: usize,
+    /// Stretches of one clock and without a hole in the commands, from stamp to stamp [ns].
+    pieces: Vec<RangeInclusive<u64>>,
+    /// How much of it can be simulated before an object is touched [s].
+    seconds: f64,
 }
 
 impl ArmClip {
@@ -89,6 +109,10 @@ impl ArmClip {
         if rate < SLOWEST {
             return Err(ArmClipError::Slow(rate));
         }
+        let (told, rows) = (&recorded.desired.stamps_ns, &recorded.measured.stamps_ns);
+        if told.last() < rows.first() || rows.last() < told.first() {
+            return Err(ArmClipError::Apart);
+        }
         let dead = dead_joints(&recorded);
         if dead.iter().take(arm.dof()).all(|dead| *dead) {
             return Err(ArmClipError::Dead);
@@ -103,21 +127,32 @@ impl ArmClip {
             let (at, by) = (seconds_between(stamps[0], stamps[row]), seconds_between(stamps[row], stamps[row + 1]));
             warnings.push(format!("the robot's clock jumps by {by:.3} s at {at:.3} s: what follows was left out"));
         }
-        let runs = runs(&recorded, &commands, contact_ns(&recorded, cell).min(until_ns));
+        let pieces = pieces(&recorded, &commands, until_ns);
+        let runs = runs(&recorded.measured.stamps_ns, &pieces, contact_ns(&recorded, cell));
         let bins = bins(&recorded.measured.stamps_ns, &runs, step_ns);
         let left = bins.iter().map(Range::len).sum::<usize>() as f64 / rate;
-        if left < SHORTEST {
-            return Err(ArmClipError::Short(left));
-        }
         let stretches = (left / STRETCH).round().max(1.0) as usize;
         let desired_rows = desired_rows(&recorded, step_ns);
         let stretch = bins.len().div_ceil(stretches);
-        Ok(Self { recorded, commands, runs, bins, dead, desired_rows, warnings, stretch })
+        Ok(Self { recorded, commands, runs, bins, dead, desired_rows, warnings, stretch, pieces, seconds: left })
+    }
+
+    /// The clip, unless it is too short to say anything about the arm.
+    pub(super) fn long_enough(self) -> Result<Self, ArmClipError> {
+        if self.seconds < SHORTEST { Err(ArmClipError::Short(self.seconds)) } else { Ok(self) }
     }
 
     /// The last row that is simulated in one go with this one.
     pub(super) fn last_row(&self, row: usize) -> usize {
         self.runs.iter().find(|run| run.contains(&row)).map_or(row, |run| run.end - 1)
+    }
+
+    /// The longest stretch of one clock and without a hole, where there is more than one of them or something is cut off.
+    pub(super) fn longest_stretch(&self) -> Option<RangeInclusive<u64>> {
+        let last = self.recorded.desired.stamps_ns.last().copied()?;
+        let whole = matches!(&self.pieces[..], [one] if *one.end() >= last);
+        let longest = self.pieces.iter().max_by_key(|piece| piece.end().saturating_sub(*piece.start()));
+        longest.filter(|_| !whole).cloned()
     }
 
     pub(super) fn name(&self) -> String {
@@ -208,26 +243,24 @@ fn contact_ns(clip: &Clip, cell: &Cell) -> u64 {
     moved.map_or(u64::MAX, |i| clip.object.stamps_ns[i].saturating_sub(BEFORE_MOTION_NS))
 }
 
-/// From the first row with a command on to the last; behind every hole anew.
-fn runs(clip: &Clip, commands: &CommandTrack, until_ns: u64) -> Vec<Range<usize>> {
-    let (rows, desired) = (&clip.measured.stamps_ns, &clip.desired.stamps_ns);
+/// From the first command on to the last; behind every hole anew, and no further than `until_ns`.
+fn pieces(clip: &Clip, commands: &CommandTrack, until_ns: u64) -> Vec<RangeInclusive<u64>> {
+    let desired = &clip.desired.stamps_ns;
     let (Some(first), Some(last)) = (desired.first(), desired.last()) else { return Vec::new() };
     // The last command holds as long as commands usually do.
     let last = (last + usual_step(desired)).min(until_ns);
-    let mut from_ns = *first;
-    let mut runs = Vec::new();
-    let mut push = |from_ns: u64, to_ns: u64| {
-        let range = rows.partition_point(|stamp| *stamp < from_ns)..rows.partition_point(|stamp| *stamp <= to_ns);
-        if range.len() > 1 {
-            runs.push(range);
-        }
+    let starts = std::iter::once(*first).chain(commands.holes().iter().map(|hole| hole.to_ns));
+    let ends = commands.holes().iter().map(|hole| hole.from_ns.min(last)).chain(std::iter::once(last));
+    starts.zip(ends).filter(|(from, to)| from < to).map(|(from, to)| from..=to).collect()
+}
+
+/// Rows of each piece, up to `until_ns`.
+fn runs(rows: &[u64], pieces: &[RangeInclusive<u64>], until_ns: u64) -> Vec<Range<usize>> {
+    let run = |piece: &RangeInclusive<u64>| {
+        let to_ns = until_ns.min(*piece.end());
+        rows.partition_point(|stamp| stamp < piece.start())..rows.partition_point(|stamp| *stamp <= to_ns)
     };
-    for hole in commands.holes() {
-        push(from_ns, hole.from_ns.min(last));
-        from_ns = hole.to_ns;
-    }
-    push(from_ns, last);
-    runs
+    pieces.iter().map(run).filter(|run| run.len() > 1).collect()
 }
 
 fn bins(stamps_ns: &[u64], runs: &[Range<usize>], step_ns: u64) -> Vec<Range<usize>> {

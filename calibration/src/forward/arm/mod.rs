@@ -8,15 +8,18 @@
 //! | file | owns |
 //! |---|---|
 //! | `clip` | a recorded clip, prepared, or the reason why it cannot be used |
+//! | `piece` | the part of a clip that can be simulated in one go |
 //! | `noise` | how noisy a signal is |
 //! | `torque_time` | which control period a logged torque belongs to |
 #![allow(non_snake_case)] // the Franka Control Interface's own symbols
 
 mod clip;
 mod noise;
+mod piece;
 mod torque_time;
 
 pub use clip::ArmClipError;
+pub use piece::one_piece;
 
 use crate::estimate::{ClipModel, Impossible, Random};
 use clip::ArmClip;
@@ -106,7 +109,7 @@ impl<F: Fn(&[f64]) -> Theta + Sync> ArmClips<F> {
         let (mut usable, mut left_out) = (Vec::new(), Vec::new());
         for clip in clips {
             let file = clip.file.file_name().unwrap_or(clip.file.as_os_str()).to_string_lossy().into_owned();
-            match ArmClip::new(clip, cell, &nominal) {
+            match ArmClip::new(clip, cell, &nominal).and_then(ArmClip::long_enough) {
                 Ok(clip) => usable.push(clip),
                 Err(why) => left_out.push(LeftOut { file, why }),
             }

@@ -7,9 +7,11 @@
 //! | `finding` | what a fit tells, number by number |
 //! | `figures` | how far the twin is off |
 //! | `verdict` | what the clips cannot tell, and why |
+//! | `doubt` | what speaks against trusting the fit |
 //! | `advice` | what to record next |
 
 mod advice;
+mod doubt;
 mod figures;
 mod finding;
 mod session;
@@ -152,7 +154,8 @@ fn identify_material(
     answer.session = options.session.display().to_string();
     answer.optimizer = options.optimizer.name().into();
     figures::fill(&mut answer, &model, &clips, &random, [&before, &outcome.fit.shared])?;
-    answer.not_identifiable = verdict::untold(&finding, &model, &clips);
+    answer.not_identifiable = verdict::untold(&finding, &model, &clips, options.optimizer);
+    answer.warnings.extend(doubt::doubts(&answer, &finding, &model, &clips, &before));
     answer.advice = advice::next(&finding, &clips);
     clips.fill(&mut answer);
     if let Some(out) = &options.out {

@@ -5,6 +5,7 @@ use crate::estimate::{ClipModel as _, Unknown};
 use crate::forward::Setting;
 use crate::forward::arm::{Channel, LeftOut};
 use crate::identify::answer::{self, Clips, Identification};
+use crate::identify::remarks::grouped;
 use crate::identify::split::{Split, split};
 use rayon::prelude::*;
 use shared_mem::cell::{Cell, ClipKind};
@@ -53,8 +54,8 @@ pub(super) fn used(
 ) -> Result<Used, ArmError> {
     left_out.extend(unusable.into_iter().map(|clip| answer::LeftOut { file: clip.file, why: clip.why.to_string() }));
     if model.clips() == 0 {
-        let reasons: Vec<String> = left_out.iter().map(|clip| format!("{}: {}", clip.file, clip.why)).collect();
-        let why = if reasons.is_empty() { "it lists none with an arm".into() } else { reasons.join("; ") };
+        let reasons = reasons(&left_out);
+        let why = if reasons.is_empty() { "it lists none with an arm".into() } else { reasons };
         return Err(ArmError::NoClip { session: path.display().to_string(), why });
     }
     let clips: Vec<&Clip> = (0..model.clips()).map(|clip| model.clip(clip)).collect();
@@ -70,9 +71,15 @@ pub(super) fn used(
         );
     }
     if !left_out.is_empty() {
-        warnings.push(format!("{} of {} clips were left out", left_out.len(), left_out.len() + model.clips()));
+        let (out, all) = (left_out.len(), left_out.len() + model.clips());
+        warnings.push(format!("{out} of {all} clips were left out: {}", reasons(&left_out)));
     }
     Ok(Used { split, train, holdout, left_out, warnings })
+}
+
+/// Why clips were left out, in one line.
+fn reasons(left_out: &[answer::LeftOut]) -> String {
+    grouped(left_out.iter().map(|clip| (clip.file.as_str(), clip.why.as_str()))).join("; ")
 }
 
 impl Used {
@@ -84,6 +91,9 @@ impl Used {
     pub(super) fn fill(self, answer: &mut Identification) {
         answer.clips = Clips { train: self.train, holdout: self.holdout, left_out: self.left_out };
         answer.warnings.extend(self.warnings);
+        answer.warnings.extend(grouped(
+            answer.by_clip.iter().flat_map(|clip| clip.warnings.iter().map(|w| (clip.file.as_str(), w.as_str()))),
+        ));
     }
 }
 

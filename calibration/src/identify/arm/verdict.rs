@@ -5,6 +5,7 @@ use super::finding::Finding;
 use super::session::{Used, joint_of};
 use crate::forward::Setting;
 use crate::identify::answer::Untold;
+use crate::identify::run::Optimizer;
 use twin::effects::find;
 
 /// A gain whose 95 % interval is wider than this share of it, to either side, is not told.
@@ -13,13 +14,19 @@ const GAIN_SHARE: f64 = 0.25;
 const EFFECT_SHARE: f64 = 0.5;
 /// Estimates that move together this closely are told apart badly.
 const TOGETHER: f64 = 0.95;
+/// Estimates that move together this closely are one number.
+const ONE: f64 = 0.99;
+/// Of a number that is nowhere near a bound, when the search did not arrive.
+const LOST: &str = "the search ended before it arrived: gains alone do not explain these clips";
 /// An effect this near to neutral is absent, as a share of its search.
 const ABSENT: f64 = 1e-9;
 
-pub(super) fn untold(finding: &Finding<'_>, model: &Model<'_>, clips: &Used) -> Vec<Untold> {
+pub(super) fn untold(finding: &Finding<'_>, model: &Model<'_>, clips: &Used, optimizer: Optimizer) -> Vec<Untold> {
+    // A swarm ends with its budget; least squares that do not arrive have lost their way.
+    let lost = !finding.outcome.arrived && optimizer == Optimizer::LeastSquares;
     let all = 0..finding.unknowns.len();
     all.filter_map(|k| {
-        let why = why(finding, k, model, clips)?;
+        let why = why(finding, k, model, clips).or_else(|| lost.then(|| LOST.to_owned()))?;
         Some(Untold { parameter: finding.unknowns[k].name.clone(), why })
     })
     .collect()
@@ -53,6 +60,12 @@ fn why(finding: &Finding<'_>, k: usize, model: &Model<'_>, clips: &Used) -> Opti
         return None;
     }
     let percent = 100.0 * half / size;
+    if let Some((name, r)) = partner(finding, k).filter(|(_, r)| r.abs() > ONE) {
+        return Some(format!(
+            "its 95 % interval is ±{percent:.0} %: only its combination with {name} shows (correlation {r:.3}); record \
+             faster motions, and log them faster"
+        ));
+    }
     let together = partner(finding, k)
         .map_or_else(String::new, |(name, r)| format!(" it moves together with {name} (correlation {r:.2}) and"));
     Some(format!("its 95 % interval is ±{percent:.0} %:{together} {moves}; record larger and faster motions"))

@@ -1,13 +1,16 @@
 //! A session's clips with an object, sorted by their use.
 
 use super::ObjectError;
-use super::screen::screened;
+use super::screen::{Screened, screened};
+use crate::forward::arm::one_piece;
 use crate::identify::answer::{Clips, LeftOut};
+use crate::identify::remarks::grouped;
 use crate::identify::split::{Split, split};
 use rayon::prelude::*;
 use shared_mem::cell::{Cell, ClipKind};
 use shared_mem::recording::{Clip, Session};
 use std::path::Path;
+use twin::arm::ArmModel;
 
 /// A clip that can be used.
 pub(super) struct Usable {
@@ -32,24 +35,31 @@ impl Material {
         if session.cell.object.is_none() {
             return Err(ObjectError::NoObject);
         }
+        let arm = session.cell.robot.as_ref().map(|_| ArmModel::from_cell(&session.cell)).transpose()?;
         let entries: Vec<_> = session.clips.iter().filter(|clip| clip.kind != ClipKind::Excitation).collect();
         let read: Vec<_> = entries
             .par_iter()
             .map(|entry| {
                 let clip = session.read(entry).map_err(|error| error.to_string());
+                let clip = clip.and_then(|clip| in_one_piece(clip, &session.cell, arm.as_ref()));
                 (entry.file.display().to_string(), clip.map(|clip| screened(clip, &session.cell)))
             })
             .collect();
         let (mut usable, mut left_out) = (Vec::new(), Vec::new());
         for (file, answer) in read {
-            match answer {
-                Ok((clip, remarks, None)) => usable.push(Usable { file, clip, remarks }),
-                Ok((_, _, Some(why))) | Err(why) => left_out.push(LeftOut { file, why }),
-            }
+            let why = match answer {
+                Ok(Screened { clip, remarks, unusable: None, elsewhere: None }) => {
+                    usable.push(Usable { file, clip, remarks });
+                    continue;
+                }
+                Ok(Screened { unusable, elsewhere, .. }) => unusable.or(elsewhere).unwrap_or_default(),
+                Err(why) => why,
+            };
+            left_out.push(LeftOut { file, why });
         }
         if usable.is_empty() {
-            let reasons: Vec<String> = left_out.iter().map(|clip| format!("{}: {}", clip.file, clip.why)).collect();
-            let why = if reasons.is_empty() { "it lists none with an object".into() } else { reasons.join("; ") };
+            let reasons = reasons(&left_out);
+            let why = if reasons.is_empty() { "it lists none with an object".into() } else { reasons };
             return Err(ObjectError::NoClip { session: path.display().to_string(), why });
         }
         let clips: Vec<&Clip> = usable.iter().map(|usable| &usable.clip).collect();
@@ -80,8 +90,23 @@ impl Material {
         }
         if !self.left_out.is_empty() {
             let all = self.left_out.len() + self.usable.len();
-            warnings.push(format!("{} of {all} clips were left out", self.left_out.len()));
+            warnings.push(format!("{} of {all} clips were left out: {}", self.left_out.len(), reasons(&self.left_out)));
         }
+        let remarks = self.usable.iter().flat_map(|u| u.remarks.iter().map(|r| (u.file.as_str(), r.as_str())));
+        warnings.extend(grouped(remarks));
         warnings
     }
+}
+
+/// A stroke with what its arm did in one piece; the reason why it cannot be used otherwise.
+fn in_one_piece(clip: Clip, cell: &Cell, arm: Option<&ArmModel>) -> Result<Clip, String> {
+    let Some(arm) = arm.filter(|_| clip.kind == ClipKind::ControlHitSlide) else { return Ok(clip) };
+    let (clip, remarks) = one_piece(clip, cell, arm).map_err(|why| why.to_string())?;
+    // What the reader found stands first among them.
+    Ok(Clip { warnings: remarks, damage: None, ..clip })
+}
+
+/// Why clips were left out, in one line.
+fn reasons(left_out: &[LeftOut]) -> String {
+    grouped(left_out.iter().map(|clip| (clip.file.as_str(), clip.why.as_str()))).join("; ")
 }

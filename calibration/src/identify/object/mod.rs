@@ -19,7 +19,7 @@ mod finding;
 mod fit;
 mod material;
 mod paper;
-mod screen;
+pub(crate) mod screen;
 mod step;
 
 use super::answer::Identification;

@@ -14,10 +14,9 @@ use twin::scene::{ObjectModel, ObjectShape};
 
 /// A pose this far from the middle of its neighbours, and they nearer to each other, is the tracker's mistake [m].
 const JUMP: f64 = 0.04;
-/// An object that moves this far from one pose to the next...
-const STEP: f64 = 0.05;
-/// ...and faster than any arm hits was lost [m/s].
-const FASTEST: f64 = 4.0;
+/// An object that moves this much farther from one pose to the next than before or after was lost [m]: a hit makes it
+/// fast at once, but friction does not stop it at once.
+const STEP: f64 = 0.03;
 /// Share of poses that may be mistakes.
 const MOST_MISTAKES: f64 = 0.1;
 /// Longest time without a pose while the object moves [s].
@@ -33,19 +32,33 @@ const SLOWEST_TRACKER: f64 = 20.0;
 /// Turns by nearly half about an axis from one pose to the next are a box taken for itself turned over [rad].
 const FLIP: f64 = 2.6;
 
-/// The clip with what could be mended mended, remarks on it, and the reason why it cannot be used, if there is one.
-pub(super) fn screened(clip: Clip, cell: &Cell) -> (Clip, Vec<String>, Option<String>) {
+/// A clip that was looked at.
+pub(crate) struct Screened {
+    /// The clip, with what could be mended mended.
+    pub(crate) clip: Clip,
+    /// What is odd about it.
+    pub(crate) remarks: Vec<String>,
+    /// Why its poses cannot be used, if they cannot.
+    pub(crate) unusable: Option<String>,
+    /// Why its poses are not those of what the arm hits, if they are not.
+    pub(crate) elsewhere: Option<String>,
+}
+
+/// Looks at a clip.
+pub(crate) fn screened(clip: Clip, cell: &Cell) -> Screened {
     let mut remarks: Vec<String> = clip.warnings.iter().chain(&clip.damage).cloned().collect();
     let (clip, mended) = mended(clip, cell);
     remarks.extend(mended);
-    let why = unusable(&clip, cell);
+    let unusable = unusable(&clip);
+    let hits = unusable.is_none() && clip.kind == ClipKind::ControlHitSlide;
+    let elsewhere = if hits { apart(&clip, cell) } else { None };
     if let Some(rate) = rate(&clip.object).filter(|rate| *rate < SLOWEST_TRACKER) {
         remarks.push(format!(
             "the object was tracked at {rate:.0} Hz: a slide shows in a few poses, and intervals are wide; track at 30 Hz \
              or more"
         ));
     }
-    (clip, remarks, why)
+    Screened { clip, remarks, unusable, elsewhere }
 }
 
 /// Poses that are the tracker's mistakes left out, a symmetric box turned back.
@@ -106,7 +119,7 @@ fn turn_back(series: &mut ObjectSeries, cell: &Cell) -> usize {
     flips
 }
 
-fn unusable(clip: &Clip, cell: &Cell) -> Option<String> {
+fn unusable(clip: &Clip) -> Option<String> {
     let ObjectSeries { stamps_ns, poses } = &clip.object;
     if poses.len() < 10 {
         return Some(format!("it holds {} object poses; the tracker has to see the whole slide", poses.len()));
@@ -114,7 +127,9 @@ fn unusable(clip: &Clip, cell: &Cell) -> Option<String> {
     let place = |row: usize| poses[row].isometry().translation.vector;
     let seconds = |a: usize, b: usize| (stamps_ns[b] - stamps_ns[a]) as f64 * 1e-9;
     let step = |row: &usize| (place(*row) - place(row - 1)).norm();
-    if let Some(row) = (1..poses.len()).find(|row| step(row) > STEP && step(row) / seconds(row - 1, *row) > FASTEST) {
+    let speed = |row: usize| if (1..poses.len()).contains(&row) { step(&row) / seconds(row - 1, row) } else { 0.0 };
+    let jump = |row: &usize| step(row) - speed(row - 1).max(speed(row + 1)) * seconds(row - 1, *row);
+    if let Some(row) = (1..poses.len()).find(|row| jump(row) > STEP) {
         let (at, far) = (seconds(0, row), step(&row) * 1e3);
         return Some(format!(
             "the tracker lost the object: its pose jumps by {far:.0} mm at {at:.2} s and stays there"
@@ -143,7 +158,7 @@ fn unusable(clip: &Clip, cell: &Cell) -> Option<String> {
             lean.to_degrees()
         ));
     }
-    apart(clip, cell)
+    None
 }
 
 /// Tool and object never come near each other although the object moves.
@@ -213,13 +228,13 @@ mod tests {
     }
 
     fn why(change: impl Fn(usize, &mut Isometry3<f64>)) -> Option<String> {
-        screened(clip(change), &cell()).2
+        screened(clip(change), &cell()).unusable
     }
 
     #[test]
     fn a_plain_slide_is_used_without_a_remark() {
-        let (clip, remarks, why) = screened(clip(|_, _| {}), &cell());
-        assert_eq!((clip.object.len(), remarks.len(), why), (90, 0, None));
+        let Screened { clip, remarks, unusable, .. } = screened(clip(|_, _| {}), &cell());
+        assert_eq!((clip.object.len(), remarks.len(), unusable), (90, 0, None));
     }
 
     #[test]
@@ -229,8 +244,8 @@ mod tests {
                 pose.translation.vector.y += 0.05;
             }
         };
-        let (clip, remarks, why) = screened(clip(far), &cell());
-        assert_eq!((clip.object.len(), why), (88, None));
+        let Screened { clip, remarks, unusable, .. } = screened(clip(far), &cell());
+        assert_eq!((clip.object.len(), unusable), (88, None));
         assert!(remarks[0].contains("2 of 90 poses jump"), "{remarks:?}");
     }
 
@@ -238,6 +253,10 @@ mod tests {
     fn an_object_that_is_lost_is_not_hit_or_topples_is_left_out_with_the_reason() {
         let lost = why(|row, pose| pose.translation.vector.y += if row > 60 { 0.3 } else { 0.0 });
         assert!(lost.as_deref().is_some_and(|why| why.contains("lost the object")), "{lost:?}");
+        for row in [10, 50, 80] {
+            let jumped = why(|at, pose| pose.translation.vector.y += if at > row { 0.05 } else { 0.0 });
+            assert!(jumped.as_deref().is_some_and(|why| why.contains("jumps by 50 mm")), "{row}: {jumped:?}");
+        }
         let still = why(|_, pose| pose.translation.vector.x = 0.5);
         assert!(still.as_deref().is_some_and(|why| why.contains("not hit")), "{still:?}");
         let toppled = why(|row, pose| {
@@ -255,8 +274,8 @@ mod tests {
                 pose.rotation *= flip;
             }
         };
-        let (clip, remarks, why) = screened(clip(flipped), &cell());
-        assert_eq!(why, None);
+        let Screened { clip, remarks, unusable, .. } = screened(clip(flipped), &cell());
+        assert_eq!(unusable, None);
         assert!(clip.object.poses.iter().all(|pose| pose.isometry().rotation.angle() < 1e-6));
         assert!(remarks[0].contains("turned by half"), "{remarks:?}");
     }

@@ -32,6 +32,9 @@ pub fn page(diagnosis: &Diagnosis) -> String {
         @if !diagnosis.next_experiment.is_empty() {
             section { h2 { "The next clip" } p.next { (diagnosis.next_experiment) } }
         }
+        @if !diagnosis.warnings.is_empty() {
+            section { h2 { "Worth knowing" } @for warning in &diagnosis.warnings { p { (warning) } } }
+        }
         (origin(diagnosis))
     };
     let command = format!("calibration diagnose {} --seed {}", diagnosis.session, diagnosis.seed);
@@ -189,6 +192,7 @@ pub(super) mod tests {
             ],
             next_experiment: "Play a chirp up to 10 Hz.".into(),
             clips: Clips { train: vec!["clip_00.mcap".into(), "clip_01.mcap".into()], ..Clips::default() },
+            warnings: Vec::new(),
             seconds: 83.2,
             session: "monday".into(),
             seed: 7,
