@@ -9,11 +9,13 @@
 //! |---|---|
 //! | `clip` | a recorded clip, prepared, or the reason why it cannot be used |
 //! | `piece` | the part of a clip that can be simulated in one go |
+//! | `encoder_age` | how old encoder readings are when controller and log get them |
 //! | `noise` | how noisy a signal is |
 //! | `torque_time` | which control period a logged torque belongs to |
 #![allow(non_snake_case)] // the Franka Control Interface's own symbols
 
 mod clip;
+mod encoder_age;
 mod noise;
 mod piece;
 mod torque_time;
@@ -124,8 +126,8 @@ impl<F: Fn(&[f64]) -> Theta + Sync> ArmClips<F> {
         Ok((Self { cell, nominal, channels, clips: usable, sigma, torque_lead, theta, spare }, left_out))
     }
 
-    /// Where the log is too coarse to tell the state in which a clip begins, that state is the clip's own: positions,
-    /// then velocities, of all joints. Otherwise every sigma is 0.
+    /// What is a clip's own: where the log is too coarse to tell the state in which it begins, that state (positions, then
+    /// velocities, of all joints; otherwise their sigmas are 0), and how old its encoders' readings are.
     #[must_use]
     pub fn random(&self) -> Vec<Random> {
         let coarse = self.clips.iter().any(|clip| {
@@ -143,6 +145,7 @@ impl<F: Fn(&[f64]) -> Theta + Sync> ArmClips<F> {
         };
         let mut all = of("q", self.sigma[0], 1e-4);
         all.extend(of("dq", [START_VELOCITY; MAX_JOINTS], 1e-2));
+        all.push(encoder_age::random());
         all
     }
 
@@ -210,25 +213,29 @@ impl<F: Fn(&[f64]) -> Theta + Sync> ArmClips<F> {
     fn simulate(&self, clip: &ArmClip, theta: &Theta, own: &[f64], out: &mut Vec<Reading>) -> Result<(), Impossible> {
         let fail = |error: &dyn std::fmt::Display| Impossible(error.to_string());
         let effects = Effects::from_theta(&theta.effects, self.nominal.dof()).map_err(|e| fail(&e))?;
+        let age = encoder_age::of(own.get(2 * self.nominal.dof()));
+        let seen = encoder_age::controlled(&self.cell, &clip.recorded.desired, theta, age);
+        let (theta, commands) = seen.as_ref().map_or((theta, &clip.commands), |(theta, commands)| (theta, commands));
         let plant = Plant::new(&self.cell, self.nominal.clone(), Some(theta), &effects.arm).map_err(|e| fail(&e))?;
         let rollout = plant.rollout();
         let measured = &clip.recorded.measured;
         out.clear();
         out.resize(measured.len(), Reading::default());
         for (i, run) in clip.runs.iter().enumerate() {
-            let start = rollout.start_state(measured, run.start, &clip.commands);
+            let start = rollout.start_state(measured, run.start, commands);
             let mut start = start.ok_or_else(|| Impossible("no measured joints".into()))?;
             if i == 0 {
                 shift(&mut start, own, self.nominal.dof());
             }
             let stamps_ns = &measured.stamps_ns[run.clone()];
-            rollout.readings(&start, stamps_ns[0], &clip.commands, stamps_ns, &mut out[run.clone()]);
+            rollout.readings(&start, stamps_ns[0], commands, stamps_ns, &mut out[run.clone()]);
             if out[run.end - 1].state.q.iter().any(|q| !q.is_finite()) {
                 return Err(Impossible(
                     "the simulated arm diverges; the damping may be too large for a 1 kHz controller".into(),
                 ));
             }
         }
+        encoder_age::shift(age, out);
         Ok(())
     }
 }
