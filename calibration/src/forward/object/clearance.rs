@@ -2,13 +2,13 @@
 
 use nalgebra::Vector3;
 use shared_mem::cell::Cell;
-use shared_mem::frames::{Base, Object, Pose};
 use shared_mem::msg::joints_from;
 use shared_mem::recording::Clip;
 use twin::arm::ArmModel;
 use twin::effects::Effects;
 use twin::physics::TableObject;
 use twin::physics::touch::Capsule;
+use twin::replay::in_model_order;
 use twin::scene::ObjectModel;
 
 /// Tool and object are apart when the tracked gap is wider than this [m]: several sigmas of any usable tracker.
@@ -16,33 +16,44 @@ const APART: f64 = 4e-3;
 /// Rows of the arm between two looks: at a metre a second the tool moves by the width above [1].
 const STRIDE: usize = 4;
 
-/// Tool, arm and object of a cell.
-pub(super) struct Clearance {
+/// Tool, arm and object of a cell, and a clip of it.
+pub struct Clearance {
     arm: ArmModel,
     tool: Capsule,
     object: TableObject,
+    clip: Clip,
 }
 
 impl Clearance {
-    /// `None` where the cell has no arm, no tool or no object.
-    pub(super) fn new(cell: &Cell) -> Option<Self> {
+    /// `None` where the cell has no arm, no tool or no object, or the clip is of another robot.
+    #[must_use]
+    pub fn new(cell: &Cell, clip: &Clip) -> Option<Self> {
         let arm = ArmModel::from_cell(cell).ok()?;
         let tool = cell.tool.as_ref()?;
         let tool = Capsule { segment: tool.length - tool.radius, radius: tool.radius };
         let model = ObjectModel::new(cell, None).ok()??;
         let object = TableObject::new(&model, None, &Effects::default()).ok()?;
-        Some(Self { arm, tool, object })
+        let clip = in_model_order(clip.clone(), &arm).ok()?;
+        (!clip.measured.is_empty()).then_some(Self { arm, tool, object, clip })
     }
 
-    /// Whether the tool at `q` is clear of the object at a tracked pose.
-    pub(super) fn apart(&mut self, q: &[f64], pose: &Pose<Base, Object>) -> bool {
-        self.object.set(pose, Vector3::zeros(), Vector3::zeros());
-        -self.object.touch(&self.tool, &self.arm.flange(&joints_from(q)).isometry()).depth > APART
+    /// Gap between tool and object when pose `row` was taken [m]; negative where they overlap.
+    pub fn gap(&mut self, row: usize) -> f64 {
+        let (measured, object) = (&self.clip.measured, &self.clip.object);
+        let at = measured.stamps_ns.partition_point(|stamp| *stamp < object.stamps_ns[row]);
+        self.between(at.min(measured.len() - 1), row)
     }
 
-    /// The clip's joints in the model's order.
-    pub(super) fn in_order(&self, clip: &Clip) -> Option<Clip> {
-        clip.clone().reorder(self.arm.joint_names()).ok()
+    /// The same between the tool at one measured row of the arm and the object at one of its poses.
+    fn between(&mut self, arm_row: usize, pose_row: usize) -> f64 {
+        let q = joints_from(self.clip.measured.q_row(arm_row));
+        self.object.set(&self.clip.object.poses[pose_row], Vector3::zeros(), Vector3::zeros());
+        -self.object.touch(&self.tool, &self.arm.flange(&q).isometry()).depth
+    }
+
+    /// Whether they are apart when pose `row` was taken.
+    pub(super) fn apart(&mut self, row: usize) -> bool {
+        self.gap(row) > APART
     }
 }
 
@@ -50,10 +61,10 @@ impl Clearance {
 /// comes near, or the cell cannot tell.
 #[must_use]
 pub fn first_near(cell: &Cell, clip: &Clip) -> Option<u64> {
-    let mut clearance = Clearance::new(cell)?;
-    let clip = clearance.in_order(clip)?;
-    let stands = clip.object.poses.first()?;
-    let near =
-        (0..clip.measured.len()).step_by(STRIDE).find(|row| !clearance.apart(clip.measured.q_row(*row), stands))?;
+    let mut clearance = Clearance::new(cell, clip)?;
+    if clip.object.is_empty() {
+        return None;
+    }
+    let near = (0..clip.measured.len()).step_by(STRIDE).find(|row| clearance.between(*row, 0) <= APART)?;
     Some(clip.measured.stamps_ns[near.saturating_sub(STRIDE)])
 }

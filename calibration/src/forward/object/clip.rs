@@ -73,13 +73,8 @@ impl ObjectClip {
 
 /// First pose between `onset` and `rest` from which on the tool stays away from the object.
 fn let_go(clip: &Clip, cell: &Cell, onset: usize, rest: usize) -> Option<usize> {
-    let mut clearance = Clearance::new(cell)?;
-    let measured = clearance.in_order(clip)?.measured;
-    let mut apart = |row: usize| {
-        let at = measured.stamps_ns.partition_point(|stamp| *stamp < clip.object.stamps_ns[row]);
-        clearance.apart(measured.q_row(at.min(measured.len() - 1)), &clip.object.poses[row])
-    };
-    let touching = (onset..=rest).rev().find(|row| !apart(*row))?;
+    let mut clearance = Clearance::new(cell, clip)?;
+    let touching = (onset..=rest).rev().find(|row| !clearance.apart(*row))?;
     Some((touching + 1).min(rest))
 }
 

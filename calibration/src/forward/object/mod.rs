@@ -22,7 +22,7 @@ mod own;
 mod rollout;
 mod rows;
 
-pub use clearance::first_near;
+pub use clearance::{Clearance, first_near};
 pub use own::{ALL, Axis, Own, Values};
 pub use rows::{Channel, Part, Row};
 

@@ -1,15 +1,11 @@
 //! Which recorded clips can be held against the twin: an object that topples, is lost by its tracker, is never hit or lies
 //! elsewhere than the tool is noticed here, mended where that is safe, and told. Base frame, SI.
 
+use crate::forward::object::Clearance;
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use shared_mem::cell::{Cell, ClipKind};
 use shared_mem::frames::Pose;
-use shared_mem::msg::joints_from;
 use shared_mem::recording::{Clip, ObjectSeries};
-use twin::arm::ArmModel;
-use twin::effects::Effects;
-use twin::physics::TableObject;
-use twin::physics::touch::Capsule;
 use twin::scene::{ObjectModel, ObjectShape};
 
 /// A pose this far from the middle of its neighbours, and they nearer to each other, is the tracker's mistake [m].
@@ -163,19 +159,8 @@ fn unusable(clip: &Clip) -> Option<String> {
 
 /// Tool and object never come near each other although the object moves.
 fn apart(clip: &Clip, cell: &Cell) -> Option<String> {
-    let arm = ArmModel::from_cell(cell).ok()?;
-    let tool = cell.tool.as_ref()?;
-    let capsule = Capsule { segment: tool.length - tool.radius, radius: tool.radius };
-    let model = ObjectModel::new(cell, None).ok()??;
-    let mut object = TableObject::new(&model, None, &Effects::default()).ok()?;
-    let measured = &clip.measured;
-    let gap = |row: usize| {
-        let at = measured.stamps_ns.partition_point(|stamp| *stamp < clip.object.stamps_ns[row]);
-        let q = joints_from(measured.q_row(at.min(measured.len().saturating_sub(1))));
-        object.set(&clip.object.poses[row], Vector3::zeros(), Vector3::zeros());
-        -object.touch(&capsule, &arm.flange(&q).isometry()).depth
-    };
-    let nearest = (0..clip.object.len()).map(gap).fold(f64::INFINITY, f64::min);
+    let mut clearance = Clearance::new(cell, clip)?;
+    let nearest = (0..clip.object.len()).map(|row| clearance.gap(row)).fold(f64::INFINITY, f64::min);
     (nearest > ELSEWHERE).then(|| {
         format!(
             "the object moves, but the tool never comes nearer than {:.0} mm: the poses are not in `{}`, or tool and table in \
