@@ -68,10 +68,11 @@ pub fn admit(session: &Session) -> Result<Admitted, Refused> {
     if groups.len() < FEWEST {
         let without = if out.is_empty() { String::new() } else { format!(" (left out: {reasons})") };
         return Err(Refused::NotTestable(format!(
-            "{} clips with {} different commands{without}: at least {FEWEST} different commands are needed to fit, to \
-             choose and to confirm on clips of their own; record more clips with other motions",
+            "too few different commands: {} among the clips that can be used ({} of {}){without}; at least {FEWEST} are needed to \
+             fit, to choose and to confirm on clips of their own: record more clips with other motions",
+            groups.len(),
             clips.len(),
-            groups.len()
+            clips.len() + out.len()
         )));
     }
     let mut warnings = grouped(remarks.iter().map(|(file, remark)| (file.as_str(), remark.as_str())));
@@ -90,10 +91,6 @@ fn looked_at(mut clip: Clip, cell: &Cell, arm: Option<&ArmModel>) -> Result<(Cli
     // What a session lacks as a whole is said of the session.
     let complete = !clip.measured.is_empty() && !clip.desired.is_empty();
     if let Some(arm) = arm.filter(|_| complete) {
-        // Own recordings of an arm whose joints have no names number them.
-        if clip.joint_names.iter().enumerate().all(|(i, name)| *name == format!("joint{}", i + 1)) {
-            clip.joint_names = arm.joint_names().to_vec();
-        }
         (clip, remarks) = one_piece(clip, cell, arm).map_err(|why| why.to_string())?;
     }
     if clip.kind == ClipKind::Excitation || clip.object.is_empty() {

@@ -224,11 +224,10 @@ fn step<E: Evidence>(bench: &Bench<'_, E>, split: &Split, from: &Hypothesis, bar
     let best = fits.iter().flatten().map(Hypothesis::deviance).fold(from.deviance(), f64::min);
     let near = best + NEAR.max(NEAR_SHARE * (from.deviance() - best));
     let trial = |(scored, fit): (Scored, Option<Hypothesis>)| {
-        let fit = fit.map(|fit| match fit.deviance() < near {
-            true => bench
-                .fit((&fit.effects, fit.full.clone()), &split.train, &weights, Some(&fit), FIRST_PASS)
-                .unwrap_or(fit),
-            false => fit,
+        let fit = fit.map(|fit| {
+            let more = || bench.fit((&fit.effects, fit.full.clone()), &split.train, &weights, Some(&fit), FIRST_PASS);
+            let nearer = if fit.deviance() < near { more() } else { None };
+            nearer.unwrap_or(fit)
         });
         let judged = fit.and_then(|fit| {
             let ahead = foretell(bench, &fit, &split.choose, &weights)?;

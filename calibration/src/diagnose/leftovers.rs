@@ -8,7 +8,7 @@ use super::fit::{Bench, Hypothesis};
 use super::gap::Typical;
 
 /// Excess over the noise that any twin leaves, in squared sigmas: numerics, not physics. Sessions of another engine with
-/// nothing wrong leave 1.1 (excitations) and 3.4 (the arm on its way into strokes, whose impact reaches it a moment early).
+/// nothing wrong leave up to 1.0 (excitations) and 0.1 (the arm on its way into strokes).
 pub const NUMERICS: f64 = 6.0;
 /// The same of an object's poses: what one engine's strokes leave in another's twin in a clip like most, where the
 /// paths end 2 mm and 2 degrees apart.
