@@ -151,6 +151,34 @@ fn gaps_other_arms_and_second_senders_are_refused() {
     );
 }
 
+/// The law multiplies `dq_d` by the damping: a velocity that the positions do not have is a torque nobody planned.
+#[test]
+fn a_velocity_that_the_positions_do_not_have_is_refused_even_at_rest() {
+    for dq_d in [1e30, -3.0, 0.011] {
+        let mut points = swing(&READY, 0.1, 1.0);
+        points[0].dq_d[1] = dq_d;
+        let (mut player, mut trace) = (Player::new(guard(), READY), Trace::at_rest(READY));
+        for chunk in chunks(1, &points) {
+            player.take(&chunk);
+        }
+        let why = BrakeReason::Limit(Violation::Inconsistent { joint: 2 });
+        assert_eq!(run(&mut player, &mut trace, 100), [Remark::Braked { motion: 1, why }]);
+    }
+}
+
+#[test]
+fn a_velocity_above_the_limit_is_refused_though_the_positions_keep_it() {
+    let limits = Limits::fr3();
+    let last = Trace { v: [2.615; MAX_JOINTS], ..Trace::at_rest(READY) };
+    let mut point = SetPoint { q_d: READY, dq_d: last.v };
+    for i in 0..7 {
+        point.q_d[i] += last.v[i] * T;
+    }
+    assert!(guard().check(&last, &point, tip(&READY)).is_ok());
+    point.dq_d[0] = limits.joints[0].velocity + 1e-3;
+    assert_eq!(guard().check(&last, &point, tip(&READY)), Err(Violation::Velocity { joint: 1 }));
+}
+
 #[test]
 fn a_motion_that_ends_at_speed_is_braked() {
     let (mut player, mut trace) = (Player::new(guard(), READY), Trace::at_rest(READY));

@@ -108,7 +108,7 @@ impl Guard {
         if !(q.is_finite() && dq.is_finite() && jerk.is_finite()) {
             return Err(Violation::NotFinite { joint });
         }
-        if *q == point_before(last, i) && *v == 0.0 && *a == 0.0 {
+        if *q == point_before(last, i) && *v == 0.0 && *a == 0.0 && *dq == 0.0 {
             return Ok(()); // holding is always allowed, wherever the arm was when the bridge took over
         }
         if jerk.abs() > limits.jerk * slack {
@@ -120,6 +120,10 @@ impl Guard {
         // The derivative at a sample and the difference before it are half a period apart.
         if (dq - v).abs() > limits.acceleration * self.period_s {
             return Err(Violation::Inconsistent { joint });
+        }
+        // The law acts on `dq_d` itself, so being near to an admitted difference is not enough.
+        if dq.abs() > limits.velocity * slack {
+            return Err(Violation::Velocity { joint });
         }
         self.check_stoppable(limits, *q, next.velocity_now(i, self.period_s), *a)
             .map_err(|at_end| if at_end { Violation::Position { joint } } else { Violation::Velocity { joint } })
