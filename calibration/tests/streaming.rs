@@ -37,7 +37,7 @@ fn attempt(test: &str, mode: ArmMode, fault: Fault, length: usize) -> Result<Out
     let domain = domain(test);
     let _bridge = FakeBridge::start(&domain, mode, START, fault);
     let mut link = Link::open(Some(&domain)).expect("shared memory");
-    play(&mut link, &swing(length), &Interrupt::default(), |_| {})
+    play(&mut link, swing(length).motion(), &Interrupt::default(), |_| {})
 }
 
 #[test]
@@ -48,7 +48,7 @@ fn every_set_point_arrives_once_and_in_order() {
     let plan = swing(1234);
     let mut states = 0;
     for _ in 0..2 {
-        let outcome = play(&mut link, &plan, &Interrupt::default(), |_| states += 1).expect("played");
+        let outcome = play(&mut link, plan.motion(), &Interrupt::default(), |_| states += 1).expect("played");
         assert_eq!(outcome, Outcome::Done);
     }
     let played = bridge.finish();
@@ -104,7 +104,7 @@ fn ctrl_c_brakes_the_arm_and_waits_for_rest() {
     let mut link = Link::open(Some(&domain)).expect("shared memory");
     let interrupt = Interrupt::default();
     let mut states = 0;
-    let outcome = play(&mut link, &swing(5000), &interrupt, |_| {
+    let outcome = play(&mut link, swing(5000).motion(), &interrupt, |_| {
         states += 1;
         if states == 500 {
             interrupt.ask();

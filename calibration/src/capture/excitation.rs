@@ -188,7 +188,7 @@ impl Desk<'_> {
     ) -> anyhow::Result<(Outcome, Quality)> {
         let progress = Progress::new(title, plan.set_points.len() as u64);
         let mut watch = Watch::default();
-        let outcome = play(link, plan, self.interrupt, |state| {
+        let outcome = play(link, plan.motion(), self.interrupt, |state| {
             watch.see(state);
             if state.cycle % (RATE as u64 / 10) == 0 {
                 progress.show(u64::from(state.motion_played), &note());

@@ -4,7 +4,15 @@
 //! the speed limit falls towards the stops, so that the arm can always be braked before it reaches one.
 
 use super::body::Body;
+use super::excess::{Excess, Quantity};
+use super::plan::RATE;
 use shared_mem::cell::Cell;
+use shared_mem::msg::motion::SetPoint;
+use shared_mem::msg::{Joints, MAX_JOINTS};
+use twin::arm::JointState;
+
+/// Share of each limit a motion may use; the rest is for the arm that does not follow exactly.
+pub const SHARE: f64 = 0.9;
 
 /// Acceleration of every joint of an FR3, also taken where nothing is known [rad/s²].
 const ACCELERATION: f64 = 10.0;
@@ -67,6 +75,33 @@ pub fn of(cell: &Cell, body: &Body) -> Vec<JointLimits> {
             }
         })
         .collect()
+}
+
+/// The first limit that set points, one a control cycle, break; torque is asked of a body where there is one.
+#[must_use]
+pub fn first_excess(points: &[SetPoint], limits: &[JointLimits], body: Option<&Body>) -> Option<Excess> {
+    points.windows(3).find_map(|w| {
+        let [before, now, after] = [&w[0], &w[1], &w[2]];
+        let ddq: Joints = std::array::from_fn(|i| 0.5 * RATE * (after.dq_d[i] - before.dq_d[i]));
+        let tau = body.map(|body| body.torque(&JointState { q: now.q_d, dq: now.dq_d }, &ddq));
+        (0..limits.len().min(MAX_JOINTS)).find_map(|joint| {
+            let (limits, q, dq) = (&limits[joint], now.q_d[joint], now.dq_d[joint]);
+            let jerk = RATE * RATE * (after.dq_d[joint] - 2.0 * dq + before.dq_d[joint]);
+            let [slowest, fastest] = limits.speed_bounds(q);
+            let torque = tau.map_or(0.0, |tau| tau[joint].abs());
+            let checks = [
+                (Quantity::Position, q, limits.q_max),
+                (Quantity::Position, -q, -limits.q_min),
+                (Quantity::Speed, dq, SHARE * fastest),
+                (Quantity::Speed, -dq, -SHARE * slowest),
+                (Quantity::Acceleration, ddq[joint].abs(), SHARE * limits.ddq_max),
+                (Quantity::Jerk, jerk.abs(), SHARE * limits.dddq_max),
+                (Quantity::Torque, torque, SHARE * limits.tau_max),
+            ];
+            let broken = checks.into_iter().find(|(_, value, limit)| value > limit);
+            broken.map(|(quantity, value, limit)| Excess { joint: Some(joint), quantity, value, limit })
+        })
+    })
 }
 
 #[cfg(test)]

@@ -3,17 +3,26 @@
 //! Pure kinematics of the nominal arm, by damped least squares on its Jacobian; called by the stroke planner.
 
 use super::body::Body;
-use nalgebra::{DMatrix, DVector, Isometry3, Vector3, Vector6};
+use super::plan::RATE;
+use nalgebra::{DMatrix, DVector, Isometry3, Translation3, UnitQuaternion, Vector3, Vector6};
+use shared_mem::msg::motion::SetPoint;
 use shared_mem::msg::{Joints, MAX_JOINTS};
 
 /// Damping of the inverse, in metres and radians alike: invisible in the working space, and no leap near a singular pose.
 const DAMPING: f64 = 1e-4;
 /// Corrections until a pose counts as out of reach.
 const CORRECTIONS: usize = 200;
-/// A pose is reached when position [m] and direction [rad] are this close.
-const REACHED: f64 = 1e-6;
+/// A pose is reached when position [m] and direction [rad] are this close: a microradian in a millisecond would already be
+/// a jerk of 1000 rad/s³.
+const REACHED: f64 = 1e-10;
 /// Largest correction of a joint at once [rad].
 const LARGEST: f64 = 0.2;
+/// Peak speed of the quintic rest-to-rest course over its mean.
+const PEAK: f64 = 1.875;
+/// How fast the tool turns on a way at most [rad/s].
+const TURN: f64 = 0.5;
+/// No way takes less time [s].
+const SHORTEST: f64 = 0.2;
 
 /// Joints that bring the tool's end to `target`, the nearest ones to `from`; `None` out of reach.
 #[must_use]
@@ -63,6 +72,31 @@ fn joints_for(body: &Body, q: &Joints, motion: &Vector6<f64>) -> Joints {
     out
 }
 
+/// A straight way of the tool's end to `end` from rest to rest at most at `speed` [m/s], the tool's direction turning on the
+/// way; `None` when it leaves the working space.
+#[must_use]
+pub fn travel(body: &Body, from: &Joints, end: &Isometry3<f64>, speed: f64) -> Option<Vec<SetPoint>> {
+    let start = body.model().tip(from).isometry();
+    let shift = end.translation.vector - start.translation.vector;
+    let turn = (end.rotation * start.rotation.inverse()).scaled_axis();
+    let duration = (PEAK * (shift.norm() / speed).max(turn.norm() / TURN)).max(SHORTEST);
+    let cycles = (duration * RATE).ceil() as usize;
+    let mut q = *from;
+    let mut points = Vec::with_capacity(cycles + 1);
+    for k in 0..=cycles {
+        let x = k as f64 / cycles as f64;
+        let share = x * x * x * (10.0 + x * (6.0 * x - 15.0));
+        let rate = 30.0 * x * x * (1.0 - x) * (1.0 - x) / duration;
+        let rotation = UnitQuaternion::from_scaled_axis(turn * share) * start.rotation;
+        let place = Translation3::from(start.translation.vector + shift * share);
+        q = reach(body, &q, &Isometry3::from_parts(place, rotation))?;
+        let motion = Vector6::from_iterator(shift.iter().chain(turn.iter()).map(|way| way * rate));
+        points.push(SetPoint { q_d: q, dq_d: joints_for(body, &q, &motion) });
+    }
+    points[0].q_d = *from;
+    Some(points)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -93,6 +127,19 @@ mod tests {
     fn a_pose_two_metres_away_is_out_of_reach() {
         let body = fr3();
         assert_eq!(reach(&body, body.model().ready(), &pointing_down(2.0, 0.0, 0.2)), None);
+    }
+
+    #[test]
+    fn a_way_straight_up_ends_above_its_start_at_rest_and_stays_on_the_line() {
+        let body = fr3();
+        let from = reach(&body, body.model().ready(), &pointing_down(0.45, 0.1, 0.05)).expect("in reach");
+        let points = travel(&body, &from, &pointing_down(0.45, 0.1, 0.25), 0.1).expect("in reach");
+        let tips: Vec<_> = points.iter().map(|p| body.model().tip(&p.q_d).isometry().translation.vector).collect();
+        assert!(tips.iter().all(|tip| (tip.x - 0.45).abs() < 1e-5 && (tip.y - 0.1).abs() < 1e-5));
+        assert!((tips[tips.len() - 1].z - 0.25).abs() < 1e-5 && points.len() as f64 > 0.2 / 0.1 * RATE);
+        let fastest = tips.windows(2).map(|w| (w[1] - w[0]).norm() * RATE).fold(0.0, f64::max);
+        assert!((fastest - 0.1).abs() < 2e-3, "{fastest}");
+        assert!(points[points.len() - 1].dq_d.iter().all(|dq| dq.abs() < 1e-9));
     }
 
     #[test]

@@ -5,16 +5,15 @@
 
 use super::body::Body;
 use super::excess::{Excess, Quantity};
-use super::limits::JointLimits;
+use super::limits::{JointLimits, SHARE};
 use super::multisine::Multisine;
+use super::stream::Motion;
 use shared_mem::msg::motion::SetPoint;
 use shared_mem::msg::{Joints, MAX_JOINTS};
 use twin::arm::JointState;
 
 /// Set points a second: the control rate of the arm.
 pub const RATE: f64 = 1000.0;
-/// Share of each limit a plan may use; the rest is for the arm that does not follow exactly.
-const SHARE: f64 = 0.9;
 /// Distance kept from the stops [rad].
 const STOP_MARGIN: f64 = 0.05;
 /// Smallest amplitude worth recording [rad].
@@ -50,6 +49,14 @@ pub struct Plan {
     pub bound_by: Vec<Option<Quantity>>,
     /// Largest commanded speed of any joint [rad/s].
     pub peak_speed: f64,
+}
+
+impl Plan {
+    /// What is streamed of it.
+    #[must_use]
+    pub fn motion(&self) -> Motion<'_> {
+        Motion { set_points: &self.set_points, dof: self.dof }
+    }
 }
 
 /// No motion can be planned.

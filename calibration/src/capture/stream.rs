@@ -3,7 +3,6 @@
 //! [`Feeder`] decides what to send from what the arm reports and is pure; [`play`] runs it over shared memory.
 
 use super::link::{Link, LinkError};
-use super::plan::Plan;
 use crate::interrupt::Interrupt;
 use shared_mem::msg::arm::{ArmState, MotionStatus};
 use shared_mem::msg::motion::{CHUNK_LENGTH, MotionChunk, MotionKind, SetPoint};
@@ -72,10 +71,19 @@ pub enum Step {
     Braked,
 }
 
-/// Cuts a plan into chunks and decides when to send them.
+/// A motion: one set point a control cycle, the first and the last at rest.
+#[derive(Debug, Clone, Copy)]
+pub struct Motion<'a> {
+    /// The set points.
+    pub set_points: &'a [SetPoint],
+    /// Number of joints.
+    pub dof: usize,
+}
+
+/// Cuts a motion into chunks and decides when to send them.
 #[derive(Debug, Clone)]
 pub struct Feeder<'a> {
-    plan: &'a Plan,
+    motion: Motion<'a>,
     motion_id: u64,
     sent: usize,
 }
@@ -83,8 +91,8 @@ pub struct Feeder<'a> {
 impl<'a> Feeder<'a> {
     /// A motion that the bridge will know as `motion_id`.
     #[must_use]
-    pub fn new(plan: &'a Plan, motion_id: u64) -> Self {
-        Self { plan, motion_id, sent: 0 }
+    pub fn new(motion: Motion<'a>, motion_id: u64) -> Self {
+        Self { motion, motion_id, sent: 0 }
     }
 
     /// What the arm's newest state asks for.
@@ -99,12 +107,16 @@ impl<'a> Feeder<'a> {
         }
         let played = if ours { state.motion_played as usize } else { 0 };
         let waiting = self.sent.saturating_sub(played);
-        if self.sent < self.plan.set_points.len() && waiting + CHUNK_LENGTH <= AHEAD { Step::Send } else { Step::Wait }
+        if self.sent < self.motion.set_points.len() && waiting + CHUNK_LENGTH <= AHEAD {
+            Step::Send
+        } else {
+            Step::Wait
+        }
     }
 
     /// The next chunk; the last one is marked as such.
     pub fn chunk(&mut self, now_ns: u64) -> MotionChunk {
-        let rest = &self.plan.set_points[self.sent..];
+        let rest = &self.motion.set_points[self.sent..];
         let length = rest.len().min(CHUNK_LENGTH);
         let mut chunk = self.empty(if length == rest.len() { MotionKind::Last } else { MotionKind::Play }, now_ns);
         chunk.set_points[..length].copy_from_slice(&rest[..length]);
@@ -126,7 +138,7 @@ impl<'a> Feeder<'a> {
             kind,
             index: u32::try_from(self.sent.div_ceil(CHUNK_LENGTH)).expect("a motion of hours at most"),
             length: 0,
-            dof: u32::try_from(self.plan.dof).expect("a handful of joints"),
+            dof: u32::try_from(self.motion.dof).expect("a handful of joints"),
             set_points: [SetPoint::default(); CHUNK_LENGTH],
         }
     }
@@ -138,12 +150,12 @@ impl<'a> Feeder<'a> {
 /// [`StreamError`] when the motion is refused, braked, not taken up, or the bridge dies.
 pub fn play(
     link: &mut Link,
-    plan: &Plan,
+    motion: Motion<'_>,
     interrupt: &Interrupt,
     mut watch: impl FnMut(&ArmState),
 ) -> Result<Outcome, StreamError> {
     let mut state = link.ready_state()?;
-    let mut feeder = Feeder::new(plan, now_ns());
+    let mut feeder = Feeder::new(motion, now_ns());
     let start = Instant::now();
     let mut stopped = None;
     loop {

@@ -5,17 +5,15 @@
 //! rest. Rise and fall follow the quintic `10 x³ - 15 x⁴ + 6 x⁵`, whose acceleration starts and ends at zero.
 
 use super::body::Body;
-use super::excess::{Excess, Quantity};
-use super::limits::JointLimits;
+use super::excess::Excess;
+use super::limits::{JointLimits, first_excess};
 use super::line;
 use super::plan::RATE;
-use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
+use super::way::upright;
+use nalgebra::Vector3;
+use shared_mem::msg::Joints;
 use shared_mem::msg::motion::SetPoint;
-use shared_mem::msg::{Joints, MAX_JOINTS};
-use twin::arm::JointState;
 
-/// Share of each limit a stroke may use; the rest is for the arm that does not follow exactly.
-const SHARE: f64 = 0.9;
 /// Way at full speed before the object's bounding circle, so that the controller has settled when it hits [m].
 const SETTLED: f64 = 0.02;
 
@@ -77,17 +75,15 @@ pub fn plan(stroke: &Stroke, near: &Joints, limits: &[JointLimits], body: &Body)
     let aside = Vector3::new(-along.y, along.x, 0.0);
     let middle = Vector3::new(stroke.object[0], stroke.object[1], stroke.height) + aside * stroke.offset;
     let start = middle - along * profile.to_middle;
-    let down = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI);
     let mut q = *near;
     let mut set_points = Vec::with_capacity(profile.samples());
     for i in 0..profile.samples() {
         let (way, speed) = profile.at(i as f64 / RATE);
         let place = start + along * way;
-        let target = Isometry3::from_parts(Translation3::from(place), down);
-        q = line::reach(body, &q, &target).ok_or(StrokeError::OutOfReach { x: place.x, y: place.y })?;
+        q = line::reach(body, &q, &upright(place)).ok_or(StrokeError::OutOfReach { x: place.x, y: place.y })?;
         set_points.push(SetPoint { q_d: q, dq_d: line::joint_velocity(body, &q, &(along * speed)) });
     }
-    match excess(&set_points, limits, body) {
+    match first_excess(&set_points, limits, Some(body)) {
         None => Ok(StrokePlan { set_points }),
         Some(excess) => Err(StrokeError::Limit(excess)),
     }
@@ -134,31 +130,6 @@ fn risen(x: f64) -> f64 {
 /// Integral of [`risen`] from 0.
 fn swept(x: f64) -> f64 {
     x.powi(4) * (2.5 + x * (x - 3.0))
-}
-
-/// The first limit that the set points break.
-fn excess(points: &[SetPoint], limits: &[JointLimits], body: &Body) -> Option<Excess> {
-    points.windows(3).find_map(|w| {
-        let [before, now, after] = [&w[0], &w[1], &w[2]];
-        let ddq: Joints = std::array::from_fn(|i| 0.5 * RATE * (after.dq_d[i] - before.dq_d[i]));
-        let tau = body.torque(&JointState { q: now.q_d, dq: now.dq_d }, &ddq);
-        (0..limits.len().min(MAX_JOINTS)).find_map(|joint| {
-            let (limits, q, dq) = (&limits[joint], now.q_d[joint], now.dq_d[joint]);
-            let jerk = RATE * RATE * (after.dq_d[joint] - 2.0 * dq + before.dq_d[joint]);
-            let [slowest, fastest] = limits.speed_bounds(q);
-            let checks = [
-                (Quantity::Position, q, limits.q_max),
-                (Quantity::Position, -q, -limits.q_min),
-                (Quantity::Speed, dq, SHARE * fastest),
-                (Quantity::Speed, -dq, -SHARE * slowest),
-                (Quantity::Acceleration, ddq[joint].abs(), SHARE * limits.ddq_max),
-                (Quantity::Jerk, jerk.abs(), SHARE * limits.dddq_max),
-                (Quantity::Torque, tau[joint].abs(), SHARE * limits.tau_max),
-            ];
-            let broken = checks.into_iter().find(|(_, value, limit)| value > limit);
-            broken.map(|(quantity, value, limit)| Excess { joint: Some(joint), quantity, value, limit })
-        })
-    })
 }
 
 #[cfg(test)]

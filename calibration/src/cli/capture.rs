@@ -1,7 +1,7 @@
 //! `calibration capture`.
 
 use super::{between, print_json};
-use calibration::capture::excitation;
+use calibration::capture::{control_hit_slide, excitation};
 use calibration::interrupt::Interrupt;
 use clap::Subcommand;
 use std::path::PathBuf;
@@ -10,6 +10,8 @@ use std::path::PathBuf;
 pub(super) enum Capture {
     /// All joints at once along sums of sines, inside every limit: what identifying the arm needs.
     Excitation(ExcitationArguments),
+    /// The tool runs up to the object, hits it and lets it slide: what identifying the object and diagnosing contact need.
+    ControlHitSlide(StrokeArguments),
 }
 
 #[derive(Debug, clap::Args)]
@@ -53,9 +55,47 @@ pub(super) struct ExcitationArguments {
     json: bool,
 }
 
+#[derive(Debug, clap::Args)]
+#[command(after_help = "\
+The arm finds the object by its tracked pose, goes above it to the stroke's start, comes down, waits until all is still,
+strikes, waits until the object rests, and steps back. Strokes come from all sides at all speeds, and every sixth repeats
+the first, so that scatter and drift can be told from a gap. Directions are chosen so that the object stays in reach; one
+that got away is asked for by hand.
+
+A session that exists is continued with the next number; nothing is overwritten. Ctrl-C brakes the arm, waits for rest
+and keeps what was recorded.
+
+Examples:
+  calibration capture control-hit-slide --cell config/fr3_cell.toml --clips 12 --out strokes
+  calibration capture control-hit-slide --cell lab/cell.toml --clips 1 --out monday --preview next.svg")]
+pub(super) struct StrokeArguments {
+    /// What the laboratory knows about its cell: [tool], [table] and [object] among it.
+    #[arg(long, value_name = "CELL.TOML")]
+    cell: PathBuf,
+    /// Clips to add. One that is no good is repeated.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1000))]
+    clips: u32,
+    /// Session folder; created, or continued.
+    #[arg(long, value_name = "SESSION")]
+    out: PathBuf,
+    /// Arm for the bridge that is started when none runs: sim or fci://HOST [default: sim].
+    #[arg(long)]
+    arm: Option<String>,
+    /// Whether that bridge refuses to run without real-time guarantees: enforce or ignore [default: the bridge's own].
+    #[arg(long, value_parser = ["enforce", "ignore"])]
+    realtime: Option<String>,
+    /// Draws the next stroke into this file and moves nothing.
+    #[arg(long, value_name = "FILE.SVG")]
+    preview: Option<PathBuf>,
+    /// Prints one JSON object on stdout at the end.
+    #[arg(long)]
+    json: bool,
+}
+
 pub(super) fn run(capture: Capture, interrupt: &Interrupt) -> anyhow::Result<()> {
     match capture {
         Capture::Excitation(arguments) => excite(arguments, interrupt),
+        Capture::ControlHitSlide(arguments) => strike(arguments, interrupt),
     }
 }
 
@@ -65,5 +105,16 @@ fn excite(arguments: ExcitationArguments, interrupt: &Interrupt) -> anyhow::Resu
     let summary = excitation::capture(&options, interrupt, &mut String::new)?;
     let kept = summary.clips.iter().filter(|clip| clip.kept).count();
     eprintln!("{}: {kept} of {} clips kept", summary.session.display(), options.clips);
+    if json { print_json(&summary) } else { Ok(()) }
+}
+
+fn strike(arguments: StrokeArguments, interrupt: &Interrupt) -> anyhow::Result<()> {
+    let StrokeArguments { cell, clips, out, arm, realtime, preview, json } = arguments;
+    let options = control_hit_slide::Options { cell, clips, out, arm, realtime, preview, domain: None };
+    let summary = control_hit_slide::capture(&options, interrupt)?;
+    if options.preview.is_none() {
+        let kept = summary.clips.iter().filter(|clip| clip.kept).count();
+        eprintln!("{}: {kept} of {} clips kept", summary.session.display(), summary.clips.len());
+    }
     if json { print_json(&summary) } else { Ok(()) }
 }

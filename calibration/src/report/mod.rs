@@ -6,6 +6,7 @@
 //! | [`benchmark`] | the page of how good the diagnosis is |
 //! | [`demo_page`] | the page of the demo |
 //! | [`identification`] | the page of what was identified about arm or object |
+//! | [`stroke`] | a stroke from above, before it is done |
 //! | [`terminal`] | diagnosis, identification and benchmark in a few lines for a terminal |
 //! | [`trace`] | what is left between robot and twin through a clip |
 //! | `frame` | what all pages share: style, headings, legends |
@@ -24,6 +25,7 @@ mod parameters;
 mod quantity;
 mod scale;
 mod share;
+pub mod stroke;
 pub mod terminal;
 pub mod trace;
 

@@ -1,0 +1,326 @@
+//! The verb `capture control-hit-slide`: for each clip find the object, choose a stroke, go there, record it, judge it, enter it
+//! into the session, and step back.
+
+use super::body::Body;
+use super::bridge::{Bridge, Wanted};
+use super::limits::{self, JointLimits};
+use super::link::Link;
+use super::object_watch::{ObjectWatch, PoseQuality};
+use super::plan::RATE;
+use super::program::{Next, Program, Wish};
+use super::quality::{Quality, Verdict, Watch};
+use super::recorder::Recorder;
+use super::session::Session;
+use super::stream::{Motion, Outcome, play};
+use super::way::Ways;
+use crate::interrupt::Interrupt;
+use crate::progress::Progress;
+use crate::report;
+use serde::Serialize;
+use shared_mem::cell::{Cell, ClipKind};
+use shared_mem::msg::motion::SetPoint;
+use std::path::PathBuf;
+use std::time::Duration;
+use twin::scene::ObjectModel;
+
+/// The tool travels this far above the object, and no lower than half of it [m].
+const ABOVE: f64 = 0.08;
+/// How long an object may take to come to rest.
+const COMES_TO_REST: Duration = Duration::from_secs(10);
+/// How long a person has to put the object back.
+const BY_HAND: Duration = Duration::from_secs(120);
+/// Further tries for every clip that is asked for.
+const AGAIN: f64 = 0.5;
+/// An object that moved less was not hit [m].
+const MOVED: f64 = 5e-3;
+/// Share of lost poses from which a stroke is better repeated.
+const POSES_LOST: f64 = 0.1;
+
+/// What is asked for.
+#[derive(Debug, Clone)]
+pub struct Options {
+    /// The laboratory's cell.toml.
+    pub cell: PathBuf,
+    /// Clips to add.
+    pub clips: u32,
+    /// Session folder.
+    pub out: PathBuf,
+    /// Arm of a bridge that has to be started, as `rt_bridge run --arm` takes it.
+    pub arm: Option<String>,
+    /// Whether that bridge insists on real time; default: the bridge's own.
+    pub realtime: Option<String>,
+    /// Where to draw the next stroke; the arm then moves nowhere.
+    pub preview: Option<PathBuf>,
+    /// Shared-memory domain; default: the one this process was started in.
+    pub domain: Option<String>,
+}
+
+/// What was done.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Summary {
+    /// Session folder.
+    pub session: PathBuf,
+    /// Clips of this run, in order.
+    pub clips: Vec<ClipSummary>,
+    /// Whether the user ended it early.
+    pub interrupted: bool,
+    /// Whether the bridge was started, and ended, by this run.
+    pub own_bridge: bool,
+}
+
+/// One clip.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ClipSummary {
+    /// File, relative to the session.
+    pub file: PathBuf,
+    /// `true`: entered into cell.toml. A clip that is not stays on disk.
+    pub kept: bool,
+    /// Why not.
+    pub why: Option<String>,
+    /// Direction of the stroke [rad].
+    pub heading: f64,
+    /// Speed of the hit that was commanded [m/s].
+    pub speed: f64,
+    /// How far the line passed to the left of the centre [m].
+    pub offset: f64,
+    /// What was seen of the arm.
+    #[serde(flatten)]
+    pub quality: Quality,
+    /// What was seen of the object.
+    #[serde(flatten)]
+    pub object: PoseQuality,
+    /// Messages in the file.
+    pub messages: u64,
+    /// Size of the file [bytes].
+    pub bytes: u64,
+}
+
+/// Captures strokes until all are there or the user ends it.
+///
+/// # Errors
+/// One line with what happened and what to do; clips that were complete before are in the session.
+pub fn capture(options: &Options, interrupt: &Interrupt) -> anyhow::Result<Summary> {
+    let cell = Cell::read(&options.cell)?;
+    let body = Body::of(&cell)?;
+    let size = size_of(&cell)?;
+    let domain = options.domain.as_deref();
+    let session = Session::open(&options.out, &cell)?;
+    let mut link = Link::open(domain)?;
+    let mut object = ObjectWatch::open(domain)?;
+    let wanted =
+        Wanted { cell: &options.cell, arm: options.arm.as_deref(), realtime: options.realtime.as_deref(), domain };
+    let mut bridge = Bridge::find_or_start(&mut link, &wanted, interrupt)?;
+    let limits = limits::of(&cell, &body);
+    let mut desk = Desk { options, cell: &cell, size, body: &body, limits: &limits, session, interrupt };
+    let clips = match desk.clips(&mut link, &mut object) {
+        Ok(clips) => clips,
+        // A bridge that died says more than the silence it leaves.
+        Err(error) => return Err(bridge.check().err().map_or(error, anyhow::Error::from)),
+    };
+    let own_bridge = bridge.is_own();
+    bridge.stop()?;
+    let session = desk.session.folder().to_owned();
+    Ok(Summary { session, clips, interrupted: interrupt.asked(), own_bridge })
+}
+
+fn size_of(cell: &Cell) -> anyhow::Result<[f64; 3]> {
+    anyhow::ensure!(
+        cell.tool.is_some() && cell.table.is_some(),
+        "cell.toml has no [tool] or no [table]; a stroke needs both: describe them, then start again"
+    );
+    let model = ObjectModel::new(cell, None)?;
+    let model =
+        model.ok_or_else(|| anyhow::anyhow!("cell.toml has no [object] to strike; describe it, then start again"))?;
+    Ok(<[f64; 3]>::from(model.shape.half_extents()).map(|half| 2.0 * half))
+}
+
+/// Everything that stays the same from clip to clip.
+struct Desk<'a> {
+    options: &'a Options,
+    cell: &'a Cell,
+    size: [f64; 3],
+    body: &'a Body,
+    limits: &'a [JointLimits],
+    session: Session,
+    interrupt: &'a Interrupt,
+}
+
+impl Desk<'_> {
+    fn clips(&mut self, link: &mut Link, object: &mut ObjectWatch) -> anyhow::Result<Vec<ClipSummary>> {
+        let mut clips: Vec<ClipSummary> = Vec::new();
+        let wanted = self.options.clips as usize;
+        let tries = wanted + (AGAIN * wanted as f64).ceil() as usize;
+        while clips.len() < tries && !self.interrupt.asked() {
+            let kept = clips.iter().filter(|clip| clip.kept).count();
+            if kept == wanted {
+                break;
+            }
+            let Some(next) = self.next(link, object)? else { break };
+            if let Some(file) = &self.options.preview {
+                std::fs::write(file, report::stroke::picture(&next, self.size)).map_err(|error| {
+                    anyhow::anyhow!("cannot write {}: {error}; choose another file", file.display())
+                })?;
+                eprintln!("{}: the next stroke; the arm was not moved", file.display());
+                break;
+            }
+            let title = format!("clip {} of {wanted}", kept + 1);
+            clips.extend(self.clip(link, object, &next, &title)?);
+        }
+        Ok(clips)
+    }
+
+    /// The stroke for the next clip, once the object stands still in reach. `None`: the user gave up.
+    fn next(&self, link: &mut Link, object: &mut ObjectWatch) -> anyhow::Result<Option<Next>> {
+        let program = Program::of(self.cell, self.size, self.body, self.limits);
+        let (number, _) = self.session.next_clip()?;
+        let state = link.ready_state()?;
+        anyhow::ensure!(
+            state.dof as usize == self.limits.len(),
+            "the bridge moves {} joints, cell.toml describes {}; start the bridge with the same --cell",
+            state.dof,
+            self.limits.len()
+        );
+        let asked = std::time::Instant::now();
+        let mut told = false;
+        loop {
+            let Some(standing) = object.standing(COMES_TO_REST, self.interrupt)? else { return Ok(None) };
+            match program.next(&Wish::of_clip(number), &standing, self.body.model().ready()) {
+                Ok(next) => return Ok(Some(next)),
+                Err(error) if asked.elapsed() > BY_HAND => return Err(error.into()),
+                Err(error) if !told => {
+                    eprintln!("{error} (waiting {} s; Ctrl-C ends)", BY_HAND.as_secs());
+                    told = true;
+                }
+                Err(_) => {}
+            }
+        }
+    }
+
+    /// One clip. `None`: interrupted before anything was recorded.
+    fn clip(
+        &mut self,
+        link: &mut Link,
+        object: &mut ObjectWatch,
+        next: &Next,
+        title: &str,
+    ) -> anyhow::Result<Option<ClipSummary>> {
+        let points = &next.plan.set_points;
+        let ways = self.ways();
+        let approach = ways.over(&link.ready_state()?.q_d, &points[0].q_d)?;
+        if self.play(link, object, &approach, &format!("{title}: approach"))?.0 == Outcome::Stopped {
+            return Ok(None);
+        }
+        let Some(_) = object.standing(COMES_TO_REST, self.interrupt)? else { return Ok(None) };
+        let (_, file) = self.session.next_clip()?;
+        let path = self.session.folder().join(&file);
+        let recorder = Recorder::start(&path, &self.options.cell, self.options.domain.as_deref(), self.interrupt)?;
+        object.begin();
+        let (outcome, quality) = self.play(link, object, points, &format!("{title}: stroke")).inspect_err(|_| {
+            eprintln!("{}: the stroke failed; the file stays as far as it goes, but is not entered", path.display());
+        })?;
+        let rested = object.standing(COMES_TO_REST, self.interrupt);
+        let seen = object.quality();
+        let recorded = recorder.finish()?;
+        let peak = points.iter().flat_map(|p| p.dq_d).fold(0.0, |peak: f64, dq| peak.max(dq.abs()));
+        let why = match (outcome, &recorded.stopped, quality.verdict(peak), rested) {
+            (Outcome::Stopped, ..) | (_, _, _, Ok(None)) => Some("it was ended by the user".to_owned()),
+            (_, Some(why), ..) => Some(why.clone()),
+            (_, _, Verdict::Repeat(why), _) => Some(why),
+            (_, _, _, Err(error)) => Some(error.to_string()),
+            (..) => unfit(&seen),
+        };
+        if why.is_none() {
+            self.session.enter(&file, ClipKind::ControlHitSlide)?;
+        }
+        let clip = ClipSummary {
+            file,
+            kept: why.is_none(),
+            why,
+            heading: next.stroke.heading,
+            speed: next.stroke.speed,
+            offset: next.stroke.offset,
+            quality,
+            object: seen,
+            messages: recorded.messages,
+            bytes: recorded.bytes,
+        };
+        eprintln!("{}", clip.line());
+        if !self.interrupt.asked() {
+            let away = self.ways().away(&points[points.len() - 1].q_d, next.stroke.heading)?;
+            self.play(link, object, &away, &format!("{title}: retreat"))?;
+        }
+        Ok(Some(clip))
+    }
+
+    fn ways(&self) -> Ways<'_> {
+        let top = self.cell.table.as_ref().map_or(0.0, |table| table.height) + self.size[2];
+        Ways { body: self.body, limits: self.limits, height: top + ABOVE, floor: top + 0.5 * ABOVE }
+    }
+
+    fn play(
+        &self,
+        link: &mut Link,
+        object: &mut ObjectWatch,
+        set_points: &[SetPoint],
+        title: &str,
+    ) -> anyhow::Result<(Outcome, Quality)> {
+        let progress = Progress::new(title, set_points.len() as u64);
+        let mut watch = Watch::default();
+        let mut looked = Ok(());
+        let motion = Motion { set_points, dof: self.limits.len() };
+        let outcome = play(link, motion, self.interrupt, |state| {
+            watch.see(state);
+            if state.cycle % (RATE as u64 / 20) == 0 {
+                progress.show(u64::from(state.motion_played), "");
+                looked = object.look();
+            }
+        })?;
+        looked?;
+        Ok((outcome, watch.quality()))
+    }
+}
+
+/// Why the object's poses make a clip useless, if they do.
+fn unfit(seen: &PoseQuality) -> Option<String> {
+    let lost = seen.lost_poses as f64 / (seen.poses + seen.lost_poses).max(1) as f64;
+    if seen.moved < MOVED {
+        return Some(format!("the object moved by {:.1} mm only: it was not hit", 1e3 * seen.moved));
+    }
+    (lost > POSES_LOST).then(|| format!("{:.0} % of the object's poses are lost", 100.0 * lost))
+}
+
+impl ClipSummary {
+    /// The clip's quality in a line.
+    #[must_use]
+    pub fn line(&self) -> String {
+        let verdict = match &self.why {
+            None => "keep".to_owned(),
+            Some(why) => format!("repeat, because {why}; the file stays, but is not entered into cell.toml"),
+        };
+        format!(
+            "{}: towards {:.0}° at {:.2} m/s, the object moved {:.0} mm and turned {:.0}°, {} packets and {} poses lost, \
+             {:.1} MB: {verdict}",
+            self.file.display(),
+            self.heading.to_degrees(),
+            self.speed,
+            1e3 * self.object.moved,
+            self.object.turned.to_degrees(),
+            self.quality.lost_packets,
+            self.object.lost_poses,
+            self.bytes as f64 * 1e-6,
+        )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_stroke_that_hit_nothing_or_lost_the_object_is_to_be_repeated() {
+        let seen = PoseQuality { poses: 100, lost_poses: 2, moved: 0.12, turned: 0.1 };
+        assert_eq!(unfit(&seen), None);
+        assert!(unfit(&PoseQuality { moved: 1e-3, ..seen }).is_some_and(|why| why.contains("not hit")));
+        assert!(unfit(&PoseQuality { lost_poses: 20, ..seen }).is_some_and(|why| why.contains("17 %")));
+    }
+}

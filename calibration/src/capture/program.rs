@@ -1,0 +1,235 @@
+//! Which stroke is next: a session's strokes come from all sides, at all speeds, over the whole face, however few there are.
+//! Pure. Base frame; m, s, rad.
+//!
+//! Wishes follow a sequence without gaps or clusters in all its dimensions (Roberts 2018: steps of powers of the generalised
+//! golden ratio), counted by the clip's number, so that a session continued tomorrow fills what is still empty. Every
+//! [`ANCHOR`]-th stroke repeats the first: the same stroke again tells scatter from gap and drift from both.
+
+use super::body::Body;
+use super::limits::JointLimits;
+use super::stroke::{self, Stroke, StrokeError, StrokePlan};
+use shared_mem::cell::Cell;
+use shared_mem::msg::Joints;
+use std::f64::consts::{FRAC_PI_2, PI, TAU};
+
+/// Every so many strokes the first is repeated.
+pub const ANCHOR: usize = 6;
+/// Root of `x⁵ = x + 1`: the golden ratio of four dimensions.
+const GOLDEN: f64 = 1.167_303_978_261_418_7;
+/// Speeds of the hit [m/s].
+const SPEEDS: [f64; 2] = [0.22, 0.6];
+/// How far a line passes beside the centre, as a share of half the narrower side.
+const ASIDE: f64 = 0.55;
+/// Heights of the tool's end as a share of the object's.
+const HEIGHTS: [f64; 2] = [0.2, 0.5];
+/// How far from a face's normal a stroke may come [rad]: further round it would slip off the edge.
+const OBLIQUE: f64 = 0.35;
+/// Middle of the area that an arm of this class reaches from all sides, and its radius [m].
+const MIDDLE: [f64; 2] = [0.48, 0.0];
+const RADIUS: f64 = 0.13;
+/// Other directions that are tried when the wanted one leads out of the area [rad].
+const TURN: f64 = PI / 9.0;
+/// Shares of the wanted speed that are tried, where no direction allows more.
+const PACES: [f64; 3] = [1.0, 0.8, 0.6];
+/// The object slides further than reckoned by this much at most.
+const SLIDES: f64 = 1.3;
+const GRAVITY: f64 = 9.81;
+
+/// What a stroke should be like.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Wish {
+    /// Direction [rad].
+    pub heading: f64,
+    /// Speed of the hit [m/s].
+    pub speed: f64,
+    /// How far the line passes to the left of the centre, -1 to 1.
+    pub aside: f64,
+    /// Height of the tool's end, 0 to 1 of [`HEIGHTS`].
+    pub height: f64,
+}
+
+impl Wish {
+    /// The wish for a clip by its number in the session, from 0.
+    #[must_use]
+    pub fn of_clip(number: usize) -> Self {
+        let turn = if number.is_multiple_of(ANCHOR) { 0 } else { number };
+        let at = |dimension: i32| (0.5 + turn as f64 * GOLDEN.powi(-dimension)).fract();
+        Self {
+            heading: TAU * at(1) - PI,
+            speed: SPEEDS[0] + (SPEEDS[1] - SPEEDS[0]) * at(2),
+            aside: 2.0 * at(3) - 1.0,
+            height: at(4),
+        }
+    }
+}
+
+/// An object's place on the table.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Standing {
+    /// Its geometric centre [m].
+    pub place: [f64; 2],
+    /// Its turn about the vertical [rad].
+    pub yaw: f64,
+}
+
+/// What can be struck, and by what.
+#[derive(Debug, Clone, Copy)]
+pub struct Program<'a> {
+    /// The arm.
+    pub body: &'a Body,
+    /// Its limits.
+    pub limits: &'a [JointLimits],
+    /// Edge lengths of the object [m].
+    pub size: [f64; 3],
+    /// Radius of the tool [m].
+    pub tool: f64,
+    /// Height of the table [m].
+    pub table: f64,
+    /// Friction that is reckoned with.
+    pub friction: f64,
+}
+
+/// A stroke that can be done.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Next {
+    /// What it is.
+    pub stroke: Stroke,
+    /// Its motion.
+    pub plan: StrokePlan,
+    /// Where the object will come to rest, about [m].
+    pub rest: [f64; 2],
+}
+
+/// No stroke can be done where the object stands.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum NoStroke {
+    /// No direction keeps the object in the area.
+    #[error(
+        "the object stands at x {:.2} m, y {:.2} m, from where no stroke keeps it in reach; put it back near x {:.2} m, y {:.2} m",
+        place[0], place[1], MIDDLE[0], MIDDLE[1]
+    )]
+    Away {
+        /// Where [m].
+        place: [f64; 2],
+    },
+    /// Directions that would keep it there cannot be done; the first refusal.
+    #[error(transparent)]
+    Refused(#[from] StrokeError),
+}
+
+impl<'a> Program<'a> {
+    /// For the arm, tool and object of a cell; `size`: the object's edge lengths [m].
+    #[must_use]
+    pub fn of(cell: &Cell, size: [f64; 3], body: &'a Body, limits: &'a [JointLimits]) -> Self {
+        Self {
+            body,
+            limits,
+            size,
+            tool: cell.tool.as_ref().map_or(0.0, |tool| tool.radius),
+            table: cell.table.as_ref().map_or(0.0, |table| table.height),
+            friction: cell.object.as_ref().map_or(0.3, shared_mem::cell::Object::nominal_friction),
+        }
+    }
+
+    /// The stroke nearest to the wish that can be done and keeps the object in reach.
+    ///
+    /// # Errors
+    /// [`NoStroke`] with the remedy.
+    pub fn next(&self, wish: &Wish, object: &Standing, near: &Joints) -> Result<Next, NoStroke> {
+        let mut refused = None;
+        let turns = (0..=9).flat_map(|k| [f64::from(k), -f64::from(k)]).skip(1);
+        let ways = PACES.into_iter().flat_map(|pace| turns.clone().map(move |turn| (pace, turn)));
+        for (pace, turn) in ways {
+            let (heading, speed) = (wish.heading + turn * TURN, pace * wish.speed);
+            let stroke = self.stroke(&Wish { heading, speed, ..*wish }, object);
+            let rest = self.rest(&stroke);
+            let away = |place: [f64; 2]| (place[0] - MIDDLE[0]).hypot(place[1] - MIDDLE[1]);
+            if away(rest) > RADIUS && away(rest) > 0.8 * away(object.place) {
+                continue;
+            }
+            match stroke::plan(&stroke, near, self.limits, self.body) {
+                Ok(plan) => return Ok(Next { stroke, plan, rest }),
+                Err(error) => refused = refused.or(Some(error)),
+            }
+        }
+        Err(refused.map_or(NoStroke::Away { place: object.place }, NoStroke::Refused))
+    }
+
+    /// The wish as a stroke on the object, its direction turned towards the nearest face.
+    fn stroke(&self, wish: &Wish, object: &Standing) -> Stroke {
+        let [x, y, z] = self.size;
+        let from_face = wish.heading - object.yaw;
+        let face = (from_face / FRAC_PI_2).round();
+        let oblique = from_face - face * FRAC_PI_2;
+        let heading = object.yaw + face * FRAC_PI_2 + oblique * OBLIQUE / (0.5 * FRAC_PI_2);
+        let height = HEIGHTS[0] + (HEIGHTS[1] - HEIGHTS[0]) * wish.height;
+        Stroke {
+            object: object.place,
+            clearance: 0.5 * x.hypot(y) + self.tool,
+            heading: heading.sin().atan2(heading.cos()),
+            offset: 0.5 * ASIDE * wish.aside * x.min(y),
+            speed: wish.speed,
+            height: self.table + (height * z).max(1.5 * self.tool),
+            rise: (0.5 * wish.speed).max(0.35),
+            follow_through: 0.0,
+            rest: [0.3, 0.8],
+        }
+    }
+
+    /// Where the object comes to rest, about: pushed until the tool slows down, then sliding freely.
+    fn rest(&self, stroke: &Stroke) -> [f64; 2] {
+        let pushed = 0.25 * stroke.speed * stroke.rise + stroke.clearance + stroke.follow_through;
+        let way = pushed.max(SLIDES * stroke.speed * stroke.speed / (2.0 * self.friction * GRAVITY));
+        let [x, y] = stroke.object;
+        [x + way * stroke.heading.cos(), y + way * stroke.heading.sin()]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::capture::limits;
+
+    fn shipped() -> (Cell, Body, Vec<JointLimits>) {
+        let text = include_str!("../../../config/fr3_cell.toml");
+        let cell: Cell = shared_mem::toml_file::parse(text, "fr3_cell.toml".as_ref()).expect("the shipped file");
+        let body = Body::of(&cell).expect("the shipped cell has an arm");
+        let limits = limits::of(&cell, &body);
+        (cell, body, limits)
+    }
+
+    #[test]
+    fn twelve_wishes_come_from_all_sides_at_all_speeds_and_the_first_comes_again() {
+        let wishes: Vec<Wish> = (0..12).map(Wish::of_clip).collect();
+        assert_eq!(wishes[0], wishes[ANCHOR]);
+        for quarter in 0..4 {
+            let [lo, hi] = [0, 1].map(|k| -PI + f64::from(quarter + k) * FRAC_PI_2);
+            assert!(wishes.iter().any(|wish| (lo..hi).contains(&wish.heading)), "no stroke towards {lo:.1} to {hi:.1}");
+        }
+        let fast = wishes.iter().filter(|wish| wish.speed > 0.5 * (SPEEDS[0] + SPEEDS[1])).count();
+        assert!((3..=9).contains(&fast), "{fast} of 12 are fast");
+        assert!(wishes.iter().any(|wish| wish.aside > 0.3) && wishes.iter().any(|wish| wish.aside < -0.3));
+    }
+
+    #[test]
+    fn forty_strokes_one_after_the_other_keep_the_object_in_reach() {
+        let (cell, body, limits) = shipped();
+        let program = Program::of(&cell, [0.08, 0.06, 0.10], &body, &limits);
+        let mut object = Standing { place: [0.55, 0.0], yaw: 0.2 };
+        for number in 0..40 {
+            let next = program.next(&Wish::of_clip(number), &object, body.model().ready()).expect("a stroke");
+            object = Standing { place: next.rest, yaw: object.yaw + 0.7 };
+            let away = (object.place[0] - MIDDLE[0]).hypot(object.place[1] - MIDDLE[1]);
+            assert!(away < 2.0 * RADIUS, "stroke {number} leads {away:.2} m away");
+        }
+    }
+
+    #[test]
+    fn an_object_out_of_reach_is_asked_for() {
+        let (cell, body, limits) = shipped();
+        let program = Program::of(&cell, [0.08, 0.06, 0.10], &body, &limits);
+        let far = Standing { place: [1.1, 0.4], yaw: 0.0 };
+        let error = program.next(&Wish::of_clip(1), &far, body.model().ready()).expect_err("too far").to_string();
+        assert!(error.contains("put it back") || error.contains("move the object"), "{error}");
+    }
+}

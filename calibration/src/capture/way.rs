@@ -1,0 +1,183 @@
+//! The motions around a stroke: over to its start without touching anything, and away from its end. Pure. Base frame; m, s,
+//! rad.
+//!
+//! Everything travels above the object; only beside it, where the stroke begins and ends, the tool goes straight down or up.
+
+use super::body::Body;
+use super::excess::{Excess, Quantity};
+use super::limits::{JointLimits, first_excess};
+use super::{line, transit};
+use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
+use shared_mem::msg::Joints;
+use shared_mem::msg::motion::SetPoint;
+
+/// Speed straight up and down [m/s].
+const SPEED: f64 = 0.15;
+/// How far the tool backs off from what it pushed before it rises [m].
+const BACK: f64 = 0.02;
+
+/// No safe way was found.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum WayError {
+    /// A place on the way cannot be reached.
+    #[error(
+        "the tool cannot get to x {x:.3} m, y {y:.3} m, z {z:.3} m; move the arm to its ready pose, then start again"
+    )]
+    OutOfReach {
+        /// Where [m].
+        x: f64,
+        /// Where [m].
+        y: f64,
+        /// Where [m].
+        z: f64,
+    },
+    /// A limit is broken on the way.
+    #[error("the way to the stroke breaks a limit ({0}); move the arm to its ready pose, then start again")]
+    Limit(Excess),
+}
+
+/// How ways are judged.
+#[derive(Debug, Clone, Copy)]
+pub struct Ways<'a> {
+    /// The arm.
+    pub body: &'a Body,
+    /// Its limits.
+    pub limits: &'a [JointLimits],
+    /// Height of the tool's end while it travels [m].
+    pub height: f64,
+    /// Height that flange and tool stay above while they travel [m].
+    pub floor: f64,
+}
+
+impl Ways<'_> {
+    /// From rest at `from` to rest at `to`, a pose beside the object: up, over, down.
+    ///
+    /// # Errors
+    /// [`WayError`] with the place, or the joint and the limit.
+    pub fn over(&self, from: &Joints, to: &Joints) -> Result<Vec<SetPoint>, WayError> {
+        let mut points = self.up(from)?;
+        let above = last(&points, from);
+        let end = self.place(to);
+        let descent = self.straight(to, &raised(&end, self.height))?;
+        let reached = last(&descent, to);
+        let across = transit::plan(&above, &reached, self.limits).ok_or_else(|| self.unreachable(&end))?;
+        self.check_height(&across)?;
+        points.extend(across);
+        // The way down is the way up from there, played backwards.
+        points.extend(descent.iter().rev().map(|p| SetPoint { q_d: p.q_d, dq_d: p.dq_d.map(|dq| -dq) }));
+        self.checked(points)
+    }
+
+    /// From rest at the end of a stroke along `heading` [rad]: back a little, then up.
+    ///
+    /// # Errors
+    /// [`WayError`].
+    pub fn away(&self, from: &Joints, heading: f64) -> Result<Vec<SetPoint>, WayError> {
+        let back = Translation3::new(-BACK * heading.cos(), -BACK * heading.sin(), 0.0);
+        let mut points = self.straight(from, &(back * self.place(from)))?;
+        points.extend(self.up(&last(&points, from))?);
+        self.checked(points)
+    }
+
+    fn up(&self, from: &Joints) -> Result<Vec<SetPoint>, WayError> {
+        let place = self.place(from);
+        if place.translation.z >= self.height {
+            return Ok(Vec::new());
+        }
+        self.straight(from, &raised(&place, self.height))
+    }
+
+    fn straight(&self, from: &Joints, to: &Isometry3<f64>) -> Result<Vec<SetPoint>, WayError> {
+        line::travel(self.body, from, to, SPEED).ok_or_else(|| self.unreachable(to))
+    }
+
+    fn place(&self, q: &Joints) -> Isometry3<f64> {
+        self.body.model().tip(q).isometry().to_owned()
+    }
+
+    fn unreachable(&self, to: &Isometry3<f64>) -> WayError {
+        let place = to.translation;
+        WayError::OutOfReach { x: place.x, y: place.y, z: place.z }
+    }
+
+    fn check_height(&self, points: &[SetPoint]) -> Result<(), WayError> {
+        let lowest = points.iter().map(|p| self.body.lowest_point(&p.q_d)).fold(f64::INFINITY, f64::min);
+        let excess = Excess { joint: None, quantity: Quantity::Height, value: lowest, limit: self.floor };
+        if lowest < self.floor { Err(WayError::Limit(excess)) } else { Ok(()) }
+    }
+
+    fn checked(&self, points: Vec<SetPoint>) -> Result<Vec<SetPoint>, WayError> {
+        match first_excess(&points, self.limits, Some(self.body)) {
+            None => Ok(points),
+            Some(excess) => Err(WayError::Limit(excess)),
+        }
+    }
+}
+
+/// The tool's end pointing straight down at a place.
+#[must_use]
+pub fn upright(place: Vector3<f64>) -> Isometry3<f64> {
+    let down = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI);
+    Isometry3::from_parts(Translation3::from(place), down)
+}
+
+fn raised(place: &Isometry3<f64>, height: f64) -> Isometry3<f64> {
+    let mut raised = *place;
+    raised.translation.z = height;
+    raised
+}
+
+fn last(points: &[SetPoint], otherwise: &Joints) -> Joints {
+    points.last().map_or(*otherwise, |point| point.q_d)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::capture::limits;
+    use proptest::prelude::*;
+    use shared_mem::cell::Cell;
+
+    fn arm() -> (Body, Vec<JointLimits>) {
+        let text = include_str!("../../../config/fr3_cell.toml");
+        let cell: Cell = shared_mem::toml_file::parse(text, "fr3_cell.toml".as_ref()).expect("the shipped file");
+        let body = Body::of(&cell).expect("the shipped cell has an arm");
+        let limits = limits::of(&cell, &body);
+        (body, limits)
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(24))]
+
+        #[test]
+        fn a_way_over_travels_above_the_object_and_comes_down_only_at_its_end(
+            (x, y) in (0.35..0.6_f64, -0.25..0.25_f64),
+            (x_from, y_from) in (0.35..0.6_f64, -0.25..0.25_f64),
+        ) {
+            let (body, limits) = arm();
+            let ways = Ways { body: &body, limits: &limits, height: 0.2, floor: 0.12 };
+            let at = |x, y, z| line::reach(&body, body.model().ready(), &upright(Vector3::new(x, y, z))).expect("in reach");
+            let (from, to) = (at(x_from, y_from, 0.03), at(x, y, 0.03));
+            let points = ways.over(&from, &to).expect("a way");
+            let joined = points.windows(2).all(|w| w[0].q_d.iter().zip(&w[1].q_d).all(|(a, b)| (a - b).abs() < 2e-3));
+            prop_assert!(joined, "no leaps");
+            let last = points[points.len() - 1].q_d;
+            prop_assert!(last.iter().zip(&to).all(|(a, b)| (a - b).abs() < 1e-9));
+            for point in &points {
+                let tip = body.model().tip(&point.q_d).isometry().translation.vector;
+                let beside = |x: f64, y: f64| (tip.x - x).hypot(tip.y - y) < 1e-3;
+                prop_assert!(tip.z > 0.12 || beside(x, y) || beside(x_from, y_from), "low at {tip}");
+            }
+        }
+    }
+
+    #[test]
+    fn after_a_stroke_the_tool_backs_off_and_rises() {
+        let (body, limits) = arm();
+        let ways = Ways { body: &body, limits: &limits, height: 0.2, floor: 0.12 };
+        let from = line::reach(&body, body.model().ready(), &upright(Vector3::new(0.5, 0.0, 0.03))).expect("in reach");
+        let points = ways.away(&from, 0.0).expect("a way");
+        let end = body.model().tip(&points[points.len() - 1].q_d).isometry().translation.vector;
+        assert!((end - Vector3::new(0.48, 0.0, 0.2)).norm() < 1e-4, "{end}");
+    }
+}

@@ -1,0 +1,40 @@
+//! The capture flow with an object: strokes planned from tracked poses, played by the bridge, recorded, and read back.
+
+use std::time::Duration;
+use tests::Cell;
+
+#[test]
+fn strokes_are_captured_kept_and_replayed_by_the_twin() {
+    let cell = Cell::shipped();
+    let preview = [
+        "capture",
+        "control-hit-slide",
+        "--cell",
+        "{cell}",
+        "--clips",
+        "1",
+        "--out",
+        &cell.text("session"),
+        "--realtime",
+        "ignore",
+        "--preview",
+        &cell.text("next.svg"),
+    ];
+    let _planned = cell.start("calibration", &preview).wait(Duration::from_secs(60)).succeeded();
+    let picture = std::fs::read_to_string(cell.path("next.svg")).expect("a picture");
+    assert!(picture.contains("m/s"), "{picture}");
+    let mut strokes = preview[..10].to_vec();
+    strokes[5] = "2";
+    strokes.push("--json");
+    let answer = cell.start("calibration", &strokes).wait(Duration::from_secs(240)).succeeded().json();
+    let clips = answer["clips"].as_array().expect("clips");
+    let kept: Vec<_> = clips.iter().filter(|clip| clip["kept"] == true).collect();
+    assert_eq!(kept.len(), 2, "{answer}");
+    assert!(kept.iter().all(|clip| clip["moved"].as_f64() > Some(0.02)), "an object was hardly touched: {answer}");
+    let replayed = cell.start("twin", &["replay", &cell.text("session"), "--json"]);
+    let replayed = replayed.wait(Duration::from_secs(120)).succeeded().json();
+    let add: Vec<f64> =
+        replayed["clips"].as_array().expect("clips").iter().filter_map(|clip| clip["object_add_m"].as_f64()).collect();
+    assert_eq!(add.len(), 2, "{replayed}");
+    assert!(add.iter().all(|add| *add < 0.01), "the twin of the same cell strays: {replayed}");
+}
