@@ -4,7 +4,7 @@
 use super::evidence::{Evidence, Row};
 use super::fit::{Bench, Effort, Hypothesis};
 use super::floor;
-use super::gap::Residuals;
+use super::gap::{Residuals, Typical};
 use super::leftovers::{Left, NUMERICS, ROUGHNESS};
 use super::score::{Advantage, Foretold, foretell};
 use super::shortlist::{self, Scored, TESTABLE};
@@ -26,6 +26,8 @@ const FIRST_PASS: Effort = Effort { iterations: 6, precision: Precision::Joints 
 const LAST_PASS: Effort = Effort { iterations: 6, precision: Precision::Exact };
 /// Other starts of a fit are this share of the strongest that is met in practice away.
 const ASIDE: f64 = 0.3;
+/// Shares of the strongest at which a candidate without a slope is tried.
+const SCANNED: [f64; 4] = [0.06, 0.2, 0.5, 1.0];
 /// Near is this far from the best deviance, or this share of what the best gains.
 const NEAR: f64 = 40.0;
 const NEAR_SHARE: f64 = 0.4;
@@ -41,6 +43,8 @@ const LEAST_GAP: f64 = 1.2;
 /// not matter: 11 of 12 clips do not agree by chance (p = 0.003).
 const PLAIN: f64 = 0.3;
 const NEARLY_ALL: f64 = 0.85;
+/// An advantage of so many of its errors is no chance.
+const CLEAR: f64 = 3.5;
 /// A gap widened by less than this share is chance.
 const HARM: f64 = 0.1;
 /// An arm that strays from the twin by less than this in squared sigmas is not the cause of what an object does.
@@ -76,6 +80,8 @@ pub struct Step {
     pub weights: Vec<f64>,
     /// How many residuals of the arm the judged clips have.
     pub arm_rows: usize,
+    /// What the hypothesis that is extended leaves on all clips but those for confirming.
+    pub left: Vec<Typical>,
 }
 
 /// What the search found.
@@ -152,7 +158,10 @@ impl Step {
             .filter_map(|trial| trial.fitted.as_ref().map(|(fit, advantage)| (trial, fit, advantage)))
             .filter(|(trial, _, advantage)| {
                 let plain = trial.closes > PLAIN && advantage.share > NEARLY_ALL;
-                convincing(advantage, trial.scored.cost) || (plain && advantage.nats > LEAST)
+                let stage = bench.library.candidates[trial.scored.candidate].effect.stage;
+                // Strokes of two engines differ by so much anyway that a little gain on most of them shows nothing.
+                let rough = stage != Stage::Control && !self.object_gap();
+                (convincing(advantage, trial.scored.cost) && !rough) || (plain && advantage.nats > LEAST)
             })
             .filter(|(trial, _, advantage)| {
                 let of_arm = bench.library.candidates[trial.scored.candidate].effect.stage == Stage::Control;
@@ -212,38 +221,105 @@ fn step<E: Evidence>(bench: &Bench<'_, E>, split: &Split, from: &Hypothesis, bar
     drop(swept);
     let from = bench.fit((&from.effects, from.full.clone()), &split.train, &weights, Some(from), FIRST_PASS)?;
     let foretold = foretell(bench, &from, &split.choose, &weights)?;
-    let worthy = worthy(bench, split, &from, &scored);
-    let mut fits: Vec<Option<Hypothesis>> = Vec::with_capacity(scored.len());
-    for scored in &scored {
-        bar.show(50 + (fits.len() as u64 * 5).min(45), bench.library.candidates[scored.candidate].effect.name);
-        let wanted = worthy.contains(&scored.candidate) && !bench.interrupt.asked();
-        let starts = if wanted { starts(bench, scored) } else { Vec::new() };
-        let heats = starts.iter().filter_map(|start| bench.extend(&from, start, &split.train, &weights, HEAT));
-        fits.push(heats.min_by(|a, b| a.deviance().total_cmp(&b.deviance())));
-    }
-    let best = fits.iter().flatten().map(Hypothesis::deviance).fold(from.deviance(), f64::min);
-    let near = best + NEAR.max(NEAR_SHARE * (from.deviance() - best));
-    let trial = |(scored, fit): (Scored, Option<Hypothesis>)| {
-        let fit = fit.map(|fit| {
-            let more = || bench.fit((&fit.effects, fit.full.clone()), &split.train, &weights, Some(&fit), FIRST_PASS);
-            let nearer = if fit.deviance() < near { more() } else { None };
-            nearer.unwrap_or(fit)
-        });
-        let judged = fit.and_then(|fit| {
-            let ahead = foretell(bench, &fit, &split.choose, &weights)?;
-            Some((fit, ahead.over(&foretold)))
-        });
-        let closes = judged.as_ref().map_or(0.0, |(fit, _)| closes(bench, split, &from, fit));
-        Trial { scored, fitted: judged, closes }
-    };
-    let trials = scored.into_iter().zip(fits).map(trial).collect();
     let of_arm = |row: &&Row| bench.evidence.channels()[row.channel].joint.is_some();
     let arm_rows = split.open().iter().map(|clip| bench.evidence.rows(*clip).iter().filter(of_arm).count()).sum();
-    Some(Step { from, foretold, trials, weights, arm_rows })
+    let trial = |scored: &Scored| Trial { scored: scored.clone(), fitted: None, closes: 0.0 };
+    let trials = scored.iter().map(trial).collect();
+    let left = Residuals::at(bench, &from, &split.open()).map(|left| left.typical()).unwrap_or_default();
+    let promising = worthy(bench, &from, &scored, &left);
+    let mut step = Step { from, foretold, trials, weights, arm_rows, left };
+    step.fit(bench, split, (&promising, false), bar);
+    if step.best(bench).is_none() {
+        let rest = overlooked(bench, &step);
+        step.fit(bench, split, (&rest, true), bar);
+    }
+    Some(step)
+}
+
+impl Step {
+    /// Fits candidates and judges them: all a little, those that come near the best to the end. `overlooked` says that the
+    /// score test did not point to them.
+    fn fit<E: Evidence>(
+        &mut self,
+        bench: &Bench<'_, E>,
+        split: &Split,
+        (wanted, overlooked): (&[usize], bool),
+        bar: &Progress,
+    ) {
+        let mut fits = Vec::new();
+        for (done, place) in
+            (0..self.trials.len()).filter(|k| wanted.contains(&self.trials[*k].scored.candidate)).enumerate()
+        {
+            if bench.interrupt.asked() {
+                return;
+            }
+            let scored = &self.trials[place].scored;
+            bar.show(50 + (done as u64 * 5).min(45), bench.library.candidates[scored.candidate].effect.name);
+            let starts = if overlooked { self.likeliest(bench, scored) } else { starts(bench, scored) };
+            let heats =
+                starts.iter().filter_map(|start| bench.extend(&self.from, start, &split.train, &self.weights, HEAT));
+            fits.extend(heats.min_by(|a, b| a.deviance().total_cmp(&b.deviance())).map(|fit| (place, fit)));
+        }
+        let best = fits.iter().map(|(_, fit)| fit.deviance()).fold(self.from.deviance(), f64::min);
+        let near = best + NEAR.max(NEAR_SHARE * (self.from.deviance() - best));
+        for (place, fit) in fits {
+            let more =
+                || bench.fit((&fit.effects, fit.full.clone()), &split.train, &self.weights, Some(&fit), FIRST_PASS);
+            let nearer = if fit.deviance() < near { more() } else { None };
+            let fit = nearer.unwrap_or(fit);
+            if let Some(ahead) = foretell(bench, &fit, &split.choose, &self.weights) {
+                let closes = closes(bench, split, &self.from, &fit);
+                let trial = &mut self.trials[place];
+                (trial.closes, trial.fitted) = (closes, Some((fit, ahead.over(&self.foretold))));
+            }
+        }
+    }
+
+    /// Whether the object strays by more than in strokes of another engine with nothing wrong.
+    fn object_gap(&self) -> bool {
+        self.left.iter().any(|group| group.of_object && group.mean_square - group.floor > ROUGHNESS)
+    }
+
+    /// Whether a trial stands out: nearly all clips speak for it, far beyond chance, and no other effect half as much.
+    #[must_use]
+    pub fn is_clear(&self, candidate: usize) -> bool {
+        let worth = |trial: &Trial| trial.fitted.as_ref().map(|(_, advantage)| net(advantage, trial.scored.cost));
+        let (own, others): (Vec<&Trial>, Vec<&Trial>) =
+            self.trials.iter().partition(|trial| trial.scored.candidate == candidate);
+        let Some((_, advantage)) = own.first().and_then(|trial| trial.fitted.as_ref()) else { return false };
+        let next = others.iter().filter_map(|trial| worth(trial)).fold(0.0, f64::max);
+        let (nats, error) = (advantage.nats, advantage.error);
+        advantage.share > NEARLY_ALL
+            && nats > CLEAR * error
+            && next < 0.5 * own.first().and_then(|t| worth(t)).unwrap_or(0.0)
+    }
+
+    /// Of a candidate that the score test did not point to, the strength at which the fitted clips cost least.
+    fn likeliest<E: Evidence>(&self, bench: &Bench<'_, E>, scored: &Scored) -> Vec<Scored> {
+        let cost = |start: &Scored| {
+            let full = bench.begun(self.from.full.clone(), start);
+            bench.cost_near(&self.from, &full, &self.weights).unwrap_or(f64::INFINITY)
+        };
+        let starts = aside(bench, scored, &SCANNED).into_iter().map(|start| (cost(&start), start));
+        starts.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, start)| start).into_iter().collect()
+    }
+}
+
+/// Candidates on the arm that the score test passed over although a gap remains there that none of the others explains:
+/// what acts only from some size on, as play does, has no slope at its neutral point. Those on the object all have one, or are
+/// fitted in any case.
+fn overlooked<E: Evidence>(bench: &Bench<'_, E>, step: &Step) -> Vec<usize> {
+    let arm = step.left.iter().find(|group| !group.of_object);
+    if !arm.is_some_and(|arm| Left::of_groups(&[*arm], &[*arm])[0].too_much(false)) {
+        return Vec::new();
+    }
+    let rest = step.trials.iter().filter(|trial| trial.fitted.is_none() && trial.scored.signal > TESTABLE);
+    let of_arm = |candidate: &usize| bench.library.candidates[*candidate].effect.stage == Stage::Control;
+    rest.map(|trial| trial.scored.candidate).filter(of_arm).collect()
 }
 
 /// Where fits of a candidate begin: where the score test points. Of an effect with many forms (a place on the table) also
-/// the forms next to the best; of an effect on the hit, whose slope at one point tells little, also some way to either side.
+/// the forms next to the best; of one whose slope at one point tells little, as on the hit, also some way to either side.
 fn starts<E: Evidence>(bench: &Bench<'_, E>, scored: &Scored) -> Vec<Scored> {
     let candidate = &bench.library.candidates[scored.candidate];
     let mut starts = vec![scored.clone()];
@@ -255,11 +331,19 @@ fn starts<E: Evidence>(bench: &Bench<'_, E>, scored: &Scored) -> Vec<Scored> {
         };
         starts.extend(scored.next.iter().map(form));
     }
-    if let (Stage::Hit, [probe]) = (candidate.effect.stage, &candidate.alternatives[scored.alternative].probes[..]) {
-        let sides = [ASIDE, -ASIDE].into_iter().filter(|side| *side > 0.0 || !probe.one_sided);
-        starts.extend(sides.map(|side| Scored { units: vec![side * probe.largest], ..scored.clone() }));
+    if candidate.effect.stage == Stage::Hit && candidate.alternatives[scored.alternative].probes.len() == 1 {
+        starts.extend(aside(bench, scored, &[ASIDE]));
     }
     starts
+}
+
+/// A candidate at shares of the strongest that is met in practice, either way where it acts both ways.
+fn aside<E: Evidence>(bench: &Bench<'_, E>, scored: &Scored, shares: &[f64]) -> Vec<Scored> {
+    let probes = &bench.library.candidates[scored.candidate].alternatives[scored.alternative].probes;
+    let one_sided = probes.iter().any(|probe| probe.one_sided);
+    let sides = shares.iter().flat_map(|share| [*share, -share]).filter(|side| *side > 0.0 || !one_sided);
+    let units = |side: f64| probes.iter().map(|probe| side * probe.largest).collect();
+    sides.map(|side| Scored { units: units(side), ..scored.clone() }).collect()
 }
 
 /// [`Trial::closes`]: of the group of sensors on which it closes most.
@@ -278,10 +362,9 @@ fn closes<E: Evidence>(bench: &Bench<'_, E>, split: &Split, from: &Hypothesis, t
 /// Candidates worth a fit, the arm's and the object's each among themselves: those that the score test cannot rule out, the
 /// best first; of the others only partners that the best is easily taken for. Where the object's gap is large all effects on
 /// the hit are fitted: a blow answers so unevenly that its slope at one point tells little.
-fn worthy<E: Evidence>(bench: &Bench<'_, E>, split: &Split, from: &Hypothesis, scored: &[Scored]) -> Vec<usize> {
+fn worthy<E: Evidence>(bench: &Bench<'_, E>, from: &Hypothesis, scored: &[Scored], left: &[Typical]) -> Vec<usize> {
     let effect = |s: &Scored| bench.library.candidates[s.candidate].effect;
     let mut all = Vec::new();
-    let left = Residuals::at(bench, from, &split.open()).map(|left| left.typical()).unwrap_or_default();
     let beyond = |of_object: bool| {
         let group = left.iter().find(|group| group.of_object == of_object);
         group.map_or(0.0, |group| group.mean_square - group.floor)

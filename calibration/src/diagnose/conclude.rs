@@ -116,8 +116,9 @@ pub fn conclude<E: Evidence>(
 fn finding<'a, E: Evidence>(bench: &Bench<'a, E>, found: &Found, left: Vec<Left>, rest: &[Place]) -> Finding<'a> {
     let name = |effect: &usize| bench.library.candidates[*effect].effect.name;
     let mut rivals = Vec::new();
-    let mut sure: f64 = 1.0;
+    let (mut sure, mut clear): (f64, bool) = (1.0, true);
     for (step, effect) in steps_of(found) {
+        clear &= step.is_clear(effect);
         let others = confidence::rivals(step, effect);
         rivals.extend(others.iter().filter(|other| !found.last.effects.contains(other)).map(name));
         let all = confidence::probabilities(step, false);
@@ -127,6 +128,7 @@ fn finding<'a, E: Evidence>(bench: &Bench<'a, E>, found: &Found, left: Vec<Left>
         effects: found.last.effects.iter().map(name).collect(),
         rivals,
         confidence: sure,
+        clear,
         left,
         at_bounds: !leftovers::at_bounds(bench, &found.last).is_empty(),
         place: rest.first().map_or_else(String::new, |place| format!("{} ({})", place.channel, place.regime)),

@@ -234,6 +234,13 @@ impl<E: Evidence> Bench<'_, E> {
         costs.into_iter().sum::<Option<f64>>().filter(|cost| cost.is_finite())
     }
 
+    /// The cost of the clips of a hypothesis at other shared numbers, their own numbers as they are.
+    #[must_use]
+    pub fn cost_near(&self, from: &Hypothesis, full: &[f64], weights: &[f64]) -> Option<f64> {
+        let clips: Vec<_> = from.fitted.iter().map(|fitted| (fitted.clip, fitted.own.clone())).collect();
+        self.cost(full, &clips, weights)
+    }
+
     /// Adds a candidate, as the score test sees it, to a hypothesis and fits both.
     #[must_use]
     pub fn extend(

@@ -12,6 +12,8 @@ pub struct Finding<'a> {
     pub rivals: Vec<&'a str>,
     /// How sure the weakest of them is.
     pub confidence: f64,
+    /// Whether each of them stood out: nearly all clips spoke for it, and for no other.
+    pub clear: bool,
     /// The gap before and after, of every group of sensors.
     pub left: Vec<Left>,
     /// Whether an effect was pushed to the bound of what is met in practice.
@@ -31,7 +33,7 @@ impl Finding<'_> {
             let gap = self.left.iter().any(|left| left.before - left.floor > left.numerics);
             return if gap { self.unexplained() } else { self.none() };
         }
-        if self.at_bounds || self.left.iter().any(Left::too_much) {
+        if self.at_bounds || self.left.iter().any(|left| left.too_much(self.clear)) {
             return self.unexplained();
         }
         if self.rivals.is_empty() { self.named() } else { self.class() }
@@ -44,7 +46,7 @@ impl Finding<'_> {
 
     fn named(&self) -> Verdict {
         let names = self.effects.iter().map(|name| (*name).to_owned()).collect::<Vec<_>>();
-        let share = 100.0 * self.left.iter().map(Left::explained).fold(0.0, f64::max);
+        let share = self.percent();
         let verb = if names.len() == 1 { "causes" } else { "together cause" };
         let text = format!(
             "{} {verb} the gap: with it the twin closes {share:.0} % of what is not noise.",
@@ -59,10 +61,17 @@ impl Finding<'_> {
         Verdict { kind: Kind::Class, effects: all, confidence: NEGATIVE, text }
     }
 
+    /// How much of what is not noise the effects explain, in the group of sensors in which they explain most [%].
+    fn percent(&self) -> f64 {
+        100.0 * self.left.iter().map(Left::explained).fold(0.0, f64::max)
+    }
+
     fn unexplained(&self) -> Verdict {
         let nearest = match &self.effects[..] {
             [] => String::new(),
-            names => format!("; {} comes nearest and leaves too much", names.join(" with ")),
+            names => {
+                format!("; {} comes nearest and leaves {:.0} % of it", names.join(" with "), 100.0 - self.percent())
+            }
         };
         let text = format!(
             "Nothing in the library explains the gap; it is largest in {}{nearest}.",
@@ -84,8 +93,17 @@ mod tests {
     use super::*;
 
     fn finding<'a>(effects: Vec<&'a str>, before: f64, after: f64) -> Finding<'a> {
-        let left = vec![Left { before, after, floor: 1.0, numerics: NUMERICS, substitute: SUBSTITUTE }];
-        Finding { effects, rivals: Vec::new(), confidence: 0.95, left, at_bounds: false, place: "joint2".into() }
+        let left =
+            vec![Left { before, after, floor: 1.0, numerics: NUMERICS, substitute: SUBSTITUTE, of_object: false }];
+        Finding {
+            effects,
+            rivals: Vec::new(),
+            confidence: 0.95,
+            clear: false,
+            left,
+            at_bounds: false,
+            place: "joint2".into(),
+        }
     }
 
     #[test]

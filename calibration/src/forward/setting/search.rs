@@ -84,7 +84,8 @@ pub fn object_parameters(cell: &Cell, base: &Theta) -> Vec<(Setting, Unknown)> {
 const WIDENED: f64 = 0.5;
 /// Difference step over the width of what is met in practice.
 const EFFECT_STEP: f64 = 2e-3;
-/// The same where a hit lies between the number and what is seen: over this step its roughness averages out.
+/// The same where hits lie between the number and what is seen, of a tool or of a gear's flanks: over this step their
+/// roughness averages out.
 const ROUGH_STEP: f64 = 2e-2;
 
 /// Every number of an effect, for an arm of `dof` joints, beginning where the effect changes nothing.
@@ -99,7 +100,8 @@ pub fn effect_settings(info: &'static EffectInfo, dof: usize) -> Vec<(Setting, U
         };
         let inverse = parameter.resting_value().is_infinite();
         let [lo, hi] = searched(parameter, inverse);
-        let share = if info.stage == Stage::Control { EFFECT_STEP } else { ROUGH_STEP };
+        let hits = info.stage != Stage::Control || info.name == "joint_backlash";
+        let share = if hits { ROUGH_STEP } else { EFFECT_STEP };
         let step = share * width(parameter, inverse);
         let start = if inverse { 0.0 } else { parameter.resting_value() };
         for index in indices {
