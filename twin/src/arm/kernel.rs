@@ -65,9 +65,55 @@ pub(super) struct Chain<const N: usize> {
     pub(super) axes: [Spatial; N],
 }
 
+/// Sines and cosines of the joints' positions.
+#[derive(Clone, Copy)]
+pub(super) struct Angles<const N: usize> {
+    sin: [f64; N],
+    cos: [f64; N],
+}
+
+/// Turns by less than this are taken from the series of sine and cosine, whose next term is then below rounding [rad].
+const SMALL_TURN: f64 = 0.02;
+
+impl<const N: usize> Angles<N> {
+    #[inline(always)]
+    pub(super) fn of(q: &[f64; N]) -> Self {
+        let (mut sin, mut cos) = ([0.0; N], [0.0; N]);
+        for i in 0..N {
+            (sin[i], cos[i]) = q[i].sin_cos();
+        }
+        Self { sin, cos }
+    }
+
+    /// Those of positions that are `turn` further.
+    #[inline(always)]
+    pub(super) fn turned(&self, q: &[f64; N], turn: &[f64; N]) -> Self {
+        if !turn.iter().all(|turn| turn.abs() < SMALL_TURN) {
+            return Self::of(&std::array::from_fn(|i| q[i] + turn[i]));
+        }
+        let mut out = *self;
+        for (i, turn) in turn.iter().enumerate() {
+            let square = turn * turn;
+            let sin =
+                turn * (1.0 - square * (1.0 / 6.0) * (1.0 - square * (1.0 / 20.0) * (1.0 - square * (1.0 / 42.0))));
+            // The cosine less 1: a small number that keeps its digits.
+            let off = -0.5 * square * (1.0 - square * (1.0 / 12.0) * (1.0 - square * (1.0 / 30.0)));
+            out.sin[i] += self.sin[i] * off + self.cos[i] * sin;
+            out.cos[i] += self.cos[i] * off - self.sin[i] * sin;
+        }
+        out
+    }
+}
+
 impl<const N: usize> Chain<N> {
     #[inline(always)]
     pub(super) fn at(links: &[Link; N], q: &[f64; N]) -> Self {
+        Self::turned(links, q, &Angles::of(q))
+    }
+
+    /// The chain at positions whose sines and cosines are known.
+    #[inline(always)]
+    pub(super) fn turned(links: &[Link; N], q: &[f64; N], angles: &Angles<N>) -> Self {
         let mut frames = [Frame::default(); N];
         let mut axes = [Spatial::default(); N];
         let mut rotation: Rot3 = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
@@ -82,8 +128,7 @@ impl<const N: usize> Chain<N> {
                 origin = add(origin, scale(axis, q[i]));
                 axes[i] = Spatial { angular: [0.0; 3], linear: axis };
             } else {
-                let (sin, cos) = q[i].sin_cos();
-                rotation = turn_about_z(&at_zero, sin, cos);
+                rotation = turn_about_z(&at_zero, angles.sin[i], angles.cos[i]);
                 axes[i] = Spatial { angular: axis, linear: cross(origin, axis) };
             }
             frames[i] = Frame { rotation, origin };
@@ -104,13 +149,25 @@ impl<const N: usize> Chain<N> {
     /// Joint torques that hold `gravity` and the velocity-dependent forces: Newton-Euler at zero joint acceleration.
     #[inline(always)]
     pub(super) fn bias(&self, bodies: &[TenParameters; N], dq: &[f64; N], gravity: Vec3) -> [f64; N] {
+        self.torques(bodies, dq, &[0.0; N], gravity)
+    }
+
+    /// Joint torques, but for those of the rotors, under which the joints accelerate by `ddq`: Newton-Euler.
+    #[inline(always)]
+    pub(super) fn torques(
+        &self,
+        bodies: &[TenParameters; N],
+        dq: &[f64; N],
+        ddq: &[f64; N],
+        gravity: Vec3,
+    ) -> [f64; N] {
         let mut velocity = Spatial::default();
         // Gravity acts like an acceleration of the base the other way.
         let mut acceleration = Spatial { angular: [0.0; 3], linear: scale(gravity, -1.0) };
         let mut forces = [Spatial::default(); N];
         for i in 0..N {
             let joint = self.axes[i].times(dq[i]);
-            acceleration = acceleration.plus(velocity.carry_motion(joint));
+            acceleration = acceleration.plus(velocity.carry_motion(joint)).plus(self.axes[i].times(ddq[i]));
             velocity = velocity.plus(joint);
             let momentum = bodies[i].momentum(velocity);
             forces[i] = bodies[i].momentum(acceleration).plus(velocity.carry_force(momentum));

@@ -7,14 +7,14 @@
 use super::control::ControlLaw;
 use super::dynamics::Response;
 use super::kernel::{filled, first, with_dof};
-use super::{ArmModel, JointState, Joints};
+use super::{ArmModel, JointState, Joints, Yielding};
 
 impl ArmModel {
     /// Moves `state` on by `dt` seconds under constant torques [N m].
     pub fn step(&self, state: &mut JointState, tau: &Joints, dt: f64) {
         with_dof!(self, N => {
             let tau = *first::<N, _>(tau);
-            self.midpoint::<N>(state, dt, |_| tau);
+            self.midpoint::<N, _>(state, dt, |_| tau, |_| ());
         });
     }
 
@@ -34,31 +34,48 @@ impl ArmModel {
         let before = *state;
         with_dof!(self, N => {
             let torque = |bias: &[f64; N]| *first(&law.torque_with(&before, q_d, dq_d, &filled(bias)));
-            let (tau, gravity) = self.midpoint::<N>(state, dt, torque);
-            (filled(&tau), filled(&gravity))
+            self.midpoint::<N, _>(state, dt, torque, |start| (filled(&start.tau), filled(&start.gravity)))
         })
     }
 
-    /// One step under the torque that `torque` answers for the bias at the start; returns that torque and the gravity.
+    /// [`ArmModel::controlled_step`], and how the arm yields at the state in which it begins.
+    pub(crate) fn yielding_step(
+        &self,
+        state: &mut JointState,
+        law: &ControlLaw,
+        (q_d, dq_d): (&Joints, &Joints),
+        dt: f64,
+    ) -> (Joints, Joints, Yielding) {
+        let before = *state;
+        with_dof!(self, N => {
+            let torque = |bias: &[f64; N]| *first(&law.torque_with(&before, q_d, dq_d, &filled(bias)));
+            self.midpoint::<N, _>(state, dt, torque, |start| {
+                (filled(&start.tau), filled(&start.gravity), self.yielding_of(&start.chain, &start.mass))
+            })
+        })
+    }
+
+    /// One step under the torque that `torque` answers for the bias at the start; what `look` sees there.
     #[inline(always)]
-    fn midpoint<const N: usize>(
+    fn midpoint<const N: usize, T>(
         &self,
         state: &mut JointState,
         dt: f64,
         torque: impl FnOnce(&[f64; N]) -> [f64; N],
-    ) -> ([f64; N], [f64; N]) {
+        look: impl FnOnce(&Response<N>) -> T,
+    ) -> T {
         let (q, dq) = (*first::<N, _>(&state.q), *first::<N, _>(&state.dq));
-        let Response { acceleration: start, tau, gravity } = self.respond(&q, &dq, torque);
-        let (mut q_mid, mut dq_mid) = (q, dq);
+        let start = self.respond(&q, &dq, torque);
+        let (mut turn, mut dq_mid) = ([0.0; N], dq);
         for i in 0..N {
-            q_mid[i] += 0.5 * dt * dq[i];
-            dq_mid[i] += 0.5 * dt * start[i];
+            turn[i] = 0.5 * dt * dq[i];
+            dq_mid[i] += 0.5 * dt * start.acceleration[i];
         }
-        let middle = self.respond(&q_mid, &dq_mid, |_| tau).acceleration;
+        let middle = self.respond_later(&start, (&q, &turn), &dq_mid);
         for i in 0..N {
             state.q[i] += dt * dq_mid[i];
             state.dq[i] += dt * middle[i];
         }
-        (tau, gravity)
+        look(&start)
     }
 }

@@ -59,13 +59,18 @@ impl ArmModel {
                 mass[i][i] = (mass[i][i] - links[i].rotor).max(LEAST_INERTIA);
             }
             factor(&mut mass);
-            let origin = self.flange_of(&chain.frames[N - 1]).translation.vector.into();
-            let columns = chain.axes.map(|axis| {
-                let linear = add(axis.linear, cross(axis.angular, origin));
-                [linear[0], linear[1], linear[2], axis.angular[0], axis.angular[1], axis.angular[2]]
-            });
-            Yielding::of(&columns, |torque| solve(&mass, torque))
+            self.yielding_of(&chain, &mass)
         })
+    }
+
+    /// How it yields where the chain is known and its mass matrix factored.
+    pub(super) fn yielding_of<const N: usize>(&self, chain: &Chain<N>, mass: &[[f64; N]; N]) -> Yielding {
+        let origin = self.flange_of(&chain.frames[N - 1]).translation.vector.into();
+        let columns = chain.axes.map(|axis| {
+            let linear = add(axis.linear, cross(axis.angular, origin));
+            [linear[0], linear[1], linear[2], axis.angular[0], axis.angular[1], axis.angular[2]]
+        });
+        Yielding::of(&columns, |torque| solve(mass, torque))
     }
 
     fn flange_of(&self, last: &Frame) -> Isometry3<f64> {

@@ -3,7 +3,7 @@
 #![allow(non_snake_case)] // the Franka Control Interface's own symbols
 
 use super::{ArmRollout, CommandTrack, TICK, TICK_NS};
-use crate::arm::{JointState, Joints, MAX_JOINTS};
+use crate::arm::{JointState, Joints, MAX_JOINTS, Yielding};
 use crate::effects::ArmMemory;
 
 /// What an arm is told for one control period.
@@ -75,6 +75,13 @@ impl ArmMotion {
         let (state, zero) = (JointState::default(), [0.0; MAX_JOINTS]);
         Self { state, memory: None, motor: zero, external: zero, tau_J: zero, tau_J_d: zero }
     }
+
+    /// Notes the torque of a controller that knows the arm exactly.
+    fn command(&mut self, tau: &Joints, gravity: &Joints) {
+        self.motor = *tau;
+        self.tau_J_d = std::array::from_fn(|i| tau[i] - gravity[i]);
+        self.external = [0.0; MAX_JOINTS];
+    }
 }
 
 impl ArmRollout<'_> {
@@ -108,19 +115,32 @@ impl ArmRollout<'_> {
 
     /// Lets one control period pass without anything touching the arm.
     pub(crate) fn period(&self, motion: &mut ArmMotion, drive: &Drive) {
-        if let (Drive::JointImpedance { q_d, dq_d }, true) = (drive, std::ptr::eq(self.arm, self.nominal)) {
-            let before = motion.state.dq;
+        let before = motion.state.dq;
+        if let Some((q_d, dq_d)) = self.exactly_known(drive) {
             let (tau, gravity) = self.arm.controlled_step(&mut motion.state, self.law, q_d, dq_d, TICK);
-            motion.motor = tau;
-            motion.tau_J_d = std::array::from_fn(|i| tau[i] - gravity[i]);
-            motion.external = [0.0; MAX_JOINTS];
+            motion.command(&tau, &gravity);
             self.sense(motion, &before);
             return;
         }
         self.begin(motion, drive);
-        let before = motion.state.dq;
         self.advance(motion, &[0.0; MAX_JOINTS], TICK);
         self.sense(motion, &before);
+    }
+
+    /// What an arm is to follow that is just what its controller believes it to be.
+    pub(crate) fn exactly_known<'d>(&self, drive: &'d Drive) -> Option<(&'d Joints, &'d Joints)> {
+        match drive {
+            Drive::JointImpedance { q_d, dq_d } if std::ptr::eq(self.arm, self.nominal) => Some((q_d, dq_d)),
+            _ => None,
+        }
+    }
+
+    /// [`ArmRollout::begin`] and the whole period without contact for such an arm, for the price of one of them; how it
+    /// yields at the start.
+    pub(crate) fn yielding_period(&self, motion: &mut ArmMotion, desired: (&Joints, &Joints)) -> Yielding {
+        let (tau, gravity, yielding) = self.arm.yielding_step(&mut motion.state, self.law, desired, TICK);
+        motion.command(&tau, &gravity);
+        yielding
     }
 
     /// Evaluates the controller for the coming period, from what the encoders read at its start.

@@ -3,7 +3,7 @@
 
 use super::SimError;
 use super::tool_path::{Reaction, ToolPath};
-use crate::arm::{ArmModel, JointState, Joints, MAX_JOINTS};
+use crate::arm::{ArmModel, FlangeMotion, JointState, Joints, MAX_JOINTS};
 use crate::effects::{ArmEffects, ArmMemory, JointMemory};
 use crate::rollout::{ArmMotion, CommandTrack, Drive, Plant, Reading, TICK};
 use crate::sensors::joint::JointNoise;
@@ -78,7 +78,10 @@ impl SimArm {
     /// Evaluates the controller once for the coming period, from the state at its start.
     pub(super) fn begin_period(&mut self, drive: &Drive) {
         self.remember(drive);
-        self.plant.rollout().begin(&mut self.motion, drive);
+        let rollout = self.plant.rollout();
+        if rollout.exactly_known(drive).is_none() {
+            rollout.begin(&mut self.motion, drive);
+        }
     }
 
     /// Parts of a period in which the arm's way may be corrected after the contact: joints that stick or yield do not
@@ -87,14 +90,24 @@ impl SimArm {
         if self.plant.acts_in_joints() { 4 } else { 1 }
     }
 
-    /// Moves the arm on by `length` seconds as if nothing touched it; the tool's way there.
-    pub(super) fn path(&mut self, length: f64) -> ToolPath {
-        let from = self.model().flange_motion(&self.motion.state);
-        let yielding = self.plant.yielding(&self.motion.state.q);
+    /// Moves the arm on by `length` seconds of the period under `drive` as if nothing touched it; the tool's way there,
+    /// which begins with `from`.
+    pub(super) fn path(&mut self, drive: &Drive, from: FlangeMotion, length: f64) -> ToolPath {
         self.start =
             StretchStart { state: self.motion.state, joints: self.motion.memory.as_ref().map(ArmMemory::joints) };
-        self.plant.rollout().advance(&mut self.motion, &[0.0; MAX_JOINTS], length);
-        ToolPath::new(from, self.model().flange_motion(&self.motion.state), length, yielding)
+        let rollout = self.plant.rollout();
+        let yielding = if let Some(desired) = rollout.exactly_known(drive) {
+            rollout.yielding_period(&mut self.motion, desired)
+        } else {
+            let yielding = self.plant.yielding(&self.motion.state.q);
+            rollout.advance(&mut self.motion, &[0.0; MAX_JOINTS], length);
+            yielding
+        };
+        ToolPath::new(from, self.flange_motion(), length, yielding)
+    }
+
+    pub(super) fn flange_motion(&self) -> FlangeMotion {
+        self.model().flange_motion(&self.motion.state)
     }
 
     /// What the contact along the path did to the arm.

@@ -5,7 +5,7 @@
 use super::arm::SimArm;
 use super::tool_path::{ToolMotion, ToolPath};
 use super::{Drive, PERIOD};
-use crate::arm::Joints;
+use crate::arm::{FlangeMotion, Joints};
 use crate::effects::HitEffects;
 use crate::physics::TableObject;
 use crate::physics::hit::{ContactLaw, ContactMotion, Press};
@@ -22,6 +22,17 @@ const LOOK: f64 = 2.5e-4;
 const INTO: f64 = 2e-7;
 /// Nothing closes a gap of this width within a millisecond [m].
 const NEAR: f64 = 0.02;
+/// Tool and object that do not touch gain no more speed of approach than this in a second [m/s²]: far more than an arm's
+/// torques or a table give them.
+const SURGE: f64 = 500.0;
+
+/// What the gap may do within the coming period.
+enum Outlook {
+    /// It stays open for so many periods, at least one.
+    Open { periods: u32 },
+    /// It may close; the flange's motion now.
+    Near(FlangeMotion),
+}
 
 /// The contact between tool and object.
 #[derive(Clone)]
@@ -42,6 +53,8 @@ pub(super) struct ContactRecord {
     pub(super) mean_force: f64,
     /// First touch and end of the last one, in simulated time [ns].
     pub(super) span: Option<(u64, u64)>,
+    /// Periods for which the gap certainly stays open: nobody needs to look at it.
+    clear_periods: u32,
 }
 
 impl ToolContact {
@@ -59,6 +72,7 @@ impl ToolContact {
     /// Other parameters of the same pair; what is on record stays.
     pub(super) fn set_parameters(&mut self, tool: Option<&Tool>, object: &ObjectParameters, effects: &HitEffects) {
         *self = Self { record: self.record, refinement: self.refinement, ..Self::new(tool, object, effects) };
+        self.look_again();
     }
 
     /// Makes the steps in touch `times` shorter: for the test that they are short enough.
@@ -70,22 +84,36 @@ impl ToolContact {
     /// One period of arm and object from the simulated time `now_ns` on.
     pub(super) fn advance(&mut self, arm: &mut SimArm, object: &mut TableObject, drive: &Drive, now_ns: u64) {
         self.record.mean_force = 0.0;
-        match self.pair.filter(|_| self.may_touch(arm, object)) {
-            None => {
-                arm.period(drive);
-                object.step(PERIOD, &[]);
-            }
-            Some((tool, motion)) => {
-                arm.begin_period(drive);
-                let stretches = arm.stretches();
-                let length = PERIOD / stretches as f64;
-                for stretch in 0..stretches {
-                    let mut close = Close { contact: self, object, tool: &tool, motion: &motion };
-                    let mut path = arm.path(length);
-                    close.follow(&mut path, now_ns, length * stretch as f64);
-                    arm.end_path(&path);
-                }
-                arm.end_period();
+        let Some((tool, motion, from)) = self.approaching(arm, object) else {
+            arm.period(drive);
+            object.step(PERIOD, &[]);
+            return;
+        };
+        arm.begin_period(drive);
+        let stretches = arm.stretches();
+        let length = PERIOD / stretches as f64;
+        for stretch in 0..stretches {
+            let from = if stretch == 0 { from } else { arm.flange_motion() };
+            let mut close = Close { contact: self, object, tool: &tool, motion: &motion };
+            let mut path = arm.path(drive, from, length);
+            close.follow(&mut path, now_ns, length * stretch as f64);
+            arm.end_path(&path);
+        }
+        arm.end_period();
+    }
+
+    /// Tool, law and the flange's motion where the gap may close within the coming period.
+    fn approaching(&mut self, arm: &SimArm, object: &TableObject) -> Option<(Capsule, ContactMotion, FlangeMotion)> {
+        let (tool, motion) = self.pair.filter(|_| arm.model().has_geometry())?;
+        if self.record.clear_periods > 0 {
+            self.record.clear_periods -= 1;
+            return None;
+        }
+        match self.outlook(&tool, arm, object) {
+            Outlook::Near(flange) => Some((tool, motion, flange)),
+            Outlook::Open { periods } => {
+                self.record.clear_periods = periods - 1;
+                None
             }
         }
     }
@@ -93,19 +121,35 @@ impl ToolContact {
     /// Whether the gap may close within a period.
     pub(super) fn may_touch(&self, arm: &SimArm, object: &TableObject) -> bool {
         let Some((tool, _)) = self.pair.as_ref().filter(|_| arm.model().has_geometry()) else { return false };
-        let flange = arm.model().flange(&arm.state().q).isometry();
-        let held = self.held(&flange);
+        self.record.clear_periods == 0 && matches!(self.outlook(tool, arm, object), Outlook::Near(_))
+    }
+
+    fn outlook(&self, tool: &Capsule, arm: &SimArm, object: &TableObject) -> Outlook {
+        let flange = arm.flange_motion();
+        let held = self.held(&flange.pose);
         let centre = Point3::from(object.pose().isometry().translation.vector);
         let on_tool = held.inverse_transform_point(&centre);
         let nearest = Point3::new(0.0, 0.0, on_tool.z.clamp(0.0, tool.segment));
-        // Most periods end here.
-        if (on_tool - nearest).norm() - tool.radius - object.bounding_radius() > NEAR {
-            return false;
+        let mut gap = (on_tool - nearest).norm() - tool.radius - object.bounding_radius();
+        if gap <= NEAR {
+            let touch = object.touch(tool, &held);
+            let moving = ToolMotion::from(flange);
+            let approach = (moving.velocity_at(&touch.point) - object.velocity_at(&touch.point)).norm();
+            gap = -touch.depth;
+            if gap.is_nan() || gap < MARGIN + approach * PERIOD {
+                return Outlook::Near(flange);
+            }
         }
-        let touch = object.touch(tool, &held);
-        let moving = ToolMotion::from(arm.model().flange_motion(arm.state()));
-        let approach = (moving.velocity_at(&touch.point) - object.velocity_at(&touch.point)).norm();
-        -touch.depth < MARGIN + approach * PERIOD
+        let reach = tool.segment + tool.radius + (held.translation.vector - flange.pose.translation.vector).norm();
+        let of_tool = flange.velocity.norm() + flange.angular_velocity.norm() * reach;
+        let of_object = object.centre_velocity().norm() + object.angular_velocity().norm() * object.bounding_radius();
+        let open = time_to_close(gap - MARGIN, of_tool + of_object);
+        Outlook::Open { periods: ((open / PERIOD) as u32).max(1) }
+    }
+
+    /// Arm or object are somewhere else now.
+    pub(super) fn look_again(&mut self) {
+        self.record.clear_periods = 0;
     }
 
     /// Gap between object and tool for an arm at `q` [m]; without bound where there is no tool.
@@ -118,6 +162,11 @@ impl ToolContact {
     fn held(&self, flange: &Isometry3<f64>) -> Isometry3<f64> {
         self.tool_shift.map_or(*flange, |shift| flange * shift)
     }
+}
+
+/// The least time in which a gap can close whose sides approach with `speed` at most now [s].
+fn time_to_close(gap: f64, speed: f64) -> f64 {
+    ((speed * speed + 2.0 * SURGE * gap).sqrt() - speed) / SURGE
 }
 
 /// Tool and object close to each other.

@@ -301,6 +301,7 @@ impl SimCell {
         if let Some(arm) = &mut self.arm {
             arm.set(q, dq);
         }
+        self.contact.look_again();
         self.takes_part.arm = true;
     }
 
@@ -326,6 +327,7 @@ impl SimCell {
         if let Some(arm) = &mut self.arm {
             arm.start(reading, at_ns, commands);
         }
+        self.contact.look_again();
         self.takes_part.arm = true;
     }
 
@@ -341,6 +343,7 @@ impl SimCell {
         if let Some(object) = &mut self.object {
             object.set(pose, velocity, angular_velocity);
         }
+        self.contact.look_again();
     }
 
     /// The cell as a camera sees it now.

@@ -48,6 +48,24 @@ fn object_position(cell: &SimCell) -> Vector3<f64> {
 }
 
 #[test]
+fn a_gap_that_is_wide_need_not_be_looked_at_in_every_period() {
+    let run = |again: bool| {
+        let mut cell = SimCell::new(&striking(), None).expect("a cell");
+        let mut near = 0;
+        strike(&mut cell, 1500, |cell| {
+            near += u32::from(cell.may_touch());
+            if again {
+                cell.contact.look_again();
+            }
+        });
+        (cell.q(), object_position(&cell), cell.first_contact_ns(), cell.last_contact_ns(), near)
+    };
+    let (seldom, always) = (run(false), run(true));
+    assert!(always.2.is_some() && always.4 < 1500);
+    assert_eq!(seldom, always);
+}
+
+#[test]
 fn an_arm_that_is_told_to_stay_stays() {
     let mut cell = SimCell::new(&shipped(), None).expect("a cell");
     let (q_d, dq_d) = (cell.q(), [0.0; 8]);
