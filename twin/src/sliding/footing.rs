@@ -62,20 +62,22 @@ impl Footing {
     /// The footing of a body that lies flat on the table and hardly moves up or down; `None` when it does not stand.
     #[must_use]
     pub fn find(solid: &Solid<'_>, body: &FreeBody, table_height: f64) -> Option<(Self, PlanarState)> {
-        let place = |rotation: UnitQuaternion<f64>, p: &Point3<f64>| rotation * (p.coords - solid.centre_of_mass);
-        let heights = || solid.corners.iter().map(|p| place(body.rotation, p).z);
-        let lowest = heights().fold(f64::INFINITY, f64::min);
+        let turn = body.rotation.to_rotation_matrix();
+        let place = |p: &Point3<f64>| turn * (p.coords - solid.centre_of_mass);
+        let lowest = solid.corners.iter().map(|p| place(p).z).fold(f64::INFINITY, f64::min);
         if (body.centre.z + lowest - table_height).abs() > GAP + BASE {
             return None;
         }
-        let base = || solid.corners.iter().map(|p| place(body.rotation, p)).filter(|p| p.z < lowest + BASE);
-        let upright = level(base())? * body.rotation;
-        let lean = (upright * body.rotation.inverse()).angle();
+        let base = || solid.corners.iter().map(place).filter(|p| p.z < lowest + BASE);
         let settled = base().all(|p| {
             let rising = body.velocity.z + body.angular_velocity.cross(&p).z;
             rising.abs() < SINKING && (body.centre.z + p.z - table_height).abs() < GAP
         });
-        if lean > LEAN || !settled {
+        if !settled {
+            return None;
+        }
+        let upright = level(base())? * body.rotation;
+        if (upright * body.rotation.inverse()).angle() > LEAN {
             return None;
         }
         let footing = Self::on(solid, upright, table_height)?;
@@ -91,13 +93,13 @@ impl Footing {
     /// A body that stands with the orientation `upright` at yaw 0; `None` when nothing flat is below its centre of mass.
     #[must_use]
     pub fn on(solid: &Solid<'_>, upright: UnitQuaternion<f64>, table_height: f64) -> Option<Self> {
-        let place = |p: &Point3<f64>| upright * (p.coords - solid.centre_of_mass);
+        let turned = upright.to_rotation_matrix();
+        let place = |p: &Point3<f64>| turned * (p.coords - solid.centre_of_mass);
         let lowest = solid.corners.iter().map(|p| place(p).z).fold(f64::INFINITY, f64::min);
         let hull = Hull::of(solid.corners.iter().map(place).filter(|p| p.z < lowest + BASE).map(|p| p.xy()))?;
         if !hull.holds(Vector2::zeros(), 0.0) {
             return None;
         }
-        let turned = upright.to_rotation_matrix();
         let slider = Slider {
             mass: solid.mass,
             yaw_inertia: (turned * solid.inertia * turned.transpose())[(2, 2)],

@@ -11,7 +11,7 @@
 //!
 //! which is where the load moves forward: braking pitches the body onto its leading edge.
 
-use super::patch::{MAX_POINTS, Patch};
+use super::patch::Places;
 use nalgebra::{Matrix3, Vector2, Vector3};
 
 /// Force and moment about the centre of mass [N, N m], gravity included, the table's answer not.
@@ -49,9 +49,9 @@ impl Wrench {
 }
 
 /// Normal force at each place of a patch [N].
-pub(super) type Loads = [f64; MAX_POINTS];
+pub(super) type Loads<const N: usize> = [f64; N];
 /// Friction over normal force at each place, against the friction: coefficient times direction of slip.
-pub(super) type Kappas = [Vector2<f64>; MAX_POINTS];
+pub(super) type Kappas<const N: usize> = [Vector2<f64>; N];
 
 /// Rounds of dropping the places that would pull; each patch seen so far needs at most four.
 const ROUNDS: usize = 12;
@@ -61,32 +61,42 @@ const SINGULAR: f64 = 1e-9;
 /// The loads under friction `kappas`; `None` when no pressure without pull can balance the body: it lifts.
 ///
 /// `wrench` and `kappas` are in the patch frame.
-pub(super) fn solve(patch: &Patch, height: f64, wrench: &Wrench, kappas: &Kappas) -> Option<Loads> {
-    balance(patch, wrench, |i, point| point - kappas[i] * height)
+pub(super) fn solve<const N: usize>(
+    places: &Places<'_, N>,
+    height: f64,
+    wrench: &Wrench,
+    kappas: &Kappas<N>,
+) -> Option<Loads<N>> {
+    let mut levers = *places.points;
+    for i in 0..N {
+        levers[i] -= kappas[i] * height;
+    }
+    balance(places, wrench, &levers)
 }
 
 /// The loads of a body at rest: its friction as a whole is known, it cancels the planar wrench.
-pub(super) fn solve_at_rest(patch: &Patch, height: f64, wrench: &Wrench) -> Option<Loads> {
+pub(super) fn solve_at_rest<const N: usize>(places: &Places<'_, N>, height: f64, wrench: &Wrench) -> Option<Loads<N>> {
     let friction = Vector2::new(-wrench.force.x, -wrench.force.y);
     let tipping = Vector3::new(height * friction.y, -height * friction.x, 0.0);
-    balance(patch, &Wrench { force: wrench.force, moment: wrench.moment + tipping }, |_, point| point)
+    balance(places, &Wrench { force: wrench.force, moment: wrench.moment + tipping }, places.points)
 }
 
-/// Finds `p = a + b x + c y >= 0` whose forces act, at the levers that `lever` gives, like the wrench demands.
-fn balance(patch: &Patch, wrench: &Wrench, lever: impl Fn(usize, Vector2<f64>) -> Vector2<f64>) -> Option<Loads> {
+/// Finds `p = a + b x + c y >= 0` whose forces act, at the places' `levers`, like the wrench demands.
+fn balance<const N: usize>(places: &Places<'_, N>, wrench: &Wrench, levers: &[Vector2<f64>; N]) -> Option<Loads<N>> {
     let weight = -wrench.force.z;
     if weight <= 0.0 {
         return None;
     }
     let demand = Vector3::new(1.0, wrench.moment.y / weight, -wrench.moment.x / weight);
-    let mut carries = [true; MAX_POINTS];
+    let mut carrying = *places.shares;
     for _ in 0..ROUNDS {
-        let pressure = pressure_on(patch, &carries, demand, &lever)?;
-        let (mut loads, mut settled) = ([0.0; MAX_POINTS], true);
-        for (i, (point, share)) in patch.places().enumerate() {
+        let pressure = pressure_on(places.points, &carrying, demand, levers)?;
+        let (mut loads, mut settled) = ([0.0; N], true);
+        for i in 0..N {
+            let (point, share) = (places.points[i], places.shares[i]);
             let load = share * (pressure.x + pressure.y * point.x + pressure.z * point.y);
-            settled &= carries[i] == (load > 0.0);
-            carries[i] = load > 0.0;
+            settled &= (carrying[i] > 0.0) == (load > 0.0);
+            carrying[i] = if load > 0.0 { share } else { 0.0 };
             loads[i] = weight * load.max(0.0);
         }
         if settled {
@@ -96,18 +106,17 @@ fn balance(patch: &Patch, wrench: &Wrench, lever: impl Fn(usize, Vector2<f64>) -
     None
 }
 
-/// The affine pressure when exactly the places that `carries` names take part.
-fn pressure_on(
-    patch: &Patch,
-    carries: &[bool; MAX_POINTS],
+/// The affine pressure when the places take part by their `shares`.
+fn pressure_on<const N: usize>(
+    points: &[Vector2<f64>; N],
+    shares: &[f64; N],
     demand: Vector3<f64>,
-    lever: &impl Fn(usize, Vector2<f64>) -> Vector2<f64>,
+    levers: &[Vector2<f64>; N],
 ) -> Option<Vector3<f64>> {
     let mut matrix = Matrix3::zeros();
-    for (i, (point, share)) in patch.places().enumerate().filter(|(i, _)| carries[*i]) {
-        let arm = lever(i, point);
-        let (left, right) = (Vector3::new(1.0, arm.x, arm.y) * share, Vector3::new(1.0, point.x, point.y));
-        matrix += left * right.transpose();
+    for i in 0..N {
+        let left = Vector3::new(1.0, levers[i].x, levers[i].y) * shares[i];
+        matrix += left * Vector3::new(1.0, points[i].x, points[i].y).transpose();
     }
     let [p, q, r] = [matrix.column(0), matrix.column(1), matrix.column(2)];
     let volume = p.dot(&q.cross(&r));

@@ -16,13 +16,48 @@ const RING_POINTS: usize = 48;
 /// Sectors of a uniform patch, or as many as it has edges; shells fill up to [`MAX_POINTS`].
 const SECTORS: usize = 16;
 
-/// The places, in the patch frame: from the centre of mass, along the table [m].
+/// The places, in the patch frame: from the centre of mass, along the table [m]. Behind the last stands the first again,
+/// with no share of the pressure, so that whoever takes a few more sees nothing new.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Patch {
     points: [Vector2<f64>; MAX_POINTS],
     weights: [f64; MAX_POINTS],
     count: usize,
 }
+
+/// All places of a patch in arrays of a length known at compile time: a box on its four corners, which is what most rollouts
+/// slide, then costs neither loops nor room for more.
+#[derive(Clone, Copy)]
+pub(super) struct Places<'a, const N: usize> {
+    pub(super) points: &'a [Vector2<f64>; N],
+    /// Shares of an even pressure.
+    pub(super) shares: &'a [f64; N],
+}
+
+/// Evaluates an expression with the places of a patch as `$places`.
+macro_rules! with_places {
+    ($patch:expr, $places:ident => $body:expr) => {
+        match $patch.len() {
+            0..=4 => {
+                let $places = $patch.first::<4>();
+                $body
+            }
+            5..=8 => {
+                let $places = $patch.first::<8>();
+                $body
+            }
+            9..=48 => {
+                let $places = $patch.first::<48>();
+                $body
+            }
+            _ => {
+                let $places = $patch.first::<{ $crate::sliding::patch::MAX_POINTS }>();
+                $body
+            }
+        }
+    };
+}
+pub(super) use with_places;
 
 /// The base spans no polygon that could carry a load.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
@@ -66,7 +101,19 @@ impl Patch {
             let shift = hull.centroid() - patch.places().map(|(point, share)| point * share).sum::<Vector2<f64>>();
             patch.points[..patch.count].iter_mut().for_each(|point| *point += shift);
         }
-        patch
+        patch.filled_up()
+    }
+
+    fn filled_up(mut self) -> Self {
+        let first = self.points[0];
+        self.points[self.count..].fill(first);
+        self
+    }
+
+    /// The places, and behind them as many as it takes to have `N`.
+    pub(super) fn first<const N: usize>(&self) -> Places<'_, N> {
+        let (points, shares) = (self.points.first_chunk(), self.weights.first_chunk());
+        Places { points: points.expect("N places"), shares: shares.expect("N places") }
     }
 
     /// The same places at `reach` times their distance from the middle of an even pressure.
@@ -74,7 +121,7 @@ impl Patch {
     pub fn reaching(mut self, reach: f64) -> Self {
         let middle = self.places().map(|(point, share)| point * share).sum::<Vector2<f64>>();
         self.points[..self.count].iter_mut().for_each(|point| *point = middle + (*point - middle) * reach);
-        self
+        self.filled_up()
     }
 
     /// Mean squared distance of an even pressure from its middle [m²].
@@ -99,10 +146,6 @@ impl Patch {
     /// Each place and its share of an even pressure; the shares add up to 1.
     pub fn places(&self) -> impl Iterator<Item = (Vector2<f64>, f64)> + '_ {
         self.points[..self.count].iter().copied().zip(self.weights[..self.count].iter().copied())
-    }
-
-    pub(super) fn points(&self) -> &[Vector2<f64>] {
-        &self.points[..self.count]
     }
 
     fn push(&mut self, point: Vector2<f64>, weight: f64) {
