@@ -27,8 +27,9 @@ struct Place {
     surface_velocity: Vector3<f64>,
     least_parting: f64,
     friction: f64,
-    normal_mobility: f64,
-    slip_mobility: f64,
+    /// Impulse for one unit of velocity, along the normal and across it.
+    normal_mass: f64,
+    slip_mass: f64,
     impulse: Vector3<f64>,
 }
 
@@ -77,20 +78,23 @@ impl Pushed<'_> {
             return None;
         }
         let (mut velocity, mut spin) = (self.body.velocity, self.body.angular_velocity.z);
-        let mut places = [0, 1].map(|i| presses.get(i).map(|press| self.place(press, dt)));
+        let place = |i: usize| presses.get(i).map(|press| self.place(press, dt));
+        let mut places = [place(0), place(1)];
+        let (per_mass, per_inertia) = (1.0 / self.mass, 1.0 / self.yaw_inertia);
         for _ in 0..SWEEPS {
             let mut largest: f64 = 0.0;
             for place in places.iter_mut().flatten() {
                 let change = place.relax(&at(&place.lever, &velocity, spin));
-                velocity += Vector3::new(change.x, change.y, 0.0) / self.mass;
-                spin += (place.lever.x * change.y - place.lever.y * change.x) / self.yaw_inertia;
-                largest = largest.max(change.amax() / self.mass);
+                velocity += Vector3::new(change.x, change.y, 0.0) * per_mass;
+                spin += (place.lever.x * change.y - place.lever.y * change.x) * per_inertia;
+                largest = largest.max(change.amax() * per_mass);
             }
             if largest < SETTLED {
                 break;
             }
         }
-        Some(places.map(|place| place.map_or_else(Vector3::zeros, |place| place.impulse / dt)))
+        let force = |place: &Option<Place>| place.as_ref().map_or_else(Vector3::zeros, |place| place.impulse / dt);
+        Some([force(&places[0]), force(&places[1])])
     }
 
     fn place(&self, press: &Press, dt: f64) -> Place {
@@ -103,8 +107,8 @@ impl Pushed<'_> {
             surface_velocity: press.tool_velocity,
             least_parting: press.least_parting(&before, dt),
             friction: press.motion.friction,
-            normal_mobility: along / self.mass + turning * turning / self.yaw_inertia,
-            slip_mobility: 1.0 / self.mass + lever.xy().norm_squared() / self.yaw_inertia,
+            normal_mass: 1.0 / (along / self.mass + turning * turning / self.yaw_inertia),
+            slip_mass: 1.0 / (1.0 / self.mass + lever.xy().norm_squared() / self.yaw_inertia),
             impulse: Vector3::zeros(),
         }
     }
@@ -116,11 +120,11 @@ impl Place {
         let relative = velocity - self.surface_velocity;
         let parting = relative.dot(&self.normal);
         let before = self.impulse.dot(&self.normal);
-        let normal = (before + (self.least_parting - parting) / self.normal_mobility).max(0.0);
+        let normal = (before + (self.least_parting - parting) * self.normal_mass).max(0.0);
         let slip = relative - self.normal * parting;
-        let wanted = self.impulse - self.normal * before - slip / self.slip_mobility;
-        let (limit, length) = (self.friction * normal, wanted.norm());
-        let rubbing = if length > limit { wanted * (limit / length) } else { wanted };
+        let wanted = self.impulse - self.normal * before - slip * self.slip_mass;
+        let (limit, square) = (self.friction * normal, wanted.norm_squared());
+        let rubbing = if square > limit * limit { wanted * (limit / square.sqrt()) } else { wanted };
         let impulse = self.normal * normal + rubbing;
         let change = impulse - self.impulse;
         self.impulse = impulse;

@@ -37,7 +37,10 @@ const PARALLEL: f64 = 0.99;
 /// The tool's axis and the object, in the object's frame.
 struct Approach<'a> {
     object: &'a TableObject,
-    object_from_flange: Isometry3<f64>,
+    base_from_object: Isometry3<f64>,
+    /// The axis at the flange, and from there to its other end.
+    start: Point3<f64>,
+    along: Vector3<f64>,
     tool: Capsule,
 }
 
@@ -64,19 +67,22 @@ impl TableObject {
 
 impl<'a> Approach<'a> {
     fn new(object: &'a TableObject, tool: &Capsule, base_from_flange: &Isometry3<f64>) -> Self {
-        Self { object, object_from_flange: object.isometry().inverse() * base_from_flange, tool: *tool }
+        let base_from_object = object.isometry();
+        let object_from_base = base_from_object.inverse();
+        let start = object_from_base * Point3::from(base_from_flange.translation.vector);
+        let along = object_from_base.rotation * (base_from_flange.rotation * (Vector3::z() * tool.segment));
+        Self { object, base_from_object, start, along, tool: *tool }
     }
 
     fn on_axis(&self, share: f64) -> Point3<f64> {
-        self.object_from_flange * Point3::new(0.0, 0.0, self.tool.segment * share)
+        self.start + self.along * share
     }
 
     fn at(&self, share: f64) -> Touch {
         let (distance, surface, outwards) = self.object.signed_distance(&self.on_axis(share));
-        let base_from_object = self.object.isometry();
         Touch {
-            point: base_from_object * surface,
-            normal: base_from_object.rotation * -outwards,
+            point: self.base_from_object * surface,
+            normal: self.base_from_object.rotation * -outwards,
             depth: self.tool.radius - distance,
         }
     }
@@ -92,8 +98,7 @@ impl<'a> Approach<'a> {
     /// Squared distance from a box is, along a line, a parabola between the shares at which the line crosses one of the
     /// six planes of its faces; the derivative only rises, so the minimum lies where it changes its sign.
     fn nearest_to_box(&self, half: &Vector3<f64>) -> f64 {
-        let start = self.on_axis(0.0).coords;
-        let along = self.on_axis(1.0).coords - start;
+        let (start, along) = (self.start.coords, self.along);
         let slope = |share: f64| -> f64 {
             (0..3)
                 .map(|i| {
@@ -152,14 +157,13 @@ impl<'a> Approach<'a> {
 
     /// Shares between which the object lies beside the axis.
     fn shared_stretch(&self) -> [f64; 2] {
-        let along = self.object_from_flange.rotation * Vector3::z() / self.tool.segment;
+        let along = self.along / self.tool.segment.powi(2);
         if let Some(half) = self.object.half_extents() {
             // The box's own shadow on the line: no need to ask all of its corners.
-            let (middle, reach) = (-along.dot(&self.object_from_flange.translation.vector), along.abs().dot(half));
+            let (middle, reach) = (-along.dot(&self.start.coords), along.abs().dot(half));
             return [middle - reach, middle + reach].map(|share| share.clamp(0.0, 1.0));
         }
-        let origin = self.object_from_flange.translation.vector;
-        let shares = self.object.corners().iter().map(|corner| along.dot(&(corner.coords - origin)));
+        let shares = self.object.corners().iter().map(|corner| along.dot(&(corner - self.start)));
         let (low, high) =
             shares.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), share| (low.min(share), high.max(share)));
         [low, high].map(|share| share.clamp(0.0, 1.0))

@@ -63,9 +63,9 @@ struct Contact {
     /// Least speed along the normal, relative to the surface, after the step [m/s].
     least_parting: f64,
     friction: f64,
-    /// Velocity gained for one unit of impulse: along the normal, and across it in the most mobile direction.
-    normal_mobility: f64,
-    slip_mobility: f64,
+    /// Impulse for one unit of velocity: along the normal, and across it in the most mobile direction.
+    normal_mass: f64,
+    slip_mass: f64,
     impulse: Vector3<f64>,
 }
 
@@ -143,14 +143,26 @@ impl Press {
 }
 
 impl Contact {
+    /// The impulse with which the place gives way as it must and rubs as it can, from its velocity relative to the surface.
+    #[inline]
+    fn relaxed(&self, relative: &Vector3<f64>) -> Vector3<f64> {
+        let (parting, before) = (relative.dot(&self.normal), self.impulse.dot(&self.normal));
+        let normal = (before + (self.least_parting - parting) * self.normal_mass).max(0.0);
+        let slip = relative - self.normal * parting;
+        let wanted = self.impulse - self.normal * before - slip * self.slip_mass;
+        let (limit, square) = (self.friction * normal, wanted.norm_squared());
+        let rubbing = if square > limit * limit { wanted * (limit / square.sqrt()) } else { wanted };
+        self.normal * normal + rubbing
+    }
+
     const NONE: Self = Self {
         lever: Vector3::new(0.0, 0.0, 0.0),
         normal: Vector3::new(0.0, 0.0, 1.0),
         surface_velocity: Vector3::new(0.0, 0.0, 0.0),
         least_parting: 0.0,
         friction: 0.0,
-        normal_mobility: 1.0,
-        slip_mobility: 1.0,
+        normal_mass: 1.0,
+        slip_mass: 1.0,
         impulse: Vector3::new(0.0, 0.0, 0.0),
     };
 }
@@ -177,7 +189,8 @@ impl Motion<'_> {
         );
         let (half_trace, determinant) = (0.5 * (mobility.trace() - normal_mobility), contact.normal.dot(&cofactors));
         let slip_mobility = half_trace + (half_trace * half_trace - determinant).max(0.0).sqrt();
-        self.contacts[self.count] = Contact { normal_mobility, slip_mobility, ..contact };
+        self.contacts[self.count] =
+            Contact { normal_mass: 1.0 / normal_mobility, slip_mass: 1.0 / slip_mobility, ..contact };
         self.count += 1;
     }
 
@@ -188,14 +201,7 @@ impl Motion<'_> {
             for i in 0..self.count {
                 let contact = &self.contacts[i];
                 let relative = self.velocity_at(&contact.lever) - contact.surface_velocity;
-                let parting = relative.dot(&contact.normal);
-                let before = contact.impulse.dot(&contact.normal);
-                let normal = (before + (contact.least_parting - parting) / contact.normal_mobility).max(0.0);
-                let slip = relative - contact.normal * parting;
-                let wanted = contact.impulse - contact.normal * before - slip / contact.slip_mobility;
-                let (limit, length) = (contact.friction * normal, wanted.norm());
-                let rubbing = if length > limit { wanted * (limit / length) } else { wanted };
-                let impulse = contact.normal * normal + rubbing;
+                let impulse = contact.relaxed(&relative);
                 let (change, lever) = (impulse - contact.impulse, contact.lever);
                 self.contacts[i].impulse = impulse;
                 self.body.velocity += change * self.inverse_mass;
