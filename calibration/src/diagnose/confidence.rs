@@ -4,6 +4,10 @@ use super::combine::{Step, net};
 
 /// Rivals this close cannot be told apart [nats].
 const NEAR: f64 = 4.0;
+/// ... or within so many standard errors of their difference.
+const CHANCE: f64 = 1.5;
+/// A rival closes at least this share of the gap that the chosen one closes.
+const ALIKE: f64 = 0.5;
 /// What is kept for causes outside the library even where everything fits; from the simulated sessions on which this was
 /// measured: of named findings this share was wrong.
 const NONE_OF_THESE: f64 = 0.04;
@@ -23,16 +27,20 @@ pub fn probabilities(step: &Step, none: bool) -> Vec<(usize, f64)> {
     fitted.iter().map(|(candidate, worth)| (*candidate, (1.0 - NONE_OF_THESE) * weight(*worth) / total)).collect()
 }
 
-/// Candidates of a step that explain it as well as the chosen one and cost no more.
+/// Candidates of a step that explain it as well as the chosen one and cost no more: whose gains, clip by clip, are not less
+/// beyond chance, and that close as much of the gap.
 #[must_use]
 pub fn rivals(step: &Step, chosen: usize) -> Vec<usize> {
     let of = |candidate: usize| {
         let trial = step.trials.iter().find(|trial| trial.scored.candidate == candidate)?;
-        trial.fitted.as_ref().map(|(_, advantage)| (net(advantage, trial.scored.cost), trial.scored.cost))
+        trial.fitted.as_ref().map(|(_, advantage)| (advantage, trial))
     };
-    let Some((best, cost)) = of(chosen) else { return Vec::new() };
+    let Some((best, chosen_trial)) = of(chosen) else { return Vec::new() };
     let near = |candidate: &usize| {
-        *candidate != chosen && of(*candidate).is_some_and(|(worth, other)| best - worth < NEAR && other <= cost)
+        let Some((other, trial)) = of(*candidate).filter(|_| *candidate != chosen) else { return false };
+        let (beyond, error) = best.beyond(other);
+        let alike = beyond < NEAR.max(CHANCE * error) && other.nats > other.error;
+        alike && trial.scored.cost <= chosen_trial.scored.cost && trial.closes > ALIKE * chosen_trial.closes
     };
     step.trials.iter().map(|trial| trial.scored.candidate).filter(near).collect()
 }

@@ -16,7 +16,7 @@ pub struct Foretold {
 }
 
 /// What one hypothesis is worth over another.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Advantage {
     /// Sum over clips of the gain in ln of the likelihood, outstanding clips cut off [nats].
     pub nats: f64,
@@ -24,6 +24,8 @@ pub struct Advantage {
     pub error: f64,
     /// Share of the clips that gain.
     pub share: f64,
+    /// Clip by clip, outstanding ones cut off [nats].
+    gains: Vec<f64>,
 }
 
 /// A clip's gain or loss counts up to so many times that of the clip in the middle, or up to so many nats: no clip decides
@@ -77,13 +79,28 @@ impl Foretold {
         let mut gains: Vec<f64> = self.clips.iter().zip(&other.clips).map(|((_, a), (_, b))| 0.5 * (b - a)).collect();
         let most = (OUTSTANDING * median(&gains.iter().map(|gain| gain.abs()).collect::<Vec<_>>())).max(LEAST);
         gains.iter_mut().for_each(|gain| *gain = gain.clamp(-most, most));
-        let count = gains.len() as f64;
-        let nats: f64 = gains.iter().sum();
-        let mean = nats / count;
-        let variance = gains.iter().map(|gain| (gain - mean).powi(2)).sum::<f64>() / (count - 1.0).max(1.0);
-        let share = gains.iter().filter(|gain| **gain > 0.0).count() as f64 / count;
-        Advantage { nats, error: (variance * count).sqrt(), share }
+        let (nats, error) = sum(&gains);
+        let share = gains.iter().filter(|gain| **gain > 0.0).count() as f64 / gains.len() as f64;
+        Advantage { nats, error, share, gains }
     }
+}
+
+impl Advantage {
+    /// By how much more this is worth than another on the same clips, and the standard error of that from the scatter of the
+    /// difference between clips [nats]: what two hypotheses gain alike on a clip says nothing about which is right.
+    #[must_use]
+    pub fn beyond(&self, other: &Self) -> (f64, f64) {
+        sum(&self.gains.iter().zip(&other.gains).map(|(a, b)| a - b).collect::<Vec<_>>())
+    }
+}
+
+/// Sum, and its standard error.
+fn sum(gains: &[f64]) -> (f64, f64) {
+    let count = gains.len() as f64;
+    let total: f64 = gains.iter().sum();
+    let mean = total / count;
+    let variance = gains.iter().map(|gain| (gain - mean).powi(2)).sum::<f64>() / (count - 1.0).max(1.0);
+    (total, (variance * count).sqrt())
 }
 
 #[cfg(test)]
@@ -97,6 +114,18 @@ mod tests {
         let after = Foretold { clips: gains.iter().enumerate().map(|(clip, gain)| (clip, 9000.0 - gain)).collect() };
         let advantage = after.over(&before);
         assert!(advantage.nats > 2.0 * advantage.error && advantage.nats < 150.0, "{advantage:?}");
+    }
+
+    #[test]
+    fn hypotheses_that_gain_on_the_same_clips_differ_by_the_difference_only() {
+        let before = Foretold { clips: (0..6).map(|clip| (clip, 900.0)).collect() };
+        let over = |gains: [f64; 6]| {
+            let clips = gains.iter().enumerate().map(|(clip, gain)| (clip, 900.0 - 2.0 * gain)).collect();
+            Foretold { clips }.over(&before)
+        };
+        let [better, worse] = [over([40.0, 10.0, 60.0, 25.0, 55.0, 20.0]), over([38.0, 8.5, 57.5, 23.0, 53.0, 18.0])];
+        let (nats, error) = better.beyond(&worse);
+        assert!((nats - 12.0).abs() < 1e-9 && error < 1.0 && better.error > 40.0, "{nats} {error}");
     }
 
     #[test]

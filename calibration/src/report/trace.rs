@@ -23,6 +23,8 @@ pub struct Trace {
 
 /// Half the width of the grey band, in sigma: noise alone stays inside 95 % of the time.
 const BAND: f64 = 2.0;
+/// Points further apart than so many of the usual distances are not joined.
+const GAP: f64 = 5.0;
 /// Width and height of one picture; two stand side by side.
 const SIZE: [f64; 2] = [445.0, 165.0];
 
@@ -41,18 +43,29 @@ impl Trace {
 
     /// Before and after, and after alone beside it: what is left is often too small to be seen next to what was there.
     fn draw(&self) -> Markup {
-        let lines = [Line { class: "before", points: &self.before }, Line { class: "after", points: &self.after }];
+        let [before, after] = [("before", &self.before), ("after", &self.after)].map(|(class, points)| {
+            let pieces = pieces(points);
+            pieces.into_iter().map(move |points| Line { class, points }).collect::<Vec<_>>()
+        });
         let title = format!("{}, {}", self.clip.trim_end_matches(".mcap"), self.channel);
         if !self.changes() {
-            return self.chart(&title, &lines[..1]);
+            return self.chart(&title, &before);
         }
-        html! { (self.chart(&title, &lines)) (self.chart("after alone", &lines[1..])) }
+        html! { (self.chart(&title, &[before, after.clone()].concat())) (self.chart("after alone", &after)) }
     }
 
     fn chart(&self, title: &str, lines: &[Line]) -> Markup {
         let band = (self.sigma > 0.0).then_some(BAND * self.sigma);
         Chart { title, x: "time [s]", unit: &self.unit, lines, band, logarithmic: false, size: SIZE }.draw()
     }
+}
+
+/// The stretches of a trace between which nothing was measured: no line may suggest what was there.
+fn pieces(points: &[[f64; 2]]) -> Vec<&[[f64; 2]]> {
+    let mut gaps: Vec<f64> = points.windows(2).map(|w| w[1][0] - w[0][0]).collect();
+    gaps.sort_unstable_by(f64::total_cmp);
+    let usual = gaps.get(gaps.len() / 2).copied().unwrap_or(0.0);
+    points.chunk_by(|a, b| b[0] - a[0] <= GAP * usual).collect()
 }
 
 /// The worst channel of each of the worst `clips` clips, worst first.
@@ -102,6 +115,14 @@ mod tests {
         let chosen: Vec<(&str, &str)> =
             worst_first(&traces, 2).iter().map(|t| (t.clip.as_str(), t.channel.as_str())).collect();
         assert_eq!(chosen, [("b.mcap", "joint2"), ("c.mcap", "joint7")]);
+    }
+
+    #[test]
+    fn nothing_is_drawn_where_nothing_was_measured() {
+        let holed: Vec<[f64; 2]> =
+            (0..40).filter(|k| !(15..30).contains(k)).map(|k| [0.1 * f64::from(k), 1.0]).collect();
+        let lengths: Vec<usize> = pieces(&holed).iter().map(|piece| piece.len()).collect();
+        assert_eq!(lengths, [15, 10]);
     }
 
     #[test]
