@@ -4,15 +4,18 @@ use std::time::Duration;
 use tests::Cell;
 
 #[test]
-fn the_demo_records_replays_and_explains_a_session() {
+fn the_demo_records_diagnoses_and_replays_a_session() {
     let cell = Cell::shipped();
     let demo = cell.start("calibration", &["demo", "--out", &cell.text("demo"), "--json"]);
-    let finished = demo.wait(Duration::from_secs(240)).succeeded();
+    let finished = demo.wait(Duration::from_secs(480)).succeeded();
     let answer = finished.json();
     let report = std::fs::read_to_string(cell.path("demo/report.html")).expect("a report");
     assert!(report.contains("<svg"), "the report holds no picture");
     assert!(!report.contains("http://") || report.contains("http://www.w3.org"), "the report reaches for the network");
-    assert!(answer.is_object(), "{answer}");
+    let hidden = std::fs::read_to_string(cell.path("demo/hidden_effect.toml")).expect("the hidden effect");
+    let named = answer["verdict"]["effects"].as_array().expect("effects");
+    assert!(named.iter().any(|name| hidden.contains(name.as_str().expect("a name"))), "{hidden} {answer}");
+    assert!(std::fs::read_to_string(cell.path("demo/diagnosis.html")).expect("a page").contains("<svg"));
     let clips: Vec<_> = std::fs::read_dir(cell.path("demo/session"))
         .expect("a session")
         .filter_map(|e| e.ok().map(|e| e.path()))

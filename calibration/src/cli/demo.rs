@@ -7,21 +7,22 @@ use std::path::PathBuf;
 
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
-Starts a simulated robot with hidden gains and its twin as two processes, records a session while the twin shadows the
-robot, replays it with the gains of cell.toml and with the true ones, and writes FOLDER/report.html. Takes less than a minute.
+Starts a simulated robot with hidden gains and a hidden effect, and its twin, as two processes; records a session while the
+twin shadows the robot; diagnoses it; replays it with cell.toml and with what was found; and writes FOLDER/report.html and
+FOLDER/diagnosis.html. Takes a minute or two.
 
 Examples:
   calibration demo --out demo
-  calibration demo --out demo7 --seed 7 --clips 4 --json")]
+  calibration demo --out demo7 --seed 7 --clips 8 --json")]
 pub(super) struct DemoArguments {
     /// Folder to create.
     #[arg(long, value_name = "FOLDER", default_value = "demo")]
     out: PathBuf,
-    /// Draws the hidden gains and the motions.
+    /// Draws the hidden gains, the hidden effect and the motions.
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// Clips to record.
-    #[arg(long, value_name = "N", default_value_t = 2, value_parser = clap::value_parser!(u32).range(1..=100))]
+    /// Clips to record; a diagnosis needs at least four.
+    #[arg(long, value_name = "N", default_value_t = 6, value_parser = clap::value_parser!(u32).range(4..=100))]
     clips: u32,
     /// Prints one JSON object on stdout at the end.
     #[arg(long)]

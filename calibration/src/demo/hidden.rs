@@ -1,9 +1,10 @@
-//! The truth that the demo hides from its twin: gains that differ from cell.toml as much as a laboratory admits.
+//! The truth that the demo hides from its twin: gains that differ from cell.toml as much as a laboratory admits, and an
+//! effect that no twin has by itself.
 
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use shared_mem::cell::Controller;
-use shared_mem::theta::{ArmTheta, Theta};
+use shared_mem::theta::{ArmTheta, EffectTheta, Theta};
 
 /// Gains lie within this share of the nominal ones: what cell.toml promises unless it says otherwise.
 const WITHIN: f64 = 0.2;
@@ -17,9 +18,37 @@ pub(super) fn gains(nominal: &Controller, seed: u64) -> Theta {
     Theta { arm: Some(arm), ..Theta::default() }
 }
 
+/// Effects that are hidden, each with the parameter that says how strong it is, and that parameter's range [SI].
+const EFFECTS: [(&str, &str, [f64; 2]); 4] = [
+    ("command_delay", "delay", [0.008, 0.016]),
+    ("command_lag", "time_constant", [0.008, 0.016]),
+    ("torque_delay", "delay", [0.002, 0.004]),
+    ("payload", "mass", [0.3, 0.6]),
+];
+
+/// Draws an effect by `seed`.
+#[must_use]
+pub(super) fn effect(seed: u64) -> EffectTheta {
+    let mut rng = Pcg64Mcg::seed_from_u64(seed);
+    let (name, parameter, [lo, hi]) = EFFECTS[rng.random_range(0..EFFECTS.len())];
+    EffectTheta { name: name.into(), parameters: [(parameter.into(), rng.random_range(lo..hi).into())].into() }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn every_hidden_effect_is_one_that_the_simulated_cell_knows() {
+        let drawn: std::collections::BTreeSet<String> = (0..40)
+            .map(|seed| {
+                let theta = Theta { effects: vec![effect(seed)], ..Theta::default() };
+                twin::effects::Effects::from_theta(&theta.effects, 7).expect("an effect of the registry");
+                theta.effects[0].name.clone()
+            })
+            .collect();
+        assert_eq!(drawn.len(), EFFECTS.len());
+    }
 
     #[test]
     fn every_gain_is_hidden_within_a_fifth_and_the_seed_decides_where() {

@@ -1,18 +1,22 @@
-//! The verb `demo`: the whole story on the simulated cell. A robot whose gains nobody was told is shadowed by a twin that
-//! believes cell.toml; a session is recorded; replayed with cell.toml and with the truth, it shows what the gap was made of.
+//! The verb `demo`: the whole story on the simulated cell. A robot with gains nobody was told and a hidden effect is shadowed by
+//! a twin that believes cell.toml; a session is recorded and diagnosed; replayed with cell.toml and with what was found, it
+//! shows how far the gap shrinks.
 
 mod hidden;
 mod replay;
 mod stage;
 
 use crate::capture::excitation::{self, Summary};
+use crate::diagnose::{self, Diagnosis, Verdict, diagnose};
 use crate::interrupt::Interrupt;
-use crate::report::Story;
+use crate::report::{self, Story};
 use anyhow::{Context as _, bail};
 use replay::{Replay, Trace, replay, trace};
 use serde::Serialize;
 use serde_json::Value;
 use shared_mem::cell::Cell;
+use shared_mem::recording::Session;
+use shared_mem::theta::{EffectTheta, Theta};
 use stage::{Answers, Stage, worst};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -29,7 +33,7 @@ const AMPLITUDE: f64 = 0.25;
 pub struct Options {
     /// Folder to create.
     pub out: PathBuf,
-    /// Draws the hidden gains and the motions.
+    /// Draws the hidden gains, the hidden effect and the motions.
     pub seed: u64,
     /// Clips to record.
     pub clips: u32,
@@ -46,6 +50,14 @@ pub struct Finding {
     pub session: PathBuf,
     /// The hidden gains.
     pub hidden: PathBuf,
+    /// The hidden effect.
+    pub hidden_effect: PathBuf,
+    /// What the diagnosis says.
+    pub verdict: Verdict,
+    /// Its page.
+    pub diagnosis: PathBuf,
+    /// The parameters and effects found.
+    pub theta: PathBuf,
     /// What drew them.
     pub seed: u64,
     /// Clips recorded.
@@ -65,7 +77,7 @@ pub struct Finding {
 pub struct Gap {
     /// Replayed with the gains of cell.toml.
     pub before: Vec<f64>,
-    /// Replayed with the true gains.
+    /// Replayed with the parameters and effects found.
     pub after: Vec<f64>,
     /// Largest over one second, live.
     pub live: Vec<f64>,
@@ -76,7 +88,10 @@ struct Files {
     out: PathBuf,
     cell: PathBuf,
     hidden: PathBuf,
+    hidden_effect: PathBuf,
     session: PathBuf,
+    diagnosis: PathBuf,
+    theta: PathBuf,
 }
 
 /// Runs the demo.
@@ -86,7 +101,7 @@ struct Files {
 pub fn demo(options: &Options, interrupt: &Interrupt) -> anyhow::Result<Finding> {
     let start = Instant::now();
     let files = prepare(options)?;
-    eprintln!("hidden from the twin: gains in {}", files.hidden.display());
+    eprintln!("hidden from the twin: gains in {}, effect in {}", files.hidden.display(), files.hidden_effect.display());
     let (captured, answers, live) = record(options, &files, interrupt)?;
     let kept: Vec<&Path> = captured.clips.iter().filter(|c| c.kept).map(|c| c.file.as_path()).collect();
     if interrupt.asked() {
@@ -95,16 +110,23 @@ pub fn demo(options: &Options, interrupt: &Interrupt) -> anyhow::Result<Finding>
     let Some(first) = kept.first() else {
         bail!("no clip was good enough to keep; run the demo again on a less busy machine");
     };
-    eprintln!("replaying with the gains of cell.toml and with the true ones");
-    let story = compare(options, &files, &files.session.join(first), live, interrupt)?;
+    eprintln!("diagnosing the session");
+    let found = examine(options, &files, interrupt)?;
+    eprintln!("replaying with cell.toml and with what was found");
+    let told = Told { effect: hidden::effect(options.seed), found: &found };
+    let story = compare(options, &files, &files.session.join(first), (live, &told), interrupt)?;
     let report = files.out.join("report.html");
-    std::fs::write(&report, story.page()).with_context(|| format!("cannot write {}", report.display()))?;
+    write(&report, &story.page())?;
     Ok(Finding {
         text: story.sentence(),
         report,
         clips: kept.len(),
         session: files.session,
         hidden: files.hidden,
+        hidden_effect: files.hidden_effect,
+        verdict: found.verdict,
+        diagnosis: files.diagnosis,
+        theta: files.theta,
         seed: options.seed,
         gap: Gap { before: story.before, after: story.after, live: story.live },
         bridge: answers.bridge,
@@ -120,20 +142,62 @@ fn prepare(options: &Options) -> anyhow::Result<Files> {
         bail!("{} is not empty; choose another folder with --out, or remove it", out.display());
     }
     std::fs::create_dir_all(&out).with_context(|| format!("cannot create {}", out.display()))?;
-    let files =
-        Files { cell: out.join("cell.toml"), hidden: out.join("hidden_theta.toml"), session: out.join("session"), out };
-    std::fs::write(&files.cell, CELL).with_context(|| format!("cannot write {}", files.cell.display()))?;
+    let files = Files {
+        cell: out.join("cell.toml"),
+        hidden: out.join("hidden_theta.toml"),
+        hidden_effect: out.join("hidden_effect.toml"),
+        session: out.join("session"),
+        diagnosis: out.join("diagnosis.html"),
+        theta: out.join("theta.toml"),
+        out,
+    };
+    write(&files.cell, CELL)?;
     let controller = Cell::read(&files.cell)?.controller.context("the shipped cell has no [controller]")?;
     let hidden = hidden::gains(&controller, options.seed).to_toml();
-    std::fs::write(&files.hidden, hidden).with_context(|| format!("cannot write {}", files.hidden.display()))?;
+    write(&files.hidden, &hidden)?;
+    let effect = Theta { effects: vec![hidden::effect(options.seed)], ..Theta::default() };
+    write(&files.hidden_effect, &effect.to_toml())?;
     Ok(files)
+}
+
+fn write(file: &Path, text: &str) -> anyhow::Result<()> {
+    std::fs::write(file, text).with_context(|| format!("cannot write {}", file.display()))
+}
+
+/// Diagnoses the session and writes page and parameters.
+fn examine(options: &Options, files: &Files, interrupt: &Interrupt) -> anyhow::Result<Diagnosis> {
+    let session = Session::open(&files.session)?;
+    let found = diagnose(&session, &diagnose::Options { theta: None, seed: options.seed }, interrupt)?;
+    write(&files.theta, &found.theta.to_toml())?;
+    write(&files.diagnosis, &report::diagnosis::page(&found))?;
+    Ok(found)
+}
+
+/// What was hidden, and what was found.
+struct Told<'a> {
+    effect: EffectTheta,
+    found: &'a Diagnosis,
+}
+
+impl Told<'_> {
+    /// The hidden effect, and the verdict on it, in two sentences.
+    fn words(&self) -> [String; 2] {
+        let values: Vec<String> = self
+            .effect
+            .parameters
+            .iter()
+            .map(|(name, value)| format!("{name} {:.4}", value.as_float().unwrap_or(0.0)))
+            .collect();
+        let hidden = format!("Hidden was {} ({}).", self.effect.name, values.join(", "));
+        [self.found.verdict.text.clone(), hidden]
+    }
 }
 
 /// Runs bridge and twin and captures a session through them.
 fn record(options: &Options, files: &Files, interrupt: &Interrupt) -> anyhow::Result<(Summary, Answers, Vec<f64>)> {
     let domain = format!("demo-{}", std::process::id());
     eprintln!("starting the simulated robot and its twin as two processes");
-    let mut stage = Stage::start(&files.cell, &files.hidden, &domain, interrupt)?;
+    let mut stage = Stage::start(&files.cell, [&files.hidden, &files.hidden_effect], &domain, interrupt)?;
     let request = excitation::Options {
         cell: files.cell.clone(),
         clips: options.clips,
@@ -157,30 +221,33 @@ fn record(options: &Options, files: &Files, interrupt: &Interrupt) -> anyhow::Re
     Ok((captured, answers, gap.largest().to_vec()))
 }
 
-/// Replays the session under both sets of gains and follows the worst joint through one clip.
+/// Replays the session with cell.toml and with what was found, and follows the worst joint through one clip.
 fn compare(
     options: &Options,
     files: &Files,
     clip: &Path,
-    live: Vec<f64>,
+    (live, told): (Vec<f64>, &Told<'_>),
     interrupt: &Interrupt,
 ) -> anyhow::Result<Story> {
-    let session = |truth| -> anyhow::Result<Replay> { replay(&files.session, truth, None, interrupt) };
-    let truth = Some(files.hidden.as_path());
-    let [before, after] = [session(None)?, session(truth)?].map(|replay| replay.mean.joint_rms_rad);
+    let session = |found| -> anyhow::Result<Replay> { replay(&files.session, found, None, interrupt) };
+    let found = Some(files.theta.as_path());
+    let [before, after] = [session(None)?, session(found)?].map(|replay| replay.mean.joint_rms_rad);
     let (joint, _) = worst(&before);
-    let follow = |name: &str, truth| -> anyhow::Result<Trace> {
+    let follow = |name: &str, parameters| -> anyhow::Result<Trace> {
         let simulated = files.out.join(name);
-        replay(clip, truth, Some(&simulated), interrupt)?;
+        replay(clip, parameters, Some(&simulated), interrupt)?;
         trace(&simulated, joint)
     };
     let by_cell = follow("twin_cell.mcap", None)?;
-    let by_truth = follow("twin_true.mcap", truth)?;
+    let by_found = follow("twin_found.mcap", found)?;
+    let [verdict, hidden] = told.words();
     Ok(Story {
         setting: format!(
-            "A simulated FR3 moved all joints at once through {} clips of {DURATION} s. Its stiffness and damping had been drawn within 20 % of cell.toml; the twin was not told.",
+            "A simulated FR3 moved all joints at once through {} clips of {DURATION} s. Its stiffness and damping had been \
+             drawn within 20 % of cell.toml, and it had an effect that its twin does not model; the twin was told neither. {hidden}",
             options.clips
         ),
+        verdict,
         origin: format!("calibration demo --seed {} --clips {}", options.seed, options.clips),
         before,
         after,
@@ -189,7 +256,7 @@ fn compare(
         real: by_cell.real,
         twin: by_cell.twin,
         error_before: by_cell.error,
-        error_after: by_truth.error,
+        error_after: by_found.error,
     })
 }
 
@@ -197,7 +264,7 @@ impl Finding {
     /// The finding as a table for people.
     #[must_use]
     pub fn table(&self) -> String {
-        let mut lines = vec!["joint   cell.toml   true gains   [mrad RMS]".to_owned()];
+        let mut lines = vec!["joint   cell.toml   as found     [mrad RMS]".to_owned()];
         for (joint, (before, after)) in self.gap.before.iter().zip(&self.gap.after).enumerate() {
             lines.push(format!("{:>5}   {:>9.3}   {:>10.4}", joint + 1, 1e3 * before, 1e3 * after));
         }

@@ -31,15 +31,21 @@ pub(super) struct Answers {
 }
 
 impl Stage {
-    /// Starts the simulated cell of `cell` with the truth in `hidden`, and a twin that is not told.
+    /// Starts the simulated cell of `cell` with the truth in `hidden` (gains, effect), and a twin that is not told.
     ///
     /// # Errors
     /// When a program is missing, ends, or the twin does not begin to shadow; the line holds its last words.
-    pub(super) fn start(cell: &Path, hidden: &Path, domain: &str, interrupt: &Interrupt) -> anyhow::Result<Self> {
-        let run = [&"run" as &dyn AsRef<std::ffi::OsStr>, &"--cell", &cell, &"--arm", &"sim", &"--camera", &"sim"];
+    pub(super) fn start(
+        cell: &Path,
+        [gains, effect]: [&Path; 2],
+        domain: &str,
+        interrupt: &Interrupt,
+    ) -> anyhow::Result<Self> {
+        let run = [&"run" as &dyn AsRef<std::ffi::OsStr>, &"--cell", &cell, &"--arm", &"sim", &"--camera", &"off"];
         // The robot's own controller, whose gains are the hidden ones, and not the bridge's, which follows cell.toml.
         let mut list = arguments(run);
-        list.extend(arguments([&"--parameters", &hidden, &"--controller", &"joint_impedance", &"--json"]));
+        list.extend(arguments([&"--parameters", &gains, &"--effects", &effect]));
+        list.extend(arguments([&"--controller", &"joint_impedance", &"--json"]));
         let bridge = Running::start(Program::Bridge, &list, Some(domain))?;
         let twin = Running::start(Program::Twin, &arguments([&"shadow", &"--cell", &cell, &"--json"]), Some(domain))?;
         let mut stage = Self { twin, bridge, gap: LiveGap::open(domain)? };

@@ -1,4 +1,4 @@
-//! The page of the demo: a robot against its twin, before and after the twin was given the robot's gains.
+//! The page of the demo: a robot against its twin, before and after the twin was given what the diagnosis found.
 
 use super::canvas::WIDTH;
 use super::figure::bars::{Row, bars};
@@ -12,11 +12,13 @@ use maud::{Markup, html};
 pub struct Story {
     /// Under which circumstances, in a sentence or two.
     pub setting: String,
+    /// What the diagnosis says, in a sentence.
+    pub verdict: String,
     /// How the page came about: command, seed.
     pub origin: String,
     /// RMS of twin minus robot by joint, with what cell.toml says.
     pub before: Vec<f64>,
-    /// The same with the true gains.
+    /// The same with what the diagnosis found.
     pub after: Vec<f64>,
     /// Largest RMS over one second by joint while the twin shadowed live.
     pub live: Vec<f64>,
@@ -28,12 +30,12 @@ pub struct Story {
     pub twin: Vec<[f64; 2]>,
     /// Twin minus robot, with what cell.toml says.
     pub error_before: Vec<[f64; 2]>,
-    /// The same with the true gains.
+    /// The same with what the diagnosis found.
     pub error_after: Vec<[f64; 2]>,
 }
 
 const CELL: &str = "twin with the gains of cell.toml";
-const TRUE: &str = "twin with the true gains";
+const FOUND: &str = "twin with what was found";
 
 impl Story {
     /// The finding in one sentence.
@@ -42,7 +44,9 @@ impl Story {
         let [before, after] = [&self.before, &self.after].map(|gap| 1e3 * root_mean_square(gap));
         let explained = if before > 0.0 { 100.0 * (1.0 - (after / before).powi(2)) } else { 0.0 };
         format!(
-            "With the gains of cell.toml the twin misses the robot by {before:.2} mrad (RMS over all joints); with the robot's true gains {after:.3} mrad are left: the gains explain {explained:.1} % of the squared gap."
+            "{} With cell.toml alone it misses the robot by {before:.2} mrad (RMS over all joints); with the gains and effects \
+             found {after:.3} mrad are left: {explained:.2} % of the squared gap are gone.",
+            self.verdict
         )
     }
 
@@ -52,7 +56,7 @@ impl Story {
         let joint = self.joint + 1;
         let body = html! {
             h1 { (unbroken(&self.sentence())) }
-            p { (self.setting) }
+            p { (self.setting) " " a href="diagnosis.html" { "The diagnosis" } " says how it was found, and what was ruled out." }
             (figure("Gap by joint: RMS of twin minus robot", "", &self.gap()))
             (figure(&format!("Joint {joint}, where the gap is largest: robot and twin"), "", &self.motion()))
             (figure(&format!("Joint {joint}: how far off the twin is"), "", &self.error()))
@@ -72,7 +76,7 @@ impl Story {
             .map(|(name, values)| Row { name, unit: "rad", values: values.clone(), floor: None })
             .collect();
         html! {
-            (legend(&[("before", CELL), ("after", TRUE)]))
+            (legend(&[("before", CELL), ("after", FOUND)]))
             (bars(&["before", "after"], &rows))
         }
     }
@@ -89,7 +93,7 @@ impl Story {
         let lines =
             [Line { class: "before", points: &self.error_before }, Line { class: "after", points: &self.error_after }];
         html! {
-            (legend(&[("before", CELL), ("after", TRUE)]))
+            (legend(&[("before", CELL), ("after", FOUND)]))
             (chart("twin minus robot", &lines))
         }
     }
@@ -98,7 +102,7 @@ impl Story {
         let milli = |value: f64| format!("{:.3}", 1e3 * value);
         html! {
             table {
-                tr { th { "joint" } th.n { "live [mrad]" } th.n { "replay, cell.toml [mrad]" } th.n { "replay, true gains [mrad]" } }
+                tr { th { "joint" } th.n { "live [mrad]" } th.n { "replay, cell.toml [mrad]" } th.n { "replay, as found [mrad]" } }
                 @for (joint, (before, after)) in self.before.iter().zip(&self.after).enumerate() {
                     tr {
                         td { (joint + 1) }
@@ -123,6 +127,7 @@ mod tests {
     fn story() -> Story {
         Story {
             setting: "A simulated FR3 & <a box>.".into(),
+            verdict: "payload causes the gap.".into(),
             origin: "calibration demo --seed 7".into(),
             before: vec![1e-3, 3e-3],
             after: vec![2e-6, 2e-6],
@@ -140,7 +145,9 @@ mod tests {
         let html = story().page();
         let heading = html.split_once("<h1>").and_then(|(_, rest)| rest.split_once("</h1>")).expect("a heading").0;
         assert!(
-            heading.contains("misses the robot by 2.24\u{a0}mrad") && heading.contains("0.002\u{a0}mrad are left"),
+            heading.contains("payload causes the gap. With")
+                && heading.contains("misses the robot by 2.24\u{a0}mrad")
+                && heading.contains("0.002\u{a0}mrad are left"),
             "{heading}"
         );
         assert_eq!(html.matches("<svg").count(), 3);
