@@ -1,7 +1,7 @@
 //! The arm of a cell with its controller and with what the controller does not know about it.
 
-use super::ArmRollout;
-use crate::arm::{ArmModel, ControlLaw, GainError, Joints, Transmission, Yielding};
+use super::{ArmRollout, TICK};
+use crate::arm::{ArmModel, ControlLaw, GainError, Joints, MassProperties, Transmission, Yielding};
 use crate::effects::ArmEffects;
 use shared_mem::cell::{Cell, Controller};
 use shared_mem::theta::Theta;
@@ -12,6 +12,10 @@ pub struct Plant {
     /// The model inside the controller.
     nominal: ArmModel,
     law: ControlLaw,
+    /// The gains that its user asked for instead.
+    asked: Option<ControlLaw>,
+    /// The model inside a controller that was told of a load: `nominal` with it.
+    laden: Option<ArmModel>,
     /// Effects and the arm that they make; `None` for an arm that is as cell.toml says.
     hidden: Option<(ArmEffects, ArmModel)>,
 }
@@ -23,7 +27,7 @@ impl Plant {
     /// [`GainError`] naming the key and the remedy.
     pub fn new(cell: &Cell, nominal: ArmModel, theta: Option<&Theta>, effects: &ArmEffects) -> Result<Self, GainError> {
         let law = law(cell.controller.as_ref(), theta, &nominal)?;
-        let mut plant = Self { nominal, law, hidden: None };
+        let mut plant = Self { nominal, law, asked: None, laden: None, hidden: None };
         plant.hide(effects);
         Ok(plant)
     }
@@ -39,6 +43,7 @@ impl Plant {
         effects: &ArmEffects,
     ) -> Result<(), GainError> {
         self.law = law(controller, theta, &self.nominal)?;
+        self.asked = None;
         self.hide(effects);
         Ok(())
     }
@@ -60,7 +65,7 @@ impl Plant {
             Some((effects, arm)) => (arm, Some(effects)),
             None => (&self.nominal, None),
         };
-        ArmRollout { arm, nominal: &self.nominal, law: &self.law, effects }
+        ArmRollout { arm, nominal: self.nominal(), law: self.asked.as_ref().unwrap_or(&self.law), effects }
     }
 
     /// The arm that moves.
@@ -83,7 +88,41 @@ impl Plant {
     /// The model inside the controller.
     #[must_use]
     pub fn nominal(&self) -> &ArmModel {
-        &self.nominal
+        self.laden.as_ref().unwrap_or(&self.nominal)
+    }
+
+    /// Tells the controller that the flange carries `load` (flange frame) beside the tool. What it really carries stays.
+    pub(crate) fn declare_load(&mut self, load: &MassProperties) {
+        self.laden = (load.mass > 0.0).then(|| {
+            let mut laden = self.nominal.clone();
+            laden.add_at_flange(load);
+            laden
+        });
+    }
+
+    /// Asks the controller for another stiffness than that of cell.toml's `controller`. What parts the gains that really
+    /// act from cell.toml's stays in proportion. So does the damping ratio, as far as a torque that holds for a period
+    /// allows: at most half the rotor's inertia over the period, where a bare rotor comes to rest without ringing.
+    pub(crate) fn ask_stiffness(
+        &mut self,
+        stiffness: &Joints,
+        controller: Option<&Controller>,
+    ) -> Result<(), GainError> {
+        let described = law(controller, None, &self.nominal)?;
+        let rotor = self.arm().rotor_inertia();
+        let mut asked = self.law;
+        for i in 0..self.nominal.dof() {
+            if described.stiffness[i] > 0.0 {
+                let ratio = stiffness[i] / described.stiffness[i];
+                let steady = (0.5 * rotor[i] / TICK).max(self.law.damping[i]);
+                asked.stiffness[i] = self.law.stiffness[i] * ratio;
+                asked.damping[i] = (self.law.damping[i] * ratio.sqrt()).min(steady);
+            } else {
+                asked.stiffness[i] = stiffness[i];
+            }
+        }
+        self.asked = Some(asked);
+        Ok(())
     }
 }
 

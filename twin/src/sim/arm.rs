@@ -21,6 +21,8 @@ pub(super) struct SimArm {
     dq_d: Joints,
     /// Velocities at the start of the period [rad/s].
     before: Joints,
+    /// Torque from outside that is known beforehand and holds for the period [N m].
+    outside: Joints,
     /// Torque behind the gears in this period so far, times the share of it that has passed [N m].
     sensed: Joints,
     start: StretchStart,
@@ -55,6 +57,7 @@ impl SimArm {
             q_d: q,
             dq_d: zero,
             before: zero,
+            outside: zero,
             sensed: zero,
             start: StretchStart::default(),
         };
@@ -78,10 +81,15 @@ impl SimArm {
     /// Evaluates the controller once for the coming period, from the state at its start.
     pub(super) fn begin_period(&mut self, drive: &Drive) {
         self.remember(drive);
-        let rollout = self.plant.rollout();
-        if rollout.exactly_known(drive).is_none() {
-            rollout.begin(&mut self.motion, drive);
+        if self.in_one_go(drive).is_none() {
+            self.plant.rollout().begin(&mut self.motion, drive);
         }
+    }
+
+    /// What the arm is to follow where controller and period can be computed together: its controller knows the arm
+    /// exactly, and nothing but the object pushes it.
+    fn in_one_go<'d>(&self, drive: &'d Drive) -> Option<(&'d Joints, &'d Joints)> {
+        self.plant.rollout().exactly_known(drive).filter(|_| self.outside == [0.0; MAX_JOINTS])
     }
 
     /// Parts of a period in which the arm's way may be corrected after the contact: joints that stick or yield do not
@@ -96,11 +104,11 @@ impl SimArm {
         self.start =
             StretchStart { state: self.motion.state, joints: self.motion.memory.as_ref().map(ArmMemory::joints) };
         let rollout = self.plant.rollout();
-        let yielding = if let Some(desired) = rollout.exactly_known(drive) {
+        let yielding = if let Some(desired) = self.in_one_go(drive) {
             rollout.yielding_period(&mut self.motion, desired)
         } else {
             let yielding = self.plant.yielding(&self.motion.state.q);
-            rollout.advance(&mut self.motion, &[0.0; MAX_JOINTS], length);
+            rollout.advance(&mut self.motion, &self.outside, length);
             yielding
         };
         ToolPath::new(from, self.flange_motion(), length, yielding)
@@ -119,7 +127,12 @@ impl SimArm {
             if let (Some(memory), Some(joints)) = (&mut self.motion.memory, &self.start.joints) {
                 memory.set_joints(joints);
                 self.motion.state = self.start.state;
-                rollout.advance(&mut self.motion, &torque, path.length());
+                let both = std::array::from_fn(|i| torque[i] + self.outside[i]);
+                // What is known beforehand was counted on the way that is taken again here.
+                for (sum, outside) in self.motion.external.iter_mut().zip(&self.outside) {
+                    *sum -= outside * share;
+                }
+                rollout.advance(&mut self.motion, &both, path.length());
                 if !self.plant.acts_in_joints() {
                     // The force acted early or late in the stretch, not evenly.
                     for i in 0..MAX_JOINTS {
@@ -150,7 +163,19 @@ impl SimArm {
     /// A whole period in which nothing touches the arm.
     pub(super) fn period(&mut self, drive: &Drive) {
         self.remember(drive);
-        self.plant.rollout().period(&mut self.motion, drive);
+        let rollout = self.plant.rollout();
+        if self.outside == [0.0; MAX_JOINTS] {
+            rollout.period(&mut self.motion, drive);
+        } else {
+            rollout.begin(&mut self.motion, drive);
+            rollout.advance(&mut self.motion, &self.outside, TICK);
+            rollout.sense(&mut self.motion, &self.before);
+        }
+    }
+
+    /// Has `torque` [N m] act on the joints from outside during the next period, beside the contact with the object.
+    pub(super) fn push(&mut self, torque: Joints) {
+        self.outside = torque;
     }
 
     fn remember(&mut self, drive: &Drive) {
@@ -183,6 +208,10 @@ impl SimArm {
 
     pub(super) fn plant(&self) -> &Plant {
         &self.plant
+    }
+
+    pub(super) fn plant_mut(&mut self) -> &mut Plant {
+        &mut self.plant
     }
 
     pub(super) fn model(&self) -> &ArmModel {

@@ -2,13 +2,15 @@
 //! robot, `twin shadow` and `twin replay` are all this one; called from their threads, never from a control thread
 //! (a contact takes too long for one).
 //!
-//! The arm meets nothing but the object, and that with its tool alone: it passes through the table and through itself.
+//! The arm meets the object, with its tool alone, and the table where that is asked for ([`SimCell::make_table_solid`]).
+//! It passes through itself.
 //! Units SI, everything in the base frame. Deterministic: the same cell, parameters and drives give the same numbers.
 #![allow(non_snake_case)] // tau_J is the Franka Control Interface's own symbol
 
 mod arm;
 mod contact;
 mod state;
+mod table;
 #[cfg(test)]
 mod tests;
 mod tool_path;
@@ -16,7 +18,7 @@ mod tool_path;
 pub use crate::rollout::Drive;
 pub use state::SimState;
 
-use crate::arm::{ArmModel, GainError, JointState, Joints, ModelError};
+use crate::arm::{ArmModel, GainError, JointState, Joints, MassProperties, ModelError};
 use crate::effects::{CameraEffects, EffectError, Effects};
 use crate::physics::{FlatMesh, TableObject};
 use crate::rollout::{CommandTrack, Plant, Reading};
@@ -28,6 +30,7 @@ use shared_mem::cell::{Cell, Controller, Tool};
 use shared_mem::frames::{Base, Object, Pose};
 use shared_mem::msg::arm::ArmState;
 use shared_mem::theta::Theta;
+use table::SolidTable;
 
 /// One control period [ns].
 pub const PERIOD_NS: u64 = 1_000_000;
@@ -41,6 +44,7 @@ pub struct SimCell {
     arm: Option<SimArm>,
     object: Option<TableObject>,
     contact: ToolContact,
+    table: Option<SolidTable>,
     camera: CameraEffects,
     takes_part: TakesPart,
     time_ns: u64,
@@ -126,6 +130,7 @@ impl SimCell {
             arm,
             object,
             contact,
+            table: None,
             camera: effects.camera,
             takes_part: TakesPart { arm: true, object: true },
             time_ns: 0,
@@ -157,7 +162,11 @@ impl SimCell {
 
     /// Lets one control period of 1 ms pass. Where the cell has no arm, `drive` moves nothing.
     pub fn step(&mut self, drive: &Drive) {
-        let Self { arm, object, contact, takes_part, .. } = self;
+        let Self { arm, object, contact, table, takes_part, .. } = self;
+        if let (Some(arm), Some(table)) = (arm.as_mut(), table) {
+            let push = table.push(arm.model(), arm.state());
+            arm.push(push);
+        }
         let (arm, object) = (arm.as_mut().filter(|_| takes_part.arm), object.as_mut().filter(|_| takes_part.object));
         match (arm, object) {
             (Some(arm), Some(object)) => contact.advance(arm, object, drive, self.time_ns),
@@ -166,6 +175,30 @@ impl SimCell {
             (None, None) => {}
         }
         self.time_ns += PERIOD_NS;
+    }
+
+    /// Lets the arm collide with the table, where the cell has an arm of known shape and a table. Off by default: a
+    /// recorded arm never did, and looking for it costs time.
+    pub fn make_table_solid(&mut self, cell: &Cell) {
+        self.table = cell.table.as_ref().map(|table| SolidTable::new(table, cell.tool.as_ref()));
+    }
+
+    /// Tells the arm's controller that the flange carries `load` (flange frame) beside the tool, so that it compensates
+    /// it. What the flange really carries stays.
+    pub fn declare_load(&mut self, load: &MassProperties) {
+        if let Some(arm) = &mut self.arm {
+            arm.plant_mut().declare_load(load);
+        }
+    }
+
+    /// Asks the arm's own controller for another stiffness than cell.toml's [N m/rad]. Gains that differ from cell.toml's
+    /// differ from what is asked in the same proportion; the damping ratio stays.
+    ///
+    /// # Errors
+    /// [`GainError`] when cell.toml describes no controller.
+    pub fn ask_stiffness(&mut self, stiffness: &Joints) -> Result<(), GainError> {
+        let Self { arm, description, .. } = self;
+        arm.as_mut().map_or(Ok(()), |arm| arm.plant_mut().ask_stiffness(stiffness, description.controller.as_ref()))
     }
 
     /// Fills what a robot reports about itself: `device_ns` (simulated clock), `dof`, `mode`, `q`, `dq` (with the
