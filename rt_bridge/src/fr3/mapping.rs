@@ -27,7 +27,9 @@ pub(super) fn fill_state(wire: &RobotState, stamp_ns: u64, state: &mut ArmState)
     state.dq_d = joints_from(&f32s_to_f64(&wire.dq_d));
     state.tau_J = joints_from(&f32s_to_f64(&wire.tau_J));
     state.tau_J_d = joints_from(&f32s_to_f64(&wire.tau_J_d));
-    state.tau_ext = joints_from(&f32s_to_f64(&wire.tau_ext_hat_filtered));
+    // The robot reports what it exerts on its surroundings (`tau_J` less what its model expects); a state holds what acts
+    // on the arm.
+    state.tau_ext = joints_from(&f32s_to_f64(&wire.tau_ext_hat_filtered).map(|tau| -tau));
     state.O_T_EE = f32s_to_f64(&wire.O_T_EE);
     state.success_rate = f64::from(wire.control_command_success_rate.get());
 }

@@ -73,7 +73,9 @@ fn every_field_of_a_state_arrives_where_it_belongs() {
     assert_eq!(arm.start(CommandInterface::JointPosition), Ok(Desired::Reported));
     let state = cycles(arm.as_mut(), CommandInterface::JointPosition, 3);
     let expected = |k: usize| joints_from(&[0, 1, 2, 3, 4, 5, 6].map(|j| (10 * (k + 1) + j) as f64));
-    let taken = [state.q, state.dq, state.q_d, state.dq_d, state.tau_J, state.tau_J_d, state.tau_ext];
+    // What the robot exerts on its surroundings is the opposite of what they exert on the arm.
+    let tau_ext = state.tau_ext.map(|tau| -tau);
+    let taken = [state.q, state.dq, state.q_d, state.dq_d, state.tau_J, state.tau_J_d, tau_ext];
     for (k, joints) in taken.into_iter().enumerate() {
         assert_eq!(joints, expected(k), "field {k}");
     }

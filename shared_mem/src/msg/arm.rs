@@ -36,7 +36,7 @@ pub struct ArmState {
     pub tau_J: Joints,
     /// Desired torque, without gravity [N m].
     pub tau_J_d: Joints,
-    /// Estimated external torque, without the robot's and its tool's own weight [N m].
+    /// Estimated torque of the surroundings on the arm, without the robot's and its tool's own weight [N m].
     pub tau_ext: Joints,
     /// Flange (or declared end effector) in the base frame: homogeneous 4x4, column-major [m].
     pub O_T_EE: [f64; 16],
