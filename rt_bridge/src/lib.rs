@@ -10,6 +10,8 @@
 //! | camera | [`camera`] | the ports for pictures, with `--camera sim` |
 //! | main | [`run`] | duration, Ctrl-C, the recorder's process, the report |
 //!
+//! `rt_bridge serve` ([`serve`]) is the other side of the line: it plays the robot.
+//!
 //! Rings without locks join control, pump and world. The recorder ([`recorder`]) is a process of its own.
 
 pub mod arm;
@@ -25,5 +27,6 @@ pub mod replay;
 pub mod rt;
 pub mod run;
 pub mod safety;
+pub mod serve;
 pub mod sim;
 pub mod times;

@@ -35,7 +35,7 @@ fn each_big_dependency_has_one_door() {
         ("mcap", &["shared_mem/src/recording/"]),
         ("parry3d_f64", &["twin/src/physics/"]),
         ("foxglove", &["twin/src/viewer", "shared_mem/src/recording/"]),
-        ("franka", &["rt_bridge/src/fr3/"]),
+        ("franka", &["rt_bridge/src/fr3/", "rt_bridge/src/serve/"]),
         ("rsruckig", &["rt_bridge/src/motion/", "rt_bridge/src/rt/"]),
     ];
     for (file, text) in product_sources() {

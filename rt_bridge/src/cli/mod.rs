@@ -6,6 +6,7 @@
 mod doctor;
 mod record;
 mod run;
+mod serve;
 
 use clap::{Parser, Subcommand};
 use std::io::{IsTerminal as _, Write as _};
@@ -23,7 +24,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
         rt_bridge doctor                                               what this machine lacks for real time\n  \
         rt_bridge run --cell config/fr3_cell.toml --arm sim            hold the simulated arm until Ctrl-C\n  \
         rt_bridge run --cell cell.toml --arm fci://172.16.0.2 --record clip.mcap\n  \
-        rt_bridge record --out clip.mcap --duration 10                 record what others do\n\n\
+        rt_bridge record --out clip.mcap --duration 10                 record what others do\n  \
+        rt_bridge serve --cell config/fr3_cell.toml                    play a Franka robot for any libfranka program\n\n\
         Processes meet when the environment variable TWINALIGN_DOMAIN agrees (default 0)."
 )]
 struct Arguments {
@@ -35,6 +37,7 @@ struct Arguments {
 enum Verb {
     Run(run::RunArguments),
     Record(record::RecordArguments),
+    Serve(serve::ServeArguments),
     Doctor(doctor::DoctorArguments),
 }
 
@@ -54,6 +57,7 @@ pub fn main() -> ExitCode {
     let done = match arguments.verb {
         Verb::Run(run) => run.execute(),
         Verb::Record(record) => record.execute(),
+        Verb::Serve(serve) => serve.execute(),
         Verb::Doctor(doctor) => doctor.execute(),
     };
     match done {

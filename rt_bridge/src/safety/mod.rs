@@ -17,7 +17,7 @@ pub mod watchdog;
 pub mod workspace;
 
 pub use guard::{Guard, Violation};
-pub use limits::{JointLimits, Limits};
+pub use limits::{JointLimits, Limits, TORQUE_RATE};
 pub use torque::TorqueGuard;
 pub use trace::Trace;
 pub use watchdog::Watchdog;

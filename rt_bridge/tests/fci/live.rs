@@ -1,5 +1,6 @@
-//! The driver against a robot that speaks the real protocol. Start `FR3_MJCF=fr3.xml run-franka-sim-server` (from the
-//! Python package franka-sim), then: `cargo test --release -p rt_bridge --test fci -- --ignored --test-threads 1 --nocapture`.
+//! The driver against a robot in a process of its own. Start `rt_bridge serve --cell config/fr3_cell.toml --lock-step`, or
+//! `FR3_MJCF=fr3.xml run-franka-sim-server` (from the Python package franka-sim), then:
+//! `cargo test --release -p rt_bridge --test fci -- --ignored --test-threads 1 --nocapture`.
 //! `FCI_HOST` names another address than 127.0.0.1.
 
 use crate::counting::allocations;

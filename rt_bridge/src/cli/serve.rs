@@ -1,0 +1,105 @@
+//! `rt_bridge serve`.
+
+use super::{answer, seconds, stop_flag};
+use crate::serve::{Pace, Ports, Report, Server};
+use anyhow::Result;
+use clap::Args;
+use shared_mem::cell::Cell;
+use shared_mem::theta::Theta;
+use std::net::IpAddr;
+use std::path::PathBuf;
+use std::time::Duration;
+
+/// Play a Franka robot: the simulated cell as an FR3 that speaks FCI version 10, until Ctrl-C
+///
+/// Point any libfranka program (0.18 to 0.21) at this address instead of a robot's. Torque, joint and Cartesian
+/// interfaces, impedance, load, collision thresholds, reflexes, error recovery and the packet-loss rule act as on a robot,
+/// on the twin's dynamics; the table and the object are there to be hit. A program has to be told not to insist on a
+/// real-time kernel where there is none (franka::RealtimeConfig::kIgnore, or --realtime ignore with rt_bridge run).
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:\n  \
+    rt_bridge serve --cell config/fr3_cell.toml                      then, elsewhere:\n  \
+    rt_bridge run --cell config/fr3_cell.toml --arm fci://127.0.0.1 --realtime ignore\n  \
+    rt_bridge serve --cell config/fr3_cell.toml --effects hidden.toml --bind 0.0.0.0\n  \
+    rt_bridge serve --cell config/fr3_cell.toml --port 0 --lock-step --fast --json\n\n\
+    JSON: cycles (the robot's milliseconds), motions, reflexes, lost_commands, clients, slipped (milliseconds that began so\n\
+    late that the robot's clock waited), late_us (how late its thread woke).")]
+pub(super) struct ServeArguments {
+    /// What the laboratory knows about its cell; [robot] has to be an FR3
+    #[arg(long, value_name = "cell.toml")]
+    cell: PathBuf,
+    /// Address of this machine to listen at; 0.0.0.0 for all of them
+    #[arg(long, value_name = "ADDRESS", default_value = "127.0.0.1")]
+    bind: IpAddr,
+    /// Port of the arm; 0 for any that is free. Clients of libfranka know no other than 1337
+    #[arg(long, default_value_t = Ports::default().arm)]
+    port: u16,
+    /// Port of the hand; 0 for any that is free
+    #[arg(long, default_value_t = 1338)]
+    hand_port: u16,
+    /// No hand
+    #[arg(long, conflicts_with = "hand_port")]
+    no_hand: bool,
+    /// Effects of the simulated cell that no client is told
+    #[arg(long, value_name = "hidden.toml")]
+    effects: Option<PathBuf>,
+    /// Parameters of the simulated cell that no client is told
+    #[arg(long, value_name = "theta.toml")]
+    parameters: Option<PathBuf>,
+    /// While a motion is commanded, let the robot's clock wait for each command instead of losing it
+    #[arg(long)]
+    lock_step: bool,
+    /// In lock-step, do not hold to real time: as fast as the client answers
+    #[arg(long, requires = "lock_step")]
+    fast: bool,
+    /// Stop after this many seconds
+    #[arg(long, value_name = "S", value_parser = seconds)]
+    duration: Option<Duration>,
+    /// Answer with one JSON object
+    #[arg(long)]
+    json: bool,
+}
+
+impl ServeArguments {
+    pub(super) fn execute(self) -> Result<()> {
+        let cell = Cell::read(&self.cell)?;
+        let ports = Ports { bind: self.bind, arm: self.port, hand: (!self.no_hand).then_some(self.hand_port) };
+        let pace = match (self.lock_step, self.fast) {
+            (false, _) => Pace::RealTime,
+            (true, false) => Pace::LockStep,
+            (true, true) => Pace::Fast,
+        };
+        let server = Server::open(&cell, self.hidden()?.as_ref(), ports, pace)?;
+        let stop = stop_flag()?;
+        let hand = server.hand_address().map_or(String::new(), |hand| format!(", its hand at {hand}"));
+        tracing::info!("an FR3 (FCI version 10) listens at {}{hand}", server.address()?);
+        let report = server.run(&stop, self.duration)?;
+        if self.json {
+            answer(&serde_json::to_string(&report)?)?;
+        } else {
+            answer(&in_words(&report))?;
+        }
+        Ok(())
+    }
+
+    fn hidden(&self) -> Result<Option<Theta>> {
+        let mut theta = self.parameters.as_deref().map(Theta::read).transpose()?;
+        if let Some(path) = &self.effects {
+            theta.get_or_insert_default().effects.extend(Theta::read(path)?.effects);
+        }
+        Ok(theta)
+    }
+}
+
+fn in_words(report: &Report) -> String {
+    format!(
+        "{} clients, {} motions, {} reflexes, {} lost commands in {:.1} s of the robot's time\nwake-up p99.9 {:.1} us, {} cycles slipped",
+        report.clients,
+        report.robot.motions,
+        report.robot.reflexes,
+        report.robot.lost_commands,
+        report.robot.cycles as f64 * 1e-3,
+        report.late_us.p999,
+        report.slipped
+    )
+}

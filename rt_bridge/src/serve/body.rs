@@ -1,0 +1,94 @@
+//! The robot's body: the simulated arm in its cell and what its sensors and its model conclude from it.
+#![allow(non_snake_case)] // the field's own symbols
+
+use super::ServeError;
+use super::kinematics::Frame;
+use super::observer::{Observer, Touched};
+use super::settings::Settings;
+use nalgebra::Vector6;
+use shared_mem::cell::{Cell, ControllerKind};
+use shared_mem::msg::arm::ArmState;
+use shared_mem::theta::Theta;
+use twin::arm::{ArmModel, GainError, JointState, Joints, MassProperties};
+use twin::sim::{Drive, SimCell};
+
+/// The body.
+pub(super) struct Body {
+    cell: SimCell,
+    /// What is known of the arm before anything is declared, so that there is always a model.
+    bare: ArmModel,
+    pub(super) measured: ArmState,
+    /// Torques a period ago [N m].
+    pub(super) tau_J_before: Joints,
+    observer: Observer,
+    pub(super) touched: Touched,
+    /// Estimated wrench at the stiffness frame, in base axes, then in its own.
+    pub(super) wrench: [Vector6<f64>; 2],
+}
+
+impl Body {
+    /// The arm of a cell where `[simulation]` puts it. `theta` are parameters and effects that no client is told.
+    pub(super) fn new(cell: &Cell, theta: Option<&Theta>) -> Result<Self, ServeError> {
+        if cell.robot.as_ref().and_then(|robot| robot.model.as_deref()) != Some("fr3") {
+            return Err(ServeError::NotAnFr3);
+        }
+        if cell.controller.as_ref().is_none_or(|controller| controller.kind != ControllerKind::JointImpedance) {
+            return Err(ServeError::NotCompliant);
+        }
+        let bare = ArmModel::from_cell(cell).map_err(twin::sim::SimError::from)?;
+        let mut simulated = SimCell::new(cell, theta)?;
+        simulated.make_table_solid(cell);
+        let mut measured = ArmState::default();
+        simulated.read(&mut measured);
+        Ok(Self {
+            bare,
+            tau_J_before: measured.tau_J,
+            observer: Observer::new(&JointState { q: measured.q, dq: measured.dq }),
+            touched: Touched::default(),
+            wrench: [Vector6::zeros(); 2],
+            measured,
+            cell: simulated,
+        })
+    }
+
+    /// The model inside the robot, with the end effector and the load it was told of.
+    pub(super) fn model(&self) -> &ArmModel {
+        self.cell.plant().map_or(&self.bare, |plant| plant.nominal())
+    }
+
+    /// What the encoders read.
+    pub(super) fn joints(&self) -> JointState {
+        JointState { q: self.measured.q, dq: self.measured.dq }
+    }
+
+    /// What they would read without noise.
+    pub(super) fn true_reading(&self) -> JointState {
+        self.cell.joint_reading()
+    }
+
+    /// Estimated torque on the surroundings [N m].
+    pub(super) fn tau_ext(&self) -> &Joints {
+        self.observer.tau_ext()
+    }
+
+    /// Lets a millisecond pass under `drive` and takes in what the sensors say then.
+    pub(super) fn step(&mut self, drive: &Drive, settings: &Settings) {
+        self.cell.step(drive);
+        self.tau_J_before = self.measured.tau_J;
+        self.cell.read(&mut self.measured);
+        let model = self.cell.plant().map_or(&self.bare, |plant| plant.nominal());
+        let now = JointState { q: self.measured.q, dq: self.measured.dq };
+        self.observer.update(model, &now, &self.measured.tau_J);
+        self.wrench = self.observer.wrench(&Frame { model, on_flange: settings.F_T_K() }, &now.q);
+    }
+
+    /// Has the robot's joint controller act with another stiffness [N m/rad].
+    pub(super) fn ask_stiffness(&mut self, stiffness: &Joints) -> Result<(), GainError> {
+        self.cell.ask_stiffness(stiffness)
+    }
+
+    /// Has the robot's model carry `load` beside the end effector.
+    pub(super) fn declare_load(&mut self, load: &MassProperties) {
+        self.cell.declare_load(load);
+    }
+}

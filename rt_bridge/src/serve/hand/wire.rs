@@ -1,0 +1,106 @@
+//! Between the bytes of the hand's protocol, version 3, and its actions. Pure, and total over bytes.
+
+use super::fingers::{Action, Fingers};
+use franka::wire::HeaderLayout;
+use franka::wire::gripper::{
+    GRIPPER_COMMAND_PORT, GRIPPER_VERSION, GraspRequest, GripperCommand, GripperConnectRequest, GripperConnectStatus,
+    GripperMoveRequest, GripperState,
+};
+use zerocopy::{FromBytes as _, IntoBytes as _};
+
+pub(in crate::serve) use franka::wire::gripper::GripperStatus as Status;
+
+/// Where hands listen.
+pub(in crate::serve) const PORT: u16 = GRIPPER_COMMAND_PORT;
+
+/// What a client asks the hand.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Request {
+    Connect { version: u16, udp_port: u16 },
+    Act(Action),
+    Stop,
+}
+
+/// Reads a request; `None` for what is none.
+pub(super) fn request(number: u32, payload: &[u8]) -> Option<Request> {
+    let empty = |request| payload.is_empty().then_some(request);
+    match GripperCommand::from_u16(u16::try_from(number).ok()?)? {
+        GripperCommand::Connect => {
+            let wire = GripperConnectRequest::read_from_bytes(payload).ok()?;
+            Some(Request::Connect { version: wire.version.get(), udp_port: wire.udp_port.get() })
+        }
+        GripperCommand::Homing => empty(Request::Act(Action::Homing)),
+        GripperCommand::Stop => empty(Request::Stop),
+        GripperCommand::Move => {
+            let wire = GripperMoveRequest::read_from_bytes(payload).ok()?;
+            Some(Request::Act(Action::Move { width: wire.width.get(), speed: wire.speed.get() }))
+        }
+        GripperCommand::Grasp => {
+            let wire = GraspRequest::read_from_bytes(payload).ok()?;
+            let epsilon = [wire.epsilon_inner.get(), wire.epsilon_outer.get()];
+            Some(Request::Act(Action::Grasp { width: wire.width.get(), epsilon, speed: wire.speed.get() }))
+        }
+    }
+}
+
+/// Whether a client of this version is understood.
+pub(super) fn speaks(version: u16) -> bool {
+    version == GRIPPER_VERSION
+}
+
+/// The reply to a handshake.
+pub(super) fn connect_reply(id: u32, agreed: bool) -> Vec<u8> {
+    let status = if agreed { GripperConnectStatus::Success } else { GripperConnectStatus::IncompatibleLibraryVersion };
+    let payload = [status.to_u16().to_le_bytes(), GRIPPER_VERSION.to_le_bytes()].concat();
+    message(GripperCommand::Connect.to_u16().into(), id, &payload)
+}
+
+/// The reply to any other request.
+pub(super) fn reply(number: u32, id: u32, status: Status) -> Vec<u8> {
+    message(number, id, &status.to_u16().to_le_bytes())
+}
+
+fn message(number: u32, id: u32, payload: &[u8]) -> Vec<u8> {
+    let mut message = HeaderLayout::Gripper.encode_header(number, id, payload.len());
+    message.extend_from_slice(payload);
+    message
+}
+
+/// The state's datagram; `stamp_ms` counts the hand's milliseconds.
+pub(super) fn state(fingers: &Fingers, stamp_ms: u32) -> Vec<u8> {
+    /// Of a hand that has been on for a while [degrees Celsius].
+    const WARM: u16 = 30;
+    let wire = GripperState {
+        message_id: stamp_ms.into(),
+        width: fingers.width().into(),
+        max_width: fingers.widest().into(),
+        is_grasped: u8::from(fingers.has_grasped()),
+        temperature: WARM.into(),
+    };
+    wire.as_bytes().to_vec()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    #[test]
+    fn messages_have_the_lengths_of_the_protocol() {
+        assert_eq!(state(&Fingers::new(), 7).len(), 23);
+        assert_eq!(connect_reply(0, true).len(), 14);
+        assert_eq!(reply(1, 0, Status::Success).len(), 12);
+    }
+
+    proptest! {
+        #[test]
+        fn any_bytes_are_a_request_or_none(number in 0_u32..70_000, payload in proptest::collection::vec(any::<u8>(), 0..60)) {
+            if let Some(Request::Act(action)) = request(number, &payload) {
+                let mut fingers = Fingers::new();
+                let _impossible = fingers.begin(action);
+                let _still_moving = fingers.step(0.01);
+                prop_assert!((0.0..=0.08).contains(&fingers.width()));
+            }
+        }
+    }
+}

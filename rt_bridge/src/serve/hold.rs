@@ -1,0 +1,63 @@
+//! What the arm does while nobody commands it: come to rest inside its limits, then hold that pose.
+
+use super::generator::rules::PERIOD;
+use crate::motion::Brake;
+use crate::safety::{Limits, Trace};
+use shared_mem::msg::MAX_JOINTS;
+use twin::arm::Joints;
+
+/// The arm's own set points.
+#[derive(Debug)]
+pub(super) struct Hold {
+    brake: Brake,
+    trace: Trace,
+    dq_d: Joints,
+    braking: bool,
+}
+
+impl Hold {
+    /// At rest at `q`.
+    pub(super) fn at_rest(limits: Limits, q: &Joints) -> Self {
+        Self { brake: Brake::new(limits, PERIOD), trace: Trace::at_rest(*q), dq_d: [0.0; MAX_JOINTS], braking: false }
+    }
+
+    /// Stops what was to move as `trace`.
+    pub(super) fn stop(&mut self, trace: &Trace) {
+        self.brake.begin(trace);
+        (self.trace, self.braking) = (*trace, true);
+    }
+
+    /// Stops an arm that was not led by set points: it is at `q` with `dq`.
+    pub(super) fn catch(&mut self, q: &Joints, dq: &Joints) {
+        self.stop(&Trace { v: *dq, ..Trace::at_rest(*q) });
+    }
+
+    /// Lets go of the pose held so far and holds `q`.
+    pub(super) fn settle(&mut self, q: &Joints) {
+        (self.trace, self.dq_d, self.braking) = (Trace::at_rest(*q), [0.0; MAX_JOINTS], false);
+    }
+
+    /// One period on.
+    pub(super) fn step(&mut self) {
+        if self.braking {
+            let step = self.brake.step();
+            self.trace =
+                if step.at_rest { Trace::at_rest(step.point.q_d) } else { self.trace.after(&step.point.q_d, PERIOD) };
+            (self.dq_d, self.braking) = (step.point.dq_d, !step.at_rest);
+        }
+    }
+
+    /// `true` once the arm is told to stand still.
+    pub(super) fn rests(&self) -> bool {
+        !self.braking
+    }
+
+    pub(super) fn trace(&self) -> &Trace {
+        &self.trace
+    }
+
+    /// Desired velocities [rad/s].
+    pub(super) fn dq_d(&self) -> &Joints {
+        &self.dq_d
+    }
+}

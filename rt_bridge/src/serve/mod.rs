@@ -1,0 +1,95 @@
+//! `rt_bridge serve`: the simulated cell as a Franka robot that speaks FCI version 10, so that anybody's libfranka program
+//! can be tried against honest dynamics.
+//!
+//! ```text
+//! client --requests, TCP 1337-----> session --> robot: settings, motion, reflexes --drive--> body: the twin's physics
+//!        --set points, UDP--------/    ^          |                                             |
+//!        <--states, UDP, 1 kHz--------/           \<-- watch: limits, contact, collision <-- sensors, observer
+//! client --requests, TCP 1338-----> hand
+//! ```
+//!
+//! | file | owns |
+//! |---|---|
+//! | [`server`] | the ports, who is served, the robot's millisecond: free-running or in lock-step with its client |
+//! | `session` | one client: its sockets, the handshake, what it is sent and when |
+//! | `framing` | from a stream of bytes to messages |
+//! | `wire` | from messages to requests and set points |
+//! | `robot` | modes, requests and their statuses, the robot's cycle |
+//! | `settings` | what setters change, and which arguments a robot takes |
+//! | `motion` | a running motion: set points, torques, its end |
+//! | `generator` | joint and Cartesian set points, their limits, inverse kinematics |
+//! | `losses` | commands that did not come: the success rate, the twenty in a row |
+//! | `hold` | the arm's own set points while nobody commands it |
+//! | `impedance` | the Cartesian impedance controller; the joint one is the twin's |
+//! | `body` | the simulated arm and its sensors |
+//! | `observer` | external torque and wrench, contact and collision |
+//! | `watch` | what the robot objects to in what it measures |
+//! | `faults` | by which names it objects |
+//! | `state` | the datagram with all of it |
+//! | `kinematics` | frames on the flange |
+//! | `hand` | the Franka Hand |
+//!
+//! Everything but `server`, `session` and the hand's service is without sockets and clocks, and deterministic.
+//!
+//! Sources: libfranka's documentation and its protocol headers (Apache-2.0), by way of `franka-rs`'s wire structs.
+
+mod body;
+mod faults;
+mod framing;
+mod generator;
+mod hand;
+mod hold;
+mod impedance;
+mod kinematics;
+mod losses;
+mod motion;
+mod observer;
+mod robot;
+pub mod server;
+mod session;
+mod settings;
+mod state;
+mod watch;
+mod wire;
+
+pub use robot::Tally;
+pub use server::{Pace, Ports, Report, Server};
+
+use std::net::SocketAddr;
+use twin::sim::SimError;
+
+/// The cell cannot be served.
+#[derive(Debug, thiserror::Error)]
+pub enum ServeError {
+    /// Another arm, or none.
+    #[error("only an FR3 speaks the Franka Control Interface; give cell.toml a [robot] block with `model = \"fr3\"`")]
+    NotAnFr3,
+    /// A servo, or nothing known.
+    #[error(
+        "the FR3's own controller is compliant; give cell.toml a [controller] block with `kind = \"joint_impedance\"`"
+    )]
+    NotCompliant,
+    /// The cell cannot be simulated.
+    #[error(transparent)]
+    Sim(#[from] SimError),
+    /// Somebody else listens there.
+    #[error(
+        "port {} of {} is taken, perhaps by another `rt_bridge serve`; end that, or choose another with `{flag}` (0: any that is free)",
+        address.port(),
+        address.ip()
+    )]
+    PortTaken {
+        /// Where.
+        address: SocketAddr,
+        /// The argument that chooses it.
+        flag: &'static str,
+    },
+    /// The system does not let us listen there.
+    #[error("cannot listen on {address} ({source}); give `--bind` an address of this machine, for example 127.0.0.1")]
+    Bind {
+        /// Where.
+        address: SocketAddr,
+        /// The system's reason.
+        source: std::io::Error,
+    },
+}

@@ -1,0 +1,78 @@
+//! What the robot keeps an eye on while it moves, beyond judging set points: what it measures. Pure.
+
+use super::body::Body;
+use super::faults::{Fault, all};
+use super::generator::Surroundings;
+use super::generator::rules::{END_EFFECTOR_SPEED, JointRules, exceeds, highest_speed};
+use super::kinematics::difference;
+use super::motion::Motion;
+use super::settings::Settings;
+use crate::arm::ReflexErrors;
+use crate::safety::JointLimits;
+
+/// How far over its limit a speed may be measured before the robot stops: a controller follows with some error.
+const MARGIN: f64 = 1.05;
+/// Commanded acceleration above which the thresholds of accelerating hold [rad/s²].
+const ACCELERATES: f64 = 0.01;
+
+/// Objections to what happens while `motion` runs; empty where there are none. Updates contact and collision flags.
+pub(super) fn objections(body: &mut Body, motion: &Motion, rules: &JointRules, settings: &Settings) -> ReflexErrors {
+    let mut faults = touches(body, Some(motion), settings);
+    let (measured, limits) = (&body.measured, &rules.limits);
+    if is_outside(body, rules) {
+        faults.push(Fault::JointPositionLimits);
+    }
+    let too_fast = |(i, limits): (usize, &JointLimits)| {
+        measured.dq[i].abs() > MARGIN * highest_speed(limits, measured.q[i], measured.dq[i]).max(MARGIN - 1.0)
+    };
+    if limits.counted().enumerate().any(too_fast) {
+        faults.push(Fault::JointVelocity);
+    }
+    let ee = Surroundings::new(body.model(), rules, settings).ee;
+    if ee.twist(&body.joints()).fixed_rows::<3>(0).norm() > MARGIN * END_EFFECTOR_SPEED {
+        faults.push(Fault::CartesianVelocity);
+    }
+    if motion.torque().is_some_and(|tau| {
+        let gravity = body.model().gravity(&measured.q);
+        limits.counted().enumerate().any(|(i, limits)| exceeds((tau[i] + gravity[i]).abs(), limits.torque))
+    }) {
+        faults.push(Fault::TorqueRange);
+    }
+    if strays(body, motion, &motion.request.path_deviation, rules, settings) {
+        faults.push(Fault::PathPoseDeviation);
+    }
+    all(&faults)
+}
+
+/// Looks for contact and, while `motion` runs, for collision.
+pub(super) fn touches(body: &mut Body, motion: Option<&Motion>, settings: &Settings) -> Vec<Fault> {
+    let accelerates =
+        motion.and_then(|m| m.generator.joints()).is_some_and(|trace| trace.a.iter().any(|a| a.abs() > ACCELERATES));
+    let thresholds = if accelerates { &settings.accelerating } else { &settings.nominal };
+    let (tau_ext, wrench) = (*body.tau_ext(), body.wrench[1]);
+    let [joint, cartesian] = body.touched.update(&tau_ext, &wrench, thresholds, motion.is_some());
+    let reflexes = [(joint, Fault::JointReflex), (cartesian, Fault::CartesianReflex)];
+    reflexes.into_iter().filter(|(struck, _)| *struck && motion.is_some()).map(|(_, fault)| fault).collect()
+}
+
+/// Whether a joint is beyond its limits.
+pub(super) fn is_outside(body: &Body, rules: &JointRules) -> bool {
+    let within = |(limits, q): (&JointLimits, &f64)| (limits.q_min..=limits.q_max).contains(q);
+    !rules.limits.counted().zip(&body.measured.q).all(within)
+}
+
+/// Whether the arm is farther from where it should be than the client allows: translation [m], rotation [rad], elbow [rad].
+pub(super) fn strays(
+    body: &Body,
+    motion: &Motion,
+    allowed: &[f64; 3],
+    rules: &JointRules,
+    settings: &Settings,
+) -> bool {
+    let Some(desired) = motion.generator.joints() else { return false };
+    let ee = Surroundings::new(body.model(), rules, settings).ee;
+    let miss = difference(&ee.pose(&body.measured.q), &ee.pose(&desired.q));
+    let elbow = (body.measured.q[2] - desired.q[2]).abs();
+    let found = [miss.fixed_rows::<3>(0).norm(), miss.fixed_rows::<3>(3).norm(), elbow];
+    found.iter().zip(allowed).any(|(found, allowed)| found > allowed)
+}

@@ -1,0 +1,81 @@
+//! The hand's protocol, byte by byte.
+
+use crate::Served;
+use rt_bridge::serve::Pace;
+use std::io::{Read, Write};
+use std::net::{TcpStream, UdpSocket};
+use std::time::Duration;
+
+struct Hand {
+    tcp: TcpStream,
+    udp: UdpSocket,
+}
+
+impl Hand {
+    fn ask(&mut self, number: u16, id: u32, payload: &[u8]) {
+        let size = 10 + u32::try_from(payload.len()).expect("a short payload");
+        let message = [&number.to_le_bytes()[..], &id.to_le_bytes(), &size.to_le_bytes(), payload].concat();
+        self.tcp.write_all(&message).expect("the hand reads");
+    }
+
+    /// Counter and payload of the next reply.
+    fn reply(&mut self, payload: usize) -> (u32, Vec<u8>) {
+        let mut message = vec![0; 10 + payload];
+        self.tcp.read_exact(&mut message).expect("a reply");
+        (u32::from_le_bytes([message[2], message[3], message[4], message[5]]), message[10..].to_vec())
+    }
+
+    /// Width and widest of the next state [m].
+    fn widths(&self) -> [f64; 2] {
+        let mut state = [0; 64];
+        assert_eq!(self.udp.recv(&mut state).expect("a state"), 23);
+        [4, 12].map(|at| f64::from_le_bytes(state[at..at + 8].try_into().expect("eight bytes")))
+    }
+
+    /// A state in which the fingers are so far apart [m].
+    fn wait_for(&self, width: f64) {
+        while (self.widths()[0] - width).abs() > 1e-9 {}
+    }
+}
+
+fn connected(served: &Served, version: u16) -> (Hand, Vec<u8>) {
+    let tcp = TcpStream::connect(served.hand).expect("the hand listens");
+    let udp = UdpSocket::bind("127.0.0.1:0").expect("a free port");
+    tcp.set_read_timeout(Some(Duration::from_secs(20))).expect("a timeout above zero");
+    udp.set_read_timeout(Some(Duration::from_secs(20))).expect("a timeout above zero");
+    let port = udp.local_addr().expect("it is bound").port();
+    let mut hand = Hand { tcp, udp };
+    hand.ask(0, 0, &[version.to_le_bytes(), port.to_le_bytes()].concat());
+    let (_, payload) = hand.reply(4);
+    (hand, payload)
+}
+
+fn numbers(values: &[f64]) -> Vec<u8> {
+    values.iter().flat_map(|x| x.to_le_bytes()).collect()
+}
+
+#[test]
+fn the_hand_homes_moves_and_grasps_nothing() {
+    let served = Served::start(Pace::Fast);
+    let (refused, payload) = connected(&served, 2);
+    assert_eq!(payload, [1, 0, 3, 0]);
+    drop(refused);
+    let (mut hand, payload) = connected(&served, 3);
+    assert_eq!(payload, [0, 0, 3, 0]);
+    assert_eq!(hand.widths()[1], 0.08);
+    hand.ask(1, 1, &[]);
+    assert_eq!(hand.reply(2), (1, vec![0, 0]));
+    hand.wait_for(0.08);
+    hand.ask(3, 2, &numbers(&[0.05, 0.1]));
+    assert_eq!(hand.reply(2), (2, vec![0, 0]));
+    hand.wait_for(0.05);
+    // Wider than the fingers go.
+    hand.ask(3, 3, &numbers(&[0.5, 0.1]));
+    assert_eq!(hand.reply(2), (3, vec![1, 0]));
+    hand.ask(2, 4, &numbers(&[0.03, 0.005, 0.005, 0.1, 20.0]));
+    assert_eq!(hand.reply(2), (4, vec![2, 0]), "there is nothing to grasp");
+    // A stop cuts off what runs: first the end of that, then its own.
+    hand.ask(3, 5, &numbers(&[0.08, 0.001]));
+    hand.ask(4, 6, &[]);
+    assert_eq!([hand.reply(2), hand.reply(2)], [(5, vec![3, 0]), (6, vec![0, 0])]);
+}

@@ -1,0 +1,177 @@
+//! The protocol, byte by byte.
+
+use crate::client::{Client, at, motion, numbers};
+use crate::{Served, cell, free_ports};
+use rt_bridge::serve::{Pace, Ports, ServeError, Server};
+use std::io::Write;
+use std::net::TcpListener;
+use std::time::Duration;
+
+const IDLE: u8 = 1;
+const MOVE: u8 = 2;
+const REFLEX: u8 = 4;
+const COMMUNICATION: usize = 25;
+
+#[test]
+fn a_client_of_another_version_is_told_ours_and_sent_nothing() {
+    let served = Served::start(Pace::Fast);
+    for version in [5, 9, 11] {
+        let mut client = Client::silent(served.address);
+        assert_eq!(client.shake_hands(version).payload, [1, 10, 0]);
+        assert!(!client.gets_states(), "version {version}");
+    }
+    let mut client = Client::connected(served.address);
+    assert_eq!(client.state_in_mode(IDLE)[at::GENERATOR], 0);
+}
+
+#[test]
+fn a_request_in_pieces_is_understood_and_garbage_costs_the_connection_alone() {
+    let served = Served::start(Pace::Fast);
+    let mut client = Client::silent(served.address);
+    for byte in client.handshake(10) {
+        client.tcp.write_all(&[byte]).expect("the server reads");
+        std::thread::sleep(Duration::from_micros(300));
+    }
+    assert_eq!(client.reply().payload, [0, 10, 0]);
+    // Two requests in one piece.
+    let (first, second) = (client.send(2, &[]), client.send(11, &[]));
+    assert_eq!(client.reply().id, first);
+    let model = client.reply();
+    assert_eq!((model.id, model.payload[0]), (second, 0));
+    let text = String::from_utf8(model.payload[1..].to_vec()).expect("a URDF");
+    assert!(text.contains("<link name=\"link8\"/>") && text.ends_with("</robot>\n"), "{text}");
+    // What is no request of this protocol is refused: unknown, too short, and as a set point.
+    assert_eq!([client.ask(99, &[]), client.ask(4, &[1, 2]), client.ask(1, &[0; 113])], [1, 2, 7]);
+    client.state();
+    client.send_datagram(&[0xff; 371]);
+    client.send_datagram(&[1; 3]);
+    client.tcp.write_all(&[0xff; 64]).expect("the server reads");
+    assert!(client.is_cut_off());
+    drop(client);
+    // Nor does somebody who asks before the handshake, or leaves without a word, stop the next one.
+    drop(Client::silent(served.address));
+    let mut rude = Client::silent(served.address);
+    rude.send(2, &[]);
+    assert!(rude.is_cut_off());
+    let mut client = Client::connected(served.address);
+    client.state_in_mode(IDLE);
+}
+
+#[test]
+fn a_second_client_waits_without_an_answer_until_the_first_has_left() {
+    let served = Served::start(Pace::Fast);
+    let mut first = Client::connected(served.address);
+    let mut second = Client::silent(served.address);
+    let handshake = second.handshake(10);
+    second.tcp.write_all(&handshake).expect("the connection is taken");
+    for _ in 0..50 {
+        first.state();
+    }
+    second.tcp.set_nonblocking(true).expect("a socket");
+    assert!(second.tcp.peek(&mut [0]).is_err(), "the second client has an answer");
+    second.tcp.set_nonblocking(false).expect("a socket");
+    assert_eq!(first.ask(2, &[]), 0, "the first one is served");
+    drop(first);
+    assert_eq!(second.reply().payload, [0, 10, 0]);
+    second.state_in_mode(IDLE);
+}
+
+#[test]
+fn a_motion_is_announced_shown_commanded_finished_shown_and_announced() {
+    let served = Served::start(Pace::Fast);
+    let mut client = Client::connected(served.address);
+    let before = client.state();
+    assert_eq!((before[at::ROBOT_MODE], before[at::CONTROLLER]), (IDLE, 3));
+    let id = client.send(1, &motion(0, 0));
+    let started = client.reply();
+    assert_eq!((started.number, started.id, &started.payload[..]), (1, id, &[1][..]));
+    let mut state = client.state_in_mode(MOVE);
+    assert_eq!((state[at::GENERATOR], state[at::CONTROLLER]), (1, 0));
+    assert_eq!(success_rate(&state), 0.0);
+    state = client.state();
+    for _ in 0..50 {
+        client.answer(&state, |_| {});
+        let next = client.state();
+        assert_eq!(counter(&next), counter(&state) + 1, "in lock-step the robot's clock waits");
+        state = next;
+    }
+    assert_eq!(success_rate(&state), 1.0);
+    assert_eq!(client.ask(4, &[0; 56]), 1, "no setter while it moves");
+    client.answer(&state, |command| command[at::MOTION_FINISHED] = 1);
+    client.state_in_mode(IDLE);
+    let over = client.reply();
+    assert_eq!((over.number, over.id, &over.payload[..]), (1, id, &[0][..]));
+    assert_eq!(client.ask(4, &[0; 56]), 0);
+}
+
+#[test]
+fn a_client_that_falls_silent_is_stopped_and_can_recover() {
+    // Free-running: this is the one thing a robot that waits for its client cannot show.
+    let served = Served::start(Pace::RealTime);
+    let mut client = Client::connected(served.address);
+    client.state();
+    let id = client.send(1, &motion(2, 4));
+    assert_eq!(client.reply().payload, [1]);
+    let mut state = client.state_in_mode(MOVE);
+    // Answers until one was in time, then no more.
+    while success_rate(&state) == 0.0 && state[at::ROBOT_MODE] == MOVE {
+        client.answer(&state, |_| {});
+        state = client.state();
+    }
+    let state = client.state_in_mode(REFLEX);
+    assert_eq!(state[at::ERRORS + COMMUNICATION], 1);
+    let over = client.reply();
+    assert_eq!((over.id, &over.payload[..]), (id, &[8][..]));
+    assert_eq!(client.ask(1, &motion(2, 4)), 5, "no motion in a reflex");
+    assert_eq!(client.ask(2, &[]), 0);
+    assert_eq!(client.ask(10, &[]), 0);
+    let state = client.state_in_mode(IDLE);
+    assert_eq!(state[at::ERRORS + COMMUNICATION], 0);
+    assert_eq!(client.ask(1, &motion(2, 4)), 1);
+    drop(client);
+    let report = served.finish();
+    assert_eq!((report.robot.reflexes, report.robot.motions, report.clients), (1, 2, 1));
+    assert!(report.robot.lost_commands >= 20);
+}
+
+#[test]
+fn torques_end_by_their_own_flag() {
+    let served = Served::start(Pace::Fast);
+    let mut client = Client::connected(served.address);
+    client.state();
+    client.send(1, &motion(2, 4));
+    assert_eq!(client.reply().payload, [1]);
+    client.state_in_mode(MOVE);
+    let mut state = client.state();
+    assert_eq!((state[at::GENERATOR], state[at::CONTROLLER]), (5, 2));
+    for _ in 0..20 {
+        client.answer(&state, |_| {});
+        state = client.state();
+    }
+    client.answer(&state, |command| command[at::TORQUE_FINISHED] = 1);
+    client.state_in_mode(IDLE);
+    assert_eq!(client.reply().payload, [0]);
+}
+
+#[test]
+fn a_port_that_is_taken_is_named_with_the_way_to_choose_another() {
+    let taken = TcpListener::bind("127.0.0.1:0").expect("a free port");
+    let port = taken.local_addr().expect("it is bound").port();
+    for (ports, flag) in [
+        (Ports { arm: port, ..free_ports() }, "`--port`"),
+        (Ports { hand: Some(port), ..free_ports() }, "`--hand-port`"),
+    ] {
+        let Err(error) = Server::open(&cell(), None, ports, Pace::Fast) else { panic!("the port is taken") };
+        let text = error.to_string();
+        assert!(matches!(error, ServeError::PortTaken { .. }));
+        assert!(text.contains(&format!("port {port} of 127.0.0.1 is taken")) && text.contains(flag), "{text}");
+    }
+}
+
+fn counter(state: &crate::client::State) -> u64 {
+    u64::from_le_bytes(state[..8].try_into().expect("eight bytes"))
+}
+
+fn success_rate(state: &crate::client::State) -> f64 {
+    numbers(state, at::SUCCESS_RATE, 1)[0]
+}
