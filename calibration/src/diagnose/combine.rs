@@ -157,11 +157,12 @@ impl Step {
         (self.trials.iter())
             .filter_map(|trial| trial.fitted.as_ref().map(|(fit, advantage)| (trial, fit, advantage)))
             .filter(|(trial, _, advantage)| {
-                let plain = trial.closes > PLAIN && advantage.share > NEARLY_ALL;
                 let stage = bench.library.candidates[trial.scored.candidate].effect.stage;
+                let (much, nearly_all) = (trial.closes > PLAIN, advantage.share > NEARLY_ALL);
                 // Strokes of two engines differ by so much anyway that a little gain on most of them shows nothing.
                 let rough = stage != Stage::Control && !self.object_gap();
-                (convincing(advantage, trial.scored.cost) && !rough) || (plain && advantage.nats > LEAST)
+                let shown = !rough || (much && self.is_alone(trial.scored.candidate));
+                (convincing(advantage, trial.scored.cost) && shown) || (much && nearly_all && advantage.nats > LEAST)
             })
             .filter(|(trial, _, advantage)| {
                 let of_arm = bench.library.candidates[trial.scored.candidate].effect.stage == Stage::Control;
@@ -283,15 +284,19 @@ impl Step {
     /// Whether a trial stands out: nearly all clips speak for it, far beyond chance, and no other effect half as much.
     #[must_use]
     pub fn is_clear(&self, candidate: usize) -> bool {
+        let own = self.trials.iter().find(|trial| trial.scored.candidate == candidate);
+        let advantage = own.and_then(|trial| trial.fitted.as_ref()).map(|(_, advantage)| advantage);
+        let clear = |a: &Advantage| a.share > NEARLY_ALL && a.nats > CLEAR * a.error;
+        advantage.is_some_and(clear) && self.is_alone(candidate)
+    }
+
+    /// Whether no other effect is worth half as much.
+    fn is_alone(&self, candidate: usize) -> bool {
         let worth = |trial: &Trial| trial.fitted.as_ref().map(|(_, advantage)| net(advantage, trial.scored.cost));
         let (own, others): (Vec<&Trial>, Vec<&Trial>) =
             self.trials.iter().partition(|trial| trial.scored.candidate == candidate);
-        let Some((_, advantage)) = own.first().and_then(|trial| trial.fitted.as_ref()) else { return false };
-        let next = others.iter().filter_map(|trial| worth(trial)).fold(0.0, f64::max);
-        let (nats, error) = (advantage.nats, advantage.error);
-        advantage.share > NEARLY_ALL
-            && nats > CLEAR * error
-            && next < 0.5 * own.first().and_then(|t| worth(t)).unwrap_or(0.0)
+        let next = others.into_iter().filter_map(worth).fold(0.0, f64::max);
+        own.into_iter().find_map(worth).is_some_and(|own| next < 0.5 * own)
     }
 
     /// Of a candidate that the score test did not point to, the strength at which the fitted clips cost least.

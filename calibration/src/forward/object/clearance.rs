@@ -13,6 +13,9 @@ use twin::scene::ObjectModel;
 
 /// Tool and object are apart when the tracked gap is wider than this [m]: several sigmas of any usable tracker.
 const APART: f64 = 4e-3;
+/// Nearer than this the arm may be touching already [m]: a tool, a camera's pose or its scale off by as much as is met in
+/// practice moves the first touch, and a single row of touch in what counts as the arm's own names a fault of the arm.
+const MAY_TOUCH: f64 = 0.02;
 /// Rows of the arm between two looks: at a metre a second the tool moves by the width above [1].
 const STRIDE: usize = 4;
 
@@ -65,6 +68,7 @@ pub fn first_near(cell: &Cell, clip: &Clip) -> Option<u64> {
     if clip.object.is_empty() {
         return None;
     }
-    let near = (0..clip.measured.len()).step_by(STRIDE).find(|row| clearance.between(*row, 0) <= APART)?;
+    let reach = MAY_TOUCH.min(0.5 * clearance.between(0, 0)).max(APART);
+    let near = (0..clip.measured.len()).step_by(STRIDE).find(|row| clearance.between(*row, 0) <= reach)?;
     Some(clip.measured.stamps_ns[near.saturating_sub(STRIDE)])
 }
