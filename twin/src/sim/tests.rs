@@ -2,7 +2,7 @@
 #![allow(non_snake_case)]
 
 use super::*;
-use crate::arm::{ControlLaw, JointState};
+use crate::arm::{ControlLaw, JointState, PointForce};
 use std::path::Path;
 
 /// The shipped cell without noise.
@@ -209,4 +209,38 @@ fn a_tossed_object_needs_no_robot() {
     assert!(velocity.norm() < 1e-3 && spin.norm() < 1e-2, "at rest after 3 s: {velocity} {spin}");
     let height = object_position(&cell).z;
     assert!([0.03, 0.04, 0.05].iter().any(|h| (height - h).abs() < 2e-4), "on one of its faces: {height}");
+}
+
+#[test]
+fn a_solid_table_carries_what_presses_on_it_and_is_not_there_unless_asked_for() {
+    let description = Cell { object: None, ..shipped() };
+    let pressed = |solid: bool| {
+        let mut cell = SimCell::new(&description, None).expect("a cell");
+        if solid {
+            cell.make_table_solid(&description);
+        }
+        let model = cell.arm_model().expect("an FR3").clone();
+        let (mut q_d, mut state) = (cell.q(), ArmState::default());
+        // Down with shoulder and wrist, the tool upright, until its tip would be well below the table.
+        for _ in 0..2500 {
+            (q_d[1], q_d[5]) = (q_d[1] + 5e-4, q_d[5] + 5e-4);
+            cell.step(&Drive::JointImpedance { q_d, dq_d: [0.0; 8] });
+        }
+        for _ in 0..1000 {
+            cell.step(&Drive::JointImpedance { q_d, dq_d: [0.0; 8] });
+        }
+        cell.read(&mut state);
+        let (wanted, is) = (model.tip(&q_d).position()[2], model.tip(&cell.q()).position()[2]);
+        assert!(wanted < -0.02, "{wanted} m");
+        // The torque from outside is that of an upward force on the tip.
+        let lift =
+            model.torque_of(&cell.q(), &PointForce { point: model.tip(&cell.q()).position(), force: [0.0, 0.0, 1.0] });
+        (is, state.tau_ext[1] / lift[1], wanted)
+    };
+    let (height, force, _) = pressed(true);
+    assert!(height > -0.004 && height < 0.001, "{height} m");
+    // A millimetre of the table's stiffness is 30 N.
+    assert!((force + 3e4 * height).abs() < 0.1 * force, "{force} N at {height} m");
+    let (height, force, wanted) = pressed(false);
+    assert!((height - wanted).abs() < 1e-3 && force == 0.0, "{height} m");
 }
