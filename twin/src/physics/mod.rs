@@ -9,9 +9,11 @@ mod convert;
 pub mod hit;
 mod push;
 mod shape;
+mod surface;
 mod table_object;
 pub mod touch;
 mod tumble;
 
 pub use shape::FlatMesh;
+pub use surface::Surface;
 pub use table_object::{ObjectMotion, TableObject};

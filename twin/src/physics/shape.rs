@@ -95,7 +95,7 @@ impl CollisionShape {
 
 /// The same for a box.
 #[inline]
-fn distance_from_box(half: &Vector3<f64>, p: &Vector3<f64>) -> (f64, Point3<f64>, Vector3<f64>) {
+pub(super) fn distance_from_box(half: &Vector3<f64>, p: &Vector3<f64>) -> (f64, Point3<f64>, Vector3<f64>) {
     let nearest = Vector3::new(p.x.clamp(-half.x, half.x), p.y.clamp(-half.y, half.y), p.z.clamp(-half.z, half.z));
     let outwards = p - nearest;
     let distance = outwards.norm();
