@@ -3,6 +3,7 @@
 mod cli;
 
 use clap::Parser as _;
+use shared_mem::error_line;
 use std::process::ExitCode;
 use tracing_subscriber::EnvFilter;
 
@@ -13,7 +14,7 @@ fn main() -> ExitCode {
     match cli::run(arguments) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("calibration: {error:#}");
+            eprintln!("calibration: {}", error_line(error.as_ref()));
             ExitCode::FAILURE
         }
     }

@@ -13,9 +13,11 @@
 //! | [`cell`] | `cell.toml`: what the laboratory knows about its cell |
 //! | [`theta`] | `theta.toml`: what was identified, and the effects that were named |
 //! | [`frames`] | typed poses: `Pose<To, From>` |
+//! | [`error_line()`] | an error with its causes in one line |
 //! | [`time`] | the clock that every stamp comes from |
 
 pub mod cell;
+mod error_line;
 pub mod frames;
 pub mod msg;
 pub mod recording;
@@ -24,3 +26,5 @@ pub mod time;
 pub mod toml_file;
 pub mod topics;
 pub mod transport;
+
+pub use error_line::error_line;

@@ -3,6 +3,7 @@
 mod cli;
 
 use clap::{Parser, Subcommand};
+use shared_mem::error_line;
 use std::process::ExitCode;
 use tracing_subscriber::EnvFilter;
 
@@ -40,7 +41,7 @@ fn main() -> ExitCode {
     match outcome {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("twin: {error:#}");
+            eprintln!("twin: {}", error_line(error.as_ref()));
             ExitCode::FAILURE
         }
     }
