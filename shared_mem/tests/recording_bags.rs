@@ -81,6 +81,11 @@ impl Bag {
         self.mcap.write_to_known_channel(&header, data).expect("room");
     }
 
+    fn announce(&mut self, topic: &str, name: &str) {
+        let schema = self.mcap.add_schema(name, "ros2msg", b"").expect("room");
+        self.mcap.add_channel(schema, topic, "cdr", &BTreeMap::new()).expect("room");
+    }
+
     fn joints(&mut self, topic: &str, stamp_ns: u64, names: &[&str], q: &[f64]) {
         let dq: Vec<f64> = q.iter().map(|q| 0.1 * q).collect();
         self.put(topic, JOINT_STATE, stamp_ns, &joint_state(stamp_ns, names, q, &dq));
@@ -137,6 +142,24 @@ fn a_missing_topic_is_an_error_that_lists_what_is_there_and_where_to_say_so() {
     for part in [MEASURED, "`/joint_states` (sensor_msgs/msg/JointState)", "`[topics] measured"] {
         assert!(error.contains(part), "{error}");
     }
+}
+
+#[test]
+fn a_topic_on_which_nothing_came_and_a_file_that_was_cut_are_told_from_a_wrong_name() {
+    let mut bag = Bag::new();
+    bag.joints(MEASURED, 1, &NAMES, &[0.0, 0.0]);
+    bag.announce(DESIRED, JOINT_STATE);
+    let error = bag.read(ClipKind::Excitation, &cell()).unwrap_err();
+    assert!(error.contains("nobody published desired joints") && !error.contains("[topics]"), "{error}");
+    let mut bag = Bag::new();
+    for i in 0..2000 {
+        bag.joints(MEASURED, i * 1_000_000 + 1, &NAMES, &[q(i, 0), q(i, 1)]);
+    }
+    bag.mcap.finish().expect("room");
+    let whole = std::fs::read(&bag.path).expect("a bag");
+    std::fs::write(&bag.path, &whole[..whole.len() / 4]).expect("a shorter one");
+    let error = read_clip(&bag.path, ClipKind::Excitation, &cell()).unwrap_err().to_string();
+    assert!(error.contains("damaged file") && error.contains("record it again"), "{error}");
 }
 
 #[test]
@@ -297,16 +320,17 @@ fn poses_in_another_frame_than_the_base_are_told() {
 }
 
 #[test]
-fn poses_in_millimetres_and_quaternions_with_w_first_are_told() {
+fn poses_in_millimetres_and_quaternions_with_w_first_or_of_another_length_are_told() {
     let free = Cell::parse("[table]\nheight = 0.0\n", Path::new("cell.toml")).expect("a valid cell");
     let mut bag = Bag::new();
     for i in 0..20u64 {
         let cdr = Cdr::default().header(i * 7_000_000, "base").numbers(&[512.0, 100.0, 50.0]);
-        bag.put("/object/pose", "geometry_msgs/msg/PoseStamped", i, &cdr.numbers(&[1.0, 0.0, 0.0, 0.0]).message());
+        bag.put("/object/pose", "geometry_msgs/msg/PoseStamped", i, &cdr.numbers(&[2.0, 0.0, 0.0, 0.0]).message());
     }
     let warnings = bag.read(ClipKind::FreeMotion, &free).unwrap_or_else(|e| panic!("{e}")).warnings;
     assert!(warnings.iter().any(|w| w.contains("millimetres")), "{warnings:?}");
     assert!(warnings.iter().any(|w| w.contains("w first")), "{warnings:?}");
+    assert!(warnings.iter().any(|w| w.contains("length 2.000 instead of 1")), "{warnings:?}");
 }
 
 #[test]

@@ -15,6 +15,12 @@ use std::path::Path;
 /// A stamp [ns] and the pose, `None` where its numbers are no pose.
 type PoseRow = (u64, Option<Pose<Base, Object>>);
 
+/// A quaternion's length is 1 up to rounding by single precision and a little more.
+const UNIT: f64 = 1e-3;
+
+/// What a topic should hold, and the key of `[topics]` that names it.
+type Wanted = (&'static str, &'static str);
+
 /// What the wanted topics held.
 #[derive(Debug, Default)]
 struct Collected {
@@ -26,6 +32,8 @@ struct Collected {
     /// Whether any pose carried a stamp of its own.
     pose_stamped: bool,
     pose_log_times_ns: Vec<u64>,
+    /// Length, less 1, of the quaternion whose length is farthest from 1.
+    too_long: f64,
 }
 
 /// Reads a bag.
@@ -41,16 +49,16 @@ pub(super) fn read<R: Read + Seek>(
             .take(&message, &cell.topics)
             .map_err(|what| ReadError::content(path, &message.channel.topic, what))?;
     }
-    let present = messages.present();
     let needs_arm = cell.robot.is_some() && kind != ClipKind::FreeMotion;
     let topics = &cell.topics;
     let mut clip = Clip::empty(path, kind);
     clip.damage = messages.damage().summary();
+    let missing = |topic: &str, wanted: Wanted| missing(path, topic, wanted, &messages);
     if needs_arm || !collected.measured.is_empty() {
-        collected.joints(&present, cell, &mut clip)?;
+        collected.joints(&missing, cell, &mut clip)?;
     }
     if kind != ClipKind::Excitation && collected.poses.is_empty() {
-        return Err(missing(path, &topics.object_pose, ("object poses", "object_pose"), &present));
+        return Err(missing(&topics.object_pose, ("object poses", "object_pose")));
     }
     let base_frame = cell.robot.as_ref().and_then(|robot| robot.base_frame.as_deref());
     clip.object = collected.object(path, &topics.object_pose, base_frame, &mut clip.warnings)?;
@@ -75,19 +83,29 @@ impl Collected {
             if self.pose_frame.is_empty() {
                 self.pose_frame = pose.frame.to_owned();
             }
-            self.poses.push((pose.stamp_ns, Pose::from_parts(pose.position, pose.wxyz)));
+            let (stamp_ns, too_long) = (pose.stamp_ns, pose.wxyz.iter().map(|v| v * v).sum::<f64>().sqrt() - 1.0);
+            let pose = Pose::from_parts(pose.position, pose.wxyz);
+            if pose.is_some() && too_long.abs() > self.too_long.abs() {
+                self.too_long = too_long;
+            }
+            self.poses.push((stamp_ns, pose));
         }
         Ok(())
     }
 
     /// Puts the rows of the two joint topics into `clip`.
-    fn joints(&mut self, present: &str, cell: &Cell, clip: &mut Clip) -> Result<(), ReadError> {
+    fn joints(
+        &mut self,
+        missing: &dyn Fn(&str, Wanted) -> ReadError,
+        cell: &Cell,
+        clip: &mut Clip,
+    ) -> Result<(), ReadError> {
         let (path, topics) = (clip.file.clone(), &cell.topics);
         if self.measured.is_empty() {
-            return Err(missing(&path, &topics.measured, ("measured joints", "measured"), present));
+            return Err(missing(&topics.measured, ("measured joints", "measured")));
         }
         if self.desired.is_empty() {
-            return Err(missing(&path, &topics.desired, ("desired joints", "desired"), present));
+            return Err(missing(&topics.desired, ("desired joints", "desired")));
         }
         let measured = NamedLog { topic: &topics.measured, log: std::mem::take(&mut self.measured) };
         let desired = NamedLog { topic: &topics.desired, log: std::mem::take(&mut self.desired) };
@@ -121,6 +139,12 @@ impl Collected {
                 self.pose_frame
             ));
         }
+        if self.too_long.abs() > UNIT {
+            warnings.push(format!(
+                "`{topic}`: a quaternion has the length {:.3} instead of 1; they were scaled: look at what computes them",
+                1.0 + self.too_long
+            ));
+        }
         let (series, found) =
             checks::object(self.poses, topic).map_err(|what| ReadError::content(path, topic, what))?;
         warnings.extend(found);
@@ -128,9 +152,25 @@ impl Collected {
     }
 }
 
-/// A topic that is not there: what it should hold, and the key of `[topics]` that names it.
-fn missing(path: &Path, topic: &str, (role, key): (&'static str, &'static str), present: &str) -> ReadError {
-    ReadError::Topic { path: path.to_owned(), topic: topic.to_owned(), role, key, present: present.to_owned() }
+/// Why nothing came from a topic: the file lost it, nobody published on it, or it is called otherwise.
+fn missing<R: Read + Seek>(path: &Path, topic: &str, (role, key): Wanted, messages: &Messages<R>) -> ReadError {
+    if let Some(damage) = messages.damage().summary() {
+        return ReadError::content(
+            path,
+            topic,
+            format!("no {role} are left in the damaged file ({damage}); record it again"),
+        );
+    }
+    if messages.has(topic) {
+        return ReadError::content(
+            path,
+            topic,
+            format!(
+                "the topic is there, but nobody published {role} on it; start what publishes them, then record again"
+            ),
+        );
+    }
+    ReadError::Topic { path: path.to_owned(), topic: topic.to_owned(), role, key, present: messages.present() }
 }
 
 fn expect_type(message: &Message<'_>, wanted: &[&str]) -> Result<(), String> {

@@ -145,7 +145,8 @@ pub(super) fn joints(
         given => given,
     };
     let ordered = desired.log.finish(desired.topic, wanted).map_err(fail(desired.topic))?;
-    warnings.extend(ordered.warnings);
+    // What holds for both topics is said once.
+    warnings.extend(ordered.warnings.into_iter().filter(|warning| !warnings.contains(warning)).collect::<Vec<_>>());
     let (mut desired_series, found) =
         checks::joints(ordered.series, desired.topic, &names).map_err(fail(desired.topic))?;
     warnings.extend(found);

@@ -17,6 +17,9 @@ pub(super) enum Wanted {
     Model(Vec<String>),
 }
 
+/// Parts of joint names that say that an arm is built like the FR3.
+const FAMILY: [&str; 4] = ["fr3", "fer", "panda", "franka"];
+
 /// Rows of one topic.
 #[derive(Debug, Default)]
 pub(super) struct JointLog {
@@ -107,6 +110,13 @@ impl JointLog {
         if publisher.names.is_empty() {
             warnings.push(format!("`{topic}`: rows carry no joint names; they are taken in the model's order"));
         }
+        if let (Wanted::Model(names), Some(stranger)) = (wanted, stranger(&publisher.names, &columns)) {
+            let meant = names.join(", ");
+            warnings.push(format!(
+                "`{stranger}` and its neighbours are taken for the model's [{meant}]: if they are another robot's, remove \
+                 the clip, or give its `urdf` in cell.toml"
+            ));
+        }
         let names = match wanted {
             Wanted::Any => publisher.names.clone(),
             Wanted::Names(names) | Wanted::Model(names) => names.clone(),
@@ -192,6 +202,15 @@ fn columns_by_suffix(wanted: &[String], have: &[String]) -> Option<Vec<usize>> {
         .collect()
 }
 
+/// The first of the columns' joints whose name carries a prefix of an arm that may be built otherwise.
+fn stranger<'a>(have: &'a [String], columns: &[usize]) -> Option<&'a String> {
+    let own = |name: &str| {
+        let prefix = name.rfind("joint").map_or(name, |at| &name[..at]).to_ascii_lowercase();
+        prefix.is_empty() || FAMILY.iter().any(|arm| prefix.contains(arm))
+    };
+    columns.iter().filter_map(|column| have.get(*column)).find(|name| !own(name))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -238,6 +257,18 @@ mod tests {
         assert_eq!(columns_by_suffix(&model, &one), Some(vec![1, 0]));
         let two = names(&["left_joint1", "left_joint2", "right_joint1", "right_joint2"]);
         assert_eq!(columns_by_suffix(&model, &two), None);
+    }
+
+    #[test]
+    fn another_robots_joints_that_end_alike_are_taken_with_a_warning() {
+        let told = |name: &str| {
+            let mut log = JointLog::default();
+            log.push(&state(1, &[name], &[1.0]), 0);
+            let ordered = log.finish("/q", &Wanted::Model(names(&["fr3_joint1"]))).expect("a joint");
+            ordered.warnings.into_iter().any(|warning| warning.contains(name) && warning.contains("another robot"))
+        };
+        assert!(told("ur3_joint1") && told("left_joint1"));
+        assert!(!["fr3_joint1", "left_fr3v2_joint1", "panda_joint1", "Franka_joint1", "joint1"].into_iter().any(told));
     }
 
     #[test]

@@ -176,6 +176,11 @@ impl<R: Read + Seek> Messages<R> {
         &self.framing.damage
     }
 
+    /// Whether a topic was met so far, with or without messages.
+    pub(super) fn has(&self, topic: &str) -> bool {
+        self.channels.values().any(|channel| channel.topic == topic)
+    }
+
     /// Topics and types met so far, for errors: `/a (type), /b (type)`.
     pub(super) fn present(&self) -> String {
         let topics: BTreeMap<&str, &str> =
