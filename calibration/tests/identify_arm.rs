@@ -112,6 +112,43 @@ fn a_dead_joint_keeps_its_gains_and_is_told() {
 }
 
 #[test]
+fn a_reading_that_stands_still_while_the_others_feel_its_joint_move_leaves_their_gains_right() {
+    let cell = cell();
+    let truth = hidden(&cell, 12);
+    let mut recorded = clips(&cell, &truth, 3, SECONDS, 12);
+    for clip in &mut recorded {
+        let stays = clip.measured.q[3];
+        clip.measured.q.iter_mut().skip(3).step_by(7).for_each(|q| *q = stays);
+        clip.measured.dq.iter_mut().skip(3).step_by(7).for_each(|dq| *dq = 0.0);
+    }
+    let found = identify(&cell, recorded).expect("an answer");
+    assert!(
+        found.warnings.iter().any(|w| w.contains("joint 4 `fr3_joint4` stands still in its readings")),
+        "{:?}",
+        found.warnings
+    );
+    for joint in [0, 1, 2, 4, 5, 6] {
+        let error = found.parameters["stiffness"].value[joint] / truth.stiffness[joint] - 1.0;
+        assert!(error.abs() < 0.03, "joint {}: {error}", joint + 1);
+    }
+}
+
+#[test]
+fn a_torque_limit_is_found_where_it_clips_and_left_away_where_it_does_not() {
+    let cell = cell();
+    let mut real = cell.clone();
+    real.controller.as_mut().expect("a controller").torque_limit = vec![8.0, 87.0, 87.0, 87.0, 12.0, 12.0, 12.0];
+    let truth = hidden(&cell, 13);
+    let recorded = clips(&real, &truth, 2, SECONDS, 13);
+    let options = Options { also: vec!["torque_saturation".into()], ..options() };
+    let found = identify_clips(&cell, recorded, &options, &Interrupt::default()).expect("an answer");
+    let limits = &found.parameters["torque_saturation.limit"].value;
+    assert!((limits[0] / 8.0 - 1.0).abs() < 0.02, "{limits:?}");
+    assert!(limits[1..].iter().all(|limit| limit.is_infinite()), "{limits:?}");
+    assert!(judge(&found, &truth).2 < 1e-2);
+}
+
+#[test]
 fn a_log_of_15_hz_is_refused_and_one_of_50_hz_is_not() {
     let cell = cell();
     let truth = hidden(&cell, 6);
@@ -255,7 +292,7 @@ fn an_effect_that_is_searched_besides_is_found() {
 }
 
 #[test]
-#[ignore = "takes minutes: how often intervals hold the truth, over 50 sessions (docs/measuring.md)"]
+#[ignore = "takes minutes: cargo test --release -p calibration --test identify_arm -- --ignored --nocapture"]
 fn intervals_hold_the_truth_in_90_to_99_of_100_cases() {
     let cell = cell();
     let (mut all, mut inside, mut worst) = (0, 0, 0.0_f64);

@@ -81,8 +81,10 @@ pub(super) struct ArmClip {
     pub(super) runs: Vec<Range<usize>>,
     /// Measured rows that are averaged, ascending.
     pub(super) bins: Vec<Range<usize>>,
-    /// Joints that do not follow.
+    /// Joints that do not follow, or whose readings stand still.
     pub(super) dead: [bool; MAX_JOINTS],
+    /// The commands as they were given, where dead joints were told to stay instead.
+    given: Option<JointSeries>,
     /// Row of the desired series at each measured row, where one was logged at that time.
     pub(super) desired_rows: Vec<Option<usize>>,
     /// What a reader has to know, one sentence each.
@@ -117,6 +119,7 @@ impl ArmClip {
         if dead.iter().take(arm.dof()).all(|dead| *dead) {
             return Err(ArmClipError::Dead);
         }
+        let given = dead.contains(&true).then(|| recorded.desired.clone());
         hold_dead(&mut recorded, &dead);
         let commands = CommandTrack::new(&recorded.desired).ok_or(ArmClipError::Empty("commands"))?;
         let mut warnings = warnings(&recorded, &commands, &dead);
@@ -134,7 +137,29 @@ impl ArmClip {
         let stretches = (left / STRETCH).round().max(1.0) as usize;
         let desired_rows = desired_rows(&recorded, step_ns);
         let stretch = bins.len().div_ceil(stretches);
-        Ok(Self { recorded, commands, runs, bins, dead, desired_rows, warnings, stretch, pieces, seconds: left })
+        Ok(Self { recorded, commands, runs, bins, dead, given, desired_rows, warnings, stretch, pieces, seconds: left })
+    }
+
+    /// Whether a joint is dead and told to stay where it is.
+    pub(super) fn stands_still(&self, joint: usize) -> bool {
+        self.dead[joint] && self.given.is_some()
+    }
+
+    /// The same with dead joints that follow their commands unseen; `None` where no joint is dead.
+    pub(super) fn unseen(&self) -> Option<Self> {
+        let mut clip = Self { given: None, ..self.clone() };
+        clip.recorded.desired = self.given.clone()?;
+        clip.commands = CommandTrack::new(&clip.recorded.desired)?;
+        for joint in (0..clip.recorded.measured.dof).filter(|joint| self.dead[*joint]) {
+            let name = clip.recorded.joint_names.get(joint).map_or("", String::as_str);
+            let joint = format!("joint {} `{name}`", joint + 1);
+            clip.warnings.retain(|warning| !warning.starts_with(&joint));
+            clip.warnings.push(format!(
+                "{joint} stands still in its readings, but the other joints feel it move: only they tell its gains; mend its \
+                 encoder or the log"
+            ));
+        }
+        Some(clip)
     }
 
     /// The clip, unless it is too short to say anything about the arm.

@@ -60,6 +60,9 @@ const SHORT_CLIP: f64 = 15.0;
 /// Scatter of the start velocity that such logs leave, one sigma [rad/s].
 const START_VELOCITY: f64 = 0.1;
 
+/// The others feel a joint move when the error is less than this share of what it is with the joint at rest.
+const FELT: f64 = 0.9;
+
 /// What one row of residuals is about.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Row {
@@ -126,6 +129,26 @@ impl<F: Fn(&[f64]) -> Theta + Sync> ArmClips<F> {
         Ok((Self { cell, nominal, channels, clips: usable, sigma, torque_lead, theta, spare }, left_out))
     }
 
+    /// Lets dead joints follow their commands unseen in the clips in which the others feel them move: then it is a reading
+    /// that stands still, and not the joint. `shared`: about right.
+    pub fn settle_dead_joints(&mut self, shared: &[f64]) {
+        for clip in 0..self.clips.len() {
+            let Some(unseen) = self.clips[clip].unseen() else { continue };
+            let still = self.cost(clip, shared);
+            let held = std::mem::replace(&mut self.clips[clip], unseen);
+            if self.cost(clip, shared) >= FELT * still {
+                self.clips[clip] = held;
+            }
+        }
+    }
+
+    /// Sum of squared residuals; infinite where the twin cannot be simulated.
+    fn cost(&self, clip: usize, shared: &[f64]) -> f64 {
+        let mut out = Vec::new();
+        let told = self.residuals(clip, shared, &[], &mut out);
+        told.map_or(f64::INFINITY, |()| out.iter().map(|residual| residual * residual).sum())
+    }
+
     /// What is a clip's own: where the log is too coarse to tell the state in which it begins, that state (positions, then
     /// velocities, of all joints; otherwise their sigmas are 0), and how old its encoders' readings are.
     #[must_use]
@@ -182,6 +205,11 @@ impl<F: Fn(&[f64]) -> Theta + Sync> ArmClips<F> {
     /// Whether a joint follows no command in this clip; its rows are 0.
     pub fn is_dead(&self, clip: usize, joint: usize) -> bool {
         self.clips[clip].dead[joint]
+    }
+
+    /// Whether a dead joint is taken to stand where it is, rather than to follow its commands unseen.
+    pub fn stands_still(&self, clip: usize, joint: usize) -> bool {
+        self.clips[clip].stands_still(joint)
     }
 
     /// Measured rows that count, in the groups that are averaged.

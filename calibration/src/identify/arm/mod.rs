@@ -4,6 +4,7 @@
 //! |---|---|
 //! | `session` | which clips of a session can be used, and for what |
 //! | `start` | where the search begins when little is known |
+//! | `saturation` | the same for a limit of the torques |
 //! | `finding` | what a fit tells, number by number |
 //! | `figures` | how far the twin is off |
 //! | `verdict` | what the clips cannot tell, and why |
@@ -14,6 +15,7 @@ mod advice;
 mod doubt;
 mod figures;
 mod finding;
+mod saturation;
 mod session;
 mod start;
 mod verdict;
@@ -142,11 +144,19 @@ fn identify_material(
     let (settings, mut unknowns): (Vec<_>, Vec<_>) = searched(&cell, &base, &options.also)?.into_iter().unzip();
     let settings = Settings::new(base, settings);
     let numbers: Numbers<'_> = Box::new(|shared| settings.theta(shared));
-    let (model, unusable) = ArmClips::new(&cell, clips, session::CHANNELS, numbers)?;
+    let (mut model, unusable) = ArmClips::new(&cell, clips, session::CHANNELS, numbers)?;
     let clips = session::used(&options.session, &model, left_out, unusable, options.seed)?;
+    let free = unknowns.clone();
     session::hold_dead(&model, &clips, settings.settings(), &mut unknowns);
     let before: Vec<f64> = unknowns.iter().map(|unknown| unknown.start).collect();
     start::improve(&cell, &model, &clips.split.train, settings.settings(), &mut unknowns, interrupt);
+    saturation::improve(&model, &clips.split.train, settings.settings(), &mut unknowns, interrupt);
+    model.settle_dead_joints(&unknowns.iter().map(|unknown| unknown.start).collect::<Vec<_>>());
+    // What moves unseen shows in its neighbours.
+    for (unknown, free) in unknowns.iter_mut().zip(&free) {
+        (unknown.lower, unknown.upper) = (free.lower, free.upper);
+    }
+    session::hold_dead(&model, &clips, settings.settings(), &mut unknowns);
     let random = model.random();
     let outcome = search(options, &model, &clips, (&unknowns, &random), interrupt)?;
     let finding = Finding::new(&settings, &unknowns, &outcome);

@@ -106,12 +106,12 @@ pub(super) fn joint_of(setting: &Setting) -> Option<usize> {
     }
 }
 
-/// Gains of joints that are dead in every clip to be fitted stay where they are.
+/// Gains of joints that stand still in every clip to be fitted stay where they are.
 pub(super) fn hold_dead(model: &Model<'_>, clips: &Used, settings: &[Setting], unknowns: &mut [Unknown]) {
     for (setting, unknown) in settings.iter().zip(unknowns) {
         let gain = matches!(setting, Setting::Stiffness(_) | Setting::Damping(_));
         let Some(joint) = joint_of(setting).filter(|_| gain) else { continue };
-        if clips.split.train.iter().all(|clip| model.is_dead(*clip, joint)) {
+        if clips.split.train.iter().all(|clip| model.stands_still(*clip, joint)) {
             (unknown.lower, unknown.upper) = (unknown.start, unknown.start);
         }
     }

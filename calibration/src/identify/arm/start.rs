@@ -92,7 +92,7 @@ fn choose(dof: usize, all: &[Tried], settings: &[Setting], unknowns: &mut [Unkno
 }
 
 /// Sum of squared residuals of each joint; infinite where the twin cannot be simulated.
-fn costs(model: &Model<'_>, clips: &[usize], numbers: &[f64]) -> Joints {
+pub(super) fn costs(model: &Model<'_>, clips: &[usize], numbers: &[f64]) -> Joints {
     let mut sums = [0.0; MAX_JOINTS];
     let mut out = Vec::new();
     for clip in clips {

@@ -1,0 +1,80 @@
+//! Where the search for the joints' torque limits begins. Without a limit nothing depends on it, so that no slope leads
+//! there; a limit that already clips some torque has one.
+
+use super::Model;
+use super::session::joint_of;
+use super::start::costs;
+use crate::estimate::{Options, Subset, Unknown, fit};
+use crate::forward::Setting;
+use crate::interrupt::Interrupt;
+use rayon::prelude::*;
+
+/// Limits that are tried, each this many times lower than the one before [1]...
+const RATIO: f64 = 1.4;
+/// ...from the highest that is met in practice [N m].
+const HIGHEST: f64 = 87.0;
+/// A limit is there when it leaves less than this share of its joint's squared error.
+const BETTER: f64 = 0.9;
+/// Iterations of the rough fit before.
+const ROUGH: usize = 4;
+/// So many clips tell whether there is one.
+const CLIPS: usize = 3;
+
+/// Moves the start of each joint's limit, one after the other, to the best of a ladder; where none is better it stays without.
+pub(super) fn improve(
+    model: &Model<'_>,
+    train: &[usize],
+    settings: &[Setting],
+    unknowns: &mut [Unknown],
+    interrupt: &Interrupt,
+) {
+    let clips = &train[..train.len().min(CLIPS)];
+    if settings.iter().all(|setting| limited(setting).is_none()) {
+        return;
+    }
+    bring_near(model, clips, settings, unknowns, interrupt);
+    for k in 0..settings.len() {
+        let Some(joint) = limited(&settings[k]) else { continue };
+        let numbers: Vec<f64> = unknowns.iter().map(|unknown| unknown.start).collect();
+        let cost = |inverse: f64| {
+            let mut numbers = numbers.clone();
+            numbers[k] = inverse;
+            if interrupt.asked() { f64::INFINITY } else { costs(model, clips, &numbers)[joint] }
+        };
+        let ladder: Vec<f64> = std::iter::successors(Some(HIGHEST.recip()), |inverse| Some(inverse * RATIO))
+            .take_while(|inverse| *inverse <= unknowns[k].upper)
+            .collect();
+        let tried: Vec<(f64, f64)> = ladder.into_par_iter().map(|inverse| (inverse, cost(inverse))).collect();
+        let best = tried.into_iter().min_by(|a, b| a.1.total_cmp(&b.1));
+        let without = cost(numbers[k]);
+        if let Some((inverse, _)) = best.filter(|(_, with)| *with < BETTER * without) {
+            unknowns[k].start = inverse;
+        }
+    }
+}
+
+/// Moves the starts of all other numbers to a rough fit without limits: a gain that is off by a fifth looks like a limit.
+fn bring_near(
+    model: &Model<'_>,
+    clips: &[usize],
+    settings: &[Setting],
+    unknowns: &mut [Unknown],
+    interrupt: &Interrupt,
+) {
+    let without = unknowns.iter().zip(settings).map(|(unknown, setting)| match limited(setting) {
+        Some(_) => Unknown { lower: unknown.start, upper: unknown.start, ..unknown.clone() },
+        None => unknown.clone(),
+    });
+    let without: Vec<Unknown> = without.collect();
+    let options = Options { iterations: ROUGH, ..Options::default() };
+    let rough = fit(&Subset { model, clips }, &without, &model.random(), &options, |_, _| !interrupt.asked());
+    // Where the twin cannot be simulated the search itself says so.
+    for (unknown, near) in unknowns.iter_mut().zip(rough.map(|fit| fit.shared).unwrap_or_default()) {
+        unknown.start = near;
+    }
+}
+
+/// The joint whose limit a number is.
+fn limited(setting: &Setting) -> Option<usize> {
+    matches!(setting, Setting::Effect { name: "torque_saturation", .. }).then(|| joint_of(setting))?
+}
