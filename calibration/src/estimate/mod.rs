@@ -10,6 +10,7 @@
 //! | [`linear`] | one clip linearised, its own numbers eliminated |
 //! | [`least_squares`] | bounded Levenberg-Marquardt on all clips |
 //! | [`interval`] | how sure the shared numbers are |
+//! | [`leverage`] | what a clip says of a fit that does not lean on it |
 //! | [`search`] | search without slopes, and its loop |
 //! | [`swarm`], [`evolution`] | two of them |
 //! | `views` | a model with its calls counted, with numbers given, with some of its clips |
@@ -21,6 +22,7 @@
 pub mod evolution;
 pub mod interval;
 pub mod least_squares;
+pub mod leverage;
 pub mod linear;
 pub mod problem;
 pub mod scatter;
@@ -31,6 +33,7 @@ mod views;
 pub use evolution::Evolution;
 pub use interval::{Intervals, at_bounds};
 pub use least_squares::{Fit, Options, fit, fit_from, score};
+pub use leverage::without_leaning;
 pub use linear::ClipFit;
 pub use problem::{ClipModel, Impossible, Random, Unknown};
 pub use search::{Found, Search, minimise};

@@ -71,8 +71,9 @@ impl JointSeries {
         }
     }
 
-    /// The rows listed in `rows`, in that order.
-    pub(super) fn select_rows(&self, rows: &[usize]) -> Self {
+    /// The rows listed in `rows`, in that order; numbers beyond the end are passed over.
+    #[must_use]
+    pub fn select_rows(&self, rows: &[usize]) -> Self {
         let pick = |values: &[f64]| -> Vec<f64> {
             rows.iter().filter_map(|&i| row(values, self.dof, i)).flatten().copied().collect()
         };
@@ -112,6 +113,14 @@ impl ObjectSeries {
     #[must_use]
     pub fn duration(&self) -> f64 {
         duration(&self.stamps_ns)
+    }
+
+    /// The poses listed in `rows`, in that order; numbers beyond the end are passed over.
+    #[must_use]
+    pub fn select_rows(&self, rows: &[usize]) -> Self {
+        let there = rows.iter().copied().filter(|row| *row < self.len().min(self.poses.len()));
+        let (stamps_ns, poses) = there.map(|row| (self.stamps_ns[row], self.poses[row])).unzip();
+        Self { stamps_ns, poses }
     }
 }
 
@@ -154,5 +163,11 @@ mod tests {
         assert_eq!(series.select_columns(&[1, 0]).q, [2.0, 1.0, 4.0, 3.0]);
         let last = series.select_rows(&[1]);
         assert_eq!((last.stamps_ns, last.q), (vec![20], vec![3.0, 4.0]));
+        let pose = Pose::from_isometry(nalgebra::Isometry3::translation(1.0, 0.0, 0.0));
+        let poses = ObjectSeries {
+            stamps_ns: vec![10, 20],
+            poses: vec![Pose::from_isometry(nalgebra::Isometry3::identity()), pose],
+        };
+        assert_eq!(poses.select_rows(&[1, 2]), ObjectSeries { stamps_ns: vec![20], poses: vec![pose] });
     }
 }

@@ -31,12 +31,5 @@ pub fn one_piece(clip: Clip, cell: &Cell, arm: &ArmModel) -> Result<(Clip, Vec<S
 fn between(series: &JointSeries, stretch: &RangeInclusive<u64>) -> JointSeries {
     let from = series.stamps_ns.partition_point(|stamp| stamp < stretch.start());
     let to = series.stamps_ns.partition_point(|stamp| stamp <= stretch.end());
-    let rows = |values: &[f64]| values.get(from * series.dof..to * series.dof).map(<[f64]>::to_vec).unwrap_or_default();
-    JointSeries {
-        stamps_ns: series.stamps_ns[from..to].to_vec(),
-        dof: series.dof,
-        q: rows(&series.q),
-        dq: rows(&series.dq),
-        tau: rows(&series.tau),
-    }
+    series.select_rows(&(from..to).collect::<Vec<_>>())
 }

@@ -43,7 +43,8 @@ use twin::sim::SimError;
 /// What the tracker's noise is taken for where cell.toml does not tell it, one sigma.
 const NOISE: PoseNoise = PoseNoise { position: 1e-3, rotation: 5e-3 };
 
-fn noise_of(cell: &Cell) -> PoseNoise {
+/// The tracker's noise, one sigma.
+pub(crate) fn noise_of(cell: &Cell) -> PoseNoise {
     cell.object.as_ref().and_then(|object| object.pose_noise).unwrap_or(NOISE)
 }
 

@@ -2,7 +2,7 @@
 
 use super::fit::ObjectFit;
 use super::material::Material;
-use crate::estimate::{Fit, Intervals, Unknown, at_bounds};
+use crate::estimate::{Fit, Intervals, Unknown, at_bounds, without_leaning};
 use crate::forward::{Setting, Settings};
 use crate::identify::answer::{Advice, Identification, Parameter, Untold};
 use std::collections::BTreeMap;
@@ -13,7 +13,7 @@ const RANGE_SHARE: f64 = 0.25;
 const VALUE_SHARE: f64 = 0.3;
 /// Estimates that move together this closely are told apart badly.
 const TOGETHER: f64 = 0.9;
-/// Strokes that are proposed.
+/// Motions that are proposed.
 const PROPOSALS: usize = 3;
 /// A clip that counts less than this is told.
 const FULL_WEIGHT: f64 = 0.99;
@@ -43,6 +43,7 @@ impl<'a> Finding<'a> {
             clip.scores.iter_mut().for_each(|score| *score *= *weight);
         }
         let held = at_bounds(unknowns, &fit.shared);
+        without_leaning(&mut fit, &held);
         let mut intervals = Intervals::new(&fit, &held);
         intervals.half_width.iter_mut().zip(&found.widths).for_each(|(half, width)| *half *= width);
         Self { settings, unknowns, found, fit, held, intervals }
@@ -68,7 +69,7 @@ impl<'a> Finding<'a> {
             convergence: self.found.convergence.clone(),
             witnesses: self.intervals.witnesses,
             misfit: self.fit.misfit().sqrt(),
-            advice: self.advice(&clips.train),
+            advice: self.advice(&clips.train, if material.cell.robot.is_some() { "stroke" } else { "toss" }),
             clips,
             warnings,
             ..Identification::default()
@@ -116,7 +117,9 @@ impl<'a> Finding<'a> {
         let together = self
             .partner(k)
             .map_or_else(String::new, |(name, r)| format!(" it moves together with {name} (correlation {r:.2});"));
-        Some(format!("its 95 % interval is as wide as ±{half:.3} {};{together} {remedy}", setting.physical_unit()))
+        let unit = setting.physical_unit();
+        let unit = if unit == "1" { String::new() } else { format!(" {unit}") };
+        Some(format!("its 95 % interval is as wide as ±{half:.3}{unit};{together} {remedy}"))
     }
 
     /// The number that this one moves together with most closely, and their correlation.
@@ -127,14 +130,14 @@ impl<'a> Finding<'a> {
         (r.abs() > TOGETHER).then(|| (self.unknowns[other].name.as_str(), r))
     }
 
-    /// Strokes that sharpen the worst number most.
-    fn advice(&self, files: &[String]) -> Vec<Advice> {
+    /// Motions that sharpen the worst number most.
+    fn advice(&self, files: &[String], motion: &str) -> Vec<Advice> {
         let half = &self.intervals.half_width;
         let share = |k: usize| half[k] / (self.unknowns[k].upper - self.unknowns[k].lower);
         let told = (0..half.len()).filter(|k| half[*k].is_finite() && !self.held[*k]);
         let Some(worst) = told.max_by(|a, b| share(*a).total_cmp(&share(*b))) else { return Vec::new() };
         let advice = |(clip, file): (&crate::estimate::ClipFit, &String)| Advice {
-            record: format!("one more stroke like {file}"),
+            record: format!("one more {motion} like {file}"),
             parameter: self.unknowns[worst].name.clone(),
             now: half[worst],
             predicted: self.intervals.with_more(&self.fit, &clip.information)[worst],
@@ -154,7 +157,6 @@ fn remedy(setting: &Setting, material: &Material) -> &'static str {
             "the arm is many times heavier than the object: weigh it and write `mass` into [object]"
         }
         Setting::Mass => "an object that slides by itself moves alike whatever it weighs: weigh it",
-        Setting::TipFriction if !hit => "no tool touches the object in these clips",
         Setting::TipFriction => "record strokes that meet the object's face askew",
         Setting::CentreOfMass(2) => "record fast strokes at other heights",
         Setting::CentreOfMass(_) => "record strokes left and right of the object's middle, from several sides",

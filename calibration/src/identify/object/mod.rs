@@ -5,22 +5,30 @@
 //! | file | owns |
 //! |---|---|
 //! | `screen` | which recorded clips can be used |
+//! | `mend` | what of a tracker's mistakes can be mended |
+//! | `odd` | what is odd about a clip that can be used |
 //! | `material` | a session's clips, sorted by their use |
 //! | `fit` | the likelihood fit |
 //! | `step` | one step of it |
 //! | `paper` | the loss on the object's surface, for searches without slopes |
 //! | `finding` | what a fit tells, number by number, and what it cannot tell |
+//! | `doubt` | what speaks against trusting the fit |
 //! | [`compare`] | ways of searching side by side |
 //! | `figures` | how far the twin is off |
 
 pub mod compare;
+mod doubt;
 mod figures;
 mod finding;
 mod fit;
 mod material;
+mod mend;
+mod odd;
 mod paper;
 pub(crate) mod screen;
 mod step;
+#[cfg(test)]
+mod test_clip;
 
 use super::answer::Identification;
 use super::run::{Optimizer, Outcome, Run, RunError};
@@ -131,6 +139,8 @@ pub fn identify(options: &Options, interrupt: &Interrupt) -> Result<Identificati
     answer.optimizer = options.optimizer.name().into();
     answer.warnings.extend(problem.warnings.iter().cloned());
     figures::fill(&mut answer, &material, [problem.settings.base(), &theta])?;
+    let doubts = doubt::doubts(&answer, &material.cell);
+    answer.warnings.extend(doubts);
     if let Some(out) = &options.out {
         std::fs::write(out, theta.to_toml()).map_err(|source| ObjectError::Write { path: out.clone(), source })?;
         answer.theta_file = out.display().to_string();
@@ -221,9 +231,14 @@ impl Problem {
 fn searched(cell: &Cell, base: Theta) -> (Settings, Vec<Unknown>) {
     // A mass that was weighed is not searched.
     let weighed = cell.object.as_ref().is_some_and(|o| o.mass.is_some() && o.mass_range.is_none());
+    let known = |setting: &Setting| match setting {
+        Setting::Mass => weighed,
+        // Without an arm no tool touches it.
+        Setting::TipFriction => cell.robot.is_none(),
+        _ => false,
+    };
     let searched = object_parameters(cell, &base).into_iter();
-    let (settings, unknowns): (Vec<Setting>, Vec<Unknown>) =
-        searched.filter(|(setting, _)| !(weighed && *setting == Setting::Mass)).unzip();
+    let (settings, unknowns): (Vec<Setting>, Vec<Unknown>) = searched.filter(|(setting, _)| !known(setting)).unzip();
     (Settings::new(base, settings), unknowns)
 }
 

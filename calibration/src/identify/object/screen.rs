@@ -1,18 +1,19 @@
 //! Which recorded clips can be held against the twin: an object that topples, is lost by its tracker, is never hit or lies
 //! elsewhere than the tool is noticed here, mended where that is safe, and told. Base frame, SI.
 
+use super::mend::mended;
+use super::odd::{oddities, rate};
 use crate::forward::object::Clearance;
-use nalgebra::{Isometry3, UnitQuaternion, Vector3};
+use nalgebra::Vector3;
 use shared_mem::cell::{Cell, ClipKind};
-use shared_mem::frames::Pose;
 use shared_mem::recording::{Clip, ObjectSeries};
 use twin::scene::{ObjectModel, ObjectShape};
 
-/// A pose this far from the middle of its neighbours, and they nearer to each other, is the tracker's mistake [m].
-const JUMP: f64 = 0.04;
 /// An object that moves this much farther from one pose to the next than before or after was lost [m]: a hit makes it
 /// fast at once, but friction does not stop it at once.
 const STEP: f64 = 0.03;
+/// No table reaches so far [m].
+const FARTHEST: f64 = 20.0;
 /// Share of poses that may be mistakes.
 const MOST_MISTAKES: f64 = 0.1;
 /// Longest time without a pose while the object moves [s].
@@ -23,10 +24,8 @@ const TOPPLED: f64 = 0.35;
 const NOT_HIT: f64 = 5e-3;
 /// A tool that came no nearer while the object moved does not push it: the poses are in another frame [m].
 const ELSEWHERE: f64 = 0.03;
-/// Fewest poses a second that show a slide.
-const SLOWEST_TRACKER: f64 = 20.0;
-/// Turns by nearly half about an axis from one pose to the next are a box taken for itself turned over [rad].
-const FLIP: f64 = 2.6;
+/// A box leans no further where it stands [rad].
+const ASKEW: f64 = 0.2;
 
 /// A clip that was looked at.
 pub(crate) struct Screened {
@@ -45,82 +44,27 @@ pub(crate) fn screened(clip: Clip, cell: &Cell) -> Screened {
     let mut remarks: Vec<String> = clip.warnings.iter().chain(&clip.damage).cloned().collect();
     let (clip, mended) = mended(clip, cell);
     remarks.extend(mended);
-    let unusable = unusable(&clip);
+    let mut unusable = unusable(&clip, cell);
     let hits = unusable.is_none() && clip.kind == ClipKind::ControlHitSlide;
-    let elsewhere = if hits { apart(&clip, cell) } else { None };
-    if let Some(rate) = rate(&clip.object).filter(|rate| *rate < SLOWEST_TRACKER) {
-        remarks.push(format!(
-            "the object was tracked at {rate:.0} Hz: a slide shows in a few poses, and intervals are wide; track at 30 Hz \
-             or more"
-        ));
+    let mut elsewhere = if hits { apart(&clip, cell) } else { None };
+    // What was odd before may be why.
+    for why in [&mut unusable, &mut elsewhere].into_iter().flatten() {
+        remarks.iter().for_each(|remark| why.push_str(&format!(" ({remark})")));
     }
+    remarks.extend(oddities(&clip, cell));
     Screened { clip, remarks, unusable, elsewhere }
 }
 
-/// Poses that are the tracker's mistakes left out, a symmetric box turned back.
-fn mended(mut clip: Clip, cell: &Cell) -> (Clip, Vec<String>) {
-    let mut remarks = Vec::new();
-    let flips = turn_back(&mut clip.object, cell);
-    if flips > 0 {
-        remarks.push(format!(
-            "the tracker took the box for itself turned by half in {flips} poses; they were turned back to the first one's side"
-        ));
-    }
-    let all = clip.object.len();
-    let place = |row: usize| clip.object.poses[row].isometry().translation.vector;
-    let mistake = |row: usize| {
-        if row == 0 || row + 1 >= all {
-            return false;
-        }
-        let (before, after) = (place(row - 1), place(row + 1));
-        let off = (place(row) - (before + after) * 0.5).norm();
-        off > JUMP && (after - before).norm() < off
-    };
-    let good: Vec<usize> = (0..all).filter(|row| !mistake(*row)).collect();
-    if good.len() < all {
-        remarks.push(format!(
-            "{} of {all} poses jump away and back by more than {:.0} mm; they were left out",
-            all - good.len(),
-            JUMP * 1e3
-        ));
-        let ObjectSeries { stamps_ns, poses } = &clip.object;
-        clip.object = ObjectSeries {
-            stamps_ns: good.iter().map(|row| stamps_ns[*row]).collect(),
-            poses: good.iter().map(|row| poses[*row]).collect(),
-        };
-    }
-    (clip, remarks)
-}
-
-/// Turns poses of a box that flip by half against the pose before; how many.
-fn turn_back(series: &mut ObjectSeries, cell: &Cell) -> usize {
-    let is_box =
-        matches!(ObjectModel::new(cell, None), Ok(Some(model)) if matches!(model.shape, ObjectShape::Box { .. }));
-    let halves = [Vector3::x_axis(), Vector3::y_axis(), Vector3::z_axis()]
-        .map(|axis| UnitQuaternion::from_axis_angle(&axis, std::f64::consts::PI));
-    let mut flips = 0;
-    for row in 1..series.len() {
-        let before = series.poses[row - 1].isometry().rotation;
-        let pose = series.poses[row].isometry();
-        if is_box && before.angle_to(&pose.rotation) > FLIP {
-            let nearest = halves
-                .map(|half| pose.rotation * half)
-                .into_iter()
-                .min_by(|a, b| before.angle_to(a).total_cmp(&before.angle_to(b)))
-                .unwrap_or(pose.rotation);
-            series.poses[row] = Pose::from_isometry(Isometry3::from_parts(pose.translation, nearest));
-            flips += 1;
-        }
-    }
-    flips
-}
-
-fn unusable(clip: &Clip) -> Option<String> {
+fn unusable(clip: &Clip, cell: &Cell) -> Option<String> {
     let ObjectSeries { stamps_ns, poses } = &clip.object;
     if poses.len() < 10 {
         return Some(format!("it holds {} object poses; the tracker has to see the whole slide", poses.len()));
     }
     let place = |row: usize| poses[row].isometry().translation.vector;
+    let farthest = (0..poses.len()).map(|row| place(row).norm()).fold(0.0, f64::max);
+    if farthest > FARTHEST {
+        return Some(format!("its poses lie up to {farthest:.0} m from the arm's base: publish them in metres"));
+    }
     let seconds = |a: usize, b: usize| (stamps_ns[b] - stamps_ns[a]) as f64 * 1e-9;
     let step = |row: &usize| (place(*row) - place(row - 1)).norm();
     let speed = |row: usize| if (1..poses.len()).contains(&row) { step(&row) / seconds(row - 1, row) } else { 0.0 };
@@ -145,6 +89,14 @@ fn unusable(clip: &Clip) -> Option<String> {
     let far = (0..poses.len()).map(|row| (place(row) - place(0)).norm()).fold(0.0, f64::max);
     if far < NOT_HIT {
         return Some(format!("the object was not hit: it moved by {:.1} mm", far * 1e3));
+    }
+    let askew = askew(clip, cell).unwrap_or(0.0);
+    if askew > ASKEW {
+        return Some(format!(
+            "the object stands on none of its faces before it is hit, but leans by {:.0} degrees: its quaternions are stored in \
+             another order than x, y, z, w, or its poses are in another frame",
+            askew.to_degrees()
+        ));
     }
     let up = |row: usize| poses[row].isometry().rotation * poses[0].isometry().rotation.inverse() * Vector3::z();
     let lean = (0..poses.len()).map(|row| up(row).z.clamp(-1.0, 1.0).acos()).fold(0.0, f64::max);
@@ -171,46 +123,20 @@ fn apart(clip: &Clip, cell: &Cell) -> Option<String> {
     })
 }
 
-/// Usual number of poses a second.
-fn rate(series: &ObjectSeries) -> Option<f64> {
-    let mut steps: Vec<u64> = series.stamps_ns.windows(2).map(|w| w[1] - w[0]).collect();
-    steps.sort_unstable();
-    steps.get(steps.len() / 2).map(|step| 1e9 / *step as f64)
+/// How far a box is turned from the face it stands on before it is hit [rad].
+fn askew(clip: &Clip, cell: &Cell) -> Option<f64> {
+    let model = ObjectModel::new(cell, None).ok()??;
+    let rotation = clip.object.poses.first()?.isometry().rotation;
+    let upright = [Vector3::x(), Vector3::y(), Vector3::z()].map(|axis| (rotation * axis).z.abs()).into_iter();
+    let is_box = matches!(model.shape, ObjectShape::Box { .. });
+    is_box.then(|| upright.fold(0.0, f64::max).min(1.0).acos())
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::test_clip::{cell, clip};
     use super::*;
-    use shared_mem::frames::{Base, Object};
-    use shared_mem::recording::JointSeries;
-    use shared_mem::toml_file;
-    use std::path::Path;
-
-    fn cell() -> Cell {
-        let text = "[table]\nheight = 0.0\n[object]\nshape = \"box\"\nsize = [0.08, 0.06, 0.1]\n";
-        toml_file::parse(text, Path::new("cell.toml")).expect("a cell.toml")
-    }
-
-    /// A box that stands for half a second, slides 0.1 m and rests, seen at 60 Hz.
-    fn clip(change: impl Fn(usize, &mut Isometry3<f64>)) -> Clip {
-        let poses = (0..90).map(|row| {
-            let along = ((row as f64 - 30.0) / 20.0).clamp(0.0, 1.0);
-            let mut pose = Isometry3::translation(0.5 + 0.1 * along, 0.0, 0.05);
-            change(row, &mut pose);
-            Pose::<Base, Object>::from_isometry(pose)
-        });
-        let object = ObjectSeries { poses: poses.collect(), stamps_ns: (0..90).map(|row| row * 16_666_667).collect() };
-        Clip {
-            file: "clip.mcap".into(),
-            kind: ClipKind::ControlHitSlide,
-            joint_names: Vec::new(),
-            desired: JointSeries::default(),
-            measured: JointSeries::default(),
-            object,
-            warnings: Vec::new(),
-            damage: None,
-        }
-    }
+    use nalgebra::{Isometry3, UnitQuaternion};
 
     fn why(change: impl Fn(usize, &mut Isometry3<f64>)) -> Option<String> {
         screened(clip(change), &cell()).unusable
@@ -249,6 +175,31 @@ mod tests {
             pose.rotation = UnitQuaternion::from_scaled_axis(lean);
         });
         assert!(toppled.as_deref().is_some_and(|why| why.contains("toppled")), "{toppled:?}");
+    }
+
+    #[test]
+    fn poses_that_a_tracker_repeats_after_it_lost_the_object_are_left_out_and_told() {
+        let shaken = |row: usize| 1e-4 * (row as f64 * 0.7).sin();
+        let lost = |row: usize, pose: &mut Isometry3<f64>| {
+            pose.translation.vector.x = if row < 45 { pose.translation.vector.x + shaken(row) } else { 0.575 };
+        };
+        let Screened { clip, remarks, unusable, .. } = screened(clip(lost), &cell());
+        assert_eq!((clip.object.len(), unusable), (46, None));
+        assert!(remarks[0].contains("44 of 90 poses repeat"), "{remarks:?}");
+        assert!(remarks[1].contains("seen until"), "{remarks:?}");
+    }
+
+    #[test]
+    fn an_edge_to_stand_on_millimetres_and_what_the_reader_found_are_told_as_reasons() {
+        let leans = UnitQuaternion::from_euler_angles(0.5, 0.0, 0.3);
+        let askew = why(|_, pose| pose.rotation = leans).expect("a reason");
+        assert!(askew.contains("leans by 29 degrees") && askew.contains("x, y, z, w"), "{askew}");
+        let far = why(|_, pose| pose.translation.vector *= 1e3).expect("a reason");
+        assert!(far.contains("602 m") && far.contains("metres"), "{far}");
+        let mut clip = clip(|row, pose| pose.translation.vector.y += if row > 60 { 0.3 } else { 0.0 });
+        clip.warnings.push("said by the reader".into());
+        let why = screened(clip, &cell()).unusable.expect("a reason");
+        assert!(why.contains("jumps by") && why.ends_with("(said by the reader)"), "{why}");
     }
 
     #[test]

@@ -1,0 +1,63 @@
+//! What speaks against trusting a fit although it looks sure of itself, one sentence each with the remedy.
+
+use crate::forward::object::noise_of;
+use crate::identify::answer::{ClipGap, Identification};
+use shared_mem::cell::Cell;
+
+/// ADD on the clips fitted, over the tracker's noise, from which on it is neither noise nor chance in the hits.
+const NOT_NOISE: f64 = 7.0;
+/// A clip is none of the others' kind when its ADD is this many times the middle clip's.
+const ODD: f64 = 4.0;
+
+/// Doubts about a fit whose figures stand in `answer`.
+pub(super) fn doubts(answer: &Identification, cell: &Cell) -> Vec<String> {
+    let noise = noise_of(cell).position;
+    let mut doubts = Vec::new();
+    if let Some(add) = answer.gap.train.object_add_m.filter(|add| *add > NOT_NOISE * noise) {
+        doubts.push(format!(
+            "on the very clips that were fitted the object is {:.1} mm off, {:.0} times the tracker's noise: something else \
+             acts, or its poses are not where the arm's frame puts them; `calibration diagnose` says what",
+            add * 1e3,
+            add / noise
+        ));
+    }
+    let add = |clip: &ClipGap| clip.after.object_add_m.unwrap_or_default();
+    let mut all: Vec<f64> = answer.by_clip.iter().map(add).collect();
+    all.sort_unstable_by(f64::total_cmp);
+    let middle = all.get(all.len() / 2).copied().unwrap_or_default();
+    for clip in answer.by_clip.iter().filter(|clip| add(clip) > (ODD * middle).max(NOT_NOISE * noise)) {
+        doubts.push(format!(
+            "{}: the object is {:.1} mm off where it is {:.1} mm in the middle clip: look whether it was hit on an edge, \
+             pushed by something else or lost, and leave the clip out if so",
+            clip.file,
+            add(clip) * 1e3,
+            middle * 1e3
+        ));
+    }
+    doubts
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::identify::answer::Figures;
+
+    fn told(fitted: [f64; 5]) -> Vec<String> {
+        let figures = |add: f64| Figures { object_add_m: Some(add), ..Figures::default() };
+        let clip =
+            |(i, add): (usize, &f64)| ClipGap { file: format!("{i}"), after: figures(*add), ..ClipGap::default() };
+        let mut answer =
+            Identification { by_clip: fitted.iter().enumerate().map(clip).collect(), ..Default::default() };
+        answer.gap.train = figures(fitted.iter().sum::<f64>() / 5.0);
+        doubts(&answer, &Cell::default())
+    }
+
+    #[test]
+    fn errors_that_are_no_noise_and_a_clip_unlike_the_others_are_told() {
+        assert_eq!(told([0.002, 0.003, 0.003, 0.004, 0.002]), [""; 0]);
+        let all = told([0.02, 0.03, 0.03, 0.04, 0.02]);
+        assert!(all.len() == 1 && all[0].contains("28.0 mm off") && all[0].contains("diagnose"), "{all:?}");
+        let one = told([0.002, 0.003, 0.002, 0.018, 0.002]);
+        assert!(one.len() == 1 && one[0].starts_with("3: the object is 18.0 mm off"), "{one:?}");
+    }
+}
