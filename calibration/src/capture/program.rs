@@ -44,7 +44,7 @@ pub struct Wish {
     pub speed: f64,
     /// How far the line passes to the left of the centre, -1 to 1.
     pub aside: f64,
-    /// Height of the tool's end, 0 to 1 of [`HEIGHTS`].
+    /// Height of the tool's end, from the lowest that is tried (0) to the highest (1).
     pub height: f64,
 }
 
