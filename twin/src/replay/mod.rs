@@ -7,16 +7,19 @@
 //! |---|---|
 //! | `predict` | [`Replayer`]: one clip in the twin |
 //! | `object_start` | where the object was and how it moved when the clip began |
+//! | `on_table` | whether the table could carry it there |
 //! | `report` | the gaps of a session, as JSON and as a table |
 //! | `session` | all clips of a session, on all cores |
 //! | `write` | a simulated clip on disk |
 
 pub mod object_start;
+mod on_table;
 mod predict;
 mod report;
 mod session;
 mod write;
 
+pub use on_table::Buried;
 pub use predict::{Prediction, ReplayError, Replayer, in_model_order};
 pub use report::{ClipGap, Gap, SessionGap};
 pub use session::{Options, replay};

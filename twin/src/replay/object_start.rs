@@ -1,9 +1,10 @@
 //! Where the object was and how it moved when a clip began, from noisy poses. Base frame, SI.
 
+use super::on_table::{Buried, Depth};
 use crate::rollout::ObjectState;
-use crate::scene::{ObjectModel, ObjectShape};
+use crate::scene::ObjectModel;
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3};
-use shared_mem::cell::Cell;
+use shared_mem::cell::{Cell, ClipKind};
 use shared_mem::frames::{Base, Object, Pose};
 use shared_mem::recording::ObjectSeries;
 
@@ -24,14 +25,40 @@ const CLEARANCE: f64 = 3e-3;
 
 /// Mean of the poses before the object first moves, set down flat on the table. `None` without poses.
 pub fn resting(series: &ObjectSeries, object: &ObjectModel, cell: &Cell) -> Option<Pose<Base, Object>> {
+    let mut pose = upright(series, cell)?;
+    if let Some(table) = cell.table {
+        pose.translation.z += Depth::of(&object.shape, &pose, &table).lowest;
+    }
+    Some(Pose::from_isometry(pose))
+}
+
+/// What there is to tell about where the poses of a clip put the object at its start; nothing without poses or a table.
+///
+/// # Errors
+/// [`Buried`] when it cannot have been there.
+pub fn remark(
+    series: &ObjectSeries,
+    kind: ClipKind,
+    object: &ObjectModel,
+    cell: &Cell,
+) -> Result<Option<String>, Buried> {
+    let first = match kind {
+        ClipKind::FreeMotion => series.poses.first().map(Pose::isometry),
+        ClipKind::ControlHitSlide | ClipKind::Excitation => upright(series, cell),
+    };
+    let Some((pose, table)) = first.zip(cell.table) else { return Ok(None) };
+    let depth = Depth::of(&object.shape, &pose, &table);
+    // What somebody lets go may begin anywhere above.
+    let stands = kind != ClipKind::FreeMotion || depth.is_inside();
+    if stands { depth.set_onto() } else { Ok(None) }
+}
+
+/// Mean of the poses before the object first moves, upright where there is a table.
+fn upright(series: &ObjectSeries, cell: &Cell) -> Option<Isometry3<f64>> {
     let noise = cell.object.as_ref().and_then(|o| o.pose_noise).map_or(POSITION_NOISE, |n| n.position);
-    let poses = &series.poses[..still(series, noise)];
-    let mean = mean_pose(poses)?;
-    let Some(table) = cell.table else { return Some(Pose::from_isometry(mean)) };
-    let upright = set_upright(&mean.rotation);
-    let mut place = mean.translation.vector;
-    place.z += table.height - lowest(&object.shape, &Isometry3::from_parts(mean.translation, upright));
-    Some(Pose::from_isometry(Isometry3::from_parts(place.into(), upright)))
+    let mean = mean_pose(&series.poses[..still(series, noise)])?;
+    let rotation = if cell.table.is_some() { set_upright(&mean.rotation) } else { mean.rotation };
+    Some(Isometry3::from_parts(mean.translation, rotation))
 }
 
 /// Number of poses, at least one, until the object first leaves the mean of those before.
@@ -71,16 +98,11 @@ fn set_upright(rotation: &UnitQuaternion<f64>) -> UnitQuaternion<f64> {
     }
 }
 
-/// Height of the object's lowest point [m].
-fn lowest(shape: &ObjectShape, pose: &Isometry3<f64>) -> f64 {
-    shape.triangles().0.iter().map(|corner| (pose * corner).z).fold(f64::INFINITY, f64::min)
-}
-
 /// Pose and velocities at the first pose, by straight lines through the first poses, free fall taken out while the
-/// object flies. `None` with fewer than three poses.
+/// object flies; one that begins inside the table begins on it. `None` with fewer than three poses.
 pub fn moving(series: &ObjectSeries, object: &ObjectModel, cell: &Cell) -> Option<ObjectState> {
-    let table = cell.table.map_or(f64::NEG_INFINITY, |t| t.height);
-    let clear = |pose: &Pose<Base, Object>| lowest(&object.shape, &pose.isometry()) > table + CLEARANCE;
+    let depth = |pose: &Isometry3<f64>| cell.table.map(|table| Depth::of(&object.shape, pose, &table));
+    let clear = |pose: &Pose<Base, Object>| depth(&pose.isometry()).is_none_or(|depth| depth.lowest < -CLEARANCE);
     let flying = series.poses.iter().take_while(|pose| clear(pose)).count();
     let (poses, fall) = if flying >= 3 { (flying.min(FLIGHT_POSES), GRAVITY) } else { (FLIGHT_POSES, 0.0) };
     let poses = &series.poses[..poses.min(series.len())];
@@ -95,8 +117,11 @@ pub fn moving(series: &ObjectSeries, object: &ObjectModel, cell: &Cell) -> Optio
     let (place, velocity) = line(&places.collect::<Vec<_>>());
     let (turn, angular_velocity) = line(&turns.collect::<Vec<_>>());
     let rotation = UnitQuaternion::from_scaled_axis(turn) * middle;
-    let pose = Pose::from_isometry(Isometry3::from_parts(Translation3::from(place), rotation));
-    Some(ObjectState { pose, velocity, angular_velocity })
+    let mut pose = Isometry3::from_parts(Translation3::from(place), rotation);
+    if let Some(depth) = depth(&pose).filter(Depth::is_inside) {
+        pose.translation.z += depth.lowest;
+    }
+    Some(ObjectState { pose: Pose::from_isometry(pose), velocity, angular_velocity })
 }
 
 /// Value at time 0 and slope of the straight line through points over time.
@@ -112,6 +137,7 @@ fn line(points: &[(f64, Vector3<f64>)]) -> (Vector3<f64>, Vector3<f64>) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scene::ObjectShape;
     use shared_mem::cell::Table;
 
     fn box_on_table() -> (ObjectModel, Cell) {
@@ -162,6 +188,24 @@ mod tests {
         assert!((motion.angular_velocity - spin).norm() < 1e-9, "{}", motion.angular_velocity);
         assert!(motion.pose.isometry().rotation.angle_to(&first) < 1e-9);
         assert!((motion.pose.position()[2] - 0.4).abs() < 1e-9);
+    }
+
+    #[test]
+    fn an_object_inside_the_table_begins_on_it_and_that_is_said() {
+        let (object, cell) = box_on_table();
+        let sunk = series((0..20).map(|_| Isometry3::translation(0.5, 0.0, 0.13)));
+        for kind in [ClipKind::ControlHitSlide, ClipKind::FreeMotion] {
+            let told = remark(&sunk, kind, &object, &cell).expect("not buried").expect("a remark");
+            assert!(told.contains("20 mm into the table"), "{told}");
+        }
+        let starts = [resting(&sunk, &object, &cell), moving(&sunk, &object, &cell).map(|state| state.pose)];
+        for start in starts.map(|start| start.expect("poses")) {
+            assert!((start.position()[2] - 0.15).abs() < 1e-9, "{start:?}");
+        }
+        let dropped = series((0..20).map(|_| Isometry3::translation(0.5, 0.0, 0.4)));
+        assert_eq!(remark(&dropped, ClipKind::FreeMotion, &object, &cell), Ok(None));
+        let buried = series((0..20).map(|_| Isometry3::translation(0.5, 0.0, 0.05)));
+        assert!(remark(&buried, ClipKind::ControlHitSlide, &object, &cell).is_err());
     }
 
     #[test]

@@ -1,6 +1,7 @@
 //! One clip in the twin: the arm alone, the arm hitting the object, or the object alone.
 
 use super::object_start;
+use super::on_table::Buried;
 use super::report::{ClipGap, Gap};
 use crate::arm::{ArmModel, JointState};
 use crate::effects::CameraEffects;
@@ -58,6 +59,9 @@ pub enum ReplayError {
     /// Too little was recorded.
     #[error("{0}: too short to replay: it holds {1}; record it again or remove it from cell.toml")]
     TooShort(String, &'static str),
+    /// The object cannot be where the poses say.
+    #[error("{0}: {1}")]
+    Buried(String, Buried),
     /// The simulation left all bounds.
     #[error(
         "{0}: the simulated arm diverges; the damping may be too large for a 1 kHz controller or the inertia too small: check `damping` and `rotor_inertia`"
@@ -107,7 +111,8 @@ impl Replayer {
             Some(arm) => in_model_order(clip, arm)?,
             None => clip,
         };
-        let prediction = self.predict(&clip)?;
+        let mut prediction = self.predict(&clip)?;
+        prediction.warnings.extend(self.placement(&clip)?);
         let gap = self.gap(&clip, &prediction);
         let finite = gap.joint_rms_rad.iter().flatten().chain(&gap.object_add_m).all(|v| v.is_finite());
         if !finite {
@@ -130,6 +135,15 @@ impl Replayer {
             }
             ClipKind::FreeMotion => self.object_alone(clip),
         }
+    }
+
+    /// What there is to tell about where the poses put the object at the clip's start.
+    fn placement(&self, clip: &Clip) -> Result<Option<String>, ReplayError> {
+        let Some((object, _)) = self.object.as_ref().filter(|_| clip.kind != ClipKind::Excitation) else {
+            return Ok(None);
+        };
+        object_start::remark(&self.undistorted(&clip.object), clip.kind, object, &self.cell)
+            .map_err(|buried| ReplayError::Buried(name(clip), buried))
     }
 
     fn with_arm(&self, clip: &Clip, object: Option<&ObjectState>) -> Result<Prediction, ReplayError> {
