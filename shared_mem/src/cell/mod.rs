@@ -148,6 +148,9 @@ impl Cell {
         if let Some(tool) = &self.tool {
             tool.check()?;
         }
+        if let Some(table) = &self.table {
+            table.check()?;
+        }
         if let Some(object) = &self.object {
             object.check()?;
         }
@@ -198,6 +201,12 @@ mod tests {
         let error = parse("[robot]\nmodel = \"fr3\"\n[controller]\nkind = \"joint_impedance\"\nstiffness = [600.0]\n")
             .unwrap_err();
         assert!(error.contains("7"), "{error}");
+    }
+
+    #[test]
+    fn a_table_at_no_height_is_refused() {
+        let error = parse("[table]\nheight = nan\n").unwrap_err();
+        assert!(error.contains("table.height"), "{error}");
     }
 
     #[test]

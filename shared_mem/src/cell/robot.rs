@@ -42,6 +42,12 @@ pub struct Table {
     pub height: f64,
 }
 
+impl Table {
+    pub(super) fn check(&self) -> Result<(), String> {
+        within("table.height", &[self.height], -10.0, 10.0)
+    }
+}
+
 /// Where a ROS 2 bag keeps what is needed.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]

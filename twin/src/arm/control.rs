@@ -20,7 +20,7 @@ pub struct ControlLaw {
 }
 
 /// The gains do not fit the arm.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum GainError {
     /// Nothing is known about the controller.
     #[error("cell.toml has no [controller] block; add one with `kind` and `stiffness`, `damping` or their ranges")]
@@ -30,6 +30,14 @@ pub enum GainError {
         "cell.toml gives no `controller.{0}`; add it, or `{0}_range = [low, high]`, or pass --parameters theta.toml"
     )]
     Unknown(&'static str),
+    /// No controller has such a gain.
+    #[error("{key} cannot hold {value}; give 0 or a positive number for each joint")]
+    Value {
+        /// The key.
+        key: &'static str,
+        /// The gain.
+        value: f64,
+    },
     /// A vector does not fit the arm.
     #[error("{key} holds {given} numbers; this arm has {dof} joints: give one for each")]
     Length {
@@ -96,7 +104,13 @@ impl ControlLaw {
 }
 
 fn exactly(key: &'static str, values: &[f64], dof: usize) -> Result<Joints, GainError> {
-    if values.len() == dof { Ok(joints_from(values)) } else { Err(GainError::Length { key, given: values.len(), dof }) }
+    if values.len() != dof {
+        return Err(GainError::Length { key, given: values.len(), dof });
+    }
+    match values.iter().find(|gain| !(gain.is_finite() && **gain >= 0.0)) {
+        Some(value) => Err(GainError::Value { key, value: *value }),
+        None => Ok(joints_from(values)),
+    }
 }
 
 fn nominal(controller: &Controller, arm: &ArmModel) -> Result<(Joints, Joints), GainError> {
@@ -123,4 +137,25 @@ fn nominal(controller: &Controller, arm: &ArmModel) -> Result<(Joints, Joints), 
 /// The middle on a ratio scale; half the upper end where the range starts at 0.
 fn geometric_middle([lo, hi]: Range) -> f64 {
     if lo > 0.0 { (lo * hi).sqrt() } else { 0.5 * hi }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_gain_that_no_controller_has_is_refused_in_one_line() {
+        let arm = ArmModel::fr3();
+        let gains = |first: f64| {
+            let mut stiffness = vec![100.0; 7];
+            stiffness[0] = first;
+            let theta = ArmTheta { stiffness, damping: vec![10.0; 7] };
+            ControlLaw::new(Some(&Controller::default()), Some(&theta), &arm)
+        };
+        assert!(gains(0.0).is_ok());
+        for (first, told) in [(-100.0, "-100"), (f64::NAN, "NaN"), (f64::INFINITY, "inf")] {
+            let error = gains(first).expect_err(told).to_string();
+            assert!(error.contains(told) && error.contains("give 0 or") && !error.contains('\n'), "{error}");
+        }
+    }
 }

@@ -146,8 +146,21 @@ fn stl(bytes: &[u8]) -> Result<Surface, String> {
             }
         }
     }
-    let count = u32::try_from(corners.len() / 3).map_err(|_| "it is too large")?;
-    Ok((corners, (0..count).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect()))
+    u32::try_from(corners.len()).map_err(|_| "it is too large")?;
+    Ok(welded(&corners))
+}
+
+/// Triangles whose corners are listed one after the other, each place once: an stl repeats it for every face around it.
+fn welded(corners: &[Point3<f64>]) -> Surface {
+    let (mut points, mut known) = (Vec::new(), HashMap::new());
+    let mut index = |corner: &Point3<f64>| {
+        *known.entry([corner.x.to_bits(), corner.y.to_bits(), corner.z.to_bits()]).or_insert_with(|| {
+            points.push(*corner);
+            points.len() as u32 - 1
+        })
+    };
+    let triangles = corners.chunks_exact(3).map(|t| [index(&t[0]), index(&t[1]), index(&t[2])]).collect();
+    (points, triangles)
 }
 
 /// One property of a ply element: how many bytes a value takes (text ignores it) and, for lists, a count before it.
@@ -337,7 +350,8 @@ mod tests {
         for (name, bytes) in files {
             let shape = read_as(name, &bytes).unwrap_or_else(|e| panic!("{name}: {e}"));
             assert_eq!(shape.half_extents(), Vector3::new(0.5, 0.5, 1.0), "{name}");
-            assert_eq!(shape.triangles().1.len(), 4, "{name}");
+            let (points, triangles) = shape.triangles();
+            assert_eq!((points.len(), triangles.len()), (4, 4), "{name}");
         }
     }
 
