@@ -1,7 +1,8 @@
 //! Whole clips a second: `cargo run --release -p twin --example throughput -- SESSION [theta.toml]`.
 //!
 //! Every Control-Hit-Slide clip of a session is rolled out again and again, from its first row to its last, with all
-//! joint rows and object poses answered, on one core and on all of them.
+//! joint rows and object poses answered, on one core and on all of them. Then the part alone from just before the hit
+//! until the object rests.
 
 use shared_mem::cell::ClipKind;
 use shared_mem::recording::{Clip, Session};
@@ -10,7 +11,7 @@ use std::path::PathBuf;
 use std::time::Instant;
 use twin::arm::JointState;
 use twin::replay::object_start;
-use twin::rollout::{CellRollout, CellTrace, CommandTrack, Course, ObjectState, Workers};
+use twin::rollout::{CellRollout, CellTrace, Checkpoint, CommandTrack, Course, ObjectState, Workers};
 use twin::scene::ObjectModel;
 
 /// A clip with everything a rollout of it starts from.
@@ -32,12 +33,29 @@ impl Prepared {
     }
 
     fn run(&self, worker: &mut CellRollout, trace: &mut CellTrace) {
-        let stamps = &self.clip.measured.stamps_ns;
-        let course =
-            Course { commands: Some(&self.commands), joints_ns: stamps, poses_ns: &self.clip.object.stamps_ns };
-        worker.start(stamps[0], Some(&self.arm), Some(&self.object), Some(&self.commands));
+        worker.start(self.clip.measured.stamps_ns[0], Some(&self.arm), Some(&self.object), Some(&self.commands));
         trace.clear();
-        worker.run(&course, trace);
+        worker.run(&self.course(), trace);
+    }
+
+    /// The worker just before the hit, when that is, and when the object rests that the tool has left [ns]; `None` where
+    /// nothing is hit.
+    fn hit(&self, worker: &mut CellRollout, trace: &mut CellTrace) -> Option<(Checkpoint, u64, u64)> {
+        worker.start(self.clip.measured.stamps_ns[0], Some(&self.arm), Some(&self.object), Some(&self.commands));
+        trace.clear();
+        let start_ns = worker.run_until_contact(&self.course(), trace)?;
+        let before = worker.checkpoint();
+        let end_ns = self.clip.object.stamps_ns.last()?;
+        let left = |worker: &CellRollout| worker.contact().is_some_and(|c| c.end_ns < worker.now_ns());
+        while worker.now_ns() < *end_ns && !(left(worker) && worker.cell().object_rests()) {
+            worker.tick(Some(&self.commands));
+        }
+        Some((before, start_ns, worker.now_ns()))
+    }
+
+    fn course(&self) -> Course<'_> {
+        let joints_ns = &self.clip.measured.stamps_ns;
+        Course { commands: Some(&self.commands), joints_ns, poses_ns: &self.clip.object.stamps_ns }
     }
 
     fn seconds(&self) -> f64 {
@@ -78,5 +96,30 @@ fn main() -> anyhow::Result<()> {
             single / time
         );
     }
+    from_hit_to_rest(&clips, worker);
     Ok(())
+}
+
+/// Microseconds per simulated millisecond of hit and slide alone, one thread.
+fn from_hit_to_rest(clips: &[Prepared], mut worker: CellRollout) {
+    let mut trace = CellTrace::default();
+    let hits: Vec<_> = clips.iter().filter_map(|clip| Some((clip, clip.hit(&mut worker, &mut trace)?))).collect();
+    let simulated: f64 = hits.iter().map(|(_, (_, start_ns, end_ns))| (end_ns - start_ns) as f64 * 1e-6).sum();
+    let time = (0..20)
+        .map(|_| {
+            let start = Instant::now();
+            for (clip, (before, _, end_ns)) in &hits {
+                worker.resume(before);
+                while worker.now_ns() < *end_ns {
+                    worker.tick(Some(&clip.commands));
+                }
+            }
+            start.elapsed().as_secs_f64()
+        })
+        .fold(f64::INFINITY, f64::min);
+    eprintln!(
+        "hit to rest: {:.0} ms of each clip, {:5.2} us per simulated ms",
+        simulated / hits.len() as f64,
+        time * 1e6 / simulated
+    );
 }
