@@ -158,7 +158,8 @@ fn identify_material(
     }
     session::hold_dead(&model, &clips, settings.settings(), &mut unknowns);
     let random = model.random();
-    let outcome = search(options, &model, &clips, (&unknowns, &random), interrupt)?;
+    let mut outcome = search(options, &model, &clips, (&unknowns, &random), interrupt)?;
+    saturation::forget_unreached(&model, settings.settings(), &mut outcome.fit);
     let finding = Finding::new(&settings, &unknowns, &outcome);
     let mut answer = finding.answer(&before);
     answer.session = options.session.display().to_string();

@@ -4,7 +4,7 @@
 use super::Model;
 use super::session::joint_of;
 use super::start::costs;
-use crate::estimate::{Options, Subset, Unknown, fit};
+use crate::estimate::{ClipModel, Fit, Options, Subset, Unknown, fit};
 use crate::forward::Setting;
 use crate::interrupt::Interrupt;
 use rayon::prelude::*;
@@ -49,6 +49,21 @@ pub(super) fn improve(
         let without = cost(numbers[k]);
         if let Some((inverse, _)) = best.filter(|(_, with)| *with < BETTER * without) {
             unknowns[k].start = inverse;
+        }
+    }
+}
+
+/// Takes away limits without which the twin is as good where the search ended: they say nothing there, and elsewhere they
+/// would clip.
+pub(super) fn forget_unreached(model: &Model<'_>, settings: &[Setting], fit: &mut Fit) {
+    let clips: Vec<usize> = (0..model.clips().min(CLIPS)).collect();
+    for (k, setting) in settings.iter().enumerate() {
+        let Some(joint) = limited(setting).filter(|_| fit.shared[k] > 0.0) else { continue };
+        let mut without = fit.shared.clone();
+        without[k] = 0.0;
+        let [with, none] = [&fit.shared, &without].map(|numbers| costs(model, &clips, numbers)[joint]);
+        if with >= BETTER * none {
+            fit.shared = without;
         }
     }
 }
