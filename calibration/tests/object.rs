@@ -88,7 +88,7 @@ fn recorded(name: &str, parameters: Option<PathBuf>) -> Identification {
 }
 
 #[test]
-#[ignore = "needs TWINALIGN_DATA=<folder of recorded sessions>"]
+#[ignore = "needs recorded sessions: TWINALIGN_DATA=FOLDER cargo test --release -p calibration --test object -- --ignored --nocapture"]
 fn strokes_of_another_engine_tell_friction_mass_and_centre_of_mass() {
     let found = recorded("none_slide", None);
     let value = |name: &str| found.parameters[name].value.clone();

@@ -2,7 +2,6 @@
 //! into the session, and step back.
 
 use super::body::Body;
-use super::bridge::{Bridge, Wanted};
 use super::limits::{self, JointLimits};
 use super::link::Link;
 use super::object_watch::{ObjectWatch, PoseQuality};
@@ -12,6 +11,7 @@ use super::quality::{Quality, Verdict, Watch};
 use super::recorder::Recorder;
 use super::session::Session;
 use super::stream::{Motion, Outcome, play};
+use super::task::{Summary, Task};
 use super::way::Ways;
 use crate::interrupt::Interrupt;
 use crate::progress::Progress;
@@ -39,33 +39,10 @@ const POSES_LOST: f64 = 0.1;
 /// What is asked for.
 #[derive(Debug, Clone)]
 pub struct Options {
-    /// The laboratory's cell.toml.
-    pub cell: PathBuf,
-    /// Clips to add.
-    pub clips: u32,
-    /// Session folder.
-    pub out: PathBuf,
-    /// Arm of a bridge that has to be started, as `rt_bridge run --arm` takes it.
-    pub arm: Option<String>,
-    /// Whether that bridge insists on real time; default: the bridge's own.
-    pub realtime: Option<String>,
+    /// What every capture is asked for.
+    pub task: Task,
     /// Where to draw the next stroke; the arm then moves nowhere.
     pub preview: Option<PathBuf>,
-    /// Shared-memory domain; default: the one this process was started in.
-    pub domain: Option<String>,
-}
-
-/// What was done.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Summary {
-    /// Session folder.
-    pub session: PathBuf,
-    /// Clips of this run, in order.
-    pub clips: Vec<ClipSummary>,
-    /// Whether the user ended it early.
-    pub interrupted: bool,
-    /// Whether the bridge was started, and ended, by this run.
-    pub own_bridge: bool,
 }
 
 /// One clip.
@@ -99,17 +76,16 @@ pub struct ClipSummary {
 ///
 /// # Errors
 /// One line with what happened and what to do; clips that were complete before are in the session.
-pub fn capture(options: &Options, interrupt: &Interrupt) -> anyhow::Result<Summary> {
-    let cell = Cell::read(&options.cell)?;
+pub fn capture(options: &Options, interrupt: &Interrupt) -> anyhow::Result<Summary<ClipSummary>> {
+    let task = &options.task;
+    let cell = Cell::read(&task.cell)?;
     let body = Body::of(&cell)?;
     let size = size_of(&cell)?;
-    let domain = options.domain.as_deref();
-    let session = Session::open(&options.out, &cell)?;
+    let domain = task.domain.as_deref();
+    let session = Session::open(&task.out, &cell)?;
     let mut link = Link::open(domain)?;
     let mut object = ObjectWatch::open(domain)?;
-    let wanted =
-        Wanted { cell: &options.cell, arm: options.arm.as_deref(), realtime: options.realtime.as_deref(), domain };
-    let mut bridge = Bridge::find_or_start(&mut link, &wanted, interrupt)?;
+    let mut bridge = task.bridge(&mut link, interrupt)?;
     let limits = limits::of(&cell, &body);
     let mut desk = Desk { options, cell: &cell, size, body: &body, limits: &limits, session, interrupt };
     let clips = match desk.clips(&mut link, &mut object) {
@@ -148,7 +124,7 @@ struct Desk<'a> {
 impl Desk<'_> {
     fn clips(&mut self, link: &mut Link, object: &mut ObjectWatch) -> anyhow::Result<Vec<ClipSummary>> {
         let mut clips: Vec<ClipSummary> = Vec::new();
-        let wanted = self.options.clips as usize;
+        let wanted = self.options.task.clips as usize;
         let tries = wanted + (AGAIN * wanted as f64).ceil() as usize;
         while clips.len() < tries && !self.interrupt.asked() {
             let kept = clips.iter().filter(|clip| clip.kept).count();
@@ -173,13 +149,7 @@ impl Desk<'_> {
     fn next(&self, link: &mut Link, object: &mut ObjectWatch) -> anyhow::Result<Option<Next>> {
         let program = Program::of(self.cell, self.size, self.body, self.limits);
         let (number, _) = self.session.next_clip()?;
-        let state = link.ready_state()?;
-        anyhow::ensure!(
-            state.dof as usize == self.limits.len(),
-            "the bridge moves {} joints, cell.toml describes {}; start the bridge with the same --cell",
-            state.dof,
-            self.limits.len()
-        );
+        link.ready_arm(self.limits.len())?;
         let asked = std::time::Instant::now();
         let mut told = false;
         loop {
@@ -213,7 +183,8 @@ impl Desk<'_> {
         let Some(_) = object.standing(COMES_TO_REST, self.interrupt)? else { return Ok(None) };
         let (_, file) = self.session.next_clip()?;
         let path = self.session.folder().join(&file);
-        let recorder = Recorder::start(&path, &self.options.cell, self.options.domain.as_deref(), self.interrupt)?;
+        let task = &self.options.task;
+        let recorder = Recorder::start(&path, &task.cell, task.domain.as_deref(), self.interrupt)?;
         object.begin();
         let (outcome, quality) = self.play(link, object, points, &format!("{title}: stroke")).inspect_err(|_| {
             eprintln!("{}: the stroke failed; the file stays as far as it goes, but is not entered", path.display());

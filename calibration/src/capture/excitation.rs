@@ -1,7 +1,6 @@
 //! The verb `capture excitation`: for each clip plan, record, play, judge, enter into the session.
 
 use super::body::Body;
-use super::bridge::{Bridge, Wanted};
 use super::limits::{self, JointLimits};
 use super::link::Link;
 use super::plan::{Plan, RATE, Request, plan};
@@ -9,6 +8,7 @@ use super::quality::{Quality, Verdict, Watch};
 use super::recorder::{Recorded, Recorder};
 use super::session::Session;
 use super::stream::{Outcome, play};
+use super::task::{Summary, Task};
 use crate::interrupt::Interrupt;
 use crate::progress::Progress;
 use serde::Serialize;
@@ -21,37 +21,14 @@ const CLEARANCE: f64 = 0.05;
 /// What is asked for.
 #[derive(Debug, Clone)]
 pub struct Options {
-    /// The laboratory's cell.toml.
-    pub cell: PathBuf,
-    /// Clips to add.
-    pub clips: u32,
-    /// Session folder.
-    pub out: PathBuf,
-    /// Arm of a bridge that has to be started, as `rt_bridge run --arm` takes it.
-    pub arm: Option<String>,
-    /// Whether that bridge insists on real time, as `rt_bridge run --realtime` takes it; default: the bridge's own.
-    pub realtime: Option<String>,
+    /// What every capture is asked for.
+    pub task: Task,
     /// Length of a clip's motion [s].
     pub duration: f64,
     /// Largest excursion of each joint [rad].
     pub amplitude: f64,
     /// Seed of the first clip; the others count on from it by their number in the session.
     pub seed: u64,
-    /// Shared-memory domain; default: the one this process was started in.
-    pub domain: Option<String>,
-}
-
-/// What was done.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Summary {
-    /// Session folder.
-    pub session: PathBuf,
-    /// Clips of this run, in order.
-    pub clips: Vec<ClipSummary>,
-    /// Whether the user ended it early.
-    pub interrupted: bool,
-    /// Whether the bridge was started, and ended, by this run.
-    pub own_bridge: bool,
 }
 
 /// One clip.
@@ -78,22 +55,24 @@ pub struct ClipSummary {
 ///
 /// # Errors
 /// One line with what happened and what to do; clips that were complete before are in the session.
-pub fn capture(options: &Options, interrupt: &Interrupt, note: &mut dyn FnMut() -> String) -> anyhow::Result<Summary> {
-    let cell = Cell::read(&options.cell)?;
+pub fn capture(
+    options: &Options,
+    interrupt: &Interrupt,
+    note: &mut dyn FnMut() -> String,
+) -> anyhow::Result<Summary<ClipSummary>> {
+    let task = &options.task;
+    let cell = Cell::read(&task.cell)?;
     let body = Body::of(&cell)?;
-    let session = Session::open(&options.out, &cell)?;
-    let domain = options.domain.as_deref();
-    let mut link = Link::open(domain)?;
-    let wanted =
-        Wanted { cell: &options.cell, arm: options.arm.as_deref(), realtime: options.realtime.as_deref(), domain };
-    let mut bridge = Bridge::find_or_start(&mut link, &wanted, interrupt)?;
+    let session = Session::open(&task.out, &cell)?;
+    let mut link = Link::open(task.domain.as_deref())?;
+    let mut bridge = task.bridge(&mut link, interrupt)?;
     let mut desk = Desk { options, limits: limits::of(&cell, &body), body, floor: floor(&cell), session, interrupt };
     let mut clips = Vec::new();
-    for count in 1..=options.clips {
+    for count in 1..=task.clips {
         if interrupt.asked() {
             break;
         }
-        let clip = match desk.clip(&mut link, &format!("clip {count} of {}", options.clips), note) {
+        let clip = match desk.clip(&mut link, &format!("clip {count} of {}", task.clips), note) {
             Ok(clip) => clip,
             // A bridge that died says more than the silence it leaves.
             Err(error) => return Err(bridge.check().err().map_or(error, anyhow::Error::from)),
@@ -134,8 +113,8 @@ impl Desk<'_> {
         let (number, file) = self.session.next_clip()?;
         let plan = self.plan(link, number)?;
         let path = self.session.folder().join(&file);
-        let domain = self.options.domain.as_deref();
-        let recorder = Recorder::start(&path, &self.options.cell, domain, self.interrupt)?;
+        let task = &self.options.task;
+        let recorder = Recorder::start(&path, &task.cell, task.domain.as_deref(), self.interrupt)?;
         if self.interrupt.asked() {
             recorder.finish()?;
             return Ok(None);
@@ -159,13 +138,7 @@ impl Desk<'_> {
 
     /// Plans around the pose that the arm is commanded to hold, and says what had to give.
     fn plan(&self, link: &mut Link, number: usize) -> anyhow::Result<Plan> {
-        let state = link.ready_state()?;
-        anyhow::ensure!(
-            state.dof as usize == self.limits.len(),
-            "the bridge moves {} joints, cell.toml describes {}; start the bridge with the same --cell",
-            state.dof,
-            self.limits.len()
-        );
+        let state = link.ready_arm(self.limits.len())?;
         let Options { amplitude, duration, seed, .. } = *self.options;
         let seed = seed.wrapping_add(number as u64);
         let request = Request { start: state.q_d, amplitude, duration, seed, floor: self.floor };

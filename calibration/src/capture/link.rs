@@ -30,6 +30,14 @@ pub enum LinkError {
     /// The bridge is another one than before.
     #[error("the bridge was started anew while a motion was being played; repeat the clip")]
     Restarted,
+    /// It moves another arm.
+    #[error("the bridge moves {moves} joints, cell.toml describes {described}; start the bridge with the same --cell")]
+    OtherArm {
+        /// Joints of the bridge's arm.
+        moves: u32,
+        /// Joints of cell.toml's.
+        described: usize,
+    },
     /// The robot is in no state to move.
     #[error("the robot is not ready to move: {what}{}; {remedy}", said(last_words))]
     NotReady {
@@ -148,6 +156,19 @@ impl Link {
             ArmMode::Recovery => ["it is recovering from an error", "wait for it, then start again"],
         };
         Err(LinkError::NotReady { what, remedy, last_words: self.last_words.clone() })
+    }
+
+    /// [`Self::ready_state`] of an arm with so many joints.
+    ///
+    /// # Errors
+    /// [`LinkError::OtherArm`], and those of [`Self::ready_state`].
+    pub fn ready_arm(&mut self, described: usize) -> Result<ArmState, LinkError> {
+        let state = self.ready_state()?;
+        if state.dof as usize == described {
+            Ok(state)
+        } else {
+            Err(LinkError::OtherArm { moves: state.dof, described })
+        }
     }
 
     /// Hands a batch of set points over.

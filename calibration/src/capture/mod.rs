@@ -3,7 +3,7 @@
 //! Planning is pure: [`plan`] for excitation on [`multisine`], [`program`], [`stroke`] and [`way`] for Control-Hit-Slide on
 //! [`line`] and [`transit`], both within [`limits`] of the [`body`]. Playing goes through shared memory only ([`stream`],
 //! [`link`], [`object_watch`]); recording is a process beside us ([`recorder`]). [`excitation`] and [`control_hit_slide`] are the
-//! verbs that bind them.
+//! verbs that bind them, and [`task`] is what both are asked for.
 
 pub mod body;
 pub mod bridge;
@@ -22,5 +22,6 @@ pub mod recorder;
 pub mod session;
 pub mod stream;
 pub mod stroke;
+pub mod task;
 pub mod transit;
 pub mod way;

@@ -96,7 +96,9 @@ pub struct Next {
     pub stroke: Stroke,
     /// Its motion.
     pub plan: StrokePlan,
-    /// Where the object will come to rest, about [m].
+    /// Where the object stands now.
+    pub object: Standing,
+    /// Where it will come to rest, about [m].
     pub rest: [f64; 2],
 }
 
@@ -148,7 +150,7 @@ impl<'a> Program<'a> {
                 continue;
             }
             match stroke::plan(&stroke, near, self.limits, self.body) {
-                Ok(plan) => return Ok(Next { stroke, plan, rest }),
+                Ok(plan) => return Ok(Next { stroke, plan, object: *object, rest }),
                 Err(error) => refused = refused.or(Some(error)),
             }
         }

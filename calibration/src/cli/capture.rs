@@ -1,6 +1,7 @@
 //! `calibration capture`.
 
 use super::{between, print_json};
+use calibration::capture::task::Task;
 use calibration::capture::{control_hit_slide, excitation};
 use calibration::interrupt::Interrupt;
 use clap::Subcommand;
@@ -14,18 +15,9 @@ pub(super) enum Capture {
     ControlHitSlide(StrokeArguments),
 }
 
+/// What every capture is asked for.
 #[derive(Debug, clap::Args)]
-#[command(after_help = "\
-The arm starts and ends at rest in the pose it holds, and stays above table and object. An amplitude that breaks a limit
-of position, speed, acceleration, jerk, torque or height is made smaller; which limit it was is said for each joint.
-
-A session that exists is continued with the next number; nothing is overwritten. Ctrl-C brakes the arm, waits for rest
-and keeps what was recorded.
-
-Examples:
-  calibration capture excitation --cell config/fr3_cell.toml --clips 4 --out session
-  calibration capture excitation --cell lab/cell.toml --clips 8 --out monday --arm fci://172.16.0.2 --amplitude 0.2")]
-pub(super) struct ExcitationArguments {
+struct TaskArguments {
     /// What the laboratory knows about its cell.
     #[arg(long, value_name = "CELL.TOML")]
     cell: PathBuf,
@@ -41,6 +33,29 @@ pub(super) struct ExcitationArguments {
     /// Whether that bridge refuses to run without real-time guarantees: enforce or ignore [default: the bridge's own].
     #[arg(long, value_parser = ["enforce", "ignore"])]
     realtime: Option<String>,
+}
+
+impl TaskArguments {
+    fn task(self) -> Task {
+        let Self { cell, clips, out, arm, realtime } = self;
+        Task { cell, clips, out, arm, realtime, domain: None }
+    }
+}
+
+#[derive(Debug, clap::Args)]
+#[command(after_help = "\
+The arm starts and ends at rest in the pose it holds, and stays above table and object. An amplitude that breaks a limit
+of position, speed, acceleration, jerk, torque or height is made smaller; which limit it was is said for each joint.
+
+A session that exists is continued with the next number; nothing is overwritten. Ctrl-C brakes the arm, waits for rest
+and keeps what was recorded.
+
+Examples:
+  calibration capture excitation --cell config/fr3_cell.toml --clips 4 --out session
+  calibration capture excitation --cell lab/cell.toml --clips 8 --out monday --arm fci://172.16.0.2 --amplitude 0.2")]
+pub(super) struct ExcitationArguments {
+    #[command(flatten)]
+    task: TaskArguments,
     /// Length of each clip's motion [s], 2 to 600.
     #[arg(long, value_name = "S", default_value_t = 8.0, value_parser = between::<2, 600, 1>)]
     duration: f64,
@@ -57,7 +72,7 @@ pub(super) struct ExcitationArguments {
 
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
-The arm finds the object by its tracked pose, goes above it to the stroke's start, comes down, waits until all is still,
+cell.toml needs [tool], [table] and [object]. The arm finds the object by its tracked pose, goes above it to the stroke's start, comes down, waits until all is still,
 strikes, waits until the object rests, and steps back. Strokes come from all sides at all speeds, and every sixth repeats
 the first, so that scatter and drift can be told from a gap. Directions are chosen so that the object stays in reach; one
 that got away is asked for by hand.
@@ -69,21 +84,8 @@ Examples:
   calibration capture control-hit-slide --cell config/fr3_cell.toml --clips 12 --out strokes
   calibration capture control-hit-slide --cell lab/cell.toml --clips 1 --out monday --preview next.svg")]
 pub(super) struct StrokeArguments {
-    /// What the laboratory knows about its cell: [tool], [table] and [object] among it.
-    #[arg(long, value_name = "CELL.TOML")]
-    cell: PathBuf,
-    /// Clips to add. One that is no good is repeated.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1000))]
-    clips: u32,
-    /// Session folder; created, or continued.
-    #[arg(long, value_name = "SESSION")]
-    out: PathBuf,
-    /// Arm for the bridge that is started when none runs: sim or fci://HOST [default: sim].
-    #[arg(long)]
-    arm: Option<String>,
-    /// Whether that bridge refuses to run without real-time guarantees: enforce or ignore [default: the bridge's own].
-    #[arg(long, value_parser = ["enforce", "ignore"])]
-    realtime: Option<String>,
+    #[command(flatten)]
+    task: TaskArguments,
     /// Draws the next stroke into this file and moves nothing.
     #[arg(long, value_name = "FILE.SVG")]
     preview: Option<PathBuf>,
@@ -100,17 +102,17 @@ pub(super) fn run(capture: Capture, interrupt: &Interrupt) -> anyhow::Result<()>
 }
 
 fn excite(arguments: ExcitationArguments, interrupt: &Interrupt) -> anyhow::Result<()> {
-    let ExcitationArguments { cell, clips, out, arm, realtime, duration, amplitude, seed, json } = arguments;
-    let options = excitation::Options { cell, clips, out, arm, realtime, duration, amplitude, seed, domain: None };
+    let ExcitationArguments { task, duration, amplitude, seed, json } = arguments;
+    let options = excitation::Options { task: task.task(), duration, amplitude, seed };
     let summary = excitation::capture(&options, interrupt, &mut String::new)?;
     let kept = summary.clips.iter().filter(|clip| clip.kept).count();
-    eprintln!("{}: {kept} of {} clips kept", summary.session.display(), options.clips);
+    eprintln!("{}: {kept} of {} clips kept", summary.session.display(), options.task.clips);
     if json { print_json(&summary) } else { Ok(()) }
 }
 
 fn strike(arguments: StrokeArguments, interrupt: &Interrupt) -> anyhow::Result<()> {
-    let StrokeArguments { cell, clips, out, arm, realtime, preview, json } = arguments;
-    let options = control_hit_slide::Options { cell, clips, out, arm, realtime, preview, domain: None };
+    let StrokeArguments { task, preview, json } = arguments;
+    let options = control_hit_slide::Options { task: task.task(), preview };
     let summary = control_hit_slide::capture(&options, interrupt)?;
     if options.preview.is_none() {
         let kept = summary.clips.iter().filter(|clip| clip.kept).count();

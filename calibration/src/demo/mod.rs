@@ -6,7 +6,8 @@ mod hidden;
 mod replay;
 mod stage;
 
-use crate::capture::excitation::{self, Summary};
+use crate::capture::excitation::{self, ClipSummary};
+use crate::capture::task::{Summary, Task};
 use crate::diagnose::{self, Diagnosis, Verdict, diagnose};
 use crate::interrupt::Interrupt;
 use crate::report::{self, Story};
@@ -194,20 +195,26 @@ impl Told<'_> {
 }
 
 /// Runs bridge and twin and captures a session through them.
-fn record(options: &Options, files: &Files, interrupt: &Interrupt) -> anyhow::Result<(Summary, Answers, Vec<f64>)> {
+fn record(
+    options: &Options,
+    files: &Files,
+    interrupt: &Interrupt,
+) -> anyhow::Result<(Summary<ClipSummary>, Answers, Vec<f64>)> {
     let domain = format!("demo-{}", std::process::id());
     eprintln!("starting the simulated robot and its twin as two processes");
     let mut stage = Stage::start(&files.cell, [&files.hidden, &files.hidden_effect], &domain, interrupt)?;
     let request = excitation::Options {
-        cell: files.cell.clone(),
-        clips: options.clips,
-        out: files.session.clone(),
-        arm: None,
-        realtime: None,
+        task: Task {
+            cell: files.cell.clone(),
+            clips: options.clips,
+            out: files.session.clone(),
+            arm: None,
+            realtime: None,
+            domain: Some(domain),
+        },
         duration: DURATION,
         amplitude: AMPLITUDE,
         seed: options.seed,
-        domain: Some(domain),
     };
     let captured = match excitation::capture(&request, interrupt, &mut || stage.gap().words()) {
         Ok(captured) => captured,

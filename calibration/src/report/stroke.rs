@@ -4,9 +4,9 @@ use crate::capture::program::Next;
 use std::fmt::Write as _;
 
 /// Pixels a metre.
-const SCALE: f64 = 900.0;
+const SCALE: f64 = 1400.0;
 /// Half the width of what is shown [m].
-const AROUND: f64 = 0.35;
+const AROUND: f64 = 0.24;
 
 /// The picture as an SVG file: x of the base frame upwards, y to the left, as seen from behind the robot.
 #[must_use]
@@ -25,22 +25,23 @@ pub fn picture(next: &Next, size: [f64; 3]) -> String {
         width + 40.0
     );
     let mut draw = |text: std::fmt::Arguments| svg.write_fmt(text).expect("a string takes all text");
-    let radius = 0.5 * size[0].hypot(size[1]);
-    let (object, rest) = (at(x0, y0), at(next.rest[0], next.rest[1]));
+    let rest = at(next.rest[0], next.rest[1]);
     let (before, after) =
         (on_line(-stroke.clearance - 0.5 * stroke.speed * stroke.rise), on_line(stroke.follow_through));
     let stop = on_line(stroke.follow_through + 0.5 * stroke.speed * stroke.rise);
-    draw(format_args!(
-        "<circle cx=\"{:.1}\" cy=\"{:.1}\" r=\"{:.1}\" fill=\"#d9e4ee\" stroke=\"#37597a\"/>",
-        object[0],
-        object[1],
-        SCALE * radius
-    ));
+    let (sin, cos) = next.object.yaw.sin_cos();
+    let corner = |(sx, sy): (f64, f64)| {
+        let (a, b) = (0.5 * sx * size[0], 0.5 * sy * size[1]);
+        at(x0 + cos * a - sin * b, y0 + sin * a + cos * b)
+    };
+    let corners = [(1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0)].map(corner);
+    let points: Vec<String> = corners.iter().map(|[x, y]| format!("{x:.1},{y:.1}")).collect();
+    draw(format_args!("<polygon points=\"{}\" fill=\"#d9e4ee\" stroke=\"#37597a\"/>", points.join(" ")));
     draw(format_args!(
         "<circle cx=\"{:.1}\" cy=\"{:.1}\" r=\"{:.1}\" fill=\"none\" stroke=\"#37597a\" stroke-dasharray=\"5 5\"/>",
         rest[0],
         rest[1],
-        SCALE * radius
+        SCALE * 0.5 * size[0].hypot(size[1])
     ));
     draw(format_args!(
         "<line x1=\"{:.1}\" y1=\"{:.1}\" x2=\"{:.1}\" y2=\"{:.1}\" stroke=\"#b4552d\" stroke-width=\"4\"/>",
@@ -55,8 +56,9 @@ pub fn picture(next: &Next, size: [f64; 3]) -> String {
         svg.write_fmt(format_args!("<text x=\"{x:.1}\" y=\"{y:.1}\" fill=\"#222\">{text}</text>"))
             .expect("a string takes all text");
     };
-    note([before[0] + 12.0, before[1] + 5.0], "the tool comes down here");
-    note([rest[0] - 50.0, rest[1]], "comes to rest about here");
+    note([before[0] - 70.0, before[1] + 26.0], "the tool comes down here");
+    note([rest[0] - 70.0, rest[1] - SCALE * 0.5 * size[0].hypot(size[1]) - 8.0], "comes to rest about here");
+    note([12.0, 22.0], "from above; the robot's base is below, its left is on the left");
     let words = format!(
         "object at x {x0:.3} m, y {y0:.3} m: towards {:.0}\u{b0} at {:.2} m/s, {:.0} mm beside the centre, {:.0} mm high",
         stroke.heading.to_degrees(),

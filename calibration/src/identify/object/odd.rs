@@ -1,20 +1,16 @@
 //! What is odd about a clip's poses that can be used all the same, one sentence each with the remedy. Base frame, SI.
 
-use shared_mem::cell::{Cell, ClipKind};
-use shared_mem::recording::{Clip, ObjectSeries};
-use twin::scene::ObjectModel;
+use shared_mem::recording::ObjectSeries;
 
 /// Fewest poses a second that show a slide.
 const SLOWEST_TRACKER: f64 = 20.0;
 /// Poses over which the last speed is taken [1], and a speed at which an object has not come to rest [m/s].
 const LAST_POSES: usize = 4;
 const STILL_MOVING: f64 = 0.05;
-/// An object that stands this far above its table or in it does so by more than a tracker's error [m].
-const OFF_TABLE: f64 = 8e-3;
 
-/// Remarks on a clip.
-pub(super) fn oddities(clip: &Clip, cell: &Cell) -> Vec<String> {
-    [slow(&clip.object), cut_short(&clip.object), off_table(clip, cell)].into_iter().flatten().collect()
+/// Remarks on a clip's poses.
+pub(super) fn oddities(series: &ObjectSeries) -> Vec<String> {
+    [slow(series), cut_short(series)].into_iter().flatten().collect()
 }
 
 /// Usual number of poses a second.
@@ -47,42 +43,21 @@ fn cut_short(series: &ObjectSeries) -> Option<String> {
     })
 }
 
-/// Before it is hit the object's lowest point is on the table.
-fn off_table(clip: &Clip, cell: &Cell) -> Option<String> {
-    let (table, pose) = (cell.table?, clip.object.poses.first()?.isometry());
-    let model = ObjectModel::new(cell, None).ok()??;
-    let lowest = model.shape.triangles().0.iter().map(|corner| (pose * corner).z).fold(f64::INFINITY, f64::min);
-    let above = lowest - table.height;
-    (clip.kind == ClipKind::ControlHitSlide && above.abs() > OFF_TABLE).then(|| {
-        format!(
-            "the object stands {:.0} mm {} the table, and was set onto it: `table.height` or the object's size in cell.toml is \
-             wrong, or the poses are in another frame or not of its middle",
-            above.abs() * 1e3,
-            if above > 0.0 { "above" } else { "inside" }
-        )
-    })
-}
-
 #[cfg(test)]
 mod tests {
-    use super::super::test_clip::{cell, clip};
+    use super::super::test_clip::clip;
     use super::*;
 
-    fn told(change: impl Fn(usize, &mut nalgebra::Isometry3<f64>), rows: usize) -> Vec<String> {
-        let mut clip = clip(change);
-        clip.object.stamps_ns.truncate(rows);
-        clip.object.poses.truncate(rows);
-        oddities(&clip, &cell())
+    fn told(rows: usize) -> Vec<String> {
+        oddities(&clip(|_, _| {}).object.select_rows(&(0..rows).collect::<Vec<_>>()))
     }
 
     #[test]
-    fn what_is_odd_is_told_with_what_to_do() {
-        assert_eq!(told(|_, _| {}, 90), [""; 0]);
-        let cut = told(|_, _| {}, 45);
+    fn poses_that_end_while_the_object_moves_or_come_slowly_are_told_with_what_to_do() {
+        assert_eq!(told(90), [""; 0]);
+        let cut = told(45);
         assert!(cut.len() == 1 && cut[0].contains("still moves at") && cut[0].contains("camera"), "{cut:?}");
-        let high = told(|_, pose| pose.translation.vector.z += 0.02, 90);
-        assert!(high.len() == 1 && high[0].contains("20 mm above the table"), "{high:?}");
-        let deep = told(|_, pose| pose.translation.vector.z -= 0.02, 90);
-        assert!(deep[0].contains("20 mm inside the table"), "{deep:?}");
+        let slow = oddities(&clip(|_, _| {}).object.select_rows(&(0..90).step_by(4).collect::<Vec<_>>()));
+        assert!(slow.len() == 1 && slow[0].contains("15 Hz"), "{slow:?}");
     }
 }

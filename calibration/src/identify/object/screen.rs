@@ -7,6 +7,7 @@ use crate::forward::object::Clearance;
 use nalgebra::Vector3;
 use shared_mem::cell::{Cell, ClipKind};
 use shared_mem::recording::{Clip, ObjectSeries};
+use twin::replay::{Buried, object_start};
 use twin::scene::{ObjectModel, ObjectShape};
 
 /// An object that moves this much farther from one pose to the next than before or after was lost [m]: a hit makes it
@@ -44,15 +45,23 @@ pub(crate) fn screened(clip: Clip, cell: &Cell) -> Screened {
     let mut remarks: Vec<String> = clip.warnings.iter().chain(&clip.damage).cloned().collect();
     let (clip, mended) = mended(clip, cell);
     remarks.extend(mended);
-    let mut unusable = unusable(&clip, cell);
+    let placed = on_table(&clip, cell);
+    let mut unusable = unusable(&clip, cell).or_else(|| placed.as_ref().err().map(ToString::to_string));
     let hits = unusable.is_none() && clip.kind == ClipKind::ControlHitSlide;
     let mut elsewhere = if hits { apart(&clip, cell) } else { None };
     // What was odd before may be why.
     for why in [&mut unusable, &mut elsewhere].into_iter().flatten() {
         remarks.iter().for_each(|remark| why.push_str(&format!(" ({remark})")));
     }
-    remarks.extend(oddities(&clip, cell));
+    remarks.extend(placed.ok().flatten());
+    remarks.extend(oddities(&clip.object));
     Screened { clip, remarks, unusable, elsewhere }
+}
+
+/// Whether the poses put the object onto its table, and what to tell if they nearly do.
+fn on_table(clip: &Clip, cell: &Cell) -> Result<Option<String>, Buried> {
+    let Ok(Some(model)) = ObjectModel::new(cell, None) else { return Ok(None) };
+    object_start::remark(&clip.object, clip.kind, &model, cell)
 }
 
 fn unusable(clip: &Clip, cell: &Cell) -> Option<String> {
@@ -187,6 +196,16 @@ mod tests {
         assert_eq!((clip.object.len(), unusable), (46, None));
         assert!(remarks[0].contains("44 of 90 poses repeat"), "{remarks:?}");
         assert!(remarks[1].contains("seen until"), "{remarks:?}");
+    }
+
+    #[test]
+    fn an_object_above_its_table_is_told_and_one_below_it_left_out() {
+        let Screened { remarks, unusable, .. } = screened(clip(|_, pose| pose.translation.vector.z += 0.02), &cell());
+        assert!(unusable.is_none() && remarks[0].contains("20 mm above the table"), "{remarks:?}");
+        let Screened { remarks, unusable, .. } = screened(clip(|_, pose| pose.translation.vector.z -= 0.02), &cell());
+        assert!(unusable.is_none() && remarks[0].contains("20 mm into the table"), "{remarks:?}");
+        let below = why(|_, pose| pose.translation.vector.z -= 0.1).expect("a reason");
+        assert!(below.contains("below the table"), "{below}");
     }
 
     #[test]

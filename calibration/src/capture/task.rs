@@ -1,0 +1,48 @@
+//! What every capture is asked for, and what it answers, whichever motions it plays.
+
+use super::bridge::{Bridge, BridgeError, Wanted};
+use super::link::Link;
+use crate::interrupt::Interrupt;
+use serde::Serialize;
+use std::path::PathBuf;
+
+/// What is asked for.
+#[derive(Debug, Clone)]
+pub struct Task {
+    /// The laboratory's cell.toml.
+    pub cell: PathBuf,
+    /// Clips to add.
+    pub clips: u32,
+    /// Session folder.
+    pub out: PathBuf,
+    /// Arm of a bridge that has to be started, as `rt_bridge run --arm` takes it.
+    pub arm: Option<String>,
+    /// Whether that bridge insists on real time, as `rt_bridge run --realtime` takes it; default: the bridge's own.
+    pub realtime: Option<String>,
+    /// Shared-memory domain; default: the one this process was started in.
+    pub domain: Option<String>,
+}
+
+/// What was done.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Summary<Clip> {
+    /// Session folder.
+    pub session: PathBuf,
+    /// Clips of this run, in order.
+    pub clips: Vec<Clip>,
+    /// Whether the user ended it early.
+    pub interrupted: bool,
+    /// Whether the bridge was started, and ended, by this run.
+    pub own_bridge: bool,
+}
+
+impl Task {
+    /// The bridge that runs, or one that is started for this task.
+    ///
+    /// # Errors
+    /// [`BridgeError`] with the remedy.
+    pub fn bridge(&self, link: &mut Link, interrupt: &Interrupt) -> Result<Bridge, BridgeError> {
+        let (arm, realtime, domain) = (self.arm.as_deref(), self.realtime.as_deref(), self.domain.as_deref());
+        Bridge::find_or_start(link, &Wanted { cell: &self.cell, arm, realtime, domain }, interrupt)
+    }
+}
