@@ -159,7 +159,7 @@ fn a_topic_on_which_nothing_came_and_a_file_that_was_cut_are_told_from_a_wrong_n
     let whole = std::fs::read(&bag.path).expect("a bag");
     std::fs::write(&bag.path, &whole[..whole.len() / 4]).expect("a shorter one");
     let error = read_clip(&bag.path, ClipKind::Excitation, &cell()).unwrap_err().to_string();
-    assert!(error.contains("damaged file") && error.contains("record it again"), "{error}");
+    assert!(error.contains("is damaged") && error.contains("record it again"), "{error}");
 }
 
 #[test]

@@ -155,11 +155,7 @@ impl Collected {
 /// Why nothing came from a topic: the file lost it, nobody published on it, or it is called otherwise.
 fn missing<R: Read + Seek>(path: &Path, topic: &str, (role, key): Wanted, messages: &Messages<R>) -> ReadError {
     if let Some(damage) = messages.damage().summary() {
-        return ReadError::content(
-            path,
-            topic,
-            format!("no {role} are left in the damaged file ({damage}); record it again"),
-        );
+        return ReadError::content(path, topic, format!("no {role} are left ({damage}); record it again"));
     }
     if messages.has(topic) {
         return ReadError::content(

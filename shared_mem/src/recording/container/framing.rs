@@ -42,11 +42,11 @@ impl Damage {
         self.parts.push(what);
     }
 
-    /// One line, `None` when the file is whole. Long lists are cut.
+    /// One line that says that the file is damaged and how, `None` when it is whole. Long lists are cut.
     pub(in super::super) fn summary(&self) -> Option<String> {
         let (first, rest) = self.parts.split_at_checked(3).unwrap_or((&self.parts, &[]));
         let more = if rest.is_empty() { String::new() } else { format!("; and {} more places", rest.len()) };
-        (!first.is_empty()).then(|| format!("{}{more}", first.join("; ")))
+        (!first.is_empty()).then(|| format!("the file is damaged: {}{more}", first.join("; ")))
     }
 }
 
