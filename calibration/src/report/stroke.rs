@@ -59,14 +59,15 @@ pub fn picture(next: &Next, size: [f64; 3]) -> String {
     note([before[0] - 70.0, before[1] + 26.0], "the tool comes down here");
     note([rest[0] - 70.0, rest[1] - SCALE * 0.5 * size[0].hypot(size[1]) - 8.0], "comes to rest about here");
     note([12.0, 22.0], "from above; the robot's base is below, its left is on the left");
+    note([12.0, width + 8.0], &format!("object at x {x0:.3} m, y {y0:.3} m"));
     let words = format!(
-        "object at x {x0:.3} m, y {y0:.3} m: towards {:.0}\u{b0} at {:.2} m/s, {:.0} mm beside the centre, {:.0} mm high",
+        "towards {:.0}\u{b0} at {:.2} m/s, {:.0} mm beside the centre, {:.0} mm high",
         stroke.heading.to_degrees(),
         stroke.speed,
         1e3 * stroke.offset.abs(),
         1e3 * stroke.height
     );
-    note([12.0, width + 22.0], &words);
+    note([12.0, width + 28.0], &words);
     svg.push_str("</svg>\n");
     svg
 }
