@@ -8,6 +8,7 @@
 //! | pump | [`pump`] | the ports for states, commands, motions and events |
 //! | world | [`sim`] | the simulated cell, with `--arm sim` |
 //! | camera | [`camera`] | the ports for pictures, with `--camera sim` |
+//! | gripper, wrench | [`device`], [`gripper`], [`mod@wrench`] | one device each, and its ports |
 //! | main | [`run`] | duration, Ctrl-C, the recorder's process, the report |
 //!
 //! `rt_bridge serve` ([`serve`]) is the other side of the line: it plays the robot.
@@ -17,9 +18,10 @@
 pub mod arm;
 pub mod camera;
 pub mod cli;
-
+pub mod device;
 pub mod doctor;
 pub mod fr3;
+pub mod gripper;
 pub mod motion;
 pub mod pump;
 pub mod recorder;
@@ -30,3 +32,4 @@ pub mod safety;
 pub mod serve;
 pub mod sim;
 pub mod times;
+pub mod wrench;

@@ -43,7 +43,8 @@ fn replay(clip: &Path) {
 fn what_was_recorded_holds_every_cycle_pictures_and_poses_and_can_be_replayed() {
     let folder = tempfile::tempdir().expect("a folder");
     let clip = folder.path().join("clip.mcap");
-    let arguments = ["--arm", "sim", "--duration", "2", "--record", clip.to_str().expect("a path")];
+    let clip_path = clip.to_str().expect("a path");
+    let arguments = ["--arm", "sim", "--gripper", "sim", "--wrench", "sim", "--duration", "2", "--record", clip_path];
     let (output, answer) = end(start("record", &arguments));
     assert!(output.status.success(), "{}", said(&output));
     assert_eq!(answer["recorded"]["lost"], 0, "{answer}");
@@ -59,7 +60,40 @@ fn what_was_recorded_holds_every_cycle_pictures_and_poses_and_can_be_replayed() 
     assert!(count(|p| matches!(p, Payload::Picture(_))) > 20);
     assert!(count(|p| matches!(p, Payload::ObjectPose(_))) > 20);
     assert!(count(|p| matches!(p, Payload::CameraInfo(_))) > 0);
+    assert!(count(|p| matches!(p, Payload::Gripper(_))) > 0);
+    // The sensor carries the tool, which hangs still.
+    assert!(count(|p| matches!(p, Payload::Wrench(w) if (w.force[2] - 2.4525).abs() < 0.1)) > 100);
     replay(&clip);
+}
+
+#[test]
+fn a_running_bridge_passes_orders_on_to_its_gripper() {
+    let bridge = start("grip", &["--arm", "sim", "--camera", "off", "--gripper", "sim"]);
+    let told = |arguments: &[&str]| {
+        let output = Command::new(env!("CARGO_BIN_EXE_rt_bridge"))
+            .env("TWINALIGN_DOMAIN", format!("grip{}", std::process::id()))
+            .args(["grip", "--json"])
+            .args(arguments)
+            .output()
+            .expect("the program starts");
+        assert!(output.status.success(), "{}", said(&output));
+        serde_json::from_slice::<Value>(&output.stdout).expect("one object")
+    };
+    let answer = told(&["move", "0.03"]);
+    assert_eq!((answer["width"].as_f64(), answer["width_d"].as_f64()), (Some(0.03), Some(0.03)));
+    assert_eq!(told(&["home"])["width"].as_f64(), Some(0.08));
+    ask_to_end(bridge.id()).expect("it still runs");
+    let (output, _) = end(bridge);
+    assert!(output.status.success(), "{}", said(&output));
+}
+
+#[test]
+fn a_device_that_is_not_there_is_refused_before_the_arm_is_driven() {
+    let (output, _) = end(start("absent", &["--arm", "sim", "--gripper", "serial:///dev/no-such-port"]));
+    assert_eq!(output.status.code(), Some(1));
+    assert!(said(&output).contains("serial:///dev/no-such-port cannot be opened"), "{}", said(&output));
+    let (output, _) = end(start("absent", &["--arm", "replay://clip.mcap", "--wrench", "sim"]));
+    assert_eq!(output.status.code(), Some(1));
 }
 
 #[test]

@@ -5,7 +5,7 @@
 
 use crate::msg::arm::{ArmCommand, ArmState};
 use crate::msg::event::Event;
-use crate::msg::gripper::GripperState;
+use crate::msg::gripper::{GripperCommand, GripperState};
 use crate::msg::image::CameraInfo;
 use crate::msg::motion::MotionChunk;
 use crate::msg::object::ObjectPose;
@@ -86,6 +86,9 @@ pub const WRENCH: Topic<Wrench> = topic("/wrench", STREAM);
 /// Bridge to all: gripper state.
 pub const GRIPPER: Topic<GripperState> =
     topic("/gripper", Limits { buffer: 64, history: 1, borrowed: 2, subscribers: 8, publishers: 1 });
+/// Anyone to bridge: what the gripper is to do. The newest counts.
+pub const GRIPPER_COMMAND: Topic<GripperCommand> =
+    topic("/gripper/command", Limits { buffer: 8, history: 0, borrowed: 2, subscribers: 4, publishers: 4 });
 /// Twin to all: its own state, each cycle it mirrors.
 pub const TWIN_STATE: Topic<TwinState> = topic("/twin/state", STREAM);
 /// Twin to all: real against twin, each cycle it mirrors.
@@ -95,7 +98,7 @@ pub const EVENTS: Topic<Event> =
     topic("/events", Limits { buffer: 128, history: 16, borrowed: 2, subscribers: 8, publishers: 8 });
 
 /// Names of all topics, in the order of a report.
-pub const ALL: [&str; 12] = [
+pub const ALL: [&str; 13] = [
     ARM_STATE.name,
     ARM_COMMAND.name,
     ARM_MOTION.name,
@@ -105,6 +108,7 @@ pub const ALL: [&str; 12] = [
     CAMERA_INFO.name,
     WRENCH.name,
     GRIPPER.name,
+    GRIPPER_COMMAND.name,
     TWIN_STATE.name,
     TWIN_GAP.name,
     EVENTS.name,

@@ -1,22 +1,36 @@
 //! `rt_bridge doctor`.
 
 use super::answer;
-use crate::doctor::{Verdict, examine};
+use crate::doctor::{Reach, Verdict, examine};
+use crate::gripper::GripperChoice;
 use crate::run::ArmChoice;
+use crate::wrench::WrenchChoice;
 use anyhow::{Result, bail};
 use clap::Args;
+use shared_mem::cell::Cell;
+use std::path::PathBuf;
 
 /// Explain this machine before a robot moves
 ///
 /// Looks at kernel, scheduling, memory lock, processors, shared memory, network and devices, and measures for two seconds
 /// how late a 1 kHz loop wakes. Each line is ok, a warning or a problem, with what to do about it.
 #[derive(Debug, Args)]
-#[command(after_help = "Examples:\n  rt_bridge doctor\n  rt_bridge doctor --arm fci://172.16.0.2 --json\n\n\
+#[command(after_help = "Examples:\n  rt_bridge doctor\n  rt_bridge doctor --arm fci://172.16.0.2 --json\n  \
+    rt_bridge doctor --cell cell.toml --gripper serial:///dev/ttyUSB0 --wrench can://can0\n\n\
     JSON: findings [{check, verdict (ok, warning, problem), found, remedy}], wake_us. Exit code 1 when there is a problem.")]
 pub(super) struct DoctorArguments {
     /// A robot to reach, fci://HOST
     #[arg(long, value_name = "ARM")]
     arm: Option<ArmChoice>,
+    /// A gripper to reach: serial:///dev/ttyUSB0 or fci://HOST; it is not moved
+    #[arg(long, value_name = "GRIPPER")]
+    gripper: Option<GripperChoice>,
+    /// A force/torque sensor to reach: can://INTERFACE
+    #[arg(long, value_name = "SENSOR")]
+    wrench: Option<WrenchChoice>,
+    /// Says which gripper and sensor they are, where they are not as shipped
+    #[arg(long, value_name = "cell.toml")]
+    cell: Option<PathBuf>,
     /// Answer with one JSON object
     #[arg(long)]
     json: bool,
@@ -24,11 +38,12 @@ pub(super) struct DoctorArguments {
 
 impl DoctorArguments {
     pub(super) fn execute(self) -> Result<()> {
-        let host = match &self.arm {
-            Some(ArmChoice::Fci(host)) => Some(host.as_str()),
+        let robot = match self.arm {
+            Some(ArmChoice::Fci(host)) => Some(host),
             _ => None,
         };
-        let report = examine(host);
+        let cell = self.cell.as_deref().map(Cell::read).transpose()?.unwrap_or_default();
+        let report = examine(&Reach { robot, gripper: self.gripper, wrench: self.wrench, cell });
         if self.json {
             answer(&serde_json::to_string(&report)?)?;
         } else {

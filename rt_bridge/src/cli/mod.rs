@@ -4,6 +4,7 @@
 //! the way goes to standard error. Exit codes: 0 done, 1 failed, 2 wrong arguments.
 
 mod doctor;
+mod grip;
 mod record;
 mod run;
 mod serve;
@@ -25,6 +26,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
         rt_bridge run --cell config/fr3_cell.toml --arm sim            hold the simulated arm until Ctrl-C\n  \
         rt_bridge run --cell cell.toml --arm fci://172.16.0.2 --record clip.mcap\n  \
         rt_bridge record --out clip.mcap --duration 10                 record what others do\n  \
+        rt_bridge grip move 0.03                                       tell the gripper of a running bridge\n  \
         rt_bridge serve --cell config/fr3_cell.toml                    play a Franka robot for any libfranka program\n\n\
         Processes meet when the environment variable TWINALIGN_DOMAIN agrees (default 0)."
 )]
@@ -38,6 +40,7 @@ enum Verb {
     Run(run::RunArguments),
     Record(record::RecordArguments),
     Serve(serve::ServeArguments),
+    Grip(grip::GripArguments),
     Doctor(doctor::DoctorArguments),
 }
 
@@ -58,6 +61,7 @@ pub fn main() -> ExitCode {
         Verb::Run(run) => run.execute(),
         Verb::Record(record) => record.execute(),
         Verb::Serve(serve) => serve.execute(),
+        Verb::Grip(grip) => grip.execute(),
         Verb::Doctor(doctor) => doctor.execute(),
     };
     match done {

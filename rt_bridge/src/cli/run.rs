@@ -1,8 +1,10 @@
 //! `rt_bridge run`.
 
 use super::{answer, seconds, stop_flag};
+use crate::gripper::GripperChoice;
 use crate::rt::Realtime;
 use crate::run::{ArmChoice, CameraChoice, ControllerChoice, RunReport, Settings, run};
+use crate::wrench::WrenchChoice;
 use anyhow::{Result, bail};
 use clap::Args;
 use std::path::PathBuf;
@@ -17,6 +19,7 @@ use std::time::Duration;
     rt_bridge run --cell config/fr3_cell.toml --arm sim\n  \
     rt_bridge run --cell config/fr3_cell.toml --arm sim --effects hidden.toml --record clip.mcap --duration 20 --json\n  \
     rt_bridge run --cell cell.toml --arm fci://172.16.0.2 --controller torque_pd --realtime enforce\n  \
+    rt_bridge run --cell cell.toml --arm fci://172.16.0.2 --gripper serial:///dev/ttyUSB0 --wrench can://can0\n  \
     rt_bridge run --cell cell.toml --arm replay://clip.mcap\n\n\
     JSON: cycles, missed_cycles (deadlines that passed unused), overruns (work longer than a period), lost_packets,\n\
     wake_us (wake-up latency), exec_us, period_us, age_us (a state's arrival to shared memory), recorded, faults.")]
@@ -34,6 +37,14 @@ pub(super) struct RunArguments {
     /// Default: sim where the arm is simulated and cell.toml has a [camera], replay with a recording, else off
     #[arg(long)]
     camera: Option<CameraChoice>,
+    /// sim, serial:///dev/ttyUSB0 (a Robotiq 2F), fci://HOST (the Franka Hand) or off.
+    /// Default: sim where the arm is simulated and cell.toml has a [gripper], else off
+    #[arg(long, value_name = "GRIPPER")]
+    gripper: Option<GripperChoice>,
+    /// Force/torque sensor: sim, can://INTERFACE or off.
+    /// Default: sim where the arm is simulated and cell.toml has a [wrench], else off
+    #[arg(long, value_name = "SENSOR")]
+    wrench: Option<WrenchChoice>,
     /// Effects of the simulated cell that nobody else is told
     #[arg(long, value_name = "hidden.toml")]
     effects: Option<PathBuf>,
@@ -63,6 +74,8 @@ impl RunArguments {
             arm: self.arm,
             controller: self.controller,
             camera: self.camera,
+            gripper: self.gripper,
+            wrench: self.wrench,
             effects: self.effects,
             parameters: self.parameters,
             record: self.record,

@@ -4,11 +4,16 @@
 mod latency;
 mod machine;
 mod network;
+mod ports;
 mod shared_memory;
 
+use crate::gripper::GripperChoice;
 use crate::times::Percentiles;
+use crate::wrench::WrenchChoice;
 use serde::Serialize;
+use shared_mem::cell::Cell;
 use std::fmt;
+use std::path::Path;
 
 /// How a thing stands.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
@@ -44,15 +49,30 @@ pub struct Report {
     pub wake_us: Percentiles,
 }
 
-/// Looks at everything; `robot` is the address of a robot to reach.
+/// What is to be reached beside the machine itself.
+#[derive(Debug, Clone, Default)]
+pub struct Reach {
+    /// Address of a robot.
+    pub robot: Option<String>,
+    /// A gripper.
+    pub gripper: Option<GripperChoice>,
+    /// A force/torque sensor.
+    pub wrench: Option<WrenchChoice>,
+    /// What the laboratory knows about its cell.
+    pub cell: Cell,
+}
+
+/// Looks at everything.
 #[must_use]
-pub fn examine(robot: Option<&str>) -> Report {
+pub fn examine(reach: &Reach) -> Report {
     let mut findings = machine::examine();
     findings.extend(shared_memory::examine());
-    if let Some(host) = robot {
+    if let Some(host) = &reach.robot {
         findings.push(network::robot(host));
     }
-    findings.push(network::devices());
+    findings.extend(ports::examine(Path::new("/")));
+    findings.extend(reach.gripper.as_ref().map(|choice| ports::gripper(choice, &reach.cell)));
+    findings.extend(reach.wrench.as_ref().map(|choice| ports::wrench(choice, &reach.cell)));
     let (finding, wake_us) = latency::examine();
     findings.push(finding);
     Report { findings, wake_us }

@@ -1,4 +1,4 @@
-//! The way to the robot, and other devices that are plugged in.
+//! The way to the robot.
 
 use super::Finding;
 use crate::arm::{Arm, ArmFault, Read};
@@ -8,7 +8,6 @@ use crate::rt::stats::ArrivalLine;
 use crate::times::Times;
 use shared_mem::cell::Cell;
 use shared_mem::msg::arm::{ArmMode, ArmState};
-use std::fs;
 
 /// States that are watched: one second.
 const STATES: u32 = 1000;
@@ -71,17 +70,4 @@ impl Line {
         }
         Finding::ok("robot", found)
     }
-}
-
-/// Cameras, serial ports and CAN interfaces.
-pub(super) fn devices() -> Finding {
-    let named = |folder: &str, starts: &[&str]| -> Vec<String> {
-        let entries = fs::read_dir(folder).into_iter().flatten().filter_map(Result::ok);
-        let names = entries.map(|e| e.file_name().to_string_lossy().into_owned());
-        names.filter(|name| starts.iter().any(|start| name.starts_with(start))).collect()
-    };
-    let mut found = named("/dev", &["video", "ttyUSB", "ttyACM"]);
-    found.extend(named("/sys/class/net", &["can", "vcan"]));
-    found.sort();
-    Finding::ok("devices", if found.is_empty() { "no camera, serial port or CAN".into() } else { found.join(", ") })
 }

@@ -1,4 +1,5 @@
-//! A Franka Research 3 over the Franka Control Interface, version 10: the only place that knows `franka-rs`.
+//! A Franka Research 3 over the Franka Control Interface, version 10, and its hand: the only place that knows `franka-rs`
+//! as a client.
 //!
 //! The robot's packet is the clock: it sends a state each millisecond and drops a set point that comes later than the next
 //! one. Torques are without gravity and friction, which the robot compensates itself, for the tool as well: cell.toml's
@@ -7,11 +8,14 @@
 //! Frames and units are those of [`shared_mem::msg::arm`]. What runs once a millisecond (`read`, `command`) does not
 //! allocate while states arrive.
 
+mod hand;
 mod mapping;
 mod motion;
 mod session;
 mod settings;
 mod version;
+
+pub use hand::Hand;
 
 use crate::arm::{Arm, ArmFault, Clock, ConnectError, Desired, Read};
 use crate::rt::Realtime;

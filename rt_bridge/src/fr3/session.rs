@@ -39,7 +39,8 @@ pub(super) struct Ticket(u32);
 impl Session {
     /// Connects, agrees on the version and waits for the first state.
     pub(super) fn connect(host: &str) -> Result<Self, ConnectError> {
-        let address = ipv4(host).ok_or_else(|| no_answer(host, "that name has no IPv4 address".into()))?;
+        let address =
+            ipv4(host, ROBOT_COMMAND_PORT).ok_or_else(|| no_answer(host, "that name has no IPv4 address".into()))?;
         let network = Network::connect_with_timeouts(
             &address.to_string(),
             ROBOT_COMMAND_PORT,
@@ -184,9 +185,9 @@ fn status_byte(message: &[u8]) -> u8 {
     message_payload(HeaderLayout::Robot, message).first().copied().unwrap_or(u8::MAX)
 }
 
-/// Where `host` is. The protocol's state socket is IPv4 only, while `localhost` often means IPv6 first.
-fn ipv4(host: &str) -> Option<SocketAddr> {
-    let found = host.to_socket_addrs().or_else(|_| (host, ROBOT_COMMAND_PORT).to_socket_addrs());
+/// Where `host` is, at `port` unless it names one. The protocol's state socket is IPv4 only, while `localhost` often means IPv6 first.
+pub(super) fn ipv4(host: &str, port: u16) -> Option<SocketAddr> {
+    let found = host.to_socket_addrs().or_else(|_| (host, port).to_socket_addrs());
     found.ok()?.find(SocketAddr::is_ipv4)
 }
 
@@ -195,7 +196,7 @@ fn no_answer(host: &str, what: String) -> ConnectError {
 }
 
 /// What the network says, without the prefix of another library.
-fn reason(error: &FrankaError) -> String {
+pub(super) fn reason(error: &FrankaError) -> String {
     let text = error.to_string();
     if text.contains("refused") {
         return "connection refused".into();
@@ -235,10 +236,10 @@ mod tests {
 
     #[test]
     fn a_host_is_a_name_or_an_address_with_the_protocols_port_unless_another_is_given() {
-        assert_eq!(ipv4("127.0.0.1"), Some(SocketAddr::from(([127, 0, 0, 1], 1337))));
-        assert_eq!(ipv4("127.0.0.1:1400"), Some(SocketAddr::from(([127, 0, 0, 1], 1400))));
-        assert_eq!(ipv4("localhost"), Some(SocketAddr::from(([127, 0, 0, 1], 1337))));
-        assert_eq!(ipv4("::1"), None);
+        assert_eq!(ipv4("127.0.0.1", 1337), Some(SocketAddr::from(([127, 0, 0, 1], 1337))));
+        assert_eq!(ipv4("127.0.0.1:1400", 1337), Some(SocketAddr::from(([127, 0, 0, 1], 1400))));
+        assert_eq!(ipv4("localhost", 1337), Some(SocketAddr::from(([127, 0, 0, 1], 1337))));
+        assert_eq!(ipv4("::1", 1337), None);
     }
 
     #[test]

@@ -8,11 +8,13 @@ use crate::rt::cycle::Plan;
 use crate::rt::law::TorquePd;
 use crate::safety::Limits;
 use crate::sim::World;
+use crate::wrench::WrenchChoice;
 use anyhow::{Result, bail};
 use rtrb::Consumer;
 use shared_mem::cell::{Cell, ControllerKind};
 use shared_mem::msg::arm::CommandInterface;
 use shared_mem::msg::object::ObjectPose;
+use shared_mem::msg::wrench::Wrench;
 use shared_mem::theta::Theta;
 use std::fmt;
 use std::path::PathBuf;
@@ -83,6 +85,8 @@ pub(super) struct Devices {
     pub(super) pictures: Pictures,
     /// From the simulated tracker, or of the recording. They come with the camera off, too.
     pub(super) poses: Option<Consumer<ObjectPose>>,
+    /// Of the simulated cell's force sensor, where it is to be there.
+    pub(super) wrenches: Option<Consumer<Wrench>>,
 }
 
 /// Where pictures come from.
@@ -109,16 +113,17 @@ impl Devices {
                     world: Some(world),
                     pictures: if camera { Pictures::Scenes(views.scenes) } else { Pictures::None },
                     poses: cell.object.is_some().then_some(views.poses),
+                    wrenches: (settings.wrench(cell)? == WrenchChoice::Sim).then_some(views.wrenches),
                 }
             }
             ArmChoice::Fci(host) => {
                 let arm = fr3::connect(host, settings.realtime, cell)?;
-                Self { arm, plan, world: None, pictures: Pictures::None, poses: None }
+                Self { arm, plan, world: None, pictures: Pictures::None, poses: None, wrenches: None }
             }
             ArmChoice::Replay(clip) => {
                 let (arm, poses, clock) = ReplayArm::open(clip, cell, &model)?;
                 let pictures = if camera { Pictures::Clip(clip.clone(), clock) } else { Pictures::None };
-                Self { arm: Box::new(arm), plan, world: None, pictures, poses: Some(poses) }
+                Self { arm: Box::new(arm), plan, world: None, pictures, poses: Some(poses), wrenches: None }
             }
         };
         let (has, described) = (devices.arm.dof(), model.dof());

@@ -8,6 +8,8 @@ pub use devices::{ArmChoice, CameraChoice, ControllerChoice};
 pub use report::RunReport;
 
 use crate::camera::Camera;
+use crate::device::Service;
+use crate::gripper::GripperChoice;
 use crate::motion::Player;
 use crate::pump::{Notice, Pump, Rings};
 use crate::recorder::child::{Change, RecorderChild};
@@ -16,12 +18,14 @@ use crate::rt::control;
 use crate::rt::cycle::{Cycle, Link, Plan};
 use crate::rt::stats::LoopStats;
 use crate::safety::{Guard, Workspace};
-use anyhow::Result;
+use crate::wrench::{self, WrenchChoice};
+use anyhow::{Result, bail};
 use devices::{Devices, Pictures};
-use rtrb::RingBuffer;
+use rtrb::{Consumer, RingBuffer};
 use shared_mem::cell::Cell;
 use shared_mem::msg::event::EventLevel;
 use shared_mem::msg::joints_from;
+use shared_mem::msg::wrench::Wrench;
 use shared_mem::topics;
 use shared_mem::transport::Node;
 use std::path::PathBuf;
@@ -53,6 +57,10 @@ pub struct Settings {
     /// The camera; none: simulated with the simulated arm where cell.toml has a `[camera]`, the recording's with a
     /// recording, else off.
     pub camera: Option<CameraChoice>,
+    /// The gripper; none: simulated with the simulated arm where cell.toml has a `[gripper]`, else off.
+    pub gripper: Option<GripperChoice>,
+    /// The force/torque sensor; none: simulated with the simulated arm where cell.toml has a `[wrench]`, else off.
+    pub wrench: Option<WrenchChoice>,
     /// Effects of the simulated cell.
     pub effects: Option<PathBuf>,
     /// Parameters of the simulated cell.
@@ -74,7 +82,53 @@ impl Settings {
                 text += &format!("{key} = {:?}\n", path.display().to_string());
             }
         }
+        for (key, choice) in [
+            ("gripper", self.gripper.as_ref().map(ToString::to_string)),
+            ("wrench", self.wrench.as_ref().map(ToString::to_string)),
+        ] {
+            if let Some(choice) = choice {
+                text += &format!("{key} = {choice:?}\n");
+            }
+        }
         text + &format!("realtime = {:?}\n", format!("{:?}", self.realtime))
+    }
+}
+
+impl Settings {
+    /// The gripper in force.
+    fn gripper(&self, cell: &Cell) -> GripperChoice {
+        let simulated = self.arm == ArmChoice::Sim && cell.gripper.is_some();
+        let default = if simulated { GripperChoice::Sim } else { GripperChoice::Off };
+        self.gripper.clone().unwrap_or(default)
+    }
+
+    /// The force sensor in force.
+    fn wrench(&self, cell: &Cell) -> Result<WrenchChoice> {
+        let simulated = self.arm == ArmChoice::Sim;
+        match &self.wrench {
+            Some(WrenchChoice::Sim) if !simulated => {
+                bail!("--wrench sim measures in the simulated cell; use it with --arm sim")
+            }
+            Some(choice) => Ok(choice.clone()),
+            None if simulated && cell.wrench.is_some() => Ok(WrenchChoice::Sim),
+            None => Ok(WrenchChoice::Off),
+        }
+    }
+
+    /// Puts gripper and force sensor to work.
+    fn instruments(
+        &self,
+        cell: &Cell,
+        wrenches: Option<Consumer<Wrench>>,
+        notices: &mpsc::Sender<Notice>,
+    ) -> Result<Vec<Service>> {
+        let gripper = self.gripper(cell).serve(cell, notices.clone())?;
+        let wrench = match (self.wrench(cell)?, wrenches) {
+            (WrenchChoice::Can(interface), _) => Some(wrench::serve_can(&interface, cell, notices.clone())?),
+            (WrenchChoice::Sim, Some(samples)) => Some(wrench::serve_simulated(samples, notices.clone())?),
+            _ => None,
+        };
+        Ok(gripper.into_iter().chain(wrench).collect())
     }
 }
 
@@ -106,6 +160,8 @@ pub fn run(settings: &Settings, stop: &Arc<AtomicBool>) -> Result<RunReport> {
         Pictures::None => None,
     };
 
+    let instruments = settings.instruments(&cell, devices.wrenches, &notices)?;
+
     let guard = Guard { limits: devices.plan.limits, workspace: Workspace::of(&cell), period_s: 1e-3 };
     let player = Player::new(guard, joints_from(&[]));
     let link = Link { beats: to_pump, remarks: to_words, chunks, pump: pump.thread() };
@@ -114,13 +170,14 @@ pub fn run(settings: &Settings, stop: &Arc<AtomicBool>) -> Result<RunReport> {
     let mut watch = Watch { node, recorder, notices, faults: Vec::new() };
     let measured = watch.over(settings, cycle, stop, &pump)?;
     drop(camera);
+    let missing: Vec<String> = instruments.into_iter().filter_map(Service::finish).collect();
     let pumped = pump.finish();
     let recorded = watch.recorder.and_then(RecorderChild::finish);
     if let Some(world) = devices.world {
         world.finish();
     }
     let pumped = pumped?;
-    let faults = pumped.faults.into_iter().chain(watch.faults).collect();
+    let faults = pumped.faults.into_iter().chain(watch.faults).chain(missing).collect();
     Ok(RunReport::new(&measured, &pumped.age, recorded, faults))
 }
 

@@ -7,11 +7,13 @@ use rtrb::{Consumer, Producer, RingBuffer};
 use shared_mem::cell::Cell;
 use shared_mem::msg::arm::{ArmCommand, ArmMode, ArmState, CommandInterface};
 use shared_mem::msg::object::ObjectPose;
+use shared_mem::msg::wrench::Wrench;
 use shared_mem::theta::Theta;
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
 use twin::scene::SceneSnapshot;
 use twin::sensors::tracker::SimTracker;
+use twin::sensors::wrench::SimWrench;
 use twin::sim::{Drive, SimCell, SimError};
 
 /// States and commands that can be under way: one of each in lock-step.
@@ -22,6 +24,9 @@ const SCENES: usize = 256;
 /// Poses that wait for the pump: more than a second at frame rate.
 const POSES: usize = 64;
 
+/// Force samples that wait for their thread: a quarter of a second at the highest rate.
+const WRENCHES: usize = 256;
+
 /// What the cell gives beside its arm.
 #[derive(Debug)]
 pub struct Views {
@@ -29,6 +34,8 @@ pub struct Views {
     pub scenes: Consumer<SceneSnapshot>,
     /// What the tracker sees, as it becomes known; `stamp_ns` is 0.
     pub poses: Consumer<ObjectPose>,
+    /// What the force sensor at the wrist measures; `stamp_ns` is 0.
+    pub wrenches: Consumer<Wrench>,
 }
 
 /// The world's ends of the rings.
@@ -37,6 +44,8 @@ struct Outlets {
     scenes: Producer<SceneSnapshot>,
     poses: Producer<ObjectPose>,
     tracker: SimTracker,
+    wrenches: Producer<Wrench>,
+    sensor: SimWrench,
 }
 
 /// The running cell. It ends when its [`SimArm`] is dropped.
@@ -55,14 +64,16 @@ impl World {
     /// # Panics
     /// When the operating system cannot make a thread.
     pub fn start(cell: &Cell, theta: Option<&Theta>) -> Result<(Self, SimArm, Views), SimError> {
-        let tracker = SimTracker::new(cell);
+        let (tracker, sensor) = (SimTracker::new(cell), SimWrench::new(cell));
         let mut cell = SimCell::new(cell, theta)?;
         let tracker = tracker.with_effects(cell.camera_effects());
         let (to_arm, states) = RingBuffer::new(IN_FLIGHT);
         let (commands, mut from_arm) = RingBuffer::<ArmCommand>::new(IN_FLIGHT);
         let (to_camera, scenes) = RingBuffer::new(SCENES);
         let (to_pump, poses) = RingBuffer::new(POSES);
-        let mut out = Outlets { states: to_arm, scenes: to_camera, poses: to_pump, tracker };
+        let (to_wrench, wrenches) = RingBuffer::new(WRENCHES);
+        let mut out =
+            Outlets { states: to_arm, scenes: to_camera, poses: to_pump, tracker, wrenches: to_wrench, sensor };
         let dof = cell.arm_model().map_or(0, twin::arm::ArmModel::dof);
         let body = move || {
             // It plays the robot, which is always in time; where that is not granted, late states count as lost packets.
@@ -79,7 +90,7 @@ impl World {
         };
         let handle = thread::Builder::new().name("world".into()).spawn(body).expect("threads can be made");
         let arm = SimArm { dof, states, commands, world: handle.thread().clone() };
-        Ok((Self { handle }, arm, Views { scenes, poses }))
+        Ok((Self { handle }, arm, Views { scenes, poses, wrenches }))
     }
 
     /// Waits for the thread, after its [`SimArm`] was dropped.
@@ -102,6 +113,11 @@ impl Outlets {
         let _scene = self.scenes.push(scene);
         if let Some(pose) = self.tracker.observe(&scene) {
             let _pose = self.poses.push(pose);
+        }
+        if !self.wrenches.is_abandoned()
+            && let Some(wrench) = self.sensor.observe(cell)
+        {
+            let _wrench = self.wrenches.push(wrench);
         }
     }
 }

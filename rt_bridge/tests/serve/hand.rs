@@ -1,7 +1,9 @@
-//! The hand's protocol, byte by byte.
+//! The hand: its protocol byte by byte, and driven by the bridge's own driver.
 
 use crate::Served;
+use rt_bridge::device::Device as _;
 use rt_bridge::serve::Pace;
+use shared_mem::msg::gripper::{GripperAction, GripperCommand, GripperState};
 use std::io::{Read, Write};
 use std::net::{TcpStream, UdpSocket};
 use std::time::Duration;
@@ -78,4 +80,43 @@ fn the_hand_homes_moves_and_grasps_nothing() {
     hand.ask(3, 5, &numbers(&[0.08, 0.001]));
     hand.ask(4, 6, &[]);
     assert_eq!([hand.reply(2), hand.reply(2)], [(5, vec![3, 0]), (6, vec![0, 0])]);
+}
+
+/// Rounds until the hand reports what is wanted.
+fn until(hand: &mut rt_bridge::fr3::Hand, order: Option<&GripperCommand>, wanted: impl Fn(&GripperState) -> bool) {
+    let mut order = order;
+    loop {
+        if let Some(state) = hand.round(order.take()).expect("the hand is there")
+            && wanted(&state)
+        {
+            return;
+        }
+    }
+}
+
+#[test]
+fn the_bridges_own_driver_moves_the_hand_and_misses_it_when_it_is_gone() {
+    let served = Served::start(Pace::Fast);
+    let mut hand = rt_bridge::fr3::Hand::connect(&served.hand.to_string()).expect("a hand");
+    let order = |action, width| GripperCommand { action, width, ..GripperCommand::default() };
+    until(&mut hand, Some(&order(GripperAction::Home, 0.0)), |state| state.width == 0.08);
+    until(&mut hand, Some(&order(GripperAction::Move, 0.03)), |state| state.width == 0.03 && state.width_d == 0.03);
+    // A newer order takes the place of one that is under way.
+    let slow = GripperCommand { speed: 1e-4, ..order(GripperAction::Move, 0.08) };
+    until(&mut hand, Some(&slow), |state| state.width_d == 0.08);
+    until(&mut hand, Some(&order(GripperAction::Move, 0.05)), |state| state.width == 0.05);
+    assert_eq!(hand.complaint(), None);
+    hand.round(Some(&order(GripperAction::Move, 0.5))).expect("the hand is there");
+    while hand.complaint().is_none() {
+        hand.round(None).expect("the hand is there");
+    }
+    drop(served);
+    let fault = loop {
+        if let Err(fault) = hand.round(None) {
+            break fault.to_string();
+        }
+    };
+    assert!(fault.contains("is gone") || fault.contains("does not answer"), "{fault}");
+    let refused = rt_bridge::fr3::Hand::connect("127.0.0.1:9").err().expect("nobody listens there").to_string();
+    assert!(refused.contains("cannot be opened (connection refused)"), "{refused}");
 }

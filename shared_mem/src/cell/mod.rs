@@ -4,15 +4,19 @@
 
 mod camera;
 mod controller;
+mod gripper;
 mod object;
 mod robot;
 mod simulation;
+mod wrench;
 
 pub use camera::{Camera, CameraPose, Intrinsics};
 pub use controller::{Controller, ControllerKind, Range};
+pub use gripper::{Gripper, GripperModel};
 pub use object::{Object, PoseNoise, Support};
 pub use robot::{Robot, Table, Tool, Topics};
 pub use simulation::Simulation;
+pub use wrench::{WrenchNoise, WrenchSensor};
 
 use crate::toml_file::{self, TomlFileError};
 use serde::{Deserialize, Serialize};
@@ -43,6 +47,12 @@ pub struct Cell {
     /// The camera.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub camera: Option<Camera>,
+    /// The gripper.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub gripper: Option<Gripper>,
+    /// The force/torque sensor.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub wrench: Option<WrenchSensor>,
     /// Where the simulated cell starts; the real one ignores it.
     #[serde(default, skip_serializing_if = "Simulation::is_default")]
     pub simulation: Simulation,
@@ -157,6 +167,12 @@ impl Cell {
         if let Some(camera) = &self.camera {
             camera.check()?;
         }
+        if let Some(gripper) = &self.gripper {
+            gripper.check()?;
+        }
+        if let Some(wrench) = &self.wrench {
+            wrench.check()?;
+        }
         Ok(())
     }
 }
@@ -207,6 +223,23 @@ mod tests {
     fn a_table_at_no_height_is_refused() {
         let error = parse("[table]\nheight = nan\n").unwrap_err();
         assert!(error.contains("table.height"), "{error}");
+    }
+
+    #[test]
+    fn gripper_and_force_sensor_are_known_by_their_model_and_their_place_on_the_bus() {
+        let cell = parse("[gripper]\nmodel = \"robotiq_2f_140\"\n[wrench]\ncan_id = 0x30\n").expect("known keys");
+        assert_eq!(cell.gripper.map(|gripper| (gripper.widest(), gripper.counts())), Some((0.14, [3, 230])));
+        assert_eq!(cell.wrench.map(|wrench| (wrench.can_id, wrench.rate)), Some((0x30, 500.0)));
+        assert_eq!(parse(&cell.to_toml()).expect("own text"), cell);
+        for (wrong, told) in [
+            ("[gripper]\nmodel = \"robotiq_2f_85\"\ncounts = [230, 3]\n", "gripper.counts"),
+            ("[gripper]\nmodel = \"robotiq\"\n", "robotiq_2f_85"),
+            ("[wrench]\ncan_id = 128\n", "wrench.can_id"),
+            ("[wrench]\nnoise = { force = -1.0 }\n", "wrench.noise.force"),
+        ] {
+            let error = parse(wrong).unwrap_err();
+            assert!(error.contains(told), "{error}");
+        }
     }
 
     #[test]

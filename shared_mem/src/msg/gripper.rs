@@ -1,4 +1,4 @@
-//! Gripper state.
+//! The gripper: what it does, and what it is told.
 
 use iceoryx2::prelude::ZeroCopySend;
 
@@ -19,4 +19,39 @@ pub struct GripperState {
     pub grasped: u32,
     /// The device's own fault code, 0 for none.
     pub fault: u32,
+}
+
+/// What the gripper is told. Topic `/gripper/command`.
+#[derive(Debug, Clone, Copy, PartialEq, Default, ZeroCopySend)]
+#[type_name("twinalign/GripperCommand/1")]
+#[repr(C)]
+pub struct GripperCommand {
+    /// When it was sent: monotonic clock [ns].
+    pub stamp_ns: u64,
+    /// Opening between the fingers to go to, or of the object to hold [m].
+    pub width: f64,
+    /// How fast; 0: as fast as it goes [m/s].
+    pub speed: f64,
+    /// How hard to hold; 0: as gently as it can [N].
+    pub force: f64,
+    /// What to do.
+    pub action: GripperAction,
+    /// Keeps the size a multiple of 8; always 0.
+    pub reserved: u32,
+}
+
+/// What a gripper can be told to do.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ZeroCopySend)]
+#[type_name("twinalign/GripperAction/1")]
+#[repr(C)]
+pub enum GripperAction {
+    /// Go to `width`.
+    #[default]
+    Move = 0,
+    /// Close until something of about `width` is held with `force`.
+    Grasp = 1,
+    /// Stay where the fingers are.
+    Stop = 2,
+    /// Find out how far the fingers go. They open and close once: keep clear.
+    Home = 3,
 }

@@ -1,10 +1,12 @@
-//! What the simulated cell's instruments report: encoders, a depth camera, an object tracker. Each takes the true
+//! What the simulated cell's instruments report: encoders, a depth camera, an object tracker, a force
+//! sensor. Each takes the true
 //! state of [`crate::sim::SimCell`] and adds what the real instrument adds: noise, latency, its own clock.
 
 pub mod camera;
 mod depth;
 pub mod joint;
 pub mod tracker;
+pub mod wrench;
 
 /// How far the simulated camera's clock is ahead of the simulated robot's [ns]: two devices never share an epoch.
 const CAMERA_EPOCH_NS: u64 = 86_400_123_456_789;

@@ -11,7 +11,7 @@ use crate::physics::TableObject;
 use crate::physics::hit::{ContactLaw, ContactMotion, Press};
 use crate::physics::touch::{Capsule, Touch};
 use crate::scene::ObjectParameters;
-use nalgebra::{Isometry3, Point3, Translation3};
+use nalgebra::{Isometry3, Point3, Translation3, Vector3};
 use shared_mem::cell::Tool;
 
 /// A gap that is wider than this plus a period's approach stays open for the period [m].
@@ -51,6 +51,8 @@ pub(super) struct ToolContact {
 pub(super) struct ContactRecord {
     /// Normal force, mean over the last period [N].
     pub(super) mean_force: f64,
+    /// Force on the tool and its moment about the base's origin, base frame, mean over the last period [N, N m].
+    pub(super) on_tool: [Vector3<f64>; 2],
     /// First touch and end of the last one, in simulated time [ns].
     pub(super) span: Option<(u64, u64)>,
     /// Periods for which the gap certainly stays open: nobody needs to look at it.
@@ -83,7 +85,7 @@ impl ToolContact {
 
     /// One period of arm and object from the simulated time `now_ns` on.
     pub(super) fn advance(&mut self, arm: &mut SimArm, object: &mut TableObject, drive: &Drive, now_ns: u64) {
-        self.record.mean_force = 0.0;
+        (self.record.mean_force, self.record.on_tool) = (0.0, Default::default());
         let Some((tool, motion, from)) = self.approaching(arm, object) else {
             arm.period(drive);
             object.step(PERIOD, &[]);
@@ -216,6 +218,11 @@ impl Close<'_> {
         let pressing: f64 = touches.iter().zip(&forces).map(|(touch, force)| force.dot(&touch.normal)).sum();
         self.contact.record.mean_force += pressing * dt / PERIOD;
         let on_tool = [0, 1].map(|i| (touches[i].point, -forces[i]));
+        let [force, moment] = &mut self.contact.record.on_tool;
+        for (point, push) in &on_tool {
+            *force += push * (dt / PERIOD);
+            *moment += point.coords.cross(push) * (dt / PERIOD);
+        }
         path.advance(dt, &on_tool, &tool.pose.translation.vector);
     }
 }

@@ -317,6 +317,13 @@ impl SimCell {
         self.contact.record.mean_force
     }
 
+    /// Force of the object on the tool [N] and its moment about the base's origin [N m], base frame, mean over the last
+    /// period.
+    #[must_use]
+    pub fn contact_wrench(&self) -> [Vector3<f64>; 2] {
+        self.contact.record.on_tool
+    }
+
     /// When tool and object touched first since the cell was made or the object was last set [ns of simulated time].
     #[must_use]
     pub fn first_contact_ns(&self) -> Option<u64> {

@@ -1,7 +1,8 @@
 //! The hand's port and clock: one client at a time, an action whose reply comes when it ends, states in between.
 
-use super::fingers::Fingers;
 use super::wire::{self, Request, Status};
+use crate::gripper::FRANKA_HAND;
+use crate::gripper::fingers::Fingers;
 use crate::serve::framing::{Inbox, Message};
 use crate::serve::session::read_into;
 use std::io::Write as _;
@@ -65,7 +66,7 @@ struct Client {
 fn serve(listener: &TcpListener, stop: &AtomicBool) -> std::io::Result<()> {
     listener.set_nonblocking(true)?;
     let udp = UdpSocket::bind(SocketAddr::new(listener.local_addr()?.ip(), 0))?;
-    let (mut fingers, mut client, begin) = (Fingers::new(), None::<Client>, Instant::now());
+    let (mut fingers, mut client, begin) = (Fingers::new(FRANKA_HAND), None::<Client>, Instant::now());
     while !stop.load(Ordering::Relaxed) {
         if client.is_none()
             && let Ok((tcp, peer)) = listener.accept()
@@ -74,7 +75,7 @@ fn serve(listener: &TcpListener, stop: &AtomicBool) -> std::io::Result<()> {
             tcp.set_nodelay(true)?;
             client = Some(Client { tcp, inbox: Inbox::of_the_hand(), states_to: None, peer, running: None });
         }
-        let ended = fingers.step(CYCLE.as_secs_f64());
+        let ended = fingers.step(CYCLE.as_secs_f64()).map(wire::status);
         let stamp_ms = u32::try_from(begin.elapsed().as_millis()).unwrap_or(u32::MAX);
         if let Some(served) = &mut client
             && served.cycle(&mut fingers, ended, &udp, stamp_ms).is_none()
@@ -122,7 +123,7 @@ impl Client {
                 self.cut_off(fingers)?;
                 match fingers.begin(action) {
                     Ok(()) => self.running = Some((number, id)),
-                    Err(status) => self.send(&wire::reply(number, id, status))?,
+                    Err(outcome) => self.send(&wire::reply(number, id, wire::status(outcome)))?,
                 }
                 Some(())
             }

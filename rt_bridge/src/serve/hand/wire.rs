@@ -1,6 +1,6 @@
 //! Between the bytes of the hand's protocol, version 3, and its actions. Pure, and total over bytes.
 
-use super::fingers::{Action, Fingers};
+use crate::gripper::fingers::{Action, Fingers, Outcome};
 use franka::wire::HeaderLayout;
 use franka::wire::gripper::{
     GRIPPER_COMMAND_PORT, GRIPPER_VERSION, GraspRequest, GripperCommand, GripperConnectRequest, GripperConnectStatus,
@@ -55,6 +55,15 @@ pub(super) fn connect_reply(id: u32, agreed: bool) -> Vec<u8> {
     message(GripperCommand::Connect.to_u16().into(), id, &payload)
 }
 
+/// How the protocol calls the end of an action.
+pub(super) fn status(outcome: Outcome) -> Status {
+    match outcome {
+        Outcome::Success => Status::Success,
+        Outcome::Unsuccessful => Status::Unsuccessful,
+        Outcome::Impossible => Status::Fail,
+    }
+}
+
 /// The reply to any other request.
 pub(super) fn reply(number: u32, id: u32, status: Status) -> Vec<u8> {
     message(number, id, &status.to_u16().to_le_bytes())
@@ -87,7 +96,7 @@ mod tests {
 
     #[test]
     fn messages_have_the_lengths_of_the_protocol() {
-        assert_eq!(state(&Fingers::new(), 7).len(), 23);
+        assert_eq!(state(&Fingers::new(crate::gripper::FRANKA_HAND), 7).len(), 23);
         assert_eq!(connect_reply(0, true).len(), 14);
         assert_eq!(reply(1, 0, Status::Success).len(), 12);
     }
@@ -96,7 +105,7 @@ mod tests {
         #[test]
         fn any_bytes_are_a_request_or_none(number in 0_u32..70_000, payload in proptest::collection::vec(any::<u8>(), 0..60)) {
             if let Some(Request::Act(action)) = request(number, &payload) {
-                let mut fingers = Fingers::new();
+                let mut fingers = Fingers::new(crate::gripper::FRANKA_HAND);
                 let _impossible = fingers.begin(action);
                 let _still_moving = fingers.step(0.01);
                 prop_assert!((0.0..=0.08).contains(&fingers.width()));

@@ -1,0 +1,195 @@
+//! The Franka Hand through its robot: version 3 of its protocol, port 1338. It sends its state some sixty times a second
+//! and answers an order when the fingers have come to its end.
+//!
+//! The bytes are `franka-rs`'s; its `Gripper` is not used, because it waits for the end of each order and a robot that falls
+//! silent would hang it.
+
+use super::session::{ipv4, reason};
+use crate::device::{Device, DeviceFault};
+use franka::network::Network;
+use franka::wire::gripper::{
+    GRIPPER_COMMAND_PORT, GRIPPER_VERSION, GraspRequest, GripperCommand as Command, GripperCommandResponse,
+    GripperConnectRequest, GripperConnectResponse, GripperMoveRequest, GripperState as WireState, GripperStatus,
+};
+use franka::wire::{HeaderLayout, parse_response};
+use shared_mem::msg::gripper::{GripperAction, GripperCommand, GripperState};
+use shared_mem::time::now_ns;
+use std::time::{Duration, Instant};
+use zerocopy::IntoBytes as _;
+
+/// How long a robot may take to accept the connection, and then to answer the handshake.
+const CONNECT_TIMEOUT: Duration = Duration::from_secs(2);
+/// How long one wait for a state lasts.
+const STATE_WAIT: Duration = Duration::from_millis(50);
+/// How long its states may pause before the hand counts as lost.
+const SILENCE: Duration = Duration::from_secs(1);
+/// How far the size of what is held may be from what was asked for [m].
+const EPSILON: f64 = 0.005;
+/// Speed of an order that names none [m/s]: 0.05 m/s a finger, from the data sheet.
+const FASTEST: f64 = 0.1;
+/// Force of an order that names none [N].
+const GENTLEST: f64 = 10.0;
+
+/// A connected hand.
+pub struct Hand {
+    device: String,
+    network: Network,
+    /// When the last state came.
+    heard: Instant,
+    last_id: u32,
+    /// Orders that are not answered yet.
+    under_way: Vec<u32>,
+    width_d: Option<f64>,
+    refused: bool,
+}
+
+impl Hand {
+    /// Connects to the hand of the robot at `host` (optionally with `:port`; 1338 where none is given).
+    ///
+    /// # Errors
+    /// [`DeviceFault::NotOpened`] when nobody answers there or another version does. At most some seconds pass.
+    pub fn connect(host: &str) -> Result<Self, DeviceFault> {
+        let device = format!("fci://{host}");
+        let failed = |why: String| DeviceFault::NotOpened {
+            device: device.clone(),
+            why,
+            remedy: "check the robot's address, that FCI is activated and that the hand is set up in its web page"
+                .into(),
+        };
+        let address = ipv4(host, GRIPPER_COMMAND_PORT).ok_or_else(|| failed("that name has no IPv4 address".into()))?;
+        let (address, layout) = (address.to_string(), HeaderLayout::Gripper);
+        let network =
+            Network::connect_with_timeouts(&address, GRIPPER_COMMAND_PORT, layout, CONNECT_TIMEOUT, STATE_WAIT)
+                .map_err(|e| failed(reason(&e)))?;
+        agree_on_version(&network).map_err(failed)?;
+        Ok(Self {
+            device,
+            network,
+            heard: Instant::now(),
+            last_id: 0,
+            under_way: Vec::new(),
+            width_d: None,
+            refused: false,
+        })
+    }
+
+    /// Sends an order; one that is under way is stopped first.
+    fn obey(&mut self, order: &GripperCommand) -> Result<(), DeviceFault> {
+        self.refused = false;
+        if !self.under_way.is_empty() || order.action == GripperAction::Stop {
+            self.send(Command::Stop, &[])?;
+        }
+        let speed = if order.speed > 0.0 { order.speed } else { FASTEST };
+        let force = if order.force > 0.0 { order.force } else { GENTLEST };
+        if order.action != GripperAction::Stop {
+            self.width_d = order.width.is_finite().then_some(order.width);
+        }
+        match order.action {
+            GripperAction::Stop => Ok(()),
+            GripperAction::Home => {
+                self.width_d = None;
+                self.send(Command::Homing, &[])
+            }
+            GripperAction::Move => self.send(Command::Move, GripperMoveRequest::new(order.width, speed).as_bytes()),
+            GripperAction::Grasp => {
+                let request = GraspRequest::new(order.width, EPSILON, EPSILON, speed, force);
+                self.send(Command::Grasp, request.as_bytes())
+            }
+        }
+    }
+
+    fn send(&mut self, command: Command, payload: &[u8]) -> Result<(), DeviceFault> {
+        let sent = self.network.tcp.send_request(command.to_u16().into(), payload);
+        self.under_way.push(sent.map_err(|e| self.gone(reason(&e)))?);
+        Ok(())
+    }
+
+    /// Takes note of orders that came to their end.
+    fn hear_answers(&mut self) -> Result<(), DeviceFault> {
+        for ticket in std::mem::take(&mut self.under_way) {
+            let answer = self.network.tcp.try_receive_response(ticket).map_err(|e| self.gone(reason(&e)))?;
+            let Some(message) = answer else {
+                self.under_way.push(ticket);
+                continue;
+            };
+            let status = parse_response::<GripperCommandResponse>(HeaderLayout::Gripper, &message)
+                .ok()
+                .and_then(|response| GripperStatus::from_u16(response.status.get()));
+            self.refused |= matches!(status, None | Some(GripperStatus::Fail));
+        }
+        Ok(())
+    }
+
+    fn gone(&self, why: String) -> DeviceFault {
+        DeviceFault::Gone { device: self.device.clone(), why }
+    }
+
+    /// The newest state that waits, or the next one; `None` when there is none within a while.
+    fn newest(&mut self) -> Option<WireState> {
+        let mut newest = self.network.blocking_receive_struct::<WireState>().ok();
+        // A datagram of another length is not the hand's and is passed over.
+        while let Ok(Some(newer)) = self.network.try_receive_struct::<WireState>() {
+            newest = Some(newer);
+        }
+        newest.filter(|state| state.message_id.get() > self.last_id)
+    }
+}
+
+impl Device for Hand {
+    type Sample = GripperState;
+    type Order = GripperCommand;
+
+    fn round(&mut self, order: Option<&GripperCommand>) -> Result<Option<GripperState>, DeviceFault> {
+        if let Some(order) = order {
+            self.obey(order)?;
+        }
+        self.hear_answers()?;
+        let Some(state) = self.newest() else {
+            self.network.tcp.throw_if_connection_closed().map_err(|_| self.gone("it closed the connection".into()))?;
+            if self.heard.elapsed() > SILENCE {
+                return Err(DeviceFault::Silent {
+                    device: self.device.clone(),
+                    check: "the robot's power and network",
+                });
+            }
+            return Ok(None);
+        };
+        (self.heard, self.last_id) = (Instant::now(), state.message_id.get());
+        let width = state.width.get();
+        Ok(Some(GripperState {
+            stamp_ns: now_ns(),
+            width,
+            width_d: self.width_d.unwrap_or(width),
+            // The hand does not tell how hard it holds.
+            force: 0.0,
+            grasped: u32::from(state.is_grasped != 0),
+            fault: 0,
+        }))
+    }
+
+    fn complaint(&self) -> Option<String> {
+        self.refused.then(|| "refused an order; home it, and ask for a width within its reach".into())
+    }
+}
+
+/// The handshake; why it failed.
+fn agree_on_version(network: &Network) -> Result<(), String> {
+    let request = GripperConnectRequest::new(GRIPPER_VERSION, network.udp.port());
+    let sent = network.tcp.send_request(Command::Connect.to_u16().into(), request.as_bytes());
+    let ticket = sent.map_err(|e| reason(&e))?;
+    let begin = Instant::now();
+    let message = loop {
+        match network.tcp.try_receive_response(ticket).map_err(|e| reason(&e))? {
+            Some(message) => break message,
+            None if begin.elapsed() > CONNECT_TIMEOUT => {
+                return Err("it accepts the connection but does not speak: another program may be connected".into());
+            }
+            None => std::thread::sleep(Duration::from_millis(1)),
+        }
+    };
+    let response: GripperConnectResponse = parse_response(HeaderLayout::Gripper, &message).map_err(|e| reason(&e))?;
+    match (response.status.get(), response.version.get()) {
+        (0, _) => Ok(()),
+        (_, theirs) => Err(format!("it speaks version {theirs}, this bridge speaks {GRIPPER_VERSION}")),
+    }
+}
