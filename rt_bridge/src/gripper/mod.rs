@@ -4,7 +4,7 @@
 //! | file | owns |
 //! |---|---|
 //! | `robotiq` | Modbus RTU, the Robotiq's registers, the serial port |
-//! | [`fingers`] | how simulated fingers move; `rt_bridge serve` moves its hand with them, too |
+//! | `fingers` | how simulated fingers move; `rt_bridge serve` moves its hand with them, too |
 //! | `sim` | the simulated gripper |
 //! | [`crate::fr3`] | the Franka Hand |
 

@@ -1,5 +1,5 @@
 //! The Franka Hand beside the arm: version 3 of its protocol, on a port of its own, with a clock of its own. Its fingers
-//! ([`crate::gripper::fingers`]) close on nothing: the cell has no object between them.
+//! (`crate::gripper`) close on nothing: the cell has no object between them.
 //!
 //! | file | owns |
 //! |---|---|
