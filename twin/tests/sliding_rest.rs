@@ -2,7 +2,9 @@
 
 use nalgebra::{Matrix3, Point3, UnitQuaternion, Vector2, Vector3};
 use shared_mem::cell::Support;
-use twin::sliding::{Coulomb, Ending, Footing, FreeBody, Patch, PlanarState, Slider, SlidingFriction, Solid, Wrench};
+use twin::sliding::{
+    Closeness, Coulomb, Ending, Footing, FreeBody, Patch, PlanarState, Slider, SlidingFriction, Solid, Wrench,
+};
 
 const MASS: f64 = 0.3;
 const MU: f64 = 0.3;
@@ -186,7 +188,7 @@ fn a_standing_body_comes_back_from_a_free_one_unchanged() {
     let state =
         PlanarState { position: Vector2::new(0.5, 0.1), yaw: 0.9, velocity: Vector2::new(0.2, -0.1), yaw_rate: 1.5 };
     let free = footing.release(&state);
-    let (again, found) = Footing::find(&solid(), &free, 0.2).expect("it stands");
+    let (again, found) = Footing::find(&solid(), &free, 0.2, Closeness::FLAT).expect("it stands");
     let back = again.release(&found);
     assert!((back.centre - free.centre).norm() < 1e-12 && back.rotation.angle_to(&free.rotation) < 1e-7);
     assert!(
@@ -200,7 +202,7 @@ fn a_standing_body_comes_back_from_a_free_one_unchanged() {
 fn a_body_that_leans_hovers_or_sinks_does_not_stand() {
     let footing = Footing::on(&solid(), UnitQuaternion::identity(), 0.0).expect("a face below");
     let standing = footing.release(&PlanarState::at_rest(Vector2::zeros(), 0.4));
-    assert!(Footing::find(&solid(), &standing, 0.0).is_some());
+    assert!(Footing::find(&solid(), &standing, 0.0, Closeness::FLAT).is_some());
     let lean = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), 0.01);
     let others = [
         FreeBody { rotation: lean * standing.rotation, ..standing },
@@ -209,7 +211,7 @@ fn a_body_that_leans_hovers_or_sinks_does_not_stand() {
         FreeBody { angular_velocity: Vector3::x() * 0.5, ..standing },
     ];
     for (i, body) in others.iter().enumerate() {
-        assert!(Footing::find(&solid(), body, 0.0).is_none(), "case {i}");
+        assert!(Footing::find(&solid(), body, 0.0, Closeness::LANDED).is_none(), "case {i}");
     }
 }
 

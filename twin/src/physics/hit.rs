@@ -5,6 +5,9 @@
 //! the contact's stiffness and the object's mass, as long as that takes a push and no pull. `zeta` follows from the
 //! restitution (Schwager, Pöschel 2007). The law states a motion, not a force: the force is whatever brings it about,
 //! more of it where the table stands behind the object. Friction: Coulomb. Base frame, SI.
+//!
+//! Once the oscillation has died down the tool just pushes. A [`Press::steady`] contact then takes steps many times longer
+//! than its oscillation: it goes to where it rests, and counts on what accelerates both sides meanwhile.
 
 use super::touch::Touch;
 use nalgebra::Vector3;
@@ -12,6 +15,12 @@ use nalgebra::Vector3;
 /// Angle of the oscillator in a step [rad]. Half of it moves the mean gap of the clips in `tests/sliding_clips.rs` by 0.3 mm
 /// at most, nearly all of it in one stroke of which every small change makes another.
 const STEP_ANGLE: f64 = 0.15;
+
+/// Friction on a table and an arm that slows down accelerate tool and object against each other by about this [m/s²]: a
+/// steady contact rests at the depth where the spring answers to it.
+const PUSHING: f64 = 3.0;
+/// A contact is steady while its oscillation adds less than this [m/s²].
+const CALM: f64 = 12.0;
 
 /// The law's numbers.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -31,8 +40,12 @@ pub struct Press {
     pub touch: Touch,
     /// Of the tool's point there [m/s].
     pub tool_velocity: Vector3<f64>,
+    /// Of the same point, were it not for the object [m/s²].
+    pub tool_acceleration: Vector3<f64>,
     /// What the law asks.
     pub motion: ContactMotion,
+    /// The step is too long to follow the oscillation, of which nothing is left.
+    pub steady: bool,
 }
 
 /// The law for one object: the oscillator that the depth follows.
@@ -77,8 +90,29 @@ impl Press {
         if self.touch.depth <= 0.0 {
             return f64::NEG_INFINITY;
         }
-        let rate = (self.tool_velocity - velocity).dot(&self.touch.normal);
-        -self.motion.approach_after(self.touch.depth, rate, dt)
+        let rate = self.approach(velocity);
+        let after = if self.steady { ContactMotion::approach_at_rest_after } else { ContactMotion::approach_after };
+        -after(&self.motion, self.touch.depth, rate, dt)
+    }
+
+    /// Velocity of the tool's point against which the object parts after `dt` [m/s].
+    pub(super) fn surface_velocity(&self, dt: f64) -> Vector3<f64> {
+        if self.steady { self.tool_velocity + self.tool_acceleration * dt } else { self.tool_velocity }
+    }
+
+    /// Whether nothing is left of the hit, and within `dt` no other begins, where the place moves with `velocity` [m/s].
+    #[must_use]
+    pub fn is_calm(&self, velocity: &Vector3<f64>, dt: f64) -> bool {
+        let (depth, rate) = (self.touch.depth, self.approach(velocity));
+        if depth > 0.0 {
+            self.motion.is_calm(depth, rate)
+        } else {
+            rate * dt < -depth || self.motion.is_calm(0.0, rate)
+        }
+    }
+
+    fn approach(&self, velocity: &Vector3<f64>) -> f64 {
+        (self.tool_velocity - velocity).dot(&self.touch.normal)
     }
 }
 
@@ -95,6 +129,20 @@ impl ContactMotion {
         // Spring by the depth before, damper by the mean speed: together with the depth that follows from the new speed
         // this neither feeds nor drains the oscillator.
         (rate * (1.0 - damping) - self.frequency * self.frequency * depth * dt) / (1.0 + damping)
+    }
+
+    /// The same for a step that may be longer than the oscillation: spring and damper by the end of the step, the way
+    /// by the mean speed. Whatever it starts from, it ends up at the depth of [`PUSHING`].
+    fn approach_at_rest_after(&self, depth: f64, rate: f64, dt: f64) -> f64 {
+        let angle = self.frequency * dt;
+        let half = 0.5 * angle * angle;
+        let spring = (self.frequency * self.frequency * depth - PUSHING) * dt;
+        (rate * (1.0 - half) - spring) / (1.0 + 2.0 * self.damping_ratio * angle + half)
+    }
+
+    fn is_calm(&self, depth: f64, rate: f64) -> bool {
+        let spring = self.frequency * self.frequency * depth - PUSHING;
+        spring.hypot(self.frequency * rate) < CALM
     }
 }
 
@@ -160,6 +208,10 @@ mod tests {
         Isometry3::from_parts((tip.coords + Vector3::z() * TOOL.segment).into(), turn)
     }
 
+    fn press(touch: Touch, tool_velocity: Vector3<f64>, law: ContactLaw) -> Press {
+        Press { touch, tool_velocity, tool_acceleration: Vector3::zeros(), motion: law.motion(0.3), steady: false }
+    }
+
     /// Flies the tool against the box along x at `speed`; velocity of tool and box (its centre) afterwards, at `tip_height`
     /// over the box's centre. No table; gravity is taken out of the result.
     fn collide(law: ContactLaw, speed: f64, tip_height: f64, offset: f64, dt: f64) -> (Vector3<f64>, TableObject, f64) {
@@ -169,7 +221,7 @@ mod tests {
         while time < 0.03 {
             let tool_velocity = velocity - Vector3::z() * fallen;
             let touches = object.touches(&TOOL, &upright(tip));
-            let presses = touches.map(|touch| Press { touch, tool_velocity, motion: law.motion(0.3) });
+            let presses = touches.map(|touch| press(touch, tool_velocity, law));
             let forces = object.step(dt, &presses);
             velocity -= (forces[0] + forces[1]) * (dt / TOOL_MASS);
             fallen += 9.81 * dt;
@@ -234,9 +286,7 @@ mod tests {
         let peak = |table: Option<f64>| {
             let mut object = TableObject::new(&box_model(), table, &Effects::default()).expect("a box");
             let touch = object.touch(&TOOL, &upright(Point3::new(-0.0519, 0.0, 0.045)));
-            let press =
-                Press { touch, tool_velocity: Vector3::x() * 0.5, motion: ContactLaw::nominal(0.0).motion(0.3) };
-            object.step(FINE, &[press])[0].x
+            object.step(FINE, &[press(touch, Vector3::x() * 0.5, ContactLaw::nominal(0.0))])[0].x
         };
         assert!(peak(Some(-0.05)) > 1.5 * peak(None), "{} {}", peak(Some(-0.05)), peak(None));
     }

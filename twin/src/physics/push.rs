@@ -4,7 +4,7 @@
 
 use super::hit::Press;
 use super::tumble::Tumbling;
-use crate::sliding::{Footing, FreeBody, Wrench};
+use crate::sliding::{Footing, FreeBody, PlanarState, Wrench};
 use nalgebra::Vector3;
 
 /// Sweeps over the two places, and the change of impulse over mass [m/s] below which they end early.
@@ -16,6 +16,8 @@ const STEEPEST: f64 = 0.95;
 /// A standing body that is pushed.
 struct Pushed<'a> {
     body: &'a FreeBody,
+    /// Of velocity and yaw rate without the push.
+    rates: Vector3<f64>,
     mass: f64,
     yaw_inertia: f64,
 }
@@ -37,7 +39,7 @@ impl Tumbling {
     /// The presses' forces on a body that goes on standing [N]; `None` when such a one could not give way to them.
     pub(super) fn push(
         &self,
-        footing: &Footing,
+        (footing, state): (&Footing, &PlanarState),
         body: &FreeBody,
         presses: &[Press],
         dt: f64,
@@ -45,7 +47,14 @@ impl Tumbling {
         if presses.iter().all(|press| press.touch.depth <= 0.0) {
             return Some([Vector3::zeros(); 2]);
         }
-        Pushed { body, mass: self.mass, yaw_inertia: footing.slider.yaw_inertia }.forces(presses, dt)
+        // In the short steps of a hit the table's friction is nothing against the push.
+        let rates = if presses.iter().any(|press| press.steady) {
+            let alone = self.wrench(footing, body, &[], &Default::default());
+            footing.slider.rates(state, &alone, &self.friction)
+        } else {
+            Vector3::zeros()
+        };
+        Pushed { body, rates, mass: self.mass, yaw_inertia: footing.slider.yaw_inertia }.forces(presses, dt)
     }
 
     /// What acts on a standing body but for the table's answer.
@@ -77,7 +86,9 @@ impl Pushed<'_> {
         if presses.iter().any(|press| press.touch.normal.z.abs() > STEEPEST) {
             return None;
         }
-        let (mut velocity, mut spin) = (self.body.velocity, self.body.angular_velocity.z);
+        let gain = self.rates * dt;
+        let mut velocity = self.body.velocity + Vector3::new(gain.x, gain.y, 0.0);
+        let mut spin = self.body.angular_velocity.z + gain.z;
         let place = |i: usize| presses.get(i).map(|press| self.place(press, dt));
         let mut places = [place(0), place(1)];
         let (per_mass, per_inertia) = (1.0 / self.mass, 1.0 / self.yaw_inertia);
@@ -104,7 +115,7 @@ impl Pushed<'_> {
         Place {
             lever,
             normal,
-            surface_velocity: press.tool_velocity,
+            surface_velocity: press.surface_velocity(dt),
             least_parting: press.least_parting(&before, dt),
             friction: press.motion.friction,
             normal_mass: 1.0 / (along / self.mass + turning * turning / self.yaw_inertia),

@@ -134,7 +134,7 @@ impl Press {
         Contact {
             lever,
             normal: self.touch.normal,
-            surface_velocity: self.tool_velocity,
+            surface_velocity: self.surface_velocity(dt),
             least_parting: self.least_parting(&velocity, dt),
             friction: self.motion.friction,
             ..Contact::NONE

@@ -210,10 +210,18 @@ impl Close<'_> {
 
     /// One step in touch.
     fn press(&mut self, path: &mut ToolPath, tool: &ToolMotion, touches: &[Touch; 2]) {
-        let left = path.left();
-        let dt = left / (left * self.contact.refinement / self.motion.step()).ceil();
-        let presses =
-            touches.map(|touch| Press { touch, tool_velocity: tool.velocity_at(&touch.point), motion: *self.motion });
+        let (left, longest) = (path.left(), self.motion.step().max(self.object.pushed_step()));
+        let mut presses = touches.map(|touch| Press {
+            touch,
+            tool_velocity: tool.velocity_at(&touch.point),
+            tool_acceleration: path.acceleration_at(tool, &touch.point),
+            motion: *self.motion,
+            steady: false,
+        });
+        let calm = presses.iter().all(|press| press.is_calm(&self.object.velocity_at(&press.touch.point), longest));
+        presses.iter_mut().for_each(|press| press.steady = calm);
+        let step = if calm { longest } else { self.motion.step() };
+        let dt = left / (left * self.contact.refinement / step).ceil();
         let forces = self.object.step(dt, &presses);
         let pressing: f64 = touches.iter().zip(&forces).map(|(touch, force)| force.dot(&touch.normal)).sum();
         self.contact.record.mean_force += pressing * dt / PERIOD;

@@ -93,6 +93,13 @@ impl ToolPath {
         }
     }
 
+    /// Acceleration of the tool's point that is at `point` now, were it not pushed; mean over the stretch [m/s²].
+    pub(super) fn acceleration_at(&self, now: &ToolMotion, point: &Point3<f64>) -> Vector3<f64> {
+        let linear = self.to.velocity - self.from.velocity;
+        let angular = self.to.angular_velocity - self.from.angular_velocity;
+        (linear + angular.cross(&(point.coords - now.pose.translation.vector))) / self.length
+    }
+
     /// Lets `dt` pass while `forces` act on the tool at places in the base frame.
     pub(super) fn advance(&mut self, dt: f64, forces: &[(Point3<f64>, Vector3<f64>)], origin: &Vector3<f64>) {
         let before = self.rate;

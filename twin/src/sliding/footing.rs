@@ -47,31 +47,46 @@ pub struct Footing {
     table_height: f64,
 }
 
-/// A body is taken as standing while its base leans less than this [rad], lies nearer to the table than [`GAP`] and
-/// each place of it rises or sinks slower than [`SINKING`]. What is dropped then is less than 1 % of the energy of a
-/// slide at 0.3 m/s.
+/// What counts as standing: how near the base must be to lying still on the table.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Closeness {
+    /// Each place of the base lies nearer to the table than this [m].
+    pub gap: f64,
+    /// Each place of the base rises or sinks slower than this [m/s].
+    pub sinking: f64,
+}
+
+impl Closeness {
+    /// For a body that is left alone. What is dropped then is less than 1 % of the energy of a slide at 0.3 m/s.
+    pub const LANDED: Self = Self { gap: 3e-4, sinking: 0.01 };
+    /// For one that leans against a tool: laid flat from farther away it would hit the tool.
+    pub const FLAT: Self = Self { gap: 1e-6, sinking: 1e-3 };
+}
+
+/// No body stands whose base leans more than this [rad].
 const LEAN: f64 = 2e-3;
-/// See [`LEAN`] [m].
-const GAP: f64 = 3e-4;
-/// See [`LEAN`] [m/s].
-const SINKING: f64 = 0.01;
 /// Corners up to this far above the lowest belong to the base [m].
 const BASE: f64 = 1e-3;
 
 impl Footing {
     /// The footing of a body that lies flat on the table and hardly moves up or down; `None` when it does not stand.
     #[must_use]
-    pub fn find(solid: &Solid<'_>, body: &FreeBody, table_height: f64) -> Option<(Self, PlanarState)> {
+    pub fn find(
+        solid: &Solid<'_>,
+        body: &FreeBody,
+        table_height: f64,
+        Closeness { gap, sinking }: Closeness,
+    ) -> Option<(Self, PlanarState)> {
         let turn = body.rotation.to_rotation_matrix();
         let place = |p: &Point3<f64>| turn * (p.coords - solid.centre_of_mass);
         let lowest = solid.corners.iter().map(|p| place(p).z).fold(f64::INFINITY, f64::min);
-        if (body.centre.z + lowest - table_height).abs() > GAP + BASE {
+        if (body.centre.z + lowest - table_height).abs() > gap + BASE {
             return None;
         }
         let base = || solid.corners.iter().map(place).filter(|p| p.z < lowest + BASE);
         let settled = base().all(|p| {
             let rising = body.velocity.z + body.angular_velocity.cross(&p).z;
-            rising.abs() < SINKING && (body.centre.z + p.z - table_height).abs() < GAP
+            rising.abs() < sinking && (body.centre.z + p.z - table_height).abs() < gap
         });
         if !settled {
             return None;

@@ -78,6 +78,23 @@ impl Slider {
         with_places!(self.patch, places => Step { slider: self, places, wrench, friction }.take(state, dt))
     }
 
+    /// Rates of velocity and yaw rate of a moving body now, world axes; zeros at rest and where the body would lift.
+    #[must_use]
+    pub fn rates(
+        &self,
+        state: &PlanarState,
+        wrench: &Wrench,
+        friction: &(impl SlidingFriction + ?Sized),
+    ) -> Vector3<f64> {
+        if state.is_at_rest() {
+            return Vector3::zeros();
+        }
+        let now = with_places!(self.patch, places => {
+            Step { slider: self, places, wrench, friction }.instant(state).map(|now| (now.acceleration, now.rates.z))
+        });
+        now.map_or_else(Vector3::zeros, |(acceleration, yaw)| Vector3::new(acceleration.x, acceleration.y, yaw))
+    }
+
     /// Turns what a wrench accelerates within `dt` into velocity at once; what is left of it only shifts the load.
     pub fn kick(&self, state: &mut PlanarState, wrench: &mut Wrench, dt: f64) {
         let planar = wrench.planar() * dt;
