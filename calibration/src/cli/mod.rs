@@ -4,6 +4,7 @@ mod benchmark;
 mod capture;
 mod compare;
 mod demo;
+mod export;
 mod identify;
 
 use calibration::diagnose;
@@ -23,6 +24,7 @@ Examples:
   calibration capture excitation --cell config/fr3_cell.toml --clips 4 --out session
   calibration identify arm session --out theta.toml --report page.html
   calibration diagnose session --report report.html
+  calibration export session --to ros2 --out bags
 Every verb has its own --help with an example. Logs and progress go to stderr (RUST_LOG=debug for more)."
 )]
 pub(crate) struct Arguments {
@@ -44,6 +46,8 @@ enum Verb {
     Diagnose(diagnose::command::Arguments),
     /// How often the diagnosis is right, on simulated worlds of which the truth is known.
     Benchmark(benchmark::BenchmarkArguments),
+    /// Writes a session as ROS 2 bags, TwinAligner clip folders or own clips.
+    Export(export::ExportArguments),
     /// The whole story on the simulated cell: shadow, record, replay, explain.
     Demo(demo::DemoArguments),
 }
@@ -63,6 +67,7 @@ pub(crate) fn run(arguments: Arguments) -> anyhow::Result<()> {
             if arguments.json { print_json(&found) } else { Ok(()) }
         }
         Verb::Benchmark(arguments) => benchmark::run(arguments, &interrupt),
+        Verb::Export(arguments) => export::run(&arguments),
         Verb::Demo(arguments) => demo::run(arguments, &interrupt),
     }
 }

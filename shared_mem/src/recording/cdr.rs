@@ -1,4 +1,4 @@
-//! Common Data Representation, the encoding of ROS 2 messages: bytes in, numbers and text out, no I/O.
+//! Common Data Representation, the encoding of ROS 2 messages: bytes to numbers and text and back, no I/O.
 //!
 //! A message starts with four bytes that name the byte order; every primitive is aligned to its own size counted from
 //! behind these four bytes (OMG DDS-RTPS 10.5; CDR 9.3). Lengths are compared with the bytes that are left before
@@ -116,6 +116,63 @@ impl<'a> CdrReader<'a> {
     pub(super) fn text_sequence(&mut self) -> Result<Vec<&'a str>, CdrError> {
         let count = self.count(4)?;
         (0..count).map(|_| self.text()).collect()
+    }
+}
+
+/// Writes one message from front to back, little-endian.
+#[derive(Debug, Clone, Default)]
+pub(super) struct CdrWriter {
+    payload: Vec<u8>,
+}
+
+impl CdrWriter {
+    fn primitive<const N: usize>(mut self, bytes: [u8; N]) -> Self {
+        self.payload.resize(self.payload.len().next_multiple_of(N), 0);
+        self.payload.extend(bytes);
+        self
+    }
+
+    pub(super) fn u8(self, value: u8) -> Self {
+        self.primitive([value])
+    }
+
+    pub(super) fn u32(self, value: u32) -> Self {
+        self.primitive(value.to_le_bytes())
+    }
+
+    pub(super) fn f64s(self, values: &[f64]) -> Self {
+        values.iter().fold(self, |writer, value| writer.primitive(value.to_le_bytes()))
+    }
+
+    pub(super) fn f64_sequence(self, values: &[f64]) -> Self {
+        self.count(values.len()).f64s(values)
+    }
+
+    pub(super) fn byte_sequence(self, bytes: &[u8]) -> Self {
+        let mut writer = self.count(bytes.len());
+        writer.payload.extend_from_slice(bytes);
+        writer
+    }
+
+    pub(super) fn text(self, text: &str) -> Self {
+        let mut writer = self.count(text.len() + 1);
+        writer.payload.extend_from_slice(text.as_bytes());
+        writer.payload.push(0);
+        writer
+    }
+
+    pub(super) fn text_sequence<'a>(self, texts: impl ExactSizeIterator<Item = &'a str>) -> Self {
+        let writer = self.count(texts.len());
+        texts.fold(writer, |writer, text| writer.text(text))
+    }
+
+    fn count(self, count: usize) -> Self {
+        self.u32(u32::try_from(count).unwrap_or(u32::MAX))
+    }
+
+    /// The message, behind the four bytes that name the encoding.
+    pub(super) fn message(self) -> Vec<u8> {
+        [vec![0, 1, 0, 0], self.payload].concat()
     }
 }
 

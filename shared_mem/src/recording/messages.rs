@@ -1,16 +1,16 @@
 //! All messages of a clip in the order they were recorded: for replaying arms and cameras, and for viewers.
 //!
-//! Own clips yield every payload; ROS 2 bags yield pictures and camera calibrations (their joints and poses are read as
-//! a whole by [`super::read_clip`]). Stamps of own clips are the recording machine's monotonic clock, of bags the
+//! Own clips yield every payload; ROS 2 bags yield pictures, camera calibrations, wrenches, a gripper's joint and log
+//! texts (their other joints and poses are read as a whole by [`super::read_clip`]). Stamps of own clips are the recording machine's monotonic clock, of bags the
 //! headers' Unix time [ns].
 
 use super::container::{Channel, Message, Messages};
 use super::error::ReadError;
 use super::picture::Picture;
-use super::ros2::{self, CameraCalibration, CompressedImage, Image};
+use super::ros2::{self, CameraCalibration, CompressedImage, Image, JointState, Log};
 use super::wire::{self, Wire, proto};
 use crate::msg::arm::{ArmCommand, ArmState};
-use crate::msg::event::Event;
+use crate::msg::event::{Event, EventLevel, EventSource};
 use crate::msg::gripper::GripperState;
 use crate::msg::image::CameraInfo;
 use crate::msg::object::ObjectPose;
@@ -45,15 +45,15 @@ pub enum Payload {
     CameraInfo(Box<CameraInfo>),
     /// `/camera/color`, `/camera/depth`, or a bag's `sensor_msgs/Image` or `CompressedImage`.
     Picture(Picture),
-    /// `/wrench`
+    /// `/wrench`, or a bag's `geometry_msgs/WrenchStamped`.
     Wrench(Wrench),
-    /// `/gripper`
+    /// `/gripper`, or a bag's joint `gripper_width`.
     Gripper(GripperState),
     /// `/twin/state`
     TwinState(Box<TwinState>),
     /// `/twin/gap`
     TwinGap(Box<TwinGap>),
-    /// `/events`
+    /// `/events`, or a bag's `rcl_interfaces/Log`.
     Event(Box<Event>),
 }
 
@@ -167,6 +167,40 @@ fn foreign(message: &Message<'_>) -> Result<Option<Payload>, String> {
             info.stamp_ns = stamp(info.stamp_ns);
             Payload::CameraInfo(Box::new(info.camera_info()?))
         }
+        ros2::WRENCH => {
+            let (header_ns, force, torque) = ros2::wrench(message.data).map_err(bad)?;
+            let stamp_ns = stamp(header_ns);
+            Payload::Wrench(Wrench { stamp_ns, device_ns: stamp_ns, force, torque, ..Wrench::default() })
+        }
+        ros2::LOG => Payload::Event(Box::new(event(&Log::decode(message.data).map_err(bad)?, stamp))),
+        JointState::TYPE => {
+            let joints = JointState::decode(message.data).map_err(bad)?;
+            let Some(state) = gripper(&joints, stamp) else { return Ok(None) };
+            Payload::Gripper(state)
+        }
         _ => return Ok(None),
     }))
+}
+
+/// A remark that a node logged.
+fn event(log: &Log<'_>, stamp: impl Fn(u64) -> u64) -> Event {
+    let level = match log.level {
+        0..30 => EventLevel::Info,
+        30..40 => EventLevel::Warning,
+        _ => EventLevel::Error,
+    };
+    let source = match log.name {
+        "recorder" => EventSource::Recorder,
+        "twin" => EventSource::Twin,
+        "capture" => EventSource::Capture,
+        _ => EventSource::Bridge,
+    };
+    Event { stamp_ns: stamp(log.stamp_ns), ..Event::new(level, source, log.text) }
+}
+
+/// A gripper's joint; `None` for other joints.
+fn gripper(joints: &JointState<'_>, stamp: impl Fn(u64) -> u64) -> Option<GripperState> {
+    let (&[ros2::GRIPPER_JOINT], &[width]) = (&joints.names[..], &joints.position[..]) else { return None };
+    let force = joints.effort.first().copied().unwrap_or(0.0);
+    Some(GripperState { stamp_ns: stamp(joints.stamp_ns), width, width_d: width, force, ..GripperState::default() })
 }

@@ -16,6 +16,7 @@
 //! | `checks` | faults that foreign logs have, each told in a sentence |
 //! | `wire`, `writer` | own clips: messages and file |
 //! | `recover` | a damaged file, rewritten |
+//! | `export` | a session in another format |
 //! | `clip`, `series`, `session` | what callers get |
 
 mod bag;
@@ -25,6 +26,7 @@ mod clip;
 mod container;
 mod device_clock;
 mod error;
+mod export;
 mod joint_log;
 mod messages;
 mod npy;
@@ -40,6 +42,7 @@ mod writer;
 
 pub use clip::{Clip, read_clip};
 pub use error::ReadError;
+pub use export::{ExportError, Exported, FlangeAt, Format, export_session};
 pub use messages::{ClipMessage, ClipMessages, Payload};
 pub use own::{read_arm_states, read_clip_info};
 pub use picture::Picture;

@@ -10,6 +10,12 @@ pub(super) const IMAGE: &str = "sensor_msgs/msg/Image";
 pub(super) const COMPRESSED_IMAGE: &str = "sensor_msgs/msg/CompressedImage";
 pub(super) const CAMERA_INFO: &str = "sensor_msgs/msg/CameraInfo";
 
+/// Types of devices and remarks.
+pub(super) const WRENCH: &str = "geometry_msgs/msg/WrenchStamped";
+pub(super) const LOG: &str = "rcl_interfaces/msg/Log";
+/// Joint of a gripper's `JointState`: its position is the width between the fingers.
+pub(super) const GRIPPER_JOINT: &str = "gripper_width";
+
 /// `sensor_msgs/msg/JointState`.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct JointState<'a> {
@@ -172,11 +178,42 @@ impl<'a> CameraCalibration<'a> {
     }
 }
 
+/// `geometry_msgs/msg/WrenchStamped`: stamp [ns], force [N] and torque [N m].
+pub(super) fn wrench(message: &[u8]) -> Result<(u64, [f64; 3], [f64; 3]), CdrError> {
+    let mut r = CdrReader::new(message)?;
+    let (stamp_ns, _frame) = header(&mut r)?;
+    Ok((stamp_ns, r.f64_array()?, r.f64_array()?))
+}
+
+/// `rcl_interfaces/msg/Log`, up to its text.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Log<'a> {
+    /// [ns]
+    pub(super) stamp_ns: u64,
+    /// 10 debug, 20 info, 30 warning, 40 error, 50 fatal.
+    pub(super) level: u8,
+    /// Who speaks.
+    pub(super) name: &'a str,
+    pub(super) text: &'a str,
+}
+
+impl<'a> Log<'a> {
+    pub(super) fn decode(message: &'a [u8]) -> Result<Self, CdrError> {
+        let mut r = CdrReader::new(message)?;
+        let stamp_ns = stamp(&mut r)?;
+        Ok(Self { stamp_ns, level: r.u8()?, name: r.text()?, text: r.text()? })
+    }
+}
+
 /// `std_msgs/msg/Header`: stamp [ns] and frame.
 fn header<'a>(r: &mut CdrReader<'a>) -> Result<(u64, &'a str), CdrError> {
+    Ok((stamp(r)?, r.text()?))
+}
+
+/// `builtin_interfaces/msg/Time` [ns].
+fn stamp(r: &mut CdrReader<'_>) -> Result<u64, CdrError> {
     let seconds = u64::try_from(r.i32()?).unwrap_or(0);
-    let nanoseconds = u64::from(r.u32()?);
-    Ok((seconds * 1_000_000_000 + nanoseconds, r.text()?))
+    Ok(seconds * 1_000_000_000 + u64::from(r.u32()?))
 }
 
 #[cfg(test)]
@@ -275,6 +312,8 @@ mod tests {
             let _ = Image::decode(&bytes);
             let _ = CompressedImage::decode(&bytes);
             let _ = CameraCalibration::decode(&bytes).map(|c| c.camera_info());
+            let _ = wrench(&bytes);
+            let _ = Log::decode(&bytes);
         }
     }
 

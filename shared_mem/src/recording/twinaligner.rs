@@ -105,6 +105,12 @@ fn read_poses(path: &Path, cell: &Cell, frames: &[Frame], clip: &mut Clip) -> Re
     Ok(())
 }
 
+/// When the pictures of a clip folder were taken [ns], on the clock of the clip that [`read`] makes of it.
+pub(super) fn picture_stamps_ns(path: &Path) -> Result<Vec<u64>, ReadError> {
+    let frames: Vec<Frame> = read_json(&path.join(FRAME))?;
+    Ok(picture_stamps(&frames, &mut Vec::new()).into_iter().map(nanoseconds).collect())
+}
+
 /// When the pictures were taken [s]; the times of the joint states where the camera's are missing or of another clock.
 fn picture_stamps(frames: &[Frame], warnings: &mut Vec<String>) -> Vec<f64> {
     let by_camera: Option<Vec<f64>> = frames.iter().map(|f| f.camera_timestamp).collect();
@@ -127,10 +133,15 @@ fn camera_from_object(m: &[f64]) -> Option<Pose<Camera, Object>> {
     let rotation = Matrix3::new(a, b, c, d, e, f, g, h, i);
     let finite = m.iter().all(|v| v.is_finite());
     let rigid = finite && (rotation * rotation.transpose() - Matrix3::identity()).norm() < 1e-2;
-    (rigid && rotation.determinant() > 0.0).then(|| {
-        let rotation = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix(&rotation));
-        Pose::from_isometry(Isometry3::from_parts(Translation3::new(x, y, z), rotation))
-    })
+    if !rigid || rotation.determinant() <= 0.0 {
+        return None;
+    }
+    // The rotation that is nearest. `Rotation3::from_matrix` looks for it step by step and never leaves the identity
+    // for a half turn.
+    let parts = rotation.svd(true, true);
+    let rotation = Rotation3::from_matrix_unchecked(parts.u? * parts.v_t?);
+    let turn = UnitQuaternion::from_rotation_matrix(&rotation);
+    Some(Pose::from_isometry(Isometry3::from_parts(Translation3::new(x, y, z), turn)))
 }
 
 /// Rows of seconds and joint positions as a log.

@@ -134,6 +134,12 @@ impl ClipWriter<File> {
         let file = File::create_new(path).map_err(|source| WriteError::Create { path: path.to_owned(), source })?;
         Self::with_sink(file, path, info)
     }
+
+    /// The same for messages of another time: `clock` takes their stamps to Unix time.
+    pub(super) fn create_stamped(path: &Path, info: &ClipInfo, clock: UnixClock) -> Result<Self, WriteError> {
+        let file = File::create_new(path).map_err(|source| WriteError::Create { path: path.to_owned(), source })?;
+        Self::with_clock(file, path, info, clock)
+    }
 }
 
 impl<W: Write> ClipWriter<W> {
@@ -142,7 +148,10 @@ impl<W: Write> ClipWriter<W> {
     /// # Errors
     /// [`WriteError`] when the sink refuses the first bytes.
     pub fn with_sink(sink: W, path: &Path, info: &ClipInfo) -> Result<Self, WriteError> {
-        let clock = UnixClock(crate::time::unix_offset_ns());
+        Self::with_clock(sink, path, info, UnixClock(crate::time::unix_offset_ns()))
+    }
+
+    fn with_clock(sink: W, path: &Path, info: &ClipInfo, clock: UnixClock) -> Result<Self, WriteError> {
         let bytes = Arc::new(AtomicU64::new(0));
         let failed = |error: McapError| WriteError::from_mcap(path, bytes.load(Ordering::Relaxed), &error);
         let counted = Counted { sink, bytes: Arc::clone(&bytes) };

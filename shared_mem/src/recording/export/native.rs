@@ -1,0 +1,198 @@
+//! A foreign clip as an own one. An own state holds what the arm did and what it was told at one moment, so both have to
+//! be stamped alike; what nobody recorded is 0.
+
+use super::super::cdr::CdrError;
+use super::super::container::Messages;
+use super::super::ros2::{JointState, StampedPose};
+use super::super::wire::UnixClock;
+use super::super::writer::{ClipInfo, ClipWriter};
+use super::super::{Payload, Picture, ReadError};
+use super::rosbag::{EXTERNAL_TORQUES, FLANGE_POSE};
+use super::source::{Beside, Kind, Source};
+use super::{ExportError, Exported, FlangeAt};
+use crate::cell::Cell;
+use crate::frames::{Base, Flange, Pose};
+use crate::msg::arm::{ArmMode, ArmState};
+use crate::msg::event::Event;
+use crate::msg::gripper::GripperState;
+use crate::msg::image::{CameraInfo, ImageHeader, PixelEncoding};
+use crate::msg::object::ObjectPose;
+use crate::msg::wrench::Wrench;
+use crate::msg::{Joints, joints_from};
+use crate::topics;
+use std::collections::HashMap;
+use std::path::Path;
+
+/// Writes the clip.
+pub(super) fn write(
+    source: &Source,
+    cell: &Cell,
+    target: &Path,
+    flange_at: FlangeAt<'_>,
+) -> Result<Exported, ExportError> {
+    let clip = &source.clip;
+    let unfit = |what: &str| ExportError::Unfit { path: source.path.clone(), what: what.to_owned() };
+    if matches!(source.kind, Kind::Own(_)) {
+        return Err(unfit("is an own clip already; choose another format with --to"));
+    }
+    if clip.measured.stamps_ns != clip.desired.stamps_ns {
+        return Err(unfit(
+            "stamps what the arm did and what it was told at different moments, which an own clip cannot hold without \
+             guessing; every command reads it as it is, and a ROS 2 bag holds it as it is",
+        ));
+    }
+    let mut exported = Exported::of(source, target);
+    let info = ClipInfo {
+        cell_toml: Some(cell.to_toml()),
+        configuration: String::new(),
+        program: concat!("twinalign ", env!("CARGO_PKG_VERSION"), ", export").into(),
+    };
+    let mut writer = ClipWriter::create_stamped(target, &info, UnixClock(0))?;
+    let known = if matches!(source.kind, Kind::Bag) { Known::read(&source.path)? } else { Known::default() };
+    let latency_ns = cell.camera.as_ref().map_or(0, |camera| (camera.latency * 1e9) as u64);
+    let mut rows = Rows { source, known, flange_at, latency_ns, state: 0, pose: 0 };
+    for beside in source.beside()? {
+        let beside = beside?;
+        rows.put_until(beside.stamp_ns, &mut writer)?;
+        exported.pictures += usize::from(matches!(beside.payload, Payload::Picture(_)));
+        put_beside(beside, cell, latency_ns, &mut writer, &mut exported)?;
+    }
+    rows.put_until(u64::MAX, &mut writer)?;
+    writer.finish()?;
+    Ok(exported)
+}
+
+fn put_beside(
+    beside: Beside,
+    cell: &Cell,
+    latency_ns: u64,
+    writer: &mut ClipWriter,
+    exported: &mut Exported,
+) -> Result<(), ExportError> {
+    let stamp_ns = beside.stamp_ns;
+    match beside.payload {
+        Payload::Picture(Picture::Pixels { header, pixels }) => {
+            let topic = match header.encoding {
+                PixelEncoding::Rgb8 => topics::CAMERA_COLOR,
+                PixelEncoding::Depth16 => topics::CAMERA_DEPTH,
+            };
+            // An own picture is stamped when it arrived.
+            writer.image(topic, &ImageHeader { stamp_ns: stamp_ns + latency_ns, ..header }, &pixels)?;
+        }
+        Payload::Picture(Picture::Compressed { .. }) => {
+            exported.pictures -= 1;
+            let what = "compressed pictures have no room in an own clip; a ROS 2 bag holds them";
+            if !exported.warnings.iter().any(|w| w == what) {
+                exported.warnings.push(what.into());
+            }
+        }
+        Payload::CameraInfo(info) => {
+            let stands = cell.camera.as_ref().map(|camera| camera.pose);
+            let (position, wxyz) = stands.map_or((info.position, info.wxyz), |pose| (pose.position, pose.orientation));
+            writer.camera_info(&CameraInfo { stamp_ns, position, wxyz, ..*info })?;
+        }
+        Payload::Wrench(wrench) => writer.wrench(&Wrench { stamp_ns, ..wrench })?,
+        Payload::Gripper(gripper) => writer.gripper(&GripperState { stamp_ns, ..gripper })?,
+        Payload::Event(event) => writer.event(&Event { stamp_ns, ..*event })?,
+        _ => {}
+    }
+    Ok(())
+}
+
+/// States and poses, written in between the rest in the order of their stamps.
+struct Rows<'a> {
+    source: &'a Source,
+    known: Known,
+    flange_at: FlangeAt<'a>,
+    latency_ns: u64,
+    state: usize,
+    pose: usize,
+}
+
+impl Rows<'_> {
+    fn put_until(&mut self, stamp_ns: u64, writer: &mut ClipWriter) -> Result<(), ExportError> {
+        let clip = &self.source.clip;
+        loop {
+            let state = clip.measured.stamps_ns.get(self.state).copied();
+            let pose = clip.object.stamps_ns.get(self.pose).copied();
+            let Some(first) = state.into_iter().chain(pose).min().filter(|first| *first <= stamp_ns) else {
+                return Ok(());
+            };
+            if state == Some(first) {
+                writer.arm_state(&self.arm_state(self.state, first))?;
+                self.state += 1;
+            }
+            if pose == Some(first) {
+                let pose = &clip.object.poses[self.pose];
+                writer.object_pose(&ObjectPose {
+                    // An own pose is stamped when it became known.
+                    stamp_ns: first + self.latency_ns,
+                    device_ns: first,
+                    sequence: self.pose as u64,
+                    position: pose.position(),
+                    wxyz: pose.wxyz(),
+                    ..ObjectPose::default()
+                })?;
+                self.pose += 1;
+            }
+        }
+    }
+
+    fn arm_state(&self, row: usize, stamp_ns: u64) -> ArmState {
+        let clip = &self.source.clip;
+        let of = |values: Option<&[f64]>| joints_from(values.unwrap_or(&[]));
+        let q = clip.measured.q_row(row);
+        let flange = self.known.flange.get(&stamp_ns).copied().or_else(|| {
+            let (position, wxyz) = (self.flange_at)(q)?;
+            Pose::from_parts(position, wxyz)
+        });
+        let mut state = ArmState {
+            stamp_ns,
+            device_ns: stamp_ns,
+            cycle: row as u64,
+            dof: clip.measured.dof as u32,
+            mode: ArmMode::Other,
+            q: joints_from(q),
+            dq: of(clip.measured.dq_row(row)),
+            q_d: joints_from(clip.desired.q_row(row)),
+            dq_d: of(clip.desired.dq_row(row)),
+            tau_J: of(clip.measured.tau_row(row)),
+            tau_J_d: of(clip.desired.tau_row(row)),
+            tau_ext: self.known.tau_ext.get(&stamp_ns).copied().unwrap_or_default(),
+            ..ArmState::default()
+        };
+        if let Some(flange) = flange {
+            state.O_T_EE.copy_from_slice(flange.isometry().to_homogeneous().as_slice());
+        }
+        state
+    }
+}
+
+/// What a bag may hold beside the two joint topics, by stamp.
+#[derive(Debug, Default)]
+struct Known {
+    tau_ext: HashMap<u64, Joints>,
+    flange: HashMap<u64, Pose<Base, Flange>>,
+}
+
+impl Known {
+    fn read(path: &Path) -> Result<Self, ReadError> {
+        let (mut messages, mut known) = (Messages::open(path)?, Self::default());
+        while let Some(message) = messages.next()? {
+            let topic = &message.channel.topic;
+            let bad = |e: CdrError| ReadError::content(path, topic, e.to_string());
+            match (topic.as_str(), message.channel.type_name()) {
+                (EXTERNAL_TORQUES, JointState::TYPE) => {
+                    let joints = JointState::decode(message.data).map_err(bad)?;
+                    known.tau_ext.insert(joints.stamp_ns, joints_from(&joints.effort));
+                }
+                (FLANGE_POSE, StampedPose::POSE_TYPE) => {
+                    let pose = StampedPose::decode(message.data, false).map_err(bad)?;
+                    known.flange.extend(Pose::from_parts(pose.position, pose.wxyz).map(|p| (pose.stamp_ns, p)));
+                }
+                _ => {}
+            }
+        }
+        Ok(known)
+    }
+}

@@ -1,0 +1,178 @@
+//! A clip as a ROS 2 bag that `ros2 bag play` and Foxglove open, under the topic names of cell.toml's `[topics]`.
+
+use super::super::ros2::{self, JointState, StampedPose};
+use super::super::{Payload, Picture};
+use super::definitions::definition;
+use super::encode;
+use super::source::{Beside, Source};
+use super::{ExportError, Exported};
+use crate::cell::Cell;
+use crate::frames::{Flange, Pose};
+use crate::msg::image::PixelEncoding;
+use mcap::records::MessageHeader;
+use mcap::{Compression, WriteOptions};
+use std::collections::{BTreeMap, HashMap};
+use std::fs::File;
+use std::io::{self, BufWriter};
+use std::path::Path;
+
+/// Topics that cell.toml does not name.
+pub(super) const EXTERNAL_TORQUES: &str = "/franka_robot_state_broadcaster/external_joint_torques";
+pub(super) const FLANGE_POSE: &str = "/franka_robot_state_broadcaster/current_pose";
+const COLOR: &str = "/camera/color/image_raw";
+const COLOR_COMPRESSED: &str = "/camera/color/image_raw/compressed";
+const DEPTH: &str = "/camera/aligned_depth_to_color/image_raw";
+const INFO: &str = "/camera/color/camera_info";
+const WRENCH: &str = "/wrench";
+const GRIPPER: &str = "/gripper/joint_states";
+const EVENTS: &str = "/events";
+/// Frame of a force sensor at the flange.
+const FLANGE: &str = "fr3_link8";
+
+/// Writes the bag.
+pub(super) fn write(source: &Source, cell: &Cell, target: &Path) -> Result<Exported, ExportError> {
+    let mut exported = Exported::of(source, target);
+    let failed = |error: mcap::McapError| ExportError::file(target)(io::Error::other(error.to_string()));
+    let file = File::create_new(target).map_err(ExportError::file(target))?;
+    let mut bag = Bag::create(file).map_err(failed)?;
+    let mut rows = Rows::new(source, cell);
+    for beside in source.beside()? {
+        let beside = beside?;
+        rows.put_until(beside.stamp_ns, &mut bag).map_err(failed)?;
+        exported.pictures += usize::from(matches!(beside.payload, Payload::Picture(_)));
+        put_beside(&beside, source.unix_ns(beside.stamp_ns), &mut bag).map_err(failed)?;
+    }
+    rows.put_until(u64::MAX, &mut bag).map_err(failed)?;
+    bag.mcap.finish().map_err(failed)?;
+    Ok(exported)
+}
+
+fn put_beside(beside: &Beside, unix_ns: u64, bag: &mut Bag) -> Result<(), mcap::McapError> {
+    match &beside.payload {
+        Payload::Picture(picture) => {
+            let topic = match picture {
+                Picture::Compressed { .. } => COLOR_COMPRESSED,
+                Picture::Pixels { header, .. } if header.encoding == PixelEncoding::Depth16 => DEPTH,
+                Picture::Pixels { .. } => COLOR,
+            };
+            let (kind, message) = encode::picture(unix_ns, picture);
+            bag.put(topic, kind, unix_ns, &message)
+        }
+        Payload::CameraInfo(info) => bag.put(INFO, ros2::CAMERA_INFO, unix_ns, &encode::camera_info(unix_ns, info)),
+        Payload::Wrench(wrench) => bag.put(WRENCH, ros2::WRENCH, unix_ns, &encode::wrench(unix_ns, FLANGE, wrench)),
+        Payload::Gripper(gripper) => {
+            let names = [ros2::GRIPPER_JOINT.to_owned()];
+            let message = encode::joint_state(unix_ns, &names, [&[gripper.width], &[], &[gripper.force]]);
+            bag.put(GRIPPER, JointState::TYPE, unix_ns, &message)
+        }
+        Payload::Event(event) => bag.put(EVENTS, ros2::LOG, unix_ns, &encode::log(unix_ns, event)),
+        _ => Ok(()),
+    }
+}
+
+/// Joints, poses and states, which are written in between the rest in the order of their stamps.
+struct Rows<'a> {
+    source: &'a Source,
+    cell: &'a Cell,
+    frame: String,
+    /// Next row of measured joints, desired joints and poses.
+    next: [usize; 3],
+    states: std::iter::Peekable<Box<dyn Iterator<Item = (u64, &'a crate::msg::arm::ArmState)> + 'a>>,
+}
+
+impl<'a> Rows<'a> {
+    fn new(source: &'a Source, cell: &'a Cell) -> Self {
+        let frame = cell.robot.as_ref().and_then(|robot| robot.base_frame.clone()).unwrap_or_else(|| "base".into());
+        let states: Box<dyn Iterator<Item = _>> = Box::new(source.states());
+        Self { source, cell, frame, next: [0; 3], states: states.peekable() }
+    }
+
+    /// Writes every row that is not later than `stamp_ns`.
+    fn put_until(&mut self, stamp_ns: u64, bag: &mut Bag) -> Result<(), mcap::McapError> {
+        let clip = &self.source.clip;
+        let (object, topics) = (&clip.object, &self.cell.topics);
+        loop {
+            let due = [&clip.measured.stamps_ns, &clip.desired.stamps_ns, &object.stamps_ns];
+            let due: [Option<u64>; 3] = std::array::from_fn(|i| due[i].get(self.next[i]).copied());
+            let state = self.states.peek().map(|(stamp, _)| *stamp);
+            let Some(first) = due.into_iter().chain([state]).flatten().min().filter(|first| *first <= stamp_ns) else {
+                return Ok(());
+            };
+            let unix_ns = self.source.unix_ns(first);
+            for (kind, (series, topic)) in
+                [(&clip.measured, &topics.measured), (&clip.desired, &topics.desired)].into_iter().enumerate()
+            {
+                if due[kind] == Some(first) {
+                    let row = self.next[kind];
+                    let of = |values: Option<&'a [f64]>| values.unwrap_or(&[]);
+                    let numbers = [series.q_row(row), of(series.dq_row(row)), of(series.tau_row(row))];
+                    let message = encode::joint_state(unix_ns, &clip.joint_names, numbers);
+                    bag.put(topic, JointState::TYPE, unix_ns, &message)?;
+                    self.next[kind] += 1;
+                }
+            }
+            if due[2] == Some(first) {
+                let pose = &object.poses[self.next[2]];
+                let message = encode::pose(unix_ns, &self.frame, pose.position(), pose.wxyz());
+                bag.put(&topics.object_pose, StampedPose::POSE_TYPE, unix_ns, &message)?;
+                self.next[2] += 1;
+            }
+            if state == Some(first)
+                && let Some((_, state)) = self.states.next()
+            {
+                let dof = (state.dof as usize).min(state.tau_ext.len());
+                let torques = [&[], &[], &state.tau_ext[..dof]];
+                let message = encode::joint_state(unix_ns, &clip.joint_names, torques);
+                bag.put(EXTERNAL_TORQUES, JointState::TYPE, unix_ns, &message)?;
+                if let Some(flange) = flange(&state.O_T_EE) {
+                    let message = encode::pose(unix_ns, &self.frame, flange.position(), flange.wxyz());
+                    bag.put(FLANGE_POSE, StampedPose::POSE_TYPE, unix_ns, &message)?;
+                }
+            }
+        }
+    }
+}
+
+/// Pose of a column-major 4x4; `None` where it is no rigid transform.
+fn flange(m: &[f64; 16]) -> Option<Pose<crate::frames::Base, Flange>> {
+    use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion};
+    let rotation = Matrix3::new(m[0], m[4], m[8], m[1], m[5], m[9], m[2], m[6], m[10]);
+    let rigid = (rotation * rotation.transpose() - Matrix3::identity()).norm() < 1e-3 && rotation.determinant() > 0.0;
+    rigid.then(|| {
+        let turn = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(rotation));
+        Pose::from_isometry(Isometry3::from_parts(Translation3::new(m[12], m[13], m[14]), turn))
+    })
+}
+
+/// A bag that is being written.
+struct Bag {
+    mcap: mcap::Writer<BufWriter<File>>,
+    /// Channel and next sequence number of each topic.
+    channels: HashMap<String, (u16, u32)>,
+}
+
+impl Bag {
+    fn create(file: File) -> Result<Self, mcap::McapError> {
+        let options = WriteOptions::new()
+            .profile("ros2")
+            .library(concat!("twinalign ", env!("CARGO_PKG_VERSION")))
+            .compression(Some(Compression::Zstd))
+            .compression_threads(0);
+        Ok(Self { mcap: options.create(BufWriter::new(file))?, channels: HashMap::new() })
+    }
+
+    fn put(&mut self, topic: &str, kind: &str, unix_ns: u64, message: &[u8]) -> Result<(), mcap::McapError> {
+        let (channel_id, sequence) = match self.channels.get(topic) {
+            Some(known) => *known,
+            None => {
+                let schema = self.mcap.add_schema(kind, "ros2msg", definition(kind).as_bytes())?;
+                // rosbag2 asks for the key even where it is empty.
+                let metadata = BTreeMap::from([("offered_qos_profiles".to_owned(), String::new())]);
+                (self.mcap.add_channel(schema, topic, "cdr", &metadata)?, 0)
+            }
+        };
+        self.channels.insert(topic.to_owned(), (channel_id, sequence.wrapping_add(1)));
+        let header = MessageHeader { channel_id, sequence, log_time: unix_ns, publish_time: unix_ns };
+        self.mcap.write_to_known_channel(&header, message)
+    }
+}

@@ -1,0 +1,240 @@
+//! Sessions there and back: what a format can hold survives it, what it cannot is told, and nothing is guessed.
+
+use shared_mem::cell::{Cell, ClipKind};
+use shared_mem::msg::arm::ArmState;
+use shared_mem::msg::event::{Event, EventLevel, EventSource};
+use shared_mem::msg::gripper::GripperState;
+use shared_mem::msg::image::{CameraInfo, ImageHeader, PixelEncoding};
+use shared_mem::msg::object::ObjectPose;
+use shared_mem::msg::wrench::Wrench;
+use shared_mem::recording::{
+    Clip, ClipInfo, ClipMessages, ClipWriter, Exported, Format, Payload, Picture, Session, export_session,
+    read_arm_states,
+};
+use shared_mem::topics;
+use std::path::{Path, PathBuf};
+
+const CELL: &str = "[robot]\nmodel = \"fr3\"\nbase_frame = \"fr3_link0\"\n\
+    [controller]\nkind = \"joint_impedance\"\nstiffness = [600, 600, 600, 600, 250, 150, 50]\ndamping = [50, 50, 50, 50, 30, 25, 15]\n\
+    [camera]\nlatency = 0.01\npose = { position = [1.0, 0.0, 0.5], orientation = [0.0, 1.0, 0.0, 0.0] }\n\
+    [[clip]]\nfile = \"clip_00.mcap\"\nkind = \"control_hit_slide\"\n";
+const START: u64 = 5_000_000_000;
+const MS: u64 = 1_000_000;
+
+/// A rigid transform with no number that is round.
+fn flange(t: f64) -> [f64; 16] {
+    let turn = nalgebra::UnitQuaternion::from_euler_angles(0.3, -0.2 + t, 0.7);
+    let pose = nalgebra::Isometry3::from_parts(nalgebra::Translation3::new(0.4 + t, 0.1, 0.3), turn);
+    let mut out = [0.0; 16];
+    out.copy_from_slice(pose.to_homogeneous().as_slice());
+    out
+}
+
+fn state(i: u64) -> ArmState {
+    let t = 1e-3 * i as f64;
+    let row =
+        |scale: f64| std::array::from_fn(|j| if j < 7 { scale * (t * (1.0 + 0.1 * j as f64)).sin() } else { 0.0 });
+    ArmState {
+        // The robot's clock is even, this machine's is not.
+        stamp_ns: START + i * MS + (i * 7919) % 60_000,
+        device_ns: 777 + i * MS,
+        cycle: i,
+        dof: 7,
+        q: row(1.0),
+        dq: row(0.9),
+        q_d: row(1.01),
+        dq_d: row(0.91),
+        tau_J: row(20.0),
+        tau_J_d: row(2.0),
+        tau_ext: row(0.3),
+        O_T_EE: flange(t),
+        ..ArmState::default()
+    }
+}
+
+/// 0.4 s of everything.
+fn record(folder: &Path) -> Session {
+    std::fs::write(folder.join("cell.toml"), CELL).expect("room");
+    let mut writer = ClipWriter::create(&folder.join("clip_00.mcap"), &ClipInfo::default()).expect("a new file");
+    let known =
+        CameraInfo { stamp_ns: START, width: 4, height: 2, intrinsics: [3.0, 3.5, 1.5, 0.5], ..CameraInfo::default() };
+    writer.camera_info(&known).expect("room");
+    for i in 0..400 {
+        let state = state(i);
+        writer.arm_state(&state).expect("room");
+        let stamp_ns = state.stamp_ns + 100;
+        if i % 2 == 0 {
+            let force = [0.1 * i as f64, -2.5, 1.0 / 3.0];
+            writer.wrench(&Wrench { stamp_ns, force, torque: [0.1, 0.2, 0.3], ..Wrench::default() }).expect("room");
+        }
+        if i % 20 == 0 {
+            let width = 0.08 - 1e-4 * i as f64;
+            writer.gripper(&GripperState { stamp_ns, width, force: 20.0, ..GripperState::default() }).expect("room");
+        }
+        if i % 33 == 0 {
+            let (x, half) = (0.5 + 1e-3 * i as f64 / 3.0, 0.02 * i as f64);
+            let wxyz = [half.cos(), 0.0, 0.0, half.sin()];
+            writer
+                .object_pose(&ObjectPose { stamp_ns, position: [x, 0.1, 0.05], wxyz, ..ObjectPose::default() })
+                .expect("room");
+            let header = ImageHeader { stamp_ns, width: 4, height: 2, stride: 12, ..ImageHeader::default() };
+            let pixels: Vec<u8> = (0..24).map(|k| (i + k) as u8).collect();
+            writer.image(topics::CAMERA_COLOR, &header, &pixels).expect("room");
+            let depth = ImageHeader { stride: 8, encoding: PixelEncoding::Depth16, depth_scale: 1e-3, ..header };
+            writer.image(topics::CAMERA_DEPTH, &depth, &pixels[..16]).expect("room");
+        }
+    }
+    let event = Event::new(EventLevel::Warning, EventSource::Capture, "the object left its place");
+    writer.event(&Event { stamp_ns: START + 400 * MS, ..event }).expect("room");
+    writer.finish().expect("room");
+    Session::open(folder).expect("a session")
+}
+
+/// Exports into a new folder.
+fn export(session: &Session, to: Format, into: &Path) -> (Session, Vec<Exported>) {
+    let flange_at = |q: &[f64]| Some(([q[0], 0.0, 0.5], [1.0, 0.0, 0.0, 0.0]));
+    let done = export_session(session, to, into, &flange_at, |_| {}).unwrap_or_else(|e| panic!("{e}"));
+    (Session::open(into).expect("a session"), done)
+}
+
+fn clip(session: &Session) -> Clip {
+    session.read(&session.clips[0]).unwrap_or_else(|e| panic!("{e}"))
+}
+
+/// Whether two lists hold the same numbers; text may cost the last bit of one.
+fn near(a: &[f64], b: &[f64], within: f64) -> bool {
+    a.len() == b.len() && a.iter().zip(b).all(|(a, b)| (a - b).abs() <= within)
+}
+
+/// The same numbers at the same moments, whatever the clocks count from.
+fn same(a: &Clip, b: &Clip, within: f64) {
+    let base = |clip: &Clip| clip.measured.stamps_ns[0];
+    let since = |clip: &Clip, stamps: &[u64]| -> Vec<i64> {
+        stamps.iter().map(|stamp| *stamp as i64 - base(clip) as i64).collect()
+    };
+    for (x, y) in [(&a.measured, &b.measured), (&a.desired, &b.desired)] {
+        assert_eq!(since(a, &x.stamps_ns), since(b, &y.stamps_ns));
+        for (numbers, others) in [(&x.q, &y.q), (&x.dq, &y.dq), (&x.tau, &y.tau)] {
+            assert!(near(numbers, others, within));
+        }
+    }
+    assert_eq!(a.joint_names, b.joint_names);
+    assert_eq!(since(a, &a.object.stamps_ns), since(b, &b.object.stamps_ns));
+    for (x, y) in a.object.poses.iter().zip(&b.object.poses) {
+        assert!((x.isometry().to_homogeneous() - y.isometry().to_homogeneous()).norm() <= 10.0 * within, "{x:?} {y:?}");
+    }
+}
+
+/// Payloads of a kind, without their stamps.
+fn payloads<T>(session: &Session, pick: impl Fn(Payload) -> Option<T>) -> Vec<T> {
+    let messages = ClipMessages::open(&session.folder.join(&session.clips[0].file), &[]).expect("a clip");
+    messages.filter_map(|message| pick(message.expect("it decodes").payload)).collect()
+}
+
+fn pictures(session: &Session) -> Vec<(PixelEncoding, Vec<u8>)> {
+    payloads(session, |payload| match payload {
+        Payload::Picture(Picture::Pixels { header, pixels }) => Some((header.encoding, pixels)),
+        _ => None,
+    })
+}
+
+fn devices(session: &Session) -> (Vec<Wrench>, Vec<(f64, f64)>, Vec<String>) {
+    let wrenches = payloads(session, |payload| match payload {
+        Payload::Wrench(wrench) => Some(Wrench { stamp_ns: 0, device_ns: 0, ..wrench }),
+        _ => None,
+    });
+    let widths = payloads(session, |payload| match payload {
+        Payload::Gripper(gripper) => Some((gripper.width, gripper.force)),
+        _ => None,
+    });
+    let words = payloads(session, |payload| match payload {
+        Payload::Event(event) => Some(format!("{:?} {:?} {}", event.level, event.source, event.text())),
+        _ => None,
+    });
+    (wrenches, widths, words)
+}
+
+#[test]
+fn an_own_session_survives_a_bag_and_comes_back() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let own = record(folder.path());
+    let (bag, done) = export(&own, Format::Ros2, &folder.path().join("bags"));
+    assert_eq!((done[0].measured, done[0].poses, done[0].pictures), (400, 13, 26), "{done:?}");
+    assert_eq!(bag.clips[0].kind, ClipKind::ControlHitSlide);
+    same(&clip(&own), &clip(&bag), 0.0);
+    assert_eq!(pictures(&own), pictures(&bag));
+    assert_eq!(devices(&own), devices(&bag));
+    let stamps = clip(&bag).measured.stamps_ns;
+    assert!(stamps[0] > 1_600_000_000_000_000_000, "a bag counts Unix time");
+
+    let (back, done) = export(&bag, Format::Own, &folder.path().join("back"));
+    assert_eq!(done[0].warnings, Vec::<String>::new());
+    same(&clip(&own), &clip(&back), 0.0);
+    assert_eq!(pictures(&own), pictures(&back));
+    assert_eq!(devices(&own), devices(&back));
+    let [before, after] = [&own, &back].map(|s| read_arm_states(&s.folder.join(&s.clips[0].file)).expect("states"));
+    for (x, y) in before.iter().zip(&after) {
+        assert_eq!((x.q_d, x.tau_J, x.tau_ext), (y.q_d, y.tau_J, y.tau_ext));
+        assert!(x.O_T_EE.iter().zip(y.O_T_EE).all(|(a, b)| (a - b).abs() < 1e-14), "{:?} {:?}", x.O_T_EE, y.O_T_EE);
+    }
+    let stands =
+        payloads(
+            &back,
+            |p| if let Payload::CameraInfo(info) = p { Some((info.intrinsics, info.position)) } else { None },
+        );
+    assert_eq!(stands, [([3.0, 3.5, 1.5, 0.5], [1.0, 0.0, 0.5])]);
+}
+
+#[test]
+fn a_twinaligner_folder_holds_commands_frames_poses_and_pictures_and_survives_a_bag() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let own = record(folder.path());
+    let (folders, done) = export(&own, Format::TwinAligner, &folder.path().join("folders"));
+    assert!(done[0].warnings.iter().any(|w| w.contains("387 joint rows between the frames")), "{done:?}");
+    assert!(done[0].warnings.iter().any(|w| w.contains("velocities and torques")), "{done:?}");
+    let (mine, theirs) = (clip(&own), clip(&folders));
+    assert_eq!((theirs.desired.len(), theirs.measured.len(), theirs.object.len()), (400, 13, 13));
+    assert!(near(&theirs.desired.q, &mine.desired.q, 1e-15));
+    assert_eq!(theirs.warnings, Vec::<String>::new());
+    let first = theirs.desired.stamps_ns[0] as i64 - mine.desired.stamps_ns[0] as i64;
+    for (i, stamp) in theirs.object.stamps_ns.iter().enumerate() {
+        assert_eq!(*stamp as i64 - first, mine.object.stamps_ns[i] as i64);
+    }
+    let at: PathBuf = folders.folder.join("traj_00000");
+    for file in ["init.json", "cam_K.txt", "rgb/00012.png", "depth/00012.npz"] {
+        assert!(at.join(file).is_file(), "{file}");
+    }
+
+    let (bag, done) = export(&folders, Format::Ros2, &folder.path().join("bags"));
+    assert_eq!(done[0].pictures, 26);
+    same(&theirs, &clip(&bag), 1e-15);
+    assert_eq!(pictures(&own), pictures(&bag));
+    let (again, _) = export(&bag, Format::TwinAligner, &folder.path().join("again"));
+    same(&theirs, &clip(&again), 1e-14);
+    for file in ["cam_K.txt", "rgb/00003.png", "depth/00003.npz"] {
+        let read = |session: &Session| std::fs::read(session.folder.join("traj_00000").join(file)).expect("a file");
+        assert_eq!(read(&folders), read(&again), "{file}");
+    }
+}
+
+#[test]
+fn what_would_have_to_be_guessed_is_refused_and_nothing_is_overwritten() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let own = record(folder.path());
+    let (folders, _) = export(&own, Format::TwinAligner, &folder.path().join("folders"));
+    let refused = |session: &Session, to: Format, out: &str| {
+        let error = export_session(session, to, &folder.path().join(out), &|_| None, |_| {}).unwrap_err();
+        error.to_string()
+    };
+    let error = refused(&folders, Format::Own, "guessed");
+    assert!(error.contains("different moments") && error.contains("ROS 2 bag"), "{error}");
+    let error = refused(&own, Format::Ros2, "folders");
+    assert!(error.contains("is not empty; choose a new folder with --out"), "{error}");
+    assert!(refused(&own, Format::Own, "same").contains("own clip already"));
+    let unposed = CELL.replace("pose = {", "# pose = {");
+    std::fs::write(folder.path().join("cell.toml"), unposed).expect("room");
+    let session = Session::open(folder.path()).expect("a session");
+    let (_, done) = export(&session, Format::TwinAligner, &folder.path().join("unposed"));
+    assert!(done[0].poses == 0 && done[0].warnings.iter().any(|w| w.contains("[camera] pose")), "{done:?}");
+    let _ = Cell::read(&folder.path().join("unposed/cell.toml")).expect("a cell");
+}
