@@ -24,6 +24,7 @@ pub mod estimate;
 pub mod forward;
 pub mod identify;
 pub mod interrupt;
+pub mod keys;
 pub mod processes;
 pub mod progress;
 pub mod report;

@@ -115,6 +115,28 @@ fn ctrl_c_brakes_the_arm_and_waits_for_rest() {
 }
 
 #[test]
+fn a_pause_brakes_the_arm_and_another_motion_goes_on_from_there() {
+    let domain = domain("pause");
+    let bridge = FakeBridge::start(&domain, ArmMode::Move, START, Fault::None);
+    let mut link = Link::open(Some(&domain)).expect("shared memory");
+    let interrupt = Interrupt::default();
+    let mut states = 0;
+    let outcome = play(&mut link, swing(5000).motion(), &interrupt, |_| {
+        states += 1;
+        if states == 500 {
+            interrupt.toggle_pause();
+        }
+    });
+    assert!(matches!(outcome, Ok(Outcome::Paused)));
+    let again = play(&mut link, swing(100).motion(), &interrupt, |_| {});
+    assert!(matches!(again, Ok(Outcome::Paused)), "nothing is begun while paused");
+    interrupt.toggle_pause();
+    let again = play(&mut link, swing(100).motion(), &interrupt, |_| {});
+    assert!(matches!(again, Ok(Outcome::Done)));
+    assert!(bridge.finish().len() < 2100, "the first motion was cut short");
+}
+
+#[test]
 fn without_a_bridge_nobody_waits_long() {
     let mut link = Link::open(Some(&domain("nobody"))).expect("shared memory");
     assert!(link.wait_for_bridge(Duration::from_millis(50), || false).expect("shared memory").is_none());

@@ -54,6 +54,8 @@ pub struct ClipSummary {
     pub kept: bool,
     /// Why not.
     pub why: Option<String>,
+    /// `true`: the user paused it, so another takes its place.
+    pub paused: bool,
     /// Direction of the stroke [rad].
     pub heading: f64,
     /// Speed of the hit that was commanded [m/s].
@@ -126,7 +128,11 @@ impl Desk<'_> {
         let mut clips: Vec<ClipSummary> = Vec::new();
         let wanted = self.options.task.clips as usize;
         let tries = wanted + (AGAIN * wanted as f64).ceil() as usize;
-        while clips.len() < tries && !self.interrupt.asked() {
+        while clips.iter().filter(|clip| !clip.paused).count() < tries {
+            self.interrupt.wait_out_pause();
+            if self.interrupt.asked() {
+                break;
+            }
             let kept = clips.iter().filter(|clip| clip.kept).count();
             if kept == wanted {
                 break;
@@ -140,7 +146,12 @@ impl Desk<'_> {
                 break;
             }
             let title = format!("clip {} of {wanted}", kept + 1);
-            clips.extend(self.clip(link, object, &next, &title)?);
+            let Some(clip) = self.clip(link, object, &next, &title)? else { continue };
+            clips.push(clip);
+            self.interrupt.wait_out_pause();
+            if !self.interrupt.asked() {
+                self.step_back(link, object, next.stroke.heading, &title)?;
+            }
         }
         Ok(clips)
     }
@@ -166,7 +177,7 @@ impl Desk<'_> {
         }
     }
 
-    /// One clip. `None`: interrupted before anything was recorded.
+    /// One clip. `None`: ended or paused before anything was recorded.
     fn clip(
         &mut self,
         link: &mut Link,
@@ -177,7 +188,7 @@ impl Desk<'_> {
         let points = &next.plan.set_points;
         let ways = self.ways();
         let approach = ways.over(&link.ready_state()?.q_d, &points[0].q_d)?;
-        if self.play(link, object, &approach, &format!("{title}: approach"))?.0 == Outcome::Stopped {
+        if self.play(link, object, &approach, &format!("{title}: approach"))?.0 != Outcome::Done {
             return Ok(None);
         }
         let Some(_) = object.standing(COMES_TO_REST, self.interrupt)? else { return Ok(None) };
@@ -195,6 +206,7 @@ impl Desk<'_> {
         let peak = points.iter().flat_map(|p| p.dq_d).fold(0.0, |peak: f64, dq| peak.max(dq.abs()));
         let why = match (outcome, &recorded.stopped, quality.verdict(peak), rested) {
             (Outcome::Stopped, ..) | (_, _, _, Ok(None)) => Some("it was ended by the user".to_owned()),
+            (Outcome::Paused, ..) => Some("it was paused by the user".to_owned()),
             (_, Some(why), ..) => Some(why.clone()),
             (_, _, Verdict::Repeat(why), _) => Some(why),
             (_, _, _, Err(error)) => Some(error.to_string()),
@@ -207,6 +219,7 @@ impl Desk<'_> {
             file,
             kept: why.is_none(),
             why,
+            paused: outcome == Outcome::Paused,
             heading: next.stroke.heading,
             speed: next.stroke.speed,
             offset: next.stroke.offset,
@@ -216,11 +229,13 @@ impl Desk<'_> {
             bytes: recorded.bytes,
         };
         eprintln!("{}", clip.line());
-        if !self.interrupt.asked() {
-            let away = self.ways().away(&points[points.len() - 1].q_d, next.stroke.heading)?;
-            self.play(link, object, &away, &format!("{title}: retreat"))?;
-        }
         Ok(Some(clip))
+    }
+
+    /// Away from what was struck, from wherever the stroke ended.
+    fn step_back(&self, link: &mut Link, object: &mut ObjectWatch, heading: f64, title: &str) -> anyhow::Result<()> {
+        let away = self.ways().away(&link.ready_state()?.q_d, heading)?;
+        self.play(link, object, &away, &format!("{title}: retreat")).map(drop)
     }
 
     fn ways(&self) -> Ways<'_> {

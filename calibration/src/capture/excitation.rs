@@ -40,6 +40,8 @@ pub struct ClipSummary {
     pub kept: bool,
     /// Why not.
     pub why: Option<String>,
+    /// `true`: the user paused it, so another takes its place.
+    pub paused: bool,
     /// Largest excursion of each joint [rad].
     pub amplitude: Vec<f64>,
     /// What was seen on the way.
@@ -68,10 +70,12 @@ pub fn capture(
     let mut bridge = task.bridge(&mut link, interrupt)?;
     let mut desk = Desk { options, limits: limits::of(&cell, &body), body, floor: floor(&cell), session, interrupt };
     let mut clips = Vec::new();
-    for count in 1..=task.clips {
+    while clips.iter().filter(|clip: &&ClipSummary| !clip.paused).count() < task.clips as usize {
+        interrupt.wait_out_pause();
         if interrupt.asked() {
             break;
         }
+        let count = 1 + clips.iter().filter(|clip| !clip.paused).count();
         let clip = match desk.clip(&mut link, &format!("clip {count} of {}", task.clips), note) {
             Ok(clip) => clip,
             // A bridge that died says more than the silence it leaves.
@@ -115,7 +119,7 @@ impl Desk<'_> {
         let path = self.session.folder().join(&file);
         let task = &self.options.task;
         let recorder = Recorder::start(&path, &task.cell, task.domain.as_deref(), self.interrupt)?;
-        if self.interrupt.asked() {
+        if self.interrupt.halted() {
             recorder.finish()?;
             return Ok(None);
         }
@@ -124,6 +128,7 @@ impl Desk<'_> {
         let recorded = recorder.finish()?;
         let why = match (outcome, &recorded.stopped, quality.verdict(plan.peak_speed)) {
             (Outcome::Stopped, ..) => Some("it was ended by the user".to_owned()),
+            (Outcome::Paused, ..) => Some("it was paused by the user".to_owned()),
             (Outcome::Done, Some(why), _) => Some(why.clone()),
             (Outcome::Done, None, Verdict::Repeat(why)) => Some(why),
             (Outcome::Done, None, Verdict::Keep) => None,
@@ -131,7 +136,8 @@ impl Desk<'_> {
         if why.is_none() {
             self.session.enter(&file, ClipKind::Excitation)?;
         }
-        let clip = summary(file, why, plan, quality, &recorded);
+        let paused = outcome == Outcome::Paused;
+        let clip = ClipSummary { paused, ..summary(file, why, plan, quality, &recorded) };
         eprintln!("{}", clip.line());
         Ok(Some(clip))
     }
@@ -180,7 +186,7 @@ fn kept_unfinished(path: &Path) -> String {
 
 fn summary(file: PathBuf, why: Option<String>, plan: Plan, quality: Quality, recorded: &Recorded) -> ClipSummary {
     let Recorded { messages, bytes, .. } = *recorded;
-    ClipSummary { file, kept: why.is_none(), why, amplitude: plan.amplitude, quality, messages, bytes }
+    ClipSummary { file, kept: why.is_none(), why, paused: false, amplitude: plan.amplitude, quality, messages, bytes }
 }
 
 impl ClipSummary {

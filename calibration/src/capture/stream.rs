@@ -23,8 +23,10 @@ const BRAKING: Duration = Duration::from_secs(3);
 pub enum Outcome {
     /// Played to its end.
     Done,
-    /// Braked because the user asked.
+    /// Braked, or not begun, because the user asked for the end.
     Stopped,
+    /// Braked, or not begun, because the user asked for a pause.
+    Paused,
 }
 
 /// A motion was not played.
@@ -144,7 +146,8 @@ impl<'a> Feeder<'a> {
     }
 }
 
-/// Plays `plan`; every state passes through `watch`. Asked to end by `interrupt`, it brakes the arm and waits for rest.
+/// Plays `motion`; every state passes through `watch`. Asked to end or to pause by `interrupt`, it brakes the arm and waits
+/// for rest; a motion that was paused has to be planned anew from where the arm is then.
 ///
 /// # Errors
 /// [`StreamError`] when the motion is refused, braked, not taken up, or the bridge dies.
@@ -155,6 +158,10 @@ pub fn play(
     mut watch: impl FnMut(&ArmState),
 ) -> Result<Outcome, StreamError> {
     let mut state = link.ready_state()?;
+    let halted = || if interrupt.asked() { Outcome::Stopped } else { Outcome::Paused };
+    if interrupt.halted() {
+        return Ok(halted());
+    }
     let mut feeder = Feeder::new(motion, now_ns());
     let start = Instant::now();
     let mut stopped = None;
@@ -163,13 +170,13 @@ pub fn play(
             watch(&newer);
             state = newer;
         }
-        if stopped.is_none() && interrupt.asked() {
+        if stopped.is_none() && interrupt.halted() {
             link.send(&feeder.stop(now_ns()))?;
-            stopped = Some(Instant::now());
+            stopped = Some((halted(), Instant::now()));
         }
-        if let Some(since) = stopped {
+        if let Some((outcome, since)) = stopped {
             if at_rest(&state, &feeder) || since.elapsed() > BRAKING {
-                return Ok(Outcome::Stopped);
+                return Ok(if interrupt.asked() { Outcome::Stopped } else { outcome });
             }
         } else {
             match feeder.next(&state) {

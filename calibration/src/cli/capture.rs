@@ -4,6 +4,7 @@ use super::{between, print_json};
 use calibration::capture::task::Task;
 use calibration::capture::{control_hit_slide, excitation};
 use calibration::interrupt::Interrupt;
+use calibration::keys::Keys;
 use clap::Subcommand;
 use std::path::PathBuf;
 
@@ -47,8 +48,9 @@ impl TaskArguments {
 The arm starts and ends at rest in the pose it holds, and stays above table and object. An amplitude that breaks a limit
 of position, speed, acceleration, jerk, torque or height is made smaller; which limit it was is said for each joint.
 
-A session that exists is continued with the next number; nothing is overwritten. Ctrl-C brakes the arm, waits for rest
-and keeps what was recorded.
+A session that exists is continued with the next number; nothing is overwritten. At any moment p (or SIGUSR1)
+pauses: the arm brakes inside its limits and holds, and p (or SIGUSR2) goes on with a fresh try of the same clip. q or
+Ctrl-C ends: the arm brakes, and what was recorded is kept.
 
 Examples:
   calibration capture excitation --cell config/fr3_cell.toml --clips 4 --out session
@@ -77,8 +79,9 @@ strikes, waits until the object rests, and steps back. Strokes come from all sid
 the first, so that scatter and drift can be told from a gap. Directions are chosen so that the object stays in reach; one
 that got away is asked for by hand.
 
-A session that exists is continued with the next number; nothing is overwritten. Ctrl-C brakes the arm, waits for rest
-and keeps what was recorded.
+A session that exists is continued with the next number; nothing is overwritten. At any moment p (or SIGUSR1)
+pauses: the arm brakes inside its limits and holds, and p (or SIGUSR2) goes on with a fresh try of the same clip. q or
+Ctrl-C ends: the arm brakes, and what was recorded is kept.
 
 Examples:
   calibration capture control-hit-slide --cell config/fr3_cell.toml --clips 12 --out strokes
@@ -95,6 +98,7 @@ pub(super) struct StrokeArguments {
 }
 
 pub(super) fn run(capture: Capture, interrupt: &Interrupt) -> anyhow::Result<()> {
+    let _terminal = Keys::listen(interrupt);
     match capture {
         Capture::Excitation(arguments) => excite(arguments, interrupt),
         Capture::ControlHitSlide(arguments) => strike(arguments, interrupt),
