@@ -7,6 +7,7 @@
 
 mod convert;
 pub mod hit;
+mod impulses;
 mod push;
 mod shape;
 mod surface;

@@ -16,7 +16,7 @@ use shared_mem::cell::Tool;
 
 /// A gap that is wider than this plus a period's approach stays open for the period [m].
 const MARGIN: f64 = 1e-3;
-/// Longest step between two looks at the gap [s].
+/// Longest step between two looks at the gap, but for one in which half of it could close [s].
 const LOOK: f64 = 2.5e-4;
 /// A step that closes the gap goes on for so long, so that it ends in touch [s].
 const INTO: f64 = 2e-7;
@@ -203,9 +203,9 @@ impl Close<'_> {
     /// How long the gap stays open for certain, or a step that ends in touch.
     fn until_touch(&self, tool: &ToolMotion, nearest: &Touch, left: f64) -> f64 {
         let approach = tool.velocity_at(&nearest.point) - self.object.velocity_at(&nearest.point);
-        let closing = approach.dot(&nearest.normal);
-        let open = if closing > 0.0 { -nearest.depth / closing + INTO } else { LOOK };
-        open.min(LOOK).min(left)
+        let (gap, closing) = (-nearest.depth, approach.dot(&nearest.normal));
+        let open = if closing > 0.0 { gap / closing + INTO } else { f64::INFINITY };
+        open.min(LOOK.max(0.5 * gap / approach.norm())).min(left)
     }
 
     /// One step in touch.
