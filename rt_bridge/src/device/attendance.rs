@@ -23,9 +23,10 @@ impl Attendance {
         self.lost.take().map(|_| Notice { level: EventLevel::Info, text: format!("{} is back", self.device) })
     }
 
-    /// The device failed. The same failure again is no news.
+    /// The device failed. The same failure again is no news, nor is that a device that is gone cannot be opened.
     pub(super) fn lost(&mut self, fault: DeviceFault) -> Option<Notice> {
-        if self.lost.as_ref() == Some(&fault) {
+        let gone = matches!(self.lost, Some(DeviceFault::Gone { .. }));
+        if self.lost.as_ref() == Some(&fault) || gone && matches!(fault, DeviceFault::NotOpened { .. }) {
             return None;
         }
         let text = fault.to_string();
@@ -70,6 +71,8 @@ mod tests {
         assert!(attendance.lost(silent()).is_none());
         let other = DeviceFault::Gone { device: "the gripper".into(), why: "unplugged".into() };
         assert!(attendance.lost(other).is_some(), "another failure is news");
+        let closed = |why: &str| DeviceFault::NotOpened { device: "it".into(), why: why.into(), remedy: "wait".into() };
+        assert!(attendance.lost(closed("no such file")).is_none(), "what is gone cannot be opened");
         assert_eq!(attendance.present().expect("news").text, "the gripper is back");
         assert!(attendance.present().is_none());
         assert_eq!(attendance.missing(), None);
