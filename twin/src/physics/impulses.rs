@@ -10,7 +10,7 @@ use nalgebra::{Matrix3, Point3, Vector3};
 
 /// Sweeps over the places, and the change of velocity [m/s] below which they end early.
 const SWEEPS: usize = 40;
-const SETTLED: f64 = 1e-7;
+const SETTLED: f64 = 1e-6;
 /// Most places whose pushes are guessed: a box that leans on an edge or stands on a face, with both ends of a tool.
 const GUESSED: usize = 6;
 /// Share of the largest coefficient below which the equations leave a push open: four corners of a face do.
