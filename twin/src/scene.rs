@@ -99,6 +99,21 @@ impl ObjectModel {
         let Self { mass, centre_of_mass, friction, tip_friction, restitution, .. } = *self;
         ObjectParameters { mass, centre_of_mass, friction, tip_friction, restitution }
     }
+
+    /// # Errors
+    /// [`ParameterError`] for what [`ObjectParameters::check`] refuses, and for a centre of mass outside of the object.
+    pub fn check(&self) -> Result<(), ParameterError> {
+        self.parameters().check()?;
+        let half = self.shape.half_extents();
+        match (0..3).find(|i| self.centre_of_mass[*i].abs() > half[*i]) {
+            Some(i) => Err(ParameterError {
+                name: "centre of mass",
+                value: self.centre_of_mass[i],
+                wanted: "a place inside the object, in metres from its geometric centre",
+            }),
+            None => Ok(()),
+        }
+    }
 }
 
 /// A number of an object that no body can have.
@@ -229,6 +244,22 @@ mod tests {
             let error = parameters.check().expect_err(told).to_string();
             assert!(error.contains(told) && error.contains("give") && !error.contains('\n'), "{error}");
         }
+    }
+
+    #[test]
+    fn a_centre_of_mass_outside_of_the_object_is_refused() {
+        let cell = Cell {
+            object: Some(shared_mem::cell::Object { size: Some([0.1, 0.2, 0.3]), ..Default::default() }),
+            ..Cell::default()
+        };
+        let with = |centre: [f64; 3]| {
+            let object = ObjectTheta { centre_of_mass: Some(centre), ..ObjectTheta::default() };
+            let theta = Theta { object: Some(object), ..Theta::default() };
+            ObjectModel::new(&cell, Some(&theta)).expect("a box").expect("an object").check()
+        };
+        assert_eq!(with([0.04, -0.09, 0.14]), Ok(()));
+        let error = with([0.04, -0.11, 0.14]).expect_err("outside").to_string();
+        assert!(error.contains("centre of mass cannot be -0.11") && !error.contains('\n'), "{error}");
     }
 
     #[test]

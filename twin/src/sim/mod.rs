@@ -113,7 +113,7 @@ impl SimCell {
         let (object, contact) = match ObjectModel::new(cell, theta)? {
             None => (None, ToolContact::without_object()),
             Some(model) => {
-                model.parameters().check()?;
+                model.check()?;
                 let table = cell.table.ok_or(SimError::NoTable)?.height;
                 let mut object = TableObject::new(&model, Some(table), &effects)?;
                 let [x, y] = cell.simulation.object_position;

@@ -2,7 +2,8 @@
 //!
 //! - Equation: `tau_f = extra ddq` at each joint, on top of the nominal rotor inertia.
 //! - Source: reflected inertia `n^2 J` of motor and gear; `n` the gear ratio, `J` at the motor.
-//! - Unit: kg m^2 at the joint. Plausible: -0.1 to 0.3; what would be negative in total becomes 0.
+//! - Unit: kg m^2 at the joint. Plausible: -0.1 to 0.3. Down to -0.2, an arm's heaviest rotors; where the joint's own is
+//!   lighter, nothing of it is left.
 //! - Signature (C9): grows with the square of the frequency, even in velocity, the same in every pose.
 //! - Confused with: payload (depends on the pose), joint elasticity, a stiffness at one frequency.
 
@@ -13,7 +14,7 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     name: "rotor_inertia",
     stage: Stage::Control,
     acts_on: Place::ArmModel,
-    parameters: &[Parameter::size("extra", "kg m^2", [-0.1, 0.3], 0.0).per_joint()],
+    parameters: &[Parameter::size("extra", "kg m^2", [-0.1, 0.3], 0.0).per_joint().within(-0.2, f64::MAX)],
     confusable_with: &["payload", "joint_elasticity"],
     install: |values, effects| effects.arm.rotor_inertia = Some(RotorInertia { extra: values.joints("extra") }),
 };
