@@ -81,7 +81,8 @@ impl Shape {
 }
 
 /// The arm where there is one, and the object.
-pub struct CellClips<F> {
+pub struct CellClips<'a, F> {
+    library: &'a Library,
     arm: Option<ArmClips<F>>,
     object: ObjectClips,
     channels: Vec<Channel>,
@@ -93,9 +94,8 @@ pub struct CellClips<F> {
     friction: Option<usize>,
     /// Index of the object's first channel.
     first: usize,
-    /// Which numbers the arm feels, and for each clip the last of them with the arm's residuals there: most of what a search
-    /// turns is the object's.
-    of_arm: Vec<bool>,
+    /// For each clip the last numbers that the arm feels with its residuals there: most of what a search turns is the
+    /// object's.
     arm_alone: Vec<Mutex<VecDeque<Arm>>>,
 }
 
@@ -104,9 +104,9 @@ type Arm = (Vec<f64>, Arc<Vec<f64>>);
 /// Kept for a clip.
 const ARMS: usize = 3;
 
-impl<F: Fn(&[f64]) -> Theta + Sync> CellClips<F> {
+impl<'a, F: Fn(&[f64]) -> Theta + Sync> CellClips<'a, F> {
     /// Both on the same clips in the same order.
-    pub fn new(arm: Option<ArmClips<F>>, object: ObjectClips, library: &Library) -> Self {
+    pub fn new(arm: Option<ArmClips<F>>, object: ObjectClips, library: &'a Library) -> Self {
         let mut channels = arm.as_ref().map_or_else(Vec::new, |arm| arm.channels().to_vec());
         let first = channels.len();
         for _ in 0..PARTS {
@@ -121,16 +121,14 @@ impl<F: Fn(&[f64]) -> Theta + Sync> CellClips<F> {
         }
         let friction = library.settings.settings().iter().position(|setting| *setting == Setting::Friction);
         let scatter = scatter(&object);
-        let of_arm = library.object_only.iter().map(|object_only| !object_only).collect();
         let arm_alone = rows.iter().map(|_| Mutex::default()).collect();
-        Self { arm, object, channels, rows, straying, scatter, friction, first, of_arm, arm_alone }
+        Self { library, arm, object, channels, rows, straying, scatter, friction, first, arm_alone }
     }
 
     /// The arm's residuals at numbers; none where there is no arm.
     fn arm(&self, clip: usize, shared: &[f64]) -> Result<Arc<Vec<f64>>, Impossible> {
         let Some(arm) = &self.arm else { return Ok(Arc::default()) };
-        let felt = shared.iter().zip(&self.of_arm).filter(|(_, of_arm)| **of_arm).map(|(value, _)| *value);
-        let felt: Vec<f64> = felt.collect();
+        let felt = self.library.felt_by_arm(shared);
         let kept = || self.arm_alone[clip].lock().unwrap_or_else(PoisonError::into_inner);
         if let Some((_, residuals)) = kept().iter().find(|(numbers, _)| *numbers == felt) {
             return Ok(Arc::clone(residuals));
@@ -250,7 +248,7 @@ fn shares(object: &ObjectClips, clip: usize, rows: &[object::Row]) -> Vec<f64> {
     rows.iter().map(of).collect()
 }
 
-impl<F: Fn(&[f64]) -> Theta + Sync> ClipModel for CellClips<F> {
+impl<F: Fn(&[f64]) -> Theta + Sync> ClipModel for CellClips<'_, F> {
     fn clips(&self) -> usize {
         self.object.clips()
     }
@@ -264,7 +262,7 @@ impl<F: Fn(&[f64]) -> Theta + Sync> ClipModel for CellClips<F> {
     }
 }
 
-impl<F: Fn(&[f64]) -> Theta + Sync> Evidence for CellClips<F> {
+impl<F: Fn(&[f64]) -> Theta + Sync> Evidence for CellClips<'_, F> {
     fn changed(
         &self,
         clip: usize,

@@ -21,8 +21,8 @@ pub struct Library {
     pub unknowns: Vec<Unknown>,
     /// The joint that each number belongs to, from 0; `None` for numbers of the whole arm and of the object.
     pub joints: Vec<Option<usize>>,
-    /// Whether each number leaves the arm as it is.
-    pub object_only: Vec<bool>,
+    /// What each number does to the arm.
+    reaches: Vec<ArmReach>,
     /// The baseline's numbers: gains, and the object's parameters.
     pub baseline: Range<usize>,
     /// Effects.
@@ -90,9 +90,10 @@ impl Library {
             candidates.push(Candidate::new(effect, at, &numbers));
         }
         let joints = numbers.iter().map(|(setting, _)| joint_of(setting)).collect();
-        let object_only = numbers.iter().map(|(setting, _)| leaves_arm(setting)).collect();
+        let carried = numbers.iter().position(|(setting, _)| is_carried(setting));
+        let reaches = numbers.iter().map(|(setting, _)| arm_reach(setting, carried)).collect();
         let (all, unknowns): (Vec<Setting>, Vec<Unknown>) = numbers.into_iter().unzip();
-        Self { settings: Settings::new(base.clone(), all), unknowns, joints, object_only, baseline, candidates }
+        Self { settings: Settings::new(base.clone(), all), unknowns, joints, reaches, baseline, candidates }
     }
 
     /// Where every search begins: the baseline's values, all effects at rest.
@@ -113,6 +114,22 @@ impl Library {
         theta
     }
 
+    /// Whether the arm feels a number where the numbers are these.
+    #[must_use]
+    pub fn arm_feels(&self, number: usize, numbers: &[f64]) -> bool {
+        match self.reaches[number] {
+            ArmReach::Always => true,
+            ArmReach::Never => false,
+            ArmReach::With(other) => numbers[other] != 0.0,
+        }
+    }
+
+    /// Those of the numbers that the arm feels.
+    #[must_use]
+    pub fn felt_by_arm(&self, numbers: &[f64]) -> Vec<f64> {
+        (0..numbers.len()).filter(|k| self.arm_feels(*k, numbers)).map(|k| numbers[k]).collect()
+    }
+
     /// Index of the candidate with this name.
     #[must_use]
     pub fn find(&self, name: &str) -> Option<usize> {
@@ -131,12 +148,32 @@ fn joint_of(setting: &Setting) -> Option<usize> {
     }
 }
 
-fn leaves_arm(setting: &Setting) -> bool {
-    match *setting {
-        Setting::Stiffness(_) | Setting::Damping(_) => false,
-        Setting::Effect { name, .. } => find(name).is_some_and(|effect| effect.stage != Stage::Control),
-        _ => true,
+/// Whether the arm feels a number.
+#[derive(Debug, Clone, Copy)]
+enum ArmReach {
+    Always,
+    Never,
+    /// Where another number is not zero.
+    With(usize),
+}
+
+fn arm_reach(setting: &Setting, carried: Option<usize>) -> ArmReach {
+    match (*setting, carried) {
+        (Setting::Stiffness(_) | Setting::Damping(_), _) => ArmReach::Always,
+        (Setting::Effect { name: TOOL_OFFSET, .. }, Some(carried)) => ArmReach::With(carried),
+        (Setting::Effect { name, .. }, _) if find(name).is_some_and(|effect| effect.stage == Stage::Control) => {
+            ArmReach::Always
+        }
+        _ => ArmReach::Never,
     }
+}
+
+/// The one effect on the hit that the arm may feel: where the tool's mass stands off with its tip.
+const TOOL_OFFSET: &str = "tool_offset";
+const CARRIED: &str = "carried";
+
+fn is_carried(setting: &Setting) -> bool {
+    matches!(setting, Setting::Effect { name: TOOL_OFFSET, parameter: CARRIED, .. })
 }
 
 /// How far gains stated by value may be off: cell.toml's own statement, and a quarter more.
@@ -172,8 +209,9 @@ impl Candidate {
     }
 }
 
-/// Forms that no clip shows well enough to be worth their numbers; they keep the registry's default.
-const KEPT: [&str; 1] = ["creep"];
+/// Forms that no clip shows well enough to be worth their numbers: they keep the registry's default, or what an alternative
+/// says.
+const KEPT: [&str; 2] = ["creep", CARRIED];
 
 /// The step of a probe as a share of what is met in practice.
 const PROBE_SHARE: f64 = 0.1;
@@ -191,6 +229,9 @@ fn alternatives(effect: &EffectInfo, at: usize, sizes: &[usize], numbers: &[(Set
         "stribeck_sliding_friction" => [0.05, 0.1, 0.2].map(|v| with(set("velocity", v))).to_vec(),
         // About the base, or about the middle of a table in front of it.
         "camera_scale" => [0.0, 0.5].map(|x| with(vec![(index("centre")[0], x)])).to_vec(),
+        // Rigid flanks, and such as yield like the gears of an arm.
+        "joint_backlash" => [1e-7, 4e-5].map(|compliance| with(set("compliance", compliance))).to_vec(),
+        TOOL_OFFSET => [0.0, 1.0].map(|share| with(set(CARRIED, share))).to_vec(),
         "payload" => [0.0, 0.06].map(|z| with(vec![(index("centre")[2], z)])).to_vec(),
         "anisotropic_friction" => {
             let (size, axis) = (sizes[0], index("axis")[0]);

@@ -178,7 +178,7 @@ impl<E: Evidence> Work<'_, E> {
         let mut numbers = self.full.to_vec();
         let units: Vec<f64> = batch.iter().map(|k| self.turn(&mut numbers, self.columns[*k])).collect();
         let mut out = Vec::with_capacity(base.len());
-        let reach = self.reach(batch);
+        let reach = self.reach(batch, &numbers);
         let answer = self.evidence.changed(clip, (&numbers, own), (reach, base), &mut out);
         let answered = answer.is_ok() && out.len() == base.len();
         if !answered {
@@ -197,14 +197,14 @@ impl<E: Evidence> Work<'_, E> {
     }
 
     /// What the columns of a batch can change; several joints at once are told apart by the arm alone.
-    fn reach(&self, batch: &[usize]) -> Reach {
+    fn reach(&self, batch: &[usize], numbers: &[f64]) -> Reach {
         let number = |k: &usize| match self.columns[*k] {
             Column::Number(k) => k,
             Column::Probe(candidate, a, p) => self.library.candidates[candidate].alternatives[a].probes[p].moves[0].0,
         };
         match batch {
             [_, _, ..] => Reach::Arm,
-            _ if batch.iter().all(|k| self.library.object_only[number(k)]) => Reach::Object,
+            _ if !batch.iter().any(|k| self.library.arm_feels(number(k), numbers)) => Reach::Object,
             _ => Reach::All,
         }
     }

@@ -26,6 +26,8 @@ pub struct ArmModel {
     /// The flange in the last link's frame, z along the last joint.
     pub(super) flange: Isometry3<f64>,
     pub(super) tool_length: f64,
+    /// The tool in the flange frame; no mass without a tool.
+    pub(super) tool: MassProperties,
     has_geometry: bool,
     joint_names: Vec<String>,
     base_frame: String,
@@ -131,8 +133,9 @@ impl ArmModel {
         let mut arm = Self::from_chain(chain)?;
         arm.has_geometry = !known;
         if let Some(tool) = &cell.tool {
-            arm.add_at_flange(&MassProperties::of_tool(tool));
+            arm.tool = MassProperties::of_tool(tool);
             arm.tool_length = tool.length;
+            arm.add_at_flange(&arm.tool.clone());
         }
         Ok(arm)
     }
@@ -156,6 +159,7 @@ impl ArmModel {
             gravity: GRAVITY,
             flange: last.inverse() * chain.flange,
             tool_length: 0.0,
+            tool: MassProperties::default(),
             has_geometry: true,
             q_min: per_joint(|j| j.position[0]),
             q_max: per_joint(|j| j.position[1]),
@@ -185,6 +189,15 @@ impl ArmModel {
     pub fn add_at_flange(&mut self, body: &MassProperties) {
         let last = &mut self.links[self.dof - 1];
         last.body = last.body.plus(&TenParameters::from_properties(&body.seen_from(&self.flange)));
+    }
+
+    /// Hangs the tool `offset` [m, flange frame] beside where it is; without a tool nothing changes.
+    pub fn shift_tool(&mut self, offset: Vector3<f64>) {
+        let tool = self.tool;
+        self.tool.centre += offset;
+        // Bodies add up in these parameters, so a negative body takes one away.
+        self.add_at_flange(&MassProperties { mass: -tool.mass, inertia: -tool.inertia, ..tool });
+        self.add_at_flange(&self.tool.clone());
     }
 
     /// Adds to the rotor inertia seen at each joint [kg m²]; what would be negative becomes 0.

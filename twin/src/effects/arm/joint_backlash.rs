@@ -1,9 +1,10 @@
 //! The gears have play: within it the motor turns and the link does not feel it.
 //!
-//! - Equation: `tau_J = 0` while `|theta - q| < play / 2`; beyond, a stiff spring, or that of `joint_elasticity`. A flank
-//!   only pushes.
+//! - Equation: `tau_J = 0` while `|theta - q| < play / 2`; beyond, a spring of stiffness `1 / compliance`, or that of
+//!   `joint_elasticity`. A flank only pushes.
 //! - Source: Nordin, Gutman 2002 (dead zone with damping).
-//! - Unit: rad, from flank to flank at the joint. Plausible: 0 to 1e-3 on an arm of this class, to 0.03 on hobby servos.
+//! - Units: play rad, from flank to flank at the joint; compliance rad/(N m). Plausible: play 0 to 1e-3 on an arm of this
+//!   class, to 0.03 on hobby servos; compliance 1e-7 (rigid: a full load twists it by 10 microrad) to 1e-4.
 //! - Signature (C18): motion lost at each reversal of the torque, not of the velocity; chatter near no load.
 //! - Confused with: Coulomb and Stribeck friction; a load that keeps one flank pressed makes it vanish.
 
@@ -14,25 +15,30 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     name: "joint_backlash",
     stage: Stage::Control,
     acts_on: Place::Joint,
-    parameters: &[Parameter::size("play", "rad", [0.0, 0.03], 0.0).per_joint().within(0.0, 1.0)],
+    parameters: &[
+        Parameter::size("play", "rad", [0.0, 0.03], 0.0).per_joint().within(0.0, 1.0),
+        Parameter::form("compliance", "rad/(N m)", [1e-7, 1e-4], 1e-7).per_joint().within(1e-7, 1e-2),
+    ],
     confusable_with: &["joint_coulomb_friction", "joint_stribeck_friction"],
-    install: |values, effects| effects.arm.joint_backlash = Some(JointBacklash { play: values.joints("play") }),
+    install: |values, effects| {
+        effects.arm.joint_backlash =
+            Some(JointBacklash { play: values.joints("play"), compliance: values.joints("compliance") });
+    },
 };
 
-/// Stiffness of a flank where no elasticity is given [N m/rad]: rigid, a full load twists it by 10 microrad.
-const FLANK_STIFFNESS: f64 = 1e7;
 /// Damping of a flank [N m s/rad]: links part again with little speed.
 const FLANK_DAMPING: f64 = 10.0;
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(in crate::effects) struct JointBacklash {
     play: Joints,
+    compliance: Joints,
 }
 
 impl JointBacklash {
     pub(super) fn spring(&self, joint: usize) -> Option<Spring> {
-        let play = self.play[joint];
-        (play > 0.0).then_some(Spring { stiffness: FLANK_STIFFNESS, damping: FLANK_DAMPING, play })
+        let (play, stiffness) = (self.play[joint], self.compliance[joint].recip());
+        (play > 0.0).then_some(Spring { stiffness, damping: FLANK_DAMPING, play })
     }
 }
 

@@ -32,6 +32,7 @@ mod transmission;
 pub use memory::ArmMemory;
 pub(crate) use memory::JointMemory;
 
+use super::hit::tool_offset::ToolOffset;
 use crate::arm::{ArmModel, JointState, Joints};
 use crate::rollout::TICK;
 
@@ -48,6 +49,7 @@ pub struct ArmEffects {
     pub(super) torque_delay: Option<torque_delay::TorqueDelay>,
     pub(super) rotor_inertia: Option<rotor_inertia::RotorInertia>,
     pub(super) payload: Option<payload::Payload>,
+    pub(super) tool_offset: Option<ToolOffset>,
     pub(super) torque_gain: Option<torque_gain::TorqueGain>,
     pub(super) joint_elasticity: Option<joint_elasticity::JointElasticity>,
     pub(super) joint_backlash: Option<joint_backlash::JointBacklash>,
@@ -73,6 +75,9 @@ impl ArmEffects {
             effect.apply(&mut arm);
         }
         if let Some(effect) = &self.payload {
+            effect.apply(&mut arm);
+        }
+        if let Some(effect) = &self.tool_offset {
             effect.apply(&mut arm);
         }
         if let Some(effect) = &self.base_tilt {

@@ -7,7 +7,7 @@ pub(super) mod restitution;
 #[cfg(test)]
 mod test_hit;
 pub(super) mod tip_friction;
-pub(super) mod tool_offset;
+pub(in crate::effects) mod tool_offset;
 
 use crate::physics::hit::ContactLaw;
 use nalgebra::Translation3;

@@ -14,12 +14,17 @@ fn theta(blocks: &str) -> Theta {
 }
 
 /// The effects of `[[effect]]` blocks.
+pub(super) fn all_effects(blocks: &str) -> Effects {
+    Effects::from_theta(&theta(blocks).effects, 7).expect("known effects")
+}
+
+/// Those of them on the hit.
 pub(super) fn effects(blocks: &str) -> HitEffects {
-    Effects::from_theta(&theta(blocks).effects, 7).expect("known effects").hit
+    all_effects(blocks).hit
 }
 
 /// The shipped cell with the table lifted to under the tip and the box 20 mm beside it, so that turning joint 1 strikes it.
-fn striking() -> (Cell, ArmModel) {
+pub(super) fn striking() -> (Cell, ArmModel) {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../config/fr3_cell.toml");
     let mut cell = Cell::read(&path).expect("the shipped cell");
     let arm = ArmModel::from_cell(&cell).expect("an FR3");
