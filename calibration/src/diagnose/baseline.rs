@@ -16,6 +16,9 @@ use shared_mem::theta::ObjectTheta;
 /// The way there, and the last steps.
 const WAY: Effort = Effort { iterations: 8, precision: Precision::Joints };
 const LAST: Effort = Effort { iterations: 8, precision: Precision::Exact };
+/// Arm and object together: with slopes joint by joint only the arm says what its gains are. An object that strays for a
+/// reason that is not in the twin yet would bend them until the hit lands where it helps.
+const TOGETHER: Effort = Effort { iterations: 8, precision: Precision::Joints };
 
 /// Identifies; `None` when the twin has no answer at the nominal parameters.
 #[must_use]
@@ -34,7 +37,7 @@ pub fn identify<E: Evidence>(
     }
     let full = refined(bench, split, cell, admitted, &arm.full).unwrap_or_else(|| arm.full.clone());
     let all = vec![1.0; channels.len()];
-    bench.fit((&[], full), &split.train, &all, Some(&arm), LAST)
+    bench.fit((&[], full), &split.train, &all, Some(&arm), TOGETHER)
 }
 
 /// Numbers with the object's parameters that fit the strokes best under the arm and the effects that are given, by

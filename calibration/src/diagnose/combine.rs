@@ -7,9 +7,11 @@ use super::floor;
 use super::gap::{Residuals, Typical};
 use super::leftovers::{Left, NUMERICS, ROUGHNESS};
 use super::score::{Advantage, Foretold, foretell};
-use super::shortlist::{self, Scored, TESTABLE};
+use super::shortlist::{self, Scored};
 use super::split::Split;
+use super::starts;
 use super::sweep::{Point, Precision, Swept, sweep};
+use super::worthy::{overlooked, worthy};
 use crate::progress::Progress;
 use nalgebra::DMatrix;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -17,17 +19,11 @@ use twin::effects::Stage;
 
 /// At most so many effects are named.
 pub const MOST: usize = 4;
-/// So many candidates are fitted at each step.
-const FITTED: usize = 5;
 /// Every candidate's fit gets so many linearisations from its signature on; those that come near the best get more, and the
 /// winner so many more again.
 const HEAT: Effort = Effort { iterations: 3, precision: Precision::Joints };
 const FIRST_PASS: Effort = Effort { iterations: 6, precision: Precision::Joints };
 const LAST_PASS: Effort = Effort { iterations: 6, precision: Precision::Exact };
-/// Other starts of a fit are this share of the strongest that is met in practice away.
-const ASIDE: f64 = 0.3;
-/// Shares of the strongest at which a candidate without a slope is tried.
-const SCANNED: [f64; 4] = [0.06, 0.2, 0.5, 1.0];
 /// Near is this far from the best deviance, or this share of what the best gains.
 const NEAR: f64 = 40.0;
 const NEAR_SHARE: f64 = 0.4;
@@ -47,10 +43,6 @@ const NEARLY_ALL: f64 = 0.85;
 const CLEAR: f64 = 3.5;
 /// A gap widened by less than this share is chance.
 const HARM: f64 = 0.1;
-/// An arm that strays from the twin by less than this in squared sigmas is not the cause of what an object does.
-const QUIET: f64 = 0.5;
-/// Candidates whose signature explains less than this share of what the best one does are not fitted.
-const CLOSE: f64 = 0.1;
 
 /// Engines integrate one and the same effect differently by a hundredth of it, so by this share of the squared gap.
 const NUMERICS_SHARE: f64 = 1e-4;
@@ -227,7 +219,7 @@ fn step<E: Evidence>(bench: &Bench<'_, E>, split: &Split, from: &Hypothesis, bar
     let trial = |scored: &Scored| Trial { scored: scored.clone(), fitted: None, closes: 0.0 };
     let trials = scored.iter().map(trial).collect();
     let left = Residuals::at(bench, &from, &split.open()).map(|left| left.typical()).unwrap_or_default();
-    let promising = worthy(bench, &from, &scored, &left);
+    let promising = worthy(bench, (&from, &weights), &scored, &left);
     let mut step = Step { from, foretold, trials, weights, arm_rows, left };
     step.fit(bench, split, (&promising, false), bar);
     if step.best(bench).is_none() {
@@ -256,9 +248,14 @@ impl Step {
             }
             let scored = &self.trials[place].scored;
             bar.show(50 + (done as u64 * 5).min(45), bench.library.candidates[scored.candidate].effect.name);
-            let starts = if overlooked { self.likeliest(bench, scored) } else { starts(bench, scored) };
-            let heats =
-                starts.iter().filter_map(|start| bench.extend(&self.from, start, &split.train, &self.weights, HEAT));
+            let starts = if overlooked {
+                starts::scanned(bench, (&self.from, &self.weights), scored)
+            } else {
+                starts::starts(bench, (&self.from, &self.weights), scored)
+            };
+            let heats = starts.into_iter().filter_map(|start| {
+                bench.extend(&self.from, (scored.candidate, start), &split.train, &self.weights, HEAT)
+            });
             fits.extend(heats.min_by(|a, b| a.deviance().total_cmp(&b.deviance())).map(|fit| (place, fit)));
         }
         let best = fits.iter().map(|(_, fit)| fit.deviance()).fold(self.from.deviance(), f64::min);
@@ -298,57 +295,6 @@ impl Step {
         let next = others.into_iter().filter_map(worth).fold(0.0, f64::max);
         own.into_iter().find_map(worth).is_some_and(|own| next < 0.5 * own)
     }
-
-    /// Of a candidate that the score test did not point to, the strength at which the fitted clips cost least.
-    fn likeliest<E: Evidence>(&self, bench: &Bench<'_, E>, scored: &Scored) -> Vec<Scored> {
-        let cost = |start: &Scored| {
-            let full = bench.begun(self.from.full.clone(), start);
-            bench.cost_near(&self.from, &full, &self.weights).unwrap_or(f64::INFINITY)
-        };
-        let starts = aside(bench, scored, &SCANNED).into_iter().map(|start| (cost(&start), start));
-        starts.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, start)| start).into_iter().collect()
-    }
-}
-
-/// Candidates on the arm that the score test passed over although a gap remains there that none of the others explains:
-/// what acts only from some size on, as play does, has no slope at its neutral point. Those on the object all have one, or are
-/// fitted in any case.
-fn overlooked<E: Evidence>(bench: &Bench<'_, E>, step: &Step) -> Vec<usize> {
-    let arm = step.left.iter().find(|group| !group.of_object);
-    if !arm.is_some_and(|arm| Left::of_groups(&[*arm], &[*arm])[0].too_much(false)) {
-        return Vec::new();
-    }
-    let rest = step.trials.iter().filter(|trial| trial.fitted.is_none() && trial.scored.signal > TESTABLE);
-    let of_arm = |candidate: &usize| bench.library.candidates[*candidate].effect.stage == Stage::Control;
-    rest.map(|trial| trial.scored.candidate).filter(of_arm).collect()
-}
-
-/// Where fits of a candidate begin: where the score test points. Of an effect with many forms (a place on the table) also
-/// the forms next to the best; of one whose slope at one point tells little, as on the hit, also some way to either side.
-fn starts<E: Evidence>(bench: &Bench<'_, E>, scored: &Scored) -> Vec<Scored> {
-    let candidate = &bench.library.candidates[scored.candidate];
-    let mut starts = vec![scored.clone()];
-    if candidate.effect.stage == Stage::Slide {
-        let form = |(alternative, units): &(usize, Vec<f64>)| Scored {
-            alternative: *alternative,
-            units: units.clone(),
-            ..scored.clone()
-        };
-        starts.extend(scored.next.iter().map(form));
-    }
-    if candidate.effect.stage == Stage::Hit && candidate.alternatives[scored.alternative].probes.len() == 1 {
-        starts.extend(aside(bench, scored, &[ASIDE]));
-    }
-    starts
-}
-
-/// A candidate at shares of the strongest that is met in practice, either way where it acts both ways.
-fn aside<E: Evidence>(bench: &Bench<'_, E>, scored: &Scored, shares: &[f64]) -> Vec<Scored> {
-    let probes = &bench.library.candidates[scored.candidate].alternatives[scored.alternative].probes;
-    let one_sided = probes.iter().any(|probe| probe.one_sided);
-    let sides = shares.iter().flat_map(|share| [*share, -share]).filter(|side| *side > 0.0 || !one_sided);
-    let units = |side: f64| probes.iter().map(|probe| side * probe.largest).collect();
-    sides.map(|side| Scored { units: units(side), ..scored.clone() }).collect()
 }
 
 /// [`Trial::closes`]: of the group of sensors on which it closes most.
@@ -362,37 +308,6 @@ fn closes<E: Evidence>(bench: &Bench<'_, E>, split: &Split, from: &Hypothesis, t
     let (Some(open), Some(choose)) = (on(&split.open()), on(&split.choose)) else { return 0.0 };
     let harmless = |(_, choose): &(&f64, &f64)| **choose > -HARM;
     open.iter().zip(&choose).filter(harmless).map(|(open, _)| *open).fold(0.0, f64::max)
-}
-
-/// Candidates worth a fit, the arm's and the object's each among themselves: those that the score test cannot rule out, the
-/// best first; of the others only partners that the best is easily taken for. Where the object's gap is large all effects on
-/// the hit are fitted: a blow answers so unevenly that its slope at one point tells little.
-fn worthy<E: Evidence>(bench: &Bench<'_, E>, from: &Hypothesis, scored: &[Scored], left: &[Typical]) -> Vec<usize> {
-    let effect = |s: &Scored| bench.library.candidates[s.candidate].effect;
-    let mut all = Vec::new();
-    let beyond = |of_object: bool| {
-        let group = left.iter().find(|group| group.of_object == of_object);
-        group.map_or(0.0, |group| group.mean_square - group.floor)
-    };
-    let quiet = left.len() > 1 && beyond(false) < QUIET;
-    for of_arm in [true, false].into_iter().filter(|of_arm| !(*of_arm && quiet)) {
-        let group: Vec<&Scored> = scored.iter().filter(|s| (effect(s).stage == Stage::Control) == of_arm).collect();
-        let Some(best) = group.first() else { continue };
-        let likely = |s: &&&Scored| {
-            let visible = !bench.negligible(s.candidate, &bench.begun(from.full.clone(), s));
-            s.p < 0.2 && s.gain > CLOSE * best.gain && visible
-        };
-        let partners = effect(best).confusable_with;
-        let first = group.iter().filter(likely).take(FITTED);
-        let confusable = (group.iter())
-            .filter(|s| partners.contains(&effect(s).name) && s.p < 0.2 && s.gain > 0.5 * CLOSE * best.gain);
-        all.extend(first.chain(confusable).map(|s| s.candidate));
-    }
-    let on_hit = scored.iter().filter(|s| effect(s).stage == Stage::Hit && s.signal > TESTABLE);
-    if beyond(true) > ROUGHNESS {
-        all.extend(on_hit.map(|s| s.candidate));
-    }
-    all
 }
 
 fn swept<E: Evidence>(bench: &Bench<'_, E>, split: &Split, from: &Hypothesis, bar: &Progress) -> Option<Swept> {

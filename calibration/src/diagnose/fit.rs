@@ -234,26 +234,28 @@ impl<E: Evidence> Bench<'_, E> {
         costs.into_iter().sum::<Option<f64>>().filter(|cost| cost.is_finite())
     }
 
-    /// The cost of the clips of a hypothesis at other shared numbers, their own numbers as they are.
+    /// The cost of the clips of a hypothesis at other shared numbers, their own numbers at rest: where they were fitted
+    /// they hide a part of the gap.
     #[must_use]
-    pub fn cost_near(&self, from: &Hypothesis, full: &[f64], weights: &[f64]) -> Option<f64> {
-        let clips: Vec<_> = from.fitted.iter().map(|fitted| (fitted.clip, fitted.own.clone())).collect();
+    pub fn plain_cost(&self, from: &Hypothesis, full: &[f64], weights: &[f64]) -> Option<f64> {
+        let nothing = vec![0.0; self.scatter.count()];
+        let clips: Vec<_> = from.fitted.iter().map(|fitted| (fitted.clip, nothing.clone())).collect();
         self.cost(full, &clips, weights)
     }
 
-    /// Adds a candidate, as the score test sees it, to a hypothesis and fits both.
+    /// Adds a candidate to a hypothesis and fits both from `full` on.
     #[must_use]
     pub fn extend(
         &self,
         from: &Hypothesis,
-        scored: &Scored,
+        (candidate, full): (usize, Vec<f64>),
         clips: &[usize],
         weights: &[f64],
         effort: Effort,
     ) -> Option<Hypothesis> {
         let mut effects = from.effects.clone();
-        effects.push(scored.candidate);
-        self.fit((&effects, self.begun(from.full.clone(), scored)), clips, weights, Some(from), effort)
+        effects.push(candidate);
+        self.fit((&effects, full), clips, weights, Some(from), effort)
     }
 
     /// `full` with the candidate as strong as the score test says, within what is met in practice.

@@ -14,7 +14,8 @@
 //! | [`baseline`] | the paper's parameters identified |
 //! | [`noise`], [`floor`] | how far residuals can be trusted |
 //! | [`sweep`], [`quadratic`] | every candidate's signature, linearised once |
-//! | [`shortlist`] | which candidates are worth fitting |
+//! | [`shortlist`] | how much of the gap each signature explains |
+//! | [`worthy`], [`starts`] | which of them are fitted, and where a fit begins |
 //! | [`fit`] | hypotheses fitted |
 //! | [`score`] | how well they foretell clips |
 //! | [`combine`] | which effects act together |
@@ -48,8 +49,10 @@ pub mod scatter;
 pub mod score;
 pub mod shortlist;
 pub mod split;
+pub mod starts;
 pub mod sweep;
 pub mod verdict;
+pub mod worthy;
 
 pub use answer::{Candidate, Change, Clips, Diagnosis, Gap, Kind, Place, Share, Size, Status, Verdict};
 

@@ -1,0 +1,79 @@
+//! Which candidates are worth a fit.
+
+use super::combine::Step;
+use super::evidence::Evidence;
+use super::fit::{Bench, Hypothesis};
+use super::gap::Typical;
+use super::leftovers::{Left, ROUGHNESS};
+use super::shortlist::{Scored, TESTABLE};
+use super::starts;
+use twin::effects::Stage;
+
+/// So many candidates are fitted at each step.
+const FITTED: usize = 5;
+/// An arm that strays from the twin by less than this in squared sigmas is not the cause of what an object does.
+const QUIET: f64 = 0.5;
+/// Candidates whose signature explains less than this share of what the best one does are not fitted.
+const CLOSE: f64 = 0.1;
+/// Where the score test tells little, a candidate of the camera must spare this share of the cost somewhere.
+const SPARES: f64 = 0.2;
+
+/// Candidates worth a fit, the arm's and the object's each among themselves: those that the score test cannot rule out, the
+/// best first; of the others only partners that the best is easily taken for. Where the object's gap is large all effects on
+/// the hit are fitted, and those of the camera that spare much of it somewhere: a blow answers so unevenly that slopes at one
+/// point tell little.
+pub(super) fn worthy<E: Evidence>(
+    bench: &Bench<'_, E>,
+    (from, weights): (&Hypothesis, &[f64]),
+    scored: &[Scored],
+    left: &[Typical],
+) -> Vec<usize> {
+    let effect = |s: &Scored| bench.library.candidates[s.candidate].effect;
+    let mut all = Vec::new();
+    let beyond = |of_object: bool| {
+        let group = left.iter().find(|group| group.of_object == of_object);
+        group.map_or(0.0, |group| group.mean_square - group.floor)
+    };
+    let quiet = left.len() > 1 && beyond(false) < QUIET;
+    for of_arm in [true, false].into_iter().filter(|of_arm| !(*of_arm && quiet)) {
+        let group: Vec<&Scored> = scored.iter().filter(|s| (effect(s).stage == Stage::Control) == of_arm).collect();
+        let Some(best) = group.first() else { continue };
+        let likely = |s: &&&Scored| {
+            let visible = !bench.negligible(s.candidate, &bench.begun(from.full.clone(), s));
+            s.p < 0.2 && s.gain > CLOSE * best.gain && visible
+        };
+        let partners = effect(best).confusable_with;
+        let first = group.iter().filter(likely).take(FITTED);
+        let confusable = (group.iter())
+            .filter(|s| partners.contains(&effect(s).name) && s.p < 0.2 && s.gain > 0.5 * CLOSE * best.gain);
+        all.extend(first.chain(confusable).map(|s| s.candidate));
+    }
+    if beyond(true) > ROUGHNESS {
+        let now = bench.plain_cost(from, &from.full, weights).unwrap_or(f64::INFINITY);
+        let spares = |s: &Scored| {
+            starts::least_cost_aside(bench, (from, weights), s).is_some_and(|(cost, _)| cost < (1.0 - SPARES) * now)
+        };
+        let asked = |s: &&Scored| match effect(s).stage {
+            Stage::Hit => true,
+            Stage::Camera => !all.contains(&s.candidate) && spares(s),
+            _ => false,
+        };
+        let more: Vec<usize> =
+            scored.iter().filter(|s| s.signal > TESTABLE).filter(asked).map(|s| s.candidate).collect();
+        all.extend(more);
+    }
+    all
+}
+
+/// Candidates on the arm that the score test passed over although a gap remains there that none of the others explains:
+/// what acts only from some size on, as play does, has no slope at its neutral point. Those on the object all have one, or are
+/// fitted in any case.
+pub(super) fn overlooked<E: Evidence>(bench: &Bench<'_, E>, step: &Step) -> Vec<usize> {
+    let arm = step.left.iter().find(|group| !group.of_object);
+    if !arm.is_some_and(|arm| Left::of_groups(&[*arm], &[*arm])[0].too_much(false)) {
+        return Vec::new();
+    }
+    let rest = step.trials.iter().filter(|trial| trial.fitted.is_none() && trial.scored.signal > TESTABLE);
+    let of_arm = |candidate: &usize| bench.library.candidates[*candidate].effect.stage == Stage::Control;
+    rest.map(|trial| trial.scored.candidate).filter(of_arm).collect()
+}
