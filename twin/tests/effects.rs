@@ -140,7 +140,8 @@ fn row(effect: &twin::effects::EffectInfo) -> String {
             Role::Size { neutral } => format!("neutral {neutral}"),
             Role::Form { default } => format!("default {default}"),
         };
-        let [low, high] = p.plausible.map(|v| format!("{}", (v * 1e4).round() / 1e4));
+        // Four places behind the point, or all of a number that would have none of them.
+        let [low, high] = p.plausible.map(|v| if v.abs() < 1e-4 { v } else { (v * 1e4).round() / 1e4 });
         format!("`{}` [{}]{count}: {low} to {high}, {rest}", p.name, p.unit)
     };
     let parameters: Vec<String> = effect.parameters.iter().map(parameter).collect();
