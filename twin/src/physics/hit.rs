@@ -142,7 +142,7 @@ impl ContactMotion {
 
     fn is_calm(&self, depth: f64, rate: f64) -> bool {
         let spring = self.frequency * self.frequency * depth - PUSHING;
-        spring.hypot(self.frequency * rate) < CALM
+        spring * spring + (self.frequency * rate).powi(2) < CALM * CALM
     }
 }
 
