@@ -236,6 +236,7 @@ impl Studio<'_> {
         Ok(Clip {
             file: format!("clip_{index:02}.mcap").into(),
             kind: if poses_ns.is_empty() { ClipKind::Excitation } else { ClipKind::ControlHitSlide },
+            torques_end_at_rows: false,
             joint_names: self.body.model().joint_names().to_vec(),
             desired,
             measured,

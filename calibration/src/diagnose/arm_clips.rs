@@ -42,7 +42,7 @@ struct Prepared {
     commands: CommandTrack,
     /// Measured rows that count, and their stamps.
     kept: Vec<usize>,
-    /// Each followed by the one a control period later: a torque logged at a tick acts in the period after it.
+    /// Each followed by the one a control period later: some logs have the torque that acts from a tick on.
     stamps_ns: Vec<u64>,
     rows: Vec<Row>,
 }
@@ -184,12 +184,13 @@ impl<F> ArmClips<F> {
         for (channel, (info, sigma)) in self.channels.iter().zip(&self.sigma).enumerate() {
             let joint = channel % dof;
             let (log, values) = series(&clip.recorded, info);
+            let later = usize::from(!clip.recorded.torques_end_at_rows);
             for (moment, row) in clip.kept.iter().enumerate() {
                 let predicted = match info.quantity {
                     "q" => readings[2 * moment].state.q[joint],
                     "dq" => readings[2 * moment].state.dq[joint],
-                    "tau_J" => readings[2 * moment + 1].tau_J[joint],
-                    _ => readings[2 * moment + 1].tau_J_d[joint],
+                    "tau_J" => readings[2 * moment + later].tau_J[joint],
+                    _ => readings[2 * moment + later].tau_J_d[joint],
                 };
                 out.push((values[row * log.dof + joint] - predicted) / sigma);
             }

@@ -73,7 +73,8 @@ pub fn conclude<E: Evidence>(
     let left = (typical(&first.from).zip(typical(&found.last)))
         .map(|(before, after)| Left::of_groups(&before, &after))
         .ok_or(DiagnoseError::NoBaseline)?;
-    let finding = finding(bench, found, left, &rest);
+    let confirmed = after.mean_square() < before.mean_square();
+    let finding = finding(bench, found, (left, confirmed), &rest);
     let verdict = finding.verdict();
     let believed = matches!(verdict.kind, Kind::Named | Kind::Class);
     let kept = if believed { &found.last } else { &first.from };
@@ -113,7 +114,12 @@ pub fn conclude<E: Evidence>(
     })
 }
 
-fn finding<'a, E: Evidence>(bench: &Bench<'a, E>, found: &Found, left: Vec<Left>, rest: &[Place]) -> Finding<'a> {
+fn finding<'a, E: Evidence>(
+    bench: &Bench<'a, E>,
+    found: &Found,
+    (left, confirmed): (Vec<Left>, bool),
+    rest: &[Place],
+) -> Finding<'a> {
     let name = |effect: &usize| bench.library.candidates[*effect].effect.name;
     let mut rivals = Vec::new();
     let (mut sure, mut clear): (f64, bool) = (1.0, true);
@@ -130,6 +136,7 @@ fn finding<'a, E: Evidence>(bench: &Bench<'a, E>, found: &Found, left: Vec<Left>
         confidence: sure,
         clear,
         left,
+        confirmed,
         at_bounds: !leftovers::at_bounds(bench, &found.last).is_empty(),
         place: rest.first().map_or_else(String::new, |place| format!("{} ({})", place.channel, place.regime)),
     }

@@ -16,6 +16,8 @@ pub struct Finding<'a> {
     pub clear: bool,
     /// The gap before and after, of every group of sensors.
     pub left: Vec<Left>,
+    /// Whether the gap shrinks on the clips that were kept for confirming.
+    pub confirmed: bool,
     /// Whether an effect was pushed to the bound of what is met in practice.
     pub at_bounds: bool,
     /// Where the gap, or what is left of it, is largest.
@@ -29,7 +31,7 @@ impl Finding<'_> {
     /// The verdict.
     #[must_use]
     pub fn verdict(&self) -> Verdict {
-        if self.effects.is_empty() {
+        if self.effects.is_empty() || !self.confirmed {
             let gap = self.left.iter().any(|left| left.before - left.floor > left.numerics);
             return if gap { self.unexplained() } else { self.none() };
         }
@@ -101,6 +103,7 @@ mod tests {
             confidence: 0.95,
             clear: false,
             left,
+            confirmed: true,
             at_bounds: false,
             place: "joint2".into(),
         }
@@ -115,6 +118,13 @@ mod tests {
         let class = Finding { rivals: vec!["base_tilt"], ..finding(vec!["payload"], 500.0, 1.5) }.verdict();
         assert_eq!((class.kind, class.effects.len()), (Kind::Class, 2));
         assert_eq!(not_testable("one clip").kind, Kind::NotTestable);
+    }
+
+    #[test]
+    fn what_widens_the_gap_on_clips_kept_for_confirming_is_not_named() {
+        let refuted = Finding { confirmed: false, ..finding(vec!["payload"], 500.0, 1.5) };
+        assert_eq!(refuted.verdict().kind, Kind::Unexplained);
+        assert_eq!(Finding { confirmed: false, ..finding(vec!["payload"], 2.0, 1.5) }.verdict().kind, Kind::None);
     }
 
     #[test]

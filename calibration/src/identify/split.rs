@@ -79,6 +79,7 @@ mod tests {
         Clip {
             file: "clip.mcap".into(),
             kind: ClipKind::Excitation,
+            torques_end_at_rows: false,
             joint_names: vec!["a".into()],
             measured: desired.clone(),
             desired,

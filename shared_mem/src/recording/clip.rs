@@ -23,6 +23,9 @@ pub struct Clip {
     pub desired: JointSeries,
     /// What the arm did: `q`, `dq` and, where logged, `tau_J` (with gravity). Empty without an arm.
     pub measured: JointSeries,
+    /// Whether a row's torques acted in the control period that ends at its stamp, as in the states of an arm, or in the one
+    /// that begins there, as where a controller logs what it has just calculated.
+    pub torques_end_at_rows: bool,
     /// Where the object was. Empty when it was not tracked.
     pub object: ObjectSeries,
     /// What was found odd in it, one sentence each.
@@ -63,6 +66,7 @@ impl Clip {
             joint_names: Vec::new(),
             desired: JointSeries::default(),
             measured: JointSeries::default(),
+            torques_end_at_rows: false,
             object: ObjectSeries::default(),
             warnings: Vec::new(),
             damage: None,

@@ -93,7 +93,7 @@ pub(super) fn read<R: Read + Seek>(
             _ => {}
         }
     }
-    let mut clip = Clip::empty(path, kind);
+    let mut clip = Clip { torques_end_at_rows: true, ..Clip::empty(path, kind) };
     clip.damage = messages.damage().summary();
     let needs_arm = cell.robot.is_some() && kind != ClipKind::FreeMotion;
     if needs_arm && rows.device_ns.is_empty() {
