@@ -42,9 +42,9 @@ impl Session {
     /// [`SessionError`] when it cannot be written, or belongs to another cell.
     pub fn open(folder: &Path, cell: &Cell) -> Result<Self, SessionError> {
         let session = Self { folder: folder.to_owned() };
-        let cell = at_home_anywhere(cell);
+        let cell = cell.at_home_anywhere();
         if session.cell_file().exists() {
-            let known = at_home_anywhere(&Cell::read(&session.cell_file())?);
+            let known = Cell::read(&session.cell_file())?.at_home_anywhere();
             return match differing_block(&known, &cell) {
                 None => Ok(session),
                 Some(block) => Err(SessionError::OtherCell { folder: session.folder, block }),
@@ -108,16 +108,6 @@ impl Session {
 /// `7` of `clip_07.mcap`.
 fn number_of(file: &Path) -> Option<usize> {
     file.to_str()?.strip_prefix("clip_")?.strip_suffix(".mcap")?.parse().ok()
-}
-
-/// The cell with paths that hold from any folder, because the session is not where the laboratory's file is.
-fn at_home_anywhere(cell: &Cell) -> Cell {
-    let mut cell = cell.clone();
-    let folder = std::path::absolute(&cell.folder).unwrap_or_else(|_| cell.folder.clone());
-    let anchor = |path: &mut PathBuf| *path = folder.join(&*path);
-    cell.robot.iter_mut().filter_map(|robot| robot.urdf.as_mut()).for_each(anchor);
-    cell.object.iter_mut().filter_map(|object| object.mesh.as_mut()).for_each(anchor);
-    cell
 }
 
 /// First block that says something else. Clips, and where a simulated cell starts, may differ.

@@ -126,6 +126,17 @@ impl Cell {
         Ok(self)
     }
 
+    /// The same cell with paths that hold from any folder.
+    #[must_use]
+    pub fn at_home_anywhere(&self) -> Self {
+        let mut cell = self.clone();
+        let folder = std::path::absolute(&cell.folder).unwrap_or_else(|_| cell.folder.clone());
+        let anchor = |path: &mut PathBuf| *path = folder.join(&*path);
+        cell.robot.iter_mut().filter_map(|robot| robot.urdf.as_mut()).for_each(anchor);
+        cell.object.iter_mut().filter_map(|object| object.mesh.as_mut()).for_each(anchor);
+        cell
+    }
+
     /// The file's text, every default spelled out where it is in force.
     ///
     /// # Panics

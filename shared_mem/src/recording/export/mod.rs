@@ -20,7 +20,7 @@ mod rosbag;
 mod source;
 
 use super::{ReadError, Session, WriteError};
-use crate::cell::{Cell, ClipEntry};
+use crate::cell::ClipEntry;
 use serde::Serialize;
 use source::Source;
 use std::io;
@@ -112,7 +112,7 @@ pub fn export_session(
     if std::fs::read_dir(out).map_err(ExportError::file(out))?.next().is_some() {
         return Err(ExportError::NotEmpty { path: out.to_owned() });
     }
-    let mut cell = at_home_anywhere(&session.cell);
+    let mut cell = session.cell.at_home_anywhere();
     cell.clips.clear();
     let mut done = Vec::new();
     for (number, entry) in session.clips.iter().enumerate() {
@@ -143,16 +143,6 @@ fn name(file: &Path, to: Format, number: usize) -> PathBuf {
             format!("{stem}.mcap").into()
         }
     }
-}
-
-/// The cell with paths that hold from any folder.
-fn at_home_anywhere(cell: &Cell) -> Cell {
-    let mut cell = cell.clone();
-    let folder = std::path::absolute(&cell.folder).unwrap_or_else(|_| cell.folder.clone());
-    let anchor = |path: &mut PathBuf| *path = folder.join(&*path);
-    cell.robot.iter_mut().filter_map(|robot| robot.urdf.as_mut()).for_each(anchor);
-    cell.object.iter_mut().filter_map(|object| object.mesh.as_mut()).for_each(anchor);
-    cell
 }
 
 impl Exported {
