@@ -97,19 +97,23 @@ fn a_robot_in_reflex_is_not_moved_and_the_remedy_is_named() {
     assert!(error.to_string().contains("recover"), "{error}");
 }
 
+/// Plays a long motion and interrupts it at its five hundredth state.
+fn interrupted(link: &mut Link, interrupt: &Interrupt, ask: fn(&Interrupt)) -> Result<Outcome, StreamError> {
+    let mut states = 0;
+    play(link, swing(5000).motion(), interrupt, |_| {
+        states += 1;
+        if states == 500 {
+            ask(interrupt);
+        }
+    })
+}
+
 #[test]
 fn ctrl_c_brakes_the_arm_and_waits_for_rest() {
     let domain = domain("ctrl-c");
     let bridge = FakeBridge::start(&domain, ArmMode::Move, START, Fault::None);
     let mut link = Link::open(Some(&domain)).expect("shared memory");
-    let interrupt = Interrupt::default();
-    let mut states = 0;
-    let outcome = play(&mut link, swing(5000).motion(), &interrupt, |_| {
-        states += 1;
-        if states == 500 {
-            interrupt.ask();
-        }
-    });
+    let outcome = interrupted(&mut link, &Interrupt::default(), Interrupt::ask);
     assert!(matches!(outcome, Ok(Outcome::Stopped)));
     assert!(bridge.finish().len() < 2000, "the motion was cut short");
 }
@@ -120,13 +124,7 @@ fn a_pause_brakes_the_arm_and_another_motion_goes_on_from_there() {
     let bridge = FakeBridge::start(&domain, ArmMode::Move, START, Fault::None);
     let mut link = Link::open(Some(&domain)).expect("shared memory");
     let interrupt = Interrupt::default();
-    let mut states = 0;
-    let outcome = play(&mut link, swing(5000).motion(), &interrupt, |_| {
-        states += 1;
-        if states == 500 {
-            interrupt.toggle_pause();
-        }
-    });
+    let outcome = interrupted(&mut link, &interrupt, Interrupt::toggle_pause);
     assert!(matches!(outcome, Ok(Outcome::Paused)));
     let again = play(&mut link, swing(100).motion(), &interrupt, |_| {});
     assert!(matches!(again, Ok(Outcome::Paused)), "nothing is begun while paused");
