@@ -49,9 +49,9 @@ impl Finding<'_> {
     fn named(&self) -> Verdict {
         let names = self.effects.iter().map(|name| (*name).to_owned()).collect::<Vec<_>>();
         let share = self.percent();
-        let verb = if names.len() == 1 { "causes" } else { "together cause" };
+        let (verb, these) = if names.len() == 1 { ("causes", "it") } else { ("together cause", "them") };
         let text = format!(
-            "{} {verb} the gap: with it the twin closes {share:.0} % of what is not noise.",
+            "{} {verb} the gap: with {these} the twin closes {share:.0} % of what is not noise.",
             names.join(" and ")
         );
         Verdict { kind: Kind::Named, effects: names, confidence: self.confidence, text }
