@@ -118,7 +118,7 @@ fn same(a: &Clip, b: &Clip, within: f64) {
             assert!(near(numbers, others, within));
         }
     }
-    assert_eq!(a.joint_names, b.joint_names);
+    assert_eq!((a.torques_end_at_rows, &a.joint_names), (b.torques_end_at_rows, &b.joint_names));
     assert_eq!(since(a, &a.object.stamps_ns), since(b, &b.object.stamps_ns));
     for (x, y) in a.object.poses.iter().zip(&b.object.poses) {
         assert!((x.isometry().to_homogeneous() - y.isometry().to_homogeneous()).norm() <= 10.0 * within, "{x:?} {y:?}");

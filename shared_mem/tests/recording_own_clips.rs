@@ -20,7 +20,12 @@ use std::path::Path;
 const CELL: &str = "[robot]\nmodel = \"fr3\"\n";
 
 fn info() -> ClipInfo {
-    ClipInfo { cell_toml: Some(CELL.into()), configuration: "rate = 1000\n".into(), program: "test 1.2.3".into() }
+    ClipInfo {
+        cell_toml: Some(CELL.into()),
+        configuration: "rate = 1000\n".into(),
+        program: "test 1.2.3".into(),
+        torques_begin_at_rows: false,
+    }
 }
 
 /// A state whose every number differs from every other.

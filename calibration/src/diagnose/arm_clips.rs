@@ -116,9 +116,11 @@ impl Prepared {
         let stamps = &recorded.measured.stamps_ns;
         let used = stamps.partition_point(|stamp| *stamp < end_ns).min(recorded.desired.len());
         let stride = used.div_ceil(MOMENTS).max(1);
-        let kept: Vec<usize> = (0..used).step_by(stride).collect();
+        let first = *stamps.first()?;
+        // What acted in the period before the first state is not known: neither are its torques.
+        let known = usize::from(recorded.torques_end_at_rows);
+        let kept: Vec<usize> = (known..used).step_by(stride).collect();
         let stamps_ns: Vec<u64> = kept.iter().flat_map(|row| [stamps[*row], stamps[*row] + TICK_NS]).collect();
-        let first = *stamps_ns.first()?;
         let dof = recorded.measured.dof;
         let mut rows = Vec::with_capacity(channels.len() * kept.len());
         for channel in 0..channels.len() {
@@ -170,7 +172,7 @@ impl<F: Fn(&[f64]) -> Theta + Sync> ClipModel for ArmClips<F> {
         let rollout = plant.rollout();
         let start = rollout.start_state(&clip.recorded.measured, 0, &clip.commands);
         let start = start.ok_or_else(|| Impossible("no measured joints".into()))?;
-        let first = clip.stamps_ns[0];
+        let first = clip.recorded.measured.stamps_ns[0];
         let mut readings = vec![Reading::default(); clip.stamps_ns.len()];
         rollout.readings(&start, first, &clip.commands, &clip.stamps_ns, &mut readings);
         self.compare(clip, &readings, out)
@@ -211,5 +213,65 @@ impl<F: Fn(&[f64]) -> Theta + Sync> Evidence for ArmClips<F> {
 
     fn scatter(&self) -> Scatter {
         Scatter::default()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use shared_mem::msg::arm::ArmState;
+    use shared_mem::recording::ObjectSeries;
+    use shared_mem::theta::EffectTheta;
+    use std::path::Path;
+    use twin::sim::{Drive, SimCell};
+
+    /// A payload, so that torques are not those of an arm at rest, and a joint that swings under it.
+    fn clip(cell: &Cell, theta: &Theta, torques_end_at_rows: bool) -> Clip {
+        let mut twin = SimCell::new(cell, Some(theta)).expect("a cell");
+        let mut state = ArmState::default();
+        twin.read(&mut state);
+        let (home, mut log) = (state.q, [JointSeries::default(), JointSeries::default()]);
+        for tick in 0..400 {
+            let t = f64::from(tick) * 1e-3;
+            let (mut q_d, mut dq_d) = (home, [0.0; 8]);
+            (q_d[3], dq_d[3]) = (q_d[3] + 0.1 * (1.0 - (5.0 * t).cos()), 0.5 * (5.0 * t).sin());
+            let mut row = state;
+            twin.step(&Drive::JointImpedance { q_d, dq_d });
+            twin.read(&mut state);
+            if !torques_end_at_rows {
+                (row.tau_J, row.tau_J_d) = (state.tau_J, state.tau_J_d);
+            }
+            let series = [(&row.q, &row.dq, &row.tau_J), (&q_d, &dq_d, &row.tau_J_d)];
+            for (log, (q, dq, tau)) in log.iter_mut().zip(series) {
+                log.dof = 7;
+                log.stamps_ns.push(u64::try_from(tick).expect("not negative") * TICK_NS);
+                log.q.extend(&q[..7]);
+                log.dq.extend(&dq[..7]);
+                log.tau.extend(&tau[..7]);
+            }
+        }
+        let [measured, desired] = log;
+        let (file, kind) = ("clip.mcap".into(), ClipKind::Excitation);
+        let joint_names = (1..=7).map(|joint| format!("fr3_joint{joint}")).collect();
+        let (object, warnings) = (ObjectSeries::default(), Vec::new());
+        Clip { file, kind, joint_names, desired, measured, torques_end_at_rows, object, warnings, damage: None }
+    }
+
+    #[test]
+    fn torques_agree_whether_a_log_means_the_period_before_or_behind_its_stamp() {
+        let text = include_str!("../../../config/fr3_cell.toml");
+        let mut cell = Cell { object: None, ..Cell::parse(text, Path::new("cell.toml")).expect("the shipped cell") };
+        (cell.simulation.q_noise, cell.simulation.dq_noise) = (0.0, 0.0);
+        let effect = EffectTheta { name: "payload".into(), parameters: [("mass".to_owned(), 0.3.into())].into() };
+        let theta = Theta { effects: vec![effect], ..Theta::default() };
+        for end_at_rows in [true, false] {
+            let arm = ArmClips::new(&cell, &[clip(&cell, &theta, end_at_rows)], |_: &[f64]| theta.clone());
+            let (arm, mut out) = (arm.expect("an arm"), Vec::new());
+            arm.residuals(0, &[], &[], &mut out).expect("it can be simulated");
+            let torques: Vec<f64> =
+                arm.rows(0).iter().zip(&out).filter(|(row, _)| row.channel >= 14).map(|(_, r)| *r).collect();
+            let worst = torques.iter().fold(0.0, |worst: f64, sigmas| worst.max(sigmas.abs()));
+            assert!(torques.len() > 2000 && worst < 3.0, "{end_at_rows}: {worst} sigmas in {} rows", torques.len());
+        }
     }
 }

@@ -45,6 +45,7 @@ impl RecordArguments {
             cell_toml: self.cell.as_deref().map(Cell::read).transpose()?.map(|cell| cell.to_toml()),
             configuration: self.configuration,
             program: concat!("rt_bridge ", env!("CARGO_PKG_VERSION")).into(),
+            torques_begin_at_rows: false,
         };
         let settings = Settings { out: self.out, duration: self.duration, parent: self.parent, info };
         let recorded = record(&settings, &stop)?;

@@ -7,6 +7,7 @@ use super::error::ReadError;
 use super::joint_log::JointLog;
 use super::ros2::{JointState, StampedPose};
 use super::series::ObjectSeries;
+use super::torques;
 use crate::cell::{Cell, ClipKind, Topics};
 use crate::frames::{Base, Object, Pose};
 use std::io::{Read, Seek};
@@ -53,6 +54,7 @@ pub(super) fn read<R: Read + Seek>(
     let topics = &cell.topics;
     let mut clip = Clip::empty(path, kind);
     clip.damage = messages.damage().summary();
+    clip.torques_end_at_rows = torques::end_at_rows(&messages, false);
     let missing = |topic: &str, wanted: Wanted| missing(path, topic, wanted, &messages);
     if needs_arm || !collected.measured.is_empty() {
         collected.joints(&missing, cell, &mut clip)?;

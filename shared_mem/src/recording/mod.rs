@@ -36,6 +36,7 @@ mod recover;
 mod ros2;
 mod series;
 mod session;
+mod torques;
 mod twinaligner;
 mod wire;
 mod writer;

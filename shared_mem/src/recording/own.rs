@@ -8,6 +8,7 @@ use super::device_clock::DeviceClock;
 use super::error::ReadError;
 use super::messages::decode;
 use super::series::JointSeries;
+use super::torques;
 use super::wire::Wire;
 use super::writer::{CELL_TOML, CONFIGURATION, ClipInfo, METADATA, PROGRAM};
 use crate::cell::{Cell, ClipKind};
@@ -25,6 +26,7 @@ pub(super) fn clip_info<R: Read + Seek>(messages: &Messages<R>) -> Option<ClipIn
         cell_toml: cell.map(|a| String::from_utf8_lossy(&a.data).into_owned()),
         configuration: text(CONFIGURATION),
         program: text(PROGRAM),
+        torques_begin_at_rows: !torques::end_at_rows(messages, true),
     })
 }
 
@@ -93,7 +95,7 @@ pub(super) fn read<R: Read + Seek>(
             _ => {}
         }
     }
-    let mut clip = Clip { torques_end_at_rows: true, ..Clip::empty(path, kind) };
+    let mut clip = Clip { torques_end_at_rows: torques::end_at_rows(&messages, true), ..Clip::empty(path, kind) };
     clip.damage = messages.damage().summary();
     let needs_arm = cell.robot.is_some() && kind != ClipKind::FreeMotion;
     if needs_arm && rows.device_ns.is_empty() {

@@ -3,6 +3,7 @@
 //! The file only grows: a chunk reaches it whole, so a killed writer loses what came after its last [`ClipWriter::flush`]
 //! and nothing else. Reading needs neither the index nor the footer that [`ClipWriter::finish`] adds.
 
+use super::torques;
 use super::wire::{self, UnixClock, Wire};
 use crate::msg::arm::{ArmCommand, ArmState};
 use crate::msg::event::Event;
@@ -43,6 +44,9 @@ pub struct ClipInfo {
     pub configuration: String,
     /// Name and version of that program.
     pub program: String,
+    /// Whether the torques of a state act from its stamp on, and not until it as those that a robot reports: see
+    /// [`Clip::torques_end_at_rows`](super::Clip::torques_end_at_rows).
+    pub torques_begin_at_rows: bool,
 }
 
 /// What a finished clip holds.
@@ -179,6 +183,7 @@ impl<W: Write> ClipWriter<W> {
         ];
         let metadata = pairs.into_iter().map(|(key, value)| (key.to_owned(), value)).collect();
         self.mcap.write_metadata(&Metadata { name: METADATA.into(), metadata })?;
+        self.mcap.write_metadata(&torques::record(!info.torques_begin_at_rows))?;
         if let Some(text) = &info.cell_toml {
             let now = self.clock.unix_ns(crate::time::now_ns());
             self.mcap.attach(&Attachment {

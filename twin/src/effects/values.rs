@@ -54,7 +54,7 @@ pub enum EffectError {
         wanted: String,
     },
     /// A value without meaning.
-    #[error("`{parameter}` of effect `{effect}` cannot be {value} {unit}; give {wanted}")]
+    #[error("`{parameter}` of effect `{effect}` cannot be {value}{}; give {wanted}", behind(unit))]
     Value {
         /// The effect.
         effect: &'static str,
@@ -67,6 +67,11 @@ pub enum EffectError {
         /// What would do.
         wanted: String,
     },
+}
+
+/// A unit as it stands behind a number; nothing for a pure one.
+fn behind(unit: &str) -> String {
+    if unit == "1" { String::new() } else { format!(" {unit}") }
 }
 
 /// Checked parameters of one effect.

@@ -27,6 +27,7 @@ pub fn write_clip(path: &Path, replayer: &Replayer, clip: &Clip, prediction: &Pr
         cell_toml: Some(replayer.cell().to_toml()),
         configuration: replayer.theta().map_or_else(String::new, |theta| theta.to_toml()),
         program: concat!("twin ", env!("CARGO_PKG_VERSION"), " replay").to_owned(),
+        torques_begin_at_rows: !clip.torques_end_at_rows,
     };
     let mut writer = ClipWriter::create(path, &info)?;
     let latency_ns = replayer.cell().camera.as_ref().map_or(0, |camera| (camera.latency * 1e9) as u64);

@@ -46,6 +46,7 @@ pub(super) fn write(
         cell_toml: Some(cell.to_toml()),
         configuration: String::new(),
         program: concat!("twinalign ", env!("CARGO_PKG_VERSION"), ", export").into(),
+        torques_begin_at_rows: !clip.torques_end_at_rows,
     };
     let mut writer = ClipWriter::create_stamped(target, &info, UnixClock(0))?;
     let known = if matches!(source.kind, Kind::Bag) { Known::read(&source.path)? } else { Known::default() };

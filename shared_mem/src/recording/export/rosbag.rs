@@ -1,7 +1,7 @@
 //! A clip as a ROS 2 bag that `ros2 bag play` and Foxglove open, under the topic names of cell.toml's `[topics]`.
 
 use super::super::ros2::{self, JointState, StampedPose};
-use super::super::{Payload, Picture};
+use super::super::{Payload, Picture, torques};
 use super::definitions::definition;
 use super::encode;
 use super::source::{Beside, Source};
@@ -35,6 +35,7 @@ pub(super) fn write(source: &Source, cell: &Cell, target: &Path) -> Result<Expor
     let failed = |error: mcap::McapError| ExportError::file(target)(io::Error::other(error.to_string()));
     let file = File::create_new(target).map_err(ExportError::file(target))?;
     let mut bag = Bag::create(file).map_err(failed)?;
+    bag.mcap.write_metadata(&torques::record(source.clip.torques_end_at_rows)).map_err(failed)?;
     let mut rows = Rows::new(source, cell);
     for beside in source.beside()? {
         let beside = beside?;
