@@ -165,7 +165,7 @@ impl Desk<'_> {
         let mut told = false;
         loop {
             let Some(standing) = object.standing(COMES_TO_REST, self.interrupt)? else { return Ok(None) };
-            match program.next(&Wish::of_clip(number), &standing, self.body.model().ready()) {
+            match program.next(&Wish::of_clip(number), &standing, &self.ways(), &link.ready_state()?.q_d) {
                 Ok(next) => return Ok(Some(next)),
                 Err(error) if asked.elapsed() > BY_HAND => return Err(error.into()),
                 Err(error) if !told => {
@@ -186,9 +186,7 @@ impl Desk<'_> {
         title: &str,
     ) -> anyhow::Result<Option<ClipSummary>> {
         let points = &next.plan.set_points;
-        let ways = self.ways();
-        let approach = ways.over(&link.ready_state()?.q_d, &points[0].q_d)?;
-        if self.play(link, object, &approach, &format!("{title}: approach"))?.0 != Outcome::Done {
+        if self.play(link, object, &next.approach, &format!("{title}: approach"))?.0 != Outcome::Done {
             return Ok(None);
         }
         let Some(_) = object.standing(COMES_TO_REST, self.interrupt)? else { return Ok(None) };

@@ -20,6 +20,12 @@ pub enum Quantity {
 }
 
 impl Quantity {
+    /// Whether the same way, taken more slowly, comes with less of it.
+    #[must_use]
+    pub fn eases(self) -> bool {
+        !matches!(self, Self::Position | Self::Height)
+    }
+
     /// Its unit.
     #[must_use]
     pub fn unit(self) -> &'static str {

@@ -8,8 +8,10 @@
 use super::body::Body;
 use super::limits::JointLimits;
 use super::stroke::{self, Stroke, StrokeError, StrokePlan};
+use super::way::{WayError, Ways};
 use shared_mem::cell::Cell;
 use shared_mem::msg::Joints;
+use shared_mem::msg::motion::SetPoint;
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 /// Every so many strokes the first is repeated.
@@ -96,6 +98,8 @@ pub struct Next {
     pub stroke: Stroke,
     /// Its motion.
     pub plan: StrokePlan,
+    /// The way to where it begins.
+    pub approach: Vec<SetPoint>,
     /// Where the object stands now.
     pub object: Standing,
     /// Where it will come to rest, about [m].
@@ -117,6 +121,9 @@ pub enum NoStroke {
     /// Directions that would keep it there cannot be done; the first refusal.
     #[error(transparent)]
     Refused(#[from] StrokeError),
+    /// Strokes could be done, but there is no way to their begin or from their end; the first refusal.
+    #[error(transparent)]
+    Cut(#[from] WayError),
 }
 
 impl<'a> Program<'a> {
@@ -133,15 +140,16 @@ impl<'a> Program<'a> {
         }
     }
 
-    /// The stroke nearest to the wish that can be done and keeps the object in reach.
+    /// The stroke nearest to the wish that can be done from rest at `from`, with the ways to it and from it, and that keeps
+    /// the object in reach.
     ///
     /// # Errors
     /// [`NoStroke`] with the remedy.
-    pub fn next(&self, wish: &Wish, object: &Standing, near: &Joints) -> Result<Next, NoStroke> {
+    pub fn next(&self, wish: &Wish, object: &Standing, ways: &Ways<'_>, from: &Joints) -> Result<Next, NoStroke> {
         let mut refused = None;
         let turns = (0..=9).flat_map(|k| [f64::from(k), -f64::from(k)]).skip(1);
-        let ways = PACES.into_iter().flat_map(|pace| turns.clone().map(move |turn| (pace, turn)));
-        for (pace, turn) in ways {
+        let tries = PACES.into_iter().flat_map(|pace| turns.clone().map(move |turn| (pace, turn)));
+        for (pace, turn) in tries {
             let (heading, speed) = (wish.heading + turn * TURN, pace * wish.speed);
             let stroke = self.stroke(&Wish { heading, speed, ..*wish }, object);
             let rest = self.rest(&stroke);
@@ -149,12 +157,21 @@ impl<'a> Program<'a> {
             if away(rest) > RADIUS && away(rest) > 0.8 * away(object.place) {
                 continue;
             }
-            match stroke::plan(&stroke, near, self.limits, self.body) {
-                Ok(plan) => return Ok(Next { stroke, plan, object: *object, rest }),
+            match self.whole(&stroke, ways, from) {
+                Ok((plan, approach)) => return Ok(Next { stroke, plan, approach, object: *object, rest }),
                 Err(error) => refused = refused.or(Some(error)),
             }
         }
-        Err(refused.map_or(NoStroke::Away { place: object.place }, NoStroke::Refused))
+        Err(refused.unwrap_or(NoStroke::Away { place: object.place }))
+    }
+
+    /// The stroke's motion and the way to it, once there is one back as well.
+    fn whole(&self, stroke: &Stroke, ways: &Ways<'_>, from: &Joints) -> Result<(StrokePlan, Vec<SetPoint>), NoStroke> {
+        let plan = stroke::plan(stroke, self.body.model().ready(), self.limits, self.body)?;
+        let [begin, .., end] = &plan.set_points[..] else { return Err(NoStroke::Away { place: stroke.object }) };
+        let approach = ways.over(from, &begin.q_d)?;
+        ways.away(&end.q_d, stroke.heading)?;
+        Ok((plan, approach))
     }
 
     /// The wish as a stroke on the object, its direction turned towards the nearest face.
@@ -217,9 +234,14 @@ mod tests {
     fn forty_strokes_one_after_the_other_keep_the_object_in_reach() {
         let (cell, body, limits) = shipped();
         let program = Program::of(&cell, [0.08, 0.06, 0.10], &body, &limits);
+        let ways = Ways { body: &body, limits: &limits, height: 0.18, floor: 0.14 };
         let mut object = Standing { place: [0.55, 0.0], yaw: 0.2 };
+        let mut at = *body.model().ready();
         for number in 0..40 {
-            let next = program.next(&Wish::of_clip(number), &object, body.model().ready()).expect("a stroke");
+            let next = program.next(&Wish::of_clip(number), &object, &ways, &at).expect("a stroke");
+            let end = next.plan.set_points[next.plan.set_points.len() - 1].q_d;
+            let away = ways.away(&end, next.stroke.heading).expect("a way back");
+            at = away[away.len() - 1].q_d;
             object = Standing { place: next.rest, yaw: object.yaw + 0.7 };
             let away = (object.place[0] - MIDDLE[0]).hypot(object.place[1] - MIDDLE[1]);
             assert!(away < 2.0 * RADIUS, "stroke {number} leads {away:.2} m away");
@@ -231,7 +253,9 @@ mod tests {
         let (cell, body, limits) = shipped();
         let program = Program::of(&cell, [0.08, 0.06, 0.10], &body, &limits);
         let far = Standing { place: [1.1, 0.4], yaw: 0.0 };
-        let error = program.next(&Wish::of_clip(1), &far, body.model().ready()).expect_err("too far").to_string();
+        let ways = Ways { body: &body, limits: &limits, height: 0.18, floor: 0.14 };
+        let error =
+            program.next(&Wish::of_clip(1), &far, &ways, body.model().ready()).expect_err("too far").to_string();
         assert!(error.contains("put it back") || error.contains("move the object"), "{error}");
     }
 }

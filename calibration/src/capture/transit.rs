@@ -16,16 +16,17 @@ const SPEED: f64 = 0.8;
 /// What a joint that is not there may do, so that the planner has numbers.
 const IDLE: f64 = 1.0;
 
-/// Set points of the way, the first in `from` and the last in `to`, one a control cycle; `None` where no way is found.
+/// Set points of the way, the first in `from` and the last in `to`, one a control cycle, at a share `pace` of the usual
+/// speed; `None` where no way is found.
 #[must_use]
-pub fn plan(from: &Joints, to: &Joints, limits: &[JointLimits]) -> Option<Vec<SetPoint>> {
+pub fn plan(from: &Joints, to: &Joints, limits: &[JointLimits], pace: f64) -> Option<Vec<SetPoint>> {
     let mut input = InputParameter::<MAX_JOINTS>::new(None);
     input.synchronization = Synchronization::Time;
     for joint in 0..MAX_JOINTS {
         let limit = limits.get(joint);
         input.current_position[joint] = from[joint];
         input.target_position[joint] = if limit.is_some() { to[joint] } else { from[joint] };
-        input.max_velocity[joint] = limit.map_or(IDLE, |limit| SPEED.min(CALM * limit.dq_max));
+        input.max_velocity[joint] = pace * limit.map_or(IDLE, |limit| SPEED.min(CALM * limit.dq_max));
         input.max_acceleration[joint] = CALM * limit.map_or(IDLE, |limit| limit.ddq_max);
         input.max_jerk[joint] = CALM * limit.map_or(IDLE, |limit| limit.dddq_max);
     }
@@ -80,7 +81,7 @@ mod tests {
                 })
             };
             let [from, to] = places.map(pose);
-            let points = plan(&from, &to, &limits).expect("a way");
+            let points = plan(&from, &to, &limits, 1.0).expect("a way");
             let [first, last] = [&points[0], &points[points.len() - 1]];
             prop_assert!(first.q_d.iter().zip(&from).all(|(a, b)| (a - b).abs() < 1e-9));
             prop_assert_eq!(last.q_d, to);

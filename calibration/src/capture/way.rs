@@ -13,6 +13,8 @@ use shared_mem::msg::motion::SetPoint;
 
 /// Speed straight up and down [m/s].
 const SPEED: f64 = 0.15;
+/// Shares of the usual speed that are tried: near a joint's stop it may move only slowly towards it.
+const PACES: [f64; 4] = [1.0, 0.5, 0.25, 0.12];
 /// How far the tool backs off from what it pushed before it rises [m].
 const BACK: f64 = 0.02;
 
@@ -32,7 +34,7 @@ pub enum WayError {
         z: f64,
     },
     /// A limit is broken on the way.
-    #[error("the way to the stroke breaks a limit ({0}); move the arm to its ready pose, then start again")]
+    #[error("the way to or from the stroke breaks a limit ({0}); move the arm to its ready pose, then start again")]
     Limit(Excess),
 }
 
@@ -55,17 +57,19 @@ impl Ways<'_> {
     /// # Errors
     /// [`WayError`] with the place, or the joint and the limit.
     pub fn over(&self, from: &Joints, to: &Joints) -> Result<Vec<SetPoint>, WayError> {
-        let mut points = self.up(from)?;
-        let above = last(&points, from);
-        let end = self.place(to);
-        let descent = self.straight(to, &raised(&end, self.height))?;
-        let reached = last(&descent, to);
-        let across = transit::plan(&above, &reached, self.limits).ok_or_else(|| self.unreachable(&end))?;
-        self.check_height(&across)?;
-        points.extend(across);
-        // The way down is the way up from there, played backwards.
-        points.extend(descent.iter().rev().map(|p| SetPoint { q_d: p.q_d, dq_d: p.dq_d.map(|dq| -dq) }));
-        self.checked(points)
+        self.paced(|pace| {
+            let mut points = self.up(from, pace)?;
+            let above = last(&points, from);
+            let end = self.place(to);
+            let descent = self.straight(to, &raised(&end, self.height), pace)?;
+            let reached = last(&descent, to);
+            let across = transit::plan(&above, &reached, self.limits, pace).ok_or_else(|| self.unreachable(&end))?;
+            self.check_height(&across)?;
+            points.extend(across);
+            // The way down is the way up from there, played backwards.
+            points.extend(descent.iter().rev().map(|p| SetPoint { q_d: p.q_d, dq_d: p.dq_d.map(|dq| -dq) }));
+            Ok(points)
+        })
     }
 
     /// From rest at the end of a stroke along `heading` [rad]: back a little, then up.
@@ -74,21 +78,35 @@ impl Ways<'_> {
     /// [`WayError`].
     pub fn away(&self, from: &Joints, heading: f64) -> Result<Vec<SetPoint>, WayError> {
         let back = Translation3::new(-BACK * heading.cos(), -BACK * heading.sin(), 0.0);
-        let mut points = self.straight(from, &(back * self.place(from)))?;
-        points.extend(self.up(&last(&points, from))?);
-        self.checked(points)
+        self.paced(|pace| {
+            let mut points = self.straight(from, &(back * self.place(from)), pace)?;
+            points.extend(self.up(&last(&points, from), pace)?);
+            Ok(points)
+        })
     }
 
-    fn up(&self, from: &Joints) -> Result<Vec<SetPoint>, WayError> {
+    /// The way at the first pace that breaks no limit; what the slowest breaks where none does.
+    fn paced(&self, way: impl Fn(f64) -> Result<Vec<SetPoint>, WayError>) -> Result<Vec<SetPoint>, WayError> {
+        let [usual, slower @ ..] = PACES;
+        let first = way(usual).and_then(|points| self.checked(points));
+        slower.into_iter().fold(first, |tried, pace| match tried {
+            Err(WayError::Limit(excess)) if excess.quantity.eases() => {
+                way(pace).and_then(|points| self.checked(points))
+            }
+            settled => settled,
+        })
+    }
+
+    fn up(&self, from: &Joints, pace: f64) -> Result<Vec<SetPoint>, WayError> {
         let place = self.place(from);
         if place.translation.z >= self.height {
             return Ok(Vec::new());
         }
-        self.straight(from, &raised(&place, self.height))
+        self.straight(from, &raised(&place, self.height), pace)
     }
 
-    fn straight(&self, from: &Joints, to: &Isometry3<f64>) -> Result<Vec<SetPoint>, WayError> {
-        line::travel(self.body, from, to, SPEED).ok_or_else(|| self.unreachable(to))
+    fn straight(&self, from: &Joints, to: &Isometry3<f64>, pace: f64) -> Result<Vec<SetPoint>, WayError> {
+        line::travel(self.body, from, to, pace * SPEED).ok_or_else(|| self.unreachable(to))
     }
 
     fn place(&self, q: &Joints) -> Isometry3<f64> {
@@ -179,5 +197,22 @@ mod tests {
         let points = ways.away(&from, 0.0).expect("a way");
         let end = body.model().tip(&points[points.len() - 1].q_d).isometry().translation.vector;
         assert!((end - Vector3::new(0.48, 0.0, 0.2)).norm() < 1e-4, "{end}");
+    }
+
+    #[test]
+    fn near_a_stop_the_way_down_is_taken_more_slowly() {
+        let (body, mut limits) = arm();
+        let to = line::reach(&body, body.model().ready(), &upright(Vector3::new(0.5, 0.0, 0.03))).expect("in reach");
+        let over = |limits: &[JointLimits]| {
+            Ways { body: &body, limits, height: 0.2, floor: 0.12 }.over(body.model().ready(), &to)
+        };
+        let usual = over(&limits).expect("a way").len();
+        // The shoulder's stop so near that it may still creep there.
+        limits[1].q_max = to[1] + 0.014;
+        let slower = over(&limits).expect("a way");
+        assert!(slower.len() > usual, "{} cycles instead of {usual}", slower.len());
+        limits[1].q_max = to[1] - 0.01;
+        let error = over(&limits).expect_err("beyond the stop");
+        assert!(matches!(error, WayError::Limit(excess) if excess.joint == Some(1)), "{error}");
     }
 }
