@@ -8,6 +8,7 @@
 //! | pump | [`pump`] | the ports for states, commands, motions and events |
 //! | world | [`sim`] | the simulated cell, with `--arm sim` |
 //! | camera | [`camera`] | the ports for pictures, with `--camera sim` |
+//! | tracker | [`tracker`] | reads the pictures and joints, owns the port for the object's poses, with `--tracker rgbd` |
 //! | gripper, wrench | [`device`], [`gripper`], [`mod@wrench`] | one device each, and its ports |
 //! | main | [`run`] | duration, Ctrl-C, the recorder's process, the report |
 //!
@@ -32,4 +33,5 @@ pub mod safety;
 pub mod serve;
 pub mod sim;
 pub mod times;
+pub mod tracker;
 pub mod wrench;

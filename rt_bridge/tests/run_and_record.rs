@@ -67,6 +67,33 @@ fn what_was_recorded_holds_every_cycle_pictures_and_poses_and_can_be_replayed() 
 }
 
 #[test]
+fn the_bridge_tracks_the_object_in_its_own_pictures() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let clip = folder.path().join("clip.mcap");
+    let clip_path = clip.to_str().expect("a path");
+    let arguments = ["--arm", "sim", "--tracker", "rgbd", "--duration", "3", "--record", clip_path];
+    let (output, _) = end(start("tracker", &arguments));
+    assert!(output.status.success(), "{}", said(&output));
+    assert!(said(&output).contains("turned by 180 degrees it would look the same"), "{}", said(&output));
+    let messages = ClipMessages::open(&clip, &[]).expect("a clip");
+    let poses: Vec<_> = messages
+        .filter_map(|m| match m.expect("a message").payload {
+            Payload::ObjectPose(pose) => Some(pose),
+            _ => None,
+        })
+        .collect();
+    assert!(poses.len() > 3, "{} poses", poses.len());
+    // Where cell.toml puts the box.
+    for pose in poses {
+        let [x, y, z] = pose.position;
+        assert!((x - 0.55).hypot(y).hypot(z - 0.05) < 0.003, "{:?}", pose.position);
+        assert!(pose.covariance[0] > 0.0 && pose.covariance[0] < 1e-5, "{}", pose.covariance[0]);
+    }
+    let refused = end(start("tracker2", &["--arm", "sim", "--tracker", "replay"])).0;
+    assert!(!refused.status.success() && said(&refused).contains("--arm replay://"), "{}", said(&refused));
+}
+
+#[test]
 fn a_running_bridge_passes_orders_on_to_its_gripper() {
     let bridge = start("grip", &["--arm", "sim", "--camera", "off", "--gripper", "sim"]);
     let ask = |arguments: &[&str]| {

@@ -4,6 +4,7 @@ use super::{answer, seconds, stop_flag};
 use crate::gripper::GripperChoice;
 use crate::rt::Realtime;
 use crate::run::{ArmChoice, CameraChoice, ControllerChoice, RunReport, Settings, run};
+use crate::tracker::TrackerChoice;
 use crate::wrench::WrenchChoice;
 use anyhow::{Result, bail};
 use clap::Args;
@@ -20,6 +21,7 @@ use std::time::Duration;
     rt_bridge run --cell config/fr3_cell.toml --arm sim --effects hidden.toml --record clip.mcap --duration 20 --json\n  \
     rt_bridge run --cell cell.toml --arm fci://172.16.0.2 --controller torque_pd --realtime enforce\n  \
     rt_bridge run --cell cell.toml --arm fci://172.16.0.2 --gripper serial:///dev/ttyUSB0 --wrench can://can0\n  \
+    rt_bridge run --cell config/fr3_cell.toml --arm sim --tracker rgbd\n  \
     rt_bridge run --cell cell.toml --arm replay://clip.mcap\n\n\
     JSON: cycles, missed_cycles (deadlines that passed unused), overruns (work longer than a period), lost_packets,\n\
     wake_us (wake-up latency), exec_us, period_us, age_us (a state's arrival to shared memory), recorded, faults.")]
@@ -37,6 +39,10 @@ pub(super) struct RunArguments {
     /// Default: sim where the arm is simulated and cell.toml has a [camera], replay with a recording, else off
     #[arg(long)]
     camera: Option<CameraChoice>,
+    /// Who publishes the object's pose: the simulated cell, the bridge from the camera's colour and depth, the recording,
+    /// or (off) another process. Default: sim with the simulated arm, replay with a recording, else off
+    #[arg(long)]
+    tracker: Option<TrackerChoice>,
     /// sim, serial:///dev/ttyUSB0 (a Robotiq 2F), fci://HOST (the Franka Hand) or off.
     /// Default: sim where the arm is simulated and cell.toml has a [gripper], else off
     #[arg(long, value_name = "GRIPPER")]
@@ -74,6 +80,7 @@ impl RunArguments {
             arm: self.arm,
             controller: self.controller,
             camera: self.camera,
+            tracker: self.tracker,
             gripper: self.gripper,
             wrench: self.wrench,
             effects: self.effects,

@@ -8,6 +8,7 @@ use crate::rt::cycle::Plan;
 use crate::rt::law::TorquePd;
 use crate::safety::Limits;
 use crate::sim::World;
+use crate::tracker::TrackerChoice;
 use crate::wrench::WrenchChoice;
 use anyhow::{Result, bail};
 use rtrb::Consumer;
@@ -83,7 +84,7 @@ pub(super) struct Devices {
     pub(super) plan: Plan,
     pub(super) world: Option<World>,
     pub(super) pictures: Pictures,
-    /// From the simulated tracker, or of the recording. They come with the camera off, too.
+    /// From the simulated tracker, or of the recording, unless another one tracks. They come with the camera off, too.
     pub(super) poses: Option<Consumer<ObjectPose>>,
     /// Of the simulated cell's force sensor, where it is to be there.
     pub(super) wrenches: Option<Consumer<Wrench>>,
@@ -104,6 +105,7 @@ impl Devices {
             bail!("--effects and --parameters change the simulated cell only; use them with --arm sim");
         }
         let camera = camera(settings, cell)?;
+        let tracker = settings.tracker(cell)?;
         let devices = match &settings.arm {
             ArmChoice::Sim => {
                 let (world, arm, views) = World::start(cell, hidden(settings, plan.interface)?.as_ref())?;
@@ -112,7 +114,7 @@ impl Devices {
                     plan,
                     world: Some(world),
                     pictures: if camera { Pictures::Scenes(views.scenes) } else { Pictures::None },
-                    poses: cell.object.is_some().then_some(views.poses),
+                    poses: (tracker == TrackerChoice::Sim).then_some(views.poses),
                     wrenches: (settings.wrench(cell)? == WrenchChoice::Sim).then_some(views.wrenches),
                 }
             }
@@ -123,7 +125,8 @@ impl Devices {
             ArmChoice::Replay(clip) => {
                 let (arm, poses, clock) = ReplayArm::open(clip, cell, &model)?;
                 let pictures = if camera { Pictures::Clip(clip.clone(), clock) } else { Pictures::None };
-                Self { arm: Box::new(arm), plan, world: None, pictures, poses: Some(poses), wrenches: None }
+                let poses = (tracker == TrackerChoice::Replay).then_some(poses);
+                Self { arm: Box::new(arm), plan, world: None, pictures, poses, wrenches: None }
             }
         };
         let (has, described) = (devices.arm.dof(), model.dof());

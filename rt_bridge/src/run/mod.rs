@@ -18,6 +18,7 @@ use crate::rt::control;
 use crate::rt::cycle::{Cycle, Link, Plan};
 use crate::rt::stats::LoopStats;
 use crate::safety::{Guard, Workspace};
+use crate::tracker::{self, TrackerChoice};
 use crate::wrench::{self, WrenchChoice};
 use anyhow::{Result, bail};
 use devices::{Devices, Pictures};
@@ -57,6 +58,9 @@ pub struct Settings {
     /// The camera; none: simulated with the simulated arm where cell.toml has a `[camera]`, the recording's with a
     /// recording, else off.
     pub camera: Option<CameraChoice>,
+    /// Who tracks the object; none: the simulated cell with the simulated arm, the recording's poses with a recording,
+    /// else nobody.
+    pub tracker: Option<TrackerChoice>,
     /// The gripper; none: simulated with the simulated arm where cell.toml has a `[gripper]`, else off.
     pub gripper: Option<GripperChoice>,
     /// The force/torque sensor; none: simulated with the simulated arm where cell.toml has a `[wrench]`, else off.
@@ -83,6 +87,7 @@ impl Settings {
             }
         }
         for (key, choice) in [
+            ("tracker", self.tracker.map(|choice| format!("{choice:?}").to_lowercase())),
             ("gripper", self.gripper.as_ref().map(ToString::to_string)),
             ("wrench", self.wrench.as_ref().map(ToString::to_string)),
         ] {
@@ -95,6 +100,26 @@ impl Settings {
 }
 
 impl Settings {
+    /// The tracker in force.
+    fn tracker(&self, cell: &Cell) -> Result<TrackerChoice> {
+        let (simulated, recorded) = (self.arm == ArmChoice::Sim, matches!(self.arm, ArmChoice::Replay(_)));
+        match self.tracker {
+            Some(TrackerChoice::Sim) if !simulated => {
+                bail!("--tracker sim reports the simulated cell's object; use it with --arm sim")
+            }
+            Some(TrackerChoice::Replay) if !recorded => {
+                bail!("--tracker replay shows a recording's poses; use it with --arm replay://CLIP.mcap")
+            }
+            Some(TrackerChoice::Rgbd) if self.camera == Some(CameraChoice::Off) => {
+                bail!("--tracker rgbd needs pictures; leave out --camera off")
+            }
+            Some(choice) => Ok(choice),
+            None if simulated && cell.object.is_some() => Ok(TrackerChoice::Sim),
+            None if recorded => Ok(TrackerChoice::Replay),
+            None => Ok(TrackerChoice::Off),
+        }
+    }
+
     /// The gripper in force.
     fn gripper(&self, cell: &Cell) -> GripperChoice {
         let simulated = self.arm == ArmChoice::Sim && cell.gripper.is_some();
@@ -160,6 +185,10 @@ pub fn run(settings: &Settings, stop: &Arc<AtomicBool>) -> Result<RunReport> {
         Pictures::None => None,
     };
 
+    let tracker = match settings.tracker(&cell)? {
+        TrackerChoice::Rgbd => Some(tracker::serve(&cell, notices.clone())?),
+        _ => None,
+    };
     let instruments = settings.instruments(&cell, devices.wrenches, &notices)?;
 
     let guard = Guard { limits: devices.plan.limits, workspace: Workspace::of(&cell), period_s: 1e-3 };
@@ -169,6 +198,7 @@ pub fn run(settings: &Settings, stop: &Arc<AtomicBool>) -> Result<RunReport> {
 
     let mut watch = Watch { node, recorder, notices, faults: Vec::new() };
     let measured = watch.over(settings, cycle, stop, &pump)?;
+    drop(tracker);
     drop(camera);
     let missing: Vec<String> = instruments.into_iter().filter_map(Service::finish).collect();
     let pumped = pump.finish();

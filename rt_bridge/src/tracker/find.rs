@@ -1,0 +1,280 @@
+//! The object in a picture of which nothing is known: what rises from the table, is not the robot and is as large as the
+//! object, with the pose in which the object looks most like it.
+
+use super::align::{COARSE, FINE, Fit, Scene};
+use super::arm::ArmBody;
+use super::judge::Verdict;
+use super::model::Model;
+use super::patch::{Patch, widened};
+use super::view::{Frame, View};
+use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
+use shared_mem::msg::Joints;
+use twin::render::{Pinhole, Raster};
+
+/// Every so many pixels along rows and columns one is looked at.
+const EVERY: usize = 2;
+/// What rises less is the table [m].
+const LEAST_HEIGHT: f32 = 0.01;
+/// Fewer pixels (of those looked at) are no object.
+const FEWEST: usize = 20;
+/// Heaps that are looked into, the largest first.
+const HEAPS: usize = 6;
+/// Turns that are tried [rad].
+const TURN: f64 = 0.27;
+/// Poses that are fitted, of all that are drawn.
+const FITTED: usize = 6;
+/// Poses that differ by less are one [m, rad].
+const ALIKE: [f64; 2] = [0.012, 0.35];
+/// Where another pose scores within this of the best, the picture does not decide between them.
+const UNDECIDED: f64 = 0.04;
+/// Share of the object that must be seen before it counts as found.
+const SHOWN: f64 = 0.35;
+/// Of what rises from the table there, the object must explain this share.
+const EXPLAINED: f64 = 0.6;
+
+/// The robot at a moment.
+pub(super) type Arm<'a> = Option<(&'a ArmBody, &'a Joints)>;
+
+/// One heap on the table.
+#[derive(Debug, Clone)]
+struct Heap {
+    /// Its pixels.
+    pixels: Vec<[u16; 2]>,
+    /// Mean of its points, base frame [m].
+    middle: Vector3<f64>,
+}
+
+impl Scene<'_> {
+    /// Looks for the object in the whole picture: poses in which it may stand where it looks most like itself, the best
+    /// first.
+    pub(super) fn find(&self, view: &View, frame: &Frame, arm: Arm) -> Vec<Fit> {
+        let heaps = self.heaps(view, frame, arm);
+        let found = heaps.iter().map(|heap| self.look_into(view, frame, arm, heap));
+        let best = found.max_by(|a, b| score(a).total_cmp(&score(b)));
+        best.unwrap_or_default().into_iter().map(|(fit, _)| fit).collect()
+    }
+
+    /// Of several poses the one that fits best, now that more is known of the object's colours; `None` where the picture
+    /// does not decide between two, or the best is mostly covered.
+    pub(super) fn decide(&self, patch: &mut Patch, poses: &[Fit]) -> Option<Fit> {
+        let mut fits: Vec<(Fit, Verdict)> = poses
+            .iter()
+            .filter_map(|pose| {
+                let fit = self.align(patch, &pose.camera_from_object, FINE)?;
+                let verdict = self.judge(patch, &fit.camera_from_object);
+                verdict.holds().then_some((fit, verdict))
+            })
+            .collect();
+        fits.sort_by(|(_, a), (_, b)| b.score().total_cmp(&a.score()));
+        let (best, verdict) = fits.first()?;
+        let undecided = fits[1..].iter().any(|(other, rival)| {
+            rival.score() > verdict.score() - UNDECIDED
+                && !self.alike(&best.camera_from_object, &other.camera_from_object)
+        });
+        let shown = f64::from(verdict.agree) >= SHOWN * f64::from(verdict.drawn);
+        (shown && !undecided).then_some(*best)
+    }
+
+    /// What rises from the table, the largest heap first.
+    fn heaps(&self, view: &View, frame: &Frame, arm: Arm) -> Vec<Heap> {
+        let (width, height) = (view.width / EVERY, view.height / EVERY);
+        let robot = robot(view, arm, width, height);
+        let mut rises = vec![0.0_f32; width * height];
+        for v in 0..height {
+            for u in 0..width {
+                let (x, y) = (u * EVERY, v * EVERY);
+                let ray = view.ray(x as f32, y as f32);
+                let seen = self.table.corrected(&ray, frame.inverse_depth(view, x, y));
+                let table = self.table.inverse_depth(&ray);
+                // On a plane seen along a ray, 1 - table / seen is the height over it as a share of the camera's.
+                let rise = (1.0 - table / seen) / self.table.normal.norm();
+                let clear = seen - table > 3.5 * self.table.noise && rise > LEAST_HEIGHT;
+                if seen > 0.0 && table > 0.0 && clear && robot[v * width + u] == 0.0 {
+                    rises[v * width + u] = seen;
+                }
+            }
+        }
+        let mut heaps: Vec<Vec<[u16; 2]>> = Vec::new();
+        for start in 0..rises.len() {
+            if rises[start] > 0.0 {
+                let pixels = flood(&mut rises, width, start, 8.0 * self.table.noise);
+                if pixels.len() >= FEWEST {
+                    heaps.push(pixels);
+                }
+            }
+        }
+        heaps.sort_by_key(|pixels| std::cmp::Reverse(pixels.len()));
+        let heaps = heaps.into_iter().filter_map(|pixels| self.heap(view, frame, pixels));
+        heaps.take(HEAPS).collect()
+    }
+
+    /// `None` where a heap is too large to be the object.
+    fn heap(&self, view: &View, frame: &Frame, pixels: Vec<[u16; 2]>) -> Option<Heap> {
+        let points: Vec<Vector3<f64>> = pixels
+            .iter()
+            .map(|[u, v]| {
+                let (u, v) = (usize::from(*u), usize::from(*v));
+                let ray = view.ray(u as f32, v as f32);
+                let point = (ray / self.table.corrected(&ray, frame.inverse_depth(view, u, v))).cast::<f64>();
+                (view.base_from_camera * nalgebra::Point3::from(point)).coords
+            })
+            .collect();
+        let middle = points.iter().sum::<Vector3<f64>>() / points.len() as f64;
+        let within = points.iter().filter(|p| (*p - middle).norm() < 1.5 * self.model.radius).count();
+        (2 * within > points.len()).then_some(Heap { pixels, middle })
+    }
+
+    /// The object's poses that explain a heap, the best first.
+    fn look_into(&self, view: &View, frame: &Frame, arm: Arm, heap: &Heap) -> Vec<(Fit, Verdict)> {
+        let camera_from_base = view.base_from_camera.inverse();
+        let centre = camera_from_base * nalgebra::Point3::from(heap.middle);
+        let Some(mut patch) = Patch::around(view, self.table, frame, arm, &centre.coords, 2.0 * self.model.radius)
+        else {
+            return Vec::new();
+        };
+        let mut starts: Vec<(f64, Isometry3<f64>)> = candidates(self.model)
+            .filter_map(|rotation| {
+                let pose = self.under(&mut patch, view, heap, &rotation)?;
+                Some((self.judge(&mut patch, &pose).score(), pose))
+            })
+            .collect();
+        starts.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let mut tried: Vec<Isometry3<f64>> = Vec::new();
+        for (_, start) in starts {
+            if tried.len() < FITTED && !tried.iter().any(|other| self.alike(other, &start)) {
+                tried.push(start);
+            }
+        }
+        let mut fits: Vec<(Fit, Verdict)> = tried
+            .iter()
+            .filter_map(|start| {
+                let fit = self.align(&mut patch, start, COARSE)?;
+                let fit = self.align(&mut patch, &fit.camera_from_object, FINE)?;
+                let verdict = self.judge(&mut patch, &fit.camera_from_object);
+                let explains = explained(&patch, heap, self.table.noise) >= EXPLAINED;
+                (verdict.holds() && explains).then_some((fit, verdict))
+            })
+            .collect();
+        fits.sort_by(|(_, a), (_, b)| b.score().total_cmp(&a.score()));
+        fits
+    }
+
+    /// Whether two poses look nearly the same.
+    fn alike(&self, a: &Isometry3<f64>, b: &Isometry3<f64>) -> bool {
+        let turned = self.model.nearest(a, &b.rotation).rotation.angle_to(&b.rotation);
+        (a.translation.vector - b.translation.vector).norm() < ALIKE[0] && turned < ALIKE[1]
+    }
+
+    /// The pose with this rotation (base frame) that stands on the table and shows its visible side where the heap is.
+    fn under(
+        &self,
+        patch: &mut Patch,
+        view: &View,
+        heap: &Heap,
+        rotation: &UnitQuaternion<f64>,
+    ) -> Option<Isometry3<f64>> {
+        let camera_from_base = view.base_from_camera.inverse();
+        let up = view.base_from_camera.inverse_transform_vector(&Vector3::z());
+        let mut place = heap.middle;
+        let mut pose = Isometry3::identity();
+        for _ in 0..2 {
+            pose = camera_from_base * Isometry3::from_parts(Translation3::from(place), *rotation);
+            let height = self.table.height(&pose.translation.vector);
+            pose.translation.vector += up * (self.model.depth_below_centre(rotation) - height);
+            patch.draw(self.model, &pose);
+            let (mut sum, mut count) = (Vector3::zeros(), 0.0);
+            for v in (0..patch.height).step_by(2) {
+                for u in (0..patch.width).step_by(2) {
+                    let at = v * patch.width + u;
+                    let drawn = patch.drawn()[at];
+                    if drawn > 0.0 && patch.arm[at] < drawn {
+                        sum += patch.ray(u, v).cast::<f64>() / f64::from(drawn);
+                        count += 1.0;
+                    }
+                }
+            }
+            if count < 5.0 {
+                return None;
+            }
+            let shown = view.base_from_camera * nalgebra::Point3::from(sum / count);
+            place += heap.middle - shown.coords;
+        }
+        Some(pose)
+    }
+}
+
+fn score(fits: &[(Fit, Verdict)]) -> f64 {
+    fits.first().map_or(f64::NEG_INFINITY, |(_, verdict)| verdict.score())
+}
+
+/// Rotations to try, base frame: every way to stand, turned about the vertical.
+fn candidates(model: &Model) -> impl Iterator<Item = UnitQuaternion<f64>> {
+    model.stances.iter().flat_map(|stance| {
+        let turns = (stance.period / TURN).round().max(1.0);
+        (0..turns as usize).map(move |i| {
+            let yaw = i as f64 * stance.period / turns;
+            UnitQuaternion::from_axis_angle(&Vector3::z_axis(), yaw) * stance.upright
+        })
+    })
+}
+
+/// The share of a heap's pixels that the drawn object explains.
+fn explained(patch: &Patch, heap: &Heap, noise: f32) -> f64 {
+    let matches = heap.pixels.iter().filter(|[u, v]| {
+        let Some(at) = patch.local(usize::from(*u), usize::from(*v)) else { return false };
+        let drawn = patch.drawn()[at];
+        drawn > 0.0 && (patch.seen[at] - drawn).abs() < 4.0 * noise + 0.01 * drawn * drawn
+    });
+    matches.count() as f64 / heap.pixels.len() as f64
+}
+
+/// The robot's outline on the grid that is looked at; 0 beside it.
+fn robot(view: &View, arm: Arm, width: usize, height: usize) -> Vec<f32> {
+    let Some((body, q)) = arm else { return vec![0.0; width * height] };
+    let [fx, fy, cx, cy] =
+        [view.pinhole.fx, view.pinhole.fy, view.pinhole.cx, view.pinhole.cy].map(|v| v / EVERY as f32);
+    let mut raster = Raster::new(width, height, Pinhole { fx, fy, cx, cy }, -Vector3::z());
+    raster.clear([0; 3]);
+    body.draw(&mut raster, &view.base_from_camera.inverse(), q);
+    widened(raster.inverse_depth(), width, 2)
+}
+
+/// Takes a connected part out of `rises`, neighbours being less than `step` apart. Answers with pixels of the picture.
+fn flood(rises: &mut [f32], width: usize, start: usize, step: f32) -> Vec<[u16; 2]> {
+    let height = rises.len() / width;
+    let mut pixels = Vec::new();
+    let mut open = vec![(start, rises[start])];
+    rises[start] = 0.0;
+    while let Some((at, depth)) = open.pop() {
+        let (u, v) = (at % width, at / width);
+        pixels.push([(u * EVERY) as u16, (v * EVERY) as u16]);
+        let beside = [
+            (u > 0).then(|| at - 1),
+            (u + 1 < width).then_some(at + 1),
+            (v > 0).then(|| at - width),
+            (v + 1 < height).then_some(at + width),
+        ];
+        for next in beside.into_iter().flatten() {
+            if rises[next] > 0.0 && (rises[next] - depth).abs() < step + 0.03 * depth * depth {
+                open.push((next, rises[next]));
+                rises[next] = 0.0;
+            }
+        }
+    }
+    pixels
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn two_heaps_side_by_side_at_other_distances_stay_two() {
+        let mut rises = vec![0.0; 12];
+        rises[1..6].fill(0.7);
+        rises[6..9].fill(0.9);
+        let first = flood(&mut rises, 12, 1, 0.01);
+        assert_eq!((first.len(), first.contains(&[10, 0])), (5, true));
+        assert_eq!(flood(&mut rises, 12, 8, 0.01).len(), 3);
+    }
+}
