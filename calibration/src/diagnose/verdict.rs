@@ -24,6 +24,9 @@ pub struct Finding<'a> {
     pub place: String,
 }
 
+/// Straying beyond this multiple of the noise is said, even where it is no gap.
+const ROUGH: f64 = 1.25;
+
 /// Confidence of a finding that rests on nothing being there, or on something unknown being there.
 const NEGATIVE: f64 = 0.9;
 
@@ -42,7 +45,15 @@ impl Finding<'_> {
     }
 
     fn none(&self) -> Verdict {
-        let text = "No gap: with the parameters identified, the twin differs from the cell by noise alone.".into();
+        let strays = self.left.iter().map(|left| left.before / left.floor).fold(1.0, f64::max).sqrt();
+        let text = if strays < ROUGH {
+            "No gap: with the parameters identified, the twin differs from the cell by noise alone.".into()
+        } else {
+            format!(
+                "No gap to explain: the cell strays {strays:.1} times as far from the twin as noise alone would make it, \
+                 no further than one simulation from another, and in no way that an effect foretells."
+            )
+        };
         Verdict { kind: Kind::None, effects: Vec::new(), confidence: NEGATIVE, text }
     }
 
@@ -112,6 +123,7 @@ mod tests {
     #[test]
     fn the_five_verdicts() {
         assert_eq!(finding(vec![], 1.5, 1.5).verdict().kind, Kind::None);
+        assert!(finding(vec![], 4.0, 4.0).verdict().text.contains("strays 2.0 times"));
         assert_eq!(finding(vec![], 500.0, 500.0).verdict().kind, Kind::Unexplained);
         assert_eq!(finding(vec!["payload"], 500.0, 1.5).verdict().kind, Kind::Named);
         assert_eq!(finding(vec!["payload"], 500.0, 200.0).verdict().kind, Kind::Unexplained);
