@@ -98,7 +98,7 @@ pub(super) struct ObjectArguments {
 /// Ways of searching, by their names on the command line.
 #[derive(Debug, Clone, Copy, ValueEnum)]
 enum Way {
-    /// Bounded least squares on rollouts: the fastest.
+    /// Bounded least squares on rollouts, for an object followed by a small cloud of points: the fastest.
     LeastSquares,
     /// A particle swarm.
     Pso,

@@ -13,13 +13,19 @@ impl Evolution {
     /// Around `start`, coordinates in units of the bounds.
     #[must_use]
     pub fn new(start: &[f64], seed: u64) -> Self {
+        Self::of_width(start, FIRST_WIDTH, seed)
+    }
+
+    /// The same, the cloud at first of this width, in units of the bounds.
+    #[must_use]
+    pub fn of_width(start: &[f64], width: f64, seed: u64) -> Self {
         let n = start.len();
         let bounds = Fitness::bounded(n, 1, &vec![0.0; n], &vec![1.0; n]);
         // The usual number of points a round.
         let points = 4 + (3.0 * (n.max(1) as f64).ln()) as i32;
         let parameters =
             CmaesParams { popsize: points.max(8), seed, max_evaluations: u64::MAX, ..CmaesParams::default() };
-        Self(Cmaes::new(bounds, start, &vec![FIRST_WIDTH; n], &parameters))
+        Self(Cmaes::new(bounds, start, &vec![width; n], &parameters))
     }
 }
 

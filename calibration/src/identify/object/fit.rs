@@ -6,6 +6,7 @@
 //! a clip's whole rest, not one of each pose), and a clip that nothing fits counts less. What the arm felt counts as well:
 //! the blow that it takes says how heavy the object is.
 
+use super::polish::POINTS;
 use super::step::{Linearised, Question};
 use crate::estimate::{ClipModel as _, Impossible, Random, Unknown};
 use crate::forward::object::{ALL, Channel, ModelError, ObjectClips, Own, Part};
@@ -45,7 +46,7 @@ const LEAST_JOINT_ERROR: f64 = 2e-5;
 /// Clips that are usually simulated until the end: for a bar alone.
 #[must_use]
 pub(super) fn usual_evaluations(clips: &ObjectClips, unknowns: &[Unknown]) -> usize {
-    2 * (FIRST_STEPS + ROUNDS) * (2 + unknowns.len()) * clips.clips()
+    (2 * (FIRST_STEPS + ROUNDS) * (2 + unknowns.len()) + POINTS) * clips.clips()
 }
 
 /// Fits from `start` on. `watch` sees numbers and evaluations after every step; `false` ends the fit there.

@@ -11,6 +11,7 @@
 //! | `fit` | the likelihood fit |
 //! | `step` | one step of it |
 //! | `paper` | the loss on the object's surface, for searches without slopes |
+//! | `polish` | the last stretch to that loss |
 //! | `finding` | what a fit tells, number by number, and what it cannot tell |
 //! | `doubt` | what speaks against trusting the fit |
 //! | [`compare`] | ways of searching side by side |
@@ -25,6 +26,7 @@ mod material;
 mod mend;
 mod odd;
 mod paper;
+mod polish;
 pub(crate) mod screen;
 mod step;
 #[cfg(test)]
@@ -43,6 +45,7 @@ use finding::Finding;
 use fit::{ObjectFit, fit_object, linearise_object};
 use material::Material;
 use paper::SurfaceLoss;
+use polish::{Searched, fit_polished};
 use shared_mem::cell::{Cell, ClipKind};
 use shared_mem::recording::{Clip, ReadError};
 use shared_mem::theta::Theta;
@@ -51,7 +54,7 @@ use std::path::PathBuf;
 use std::time::Instant;
 use twin::arm::ModelError;
 use twin::replay::ReplayError;
-use twin::scene::{MeshFileError, ObjectModel};
+use twin::scene::{MeshFileError, ObjectModel, ObjectShape};
 use twin::sim::SimError;
 
 /// What to identify, and how.
@@ -212,7 +215,8 @@ impl Problem {
         let start = run.kept_numbers().unwrap_or(start);
         let bar = Progress::new("identify", fit::usual_evaluations(clips, &self.unknowns) as u64);
         let kept = std::sync::Mutex::new(Ok(()));
-        let found = fit_object(clips, &self.unknowns, &start, |numbers, evaluations| {
+        let shape = self.shape(clips)?;
+        let found = fit_polished(clips, self.searched(&shape, run.seed), &start, |numbers, evaluations| {
             bar.show(evaluations as u64, &format!("{evaluations} clips simulated"));
             *kept.lock().expect("no holder panics") = run.keep_numbers(numbers);
             !run.interrupt.asked()
@@ -222,7 +226,11 @@ impl Problem {
         Ok(found)
     }
 
-    fn shape(&self, clips: &ObjectClips) -> Result<twin::scene::ObjectShape, ObjectError> {
+    fn searched<'a>(&'a self, shape: &'a ObjectShape, seed: u64) -> Searched<'a> {
+        Searched { unknowns: &self.unknowns, settings: self.settings.settings(), shape, seed }
+    }
+
+    fn shape(&self, clips: &ObjectClips) -> Result<ObjectShape, ObjectError> {
         Ok(ObjectModel::new(clips.cell(), Some(self.settings.base()))?.ok_or(ObjectError::NoObject)?.shape)
     }
 }
