@@ -7,7 +7,7 @@
 //! | control | [`rt`], [`motion`], [`safety`], an [`arm::Arm`] | the arm; neither memory nor locks nor files while it loops |
 //! | pump | [`pump`] | the ports for states, commands, motions and events |
 //! | world | [`sim`] | the simulated cell, with `--arm sim` |
-//! | camera | [`camera`] | the ports for pictures, with `--camera sim` |
+//! | camera | [`camera`] | the ports for pictures, with a simulated or replayed camera; a RealSense camera has one like the gripper's |
 //! | tracker | [`tracker`] | reads the pictures and joints, owns the port for the object's poses, with `--tracker rgbd` |
 //! | gripper, wrench | [`device`], [`gripper`], [`mod@wrench`] | one device each, and its ports |
 //! | main | [`run`] | duration, Ctrl-C, the recorder's process, the report |

@@ -14,7 +14,7 @@ fn text(bytes: &[u8]) -> String {
 #[test]
 fn every_verb_explains_itself_with_an_example() {
     assert_eq!(rt_bridge(&["--version"]).status.code(), Some(0));
-    for verb in ["run", "record", "doctor"] {
+    for verb in ["run", "record", "convert", "doctor"] {
         let help = rt_bridge(&[verb, "--help"]);
         assert_eq!(help.status.code(), Some(0), "{verb}");
         assert!(text(&help.stdout).contains(&format!("rt_bridge {verb}")), "{verb} shows no example");
@@ -23,12 +23,21 @@ fn every_verb_explains_itself_with_an_example() {
 
 #[test]
 fn wrong_arguments_exit_with_two_and_name_what_there_is() {
-    let camera = rt_bridge(&["run", "--cell", "cell.toml", "--arm", "sim", "--camera", "realsense"]);
+    let camera = rt_bridge(&["run", "--cell", "cell.toml", "--arm", "sim", "--camera", "webcam"]);
     assert_eq!(camera.status.code(), Some(2));
-    assert!(text(&camera.stderr).contains("possible values: sim, replay, off"), "{}", text(&camera.stderr));
+    assert!(text(&camera.stderr).contains("use sim, realsense, bag://FILE.bag"), "{}", text(&camera.stderr));
     let arm = rt_bridge(&["run", "--cell", "cell.toml", "--arm", "172.16.0.2"]);
     assert_eq!(arm.status.code(), Some(2));
     assert!(text(&arm.stderr).contains("fci://172.16.0.2"), "{}", text(&arm.stderr));
+}
+
+#[test]
+#[cfg(not(feature = "realsense"))]
+fn a_program_without_librealsense_says_how_to_get_it() {
+    let end = rt_bridge(&["convert", "table.bag", "--out", "/nowhere/table.mcap"]);
+    assert_eq!(end.status.code(), Some(1));
+    let said = text(&end.stderr);
+    assert!(said.contains("--features realsense") && said.trim_end().lines().count() == 1, "{said}");
 }
 
 #[test]

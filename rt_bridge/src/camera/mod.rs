@@ -1,7 +1,16 @@
-//! The camera thread: pictures of the simulated cell, or of a recording, onto shared memory.
+//! Cameras: pictures of the simulated cell, of a clip, or of a RealSense camera, onto shared memory.
 
+#[cfg(not(feature = "realsense"))]
+#[path = "absent.rs"]
+mod realsense;
+#[cfg(feature = "realsense")]
+mod realsense;
 mod replay;
 mod sim;
+mod source;
+
+pub use realsense::{convert, serve};
+pub use source::{CameraSource, ConvertError, Converted};
 
 use crate::replay::ReplayClock;
 use rtrb::Consumer;
@@ -17,7 +26,7 @@ use std::thread::{self, JoinHandle};
 use twin::scene::SceneSnapshot;
 use twin::sensors::camera::SimCamera;
 
-/// The running camera. Dropping it ends the thread.
+/// The running simulated or replayed camera. Dropping it ends the thread.
 #[derive(Debug)]
 pub struct Camera {
     stop: Arc<AtomicBool>,

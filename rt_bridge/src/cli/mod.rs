@@ -3,6 +3,7 @@
 //! Standard output holds nothing but the answer: one JSON object with `--json`, a few lines without. Everything said on
 //! the way goes to standard error. Exit codes: 0 done, 1 failed, 2 wrong arguments.
 
+mod convert;
 mod doctor;
 mod grip;
 mod record;
@@ -26,6 +27,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
         rt_bridge run --cell config/fr3_cell.toml --arm sim            hold the simulated arm until Ctrl-C\n  \
         rt_bridge run --cell cell.toml --arm fci://172.16.0.2 --record clip.mcap\n  \
         rt_bridge record --out clip.mcap --duration 10                 record what others do\n  \
+        rt_bridge convert table.bag --out table.mcap                   a RealSense recording as a clip\n  \
         rt_bridge grip move 0.03                                       tell the gripper of a running bridge\n  \
         rt_bridge serve --cell config/fr3_cell.toml                    play a Franka robot for any libfranka program\n\n\
         Processes meet when the environment variable TWINALIGN_DOMAIN agrees (default 0)."
@@ -39,6 +41,7 @@ struct Arguments {
 enum Verb {
     Run(run::RunArguments),
     Record(record::RecordArguments),
+    Convert(convert::ConvertArguments),
     Serve(serve::ServeArguments),
     Grip(grip::GripArguments),
     Doctor(doctor::DoctorArguments),
@@ -60,6 +63,7 @@ pub fn main() -> ExitCode {
     let done = match arguments.verb {
         Verb::Run(run) => run.execute(),
         Verb::Record(record) => record.execute(),
+        Verb::Convert(convert) => convert.execute(),
         Verb::Serve(serve) => serve.execute(),
         Verb::Grip(grip) => grip.execute(),
         Verb::Doctor(doctor) => doctor.execute(),

@@ -36,11 +36,13 @@ pub(super) struct RunArguments {
     /// Default: torque_pd, and joint_impedance where cell.toml describes a servo
     #[arg(long)]
     controller: Option<ControllerChoice>,
+    /// sim, realsense, bag://FILE.bag (a recording by librealsense), replay or off.
     /// Default: sim where the arm is simulated and cell.toml has a [camera], replay with a recording, else off
-    #[arg(long)]
+    #[arg(long, value_name = "CAMERA")]
     camera: Option<CameraChoice>,
     /// Who publishes the object's pose: the simulated cell, the bridge from the camera's colour and depth, the recording,
-    /// or (off) another process. Default: sim with the simulated arm, replay with a recording, else off
+    /// or (off) another process. Default: sim with the simulated arm, replay with a recording, rgbd with a RealSense
+    /// camera, else off
     #[arg(long)]
     tracker: Option<TrackerChoice>,
     /// sim, serial:///dev/ttyUSB0 (a Robotiq 2F), fci://HOST (the Franka Hand) or off.

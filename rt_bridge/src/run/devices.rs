@@ -2,6 +2,7 @@
 
 use super::Settings;
 use crate::arm::Arm;
+use crate::camera::CameraSource;
 use crate::fr3;
 use crate::replay::{ReplayArm, ReplayClock};
 use crate::rt::cycle::Plan;
@@ -69,14 +70,43 @@ pub enum ControllerChoice {
 }
 
 /// Which camera.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub enum CameraChoice {
     /// Rendered from the simulated cell.
     Sim,
+    /// A RealSense camera, or a recording of one.
+    RealSense(CameraSource),
     /// The pictures of the recording.
     Replay,
     /// None.
     Off,
+}
+
+impl FromStr for CameraChoice {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text.split_once("://") {
+            None if text == "sim" => Ok(Self::Sim),
+            None if text == "realsense" => Ok(Self::RealSense(CameraSource::Device)),
+            None if text == "replay" => Ok(Self::Replay),
+            None if text == "off" => Ok(Self::Off),
+            Some(("bag", file)) if !file.is_empty() => Ok(Self::RealSense(CameraSource::Bag(file.into()))),
+            _ => Err("use sim, realsense, bag://FILE.bag, replay or off".into()),
+        }
+    }
+}
+
+impl fmt::Display for CameraChoice {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Sim => f.write_str("sim"),
+            Self::RealSense(CameraSource::Device) => f.write_str("realsense"),
+            Self::RealSense(CameraSource::Bag(file)) => write!(f, "bag://{}", file.display()),
+            Self::Replay => f.write_str("replay"),
+            Self::Off => f.write_str("off"),
+        }
+    }
 }
 
 pub(super) struct Devices {
@@ -95,6 +125,17 @@ pub(super) enum Pictures {
     None,
     Scenes(Consumer<SceneSnapshot>),
     Clip(PathBuf, ReplayClock),
+    RealSense(CameraSource),
+}
+
+impl Pictures {
+    /// Those of a camera that knows nothing of the arm.
+    fn beside_the_arm(camera: CameraChoice) -> Self {
+        match camera {
+            CameraChoice::RealSense(source) => Self::RealSense(source),
+            _ => Self::None,
+        }
+    }
 }
 
 impl Devices {
@@ -104,7 +145,7 @@ impl Devices {
         if settings.arm != ArmChoice::Sim && (settings.effects.is_some() || settings.parameters.is_some()) {
             bail!("--effects and --parameters change the simulated cell only; use them with --arm sim");
         }
-        let camera = camera(settings, cell)?;
+        let camera = settings.camera(cell)?;
         let tracker = settings.tracker(cell)?;
         let devices = match &settings.arm {
             ArmChoice::Sim => {
@@ -113,18 +154,25 @@ impl Devices {
                     arm: Box::new(arm),
                     plan,
                     world: Some(world),
-                    pictures: if camera { Pictures::Scenes(views.scenes) } else { Pictures::None },
+                    pictures: match camera {
+                        CameraChoice::Sim => Pictures::Scenes(views.scenes),
+                        other => Pictures::beside_the_arm(other),
+                    },
                     poses: (tracker == TrackerChoice::Sim).then_some(views.poses),
                     wrenches: (settings.wrench(cell)? == WrenchChoice::Sim).then_some(views.wrenches),
                 }
             }
             ArmChoice::Fci(host) => {
                 let arm = fr3::connect(host, settings.realtime, cell)?;
-                Self { arm, plan, world: None, pictures: Pictures::None, poses: None, wrenches: None }
+                let pictures = Pictures::beside_the_arm(camera);
+                Self { arm, plan, world: None, pictures, poses: None, wrenches: None }
             }
             ArmChoice::Replay(clip) => {
                 let (arm, poses, clock) = ReplayArm::open(clip, cell, &model)?;
-                let pictures = if camera { Pictures::Clip(clip.clone(), clock) } else { Pictures::None };
+                let pictures = match camera {
+                    CameraChoice::Replay => Pictures::Clip(clip.clone(), clock),
+                    other => Pictures::beside_the_arm(other),
+                };
                 let poses = (tracker == TrackerChoice::Replay).then_some(poses);
                 Self { arm: Box::new(arm), plan, world: None, pictures, poses, wrenches: None }
             }
@@ -134,20 +182,6 @@ impl Devices {
             bail!("the arm has {has} joints, cell.toml describes {described}; correct [robot] in cell.toml");
         }
         Ok(devices)
-    }
-}
-
-/// Whether there is to be a camera, and whether that goes with the arm.
-fn camera(settings: &Settings, cell: &Cell) -> Result<bool> {
-    match (settings.camera, &settings.arm) {
-        (None, ArmChoice::Sim) => Ok(cell.camera.is_some()),
-        (Some(CameraChoice::Sim), ArmChoice::Sim) | (Some(CameraChoice::Replay), ArmChoice::Replay(_)) => Ok(true),
-        (Some(CameraChoice::Sim), _) => bail!("--camera sim shows the simulated cell; use it with --arm sim"),
-        (Some(CameraChoice::Replay), _) => {
-            bail!("--camera replay shows a recording's pictures; use it with --arm replay://CLIP.mcap")
-        }
-        (Some(CameraChoice::Off), _) | (None, ArmChoice::Fci(_)) => Ok(false),
-        (None, ArmChoice::Replay(_)) => Ok(true),
     }
 }
 
@@ -206,6 +240,16 @@ mod tests {
         assert_eq!("replay://a/b.mcap".parse(), Ok(ArmChoice::Replay("a/b.mcap".into())));
         for wrong in ["", "fci://", "simulated", "tcp://x"] {
             assert!(wrong.parse::<ArmChoice>().is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn a_camera_is_named_as_it_is_printed() {
+        for text in ["sim", "realsense", "bag://a/b.bag", "replay", "off"] {
+            assert_eq!(text.parse::<CameraChoice>().map(|choice| choice.to_string()).as_deref(), Ok(text));
+        }
+        for wrong in ["", "bag://", "d455", "sim://x"] {
+            assert!(wrong.parse::<CameraChoice>().is_err(), "{wrong}");
         }
     }
 }

@@ -7,7 +7,7 @@ mod report;
 pub use devices::{ArmChoice, CameraChoice, ControllerChoice};
 pub use report::RunReport;
 
-use crate::camera::Camera;
+use crate::camera::{self, Camera};
 use crate::device::Service;
 use crate::gripper::GripperChoice;
 use crate::motion::Player;
@@ -59,7 +59,7 @@ pub struct Settings {
     /// recording, else off.
     pub camera: Option<CameraChoice>,
     /// Who tracks the object; none: the simulated cell with the simulated arm, the recording's poses with a recording,
-    /// else nobody.
+    /// the bridge with a RealSense camera, else nobody.
     pub tracker: Option<TrackerChoice>,
     /// The gripper; none: simulated with the simulated arm where cell.toml has a `[gripper]`, else off.
     pub gripper: Option<GripperChoice>,
@@ -87,6 +87,7 @@ impl Settings {
             }
         }
         for (key, choice) in [
+            ("camera", self.camera.as_ref().map(ToString::to_string)),
             ("tracker", self.tracker.map(|choice| format!("{choice:?}").to_lowercase())),
             ("gripper", self.gripper.as_ref().map(ToString::to_string)),
             ("wrench", self.wrench.as_ref().map(ToString::to_string)),
@@ -100,6 +101,25 @@ impl Settings {
 }
 
 impl Settings {
+    /// The camera in force, which has to go with the arm.
+    fn camera(&self, cell: &Cell) -> Result<CameraChoice> {
+        let default = match &self.arm {
+            ArmChoice::Sim if cell.camera.is_some() => CameraChoice::Sim,
+            ArmChoice::Replay(_) => CameraChoice::Replay,
+            _ => CameraChoice::Off,
+        };
+        let choice = self.camera.clone().unwrap_or(default);
+        match (&choice, &self.arm) {
+            (CameraChoice::Sim, ArmChoice::Fci(_) | ArmChoice::Replay(_)) => {
+                bail!("--camera sim shows the simulated cell; use it with --arm sim")
+            }
+            (CameraChoice::Replay, ArmChoice::Sim | ArmChoice::Fci(_)) => {
+                bail!("--camera replay shows a recording's pictures; use it with --arm replay://CLIP.mcap")
+            }
+            _ => Ok(choice),
+        }
+    }
+
     /// The tracker in force.
     fn tracker(&self, cell: &Cell) -> Result<TrackerChoice> {
         let (simulated, recorded) = (self.arm == ArmChoice::Sim, matches!(self.arm, ArmChoice::Replay(_)));
@@ -110,12 +130,15 @@ impl Settings {
             Some(TrackerChoice::Replay) if !recorded => {
                 bail!("--tracker replay shows a recording's poses; use it with --arm replay://CLIP.mcap")
             }
-            Some(TrackerChoice::Rgbd) if self.camera == Some(CameraChoice::Off) => {
-                bail!("--tracker rgbd needs pictures; leave out --camera off")
+            Some(TrackerChoice::Rgbd) if self.camera(cell)? == CameraChoice::Off => {
+                bail!("--tracker rgbd needs pictures; choose a --camera")
             }
             Some(choice) => Ok(choice),
             None if simulated && cell.object.is_some() => Ok(TrackerChoice::Sim),
             None if recorded => Ok(TrackerChoice::Replay),
+            None if cell.object.is_some() && matches!(self.camera(cell)?, CameraChoice::RealSense(_)) => {
+                Ok(TrackerChoice::Rgbd)
+            }
             None => Ok(TrackerChoice::Off),
         }
     }
@@ -179,9 +202,14 @@ pub fn run(settings: &Settings, stop: &Arc<AtomicBool>) -> Result<RunReport> {
         }
         None => None,
     };
+    let mut instruments = settings.instruments(&cell, devices.wrenches, &notices)?;
     let camera = match devices.pictures {
         Pictures::Scenes(scenes) => Some(Camera::simulated(&cell, scenes)?),
         Pictures::Clip(clip, clock) => Some(Camera::replayed(&clip, clock)?),
+        Pictures::RealSense(source) => {
+            instruments.push(camera::serve(&source, &cell, notices.clone())?);
+            None
+        }
         Pictures::None => None,
     };
 
@@ -189,8 +217,6 @@ pub fn run(settings: &Settings, stop: &Arc<AtomicBool>) -> Result<RunReport> {
         TrackerChoice::Rgbd => Some(tracker::serve(&cell, notices.clone())?),
         _ => None,
     };
-    let instruments = settings.instruments(&cell, devices.wrenches, &notices)?;
-
     let guard = Guard { limits: devices.plan.limits, workspace: Workspace::of(&cell), period_s: 1e-3 };
     let player = Player::new(guard, joints_from(&[]));
     let link = Link { beats: to_pump, remarks: to_words, chunks, pump: pump.thread() };

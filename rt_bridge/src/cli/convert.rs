@@ -1,0 +1,66 @@
+//! `rt_bridge convert`.
+
+use super::answer;
+use crate::camera::{Converted, convert};
+use anyhow::Result;
+use clap::Args;
+use shared_mem::cell::Cell;
+use shared_mem::recording::ClipInfo;
+use std::path::PathBuf;
+
+/// Turn a recording of a RealSense camera into a clip
+///
+/// Colour, depth aligned to it, and intrinsics, with the camera's own stamps. Needs a program built with the feature
+/// realsense. The recording is played at its own pace, again if this machine was too slow for a frame.
+#[derive(Debug, Args)]
+#[command(after_help = "Example:\n  \
+    rt_bridge convert table.bag --cell config/fr3_cell.toml --out table.mcap\n\n\
+    JSON: file, frames (pairs of colour and depth), missing (frame numbers between the first and the last that are not\n\
+    there), dropped (of those, how many the recording has), passes.")]
+pub(super) struct ConvertArguments {
+    /// A .bag recorded by librealsense or the RealSense Viewer
+    #[arg(value_name = "FILE.bag")]
+    bag: PathBuf,
+    /// The new file
+    #[arg(long, value_name = "CLIP.mcap")]
+    out: PathBuf,
+    /// Says where the camera stands, and rides along in the file
+    #[arg(long, value_name = "cell.toml")]
+    cell: Option<PathBuf>,
+    /// Answer with one JSON object
+    #[arg(long)]
+    json: bool,
+}
+
+impl ConvertArguments {
+    pub(super) fn execute(self) -> Result<()> {
+        let cell = self.cell.as_deref().map(Cell::read).transpose()?;
+        let info = ClipInfo {
+            cell_toml: cell.as_ref().map(Cell::to_toml),
+            configuration: format!("bag = {:?}\n", self.bag.display().to_string()),
+            program: concat!("rt_bridge ", env!("CARGO_PKG_VERSION")).into(),
+            torques_begin_at_rows: false,
+        };
+        let camera = cell.and_then(|cell| cell.camera).unwrap_or_default();
+        let converted = convert(&self.bag, &camera, &self.out, &info)?;
+        if self.json {
+            answer(&serde_json::to_string(&converted)?)?;
+        } else {
+            answer(&in_words(&converted))?;
+        }
+        Ok(())
+    }
+}
+
+fn in_words(converted: &Converted) -> String {
+    let Converted { file, frames, missing, dropped, .. } = converted;
+    let mut text = format!("{frames} pictures with depth in {}", file.display());
+    if !missing.is_empty() {
+        let lacking = missing.len() - dropped;
+        text += &format!("; the recording lacks {lacking} on the way");
+    }
+    if *dropped > 0 {
+        text += &format!("; this machine was too slow for {dropped} more: end other programs and convert again");
+    }
+    text
+}
