@@ -12,6 +12,7 @@
 //! | [`forward`] | what the twin makes of recorded clips, as residuals |
 //! | [`identify`] | the parameters that a session tells, and what it cannot tell |
 //! | [`report`] | pages with plots |
+//! | [`viewpoint`] | the camera's pose from pictures of the robot |
 //! | [`processes`] | the other programs as children |
 //! | [`interrupt`] | Ctrl-C |
 //! | [`progress`] | the bar on stderr |
@@ -28,3 +29,4 @@ pub mod keys;
 pub mod processes;
 pub mod progress;
 pub mod report;
+pub mod viewpoint;

@@ -6,6 +6,7 @@ mod compare;
 mod demo;
 mod export;
 mod identify;
+mod viewpoint;
 
 use calibration::diagnose;
 use calibration::interrupt::Interrupt;
@@ -24,6 +25,7 @@ Examples:
   calibration capture excitation --cell config/fr3_cell.toml --clips 4 --out session
   calibration identify arm session --out theta.toml --report page.html
   calibration diagnose session --report report.html
+  calibration viewpoint session --out cell.toml --report outline.png
   calibration export session --to ros2 --out bags
 Every verb has its own --help with an example. Logs and progress go to stderr (RUST_LOG=debug for more)."
 )]
@@ -46,6 +48,8 @@ enum Verb {
     Diagnose(diagnose::command::Arguments),
     /// How often the diagnosis is right, on simulated worlds of which the truth is known.
     Benchmark(benchmark::BenchmarkArguments),
+    /// Finds where the camera stands, from pictures of the robot and its joints.
+    Viewpoint(Box<viewpoint::ViewpointArguments>),
     /// Writes a session as ROS 2 bags, TwinAligner clip folders or own clips.
     Export(export::ExportArguments),
     /// The whole story on the simulated cell: shadow, record, replay, explain.
@@ -67,6 +71,7 @@ pub(crate) fn run(arguments: Arguments) -> anyhow::Result<()> {
             if arguments.json { print_json(&found) } else { Ok(()) }
         }
         Verb::Benchmark(arguments) => benchmark::run(arguments, &interrupt),
+        Verb::Viewpoint(arguments) => viewpoint::run(*arguments),
         Verb::Export(arguments) => export::run(&arguments),
         Verb::Demo(arguments) => demo::run(arguments, &interrupt),
     }

@@ -115,7 +115,7 @@ fn spread(part: &DMatrix<f64>, free: &[usize], n: usize) -> DMatrix<f64> {
 }
 
 /// Two-sided 95 % quantile of Student's t (Abramowitz & Stegun 26.7.5, right to 1 % from 3 degrees of freedom on).
-fn student_95(degrees: usize) -> f64 {
+pub(crate) fn student_95(degrees: usize) -> f64 {
     match degrees {
         0 => f64::INFINITY,
         1 => 12.706,

@@ -9,7 +9,7 @@
 //! | `container` | MCAP records and messages of a file that may be cut or changed |
 //! | `cdr`, `ros2` | ROS 2 messages |
 //! | `own` | an own recording as a clip |
-//! | `messages`, `picture` | all messages one by one, pictures |
+//! | `messages`, `picture`, `picture_file` | all messages one by one, pictures, pictures as files |
 //! | `bag` | a ROS 2 bag as a clip |
 //! | `twinaligner`, `npy` | a TwinAligner folder as a clip |
 //! | `joint_log` | joint rows: one publisher, one joint order |
@@ -32,6 +32,7 @@ mod messages;
 mod npy;
 mod own;
 mod picture;
+mod picture_file;
 mod recover;
 mod ros2;
 mod series;
@@ -47,6 +48,7 @@ pub use export::{ExportError, Exported, FlangeAt, Format, export_session};
 pub use messages::{ClipMessage, ClipMessages, Payload};
 pub use own::{read_arm_states, read_clip_info};
 pub use picture::Picture;
+pub use picture_file::{read_picture, unpack_picture, write_png};
 pub use recover::{RecoverError, Recovered, recover};
 pub use series::{JointSeries, ObjectSeries};
 pub use session::Session;

@@ -130,7 +130,7 @@ fn header(stamp_ns: u64, (width, height): (u32, u32), encoding: PixelEncoding) -
     }
 }
 
-fn unpack_png(bytes: &[u8], stamp_ns: u64) -> Result<Picture, png::DecodingError> {
+pub(super) fn unpack_png(bytes: &[u8], stamp_ns: u64) -> Result<Picture, png::DecodingError> {
     let limits = png::Limits { bytes: LARGEST };
     let mut decoder = png::Decoder::new_with_limits(std::io::Cursor::new(bytes), limits);
     decoder.set_transformations(png::Transformations::EXPAND);

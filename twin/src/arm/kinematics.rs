@@ -56,6 +56,18 @@ impl ArmModel {
         })
     }
 
+    /// Frame of every link behind a joint, in the base frame: z along the joint's axis. Identity from `dof` on.
+    #[must_use]
+    pub fn link_frames(&self, q: &Joints) -> [Isometry3<f64>; MAX_JOINTS] {
+        with_dof!(self, N => {
+            let mut out = [Isometry3::identity(); MAX_JOINTS];
+            for (o, frame) in out.iter_mut().zip(&Chain::<N>::at(first(&self.links), first(q)).frames) {
+                *o = isometry(frame);
+            }
+            out
+        })
+    }
+
     fn last_frame(&self, q: &Joints) -> Frame {
         with_dof!(self, N => Chain::<N>::at(first(&self.links), first(q)).frames[N - 1])
     }

@@ -4,8 +4,11 @@
 //! Camera frame: z forward, x right, y down, metres; pixel centres lie at whole numbers. `f32` throughout: at 2 m a
 //! depth is good to a micrometre. Called by [`crate::sensors::camera`].
 
+mod glb;
 mod mesh;
 mod raster;
+mod robot;
 
 pub use mesh::Mesh;
 pub use raster::{Pinhole, Raster};
+pub use robot::{Hand, RobotSurface};

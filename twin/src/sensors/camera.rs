@@ -1,14 +1,14 @@
 //! A simulated D455: colour and depth of one moment, depth aligned to colour, from the scene's geometry. Table, box or
-//! mesh, arm as capsules between its joints, tool as the capsule it is. The picture has no lens distortion.
+//! mesh, the robot's surface, tool as the capsule it is. The picture has no lens distortion.
 //!
 //! Called by the camera thread of the bridge: allocates nothing after its first picture.
 
 use super::depth::{self, DepthSensor};
 use super::{camera_clock_ns, generator};
-use crate::render::{Mesh, Pinhole, Raster};
-use crate::scene::{ArmOutline, ObjectModel, SceneSnapshot};
+use crate::render::{Hand, Mesh, Pinhole, Raster, RobotSurface};
+use crate::scene::{ObjectModel, SceneSnapshot};
 use crate::sim::SimError;
-use nalgebra::{Isometry3, Point3, Vector3};
+use nalgebra::{Isometry3, Vector3};
 use shared_mem::cell::{Camera, Cell};
 use shared_mem::msg::image::{CameraInfo, ImageHeader, PixelEncoding, StampDomain};
 
@@ -19,16 +19,10 @@ pub struct SimCamera {
     raster: Raster,
     depth: DepthSensor,
     still: Vec<Mesh>,
-    arm: Option<ArmBody>,
+    robot: Option<RobotSurface>,
     object: Option<Mesh>,
     sequence: u64,
     next_picture_ns: u64,
-}
-
-/// The arm as it is drawn: a mesh for each part of its outline.
-struct ArmBody {
-    outline: ArmOutline,
-    meshes: Vec<Mesh>,
 }
 
 /// Half edges of the drawn table top and its middle in front of the robot [m]; physics knows an endless plane.
@@ -44,8 +38,6 @@ const LIGHT: [f32; 3] = [0.55, 0.25, 0.8];
 const BACKGROUND: [u8; 3] = [168, 186, 204];
 const FLOOR: [u8; 3] = [128, 130, 134];
 const TABLE: [u8; 3] = [196, 172, 140];
-const LINKS: [[u8; 3]; 2] = [[238, 240, 242], [206, 210, 216]];
-const TOOL: [u8; 3] = [92, 100, 116];
 const OBJECT: [u8; 3] = [222, 112, 40];
 
 impl SimCamera {
@@ -73,7 +65,7 @@ impl SimCamera {
             raster,
             depth: DepthSensor::new(settings.width, settings.height, noisy, generator(cell, 2)),
             still,
-            arm: cell.robot.as_ref().map(|_| ArmBody::new(cell)).transpose()?,
+            robot: cell.robot.as_ref().map(|_| RobotSurface::new(cell, Hand::None)).transpose()?,
             object: ObjectModel::new(cell, None)?.map(|model| Mesh::new(model.shape.triangles(), OBJECT)),
             sequence: 0,
             next_picture_ns: 0,
@@ -155,29 +147,14 @@ impl SimCamera {
         for mesh in &self.still {
             self.raster.draw(mesh, &self.camera_from_base);
         }
-        if let Some(arm) = &self.arm {
-            arm.draw(&mut self.raster, &self.camera_from_base, scene);
+        if let Some(robot) = &self.robot {
+            robot.for_each(&scene.q, |part, base_from_part| {
+                self.raster.draw(&robot.parts()[part], &(self.camera_from_base * base_from_part.cast::<f32>()));
+            });
         }
         if let (Some(mesh), Some(pose)) = (&self.object, scene.object) {
             self.raster.draw(mesh, &(self.camera_from_base * pose.isometry().cast::<f32>()));
         }
-    }
-}
-
-impl ArmBody {
-    fn new(cell: &Cell) -> Result<Self, SimError> {
-        let outline = ArmOutline::new(cell)?;
-        let meshes = outline.parts().iter().enumerate().map(|(number, part)| {
-            let color = if part.is_tool { TOOL } else { LINKS[number % 2] };
-            Mesh::capsule(&Point3::origin(), &Point3::new(0.0, 0.0, part.length), part.radius, color)
-        });
-        Ok(Self { meshes: meshes.collect(), outline })
-    }
-
-    fn draw(&self, raster: &mut Raster, camera_from_base: &Isometry3<f32>, scene: &SceneSnapshot) {
-        self.outline.for_each(&scene.q, |number, base_from_part| {
-            raster.draw(&self.meshes[number], &(camera_from_base * base_from_part.cast::<f32>()));
-        });
     }
 }
 

@@ -1,0 +1,149 @@
+//! `calibration viewpoint`.
+
+use super::print_json;
+use calibration::viewpoint::answer::Viewpoint;
+use calibration::viewpoint::command::{Options, StartFrom, run as find};
+use calibration::viewpoint::fit::Method;
+use calibration::viewpoint::search::Reach;
+use clap::{Args, ValueEnum};
+use std::path::PathBuf;
+use twin::render::Hand;
+
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  calibration viewpoint session --out cell.toml --report outline.png
+  calibration viewpoint photo.jpg --joints 0,-0.78,0,-2.36,0,1.57,0.79 --cell cell.toml --start 1.4,0.8,0.9,0.26,-0.37,-0.73,0.51
+  calibration viewpoint a.png b.png --joints a.json --joints b.json --mask ma.png --mask mb.png --start search --json
+A joint file is JSON: a list of positions, or an object with `q`; `K`, `D`, `width`, `height` beside it are intrinsics as ROS names them.")]
+pub(crate) struct ViewpointArguments {
+    /// A session folder, a clip, or pictures (png, jpg) of one camera that did not move.
+    #[arg(required = true)]
+    targets: Vec<PathBuf>,
+    /// The cell: arm, tool, intrinsics, first pose of the camera; a session brings its own.
+    #[arg(long)]
+    cell: Option<PathBuf>,
+    /// Joint positions [rad] of a picture, with commas between them or as a JSON file; one for each picture.
+    #[arg(long, allow_hyphen_values = true)]
+    joints: Vec<String>,
+    /// Mask of a picture, as an outside segmenter writes it: the robot white, all else black; one for each picture.
+    #[arg(long)]
+    mask: Vec<PathBuf>,
+    /// The same view without the robot: colour, or depth where the pictures are depth.
+    #[arg(long)]
+    background: Option<PathBuf>,
+    /// Focal lengths and principal point [pixel]: fx,fy,cx,cy.
+    #[arg(long, value_parser = numbers::<4>)]
+    intrinsics: Option<[f64; 4]>,
+    /// Where the camera is about: `cell` (its cell.toml), `search`, or x,y,z,qw,qx,qy,qz of the optical frame in the base.
+    #[arg(long, default_value = "cell", allow_hyphen_values = true, value_parser = start)]
+    start: StartFrom,
+    /// How far the start may be from the truth: degrees,metres [default: 20,0.32 with silhouettes, 14,0.15 with photos].
+    #[arg(long, value_parser = numbers::<2>)]
+    reach: Option<[f64; 2]>,
+    /// outline: least squares on the outline; swarm: the paper's particle swarm on the silhouettes.
+    #[arg(long, value_enum, default_value_t = MethodName::Outline)]
+    method: MethodName,
+    /// Pictures drawn by the swarm, for each frame.
+    #[arg(long, default_value_t = 10_000, value_parser = clap::value_parser!(u32).range(40..=1_000_000))]
+    budget: u32,
+    /// At most so many pictures of a session.
+    #[arg(long, default_value_t = 6, value_parser = clap::value_parser!(u8).range(1..=100))]
+    frames: u8,
+    /// A Franka Hand is mounted, its fingers this far apart [m].
+    #[arg(long)]
+    hand: Option<f64>,
+    /// Seed of what is drawn by lot.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Writes the cell with the pose found.
+    #[arg(long)]
+    out: Option<PathBuf>,
+    /// Writes the pictures with the outline (red: found, green: start) as a PNG.
+    #[arg(long)]
+    report: Option<PathBuf>,
+    /// Prints the answer as one JSON object.
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum MethodName {
+    Outline,
+    Swarm,
+}
+
+fn numbers<const N: usize>(text: &str) -> Result<[f64; N], String> {
+    let parts: Result<Vec<f64>, _> = text.split(',').map(|part| part.trim().parse::<f64>()).collect();
+    let parts = parts.ok().filter(|parts| parts.iter().all(|value| value.is_finite()));
+    parts.and_then(|parts| parts.try_into().ok()).ok_or_else(|| format!("give {N} numbers with commas between them"))
+}
+
+fn start(text: &str) -> Result<StartFrom, String> {
+    match text {
+        "cell" => Ok(StartFrom::Cell),
+        "search" => Ok(StartFrom::Search),
+        _ => {
+            let [x, y, z, w, i, j, k] = numbers::<7>(text).map_err(|e| format!("{e}, or `cell`, or `search`"))?;
+            if w.hypot(i).hypot(j).hypot(k) < 1e-6 {
+                return Err("the quaternion qw,qx,qy,qz must not be zero".into());
+            }
+            Ok(StartFrom::Pose([x, y, z], [w, i, j, k]))
+        }
+    }
+}
+
+/// Runs the verb.
+///
+/// # Errors
+/// One line: what happened, and what to do.
+pub(super) fn run(arguments: ViewpointArguments) -> anyhow::Result<()> {
+    let ViewpointArguments { targets, cell, joints, mask, background, intrinsics, start, reach, .. } = arguments;
+    let method = match arguments.method {
+        MethodName::Outline => Method::Outline,
+        MethodName::Swarm => Method::Swarm(arguments.budget as usize),
+    };
+    let found = find(&Options {
+        targets,
+        cell,
+        joints,
+        masks: mask,
+        background,
+        intrinsics,
+        start,
+        reach: reach.map(|[degrees, distance]| Reach { angle: degrees.to_radians(), distance }),
+        method,
+        frames: usize::from(arguments.frames),
+        hand: arguments.hand.map_or(Hand::None, |width| Hand::Franka { width }),
+        seed: arguments.seed,
+        out: arguments.out,
+        report: arguments.report,
+    })?;
+    tell(&found);
+    if arguments.json { print_json(&found) } else { Ok(()) }
+}
+
+fn tell(found: &Viewpoint) {
+    let [x, y, z] = found.camera.position;
+    let [qw, qx, qy, qz] = found.camera.orientation;
+    eprintln!("camera in the base frame: {x:.4}, {y:.4}, {z:.4} m; {qw:.5}, {qx:.5}, {qy:.5}, {qz:.5} (w, x, y, z)");
+    if let Some(interval) = &found.interval {
+        let [a, b, c] = interval.position.map(|v| v * 1e3);
+        let [d, e, f] = interval.rotation.map(f64::to_degrees);
+        eprintln!("95 % within {a:.1}, {b:.1}, {c:.1} mm and {d:.2}, {e:.2}, {f:.2} degrees");
+    }
+    let confirmed = found.confirmed * 100.0;
+    eprintln!("{confirmed:.0} % of the outline confirmed; {} drawings, {:.1} s", found.drawings, found.seconds);
+    if let Some(start) = &found.start {
+        eprintln!(
+            "the start was {:.1} mm and {:.2} degrees away, {:.1} pixels in the picture{}",
+            start.distance_m * 1e3,
+            start.angle_rad.to_degrees(),
+            start.reprojection_px,
+            if start.excluded { ": outside of the interval" } else { "" }
+        );
+    }
+    for warning in &found.warnings {
+        eprintln!("note: {warning}");
+    }
+}

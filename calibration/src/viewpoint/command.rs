@@ -1,0 +1,309 @@
+//! `calibration viewpoint`: from what was given to the answer.
+
+use super::answer::{FrameAnswer, Pose, Start, Viewpoint};
+use super::fit::{Fit, Method, fit};
+use super::frame::Frame;
+use super::lens::Lens;
+use super::picture::{Moment, Pixels};
+use super::search::Reach;
+use super::shape::Shape;
+use super::{overlay, refine, session, start, step};
+use anyhow::{Context as _, bail, ensure};
+use nalgebra::{Isometry3, Point3};
+use shared_mem::cell::{Camera, CameraPose, Cell, Intrinsics, Robot};
+use shared_mem::frames::{Base, Camera as CameraFrame, Pose as FramePose};
+use shared_mem::recording::{Session, write_png};
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+use twin::arm::{Joints, MAX_JOINTS};
+use twin::render::{Hand, RobotSurface};
+
+/// What was asked for.
+#[derive(Debug, Clone)]
+pub struct Options {
+    /// A session folder, a clip, or pictures.
+    pub targets: Vec<PathBuf>,
+    /// The cell; of a session its own unless given.
+    pub cell: Option<PathBuf>,
+    /// Joints of every picture.
+    pub joints: Vec<String>,
+    /// Masks of the pictures.
+    pub masks: Vec<PathBuf>,
+    /// A picture without the robot.
+    pub background: Option<PathBuf>,
+    /// fx, fy, cx, cy.
+    pub intrinsics: Option<[f64; 4]>,
+    /// Where to begin.
+    pub start: StartFrom,
+    /// How far the start may be from the truth; by the kind of picture unless given.
+    pub reach: Option<Reach>,
+    /// Which way to go.
+    pub method: Method,
+    /// At most so many pictures of a session.
+    pub frames: usize,
+    /// The hand at the flange.
+    pub hand: Hand,
+    /// Seed of what is drawn by lot.
+    pub seed: u64,
+    /// Where the cell with the found pose goes.
+    pub out: Option<PathBuf>,
+    /// Where the pictures with the outline go.
+    pub report: Option<PathBuf>,
+}
+
+/// Where to begin.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum StartFrom {
+    /// The pose in cell.toml.
+    Cell,
+    /// This one: the optical frame in the base frame.
+    Pose([f64; 3], [f64; 4]),
+    /// Anywhere around the robot, the camera upright.
+    Search,
+}
+
+/// How far a start is trusted where nothing was said [rad, m]: a silhouette draws from further away than a photo's edges.
+const REACH_OF_MASKS: Reach = Reach { angle: 0.36, distance: 0.32 };
+const REACH_OF_PHOTOS: Reach = Reach { angle: 0.25, distance: 0.15 };
+
+/// A picture with everything that belongs to it.
+struct Taken {
+    name: String,
+    pixels: Pixels,
+    moment: Moment,
+}
+
+/// Finds the pose.
+///
+/// # Errors
+/// One line: what is missing or does not fit together, and what to do.
+pub fn run(options: &Options) -> anyhow::Result<Viewpoint> {
+    let began = Instant::now();
+    let (mut cell, taken) = gather(options)?;
+    let mut warnings = Vec::new();
+    let camera = camera(&cell, options, &taken)?;
+    let lens = Lens::new(&camera.pinhole());
+    let surface = RobotSurface::new(&cell, options.hand)?;
+    ensure!(
+        !surface.parts().is_empty(),
+        "the arm's shape is not known: give `robot.model = \"fr3\"` or a URDF in cell.toml"
+    );
+    if !surface.is_measured() {
+        warnings.push("only the FR3's shape is known exactly; this arm is drawn as capsules along its links".into());
+    }
+    let shape = Shape::new(surface);
+    let (frames, pixels) = frames(options, &camera, &lens, &shape, taken)?;
+    let method = options.method;
+    let masked = frames.iter().all(Frame::has_mask);
+    ensure!(
+        masked || matches!(method, Method::Outline),
+        "a particle swarm needs silhouettes: give --mask or --background, or use --method outline"
+    );
+    let reach = options.reach.unwrap_or(if masked { REACH_OF_MASKS } else { REACH_OF_PHOTOS });
+    let start = match options.start {
+        StartFrom::Cell => cell.camera.as_ref().and_then(Camera::base_from_camera),
+        StartFrom::Pose(position, wxyz) => FramePose::from_parts(position, wxyz),
+        StartFrom::Search => None,
+    };
+    let start = start.map(|pose| pose.inverse().isometry());
+    let found = match (&start, options.start) {
+        (Some(start), _) => fit(&frames, &shape, start, &reach, method, options.seed)?,
+        (None, StartFrom::Search) => start::search(&frames, &shape, &lens, method, options.seed)?,
+        (None, _) => {
+            bail!("no start: cell.toml has no `[camera] pose`; give --start x,y,z,qw,qx,qy,qz or --start search")
+        }
+    };
+    if found.rival.is_some_and(|rival| rival > 0.95 * found.confirmed) {
+        warnings.push("another pose explains the pictures nearly as well; add a picture of another arm pose".into());
+    }
+    let answer = answer(&frames, &shape, &lens, &found, start.as_ref(), warnings, began, method);
+    if let Some(out) = &options.out {
+        cell.camera = Some(Camera {
+            pose: CameraPose { position: answer.camera.position, orientation: answer.camera.orientation },
+            ..camera
+        });
+        std::fs::write(out, cell.to_toml())
+            .with_context(|| format!("{}; give --out a place that can be written", out.display()))?;
+    }
+    if let Some(report) = &options.report {
+        let (width, height, rgb) = overlay::sheet(&frames, &pixels, &shape, &found.camera_from_base, start.as_ref());
+        write_png(report, width, height, &rgb)?;
+    }
+    Ok(answer)
+}
+
+/// The cell and the pictures.
+fn gather(options: &Options) -> anyhow::Result<(Cell, Vec<Taken>)> {
+    let is_picture = |path: &Path| {
+        let ending = path.extension().and_then(|e| e.to_str()).unwrap_or("").to_ascii_lowercase();
+        ["png", "jpg", "jpeg"].contains(&ending.as_str())
+    };
+    if options.targets.iter().all(|path| is_picture(path)) {
+        let cell = match &options.cell {
+            Some(path) => Cell::read(path)?,
+            None => Cell { robot: Some(Robot { model: Some("fr3".into()), ..Robot::default() }), ..Cell::default() },
+        };
+        let count = options.targets.len();
+        ensure!(
+            options.joints.len() == count,
+            "{count} pictures need {count} --joints, one for each in their order; {} given",
+            options.joints.len()
+        );
+        let taken = options.targets.iter().zip(&options.joints).map(|(path, joints)| {
+            let name = path.display().to_string();
+            Ok(Taken { name, pixels: Pixels::read(path)?, moment: Moment::parse(joints)? })
+        });
+        return Ok((cell, taken.collect::<anyhow::Result<_>>()?));
+    }
+    let [target] = &options.targets[..] else { bail!("give either one session or clip, or pictures (png, jpg)") };
+    let session = Session::open_with(target, options.cell.as_deref())?;
+    let shots = session::shots(&session, options.frames)?;
+    let taken = shots.into_iter().map(|shot| {
+        let moment = Moment { q: shot.q, size: None, pinhole: None, distortion: [0.0; 5] };
+        Taken { name: shot.name, pixels: shot.pixels, moment }
+    });
+    Ok((session.cell, taken.collect()))
+}
+
+/// The camera whose intrinsics hold for the pictures.
+fn camera(cell: &Cell, options: &Options, taken: &[Taken]) -> anyhow::Result<Camera> {
+    let mut camera = cell.camera.clone().unwrap_or_default();
+    let first = taken.first().context("no pictures")?;
+    let given = options.intrinsics.or(first.moment.pinhole);
+    let mut size = [camera.width as usize, camera.height as usize];
+    if let Some([fx, fy, cx, cy]) = given {
+        ensure!(fx > 0.0 && fy > 0.0, "focal lengths must be above 0, not {fx} and {fy}");
+        size = first.moment.size.unwrap_or(first.pixels.size);
+        let inside = (0.0..size[0] as f64).contains(&cx) && (0.0..size[1] as f64).contains(&cy);
+        ensure!(
+            inside,
+            "the principal point {cx}, {cy} lies outside of {} x {} pixels: intrinsics of another resolution?",
+            size[0],
+            size[1]
+        );
+        camera.intrinsics = Some(Intrinsics { fx, fy, cx, cy });
+        if first.moment.pinhole.is_some() {
+            camera.distortion = first.moment.distortion;
+        }
+    } else if cell.camera.is_none() {
+        bail!("no intrinsics: give --cell with a `[camera]`, --intrinsics fx,fy,cx,cy, or a joint file with `K`");
+    }
+    for picture in taken {
+        let [width, height] = picture.pixels.size;
+        ensure!(
+            picture.pixels.size == size,
+            "{} has {width} x {height} pixels, the intrinsics are for {} x {}: give those of this resolution",
+            picture.name,
+            size[0],
+            size[1]
+        );
+    }
+    (camera.width, camera.height) = (size[0] as u32, size[1] as u32);
+    Ok(camera)
+}
+
+fn frames(
+    options: &Options,
+    camera: &Camera,
+    lens: &Lens,
+    shape: &Shape,
+    taken: Vec<Taken>,
+) -> anyhow::Result<(Vec<Frame>, Vec<Pixels>)> {
+    ensure!(
+        options.masks.is_empty() || options.masks.len() == taken.len(),
+        "{} pictures need as many --mask, one for each in their order; {} given",
+        taken.len(),
+        options.masks.len()
+    );
+    let background = options.background.as_ref().map(|path| Pixels::read(path)).transpose()?;
+    let model = shape.surface().model();
+    let (mut frames, mut all) = (Vec::new(), Vec::new());
+    for (number, taken) in taken.into_iter().enumerate() {
+        let Taken { name, pixels, moment } = taken;
+        ensure!(
+            moment.q.len() == model.dof(),
+            "{name}: {} joint positions were given, the arm has {} joints",
+            moment.q.len(),
+            model.dof()
+        );
+        let mut q: Joints = [0.0; MAX_JOINTS];
+        q[..moment.q.len()].copy_from_slice(&moment.q);
+        let flat = |pixels: Pixels| pixels.undistorted(lens, &camera.distortion);
+        // The difference is taken before the lens is undone: beyond the picture's edge there is nothing to compare.
+        let evidence = match (options.masks.get(number), &background) {
+            (Some(mask), _) => {
+                let mask = Pixels::read(mask)?;
+                ensure!(mask.size == pixels.size, "the mask of {name} is of another size than the picture");
+                flat(mask).mask(&name)?
+            }
+            (None, Some(background)) => {
+                pixels.against(background, &name)?.map(|grid| grid.undistorted(lens, &camera.distortion, 0.0))
+            }
+            (None, None) => flat(pixels.clone()).photo(&name)?,
+        };
+        frames.push(Frame::new(name, q, *lens, &evidence, shape));
+        all.push(flat(pixels));
+    }
+    Ok((frames, all))
+}
+
+#[allow(clippy::too_many_arguments, reason = "everything that the answer tells")]
+fn answer(
+    frames: &[Frame],
+    shape: &Shape,
+    lens: &Lens,
+    found: &Fit,
+    start: Option<&Isometry3<f64>>,
+    warnings: Vec<String>,
+    began: Instant,
+    method: Method,
+) -> Viewpoint {
+    let pose = |camera_from_base: &Isometry3<f64>| {
+        let pose = FramePose::<Base, CameraFrame>::from_isometry(camera_from_base.inverse());
+        Pose { position: pose.position(), orientation: pose.wxyz() }
+    };
+    let joints = |frame: &Frame, pose: &Isometry3<f64>| -> Vec<[f64; 2]> {
+        let model = shape.surface().model();
+        let origins = model.joint_origins(&frame.q)[..model.dof()].to_vec();
+        let points = origins.into_iter().chain([model.flange(&frame.q).position()]);
+        points.map(|p| pose * Point3::from(p)).filter(|p| p.z > 0.0).map(|p| lens.project(&p)).collect()
+    };
+    let start = start.map(|start| {
+        let (distance_m, angle_rad) = step::apart(start, &found.camera_from_base);
+        let mut off: Vec<f64> = (frames.iter())
+            .flat_map(|frame| joints(frame, start).into_iter().zip(joints(frame, &found.camera_from_base)))
+            .map(|(a, b)| (a[0] - b[0]).hypot(a[1] - b[1]))
+            .collect();
+        off.sort_by(f64::total_cmp);
+        let (from, to) = (pose(start), pose(&found.camera_from_base));
+        let excluded = found
+            .interval
+            .is_some_and(|interval| (0..3).any(|i| (from.position[i] - to.position[i]).abs() > interval.position[i]));
+        Start {
+            camera: from,
+            distance_m,
+            angle_rad,
+            reprojection_px: off.get(off.len() / 2).copied().unwrap_or(f64::MAX),
+            confirmed: refine::at(frames, shape, start).map_or(0.0, |there| 1.0 - there.cost),
+            excluded,
+        }
+    });
+    let frame_answer = |frame: &Frame| FrameAnswer {
+        name: frame.name.clone(),
+        loss: frame.wrong(Frame::FINEST, shape, &found.camera_from_base),
+        joints_px: joints(frame, &found.camera_from_base),
+    };
+    Viewpoint {
+        camera: pose(&found.camera_from_base),
+        interval: found.interval,
+        loss: found.loss,
+        confirmed: found.confirmed,
+        rival: found.rival,
+        start,
+        frames: frames.iter().map(frame_answer).collect(),
+        method: if method == Method::Outline { "outline" } else { "swarm" },
+        drawings: found.drawings,
+        seconds: began.elapsed().as_secs_f64(),
+        warnings,
+    }
+}

@@ -1,0 +1,184 @@
+//! What a picture tells of the robot: from a mask file, from the difference to a picture without the robot, or, where
+//! there is neither, from the photo's own edges.
+
+use super::frame::Evidence;
+use super::grid::Grid;
+use super::lens::Lens;
+use anyhow::{Context as _, bail, ensure};
+use shared_mem::msg::image::{ImageHeader, PixelEncoding};
+use shared_mem::recording::{Picture, read_picture};
+use std::path::Path;
+
+/// Pixels as they were taken.
+#[derive(Debug, Clone)]
+pub struct Pixels {
+    /// Columns and rows.
+    pub size: [usize; 2],
+    /// Red, green, blue, 0 to 255; or one depth [mm], 0 where nothing was measured.
+    pub channels: Vec<Grid>,
+}
+
+/// Two pixels of one place differ when a colour does by this much, or the depth by that share.
+const COLOUR: f32 = 24.0;
+const DEPTH: f32 = 0.02;
+/// A photo whose colours lie closer together than this shows nothing.
+const CONTRAST: f32 = 12.0;
+/// Shares of a mask that a robot can cover.
+const COVERED: std::ops::Range<f64> = 1e-4..0.9;
+
+impl Pixels {
+    /// Reads a PNG or JPEG file.
+    ///
+    /// # Errors
+    /// When it is no such file.
+    pub fn read(path: &Path) -> anyhow::Result<Self> {
+        Self::new(&read_picture(path)?)
+    }
+
+    /// From a recorded picture.
+    ///
+    /// # Errors
+    /// When it is compressed in a way that is not known here.
+    pub fn new(picture: &Picture) -> anyhow::Result<Self> {
+        match picture {
+            Picture::Pixels { header, pixels } => Ok(Self::unpacked(header, pixels)),
+            Picture::Compressed { stamp_ns, bytes, .. } => {
+                let unpacked = shared_mem::recording::unpack_picture(bytes, *stamp_ns);
+                Self::new(&unpacked.map_err(anyhow::Error::msg)?)
+            }
+        }
+    }
+
+    fn unpacked(header: &ImageHeader, bytes: &[u8]) -> Self {
+        let size = [header.width as usize, header.height as usize];
+        let stride = header.stride as usize;
+        let byte = |at: usize| bytes.get(at).copied().unwrap_or(0);
+        let channels = match header.encoding {
+            PixelEncoding::Rgb8 => {
+                let channel = |c| Grid::from_fn(size[0], size[1], |x, y| f32::from(byte(y * stride + 3 * x + c)));
+                (0..3).map(channel).collect()
+            }
+            PixelEncoding::Depth16 => {
+                let depth = |x: usize, y: usize| {
+                    f32::from(u16::from_le_bytes([byte(y * stride + 2 * x), byte(y * stride + 2 * x + 1)]))
+                };
+                vec![Grid::from_fn(size[0], size[1], depth)]
+            }
+        };
+        Self { size, channels }
+    }
+
+    /// Free of the lens's distortion; what lies outside of the picture is black.
+    #[must_use]
+    pub fn undistorted(self, lens: &Lens, distortion: &[f64; 5]) -> Self {
+        let channels = self.channels.into_iter().map(|grid| grid.undistorted(lens, distortion, 0.0)).collect();
+        Self { channels, ..self }
+    }
+
+    /// The photo itself.
+    ///
+    /// # Errors
+    /// When all of it looks the same, or it is a depth picture.
+    pub fn photo(&self, name: &str) -> anyhow::Result<Evidence> {
+        let [r, g, b] = &self.channels[..] else {
+            bail!("{name} is a depth picture; give --background with one that was taken without the robot");
+        };
+        let spread = |grid: &Grid| {
+            let mut values = grid.values.clone();
+            let last = values.len().saturating_sub(1);
+            let mut at = |share: f64| *values.select_nth_unstable_by((share * last as f64) as usize, f32::total_cmp).1;
+            at(0.995) - at(0.005)
+        };
+        let most = [r, g, b].map(spread).into_iter().fold(0.0, f32::max);
+        ensure!(most >= CONTRAST, "{name} shows nothing: all of it is of one colour; check exposure and lens cap");
+        Ok(Evidence::Photo([r.clone(), g.clone(), b.clone()]))
+    }
+
+    /// The robot as whatever differs from a picture without it.
+    ///
+    /// # Errors
+    /// When the sizes differ, or nothing or everything does.
+    pub fn against(&self, background: &Self, name: &str) -> anyhow::Result<Evidence> {
+        ensure!(
+            self.size == background.size && self.channels.len() == background.channels.len(),
+            "{name} and its background are pictures of another kind or size: take both with the same camera"
+        );
+        let is_depth = self.channels.len() == 1;
+        let differs = |i: usize| {
+            let pairs = self.channels.iter().zip(&background.channels);
+            pairs.into_iter().any(|(a, b)| {
+                let (a, b) = (a.values[i], b.values[i]);
+                if is_depth { a > 0.0 && (b == 0.0 || a < b * (1.0 - DEPTH)) } else { (a - b).abs() > COLOUR }
+            })
+        };
+        let [width, height] = self.size;
+        let share = Grid::from_fn(width, height, |x, y| f32::from(u8::from(differs(y * width + x))));
+        checked(share, name, "differs from the background")
+    }
+
+    /// The robot as a mask file marks it: everything that is not black.
+    ///
+    /// # Errors
+    /// When nothing or everything is marked.
+    pub fn mask(&self, name: &str) -> anyhow::Result<Evidence> {
+        let [width, height] = self.size;
+        let lit = |i: usize| self.channels.iter().any(|grid| grid.values[i] > 127.0);
+        let share = Grid::from_fn(width, height, |x, y| f32::from(u8::from(lit(y * width + x))));
+        checked(share, name, "is marked")
+    }
+}
+
+fn checked(share: Grid, name: &str, what: &str) -> anyhow::Result<Evidence> {
+    let covered = share.values.iter().map(|v| f64::from(*v)).sum::<f64>() / share.values.len().max(1) as f64;
+    ensure!(covered >= COVERED.start, "{name}: nothing to fit: no pixel of it {what}");
+    ensure!(covered <= COVERED.end, "{name}: nothing to fit: all of it {what}");
+    Ok(Evidence::Mask(share))
+}
+
+/// Joint positions and, where the file tells them, intrinsics.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Moment {
+    /// Joint positions [rad].
+    pub q: Vec<f64>,
+    /// Columns and rows that `pinhole` and `distortion` are for.
+    pub size: Option<[usize; 2]>,
+    /// fx, fy, cx, cy [pixel].
+    pub pinhole: Option<[f64; 4]>,
+    /// k1, k2, p1, p2, k3.
+    pub distortion: [f64; 5],
+}
+
+impl Moment {
+    /// From numbers with commas between them, or from a JSON file: a list of joint positions, or an object with `q`, or
+    /// with `states` (each with `q`) and `nearest_state_index`; beside them `K`, `D`, `width` and `height` as ROS names
+    /// them.
+    ///
+    /// # Errors
+    /// When it is neither, with what was expected.
+    pub fn parse(text: &str) -> anyhow::Result<Self> {
+        let numbers: Result<Vec<f64>, _> = text.split(',').map(|part| part.trim().parse::<f64>()).collect();
+        if let Ok(q) = numbers {
+            return Ok(Self { q, size: None, pinhole: None, distortion: [0.0; 5] });
+        }
+        let file = std::fs::read(text)
+            .with_context(|| format!("{text} is neither numbers with commas between them nor a readable JSON file"))?;
+        let value: serde_json::Value = serde_json::from_slice(&file).with_context(|| format!("{text} is no JSON"))?;
+        let numbers = |value: &serde_json::Value| -> Option<Vec<f64>> {
+            value.as_array()?.iter().map(serde_json::Value::as_f64).collect()
+        };
+        let at = value.get("nearest_state_index").and_then(serde_json::Value::as_u64).unwrap_or(0) as usize;
+        let state = value.get("states").and_then(|states| states.get(at));
+        let q = numbers(&value).or_else(|| numbers(value.get("q")?)).or_else(|| numbers(state?.get("q")?));
+        let q = q.with_context(|| {
+            format!("{text} holds no joint positions: give a list of numbers or an object with `q`")
+        })?;
+        let count = |key: &str| value.get(key)?.as_u64().map(|n| n as usize);
+        let k = value.get("K").and_then(numbers).filter(|k| k.len() == 9);
+        let mut distortion = [0.0; 5];
+        for (to, from) in distortion.iter_mut().zip(value.get("D").and_then(numbers).unwrap_or_default()) {
+            *to = from;
+        }
+        let size = count("width").zip(count("height")).map(|(width, height)| [width, height]);
+        Ok(Self { q, size, pinhole: k.map(|k| [k[0], k[4], k[2], k[5]]), distortion })
+    }
+}

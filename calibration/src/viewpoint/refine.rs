@@ -1,0 +1,250 @@
+//! From a pose that is nearly right to the best one: robust least squares on the distances between the robot's outline
+//! and what the pictures show of it, from coarse pictures to fine ones.
+//!
+//! An outline's points slide over the body as the camera moves, but along the line of sight, which no picture sees: so
+//! each of them may be held as a point of the body within a step (Drummond & Cipolla 2002).
+
+use super::frame::Frame;
+use super::outline::{Outliner, Place};
+use super::shape::Shape;
+use super::step::moved;
+use nalgebra::{Isometry3, Matrix6, Point3, Vector3, Vector6};
+use std::ops::Range;
+
+/// A pose and what the pictures say there.
+#[derive(Debug, Clone)]
+pub struct Refined {
+    /// The pose.
+    pub camera_from_base: Isometry3<f64>,
+    /// Mean robust cost of a pixel of outline, 0 to 1.
+    pub cost: f64,
+    /// The equations there, one set a group of places: frame and link.
+    pub groups: Vec<Group>,
+    /// Point that the six numbers turn about, camera frame [m].
+    pub pivot: Point3<f64>,
+    /// How many times the robot was drawn.
+    pub drawings: usize,
+}
+
+/// Normal equations of the places of one link in one frame.
+#[derive(Debug, Clone)]
+pub struct Group {
+    /// Number of the frame.
+    pub frame: usize,
+    /// Number of the link.
+    pub link: usize,
+    /// Sum of weighted outer products of the slopes [pixel², per rad or m].
+    pub information: Matrix6<f64>,
+    /// Sum of weighted offsets times slopes.
+    pub gradient: Vector6<f64>,
+    /// Sum of weights [pixel of outline].
+    pub weight: f64,
+    /// What the gradient would be if this link were a pixel thicker than it is.
+    pub swell: Vector6<f64>,
+}
+
+/// One stage: a level, how far a place looks [pixel of the level], and where an offset counts half [pixel].
+struct Stage {
+    level: usize,
+    range: f64,
+    half: f64,
+    steps: usize,
+    /// Silhouettes are compared with the drawn robot instead of with their border alone.
+    smooth: bool,
+}
+
+/// From far to near.
+const STAGES: [Stage; 6] = [
+    Stage { level: 0, range: 8.0, half: 4.0, steps: 12, smooth: false },
+    Stage { level: 0, range: 4.0, half: 2.0, steps: 10, smooth: false },
+    Stage { level: 1, range: 5.0, half: 2.0, steps: 10, smooth: false },
+    Stage { level: 2, range: 6.0, half: 2.0, steps: 10, smooth: false },
+    Stage { level: 2, range: 3.0, half: 1.0, steps: 20, smooth: false },
+    Stage { level: 2, range: 3.0, half: 1.0, steps: 10, smooth: true },
+];
+/// The stages that begin far away, and those that end at the finest pictures.
+pub const COARSE: Range<usize> = 0..3;
+/// See [`COARSE`].
+pub const FINE: Range<usize> = 2..5;
+/// The last stage, which is finer than pixels for silhouettes.
+pub const LAST: Range<usize> = 5..6;
+/// Steps with growing damping before a stage ends.
+const TRIALS: usize = 5;
+/// A stage ends when a step moves the picture by less than this [pixel].
+const STILL: f64 = 2e-3;
+/// Outline between links counts less than that before the background: little tells two white links apart.
+const INNER: f64 = 0.3;
+
+/// The best pose near `start`, by the stages in `which`: [`COARSE`], [`FINE`] or [`LAST`].
+#[must_use]
+pub fn refine(frames: &[Frame], shape: &Shape, start: &Isometry3<f64>, which: Range<usize>) -> Option<Refined> {
+    let mut best: Option<Refined> = None;
+    let mut drawings = 0;
+    for stage in &STAGES[which] {
+        let from = best.as_ref().map_or(*start, |best| best.camera_from_base);
+        let mut work = Work::new(frames, shape, stage);
+        let mut here = work.at(&from)?;
+        if stage.smooth {
+            // Whatever cuts or adds to a silhouette then weighs little against what it shows exactly.
+            let typical = median(&mut work.offsets).unwrap_or(0.0);
+            work.half = (OUTLIERS * typical).clamp(FINEST_HALF, stage.half);
+            here = work.at(&from)?;
+        }
+        let mut damping = 1e-3;
+        for _ in 0..stage.steps {
+            let (information, gradient) = here.sums();
+            let mut trials = 0;
+            let better = loop {
+                let step = solve(&information, &gradient, damping)?;
+                let there = work.at(&moved(&here.camera_from_base, &here.pivot, &step));
+                // Near the end the cost flickers with the places that come and go, while the step stays true.
+                match there.filter(|there| stage.smooth || there.cost < here.cost) {
+                    Some(there) => break Some((there, step)),
+                    None if trials == TRIALS => break None,
+                    None => (damping, trials) = (damping * 10.0, trials + 1),
+                }
+            };
+            let Some((there, step)) = better else { break };
+            damping = (damping * 0.1).max(1e-6);
+            let weight: f64 = here.groups.iter().map(|group| group.weight).sum();
+            let motion = ((information * step).dot(&step) / weight.max(1e-9)).sqrt();
+            here = there;
+            if motion < STILL {
+                break;
+            }
+        }
+        drawings += work.drawings;
+        best = Some(here);
+    }
+    best.map(|best| Refined { drawings, ..best })
+}
+
+/// The equations at a pose, as the last stage sees them.
+#[must_use]
+pub fn at(frames: &[Frame], shape: &Shape, camera_from_base: &Isometry3<f64>) -> Option<Refined> {
+    Work::new(frames, shape, &STAGES[STAGES.len() - 1]).at(camera_from_base)
+}
+
+impl Refined {
+    /// The equations of all groups.
+    #[must_use]
+    pub fn sums(&self) -> (Matrix6<f64>, Vector6<f64>) {
+        let sum = (Matrix6::zeros(), Vector6::zeros());
+        self.groups.iter().fold(sum, |(h, g), group| (h + group.information, g + group.gradient))
+    }
+}
+
+/// The damped step down.
+fn solve(information: &Matrix6<f64>, gradient: &Vector6<f64>, damping: f64) -> Option<Vector6<f64>> {
+    let mut damped = *information;
+    let floor = 1e-9 * information.diagonal().max().max(1e-9);
+    for i in 0..6 {
+        damped[(i, i)] += damping * information[(i, i)] + floor;
+    }
+    damped.cholesky().map(|factor| -factor.solve(gradient))
+}
+
+/// At the last stage an offset counts half at this multiple of the usual one, but not below that [pixel].
+const OUTLIERS: f64 = 3.0;
+const FINEST_HALF: f64 = 0.2;
+
+fn median(values: &mut [f64]) -> Option<f64> {
+    let middle = values.len().checked_sub(1)? / 2;
+    Some(*values.select_nth_unstable_by(middle, f64::total_cmp).1)
+}
+
+/// Draws and compares at one stage.
+struct Work<'a> {
+    frames: &'a [Frame],
+    shape: &'a Shape,
+    stage: &'a Stage,
+    half: f64,
+    /// Offsets met at the last pose, without their signs [pixel].
+    offsets: Vec<f64>,
+    outliners: Vec<Outliner>,
+    outlines: Vec<Vec<Place>>,
+    drawings: usize,
+}
+
+/// Fewer pixels of outline in all pictures together say nothing.
+const FEWEST: f64 = 30.0;
+
+impl<'a> Work<'a> {
+    fn new(frames: &'a [Frame], shape: &'a Shape, stage: &'a Stage) -> Self {
+        let outliners = frames.iter().map(|frame| frame.outliner(stage.level)).collect();
+        let outlines = vec![Vec::new(); frames.len()];
+        Self { frames, shape, stage, half: stage.half, offsets: Vec::new(), outliners, outlines, drawings: 0 }
+    }
+
+    /// The equations at a pose; `None` where too little of the robot is in view.
+    fn at(&mut self, camera_from_base: &Isometry3<f64>) -> Option<Refined> {
+        let parts = if self.stage.level == Frame::COARSEST { &self.shape.coarse } else { &self.shape.fine };
+        self.drawings += self.frames.len();
+        let (mut sum, mut length) = (Vector3::zeros(), 0.0);
+        for ((frame, outliner), outline) in self.frames.iter().zip(&mut self.outliners).zip(&mut self.outlines) {
+            outliner.outline(parts, &frame.placed(camera_from_base), outline);
+            for place in outline.iter() {
+                sum += place.point.coords * place.length;
+                length += place.length;
+            }
+        }
+        if length < FEWEST {
+            return None;
+        }
+        let pivot = Point3::from(sum / length);
+        let smoothed: Vec<_> = (self.frames.iter().zip(&self.outliners))
+            .map(|(frame, outliner)| if self.stage.smooth { frame.smoothed(self.stage.level, outliner) } else { None })
+            .collect();
+        self.offsets.clear();
+        let (mut groups, mut cost, mut total) = (Vec::<Group>::new(), 0.0, 0.0);
+        for (number, (frame, outline)) in self.frames.iter().zip(&self.outlines).enumerate() {
+            for place in outline {
+                let length = place.length * if place.is_outer || frame.has_mask() { 1.0 } else { INNER };
+                if frame.has_mask() && !place.is_outer {
+                    continue;
+                }
+                total += length;
+                let pull = match &smoothed[number] {
+                    Some(drawn) => frame.pull_smooth(self.stage.level, place, drawn),
+                    None => frame.pull(self.stage.level, place, self.stage.range),
+                };
+                let Some(pull) = pull else {
+                    cost += length;
+                    continue;
+                };
+                self.offsets.push(pull.offset.abs());
+                let ratio = (pull.offset / self.half).powi(2);
+                // Geman & McClure: half weight at the half, hardly any far beyond.
+                let clear = length * pull.weight;
+                cost += length - clear + clear * ratio / (1.0 + ratio);
+                let weight = clear / (1.0 + ratio).powi(2);
+                let slope = slope(place, frame.lens(self.stage.level).focal, &pivot, &pull.direction);
+                let at = groups.iter().position(|g| (g.frame, g.link) == (number, place.link));
+                let group = match at {
+                    Some(at) => &mut groups[at],
+                    None => {
+                        let (information, gradient) = (Matrix6::zeros(), Vector6::zeros());
+                        let (frame, link, swell) = (number, place.link, gradient);
+                        groups.push(Group { frame, link, information, gradient, weight: 0.0, swell });
+                        groups.last_mut()?
+                    }
+                };
+                group.information += weight * slope * slope.transpose();
+                group.gradient += weight * pull.offset * slope;
+                group.weight += weight;
+                group.swell += weight * slope;
+            }
+        }
+        let camera_from_base = *camera_from_base;
+        Some(Refined { camera_from_base, cost: cost / total.max(1e-9), groups, pivot, drawings: 0 })
+    }
+}
+
+/// How the offset of a place grows with the six numbers of [`moved`].
+fn slope(place: &Place, focal: [f64; 2], pivot: &Point3<f64>, direction: &[f64; 2]) -> Vector6<f64> {
+    let p = place.point;
+    let (a, b) = (direction[0] * focal[0] / p.z, direction[1] * focal[1] / p.z);
+    let along = Vector3::new(a, b, -(a * p.x + b * p.y) / p.z);
+    let turn = (p - pivot).cross(&along);
+    Vector6::new(turn.x, turn.y, turn.z, along.x, along.y, along.z)
+}

@@ -1,0 +1,143 @@
+//! Pictures and joints out of a session's clips: moments when the arm stands still, as different from each other as there
+//! are.
+
+use super::picture::Pixels;
+use anyhow::{Context as _, ensure};
+use shared_mem::recording::{ClipMessages, JointSeries, Payload, Picture, Session};
+use std::path::Path;
+
+/// A picture of a session.
+#[derive(Debug)]
+pub struct Shot {
+    /// Clip and time in it.
+    pub name: String,
+    /// The pixels.
+    pub pixels: Pixels,
+    /// Joint positions [rad].
+    pub q: Vec<f64>,
+}
+
+/// Joints slower than this stand still [rad/s].
+const STILL: f64 = 0.03;
+
+struct Known {
+    clip: usize,
+    stamp_ns: u64,
+    q: Vec<f64>,
+    speed: f64,
+}
+
+/// At most `wanted` colour pictures of the session.
+///
+/// # Errors
+/// When a clip cannot be read or holds no pictures with joints.
+pub fn shots(session: &Session, wanted: usize) -> anyhow::Result<Vec<Shot>> {
+    let latency_ns = session.cell.camera.as_ref().map_or(0, |camera| (camera.latency * 1e9) as u64);
+    let mut known = Vec::new();
+    for (number, entry) in session.clips.iter().enumerate() {
+        let path = session.folder.join(&entry.file);
+        let clip = session.read(entry)?;
+        for_pictures(&path, |stamp_ns, _| {
+            if let Some((q, speed)) = at(&clip.measured, stamp_ns.saturating_sub(latency_ns)) {
+                known.push(Known { clip: number, stamp_ns, q, speed });
+            }
+            Ok(())
+        })?;
+    }
+    ensure!(
+        !known.is_empty(),
+        "no clip of the session holds colour pictures with joints at their time; record with `--camera`, or give images"
+    );
+    let chosen = choose(known, wanted);
+    let mut out = Vec::new();
+    for (number, entry) in session.clips.iter().enumerate() {
+        if !chosen.iter().any(|known| known.clip == number) {
+            continue;
+        }
+        for_pictures(&session.folder.join(&entry.file), |stamp_ns, picture| {
+            if let Some(known) = chosen.iter().find(|known| (known.clip, known.stamp_ns) == (number, stamp_ns)) {
+                let name = format!("{} at {:.3} s", entry.file.display(), stamp_ns as f64 * 1e-9);
+                out.push(Shot { name, pixels: Pixels::new(picture)?, q: known.q.clone() });
+            }
+            Ok(())
+        })?;
+    }
+    Ok(out)
+}
+
+/// Calls `each` with every colour picture of a clip and its stamp [ns].
+fn for_pictures(path: &Path, mut each: impl FnMut(u64, &Picture) -> anyhow::Result<()>) -> anyhow::Result<()> {
+    if path.is_dir() {
+        return Ok(());
+    }
+    for message in ClipMessages::open(path, &[])? {
+        let message = message.with_context(|| format!("{} cannot be read to its end", path.display()))?;
+        if let Payload::Picture(picture) = &message.payload {
+            let stamp_ns = match picture {
+                Picture::Pixels { header, .. } if header.depth_scale == 0.0 => header.stamp_ns,
+                Picture::Compressed { stamp_ns, .. } if !message.topic.contains("depth") => *stamp_ns,
+                _ => continue,
+            };
+            each(stamp_ns, picture)?;
+        }
+    }
+    Ok(())
+}
+
+/// Joint positions and the fastest joint's speed at a time, between rows; `None` outside of the series.
+fn at(series: &JointSeries, time_ns: u64) -> Option<(Vec<f64>, f64)> {
+    let next = series.stamps_ns.partition_point(|stamp| *stamp < time_ns);
+    let before = next.checked_sub(1)?;
+    let (a, b) = (*series.stamps_ns.get(before)?, *series.stamps_ns.get(next)?);
+    let share = (time_ns - a) as f64 / (b - a).max(1) as f64;
+    let (from, to) = (series.q_row(before), series.q_row(next));
+    let q = from.iter().zip(to).map(|(from, to)| from + share * (to - from)).collect();
+    let seconds = (b - a).max(1) as f64 * 1e-9;
+    let speed = from.iter().zip(to).map(|(from, to)| (to - from).abs() / seconds).fold(0.0, f64::max);
+    Some((q, speed))
+}
+
+/// Those at rest, where there are any; of these one after the other the one that differs most from all chosen before.
+fn choose(mut known: Vec<Known>, wanted: usize) -> Vec<Known> {
+    let slowest = known.iter().map(|known| known.speed).fold(f64::INFINITY, f64::min);
+    known.retain(|known| known.speed <= STILL.max(2.0 * slowest));
+    let mut out: Vec<Known> = Vec::new();
+    while out.len() < wanted.max(1) && !known.is_empty() {
+        let apart = |known: &Known| {
+            let to = |other: &Known| known.q.iter().zip(&other.q).map(|(a, b)| (a - b).powi(2)).sum::<f64>();
+            out.iter().map(to).fold(f64::INFINITY, f64::min)
+        };
+        let furthest = (0..known.len()).max_by(|a, b| apart(&known[*a]).total_cmp(&apart(&known[*b])));
+        let Some(furthest) = furthest else { break };
+        // The same pose again adds nothing but its noise.
+        if !out.is_empty() && apart(&known[furthest]) < 1e-4 {
+            break;
+        }
+        out.push(known.swap_remove(furthest));
+    }
+    out.sort_by_key(|known| (known.clip, known.stamp_ns));
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pictures_at_rest_and_of_different_poses_are_chosen() {
+        let known = |stamp_ns, q: f64, speed| Known { clip: 0, stamp_ns, q: vec![q], speed };
+        let all =
+            vec![known(1, 0.0, 0.0), known(2, 0.001, 0.0), known(3, 0.5, 1.0), known(4, 1.0, 0.01), known(5, 0.6, 0.0)];
+        let chosen: Vec<u64> = choose(all, 4).iter().map(|known| known.stamp_ns).collect();
+        assert_eq!(chosen.len(), 3, "{chosen:?}");
+        assert!(chosen.contains(&4) && chosen.contains(&5) && !chosen.contains(&3), "{chosen:?}");
+    }
+
+    #[test]
+    fn joints_between_rows_are_interpolated() {
+        let series = JointSeries { stamps_ns: vec![0, 10], dof: 1, q: vec![1.0, 2.0], dq: Vec::new(), tau: Vec::new() };
+        let (q, speed) = at(&series, 5).expect("inside");
+        assert_eq!((q, speed), (vec![1.5], 1e8));
+        assert!(at(&series, 11).is_none());
+    }
+}

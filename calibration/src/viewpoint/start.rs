@@ -1,0 +1,60 @@
+//! Where nothing is known: the camera stands somewhere around the robot, upright, and looks at it.
+
+use super::fit::{Fit, Method, NoFit, fit};
+use super::frame::Frame;
+use super::lens::Lens;
+use super::scan::scan;
+use super::search::Reach;
+use super::shape::Shape;
+use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
+
+/// Places looked from: around, and from the table's height to far above [rad], away from the robot [m].
+const AROUND: usize = 16;
+const HEIGHTS: [f64; 4] = [0.1, 0.4, 0.7, 1.1];
+const DISTANCES: [f64; 4] = [0.9, 1.3, 1.8, 2.5];
+/// What is looked at: the middle of an arm [m].
+const MIDDLE: f64 = 0.4;
+/// The turn within which each place is looked at, and so many places that are followed.
+const TURN: f64 = 0.35;
+const FOLLOWED: usize = 5;
+
+/// The pose that explains the frames best, from anywhere around the robot.
+///
+/// # Errors
+/// As [`fit`].
+pub fn search(frames: &[Frame], shape: &Shape, lens: &Lens, method: Method, seed: u64) -> Result<Fit, NoFit> {
+    let reach = Reach { angle: TURN, distance: 0.0 };
+    let mut seen = Vec::new();
+    let mut drawings = 0;
+    for place in 0..AROUND * HEIGHTS.len() * DISTANCES.len() {
+        let around = std::f64::consts::TAU * (place % AROUND) as f64 / AROUND as f64;
+        let height = HEIGHTS[place / AROUND % HEIGHTS.len()];
+        // A long lens stands further away: what is far is told by the field of view.
+        let away =
+            DISTANCES[place / AROUND / HEIGHTS.len()] * (lens.focal[1] / (2.0 * lens.centre[1].max(1.0))).max(0.5);
+        let from = Vector3::new(around.cos() * height.cos(), around.sin() * height.cos(), height.sin()) * away;
+        let (candidates, drawn) = scan(&frames[..1], shape, &looking(&from), &reach, 1);
+        drawings += drawn;
+        seen.extend(candidates);
+    }
+    seen.sort_by(|a, b| a.loss.total_cmp(&b.loss));
+    let reach = Reach { angle: 0.3, distance: 0.3 };
+    let mut best: Result<Fit, NoFit> = Err(NoFit::OutOfView);
+    for candidate in seen.iter().take(FOLLOWED) {
+        let found = fit(frames, shape, &candidate.camera_from_base, &reach, method, seed);
+        drawings += found.as_ref().map_or(0, |found| found.drawings);
+        best = match (best, found) {
+            (Ok(best), Ok(found)) if found.confirmed > best.confirmed => Ok(found),
+            (Ok(best), _) => Ok(best),
+            (Err(_), found) => found,
+        };
+    }
+    best.map(|best| Fit { drawings, ..best })
+}
+
+/// Camera pose at `from` the robot's middle, looking at it, upright.
+fn looking(from: &Vector3<f64>) -> Isometry3<f64> {
+    let middle = Point3::new(0.0, 0.0, MIDDLE);
+    let turned = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI);
+    turned * Isometry3::look_at_rh(&(middle + from), &middle, &Vector3::z())
+}

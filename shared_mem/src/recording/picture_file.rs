@@ -1,0 +1,129 @@
+//! Pictures as files: PNG and JPEG in, PNG out. Colour has three bytes a pixel, depth one little-endian `u16` of a
+//! millimetre (a PNG with 16 bits of grey).
+
+use super::error::ReadError;
+use super::picture::{Picture, unpack_png};
+use crate::msg::image::{ImageHeader, PixelEncoding, StampDomain};
+use std::io::BufWriter;
+use std::path::Path;
+use zune_core::bytestream::ZCursor;
+use zune_core::colorspace::ColorSpace;
+use zune_core::options::DecoderOptions;
+use zune_jpeg::JpegDecoder;
+
+/// Longest edge of a JPEG that is unpacked [pixel].
+const LONGEST: usize = 16_384;
+
+/// Reads a PNG or JPEG file.
+///
+/// # Errors
+/// [`ReadError`] when the file is missing, cut short, or neither of both.
+pub fn read_picture(path: &Path) -> Result<Picture, ReadError> {
+    let bytes = std::fs::read(path).map_err(|e| ReadError::kind(path, format!("cannot be read: {e}")))?;
+    unpack_picture(&bytes, 0).map_err(|what| ReadError::kind(path, what))
+}
+
+/// The same from a file's bytes, as a clip's compressed picture holds them.
+///
+/// # Errors
+/// A sentence when the bytes are cut short or neither PNG nor JPEG.
+pub fn unpack_picture(bytes: &[u8], stamp_ns: u64) -> Result<Picture, String> {
+    if bytes.starts_with(b"\x89PNG") {
+        return unpack_png(bytes, stamp_ns).map_err(|e| format!("the PNG cannot be read: {e}"));
+    }
+    if bytes.starts_with(&[0xff, 0xd8]) {
+        return unpack_jpeg(bytes, stamp_ns).map_err(|e| format!("the JPEG cannot be read: {e}"));
+    }
+    Err("is neither a PNG nor a JPEG picture".into())
+}
+
+fn unpack_jpeg(bytes: &[u8], stamp_ns: u64) -> Result<Picture, String> {
+    let options = DecoderOptions::default()
+        .jpeg_set_out_colorspace(ColorSpace::RGB)
+        .set_max_width(LONGEST)
+        .set_max_height(LONGEST)
+        .set_strict_mode(true);
+    let mut decoder = JpegDecoder::new_with_options(ZCursor::new(bytes), options);
+    let pixels = decoder.decode().map_err(|e| format!("{e:?}"))?;
+    let (width, height) = decoder.dimensions().ok_or("it tells no size")?;
+    if pixels.len() != width * height * 3 {
+        return Err(format!("a picture of {width} x {height} pixels holds {} bytes", pixels.len()));
+    }
+    let header = ImageHeader {
+        stamp_ns,
+        device_ns: stamp_ns,
+        width: width as u32,
+        height: height as u32,
+        stride: width as u32 * 3,
+        encoding: PixelEncoding::Rgb8,
+        stamp_domain: StampDomain::SystemTime,
+        ..ImageHeader::default()
+    };
+    Ok(Picture::Pixels { header, pixels })
+}
+
+/// Writes `width * height` pixels of red, green, blue as a PNG.
+///
+/// # Errors
+/// [`ReadError`] when the file cannot be written or the pixels are not that many.
+pub fn write_png(path: &Path, width: u32, height: u32, rgb: &[u8]) -> Result<(), ReadError> {
+    let cannot = |e: &dyn std::fmt::Display| ReadError::kind(path, format!("cannot be written: {e}"));
+    let file = std::fs::File::create(path).map_err(|e| cannot(&e))?;
+    let mut encoder = png::Encoder::new(BufWriter::new(file), width, height);
+    encoder.set_color(png::ColorType::Rgb);
+    encoder.set_depth(png::BitDepth::Eight);
+    let write = |encoder: png::Encoder<'_, _>| encoder.write_header()?.write_image_data(rgb);
+    write(encoder).map_err(|e| cannot(&e))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    /// A grey square of 16 pixels: quantisation of 1, one coefficient a block, the shortest Huffman tables.
+    fn jpeg() -> Vec<u8> {
+        let mut out = vec![0xff, 0xd8, 0xff, 0xdb, 0, 67, 0];
+        out.extend([1; 64]);
+        out.extend([0xff, 0xc0, 0, 11, 8, 0, 16, 0, 16, 1, 1, 0x11, 0]);
+        // DC: one code of two bits for size 0 and one for size 8; AC: one code of two bits for "end of block".
+        out.extend([0xff, 0xc4, 0, 21, 0x00, 0, 2, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 8]);
+        out.extend([0xff, 0xc4, 0, 20, 0x10, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0]);
+        out.extend([0xff, 0xda, 0, 8, 1, 1, 0, 0, 63, 0]);
+        // First block: size 8 (01), value 200 (11001000), end (00); three more: size 0 (00), end (00); ones to the end.
+        out.extend([0b0111_0010, 0b0000_0000, 0b0000_0000, 0xff, 0xd9]);
+        out
+    }
+
+    #[test]
+    fn a_jpeg_becomes_colour_pixels() {
+        let Ok(Picture::Pixels { header, pixels }) = unpack_picture(&jpeg(), 3) else { panic!("no picture") };
+        assert_eq!((header.width, header.height, header.stride, header.stamp_ns), (16, 16, 48, 3));
+        // A mean of 200 / 8 over the middle grey of 128.
+        assert!(pixels.iter().all(|v| v.abs_diff(153) <= 1), "{:?}", &pixels[..6]);
+    }
+
+    #[test]
+    fn what_is_written_is_read_back() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("a.png");
+        let rgb: Vec<u8> = (0..2 * 3 * 3).collect();
+        write_png(&path, 2, 3, &rgb).expect("a file");
+        let Ok(Picture::Pixels { header, pixels }) = read_picture(&path) else { panic!("no picture") };
+        assert_eq!((header.width, header.height, pixels), (2, 3, rgb));
+        assert!(write_png(&path, 2, 2, &[0; 3]).is_err());
+        std::fs::write(&path, b"GIF89a").expect("a file");
+        assert!(read_picture(&path).unwrap_err().to_string().contains("neither a PNG nor a JPEG"));
+    }
+
+    proptest! {
+        #[test]
+        fn a_damaged_file_is_refused_or_read_but_never_a_panic(cut in 0usize..250, at in 0usize..200, value in any::<u8>()) {
+            let mut bytes = jpeg();
+            let at = at.min(bytes.len() - 1);
+            bytes[at] = value;
+            bytes.truncate(cut);
+            let _ = unpack_picture(&bytes, 0);
+        }
+    }
+}
