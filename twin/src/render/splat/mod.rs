@@ -1,0 +1,23 @@
+//! Gaussian splats: files, projection, and the reference renderer of splats and meshes together.
+//!
+//! | module | owns |
+//! |---|---|
+//! | `cloud` | the splats of one body |
+//! | `ply`, `compressed` | 3DGS PLY and SuperSplat's compressed PLY |
+//! | `harmonics` | colour by direction |
+//! | `lens` | pinhole and Brown-Conrady distortion, both ways |
+//! | `project` | one splat in a picture |
+//! | `reference` | the picture |
+
+mod cloud;
+mod compressed;
+mod harmonics;
+mod lens;
+mod ply;
+mod project;
+mod reference;
+
+pub use cloud::{Splat, SplatCloud, SplatError};
+pub use lens::Lens;
+pub use project::{Projected, project};
+pub use reference::{Body, Picture, Shape, render};
