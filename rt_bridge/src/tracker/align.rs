@@ -20,7 +20,7 @@ const SHARED_LINES: f64 = 2.0;
 const CONTACT: f64 = 0.0015;
 const LIFTED: f64 = 0.004;
 /// What a pose is known to beside the picture, one sigma [m, rad]: it keeps what cannot be seen from running away.
-const EXPECTED: [f64; 2] = [0.05, 0.5];
+pub(super) const EXPECTED: [f64; 2] = [0.05, 0.5];
 /// A step that changes nothing [m, rad].
 const STILL: f64 = 2e-5;
 

@@ -27,6 +27,9 @@ const FITTED: usize = 6;
 const ALIKE: [f64; 2] = [0.012, 0.35];
 /// Where another pose scores within this of the best, the picture does not decide between them.
 const UNDECIDED: f64 = 0.04;
+/// Poses look the same where their outlines differ by no more than this share of the pixels, and their surfaces by this [m].
+const SAME_OUTLINE: f32 = 0.04;
+const SAME_SURFACE: f32 = 0.002;
 /// Share of the object that must be seen before it counts as found.
 const SHOWN: f64 = 0.35;
 /// Of what rises from the table there, the object must explain this share.
@@ -68,11 +71,28 @@ impl Scene<'_> {
         fits.sort_by(|(_, a), (_, b)| b.score().total_cmp(&a.score()));
         let (best, verdict) = fits.first()?;
         let undecided = fits[1..].iter().any(|(other, rival)| {
-            rival.score() > verdict.score() - UNDECIDED
-                && !self.alike(&best.camera_from_object, &other.camera_from_object)
+            let (a, b) = (&best.camera_from_object, &other.camera_from_object);
+            rival.score() > verdict.score() - UNDECIDED && !self.alike(a, b) && !self.look_alike(patch, a, b)
         });
         let shown = f64::from(verdict.agree) >= SHOWN * f64::from(verdict.drawn);
         (shown && !undecided).then_some(*best)
+    }
+
+    /// Whether nobody could tell two poses apart, as with a cylinder that is turned.
+    fn look_alike(&self, patch: &mut Patch, a: &Isometry3<f64>, b: &Isometry3<f64>) -> bool {
+        patch.draw(self.model, a);
+        let first = patch.drawn().to_vec();
+        patch.draw(self.model, b);
+        let (mut either, mut one, mut apart) = (0.0, 0.0, 0.0);
+        for (a, b) in first.iter().zip(patch.drawn()).filter(|(a, b)| **a > 0.0 || **b > 0.0) {
+            either += 1.0;
+            if *a > 0.0 && *b > 0.0 {
+                apart += (1.0 / a - 1.0 / b).abs();
+            } else {
+                one += 1.0;
+            }
+        }
+        one < SAME_OUTLINE * either && apart < SAME_SURFACE * either
     }
 
     /// What rises from the table, the largest heap first.

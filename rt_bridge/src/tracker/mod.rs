@@ -255,7 +255,8 @@ impl Tracker {
         let pose = self.model.nearest(&seen, &reference);
         self.last = Some(Seen::after(self.last.filter(|_| self.lost_for == 0), pose, at));
         self.lost_for = 0;
-        Estimate { pose: Pose::from_isometry(pose), covariance: covariance(view, &fit.information) }
+        let unseen = self.model.spins_about.map(|axis| pose.rotation * axis);
+        Estimate { pose: Pose::from_isometry(pose), covariance: covariance(view, &fit.information, unseen) }
     }
 
     fn learn(&mut self, patch: &mut Patch, table: &Table, camera_from_object: &Isometry3<f64>) {
@@ -300,14 +301,20 @@ impl Seen {
     }
 }
 
-/// Covariance about the base axes, from the information about the camera's.
-fn covariance(view: &View, information: &Matrix6<f64>) -> [f64; 36] {
+/// Covariance about the base axes, from the information about the camera's. The turn about the axis `unseen` (base frame)
+/// cannot be known.
+fn covariance(view: &View, information: &Matrix6<f64>, unseen: Option<Vector3<f64>>) -> [f64; 36] {
     let turn = view.base_from_camera.rotation.to_rotation_matrix();
     let mut axes = Matrix6::zeros();
     axes.fixed_view_mut::<3, 3>(0, 0).copy_from(turn.matrix());
     axes.fixed_view_mut::<3, 3>(3, 3).copy_from(turn.matrix());
     // Never singular: what the picture leaves open is bounded by what is expected beside it.
     let inverse = information.try_inverse().unwrap_or_else(Matrix6::identity);
-    let covariance = axes * inverse * axes.transpose();
+    let mut covariance = axes * inverse * axes.transpose();
+    if let Some(axis) = unseen {
+        let [_, turn] = align::EXPECTED;
+        let mut block = covariance.fixed_view_mut::<3, 3>(3, 3);
+        block += axis * axis.transpose() * (turn * turn);
+    }
     std::array::from_fn(|i| covariance[(i / 6, i % 6)])
 }

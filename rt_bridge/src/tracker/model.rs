@@ -22,6 +22,8 @@ pub struct Model {
     pub(super) radius: f64,
     /// Turns of the object, in its own frame, that change nothing an eye could see. The first is none at all.
     symmetries: Vec<UnitQuaternion<f64>>,
+    /// The axis of a body of revolution: the turn about it cannot be seen.
+    pub(super) spins_about: Option<Vector3<f64>>,
     /// Ways to stand on the table: which direction of the object points up, and after what turn about the vertical it
     /// looks the same again [rad].
     pub(super) stances: Vec<Stance>,
@@ -48,6 +50,7 @@ impl Model {
             mesh: Mesh::new((points, triangles), [255; 3]),
             corners,
             symmetries,
+            spins_about: axis_of_revolution(shape),
             stances: Vec::new(),
         };
         model.stances = model.ways_to_stand();
@@ -125,6 +128,33 @@ fn looks_the_same(shape: &ObjectShape, turn: &UnitQuaternion<f64>) -> bool {
             })
         }
     }
+}
+
+/// The coordinate axis about which a mesh is round: wherever it has a corner, it has others as high and as far out all
+/// around.
+fn axis_of_revolution(shape: &ObjectShape) -> Option<Vector3<f64>> {
+    const SECTORS: usize = 12;
+    let ObjectShape::Mesh { points, .. } = shape else { return None };
+    (0..3)
+        .find(|axis| {
+            let place = |p: &Point3<f64>| {
+                let (x, y) = (p[(axis + 1) % 3], p[(axis + 2) % 3]);
+                (p[*axis], x.hypot(y), y.atan2(x))
+            };
+            let every = points.len().div_ceil(COMPARED);
+            points.iter().step_by(every).all(|p| {
+                let (height, out, _) = place(p);
+                let mut met = [out < SAME; SECTORS];
+                for (other_height, other_out, angle) in points.iter().map(place) {
+                    if (other_height - height).abs() < SAME && (other_out - out).abs() < SAME {
+                        let turn = (angle / std::f64::consts::TAU).rem_euclid(1.0);
+                        met[((turn * SECTORS as f64) as usize).min(SECTORS - 1)] = true;
+                    }
+                }
+                met.iter().all(|met| *met)
+            })
+        })
+        .map(|axis| Vector3::ith(axis, 1.0))
 }
 
 /// Those points that lie farthest in one of many directions.

@@ -1,6 +1,7 @@
 //! The tracker on pictures of the simulated D455, noise included: how right it is, and whether it knows when it is not.
 #![allow(missing_docs, clippy::print_stdout)]
 
+mod meshes;
 mod rough;
 mod scenes;
 

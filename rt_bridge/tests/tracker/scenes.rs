@@ -69,7 +69,7 @@ impl Bench {
 /// A scene with the object standing at a place, the arm ready.
 pub(crate) fn standing(cell: &Cell, x: f64, y: f64, yaw: f64, frame: u64) -> SceneSnapshot {
     let model = ArmModel::from_cell(cell).expect("an arm");
-    let half = cell.object.as_ref().and_then(|o| o.size).expect("a box")[2] / 2.0;
+    let half = cell.object.as_ref().and_then(|o| o.size).map_or(0.0, |size| size[2] / 2.0);
     SceneSnapshot {
         time_ns: frame * PERIOD_NS,
         dof: 7,
