@@ -17,6 +17,7 @@ use tracing_subscriber::EnvFilter;
 Examples:
   twin shadow --cell config/fr3_cell.toml --viewer
   twin replay session --parameters theta.toml
+  twin render session --out frames
 Every verb has its own --help with examples. Logs and progress go to stderr (RUST_LOG=debug for more)."
 )]
 struct Arguments {
@@ -28,6 +29,7 @@ struct Arguments {
 enum Verb {
     Shadow(cli::shadow::Shadow),
     Replay(cli::replay::Replay),
+    Render(cli::render::Render),
 }
 
 fn main() -> ExitCode {
@@ -37,6 +39,7 @@ fn main() -> ExitCode {
     let outcome = match arguments.verb {
         Verb::Shadow(verb) => verb.run(),
         Verb::Replay(verb) => verb.run(),
+        Verb::Render(verb) => verb.run(),
     };
     match outcome {
         Ok(()) => ExitCode::SUCCESS,

@@ -3,11 +3,12 @@
 use nalgebra::{Isometry3, Matrix2, Matrix3, Point3, Translation3, UnitQuaternion, Vector2, Vector3};
 use proptest::prelude::*;
 use std::path::Path;
-use twin::render::splat::{Body, Lens, Picture, Shape, Splat, SplatCloud, render};
+use twin::render::splat::{Body, Lens, Picture, Shape, Splat, SplatCloud, Surroundings, render};
 use twin::render::{Hand, RobotSurface};
 
 const SIZE: [usize; 2] = [160, 120];
 const LENS: Lens = Lens { focal: [150.0, 140.0], centre: [81.3, 58.6], distortion: [0.0; 5] };
+const DARK: Surroundings = Surroundings { background: [0.0; 3], light: Vector3::new(0.0, 0.0, -1.0) };
 const BENT: Lens = Lens { distortion: [-0.08, 0.04, 6e-4, -4e-4, 0.0], ..LENS };
 
 fn splat(centre: [f32; 3], sigma: [f32; 3], turn: [f32; 3], opacity: f32) -> Splat {
@@ -24,7 +25,7 @@ fn picture(lens: &Lens, clouds: &[&SplatCloud], camera_from_body: Isometry3<f64>
     let bodies: Vec<Body<'_>> = (clouds.iter().enumerate())
         .map(|(number, cloud)| Body { shape: Shape::Splats(cloud), camera_from_body, instance: number as u32 + 1 })
         .collect();
-    render(&bodies, lens, SIZE, [0.0; 3])
+    render(&bodies, lens, SIZE, &DARK)
 }
 
 #[test]
@@ -79,7 +80,7 @@ fn a_mesh_hides_the_splats_behind_it_and_shows_through_those_before_it() {
             Body { shape: Shape::Mesh(mesh), camera_from_body: camera_from_mesh, instance: 7 },
             Body { shape: Shape::Splats(cloud), camera_from_body: Isometry3::identity(), instance: 8 },
         ];
-        render(&bodies, &LENS, SIZE, [0.0; 3])
+        render(&bodies, &LENS, SIZE, &DARK)
     };
     let none = SplatCloud::default();
     let (alone, hidden, veiled) = (with(&none), with(&behind), with(&front));
@@ -110,7 +111,7 @@ fn the_robots_silhouette_is_what_rays_hit() {
                 instance: *part as u32 + 1,
             })
             .collect();
-        let seen = render(&bodies, &lens, SIZE, [0.0; 3]);
+        let seen = render(&bodies, &lens, SIZE, &DARK);
         let triangles: Vec<[Point3<f64>; 3]> = (placed.iter())
             .flat_map(|(part, pose)| {
                 let mesh = &surface.parts()[*part];
@@ -118,7 +119,7 @@ fn the_robots_silhouette_is_what_rays_hit() {
             })
             .collect();
         let (mut both, mut either) = (0, 0);
-        let every = if lens == LENS { 3 } else { 7 };
+        let every = if lens == LENS { 1 } else { 3 };
         for (i, drawn) in seen.instance.iter().enumerate().step_by(every) {
             let ray = lens.ray([(i % SIZE[0]) as f64, (i / SIZE[0]) as f64]);
             let hit = triangles.iter().any(|t| faces_and_hits(t, &ray));

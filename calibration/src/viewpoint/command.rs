@@ -66,6 +66,9 @@ pub enum StartFrom {
 const REACH_OF_MASKS: Reach = Reach { angle: 0.36, distance: 0.32 };
 const REACH_OF_PHOTOS: Reach = Reach { angle: 0.25, distance: 0.15 };
 
+/// A principal point further from the middle than this share of the picture is one of another resolution or crop.
+const OFF_CENTRE: f64 = 0.12;
+
 /// A picture with everything that belongs to it.
 struct Taken {
     name: String,
@@ -174,13 +177,6 @@ fn camera(cell: &Cell, options: &Options, taken: &[Taken]) -> anyhow::Result<Cam
     if let Some([fx, fy, cx, cy]) = given {
         ensure!(fx > 0.0 && fy > 0.0, "focal lengths must be above 0, not {fx} and {fy}");
         size = first.moment.size.unwrap_or(first.pixels.size);
-        let inside = (0.0..size[0] as f64).contains(&cx) && (0.0..size[1] as f64).contains(&cy);
-        ensure!(
-            inside,
-            "the principal point {cx}, {cy} lies outside of {} x {} pixels: intrinsics of another resolution?",
-            size[0],
-            size[1]
-        );
         camera.intrinsics = Some(Intrinsics { fx, fy, cx, cy });
         if first.moment.pinhole.is_some() {
             camera.distortion = first.moment.distortion;
@@ -188,6 +184,16 @@ fn camera(cell: &Cell, options: &Options, taken: &[Taken]) -> anyhow::Result<Cam
     } else if cell.camera.is_none() {
         bail!("no intrinsics: give --cell with a `[camera]`, --intrinsics fx,fy,cx,cy, or a joint file with `K`");
     }
+    let pinhole = camera.pinhole();
+    let off = [(pinhole.cx, size[0]), (pinhole.cy, size[1])].map(|(at, size)| (at / size as f64 - 0.5).abs());
+    ensure!(
+        off.iter().all(|off| *off < OFF_CENTRE),
+        "the principal point {:.0}, {:.0} lies far from the middle of {} x {} pixels: intrinsics of another resolution?",
+        pinhole.cx,
+        pinhole.cy,
+        size[0],
+        size[1]
+    );
     for picture in taken {
         let [width, height] = picture.pixels.size;
         ensure!(

@@ -2,9 +2,8 @@
 //! are.
 
 use super::picture::Pixels;
-use anyhow::{Context as _, ensure};
-use shared_mem::recording::{ClipMessages, JointSeries, Payload, Picture, Session};
-use std::path::Path;
+use anyhow::ensure;
+use shared_mem::recording::{Session, for_color_pictures};
 
 /// A picture of a session.
 #[derive(Debug)]
@@ -37,11 +36,11 @@ pub fn shots(session: &Session, wanted: usize) -> anyhow::Result<Vec<Shot>> {
     for (number, entry) in session.clips.iter().enumerate() {
         let path = session.folder.join(&entry.file);
         let clip = session.read(entry)?;
-        for_pictures(&path, |stamp_ns, _| {
-            if let Some((q, speed)) = at(&clip.measured, stamp_ns.saturating_sub(latency_ns)) {
+        for_color_pictures(&path, |stamp_ns, _| {
+            if let Some((q, speed)) = clip.measured.at(stamp_ns.saturating_sub(latency_ns)) {
                 known.push(Known { clip: number, stamp_ns, q, speed });
             }
-            Ok(())
+            anyhow::Ok(())
         })?;
     }
     ensure!(
@@ -54,47 +53,15 @@ pub fn shots(session: &Session, wanted: usize) -> anyhow::Result<Vec<Shot>> {
         if !chosen.iter().any(|known| known.clip == number) {
             continue;
         }
-        for_pictures(&session.folder.join(&entry.file), |stamp_ns, picture| {
+        for_color_pictures(&session.folder.join(&entry.file), |stamp_ns, picture| {
             if let Some(known) = chosen.iter().find(|known| (known.clip, known.stamp_ns) == (number, stamp_ns)) {
                 let name = format!("{} at {:.3} s", entry.file.display(), stamp_ns as f64 * 1e-9);
                 out.push(Shot { name, pixels: Pixels::new(picture)?, q: known.q.clone() });
             }
-            Ok(())
+            anyhow::Ok(())
         })?;
     }
     Ok(out)
-}
-
-/// Calls `each` with every colour picture of a clip and its stamp [ns].
-fn for_pictures(path: &Path, mut each: impl FnMut(u64, &Picture) -> anyhow::Result<()>) -> anyhow::Result<()> {
-    if path.is_dir() {
-        return Ok(());
-    }
-    for message in ClipMessages::open(path, &[])? {
-        let message = message.with_context(|| format!("{} cannot be read to its end", path.display()))?;
-        if let Payload::Picture(picture) = &message.payload {
-            let stamp_ns = match picture {
-                Picture::Pixels { header, .. } if header.depth_scale == 0.0 => header.stamp_ns,
-                Picture::Compressed { stamp_ns, .. } if !message.topic.contains("depth") => *stamp_ns,
-                _ => continue,
-            };
-            each(stamp_ns, picture)?;
-        }
-    }
-    Ok(())
-}
-
-/// Joint positions and the fastest joint's speed at a time, between rows; `None` outside of the series.
-fn at(series: &JointSeries, time_ns: u64) -> Option<(Vec<f64>, f64)> {
-    let next = series.stamps_ns.partition_point(|stamp| *stamp < time_ns);
-    let before = next.checked_sub(1)?;
-    let (a, b) = (*series.stamps_ns.get(before)?, *series.stamps_ns.get(next)?);
-    let share = (time_ns - a) as f64 / (b - a).max(1) as f64;
-    let (from, to) = (series.q_row(before), series.q_row(next));
-    let q = from.iter().zip(to).map(|(from, to)| from + share * (to - from)).collect();
-    let seconds = (b - a).max(1) as f64 * 1e-9;
-    let speed = from.iter().zip(to).map(|(from, to)| (to - from).abs() / seconds).fold(0.0, f64::max);
-    Some((q, speed))
 }
 
 /// Those at rest, where there are any; of these one after the other the one that differs most from all chosen before.
@@ -131,13 +98,5 @@ mod tests {
         let chosen: Vec<u64> = choose(all, 4).iter().map(|known| known.stamp_ns).collect();
         assert_eq!(chosen.len(), 3, "{chosen:?}");
         assert!(chosen.contains(&4) && chosen.contains(&5) && !chosen.contains(&3), "{chosen:?}");
-    }
-
-    #[test]
-    fn joints_between_rows_are_interpolated() {
-        let series = JointSeries { stamps_ns: vec![0, 10], dof: 1, q: vec![1.0, 2.0], dq: Vec::new(), tau: Vec::new() };
-        let (q, speed) = at(&series, 5).expect("inside");
-        assert_eq!((q, speed), (vec![1.5], 1e8));
-        assert!(at(&series, 11).is_none());
     }
 }

@@ -141,12 +141,13 @@ fn what_cannot_be_fitted_is_refused_in_one_line() {
         path
     };
     let (black, wide) = (file("black.png", 0, 320), file("wide.png", 9, 640));
-    let refused: [(Options, &str); 6] = [
+    let refused: [(Options, &str); 7] = [
         (Options { targets: vec![black.clone()], ..options.clone() }, "shows nothing"),
         (Options { targets: vec![wide], ..options.clone() }, "intrinsics are for 320 x 240"),
         (Options { masks: vec![black], ..options.clone() }, "nothing to fit"),
         (Options { joints: vec!["0,0".into()], ..options.clone() }, "7 joints"),
         (Options { joints: Vec::new(), ..options.clone() }, "one for each"),
+        (Options { intrinsics: Some([600.0, 600.0, 320.0, 240.0]), ..options.clone() }, "another resolution"),
         (Options { method: Method::Swarm(100), ..options }, "silhouettes"),
     ];
     for (options, told) in refused {

@@ -9,7 +9,7 @@
 //! | `container` | MCAP records and messages of a file that may be cut or changed |
 //! | `cdr`, `ros2` | ROS 2 messages |
 //! | `own` | an own recording as a clip |
-//! | `messages`, `picture`, `picture_file` | all messages one by one, pictures, pictures as files |
+//! | `messages`, `picture`, `picture_file`, `colour` | all messages one by one, pictures, pictures as files, a clip's colour pictures |
 //! | `bag` | a ROS 2 bag as a clip |
 //! | `twinaligner`, `npy` | a TwinAligner folder as a clip |
 //! | `joint_log` | joint rows: one publisher, one joint order |
@@ -23,6 +23,7 @@ mod bag;
 mod cdr;
 mod checks;
 mod clip;
+mod colour;
 mod container;
 mod device_clock;
 mod error;
@@ -43,6 +44,7 @@ mod wire;
 mod writer;
 
 pub use clip::{Clip, read_clip};
+pub use colour::for_color_pictures;
 pub use error::ReadError;
 pub use export::{ExportError, Exported, FlangeAt, Format, export_session};
 pub use messages::{ClipMessage, ClipMessages, Payload};

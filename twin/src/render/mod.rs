@@ -8,6 +8,7 @@ mod glb;
 mod mesh;
 mod raster;
 mod robot;
+pub mod session;
 pub mod splat;
 
 pub use mesh::Mesh;

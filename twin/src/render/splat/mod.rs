@@ -20,4 +20,4 @@ mod reference;
 pub use cloud::{Splat, SplatCloud, SplatError};
 pub use lens::Lens;
 pub use project::{Projected, project};
-pub use reference::{Body, Picture, Shape, render};
+pub use reference::{Body, Picture, Shape, Surroundings, render};

@@ -30,6 +30,15 @@ pub struct Body<'a> {
     pub instance: u32,
 }
 
+/// What is around the bodies.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Surroundings {
+    /// What lies behind all: red, green, blue, 0 to 1.
+    pub background: [f64; 3],
+    /// Towards the light that meshes are shaded by, camera frame; splats carry their own.
+    pub light: Vector3<f64>,
+}
+
 /// What the camera sees, row by row.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Picture {
@@ -57,9 +66,9 @@ struct Drawn {
     instance: u32,
 }
 
-/// Draws bodies before a background of one colour (red, green, blue, 0 to 1).
+/// Draws bodies.
 #[must_use]
-pub fn render(bodies: &[Body<'_>], lens: &Lens, size: [usize; 2], background: [f64; 3]) -> Picture {
+pub fn render(bodies: &[Body<'_>], lens: &Lens, size: [usize; 2], around: &Surroundings) -> Picture {
     let mut drawn: Vec<Drawn> = Vec::new();
     for body in bodies {
         if let Shape::Splats(cloud) = body.shape {
@@ -81,11 +90,11 @@ pub fn render(bodies: &[Body<'_>], lens: &Lens, size: [usize; 2], background: [f
             range(0).for_each(|x| lists[y * tiles[0] + x].push(number as u32));
         }
     }
-    let solid = Solid::draw(bodies, lens, size);
+    let solid = Solid::draw(bodies, lens, size, &around.light);
     let pixel = |i: usize| {
         let (x, y) = (i % size[0], i / size[0]);
         let list = &lists[y / TILE * tiles[0] + x / TILE];
-        blend(list.iter().map(|n| &drawn[*n as usize]), [x as f64, y as f64], solid.at(i), background)
+        blend(list.iter().map(|n| &drawn[*n as usize]), [x as f64, y as f64], solid.at(i), around.background)
     };
     let pixels: Vec<Pixel> = (0..size[0] * size[1]).into_par_iter().map(pixel).collect();
     Picture {
@@ -157,7 +166,7 @@ struct Solid {
 }
 
 impl Solid {
-    fn draw(bodies: &[Body<'_>], lens: &Lens, size: [usize; 2]) -> Self {
+    fn draw(bodies: &[Body<'_>], lens: &Lens, size: [usize; 2], light: &Vector3<f64>) -> Self {
         let meshes: Vec<(&Mesh, &Body<'_>)> = (bodies.iter())
             .filter_map(|body| if let Shape::Mesh(mesh) = body.shape { Some((mesh, body)) } else { None })
             .collect();
@@ -169,7 +178,7 @@ impl Solid {
         let [width, height] = [0, 1].map(|i| size[i] + 2 * margin[i]);
         let [cx, cy] = [0, 1].map(|i| (lens.centre[i] + margin[i] as f64) as f32);
         let pinhole = Pinhole { fx: lens.focal[0] as f32, fy: lens.focal[1] as f32, cx, cy };
-        let mut raster = Raster::new(width, height, pinhole, -Vector3::z());
+        let mut raster = Raster::new(width, height, pinhole, light.cast::<f32>());
         raster.clear([0; 3]);
         let mut owners = vec![0; width * height];
         let mut before = vec![0.0f32; width * height];

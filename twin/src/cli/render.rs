@@ -1,0 +1,118 @@
+//! `twin render`: real, twin and difference side by side, as PNG files and, where ffmpeg is there, as a film.
+
+use anyhow::{Context as _, bail, ensure};
+use shared_mem::recording::{Session, for_color_pictures, write_png};
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use twin::render::session::{TwinView, ViewError, beside, pixels_of};
+
+/// Draws the twin beside every recorded picture: what the camera saw, what the twin shows, where they differ.
+#[derive(clap::Args)]
+#[command(after_help = "\
+The robot is drawn at the joints measured when the picture was taken, from its meshes or from splats of its links; the object
+where it was seen.
+
+Examples:
+  twin render session --out frames
+  twin render session/clip_00.mcap --every 10 --splats fr3_splats --film --out frames")]
+pub(crate) struct Render {
+    /// Session folder (with cell.toml), or one clip.
+    #[arg(value_name = "SESSION|CLIP")]
+    path: PathBuf,
+    /// What the laboratory knows about its cell [default: cell.toml beside the clips].
+    #[arg(long, value_name = "CELL.TOML")]
+    cell: Option<PathBuf>,
+    /// Folder for the frames.
+    #[arg(long, value_name = "FOLDER")]
+    out: PathBuf,
+    /// Draws every so many pictures only.
+    #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
+    every: u32,
+    /// Folder with a splat file for each link (`…link0….ply` to `…link7….ply`, `…hand….ply`), in the links' frames.
+    #[arg(long, value_name = "FOLDER")]
+    splats: Option<PathBuf>,
+    /// Joint positions [rad], with commas between them, at which the arm was scanned: then all splats are in its base frame.
+    #[arg(long, value_name = "Q", requires = "splats", allow_hyphen_values = true, value_delimiter = ',')]
+    scanned_at: Option<Vec<f64>>,
+    /// Also joins the frames to `film.mp4`, if ffmpeg is installed.
+    #[arg(long)]
+    film: bool,
+    /// Prints one JSON object on stdout at the end.
+    #[arg(long)]
+    json: bool,
+}
+
+impl Render {
+    pub(crate) fn run(&self) -> anyhow::Result<()> {
+        let session = Session::open_with(&self.path, self.cell.as_deref())?;
+        let view = TwinView::new(&session.cell, self.splats.as_deref(), self.scanned_at.as_deref())?;
+        std::fs::create_dir_all(&self.out)
+            .with_context(|| format!("{}; give --out a place that can be written", self.out.display()))?;
+        let camera = session.cell.camera.as_ref().context("cell.toml has no `[camera]`")?;
+        let latency_ns = (camera.latency * 1e9) as u64;
+        let (mut frames, mut skipped, mut number) = (0u32, 0u32, 0u32);
+        let mut apart = 0.0;
+        for entry in &session.clips {
+            let clip = session.read(entry)?;
+            for_color_pictures(&session.folder.join(&entry.file), |stamp_ns, picture| {
+                number += 1;
+                if (number - 1) % self.every != 0 {
+                    return anyhow::Ok(());
+                }
+                let Some((q, _)) = clip.measured.at(stamp_ns.saturating_sub(latency_ns)) else {
+                    skipped += 1;
+                    return Ok(());
+                };
+                let (of_pictures, real) = pixels_of(picture).map_err(anyhow::Error::msg)?;
+                ensure!(of_pictures == view.size(), ViewError::Size { of_pictures, of_camera: view.size() });
+                let at = clip.object.stamps_ns.partition_point(|stamp| *stamp < stamp_ns);
+                let object = clip.object.poses.get(at.min(clip.object.len().saturating_sub(1))).copied();
+                let twin = view.draw(&q, object);
+                let sum: u64 = real.iter().zip(&twin).map(|(a, b)| u64::from(a.abs_diff(*b))).sum();
+                apart += sum as f64 / (255.0 * real.len() as f64);
+                let (width, height, rgb) = beside(of_pictures, &real, &twin);
+                write_png(&self.out.join(format!("frame_{frames:05}.png")), width, height, &rgb)?;
+                frames += 1;
+                Ok(())
+            })?;
+        }
+        if frames == 0 {
+            bail!("no clip holds colour pictures with joints at their time; record with `rt_bridge run --camera`");
+        }
+        let difference = apart / f64::from(frames);
+        let film = if self.film { film(&self.out, camera.rate / f64::from(self.every))? } else { None };
+        eprintln!(
+            "{frames} frames in {}{}; mean difference {:.1} %",
+            self.out.display(),
+            if skipped > 0 { format!(" ({skipped} pictures without joints left out)") } else { String::new() },
+            difference * 100.0
+        );
+        if self.film && film.is_none() {
+            eprintln!("note: ffmpeg is not installed, so there is no film");
+        }
+        if self.json {
+            let answer = serde_json::json!({
+                "frames": frames, "without_joints": skipped, "difference": difference, "film": film,
+            });
+            writeln!(std::io::stdout().lock(), "{answer}")?;
+        }
+        Ok(())
+    }
+}
+
+/// The frames as a film; `None` where there is no ffmpeg.
+fn film(folder: &Path, rate: f64) -> anyhow::Result<Option<PathBuf>> {
+    let out = folder.join("film.mp4");
+    let rate = rate.to_string();
+    let mut command = Command::new("ffmpeg");
+    command.args(["-y", "-loglevel", "error", "-framerate", &rate, "-i"]).arg(folder.join("frame_%05d.png"));
+    // The usual encoding needs an even number of rows and columns.
+    command.args(["-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2", "-pix_fmt", "yuv420p"]).arg(&out);
+    match command.stdin(Stdio::null()).status() {
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(None),
+        Err(error) => Err(error).context("ffmpeg cannot be started"),
+        Ok(status) if status.success() => Ok(Some(out)),
+        Ok(status) => bail!("ffmpeg failed ({status}); the frames are there"),
+    }
+}
