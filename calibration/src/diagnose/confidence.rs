@@ -8,6 +8,8 @@ const NEAR: f64 = 4.0;
 const CHANCE: f64 = 1.5;
 /// A rival closes at least this share of the gap that the chosen one closes.
 const ALIKE: f64 = 0.5;
+/// ... and one that has more numbers for it this much more of the gap: what own numbers of clips hide from the likelihood.
+const MORE: f64 = 0.04;
 /// What is kept for causes outside the library even where everything fits; from the simulated sessions on which this was
 /// measured: of named findings this share was wrong.
 const NONE_OF_THESE: f64 = 0.04;
@@ -27,8 +29,8 @@ pub fn probabilities(step: &Step, none: bool) -> Vec<(usize, f64)> {
     fitted.iter().map(|(candidate, worth)| (*candidate, (1.0 - NONE_OF_THESE) * weight(*worth) / total)).collect()
 }
 
-/// Candidates of a step that explain it as well as the chosen one and cost no more: whose gains, clip by clip, are not less
-/// beyond chance, and that close as much of the gap.
+/// Candidates of a step that explain it as well as the chosen one: whose gains, clip by clip, are not less beyond chance, and
+/// that close as much of the gap; with more numbers than the chosen one, markedly more of it.
 #[must_use]
 pub fn rivals(step: &Step, chosen: usize) -> Vec<usize> {
     let of = |candidate: usize| {
@@ -40,7 +42,9 @@ pub fn rivals(step: &Step, chosen: usize) -> Vec<usize> {
         let Some((other, trial)) = of(*candidate).filter(|_| *candidate != chosen) else { return false };
         let (beyond, error) = best.beyond(other);
         let alike = beyond < NEAR.max(CHANCE * error) && other.nats > other.error;
-        alike && trial.scored.cost <= chosen_trial.scored.cost && trial.closes > ALIKE * chosen_trial.closes
+        let dearer = trial.scored.cost > chosen_trial.scored.cost;
+        let enough = if dearer { chosen_trial.closes + MORE } else { ALIKE * chosen_trial.closes };
+        alike && trial.closes > enough
     };
     step.trials.iter().map(|trial| trial.scored.candidate).filter(near).collect()
 }

@@ -29,7 +29,12 @@ pub(super) struct Finding<'a> {
 }
 
 impl<'a> Finding<'a> {
-    pub(super) fn new(settings: &'a Settings, unknowns: &'a [Unknown], found: &'a ObjectFit) -> Self {
+    /// `disagreement`: half widths that intervals have at least.
+    pub(super) fn new(
+        (settings, unknowns): (&'a Settings, &'a [Unknown]),
+        found: &'a ObjectFit,
+        disagreement: &[f64],
+    ) -> Self {
         let mut fit = Fit {
             shared: found.at.shared.clone(),
             clips: found.at.clips.clone(),
@@ -46,6 +51,7 @@ impl<'a> Finding<'a> {
         without_leaning(&mut fit, &held);
         let mut intervals = Intervals::new(&fit, &held);
         intervals.half_width.iter_mut().zip(&found.widths).for_each(|(half, width)| *half *= width);
+        intervals.half_width.iter_mut().zip(disagreement).for_each(|(half, least)| *half = half.max(*least));
         Self { settings, unknowns, found, fit, held, intervals }
     }
 

@@ -11,6 +11,7 @@
 //! | `fit` | the likelihood fit |
 //! | `step` | one step of it |
 //! | `paper` | the loss on the object's surface, for searches without slopes |
+//! | `parts` | how sure tosses leave the numbers |
 //! | `polish` | the last stretch to that loss |
 //! | `finding` | what a fit tells, number by number, and what it cannot tell |
 //! | `doubt` | what speaks against trusting the fit |
@@ -26,6 +27,7 @@ mod material;
 mod mend;
 mod odd;
 mod paper;
+mod parts;
 mod polish;
 pub(crate) mod screen;
 mod step;
@@ -45,6 +47,7 @@ use finding::Finding;
 use fit::{ObjectFit, fit_object, linearise_object};
 use material::Material;
 use paper::SurfaceLoss;
+use parts::disagreement;
 use polish::{Searched, fit_polished};
 use shared_mem::cell::{Cell, ClipKind};
 use shared_mem::recording::{Clip, ReadError};
@@ -135,7 +138,9 @@ pub fn identify(options: &Options, interrupt: &Interrupt) -> Result<Identificati
     let problem = Problem::new(&material, options, interrupt)?;
     let mut clips = ObjectClips::new(&material.cell, material.train(), problem.settings.clone())?;
     let found = problem.search(&mut clips, options, interrupt)?;
-    let finding = Finding::new(&problem.settings, &problem.unknowns, &found);
+    let searched = (&problem.settings, &problem.unknowns[..]);
+    let disagreement = disagreement(&found.at.shared, &clips, searched, interrupt)?;
+    let finding = Finding::new(searched, &found, &disagreement);
     let theta = problem.settings.theta(&found.at.shared);
     let mut answer = finding.answer(&material);
     answer.session = options.session.display().to_string();

@@ -45,8 +45,7 @@ pub(super) fn fit_polished(
     watch: impl Fn(&[f64], usize) -> bool,
 ) -> Result<ObjectFit, Impossible> {
     let found = fit_object(clips, searched.unknowns, start, &watch)?;
-    let let_go = (0..clips.clips()).any(|clip| clips.clip(clip).kind == ClipKind::FreeMotion);
-    if let_go || !watch(&found.at.shared, found.evaluations) {
+    if let_go(clips) || !watch(&found.at.shared, found.evaluations) {
         return Ok(found);
     }
     let (numbers, more) = {
@@ -55,6 +54,11 @@ pub(super) fn fit_polished(
     };
     let (at, widths) = linearise_object(clips, searched.unknowns, &numbers)?;
     Ok(ObjectFit { at, widths, evaluations: found.evaluations + more, ..found })
+}
+
+/// Whether some of the clips are tosses: nothing pushes the object in them.
+pub(super) fn let_go(clips: &ObjectClips) -> bool {
+    (0..clips.clips()).any(|clip| clips.clip(clip).kind == ClipKind::FreeMotion)
 }
 
 /// Numbers of little loss near those of `from`, clips counting as they did there, and the clips simulated for it.

@@ -1,0 +1,67 @@
+//! How sure tosses leave the numbers, by asking parts of them alone.
+//!
+//! A body that tumbles answers so unevenly that slopes at one point say nothing of how far an answer may be off. Four
+//! parts of the tosses, each fitted by itself, do: their spread is that of the answer, whatever the reason.
+
+use super::ObjectError;
+use super::fit::fit_object;
+use super::polish::let_go;
+use crate::estimate::{ClipModel as _, Unknown};
+use crate::forward::Settings;
+use crate::forward::object::ObjectClips;
+use crate::interrupt::Interrupt;
+use shared_mem::recording::Clip;
+
+/// Parts, and Student's t for 95 % with one freedom less (two-sided).
+const PARTS: usize = 4;
+const STUDENT: f64 = 3.182;
+/// Fewer clips make no part.
+const LEAST: usize = 4;
+
+/// Half of the 95 % interval of every number by what parts of the clips disagree; 0 where the clips are no tosses or too
+/// few, or the user asked for the end.
+///
+/// # Errors
+/// [`ObjectError`] when a part cannot be simulated.
+pub(super) fn disagreement(
+    at: &[f64],
+    clips: &ObjectClips,
+    (settings, unknowns): (&Settings, &[Unknown]),
+    interrupt: &Interrupt,
+) -> Result<Vec<f64>, ObjectError> {
+    if !let_go(clips) || clips.clips() < PARTS * LEAST {
+        return Ok(vec![0.0; at.len()]);
+    }
+    let mut answers = Vec::new();
+    for part in 0..PARTS {
+        if interrupt.asked() {
+            return Ok(vec![0.0; at.len()]);
+        }
+        let of_part = |clip: &usize| clip % PARTS == part;
+        let own: Vec<Clip> = (0..clips.clips()).filter(of_part).map(|clip| clips.clip(clip).clone()).collect();
+        let mut own = ObjectClips::new(clips.cell(), own, settings.clone())?;
+        answers.push(fit_object(&mut own, unknowns, at, |_, _| !interrupt.asked())?.at.shared);
+    }
+    Ok((0..at.len()).map(|k| half_width(&answers.iter().map(|answer| answer[k]).collect::<Vec<_>>())).collect())
+}
+
+/// Half of the 95 % interval of the mean of parts.
+fn half_width(parts: &[f64]) -> f64 {
+    let count = parts.len() as f64;
+    let mean = parts.iter().sum::<f64>() / count;
+    let variance = parts.iter().map(|part| (part - mean).powi(2)).sum::<f64>() / (count - 1.0);
+    STUDENT * (variance / count).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn parts_that_agree_leave_no_doubt_and_others_as_much_as_student_says() {
+        assert_eq!(half_width(&[0.18; 4]), 0.0);
+        // Mean 0.2, deviation 0.02 * sqrt(4 / 3).
+        let half = half_width(&[0.18, 0.22, 0.18, 0.22]);
+        assert!((half - 3.182 * 0.02 * (4.0_f64 / 3.0).sqrt() / 2.0).abs() < 1e-12, "{half}");
+    }
+}
