@@ -14,7 +14,6 @@ use crate::forward::{Setting, Settings};
 use crate::identify::answer::Figures;
 use crate::identify::run::{Optimizer, Run};
 use crate::interrupt::Interrupt;
-use rayon::prelude::*;
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -119,10 +118,11 @@ fn squares(
     };
     let seconds = began.elapsed().as_secs_f64();
     let loss = SurfaceLoss::new(&clips, &shape);
+    let equal = vec![1.0; loss.clips()];
     let way = steps.into_inner().expect("no holder panics");
-    let way = way.into_iter().map(|(numbers, n, at)| Ok((n, at, mean_loss(&loss, &numbers)?)));
+    let way = way.into_iter().map(|(numbers, n, at)| Ok((n, at, loss.mean(&numbers, &equal)?)));
     let way = way.collect::<Result<Vec<_>, ObjectError>>()?;
-    let last = mean_loss(&loss, &found.at.shared)?;
+    let last = loss.mean(&found.at.shared, &equal)?;
     finished(name, problem, material, &found.at.shared, (found.evaluations, seconds, last, way))
 }
 
@@ -153,7 +153,13 @@ fn slopeless(
     let all = outcome.simulated.max(1) as f64;
     let way = outcome.convergence.iter().map(|[n, loss]| (*n as usize, seconds * n / all, *loss)).collect();
     let numbers = &outcome.fit.shared;
-    finished(name, problem, material, numbers, (outcome.simulated, seconds, mean_loss(&loss, numbers)?, way))
+    finished(
+        name,
+        problem,
+        material,
+        numbers,
+        (outcome.simulated, seconds, loss.mean(numbers, &vec![1.0; loss.clips()])?, way),
+    )
 }
 
 /// Clips simulated, wall time, last loss, and the way there.
@@ -186,18 +192,6 @@ fn finished(
         clips: material.split.holdout.iter().map(clip).collect(),
         way,
     })
-}
-
-/// Mean over all poses of the clips [m].
-fn mean_loss(loss: &SurfaceLoss<'_>, numbers: &[f64]) -> Result<f64, ObjectError> {
-    let one = |clip: usize| {
-        let mut out = Vec::new();
-        loss.residuals(clip, numbers, &[], &mut out)?;
-        Ok((out.iter().map(|r| r * r).sum::<f64>(), out.len()))
-    };
-    let all: Vec<(f64, usize)> = (0..loss.clips()).into_par_iter().map(one).collect::<Result<_, ObjectError>>()?;
-    let (sum, rows) = all.iter().fold((0.0, 0), |(sum, rows), one| (sum + one.0, rows + one.1));
-    Ok(sum / rows.max(1) as f64)
 }
 
 /// Width of a column that holds the name of a way of searching.

@@ -140,12 +140,17 @@ pub fn identify(options: &Options, interrupt: &Interrupt) -> Result<Identificati
     let found = problem.search(&mut clips, options, interrupt)?;
     let searched = (&problem.settings, &problem.unknowns[..]);
     let disagreement = disagreement(&found.at.shared, &clips, searched, interrupt)?;
-    let finding = Finding::new(searched, &found, &disagreement);
+    let finding = Finding::new(searched, &found, disagreement.as_deref().unwrap_or_default());
     let theta = problem.settings.theta(&found.at.shared);
     let mut answer = finding.answer(&material);
     answer.session = options.session.display().to_string();
     answer.optimizer = options.optimizer.name().into();
     answer.warnings.extend(problem.warnings.iter().cloned());
+    if disagreement.is_none() {
+        answer
+            .warnings
+            .push("ended before parts of the tosses were asked: the intervals are too narrow; run it again".into());
+    }
     figures::fill(&mut answer, &material, [problem.settings.base(), &theta])?;
     let doubts = doubt::doubts(&answer, &material.cell);
     answer.warnings.extend(doubts);

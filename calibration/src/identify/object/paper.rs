@@ -22,6 +22,20 @@ impl<'a> SurfaceLoss<'a> {
         Self { clips, points: SurfacePoints::new(shape) }
     }
 
+    /// Mean over all poses of the clips [m], each clip as much as it counts.
+    ///
+    /// # Errors
+    /// [`Impossible`] where the twin has no answer.
+    pub(super) fn mean(&self, numbers: &[f64], weights: &[f64]) -> Result<f64, Impossible> {
+        let (mut sum, mut rows, mut out) = (0.0, 0.0, Vec::new());
+        for (clip, weight) in weights.iter().enumerate() {
+            self.residuals(clip, numbers, &[], &mut out)?;
+            sum += weight * out.iter().map(|r| r * r).sum::<f64>();
+            rows += weight * out.len() as f64;
+        }
+        Ok(sum / rows.max(f64::MIN_POSITIVE))
+    }
+
     fn loss(&self, a: &Pose<Base, Object>, b: &Pose<Base, Object>) -> f64 {
         self.points.add(a, b) + self.points.add_s(a, b)
     }

@@ -6,20 +6,21 @@
 use super::ObjectError;
 use super::fit::fit_object;
 use super::polish::let_go;
+use crate::estimate::interval::student_95;
 use crate::estimate::{ClipModel as _, Unknown};
 use crate::forward::Settings;
 use crate::forward::object::ObjectClips;
 use crate::interrupt::Interrupt;
+use crate::progress::Progress;
 use shared_mem::recording::Clip;
 
-/// Parts, and Student's t for 95 % with one freedom less (two-sided).
+/// Parts.
 const PARTS: usize = 4;
-const STUDENT: f64 = 3.182;
 /// Fewer clips make no part.
 const LEAST: usize = 4;
 
 /// Half of the 95 % interval of every number by what parts of the clips disagree; 0 where the clips are no tosses or too
-/// few, or the user asked for the end.
+/// few. `None`: the user asked for the end.
 ///
 /// # Errors
 /// [`ObjectError`] when a part cannot be simulated.
@@ -28,21 +29,23 @@ pub(super) fn disagreement(
     clips: &ObjectClips,
     (settings, unknowns): (&Settings, &[Unknown]),
     interrupt: &Interrupt,
-) -> Result<Vec<f64>, ObjectError> {
+) -> Result<Option<Vec<f64>>, ObjectError> {
     if !let_go(clips) || clips.clips() < PARTS * LEAST {
-        return Ok(vec![0.0; at.len()]);
+        return Ok(Some(vec![0.0; at.len()]));
     }
-    let mut answers = Vec::new();
+    let (bar, mut answers) = (Progress::new("intervals", PARTS as u64), Vec::new());
     for part in 0..PARTS {
-        if interrupt.asked() {
-            return Ok(vec![0.0; at.len()]);
-        }
+        bar.show(part as u64, "a part of the tosses by itself");
         let of_part = |clip: &usize| clip % PARTS == part;
         let own: Vec<Clip> = (0..clips.clips()).filter(of_part).map(|clip| clips.clip(clip).clone()).collect();
         let mut own = ObjectClips::new(clips.cell(), own, settings.clone())?;
         answers.push(fit_object(&mut own, unknowns, at, |_, _| !interrupt.asked())?.at.shared);
+        if interrupt.asked() {
+            return Ok(None);
+        }
     }
-    Ok((0..at.len()).map(|k| half_width(&answers.iter().map(|answer| answer[k]).collect::<Vec<_>>())).collect())
+    let half = (0..at.len()).map(|k| half_width(&answers.iter().map(|answer| answer[k]).collect::<Vec<_>>()));
+    Ok(Some(half.collect()))
 }
 
 /// Half of the 95 % interval of the mean of parts.
@@ -50,7 +53,7 @@ fn half_width(parts: &[f64]) -> f64 {
     let count = parts.len() as f64;
     let mean = parts.iter().sum::<f64>() / count;
     let variance = parts.iter().map(|part| (part - mean).powi(2)).sum::<f64>() / (count - 1.0);
-    STUDENT * (variance / count).sqrt()
+    student_95(parts.len() - 1) * (variance / count).sqrt()
 }
 
 #[cfg(test)]
@@ -62,6 +65,6 @@ mod tests {
         assert_eq!(half_width(&[0.18; 4]), 0.0);
         // Mean 0.2, deviation 0.02 * sqrt(4 / 3).
         let half = half_width(&[0.18, 0.22, 0.18, 0.22]);
-        assert!((half - 3.182 * 0.02 * (4.0_f64 / 3.0).sqrt() / 2.0).abs() < 1e-12, "{half}");
+        assert!((half - student_95(3) * 0.02 * (4.0_f64 / 3.0).sqrt() / 2.0).abs() < 1e-12, "{half}");
     }
 }

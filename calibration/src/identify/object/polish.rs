@@ -83,7 +83,7 @@ fn polish(
     let mut cloud = Evolution::of_width(&search::start(&axes), 0.5 * WIDTH / REACH, seed);
     let seen = Mutex::new(Vec::new());
     let cost = |z: &[f64]| {
-        let cost = mean_loss(loss, &place(z), &from.at.weights).unwrap_or(f64::INFINITY);
+        let cost = loss.mean(&place(z), &from.at.weights).unwrap_or(f64::INFINITY);
         seen.lock().expect("no holder panics").push((cost, z.to_vec()));
         cost
     };
@@ -103,17 +103,6 @@ fn middle_of_best(seen: &mut [(f64, Vec<f64>)]) -> Vec<f64> {
     let best = &seen[..seen.len().min(BEST)];
     let mean = |k: usize| best.iter().map(|(_, z)| z[k]).sum::<f64>() / best.len() as f64;
     (0..best.first().map_or(0, |(_, z)| z.len())).map(mean).collect()
-}
-
-/// Mean over all poses of the clips [m], each clip as much as it counts; `None` where the twin has no answer.
-fn mean_loss(loss: &SurfaceLoss<'_>, numbers: &[f64], weights: &[f64]) -> Option<f64> {
-    let (mut sum, mut rows, mut out) = (0.0, 0.0, Vec::new());
-    for (clip, weight) in weights.iter().enumerate() {
-        loss.residuals(clip, numbers, &[], &mut out).ok()?;
-        sum += weight * out.iter().map(|r| r * r).sum::<f64>();
-        rows += weight * out.len() as f64;
-    }
-    Some(sum / rows.max(f64::MIN_POSITIVE))
 }
 
 /// A square root of the free numbers' covariance, (free, free), each in its own unit.
