@@ -5,17 +5,20 @@ use shared_mem::recording::{Session, for_color_pictures, write_png};
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
+use twin::render::Drawer;
 use twin::render::session::{TwinView, ViewError, beside, pixels_of};
 
 /// Draws the twin beside every recorded picture: what the camera saw, what the twin shows, where they differ.
 #[derive(clap::Args)]
 #[command(after_help = "\
 The robot is drawn at the joints measured when the picture was taken, from its meshes or from splats of its links; the object
-where it was seen.
+where it was seen. A graphics card draws where the program was built with `--features render` and finds one by Vulkan, else the
+processor; both draw the same picture.
 
 Examples:
   twin render session --out frames
-  twin render session/clip_00.mcap --every 10 --splats fr3_splats --film --out frames")]
+  twin render session/clip_00.mcap --every 10 --splats fr3_splats --film --out frames
+  twin render session --device gpu --out frames")]
 pub(crate) struct Render {
     /// Session folder (with cell.toml), or one clip.
     #[arg(value_name = "SESSION|CLIP")]
@@ -35,6 +38,9 @@ pub(crate) struct Render {
     /// Joint positions [rad], with commas between them, at which the arm was scanned: then all splats are in its base frame.
     #[arg(long, value_name = "Q", requires = "splats", allow_hyphen_values = true, value_delimiter = ',')]
     scanned_at: Option<Vec<f64>>,
+    /// Who draws.
+    #[arg(long, value_enum, default_value_t = Device::Auto)]
+    device: Device,
     /// Also joins the frames to `film.mp4`, if ffmpeg is installed.
     #[arg(long)]
     film: bool,
@@ -43,10 +49,35 @@ pub(crate) struct Render {
     json: bool,
 }
 
+/// Who draws, as it is asked for.
+#[derive(Debug, Clone, Copy, clap::ValueEnum)]
+enum Device {
+    /// A graphics card that holds the models, else the processor.
+    Auto,
+    /// The processor, in double precision.
+    Cpu,
+    /// A Vulkan device, even one in software; an error where there is none.
+    Gpu,
+}
+
+impl From<Device> for Drawer {
+    fn from(device: Device) -> Self {
+        match device {
+            Device::Auto => Self::Auto,
+            Device::Cpu => Self::Processor,
+            Device::Gpu => Self::Device,
+        }
+    }
+}
+
 impl Render {
     pub(crate) fn run(&self) -> anyhow::Result<()> {
         let session = Session::open_with(&self.path, self.cell.as_deref())?;
-        let view = TwinView::new(&session.cell, self.splats.as_deref(), self.scanned_at.as_deref())?;
+        let (splats, scanned_at) = (self.splats.as_deref(), self.scanned_at.as_deref());
+        let mut view = TwinView::new(&session.cell, splats, scanned_at, self.device.into())?;
+        if let Some(note) = view.painter().note() {
+            eprintln!("note: the processor draws: {note}");
+        }
         std::fs::create_dir_all(&self.out)
             .with_context(|| format!("{}; give --out a place that can be written", self.out.display()))?;
         let camera = session.cell.camera.as_ref().context("cell.toml has no `[camera]`")?;
@@ -68,7 +99,7 @@ impl Render {
                 ensure!(of_pictures == view.size(), ViewError::Size { of_pictures, of_camera: view.size() });
                 let at = clip.object.stamps_ns.partition_point(|stamp| *stamp < stamp_ns);
                 let object = clip.object.poses.get(at.min(clip.object.len().saturating_sub(1))).copied();
-                let twin = view.draw(&q, object);
+                let twin = view.draw(&q, object)?;
                 let sum: u64 = real.iter().zip(&twin).map(|(a, b)| u64::from(a.abs_diff(*b))).sum();
                 apart += sum as f64 / (255.0 * real.len() as f64);
                 let (width, height, rgb) = beside(of_pictures, &real, &twin);
@@ -83,8 +114,9 @@ impl Render {
         let difference = apart / f64::from(frames);
         let film = if self.film { film(&self.out, camera.rate / f64::from(self.every))? } else { None };
         eprintln!(
-            "{frames} frames in {}{}; mean difference {:.1} %",
+            "{frames} frames in {}, drawn by {}{}; mean difference {:.1} %",
             self.out.display(),
+            view.painter().name(),
             if skipped > 0 { format!(" ({skipped} pictures without joints left out)") } else { String::new() },
             difference * 100.0
         );
@@ -94,6 +126,7 @@ impl Render {
         if self.json {
             let answer = serde_json::json!({
                 "frames": frames, "without_joints": skipped, "difference": difference, "film": film,
+                "drawn_by": view.painter().name(),
             });
             writeln!(std::io::stdout().lock(), "{answer}")?;
         }

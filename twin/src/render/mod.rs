@@ -1,16 +1,21 @@
 //! Pictures of the cell: a CPU rasteriser of flat-shaded triangles, colour and depth in one pass, fast enough for the
-//! simulated camera on one core; and beside it [`splat`], Gaussian splats and meshes in one picture.
+//! simulated camera on one core; and beside it [`splat`], Gaussian splats and meshes in one picture, which with the
+//! feature `render` a Vulkan device draws as well. A [`Painter`] is the one or the other.
 //!
 //! Camera frame: z forward, x right, y down, metres; pixel centres lie at whole numbers. `f32` throughout: at 2 m a
 //! depth is good to a micrometre. Called by [`crate::sensors::camera`].
 
+#[cfg(feature = "render")]
+pub mod device;
 mod glb;
 mod mesh;
+mod painter;
 mod raster;
 mod robot;
 pub mod session;
 pub mod splat;
 
 pub use mesh::Mesh;
+pub use painter::{Drawer, Model, PaintError, Painter};
 pub use raster::{Pinhole, Raster};
 pub use robot::{Hand, RobotSurface};

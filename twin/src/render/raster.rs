@@ -4,6 +4,7 @@
 
 use super::Mesh;
 use nalgebra::{Isometry3, Point3, Vector3};
+use std::ops::Range;
 
 /// Where a point of the camera frame lands [pixel].
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -31,6 +32,8 @@ pub struct Raster {
     /// Its colour, 0x00BBGGRR.
     color: Vec<u32>,
     corners: Vec<Point3<f32>>,
+    /// Rows of the body that is being drawn.
+    touched: Range<usize>,
 }
 
 /// Nearer surfaces are cut away [m].
@@ -51,6 +54,7 @@ impl Raster {
             inverse_depth: vec![0.0; pixels],
             color: vec![0; pixels],
             corners: Vec::with_capacity(1024),
+            touched: 0..0,
         }
     }
 
@@ -72,15 +76,17 @@ impl Raster {
         &self.color
     }
 
-    /// Draws a closed body; its far sides are left out.
-    pub fn draw(&mut self, mesh: &Mesh, camera_from_body: &Isometry3<f32>) {
+    /// Draws a closed body; its far sides are left out. Answers with the rows outside of which nothing has changed.
+    pub fn draw(&mut self, mesh: &Mesh, camera_from_body: &Isometry3<f32>) -> Range<usize> {
         let mut corners = std::mem::take(&mut self.corners);
         corners.clear();
         corners.extend(mesh.points.iter().map(|p| camera_from_body * p));
+        self.touched = self.height..0;
         for triangle in &mesh.triangles {
             self.triangle(triangle.map(|i| corners[i as usize]), mesh.color);
         }
         self.corners = corners;
+        self.touched.start.min(self.touched.end)..self.touched.end
     }
 
     fn triangle(&mut self, [a, b, c]: [Point3<f32>; 3], color: [u8; 3]) {
@@ -110,6 +116,7 @@ impl Raster {
         let [top, middle, bottom] = corners;
         let first = top.1.ceil().max(0.0) as usize;
         let end = (bottom.1.ceil().max(0.0) as usize).min(self.height);
+        self.touched = self.touched.start.min(first)..self.touched.end.max(end);
         let slope = |a: (f32, f32), b: (f32, f32)| if b.1 > a.1 { (b.0 - a.0) / (b.1 - a.1) } else { 0.0 };
         let (long, upper, lower) = (slope(top, bottom), slope(top, middle), slope(middle, bottom));
         for row in first..end {

@@ -1,8 +1,8 @@
 //! A recorded session beside its twin: the camera's picture, what the twin shows at the same joints, and where they differ.
 
-use super::Mesh;
 use super::robot::{Hand, RobotSurface};
-use super::splat::{Body, Lens, Shape, SplatCloud, SplatError, Surroundings, render};
+use super::splat::{Lens, SplatCloud, SplatError, Surroundings};
+use super::{Drawer, Mesh, Model, PaintError, Painter};
 use crate::arm::{ArmModel, Joints, MAX_JOINTS, ModelError};
 use crate::scene::{MeshFileError, ObjectModel};
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
@@ -27,14 +27,23 @@ const OBJECT_COLOR: [u8; 3] = [222, 112, 40];
 /// The cell's twin as a camera sees it.
 #[derive(Debug)]
 pub struct TwinView {
-    lens: Lens,
     size: [usize; 2],
     camera_from_base: Isometry3<f64>,
     robot: RobotSurface,
-    /// Splats of links, with the link that each moves with, and their frame in the link's.
-    splats: Vec<(usize, SplatCloud, Isometry3<f64>)>,
-    table: Option<Mesh>,
-    object: Option<Mesh>,
+    painter: Painter,
+    /// What each of the painter's models moves with.
+    places: Vec<Place>,
+}
+
+/// What a model moves with.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Place {
+    Base,
+    Object,
+    /// A part of the robot's surface.
+    Part(usize),
+    /// A link that was scanned, and the scan's frame in the link's.
+    Link(usize, Isometry3<f64>),
 }
 
 /// The twin cannot be drawn.
@@ -49,6 +58,9 @@ pub enum ViewError {
     /// A splat file cannot be used.
     #[error(transparent)]
     Splats(#[from] SplatError),
+    /// Who shall draw cannot.
+    #[error(transparent)]
+    Paint(#[from] PaintError),
     /// The cell says nothing of a camera.
     #[error(
         "cell.toml has no `[camera]`: without intrinsics and pose there is no view; `calibration viewpoint` finds the pose"
@@ -77,7 +89,12 @@ impl TwinView {
     ///
     /// # Errors
     /// [`ViewError`].
-    pub fn new(cell: &Cell, splats: Option<&Path>, scanned_at: Option<&[f64]>) -> Result<Self, ViewError> {
+    pub fn new(
+        cell: &Cell,
+        splats: Option<&Path>,
+        scanned_at: Option<&[f64]>,
+        drawer: Drawer,
+    ) -> Result<Self, ViewError> {
         let camera = cell.camera.as_ref().ok_or(ViewError::NoCamera)?;
         let base_from_camera = camera.base_from_camera().ok_or(ViewError::NoCamera)?;
         let pinhole = camera.pinhole();
@@ -85,20 +102,38 @@ impl TwinView {
             Lens { focal: [pinhole.fx, pinhole.fy], centre: [pinhole.cx, pinhole.cy], distortion: camera.distortion };
         let robot = RobotSurface::new(cell, Hand::None)?;
         let clouds = splats.map(link_splats).transpose()?.unwrap_or_default();
-        let link_from_scan = |link: usize| match scanned_at {
-            Some(q) => base_from_link(robot.model(), &joints(q), link).inverse(),
-            None => Isometry3::identity(),
-        };
-        let splats = clouds.into_iter().map(|(link, cloud)| (link, cloud, link_from_scan(link))).collect();
-        let height = cell.table.map(|table| table.height as f32);
+        let mut shown: Vec<(Place, Model, u32)> = Vec::new();
+        if let Some(height) = cell.table.map(|table| table.height as f32) {
+            let table = Mesh::plate([0.3, 0.0, height], TABLE_HALF, TABLE_COLOR);
+            shown.push((Place::Base, Model::Mesh(table), TABLE));
+        }
+        if let Some(model) = ObjectModel::new(cell, None)? {
+            let mesh = Mesh::new(model.shape.triangles(), OBJECT_COLOR);
+            shown.push((Place::Object, Model::Mesh(mesh), OBJECT));
+        }
+        let flange = robot.model().dof() + 1;
+        for (part, (mesh, link)) in robot.parts().iter().zip(robot.links()).enumerate() {
+            // The tool is no link that was scanned.
+            if clouds.is_empty() || link == flange {
+                shown.push((Place::Part(part), Model::Mesh(mesh.clone()), ROBOT + link as u32));
+            }
+        }
+        for (link, cloud) in clouds {
+            let link_from_scan = match scanned_at {
+                Some(q) => base_from_link(robot.model(), &joints(q), link).inverse(),
+                None => Isometry3::identity(),
+            };
+            shown.push((Place::Link(link, link_from_scan), Model::Splats(cloud), ROBOT + link as u32));
+        }
+        let places = shown.iter().map(|(place, ..)| *place).collect();
+        let models = shown.into_iter().map(|(_, model, number)| (model, number)).collect();
+        let size = [camera.width as usize, camera.height as usize];
         Ok(Self {
-            lens,
-            size: [camera.width as usize, camera.height as usize],
+            size,
             camera_from_base: base_from_camera.inverse().isometry(),
             robot,
-            splats,
-            table: height.map(|height| Mesh::plate([0.3, 0.0, height], TABLE_HALF, TABLE_COLOR)),
-            object: ObjectModel::new(cell, None)?.map(|model| Mesh::new(model.shape.triangles(), OBJECT_COLOR)),
+            painter: Painter::new(drawer, models, lens, size)?,
+            places,
         })
     }
 
@@ -108,36 +143,31 @@ impl TwinView {
         self.size
     }
 
-    /// The twin at these joint positions [rad], the object where it was seen: red, green, blue, row by row.
+    /// Who draws.
     #[must_use]
-    pub fn draw(&self, q: &[f64], object: Option<Pose<Base, Object>>) -> Vec<u8> {
+    pub fn painter(&self) -> &Painter {
+        &self.painter
+    }
+
+    /// The twin at these joint positions [rad], the object where it was seen: red, green, blue, row by row.
+    ///
+    /// # Errors
+    /// [`ViewError::Paint`] when the device that draws fails.
+    pub fn draw(&mut self, q: &[f64], object: Option<Pose<Base, Object>>) -> Result<Vec<u8>, ViewError> {
         let q = joints(q);
-        let mut bodies: Vec<Body<'_>> = Vec::new();
-        let mut add = |shape, base_from_body: Isometry3<f64>, instance| {
-            bodies.push(Body { shape, camera_from_body: self.camera_from_base * base_from_body, instance });
+        let mut parts = vec![Isometry3::identity(); self.robot.parts().len()];
+        self.robot.for_each(&q, |part, pose| parts[part] = pose);
+        let base_from = |place: &Place| match place {
+            Place::Base => Some(Isometry3::identity()),
+            Place::Object => object.map(|pose| pose.isometry()),
+            Place::Part(part) => Some(parts[*part]),
+            Place::Link(link, link_from_scan) => Some(base_from_link(self.robot.model(), &q, *link) * link_from_scan),
         };
-        if let Some(table) = &self.table {
-            add(Shape::Mesh(table), Isometry3::identity(), TABLE);
-        }
-        if let (Some(mesh), Some(pose)) = (&self.object, object) {
-            add(Shape::Mesh(mesh), pose.isometry(), OBJECT);
-        }
-        let links = self.robot.links();
-        let flange = self.robot.model().dof() + 1;
-        self.robot.for_each(&q, |part, pose| {
-            // The tool is no link that was scanned.
-            if self.splats.is_empty() || links[part] == flange {
-                add(Shape::Mesh(&self.robot.parts()[part]), pose, ROBOT + links[part] as u32);
-            }
-        });
-        for (link, cloud, link_from_cloud) in &self.splats {
-            let base_from_link = base_from_link(self.robot.model(), &q, *link);
-            add(Shape::Splats(cloud), base_from_link * link_from_cloud, ROBOT + *link as u32);
-        }
-        let light = self.camera_from_base * Vector3::from(LIGHT);
-        let around = Surroundings { background: BACKGROUND, light };
-        let seen = render(&bodies, &self.lens, self.size, &around);
-        seen.color.iter().flatten().map(|value| (value.clamp(0.0, 1.0) * 255.0).round() as u8).collect()
+        let poses: Vec<Option<Isometry3<f64>>> =
+            self.places.iter().map(|place| Some(self.camera_from_base * base_from(place)?)).collect();
+        let around = Surroundings { background: BACKGROUND, light: self.camera_from_base * Vector3::from(LIGHT) };
+        let seen = self.painter.paint(&poses, &around)?;
+        Ok(seen.color.iter().flatten().map(|value| (value.clamp(0.0, 1.0) * 255.0).round() as u8).collect())
     }
 }
 
@@ -221,12 +251,12 @@ mod tests {
     #[test]
     fn the_twin_of_the_simulated_camera_s_picture_is_that_picture_where_the_robot_is() {
         let cell = shipped();
-        let view = TwinView::new(&cell, None, None).expect("a view");
+        let mut view = TwinView::new(&cell, None, None, Drawer::Processor).expect("a view");
         let mut camera = SimCamera::new(&cell).expect("a camera");
         let q = *view.robot.model().ready();
         let (mut color, mut depth) = (vec![0; camera.color_bytes()], vec![0; camera.depth_bytes()]);
         camera.render(&SceneSnapshot { q, dof: 7, ..SceneSnapshot::default() }, &mut color, &mut depth);
-        let twin = view.draw(&q, None);
+        let twin = view.draw(&q, None).expect("a picture");
         let white = |rgb: &[u8]| rgb.iter().all(|c| *c > 200);
         let pairs = || color.chunks_exact(3).zip(twin.chunks_exact(3));
         let both = pairs().filter(|(a, b)| white(a) && white(b)).count();
@@ -239,9 +269,10 @@ mod tests {
     #[test]
     fn a_cell_without_a_camera_and_a_folder_without_splats_are_refused() {
         let (cell, folder) = (shipped(), tempfile::tempdir().expect("a folder"));
-        let error = TwinView::new(&Cell { camera: None, ..cell.clone() }, None, None).expect_err("no camera");
+        let error = TwinView::new(&Cell { camera: None, ..cell.clone() }, None, None, Drawer::Processor)
+            .expect_err("no camera");
         assert!(error.to_string().contains("[camera]"));
-        let error = TwinView::new(&cell, Some(folder.path()), None).expect_err("no splats");
+        let error = TwinView::new(&cell, Some(folder.path()), None, Drawer::Processor).expect_err("no splats");
         assert!(error.to_string().contains("no splats of links"));
     }
 }

@@ -57,7 +57,11 @@ impl Lens {
             for _ in 0..STEPS {
                 let (bent, slope) = self.bend(at.x, at.y);
                 let Some(back) = slope.try_inverse() else { break };
-                at += back * (wanted - bent);
+                let step = back * (wanted - bent);
+                at += step;
+                if step.norm() < 1e-13 {
+                    break;
+                }
             }
         }
         Vector3::new(at.x, at.y, 1.0)

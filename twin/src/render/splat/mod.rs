@@ -7,6 +7,7 @@
 //! | `harmonics` | colour by direction |
 //! | `lens` | pinhole and Brown-Conrady distortion, both ways |
 //! | `project` | one splat in a picture |
+//! | `straight` | the pinhole's picture beside the lens's |
 //! | `reference` | the picture |
 
 mod cloud;
@@ -16,8 +17,14 @@ mod lens;
 mod ply;
 mod project;
 mod reference;
+mod straight;
+
+#[cfg(feature = "render")]
+pub(super) use project::held;
+#[cfg(feature = "render")]
+pub(super) use straight::Straight;
 
 pub use cloud::{Splat, SplatCloud, SplatError};
 pub use lens::Lens;
 pub use project::{Projected, project};
-pub use reference::{Body, Picture, Shape, Surroundings, render};
+pub use reference::{Body, Canvas, Picture, Shape, Surroundings, render};

@@ -49,13 +49,11 @@ pub fn project(
         return None;
     }
     let (pixel, _) = lens.project(&centre);
-    let mut held = centre;
-    for i in 0..2 {
-        let ends = [-lens.centre[i], size[i] as f64 - 1.0 - lens.centre[i]].map(|end| end / lens.focal[i]);
-        let spare = (OUTSIDE - 1.0) * 0.5 * (ends[1] - ends[0]);
-        held[i] = (centre[i] / centre.z).clamp(ends[0] - spare, ends[1] + spare) * centre.z;
+    let mut held_at = centre;
+    for (i, [least, most]) in held(lens, size).into_iter().enumerate() {
+        held_at[i] = (centre[i] / centre.z).clamp(least, most) * centre.z;
     }
-    let (_, slope) = lens.project(&held);
+    let (_, slope) = lens.project(&held_at);
     let axes: Matrix3<f64> = (camera_from_body.rotation * splat.rotation.cast::<f64>()).to_rotation_matrix().into();
     let spread = axes * Matrix3::from_diagonal(&splat.sigma.cast::<f64>());
     let in_plane = slope * spread;
@@ -86,12 +84,26 @@ pub fn project(
     })
 }
 
+/// Between which ends the slope of the projection is taken, along a row and along a column, in the plane z = 1.
+pub(in crate::render) fn held(lens: &Lens, size: [usize; 2]) -> [[f64; 2]; 2] {
+    [0, 1].map(|i| {
+        let ends = [-lens.centre[i], size[i] as f64 - 1.0 - lens.centre[i]].map(|end| end / lens.focal[i]);
+        let spare = (OUTSIDE - 1.0) * 0.5 * (ends[1] - ends[0]);
+        [ends[0] - spare, ends[1] + spare]
+    })
+}
+
 impl Projected {
     /// Share of light that it keeps back at a pixel.
     #[must_use]
     pub fn alpha(&self, u: f64, v: f64) -> f64 {
+        self.opacity * self.exponent(u, v).exp()
+    }
+
+    /// Logarithm of its bell at a pixel, 0 at its centre.
+    pub(super) fn exponent(&self, u: f64, v: f64) -> f64 {
         let (x, y) = (u - self.centre[0], v - self.centre[1]);
         let [xx, xy, yy] = self.conic;
-        self.opacity * (-0.5 * (xx * x * x + yy * y * y) - xy * x * y).exp()
+        -0.5 * (xx * x * x + yy * y * y) - xy * x * y
     }
 }

@@ -6,7 +6,8 @@
 use super::cloud::SplatCloud;
 use super::lens::Lens;
 use super::project::{FAINTEST, Projected, project};
-use crate::render::{Mesh, Pinhole, Raster};
+use super::straight::Straight;
+use crate::render::{Mesh, Raster};
 use nalgebra::{Isometry3, Vector3};
 use rayon::prelude::*;
 
@@ -66,150 +67,239 @@ struct Drawn {
     instance: u32,
 }
 
-/// Draws bodies.
+/// Draws bodies once; [`Canvas`] is for the same view again and again.
 #[must_use]
 pub fn render(bodies: &[Body<'_>], lens: &Lens, size: [usize; 2], around: &Surroundings) -> Picture {
-    let mut drawn: Vec<Drawn> = Vec::new();
-    for body in bodies {
-        if let Shape::Splats(cloud) = body.shape {
-            let one = |number| project(cloud, number, &body.camera_from_body, lens, size);
-            let splats: Vec<Projected> = (0..cloud.splats.len()).into_par_iter().filter_map(one).collect();
-            drawn.extend(splats.into_iter().map(|splat| Drawn { splat, instance: body.instance }));
-        }
+    Canvas::new(*lens, size).render(bodies, around)
+}
+
+/// What stays the same from picture to picture: the lens, and what its bending makes of each pixel.
+#[derive(Debug, Clone)]
+pub struct Canvas {
+    lens: Lens,
+    size: [usize; 2],
+    straight: Straight,
+}
+
+impl Canvas {
+    /// For pictures of so many columns and rows.
+    #[must_use]
+    pub fn new(lens: Lens, size: [usize; 2]) -> Self {
+        Self { lens, size, straight: Straight::new(&lens, size) }
     }
-    // Splats at one depth keep the order of their bodies and files.
-    drawn.par_sort_by(|a, b| a.splat.depth.total_cmp(&b.splat.depth));
-    let tiles = size.map(|pixels| pixels.div_ceil(TILE));
-    let mut lists: Vec<Vec<u32>> = vec![Vec::new(); tiles[0] * tiles[1]];
-    for (number, Drawn { splat, .. }) in drawn.iter().enumerate() {
-        let range = |i: usize| {
-            let tile = |at: f64| (at.max(0.0) as usize / TILE).min(tiles[i] - 1);
-            tile(splat.centre[i] - splat.reach[i])..=tile(splat.centre[i] + splat.reach[i])
+
+    /// Draws bodies.
+    #[must_use]
+    pub fn render(&self, bodies: &[Body<'_>], around: &Surroundings) -> Picture {
+        let size = self.size;
+        let (drawn, lists) = self.front_to_back(bodies);
+        let solid = Solid::draw(bodies, &self.straight, &around.light);
+        let pixels = size[0] * size[1];
+        let mut picture = Picture {
+            size,
+            color: vec![[0.0; 3]; pixels],
+            depth: vec![0.0; pixels],
+            instance: vec![0; pixels],
+            cover: vec![0.0; pixels],
         };
-        for y in range(1) {
-            range(0).for_each(|x| lists[y * tiles[0] + x].push(number as u32));
-        }
+        let across = size[0].div_ceil(TILE).max(1);
+        let band = (TILE * size[0]).max(1);
+        (picture.color.par_chunks_mut(band))
+            .zip(picture.depth.par_chunks_mut(band))
+            .zip(picture.instance.par_chunks_mut(band).zip(picture.cover.par_chunks_mut(band)))
+            .zip(lists.par_chunks(across))
+            .enumerate()
+            .for_each(|(row, (((color, depth), (instance, cover)), lists))| {
+                for (column, list) in lists.iter().enumerate() {
+                    let mut tile = Tile::new([column * TILE, row * TILE], size, &solid);
+                    tile.blend(list.iter().map(|number| &drawn[*number as usize]));
+                    for (at, light) in tile.finish() {
+                        let at = at - row * band;
+                        let left = light.left;
+                        color[at] = [0, 1, 2].map(|c| (light.color[c] + left * around.background[c]) as f32);
+                        cover[at] = (1.0 - left) as f32;
+                        depth[at] = if left < 1.0 { (light.depth / (1.0 - left)) as f32 } else { 0.0 };
+                        instance[at] = light.instance;
+                    }
+                }
+            });
+        picture
     }
-    let solid = Solid::draw(bodies, lens, size, &around.light);
-    let pixel = |i: usize| {
-        let (x, y) = (i % size[0], i / size[0]);
-        let list = &lists[y / TILE * tiles[0] + x / TILE];
-        blend(list.iter().map(|n| &drawn[*n as usize]), [x as f64, y as f64], solid.at(i), around.background)
-    };
-    let pixels: Vec<Pixel> = (0..size[0] * size[1]).into_par_iter().map(pixel).collect();
-    Picture {
-        size,
-        color: pixels.iter().map(|p| p.color.map(|c| c as f32)).collect(),
-        depth: pixels.iter().map(|p| p.depth as f32).collect(),
-        instance: pixels.iter().map(|p| p.instance).collect(),
-        cover: pixels.iter().map(|p| p.cover as f32).collect(),
+
+    /// The splats that are seen, nearest first, and for each tile the numbers of those that reach it.
+    fn front_to_back(&self, bodies: &[Body<'_>]) -> (Vec<Drawn>, Vec<Vec<u32>>) {
+        let mut drawn: Vec<Drawn> = Vec::new();
+        for body in bodies {
+            if let Shape::Splats(cloud) = body.shape {
+                let one = |number| {
+                    let splat = project(cloud, number, &body.camera_from_body, &self.lens, self.size)?;
+                    Some(Drawn { splat, instance: body.instance })
+                };
+                drawn.par_extend((0..cloud.splats.len()).into_par_iter().filter_map(one));
+            }
+        }
+        // Splats at one depth keep the order of their bodies and files.
+        let mut order: Vec<(f64, u32)> = drawn.iter().zip(0..).map(|(drawn, n)| (drawn.splat.depth, n)).collect();
+        order.par_sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        let tiles = self.size.map(|pixels| pixels.div_ceil(TILE));
+        let mut lists: Vec<Vec<u32>> = vec![Vec::new(); tiles[0] * tiles[1]];
+        for (_, number) in order {
+            let splat = &drawn[number as usize].splat;
+            let range = |i: usize| {
+                let tile = |at: f64| (at.max(0.0) as usize / TILE).min(tiles[i] - 1);
+                tile(splat.centre[i] - splat.reach[i])..=tile(splat.centre[i] + splat.reach[i])
+            };
+            for y in range(1) {
+                range(0).for_each(|x| lists[y * tiles[0] + x].push(number));
+            }
+        }
+        (drawn, lists)
     }
 }
 
-struct Pixel {
+/// What has been gathered at a pixel, front to back.
+#[derive(Clone, Copy)]
+struct Light {
     color: [f64; 3],
     depth: f64,
     instance: u32,
-    cover: f64,
+    /// What is left of the light behind.
+    left: f64,
+    /// Where a mesh ends it [m].
+    end: f64,
 }
 
-/// A mesh's surface at a pixel.
-struct Surface {
-    depth: f64,
-    color: [f64; 3],
-    instance: u32,
+impl Light {
+    fn add(&mut self, alpha: f64, color: &[f64; 3], depth: f64, instance: u32) {
+        let weight = self.left * alpha;
+        (0..3).for_each(|c| self.color[c] += weight * color[c]);
+        self.depth += weight * depth;
+        self.left -= weight;
+        if self.instance == 0 && self.left < 0.5 {
+            self.instance = instance;
+        }
+    }
 }
 
-fn blend<'a>(
-    splats: impl Iterator<Item = &'a Drawn>,
-    [u, v]: [f64; 2],
-    surface: Option<Surface>,
-    background: [f64; 3],
-) -> Pixel {
-    let end = surface.as_ref().map_or(f64::INFINITY, |surface| surface.depth);
-    let mut left = 1.0;
-    let mut out = Pixel { color: [0.0; 3], depth: 0.0, instance: 0, cover: 0.0 };
-    let mut add = |weight: f64, color: &[f64; 3], depth: f64, instance: u32, left: &mut f64| {
-        (0..3).for_each(|c| out.color[c] += weight * color[c]);
-        out.depth += weight * depth;
-        *left -= weight;
-        if out.instance == 0 && *left < 0.5 {
-            out.instance = instance;
+/// A square of pixels, blended at once.
+struct Tile<'a> {
+    first: [usize; 2],
+    /// Columns and rows that lie in the picture.
+    size: [usize; 2],
+    width: usize,
+    solid: &'a Solid<'a>,
+    lights: [Light; TILE * TILE],
+}
+
+impl<'a> Tile<'a> {
+    fn new(first: [usize; 2], picture: [usize; 2], solid: &'a Solid<'a>) -> Self {
+        let dark = Light { color: [0.0; 3], depth: 0.0, instance: 0, left: 1.0, end: f64::INFINITY };
+        let size = [0, 1].map(|i| TILE.min(picture[i] - first[i]));
+        let mut tile = Self { first, size, width: picture[0], solid, lights: [dark; TILE * TILE] };
+        for row in 0..size[1] {
+            for column in 0..size[0] {
+                let at = (first[1] + row) * picture[0] + first[0] + column;
+                tile.lights[row * TILE + column].end = solid.end(at);
+            }
         }
-    };
-    for Drawn { splat, instance } in splats {
-        if splat.depth >= end || left < SPENT {
-            break;
-        }
-        let alpha = splat.alpha(u, v).min(MOST);
-        if alpha >= FAINTEST {
-            add(left * alpha, &splat.color, splat.depth, *instance, &mut left);
+        tile
+    }
+
+    /// Lets splats keep back light, nearest first; each is asked only where it reaches.
+    fn blend<'b>(&mut self, splats: impl Iterator<Item = &'b Drawn>) {
+        let mut open = self.size[0] * self.size[1];
+        for Drawn { splat, instance } in splats {
+            if open == 0 {
+                break;
+            }
+            let range = |i: usize| {
+                let at = splat.centre[i] - self.first[i] as f64;
+                let from = (at - splat.reach[i]).ceil().max(0.0) as usize;
+                from..((at + splat.reach[i]).floor() + 1.0).clamp(0.0, self.size[i] as f64) as usize
+            };
+            let (rows, columns) = (range(1), range(0));
+            // Below this the bell is lower than what counts; a hair is left for rounding.
+            let lowest = (FAINTEST / splat.opacity).ln() - 1e-9;
+            for row in rows {
+                for column in columns.clone() {
+                    let light = &mut self.lights[row * TILE + column];
+                    if splat.depth >= light.end || light.left < SPENT {
+                        continue;
+                    }
+                    let exponent = splat.exponent((self.first[0] + column) as f64, (self.first[1] + row) as f64);
+                    if exponent < lowest {
+                        continue;
+                    }
+                    let alpha = (splat.opacity * exponent.exp()).min(MOST);
+                    if alpha >= FAINTEST {
+                        light.add(alpha, &splat.color, splat.depth, *instance);
+                        open -= usize::from(light.left < SPENT);
+                    }
+                }
+            }
         }
     }
-    if let Some(Surface { depth, color, instance }) = surface {
-        add(left, &color, depth, instance, &mut left);
+
+    /// Every pixel's number and its light, the meshes' included.
+    fn finish(self) -> impl Iterator<Item = (usize, Light)> {
+        let Self { first, size, width, solid, mut lights } = self;
+        (0..size[1]).flat_map(move |row| {
+            (0..size[0]).map(move |column| {
+                let at = (first[1] + row) * width + first[0] + column;
+                let light = &mut lights[row * TILE + column];
+                if light.end.is_finite() {
+                    let (color, instance) = solid.look(at);
+                    light.add(1.0, &color, light.end, instance);
+                }
+                (at, *light)
+            })
+        })
     }
-    out.cover = 1.0 - left;
-    (0..3).for_each(|c| out.color[c] += left * background[c]);
-    if out.cover > 0.0 {
-        out.depth /= out.cover;
-    }
-    out
 }
 
 /// The meshes, drawn by a pinhole and looked up through the lens.
-struct Solid {
+struct Solid<'a> {
+    straight: &'a Straight,
     raster: Option<Raster>,
     owners: Vec<u32>,
-    /// For every pixel the pinhole's one.
-    lookup: Vec<Option<usize>>,
 }
 
-impl Solid {
-    fn draw(bodies: &[Body<'_>], lens: &Lens, size: [usize; 2], light: &Vector3<f64>) -> Self {
+impl<'a> Solid<'a> {
+    fn draw(bodies: &[Body<'_>], straight: &'a Straight, light: &Vector3<f64>) -> Self {
         let meshes: Vec<(&Mesh, &Body<'_>)> = (bodies.iter())
             .filter_map(|body| if let Shape::Mesh(mesh) = body.shape { Some((mesh, body)) } else { None })
             .collect();
         if meshes.is_empty() {
-            return Self { raster: None, owners: Vec::new(), lookup: Vec::new() };
+            return Self { straight, raster: None, owners: Vec::new() };
         }
-        // A lens that bends sees a little more or less than its pinhole: that one's picture is made large enough.
-        let margin = if lens.is_bent() { size.map(|pixels| pixels / 4) } else { [0, 0] };
-        let [width, height] = [0, 1].map(|i| size[i] + 2 * margin[i]);
-        let [cx, cy] = [0, 1].map(|i| (lens.centre[i] + margin[i] as f64) as f32);
-        let pinhole = Pinhole { fx: lens.focal[0] as f32, fy: lens.focal[1] as f32, cx, cy };
-        let mut raster = Raster::new(width, height, pinhole, light.cast::<f32>());
+        let [width, height] = straight.size;
+        let mut raster = Raster::new(width, height, straight.pinhole, light.cast::<f32>());
         raster.clear([0; 3]);
         let mut owners = vec![0; width * height];
         let mut before = vec![0.0f32; width * height];
         for (mesh, body) in meshes {
-            raster.draw(mesh, &body.camera_from_body.cast::<f32>());
-            for ((owner, known), here) in owners.iter_mut().zip(&mut before).zip(raster.inverse_depth()) {
+            let rows = raster.draw(mesh, &body.camera_from_body.cast::<f32>());
+            let touched = rows.start * width..rows.end * width;
+            let here = &raster.inverse_depth()[touched.clone()];
+            for ((owner, known), here) in owners[touched.clone()].iter_mut().zip(&mut before[touched]).zip(here) {
                 if here > known {
                     (*owner, *known) = (body.instance, *here);
                 }
             }
         }
-        let pixel = |i: usize| {
-            let (x, y) = (i % size[0], i / size[0]);
-            if !lens.is_bent() {
-                return Some(i);
-            }
-            let ray = lens.ray([x as f64, y as f64]);
-            let [u, v] = [ray.x * f64::from(pinhole.fx) + f64::from(cx), ray.y * f64::from(pinhole.fy) + f64::from(cy)]
-                .map(f64::round);
-            let inside = u >= 0.0 && v >= 0.0 && u < width as f64 && v < height as f64;
-            inside.then(|| v as usize * width + u as usize)
-        };
-        let lookup = (0..size[0] * size[1]).into_par_iter().map(pixel).collect();
-        Self { raster: Some(raster), owners, lookup }
+        Self { straight, raster: Some(raster), owners }
     }
 
-    fn at(&self, pixel: usize) -> Option<Surface> {
-        let (raster, at) = (self.raster.as_ref()?, self.lookup.get(pixel).copied().flatten()?);
-        let near = f64::from(raster.inverse_depth()[at]);
+    /// How far a mesh is at a pixel [m]; infinite where there is none.
+    fn end(&self, pixel: usize) -> f64 {
+        let Some(raster) = &self.raster else { return f64::INFINITY };
+        self.straight.at(pixel).map_or(f64::INFINITY, |at| 1.0 / f64::from(raster.inverse_depth()[at]))
+    }
+
+    /// Colour and number of the mesh at a pixel.
+    fn look(&self, pixel: usize) -> ([f64; 3], u32) {
+        let (Some(raster), Some(at)) = (&self.raster, self.straight.at(pixel)) else { return ([0.0; 3], 0) };
         let [r, g, b, _] = raster.color()[at].to_le_bytes();
-        let color = [r, g, b].map(|v| f64::from(v) / 255.0);
-        (near > 0.0).then(|| Surface { depth: 1.0 / near, color, instance: self.owners[at] })
+        ([r, g, b].map(|v| f64::from(v) / 255.0), self.owners[at])
     }
 }

@@ -1,0 +1,47 @@
+//! The straight picture that meshes are drawn in, and where each pixel of a bent lens finds itself in it.
+
+use super::lens::Lens;
+use crate::render::Pinhole;
+use rayon::prelude::*;
+
+/// A pixel that sees nothing of the straight picture.
+pub(in crate::render) const NOWHERE: u32 = u32::MAX;
+
+/// The pinhole beside a lens.
+#[derive(Debug, Clone)]
+pub(in crate::render) struct Straight {
+    pub(in crate::render) pinhole: Pinhole,
+    /// Columns and rows.
+    pub(in crate::render) size: [usize; 2],
+    /// For every pixel behind the lens the pixel of the straight picture, or [`NOWHERE`]; empty where the two are one.
+    pub(in crate::render) lookup: Vec<u32>,
+}
+
+impl Straight {
+    pub(in crate::render) fn new(lens: &Lens, seen: [usize; 2]) -> Self {
+        // A lens that bends sees a little more or less than its pinhole: that one's picture is made large enough.
+        let margin = if lens.is_bent() { seen.map(|pixels| pixels / 4) } else { [0, 0] };
+        let size = [0, 1].map(|i| seen[i] + 2 * margin[i]);
+        let [fx, fy] = lens.focal.map(|f| f as f32);
+        let [cx, cy] = [0, 1].map(|i| (lens.centre[i] + margin[i] as f64) as f32);
+        let pixel = |i: usize| {
+            let ray = lens.ray([(i % seen[0]) as f64, (i / seen[0]) as f64]);
+            let u = (ray.x * f64::from(fx) + f64::from(cx)).round();
+            let v = (ray.y * f64::from(fy) + f64::from(cy)).round();
+            let inside = u >= 0.0 && v >= 0.0 && u < size[0] as f64 && v < size[1] as f64;
+            if inside { (v as usize * size[0] + u as usize) as u32 } else { NOWHERE }
+        };
+        let lookup =
+            if lens.is_bent() { (0..seen[0] * seen[1]).into_par_iter().map(pixel).collect() } else { Vec::new() };
+        Self { pinhole: Pinhole { fx, fy, cx, cy }, size, lookup }
+    }
+
+    /// The straight picture's pixel for one behind the lens.
+    pub(in crate::render) fn at(&self, pixel: usize) -> Option<usize> {
+        match self.lookup.get(pixel) {
+            None => Some(pixel),
+            Some(&NOWHERE) => None,
+            Some(&there) => Some(there as usize),
+        }
+    }
+}
