@@ -1,12 +1,12 @@
 //! `twin render`: real, twin and difference side by side, as PNG files and, where ffmpeg is there, as a film.
 
+use super::look::Look;
 use anyhow::{Context as _, bail, ensure};
 use shared_mem::recording::{Session, for_color_pictures, write_png};
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
-use twin::render::Drawer;
-use twin::render::session::{TwinView, ViewError, beside, pixels_of};
+use twin::render::session::{ViewError, beside, pixels_of};
 
 /// Draws the twin beside every recorded picture: what the camera saw, what the twin shows, where they differ.
 #[derive(clap::Args)]
@@ -32,15 +32,8 @@ pub(crate) struct Render {
     /// Draws every so many pictures only.
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
     every: u32,
-    /// Folder with a splat file for each link (`…link0….ply` to `…link7….ply`, `…hand….ply`), in the links' frames.
-    #[arg(long, value_name = "FOLDER")]
-    splats: Option<PathBuf>,
-    /// Joint positions [rad], with commas between them, at which the arm was scanned: then all splats are in its base frame.
-    #[arg(long, value_name = "Q", requires = "splats", allow_hyphen_values = true, value_delimiter = ',')]
-    scanned_at: Option<Vec<f64>>,
-    /// Who draws.
-    #[arg(long, value_enum, default_value_t = Device::Auto)]
-    device: Device,
+    #[command(flatten)]
+    look: Look,
     /// Also joins the frames to `film.mp4`, if ffmpeg is installed.
     #[arg(long)]
     film: bool,
@@ -49,35 +42,10 @@ pub(crate) struct Render {
     json: bool,
 }
 
-/// Who draws, as it is asked for.
-#[derive(Debug, Clone, Copy, clap::ValueEnum)]
-enum Device {
-    /// A graphics card that holds the models, else the processor.
-    Auto,
-    /// The processor, in double precision.
-    Cpu,
-    /// A Vulkan device, even one in software; an error where there is none.
-    Gpu,
-}
-
-impl From<Device> for Drawer {
-    fn from(device: Device) -> Self {
-        match device {
-            Device::Auto => Self::Auto,
-            Device::Cpu => Self::Processor,
-            Device::Gpu => Self::Device,
-        }
-    }
-}
-
 impl Render {
     pub(crate) fn run(&self) -> anyhow::Result<()> {
         let session = Session::open_with(&self.path, self.cell.as_deref())?;
-        let (splats, scanned_at) = (self.splats.as_deref(), self.scanned_at.as_deref());
-        let mut view = TwinView::new(&session.cell, splats, scanned_at, self.device.into())?;
-        if let Some(note) = view.painter().note() {
-            eprintln!("note: the processor draws: {note}");
-        }
+        let mut view = self.look.view(&session.cell)?;
         std::fs::create_dir_all(&self.out)
             .with_context(|| format!("{}; give --out a place that can be written", self.out.display()))?;
         let camera = session.cell.camera.as_ref().context("cell.toml has no `[camera]`")?;

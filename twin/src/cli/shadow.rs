@@ -1,5 +1,6 @@
 //! `twin shadow`: mirrors a running bridge and publishes the gap.
 
+use super::look::Look;
 use anyhow::Context as _;
 use clap::Args;
 use shared_mem::cell::Cell;
@@ -9,6 +10,8 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
+#[cfg(feature = "viewer")]
+use twin::render::LiveView;
 use twin::shadow::live::{Live, Watcher};
 use twin::shadow::{Mirrored, Shadow as Twin};
 
@@ -20,6 +23,7 @@ use twin::shadow::{Mirrored, Shadow as Twin};
 #[command(after_help = "Examples:\n  \
     twin shadow --cell config/fr3_cell.toml                       until Ctrl-C, gap on the terminal\n  \
     twin shadow --cell config/fr3_cell.toml --viewer              in Foxglove or Lichtblick: ws://127.0.0.1:8765\n  \
+    twin shadow --cell cell.toml --viewer --splats fr3_splats     the twin's pictures from a scanned robot\n  \
     twin shadow --cell cell.toml --parameters theta.toml --duration 60 --json")]
 pub(crate) struct Shadow {
     /// What is known about the cell; the same file the bridge runs with
@@ -31,9 +35,11 @@ pub(crate) struct Shadow {
     /// Stop after so many seconds; without it, on Ctrl-C
     #[arg(long, value_name = "SECONDS", value_parser = seconds)]
     duration: Option<f64>,
-    /// Show robot and twin in 3D: a Foxglove WebSocket on 127.0.0.1:8765
+    /// Show robot and twin in 3D, and the camera's picture beside the twin's: a Foxglove WebSocket on 127.0.0.1:8765
     #[arg(long)]
     viewer: bool,
+    #[command(flatten)]
+    look: Look,
     /// One JSON object with the figures on stdout at the end
     #[arg(long)]
     json: bool,
@@ -55,7 +61,7 @@ impl Shadow {
         let stop = Arc::new(AtomicBool::new(false));
         let on_signal = Arc::clone(&stop);
         ctrlc::set_handler(move || on_signal.store(true, Ordering::Relaxed)).context("cannot listen for Ctrl-C")?;
-        let viewer = self.viewer.then(|| viewer(&cell, &stop)).transpose()?;
+        let viewer = self.viewer.then(|| viewer(&cell, &self.look, &stop)).transpose()?;
         let mut terminal = Terminal::new();
         let outcome = Live::open()?.run(&mut shadow, self.duration.map(Duration::from_secs_f64), &stop, &mut terminal);
         terminal.finish();
@@ -76,15 +82,17 @@ impl Shadow {
 type ViewerThread = std::thread::JoinHandle<anyhow::Result<()>>;
 
 #[cfg(feature = "viewer")]
-fn viewer(cell: &Cell, stop: &Arc<AtomicBool>) -> anyhow::Result<ViewerThread> {
-    let viewer = twin::viewer::Viewer::start(cell)?;
+fn viewer(cell: &Cell, look: &Look, stop: &Arc<AtomicBool>) -> anyhow::Result<ViewerThread> {
+    let camera = cell.camera.as_ref();
+    let pictures = camera.map(|camera| Ok::<_, anyhow::Error>(LiveView::new(look.view(cell)?, camera.latency)));
+    let viewer = twin::viewer::Viewer::start(cell, pictures.transpose()?)?;
     eprintln!("viewer: open {} in Foxglove or Lichtblick", viewer.address());
     let stop = Arc::clone(stop);
     Ok(std::thread::Builder::new().name("viewer".into()).spawn(move || Ok(viewer.run(&stop)?))?)
 }
 
 #[cfg(not(feature = "viewer"))]
-fn viewer(_: &Cell, _: &Arc<AtomicBool>) -> anyhow::Result<ViewerThread> {
+fn viewer(_: &Cell, _: &Look, _: &Arc<AtomicBool>) -> anyhow::Result<ViewerThread> {
     anyhow::bail!("this program was built without its viewer; build with `--features viewer`, or leave --viewer out")
 }
 

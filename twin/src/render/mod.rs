@@ -8,6 +8,7 @@
 #[cfg(feature = "render")]
 pub mod device;
 mod glb;
+mod live;
 mod mesh;
 mod painter;
 mod raster;
@@ -15,6 +16,7 @@ mod robot;
 pub mod session;
 pub mod splat;
 
+pub use live::{Beside, LiveView};
 pub use mesh::Mesh;
 pub use painter::{Drawer, Model, PaintError, Painter};
 pub use raster::{Pinhole, Raster};

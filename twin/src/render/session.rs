@@ -212,9 +212,22 @@ pub fn beside(size: [usize; 2], real: &[u8], twin: &[u8]) -> (u32, u32, Vec<u8>)
     for (real, twin) in real.chunks_exact(row).zip(twin.chunks_exact(row)) {
         out.extend_from_slice(real);
         out.extend_from_slice(twin);
-        out.extend(real.iter().zip(twin).map(|(a, b)| a.abs_diff(*b)));
+        out.extend(difference(real, twin));
     }
     (3 * size[0] as u32, size[1] as u32, out)
+}
+
+/// Columns, rows and pixels without what fills up rows.
+pub(super) fn tight_pixels(header: &ImageHeader, pixels: &[u8]) -> ([usize; 2], Vec<u8>) {
+    let row = header.width as usize * 3;
+    let rows = pixels.chunks(header.stride.max(1) as usize).take(header.height as usize);
+    let out: Vec<u8> = rows.flat_map(|bytes| bytes.iter().take(row).copied()).collect();
+    ([header.width as usize, header.height as usize], out)
+}
+
+/// How far two pictures are apart, value by value.
+pub(super) fn difference(real: &[u8], twin: &[u8]) -> Vec<u8> {
+    real.iter().zip(twin).map(|(a, b)| a.abs_diff(*b)).collect()
 }
 
 /// The pixels of a recorded colour picture, without padding: red, green, blue.
@@ -222,16 +235,10 @@ pub fn beside(size: [usize; 2], real: &[u8], twin: &[u8]) -> (u32, u32, Vec<u8>)
 /// # Errors
 /// A sentence when it is compressed in a way that is not known.
 pub fn pixels_of(picture: &Picture) -> Result<([usize; 2], Vec<u8>), String> {
-    let tight = |header: &ImageHeader, pixels: &[u8]| {
-        let row = header.width as usize * 3;
-        let rows = pixels.chunks(header.stride.max(1) as usize).take(header.height as usize);
-        let out: Vec<u8> = rows.flat_map(|bytes| bytes.iter().take(row).copied()).collect();
-        ([header.width as usize, header.height as usize], out)
-    };
     match picture {
-        Picture::Pixels { header, pixels } => Ok(tight(header, pixels)),
+        Picture::Pixels { header, pixels } => Ok(tight_pixels(header, pixels)),
         Picture::Compressed { stamp_ns, bytes, .. } => match shared_mem::recording::unpack_picture(bytes, *stamp_ns)? {
-            Picture::Pixels { header, pixels } => Ok(tight(&header, &pixels)),
+            Picture::Pixels { header, pixels } => Ok(tight_pixels(&header, &pixels)),
             Picture::Compressed { format, .. } => Err(format!("a picture is compressed as {format}")),
         },
     }

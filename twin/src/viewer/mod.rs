@@ -5,16 +5,17 @@
 mod scene;
 
 use crate::arm::ModelError;
+use crate::render::LiveView;
 use foxglove::messages::{FrameTransform, FrameTransforms, PoseInFrame, RawImage, SceneUpdate, Timestamp};
 use foxglove::{Channel, ChannelBuilder, FoxgloveError, RawChannel, Schema, WebSocketServer, WebSocketServerHandle};
 use scene::{Look, Scene};
 use shared_mem::cell::Cell;
 use shared_mem::frames::{Base, Object, Pose};
-use shared_mem::msg::image::PixelEncoding;
+use shared_mem::msg::image::{ImageHeader, PixelEncoding};
 use shared_mem::msg::twin::TwinGap;
 use shared_mem::time::unix_offset_ns;
 use shared_mem::topics::{ARM_STATE, CAMERA_COLOR, CAMERA_DEPTH, CAMERA_INFO, OBJECT_POSE, TWIN_GAP, TWIN_STATE};
-use shared_mem::transport::{ImageSubscriber, Node, TransportError};
+use shared_mem::transport::{ImageSample, ImageSubscriber, Node, TransportError};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
@@ -37,6 +38,9 @@ pub struct Viewer {
     transforms: Channel<FrameTransforms>,
     color: Channel<RawImage>,
     depth: Channel<RawImage>,
+    /// The twin as the camera sees it, where the cell has a camera; on twin, blend, difference.
+    live: Option<LiveView>,
+    beside: [Channel<RawImage>; 3],
     gap: Arc<RawChannel>,
 }
 
@@ -58,11 +62,11 @@ pub enum ViewerError {
 }
 
 impl Viewer {
-    /// Opens the socket.
+    /// Opens the socket; `live` draws the twin beside the camera's pictures.
     ///
     /// # Errors
     /// [`ViewerError`] when the port is taken or cell.toml describes no arm.
-    pub fn start(cell: &Cell) -> Result<Self, ViewerError> {
+    pub fn start(cell: &Cell, live: Option<LiveView>) -> Result<Self, ViewerError> {
         let scene = Scene::new(cell)?;
         let server = WebSocketServer::new()
             .name("twinalign shadow")
@@ -88,6 +92,8 @@ impl Viewer {
             transforms: Channel::new("/tf"),
             color: Channel::new(CAMERA_COLOR.name),
             depth: Channel::new(CAMERA_DEPTH.name),
+            live,
+            beside: ["/camera/twin", "/camera/blend", "/camera/difference"].map(Channel::new),
             gap,
         })
     }
@@ -102,13 +108,12 @@ impl Viewer {
     ///
     /// # Errors
     /// [`ViewerError::Transport`] when shared memory fails.
-    pub fn run(self, stop: &AtomicBool) -> Result<(), ViewerError> {
+    pub fn run(mut self, stop: &AtomicBool) -> Result<(), ViewerError> {
         let node = Node::open("twin_viewer")?;
         let (arm, twin) = (node.subscriber(ARM_STATE)?, node.subscriber(TWIN_STATE)?);
         let (gaps, poses) = (node.subscriber(TWIN_GAP)?, node.subscriber(OBJECT_POSE)?);
         let info = node.subscriber(CAMERA_INFO)?;
-        let pictures =
-            [(node.image_subscriber(CAMERA_COLOR)?, &self.color), (node.image_subscriber(CAMERA_DEPTH)?, &self.depth)];
+        let (color, depth) = (node.image_subscriber(CAMERA_COLOR)?, node.image_subscriber(CAMERA_DEPTH)?);
         while !stop.load(Ordering::Relaxed) {
             let time = timestamp(shared_mem::time::now_ns());
             if let Some(state) = arm.newest()? {
@@ -120,6 +125,9 @@ impl Viewer {
                 self.scenes.log(&self.scene.arm(time, Look::Twin, &state.q));
                 let pose = Pose::from_parts(state.object_position, state.object_wxyz);
                 self.show_object(time, Look::Twin, pose.filter(|_| state.has_object == 1));
+                if let Some(live) = &mut self.live {
+                    live.remember(&state);
+                }
             }
             if let Some(pose) = poses.newest()? {
                 self.show_object(time, Look::Real, pose.pose());
@@ -130,8 +138,12 @@ impl Viewer {
             if let Some(info) = info.newest()? {
                 self.show_camera_frame(time, info.position, info.wxyz);
             }
-            for (reader, channel) in &pictures {
-                show_picture(time, reader, channel)?;
+            if let Some(sample) = newest(&depth)? {
+                show_picture(time, sample.header(), &self.depth, || sample.bytes().to_vec());
+            }
+            if let Some(sample) = newest(&color)? {
+                show_picture(time, sample.header(), &self.color, || sample.bytes().to_vec());
+                self.show_beside(time, sample.header(), sample.bytes());
             }
             std::thread::sleep(FRAME);
         }
@@ -145,6 +157,27 @@ impl Viewer {
         channel.log(&self.scene.pose_in_base(time, &pose.isometry()));
         if let Some(update) = self.scene.object(time, look, &pose.isometry()) {
             self.scenes.log(&update);
+        }
+    }
+
+    /// The twin at the moment of a colour picture, while somebody looks. What cannot be drawn once is not tried again.
+    fn show_beside(&mut self, time: Timestamp, header: &ImageHeader, bytes: &[u8]) {
+        let Some(live) = &mut self.live else { return };
+        if !self.beside.iter().any(Channel::has_sinks) {
+            return;
+        }
+        match live.beside(header, bytes) {
+            Ok(Some(seen)) => {
+                let header = ImageHeader { stride: 3 * header.width, ..*header };
+                for (channel, pixels) in self.beside.iter().zip([seen.twin, seen.blend, seen.difference]) {
+                    show_picture(time, &header, channel, || pixels);
+                }
+            }
+            Ok(None) => {}
+            Err(error) => {
+                tracing::warn!("no twin beside the camera's pictures: {error}");
+                self.live = None;
+            }
         }
     }
 
@@ -163,28 +196,31 @@ impl Viewer {
     }
 }
 
-fn show_picture(time: Timestamp, reader: &ImageSubscriber, channel: &Channel<RawImage>) -> Result<(), TransportError> {
+fn newest(reader: &ImageSubscriber) -> Result<Option<ImageSample>, TransportError> {
     let mut newest = None;
     while let Some(sample) = reader.receive()? {
         newest = Some(sample);
     }
-    // Copying a megabyte for nobody would be a waste.
-    if let Some(sample) = newest.filter(|_| channel.has_sinks()) {
-        let header = sample.header();
-        channel.log(&RawImage {
-            timestamp: Some(time),
-            frame_id: "camera".into(),
-            width: header.width,
-            height: header.height,
-            encoding: match header.encoding {
-                PixelEncoding::Rgb8 => "rgb8".into(),
-                PixelEncoding::Depth16 => "16UC1".into(),
-            },
-            step: header.stride,
-            data: sample.bytes().to_vec().into(),
-        });
+    Ok(newest)
+}
+
+/// Nothing is copied or drawn for nobody.
+fn show_picture(time: Timestamp, header: &ImageHeader, channel: &Channel<RawImage>, pixels: impl FnOnce() -> Vec<u8>) {
+    if !channel.has_sinks() {
+        return;
     }
-    Ok(())
+    channel.log(&RawImage {
+        timestamp: Some(time),
+        frame_id: "camera".into(),
+        width: header.width,
+        height: header.height,
+        encoding: match header.encoding {
+            PixelEncoding::Rgb8 => "rgb8".into(),
+            PixelEncoding::Depth16 => "16UC1".into(),
+        },
+        step: header.stride,
+        data: pixels().into(),
+    });
 }
 
 /// NaN, which JSON lacks, becomes null.
