@@ -6,8 +6,8 @@
 //! a clip's whole rest, not one of each pose), and a clip that nothing fits counts less. What the arm felt counts as well:
 //! the blow that it takes says how heavy the object is.
 
-use super::polish::POINTS;
 use super::step::{Linearised, Question};
+use super::vicinity::points;
 use crate::estimate::{ClipModel as _, Impossible, Random, Unknown};
 use crate::forward::object::{ALL, Channel, ModelError, ObjectClips, Own, Part};
 use rayon::prelude::*;
@@ -34,8 +34,9 @@ const FIRST_ERROR: ModelError = ModelError {
     rest: PoseNoise { position: 0.0, rotation: 0.0 },
     joints: Some(1e-4),
 };
-/// Most steps of the first way.
+/// Most steps of the first way, and of one that need not arrive.
 const FIRST_STEPS: usize = 12;
+const ROUGH_STEPS: usize = 4;
 /// Rounds after it, each with the error that the round before left.
 const ROUNDS: usize = 4;
 /// Poses of a moving object, and rows of the arm, of which one is a witness: their errors last.
@@ -46,7 +47,7 @@ const LEAST_JOINT_ERROR: f64 = 2e-5;
 /// Clips that are usually simulated until the end: for a bar alone.
 #[must_use]
 pub(super) fn usual_evaluations(clips: &ObjectClips, unknowns: &[Unknown]) -> usize {
-    (2 * (FIRST_STEPS + ROUNDS) * (2 + unknowns.len()) + POINTS) * clips.clips()
+    (2 * (FIRST_STEPS + ROUNDS) * (2 + unknowns.len()) + points(unknowns.len())) * clips.clips()
 }
 
 /// Fits from `start` on. `watch` sees numbers and evaluations after every step; `false` ends the fit there.
@@ -59,12 +60,9 @@ pub(super) fn fit_object(
     start: &[f64],
     watch: impl Fn(&[f64], usize) -> bool,
 ) -> Result<ObjectFit, Impossible> {
-    clips.set_model_error(FIRST_ERROR);
-    let mut random = held(clips);
-    let own = vec![vec![0.0; random.len()]; clips.clips()];
     let mut search = Search { convergence: Vec::new(), evaluations: 0, watch: &watch, stopped: false };
-    let mut at = search.steps(Question { clips, unknowns, random: &random }, (start, &own), FIRST_STEPS)?;
-    random = scattered(clips);
+    let mut at = search.first(clips, unknowns, start, FIRST_STEPS)?;
+    let random = scattered(clips);
     for _ in 0..ROUNDS {
         if search.stopped {
             break;
@@ -79,7 +77,22 @@ pub(super) fn fit_object(
     Ok(ObjectFit { converged: at.small && !stopped, at, widths, evaluations, convergence })
 }
 
-/// The clips at numbers that were found otherwise, with the error of hits that they leave, and [`Question::widths`].
+/// The first way alone: near enough for a search by the loss of poses. Where it came to, and the clips simulated.
+///
+/// # Errors
+/// As [`fit_object`].
+pub(super) fn roughly(
+    clips: &mut ObjectClips,
+    unknowns: &[Unknown],
+    start: &[f64],
+    watch: impl Fn(&[f64], usize) -> bool,
+) -> Result<(Linearised, usize), Impossible> {
+    let mut search = Search { convergence: Vec::new(), evaluations: 0, watch: &watch, stopped: false };
+    let at = search.first(clips, unknowns, start, ROUGH_STEPS)?;
+    Ok((at, search.evaluations))
+}
+
+/// The clips at numbers that were found otherwise, with the error of hits that they leave.
 ///
 /// # Errors
 /// [`Impossible`] when the cell cannot be simulated there.
@@ -87,16 +100,23 @@ pub(super) fn linearise_object(
     clips: &mut ObjectClips,
     unknowns: &[Unknown],
     at: &[f64],
-) -> Result<(Linearised, Vec<f64>), Impossible> {
+) -> Result<Linearised, Impossible> {
     clips.set_model_error(FIRST_ERROR);
     let random = scattered(clips);
     let own = vec![vec![0.0; random.len()]; clips.clips()];
     let first = Question { clips, unknowns, random: &random }.here(at, &own)?;
     clips.set_model_error(model_error(clips, &first)?);
-    let question = Question { clips, unknowns, random: &random };
-    let there = question.here(at, &first.own())?;
-    let (widths, _) = question.widths(&there)?;
-    Ok((there, widths))
+    let mut there = Question { clips, unknowns, random: &random }.here(at, &first.own())?;
+    there.evaluations += first.evaluations;
+    Ok(there)
+}
+
+/// [`Question::widths`] of clips that were linearised at numbers found otherwise.
+///
+/// # Errors
+/// As [`linearise_object`].
+pub(super) fn widths(clips: &ObjectClips, unknowns: &[Unknown], at: &Linearised) -> Result<Vec<f64>, Impossible> {
+    Ok(Question { clips, unknowns, random: &scattered(clips) }.widths(at)?.0)
 }
 
 struct Search<'a, W> {
@@ -107,6 +127,20 @@ struct Search<'a, W> {
 }
 
 impl<W: Fn(&[f64], usize) -> bool> Search<'_, W> {
+    /// From far away to where resting places agree, no clip having numbers of its own.
+    fn first(
+        &mut self,
+        clips: &mut ObjectClips,
+        unknowns: &[Unknown],
+        start: &[f64],
+        most: usize,
+    ) -> Result<Linearised, Impossible> {
+        clips.set_model_error(FIRST_ERROR);
+        let random = held(clips);
+        let own = vec![vec![0.0; random.len()]; clips.clips()];
+        self.steps(Question { clips, unknowns, random: &random }, (start, &own), most)
+    }
+
     fn steps(
         &mut self,
         question: Question<'_>,

@@ -13,6 +13,7 @@
 //! | `paper` | the loss on the object's surface, for searches without slopes |
 //! | `parts` | how sure tosses leave the numbers |
 //! | `polish` | the last stretch to that loss |
+//! | `vicinity` | the way down to it by few points |
 //! | `finding` | what a fit tells, number by number, and what it cannot tell |
 //! | `doubt` | what speaks against trusting the fit |
 //! | [`compare`] | ways of searching side by side |
@@ -33,6 +34,7 @@ pub(crate) mod screen;
 mod step;
 #[cfg(test)]
 mod test_clip;
+mod vicinity;
 
 use super::answer::Identification;
 use super::run::{Optimizer, Outcome, Run, RunError};
@@ -215,7 +217,8 @@ impl Problem {
             let loss = SurfaceLoss::new(clips, &shape);
             run.search(&loss, &loss)?
         };
-        let (at, widths) = linearise_object(clips, &self.unknowns, &outcome.fit.shared)?;
+        let at = linearise_object(clips, &self.unknowns, &outcome.fit.shared)?;
+        let widths = fit::widths(clips, &self.unknowns, &at)?;
         let Outcome { simulated: evaluations, convergence, arrived: converged, .. } = outcome;
         Ok(ObjectFit { at, widths, evaluations, convergence, converged })
     }

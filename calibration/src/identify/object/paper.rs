@@ -4,12 +4,21 @@
 
 use crate::estimate::{ClipModel, Impossible};
 use crate::forward::object::ObjectClips;
+use nalgebra::{Isometry3, Vector6};
 use shared_mem::frames::{Base, Object, Pose};
 use twin::metrics::SurfacePoints;
 use twin::scene::ObjectShape;
 
 /// Poses of a clip that count, evenly spaced: more do not move the mean.
 const POSES: usize = 40;
+
+/// A simulated pose in the measured object's frame: how far it lies off [m] and its turn [rad], axis times angle.
+pub(super) type Slip = Vector6<f64>;
+
+/// Of how many poses of a clip one counts.
+fn every(poses: usize) -> usize {
+    poses.div_ceil(POSES).max(1)
+}
 
 /// Clips, judged by their surface's points alone.
 pub(super) struct SurfaceLoss<'a> {
@@ -36,8 +45,32 @@ impl<'a> SurfaceLoss<'a> {
         Ok(sum / rows.max(f64::MIN_POSITIVE))
     }
 
-    fn loss(&self, a: &Pose<Base, Object>, b: &Pose<Base, Object>) -> f64 {
-        self.points.add(a, b) + self.points.add_s(a, b)
+    /// How far the simulated object lies from the measured one, pose by pose that counts.
+    ///
+    /// # Errors
+    /// [`Impossible`] where the twin has no answer.
+    pub(super) fn slips(&self, clip: usize, numbers: &[f64]) -> Result<Vec<Slip>, Impossible> {
+        let predicted = self.clips.predict(clip, numbers, &[])?.poses;
+        let measured = &self.clips.clip(clip).object.poses;
+        let slip = |(predicted, measured): (&Pose<Base, Object>, &Pose<Base, Object>)| {
+            let slip = measured.isometry().inverse() * predicted.isometry();
+            let (by, turn) = (slip.translation.vector, slip.rotation.scaled_axis());
+            Slip::new(by.x, by.y, by.z, turn.x, turn.y, turn.z)
+        };
+        Ok(predicted.iter().zip(measured).step_by(every(measured.len())).map(slip).collect())
+    }
+
+    /// Poses of a clip that count.
+    pub(super) fn poses(&self, clip: usize) -> usize {
+        let poses = self.clips.clip(clip).object.poses.len();
+        poses.div_ceil(every(poses))
+    }
+
+    /// Loss of a pose that lies so far from the measured one [m].
+    pub(super) fn of_slip(&self, slip: &Slip) -> f64 {
+        let there = Isometry3::new(slip.fixed_rows::<3>(0).into(), slip.fixed_rows::<3>(3).into());
+        let [there, here] = [there, Isometry3::identity()].map(Pose::from_isometry);
+        self.points.add(&there, &here) + self.points.add_s(&there, &here)
     }
 }
 
@@ -47,12 +80,8 @@ impl ClipModel for SurfaceLoss<'_> {
     }
 
     fn residuals(&self, clip: usize, shared: &[f64], _: &[f64], out: &mut Vec<f64>) -> Result<(), Impossible> {
-        let predicted = self.clips.predict(clip, shared, &[])?.poses;
-        let measured = &self.clips.clip(clip).object.poses;
-        let every = measured.len().div_ceil(POSES).max(1);
         out.clear();
-        let pairs = predicted.iter().zip(measured).step_by(every);
-        out.extend(pairs.map(|(predicted, measured)| self.loss(predicted, measured).sqrt()));
+        out.extend(self.slips(clip, shared)?.iter().map(|slip| self.of_slip(slip).sqrt()));
         Ok(())
     }
 }

@@ -1,26 +1,19 @@
 //! The last stretch to the paper's loss. Slopes lead near it and no further: a hit is so rough that the lowest place has
-//! none to follow. From there a small cloud of points goes on, shaped by what the slopes said of the numbers together.
+//! none to follow. From there points scattered in the shape that the slopes gave lead on.
 //!
 //! The loss sees poses alone, and they hardly tell a heavy object from a light one: the mass stays what the arm felt.
 
-use super::fit::{ObjectFit, fit_object, linearise_object};
+use super::fit::{ObjectFit, fit_object, linearise_object, roughly};
 use super::paper::SurfaceLoss;
-use crate::estimate::{ClipModel as _, Evolution, Impossible, Unknown, minimise, search};
+use super::step::Linearised;
+use super::vicinity::descend;
+use crate::estimate::{ClipModel as _, Impossible, Unknown};
 use crate::forward::Setting;
 use crate::forward::object::ObjectClips;
 use nalgebra::{DMatrix, DVector};
 use shared_mem::cell::ClipKind;
-use std::cmp::Ordering;
-use std::sync::Mutex;
 use twin::scene::ObjectShape;
 
-/// How far the cloud may reach, and how wide it is at first, in sigmas of what the slopes said.
-const REACH: f64 = 10.0;
-const WIDTH: f64 = 1.0;
-/// Points whose loss is asked for at most.
-pub(super) const POINTS: usize = 160;
-/// So many of them, the best, are averaged.
-const BEST: usize = 8;
 /// No number is taken for known better than this share of its range.
 const BLUR: f64 = 0.01;
 
@@ -50,10 +43,30 @@ pub(super) fn fit_polished(
     }
     let (numbers, more) = {
         let loss = SurfaceLoss::new(clips, searched.shape);
-        polish(&loss, searched, &found, |numbers, more| watch(numbers, found.evaluations + more))
+        let free = |setting: &Setting| *setting != Setting::Mass;
+        polish(&loss, searched, (&found.at, free), |numbers, more| watch(numbers, found.evaluations + more))
     };
-    let (at, widths) = linearise_object(clips, searched.unknowns, &numbers)?;
-    Ok(ObjectFit { at, widths, evaluations: found.evaluations + more, ..found })
+    // How much wider intervals are was told where the deviance is least; here it may fall to a side.
+    let at = linearise_object(clips, searched.unknowns, &numbers)?;
+    Ok(ObjectFit { evaluations: found.evaluations + more + at.evaluations, at, ..found })
+}
+
+/// By the loss alone, whatever the arm felt: numbers and clips simulated. A comparison with searches that know nothing
+/// else; the mass comes out wrong.
+///
+/// # Errors
+/// As [`fit_polished`].
+pub(super) fn fit_poses_alone(
+    clips: &mut ObjectClips,
+    searched: Searched<'_>,
+    start: &[f64],
+    watch: impl Fn(&[f64], usize) -> bool,
+) -> Result<(Vec<f64>, usize), Impossible> {
+    let (found, evaluations) = roughly(clips, searched.unknowns, start, &watch)?;
+    let loss = SurfaceLoss::new(clips, searched.shape);
+    let (numbers, more) =
+        polish(&loss, searched, (&found, |_| true), |numbers, more| watch(numbers, evaluations + more));
+    Ok((numbers, evaluations + more))
 }
 
 /// Whether some of the clips are tosses: nothing pushes the object in them.
@@ -65,44 +78,22 @@ pub(super) fn let_go(clips: &ObjectClips) -> bool {
 fn polish(
     loss: &SurfaceLoss<'_>,
     searched: Searched<'_>,
-    from: &ObjectFit,
+    (from, free): (&Linearised, impl Fn(&Setting) -> bool),
     watch: impl Fn(&[f64], usize) -> bool,
 ) -> (Vec<f64>, usize) {
     let Searched { unknowns, settings, seed, .. } = searched;
-    let free: Vec<usize> = (0..unknowns.len()).filter(|k| settings[*k] != Setting::Mass).collect();
-    let spread = spread(&from.at.information(), &free, unknowns);
+    let free: Vec<usize> = (0..unknowns.len()).filter(|k| free(&settings[*k])).collect();
+    let spread = spread(&from.information(), &free, unknowns);
     let place = |z: &[f64]| {
-        let mut numbers = from.at.shared.clone();
+        let mut numbers = from.shared.clone();
         for (k, step) in free.iter().zip((&spread * DVector::from_column_slice(z)).iter()) {
             numbers[*k] = (numbers[*k] + step).clamp(unknowns[*k].lower, unknowns[*k].upper);
         }
         numbers
     };
-    let axis = |k: usize| Unknown { name: format!("axis {k}"), start: 0.0, lower: -REACH, upper: REACH, step: 1.0 };
-    let axes: Vec<Unknown> = (0..free.len()).map(axis).collect();
-    let mut cloud = Evolution::of_width(&search::start(&axes), 0.5 * WIDTH / REACH, seed);
-    let seen = Mutex::new(Vec::new());
-    let cost = |z: &[f64]| {
-        let cost = loss.mean(&place(z), &from.at.weights).unwrap_or(f64::INFINITY);
-        seen.lock().expect("no holder panics").push((cost, z.to_vec()));
-        cost
-    };
-    cost(&vec![0.0; free.len()]);
-    let middle = || place(&middle_of_best(&mut seen.lock().expect("no holder panics")));
-    let found = minimise(&mut cloud, &axes, POINTS, &[], cost, |_, best| {
-        watch(&middle(), (1 + best.evaluations) * loss.clips())
-    });
-    (middle(), (1 + found.evaluations) * loss.clips())
-}
-
-/// The middle of the points with the least loss. The very lowest lies where chance has dug a hole into the roughness of
-/// these clips' hits; others have theirs elsewhere.
-fn middle_of_best(seen: &mut [(f64, Vec<f64>)]) -> Vec<f64> {
-    // Threads ask in any order.
-    seen.sort_by(|a, b| a.0.total_cmp(&b.0).then_with(|| a.1.partial_cmp(&b.1).unwrap_or(Ordering::Equal)));
-    let best = &seen[..seen.len().min(BEST)];
-    let mean = |k: usize| best.iter().map(|(_, z)| z[k]).sum::<f64>() / best.len() as f64;
-    (0..best.first().map_or(0, |(_, z)| z.len())).map(mean).collect()
+    let (z, simulated) =
+        descend(loss, &from.weights, (free.len(), seed), place, |z, simulated| watch(&place(z), simulated));
+    (place(&z), simulated)
 }
 
 /// A square root of the free numbers' covariance, (free, free), each in its own unit.
@@ -120,14 +111,6 @@ fn spread(information: &DMatrix<f64>, free: &[usize], unknowns: &[Unknown]) -> D
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn the_best_points_are_averaged_in_whatever_order_they_were_asked() {
-        let point = |k: usize| (k as f64, vec![k as f64, 1.0]);
-        let mut seen: Vec<_> = (0..20).map(|k| point((7 * k) % 20)).collect();
-        assert_eq!(middle_of_best(&mut seen), [3.5, 1.0]);
-        assert_eq!(middle_of_best(&mut [point(4)]), [4.0, 1.0]);
-    }
 
     #[test]
     fn the_spread_follows_what_the_slopes_say_and_never_leaves_the_ranges() {

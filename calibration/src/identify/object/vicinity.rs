@@ -1,0 +1,192 @@
+//! The way down to the paper's loss near a place, by asking few points.
+//!
+//! Hits are rough, so slopes at one point say little; a regression over points scattered around it looks over the
+//! roughness. It tells where every pose goes, six numbers each, not only the loss: poses answer to the numbers nearly
+//! linearly where their mean distance has a kink, and each point brings thousands of them (Zhang, Conn & Scheinberg 2010
+//! go down sums of squares without slopes in the same way). The loss of these modelled poses costs no simulation, so it
+//! is searched at leisure; then points are scattered there, less wide.
+
+use super::paper::{Slip, SurfaceLoss};
+use crate::estimate::{ClipModel as _, Evolution, Impossible, Unknown, minimise, search};
+use nalgebra::{Cholesky, DMatrix, DVector};
+use rand::{RngExt as _, SeedableRng as _};
+use rand_distr::StandardNormal;
+use rand_pcg::Pcg64;
+use rayon::prelude::*;
+
+/// Times that points are scattered.
+const ROUNDS: usize = 3;
+/// First width of the scatter, in what coordinates are counted in, and its shrinking from round to round.
+const WIDTH: f64 = 1.5;
+const NARROWER: f64 = 0.6;
+/// How far the modelled loss may lead away from the middle of the scatter, in its widths.
+const REACH: f64 = 2.0;
+/// Looks at the modelled loss in a round.
+const LOOKS: usize = 400;
+/// Of the poses that count, every third is modelled.
+const EVERY: usize = 3;
+/// What the regression holds slopes back with, in squared widths: enough for a direction that few points went to.
+const RIDGE: f64 = 0.3;
+
+/// Points whose loss is asked for at most, of so many coordinates.
+pub(super) const fn points(coordinates: usize) -> usize {
+    ROUNDS * (per_round(coordinates) + 1)
+}
+
+/// The middle, and pairs to both sides of it in one more direction than there are.
+const fn per_round(coordinates: usize) -> usize {
+    1 + 2 * (coordinates + 1)
+}
+
+/// A place asked for.
+struct Asked {
+    at: Vec<f64>,
+    /// Where the modelled poses went: clip by clip, pose by pose, six numbers each.
+    slips: Vec<Slip>,
+    loss: f64,
+}
+
+/// From zero down to a place of less loss, and the clips simulated on the way. `place` makes numbers of coordinates;
+/// clips count as much as `weights` say. `watch` sees coordinates and clips simulated after every round; `false` ends it.
+pub(super) fn descend(
+    loss: &SurfaceLoss<'_>,
+    weights: &[f64],
+    (coordinates, seed): (usize, u64),
+    place: impl Fn(&[f64]) -> Vec<f64> + Sync,
+    watch: impl Fn(&[f64], usize) -> bool,
+) -> (Vec<f64>, usize) {
+    let mut random = Pcg64::seed_from_u64(seed);
+    let (mut middle, mut width, mut simulated) = (vec![0.0; coordinates], WIDTH, 0);
+    let (mut asked, mut middles): (Vec<Asked>, Vec<(f64, Vec<f64>)>) = (Vec::new(), Vec::new());
+    let ask = |at: &Vec<f64>| ask(loss, weights, at, &place(at)).ok();
+    for _ in 0..ROUNDS {
+        let scattered = scatter(&middle, width, &mut random);
+        simulated += scattered.len() * loss.clips();
+        asked.extend(scattered.par_iter().filter_map(ask).collect::<Vec<_>>());
+        let Some(vicinity) = Vicinity::through(&asked, &middle, width) else { break };
+        middle = vicinity.lowest(loss, weights, seed);
+        // The next round's first point, were it not for the last one, that nobody follows.
+        simulated += loss.clips();
+        middles.extend(ask(&middle).map(|asked| (asked.loss, asked.at)));
+        width *= NARROWER;
+        if !watch(&middle, simulated) {
+            break;
+        }
+    }
+    // The first one asked is where all began.
+    middles.extend(asked.into_iter().next().map(|first| (first.loss, first.at)));
+    let lowest = middles.into_iter().min_by(|a, b| a.0.total_cmp(&b.0));
+    (lowest.map_or(vec![0.0; coordinates], |(_, at)| at), simulated)
+}
+
+fn ask(loss: &SurfaceLoss<'_>, weights: &[f64], at: &[f64], numbers: &[f64]) -> Result<Asked, Impossible> {
+    let (mut slips, mut sum, mut rows) = (Vec::new(), 0.0, 0.0);
+    for (clip, weight) in weights.iter().enumerate() {
+        let of_clip = loss.slips(clip, numbers)?;
+        sum += weight * of_clip.iter().map(|slip| loss.of_slip(slip)).sum::<f64>();
+        rows += weight * of_clip.len() as f64;
+        slips.extend(of_clip.into_iter().step_by(EVERY));
+    }
+    Ok(Asked { at: at.to_vec(), slips, loss: sum / rows.max(f64::MIN_POSITIVE) })
+}
+
+/// `middle`, and pairs to both sides of it.
+fn scatter(middle: &[f64], width: f64, random: &mut Pcg64) -> Vec<Vec<f64>> {
+    let mut points = vec![middle.to_vec()];
+    while points.len() < per_round(middle.len()) {
+        let way: Vec<f64> = middle.iter().map(|_| random.sample(StandardNormal)).collect();
+        for side in [width, -width] {
+            points.push(middle.iter().zip(&way).map(|(x, dx): (&f64, &f64)| x + side * dx).collect());
+        }
+    }
+    points
+}
+
+/// Where poses go around a place: linear in the coordinates.
+struct Vicinity {
+    middle: Vec<f64>,
+    reach: f64,
+    /// `(1 + coordinates, 6 * poses)`: at the middle, and by how much more a unit of each coordinate.
+    slopes: DMatrix<f64>,
+}
+
+impl Vicinity {
+    /// Through the points asked so far, nearer ones counting more; none where there are too few.
+    fn through(asked: &[Asked], middle: &[f64], width: f64) -> Option<Self> {
+        let (n, poses) = (middle.len(), asked.first()?.slips.len());
+        if asked.len() < n + 2 {
+            return None;
+        }
+        let away = |point: &Asked| point.at.iter().zip(middle).map(|(x, m)| (x - m).powi(2)).sum::<f64>();
+        let counts = |point: &Asked| (-0.25 * away(point) / (n as f64 * (1.5 * width).powi(2))).exp();
+        let roots: Vec<f64> = asked.iter().map(counts).collect();
+        let x = DMatrix::from_fn(asked.len(), n + 1, |i, k| {
+            roots[i] * if k == 0 { 1.0 } else { asked[i].at[k - 1] - middle[k - 1] }
+        });
+        let y = DMatrix::from_fn(asked.len(), 6 * poses, |i, k| roots[i] * asked[i].slips[k / 6][k % 6]);
+        let mut gram = x.tr_mul(&x);
+        for k in 1..=n {
+            gram[(k, k)] += RIDGE * width * width;
+        }
+        let slopes = Cholesky::new(gram)?.solve(&x.tr_mul(&y));
+        Some(Self { middle: middle.to_vec(), reach: REACH * width, slopes })
+    }
+
+    /// Where the modelled poses have the least loss.
+    fn lowest(&self, loss: &SurfaceLoss<'_>, weights: &[f64], seed: u64) -> Vec<f64> {
+        let axis = |m: &f64| Unknown {
+            name: String::new(),
+            start: *m,
+            lower: m - self.reach,
+            upper: m + self.reach,
+            step: self.reach,
+        };
+        let axes: Vec<Unknown> = self.middle.iter().map(axis).collect();
+        let of_clip = |(clip, weight): (usize, &f64)| vec![*weight; loss.poses(clip).div_ceil(EVERY)];
+        let counts: Vec<f64> = weights.iter().enumerate().flat_map(of_clip).collect();
+        let modelled = |at: &[f64]| {
+            let slips = self.slips(at);
+            let pose = |(k, counts): (usize, &f64)| counts * loss.of_slip(&slips.fixed_rows::<6>(6 * k).into_owned());
+            counts.iter().enumerate().map(pose).sum::<f64>()
+        };
+        let mut cloud = Evolution::new(&search::start(&axes), seed);
+        minimise(&mut cloud, &axes, LOOKS, &[], modelled, |_, _| true).numbers
+    }
+
+    fn slips(&self, at: &[f64]) -> DVector<f64> {
+        let moved = at.iter().zip(&self.middle).map(|(x, m)| x - m);
+        self.slopes.tr_mul(&DVector::from_iterator(1 + at.len(), std::iter::once(1.0).chain(moved)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_regression_looks_over_roughness_that_slopes_fall_into() {
+        let mut random = Pcg64::seed_from_u64(2);
+        let rough = |at: &[f64]| {
+            let ripple = 0.002 * (90.0 * at[0]).sin();
+            Asked { at: at.to_vec(), slips: vec![Slip::repeat(0.03 - 0.01 * at[0] + 0.02 * at[1] + ripple)], loss: 0.0 }
+        };
+        let asked: Vec<Asked> =
+            (0..4).flat_map(|_| scatter(&[1.0, 0.5], 1.0, &mut random)).map(|at| rough(&at)).collect();
+        let vicinity = Vicinity::through(&asked, &[1.0, 0.5], 1.0).expect("enough points");
+        for at in [[1.0, 0.5], [2.0, 0.5], [1.0, 1.5]] {
+            let plain = 0.03 - 0.01 * at[0] + 0.02 * at[1];
+            assert!((vicinity.slips(&at)[5] - plain).abs() < 2e-3, "{at:?}");
+        }
+        assert!(Vicinity::through(&asked[..3], &[1.0, 0.5], 1.0).is_none(), "too few points say nothing");
+    }
+
+    #[test]
+    fn points_lie_on_both_sides_and_are_as_many_as_the_bar_counts() {
+        let scattered = scatter(&[0.5, -1.0, 2.0], 0.7, &mut Pcg64::seed_from_u64(1));
+        assert_eq!(ROUNDS * (scattered.len() + 1), points(3));
+        for k in 0..3 {
+            let mean = scattered.iter().map(|at| at[k]).sum::<f64>() / scattered.len() as f64;
+            assert!((mean - [0.5, -1.0, 2.0][k]).abs() < 1e-12);
+        }
+    }
+}
