@@ -2,7 +2,7 @@
 //! into the session, and step back.
 
 use super::body::Body;
-use super::limits::{self, JointLimits};
+use super::limits;
 use super::link::Link;
 use super::object_watch::{ObjectWatch, PoseQuality};
 use super::plan::RATE;
@@ -21,6 +21,7 @@ use shared_mem::cell::{Cell, ClipKind};
 use shared_mem::msg::motion::SetPoint;
 use std::path::PathBuf;
 use std::time::Duration;
+use twin::arm::JointLimits;
 use twin::scene::ObjectModel;
 
 /// The tool travels this far above the object, and no lower than half of it [m].

@@ -1,7 +1,7 @@
 //! The verb `capture excitation`: for each clip plan, record, play, judge, enter into the session.
 
 use super::body::Body;
-use super::limits::{self, JointLimits};
+use super::limits;
 use super::link::Link;
 use super::plan::{Plan, RATE, Request, plan};
 use super::quality::{Quality, Verdict, Watch};
@@ -14,6 +14,7 @@ use crate::progress::Progress;
 use serde::Serialize;
 use shared_mem::cell::{Cell, ClipKind};
 use std::path::{Path, PathBuf};
+use twin::arm::JointLimits;
 
 /// Flange and tool stay this far above table and object [m]: about twice what a loosely tuned arm strays.
 const CLEARANCE: f64 = 0.05;

@@ -5,11 +5,12 @@
 
 use super::body::Body;
 use super::excess::{Excess, Quantity};
-use super::limits::{JointLimits, SHARE};
+use super::limits::SHARE;
 use super::multisine::Multisine;
 use super::stream::Motion;
 use shared_mem::msg::motion::SetPoint;
 use shared_mem::msg::{Joints, MAX_JOINTS};
+use twin::arm::JointLimits;
 use twin::arm::JointState;
 
 /// Set points a second: the control rate of the arm.
@@ -129,7 +130,7 @@ fn pose_excess(state: &JointState, ddq: &Joints, floor: f64, limits: &[JointLimi
     }
     let torque = body.torque(state, ddq);
     torque.iter().zip(limits).enumerate().find_map(|(joint, (tau, limits))| {
-        let limit = SHARE * limits.tau_max;
+        let limit = SHARE * limits.torque;
         (tau.abs() > limit).then_some(Excess {
             joint: Some(joint),
             quantity: Quantity::Torque,
@@ -164,8 +165,8 @@ impl Samples {
             let speed_limit = SHARE * if dq < 0.0 { -slowest } else { fastest };
             let checks = [
                 (Quantity::Speed, dq.abs(), speed_limit),
-                (Quantity::Acceleration, ddq.abs(), SHARE * limits.ddq_max),
-                (Quantity::Jerk, dddq.abs(), SHARE * limits.dddq_max),
+                (Quantity::Acceleration, ddq.abs(), SHARE * limits.acceleration),
+                (Quantity::Jerk, dddq.abs(), SHARE * limits.jerk),
             ];
             let beyond = checks.into_iter().find(|(_, value, limit)| value > limit);
             position_excess(joint, q, limits).or(beyond.map(|(quantity, value, limit)| Excess {
@@ -237,9 +238,9 @@ mod tests {
                 let jerk = (acceleration(i, joint) - acceleration(i - 1, joint)) * RATE;
                 assert!((limits.q_min..=limits.q_max).contains(&q(i, joint)), "joint {joint} at {i}: {}", q(i, joint));
                 assert!((slowest..=fastest).contains(&speed(i, joint)), "joint {joint} at {i}: {}", speed(i, joint));
-                assert!(acceleration(i, joint).abs() <= limits.ddq_max, "joint {joint} at {i}");
-                assert!(jerk.abs() <= limits.dddq_max, "joint {joint} at {i}: {jerk}");
-                assert!((plan.set_points[i].dq_d[joint] - speed(i, joint)).abs() < limits.ddq_max / RATE);
+                assert!(acceleration(i, joint).abs() <= limits.acceleration, "joint {joint} at {i}");
+                assert!(jerk.abs() <= limits.jerk, "joint {joint} at {i}: {jerk}");
+                assert!((plan.set_points[i].dq_d[joint] - speed(i, joint)).abs() < limits.acceleration / RATE);
             }
         }
         for i in (2..plan.set_points.len()).step_by(7) {
@@ -247,7 +248,7 @@ mod tests {
             let mut ddq = [0.0; MAX_JOINTS];
             (0..limits.len()).for_each(|joint| ddq[joint] = acceleration(i, joint));
             let tau = body.torque(&JointState { q: point.q_d, dq: point.dq_d }, &ddq);
-            assert!(tau.iter().zip(limits).all(|(tau, limits)| tau.abs() <= limits.tau_max), "at {i}: {tau:?}");
+            assert!(tau.iter().zip(limits).all(|(tau, limits)| tau.abs() <= limits.torque), "at {i}: {tau:?}");
             assert!(body.lowest_point(&point.q_d) >= floor, "at {i}");
         }
     }

@@ -6,13 +6,13 @@
 //! [`ANCHOR`]-th stroke repeats the first: the same stroke again tells scatter from gap and drift from both.
 
 use super::body::Body;
-use super::limits::JointLimits;
 use super::stroke::{self, Stroke, StrokeError, StrokePlan};
 use super::way::{WayError, Ways};
 use shared_mem::cell::Cell;
 use shared_mem::msg::Joints;
 use shared_mem::msg::motion::SetPoint;
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
+use twin::arm::JointLimits;
 
 /// Every so many strokes the first is repeated.
 pub const ANCHOR: usize = 6;

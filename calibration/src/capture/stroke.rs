@@ -6,13 +6,14 @@
 
 use super::body::Body;
 use super::excess::Excess;
-use super::limits::{JointLimits, first_excess};
+use super::limits::first_excess;
 use super::line;
 use super::plan::RATE;
 use super::way::upright;
 use nalgebra::Vector3;
 use shared_mem::msg::Joints;
 use shared_mem::msg::motion::SetPoint;
+use twin::arm::JointLimits;
 
 /// Way at full speed before the object's bounding circle, so that the controller has settled when it hits [m].
 const SETTLED: f64 = 0.02;

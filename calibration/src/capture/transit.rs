@@ -3,11 +3,11 @@
 //!
 //! The only `rsruckig` code of this crate.
 
-use super::limits::JointLimits;
 use super::plan::RATE;
 use rsruckig::prelude::*;
 use shared_mem::msg::motion::SetPoint;
 use shared_mem::msg::{Joints, MAX_JOINTS};
+use twin::arm::JointLimits;
 
 /// Share of the limits of acceleration and jerk that a transit uses.
 const CALM: f64 = 0.4;
@@ -26,9 +26,9 @@ pub fn plan(from: &Joints, to: &Joints, limits: &[JointLimits], pace: f64) -> Op
         let limit = limits.get(joint);
         input.current_position[joint] = from[joint];
         input.target_position[joint] = if limit.is_some() { to[joint] } else { from[joint] };
-        input.max_velocity[joint] = pace * limit.map_or(IDLE, |limit| SPEED.min(CALM * limit.dq_max));
-        input.max_acceleration[joint] = CALM * limit.map_or(IDLE, |limit| limit.ddq_max);
-        input.max_jerk[joint] = CALM * limit.map_or(IDLE, |limit| limit.dddq_max);
+        input.max_velocity[joint] = pace * limit.map_or(IDLE, |limit| SPEED.min(CALM * limit.velocity));
+        input.max_acceleration[joint] = CALM * limit.map_or(IDLE, |limit| limit.acceleration);
+        input.max_jerk[joint] = CALM * limit.map_or(IDLE, |limit| limit.jerk);
     }
     let mut planner = Ruckig::<MAX_JOINTS, IgnoreErrorHandler>::new(None, RATE.recip());
     let mut plan = Trajectory::new(None);

@@ -5,11 +5,12 @@
 
 use super::body::Body;
 use super::excess::{Excess, Quantity};
-use super::limits::{JointLimits, first_excess};
+use super::limits::first_excess;
 use super::{line, transit};
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use shared_mem::msg::Joints;
 use shared_mem::msg::motion::SetPoint;
+use twin::arm::JointLimits;
 
 /// Speed straight up and down [m/s].
 const SPEED: f64 = 0.15;

@@ -214,17 +214,13 @@ fn plan(settings: &Settings, cell: &Cell, model: &ArmModel) -> Result<Plan> {
         true => Some(TorquePd::new(&ControlLaw::new(cell.controller.as_ref(), None, model)?, model.clone())),
         false => None,
     };
-    let limits = match cell.robot.as_ref().and_then(|robot| robot.model.as_deref()) {
-        Some("fr3") => Limits::fr3().with_torque_of(model),
-        _ => Limits::of_model(model),
-    };
     let session = SystemTime::now().duration_since(UNIX_EPOCH).map_or(1, |d| d.as_nanos() as u64);
     Ok(Plan {
         interface: if law.is_some() { CommandInterface::Torque } else { CommandInterface::JointPosition },
         law,
         model: model.clone(),
         tip_radius: cell.tool.as_ref().map_or(0.0, |tool| tool.radius),
-        limits,
+        limits: Limits::of(cell, model),
         session,
     })
 }

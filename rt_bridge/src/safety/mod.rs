@@ -2,7 +2,6 @@
 //!
 //! | file | owns |
 //! |---|---|
-//! | [`limits`] | how far, fast and hard each joint may go |
 //! | [`trace`] | velocity, acceleration and jerk of what was commanded, as the robot differences it |
 //! | [`guard`] | the verdict on the next set point: it and the braking that may follow it stay inside the limits |
 //! | [`torque`] | torque and torque rate, clamped |
@@ -10,15 +9,14 @@
 //! | [`watchdog`] | how long silence is borne |
 
 pub mod guard;
-pub mod limits;
 pub mod torque;
 pub mod trace;
 pub mod watchdog;
 pub mod workspace;
 
 pub use guard::{Guard, Violation};
-pub use limits::{JointLimits, Limits, TORQUE_RATE};
 pub use torque::TorqueGuard;
 pub use trace::Trace;
+pub use twin::arm::{JointLimits, Limits, TORQUE_RATE};
 pub use watchdog::Watchdog;
 pub use workspace::Workspace;

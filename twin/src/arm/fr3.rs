@@ -72,6 +72,10 @@ const LIMITS: [(f64, f64, f64, f64, f64); 7] = [
     (-3.0508, 3.0508, 5.26, 12.0, 0.074),
 ];
 
+/// Deceleration [rad/s²] and speed offset [rad/s] by which the speed limit falls towards a joint's stops.
+pub(super) const BRAKING: [[f64; 2]; 7] =
+    [[6.0, 0.6599], [2.585, 0.2517], [3.5, 0.2000], [4.0, 0.3533], [17.0, 0.5757], [5.5, 0.4878], [17.0, 0.4628]];
+
 /// The vendor's ready pose [rad].
 const READY: [f64; 7] = [0.0, -FRAC_PI_4, 0.0, -3.0 * FRAC_PI_4, 0.0, FRAC_PI_2, FRAC_PI_4];
 

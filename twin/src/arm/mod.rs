@@ -9,6 +9,7 @@
 //! | `model` | [`ArmModel`]: what an arm is, and how cell.toml, tool and payload make one |
 //! | `fr3` | numbers of the built-in Franka FR3 |
 //! | `urdf` | the way in from a URDF file (the only `urdf-rs` code) |
+//! | `limits` | [`Limits`]: how far, fast and hard each joint may go |
 //! | `inertia` | mass properties of bodies |
 //! | `kinematics` | flange, Jacobian |
 //! | `dynamics` | gravity, Coriolis, mass matrix, accelerations |
@@ -24,6 +25,7 @@ mod fr3;
 mod inertia;
 mod kernel;
 mod kinematics;
+mod limits;
 mod model;
 mod spatial;
 mod step;
@@ -35,6 +37,7 @@ pub use control::{ControlLaw, GainError};
 pub use dynamics::PointForce;
 pub use inertia::MassProperties;
 pub use kinematics::Jacobian;
+pub use limits::{JointLimits, Limits, TORQUE_RATE};
 pub use model::{ArmModel, ModelError};
 pub use shared_mem::msg::{Joints, MAX_JOINTS};
 pub use transmission::{Spring, Transmission};

@@ -116,7 +116,7 @@ impl Robot {
     /// The robot of a cell, idle where `[simulation]` puts it. `theta` are parameters and effects that no client is told.
     pub(super) fn new(cell: &Cell, theta: Option<&Theta>) -> Result<Self, ServeError> {
         let body = Body::new(cell, theta)?;
-        let limits = Limits::fr3().with_torque_of(body.model());
+        let limits = Limits::of(cell, body.model());
         let mut robot = Self {
             rules: JointRules { limits },
             settings: Settings::at_power_on(cell.tool.as_ref()),
