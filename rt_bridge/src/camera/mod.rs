@@ -23,6 +23,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{self, Sender};
 use std::thread::{self, JoinHandle};
+use twin::effects::CameraEffects;
 use twin::scene::SceneSnapshot;
 use twin::sensors::camera::SimCamera;
 
@@ -48,13 +49,18 @@ pub enum CameraError {
 }
 
 impl Camera {
-    /// Starts the simulated camera on the scenes of a simulated cell.
+    /// Starts the simulated camera on the scenes of a simulated cell, under effects that nobody is told.
     ///
     /// # Errors
     /// [`CameraError`] when the cell cannot be drawn or another camera runs.
-    pub fn simulated(cell: &Cell, scenes: Consumer<SceneSnapshot>) -> Result<Self, CameraError> {
-        let camera = SimCamera::new(cell)?;
-        let latency_ns = cell.camera.as_ref().map_or(0, |camera| (camera.latency * 1e9) as u64);
+    pub fn simulated(
+        cell: &Cell,
+        scenes: Consumer<SceneSnapshot>,
+        effects: &CameraEffects,
+    ) -> Result<Self, CameraError> {
+        let camera = SimCamera::new(cell)?.with_effects(effects);
+        let known_ns = cell.camera.as_ref().map_or(0, |camera| (camera.latency * 1e9) as u64);
+        let latency_ns = known_ns + effects.latency_ns();
         Ok(Self::start(move |opened, stop| {
             let (_node, ports) = match sim::open(&camera) {
                 Ok(open) => open,

@@ -23,6 +23,7 @@ use std::path::PathBuf;
 use std::str::FromStr;
 use std::time::{SystemTime, UNIX_EPOCH};
 use twin::arm::{ArmModel, ControlLaw};
+use twin::effects::CameraEffects;
 use twin::scene::SceneSnapshot;
 
 /// Which arm.
@@ -123,7 +124,7 @@ pub(super) struct Devices {
 /// Where pictures come from.
 pub(super) enum Pictures {
     None,
-    Scenes(Consumer<SceneSnapshot>),
+    Scenes(Consumer<SceneSnapshot>, CameraEffects),
     Clip(PathBuf, ReplayClock),
     RealSense(CameraSource),
 }
@@ -150,12 +151,19 @@ impl Devices {
         let devices = match &settings.arm {
             ArmChoice::Sim => {
                 let (world, arm, views) = World::start(cell, hidden(settings, plan.interface)?.as_ref())?;
+                if tracker == TrackerChoice::Rgbd
+                    && let [name, ..] = views.camera_effects.of_the_tracker()[..]
+                {
+                    bail!(
+                        "{name} is an effect of the simulated tracker, which no picture shows; use it with --tracker sim"
+                    );
+                }
                 Self {
                     arm: Box::new(arm),
                     plan,
                     world: Some(world),
                     pictures: match camera {
-                        CameraChoice::Sim => Pictures::Scenes(views.scenes),
+                        CameraChoice::Sim => Pictures::Scenes(views.scenes, views.camera_effects),
                         other => Pictures::beside_the_arm(other),
                     },
                     poses: (tracker == TrackerChoice::Sim).then_some(views.poses),

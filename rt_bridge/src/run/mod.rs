@@ -204,7 +204,7 @@ pub fn run(settings: &Settings, stop: &Arc<AtomicBool>) -> Result<RunReport> {
     };
     let mut instruments = settings.instruments(&cell, devices.wrenches, &notices)?;
     let camera = match devices.pictures {
-        Pictures::Scenes(scenes) => Some(Camera::simulated(&cell, scenes)?),
+        Pictures::Scenes(scenes, effects) => Some(Camera::simulated(&cell, scenes, &effects)?),
         Pictures::Clip(clip, clock) => Some(Camera::replayed(&clip, clock)?),
         Pictures::RealSense(source) => {
             instruments.push(camera::serve(&source, &cell, notices.clone())?);

@@ -11,6 +11,7 @@ use shared_mem::msg::wrench::Wrench;
 use shared_mem::theta::Theta;
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
+use twin::effects::CameraEffects;
 use twin::scene::SceneSnapshot;
 use twin::sensors::tracker::SimTracker;
 use twin::sensors::wrench::SimWrench;
@@ -36,6 +37,8 @@ pub struct Views {
     pub poses: Consumer<ObjectPose>,
     /// What the force sensor at the wrist measures; `stamp_ns` is 0.
     pub wrenches: Consumer<Wrench>,
+    /// Effects on what a camera or a tracker reports, which nobody else is told.
+    pub camera_effects: CameraEffects,
 }
 
 /// The world's ends of the rings.
@@ -66,7 +69,8 @@ impl World {
     pub fn start(cell: &Cell, theta: Option<&Theta>) -> Result<(Self, SimArm, Views), SimError> {
         let (tracker, sensor) = (SimTracker::new(cell), SimWrench::new(cell));
         let mut cell = SimCell::new(cell, theta)?;
-        let tracker = tracker.with_effects(cell.camera_effects());
+        let camera_effects = cell.camera_effects();
+        let tracker = tracker.with_effects(camera_effects);
         let (to_arm, states) = RingBuffer::new(IN_FLIGHT);
         let (commands, mut from_arm) = RingBuffer::<ArmCommand>::new(IN_FLIGHT);
         let (to_camera, scenes) = RingBuffer::new(SCENES);
@@ -90,7 +94,7 @@ impl World {
         };
         let handle = thread::Builder::new().name("world".into()).spawn(body).expect("threads can be made");
         let arm = SimArm { dof, states, commands, world: handle.thread().clone() };
-        Ok((Self { handle }, arm, Views { scenes, poses, wrenches }))
+        Ok((Self { handle }, arm, Views { scenes, poses, wrenches, camera_effects }))
     }
 
     /// Waits for the thread, after its [`SimArm`] was dropped.

@@ -5,6 +5,7 @@
 
 use super::depth::{self, DepthSensor};
 use super::{camera_clock_ns, generator};
+use crate::effects::CameraEffects;
 use crate::render::{Hand, Mesh, Pinhole, Raster, RobotSurface};
 use crate::scene::{ObjectModel, SceneSnapshot};
 use crate::sim::SimError;
@@ -21,6 +22,8 @@ pub struct SimCamera {
     still: Vec<Mesh>,
     robot: Option<RobotSurface>,
     object: Option<Mesh>,
+    /// How much older a picture is than its stamp says.
+    older_ns: u64,
     sequence: u64,
     next_picture_ns: u64,
 }
@@ -67,10 +70,19 @@ impl SimCamera {
             still,
             robot: cell.robot.as_ref().map(|_| RobotSurface::new(cell, Hand::None)).transpose()?,
             object: ObjectModel::new(cell, None)?.map(|model| Mesh::new(model.shape.triangles(), OBJECT)),
+            older_ns: 0,
             sequence: 0,
             next_picture_ns: 0,
             settings,
         })
+    }
+
+    /// The same camera under effects that nobody is told: it stands elsewhere than [`Self::info`] says, and its pictures
+    /// are older than their stamps. What is a tracker's own ([`CameraEffects::of_the_tracker`]) is in no picture.
+    #[must_use]
+    pub fn with_effects(self, effects: &CameraEffects) -> Self {
+        let camera_from_base = self.camera_from_base * effects.misplaced().cast::<f32>();
+        Self { camera_from_base, older_ns: effects.latency_ns(), ..self }
     }
 
     /// Bytes of a colour picture.
@@ -113,7 +125,7 @@ impl SimCamera {
         [(PixelEncoding::Rgb8, 3, 0.0), (PixelEncoding::Depth16, 2, depth::SCALE)].map(
             |(encoding, bytes, depth_scale)| ImageHeader {
                 stamp_ns: 0,
-                device_ns: camera_clock_ns(scene.time_ns),
+                device_ns: camera_clock_ns(scene.time_ns + self.older_ns),
                 sequence: self.sequence - 1,
                 exposure_ns: 0,
                 width: self.settings.width,
@@ -209,6 +221,39 @@ mod tests {
         let white = color.chunks_exact(3).filter(|p| p.iter().all(|c| *c > 200)).count();
         assert!((400..8000).contains(&orange), "{orange} pixels of the box");
         assert!(white > 1500, "{white} pixels of the arm");
+    }
+
+    #[test]
+    fn an_unknown_latency_and_a_wrong_place_are_in_the_picture_and_not_in_what_the_camera_says() {
+        let mut cell = shipped();
+        cell.object.as_mut().expect("a box").pose_noise = None;
+        let blocks = "[[effect]]\nname = \"camera_latency\"\nlatency = 0.04\n\
+                      [[effect]]\nname = \"camera_extrinsic_translation\"\ntranslation = [0.02, -0.01, 0.0]\n";
+        let theta: shared_mem::theta::Theta =
+            shared_mem::toml_file::parse(blocks, Path::new("theta.toml")).expect("a theta.toml");
+        let effects = crate::effects::Effects::from_theta(&theta.effects, 7).expect("known effects").camera;
+        let scene = SimCell::new(&cell, None).expect("a cell").snapshot();
+        let mut camera = SimCamera::new(&cell).expect("a camera").with_effects(&effects);
+        let (mut color, mut depth) = (vec![0; camera.color_bytes()], vec![0; camera.depth_bytes()]);
+        let headers = camera.render(&scene, &mut color, &mut depth);
+        assert_eq!(headers.map(|header| header.device_ns), [camera_clock_ns(scene.time_ns + 40_000_000); 2]);
+        // To the nominal camera the box seems to be where it is not. Its pixels are those that change when it goes away.
+        let moved = nalgebra::Translation3::new(0.02, -0.01, 0.0) * scene.object.expect("a box").isometry();
+        let (mut elsewhere, mut gone) = (scene, scene);
+        elsewhere.object = Some(shared_mem::frames::Pose::from_isometry(moved));
+        gone.object = None;
+        let (nominal, expected, ..) = picture(&cell, &elsewhere);
+        assert_eq!(camera.info(), nominal.info());
+        let (_, without, ..) = picture(&cell, &gone);
+        let mut empty = vec![0; camera.color_bytes()];
+        camera.render(&gone, &mut empty, &mut depth);
+        let changed = |a: &[u8], b: &[u8]| -> Vec<bool> {
+            a.chunks_exact(3).zip(b.chunks_exact(3)).map(|(a, b)| a != b).collect()
+        };
+        let (shown, expected) = (changed(&color, &empty), changed(&expected, &without));
+        let both = shown.iter().zip(&expected).filter(|(a, b)| **a && **b).count();
+        let either = shown.iter().zip(&expected).filter(|(a, b)| **a || **b).count();
+        assert!(either > 400 && both as f64 > 0.97 * either as f64, "{both} of {either} pixels of the box");
     }
 
     #[test]

@@ -45,6 +45,27 @@ impl CameraEffects {
         if self.is_none() { pose } else { Pose::from_isometry(self.report(memory, stamp_ns, &pose.isometry())) }
     }
 
+    /// How far from where it is everything seems to be that a picture shows (base frame), because the camera stands
+    /// elsewhere than its calibration says.
+    #[must_use]
+    pub fn misplaced(&self) -> Isometry3<f64> {
+        let mut moved = Isometry3::identity();
+        if let Some(effect) = &self.camera_extrinsic_rotation {
+            effect.apply(&mut moved);
+        }
+        if let Some(effect) = &self.camera_extrinsic_translation {
+            effect.apply(&mut moved);
+        }
+        moved
+    }
+
+    /// The effects a picture cannot show, because they are the tracker's own, by name.
+    #[must_use]
+    pub fn of_the_tracker(&self) -> Vec<&'static str> {
+        let scale = self.camera_scale.map(|_| camera_scale::EFFECT.name);
+        scale.into_iter().chain(self.tracker_smoothing.map(|_| tracker_smoothing::EFFECT.name)).collect()
+    }
+
     /// Where an object was that is reported at `pose`, but for latency and smoothing.
     #[must_use]
     pub fn undistorted(&self, pose: &Isometry3<f64>) -> Isometry3<f64> {
@@ -96,5 +117,35 @@ mod test_camera {
     pub(super) fn effects(blocks: &str) -> CameraEffects {
         let theta: Theta = shared_mem::toml_file::parse(blocks, Path::new("theta.toml")).expect("a theta.toml");
         Effects::from_theta(&theta.effects, 7).expect("known effects").camera
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::test_camera::effects;
+    use super::*;
+    use nalgebra::Vector3;
+
+    #[test]
+    fn a_picture_is_misplaced_as_reported_poses_are_and_shows_nothing_of_the_tracker() {
+        let effects = effects(
+            "[[effect]]\nname = \"camera_extrinsic_rotation\"\nrotation = [0.0, 0.01, 0.02]\n\
+             [[effect]]\nname = \"camera_extrinsic_translation\"\ntranslation = [0.01, 0.0, -0.02]\n",
+        );
+        let pose = Isometry3::new(Vector3::new(0.5, 0.1, 0.05), Vector3::z() * 0.3);
+        let reported = effects.report(&mut CameraMemory::default(), 0, &pose);
+        let shown = effects.misplaced() * pose;
+        assert!((reported.translation.vector - shown.translation.vector).norm() < 1e-15);
+        assert!(reported.rotation.angle_to(&shown.rotation) < 1e-7);
+        assert!(effects.of_the_tracker().is_empty());
+    }
+
+    #[test]
+    fn scale_and_smoothing_are_the_trackers_own() {
+        let effects = effects(
+            "[[effect]]\nname = \"camera_scale\"\nscale = 0.02\n[[effect]]\nname = \"tracker_smoothing\"\ntime_constant = 0.05\n",
+        );
+        assert_eq!(effects.of_the_tracker(), ["camera_scale", "tracker_smoothing"]);
+        assert_eq!(effects.misplaced(), Isometry3::identity());
     }
 }
