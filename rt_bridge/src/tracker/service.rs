@@ -183,13 +183,14 @@ impl Desk {
         let Some(view) = self.tracker.view() else { return Ok(()) };
         let color = color.map(|sample| (sample.header(), sample.bytes()));
         let Some(frame) = Frame::new(view, (depth.header(), depth.bytes()), color) else { return Ok(()) };
-        let device_ns = depth.header().device_ns;
+        let (stamp_ns, device_ns) = (depth.header().stamp_ns, depth.header().device_ns);
         // Whole seconds of a device's epoch would cost the fraction its digits.
         let at = (device_ns % 1_000_000_000_000_000) as f64 * 1e-9;
         let sight = self.tracker.look(&frame, at, q);
         if let Sight::Tracked(Estimate { pose, covariance }) = sight {
             ports.poses.send(&ObjectPose {
-                stamp_ns: now_ns(),
+                // Of the picture, not of the answer: what the search takes says nothing about when the object was there.
+                stamp_ns,
                 device_ns,
                 sequence: self.poses,
                 position: pose.position(),

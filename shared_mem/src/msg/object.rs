@@ -8,7 +8,8 @@ use iceoryx2::prelude::ZeroCopySend;
 #[type_name("twinalign/ObjectPose/1")]
 #[repr(C)]
 pub struct ObjectPose {
-    /// When the pose became known here: monotonic clock [ns].
+    /// When the picture behind it, or where nobody knows that, the pose arrived here: monotonic clock [ns]. One latency of
+    /// cell.toml's camera after the object was there.
     pub stamp_ns: u64,
     /// When the picture behind it was taken, by the camera's clock [ns].
     pub device_ns: u64,
