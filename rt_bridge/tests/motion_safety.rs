@@ -210,6 +210,49 @@ fn an_arm_that_stopped_itself_takes_no_motion() {
 }
 
 proptest! {
+    #![proptest_config(ProptestConfig::with_cases(100))]
+
+    /// A robot that does not get every set point goes on by itself and objects to whoever goes on as if it had got them.
+    #[test]
+    fn a_motion_survives_set_points_that_come_too_late(
+        losses in prop::collection::vec((20_usize..300, 1_usize..12, any::<bool>()), 1..40),
+    ) {
+        let mut player = Player::new(guard(), READY);
+        let points = swing(&READY, 0.5, 2.0);
+        for chunk in chunks(4, &points) {
+            player.take(&chunk);
+        }
+        let (mut robot, limits) = (Trace::at_rest(READY), Limits::fr3());
+        let mut lost = losses.iter().cycle();
+        let (mut until_loss, mut periods, mut done) = (0, 1, false);
+        for _ in 0..4000 {
+            let said = robot.q.map(|q| f64::from(q as f32));
+            player.reconcile(&said, periods);
+            let (point, remark) = player.advance(tip);
+            done |= remark.is_some_and(|r| matches!(r, Remark::Done { .. }));
+            prop_assert!(remark.is_none_or(|r| matches!(r, Remark::Done { .. })), "{:?}", remark);
+            let (mut came, mut missed) = (true, 0);
+            if until_loss == 0 {
+                let (wait, length, first_comes) = lost.next().expect("a cycle");
+                (until_loss, missed, came) = (*wait, *length, *first_comes);
+            }
+            until_loss -= 1;
+            let next = if came { robot.after(&point.q_d, T) } else { robot.onward(T) };
+            for i in 0..7 {
+                prop_assert!(next.a[i].abs() <= limits.joints[i].acceleration + 0.3, "joint {}: {}", i, next.a[i]);
+                let jerk = (next.a[i] - robot.a[i]) / T;
+                prop_assert!(jerk.abs() <= limits.joints[i].jerk + 600.0, "joint {}: jerk {}", i, jerk);
+            }
+            robot = (0..missed).fold(next, |trace, _| trace.onward(T));
+            periods = 1 + missed as u64;
+        }
+        prop_assert!(done && robot.is_at_rest(7, T));
+        let end = points[points.len() - 1].q_d;
+        prop_assert!(robot.q.iter().zip(&end).all(|(a, b)| (a - b).abs() < 1e-6), "{:?}", robot.q);
+    }
+}
+
+proptest! {
     #![proptest_config(ProptestConfig::with_cases(300))]
 
     /// Swings of any size and pace, anywhere, stopped at any moment.

@@ -43,8 +43,6 @@ pub enum Read {
 pub enum Desired {
     /// The control thread overwrites what `read` filled in with its own command of the cycle.
     Commanded,
-    /// What `read` filled in stays: the arm reports what its own controller follows.
-    Reported,
     /// The arm is a recording and follows nobody: what `read` filled in is published as state and as command.
     Recorded,
 }

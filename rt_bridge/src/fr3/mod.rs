@@ -85,10 +85,8 @@ impl Arm for Fr3 {
         }
         self.settings.send(&self.session, interface, f64::from(self.wire.m_ee.get()))?;
         self.motion = Some(Motion::start(&mut self.session, interface, &mut self.wire)?);
-        Ok(match interface {
-            CommandInterface::Torque => Desired::Commanded,
-            CommandInterface::JointPosition => Desired::Reported,
-        })
+        // What a state reports as desired acted until it; what answers it acts from then on.
+        Ok(Desired::Commanded)
     }
 
     fn read(&mut self, state: &mut ArmState) -> Result<Read, ArmFault> {

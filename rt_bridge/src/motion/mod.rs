@@ -1,12 +1,16 @@
-//! Motions: set points out of a queue, one a cycle, and the stop for everything that goes wrong. Runs in the control
-//! thread: pure logic on memory set aside in advance.
+//! Motions: set points out of a queue, one a cycle, the stop for everything that goes wrong. Pure
+//! logic on memory set aside in advance; player and brake run in the control thread.
 //!
 //! | file | owns |
 //! |---|---|
 //! | [`player`] | the queue, the verdict of [`crate::safety::Guard`] on each set point, the motion's progress |
-//! | [`brake`] | from any admitted motion to rest inside the limits (the only `rsruckig` code) |
+//! | `lost` | what the arm is told to do where set points came too late |
+//! | `ease` | from there back to the plan |
+//! | [`brake`] | from any admitted motion to rest inside the limits |
 
 pub mod brake;
+mod ease;
+mod lost;
 pub mod player;
 
 pub use brake::Brake;

@@ -3,8 +3,12 @@
 //!
 //! A motion begins at once when its first chunk arrives and the arm holds. It must start where the arm is *commanded* to
 //! be, to [`START_TOLERANCE`]: a larger step would itself break the acceleration limit (10 rad/s² is 10 urad in 1 ms).
+//!
+//! Where set points did not reach the arm in time and it went on by itself meanwhile, the motion goes on from there and eases
+//! back to its plan.
 
-use super::Brake;
+use super::ease::Ease;
+use super::{Brake, lost};
 use crate::rt::remark::{BrakeReason, Refusal, Remark};
 use crate::safety::{Guard, Trace};
 use shared_mem::msg::arm::{ArmState, MotionStatus};
@@ -30,6 +34,11 @@ pub struct Player {
     guard: Guard,
     brake: Brake,
     trace: Trace,
+    /// The same before the last set point.
+    before: Trace,
+    /// What is played, as it was planned, and how far off that the arm still is.
+    planned: Trace,
+    ease: Ease,
     queue: Queue,
     activity: Activity,
     status: MotionStatus,
@@ -49,6 +58,9 @@ impl Player {
             brake: Brake::new(guard.limits, guard.period_s),
             guard,
             trace: Trace::at_rest(q_d),
+            before: Trace::at_rest(q_d),
+            planned: Trace::at_rest(q_d),
+            ease: Ease::over(),
             queue: Queue::new(),
             activity: Activity::Holding,
             status: MotionStatus::None,
@@ -63,6 +75,26 @@ impl Player {
     /// Holds `q_d` from now on. Called once, when the arm's pose is known.
     pub fn hold_at(&mut self, q_d: Joints) {
         self.trace = Trace::at_rest(q_d);
+        self.before = self.trace;
+    }
+
+    /// The arm says that it is told to be at `in_force`, `periods` after the state that the last set point answered. Where
+    /// that is not what was sent, what follows goes on from there.
+    pub fn reconcile(&mut self, in_force: &Joints, periods: u64) {
+        let Some(trace) = lost::in_force(&self.trace, &self.before, in_force, periods, self.guard.period_s) else {
+            return;
+        };
+        self.trace = trace;
+        match self.activity {
+            Activity::Playing => {
+                self.ease = Ease::between(&trace, &self.planned, &self.guard.limits, self.guard.period_s);
+            }
+            Activity::Holding | Activity::Braking => {
+                self.brake.begin(&trace);
+                self.activity = Activity::Braking;
+            }
+            Activity::Halted => {}
+        }
     }
 
     /// `true` when a further chunk fits; else it stays with the sender.
@@ -98,6 +130,7 @@ impl Player {
             Ok(()) => {
                 self.motion = chunk.motion_id;
                 (self.due_index, self.played, self.has_last) = (0, 0, false);
+                (self.planned, self.ease) = (self.trace, Ease::over());
                 (self.activity, self.status) = (Activity::Playing, MotionStatus::Playing);
                 self.append(chunk);
                 Some(Remark::Began { motion: self.motion })
@@ -137,6 +170,7 @@ impl Player {
 
     /// The set point of this cycle. `tip` gives the tool tip of joint positions, base frame [m].
     pub fn advance(&mut self, tip: impl Fn(&Joints) -> [f64; 3]) -> (SetPoint, Option<Remark>) {
+        self.before = self.trace;
         match self.activity {
             Activity::Holding | Activity::Halted => (self.hold(), None),
             Activity::Braking => (self.braked(), None),
@@ -153,14 +187,22 @@ impl Player {
     }
 
     fn play(&mut self, tip: impl Fn(&Joints) -> [f64; 3]) -> (SetPoint, Option<Remark>) {
-        let (point, at_end) = match self.queue.pop() {
+        let (mut point, at_end) = match self.queue.pop() {
             Some(point) => (point, false),
-            None if self.has_last => (SetPoint { q_d: self.trace.q, dq_d: [0.0; MAX_JOINTS] }, true),
+            None if self.has_last => (SetPoint { q_d: self.planned.q, dq_d: [0.0; MAX_JOINTS] }, self.ease.is_over()),
             None => {
                 let remark = self.stop(BrakeReason::Underrun);
                 return (self.braked(), remark);
             }
         };
+        self.planned = self.planned.after(&point.q_d, self.guard.period_s);
+        if !self.ease.is_over() {
+            let [q, dq] = self.ease.step(self.guard.period_s);
+            for i in 0..self.guard.limits.dof {
+                point.q_d[i] += q[i];
+                point.dq_d[i] += dq[i];
+            }
+        }
         match self.guard.check(&self.trace, &point, tip(&point.q_d)) {
             Ok(_) if at_end => {
                 (self.activity, self.status) = (Activity::Holding, MotionStatus::Done);

@@ -83,6 +83,8 @@ pub struct Cycle {
     state: ArmState,
     last_begin_ns: u64,
     last_device_ns: u64,
+    /// The arm's clock in the state that was answered last.
+    answered_ns: u64,
     stats: LoopStats,
 }
 
@@ -103,6 +105,7 @@ impl Cycle {
             state: ArmState::default(),
             last_begin_ns: 0,
             last_device_ns: 0,
+            answered_ns: 0,
             stats: LoopStats::default(),
         }
     }
@@ -210,6 +213,7 @@ impl Cycle {
             self.fail(ArmFault::BadState { joint });
         }
         self.take_chunk();
+        self.reconcile();
         let (point, remark) = self.player.advance(|q| tip_of(&self.plan, q));
         if let Some(remark) = remark {
             self.tell(remark);
@@ -251,6 +255,20 @@ impl Cycle {
         }
     }
 
+    /// Goes on from what the arm has, where it did not get everything that was sent.
+    fn reconcile(&mut self) {
+        if !self.commanding || self.arm.clock() != Clock::Device {
+            return;
+        }
+        match self.plan.interface {
+            CommandInterface::Torque => self.torque.resume(&self.state.tau_J_d),
+            CommandInterface::JointPosition => {
+                self.player
+                    .reconcile(&self.state.q_d, self.state.device_ns.saturating_sub(self.answered_ns) / PERIOD_NS);
+            }
+        }
+    }
+
     fn take_chunk(&mut self) {
         if self.player.has_room()
             && let Ok(chunk) = self.link.chunks.pop()
@@ -277,6 +295,7 @@ impl Cycle {
             self.stats.clamped += u64::from(clamped.held_back);
         }
         command.stamp_ns = now_ns();
+        self.answered_ns = self.state.device_ns;
         match self.arm.command(&command) {
             Ok(()) => Some(command),
             Err(fault) => {

@@ -6,10 +6,17 @@ use shared_mem::msg::{Joints, MAX_JOINTS};
 /// Share of the rate limit that is used: the robot differences what it received in another rounding.
 const RATE_SHARE: f64 = 0.999;
 
-/// Remembers the torque sent last.
+/// Torques that are remembered: more than a robot loses in a row before it stops by itself.
+const REMEMBERED: usize = 32;
+/// What single precision makes of a torque is off by no more [N m].
+const ROUNDING: f64 = 5e-6;
+
+/// Remembers the torque in force, which the next one is held to, and those sent before.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct TorqueGuard {
     last: Joints,
+    sent: [Joints; REMEMBERED],
+    newest: usize,
 }
 
 /// What is sent, and whether it is less than what was asked for.
@@ -29,7 +36,18 @@ impl TorqueGuard {
         for ((last, tau), joint) in last.iter_mut().zip(tau).zip(limits.counted()) {
             *last = if tau.is_finite() { tau.clamp(-joint.torque, joint.torque) } else { 0.0 };
         }
-        Self { last }
+        Self { last, sent: [last; REMEMBERED], newest: 0 }
+    }
+
+    /// The robot says that `told` is in force, in single precision: of the torques sent the newest that this can be. One that
+    /// came too late never was, and a step from it would be a step of several periods to the robot.
+    pub fn resume(&mut self, told: &Joints) {
+        let is_told = |sent: &Joints| sent.iter().zip(told).all(|(sent, told)| (sent - told).abs() <= ROUNDING);
+        let from_newest = (0..REMEMBERED).map(|back| (self.newest + REMEMBERED - back) % REMEMBERED);
+        // A robot that does not say what is in force is taken to have got everything.
+        if let Some(found) = from_newest.filter_map(|at| self.sent.get(at)).find(|sent| is_told(sent)) {
+            self.last = *found;
+        }
     }
 
     /// The nearest torque to `wanted` inside torque and rate limits, `period_s` after the last one. A number that is not
@@ -43,6 +61,10 @@ impl TorqueGuard {
             out.held_back |= *tau != *wanted;
         }
         self.last = out.tau;
+        self.newest = (self.newest + 1) % REMEMBERED;
+        if let Some(slot) = self.sent.get_mut(self.newest) {
+            *slot = out.tau;
+        }
         out
     }
 }
@@ -70,6 +92,22 @@ mod tests {
                 last = sent;
             }
         }
+    }
+
+    #[test]
+    fn a_step_is_measured_from_the_torque_that_the_robot_has() {
+        let limits = Limits::fr3();
+        let mut guard = TorqueGuard::after(&[0.0; MAX_JOINTS], &limits);
+        let sent: Vec<Joints> = (0..5).map(|_| guard.clamp(&[20.0; MAX_JOINTS], &limits, 1e-3).tau).collect();
+        guard.resume(&sent[4].map(|tau| f64::from(tau as f32)));
+        let mut all_came = guard;
+        assert!((all_came.clamp(&[20.0; MAX_JOINTS], &limits, 1e-3).tau[0] - sent[4][0] - 0.999).abs() < 1e-9);
+        guard.resume(&sent[1].map(|tau| f64::from(tau as f32)));
+        let next = guard.clamp(&[20.0; MAX_JOINTS], &limits, 1e-3).tau;
+        assert!((next[0] - sent[1][0] - 0.999).abs() < 1e-9, "three did not come in time: {}", next[0]);
+        // Nothing that was ever sent: a robot that does not say.
+        guard.resume(&[-7.0; MAX_JOINTS]);
+        assert!((guard.clamp(&[20.0; MAX_JOINTS], &limits, 1e-3).tau[0] - next[0] - 0.999).abs() < 1e-9);
     }
 
     #[test]

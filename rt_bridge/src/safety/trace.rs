@@ -32,6 +32,17 @@ impl Trace {
         next
     }
 
+    /// A period on at the same acceleration: what an FCI robot does where no command comes.
+    #[must_use]
+    pub fn onward(&self, period_s: f64) -> Self {
+        let mut next = *self;
+        for (i, a) in self.a.iter().enumerate() {
+            next.v[i] += a * period_s;
+            next.q[i] += next.v[i] * period_s;
+        }
+        next
+    }
+
     /// Velocity at the last sample [rad/s]: the difference speaks of the middle of its period, half a period ago.
     #[must_use]
     pub fn velocity_now(&self, joint: usize, period_s: f64) -> f64 {

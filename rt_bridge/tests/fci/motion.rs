@@ -70,7 +70,7 @@ fn every_field_of_a_state_arrives_where_it_belongs() {
     let mut arm = connected(&robot);
     let mut idle = ArmState::default();
     assert_eq!(arm.read(&mut idle), Ok(Read::Fresh));
-    assert_eq!(arm.start(CommandInterface::JointPosition), Ok(Desired::Reported));
+    assert_eq!(arm.start(CommandInterface::JointPosition), Ok(Desired::Commanded));
     let state = cycles(arm.as_mut(), CommandInterface::JointPosition, 3);
     let expected = |k: usize| joints_from(&[0, 1, 2, 3, 4, 5, 6].map(|j| (10 * (k + 1) + j) as f64));
     // What the robot exerts on its surroundings is the opposite of what they exert on the arm.

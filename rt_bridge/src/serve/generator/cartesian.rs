@@ -6,7 +6,6 @@
 
 use super::Surroundings;
 use super::inverse::solve;
-use super::joint::onward;
 use super::rules::{FOLLOWING, JointRules, PERIOD, check_end_effector, check_end_effector_end, exceeds};
 use crate::safety::Trace;
 use crate::serve::faults::{Fault, Verdict};
@@ -112,7 +111,7 @@ impl CartesianGenerator {
         self.trace = CartesianTrace { pose, twist, acceleration };
         self.joints = match solve(&around.ee, &self.joints.q, &pose, None) {
             Some(q) => self.joints.after(&q, PERIOD),
-            None => onward(&self.joints),
+            None => self.joints.onward(PERIOD),
         };
     }
 

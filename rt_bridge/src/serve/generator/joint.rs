@@ -35,7 +35,7 @@ impl JointGenerator {
     pub(super) fn follow(&mut self, set_point: Option<&SetPoint>, rules: &JointRules) -> Verdict {
         let last = self.trace;
         let Some(set_point) = set_point else {
-            self.trace = onward(&last);
+            self.trace = last.onward(PERIOD);
             return Ok(());
         };
         let q = if self.velocities {
@@ -57,14 +57,4 @@ impl JointGenerator {
     pub(super) fn finish(&self, rules: &JointRules) -> Verdict {
         rules.check_end(&self.trace, &COMMANDED)
     }
-}
-
-/// One period on at the same acceleration.
-pub(super) fn onward(last: &Trace) -> Trace {
-    let mut next = *last;
-    for i in 0..next.q.len() {
-        next.v[i] += last.a[i] * PERIOD;
-        next.q[i] += next.v[i] * PERIOD;
-    }
-    next
 }

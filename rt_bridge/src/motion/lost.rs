@@ -1,0 +1,62 @@
+//! What became of set points that did not come in time. An FCI robot goes on with the last acceleration instead, and refuses
+//! whoever goes on as if nothing had happened; what it is told to do by then is in its state. Pure.
+
+use crate::safety::Trace;
+use shared_mem::msg::Joints;
+
+/// What single precision makes of an angle is off by no more [rad].
+const ROUNDING: f64 = 3e-7;
+/// What a robot says is off by no more from what it does, its own arithmetic included [rad].
+const ECHO: f64 = 2e-6;
+/// After more it has stopped by itself.
+const MOST: u64 = 20;
+
+/// How the robot is told to move now, where that is not as `sent`: `before` came before that, `in_force` is what its newest
+/// state says, `periods` after the one that `sent` answered. `None`: it has what was sent, or nobody can tell what it has.
+pub(super) fn in_force(sent: &Trace, before: &Trace, in_force: &Joints, periods: u64, period_s: f64) -> Option<Trace> {
+    if !(1..=MOST).contains(&periods) {
+        return None;
+    }
+    let off = |trace: &Trace| trace.q.iter().zip(in_force).map(|(q, told)| (q - told).abs()).fold(0.0, f64::max);
+    if off(sent) <= ROUNDING {
+        return None;
+    }
+    let taken = (1..periods).fold(*sent, |trace, _| trace.onward(period_s));
+    let lost = (0..periods).fold(*before, |trace, _| trace.onward(period_s));
+    let likelier = if off(&taken) <= ROUNDING { taken } else { lost };
+    (off(&likelier) <= ECHO).then_some(likelier)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use shared_mem::msg::MAX_JOINTS;
+
+    const T: f64 = 1e-3;
+
+    fn echo(trace: &Trace) -> Joints {
+        trace.q.map(|q| f64::from(q as f32))
+    }
+
+    #[test]
+    fn what_the_robot_has_is_told_from_what_it_says() {
+        let mut before = Trace::at_rest([2.0; MAX_JOINTS]);
+        (before.v, before.a) = ([0.5; MAX_JOINTS], [3.0; MAX_JOINTS]);
+        // A plan that accelerates less and less.
+        let sent = before.after(&std::array::from_fn(|i| before.q[i] + 0.5e-3 - 4e-6 * (i as f64 + 1.0)), T);
+        assert_eq!(in_force(&sent, &before, &echo(&sent), 1, T), None, "all is well");
+        let lost = before.onward(T);
+        assert_eq!(in_force(&sent, &before, &echo(&lost), 1, T), Some(lost), "it did not come in time");
+        let late = sent.onward(T).onward(T);
+        assert_eq!(in_force(&sent, &before, &echo(&late), 3, T), Some(late), "two states went by without an answer");
+        assert_eq!(in_force(&sent, &before, &echo(&sent), 3, T), None, "a robot that waits");
+        assert_eq!(in_force(&sent, &before, &[0.0; MAX_JOINTS], 1, T), None, "a robot that says nothing");
+        assert_eq!(in_force(&sent, &before, &echo(&sent), 40, T), None);
+    }
+
+    #[test]
+    fn an_arm_that_holds_loses_nothing() {
+        let still = Trace::at_rest([1.0; MAX_JOINTS]);
+        assert_eq!(in_force(&still, &still, &echo(&still), 5, T), None);
+    }
+}
