@@ -4,6 +4,7 @@
 use super::ServeError;
 use super::kinematics::Frame;
 use super::observer::{Observer, Touched};
+use super::self_collision::SelfCollision;
 use super::settings::Settings;
 use nalgebra::Vector6;
 use shared_mem::cell::{Cell, ControllerKind};
@@ -21,6 +22,7 @@ pub(super) struct Body {
     /// Torques a period ago [N m].
     pub(super) tau_J_before: Joints,
     observer: Observer,
+    itself: SelfCollision,
     pub(super) touched: Touched,
     /// Estimated wrench at the stiffness frame, in base axes, then in its own.
     pub(super) wrench: [Vector6<f64>; 2],
@@ -43,6 +45,7 @@ impl Body {
         Ok(Self {
             bare,
             tau_J_before: measured.tau_J,
+            itself: SelfCollision::new(cell).map_err(twin::sim::SimError::from)?,
             observer: Observer::new(&JointState { q: measured.q, dq: measured.dq }),
             touched: Touched::default(),
             wrench: [Vector6::zeros(); 2],
@@ -69,6 +72,11 @@ impl Body {
     /// Estimated torque on the surroundings [N m].
     pub(super) fn tau_ext(&self) -> &Joints {
         self.observer.tau_ext()
+    }
+
+    /// Whether the arm is running into itself.
+    pub(super) fn threatens_itself(&mut self) -> bool {
+        self.itself.threatens(&self.joints())
     }
 
     /// Lets a millisecond pass under `drive` and takes in what the sensors say then.

@@ -7,6 +7,7 @@ use crate::arm::ReflexErrors;
 #[repr(u8)]
 pub(super) enum Fault {
     JointPositionLimits = 0,
+    SelfCollision = 2,
     JointVelocity = 3,
     CartesianVelocity = 4,
     JointReflex = 6,
@@ -18,6 +19,7 @@ pub(super) enum Fault {
     JointVelocityDiscontinuity = 14,
     JointAccelerationDiscontinuity = 15,
     CartesianStartPose = 16,
+    ElbowLimit = 17,
     CartesianVelocityLimits = 18,
     CartesianVelocityDiscontinuity = 19,
     CartesianAccelerationDiscontinuity = 20,
@@ -31,6 +33,8 @@ pub(super) enum Fault {
     InvalidFrame = 31,
     TorqueDiscontinuity = 32,
     TorqueRange = 34,
+    /// A target that cannot be planned to. By which name the robot refuses one is not published.
+    PlanningJointLimits = 38,
 }
 
 /// Nothing to object to, or everything there is.
@@ -56,6 +60,9 @@ mod tests {
     fn numbers_and_the_protocols_names_agree() {
         for (fault, name) in [
             (Fault::JointPositionLimits, "joint_position_limits_violation"),
+            (Fault::SelfCollision, "self_collision_avoidance_violation"),
+            (Fault::ElbowLimit, "cartesian_motion_generator_elbow_limit_violation"),
+            (Fault::PlanningJointLimits, "joint_via_motion_generator_planning_joint_limit_violation"),
             (Fault::JointVelocity, "joint_velocity_violation"),
             (Fault::JointReflex, "joint_reflex"),
             (Fault::CartesianReflex, "cartesian_reflex"),

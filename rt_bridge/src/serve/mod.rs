@@ -23,6 +23,7 @@
 //! | `impedance` | the Cartesian impedance controller; the joint one is the twin's |
 //! | `body` | the simulated arm and its sensors |
 //! | `observer` | external torque and wrench, contact and collision |
+//! | `self_collision` | whether the arm is about to run into itself |
 //! | `watch` | what the robot objects to in what it measures |
 //! | `faults` | by which names it objects |
 //! | `state` | the datagram with all of it |
@@ -45,6 +46,7 @@ mod losses;
 mod motion;
 mod observer;
 mod robot;
+mod self_collision;
 pub mod server;
 mod session;
 mod settings;

@@ -10,6 +10,7 @@ use super::wire::{Controller, GeneratorKind, MotionRequest, SetPoint};
 use crate::arm::ReflexErrors;
 use crate::safety::TORQUE_RATE;
 use shared_mem::msg::{MAX_JOINTS, joints_from};
+use std::ops::RangeInclusive;
 use twin::arm::Joints;
 
 /// What a client's single-precision echo of a torque of 64 to 128 N m may be off, as a rate [N m/s].
@@ -40,7 +41,7 @@ pub(super) struct Motion {
 impl Motion {
     /// A motion that begins at rest with the desired positions `q`.
     pub(super) fn begin(request: MotionRequest, id: u32, since: u64, q: &Joints, around: &Surroundings) -> Self {
-        let generator = Generator::at_rest(request.generator, q, around);
+        let generator = Generator::at_rest(&request, q, around);
         Self { request, id, since, generator, losses: Losses::new(), tau_J_d: None }
     }
 
@@ -58,7 +59,10 @@ impl Motion {
         held: &Joints,
         around: &Surroundings,
     ) -> Result<Course, ReflexErrors> {
-        let set_point = set_point.filter(|s| s.answers == now && s.answers > self.since);
+        let set_point = set_point.filter(|s| self.answers(now).contains(&s.answers));
+        if self.request.targets.is_some() {
+            return self.plan_on(set_point, around);
+        }
         if !self.losses.note(set_point.is_some()) {
             return Err(Fault::CommunicationConstraints.alone());
         }
@@ -77,6 +81,21 @@ impl Motion {
         {
             self.take_torque(set_point, held)?;
         }
+        Ok(Course::Runs)
+    }
+
+    /// Counters of the states that a set point may answer, `now` being the newest: a target may come at any time.
+    pub(super) fn answers(&self, now: u64) -> RangeInclusive<u64> {
+        let oldest = if self.request.targets.is_some() { 0 } else { now };
+        oldest.max(self.since + 1)..=now
+    }
+
+    /// A cycle in which a target may have come.
+    fn plan_on(&mut self, target: Option<&SetPoint>, around: &Surroundings) -> Result<Course, ReflexErrors> {
+        if target.is_some_and(|target| target.motion_finished) {
+            return Ok(Course::Finished);
+        }
+        self.generator.follow(target, around)?;
         Ok(Course::Runs)
     }
 

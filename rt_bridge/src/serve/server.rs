@@ -215,7 +215,7 @@ impl Server {
 
     fn take_set_point(&mut self) -> io::Result<Option<SetPoint>> {
         self.udp.set_nonblocking(true)?;
-        Ok(self.session.as_ref().and_then(|session| session.waiting_set_point(&self.udp, self.robot.now())))
+        Ok(self.session.as_ref().and_then(|session| session.waiting_set_point(&self.udp, &self.robot.answers())))
     }
 
     /// The set point of the newest state, for as long as one is owed.

@@ -7,6 +7,7 @@ use super::wire::{
 };
 use std::io::{self, Read as _, Write as _};
 use std::net::{IpAddr, SocketAddr, TcpStream, UdpSocket};
+use std::ops::RangeInclusive;
 use zerocopy::IntoBytes as _;
 
 /// Number of the request that opens a session.
@@ -108,13 +109,14 @@ impl Session {
         self.tcp.write_all(&message).map_err(|error| Gone::Broken(error.kind()))
     }
 
-    /// The set point that answers state `now`, if one waits at the socket; everything else there is thrown away.
-    pub(super) fn waiting_set_point(&self, udp: &UdpSocket, now: u64) -> Option<SetPoint> {
+    /// The newest set point that answers one of the states `answers`, if one waits at the socket; everything else there is
+    /// thrown away.
+    pub(super) fn waiting_set_point(&self, udp: &UdpSocket, answers: &RangeInclusive<u64>) -> Option<SetPoint> {
         let (mut found, mut datagram) = (None, [0; DATAGRAM]);
         for _ in 0..READS {
             let Ok((length, from)) = udp.recv_from(&mut datagram) else { break };
             let point = set_point(&datagram[..length]).filter(|_| Some(from) == self.states_to);
-            found = point.filter(|point| point.answers == now).or(found);
+            found = point.filter(|point| answers.contains(&point.answers)).or(found);
         }
         found
     }

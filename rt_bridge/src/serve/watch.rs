@@ -18,6 +18,9 @@ const ACCELERATES: f64 = 0.01;
 /// Objections to what happens while `motion` runs; empty where there are none. Updates contact and collision flags.
 pub(super) fn objections(body: &mut Body, motion: &Motion, rules: &JointRules, settings: &Settings) -> ReflexErrors {
     let mut faults = touches(body, Some(motion), settings);
+    if body.threatens_itself() {
+        faults.push(Fault::SelfCollision);
+    }
     let (measured, limits) = (&body.measured, &rules.limits);
     if is_outside(body, rules) {
         faults.push(Fault::JointPositionLimits);

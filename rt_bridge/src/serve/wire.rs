@@ -54,8 +54,9 @@ pub(super) struct MotionRequest {
     pub(super) path_deviation: [f64; 3],
     /// How far from its goal it may end, likewise.
     pub(super) goal_deviation: [f64; 3],
-    /// Sparse targets that the robot plans to by itself, rather than one set point a cycle.
-    pub(super) asynchronous: bool,
+    /// Sparse targets that the robot plans to by itself, rather than one set point a cycle; no joint faster than this
+    /// [rad/s].
+    pub(super) targets: Option<[f64; 7]>,
 }
 
 /// Contact and collision thresholds of one regime: joints [N m], then Cartesian [N, N m].
@@ -173,7 +174,7 @@ fn motion(wire: &MoveRequest) -> Option<MotionRequest> {
         generator,
         path_deviation: deviation(&wire.maximum_path_deviation),
         goal_deviation: deviation(&wire.maximum_goal_pose_deviation),
-        asynchronous: wire.use_async_motion_generator != 0,
+        targets: (wire.use_async_motion_generator != 0).then(|| f64s_to_f64(&wire.maximum_velocity)),
     })
 }
 

@@ -69,9 +69,13 @@ impl CartesianGenerator {
         {
             return Err(Fault::ElbowSignInconsistent.alone());
         }
+        let joint_3 = set_point.elbow_c.map(|[position, _]| position);
+        let elbow = &around.rules.limits.joints[ELBOW];
+        if joint_3.is_some_and(|position| !(elbow.q_min..=elbow.q_max).contains(&position)) {
+            return Err(Fault::ElbowLimit.alone());
+        }
         let jerk = (next.acceleration - self.trace.acceleration) / PERIOD;
         check_end_effector(&next.twist, &next.acceleration, &jerk)?;
-        let joint_3 = set_point.elbow_c.map(|[position, _]| position);
         let q = solve(&around.ee, &self.joints.q, &next.pose, joint_3)
             .ok_or(Fault::CartesianJointVelocityLimits.alone())?;
         let joints = self.joints.after(&q, PERIOD);

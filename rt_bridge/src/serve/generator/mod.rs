@@ -5,6 +5,7 @@
 //! | file | owns |
 //! |---|---|
 //! | [`joint`] | joint positions and joint velocities |
+//! | [`targets`] | sparse targets of the joints, which the robot plans to |
 //! | [`cartesian`] | poses and twists of the end effector, with or without elbow |
 //! | [`inverse`] | the joint positions of a pose |
 //! | [`rules`] | how fast joints and end effector may go and change |
@@ -13,15 +14,17 @@ pub(super) mod cartesian;
 mod inverse;
 pub(super) mod joint;
 pub(super) mod rules;
+mod targets;
 
 use super::faults::Verdict;
 use super::kinematics::Frame;
 use super::settings::Settings;
-use super::wire::{GeneratorKind, SetPoint};
+use super::wire::{GeneratorKind, MotionRequest, SetPoint};
 use crate::safety::Trace;
 use cartesian::{CartesianGenerator, CartesianTrace};
 use joint::JointGenerator;
 use rules::JointRules;
+use targets::TargetGenerator;
 use twin::arm::{ArmModel, Joints};
 
 /// What a generator needs to know about the arm.
@@ -40,18 +43,22 @@ impl<'a> Surroundings<'a> {
 }
 
 /// The generator of a running motion.
-#[derive(Debug, Clone)]
+#[derive(Debug)]
 pub(super) enum Generator {
     /// Torques alone: nothing is generated.
     None,
     Joint(JointGenerator),
+    Targets(Box<TargetGenerator>),
     Cartesian(Box<CartesianGenerator>),
 }
 
 impl Generator {
-    /// One that starts at rest at `q`.
-    pub(super) fn at_rest(kind: GeneratorKind, q: &Joints, around: &Surroundings) -> Self {
-        match kind {
+    /// The one that `request` is about, starting at rest at `q`.
+    pub(super) fn at_rest(request: &MotionRequest, q: &Joints, around: &Surroundings) -> Self {
+        if let Some(fastest) = &request.targets {
+            return Self::Targets(Box::new(TargetGenerator::at_rest(q, fastest, around.rules)));
+        }
+        match request.generator {
             GeneratorKind::None => Self::None,
             GeneratorKind::JointPosition => Self::Joint(JointGenerator::of_positions(q)),
             GeneratorKind::JointVelocity => Self::Joint(JointGenerator::of_velocities(q)),
@@ -65,6 +72,7 @@ impl Generator {
         match self {
             Self::None => Ok(()),
             Self::Joint(joint) => joint.follow(set_point, around.rules),
+            Self::Targets(targets) => targets.follow(set_point),
             Self::Cartesian(cartesian) => cartesian.follow(set_point, around),
         }
     }
@@ -72,7 +80,8 @@ impl Generator {
     /// Whether the motion may end here: whoever ends it has to have come to rest.
     pub(super) fn finish(&self, around: &Surroundings) -> Verdict {
         match self {
-            Self::None => Ok(()),
+            // The robot, which plans to targets by itself, also brakes by itself.
+            Self::None | Self::Targets(_) => Ok(()),
             Self::Joint(joint) => joint.finish(around.rules),
             Self::Cartesian(cartesian) => cartesian.finish(around.rules),
         }
@@ -83,6 +92,7 @@ impl Generator {
         match self {
             Self::None => None,
             Self::Joint(joint) => Some(joint.trace()),
+            Self::Targets(targets) => Some(targets.trace()),
             Self::Cartesian(cartesian) => Some(cartesian.joints()),
         }
     }
@@ -91,7 +101,7 @@ impl Generator {
     pub(super) fn end_effector(&self) -> Option<&CartesianTrace> {
         match self {
             Self::Cartesian(cartesian) => Some(cartesian.trace()),
-            Self::None | Self::Joint(_) => None,
+            Self::None | Self::Joint(_) | Self::Targets(_) => None,
         }
     }
 }

@@ -19,6 +19,8 @@
 mod fuzz;
 mod requests;
 #[cfg(test)]
+mod target_tests;
+#[cfg(test)]
 mod tests;
 
 use super::ServeError;
@@ -41,6 +43,7 @@ use crate::arm::ReflexErrors;
 use crate::safety::{Limits, Trace};
 use shared_mem::cell::Cell;
 use shared_mem::theta::Theta;
+use std::ops::RangeInclusive;
 use twin::arm::{JointState, Joints};
 use twin::sim::Drive;
 
@@ -142,6 +145,11 @@ impl Robot {
     /// Counter of the newest state: the robot's clock [ms].
     pub(super) fn now(&self) -> u64 {
         self.tally.cycles
+    }
+
+    /// Counters of the states that a set point may answer.
+    pub(super) fn answers(&self) -> RangeInclusive<u64> {
+        self.running().map_or(self.now()..=self.now(), |motion| motion.answers(self.now()))
     }
 
     /// What has happened so far.

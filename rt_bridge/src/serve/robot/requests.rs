@@ -70,11 +70,9 @@ impl Robot {
         let deviations = request.path_deviation.iter().chain(&request.goal_deviation);
         if !matches!(self.mode, Mode::Idle) || self.waiting.is_some() {
             self.answer_move(id, MoveStatus::CommandNotPossibleRejected);
-        } else if request.asynchronous {
-            tracing::warn!("asynchronous position targets are not simulated; send a set point each millisecond");
-            self.answer_move(id, MoveStatus::CommandNotPossibleRejected);
         } else if torques_alone && request.controller != Controller::External
             || deviations.into_iter().any(|d| !(*d > 0.0 && d.is_finite()))
+            || request.targets.is_some_and(|fastest| !plans_to_targets(request, &fastest))
         {
             self.answer_move(id, MoveStatus::InvalidArgumentRejected);
         } else {
@@ -110,4 +108,11 @@ impl Robot {
         };
         self.outbox.before_state.push(Reply { number: RECOVER, id, payload: vec![status.to_u8()] });
     }
+}
+
+/// Targets are planned to in joint space, at some speed, and followed by the robot's own controllers.
+fn plans_to_targets(request: &MotionRequest, fastest: &[f64; 7]) -> bool {
+    request.generator == GeneratorKind::JointPosition
+        && request.controller != Controller::External
+        && fastest.iter().all(|speed| *speed > 0.0 && speed.is_finite())
 }

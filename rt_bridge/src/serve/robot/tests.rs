@@ -24,11 +24,11 @@ pub(super) fn robot() -> Robot {
 
 pub(super) fn motion(generator: GeneratorKind, controller: Controller) -> MotionRequest {
     let wide = [10.0, 3.12, std::f64::consts::TAU];
-    MotionRequest { controller, generator, path_deviation: wide, goal_deviation: wide, asynchronous: false }
+    MotionRequest { controller, generator, path_deviation: wide, goal_deviation: wide, targets: None }
 }
 
 /// Payloads of the replies to request `number` that went out since the last look.
-fn replies(robot: &mut Robot, number: u32) -> Vec<u8> {
+pub(super) fn replies(robot: &mut Robot, number: u32) -> Vec<u8> {
     let Outbox { before_state, after_state } = robot.outbox();
     before_state.into_iter().chain(after_state).filter(|r| r.number == number).map(|r| r.payload[0]).collect()
 }
@@ -54,11 +54,11 @@ fn command(robot: &mut Robot, cycles: usize, mut command: impl FnMut(usize, &mut
     }
 }
 
-fn idle(robot: &mut Robot, cycles: usize) {
+pub(super) fn idle(robot: &mut Robot, cycles: usize) {
     (0..cycles).for_each(|_| robot.tick(None));
 }
 
-fn numbers<const N: usize>(wire: [F32; N]) -> [f64; N] {
+pub(super) fn numbers<const N: usize>(wire: [F32; N]) -> [f64; N] {
     wire.map(|x| f64::from(x.get()))
 }
 
@@ -68,7 +68,7 @@ fn smooth(t: f64) -> f64 {
     t * t * t * (10.0 + t * (6.0 * t - 15.0))
 }
 
-fn recover(robot: &mut Robot) {
+pub(super) fn recover(robot: &mut Robot) {
     robot.request(RECOVER, 9, &Request::AutomaticErrorRecovery);
     for _ in 0..2000 {
         robot.tick(None);
@@ -82,7 +82,7 @@ fn recover(robot: &mut Robot) {
 }
 
 /// The robot has stopped itself for `fault`, and has said so in this order: state, then reply.
-fn assert_reflex(robot: &mut Robot, fault: Fault) {
+pub(super) fn assert_reflex(robot: &mut Robot, fault: Fault) {
     assert_eq!(robot.state().robot_mode, RobotMode::Reflex.to_u8(), "still running");
     let raised = ReflexErrors::from_flags(&robot.state().errors.map(|flag| flag != 0));
     assert!(raised.bits() & fault.alone().bits() != 0, "{raised} instead of {}", fault.alone());
@@ -244,9 +244,14 @@ fn what_a_mode_does_not_allow_is_refused() {
     assert_eq!(ask(&mut robot, motion(GeneratorKind::None, Controller::JointImpedance)), [7]);
     let nowhere = MotionRequest { path_deviation: [0.0; 3], ..motion(GeneratorKind::None, Controller::External) };
     assert_eq!(ask(&mut robot, nowhere), [7]);
-    let sparse =
-        MotionRequest { asynchronous: true, ..motion(GeneratorKind::JointPosition, Controller::JointImpedance) };
-    assert_eq!(ask(&mut robot, sparse), [5]);
+    let sparse = |generator, controller| MotionRequest { targets: Some([1.0; 7]), ..motion(generator, controller) };
+    assert_eq!(ask(&mut robot, sparse(GeneratorKind::JointVelocity, Controller::JointImpedance)), [7]);
+    assert_eq!(ask(&mut robot, sparse(GeneratorKind::JointPosition, Controller::External)), [7]);
+    let at_no_speed = MotionRequest {
+        targets: Some([1.0, 1.0, 0.0, 1.0, 1.0, 1.0, 1.0]),
+        ..motion(GeneratorKind::JointPosition, Controller::JointImpedance)
+    };
+    assert_eq!(ask(&mut robot, at_no_speed), [7]);
     start(&mut robot, GeneratorKind::None, Controller::External);
     assert_eq!(ask(&mut robot, motion(GeneratorKind::None, Controller::External)), [5], "one motion at a time");
     robot.request(SET_IMPEDANCE, 1, &Request::SetJointImpedance([100.0; 7]));
