@@ -1,12 +1,15 @@
 //! How long a picture of a robot of 70,000 splats takes at 640x480: on the processor, and with the feature `render` on
 //! the Vulkan device that there is.
 
+#[path = "shared/eye.rs"]
+mod eye;
 #[path = "shared/robot_splats.rs"]
 mod robot_splats;
 
 use criterion::{Criterion, criterion_group, criterion_main};
+use eye::camera_from_base;
 use nalgebra::Vector3;
-use robot_splats::{camera_from_base, robot_splats};
+use robot_splats::robot_splats;
 use shared_mem::cell::Cell;
 use std::path::Path;
 use twin::render::splat::{Body, Canvas, Lens, Shape, Surroundings};

@@ -4,6 +4,7 @@ pub mod arm;
 pub mod effects;
 pub mod metrics;
 pub mod physics;
+pub mod reconstruct;
 pub mod render;
 pub mod replay;
 pub mod rollout;

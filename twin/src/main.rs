@@ -18,6 +18,7 @@ Examples:
   twin shadow --cell config/fr3_cell.toml --viewer
   twin replay session --parameters theta.toml
   twin render session --out frames
+  twin label-splats scan.ply --cell cell.toml --joints 0,-0.78,0,-2.36,0,1.57,0.78 --out fr3_splats
 Every verb has its own --help with examples. Logs and progress go to stderr (RUST_LOG=debug for more)."
 )]
 struct Arguments {
@@ -30,6 +31,7 @@ enum Verb {
     Shadow(cli::shadow::Shadow),
     Replay(cli::replay::Replay),
     Render(cli::render::Render),
+    LabelSplats(cli::label_splats::LabelSplats),
 }
 
 fn main() -> ExitCode {
@@ -40,6 +42,7 @@ fn main() -> ExitCode {
         Verb::Shadow(verb) => verb.run(),
         Verb::Replay(verb) => verb.run(),
         Verb::Render(verb) => verb.run(),
+        Verb::LabelSplats(verb) => verb.run(),
     };
     match outcome {
         Ok(()) => ExitCode::SUCCESS,

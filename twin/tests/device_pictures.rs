@@ -1,11 +1,14 @@
 //! The device's pictures against the reference's. Where there is no Vulkan device nothing is compared, and the test says so.
 #![cfg(feature = "render")]
 
+#[path = "../benches/shared/eye.rs"]
+mod eye;
 #[path = "../benches/shared/robot_splats.rs"]
 mod robot_splats;
 
+use eye::camera_from_base;
 use nalgebra::{Isometry3, Matrix2, Matrix3, Point3, Translation3, UnitQuaternion, Vector2, Vector3};
-use robot_splats::{camera_from_base, robot_splats};
+use robot_splats::robot_splats;
 use std::path::Path;
 use twin::render::device::{Device, DeviceCanvas, DeviceError};
 use twin::render::splat::{Body, Lens, Picture, Shape, Splat, SplatCloud, Surroundings, render};

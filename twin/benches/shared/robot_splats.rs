@@ -1,7 +1,7 @@
 //! A robot as splats, made from the surfaces of its meshes: flat discs, one beside the other, with colours that depend on
 //! the direction. What benchmarks and tests draw where no scanned robot is at hand.
 
-use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
+use nalgebra::{Point3, UnitQuaternion, Vector3};
 use rand::{RngExt as _, SeedableRng as _};
 use rand_pcg::Pcg64Mcg;
 use twin::render::splat::{Splat, SplatCloud};
@@ -17,12 +17,6 @@ pub(crate) fn robot_splats(robot: &RobotSurface, count: usize) -> Vec<SplatCloud
             on_surface(part, (share * count as f32).round() as usize, &mut random)
         })
         .collect()
-}
-
-/// The camera in front of the robot: from the base's frame to its own.
-pub(crate) fn camera_from_base(eye: [f64; 3], at: [f64; 3]) -> Isometry3<f64> {
-    let flip = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), std::f64::consts::PI);
-    flip * Isometry3::look_at_rh(&Point3::from(eye), &Point3::from(at), &-Vector3::z())
 }
 
 fn corners(mesh: &Mesh) -> impl Iterator<Item = [Point3<f32>; 3]> + '_ {

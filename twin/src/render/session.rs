@@ -173,7 +173,8 @@ impl TwinView {
 
 /// Frame of a link in the base, 0 the base itself; behind the last joint the Franka Hand's, an eighth of a turn from the
 /// flange's.
-fn base_from_link(model: &ArmModel, q: &Joints, link: usize) -> Isometry3<f64> {
+#[must_use]
+pub fn base_from_link(model: &ArmModel, q: &Joints, link: usize) -> Isometry3<f64> {
     let hand = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), -std::f64::consts::FRAC_PI_4);
     match link {
         0 => Isometry3::identity(),

@@ -1,8 +1,9 @@
 //! The splats of one body: anisotropic Gaussians with opacity and a colour that depends on the direction (Kerbl et al.
 //! 2023). Body frame, metres.
 
+use super::harmonics::turns;
 use super::{compressed, ply};
-use nalgebra::{Point3, UnitQuaternion, Vector3};
+use nalgebra::{Point3, Similarity3, UnitQuaternion, Vector3};
 use std::path::{Path, PathBuf};
 
 /// One splat, without its colour.
@@ -35,6 +36,14 @@ pub enum SplatError {
     /// Missing or unreadable.
     #[error("cannot read the splats {}: {source}; check the path", path.display())]
     Read {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// It cannot be written.
+    #[error("cannot write {}: {source}; give a place that can be written", path.display())]
+    Write {
         /// The file.
         path: PathBuf,
         /// What the system said.
@@ -79,6 +88,56 @@ impl SplatCloud {
     #[must_use]
     pub fn coefficients(&self) -> usize {
         (self.degree + 1) * (self.degree + 1)
+    }
+
+    /// The splats whose number `keep` wants.
+    #[must_use]
+    pub fn only(&self, keep: impl Fn(usize) -> bool) -> Self {
+        let mut part = Self { degree: self.degree, ..Self::default() };
+        let colors = self.harmonics.chunks_exact(self.coefficients());
+        for (number, (splat, colors)) in self.splats.iter().zip(colors).enumerate() {
+            if keep(number) {
+                part.splats.push(*splat);
+                part.harmonics.extend_from_slice(colors);
+            }
+        }
+        part
+    }
+
+    /// The same splats turned, shifted and grown; their colours turn with them.
+    #[must_use]
+    pub fn moved(&self, change: &Similarity3<f64>) -> Self {
+        let (rotation, scale) = (change.isometry.rotation, change.scaling());
+        let turns = turns(&rotation);
+        let splats = self.splats.iter().map(|splat| Splat {
+            centre: (change * splat.centre.cast::<f64>()).cast(),
+            rotation: (rotation * splat.rotation.cast::<f64>()).cast(),
+            sigma: splat.sigma * scale as f32,
+            opacity: splat.opacity,
+        });
+        let mut harmonics = self.harmonics.clone();
+        for (colors, before) in
+            harmonics.chunks_exact_mut(self.coefficients()).zip(self.harmonics.chunks_exact(self.coefficients()))
+        {
+            for (degree, turn) in (1..=self.degree).zip(&turns) {
+                let first = degree * degree;
+                for (row, color) in colors[first..first + 2 * degree + 1].iter_mut().enumerate() {
+                    *color = [0, 1, 2].map(|c| {
+                        (0..2 * degree + 1).map(|k| turn[(row, k)] * f64::from(before[first + k][c])).sum::<f64>()
+                            as f32
+                    });
+                }
+            }
+        }
+        Self { splats: splats.collect(), degree: self.degree, harmonics }
+    }
+
+    /// Writes a 3DGS PLY.
+    ///
+    /// # Errors
+    /// [`SplatError::Write`] where it cannot be written.
+    pub fn write(&self, path: &Path) -> Result<(), SplatError> {
+        std::fs::write(path, ply::write(self)).map_err(|source| SplatError::Write { path: path.to_owned(), source })
     }
 
     fn check(&self) -> Result<(), String> {

@@ -1,5 +1,7 @@
 //! Colour by direction: real spherical harmonics to degree 3, with the signs that 3DGS files are written for.
 
+use nalgebra::{DMatrix, UnitQuaternion, Vector3};
+
 /// The constant function.
 pub(super) const FIRST: f64 = 0.282_094_791_773_878_14;
 
@@ -32,6 +34,38 @@ pub(super) fn values(degree: usize, [x, y, z]: [f64; 3]) -> [f64; 16] {
     out
 }
 
+/// How coefficients change when what they colour is turned: for every degree a matrix over its own functions, so that the
+/// turned splat shows in a turned direction what it showed before.
+pub(super) fn turns(rotation: &UnitQuaternion<f64>) -> [DMatrix<f64>; 3] {
+    // The functions of one degree turn into each other: what they become follows from their values in enough directions.
+    let directions: Vec<Vector3<f64>> = (0..DIRECTIONS)
+        .map(|i| {
+            let z: f64 = 1.0 - (2.0 * f64::from(i) + 1.0) / f64::from(DIRECTIONS);
+            let (sin, cos) = (f64::from(i) * 2.399_963_229_728_653).sin_cos();
+            let r = (1.0 - z * z).sqrt();
+            Vector3::new(r * cos, r * sin, z)
+        })
+        .collect();
+    let back = rotation.inverse();
+    [1usize, 2, 3].map(|degree| {
+        let table = |turned: bool| {
+            DMatrix::from_fn(directions.len(), 2 * degree + 1, |row, column| {
+                let way = if turned { back * directions[row] } else { directions[row] };
+                values(degree, way.into())[degree * degree + column]
+            })
+        };
+        let (plain, turned) = (table(false), table(true));
+        let square = plain.transpose() * &plain;
+        square.cholesky().map_or_else(
+            || DMatrix::identity(2 * degree + 1, 2 * degree + 1),
+            |square| square.solve(&(plain.transpose() * turned)),
+        )
+    })
+}
+
+/// Enough to tell the seven functions of degree 3 apart many times over.
+const DIRECTIONS: u32 = 64;
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -56,6 +90,26 @@ mod tests {
             for (j, product) in row.iter().enumerate() {
                 assert!((product - f64::from(u8::from(i == j))).abs() < 1e-3, "{i} {j}: {product}");
             }
+        }
+    }
+
+    #[test]
+    fn turned_coefficients_show_in_a_turned_direction_what_they_showed_before() {
+        let rotation = UnitQuaternion::from_euler_angles(0.7, -1.1, 2.3);
+        let turns = turns(&rotation);
+        let before: Vec<f64> = (0..16).map(|k| (f64::from(k) * 1.7).sin()).collect();
+        let mut after = before.clone();
+        for (degree, turn) in (1..).zip(&turns) {
+            for row in 0..2 * degree + 1 {
+                after[degree * degree + row] =
+                    (0..2 * degree + 1).map(|k| turn[(row, k)] * before[degree * degree + k]).sum();
+            }
+        }
+        let shown = |coefficients: &[f64], way: Vector3<f64>| -> f64 {
+            values(3, way.into()).iter().zip(coefficients).map(|(a, b)| a * b).sum()
+        };
+        for way in [Vector3::new(0.6, 0.0, 0.8), Vector3::new(-0.36, 0.48, -0.8), Vector3::y()] {
+            assert!((shown(&before, way) - shown(&after, rotation * way)).abs() < 1e-12);
         }
     }
 }

@@ -182,3 +182,27 @@ pub(super) fn degree(rest: usize) -> Result<usize, String> {
         .position(|known| *known == rest)
         .ok_or_else(|| format!("it has {rest} columns `f_rest_*`; degrees 0 to 3 have 0, 9, 24 or 45"))
 }
+
+/// A file with these splats, in the usual columns.
+pub(super) fn write(cloud: &SplatCloud) -> Vec<u8> {
+    let rest = 3 * (cloud.coefficients() - 1);
+    let mut header = format!("ply\nformat binary_little_endian 1.0\nelement vertex {}\n", cloud.splats.len());
+    let names = ["x", "y", "z", "f_dc_0", "f_dc_1", "f_dc_2"].map(str::to_owned).into_iter();
+    let more = (0..rest).map(|n| format!("f_rest_{n}"));
+    let last = ["opacity", "scale_0", "scale_1", "scale_2", "rot_0", "rot_1", "rot_2", "rot_3"].map(str::to_owned);
+    names.chain(more).chain(last).for_each(|name| header += &format!("property float {name}\n"));
+    let mut out = (header + "end_header\n").into_bytes();
+    for (splat, colors) in cloud.splats.iter().zip(cloud.harmonics.chunks_exact(cloud.coefficients())) {
+        let opacity = splat.opacity.clamp(1e-6, 1.0 - 1e-6);
+        let turn = splat.rotation.quaternion();
+        let rest = (0..3).flat_map(|c| colors[1..].iter().map(move |color| color[c]));
+        (splat.centre.iter().copied())
+            .chain(colors[0])
+            .chain(rest)
+            .chain([(opacity / (1.0 - opacity)).ln()])
+            .chain(splat.sigma.iter().map(|sigma| sigma.max(1e-30).ln()))
+            .chain([turn.w, turn.i, turn.j, turn.k])
+            .for_each(|value| out.extend(value.to_le_bytes()));
+    }
+    out
+}

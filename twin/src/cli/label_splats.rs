@@ -1,0 +1,129 @@
+//! `twin label-splats`: the robot out of a scanned cell, one splat file for each link.
+
+use anyhow::{Context as _, bail, ensure};
+use nalgebra::{Isometry3, Point3, Quaternion, Similarity3, Translation3, UnitQuaternion};
+use shared_mem::cell::Cell;
+use std::io::Write as _;
+use std::path::PathBuf;
+use twin::arm::MAX_JOINTS;
+use twin::reconstruct::{SurfacePoints, align, label};
+use twin::render::session::base_from_link;
+use twin::render::splat::SplatCloud;
+use twin::render::{Hand, RobotSurface};
+
+/// Finds the robot in a scanned cell and parts the scan: one splat file for each link, in its frame, and the rest.
+#[derive(clap::Args)]
+#[command(after_help = "\
+The scan is laid onto the robot's surface at the joint positions it stood at: turned, shifted and scaled, beginning with --start
+and what lies within 15 degrees and 15 % of scale around it. Then each splat goes to the link whose surface is nearest.
+Writes link0.ply to link7.ply (hand.ply with --hand) and scene.ply, which is the rest in the base frame.
+
+Examples:
+  twin label-splats scan.ply --cell cell.toml --joints 0,-0.78,0,-2.36,0,1.57,0.78 --out fr3_splats
+  twin label-splats scan.ply --cell cell.toml --joints 0,-0.78,0,-2.36,0,1.57,0.78 --start 0.4,0,0.1,1,0,0,0,0.31 --out fr3_splats
+  twin render session --splats fr3_splats --out frames")]
+pub(crate) struct LabelSplats {
+    /// The scan: 3DGS PLY, or SuperSplat's compressed PLY
+    #[arg(value_name = "SCAN.ply")]
+    scan: PathBuf,
+    /// What the laboratory knows about its cell; its table is no robot
+    #[arg(long, value_name = "CELL.toml")]
+    cell: PathBuf,
+    /// Joint positions of the robot in the scan [rad], with commas between them
+    #[arg(long, value_name = "Q", allow_hyphen_values = true, value_delimiter = ',', required = true)]
+    joints: Vec<f64>,
+    /// Folder for the parts
+    #[arg(long, value_name = "FOLDER")]
+    out: PathBuf,
+    /// Roughly where the scan's frame lies in the base: x,y,z,qw,qx,qy,qz, and metres for one of its units [default: at the
+    /// base, in metres]
+    #[arg(long, value_name = "POSE", allow_hyphen_values = true, value_delimiter = ',')]
+    start: Option<Vec<f64>>,
+    /// The Franka Hand is mounted, its fingers so far apart [m]
+    #[arg(long, value_name = "WIDTH")]
+    hand: Option<f64>,
+    /// A splat belongs to a link whose surface is nearer than this [m]
+    #[arg(long, value_name = "DISTANCE", default_value_t = 0.015)]
+    reach: f64,
+    /// Prints one JSON object on stdout at the end
+    #[arg(long)]
+    json: bool,
+}
+
+/// Splats fainter than this are haze and say nothing of a surface.
+const FAINT: f32 = 0.3;
+/// Nor do those that are as large as this [share of the arm's reach of about a metre].
+const BLURRED: f64 = 0.05;
+/// So near above the table a splat is the table's [m].
+const ON_TABLE: f64 = 0.004;
+
+impl LabelSplats {
+    pub(crate) fn run(&self) -> anyhow::Result<()> {
+        let mut cell = Cell::read(&self.cell)?;
+        // The capsule that stands for the tool is not what was scanned.
+        cell.tool = None;
+        let hand = self.hand.map_or(Hand::None, |width| Hand::Franka { width });
+        let robot = RobotSurface::new(&cell, hand)?;
+        let dof = robot.model().dof();
+        ensure!(self.joints.len() == dof, "--joints has {} values, the arm {dof} joints", self.joints.len());
+        ensure!(self.joints.iter().all(|q| q.is_finite()), "--joints holds a value that is no finite number");
+        ensure!((1e-4..=0.2).contains(&self.reach), "--reach is a distance from 0.1 mm to 200 mm, in metres");
+        let mut q = [0.0; MAX_JOINTS];
+        q[..dof].copy_from_slice(&self.joints);
+        let start = self.start()?;
+        let scan = SplatCloud::read(&self.scan)?;
+        let surface = SurfacePoints::new(&robot, &q, |_| true);
+        let clear = scan
+            .splats
+            .iter()
+            .filter(|splat| splat.opacity >= FAINT && f64::from(splat.sigma.max()) * start.scaling() < BLURRED);
+        let points: Vec<Point3<f64>> = clear.map(|splat| splat.centre.cast()).collect();
+        let found = align(&points, &surface, &start)?;
+        let table = cell.table.map(|table| table.height + ON_TABLE);
+        let parts = label(&scan, &found.base_from_scan, &surface, self.reach, table);
+        std::fs::create_dir_all(&self.out)
+            .with_context(|| format!("{}; give --out a place that can be written", self.out.display()))?;
+        let mut counts = Vec::new();
+        for (link, splats) in parts.links.iter().enumerate() {
+            let link_from_base = base_from_link(robot.model(), &q, link).inverse();
+            let name = if link > dof { "hand.ply".to_owned() } else { format!("link{link}.ply") };
+            splats.moved(&Similarity3::from_isometry(link_from_base, 1.0)).write(&self.out.join(name))?;
+            counts.push(splats.splats.len());
+        }
+        parts.rest.write(&self.out.join("scene.ply"))?;
+        let at = found.base_from_scan;
+        let (place, turn) = (at.isometry.translation.vector, at.isometry.rotation.quaternion());
+        eprintln!(
+            "{} of {} splats are the robot, in {}; {:.0} % of its surface was scanned, {:.1} mm off (root mean square)",
+            counts.iter().sum::<usize>(),
+            scan.splats.len(),
+            self.out.display(),
+            found.seen * 100.0,
+            found.rms * 1e3,
+        );
+        if self.json {
+            let answer = serde_json::json!({
+                "scale": at.scaling(), "position": [place.x, place.y, place.z],
+                "orientation_wxyz": [turn.w, turn.i, turn.j, turn.k], "seen": found.seen, "rms_m": found.rms,
+                "links": counts, "rest": parts.rest.splats.len(),
+            });
+            writeln!(std::io::stdout().lock(), "{answer}")?;
+        }
+        Ok(())
+    }
+
+    fn start(&self) -> anyhow::Result<Similarity3<f64>> {
+        let (values, scale) = match self.start.as_deref() {
+            None => return Ok(Similarity3::identity()),
+            Some(values @ [_, _, _, _, _, _, _]) => (values, 1.0),
+            Some([values @ .., scale]) if values.len() == 7 => (values, *scale),
+            Some(values) => bail!("--start has {} values; it is x,y,z,qw,qx,qy,qz and a scale", values.len()),
+        };
+        let turn = Quaternion::new(values[3], values[4], values[5], values[6]);
+        let sound = values.iter().all(|value| value.is_finite()) && turn.norm() > 1e-6;
+        ensure!(sound && scale.is_finite() && scale > 0.0, "--start holds no pose: check its quaternion and its scale");
+        let place = Translation3::new(values[0], values[1], values[2]);
+        let pose = Isometry3::from_parts(place, UnitQuaternion::from_quaternion(turn));
+        Ok(Similarity3::from_isometry(pose, scale))
+    }
+}
