@@ -24,6 +24,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{self, Sender};
 use std::thread::{self, JoinHandle};
 use twin::effects::CameraEffects;
+use twin::render::Drawer;
 use twin::scene::SceneSnapshot;
 use twin::sensors::camera::SimCamera;
 
@@ -40,6 +41,9 @@ pub enum CameraError {
     /// The cell cannot be drawn.
     #[error(transparent)]
     Cell(#[from] twin::sim::SimError),
+    /// The splats of its robot.
+    #[error(transparent)]
+    Splats(#[from] twin::render::session::ViewError),
     /// The recording.
     #[error(transparent)]
     Clip(#[from] ReadError),
@@ -49,7 +53,8 @@ pub enum CameraError {
 }
 
 impl Camera {
-    /// Starts the simulated camera on the scenes of a simulated cell, under effects that nobody is told.
+    /// Starts the simulated camera on the scenes of a simulated cell, under effects that nobody is told; `splats`: a folder
+    /// with the robot's links as it shall show them.
     ///
     /// # Errors
     /// [`CameraError`] when the cell cannot be drawn or another camera runs.
@@ -57,8 +62,12 @@ impl Camera {
         cell: &Cell,
         scenes: Consumer<SceneSnapshot>,
         effects: &CameraEffects,
+        splats: Option<&Path>,
     ) -> Result<Self, CameraError> {
-        let camera = SimCamera::new(cell)?.with_effects(effects);
+        let mut camera = SimCamera::new(cell)?.with_effects(effects);
+        if let Some(folder) = splats {
+            camera = camera.with_splats(folder, Drawer::Auto)?;
+        }
         let known_ns = cell.camera.as_ref().map_or(0, |camera| (camera.latency * 1e9) as u64);
         let latency_ns = known_ns + effects.latency_ns();
         Ok(Self::start(move |opened, stop| {

@@ -40,6 +40,10 @@ pub(super) struct RunArguments {
     /// Default: sim where the arm is simulated and cell.toml has a [camera], replay with a recording, else off
     #[arg(long, value_name = "CAMERA")]
     camera: Option<CameraChoice>,
+    /// The simulated camera draws the robot from splats of its links (link0.ply to link7.ply, as `twin label-splats` writes
+    /// them), on a graphics card where the program was built with `--features render` and finds one
+    #[arg(long, value_name = "FOLDER")]
+    splats: Option<PathBuf>,
     /// Who publishes the object's pose: the simulated cell, the bridge from the camera's colour and depth, the recording,
     /// or (off) another process. Default: sim with the simulated arm, replay with a recording, rgbd with a RealSense
     /// camera, else off
@@ -82,6 +86,7 @@ impl RunArguments {
             arm: self.arm,
             controller: self.controller,
             camera: self.camera,
+            splats: self.splats,
             tracker: self.tracker,
             gripper: self.gripper,
             wrench: self.wrench,

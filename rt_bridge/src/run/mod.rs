@@ -20,7 +20,7 @@ use crate::rt::stats::LoopStats;
 use crate::safety::{Guard, Workspace};
 use crate::tracker::{self, TrackerChoice};
 use crate::wrench::{self, WrenchChoice};
-use anyhow::{Result, bail};
+use anyhow::{Result, bail, ensure};
 use devices::{Devices, Pictures};
 use rtrb::{Consumer, RingBuffer};
 use shared_mem::cell::Cell;
@@ -58,6 +58,8 @@ pub struct Settings {
     /// The camera; none: simulated with the simulated arm where cell.toml has a `[camera]`, the recording's with a
     /// recording, else off.
     pub camera: Option<CameraChoice>,
+    /// Splats of the robot's links, which the simulated camera draws.
+    pub splats: Option<PathBuf>,
     /// Who tracks the object; none: the simulated cell with the simulated arm, the recording's poses with a recording,
     /// the bridge with a RealSense camera, else nobody.
     pub tracker: Option<TrackerChoice>,
@@ -188,6 +190,11 @@ impl Settings {
 pub fn run(settings: &Settings, stop: &Arc<AtomicBool>) -> Result<RunReport> {
     let cell = Cell::read(&settings.cell)?;
     let devices = Devices::open(settings, &cell)?;
+    let is_drawn = matches!(devices.pictures, Pictures::Scenes(..));
+    ensure!(
+        is_drawn || settings.splats.is_none(),
+        "--splats is for the simulated camera: leave it out, or add --camera sim"
+    );
     let node = Node::open("rt_bridge")?;
 
     let (to_pump, beats) = RingBuffer::new(BEATS);
@@ -204,7 +211,9 @@ pub fn run(settings: &Settings, stop: &Arc<AtomicBool>) -> Result<RunReport> {
     };
     let mut instruments = settings.instruments(&cell, devices.wrenches, &notices)?;
     let camera = match devices.pictures {
-        Pictures::Scenes(scenes, effects) => Some(Camera::simulated(&cell, scenes, &effects)?),
+        Pictures::Scenes(scenes, effects) => {
+            Some(Camera::simulated(&cell, scenes, &effects, settings.splats.as_deref())?)
+        }
         Pictures::Clip(clip, clock) => Some(Camera::replayed(&clip, clock)?),
         Pictures::RealSense(source) => {
             instruments.push(camera::serve(&source, &cell, notices.clone())?);

@@ -190,7 +190,7 @@ fn joints(q: &[f64]) -> Joints {
 }
 
 /// The splats of every link that the folder has, and of the hand, which moves with the flange.
-fn link_splats(folder: &Path) -> Result<Vec<(usize, SplatCloud)>, ViewError> {
+pub(crate) fn link_splats(folder: &Path) -> Result<Vec<(usize, SplatCloud)>, ViewError> {
     let read = |source| SplatError::Read { path: folder.to_owned(), source };
     let mut files: Vec<_> = std::fs::read_dir(folder).map_err(read)?.filter_map(|e| Some(e.ok()?.path())).collect();
     files.sort();

@@ -1,17 +1,22 @@
 //! A simulated D455: colour and depth of one moment, depth aligned to colour, from the scene's geometry. Table, box or
 //! mesh, the robot's surface, tool as the capsule it is. The picture has no lens distortion.
 //!
-//! Called by the camera thread of the bridge: allocates nothing after its first picture.
+//! Called by the camera thread of the bridge: allocates nothing after its first picture, unless the robot is drawn from
+//! splats.
 
 use super::depth::{self, DepthSensor};
+use super::scanned::Scanned;
 use super::{camera_clock_ns, generator};
 use crate::effects::CameraEffects;
-use crate::render::{Hand, Mesh, Pinhole, Raster, RobotSurface};
+use crate::render::session::ViewError;
+use crate::render::splat::{Lens, Picture, Surroundings};
+use crate::render::{Drawer, Hand, Mesh, Pinhole, Raster, RobotSurface};
 use crate::scene::{ObjectModel, SceneSnapshot};
 use crate::sim::SimError;
 use nalgebra::{Isometry3, Vector3};
 use shared_mem::cell::{Camera, Cell};
 use shared_mem::msg::image::{CameraInfo, ImageHeader, PixelEncoding, StampDomain};
+use std::path::Path;
 
 /// The camera.
 pub struct SimCamera {
@@ -22,6 +27,7 @@ pub struct SimCamera {
     still: Vec<Mesh>,
     robot: Option<RobotSurface>,
     object: Option<Mesh>,
+    scanned: Option<Scanned>,
     /// How much older a picture is than its stamp says.
     older_ns: u64,
     sequence: u64,
@@ -70,6 +76,7 @@ impl SimCamera {
             still,
             robot: cell.robot.as_ref().map(|_| RobotSurface::new(cell, Hand::None)).transpose()?,
             object: ObjectModel::new(cell, None)?.map(|model| Mesh::new(model.shape.triangles(), OBJECT)),
+            scanned: None,
             older_ns: 0,
             sequence: 0,
             next_picture_ns: 0,
@@ -83,6 +90,21 @@ impl SimCamera {
     pub fn with_effects(self, effects: &CameraEffects) -> Self {
         let camera_from_base = self.camera_from_base * effects.misplaced().cast::<f32>();
         Self { camera_from_base, older_ns: effects.latency_ns(), ..self }
+    }
+
+    /// The same camera before a robot of splats: a folder with a file for each link, in the links' frames. A picture then
+    /// takes as long as whoever draws it needs.
+    ///
+    /// # Errors
+    /// [`ViewError`] when the splats cannot be used, or who shall draw cannot.
+    pub fn with_splats(mut self, folder: &Path, drawer: Drawer) -> Result<Self, ViewError> {
+        let pinhole = self.settings.pinhole();
+        let lens = Lens { focal: [pinhole.fx, pinhole.fy], centre: [pinhole.cx, pinhole.cy], distortion: [0.0; 5] };
+        let view = (lens, [self.settings.width as usize, self.settings.height as usize]);
+        if let Some(robot) = &self.robot {
+            self.scanned = Some(Scanned::new(folder, robot, &self.still, self.object.as_ref(), drawer, view)?);
+        }
+        Ok(self)
     }
 
     /// Bytes of a colour picture.
@@ -111,15 +133,27 @@ impl SimCamera {
     /// without padding, [`Self::color_bytes`] and [`Self::depth_bytes`] long. Answers with the headers of both, whose
     /// `stamp_ns` the host sets.
     pub fn render(&mut self, scene: &SceneSnapshot, color: &mut [u8], depth: &mut [u8]) -> [ImageHeader; 2] {
-        self.draw(scene);
-        for (rgb, packed) in color.chunks_exact_mut(3).zip(self.raster.color()) {
-            rgb.copy_from_slice(&packed.to_le_bytes()[..3]);
-        }
         let width = self.settings.width as usize;
-        for (row, inverse_depth) in
-            depth.chunks_exact_mut(2 * width).zip(self.raster.inverse_depth().chunks_exact(width))
-        {
-            self.depth.row(inverse_depth, row);
+        if let Some(picture) = self.paint(scene) {
+            for (rgb, seen) in color.chunks_exact_mut(3).zip(&picture.color) {
+                rgb.copy_from_slice(&seen.map(|value| (value.clamp(0.0, 1.0) * 255.0).round() as u8));
+            }
+            // Half seen through is not measured.
+            let solid =
+                picture.depth.iter().zip(&picture.cover).map(|(d, cover)| if *cover < 0.5 { 0.0 } else { 1.0 / d });
+            let inverse: Vec<f32> = solid.collect();
+            for (row, inverse_depth) in depth.chunks_exact_mut(2 * width).zip(inverse.chunks_exact(width)) {
+                self.depth.row(inverse_depth, row);
+            }
+        } else {
+            self.draw(scene);
+            for (rgb, packed) in color.chunks_exact_mut(3).zip(self.raster.color()) {
+                rgb.copy_from_slice(&packed.to_le_bytes()[..3]);
+            }
+            let inverse = self.raster.inverse_depth().chunks_exact(width);
+            for (row, inverse_depth) in depth.chunks_exact_mut(2 * width).zip(inverse) {
+                self.depth.row(inverse_depth, row);
+            }
         }
         self.sequence += 1;
         [(PixelEncoding::Rgb8, 3, 0.0), (PixelEncoding::Depth16, 2, depth::SCALE)].map(
@@ -154,6 +188,25 @@ impl SimCamera {
         }
     }
 
+    /// The picture with the scanned robot; `None` where there is none, and from then on where its device has failed.
+    fn paint(&mut self, scene: &SceneSnapshot) -> Option<Picture> {
+        let (scanned, robot) = (self.scanned.as_mut()?, self.robot.as_ref()?);
+        let camera_from_base: Isometry3<f64> = self.camera_from_base.cast();
+        let around = Surroundings {
+            background: BACKGROUND.map(|value| f64::from(value) / 255.0),
+            light: camera_from_base * Vector3::from(LIGHT).cast::<f64>(),
+        };
+        let object = scene.object.map(|pose| pose.isometry());
+        match scanned.paint(robot, &scene.q, object, &camera_from_base, &around) {
+            Ok(picture) => Some(picture),
+            Err(error) => {
+                tracing::warn!("the simulated camera draws the robot's meshes from here on: {error}");
+                self.scanned = None;
+                None
+            }
+        }
+    }
+
     fn draw(&mut self, scene: &SceneSnapshot) {
         self.raster.clear(BACKGROUND);
         for mesh in &self.still {
@@ -173,6 +226,9 @@ impl SimCamera {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::reconstruct::SurfacePoints;
+    use crate::render::session::base_from_link;
+    use crate::render::splat::{Splat, SplatCloud};
     use crate::sim::SimCell;
     use shared_mem::cell::CameraPose;
     use std::path::Path;
@@ -210,6 +266,47 @@ mod tests {
         let beside = at(pinhole.cx + pinhole.fx * 0.05, pinhole.cy);
         assert!(beside.abs_diff(1100) <= 1, "the table beside it: {beside} mm");
         assert_eq!((header.width, header.stride, header.depth_scale), (640, 1280, 0.001));
+    }
+
+    #[test]
+    fn a_robot_of_splats_stands_where_the_meshes_stood() {
+        let mut cell = shipped();
+        cell.object.as_mut().expect("a box").pose_noise = None;
+        let folder = tempfile::tempdir().expect("a folder");
+        let bare = Cell { tool: None, ..cell.clone() };
+        let robot = RobotSurface::new(&bare, Hand::None).expect("a robot");
+        // A white ball of 5 mm on every point of the links' surfaces, in the links' frames.
+        let zero = [0.0; crate::arm::MAX_JOINTS];
+        let surface = SurfacePoints::new(&robot, &zero, |_| true);
+        for link in 0..8 {
+            let link_from_base = base_from_link(robot.model(), &zero, link).inverse();
+            let own = surface.points.iter().zip(&surface.links).filter(|(_, of)| **of == link);
+            let ball = |(at, _): (&nalgebra::Point3<f64>, _)| Splat {
+                centre: (link_from_base * at).cast(),
+                rotation: nalgebra::UnitQuaternion::identity(),
+                sigma: Vector3::repeat(0.005),
+                opacity: 0.95,
+            };
+            let splats: Vec<Splat> = own.map(ball).collect();
+            let harmonics = vec![[1.6; 3]; splats.len()];
+            let file = folder.path().join(format!("link{link}.ply"));
+            SplatCloud { splats, degree: 0, harmonics }.write(&file).expect("written");
+        }
+        let scene = SimCell::new(&cell, None).expect("a cell").snapshot();
+        let (_, meshes, deep, _) = picture(&cell, &scene);
+        let camera = SimCamera::new(&cell).expect("a camera");
+        let mut camera = camera.with_splats(folder.path(), Drawer::Processor).expect("splats");
+        let (mut color, mut depth) = (vec![0; camera.color_bytes()], vec![0; camera.depth_bytes()]);
+        camera.render(&scene, &mut color, &mut depth);
+        let depth: Vec<u16> = depth.chunks_exact(2).map(|b| u16::from_le_bytes([b[0], b[1]])).collect();
+        let white = |rgb: &[u8]| rgb.iter().all(|c| *c > 200);
+        let arm: Vec<usize> = (0..depth.len()).filter(|i| white(&meshes[3 * i..3 * i + 3])).collect();
+        let same = arm.iter().filter(|i| white(&color[3 * **i..3 * **i + 3])).count();
+        let near = arm.iter().filter(|i| depth[**i].abs_diff(deep[**i]) < 30).count();
+        assert!(same * 100 > 95 * arm.len() && near * 100 > 90 * arm.len(), "{same} and {near} of {}", arm.len());
+        let beside = (0..depth.len()).filter(|i| depth[*i].abs_diff(deep[*i]) > 30).count();
+        assert!(beside * 20 < depth.len(), "{beside} pixels elsewhere");
+        assert!(SimCamera::new(&cell).expect("a camera").with_splats(Path::new("nowhere"), Drawer::Auto).is_err());
     }
 
     #[test]

@@ -5,6 +5,7 @@
 pub mod camera;
 mod depth;
 pub mod joint;
+mod scanned;
 pub mod tracker;
 pub mod wrench;
 
