@@ -46,11 +46,6 @@ impl Colors {
         self.odds.get(usize::from(bin)).copied().unwrap_or(0.0)
     }
 
-    /// Forgets everything.
-    pub(super) fn forget(&mut self) {
-        *self = Self::new();
-    }
-
     /// Learns from one picture: colours, and whether each is the object's.
     pub(super) fn learn(&mut self, pixels: impl Iterator<Item = (Bin, bool)>) {
         let mut counts = [vec![0.0_f32; self.odds.len()], vec![0.0_f32; self.odds.len()]];

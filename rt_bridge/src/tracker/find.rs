@@ -1,5 +1,6 @@
-//! The object in a picture of which nothing is known: what rises from the table, is not the robot and is as large as the
-//! object, with the pose in which the object looks most like it.
+//! The object in pictures of which nothing is known: what rises from the table, is not the robot and is as large as the
+//! object, with the pose in which the object looks most like it. One step a picture, so that none takes longer than a camera
+//! leaves: heaps, then for each of them where the object may stand there, and what fits.
 
 use super::align::{COARSE, FINE, Fit, Scene};
 use super::arm::ArmBody;
@@ -21,8 +22,9 @@ const FEWEST: usize = 20;
 const HEAPS: usize = 6;
 /// Turns that are tried [rad].
 const TURN: f64 = 0.27;
-/// Poses that are fitted, of all that are drawn.
+/// Poses that are fitted, of all that are drawn, and of those how many to the end.
 const FITTED: usize = 6;
+const FINISHED: usize = 3;
 /// Poses that differ by less are one [m, rad].
 const ALIKE: [f64; 2] = [0.012, 0.35];
 /// Where another pose scores within this of the best, the picture does not decide between them.
@@ -47,14 +49,55 @@ struct Heap {
     middle: Vector3<f64>,
 }
 
+/// A search under way.
+#[derive(Debug, Clone)]
+pub(super) struct Hunt {
+    /// Heaps that nobody has looked into, the largest last.
+    left: Vec<Heap>,
+    /// The heap that is looked into, and poses in which the object may be there.
+    ranked: Option<(Heap, Vec<Isometry3<f64>>)>,
+    /// The poses that explain one heap and do so best, the best first.
+    best: Vec<(Fit, Verdict)>,
+}
+
+impl Hunt {
+    /// Whether everything was looked into.
+    pub(super) fn is_over(&self) -> bool {
+        self.left.is_empty() && self.ranked.is_none()
+    }
+
+    /// The poses found, the best first.
+    pub(super) fn found(&self) -> Vec<Fit> {
+        self.best.iter().map(|(fit, _)| *fit).collect()
+    }
+}
+
 impl Scene<'_> {
-    /// Looks for the object in the whole picture: poses in which it may stand where it looks most like itself, the best
-    /// first.
-    pub(super) fn find(&self, view: &View, frame: &Frame, arm: Arm) -> Vec<Fit> {
-        let heaps = self.heaps(view, frame, arm);
-        let found = heaps.iter().map(|heap| self.look_into(view, frame, arm, heap));
-        let best = found.max_by(|a, b| score(a).total_cmp(&score(b)));
-        best.unwrap_or_default().into_iter().map(|(fit, _)| fit).collect()
+    /// Begins to look for the object in the whole picture.
+    pub(super) fn begin_hunt(&self, view: &View, frame: &Frame, arm: Arm) -> Hunt {
+        let mut left = self.heaps(view, frame, arm);
+        left.reverse();
+        let mut hunt = Hunt { left, ranked: None, best: Vec::new() };
+        self.go_on(&mut hunt, view, frame, arm);
+        hunt
+    }
+
+    /// The next step of a search.
+    pub(super) fn go_on(&self, hunt: &mut Hunt, view: &View, frame: &Frame, arm: Arm) {
+        match hunt.ranked.take() {
+            Some((heap, starts)) => {
+                let fits = self.fit(view, frame, arm, &heap, &starts);
+                if score(&fits) > score(&hunt.best) {
+                    hunt.best = fits;
+                }
+            }
+            None => {
+                hunt.ranked = hunt.left.pop().map(|heap| {
+                    let starts = self.rank(view, frame, arm, &heap);
+                    (heap, starts)
+                });
+            }
+        }
     }
 
     /// Of several poses the one that fits best, now that more is known of the object's colours; `None` where the picture
@@ -144,14 +187,9 @@ impl Scene<'_> {
         (2 * within > points.len()).then_some(Heap { pixels, middle })
     }
 
-    /// The object's poses that explain a heap, the best first.
-    fn look_into(&self, view: &View, frame: &Frame, arm: Arm, heap: &Heap) -> Vec<(Fit, Verdict)> {
-        let camera_from_base = view.base_from_camera.inverse();
-        let centre = camera_from_base * nalgebra::Point3::from(heap.middle);
-        let Some(mut patch) = Patch::around(view, self.table, frame, arm, &centre.coords, 2.0 * self.model.radius)
-        else {
-            return Vec::new();
-        };
+    /// The poses in which the object, standing on the table, looks most like a heap.
+    fn rank(&self, view: &View, frame: &Frame, arm: Arm, heap: &Heap) -> Vec<Isometry3<f64>> {
+        let Some(mut patch) = self.around(view, frame, arm, heap) else { return Vec::new() };
         let mut starts: Vec<(f64, Isometry3<f64>)> = candidates(self.model)
             .filter_map(|rotation| {
                 let pose = self.under(&mut patch, view, heap, &rotation)?;
@@ -165,11 +203,30 @@ impl Scene<'_> {
                 tried.push(start);
             }
         }
-        let mut fits: Vec<(Fit, Verdict)> = tried
+        tried
+    }
+
+    /// The object's poses that explain a heap, the best first: all are fitted roughly, the best of them to the end.
+    fn fit(&self, view: &View, frame: &Frame, arm: Arm, heap: &Heap, starts: &[Isometry3<f64>]) -> Vec<(Fit, Verdict)> {
+        let Some(mut patch) = self.around(view, frame, arm, heap) else { return Vec::new() };
+        let mut rough: Vec<(f64, Isometry3<f64>)> = starts
             .iter()
             .filter_map(|start| {
-                let fit = self.align(&mut patch, start, COARSE)?;
-                let fit = self.align(&mut patch, &fit.camera_from_object, FINE)?;
+                let pose = self.align(&mut patch, start, COARSE)?.camera_from_object;
+                Some((self.judge(&mut patch, &pose).score(), pose))
+            })
+            .collect();
+        rough.sort_by(|(a, _), (b, _)| b.total_cmp(a));
+        let mut apart: Vec<Isometry3<f64>> = Vec::new();
+        for (_, pose) in rough {
+            if apart.len() < FINISHED && !apart.iter().any(|other| self.alike(other, &pose)) {
+                apart.push(pose);
+            }
+        }
+        let mut fits: Vec<(Fit, Verdict)> = apart
+            .iter()
+            .filter_map(|pose| {
+                let fit = self.align(&mut patch, pose, FINE)?;
                 let verdict = self.judge(&mut patch, &fit.camera_from_object);
                 let explains = explained(&patch, heap, self.table.noise) >= EXPLAINED;
                 (verdict.holds() && explains).then_some((fit, verdict))
@@ -177,6 +234,11 @@ impl Scene<'_> {
             .collect();
         fits.sort_by(|(_, a), (_, b)| b.score().total_cmp(&a.score()));
         fits
+    }
+
+    fn around(&self, view: &View, frame: &Frame, arm: Arm, heap: &Heap) -> Option<Patch> {
+        let centre = view.base_from_camera.inverse() * nalgebra::Point3::from(heap.middle);
+        Patch::around(view, self.table, frame, arm, &centre.coords, 2.0 * self.model.radius)
     }
 
     /// Whether two poses look nearly the same.

@@ -43,6 +43,7 @@ pub use view::{Frame, View};
 use align::{FINE, Fit, Scene};
 use arm::ArmBody;
 use colors::Colors;
+use find::Hunt;
 use judge::Verdict;
 use nalgebra::{Isometry3, Matrix6, UnitQuaternion, Vector3};
 use patch::Patch;
@@ -55,8 +56,6 @@ use twin::scene::{MeshFileError, ObjectModel};
 
 /// Frames after which speeds of long ago are forgotten [s].
 const LONG_AGO: f64 = 0.2;
-/// While lost, the whole picture is searched in one of so many frames.
-const SEARCH_EVERY: u32 = 3;
 /// Other turns to try where a fit is poor [rad].
 const OTHER_TURNS: [f64; 4] = [0.35, -0.35, 0.8, -0.8];
 
@@ -71,6 +70,8 @@ pub struct Tracker {
     colors: Colors,
     last: Option<Seen>,
     lost_for: u32,
+    /// A search under way.
+    hunt: Option<Hunt>,
 }
 
 /// The last pose.
@@ -150,6 +151,7 @@ impl Tracker {
             colors: Colors::new(),
             last: None,
             lost_for: 0,
+            hunt: None,
         })
     }
 
@@ -157,6 +159,7 @@ impl Tracker {
     pub fn set_view(&mut self, view: View) {
         self.table = Table::new(&view, self.table_height);
         self.view = Some(view);
+        self.hunt = None;
     }
 
     /// How the camera projects, once that is known.
@@ -213,8 +216,10 @@ impl Tracker {
         let centre = camera_from_base * nalgebra::Point3::from(predicted.translation.vector);
         let mut patch = Patch::around(view, table, frame, robot, &centre.coords, self.model.radius)?;
         let mut best: Option<(Fit, Verdict)> = None;
-        let turned = OTHER_TURNS.map(|turn| {
-            let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), turn);
+        // While the whole picture is searched there is no time to look that closely at one place.
+        let turns = if self.hunt.is_none() { &OTHER_TURNS[..] } else { &[] };
+        let turned = turns.iter().map(|turn| {
+            let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), *turn);
             Isometry3::from_parts(predicted.translation, turn * predicted.rotation)
         });
         for start in [predicted, last.base_from_object].into_iter().chain(turned) {
@@ -230,18 +235,32 @@ impl Tracker {
         best.filter(|(_, verdict)| verdict.holds()).map(|(fit, _)| fit)
     }
 
-    /// In the whole picture.
+    /// In the whole picture, one step a frame, without regard to what was learnt: another light, other neighbours may have
+    /// made it wrong. What is found decides what holds from then on.
     fn search(&mut self, view: &View, table: &Table, frame: &Frame, robot: find::Arm) -> Option<Fit> {
-        if !self.lost_for.is_multiple_of(SEARCH_EVERY) {
+        let unknown = Colors::new();
+        let scene = Scene { model: &self.model, table, colors: &unknown };
+        let Some(mut hunt) = self.hunt.take() else {
+            self.hunt = Some(scene.begin_hunt(view, frame, robot));
+            return None;
+        };
+        if !hunt.is_over() {
+            scene.go_on(&mut hunt, view, frame, robot);
+            self.hunt = Some(hunt);
             return None;
         }
-        // Another light, other neighbours: what was learnt may be wrong by now.
-        self.colors.forget();
-        let poses = Scene { model: &self.model, table, colors: &self.colors }.find(view, frame, robot);
+        let poses = hunt.found();
         let first = poses.first()?.camera_from_object;
         let mut patch = Patch::around(view, table, frame, robot, &first.translation.vector, self.model.radius)?;
+        // It may have moved since the last picture.
+        let first = scene.align(&mut patch, &first, FINE)?.camera_from_object;
+        let before = std::mem::replace(&mut self.colors, Colors::new());
         self.learn(&mut patch, table, &first);
-        Scene { model: &self.model, table, colors: &self.colors }.decide(&mut patch, &poses)
+        let found = Scene { model: &self.model, table, colors: &self.colors }.decide(&mut patch, &poses);
+        if found.is_none() {
+            self.colors = before;
+        }
+        found
     }
 
     /// Takes a fit as the object's pose.
@@ -254,7 +273,7 @@ impl Tracker {
         let reference = self.last.map_or_else(UnitQuaternion::identity, |last| last.moved_on(at).rotation);
         let pose = self.model.nearest(&seen, &reference);
         self.last = Some(Seen::after(self.last.filter(|_| self.lost_for == 0), pose, at));
-        self.lost_for = 0;
+        (self.lost_for, self.hunt) = (0, None);
         let unseen = self.model.spins_about.map(|axis| pose.rotation * axis);
         Estimate { pose: Pose::from_isometry(pose), covariance: covariance(view, &fit.information, unseen) }
     }

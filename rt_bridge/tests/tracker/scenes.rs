@@ -38,6 +38,9 @@ pub(crate) struct Bench {
     pub(crate) headers: [ImageHeader; 2],
 }
 
+/// Frames for which a search goes on before the one in which a lone object is found.
+pub(crate) const SEARCH: u32 = 2;
+
 impl Bench {
     pub(crate) fn new(cell: &Cell) -> Self {
         let camera = SimCamera::new(cell).expect("a camera");
@@ -58,6 +61,15 @@ impl Bench {
         let [color, depth] = &self.headers;
         let frame = Frame::new(&view, (depth, &self.depth), Some((color, &self.color))).expect("a frame");
         self.tracker.look(&frame, scene.time_ns as f64 * 1e-9, Some(&scene.q))
+    }
+
+    /// Looks at a scene until the search is over but for the last look.
+    pub(crate) fn search(&mut self, scene: &SceneSnapshot) {
+        self.film(scene);
+        for _ in 0..SEARCH {
+            let sight = self.look(scene);
+            assert!(matches!(sight, Sight::Lost(_)), "found at once: {sight:?}");
+        }
     }
 
     pub(crate) fn see(&mut self, scene: &SceneSnapshot) -> Sight {
