@@ -8,7 +8,7 @@ use crate::diagnose::admit::{Admitted, Refused};
 use crate::diagnose::arm_clips::ArmClips;
 use crate::diagnose::cell_clips::CellClips;
 use crate::diagnose::evidence::Evidence;
-use crate::diagnose::fit::{Bench, Effort, Hypothesis};
+use crate::diagnose::fit::{Bench, Effort, FittedClip, Hypothesis};
 use crate::diagnose::gap::Residuals;
 use crate::diagnose::library::Library;
 use crate::diagnose::split::{self, Split};
@@ -87,7 +87,7 @@ impl Court<'_> {
         let judged = || {
             let truth = bench.fit((&effects, full), &self.split.train, even, Some(baseline), EFFORT)?;
             let deviance = |hypothesis: &Hypothesis| -> Option<f64> {
-                Some(bench.judge(hypothesis, &self.split.confirm, even)?.iter().map(|(_, deviance)| deviance).sum())
+                Some(bench.judge(hypothesis, &self.split.confirm, even)?.iter().map(FittedClip::deviance).sum())
             };
             let gain = deviance(baseline)? - deviance(&truth)?;
             let [before, after] =

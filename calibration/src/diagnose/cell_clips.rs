@@ -3,7 +3,8 @@
 //!
 //! Every clip has a friction and a clock of its own, and its object strays from the simulated path: nobody simulates a
 //! blow exactly, and what it leaves behind grows along the way. That straying is a part of the measurement, added to the
-//! simulated poses, so it costs no simulation; how far clips stray is what an effect must beat to be believed.
+//! simulated poses, so it costs no simulation; how far clips stray is what an effect must beat to be believed
+//! ([`super::straying`]).
 
 use super::arm_clips::ArmClips;
 use super::evidence::{Channel, Evidence, Reach, Row, StageName};
@@ -175,7 +176,7 @@ fn scatter(object: &ObjectClips) -> Scatter {
         light.iter().map(|own| Random { sigma: own.sigma(object.cell(), kind), ..own.random() }).collect();
     let stray = |(name, _, _, sigma): (&str, _, _, f64)| Random { name: name.into(), sigma, step: sigma };
     random.extend(STRAYING.map(stray));
-    Scatter { heavy: FIRST_STRAY..random.len(), random }
+    Scatter { heavy: FIRST_STRAY..random.len(), forgiving: 1.0, random }
 }
 
 fn pose_rows(object: &ObjectClips, clip: usize, first: usize) -> Vec<Row> {

@@ -10,8 +10,9 @@ use super::score::{Advantage, Foretold, foretell};
 use super::shortlist::{self, Scored};
 use super::split::Split;
 use super::starts;
+use super::straying;
 use super::sweep::{Point, Precision, Swept, sweep};
-use super::worthy::{overlooked, worthy};
+use super::worthy::{overlooked, seen_when_clips_stray_little, worthy};
 use crate::progress::Progress;
 use nalgebra::DMatrix;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -200,26 +201,38 @@ fn without_superfluous<E: Evidence>(
 
 /// Sweeps around a hypothesis, scores all candidates, fits the best.
 fn step<E: Evidence>(bench: &Bench<'_, E>, split: &Split, from: &Hypothesis, bar: &Progress) -> Option<Step> {
-    let swept = swept(bench, split, from, bar)?;
+    let mut swept = swept(bench, split, from, bar)?;
     let mut weights = vec![1.0; bench.evidence.channels().len()];
     // Weights depend on what the richest hypothesis leaves, and that on the weights: twice is enough.
     for _ in 0..2 {
         let left = floor::richest_residuals(&swept, bench.evidence, bench.library, &weights);
         weights = floor::weights(bench.evidence, &left);
     }
-    let size = 1 + swept.columns.len();
-    let sum =
-        swept.reduced(bench.evidence, &weights).iter().fold(DMatrix::zeros(size, size), |sum, clip| sum + &clip.form);
-    let scored = shortlist::score(&swept, &sum, bench.library);
+    let scores = |swept: &Swept| {
+        let size = 1 + swept.columns.len();
+        let forms = swept.reduced(bench.evidence, &weights);
+        let sum = forms.iter().fold(DMatrix::zeros(size, size), |sum, clip| sum + &clip.form);
+        shortlist::score(swept, &sum, bench.library)
+    };
+    let mut scored = scores(&swept);
+    // Where clips of the right hypothesis stray little, the usual straying hides a small effect altogether.
+    swept.scatter = bench.scatter.narrowed(straying::LEAST);
+    let narrow = scores(&swept);
     drop(swept);
     let from = bench.fit((&from.effects, from.full.clone()), &split.train, &weights, Some(from), FIRST_PASS)?;
     let foretold = foretell(bench, &from, &split.choose, &weights)?;
     let of_arm = |row: &&Row| bench.evidence.channels()[row.channel].joint.is_some();
     let arm_rows = split.open().iter().map(|clip| bench.evidence.rows(*clip).iter().filter(of_arm).count()).sum();
+    let left = Residuals::at(bench, &from, &split.open()).map(|left| left.typical()).unwrap_or_default();
+    let mut promising = worthy(bench, (&from, &weights), &scored, &left);
+    for seen in seen_when_clips_stray_little(bench, &from, &narrow) {
+        if !promising.contains(&seen.candidate) {
+            promising.push(seen.candidate);
+            scored.iter_mut().filter(|s| s.candidate == seen.candidate).for_each(|s| *s = seen.clone());
+        }
+    }
     let trial = |scored: &Scored| Trial { scored: scored.clone(), fitted: None, closes: 0.0 };
     let trials = scored.iter().map(trial).collect();
-    let left = Residuals::at(bench, &from, &split.open()).map(|left| left.typical()).unwrap_or_default();
-    let promising = worthy(bench, (&from, &weights), &scored, &left);
     let mut step = Step { from, foretold, trials, weights, arm_rows, left };
     step.fit(bench, split, (&promising, false), bar);
     if step.best(bench).is_none() {

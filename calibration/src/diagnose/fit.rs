@@ -36,6 +36,14 @@ pub struct FittedClip {
     pub reduced: Reduced,
 }
 
+impl FittedClip {
+    /// `-2 ln` of its likelihood.
+    #[must_use]
+    pub fn deviance(&self) -> f64 {
+        self.reduced.form[(0, 0)] + self.reduced.volume
+    }
+}
+
 /// A hypothesis with its numbers.
 #[derive(Debug, Clone)]
 pub struct Hypothesis {
@@ -53,7 +61,7 @@ impl Hypothesis {
     /// `-2 ln` of the likelihood of the clips it was fitted to.
     #[must_use]
     pub fn deviance(&self) -> f64 {
-        self.fitted.iter().map(|clip| clip.reduced.form[(0, 0)] + clip.reduced.volume).sum()
+        self.fitted.iter().map(FittedClip::deviance).sum()
     }
 
     /// A clip's own numbers where it was fitted, else at rest.
@@ -289,15 +297,16 @@ impl<E: Evidence> Bench<'_, E> {
         full
     }
 
-    /// Clips that were not fitted, at a hypothesis' numbers: their own numbers at their best, and their deviances.
+    /// Clips that were not fitted, at a hypothesis' numbers with their own ones at their best.
     #[must_use]
-    pub fn judge(&self, hypothesis: &Hypothesis, clips: &[usize], weights: &[f64]) -> Option<Vec<(Vec<f64>, f64)>> {
+    pub fn judge(&self, hypothesis: &Hypothesis, clips: &[usize], weights: &[f64]) -> Option<Vec<FittedClip>> {
         let nothing = vec![0.0; self.scatter.count()];
         let clips = clips.iter().map(|clip| (*clip, nothing.clone())).collect();
         let at = self.settled(&hypothesis.full, clips, weights)?;
         let swept = self.linearise(&hypothesis.full, &[], &at, Precision::Exact)?;
-        let deviances = swept.reduced(self.evidence, weights).into_iter().map(|clip| clip.form[(0, 0)] + clip.volume);
-        Some(at.into_iter().map(|(_, own)| own).zip(deviances).collect())
+        let forms = swept.reduced(self.evidence, weights);
+        let judged = at.into_iter().zip(forms).map(|((clip, own), reduced)| FittedClip { clip, own, reduced });
+        Some(judged.collect())
     }
 
     /// Clips with their own numbers at their best for shared ones that are given.

@@ -18,6 +18,7 @@
 //! | [`worthy`], [`starts`] | which of them are fitted, and where a fit begins |
 //! | [`fit`] | hypotheses fitted |
 //! | [`score`] | how well they foretell clips |
+//! | [`straying`] | how far clips stray under one of them |
 //! | [`combine`] | which effects act together |
 //! | [`leftovers`] | what they leave |
 //! | [`gap`], [`localise`] | how large the gap is, and where |
@@ -50,6 +51,7 @@ pub mod score;
 pub mod shortlist;
 pub mod split;
 pub mod starts;
+pub mod straying;
 pub mod sweep;
 pub mod verdict;
 pub mod worthy;

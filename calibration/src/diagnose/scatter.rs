@@ -11,15 +11,37 @@ use std::ops::Range;
 const FREEDOM: f64 = 3.0;
 
 /// The own numbers of a clip.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone)]
 pub struct Scatter {
     /// Names, sigmas and steps.
     pub random: Vec<Random>,
     /// Those of them whose scatter has heavy tails, as one vector.
     pub heavy: Range<usize>,
+    /// Which clips count as having gone their own way is told by sigmas so many times as wide.
+    pub forgiving: f64,
+}
+
+impl Default for Scatter {
+    fn default() -> Self {
+        Self { random: Vec::new(), heavy: 0..0, forgiving: 1.0 }
+    }
 }
 
 impl Scatter {
+    /// The same where clips stray so many times as far.
+    #[must_use]
+    pub fn scaled(&self, scale: f64) -> Self {
+        let mut scaled = self.clone();
+        scaled.random[self.heavy.clone()].iter_mut().for_each(|number| number.sigma *= scale);
+        scaled
+    }
+
+    /// Held to so many times less straying, but for the clips that went their own way before.
+    #[must_use]
+    pub fn narrowed(&self, scale: f64) -> Self {
+        Self { forgiving: 1.0 / scale, ..self.scaled(scale) }
+    }
+
     /// How many numbers a clip has of its own.
     #[must_use]
     pub fn count(&self) -> usize {
@@ -28,7 +50,7 @@ impl Scatter {
 
     /// Sum of squares of the heavy numbers in their sigmas.
     fn strayed(&self, own: &[f64]) -> f64 {
-        self.heavy.clone().map(|k| (own[k] / self.random[k].sigma).powi(2)).sum()
+        self.heavy.clone().map(|k| (own[k] / (self.forgiving * self.random[k].sigma)).powi(2)).sum()
     }
 
     /// By how much more (or less) than at one sigma the heavy numbers of a clip are held: the weight with which
@@ -77,7 +99,7 @@ mod tests {
 
     fn two() -> Scatter {
         let random = |name: &str, sigma| Random { name: name.into(), sigma, step: 1e-3 };
-        Scatter { random: vec![random("light", 2.0), random("heavy", 0.5)], heavy: 1..2 }
+        Scatter { random: vec![random("light", 2.0), random("heavy", 0.5)], heavy: 1..2, forgiving: 1.0 }
     }
 
     #[test]

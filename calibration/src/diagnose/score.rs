@@ -7,6 +7,7 @@ use super::evidence::Evidence;
 use super::fit::{Bench, FittedClip, Hypothesis};
 use super::noise::median;
 use super::quadratic::{minimum, value};
+use super::straying::{Around, eased};
 
 /// Deviance of every judged clip out of sample, and what it says about numbers.
 #[derive(Debug, Clone, PartialEq)]
@@ -43,7 +44,11 @@ pub fn foretell<E: Evidence>(
 ) -> Option<Foretold> {
     let mut clips = left_out(bench, hypothesis);
     let judged = bench.judge(hypothesis, choose, weights)?;
-    clips.extend(choose.iter().copied().zip(judged.into_iter().map(|(_, deviance)| deviance)));
+    clips.extend(judged.iter().map(|clip| (clip.clip, clip.deviance())));
+    let around: Vec<&Around> = hypothesis.fitted.iter().chain(&judged).map(|clip| &clip.reduced.around).collect();
+    for ((_, deviance), change) in clips.iter_mut().zip(eased(&around, &bench.scatter)) {
+        *deviance += change;
+    }
     Some(Foretold { clips })
 }
 

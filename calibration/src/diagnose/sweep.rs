@@ -12,6 +12,7 @@
 use super::evidence::{Evidence, Reach};
 use super::library::{Alternative, Library};
 use super::scatter::Scatter;
+use super::straying::Around;
 use crate::estimate::Impossible;
 use nalgebra::{Cholesky, DMatrix, DVector};
 use rayon::prelude::*;
@@ -63,6 +64,8 @@ pub struct Reduced {
     pub form: DMatrix<f64>,
     /// Logarithm of the volume that the own numbers were integrated over; part of the deviance.
     pub volume: f64,
+    /// The clip around its own numbers.
+    pub around: Around,
 }
 
 /// Where a sweep stands.
@@ -256,8 +259,10 @@ impl Swept {
         let gram = gram(clip, evidence, weights);
         let kept = 1 + self.columns.len();
         let outer = gram.view((0, 0), (kept, kept)).into_owned();
+        let alone = gram.clone().remove_columns(1, self.columns.len()).remove_rows(1, self.columns.len());
+        let around = Around { gram: alone, own: clip.own.clone() };
         if self.scatter.count() == 0 {
-            return Reduced { form: outer, volume: 0.0 };
+            return Reduced { form: outer, volume: 0.0, around };
         }
         let (inner, cross, precision) = self.own_part(clip, &gram);
         let constant: f64 = precision.iter().zip(&clip.own).map(|(p, u)| p * u * u).sum();
@@ -265,7 +270,7 @@ impl Swept {
         let mut form = outer - cross.tr_mul(&inner.solve(&cross));
         form[(0, 0)] += constant;
         let volume = inner.ln_determinant() - precision.iter().map(|p| p.ln()).sum::<f64>();
-        Reduced { form, volume: volume + self.scatter.correction(&clip.own) }
+        Reduced { form, volume: volume + self.scatter.correction(&clip.own), around }
     }
 
     fn own_part(&self, clip: &SweptClip, gram: &DMatrix<f64>) -> (DMatrix<f64>, DMatrix<f64>, Vec<f64>) {

@@ -15,6 +15,10 @@ const FITTED: usize = 5;
 const QUIET: f64 = 0.5;
 /// Candidates whose signature explains less than this share of what the best one does are not fitted.
 const CLOSE: f64 = 0.1;
+/// So many candidates are fitted beside them because they stand out where clips stray little: those whose signature explains
+/// this share of what the best one does there.
+const STANDING_OUT: usize = 2;
+const ALIKE: f64 = 0.5;
 /// Where the score test tells little, a candidate of the camera must spare this share of the cost somewhere.
 const SPARES: f64 = 0.2;
 
@@ -63,6 +67,21 @@ pub(super) fn worthy<E: Evidence>(
         all.extend(more);
     }
     all
+}
+
+/// The object's candidates that stand out once clips are held to stray little, whatever else the score test says.
+pub(super) fn seen_when_clips_stray_little<'a, E: Evidence>(
+    bench: &Bench<'_, E>,
+    from: &Hypothesis,
+    narrow: &'a [Scored],
+) -> Vec<&'a Scored> {
+    let of_object = |s: &&Scored| bench.library.candidates[s.candidate].effect.stage != Stage::Control;
+    let object: Vec<&Scored> = narrow.iter().filter(of_object).collect();
+    let Some(best) = object.first() else { return Vec::new() };
+    let likely = |s: &&&Scored| {
+        s.p < 0.01 && s.gain > ALIKE * best.gain && !bench.negligible(s.candidate, &bench.begun(from.full.clone(), s))
+    };
+    object.iter().filter(likely).take(STANDING_OUT).copied().collect()
 }
 
 /// Candidates on the arm that the score test passed over although a gap remains there that none of the others explains:
