@@ -23,7 +23,7 @@ pub struct Theta {
 
 /// Identified gains.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(deny_unknown_fields, expecting = "an [arm] block")]
 pub struct ArmTheta {
     /// Stiffness of each joint [N m/rad].
     pub stiffness: Vec<f64>,
@@ -33,7 +33,7 @@ pub struct ArmTheta {
 
 /// Identified physics of the object.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(deny_unknown_fields, expecting = "an [object] block")]
 pub struct ObjectTheta {
     /// Coulomb friction between object and table.
     #[serde(default, skip_serializing_if = "Option::is_none")]

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 /// The camera.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(deny_unknown_fields, expecting = "a [camera] block")]
 pub struct Camera {
     /// Columns.
     #[serde(default = "default_width")]
@@ -33,7 +33,7 @@ pub struct Camera {
 
 /// Pinhole intrinsics [pixel].
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(deny_unknown_fields, expecting = "a table of fx, fy, cx and cy [pixel]")]
 pub struct Intrinsics {
     /// Focal length along a row.
     pub fx: f64,
@@ -47,7 +47,7 @@ pub struct Intrinsics {
 
 /// The optical frame (z forward, x right, y down) in the base frame.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(deny_unknown_fields, expecting = "a table of position [m] and orientation (w, x, y, z)")]
 pub struct CameraPose {
     /// Position [m].
     pub position: [f64; 3],

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 /// The joint controller. Vectors hold one number a joint; an empty one is "not known".
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(deny_unknown_fields, expecting = "a [controller] block")]
 pub struct Controller {
     /// The law.
     pub kind: ControllerKind,

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 /// The gripper.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(deny_unknown_fields, expecting = "a [gripper] block")]
 pub struct Gripper {
     /// Which one.
     pub model: GripperModel,

@@ -66,7 +66,7 @@ pub struct Cell {
 
 /// One clip of a session.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(deny_unknown_fields, expecting = "a [[clip]] block")]
 pub struct ClipEntry {
     /// File or folder, relative to cell.toml.
     pub file: PathBuf,
@@ -221,6 +221,14 @@ mod tests {
         assert!(error.contains("did you mean `height`"), "{error}");
         let error = parse("[controler]\n").unwrap_err();
         assert!(error.contains("did you mean `controller`"), "{error}");
+    }
+
+    #[test]
+    fn what_is_no_block_is_refused_in_the_words_of_the_file() {
+        let error = parse("robot = \"fr3\"\n").unwrap_err();
+        assert!(error.contains("expected a [robot] block"), "{error}");
+        let error = parse("[camera]\npose = 3.0\n").unwrap_err();
+        assert!(error.contains("position [m]"), "{error}");
     }
 
     #[test]

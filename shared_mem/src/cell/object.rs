@@ -7,7 +7,7 @@ use std::path::PathBuf;
 
 /// The object. Ranges say where a parameter may lie; a plain `mass` says that it was weighed.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(deny_unknown_fields, expecting = "an [object] block")]
 pub struct Object {
     /// `"box"`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -62,7 +62,7 @@ pub enum Support {
 
 /// Noise of the tracker, one sigma.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(deny_unknown_fields, expecting = "a table of position [m] and rotation [rad]")]
 pub struct PoseNoise {
     /// Of each coordinate [m].
     pub position: f64,

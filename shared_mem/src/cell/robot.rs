@@ -6,7 +6,7 @@ use std::path::PathBuf;
 
 /// The arm: a built-in model, a URDF, or only joint names where no model is known.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(deny_unknown_fields, expecting = "a [robot] block")]
 pub struct Robot {
     /// Built-in model: `"fr3"`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -24,7 +24,7 @@ pub struct Robot {
 
 /// The tool: a solid capsule along the flange's z axis.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(deny_unknown_fields, expecting = "a [tool] block")]
 pub struct Tool {
     /// Mass, spread evenly over the capsule [kg].
     pub mass: f64,
@@ -36,7 +36,7 @@ pub struct Tool {
 
 /// The table: a horizontal plane.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(deny_unknown_fields, expecting = "a [table] block")]
 pub struct Table {
     /// Height of its surface in the base frame [m].
     pub height: f64,
@@ -50,7 +50,7 @@ impl Table {
 
 /// Where a ROS 2 bag keeps what is needed.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
+#[serde(deny_unknown_fields, default, expecting = "a [topics] block")]
 pub struct Topics {
     /// `sensor_msgs/JointState`: q, dq and, where logged, `tau_J`.
     pub measured: String,

@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 /// Start of the simulated cell.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
+#[serde(deny_unknown_fields, default, expecting = "a [simulation] block")]
 pub struct Simulation {
     /// Joint positions at the start [rad]; empty: the model's ready pose.
     pub q: Vec<f64>,

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 /// The sensor.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
+#[serde(deny_unknown_fields, default, expecting = "a [wrench] block")]
 pub struct WrenchSensor {
     /// Base identifier on the CAN bus: the upper seven bits of the eleven.
     pub can_id: u8,
@@ -21,7 +21,7 @@ pub struct WrenchSensor {
 
 /// Noise of one sample, one sigma.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
+#[serde(deny_unknown_fields, default, expecting = "a table of force [N] and torque [N m]")]
 pub struct WrenchNoise {
     /// Of each force [N].
     pub force: f64,
