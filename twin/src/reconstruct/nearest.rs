@@ -1,71 +1,44 @@
-//! Points by distance: a k-d tree (Bentley 1975) that is an array, its middle the root.
+//! Points by distance. The tree is rstar's.
 
 use nalgebra::Point3;
+use rstar::primitives::GeomWithData;
+use rstar::{RStarInsertionStrategy, RTree, RTreeParams};
 
 /// Points that can be asked for the nearest.
 pub(super) struct Nearest {
-    /// The middle of every range parts it along one axis after the other.
-    points: Vec<(Point3<f64>, usize)>,
+    points: RTree<GeomWithData<[f64; 3], usize>, Broad>,
+}
+
+/// Three children along each axis: asked a fifth quicker than rstar's own two.
+struct Broad;
+
+impl RTreeParams for Broad {
+    const MIN_SIZE: usize = 9;
+    const MAX_SIZE: usize = 27;
+    const REINSERTION_COUNT: usize = 1;
+    type DefaultInsertionStrategy = RStarInsertionStrategy;
 }
 
 impl Nearest {
-    /// Numbers the points as they come.
+    /// Numbers the points as they come. They are finite, and so is what is asked: rstar orders no NaN.
     pub(super) fn new(points: impl IntoIterator<Item = Point3<f64>>) -> Self {
-        let mut points: Vec<_> = points.into_iter().zip(0..).collect();
-        arrange(&mut points, 0);
-        Self { points }
+        let points = points.into_iter().zip(0..).map(|(point, number)| GeomWithData::new(point.into(), number));
+        Self { points: RTree::bulk_load_with_params(points.collect()) }
     }
 
     /// The nearest point within a distance: the distance and its number.
     pub(super) fn one(&self, at: &Point3<f64>, within: f64) -> Option<(f64, usize)> {
-        let mut found = Vec::with_capacity(1);
-        self.some(at, within, 1, &mut found);
-        found.pop()
+        let (point, square) = self.points.nearest_neighbor_with_distance_2((*at).into())?;
+        Some((square.sqrt(), point.data)).filter(|found| found.0 < within)
     }
 
     /// The `count` nearest points within a distance, nearest first: distances and numbers.
     pub(super) fn some(&self, at: &Point3<f64>, within: f64, count: usize, found: &mut Vec<(f64, usize)>) {
+        let ordered = self.points.nearest_neighbor_iter_with_distance_2((*at).into());
         found.clear();
-        search(&self.points, 0, at, within, count, found);
-    }
-}
-
-fn arrange(points: &mut [(Point3<f64>, usize)], axis: usize) {
-    if points.len() > 1 {
-        let middle = points.len() / 2;
-        points.select_nth_unstable_by(middle, |a, b| a.0[axis].total_cmp(&b.0[axis]));
-        let (low, high) = points.split_at_mut(middle);
-        arrange(low, (axis + 1) % 3);
-        arrange(&mut high[1..], (axis + 1) % 3);
-    }
-}
-
-fn search(
-    points: &[(Point3<f64>, usize)],
-    axis: usize,
-    at: &Point3<f64>,
-    within: f64,
-    count: usize,
-    found: &mut Vec<(f64, usize)>,
-) {
-    if points.is_empty() {
-        return;
-    }
-    let middle = points.len() / 2;
-    let (point, number) = points[middle];
-    let reach = |found: &[(f64, usize)]| if found.len() == count { found[count - 1].0.min(within) } else { within };
-    let distance = (point - at).norm();
-    if distance < reach(found) {
-        let place = found.partition_point(|known| known.0 <= distance);
-        found.insert(place, (distance, number));
-        found.truncate(count);
-    }
-    let beyond = at[axis] - point[axis];
-    let (low, high) = (&points[..middle], &points[middle + 1..]);
-    let (near, far) = if beyond < 0.0 { (low, high) } else { (high, low) };
-    search(near, (axis + 1) % 3, at, within, count, found);
-    if beyond.abs() < reach(found) {
-        search(far, (axis + 1) % 3, at, within, count, found);
+        found.extend(
+            ordered.take(count).map(|(point, square)| (square.sqrt(), point.data)).take_while(|f| f.0 < within),
+        );
     }
 }
 
@@ -77,7 +50,7 @@ mod tests {
     proptest! {
         #[test]
         fn the_nearest_are_those_of_a_search_through_all(
-            points in prop::collection::vec(prop::array::uniform3(-1.0f64..1.0), 0..80),
+            points in prop::collection::vec(prop::array::uniform3(-1.0f64..1.0), 0..300),
             at in prop::array::uniform3(-1.2f64..1.2), within in 0.0f64..2.0, count in 1usize..9,
         ) {
             let points: Vec<Point3<f64>> = points.into_iter().map(Point3::from).collect();
@@ -86,7 +59,9 @@ mod tests {
             wanted.sort_by(f64::total_cmp);
             wanted.truncate(count);
             let mut found = Vec::new();
-            Nearest::new(points.iter().copied()).some(&at, within, count, &mut found);
+            let tree = Nearest::new(points.iter().copied());
+            tree.some(&at, within, count, &mut found);
+            prop_assert_eq!(tree.one(&at, within).map(|f| f.0), wanted.first().copied());
             prop_assert_eq!(found.iter().map(|f| f.0).collect::<Vec<_>>(), wanted);
             prop_assert!(found.iter().all(|(d, n)| ((points[*n] - at).norm() - d).abs() < 1e-12));
         }
