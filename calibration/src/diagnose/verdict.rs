@@ -45,7 +45,7 @@ impl Finding<'_> {
     }
 
     fn none(&self) -> Verdict {
-        let strays = self.left.iter().map(|left| left.before / left.floor).fold(1.0, f64::max).sqrt();
+        let strays = self.strays();
         let text = if strays < ROUGH {
             "No gap: with the parameters identified, the twin differs from the cell by noise alone.".into()
         } else {
@@ -55,6 +55,11 @@ impl Finding<'_> {
             )
         };
         Verdict { kind: Kind::None, effects: Vec::new(), confidence: NEGATIVE, text }
+    }
+
+    /// How many times as far as noise alone would make it the cell strays from the twin without any effect.
+    fn strays(&self) -> f64 {
+        self.left.iter().map(|left| left.before / left.floor).fold(1.0, f64::max).sqrt()
     }
 
     fn named(&self) -> Verdict {
@@ -87,7 +92,9 @@ impl Finding<'_> {
             }
         };
         let text = format!(
-            "Nothing in the library explains the gap; it is largest in {}{nearest}.",
+            "Nothing in the library explains the gap: the cell strays {:.1} times as far from the twin as noise alone would \
+             make it, most in {}{nearest}.",
+            self.strays(),
             if self.place.is_empty() { "no single place" } else { &self.place }
         );
         Verdict { kind: Kind::Unexplained, effects: Vec::new(), confidence: NEGATIVE, text }
