@@ -28,14 +28,15 @@ const EVERY: usize = 3;
 /// What the regression holds slopes back with, in squared widths: enough for a direction that few points went to.
 const RIDGE: f64 = 0.3;
 
-/// Points whose loss is asked for at most, of so many coordinates.
+/// Points whose loss is asked for at most, of so many coordinates: where all begins, and in every round those scattered
+/// and the place they lead to.
 pub(super) const fn points(coordinates: usize) -> usize {
-    ROUNDS * (per_round(coordinates) + 1)
+    1 + ROUNDS * (scattered(coordinates) + 1)
 }
 
-/// The middle, and pairs to both sides of it in one more direction than there are.
-const fn per_round(coordinates: usize) -> usize {
-    1 + 2 * (coordinates + 1)
+/// Pairs in one more direction than there are.
+const fn scattered(coordinates: usize) -> usize {
+    2 * (coordinates + 1)
 }
 
 /// A place asked for.
@@ -56,25 +57,25 @@ pub(super) fn descend(
     watch: impl Fn(&[f64], usize) -> bool,
 ) -> (Vec<f64>, usize) {
     let mut random = Pcg64::seed_from_u64(seed);
-    let (mut middle, mut width, mut simulated) = (vec![0.0; coordinates], WIDTH, 0);
-    let (mut asked, mut middles): (Vec<Asked>, Vec<(f64, Vec<f64>)>) = (Vec::new(), Vec::new());
     let ask = |at: &Vec<f64>| ask(loss, weights, at, &place(at)).ok();
+    let (mut middle, mut width, mut simulated) = (vec![0.0; coordinates], WIDTH, loss.clips());
+    let mut asked: Vec<Asked> = ask(&middle).into_iter().collect();
+    let mut middles: Vec<(f64, Vec<f64>)> = asked.iter().map(|first| (first.loss, first.at.clone())).collect();
     for _ in 0..ROUNDS {
         let scattered = scatter(&middle, width, &mut random);
-        simulated += scattered.len() * loss.clips();
+        simulated += (scattered.len() + 1) * loss.clips();
         asked.extend(scattered.par_iter().filter_map(ask).collect::<Vec<_>>());
         let Some(vicinity) = Vicinity::through(&asked, &middle, width) else { break };
         middle = vicinity.lowest(loss, weights, seed);
-        // The next round's first point, were it not for the last one, that nobody follows.
-        simulated += loss.clips();
-        middles.extend(ask(&middle).map(|asked| (asked.loss, asked.at)));
+        if let Some(there) = ask(&middle) {
+            middles.push((there.loss, middle.clone()));
+            asked.push(there);
+        }
         width *= NARROWER;
         if !watch(&middle, simulated) {
             break;
         }
     }
-    // The first one asked is where all began.
-    middles.extend(asked.into_iter().next().map(|first| (first.loss, first.at)));
     let lowest = middles.into_iter().min_by(|a, b| a.0.total_cmp(&b.0));
     (lowest.map_or(vec![0.0; coordinates], |(_, at)| at), simulated)
 }
@@ -90,10 +91,10 @@ fn ask(loss: &SurfaceLoss<'_>, weights: &[f64], at: &[f64], numbers: &[f64]) -> 
     Ok(Asked { at: at.to_vec(), slips, loss: sum / rows.max(f64::MIN_POSITIVE) })
 }
 
-/// `middle`, and pairs to both sides of it.
+/// Pairs to both sides of `middle`.
 fn scatter(middle: &[f64], width: f64, random: &mut Pcg64) -> Vec<Vec<f64>> {
-    let mut points = vec![middle.to_vec()];
-    while points.len() < per_round(middle.len()) {
+    let mut points = Vec::new();
+    while points.len() < scattered(middle.len()) {
         let way: Vec<f64> = middle.iter().map(|_| random.sample(StandardNormal)).collect();
         for side in [width, -width] {
             points.push(middle.iter().zip(&way).map(|(x, dx): (&f64, &f64)| x + side * dx).collect());
@@ -183,7 +184,7 @@ mod tests {
     #[test]
     fn points_lie_on_both_sides_and_are_as_many_as_the_bar_counts() {
         let scattered = scatter(&[0.5, -1.0, 2.0], 0.7, &mut Pcg64::seed_from_u64(1));
-        assert_eq!(ROUNDS * (scattered.len() + 1), points(3));
+        assert_eq!(1 + ROUNDS * (scattered.len() + 1), points(3));
         for k in 0..3 {
             let mean = scattered.iter().map(|at| at[k]).sum::<f64>() / scattered.len() as f64;
             assert!((mean - [0.5, -1.0, 2.0][k]).abs() < 1e-12);
