@@ -53,12 +53,13 @@ fn pictures(clip: &Path) -> Vec<(String, u64, u64)> {
 }
 
 #[test]
-#[ignore = "needs librealsense and a recording: TWINALIGN_BAG=FILE.bag cargo test --release -p rt_bridge --features realsense --test realsense -- --ignored"]
+#[ignore = "needs librealsense, a recording and an idle machine: TWINALIGN_BAG=FILE.bag cargo test --release -p rt_bridge --features realsense --test realsense -- --ignored"]
 fn a_recording_becomes_a_clip_that_holds_each_pair_once() {
     let folder = tempfile::tempdir().expect("a folder");
     let (bag, clip) = (bag(), folder.path().join("clip.mcap"));
     let (bag, path) = (bag.to_str().expect("a path"), clip.to_str().expect("a path"));
     let (_, answer) = bridge(&["convert", bag, "--cell", CELL, "--out", path, "--json"]);
+    assert_eq!(answer["dropped"], 0, "{answer}");
     let pictures = pictures(&clip);
     let of = |topic: &str| -> Vec<(u64, u64)> {
         pictures.iter().filter(|(t, ..)| t == topic).map(|(_, number, stamp)| (*number, *stamp)).collect()
@@ -68,9 +69,7 @@ fn a_recording_becomes_a_clip_that_holds_each_pair_once() {
     assert_eq!(color.len(), depth.len());
     assert!(depth.windows(2).all(|pair| pair[0].0 < pair[1].0 && pair[0].1 < pair[1].1), "in order");
     let gaps = depth.windows(2).map(|pair| pair[1].0 - pair[0].0 - 1).sum::<u64>();
-    // The library plays in real time, so a busy machine may lose pairs; whatever is not there is said.
-    let missing = answer["missing"].as_array().expect("a list").len();
-    assert!(gaps as usize <= missing && answer["dropped"].as_u64().expect("a number") as usize <= missing, "{answer}");
+    assert_eq!(gaps as usize, answer["missing"].as_array().expect("a list").len(), "{answer}");
     let again = Command::new(env!("CARGO_BIN_EXE_rt_bridge")).args(["convert", bag, "--out", path]).output();
     assert!(!again.expect("the program starts").status.success(), "a file is never overwritten");
 }
@@ -85,5 +84,5 @@ fn a_recording_plays_as_the_camera_of_a_bridge() {
     let arguments: Vec<&str> = run.into_iter().chain(["--camera", &camera, "--record", path]).collect();
     let (_, answer) = bridge(&arguments);
     assert_eq!(answer["faults"].as_array().map(Vec::len), Some(0), "{answer}");
-    assert!(pictures(&clip).len() > 2);
+    assert!(pictures(&clip).len() > 20);
 }
