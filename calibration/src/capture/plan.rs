@@ -10,8 +10,7 @@ use super::multisine::Multisine;
 use super::stream::Motion;
 use shared_mem::msg::motion::SetPoint;
 use shared_mem::msg::{Joints, MAX_JOINTS};
-use twin::arm::JointLimits;
-use twin::arm::JointState;
+use twin::arm::{JointLimits, JointState};
 
 /// Set points a second: the control rate of the arm.
 pub const RATE: f64 = 1000.0;

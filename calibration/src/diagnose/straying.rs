@@ -28,10 +28,10 @@ pub struct Around {
 /// number has heavy tails.
 #[must_use]
 pub fn eased(clips: &[&Around], scatter: &Scatter) -> Vec<f64> {
-    let usual: Vec<f64> = clips.iter().map(|clip| deviance(clip, scatter)).collect();
     if scatter.heavy.is_empty() {
         return vec![0.0; clips.len()];
     }
+    let usual: Vec<f64> = clips.iter().map(|clip| deviance(clip, scatter)).collect();
     let changes = |scale: &f64| -> Vec<f64> {
         let scatter = scatter.scaled(*scale);
         clips.iter().zip(&usual).map(|(clip, usual)| deviance(clip, &scatter) - usual).collect()
@@ -76,9 +76,13 @@ mod tests {
         strays.iter().map(|stray| Around { gram: gram(*stray), own: vec![0.0] }).collect()
     }
 
-    fn changes(strays: &[f64], heavy: std::ops::Range<usize>) -> f64 {
+    fn scatter(heavy: std::ops::Range<usize>) -> Scatter {
         let random = vec![Random { name: "stray".into(), sigma: 4.0, step: 4.0 }];
-        let scatter = Scatter { random, heavy, forgiving: 1.0 };
+        Scatter { random, heavy, forgiving: 1.0 }
+    }
+
+    fn changes(strays: &[f64], heavy: std::ops::Range<usize>) -> f64 {
+        let scatter = scatter(heavy);
         let clips = clips(strays);
         eased(&clips.iter().collect::<Vec<_>>(), &scatter).iter().sum()
     }
@@ -96,8 +100,7 @@ mod tests {
 
     #[test]
     fn a_clip_at_its_best_is_found_from_wherever_it_was_left() {
-        let random = vec![Random { name: "stray".into(), sigma: 4.0, step: 4.0 }];
-        let scatter = Scatter { random, heavy: 0..1, forgiving: 1.0 };
+        let scatter = scatter(0..1);
         let at = |own: f64| {
             // The residual of a stray of 3 that `own` takes off already.
             let left = 3.0 + own;

@@ -259,7 +259,10 @@ impl Swept {
         let gram = gram(clip, evidence, weights);
         let kept = 1 + self.columns.len();
         let outer = gram.view((0, 0), (kept, kept)).into_owned();
-        let alone = gram.clone().remove_columns(1, self.columns.len()).remove_rows(1, self.columns.len());
+        // The residual and the clip's own numbers, without the columns between them.
+        let of_clip = |k: usize| if k == 0 { 0 } else { self.columns.len() + k };
+        let alone = 1 + self.scatter.count();
+        let alone = DMatrix::from_fn(alone, alone, |i, k| gram[(of_clip(i), of_clip(k))]);
         let around = Around { gram: alone, own: clip.own.clone() };
         if self.scatter.count() == 0 {
             return Reduced { form: outer, volume: 0.0, around };

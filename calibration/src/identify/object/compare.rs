@@ -71,21 +71,26 @@ pub fn compare(options: &Options, interrupt: &Interrupt) -> Result<Comparison, O
         .filter(|k| !matches!(problem.settings.settings()[*k], Setting::CentreOfMass(_)))
         .collect();
     let pin = problem.of(&without);
-    let alone = Searcher::PosesAlone(options.seed);
-    let mut methods = vec![
-        sloped("least squares", &problem, &material, Searcher::Usual(options.seed), interrupt)?,
-        sloped("poses alone", &problem, &material, alone, interrupt)?,
-        slopeless("particle swarm", Optimizer::Swarm, &problem, &material, options, interrupt)?,
-        slopeless("CMA-ES", Optimizer::Evolution, &problem, &material, options, interrupt)?,
-        sloped("gradient without centre of mass", &pin, &material, Searcher::Slopes, interrupt)?,
-    ];
-    let target = methods[2].loss_m;
+    let usual = sloped("least squares", &problem, &material, Searcher::Usual(options.seed), interrupt)?;
+    let alone = sloped("poses alone", &problem, &material, Searcher::PosesAlone(options.seed), interrupt)?;
+    let swarm = slopeless("particle swarm", Optimizer::Swarm, &problem, &material, options, interrupt)?;
+    let evolution = slopeless("CMA-ES", Optimizer::Evolution, &problem, &material, options, interrupt)?;
+    let slopes = sloped("gradient without centre of mass", &pin, &material, Searcher::Slopes, interrupt)?;
+    let target = swarm.loss_m;
+    let clips = |method: &Method| method.to(target).map(|(clips, _)| clips as f64);
+    let fewer = clips(&alone).zip(clips(&swarm)).map(|(alone, swarm)| swarm / alone);
+    let mut methods = vec![usual, alone, swarm, evolution, slopes];
     for method in &mut methods {
-        method.to_target = method.way.iter().find(|(.., loss)| *loss <= target).map(|(n, seconds, _)| (*n, *seconds));
+        method.to_target = method.to(target);
     }
-    let [alone, swarm] = [1, 2].map(|k| methods[k].to_target.map(|(n, _)| n as f64));
-    let fewer = alone.zip(swarm).map(|(alone, swarm)| swarm / alone);
     Ok(Comparison { session: options.session.display().to_string(), methods, target_loss_m: target, fewer })
+}
+
+impl Method {
+    /// Clips simulated and wall time [s] when the loss was first as low as this [m].
+    fn to(&self, loss_m: f64) -> Option<(usize, f64)> {
+        self.way.iter().find(|(.., loss)| *loss <= loss_m).map(|(clips, seconds, _)| (*clips, *seconds))
+    }
 }
 
 impl Problem {

@@ -36,20 +36,28 @@ impl<'a> SurfaceLoss<'a> {
     /// # Errors
     /// [`Impossible`] where the twin has no answer.
     pub(super) fn mean(&self, numbers: &[f64], weights: &[f64]) -> Result<f64, Impossible> {
-        let (mut sum, mut rows, mut out) = (0.0, 0.0, Vec::new());
-        for (clip, weight) in weights.iter().enumerate() {
-            self.residuals(clip, numbers, &[], &mut out)?;
-            sum += weight * out.iter().map(|r| r * r).sum::<f64>();
-            rows += weight * out.len() as f64;
-        }
-        Ok(sum / rows.max(f64::MIN_POSITIVE))
+        Ok(self.mean_of(&self.slips(numbers)?, weights))
     }
 
-    /// How far the simulated object lies from the measured one, pose by pose that counts.
+    /// Where poses lie so far from the measured ones, clip by clip: the mean, each clip as much as it counts [m].
+    pub(super) fn mean_of(&self, slips: &[Vec<Slip>], weights: &[f64]) -> f64 {
+        let (mut sum, mut count) = (0.0, 0.0);
+        for (slips, weight) in slips.iter().zip(weights) {
+            sum += weight * slips.iter().map(|slip| self.of_slip(slip)).sum::<f64>();
+            count += weight * slips.len() as f64;
+        }
+        sum / count.max(f64::MIN_POSITIVE)
+    }
+
+    /// How far the simulated object lies from the measured one, clip by clip, pose by pose that counts.
     ///
     /// # Errors
     /// [`Impossible`] where the twin has no answer.
-    pub(super) fn slips(&self, clip: usize, numbers: &[f64]) -> Result<Vec<Slip>, Impossible> {
+    pub(super) fn slips(&self, numbers: &[f64]) -> Result<Vec<Vec<Slip>>, Impossible> {
+        (0..self.clips.clips()).map(|clip| self.of_clip(clip, numbers)).collect()
+    }
+
+    fn of_clip(&self, clip: usize, numbers: &[f64]) -> Result<Vec<Slip>, Impossible> {
         let predicted = self.clips.predict(clip, numbers, &[])?.poses;
         let measured = &self.clips.clip(clip).object.poses;
         let slip = |(predicted, measured): (&Pose<Base, Object>, &Pose<Base, Object>)| {
@@ -60,14 +68,8 @@ impl<'a> SurfaceLoss<'a> {
         Ok(predicted.iter().zip(measured).step_by(every(measured.len())).map(slip).collect())
     }
 
-    /// Poses of a clip that count.
-    pub(super) fn poses(&self, clip: usize) -> usize {
-        let poses = self.clips.clip(clip).object.poses.len();
-        poses.div_ceil(every(poses))
-    }
-
     /// Loss of a pose that lies so far from the measured one [m].
-    pub(super) fn of_slip(&self, slip: &Slip) -> f64 {
+    fn of_slip(&self, slip: &Slip) -> f64 {
         let there = Isometry3::new(slip.fixed_rows::<3>(0).into(), slip.fixed_rows::<3>(3).into());
         let [there, here] = [there, Isometry3::identity()].map(Pose::from_isometry);
         self.points.add(&there, &here) + self.points.add_s(&there, &here)
@@ -81,7 +83,7 @@ impl ClipModel for SurfaceLoss<'_> {
 
     fn residuals(&self, clip: usize, shared: &[f64], _: &[f64], out: &mut Vec<f64>) -> Result<(), Impossible> {
         out.clear();
-        out.extend(self.slips(clip, shared)?.iter().map(|slip| self.of_slip(slip).sqrt()));
+        out.extend(self.of_clip(clip, shared)?.iter().map(|slip| self.of_slip(slip).sqrt()));
         Ok(())
     }
 }

@@ -43,7 +43,7 @@ const fn scattered(coordinates: usize) -> usize {
 struct Asked {
     at: Vec<f64>,
     /// Where the modelled poses went: clip by clip, pose by pose, six numbers each.
-    slips: Vec<Slip>,
+    slips: Vec<Vec<Slip>>,
     loss: f64,
 }
 
@@ -81,14 +81,12 @@ pub(super) fn descend(
 }
 
 fn ask(loss: &SurfaceLoss<'_>, weights: &[f64], at: &[f64], numbers: &[f64]) -> Result<Asked, Impossible> {
-    let (mut slips, mut sum, mut rows) = (Vec::new(), 0.0, 0.0);
-    for (clip, weight) in weights.iter().enumerate() {
-        let of_clip = loss.slips(clip, numbers)?;
-        sum += weight * of_clip.iter().map(|slip| loss.of_slip(slip)).sum::<f64>();
-        rows += weight * of_clip.len() as f64;
-        slips.extend(of_clip.into_iter().step_by(EVERY));
+    let mut slips = loss.slips(numbers)?;
+    let mean = loss.mean_of(&slips, weights);
+    for of_clip in &mut slips {
+        *of_clip = of_clip.iter().step_by(EVERY).copied().collect();
     }
-    Ok(Asked { at: at.to_vec(), slips, loss: sum / rows.max(f64::MIN_POSITIVE) })
+    Ok(Asked { at: at.to_vec(), slips, loss: mean })
 }
 
 /// Pairs to both sides of `middle`.
@@ -107,6 +105,8 @@ fn scatter(middle: &[f64], width: f64, random: &mut Pcg64) -> Vec<Vec<f64>> {
 struct Vicinity {
     middle: Vec<f64>,
     reach: f64,
+    /// Poses modelled, clip by clip.
+    poses: Vec<usize>,
     /// `(1 + coordinates, 6 * poses)`: at the middle, and by how much more a unit of each coordinate.
     slopes: DMatrix<f64>,
 }
@@ -114,7 +114,8 @@ struct Vicinity {
 impl Vicinity {
     /// Through the points asked so far, nearer ones counting more; none where there are too few.
     fn through(asked: &[Asked], middle: &[f64], width: f64) -> Option<Self> {
-        let (n, poses) = (middle.len(), asked.first()?.slips.len());
+        let n = middle.len();
+        let poses: Vec<usize> = asked.first()?.slips.iter().map(Vec::len).collect();
         if asked.len() < n + 2 {
             return None;
         }
@@ -124,13 +125,15 @@ impl Vicinity {
         let x = DMatrix::from_fn(asked.len(), n + 1, |i, k| {
             roots[i] * if k == 0 { 1.0 } else { asked[i].at[k - 1] - middle[k - 1] }
         });
-        let y = DMatrix::from_fn(asked.len(), 6 * poses, |i, k| roots[i] * asked[i].slips[k / 6][k % 6]);
+        let went = |point: &Asked| point.slips.iter().flatten().flat_map(|slip| slip.iter().copied()).collect();
+        let went: Vec<Vec<f64>> = asked.iter().map(went).collect();
+        let y = DMatrix::from_fn(asked.len(), 6 * poses.iter().sum::<usize>(), |i, k| roots[i] * went[i][k]);
         let mut gram = x.tr_mul(&x);
         for k in 1..=n {
             gram[(k, k)] += RIDGE * width * width;
         }
         let slopes = Cholesky::new(gram)?.solve(&x.tr_mul(&y));
-        Some(Self { middle: middle.to_vec(), reach: REACH * width, slopes })
+        Some(Self { middle: middle.to_vec(), reach: REACH * width, poses, slopes })
     }
 
     /// Where the modelled poses have the least loss.
@@ -143,20 +146,17 @@ impl Vicinity {
             step: self.reach,
         };
         let axes: Vec<Unknown> = self.middle.iter().map(axis).collect();
-        let of_clip = |(clip, weight): (usize, &f64)| vec![*weight; loss.poses(clip).div_ceil(EVERY)];
-        let counts: Vec<f64> = weights.iter().enumerate().flat_map(of_clip).collect();
-        let modelled = |at: &[f64]| {
-            let slips = self.slips(at);
-            let pose = |(k, counts): (usize, &f64)| counts * loss.of_slip(&slips.fixed_rows::<6>(6 * k).into_owned());
-            counts.iter().enumerate().map(pose).sum::<f64>()
-        };
+        let modelled = |at: &[f64]| loss.mean_of(&self.slips(at), weights);
         let mut cloud = Evolution::new(&search::start(&axes), seed);
         minimise(&mut cloud, &axes, LOOKS, &[], modelled, |_, _| true).numbers
     }
 
-    fn slips(&self, at: &[f64]) -> DVector<f64> {
+    /// Where the poses go, clip by clip.
+    fn slips(&self, at: &[f64]) -> Vec<Vec<Slip>> {
         let moved = at.iter().zip(&self.middle).map(|(x, m)| x - m);
-        self.slopes.tr_mul(&DVector::from_iterator(1 + at.len(), std::iter::once(1.0).chain(moved)))
+        let all = self.slopes.tr_mul(&DVector::from_iterator(1 + at.len(), std::iter::once(1.0).chain(moved)));
+        let mut slips = all.as_slice().chunks_exact(6).map(Slip::from_column_slice);
+        self.poses.iter().map(|poses| slips.by_ref().take(*poses).collect()).collect()
     }
 }
 
@@ -169,14 +169,18 @@ mod tests {
         let mut random = Pcg64::seed_from_u64(2);
         let rough = |at: &[f64]| {
             let ripple = 0.002 * (90.0 * at[0]).sin();
-            Asked { at: at.to_vec(), slips: vec![Slip::repeat(0.03 - 0.01 * at[0] + 0.02 * at[1] + ripple)], loss: 0.0 }
+            Asked {
+                at: at.to_vec(),
+                slips: vec![vec![Slip::repeat(0.03 - 0.01 * at[0] + 0.02 * at[1] + ripple)]],
+                loss: 0.0,
+            }
         };
         let asked: Vec<Asked> =
             (0..4).flat_map(|_| scatter(&[1.0, 0.5], 1.0, &mut random)).map(|at| rough(&at)).collect();
         let vicinity = Vicinity::through(&asked, &[1.0, 0.5], 1.0).expect("enough points");
         for at in [[1.0, 0.5], [2.0, 0.5], [1.0, 1.5]] {
             let plain = 0.03 - 0.01 * at[0] + 0.02 * at[1];
-            assert!((vicinity.slips(&at)[5] - plain).abs() < 2e-3, "{at:?}");
+            assert!((vicinity.slips(&at)[0][0][5] - plain).abs() < 2e-3, "{at:?}");
         }
         assert!(Vicinity::through(&asked[..3], &[1.0, 0.5], 1.0).is_none(), "too few points say nothing");
     }
