@@ -2,7 +2,7 @@
 
 use crate::device::DeviceFault;
 use serde::Serialize;
-use shared_mem::recording::WriteError;
+use shared_mem::recording::{ReadError, WriteError};
 use std::fmt;
 use std::path::PathBuf;
 
@@ -33,8 +33,8 @@ pub struct Converted {
     pub frames: usize,
     /// Frame numbers between the first and the last that are not in it.
     pub missing: Vec<u64>,
-    /// Of those, how many another pass had: the machine was too slow for them.
-    pub dropped: usize,
+    /// Depth pictures of the recording, by its index, that are not in it: without a colour picture beside them.
+    pub unpaired: usize,
     /// How often the recording was played.
     pub passes: u32,
 }
@@ -48,6 +48,9 @@ pub enum ConvertError {
     /// The clip.
     #[error(transparent)]
     Write(#[from] WriteError),
+    /// What a pass wrote.
+    #[error(transparent)]
+    Read(#[from] ReadError),
     /// There is a file already.
     #[error("{} exists and is not overwritten; choose another name", path.display())]
     Exists {

@@ -11,12 +11,12 @@ use std::path::PathBuf;
 /// Turn a recording of a RealSense camera into a clip
 ///
 /// Colour, depth aligned to it, and intrinsics, with the camera's own stamps. Needs a program built with the feature
-/// realsense. The recording is played at its own pace, again if this machine was too slow for a frame.
+/// realsense. The recording is played at its own pace, again for the frames that this machine was too slow for.
 #[derive(Debug, Args)]
 #[command(after_help = "Example:\n  \
     rt_bridge convert table.bag --cell config/fr3_cell.toml --out table.mcap\n\n\
     JSON: file, frames (pairs of colour and depth), missing (frame numbers between the first and the last that are not\n\
-    there), dropped (of those, how many the recording has), passes.")]
+    there), unpaired (depth pictures in the recording that it gives no colour picture for), passes.")]
 pub(super) struct ConvertArguments {
     /// A .bag recorded by librealsense or the RealSense Viewer
     #[arg(value_name = "FILE.bag")]
@@ -53,14 +53,13 @@ impl ConvertArguments {
 }
 
 fn in_words(converted: &Converted) -> String {
-    let Converted { file, frames, missing, dropped, .. } = converted;
+    let Converted { file, frames, missing, unpaired, .. } = converted;
     let mut text = format!("{frames} pictures with depth in {}", file.display());
     if !missing.is_empty() {
-        let lacking = missing.len() - dropped;
-        text += &format!("; the recording lacks {lacking} on the way");
+        text += &format!("; {} frame numbers on the way are missing", missing.len());
     }
-    if *dropped > 0 {
-        text += &format!("; this machine was too slow for {dropped} more: end other programs and convert again");
+    if *unpaired > 0 {
+        text += &format!("; {unpaired} depth pictures of the recording have no colour picture beside them");
     }
     text
 }

@@ -1,18 +1,25 @@
 //! A `.bag` as a clip. librealsense plays a recording at the pace it was made with and drops what the reader is too slow
-//! for, so it is played again until a pass lacks nothing that another had.
+//! for, so it is played again for what is still missing, until the clip has what the recording's index counts, or nothing
+//! more is to be had.
 
+use super::bag_index::{IndexError, depth_pictures};
+use super::passes::{Passes, write};
 use super::stream;
 use crate::camera::{CameraSource, ConvertError, Converted};
+use crate::device::DeviceFault;
 use shared_mem::cell::Camera;
 use shared_mem::msg::image::{CameraInfo, ImageHeader};
 use shared_mem::recording::{ClipInfo, ClipWriter};
 use shared_mem::time::now_ns;
-use shared_mem::topics;
 use std::collections::BTreeSet;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// Passes at most.
-const PASSES: u32 = 4;
+const PASSES: u32 = 30;
+/// So many passes in a row that bring nothing new: there is no more.
+const FRUITLESS: u32 = 4;
+/// The synchroniser gives out no pair for the very first picture.
+const NEVER_PAIRED: usize = 1;
 
 /// Writes colour, aligned depth and intrinsics of `bag` to the new clip `out`. Stamps keep the distances of the camera's
 /// clock; `camera` says where the camera stands.
@@ -24,56 +31,74 @@ pub fn convert(bag: &Path, camera: &Camera, out: &Path, info: &ClipInfo) -> Resu
         return Err(ConvertError::Exists { path: out.to_owned() });
     }
     let source = CameraSource::Bag(bag.to_owned());
-    let unfinished = out.with_extension("mcap.unfinished");
-    let mut known = BTreeSet::new();
-    for pass in 1..=PASSES {
-        remove(&unfinished)?;
-        let frames = play(&source, camera, &unfinished, info)?;
-        known.extend(&frames);
-        let gaps = missing(&frames);
-        // Two passes that agree, or one without a gap, have it all.
-        let whole = frames == known && (gaps.is_empty() || pass > 1);
-        if whole || pass == PASSES {
-            if frames.is_empty() {
-                remove(&unfinished)?;
-                return Err(ConvertError::Empty { path: bag.to_owned() });
+    let recorded = depth_pictures(bag).map_err(|e| refused(&source, &e))?;
+    let mut conversion = Conversion { source, camera, info, known: BTreeSet::new(), begin: None };
+    let mut passes = Passes::new(out);
+    let (mut played, mut fruitless) = (0, 0);
+    while played < PASSES && fruitless < FRUITLESS && conversion.known.len() + NEVER_PAIRED < recorded {
+        let known = conversion.known.len();
+        let seen = conversion.play(&passes.next_file()?)?;
+        played += 1;
+        if conversion.known.len() > known {
+            fruitless = 0;
+        } else {
+            passes.forget_last();
+            fruitless += 1;
+            // A pass without a loss says more than one that lacked something itself.
+            if seen == known {
+                break;
             }
-            std::fs::rename(&unfinished, out).map_err(|source| ConvertError::File { path: out.to_owned(), source })?;
-            let dropped = known.difference(&frames).count();
-            return Ok(Converted { file: out.to_owned(), frames: frames.len(), missing: gaps, dropped, passes: pass });
         }
     }
-    unreachable!("the last pass returns")
+    let Conversion { known, begin: Some((camera, _)), .. } = conversion else {
+        return Err(ConvertError::Empty { path: bag.to_owned() });
+    };
+    passes.finish(&camera, info)?;
+    let unpaired = recorded.saturating_sub(known.len());
+    Ok(Converted { file: out.to_owned(), frames: known.len(), missing: missing(&known), unpaired, passes: played })
 }
 
-fn remove(path: &PathBuf) -> Result<(), ConvertError> {
-    match std::fs::remove_file(path) {
-        Err(source) if path.exists() => Err(ConvertError::File { path: path.clone(), source }),
-        _ => Ok(()),
+fn refused(source: &CameraSource, error: &IndexError) -> ConvertError {
+    let remedy = "give a .bag recorded by librealsense, with colour and depth".into();
+    DeviceFault::NotOpened { device: source.to_string(), why: error.to_string(), remedy }.into()
+}
+
+/// What all passes have in common.
+struct Conversion<'a> {
+    source: CameraSource,
+    camera: &'a Camera,
+    info: &'a ClipInfo,
+    /// Numbers of the pairs written.
+    known: BTreeSet<u64>,
+    /// How the camera projects; what takes its clock to this machine's [ns].
+    begin: Option<(CameraInfo, u64)>,
+}
+
+impl Conversion<'_> {
+    /// One pass: writes the pairs that are not known yet to the new file `out`. Pairs seen.
+    fn play(&mut self, out: &Path) -> Result<usize, ConvertError> {
+        let mut writer = ClipWriter::create(out, self.info)?;
+        let (known, begin) = (&mut self.known, &mut self.begin);
+        let mut seen = BTreeSet::new();
+        let mut described = false;
+        stream::play(&self.source, self.camera, |moment| -> Result<(), ConvertError> {
+            let number = moment.depth.sequence;
+            seen.insert(number);
+            if known.insert(number) {
+                // The camera's clock, begun at this machine's now.
+                let begun = || (moment.info, now_ns().wrapping_sub(moment.depth.device_ns));
+                let (camera, shift_ns) = begin.get_or_insert_with(begun);
+                let stamped =
+                    |header: ImageHeader| ImageHeader { stamp_ns: header.device_ns.wrapping_add(*shift_ns), ..header };
+                let pair = [(stamped(moment.color), moment.color_pixels), (stamped(moment.depth), moment.depth_pixels)];
+                write(&mut writer, &pair, (!described).then_some(&*camera))?;
+                described = true;
+            }
+            Ok(())
+        })?;
+        writer.finish()?;
+        Ok(seen.len())
     }
-}
-
-/// One pass; the numbers of the frames written.
-fn play(source: &CameraSource, camera: &Camera, out: &Path, info: &ClipInfo) -> Result<BTreeSet<u64>, ConvertError> {
-    let mut writer = ClipWriter::create(out, info)?;
-    let mut frames = BTreeSet::new();
-    let mut shift_ns = None;
-    stream::play(source, camera, |moment| -> Result<(), ConvertError> {
-        // The camera's clock, begun at this machine's now.
-        let shift_ns = *shift_ns.get_or_insert_with(|| now_ns().wrapping_sub(moment.depth.device_ns));
-        let stamped = |header: ImageHeader| ImageHeader { stamp_ns: header.device_ns.wrapping_add(shift_ns), ..header };
-        let (color, depth) = (stamped(moment.color), stamped(moment.depth));
-        if frames.is_empty() {
-            writer.camera_info(&CameraInfo { stamp_ns: depth.stamp_ns, ..moment.info })?;
-        }
-        if frames.insert(depth.sequence) {
-            writer.image(topics::CAMERA_COLOR, &color, &moment.color_pixels)?;
-            writer.image(topics::CAMERA_DEPTH, &depth, &moment.depth_pixels)?;
-        }
-        Ok(())
-    })?;
-    writer.finish()?;
-    Ok(frames)
 }
 
 /// Numbers between the first and the last that are not there.

@@ -7,10 +7,14 @@
 //! | `stream` | frames out of librealsense (the only code that knows it) |
 //! | `lens` | its lens models as Brown and Conrady's |
 //! | `convert` | a `.bag` as a clip |
+//! | `passes` | what several passes over a `.bag` brought, as one clip |
+//! | `bag_index` | how many depth pictures a `.bag` holds |
 
+mod bag_index;
 mod convert;
 mod lens;
 mod moment;
+mod passes;
 mod stream;
 
 pub use convert::convert;
