@@ -11,6 +11,8 @@ pub mod rollout;
 pub mod scene;
 pub mod sensors;
 pub mod shadow;
+#[cfg(test)]
+mod shipped;
 pub mod sim;
 pub mod sliding;
 #[cfg(feature = "viewer")]

@@ -7,8 +7,7 @@ use std::io::Write as _;
 use std::path::PathBuf;
 use twin::arm::MAX_JOINTS;
 use twin::reconstruct::{SurfacePoints, align, label};
-use twin::render::session::base_from_link;
-use twin::render::splat::SplatCloud;
+use twin::render::splat::{SplatCloud, link_file};
 use twin::render::{Hand, RobotSurface};
 
 /// Finds the robot in a scanned cell and parts the scan: one splat file for each link, in its frame, and the rest.
@@ -85,9 +84,8 @@ impl LabelSplats {
             .with_context(|| format!("{}; give --out a place that can be written", self.out.display()))?;
         let mut counts = Vec::new();
         for (link, splats) in parts.links.iter().enumerate() {
-            let link_from_base = base_from_link(robot.model(), &q, link).inverse();
-            let name = if link > dof { "hand.ply".to_owned() } else { format!("link{link}.ply") };
-            splats.moved(&Similarity3::from_isometry(link_from_base, 1.0)).write(&self.out.join(name))?;
+            let link_from_base = robot.base_from_link(&q, link).inverse();
+            splats.moved(&Similarity3::from_isometry(link_from_base, 1.0)).write(&self.out.join(link_file(link)))?;
             counts.push(splats.splats.len());
         }
         parts.rest.write(&self.out.join("scene.ply"))?;

@@ -97,12 +97,11 @@ mod tests {
     use crate::render::Drawer;
     use crate::scene::SceneSnapshot;
     use crate::sensors::camera::SimCamera;
+    use crate::shipped::shipped;
     use shared_mem::cell::Cell;
-    use std::path::Path;
 
     fn live() -> (Cell, LiveView) {
-        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../config/fr3_cell.toml");
-        let cell = Cell::read(&path).expect("the shipped cell");
+        let cell = shipped();
         let view = TwinView::new(&cell, None, None, Drawer::Processor).expect("a view");
         (cell, LiveView::new(view, 0.01))
     }

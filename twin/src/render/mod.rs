@@ -9,11 +9,13 @@
 pub mod device;
 mod glb;
 mod live;
+pub(crate) mod looks;
 mod mesh;
 mod painter;
 mod raster;
 mod robot;
 pub mod session;
+mod shown;
 pub mod splat;
 
 pub use live::{Beside, LiveView};
@@ -21,3 +23,4 @@ pub use mesh::Mesh;
 pub use painter::{Drawer, Model, PaintError, Painter};
 pub use raster::{Pinhole, Raster};
 pub use robot::{Hand, RobotSurface};
+pub(crate) use shown::{ScannedLink, Shown};

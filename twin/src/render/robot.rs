@@ -77,12 +77,12 @@ impl RobotSurface {
             self.add(bytes, body, Isometry3::identity());
         }
         if let Hand::Franka { width } = hand {
-            let turned = |angle| UnitQuaternion::from_axis_angle(&Vector3::z_axis(), angle);
-            let flange_from_hand = Isometry3::from_parts(Translation3::identity(), turned(-FRAC_PI_4));
+            let flange_from_hand = flange_from_hand();
             self.add(set.hand, Body::Flange, flange_from_hand);
             for (side, angle) in [(1.0, 0.0), (-1.0, std::f64::consts::PI)] {
                 let place = Translation3::new(0.0, side * width / 2.0, FINGERS);
-                self.add(set.finger, Body::Flange, flange_from_hand * Isometry3::from_parts(place, turned(angle)));
+                let hand_from_finger = Isometry3::from_parts(place, about_z(angle));
+                self.add(set.finger, Body::Flange, flange_from_hand * hand_from_finger);
             }
         }
     }
@@ -146,6 +146,17 @@ impl RobotSurface {
         }
     }
 
+    /// Frame of a link in the base at joint positions `q` [rad], by its number as in [`Self::links`]; behind the last joint
+    /// that of the Franka Hand.
+    #[must_use]
+    pub fn base_from_link(&self, q: &Joints, link: usize) -> Isometry3<f64> {
+        match link {
+            0 => Isometry3::identity(),
+            link if link > self.model().dof() => self.model().flange(q).isometry() * flange_from_hand(),
+            link => self.model().link_frames(q)[link - 1],
+        }
+    }
+
     /// The arm's model.
     #[must_use]
     pub fn model(&self) -> &ArmModel {
@@ -153,15 +164,19 @@ impl RobotSurface {
     }
 }
 
+/// The Franka Hand is mounted an eighth of a turn from the flange's frame.
+fn flange_from_hand() -> Isometry3<f64> {
+    Isometry3::from_parts(Translation3::identity(), about_z(-FRAC_PI_4))
+}
+
+fn about_z(angle: f64) -> UnitQuaternion<f64> {
+    UnitQuaternion::from_axis_angle(&Vector3::z_axis(), angle)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::path::Path;
-
-    fn shipped() -> Cell {
-        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../config/fr3_cell.toml");
-        Cell::read(&path).expect("the shipped cell")
-    }
+    use crate::shipped::shipped;
 
     #[test]
     fn every_link_touches_the_next_at_the_joint_between_them() {

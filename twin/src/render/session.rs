@@ -1,28 +1,15 @@
 //! A recorded session beside its twin: the camera's picture, what the twin shows at the same joints, and where they differ.
 
-use super::robot::{Hand, RobotSurface};
-use super::splat::{Lens, SplatCloud, SplatError, Surroundings};
-use super::{Drawer, Mesh, Model, PaintError, Painter};
-use crate::arm::{ArmModel, Joints, MAX_JOINTS, ModelError};
-use crate::scene::{MeshFileError, ObjectModel};
-use nalgebra::{Isometry3, UnitQuaternion, Vector3};
+use super::splat::{Lens, SplatError, read_links};
+use super::{Drawer, Hand, PaintError, Painter, RobotSurface, ScannedLink, Shown, looks};
+use crate::arm::{Joints, MAX_JOINTS, ModelError};
+use crate::scene::MeshFileError;
+use nalgebra::Isometry3;
 use shared_mem::cell::Cell;
 use shared_mem::frames::{Base, Object, Pose};
 use shared_mem::msg::image::ImageHeader;
 use shared_mem::recording::Picture;
 use std::path::Path;
-
-/// Instances: the table, the object, and the robot's links from here on.
-const TABLE: u32 = 1;
-const OBJECT: u32 = 2;
-const ROBOT: u32 = 3;
-/// What lies behind everything, and the table top around the robot's front [m].
-const BACKGROUND: [f64; 3] = [0.66, 0.73, 0.8];
-/// Towards the light, base frame.
-const LIGHT: [f64; 3] = [0.55, 0.25, 0.8];
-const TABLE_COLOR: [u8; 3] = [196, 172, 140];
-const TABLE_HALF: [f32; 2] = [0.7, 0.8];
-const OBJECT_COLOR: [u8; 3] = [222, 112, 40];
 
 /// The cell's twin as a camera sees it.
 #[derive(Debug)]
@@ -30,20 +17,7 @@ pub struct TwinView {
     size: [usize; 2],
     camera_from_base: Isometry3<f64>,
     robot: RobotSurface,
-    painter: Painter,
-    /// What each of the painter's models moves with.
-    places: Vec<Place>,
-}
-
-/// What a model moves with.
-#[derive(Debug, Clone, Copy, PartialEq)]
-enum Place {
-    Base,
-    Object,
-    /// A part of the robot's surface.
-    Part(usize),
-    /// A link that was scanned, and the scan's frame in the link's.
-    Link(usize, Isometry3<f64>),
+    shown: Shown,
 }
 
 /// The twin cannot be drawn.
@@ -66,9 +40,6 @@ pub enum ViewError {
         "cell.toml has no `[camera]`: without intrinsics and pose there is no view; `calibration viewpoint` finds the pose"
     )]
     NoCamera,
-    /// A folder of splats without any.
-    #[error("{0} holds no splats of links: name them like `link3.ply`")]
-    NoSplats(String),
     /// Pictures of another size than the camera's intrinsics are for.
     #[error(
         "the pictures have {} x {} pixels, the `[camera]` of cell.toml {} x {}: give it the intrinsics of this resolution",
@@ -101,40 +72,16 @@ impl TwinView {
         let lens =
             Lens { focal: [pinhole.fx, pinhole.fy], centre: [pinhole.cx, pinhole.cy], distortion: camera.distortion };
         let robot = RobotSurface::new(cell, Hand::None)?;
-        let clouds = splats.map(link_splats).transpose()?.unwrap_or_default();
-        let mut shown: Vec<(Place, Model, u32)> = Vec::new();
-        if let Some(height) = cell.table.map(|table| table.height as f32) {
-            let table = Mesh::plate([0.3, 0.0, height], TABLE_HALF, TABLE_COLOR);
-            shown.push((Place::Base, Model::Mesh(table), TABLE));
-        }
-        if let Some(model) = ObjectModel::new(cell, None)? {
-            let mesh = Mesh::new(model.shape.triangles(), OBJECT_COLOR);
-            shown.push((Place::Object, Model::Mesh(mesh), OBJECT));
-        }
-        let flange = robot.model().dof() + 1;
-        for (part, (mesh, link)) in robot.parts().iter().zip(robot.links()).enumerate() {
-            // The tool is no link that was scanned.
-            if clouds.is_empty() || link == flange {
-                shown.push((Place::Part(part), Model::Mesh(mesh.clone()), ROBOT + link as u32));
-            }
-        }
-        for (link, cloud) in clouds {
-            let link_from_scan = match scanned_at {
-                Some(q) => base_from_link(robot.model(), &joints(q), link).inverse(),
-                None => Isometry3::identity(),
-            };
-            shown.push((Place::Link(link, link_from_scan), Model::Splats(cloud), ROBOT + link as u32));
-        }
-        let places = shown.iter().map(|(place, ..)| *place).collect();
-        let models = shown.into_iter().map(|(_, model, number)| (model, number)).collect();
+        let table = cell.table.map(|table| looks::table_top(table.height as f32));
+        let object = looks::object(cell)?;
+        let scans = splats.map(read_links).transpose()?.unwrap_or_default().into_iter().map(|(link, splats)| {
+            let link_from_scan =
+                scanned_at.map_or_else(Isometry3::identity, |q| robot.base_from_link(&joints(q), link).inverse());
+            ScannedLink { link, link_from_scan, splats }
+        });
         let size = [camera.width as usize, camera.height as usize];
-        Ok(Self {
-            size,
-            camera_from_base: base_from_camera.inverse().isometry(),
-            robot,
-            painter: Painter::new(drawer, models, lens, size)?,
-            places,
-        })
+        let shown = Shown::new(&robot, table.as_slice(), object.as_ref(), scans.collect(), drawer, (lens, size))?;
+        Ok(Self { size, camera_from_base: base_from_camera.inverse().isometry(), robot, shown })
     }
 
     /// Columns and rows.
@@ -146,7 +93,7 @@ impl TwinView {
     /// Who draws.
     #[must_use]
     pub fn painter(&self) -> &Painter {
-        &self.painter
+        self.shown.painter()
     }
 
     /// The twin at these joint positions [rad], the object where it was seen: red, green, blue, row by row.
@@ -154,32 +101,9 @@ impl TwinView {
     /// # Errors
     /// [`ViewError::Paint`] when the device that draws fails.
     pub fn draw(&mut self, q: &[f64], object: Option<Pose<Base, Object>>) -> Result<Vec<u8>, ViewError> {
-        let q = joints(q);
-        let mut parts = vec![Isometry3::identity(); self.robot.parts().len()];
-        self.robot.for_each(&q, |part, pose| parts[part] = pose);
-        let base_from = |place: &Place| match place {
-            Place::Base => Some(Isometry3::identity()),
-            Place::Object => object.map(|pose| pose.isometry()),
-            Place::Part(part) => Some(parts[*part]),
-            Place::Link(link, link_from_scan) => Some(base_from_link(self.robot.model(), &q, *link) * link_from_scan),
-        };
-        let poses: Vec<Option<Isometry3<f64>>> =
-            self.places.iter().map(|place| Some(self.camera_from_base * base_from(place)?)).collect();
-        let around = Surroundings { background: BACKGROUND, light: self.camera_from_base * Vector3::from(LIGHT) };
-        let seen = self.painter.paint(&poses, &around)?;
-        Ok(seen.color.iter().flatten().map(|value| (value.clamp(0.0, 1.0) * 255.0).round() as u8).collect())
-    }
-}
-
-/// Frame of a link in the base, 0 the base itself; behind the last joint the Franka Hand's, an eighth of a turn from the
-/// flange's.
-#[must_use]
-pub fn base_from_link(model: &ArmModel, q: &Joints, link: usize) -> Isometry3<f64> {
-    let hand = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), -std::f64::consts::FRAC_PI_4);
-    match link {
-        0 => Isometry3::identity(),
-        link if link > model.dof() => model.flange(q).isometry() * hand,
-        link => model.link_frames(q)[link - 1],
+        let object = object.map(|pose| pose.isometry());
+        let seen = self.shown.paint(&self.robot, &joints(q), object, &self.camera_from_base)?;
+        Ok(seen.rgb8().flatten().collect())
     }
 }
 
@@ -187,22 +111,6 @@ fn joints(q: &[f64]) -> Joints {
     let mut joints = [0.0; MAX_JOINTS];
     joints.iter_mut().zip(q).for_each(|(to, from)| *to = *from);
     joints
-}
-
-/// The splats of every link that the folder has, and of the hand, which moves with the flange.
-pub(crate) fn link_splats(folder: &Path) -> Result<Vec<(usize, SplatCloud)>, ViewError> {
-    let read = |source| SplatError::Read { path: folder.to_owned(), source };
-    let mut files: Vec<_> = std::fs::read_dir(folder).map_err(read)?.filter_map(|e| Some(e.ok()?.path())).collect();
-    files.sort();
-    let mut out = Vec::new();
-    for path in files.iter().filter(|path| path.extension().is_some_and(|e| e == "ply")) {
-        let name = path.file_name().and_then(|name| name.to_str()).unwrap_or("");
-        let link = (0..8).find(|link| name.contains(&format!("link{link}"))).or(name.contains("hand").then_some(8));
-        if let Some(link) = link {
-            out.push((link, SplatCloud::read(path)?));
-        }
-    }
-    if out.is_empty() { Err(ViewError::NoSplats(folder.display().to_string())) } else { Ok(out) }
 }
 
 /// Real, twin and their difference side by side: columns, rows and pixels.
@@ -250,11 +158,7 @@ mod tests {
     use super::*;
     use crate::scene::SceneSnapshot;
     use crate::sensors::camera::SimCamera;
-
-    fn shipped() -> Cell {
-        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../config/fr3_cell.toml");
-        Cell::read(&path).expect("the shipped cell")
-    }
+    use crate::shipped::shipped;
 
     #[test]
     fn the_twin_of_the_simulated_camera_s_picture_is_that_picture_where_the_robot_is() {

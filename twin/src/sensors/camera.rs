@@ -5,13 +5,12 @@
 //! splats.
 
 use super::depth::{self, DepthSensor};
-use super::scanned::Scanned;
 use super::{camera_clock_ns, generator};
 use crate::effects::CameraEffects;
 use crate::render::session::ViewError;
-use crate::render::splat::{Lens, Picture, Surroundings};
-use crate::render::{Drawer, Hand, Mesh, Pinhole, Raster, RobotSurface};
-use crate::scene::{ObjectModel, SceneSnapshot};
+use crate::render::splat::{Lens, Picture, read_links};
+use crate::render::{Drawer, Hand, Mesh, Pinhole, Raster, RobotSurface, ScannedLink, Shown, looks};
+use crate::scene::SceneSnapshot;
 use crate::sim::SimError;
 use nalgebra::{Isometry3, Vector3};
 use shared_mem::cell::{Camera, Cell};
@@ -27,27 +26,19 @@ pub struct SimCamera {
     still: Vec<Mesh>,
     robot: Option<RobotSurface>,
     object: Option<Mesh>,
-    scanned: Option<Scanned>,
+    /// The same with the robot of splats.
+    scanned: Option<Shown>,
     /// How much older a picture is than its stamp says.
     older_ns: u64,
     sequence: u64,
     next_picture_ns: u64,
 }
 
-/// Half edges of the drawn table top and its middle in front of the robot [m]; physics knows an endless plane.
-const TABLE_HALF: [f32; 2] = [0.7, 0.8];
-const TABLE_MIDDLE_X: f32 = 0.3;
 /// The floor below the table top [m], and half its edge.
 const FLOOR_BELOW: f32 = 0.75;
 const FLOOR_HALF: f32 = 5.0;
 
-/// Towards the light, base frame: above, on the side that cameras in front of the robot see.
-const LIGHT: [f32; 3] = [0.55, 0.25, 0.8];
-
-const BACKGROUND: [u8; 3] = [168, 186, 204];
 const FLOOR: [u8; 3] = [128, 130, 134];
-const TABLE: [u8; 3] = [196, 172, 140];
-const OBJECT: [u8; 3] = [222, 112, 40];
 
 impl SimCamera {
     /// The camera of a cell, a D455 where `[camera]` is absent. Without `[object] pose_noise` depth is exact.
@@ -60,22 +51,20 @@ impl SimCamera {
         let [fx, fy, cx, cy] = [pinhole.fx, pinhole.fy, pinhole.cx, pinhole.cy].map(|v| v as f32);
         let base_from_camera = settings.base_from_camera().map_or_else(Isometry3::identity, |pose| pose.isometry());
         let camera_from_base: Isometry3<f32> = base_from_camera.inverse().cast();
-        let light = camera_from_base * Vector3::from(LIGHT);
+        let light = camera_from_base * Vector3::from(looks::LIGHT).cast::<f32>();
         let pinhole = Pinhole { fx, fy, cx, cy };
         let raster = Raster::new(settings.width as usize, settings.height as usize, pinhole, light);
         let noisy = cell.object.as_ref().is_none_or(|o| o.pose_noise.is_some());
         let height = cell.table.map_or(0.0, |t| t.height as f32);
-        let still = vec![
-            Mesh::plate([0.0, 0.0, height - FLOOR_BELOW], [FLOOR_HALF; 2], FLOOR),
-            Mesh::plate([TABLE_MIDDLE_X, 0.0, height], TABLE_HALF, TABLE),
-        ];
+        let still =
+            vec![Mesh::plate([0.0, 0.0, height - FLOOR_BELOW], [FLOOR_HALF; 2], FLOOR), looks::table_top(height)];
         Ok(Self {
             camera_from_base,
             raster,
             depth: DepthSensor::new(settings.width, settings.height, noisy, generator(cell, 2)),
             still,
             robot: cell.robot.as_ref().map(|_| RobotSurface::new(cell, Hand::None)).transpose()?,
-            object: ObjectModel::new(cell, None)?.map(|model| Mesh::new(model.shape.triangles(), OBJECT)),
+            object: looks::object(cell)?,
             scanned: None,
             older_ns: 0,
             sequence: 0,
@@ -102,7 +91,9 @@ impl SimCamera {
         let lens = Lens { focal: [pinhole.fx, pinhole.fy], centre: [pinhole.cx, pinhole.cy], distortion: [0.0; 5] };
         let view = (lens, [self.settings.width as usize, self.settings.height as usize]);
         if let Some(robot) = &self.robot {
-            self.scanned = Some(Scanned::new(folder, robot, &self.still, self.object.as_ref(), drawer, view)?);
+            let scans = read_links(folder)?.into_iter();
+            let scans = scans.map(|(link, splats)| ScannedLink { link, link_from_scan: Isometry3::identity(), splats });
+            self.scanned = Some(Shown::new(robot, &self.still, self.object.as_ref(), scans.collect(), drawer, view)?);
         }
         Ok(self)
     }
@@ -135,8 +126,8 @@ impl SimCamera {
     pub fn render(&mut self, scene: &SceneSnapshot, color: &mut [u8], depth: &mut [u8]) -> [ImageHeader; 2] {
         let width = self.settings.width as usize;
         if let Some(picture) = self.paint(scene) {
-            for (rgb, seen) in color.chunks_exact_mut(3).zip(&picture.color) {
-                rgb.copy_from_slice(&seen.map(|value| (value.clamp(0.0, 1.0) * 255.0).round() as u8));
+            for (rgb, seen) in color.chunks_exact_mut(3).zip(picture.rgb8()) {
+                rgb.copy_from_slice(&seen);
             }
             // Half seen through is not measured.
             let solid =
@@ -192,12 +183,8 @@ impl SimCamera {
     fn paint(&mut self, scene: &SceneSnapshot) -> Option<Picture> {
         let (scanned, robot) = (self.scanned.as_mut()?, self.robot.as_ref()?);
         let camera_from_base: Isometry3<f64> = self.camera_from_base.cast();
-        let around = Surroundings {
-            background: BACKGROUND.map(|value| f64::from(value) / 255.0),
-            light: camera_from_base * Vector3::from(LIGHT).cast::<f64>(),
-        };
         let object = scene.object.map(|pose| pose.isometry());
-        match scanned.paint(robot, &scene.q, object, &camera_from_base, &around) {
+        match scanned.paint(robot, &scene.q, object, &camera_from_base) {
             Ok(picture) => Some(picture),
             Err(error) => {
                 tracing::warn!("the simulated camera draws the robot's meshes from here on: {error}");
@@ -208,7 +195,7 @@ impl SimCamera {
     }
 
     fn draw(&mut self, scene: &SceneSnapshot) {
-        self.raster.clear(BACKGROUND);
+        self.raster.clear(looks::BACKGROUND);
         for mesh in &self.still {
             self.raster.draw(mesh, &self.camera_from_base);
         }
@@ -227,16 +214,11 @@ impl SimCamera {
 mod tests {
     use super::*;
     use crate::reconstruct::SurfacePoints;
-    use crate::render::session::base_from_link;
-    use crate::render::splat::{Splat, SplatCloud};
+    use crate::render::splat::{Splat, SplatCloud, link_file};
+    use crate::shipped::shipped;
     use crate::sim::SimCell;
     use shared_mem::cell::CameraPose;
     use std::path::Path;
-
-    fn shipped() -> Cell {
-        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../config/fr3_cell.toml");
-        Cell::read(&path).expect("the shipped cell")
-    }
 
     fn picture(cell: &Cell, scene: &SceneSnapshot) -> (SimCamera, Vec<u8>, Vec<u16>, [ImageHeader; 2]) {
         let mut camera = SimCamera::new(cell).expect("a camera");
@@ -279,7 +261,7 @@ mod tests {
         let zero = [0.0; crate::arm::MAX_JOINTS];
         let surface = SurfacePoints::new(&robot, &zero, |_| true);
         for link in 0..8 {
-            let link_from_base = base_from_link(robot.model(), &zero, link).inverse();
+            let link_from_base = robot.base_from_link(&zero, link).inverse();
             let own = surface.points.iter().zip(&surface.links).filter(|(_, of)| **of == link);
             let ball = |(at, _): (&nalgebra::Point3<f64>, _)| Splat {
                 centre: (link_from_base * at).cast(),
@@ -289,7 +271,7 @@ mod tests {
             };
             let splats: Vec<Splat> = own.map(ball).collect();
             let harmonics = vec![[1.6; 3]; splats.len()];
-            let file = folder.path().join(format!("link{link}.ply"));
+            let file = folder.path().join(link_file(link));
             SplatCloud { splats, degree: 0, harmonics }.write(&file).expect("written");
         }
         let scene = SimCell::new(&cell, None).expect("a cell").snapshot();

@@ -5,7 +5,6 @@
 pub mod camera;
 mod depth;
 pub mod joint;
-mod scanned;
 pub mod tracker;
 pub mod wrench;
 

@@ -2,18 +2,10 @@
 
 use super::*;
 use crate::sensors::tracker::SimTracker;
+use crate::shipped::shipped_exact;
 use nalgebra::{Isometry3, Vector3};
 use shared_mem::frames::Pose;
 use shared_mem::theta::ArmTheta;
-use std::path::Path;
-
-/// The shipped cell with exact encoders.
-fn shipped() -> Cell {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../config/fr3_cell.toml");
-    let mut cell = Cell::read(&path).expect("the shipped cell");
-    (cell.simulation.q_noise, cell.simulation.dq_noise) = (0.0, 0.0);
-    cell
-}
 
 /// A simulated robot with its bridge: all joints swing, each at its own frequency.
 struct Robot {
@@ -74,7 +66,7 @@ fn worst(joints: &Joints) -> f64 {
 
 #[test]
 fn a_twin_with_the_same_parameters_has_no_gap() {
-    let cell = shipped();
+    let cell = shipped_exact();
     let mut robot = Robot::new(&cell, None);
     let mut shadow = Shadow::new(&cell, None).expect("a shadow");
     for k in 0..2000 {
@@ -87,7 +79,7 @@ fn a_twin_with_the_same_parameters_has_no_gap() {
 
 #[test]
 fn attaching_in_the_middle_of_a_motion_gives_no_gap_either() {
-    let cell = shipped();
+    let cell = shipped_exact();
     let mut robot = Robot::new(&cell, None);
     robot.skip(700);
     let mut shadow = Shadow::new(&cell, None).expect("a shadow");
@@ -99,7 +91,7 @@ fn attaching_in_the_middle_of_a_motion_gives_no_gap_either() {
 
 #[test]
 fn hidden_gains_open_a_gap_and_the_right_parameters_close_it() {
-    let cell = shipped();
+    let cell = shipped_exact();
     let gains = cell.controller.clone().expect("gains");
     let hidden = Theta {
         arm: Some(ArmTheta { stiffness: gains.stiffness.iter().map(|k| 0.8 * k).collect(), damping: gains.damping }),
@@ -117,7 +109,7 @@ fn hidden_gains_open_a_gap_and_the_right_parameters_close_it() {
 
 #[test]
 fn a_restarted_bridge_and_a_long_hole_align_the_twin_and_a_short_hole_does_not() {
-    let cell = shipped();
+    let cell = shipped_exact();
     let mut robot = Robot::new(&cell, None);
     let mut shadow = Shadow::new(&cell, None).expect("a shadow");
     let lose = |robot: &mut Robot, shadow: &mut Shadow, cycles: u64| {
@@ -138,7 +130,7 @@ fn a_restarted_bridge_and_a_long_hole_align_the_twin_and_a_short_hole_does_not()
 
 #[test]
 fn a_twin_that_fell_behind_skips_ahead_and_says_how_much_it_dropped() {
-    let cell = shipped();
+    let cell = shipped_exact();
     let mut robot = Robot::new(&cell, None);
     let mut shadow = Shadow::new(&cell, None).expect("a shadow");
     mirror(&mut shadow, &robot.cycle().0);
@@ -150,7 +142,7 @@ fn a_twin_that_fell_behind_skips_ahead_and_says_how_much_it_dropped() {
 
 #[test]
 fn repeated_and_broken_states_are_no_cycles() {
-    let cell = shipped();
+    let cell = shipped_exact();
     let mut robot = Robot::new(&cell, None);
     let mut shadow = Shadow::new(&cell, None).expect("a shadow");
     let (state, _) = robot.cycle();
@@ -166,7 +158,7 @@ fn repeated_and_broken_states_are_no_cycles() {
 
 #[test]
 fn the_object_is_found_and_found_again_when_it_rests_elsewhere() {
-    let cell = shipped();
+    let cell = shipped_exact();
     let mut robot = Robot::new(&cell, None);
     let mut shadow = Shadow::new(&cell, None).expect("a shadow");
     let mut events = Vec::new();
@@ -194,7 +186,7 @@ fn the_object_is_found_and_found_again_when_it_rests_elsewhere() {
 
 #[test]
 fn the_json_has_the_keys_that_others_read() {
-    let cell = shipped();
+    let cell = shipped_exact();
     let mut robot = Robot::new(&cell, None);
     let mut shadow = Shadow::new(&cell, None).expect("a shadow");
     mirror_cycles(&mut shadow, &mut robot, 100);

@@ -3,20 +3,12 @@
 
 use super::*;
 use crate::arm::{ControlLaw, JointState, PointForce};
-use std::path::Path;
-
-/// The shipped cell without noise.
-fn shipped() -> Cell {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../config/fr3_cell.toml");
-    let mut cell = Cell::read(&path).expect("the shipped cell");
-    (cell.simulation.q_noise, cell.simulation.dq_noise) = (0.0, 0.0);
-    cell
-}
+use crate::shipped::shipped_exact;
 
 /// The shipped cell with the table lifted to 30 mm under the tip and the box 20 mm beside it, so that turning joint 1
 /// strikes it.
 fn striking() -> Cell {
-    let mut cell = shipped();
+    let mut cell = shipped_exact();
     let arm = ArmModel::from_cell(&cell).expect("an FR3");
     let tip = arm.tip(arm.ready()).position();
     cell.table = Some(shared_mem::cell::Table { height: tip[2] - 0.03 });
@@ -67,7 +59,7 @@ fn a_gap_that_is_wide_need_not_be_looked_at_in_every_period() {
 
 #[test]
 fn an_arm_that_is_told_to_stay_stays() {
-    let mut cell = SimCell::new(&shipped(), None).expect("a cell");
+    let mut cell = SimCell::new(&shipped_exact(), None).expect("a cell");
     let (q_d, dq_d) = (cell.q(), [0.0; 8]);
     for _ in 0..1000 {
         cell.step(&Drive::JointImpedance { q_d, dq_d });
@@ -80,7 +72,7 @@ fn an_arm_that_is_told_to_stay_stays() {
 
 #[test]
 fn the_client_s_torque_and_the_robot_s_own_controller_move_the_arm_alike() {
-    let description = shipped();
+    let description = shipped_exact();
     let mut inside = SimCell::new(&description, None).expect("a cell");
     let mut outside = SimCell::new(&description, None).expect("a cell");
     let model = ArmModel::from_cell(&description).expect("an FR3");
@@ -148,7 +140,7 @@ fn a_finer_step_changes_the_hit_by_less_than_two_per_cent() {
 
 #[test]
 fn a_hidden_gain_changes_the_motion_and_an_unknown_effect_is_refused() {
-    let description = shipped();
+    let description = shipped_exact();
     let controller = description.controller.clone().expect("gains");
     let theta = Theta {
         arm: Some(shared_mem::theta::ArmTheta {
@@ -170,13 +162,13 @@ fn a_hidden_gain_changes_the_motion_and_an_unknown_effect_is_refused() {
 
 #[test]
 fn an_object_without_a_table_is_refused_with_the_remedy() {
-    let error = SimCell::new(&Cell { table: None, ..shipped() }, None).err().expect("refused").to_string();
+    let error = SimCell::new(&Cell { table: None, ..shipped_exact() }, None).err().expect("refused").to_string();
     assert!(error.contains("[table]"), "{error}");
 }
 
 #[test]
 fn the_report_is_the_state_with_noise_and_gravity_where_they_belong() {
-    let mut description = shipped();
+    let mut description = shipped_exact();
     description.simulation.q_noise = 1e-5;
     let mut cell = SimCell::new(&description, None).expect("a cell");
     let (q_d, dq_d) = (cell.q(), [0.0; 8]);
@@ -196,7 +188,7 @@ fn the_report_is_the_state_with_noise_and_gravity_where_they_belong() {
 
 #[test]
 fn a_tossed_object_needs_no_robot() {
-    let mut description = shipped();
+    let mut description = shipped_exact();
     (description.robot, description.controller, description.tool) = (None, None, None);
     let mut cell = SimCell::new(&description, None).expect("a cell");
     let start = Isometry3::new(Vector3::new(0.0, 0.0, 0.4), Vector3::new(0.3, 0.8, 0.1));
@@ -213,7 +205,7 @@ fn a_tossed_object_needs_no_robot() {
 
 #[test]
 fn a_solid_table_carries_what_presses_on_it_and_is_not_there_unless_asked_for() {
-    let description = Cell { object: None, ..shipped() };
+    let description = Cell { object: None, ..shipped_exact() };
     let pressed = |solid: bool| {
         let mut cell = SimCell::new(&description, None).expect("a cell");
         if solid {

@@ -3,6 +3,7 @@
 use super::HitEffects;
 use crate::arm::ArmModel;
 use crate::effects::Effects;
+use crate::shipped::shipped;
 use crate::sim::{Drive, SimCell};
 use nalgebra::{UnitQuaternion, Vector3};
 use shared_mem::cell::{Cell, Table};
@@ -25,8 +26,7 @@ pub(super) fn effects(blocks: &str) -> HitEffects {
 
 /// The shipped cell with the table lifted to under the tip and the box 20 mm beside it, so that turning joint 1 strikes it.
 pub(super) fn striking() -> (Cell, ArmModel) {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../config/fr3_cell.toml");
-    let mut cell = Cell::read(&path).expect("the shipped cell");
+    let mut cell = shipped();
     let arm = ArmModel::from_cell(&cell).expect("an FR3");
     let tip = arm.tip(arm.ready()).position();
     cell.table = Some(Table { height: tip[2] - 0.03 });

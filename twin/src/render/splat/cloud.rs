@@ -57,6 +57,12 @@ pub enum SplatError {
         /// What is wrong.
         what: String,
     },
+    /// A folder of a robot's splats without any.
+    #[error("{} holds no splats of links: name them like `link3.ply`", folder.display())]
+    NoLinks {
+        /// The folder.
+        folder: PathBuf,
+    },
 }
 
 impl SplatCloud {

@@ -55,6 +55,13 @@ pub struct Picture {
     pub cover: Vec<f32>,
 }
 
+impl Picture {
+    /// Red, green and blue of every pixel, one byte each, row by row.
+    pub fn rgb8(&self) -> impl Iterator<Item = [u8; 3]> + '_ {
+        self.color.iter().map(|color| color.map(|value| (value.clamp(0.0, 1.0) * 255.0).round() as u8))
+    }
+}
+
 /// Edge of a tile [pixel].
 const TILE: usize = 16;
 /// No splat keeps back all light.
