@@ -43,6 +43,25 @@ pub enum PixelEncoding {
     Depth16 = 1,
 }
 
+impl PixelEncoding {
+    const ALL: [Self; 2] = [Self::Rgb8, Self::Depth16];
+
+    /// What ROS and Foxglove call it (`sensor_msgs/image_encodings.hpp`).
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Rgb8 => "rgb8",
+            Self::Depth16 => "16UC1",
+        }
+    }
+
+    /// The encoding of a [`Self::name`]; `None` for any other.
+    #[must_use]
+    pub fn from_name(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|encoding| encoding.name() == name)
+    }
+}
+
 /// Which clock a camera stamped with: librealsense's three domains.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ZeroCopySend)]
 #[type_name("twinalign/StampDomain/1")]

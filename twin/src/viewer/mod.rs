@@ -11,7 +11,7 @@ use foxglove::{Channel, ChannelBuilder, FoxgloveError, RawChannel, Schema, WebSo
 use scene::{Look, Scene};
 use shared_mem::cell::Cell;
 use shared_mem::frames::{Base, Object, Pose};
-use shared_mem::msg::image::{ImageHeader, PixelEncoding};
+use shared_mem::msg::image::ImageHeader;
 use shared_mem::msg::twin::TwinGap;
 use shared_mem::time::unix_offset_ns;
 use shared_mem::topics::{ARM_STATE, CAMERA_COLOR, CAMERA_DEPTH, CAMERA_INFO, OBJECT_POSE, TWIN_GAP, TWIN_STATE};
@@ -214,10 +214,7 @@ fn show_picture(time: Timestamp, header: &ImageHeader, channel: &Channel<RawImag
         frame_id: "camera".into(),
         width: header.width,
         height: header.height,
-        encoding: match header.encoding {
-            PixelEncoding::Rgb8 => "rgb8".into(),
-            PixelEncoding::Depth16 => "16UC1".into(),
-        },
+        encoding: header.encoding.name().into(),
         step: header.stride,
         data: pixels().into(),
     });

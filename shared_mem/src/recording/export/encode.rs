@@ -47,15 +47,12 @@ pub(super) fn picture(stamp_ns: u64, picture: &Picture) -> (&'static str, Vec<u8
         Picture::Pixels { header: head, pixels } => {
             let counts = head.encoding == PixelEncoding::Depth16;
             let metres = counts && (head.depth_scale - MILLIMETRE).abs() > 1e-9;
-            let (encoding, step, data) = match (counts, metres) {
-                (false, _) => ("rgb8", head.stride, std::borrow::Cow::Borrowed(pixels)),
-                (true, false) => ("16UC1", head.stride, std::borrow::Cow::Borrowed(pixels)),
-                (true, true) => {
-                    let count =
-                        |pair: &[u8]| (f64::from(u16::from_le_bytes([pair[0], pair[1]])) * head.depth_scale) as f32;
-                    let data = pixels.chunks_exact(2).flat_map(|pair| count(pair).to_le_bytes()).collect();
-                    ("32FC1", 2 * head.stride, std::borrow::Cow::Owned(data))
-                }
+            let (encoding, step, data) = if metres {
+                let count = |pair: &[u8]| (f64::from(u16::from_le_bytes([pair[0], pair[1]])) * head.depth_scale) as f32;
+                let data = pixels.chunks_exact(2).flat_map(|pair| count(pair).to_le_bytes()).collect();
+                ("32FC1", 2 * head.stride, std::borrow::Cow::Owned(data))
+            } else {
+                (head.encoding.name(), head.stride, std::borrow::Cow::Borrowed(pixels))
             };
             let message = header(stamp_ns, CAMERA).u32(head.height).u32(head.width).text(encoding).u8(0);
             (ros2::IMAGE, message.u32(step).byte_sequence(&data).message())

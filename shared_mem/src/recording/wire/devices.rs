@@ -227,10 +227,7 @@ pub(in super::super) fn image_to_wire(header: &ImageHeader, pixels: &[u8], clock
         timestamp: clock.timestamp(header.stamp_ns),
         width: header.width,
         height: header.height,
-        encoding: match header.encoding {
-            PixelEncoding::Rgb8 => "rgb8".into(),
-            PixelEncoding::Depth16 => "16UC1".into(),
-        },
+        encoding: header.encoding.name().into(),
         step: header.stride,
         data: Vec::new(),
         frame_id: CAMERA.into(),
@@ -261,11 +258,7 @@ pub(in super::super) fn image_from_wire(m: foxglove::RawImage) -> Option<(ImageH
         width: m.width,
         height: m.height,
         stride: m.step,
-        encoding: match m.encoding.as_str() {
-            "rgb8" => PixelEncoding::Rgb8,
-            "16UC1" => PixelEncoding::Depth16,
-            _ => return None,
-        },
+        encoding: PixelEncoding::from_name(&m.encoding)?,
         depth_scale: detail.depth_scale,
         stamp_domain: match detail.stamp_domain() {
             WireDomain::HardwareClock => StampDomain::HardwareClock,
