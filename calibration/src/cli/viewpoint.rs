@@ -2,6 +2,7 @@
 
 use super::print_json;
 use calibration::viewpoint::answer::Viewpoint;
+use calibration::viewpoint::board::Board;
 use calibration::viewpoint::command::{Options, StartFrom, run as find};
 use calibration::viewpoint::fit::Method;
 use calibration::viewpoint::search::Reach;
@@ -35,6 +36,14 @@ pub(crate) struct ViewpointArguments {
     /// Focal lengths and principal point [pixel]: fx,fy,cx,cy.
     #[arg(long, value_parser = numbers::<4>)]
     intrinsics: Option<[f64; 4]>,
+    /// A ChArUco board in view that tells where the camera is about, as OpenCV draws it: COLUMNSxROWS,SQUARE,MARKER,DICTIONARY,
+    /// lengths in metres, for example 5x7,0.04,0.03,DICT_5X5_100.
+    #[arg(long, value_name = "BOARD", requires = "board_at", conflicts_with = "start", value_parser = Board::parse)]
+    board: Option<Board>,
+    /// Where the board lies in the base frame: x,y,z,qw,qx,qy,qz of its first square's outer corner, x along the rows, y down
+    /// the columns, z into the board.
+    #[arg(long, value_name = "POSE", requires = "board", allow_hyphen_values = true, value_parser = pose)]
+    board_at: Option<([f64; 3], [f64; 4])>,
     /// Where the camera is about: `cell` (its cell.toml), `search`, or x,y,z,qw,qx,qy,qz of the optical frame in the base.
     #[arg(long, default_value = "cell", allow_hyphen_values = true, value_parser = start)]
     start: StartFrom,
@@ -79,16 +88,21 @@ fn numbers<const N: usize>(text: &str) -> Result<[f64; N], String> {
     parts.and_then(|parts| parts.try_into().ok()).ok_or_else(|| format!("give {N} numbers with commas between them"))
 }
 
+fn pose(text: &str) -> Result<([f64; 3], [f64; 4]), String> {
+    let [x, y, z, w, i, j, k] = numbers::<7>(text)?;
+    if w.hypot(i).hypot(j).hypot(k) < 1e-6 {
+        return Err("the quaternion qw,qx,qy,qz must not be zero".into());
+    }
+    Ok(([x, y, z], [w, i, j, k]))
+}
+
 fn start(text: &str) -> Result<StartFrom, String> {
     match text {
         "cell" => Ok(StartFrom::Cell),
         "search" => Ok(StartFrom::Search),
         _ => {
-            let [x, y, z, w, i, j, k] = numbers::<7>(text).map_err(|e| format!("{e}, or `cell`, or `search`"))?;
-            if w.hypot(i).hypot(j).hypot(k) < 1e-6 {
-                return Err("the quaternion qw,qx,qy,qz must not be zero".into());
-            }
-            Ok(StartFrom::Pose([x, y, z], [w, i, j, k]))
+            let (position, wxyz) = pose(text).map_err(|e| format!("{e}; or say `cell` or `search`"))?;
+            Ok(StartFrom::Pose(position, wxyz))
         }
     }
 }
@@ -99,6 +113,10 @@ fn start(text: &str) -> Result<StartFrom, String> {
 /// One line: what happened, and what to do.
 pub(super) fn run(arguments: ViewpointArguments) -> anyhow::Result<()> {
     let ViewpointArguments { targets, cell, joints, mask, background, intrinsics, start, reach, .. } = arguments;
+    let start = match (arguments.board, arguments.board_at) {
+        (Some(board), Some((position, wxyz))) => StartFrom::Board(board, position, wxyz),
+        _ => start,
+    };
     let method = match arguments.method {
         MethodName::Outline => Method::Outline,
         MethodName::Swarm => Method::Swarm(arguments.budget as usize),

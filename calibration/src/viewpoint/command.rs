@@ -1,6 +1,7 @@
 //! `calibration viewpoint`: from what was given to the answer.
 
 use super::answer::{FrameAnswer, Pose, Start, Viewpoint};
+use super::board::Board;
 use super::fit::{Fit, Method, fit};
 use super::frame::Frame;
 use super::lens::Lens;
@@ -9,7 +10,7 @@ use super::search::Reach;
 use super::shape::Shape;
 use super::{overlay, refine, session, start, step};
 use anyhow::{Context as _, bail, ensure};
-use nalgebra::{Isometry3, Point3};
+use nalgebra::{Isometry3, Point3, Quaternion, UnitQuaternion};
 use shared_mem::cell::{Camera, CameraPose, Cell, Intrinsics, Robot};
 use shared_mem::frames::{Base, Camera as CameraFrame, Pose as FramePose};
 use shared_mem::recording::{Session, write_png};
@@ -52,7 +53,7 @@ pub struct Options {
 }
 
 /// Where to begin.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub enum StartFrom {
     /// The pose in cell.toml.
     Cell,
@@ -60,6 +61,8 @@ pub enum StartFrom {
     Pose([f64; 3], [f64; 4]),
     /// Anywhere around the robot, the camera upright.
     Search,
+    /// Wherever a board is seen from whose frame lies here in the base frame.
+    Board(Board, [f64; 3], [f64; 4]),
 }
 
 /// How far a start is trusted where nothing was said [rad, m]: a silhouette draws from further away than a photo's edges.
@@ -103,17 +106,25 @@ pub fn run(options: &Options) -> anyhow::Result<Viewpoint> {
         "a particle swarm needs silhouettes: give --mask or --background, or use --method outline"
     );
     let reach = options.reach.unwrap_or(if masked { REACH_OF_MASKS } else { REACH_OF_PHOTOS });
-    let start = match options.start {
+    let start = match &options.start {
         StartFrom::Cell => cell.camera.as_ref().and_then(Camera::base_from_camera),
-        StartFrom::Pose(position, wxyz) => FramePose::from_parts(position, wxyz),
+        StartFrom::Pose(position, wxyz) => FramePose::from_parts(*position, *wxyz),
+        StartFrom::Board(board, position, [w, x, y, z]) => {
+            let turn = UnitQuaternion::from_quaternion(Quaternion::new(*w, *x, *y, *z));
+            let base_from_board = Isometry3::from_parts((*position).into(), turn);
+            let board_from_camera = board.camera_from_board(&pixels, &lens)?.inverse();
+            Some(FramePose::from_isometry(base_from_board * board_from_camera))
+        }
         StartFrom::Search => None,
     };
     let start = start.map(|pose| pose.inverse().isometry());
-    let found = match (&start, options.start) {
+    let found = match (&start, &options.start) {
         (Some(start), _) => fit(&frames, &shape, start, &reach, method, options.seed)?,
         (None, StartFrom::Search) => start::search(&frames, &shape, &lens, method, options.seed)?,
         (None, _) => {
-            bail!("no start: cell.toml has no `[camera] pose`; give --start x,y,z,qw,qx,qy,qz or --start search")
+            bail!(
+                "no start: cell.toml has no `[camera] pose`; give --start x,y,z,qw,qx,qy,qz, --board, or --start search"
+            )
         }
     };
     if found.rival.is_some_and(|rival| rival > 0.95 * found.confirmed) {

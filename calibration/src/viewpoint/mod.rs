@@ -11,10 +11,12 @@
 //! | [`scan`], [`refine`], [`fit`] | the fast way: look everywhere, least squares, keep the best |
 //! | [`search`] | the paper's way: a particle swarm |
 //! | [`start`] | a start where none is known |
+//! | [`board`], [`planar`] | a start from a ChArUco board at a known place |
 //! | [`interval`] | how sure the pose is |
 //! | [`grid`], [`lens`], [`step`], `distance` | pictures of numbers, projection, moves of a camera |
 
 pub mod answer;
+pub mod board;
 pub mod command;
 mod distance;
 pub mod fit;
@@ -26,6 +28,7 @@ pub mod outline;
 pub mod overlay;
 pub mod photo;
 pub mod picture;
+pub mod planar;
 pub mod pull;
 pub mod refine;
 pub mod scan;

@@ -75,6 +75,15 @@ impl Pixels {
         Self { channels, ..self }
     }
 
+    /// The mean of the colours, 0 to 255.
+    #[must_use]
+    pub fn grey(&self) -> Grid {
+        let share = 1.0 / self.channels.len().max(1) as f32;
+        let [width, height] = self.size;
+        let mean = |i: usize| self.channels.iter().map(|channel| channel.values[i]).sum::<f32>() * share;
+        Grid::from_fn(width, height, |x, y| mean(y * width + x))
+    }
+
     /// The photo itself.
     ///
     /// # Errors

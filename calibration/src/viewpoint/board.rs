@@ -1,0 +1,267 @@
+//! A ChArUco board at a known place: a chessboard with a marker in each white square, so that every corner between four
+//! squares is told apart from the others even when only some are seen (Garrido-Jurado et al. 2014). Rough is enough:
+//! the robot's outline has the last word on where the camera stands.
+
+use super::grid::Grid;
+use super::lens::Lens;
+use super::picture::Pixels;
+use super::planar::{self, Seen};
+use anyhow::Context as _;
+use calib_targets_aruco::resolve_dictionary;
+use calib_targets_chessboard::{ChessCorner, ChessboardDetector, ChessboardParams};
+use chess_corners::DetectorConfig;
+use nalgebra::{Isometry3, Point2, Point3};
+
+/// The board as OpenCV draws it, the first square black. Its frame: origin at the outer corner of that square, x along
+/// the rows, y down the columns, z into the board.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Board {
+    /// Squares in a row and in a column.
+    pub squares: [u32; 2],
+    /// Edge of a square [m].
+    pub square: f64,
+    /// Edge of a marker [m].
+    pub marker: f64,
+    /// Name of the markers' dictionary as OpenCV has it, ArUco's or AprilTag's: `DICT_5X5_100`, `DICT_APRILTAG_36h11`.
+    pub dictionary: String,
+}
+
+/// A crossing of four squares: its place in a lattice that begins anywhere and may be turned, and where it is seen [pixel].
+type Crossing = ([i32; 2], [f64; 2]);
+
+/// Less of a picture's light and dark at the markers explained by the board there than this, and it is not there: a
+/// lattice laid over other crossings explains next to nothing.
+const EXPLAINED: f64 = 0.6;
+
+/// Crossings fainter than this are noise: differences of grey values, summed around a ring (Bennett & Lasenby 2014).
+const CONTRAST: f32 = 15.0;
+/// Pictures are looked at as they are and enlarged by this: small squares' crossings lie too near to one another.
+const ENLARGED: [usize; 2] = [1, 2];
+
+impl Board {
+    /// From `COLUMNSxROWS,SQUARE,MARKER,DICTIONARY`, lengths in metres.
+    ///
+    /// # Errors
+    /// A sentence that says what does not fit.
+    pub fn parse(text: &str) -> Result<Self, String> {
+        let expected = "give COLUMNSxROWS,SQUARE,MARKER,DICTIONARY, for example 5x7,0.04,0.03,DICT_5X5_100";
+        let parts: Vec<&str> = text.split(',').map(str::trim).collect();
+        let [squares, square, marker, dictionary] = parts[..] else { return Err(expected.into()) };
+        let (columns, rows) = squares.split_once('x').ok_or(expected)?;
+        let count = |text: &str| text.parse::<u32>().ok().filter(|n| (3..=50).contains(n)).ok_or("3 to 50 squares");
+        let length = |text: &str| text.parse::<f64>().ok().filter(|l| (1e-3..=1.0).contains(l)).ok_or(expected);
+        let (squares, square, marker) = ([count(columns)?, count(rows)?], length(square)?, length(marker)?);
+        if marker >= square {
+            return Err("a marker is smaller than its square; both in metres".into());
+        }
+        let Some(known) = resolve_dictionary(dictionary) else {
+            return Err(format!("no dictionary is called {dictionary}; OpenCV's names hold, like DICT_4X4_50"));
+        };
+        let (needed, has) = (squares[0] * squares[1] / 2, known.codes().len());
+        if has < needed as usize {
+            return Err(format!("the board has {needed} markers, {dictionary} only {has}"));
+        }
+        Ok(Self { squares, square, marker, dictionary: dictionary.into() })
+    }
+
+    /// The camera's pose from pictures without distortion of one camera that stood still, as did the board: from the one
+    /// that shows the board best.
+    ///
+    /// # Errors
+    /// When no picture shows the board.
+    pub fn camera_from_board(&self, pictures: &[Pixels], lens: &Lens) -> anyhow::Result<Isometry3<f64>> {
+        let mut best: Option<(f64, Isometry3<f64>)> = None;
+        let enlarged = |picture: &Pixels| ENLARGED.map(|factor| (picture.grey(), factor));
+        for (grey, factor) in pictures.iter().flat_map(enlarged) {
+            for crossings in lattices(&grey, factor)? {
+                for seen in self.readings(&crossings) {
+                    let Some(pose) = planar::pose(&seen, lens) else { continue };
+                    let explained = self.explained(&grey, lens, &pose);
+                    if explained > best.map_or(EXPLAINED, |(most, _)| most) {
+                        best = Some((explained, pose));
+                    }
+                }
+            }
+        }
+        let [columns, rows] = self.squares;
+        let (_, pose) = best.with_context(|| {
+            format!(
+                "no picture shows the board of {columns} x {rows} squares with {}: check --board and the light",
+                self.dictionary
+            )
+        })?;
+        Ok(pose)
+    }
+
+    /// How well the board at a pose says which of the markers' fields are light: their correlation, 1 at best.
+    fn explained(&self, grey: &Grid, lens: &Lens, camera_from_board: &Isometry3<f64>) -> f64 {
+        let mut sums = [0.0; 6];
+        for (place, is_light) in self.fields() {
+            let at = camera_from_board * Point3::new(place[0], place[1], 0.0);
+            let [u, v] = lens.project(&at);
+            let Some(seen) = grey.sample(u, v).filter(|_| at.z > 0.0) else { continue };
+            let said = f64::from(u8::from(is_light));
+            let terms = [1.0, said, seen, said * said, said * seen, seen * seen];
+            sums.iter_mut().zip(terms).for_each(|(sum, term)| *sum += term);
+        }
+        let [count, said, seen, said_said, said_seen, seen_seen] = sums;
+        let spread = (count * said_said - said * said) * (count * seen_seen - seen * seen);
+        if spread > 0.0 { (count * said_seen - said * seen) / spread.sqrt() } else { 0.0 }
+    }
+
+    /// Middle of every field of every marker in the board's frame [m], and whether it is light.
+    fn fields(&self) -> Vec<([f64; 2], bool)> {
+        let Some(dictionary) = resolve_dictionary(&self.dictionary) else { return Vec::new() };
+        let fields = dictionary.marker_size() as u32 + 2;
+        let [columns, rows] = self.squares;
+        let white = (0..rows).flat_map(|row| (0..columns).map(move |column| [column, row]));
+        let white = white.filter(|[column, row]| (column + row) % 2 == 1);
+        let mut out = Vec::new();
+        for ([column, row], code) in white.zip(dictionary.codes()) {
+            for (i, j) in (0..fields).flat_map(|j| (0..fields).map(move |i| (i, j))) {
+                let across = |square: u32, field: u32| {
+                    (f64::from(square) + 0.5) * self.square
+                        + ((f64::from(field) + 0.5) / f64::from(fields) - 0.5) * self.marker
+                };
+                let inside = (1..fields - 1).contains(&i) && (1..fields - 1).contains(&j);
+                // The crate's codes have a 1 where the marker is black.
+                let is_light = inside && code >> ((j - 1) * (fields - 2) + i - 1) & 1 == 0;
+                out.push(([across(column, i), across(row, j)], is_light));
+            }
+        }
+        out
+    }
+
+    /// All ways to lay the board under a lattice so that every crossing is one of the board's.
+    fn readings(&self, crossings: &[Crossing]) -> Vec<Vec<Seen>> {
+        let inner = self.squares.map(|squares| squares as i32 - 1);
+        let mut out = Vec::new();
+        for quarter in 0..4 {
+            let turned = |[a, b]: [i32; 2]| [[a, b], [-b, a], [-a, -b], [b, -a]][quarter];
+            let span = [0, 1].map(|axis| {
+                let values = || crossings.iter().map(|(at, _)| turned(*at)[axis]);
+                [values().min().unwrap_or(0), values().max().unwrap_or(0)]
+            });
+            let shifts = |axis: usize| 1 - span[axis][0]..=inner[axis] - span[axis][1];
+            for (x, y) in shifts(1).flat_map(|y| shifts(0).map(move |x| (x, y))) {
+                let place = |at: [i32; 2]| {
+                    let [a, b] = turned(at);
+                    [a + x, b + y].map(|n| f64::from(n) * self.square)
+                };
+                out.push(crossings.iter().map(|(at, pixel)| Seen { place: place(*at), pixel: *pixel }).collect());
+            }
+        }
+        out
+    }
+}
+
+/// The chessboards that a picture shows, looked for in one that is `factor` times as large.
+fn lattices(grey: &Grid, factor: usize) -> anyhow::Result<Vec<Vec<Crossing>>> {
+    let (width, height) = (grey.width * factor, grey.height * factor);
+    // Pixel centres lie at whole numbers in both.
+    let smaller = |at: f64| (at + 0.5) / factor as f64 - 0.5;
+    let larger = Grid::from_fn(width, height, |x, y| {
+        let (u, v) = (smaller(x as f64).max(0.0), smaller(y as f64).max(0.0));
+        let (u, v) = (u.min((grey.width - 1) as f64), v.min((grey.height - 1) as f64));
+        grey.sample(u, v).unwrap_or(0.0) as f32
+    });
+    let bytes: Vec<u8> = larger.values.iter().map(|value| value.clamp(0.0, 255.0) as u8).collect();
+    let settings = DetectorConfig::chess().with_threshold(CONTRAST);
+    let found = chess_corners::Detector::new(settings)?.detect_u8(&bytes, width as u32, height as u32)?;
+    let crossings: Vec<ChessCorner> = found
+        .iter()
+        .map(|found| {
+            let mut corner = ChessCorner::from_position(Point2::new(found.x, found.y));
+            corner.strength = found.response;
+            for (to, from) in corner.axes.iter_mut().zip(found.axes.iter().flatten()) {
+                (to.angle, to.sigma) = (from.angle, from.sigma);
+            }
+            corner
+        })
+        .collect();
+    let boards = ChessboardDetector::new(ChessboardParams::default())?.detect_all(&crossings);
+    let pixel = |at: &Point2<f32>| [at.x, at.y].map(|v| smaller(f64::from(v)));
+    Ok(boards.iter().map(|b| b.corners.iter().map(|c| ([c.grid.u, c.grid.v], pixel(&c.position))).collect()).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::{Translation3, UnitQuaternion, Vector3};
+
+    const LENS: Lens = Lens { focal: [520.0, 520.0], centre: [319.5, 239.5] };
+
+    /// A picture of the board, every pixel the mean of four rays; the room around is grey.
+    fn picture(board: &Board, camera_from_board: &Isometry3<f64>) -> Pixels {
+        let fields = board.fields();
+        let across = resolve_dictionary(&board.dictionary).expect("a dictionary").marker_size() + 2;
+        let board_from_camera = camera_from_board.inverse();
+        let eye = board_from_camera * Point3::origin();
+        let shade = |u: f64, v: f64| {
+            let ray = Vector3::new((u - LENS.centre[0]) / LENS.focal[0], (v - LENS.centre[1]) / LENS.focal[1], 1.0);
+            let ray = board_from_camera * ray;
+            let at = eye + ray * (-eye.z / ray.z);
+            let [column, row] = [at.x, at.y].map(|v| (v / board.square).floor());
+            let beyond = [column - f64::from(board.squares[0]), row - f64::from(board.squares[1])];
+            if column.min(row) < -1.0 || beyond[0].max(beyond[1]) > 0.0 {
+                return 120.0;
+            }
+            if column.min(row) < 0.0 || beyond[0].max(beyond[1]) >= 0.0 {
+                return 235.0;
+            }
+            // Where in its marker, in fields; beyond it the square is bare.
+            let field = |v: f64| ((v / board.square).fract() - 0.5) * board.square / board.marker + 0.5;
+            let [i, j] = [at.x, at.y].map(|v| (field(v) * across as f64).floor());
+            let marked = i.min(j) >= 0.0 && i.max(j) < across as f64;
+            let number = board.squares[0] as usize * row as usize / 2 + column as usize / 2;
+            let is_light = match (column + row).rem_euclid(2.0) > 0.5 {
+                true if marked => fields[(number * across + j as usize) * across + i as usize].1,
+                is_white => is_white,
+            };
+            if is_light { 235.0 } else { 20.0 }
+        };
+        let halves = [-0.25, 0.25];
+        let grid = Grid::from_fn(640, 480, |x, y| {
+            let rays = halves.iter().flat_map(|dv| halves.iter().map(move |du| (*du, *dv)));
+            rays.map(|(du, dv)| shade(x as f64 + du, y as f64 + dv)).sum::<f64>() as f32 / 4.0
+        });
+        Pixels { size: [640, 480], channels: vec![grid.clone(), grid.clone(), grid] }
+    }
+
+    fn close(board: &str, camera_from_board: &Isometry3<f64>) {
+        let board = Board::parse(board).expect("a board");
+        let found = board.camera_from_board(&[picture(&board, camera_from_board)], &LENS).expect("a pose");
+        let off = (found.translation.vector - camera_from_board.translation.vector).norm();
+        let angle = found.rotation.angle_to(&camera_from_board.rotation);
+        assert!(off < 3e-3 && angle < 0.01, "{off} m and {angle} rad off");
+    }
+
+    fn before(x: f64, y: f64, z: f64, angles: [f64; 3]) -> Isometry3<f64> {
+        let turn = UnitQuaternion::from_euler_angles(angles[0], angles[1], angles[2]);
+        Isometry3::from_parts(Translation3::new(x, y, z), turn)
+    }
+
+    #[test]
+    fn a_board_of_aruco_markers_tells_where_the_camera_stands() {
+        close("5x7,0.04,0.03,DICT_5X5_100", &before(-0.1, -0.12, 0.55, [0.35, -0.2, 0.1]));
+        close("7x5,0.05,0.037,DICT_4X4_50", &before(0.16, -0.12, 0.7, [-0.3, 0.3, 1.4]));
+    }
+
+    #[test]
+    fn a_picture_without_the_board_says_so_and_a_board_that_cannot_be_is_refused() {
+        let board = Board::parse("5x7,0.04,0.03,DICT_5X5_100").expect("a board");
+        let blank = Grid::from_fn(640, 480, |x, y| ((x / 7 + y / 5) % 11) as f32 * 20.0);
+        let blank = Pixels { size: [640, 480], channels: vec![blank] };
+        let error = board.camera_from_board(&[blank], &LENS).expect_err("no board").to_string();
+        assert!(error.contains("5 x 7") && !error.contains('\n'), "{error}");
+        for wrong in [
+            "5x7",
+            "2x7,0.04,0.03,DICT_4X4_50",
+            "5x7,0.03,0.04,DICT_4X4_50",
+            "5x7,0.04,0.03,DICT_9",
+            "50x7,0.04,0.03,DICT_4X4_50",
+        ] {
+            assert!(Board::parse(wrong).is_err(), "{wrong}");
+        }
+    }
+}
