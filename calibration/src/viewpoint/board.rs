@@ -12,8 +12,8 @@ use calib_targets_chessboard::{ChessCorner, ChessboardDetector, ChessboardParams
 use chess_corners::DetectorConfig;
 use nalgebra::{Isometry3, Point2, Point3};
 
-/// The board as OpenCV draws it, the first square black. Its frame: origin at the outer corner of that square, x along
-/// the rows, y down the columns, z into the board.
+/// The board as OpenCV draws it: the first square black, or, of an even number of rows drawn before OpenCV 4.6, white. Its
+/// frame: origin at the outer corner of that square, x along the rows, y down the columns, z into the board.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Board {
     /// Squares in a row and in a column.
@@ -28,6 +28,9 @@ pub struct Board {
 
 /// A crossing of four squares: its place in a lattice that begins anywhere and may be turned, and where it is seen [pixel].
 type Crossing = ([i32; 2], [f64; 2]);
+
+/// Middle of a field of a marker in the board's frame [m], and whether it is light.
+type Field = ([f64; 2], bool);
 
 /// Less of a picture's light and dark at the markers explained by the board there than this, and it is not there: a
 /// lattice laid over other crossings explains next to nothing.
@@ -71,19 +74,23 @@ impl Board {
     /// When no picture shows the board.
     pub fn camera_from_board(&self, pictures: &[Pixels], lens: &Lens) -> anyhow::Result<Isometry3<f64>> {
         let mut best: Option<(f64, Isometry3<f64>)> = None;
+        let [columns, rows] = self.squares;
+        let patterns: Vec<_> =
+            [0, 1][..if rows % 2 == 0 { 2 } else { 1 }].iter().map(|black| self.fields(*black)).collect();
         let enlarged = |picture: &Pixels| ENLARGED.map(|factor| (picture.grey(), factor));
         for (grey, factor) in pictures.iter().flat_map(enlarged) {
             for crossings in lattices(&grey, factor)? {
                 for seen in self.readings(&crossings) {
                     let Some(pose) = planar::pose(&seen, lens) else { continue };
-                    let explained = self.explained(&grey, lens, &pose);
-                    if explained > best.map_or(EXPLAINED, |(most, _)| most) {
-                        best = Some((explained, pose));
+                    for fields in &patterns {
+                        let explained = explained(fields, &grey, lens, &pose);
+                        if explained > best.map_or(EXPLAINED, |(most, _)| most) {
+                            best = Some((explained, pose));
+                        }
                     }
                 }
             }
         }
-        let [columns, rows] = self.squares;
         let (_, pose) = best.with_context(|| {
             format!(
                 "no picture shows the board of {columns} x {rows} squares with {}: check --board and the light",
@@ -93,29 +100,13 @@ impl Board {
         Ok(pose)
     }
 
-    /// How well the board at a pose says which of the markers' fields are light: their correlation, 1 at best.
-    fn explained(&self, grey: &Grid, lens: &Lens, camera_from_board: &Isometry3<f64>) -> f64 {
-        let mut sums = [0.0; 6];
-        for (place, is_light) in self.fields() {
-            let at = camera_from_board * Point3::new(place[0], place[1], 0.0);
-            let [u, v] = lens.project(&at);
-            let Some(seen) = grey.sample(u, v).filter(|_| at.z > 0.0) else { continue };
-            let said = f64::from(u8::from(is_light));
-            let terms = [1.0, said, seen, said * said, said * seen, seen * seen];
-            sums.iter_mut().zip(terms).for_each(|(sum, term)| *sum += term);
-        }
-        let [count, said, seen, said_said, said_seen, seen_seen] = sums;
-        let spread = (count * said_said - said * said) * (count * seen_seen - seen * seen);
-        if spread > 0.0 { (count * said_seen - said * seen) / spread.sqrt() } else { 0.0 }
-    }
-
-    /// Middle of every field of every marker in the board's frame [m], and whether it is light.
-    fn fields(&self) -> Vec<([f64; 2], bool)> {
+    /// Every field of every marker, for a board whose first square is black (0) or white (1).
+    fn fields(&self, first: u32) -> Vec<Field> {
         let Some(dictionary) = resolve_dictionary(&self.dictionary) else { return Vec::new() };
         let fields = dictionary.marker_size() as u32 + 2;
         let [columns, rows] = self.squares;
         let white = (0..rows).flat_map(|row| (0..columns).map(move |column| [column, row]));
-        let white = white.filter(|[column, row]| (column + row) % 2 == 1);
+        let white = white.filter(|[column, row]| (column + row + first) % 2 == 1);
         let mut out = Vec::new();
         for ([column, row], code) in white.zip(dictionary.codes()) {
             for (i, j) in (0..fields).flat_map(|j| (0..fields).map(move |i| (i, j))) {
@@ -155,6 +146,22 @@ impl Board {
     }
 }
 
+/// How well the fields of a board at a pose say what is light and dark there: their correlation, 1 at best.
+fn explained(fields: &[Field], grey: &Grid, lens: &Lens, camera_from_board: &Isometry3<f64>) -> f64 {
+    let mut sums = [0.0; 6];
+    for (place, is_light) in fields {
+        let at = camera_from_board * Point3::new(place[0], place[1], 0.0);
+        let [u, v] = lens.project(&at);
+        let Some(seen) = grey.sample(u, v).filter(|_| at.z > 0.0) else { continue };
+        let said = f64::from(u8::from(*is_light));
+        let terms = [1.0, said, seen, said * said, said * seen, seen * seen];
+        sums.iter_mut().zip(terms).for_each(|(sum, term)| *sum += term);
+    }
+    let [count, said, seen, said_said, said_seen, seen_seen] = sums;
+    let spread = (count * said_said - said * said) * (count * seen_seen - seen * seen);
+    if spread > 0.0 { (count * said_seen - said * seen) / spread.sqrt() } else { 0.0 }
+}
+
 /// The chessboards that a picture shows, looked for in one that is `factor` times as large.
 fn lattices(grey: &Grid, factor: usize) -> anyhow::Result<Vec<Vec<Crossing>>> {
     let (width, height) = (grey.width * factor, grey.height * factor);
@@ -192,8 +199,8 @@ mod tests {
     const LENS: Lens = Lens { focal: [520.0, 520.0], centre: [319.5, 239.5] };
 
     /// A picture of the board, every pixel the mean of four rays; the room around is grey.
-    fn picture(board: &Board, camera_from_board: &Isometry3<f64>) -> Pixels {
-        let fields = board.fields();
+    fn picture(board: &Board, first: u32, camera_from_board: &Isometry3<f64>) -> Pixels {
+        let fields = board.fields(first);
         let across = resolve_dictionary(&board.dictionary).expect("a dictionary").marker_size() + 2;
         let board_from_camera = camera_from_board.inverse();
         let eye = board_from_camera * Point3::origin();
@@ -213,8 +220,9 @@ mod tests {
             let field = |v: f64| ((v / board.square).fract() - 0.5) * board.square / board.marker + 0.5;
             let [i, j] = [at.x, at.y].map(|v| (field(v) * across as f64).floor());
             let marked = i.min(j) >= 0.0 && i.max(j) < across as f64;
-            let number = board.squares[0] as usize * row as usize / 2 + column as usize / 2;
-            let is_light = match (column + row).rem_euclid(2.0) > 0.5 {
+            let before = board.squares[0] as usize * row as usize + first as usize;
+            let number = before / 2 + column as usize / 2;
+            let is_light = match (column + row + f64::from(first)).rem_euclid(2.0) > 0.5 {
                 true if marked => fields[(number * across + j as usize) * across + i as usize].1,
                 is_white => is_white,
             };
@@ -228,9 +236,9 @@ mod tests {
         Pixels { size: [640, 480], channels: vec![grid.clone(), grid.clone(), grid] }
     }
 
-    fn close(board: &str, camera_from_board: &Isometry3<f64>) {
+    fn close(board: &str, first: u32, camera_from_board: &Isometry3<f64>) {
         let board = Board::parse(board).expect("a board");
-        let found = board.camera_from_board(&[picture(&board, camera_from_board)], &LENS).expect("a pose");
+        let found = board.camera_from_board(&[picture(&board, first, camera_from_board)], &LENS).expect("a pose");
         let off = (found.translation.vector - camera_from_board.translation.vector).norm();
         let angle = found.rotation.angle_to(&camera_from_board.rotation);
         assert!(off < 3e-3 && angle < 0.01, "{off} m and {angle} rad off");
@@ -243,8 +251,9 @@ mod tests {
 
     #[test]
     fn a_board_of_aruco_markers_tells_where_the_camera_stands() {
-        close("5x7,0.04,0.03,DICT_5X5_100", &before(-0.1, -0.12, 0.55, [0.35, -0.2, 0.1]));
-        close("7x5,0.05,0.037,DICT_4X4_50", &before(0.16, -0.12, 0.7, [-0.3, 0.3, 1.4]));
+        close("5x7,0.04,0.03,DICT_5X5_100", 0, &before(-0.1, -0.12, 0.55, [0.35, -0.2, 0.1]));
+        close("7x5,0.05,0.037,DICT_4X4_50", 0, &before(0.16, -0.12, 0.7, [-0.3, 0.3, 1.4]));
+        close("4x6,0.05,0.04,DICT_5X5_50", 1, &before(-0.1, -0.12, 0.6, [0.2, 0.3, 0.1]));
     }
 
     #[test]
