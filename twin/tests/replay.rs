@@ -4,7 +4,7 @@ use shared_mem::cell::{Cell, ClipEntry, ClipKind};
 use shared_mem::msg::arm::ArmState;
 use shared_mem::msg::joints_from;
 use shared_mem::msg::object::ObjectPose;
-use shared_mem::recording::{Clip, ClipInfo, ClipWriter, JointSeries, read_clip};
+use shared_mem::recording::{Clip, ClipInfo, ClipMessages, ClipWriter, JointSeries, Payload, read_clip};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 use twin::replay::Replayer;
@@ -160,6 +160,19 @@ fn a_simulated_clip_is_written_and_reads_back_as_the_recording() {
     let [recorded, written] =
         [&path.join("b.mcap"), &out].map(|file| read_clip(file, ClipKind::Excitation, &cell).expect("a clip"));
     assert_eq!((written.measured.q, written.desired.q), (recorded.measured.q, recorded.desired.q));
+    let (mut real, mut twin_s) = (Vec::new(), Vec::new());
+    for message in ClipMessages::open(&out, &[]).expect("a clip") {
+        match message.expect("a message").payload {
+            Payload::ArmState(state) => real.push(state.tau_J),
+            Payload::TwinState(state) => twin_s.push(state.tau_J),
+            _ => {}
+        }
+    }
+    assert!(real.len() > 1000 && real.len() == twin_s.len(), "{} and {}", real.len(), twin_s.len());
+    for (real, twin) in real.iter().zip(&twin_s).skip(1) {
+        let apart = real.iter().zip(twin).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        assert!(apart < 0.05 && twin[1].abs() > 1.0, "the arm's weight and motion: {real:?}, {twin:?}");
+    }
     let again = twin(&[text(&path.join("b.mcap")), "--out", text(&out)]);
     assert_eq!(again.status.code(), Some(1), "an existing clip is not overwritten");
 }

@@ -6,7 +6,7 @@ use super::report::{ClipGap, Gap};
 use crate::arm::{ArmModel, JointState};
 use crate::effects::CameraEffects;
 use crate::metrics::{SurfacePoints, joint_rms};
-use crate::rollout::{CellRollout, CellTrace, CommandTrack, Course, Hole, ObjectState};
+use crate::rollout::{CellRollout, CellTrace, CommandTrack, Course, Hole, ObjectState, Reading};
 use crate::scene::{MeshFileError, ObjectModel};
 use crate::sim::SimError;
 use shared_mem::cell::{Cell, ClipKind};
@@ -28,8 +28,8 @@ pub struct Replayer {
 /// What the twin did under the commands of a clip.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Prediction {
-    /// Joint states, one for each measured row. Empty without an arm.
-    pub joints: Vec<JointState>,
+    /// What the arm's sensors read, one for each measured row. Empty without an arm.
+    pub joints: Vec<Reading>,
     /// Object poses, one for each recorded pose. Empty where the object was not simulated.
     pub object: Vec<Pose<Base, Object>>,
     /// From the first measured row to the first touch of tool and object [s]; `None` when they did not touch.
@@ -166,8 +166,12 @@ impl Replayer {
         }
         rollout.run(&course, &mut trace);
         let contact_time = trace.contact.map(|contact| seconds_between(stamps_ns[0], contact.start_ns));
-        let joints = trace.joints.iter().map(|reading| reading.state).collect();
-        Ok(Prediction { joints, object: trace.poses, contact_time, warnings: hole_warnings(clip, &commands) })
+        Ok(Prediction {
+            joints: trace.joints,
+            object: trace.poses,
+            contact_time,
+            warnings: hole_warnings(clip, &commands),
+        })
     }
 
     fn object_alone(&self, clip: &Clip) -> Result<Prediction, ReplayError> {
@@ -194,7 +198,8 @@ impl Replayer {
 
     fn gap(&self, clip: &Clip, prediction: &Prediction) -> Gap {
         let dof = clip.measured.dof;
-        let joints = || joint_rms(&prediction.joints, &clip.measured.q, dof)[..dof].to_vec();
+        let states: Vec<JointState> = prediction.joints.iter().map(|reading| reading.state).collect();
+        let joints = || joint_rms(&states, &clip.measured.q, dof)[..dof].to_vec();
         let poses = || prediction.object.iter().zip(&clip.object.poses);
         let surface = self.surface().filter(|_| poses().len() > 0);
         let mean = |distance: Distance| {

@@ -1,7 +1,7 @@
 //! A simulated clip on disk: what was recorded, what the twin did, and the gap between them, on the clip's own stamps.
 
 use super::predict::{Prediction, Replayer};
-use crate::arm::{JointState, Joints, MAX_JOINTS};
+use crate::arm::{Joints, MAX_JOINTS};
 use shared_mem::msg::arm::ArmState;
 use shared_mem::msg::joints_from;
 use shared_mem::msg::object::ObjectPose;
@@ -101,8 +101,8 @@ impl Simulated<'_> {
         let cycle = row.unwrap_or(self.pose) as u64;
         let dof = u32::try_from(self.clip.measured.dof).unwrap_or(0);
         let mut state = TwinState { stamp_ns, mirrors_ns: stamp_ns, cycle, dof, ..TwinState::default() };
-        if let Some(JointState { q, dq }) = row.and_then(|row| self.prediction.joints.get(row)) {
-            (state.q, state.dq) = (*q, *dq);
+        if let Some(twin) = row.and_then(|row| self.prediction.joints.get(row)) {
+            (state.q, state.dq, state.tau_J) = (twin.state.q, twin.state.dq, twin.tau_J);
         }
         let mut gap =
             TwinGap { stamp_ns, cycle, dof, alignments: 1, joint_error: error, joint_rms: rms, ..TwinGap::default() };
@@ -143,7 +143,7 @@ impl Simulated<'_> {
         let rows = self.prediction.joints.iter().enumerate();
         rows.map(|(row, twin)| {
             let real = joints_from(self.clip.measured.q_row(row));
-            std::array::from_fn(|joint| twin.q[joint] - real[joint])
+            std::array::from_fn(|joint| twin.state.q[joint] - real[joint])
         })
         .collect()
     }
