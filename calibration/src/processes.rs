@@ -44,24 +44,26 @@ pub enum ProcessError {
         source: std::io::Error,
     },
     /// It ended by itself, or with a failure.
-    #[error("`{name}` ended with {status}; it last said:\n{tail}")]
+    #[error("`{name}` ended with {status}{words}")]
     Ended {
         /// The program and its verb.
         name: String,
         /// How.
         status: ExitStatus,
-        /// Its last lines on stderr, indented.
-        tail: String,
+        /// Its last words on stderr in a line, after a colon; empty where there are none worth telling.
+        words: String,
+        /// What it wrote to stdout.
+        answer: String,
     },
     /// It did not end in time and was killed.
-    #[error("`{name}` did not end within {} s and was killed; it last said:\n{tail}", waited.as_secs())]
+    #[error("`{name}` did not end within {} s and was killed{words}", waited.as_secs())]
     Stuck {
         /// The program and its verb.
         name: String,
         /// How long it was waited for.
         waited: Duration,
-        /// Its last lines on stderr, indented.
-        tail: String,
+        /// As of [`ProcessError::Ended`].
+        words: String,
     },
 }
 
@@ -160,7 +162,7 @@ impl Running {
     pub fn check(&mut self) -> Result<(), ProcessError> {
         match self.poll() {
             None => Ok(()),
-            Some(status) => Err(self.ended(status)),
+            Some(status) => Err(self.ended(status, String::new())),
         }
     }
 
@@ -190,12 +192,12 @@ impl Running {
             }
             if start.elapsed() > patience {
                 self.kill();
-                return Err(ProcessError::Stuck { name: self.name.clone(), waited: patience, tail: self.tail() });
+                return Err(ProcessError::Stuck { name: self.name.clone(), waited: patience, words: self.words() });
             }
             std::thread::sleep(LOOK);
         };
         let answer = self.answer.take().and_then(|reader| reader.join().ok()).unwrap_or_default();
-        if status.success() { Ok(answer) } else { Err(self.ended(status)) }
+        if status.success() { Ok(answer) } else { Err(self.ended(status, answer)) }
     }
 
     fn poll(&mut self) -> Option<ExitStatus> {
@@ -220,18 +222,18 @@ impl Running {
         let _ = self.child.wait();
     }
 
-    fn ended(&self, status: ExitStatus) -> ProcessError {
+    fn ended(&self, status: ExitStatus, answer: String) -> ProcessError {
         // The reader of stderr may be a moment behind the end of the process.
         std::thread::sleep(LOOK);
-        ProcessError::Ended { name: self.name.clone(), status, tail: self.tail() }
+        ProcessError::Ended { name: self.name.clone(), status, words: self.words(), answer }
     }
 
-    fn tail(&self) -> String {
+    /// The last line that tells of trouble: a log of what went well explains no end.
+    fn words(&self) -> String {
         let lines = self.tail.lock().unwrap_or_else(PoisonError::into_inner);
-        if lines.is_empty() {
-            return "  (nothing)".into();
-        }
-        lines.iter().map(|line| format!("  {line}")).collect::<Vec<_>>().join("\n")
+        let is_trouble = |line: &&String| !line.trim().is_empty() && !line.contains(" INFO ");
+        let last = lines.iter().rfind(is_trouble);
+        last.map_or(String::new(), |line| format!(": {}", line.trim().trim_start_matches("error: ")))
     }
 }
 
@@ -273,6 +275,14 @@ mod tests {
     fn the_last_words_of_a_child_that_fails_are_quoted() {
         let error = shell("echo cannot open the robot >&2; exit 1").finish(GRACE, || false).unwrap_err().to_string();
         assert!(error.contains("exit status: 1") && error.contains("cannot open the robot"), "{error}");
+    }
+
+    #[test]
+    fn a_child_that_fails_leaves_its_answer_and_its_trouble_in_a_line() {
+        let script = "echo kept; echo '12:00 INFO all is well' >&2; echo 'error: no room' >&2; echo '12:01  INFO bye' >&2; exit 1";
+        let ended = shell(script).finish(GRACE, || false).unwrap_err();
+        assert!(ended.to_string().ends_with(": no room"), "{ended}");
+        assert!(matches!(ended, ProcessError::Ended { answer, .. } if answer == "kept\n"));
     }
 
     #[test]

@@ -11,7 +11,7 @@ use super::quality::{Quality, Verdict, Watch};
 use super::recorder::Recorder;
 use super::session::Session;
 use super::stream::{Motion, Outcome, play};
-use super::task::{Summary, Task};
+use super::task::{Summary, Task, cause};
 use super::way::Ways;
 use crate::interrupt::Interrupt;
 use crate::progress::Progress;
@@ -93,8 +93,7 @@ pub fn capture(options: &Options, interrupt: &Interrupt) -> anyhow::Result<Summa
     let mut desk = Desk { options, cell: &cell, size, body: &body, limits: &limits, session, interrupt };
     let clips = match desk.clips(&mut link, &mut object) {
         Ok(clips) => clips,
-        // A bridge that died says more than the silence it leaves.
-        Err(error) => return Err(bridge.check().err().map_or(error, anyhow::Error::from)),
+        Err(error) => return Err(cause(error, &mut bridge)),
     };
     let own_bridge = bridge.is_own();
     bridge.stop()?;

@@ -8,7 +8,7 @@ use super::quality::{Quality, Verdict, Watch};
 use super::recorder::{Recorded, Recorder};
 use super::session::Session;
 use super::stream::{Outcome, play};
-use super::task::{Summary, Task};
+use super::task::{Summary, Task, cause};
 use crate::interrupt::Interrupt;
 use crate::progress::Progress;
 use serde::Serialize;
@@ -79,8 +79,7 @@ pub fn capture(
         let count = 1 + clips.iter().filter(|clip| !clip.paused).count();
         let clip = match desk.clip(&mut link, &format!("clip {count} of {}", task.clips), note) {
             Ok(clip) => clip,
-            // A bridge that died says more than the silence it leaves.
-            Err(error) => return Err(bridge.check().err().map_or(error, anyhow::Error::from)),
+            Err(error) => return Err(cause(error, &mut bridge)),
         };
         clips.extend(clip);
     }

@@ -36,6 +36,16 @@ pub struct Summary<Clip> {
     pub own_bridge: bool,
 }
 
+/// Why a capture failed: a bridge that died says more than the silence it leaves.
+pub fn cause(error: anyhow::Error, bridge: &mut Bridge) -> anyhow::Error {
+    match bridge.check() {
+        Ok(()) => error,
+        Err(ended) => anyhow::anyhow!(
+            "{ended}; what was recorded is kept: to go on, start the same command again, and the session is continued"
+        ),
+    }
+}
+
 impl Task {
     /// The bridge that runs, or one that is started for this task.
     ///
