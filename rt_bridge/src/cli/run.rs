@@ -33,7 +33,8 @@ pub(super) struct RunArguments {
     #[arg(long, value_name = "ARM")]
     arm: ArmChoice,
     /// Who computes the torque: the bridge (joint impedance with the gains of cell.toml) or the arm's own controller.
-    /// Default: torque_pd, and joint_impedance where cell.toml describes a servo
+    /// Default: torque_pd, and joint_impedance where cell.toml describes a servo or the simulated arm hides something in its
+    /// own controller: gains, command_delay, command_lag
     #[arg(long)]
     controller: Option<ControllerChoice>,
     /// sim, realsense, bag://FILE.bag (a recording by librealsense), replay or off.

@@ -23,7 +23,7 @@ use std::path::PathBuf;
 use std::str::FromStr;
 use std::time::{SystemTime, UNIX_EPOCH};
 use twin::arm::{ArmModel, ControlLaw};
-use twin::effects::CameraEffects;
+use twin::effects::{CameraEffects, Place, find};
 use twin::scene::SceneSnapshot;
 
 /// Which arm.
@@ -142,15 +142,16 @@ impl Pictures {
 impl Devices {
     pub(super) fn open(settings: &Settings, cell: &Cell) -> Result<Self> {
         let model = ArmModel::from_cell(cell)?;
-        let plan = plan(settings, cell, &model)?;
         if settings.arm != ArmChoice::Sim && (settings.effects.is_some() || settings.parameters.is_some()) {
             bail!("--effects and --parameters change the simulated cell only; use them with --arm sim");
         }
+        let hidden = hidden(settings)?;
+        let plan = plan(settings, cell, &model, hidden.as_ref())?;
         let camera = settings.camera(cell)?;
         let tracker = settings.tracker(cell)?;
         let devices = match &settings.arm {
             ArmChoice::Sim => {
-                let (world, arm, views) = World::start(cell, hidden(settings, plan.interface)?.as_ref())?;
+                let (world, arm, views) = World::start(cell, hidden.as_ref())?;
                 if tracker == TrackerChoice::Rgbd
                     && let [name, ..] = views.camera_effects.of_the_tracker()[..]
                 {
@@ -194,29 +195,38 @@ impl Devices {
 }
 
 /// Parameters and effects of the simulated cell, which nobody else is told.
-fn hidden(settings: &Settings, interface: CommandInterface) -> Result<Option<Theta>> {
+fn hidden(settings: &Settings) -> Result<Option<Theta>> {
     let mut theta = settings.parameters.as_deref().map(Theta::read).transpose()?;
     if let Some(path) = &settings.effects {
         let effects = Theta::read(path)?.effects;
         theta.get_or_insert_default().effects.extend(effects);
     }
-    if interface == CommandInterface::Torque && theta.as_ref().is_some_and(|theta| theta.arm.is_some()) {
-        tracing::warn!(
-            "the gains in --parameters are those of the arm's own controller, which does not act: add --controller joint_impedance"
-        );
-    }
     Ok(theta)
 }
 
-fn plan(settings: &Settings, cell: &Cell, model: &ArmModel) -> Result<Plan> {
+/// What of `hidden` acts in the arm's own controller or on the way there: where the bridge computes the torque, nothing shows it.
+fn inside_the_controller(hidden: &Theta) -> Option<&str> {
+    let on_the_way = |name: &&str| find(name).is_some_and(|effect| effect.acts_on == Place::CommandPath);
+    let gains = hidden.arm.as_ref().map(|_| "the controller's gains in --parameters");
+    gains.or_else(|| hidden.effects.iter().map(|effect| effect.name.as_str()).find(on_the_way))
+}
+
+fn plan(settings: &Settings, cell: &Cell, model: &ArmModel, hidden: Option<&Theta>) -> Result<Plan> {
     let servo = cell.controller.as_ref().is_some_and(|c| c.kind == ControllerKind::JointPd);
     let replay = matches!(settings.arm, ArmChoice::Replay(_));
+    let inside = hidden.and_then(inside_the_controller);
+    if let (Some(what), Some(ControllerChoice::TorquePd)) = (inside, settings.controller) {
+        bail!(
+            "{what}: that acts in the arm's own controller, and --controller torque_pd has the bridge compute the torque; use \
+             --controller joint_impedance"
+        );
+    }
     let torque = match settings.controller {
         Some(ControllerChoice::TorquePd) if servo => bail!(
             "[controller] in cell.toml is a servo (joint_pd), which computes its own torque; use --controller joint_impedance"
         ),
         Some(choice) => choice == ControllerChoice::TorquePd,
-        None => !servo,
+        None => !servo && inside.is_none(),
     };
     let law = match torque && !replay {
         true => Some(TorquePd::new(&ControlLaw::new(cell.controller.as_ref(), None, model)?, model.clone())),
@@ -245,6 +255,18 @@ mod tests {
         for wrong in ["", "fci://", "simulated", "tcp://x"] {
             assert!(wrong.parse::<ArmChoice>().is_err(), "{wrong}");
         }
+    }
+
+    #[test]
+    fn what_is_hidden_in_the_arms_own_controller_is_told_from_what_any_controller_shows() {
+        let inside = |text: &str| {
+            let theta = shared_mem::toml_file::parse(text, "hidden.toml".as_ref()).expect("a theta.toml");
+            inside_the_controller(&theta).map(str::to_owned)
+        };
+        let delay = "[[effect]]\nname = \"payload\"\nmass = 0.3\n[[effect]]\nname = \"command_delay\"\ndelay = 0.012\n";
+        assert_eq!(inside(delay).as_deref(), Some("command_delay"));
+        assert!(inside("[arm]\nstiffness = [500.0]\ndamping = [40.0]\n").is_some_and(|what| what.contains("gains")));
+        assert_eq!(inside("[[effect]]\nname = \"torque_delay\"\ndelay = 0.002\n[object]\nmass = 0.3\n"), None);
     }
 
     #[test]

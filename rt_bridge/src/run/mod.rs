@@ -53,7 +53,8 @@ pub struct Settings {
     pub cell: PathBuf,
     /// The arm.
     pub arm: ArmChoice,
-    /// Who computes the torque; none: the bridge for `joint_impedance`, the arm itself for a servo.
+    /// Who computes the torque; none: the bridge for `joint_impedance`, the arm itself for a servo and where the simulated
+    /// arm hides something in its own controller.
     pub controller: Option<ControllerChoice>,
     /// The camera; none: simulated with the simulated arm where cell.toml has a `[camera]`, the recording's with a
     /// recording, else off.
