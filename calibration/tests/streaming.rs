@@ -4,7 +4,8 @@ mod fake_bridge;
 
 use calibration::capture::link::{Link, LinkError};
 use calibration::capture::plan::Plan;
-use calibration::capture::stream::{Outcome, StreamError, play};
+use calibration::capture::recovery::Recovery;
+use calibration::capture::stream::{Motion, Outcome, StreamError, play};
 use calibration::interrupt::Interrupt;
 use fake_bridge::{FakeBridge, Fault};
 use shared_mem::msg::arm::ArmMode;
@@ -95,6 +96,51 @@ fn a_robot_in_reflex_is_not_moved_and_the_remedy_is_named() {
     let error = attempt("reflex", ArmMode::Reflex, Fault::None, 600).unwrap_err();
     assert!(matches!(error, StreamError::Link(LinkError::NotReady { .. })), "{error}");
     assert!(error.to_string().contains("recover"), "{error}");
+}
+
+#[test]
+fn a_robot_that_stops_itself_is_recovered_a_few_times_and_no_more() {
+    let domain = domain("recovery");
+    let _bridge = FakeBridge::start(&domain, ArmMode::Move, START, Fault::ReflexAfter(300));
+    let mut link = Link::open(Some(&domain)).expect("shared memory");
+    let (mut recovery, interrupt) = (Recovery::default(), Interrupt::default());
+    assert!(!recovery.settle(&mut link, &interrupt).expect("nothing to settle"));
+    for _ in 0..3 {
+        stops_itself(&mut link, &mut recovery);
+        assert!(recovery.settle(&mut link, &interrupt).expect("recovered"));
+    }
+    stops_itself(&mut link, &mut recovery);
+    let error = recovery.settle(&mut link, &interrupt).expect_err("too often").to_string();
+    assert!(error.contains("cartesian_reflex") && error.contains("session is continued"), "{error}");
+}
+
+#[test]
+fn a_robot_that_a_person_stopped_or_whose_run_was_ended_is_not_recovered() {
+    let domain = domain("stopped");
+    let _bridge = FakeBridge::start(&domain, ArmMode::Move, START, Fault::ReflexAfter(300));
+    let mut link = Link::open(Some(&domain)).expect("shared memory");
+    let (mut recovery, interrupt) = (Recovery::default(), Interrupt::default());
+    stops_itself(&mut link, &mut recovery);
+    interrupt.ask();
+    assert!(!recovery.settle(&mut link, &interrupt).expect("ended"));
+    assert!(matches!(link.ready_state(), Err(LinkError::NotReady { .. })), "still in its reflex");
+
+    let domain = self::domain("button");
+    let _bridge = FakeBridge::start(&domain, ArmMode::UserStopped, START, Fault::None);
+    let mut link = Link::open(Some(&domain)).expect("shared memory");
+    assert!(link.wait_for_bridge(Duration::from_secs(5), || false).expect("shared memory").is_some());
+    let error = link.recover().expect_err("a person's stop is a person's to lift").to_string();
+    assert!(error.contains("stop button"), "{error}");
+}
+
+fn stops_itself(link: &mut Link, recovery: &mut Recovery) {
+    let from = link.ready_state().expect("a robot that is well").q_d;
+    let set_points = vec![SetPoint { q_d: from, dq_d: [0.0; 8] }; 600];
+    let motion = Motion { set_points: &set_points, dof: 7 };
+    let outcome = play(link, motion, &Interrupt::default(), |_| {}).expect("a reflex is no error");
+    assert_eq!(outcome, Outcome::Reflex);
+    recovery.note(outcome, link).expect("shared memory");
+    assert_eq!(recovery.reason().as_deref(), Some("the robot stopped itself (cartesian_reflex)"));
 }
 
 /// Plays a long motion and interrupts it at its five hundredth state.

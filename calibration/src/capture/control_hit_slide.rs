@@ -9,6 +9,7 @@ use super::plan::RATE;
 use super::program::{Next, Program, Wish};
 use super::quality::{Quality, Verdict, Watch};
 use super::recorder::Recorder;
+use super::recovery::Recovery;
 use super::session::Session;
 use super::stream::{Motion, Outcome, play};
 use super::task::{Summary, Task, cause};
@@ -57,6 +58,8 @@ pub struct ClipSummary {
     pub why: Option<String>,
     /// `true`: the user paused it, so another takes its place.
     pub paused: bool,
+    /// `true`: the robot stopped itself, so another takes its place.
+    pub reflex: bool,
     /// Direction of the stroke [rad].
     pub heading: f64,
     /// Speed of the hit that was commanded [m/s].
@@ -90,7 +93,8 @@ pub fn capture(options: &Options, interrupt: &Interrupt) -> anyhow::Result<Summa
     let mut object = ObjectWatch::open(domain)?;
     let mut bridge = task.bridge(&mut link, interrupt)?;
     let limits = limits::of(&cell, &body);
-    let mut desk = Desk { options, cell: &cell, size, body: &body, limits: &limits, session, interrupt };
+    let recovery = Recovery::default();
+    let mut desk = Desk { options, cell: &cell, size, body: &body, limits: &limits, session, interrupt, recovery };
     let clips = match desk.clips(&mut link, &mut object) {
         Ok(clips) => clips,
         Err(error) => return Err(cause(error, &mut bridge)),
@@ -121,6 +125,7 @@ struct Desk<'a> {
     limits: &'a [JointLimits],
     session: Session,
     interrupt: &'a Interrupt,
+    recovery: Recovery,
 }
 
 impl Desk<'_> {
@@ -146,11 +151,13 @@ impl Desk<'_> {
                 break;
             }
             let title = format!("clip {} of {wanted}", kept + 1);
-            let Some(clip) = self.clip(link, object, &next, &title)? else { continue };
-            clips.push(clip);
+            let clip = self.clip(link, object, &next, &title)?;
+            let is_under_way = self.recovery.settle(link, self.interrupt)? || clip.is_some();
+            clips.extend(clip);
             self.interrupt.wait_out_pause();
-            if !self.interrupt.asked() {
+            if is_under_way && !self.interrupt.asked() {
                 self.step_back(link, object, next.stroke.heading, &title)?;
+                self.recovery.settle(link, self.interrupt)?;
             }
         }
         Ok(clips)
@@ -177,7 +184,7 @@ impl Desk<'_> {
         }
     }
 
-    /// One clip. `None`: ended or paused before anything was recorded.
+    /// One clip. `None`: ended, paused or stopped by the robot before anything was recorded.
     fn clip(
         &mut self,
         link: &mut Link,
@@ -205,6 +212,7 @@ impl Desk<'_> {
         let why = match (outcome, &recorded.stopped, quality.verdict(peak), rested) {
             (Outcome::Stopped, ..) | (_, _, _, Ok(None)) => Some("it was ended by the user".to_owned()),
             (Outcome::Paused, ..) => Some("it was paused by the user".to_owned()),
+            (Outcome::Reflex, ..) => self.recovery.reason(),
             (_, Some(why), ..) => Some(why.clone()),
             (_, _, Verdict::Repeat(why), _) => Some(why),
             (_, _, _, Err(error)) => Some(error.to_string()),
@@ -218,6 +226,7 @@ impl Desk<'_> {
             kept: why.is_none(),
             why,
             paused: outcome == Outcome::Paused,
+            reflex: outcome == Outcome::Reflex,
             heading: next.stroke.heading,
             speed: next.stroke.speed,
             offset: next.stroke.offset,
@@ -231,7 +240,13 @@ impl Desk<'_> {
     }
 
     /// Away from what was struck, from wherever the stroke ended.
-    fn step_back(&self, link: &mut Link, object: &mut ObjectWatch, heading: f64, title: &str) -> anyhow::Result<()> {
+    fn step_back(
+        &mut self,
+        link: &mut Link,
+        object: &mut ObjectWatch,
+        heading: f64,
+        title: &str,
+    ) -> anyhow::Result<()> {
         let away = self.ways().away(&link.ready_state()?.q_d, heading)?;
         self.play(link, object, &away, &format!("{title}: retreat")).map(drop)
     }
@@ -242,7 +257,7 @@ impl Desk<'_> {
     }
 
     fn play(
-        &self,
+        &mut self,
         link: &mut Link,
         object: &mut ObjectWatch,
         set_points: &[SetPoint],
@@ -260,6 +275,7 @@ impl Desk<'_> {
             }
         })?;
         looked?;
+        self.recovery.note(outcome, link)?;
         Ok((outcome, watch.quality()))
     }
 }

@@ -1,23 +1,29 @@
 //! The verb `capture excitation`: for each clip plan, record, play, judge, enter into the session.
 
 use super::body::Body;
-use super::limits;
+use super::limits::{self, first_excess};
 use super::link::Link;
 use super::plan::{Plan, RATE, Request, plan};
 use super::quality::{Quality, Verdict, Watch};
 use super::recorder::{Recorded, Recorder};
+use super::recovery::Recovery;
 use super::session::Session;
-use super::stream::{Outcome, play};
+use super::stream::{Motion, Outcome, play};
 use super::task::{Summary, Task, cause};
+use super::transit;
 use crate::interrupt::Interrupt;
 use crate::progress::Progress;
 use serde::Serialize;
 use shared_mem::cell::{Cell, ClipKind};
+use shared_mem::msg::Joints;
+use shared_mem::msg::motion::SetPoint;
 use std::path::{Path, PathBuf};
 use twin::arm::JointLimits;
 
 /// Flange and tool stay this far above table and object [m]: about twice what a loosely tuned arm strays.
 const CLEARANCE: f64 = 0.05;
+/// Share of a transit's usual speed on the way back after a reflex.
+const BACK_PACE: f64 = 0.3;
 
 /// What is asked for.
 #[derive(Debug, Clone)]
@@ -43,6 +49,8 @@ pub struct ClipSummary {
     pub why: Option<String>,
     /// `true`: the user paused it, so another takes its place.
     pub paused: bool,
+    /// `true`: the robot stopped itself, so another takes its place.
+    pub reflex: bool,
     /// Largest excursion of each joint [rad].
     pub amplitude: Vec<f64>,
     /// What was seen on the way.
@@ -69,14 +77,15 @@ pub fn capture(
     let session = Session::open(&task.out, &cell)?;
     let mut link = Link::open(task.domain.as_deref())?;
     let mut bridge = task.bridge(&mut link, interrupt)?;
-    let mut desk = Desk { options, limits: limits::of(&cell, &body), body, floor: floor(&cell), session, interrupt };
+    let (limits, floor, recovery) = (limits::of(&cell, &body), floor(&cell), Recovery::default());
+    let mut desk = Desk { options, limits, body, floor, session, interrupt, recovery };
     let mut clips = Vec::new();
-    while clips.iter().filter(|clip: &&ClipSummary| !clip.paused).count() < task.clips as usize {
+    loop {
         interrupt.wait_out_pause();
-        if interrupt.asked() {
+        let count = 1 + clips.iter().filter(|clip: &&ClipSummary| !clip.paused && !clip.reflex).count();
+        if interrupt.asked() || count > task.clips as usize {
             break;
         }
-        let count = 1 + clips.iter().filter(|clip| !clip.paused).count();
         let clip = match desk.clip(&mut link, &format!("clip {count} of {}", task.clips), note) {
             Ok(clip) => clip,
             Err(error) => return Err(cause(error, &mut bridge)),
@@ -104,6 +113,7 @@ struct Desk<'a> {
     floor: f64,
     session: Session,
     interrupt: &'a Interrupt,
+    recovery: Recovery,
 }
 
 impl Desk<'_> {
@@ -129,6 +139,7 @@ impl Desk<'_> {
         let why = match (outcome, &recorded.stopped, quality.verdict(plan.peak_speed)) {
             (Outcome::Stopped, ..) => Some("it was ended by the user".to_owned()),
             (Outcome::Paused, ..) => Some("it was paused by the user".to_owned()),
+            (Outcome::Reflex, ..) => self.recovery.reason(),
             (Outcome::Done, Some(why), _) => Some(why.clone()),
             (Outcome::Done, None, Verdict::Repeat(why)) => Some(why),
             (Outcome::Done, None, Verdict::Keep) => None,
@@ -136,10 +147,32 @@ impl Desk<'_> {
         if why.is_none() {
             self.session.enter(&file, ClipKind::Excitation)?;
         }
-        let paused = outcome == Outcome::Paused;
-        let clip = ClipSummary { paused, ..summary(file, why, plan, quality, &recorded) };
+        let [paused, reflex] = [outcome == Outcome::Paused, outcome == Outcome::Reflex];
+        let begin = plan.set_points[0].q_d;
+        let clip = ClipSummary { paused, reflex, ..summary(file, why, plan, quality, &recorded) };
         eprintln!("{}", clip.line());
+        if self.recovery.settle(link, self.interrupt)? {
+            self.go_back(link, &begin)?;
+        }
         Ok(Some(clip))
+    }
+
+    /// After a reflex: calmly back to where the clip began. Where no way is free, the next clip begins here.
+    fn go_back(&mut self, link: &mut Link, begin: &Joints) -> anyhow::Result<()> {
+        let from = link.ready_state()?.q_d;
+        let way = transit::plan(&from, begin, &self.limits, BACK_PACE).filter(|way| {
+            let is_low = |point: &SetPoint| self.body.lowest_point(&point.q_d) < self.floor;
+            first_excess(way, &self.limits, Some(&self.body)).is_none() && !way.iter().any(is_low)
+        });
+        let Some(set_points) = way else {
+            eprintln!("no free way back to where the clip began: the next one begins here");
+            return Ok(());
+        };
+        let motion = Motion { set_points: &set_points, dof: self.limits.len() };
+        let outcome = play(link, motion, self.interrupt, |_| {})?;
+        self.recovery.note(outcome, link)?;
+        self.recovery.settle(link, self.interrupt)?;
+        Ok(())
     }
 
     /// Plans around the pose that the arm is commanded to hold, and says what had to give.
@@ -159,7 +192,7 @@ impl Desk<'_> {
     }
 
     fn play(
-        &self,
+        &mut self,
         link: &mut Link,
         plan: &Plan,
         title: &str,
@@ -173,6 +206,7 @@ impl Desk<'_> {
                 progress.show(u64::from(state.motion_played), &note());
             }
         })?;
+        self.recovery.note(outcome, link)?;
         Ok((outcome, watch.quality()))
     }
 }
@@ -186,7 +220,17 @@ fn kept_unfinished(path: &Path) -> String {
 
 fn summary(file: PathBuf, why: Option<String>, plan: Plan, quality: Quality, recorded: &Recorded) -> ClipSummary {
     let Recorded { messages, bytes, .. } = *recorded;
-    ClipSummary { file, kept: why.is_none(), why, paused: false, amplitude: plan.amplitude, quality, messages, bytes }
+    ClipSummary {
+        file,
+        kept: why.is_none(),
+        why,
+        paused: false,
+        reflex: false,
+        amplitude: plan.amplitude,
+        quality,
+        messages,
+        bytes,
+    }
 }
 
 impl ClipSummary {

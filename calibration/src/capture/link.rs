@@ -4,13 +4,16 @@
 
 use shared_mem::msg::arm::{ArmMode, ArmState};
 use shared_mem::msg::event::{Event, EventLevel, EventSource};
-use shared_mem::msg::motion::MotionChunk;
+use shared_mem::msg::motion::{MotionChunk, MotionKind};
+use shared_mem::time::now_ns;
 use shared_mem::topics::{ARM_MOTION, ARM_STATE, EVENTS};
 use shared_mem::transport::{Node, Publisher, Subscriber, TransportError};
 use std::time::{Duration, Instant};
 
 /// A bridge that says nothing for this long is gone.
 const SILENCE: Duration = Duration::from_secs(1);
+/// How long a bridge may take to recover a robot from a reflex: brakes close and open. It says nothing meanwhile.
+const RECOVERY: Duration = Duration::from_secs(15);
 
 /// The link to a bridge failed, or the bridge cannot be used as it is.
 #[derive(Debug, thiserror::Error)]
@@ -54,6 +57,13 @@ fn said(last_words: &Option<String>) -> String {
     last_words.as_ref().map_or(String::new(), |words| format!(" (the bridge said: {words})"))
 }
 
+/// A warning or an error of the bridge.
+#[derive(Debug, Clone)]
+struct Words {
+    level: EventLevel,
+    text: String,
+}
+
 /// A seat beside one bridge.
 #[derive(Debug)]
 pub struct Link {
@@ -62,7 +72,7 @@ pub struct Link {
     motions: Publisher<MotionChunk>,
     newest: Option<ArmState>,
     heard: Instant,
-    last_words: Option<String>,
+    last_words: Option<Words>,
     // Declared last: ports go before the node they belong to.
     _node: Node,
 }
@@ -94,7 +104,7 @@ impl Link {
         self.listen()?;
         let Some(state) = self.states.receive()? else {
             if self.heard.elapsed() > SILENCE {
-                return Err(LinkError::Silent { last_words: self.last_words.clone() });
+                return Err(LinkError::Silent { last_words: self.last_words() });
             }
             return Ok(None);
         };
@@ -155,7 +165,7 @@ impl Link {
             ArmMode::UserStopped => ["the stop button is pressed", "release the button, then start again"],
             ArmMode::Recovery => ["it is recovering from an error", "wait for it, then start again"],
         };
-        Err(LinkError::NotReady { what, remedy, last_words: self.last_words.clone() })
+        Err(LinkError::NotReady { what, remedy, last_words: self.last_words() })
     }
 
     /// [`Self::ready_state`] of an arm with so many joints.
@@ -169,6 +179,27 @@ impl Link {
         } else {
             Err(LinkError::OtherArm { moves: state.dof, described })
         }
+    }
+
+    /// Has the bridge recover the robot from a reflex and waits until it holds. A robot that a person stopped is left alone.
+    ///
+    /// # Errors
+    /// [`LinkError::NotReady`] when it could not be recovered or a person has to act, [`LinkError::Silent`].
+    pub fn recover(&mut self) -> Result<ArmState, LinkError> {
+        let is_in_reflex = |state: Option<ArmState>| state.is_none_or(|state| state.mode == ArmMode::Reflex);
+        self.newest = self.states.newest()?.or(self.newest);
+        if is_in_reflex(self.newest) {
+            self.listen()?;
+            self.last_words = None;
+            self.send(&MotionChunk { stamp_ns: now_ns(), kind: MotionKind::Recover, ..MotionChunk::default() })?;
+            let asked = Instant::now();
+            while is_in_reflex(self.newest) && self.last_words.is_none() && asked.elapsed() < RECOVERY {
+                std::thread::sleep(Duration::from_millis(5));
+                self.listen()?;
+                self.newest = self.states.newest()?.or(self.newest);
+            }
+        }
+        self.ready_state()
     }
 
     /// Hands a batch of set points over.
@@ -189,14 +220,23 @@ impl Link {
             std::thread::sleep(Duration::from_millis(10));
             self.listen()?;
         }
-        Ok(self.last_words.clone().unwrap_or_else(|| "the bridge gave no reason".into()))
+        Ok(self.last_words().unwrap_or_else(|| "the bridge gave no reason".into()))
     }
 
-    /// Keeps the bridge's last warning or error.
+    fn last_words(&self) -> Option<String> {
+        self.last_words.as_ref().map(|words| words.text.clone())
+    }
+
+    /// Keeps the bridge's last warning or error; an error outlasts the warnings that follow from it.
     fn listen(&mut self) -> Result<(), LinkError> {
         while let Some(event) = self.events.receive()? {
-            if event.source == EventSource::Bridge && event.level != EventLevel::Info {
-                self.last_words = Some(event.text().to_owned());
+            let Event { level, source, .. } = event;
+            let outlasts = |words: &Words| words.level == EventLevel::Error && level != EventLevel::Error;
+            if source == EventSource::Bridge
+                && level != EventLevel::Info
+                && !self.last_words.as_ref().is_some_and(outlasts)
+            {
+                self.last_words = Some(Words { level, text: event.text().to_owned() });
             }
         }
         Ok(())

@@ -2,7 +2,7 @@
 //!
 //! Planning is pure: [`plan`] for excitation on [`multisine`], [`program`], [`stroke`] and [`way`] for Control-Hit-Slide on
 //! [`line`] and [`transit`], both within [`limits`] of the [`body`]. Playing goes through shared memory only ([`stream`],
-//! [`link`], [`object_watch`]); recording is a process beside us ([`recorder`]). [`excitation`] and [`control_hit_slide`] are the
+//! [`link`], [`object_watch`]), with [`recovery`] where the robot stops itself; recording is a process beside us ([`recorder`]). [`excitation`] and [`control_hit_slide`] are the
 //! verbs that bind them, and [`task`] is what both are asked for.
 
 pub mod body;
@@ -19,6 +19,7 @@ pub mod plan;
 pub mod program;
 pub mod quality;
 pub mod recorder;
+pub mod recovery;
 pub mod session;
 pub mod stream;
 pub mod stroke;

@@ -4,7 +4,7 @@
 
 use super::link::{Link, LinkError};
 use crate::interrupt::Interrupt;
-use shared_mem::msg::arm::{ArmState, MotionStatus};
+use shared_mem::msg::arm::{ArmMode, ArmState, MotionStatus};
 use shared_mem::msg::motion::{CHUNK_LENGTH, MotionChunk, MotionKind, SetPoint};
 use shared_mem::time::now_ns;
 use std::time::{Duration, Instant};
@@ -27,6 +27,8 @@ pub enum Outcome {
     Stopped,
     /// Braked, or not begun, because the user asked for a pause.
     Paused,
+    /// The robot stopped itself: it is in a reflex.
+    Reflex,
 }
 
 /// A motion was not played.
@@ -71,6 +73,8 @@ pub enum Step {
     Refused,
     /// The bridge braked the arm.
     Braked,
+    /// The robot stopped itself.
+    Reflex,
 }
 
 /// A motion: one set point a control cycle, the first and the last at rest.
@@ -103,6 +107,7 @@ impl<'a> Feeder<'a> {
         let ours = state.motion_id == self.motion_id;
         match state.motion {
             MotionStatus::Refused if ours => return Step::Refused,
+            MotionStatus::Braked if ours && state.mode == ArmMode::Reflex => return Step::Reflex,
             MotionStatus::Braked if ours => return Step::Braked,
             MotionStatus::Done if ours => return Step::Done,
             _ => {}
@@ -187,6 +192,7 @@ pub fn play(
                 }
                 Step::Wait => {}
                 Step::Done => return Ok(Outcome::Done),
+                Step::Reflex => return Ok(Outcome::Reflex),
                 Step::Refused => return Err(StreamError::Refused { reason: link.reason()? }),
                 Step::Braked => {
                     return Err(StreamError::Braked { played: state.motion_played, reason: link.reason()? });

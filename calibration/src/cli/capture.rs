@@ -50,7 +50,8 @@ of position, speed, acceleration, jerk, torque or height is made smaller; which 
 
 A session that exists is continued with the next number; nothing is overwritten. At any moment p (or SIGUSR1)
 pauses: the arm brakes inside its limits and holds, and p (or SIGUSR2) goes on with a fresh try of the same clip. q or
-Ctrl-C ends: the arm brakes, and what was recorded is kept.
+Ctrl-C ends: the arm brakes, and what was recorded is kept. A robot that stops itself is recovered up to three times, the
+arm goes back and the clip is repeated; one that a person stopped is left alone.
 
 Examples:
   calibration capture excitation --cell config/fr3_cell.toml --clips 4 --out session
@@ -81,7 +82,8 @@ that got away is asked for by hand.
 
 A session that exists is continued with the next number; nothing is overwritten. At any moment p (or SIGUSR1)
 pauses: the arm brakes inside its limits and holds, and p (or SIGUSR2) goes on with a fresh try of the same clip. q or
-Ctrl-C ends: the arm brakes, and what was recorded is kept.
+Ctrl-C ends: the arm brakes, and what was recorded is kept. A robot that stops itself is recovered up to three times, the
+arm goes back and the clip is repeated; one that a person stopped is left alone.
 
 Examples:
   calibration capture control-hit-slide --cell config/fr3_cell.toml --clips 12 --out strokes

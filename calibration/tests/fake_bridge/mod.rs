@@ -27,6 +27,8 @@ pub(crate) enum Fault {
     RestartAfter(u32),
     /// Takes no motion up.
     Deaf,
+    /// Stops itself after so many set points of every motion.
+    ReflexAfter(u32),
 }
 
 /// The running fake; ends when dropped.
@@ -117,6 +119,14 @@ impl Fake {
         if self.fault == Fault::Deaf {
             return;
         }
+        if chunk.kind == MotionKind::Recover {
+            assert_eq!(self.state.mode, ArmMode::Reflex, "nobody recovers a robot that is well");
+            self.state.mode = ArmMode::Move;
+            return;
+        }
+        if self.state.mode == ArmMode::Reflex {
+            return;
+        }
         if chunk.motion_id != self.state.motion_id {
             assert_eq!(chunk.index, 0, "chunks are numbered from 0");
             self.state.motion_id = chunk.motion_id;
@@ -131,7 +141,7 @@ impl Fake {
         match chunk.kind {
             MotionKind::Stop => self.brake("stopped on request"),
             MotionKind::Last => self.complete = true,
-            MotionKind::Play => {}
+            MotionKind::Play | MotionKind::Recover => {}
         }
         self.queue.extend(&chunk.set_points[..chunk.length as usize]);
         assert!(self.queue.len() <= 600, "the sender keeps at most a few hundred milliseconds queued");
@@ -153,6 +163,12 @@ impl Fake {
         match self.fault {
             Fault::BrakeAfter(n) if self.state.motion_played == n => self.brake("joint 4 too fast"),
             Fault::RestartAfter(n) if self.state.motion_played == n => self.state.session += 1,
+            Fault::ReflexAfter(n) if self.state.motion_played == n => {
+                self.state.mode = ArmMode::Reflex;
+                let error = "the robot stopped itself (cartesian_reflex); start again";
+                self.events.send(&Event::new(EventLevel::Error, EventSource::Bridge, error)).expect("shared memory");
+                self.brake("the arm is no longer under command");
+            }
             _ => {}
         }
     }

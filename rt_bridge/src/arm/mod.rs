@@ -58,8 +58,8 @@ pub trait Arm: Send {
     /// Who says when a cycle begins.
     fn clock(&self) -> Clock;
 
-    /// Makes the arm follow commands of `interface`. Called by the control thread before its first cycle; may block and
-    /// allocate.
+    /// Makes the arm follow commands of `interface`. Called by the control thread before its first cycle and after
+    /// [`Arm::recover`]; may block and allocate.
     ///
     /// # Errors
     /// [`ArmFault`] when the arm refuses; its state can still be read.
@@ -82,7 +82,8 @@ pub trait Arm: Send {
     /// Ends commanding in the arm's own orderly way; the arm is at rest already. May block, at most a second.
     fn stop(&mut self);
 
-    /// Clears a reflex so that `start` can succeed. Called before `start` when the arm came up in a reflex.
+    /// Clears a reflex so that `start` can succeed. Called before `start` when the arm is in a reflex; may block, at most 12
+    /// seconds, and allocate.
     ///
     /// # Errors
     /// [`ArmFault`] when a person has to act first.

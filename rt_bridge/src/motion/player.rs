@@ -72,10 +72,11 @@ impl Player {
         }
     }
 
-    /// Holds `q_d` from now on. Called once, when the arm's pose is known.
+    /// Holds `q_d` from now on. Called when command of the arm is taken, and its pose is known.
     pub fn hold_at(&mut self, q_d: Joints) {
+        self.queue.clear();
         self.trace = Trace::at_rest(q_d);
-        self.before = self.trace;
+        (self.before, self.ease, self.activity) = (self.trace, Ease::over(), Activity::Holding);
     }
 
     /// The arm says that it is told to be at `in_force`, `periods` after the state that the last set point answered. Where

@@ -4,7 +4,7 @@
 //! |---|---|
 //! | cycle | one state received, and one command that answers it |
 //! | beat | what a cycle leaves for the pump: the state and the command |
-//! | commanding | the arm follows us; a fault ends it, states go on being read |
+//! | commanding | the arm follows us; a fault ends it, states go on being read; a reflex may be recovered from |
 
 use super::law::TorquePd;
 use super::remark::{BrakeReason, Remark};
@@ -15,7 +15,7 @@ use crate::rt::deadline::Wake;
 use crate::safety::{Limits, TorqueGuard, Watchdog, watchdog::LONGEST_SILENCE_NS};
 use rtrb::{Consumer, Producer};
 use shared_mem::msg::arm::{ArmCommand, ArmMode, ArmState, CommandInterface};
-use shared_mem::msg::motion::{MotionChunk, SetPoint};
+use shared_mem::msg::motion::{MotionChunk, MotionKind, SetPoint};
 use shared_mem::msg::{Joints, MAX_JOINTS};
 use shared_mem::time::now_ns;
 use std::thread::Thread;
@@ -77,6 +77,8 @@ pub struct Cycle {
     link: Link,
     desired: Desired,
     commanding: bool,
+    /// Somebody asked to recover from a reflex.
+    to_recover: bool,
     torque: TorqueGuard,
     watchdog: Watchdog,
     arrival: ArrivalLine,
@@ -99,6 +101,7 @@ impl Cycle {
             link,
             desired: Desired::Commanded,
             commanding: false,
+            to_recover: false,
             torque: TorqueGuard::default(),
             watchdog: Watchdog::new(now_ns(), LONGEST_SILENCE_NS),
             arrival: ArrivalLine::default(),
@@ -137,11 +140,21 @@ impl Cycle {
     }
 
     fn first_state(&mut self) -> Result<(), ArmFault> {
+        self.next_state()?;
+        if self.state.mode != ArmMode::Reflex {
+            return Ok(());
+        }
+        self.arm.recover()?;
+        // It stands elsewhere, maybe, and is told to be there: brakes have closed and opened.
+        self.next_state()
+    }
+
+    fn next_state(&mut self) -> Result<(), ArmFault> {
         loop {
             match self.arm.read(&mut self.state) {
-                Ok(Read::Fresh) => break,
+                Ok(Read::Fresh) => return Ok(()),
                 // A robot that came up in a reflex or under the user stop is told of once, by `start`.
-                Err(fault) if !fault.is_final() => break,
+                Err(fault) if !fault.is_final() => return Ok(()),
                 Err(fault) => return Err(fault),
                 Ok(Read::Missing | Read::End) => {
                     if let Some(ms) = self.watchdog.expired(now_ns()) {
@@ -151,20 +164,34 @@ impl Cycle {
                 }
             }
         }
-        if self.state.mode == ArmMode::Reflex { self.arm.recover() } else { Ok(()) }
+    }
+
+    /// Takes command again after a reflex, where that was asked for. The arm is not commanded then: as before the first
+    /// cycle, this may block and allocate.
+    fn recover(&mut self) -> Option<Turn> {
+        let asked = std::mem::take(&mut self.to_recover);
+        if !asked || self.commanding || self.state.mode != ArmMode::Reflex {
+            return None;
+        }
+        let turn = self.take_command();
+        if self.commanding {
+            self.tell(Remark::Recovered);
+        }
+        self.last_begin_ns = 0;
+        Some(turn)
     }
 
     fn start(&mut self) -> Result<(), ArmFault> {
         self.desired = self.arm.start(self.plan.interface)?;
         self.commanding = self.desired != Desired::Recorded;
-        if !self.commanding {
-            self.player.halt();
-        }
         // A torque law starts where the arm is, a position interface where the robot is told to be already.
         self.player.hold_at(match self.plan.interface {
             CommandInterface::Torque => self.state.q,
             CommandInterface::JointPosition => self.state.q_d,
         });
+        if !self.commanding {
+            self.player.halt();
+        }
         self.torque = TorqueGuard::after(&self.state.tau_J_d, &self.plan.limits);
         Ok(())
     }
@@ -174,6 +201,9 @@ impl Cycle {
         if let Some(wake) = wake {
             self.stats.wake.record(wake.late_ns);
             self.stats.missed_cycles += wake.missed;
+        }
+        if let Some(turn) = self.recover() {
+            return turn;
         }
         match self.arm.read(&mut self.state) {
             Ok(Read::Fresh) => self.answer(wake.is_none()),
@@ -272,9 +302,10 @@ impl Cycle {
     fn take_chunk(&mut self) {
         if self.player.has_room()
             && let Ok(chunk) = self.link.chunks.pop()
-            && let Some(remark) = self.player.take(&chunk)
         {
-            self.tell(remark);
+            self.to_recover = chunk.kind == MotionKind::Recover;
+            let remark = if self.to_recover { None } else { self.player.take(&chunk) };
+            remark.into_iter().for_each(|remark| self.tell(remark));
         }
     }
 

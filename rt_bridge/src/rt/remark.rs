@@ -13,6 +13,8 @@ pub enum Remark {
     LesserClock(Claim),
     /// Commanding ended.
     Fault(ArmFault),
+    /// A reflex was cleared: commanding goes on.
+    Recovered,
     /// A motion was refused before it began, or its sender's chunks do not count.
     Refused {
         /// The motion.
@@ -104,7 +106,7 @@ impl Remark {
             Self::Refused { .. } | Self::LesserClock(_) => EventLevel::Warning,
             Self::Braked { why: BrakeReason::Asked | BrakeReason::RunEnds, .. } => EventLevel::Info,
             Self::Braked { .. } => EventLevel::Warning,
-            Self::Began { .. } | Self::Done { .. } => EventLevel::Info,
+            Self::Recovered | Self::Began { .. } | Self::Done { .. } => EventLevel::Info,
         }
     }
 }
@@ -114,6 +116,7 @@ impl fmt::Display for Remark {
         match self {
             Self::LesserClock(claim) => write!(f, "running without real-time guarantees: {claim}"),
             Self::Fault(fault) => fault.fmt(f),
+            Self::Recovered => f.write_str("recovered from the reflex; the arm holds where it stands"),
             Self::Refused { motion, why } => write!(f, "motion {motion} refused: {why}"),
             Self::Began { motion } => write!(f, "motion {motion} began"),
             Self::Done { motion } => write!(f, "motion {motion} done"),

@@ -32,7 +32,7 @@ impl Default for SetPoint {
 /// Chunks of a motion are numbered from 0 without gaps. The first set point must lie where the arm is commanded to be
 /// already, at rest; the last one must be at rest too.
 #[derive(Debug, Clone, Copy, PartialEq, ZeroCopySend)]
-#[type_name("twinalign/MotionChunk/1")]
+#[type_name("twinalign/MotionChunk/2")]
 #[repr(C)]
 pub struct MotionChunk {
     /// When the chunk was sent: monotonic clock [ns].
@@ -67,7 +67,7 @@ impl Default for MotionChunk {
 
 /// What a [`MotionChunk`] is for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ZeroCopySend)]
-#[type_name("twinalign/MotionKind/1")]
+#[type_name("twinalign/MotionKind/2")]
 #[repr(C)]
 pub enum MotionKind {
     /// More follows.
@@ -77,4 +77,7 @@ pub enum MotionKind {
     Last = 1,
     /// Brake now, whatever is queued; the set points do not count.
     Stop = 2,
+    /// Clear the reflex that ended commanding and hold the arm where it stands; the set points do not count. Nothing
+    /// happens unless the arm is in a reflex: a stop that a person pressed is a person's to release.
+    Recover = 3,
 }
