@@ -184,7 +184,7 @@ impl Cell {
         if let Some(wrench) = &self.wrench {
             wrench.check()?;
         }
-        Ok(())
+        self.simulation.check()
     }
 }
 
@@ -242,6 +242,19 @@ mod tests {
     fn a_table_at_no_height_is_refused() {
         let error = parse("[table]\nheight = nan\n").unwrap_err();
         assert!(error.contains("table.height"), "{error}");
+    }
+
+    #[test]
+    fn a_simulated_start_in_degrees_or_millimetres_is_refused() {
+        for (wrong, told) in [
+            ("q = [0.0, -45.0, 0.0, -135.0, 0.0, 90.0, 45.0]", "simulation.q`"),
+            ("object_position = [550.0, 0.0]", "simulation.object_position"),
+            ("object_yaw = 90.0", "simulation.object_yaw"),
+            ("q_noise = -1e-6", "simulation.q_noise"),
+        ] {
+            let error = parse(&format!("[simulation]\n{wrong}\n")).unwrap_err();
+            assert!(error.contains(told) && error.contains("SI units"), "{error}");
+        }
     }
 
     #[test]

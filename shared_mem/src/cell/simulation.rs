@@ -1,5 +1,6 @@
 //! `[simulation]`: where the simulated cell starts. A real cell ignores it.
 
+use super::within;
 use serde::{Deserialize, Serialize};
 
 /// Start of the simulated cell.
@@ -40,6 +41,19 @@ impl Default for Simulation {
 }
 
 impl Simulation {
+    pub(super) fn check(&self) -> Result<(), String> {
+        within("simulation.q", &self.q, -10.0, 10.0)?;
+        within("simulation.object_position", &self.object_position, -10.0, 10.0)?;
+        within("simulation.object_yaw", &[self.object_yaw], -10.0, 10.0)?;
+        let noises = [
+            ("q_noise", self.q_noise),
+            ("dq_noise", self.dq_noise),
+            ("q_step", self.q_step),
+            ("dq_step", self.dq_step),
+        ];
+        noises.into_iter().try_for_each(|(key, size)| within(&format!("simulation.{key}"), &[size], 0.0, 1.0))
+    }
+
     pub(super) fn is_default(&self) -> bool {
         *self == Self::default()
     }
