@@ -242,6 +242,17 @@ fn an_existing_file_is_never_overwritten() {
     assert_eq!(std::fs::read(&path).expect("the file"), b"precious");
 }
 
+#[test]
+fn a_file_that_a_killed_recorder_left_empty_is_told_from_one_that_is_no_clip() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("clip.mcap");
+    for (text, told) in [(&b""[..], "is empty: its recorder"), (b"a poem", "is no MCAP file")] {
+        std::fs::write(&path, text).expect("a file");
+        let error = read_arm_states(&path).expect_err("nothing to read").to_string();
+        assert!(error.contains(told), "{error}");
+    }
+}
+
 /// A disk with little room.
 struct SmallDisk {
     room: usize,

@@ -110,6 +110,10 @@ impl Messages<BufReader<File>> {
     /// Opens a file.
     pub(super) fn open(path: &Path) -> Result<Self, ReadError> {
         let file = File::open(path).map_err(ReadError::io(path))?;
+        if file.metadata().is_ok_and(|about| about.is_file() && about.len() == 0) {
+            let what = "is empty: its recorder ended before it wrote anything; record the clip again";
+            return Err(ReadError::kind(path, what));
+        }
         Self::from_source(BufReader::with_capacity(1 << 16, file), path)
     }
 }
