@@ -13,6 +13,8 @@ pub struct Diagnosis {
     pub verdict: Verdict,
     /// How large the gap is.
     pub gap: Gap,
+    /// What comes nearest to explaining a gap that nothing explains; none where nothing comes near, or something explains it.
+    pub nearest: Option<Nearest>,
     /// Where it lies; shares sum to 1 over everything that was measured.
     #[serde(rename = "where")]
     pub places: Vec<Place>,
@@ -89,6 +91,15 @@ pub struct Gap {
     pub object_add_m: Change,
     /// Mean ADD-S [m].
     pub object_add_s_m: Change,
+}
+
+/// Effects that close a part of the gap but leave more than a cause does.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct Nearest {
+    /// Names of the registry.
+    pub effects: Vec<String>,
+    /// Share of the squared gap that they close together on the confirm clips.
+    pub shrink: Share,
 }
 
 /// A share with its 90 % interval.

@@ -6,6 +6,7 @@ use super::evidence::{Channel, Evidence, Row, StageName};
 use super::noise;
 use super::scatter::Scatter;
 use crate::estimate::{ClipModel, Impossible};
+use crate::forward::arm::noise as signal;
 use crate::forward::object;
 use shared_mem::cell::{Cell, ClipKind};
 use shared_mem::recording::{Clip, JointSeries};
@@ -91,7 +92,7 @@ fn series<'a>(clip: &'a Clip, channel: &Channel) -> (&'a JointSeries, &'a [f64])
 fn sensor_sigma(clips: &[Clip], channel: &Channel, joint: usize) -> f64 {
     let of = |clip: &Clip| {
         let (log, values) = series(clip, channel);
-        noise::white_sigma(values.iter().skip(joint).step_by(log.dof.max(1)).copied())
+        signal::sigma(&values.iter().skip(joint).step_by(log.dof.max(1)).copied().collect::<Vec<_>>())
     };
     let each: Vec<f64> = clips.iter().map(of).collect();
     // A sensor without noise does not exist: below this a log was computed, not measured.

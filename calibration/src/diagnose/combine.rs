@@ -1,6 +1,7 @@
 //! Which effects act together: effects are added while that foretells clips better, and dropped or swapped when they are
 //! not needed any more.
 
+use super::closing::closes;
 use super::evidence::{Evidence, Row};
 use super::fit::{Bench, Effort, Hypothesis};
 use super::floor;
@@ -34,17 +35,12 @@ const LEAST: f64 = 4.0;
 const WORTHWHILE: f64 = 0.0025;
 /// ... and close at least this share of the gap: what helps only beside numbers that clips have of their own is no cause.
 const CLOSES: f64 = 0.1;
-/// A gap smaller than this, over its floor, is taken for this size.
-const LEAST_GAP: f64 = 1.2;
 /// ... unless it closes so much of the gap and foretells so many of the clips better that one which it foretells worse does
 /// not matter: 11 of 12 clips do not agree by chance (p = 0.003).
 const PLAIN: f64 = 0.3;
 const NEARLY_ALL: f64 = 0.85;
 /// An advantage of so many of its errors is no chance.
 const CLEAR: f64 = 3.5;
-/// A gap widened by less than this share is chance.
-const HARM: f64 = 0.1;
-
 /// Engines integrate one and the same effect differently by a hundredth of it, so by this share of the squared gap.
 const NUMERICS_SHARE: f64 = 1e-4;
 
@@ -55,8 +51,7 @@ pub struct Trial {
     pub scored: Scored,
     /// Fitted, where that was worth it.
     pub fitted: Option<(Hypothesis, Advantage)>,
-    /// Share of the gap between twin and clips, on a logarithmic scale, that it closes when nothing of a clip's own is fitted, on
-    /// all clips but those for confirming; 0 where it widens the gap on clips it was not fitted to.
+    /// [`closes`]: how much of the gap.
     pub closes: f64,
 }
 
@@ -75,6 +70,8 @@ pub struct Step {
     pub arm_rows: usize,
     /// What the hypothesis that is extended leaves on all clips but those for confirming.
     pub left: Vec<Typical>,
+    /// What the baseline leaves on them.
+    pub whole: Vec<Typical>,
 }
 
 /// What the search found.
@@ -111,7 +108,7 @@ pub fn search<E: Evidence>(
     let mut steps: Vec<Step> = Vec::new();
     let mut now = baseline;
     loop {
-        let step = step(bench, split, &now, bar)?;
+        let step = step(bench, split, &now, steps.first().map(|first| &first.left), bar)?;
         let best = step.best(bench).map(|(_, fit, _)| fit.clone());
         now = step.from.clone();
         let weights = step.weights.clone();
@@ -200,7 +197,14 @@ fn without_superfluous<E: Evidence>(
 }
 
 /// Sweeps around a hypothesis, scores all candidates, fits the best.
-fn step<E: Evidence>(bench: &Bench<'_, E>, split: &Split, from: &Hypothesis, bar: &Progress) -> Option<Step> {
+/// `whole`: what the baseline leaves, where `from` is not the baseline itself.
+fn step<E: Evidence>(
+    bench: &Bench<'_, E>,
+    split: &Split,
+    from: &Hypothesis,
+    whole: Option<&Vec<Typical>>,
+    bar: &Progress,
+) -> Option<Step> {
     let mut swept = swept(bench, split, from, bar)?;
     let mut weights = vec![1.0; bench.evidence.channels().len()];
     // Weights depend on what the richest hypothesis leaves, and that on the weights: twice is enough.
@@ -233,7 +237,8 @@ fn step<E: Evidence>(bench: &Bench<'_, E>, split: &Split, from: &Hypothesis, bar
     }
     let trial = |scored: &Scored| Trial { scored: scored.clone(), fitted: None, closes: 0.0 };
     let trials = scored.iter().map(trial).collect();
-    let mut step = Step { from, foretold, trials, weights, arm_rows, left };
+    let whole = whole.unwrap_or(&left).clone();
+    let mut step = Step { from, foretold, trials, weights, arm_rows, left, whole };
     step.fit(bench, split, (&promising, false), bar);
     if step.best(bench).is_none() {
         let rest = overlooked(bench, &step);
@@ -279,11 +284,24 @@ impl Step {
             let nearer = if fit.deviance() < near { more() } else { None };
             let fit = nearer.unwrap_or(fit);
             if let Some(ahead) = foretell(bench, &fit, &split.choose, &self.weights) {
-                let closes = closes(bench, split, &self.from, &fit);
+                let closes = closes(bench, split, &self.whole, [&self.from, &fit]);
                 let trial = &mut self.trials[place];
                 (trial.closes, trial.fitted) = (closes, Some((fit, ahead.over(&self.foretold))));
             }
         }
+    }
+
+    /// How many times what a hypothesis leaves of an arm's clips exceeds what was taken for noise in this step, at least 1:
+    /// so many times less do differences between candidates say. Weights come from slopes, with all candidates at once; a
+    /// real arm strays far more under all that is named. Clips with numbers of their own take such leftovers up.
+    #[must_use]
+    pub fn unforeseen<E: Evidence>(&self, bench: &Bench<'_, E>, last: &Hypothesis) -> f64 {
+        let clips: Vec<usize> = last.fitted.iter().map(|clip| clip.clip).collect();
+        let left = Residuals::at(bench, last, &clips).filter(|_| bench.scatter.count() == 0);
+        let Some(left) = left else { return 1.0 };
+        let weights = floor::weights(bench.evidence, &left.clips);
+        let ratios = self.weights.iter().zip(&weights).map(|(taken, found)| (taken / found).powi(2));
+        (ratios.sum::<f64>() / weights.len() as f64).max(1.0)
     }
 
     /// Whether the object strays by more than in strokes of another engine with nothing wrong.
@@ -308,19 +326,6 @@ impl Step {
         let next = others.into_iter().filter_map(worth).fold(0.0, f64::max);
         own.into_iter().find_map(worth).is_some_and(|own| next < 0.5 * own)
     }
-}
-
-/// [`Trial::closes`]: of the group of sensors on which it closes most.
-fn closes<E: Evidence>(bench: &Bench<'_, E>, split: &Split, from: &Hypothesis, to: &Hypothesis) -> f64 {
-    let on = |clips: &[usize]| -> Option<Vec<f64>> {
-        let [before, after] = [from, to].map(|hypothesis| Residuals::at(bench, hypothesis, clips));
-        let left = Left::of_groups(&before?.typical(), &after?.typical());
-        let share = |left: &Left| (left.before / left.after).ln() / (left.before / left.floor).max(LEAST_GAP).ln();
-        Some(left.iter().map(share).collect())
-    };
-    let (Some(open), Some(choose)) = (on(&split.open()), on(&split.choose)) else { return 0.0 };
-    let harmless = |(_, choose): &(&f64, &f64)| **choose > -HARM;
-    open.iter().zip(&choose).filter(harmless).map(|(open, _)| *open).fold(0.0, f64::max)
 }
 
 fn swept<E: Evidence>(bench: &Bench<'_, E>, split: &Split, from: &Hypothesis, bar: &Progress) -> Option<Swept> {

@@ -1,7 +1,7 @@
 //! From what the search found to the answer: the confirm clips are opened here, and only here.
 
 use super::admit::Admitted;
-use super::answer::{Candidate, Change, Clips, Diagnosis, Gap, Place, Share, Status};
+use super::answer::{Candidate, Change, Clips, Diagnosis, Gap, Nearest, Place, Share, Status};
 use super::combine::{Found, Step};
 use super::evidence::Evidence;
 use super::fit::{Bench, Hypothesis};
@@ -38,6 +38,7 @@ pub fn not_testable(session: &Session, options: &Options, theta: Theta, why: &st
             object_add_m: Change::default(),
             object_add_s_m: Change::default(),
         },
+        nearest: None,
         places: Vec::new(),
         candidates: Vec::new(),
         next_experiment: format!("Record a session that has what this one lacks: {why}."),
@@ -79,6 +80,11 @@ pub fn conclude<E: Evidence>(
     let believed = matches!(verdict.kind, Kind::Named | Kind::Class);
     let kept = if believed { &found.last } else { &first.from };
     let shown = if believed { &after } else { &before };
+    let some = verdict.kind == Kind::Unexplained && confirmed && !finding.effects.is_empty();
+    let nearest = some.then(|| Nearest {
+        effects: finding.effects.iter().map(|name| (*name).to_owned()).collect(),
+        shrink: after.shrink(&before, options.seed),
+    });
     let [joints, add, add_s] = replayed(bench, [&first.from, kept], session, (admitted, split))?;
     let gap = Gap {
         unit: "sigma",
@@ -110,7 +116,8 @@ pub fn conclude<E: Evidence>(
         seed: options.seed,
         theta: bench.library.theta(&kept.full),
         theta_file: None,
-        traces: traces(bench.evidence, (&before, shown), &admitted.files),
+        traces: traces(bench.evidence, (&before, if nearest.is_some() { &after } else { shown }), &admitted.files),
+        nearest,
     })
 }
 
@@ -125,7 +132,7 @@ fn finding<'a, E: Evidence>(
     let (mut sure, mut clear): (f64, bool) = (1.0, true);
     for (step, effect) in steps_of(found) {
         clear &= step.is_clear(effect);
-        let others = confidence::rivals(step, effect);
+        let others = confidence::rivals(step, effect, step.unforeseen(bench, &found.last));
         rivals.extend(others.iter().filter(|other| !found.last.effects.contains(other)).map(name));
         let all = confidence::probabilities(step, false);
         sure = sure.min(all.iter().find(|(candidate, _)| *candidate == effect).map_or(0.5, |(_, p)| *p));
@@ -137,7 +144,7 @@ fn finding<'a, E: Evidence>(
         clear,
         left,
         confirmed,
-        at_bounds: !leftovers::at_bounds(bench, &found.last).is_empty(),
+        implausible: !leftovers::implausible(bench, &found.last).is_empty(),
         place: rest.first().map_or_else(String::new, |place| format!("{} ({})", place.channel, place.regime)),
     }
 }
@@ -187,6 +194,7 @@ fn candidates<E: Evidence>(
 ) -> Vec<Candidate> {
     let first = &found.steps[0];
     let likely = confidence::probabilities(first, found.last.effects.is_empty());
+    let unforeseen = first.unforeseen(bench, &found.last);
     let mut all: Vec<Candidate> = first
         .trials
         .iter()
@@ -203,7 +211,7 @@ fn candidates<E: Evidence>(
                 probability: if kept { probability.max(finding.confidence) } else { probability },
                 parameters: fit.map(|fit| parameters::of_effect(bench, fit, effect)).unwrap_or_default(),
                 shrink: alone.map_or(Share { value: 0.0, ci90: [0.0; 2] }, |alone| alone.shrink(before, seed)),
-                confusable_with: confusable(first, effect, bench),
+                confusable_with: confusable(first, effect, unforeseen, bench),
                 status,
                 why: why(trial, status),
             }
@@ -225,8 +233,8 @@ fn status(scored: &super::shortlist::Scored, kept: bool, rival: bool, kind: Kind
     }
 }
 
-fn confusable<E: Evidence>(first: &Step, effect: usize, bench: &Bench<'_, E>) -> Vec<String> {
-    let near = confidence::rivals(first, effect);
+fn confusable<E: Evidence>(first: &Step, effect: usize, unforeseen: f64, bench: &Bench<'_, E>) -> Vec<String> {
+    let near = confidence::rivals(first, effect, unforeseen);
     near.iter().map(|other| bench.library.candidates[*other].effect.name.to_owned()).collect()
 }
 

@@ -4,7 +4,7 @@ use super::combine::{Step, net};
 
 /// Rivals this close cannot be told apart [nats].
 const NEAR: f64 = 4.0;
-/// ... or within so many standard errors of their difference.
+/// ... or within so many standard errors of their difference, were these known exactly.
 const CHANCE: f64 = 1.5;
 /// A rival closes at least this share of the gap that the chosen one closes.
 const ALIKE: f64 = 0.5;
@@ -30,9 +30,10 @@ pub fn probabilities(step: &Step, none: bool) -> Vec<(usize, f64)> {
 }
 
 /// Candidates of a step that explain it as well as the chosen one: whose gains, clip by clip, are not less beyond chance, and
-/// that close as much of the gap; with more numbers than the chosen one, markedly more of it.
+/// that close as much of the gap; with more numbers than the chosen one, markedly more of it. Differences count `unforeseen`
+/// times less.
 #[must_use]
-pub fn rivals(step: &Step, chosen: usize) -> Vec<usize> {
+pub fn rivals(step: &Step, chosen: usize, unforeseen: f64) -> Vec<usize> {
     let of = |candidate: usize| {
         let trial = step.trials.iter().find(|trial| trial.scored.candidate == candidate)?;
         trial.fitted.as_ref().map(|(_, advantage)| (advantage, trial))
@@ -41,10 +42,32 @@ pub fn rivals(step: &Step, chosen: usize) -> Vec<usize> {
     let near = |candidate: &usize| {
         let Some((other, trial)) = of(*candidate).filter(|_| *candidate != chosen) else { return false };
         let (beyond, error) = best.beyond(other);
-        let alike = beyond < NEAR.max(CHANCE * error) && other.nats > other.error;
+        let (beyond, error) = (beyond / unforeseen, error / unforeseen);
+        let alike = beyond < NEAR.max(chance(best.clips()) * error) && other.nats > other.error;
         let dearer = trial.scored.cost > chosen_trial.scored.cost;
         let enough = if dearer { chosen_trial.closes + MORE } else { ALIKE * chosen_trial.closes };
         alike && trial.closes > enough
     };
     step.trials.iter().map(|trial| trial.scored.candidate).filter(near).collect()
+}
+
+/// [`CHANCE`] where the error is itself told from so few clips: the quantile of Student's distribution at the same
+/// probability (Abramowitz & Stegun 26.7.5).
+fn chance(clips: usize) -> f64 {
+    let (z, freedom) = (CHANCE, clips.saturating_sub(1).max(1) as f64);
+    let (first, second) = ((z.powi(3) + z) / 4.0, (5.0 * z.powi(5) + 16.0 * z.powi(3) + 3.0 * z) / 96.0);
+    z + first / freedom + second / freedom.powi(2)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn few_clips_must_differ_by_more() {
+        // Quantiles of Student's distribution at 0.933193, from tables.
+        for (clips, quantile) in [(3, 2.454), (6, 1.789), (12, 1.620), (1000, 1.501)] {
+            assert!((chance(clips) - quantile).abs() < 0.1, "{clips}: {}", chance(clips));
+        }
+    }
 }

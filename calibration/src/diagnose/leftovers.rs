@@ -1,11 +1,13 @@
 //! What the named effects leave: whether it is small enough to believe that they are the cause.
 //!
-//! A substitute for a cause that the library does not know fits a part of it, drifts to a bound, or helps on some clips
-//! and harms on others. What is left is then more than another engine's way of integrating leaves.
+//! A substitute for a cause that the library does not know fits a part of it, grows beyond what is met in practice, or helps
+//! on some clips and harms on others. What is left is then more than another engine's way of integrating leaves.
 
 use super::evidence::Evidence;
 use super::fit::{Bench, Hypothesis};
 use super::gap::Typical;
+use super::parameters;
+use twin::effects::Role;
 
 /// Excess over the noise that any twin leaves, in squared sigmas: numerics, not physics. Sessions of another engine with
 /// nothing wrong leave up to 1.0 (excitations) and 0.1 (the arm on its way into strokes).
@@ -80,18 +82,26 @@ pub fn explained(before: f64, after: f64, floor: f64) -> f64 {
     if excess <= 0.0 { 0.0 } else { ((before - after) / excess).clamp(0.0, 1.0) }
 }
 
-/// Effects of a hypothesis that were pushed against the bound of what is met in practice.
+/// An effect stronger than what is met in practice by more than this share of that range is no cause but a substitute for
+/// one.
+const BEYOND: f64 = 0.05;
+
+/// Effects of a hypothesis that are stronger than what is met in practice, whatever of their intervals is true.
 #[must_use]
-pub fn at_bounds<E: Evidence>(bench: &Bench<'_, E>, hypothesis: &Hypothesis) -> Vec<usize> {
-    let at_bound = |k: &usize| {
-        let (value, unknown) = (hypothesis.full[*k], &bench.library.unknowns[*k]);
-        let room = 1e-3 * (unknown.upper - unknown.lower);
-        let resting = unknown.start;
-        let far = (value - resting).abs() > room;
-        far && (value > unknown.upper - room || value < unknown.lower + room)
+pub fn implausible<E: Evidence>(bench: &Bench<'_, E>, hypothesis: &Hypothesis) -> Vec<usize> {
+    let beyond = |effect: &usize| {
+        let sizes = parameters::of_effect(bench, hypothesis, *effect);
+        let info = bench.library.candidates[*effect].effect.parameters.iter();
+        info.filter(|parameter| matches!(parameter.role, Role::Size { .. })).any(|parameter| {
+            let [lo, hi] = parameter.plausible;
+            let room = BEYOND * (hi - lo);
+            // What fades out towards infinity is met from its strongest on.
+            let hi = if parameter.resting_value().is_infinite() { f64::INFINITY } else { hi };
+            let outside = |[low, high]: &[f64; 2]| *low > hi + room || *high < lo - room;
+            sizes.get(parameter.name).is_some_and(|size| size.ci90.iter().any(outside))
+        })
     };
-    let pushed = |effect: &usize| bench.library.candidates[*effect].sizes.iter().any(at_bound);
-    hypothesis.effects.iter().copied().filter(pushed).collect()
+    hypothesis.effects.iter().copied().filter(beyond).collect()
 }
 
 #[cfg(test)]

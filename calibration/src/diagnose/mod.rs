@@ -19,6 +19,7 @@
 //! | [`fit`] | hypotheses fitted |
 //! | [`score`] | how well they foretell clips |
 //! | [`straying`] | how far clips stray under one of them |
+//! | [`closing`] | how much of the gap they close |
 //! | [`combine`] | which effects act together |
 //! | [`leftovers`] | what they leave |
 //! | [`gap`], [`localise`] | how large the gap is, and where |
@@ -32,6 +33,7 @@ pub mod answer;
 pub mod arm_clips;
 pub mod baseline;
 pub mod cell_clips;
+pub mod closing;
 pub mod combine;
 pub mod command;
 pub mod conclude;
@@ -56,7 +58,7 @@ pub mod sweep;
 pub mod verdict;
 pub mod worthy;
 
-pub use answer::{Candidate, Change, Clips, Diagnosis, Gap, Kind, Place, Share, Size, Status, Verdict};
+pub use answer::{Candidate, Change, Clips, Diagnosis, Gap, Kind, Nearest, Place, Share, Size, Status, Verdict};
 
 use crate::forward::object::ObjectClips;
 use crate::forward::setting::{self, BaseError};

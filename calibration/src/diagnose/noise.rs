@@ -1,19 +1,4 @@
-//! How much of a logged series is noise, told from the series alone.
-
-/// Sum of the squared coefficients of a third difference, 1 3 3 1.
-const THIRD: f64 = 20.0;
-/// Median of the absolute value of a standard normal number.
-const MEDIAN_ABS: f64 = 0.674_49;
-
-/// One sigma of the white noise of an evenly sampled series, from its third differences: motion as smooth as a robot's
-/// leaves little in them. The median forgives single jumps.
-#[must_use]
-pub fn white_sigma(values: impl Iterator<Item = f64>) -> f64 {
-    let values: Vec<f64> = values.collect();
-    let third = |w: &[f64]| (w[3] - 3.0 * w[2] + 3.0 * w[1] - w[0]).abs();
-    let differences: Vec<f64> = values.windows(4).map(third).collect();
-    median(&differences) / MEDIAN_ABS / THIRD.sqrt()
-}
+//! Of many values, what holds for most; and how many of them say the same.
 
 /// The middle value; 0 of none.
 #[must_use]
@@ -57,14 +42,6 @@ mod tests {
         let mut rng = Pcg64::seed_from_u64(1);
         // A sum of twelve uniform numbers is normal enough, with unit variance.
         (0..count).map(|_| (0..12).map(|_| rng.random_range(-0.5..0.5)).sum()).collect()
-    }
-
-    #[test]
-    fn noise_is_told_from_smooth_motion() {
-        let noisy: Vec<f64> =
-            white(4000).iter().enumerate().map(|(i, e)| 1e-3 * e + 0.3 * (i as f64 * 0.006).sin()).collect();
-        let sigma = white_sigma(noisy.into_iter());
-        assert!((sigma / 1e-3 - 1.0).abs() < 0.05, "{sigma}");
     }
 
     #[test]

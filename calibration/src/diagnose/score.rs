@@ -91,6 +91,12 @@ impl Foretold {
 }
 
 impl Advantage {
+    /// How many clips judged.
+    #[must_use]
+    pub fn clips(&self) -> usize {
+        self.gains.len()
+    }
+
     /// By how much more this is worth than another on the same clips, and the standard error of that from the scatter of the
     /// difference between clips [nats]: what two hypotheses gain alike on a clip says nothing about which is right.
     #[must_use]

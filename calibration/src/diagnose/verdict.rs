@@ -18,8 +18,8 @@ pub struct Finding<'a> {
     pub left: Vec<Left>,
     /// Whether the gap shrinks on the clips that were kept for confirming.
     pub confirmed: bool,
-    /// Whether an effect was pushed to the bound of what is met in practice.
-    pub at_bounds: bool,
+    /// Whether an effect is stronger than what is met in practice.
+    pub implausible: bool,
     /// Where the gap, or what is left of it, is largest.
     pub place: String,
 }
@@ -38,7 +38,7 @@ impl Finding<'_> {
             let gap = self.left.iter().any(|left| left.before - left.floor > left.numerics);
             return if gap { self.unexplained() } else { self.none() };
         }
-        if self.at_bounds || self.left.iter().any(|left| left.too_much(self.clear)) {
+        if self.implausible || self.left.iter().any(|left| left.too_much(self.clear)) {
             return self.unexplained();
         }
         if self.rivals.is_empty() { self.named() } else { self.class() }
@@ -88,7 +88,9 @@ impl Finding<'_> {
         let nearest = match &self.effects[..] {
             [] => String::new(),
             names => {
-                format!("; {} comes nearest and leaves {:.0} % of it", names.join(" with "), 100.0 - self.percent())
+                let strength = if self.implausible { ", stronger than it is met in practice," } else { "" };
+                let rest = 100.0 - self.percent();
+                format!("; {} comes nearest{strength} and leaves {rest:.0} % of it", names.join(" with "))
             }
         };
         let text = format!(
@@ -122,7 +124,7 @@ mod tests {
             clear: false,
             left,
             confirmed: true,
-            at_bounds: false,
+            implausible: false,
             place: "joint2".into(),
         }
     }
@@ -148,7 +150,8 @@ mod tests {
 
     #[test]
     fn an_effect_beyond_what_is_met_in_practice_is_a_substitute() {
-        let pushed = Finding { at_bounds: true, ..finding(vec!["payload"], 500.0, 1.5) };
-        assert_eq!(pushed.verdict().kind, Kind::Unexplained);
+        let pushed = Finding { implausible: true, ..finding(vec!["payload"], 500.0, 1.5) };
+        let verdict = pushed.verdict();
+        assert!(verdict.kind == Kind::Unexplained && verdict.text.contains("stronger than"), "{}", verdict.text);
     }
 }

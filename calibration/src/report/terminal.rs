@@ -1,7 +1,7 @@
 //! What verbs print on stderr for a person: a short table, aligned, and the sentence at the end, where eyes are.
 
 use super::benchmark::{Method, RATES};
-use super::diagnosis::{has_effects, is_known, sizes, verdict_words, words};
+use super::diagnosis::{has_effects, is_known, sizes, together, verdict_words, words};
 use super::identification::{Parameter, Sheet};
 use super::quantity::{Unit, short};
 use super::scale::span;
@@ -87,6 +87,10 @@ fn gap(diagnosis: &Diagnosis) -> Vec<String> {
         if both { format!(", closed {}", percent_interval(gap.shrink.value, gap.shrink.ci90)) } else { String::new() };
     let noise = short(gap.floor);
     let mut lines = vec![format!("gap: {} (noise alone {noise}){closed}", arrow(&sigma, gap.before, gap.after))];
+    if let Some(nearest) = &diagnosis.nearest {
+        let closed = percent_interval(nearest.shrink.value, nearest.shrink.ci90);
+        lines.push(format!("nearest: {} closes {closed} of it", together(&nearest.effects)));
+    }
     let human =
         [("joints", "rad", gap.joint_rms_rad), ("ADD", "m", gap.object_add_m), ("ADD-S", "m", gap.object_add_s_m)];
     for (name, si, change) in human {

@@ -16,7 +16,7 @@
 
 mod clip;
 mod encoder_age;
-mod noise;
+pub mod noise;
 mod piece;
 mod torque_time;
 

@@ -6,8 +6,10 @@ const THIRD_DIFFERENCE: f64 = 20.0;
 const MEDIAN_ABSOLUTE: f64 = 0.674_49;
 
 /// One sigma of the noise of an evenly sampled signal. Third differences take out the motion; their median takes out
-/// events. Never less than what its resolution leaves unknown.
-pub(super) fn sigma(signal: &[f64]) -> f64 {
+/// events. Never less than what its resolution leaves unknown: slow motion on a coarse encoder stands on one step for most
+/// of the time, and that is no certainty.
+#[must_use]
+pub fn sigma(signal: &[f64]) -> f64 {
     let mut thirds: Vec<f64> =
         signal.windows(4).map(|w| (w[3] - 3.0 * w[2] + 3.0 * w[1] - w[0]).abs()).filter(|d| d.is_finite()).collect();
     if thirds.is_empty() {

@@ -57,6 +57,11 @@ pub(super) fn words(effect: &str) -> String {
     effect.replace('_', " ")
 }
 
+/// Names of effects that act together, as words.
+pub(super) fn together(effects: &[String]) -> String {
+    effects.iter().map(|effect| words(effect)).collect::<Vec<_>>().join(" and ")
+}
+
 /// Whether an effect was added, so that there is an after.
 pub(super) fn has_effects(diagnosis: &Diagnosis) -> bool {
     matches!(diagnosis.verdict.kind, Kind::Named | Kind::Class) && !diagnosis.verdict.effects.is_empty()
@@ -70,6 +75,11 @@ fn head(diagnosis: &Diagnosis) -> Markup {
         entries.push((closed, "of the squared gap closed (90 % interval)"));
         entries.push((percent(gap.explainable_fraction), "of what can be explained"));
     }
+    let closed_by = diagnosis.nearest.as_ref().map(|nearest| {
+        let closed = percent_interval(nearest.shrink.value, nearest.shrink.ci90);
+        (closed, format!("of the squared gap closed by {}", together(&nearest.effects)))
+    });
+    entries.extend(closed_by.iter().map(|(closed, what)| (closed.clone(), what.as_str())));
     html! {
         p.kicker { "Diagnosis of " b { (diagnosis.session) } ": " (verdict_words(verdict.kind)) }
         h1 { (unbroken(&verdict.text)) }
@@ -87,11 +97,10 @@ fn map(diagnosis: &Diagnosis) -> Markup {
 }
 
 fn residuals(diagnosis: &Diagnosis) -> Markup {
-    let names: Vec<String> = diagnosis.verdict.effects.iter().map(|effect| words(effect)).collect();
+    let effects = diagnosis.nearest.as_ref().map_or(&diagnosis.verdict.effects, |nearest| &nearest.effects);
     let added = match diagnosis.verdict.kind {
-        _ if names.is_empty() => "with the best candidate".to_owned(),
-        Kind::Class => format!("with {}", names.join(" or ")),
-        _ => format!("with {}", names.join(" and ")),
+        Kind::Class => format!("with {}", effects.iter().map(|effect| words(effect)).collect::<Vec<_>>().join(" or ")),
+        _ => format!("with {}", together(effects)),
     };
     let pictures = gallery(&diagnosis.traces, SHOWN_CLIPS, ["parameters identified first", &added]);
     figure("Clips never used: measured less predicted", "The worst channel of the worst clips.", &pictures)
@@ -131,7 +140,7 @@ fn clip_list(clips: &[String]) -> String {
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
-    use crate::diagnose::{Candidate, Change, Clips, Gap, Place, Share, Size, Status, Verdict};
+    use crate::diagnose::{Candidate, Change, Clips, Gap, Nearest, Place, Share, Size, Status, Verdict};
     use crate::report::Trace;
     use shared_mem::theta::Theta;
     use std::collections::BTreeMap;
@@ -178,6 +187,7 @@ pub(super) mod tests {
                 object_add_m: Change { before: Some(0.0139), after: Some(0.0012) },
                 object_add_s_m: Change::default(),
             },
+            nearest: None,
             places: vec![Place {
                 stage: "control".into(),
                 channel: "joint2".into(),
@@ -242,6 +252,19 @@ pub(super) mod tests {
         let html = page(&diagnosis);
         assert!(html.contains("no gap beyond the noise") && !html.contains("1.40 \u{3c3}"), "{html}");
         assert!(html.contains("None of them is named or still possible"));
+    }
+
+    #[test]
+    fn what_comes_nearest_to_an_unknown_cause_is_shown_with_what_it_closes() {
+        let mut diagnosis = named();
+        diagnosis.verdict = Verdict { kind: Kind::Unexplained, effects: vec![], ..diagnosis.verdict };
+        let effects = vec!["payload".into(), "joint_viscous_friction".into()];
+        diagnosis.nearest = Some(Nearest { effects, shrink: Share { value: 0.84, ci90: [0.8, 0.88] } });
+        let html = page(&diagnosis);
+        for text in ["84 [80, 88] %", "closed by payload and joint viscous friction", "with payload and joint viscous"]
+        {
+            assert!(html.contains(text), "no {text} in {html}");
+        }
     }
 
     #[test]
