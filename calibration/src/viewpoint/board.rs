@@ -2,15 +2,15 @@
 //! squares is told apart from the others even when only some are seen (Garrido-Jurado et al. 2014). Rough is enough:
 //! the robot's outline has the last word on where the camera stands.
 
+use super::dictionary::Dictionary;
 use super::grid::Grid;
+use super::lattice::{self, Corner, Crossing};
 use super::lens::Lens;
 use super::picture::Pixels;
 use super::planar::{self, Seen};
 use anyhow::Context as _;
-use calib_targets_aruco::resolve_dictionary;
-use calib_targets_chessboard::{ChessCorner, ChessboardDetector, ChessboardParams};
 use chess_corners::DetectorConfig;
-use nalgebra::{Isometry3, Point2, Point3};
+use nalgebra::{Isometry3, Point3};
 
 /// The board as OpenCV draws it: the first square black, or, of an even number of rows drawn before OpenCV 4.6, white. Its
 /// frame: origin at the outer corner of that square, x along the rows, y down the columns, z into the board.
@@ -25,9 +25,6 @@ pub struct Board {
     /// Name of the markers' dictionary as OpenCV has it, ArUco's or AprilTag's: `DICT_5X5_100`, `DICT_APRILTAG_36h11`.
     pub dictionary: String,
 }
-
-/// A crossing of four squares: its place in a lattice that begins anywhere and may be turned, and where it is seen [pixel].
-type Crossing = ([i32; 2], [f64; 2]);
 
 /// Middle of a field of a marker in the board's frame [m], and whether it is light.
 type Field = ([f64; 2], bool);
@@ -57,10 +54,10 @@ impl Board {
         if marker >= square {
             return Err("a marker is smaller than its square; both in metres".into());
         }
-        let Some(known) = resolve_dictionary(dictionary) else {
+        let Some(known) = Dictionary::named(dictionary) else {
             return Err(format!("no dictionary is called {dictionary}; OpenCV's names hold, like DICT_4X4_50"));
         };
-        let (needed, has) = (squares[0] * squares[1] / 2, known.codes().len());
+        let (needed, has) = (squares[0] * squares[1] / 2, known.markers());
         if has < needed as usize {
             return Err(format!("the board has {needed} markers, {dictionary} only {has}"));
         }
@@ -102,21 +99,21 @@ impl Board {
 
     /// Every field of every marker, for a board whose first square is black (0) or white (1).
     fn fields(&self, first: u32) -> Vec<Field> {
-        let Some(dictionary) = resolve_dictionary(&self.dictionary) else { return Vec::new() };
-        let fields = dictionary.marker_size() as u32 + 2;
+        let Some(dictionary) = Dictionary::named(&self.dictionary) else { return Vec::new() };
+        let fields = dictionary.side + 2;
         let [columns, rows] = self.squares;
         let white = (0..rows).flat_map(|row| (0..columns).map(move |column| [column, row]));
         let white = white.filter(|[column, row]| (column + row + first) % 2 == 1);
         let mut out = Vec::new();
-        for ([column, row], code) in white.zip(dictionary.codes()) {
+        for (marker, [column, row]) in white.take(dictionary.markers()).enumerate() {
             for (i, j) in (0..fields).flat_map(|j| (0..fields).map(move |i| (i, j))) {
                 let across = |square: u32, field: u32| {
                     (f64::from(square) + 0.5) * self.square
                         + ((f64::from(field) + 0.5) / f64::from(fields) - 0.5) * self.marker
                 };
-                let inside = (1..fields - 1).contains(&i) && (1..fields - 1).contains(&j);
-                // The crate's codes have a 1 where the marker is black.
-                let is_light = inside && code >> ((j - 1) * (fields - 2) + i - 1) & 1 == 0;
+                // The border is black.
+                let inside = i.checked_sub(1).zip(j.checked_sub(1));
+                let is_light = inside.and_then(|(i, j)| dictionary.is_light(marker, i, j)).unwrap_or(false);
                 out.push(([across(column, i), across(row, j)], is_light));
             }
         }
@@ -175,20 +172,15 @@ fn lattices(grey: &Grid, factor: usize) -> anyhow::Result<Vec<Vec<Crossing>>> {
     let bytes: Vec<u8> = larger.values.iter().map(|value| value.clamp(0.0, 255.0) as u8).collect();
     let settings = DetectorConfig::chess().with_threshold(CONTRAST);
     let found = chess_corners::Detector::new(settings)?.detect_u8(&bytes, width as u32, height as u32)?;
-    let crossings: Vec<ChessCorner> = found
-        .iter()
-        .map(|found| {
-            let mut corner = ChessCorner::from_position(Point2::new(found.x, found.y));
-            corner.strength = found.response;
-            for (to, from) in corner.axes.iter_mut().zip(found.axes.iter().flatten()) {
-                (to.angle, to.sigma) = (from.angle, from.sigma);
-            }
-            corner
+    let corners = found.iter().filter_map(|found| {
+        let axes = found.axes?.map(|axis| f64::from(axis.angle));
+        Some(Corner {
+            at: [found.x, found.y].map(|v| smaller(f64::from(v))),
+            response: f64::from(found.response),
+            axes,
         })
-        .collect();
-    let boards = ChessboardDetector::new(ChessboardParams::default())?.detect_all(&crossings);
-    let pixel = |at: &Point2<f32>| [at.x, at.y].map(|v| smaller(f64::from(v)));
-    Ok(boards.iter().map(|b| b.corners.iter().map(|c| ([c.grid.u, c.grid.v], pixel(&c.position))).collect()).collect())
+    });
+    Ok(lattice::lattices(&corners.collect::<Vec<_>>()))
 }
 
 #[cfg(test)]
@@ -201,7 +193,7 @@ mod tests {
     /// A picture of the board, every pixel the mean of four rays; the room around is grey.
     fn picture(board: &Board, first: u32, camera_from_board: &Isometry3<f64>) -> Pixels {
         let fields = board.fields(first);
-        let across = resolve_dictionary(&board.dictionary).expect("a dictionary").marker_size() + 2;
+        let across = Dictionary::named(&board.dictionary).expect("a dictionary").side as usize + 2;
         let board_from_camera = camera_from_board.inverse();
         let eye = board_from_camera * Point3::origin();
         let shade = |u: f64, v: f64| {

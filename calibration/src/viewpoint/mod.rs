@@ -11,18 +11,20 @@
 //! | [`scan`], [`refine`], [`fit`] | the fast way: look everywhere, least squares, keep the best |
 //! | [`search`] | the paper's way: a particle swarm |
 //! | [`start`] | a start where none is known |
-//! | [`board`], [`planar`] | a start from a ChArUco board at a known place |
+//! | [`board`], [`lattice`], [`dictionary`], [`planar`] | a start from a ChArUco board at a known place: what it looks like, its crossings, its markers, where it stands |
 //! | [`interval`] | how sure the pose is |
 //! | [`grid`], [`lens`], [`step`], `distance` | pictures of numbers, projection, moves of a camera |
 
 pub mod answer;
 pub mod board;
 pub mod command;
+pub mod dictionary;
 mod distance;
 pub mod fit;
 pub mod frame;
 pub mod grid;
 pub mod interval;
+pub mod lattice;
 pub mod lens;
 pub mod outline;
 pub mod overlay;

@@ -40,30 +40,12 @@ fn middle(seen: &[Seen]) -> Vector3<f64> {
     Vector3::new(sum[0] / count, sum[1] / count, 0.0)
 }
 
-/// Pose of the plane about the middle of the points, from the direct linear transform with points of unit size.
+/// Pose of the plane about the middle of the points.
 fn from_homography(seen: &[Seen], lens: &Lens) -> Option<Isometry3<f64>> {
-    if seen.len() < 4 {
-        return None;
-    }
     let middle = middle(seen);
-    let size = (seen.iter().map(|s| (Vector3::new(s.place[0], s.place[1], 0.0) - middle).norm_squared()).sum::<f64>()
-        / seen.len() as f64)
-        .sqrt();
-    let mut rows = DMatrix::zeros(2 * seen.len(), 9);
-    for (number, s) in seen.iter().enumerate() {
-        let [x, y] = [0, 1].map(|i| (s.place[i] - middle[i]) / size);
-        let [u, v] = [0, 1].map(|i| (s.pixel[i] - lens.centre[i]) / lens.focal[i]);
-        rows.row_mut(2 * number).copy_from_slice(&[x, y, 1.0, 0.0, 0.0, 0.0, -u * x, -u * y, -u]);
-        rows.row_mut(2 * number + 1).copy_from_slice(&[0.0, 0.0, 0.0, x, y, 1.0, -v * x, -v * y, -v]);
-    }
-    let eigen = (rows.transpose() * rows).symmetric_eigen();
-    let mut order: Vec<usize> = (0..9).collect();
-    order.sort_by(|a, b| eigen.eigenvalues[*a].total_cmp(&eigen.eigenvalues[*b]));
-    // Points on a line leave more than one direction open.
-    if eigen.eigenvalues[order[1]] < 1e-9 * eigen.eigenvalues[order[8]] {
-        return None;
-    }
-    let mut h = Matrix3::from_row_slice(eigen.eigenvectors.column(order[0]).as_slice());
+    let sight = |s: &Seen| [0, 1].map(|i| (s.pixel[i] - lens.centre[i]) / lens.focal[i]);
+    let pairs: Vec<_> = seen.iter().map(|s| ([s.place[0] - middle.x, s.place[1] - middle.y], sight(s))).collect();
+    let mut h = homography(&pairs)?;
     if h[(2, 2)] < 0.0 {
         h = -h;
     }
@@ -74,8 +56,42 @@ fn from_homography(seen: &[Seen], lens: &Lens) -> Option<Isometry3<f64>> {
     let (x, y) = (h.column(0) / scale, h.column(1) / scale);
     let turn =
         Rotation3::from_matrix_eps(&Matrix3::from_columns(&[x, y, x.cross(&y)]), 1e-12, 100, Rotation3::identity());
-    let at = h.column(2) * (size / scale);
+    let at = h.column(2) / scale;
     Some(Isometry3::from_parts(Translation3::new(at.x, at.y, at.z), UnitQuaternion::from_rotation_matrix(&turn)))
+}
+
+/// How one plane shows in another, from points of both: the direct linear transform, both sides about the origin and of
+/// unit size (Hartley 1997). `None` for fewer than four points, or points on a line.
+#[must_use]
+pub fn homography(pairs: &[([f64; 2], [f64; 2])]) -> Option<Matrix3<f64>> {
+    if pairs.len() < 4 {
+        return None;
+    }
+    let unit = |points: &[[f64; 2]]| {
+        let count = points.len() as f64;
+        let middle = [0, 1].map(|i| points.iter().map(|p| p[i]).sum::<f64>() / count);
+        let squares = points.iter().map(|p| (p[0] - middle[0]).powi(2) + (p[1] - middle[1]).powi(2));
+        let size = (squares.sum::<f64>() / count).sqrt().max(f64::MIN_POSITIVE);
+        Matrix3::new(1.0 / size, 0.0, -middle[0] / size, 0.0, 1.0 / size, -middle[1] / size, 0.0, 0.0, 1.0)
+    };
+    let (from, to): (Vec<_>, Vec<_>) = pairs.iter().copied().unzip();
+    let (of_from, of_to) = (unit(&from), unit(&to));
+    let mut rows = DMatrix::zeros(2 * pairs.len(), 9);
+    for (number, (from, to)) in pairs.iter().enumerate() {
+        let [x, y] = [0, 1].map(|i| of_from[(i, i)] * from[i] + of_from[(i, 2)]);
+        let [u, v] = [0, 1].map(|i| of_to[(i, i)] * to[i] + of_to[(i, 2)]);
+        rows.row_mut(2 * number).copy_from_slice(&[x, y, 1.0, 0.0, 0.0, 0.0, -u * x, -u * y, -u]);
+        rows.row_mut(2 * number + 1).copy_from_slice(&[0.0, 0.0, 0.0, x, y, 1.0, -v * x, -v * y, -v]);
+    }
+    let eigen = (rows.transpose() * rows).symmetric_eigen();
+    let mut order: Vec<usize> = (0..9).collect();
+    order.sort_by(|a, b| eigen.eigenvalues[*a].total_cmp(&eigen.eigenvalues[*b]));
+    // Points on a line leave more than one direction open.
+    if eigen.eigenvalues[order[1]] < 1e-9 * eigen.eigenvalues[order[8]] {
+        return None;
+    }
+    let between = Matrix3::from_row_slice(eigen.eigenvectors.column(order[0]).as_slice());
+    Some(of_to.try_inverse()? * between * of_from)
 }
 
 /// Least squares on the pixels, the plane's frame at the middle of the points: what is left [pixel²], and the pose.
