@@ -164,8 +164,9 @@ impl Step {
     }
 }
 
-/// Clips with an object take a simulation for each number of their own; joints one by one besides would take too long.
-fn last_pass<E: Evidence>(bench: &Bench<'_, E>) -> Effort {
+/// The effort of a fit to the end. Clips with an object take a simulation for each number of their own; joints one by one
+/// besides would take too long.
+pub fn last_pass<E: Evidence>(bench: &Bench<'_, E>) -> Effort {
     if bench.scatter.count() == 0 { LAST_PASS } else { Effort { precision: Precision::Joints, ..LAST_PASS } }
 }
 

@@ -7,10 +7,11 @@ use super::evidence::Evidence;
 use super::fit::{Bench, Hypothesis};
 use super::gap::Residuals;
 use super::leftovers::{self, Left};
+use super::score::foretell;
 use super::shortlist::TESTABLE;
 use super::split::Split;
 use super::verdict::{self, Finding};
-use super::{DiagnoseError, Kind, Options, advice, confidence, localise, parameters};
+use super::{DiagnoseError, Kind, Options, advice, combine, confidence, localise, parameters};
 use crate::report::Trace;
 use shared_mem::recording::Session;
 use shared_mem::theta::Theta;
@@ -75,7 +76,7 @@ pub fn conclude<E: Evidence>(
         .map(|(before, after)| Left::of_groups(&before, &after))
         .ok_or(DiagnoseError::NoBaseline)?;
     let confirmed = after.mean_square() < before.mean_square();
-    let finding = finding(bench, found, (left, confirmed), &rest);
+    let finding = finding(bench, (split, found), (left, confirmed), &rest);
     let verdict = finding.verdict();
     let believed = matches!(verdict.kind, Kind::Named | Kind::Class);
     let kept = if believed { &found.last } else { &first.from };
@@ -123,7 +124,7 @@ pub fn conclude<E: Evidence>(
 
 fn finding<'a, E: Evidence>(
     bench: &Bench<'a, E>,
-    found: &Found,
+    (split, found): (&Split, &Found),
     (left, confirmed): (Vec<Left>, bool),
     rest: &[Place],
 ) -> Finding<'a> {
@@ -133,7 +134,8 @@ fn finding<'a, E: Evidence>(
     for (step, effect) in steps_of(found) {
         clear &= step.is_clear(effect);
         let others = confidence::rivals(step, effect, step.unforeseen(bench, &found.last));
-        rivals.extend(others.iter().filter(|other| !found.last.effects.contains(other)).map(name));
+        let others = others.into_iter().filter(|other| !found.last.effects.contains(other));
+        rivals.extend(others.filter(|other| stands_in(bench, split, found, (step, effect), *other)).map(|k| name(&k)));
         let all = confidence::probabilities(step, false);
         sure = sure.min(all.iter().find(|(candidate, _)| *candidate == effect).map_or(0.5, |(_, p)| *p));
     }
@@ -147,6 +149,31 @@ fn finding<'a, E: Evidence>(
         implausible: !leftovers::implausible(bench, &found.last).is_empty(),
         place: rest.first().map_or_else(String::new, |place| format!("{} ({})", place.channel, place.regime)),
     }
+}
+
+/// Whether a rival of an effect does as well in its place beside all the others that were found: where several act, what one
+/// of them left unexplained makes rivals of it look alike that are told apart once the others are there.
+fn stands_in<E: Evidence>(
+    bench: &Bench<'_, E>,
+    split: &Split,
+    found: &Found,
+    (step, effect): (&Step, usize),
+    rival: usize,
+) -> bool {
+    let (last, weights) = (&found.last, &found.steps[found.steps.len() - 1].weights);
+    let fitted = step.trials.iter().find(|trial| trial.scored.candidate == rival);
+    let Some((fit, _)) = fitted.and_then(|trial| trial.fitted.as_ref()).filter(|_| last.effects.len() > 1) else {
+        return true;
+    };
+    let effects: Vec<usize> = last.effects.iter().map(|other| if *other == effect { rival } else { *other }).collect();
+    let mut full = last.full.clone();
+    bench.library.candidates[effect].numbers.clone().for_each(|k| full[k] = bench.library.unknowns[k].start);
+    bench.library.candidates[rival].numbers.clone().for_each(|k| full[k] = fit.full[k]);
+    let swapped = bench.fit((&effects, full), &split.train, weights, Some(last), combine::last_pass(bench));
+    let foretold = |hypothesis| foretell(bench, hypothesis, &split.choose, weights);
+    let Some((with, instead)) = foretold(last).zip(swapped.as_ref().and_then(foretold)) else { return true };
+    let advantage = with.over(&instead);
+    confidence::alike(advantage.nats, advantage.error, advantage.clips())
 }
 
 /// The steps in which the effects that were kept were added.

@@ -43,12 +43,18 @@ pub fn rivals(step: &Step, chosen: usize, unforeseen: f64) -> Vec<usize> {
         let Some((other, trial)) = of(*candidate).filter(|_| *candidate != chosen) else { return false };
         let (beyond, error) = best.beyond(other);
         let (beyond, error) = (beyond / unforeseen, error / unforeseen);
-        let alike = beyond < NEAR.max(chance(best.clips()) * error) && other.nats > other.error;
+        let alike = alike(beyond, error, best.clips()) && other.nats > other.error;
         let dearer = trial.scored.cost > chosen_trial.scored.cost;
         let enough = if dearer { chosen_trial.closes + MORE } else { ALIKE * chosen_trial.closes };
         alike && trial.closes > enough
     };
     step.trials.iter().map(|trial| trial.scored.candidate).filter(near).collect()
+}
+
+/// Whether an advantage over a rival could be chance.
+#[must_use]
+pub fn alike(beyond: f64, error: f64, clips: usize) -> bool {
+    beyond < NEAR.max(chance(clips) * error)
 }
 
 /// [`CHANCE`] where the error is itself told from so few clips: the quantile of Student's distribution at the same
