@@ -103,7 +103,7 @@ fn a_robot_that_stops_itself_is_recovered_a_few_times_and_no_more() {
     let domain = domain("recovery");
     let _bridge = FakeBridge::start(&domain, ArmMode::Move, START, Fault::ReflexAfter(300));
     let mut link = Link::open(Some(&domain)).expect("shared memory");
-    let (mut recovery, interrupt) = (Recovery::default(), Interrupt::default());
+    let (mut recovery, interrupt) = (Recovery::new(3), Interrupt::default());
     assert!(!recovery.settle(&mut link, &interrupt).expect("nothing to settle"));
     for _ in 0..3 {
         stops_itself(&mut link, &mut recovery);
@@ -111,6 +111,7 @@ fn a_robot_that_stops_itself_is_recovered_a_few_times_and_no_more() {
     }
     stops_itself(&mut link, &mut recovery);
     let error = recovery.settle(&mut link, &interrupt).expect_err("too often").to_string();
+    assert!(error.contains("3 times"), "{error}");
     assert!(error.contains("cartesian_reflex") && error.contains("session is continued"), "{error}");
 }
 
@@ -119,7 +120,7 @@ fn a_robot_that_a_person_stopped_or_whose_run_was_ended_is_not_recovered() {
     let domain = domain("stopped");
     let _bridge = FakeBridge::start(&domain, ArmMode::Move, START, Fault::ReflexAfter(300));
     let mut link = Link::open(Some(&domain)).expect("shared memory");
-    let (mut recovery, interrupt) = (Recovery::default(), Interrupt::default());
+    let (mut recovery, interrupt) = (Recovery::new(3), Interrupt::default());
     stops_itself(&mut link, &mut recovery);
     interrupt.ask();
     assert!(!recovery.settle(&mut link, &interrupt).expect("ended"));

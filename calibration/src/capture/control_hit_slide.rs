@@ -93,7 +93,7 @@ pub fn capture(options: &Options, interrupt: &Interrupt) -> anyhow::Result<Summa
     let mut object = ObjectWatch::open(domain)?;
     let mut bridge = task.bridge(&mut link, interrupt)?;
     let limits = limits::of(&cell, &body);
-    let recovery = Recovery::default();
+    let recovery = Recovery::new(options.task.recover);
     let mut desk = Desk { options, cell: &cell, size, body: &body, limits: &limits, session, interrupt, recovery };
     let clips = match desk.clips(&mut link, &mut object) {
         Ok(clips) => clips,

@@ -77,7 +77,7 @@ pub fn capture(
     let session = Session::open(&task.out, &cell)?;
     let mut link = Link::open(task.domain.as_deref())?;
     let mut bridge = task.bridge(&mut link, interrupt)?;
-    let (limits, floor, recovery) = (limits::of(&cell, &body), floor(&cell), Recovery::default());
+    let (limits, floor, recovery) = (limits::of(&cell, &body), floor(&cell), Recovery::new(options.task.recover));
     let mut desk = Desk { options, limits, body, floor, session, interrupt, recovery };
     let mut clips = Vec::new();
     loop {

@@ -1,13 +1,11 @@
-//! What a capture does when the robot stops itself on the way: it waits, has the reflex cleared and goes on, a few times. A stop
-//! that a person pressed is never lifted.
+//! What a capture does when the robot stops itself on the way: it ends, unless it was told how often to go on by itself. Then it
+//! waits, has the reflex cleared and goes on. A stop that a person pressed is never lifted.
 
 use super::link::{Link, LinkError};
 use super::stream::Outcome;
 use crate::interrupt::Interrupt;
 use std::time::{Duration, Instant};
 
-/// So often a run recovers by itself; an arm that stops itself more often is in trouble that a person has to look at.
-const MOST: u32 = 3;
 /// Wait before a reflex is cleared: an object comes to rest, a person sees what happened and can end it.
 const PAUSE: Duration = Duration::from_secs(2);
 /// How often the wait looks whether to end.
@@ -16,15 +14,16 @@ const LOOK: Duration = Duration::from_millis(20);
 /// The robot will not be recovered by this run.
 #[derive(Debug, thiserror::Error)]
 pub enum RecoveryError {
-    /// It stopped itself again and again.
+    /// It stopped itself more often than this run was to recover it.
     #[error(
-        "{reason} for the {nth}th time in this run; look at what the arm runs into, free it, restart the bridge and start the \
-         same command again: the session is continued",
-        nth = MOST + 1
+        "{reason}; look at what the arm runs into, free it, restart the bridge and start the same command again: the session \
+         is continued (recovered by itself {most} times, as --recover allows)"
     )]
     TooOften {
         /// What the bridge said.
         reason: String,
+        /// How often it was recovered.
+        most: u32,
     },
     /// The bridge could not recover it, or a person stopped it.
     #[error(transparent)]
@@ -32,13 +31,20 @@ pub enum RecoveryError {
 }
 
 /// The reflexes of one run.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub struct Recovery {
+    most: u32,
     pending: Option<String>,
     done: u32,
 }
 
 impl Recovery {
+    /// Recovers by itself at most so often: an arm that stops itself more often is in trouble that a person has to look at.
+    #[must_use]
+    pub fn new(most: u32) -> Self {
+        Self { most, pending: None, done: 0 }
+    }
+
     /// Takes note of how a motion ended.
     ///
     /// # Errors
@@ -64,12 +70,12 @@ impl Recovery {
     /// [`RecoveryError`] with the remedy.
     pub fn settle(&mut self, link: &mut Link, interrupt: &Interrupt) -> Result<bool, RecoveryError> {
         let Some(reason) = self.pending.take() else { return Ok(false) };
-        if self.done == MOST {
-            return Err(RecoveryError::TooOften { reason });
+        if self.done == self.most {
+            return Err(RecoveryError::TooOften { reason, most: self.most });
         }
         self.done += 1;
         let wait = PAUSE.as_secs();
-        eprintln!("{reason}; it is recovered in {wait} s ({} of {MOST} times, Ctrl-C ends)", self.done);
+        eprintln!("{reason}; it is recovered in {wait} s ({} of {} times, Ctrl-C ends)", self.done, self.most);
         let begin = Instant::now();
         while begin.elapsed() < PAUSE && !interrupt.asked() {
             std::thread::sleep(LOOK);

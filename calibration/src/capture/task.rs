@@ -19,6 +19,8 @@ pub struct Task {
     pub arm: Option<String>,
     /// Whether that bridge insists on real time, as `rt_bridge run --realtime` takes it; default: the bridge's own.
     pub realtime: Option<String>,
+    /// How often a robot that stops itself is recovered without a person.
+    pub recover: u32,
     /// Shared-memory domain; default: the one this process was started in.
     pub domain: Option<String>,
 }

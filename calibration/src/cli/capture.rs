@@ -34,12 +34,15 @@ struct TaskArguments {
     /// Whether that bridge refuses to run without real-time guarantees: enforce or ignore [default: the bridge's own].
     #[arg(long, value_parser = ["enforce", "ignore"])]
     realtime: Option<String>,
+    /// How often a robot that stops itself (a reflex) is recovered without you: the arm moves again by itself then.
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u32).range(..=20))]
+    recover: u32,
 }
 
 impl TaskArguments {
     fn task(self) -> Task {
-        let Self { cell, clips, out, arm, realtime } = self;
-        Task { cell, clips, out, arm, realtime, domain: None }
+        let Self { cell, clips, out, arm, realtime, recover } = self;
+        Task { cell, clips, out, arm, realtime, recover, domain: None }
     }
 }
 
@@ -50,8 +53,8 @@ of position, speed, acceleration, jerk, torque or height is made smaller; which 
 
 A session that exists is continued with the next number; nothing is overwritten. At any moment p (or SIGUSR1)
 pauses: the arm brakes inside its limits and holds, and p (or SIGUSR2) goes on with a fresh try of the same clip. q or
-Ctrl-C ends: the arm brakes, and what was recorded is kept. A robot that stops itself is recovered up to three times, the
-arm goes back and the clip is repeated; one that a person stopped is left alone.
+Ctrl-C ends: the arm brakes, and what was recorded is kept. A robot that stops itself ends it too; with --recover 3 it is
+recovered up to three times 2 s later, the arm goes back and the clip is repeated. One that a person stopped is left alone.
 
 Examples:
   calibration capture excitation --cell config/fr3_cell.toml --clips 4 --out session
@@ -82,8 +85,8 @@ that got away is asked for by hand.
 
 A session that exists is continued with the next number; nothing is overwritten. At any moment p (or SIGUSR1)
 pauses: the arm brakes inside its limits and holds, and p (or SIGUSR2) goes on with a fresh try of the same clip. q or
-Ctrl-C ends: the arm brakes, and what was recorded is kept. A robot that stops itself is recovered up to three times, the
-arm goes back and the clip is repeated; one that a person stopped is left alone.
+Ctrl-C ends: the arm brakes, and what was recorded is kept. A robot that stops itself ends it too; with --recover 3 it is
+recovered up to three times 2 s later, the arm goes back and the clip is repeated. One that a person stopped is left alone.
 
 Examples:
   calibration capture control-hit-slide --cell config/fr3_cell.toml --clips 12 --out strokes

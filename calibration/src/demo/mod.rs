@@ -210,6 +210,7 @@ fn record(
             out: files.session.clone(),
             arm: None,
             realtime: None,
+            recover: 0,
             domain: Some(domain),
         },
         duration: DURATION,
