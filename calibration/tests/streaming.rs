@@ -100,9 +100,7 @@ fn a_robot_in_reflex_is_not_moved_and_the_remedy_is_named() {
 
 #[test]
 fn a_robot_that_stops_itself_is_recovered_a_few_times_and_no_more() {
-    let domain = domain("recovery");
-    let _bridge = FakeBridge::start(&domain, ArmMode::Move, START, Fault::ReflexAfter(300));
-    let mut link = Link::open(Some(&domain)).expect("shared memory");
+    let (_bridge, mut link) = robot_that_stops_itself("recovery");
     let (mut recovery, interrupt) = (Recovery::new(3), Interrupt::default());
     assert!(!recovery.settle(&mut link, &interrupt).expect("nothing to settle"));
     for _ in 0..3 {
@@ -116,22 +114,36 @@ fn a_robot_that_stops_itself_is_recovered_a_few_times_and_no_more() {
 }
 
 #[test]
+fn no_robot_is_recovered_unless_that_was_allowed_beforehand() {
+    let (_bridge, mut link) = robot_that_stops_itself("forbidden");
+    let mut recovery = Recovery::new(0);
+    stops_itself(&mut link, &mut recovery);
+    let error = recovery.settle(&mut link, &Interrupt::default()).expect_err("nobody allowed it").to_string();
+    assert!(error.contains("--recover") && !error.contains('\n'), "{error}");
+    assert!(matches!(link.ready_state(), Err(LinkError::NotReady { .. })), "still in its reflex");
+}
+
+#[test]
 fn a_robot_that_a_person_stopped_or_whose_run_was_ended_is_not_recovered() {
-    let domain = domain("stopped");
-    let _bridge = FakeBridge::start(&domain, ArmMode::Move, START, Fault::ReflexAfter(300));
-    let mut link = Link::open(Some(&domain)).expect("shared memory");
+    let (_bridge, mut link) = robot_that_stops_itself("stopped");
     let (mut recovery, interrupt) = (Recovery::new(3), Interrupt::default());
     stops_itself(&mut link, &mut recovery);
     interrupt.ask();
     assert!(!recovery.settle(&mut link, &interrupt).expect("ended"));
     assert!(matches!(link.ready_state(), Err(LinkError::NotReady { .. })), "still in its reflex");
 
-    let domain = self::domain("button");
+    let domain = domain("button");
     let _bridge = FakeBridge::start(&domain, ArmMode::UserStopped, START, Fault::None);
     let mut link = Link::open(Some(&domain)).expect("shared memory");
     assert!(link.wait_for_bridge(Duration::from_secs(5), || false).expect("shared memory").is_some());
     let error = link.recover().expect_err("a person's stop is a person's to lift").to_string();
     assert!(error.contains("stop button"), "{error}");
+}
+
+fn robot_that_stops_itself(name: &str) -> (FakeBridge, Link) {
+    let domain = domain(name);
+    let bridge = FakeBridge::start(&domain, ArmMode::Move, START, Fault::ReflexAfter(300));
+    (bridge, Link::open(Some(&domain)).expect("shared memory"))
 }
 
 fn stops_itself(link: &mut Link, recovery: &mut Recovery) {
