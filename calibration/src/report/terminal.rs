@@ -89,7 +89,7 @@ fn gap(diagnosis: &Diagnosis) -> Vec<String> {
     let mut lines = vec![format!("gap: {} (noise alone {noise}){closed}", arrow(&sigma, gap.before, gap.after))];
     if let Some(nearest) = &diagnosis.nearest {
         let closed = percent_interval(nearest.shrink.value, nearest.shrink.ci90);
-        lines.push(format!("nearest: {} closes {closed} of it", together(&nearest.effects)));
+        lines.push(format!("nearest: {} closes {closed} of it on clips held out", together(&nearest.effects)));
     }
     let human =
         [("joints", "rad", gap.joint_rms_rad), ("ADD", "m", gap.object_add_m), ("ADD-S", "m", gap.object_add_s_m)];

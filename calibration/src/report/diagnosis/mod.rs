@@ -77,7 +77,7 @@ fn head(diagnosis: &Diagnosis) -> Markup {
     }
     let closed_by = diagnosis.nearest.as_ref().map(|nearest| {
         let closed = percent_interval(nearest.shrink.value, nearest.shrink.ci90);
-        (closed, format!("of the squared gap closed by {}", together(&nearest.effects)))
+        (closed, format!("of the squared gap closed by {} on clips held out", together(&nearest.effects)))
     });
     entries.extend(closed_by.iter().map(|(closed, what)| (closed.clone(), what.as_str())));
     html! {
