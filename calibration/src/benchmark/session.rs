@@ -77,6 +77,7 @@ impl Studio<'_> {
         let acting = self.acting(&desired, &mut rng);
         let theta = self.theta(index as f64 / count as f64, &mut rng);
         let mut rollout = CellRollout::new(&self.world.cell, Some(&theta))?;
+        rollout.refine(self.world.parts);
         let commands = CommandTrack::new(&acting).ok_or_else(|| SessionError::Motion("an empty plan".into()))?;
         let strokes = self.world.kind == Kind::Strokes;
         let standing = ObjectState::at_rest(Pose::from_isometry(object));

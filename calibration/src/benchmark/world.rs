@@ -90,6 +90,8 @@ pub struct World {
     pub outside: Option<Outside>,
     /// One sigma of ln(mu) from clip to clip.
     pub friction_scatter: f64,
+    /// Steps in which the world integrates what the twin takes in one: nature does not use the fitter's integrator.
+    pub parts: u32,
 }
 
 impl World {
@@ -115,6 +117,7 @@ impl World {
             hidden: Theta { arm: arm(cell, &mut rng), object: object(cell, &mut rng), effects },
             outside: if let Fault::Outside(outside) = fault { Some(outside) } else { None },
             friction_scatter: if number.is_multiple_of(2) { declared } else { 2.0 * declared },
+            parts: rng.random_range(2..=4),
         }
     }
 }

@@ -59,6 +59,11 @@ impl CellRollout {
         self.cell.set_parameters(theta)
     }
 
+    /// Integrates in `parts` as many steps as the twin takes ([`SimCell::refine`]).
+    pub fn refine(&mut self, parts: u32) {
+        self.cell.refine(parts);
+    }
+
     /// Starts at the stamp `at_ns`: the arm where its encoders read `arm`, the object in `object`. Who is `None` takes
     /// no part: the arm alone, the object alone. Commands from before `at_ns` count where they come late.
     pub fn start(

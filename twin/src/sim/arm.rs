@@ -26,6 +26,8 @@ pub(super) struct SimArm {
     /// Torque behind the gears in this period so far, times the share of it that has passed [N m].
     sensed: Joints,
     start: StretchStart,
+    /// A period is integrated in so many parts.
+    parts: u32,
 }
 
 /// The arm at the start of a stretch.
@@ -60,6 +62,7 @@ impl SimArm {
             outside: zero,
             sensed: zero,
             start: StretchStart::default(),
+            parts: 1,
         };
         arm.set(&q, &zero);
         Ok(arm)
@@ -86,16 +89,25 @@ impl SimArm {
         }
     }
 
+    /// See [`super::SimCell::refine`].
+    pub(super) fn refine(&mut self, parts: u32) {
+        self.parts = parts;
+    }
+
     /// What the arm is to follow where controller and period can be computed together: its controller knows the arm
-    /// exactly, and nothing but the object pushes it.
+    /// exactly, nothing but the object pushes it, and the period is taken whole.
     fn in_one_go<'d>(&self, drive: &'d Drive) -> Option<(&'d Joints, &'d Joints)> {
-        self.plant.rollout().exactly_known(drive).filter(|_| self.outside == [0.0; MAX_JOINTS])
+        self.plant.rollout().exactly_known(drive).filter(|_| self.is_whole())
+    }
+
+    fn is_whole(&self) -> bool {
+        self.parts == 1 && self.outside == [0.0; MAX_JOINTS]
     }
 
     /// Parts of a period in which the arm's way may be corrected after the contact: joints that stick or yield do not
     /// answer to a force as the path takes it, so it must be short for them.
-    pub(super) fn stretches(&self) -> usize {
-        if self.plant.acts_in_joints() { 4 } else { 1 }
+    pub(super) fn stretches(&self) -> u32 {
+        self.parts * if self.plant.acts_in_joints() { 4 } else { 1 }
     }
 
     /// Moves the arm on by `length` seconds of the period under `drive` as if nothing touched it; the tool's way there,
@@ -147,7 +159,12 @@ impl SimArm {
                 }
             }
         }
-        rollout.sense(&mut self.motion, &self.before);
+        self.sense(share);
+    }
+
+    /// Adds what the sensors behind the gears told in this `share` of the period.
+    fn sense(&mut self, share: f64) {
+        self.plant.rollout().sense(&mut self.motion, &self.before);
         for (sum, torque) in self.sensed.iter_mut().zip(&self.motion.tau_J) {
             *sum += torque * share;
         }
@@ -163,14 +180,17 @@ impl SimArm {
     /// A whole period in which nothing touches the arm.
     pub(super) fn period(&mut self, drive: &Drive) {
         self.remember(drive);
-        let rollout = self.plant.rollout();
-        if self.outside == [0.0; MAX_JOINTS] {
-            rollout.period(&mut self.motion, drive);
-        } else {
-            rollout.begin(&mut self.motion, drive);
-            rollout.advance(&mut self.motion, &self.outside, TICK);
-            rollout.sense(&mut self.motion, &self.before);
+        if self.is_whole() {
+            self.plant.rollout().period(&mut self.motion, drive);
+            return;
         }
+        self.plant.rollout().begin(&mut self.motion, drive);
+        let share = 1.0 / f64::from(self.parts);
+        for _ in 0..self.parts {
+            self.plant.rollout().advance(&mut self.motion, &self.outside, TICK * share);
+            self.sense(share);
+        }
+        self.end_period();
     }
 
     /// Has `torque` [N m] act on the joints from outside during the next period, beside the contact with the object.

@@ -41,8 +41,8 @@ pub(super) struct ToolContact {
     pair: Option<(Capsule, ContactMotion)>,
     /// From where the flange should hold the tool to where it does, in the flange frame.
     tool_shift: Option<Translation3<f64>>,
-    /// Steps in touch are so many times shorter than the law asks for.
-    refinement: f64,
+    /// Steps are so many times shorter than they need be.
+    parts: u32,
     pub(super) record: ContactRecord,
 }
 
@@ -61,7 +61,7 @@ pub(super) struct ContactRecord {
 
 impl ToolContact {
     pub(super) fn without_object() -> Self {
-        Self { pair: None, tool_shift: None, refinement: 1.0, record: ContactRecord::default() }
+        Self { pair: None, tool_shift: None, parts: 1, record: ContactRecord::default() }
     }
 
     pub(super) fn new(tool: Option<&Tool>, object: &ObjectParameters, effects: &HitEffects) -> Self {
@@ -73,14 +73,20 @@ impl ToolContact {
 
     /// Other parameters of the same pair; what is on record stays.
     pub(super) fn set_parameters(&mut self, tool: Option<&Tool>, object: &ObjectParameters, effects: &HitEffects) {
-        *self = Self { record: self.record, refinement: self.refinement, ..Self::new(tool, object, effects) };
+        *self = Self { record: self.record, parts: self.parts, ..Self::new(tool, object, effects) };
         self.look_again();
     }
 
-    /// Makes the steps in touch `times` shorter: for the test that they are short enough.
-    #[cfg(test)]
-    pub(super) fn refine(&mut self, times: f64) {
-        self.refinement = times;
+    /// See [`super::SimCell::refine`].
+    pub(super) fn refine(&mut self, parts: u32) {
+        self.parts = parts;
+    }
+
+    /// One period of an object that nothing touches.
+    pub(super) fn pass(&self, object: &mut TableObject) {
+        for _ in 0..self.parts {
+            object.step(PERIOD / f64::from(self.parts), &[]);
+        }
     }
 
     /// One period of arm and object from the simulated time `now_ns` on.
@@ -88,17 +94,17 @@ impl ToolContact {
         (self.record.mean_force, self.record.on_tool) = (0.0, Default::default());
         let Some((tool, motion, from)) = self.approaching(arm, object) else {
             arm.period(drive);
-            object.step(PERIOD, &[]);
+            self.pass(object);
             return;
         };
         arm.begin_period(drive);
         let stretches = arm.stretches();
-        let length = PERIOD / stretches as f64;
+        let length = PERIOD / f64::from(stretches);
         for stretch in 0..stretches {
             let from = if stretch == 0 { from } else { arm.flange_motion() };
             let mut close = Close { contact: self, object, tool: &tool, motion: &motion };
             let mut path = arm.path(drive, from, length);
-            close.follow(&mut path, now_ns, length * stretch as f64);
+            close.follow(&mut path, now_ns, length * f64::from(stretch));
             arm.end_path(&path);
         }
         arm.end_period();
@@ -221,7 +227,7 @@ impl Close<'_> {
         let calm = presses.iter().all(|press| press.is_calm(&self.object.velocity_at(&press.touch.point), longest));
         presses.iter_mut().for_each(|press| press.steady = calm);
         let step = if calm { longest } else { self.motion.step() };
-        let dt = left / (left * self.contact.refinement / step).ceil();
+        let dt = left / (left * f64::from(self.contact.parts) / step).ceil();
         let forces = self.object.step(dt, &presses);
         let pressing: f64 = touches.iter().zip(&forces).map(|(touch, force)| force.dot(&touch.normal)).sum();
         self.contact.record.mean_force += pressing * dt / PERIOD;

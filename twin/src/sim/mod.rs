@@ -171,7 +171,7 @@ impl SimCell {
         match (arm, object) {
             (Some(arm), Some(object)) => contact.advance(arm, object, drive, self.time_ns),
             (Some(arm), None) => arm.period(drive),
-            (None, Some(object)) => drop(object.step(PERIOD, &[])),
+            (None, Some(object)) => contact.pass(object),
             (None, None) => {}
         }
         self.time_ns += PERIOD_NS;
@@ -181,6 +181,15 @@ impl SimCell {
     /// recorded arm never did, and looking for it costs time.
     pub fn make_table_solid(&mut self, cell: &Cell) {
         self.table = cell.table.as_ref().map(|table| SolidTable::new(table, cell.tool.as_ref()));
+    }
+
+    /// Integrates every period from now on in `parts` as many steps as it would take, of the arm, of the contact and of the
+    /// object: the same cell by another rule, as another engine would have it. 1 is how the twin itself does it.
+    pub fn refine(&mut self, parts: u32) {
+        if let Some(arm) = &mut self.arm {
+            arm.refine(parts);
+        }
+        self.contact.refine(parts);
     }
 
     /// Tells the arm's controller that the flange carries `load` (flange frame) beside the tool, so that it compensates

@@ -122,9 +122,9 @@ fn a_struck_box_moves_and_the_arm_feels_it() {
 #[test]
 fn a_finer_step_changes_the_hit_by_less_than_two_per_cent() {
     let description = striking();
-    let speeds = [1.0, 2.0].map(|finer| {
+    let speeds = [1, 2].map(|finer| {
         let mut cell = SimCell::new(&description, None).expect("a cell");
-        cell.contact.refine(finer);
+        cell.refine(finer);
         let mut top = 0.0f64;
         strike(&mut cell, 700, |cell| {
             top = top.max(cell.object_velocity().expect("a box").0.norm());
@@ -136,6 +136,20 @@ fn a_finer_step_changes_the_hit_by_less_than_two_per_cent() {
     assert!(change < 0.02, "{change}");
     let shift = (speeds[0].1 - speeds[1].1).norm();
     assert!(shift < 0.003, "{shift} m");
+}
+
+#[test]
+fn a_cell_integrated_in_more_steps_is_the_same_cell_by_another_rule() {
+    let description = striking();
+    let [(q, place), (finer_q, finer_place)] = [1, 3].map(|parts| {
+        let mut cell = SimCell::new(&description, None).expect("a cell");
+        cell.refine(parts);
+        strike(&mut cell, 700, |_| ());
+        (cell.q(), object_position(&cell))
+    });
+    let apart = q.iter().zip(&finer_q).map(|(q, finer)| (q - finer).abs()).fold(0.0, f64::max);
+    assert!((1e-12..2e-4).contains(&apart), "{apart} rad");
+    assert!((place - finer_place).norm() < 0.003, "{} m", (place - finer_place).norm());
 }
 
 #[test]
