@@ -7,6 +7,7 @@ use calibration::viewpoint::command::{Options, StartFrom, run as find};
 use calibration::viewpoint::fit::Method;
 use calibration::viewpoint::search::Reach;
 use clap::{Args, ValueEnum};
+use shared_mem::recording::PictureKind;
 use std::path::PathBuf;
 use twin::render::Hand;
 
@@ -33,6 +34,10 @@ pub(crate) struct ViewpointArguments {
     /// The same view without the robot: colour, or depth where the pictures are depth.
     #[arg(long)]
     background: Option<PathBuf>,
+    /// Silhouettes from a session's depth pictures, without a background: whatever hangs together and stands out of table,
+    /// floor and walls; the robot has to be the largest such thing in view.
+    #[arg(long, conflicts_with_all = ["mask", "board"])]
+    depth: bool,
     /// Focal lengths and principal point [pixel]: fx,fy,cx,cy.
     #[arg(long, value_parser = numbers::<4>)]
     intrinsics: Option<[f64; 4]>,
@@ -127,6 +132,7 @@ pub(super) fn run(arguments: ViewpointArguments) -> anyhow::Result<()> {
         joints,
         masks: mask,
         background,
+        kind: if arguments.depth { PictureKind::Depth } else { PictureKind::Color },
         intrinsics,
         start,
         reach: reach.map(|[degrees, distance]| Reach { angle: degrees.to_radians(), distance }),

@@ -13,7 +13,7 @@ use anyhow::{Context as _, bail, ensure};
 use nalgebra::{Isometry3, Point3, Quaternion, UnitQuaternion};
 use shared_mem::cell::{Camera, CameraPose, Cell, Intrinsics, Robot};
 use shared_mem::frames::{Base, Camera as CameraFrame, Pose as FramePose};
-use shared_mem::recording::{Session, write_png};
+use shared_mem::recording::{PictureKind, Session, write_png};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 use twin::arm::{Joints, MAX_JOINTS};
@@ -32,6 +32,8 @@ pub struct Options {
     pub masks: Vec<PathBuf>,
     /// A picture without the robot.
     pub background: Option<PathBuf>,
+    /// Which pictures of a session.
+    pub kind: PictureKind,
     /// fx, fy, cx, cy.
     pub intrinsics: Option<[f64; 4]>,
     /// Where to begin.
@@ -103,7 +105,7 @@ pub fn run(options: &Options) -> anyhow::Result<Viewpoint> {
     let masked = frames.iter().all(Frame::has_mask);
     ensure!(
         masked || matches!(method, Method::Outline),
-        "a particle swarm needs silhouettes: give --mask or --background, or use --method outline"
+        "a particle swarm needs silhouettes: give --mask, --background or --depth, or use --method outline"
     );
     let reach = options.reach.unwrap_or(if masked { REACH_OF_MASKS } else { REACH_OF_PHOTOS });
     let start = match &options.start {
@@ -171,7 +173,7 @@ fn gather(options: &Options) -> anyhow::Result<(Cell, Vec<Taken>)> {
     }
     let [target] = &options.targets[..] else { bail!("give either one session or clip, or pictures (png, jpg)") };
     let session = Session::open_with(target, options.cell.as_deref())?;
-    let shots = session::shots(&session, options.frames)?;
+    let shots = session::shots(&session, options.kind, options.frames)?;
     let taken = shots.into_iter().map(|shot| {
         let moment = Moment { q: shot.q, size: None, pinhole: None, distortion: [0.0; 5] };
         Taken { name: shot.name, pixels: shot.pixels, moment }
@@ -256,7 +258,7 @@ fn frames(
             (None, Some(background)) => {
                 pixels.against(background, &name)?.map(|grid| grid.undistorted(lens, &camera.distortion, 0.0))
             }
-            (None, None) => flat(pixels.clone()).photo(&name)?,
+            (None, None) => flat(pixels.clone()).alone(lens, &name)?,
         };
         frames.push(Frame::new(name, q, *lens, &evidence, shape));
         all.push(flat(pixels));

@@ -86,6 +86,19 @@ impl Grid {
             self.sample(u, v).map_or(outside, |value| value as f32)
         })
     }
+
+    /// The same of numbers between which there is nothing: every pixel shows the one that lies nearest, 0 outside.
+    #[must_use]
+    pub fn undistorted_nearest(self, lens: &Lens, distortion: &[f64; 5]) -> Self {
+        if distortion.iter().all(|k| *k == 0.0) {
+            return self;
+        }
+        Self::from_fn(self.width, self.height, |x, y| {
+            let [u, v] = distorted(lens, distortion, [x as f64, y as f64]).map(f64::round);
+            let inside = u >= 0.0 && v >= 0.0 && u < self.width as f64 && v < self.height as f64;
+            if inside { self.at(u as usize, v as usize) } else { 0.0 }
+        })
+    }
 }
 
 #[cfg(test)]

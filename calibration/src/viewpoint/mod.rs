@@ -5,6 +5,7 @@
 //! |---|---|
 //! | [`command`], [`answer`], [`overlay`] | what was asked, what is said, the picture with the outline |
 //! | [`picture`], [`session`] | pictures, masks, differences, joints: from files and from clips |
+//! | [`depth`] | the robot in a depth picture without one of the empty cell |
 //! | [`frame`] | one picture with its joints, at three resolutions |
 //! | [`silhouette`], [`photo`], [`pull`] | what a mask and what a photo without one say about the outline |
 //! | [`shape`], [`outline`] | the robot's meshes, and their outline from a pose |
@@ -18,6 +19,7 @@
 pub mod answer;
 pub mod board;
 pub mod command;
+pub mod depth;
 pub mod dictionary;
 mod distance;
 pub mod fit;

@@ -1,10 +1,11 @@
 //! What a picture tells of the robot: from a mask file, from the difference to a picture without the robot, or, where
-//! there is neither, from the photo's own edges.
+//! there is neither, from a photo's own edges or from what stands out of a depth picture's planes.
 
+use super::depth;
 use super::frame::Evidence;
 use super::grid::Grid;
 use super::lens::Lens;
-use anyhow::{Context as _, bail, ensure};
+use anyhow::{Context as _, ensure};
 use shared_mem::msg::image::{ImageHeader, PixelEncoding};
 use shared_mem::recording::{Picture, read_picture};
 use std::path::Path;
@@ -59,8 +60,10 @@ impl Pixels {
                 (0..3).map(channel).collect()
             }
             PixelEncoding::Depth16 => {
+                // A file does not tell its unit: millimetres, as a D455 writes them.
+                let unit = if header.depth_scale > 0.0 { header.depth_scale as f32 * 1e3 } else { 1.0 };
                 let depth = |x: usize, y: usize| {
-                    f32::from(u16::from_le_bytes([byte(y * stride + 2 * x), byte(y * stride + 2 * x + 1)]))
+                    unit * f32::from(u16::from_le_bytes([byte(y * stride + 2 * x), byte(y * stride + 2 * x + 1)]))
                 };
                 vec![Grid::from_fn(size[0], size[1], depth)]
             }
@@ -71,8 +74,13 @@ impl Pixels {
     /// Free of the lens's distortion; what lies outside of the picture is black.
     #[must_use]
     pub fn undistorted(self, lens: &Lens, distortion: &[f64; 5]) -> Self {
-        let channels = self.channels.into_iter().map(|grid| grid.undistorted(lens, distortion, 0.0)).collect();
-        Self { channels, ..self }
+        let is_depth = self.channels.len() == 1;
+        let flat = |grid: Grid| match is_depth {
+            // Between two depths there is nothing.
+            true => grid.undistorted_nearest(lens, distortion),
+            false => grid.undistorted(lens, distortion, 0.0),
+        };
+        Self { channels: self.channels.into_iter().map(flat).collect(), ..self }
     }
 
     /// The mean of the colours, 0 to 255.
@@ -84,13 +92,13 @@ impl Pixels {
         Grid::from_fn(width, height, |x, y| mean(y * width + x))
     }
 
-    /// The photo itself.
+    /// The picture by itself, free of distortion: a photo as it is, of a depth picture what stands out of its planes.
     ///
     /// # Errors
-    /// When all of it looks the same, or it is a depth picture.
-    pub fn photo(&self, name: &str) -> anyhow::Result<Evidence> {
+    /// When all of it looks the same.
+    pub fn alone(&self, lens: &Lens, name: &str) -> anyhow::Result<Evidence> {
         let [r, g, b] = &self.channels[..] else {
-            bail!("{name} is a depth picture; give --background with one that was taken without the robot");
+            return checked(depth::silhouette(&self.channels[0], lens), name, "stands out of table, floor and walls");
         };
         let spread = |grid: &Grid| {
             let mut values = grid.values.clone();

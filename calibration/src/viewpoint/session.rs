@@ -3,7 +3,7 @@
 
 use super::picture::Pixels;
 use anyhow::ensure;
-use shared_mem::recording::{Session, for_color_pictures};
+use shared_mem::recording::{PictureKind, Session, for_pictures};
 
 /// A picture of a session.
 #[derive(Debug)]
@@ -26,17 +26,17 @@ struct Known {
     speed: f64,
 }
 
-/// At most `wanted` colour pictures of the session.
+/// At most `wanted` pictures of a kind in the session.
 ///
 /// # Errors
-/// When a clip cannot be read or holds no pictures with joints.
-pub fn shots(session: &Session, wanted: usize) -> anyhow::Result<Vec<Shot>> {
+/// When a clip cannot be read or holds no such pictures with joints.
+pub fn shots(session: &Session, kind: PictureKind, wanted: usize) -> anyhow::Result<Vec<Shot>> {
     let latency_ns = session.cell.camera.as_ref().map_or(0, |camera| (camera.latency * 1e9) as u64);
     let mut known = Vec::new();
     for (number, entry) in session.clips.iter().enumerate() {
         let path = session.folder.join(&entry.file);
         let clip = session.read(entry)?;
-        for_color_pictures(&path, |stamp_ns, _| {
+        for_pictures(&path, kind, |stamp_ns, _| {
             if let Some((q, speed)) = clip.measured.at(stamp_ns.saturating_sub(latency_ns)) {
                 known.push(Known { clip: number, stamp_ns, q, speed });
             }
@@ -45,7 +45,8 @@ pub fn shots(session: &Session, wanted: usize) -> anyhow::Result<Vec<Shot>> {
     }
     ensure!(
         !known.is_empty(),
-        "no clip of the session holds colour pictures with joints at their time; record with `--camera`, or give images"
+        "no clip of the session holds {} pictures with joints at their time; record with `--camera`, or give images",
+        if kind == PictureKind::Color { "colour" } else { "depth" }
     );
     let chosen = choose(known, wanted);
     let mut out = Vec::new();
@@ -53,7 +54,7 @@ pub fn shots(session: &Session, wanted: usize) -> anyhow::Result<Vec<Shot>> {
         if !chosen.iter().any(|known| known.clip == number) {
             continue;
         }
-        for_color_pictures(&session.folder.join(&entry.file), |stamp_ns, picture| {
+        for_pictures(&session.folder.join(&entry.file), kind, |stamp_ns, picture| {
             if let Some(known) = chosen.iter().find(|known| (known.clip, known.stamp_ns) == (number, stamp_ns)) {
                 let name = format!("{} at {:.3} s", entry.file.display(), stamp_ns as f64 * 1e-9);
                 out.push(Shot { name, pixels: Pixels::new(picture)?, q: known.q.clone() });

@@ -1,6 +1,7 @@
 //! The whole way, on the simulated camera.
 
 use super::command::{Options, StartFrom, run};
+use super::depth;
 use super::fit::{Method, NoFit, fit};
 use super::frame::{Evidence, Frame};
 use super::grid::Grid;
@@ -11,7 +12,8 @@ use super::shape::Shape;
 use super::step;
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use shared_mem::cell::{Camera, Cell};
-use shared_mem::recording::write_png;
+use shared_mem::frames::Pose;
+use shared_mem::recording::{PictureKind, write_png};
 use std::path::{Path, PathBuf};
 use twin::render::{Hand, RobotSurface};
 use twin::scene::SceneSnapshot;
@@ -74,6 +76,7 @@ fn photo(cell: &Cell, folder: &Path) -> Options {
         joints: vec![q[..7].iter().map(f64::to_string).collect::<Vec<_>>().join(",")],
         masks: Vec::new(),
         background: None,
+        kind: PictureKind::Color,
         intrinsics: None,
         start: StartFrom::Pose(base_from_camera.translation.vector.into(), [turn.w, turn.i, turn.j, turn.k]),
         reach: Some(REACH),
@@ -95,6 +98,23 @@ fn a_silhouette_brings_a_camera_back_to_its_place_finer_than_its_pixels() {
     // A pixel is 6 mm at the robot.
     assert!(distance < 6e-3 && angle < 4e-3, "{distance} m, {angle} rad");
     assert!(found.loss < 1e-3, "{}", found.loss);
+}
+
+#[test]
+fn a_noisy_depth_picture_of_robot_table_and_box_is_enough() {
+    let cell = shipped();
+    let shape = shape(&cell);
+    let mut camera = SimCamera::new(&cell).expect("a camera");
+    let q = *shape.surface().model().ready();
+    let (mut color, mut bytes) = (vec![0; camera.color_bytes()], vec![0; camera.depth_bytes()]);
+    let object = Some(Pose::from_isometry(Isometry3::translation(0.6, 0.25, 0.05)));
+    camera.render(&SceneSnapshot { q, dof: 7, object, ..SceneSnapshot::default() }, &mut color, &mut bytes);
+    let values = bytes.chunks_exact(2).map(|b| f32::from(u16::from_le_bytes([b[0], b[1]]))).collect();
+    let share = depth::silhouette(&Grid { width: 320, height: 240, values }, &lens(&cell));
+    let frame = Frame::new("depth".into(), q, lens(&cell), &Evidence::Mask(share), &shape);
+    let found = fit(&[frame], &shape, &off(&cell), &REACH, Method::Outline, 1).expect("a pose");
+    let (distance, angle) = step::apart(&found.camera_from_base, &truth(&cell));
+    assert!(distance < 0.012 && angle < 8e-3, "{distance} m, {angle} rad");
 }
 
 #[test]

@@ -9,7 +9,7 @@
 //! | `container` | MCAP records and messages of a file that may be cut or changed |
 //! | `cdr`, `ros2` | ROS 2 messages |
 //! | `own` | an own recording as a clip |
-//! | `messages`, `picture`, `picture_file`, `colour` | all messages one by one, pictures, pictures as files, a clip's colour pictures |
+//! | `messages`, `picture`, `picture_file`, `pictures` | all messages one by one, a picture, pictures as files, a clip's pictures |
 //! | `bag` | a ROS 2 bag as a clip |
 //! | `twinaligner`, `npy` | a TwinAligner folder as a clip |
 //! | `joint_log` | joint rows: one publisher, one joint order |
@@ -23,7 +23,6 @@ mod bag;
 mod cdr;
 mod checks;
 mod clip;
-mod colour;
 mod container;
 mod device_clock;
 mod error;
@@ -34,6 +33,7 @@ mod npy;
 mod own;
 mod picture;
 mod picture_file;
+mod pictures;
 mod recover;
 mod ros2;
 mod series;
@@ -44,13 +44,13 @@ mod wire;
 mod writer;
 
 pub use clip::{Clip, read_clip};
-pub use colour::for_color_pictures;
 pub use error::ReadError;
 pub use export::{ExportError, Exported, FlangeAt, Format, export_session};
 pub use messages::{ClipMessage, ClipMessages, Payload};
 pub use own::{read_arm_states, read_clip_info};
 pub use picture::Picture;
 pub use picture_file::{read_picture, unpack_picture, write_png};
+pub use pictures::{PictureKind, for_pictures};
 pub use recover::{RecoverError, Recovered, recover};
 pub use series::{JointSeries, ObjectSeries};
 pub use session::Session;

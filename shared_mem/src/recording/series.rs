@@ -1,6 +1,7 @@
 //! Time series of a clip: joints and object, as plain arrays. Units SI, stamps integer nanoseconds.
 
 use crate::frames::{Base, Object, Pose};
+use std::ops::RangeInclusive;
 
 /// Joint positions over time, with velocities and torques where they were logged.
 ///
@@ -69,6 +70,14 @@ impl JointSeries {
             dq: pick(&self.dq),
             tau: pick(&self.tau),
         }
+    }
+
+    /// The rows with these stamps [ns].
+    #[must_use]
+    pub fn between(&self, stamps_ns: RangeInclusive<u64>) -> Self {
+        let from = self.stamps_ns.partition_point(|stamp| stamp < stamps_ns.start());
+        let to = self.stamps_ns.partition_point(|stamp| stamp <= stamps_ns.end());
+        self.select_rows(&(from..to).collect::<Vec<_>>())
     }
 
     /// The rows listed in `rows`, in that order; numbers beyond the end are passed over.

@@ -2,7 +2,7 @@
 
 use super::look::Look;
 use anyhow::{Context as _, bail, ensure};
-use shared_mem::recording::{Session, for_color_pictures, write_png};
+use shared_mem::recording::{PictureKind, Session, for_pictures, write_png};
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -54,7 +54,7 @@ impl Render {
         let mut apart = 0.0;
         for entry in &session.clips {
             let clip = session.read(entry)?;
-            for_color_pictures(&session.folder.join(&entry.file), |stamp_ns, picture| {
+            for_pictures(&session.folder.join(&entry.file), PictureKind::Color, |stamp_ns, picture| {
                 number += 1;
                 if (number - 1) % self.every != 0 {
                     return anyhow::Ok(());

@@ -2,8 +2,7 @@
 
 use super::clip::{ArmClip, ArmClipError};
 use shared_mem::cell::{Cell, ClipKind};
-use shared_mem::recording::{Clip, JointSeries};
-use std::ops::RangeInclusive;
+use shared_mem::recording::Clip;
 use twin::arm::ArmModel;
 
 /// The longest stretch of a clip that has commands, one clock, and joints that follow; and what was done, one sentence each.
@@ -23,13 +22,7 @@ pub fn one_piece(clip: Clip, cell: &Cell, arm: &ArmModel) -> Result<(Clip, Vec<S
         return Err(ArmClipError::Broken(whole.warnings.last().cloned().unwrap_or_default()));
     }
     let mut clip = whole.recorded;
-    clip.measured = between(&clip.measured, &stretch);
-    clip.desired = between(&clip.desired, &stretch);
+    clip.measured = clip.measured.between(stretch.clone());
+    clip.desired = clip.desired.between(stretch);
     Ok((clip, whole.warnings))
-}
-
-fn between(series: &JointSeries, stretch: &RangeInclusive<u64>) -> JointSeries {
-    let from = series.stamps_ns.partition_point(|stamp| stamp < stretch.start());
-    let to = series.stamps_ns.partition_point(|stamp| stamp <= stretch.end());
-    series.select_rows(&(from..to).collect::<Vec<_>>())
 }

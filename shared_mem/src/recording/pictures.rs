@@ -1,4 +1,4 @@
-//! The colour pictures of a clip, and the joints of their moments.
+//! The pictures of a clip, and the joints of their moments.
 
 use super::error::ReadError;
 use super::messages::{ClipMessages, Payload};
@@ -6,13 +6,23 @@ use super::picture::Picture;
 use super::series::JointSeries;
 use std::path::Path;
 
-/// Calls `each` with every colour picture of a clip and its stamp [ns], in the clock of the clip's joints. A TwinAligner
+/// Pictures of a kind.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum PictureKind {
+    /// Colour.
+    Color,
+    /// Depth.
+    Depth,
+}
+
+/// Calls `each` with every picture of a kind in a clip and its stamp [ns], in the clock of the clip's joints. A TwinAligner
 /// folder has none.
 ///
 /// # Errors
 /// [`ReadError`] when the clip cannot be read, or what `each` answers.
-pub fn for_color_pictures<E: From<ReadError>>(
+pub fn for_pictures<E: From<ReadError>>(
     path: &Path,
+    kind: PictureKind,
     mut each: impl FnMut(u64, &Picture) -> Result<(), E>,
 ) -> Result<(), E> {
     if path.is_dir() {
@@ -21,12 +31,13 @@ pub fn for_color_pictures<E: From<ReadError>>(
     for message in ClipMessages::open(path, &[])? {
         let message = message?;
         if let Payload::Picture(picture) = &message.payload {
-            let stamp_ns = match picture {
-                Picture::Pixels { header, .. } if header.depth_scale == 0.0 => header.stamp_ns,
-                Picture::Compressed { stamp_ns, .. } if !message.topic.contains("depth") => *stamp_ns,
-                _ => continue,
+            let (stamp_ns, is_depth) = match picture {
+                Picture::Pixels { header, .. } => (header.stamp_ns, header.depth_scale != 0.0),
+                Picture::Compressed { stamp_ns, .. } => (*stamp_ns, message.topic.contains("depth")),
             };
-            each(stamp_ns, picture)?;
+            if is_depth == (kind == PictureKind::Depth) {
+                each(stamp_ns, picture)?;
+            }
         }
     }
     Ok(())
