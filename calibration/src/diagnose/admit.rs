@@ -1,6 +1,6 @@
 //! Whether the recorded clips can be diagnosed at all; if not, what is missing.
 
-use super::split;
+use super::{length, split};
 use crate::forward::arm::one_piece;
 use crate::identify::object::screen::{Screened, screened};
 use crate::identify::remarks::grouped;
@@ -80,6 +80,7 @@ pub fn admit(session: &Session) -> Result<Admitted, Refused> {
         let all = out.len() + clips.len();
         warnings.insert(0, format!("{} of {all} clips were left out: {reasons}", out.len()));
     }
+    warnings.extend(length::liveliest(&mut clips));
     let with_object = clips.iter().all(|clip| clip.kind == ClipKind::ControlHitSlide);
     Ok(Admitted { clips, files, groups, with_object, warnings })
 }

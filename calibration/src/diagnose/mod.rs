@@ -7,6 +7,7 @@
 //! | module | step |
 //! |---|---|
 //! | [`admit`] | can the clips be diagnosed at all |
+//! | [`length`] | how much of long clips counts |
 //! | [`split`] | which clips are for what |
 //! | [`evidence`], [`arm_clips`], [`cell_clips`] | what is measured against the twin, and where in a clip |
 //! | [`scatter`] | what every clip has of its own |
@@ -43,6 +44,7 @@ pub mod fit;
 pub mod floor;
 pub mod gap;
 pub mod leftovers;
+pub mod length;
 pub mod library;
 pub mod localise;
 pub mod noise;

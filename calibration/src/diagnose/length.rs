@@ -1,0 +1,130 @@
+//! How much of long clips counts: a session of hours says no more about its gap than its liveliest minutes, and every
+//! candidate simulates all that counts a hundred times.
+
+use shared_mem::cell::ClipKind;
+use shared_mem::recording::{Clip, JointSeries};
+
+/// So much motion counts in all: sixteen clips of ten seconds [s].
+const ENOUGH: f64 = 160.0;
+/// Commands from before the part that counts are kept for so long: some are still on their way [ns].
+const BEFORE_NS: u64 = 500_000_000;
+/// Parts of a clip that are compared begin this share of their length apart.
+const APART: f64 = 0.05;
+
+/// Cuts the longest clips of arms alone to one length, so that no more than [`ENOUGH`] is left: of each the part in which
+/// its commands move the joints most. What was done, for the reader.
+#[must_use]
+pub fn liveliest(clips: &mut [Clip]) -> Option<String> {
+    let seconds: Vec<f64> = clips.iter().map(|clip| clip.measured.duration()).collect();
+    let most = equal_share(&seconds)?;
+    let long = |clip: &Clip| clip.kind != ClipKind::ControlHitSlide && clip.measured.duration() > most;
+    let mut cut = 0;
+    for clip in clips.iter_mut().filter(|clip| long(clip)) {
+        let [from_ns, to_ns] = liveliest_part(&clip.desired, &clip.measured, most);
+        clip.measured = clip.measured.between(from_ns..=to_ns);
+        clip.desired = clip.desired.between(from_ns.saturating_sub(BEFORE_NS)..=to_ns);
+        cut += 1;
+    }
+    (cut > 0).then(|| {
+        format!(
+            "of {cut} long clips the {most:.1} s count in which their commands move the joints most: all {:.0} s would take far \
+             longer and say little more; `twin replay` takes them whole",
+            seconds.iter().sum::<f64>()
+        )
+    })
+}
+
+/// The length beyond which clips are cut so that all of them together last [`ENOUGH`]; `None` where they are no longer.
+fn equal_share(seconds: &[f64]) -> Option<f64> {
+    let mut ascending = seconds.to_vec();
+    ascending.sort_unstable_by(f64::total_cmp);
+    let mut left = ENOUGH;
+    for (place, length) in ascending.iter().enumerate() {
+        let share = left / (ascending.len() - place) as f64;
+        if *length > share {
+            return Some(share);
+        }
+        left -= length;
+    }
+    None
+}
+
+/// First and last stamp of the part of `most` seconds in which commands go the longest way [ns].
+fn liveliest_part(commands: &JointSeries, measured: &JointSeries, most: f64) -> [u64; 2] {
+    let (Some(first), Some(last)) = (measured.stamps_ns.first(), measured.stamps_ns.last()) else {
+        return [0, u64::MAX];
+    };
+    let length_ns = (most * 1e9) as u64;
+    let step_ns = ((most * APART * 1e9) as usize).max(1);
+    let starts = (*first..=last.saturating_sub(length_ns).max(*first)).step_by(step_ns);
+    let way = ways(commands);
+    let at = |ns: u64| way[commands.stamps_ns.partition_point(|stamp| *stamp < ns).min(way.len() - 1)];
+    let gone = |from: u64| at(from + length_ns) - at(from);
+    // Of several that are alike the first.
+    let from = starts.reduce(|best, next| if gone(next) > gone(best) { next } else { best }).unwrap_or(*first);
+    [from, from + length_ns]
+}
+
+/// How far the joints were sent before each row, together [rad].
+fn ways(commands: &JointSeries) -> Vec<f64> {
+    let mut gone = vec![0.0];
+    for row in 1..commands.len() {
+        let step = commands.q_row(row).iter().zip(commands.q_row(row - 1)).map(|(to, from)| (to - from).abs());
+        gone.push(gone[row - 1] + step.sum::<f64>());
+    }
+    gone
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use shared_mem::recording::ObjectSeries;
+    use shared_mem::time::seconds_between;
+
+    /// A joint that rests but for half a minute of swinging from `lively` s on.
+    fn clip(seconds: usize, lively: f64) -> Clip {
+        let stamps_ns: Vec<u64> = (0..seconds as u64 * 100).map(|i| i * 10_000_000).collect();
+        let swing = |ns: &u64| {
+            let t = seconds_between(0, *ns) - lively;
+            if (0.0..30.0).contains(&t) { 0.3 * (3.0 * t).sin() } else { 0.0 }
+        };
+        let q = stamps_ns.iter().map(swing).collect();
+        let series = JointSeries { stamps_ns, dof: 1, q, dq: Vec::new(), tau: Vec::new() };
+        Clip {
+            file: "clip.mcap".into(),
+            kind: ClipKind::Excitation,
+            joint_names: vec!["joint1".into()],
+            desired: series.clone(),
+            measured: series,
+            torques_end_at_rows: false,
+            object: ObjectSeries::default(),
+            warnings: Vec::new(),
+            damage: None,
+        }
+    }
+
+    #[test]
+    fn what_is_short_stays_and_the_long_share_the_rest() {
+        assert_eq!(equal_share(&[10.0; 16]), None);
+        assert_eq!(equal_share(&[60.0; 16]), Some(10.0));
+        // 20 s and 40 s of the 160 are taken; two share the hundred that are left.
+        assert_eq!(equal_share(&[500.0, 20.0, 40.0, 300.0]), Some(50.0));
+    }
+
+    #[test]
+    fn of_a_long_clip_the_part_is_kept_in_which_the_joints_move() {
+        let mut clips = vec![clip(300, 100.0), clip(20, 0.0), clip(300, 250.0), clip(300, 0.0)];
+        let short = clips[1].clone();
+        let said = liveliest(&mut clips).expect("they are long");
+        assert!(said.contains("3 long clips the 46.7 s"), "{said}");
+        assert_eq!(clips[1], short);
+        for (clip, lively) in [(&clips[0], 100.0), (&clips[2], 250.0), (&clips[3], 0.0)] {
+            let (from, to) = (clip.measured.stamps_ns[0] as f64 * 1e-9, clip.measured.duration());
+            assert!(from <= lively + 1e-9 && from + to >= lively + 29.9, "{from} s, {to} s long");
+            assert!((46.0..46.8).contains(&to), "{to}");
+            let before = seconds_between(clip.desired.stamps_ns[0], clip.measured.stamps_ns[0]);
+            assert!((before - 0.5_f64.min(from)).abs() < 1e-9, "{before}");
+        }
+        assert_eq!(liveliest(&mut clips), None, "once is enough");
+    }
+}
