@@ -1,4 +1,4 @@
-//! A progress bar on stderr; where stderr is no terminal, nothing.
+//! A progress bar on stderr; where stderr is no terminal, no bar.
 
 use indicatif::{ProgressBar, ProgressStyle};
 
@@ -22,6 +22,11 @@ impl Progress {
     pub fn show(&self, position: u64, note: &str) {
         self.0.set_position(position);
         self.0.set_message(note.to_owned());
+    }
+
+    /// Tells a line on stderr, above the bar where there is one.
+    pub fn tell(&self, line: &str) {
+        if self.0.is_hidden() { eprintln!("{line}") } else { self.0.println(line) }
     }
 }
 

@@ -54,7 +54,10 @@ pub fn run(plan: &Plan, cell: &Cell, interrupt: &Interrupt) -> Outcome {
         let world = World::draw(number, kind, fault, cell);
         bar.show(done as u64, &format!("world {number}"));
         match judged(&world, plan.clips, interrupt) {
-            Ok(cases) => methods.iter_mut().zip(cases).for_each(|(method, case)| method.cases.push(case)),
+            Ok(cases) => {
+                bar.tell(&cases[0].line());
+                methods.iter_mut().zip(cases).for_each(|(method, case)| method.cases.push(case));
+            }
             Err(error) => left_out.push(format!("world {number}: {error}")),
         }
     }

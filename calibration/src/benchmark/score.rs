@@ -142,6 +142,13 @@ impl Said {
 }
 
 impl Case {
+    /// What is true and what was said, for a log.
+    #[must_use]
+    pub fn line(&self) -> String {
+        let (truth, said) = (self.truth_label(), self.said.label());
+        format!("world {}: {truth} -> {said}, {:.0} % sure", self.world, 100.0 * self.said.confidence)
+    }
+
     fn effects(&self) -> Option<&[String]> {
         match &self.truth {
             Truth::Effects(effects) => Some(effects),
