@@ -3,21 +3,21 @@
 //! and torque rate, in either interface. The cycle knows its arm by one trait alone, so this holds for every backend.
 #![allow(missing_docs)]
 
+mod bench;
+
+use bench::{Bench, WAITING};
 use rand::{RngExt as _, SeedableRng as _};
 use rand_pcg::Pcg64;
 use rt_bridge::arm::{Arm, ArmFault, Clock, Desired, Read};
-use rt_bridge::motion::Player;
-use rt_bridge::rt::cycle::{Cycle, Link, Plan, Turn};
-use rt_bridge::rt::law::TorquePd;
-use rt_bridge::safety::{Guard, Limits, Trace, Workspace};
-use rtrb::{Producer, RingBuffer};
+use rt_bridge::rt::cycle::Turn;
+use rt_bridge::safety::{Limits, Trace, Workspace};
 use shared_mem::cell::Cell;
 use shared_mem::msg::arm::{ArmCommand, ArmMode, ArmState, CommandInterface};
 use shared_mem::msg::motion::{CHUNK_LENGTH, MotionChunk, MotionKind, SetPoint};
 use shared_mem::msg::{Joints, MAX_JOINTS};
 use std::path::Path;
 use std::sync::{Arc, Mutex};
-use twin::arm::{ArmModel, ControlLaw};
+use twin::arm::ArmModel;
 
 const T: f64 = 1e-3;
 /// Rounding that the arm forgives, as a share of a limit.
@@ -110,43 +110,25 @@ impl Arm for StrictArm {
 }
 
 /// A bridge that holds somewhere.
-struct Bench {
-    cycle: Cycle,
-    chunks: Producer<MotionChunk>,
+struct Bridge {
+    bench: Bench,
     judged: Arc<Mutex<Judged>>,
     model: ArmModel,
 }
 
-impl Bench {
+impl Bridge {
     fn new(cell: &Cell, interface: CommandInterface, start: Joints, seed: u64) -> Self {
-        let model = ArmModel::from_cell(cell).expect("a model");
-        let law = ControlLaw::new(cell.controller.as_ref(), None, &model).expect("gains");
-        let torque = interface == CommandInterface::Torque;
-        let limits = Limits::fr3();
-        let plan = Plan {
-            interface,
-            law: torque.then(|| TorquePd::new(&law, model.clone())),
-            model: model.clone(),
-            tip_radius: 0.012,
-            limits,
-            session: 1,
-        };
         let judged = Judged { trace: Trace::at_rest(start), tau: [0.0; MAX_JOINTS], moved: 0, told: 0, broken: None };
         let judged = Arc::new(Mutex::new(judged));
-        let arm = StrictArm { limits, judged: judged.clone(), rng: Pcg64::seed_from_u64(seed), device_ns: 0 };
-        let guard = Guard { limits, workspace: Workspace::of(cell), period_s: T };
-        let (to_pump, _) = RingBuffer::new(1);
-        let (to_words, _) = RingBuffer::new(1);
-        let (chunks, from_pump) = RingBuffer::new(128);
-        let link = Link { beats: to_pump, remarks: to_words, chunks: from_pump, pump: std::thread::current() };
-        let mut cycle = Cycle::new(Box::new(arm), plan, Player::new(guard, [0.0; 8]), link);
-        assert_eq!(cycle.take_command(), Turn::Continue);
-        Self { cycle, chunks, judged, model }
+        let rng = Pcg64::seed_from_u64(seed);
+        let arm = StrictArm { limits: Limits::fr3(), judged: judged.clone(), rng, device_ns: 0 };
+        let model = ArmModel::from_cell(cell).expect("a model");
+        Self { bench: Bench::around(arm, cell, interface), judged, model }
     }
 
     fn turn(&mut self, cycles: usize) {
         for _ in 0..cycles {
-            assert_eq!(self.cycle.turn(None), Turn::Continue);
+            assert_eq!(self.bench.cycle.turn(None), Turn::Continue);
         }
     }
 
@@ -168,20 +150,20 @@ impl Bench {
             let (index, length) = (index as u32, part.len() as u32);
             let mut chunk = MotionChunk { motion_id, kind, index, length, dof: 7, ..MotionChunk::default() };
             chunk.set_points[..part.len()].copy_from_slice(part);
-            while self.chunks.is_full() {
+            while self.bench.chunks.is_full() {
                 self.turn(1);
             }
-            self.chunks.push(chunk).expect("there is room");
+            self.bench.chunks.push(chunk).expect("there is room");
         }
         if rng.random_range(0..4) == 0 {
             self.turn(rng.random_range(0..=points.len()));
             let stop = MotionChunk { motion_id, kind: MotionKind::Stop, ..MotionChunk::default() };
-            if self.chunks.push(stop).is_ok() {
+            if self.bench.chunks.push(stop).is_ok() {
                 self.turn(1);
             }
         }
         let mut patience = points.len() + 3000;
-        while !(self.chunks.slots() == 128 && self.cycle.is_at_rest()) && patience > 0 {
+        while !(self.bench.chunks.slots() == WAITING && self.bench.cycle.is_at_rest()) && patience > 0 {
             self.turn(1);
             patience -= 1;
         }
@@ -263,15 +245,15 @@ fn attempts(count: u64) -> u64 {
         let interface =
             if rng.random_range(0..2) == 0 { CommandInterface::Torque } else { CommandInterface::JointPosition };
         let start = somewhere(&cell, &model, &mut rng);
-        let mut bench = Bench::new(&cell, interface, start, rng.random_range(0..u64::MAX));
+        let mut bridge = Bridge::new(&cell, interface, start, rng.random_range(0..u64::MAX));
         for motion_id in 1..=20 {
-            let before = bench.commanded();
-            if let Some(what) = bench.attempt(motion_id, &mut rng) {
+            let before = bridge.commanded();
+            if let Some(what) = bridge.attempt(motion_id, &mut rng) {
                 panic!("attempt {done} ({interface:?}, from {before:?}): {what}");
             }
             done += 1;
         }
-        moved += bench.judged.lock().expect("one thread").moved;
+        moved += bridge.judged.lock().expect("one thread").moved;
     }
     moved
 }

@@ -1,0 +1,50 @@
+//! A control loop around any arm, put together as the bridge's control thread does it, for tests that turn it by hand.
+
+use rt_bridge::arm::Arm;
+use rt_bridge::motion::Player;
+use rt_bridge::rt::cycle::{Beat, Cycle, Link, Plan, Turn};
+use rt_bridge::rt::law::TorquePd;
+use rt_bridge::rt::remark::Remark;
+use rt_bridge::safety::{Guard, Limits, Workspace};
+use rtrb::{Consumer, Producer, RingBuffer};
+use shared_mem::cell::Cell;
+use shared_mem::msg::arm::CommandInterface;
+use shared_mem::msg::motion::MotionChunk;
+use twin::arm::{ArmModel, ControlLaw};
+
+/// Chunks of a motion that wait at most.
+pub const WAITING: usize = 128;
+
+/// The loop, and the other ends of its rings.
+#[allow(dead_code)] // not every test looks at every end
+pub struct Bench {
+    pub cycle: Cycle,
+    pub beats: Consumer<Beat>,
+    pub remarks: Consumer<Remark>,
+    pub chunks: Producer<MotionChunk>,
+}
+
+impl Bench {
+    /// A loop that has taken command of `arm` and holds.
+    pub fn around(arm: impl Arm + 'static, cell: &Cell, interface: CommandInterface) -> Self {
+        let model = ArmModel::from_cell(cell).expect("a model");
+        let law =
+            || TorquePd::new(&ControlLaw::new(cell.controller.as_ref(), None, &model).expect("gains"), model.clone());
+        let plan = Plan {
+            interface,
+            law: (interface == CommandInterface::Torque).then(law),
+            tip_radius: cell.tool.as_ref().map_or(0.0, |tool| tool.radius),
+            limits: Limits::fr3(),
+            session: 1,
+            model: model.clone(),
+        };
+        let guard = Guard { limits: Limits::fr3(), workspace: Workspace::of(cell), period_s: 1e-3 };
+        let (to_pump, beats) = RingBuffer::new(64);
+        let (to_words, remarks) = RingBuffer::new(64);
+        let (chunks, from_pump) = RingBuffer::new(WAITING);
+        let link = Link { beats: to_pump, remarks: to_words, chunks: from_pump, pump: std::thread::current() };
+        let mut cycle = Cycle::new(Box::new(arm), plan, Player::new(guard, [0.0; 8]), link);
+        assert_eq!(cycle.take_command(), Turn::Continue);
+        Self { cycle, beats, remarks, chunks }
+    }
+}
