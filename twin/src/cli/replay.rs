@@ -63,7 +63,7 @@ impl Replay {
         if self.json {
             serde_json::to_writer(&mut stdout, &gap)?;
             writeln!(stdout)?;
-        } else {
+        } else if !gap.clips.is_empty() {
             write!(stdout, "{gap}")?;
         }
         let failed = gap.failures().count();
