@@ -13,20 +13,20 @@ use shared_mem::msg::motion::MotionChunk;
 use twin::arm::{ArmModel, ControlLaw};
 
 /// Chunks of a motion that wait at most.
-pub const WAITING: usize = 128;
+pub(crate) const WAITING: usize = 128;
 
 /// The loop, and the other ends of its rings.
 #[allow(dead_code)] // not every test looks at every end
-pub struct Bench {
-    pub cycle: Cycle,
-    pub beats: Consumer<Beat>,
-    pub remarks: Consumer<Remark>,
-    pub chunks: Producer<MotionChunk>,
+pub(crate) struct Bench {
+    pub(crate) cycle: Cycle,
+    pub(crate) beats: Consumer<Beat>,
+    pub(crate) remarks: Consumer<Remark>,
+    pub(crate) chunks: Producer<MotionChunk>,
 }
 
 impl Bench {
     /// A loop that has taken command of `arm` and holds.
-    pub fn around(arm: impl Arm + 'static, cell: &Cell, interface: CommandInterface) -> Self {
+    pub(crate) fn around(arm: impl Arm + 'static, cell: &Cell, interface: CommandInterface) -> Self {
         let model = ArmModel::from_cell(cell).expect("a model");
         let law =
             || TorquePd::new(&ControlLaw::new(cell.controller.as_ref(), None, &model).expect("gains"), model.clone());
