@@ -237,7 +237,8 @@ impl Studio<'_> {
         Ok(Clip {
             file: format!("clip_{index:02}.mcap").into(),
             kind: if poses_ns.is_empty() { ClipKind::Excitation } else { ClipKind::ControlHitSlide },
-            torques_end_at_rows: false,
+            // A reading tells the mean over the period that ends there.
+            torques_end_at_rows: true,
             joint_names: self.body.model().joint_names().to_vec(),
             desired,
             measured,
@@ -279,12 +280,19 @@ fn effect(name: &str, parameter: &str, value: f64) -> EffectTheta {
 mod tests {
     use super::super::world::Fault;
     use super::*;
+    use crate::diagnose::arm_clips::ArmClips;
+    use crate::diagnose::evidence::Evidence;
+    use crate::estimate::ClipModel;
+    use shared_mem::cell::Cell;
     use std::path::Path;
 
-    fn session(kind: Kind, fault: Fault) -> Vec<Clip> {
+    fn shipped() -> Cell {
         let text = include_str!("../../../config/fr3_cell.toml");
-        let cell = shared_mem::toml_file::parse(text, Path::new("fr3_cell.toml")).expect("the shipped file");
-        record(&World::draw(3, kind, fault, &cell), 2).expect("a session")
+        shared_mem::toml_file::parse(text, Path::new("fr3_cell.toml")).expect("the shipped file")
+    }
+
+    fn session(kind: Kind, fault: Fault) -> Vec<Clip> {
+        record(&World::draw(3, kind, fault, &shipped()), 2).expect("a session")
     }
 
     #[test]
@@ -295,6 +303,29 @@ mod tests {
             let (way, end) = ((place(last) - place(0)).norm(), (place(last) - place(last - 5)).norm());
             assert!(way > 0.03, "it was hit: {way} m");
             assert!(end < 0.006, "it rests: {end} m");
+        }
+    }
+
+    #[test]
+    fn the_twin_that_knows_the_truth_leaves_of_a_world_what_is_noise() {
+        for number in [3, 4] {
+            let world = World::draw(number, Kind::Excitation, Fault::Single(1), &shipped());
+            let clips = record(&world, 2).expect("a session");
+            let arm = ArmClips::new(&world.cell, &clips, |_: &[f64]| world.hidden.clone()).expect("an arm");
+            for clip in 0..clips.len() {
+                let mut out = Vec::new();
+                arm.residuals(clip, &[], &[], &mut out).expect("it can be simulated");
+                let mut channels = vec![(0.0, 0.0); arm.channels().len()];
+                for (row, residual) in arm.rows(clip).iter().zip(&out) {
+                    let (sum, count) = &mut channels[row.channel];
+                    (*sum, *count) = (*sum + residual * residual, *count + 1.0);
+                }
+                for (channel, (sum, count)) in channels.iter().enumerate() {
+                    let left = sum / count;
+                    let info = &arm.channels()[channel];
+                    assert!((0.5..3.0).contains(&left), "{} of {}: {left} sigma²", info.quantity, info.place);
+                }
+            }
         }
     }
 
