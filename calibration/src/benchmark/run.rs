@@ -13,7 +13,7 @@ use shared_mem::cell::Cell;
 pub enum Extent {
     /// A dozen of all sorts.
     Short,
-    /// Every effect so many times in each kind of session, and as many of the other sorts.
+    /// Every effect so many times in each kind of session, half as many worlds without any, and a quarter as many with two.
     Full(u64),
     /// So many without anything wrong.
     Null(u64),
@@ -78,7 +78,7 @@ impl Plan {
                 Extent::Short => ((1..all).step_by(all / 2).collect(), &outside[..1], 1, 2),
                 Extent::Full(rounds) => {
                     let rounds = usize::try_from(rounds).unwrap_or(1);
-                    ((0..all * rounds).collect(), outside, all * rounds / 2, all * rounds)
+                    ((0..all * rounds).collect(), outside, all * rounds / 4, all * rounds / 2)
                 }
                 Extent::Null(worlds) => (Vec::new(), &[], 0, usize::try_from(worlds / 2).unwrap_or(1)),
             };

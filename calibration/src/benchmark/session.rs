@@ -6,7 +6,8 @@ use super::world::{Kind, Outside, World};
 use crate::capture::body::Body;
 use crate::capture::limits;
 use crate::capture::plan::{self, Request};
-use crate::capture::stroke::{self, Stroke};
+use crate::capture::program::{Program, SPEEDS, Standing, Wish};
+use crate::capture::stroke;
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_distr::{Distribution as _, StandardNormal};
@@ -104,26 +105,22 @@ impl Studio<'_> {
         Ok(plan.set_points)
     }
 
-    /// A stroke from any side, at any speed, somewhere on the object.
+    /// A stroke as a capture makes them: from any side, at any speed, somewhere on the object.
     fn stroke(&self, object: &Isometry3<f64>, rng: &mut Pcg64) -> Result<Vec<SetPoint>, SessionError> {
         let size = self.world.cell.object.as_ref().and_then(|object| object.size).unwrap_or([0.1; 3]);
-        let radius = 0.5 * (size[0] * size[0] + size[1] * size[1]).sqrt();
-        let tool = self.world.cell.tool.as_ref().map_or(0.0, |tool| tool.radius);
         let limits = limits::of(&self.world.cell, &self.body);
+        let program = Program::of(&self.world.cell, size, &self.body, &limits);
+        let (x, y) = (object.translation.x, object.translation.y);
+        let standing = Standing { place: [x, y], yaw: object.rotation.euler_angles().2 };
         let mut refused = String::new();
         for _ in 0..TRIES {
-            let stroke = Stroke {
-                object: [object.translation.x, object.translation.y],
-                clearance: radius + tool,
+            let wish = Wish {
                 heading: rng.random_range(-PI..PI),
-                offset: rng.random_range(-0.25..0.25) * size[1],
-                speed: rng.random_range(0.25..0.65),
-                height: rng.random_range(0.2..0.6) * size[2],
-                rise: rng.random_range(0.35..0.5),
-                follow_through: rng.random_range(-0.02..0.02),
-                rest: [0.2, 0.9],
+                speed: rng.random_range(SPEEDS[0]..SPEEDS[1]),
+                aside: rng.random_range(-1.0..1.0),
+                height: rng.random_range(0.0..1.0),
             };
-            match stroke::plan(&stroke, self.body.model().ready(), &limits, &self.body) {
+            match stroke::plan(&program.stroke(&wish, &standing), self.body.model().ready(), &limits, &self.body) {
                 Ok(plan) => return Ok(plan.set_points),
                 Err(error) => refused = error.to_string(),
             }

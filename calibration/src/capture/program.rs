@@ -19,7 +19,7 @@ pub const ANCHOR: usize = 6;
 /// Root of `x⁵ = x + 1`: the golden ratio of four dimensions.
 const GOLDEN: f64 = 1.167_303_978_261_418_7;
 /// Speeds of the hit [m/s].
-const SPEEDS: [f64; 2] = [0.22, 0.6];
+pub const SPEEDS: [f64; 2] = [0.22, 0.6];
 /// How far a line passes beside the centre, as a share of half the narrower side.
 const ASIDE: f64 = 0.55;
 /// Heights of the tool's end as a share of the object's.
@@ -175,7 +175,8 @@ impl<'a> Program<'a> {
     }
 
     /// The wish as a stroke on the object, its direction turned towards the nearest face.
-    fn stroke(&self, wish: &Wish, object: &Standing) -> Stroke {
+    #[must_use]
+    pub fn stroke(&self, wish: &Wish, object: &Standing) -> Stroke {
         let [x, y, z] = self.size;
         let from_face = wish.heading - object.yaw;
         let face = (from_face / FRAC_PI_2).round();

@@ -15,8 +15,9 @@ use std::time::Instant;
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Worlds are drawn from their numbers: gains, object, motions, scatter, and what is wrong. Nothing of it is told to the
-diagnosis. With --size 1 every effect is met once in each kind of session, beside as many worlds without any, pairs of
-effects, and disturbances that no effect describes; a larger size repeats that with other numbers.
+diagnosis, and they are integrated in other steps than the twin's. With --size 1 every effect is met once in each kind of
+session, beside half as many worlds without any, a quarter as many with two, and disturbances that no effect describes; a
+larger size repeats that with other numbers. Each world is told on stderr as soon as it is scored.
 
 Ctrl-C scores the worlds that are done.
 
