@@ -4,6 +4,7 @@
 use super::closing::closes;
 use super::evidence::{Evidence, Row};
 use super::fit::{Bench, Effort, Hypothesis};
+use super::flat;
 use super::floor;
 use super::gap::{Residuals, Typical};
 use super::leftovers::{Left, NUMERICS, ROUGHNESS};
@@ -125,7 +126,7 @@ pub fn search<E: Evidence>(
             _ => break,
         }
     }
-    let last = without_superfluous(bench, split, now, &steps.last()?.weights);
+    let last = flat::without(bench, &without_superfluous(bench, split, now, &steps.last()?.weights));
     Some(Found { steps, last })
 }
 

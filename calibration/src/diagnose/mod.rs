@@ -22,6 +22,7 @@
 //! | [`straying`] | how far clips stray under one of them |
 //! | [`closing`] | how much of the gap they close |
 //! | [`combine`] | which effects act together |
+//! | [`flat`] | which of their numbers nothing depends on |
 //! | [`leftovers`] | what they leave |
 //! | [`gap`], [`localise`] | how large the gap is, and where |
 //! | [`parameters`], [`confidence`], [`verdict`], [`advice`] | what is said about it |
@@ -41,6 +42,7 @@ pub mod conclude;
 pub mod confidence;
 pub mod evidence;
 pub mod fit;
+pub mod flat;
 pub mod floor;
 pub mod gap;
 pub mod leftovers;

@@ -2,7 +2,8 @@
 //!
 //! An interval is the wider of two: from the curvature of the weighted deviance, and from how the number moves when clips are
 //! left out one by one (jackknife). Where a hit lies between a number and what is seen, the step over which its slope was
-//! taken comes on top: the answer to less than that is rough.
+//! taken comes on top: the answer to less than that is rough. Of a size on which nothing depends ([`super::flat`]) all that is
+//! met in practice is possible.
 
 use super::answer::Size;
 use super::evidence::Evidence;
@@ -35,7 +36,8 @@ pub fn of_effect<E: Evidence>(bench: &Bench<'_, E>, hypothesis: &Hypothesis, eff
             let value = hypothesis.full[k];
             let sigma = hypothesis.free.iter().position(|free| *free == k).map_or(0.0, |place| spread[place]);
             let sigma = if rough && sigma > 0.0 { sigma.hypot(bench.library.unknowns[k].step) } else { sigma };
-            let interval = [value - NINETY * sigma, value + NINETY * sigma];
+            let open = candidate.sizes.contains(&k) && !hypothesis.free.contains(&k);
+            let interval = if open { parameter.plausible } else { [value - NINETY * sigma, value + NINETY * sigma] };
             let (value, interval) = readable(value, interval, inverse, parameter.possible);
             size.values.push(value);
             size.ci90.push(interval);
