@@ -30,6 +30,8 @@ pub struct Plan {
     pub seed: u64,
 }
 
+const GOLDEN: f64 = 0.618_033_988_749_894_9;
+
 /// What came of it.
 #[derive(Debug)]
 pub struct Outcome {
@@ -87,7 +89,12 @@ impl Plan {
             faults.extend((0..pairs).map(|_| (kind, Fault::Pair)));
             faults.extend((0..nothing).map(|_| (kind, Fault::Nothing)));
         }
-        (self.seed..).zip(faults).map(|(number, (kind, fault))| (number, kind, fault)).collect()
+        let mut worlds: Vec<_> =
+            (self.seed..).zip(faults).map(|(number, (kind, fault))| (number, kind, fault)).collect();
+        // Steps of the golden section: whoever ends early has met all sorts alike.
+        let place = |number: u64| ((number - self.seed) as f64 * GOLDEN).fract();
+        worlds.sort_by(|a, b| place(a.0).total_cmp(&place(b.0)));
+        worlds
     }
 }
 
@@ -103,6 +110,19 @@ mod tests {
             let has = |sort: fn(&Fault) -> bool| worlds.iter().any(|(_, k, fault)| *k == kind && sort(fault));
             assert!(has(|fault| matches!(fault, Fault::Single(_))) && has(|fault| *fault == Fault::Pair));
             assert!(has(|fault| matches!(fault, Fault::Outside(_))) && has(|fault| *fault == Fault::Nothing));
+        }
+    }
+
+    #[test]
+    fn the_first_half_meets_all_sorts_about_alike() {
+        let worlds = Plan { extent: Extent::Full(1), clips: 8, seed: 5 }.worlds();
+        let (half, _) = worlds.split_at(worlds.len() / 2);
+        for kind in [Kind::Excitation, Kind::Strokes] {
+            for sort in [|fault: &Fault| matches!(fault, Fault::Single(_)), |fault: &Fault| *fault == Fault::Nothing] {
+                let count =
+                    |worlds: &[(u64, Kind, Fault)]| worlds.iter().filter(|(_, k, f)| *k == kind && sort(f)).count();
+                assert!(count(half).abs_diff(count(&worlds) - count(half)) <= 4, "{kind:?}");
+            }
         }
     }
 
