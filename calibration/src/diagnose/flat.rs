@@ -45,3 +45,49 @@ fn held(hypothesis: Hypothesis, number: usize, full: Vec<f64>) -> Hypothesis {
     let free = hypothesis.free.iter().copied().filter(|free| *free != number).collect();
     Hypothesis { full, free, fitted: hypothesis.fitted.into_iter().map(less).collect(), ..hypothesis }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::arm_clips::ArmClips;
+    use super::super::fit::Effort;
+    use super::super::library::Library;
+    use super::super::sweep::Precision;
+    use super::*;
+    use crate::benchmark::draw;
+    use crate::benchmark::session::record;
+    use crate::benchmark::world::{Fault, Kind, World};
+    use crate::forward::setting;
+    use crate::interrupt::Interrupt;
+    use shared_mem::cell::Cell;
+    use std::path::Path;
+
+    #[test]
+    fn a_vertical_joint_s_encoder_may_be_off_by_any_angle_and_no_other_s() {
+        let text = include_str!("../../../config/fr3_cell.toml");
+        let cell = Cell::parse(text, Path::new("fr3_cell.toml")).expect("the shipped cell");
+        let place = draw::candidates(false).iter().position(|effect| effect.name == "joint_encoder_offset");
+        let world = World::draw(14, Kind::Excitation, Fault::Single(place.expect("an effect")), &cell);
+        let clips = record(&world, 2).expect("a session");
+        let library = Library::new(&cell, &setting::complete(&cell, None).expect("a cell"), false);
+        let evidence = ArmClips::new(&cell, &clips, |numbers: &[f64]| library.theta(numbers)).expect("an arm");
+        let interrupt = Interrupt::default();
+        let bench =
+            Bench { evidence: &evidence, library: &library, scatter: evidence.scatter(), interrupt: &interrupt };
+        let effect = library.candidates.iter().position(|c| c.effect.name == "joint_encoder_offset");
+        let effect = effect.expect("a candidate");
+        let offsets = library.candidates[effect].sizes.clone();
+        let mut full = library.start();
+        for (number, value) in full.iter_mut().zip(library.settings.numbers(&world.hidden)) {
+            *number = value.unwrap_or(*number);
+        }
+        full[offsets[0]] = 0.04;
+        let even = vec![1.0; evidence.channels().len()];
+        let effort = Effort { iterations: 1, precision: Precision::Joints };
+        let found = bench.fit((&[effect], full), &[0, 1], &even, None, effort).expect("a fit");
+        let kept = without(&bench, &found);
+        assert_eq!(kept.full[offsets[0]], 0.0);
+        let free: Vec<bool> = offsets.iter().map(|k| kept.free.contains(k)).collect();
+        assert_eq!(free, [false, true, true, true, true, true, true]);
+        assert_eq!(kept.fitted[0].reduced.form.ncols(), kept.free.len() + 1);
+    }
+}
