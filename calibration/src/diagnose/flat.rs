@@ -7,7 +7,7 @@ use twin::effects::Stage;
 
 /// What a number may change of the clips' squared residuals, as a share and at least, and still be one that nothing depends
 /// on.
-const SHARE: f64 = 1e-4;
+const SHARE: f64 = 1e-6;
 const LEAST: f64 = 1.0;
 
 /// The hypothesis with the sizes of its effects on the arm at rest that nothing depends on, and no longer free.

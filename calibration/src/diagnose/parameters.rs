@@ -37,7 +37,11 @@ pub fn of_effect<E: Evidence>(bench: &Bench<'_, E>, hypothesis: &Hypothesis, eff
             let sigma = hypothesis.free.iter().position(|free| *free == k).map_or(0.0, |place| spread[place]);
             let sigma = if rough && sigma > 0.0 { sigma.hypot(bench.library.unknowns[k].step) } else { sigma };
             let open = candidate.sizes.contains(&k) && !hypothesis.free.contains(&k);
-            let interval = if open { parameter.plausible } else { [value - NINETY * sigma, value + NINETY * sigma] };
+            let interval = match parameter.plausible {
+                _ if !open => [value - NINETY * sigma, value + NINETY * sigma],
+                [low, _] if inverse => [0.0, low.recip()],
+                plausible => plausible,
+            };
             let (value, interval) = readable(value, interval, inverse, parameter.possible);
             size.values.push(value);
             size.ci90.push(interval);
