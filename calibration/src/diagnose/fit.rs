@@ -330,13 +330,12 @@ impl<E: Evidence> Bench<'_, E> {
     #[must_use]
     pub fn negligible(&self, effect: usize, full: &[f64]) -> bool {
         let candidate = &self.library.candidates[effect];
-        let probes = candidate.alternatives.iter().flat_map(|alternative| &alternative.probes);
-        let strongest = probes.map(|probe| {
-            let (size, value) = probe.moves[0];
-            let resting = self.library.unknowns[size].start;
-            ((full[size] - resting) / (probe.largest * (value - resting))).abs()
+        let shares = candidate.sizes.iter().filter_map(|size| {
+            let resting = self.library.unknowns[*size].start;
+            let strongest = candidate.strongest(*size, resting)?;
+            Some(((full[*size] - resting) / (strongest - resting)).abs())
         });
-        strongest.fold(0.0, f64::max) < least(candidate.effect)
+        shares.fold(0.0, f64::max) < least(candidate.effect)
     }
 
     /// The sum of fitted clips' forms, numbers held to their known ranges.

@@ -24,26 +24,33 @@ pub fn without<E: Evidence>(bench: &Bench<'_, E>, hypothesis: &Hypothesis) -> Hy
             continue;
         }
         for k in &candidate.sizes {
-            let mut full = out.full.clone();
-            full[*k] = bench.library.unknowns[*k].start;
-            if (cost(&full) - now).abs() < LEAST.max(SHARE * now) {
-                out = held(out, *k, full);
+            let resting = bench.library.unknowns[*k].start;
+            let at = |value: f64| {
+                let mut full = out.full.clone();
+                full[*k] = value;
+                full
+            };
+            let alike = |value: f64| (cost(&at(value)) - now).abs() < LEAST.max(SHARE * now);
+            // A number that was found to be at rest is known: what it does elsewhere tells.
+            if alike(resting) && candidate.strongest(*k, resting).is_some_and(alike) {
+                out = held(out, *k, resting);
             }
         }
     }
     out
 }
 
-/// The hypothesis with other numbers, of which one is no longer free.
-fn held(hypothesis: Hypothesis, number: usize, full: Vec<f64>) -> Hypothesis {
+/// The hypothesis with a number that has another value and is no longer free.
+fn held(mut hypothesis: Hypothesis, number: usize, value: f64) -> Hypothesis {
     let Some(place) = hypothesis.free.iter().position(|free| *free == number) else { return hypothesis };
+    hypothesis.full[number] = value;
     let less = |clip: FittedClip| {
         let mut reduced = clip.reduced;
         reduced.form = reduced.form.remove_row(place + 1).remove_column(place + 1);
         FittedClip { reduced, ..clip }
     };
     let free = hypothesis.free.iter().copied().filter(|free| *free != number).collect();
-    Hypothesis { full, free, fitted: hypothesis.fitted.into_iter().map(less).collect(), ..hypothesis }
+    Hypothesis { free, fitted: hypothesis.fitted.into_iter().map(less).collect(), ..hypothesis }
 }
 
 #[cfg(test)]
@@ -59,6 +66,7 @@ mod tests {
     use crate::forward::setting;
     use crate::interrupt::Interrupt;
     use shared_mem::cell::Cell;
+    use shared_mem::theta::Theta;
     use std::path::Path;
 
     #[test]
@@ -69,7 +77,8 @@ mod tests {
         let world = World::draw(14, Kind::Excitation, Fault::Single(place.expect("an effect")), &cell);
         let clips = record(&world, 2).expect("a session");
         let library = Library::new(&cell, &setting::complete(&cell, None).expect("a cell"), false);
-        let evidence = ArmClips::new(&cell, &clips, |numbers: &[f64]| library.theta(numbers)).expect("an arm");
+        let theta = |numbers: &[f64]| library.theta(numbers);
+        let evidence = ArmClips::new(&cell, &clips, theta).expect("an arm");
         let interrupt = Interrupt::default();
         let bench =
             Bench { evidence: &evidence, library: &library, scatter: evidence.scatter(), interrupt: &interrupt };
@@ -80,6 +89,7 @@ mod tests {
         for (number, value) in full.iter_mut().zip(library.settings.numbers(&world.hidden)) {
             *number = value.unwrap_or(*number);
         }
+        let truth = full.clone();
         full[offsets[0]] = 0.04;
         let even = vec![1.0; evidence.channels().len()];
         let effort = Effort { iterations: 1, precision: Precision::Joints };
@@ -89,5 +99,15 @@ mod tests {
         let free: Vec<bool> = offsets.iter().map(|k| kept.free.contains(k)).collect();
         assert_eq!(free, [false, true, true, true, true, true, true]);
         assert_eq!(kept.fitted[0].reduced.form.ncols(), kept.free.len() + 1);
+        let rest = World { hidden: Theta { effects: Vec::new(), ..world.hidden.clone() }, ..world };
+        let clips = record(&rest, 2).expect("a session");
+        let evidence = ArmClips::new(&cell, &clips, theta).expect("an arm");
+        let bench = Bench { evidence: &evidence, ..bench };
+        let mut full = truth;
+        offsets.iter().for_each(|k| full[*k] = 0.0);
+        let found = bench.fit((&[effect], full), &[0, 1], &even, None, effort).expect("a fit");
+        let kept = without(&bench, &found);
+        let free: Vec<bool> = offsets.iter().map(|k| kept.free.contains(k)).collect();
+        assert_eq!(free, [false, true, true, true, true, true, true], "what is known to rest is known");
     }
 }

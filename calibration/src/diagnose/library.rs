@@ -64,6 +64,16 @@ pub struct Probe {
     pub largest: f64,
 }
 
+impl Candidate {
+    /// One of the sizes at the strongest that is met in practice; `resting`: where it changes nothing.
+    #[must_use]
+    pub fn strongest(&self, size: usize, resting: f64) -> Option<f64> {
+        let mut probes = self.alternatives.iter().flat_map(|alternative| &alternative.probes);
+        let probe = probes.find(|probe| probe.moves[0].0 == size)?;
+        Some(resting + probe.largest * (probe.moves[0].1 - resting))
+    }
+}
+
 impl Library {
     /// The library of a cell: with effects on the arm, and with those on hit, slide and camera where clips have an object.
     /// `base`: a complete theta whose effects act in the baseline already and are no candidates.
