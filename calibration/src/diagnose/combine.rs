@@ -84,6 +84,24 @@ pub struct Found {
     pub last: Hypothesis,
 }
 
+impl Found {
+    /// For every step, how many times what the search left of an arm's clips exceeds what was taken for noise in it, at least
+    /// 1: so many times less do differences between candidates say. Weights come from slopes, with all candidates at once; a
+    /// real arm strays far more under all that is named. Clips with numbers of their own take such leftovers up.
+    #[must_use]
+    pub fn unforeseen<E: Evidence>(&self, bench: &Bench<'_, E>) -> Vec<f64> {
+        let clips: Vec<usize> = self.last.fitted.iter().map(|clip| clip.clip).collect();
+        let left = (bench.scatter.count() == 0).then(|| Residuals::at(bench, &self.last, &clips)).flatten();
+        let Some(left) = left else { return vec![1.0; self.steps.len()] };
+        let weights = floor::weights(bench.evidence, &left.clips);
+        let exceeds = |step: &Step| {
+            let ratios = step.weights.iter().zip(&weights).map(|(taken, found)| (taken / found).powi(2));
+            (ratios.sum::<f64>() / weights.len() as f64).max(1.0)
+        };
+        self.steps.iter().map(exceeds).collect()
+    }
+}
+
 /// Whether an advantage is enough for `cost` more numbers.
 #[must_use]
 pub fn convincing(advantage: &Advantage, cost: usize) -> bool {
@@ -291,19 +309,6 @@ impl Step {
                 (trial.closes, trial.fitted) = (closes, Some((fit, ahead.over(&self.foretold))));
             }
         }
-    }
-
-    /// How many times what a hypothesis leaves of an arm's clips exceeds what was taken for noise in this step, at least 1:
-    /// so many times less do differences between candidates say. Weights come from slopes, with all candidates at once; a
-    /// real arm strays far more under all that is named. Clips with numbers of their own take such leftovers up.
-    #[must_use]
-    pub fn unforeseen<E: Evidence>(&self, bench: &Bench<'_, E>, last: &Hypothesis) -> f64 {
-        let clips: Vec<usize> = last.fitted.iter().map(|clip| clip.clip).collect();
-        let left = Residuals::at(bench, last, &clips).filter(|_| bench.scatter.count() == 0);
-        let Some(left) = left else { return 1.0 };
-        let weights = floor::weights(bench.evidence, &left.clips);
-        let ratios = self.weights.iter().zip(&weights).map(|(taken, found)| (taken / found).powi(2));
-        (ratios.sum::<f64>() / weights.len() as f64).max(1.0)
     }
 
     /// Whether the object strays by more than in strokes of another engine with nothing wrong.

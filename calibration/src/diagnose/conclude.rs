@@ -76,7 +76,8 @@ pub fn conclude<E: Evidence>(
         .map(|(before, after)| Left::of_groups(&before, &after))
         .ok_or(DiagnoseError::NoBaseline)?;
     let confirmed = after.mean_square() < before.mean_square();
-    let finding = finding(bench, (split, found), (left, confirmed), &rest);
+    let unforeseen = found.unforeseen(bench);
+    let finding = finding(bench, (split, found), &unforeseen, (left, confirmed), &rest);
     let verdict = finding.verdict();
     let believed = matches!(verdict.kind, Kind::Named | Kind::Class);
     let kept = if believed { &found.last } else { &first.from };
@@ -102,7 +103,7 @@ pub fn conclude<E: Evidence>(
     let largest = rest.first().map(|place| (place.channel.as_str(), place.regime.as_str()));
     Ok(Diagnosis {
         gap,
-        candidates: candidates(bench, found, split, (&before, &finding), verdict.kind, options.seed),
+        candidates: candidates(bench, (found, unforeseen[0]), split, (&before, &finding), verdict.kind, options.seed),
         next_experiment: match verdict.kind {
             Kind::Unexplained => advice::unexplained(largest),
             Kind::None => "Nothing is open; record the next session as usual.".into(),
@@ -125,15 +126,17 @@ pub fn conclude<E: Evidence>(
 fn finding<'a, E: Evidence>(
     bench: &Bench<'a, E>,
     (split, found): (&Split, &Found),
+    unforeseen: &[f64],
     (left, confirmed): (Vec<Left>, bool),
     rest: &[Place],
 ) -> Finding<'a> {
     let name = |effect: &usize| bench.library.candidates[*effect].effect.name;
     let mut rivals = Vec::new();
     let (mut sure, mut clear): (f64, bool) = (1.0, true);
-    for (step, effect) in steps_of(found) {
+    for (place, effect) in steps_of(found) {
+        let step = &found.steps[place];
         clear &= step.is_clear(effect);
-        let others = confidence::rivals(step, effect, step.unforeseen(bench, &found.last));
+        let others = confidence::rivals(step, effect, unforeseen[place]);
         let others = others.into_iter().filter(|other| !found.last.effects.contains(other));
         rivals.extend(others.filter(|other| stands_in(bench, split, found, (step, effect), *other)).map(|k| name(&k)));
         let all = confidence::probabilities(step, false);
@@ -176,11 +179,11 @@ fn stands_in<E: Evidence>(
     confidence::alike(advantage.nats, advantage.error, advantage.clips())
 }
 
-/// The steps in which the effects that were kept were added.
-fn steps_of(found: &Found) -> impl Iterator<Item = (&Step, usize)> {
-    found.steps.windows(2).filter_map(|pair| {
+/// The effects that were kept, each with the step in which it was added.
+fn steps_of(found: &Found) -> impl Iterator<Item = (usize, usize)> {
+    found.steps.windows(2).enumerate().filter_map(|(place, pair)| {
         let added = pair[1].from.effects.iter().find(|effect| !pair[0].from.effects.contains(effect))?;
-        found.last.effects.contains(added).then_some((&pair[0], *added))
+        found.last.effects.contains(added).then_some((place, *added))
     })
 }
 
@@ -213,7 +216,7 @@ fn replayed<E: Evidence>(
 
 fn candidates<E: Evidence>(
     bench: &Bench<'_, E>,
-    found: &Found,
+    (found, unforeseen): (&Found, f64),
     split: &Split,
     (before, finding): (&Residuals, &Finding<'_>),
     kind: Kind,
@@ -221,7 +224,6 @@ fn candidates<E: Evidence>(
 ) -> Vec<Candidate> {
     let first = &found.steps[0];
     let likely = confidence::probabilities(first, found.last.effects.is_empty());
-    let unforeseen = first.unforeseen(bench, &found.last);
     let mut all: Vec<Candidate> = first
         .trials
         .iter()
