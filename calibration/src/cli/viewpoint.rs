@@ -34,7 +34,7 @@ pub(crate) struct ViewpointArguments {
     /// The same view without the robot: colour, or depth where the pictures are depth.
     #[arg(long)]
     background: Option<PathBuf>,
-    /// Silhouettes from a session's depth pictures, without a background: whatever hangs together and stands out of table,
+    /// Silhouettes from depth pictures alone, a session's or given ones: whatever hangs together and stands out of table,
     /// floor and walls; the robot has to be the largest such thing in view.
     #[arg(long, conflicts_with_all = ["mask", "board"])]
     depth: bool,

@@ -167,7 +167,10 @@ fn gather(options: &Options) -> anyhow::Result<(Cell, Vec<Taken>)> {
         );
         let taken = options.targets.iter().zip(&options.joints).map(|(path, joints)| {
             let name = path.display().to_string();
-            Ok(Taken { name, pixels: Pixels::read(path)?, moment: Moment::parse(joints)? })
+            let pixels = Pixels::read(path)?;
+            let wanted = options.kind == PictureKind::Color || pixels.is_depth();
+            ensure!(wanted, "{name} shows colours: give depth pictures, or leave --depth out");
+            Ok(Taken { name, pixels, moment: Moment::parse(joints)? })
         });
         return Ok((cell, taken.collect::<anyhow::Result<_>>()?));
     }

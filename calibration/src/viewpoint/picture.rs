@@ -71,14 +71,19 @@ impl Pixels {
         Self { size, channels }
     }
 
+    /// Whether it shows depths, not colours.
+    #[must_use]
+    pub fn is_depth(&self) -> bool {
+        self.channels.len() == 1
+    }
+
     /// Free of the lens's distortion; what lies outside of the picture is black.
     #[must_use]
     pub fn undistorted(self, lens: &Lens, distortion: &[f64; 5]) -> Self {
-        let is_depth = self.channels.len() == 1;
-        let flat = |grid: Grid| match is_depth {
+        let is_depth = self.is_depth();
+        let flat = |grid: Grid| {
             // Between two depths there is nothing.
-            true => grid.undistorted_nearest(lens, distortion),
-            false => grid.undistorted(lens, distortion, 0.0),
+            if is_depth { grid.undistorted_nearest(lens, distortion) } else { grid.undistorted(lens, distortion, 0.0) }
         };
         Self { channels: self.channels.into_iter().map(flat).collect(), ..self }
     }
@@ -120,7 +125,7 @@ impl Pixels {
             self.size == background.size && self.channels.len() == background.channels.len(),
             "{name} and its background are pictures of another kind or size: take both with the same camera"
         );
-        let is_depth = self.channels.len() == 1;
+        let is_depth = self.is_depth();
         let differs = |i: usize| {
             let pairs = self.channels.iter().zip(&background.channels);
             pairs.into_iter().any(|(a, b)| {

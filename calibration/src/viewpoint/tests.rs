@@ -161,7 +161,8 @@ fn what_cannot_be_fitted_is_refused_in_one_line() {
         path
     };
     let (black, wide) = (file("black.png", 0, 320), file("wide.png", 9, 640));
-    let refused: [(Options, &str); 7] = [
+    let refused: [(Options, &str); 8] = [
+        (Options { kind: PictureKind::Depth, ..options.clone() }, "leave --depth out"),
         (Options { targets: vec![black.clone()], ..options.clone() }, "shows nothing"),
         (Options { targets: vec![wide], ..options.clone() }, "intrinsics are for 320 x 240"),
         (Options { masks: vec![black], ..options.clone() }, "nothing to fit"),
