@@ -30,6 +30,7 @@ pub struct Plan {
     pub seed: u64,
 }
 
+/// The golden section: its multiples fall evenly into one turn, however many are taken.
 const GOLDEN: f64 = 0.618_033_988_749_894_9;
 
 /// What came of it.
@@ -91,7 +92,7 @@ impl Plan {
         }
         let mut worlds: Vec<_> =
             (self.seed..).zip(faults).map(|(number, (kind, fault))| (number, kind, fault)).collect();
-        // Steps of the golden section: whoever ends early has met all sorts alike.
+        // Whoever ends early has met all sorts alike.
         let place = |number: u64| ((number - self.seed) as f64 * GOLDEN).fract();
         worlds.sort_by(|a, b| place(a.0).total_cmp(&place(b.0)));
         worlds
