@@ -89,7 +89,7 @@ impl ClipFit {
             own: own.to_vec(),
             deviance: r.norm_squared() + pull.dot(&u) + log_volume,
             gradient: a.tr_mul(r) + ba.tr_mul(&own_step),
-            information: a.tr_mul(a) + ba.tr_mul(&own_answer),
+            information: a.transpose() * a + ba.tr_mul(&own_answer),
             scores,
             own_covariance: inner.inverse(),
             own_step,
