@@ -1,22 +1,24 @@
 //! The impulses at all places that touch a free body within one step, found together: each place gives way as it must and
 //! pulls at nothing, and friction stops a slip or reaches Coulomb's cone.
 //!
-//! Sweeps over the places (projected Gauss-Seidel) find them. They begin at a guess that is the answer already where
-//! every place slips on the way it slipped before, as it mostly does: the pushes are then the unknowns of linear
-//! equations. Base frame, SI. Called by [`super::tumble`].
+//! Sweeps over the places (projected Gauss-Seidel) find them. Where it is known which places part, stick or slip and how,
+//! linear equations give the answer ([`modes`]): the sweeps begin with that for a motion that goes on as before, and where
+//! they settle slowly, as with a tool that sticks, with that for what they have found so far (after Silcowitz, Niebe and
+//! Erleben 2010, "Projected Gauss-Seidel Subspace Minimization Method for Interactive Rigid Body Dynamics"). Base frame,
+//! SI. Called by [`super::tumble`].
+
+mod modes;
 
 use crate::sliding::FreeBody;
+use modes::Mode;
 use nalgebra::{Matrix3, Point3, Vector3};
 
 /// Sweeps over the places, and the change of velocity [m/s] below which they end early.
-const SWEEPS: usize = 40;
+const SWEEPS: usize = 80;
 const SETTLED: f64 = 1e-6;
-/// Most places whose pushes are guessed: a box that leans on an edge or stands on a face, with both ends of a tool.
-const GUESSED: usize = 6;
-/// Share of the largest coefficient below which the equations leave a push open: four corners of a face do.
-const OPEN: f64 = 1e-6;
-/// A slip slower than this has no direction [m/s].
-const STICKS: f64 = 1e-6;
+/// Sweeps after which equations take up what they have found; again after twice as many, and so on, so that where no
+/// answer of equations holds the sweeps get there.
+const SLOW: usize = 3;
 
 /// One place that touches within the step.
 #[derive(Clone, Copy)]
@@ -60,13 +62,6 @@ impl Contact {
         least_parting: 0.0,
         friction: 0.0,
     };
-
-    /// Impulse for a push of one, at a place that moves like `relative`.
-    fn per_push(&self, relative: &Vector3<f64>) -> Vector3<f64> {
-        let slip = relative - self.normal * relative.dot(&self.normal);
-        let speed = slip.norm();
-        if speed > STICKS { self.normal - slip * (self.friction / speed) } else { self.normal }
-    }
 }
 
 impl Place {
@@ -138,8 +133,8 @@ impl<'a, const N: usize> Impulses<'a, N> {
 
     /// Finds the impulses and gives them to the body.
     pub(super) fn settle(&mut self) {
-        self.guess();
-        for _ in 0..SWEEPS {
+        self.follow(Mode::of_motion);
+        for sweep in 1..=SWEEPS {
             let mut largest: f64 = 0.0;
             for i in 0..self.count {
                 let relative = self.relative(i);
@@ -149,6 +144,9 @@ impl<'a, const N: usize> Impulses<'a, N> {
             }
             if largest < SETTLED {
                 break;
+            }
+            if sweep % SLOW == 0 && (sweep / SLOW).is_power_of_two() {
+                self.follow(Mode::of_impulse);
             }
         }
     }
@@ -164,68 +162,7 @@ impl<'a, const N: usize> Impulses<'a, N> {
         self.body.velocity += change * self.inverse_mass;
         self.body.angular_velocity += self.inverse_inertia * place.contact.lever.cross(change);
     }
-
-    /// Impulses for the sweeps to begin with; none where there is no simple answer.
-    fn guess(&mut self) {
-        if self.count < 2 || self.count > GUESSED {
-            return;
-        }
-        let mut equations = Equations { rows: [[0.0; GUESSED + 1]; GUESSED], count: self.count };
-        let (mut per_push, mut pushed) = ([Vector3::zeros(); GUESSED], [false; GUESSED]);
-        for i in 0..self.count {
-            let (contact, relative) = (&self.places[i].contact, self.relative(i));
-            let lacking = contact.least_parting - relative.dot(&contact.normal);
-            (per_push[i], pushed[i]) = (contact.per_push(&relative), lacking > 0.0);
-            equations.rows[i][GUESSED] = lacking;
-            let (linear, angular) =
-                (per_push[i] * self.inverse_mass, self.inverse_inertia * contact.lever.cross(&per_push[i]));
-            for (row, other) in self.places[..self.count].iter().map(|place| &place.contact).enumerate() {
-                equations.rows[row][i] = other.normal.dot(&(linear + angular.cross(&other.lever)));
-            }
-        }
-        // A place that would have to pull is left out, and the others are asked again.
-        for _ in 0..self.count {
-            let Some(pushes) = equations.solve(&pushed) else { return };
-            let pulling = (0..self.count).filter(|i| pushes[*i] < 0.0).min_by(|a, b| pushes[*a].total_cmp(&pushes[*b]));
-            match pulling {
-                Some(i) => pushed[i] = false,
-                None => {
-                    (0..self.count).filter(|i| pushed[*i]).for_each(|i| self.push(i, &(per_push[i] * pushes[i])));
-                    return;
-                }
-            }
-        }
-    }
 }
 
-/// Linear equations for the pushes: what each does to the parting speeds, and in the last column what these lack.
-struct Equations {
-    rows: [[f64; GUESSED + 1]; GUESSED],
-    count: usize,
-}
-
-impl Equations {
-    /// The pushes of the places that take part, 0 for the others, by elimination; `None` where that leaves one open.
-    fn solve(&self, part: &[bool; GUESSED]) -> Option<[f64; GUESSED]> {
-        let mut rows = self.rows;
-        let largest = (0..self.count).map(|i| rows[i][i].abs()).fold(0.0, f64::max);
-        let parts = || (0..self.count).filter(|i| part[*i]);
-        for pivot in parts() {
-            if rows[pivot][pivot] < OPEN * largest {
-                return None;
-            }
-            for row in parts().filter(|row| *row > pivot) {
-                let factor = rows[row][pivot] / rows[pivot][pivot];
-                for column in parts().filter(|column| *column > pivot).chain([GUESSED]) {
-                    rows[row][column] -= factor * rows[pivot][column];
-                }
-            }
-        }
-        let mut pushes = [0.0; GUESSED];
-        for i in parts().rev() {
-            let known: f64 = parts().filter(|j| *j > i).map(|j| rows[i][j] * pushes[j]).sum();
-            pushes[i] = (rows[i][GUESSED] - known) / rows[i][i];
-        }
-        Some(pushes)
-    }
-}
+#[cfg(test)]
+mod tests;
