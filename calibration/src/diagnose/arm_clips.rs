@@ -3,10 +3,9 @@
 #![allow(non_snake_case)] // the Franka Control Interface's own symbols
 
 use super::evidence::{Channel, Evidence, Row, StageName};
-use super::noise;
 use super::scatter::Scatter;
 use crate::estimate::{ClipModel, Impossible};
-use crate::forward::arm::noise as signal;
+use crate::forward::arm::noise;
 use crate::forward::object;
 use shared_mem::cell::{Cell, ClipKind};
 use shared_mem::recording::{Clip, JointSeries};
@@ -92,12 +91,11 @@ fn series<'a>(clip: &'a Clip, channel: &Channel) -> (&'a JointSeries, &'a [f64])
 fn sensor_sigma(clips: &[Clip], channel: &Channel, joint: usize) -> f64 {
     let of = |clip: &Clip| {
         let (log, values) = series(clip, channel);
-        signal::sigma(&values.iter().skip(joint).step_by(log.dof.max(1)).copied().collect::<Vec<_>>())
+        noise::sigma(&values.iter().skip(joint).step_by(log.dof.max(1)).copied().collect::<Vec<_>>())
     };
-    let each: Vec<f64> = clips.iter().map(of).collect();
     // A sensor without noise does not exist: below this a log was computed, not measured.
     let least = if channel.quantity.starts_with("tau") { 1e-3 } else { 1e-6 };
-    noise::median(&each).max(least)
+    noise::of_clips(clips.iter().map(of)).max(least)
 }
 
 fn top_speeds(clips: &[Clip], dof: usize) -> Vec<f64> {

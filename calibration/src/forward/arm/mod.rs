@@ -287,7 +287,7 @@ fn values(clip: &ArmClip, channel: Channel) -> Option<&[f64]> {
     (!values.is_empty()).then_some(values)
 }
 
-/// Median over the clips, joint by joint.
+/// Joint by joint.
 fn sigmas(clips: &[ArmClip], dof: usize) -> [Joints; 4] {
     CHANNELS.map(|channel| {
         let least = LEAST_SIGMA[channel as usize];
@@ -297,9 +297,7 @@ fn sigmas(clips: &[ArmClip], dof: usize) -> [Joints; 4] {
                 let signal: Vec<f64> = values(clip, channel)?.iter().skip(joint).step_by(dof).copied().collect();
                 (!clip.dead[joint]).then(|| noise::sigma(&signal))
             };
-            let mut all: Vec<f64> = clips.iter().filter_map(of).collect();
-            all.sort_unstable_by(f64::total_cmp);
-            *sigma = all.get(all.len() / 2).copied().unwrap_or(least).max(least);
+            *sigma = noise::of_clips(clips.iter().filter_map(of)).max(least);
         }
         sigma
     })

@@ -21,6 +21,15 @@ pub fn sigma(signal: &[f64]) -> f64 {
     white.max(resolution(signal) / 12.0_f64.sqrt())
 }
 
+/// One sigma of a sensor from that of its signal in each of several clips: what holds for most. A clip in which the reading
+/// never changes has 0 and tells nothing: the joint stood still, and what moves it less than a step is not seen.
+#[must_use]
+pub fn of_clips(sigmas: impl Iterator<Item = f64>) -> f64 {
+    let mut told: Vec<f64> = sigmas.filter(|sigma| *sigma > 0.0).collect();
+    told.sort_unstable_by(f64::total_cmp);
+    told.get(told.len() / 2).copied().unwrap_or_default()
+}
+
 /// Smallest step between neighbouring samples; 0 where nothing ever changes.
 fn resolution(signal: &[f64]) -> f64 {
     let steps = signal.windows(2).map(|w| (w[1] - w[0]).abs()).filter(|step| *step > 0.0);
@@ -47,5 +56,11 @@ mod tests {
     fn a_coarse_encoder_is_no_better_than_its_steps() {
         let signal: Vec<f64> = (0..1000).map(|i| (i as f64 * 1e-4 / 1.5e-3).round() * 1.5e-3).collect();
         assert!((sigma(&signal) - 1.5e-3 / 12.0_f64.sqrt()).abs() < 1e-6, "{}", sigma(&signal));
+    }
+
+    #[test]
+    fn clips_in_which_a_joint_stood_still_do_not_hide_its_noise() {
+        assert_eq!(of_clips([0.0, 0.0, 4e-4, 0.0, 5e-4, 6e-4, 0.0].into_iter()), 5e-4);
+        assert_eq!(of_clips([0.0; 3].into_iter()), 0.0);
     }
 }
