@@ -9,6 +9,7 @@ use shared_mem::theta::Theta;
 use std::net::IpAddr;
 use std::path::PathBuf;
 use std::time::Duration;
+use twin::effects::{Place, find};
 
 /// Play a Franka robot: the simulated cell as an FR3 that speaks FCI version 10, until Ctrl-C
 ///
@@ -69,10 +70,17 @@ impl ServeArguments {
             (true, false) => Pace::LockStep,
             (true, true) => Pace::Fast,
         };
-        let server = Server::open(&cell, self.hidden()?.as_ref(), ports, pace)?;
+        let hidden = self.hidden()?;
+        let server = Server::open(&cell, hidden.as_ref(), ports, pace)?;
         let stop = stop_flag()?;
         let hand = server.hand_address().map_or(String::new(), |hand| format!(", its hand at {hand}"));
         tracing::info!("an FR3 (FCI version 10) listens at {}{hand}", server.address()?);
+        for effect in hidden.iter().flat_map(unmet_by_torques) {
+            tracing::warn!(
+                "{effect} acts on positions under joint impedance alone; clients that command torques, or under Cartesian \
+                 impedance, do not meet it: torque_delay acts on those"
+            );
+        }
         let report = server.run(&stop, self.duration)?;
         if self.json {
             answer(&serde_json::to_string(&report)?)?;
@@ -89,6 +97,12 @@ impl ServeArguments {
         }
         Ok(theta)
     }
+}
+
+/// Effects on the way to the robot's own joint controller.
+fn unmet_by_torques(hidden: &Theta) -> impl Iterator<Item = &str> {
+    let on_the_way = |name: &&str| find(name).is_some_and(|effect| effect.acts_on == Place::CommandPath);
+    hidden.effects.iter().map(|effect| effect.name.as_str()).filter(on_the_way)
 }
 
 fn in_words(report: &Report) -> String {
