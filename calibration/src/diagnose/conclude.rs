@@ -283,9 +283,11 @@ fn why(trial: &super::combine::Trial, status: Status) -> String {
             scored.cost,
             100.0 * trial.closes.clamp(0.0, 1.0)
         ),
-        (None, _) => {
-            format!("its signature explains {:.1} % of what the baseline leaves", 100.0 * scored.cosine.powi(2))
-        }
+        (None, _) => format!(
+            "its signature explains {:.1} % of what the baseline leaves; its parameters imitate {:.0} % of that signature",
+            100.0 * scored.cosine.powi(2),
+            100.0 * scored.imitated
+        ),
     }
 }
 

@@ -24,6 +24,8 @@ pub struct Scored {
     pub cosine: f64,
     /// Its signal at the strongest that is met in practice, in sigmas, what baseline numbers can imitate taken out.
     pub signal: f64,
+    /// Share of that signal's power that baseline numbers imitate.
+    pub imitated: f64,
     /// Probability of such a gain by chance.
     pub p: f64,
 }
@@ -66,14 +68,17 @@ pub fn score(swept: &Swept, sum: &DMatrix<f64>, library: &Library) -> Vec<Scored
             }
             let one_sided: Vec<bool> = alternative.probes.iter().map(|probe| probe.one_sided).collect();
             let found = bounded_minimum(&left, &free, &one_sided);
-            let energy = |(k, at): (&usize, f64)| at * at * left[(*k, *k)];
-            let largest = alternative.probes.iter().map(|probe| probe.largest);
-            let signal = free.iter().zip(largest).map(energy).fold(0.0, f64::max).max(0.0).sqrt();
+            let strongest = |form: &DMatrix<f64>| {
+                let largest = alternative.probes.iter().map(|probe| probe.largest);
+                free.iter().zip(largest).map(|(k, at)| at * at * form[(*k, *k)]).fold(0.0, f64::max)
+            };
+            let (power, beyond) = (strongest(&form), strongest(&left));
+            let (signal, imitated) = (beyond.sqrt(), (1.0 - beyond / power.max(f64::MIN_POSITIVE)).max(0.0));
             let cost = free.len() + alternative.form.len().min(1);
             let cosine = (found.gain.max(0.0) / left[(0, 0)].max(f64::MIN_POSITIVE)).sqrt().min(1.0);
             let p = chance(found.gain, cost);
-            let (units, next) = (found.at, Vec::new());
-            Some(Scored { candidate, alternative: a, units, next, gain: found.gain, cost, cosine, signal, p })
+            let (units, next, gain) = (found.at, Vec::new(), found.gain);
+            Some(Scored { candidate, alternative: a, units, next, gain, cost, cosine, signal, imitated, p })
         });
         let mut forms: Vec<Scored> = forms.collect();
         forms.sort_by(|a, b| b.gain.total_cmp(&a.gain));
