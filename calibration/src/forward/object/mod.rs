@@ -189,7 +189,11 @@ impl ObjectClips {
                 errors.extend(measured.q_row(*row).iter().zip(predicted).map(|(q, predicted)| q - predicted));
             }
         }
-        Ok(errors)
+        if errors.iter().all(|error| error.is_finite()) {
+            Ok(errors)
+        } else {
+            Err(Impossible("the twin flies apart with these numbers".into()))
+        }
     }
 
     /// One sigma of every row.

@@ -11,6 +11,9 @@ const ROUNDS: usize = 6;
 /// Give of a place, as a share of the largest coefficient. It decides what equations of rigid places leave open: the four
 /// corners of a face share its load evenly.
 const GIVE: f64 = 1e-6;
+/// Impulses larger than this many times what would give each place its velocity by itself come of velocities that no rigid
+/// body can have, as where both ends of a turning tool hold fast.
+const FORCED: f64 = 10.0;
 /// A slip slower than this has no direction [m/s].
 const STILL: f64 = 1e-6;
 
@@ -120,7 +123,10 @@ impl<const N: usize> Impulses<'_, N> {
         let sizes = eliminated(&mut rows, count)?;
         let mut impulses = [Vector3::zeros(); N];
         unknowns.iter().zip(&sizes).for_each(|(unknown, size)| impulses[unknown.place] += unknown.along * *size);
-        Some(impulses)
+        let by_itself = unknowns.iter().map(|unknown| unknown.lacking.abs()).sum::<f64>() / self.inverse_mass;
+        // Not `>`: numbers out of range are no answer either.
+        let moderate = impulses.iter().all(|impulse| impulse.norm() <= FORCED * by_itself);
+        moderate.then_some(impulses)
     }
 
     /// Whether a place cannot do what was supposed: it would pull, stick beyond its friction, or be driven by it.
