@@ -56,6 +56,14 @@ pub struct Trial {
     pub closes: f64,
 }
 
+impl Trial {
+    /// Whether enough of the gap closes with it for a cause, however much better the clips are foretold.
+    #[must_use]
+    pub fn is_cause(&self) -> bool {
+        self.closes > CLOSES
+    }
+}
+
 /// One step of the search.
 #[derive(Debug, Clone)]
 pub struct Step {
@@ -177,7 +185,7 @@ impl Step {
                 let of_arm = bench.library.candidates[trial.scored.candidate].effect.stage == Stage::Control;
                 !of_arm || advantage.nats > WORTHWHILE * self.arm_rows as f64
             })
-            .filter(|(trial, _, _)| trial.closes > CLOSES)
+            .filter(|(trial, _, _)| trial.is_cause())
             .filter(|(trial, fit, _)| !bench.negligible(trial.scored.candidate, &fit.full))
             .max_by(|a, b| net(a.2, a.0.scored.cost).total_cmp(&net(b.2, b.0.scored.cost)))
     }

@@ -139,7 +139,7 @@ fn finding<'a, E: Evidence>(
         let others = confidence::rivals(step, effect, unforeseen[place]);
         let others = others.into_iter().filter(|other| !found.last.effects.contains(other));
         rivals.extend(others.filter(|other| stands_in(bench, split, found, (step, effect), *other)).map(|k| name(&k)));
-        let all = confidence::probabilities(step, false);
+        let all = confidence::probabilities(&step.trials, false);
         sure = sure.min(all.iter().find(|(candidate, _)| *candidate == effect).map_or(0.5, |(_, p)| *p));
     }
     Finding {
@@ -223,7 +223,7 @@ fn candidates<E: Evidence>(
     seed: u64,
 ) -> Vec<Candidate> {
     let first = &found.steps[0];
-    let likely = confidence::probabilities(first, found.last.effects.is_empty());
+    let likely = confidence::probabilities(&first.trials, found.last.effects.is_empty());
     let mut all: Vec<Candidate> = first
         .trials
         .iter()

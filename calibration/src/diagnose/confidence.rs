@@ -1,6 +1,6 @@
 //! How sure a finding is: shares of the evidence among rivals, less what experience with simulated sessions takes off.
 
-use super::combine::{Step, net};
+use super::combine::{Step, Trial, net};
 
 /// Rivals this close cannot be told apart [nats].
 const NEAR: f64 = 4.0;
@@ -16,10 +16,11 @@ const NONE_OF_THESE: f64 = 0.04;
 /// Nats count less than they say: twins are never exact. The temperature that made shares agree with frequencies.
 const TEMPERATURE: f64 = 4.0;
 
-/// Probability of every candidate of a step that it is the one to add, and what is left for none of them.
+/// Probability of every candidate tried in a step that could be the cause, and what is left for none of them.
 #[must_use]
-pub fn probabilities(step: &Step, none: bool) -> Vec<(usize, f64)> {
-    let fitted: Vec<(usize, f64)> = (step.trials.iter())
+pub fn probabilities(trials: &[Trial], none: bool) -> Vec<(usize, f64)> {
+    let fitted: Vec<(usize, f64)> = (trials.iter())
+        .filter(|trial| trial.is_cause())
         .filter_map(|trial| trial.fitted.as_ref().map(|(_, a)| (trial.scored.candidate, net(a, trial.scored.cost))))
         .collect();
     let best = fitted.iter().map(|(_, worth)| *worth).fold(0.0, f64::max);
@@ -67,7 +68,40 @@ fn chance(clips: usize) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use super::super::fit::Hypothesis;
+    use super::super::score::Foretold;
+    use super::super::shortlist::Scored;
     use super::*;
+
+    fn trial(candidate: usize, nats: f64, closes: f64) -> Trial {
+        let foretold = |gain: f64| Foretold { clips: (0..12).map(|clip| (clip, 1000.0 - 2.0 * gain / 12.0)).collect() };
+        let (units, next) = (vec![1.0], Vec::new());
+        let scored = Scored {
+            candidate,
+            alternative: 0,
+            units,
+            next,
+            gain: 2.0 * nats,
+            cost: 1,
+            cosine: 0.5,
+            signal: 30.0,
+            imitated: 0.1,
+            p: 0.0,
+        };
+        let fit = Hypothesis { effects: vec![candidate], full: Vec::new(), free: Vec::new(), fitted: Vec::new() };
+        Trial { scored, fitted: Some((fit, foretold(nats).over(&foretold(0.0)))), closes }
+    }
+
+    #[test]
+    fn a_candidate_that_closes_nothing_takes_no_probability_however_well_it_foretells() {
+        let sure = |trials: &[Trial]| {
+            let all = probabilities(trials, false);
+            all.iter().find(|(candidate, _)| *candidate == 0).map_or(0.0, |(_, p)| *p)
+        };
+        let cause = trial(0, 100.0, 0.4);
+        assert!((sure(&[cause.clone(), trial(1, 150.0, 0.05)]) - (1.0 - NONE_OF_THESE)).abs() < 1e-6);
+        assert!(sure(&[cause, trial(1, 150.0, 0.4)]) < 0.1, "one that closes as much does");
+    }
 
     #[test]
     fn few_clips_must_differ_by_more() {
