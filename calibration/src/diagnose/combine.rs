@@ -44,6 +44,8 @@ const NEARLY_ALL: f64 = 0.85;
 const CLEAR: f64 = 3.5;
 /// Engines integrate one and the same effect differently by a hundredth of it, so by this share of the squared gap.
 const NUMERICS_SHARE: f64 = 1e-4;
+/// One that has more numbers must close this much more of the gap: what own numbers of clips hide from the likelihood.
+pub const MORE: f64 = 0.04;
 
 /// A candidate tried on top of a hypothesis.
 #[derive(Debug, Clone)]
@@ -61,6 +63,14 @@ impl Trial {
     #[must_use]
     pub fn is_cause(&self) -> bool {
         self.closes > CLOSES
+    }
+
+    /// Whether another does the same with fewer numbers: what is better about this one is no more than engines differ by.
+    #[must_use]
+    pub fn is_outdone_by(&self, other: &Self) -> bool {
+        let (Some((_, mine)), Some((_, its))) = (&self.fitted, &other.fitted) else { return false };
+        let alike = mine.nats - its.nats < LEAST.max(NUMERICS_SHARE * its.nats);
+        other.scored.cost < self.scored.cost && alike && self.closes < other.closes + MORE
     }
 }
 
@@ -171,7 +181,7 @@ impl Step {
     /// The trial that is worth most among those worth it.
     #[must_use]
     pub fn best<E: Evidence>(&self, bench: &Bench<'_, E>) -> Option<(&Trial, &Hypothesis, &Advantage)> {
-        (self.trials.iter())
+        let worthy: Vec<(&Trial, &Hypothesis, &Advantage)> = (self.trials.iter())
             .filter_map(|trial| trial.fitted.as_ref().map(|(fit, advantage)| (trial, fit, advantage)))
             .filter(|(trial, _, advantage)| {
                 let stage = bench.library.candidates[trial.scored.candidate].effect.stage;
@@ -187,7 +197,10 @@ impl Step {
             })
             .filter(|(trial, _, _)| trial.is_cause())
             .filter(|(trial, fit, _)| !bench.negligible(trial.scored.candidate, &fit.full))
-            .max_by(|a, b| net(a.2, a.0.scored.cost).total_cmp(&net(b.2, b.0.scored.cost)))
+            .collect();
+        let simplest = |(trial, ..): &&(&Trial, _, _)| !worthy.iter().any(|(other, ..)| trial.is_outdone_by(other));
+        let worth = |(trial, _, advantage): &(&Trial, _, &Advantage)| net(advantage, trial.scored.cost);
+        worthy.iter().filter(simplest).max_by(|a, b| worth(a).total_cmp(&worth(b))).copied()
     }
 }
 

@@ -1,6 +1,6 @@
 //! How sure a finding is: shares of the evidence among rivals, less what experience with simulated sessions takes off.
 
-use super::combine::{Step, Trial, net};
+use super::combine::{MORE, Step, Trial, net};
 
 /// Rivals this close cannot be told apart [nats].
 const NEAR: f64 = 4.0;
@@ -8,8 +8,6 @@ const NEAR: f64 = 4.0;
 const CHANCE: f64 = 1.5;
 /// A rival closes at least this share of the gap that the chosen one closes.
 const ALIKE: f64 = 0.5;
-/// ... and one that has more numbers for it this much more of the gap: what own numbers of clips hide from the likelihood.
-const MORE: f64 = 0.04;
 /// What is kept for causes outside the library even where everything fits; from the simulated sessions on which this was
 /// measured: of named findings this share was wrong.
 const NONE_OF_THESE: f64 = 0.04;
@@ -20,7 +18,7 @@ const TEMPERATURE: f64 = 4.0;
 #[must_use]
 pub fn probabilities(trials: &[Trial], none: bool) -> Vec<(usize, f64)> {
     let fitted: Vec<(usize, f64)> = (trials.iter())
-        .filter(|trial| trial.is_cause())
+        .filter(|trial| trial.is_cause() && !trials.iter().any(|other| other.is_cause() && trial.is_outdone_by(other)))
         .filter_map(|trial| trial.fitted.as_ref().map(|(_, a)| (trial.scored.candidate, net(a, trial.scored.cost))))
         .collect();
     let best = fitted.iter().map(|(_, worth)| *worth).fold(0.0, f64::max);
@@ -100,7 +98,10 @@ mod tests {
         };
         let cause = trial(0, 100.0, 0.4);
         assert!((sure(&[cause.clone(), trial(1, 150.0, 0.05)]) - (1.0 - NONE_OF_THESE)).abs() < 1e-6);
-        assert!(sure(&[cause, trial(1, 150.0, 0.4)]) < 0.1, "one that closes as much does");
+        assert!(sure(&[cause.clone(), trial(1, 150.0, 0.4)]) < 0.1, "one that closes as much does");
+        let mut dearer = trial(1, 103.0, 0.41);
+        dearer.scored.cost = 8;
+        assert!((sure(&[cause, dearer]) - (1.0 - NONE_OF_THESE)).abs() < 1e-6, "one with more numbers does not");
     }
 
     #[test]

@@ -19,7 +19,8 @@ pub struct Library {
     pub settings: Settings,
     /// Bounds, steps, and where the baseline begins; effects rest.
     pub unknowns: Vec<Unknown>,
-    /// The joint that each number belongs to, from 0; `None` for numbers of the whole arm and of the object.
+    /// The joint in whose channels each number shows, from 0; `None` for numbers of the whole arm and of the object, and for
+    /// those of a joint that an object alone may show.
     pub joints: Vec<Option<usize>>,
     /// What each number does to the arm.
     reaches: Vec<ArmReach>,
@@ -99,7 +100,8 @@ impl Library {
             numbers.extend(setting::effect_settings(effect, dof));
             candidates.push(Candidate::new(effect, at, &numbers));
         }
-        let joints = numbers.iter().map(|(setting, _)| joint_of(setting)).collect();
+        let joint = |setting| joint_of(setting).filter(|_| !(with_object && moves_the_tip_unseen(setting)));
+        let joints = numbers.iter().map(|(setting, _)| joint(setting)).collect();
         let carried = numbers.iter().position(|(setting, _)| is_carried(setting));
         let reaches = numbers.iter().map(|(setting, _)| arm_reach(setting, carried)).collect();
         let (all, unknowns): (Vec<Setting>, Vec<Unknown>) = numbers.into_iter().unzip();
@@ -156,6 +158,12 @@ fn joint_of(setting: &Setting) -> Option<usize> {
         }
         _ => None,
     }
+}
+
+/// Whether a number of a joint moves the tip by what no sensor of the arm need show: nothing tells of a vertical joint's
+/// encoder but what the tip hits.
+fn moves_the_tip_unseen(setting: &Setting) -> bool {
+    matches!(setting, Setting::Effect { name: "joint_encoder_offset", .. })
 }
 
 /// Whether the arm feels a number.

@@ -46,7 +46,8 @@ impl Unit {
         let exponent = value.abs().max(lo.abs()).log10().floor();
         let exponent = if (-4.0..5.0).contains(&exponent) || !exponent.is_finite() { 0.0 } else { exponent };
         let [value, lo, hi] = [value, lo, hi].map(|x| x / 10_f64.powf(exponent));
-        let digits = digits_for((hi - lo).min(value.abs().max(lo.abs())));
+        let size = value.abs().max(lo.abs());
+        let digits = digits_for(if size > 0.0 { (hi - lo).min(size) } else { hi - lo });
         let text = format!("{} [{}, {}]", fixed(value, digits), fixed(lo, digits), fixed(hi, digits));
         self.attach(&if exponent == 0.0 { text } else { format!("{text}{}", times_ten_to(exponent as i32)) })
     }
@@ -127,6 +128,7 @@ mod tests {
         let stiff = Unit::suited("N m/rad", 1e6).interval(1.4499e6, [1.0747e6, 2.2273e6]);
         assert_eq!(stiff, "1.4 [1.1, 2.2]\u{b7}10\u{2076} N m/rad");
         assert_eq!(ms.interval(0.012, [f64::NAN, 0.013]), "12.0 ms");
+        assert_eq!(Unit::suited("%", 1.0).interval(0.0, [0.0, 0.7076]), "0 [0, 71] %");
         assert_eq!(Unit::suited("m", 0.001).interval(-0.000_001, [-0.001, 0.001]), "0.0 [-1.0, 1.0] mm");
     }
 

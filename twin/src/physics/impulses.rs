@@ -136,7 +136,7 @@ impl<'a, const N: usize> Impulses<'a, N> {
 
     /// Finds the impulses and gives them to the body.
     pub(super) fn settle(&mut self) {
-        self.follow(Mode::of_motion);
+        self.follow(|contact, relative, _| Mode::of_motion(contact, relative));
         let mut before = f64::INFINITY;
         for sweep in 1..=SWEEPS {
             let mut largest: f64 = 0.0;
@@ -154,7 +154,7 @@ impl<'a, const N: usize> Impulses<'a, N> {
                     break;
                 }
                 before = largest;
-                self.follow(Mode::of_impulse);
+                self.follow(|contact, _, impulse| Mode::of_impulse(contact, impulse));
             }
         }
     }

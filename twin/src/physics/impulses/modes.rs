@@ -39,7 +39,7 @@ struct Unknown {
 
 impl Mode {
     /// Of a place that moves like `relative` towards the surface or along it: it goes on as it does.
-    pub(super) fn of_motion(contact: &Contact, relative: &Vector3<f64>, _: &Vector3<f64>) -> Self {
+    pub(super) fn of_motion(contact: &Contact, relative: &Vector3<f64>) -> Self {
         let parting = relative.dot(&contact.normal);
         if parting >= contact.least_parting {
             return Self::Parts;
@@ -54,7 +54,7 @@ impl Mode {
     }
 
     /// Of a place with an impulse: on Coulomb's cone it slips, inside it sticks.
-    pub(super) fn of_impulse(contact: &Contact, _: &Vector3<f64>, impulse: &Vector3<f64>) -> Self {
+    pub(super) fn of_impulse(contact: &Contact, impulse: &Vector3<f64>) -> Self {
         let push = impulse.dot(&contact.normal);
         if push <= 0.0 {
             return Self::Parts;
@@ -66,8 +66,8 @@ impl Mode {
 }
 
 impl<const N: usize> Impulses<'_, N> {
-    /// Takes the impulses with which every place does what `mode` supposes, or, where that is impossible, something near
-    /// it; leaves what there is where there is no such answer.
+    /// Takes the impulses with which every place does what `mode` supposes from its motion and its impulse so far, or, where
+    /// that is impossible, something near it; leaves what there is where there is no such answer.
     pub(super) fn follow(&mut self, mode: impl Fn(&Contact, &Vector3<f64>, &Vector3<f64>) -> Mode) {
         if self.count == 0 {
             return;
