@@ -6,6 +6,7 @@ use super::score::{Case, Said, Truth};
 use super::world::World;
 use crate::diagnose::admit::{Admitted, Refused};
 use crate::diagnose::arm_clips::ArmClips;
+use crate::diagnose::baseline;
 use crate::diagnose::cell_clips::CellClips;
 use crate::diagnose::evidence::Evidence;
 use crate::diagnose::fit::{Bench, Effort, FittedClip, Hypothesis};
@@ -43,7 +44,8 @@ pub fn examine(world: &World, clips: Vec<Clip>, interrupt: &Interrupt) -> Result
     let library = Library::new(&world.cell, &base, with_object);
     let theta = |numbers: &[f64]| library.theta(numbers);
     let arm = ArmClips::new(&world.cell, &admitted.clips, theta).map_err(Refused::from)?;
-    let court = Court { world, library: &library, split: Split::new(&admitted.groups, options.seed), interrupt };
+    let split = Split::new(&admitted.groups, options.seed);
+    let court = Court { world, library: &library, split, admitted: &admitted, interrupt };
     if with_object {
         let object = ObjectClips::new(&world.cell, admitted.clips.clone(), library.settings.clone())?;
         court.cases(&CellClips::new(Some(arm), object, &library), &found)
@@ -56,6 +58,7 @@ struct Court<'a> {
     world: &'a World,
     library: &'a Library,
     split: Split,
+    admitted: &'a Admitted,
     interrupt: &'a Interrupt,
 }
 
@@ -63,8 +66,9 @@ impl Court<'_> {
     fn cases<E: Evidence>(&self, evidence: &E, found: &Diagnosis) -> Result<Vec<Case>, DiagnoseError> {
         let bench = Bench { evidence, library: self.library, scatter: evidence.scatter(), interrupt: self.interrupt };
         let even = vec![1.0; evidence.channels().len()];
-        let start = (&[][..], self.library.start());
-        let baseline = bench.fit(start, &self.split.train, &even, None, EFFORT).ok_or(DiagnoseError::NoBaseline)?;
+        // The diagnosis' own: what its parameters make up for is no gap that anyone could explain.
+        let baseline = baseline::identify(&bench, &self.split, &self.world.cell, self.admitted);
+        let baseline = baseline.ok_or(DiagnoseError::NoBaseline)?;
         let (detectability, oracle_shrink) = self.oracle(&bench, &baseline, &even);
         let case = |said| Case {
             world: self.world.number,
