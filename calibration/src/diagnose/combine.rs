@@ -44,6 +44,8 @@ const NEARLY_ALL: f64 = 0.85;
 const CLEAR: f64 = 3.5;
 /// Engines integrate one and the same effect differently by a hundredth of it, so by this share of the squared gap.
 const NUMERICS_SHARE: f64 = 1e-4;
+/// ... and what more numbers make of that difference by this share of the gain: friction at rest is every engine's own.
+const OWN_SHARE: f64 = 1e-3;
 /// One that has more numbers must close this much more of the gap: what own numbers of clips hide from the likelihood.
 pub const MORE: f64 = 0.04;
 
@@ -69,7 +71,7 @@ impl Trial {
     #[must_use]
     pub fn is_outdone_by(&self, other: &Self) -> bool {
         let (Some((_, mine)), Some((_, its))) = (&self.fitted, &other.fitted) else { return false };
-        let alike = mine.nats - its.nats < LEAST.max(NUMERICS_SHARE * its.nats);
+        let alike = mine.nats - its.nats < LEAST.max(OWN_SHARE * its.nats);
         other.scored.cost < self.scored.cost && alike && self.closes < other.closes + MORE
     }
 }
