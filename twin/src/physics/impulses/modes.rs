@@ -99,13 +99,13 @@ impl<const N: usize> Impulses<'_, N> {
         for (place, mode) in modes[..self.count].iter().enumerate() {
             let (contact, relative) = (&self.places[place].contact, self.relative(place));
             let lacking = contact.normal * contact.least_parting - relative;
-            let axes = [Vector3::x(), Vector3::y(), Vector3::z()];
-            let (directions, slips) = match mode {
-                Mode::Parts => continue,
-                Mode::Sticks => (axes.map(|axis| (axis, axis)), false),
-                Mode::Slips(along) => ([(*along, contact.normal); 3], true),
+            let holding = [Vector3::x(), Vector3::y(), Vector3::z()].map(|axis| (axis, axis));
+            let directions = match mode {
+                Mode::Parts => &[],
+                Mode::Sticks => &holding[..],
+                Mode::Slips(along) => &[(*along, contact.normal)],
             };
-            for (along, across) in directions.into_iter().take(if slips { 1 } else { 3 }) {
+            for &(along, across) in directions {
                 *unknowns.get_mut(count)? = Unknown { place, along, across, lacking: lacking.dot(&across) };
                 count += 1;
             }
