@@ -2,14 +2,13 @@
 
 use super::{answer, seconds, stop_flag};
 use crate::serve::{Pace, Ports, Report, Server};
+use crate::sim::hidden;
 use anyhow::Result;
 use clap::Args;
 use shared_mem::cell::Cell;
-use shared_mem::theta::Theta;
 use std::net::IpAddr;
 use std::path::PathBuf;
 use std::time::Duration;
-use twin::effects::{Place, find};
 
 /// Play a Franka robot: the simulated cell as an FR3 that speaks FCI version 10, until Ctrl-C
 ///
@@ -70,12 +69,12 @@ impl ServeArguments {
             (true, false) => Pace::LockStep,
             (true, true) => Pace::Fast,
         };
-        let hidden = self.hidden()?;
+        let hidden = hidden::read(self.parameters.as_deref(), self.effects.as_deref())?;
         let server = Server::open(&cell, hidden.as_ref(), ports, pace)?;
         let stop = stop_flag()?;
         let hand = server.hand_address().map_or(String::new(), |hand| format!(", its hand at {hand}"));
         tracing::info!("an FR3 (FCI version 10) listens at {}{hand}", server.address()?);
-        for effect in hidden.iter().flat_map(unmet_by_torques) {
+        for effect in hidden.iter().flat_map(hidden::on_the_way) {
             tracing::warn!(
                 "{effect} acts on positions under joint impedance alone; clients that command torques, or under Cartesian \
                  impedance, do not meet it: torque_delay acts on those"
@@ -89,20 +88,6 @@ impl ServeArguments {
         }
         Ok(())
     }
-
-    fn hidden(&self) -> Result<Option<Theta>> {
-        let mut theta = self.parameters.as_deref().map(Theta::read).transpose()?;
-        if let Some(path) = &self.effects {
-            theta.get_or_insert_default().effects.extend(Theta::read(path)?.effects);
-        }
-        Ok(theta)
-    }
-}
-
-/// Effects on the way to the robot's own joint controller.
-fn unmet_by_torques(hidden: &Theta) -> impl Iterator<Item = &str> {
-    let on_the_way = |name: &&str| find(name).is_some_and(|effect| effect.acts_on == Place::CommandPath);
-    hidden.effects.iter().map(|effect| effect.name.as_str()).filter(on_the_way)
 }
 
 fn in_words(report: &Report) -> String {

@@ -8,7 +8,7 @@ use crate::replay::{ReplayArm, ReplayClock};
 use crate::rt::cycle::Plan;
 use crate::rt::law::TorquePd;
 use crate::safety::Limits;
-use crate::sim::World;
+use crate::sim::{World, hidden};
 use crate::tracker::TrackerChoice;
 use crate::wrench::WrenchChoice;
 use anyhow::{Result, bail};
@@ -23,7 +23,7 @@ use std::path::PathBuf;
 use std::str::FromStr;
 use std::time::{SystemTime, UNIX_EPOCH};
 use twin::arm::{ArmModel, ControlLaw};
-use twin::effects::{CameraEffects, Place, find};
+use twin::effects::CameraEffects;
 use twin::scene::SceneSnapshot;
 
 /// Which arm.
@@ -145,7 +145,7 @@ impl Devices {
         if settings.arm != ArmChoice::Sim && (settings.effects.is_some() || settings.parameters.is_some()) {
             bail!("--effects and --parameters change the simulated cell only; use them with --arm sim");
         }
-        let hidden = hidden(settings)?;
+        let hidden = hidden::read(settings.parameters.as_deref(), settings.effects.as_deref())?;
         let plan = plan(settings, cell, &model, hidden.as_ref())?;
         let camera = settings.camera(cell)?;
         let tracker = settings.tracker(cell)?;
@@ -194,21 +194,10 @@ impl Devices {
     }
 }
 
-/// Parameters and effects of the simulated cell, which nobody else is told.
-fn hidden(settings: &Settings) -> Result<Option<Theta>> {
-    let mut theta = settings.parameters.as_deref().map(Theta::read).transpose()?;
-    if let Some(path) = &settings.effects {
-        let effects = Theta::read(path)?.effects;
-        theta.get_or_insert_default().effects.extend(effects);
-    }
-    Ok(theta)
-}
-
 /// What of `hidden` acts in the arm's own controller or on the way there: where the bridge computes the torque, nothing shows it.
 fn inside_the_controller(hidden: &Theta) -> Option<&str> {
-    let on_the_way = |name: &&str| find(name).is_some_and(|effect| effect.acts_on == Place::CommandPath);
     let gains = hidden.arm.as_ref().map(|_| "the controller's gains in --parameters");
-    gains.or_else(|| hidden.effects.iter().map(|effect| effect.name.as_str()).find(on_the_way))
+    gains.or_else(|| hidden::on_the_way(hidden).next())
 }
 
 fn plan(settings: &Settings, cell: &Cell, model: &ArmModel, hidden: Option<&Theta>) -> Result<Plan> {

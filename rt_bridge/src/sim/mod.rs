@@ -9,6 +9,7 @@
 //! missed makes simulated time wait, so that a busy machine slows the cell down instead of tearing its motion.
 
 mod arm;
+pub(crate) mod hidden;
 mod world;
 
 pub use arm::SimArm;
