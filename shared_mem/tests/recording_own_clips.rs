@@ -233,6 +233,23 @@ fn a_clip_without_its_cell_toml_opens_with_the_one_it_carries() {
 }
 
 #[test]
+fn a_clip_that_no_cell_toml_lists_is_about_what_was_recorded() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let object = "[object]\nshape = \"box\"\nsize = [0.1, 0.1, 0.1]\n";
+    let info = ClipInfo { cell_toml: Some(format!("{CELL}{object}")), ..info() };
+    for (name, poses, kind) in [("arm", 0, ClipKind::Excitation), ("stroke", 3, ClipKind::ControlHitSlide)] {
+        let path = folder.path().join(name);
+        let mut writer = ClipWriter::create(&path, &info).expect("a new file");
+        (0..30).for_each(|i| writer.arm_state(&state(i)).expect("room"));
+        (0..poses).for_each(|i| writer.object_pose(&pose(i)).expect("room"));
+        writer.finish().expect("room");
+        let session = Session::open(&path).expect("the clip carries its cell");
+        assert_eq!(session.clips[0].kind, kind, "{name}");
+        assert_eq!(session.read(&session.clips[0]).expect("a clip").object.len(), poses as usize);
+    }
+}
+
+#[test]
 fn an_existing_file_is_never_overwritten() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("clip.mcap");

@@ -6,9 +6,10 @@ use std::time::Duration;
 use tests::{Cell, Program};
 
 /// Starts a robot that waits for its client, and returns where it listens.
-fn serve(cell: &Cell) -> (Program, String) {
+fn serve(cell: &Cell, more: &[&str]) -> (Program, String) {
     let port = TcpListener::bind("127.0.0.1:0").and_then(|l| l.local_addr()).expect("a free port").port().to_string();
     let arguments = ["serve", "--cell", "{cell}", "--port", &port, "--no-hand", "--lock-step", "--json"];
+    let arguments = [&arguments, more].concat();
     let mut robot = cell.start("rt_bridge", &arguments);
     let address = format!("127.0.0.1:{port}");
     Cell::until("a robot that listens", Duration::from_secs(20), || {
@@ -21,7 +22,7 @@ fn serve(cell: &Cell) -> (Program, String) {
 #[test]
 fn an_excitation_captured_over_the_interface_is_what_the_twin_does() {
     let cell = Cell::shipped();
-    let (robot, address) = serve(&cell);
+    let (robot, address) = serve(&cell, &[]);
     let arm = format!("fci://{address}");
     let bridge = ["run", "--cell", "{cell}", "--arm", &arm, "--realtime", "ignore", "--json"];
     let bridge = cell.start("rt_bridge", &bridge);
@@ -39,4 +40,33 @@ fn an_excitation_captured_over_the_interface_is_what_the_twin_does() {
     assert_eq!(rms.len(), 7, "{answer}");
     // Encoder noise, single precision, and a law that acts on both: microradians where the motion is tenths of a radian.
     assert!(rms.iter().all(|rms| rms.as_f64() < Some(5e-5)), "{answer}");
+}
+
+#[test]
+fn a_reflex_in_mid_motion_ends_a_capture_that_the_same_command_continues() {
+    let cell = Cell::shipped();
+    // Too heavy to be moved about, not to be held: the robot takes it for a collision as soon as it accelerates.
+    std::fs::write(cell.path("heavy.toml"), "[[effect]]\nname = \"payload\"\nmass = 3.6\n").expect("a file");
+    let capture = |address: &str| {
+        let arm = format!("fci://{address}");
+        let fixed = ["capture", "excitation", "--cell", "{cell}", "--clips", "1", "--out", "{dir}/session", "--json"];
+        let more = ["--realtime", "ignore", "--arm", arm.as_str()];
+        cell.start("calibration", &[&fixed[..], &more].concat()).wait(Duration::from_secs(120))
+    };
+    let (robot, address) = serve(&cell, &["--effects", &cell.text("heavy.toml")]);
+    let stopped = capture(&address);
+    assert_eq!(stopped.status.code(), Some(1), "{}", stopped.stderr);
+    assert!(stopped.stderr.contains("reflex") && stopped.stderr.contains("is continued"), "{}", stopped.stderr);
+    assert_eq!(robot.interrupt().succeeded().json()["reflexes"], 1);
+    let clip = cell.start("twin", &["replay", "{dir}/session/clip_00.mcap", "--json"]);
+    let left = clip.wait(Duration::from_secs(60)).succeeded().json();
+    assert!(left["clips"][0]["joint_rms_rad"][1].as_f64() > Some(1e-3), "the load is seen in what was recorded: {left}");
+
+    let (robot, address) = serve(&cell, &[]);
+    let answer = capture(&address).succeeded().json();
+    assert_eq!(answer["clips"][0]["file"], "clip_01.mcap", "{answer}");
+    assert_eq!(answer["clips"][0]["kept"], true, "{answer}");
+    assert_eq!(robot.interrupt().succeeded().json()["reflexes"], 0);
+    let listed = std::fs::read_to_string(cell.path("session/cell.toml")).expect("the session's cell.toml");
+    assert!(listed.contains("clip_01.mcap") && !listed.contains("clip_00.mcap"), "{listed}");
 }

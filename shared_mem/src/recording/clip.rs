@@ -6,8 +6,10 @@ use super::error::ReadError;
 use super::joint_log::{self, JointLog, Wanted};
 use super::messages::is_own;
 use super::series::{JointSeries, ObjectSeries};
+use super::wire::Wire;
 use super::{bag, own, twinaligner};
 use crate::cell::{Cell, ClipKind};
+use crate::msg::object::ObjectPose;
 use std::path::{Path, PathBuf};
 
 /// One recorded clip.
@@ -55,6 +57,23 @@ pub fn read_clip(path: &Path, kind: ClipKind, cell: &Cell) -> Result<Clip, ReadE
     } else {
         bag::read(path, messages, kind, cell)
     }
+}
+
+/// Whether poses of an object were recorded in a clip; read up to the first of them.
+///
+/// # Errors
+/// [`ReadError`] when the file is missing or of no known kind.
+pub(super) fn shows_object(path: &Path, cell: &Cell) -> Result<bool, ReadError> {
+    if path.is_dir() {
+        return Ok(twinaligner::is_clip_folder(path));
+    }
+    let mut messages = Messages::open(path)?;
+    while let Some(message) = messages.next()? {
+        if message.channel.type_name() == ObjectPose::SCHEMA || message.channel.topic == cell.topics.object_pose {
+            return Ok(true);
+        }
+    }
+    Ok(false)
 }
 
 impl Clip {

@@ -48,7 +48,10 @@ impl Session {
         };
         let file = path.file_name().map_or_else(|| path.to_owned(), PathBuf::from);
         let listed = cell.clips.iter().find(|clip| clip.file == file).cloned();
-        let clip = listed.unwrap_or_else(|| ClipEntry { kind: kind_by_cell(&cell), file });
+        let clip = match listed {
+            Some(clip) => clip,
+            None => ClipEntry { kind: kind_of(path, &cell)?, file },
+        };
         Ok(Self { folder, clips: vec![clip], cell })
     }
 
@@ -70,11 +73,11 @@ fn carried_cell(path: &Path) -> Result<Cell, ReadError> {
     Ok(Cell::parse(&text, path)?)
 }
 
-/// What a clip that cell.toml does not list is most likely about.
-fn kind_by_cell(cell: &Cell) -> ClipKind {
-    match (&cell.robot, &cell.object) {
+/// What a clip that cell.toml does not list is about: an arm may have moved alone in a cell that has an object too.
+fn kind_of(path: &Path, cell: &Cell) -> Result<ClipKind, ReadError> {
+    Ok(match (&cell.robot, &cell.object) {
         (None, _) => ClipKind::FreeMotion,
-        (Some(_), None) => ClipKind::Excitation,
-        (Some(_), Some(_)) => ClipKind::ControlHitSlide,
-    }
+        (Some(_), Some(_)) if super::clip::shows_object(path, cell)? => ClipKind::ControlHitSlide,
+        (Some(_), _) => ClipKind::Excitation,
+    })
 }
