@@ -14,7 +14,7 @@ use crate::diagnose::gap::Residuals;
 use crate::diagnose::library::Library;
 use crate::diagnose::split::{self, Split};
 use crate::diagnose::sweep::Precision;
-use crate::diagnose::{DiagnoseError, Diagnosis, Kind, Options, diagnose_clips};
+use crate::diagnose::{DiagnoseError, Diagnosis, Kind, Options, diagnose_clips, peaks};
 use crate::forward::object::ObjectClips;
 use crate::forward::setting;
 use crate::interrupt::Interrupt;
@@ -41,7 +41,7 @@ pub fn examine(world: &World, clips: Vec<Clip>, interrupt: &Interrupt) -> Result
     let options = Options { theta: None, seed: world.number };
     let found = diagnose_clips(&session, &admitted, &options, interrupt)?;
     let base = setting::complete(&world.cell, None)?;
-    let library = Library::new(&world.cell, &base, with_object);
+    let library = Library::new(&world.cell, &base, with_object, &peaks(&world.cell, &admitted, &base)?);
     let theta = |numbers: &[f64]| library.theta(numbers);
     let arm = ArmClips::new(&world.cell, &admitted.clips, theta).map_err(Refused::from)?;
     let split = Split::new(&admitted.groups, options.seed);

@@ -10,7 +10,7 @@ use crate::forward::object;
 use shared_mem::cell::{Cell, ClipKind};
 use shared_mem::recording::{Clip, JointSeries};
 use shared_mem::theta::Theta;
-use twin::arm::{ArmModel, ModelError};
+use twin::arm::{ArmModel, Joints, MAX_JOINTS, ModelError};
 use twin::effects::Effects;
 use twin::rollout::{CommandTrack, Plant, Reading, TICK_NS};
 
@@ -163,6 +163,30 @@ impl<F: Fn(&[f64]) -> Theta + Sync> ClipModel for ArmClips<F> {
     }
 
     fn residuals(&self, clip: usize, shared: &[f64], _own: &[f64], out: &mut Vec<f64>) -> Result<(), Impossible> {
+        let readings = self.readings(clip, shared)?;
+        self.compare(&self.clips[clip], &readings, out)
+    }
+}
+
+impl<F: Fn(&[f64]) -> Theta + Sync> ArmClips<F> {
+    /// Largest torque that the controller asks of each joint in any of the clips, gravity included [N m].
+    ///
+    /// # Errors
+    /// [`Impossible`] when the cell cannot be simulated with these numbers.
+    pub fn peaks(&self, shared: &[f64]) -> Result<Joints, Impossible> {
+        let mut peaks = [0.0; MAX_JOINTS];
+        for clip in 0..self.clips.len() {
+            for reading in self.readings(clip, shared)? {
+                let gravity = self.nominal.gravity(&reading.state.q);
+                let asked = reading.tau_J_d.iter().zip(gravity).map(|(tau, gravity)| (tau + gravity).abs());
+                peaks.iter_mut().zip(asked).for_each(|(peak, asked)| *peak = asked.max(*peak));
+            }
+        }
+        Ok(peaks)
+    }
+
+    /// At every moment that counts, and a control period later.
+    fn readings(&self, clip: usize, shared: &[f64]) -> Result<Vec<Reading>, Impossible> {
         let fail = |error: &dyn std::fmt::Display| Impossible(error.to_string());
         let clip = &self.clips[clip];
         let theta = (self.theta)(shared);
@@ -174,11 +198,9 @@ impl<F: Fn(&[f64]) -> Theta + Sync> ClipModel for ArmClips<F> {
         let first = clip.recorded.measured.stamps_ns[0];
         let mut readings = vec![Reading::default(); clip.stamps_ns.len()];
         rollout.readings(&start, first, &clip.commands, &clip.stamps_ns, &mut readings);
-        self.compare(clip, &readings, out)
+        Ok(readings)
     }
-}
 
-impl<F> ArmClips<F> {
     fn compare(&self, clip: &Prepared, readings: &[Reading], out: &mut Vec<f64>) -> Result<(), Impossible> {
         let dof = self.nominal.dof();
         out.clear();

@@ -3,6 +3,7 @@
 
 use super::evidence::Evidence;
 use super::fit::{Bench, FittedClip, Hypothesis};
+use super::library::TORQUE_SATURATION;
 use twin::effects::Stage;
 
 /// What a number may change of the clips' squared residuals, as a share and at least, and still be one that nothing depends
@@ -31,8 +32,10 @@ pub fn without<E: Evidence>(bench: &Bench<'_, E>, hypothesis: &Hypothesis) -> Hy
                 full
             };
             let alike = |value: f64| (cost(&at(value)) - now).abs() < LEAST.max(SHARE * now);
-            // A number that was found to be at rest is known: what it does elsewhere tells.
-            if alike(resting) && candidate.strongest(*k, resting).is_some_and(alike) {
+            // A number that was found to be at rest is known: what it does elsewhere tells. A limit that is never reached is
+            // none, wherever it is.
+            let never_reached = candidate.effect.name == TORQUE_SATURATION;
+            if alike(resting) && (never_reached || candidate.strongest(*k, resting).is_some_and(alike)) {
                 out = held(out, *k, resting);
             }
         }
@@ -68,6 +71,7 @@ mod tests {
     use shared_mem::cell::Cell;
     use shared_mem::theta::Theta;
     use std::path::Path;
+    use twin::arm::MAX_JOINTS;
 
     #[test]
     fn a_vertical_joint_s_encoder_may_be_off_by_any_angle_and_no_other_s() {
@@ -76,7 +80,7 @@ mod tests {
         let place = draw::candidates(false).iter().position(|effect| effect.name == "joint_encoder_offset");
         let world = World::draw(14, Kind::Excitation, Fault::Single(place.expect("an effect")), &cell);
         let clips = record(&world, 2).expect("a session");
-        let library = Library::new(&cell, &setting::complete(&cell, None).expect("a cell"), false);
+        let library = Library::new(&cell, &setting::complete(&cell, None).expect("a cell"), false, &[10.0; MAX_JOINTS]);
         let theta = |numbers: &[f64]| library.theta(numbers);
         let evidence = ArmClips::new(&cell, &clips, theta).expect("an arm");
         let interrupt = Interrupt::default();

@@ -10,6 +10,7 @@ use crate::forward::setting::{self, Setting, Settings};
 use shared_mem::cell::Cell;
 use shared_mem::theta::Theta;
 use std::ops::Range;
+use twin::arm::Joints;
 use twin::effects::{EffectInfo, Role, Shape, Stage, find, registry};
 
 /// All numbers of all hypotheses.
@@ -77,9 +78,10 @@ impl Candidate {
 
 impl Library {
     /// The library of a cell: with effects on the arm, and with those on hit, slide and camera where clips have an object.
-    /// `base`: a complete theta whose effects act in the baseline already and are no candidates.
+    /// `base`: a complete theta whose effects act in the baseline already and are no candidates. `peaks`: the largest torque
+    /// that each joint is asked for in the clips [N m].
     #[must_use]
-    pub fn new(cell: &Cell, base: &Theta, with_object: bool) -> Self {
+    pub fn new(cell: &Cell, base: &Theta, with_object: bool, peaks: &Joints) -> Self {
         let dof = base.arm.as_ref().map_or(0, |arm| arm.stiffness.len());
         let mut numbers = setting::gains(cell, base);
         if with_object {
@@ -98,7 +100,12 @@ impl Library {
         for effect in registry().iter().filter(fits) {
             let at = numbers.len();
             numbers.extend(setting::effect_settings(effect, dof));
-            candidates.push(Candidate::new(effect, at, &numbers));
+            for (setting, unknown) in &mut numbers[at..] {
+                if let Some(bound) = bound_of(setting, peaks) {
+                    unknown.step = BOUND_STEP / bound;
+                }
+            }
+            candidates.push(Candidate::new(effect, at, &numbers, peaks));
         }
         let joint = |setting| joint_of(setting).filter(|_| !(with_object && moves_the_tip_unseen(setting)));
         let joints = numbers.iter().map(|(setting, _)| joint(setting)).collect();
@@ -212,7 +219,7 @@ fn keep_known_gains(cell: &Cell, unknown: &mut Unknown) {
 }
 
 impl Candidate {
-    fn new(effect: &'static EffectInfo, at: usize, numbers: &[(Setting, Unknown)]) -> Self {
+    fn new(effect: &'static EffectInfo, at: usize, numbers: &[(Setting, Unknown)], peaks: &Joints) -> Self {
         let is_size = |setting: &Setting| match setting {
             Setting::Effect { parameter, .. } => {
                 effect.parameters.iter().any(|p| p.name == *parameter && matches!(p.role, Role::Size { .. }))
@@ -222,10 +229,35 @@ impl Candidate {
         let sizes: Vec<usize> = (at..numbers.len()).filter(|k| is_size(&numbers[*k].0)).collect();
         let kept = |setting: &Setting| matches!(setting, Setting::Effect { parameter, .. } if KEPT.contains(parameter));
         let turned = (at..numbers.len()).filter(|k| !kept(&numbers[*k].0)).collect();
-        let alternatives = alternatives(effect, at, &sizes, numbers);
+        let alternatives = alternatives(effect, at, &sizes, numbers, peaks);
         Self { effect, numbers: at..numbers.len(), turned, sizes, alternatives }
     }
 }
+
+/// The torque at which a limit of a joint begins to bite [N m], where a number is such a limit.
+fn bound_of(setting: &Setting, peaks: &Joints) -> Option<f64> {
+    match *setting {
+        Setting::Effect { name: TORQUE_SATURATION, index: Some(joint), .. } => {
+            Some(peaks[joint]).filter(|peak| *peak > 0.0)
+        }
+        _ => None,
+    }
+}
+
+/// A limit of its own for every joint: what it does depends on how hard the clips drive that joint, and above that it does
+/// nothing at all.
+fn biting(number: usize, peak: f64, unknown: &Unknown) -> Probe {
+    let moves = vec![(number, (BITES * peak).recip().min(unknown.upper))];
+    Probe { moves, one_sided: true, largest: LOWEST_LIMIT.recip() }
+}
+
+/// The one effect on torques that does nothing below a threshold.
+pub const TORQUE_SATURATION: &str = "torque_saturation";
+/// Its probe cuts this much off the tops of the torques, its difference step is this share of them, and below this share
+/// of them no limit is looked for.
+const BITES: f64 = 0.9;
+const BOUND_STEP: f64 = 0.01;
+const LOWEST_LIMIT: f64 = 0.25;
 
 /// Forms that no clip shows well enough to be worth their numbers: they keep the registry's default, or what an alternative
 /// says.
@@ -234,8 +266,18 @@ const KEPT: [&str; 2] = ["creep", CARRIED];
 /// The step of a probe as a share of what is met in practice.
 const PROBE_SHARE: f64 = 0.1;
 
-fn alternatives(effect: &EffectInfo, at: usize, sizes: &[usize], numbers: &[(Setting, Unknown)]) -> Vec<Alternative> {
-    let probes: Vec<Probe> = sizes.iter().map(|k| probe(effect, *k, &numbers[*k])).collect();
+fn alternatives(
+    effect: &EffectInfo,
+    at: usize,
+    sizes: &[usize],
+    numbers: &[(Setting, Unknown)],
+    peaks: &Joints,
+) -> Vec<Alternative> {
+    let probe = |k: &usize| match bound_of(&numbers[*k].0, peaks) {
+        Some(peak) => biting(*k, peak, &numbers[*k].1),
+        None => probe(effect, *k, &numbers[*k]),
+    };
+    let probes: Vec<Probe> = sizes.iter().map(probe).collect();
     let index = |parameter: &str| -> Vec<usize> {
         let is = |setting: &Setting| matches!(setting, Setting::Effect { parameter: p, .. } if *p == parameter);
         (at..numbers.len()).filter(|k| is(&numbers[*k].0)).collect()

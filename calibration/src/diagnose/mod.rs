@@ -74,10 +74,12 @@ use cell_clips::CellClips;
 use evidence::Evidence;
 use fit::Bench;
 use library::Library;
+use shared_mem::cell::Cell;
 use shared_mem::recording::Session;
 use shared_mem::theta::Theta;
 use split::Split;
 use std::time::Instant;
+use twin::arm::Joints;
 use twin::replay::ReplayError;
 use twin::sim::SimError;
 
@@ -141,7 +143,8 @@ pub fn diagnose_clips(
 ) -> Result<Diagnosis, DiagnoseError> {
     let began = Instant::now();
     let base = setting::complete(&session.cell, options.theta.as_ref())?;
-    let library = Library::new(&session.cell, &base, admitted.with_object);
+    let peaks = peaks(&session.cell, admitted, &base)?;
+    let library = Library::new(&session.cell, &base, admitted.with_object, &peaks);
     let theta = |numbers: &[f64]| library.theta(numbers);
     let mut diagnosis = if admitted.with_object {
         let arm = ArmClips::new(&session.cell, &admitted.clips, theta).map_err(Refused::from)?;
@@ -154,6 +157,15 @@ pub fn diagnose_clips(
     };
     diagnosis.seconds = began.elapsed().as_secs_f64();
     Ok(diagnosis)
+}
+
+/// The largest torque that each joint is asked for in the clips where nothing is wrong [N m].
+///
+/// # Errors
+/// [`DiagnoseError`] when the cell has no arm, or it cannot follow the clips.
+pub fn peaks(cell: &Cell, admitted: &Admitted, base: &Theta) -> Result<Joints, DiagnoseError> {
+    let arm = ArmClips::new(cell, &admitted.clips, |_: &[f64]| base.clone()).map_err(Refused::from)?;
+    arm.peaks(&[]).map_err(|_| DiagnoseError::NoBaseline)
 }
 
 fn examine<E: Evidence>(

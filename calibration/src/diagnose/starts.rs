@@ -1,9 +1,10 @@
 //! Where fits of a candidate begin. Effects on the arm and on the slide answer evenly: there the slope at the neutral point
 //! shows the way. What has no slope there, and what changes where or how an object is hit, is tried at strengths that are met
-//! in practice.
+//! in practice; what does nothing below a threshold, joint by joint.
 
 use super::evidence::Evidence;
 use super::fit::{Bench, Hypothesis};
+use super::library::TORQUE_SATURATION;
 use super::shortlist::Scored;
 use twin::effects::Stage;
 
@@ -13,6 +14,9 @@ const ASIDE: f64 = 0.3;
 const TRIED: [f64; 3] = [0.1, 0.3, 0.6];
 /// Shares of the strongest at which a candidate without a slope is tried.
 const SCANNED: [f64; 4] = [0.06, 0.2, 0.5, 1.0];
+
+/// Units of a probe at which each direction of one with a threshold is tried.
+const STEPPED: [f64; 6] = [0.95, 1.05, 1.15, 1.3, 1.6, 2.2];
 
 /// Numbers at which fits of a candidate begin: where the score test points. Of an effect with many forms (a place on the
 /// table) also the forms next to the best; of one whose slope at one point tells little, as where the object is hit
@@ -34,6 +38,9 @@ pub(super) fn starts<E: Evidence>(bench: &Bench<'_, E>, at: (&Hypothesis, &[f64]
         starts.extend(aside(bench, scored, &[ASIDE]));
     }
     let mut numbers: Vec<Vec<f64>> = starts.iter().map(|start| bench.begun(at.0.full.clone(), start)).collect();
+    if candidate.effect.name == TORQUE_SATURATION {
+        numbers.push(one_by_one(bench, at, scored));
+    }
     if uneven && !one_probe {
         numbers.extend(least_cost_aside(bench, at, scored).map(|(_, full)| full));
     }
@@ -74,6 +81,23 @@ pub(super) fn least_cost_aside<E: Evidence>(
     cheapest(bench, at, numbers)
 }
 
+/// Each direction of a candidate, one after the other, at the strength at which the clips cost least beside those before it:
+/// from rest no slope leads there.
+fn one_by_one<E: Evidence>(bench: &Bench<'_, E>, at: (&Hypothesis, &[f64]), scored: &Scored) -> Vec<f64> {
+    let probes = &bench.library.candidates[scored.candidate].alternatives[scored.alternative].probes;
+    let mut best = Scored { units: vec![0.0; probes.len()], ..scored.clone() };
+    for probe in 0..probes.len() {
+        let tried = [0.0].iter().chain(&STEPPED).map(|units| {
+            let mut tried = best.clone();
+            tried.units[probe] = *units;
+            let cost = bench.plain_cost(at.0, &bench.begun(at.0.full.clone(), &tried), at.1);
+            (cost.unwrap_or(f64::INFINITY), tried)
+        });
+        best = tried.min_by(|a, b| a.0.total_cmp(&b.0)).map_or(best.clone(), |(_, tried)| tried);
+    }
+    bench.begun(at.0.full.clone(), &best)
+}
+
 /// The numbers with the baseline's object as cell.toml has it.
 fn with_nominal_object<E: Evidence>(bench: &Bench<'_, E>, mut full: Vec<f64>) -> Vec<f64> {
     for k in bench.library.baseline.clone().filter(|k| !bench.library.arm_feels(*k, &full)).collect::<Vec<_>>() {
@@ -99,4 +123,69 @@ fn aside<E: Evidence>(bench: &Bench<'_, E>, scored: &Scored, shares: &[f64]) -> 
     let sides = shares.iter().flat_map(|share| [*share, -share]).filter(|side| *side > 0.0 || !one_sided);
     let units = |side: f64| probes.iter().map(|probe| side * probe.largest).collect();
     sides.map(|side| Scored { units: units(side), ..scored.clone() }).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::arm_clips::ArmClips;
+    use super::super::fit::Effort;
+    use super::super::library::Library;
+    use super::super::sweep::Precision;
+    use super::*;
+    use crate::benchmark::session::record;
+    use crate::benchmark::world::{Fault, Kind, World};
+    use crate::forward::setting;
+    use crate::interrupt::Interrupt;
+    use shared_mem::cell::Cell;
+    use shared_mem::theta::{EffectTheta, Theta};
+    use std::path::Path;
+
+    #[test]
+    fn limits_of_the_torque_are_found_joint_by_joint_though_no_slope_leads_there() {
+        let text = include_str!("../../../config/fr3_cell.toml");
+        let cell = Cell::parse(text, Path::new("fr3_cell.toml")).expect("the shipped cell");
+        let well = World::draw(3, Kind::Excitation, Fault::Nothing, &cell);
+        let base = setting::complete(&cell, Some(&well.hidden)).expect("a cell");
+        let arm =
+            ArmClips::new(&cell, &record(&well, 2).expect("a session"), |_: &[f64]| base.clone()).expect("an arm");
+        let peaks = arm.peaks(&[]).expect("it can be simulated");
+        // Two joints are cut short, each to its own share of what it needs.
+        let shares = [None, Some(0.8), None, Some(0.88), None, None, None];
+        let limits = shares.iter().zip(peaks).map(|(share, peak)| share.map_or(1e3, |share: f64| share * peak));
+        let limits = limits.collect::<Vec<f64>>();
+        let parameters = [("limit".to_owned(), limits.clone().into())].into();
+        let cut = EffectTheta { name: TORQUE_SATURATION.into(), parameters };
+        let world = World { hidden: Theta { effects: vec![cut], ..well.hidden.clone() }, ..well };
+        let library = Library::new(&cell, &base, false, &peaks);
+        let theta = |numbers: &[f64]| library.theta(numbers);
+        let evidence = ArmClips::new(&cell, &record(&world, 2).expect("a session"), theta).expect("an arm");
+        let interrupt = Interrupt::default();
+        let bench =
+            Bench { evidence: &evidence, library: &library, scatter: evidence.scatter(), interrupt: &interrupt };
+        let even = vec![1.0; evidence.channels().len()];
+        let effort = Effort { iterations: 1, precision: Precision::Joints };
+        let baseline = bench.fit((&[], library.start()), &[0, 1], &even, None, effort).expect("a fit");
+        let candidate = library.find(TORQUE_SATURATION).expect("a candidate");
+        let probes = library.candidates[candidate].alternatives[0].probes.len();
+        let scored = Scored {
+            candidate,
+            alternative: 0,
+            units: vec![0.0; probes],
+            next: Vec::new(),
+            gain: 0.0,
+            cost: probes,
+            cosine: 0.0,
+            signal: 0.0,
+            imitated: 0.0,
+            p: 1.0,
+        };
+        let begun = one_by_one(&bench, (&baseline, &even), &scored);
+        for ((size, share), peak) in library.candidates[candidate].sizes.iter().zip(shares).zip(peaks) {
+            let found = (begun[*size] * peak).recip();
+            match share {
+                Some(share) => assert!((found / share - 1.0).abs() < 0.1, "{found} for {share} of what is asked"),
+                None => assert!(found > 0.9, "{found} of what is asked"),
+            }
+        }
+    }
 }
