@@ -35,7 +35,7 @@ const LEAST: f64 = 4.0;
 /// ... of the arm more than this for each of its residuals: there are so many that the least numerics add up.
 const WORTHWHILE: f64 = 0.0025;
 /// ... and close at least this share of the gap: what helps only beside numbers that clips have of their own is no cause.
-const CLOSES: f64 = 0.1;
+pub const CLOSES: f64 = 0.1;
 /// ... unless it closes so much of the gap and foretells so many of the clips better that one which it foretells worse does
 /// not matter: 11 of 12 clips do not agree by chance (p = 0.003).
 const PLAIN: f64 = 0.3;
@@ -199,6 +199,7 @@ impl Step {
             })
             .filter(|(trial, _, _)| trial.is_cause())
             .filter(|(trial, fit, _)| !bench.negligible(trial.scored.candidate, &fit.full))
+            .filter(|(trial, fit, _)| !bench.is_convention(trial.scored.candidate, fit))
             .collect();
         let simplest = |(trial, ..): &&(&Trial, _, _)| !worthy.iter().any(|(other, ..)| trial.is_outdone_by(other));
         let worth = |(trial, _, advantage): &(&Trial, _, &Advantage)| net(advantage, trial.scored.cost);
@@ -348,12 +349,12 @@ impl Step {
         advantage.is_some_and(clear) && self.is_alone(candidate)
     }
 
-    /// Whether no other effect is worth half as much.
+    /// Whether no other effect that could be the cause is worth half as much.
     fn is_alone(&self, candidate: usize) -> bool {
         let worth = |trial: &Trial| trial.fitted.as_ref().map(|(_, advantage)| net(advantage, trial.scored.cost));
         let (own, others): (Vec<&Trial>, Vec<&Trial>) =
             self.trials.iter().partition(|trial| trial.scored.candidate == candidate);
-        let next = others.into_iter().filter_map(worth).fold(0.0, f64::max);
+        let next = others.into_iter().filter(|trial| trial.is_cause()).filter_map(worth).fold(0.0, f64::max);
         own.into_iter().find_map(worth).is_some_and(|own| next < 0.5 * own)
     }
 }

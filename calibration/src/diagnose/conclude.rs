@@ -75,7 +75,7 @@ pub fn conclude<E: Evidence>(
     let left = (typical(&first.from).zip(typical(&found.last)))
         .map(|(before, after)| Left::of_groups(&before, &after))
         .ok_or(DiagnoseError::NoBaseline)?;
-    let confirmed = after.mean_square() < before.mean_square();
+    let confirmed = confirms(&before, &after);
     let unforeseen = found.unforeseen(bench);
     let finding = finding(bench, (split, found), &unforeseen, (left, confirmed), &rest);
     let verdict = finding.verdict();
@@ -121,6 +121,13 @@ pub fn conclude<E: Evidence>(
         traces: traces(bench.evidence, (&before, if nearest.is_some() { &after } else { shown }), &admitted.files),
         nearest,
     })
+}
+
+/// Whether enough of the gap closes on the confirm clips for a cause, in their mean or in a clip like most.
+fn confirms(before: &Residuals, after: &Residuals) -> bool {
+    let mean = leftovers::explained(before.mean_square(), after.mean_square(), before.floor());
+    let usual = Left::of_groups(&before.typical(), &after.typical()).iter().map(Left::explained).fold(mean, f64::max);
+    after.mean_square() < before.mean_square() && usual > combine::CLOSES
 }
 
 fn finding<'a, E: Evidence>(

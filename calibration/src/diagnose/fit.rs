@@ -11,7 +11,7 @@ use crate::estimate::ClipModel;
 use crate::interrupt::Interrupt;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
-use twin::effects::{EffectInfo, Role};
+use twin::effects::{EffectInfo, Place, Role};
 
 /// What every step of the diagnosis is given.
 pub struct Bench<'a, E> {
@@ -87,6 +87,8 @@ const TOLERANCE: f64 = 0.05;
 /// rules of integration differ by as much (0.35 % of a rotor's inertia and 0.02 % of viscous friction, measured on sessions
 /// of another engine with nothing wrong).
 const NEGLIGIBLE: f64 = 0.008;
+/// A control period and a half [s].
+const CONVENTION: f64 = 1.5e-3;
 /// Steps in which a clip finds its own numbers.
 const OWN_STEPS: usize = 2;
 /// Most trials with growing damping before a point counts as the best there is.
@@ -336,6 +338,17 @@ impl<E: Evidence> Bench<'_, E> {
             Some(((full[*size] - resting) / (strongest - resting)).abs())
         });
         shares.fold(0.0, f64::max) < least(candidate.effect)
+    }
+
+    /// Whether an effect of a hypothesis does no more to commands that another changes already than shift them by a control
+    /// period: from which period on a filtered command acts is every engine's own.
+    #[must_use]
+    pub fn is_convention(&self, effect: usize, hypothesis: &Hypothesis) -> bool {
+        let of_commands = |k: &usize| self.library.candidates[*k].effect.acts_on == Place::CommandPath;
+        let weak = |size: &usize| hypothesis.full[*size] - self.library.unknowns[*size].start < CONVENTION;
+        of_commands(&effect)
+            && hypothesis.effects.iter().any(|other| *other != effect && of_commands(other))
+            && self.library.candidates[effect].sizes.iter().all(weak)
     }
 
     /// The sum of fitted clips' forms, numbers held to their known ranges.
