@@ -60,7 +60,10 @@ fn a_reflex_in_mid_motion_ends_a_capture_that_the_same_command_continues() {
     assert_eq!(robot.interrupt().succeeded().json()["reflexes"], 1);
     let clip = cell.start("twin", &["replay", "{dir}/session/clip_00.mcap", "--json"]);
     let left = clip.wait(Duration::from_secs(60)).succeeded().json();
-    assert!(left["clips"][0]["joint_rms_rad"][1].as_f64() > Some(1e-3), "the load is seen in what was recorded: {left}");
+    assert!(
+        left["clips"][0]["joint_rms_rad"][1].as_f64() > Some(1e-3),
+        "the load is seen in what was recorded: {left}"
+    );
 
     let (robot, address) = serve(&cell, &[]);
     let answer = capture(&address).succeeded().json();
