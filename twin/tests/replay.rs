@@ -7,7 +7,7 @@ use shared_mem::msg::object::ObjectPose;
 use shared_mem::recording::{Clip, ClipInfo, ClipMessages, ClipWriter, JointSeries, Payload, read_clip};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
-use twin::replay::Replayer;
+use twin::replay::{Replayer, write_clip};
 use twin::sim::{Drive, SimCell};
 
 const MILLISECOND: u64 = 1_000_000;
@@ -175,6 +175,25 @@ fn a_simulated_clip_is_written_and_reads_back_as_the_recording() {
     }
     let again = twin(&[text(&path.join("b.mcap")), "--out", text(&out)]);
     assert_eq!(again.status.code(), Some(1), "an existing clip is not overwritten");
+}
+
+#[test]
+fn a_recording_from_before_this_machine_was_started_keeps_its_stamps() {
+    let (_folder, path) = session();
+    let cell = Cell::read(&path.join("cell.toml")).expect("the session's cell");
+    let mut clip = read_clip(&path.join("a.mcap"), ClipKind::Excitation, &cell).expect("a clip");
+    // As a ROS 2 bag of the year 2020 stamps them.
+    for series in [&mut clip.measured, &mut clip.desired] {
+        series.stamps_ns.iter_mut().for_each(|stamp| *stamp += 1_600_000_000_000_000_000);
+    }
+    let replayer = Replayer::new(&cell, None).expect("a twin");
+    let (clip, prediction, _) = replayer.replay(clip).expect("an arm that follows");
+    let out = path.join("simulated.mcap");
+    write_clip(&out, &replayer, &clip, &prediction).expect("room");
+    let messages =
+        ClipMessages::open(&out, &["/twin/state"]).expect("a clip").map(|message| message.expect("a message"));
+    let logged: Vec<u64> = messages.map(|message| message.log_time_ns).collect();
+    assert_eq!(logged, clip.measured.stamps_ns);
 }
 
 #[test]

@@ -139,10 +139,14 @@ impl ClipWriter<File> {
         Self::with_sink(file, path, info)
     }
 
-    /// The same for messages of another time: `clock` takes their stamps to Unix time.
-    pub(super) fn create_stamped(path: &Path, info: &ClipInfo, clock: UnixClock) -> Result<Self, WriteError> {
+    /// The same for messages whose stamps are Unix time, as those of a recording made elsewhere: before this machine was
+    /// started there is no monotonic time for them.
+    ///
+    /// # Errors
+    /// As [`Self::create`].
+    pub fn create_in_unix_time(path: &Path, info: &ClipInfo) -> Result<Self, WriteError> {
         let file = File::create_new(path).map_err(|source| WriteError::Create { path: path.to_owned(), source })?;
-        Self::with_clock(file, path, info, clock)
+        Self::with_clock(file, path, info, UnixClock(0))
     }
 }
 

@@ -29,18 +29,18 @@ pub fn write_clip(path: &Path, replayer: &Replayer, clip: &Clip, prediction: &Pr
         program: concat!("twin ", env!("CARGO_PKG_VERSION"), " replay").to_owned(),
         torques_begin_at_rows: !clip.torques_end_at_rows,
     };
-    let mut writer = ClipWriter::create(path, &info)?;
+    let create = if in_unix_time(clip) { ClipWriter::create_in_unix_time } else { ClipWriter::create };
+    let mut writer = create(path, &info)?;
     let latency_ns = replayer.cell().camera.as_ref().map_or(0, |camera| (camera.latency * 1e9) as u64);
-    let offset_ns = offset(clip);
-    Simulated { writer: &mut writer, replayer, clip, prediction, offset_ns, latency_ns, pose: 0 }.write()?;
+    Simulated { writer: &mut writer, replayer, clip, prediction, latency_ns, pose: 0 }.write()?;
     writer.finish()?;
     Ok(())
 }
 
-/// What brings the recording's stamps onto this machine's monotonic clock, which a clip's messages carry [ns].
-fn offset(clip: &Clip) -> i64 {
+/// Whether the recording's stamps are Unix time, and not those of a monotonic clock.
+fn in_unix_time(clip: &Clip) -> bool {
     let first = clip.measured.stamps_ns.first().or(clip.object.stamps_ns.first());
-    if first.is_some_and(|stamp| *stamp >= UNIX_FROM_NS) { -shared_mem::time::unix_offset_ns() } else { 0 }
+    first.is_some_and(|stamp| *stamp >= UNIX_FROM_NS)
 }
 
 struct Simulated<'a> {
@@ -48,7 +48,6 @@ struct Simulated<'a> {
     replayer: &'a Replayer,
     clip: &'a Clip,
     prediction: &'a Prediction,
-    offset_ns: i64,
     /// A pose becomes known one camera latency after its picture, and own clips stamp it then [ns].
     latency_ns: u64,
     /// Recorded poses written so far.
@@ -74,7 +73,7 @@ impl Simulated<'_> {
         while let Some(recorded_ns) = self.clip.object.stamps_ns.get(self.pose).filter(|stamp| **stamp <= until_ns) {
             let pose = &self.clip.object.poses[self.pose];
             let message = ObjectPose {
-                stamp_ns: self.stamp(*recorded_ns) + self.latency_ns,
+                stamp_ns: *recorded_ns + self.latency_ns,
                 device_ns: *recorded_ns,
                 sequence: self.pose as u64,
                 position: pose.position(),
@@ -90,14 +89,7 @@ impl Simulated<'_> {
         Ok(())
     }
 
-    fn write_twin(
-        &mut self,
-        recorded_ns: u64,
-        row: Option<usize>,
-        error: Joints,
-        rms: Joints,
-    ) -> Result<(), WriteError> {
-        let stamp_ns = self.stamp(recorded_ns);
+    fn write_twin(&mut self, stamp_ns: u64, row: Option<usize>, error: Joints, rms: Joints) -> Result<(), WriteError> {
         let cycle = row.unwrap_or(self.pose) as u64;
         let dof = u32::try_from(self.clip.measured.dof).unwrap_or(0);
         let mut state = TwinState { stamp_ns, mirrors_ns: stamp_ns, cycle, dof, ..TwinState::default() };
@@ -125,7 +117,7 @@ impl Simulated<'_> {
         let command = desired.stamps_ns.partition_point(|stamp| *stamp <= now).saturating_sub(1);
         let logged = |values: Option<&[f64]>| values.map_or([0.0; MAX_JOINTS], joints_from);
         ArmState {
-            stamp_ns: self.stamp(now),
+            stamp_ns: now,
             device_ns: now,
             cycle: row as u64,
             dof: u32::try_from(measured.dof).unwrap_or(0),
@@ -146,10 +138,6 @@ impl Simulated<'_> {
             std::array::from_fn(|joint| twin.state.q[joint] - real[joint])
         })
         .collect()
-    }
-
-    fn stamp(&self, recorded_ns: u64) -> u64 {
-        recorded_ns.saturating_add_signed(self.offset_ns)
     }
 }
 

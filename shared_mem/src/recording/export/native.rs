@@ -4,7 +4,6 @@
 use super::super::cdr::CdrError;
 use super::super::container::Messages;
 use super::super::ros2::{JointState, StampedPose};
-use super::super::wire::UnixClock;
 use super::super::writer::{ClipInfo, ClipWriter};
 use super::super::{Payload, Picture, ReadError};
 use super::rosbag::{EXTERNAL_TORQUES, FLANGE_POSE};
@@ -48,7 +47,7 @@ pub(super) fn write(
         program: concat!("twinalign ", env!("CARGO_PKG_VERSION"), ", export").into(),
         torques_begin_at_rows: !clip.torques_end_at_rows,
     };
-    let mut writer = ClipWriter::create_stamped(target, &info, UnixClock(0))?;
+    let mut writer = ClipWriter::create_in_unix_time(target, &info)?;
     let known = if matches!(source.kind, Kind::Bag) { Known::read(&source.path)? } else { Known::default() };
     let latency_ns = cell.camera.as_ref().map_or(0, |camera| (camera.latency * 1e9) as u64);
     let mut rows = Rows { source, known, flange_at, latency_ns, state: 0, pose: 0 };
