@@ -8,6 +8,7 @@ use super::flat;
 use super::floor;
 use super::gap::{Residuals, Typical};
 use super::leftovers::{Left, NUMERICS, ROUGHNESS};
+use super::library::Library;
 use super::score::{Advantage, Foretold, foretell};
 use super::shortlist::{self, Scored};
 use super::split::Split;
@@ -190,7 +191,7 @@ impl Step {
                 let (much, nearly_all) = (trial.closes > PLAIN, advantage.share > NEARLY_ALL);
                 // Strokes of two engines differ by so much anyway that a little gain on most of them shows nothing.
                 let rough = stage != Stage::Control && !self.object_gap();
-                let shown = !rough || (much && self.is_alone(trial.scored.candidate));
+                let shown = !rough || (much && self.is_alone(bench.library, trial.scored.candidate));
                 (convincing(advantage, trial.scored.cost) && shown) || (much && nearly_all && advantage.nats > LEAST)
             })
             .filter(|(trial, _, advantage)| {
@@ -340,21 +341,28 @@ impl Step {
         self.left.iter().any(|group| group.of_object && group.mean_square - group.floor > ROUGHNESS)
     }
 
-    /// Whether a trial stands out: nearly all clips speak for it, far beyond chance, and no other effect half as much.
+    /// Whether a trial stands out: nearly all clips speak for it, far beyond chance, and for no other effect half as much.
     #[must_use]
-    pub fn is_clear(&self, candidate: usize) -> bool {
+    pub fn is_clear(&self, library: &Library, candidate: usize) -> bool {
         let own = self.trials.iter().find(|trial| trial.scored.candidate == candidate);
         let advantage = own.and_then(|trial| trial.fitted.as_ref()).map(|(_, advantage)| advantage);
         let clear = |a: &Advantage| a.share > NEARLY_ALL && a.nats > CLEAR * a.error;
-        advantage.is_some_and(clear) && self.is_alone(candidate)
+        advantage.is_some_and(clear) && self.is_alone(library, candidate)
     }
 
-    /// Whether no other effect that could be the cause is worth half as much.
-    fn is_alone(&self, candidate: usize) -> bool {
+    /// Whether no other effect that could be the cause is worth half as much, but for those that are known to look alike:
+    /// that some of them act stands out even where it does not show which.
+    fn is_alone(&self, library: &Library, candidate: usize) -> bool {
+        let effect = library.candidates[candidate].effect;
+        let looks_alike = |trial: &&Trial| {
+            let other = library.candidates[trial.scored.candidate].effect;
+            effect.confusable_with.contains(&other.name) || other.confusable_with.contains(&effect.name)
+        };
         let worth = |trial: &Trial| trial.fitted.as_ref().map(|(_, advantage)| net(advantage, trial.scored.cost));
         let (own, others): (Vec<&Trial>, Vec<&Trial>) =
             self.trials.iter().partition(|trial| trial.scored.candidate == candidate);
-        let next = others.into_iter().filter(|trial| trial.is_cause()).filter_map(worth).fold(0.0, f64::max);
+        let rivals = others.into_iter().filter(|trial| trial.is_cause() && !looks_alike(trial));
+        let next = rivals.filter_map(worth).fold(0.0, f64::max);
         own.into_iter().find_map(worth).is_some_and(|own| next < 0.5 * own)
     }
 }

@@ -142,7 +142,7 @@ fn finding<'a, E: Evidence>(
     let (mut sure, mut clear): (f64, bool) = (1.0, true);
     for (place, effect) in steps_of(found) {
         let step = &found.steps[place];
-        clear &= step.is_clear(effect);
+        clear &= step.is_clear(bench.library, effect);
         let others = confidence::rivals(step, effect, unforeseen[place]);
         let others = others.into_iter().filter(|other| !found.last.effects.contains(other));
         rivals.extend(others.filter(|other| stands_in(bench, split, found, (step, effect), *other)).map(|k| name(&k)));

@@ -261,7 +261,7 @@ const LOWEST_LIMIT: f64 = 0.25;
 
 /// Forms that no clip shows well enough to be worth their numbers: they keep the registry's default, or what an alternative
 /// says.
-const KEPT: [&str; 2] = ["creep", CARRIED];
+const KEPT: [&str; 3] = ["creep", "drift", CARRIED];
 
 /// The step of a probe as a share of what is met in practice.
 const PROBE_SHARE: f64 = 0.1;
@@ -296,7 +296,9 @@ fn alternatives(
         "anisotropic_friction" => {
             let (size, axis) = (sizes[0], index("axis")[0]);
             let turned = |angle: f64| Probe { moves: vec![(size, 0.1), (axis, angle)], one_sided: false, largest: 5.0 };
-            vec![Alternative { form: Vec::new(), probes: vec![turned(0.0), turned(std::f64::consts::FRAC_PI_4)] }]
+            let probes = vec![turned(0.0), turned(std::f64::consts::FRAC_PI_4)];
+            // Slips that are turned aside as far as they can be, and not at all.
+            [1.0, 0.0].map(|drift| Alternative { form: set("drift", drift), probes: probes.clone() }).to_vec()
         }
         "friction_patch" => {
             let (direction, distance) = (index("direction")[0], index("distance")[0]);

@@ -11,7 +11,7 @@ mod modes;
 
 use crate::sliding::FreeBody;
 use modes::Mode;
-use nalgebra::{Matrix3, Point3, Vector3};
+use nalgebra::{Matrix3, Point3, Vector2, Vector3};
 
 /// Sweeps over the places, and the change of velocity [m/s] below which they end early.
 const SWEEPS: usize = 80;
@@ -22,6 +22,9 @@ const SLOW: usize = 3;
 /// Sweeps end where the change of velocity is still this share of what it was when equations were last asked: a body that
 /// a tool pins to the table is pressed a little harder by every sweep, and moves no more.
 const HARDLY: f64 = 0.9;
+
+/// Slower than this a place is as good as at rest [m/s]: which way it slips is chance.
+const SLIPS: f64 = 1e-3;
 
 /// One place that touches within the step.
 #[derive(Clone, Copy)]
@@ -101,6 +104,23 @@ impl<'a, const N: usize> Impulses<'a, N> {
     /// What was found, in the order in which the places were added [N s].
     pub(super) fn iter(&self) -> impl Iterator<Item = Vector3<f64>> + '_ {
         self.places[..self.count].iter().map(|place| place.impulse)
+    }
+
+    /// Turns what slips on the table aside, after the impulses are found: `aside` is the force to the right of a slip over the
+    /// load, for a place on the table and the slip there.
+    pub(super) fn turn_aside(&mut self, aside: impl Fn(Vector2<f64>, Vector2<f64>) -> f64) {
+        for k in 0..self.count {
+            let Place { contact, impulse, .. } = self.places[k];
+            let slip = self.velocity_at(&contact.lever).xy();
+            let speed = slip.norm();
+            if contact.normal != Contact::NONE.normal || speed < SLIPS {
+                continue;
+            }
+            let across = impulse.z * aside((self.body.centre.coords + contact.lever).xy(), slip) / speed;
+            let push = Vector3::new(slip.y * across, -slip.x * across, 0.0);
+            self.body.velocity += push * self.inverse_mass;
+            self.body.angular_velocity += self.inverse_inertia * contact.lever.cross(&push);
+        }
     }
 
     pub(super) fn velocity_at(&self, lever: &Vector3<f64>) -> Vector3<f64> {

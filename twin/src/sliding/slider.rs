@@ -181,7 +181,7 @@ impl<F: SlidingFriction + ?Sized, const N: usize> Step<'_, F, N> {
             let turned = turn(cos, sin, *point);
             let slip = state.velocity + left_of(turned) * state.yaw_rate;
             let (mu, speed, reach) = (self.friction.mu(state.position + turned, slip), slip.norm(), point.norm());
-            kappas[i] = turn(cos, -sin, slip) * (mu / speed);
+            kappas[i] = turn(cos, -sin, self.rubbing(state.position + turned, slip) / speed);
             let (force, moment) = (planar.xy().norm() + mu * weight, planar.z.abs() + mu * weight * reach);
             let change =
                 force / self.slider.mass + moment * reach / self.slider.yaw_inertia + reach * state.yaw_rate.powi(2);
@@ -198,9 +198,11 @@ impl<F: SlidingFriction + ?Sized, const N: usize> Step<'_, F, N> {
         for (i, point) in self.places.points.iter().enumerate() {
             let turned = turn(cos, sin, *point);
             let slip = state.velocity + left_of(turned) * state.yaw_rate;
-            let (mu, speed) = (self.friction.mu(state.position + turned, slip), slip.norm());
+            let speed = slip.norm();
             slips[i] = turn(cos, -sin, slip);
-            kappas[i] = if speed > 0.0 { slips[i] * (mu / speed) } else { Vector2::zeros() };
+            if speed > 0.0 {
+                kappas[i] = turn(cos, -sin, self.rubbing(state.position + turned, slip) / speed);
+            }
         }
         let loads = load::solve(&self.places, self.slider.height, &local, &kappas)?;
         let mut total = local.planar();
@@ -211,6 +213,12 @@ impl<F: SlidingFriction + ?Sized, const N: usize> Step<'_, F, N> {
         let Slider { mass, yaw_inertia, .. } = *self.slider;
         let rates = Vector3::new(total.x / mass, total.y / mass, total.z / yaw_inertia);
         Some(Instant { rates, acceleration: turn(cos, sin, rates.xy()), slips, loads })
+    }
+
+    /// Friction at a place, reversed, over its load and times the speed of its slip; world axes.
+    #[inline]
+    fn rubbing(&self, place: Vector2<f64>, slip: Vector2<f64>) -> Vector2<f64> {
+        slip * self.friction.mu(place, slip) + left_of(slip) * self.friction.aside(place, slip)
     }
 
     /// Longest step, `wanted` or a power of two shorter, in which all but [`UNRESOLVED`] of the load keeps its direction.

@@ -61,6 +61,12 @@ impl SlidingFriction for TableFriction {
     fn mu(&self, point: Vector2<f64>, velocity: Vector2<f64>) -> f64 {
         self.effects.as_ref().map_or(self.nominal, |effects| effects.mu(self.nominal, point, velocity))
     }
+
+    #[inline]
+    fn aside(&self, _point: Vector2<f64>, velocity: Vector2<f64>) -> f64 {
+        let rough = self.effects.as_ref().and_then(|effects| effects.anisotropic_friction.as_ref());
+        rough.map_or(0.0, |effect| self.nominal * effect.aside(velocity))
+    }
 }
 
 impl SlideEffects {
