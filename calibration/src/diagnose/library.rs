@@ -253,8 +253,8 @@ fn biting(number: usize, peak: f64, unknown: &Unknown) -> Probe {
 
 /// The one effect on torques that does nothing below a threshold.
 pub const TORQUE_SATURATION: &str = "torque_saturation";
-/// Its probe cuts this much off the tops of the torques, its difference step is this share of them, and below this share
-/// of them no limit is looked for.
+/// Its probe is a limit at this share of a joint's largest torque, its difference step is this share of it, and below this
+/// share of it no limit is looked for.
 const BITES: f64 = 0.9;
 const BOUND_STEP: f64 = 0.01;
 const LOWEST_LIMIT: f64 = 0.25;
