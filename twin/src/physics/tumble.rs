@@ -76,7 +76,9 @@ impl Tumbling {
         }
         self.add_corners(&mut impulses, &turn, dt);
         impulses.settle();
-        impulses.turn_aside(|place, slip| self.friction.aside(place, slip));
+        if self.friction.effects.is_some() {
+            impulses.turn_aside(|place, slip| self.friction.aside(place, slip));
+        }
         let (mut forces, touched) = ([Vector3::zeros(); 2], !impulses.is_empty());
         let pressing = forces.iter_mut().zip(presses).filter(|(_, press)| press.touch.depth > 0.0);
         pressing.zip(impulses.iter()).for_each(|((force, _), impulse)| *force = impulse / dt);
