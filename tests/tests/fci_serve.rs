@@ -54,6 +54,8 @@ fn a_reflex_in_mid_motion_ends_a_capture_that_the_same_command_continues() {
         cell.start("calibration", &[&fixed[..], &more].concat()).wait(Duration::from_secs(120))
     };
     let (robot, address) = serve(&cell, &["--effects", &cell.text("heavy.toml")]);
+    // It sinks under the load until its controller holds it; a motion that began meanwhile would be stopped at once.
+    std::thread::sleep(Duration::from_secs(4));
     let stopped = capture(&address);
     assert_eq!(stopped.status.code(), Some(1), "{}", stopped.stderr);
     assert!(stopped.stderr.contains("reflex") && stopped.stderr.contains("is continued"), "{}", stopped.stderr);
