@@ -126,9 +126,12 @@ impl Hand {
 
     /// The newest state that waits, or the next one; `None` when there is none within a while.
     fn newest(&mut self) -> Option<WireState> {
-        let mut newest = self.network.blocking_receive_struct::<WireState>().ok();
+        // From the datagrams' own channel: the network's calls of these names end the TCP connection when nothing comes in time,
+        // and a hand that pauses is not lost before `SILENCE`.
+        let states = &self.network.udp;
+        let mut newest = states.blocking_receive_struct::<WireState>().ok();
         // A datagram of another length is not the hand's and is passed over.
-        while let Ok(Some(newer)) = self.network.try_receive_struct::<WireState>() {
+        while let Ok(Some(newer)) = states.try_receive_struct::<WireState>() {
             newest = Some(newer);
         }
         newest.filter(|state| state.message_id.get() > self.last_id)

@@ -5,7 +5,7 @@ use rt_bridge::device::Device as _;
 use rt_bridge::serve::Pace;
 use shared_mem::msg::gripper::{GripperAction, GripperCommand, GripperState};
 use std::io::{Read, Write};
-use std::net::{TcpStream, UdpSocket};
+use std::net::{TcpListener, TcpStream, UdpSocket};
 use std::time::Duration;
 
 struct Hand {
@@ -119,4 +119,30 @@ fn the_bridges_own_driver_moves_the_hand_and_misses_it_when_it_is_gone() {
     assert!(fault.contains("is gone") || fault.contains("does not answer"), "{fault}");
     let refused = rt_bridge::fr3::Hand::connect("127.0.0.1:9").err().expect("nobody listens there").to_string();
     assert!(refused.contains("cannot be opened (connection refused)"), "{refused}");
+}
+
+#[test]
+fn a_hand_that_pauses_is_not_lost() {
+    let listener = TcpListener::bind("127.0.0.1:0").expect("a free port");
+    let address = listener.local_addr().expect("it is bound");
+    let theirs = std::thread::spawn(move || {
+        let (mut tcp, _) = listener.accept().expect("the driver connects");
+        let mut request = [0; 14];
+        tcp.read_exact(&mut request).expect("a handshake");
+        let port = u16::from_le_bytes([request[12], request[13]]);
+        let reply = [&[0, 0][..], &request[2..6], &14_u32.to_le_bytes(), &[0, 0, 3, 0]].concat();
+        tcp.write_all(&reply).expect("the driver listens");
+        let udp = UdpSocket::bind("127.0.0.1:0").expect("a free port");
+        for id in 1_u32..=2 {
+            let width = 0.01 * f64::from(id);
+            let state = [&id.to_le_bytes()[..], &numbers(&[width, 0.08]), &[0, 0, 0]].concat();
+            udp.send_to(&state, ("127.0.0.1", port)).expect("the driver listens");
+            std::thread::sleep(Duration::from_millis(300));
+        }
+        tcp
+    });
+    let mut hand = rt_bridge::fr3::Hand::connect(&address.to_string()).expect("a hand");
+    until(&mut hand, None, |state| state.width == 0.01);
+    until(&mut hand, None, |state| state.width == 0.02);
+    drop(theirs.join().expect("a hand that paused"));
 }
