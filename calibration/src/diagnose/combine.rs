@@ -47,8 +47,9 @@ const CLEAR: f64 = 3.5;
 const NUMERICS_SHARE: f64 = 1e-4;
 /// ... and what more numbers make of that difference by this share of the gain: friction at rest is every engine's own.
 const OWN_SHARE: f64 = 1e-3;
-/// One that has more numbers must close this much more of the gap: what own numbers of clips hide from the likelihood.
-pub const MORE: f64 = 0.04;
+/// Where clips have numbers of their own, which hide what a candidate closes from the likelihood, one that has more numbers
+/// than another must close this much more of the gap.
+const MORE: f64 = 0.04;
 
 /// A candidate tried on top of a hypothesis.
 #[derive(Debug, Clone)]
@@ -59,6 +60,8 @@ pub struct Trial {
     pub fitted: Option<(Hypothesis, Advantage)>,
     /// [`closes`]: how much of the gap.
     pub closes: f64,
+    /// Whether clips have numbers of their own.
+    pub own_numbers: bool,
 }
 
 impl Trial {
@@ -73,7 +76,14 @@ impl Trial {
     pub fn is_outdone_by(&self, other: &Self) -> bool {
         let (Some((_, mine)), Some((_, its))) = (&self.fitted, &other.fitted) else { return false };
         let alike = mine.nats - its.nats < LEAST.max(OWN_SHARE * its.nats);
-        other.scored.cost < self.scored.cost && alike && self.closes < other.closes + MORE
+        other.scored.cost < self.scored.cost && alike && !self.closes_more_than(other)
+    }
+
+    /// Whether it closes so much more of the gap that its additional numbers are worth it although clips are foretold as well
+    /// without them.
+    #[must_use]
+    pub fn closes_more_than(&self, other: &Self) -> bool {
+        self.own_numbers && self.closes > other.closes + MORE
     }
 }
 
@@ -202,6 +212,34 @@ impl Step {
             .filter(|(trial, fit, _)| !bench.negligible(trial.scored.candidate, &fit.full))
             .filter(|(trial, fit, _)| !bench.is_convention(trial.scored.candidate, fit))
             .collect();
+        if std::env::var("DBG").is_ok() {
+            for t in &self.trials {
+                if let Some((f, a)) = &t.fitted {
+                    eprintln!(
+                        "step {:?} trial {} nats {:.1} err {:.1} share {:.2} cost {} closes {:.4} dev {:.1} worthy {} negl {} conv {}",
+                        self.from.effects.iter().map(|e| bench.library.candidates[*e].effect.name).collect::<Vec<_>>(),
+                        bench.library.candidates[t.scored.candidate].effect.name,
+                        a.nats,
+                        a.error,
+                        a.share,
+                        t.scored.cost,
+                        t.closes,
+                        f.deviance(),
+                        worthy.iter().any(|(o, ..)| o.scored.candidate == t.scored.candidate),
+                        bench.negligible(t.scored.candidate, &f.full),
+                        bench.is_convention(t.scored.candidate, f)
+                    );
+                } else {
+                    eprintln!(
+                        "   unfitted {} gain {:.1} p {:.3} signal {:.1}",
+                        bench.library.candidates[t.scored.candidate].effect.name,
+                        t.scored.gain,
+                        t.scored.p,
+                        t.scored.signal
+                    );
+                }
+            }
+        }
         let simplest = |(trial, ..): &&(&Trial, _, _)| !worthy.iter().any(|(other, ..)| trial.is_outdone_by(other));
         let worth = |(trial, _, advantage): &(&Trial, _, &Advantage)| net(advantage, trial.scored.cost);
         worthy.iter().filter(simplest).max_by(|a, b| worth(a).total_cmp(&worth(b))).copied()
@@ -280,7 +318,8 @@ fn step<E: Evidence>(
             scored.iter_mut().filter(|s| s.candidate == seen.candidate).for_each(|s| *s = seen.clone());
         }
     }
-    let trial = |scored: &Scored| Trial { scored: scored.clone(), fitted: None, closes: 0.0 };
+    let own_numbers = bench.scatter.count() > 0;
+    let trial = |scored: &Scored| Trial { scored: scored.clone(), fitted: None, closes: 0.0, own_numbers };
     let trials = scored.iter().map(trial).collect();
     let whole = whole.unwrap_or(&left).clone();
     let mut step = Step { from, foretold, trials, weights, arm_rows, left, whole };

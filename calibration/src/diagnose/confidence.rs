@@ -1,6 +1,6 @@
 //! How sure a finding is: shares of the evidence among rivals, less what experience with simulated sessions takes off.
 
-use super::combine::{MORE, Step, Trial, net};
+use super::combine::{Step, Trial, net};
 
 /// Rivals this close cannot be told apart [nats].
 const NEAR: f64 = 4.0;
@@ -44,8 +44,9 @@ pub fn rivals(step: &Step, chosen: usize, unforeseen: f64) -> Vec<usize> {
         let (beyond, error) = (beyond / unforeseen, error / unforeseen);
         let alike = alike(beyond, error, best.clips()) && other.nats > other.error;
         let dearer = trial.scored.cost > chosen_trial.scored.cost;
-        let enough = if dearer { chosen_trial.closes + MORE } else { ALIKE * chosen_trial.closes };
-        alike && trial.closes > enough
+        let enough =
+            if dearer { trial.closes_more_than(chosen_trial) } else { trial.closes > ALIKE * chosen_trial.closes };
+        alike && enough
     };
     step.trials.iter().map(|trial| trial.scored.candidate).filter(near).collect()
 }
@@ -87,7 +88,7 @@ mod tests {
             p: 0.0,
         };
         let fit = Hypothesis { effects: vec![candidate], full: Vec::new(), free: Vec::new(), fitted: Vec::new() };
-        Trial { scored, fitted: Some((fit, foretold(nats).over(&foretold(0.0)))), closes }
+        Trial { scored, fitted: Some((fit, foretold(nats).over(&foretold(0.0)))), closes, own_numbers: true }
     }
 
     #[test]
@@ -101,7 +102,15 @@ mod tests {
         assert!(sure(&[cause.clone(), trial(1, 150.0, 0.4)]) < 0.1, "one that closes as much does");
         let mut dearer = trial(1, 103.0, 0.41);
         dearer.scored.cost = 8;
-        assert!((sure(&[cause, dearer]) - (1.0 - NONE_OF_THESE)).abs() < 1e-6, "one with more numbers does not");
+        assert!(
+            (sure(&[cause.clone(), dearer.clone()]) - (1.0 - NONE_OF_THESE)).abs() < 1e-6,
+            "one with more numbers does not"
+        );
+        // ... unless it closes markedly more, where own numbers of clips could hide that from the likelihood.
+        dearer.closes = 0.5;
+        assert!(sure(&[cause.clone(), dearer.clone()]) < 0.5);
+        dearer.own_numbers = false;
+        assert!((sure(&[cause, dearer]) - (1.0 - NONE_OF_THESE)).abs() < 1e-6);
     }
 
     #[test]

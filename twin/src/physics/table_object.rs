@@ -43,6 +43,8 @@ pub struct ObjectMotion {
     standing: Option<(Footing, PlanarState)>,
     /// It stands still and does so until something touches it.
     rests: bool,
+    /// Where the table is from the face on which it stands or last stood, object axes.
+    down: Vector3<f64>,
     made_of: Material,
 }
 
@@ -57,6 +59,11 @@ const DRAG_STEP: f64 = 2.5e-4;
 /// hit before moves them by 0.2 mm.
 const PUSHED_STEP: f64 = 1e-3;
 const LEANING_STEP: f64 = 3.4e-4;
+/// Corners up to this far above the lowest belong to the base [m].
+const BASE: f64 = 1e-3;
+/// What leans more than this topples [rad]: it no longer pivots about where its base presses, but meets the table with its
+/// corners.
+const TOPPLES: f64 = 0.3;
 
 impl TableObject {
     /// The object at the origin, at rest. Without `table_height` there is no table and it falls. Of `effects` those on
@@ -85,7 +92,7 @@ impl TableObject {
             velocity: Vector3::zeros(),
             angular_velocity: Vector3::zeros(),
         };
-        let motion = ObjectMotion { body, standing: None, rests: false, made_of };
+        let motion = ObjectMotion { body, standing: None, rests: false, down: -Vector3::z(), made_of };
         let mut object = Self { shape, support: model.support, made_of, tumbling, motion };
         object.take(made_of);
         Ok(object)
@@ -106,9 +113,6 @@ impl TableObject {
         let mut inertia = self.shape.unit_inertia * parameters.mass;
         inertia[(2, 2)] *= yaw_factor;
         let tumbling = &mut self.tumbling;
-        for (corner, place) in tumbling.corners.iter_mut().zip(&self.shape.corners) {
-            *corner = place.coords - parameters.centre_of_mass;
-        }
         (tumbling.mass, tumbling.inertia) = (parameters.mass, inertia);
         tumbling.inverse_inertia = inertia.try_inverse().unwrap_or_else(Matrix3::identity);
         let effects = (slide != SlideEffects::default()).then_some(slide);
@@ -117,6 +121,21 @@ impl TableObject {
         tumbling.gravity = slide.gravity(GRAVITY);
         (tumbling.drag, tumbling.middle) = (slide.drag(), -parameters.centre_of_mass);
         (self.made_of, self.motion.made_of) = (made_of, made_of);
+        self.place_corners();
+    }
+
+    /// The corners about which it pivots: those of the base on which it stood nearer to the middle, where it presses there.
+    fn place_corners(&mut self) {
+        let (corners, down) = (&self.shape.corners, self.motion.down);
+        let lowest = corners.iter().map(|p| p.coords.dot(&down)).fold(f64::NEG_INFINITY, f64::max);
+        let (pivots, lean) = (self.made_of.slide.pivots(), (self.motion.body.rotation * down).angle(&-Vector3::z()));
+        let in_base = |p: &Point3<f64>| pivots != 1.0 && lean < TOPPLES && p.coords.dot(&down) > lowest - BASE;
+        let base = || corners.iter().filter(|p| in_base(p)).map(|p| p.coords);
+        let middle = base().sum::<Vector3<f64>>() / base().count().max(1) as f64;
+        for (corner, place) in self.tumbling.corners.iter_mut().zip(corners) {
+            let from = if in_base(place) { middle + (place.coords - middle) * pivots } else { place.coords };
+            *corner = from - self.made_of.parameters.centre_of_mass;
+        }
     }
 
     /// What it does now, to go on from later.
@@ -130,6 +149,7 @@ impl TableObject {
     pub fn resume(&mut self, motion: &ObjectMotion) {
         if motion.made_of == self.made_of {
             self.motion = *motion;
+            self.find_base();
             return;
         }
         let FreeBody { centre, rotation, velocity, angular_velocity } = motion.body;
@@ -197,6 +217,18 @@ impl TableObject {
     fn settle(&mut self, body: FreeBody, presses: &[Press], dt: f64) {
         self.motion.standing = self.standing(&body, presses, dt);
         self.motion.body = self.motion.standing.as_ref().map_or(body, |(footing, state)| footing.release(state));
+        self.find_base();
+    }
+
+    /// Notes on which face it stands, and what it pivots about there.
+    fn find_base(&mut self) {
+        if self.made_of.slide.pivots() == 1.0 {
+            return;
+        }
+        if self.motion.standing.is_some() {
+            self.motion.down = self.motion.body.rotation.inverse() * -Vector3::z();
+        }
+        self.place_corners();
     }
 
     fn standing(&self, body: &FreeBody, presses: &[Press], dt: f64) -> Option<(Footing, PlanarState)> {

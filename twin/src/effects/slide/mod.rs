@@ -45,6 +45,12 @@ impl SlideEffects {
     pub fn pressure_reach(&self) -> f64 {
         self.pressure_distribution.map_or(1.0, |effect| effect.reach)
     }
+
+    /// Distance from the middle of the base of what a tipping object pivots about, over that of its corners.
+    #[must_use]
+    pub fn pivots(&self) -> f64 {
+        self.pressure_distribution.map_or(1.0, |effect| effect.pivots())
+    }
 }
 
 /// Friction of the real table: a coefficient and what it depends on.

@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::scene::ObjectShape;
+use shared_mem::theta::Theta;
 
 const STEP: f64 = 2.5e-4;
 
@@ -138,4 +139,22 @@ fn a_bounce_returns_the_restitution() {
         top = top.max(height(&object) - corner.norm());
     }
     assert!((top / 0.2 - 0.25).abs() < 0.01, "rebound {top} m of 0.2 m");
+}
+
+#[test]
+fn on_feet_a_box_topples_from_a_slope_on_which_its_corners_hold_it() {
+    let lean = |tipping: f64| {
+        let blocks = format!(
+            "[[effect]]\nname = \"table_tilt\"\ntilt = [0.3, 0.0]\n[[effect]]\nname = \"pressure_distribution\"\nreach = 0.4\ntipping = {tipping}"
+        );
+        let theta: Theta =
+            shared_mem::toml_file::parse(&blocks, std::path::Path::new("theta.toml")).expect("a theta.toml");
+        let effects = Effects::from_theta(&theta.effects, 0).expect("known effects");
+        let mut object = TableObject::new(&box_model(1.0, 0.0), Some(0.0), &effects).expect("a box");
+        object.set(&Pose::from_isometry(Isometry3::translation(0.0, 0.0, 0.05)), Vector3::zeros(), Vector3::zeros());
+        run(&mut object, 1.0);
+        (object.isometry().rotation * Vector3::z()).angle(&Vector3::z())
+    };
+    assert!(lean(1.0) > 0.5, "{}", lean(1.0));
+    assert!(lean(0.0) < 1e-3, "{}", lean(0.0));
 }
