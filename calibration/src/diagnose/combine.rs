@@ -8,7 +8,7 @@ use super::flat;
 use super::floor;
 use super::gap::{Residuals, Typical};
 use super::leftovers::{Left, NUMERICS, ROUGHNESS};
-use super::library::Library;
+use super::library::{Alternative, Library};
 use super::score::{Advantage, Foretold, foretell};
 use super::shortlist::{self, Scored};
 use super::split::Split;
@@ -28,6 +28,9 @@ pub const MOST: usize = 4;
 const HEAT: Effort = Effort { iterations: 3, precision: Precision::Joints };
 const FIRST_PASS: Effort = Effort { iterations: 6, precision: Precision::Joints };
 const LAST_PASS: Effort = Effort { iterations: 6, precision: Precision::Exact };
+/// Rivals of the best that are worth this share of it are fitted again, so many of them.
+const RIVAL: f64 = 0.5;
+const TRIED_AGAIN: usize = 2;
 /// Near is this far from the best deviance, or this share of what the best gains.
 const NEAR: f64 = 40.0;
 const NEAR_SHARE: f64 = 0.4;
@@ -165,18 +168,43 @@ pub fn search<E: Evidence>(
         steps.push(step);
         match best {
             Some(best) if now.effects.len() < MOST && !bench.interrupt.asked() && !spent(bench, split, &steps) => {
-                let settled =
-                    |full| bench.fit((&best.effects, full), &split.train, &weights, Some(&best), last_pass(bench));
-                // An effect frees the object's parameters from what they stood in for: they are found anew under it.
-                let anew = refined(&best.full).and_then(settled);
-                let near = settled(best.full.clone())?;
-                now = anew.filter(|anew| anew.deviance() < near.deviance()).unwrap_or(near);
+                now = settled(bench, split, (&best, &weights), refined)?;
+                let step = steps.last_mut()?;
+                step.try_again(bench, split, &now, refined);
+                let other = step.best(bench).map(|(_, fit, _)| fit.clone()).filter(|fit| fit.effects != now.effects);
+                if let Some(other) = other {
+                    now = settled(bench, split, (&other, &weights), refined)?;
+                }
             }
             _ => break,
         }
     }
     let last = flat::without(bench, &without_superfluous(bench, split, now, &steps.last()?.weights));
     Some(Found { steps, last })
+}
+
+/// A fit to the end, from where it is and from elsewhere: an effect frees the object's parameters from what they stood in
+/// for, so they are found anew under it, and under the other way in which it could act where there are two.
+fn settled<E: Evidence>(
+    bench: &Bench<'_, E>,
+    split: &Split,
+    (fit, weights): (&Hypothesis, &[f64]),
+    refined: &impl Fn(&[f64]) -> Option<Vec<f64>>,
+) -> Option<Hypothesis> {
+    let from = |full| bench.fit((&fit.effects, full), &split.train, weights, Some(fit), last_pass(bench));
+    let starts = [Some(fit.full.clone()), other_way(bench, fit)];
+    let anew = starts.iter().flatten().filter_map(|full| refined(full)).filter_map(from);
+    anew.chain(from(fit.full.clone())).min_by(|a, b| a.deviance().total_cmp(&b.deviance()))
+}
+
+/// The numbers of a fit whose last effect has two forms, in the form that is further from what was fitted.
+fn other_way<E: Evidence>(bench: &Bench<'_, E>, fit: &Hypothesis) -> Option<Vec<f64>> {
+    let [one, two] = &bench.library.candidates[*fit.effects.last()?].alternatives[..] else { return None };
+    let far = |form: &Alternative| form.form.iter().map(|(k, value)| (fit.full[*k] - value).abs()).sum::<f64>();
+    let mut full = fit.full.clone();
+    let other = if far(one) > far(two) { one } else { two };
+    other.form.iter().for_each(|(k, value)| full[*k] = *value);
+    Some(full)
 }
 
 /// Whether the effects found so far leave no more than numerics do: a further one would only name how engines differ. The
@@ -202,7 +230,9 @@ impl Step {
                 // Strokes of two engines differ by so much anyway that a little gain on most of them shows nothing.
                 let rough = stage != Stage::Control && !self.object_gap();
                 let shown = !rough || (much && self.is_alone(bench.library, trial.scored.candidate));
-                (convincing(advantage, trial.scored.cost) && shown) || (much && nearly_all && advantage.nats > LEAST)
+                // ... and beside a cause that was found before, a gain on nearly all of them neither.
+                let plain = much && nearly_all && advantage.nats > LEAST && (shown || self.from.effects.is_empty());
+                (convincing(advantage, trial.scored.cost) && shown) || plain
             })
             .filter(|(trial, _, advantage)| {
                 let of_arm = bench.library.candidates[trial.scored.candidate].effect.stage == Stage::Control;
@@ -366,11 +396,46 @@ impl Step {
             let more =
                 || bench.fit((&fit.effects, fit.full.clone()), &split.train, &self.weights, Some(&fit), FIRST_PASS);
             let nearer = if fit.deviance() < near { more() } else { None };
-            let fit = nearer.unwrap_or(fit);
-            if let Some(ahead) = foretell(bench, &fit, &split.choose, &self.weights) {
-                let closes = closes(bench, split, &self.whole, [&self.from, &fit]);
-                let trial = &mut self.trials[place];
-                (trial.closes, trial.fitted) = (closes, Some((fit, ahead.over(&self.foretold))));
+            self.judge(bench, split, place, nearer.unwrap_or(fit));
+        }
+    }
+
+    /// Notes a fit of a trial with what it foretells and closes.
+    fn judge<E: Evidence>(&mut self, bench: &Bench<'_, E>, split: &Split, place: usize, fit: Hypothesis) {
+        if let Some(ahead) = foretell(bench, &fit, &split.choose, &self.weights) {
+            let closes = closes(bench, split, &self.whole, [&self.from, &fit]);
+            let trial = &mut self.trials[place];
+            (trial.closes, trial.fitted) = (closes, Some((fit, ahead.over(&self.foretold))));
+        }
+    }
+
+    /// Compares the best trial, fitted to the end, with its nearest rivals once more, each with the object found anew under
+    /// it: with an object that stands in for part of an effect a fit ends somewhere else than with the right one.
+    fn try_again<E: Evidence>(
+        &mut self,
+        bench: &Bench<'_, E>,
+        split: &Split,
+        best: &Hypothesis,
+        refined: &impl Fn(&[f64]) -> Option<Vec<f64>>,
+    ) {
+        let added = best.effects.last().and_then(|c| self.trials.iter().position(|t| t.scored.candidate == *c));
+        let Some(added) = added.filter(|place| self.trials[*place].own_numbers) else { return };
+        let of_arm = |trial: &Trial| bench.library.candidates[trial.scored.candidate].effect.stage == Stage::Control;
+        if of_arm(&self.trials[added]) {
+            return;
+        }
+        self.judge(bench, split, added, best.clone());
+        let nats = |trial: &Trial| trial.fitted.as_ref().map_or(0.0, |(_, advantage)| advantage.nats);
+        let least = RIVAL * nats(&self.trials[added]);
+        let near = |k: &usize| *k != added && nats(&self.trials[*k]) > least && !of_arm(&self.trials[*k]);
+        let mut rivals: Vec<usize> = (0..self.trials.len()).filter(near).collect();
+        rivals.sort_by(|a, b| nats(&self.trials[*b]).total_cmp(&nats(&self.trials[*a])));
+        for place in rivals.into_iter().take(TRIED_AGAIN) {
+            let Some((fit, _)) = self.trials[place].fitted.clone() else { continue };
+            let from = |full| bench.fit((&fit.effects, full), &split.train, &self.weights, Some(&fit), FIRST_PASS);
+            let anew = refined(&fit.full).and_then(from).filter(|anew| anew.deviance() < fit.deviance());
+            if let Some(anew) = anew {
+                self.judge(bench, split, place, anew);
             }
         }
     }

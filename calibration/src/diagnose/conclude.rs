@@ -11,7 +11,7 @@ use super::score::foretell;
 use super::shortlist::TESTABLE;
 use super::split::Split;
 use super::verdict::{self, Finding};
-use super::{DiagnoseError, Kind, Options, advice, combine, confidence, localise, parameters};
+use super::{DiagnoseError, Kind, Options, advice, combine, confidence, drift, localise, parameters};
 use crate::report::Trace;
 use shared_mem::recording::Session;
 use shared_mem::theta::Theta;
@@ -157,6 +157,7 @@ fn finding<'a, E: Evidence>(
         left,
         confirmed,
         implausible: !leftovers::implausible(bench, &found.last).is_empty(),
+        drift: drift::of_friction(&bench.scatter, &found.last),
         place: rest.first().map_or_else(String::new, |place| format!("{} ({})", place.channel, place.regime)),
     }
 }

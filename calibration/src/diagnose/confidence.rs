@@ -1,6 +1,7 @@
 //! How sure a finding is: shares of the evidence among rivals, less what experience with simulated sessions takes off.
 
 use super::combine::{Step, Trial, net};
+use crate::estimate::interval::student;
 
 /// Rivals this close cannot be told apart [nats].
 const NEAR: f64 = 4.0;
@@ -58,11 +59,9 @@ pub fn alike(beyond: f64, error: f64, clips: usize) -> bool {
 }
 
 /// [`CHANCE`] where the error is itself told from so few clips: the quantile of Student's distribution at the same
-/// probability (Abramowitz & Stegun 26.7.5).
+/// probability.
 fn chance(clips: usize) -> f64 {
-    let (z, freedom) = (CHANCE, clips.saturating_sub(1).max(1) as f64);
-    let (first, second) = ((z.powi(3) + z) / 4.0, (5.0 * z.powi(5) + 16.0 * z.powi(3) + 3.0 * z) / 96.0);
-    z + first / freedom + second / freedom.powi(2)
+    student(CHANCE, clips.saturating_sub(1))
 }
 
 #[cfg(test)]

@@ -253,6 +253,8 @@ fn biting(number: usize, peak: f64, unknown: &Unknown) -> Probe {
 
 /// The one effect on torques that does nothing below a threshold.
 pub const TORQUE_SATURATION: &str = "torque_saturation";
+/// The one effect on the slide that changes the hit as well.
+pub const PRESSURE_DISTRIBUTION: &str = "pressure_distribution";
 /// Its probe is a limit at this share of a joint's largest torque, its difference step is this share of it, and below this
 /// share of it no limit is looked for.
 const BITES: f64 = 0.9;
@@ -292,7 +294,7 @@ fn alternatives(
         // Rigid flanks, and such as yield like the gears of an arm.
         "joint_backlash" => [1e-7, 4e-5].map(|compliance| with(set("compliance", compliance))).to_vec(),
         // An object that pivots about where it presses, and one that pivots about its corners.
-        "pressure_distribution" => [1.0, 0.0].map(|tipping| with(set("tipping", tipping))).to_vec(),
+        PRESSURE_DISTRIBUTION => [1.0, 0.0].map(|tipping| with(set("tipping", tipping))).to_vec(),
         TOOL_OFFSET => [0.0, 1.0].map(|share| with(set(CARRIED, share))).to_vec(),
         "payload" => [0.0, 0.06].map(|z| with(vec![(index("centre")[2], z)])).to_vec(),
         "anisotropic_friction" => {

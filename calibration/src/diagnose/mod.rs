@@ -40,6 +40,7 @@ pub mod combine;
 pub mod command;
 pub mod conclude;
 pub mod confidence;
+pub mod drift;
 pub mod evidence;
 pub mod fit;
 pub mod flat;

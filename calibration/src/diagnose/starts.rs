@@ -4,8 +4,9 @@
 
 use super::evidence::Evidence;
 use super::fit::{Bench, Hypothesis};
-use super::library::TORQUE_SATURATION;
+use super::library::{PRESSURE_DISTRIBUTION, TORQUE_SATURATION};
 use super::shortlist::Scored;
+use crate::forward::Setting;
 use twin::effects::Stage;
 
 /// Other starts of a fit are this share of the strongest that is met in practice away.
@@ -41,7 +42,8 @@ pub(super) fn starts<E: Evidence>(bench: &Bench<'_, E>, at: (&Hypothesis, &[f64]
     if candidate.effect.name == TORQUE_SATURATION {
         numbers.push(one_by_one(bench, at, scored));
     }
-    if uneven && !one_probe {
+    // What an object pivots about changes the hit, of which slopes tell little, and its number decides how it spins besides.
+    if (uneven && !one_probe) || candidate.effect.name == PRESSURE_DISTRIBUTION {
         numbers.extend(least_cost_aside(bench, at, scored).map(|(_, full)| full));
     }
     numbers
@@ -98,10 +100,13 @@ fn one_by_one<E: Evidence>(bench: &Bench<'_, E>, at: (&Hypothesis, &[f64]), scor
     bench.begun(at.0.full.clone(), &best)
 }
 
-/// The numbers with the baseline's object as cell.toml has it.
+/// The numbers with the baseline's object as cell.toml has it, but for its friction: how far it slides tells that whatever
+/// the hit was like.
 fn with_nominal_object<E: Evidence>(bench: &Bench<'_, E>, mut full: Vec<f64>) -> Vec<f64> {
-    for k in bench.library.baseline.clone().filter(|k| !bench.library.arm_feels(*k, &full)).collect::<Vec<_>>() {
-        full[k] = bench.library.unknowns[k].start;
+    let library = bench.library;
+    let of_object = |k: &usize| !library.arm_feels(*k, &full) && library.settings.settings()[*k] != Setting::Friction;
+    for k in library.baseline.clone().filter(of_object).collect::<Vec<_>>() {
+        full[k] = library.unknowns[k].start;
     }
     full
 }

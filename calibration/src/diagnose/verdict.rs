@@ -20,6 +20,8 @@ pub struct Finding<'a> {
     pub confirmed: bool,
     /// Whether an effect is stronger than what is met in practice.
     pub implausible: bool,
+    /// How much the friction of the last clip is over that of the first, less 1, where it drifts over the session.
+    pub drift: Option<f64>,
     /// Where the gap, or what is left of it, is largest.
     pub place: String,
 }
@@ -36,7 +38,7 @@ impl Finding<'_> {
     pub fn verdict(&self) -> Verdict {
         if self.effects.is_empty() || !self.confirmed {
             let gap = self.left.iter().any(|left| left.before - left.floor > left.numerics);
-            return if gap { self.unexplained() } else { self.none() };
+            return if gap || self.drift.is_some() { self.unexplained() } else { self.none() };
         }
         if self.implausible || self.left.iter().any(|left| left.too_much(self.clear)) {
             return self.unexplained();
@@ -93,9 +95,13 @@ impl Finding<'_> {
                 format!("; {} comes nearest{strength} and leaves {rest:.0} % of it", names.join(" with "))
             }
         };
+        let drift = self.drift.map_or_else(String::new, |change| {
+            let (verb, share) = (if change > 0.0 { "rises" } else { "falls" }, 100.0 * change.abs());
+            format!("; from the first clip to the last the friction {verb} by {share:.0} %, as where a table wears or gets dirty")
+        });
         let text = format!(
             "Nothing in the library explains the gap: the cell strays {:.1} times as far from the twin as noise alone would \
-             make it, most in {}{nearest}.",
+             make it, most in {}{nearest}{drift}.",
             self.strays(),
             if self.place.is_empty() { "no single place" } else { &self.place }
         );
@@ -125,8 +131,17 @@ mod tests {
             left,
             confirmed: true,
             implausible: false,
+            drift: None,
             place: "joint2".into(),
         }
+    }
+
+    #[test]
+    fn friction_that_drifts_is_told_even_where_every_clip_can_be_followed() {
+        let worn = Finding { drift: Some(0.38), ..finding(vec![], 4.0, 4.0) }.verdict();
+        assert!(worn.kind == Kind::Unexplained && worn.text.contains("the friction rises by 38 %"), "{}", worn.text);
+        let named = Finding { drift: Some(0.38), ..finding(vec!["payload"], 500.0, 1.5) }.verdict();
+        assert_eq!(named.kind, Kind::Named);
     }
 
     #[test]

@@ -114,20 +114,24 @@ fn spread(part: &DMatrix<f64>, free: &[usize], n: usize) -> DMatrix<f64> {
     whole
 }
 
-/// Two-sided 95 % quantile of Student's t (Abramowitz & Stegun 26.7.5, right to 1 % from 3 degrees of freedom on).
+/// Two-sided 95 % quantile of Student's t.
 pub(crate) fn student_95(degrees: usize) -> f64 {
     match degrees {
         0 => f64::INFINITY,
         1 => 12.706,
         2 => 4.303,
-        _ => {
-            let (z, n) = (NORMAL_95, degrees as f64);
-            let (z3, z5, z7) = (z.powi(3), z.powi(5), z.powi(7));
-            z + (z3 + z) / (4.0 * n)
-                + (5.0 * z5 + 16.0 * z3 + 3.0 * z) / (96.0 * n * n)
-                + (3.0 * z7 + 19.0 * z5 + 17.0 * z3 - 15.0 * z) / (384.0 * n.powi(3))
-        }
+        _ => student(NORMAL_95, degrees),
     }
+}
+
+/// The quantile of Student's t at the probability of `z` in a normal distribution (Abramowitz & Stegun 26.7.5, right to 1 %
+/// from 3 degrees of freedom on at 95 %, to 5 % at 99.9 %).
+pub(crate) fn student(z: f64, degrees: usize) -> f64 {
+    let n = degrees.max(1) as f64;
+    let (z3, z5, z7) = (z.powi(3), z.powi(5), z.powi(7));
+    z + (z3 + z) / (4.0 * n)
+        + (5.0 * z5 + 16.0 * z3 + 3.0 * z) / (96.0 * n * n)
+        + (3.0 * z7 + 19.0 * z5 + 17.0 * z3 - 15.0 * z) / (384.0 * n.powi(3))
 }
 
 #[cfg(test)]
