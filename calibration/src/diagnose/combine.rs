@@ -299,7 +299,9 @@ fn without_superfluous<E: Evidence>(
             let fit = bench.fit((&others, full), &split.train, weights, Some(&now), FIRST_PASS)?;
             let less = foretell(bench, &fit, &split.choose, weights)?;
             let cost = candidate.alternatives[0].probes.len();
-            (!convincing(&whole.over(&less), cost)).then_some(fit)
+            let loss = whole.over(&less);
+            let missed = loss.share > NEARLY_ALL && loss.nats > LEAST;
+            (!missed && !convincing(&loss, cost)).then_some(fit)
         });
         match dropped {
             Some(fit) => now = fit,

@@ -293,8 +293,8 @@ fn alternatives(
         "camera_scale" => [0.0, 0.5].map(|x| with(vec![(index("centre")[0], x)])).to_vec(),
         // Rigid flanks, and such as yield like the gears of an arm.
         "joint_backlash" => [1e-7, 4e-5].map(|compliance| with(set("compliance", compliance))).to_vec(),
-        // An object that pivots about where it presses, and one that pivots about its corners.
-        PRESSURE_DISTRIBUTION => [1.0, 0.0].map(|tipping| with(set("tipping", tipping))).to_vec(),
+        // An object that pivots about feet, and one that pivots about its corners.
+        PRESSURE_DISTRIBUTION => [0.75, 1.0].map(|pivot| with(set("pivot", pivot))).to_vec(),
         TOOL_OFFSET => [0.0, 1.0].map(|share| with(set(CARRIED, share))).to_vec(),
         "payload" => [0.0, 0.06].map(|z| with(vec![(index("centre")[2], z)])).to_vec(),
         "anisotropic_friction" => {

@@ -128,7 +128,8 @@ impl TableObject {
     fn place_corners(&mut self) {
         let (corners, down) = (&self.shape.corners, self.motion.down);
         let lowest = corners.iter().map(|p| p.coords.dot(&down)).fold(f64::NEG_INFINITY, f64::max);
-        let (pivots, lean) = (self.made_of.slide.pivots(), (self.motion.body.rotation * down).angle(&-Vector3::z()));
+        let (pivots, lean) =
+            (self.made_of.slide.pivot_reach(), (self.motion.body.rotation * down).angle(&-Vector3::z()));
         let in_base = |p: &Point3<f64>| pivots != 1.0 && lean < TOPPLES && p.coords.dot(&down) > lowest - BASE;
         let base = || corners.iter().filter(|p| in_base(p)).map(|p| p.coords);
         let middle = base().sum::<Vector3<f64>>() / base().count().max(1) as f64;
@@ -222,7 +223,7 @@ impl TableObject {
 
     /// Notes on which face it stands, and what it pivots about there.
     fn find_base(&mut self) {
-        if self.made_of.slide.pivots() == 1.0 {
+        if self.made_of.slide.pivot_reach() == 1.0 {
             return;
         }
         if self.motion.standing.is_some() {

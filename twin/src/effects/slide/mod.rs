@@ -48,8 +48,8 @@ impl SlideEffects {
 
     /// Distance from the middle of the base of what a tipping object pivots about, over that of its corners.
     #[must_use]
-    pub fn pivots(&self) -> f64 {
-        self.pressure_distribution.map_or(1.0, |effect| effect.pivots())
+    pub fn pivot_reach(&self) -> f64 {
+        self.pressure_distribution.map_or(1.0, |effect| effect.pivot)
     }
 }
 

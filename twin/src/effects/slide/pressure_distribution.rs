@@ -1,10 +1,10 @@
 //! The base presses nearer to its middle, or further out, than cell.toml's `support` says.
 //!
 //! - Equation: each place of pressure at `reach` times its distance from the middle of the base; what the object pivots
-//!   about when it tips at `1 + tipping (reach - 1)` times the distance of its corners: 1 stands for an object on feet, 0
-//!   for one whose base is a little hollow or bulged and still meets the table with its corners first.
+//!   about when it tips at `pivot` times the distance of its corners. An object on feet has both below 1; one whose base
+//!   bulges a little, and still meets the table with its corners when it tips, has `pivot` 1.
 //! - Source: radius of the limit surface (Goyal, Ruina, Papadopoulos 1991): 2/3 of the rim's for even pressure.
-//! - Unit: 1. Plausible: reach 0.4 to 1.2, tipping 0 to 1. Even pressure on a square base is about 0.54 of its corners.
+//! - Unit: 1. Plausible: 0.4 to 1.2. Even pressure on a square base is about 0.54 of its corners.
 //! - Signature (S10): spin decays slower with less reach; travel without spin stays, unless the hit tips the object.
 //! - Confused with: object inertia (spin too, but at the hit already), the object's friction.
 
@@ -16,26 +16,19 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     acts_on: Place::Table,
     parameters: &[
         Parameter::size("reach", "1", [0.4, 1.2], 1.0).within(0.01, 2.0),
-        Parameter::form("tipping", "1", [0.0, 1.0], 1.0).within(0.0, 1.0),
+        Parameter::form("pivot", "1", [0.4, 1.2], 1.0).within(0.01, 2.0),
     ],
     confusable_with: &["object_inertia", "tool_offset"],
     install: |values, effects| {
-        let (reach, tipping) = (values.number("reach"), values.number("tipping"));
-        effects.slide.pressure_distribution = Some(PressureDistribution { reach, tipping });
+        let (reach, pivot) = (values.number("reach"), values.number("pivot"));
+        effects.slide.pressure_distribution = Some(PressureDistribution { reach, pivot });
     },
 };
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(in crate::effects) struct PressureDistribution {
     pub(super) reach: f64,
-    tipping: f64,
-}
-
-impl PressureDistribution {
-    /// Distance from the middle of the base of what the object pivots about, over that of its corners.
-    pub(super) fn pivots(&self) -> f64 {
-        1.0 + self.tipping * (self.reach - 1.0)
-    }
+    pub(super) pivot: f64,
 }
 
 #[cfg(test)]

@@ -143,9 +143,9 @@ fn a_bounce_returns_the_restitution() {
 
 #[test]
 fn on_feet_a_box_topples_from_a_slope_on_which_its_corners_hold_it() {
-    let lean = |tipping: f64| {
+    let lean = |pivot: f64| {
         let blocks = format!(
-            "[[effect]]\nname = \"table_tilt\"\ntilt = [0.3, 0.0]\n[[effect]]\nname = \"pressure_distribution\"\nreach = 0.4\ntipping = {tipping}"
+            "[[effect]]\nname = \"table_tilt\"\ntilt = [0.3, 0.0]\n[[effect]]\nname = \"pressure_distribution\"\nreach = 0.4\npivot = {pivot}"
         );
         let theta: Theta =
             shared_mem::toml_file::parse(&blocks, std::path::Path::new("theta.toml")).expect("a theta.toml");
@@ -155,6 +155,6 @@ fn on_feet_a_box_topples_from_a_slope_on_which_its_corners_hold_it() {
         run(&mut object, 1.0);
         (object.isometry().rotation * Vector3::z()).angle(&Vector3::z())
     };
-    assert!(lean(1.0) > 0.5, "{}", lean(1.0));
-    assert!(lean(0.0) < 1e-3, "{}", lean(0.0));
+    assert!(lean(0.4) > 0.5, "{}", lean(0.4));
+    assert!(lean(1.0) < 1e-3, "{}", lean(1.0));
 }
