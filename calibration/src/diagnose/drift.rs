@@ -1,17 +1,18 @@
 //! Whether the friction drifts from clip to clip over a session, as on a table that wears or gets dirty.
 //!
 //! Clips scatter in friction anyway, so that a twin may follow each of them; but chance knows no order. A straight line
-//! through the logarithm of their friction, in the order in which they were recorded, tells (Student's t of its slope).
+//! through the logarithm of their friction, in the order in which they were recorded, tells (Student's t of its slope), if it
+//! leads further than clips scatter.
 
 use super::fit::Hypothesis;
 use super::scatter::Scatter;
 use crate::estimate::interval::student;
 use crate::forward::object::Own;
 
-/// A slope of so many sigmas of a normal distribution, or as unlikely a one of few clips, is no chance: p = 0.001.
-const NO_CHANCE: f64 = 3.29;
-/// Friction that changes by less over a session is of no account.
-const LEAST: f64 = 0.05;
+/// A slope of so many sigmas of a normal distribution, or as unlikely a one of few clips, is no chance: p = 0.02.
+const NO_CHANCE: f64 = 2.33;
+/// ... and over the session the friction changes by so many sigmas of its scatter from clip to clip.
+const LEAST: f64 = 6.0;
 /// A line through fewer clips tells nothing.
 const FEWEST: usize = 5;
 
@@ -22,8 +23,8 @@ pub fn of_friction(scatter: &Scatter, hypothesis: &Hypothesis) -> Option<f64> {
     let number = scatter.random.iter().position(|random| random.name == name)?;
     let points: Vec<(f64, f64)> =
         hypothesis.fitted.iter().map(|fitted| (fitted.clip as f64, fitted.own[number])).collect();
-    let change = trend(&points)?.exp_m1();
-    (change.abs() > LEAST).then_some(change)
+    let change = trend(&points)?;
+    (change.abs() > LEAST * scatter.random[number].sigma).then(|| change.exp_m1())
 }
 
 /// By how much the line through points rises from the first to the last, where its slope is no chance.
@@ -55,7 +56,7 @@ mod tests {
     #[test]
     fn a_rise_is_told_from_scatter() {
         assert_eq!(trend(&clips(0.0)), None);
-        assert_eq!(trend(&clips(0.05)), None, "as much as chance makes of such a scatter");
+        assert_eq!(trend(&clips(0.02)), None, "as much as chance makes of such a scatter");
         for rise in [0.4, -0.3] {
             let found = trend(&clips(rise)).expect("a trend");
             assert!((found - rise).abs() < 0.05, "{found}");

@@ -253,6 +253,8 @@ fn biting(number: usize, peak: f64, unknown: &Unknown) -> Probe {
 
 /// The one effect on torques that does nothing below a threshold.
 pub const TORQUE_SATURATION: &str = "torque_saturation";
+/// The one effect that has to be met in step.
+pub const TORQUE_RIPPLE: &str = "torque_ripple";
 /// The one effect on the slide that changes the hit as well.
 pub const PRESSURE_DISTRIBUTION: &str = "pressure_distribution";
 /// Its probe is a limit at this share of a joint's largest torque, its difference step is this share of it, and below this
@@ -314,7 +316,7 @@ fn alternatives(
             });
             lines.map(with).collect()
         }
-        "torque_ripple" => {
+        TORQUE_RIPPLE => {
             let (order, phase) = (index("order"), index("phase"));
             let orders = [10.0, 20.0, 40.0, 60.0, 100.0, 200.0];
             orders.map(|k| ripple(sizes, (&order, k), &phase)).to_vec()

@@ -53,6 +53,7 @@ pub mod localise;
 pub mod noise;
 pub mod parameters;
 pub mod quadratic;
+pub mod ripple;
 pub mod scatter;
 pub mod score;
 pub mod shortlist;

@@ -4,7 +4,8 @@
 
 use super::evidence::Evidence;
 use super::fit::{Bench, Hypothesis};
-use super::library::{PRESSURE_DISTRIBUTION, TORQUE_SATURATION};
+use super::library::{PRESSURE_DISTRIBUTION, TORQUE_RIPPLE, TORQUE_SATURATION};
+use super::ripple;
 use super::shortlist::Scored;
 use crate::forward::Setting;
 use twin::effects::Stage;
@@ -42,6 +43,9 @@ pub(super) fn starts<E: Evidence>(bench: &Bench<'_, E>, at: (&Hypothesis, &[f64]
     if candidate.effect.name == TORQUE_SATURATION {
         numbers.push(one_by_one(bench, at, scored));
     }
+    if candidate.effect.name == TORQUE_RIPPLE {
+        numbers.extend(ripple::start(bench, at, scored.candidate));
+    }
     // What an object pivots about changes the hit, of which slopes tell little, and its number decides how it spins besides.
     if (uneven && !one_probe) || candidate.effect.name == PRESSURE_DISTRIBUTION {
         numbers.extend(least_cost_aside(bench, at, scored).map(|(_, full)| full));
@@ -54,7 +58,9 @@ pub(super) fn scanned<E: Evidence>(bench: &Bench<'_, E>, at: (&Hypothesis, &[f64
     let forms = 0..bench.library.candidates[scored.candidate].alternatives.len();
     let starts = forms.flat_map(|alternative| aside(bench, &Scored { alternative, ..scored.clone() }, &SCANNED));
     let numbers = starts.map(|start| bench.begun(at.0.full.clone(), &start));
-    cheapest(bench, at, numbers).map(|(_, full)| full).into_iter().collect()
+    let ripples = bench.library.candidates[scored.candidate].effect.name == TORQUE_RIPPLE;
+    let in_step = if ripples { ripple::start(bench, at, scored.candidate) } else { None };
+    cheapest(bench, at, numbers.chain(in_step)).map(|(_, full)| full).into_iter().collect()
 }
 
 /// Some way to either side along each of a candidate's directions, in any of its forms: what the clips cost where they cost

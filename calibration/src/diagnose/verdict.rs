@@ -29,6 +29,9 @@ pub struct Finding<'a> {
 /// Straying beyond this multiple of the noise is said, even where it is no gap.
 const ROUGH: f64 = 1.25;
 
+/// What is stronger than what is met in practice is believed where it explains this much [%]: a substitute does not.
+const ALL_BUT_EXACT: f64 = 99.5;
+
 /// Confidence of a finding that rests on nothing being there, or on something unknown being there.
 const NEGATIVE: f64 = 0.9;
 
@@ -40,7 +43,8 @@ impl Finding<'_> {
             let gap = self.left.iter().any(|left| left.before - left.floor > left.numerics);
             return if gap || self.drift.is_some() { self.unexplained() } else { self.none() };
         }
-        if self.implausible || self.left.iter().any(|left| left.too_much(self.clear)) {
+        let pushed = self.implausible && self.percent() < ALL_BUT_EXACT;
+        if pushed || self.left.iter().any(|left| left.too_much(self.clear)) {
             return self.unexplained();
         }
         if self.rivals.is_empty() { self.named() } else { self.class() }
@@ -165,7 +169,9 @@ mod tests {
 
     #[test]
     fn an_effect_beyond_what_is_met_in_practice_is_a_substitute() {
-        let pushed = Finding { implausible: true, ..finding(vec!["payload"], 500.0, 1.5) };
+        let exact = Finding { implausible: true, ..finding(vec!["payload"], 500.0, 1.5) };
+        assert_eq!(exact.verdict().kind, Kind::Named, "stronger than usual, and exactly that");
+        let pushed = Finding { implausible: true, ..finding(vec!["payload"], 500.0, 6.5) };
         let verdict = pushed.verdict();
         assert!(verdict.kind == Kind::Unexplained && verdict.text.contains("stronger than"), "{}", verdict.text);
     }
