@@ -242,34 +242,6 @@ impl Step {
             .filter(|(trial, fit, _)| !bench.negligible(trial.scored.candidate, &fit.full))
             .filter(|(trial, fit, _)| !bench.is_convention(trial.scored.candidate, fit))
             .collect();
-        if std::env::var("DBG").is_ok() {
-            for t in &self.trials {
-                if let Some((f, a)) = &t.fitted {
-                    eprintln!(
-                        "step {:?} trial {} nats {:.1} err {:.1} share {:.2} cost {} closes {:.4} dev {:.1} worthy {} negl {} conv {}",
-                        self.from.effects.iter().map(|e| bench.library.candidates[*e].effect.name).collect::<Vec<_>>(),
-                        bench.library.candidates[t.scored.candidate].effect.name,
-                        a.nats,
-                        a.error,
-                        a.share,
-                        t.scored.cost,
-                        t.closes,
-                        f.deviance(),
-                        worthy.iter().any(|(o, ..)| o.scored.candidate == t.scored.candidate),
-                        bench.negligible(t.scored.candidate, &f.full),
-                        bench.is_convention(t.scored.candidate, f)
-                    );
-                } else {
-                    eprintln!(
-                        "   unfitted {} gain {:.1} p {:.3} signal {:.1}",
-                        bench.library.candidates[t.scored.candidate].effect.name,
-                        t.scored.gain,
-                        t.scored.p,
-                        t.scored.signal
-                    );
-                }
-            }
-        }
         let simplest = |(trial, ..): &&(&Trial, _, _)| !worthy.iter().any(|(other, ..)| trial.is_outdone_by(other));
         let worth = |(trial, _, advantage): &(&Trial, _, &Advantage)| net(advantage, trial.scored.cost);
         worthy.iter().filter(simplest).max_by(|a, b| worth(a).total_cmp(&worth(b))).copied()

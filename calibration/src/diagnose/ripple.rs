@@ -1,6 +1,6 @@
 //! Where the fit of a torque ripple begins: the order at which each joint's residuals follow its position best.
 //!
-//! A ripple a few periods a radian off shows nothing of the true one: it runs out of step within a joint's travel, and no
+//! A ripple a few periods a turn off shows nothing of the true one: it runs out of step within a joint's travel, and no
 //! slope leads from one to the other. So all orders are tried in steps that a fit can bridge, every joint by itself (a
 //! periodogram over the position instead of over time, by least squares: Lomb 1976).
 
