@@ -8,8 +8,9 @@ use super::flat;
 use super::floor;
 use super::gap::{Residuals, Typical};
 use super::leftovers::{Left, NUMERICS, ROUGHNESS};
-use super::library::{Alternative, Library};
+use super::library::Library;
 use super::score::{Advantage, Foretold, foretell};
+use super::settle::{settled, without_superfluous};
 use super::shortlist::{self, Scored};
 use super::split::Split;
 use super::starts;
@@ -23,11 +24,9 @@ use twin::effects::Stage;
 
 /// At most so many effects are named.
 pub const MOST: usize = 4;
-/// Every candidate's fit gets so many linearisations from its signature on; those that come near the best get more, and the
-/// winner so many more again.
+/// Every candidate's fit gets so many linearisations from its signature on; those that come near the best get more.
 const HEAT: Effort = Effort { iterations: 3, precision: Precision::Joints };
-const FIRST_PASS: Effort = Effort { iterations: 6, precision: Precision::Joints };
-const LAST_PASS: Effort = Effort { iterations: 6, precision: Precision::Exact };
+pub(super) const FIRST_PASS: Effort = Effort { iterations: 6, precision: Precision::Joints };
 /// Rivals of the best that are worth this share of it are fitted again, so many of them.
 const RIVAL: f64 = 0.5;
 const TRIED_AGAIN: usize = 2;
@@ -35,7 +34,7 @@ const TRIED_AGAIN: usize = 2;
 const NEAR: f64 = 40.0;
 const NEAR_SHARE: f64 = 0.4;
 /// A new effect must be worth at least this [nats], more than twice its error, and more than its numbers cost.
-const LEAST: f64 = 4.0;
+pub(super) const LEAST: f64 = 4.0;
 /// ... of the arm more than this for each of its residuals: there are so many that the least numerics add up.
 const WORTHWHILE: f64 = 0.0025;
 /// ... and close at least this share of the gap: what helps only beside numbers that clips have of their own is no cause.
@@ -43,7 +42,7 @@ pub const CLOSES: f64 = 0.1;
 /// ... unless it closes so much of the gap and foretells so many of the clips better that one which it foretells worse does
 /// not matter: 11 of 12 clips do not agree by chance (p = 0.003).
 const PLAIN: f64 = 0.3;
-const NEARLY_ALL: f64 = 0.85;
+pub(super) const NEARLY_ALL: f64 = 0.85;
 /// An advantage of so many of its errors is no chance.
 const CLEAR: f64 = 3.5;
 /// Engines integrate one and the same effect differently by a hundredth of it, so by this share of the squared gap.
@@ -183,30 +182,6 @@ pub fn search<E: Evidence>(
     Some(Found { steps, last })
 }
 
-/// A fit to the end, from where it is and from elsewhere: an effect frees the object's parameters from what they stood in
-/// for, so they are found anew under it, and under the other way in which it could act where there are two.
-fn settled<E: Evidence>(
-    bench: &Bench<'_, E>,
-    split: &Split,
-    (fit, weights): (&Hypothesis, &[f64]),
-    refined: &impl Fn(&[f64]) -> Option<Vec<f64>>,
-) -> Option<Hypothesis> {
-    let from = |full| bench.fit((&fit.effects, full), &split.train, weights, Some(fit), last_pass(bench));
-    let starts = [Some(fit.full.clone()), other_way(bench, fit)];
-    let anew = starts.iter().flatten().filter_map(|full| refined(full)).filter_map(from);
-    anew.chain(from(fit.full.clone())).min_by(|a, b| a.deviance().total_cmp(&b.deviance()))
-}
-
-/// The numbers of a fit whose last effect has two forms, in the form that is further from what was fitted.
-fn other_way<E: Evidence>(bench: &Bench<'_, E>, fit: &Hypothesis) -> Option<Vec<f64>> {
-    let [one, two] = &bench.library.candidates[*fit.effects.last()?].alternatives[..] else { return None };
-    let far = |form: &Alternative| form.form.iter().map(|(k, value)| (fit.full[*k] - value).abs()).sum::<f64>();
-    let mut full = fit.full.clone();
-    let other = if far(one) > far(two) { one } else { two };
-    other.form.iter().for_each(|(k, value)| full[*k] = *value);
-    Some(full)
-}
-
 /// Whether the effects found so far leave no more than numerics do: a further one would only name how engines differ. The
 /// first effect is never held back by this.
 fn spent<E: Evidence>(bench: &Bench<'_, E>, split: &Split, steps: &[Step]) -> bool {
@@ -246,41 +221,6 @@ impl Step {
         let worth = |(trial, _, advantage): &(&Trial, _, &Advantage)| net(advantage, trial.scored.cost);
         worthy.iter().filter(simplest).max_by(|a, b| worth(a).total_cmp(&worth(b))).copied()
     }
-}
-
-/// The effort of a fit to the end. Clips with an object take a simulation for each number of their own; joints one by one
-/// besides would take too long.
-pub fn last_pass<E: Evidence>(bench: &Bench<'_, E>) -> Effort {
-    if bench.scatter.count() == 0 { LAST_PASS } else { Effort { precision: Precision::Joints, ..LAST_PASS } }
-}
-
-/// Drops effects that the others make superfluous, one after the other.
-fn without_superfluous<E: Evidence>(
-    bench: &Bench<'_, E>,
-    split: &Split,
-    mut now: Hypothesis,
-    weights: &[f64],
-) -> Hypothesis {
-    while now.effects.len() > 1 && !bench.interrupt.asked() {
-        let Some(whole) = foretell(bench, &now, &split.choose, weights) else { break };
-        let dropped = now.effects.iter().find_map(|effect| {
-            let others: Vec<usize> = now.effects.iter().copied().filter(|other| other != effect).collect();
-            let mut full = now.full.clone();
-            let candidate = &bench.library.candidates[*effect];
-            candidate.numbers.clone().for_each(|k| full[k] = bench.library.unknowns[k].start);
-            let fit = bench.fit((&others, full), &split.train, weights, Some(&now), FIRST_PASS)?;
-            let less = foretell(bench, &fit, &split.choose, weights)?;
-            let cost = candidate.alternatives[0].probes.len();
-            let loss = whole.over(&less);
-            let missed = loss.share > NEARLY_ALL && loss.nats > LEAST;
-            (!missed && !convincing(&loss, cost)).then_some(fit)
-        });
-        match dropped {
-            Some(fit) => now = fit,
-            None => break,
-        }
-    }
-    now
 }
 
 /// Sweeps around a hypothesis, scores all candidates, fits the best.

@@ -11,7 +11,7 @@ use super::score::foretell;
 use super::shortlist::TESTABLE;
 use super::split::Split;
 use super::verdict::{self, Finding};
-use super::{DiagnoseError, Kind, Options, advice, combine, confidence, drift, localise, parameters};
+use super::{DiagnoseError, Kind, Options, advice, combine, confidence, drift, localise, parameters, settle};
 use crate::report::Trace;
 use shared_mem::recording::Session;
 use shared_mem::theta::Theta;
@@ -180,7 +180,7 @@ fn stands_in<E: Evidence>(
     let mut full = last.full.clone();
     bench.library.candidates[effect].numbers.clone().for_each(|k| full[k] = bench.library.unknowns[k].start);
     bench.library.candidates[rival].numbers.clone().for_each(|k| full[k] = fit.full[k]);
-    let swapped = bench.fit((&effects, full), &split.train, weights, Some(last), combine::last_pass(bench));
+    let swapped = bench.fit((&effects, full), &split.train, weights, Some(last), settle::last_pass(bench));
     let foretold = |hypothesis| foretell(bench, hypothesis, &split.choose, weights);
     let Some((with, instead)) = foretold(last).zip(swapped.as_ref().and_then(foretold)) else { return true };
     let advantage = with.over(&instead);

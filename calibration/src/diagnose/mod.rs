@@ -16,14 +16,14 @@
 //! | [`noise`], [`floor`] | how far residuals can be trusted |
 //! | [`sweep`], [`quadratic`] | every candidate's signature, linearised once |
 //! | [`shortlist`] | how much of the gap each signature explains |
-//! | [`worthy`], [`starts`] | which of them are fitted, and where a fit begins |
+//! | [`worthy`], [`starts`], [`ripple`] | which of them are fitted, and where a fit begins |
 //! | [`fit`] | hypotheses fitted |
 //! | [`score`] | how well they foretell clips |
 //! | [`straying`] | how far clips stray under one of them |
 //! | [`closing`] | how much of the gap they close |
-//! | [`combine`] | which effects act together |
+//! | [`combine`], [`settle`] | which effects act together |
 //! | [`flat`] | which of their numbers nothing depends on |
-//! | [`leftovers`] | what they leave |
+//! | [`leftovers`], [`drift`] | what they leave |
 //! | [`gap`], [`localise`] | how large the gap is, and where |
 //! | [`parameters`], [`confidence`], [`verdict`], [`advice`] | what is said about it |
 //! | [`conclude`], [`answer`] | the answer |
@@ -56,6 +56,7 @@ pub mod quadratic;
 pub mod ripple;
 pub mod scatter;
 pub mod score;
+pub mod settle;
 pub mod shortlist;
 pub mod split;
 pub mod starts;
