@@ -12,7 +12,7 @@ use super::shape::{CollisionShape, FlatMesh};
 use super::tumble::Tumbling;
 use crate::effects::{Effects, SlideEffects, TableFriction};
 use crate::scene::{ObjectModel, ObjectParameters};
-use crate::sliding::{Closeness, Ending, Footing, FreeBody, PlanarState, Solid};
+use crate::sliding::{BASE, Closeness, Ending, Footing, FreeBody, PlanarState, Solid};
 use nalgebra::{Isometry3, Matrix3, Point3, UnitQuaternion, Vector3};
 use shared_mem::cell::Support;
 use shared_mem::frames::{Base, Object, Pose};
@@ -59,8 +59,6 @@ const DRAG_STEP: f64 = 2.5e-4;
 /// hit before moves them by 0.2 mm.
 const PUSHED_STEP: f64 = 1e-3;
 const LEANING_STEP: f64 = 3.4e-4;
-/// Corners up to this far above the lowest belong to the base [m].
-const BASE: f64 = 1e-3;
 /// What leans more than this topples [rad]: it no longer pivots about where its base presses, but meets the table with its
 /// corners.
 const TOPPLES: f64 = 0.3;

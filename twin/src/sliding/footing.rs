@@ -66,7 +66,7 @@ impl Closeness {
 /// No body stands whose base leans more than this [rad].
 const LEAN: f64 = 2e-3;
 /// Corners up to this far above the lowest belong to the base [m].
-const BASE: f64 = 1e-3;
+pub const BASE: f64 = 1e-3;
 
 impl Footing {
     /// The footing of a body that lies flat on the table and hardly moves up or down; `None` when it does not stand.

@@ -21,7 +21,7 @@ mod patch;
 mod planar;
 mod slider;
 
-pub use footing::{Closeness, Footing, FreeBody, Solid};
+pub use footing::{BASE, Closeness, Footing, FreeBody, Solid};
 pub use friction::{Coulomb, SlidingFriction};
 pub use load::Wrench;
 pub use patch::{MAX_POINTS, Patch, PatchError};
