@@ -58,34 +58,21 @@ fn held(mut hypothesis: Hypothesis, number: usize, value: f64) -> Hypothesis {
 
 #[cfg(test)]
 mod tests {
-    use super::super::arm_clips::ArmClips;
-    use super::super::fit::Effort;
     use super::super::library::Library;
-    use super::super::sweep::Precision;
+    use super::super::test_bench::{ONCE, on_bench, shipped};
     use super::*;
     use crate::benchmark::draw;
-    use crate::benchmark::session::record;
     use crate::benchmark::world::{Fault, Kind, World};
     use crate::forward::setting;
-    use crate::interrupt::Interrupt;
-    use shared_mem::cell::Cell;
     use shared_mem::theta::Theta;
-    use std::path::Path;
     use twin::arm::MAX_JOINTS;
 
     #[test]
     fn a_vertical_joint_s_encoder_may_be_off_by_any_angle_and_no_other_s() {
-        let text = include_str!("../../../config/fr3_cell.toml");
-        let cell = Cell::parse(text, Path::new("fr3_cell.toml")).expect("the shipped cell");
+        let cell = shipped();
         let place = draw::candidates(false).iter().position(|effect| effect.name == "joint_encoder_offset");
         let world = World::draw(14, Kind::Excitation, Fault::Single(place.expect("an effect")), &cell);
-        let clips = record(&world, 2).expect("a session");
         let library = Library::new(&cell, &setting::complete(&cell, None).expect("a cell"), false, &[10.0; MAX_JOINTS]);
-        let theta = |numbers: &[f64]| library.theta(numbers);
-        let evidence = ArmClips::new(&cell, &clips, theta).expect("an arm");
-        let interrupt = Interrupt::default();
-        let bench =
-            Bench { evidence: &evidence, library: &library, scatter: evidence.scatter(), interrupt: &interrupt };
         let effect = library.candidates.iter().position(|c| c.effect.name == "joint_encoder_offset");
         let effect = effect.expect("a candidate");
         let offsets = library.candidates[effect].sizes.clone();
@@ -95,23 +82,21 @@ mod tests {
         }
         let truth = full.clone();
         full[offsets[0]] = 0.04;
-        let even = vec![1.0; evidence.channels().len()];
-        let effort = Effort { iterations: 1, precision: Precision::Joints };
-        let found = bench.fit((&[effect], full), &[0, 1], &even, None, effort).expect("a fit");
-        let kept = without(&bench, &found);
-        assert_eq!(kept.full[offsets[0]], 0.0);
-        let free: Vec<bool> = offsets.iter().map(|k| kept.free.contains(k)).collect();
+        let kept = |world: &World, full: Vec<f64>| {
+            on_bench((&cell, world), &library, |bench, even| {
+                without(bench, &bench.fit((&[effect], full), &[0, 1], even, None, ONCE).expect("a fit"))
+            })
+        };
+        let off = kept(&world, full);
+        assert_eq!(off.full[offsets[0]], 0.0);
+        let free: Vec<bool> = offsets.iter().map(|k| off.free.contains(k)).collect();
         assert_eq!(free, [false, true, true, true, true, true, true]);
-        assert_eq!(kept.fitted[0].reduced.form.ncols(), kept.free.len() + 1);
+        assert_eq!(off.fitted[0].reduced.form.ncols(), off.free.len() + 1);
         let rest = World { hidden: Theta { effects: Vec::new(), ..world.hidden.clone() }, ..world };
-        let clips = record(&rest, 2).expect("a session");
-        let evidence = ArmClips::new(&cell, &clips, theta).expect("an arm");
-        let bench = Bench { evidence: &evidence, ..bench };
         let mut full = truth;
         offsets.iter().for_each(|k| full[*k] = 0.0);
-        let found = bench.fit((&[effect], full), &[0, 1], &even, None, effort).expect("a fit");
-        let kept = without(&bench, &found);
-        let free: Vec<bool> = offsets.iter().map(|k| kept.free.contains(k)).collect();
+        let resting = kept(&rest, full);
+        let free: Vec<bool> = offsets.iter().map(|k| resting.free.contains(k)).collect();
         assert_eq!(free, [false, true, true, true, true, true, true], "what is known to rest is known");
     }
 }

@@ -62,6 +62,8 @@ pub mod split;
 pub mod starts;
 pub mod straying;
 pub mod sweep;
+#[cfg(test)]
+mod test_bench;
 pub mod verdict;
 pub mod worthy;
 

@@ -94,23 +94,16 @@ pub(super) fn start<E: Evidence>(
 
 #[cfg(test)]
 mod tests {
-    use super::super::arm_clips::ArmClips;
-    use super::super::fit::Effort;
     use super::super::library::{Library, TORQUE_RIPPLE};
-    use super::super::sweep::Precision;
+    use super::super::test_bench::{ONCE, on_bench, shipped};
     use super::*;
-    use crate::benchmark::session::record;
     use crate::benchmark::world::{Fault, Kind, World};
     use crate::forward::setting;
-    use crate::interrupt::Interrupt;
-    use shared_mem::cell::Cell;
     use shared_mem::theta::{EffectTheta, Theta};
-    use std::path::Path;
 
     #[test]
     fn every_joint_is_met_at_its_own_order() {
-        let text = include_str!("../../../config/fr3_cell.toml");
-        let cell = Cell::parse(text, Path::new("fr3_cell.toml")).expect("the shipped cell");
+        let cell = shipped();
         let well = World::draw(3, Kind::Excitation, Fault::Nothing, &cell);
         let base = setting::complete(&cell, Some(&well.hidden)).expect("a cell");
         let (amplitude, order) = ([0.6, 0.6, 0.6, 0.6, 0.3, 0.3, 0.3], [33.0, 61.7, 161.3, 77.0, 145.0, 111.1, 52.4]);
@@ -119,16 +112,11 @@ mod tests {
         let rippled = EffectTheta { name: TORQUE_RIPPLE.into(), parameters: parameters.into() };
         let world = World { hidden: Theta { effects: vec![rippled], ..well.hidden.clone() }, ..well };
         let library = Library::new(&cell, &base, false, &[87.0; 8]);
-        let theta = |numbers: &[f64]| library.theta(numbers);
-        let evidence = ArmClips::new(&cell, &record(&world, 2).expect("a session"), theta).expect("an arm");
-        let interrupt = Interrupt::default();
-        let bench =
-            Bench { evidence: &evidence, library: &library, scatter: evidence.scatter(), interrupt: &interrupt };
-        let even = vec![1.0; evidence.channels().len()];
-        let effort = Effort { iterations: 1, precision: Precision::Joints };
-        let baseline = bench.fit((&[], library.start()), &[0, 1], &even, None, effort).expect("a fit");
         let candidate = library.find(TORQUE_RIPPLE).expect("a candidate");
-        let begun = start(&bench, (&baseline, &even), candidate).expect("numbers");
+        let begun = on_bench((&cell, &world), &library, |bench, even| {
+            let baseline = bench.fit((&[], library.start()), &[0, 1], even, None, ONCE).expect("a fit");
+            start(bench, (&baseline, even), candidate).expect("numbers")
+        });
         let orders = library.candidates[candidate].alternatives[0].form.iter().map(|(k, _)| begun[*k]);
         for (joint, (found, order)) in orders.zip(order).enumerate() {
             assert!((found - order).abs() < APART, "joint {joint}: {found} instead of {order}");

@@ -139,22 +139,17 @@ fn aside<E: Evidence>(bench: &Bench<'_, E>, scored: &Scored, shares: &[f64]) -> 
 #[cfg(test)]
 mod tests {
     use super::super::arm_clips::ArmClips;
-    use super::super::fit::Effort;
     use super::super::library::Library;
-    use super::super::sweep::Precision;
+    use super::super::test_bench::{ONCE, on_bench, shipped};
     use super::*;
     use crate::benchmark::session::record;
     use crate::benchmark::world::{Fault, Kind, World};
     use crate::forward::setting;
-    use crate::interrupt::Interrupt;
-    use shared_mem::cell::Cell;
     use shared_mem::theta::{EffectTheta, Theta};
-    use std::path::Path;
 
     #[test]
     fn limits_of_the_torque_are_found_joint_by_joint_though_no_slope_leads_there() {
-        let text = include_str!("../../../config/fr3_cell.toml");
-        let cell = Cell::parse(text, Path::new("fr3_cell.toml")).expect("the shipped cell");
+        let cell = shipped();
         let well = World::draw(3, Kind::Excitation, Fault::Nothing, &cell);
         let base = setting::complete(&cell, Some(&well.hidden)).expect("a cell");
         let arm =
@@ -168,14 +163,6 @@ mod tests {
         let cut = EffectTheta { name: TORQUE_SATURATION.into(), parameters };
         let world = World { hidden: Theta { effects: vec![cut], ..well.hidden.clone() }, ..well };
         let library = Library::new(&cell, &base, false, &peaks);
-        let theta = |numbers: &[f64]| library.theta(numbers);
-        let evidence = ArmClips::new(&cell, &record(&world, 2).expect("a session"), theta).expect("an arm");
-        let interrupt = Interrupt::default();
-        let bench =
-            Bench { evidence: &evidence, library: &library, scatter: evidence.scatter(), interrupt: &interrupt };
-        let even = vec![1.0; evidence.channels().len()];
-        let effort = Effort { iterations: 1, precision: Precision::Joints };
-        let baseline = bench.fit((&[], library.start()), &[0, 1], &even, None, effort).expect("a fit");
         let candidate = library.find(TORQUE_SATURATION).expect("a candidate");
         let probes = library.candidates[candidate].alternatives[0].probes.len();
         let scored = Scored {
@@ -190,7 +177,10 @@ mod tests {
             imitated: 0.0,
             p: 1.0,
         };
-        let begun = one_by_one(&bench, (&baseline, &even), &scored);
+        let begun = on_bench((&cell, &world), &library, |bench, even| {
+            let baseline = bench.fit((&[], library.start()), &[0, 1], even, None, ONCE).expect("a fit");
+            one_by_one(bench, (&baseline, even), &scored)
+        });
         for ((size, share), peak) in library.candidates[candidate].sizes.iter().zip(shares).zip(peaks) {
             let found = (begun[*size] * peak).recip();
             match share {
