@@ -40,7 +40,7 @@ pub use kinematics::Jacobian;
 pub use limits::{JointLimits, Limits, TORQUE_RATE};
 pub use model::{ArmModel, ModelError};
 pub use shared_mem::msg::{Joints, MAX_JOINTS};
-pub use transmission::{Spring, Transmission};
+pub use transmission::{Passed, Spring, Transmission};
 pub use yielding::{FlangeMotion, Yielding};
 
 /// Positions and velocities of all joints.

@@ -8,6 +8,7 @@
 //! creeps under it does not rest: its friction is `bound tanh(speed / creep)` at the end of the step, found by secants. Which
 //! of the two holds in which joint is found by least-index pivoting (Murty 1974), which ends because `M` is positive
 //! definite. Explicit midpoint rule around it, as in [`super::step`].
+#![allow(non_snake_case)] // tau_J is the Franka Control Interface's own symbol
 
 use super::kernel::{Chain, factor, filled, first, solve, with_dof};
 use super::{ArmModel, JointState, Joints};
@@ -46,6 +47,8 @@ const SECANTS: usize = 5;
 const SETTLED: f64 = 1e-4;
 /// Inertia of a link that weighs nothing, as seen by a gear that yields [kg m²].
 const LEAST_INERTIA: f64 = 1e-6;
+/// What a joint resists that dry friction holds, as an inertia [kg m²].
+const HELD: f64 = 1e6;
 
 /// Whether the motor moves against its dry friction.
 #[derive(Clone, Copy, PartialEq)]
@@ -91,6 +94,16 @@ struct Stage<const N: usize> {
     sides: [Side; N],
 }
 
+/// What came through the joints in a step.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Passed {
+    /// Mean torque behind the gears [N m].
+    pub tau_J: Joints,
+    /// What a joint resists a further torque at its link with over such a step, beyond its inertia without a gear that
+    /// yields [kg m²]: friction that grows with the motion, and the rotor behind a spring.
+    pub grip: Joints,
+}
+
 /// Accelerations of links and motors, and the torque behind the gears.
 struct Answer<const N: usize> {
     link: [f64; N],
@@ -100,14 +113,14 @@ struct Answer<const N: usize> {
 
 impl ArmModel {
     /// Moves `link` and `motor` on by `dt` seconds under constant motor torques `tau` and external torques at the links,
-    /// and returns the mean torque behind the gears [N m]. Where the gear is rigid, `motor` follows `link`.
+    /// and returns the mean torque behind the gears. Where the gear is rigid, `motor` follows `link`.
     pub fn step_through(
         &self,
         transmission: &impl Transmission,
         (link, motor): (&mut JointState, &mut JointState),
         (tau, external): (&Joints, &Joints),
         dt: f64,
-    ) -> Joints {
+    ) -> Passed {
         with_dof!(self, N => {
             let sides = |at: &JointState| self.sides::<N>(transmission, (link, motor), at, tau);
             let mut modes = None;
@@ -121,7 +134,8 @@ impl ArmModel {
                 out
             };
             let sides = sides(&middle(motor, &half.motor));
-            let answer = self.stage(&middle(link, &half.link), sides, external, dt).answer(&mut modes);
+            let mut stage = self.stage(&middle(link, &half.link), sides, external, dt);
+            let answer = stage.answer(&mut modes);
             let modes = modes.expect("an answer leaves its pattern");
             for (i, (dry, gear)) in modes.into_iter().enumerate() {
                 let sticks = dry == Dry::Sticks && transmission.creep(i) <= 0.0;
@@ -131,7 +145,8 @@ impl ArmModel {
                     _ => advance(motor, i, answer.motor[i], sticks, dt),
                 }
             }
-            filled(&answer.gear)
+            let grip = std::array::from_fn(|i| stage.sides[i].grip(modes[i], answer.motor[i], dt));
+            Passed { tau_J: filled(&answer.gear), grip: filled::<N>(&grip) }
         })
     }
 
@@ -154,7 +169,8 @@ impl ArmModel {
             // Without a rotor nothing could turn on the motor's side of a spring.
             spring: transmission.spring(i).filter(|_| self.links[i].rotor > 0.0),
         };
-        std::array::from_fn(|i| side(i).creeping_at(at.dq[i]))
+        // At the end of the step, as far as `at` tells: where that is right, the friction is found at once.
+        std::array::from_fn(|i| side(i).creeping_at(2.0 * at.dq[i] - motor.dq[i]))
     }
 
     fn stage<const N: usize>(&self, at: &JointState, sides: [Side; N], external: &Joints, dt: f64) -> Stage<N> {
@@ -304,6 +320,19 @@ impl Side {
                 Some((self.rotor + self.viscosity * dt, self.drive - self.viscosity * self.motor_speed))
             }
             Dry::Sticks => None,
+        }
+    }
+
+    /// [`Passed::grip`] at the end of a step with this acceleration of the motor.
+    fn grip(&self, (dry, gear): (Dry, Gear), motor: f64, dt: f64) -> f64 {
+        let speed = self.motor_speed + dt * motor;
+        let tangent = match dry {
+            Dry::Sticks if self.creep > 0.0 => self.dry / self.creep * (1.0 - (speed / self.creep).tanh().powi(2)),
+            _ => 0.0,
+        };
+        match (dry, gear) {
+            (Dry::Sticks, Gear::Rigid) if self.creep <= 0.0 => HELD,
+            _ => Self { viscosity: tangent, ..*self }.seen_by_link((dry, gear), dt).0,
         }
     }
 

@@ -48,15 +48,19 @@ impl ArmModel {
         })
     }
 
-    /// How the arm yields at `q`. A joint that `springs` says lies behind a gear that yields leaves its rotor behind.
+    /// How the arm yields at `q`. A joint that `springs` says lies behind a gear that yields leaves its rotor behind; `grip`
+    /// is what joints resist besides [kg m²].
     #[must_use]
-    pub fn yielding(&self, q: &Joints, springs: impl Fn(usize) -> bool) -> Yielding {
+    pub fn yielding(&self, q: &Joints, springs: impl Fn(usize) -> bool, grip: &Joints) -> Yielding {
         with_dof!(self, N => {
             let links = first::<N, _>(&self.links);
             let chain = Chain::at(links, first(q));
             let mut mass = chain.mass_matrix(&chain.bodies(links), links);
             for i in (0..N).filter(|i| springs(*i)) {
                 mass[i][i] = (mass[i][i] - links[i].rotor).max(LEAST_INERTIA);
+            }
+            for i in 0..N {
+                mass[i][i] += grip[i];
             }
             factor(&mut mass);
             self.yielding_of(&chain, &mass)
@@ -117,7 +121,7 @@ fn combined(columns: &[Joints; 6], wrench: &Vector6<f64>) -> Joints {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::arm::PointForce;
+    use crate::arm::{PointForce, Spring, Transmission};
 
     fn moving() -> JointState {
         let q = *ArmModel::fr3().ready();
@@ -146,12 +150,64 @@ mod tests {
         let [without, with] = [[0.0; 8], arm.torque_of(&state.q, &load)].map(|tau| arm.accelerations(&state, &tau));
         let moment = lever.cross(&force);
         let wrench = Vector6::new(force.x, force.y, force.z, moment.x, moment.y, moment.z);
-        let yielding = arm.yielding(&state.q, |_| false);
+        let yielding = arm.yielding(&state.q, |_| false, &[0.0; 8]);
         let (joints, torques) = (yielding.joints_under(&wrench), yielding.torques_under(&wrench));
         for i in 0..7 {
             assert!((joints[i] - (with[i] - without[i])).abs() < 1e-9);
             assert!((torques[i] - arm.torque_of(&state.q, &load)[i]).abs() < 1e-12);
         }
         assert!((yielding.flange - yielding.flange.transpose()).amax() < 1e-9, "Maxwell's reciprocity");
+    }
+
+    /// The same dry friction in every joint.
+    struct Dry {
+        bound: f64,
+        creep: f64,
+    }
+
+    impl Transmission for Dry {
+        fn spring(&self, _joint: usize) -> Option<Spring> {
+            None
+        }
+
+        fn dry_friction(&self, _joint: usize, _speed: f64, _motor_torque: f64) -> f64 {
+            self.bound
+        }
+
+        fn creep(&self, _joint: usize) -> f64 {
+            self.creep
+        }
+
+        fn drag(&self, _joint: usize, _q: f64, _dq: f64) -> f64 {
+            0.0
+        }
+    }
+
+    #[test]
+    fn a_small_push_moves_joints_with_friction_as_far_as_their_grip_lets_it() {
+        let arm = ArmModel::fr3();
+        let slow = JointState { q: *arm.ready(), dq: [1e-3, -2e-3, 5e-3, 0.0, -1e-3, 0.3, 4e-3, 0.0] };
+        let still = JointState { dq: [0.0; 8], ..slow };
+        let (gravity, dt) = (arm.gravity(&slow.q), 1e-3);
+        let wrench = Vector6::new(0.05, -0.08, 0.03, 0.0, 0.0, 0.0);
+        for (state, creep) in [(slow, 4e-3), (slow, 1e-4), (still, 0.0)] {
+            let dry = Dry { bound: 0.6, creep };
+            let step = |external: &Joints| {
+                let (mut link, mut motor) = (state, state);
+                let passed = arm.step_through(&dry, (&mut link, &mut motor), (&gravity, external), dt);
+                (link.dq, passed.grip)
+            };
+            let (alone, grip) = step(&[0.0; 8]);
+            let yielding = arm.yielding(&state.q, |_| false, &grip);
+            let (pushed, _) = step(&yielding.torques_under(&wrench));
+            let expected = yielding.joints_under(&wrench);
+            let ideal = arm.yielding(&state.q, |_| false, &[0.0; 8]).joints_under(&wrench);
+            let scale = ideal.iter().fold(0.0_f64, |most, value| most.max(value.abs()));
+            for i in 0..7 {
+                let change = (pushed[i] - alone[i]) / dt;
+                assert!((change - expected[i]).abs() < 0.02 * scale, "creep {creep}: {change} {}", expected[i]);
+            }
+            assert!((0..7).any(|i| (expected[i] - ideal[i]).abs() > 0.1 * scale), "friction makes a difference");
+        }
     }
 }

@@ -74,15 +74,15 @@ impl Plant {
         self.rollout().arm
     }
 
-    /// Whether friction or a gear that yields lies between motors and links.
-    pub(crate) fn acts_in_joints(&self) -> bool {
-        self.hidden.as_ref().is_some_and(|(effects, _)| effects.acts_in_joints())
+    /// Whether motor and link of a joint may part.
+    pub(crate) fn yields_in_joints(&self) -> bool {
+        self.hidden.as_ref().is_some_and(|(effects, _)| effects.yields())
     }
 
-    /// How the arm gives way to a push at `q`.
-    pub(crate) fn yielding(&self, q: &Joints) -> Yielding {
+    /// How the arm gives way to a push at `q`; `grip`: what its joints resist besides ([`crate::arm::Passed::grip`]).
+    pub(crate) fn yielding(&self, q: &Joints, grip: &Joints) -> Yielding {
         let effects = self.hidden.as_ref().map(|(effects, _)| effects);
-        self.arm().yielding(q, |joint| effects.is_some_and(|effects| effects.spring(joint).is_some()))
+        self.arm().yielding(q, |joint| effects.is_some_and(|effects| effects.spring(joint).is_some()), grip)
     }
 
     /// The model inside the controller.

@@ -104,10 +104,10 @@ impl SimArm {
         self.parts == 1 && self.outside == [0.0; MAX_JOINTS]
     }
 
-    /// Parts of a period in which the arm's way may be corrected after the contact: joints that stick or yield do not
-    /// answer to a force as the path takes it, so it must be short for them.
+    /// Parts of a period in which the arm's way may be corrected after the contact: a link on its spring does not answer to
+    /// a force as the path takes it, so it must be short for it.
     pub(super) fn stretches(&self) -> u32 {
-        self.parts * if self.plant.acts_in_joints() { 4 } else { 1 }
+        self.parts * if self.plant.yields_in_joints() { 4 } else { 1 }
     }
 
     /// Moves the arm on by `length` seconds of the period under `drive` as if nothing touched it; the tool's way there,
@@ -119,9 +119,9 @@ impl SimArm {
         let yielding = if let Some(desired) = self.in_one_go(drive) {
             rollout.yielding_period(&mut self.motion, desired)
         } else {
-            let yielding = self.plant.yielding(&self.motion.state.q);
             rollout.advance(&mut self.motion, &self.outside, length);
-            yielding
+            let grip = self.motion.memory.as_ref().map_or([0.0; MAX_JOINTS], |memory| *memory.grip());
+            self.plant.yielding(&self.start.state.q, &grip)
         };
         ToolPath::new(from, self.flange_motion(), length, yielding)
     }
@@ -145,7 +145,7 @@ impl SimArm {
                     *sum -= outside * share;
                 }
                 rollout.advance(&mut self.motion, &both, path.length());
-                if !self.plant.acts_in_joints() {
+                if !self.plant.yields_in_joints() {
                     // The force acted early or late in the stretch, not evenly.
                     for i in 0..MAX_JOINTS {
                         self.motion.state.q[i] += q[i] - 0.5 * path.length() * dq[i];

@@ -16,6 +16,8 @@ pub struct ArmMemory {
     pub(super) motor: JointState,
     /// Torque behind the gears, mean over the last step [N m].
     pub(super) tau_J: Joints,
+    /// What joints resisted a push with in the last step, beyond their inertia [kg m²].
+    pub(super) grip: Joints,
 }
 
 impl Clone for ArmMemory {
@@ -29,7 +31,8 @@ impl Clone for ArmMemory {
         self.q_d.clone_from(&source.q_d);
         self.dq_d.clone_from(&source.dq_d);
         self.torque.clone_from(&source.torque);
-        (self.lagging, self.motor, self.tau_J) = (source.lagging, source.motor, source.tau_J);
+        (self.lagging, self.motor) = (source.lagging, source.motor);
+        (self.tau_J, self.grip) = (source.tau_J, source.grip);
     }
 }
 
@@ -44,6 +47,11 @@ impl ArmMemory {
     /// What a step of the arm changes.
     pub(crate) fn joints(&self) -> JointMemory {
         JointMemory { motor: self.motor, tau_J: self.tau_J }
+    }
+
+    /// [`crate::arm::Passed::grip`] of the last step.
+    pub(crate) fn grip(&self) -> &Joints {
+        &self.grip
     }
 
     /// Takes a step of the arm back.
@@ -69,6 +77,7 @@ impl ArmMemory {
             torque: DelayLine::empty(torque),
             motor: JointState::default(),
             tau_J: Joints::default(),
+            grip: Joints::default(),
         }
     }
 }

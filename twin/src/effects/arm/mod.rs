@@ -176,7 +176,8 @@ impl ArmEffects {
         dt: f64,
     ) {
         if self.acts_in_joints() {
-            memory.tau_J = self.advance_through(&mut memory.motor, arm, state, (motor_torque, external), dt);
+            let passed = self.advance_through(&mut memory.motor, arm, state, (motor_torque, external), dt);
+            (memory.tau_J, memory.grip) = (passed.tau_J, passed.grip);
             return;
         }
         let before = state.dq;

@@ -3,7 +3,7 @@
 //! elasticity and backlash to one spring with play.
 
 use super::ArmEffects;
-use crate::arm::{ArmModel, JointState, Joints, MAX_JOINTS, Spring, Transmission};
+use crate::arm::{ArmModel, JointState, Joints, Passed, Spring, Transmission};
 
 /// Longest step of a gear that yields [s]: a wrist link on its spring rings at up to 200 Hz.
 const LONGEST_STEP: f64 = 2.5e-4;
@@ -21,7 +21,7 @@ impl ArmEffects {
     }
 
     /// Whether motor and link of a joint may be at different positions.
-    pub(super) fn yields(&self) -> bool {
+    pub(crate) fn yields(&self) -> bool {
         self.joint_elasticity.is_some() || self.joint_backlash.is_some()
     }
 
@@ -33,7 +33,7 @@ impl ArmEffects {
         })
     }
 
-    /// [`ArmEffects::advance`] where something acts in the joints; returns the mean torque behind the gears.
+    /// [`ArmEffects::advance`] where something acts in the joints.
     pub(super) fn advance_through(
         &self,
         motor: &mut JointState,
@@ -41,18 +41,19 @@ impl ArmEffects {
         state: &mut JointState,
         torques: (&Joints, &Joints),
         dt: f64,
-    ) -> Joints {
+    ) -> Passed {
         if !self.yields() {
             *motor = *state;
             return arm.step_through(self, (state, motor), torques, dt);
         }
         let steps = (dt / LONGEST_STEP - 1e-9).ceil().max(1.0);
-        let mut mean = [0.0; MAX_JOINTS];
+        let mut whole = Passed::default();
         for _ in 0..steps as usize {
-            let gear = arm.step_through(self, (state, motor), torques, dt / steps);
-            mean = std::array::from_fn(|i| mean[i] + gear[i] / steps);
+            let part = arm.step_through(self, (state, motor), torques, dt / steps);
+            whole.grip = part.grip;
+            whole.tau_J = std::array::from_fn(|i| whole.tau_J[i] + part.tau_J[i] / steps);
         }
-        mean
+        whole
     }
 }
 
