@@ -13,6 +13,8 @@ use twin::rollout::CommandTrack;
 const MOVING_SIGMAS: f64 = 8.0;
 /// The arm is looked at so often from a moment before the hit until the object rests [ns].
 const ARM_EVERY_NS: u64 = 10_000_000;
+/// ... and no longer than this after the tool has let go: what the joints do then tells nothing about the blow [ns].
+const AFTER_RELEASE_NS: u64 = 50_000_000;
 /// That moment: two poses of a 60 Hz tracker [ns].
 const BEFORE_HIT_NS: u64 = 40_000_000;
 
@@ -46,10 +48,11 @@ impl ObjectClip {
         let rest = poses.iter().rposition(away(last)).unwrap_or(0);
         let (onset_ns, rest_ns) = (stamps_ns[onset], stamps_ns[rest]);
         let free_ns = let_go(&recorded, cell, onset, rest).map_or(rest_ns, |row| stamps_ns[row]);
+        let felt_ns = rest_ns.min(free_ns + AFTER_RELEASE_NS);
         let (mut arm_rows, mut arm_ns) = (Vec::new(), Vec::new());
         let mut next_ns = onset_ns.saturating_sub(BEFORE_HIT_NS);
         for (row, &stamp) in recorded.measured.stamps_ns.iter().enumerate() {
-            if stamp >= next_ns && stamp <= rest_ns {
+            if stamp >= next_ns && stamp <= felt_ns {
                 arm_rows.push(row);
                 arm_ns.push(stamp);
                 next_ns = stamp + ARM_EVERY_NS;

@@ -121,6 +121,9 @@ impl ObjectClips {
 
     /// Changes [`Self::model_error`].
     pub fn set_model_error(&mut self, error: ModelError) {
+        if error.joints.is_some() != self.error.joints.is_some() {
+            self.caches.iter_mut().for_each(|cache| *cache = ClipCache::default());
+        }
         self.error = error;
     }
 
@@ -168,7 +171,8 @@ impl ObjectClips {
         }
         let idle = self.workers.lock().expect("no rollout has panicked").pop();
         let mut worker = idle.unwrap_or_else(|| self.worker.clone());
-        let outcome = Job { cell: &self.cell, clip, theta: &theta, own, worker: &mut worker, cache }.run();
+        let joints_ns = if self.error.joints.is_some() { &clip.arm_ns[..] } else { &[] };
+        let outcome = Job { cell: &self.cell, clip, theta: &theta, own, joints_ns, worker: &mut worker, cache }.run();
         self.workers.lock().expect("no rollout has panicked").push(worker);
         Ok(cache.keep_outcome(theta, own, outcome?))
     }

@@ -21,6 +21,8 @@ use twin::scene::ObjectModel;
 
 /// The simulation ends when the object has rested for so many periods and no recorded pose moves any more.
 const REST_PERIODS: usize = 50;
+/// Periods between two looks whether the arm still counts.
+const LOOK_TICKS: u32 = 8;
 
 /// What the twin did in a clip.
 #[derive(Debug, Clone)]
@@ -63,6 +65,8 @@ pub(super) struct Job<'a> {
     pub(super) clip: &'a ObjectClip,
     pub(super) theta: &'a Theta,
     pub(super) own: &'a Values,
+    /// When the joints are asked for [ns].
+    pub(super) joints_ns: &'a [u64],
     pub(super) worker: &'a mut CellRollout,
     pub(super) cache: &'a ClipCache,
 }
@@ -94,20 +98,44 @@ impl Job<'_> {
             self.with_own_friction(object)?;
             self.worker.resume(checkpoint);
             self.leave_behind();
-            let mut rested = 0;
-            let clip = self.clip;
-            while self.worker.now_ns() < clip.end_ns
-                && !(rested > REST_PERIODS
-                    && self.worker.now_ns() > clip.rest_ns
-                    && joints.joints.len() == clip.arm_ns.len())
-            {
-                self.tick(&mut joints);
-                let still = self.keep(&mut path)?;
-                rested = if still { rested + 1 } else { 0 };
-            }
+            self.slide(&mut path, &mut joints)?;
         }
         let joints = joints.joints.iter().map(|reading| reading.state.q).collect();
         Ok(Outcome { object: path, joints, contact_ns: hit.contact_ns, camera })
+    }
+
+    /// From where the tool has let go until the object rests, without the arm from where it no longer counts.
+    fn slide(&mut self, path: &mut Path, joints: &mut CellTrace) -> Result<(), Impossible> {
+        let clip = self.clip;
+        let commands = clip.commands.as_ref().ok_or_else(|| impossible("no commands"))?;
+        // Where commands lead the tool back, the arm stays at least until then.
+        let (mut parted, mut not_before_ns) = (None, 0);
+        let (mut rested, mut ticks) = (0, 0u32);
+        let over = |now_ns, rested| now_ns >= clip.end_ns || (rested > REST_PERIODS && now_ns > clip.rest_ns);
+        while !over(self.worker.now_ns(), rested) {
+            if ticks.is_multiple_of(LOOK_TICKS) {
+                match parted {
+                    None if joints.joints.len() == self.joints_ns.len() && self.worker.now_ns() > not_before_ns => {
+                        parted = self.worker.part(commands).map(|parted| (parted, path.poses.len(), rested));
+                    }
+                    Some((arm, poses, then)) if !self.worker.keeps_apart(arm, commands) => {
+                        not_before_ns = self.worker.now_ns();
+                        self.worker.rejoin();
+                        path.poses.truncate(poses);
+                        (parted, rested) = (None, then);
+                    }
+                    _ => {}
+                }
+            }
+            match parted {
+                None => self.tick(joints),
+                Some(_) => self.worker.tick(None),
+            }
+            let still = self.keep(path)?;
+            rested = if still { rested + 1 } else { 0 };
+            ticks += 1;
+        }
+        Ok(())
     }
 
     /// From the start, or from what is kept, to the moment at which the tool has let go.
@@ -145,7 +173,8 @@ impl Job<'_> {
         let object = ObjectState::at_rest(Pose::from_isometry(*start));
         self.worker.start(measured.stamps_ns[0], Some(&first), Some(&object), Some(commands));
         let mut joints = CellTrace::default();
-        let course = Course { commands: Some(commands), joints_ns: &self.clip.arm_ns, poses_ns: &[] };
+        let end_ns = [self.clip.end_ns];
+        let course = Course { commands: Some(commands), joints_ns: self.joints_ns, poses_ns: &end_ns };
         let contact_ns = self.worker.run_until_contact(&course, &mut joints);
         let checkpoint = contact_ns.map(|_| self.worker.checkpoint());
         self.worker.set_parameters(self.theta).map_err(impossible)?;
@@ -176,7 +205,7 @@ impl Job<'_> {
     }
 
     fn tick(&mut self, joints: &mut CellTrace) {
-        let course = Course { commands: self.clip.commands.as_ref(), joints_ns: &self.clip.arm_ns, poses_ns: &[] };
+        let course = Course { commands: self.clip.commands.as_ref(), joints_ns: self.joints_ns, poses_ns: &[] };
         self.worker.run_until(self.worker.now_ns() + TICK_NS, &course, joints);
     }
 
