@@ -22,7 +22,7 @@ use shared_mem::cell::{ClipEntry, ClipKind};
 use shared_mem::recording::{Clip, Session};
 
 /// Linearisations of the fits that the oracle and the rules rest on.
-const EFFORT: Effort = Effort { iterations: 8, precision: Precision::Joints };
+const EFFORT: Effort = Effort::of(8, Precision::Joints);
 
 /// What the diagnosis and then each of the rules said of a world, the diagnosis first.
 ///

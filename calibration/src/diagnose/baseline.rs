@@ -4,6 +4,7 @@
 //! then the object's parameters under that arm, by the identification's own way over rough hits; then all together.
 
 use super::admit::Admitted;
+use super::arm_alone::ArmAlone;
 use super::evidence::Evidence;
 use super::fit::{Bench, Effort, Hypothesis};
 use super::split::Split;
@@ -14,11 +15,11 @@ use shared_mem::recording::Clip;
 use shared_mem::theta::ObjectTheta;
 
 /// The way there, and the last steps.
-const WAY: Effort = Effort { iterations: 8, precision: Precision::Joints };
-const LAST: Effort = Effort { iterations: 8, precision: Precision::Exact };
+const WAY: Effort = Effort::of(8, Precision::Joints);
+const LAST: Effort = Effort::of(8, Precision::Exact);
 /// Arm and object together: with slopes joint by joint only the arm says what its gains are. An object that strays for a
 /// reason that is not in the twin yet would bend them until the hit lands where it helps.
-const TOGETHER: Effort = Effort { iterations: 8, precision: Precision::Joints };
+const TOGETHER: Effort = Effort::of(8, Precision::Joints);
 
 /// Identifies; `None` when the twin has no answer at the nominal parameters.
 #[must_use]
@@ -29,15 +30,16 @@ pub fn identify<E: Evidence>(
     admitted: &Admitted,
 ) -> Option<Hypothesis> {
     let channels = bench.evidence.channels();
-    let of_arm: Vec<f64> = channels.iter().map(|channel| f64::from(u8::from(channel.joint.is_some()))).collect();
-    let arm = bench.fit((&[], bench.library.start()), &split.train, &of_arm, None, WAY)?;
-    let arm = bench.fit((&[], arm.full.clone()), &split.train, &of_arm, Some(&arm), LAST)?;
+    let even = vec![1.0; channels.len()];
+    let arm = ArmAlone(bench.evidence);
+    let alone = arm.bench(bench);
+    let arm = alone.fit((&[], bench.library.start()), &split.train, &even, None, WAY)?;
+    let arm = alone.fit((&[], arm.full.clone()), &split.train, &even, Some(&arm), LAST)?;
     if !admitted.with_object {
         return Some(arm);
     }
     let full = refined(bench, split, cell, admitted, &arm.full).unwrap_or_else(|| arm.full.clone());
-    let all = vec![1.0; channels.len()];
-    bench.fit((&[], full), &split.train, &all, Some(&arm), TOGETHER)
+    bench.fit((&[], full), &split.train, &even, None, TOGETHER)
 }
 
 /// Numbers with the object's parameters that fit the strokes best under the arm and the effects that are given, by

@@ -102,8 +102,8 @@ pub struct CellClips<'a, F> {
 
 /// The arm's numbers, and its residuals there.
 type Arm = (Vec<f64>, Arc<Vec<f64>>);
-/// Kept for a clip.
-const ARMS: usize = 3;
+/// Kept for a clip: a linearisation turns the numbers of a few effects on joints.
+const ARMS: usize = 16;
 
 impl<'a, F: Fn(&[f64]) -> Theta + Sync> CellClips<'a, F> {
     /// Both on the same clips in the same order.

@@ -1,6 +1,7 @@
 //! Which effects act together: effects are added while that foretells clips better, and dropped or swapped when they are
 //! not needed any more.
 
+use super::arm_alone::ArmAlone;
 use super::closing::closes;
 use super::evidence::{Evidence, Row};
 use super::fit::{Bench, Effort, Hypothesis};
@@ -25,8 +26,9 @@ use twin::effects::Stage;
 /// At most so many effects are named.
 pub const MOST: usize = 4;
 /// Every candidate's fit gets so many linearisations from its signature on; those that come near the best get more.
-const HEAT: Effort = Effort { iterations: 3, precision: Precision::Joints };
-pub(super) const FIRST_PASS: Effort = Effort { iterations: 6, precision: Precision::Joints };
+const HEAT: Effort = Effort::of(3, Precision::Joints);
+const LOOK: Effort = Effort::of(1, Precision::Joints);
+pub(super) const FIRST_PASS: Effort = Effort::of(6, Precision::Joints);
 /// Rivals of the best that are worth this share of it are fitted again, so many of them.
 const RIVAL: f64 = 0.5;
 const TRIED_AGAIN: usize = 2;
@@ -299,19 +301,38 @@ impl Step {
             } else {
                 starts::starts(bench, (&self.from, &self.weights), scored)
             };
-            let heats = starts.into_iter().filter_map(|start| {
-                bench.extend(&self.from, (scored.candidate, start), &split.train, &self.weights, HEAT)
-            });
+            let heats = starts.into_iter().filter_map(|start| self.heat(bench, split, scored.candidate, start));
             fits.extend(heats.min_by(|a, b| a.deviance().total_cmp(&b.deviance())).map(|fit| (place, fit)));
         }
         let best = fits.iter().map(|(_, fit)| fit.deviance()).fold(self.from.deviance(), f64::min);
         let near = best + NEAR.max(NEAR_SHARE * (self.from.deviance() - best));
         for (place, fit) in fits {
-            let more =
-                || bench.fit((&fit.effects, fit.full.clone()), &split.train, &self.weights, Some(&fit), FIRST_PASS);
+            let effort = bench.trying(self.trials[place].scored.candidate, FIRST_PASS);
+            let more = || bench.fit((&fit.effects, fit.full.clone()), &split.train, &self.weights, Some(&fit), effort);
             let nearer = if fit.deviance() < near { more() } else { None };
             self.judge(bench, split, place, nearer.unwrap_or(fit));
         }
+    }
+
+    /// A little of a fit. Where the joints' own channels alone tell the candidate's numbers, they are fitted to the arm alone
+    /// first, and the object is looked at once.
+    fn heat<E: Evidence>(
+        &self,
+        bench: &Bench<'_, E>,
+        split: &Split,
+        candidate: usize,
+        start: Vec<f64>,
+    ) -> Option<Hypothesis> {
+        let effort = bench.trying(candidate, HEAT);
+        let of_joints = bench.library.candidates[candidate].turned.iter().all(|k| bench.library.joints[*k].is_some());
+        if bench.scatter.count() == 0 || !of_joints {
+            return bench.extend(&self.from, (candidate, start), &split.train, &self.weights, effort);
+        }
+        let mut effects = self.from.effects.clone();
+        effects.push(candidate);
+        let arm = ArmAlone(bench.evidence);
+        let alone = arm.bench(bench).fit((&effects, start), &split.train, &self.weights, None, effort)?;
+        bench.extend(&self.from, (candidate, alone.full), &split.train, &self.weights, LOOK)
     }
 
     /// Notes a fit of a trial with what it foretells and closes.
@@ -346,7 +367,8 @@ impl Step {
         rivals.sort_by(|a, b| nats(&self.trials[*b]).total_cmp(&nats(&self.trials[*a])));
         for place in rivals.into_iter().take(TRIED_AGAIN) {
             let Some((fit, _)) = self.trials[place].fitted.clone() else { continue };
-            let from = |full| bench.fit((&fit.effects, full), &split.train, &self.weights, Some(&fit), FIRST_PASS);
+            let effort = bench.trying(self.trials[place].scored.candidate, FIRST_PASS);
+            let from = |full| bench.fit((&fit.effects, full), &split.train, &self.weights, Some(&fit), effort);
             let anew = refined(&fit.full).and_then(from).filter(|anew| anew.deviance() < fit.deviance());
             if let Some(anew) = anew {
                 self.judge(bench, split, place, anew);

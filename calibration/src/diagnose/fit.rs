@@ -11,7 +11,7 @@ use crate::estimate::ClipModel;
 use crate::interrupt::Interrupt;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
-use twin::effects::{EffectInfo, Place, Role};
+use twin::effects::{EffectInfo, Place, Role, Stage};
 
 /// What every step of the diagnosis is given.
 pub struct Bench<'a, E> {
@@ -79,6 +79,17 @@ pub struct Effort {
     pub iterations: usize,
     /// How they are taken.
     pub precision: Precision,
+    /// Whether numbers that the arm alone tells stay where they are: an effect beyond the arm does not change what its joints
+    /// say, and the arm need not be simulated again.
+    pub holds_joints: bool,
+}
+
+impl Effort {
+    /// So many linearisations, taken like this, of all numbers.
+    #[must_use]
+    pub const fn of(iterations: usize, precision: Precision) -> Self {
+        Self { iterations, precision, holds_joints: false }
+    }
 }
 
 /// A fit has converged when a step promises less than this of the deviance: a fiftieth of a nat decides nothing.
@@ -137,7 +148,11 @@ impl<E: Evidence> Bench<'_, E> {
                 break;
             }
             let forms = at.reduced(self.evidence, weights);
-            let Some((to, to_own)) = self.improved(&full, &free, (&at, &forms), weights, &mut damping) else { break };
+            let holds = |k: &usize| effort.holds_joints && self.library.joints[*k].is_some();
+            let held: Vec<bool> = free.iter().map(holds).collect();
+            let Some((to, to_own)) = self.improved(&full, (&free, &held), (&at, &forms), weights, &mut damping) else {
+                break;
+            };
             (full, clips) = (to, to_own);
             at = self.linearise(&full, &free, &clips, effort.precision)?;
         }
@@ -162,7 +177,7 @@ impl<E: Evidence> Bench<'_, E> {
     fn improved(
         &self,
         full: &[f64],
-        free: &[usize],
+        (free, held): (&[usize], &[bool]),
         (at, forms): (&Swept, &[Reduced]),
         weights: &[f64],
         damping: &mut f64,
@@ -172,7 +187,7 @@ impl<E: Evidence> Bench<'_, E> {
         let kept: Vec<(usize, Vec<f64>)> = at.clips.iter().map(|clip| (clip.clip, clip.own.clone())).collect();
         let now = self.cost(full, &kept, weights)?;
         for _ in 0..TRIALS {
-            let step = self.bounded_step(full, free, &sum, *damping);
+            let step = self.bounded_step(full, (free, held), &sum, *damping);
             let promised = sum[(0, 0)] - quadratic::value(&sum, &(1..size).collect::<Vec<_>>(), step.as_slice());
             let mut to = full.to_vec();
             free.iter().zip(step.iter()).for_each(|(k, step)| to[*k] += step);
@@ -194,8 +209,14 @@ impl<E: Evidence> Bench<'_, E> {
         None
     }
 
-    /// A damped step that keeps numbers at a bound there when they are pushed against it.
-    fn bounded_step(&self, full: &[f64], free: &[usize], sum: &DMatrix<f64>, damping: f64) -> DVector<f64> {
+    /// A damped step that keeps numbers at a bound there when they are pushed against it, and those that are `held`.
+    fn bounded_step(
+        &self,
+        full: &[f64],
+        (free, held): (&[usize], &[bool]),
+        sum: &DMatrix<f64>,
+        damping: f64,
+    ) -> DVector<f64> {
         let mut form = sum.clone();
         for k in 1..form.ncols() {
             form[(k, k)] *= 1.0 + damping;
@@ -205,7 +226,7 @@ impl<E: Evidence> Bench<'_, E> {
             (unknown.lower - full[free[i]], unknown.upper - full[free[i]])
         };
         let mut step = DVector::zeros(free.len());
-        let mut held = vec![false; free.len()];
+        let mut held = held.to_vec();
         loop {
             let moving: Vec<usize> = (0..free.len()).filter(|i| !held[*i]).collect();
             // What is held at a bound pulls on the others: its share of the slope moves into the constant column.
@@ -251,6 +272,13 @@ impl<E: Evidence> Bench<'_, E> {
         let nothing = vec![0.0; self.scatter.count()];
         let clips: Vec<_> = from.fitted.iter().map(|fitted| (fitted.clip, nothing.clone())).collect();
         self.cost(full, &clips, weights)
+    }
+
+    /// The effort of a trial of a candidate: one beyond the arm leaves the joints' numbers alone.
+    #[must_use]
+    pub fn trying(&self, candidate: usize, effort: Effort) -> Effort {
+        let stage = self.library.candidates[candidate].effect.stage;
+        Effort { holds_joints: stage != Stage::Control, ..effort }
     }
 
     /// Adds a candidate to a hypothesis and fits both from `full` on.

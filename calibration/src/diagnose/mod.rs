@@ -9,7 +9,7 @@
 //! | [`admit`] | can the clips be diagnosed at all |
 //! | [`length`] | how much of long clips counts |
 //! | [`split`] | which clips are for what |
-//! | [`evidence`], [`arm_clips`], [`cell_clips`] | what is measured against the twin, and where in a clip |
+//! | [`evidence`], [`arm_clips`], [`cell_clips`], [`arm_alone`] | what is measured against the twin, and where in a clip |
 //! | [`scatter`] | what every clip has of its own |
 //! | [`library`] | the candidates as numbers |
 //! | [`baseline`] | the paper's parameters identified |
@@ -32,6 +32,7 @@
 pub mod admit;
 pub mod advice;
 pub mod answer;
+pub mod arm_alone;
 pub mod arm_clips;
 pub mod baseline;
 pub mod cell_clips;

@@ -9,7 +9,7 @@ use super::split::Split;
 use super::sweep::Precision;
 
 /// The winner gets so many linearisations more.
-const LAST_PASS: Effort = Effort { iterations: 6, precision: Precision::Exact };
+const LAST_PASS: Effort = Effort::of(6, Precision::Exact);
 
 /// A fit to the end, from where it is and from elsewhere: an effect frees the object's parameters from what they stood in
 /// for, so they are found anew under it, and under the other way in which it could act where there are two.

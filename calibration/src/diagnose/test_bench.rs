@@ -13,7 +13,7 @@ use shared_mem::theta::Theta;
 use std::path::Path;
 
 /// One linearisation.
-pub(super) const ONCE: Effort = Effort { iterations: 1, precision: Precision::Joints };
+pub(super) const ONCE: Effort = Effort::of(1, Precision::Joints);
 
 /// The parameters of the library's numbers.
 type Parameters<'a> = &'a (dyn Fn(&[f64]) -> Theta + Sync);
