@@ -29,9 +29,6 @@ pub const MOST: usize = 4;
 const HEAT: Effort = Effort::of(3, Precision::Joints);
 const LOOK: Effort = Effort::of(1, Precision::Joints);
 pub(super) const FIRST_PASS: Effort = Effort::of(6, Precision::Joints);
-/// Rivals of the best that are worth this share of it are fitted again, so many of them.
-const RIVAL: f64 = 0.5;
-const TRIED_AGAIN: usize = 2;
 /// Near is this far from the best deviance, or this share of what the best gains.
 const NEAR: f64 = 40.0;
 const NEAR_SHARE: f64 = 0.4;
@@ -43,7 +40,7 @@ const WORTHWHILE: f64 = 0.0025;
 pub const CLOSES: f64 = 0.1;
 /// ... unless it closes so much of the gap and foretells so many of the clips better that one which it foretells worse does
 /// not matter: 11 of 12 clips do not agree by chance (p = 0.003).
-const PLAIN: f64 = 0.3;
+pub(super) const PLAIN: f64 = 0.3;
 pub(super) const NEARLY_ALL: f64 = 0.85;
 /// An advantage of so many of its errors is no chance.
 const CLEAR: f64 = 3.5;
@@ -73,6 +70,11 @@ impl Trial {
     #[must_use]
     pub fn is_cause(&self) -> bool {
         self.closes > CLOSES
+    }
+
+    /// What it is worth as fitted [nats]; 0 where it was not.
+    pub(super) fn nats(&self) -> f64 {
+        self.fitted.as_ref().map_or(0.0, |(_, advantage)| advantage.nats)
     }
 
     /// Whether another does the same with fewer numbers: what is better about this one is no more than engines differ by.
@@ -162,7 +164,8 @@ pub fn search<E: Evidence>(
     let mut steps: Vec<Step> = Vec::new();
     let mut now = baseline;
     loop {
-        let step = step(bench, split, &now, steps.first().map(|first| &first.left), bar)?;
+        let mut step = step(bench, split, &now, steps.first().map(|first| &first.left), bar)?;
+        step.reconsider(bench, split, refined);
         let best = step.best(bench).map(|(_, fit, _)| fit.clone());
         now = step.from.clone();
         let weights = step.weights.clone();
@@ -336,43 +339,11 @@ impl Step {
     }
 
     /// Notes a fit of a trial with what it foretells and closes.
-    fn judge<E: Evidence>(&mut self, bench: &Bench<'_, E>, split: &Split, place: usize, fit: Hypothesis) {
+    pub(super) fn judge<E: Evidence>(&mut self, bench: &Bench<'_, E>, split: &Split, place: usize, fit: Hypothesis) {
         if let Some(ahead) = foretell(bench, &fit, &split.choose, &self.weights) {
             let closes = closes(bench, split, &self.whole, [&self.from, &fit]);
             let trial = &mut self.trials[place];
             (trial.closes, trial.fitted) = (closes, Some((fit, ahead.over(&self.foretold))));
-        }
-    }
-
-    /// Compares the best trial, fitted to the end, with its nearest rivals once more, each with the object found anew under
-    /// it: with an object that stands in for part of an effect a fit ends somewhere else than with the right one.
-    fn try_again<E: Evidence>(
-        &mut self,
-        bench: &Bench<'_, E>,
-        split: &Split,
-        best: &Hypothesis,
-        refined: &impl Fn(&[f64]) -> Option<Vec<f64>>,
-    ) {
-        let added = best.effects.last().and_then(|c| self.trials.iter().position(|t| t.scored.candidate == *c));
-        let Some(added) = added.filter(|place| self.trials[*place].own_numbers) else { return };
-        let of_arm = |trial: &Trial| bench.library.candidates[trial.scored.candidate].effect.stage == Stage::Control;
-        if of_arm(&self.trials[added]) {
-            return;
-        }
-        self.judge(bench, split, added, best.clone());
-        let nats = |trial: &Trial| trial.fitted.as_ref().map_or(0.0, |(_, advantage)| advantage.nats);
-        let least = RIVAL * nats(&self.trials[added]);
-        let near = |k: &usize| *k != added && nats(&self.trials[*k]) > least && !of_arm(&self.trials[*k]);
-        let mut rivals: Vec<usize> = (0..self.trials.len()).filter(near).collect();
-        rivals.sort_by(|a, b| nats(&self.trials[*b]).total_cmp(&nats(&self.trials[*a])));
-        for place in rivals.into_iter().take(TRIED_AGAIN) {
-            let Some((fit, _)) = self.trials[place].fitted.clone() else { continue };
-            let effort = bench.trying(self.trials[place].scored.candidate, FIRST_PASS);
-            let from = |full| bench.fit((&fit.effects, full), &split.train, &self.weights, Some(&fit), effort);
-            let anew = refined(&fit.full).and_then(from).filter(|anew| anew.deviance() < fit.deviance());
-            if let Some(anew) = anew {
-                self.judge(bench, split, place, anew);
-            }
         }
     }
 

@@ -21,7 +21,7 @@
 //! | [`score`] | how well they foretell clips |
 //! | [`straying`] | how far clips stray under one of them |
 //! | [`closing`] | how much of the gap they close |
-//! | [`combine`], [`settle`] | which effects act together |
+//! | [`combine`], [`again`], [`settle`] | which effects act together |
 //! | [`flat`] | which of their numbers nothing depends on |
 //! | [`leftovers`], [`drift`] | what they leave |
 //! | [`gap`], [`localise`] | how large the gap is, and where |
@@ -31,6 +31,7 @@
 
 pub mod admit;
 pub mod advice;
+pub mod again;
 pub mod answer;
 pub mod arm_alone;
 pub mod arm_clips;

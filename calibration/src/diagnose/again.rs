@@ -1,0 +1,71 @@
+//! Trials that are fitted once more with the object found anew: its parameters were identified without the effect, and
+//! stand in for a part of it.
+
+use super::combine::{FIRST_PASS, LEAST, PLAIN, Step, Trial};
+use super::evidence::Evidence;
+use super::fit::{Bench, Hypothesis};
+use super::split::Split;
+use twin::effects::Stage;
+
+/// Rivals of the best that are worth this share of it are fitted again.
+const RIVAL: f64 = 0.5;
+/// So many trials of a step are.
+const TRIED_AGAIN: usize = 2;
+
+impl Step {
+    /// Compares the best trial, fitted to the end, with its nearest rivals once more, each with the object found anew under
+    /// it: with an object that stands in for part of an effect a fit ends somewhere else than with the right one.
+    pub(super) fn try_again<E: Evidence>(
+        &mut self,
+        bench: &Bench<'_, E>,
+        split: &Split,
+        best: &Hypothesis,
+        refined: &impl Fn(&[f64]) -> Option<Vec<f64>>,
+    ) {
+        let added = best.effects.last().and_then(|c| self.trials.iter().position(|t| t.scored.candidate == *c));
+        let Some(added) = added.filter(|place| self.trials[*place].own_numbers) else { return };
+        let of_arm = |trial: &Trial| bench.library.candidates[trial.scored.candidate].effect.stage == Stage::Control;
+        if of_arm(&self.trials[added]) {
+            return;
+        }
+        self.judge(bench, split, added, best.clone());
+        let least = RIVAL * self.trials[added].nats();
+        self.with_object_anew(bench, split, |k, trial| k != added && trial.nats() > least, refined);
+    }
+
+    /// Where no trial is worth it, those that close much of the gap are given the object anew before they are given up: what
+    /// stands in for a part of them makes them uncertain.
+    pub(super) fn reconsider<E: Evidence>(
+        &mut self,
+        bench: &Bench<'_, E>,
+        split: &Split,
+        refined: &impl Fn(&[f64]) -> Option<Vec<f64>>,
+    ) {
+        if self.best(bench).is_none() && bench.scatter.count() > 0 {
+            self.with_object_anew(bench, split, |_, trial| trial.nats() > LEAST && trial.closes > PLAIN, refined);
+        }
+    }
+
+    /// Fits the best of the trials beyond the arm that are `wanted` again, with the object found anew under each.
+    fn with_object_anew<E: Evidence>(
+        &mut self,
+        bench: &Bench<'_, E>,
+        split: &Split,
+        wanted: impl Fn(usize, &Trial) -> bool,
+        refined: &impl Fn(&[f64]) -> Option<Vec<f64>>,
+    ) {
+        let of_arm = |trial: &Trial| bench.library.candidates[trial.scored.candidate].effect.stage == Stage::Control;
+        let asked = |k: &usize| !of_arm(&self.trials[*k]) && wanted(*k, &self.trials[*k]);
+        let mut places: Vec<usize> = (0..self.trials.len()).filter(asked).collect();
+        places.sort_by(|a, b| self.trials[*b].nats().total_cmp(&self.trials[*a].nats()));
+        for place in places.into_iter().take(TRIED_AGAIN) {
+            let Some((fit, _)) = self.trials[place].fitted.clone() else { continue };
+            let effort = bench.trying(self.trials[place].scored.candidate, FIRST_PASS);
+            let from = |full| bench.fit((&fit.effects, full), &split.train, &self.weights, Some(&fit), effort);
+            let anew = refined(&fit.full).and_then(from).filter(|anew| anew.deviance() < fit.deviance());
+            if let Some(anew) = anew {
+                self.judge(bench, split, place, anew);
+            }
+        }
+    }
+}
