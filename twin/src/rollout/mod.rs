@@ -17,7 +17,7 @@
 //! | `arm` | [`ArmRollout`] over a whole clip |
 //! | `start` | the state an arm was in when its recording begins |
 //! | `cell` | [`CellRollout`] |
-//! | `parted` | a slide without the arm that is clear of it |
+//! | `parted` | [`Parted`]: a slide without the arm, which is clear of it |
 //! | `trace` | what a rollout is asked for and what it answers |
 //! | `workers` | [`Workers`]: many jobs on all cores |
 

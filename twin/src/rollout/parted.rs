@@ -22,7 +22,8 @@ impl CellRollout {
     pub fn part(&mut self, commands: &CommandTrack) -> Option<Parted> {
         let gap = self.cell().gap_at(&self.cell().q());
         let commanded = self.least_commanded_gap(commands);
-        let slack = 2.0 * (commanded - gap).abs();
+        // A cell without a tool has no gap that ever closes.
+        let slack = if gap.is_finite() { 2.0 * (commanded - gap).abs() } else { 0.0 };
         if gap.min(commanded) <= CLEAR + slack {
             return None;
         }
