@@ -265,7 +265,7 @@ const LOWEST_LIMIT: f64 = 0.25;
 
 /// Forms that no clip shows well enough to be worth their numbers: they keep the registry's default, or what an alternative
 /// says.
-const KEPT: [&str; 2] = ["creep", CARRIED];
+const KEPT: [&str; 3] = ["creep", "fading", CARRIED];
 
 /// The step of a probe as a share of what is met in practice.
 const PROBE_SHARE: f64 = 0.1;
@@ -293,6 +293,8 @@ fn alternatives(
         "stribeck_sliding_friction" => [0.05, 0.1, 0.2].map(|v| with(set("velocity", v))).to_vec(),
         // About the base, or about the middle of a table in front of it.
         "camera_scale" => [0.0, 0.5].map(|x| with(vec![(index("centre")[0], x)])).to_vec(),
+        // At rest as in motion, and none at rest.
+        "joint_friction_asymmetry" => [0.0, 0.01].map(|fading| with(set("fading", fading))).to_vec(),
         // Rigid flanks, and such as yield like the gears of an arm.
         "joint_backlash" => [1e-7, 4e-5].map(|compliance| with(set("compliance", compliance))).to_vec(),
         // An object that pivots about feet, and one that pivots about its corners.

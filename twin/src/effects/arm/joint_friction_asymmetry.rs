@@ -1,9 +1,11 @@
 //! Friction of a joint that differs between the two directions.
 //!
 //! - Equation: `tau_f = offset`, whatever the direction: with Coulomb friction beside it, `coulomb + offset` one way and
-//!   `coulomb - offset` the other.
-//! - Source: the friction offset of Gaz et al. 2019, equation of the Panda's joint friction.
-//! - Unit: N m at the joint, before the torque sensor. Plausible: -1 to 1 (Panda -0.3 to 0.3).
+//!   `coulomb - offset` the other. With `fading` above 0 it is `offset |tanh(dq / fading)|`: a difference between two
+//!   frictions is none where the joint rests.
+//! - Source: the friction offset of Gaz et al. 2019, equation of the Panda's joint friction; friction levels of their own
+//!   for each direction: Armstrong-Helouvry, Dupont, Canudas de Wit 1994, section 2.
+//! - Units: offset N m at the joint, before the torque sensor; fading rad/s. Plausible: offset -1 to 1 (Panda -0.3 to 0.3).
 //! - Signature (C5): even in velocity, flat over speed and over pose.
 //! - Confused with: payload and base tilt (even as well, but follow the pose), torque sensor bias (leaves the motion alone).
 
@@ -14,16 +16,29 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     name: "joint_friction_asymmetry",
     stage: Stage::Control,
     acts_on: Place::Joint,
-    parameters: &[Parameter::size("offset", "N m", [-1.0, 1.0], 0.0).per_joint()],
+    parameters: &[
+        Parameter::size("offset", "N m", [-1.0, 1.0], 0.0).per_joint(),
+        Parameter::form("fading", "rad/s", [0.0, 0.05], 0.0).within(0.0, f64::MAX),
+    ],
     confusable_with: &["payload", "base_tilt", "torque_sensor_bias"],
     install: |values, effects| {
-        effects.arm.joint_friction_asymmetry = Some(JointFrictionAsymmetry { offset: values.joints("offset") });
+        effects.arm.joint_friction_asymmetry =
+            Some(JointFrictionAsymmetry { offset: values.joints("offset"), fading: values.number("fading") });
     },
 };
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(in crate::effects) struct JointFrictionAsymmetry {
-    pub(super) offset: Joints,
+    offset: Joints,
+    fading: f64,
+}
+
+impl JointFrictionAsymmetry {
+    /// Torque that a joint's motor loses at a speed [N m].
+    pub(super) fn torque(&self, joint: usize, dq: f64) -> f64 {
+        let share = if self.fading > 0.0 { (dq / self.fading).tanh().abs() } else { 1.0 };
+        self.offset[joint] * share
+    }
 }
 
 #[cfg(test)]
@@ -40,5 +55,16 @@ mod tests {
         let torque = |dq: f64| slowed(dq) * (ROTOR + 0.07) / 0.05;
         assert!((torque(1.0) - 0.4).abs() < 1e-9, "{}", torque(1.0));
         assert!((torque(-1.0) - 0.2).abs() < 1e-9, "{}", torque(-1.0));
+    }
+
+    #[test]
+    fn a_difference_that_fades_is_none_at_rest_and_all_of_it_in_motion() {
+        let effects = effects("[[effect]]\nname = \"joint_friction_asymmetry\"\noffset = 0.1\nfading = 0.01\n");
+        let rested = run(&joint(0.07), &effects, turning(0.0), 100, |_, _| 0.0)[100];
+        assert_eq!((rested.q[0], rested.dq[0]), (0.0, 0.0), "it moves by itself");
+        let lost = |dq: f64| (dq - run(&joint(0.07), &effects, turning(dq), 50, |_, _| 0.0)[50].dq[0]) / 0.05;
+        for dq in [1.0, -1.0] {
+            assert!((lost(dq) * (ROTOR + 0.07) - 0.1).abs() < 1e-9, "{}", lost(dq));
+        }
     }
 }

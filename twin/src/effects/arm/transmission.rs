@@ -81,7 +81,7 @@ impl Transmission for ArmEffects {
 
     fn drag(&self, joint: usize, q: f64, dq: f64) -> f64 {
         self.joint_viscous_friction.map_or(0.0, |effect| effect.viscous[joint] * dq)
-            + self.joint_friction_asymmetry.map_or(0.0, |effect| effect.offset[joint])
+            + self.joint_friction_asymmetry.map_or(0.0, |effect| effect.torque(joint, dq))
             + self.torque_ripple.map_or(0.0, |effect| effect.torque(joint, q))
     }
 }
