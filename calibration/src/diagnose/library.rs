@@ -265,7 +265,7 @@ const LOWEST_LIMIT: f64 = 0.25;
 
 /// Forms that no clip shows well enough to be worth their numbers: they keep the registry's default, or what an alternative
 /// says.
-const KEPT: [&str; 3] = ["creep", "fading", CARRIED];
+const KEPT: [&str; 2] = ["creep", CARRIED];
 
 /// The step of a probe as a share of what is met in practice.
 const PROBE_SHARE: f64 = 0.1;
