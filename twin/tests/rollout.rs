@@ -2,10 +2,9 @@
 
 mod stroke;
 
-use shared_mem::recording::JointSeries;
 use shared_mem::theta::{ObjectTheta, Theta};
 use stroke::{Stroke, theta};
-use twin::rollout::{CellTrace, CommandTrack, ObjectState, Workers};
+use twin::rollout::{CellTrace, ObjectState, Workers};
 
 const EFFECTS: &str = r#"
 [[effect]]
@@ -202,51 +201,5 @@ fn who_asks_for_poses_alone_gets_the_same_ones_sooner() {
         worker.run(&twin::rollout::Course { joints_ns: &[], ..stroke.course() }, &mut poses);
         assert!(poses.poses == whole.poses && poses.contact == whole.contact);
         assert!(worker.now_ns() + 300_000_000 < whole_end, "{} {whole_end}", worker.now_ns());
-    }
-}
-
-#[test]
-fn an_object_slides_on_alike_without_the_arm_that_let_it_go() {
-    const LOOKS: usize = 12;
-    let stroke = Stroke::new();
-    let slippery = "[object]\nfriction = 0.06\n";
-    for text in [slippery.to_owned(), format!("{slippery}{EFFECTS}")] {
-        let mut worker = stroke.worker(Some(&theta(&text)));
-        stroke.start(&mut worker);
-        worker.run_until_contact(&stroke.course(), &mut CellTrace::default()).expect("a hit");
-        assert_eq!(worker.part(&stroke.commands), None, "the tool is at the object");
-        let touching = worker.reading().state.q;
-        let lasts = |worker: &mut twin::rollout::CellRollout, parted| {
-            (0..LOOKS).all(|_| {
-                (0..8).for_each(|_| worker.tick(None));
-                worker.keeps_apart(parted, &stroke.commands)
-            })
-        };
-        let parted = loop {
-            worker.tick(Some(&stroke.commands));
-            let Some(parted) = worker.part(&stroke.commands) else { continue };
-            let lasts = lasts(&mut worker, parted);
-            worker.rejoin();
-            if lasts {
-                break worker.part(&stroke.commands).expect("as before");
-            }
-        };
-        let (then_ns, then) = (worker.now_ns(), worker.object());
-        let slide = |worker: &mut twin::rollout::CellRollout, commands| {
-            let periods = 0..8 * LOOKS;
-            periods.map(|_| (worker.tick(commands), worker.object().expect("a box")).1).collect::<Vec<_>>()
-        };
-        let alone = slide(&mut worker, None);
-        worker.rejoin();
-        assert_eq!((worker.now_ns(), worker.object()), (then_ns, then));
-        let together = slide(&mut worker, Some(&stroke.commands));
-        assert!(alone == together, "other bits");
-        assert!(together[0].pose != together[8 * LOOKS - 1].pose, "it slid");
-        // Commands that bring the tool back to where it hit, and the object still there.
-        let mut back = JointSeries { dof: 7, ..JointSeries::default() };
-        back.stamps_ns.push(stroke.joints_ns[0]);
-        back.q.extend_from_slice(&touching[..7]);
-        worker.put_object(&stroke.object);
-        assert!(!worker.keeps_apart(parted, &CommandTrack::new(&back).expect("a row")));
     }
 }

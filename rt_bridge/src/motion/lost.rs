@@ -18,12 +18,14 @@ pub(super) fn in_force(sent: &Trace, before: &Trace, in_force: &Joints, periods:
         return None;
     }
     let off = |trace: &Trace| trace.q.iter().zip(in_force).map(|(q, told)| (q - told).abs()).fold(0.0, f64::max);
-    if off(sent) <= ROUNDING {
-        return None;
-    }
     let taken = (1..periods).fold(*sent, |trace, _| trace.onward(period_s));
     let lost = (0..periods).fold(*before, |trace, _| trace.onward(period_s));
     let likelier = if off(&taken) <= ROUNDING { taken } else { lost };
+    if off(sent) <= ROUNDING {
+        // All is well, or the robot waits; unless it turned round meanwhile and is on its way back through the same place.
+        let apart = likelier.v.iter().zip(&sent.v).map(|(a, b)| (a - b).abs() * period_s).fold(0.0, f64::max);
+        return (off(&likelier) <= ROUNDING && apart > ROUNDING).then_some(likelier);
+    }
     (off(&likelier) <= ECHO).then_some(likelier)
 }
 
@@ -52,6 +54,18 @@ mod tests {
         assert_eq!(in_force(&sent, &before, &echo(&sent), 3, T), None, "a robot that waits");
         assert_eq!(in_force(&sent, &before, &[0.0; MAX_JOINTS], 1, T), None, "a robot that says nothing");
         assert_eq!(in_force(&sent, &before, &echo(&sent), 40, T), None);
+    }
+
+    #[test]
+    fn a_robot_that_turned_round_in_the_place_where_it_was_sent_is_not_where_it_should_be() {
+        // Ten periods on, constant deceleration brings it back to where it was after the first.
+        let mut before = Trace::at_rest([1.0; MAX_JOINTS]);
+        (before.v, before.a) = ([0.012; MAX_JOINTS], [-2.0; MAX_JOINTS]);
+        let sent = before.onward(T);
+        let back = (0..10).fold(before, |trace, _| trace.onward(T));
+        assert!((sent.q[0] - back.q[0]).abs() < ROUNDING && sent.v[0] > 0.0 && back.v[0] < 0.0, "{sent:?} {back:?}");
+        let found = in_force(&sent, &before, &echo(&back), 10, T).expect("it went on");
+        assert!((found.v[0] - back.v[0]).abs() < 1e-9);
     }
 
     #[test]

@@ -16,7 +16,7 @@ use shared_mem::theta::Theta;
 pub struct CellRollout {
     cell: SimCell,
     camera: CameraMemory,
-    /// Of the tick before a touch, while that is looked for; of the moment at which the arm was taken out.
+    /// Of the tick before a touch, while that is looked for.
     before: Checkpoint,
 }
 
@@ -143,19 +143,6 @@ impl CellRollout {
         self.advance(course, out, Until::Contact).then(|| self.now_ns())
     }
 
-    /// Takes the arm out, to be brought back by [`CellRollout::rejoin`].
-    pub(super) fn part_arm(&mut self) {
-        self.cell.state_into(&mut self.before.cell);
-        self.before.camera = self.camera;
-        self.cell.remove_arm();
-    }
-
-    /// Goes back to the moment at which the arm was last taken out ([`CellRollout::part`]), with the arm.
-    pub fn rejoin(&mut self) {
-        self.cell.resume(&self.before.cell);
-        self.camera = self.before.camera;
-    }
-
     /// Lets one control period pass, for callers that look at every tick themselves.
     pub fn tick(&mut self, commands: Option<&CommandTrack>) {
         let drive = match commands {
@@ -215,9 +202,6 @@ impl CellRollout {
     fn stays(&self, commands: Option<&CommandTrack>, until_ns: u64) -> bool {
         if !self.cell.object_rests() {
             return false;
-        }
-        if !self.cell.arm_takes_part() {
-            return true;
         }
         let q = self.cell.q();
         let Some(commands) = commands else { return self.cell.gap_at(&q) > CLEAR };
@@ -301,7 +285,7 @@ impl CellRollout {
 }
 
 /// A tool that stays so far from an object [m], and twice its tracking error more, does not touch it.
-pub(super) const CLEAR: f64 = 0.02;
+const CLEAR: f64 = 0.02;
 /// Ticks between two looks whether all is over, and time between two places of the tool that are looked at [ns].
 const LOOK_TICKS: u64 = 32;
 const LOOK_NS: u64 = 8_000_000;

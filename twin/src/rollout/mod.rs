@@ -17,7 +17,6 @@
 //! | `arm` | [`ArmRollout`] over a whole clip |
 //! | `start` | the state an arm was in when its recording begins |
 //! | `cell` | [`CellRollout`] |
-//! | `parted` | [`Parted`]: a slide without the arm, which is clear of it |
 //! | `trace` | what a rollout is asked for and what it answers |
 //! | `workers` | [`Workers`]: many jobs on all cores |
 
@@ -25,7 +24,6 @@ mod arm;
 mod cell;
 mod commands;
 mod motion;
-mod parted;
 mod plant;
 mod start;
 mod trace;
@@ -36,7 +34,6 @@ pub use cell::{CellRollout, Checkpoint};
 pub use commands::{CommandTrack, Hole};
 pub(crate) use motion::ArmMotion;
 pub use motion::{Drive, Reading};
-pub use parted::Parted;
 pub use plant::Plant;
 pub use trace::{CellTrace, ContactSpan, Course, ObjectState};
 pub use workers::Workers;

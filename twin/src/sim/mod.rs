@@ -309,18 +309,13 @@ impl SimCell {
         self.object.as_ref().filter(|_| self.takes_part.object).is_none_or(TableObject::rests)
     }
 
-    /// Whether there is an arm that takes part.
-    #[must_use]
-    pub fn arm_takes_part(&self) -> bool {
-        self.arm.is_some() && self.takes_part.arm
-    }
-
-    /// Gap between tool and object if the arm were at `q` [m], whether it takes part or not; without bound where the
-    /// object takes none.
+    /// Gap between tool and object if the arm were at `q` [m]; without bound where one of them takes no part.
     #[must_use]
     pub fn gap_at(&self, q: &Joints) -> f64 {
         match (&self.arm, &self.object) {
-            (Some(arm), Some(object)) if self.takes_part.object => self.contact.gap_at(arm, q, object),
+            (Some(arm), Some(object)) if self.takes_part.arm && self.takes_part.object => {
+                self.contact.gap_at(arm, q, object)
+            }
             _ => f64::INFINITY,
         }
     }
