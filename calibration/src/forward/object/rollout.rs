@@ -21,8 +21,6 @@ use twin::scene::ObjectModel;
 
 /// The simulation ends when the object has rested for so many periods and no recorded pose moves any more.
 const REST_PERIODS: usize = 50;
-/// Periods between two looks whether the arm still counts.
-const LOOK_TICKS: u32 = 8;
 
 /// What the twin did in a clip.
 #[derive(Debug, Clone)]
@@ -98,44 +96,16 @@ impl Job<'_> {
             self.with_own_friction(object)?;
             self.worker.resume(checkpoint);
             self.leave_behind();
-            self.slide(&mut path, &mut joints)?;
+            let (clip, mut rested) = (self.clip, 0);
+            while self.worker.now_ns() < clip.end_ns && !(rested > REST_PERIODS && self.worker.now_ns() > clip.rest_ns)
+            {
+                self.tick(&mut joints);
+                let still = self.keep(&mut path)?;
+                rested = if still { rested + 1 } else { 0 };
+            }
         }
         let joints = joints.joints.iter().map(|reading| reading.state.q).collect();
         Ok(Outcome { object: path, joints, contact_ns: hit.contact_ns, camera })
-    }
-
-    /// From where the tool has let go until the object rests, without the arm from where it no longer counts.
-    fn slide(&mut self, path: &mut Path, joints: &mut CellTrace) -> Result<(), Impossible> {
-        let clip = self.clip;
-        let commands = clip.commands.as_ref().ok_or_else(|| impossible("no commands"))?;
-        // Where commands lead the tool back, the arm stays at least until then.
-        let (mut parted, mut not_before_ns) = (None, 0);
-        let (mut rested, mut ticks) = (0, 0u32);
-        let over = |now_ns, rested| now_ns >= clip.end_ns || (rested > REST_PERIODS && now_ns > clip.rest_ns);
-        while !over(self.worker.now_ns(), rested) {
-            if ticks.is_multiple_of(LOOK_TICKS) {
-                match parted {
-                    None if joints.joints.len() == self.joints_ns.len() && self.worker.now_ns() > not_before_ns => {
-                        parted = self.worker.part(commands).map(|parted| (parted, path.poses.len(), rested));
-                    }
-                    Some((arm, poses, then)) if !self.worker.keeps_apart(arm, commands) => {
-                        not_before_ns = self.worker.now_ns();
-                        self.worker.rejoin();
-                        path.poses.truncate(poses);
-                        (parted, rested) = (None, then);
-                    }
-                    _ => {}
-                }
-            }
-            match parted {
-                None => self.tick(joints),
-                Some(_) => self.worker.tick(None),
-            }
-            let still = self.keep(path)?;
-            rested = if still { rested + 1 } else { 0 };
-            ticks += 1;
-        }
-        Ok(())
     }
 
     /// From the start, or from what is kept, to the moment at which the tool has let go.
