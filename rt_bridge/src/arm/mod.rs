@@ -58,6 +58,12 @@ pub trait Arm: Send {
     /// Who says when a cycle begins.
     fn clock(&self) -> Clock;
 
+    /// Whether the arm goes on with its last acceleration in a period for which no position command came; `false` for one
+    /// that waits where it was told to be.
+    fn extrapolates(&self) -> bool {
+        false
+    }
+
     /// Makes the arm follow commands of `interface`. Called by the control thread before its first cycle and after
     /// [`Arm::recover`]; may block and allocate.
     ///

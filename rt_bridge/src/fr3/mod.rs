@@ -75,6 +75,10 @@ impl Arm for Fr3 {
         Clock::Device
     }
 
+    fn extrapolates(&self) -> bool {
+        true
+    }
+
     fn start(&mut self, interface: CommandInterface) -> Result<Desired, ArmFault> {
         self.session.receive(&mut self.wire)?;
         match mode_of(&self.wire) {

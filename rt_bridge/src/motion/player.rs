@@ -5,7 +5,7 @@
 //! be, to [`START_TOLERANCE`]: a larger step would itself break the acceleration limit (10 rad/s² is 10 urad in 1 ms).
 //!
 //! Where set points did not reach the arm in time and it went on by itself meanwhile, the motion goes on from there and eases
-//! back to its plan.
+//! back to its plan; where those were the last ones, the arm eases back to the end.
 
 use super::ease::Ease;
 use super::{Brake, lost};
@@ -36,7 +36,7 @@ pub struct Player {
     trace: Trace,
     /// The same before the last set point.
     before: Trace,
-    /// What is played, as it was planned, and how far off that the arm still is.
+    /// What is played, as it was planned, or where the arm is held; and how far off that it still is.
     planned: Trace,
     ease: Ease,
     queue: Queue,
@@ -76,7 +76,8 @@ impl Player {
     pub fn hold_at(&mut self, q_d: Joints) {
         self.queue.clear();
         self.trace = Trace::at_rest(q_d);
-        (self.before, self.ease, self.activity) = (self.trace, Ease::over(), Activity::Holding);
+        (self.before, self.activity) = (self.trace, Activity::Holding);
+        (self.planned, self.ease) = (self.trace, Ease::over());
     }
 
     /// The arm says that it is told to be at `in_force`, `periods` after the state that the last set point answered. Where
@@ -87,13 +88,10 @@ impl Player {
         };
         self.trace = trace;
         match self.activity {
-            Activity::Playing => {
+            Activity::Playing | Activity::Holding => {
                 self.ease = Ease::between(&trace, &self.planned, &self.guard.limits, self.guard.period_s);
             }
-            Activity::Holding | Activity::Braking => {
-                self.brake.begin(&trace);
-                self.activity = Activity::Braking;
-            }
+            Activity::Braking => self.brake.begin(&trace),
             Activity::Halted => {}
         }
     }
@@ -107,7 +105,11 @@ impl Player {
     /// `true` when nothing moves and nothing is about to.
     #[must_use]
     pub fn is_at_rest(&self) -> bool {
-        matches!(self.activity, Activity::Holding | Activity::Halted)
+        match self.activity {
+            Activity::Holding => self.ease.is_over(),
+            Activity::Halted => true,
+            Activity::Playing | Activity::Braking => false,
+        }
     }
 
     /// Takes in a chunk. Returns what there is to say about it.
@@ -131,7 +133,6 @@ impl Player {
             Ok(()) => {
                 self.motion = chunk.motion_id;
                 (self.due_index, self.played, self.has_last) = (0, 0, false);
-                (self.planned, self.ease) = (self.trace, Ease::over());
                 (self.activity, self.status) = (Activity::Playing, MotionStatus::Playing);
                 self.append(chunk);
                 Some(Remark::Began { motion: self.motion })
@@ -173,6 +174,7 @@ impl Player {
     pub fn advance(&mut self, tip: impl Fn(&Joints) -> [f64; 3]) -> (SetPoint, Option<Remark>) {
         self.before = self.trace;
         match self.activity {
+            Activity::Holding if !self.ease.is_over() => (self.settle(tip), None),
             Activity::Holding | Activity::Halted => (self.hold(), None),
             Activity::Braking => (self.braked(), None),
             Activity::Playing => self.play(tip),
@@ -197,16 +199,11 @@ impl Player {
             }
         };
         self.planned = self.planned.after(&point.q_d, self.guard.period_s);
-        if !self.ease.is_over() {
-            let [q, dq] = self.ease.step(self.guard.period_s);
-            for i in 0..self.guard.limits.dof {
-                point.q_d[i] += q[i];
-                point.dq_d[i] += dq[i];
-            }
-        }
+        self.ease_back(&mut point);
         match self.guard.check(&self.trace, &point, tip(&point.q_d)) {
             Ok(_) if at_end => {
                 (self.activity, self.status) = (Activity::Holding, MotionStatus::Done);
+                self.planned = Trace::at_rest(self.planned.q);
                 (self.hold(), Some(Remark::Done { motion: self.motion }))
             }
             Ok(next) => {
@@ -222,11 +219,41 @@ impl Player {
         }
     }
 
+    /// Holds, and is not yet where it is held.
+    fn settle(&mut self, tip: impl Fn(&Joints) -> [f64; 3]) -> SetPoint {
+        let mut point = SetPoint { q_d: self.planned.q, dq_d: [0.0; MAX_JOINTS] };
+        self.ease_back(&mut point);
+        match self.guard.check(&self.trace, &point, tip(&point.q_d)) {
+            Ok(next) => {
+                self.trace = next;
+                point
+            }
+            Err(_) => {
+                self.brake.begin(&self.trace);
+                self.activity = Activity::Braking;
+                self.braked()
+            }
+        }
+    }
+
+    /// Adds to a planned set point what the arm is still off.
+    fn ease_back(&mut self, point: &mut SetPoint) {
+        if self.ease.is_over() {
+            return;
+        }
+        let [q, dq] = self.ease.step(self.guard.period_s);
+        for i in 0..self.guard.limits.dof {
+            point.q_d[i] += q[i];
+            point.dq_d[i] += dq[i];
+        }
+    }
+
     fn braked(&mut self) -> SetPoint {
         let step = self.brake.step();
         self.trace = self.trace.after(&step.point.q_d, self.guard.period_s);
         if step.at_rest {
             self.activity = Activity::Holding;
+            (self.planned, self.ease) = (Trace::at_rest(self.trace.q), Ease::over());
         }
         step.point
     }
@@ -247,7 +274,7 @@ impl Player {
         }
         self.acceptable(chunk, 0)?;
         let first = chunk.set_points[0].q_d;
-        for (i, (first, now)) in first.iter().zip(&self.trace.q).enumerate().take(self.guard.limits.dof) {
+        for (i, (first, now)) in first.iter().zip(&self.planned.q).enumerate().take(self.guard.limits.dof) {
             if (first - now).abs() > START_TOLERANCE {
                 return Err(Refusal::StartsElsewhere { joint: u8::try_from(i + 1).unwrap_or(u8::MAX) });
             }

@@ -292,6 +292,7 @@ impl Cycle {
         }
         match self.plan.interface {
             CommandInterface::Torque => self.torque.resume(&self.state.tau_J_d),
+            CommandInterface::JointPosition if !self.arm.extrapolates() => {}
             CommandInterface::JointPosition => {
                 self.player
                     .reconcile(&self.state.q_d, self.state.device_ns.saturating_sub(self.answered_ns) / PERIOD_NS);
