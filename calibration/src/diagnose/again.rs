@@ -5,7 +5,6 @@ use super::combine::{FIRST_PASS, LEAST, PLAIN, Step, Trial};
 use super::evidence::Evidence;
 use super::fit::{Bench, Hypothesis};
 use super::split::Split;
-use twin::effects::Stage;
 
 /// Rivals of the best that are worth this share of it are fitted again.
 const RIVAL: f64 = 0.5;
@@ -24,8 +23,7 @@ impl Step {
     ) {
         let added = best.effects.last().and_then(|c| self.trials.iter().position(|t| t.scored.candidate == *c));
         let Some(added) = added.filter(|place| self.trials[*place].own_numbers) else { return };
-        let of_arm = |trial: &Trial| bench.library.candidates[trial.scored.candidate].effect.stage == Stage::Control;
-        if of_arm(&self.trials[added]) {
+        if bench.library.candidates[self.trials[added].scored.candidate].is_of_arm() {
             return;
         }
         self.judge(bench, split, added, best.clone());
@@ -54,7 +52,7 @@ impl Step {
         wanted: impl Fn(usize, &Trial) -> bool,
         refined: &impl Fn(&[f64]) -> Option<Vec<f64>>,
     ) {
-        let of_arm = |trial: &Trial| bench.library.candidates[trial.scored.candidate].effect.stage == Stage::Control;
+        let of_arm = |trial: &Trial| bench.library.candidates[trial.scored.candidate].is_of_arm();
         let asked = |k: &usize| !of_arm(&self.trials[*k]) && wanted(*k, &self.trials[*k]);
         let mut places: Vec<usize> = (0..self.trials.len()).filter(asked).collect();
         places.sort_by(|a, b| self.trials[*b].nats().total_cmp(&self.trials[*a].nats()));

@@ -21,7 +21,6 @@ use super::worthy::{overlooked, seen_when_clips_stray_little, worthy};
 use crate::progress::Progress;
 use nalgebra::DMatrix;
 use std::sync::atomic::{AtomicUsize, Ordering};
-use twin::effects::Stage;
 
 /// At most so many effects are named.
 pub const MOST: usize = 4;
@@ -205,17 +204,17 @@ impl Step {
         let worthy: Vec<(&Trial, &Hypothesis, &Advantage)> = (self.trials.iter())
             .filter_map(|trial| trial.fitted.as_ref().map(|(fit, advantage)| (trial, fit, advantage)))
             .filter(|(trial, _, advantage)| {
-                let stage = bench.library.candidates[trial.scored.candidate].effect.stage;
+                let of_arm = bench.library.candidates[trial.scored.candidate].is_of_arm();
                 let (much, nearly_all) = (trial.closes > PLAIN, advantage.share > NEARLY_ALL);
                 // Strokes of two engines differ by so much anyway that a little gain on most of them shows nothing.
-                let rough = stage != Stage::Control && !self.object_gap();
+                let rough = !of_arm && !self.object_gap();
                 let shown = !rough || (much && self.is_alone(bench.library, trial.scored.candidate));
                 // ... and beside a cause that was found before, a gain on nearly all of them neither.
                 let plain = much && nearly_all && advantage.nats > LEAST && (shown || self.from.effects.is_empty());
                 (convincing(advantage, trial.scored.cost) && shown) || plain
             })
             .filter(|(trial, _, advantage)| {
-                let of_arm = bench.library.candidates[trial.scored.candidate].effect.stage == Stage::Control;
+                let of_arm = bench.library.candidates[trial.scored.candidate].is_of_arm();
                 !of_arm || advantage.nats > WORTHWHILE * self.arm_rows as f64
             })
             .filter(|(trial, _, _)| trial.is_cause())

@@ -11,7 +11,7 @@ use crate::estimate::ClipModel;
 use crate::interrupt::Interrupt;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
-use twin::effects::{EffectInfo, Place, Role, Stage};
+use twin::effects::{EffectInfo, Place, Role};
 
 /// What every step of the diagnosis is given.
 pub struct Bench<'a, E> {
@@ -277,8 +277,7 @@ impl<E: Evidence> Bench<'_, E> {
     /// The effort of a trial of a candidate: one beyond the arm leaves the joints' numbers alone.
     #[must_use]
     pub fn trying(&self, candidate: usize, effort: Effort) -> Effort {
-        let stage = self.library.candidates[candidate].effect.stage;
-        Effort { holds_joints: stage != Stage::Control, ..effort }
+        Effort { holds_joints: !self.library.candidates[candidate].is_of_arm(), ..effort }
     }
 
     /// Adds a candidate to a hypothesis and fits both from `full` on.

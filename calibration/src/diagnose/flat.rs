@@ -4,7 +4,6 @@
 use super::evidence::Evidence;
 use super::fit::{Bench, FittedClip, Hypothesis};
 use super::library::TORQUE_SATURATION;
-use twin::effects::Stage;
 
 /// What a number may change of the clips' squared residuals, as a share and at least, and still be one that nothing depends
 /// on.
@@ -21,7 +20,7 @@ pub fn without<E: Evidence>(bench: &Bench<'_, E>, hypothesis: &Hypothesis) -> Hy
     for effect in &hypothesis.effects {
         let candidate = &bench.library.candidates[*effect];
         // Of one number it is known that something depends on it: it was found.
-        if candidate.effect.stage != Stage::Control || candidate.sizes.len() < 2 {
+        if !candidate.is_of_arm() || candidate.sizes.len() < 2 {
             continue;
         }
         for k in &candidate.sizes {

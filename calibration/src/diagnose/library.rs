@@ -67,6 +67,12 @@ pub struct Probe {
 }
 
 impl Candidate {
+    /// Whether it acts on the arm itself; the others act on what the arm meets and on what the camera sees of it.
+    #[must_use]
+    pub fn is_of_arm(&self) -> bool {
+        self.effect.stage == Stage::Control
+    }
+
     /// One of the sizes at the strongest that is met in practice; `resting`: where it changes nothing.
     #[must_use]
     pub fn strongest(&self, size: usize, resting: f64) -> Option<f64> {

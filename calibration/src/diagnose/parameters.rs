@@ -12,7 +12,7 @@ use super::quadratic::minimum;
 use crate::forward::setting::Setting;
 use nalgebra::DMatrix;
 use std::collections::BTreeMap;
-use twin::effects::{Role, Shape, Stage};
+use twin::effects::{Role, Shape};
 
 /// Half the width of a 90 % interval of a normal number, in sigmas.
 const NINETY: f64 = 1.645;
@@ -22,7 +22,7 @@ const NINETY: f64 = 1.645;
 pub fn of_effect<E: Evidence>(bench: &Bench<'_, E>, hypothesis: &Hypothesis, effect: usize) -> BTreeMap<String, Size> {
     let spread = spread(bench, hypothesis);
     let candidate = &bench.library.candidates[effect];
-    let rough = candidate.effect.stage != Stage::Control;
+    let rough = !candidate.is_of_arm();
     let mut sizes = BTreeMap::new();
     for parameter in candidate.effect.parameters {
         let mut size = Size { values: Vec::new(), ci90: Vec::new(), unit: parameter.unit.to_owned() };

@@ -40,7 +40,8 @@ pub(super) fn worthy<E: Evidence>(
     };
     let quiet = left.len() > 1 && beyond(false) < QUIET;
     for of_arm in [true, false].into_iter().filter(|of_arm| !(*of_arm && quiet)) {
-        let group: Vec<&Scored> = scored.iter().filter(|s| (effect(s).stage == Stage::Control) == of_arm).collect();
+        let group: Vec<&Scored> =
+            scored.iter().filter(|s| bench.library.candidates[s.candidate].is_of_arm() == of_arm).collect();
         let Some(best) = group.first() else { continue };
         let likely = |s: &&&Scored| {
             let visible = !bench.negligible(s.candidate, &bench.begun(from.full.clone(), s));
@@ -75,7 +76,7 @@ pub(super) fn seen_when_clips_stray_little<'a, E: Evidence>(
     from: &Hypothesis,
     narrow: &'a [Scored],
 ) -> Vec<&'a Scored> {
-    let of_object = |s: &&Scored| bench.library.candidates[s.candidate].effect.stage != Stage::Control;
+    let of_object = |s: &&Scored| !bench.library.candidates[s.candidate].is_of_arm();
     let object: Vec<&Scored> = narrow.iter().filter(of_object).collect();
     let Some(best) = object.first() else { return Vec::new() };
     let likely = |s: &&&Scored| {
@@ -93,6 +94,6 @@ pub(super) fn overlooked<E: Evidence>(bench: &Bench<'_, E>, step: &Step) -> Vec<
         return Vec::new();
     }
     let rest = step.trials.iter().filter(|trial| trial.fitted.is_none() && trial.scored.signal > TESTABLE);
-    let of_arm = |candidate: &usize| bench.library.candidates[*candidate].effect.stage == Stage::Control;
+    let of_arm = |candidate: &usize| bench.library.candidates[*candidate].is_of_arm();
     rest.map(|trial| trial.scored.candidate).filter(of_arm).collect()
 }
