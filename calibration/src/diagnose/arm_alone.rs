@@ -63,6 +63,7 @@ mod tests {
     use super::super::arm_clips::ArmClips;
     use super::super::cell_clips::CellClips;
     use super::super::fit::Effort;
+    use super::super::ground::Ground;
     use super::super::library::Library;
     use super::super::sweep::Precision;
     use super::super::test_bench::shipped;
@@ -79,9 +80,9 @@ mod tests {
         let cell = shipped();
         let world = World::draw(3, Kind::Strokes, Fault::Nothing, &cell);
         let base = setting::complete(&cell, None).expect("a cell");
-        let library = Library::new(&cell, &base, true, &[87.0; 8]);
-        let theta = |numbers: &[f64]| -> Theta { library.theta(numbers) };
         let clips = record(&world, 2).expect("a session");
+        let library = Library::new(&cell, &base, Ground::of(&clips).as_ref(), &[87.0; 8]);
+        let theta = |numbers: &[f64]| -> Theta { library.theta(numbers) };
         let arm = ArmClips::new(&cell, &clips, theta).expect("an arm");
         let object = ObjectClips::new(&cell, clips.clone(), library.settings.clone()).expect("an object");
         let evidence = CellClips::new(Some(arm), object, &library);

@@ -71,7 +71,7 @@ mod tests {
         let cell = shipped();
         let place = draw::candidates(false).iter().position(|effect| effect.name == "joint_encoder_offset");
         let world = World::draw(14, Kind::Excitation, Fault::Single(place.expect("an effect")), &cell);
-        let library = Library::new(&cell, &setting::complete(&cell, None).expect("a cell"), false, &[10.0; MAX_JOINTS]);
+        let library = Library::new(&cell, &setting::complete(&cell, None).expect("a cell"), None, &[10.0; MAX_JOINTS]);
         let effect = library.candidates.iter().position(|c| c.effect.name == "joint_encoder_offset");
         let effect = effect.expect("a candidate");
         let offsets = library.candidates[effect].sizes.clone();

@@ -5,6 +5,7 @@
 //! play and saturation have no slope there. An effect with a form beside its size (a place, an axis, a speed) has one
 //! alternative for each of a few forms.
 
+use super::ground::{Ground, Patch};
 use crate::estimate::Unknown;
 use crate::forward::setting::{self, Setting, Settings};
 use shared_mem::cell::Cell;
@@ -83,11 +84,12 @@ impl Candidate {
 }
 
 impl Library {
-    /// The library of a cell: with effects on the arm, and with those on hit, slide and camera where clips have an object.
-    /// `base`: a complete theta whose effects act in the baseline already and are no candidates. `peaks`: the largest torque
-    /// that each joint is asked for in the clips [N m].
+    /// The library of a cell: with effects on the arm, and with those on hit, slide and camera where clips have an object,
+    /// which crossed this `ground`. `base`: a complete theta whose effects act in the baseline already and are no candidates.
+    /// `peaks`: the largest torque that each joint is asked for in the clips [N m].
     #[must_use]
-    pub fn new(cell: &Cell, base: &Theta, with_object: bool, peaks: &Joints) -> Self {
+    pub fn new(cell: &Cell, base: &Theta, ground: Option<&Ground>, peaks: &Joints) -> Self {
+        let with_object = ground.is_some();
         let dof = base.arm.as_ref().map_or(0, |arm| arm.stiffness.len());
         let mut numbers = setting::gains(cell, base);
         if with_object {
@@ -111,7 +113,7 @@ impl Library {
                     unknown.step = BOUND_STEP / bound;
                 }
             }
-            candidates.push(Candidate::new(effect, at, &numbers, peaks));
+            candidates.push(Candidate::new(effect, at, &numbers, (ground, peaks)));
         }
         let joint = |setting| joint_of(setting).filter(|_| !(with_object && moves_the_tip_unseen(setting)));
         let joints = numbers.iter().map(|(setting, _)| joint(setting)).collect();
@@ -225,7 +227,7 @@ fn keep_known_gains(cell: &Cell, unknown: &mut Unknown) {
 }
 
 impl Candidate {
-    fn new(effect: &'static EffectInfo, at: usize, numbers: &[(Setting, Unknown)], peaks: &Joints) -> Self {
+    fn new(effect: &'static EffectInfo, at: usize, numbers: &[(Setting, Unknown)], met: Met<'_>) -> Self {
         let is_size = |setting: &Setting| match setting {
             Setting::Effect { parameter, .. } => {
                 effect.parameters.iter().any(|p| p.name == *parameter && matches!(p.role, Role::Size { .. }))
@@ -235,7 +237,7 @@ impl Candidate {
         let sizes: Vec<usize> = (at..numbers.len()).filter(|k| is_size(&numbers[*k].0)).collect();
         let kept = |setting: &Setting| matches!(setting, Setting::Effect { parameter, .. } if KEPT.contains(parameter));
         let turned = (at..numbers.len()).filter(|k| !kept(&numbers[*k].0)).collect();
-        let alternatives = alternatives(effect, at, &sizes, numbers, peaks);
+        let alternatives = alternatives(effect, at, &sizes, numbers, met);
         Self { effect, numbers: at..numbers.len(), turned, sizes, alternatives }
     }
 }
@@ -276,12 +278,15 @@ const KEPT: [&str; 2] = ["creep", CARRIED];
 /// The step of a probe as a share of what is met in practice.
 const PROBE_SHARE: f64 = 0.1;
 
+/// Where objects slid, and what the joints were asked for [N m].
+type Met<'a> = (Option<&'a Ground>, &'a Joints);
+
 fn alternatives(
     effect: &EffectInfo,
     at: usize,
     sizes: &[usize],
     numbers: &[(Setting, Unknown)],
-    peaks: &Joints,
+    (ground, peaks): Met<'_>,
 ) -> Vec<Alternative> {
     let probe = |k: &usize| match bound_of(&numbers[*k].0, peaks) {
         Some(peak) => biting(*k, peak, &numbers[*k].1),
@@ -315,14 +320,11 @@ fn alternatives(
             [1.0, 0.0].map(|drift| Alternative { form: set("drift", drift), probes: probes.clone() }).to_vec()
         }
         "friction_patch" => {
-            let (direction, distance) = (index("direction")[0], index("distance")[0]);
-            let lines = (0..8).flat_map(|eighth| {
-                let angle = f64::from(eighth) * std::f64::consts::FRAC_PI_4 - 3.0;
-                // Lines through the middle of a table half a metre in front of the robot, and beside it.
-                let middle = 0.5 * angle.cos();
-                [0.0, 0.06].map(|aside| vec![(direction, angle), (distance, middle + aside)])
-            });
-            lines.map(with).collect()
+            let [direction, distance, radius] = ["direction", "distance", "radius"].map(|form| index(form)[0]);
+            let place = |patch: Patch| {
+                with(vec![(direction, patch.direction), (distance, patch.distance), (radius, patch.curvature)])
+            };
+            ground.map(Ground::patches).unwrap_or_default().into_iter().map(place).collect()
         }
         TORQUE_RIPPLE => {
             let (order, phase) = (index("order"), index("phase"));

@@ -11,7 +11,7 @@
 //! | [`split`] | which clips are for what |
 //! | [`evidence`], [`arm_clips`], [`cell_clips`], [`arm_alone`] | what is measured against the twin, and where in a clip |
 //! | [`scatter`] | what every clip has of its own |
-//! | [`library`] | the candidates as numbers |
+//! | [`library`], [`ground`] | the candidates as numbers, and where on the table they can show |
 //! | [`baseline`] | the paper's parameters identified |
 //! | [`noise`], [`floor`] | how far residuals can be trusted |
 //! | [`sweep`], [`quadratic`] | every candidate's signature, linearised once |
@@ -48,6 +48,7 @@ pub mod fit;
 pub mod flat;
 pub mod floor;
 pub mod gap;
+pub mod ground;
 pub mod leftovers;
 pub mod length;
 pub mod library;
@@ -80,6 +81,7 @@ use arm_clips::ArmClips;
 use cell_clips::CellClips;
 use evidence::Evidence;
 use fit::Bench;
+use ground::Ground;
 use library::Library;
 use shared_mem::cell::Cell;
 use shared_mem::recording::Session;
@@ -151,7 +153,8 @@ pub fn diagnose_clips(
     let began = Instant::now();
     let base = setting::complete(&session.cell, options.theta.as_ref())?;
     let peaks = peaks(&session.cell, admitted, &base)?;
-    let library = Library::new(&session.cell, &base, admitted.with_object, &peaks);
+    let ground = Ground::of(&admitted.clips).filter(|_| admitted.with_object);
+    let library = Library::new(&session.cell, &base, ground.as_ref(), &peaks);
     let theta = |numbers: &[f64]| library.theta(numbers);
     let mut diagnosis = if admitted.with_object {
         let arm = ArmClips::new(&session.cell, &admitted.clips, theta).map_err(Refused::from)?;

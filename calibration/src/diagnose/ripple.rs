@@ -111,7 +111,7 @@ mod tests {
             [("amplitude", amplitude), ("order", order)].map(|(name, of)| (name.to_owned(), of.to_vec().into()));
         let rippled = EffectTheta { name: TORQUE_RIPPLE.into(), parameters: parameters.into() };
         let world = World { hidden: Theta { effects: vec![rippled], ..well.hidden.clone() }, ..well };
-        let library = Library::new(&cell, &base, false, &[87.0; 8]);
+        let library = Library::new(&cell, &base, None, &[87.0; 8]);
         let candidate = library.find(TORQUE_RIPPLE).expect("a candidate");
         let begun = on_bench((&cell, &world), &library, |bench, even| {
             let baseline = bench.fit((&[], library.start()), &[0, 1], even, None, ONCE).expect("a fit");

@@ -162,7 +162,7 @@ mod tests {
         let parameters = [("limit".to_owned(), limits.clone().into())].into();
         let cut = EffectTheta { name: TORQUE_SATURATION.into(), parameters };
         let world = World { hidden: Theta { effects: vec![cut], ..well.hidden.clone() }, ..well };
-        let library = Library::new(&cell, &base, false, &peaks);
+        let library = Library::new(&cell, &base, None, &peaks);
         let candidate = library.find(TORQUE_SATURATION).expect("a candidate");
         let probes = library.candidates[candidate].alternatives[0].probes.len();
         let scored = Scored {
