@@ -41,7 +41,7 @@ impl Ground {
         for clip in clips {
             let mut last: Option<[f64; 2]> = None;
             for pose in &clip.object.poses {
-                let [x, y, _] = pose.position().into();
+                let [x, y, _] = pose.position();
                 if last.is_none_or(|[a, b]: [f64; 2]| (x - a).hypot(y - b) > STEP) {
                     last = Some([x, y]);
                     places.push([x, y]);
@@ -90,7 +90,7 @@ mod tests {
         let away = |place: [f64; 2]| (place[0] - ground.middle[0]).hypot(place[1] - ground.middle[1]);
         for clip in &clips {
             let [first, last] = [clip.object.poses.first(), clip.object.poses.last()].map(|pose| {
-                let [x, y, _] = pose.expect("poses").position().into();
+                let [x, y, _] = pose.expect("poses").position();
                 away([x, y])
             });
             assert!(first.min(last) < 2.0 * ground.spread, "{first} {last} {ground:?}");

@@ -1,6 +1,6 @@
-//! Where fits of a candidate begin. Effects on the arm and on the slide answer evenly: there the slope at the neutral point
-//! shows the way. What has no slope there, and what changes where or how an object is hit, is tried at strengths that are met
-//! in practice; what does nothing below a threshold, joint by joint.
+//! Where fits of a candidate begin. Effects on the arm answer evenly: there the slope at the neutral point shows the way. What
+//! has no slope there, and what changes how an object is hit or slides, is tried at strengths that are met in practice; what
+//! does nothing below a threshold, joint by joint.
 
 use super::evidence::Evidence;
 use super::fit::{Bench, Hypothesis};
@@ -21,8 +21,9 @@ const SCANNED: [f64; 4] = [0.06, 0.2, 0.5, 1.0];
 const STEPPED: [f64; 6] = [0.95, 1.05, 1.15, 1.3, 1.6, 2.2];
 
 /// Numbers at which fits of a candidate begin: where the score test points. Of an effect with many forms (a place on the
-/// table) also the forms next to the best; of one whose slope at one point tells little, as where the object is hit
-/// elsewhere, also where the clips cost least some way to either side.
+/// table) also the forms next to the best; of one beyond the arm also some way to either side, since the object's numbers,
+/// fitted without it, stand in for a part of it; of one whose slope at one point tells little, as where the object is hit
+/// elsewhere, also where the clips cost least.
 pub(super) fn starts<E: Evidence>(bench: &Bench<'_, E>, at: (&Hypothesis, &[f64]), scored: &Scored) -> Vec<Vec<f64>> {
     let candidate = &bench.library.candidates[scored.candidate];
     let mut starts = vec![scored.clone()];
@@ -36,7 +37,7 @@ pub(super) fn starts<E: Evidence>(bench: &Bench<'_, E>, at: (&Hypothesis, &[f64]
     }
     let one_probe = candidate.alternatives[scored.alternative].probes.len() == 1;
     let uneven = matches!(candidate.effect.stage, Stage::Hit | Stage::Camera);
-    if uneven && one_probe {
+    if one_probe && candidate.effect.stage != Stage::Control {
         starts.extend(aside(bench, scored, &[ASIDE]));
     }
     let mut numbers: Vec<Vec<f64>> = starts.iter().map(|start| bench.begun(at.0.full.clone(), start)).collect();

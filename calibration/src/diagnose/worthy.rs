@@ -19,13 +19,16 @@ const CLOSE: f64 = 0.1;
 /// this share of what the best one does there.
 const STANDING_OUT: usize = 2;
 const ALIKE: f64 = 0.5;
+/// An object's gap beyond this, half of what two engines differ by, has all effects on the slide fitted: which of them it is
+/// shows in how far fits get.
+const SLID: f64 = 0.5 * ROUGHNESS;
 /// Where the score test tells little, a candidate of the camera must spare this share of the cost somewhere.
 const SPARES: f64 = 0.2;
 
 /// Candidates worth a fit, the arm's and the object's each among themselves: those that the score test cannot rule out, the
-/// best first; of the others only partners that the best is easily taken for. Where the object's gap is large all effects on
-/// the hit are fitted, and those of the camera that spare much of it somewhere: a blow answers so unevenly that slopes at one
-/// point tell little.
+/// best first; of the others only partners that the best is easily taken for. Where the object's gap is not small all effects
+/// on the slide are fitted, where it is large all on the hit as well, and those of the camera that spare much of it
+/// somewhere: a blow answers so unevenly that slopes at one point tell little.
 pub(super) fn worthy<E: Evidence>(
     bench: &Bench<'_, E>,
     (from, weights): (&Hypothesis, &[f64]),
@@ -53,19 +56,23 @@ pub(super) fn worthy<E: Evidence>(
             .filter(|s| partners.contains(&effect(s).name) && s.p < 0.2 && s.gain > 0.5 * CLOSE * best.gain);
         all.extend(first.chain(confusable).map(|s| s.candidate));
     }
+    let more = |wanted: &dyn Fn(&Scored) -> bool| -> Vec<usize> {
+        let wanted = scored.iter().filter(|s| s.signal > TESTABLE && wanted(s));
+        wanted.map(|s| s.candidate).collect()
+    };
+    if beyond(true) > SLID {
+        all.extend(more(&|s| effect(s).stage == Stage::Slide && !all.contains(&s.candidate)));
+    }
     if beyond(true) > ROUGHNESS {
         let now = bench.plain_cost(from, &from.full, weights).unwrap_or(f64::INFINITY);
         let spares = |s: &Scored| {
             starts::least_cost_aside(bench, (from, weights), s).is_some_and(|(cost, _)| cost < (1.0 - SPARES) * now)
         };
-        let asked = |s: &&Scored| match effect(s).stage {
+        all.extend(more(&|s| match effect(s).stage {
             Stage::Hit => true,
             Stage::Camera => !all.contains(&s.candidate) && spares(s),
             _ => false,
-        };
-        let more: Vec<usize> =
-            scored.iter().filter(|s| s.signal > TESTABLE).filter(asked).map(|s| s.candidate).collect();
-        all.extend(more);
+        }));
     }
     all
 }
