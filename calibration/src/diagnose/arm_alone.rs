@@ -60,58 +60,39 @@ impl<E: Evidence> Evidence for ArmAlone<'_, E> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::arm_clips::ArmClips;
-    use super::super::cell_clips::CellClips;
     use super::super::fit::Effort;
-    use super::super::ground::Ground;
-    use super::super::library::Library;
     use super::super::sweep::Precision;
-    use super::super::test_bench::shipped;
+    use super::super::test_bench::{on_strokes, shipped};
     use super::*;
-    use crate::benchmark::session::record;
     use crate::benchmark::world::{Fault, Kind, World};
-    use crate::forward::object::ObjectClips;
-    use crate::forward::setting;
-    use crate::interrupt::Interrupt;
-    use shared_mem::theta::Theta;
 
     #[test]
     fn the_object_is_silent_and_fits_turn_what_they_may() {
         let cell = shipped();
         let world = World::draw(3, Kind::Strokes, Fault::Nothing, &cell);
-        let base = setting::complete(&cell, None).expect("a cell");
-        let clips = record(&world, 2).expect("a session");
-        let library = Library::new(&cell, &base, Ground::of(&clips).as_ref(), &[87.0; 8]);
-        let theta = |numbers: &[f64]| -> Theta { library.theta(numbers) };
-        let arm = ArmClips::new(&cell, &clips, theta).expect("an arm");
-        let object = ObjectClips::new(&cell, clips.clone(), library.settings.clone()).expect("an object");
-        let evidence = CellClips::new(Some(arm), object, &library);
-        let interrupt = Interrupt::default();
-        let whole =
-            Bench { evidence: &evidence, library: &library, scatter: evidence.scatter(), interrupt: &interrupt };
-        let alone = ArmAlone(&evidence);
+        on_strokes((&cell, &world), |whole, even| {
+            let (evidence, library, alone) = (whole.evidence, whole.library, ArmAlone(whole.evidence));
+            let (mut all, mut some) = (Vec::new(), Vec::new());
+            evidence.residuals(0, &library.start(), &[], &mut all).expect("a stroke");
+            alone.residuals(0, &library.start(), &[], &mut some).expect("a stroke");
+            let of_joint = |row: &Row| evidence.channels()[row.channel].joint.is_some();
+            for ((row, all), some) in evidence.rows(0).iter().zip(&all).zip(&some) {
+                assert_eq!(*some, if of_joint(row) { *all } else { 0.0 });
+            }
 
-        let (mut all, mut some) = (Vec::new(), Vec::new());
-        evidence.residuals(0, &library.start(), &[], &mut all).expect("a stroke");
-        alone.residuals(0, &library.start(), &[], &mut some).expect("a stroke");
-        let of_joint = |row: &Row| evidence.channels()[row.channel].joint.is_some();
-        for ((row, all), some) in evidence.rows(0).iter().zip(&all).zip(&some) {
-            assert_eq!(*some, if of_joint(row) { *all } else { 0.0 });
-        }
-
-        let even = vec![1.0; evidence.channels().len()];
-        let step = Effort::of(2, Precision::Joints);
-        let moved = |numbers: Vec<f64>| -> Vec<usize> {
-            let of_baseline = library.baseline.clone();
-            of_baseline.filter(|k| numbers[*k] != library.unknowns[*k].start).collect()
-        };
-        let (gains, of_object): (Vec<usize>, Vec<usize>) =
-            library.baseline.clone().partition(|k| library.joints[*k].is_some());
-        let fit = alone.bench(&whole).fit((&[], library.start()), &[0, 1], &even, None, step).expect("a fit");
-        assert_eq!(moved(fit.full), gains, "joints' channels tell the gains, and nothing of the object");
-        let effort = Effort { holds_joints: true, ..step };
-        let fit = whole.fit((&[], library.start()), &[0, 1], &even, None, effort).expect("a fit");
-        let moved = moved(fit.full);
-        assert!(!moved.is_empty() && moved.iter().all(|k| of_object.contains(k)), "{moved:?} of {of_object:?}");
+            let step = Effort::of(2, Precision::Joints);
+            let moved = |numbers: Vec<f64>| -> Vec<usize> {
+                let of_baseline = library.baseline.clone();
+                of_baseline.filter(|k| numbers[*k] != library.unknowns[*k].start).collect()
+            };
+            let (gains, of_object): (Vec<usize>, Vec<usize>) =
+                library.baseline.clone().partition(|k| library.joints[*k].is_some());
+            let fit = alone.bench(whole).fit((&[], library.start()), &[0, 1], even, None, step).expect("a fit");
+            assert_eq!(moved(fit.full), gains, "joints' channels tell the gains, and nothing of the object");
+            let effort = Effort { holds_joints: true, ..step };
+            let fit = whole.fit((&[], library.start()), &[0, 1], even, None, effort).expect("a fit");
+            let moved = moved(fit.full);
+            assert!(!moved.is_empty() && moved.iter().all(|k| of_object.contains(k)), "{moved:?} of {of_object:?}");
+        });
     }
 }

@@ -141,7 +141,7 @@ fn aside<E: Evidence>(bench: &Bench<'_, E>, scored: &Scored, shares: &[f64]) -> 
 mod tests {
     use super::super::arm_clips::ArmClips;
     use super::super::library::Library;
-    use super::super::test_bench::{ONCE, on_bench, shipped};
+    use super::super::test_bench::{ONCE, nothing_said_of, on_bench, on_strokes, shipped};
     use super::*;
     use crate::benchmark::session::record;
     use crate::benchmark::world::{Fault, Kind, World};
@@ -165,19 +165,7 @@ mod tests {
         let world = World { hidden: Theta { effects: vec![cut], ..well.hidden.clone() }, ..well };
         let library = Library::new(&cell, &base, None, &peaks);
         let candidate = library.find(TORQUE_SATURATION).expect("a candidate");
-        let probes = library.candidates[candidate].alternatives[0].probes.len();
-        let scored = Scored {
-            candidate,
-            alternative: 0,
-            units: vec![0.0; probes],
-            next: Vec::new(),
-            gain: 0.0,
-            cost: probes,
-            cosine: 0.0,
-            signal: 0.0,
-            imitated: 0.0,
-            p: 1.0,
-        };
+        let scored = nothing_said_of(&library, candidate);
         let begun = on_bench((&cell, &world), &library, |bench, even| {
             let baseline = bench.fit((&[], library.start()), &[0, 1], even, None, ONCE).expect("a fit");
             one_by_one(bench, (&baseline, even), &scored)
@@ -189,5 +177,20 @@ mod tests {
                 None => assert!(found > 0.9, "{found} of what is asked"),
             }
         }
+    }
+
+    #[test]
+    fn what_acts_on_the_slide_is_tried_from_either_side() {
+        let cell = shipped();
+        let world = World::draw(3, Kind::Strokes, Fault::Nothing, &cell);
+        let tried = on_strokes((&cell, &world), |bench, even| {
+            let candidate = bench.library.find("velocity_dependent_friction").expect("a candidate");
+            let baseline = bench.fit((&[], bench.library.start()), &[0, 1], even, None, ONCE).expect("a fit");
+            let size = bench.library.candidates[candidate].sizes[0];
+            let from = starts(bench, (&baseline, even), &nothing_said_of(bench.library, candidate));
+            from.into_iter().map(|full| full[size]).collect::<Vec<f64>>()
+        });
+        assert!(tried.contains(&0.0), "{tried:?}");
+        assert!(tried.iter().any(|slope| *slope > 0.05) && tried.iter().any(|slope| *slope < -0.05), "{tried:?}");
     }
 }

@@ -1,14 +1,20 @@
-//! Two recorded excitations of a world on a bench, to try the steps of the search on.
+//! Two recorded clips of a world on a bench, to try the steps of the search on.
 
 use super::arm_clips::ArmClips;
+use super::cell_clips::CellClips;
 use super::evidence::Evidence as _;
 use super::fit::{Bench, Effort};
+use super::ground::Ground;
 use super::library::Library;
+use super::shortlist::Scored;
 use super::sweep::Precision;
 use crate::benchmark::session::record;
 use crate::benchmark::world::World;
+use crate::forward::object::ObjectClips;
+use crate::forward::setting;
 use crate::interrupt::Interrupt;
 use shared_mem::cell::Cell;
+use shared_mem::msg::MAX_JOINTS;
 use shared_mem::theta::Theta;
 use std::path::Path;
 
@@ -35,4 +41,38 @@ pub(super) fn on_bench<R>(
     let interrupt = Interrupt::default();
     let bench = Bench { evidence: &evidence, library, scatter: evidence.scatter(), interrupt: &interrupt };
     ask(&bench, &vec![1.0; evidence.channels().len()])
+}
+
+/// Asks the bench on which the world's strokes lie, with the library of all effects that they could show.
+pub(super) fn on_strokes<R>(
+    (cell, world): (&Cell, &World),
+    ask: impl FnOnce(&Bench<'_, CellClips<'_, Parameters<'_>>>, &[f64]) -> R,
+) -> R {
+    let clips = record(world, 2).expect("a session");
+    let base = setting::complete(cell, None).expect("a cell");
+    let library = Library::new(cell, &base, Ground::of(&clips).as_ref(), &[87.0; MAX_JOINTS]);
+    let theta = |numbers: &[f64]| library.theta(numbers);
+    let arm = ArmClips::new(cell, &clips, &theta as Parameters<'_>).expect("an arm");
+    let object = ObjectClips::new(cell, clips, library.settings.clone()).expect("an object");
+    let evidence = CellClips::new(Some(arm), object, &library);
+    let interrupt = Interrupt::default();
+    let bench = Bench { evidence: &evidence, library: &library, scatter: evidence.scatter(), interrupt: &interrupt };
+    ask(&bench, &vec![1.0; evidence.channels().len()])
+}
+
+/// A candidate of which the score test says nothing.
+pub(super) fn nothing_said_of(library: &Library, candidate: usize) -> Scored {
+    let probes = library.candidates[candidate].alternatives[0].probes.len();
+    Scored {
+        candidate,
+        alternative: 0,
+        units: vec![0.0; probes],
+        next: Vec::new(),
+        gain: 0.0,
+        cost: probes,
+        cosine: 0.0,
+        signal: 0.0,
+        imitated: 0.0,
+        p: 1.0,
+    }
 }

@@ -104,3 +104,28 @@ pub(super) fn overlooked<E: Evidence>(bench: &Bench<'_, E>, step: &Step) -> Vec<
     let of_arm = |candidate: &usize| bench.library.candidates[*candidate].is_of_arm();
     rest.map(|trial| trial.scored.candidate).filter(of_arm).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::test_bench::{ONCE, nothing_said_of, on_strokes, shipped};
+    use super::*;
+    use crate::benchmark::world::{Fault, Kind, World};
+
+    #[test]
+    fn a_gap_of_the_object_has_every_effect_on_the_slide_fitted_though_slopes_do_not_point_there() {
+        let cell = shipped();
+        let world = World::draw(3, Kind::Strokes, Fault::Nothing, &cell);
+        on_strokes((&cell, &world), |bench, even| {
+            let from = bench.fit((&[], bench.library.start()), &[0, 1], even, None, ONCE).expect("a fit");
+            let scored = |candidate| Scored { signal: 2.0 * TESTABLE, ..nothing_said_of(bench.library, candidate) };
+            let all: Vec<Scored> = (0..bench.library.candidates.len()).map(scored).collect();
+            let fitted = |mean_square: f64| {
+                let group = |of_object, mean_square| Typical { mean_square, floor: 1.5, of_object };
+                worthy(bench, (&from, even), &all, &[group(false, 1.5), group(true, mean_square)])
+            };
+            let slides = bench.library.candidates.iter().filter(|c| c.effect.stage == Stage::Slide).count();
+            assert_eq!(fitted(1.5 + 0.9 * SLID).len(), 0);
+            assert_eq!(fitted(1.5 + 1.1 * SLID).len(), slides);
+        });
+    }
+}
