@@ -26,7 +26,8 @@ pub(super) fn in_force(sent: &Trace, before: &Trace, in_force: &Joints, periods:
         let apart = likelier.v.iter().zip(&sent.v).map(|(a, b)| (a - b).abs() * period_s).fold(0.0, f64::max);
         return (off(&likelier) <= ROUNDING && apart > ROUNDING).then_some(likelier);
     }
-    (off(&likelier) <= ECHO).then_some(likelier)
+    // An arm that stands has lost nothing, however it rounds.
+    (off(&likelier) <= ECHO && likelier != *sent).then_some(likelier)
 }
 
 #[cfg(test)]
@@ -72,5 +73,7 @@ mod tests {
     fn an_arm_that_holds_loses_nothing() {
         let still = Trace::at_rest([1.0; MAX_JOINTS]);
         assert_eq!(in_force(&still, &still, &echo(&still), 5, T), None);
+        let rounded = still.q.map(|q| q + 1e-6);
+        assert_eq!(in_force(&still, &still, &rounded, 1, T), None, "its own arithmetic");
     }
 }
