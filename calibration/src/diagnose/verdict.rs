@@ -32,6 +32,9 @@ const ROUGH: f64 = 1.25;
 /// What is stronger than what is met in practice is believed where it explains this much [%]: a substitute does not.
 const ALL_BUT_EXACT: f64 = 99.5;
 
+/// What is less likely than not is not named.
+const LIKELY: f64 = 0.5;
+
 /// Confidence of a finding that rests on nothing being there, or on something unknown being there.
 const NEGATIVE: f64 = 0.9;
 
@@ -39,7 +42,8 @@ impl Finding<'_> {
     /// The verdict.
     #[must_use]
     pub fn verdict(&self) -> Verdict {
-        if self.effects.is_empty() || !self.confirmed {
+        let unlikely = self.rivals.is_empty() && self.confidence < LIKELY;
+        if self.effects.is_empty() || !self.confirmed || unlikely {
             let gap = self.left.iter().any(|left| left.before - left.floor > left.numerics);
             return if gap || self.drift.is_some() { self.unexplained() } else { self.none() };
         }
@@ -165,6 +169,15 @@ mod tests {
         let refuted = Finding { confirmed: false, ..finding(vec!["payload"], 500.0, 1.5) };
         assert_eq!(refuted.verdict().kind, Kind::Unexplained);
         assert_eq!(Finding { confirmed: false, ..finding(vec!["payload"], 2.0, 1.5) }.verdict().kind, Kind::None);
+    }
+
+    #[test]
+    fn what_is_less_likely_than_not_is_not_named_alone() {
+        let unlikely = Finding { confidence: 0.1, ..finding(vec!["restitution"], 5.0, 1.5) };
+        assert_eq!(unlikely.verdict().kind, Kind::None);
+        assert_eq!(Finding { rivals: vec!["tip_friction"], ..unlikely }.verdict().kind, Kind::Class);
+        let in_a_gap = Finding { confidence: 0.1, ..finding(vec!["restitution"], 500.0, 1.5) };
+        assert_eq!(in_a_gap.verdict().kind, Kind::Unexplained);
     }
 
     #[test]
