@@ -6,7 +6,7 @@ use shared_mem::msg::arm::ArmState;
 use shared_mem::msg::image::{CameraInfo, ImageHeader};
 use shared_mem::topics;
 use shared_mem::transport::{Node, TransportError};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// A seat in the domain of one test.
 fn node(test: &str, name: &str) -> Node {
@@ -38,6 +38,33 @@ fn messages_arrive_in_order_and_a_sleeper_wakes() {
     }
     let cycles = reader.join().expect("reader");
     assert!(cycles.windows(2).all(|w| w[1] == w[0] + 1), "out of order or lost: {cycles:?}");
+}
+
+/// Rings as fast as they can be sent meet those that are just being answered.
+#[test]
+fn a_sleeper_sleeps_until_something_is_sent() {
+    const LAST: u64 = 100_000;
+    let sender = node("rush", "sender");
+    let publisher = sender.publisher(topics::ARM_STATE).expect("publisher");
+    let reader = std::thread::spawn(|| {
+        let seat = node("rush", "reader");
+        let subscriber = seat.subscriber(topics::ARM_STATE).expect("subscriber");
+        let wake = seat.wake_on(topics::ARM_STATE.name).expect("wake");
+        let mut newest = 0;
+        while newest < LAST {
+            let lain_down = Instant::now();
+            let told = wake.wait(Duration::from_secs(20)).expect("wait");
+            assert!(told, "woken for nothing after {newest}");
+            assert!(lain_down.elapsed() < Duration::from_secs(10), "slept on while messages came");
+            newest = subscriber.newest().expect("receive").map_or(newest, |state| state.cycle);
+        }
+    });
+    while !reader.is_finished() {
+        for cycle in 1..=LAST {
+            publisher.send(&ArmState { cycle, ..ArmState::default() }).expect("send");
+        }
+    }
+    reader.join().expect("reader");
 }
 
 #[test]

@@ -2,10 +2,15 @@
 
 use super::{Node, Service, TransportError, open_error, owner_of};
 use crate::topics::{Limits, Topic};
-use iceoryx2::port::{listener::Listener, subscriber::Subscriber as Port};
+use iceoryx2::port::listener::{Listener, ListenerWaitError};
+use iceoryx2::port::subscriber::Subscriber as Port;
 use iceoryx2::prelude::*;
 use std::fmt::Debug;
-use std::time::Duration;
+use std::time::{Duration, Instant};
+
+/// How late a sleeper at most hears a ring that iceoryx2 0.10 lost. A listener that empties its socket between the sender's ring and
+/// the mark the sender makes of it sleeps on a mark that keeps all later rings from being sent; it reads the mark when it lies down anew.
+const TURN: Duration = Duration::from_millis(5);
 
 /// Receives messages of one topic, oldest first.
 #[derive(Debug)]
@@ -84,19 +89,20 @@ impl<Payload: Debug + ZeroCopySend + Copy + 'static> Subscriber<Payload> {
 }
 
 impl Wake {
-    /// Sleeps until something was sent or `timeout` passed; `true` when something was sent.
+    /// Sleeps until something was sent or `timeout` passed; `true` when something was sent. A signal, which is no failure, ends the sleep early.
     ///
     /// # Errors
-    /// [`TransportError::Port`] when shared memory fails. A signal is no failure.
+    /// [`TransportError::Port`] when shared memory fails.
     pub fn wait(&self, timeout: Duration) -> Result<bool, TransportError> {
-        match self.listener.timed_wait(|_| (), timeout) {
-            Ok(count) => Ok(count > 0),
-            Err(e) => {
-                let what = format!("{e:?}");
-                if what.contains("Interrupt") {
-                    return Ok(false);
-                }
-                Err(TransportError::Port { topic: self.topic, what })
+        let end = Instant::now() + timeout;
+        loop {
+            let left = end.saturating_duration_since(Instant::now());
+            match self.listener.timed_wait(|_| (), left.min(TURN)) {
+                // A ring that arrives just as the one before it is answered is answered with it, and wakes once more for nothing.
+                Ok(0) if !left.is_zero() => {}
+                Ok(count) => return Ok(count > 0),
+                Err(ListenerWaitError::InterruptSignal) => return Ok(false),
+                Err(e) => return Err(TransportError::Port { topic: self.topic, what: format!("{e:?}") }),
             }
         }
     }
