@@ -209,9 +209,8 @@ fn an_arm_that_stopped_itself_takes_no_motion() {
     assert_eq!(player.take(&again), Some(Remark::Refused { motion: 5, why: Refusal::NotCommanded }));
 }
 
-/// What follows starts where a motion was planned to end, and the arm has gone on beyond.
-#[test]
-fn an_arm_that_loses_its_last_set_points_comes_back_to_the_end_and_takes_the_next_motion() {
+/// A player whose motion has ended, and its robot, which got nothing of the last twelve periods; the planned end.
+fn beyond_the_end() -> (Player, Trace, [f64; MAX_JOINTS]) {
     let (mut player, mut robot) = (Player::new(guard(), READY), Trace::at_rest(READY));
     // Quintic, 0.2 rad in 0.6 s: decelerates until its last period.
     let points: Vec<SetPoint> = (0..=600)
@@ -237,11 +236,29 @@ fn an_arm_that_loses_its_last_set_points_comes_back_to_the_end_and_takes_the_nex
     assert_eq!(done, Some(Remark::Done { motion: 1 }));
     robot = (0..11).fold(robot, |trace, _| trace.onward(T));
     player.reconcile(&said(&robot), 12);
+    (player, robot, end)
+}
+
+/// What follows starts where a motion was planned to end, and the arm has gone on beyond.
+#[test]
+fn an_arm_that_loses_its_last_set_points_comes_back_to_the_end_and_takes_the_next_motion() {
+    let (mut player, mut robot, end) = beyond_the_end();
     let away = |robot: &Trace| robot.q.iter().zip(&end).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
     assert!(away(&robot) > 2e-6, "{:?}", robot.q);
     assert_eq!(run(&mut player, &mut robot, 1000), []);
     assert!(player.is_at_rest() && away(&robot) < 1e-9, "{:?}", robot.q);
     assert_eq!(player.take(&chunks(2, &swing(&end, 0.1, 1.0))[0]), Some(Remark::Began { motion: 2 }));
+}
+
+#[test]
+fn an_arm_on_its_way_back_to_the_end_stops_when_asked() {
+    let (mut player, mut robot, _) = beyond_the_end();
+    assert!(!player.is_at_rest());
+    assert_eq!(player.take(&MotionChunk { kind: MotionKind::Stop, ..MotionChunk::default() }), None);
+    assert_eq!(run(&mut player, &mut robot, 50), [], "sooner than the way back takes");
+    assert!(player.is_at_rest() && status(&player).motion == MotionStatus::Done);
+    let (held, _) = player.advance(tip);
+    assert_eq!(held.q_d, robot.q);
 }
 
 proptest! {

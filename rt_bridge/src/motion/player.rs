@@ -147,15 +147,19 @@ impl Player {
         }
     }
 
-    /// Brakes what is being played; nothing when the arm holds already.
+    /// Brakes what is being played, or the way back to where the arm is held, of which nothing is told; nothing when it rests.
     pub fn stop(&mut self, why: BrakeReason) -> Option<Remark> {
-        if self.activity != Activity::Playing {
+        let played = self.activity == Activity::Playing;
+        if self.is_at_rest() || self.activity == Activity::Braking {
+            return None;
+        }
+        self.brake.begin(&self.trace);
+        self.activity = Activity::Braking;
+        if !played {
             return None;
         }
         self.queue.clear();
-        self.brake.begin(&self.trace);
-        (self.activity, self.status) = (Activity::Braking, MotionStatus::Braked);
-        self.dropped_motion = self.motion;
+        (self.status, self.dropped_motion) = (MotionStatus::Braked, self.motion);
         Some(Remark::Braked { motion: self.motion, why })
     }
 
@@ -228,9 +232,8 @@ impl Player {
                 self.trace = next;
                 point
             }
-            Err(_) => {
-                self.brake.begin(&self.trace);
-                self.activity = Activity::Braking;
+            Err(violation) => {
+                self.stop(BrakeReason::Limit(violation));
                 self.braked()
             }
         }
