@@ -37,7 +37,7 @@ pub(super) fn starts<E: Evidence>(bench: &Bench<'_, E>, at: (&Hypothesis, &[f64]
     }
     let one_probe = candidate.alternatives[scored.alternative].probes.len() == 1;
     let uneven = matches!(candidate.effect.stage, Stage::Hit | Stage::Camera);
-    if one_probe && candidate.effect.stage != Stage::Control {
+    if one_probe && !candidate.is_of_arm() {
         starts.extend(aside(bench, scored, &[ASIDE]));
     }
     let mut numbers: Vec<Vec<f64>> = starts.iter().map(|start| bench.begun(at.0.full.clone(), start)).collect();
