@@ -68,6 +68,15 @@ fn a_sleeper_sleeps_until_something_is_sent() {
 }
 
 #[test]
+fn a_sleeper_wakes_when_nothing_is_sent_however_short_its_sleep() {
+    let seat = node("silence", "reader");
+    let wake = seat.wake_on(topics::ARM_STATE.name).expect("wake");
+    for nanoseconds in (0..3000).step_by(100).chain([99_999, 100_001, 5_000_001]) {
+        assert!(!wake.wait(Duration::from_nanos(nanoseconds)).expect("wait"));
+    }
+}
+
+#[test]
 fn a_second_publisher_is_refused_by_name() {
     let first = node("second", "first");
     let _publisher = first.publisher(topics::ARM_STATE).expect("publisher");

@@ -11,6 +11,8 @@ use std::time::{Duration, Instant};
 /// How late a sleeper at most hears a ring that iceoryx2 0.10 lost. A listener that empties its socket between the sender's ring and
 /// the mark the sender makes of it sleeps on a mark that keeps all later rings from being sent; it reads the mark when it lies down anew.
 const TURN: Duration = Duration::from_millis(5);
+/// Nobody lies down for less: a socket's timeout is in microseconds, and none of them means for ever.
+const TICK: Duration = Duration::from_micros(100);
 
 /// Receives messages of one topic, oldest first.
 #[derive(Debug)]
@@ -97,9 +99,14 @@ impl Wake {
         let end = Instant::now() + timeout;
         loop {
             let left = end.saturating_duration_since(Instant::now());
-            match self.listener.timed_wait(|_| (), left.min(TURN)) {
+            let heard = if left < TICK {
+                self.listener.try_wait(|_| ())
+            } else {
+                self.listener.timed_wait(|_| (), left.min(TURN))
+            };
+            match heard {
                 // A ring that arrives just as the one before it is answered is answered with it, and wakes once more for nothing.
-                Ok(0) if !left.is_zero() => {}
+                Ok(0) if left >= TICK => {}
                 Ok(count) => return Ok(count > 0),
                 Err(ListenerWaitError::InterruptSignal) => return Ok(false),
                 Err(e) => return Err(TransportError::Port { topic: self.topic, what: format!("{e:?}") }),
