@@ -83,7 +83,10 @@ impl Plan {
                     let rounds = usize::try_from(rounds).unwrap_or(1);
                     ((0..all * rounds).collect(), outside, all * rounds / 4, all * rounds / 2)
                 }
-                Extent::Null(worlds) => (Vec::new(), &[], 0, usize::try_from(worlds / 2).unwrap_or(1)),
+                Extent::Null(worlds) => {
+                    let of_kind = if kind == Kind::Strokes { worlds / 2 } else { worlds.div_ceil(2) };
+                    (Vec::new(), &[], 0, usize::try_from(of_kind).unwrap_or(usize::MAX))
+                }
             };
             faults.extend(singles.into_iter().map(|which| (kind, Fault::Single(which))));
             faults.extend(outside.iter().map(|outside| (kind, Fault::Outside(*outside))));
@@ -124,6 +127,14 @@ mod tests {
                     |worlds: &[(u64, Kind, Fault)]| worlds.iter().filter(|(_, k, f)| *k == kind && sort(f)).count();
                 assert!(count(half).abs_diff(count(&worlds) - count(half)) <= 4, "{kind:?}");
             }
+        }
+    }
+
+    #[test]
+    fn so_many_worlds_without_anything_wrong_are_met_as_were_asked_for() {
+        for asked in [0, 1, 8, 301] {
+            let worlds = Plan { extent: Extent::Null(asked), clips: 8, seed: 1 }.worlds();
+            assert!(worlds.len() as u64 == asked && worlds.iter().all(|(_, _, fault)| *fault == Fault::Nothing));
         }
     }
 

@@ -11,7 +11,6 @@ use crate::diagnose::cell_clips::CellClips;
 use crate::diagnose::evidence::Evidence;
 use crate::diagnose::fit::{Bench, Effort, FittedClip, Hypothesis};
 use crate::diagnose::gap::Residuals;
-use crate::diagnose::ground::Ground;
 use crate::diagnose::library::Library;
 use crate::diagnose::split::{self, Split};
 use crate::diagnose::sweep::Precision;
@@ -42,8 +41,8 @@ pub fn examine(world: &World, clips: Vec<Clip>, interrupt: &Interrupt) -> Result
     let options = Options { theta: None, seed: world.number };
     let found = diagnose_clips(&session, &admitted, &options, interrupt)?;
     let base = setting::complete(&world.cell, None)?;
-    let ground = Ground::of(&admitted.clips).filter(|_| with_object);
-    let library = Library::new(&world.cell, &base, ground.as_ref(), &peaks(&world.cell, &admitted, &base)?);
+    let peaks = peaks(&world.cell, &admitted, &base)?;
+    let library = Library::new(&world.cell, &base, admitted.ground().as_ref(), &peaks);
     let theta = |numbers: &[f64]| library.theta(numbers);
     let arm = ArmClips::new(&world.cell, &admitted.clips, theta).map_err(Refused::from)?;
     let split = Split::new(&admitted.groups, options.seed);

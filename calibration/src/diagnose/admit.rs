@@ -1,5 +1,6 @@
 //! Whether the recorded clips can be diagnosed at all; if not, what is missing.
 
+use super::ground::Ground;
 use super::{length, split};
 use crate::forward::arm::one_piece;
 use crate::identify::object::screen::{Screened, screened};
@@ -21,6 +22,14 @@ pub struct Admitted {
     pub with_object: bool,
     /// What a reader has to know about the clips, one sentence each.
     pub warnings: Vec<String>,
+}
+
+impl Admitted {
+    /// Where the objects slid; `None` where it is the arm that the clips are for.
+    #[must_use]
+    pub fn ground(&self) -> Option<Ground> {
+        Ground::of(&self.clips).filter(|_| self.with_object)
+    }
 }
 
 /// Why a session cannot be diagnosed.

@@ -81,7 +81,6 @@ use arm_clips::ArmClips;
 use cell_clips::CellClips;
 use evidence::Evidence;
 use fit::Bench;
-use ground::Ground;
 use library::Library;
 use shared_mem::cell::Cell;
 use shared_mem::recording::Session;
@@ -153,8 +152,7 @@ pub fn diagnose_clips(
     let began = Instant::now();
     let base = setting::complete(&session.cell, options.theta.as_ref())?;
     let peaks = peaks(&session.cell, admitted, &base)?;
-    let ground = Ground::of(&admitted.clips).filter(|_| admitted.with_object);
-    let library = Library::new(&session.cell, &base, ground.as_ref(), &peaks);
+    let library = Library::new(&session.cell, &base, admitted.ground().as_ref(), &peaks);
     let theta = |numbers: &[f64]| library.theta(numbers);
     let mut diagnosis = if admitted.with_object {
         let arm = ArmClips::new(&session.cell, &admitted.clips, theta).map_err(Refused::from)?;
