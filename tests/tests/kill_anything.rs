@@ -70,14 +70,19 @@ fn a_dead_recorder(cell: &Cell, round: u32, moment: Duration) {
     let died = shared_mem::time::now_ns();
     let end = bridge.wait(Duration::from_secs(20)).succeeded();
     let answer = end.json();
-    assert!(answer["cycles"].as_u64() > Some(4000), "the bridge stopped: {answer}");
+    assert_eq!(answer["faults"].as_array().map(Vec::len), Some(0), "the bridge stopped: {answer}");
     assert!(end.stderr.contains("recorder"), "nobody said that the recorder died:\n{}", end.stderr);
     let files = clips(cell, &stem);
     let (last, _) = last_state(&files[0]);
     assert!(died - last < 1_000_000_000, "the last {} ms are missing", (died - last) / 1_000_000);
     assert!(files.len() > 1, "the recording did not go on: {files:?}");
+    // The bridge ends three seconds after the recorder died, or a little later where the machine is busy.
     let (end, _) = last_state(&files[1]);
-    assert!(end > died, "the second file holds nothing newer");
+    assert!(
+        end > died + 1_000_000_000,
+        "nothing was recorded later than {} ms after",
+        end.saturating_sub(died) / 1_000_000
+    );
 }
 
 fn a_dead_twin(cell: &Cell, moment: Duration) {
