@@ -15,9 +15,16 @@ pub const NUMERICS: f64 = 6.0;
 /// The same of an object's poses: what one engine's strokes leave in another's twin in a clip like most, where the
 /// paths end 2 mm and 2 degrees apart.
 pub const ROUGHNESS: f64 = 14.0;
-/// The same in the roughest session: of seven of another engine with nothing wrong one left 19.3, the next 14; one with an
-/// unknown force that pulls at the object 27.5.
+/// The same beside a cause that was found: twice what the roughest session with nothing wrong leaves. One with an unknown
+/// force that pulls at the object leaves 27.5.
 const ROUGHEST: f64 = 23.0;
+/// An object's excess that is a gap: of nine sessions of another engine with nothing wrong the roughest left 10.2, the next
+/// 9.4; five with a cause too weak to be told from others left 15 to 22.
+const GAP_OF_OBJECT: f64 = 13.0;
+/// Where half of the sessions in which no cause is seen have one, as a share of the least gap, and how sharply that turns:
+/// below 7 squared sigmas of the object all six had none, between 8 and 11 three of five, beyond 15 none of five.
+const DOUBTFUL: f64 = 0.75;
+const TURNS_WITHIN: f64 = 0.12;
 /// A cause leaves no more than this share of the gap it closes: of the arm's, and of the object's, whose hits are foretold
 /// less exactly.
 pub const SUBSTITUTE: f64 = 0.03;
@@ -57,6 +64,18 @@ impl Left {
             of_object: before.of_object,
         };
         before.iter().zip(after).map(one).collect()
+    }
+
+    /// What the twin without any effect strays by beyond the noise, in least gaps: of 1 on it is a gap.
+    #[must_use]
+    pub fn gaps(&self) -> f64 {
+        (self.before - self.floor) / if self.of_object { GAP_OF_OBJECT } else { NUMERICS }
+    }
+
+    /// How likely it is that nothing is there where no cause is seen.
+    #[must_use]
+    pub fn is_nothing(&self) -> f64 {
+        1.0 / (1.0 + ((self.gaps() - DOUBTFUL) / TURNS_WITHIN).exp())
     }
 
     /// Whether something structured remains that is no numerics. `clear`: what was found stood out so much that it is

@@ -35,8 +35,15 @@ const ALL_BUT_EXACT: f64 = 99.5;
 /// What is less likely than not is not named.
 const LIKELY: f64 = 0.5;
 
-/// Confidence of a finding that rests on nothing being there, or on something unknown being there.
-const NEGATIVE: f64 = 0.9;
+/// How often it is right, as met in sessions of another engine, that nothing is there where the twin is as near as noise allows, ...
+const NONE: f64 = 0.96;
+/// ... that one of a class is the cause, ...
+const CLASS: f64 = 0.9;
+/// ... and that the cause of a plain gap is unknown (seven of ten); else it was an effect too far from its model.
+const UNKNOWN: f64 = 0.7;
+/// A gap of less than three least ones is seldom that (one of eight): mostly an effect that is too weak to be believed.
+const PLAIN: f64 = 3.0;
+const UNKNOWN_OF_LITTLE: f64 = 0.2;
 
 impl Finding<'_> {
     /// The verdict.
@@ -44,7 +51,7 @@ impl Finding<'_> {
     pub fn verdict(&self) -> Verdict {
         let unlikely = self.rivals.is_empty() && self.confidence < LIKELY;
         if self.effects.is_empty() || !self.confirmed || unlikely {
-            let gap = self.left.iter().any(|left| left.before - left.floor > left.numerics);
+            let gap = self.left.iter().any(|left| left.gaps() > 1.0);
             return if gap || self.drift.is_some() { self.unexplained() } else { self.none() };
         }
         let pushed = self.implausible && self.percent() < ALL_BUT_EXACT;
@@ -64,7 +71,8 @@ impl Finding<'_> {
                  no further than one simulation from another, and in no way that an effect foretells."
             )
         };
-        Verdict { kind: Kind::None, effects: Vec::new(), confidence: NEGATIVE, text }
+        let nothing = self.left.iter().map(Left::is_nothing).fold(1.0, f64::min);
+        Verdict { kind: Kind::None, effects: Vec::new(), confidence: NONE * nothing, text }
     }
 
     /// How many times as far as noise alone would make it the cell strays from the twin without any effect.
@@ -86,7 +94,7 @@ impl Finding<'_> {
     fn class(&self) -> Verdict {
         let all: Vec<String> = self.effects.iter().chain(&self.rivals).map(|name| (*name).to_owned()).collect();
         let text = format!("One of {} causes the gap; these clips cannot tell which.", all.join(", "));
-        Verdict { kind: Kind::Class, effects: all, confidence: NEGATIVE, text }
+        Verdict { kind: Kind::Class, effects: all, confidence: CLASS, text }
     }
 
     /// How much of what is not noise the effects explain, in the group of sensors in which they explain most [%].
@@ -107,13 +115,19 @@ impl Finding<'_> {
             let (verb, share) = (if change > 0.0 { "rises" } else { "falls" }, 100.0 * change.abs());
             format!("; from the first clip to the last the friction {verb} by {share:.0} %, as where a table wears or gets dirty")
         });
+        let plain = self.drift.is_some() || self.left.iter().any(|left| left.gaps() > PLAIN);
+        let (confidence, weak) = if plain {
+            (UNKNOWN, "")
+        } else {
+            (UNKNOWN_OF_LITTLE, "; an effect of the library may also act too weakly to be told in so small a gap")
+        };
         let text = format!(
             "Nothing in the library explains the gap: the cell strays {:.1} times as far from the twin as noise alone would \
-             make it, most in {}{nearest}{drift}.",
+             make it, most in {}{nearest}{drift}{weak}.",
             self.strays(),
             if self.place.is_empty() { "no single place" } else { &self.place }
         );
-        Verdict { kind: Kind::Unexplained, effects: Vec::new(), confidence: NEGATIVE, text }
+        Verdict { kind: Kind::Unexplained, effects: Vec::new(), confidence, text }
     }
 }
 
@@ -150,6 +164,20 @@ mod tests {
         assert!(worn.kind == Kind::Unexplained && worn.text.contains("the friction rises by 38 %"), "{}", worn.text);
         let named = Finding { drift: Some(0.38), ..finding(vec!["payload"], 500.0, 1.5) }.verdict();
         assert_eq!(named.kind, Kind::Named);
+    }
+
+    #[test]
+    fn the_further_the_cell_strays_the_less_sure_it_is_that_nothing_is_there() {
+        let object = |before: f64| {
+            let mut nothing = finding(vec![], before, before);
+            nothing.left[0].of_object = true;
+            nothing.verdict()
+        };
+        let (near, rough, far) = (object(1.5), object(10.5), object(16.0));
+        assert!(near.kind == Kind::None && near.confidence > 0.95, "{near:?}");
+        assert!(rough.kind == Kind::None && (0.4..0.7).contains(&rough.confidence), "{rough:?}");
+        assert!(far.kind == Kind::Unexplained && far.confidence < 0.5 && far.text.contains("too weakly"), "{far:?}");
+        assert!(object(100.0).confidence > 0.6);
     }
 
     #[test]
