@@ -138,24 +138,29 @@ impl<E: Evidence> Bench<'_, E> {
         effort: Effort,
     ) -> Option<Hypothesis> {
         let free = self.free(effects);
+        let holds = |k: &usize| effort.holds_joints && self.library.joints[*k].is_some();
+        let moving: Vec<usize> = free.iter().copied().filter(|k| !holds(k)).collect();
         let count = self.scatter.count();
         let own = |clip: &usize| (*clip, near.map_or_else(|| vec![0.0; count], |near| near.own(*clip, count)));
         let mut clips = self.settled(&full, clips.iter().map(own).collect(), weights)?;
         let mut damping = 1e-4;
-        let mut at = self.linearise(&full, &free, &clips, effort.precision)?;
+        let mut best = None;
         for _ in 1..effort.iterations {
             if self.interrupt.asked() {
                 break;
             }
+            let at = self.linearise(&full, &moving, &clips, effort.precision)?;
             let forms = at.reduced(self.evidence, weights);
-            let holds = |k: &usize| effort.holds_joints && self.library.joints[*k].is_some();
-            let held: Vec<bool> = free.iter().map(holds).collect();
-            let Some((to, to_own)) = self.improved(&full, (&free, &held), (&at, &forms), weights, &mut damping) else {
+            let Some((to, to_own)) = self.improved(&full, &moving, (&at, &forms), weights, &mut damping) else {
+                best = Some(at);
                 break;
             };
             (full, clips) = (to, to_own);
-            at = self.linearise(&full, &free, &clips, effort.precision)?;
         }
+        let at = match best.filter(|_| moving.len() == free.len()) {
+            Some(at) => at,
+            None => self.linearise(&full, &free, &clips, effort.precision)?,
+        };
         let forms = at.reduced(self.evidence, weights);
         let fitted = clips.into_iter().zip(forms).map(|((clip, own), reduced)| FittedClip { clip, own, reduced });
         Some(Hypothesis { effects: effects.to_vec(), full, free, fitted: fitted.collect() })
@@ -177,7 +182,7 @@ impl<E: Evidence> Bench<'_, E> {
     fn improved(
         &self,
         full: &[f64],
-        (free, held): (&[usize], &[bool]),
+        free: &[usize],
         (at, forms): (&Swept, &[Reduced]),
         weights: &[f64],
         damping: &mut f64,
@@ -187,7 +192,7 @@ impl<E: Evidence> Bench<'_, E> {
         let kept: Vec<(usize, Vec<f64>)> = at.clips.iter().map(|clip| (clip.clip, clip.own.clone())).collect();
         let now = self.cost(full, &kept, weights)?;
         for _ in 0..TRIALS {
-            let step = self.bounded_step(full, (free, held), &sum, *damping);
+            let step = self.bounded_step(full, free, &sum, *damping);
             let promised = sum[(0, 0)] - quadratic::value(&sum, &(1..size).collect::<Vec<_>>(), step.as_slice());
             let mut to = full.to_vec();
             free.iter().zip(step.iter()).for_each(|(k, step)| to[*k] += step);
@@ -209,14 +214,8 @@ impl<E: Evidence> Bench<'_, E> {
         None
     }
 
-    /// A damped step that keeps numbers at a bound there when they are pushed against it, and those that are `held`.
-    fn bounded_step(
-        &self,
-        full: &[f64],
-        (free, held): (&[usize], &[bool]),
-        sum: &DMatrix<f64>,
-        damping: f64,
-    ) -> DVector<f64> {
+    /// A damped step that keeps numbers at a bound there when they are pushed against it.
+    fn bounded_step(&self, full: &[f64], free: &[usize], sum: &DMatrix<f64>, damping: f64) -> DVector<f64> {
         let mut form = sum.clone();
         for k in 1..form.ncols() {
             form[(k, k)] *= 1.0 + damping;
@@ -226,7 +225,7 @@ impl<E: Evidence> Bench<'_, E> {
             (unknown.lower - full[free[i]], unknown.upper - full[free[i]])
         };
         let mut step = DVector::zeros(free.len());
-        let mut held = held.to_vec();
+        let mut held = vec![false; free.len()];
         loop {
             let moving: Vec<usize> = (0..free.len()).filter(|i| !held[*i]).collect();
             // What is held at a bound pulls on the others: its share of the slope moves into the constant column.
