@@ -2,6 +2,7 @@
 //! stand in for a part of it.
 
 use super::combine::{FIRST_PASS, LEAST, PLAIN, Step, Trial};
+use super::confidence;
 use super::evidence::Evidence;
 use super::fit::{Bench, Hypothesis};
 use super::split::Split;
@@ -13,7 +14,8 @@ const TRIED_AGAIN: usize = 2;
 
 impl Step {
     /// Compares the best trial, fitted to the end, with its nearest rivals once more, each with the object found anew under
-    /// it: with an object that stands in for part of an effect a fit ends somewhere else than with the right one.
+    /// it: with an object that stands in for part of an effect a fit ends somewhere else than with the right one. What acts on
+    /// the arm the arm's own channels tell apart, so there only those are rivals that still look alike.
     pub(super) fn try_again<E: Evidence>(
         &mut self,
         bench: &Bench<'_, E>,
@@ -23,12 +25,16 @@ impl Step {
     ) {
         let added = best.effects.last().and_then(|c| self.trials.iter().position(|t| t.scored.candidate == *c));
         let Some(added) = added.filter(|place| self.trials[*place].own_numbers) else { return };
-        if bench.library.candidates[self.trials[added].scored.candidate].is_of_arm() {
-            return;
-        }
         self.judge(bench, split, added, best.clone());
-        let least = RIVAL * self.trials[added].nats();
-        self.with_object_anew(bench, split, |k, trial| k != added && trial.nats() > least, refined);
+        let chosen = self.trials[added].scored.candidate;
+        if bench.library.candidates[chosen].is_of_arm() {
+            let alike = confidence::rivals(self, chosen, 1.0);
+            self.with_object_anew(bench, split, |_, trial| alike.contains(&trial.scored.candidate), refined);
+        } else {
+            let least = RIVAL * self.trials[added].nats();
+            let near = |k, trial: &Trial| k != added && trial.nats() > least && !of_arm(bench, trial);
+            self.with_object_anew(bench, split, near, refined);
+        }
     }
 
     /// Where no trial is worth it, those that close much of the gap are given the object anew before they are given up: what
@@ -40,11 +46,12 @@ impl Step {
         refined: &impl Fn(&[f64]) -> Option<Vec<f64>>,
     ) {
         if self.best(bench).is_none() && bench.scatter.count() > 0 {
-            self.with_object_anew(bench, split, |_, trial| trial.nats() > LEAST && trial.closes > PLAIN, refined);
+            let much = |_, trial: &Trial| trial.nats() > LEAST && trial.closes > PLAIN && !of_arm(bench, trial);
+            self.with_object_anew(bench, split, much, refined);
         }
     }
 
-    /// Fits the best of the trials beyond the arm that are `wanted` again, with the object found anew under each.
+    /// Fits the best of the trials that are `wanted` again, with the object found anew under each.
     fn with_object_anew<E: Evidence>(
         &mut self,
         bench: &Bench<'_, E>,
@@ -52,9 +59,7 @@ impl Step {
         wanted: impl Fn(usize, &Trial) -> bool,
         refined: &impl Fn(&[f64]) -> Option<Vec<f64>>,
     ) {
-        let of_arm = |trial: &Trial| bench.library.candidates[trial.scored.candidate].is_of_arm();
-        let asked = |k: &usize| !of_arm(&self.trials[*k]) && wanted(*k, &self.trials[*k]);
-        let mut places: Vec<usize> = (0..self.trials.len()).filter(asked).collect();
+        let mut places: Vec<usize> = (0..self.trials.len()).filter(|k| wanted(*k, &self.trials[*k])).collect();
         places.sort_by(|a, b| self.trials[*b].nats().total_cmp(&self.trials[*a].nats()));
         for place in places.into_iter().take(TRIED_AGAIN) {
             let Some((fit, _)) = self.trials[place].fitted.clone() else { continue };
@@ -66,4 +71,8 @@ impl Step {
             }
         }
     }
+}
+
+fn of_arm<E>(bench: &Bench<'_, E>, trial: &Trial) -> bool {
+    bench.library.candidates[trial.scored.candidate].is_of_arm()
 }

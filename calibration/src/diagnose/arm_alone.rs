@@ -1,10 +1,17 @@
 //! Clips with an object as if only the arm had been recorded. What the joints' own channels tell about an effect in the
 //! joints needs no object, and simulating the arm up to the touch takes a tenth of the time of a whole stroke.
 
+use super::combine::{FIRST_PASS, HEAT, LOOK, NEAR, Step};
 use super::evidence::{Channel, Evidence, Reach, Row};
-use super::fit::Bench;
+use super::fit::{Bench, Hypothesis};
 use super::scatter::Scatter;
+use super::split::Split;
+use super::{flat, starts};
 use crate::estimate::{ClipModel, Impossible};
+use crate::progress::Progress;
+
+/// What leaves more of the gain of the best on the arm's own channels than this share is not what acts there.
+const NEAR_ON_ARM: f64 = 0.1;
 
 /// The same clips, rows and channels; residuals of the object are zero, and clips have no numbers of their own.
 pub struct ArmAlone<'a, E>(pub &'a E);
@@ -13,6 +20,46 @@ impl<E: Evidence> ArmAlone<'_, E> {
     /// A bench for these.
     pub fn bench<'b>(&'b self, whole: &Bench<'b, E>) -> Bench<'b, Self> {
         Bench { evidence: self, library: whole.library, scatter: Scatter::default(), interrupt: whole.interrupt }
+    }
+}
+
+impl Step {
+    /// Fits trials of effects in the joints, at their `places`: to the arm's own channels first; those that explain these about
+    /// as well as the best of them are looked at once with the object as well. What an object does after it was hit a little
+    /// elsewhere is no judge of joints.
+    pub(super) fn fitted_to_the_arm_first<E: Evidence>(
+        &self,
+        bench: &Bench<'_, E>,
+        split: &Split,
+        (places, overlooked): (&[usize], bool),
+        bar: &Progress,
+    ) -> Vec<(usize, Hypothesis)> {
+        let (evidence, weights) = (ArmAlone(bench.evidence), &self.weights);
+        let arm = evidence.bench(bench);
+        let at = (&self.from, &weights[..]);
+        let fit = |effects: &[usize], full, effort| arm.fit((effects, full), &split.train, weights, None, effort);
+        let alone = |place: &usize| {
+            let scored = &self.trials[*place].scored;
+            bar.show(50, bench.library.candidates[scored.candidate].effect.name);
+            let effects = [&self.from.effects[..], &[scored.candidate]].concat();
+            let starts = starts::of(&arm, at, scored, overlooked).into_iter();
+            let begun = starts.filter_map(|start| fit(&effects, start, HEAT));
+            let best = begun.min_by(|a, b| a.deviance().total_cmp(&b.deviance()))?;
+            Some((*place, fit(&effects, best.full, FIRST_PASS)?))
+        };
+        let told = |place: &usize| if bench.interrupt.asked() { None } else { alone(place) };
+        let all: Vec<(usize, Hypothesis)> = places.iter().filter_map(told).collect();
+        let Some(from) = fit(&self.from.effects, self.from.full.clone(), LOOK) else { return Vec::new() };
+        let best = all.iter().map(|(_, fit)| fit.deviance()).fold(from.deviance(), f64::min);
+        let near = best + NEAR.max(NEAR_ON_ARM * (from.deviance() - best));
+        let with_object = |(place, alone): (usize, Hypothesis)| {
+            let candidate = self.trials[place].scored.candidate;
+            let mut open = flat::seen_by_nothing(&arm, &alone, candidate);
+            open.retain(|k| bench.library.joints[*k].is_none());
+            let full = starts::seen_by_the_object(bench, at, alone.full, &open);
+            Some((place, bench.extend(&self.from, (candidate, full), &split.train, weights, LOOK)?))
+        };
+        all.into_iter().filter(|(_, alone)| alone.deviance() < near).filter_map(with_object).collect()
     }
 }
 
@@ -60,11 +107,53 @@ impl<E: Evidence> Evidence for ArmAlone<'_, E> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::combine::Trial;
     use super::super::fit::Effort;
+    use super::super::score::Foretold;
     use super::super::sweep::Precision;
-    use super::super::test_bench::{on_strokes, shipped};
+    use super::super::test_bench::{nothing_said_of, on_strokes, shipped};
     use super::*;
+    use crate::benchmark::draw;
     use crate::benchmark::world::{Fault, Kind, World};
+
+    #[test]
+    fn the_arm_tells_its_effects_apart_and_the_object_what_the_arm_leaves_open() {
+        let cell = shipped();
+        let off = draw::candidates(true).iter().position(|effect| effect.name == "joint_encoder_offset");
+        let world = World::draw(48, Kind::Strokes, Fault::Single(off.expect("an effect")), &cell);
+        on_strokes((&cell, &world), |bench, even| {
+            let library = bench.library;
+            let hidden = library.settings.numbers(&world.hidden);
+            let mut full = library.start();
+            for k in library.baseline.clone() {
+                full[k] = hidden[k].unwrap_or(full[k]);
+            }
+            let asked = ["base_tilt", "joint_encoder_offset"].map(|name| library.find(name).expect("a candidate"));
+            let trial = |candidate: usize| Trial {
+                scored: nothing_said_of(library, candidate),
+                fitted: None,
+                closes: 0.0,
+                own_numbers: true,
+            };
+            let step = Step {
+                from: bench.fit((&[], full), &[0, 1], even, None, LOOK).expect("a fit"),
+                foretold: Foretold { clips: Vec::new() },
+                trials: asked.into_iter().map(trial).collect(),
+                weights: even.to_vec(),
+                arm_rows: 0,
+                left: Vec::new(),
+                whole: Vec::new(),
+            };
+            let split = Split { train: vec![0, 1], choose: Vec::new(), confirm: Vec::new() };
+            let bar = Progress::new("nothing", 1);
+            let found = step.fitted_to_the_arm_first(bench, &split, (&[0, 1], false), &bar);
+            let [(1, fit)] = &found[..] else { panic!("{} fits", found.len()) };
+            let sizes = &library.candidates[asked[1]].sizes;
+            let [turned, lifted] = [0, 1].map(|joint| (fit.full[sizes[joint]], hidden[sizes[joint]].expect("hidden")));
+            assert!((lifted.0 - lifted.1).abs() < 1e-4, "gravity tells it: {lifted:?}");
+            assert!((turned.0 - turned.1).abs() < 5e-3, "only the hit tells it: {turned:?}");
+        });
+    }
 
     #[test]
     fn the_object_is_silent_and_fits_turn_what_they_may() {

@@ -1,7 +1,6 @@
 //! Which effects act together: effects are added while that foretells clips better, and dropped or swapped when they are
 //! not needed any more.
 
-use super::arm_alone::ArmAlone;
 use super::closing::closes;
 use super::evidence::{Evidence, Row};
 use super::fit::{Bench, Effort, Hypothesis};
@@ -17,7 +16,7 @@ use super::split::Split;
 use super::starts;
 use super::straying;
 use super::sweep::{Point, Precision, Swept, sweep};
-use super::worthy::{overlooked, seen_when_clips_stray_little, worthy};
+use super::worthy::{overlooked, seen_when_clips_stray_little, strays, worthy};
 use crate::progress::Progress;
 use nalgebra::DMatrix;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -25,11 +24,11 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 /// At most so many effects are named.
 pub const MOST: usize = 4;
 /// Every candidate's fit gets so many linearisations from its signature on; those that come near the best get more.
-const HEAT: Effort = Effort::of(3, Precision::Joints);
-const LOOK: Effort = Effort::of(1, Precision::Joints);
+pub(super) const HEAT: Effort = Effort::of(3, Precision::Joints);
+pub(super) const LOOK: Effort = Effort::of(1, Precision::Joints);
 pub(super) const FIRST_PASS: Effort = Effort::of(6, Precision::Joints);
 /// Near is this far from the best deviance, or this share of what the best gains.
-const NEAR: f64 = 40.0;
+pub(super) const NEAR: f64 = 40.0;
 const NEAR_SHARE: f64 = 0.4;
 /// A new effect must be worth at least this [nats], more than twice its error, and more than its numbers cost.
 pub(super) const LEAST: f64 = 4.0;
@@ -163,6 +162,12 @@ pub fn search<E: Evidence>(
     let mut steps: Vec<Step> = Vec::new();
     let mut now = baseline;
     loop {
+        if let Some(first) = steps.first().filter(|first| spent(bench, split, first, &now)) {
+            let last = last_step(bench, split, &now, first)?;
+            now = last.from.clone();
+            steps.push(last);
+            break;
+        }
         let mut step = step(bench, split, &now, steps.first().map(|first| &first.left), bar)?;
         step.reconsider(bench, split, refined);
         let best = step.best(bench).map(|(_, fit, _)| fit.clone());
@@ -170,7 +175,7 @@ pub fn search<E: Evidence>(
         let weights = step.weights.clone();
         steps.push(step);
         match best {
-            Some(best) if now.effects.len() < MOST && !bench.interrupt.asked() && !spent(bench, split, &steps) => {
+            Some(best) if now.effects.len() < MOST && !bench.interrupt.asked() => {
                 now = settled(bench, split, (&best, &weights), refined)?;
                 let step = steps.last_mut()?;
                 step.try_again(bench, split, &now, refined);
@@ -188,10 +193,9 @@ pub fn search<E: Evidence>(
 
 /// Whether the effects found so far leave no more than numerics do: a further one would only name how engines differ. The
 /// first effect is never held back by this.
-fn spent<E: Evidence>(bench: &Bench<'_, E>, split: &Split, steps: &[Step]) -> bool {
-    let [first, .., now] = steps else { return false };
-    let typical = |step: &Step| Residuals::at(bench, &step.from, &split.choose).map(|left| left.typical());
-    let (Some(before), Some(after)) = (typical(first), typical(now)) else { return false };
+fn spent<E: Evidence>(bench: &Bench<'_, E>, split: &Split, first: &Step, now: &Hypothesis) -> bool {
+    let typical = |hypothesis| Residuals::at(bench, hypothesis, &split.choose).map(|left| left.typical());
+    let (Some(before), Some(after)) = (typical(&first.from), typical(now)) else { return false };
     Left::of_groups(&before, &after)
         .iter()
         .all(|left| left.after - left.floor <= NUMERICS.max(NUMERICS_SHARE * (left.before - left.floor)))
@@ -259,8 +263,10 @@ fn step<E: Evidence>(
     let of_arm = |row: &&Row| bench.evidence.channels()[row.channel].joint.is_some();
     let arm_rows = split.open().iter().map(|clip| bench.evidence.rows(*clip).iter().filter(of_arm).count()).sum();
     let left = Residuals::at(bench, &from, &split.open()).map(|left| left.typical()).unwrap_or_default();
-    let mut promising = worthy(bench, (&from, &weights), &scored, &left);
-    for seen in seen_when_clips_stray_little(bench, &from, &narrow) {
+    let whole = whole.unwrap_or(&left).clone();
+    let mut promising = worthy(bench, (&from, &weights), &scored, (&whole, &left));
+    let seen = if strays(&whole, &left) { Vec::new() } else { seen_when_clips_stray_little(bench, &from, &narrow) };
+    for seen in seen {
         if !promising.contains(&seen.candidate) {
             promising.push(seen.candidate);
             scored.iter_mut().filter(|s| s.candidate == seen.candidate).for_each(|s| *s = seen.clone());
@@ -269,7 +275,6 @@ fn step<E: Evidence>(
     let own_numbers = bench.scatter.count() > 0;
     let trial = |scored: &Scored| Trial { scored: scored.clone(), fitted: None, closes: 0.0, own_numbers };
     let trials = scored.iter().map(trial).collect();
-    let whole = whole.unwrap_or(&left).clone();
     let mut step = Step { from, foretold, trials, weights, arm_rows, left, whole };
     step.fit(bench, split, (&promising, false), bar);
     if step.best(bench).is_none() {
@@ -277,6 +282,16 @@ fn step<E: Evidence>(
         step.fit(bench, split, (&rest, true), bar);
     }
     Some(step)
+}
+
+/// The step at whose start nothing is left that could be tried: the hypothesis with the weights that it leaves itself.
+fn last_step<E: Evidence>(bench: &Bench<'_, E>, split: &Split, now: &Hypothesis, first: &Step) -> Option<Step> {
+    let left = Residuals::at(bench, now, &split.train)?;
+    let weights = floor::weights(bench.evidence, &left.clips);
+    let from = bench.fit((&now.effects, now.full.clone()), &split.train, &weights, Some(now), FIRST_PASS)?;
+    let foretold = foretell(bench, &from, &split.choose, &weights)?;
+    let left = Residuals::at(bench, &from, &split.open())?.typical();
+    Some(Step { from, foretold, trials: Vec::new(), weights, left, ..first.clone() })
 }
 
 impl Step {
@@ -289,21 +304,24 @@ impl Step {
         (wanted, overlooked): (&[usize], bool),
         bar: &Progress,
     ) {
-        let mut fits = Vec::new();
-        for (done, place) in
-            (0..self.trials.len()).filter(|k| wanted.contains(&self.trials[*k].scored.candidate)).enumerate()
-        {
+        let asked: Vec<usize> =
+            (0..self.trials.len()).filter(|k| wanted.contains(&self.trials[*k].scored.candidate)).collect();
+        let on_arm = |place: &usize| {
+            self.trials[*place].own_numbers
+                && bench.library.candidates[self.trials[*place].scored.candidate].is_of_arm()
+        };
+        let (of_arm, others): (Vec<usize>, Vec<usize>) = asked.into_iter().partition(on_arm);
+        let mut fits = self.fitted_to_the_arm_first(bench, split, (&of_arm, overlooked), bar);
+        for (done, place) in others.into_iter().enumerate() {
             if bench.interrupt.asked() {
                 return;
             }
             let scored = &self.trials[place].scored;
             bar.show(50 + (done as u64 * 5).min(45), bench.library.candidates[scored.candidate].effect.name);
-            let starts = if overlooked {
-                starts::scanned(bench, (&self.from, &self.weights), scored)
-            } else {
-                starts::starts(bench, (&self.from, &self.weights), scored)
-            };
-            let heats = starts.into_iter().filter_map(|start| self.heat(bench, split, scored.candidate, start));
+            let starts = starts::of(bench, (&self.from, &self.weights), scored, overlooked);
+            let effort = bench.trying(scored.candidate, HEAT);
+            let heat = |start| bench.extend(&self.from, (scored.candidate, start), &split.train, &self.weights, effort);
+            let heats = starts.into_iter().filter_map(heat);
             fits.extend(heats.min_by(|a, b| a.deviance().total_cmp(&b.deviance())).map(|fit| (place, fit)));
         }
         let best = fits.iter().map(|(_, fit)| fit.deviance()).fold(self.from.deviance(), f64::min);
@@ -314,27 +332,6 @@ impl Step {
             let nearer = if fit.deviance() < near { more() } else { None };
             self.judge(bench, split, place, nearer.unwrap_or(fit));
         }
-    }
-
-    /// A little of a fit. Where the joints' own channels alone tell the candidate's numbers, they are fitted to the arm alone
-    /// first, and the object is looked at once.
-    fn heat<E: Evidence>(
-        &self,
-        bench: &Bench<'_, E>,
-        split: &Split,
-        candidate: usize,
-        start: Vec<f64>,
-    ) -> Option<Hypothesis> {
-        let effort = bench.trying(candidate, HEAT);
-        let of_joints = bench.library.candidates[candidate].turned.iter().all(|k| bench.library.joints[*k].is_some());
-        if bench.scatter.count() == 0 || !of_joints {
-            return bench.extend(&self.from, (candidate, start), &split.train, &self.weights, effort);
-        }
-        let mut effects = self.from.effects.clone();
-        effects.push(candidate);
-        let arm = ArmAlone(bench.evidence);
-        let alone = arm.bench(bench).fit((&effects, start), &split.train, &self.weights, None, effort)?;
-        bench.extend(&self.from, (candidate, alone.full), &split.train, &self.weights, LOOK)
     }
 
     /// Notes a fit of a trial with what it foretells and closes.

@@ -13,33 +13,45 @@ const LEAST: f64 = 1.0;
 /// The hypothesis with the sizes of its effects on the arm at rest that nothing depends on, and no longer free.
 #[must_use]
 pub fn without<E: Evidence>(bench: &Bench<'_, E>, hypothesis: &Hypothesis) -> Hypothesis {
-    let even = vec![1.0; bench.evidence.channels().len()];
-    let cost = |full: &[f64]| bench.plain_cost(hypothesis, full, &even).unwrap_or(f64::INFINITY);
-    let now = cost(&hypothesis.full);
     let mut out = hypothesis.clone();
     for effect in &hypothesis.effects {
-        let candidate = &bench.library.candidates[*effect];
-        // Of one number it is known that something depends on it: it was found.
-        if !candidate.is_of_arm() || candidate.sizes.len() < 2 {
-            continue;
-        }
-        for k in &candidate.sizes {
-            let resting = bench.library.unknowns[*k].start;
-            let at = |value: f64| {
-                let mut full = out.full.clone();
-                full[*k] = value;
-                full
-            };
-            let alike = |value: f64| (cost(&at(value)) - now).abs() < LEAST.max(SHARE * now);
-            // A number that was found to be at rest is known: what it does elsewhere tells. A limit that is never reached is
-            // none, wherever it is.
-            let never_reached = candidate.effect.name == TORQUE_SATURATION;
-            if alike(resting) && (never_reached || candidate.strongest(*k, resting).is_some_and(alike)) {
-                out = held(out, *k, resting);
-            }
+        for k in seen_by_nothing(bench, hypothesis, *effect) {
+            out = held(out, k, bench.library.unknowns[k].start);
         }
     }
     out
+}
+
+/// The sizes of an effect on the arm that nothing depends on.
+#[must_use]
+pub fn seen_by_nothing<E: Evidence>(bench: &Bench<'_, E>, hypothesis: &Hypothesis, effect: usize) -> Vec<usize> {
+    let candidate = &bench.library.candidates[effect];
+    // Of one number it is known that something depends on it: it was found.
+    if !candidate.is_of_arm() || candidate.sizes.len() < 2 {
+        return Vec::new();
+    }
+    let even = vec![1.0; bench.evidence.channels().len()];
+    let cost = |full: &[f64]| bench.plain_cost(hypothesis, full, &even).unwrap_or(f64::INFINITY);
+    let now = cost(&hypothesis.full);
+    let mut full = hypothesis.full.clone();
+    let mut unseen = Vec::new();
+    for k in &candidate.sizes {
+        let resting = bench.library.unknowns[*k].start;
+        let at = |value: f64| {
+            let mut full = full.clone();
+            full[*k] = value;
+            full
+        };
+        let alike = |value: f64| (cost(&at(value)) - now).abs() < LEAST.max(SHARE * now);
+        // A number that was found to be at rest is known: what it does elsewhere tells. A limit that is never reached is none,
+        // wherever it is.
+        let never_reached = candidate.effect.name == TORQUE_SATURATION;
+        if alike(resting) && (never_reached || candidate.strongest(*k, resting).is_some_and(alike)) {
+            full[*k] = resting;
+            unseen.push(*k);
+        }
+    }
+    unseen
 }
 
 /// The hypothesis with a number that has another value and is no longer free.

@@ -151,6 +151,12 @@ impl Library {
         }
     }
 
+    /// Whether the arm feels a candidate in one of its forms.
+    #[must_use]
+    pub fn arm_may_feel(&self, candidate: usize) -> bool {
+        self.candidates[candidate].numbers.clone().any(|k| !matches!(self.reaches[k], ArmReach::Never))
+    }
+
     /// Those of the numbers that the arm feels.
     #[must_use]
     pub fn felt_by_arm(&self, numbers: &[f64]) -> Vec<f64> {

@@ -19,12 +19,24 @@ const SCANNED: [f64; 4] = [0.06, 0.2, 0.5, 1.0];
 
 /// Units of a probe at which each direction of one with a threshold is tried.
 const STEPPED: [f64; 6] = [0.95, 1.05, 1.15, 1.3, 1.6, 2.2];
+/// Units of a probe at which a number that only the object tells is tried: all of what is met in practice.
+const ALL_ALONG: [f64; 10] = [-9.0, -7.0, -5.0, -3.0, -1.0, 1.0, 3.0, 5.0, 7.0, 9.0];
+
+/// Numbers at which fits of a candidate begin; `overlooked`: the score test did not point to it.
+pub(super) fn of<E: Evidence>(
+    bench: &Bench<'_, E>,
+    at: (&Hypothesis, &[f64]),
+    scored: &Scored,
+    overlooked: bool,
+) -> Vec<Vec<f64>> {
+    if overlooked { scanned(bench, at, scored) } else { pointed_at(bench, at, scored) }
+}
 
 /// Numbers at which fits of a candidate begin: where the score test points. Of an effect with many forms (a place on the
 /// table) also the forms next to the best; of one beyond the arm also some way to either side, since the object's numbers,
 /// fitted without it, stand in for a part of it; of one whose slope at one point tells little, as where the object is hit
 /// elsewhere, also where the clips cost least.
-pub(super) fn starts<E: Evidence>(bench: &Bench<'_, E>, at: (&Hypothesis, &[f64]), scored: &Scored) -> Vec<Vec<f64>> {
+fn pointed_at<E: Evidence>(bench: &Bench<'_, E>, at: (&Hypothesis, &[f64]), scored: &Scored) -> Vec<Vec<f64>> {
     let candidate = &bench.library.candidates[scored.candidate];
     let mut starts = vec![scored.clone()];
     if candidate.effect.stage == Stage::Slide {
@@ -42,7 +54,7 @@ pub(super) fn starts<E: Evidence>(bench: &Bench<'_, E>, at: (&Hypothesis, &[f64]
     }
     let mut numbers: Vec<Vec<f64>> = starts.iter().map(|start| bench.begun(at.0.full.clone(), start)).collect();
     if candidate.effect.name == TORQUE_SATURATION {
-        numbers.push(one_by_one(bench, at, scored));
+        numbers.push(one_by_one(bench, at, numbers[0].clone(), &candidate.sizes, &STEPPED));
     }
     if candidate.effect.name == TORQUE_RIPPLE {
         numbers.extend(ripple::start(bench, at, scored.candidate));
@@ -55,7 +67,7 @@ pub(super) fn starts<E: Evidence>(bench: &Bench<'_, E>, at: (&Hypothesis, &[f64]
 }
 
 /// Of a candidate that the score test did not point to, the strength at which the fitted clips cost least, in any form.
-pub(super) fn scanned<E: Evidence>(bench: &Bench<'_, E>, at: (&Hypothesis, &[f64]), scored: &Scored) -> Vec<Vec<f64>> {
+fn scanned<E: Evidence>(bench: &Bench<'_, E>, at: (&Hypothesis, &[f64]), scored: &Scored) -> Vec<Vec<f64>> {
     let forms = 0..bench.library.candidates[scored.candidate].alternatives.len();
     let starts = forms.flat_map(|alternative| aside(bench, &Scored { alternative, ..scored.clone() }, &SCANNED));
     let numbers = starts.map(|start| bench.begun(at.0.full.clone(), &start));
@@ -90,21 +102,38 @@ pub(super) fn least_cost_aside<E: Evidence>(
     cheapest(bench, at, numbers)
 }
 
-/// Each direction of a candidate, one after the other, at the strength at which the clips cost least beside those before it:
-/// from rest no slope leads there.
-fn one_by_one<E: Evidence>(bench: &Bench<'_, E>, at: (&Hypothesis, &[f64]), scored: &Scored) -> Vec<f64> {
-    let probes = &bench.library.candidates[scored.candidate].alternatives[scored.alternative].probes;
-    let mut best = Scored { units: vec![0.0; probes.len()], ..scored.clone() };
-    for probe in 0..probes.len() {
-        let tried = [0.0].iter().chain(&STEPPED).map(|units| {
-            let mut tried = best.clone();
-            tried.units[probe] = *units;
-            let cost = bench.plain_cost(at.0, &bench.begun(at.0.full.clone(), &tried), at.1);
-            (cost.unwrap_or(f64::INFINITY), tried)
+/// Numbers of an effect in the joints that the arm's own channels leave open, where the object tells them: nothing but what
+/// the tip hits says how far off a vertical joint's encoder is. `full`: the others, as the arm tells them.
+pub(super) fn seen_by_the_object<E: Evidence>(
+    bench: &Bench<'_, E>,
+    at: (&Hypothesis, &[f64]),
+    full: Vec<f64>,
+    open: &[usize],
+) -> Vec<f64> {
+    one_by_one(bench, at, full, open, &ALL_ALONG)
+}
+
+/// Numbers of a candidate, one after the other, where the clips cost least beside those before it: from rest no slope leads
+/// there. `units` of each number's probe are tried, and rest.
+fn one_by_one<E: Evidence>(
+    bench: &Bench<'_, E>,
+    at: (&Hypothesis, &[f64]),
+    mut full: Vec<f64>,
+    numbers: &[usize],
+    units: &[f64],
+) -> Vec<f64> {
+    let probes = bench.library.candidates.iter().flat_map(|candidate| &candidate.alternatives[0].probes);
+    let moves: Vec<(usize, f64)> = probes.filter_map(|probe| probe.moves.first().copied()).collect();
+    for (number, probed) in moves.into_iter().filter(|(number, _)| numbers.contains(number)) {
+        let unknown = &bench.library.unknowns[number];
+        let tried = [0.0].iter().chain(units).map(|units| {
+            let mut tried = full.clone();
+            tried[number] = (unknown.start + units * (probed - unknown.start)).clamp(unknown.lower, unknown.upper);
+            tried
         });
-        best = tried.min_by(|a, b| a.0.total_cmp(&b.0)).map_or(best.clone(), |(_, tried)| tried);
+        full = cheapest(bench, at, tried.collect::<Vec<_>>().into_iter()).map_or(full, |(_, full)| full);
     }
-    bench.begun(at.0.full.clone(), &best)
+    full
 }
 
 /// The numbers with the baseline's object as cell.toml has it, but for its friction: how far it slides tells that whatever
@@ -168,7 +197,8 @@ mod tests {
         let scored = nothing_said_of(&library, candidate);
         let begun = on_bench((&cell, &world), &library, |bench, even| {
             let baseline = bench.fit((&[], library.start()), &[0, 1], even, None, ONCE).expect("a fit");
-            one_by_one(bench, (&baseline, even), &scored)
+            let from = bench.begun(library.start(), &scored);
+            one_by_one(bench, (&baseline, even), from, &library.candidates[candidate].sizes, &STEPPED)
         });
         for ((size, share), peak) in library.candidates[candidate].sizes.iter().zip(shares).zip(peaks) {
             let found = (begun[*size] * peak).recip();
@@ -187,7 +217,7 @@ mod tests {
             let candidate = bench.library.find("velocity_dependent_friction").expect("a candidate");
             let baseline = bench.fit((&[], bench.library.start()), &[0, 1], even, None, ONCE).expect("a fit");
             let size = bench.library.candidates[candidate].sizes[0];
-            let from = starts(bench, (&baseline, even), &nothing_said_of(bench.library, candidate));
+            let from = pointed_at(bench, (&baseline, even), &nothing_said_of(bench.library, candidate));
             from.into_iter().map(|full| full[size]).collect::<Vec<f64>>()
         });
         assert!(tried.contains(&0.0), "{tried:?}");

@@ -26,14 +26,15 @@ const SLID: f64 = 0.5 * ROUGHNESS;
 const SPARES: f64 = 0.2;
 
 /// Candidates worth a fit, the arm's and the object's each among themselves: those that the score test cannot rule out, the
-/// best first; of the others only partners that the best is easily taken for. Where the object's gap is not small all effects
+/// best first; of the others only partners that the best is easily taken for. While the arm strays only what the arm feels
+/// is: how an object is hit by an arm that is elsewhere tells nothing of the object. Where the object's gap is not small all effects
 /// on the slide are fitted, where it is large all on the hit as well, and those of the camera that spare much of it
 /// somewhere: a blow answers so unevenly that slopes at one point tell little.
 pub(super) fn worthy<E: Evidence>(
     bench: &Bench<'_, E>,
     (from, weights): (&Hypothesis, &[f64]),
     scored: &[Scored],
-    left: &[Typical],
+    (whole, left): (&[Typical], &[Typical]),
 ) -> Vec<usize> {
     let effect = |s: &Scored| bench.library.candidates[s.candidate].effect;
     let mut all = Vec::new();
@@ -42,9 +43,13 @@ pub(super) fn worthy<E: Evidence>(
         group.map_or(0.0, |group| group.mean_square - group.floor)
     };
     let quiet = left.len() > 1 && beyond(false) < QUIET;
-    for of_arm in [true, false].into_iter().filter(|of_arm| !(*of_arm && quiet)) {
-        let group: Vec<&Scored> =
-            scored.iter().filter(|s| bench.library.candidates[s.candidate].is_of_arm() == of_arm).collect();
+    let strays = strays(whole, left);
+    for of_arm in [true, false].into_iter().filter(|of_arm| if *of_arm { !quiet } else { !strays }) {
+        let of_group = |s: &&Scored| {
+            let is_of_arm = bench.library.candidates[s.candidate].is_of_arm();
+            is_of_arm == of_arm || (strays && bench.library.arm_may_feel(s.candidate))
+        };
+        let group: Vec<&Scored> = scored.iter().filter(of_group).collect();
         let Some(best) = group.first() else { continue };
         let likely = |s: &&&Scored| {
             let visible = !bench.negligible(s.candidate, &bench.begun(from.full.clone(), s));
@@ -60,6 +65,9 @@ pub(super) fn worthy<E: Evidence>(
         let wanted = scored.iter().filter(|s| s.signal > TESTABLE && wanted(s));
         wanted.map(|s| s.candidate).collect()
     };
+    if strays {
+        return all;
+    }
     if beyond(true) > SLID {
         all.extend(more(&|s| effect(s).stage == Stage::Slide && !all.contains(&s.candidate)));
     }
@@ -75,6 +83,11 @@ pub(super) fn worthy<E: Evidence>(
         }));
     }
     all
+}
+
+/// Whether the arm strays by more than numerics beside an object.
+pub(super) fn strays(whole: &[Typical], left: &[Typical]) -> bool {
+    left.len() > 1 && Left::of_groups(whole, left).iter().any(|left| !left.of_object && left.too_much(false))
 }
 
 /// The object's candidates that stand out once clips are held to stray little, whatever else the score test says.
@@ -121,11 +134,39 @@ mod tests {
             let all: Vec<Scored> = (0..bench.library.candidates.len()).map(scored).collect();
             let fitted = |mean_square: f64| {
                 let group = |of_object, mean_square| Typical { mean_square, floor: 1.5, of_object };
-                worthy(bench, (&from, even), &all, &[group(false, 1.5), group(true, mean_square)])
+                let left = [group(false, 1.5), group(true, mean_square)];
+                worthy(bench, (&from, even), &all, (&left, &left))
             };
             let slides = bench.library.candidates.iter().filter(|c| c.effect.stage == Stage::Slide).count();
             assert_eq!(fitted(1.5 + 0.9 * SLID).len(), 0);
             assert_eq!(fitted(1.5 + 1.1 * SLID).len(), slides);
+        });
+    }
+
+    #[test]
+    fn while_the_arm_strays_only_what_it_feels_is_fitted() {
+        let cell = shipped();
+        let world = World::draw(3, Kind::Strokes, Fault::Nothing, &cell);
+        on_strokes((&cell, &world), |bench, even| {
+            let from = bench.fit((&[], bench.library.start()), &[0, 1], even, None, ONCE).expect("a fit");
+            // All of them stand out alike by the score test.
+            let scored = |candidate: usize| {
+                let probe = &bench.library.candidates[candidate].alternatives[0].probes[0];
+                let mut said =
+                    Scored { gain: 100.0, signal: 30.0, p: 0.0, ..nothing_said_of(bench.library, candidate) };
+                said.units[0] = if probe.one_sided { probe.largest } else { 0.5 * probe.largest };
+                said
+            };
+            let all: Vec<Scored> = (0..bench.library.candidates.len()).map(scored).collect();
+            let fitted = |arm: f64| -> Vec<Stage> {
+                let group = |of_object, mean_square| Typical { mean_square, floor: 1.5, of_object };
+                let left = [group(false, arm), group(true, 100.0)];
+                let worthy = worthy(bench, (&from, even), &all, (&left, &left));
+                worthy.into_iter().map(|c| bench.library.candidates[c].effect.stage).collect()
+            };
+            assert!(fitted(3.0).contains(&Stage::Slide));
+            let straying = fitted(50.0);
+            assert!(straying.contains(&Stage::Control) && !straying.contains(&Stage::Slide), "{straying:?}");
         });
     }
 }
