@@ -1,5 +1,6 @@
 //! Clips with an object as if only the arm had been recorded. What the joints' own channels tell about an effect in the
-//! joints needs no object, and simulating the arm up to the touch takes a tenth of the time of a whole stroke.
+//! joints needs no object, and simulating the arm up to the touch takes a tenth of the time of a whole stroke. So effects in
+//! the joints are compared there first, and few of them are taken on to the object.
 
 use super::combine::{FIRST_PASS, HEAT, LOOK, NEAR, Step};
 use super::evidence::{Channel, Evidence, Reach, Row};

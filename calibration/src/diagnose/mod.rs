@@ -9,14 +9,14 @@
 //! | [`admit`] | can the clips be diagnosed at all |
 //! | [`length`] | how much of long clips counts |
 //! | [`split`] | which clips are for what |
-//! | [`evidence`], [`arm_clips`], [`cell_clips`], [`arm_alone`] | what is measured against the twin, and where in a clip |
+//! | [`evidence`], [`arm_clips`], [`cell_clips`] | what is measured against the twin, and where in a clip |
 //! | [`scatter`] | what every clip has of its own |
 //! | [`library`], [`ground`] | the candidates as numbers, and where on the table they can show |
 //! | [`baseline`] | the paper's parameters identified |
 //! | [`noise`], [`floor`] | how far residuals can be trusted |
 //! | [`sweep`], [`quadratic`] | every candidate's signature, linearised once |
 //! | [`shortlist`] | how much of the gap each signature explains |
-//! | [`worthy`], [`starts`], [`ripple`] | which of them are fitted, and where a fit begins |
+//! | [`worthy`], [`arm_alone`], [`starts`], [`ripple`] | which of them are fitted, to the arm first, and where a fit begins |
 //! | [`fit`] | hypotheses fitted |
 //! | [`score`] | how well they foretell clips |
 //! | [`straying`] | how far clips stray under one of them |
