@@ -60,14 +60,18 @@ pub fn separating(effects: &[&str]) -> String {
     }
     match effects {
         [] => String::new(),
-        [one] => {
-            format!("To confirm {one}: repeat two of these clips and add one with half and one with twice the speed.")
-        }
         all => format!(
             "To tell {} apart: slow triangles, a chirp and holds in one clip, with desired and measured torques logged.",
             all.join(", ")
         ),
     }
+}
+
+/// What to record next to confirm what was found.
+#[must_use]
+pub fn confirming(effects: &[String]) -> String {
+    let effects = effects.join(" and ");
+    format!("To confirm {effects}: repeat two of these clips and add one with half and one with twice the speed.")
 }
 
 /// What to record where something unknown is left.
@@ -93,7 +97,10 @@ mod tests {
     }
 
     #[test]
-    fn a_class_of_two_gets_the_clip_that_separates_them() {
+    fn a_class_of_two_gets_the_clip_that_separates_them_and_two_that_act_together_one_that_confirms_them() {
         assert!(separating(&["command_lag", "command_delay"]).contains("10 Hz"));
+        assert!(
+            confirming(&["command_delay".into(), "friction_patch".into()]).contains("delay and friction_patch: repeat")
+        );
     }
 }

@@ -2,7 +2,7 @@
 
 use super::admit::Admitted;
 use super::answer::{Candidate, Change, Clips, Diagnosis, Gap, Nearest, Place, Share, Status};
-use super::combine::{Found, Step};
+use super::combine::{Found, Step, Trial};
 use super::evidence::Evidence;
 use super::fit::{Bench, Hypothesis};
 use super::gap::Residuals;
@@ -107,6 +107,7 @@ pub fn conclude<E: Evidence>(
         next_experiment: match verdict.kind {
             Kind::Unexplained => advice::unexplained(largest),
             Kind::None => "Nothing is open; record the next session as usual.".into(),
+            Kind::Named => advice::confirming(&verdict.effects),
             _ => advice::separating(&verdict.effects.iter().map(String::as_str).collect::<Vec<_>>()),
         },
         verdict,
@@ -232,28 +233,35 @@ fn candidates<E: Evidence>(
 ) -> Vec<Candidate> {
     let first = &found.steps[0];
     let likely = confidence::probabilities(&first.trials, found.last.effects.is_empty());
-    let mut all: Vec<Candidate> = first
-        .trials
-        .iter()
-        .map(|trial| {
-            let effect = trial.scored.candidate;
-            let name = bench.library.candidates[effect].effect.name;
-            let kept = found.last.effects.contains(&effect) && matches!(kind, Kind::Named | Kind::Class);
-            let fit = if kept { Some(&found.last) } else { trial.fitted.as_ref().map(|(fit, _)| fit) };
-            let alone = trial.fitted.as_ref().and_then(|(fit, _)| Residuals::at(bench, fit, &split.confirm));
-            let probability = likely.iter().find(|(candidate, _)| *candidate == effect).map_or(0.0, |(_, p)| *p);
-            let status = status(&trial.scored, kept, finding.rivals.contains(&name), kind);
-            Candidate {
-                effect: name.into(),
-                probability: if kept { probability.max(finding.confidence) } else { probability },
-                parameters: fit.map(|fit| parameters::of_effect(bench, fit, effect)).unwrap_or_default(),
-                shrink: alone.map_or(Share { value: 0.0, ci90: [0.0; 2] }, |alone| alone.shrink(before, seed)),
-                confusable_with: confusable(first, effect, unforeseen, bench),
-                status,
-                why: why(trial, status),
-            }
-        })
-        .collect();
+    let one = |trial: &Trial| {
+        let effect = trial.scored.candidate;
+        let name = bench.library.candidates[effect].effect.name;
+        let kept = found.last.effects.contains(&effect) && matches!(kind, Kind::Named | Kind::Class);
+        // An effect that was found beside others is judged by what these left.
+        let added = steps_of(found).find(|(_, added)| kept && *added == effect).map(|(place, _)| &found.steps[place]);
+        let step = added.filter(|step| !step.from.effects.is_empty()).unwrap_or(first);
+        let trial = step.trials.iter().find(|trial| trial.scored.candidate == effect).unwrap_or(trial);
+        let on_confirm = |fit| Residuals::at(bench, fit, &split.confirm);
+        let fitted = trial.fitted.as_ref().and_then(|(fit, _)| on_confirm(fit));
+        let shrink = match &step.from.effects[..] {
+            [] => fitted.map(|fitted| fitted.shrink(before, seed)),
+            _ => fitted.zip(on_confirm(&step.from)).map(|(fitted, from)| fitted.shrink(&from, seed)),
+        };
+        let beside: Vec<&str> = step.from.effects.iter().map(|k| bench.library.candidates[*k].effect.name).collect();
+        let fit = if kept { Some(&found.last) } else { trial.fitted.as_ref().map(|(fit, _)| fit) };
+        let probability = likely.iter().find(|(candidate, _)| *candidate == effect).map_or(0.0, |(_, p)| *p);
+        let status = status(&trial.scored, kept, finding.rivals.contains(&name), kind);
+        Candidate {
+            effect: name.into(),
+            probability: if kept { probability.max(finding.confidence) } else { probability },
+            parameters: fit.map(|fit| parameters::of_effect(bench, fit, effect)).unwrap_or_default(),
+            shrink: shrink.unwrap_or(Share { value: 0.0, ci90: [0.0; 2] }),
+            confusable_with: confusable(first, effect, unforeseen, bench),
+            status,
+            why: why(trial, &beside, status),
+        }
+    };
+    let mut all: Vec<Candidate> = first.trials.iter().map(one).collect();
     all.sort_by(|a, b| {
         let key = |c: &Candidate| (c.status != Status::Named, c.status != Status::Possible, -c.probability);
         key(a).partial_cmp(&key(b)).unwrap_or(std::cmp::Ordering::Equal)
@@ -275,7 +283,7 @@ fn confusable<E: Evidence>(first: &Step, effect: usize, unforeseen: f64, bench: 
     near.iter().map(|other| bench.library.candidates[*other].effect.name.to_owned()).collect()
 }
 
-fn why(trial: &super::combine::Trial, status: Status) -> String {
+fn why(trial: &Trial, beside: &[&str], status: Status) -> String {
     let scored = &trial.scored;
     match (&trial.fitted, status) {
         (_, Status::NotTestable) => format!(
@@ -283,13 +291,15 @@ fn why(trial: &super::combine::Trial, status: Status) -> String {
             scored.signal
         ),
         (Some((_, advantage)), _) => format!(
-            "foretells the clips better by {:.0} ± {:.0} nats, in {:.0} % of them, for {} numbers; alone it closes {:.0} % \
-             of the gap",
+            "{}foretells the clips better by {:.0} ± {:.0} nats, in {:.0} % of them, for {} numbers; {} {:.0} % of {}",
+            if beside.is_empty() { String::new() } else { format!("beside {} it ", beside.join(" and ")) },
             advantage.nats,
             advantage.error,
             100.0 * advantage.share,
             scored.cost,
-            100.0 * trial.closes.clamp(0.0, 1.0)
+            if beside.is_empty() { "alone it closes" } else { "there it closes" },
+            100.0 * trial.closes.clamp(0.0, 1.0),
+            if beside.is_empty() { "the gap" } else { "what is left" },
         ),
         (None, _) => format!(
             "its signature explains {:.1} % of what the baseline leaves; its parameters imitate {:.0} % of that signature",

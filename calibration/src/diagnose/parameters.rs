@@ -17,6 +17,9 @@ use twin::effects::{Role, Shape};
 /// Half the width of a 90 % interval of a normal number, in sigmas.
 const NINETY: f64 = 1.645;
 
+/// What stands for infinity at the end of an interval of what fades out towards it: JSON has no such number.
+pub const UNBOUNDED: f64 = 1e9;
+
 /// The parameters of one of a hypothesis' effects.
 #[must_use]
 pub fn of_effect<E: Evidence>(bench: &Bench<'_, E>, hypothesis: &Hypothesis, effect: usize) -> BTreeMap<String, Size> {
@@ -58,7 +61,7 @@ pub fn of_effect<E: Evidence>(bench: &Bench<'_, E>, hypothesis: &Hypothesis, eff
 /// Back from the number that was turned, within the values that have a meaning.
 fn readable(value: f64, [low, high]: [f64; 2], inverse: bool, possible: [f64; 2]) -> (f64, [f64; 2]) {
     if inverse {
-        let of = |number: f64| if number > 1e-9 { number.recip() } else { 1e9 };
+        let of = |number: f64| if number > UNBOUNDED.recip() { number.recip() } else { UNBOUNDED };
         return (of(value), [of(high), of(low)]);
     }
     (value, [low.max(possible[0]), high.min(possible[1])])

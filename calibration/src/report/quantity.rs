@@ -1,5 +1,7 @@
 //! Numbers for people: SI prefixes where they help, as many digits as the interval allows, never an exponent that can be avoided.
 
+use crate::diagnose::parameters::UNBOUNDED;
+
 /// How a unit is shown: factor from SI, and the name.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Unit {
@@ -38,6 +40,9 @@ impl Unit {
 
     /// The value with its interval and unit, with no more digits than the interval deserves: `11.9 [11.2, 12.6] ms`.
     pub(super) fn interval(&self, si: f64, [lo, hi]: [f64; 2]) -> String {
+        if hi >= UNBOUNDED && si < UNBOUNDED {
+            return self.attach(&format!("{} [{}, \u{221e}]", short(self.scaled(si)), short(self.scaled(lo))));
+        }
         let [value, lo, hi] = [si, lo, hi].map(|x| self.scaled(x));
         if !(lo.is_finite() && hi.is_finite() && hi > lo) {
             return self.attach(&short(value));
@@ -130,6 +135,11 @@ mod tests {
         assert_eq!(ms.interval(0.012, [f64::NAN, 0.013]), "12.0 ms");
         assert_eq!(Unit::suited("%", 1.0).interval(0.0, [0.0, 0.7076]), "0 [0, 71] %");
         assert_eq!(Unit::suited("m", 0.001).interval(-0.000_001, [-0.001, 0.001]), "0.0 [-1.0, 1.0] mm");
+    }
+
+    #[test]
+    fn an_interval_that_does_not_end_says_so() {
+        assert_eq!(Unit::suited("m", 7.0).interval(7.0, [0.0, UNBOUNDED]), "7.00 [0, \u{221e}] m");
     }
 
     #[test]
