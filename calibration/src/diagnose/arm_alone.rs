@@ -7,6 +7,7 @@ use super::evidence::{Channel, Evidence, Reach, Row};
 use super::fit::{Bench, Hypothesis};
 use super::scatter::Scatter;
 use super::split::Split;
+use super::worthy::strays;
 use super::{flat, starts};
 use crate::estimate::{ClipModel, Impossible};
 use crate::progress::Progress;
@@ -33,6 +34,7 @@ impl Step {
         bench: &Bench<'_, E>,
         split: &Split,
         (places, overlooked): (&[usize], bool),
+        refined: &impl Fn(&[f64]) -> Option<Vec<f64>>,
         bar: &Progress,
     ) -> Vec<(usize, Hypothesis)> {
         let (evidence, weights) = (ArmAlone(bench.evidence), &self.weights);
@@ -51,14 +53,21 @@ impl Step {
         let told = |place: &usize| if bench.interrupt.asked() { None } else { alone(place) };
         let all: Vec<(usize, Hypothesis)> = places.iter().filter_map(told).collect();
         let Some(from) = fit(&self.from.effects, self.from.full.clone(), LOOK) else { return Vec::new() };
-        let best = all.iter().map(|(_, fit)| fit.deviance()).fold(from.deviance(), f64::min);
-        let near = best + NEAR.max(NEAR_ON_ARM * (from.deviance() - best));
+        let best = all.iter().fold(&from, |best, (_, fit)| if fit.deviance() < best.deviance() { fit } else { best });
+        let near = best.deviance() + NEAR.max(NEAR_ON_ARM * (from.deviance() - best.deviance()));
+        let anew = if strays(&self.whole, &self.left) { refined(&best.full) } else { None };
         let with_object = |(place, alone): (usize, Hypothesis)| {
             let candidate = self.trials[place].scored.candidate;
             let mut open = flat::seen_by_nothing(&arm, &alone, candidate);
             open.retain(|k| bench.library.joints[*k].is_none());
-            let full = starts::seen_by_the_object(bench, at, alone.full, &open);
-            Some((place, bench.extend(&self.from, (candidate, full), &split.train, weights, LOOK)?))
+            let object = |other: &Vec<f64>| bench.library.with_object_of(alone.full.clone(), other);
+            let starts = [Some(alone.full.clone()), anew.as_ref().map(object)].into_iter().flatten();
+            let look = |start: Vec<f64>| {
+                let full = starts::seen_by_the_object(bench, at, start, &open);
+                bench.extend(&self.from, (candidate, full), &split.train, weights, LOOK)
+            };
+            let looks = starts.filter_map(look);
+            Some((place, looks.min_by(|a, b| a.deviance().total_cmp(&b.deviance()))?))
         };
         all.into_iter().filter(|(_, alone)| alone.deviance() < near).filter_map(with_object).collect()
     }
@@ -110,44 +119,91 @@ impl<E: Evidence> Evidence for ArmAlone<'_, E> {
 mod tests {
     use super::super::combine::Trial;
     use super::super::fit::Effort;
+    use super::super::gap::Typical;
+    use super::super::library::Library;
     use super::super::score::Foretold;
     use super::super::sweep::Precision;
     use super::super::test_bench::{nothing_said_of, on_strokes, shipped};
     use super::*;
     use crate::benchmark::draw;
     use crate::benchmark::world::{Fault, Kind, World};
+    use shared_mem::cell::Cell;
+
+    /// The strokes of a world in which one effect acts.
+    fn with_effect(name: &str, number: u64, cell: &Cell) -> World {
+        let place = draw::candidates(true).iter().position(|effect| effect.name == name);
+        World::draw(number, Kind::Strokes, Fault::Single(place.expect("an effect")), cell)
+    }
+
+    /// The baseline as it is hidden in a world.
+    fn hidden_baseline(library: &Library, world: &World) -> Vec<f64> {
+        let (hidden, mut full) = (library.settings.numbers(&world.hidden), library.start());
+        for k in library.baseline.clone() {
+            full[k] = hidden[k].unwrap_or(full[k]);
+        }
+        full
+    }
+
+    /// A step from these numbers on two strokes, in which trials of these candidates are to be fitted.
+    fn step<E: Evidence>(bench: &Bench<'_, E>, full: Vec<f64>, even: &[f64], asked: &[usize]) -> (Step, Split) {
+        let trial = |candidate: &usize| Trial {
+            scored: nothing_said_of(bench.library, *candidate),
+            fitted: None,
+            closes: 0.0,
+            own_numbers: true,
+        };
+        let step = Step {
+            from: bench.fit((&[], full), &[0, 1], even, None, LOOK).expect("a fit"),
+            foretold: Foretold { clips: Vec::new() },
+            trials: asked.iter().map(trial).collect(),
+            weights: even.to_vec(),
+            arm_rows: 0,
+            left: Vec::new(),
+            whole: Vec::new(),
+        };
+        (step, Split { train: vec![0, 1], choose: Vec::new(), confirm: Vec::new() })
+    }
+
+    #[test]
+    fn an_object_that_was_found_under_an_arm_that_strays_is_found_anew() {
+        let cell = shipped();
+        let world = with_effect("command_delay", 40, &cell);
+        on_strokes((&cell, &world), |bench, even| {
+            let library = bench.library;
+            let hidden = hidden_baseline(library, &world);
+            let mut astray = hidden.clone();
+            for k in library.baseline.clone().filter(|k| !library.arm_feels(*k, &hidden)) {
+                astray[k] = library.start()[k];
+            }
+            let candidate = library.find("command_delay").expect("a candidate");
+            let (mut step, split) = step(bench, astray.clone(), even, &[candidate]);
+            let object = |fits: Vec<(usize, Hypothesis)>| {
+                let [(0, fit)] = &fits[..] else { panic!("{} fits", fits.len()) };
+                library.with_object_of(hidden.clone(), &fit.full)
+            };
+            let anew = |given: &[f64]| Some(library.with_object_of(given.to_vec(), &hidden));
+            let mut fitted = |arm: f64| {
+                let group = |of_object, mean_square| Typical { mean_square, floor: 1.5, of_object };
+                step.left = vec![group(false, arm), group(true, 100.0)];
+                step.whole = step.left.clone();
+                object(step.fitted_to_the_arm_first(bench, &split, (&[0], false), &anew, &Progress::new("nothing", 1)))
+            };
+            assert_eq!(fitted(1.5), library.with_object_of(hidden.clone(), &astray), "the arm is where it was");
+            assert_eq!(fitted(50.0), hidden);
+        });
+    }
 
     #[test]
     fn the_arm_tells_its_effects_apart_and_the_object_what_the_arm_leaves_open() {
         let cell = shipped();
-        let off = draw::candidates(true).iter().position(|effect| effect.name == "joint_encoder_offset");
-        let world = World::draw(48, Kind::Strokes, Fault::Single(off.expect("an effect")), &cell);
+        let world = with_effect("joint_encoder_offset", 48, &cell);
         on_strokes((&cell, &world), |bench, even| {
             let library = bench.library;
             let hidden = library.settings.numbers(&world.hidden);
-            let mut full = library.start();
-            for k in library.baseline.clone() {
-                full[k] = hidden[k].unwrap_or(full[k]);
-            }
             let asked = ["base_tilt", "joint_encoder_offset"].map(|name| library.find(name).expect("a candidate"));
-            let trial = |candidate: usize| Trial {
-                scored: nothing_said_of(library, candidate),
-                fitted: None,
-                closes: 0.0,
-                own_numbers: true,
-            };
-            let step = Step {
-                from: bench.fit((&[], full), &[0, 1], even, None, LOOK).expect("a fit"),
-                foretold: Foretold { clips: Vec::new() },
-                trials: asked.into_iter().map(trial).collect(),
-                weights: even.to_vec(),
-                arm_rows: 0,
-                left: Vec::new(),
-                whole: Vec::new(),
-            };
-            let split = Split { train: vec![0, 1], choose: Vec::new(), confirm: Vec::new() };
+            let (step, split) = step(bench, hidden_baseline(library, &world), even, &asked);
             let bar = Progress::new("nothing", 1);
-            let found = step.fitted_to_the_arm_first(bench, &split, (&[0, 1], false), &bar);
+            let found = step.fitted_to_the_arm_first(bench, &split, (&[0, 1], false), &|_: &[f64]| None, &bar);
             let [(1, fit)] = &found[..] else { panic!("{} fits", found.len()) };
             let sizes = &library.candidates[asked[1]].sizes;
             let [turned, lifted] = [0, 1].map(|joint| (fit.full[sizes[joint]], hidden[sizes[joint]].expect("hidden")));

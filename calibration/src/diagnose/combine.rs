@@ -168,7 +168,7 @@ pub fn search<E: Evidence>(
             steps.push(last);
             break;
         }
-        let mut step = step(bench, split, &now, steps.first().map(|first| &first.left), bar)?;
+        let mut step = step(bench, split, (&now, steps.first().map(|first| &first.left)), refined, bar)?;
         step.reconsider(bench, split, refined);
         let best = step.best(bench).map(|(_, fit, _)| fit.clone());
         now = step.from.clone();
@@ -236,8 +236,8 @@ impl Step {
 fn step<E: Evidence>(
     bench: &Bench<'_, E>,
     split: &Split,
-    from: &Hypothesis,
-    whole: Option<&Vec<Typical>>,
+    (from, whole): (&Hypothesis, Option<&Vec<Typical>>),
+    refined: &impl Fn(&[f64]) -> Option<Vec<f64>>,
     bar: &Progress,
 ) -> Option<Step> {
     let mut swept = swept(bench, split, from, bar)?;
@@ -276,10 +276,10 @@ fn step<E: Evidence>(
     let trial = |scored: &Scored| Trial { scored: scored.clone(), fitted: None, closes: 0.0, own_numbers };
     let trials = scored.iter().map(trial).collect();
     let mut step = Step { from, foretold, trials, weights, arm_rows, left, whole };
-    step.fit(bench, split, (&promising, false), bar);
+    step.fit(bench, split, (&promising, false), refined, bar);
     if step.best(bench).is_none() {
         let rest = overlooked(bench, &step);
-        step.fit(bench, split, (&rest, true), bar);
+        step.fit(bench, split, (&rest, true), refined, bar);
     }
     Some(step)
 }
@@ -302,6 +302,7 @@ impl Step {
         bench: &Bench<'_, E>,
         split: &Split,
         (wanted, overlooked): (&[usize], bool),
+        refined: &impl Fn(&[f64]) -> Option<Vec<f64>>,
         bar: &Progress,
     ) {
         let asked: Vec<usize> =
@@ -311,7 +312,7 @@ impl Step {
                 && bench.library.candidates[self.trials[*place].scored.candidate].is_of_arm()
         };
         let (of_arm, others): (Vec<usize>, Vec<usize>) = asked.into_iter().partition(on_arm);
-        let mut fits = self.fitted_to_the_arm_first(bench, split, (&of_arm, overlooked), bar);
+        let mut fits = self.fitted_to_the_arm_first(bench, split, (&of_arm, overlooked), refined, bar);
         for (done, place) in others.into_iter().enumerate() {
             if bench.interrupt.asked() {
                 return;

@@ -141,6 +141,15 @@ impl Library {
         theta
     }
 
+    /// Numbers with the baseline's object as others have it.
+    #[must_use]
+    pub fn with_object_of(&self, mut numbers: Vec<f64>, others: &[f64]) -> Vec<f64> {
+        for k in self.baseline.clone().filter(|k| !self.arm_feels(*k, &numbers)).collect::<Vec<_>>() {
+            numbers[k] = others[k];
+        }
+        numbers
+    }
+
     /// Whether the arm feels a number where the numbers are these.
     #[must_use]
     pub fn arm_feels(&self, number: usize, numbers: &[f64]) -> bool {
