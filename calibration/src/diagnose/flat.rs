@@ -3,7 +3,7 @@
 
 use super::evidence::Evidence;
 use super::fit::{Bench, FittedClip, Hypothesis};
-use super::library::TORQUE_SATURATION;
+use twin::effects::Search;
 
 /// What a number may change of the clips' squared residuals, as a share and at least, and still be one that nothing depends
 /// on.
@@ -45,7 +45,7 @@ pub fn seen_by_nothing<E: Evidence>(bench: &Bench<'_, E>, hypothesis: &Hypothesi
         let alike = |value: f64| (cost(&at(value)) - now).abs() < LEAST.max(SHARE * now);
         // A number that was found to be at rest is known: what it does elsewhere tells. A limit that is never reached is none,
         // wherever it is.
-        let never_reached = candidate.effect.name == TORQUE_SATURATION;
+        let never_reached = candidate.is_searched(Search::Limit);
         if alike(resting) && (never_reached || candidate.strongest(*k, resting).is_some_and(alike)) {
             full[*k] = resting;
             unseen.push(*k);

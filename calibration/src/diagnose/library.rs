@@ -12,7 +12,7 @@ use shared_mem::cell::Cell;
 use shared_mem::theta::Theta;
 use std::ops::Range;
 use twin::arm::Joints;
-use twin::effects::{EffectInfo, Role, Shape, Stage, find, registry};
+use twin::effects::{EffectInfo, Role, Search, Shape, Stage, find, registry};
 
 /// All numbers of all hypotheses.
 #[derive(Debug, Clone)]
@@ -72,6 +72,12 @@ impl Candidate {
     #[must_use]
     pub fn is_of_arm(&self) -> bool {
         self.effect.stage == Stage::Control
+    }
+
+    /// Whether one of its parameters is come by in this way.
+    #[must_use]
+    pub fn is_searched(&self, search: Search) -> bool {
+        self.effect.parameters.iter().any(|parameter| parameter.search == search)
     }
 
     /// One of the sizes at the strongest that is met in practice; `resting`: where it changes nothing.
@@ -219,6 +225,8 @@ fn arm_reach(setting: &Setting, carried: Option<usize>) -> ArmReach {
 /// The one effect on the hit that the arm may feel: where the tool's mass stands off with its tip.
 const TOOL_OFFSET: &str = "tool_offset";
 const CARRIED: &str = "carried";
+/// The one effect whose forms are places on the table: those where a change of friction shows depend on the strokes.
+const FRICTION_PATCH: &str = "friction_patch";
 
 fn is_carried(setting: &Setting) -> bool {
     matches!(setting, Setting::Effect { name: TOOL_OFFSET, parameter: CARRIED, .. })
@@ -250,8 +258,7 @@ impl Candidate {
             _ => false,
         };
         let sizes: Vec<usize> = (at..numbers.len()).filter(|k| is_size(&numbers[*k].0)).collect();
-        let kept = |setting: &Setting| matches!(setting, Setting::Effect { parameter, .. } if KEPT.contains(parameter));
-        let turned = (at..numbers.len()).filter(|k| !kept(&numbers[*k].0)).collect();
+        let turned = (at..numbers.len()).filter(|k| search_of(&numbers[*k].0) != Some(Search::Held)).collect();
         let alternatives = alternatives(effect, at, &sizes, numbers, met);
         Self { effect, numbers: at..numbers.len(), turned, sizes, alternatives }
     }
@@ -260,11 +267,17 @@ impl Candidate {
 /// The torque at which a limit of a joint begins to bite [N m], where a number is such a limit.
 fn bound_of(setting: &Setting, peaks: &Joints) -> Option<f64> {
     match *setting {
-        Setting::Effect { name: TORQUE_SATURATION, index: Some(joint), .. } => {
+        Setting::Effect { index: Some(joint), .. } if search_of(setting) == Some(Search::Limit) => {
             Some(peaks[joint]).filter(|peak| *peak > 0.0)
         }
         _ => None,
     }
+}
+
+/// How a search comes by a number of an effect.
+fn search_of(setting: &Setting) -> Option<Search> {
+    let Setting::Effect { name, parameter, .. } = setting else { return None };
+    find(name)?.parameters.iter().find(|p| p.name == *parameter).map(|p| p.search)
 }
 
 /// A limit of its own for every joint: what it does depends on how hard the clips drive that joint, and above that it does
@@ -274,21 +287,11 @@ fn biting(number: usize, peak: f64, unknown: &Unknown) -> Probe {
     Probe { moves, one_sided: true, largest: LOWEST_LIMIT.recip() }
 }
 
-/// The one effect on torques that does nothing below a threshold.
-pub const TORQUE_SATURATION: &str = "torque_saturation";
-/// The one effect that has to be met in step.
-pub const TORQUE_RIPPLE: &str = "torque_ripple";
-/// The one effect on the slide that changes the hit as well.
-pub const PRESSURE_DISTRIBUTION: &str = "pressure_distribution";
-/// Its probe is a limit at this share of a joint's largest torque, its difference step is this share of it, and below this
-/// share of it no limit is looked for.
+/// The probe of a limit is one at this share of a joint's largest torque, its difference step is this share of it, and below
+/// this share of it no limit is looked for.
 const BITES: f64 = 0.9;
 const BOUND_STEP: f64 = 0.01;
 const LOWEST_LIMIT: f64 = 0.25;
-
-/// Forms that no clip shows well enough to be worth their numbers: they keep the registry's default, or what an alternative
-/// says.
-const KEPT: [&str; 2] = ["creep", CARRIED];
 
 /// The step of a probe as a share of what is met in practice.
 const PROBE_SHARE: f64 = 0.1;
@@ -307,61 +310,47 @@ fn alternatives(
         Some(peak) => biting(*k, peak, &numbers[*k].1),
         None => probe(effect, *k, &numbers[*k]),
     };
-    let probes: Vec<Probe> = sizes.iter().map(probe).collect();
     let index = |parameter: &str| -> Vec<usize> {
         let is = |setting: &Setting| matches!(setting, Setting::Effect { parameter: p, .. } if *p == parameter);
         (at..numbers.len()).filter(|k| is(&numbers[*k].0)).collect()
     };
+    let angle = effect.parameters.iter().find_map(|p| match p.search {
+        Search::Angle { quarter } => Some((index(p.name), quarter)),
+        _ => None,
+    });
+    let probes: Vec<Probe> = match angle {
+        Some((angles, quarter)) => [0.0, quarter].map(|angle| across(effect, sizes, (&angles, angle))).concat(),
+        None => sizes.iter().map(probe).collect(),
+    };
     let with = |form: Vec<(usize, f64)>| Alternative { form, probes: probes.clone() };
-    let set = |parameter: &str, value: f64| index(parameter).into_iter().map(|k| (k, value)).collect::<Vec<_>>();
-    match effect.name {
-        "joint_stribeck_friction" => [0.03, 0.1].map(|v| with(set("velocity", v))).to_vec(),
-        "stribeck_sliding_friction" => [0.05, 0.1, 0.2].map(|v| with(set("velocity", v))).to_vec(),
-        // About the base, or about the middle of a table in front of it.
-        "camera_scale" => [0.0, 0.5].map(|x| with(vec![(index("centre")[0], x)])).to_vec(),
-        // At rest as in motion, and none at rest.
-        "joint_friction_asymmetry" => [0.0, 0.01].map(|fading| with(set("fading", fading))).to_vec(),
-        // Rigid flanks, and such as yield like the gears of an arm.
-        "joint_backlash" => [1e-7, 4e-5].map(|compliance| with(set("compliance", compliance))).to_vec(),
-        // An object that pivots about feet, and one that pivots about its corners.
-        PRESSURE_DISTRIBUTION => [0.75, 1.0].map(|pivot| with(set("pivot", pivot))).to_vec(),
-        TOOL_OFFSET => [0.0, 1.0].map(|share| with(set(CARRIED, share))).to_vec(),
-        "payload" => [0.0, 0.06].map(|z| with(vec![(index("centre")[2], z)])).to_vec(),
-        "anisotropic_friction" => {
-            let (size, axis) = (sizes[0], index("axis")[0]);
-            let turned = |angle: f64| Probe { moves: vec![(size, 0.1), (axis, angle)], one_sided: false, largest: 5.0 };
-            let probes = vec![turned(0.0), turned(std::f64::consts::FRAC_PI_4)];
-            // Slips that are turned aside as far as they can be, and not at all.
-            [1.0, 0.0].map(|drift| Alternative { form: set("drift", drift), probes: probes.clone() }).to_vec()
+    if effect.name == FRICTION_PATCH {
+        let [direction, distance, radius] = ["direction", "distance", "radius"].map(|form| index(form)[0]);
+        let place = |patch: Patch| {
+            with(vec![(direction, patch.direction), (distance, patch.distance), (radius, patch.curvature)])
+        };
+        return ground.map(Ground::patches).unwrap_or_default().into_iter().map(place).collect();
+    }
+    match effect.parameters.iter().find(|parameter| !parameter.begun_at.is_empty()) {
+        Some(form) => {
+            let from =
+                |values: &&[f64]| with(index(form.name).into_iter().zip(values.iter().copied().cycle()).collect());
+            form.begun_at.iter().map(from).collect()
         }
-        "friction_patch" => {
-            let [direction, distance, radius] = ["direction", "distance", "radius"].map(|form| index(form)[0]);
-            let place = |patch: Patch| {
-                with(vec![(direction, patch.direction), (distance, patch.distance), (radius, patch.curvature)])
-            };
-            ground.map(Ground::patches).unwrap_or_default().into_iter().map(place).collect()
-        }
-        TORQUE_RIPPLE => {
-            let (order, phase) = (index("order"), index("phase"));
-            let orders = [10.0, 20.0, 40.0, 60.0, 100.0, 200.0];
-            orders.map(|k| ripple(sizes, (&order, k), &phase)).to_vec()
-        }
-        _ => vec![with(Vec::new())],
+        None => vec![with(Vec::new())],
     }
 }
 
-/// Sine and cosine of every joint's ripple.
-fn ripple(sizes: &[usize], (order, k): (&[usize], f64), phase: &[usize]) -> Alternative {
-    let quarter = |angle: f64| {
-        let of = move |(size, phase): (&usize, &usize)| Probe {
-            moves: vec![(*size, 0.1), (*phase, angle)],
-            one_sided: false,
-            largest: 5.0,
-        };
-        sizes.iter().zip(phase).map(of).collect::<Vec<_>>()
+/// Every size at an angle, as strong as a probe of it is.
+fn across(effect: &EffectInfo, sizes: &[usize], (angles, angle): (&[usize], f64)) -> Vec<Probe> {
+    let size = effect.parameters.iter().find(|p| matches!(p.role, Role::Size { .. })).expect("an effect has a size");
+    let share = 2.0 * PROBE_SHARE;
+    let strength = share * size.plausible[1];
+    let of = |(size, number): (&usize, &usize)| Probe {
+        moves: vec![(*size, strength), (*number, angle)],
+        one_sided: false,
+        largest: share.recip(),
     };
-    let probes = [quarter(0.0), quarter(std::f64::consts::FRAC_PI_2)].concat();
-    Alternative { form: order.iter().map(|index| (*index, k)).collect(), probes }
+    sizes.iter().zip(angles).map(of).collect()
 }
 
 fn probe(effect: &EffectInfo, number: usize, (setting, unknown): &(Setting, Unknown)) -> Probe {

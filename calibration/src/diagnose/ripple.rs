@@ -94,7 +94,7 @@ pub(super) fn start<E: Evidence>(
 
 #[cfg(test)]
 mod tests {
-    use super::super::library::{Library, TORQUE_RIPPLE};
+    use super::super::library::Library;
     use super::super::test_bench::{ONCE, on_bench, shipped};
     use super::*;
     use crate::benchmark::world::{Fault, Kind, World};
@@ -109,10 +109,10 @@ mod tests {
         let (amplitude, order) = ([0.6, 0.6, 0.6, 0.6, 0.3, 0.3, 0.3], [33.0, 61.7, 161.3, 77.0, 145.0, 111.1, 52.4]);
         let parameters =
             [("amplitude", amplitude), ("order", order)].map(|(name, of)| (name.to_owned(), of.to_vec().into()));
-        let rippled = EffectTheta { name: TORQUE_RIPPLE.into(), parameters: parameters.into() };
+        let rippled = EffectTheta { name: "torque_ripple".into(), parameters: parameters.into() };
         let world = World { hidden: Theta { effects: vec![rippled], ..well.hidden.clone() }, ..well };
         let library = Library::new(&cell, &base, None, &[87.0; 8]);
-        let candidate = library.find(TORQUE_RIPPLE).expect("a candidate");
+        let candidate = library.find("torque_ripple").expect("a candidate");
         let begun = on_bench((&cell, &world), &library, |bench, even| {
             let baseline = bench.fit((&[], library.start()), &[0, 1], even, None, ONCE).expect("a fit");
             start(bench, (&baseline, even), candidate).expect("numbers")

@@ -4,11 +4,10 @@
 
 use super::evidence::Evidence;
 use super::fit::{Bench, Hypothesis};
-use super::library::{PRESSURE_DISTRIBUTION, TORQUE_RIPPLE, TORQUE_SATURATION};
 use super::ripple;
 use super::shortlist::Scored;
 use crate::forward::Setting;
-use twin::effects::Stage;
+use twin::effects::{Search, Stage};
 
 /// Other starts of a fit are this share of the strongest that is met in practice away.
 const ASIDE: f64 = 0.3;
@@ -53,14 +52,14 @@ fn pointed_at<E: Evidence>(bench: &Bench<'_, E>, at: (&Hypothesis, &[f64]), scor
         starts.extend(aside(bench, scored, &[ASIDE]));
     }
     let mut numbers: Vec<Vec<f64>> = starts.iter().map(|start| bench.begun(at.0.full.clone(), start)).collect();
-    if candidate.effect.name == TORQUE_SATURATION {
+    if candidate.is_searched(Search::Limit) {
         numbers.push(one_by_one(bench, at, numbers[0].clone(), &candidate.sizes, &STEPPED));
     }
-    if candidate.effect.name == TORQUE_RIPPLE {
+    if candidate.is_searched(Search::InStep) {
         numbers.extend(ripple::start(bench, at, scored.candidate));
     }
     // What an object pivots about changes the hit, of which slopes tell little, and its number decides how it spins besides.
-    if (uneven && !one_probe) || candidate.effect.name == PRESSURE_DISTRIBUTION {
+    if (uneven && !one_probe) || candidate.is_searched(Search::Uneven) {
         numbers.extend(least_cost_aside(bench, at, scored).map(|(_, full)| full));
     }
     numbers
@@ -71,7 +70,7 @@ fn scanned<E: Evidence>(bench: &Bench<'_, E>, at: (&Hypothesis, &[f64]), scored:
     let forms = 0..bench.library.candidates[scored.candidate].alternatives.len();
     let starts = forms.flat_map(|alternative| aside(bench, &Scored { alternative, ..scored.clone() }, &SCANNED));
     let numbers = starts.map(|start| bench.begun(at.0.full.clone(), &start));
-    let ripples = bench.library.candidates[scored.candidate].effect.name == TORQUE_RIPPLE;
+    let ripples = bench.library.candidates[scored.candidate].is_searched(Search::InStep);
     let in_step = if ripples { ripple::start(bench, at, scored.candidate) } else { None };
     cheapest(bench, at, numbers.chain(in_step)).map(|(_, full)| full).into_iter().collect()
 }
@@ -190,10 +189,10 @@ mod tests {
         let limits = shares.iter().zip(peaks).map(|(share, peak)| share.map_or(1e3, |share: f64| share * peak));
         let limits = limits.collect::<Vec<f64>>();
         let parameters = [("limit".to_owned(), limits.clone().into())].into();
-        let cut = EffectTheta { name: TORQUE_SATURATION.into(), parameters };
+        let cut = EffectTheta { name: "torque_saturation".into(), parameters };
         let world = World { hidden: Theta { effects: vec![cut], ..well.hidden.clone() }, ..well };
         let library = Library::new(&cell, &base, None, &peaks);
-        let candidate = library.find(TORQUE_SATURATION).expect("a candidate");
+        let candidate = library.find("torque_saturation").expect("a candidate");
         let scored = nothing_said_of(&library, candidate);
         let begun = on_bench((&cell, &world), &library, |bench, even| {
             let baseline = bench.fit((&[], library.start()), &[0, 1], even, None, ONCE).expect("a fit");

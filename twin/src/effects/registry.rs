@@ -65,6 +65,26 @@ pub enum Role {
     },
 }
 
+/// How a search for an effect comes by one of its parameters.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Search {
+    /// Along its slope.
+    Slope,
+    /// Not at all: no clip shows it well enough to be worth a number.
+    Held,
+    /// A limit: as long as it is not reached nothing happens, and no slope leads there.
+    Limit,
+    /// As the teeth of a gear: a little out of step it does nothing.
+    InStep,
+    /// The angle of a size, which together are a vector: at `quarter` it acts across [rad].
+    Angle {
+        /// A quarter of the angle's period.
+        quarter: f64,
+    },
+    /// It changes a hit, of which slopes at one point tell little.
+    Uneven,
+}
+
 /// One parameter of an effect.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Parameter {
@@ -80,6 +100,10 @@ pub struct Parameter {
     pub possible: [f64; 2],
     /// What it does to the effect.
     pub role: Role,
+    /// How a search comes by it.
+    pub search: Search,
+    /// Values from each of which a search begins, where its resting value is not enough; of a vector all components.
+    pub begun_at: &'static [&'static [f64]],
 }
 
 /// One effect: what the nominal cell lacks.
@@ -122,6 +146,8 @@ impl Parameter {
             plausible,
             possible: [f64::MIN, f64::MAX],
             role: Role::Size { neutral },
+            search: Search::Slope,
+            begun_at: &[],
         }
     }
 
@@ -140,6 +166,14 @@ impl Parameter {
 
     pub(super) const fn within(self, lowest: f64, highest: f64) -> Self {
         Self { possible: [lowest, highest], ..self }
+    }
+
+    pub(super) const fn searched(self, search: Search) -> Self {
+        Self { search, ..self }
+    }
+
+    pub(super) const fn begun_at(self, begun_at: &'static [&'static [f64]]) -> Self {
+        Self { begun_at, ..self }
     }
 
     /// The value that changes nothing, or the default of a parameter that says how.

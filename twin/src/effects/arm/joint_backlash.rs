@@ -17,7 +17,11 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     acts_on: Place::Joint,
     parameters: &[
         Parameter::size("play", "rad", [0.0, 0.03], 0.0).per_joint().within(0.0, 1.0),
-        Parameter::form("compliance", "rad/(N m)", [1e-7, 1e-4], 1e-7).per_joint().within(1e-7, 1e-2),
+        Parameter::form("compliance", "rad/(N m)", [1e-7, 1e-4], 1e-7)
+            .per_joint()
+            .within(1e-7, 1e-2)
+            // Rigid flanks, and such as yield like the gears of an arm.
+            .begun_at(&[&[1e-7], &[4e-5]]),
     ],
     confusable_with: &["joint_coulomb_friction", "joint_stribeck_friction"],
     install: |values, effects| {

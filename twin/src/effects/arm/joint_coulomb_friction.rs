@@ -9,7 +9,7 @@
 //! - Confused with: load friction (alike in one pose), backlash (lost motion too), Stribeck friction (needs creep).
 
 use crate::arm::Joints;
-use crate::effects::registry::{EffectInfo, Parameter, Place, Stage};
+use crate::effects::registry::{EffectInfo, Parameter, Place, Search, Stage};
 
 pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     name: "joint_coulomb_friction",
@@ -32,7 +32,7 @@ pub(in crate::effects) struct JointCoulombFriction {
 /// Of every dry friction: speed over which it builds up, as `tanh(dq / creep)`. Gears creep before they break loose, and
 /// many models soften friction like this; 0 makes it stick exactly.
 pub(super) const CREEP: Parameter =
-    Parameter::form("creep", "rad/s", [0.0, 0.02], 0.002).per_joint().within(0.0, f64::MAX);
+    Parameter::form("creep", "rad/s", [0.0, 0.02], 0.002).per_joint().within(0.0, f64::MAX).searched(Search::Held);
 
 #[cfg(test)]
 mod tests {

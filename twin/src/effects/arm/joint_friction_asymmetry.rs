@@ -18,7 +18,10 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     acts_on: Place::Joint,
     parameters: &[
         Parameter::size("offset", "N m", [-1.0, 1.0], 0.0).per_joint(),
-        Parameter::form("fading", "rad/s", [0.0, 0.05], 0.0).within(0.0, f64::MAX),
+        Parameter::form("fading", "rad/s", [0.0, 0.05], 0.0)
+            .within(0.0, f64::MAX)
+            // At rest as in motion, and none at rest.
+            .begun_at(&[&[0.0], &[0.01]]),
     ],
     confusable_with: &["payload", "base_tilt", "torque_sensor_bias"],
     install: |values, effects| {

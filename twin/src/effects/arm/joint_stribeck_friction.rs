@@ -19,7 +19,10 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     parameters: &[
         Parameter::size("coulomb", "N m", [0.0, 3.0], 0.0).per_joint().within(0.0, f64::MAX),
         Parameter::size("excess", "N m", [0.0, 3.0], 0.0).per_joint().within(0.0, f64::MAX),
-        Parameter::form("velocity", "rad/s", [0.01, 0.2], 0.05).per_joint().within(1e-6, f64::MAX),
+        Parameter::form("velocity", "rad/s", [0.01, 0.2], 0.05)
+            .per_joint()
+            .within(1e-6, f64::MAX)
+            .begun_at(&[&[0.03], &[0.1]]),
         CREEP,
     ],
     confusable_with: &["joint_coulomb_friction", "joint_backlash"],

@@ -15,7 +15,10 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     acts_on: Place::ArmModel,
     parameters: &[
         Parameter::size("mass", "kg", [0.0, 1.5], 0.0).within(0.0, 100.0),
-        Parameter::form("centre", "m", [-0.03, 0.15], 0.0).vector(3),
+        Parameter::form("centre", "m", [-0.03, 0.15], 0.0)
+            .vector(3)
+            // At the flange, and in a hand.
+            .begun_at(&[&[0.0, 0.0, 0.0], &[0.0, 0.0, 0.06]]),
     ],
     confusable_with: &["torque_gain", "joint_friction_asymmetry", "base_tilt"],
     install: |values, effects| {

@@ -8,8 +8,8 @@
 //! - Confused with: joint elasticity (a fixed frequency), noise.
 
 use crate::arm::Joints;
-use crate::effects::registry::{EffectInfo, Parameter, Place, Stage};
-use std::f64::consts::PI;
+use crate::effects::registry::{EffectInfo, Parameter, Place, Search, Stage};
+use std::f64::consts::{FRAC_PI_2, PI};
 
 pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     name: "torque_ripple",
@@ -17,8 +17,15 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     acts_on: Place::Joint,
     parameters: &[
         Parameter::size("amplitude", "N m", [0.0, 0.5], 0.0).per_joint(),
-        Parameter::form("order", "1", [1.0, 400.0], 200.0).per_joint(),
-        Parameter::form("phase", "rad", [-PI, PI], 0.0).per_joint(),
+        Parameter::form("order", "1", [1.0, 400.0], 200.0).per_joint().searched(Search::InStep).begun_at(&[
+            &[10.0],
+            &[20.0],
+            &[40.0],
+            &[60.0],
+            &[100.0],
+            &[200.0],
+        ]),
+        Parameter::form("phase", "rad", [-PI, PI], 0.0).per_joint().searched(Search::Angle { quarter: FRAC_PI_2 }),
     ],
     confusable_with: &["joint_elasticity", "joint_coulomb_friction"],
     install: |values, effects| {

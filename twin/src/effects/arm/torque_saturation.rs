@@ -7,13 +7,16 @@
 //! - Confused with: torque gain (acts at every torque), command delay (in fast motion).
 
 use crate::arm::Joints;
-use crate::effects::registry::{EffectInfo, Parameter, Place, Stage};
+use crate::effects::registry::{EffectInfo, Parameter, Place, Search, Stage};
 
 pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     name: "torque_saturation",
     stage: Stage::Control,
     acts_on: Place::TorquePath,
-    parameters: &[Parameter::size("limit", "N m", [1.0, 87.0], f64::INFINITY).per_joint().within(0.0, f64::MAX)],
+    parameters: &[Parameter::size("limit", "N m", [1.0, 87.0], f64::INFINITY)
+        .per_joint()
+        .within(0.0, f64::MAX)
+        .searched(Search::Limit)],
     confusable_with: &["torque_gain", "command_delay"],
     install: |values, effects| effects.arm.torque_saturation = Some(TorqueSaturation { limit: values.joints("limit") }),
 };

@@ -17,7 +17,10 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     acts_on: Place::ObjectObservation,
     parameters: &[
         Parameter::size("scale", "1", [-0.1, 0.1], 0.0).within(-0.99, 100.0),
-        Parameter::form("centre", "m", [-1.0, 1.0], 0.0).vector(3),
+        Parameter::form("centre", "m", [-1.0, 1.0], 0.0)
+            .vector(3)
+            // The base, and the middle of a table in front of it.
+            .begun_at(&[&[0.0, 0.0, 0.0], &[0.5, 0.0, 0.0]]),
     ],
     confusable_with: &["camera_extrinsic_translation", "restitution"],
     install: |values, effects| {

@@ -9,7 +9,7 @@
 //! - Confused with: tip friction, encoder offset, camera extrinsics.
 
 use crate::arm::ArmModel;
-use crate::effects::registry::{EffectInfo, Parameter, Place, Stage};
+use crate::effects::registry::{EffectInfo, Parameter, Place, Search, Stage};
 use nalgebra::{Translation3, Vector3};
 
 pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
@@ -18,7 +18,10 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     acts_on: Place::ToolContact,
     parameters: &[
         Parameter::size("offset", "m", [-0.02, 0.02], 0.0).vector(3).within(-1.0, 1.0),
-        Parameter::form("carried", "1", [0.0, 1.0], 0.0).within(0.0, 1.0),
+        Parameter::form("carried", "1", [0.0, 1.0], 0.0)
+            .within(0.0, 1.0)
+            .searched(Search::Held)
+            .begun_at(&[&[0.0], &[1.0]]),
     ],
     confusable_with: &["tip_friction", "joint_encoder_offset", "camera_extrinsic_translation"],
     install: |values, effects| {

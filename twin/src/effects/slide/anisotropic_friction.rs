@@ -10,9 +10,9 @@
 //! - Signature (S7): deceleration repeats twice over a full turn of the heading; paths bend towards the smoother axis.
 //! - Confused with: table tilt (repeats once), friction patch (follows the place).
 
-use crate::effects::registry::{EffectInfo, Parameter, Place, Stage};
+use crate::effects::registry::{EffectInfo, Parameter, Place, Search, Stage};
 use nalgebra::Vector2;
-use std::f64::consts::FRAC_PI_2;
+use std::f64::consts::{FRAC_PI_2, FRAC_PI_4};
 
 pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     name: "anisotropic_friction",
@@ -20,8 +20,11 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     acts_on: Place::Table,
     parameters: &[
         Parameter::size("size", "1", [0.0, 0.5], 0.0).within(-1.0, 1.0),
-        Parameter::form("axis", "rad", [-FRAC_PI_2, FRAC_PI_2], 0.0),
-        Parameter::form("drift", "1", [0.0, 1.0], 1.0).within(0.0, 1.0),
+        Parameter::form("axis", "rad", [-FRAC_PI_2, FRAC_PI_2], 0.0).searched(Search::Angle { quarter: FRAC_PI_4 }),
+        Parameter::form("drift", "1", [0.0, 1.0], 1.0)
+            .within(0.0, 1.0)
+            // Slips that are turned aside as far as they can be, and not at all.
+            .begun_at(&[&[1.0], &[0.0]]),
     ],
     confusable_with: &["table_tilt", "friction_patch"],
     install: |values, effects| {

@@ -8,7 +8,7 @@
 //! - Signature (S10): spin decays slower with less reach; travel without spin stays, unless the hit tips the object.
 //! - Confused with: object inertia (spin too, but at the hit already), the object's friction.
 
-use crate::effects::registry::{EffectInfo, Parameter, Place, Stage};
+use crate::effects::registry::{EffectInfo, Parameter, Place, Search, Stage};
 
 pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     name: "pressure_distribution",
@@ -16,7 +16,11 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     acts_on: Place::Table,
     parameters: &[
         Parameter::size("reach", "1", [0.4, 1.2], 1.0).within(0.01, 2.0),
-        Parameter::form("pivot", "1", [0.4, 1.2], 1.0).within(0.01, 2.0),
+        Parameter::form("pivot", "1", [0.4, 1.2], 1.0)
+            .within(0.01, 2.0)
+            .searched(Search::Uneven)
+            // Feet, and the corners of the base.
+            .begun_at(&[&[0.75], &[1.0]]),
     ],
     confusable_with: &["object_inertia", "tool_offset"],
     install: |values, effects| {

@@ -14,7 +14,11 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     acts_on: Place::Table,
     parameters: &[
         Parameter::size("excess", "1", [-0.2, 0.2], 0.0).within(-10.0, 10.0),
-        Parameter::form("velocity", "m/s", [0.02, 0.3], 0.1).within(1e-6, f64::MAX),
+        Parameter::form("velocity", "m/s", [0.02, 0.3], 0.1).within(1e-6, f64::MAX).begun_at(&[
+            &[0.05],
+            &[0.1],
+            &[0.2],
+        ]),
     ],
     confusable_with: &["velocity_dependent_friction", "tracker_smoothing"],
     install: |values, effects| {
