@@ -3,7 +3,7 @@
 //! Each child runs in a process group of its own, so that Ctrl-C on the terminal reaches only this program, which then
 //! ends its children in an order that loses nothing. A child that is dropped is ended. Called by capture and demo.
 
-use rustix::process::{Pid, Signal, kill_process};
+use rustix::process::{Pid, Signal, kill_process_group};
 use shared_mem::transport::DOMAIN_VARIABLE;
 use std::collections::VecDeque;
 use std::ffi::OsString;
@@ -11,8 +11,8 @@ use std::io::{BufRead, BufReader, Read};
 use std::os::unix::process::CommandExt;
 use std::path::PathBuf;
 use std::process::{Child, Command, ExitStatus, Stdio};
+use std::sync::mpsc::{Receiver, channel};
 use std::sync::{Arc, Mutex, PoisonError};
-use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 /// Lines of a child's stderr kept for an error message.
@@ -108,7 +108,7 @@ impl Program {
 pub struct Running {
     name: String,
     child: Child,
-    answer: Option<JoinHandle<String>>,
+    answer: Option<Receiver<String>>,
     tail: Arc<Mutex<VecDeque<String>>>,
     status: Option<ExitStatus>,
 }
@@ -127,7 +127,7 @@ impl Running {
     pub fn start(program: Program, arguments: &[OsString], domain: Option<&str>) -> Result<Self, ProcessError> {
         let path = program.find()?;
         let mut command = Command::new(&path);
-        command.args(arguments).stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped()).process_group(0);
+        command.args(arguments).stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
         if let Some(domain) = domain {
             command.env(DOMAIN_VARIABLE, domain);
         }
@@ -137,19 +137,21 @@ impl Running {
     }
 
     fn spawn(name: String, command: &mut Command) -> std::io::Result<Self> {
-        let mut child = command.spawn()?;
+        let mut child = command.process_group(0).spawn()?;
         let tail = Arc::new(Mutex::new(VecDeque::new()));
         if let Some(stderr) = child.stderr.take() {
             let tail = Arc::clone(&tail);
             std::thread::spawn(move || keep_tail(BufReader::new(stderr), &tail));
         }
         let answer = child.stdout.take().map(|mut stdout| {
+            let (told, answer) = channel();
             std::thread::spawn(move || {
                 let mut text = String::new();
-                // What cannot be read is missed by whoever parses the answer.
+                // What cannot be read is missed by whoever parses the answer; who gave up on it hears nothing.
                 let _ = stdout.read_to_string(&mut text);
-                text
-            })
+                let _ = told.send(text);
+            });
+            answer
         });
         tracing::debug!("started {name} as process {}", child.id());
         Ok(Self { name, child, answer, tail, status: None })
@@ -196,7 +198,8 @@ impl Running {
             }
             std::thread::sleep(LOOK);
         };
-        let answer = self.answer.take().and_then(|reader| reader.join().ok()).unwrap_or_default();
+        // Not for ever: another process may have inherited the pipe and hold it open.
+        let answer = self.answer.take().and_then(|answer| answer.recv_timeout(GRACE).ok()).unwrap_or_default();
         if status.success() { Ok(answer) } else { Err(self.ended(status, answer)) }
     }
 
@@ -210,7 +213,7 @@ impl Running {
     fn terminate(&mut self) {
         if self.poll().is_none()
             && let Some(pid) = i32::try_from(self.child.id()).ok().and_then(Pid::from_raw)
-            && let Err(error) = kill_process(pid, Signal::TERM)
+            && let Err(error) = kill_process_group(pid, Signal::TERM)
         {
             tracing::warn!("cannot end {}: {error}", self.name);
         }
@@ -218,7 +221,9 @@ impl Running {
 
     fn kill(&mut self) {
         // Fails only when it is gone already, which is what is wanted.
-        let _ = self.child.kill();
+        if let Some(pid) = i32::try_from(self.child.id()).ok().and_then(Pid::from_raw) {
+            let _ = kill_process_group(pid, Signal::KILL);
+        }
         let _ = self.child.wait();
     }
 
@@ -271,6 +276,13 @@ mod tests {
         Running::spawn("sh".into(), &mut command).expect("a shell")
     }
 
+    /// Returns once the child has said something on stderr.
+    fn said(child: &Running) {
+        while child.words().is_empty() {
+            std::thread::sleep(LOOK);
+        }
+    }
+
     #[test]
     fn the_last_words_of_a_child_that_fails_are_quoted() {
         let error = shell("echo cannot open the robot >&2; exit 1").finish(GRACE, || false).unwrap_err().to_string();
@@ -288,14 +300,19 @@ mod tests {
     #[test]
     fn a_child_that_ends_unasked_is_noticed() {
         let mut child = shell("exit 0");
-        std::thread::sleep(Duration::from_millis(200));
-        assert!(matches!(child.check(), Err(ProcessError::Ended { .. })));
+        let ended = loop {
+            match child.check() {
+                Ok(()) => std::thread::sleep(LOOK),
+                Err(ended) => break ended,
+            }
+        };
+        assert!(matches!(ended, ProcessError::Ended { .. }), "{ended}");
     }
 
     #[test]
     fn a_stopped_child_still_gives_its_answer() {
-        let child = shell("trap 'echo done; exit 0' TERM; while true; do sleep 0.01; done");
-        std::thread::sleep(Duration::from_millis(300));
+        let child = shell("trap 'echo done; exit 0' TERM; echo ready >&2; while true; do sleep 0.01; done");
+        said(&child);
         assert_eq!(child.stop().expect("a clean end"), "done\n");
     }
 
@@ -306,9 +323,19 @@ mod tests {
     }
 
     #[test]
-    fn a_cancelled_child_is_ended() {
+    fn a_cancelled_child_is_ended_with_those_it_started() {
+        let mut child = shell("sleep 600 & echo ready >&2; wait");
+        said(&child);
+        let answer = child.answer.take().expect("a pipe");
+        assert!(matches!(child.finish(GRACE, || true), Err(ProcessError::Ended { .. })));
+        assert!(answer.recv_timeout(GRACE).is_ok(), "a process it started still holds its stdout");
+    }
+
+    #[test]
+    fn a_process_that_left_the_group_of_an_ended_child_is_not_waited_for() {
+        let child = shell("setsid sleep 90 & exit 0");
         let start = Instant::now();
-        assert!(shell("sleep 60").finish(Duration::from_secs(30), || true).is_err());
-        assert!(start.elapsed() < Duration::from_secs(10));
+        assert_eq!(child.finish(2 * GRACE, || false).expect("a clean end"), "");
+        assert!(start.elapsed() < 10 * GRACE, "waited for the process that holds the pipe");
     }
 }
