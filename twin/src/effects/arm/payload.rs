@@ -2,7 +2,7 @@
 //!
 //! - Equation: `tau = Y(q, dq, ddq) dpi` of a point mass on the flange: it is added to the arm, not to the controller's model.
 //! - Source: Gautier, Khalil 1990 (inertial parameters enter linearly).
-//! - Units: mass kg; centre m in the flange frame. Plausible: mass 0 to 1.5, centre within 0.03 across and 0 to 0.15 along z.
+//! - Units: mass kg; centre m in the flange frame. Plausible: mass 0 to 1.5, centre within 0.15 to every side.
 //! - Signature (C10): sags in rest with the gravity regressor over the pose; grows with the square of the frequency too.
 //! - Confused with: torque gain, friction asymmetry (the same in every pose), base tilt.
 
@@ -15,7 +15,7 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     acts_on: Place::ArmModel,
     parameters: &[
         Parameter::size("mass", "kg", [0.0, 1.5], 0.0).within(0.0, 100.0),
-        Parameter::form("centre", "m", [-0.03, 0.15], 0.0)
+        Parameter::form("centre", "m", [-0.15, 0.15], 0.0)
             .vector(3)
             // At the flange, and in a hand.
             .begun_at(&[&[0.0, 0.0, 0.0], &[0.0, 0.0, 0.06]]),
