@@ -357,9 +357,11 @@ fn probe(effect: &EffectInfo, number: usize, (setting, unknown): &(Setting, Unkn
     let Setting::Effect { parameter, inverse, .. } = setting else { unreachable!("sizes belong to effects") };
     let info = effect.parameters.iter().find(|p| p.name == *parameter).expect("a size is a parameter");
     let [lo, hi] = info.plausible;
-    let reach = if *inverse { lo.recip() } else { (hi - unknown.start).max(unknown.start - lo) };
-    // The registry's range reaches to hobby servos; gears of an arm have a tenth of that play.
-    let reach = if effect.name == "joint_backlash" { 0.1 * reach } else { reach };
+    let reach = match info.usual {
+        _ if *inverse => lo.recip(),
+        Some(usual) => (usual - unknown.start).abs(),
+        None => (hi - unknown.start).max(unknown.start - lo),
+    };
     let one_sided = *inverse || unknown.lower >= unknown.start || unknown.upper <= unknown.start;
     let way = if unknown.upper > unknown.start { 1.0 } else { -1.0 };
     let share = if info.shape == Shape::PerJoint || *inverse { PROBE_SHARE } else { 0.5 * PROBE_SHARE };

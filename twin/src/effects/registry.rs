@@ -70,7 +70,8 @@ pub enum Role {
 pub enum Search {
     /// Along its slope.
     Slope,
-    /// Not at all: no clip shows it well enough to be worth a number.
+    /// Not along with the others, since few clips show it well enough to be worth a number of its own: only what was found is
+    /// tried at other values of it.
     Held,
     /// A limit: as long as it is not reached nothing happens, and no slope leads there.
     Limit,
@@ -96,6 +97,8 @@ pub struct Parameter {
     pub shape: Shape,
     /// Values that are met in practice: the range of a search.
     pub plausible: [f64; 2],
+    /// The strongest that is met in arms of laboratories, where simpler machines have more: by this a search takes its steps.
+    pub usual: Option<f64>,
     /// Values that have a meaning.
     pub possible: [f64; 2],
     /// What it does to the effect.
@@ -144,6 +147,7 @@ impl Parameter {
             unit,
             shape: Shape::Number,
             plausible,
+            usual: None,
             possible: [f64::MIN, f64::MAX],
             role: Role::Size { neutral },
             search: Search::Slope,
@@ -166,6 +170,10 @@ impl Parameter {
 
     pub(super) const fn within(self, lowest: f64, highest: f64) -> Self {
         Self { possible: [lowest, highest], ..self }
+    }
+
+    pub(super) const fn usually_up_to(self, strongest: f64) -> Self {
+        Self { usual: Some(strongest), ..self }
     }
 
     pub(super) const fn searched(self, search: Search) -> Self {

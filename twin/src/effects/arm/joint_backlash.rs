@@ -16,7 +16,8 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     stage: Stage::Control,
     acts_on: Place::Joint,
     parameters: &[
-        Parameter::size("play", "rad", [0.0, 0.03], 0.0).per_joint().within(0.0, 1.0),
+        // Hobby servos reach the end of the range; gears of an arm have a tenth of that play.
+        Parameter::size("play", "rad", [0.0, 0.03], 0.0).per_joint().within(0.0, 1.0).usually_up_to(3e-3),
         Parameter::form("compliance", "rad/(N m)", [1e-7, 1e-4], 1e-7)
             .per_joint()
             .within(1e-7, 1e-2)
