@@ -123,17 +123,9 @@ mod tests {
     use super::super::library::Library;
     use super::super::score::Foretold;
     use super::super::sweep::Precision;
-    use super::super::test_bench::{nothing_said_of, on_strokes, shipped};
+    use super::super::test_bench::{nothing_said_of, on_strokes, shipped, with_effect};
     use super::*;
-    use crate::benchmark::draw;
     use crate::benchmark::world::{Fault, Kind, World};
-    use shared_mem::cell::Cell;
-
-    /// The strokes of a world in which one effect acts.
-    fn with_effect(name: &str, number: u64, cell: &Cell) -> World {
-        let place = draw::candidates(true).iter().position(|effect| effect.name == name);
-        World::draw(number, Kind::Strokes, Fault::Single(place.expect("an effect")), cell)
-    }
 
     /// The baseline as it is hidden in a world.
     fn hidden_baseline(library: &Library, world: &World) -> Vec<f64> {
@@ -167,7 +159,7 @@ mod tests {
     #[test]
     fn an_object_that_was_found_under_an_arm_that_strays_is_found_anew() {
         let cell = shipped();
-        let world = with_effect("command_delay", 40, &cell);
+        let world = with_effect("command_delay", 40, Kind::Strokes, &cell);
         on_strokes((&cell, &world), |bench, even| {
             let library = bench.library;
             let hidden = hidden_baseline(library, &world);
@@ -196,7 +188,7 @@ mod tests {
     #[test]
     fn the_arm_tells_its_effects_apart_and_the_object_what_the_arm_leaves_open() {
         let cell = shipped();
-        let world = with_effect("joint_encoder_offset", 48, &cell);
+        let world = with_effect("joint_encoder_offset", 48, Kind::Strokes, &cell);
         on_strokes((&cell, &world), |bench, even| {
             let library = bench.library;
             let hidden = library.settings.numbers(&world.hidden);

@@ -70,10 +70,9 @@ fn held(mut hypothesis: Hypothesis, number: usize, value: f64) -> Hypothesis {
 #[cfg(test)]
 mod tests {
     use super::super::library::Library;
-    use super::super::test_bench::{ONCE, on_bench, shipped};
+    use super::super::test_bench::{ONCE, on_bench, shipped, truth, with_effect};
     use super::*;
-    use crate::benchmark::draw;
-    use crate::benchmark::world::{Fault, Kind, World};
+    use crate::benchmark::world::{Kind, World};
     use crate::forward::setting;
     use shared_mem::theta::Theta;
     use twin::arm::MAX_JOINTS;
@@ -81,17 +80,12 @@ mod tests {
     #[test]
     fn a_vertical_joint_s_encoder_may_be_off_by_any_angle_and_no_other_s() {
         let cell = shipped();
-        let place = draw::candidates(false).iter().position(|effect| effect.name == "joint_encoder_offset");
-        let world = World::draw(14, Kind::Excitation, Fault::Single(place.expect("an effect")), &cell);
+        let world = with_effect("joint_encoder_offset", 14, Kind::Excitation, &cell);
         let library = Library::new(&cell, &setting::complete(&cell, None).expect("a cell"), None, &[10.0; MAX_JOINTS]);
-        let effect = library.candidates.iter().position(|c| c.effect.name == "joint_encoder_offset");
-        let effect = effect.expect("a candidate");
+        let effect = library.find("joint_encoder_offset").expect("a candidate");
         let offsets = library.candidates[effect].sizes.clone();
-        let mut full = library.start();
-        for (number, value) in full.iter_mut().zip(library.settings.numbers(&world.hidden)) {
-            *number = value.unwrap_or(*number);
-        }
-        let truth = full.clone();
+        let truth = truth(&library, &world);
+        let mut full = truth.clone();
         full[offsets[0]] = 0.04;
         let kept = |world: &World, full: Vec<f64>| {
             on_bench((&cell, world), &library, |bench, even| {

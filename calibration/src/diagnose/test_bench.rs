@@ -8,8 +8,9 @@ use super::ground::Ground;
 use super::library::Library;
 use super::shortlist::Scored;
 use super::sweep::Precision;
+use crate::benchmark::draw;
 use crate::benchmark::session::record;
-use crate::benchmark::world::World;
+use crate::benchmark::world::{Fault, Kind, World};
 use crate::forward::object::ObjectClips;
 use crate::forward::setting;
 use crate::interrupt::Interrupt;
@@ -27,6 +28,18 @@ type Parameters<'a> = &'a (dyn Fn(&[f64]) -> Theta + Sync);
 /// The cell as it is shipped.
 pub(super) fn shipped() -> Cell {
     Cell::parse(include_str!("../../../config/fr3_cell.toml"), Path::new("fr3_cell.toml")).expect("the shipped cell")
+}
+
+/// A world in which one effect acts.
+pub(super) fn with_effect(name: &str, number: u64, kind: Kind, cell: &Cell) -> World {
+    let place = draw::candidates(kind == Kind::Strokes).iter().position(|effect| effect.name == name);
+    World::draw(number, kind, Fault::Single(place.expect("an effect")), cell)
+}
+
+/// The library's numbers as they are hidden in a world.
+pub(super) fn truth(library: &Library, world: &World) -> Vec<f64> {
+    let hidden = library.settings.numbers(&world.hidden);
+    library.start().into_iter().zip(hidden).map(|(start, hidden)| hidden.unwrap_or(start)).collect()
 }
 
 /// Asks the bench on which the world's clips lie; every channel weighs the same.
