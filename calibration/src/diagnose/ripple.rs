@@ -12,6 +12,9 @@ use std::f64::consts::FRAC_PI_2;
 
 /// Orders are this far apart [periods per turn]: half of it is a third of a period within a joint's travel of 1 rad.
 const APART: f64 = 4.0;
+/// So many clips are looked at: a joint that turns through a radian or two in each tells its order from all others there,
+/// and every further one would cost two simulations an order.
+const CLIPS: usize = 2;
 /// Strength at which the answer is looked at [N m].
 const PROBED: f64 = 0.05;
 
@@ -74,8 +77,8 @@ pub(super) fn start<E: Evidence>(
         };
         tried.iter().map(waves).collect()
     };
-    let clips: Vec<Vec<Vec<Waves>>> =
-        from.fitted.par_iter().map(|fitted| of_clip(fitted.clip)).collect::<Option<_>>()?;
+    let looked_at = &from.fitted[..from.fitted.len().min(CLIPS)];
+    let clips: Vec<Vec<Vec<Waves>>> = looked_at.par_iter().map(|fitted| of_clip(fitted.clip)).collect::<Option<_>>()?;
     let mut full = from.full.clone();
     for (joint, size) in ripple.sizes.iter().enumerate() {
         let over_clips = |order: usize| {

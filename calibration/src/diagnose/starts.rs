@@ -16,6 +16,10 @@ const TRIED: [f64; 3] = [0.1, 0.3, 0.6];
 /// Shares of the strongest at which a candidate without a slope is tried.
 const SCANNED: [f64; 4] = [0.06, 0.2, 0.5, 1.0];
 
+/// A start that costs more than this many times what the hypothesis without the candidate does is far from anything that
+/// acts: an effect whose strength is right spares something, though the other numbers still stand in for it.
+const ASTRAY: f64 = 2.0;
+
 /// Units of a probe at which each direction of one with a threshold is tried.
 const STEPPED: [f64; 6] = [0.95, 1.05, 1.15, 1.3, 1.6, 2.2];
 /// Units of a probe at which a number that only the object tells is tried: all of what is met in practice.
@@ -65,14 +69,17 @@ fn pointed_at<E: Evidence>(bench: &Bench<'_, E>, at: (&Hypothesis, &[f64]), scor
     numbers
 }
 
-/// Of a candidate that the score test did not point to, the strength at which the fitted clips cost least, in any form.
+/// Of a candidate that the score test did not point to, the strength at which the fitted clips cost least, in any form, unless
+/// they cost far more than without it.
 fn scanned<E: Evidence>(bench: &Bench<'_, E>, at: (&Hypothesis, &[f64]), scored: &Scored) -> Vec<Vec<f64>> {
     let forms = 0..bench.library.candidates[scored.candidate].alternatives.len();
     let starts = forms.flat_map(|alternative| aside(bench, &Scored { alternative, ..scored.clone() }, &SCANNED));
     let numbers = starts.map(|start| bench.begun(at.0.full.clone(), &start));
     let ripples = bench.library.candidates[scored.candidate].is_searched(Search::InStep);
     let in_step = if ripples { ripple::start(bench, at, scored.candidate) } else { None };
-    cheapest(bench, at, numbers.chain(in_step)).map(|(_, full)| full).into_iter().collect()
+    let most = ASTRAY * bench.plain_cost(at.0, &at.0.full, at.1).unwrap_or(f64::INFINITY);
+    let start = cheapest(bench, at, numbers.chain(in_step)).filter(|(cost, _)| *cost < most);
+    start.map(|(_, full)| full).into_iter().collect()
 }
 
 /// Some way to either side along each of a candidate's directions, in any of its forms: what the clips cost where they cost
@@ -174,6 +181,7 @@ mod tests {
     use crate::benchmark::session::record;
     use crate::benchmark::world::{Fault, Kind, World};
     use crate::forward::setting;
+    use shared_mem::msg::MAX_JOINTS;
     use shared_mem::theta::{EffectTheta, Theta};
 
     #[test]
@@ -206,6 +214,25 @@ mod tests {
                 None => assert!(found > 0.9, "{found} of what is asked"),
             }
         }
+    }
+
+    #[test]
+    fn what_slopes_do_not_point_to_is_tried_where_it_spares_something_and_nowhere_else() {
+        let cell = shipped();
+        let well = World::draw(3, Kind::Excitation, Fault::Nothing, &cell);
+        let base = setting::complete(&cell, Some(&well.hidden)).expect("a cell");
+        let play = [("play".to_owned(), vec![1e-3; 7].into())].into();
+        let loose = EffectTheta { name: "joint_backlash".into(), parameters: play };
+        let world = World { hidden: Theta { effects: vec![loose], ..well.hidden.clone() }, ..well };
+        let library = Library::new(&cell, &base, None, &[87.0; MAX_JOINTS]);
+        on_bench((&cell, &world), &library, |bench, even| {
+            let from = bench.fit((&[], library.start()), &[0, 1], even, None, ONCE).expect("a fit");
+            let starts = |name| {
+                let candidate = library.find(name).expect("a candidate");
+                scanned(bench, (&from, even), &nothing_said_of(&library, candidate)).len()
+            };
+            assert_eq!((starts("joint_backlash"), starts("command_delay")), (1, 0));
+        });
     }
 
     #[test]
