@@ -135,6 +135,14 @@ impl Found {
         };
         self.steps.iter().map(exceeds).collect()
     }
+
+    /// The effects that were kept, each with the step in which it was added.
+    pub fn kept(&self) -> impl Iterator<Item = (usize, usize)> {
+        self.steps.windows(2).enumerate().filter_map(|(place, pair)| {
+            let added = pair[1].from.effects.iter().find(|effect| !pair[0].from.effects.contains(effect))?;
+            self.last.effects.contains(added).then_some((place, *added))
+        })
+    }
 }
 
 /// Whether an advantage is enough for `cost` more numbers.

@@ -1,17 +1,16 @@
 //! From what the search found to the answer: the confirm clips are opened here, and only here.
 
 use super::admit::Admitted;
-use super::answer::{Candidate, Change, Clips, Diagnosis, Gap, Nearest, Place, Share, Status};
-use super::combine::{Found, Step, Trial};
+use super::answer::{Change, Clips, Diagnosis, Gap, Nearest, Place, Share};
+use super::combine::{Found, Step};
 use super::evidence::Evidence;
 use super::fit::{Bench, Hypothesis};
 use super::gap::Residuals;
 use super::leftovers::{self, Left};
 use super::score::foretell;
-use super::shortlist::TESTABLE;
 use super::split::Split;
 use super::verdict::{self, Finding};
-use super::{DiagnoseError, Kind, Options, advice, combine, confidence, drift, localise, parameters, settle};
+use super::{DiagnoseError, Kind, Options, advice, combine, confidence, drift, localise, ranked, settle};
 use crate::report::Trace;
 use shared_mem::recording::Session;
 use shared_mem::theta::Theta;
@@ -103,7 +102,14 @@ pub fn conclude<E: Evidence>(
     let largest = rest.first().map(|place| (place.channel.as_str(), place.regime.as_str()));
     Ok(Diagnosis {
         gap,
-        candidates: candidates(bench, (found, unforeseen[0]), split, (&before, &finding), verdict.kind, options.seed),
+        candidates: ranked::candidates(
+            bench,
+            (found, unforeseen[0]),
+            split,
+            (&before, &finding),
+            verdict.kind,
+            options.seed,
+        ),
         next_experiment: match verdict.kind {
             Kind::Unexplained => advice::unexplained(largest),
             Kind::None => "Nothing is open; record the next session as usual.".into(),
@@ -141,7 +147,7 @@ fn finding<'a, E: Evidence>(
     let name = |effect: &usize| bench.library.candidates[*effect].effect.name;
     let mut rivals = Vec::new();
     let (mut sure, mut clear): (f64, bool) = (1.0, true);
-    for (place, effect) in steps_of(found) {
+    for (place, effect) in found.kept() {
         let step = &found.steps[place];
         clear &= step.is_clear(bench.library, effect);
         let others = confidence::rivals(step, effect, unforeseen[place]);
@@ -188,14 +194,6 @@ fn stands_in<E: Evidence>(
     confidence::alike(advantage.nats, advantage.error, advantage.clips())
 }
 
-/// The effects that were kept, each with the step in which it was added.
-fn steps_of(found: &Found) -> impl Iterator<Item = (usize, usize)> {
-    found.steps.windows(2).enumerate().filter_map(|(place, pair)| {
-        let added = pair[1].from.effects.iter().find(|effect| !pair[0].from.effects.contains(effect))?;
-        found.last.effects.contains(added).then_some((place, *added))
-    })
-}
-
 /// Mean joint error, ADD and ADD-S of the confirm clips at two hypotheses, by the code of `twin replay`.
 fn replayed<E: Evidence>(
     bench: &Bench<'_, E>,
@@ -221,92 +219,6 @@ fn replayed<E: Evidence>(
         }
     }
     Ok(changes)
-}
-
-fn candidates<E: Evidence>(
-    bench: &Bench<'_, E>,
-    (found, unforeseen): (&Found, f64),
-    split: &Split,
-    (before, finding): (&Residuals, &Finding<'_>),
-    kind: Kind,
-    seed: u64,
-) -> Vec<Candidate> {
-    let first = &found.steps[0];
-    let likely = confidence::probabilities(&first.trials, found.last.effects.is_empty());
-    let one = |trial: &Trial| {
-        let effect = trial.scored.candidate;
-        let name = bench.library.candidates[effect].effect.name;
-        let kept = found.last.effects.contains(&effect) && matches!(kind, Kind::Named | Kind::Class);
-        // An effect that was found beside others is judged by what these left.
-        let added = steps_of(found).find(|(_, added)| kept && *added == effect).map(|(place, _)| &found.steps[place]);
-        let step = added.filter(|step| !step.from.effects.is_empty()).unwrap_or(first);
-        let trial = step.trials.iter().find(|trial| trial.scored.candidate == effect).unwrap_or(trial);
-        let on_confirm = |fit| Residuals::at(bench, fit, &split.confirm);
-        let fitted = trial.fitted.as_ref().and_then(|(fit, _)| on_confirm(fit));
-        let shrink = match &step.from.effects[..] {
-            [] => fitted.map(|fitted| fitted.shrink(before, seed)),
-            _ => fitted.zip(on_confirm(&step.from)).map(|(fitted, from)| fitted.shrink(&from, seed)),
-        };
-        let beside: Vec<&str> = step.from.effects.iter().map(|k| bench.library.candidates[*k].effect.name).collect();
-        let fit = if kept { Some(&found.last) } else { trial.fitted.as_ref().map(|(fit, _)| fit) };
-        let probability = likely.iter().find(|(candidate, _)| *candidate == effect).map_or(0.0, |(_, p)| *p);
-        let status = status(&trial.scored, kept, finding.rivals.contains(&name), kind);
-        Candidate {
-            effect: name.into(),
-            probability: if kept { probability.max(finding.confidence) } else { probability },
-            parameters: fit.map(|fit| parameters::of_effect(bench, fit, effect)).unwrap_or_default(),
-            shrink: shrink.unwrap_or(Share { value: 0.0, ci90: [0.0; 2] }),
-            confusable_with: confusable(first, effect, unforeseen, bench),
-            status,
-            why: why(trial, &beside, status),
-        }
-    };
-    let mut all: Vec<Candidate> = first.trials.iter().map(one).collect();
-    all.sort_by(|a, b| {
-        let key = |c: &Candidate| (c.status != Status::Named, c.status != Status::Possible, -c.probability);
-        key(a).partial_cmp(&key(b)).unwrap_or(std::cmp::Ordering::Equal)
-    });
-    all
-}
-
-fn status(scored: &super::shortlist::Scored, kept: bool, rival: bool, kind: Kind) -> Status {
-    match kind {
-        Kind::Named if kept => Status::Named,
-        Kind::Class if kept || rival => Status::Possible,
-        _ if scored.signal < TESTABLE => Status::NotTestable,
-        _ => Status::RuledOut,
-    }
-}
-
-fn confusable<E: Evidence>(first: &Step, effect: usize, unforeseen: f64, bench: &Bench<'_, E>) -> Vec<String> {
-    let near = confidence::rivals(first, effect, unforeseen);
-    near.iter().map(|other| bench.library.candidates[*other].effect.name.to_owned()).collect()
-}
-
-fn why(trial: &Trial, beside: &[&str], status: Status) -> String {
-    let scored = &trial.scored;
-    match (&trial.fitted, status) {
-        (_, Status::NotTestable) => format!(
-            "even at its largest it would show by {:.1} sigma beyond what the other parameters can imitate",
-            scored.signal
-        ),
-        (Some((_, advantage)), _) => format!(
-            "{}foretells the clips better by {:.0} ± {:.0} nats, in {:.0} % of them, for {} numbers; {} {:.0} % of {}",
-            if beside.is_empty() { String::new() } else { format!("beside {} it ", beside.join(" and ")) },
-            advantage.nats,
-            advantage.error,
-            100.0 * advantage.share,
-            scored.cost,
-            if beside.is_empty() { "alone it closes" } else { "there it closes" },
-            100.0 * trial.closes.clamp(0.0, 1.0),
-            if beside.is_empty() { "the gap" } else { "what is left" },
-        ),
-        (None, _) => format!(
-            "its signature explains {:.1} % of what the baseline leaves; its parameters imitate {:.0} % of that signature",
-            100.0 * scored.cosine.powi(2),
-            100.0 * scored.imitated
-        ),
-    }
 }
 
 /// Residuals of the channels with the largest gap, before and after, on the confirm clips.

@@ -26,6 +26,7 @@
 //! | [`leftovers`], [`drift`] | what they leave |
 //! | [`gap`], [`localise`] | how large the gap is, and where |
 //! | [`parameters`], [`confidence`], [`verdict`], [`advice`] | what is said about it |
+//! | [`ranked`] | what is said of every candidate |
 //! | [`conclude`], [`answer`] | the answer |
 //! | [`command`] | the verb |
 
@@ -56,6 +57,7 @@ pub mod localise;
 pub mod noise;
 pub mod parameters;
 pub mod quadratic;
+pub mod ranked;
 pub mod ripple;
 pub mod scatter;
 pub mod score;
