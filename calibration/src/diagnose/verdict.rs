@@ -102,13 +102,24 @@ impl Finding<'_> {
         100.0 * self.left.iter().map(Left::explained).fold(0.0, f64::max)
     }
 
+    /// How much is left, of what the arm does or of what the object does where only one of them is explained.
+    fn rest(&self) -> String {
+        let open: Vec<&Left> = self.left.iter().filter(|left| left.too_much(self.clear)).collect();
+        match &open[..] {
+            [open] if self.left.len() > 1 => {
+                let whose = if open.of_object { "object" } else { "arm" };
+                format!("{:.0} % of what the {whose} does", 100.0 * (1.0 - open.explained()))
+            }
+            _ => format!("{:.0} % of it", 100.0 - self.percent()),
+        }
+    }
+
     fn unexplained(&self) -> Verdict {
         let nearest = match &self.effects[..] {
             [] => String::new(),
             names => {
                 let strength = if self.implausible { ", stronger than it is met in practice," } else { "" };
-                let rest = 100.0 - self.percent();
-                format!("; {} comes nearest{strength} and leaves {rest:.0} % of it", names.join(" with "))
+                format!("; {} comes nearest{strength} and leaves {}", names.join(" with "), self.rest())
             }
         };
         let drift = self.drift.map_or_else(String::new, |change| {
@@ -206,6 +217,18 @@ mod tests {
         assert_eq!(Finding { rivals: vec!["tip_friction"], ..unlikely }.verdict().kind, Kind::Class);
         let in_a_gap = Finding { confidence: 0.1, ..finding(vec!["restitution"], 500.0, 1.5) };
         assert_eq!(in_a_gap.verdict().kind, Kind::Unexplained);
+    }
+
+    #[test]
+    fn where_only_the_arm_is_explained_it_is_said_what_is_left_of_the_object() {
+        let mut found = finding(vec!["command_delay"], 5e5, 1.5);
+        let arm = found.left[0];
+        found.left.push(Left { of_object: true, before: 301.0, after: 91.0, ..arm });
+        let Verdict { kind, text, .. } = found.verdict();
+        let told = text.contains("command_delay comes nearest and leaves 30 % of what the object does");
+        assert!(kind == Kind::Unexplained && told, "{text}");
+        found.left[0].after = 2e5;
+        assert!(found.verdict().text.contains("leaves 30 % of it"), "both are left");
     }
 
     #[test]
