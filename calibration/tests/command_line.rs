@@ -41,3 +41,15 @@ fn a_missing_cell_fails_in_one_line_that_names_the_file() {
     assert_eq!(said.lines().count(), 1, "{said}");
     assert!(said.contains("nowhere/cell.toml"), "{said}");
 }
+
+#[test]
+fn a_demo_that_lacks_a_program_leaves_its_folder_for_the_next_call() {
+    let alone = tempfile::tempdir().expect("a folder");
+    let [program, out] = ["calibration", "demo"].map(|name| alone.path().join(name));
+    std::fs::copy(env!("CARGO_BIN_EXE_calibration"), &program).expect("a copy");
+    let output = Command::new(&program).args(["demo", "--out"]).arg(&out).env("PATH", "").output().expect("it runs");
+    assert_eq!(output.status.code(), Some(1));
+    let said = text(&output.stderr);
+    assert!(said.contains("cannot find the program `rt_bridge`; build it with"), "{said}");
+    assert!(!out.exists(), "written before it is known to work");
+}

@@ -10,6 +10,7 @@ use crate::capture::excitation::{self, ClipSummary};
 use crate::capture::task::{Summary, Task};
 use crate::diagnose::{self, Diagnosis, Verdict, diagnose};
 use crate::interrupt::Interrupt;
+use crate::processes::Program;
 use crate::report::{self, Story};
 use anyhow::{Context as _, bail};
 use replay::{Replay, Trace, replay, trace};
@@ -141,6 +142,10 @@ fn prepare(options: &Options) -> anyhow::Result<Files> {
     let out = options.out.clone();
     if out.read_dir().is_ok_and(|mut entries| entries.next().is_some()) {
         bail!("{} is not empty; choose another folder with --out, or remove it", out.display());
+    }
+    // Before anything is written: whoever builds what is missing calls again with the same folder.
+    for program in [Program::Bridge, Program::Twin] {
+        program.find()?;
     }
     std::fs::create_dir_all(&out).with_context(|| format!("cannot create {}", out.display()))?;
     let files = Files {
