@@ -25,6 +25,9 @@ pub struct Bench<'a, E> {
     pub interrupt: &'a Interrupt,
 }
 
+/// Clips, each with its own numbers.
+pub(super) type Clips = Vec<(usize, Vec<f64>)>;
+
 /// A clip at a hypothesis.
 #[derive(Debug, Clone)]
 pub struct FittedClip {
@@ -143,6 +146,7 @@ impl<E: Evidence> Bench<'_, E> {
         let count = self.scatter.count();
         let own = |clip: &usize| (*clip, near.map_or_else(|| vec![0.0; count], |near| near.own(*clip, count)));
         let mut clips = self.settled(&full, clips.iter().map(own).collect(), weights)?;
+        clips = self.freed(&full, clips, weights);
         let mut damping = 1e-4;
         let mut best = None;
         for _ in 1..effort.iterations {
@@ -157,16 +161,17 @@ impl<E: Evidence> Bench<'_, E> {
             };
             (full, clips) = (to, to_own);
         }
-        let at = match best.filter(|_| moving.len() == free.len()) {
+        let freed = self.freed(&full, clips.clone(), weights);
+        let at = match best.filter(|_| moving.len() == free.len() && freed == clips) {
             Some(at) => at,
-            None => self.linearise(&full, &free, &clips, effort.precision)?,
+            None => self.linearise(&full, &free, &freed, effort.precision)?,
         };
         let forms = at.reduced(self.evidence, weights);
-        let fitted = clips.into_iter().zip(forms).map(|((clip, own), reduced)| FittedClip { clip, own, reduced });
+        let fitted = freed.into_iter().zip(forms).map(|((clip, own), reduced)| FittedClip { clip, own, reduced });
         Some(Hypothesis { effects: effects.to_vec(), full, free, fitted: fitted.collect() })
     }
 
-    fn linearise(
+    pub(super) fn linearise(
         &self,
         full: &[f64],
         free: &[usize],
@@ -178,7 +183,6 @@ impl<E: Evidence> Bench<'_, E> {
     }
 
     /// A point with a lower cost, along damped steps; `None` when there is none that is worth it.
-    #[allow(clippy::type_complexity)] // the numbers, and each clip with its own
     fn improved(
         &self,
         full: &[f64],
@@ -186,10 +190,10 @@ impl<E: Evidence> Bench<'_, E> {
         (at, forms): (&Swept, &[Reduced]),
         weights: &[f64],
         damping: &mut f64,
-    ) -> Option<(Vec<f64>, Vec<(usize, Vec<f64>)>)> {
+    ) -> Option<(Vec<f64>, Clips)> {
         let size = 1 + free.len();
         let sum = forms.iter().fold(DMatrix::zeros(size, size), |sum, reduced| sum + &reduced.form);
-        let kept: Vec<(usize, Vec<f64>)> = at.clips.iter().map(|clip| (clip.clip, clip.own.clone())).collect();
+        let kept: Clips = at.clips.iter().map(|clip| (clip.clip, clip.own.clone())).collect();
         let now = self.cost(full, &kept, weights)?;
         for _ in 0..TRIALS {
             let step = self.bounded_step(full, free, &sum, *damping);
@@ -198,7 +202,8 @@ impl<E: Evidence> Bench<'_, E> {
             free.iter().zip(step.iter()).for_each(|(k, step)| to[*k] += step);
             let own = |clip: &super::sweep::SweptClip| (clip.clip, at.own_after(clip, self.evidence, weights, &step));
             let to_own = at.clips.iter().map(own).collect();
-            let Some(to_own) = self.settled(&to, to_own, weights) else {
+            let settled = self.settled(&to, to_own, weights).map(|to_own| self.freed(&to, to_own, weights));
+            let Some(to_own) = settled else {
                 *damping = (*damping * 20.0).max(1e-3);
                 continue;
             };
@@ -253,6 +258,11 @@ impl<E: Evidence> Bench<'_, E> {
 
     /// Sum of squared weighted residuals and of the own numbers in their sigmas.
     fn cost(&self, full: &[f64], clips: &[(usize, Vec<f64>)], weights: &[f64]) -> Option<f64> {
+        Some(self.costs(full, clips, weights)?.iter().sum::<f64>()).filter(|cost| cost.is_finite())
+    }
+
+    /// The same clip by clip.
+    pub(super) fn costs(&self, full: &[f64], clips: &[(usize, Vec<f64>)], weights: &[f64]) -> Option<Vec<f64>> {
         let one = |(clip, own): &(usize, Vec<f64>)| {
             let selected =
                 Selected { evidence: self.evidence, full: full.to_vec(), free: vec![], clips: vec![*clip], weights };
@@ -260,8 +270,7 @@ impl<E: Evidence> Bench<'_, E> {
             selected.residuals(0, &[], own, &mut out).ok()?;
             Some(out.iter().map(|r| r * r).sum::<f64>() + self.scatter.penalty(own))
         };
-        let costs: Vec<Option<f64>> = clips.par_iter().map(one).collect();
-        costs.into_iter().sum::<Option<f64>>().filter(|cost| cost.is_finite())
+        clips.par_iter().map(one).collect()
     }
 
     /// The cost of the clips of a hypothesis at other shared numbers, their own numbers at rest: where they were fitted
@@ -331,6 +340,7 @@ impl<E: Evidence> Bench<'_, E> {
         let nothing = vec![0.0; self.scatter.count()];
         let clips = clips.iter().map(|clip| (*clip, nothing.clone())).collect();
         let at = self.settled(&hypothesis.full, clips, weights)?;
+        let at = self.freed(&hypothesis.full, at, weights);
         let swept = self.linearise(&hypothesis.full, &[], &at, Precision::Exact)?;
         let forms = swept.reduced(self.evidence, weights);
         let judged = at.into_iter().zip(forms).map(|((clip, own), reduced)| FittedClip { clip, own, reduced });
@@ -338,12 +348,7 @@ impl<E: Evidence> Bench<'_, E> {
     }
 
     /// Clips with their own numbers at their best for shared ones that are given.
-    fn settled(
-        &self,
-        full: &[f64],
-        mut clips: Vec<(usize, Vec<f64>)>,
-        weights: &[f64],
-    ) -> Option<Vec<(usize, Vec<f64>)>> {
+    fn settled(&self, full: &[f64], mut clips: Clips, weights: &[f64]) -> Option<Clips> {
         let steps = if self.scatter.count() == 0 { 0 } else { OWN_STEPS };
         for _ in 0..steps {
             let swept = self.linearise(full, &[], &clips, Precision::Exact)?;

@@ -17,7 +17,7 @@
 //! | [`sweep`], [`quadratic`] | every candidate's signature, linearised once |
 //! | [`shortlist`] | how much of the gap each signature explains |
 //! | [`worthy`], [`arm_alone`], [`starts`], [`ripple`] | which of them are fitted, to the arm first, and where a fit begins |
-//! | [`fit`] | hypotheses fitted |
+//! | [`fit`], [`freed`] | hypotheses fitted, and clips whose own numbers got stuck |
 //! | [`score`] | how well they foretell clips |
 //! | [`straying`] | how far clips stray under one of them |
 //! | [`closing`] | how much of the gap they close |
@@ -48,6 +48,7 @@ pub mod evidence;
 pub mod fit;
 pub mod flat;
 pub mod floor;
+pub mod freed;
 pub mod gap;
 pub mod ground;
 pub mod leftovers;

@@ -13,6 +13,12 @@ use twin::effects::{Search, Stage};
 const ASIDE: f64 = 0.3;
 /// Shares of the strongest at which one whose slope tells little is tried.
 const TRIED: [f64; 3] = [0.1, 0.3, 0.6];
+/// Shares of the strongest at which a patch is tried in every place, and friction beside it as a share of what it is without
+/// one: what was fitted is a mean of both.
+const PLACED: [f64; 2] = [0.4, 0.8];
+const BESIDE: [f64; 3] = [0.9, 1.0, 1.1];
+/// So many of the places where the clips cost least are fitted.
+const PLACES: usize = 3;
 /// Shares of the strongest at which a candidate without a slope is tried.
 const SCANNED: [f64; 4] = [0.06, 0.2, 0.5, 1.0];
 
@@ -56,6 +62,9 @@ fn pointed_at<E: Evidence>(bench: &Bench<'_, E>, at: (&Hypothesis, &[f64]), scor
         starts.extend(aside(bench, scored, &[ASIDE]));
     }
     let mut numbers: Vec<Vec<f64>> = starts.iter().map(|start| bench.begun(at.0.full.clone(), start)).collect();
+    if candidate.alternatives.len() > PLACES && candidate.effect.stage == Stage::Slide {
+        numbers.extend(placed(bench, at, scored));
+    }
     if candidate.is_searched(Search::Limit) {
         numbers.push(one_by_one(bench, at, numbers[0].clone(), &candidate.sizes, &STEPPED));
     }
@@ -67,6 +76,27 @@ fn pointed_at<E: Evidence>(bench: &Bench<'_, E>, at: (&Hypothesis, &[f64]), scor
         numbers.extend(least_cost_aside(bench, at, scored).map(|(_, full)| full));
     }
     numbers
+}
+
+/// Where the clips cost least with a candidate in each of its many forms, friction being another beside it: an edge that lies
+/// elsewhere than it is shows no slope towards its place.
+fn placed<E: Evidence>(bench: &Bench<'_, E>, at: (&Hypothesis, &[f64]), scored: &Scored) -> Vec<Vec<f64>> {
+    let friction = bench.library.settings.settings().iter().position(|setting| *setting == Setting::Friction);
+    let forms = 0..bench.library.candidates[scored.candidate].alternatives.len();
+    let in_form = |alternative: usize| {
+        let starts = aside(bench, &Scored { alternative, ..scored.clone() }, &PLACED);
+        let numbers = starts.into_iter().flat_map(|start| {
+            BESIDE.map(|share| {
+                let mut full = bench.begun(at.0.full.clone(), &start);
+                friction.into_iter().for_each(|k| full[k] *= share);
+                full
+            })
+        });
+        cheapest(bench, at, numbers)
+    };
+    let mut places: Vec<(f64, Vec<f64>)> = forms.filter_map(in_form).collect();
+    places.sort_by(|a, b| a.0.total_cmp(&b.0));
+    places.into_iter().take(PLACES).map(|(_, full)| full).collect()
 }
 
 /// Of a candidate that the score test did not point to, the strength at which the fitted clips cost least, in any form, unless
