@@ -112,6 +112,7 @@ pub fn conclude<E: Evidence>(
         ),
         next_experiment: match verdict.kind {
             Kind::Unexplained => advice::unexplained(largest),
+            Kind::Named if finding.open().is_some() => advice::unexplained(largest),
             Kind::None => "Nothing is open; record the next session as usual.".into(),
             Kind::Named => advice::confirming(&verdict.effects),
             _ => advice::separating(&verdict.effects.iter().map(String::as_str).collect::<Vec<_>>()),
@@ -161,6 +162,7 @@ fn finding<'a, E: Evidence>(
         rivals,
         confidence: sure,
         clear,
+        of_arm: found.last.effects.iter().all(|effect| bench.library.candidates[*effect].is_of_arm()),
         left,
         confirmed,
         implausible: !leftovers::implausible(bench, &found.last).is_empty(),

@@ -206,7 +206,7 @@ fn aside<E: Evidence>(bench: &Bench<'_, E>, scored: &Scored, shares: &[f64]) -> 
 mod tests {
     use super::super::arm_clips::ArmClips;
     use super::super::library::Library;
-    use super::super::test_bench::{ONCE, nothing_said_of, on_bench, on_strokes, shipped};
+    use super::super::test_bench::{ONCE, nothing_said_of, on_bench, on_strokes, shipped, with_effect};
     use super::*;
     use crate::benchmark::session::record;
     use crate::benchmark::world::{Fault, Kind, World};
@@ -262,6 +262,23 @@ mod tests {
                 scanned(bench, (&from, even), &nothing_said_of(&library, candidate)).len()
             };
             assert_eq!((starts("joint_backlash"), starts("command_delay")), (1, 0));
+        });
+    }
+
+    #[test]
+    fn a_patch_is_tried_in_the_places_where_the_clips_cost_least() {
+        let cell = shipped();
+        let world = with_effect("friction_patch", 5, Kind::Strokes, &cell);
+        on_strokes((&cell, &world), |bench, even| {
+            let from = bench.fit((&[], bench.library.start()), &[0, 1], even, None, ONCE).expect("a fit");
+            let patch = bench.library.find("friction_patch").expect("a candidate");
+            let starts = placed(bench, (&from, even), &nothing_said_of(bench.library, patch));
+            assert_eq!(starts.len(), PLACES);
+            let cost = |full: &[f64]| bench.plain_cost(&from, full, even).expect("strokes");
+            let costs: Vec<f64> = starts.iter().map(|full| cost(full)).collect();
+            assert!(costs.is_sorted() && costs[0] < cost(&from.full), "{costs:?}");
+            let places = bench.library.candidates[patch].numbers.clone();
+            assert!(starts.iter().skip(1).all(|other| other[places.clone()] != starts[0][places.clone()]), "elsewhere");
         });
     }
 

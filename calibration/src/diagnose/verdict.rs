@@ -14,6 +14,8 @@ pub struct Finding<'a> {
     pub confidence: f64,
     /// Whether each of them stood out: nearly all clips spoke for it, and for no other.
     pub clear: bool,
+    /// Whether all of them act on the arm.
+    pub of_arm: bool,
     /// The gap before and after, of every group of sensors.
     pub left: Vec<Left>,
     /// Whether the gap shrinks on the clips that were kept for confirming.
@@ -55,10 +57,23 @@ impl Finding<'_> {
             return if gap || self.drift.is_some() { self.unexplained() } else { self.none() };
         }
         let pushed = self.implausible && self.percent() < ALL_BUT_EXACT;
-        if pushed || self.left.iter().any(|left| left.too_much(self.clear)) {
+        if pushed || self.left.iter().any(|left| left.too_much(self.clear) && !(left.of_object && self.moves_the_arm()))
+        {
             return self.unexplained();
         }
         if self.rivals.is_empty() { self.named() } else { self.class() }
+    }
+
+    /// The first group of sensors of which the effects leave too much.
+    pub(super) fn open(&self) -> Option<&Left> {
+        self.left.iter().find(|left| left.too_much(self.clear))
+    }
+
+    /// Whether the effects are what moves the arm, whatever an object does besides: a gap that is plain, and a cause that
+    /// leaves nothing of it.
+    fn moves_the_arm(&self) -> bool {
+        let arm = self.left.iter().find(|left| !left.of_object);
+        self.of_arm && arm.is_some_and(|arm| arm.gaps() > PLAIN && arm.explained() > 1.0 - arm.substitute)
     }
 
     fn none(&self) -> Verdict {
@@ -84,8 +99,19 @@ impl Finding<'_> {
         let names = self.effects.iter().map(|name| (*name).to_owned()).collect::<Vec<_>>();
         let share = self.percent();
         let (verb, these) = if names.len() == 1 { ("causes", "it") } else { ("together cause", "them") };
+        let (whose, rest) = match self.open() {
+            Some(open) if !self.place.is_empty() => (
+                "the arm's gap",
+                format!(
+                    " there; {:.0} % of what the object does, most in {}, stays unexplained",
+                    100.0 * (1.0 - open.explained()),
+                    self.place
+                ),
+            ),
+            _ => ("the gap", String::new()),
+        };
         let text = format!(
-            "{} {verb} the gap: with {these} the twin closes {share:.0} % of what is not noise.",
+            "{} {verb} {whose}: with {these} the twin closes {share:.0} % of what is not noise{rest}.",
             names.join(" and ")
         );
         Verdict { kind: Kind::Named, effects: names, confidence: self.confidence, text }
@@ -161,6 +187,7 @@ mod tests {
             rivals: Vec::new(),
             confidence: 0.95,
             clear: false,
+            of_arm: true,
             left,
             confirmed: true,
             implausible: false,
@@ -220,13 +247,21 @@ mod tests {
     }
 
     #[test]
-    fn where_only_the_arm_is_explained_it_is_said_what_is_left_of_the_object() {
+    fn where_only_the_arm_is_explained_its_cause_is_named_and_it_is_said_what_is_left_of_the_object() {
         let mut found = finding(vec!["command_delay"], 5e5, 1.5);
         let arm = found.left[0];
         found.left.push(Left { of_object: true, before: 301.0, after: 91.0, ..arm });
+        found.place = "yaw (after the slide)".into();
         let Verdict { kind, text, .. } = found.verdict();
-        let told = text.contains("command_delay comes nearest and leaves 30 % of what the object does");
-        assert!(kind == Kind::Unexplained && told, "{text}");
+        let told = "the arm's gap: with it the twin closes 100 % of what is not noise there; 30 % of what the object does, \
+                    most in yaw (after the slide), stays unexplained";
+        assert!(kind == Kind::Named && text.contains(told), "{text}");
+        let of_object = Finding { of_arm: false, ..found.clone() }.verdict();
+        let nearest = "comes nearest and leaves 30 % of what the object does";
+        assert!(of_object.kind == Kind::Unexplained && of_object.text.contains(nearest), "{}", of_object.text);
+        let mut little = found.clone();
+        (little.left[0].before, little.left[0].after) = (15.0, 1.2);
+        assert_eq!(little.verdict().kind, Kind::Unexplained, "a substitute closes so small a gap as well");
         found.left[0].after = 2e5;
         assert!(found.verdict().text.contains("leaves 30 % of it"), "both are left");
     }
