@@ -27,6 +27,8 @@ pub const MOST: usize = 4;
 pub(super) const HEAT: Effort = Effort::of(3, Precision::Joints);
 pub(super) const LOOK: Effort = Effort::of(1, Precision::Joints);
 pub(super) const FIRST_PASS: Effort = Effort::of(6, Precision::Joints);
+/// So many places of a patch are fitted to the end.
+const LAST_PLACES: usize = 3;
 /// Near is this far from the best deviance, or this share of what the best gains.
 pub(super) const NEAR: f64 = 40.0;
 const NEAR_SHARE: f64 = 0.4;
@@ -330,8 +332,18 @@ impl Step {
             let starts = starts::of(bench, (&self.from, &self.weights), scored, overlooked);
             let effort = bench.trying(scored.candidate, HEAT);
             let heat = |start| bench.extend(&self.from, (scored.candidate, start), &split.train, &self.weights, effort);
-            let heats = starts.into_iter().filter_map(heat);
-            fits.extend(heats.min_by(|a, b| a.deviance().total_cmp(&b.deviance())).map(|fit| (place, fit)));
+            let mut heats: Vec<Hypothesis> = starts.into_iter().filter_map(heat).collect();
+            heats.sort_by(|a, b| a.deviance().total_cmp(&b.deviance()));
+            if starts::has_places(bench, scored.candidate) {
+                // What lies in the right place may come down later than what stands in for it elsewhere.
+                let effort = bench.trying(scored.candidate, FIRST_PASS);
+                let to_the_end = |fit: Hypothesis| {
+                    let full = fit.full.clone();
+                    bench.fit((&fit.effects, full), &split.train, &self.weights, Some(&fit), effort)
+                };
+                heats = heats.into_iter().take(LAST_PLACES).filter_map(to_the_end).collect();
+            }
+            fits.extend(heats.into_iter().min_by(|a, b| a.deviance().total_cmp(&b.deviance())).map(|fit| (place, fit)));
         }
         let best = fits.iter().map(|(_, fit)| fit.deviance()).fold(self.from.deviance(), f64::min);
         let near = best + NEAR.max(NEAR_SHARE * (self.from.deviance() - best));

@@ -62,7 +62,7 @@ fn pointed_at<E: Evidence>(bench: &Bench<'_, E>, at: (&Hypothesis, &[f64]), scor
         starts.extend(aside(bench, scored, &[ASIDE]));
     }
     let mut numbers: Vec<Vec<f64>> = starts.iter().map(|start| bench.begun(at.0.full.clone(), start)).collect();
-    if candidate.alternatives.len() > PLACES && candidate.effect.stage == Stage::Slide {
+    if has_places(bench, scored.candidate) {
         numbers.extend(placed(bench, at, scored));
     }
     if candidate.is_searched(Search::Limit) {
@@ -76,6 +76,12 @@ fn pointed_at<E: Evidence>(bench: &Bench<'_, E>, at: (&Hypothesis, &[f64]), scor
         numbers.extend(least_cost_aside(bench, at, scored).map(|(_, full)| full));
     }
     numbers
+}
+
+/// Whether a candidate's forms are places on the table.
+pub(super) fn has_places<E>(bench: &Bench<'_, E>, candidate: usize) -> bool {
+    let candidate = &bench.library.candidates[candidate];
+    candidate.alternatives.len() > PLACES && candidate.effect.stage == Stage::Slide
 }
 
 /// Where the clips cost least with a candidate in each of its many forms, friction being another beside it: an edge that lies
