@@ -6,8 +6,8 @@
 //!
 //! | module | owns |
 //! |---|---|
-//! | [`msg`] | the payloads: one file a device, `repr(C)`, every field with unit and frame |
-//! | [`topics`] | every topic's name, payload and limits: nothing else names a topic |
+//! | [`msg`] | the messages: one file a device, every field with unit and frame, their plain form for shared memory and its check |
+//! | [`topics`] | every topic's name, message and limits: nothing else names a topic |
 //! | [`transport`] | shared memory (the only iceoryx2 code) |
 //! | [`recording`] | clips and sessions on disk (the only MCAP code) |
 //! | [`cell`] | `cell.toml`: what the laboratory knows about its cell |

@@ -3,6 +3,7 @@
 //! Memory is set aside for the worst case when a topic opens: `(subscribers x (buffer + borrowed) + history + loans)`
 //! payloads. All topics overflow safely: a slow reader loses its oldest messages and never blocks the writer.
 
+use crate::msg::Message;
 use crate::msg::arm::{ArmCommand, ArmState};
 use crate::msg::event::Event;
 use crate::msg::gripper::{GripperCommand, GripperState};
@@ -13,22 +14,22 @@ use crate::msg::twin::{TwinGap, TwinState};
 use crate::msg::wrench::Wrench;
 use std::marker::PhantomData;
 
-/// A topic with a payload of fixed size.
+/// A topic with messages of fixed size.
 #[derive(Debug)]
-pub struct Topic<Payload> {
+pub struct Topic<M> {
     /// Name on shared memory and in recordings.
     pub name: &'static str,
     /// How many messages wait for each reader.
     pub limits: Limits,
-    payload: PhantomData<fn() -> Payload>,
+    message: PhantomData<fn() -> M>,
 }
 
-impl<Payload> Clone for Topic<Payload> {
+impl<M> Clone for Topic<M> {
     fn clone(&self) -> Self {
         *self
     }
 }
-impl<Payload> Copy for Topic<Payload> {}
+impl<M> Copy for Topic<M> {}
 
 /// A topic of pictures.
 #[derive(Debug, Clone, Copy)]
@@ -61,8 +62,8 @@ const PICTURES: Limits = Limits { buffer: 8, history: 0, borrowed: 2, subscriber
 /// What a late reader wants to know at once.
 const LATCHED: Limits = Limits { buffer: 4, history: 1, borrowed: 2, subscribers: 8, publishers: 1 };
 
-const fn topic<Payload>(name: &'static str, limits: Limits) -> Topic<Payload> {
-    Topic { name, limits, payload: PhantomData }
+const fn topic<M: Message>(name: &'static str, limits: Limits) -> Topic<M> {
+    Topic { name, limits, message: PhantomData }
 }
 
 /// Bridge to all: state of the arm, each cycle.
@@ -97,19 +98,50 @@ pub const TWIN_GAP: Topic<TwinGap> = topic("/twin/gap", STREAM);
 pub const EVENTS: Topic<Event> =
     topic("/events", Limits { buffer: 128, history: 16, borrowed: 2, subscribers: 8, publishers: 8 });
 
-/// Names of all topics, in the order of a report.
-pub const ALL: [&str; 13] = [
-    ARM_STATE.name,
-    ARM_COMMAND.name,
-    ARM_MOTION.name,
-    OBJECT_POSE.name,
-    CAMERA_COLOR.name,
-    CAMERA_DEPTH.name,
-    CAMERA_INFO.name,
-    WRENCH.name,
-    GRIPPER.name,
-    GRIPPER_COMMAND.name,
-    TWIN_STATE.name,
-    TWIN_GAP.name,
-    EVENTS.name,
-];
+/// Something to do with every topic, whatever its messages.
+pub trait Visitor {
+    /// A topic of messages.
+    fn messages<M: Message>(&mut self, topic: Topic<M>);
+    /// A topic of pictures.
+    fn pictures(&mut self, topic: ImageTopic);
+}
+
+macro_rules! list {
+    ($($kind:ident $topic:ident),+ $(,)?) => {
+        /// Names of all topics, in the order of a report.
+        pub const ALL: [&str; [$($topic.name),+].len()] = [$($topic.name),+];
+
+        /// Calls the visitor once for each topic.
+        pub fn visit(visitor: &mut impl Visitor) {
+            $(visitor.$kind($topic);)+
+        }
+    };
+}
+list!(
+    messages ARM_STATE,
+    messages ARM_COMMAND,
+    messages ARM_MOTION,
+    messages OBJECT_POSE,
+    pictures CAMERA_COLOR,
+    pictures CAMERA_DEPTH,
+    messages CAMERA_INFO,
+    messages WRENCH,
+    messages GRIPPER,
+    messages GRIPPER_COMMAND,
+    messages TWIN_STATE,
+    messages TWIN_GAP,
+    messages EVENTS,
+);
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_topic_of_this_file_is_in_the_list() {
+        let definitions = include_str!("topics.rs").lines().filter(|line| {
+            line.starts_with("pub const ") && (line.contains(": Topic<") || line.contains(": ImageTopic"))
+        });
+        assert_eq!(definitions.count(), ALL.len());
+    }
+}

@@ -2,6 +2,8 @@
 //!
 //! Each test takes a domain of its own, so that they neither meet each other nor a bridge that runs on this machine.
 
+mod any_bits;
+
 use shared_mem::msg::arm::ArmState;
 use shared_mem::msg::image::{CameraInfo, ImageHeader};
 use shared_mem::topics;
@@ -90,7 +92,7 @@ fn a_second_publisher_is_refused_by_name() {
 fn a_late_reader_gets_the_history() {
     let sender = node("late", "sender");
     let publisher = sender.publisher(topics::CAMERA_INFO).expect("publisher");
-    publisher.send(&CameraInfo { width: 640, ..CameraInfo::default() }).expect("send");
+    publisher.send(&CameraInfo { width: 640, height: 480, ..CameraInfo::default() }).expect("send");
     let late = node("late", "late");
     let subscriber = late.subscriber(topics::CAMERA_INFO).expect("subscriber");
     publisher.greet_new_readers().expect("greet");

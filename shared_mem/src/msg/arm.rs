@@ -4,13 +4,13 @@
 //! `tau_J_d` is what the controller asks for without gravity.
 #![allow(non_snake_case)] // the field's own symbols
 
+use super::check::{self, Wrong};
+use super::wire::{codes, wire};
 use super::{Joints, MAX_JOINTS};
 use iceoryx2::prelude::ZeroCopySend;
 
 /// State of the arm as of one cycle. Topic `/arm/state`.
-#[derive(Debug, Clone, Copy, PartialEq, ZeroCopySend)]
-#[type_name("twinalign/ArmState/1")]
-#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ArmState {
     /// When the state reached this machine: monotonic clock [ns].
     pub stamp_ns: u64,
@@ -81,10 +81,44 @@ impl Default for ArmState {
     }
 }
 
+impl ArmState {
+    fn check(&self) -> Result<(), Wrong> {
+        check::running("stamp_ns", self.stamp_ns)?;
+        check::running("device_ns", self.device_ns)?;
+        check::running("cycle", self.cycle)?;
+        check::dof(self.dof)?;
+        check::joints(&[("q", &self.q), ("dq", &self.dq), ("q_d", &self.q_d), ("dq_d", &self.dq_d)])?;
+        check::joints(&[("tau_J", &self.tau_J), ("tau_J_d", &self.tau_J_d), ("tau_ext", &self.tau_ext)])?;
+        check::numbers("O_T_EE", &self.O_T_EE)?;
+        check::number("success_rate", self.success_rate)
+    }
+}
+
+wire!("twinalign/ArmState/2" ArmStateWire: ArmState {
+    stamp_ns: u64,
+    device_ns: u64,
+    cycle: u64,
+    session: u64,
+    dof: u32,
+    mode: ArmMode,
+    q: Joints,
+    dq: Joints,
+    q_d: Joints,
+    dq_d: Joints,
+    tau_J: Joints,
+    tau_J_d: Joints,
+    tau_ext: Joints,
+    O_T_EE: [f64; 16],
+    success_rate: f64,
+    motion_id: u64,
+    motion_played: u32,
+    motion_queued: u32,
+    motion: MotionStatus,
+    reserved: u32,
+});
+
 /// What the robot is doing. Values are those of the Franka Control Interface.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ZeroCopySend)]
-#[type_name("twinalign/ArmMode/1")]
-#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum ArmMode {
     /// Nothing of the below, or not known.
     #[default]
@@ -103,10 +137,10 @@ pub enum ArmMode {
     Recovery = 6,
 }
 
+codes!(ArmMode: Other, Idle, Move, Guiding, Reflex, UserStopped, Recovery);
+
 /// How the motion named by `motion_id` stands.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ZeroCopySend)]
-#[type_name("twinalign/MotionStatus/1")]
-#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum MotionStatus {
     /// No motion was started since the bridge came up; the pose is held.
     #[default]
@@ -121,10 +155,10 @@ pub enum MotionStatus {
     Braked = 4,
 }
 
+codes!(MotionStatus: None, Playing, Done, Refused, Braked);
+
 /// What the bridge told the arm in one cycle. Topic `/arm/command`.
-#[derive(Debug, Clone, Copy, PartialEq, ZeroCopySend)]
-#[type_name("twinalign/ArmCommand/1")]
-#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ArmCommand {
     /// When the command was handed to the arm: monotonic clock [ns].
     pub stamp_ns: u64,
@@ -159,10 +193,29 @@ impl Default for ArmCommand {
     }
 }
 
+impl ArmCommand {
+    fn check(&self) -> Result<(), Wrong> {
+        check::running("stamp_ns", self.stamp_ns)?;
+        check::running("answers_device_ns", self.answers_device_ns)?;
+        check::running("cycle", self.cycle)?;
+        check::dof(self.dof)?;
+        check::joints(&[("q_d", &self.q_d), ("dq_d", &self.dq_d), ("tau_J_d", &self.tau_J_d)])
+    }
+}
+
+wire!("twinalign/ArmCommand/2" ArmCommandWire: ArmCommand {
+    stamp_ns: u64,
+    answers_device_ns: u64,
+    cycle: u64,
+    dof: u32,
+    interface: CommandInterface,
+    q_d: Joints,
+    dq_d: Joints,
+    tau_J_d: Joints,
+});
+
 /// Which field of an [`ArmCommand`] the arm follows.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ZeroCopySend)]
-#[type_name("twinalign/CommandInterface/1")]
-#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum CommandInterface {
     /// `tau_J_d`: the bridge runs the joint-impedance law itself.
     #[default]
@@ -170,3 +223,5 @@ pub enum CommandInterface {
     /// `q_d`: the robot's internal joint impedance follows.
     JointPosition = 1,
 }
+
+codes!(CommandInterface: Torque, JointPosition);

@@ -1,14 +1,14 @@
 //! Things worth telling a person: faults, refusals, restarts. Rare, short, kept in every recording.
 
+use super::check::{self, Wrong};
+use super::wire::{codes, wire};
 use iceoryx2::prelude::ZeroCopySend;
 
 /// Longest text of an event [bytes of UTF-8].
 pub const TEXT_LENGTH: usize = 232;
 
 /// One remark. Topic `/events`.
-#[derive(Debug, Clone, Copy, PartialEq, ZeroCopySend)]
-#[type_name("twinalign/Event/1")]
-#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Event {
     /// When it happened: monotonic clock [ns].
     pub stamp_ns: u64,
@@ -52,10 +52,26 @@ impl Event {
     }
 }
 
+impl Event {
+    fn check(&self) -> Result<(), Wrong> {
+        check::running("stamp_ns", self.stamp_ns)?;
+        check::count("length", self.length, 0, TEXT_LENGTH as u64)?;
+        let text = self.text.get(..self.length as usize).unwrap_or(&[]);
+        std::str::from_utf8(text).map(|_| ()).map_err(|_| Wrong::Text { field: "text" })
+    }
+}
+
+wire!("twinalign/Event/2" EventWire: Event {
+    stamp_ns: u64,
+    level: EventLevel,
+    source: EventSource,
+    length: u32,
+    reserved: u32,
+    text: [u8; TEXT_LENGTH],
+});
+
 /// How serious an event is. Values are Foxglove's.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ZeroCopySend)]
-#[type_name("twinalign/EventLevel/1")]
-#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum EventLevel {
     /// Worth knowing.
     Info = 2,
@@ -65,10 +81,10 @@ pub enum EventLevel {
     Error = 4,
 }
 
+codes!(EventLevel: Info, Warning, Error);
+
 /// Which program speaks.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ZeroCopySend)]
-#[type_name("twinalign/EventSource/1")]
-#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum EventSource {
     /// `rt_bridge run`.
     Bridge = 0,
@@ -79,6 +95,8 @@ pub enum EventSource {
     /// `calibration capture`.
     Capture = 3,
 }
+
+codes!(EventSource: Bridge, Recorder, Twin, Capture);
 
 #[cfg(test)]
 mod tests {

@@ -1,9 +1,12 @@
 //! The gripper: what it does, and what it is told.
 
+use super::check::{self, Wrong};
+use super::wire::{codes, plain, wire};
 use iceoryx2::prelude::ZeroCopySend;
+use zerocopy::{FromBytes, Immutable, IntoBytes};
 
 /// State of the gripper. Topic `/gripper`.
-#[derive(Debug, Clone, Copy, PartialEq, Default, ZeroCopySend)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, ZeroCopySend, FromBytes, IntoBytes, Immutable)]
 #[type_name("twinalign/GripperState/1")]
 #[repr(C)]
 pub struct GripperState {
@@ -21,10 +24,19 @@ pub struct GripperState {
     pub fault: u32,
 }
 
+impl GripperState {
+    fn check(&self) -> Result<(), Wrong> {
+        check::running("stamp_ns", self.stamp_ns)?;
+        check::numbers("width", &[self.width, self.width_d])?;
+        check::number("force", self.force)?;
+        check::flag("grasped", self.grasped)
+    }
+}
+
+plain!(GripperState);
+
 /// What the gripper is told. Topic `/gripper/command`.
-#[derive(Debug, Clone, Copy, PartialEq, Default, ZeroCopySend)]
-#[type_name("twinalign/GripperCommand/1")]
-#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct GripperCommand {
     /// When it was sent: monotonic clock [ns].
     pub stamp_ns: u64,
@@ -40,10 +52,26 @@ pub struct GripperCommand {
     pub reserved: u32,
 }
 
+impl GripperCommand {
+    fn check(&self) -> Result<(), Wrong> {
+        check::running("stamp_ns", self.stamp_ns)?;
+        check::number("width", self.width)?;
+        check::number("speed", self.speed)?;
+        check::number("force", self.force)
+    }
+}
+
+wire!("twinalign/GripperCommand/2" GripperCommandWire: GripperCommand {
+    stamp_ns: u64,
+    width: f64,
+    speed: f64,
+    force: f64,
+    action: GripperAction,
+    reserved: u32,
+});
+
 /// What a gripper can be told to do.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ZeroCopySend)]
-#[type_name("twinalign/GripperAction/1")]
-#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum GripperAction {
     /// Go to `width`.
     #[default]
@@ -55,3 +83,5 @@ pub enum GripperAction {
     /// Find out how far the fingers go. They open and close once: keep clear.
     Home = 3,
 }
+
+codes!(GripperAction: Move, Grasp, Stop, Home);

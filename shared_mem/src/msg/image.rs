@@ -1,11 +1,13 @@
 //! Pictures: pixels travel as a byte slice, this header beside them.
 
+use super::Message as _;
+use super::check::{self, Wrong};
+use super::wire::{codes, plain, wire};
 use iceoryx2::prelude::ZeroCopySend;
+use zerocopy::{FromBytes, Immutable, IntoBytes};
 
 /// Describes the bytes of one picture. User header of `/camera/color` and `/camera/depth`.
-#[derive(Debug, Clone, Copy, PartialEq, Default, ZeroCopySend)]
-#[type_name("twinalign/ImageHeader/1")]
-#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct ImageHeader {
     /// When the picture reached this machine: monotonic clock [ns].
     pub stamp_ns: u64,
@@ -31,10 +33,51 @@ pub struct ImageHeader {
     pub reserved: u32,
 }
 
+impl ImageHeader {
+    fn check(&self) -> Result<(), Wrong> {
+        check::running("stamp_ns", self.stamp_ns)?;
+        check::running("device_ns", self.device_ns)?;
+        check::running("sequence", self.sequence)?;
+        check::running("exposure_ns", self.exposure_ns)?;
+        check::side("width", self.width)?;
+        check::side("height", self.height)?;
+        let shortest = u64::from(self.width) * u64::from(self.encoding.bytes_per_pixel());
+        check::count("stride", self.stride, shortest, u32::MAX.into())?;
+        check::number("depth_scale", self.depth_scale)
+    }
+
+    /// Whether the header describes as many bytes as came.
+    ///
+    /// # Errors
+    /// [`Wrong::PictureSize`] when it does not.
+    pub fn check_size(&self, bytes: usize) -> Result<(), Wrong> {
+        let (bytes, described) = (bytes as u64, u64::from(self.stride) * u64::from(self.height));
+        if bytes == described { Ok(()) } else { Err(Wrong::PictureSize { bytes, described }) }
+    }
+}
+
+wire!("twinalign/ImageHeader/2" ImageHeaderWire: ImageHeader {
+    stamp_ns: u64,
+    device_ns: u64,
+    sequence: u64,
+    exposure_ns: u64,
+    width: u32,
+    height: u32,
+    stride: u32,
+    encoding: PixelEncoding,
+    depth_scale: f64,
+    stamp_domain: StampDomain,
+    reserved: u32,
+});
+
+impl Default for ImageHeaderWire {
+    fn default() -> Self {
+        ImageHeader::default().to_wire()
+    }
+}
+
 /// How a pixel is stored.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ZeroCopySend)]
-#[type_name("twinalign/PixelEncoding/1")]
-#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum PixelEncoding {
     /// Three bytes: red, green, blue.
     #[default]
@@ -43,8 +86,19 @@ pub enum PixelEncoding {
     Depth16 = 1,
 }
 
+codes!(PixelEncoding: Rgb8, Depth16);
+
 impl PixelEncoding {
     const ALL: [Self; 2] = [Self::Rgb8, Self::Depth16];
+
+    /// Bytes of one pixel.
+    #[must_use]
+    pub fn bytes_per_pixel(self) -> u32 {
+        match self {
+            Self::Rgb8 => 3,
+            Self::Depth16 => 2,
+        }
+    }
 
     /// What ROS and Foxglove call it (`sensor_msgs/image_encodings.hpp`).
     #[must_use]
@@ -63,9 +117,7 @@ impl PixelEncoding {
 }
 
 /// Which clock a camera stamped with: librealsense's three domains.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ZeroCopySend)]
-#[type_name("twinalign/StampDomain/1")]
-#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum StampDomain {
     /// The camera's hardware clock.
     #[default]
@@ -76,8 +128,10 @@ pub enum StampDomain {
     GlobalTime = 2,
 }
 
+codes!(StampDomain: HardwareClock, SystemTime, GlobalTime);
+
 /// How the camera projects, and where it stands. Topic `/camera/info`.
-#[derive(Debug, Clone, Copy, PartialEq, ZeroCopySend)]
+#[derive(Debug, Clone, Copy, PartialEq, ZeroCopySend, FromBytes, IntoBytes, Immutable)]
 #[type_name("twinalign/CameraInfo/1")]
 #[repr(C)]
 pub struct CameraInfo {
@@ -110,3 +164,17 @@ impl Default for CameraInfo {
         }
     }
 }
+
+impl CameraInfo {
+    fn check(&self) -> Result<(), Wrong> {
+        check::running("stamp_ns", self.stamp_ns)?;
+        check::side("width", self.width)?;
+        check::side("height", self.height)?;
+        check::numbers("intrinsics", &self.intrinsics)?;
+        check::numbers("distortion", &self.distortion)?;
+        check::numbers("position", &self.position)?;
+        check::quaternion("wxyz", &self.wxyz)
+    }
+}
+
+plain!(CameraInfo);

@@ -1,15 +1,21 @@
-//! The payloads that cross process borders. One file a device; every payload is `repr(C)`, holds no pointers and is
-//! versioned by its `type_name`: a change of layout changes the name, so old and new programs refuse each other
-//! instead of misreading.
+//! The messages that cross process borders. One file a device; each has a plain form ([`Message::Wire`]) for shared memory
+//! that is `repr(C)`, holds numbers only and is versioned by its `type_name`: a change of layout changes the name, so old
+//! and new programs refuse each other instead of misreading. What comes out of shared memory is checked before it is a
+//! message again.
 
 pub mod arm;
+pub mod check;
 pub mod event;
 pub mod gripper;
 pub mod image;
 pub mod motion;
 pub mod object;
 pub mod twin;
+pub mod wire;
 pub mod wrench;
+
+pub use check::Wrong;
+pub use wire::Message;
 
 /// Most joints of an arm that fit into a message. Arrays are this long; `dof` says how many entries count, the others are 0.
 pub const MAX_JOINTS: usize = 8;

@@ -4,14 +4,17 @@
 //! control thread plays the queue by its own clock, a late sender cannot make the arm jerk, and a dead one lets the
 //! queue run dry: then the arm is braked within its limits and held.
 
+use super::check::{self, Wrong};
+use super::wire::{codes, wire};
 use super::{Joints, MAX_JOINTS};
 use iceoryx2::prelude::ZeroCopySend;
+use zerocopy::{FromBytes, Immutable, IntoBytes};
 
 /// Set points in one [`MotionChunk`]: 50 ms at 1 kHz.
 pub const CHUNK_LENGTH: usize = 50;
 
 /// Desired state of one control cycle.
-#[derive(Debug, Clone, Copy, PartialEq, ZeroCopySend)]
+#[derive(Debug, Clone, Copy, PartialEq, ZeroCopySend, FromBytes, IntoBytes, Immutable)]
 #[type_name("twinalign/SetPoint/1")]
 #[repr(C)]
 pub struct SetPoint {
@@ -31,9 +34,7 @@ impl Default for SetPoint {
 ///
 /// Chunks of a motion are numbered from 0 without gaps. The first set point must lie where the arm is commanded to be
 /// already, at rest; the last one must be at rest too.
-#[derive(Debug, Clone, Copy, PartialEq, ZeroCopySend)]
-#[type_name("twinalign/MotionChunk/2")]
-#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MotionChunk {
     /// When the chunk was sent: monotonic clock [ns].
     pub stamp_ns: u64,
@@ -65,10 +66,27 @@ impl Default for MotionChunk {
     }
 }
 
+impl MotionChunk {
+    /// The set points are left to the bridge's limits, which refuse a motion by its number: its sender learns of it.
+    fn check(&self) -> Result<(), Wrong> {
+        check::running("stamp_ns", self.stamp_ns)?;
+        check::count("length", self.length, 0, CHUNK_LENGTH as u64)?;
+        check::dof(self.dof)
+    }
+}
+
+wire!("twinalign/MotionChunk/3" MotionChunkWire: MotionChunk {
+    stamp_ns: u64,
+    motion_id: u64,
+    kind: MotionKind,
+    index: u32,
+    length: u32,
+    dof: u32,
+    set_points: [SetPoint; CHUNK_LENGTH],
+});
+
 /// What a [`MotionChunk`] is for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ZeroCopySend)]
-#[type_name("twinalign/MotionKind/2")]
-#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum MotionKind {
     /// More follows.
     #[default]
@@ -81,3 +99,5 @@ pub enum MotionKind {
     /// happens unless the arm is in a reflex: a stop that a person pressed is a person's to release.
     Recover = 3,
 }
+
+codes!(MotionKind: Play, Last, Stop, Recover);

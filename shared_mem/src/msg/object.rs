@@ -1,10 +1,13 @@
 //! Pose of the tracked object, whoever tracks it.
 
+use super::check::{self, Wrong};
+use super::wire::plain;
 use crate::frames::{Base, Object, Pose};
 use iceoryx2::prelude::ZeroCopySend;
+use zerocopy::{FromBytes, Immutable, IntoBytes};
 
 /// The object's geometric centre in the base frame. Topic `/object/pose`.
-#[derive(Debug, Clone, Copy, PartialEq, ZeroCopySend)]
+#[derive(Debug, Clone, Copy, PartialEq, ZeroCopySend, FromBytes, IntoBytes, Immutable)]
 #[type_name("twinalign/ObjectPose/1")]
 #[repr(C)]
 pub struct ObjectPose {
@@ -42,4 +45,15 @@ impl ObjectPose {
     pub fn pose(&self) -> Option<Pose<Base, Object>> {
         Pose::from_parts(self.position, self.wxyz)
     }
+
+    fn check(&self) -> Result<(), Wrong> {
+        check::running("stamp_ns", self.stamp_ns)?;
+        check::running("device_ns", self.device_ns)?;
+        check::running("sequence", self.sequence)?;
+        check::numbers("position", &self.position)?;
+        check::quaternion("wxyz", &self.wxyz)?;
+        check::numbers("covariance", &self.covariance)
+    }
 }
+
+plain!(ObjectPose);

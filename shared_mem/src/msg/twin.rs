@@ -1,11 +1,14 @@
 //! What the twin says about the cell while it shadows it.
 #![allow(non_snake_case)] // the field's own symbols
 
+use super::check::{self, Wrong};
+use super::wire::plain;
 use super::{Joints, MAX_JOINTS};
 use iceoryx2::prelude::ZeroCopySend;
+use zerocopy::{FromBytes, Immutable, IntoBytes};
 
 /// The twin's own state, for the same command and moment as one `/arm/state`. Topic `/twin/state`.
-#[derive(Debug, Clone, Copy, PartialEq, ZeroCopySend)]
+#[derive(Debug, Clone, Copy, PartialEq, ZeroCopySend, FromBytes, IntoBytes, Immutable)]
 #[type_name("twinalign/TwinState/1")]
 #[repr(C)]
 pub struct TwinState {
@@ -51,8 +54,24 @@ impl Default for TwinState {
     }
 }
 
+impl TwinState {
+    fn check(&self) -> Result<(), Wrong> {
+        check::running("stamp_ns", self.stamp_ns)?;
+        check::running("mirrors_ns", self.mirrors_ns)?;
+        check::running("cycle", self.cycle)?;
+        check::dof(self.dof)?;
+        check::flag("has_object", self.has_object)?;
+        check::joints(&[("q", &self.q), ("dq", &self.dq), ("tau_J", &self.tau_J)])?;
+        check::numbers("object_position", &self.object_position)?;
+        check::quaternion("object_wxyz", &self.object_wxyz)?;
+        check::number("contact_force", self.contact_force)
+    }
+}
+
+plain!(TwinState);
+
 /// Real against twin. Topic `/twin/gap`.
-#[derive(Debug, Clone, Copy, PartialEq, ZeroCopySend)]
+#[derive(Debug, Clone, Copy, PartialEq, ZeroCopySend, FromBytes, IntoBytes, Immutable)]
 #[type_name("twinalign/TwinGap/1")]
 #[repr(C)]
 pub struct TwinGap {
@@ -91,3 +110,17 @@ impl Default for TwinGap {
         }
     }
 }
+
+impl TwinGap {
+    fn check(&self) -> Result<(), Wrong> {
+        check::running("stamp_ns", self.stamp_ns)?;
+        check::running("cycle", self.cycle)?;
+        check::dof(self.dof)?;
+        check::joints(&[("joint_error", &self.joint_error), ("joint_rms", &self.joint_rms)])?;
+        check::number_or_none("object_add_m", self.object_add_m)?;
+        check::number_or_none("object_add_s_m", self.object_add_s_m)?;
+        check::running("age_ns", self.age_ns)
+    }
+}
+
+plain!(TwinGap);

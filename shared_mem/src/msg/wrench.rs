@@ -1,9 +1,12 @@
 //! Force/torque sensor at the wrist.
 
+use super::check::{self, Wrong};
+use super::wire::plain;
 use iceoryx2::prelude::ZeroCopySend;
+use zerocopy::{FromBytes, Immutable, IntoBytes};
 
 /// One sample. Topic `/wrench`.
-#[derive(Debug, Clone, Copy, PartialEq, Default, ZeroCopySend)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, ZeroCopySend, FromBytes, IntoBytes, Immutable)]
 #[type_name("twinalign/Wrench/1")]
 #[repr(C)]
 pub struct Wrench {
@@ -22,3 +25,16 @@ pub struct Wrench {
     /// Keeps the size a multiple of 8; always 0.
     pub reserved: u32,
 }
+
+impl Wrench {
+    fn check(&self) -> Result<(), Wrong> {
+        check::running("stamp_ns", self.stamp_ns)?;
+        check::running("device_ns", self.device_ns)?;
+        check::running("sequence", self.sequence)?;
+        check::numbers("force", &self.force)?;
+        check::numbers("torque", &self.torque)?;
+        check::count("saturated", self.saturated, 0, 0b11_1111)
+    }
+}
+
+plain!(Wrench);

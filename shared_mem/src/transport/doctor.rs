@@ -1,8 +1,10 @@
 //! What is on shared memory right now, for `rt_bridge doctor`.
 
-use super::{Service, TransportError, configuration, domain};
+use super::place::{ForeignFile, Place, PlaceError, all_foreign_files, folder};
+use super::{Service, TransportError, domain};
 use iceoryx2::node::NodeView;
 use iceoryx2::prelude::*;
+use std::path::PathBuf;
 
 /// A seat on shared memory.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -26,13 +28,27 @@ pub struct SharedMemoryReport {
     pub unreadable: usize,
 }
 
+/// The folder in which this user's processes find each other.
+///
+/// # Errors
+/// [`PlaceError`] when it is not this user's alone, with the remedy.
+pub fn book_keeping() -> Result<PathBuf, PlaceError> {
+    folder(rustix::process::geteuid().as_raw())
+}
+
+/// Files of other users in shared memory under names of this user's, in every domain. None of them is used.
+#[must_use]
+pub fn foreign_files() -> Vec<ForeignFile> {
+    all_foreign_files(rustix::process::geteuid().as_raw())
+}
+
 /// Lists the seats of this domain.
 ///
 /// # Errors
-/// [`TransportError::Node`] when shared memory is not usable.
+/// [`TransportError`] when shared memory is not usable.
 pub fn survey() -> Result<SharedMemoryReport, TransportError> {
     let mut report = SharedMemoryReport::default();
-    iceoryx2::node::Node::<Service>::list(&configuration(&domain())?, |state| {
+    iceoryx2::node::Node::<Service>::list(&Place::open(&domain())?.configuration()?, |state| {
         let (details, alive) = match &state {
             NodeState::Alive(view) => (view.details().clone(), true),
             NodeState::Dead(view) => (view.details().clone(), false),
@@ -49,6 +65,6 @@ pub fn survey() -> Result<SharedMemoryReport, TransportError> {
         }
         CallbackProgression::Continue
     })
-    .map_err(|e| TransportError::Node { what: format!("{e:?}") })?;
+    .map_err(TransportError::node)?;
     Ok(report)
 }

@@ -1,18 +1,20 @@
 //! Sending messages of fixed size, and waking those who wait for them.
 
-use super::{Node, Service, TransportError, open_error, owner_of, service_name};
+use super::error::{MOST_BELLS, MOST_NODES, bell_error, notifier_error, publisher_error, service_error};
+use super::{Node, Service, TransportError, service_name};
+use crate::msg::Message;
 use crate::topics::{Limits, Topic};
 use iceoryx2::port::update_connections::UpdateConnections as _;
 use iceoryx2::port::{notifier::Notifier, publisher::Publisher as Port};
 use iceoryx2::prelude::*;
 use iceoryx2::service::port_factory::event::PortFactory as EventFactory;
-use std::fmt::Debug;
+use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
 
 /// Sends messages of one topic.
 #[derive(Debug)]
-pub struct Publisher<Payload: Debug + ZeroCopySend + 'static> {
+pub struct Publisher<M: Message> {
     topic: &'static str,
-    port: Port<Service, Payload, ()>,
+    port: Port<Service, M::Wire, ()>,
     bell: Notifier<Service>,
 }
 
@@ -21,10 +23,7 @@ impl Node {
     ///
     /// # Errors
     /// [`TransportError::Full`] when another process already sends on it, other variants when shared memory fails.
-    pub fn publisher<Payload: Debug + ZeroCopySend + 'static>(
-        &self,
-        topic: Topic<Payload>,
-    ) -> Result<Publisher<Payload>, TransportError> {
+    pub fn publisher<M: Message>(&self, topic: Topic<M>) -> Result<Publisher<M>, TransportError> {
         let limits = topic.limits;
         let port = self
             .service(topic)?
@@ -32,29 +31,29 @@ impl Node {
             .max_loaned_samples(1)
             .backpressure_strategy(BackpressureStrategy::DiscardData)
             .create()
-            .map_err(|e| publisher_error(topic.name, limits, &format!("{e:?}")))?;
+            .map_err(|e| publisher_error(topic.name, limits, e))?;
         Ok(Publisher { topic: topic.name, port, bell: self.bell(topic.name)? })
     }
 
     /// The service behind a topic; both sides open it with the same limits.
-    pub(super) fn service<Payload: Debug + ZeroCopySend + 'static>(
+    pub(super) fn service<M: Message>(
         &self,
-        topic: Topic<Payload>,
-    ) -> Result<iceoryx2::service::port_factory::publish_subscribe::PortFactory<Service, Payload, ()>, TransportError>
-    {
+        topic: Topic<M>,
+    ) -> Result<PortFactory<Service, M::Wire, ()>, TransportError> {
+        self.place.refuse_foreign_files()?;
         let Limits { buffer, history, borrowed, subscribers, publishers } = topic.limits;
         self.inner
             .service_builder(&service_name(topic.name)?)
-            .publish_subscribe::<Payload>()
+            .publish_subscribe::<M::Wire>()
             .enable_safe_overflow(true)
             .subscriber_max_buffer_size(buffer)
             .history_size(history)
             .subscriber_max_borrowed_samples(borrowed)
             .max_subscribers(subscribers)
             .max_publishers(publishers)
-            .max_nodes(32)
+            .max_nodes(MOST_NODES)
             .open_or_create()
-            .map_err(|e| open_error(topic.name, &format!("{e:?}")))
+            .map_err(|e| service_error(topic.name, e))
     }
 
     /// The event service that rings when something was sent.
@@ -62,45 +61,44 @@ impl Node {
         self.inner
             .service_builder(&service_name(topic)?)
             .event()
-            .max_listeners(16)
-            .max_notifiers(16)
-            .max_nodes(32)
+            .max_listeners(MOST_BELLS)
+            .max_notifiers(MOST_BELLS)
+            .max_nodes(MOST_NODES)
             .event_id_max_value(4)
             .open_or_create()
-            .map_err(|e| open_error(topic, &format!("{e:?}")))
+            .map_err(|e| bell_error(topic, e))
     }
 
     pub(super) fn bell(&self, topic: &'static str) -> Result<Notifier<Service>, TransportError> {
-        self.bell_service(topic)?.notifier_builder().create().map_err(|e| open_error(topic, &format!("{e:?}")))
+        self.bell_service(topic)?.notifier_builder().create().map_err(|e| notifier_error(topic, e))
     }
 }
 
-pub(super) fn publisher_error(topic: &'static str, limits: Limits, what: &str) -> TransportError {
-    if what.contains("ExceedsMaxSupported") {
-        TransportError::Full { topic, limit: limits.publishers, side: "publisher(s)", owner: owner_of(topic) }
-    } else {
-        open_error(topic, what)
-    }
-}
-
-impl<Payload: Debug + ZeroCopySend + Copy + 'static> Publisher<Payload> {
+impl<M: Message> Publisher<M> {
     /// Sends a message and wakes the readers that wait.
     ///
     /// # Errors
     /// [`TransportError::Port`] when shared memory fails.
-    pub fn send(&self, message: &Payload) -> Result<(), TransportError> {
+    pub fn send(&self, message: &M) -> Result<(), TransportError> {
         self.send_quietly(message)?;
-        self.wake()
+        ring(&self.bell, self.topic)
     }
 
     /// Sends a message without waking anybody: for topics whose readers look by themselves.
     ///
     /// # Errors
     /// [`TransportError::Port`] when shared memory fails.
-    pub fn send_quietly(&self, message: &Payload) -> Result<(), TransportError> {
-        let failed = |what: String| TransportError::Port { topic: self.topic, what };
-        let sample = self.port.loan_uninit().map_err(|e| failed(format!("{e:?}")))?;
-        sample.write_payload(*message).send().map_err(|e| failed(format!("{e:?}")))?;
+    pub fn send_quietly(&self, message: &M) -> Result<(), TransportError> {
+        self.send_numbers(&message.to_wire())
+    }
+
+    /// Sends numbers as they are, which need be no message: to try what a receiver does with them. Wakes nobody.
+    ///
+    /// # Errors
+    /// [`TransportError::Port`] when shared memory fails.
+    pub fn send_numbers(&self, numbers: &M::Wire) -> Result<(), TransportError> {
+        let sample = self.port.loan_uninit().map_err(|e| TransportError::port(self.topic, e))?;
+        sample.write_payload(*numbers).send().map_err(|e| TransportError::port(self.topic, e))?;
         Ok(())
     }
 
@@ -109,24 +107,11 @@ impl<Payload: Debug + ZeroCopySend + Copy + 'static> Publisher<Payload> {
     /// # Errors
     /// [`TransportError::Port`] when shared memory fails.
     pub fn greet_new_readers(&self) -> Result<(), TransportError> {
-        self.port.update_connections().map_err(|e| TransportError::Port { topic: self.topic, what: format!("{e:?}") })
-    }
-
-    fn wake(&self) -> Result<(), TransportError> {
-        ring(&self.bell, self.topic)
+        self.port.update_connections().map_err(|e| TransportError::port(self.topic, e))
     }
 }
 
-/// Rings a bell. A listener that died a moment ago is no failure of ours.
+/// Rings a bell. A listener that has died or is full is passed over by iceoryx2 itself.
 pub(super) fn ring(bell: &Notifier<Service>, topic: &'static str) -> Result<(), TransportError> {
-    match bell.notify() {
-        Ok(_) => Ok(()),
-        Err(e) => {
-            let what = format!("{e:?}");
-            if what.contains("Listener") || what.contains("Disconnected") || what.contains("Full") {
-                return Ok(());
-            }
-            Err(TransportError::Port { topic, what })
-        }
-    }
+    bell.notify().map(|_| ()).map_err(|e| TransportError::port(topic, e))
 }

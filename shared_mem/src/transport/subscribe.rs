@@ -1,11 +1,13 @@
 //! Receiving messages of fixed size: by looking, or by sleeping until something was sent.
 
-use super::{Node, Service, TransportError, open_error, owner_of};
-use crate::topics::{Limits, Topic};
+use super::error::{listener_error, subscriber_error};
+use super::ignored::Tally;
+use super::{Node, Service, TransportError};
+use crate::msg::Message;
+use crate::topics::Topic;
 use iceoryx2::port::listener::{Listener, ListenerWaitError};
 use iceoryx2::port::subscriber::Subscriber as Port;
-use iceoryx2::prelude::*;
-use std::fmt::Debug;
+use std::rc::Rc;
 use std::time::{Duration, Instant};
 
 /// How late a sleeper at most hears a ring that iceoryx2 0.10 lost. A listener that empties its socket between the sender's ring and
@@ -14,11 +16,13 @@ const TURN: Duration = Duration::from_millis(5);
 /// Nobody lies down for less: a socket's timeout is in microseconds, and none of them means for ever.
 const TICK: Duration = Duration::from_micros(100);
 
-/// Receives messages of one topic, oldest first.
+/// Receives messages of one topic, oldest first. Those that fail their check are ignored and counted: see
+/// [`Node::newly_ignored`].
 #[derive(Debug)]
-pub struct Subscriber<Payload: Debug + ZeroCopySend + 'static> {
+pub struct Subscriber<M: Message> {
     topic: &'static str,
-    port: Port<Service, Payload, ()>,
+    port: Port<Service, M::Wire, ()>,
+    ignored: Rc<Tally>,
 }
 
 /// Sleeps until something is sent on one topic.
@@ -33,17 +37,14 @@ impl Node {
     ///
     /// # Errors
     /// [`TransportError::Full`] when all places are taken, other variants when shared memory fails.
-    pub fn subscriber<Payload: Debug + ZeroCopySend + 'static>(
-        &self,
-        topic: Topic<Payload>,
-    ) -> Result<Subscriber<Payload>, TransportError> {
+    pub fn subscriber<M: Message>(&self, topic: Topic<M>) -> Result<Subscriber<M>, TransportError> {
         let port = self
             .service(topic)?
             .subscriber_builder()
             .buffer_size(topic.limits.buffer)
             .create()
-            .map_err(|e| subscriber_error(topic.name, topic.limits, &format!("{e:?}")))?;
-        Ok(Subscriber { topic: topic.name, port })
+            .map_err(|e| subscriber_error(topic.name, topic.limits, e))?;
+        Ok(Subscriber { topic: topic.name, port, ignored: self.tallies.open(topic.name) })
     }
 
     /// Opens something to sleep on until a topic's next message.
@@ -51,37 +52,39 @@ impl Node {
     /// # Errors
     /// [`TransportError`] when shared memory fails.
     pub fn wake_on(&self, topic: &'static str) -> Result<Wake, TransportError> {
-        let listener =
-            self.bell_service(topic)?.listener_builder().create().map_err(|e| open_error(topic, &format!("{e:?}")))?;
+        let listener = self.bell_service(topic)?.listener_builder().create().map_err(|e| listener_error(topic, e))?;
         Ok(Wake { topic, listener })
     }
 }
 
-pub(super) fn subscriber_error(topic: &'static str, limits: Limits, what: &str) -> TransportError {
-    if what.contains("ExceedsMaxSupported") {
-        TransportError::Full { topic, limit: limits.subscribers, side: "subscriber(s)", owner: owner_of(topic) }
-    } else {
-        open_error(topic, what)
-    }
-}
-
-impl<Payload: Debug + ZeroCopySend + Copy + 'static> Subscriber<Payload> {
+impl<M: Message> Subscriber<M> {
     /// The oldest message not yet received, if any.
     ///
     /// # Errors
     /// [`TransportError::Port`] when shared memory fails.
-    pub fn receive(&self) -> Result<Option<Payload>, TransportError> {
-        match self.port.receive() {
-            Ok(sample) => Ok(sample.map(|s| *s.payload())),
-            Err(e) => Err(TransportError::Port { topic: self.topic, what: format!("{e:?}") }),
+    pub fn receive(&self) -> Result<Option<M>, TransportError> {
+        while let Some(sample) = self.port.receive().map_err(|e| TransportError::port(self.topic, e))? {
+            // Copied before it is checked: its sender could still change it where it lies.
+            let numbers = *sample.payload();
+            match M::from_wire(&numbers) {
+                Ok(message) => return Ok(Some(message)),
+                Err(why) => self.ignored.add(why),
+            }
         }
+        Ok(None)
+    }
+
+    /// Messages so far that failed their check.
+    #[must_use]
+    pub fn ignored(&self) -> u64 {
+        self.ignored.count()
     }
 
     /// The newest message, if any arrived; older ones are dropped.
     ///
     /// # Errors
     /// [`TransportError::Port`] when shared memory fails.
-    pub fn newest(&self) -> Result<Option<Payload>, TransportError> {
+    pub fn newest(&self) -> Result<Option<M>, TransportError> {
         let mut last = None;
         while let Some(message) = self.receive()? {
             last = Some(message);
@@ -109,7 +112,7 @@ impl Wake {
                 Ok(0) if left >= TICK => {}
                 Ok(count) => return Ok(count > 0),
                 Err(ListenerWaitError::InterruptSignal) => return Ok(false),
-                Err(e) => return Err(TransportError::Port { topic: self.topic, what: format!("{e:?}") }),
+                Err(e) => return Err(TransportError::port(self.topic, e)),
             }
         }
     }
