@@ -99,7 +99,7 @@ impl Pump {
                 }
             };
             let _gone = opened.send(Ok(()));
-            let report = run(rings, &ports, &told);
+            let report = run(rings, &node, &ports, &told);
             drop(node);
             report
         };
@@ -146,7 +146,7 @@ fn open(tracks: bool) -> Result<(Node, Ports), TransportError> {
     Ok((node, ports))
 }
 
-fn run(mut rings: Rings, ports: &Ports, stop: &AtomicBool) -> Result<PumpReport, TransportError> {
+fn run(mut rings: Rings, node: &Node, ports: &Ports, stop: &AtomicBool) -> Result<PumpReport, TransportError> {
     let mut report = PumpReport::default();
     loop {
         let last_round = stop.load(Ordering::Acquire);
@@ -159,6 +159,9 @@ fn run(mut rings: Rings, ports: &Ports, stop: &AtomicBool) -> Result<PumpReport,
         {
             // There is room: checked above, and only this thread pushes.
             let _pushed = rings.chunks.push(chunk);
+        }
+        for ignored in node.newly_ignored() {
+            say(ports, EventLevel::Warning, &ignored.to_string())?;
         }
         if rings.beats.is_empty() {
             ports.events.greet_new_readers()?;

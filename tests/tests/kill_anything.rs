@@ -1,5 +1,5 @@
 //! Bridge, twin and recorder die without warning at random moments: the others go on or say why they stop, a restart
-//! needs no cleaning by hand, and the clip is readable up to the last second.
+//! needs no cleaning by hand, and the clip is readable up to the last second. Bytes that are no message kill nobody.
 
 use rand::{RngExt, SeedableRng};
 use rustix::process::{Pid, Signal, kill_process};
@@ -114,6 +114,22 @@ fn rounds(count: u32) {
 #[test]
 fn any_process_may_die_at_any_moment() {
     rounds(3);
+}
+
+/// The program throws random bytes for as long as it is told: `random_bytes 600` is the long run.
+#[test]
+fn whatever_bytes_lie_in_shared_memory_no_process_dies_and_no_limit_is_exceeded() {
+    let cell = Cell::shipped();
+    let answer =
+        Program::start("random_bytes", cell.domain(), &["4"]).wait(Duration::from_secs(120)).succeeded().json();
+    let thrown = [&answer["thrown"]["beside_the_bridge"], &answer["thrown"]["alone"]].map(|t| t.as_object().cloned());
+    let [beside, alone] = thrown.map(Option::unwrap_or_default);
+    for topic in shared_mem::topics::ALL {
+        assert!(alone.contains_key(topic) || beside.contains_key(topic), "nothing was thrown at {topic}: {answer}");
+    }
+    assert!(beside.contains_key("/gripper/command") && beside.contains_key("/events"), "{answer}");
+    let ignored = answer["ignored"].as_array().expect("remarks");
+    assert!(ignored.iter().any(|line| line.as_str().is_some_and(|line| line.contains("/gripper/command"))), "{answer}");
 }
 
 #[test]

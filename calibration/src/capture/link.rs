@@ -74,7 +74,7 @@ pub struct Link {
     heard: Instant,
     last_words: Option<Words>,
     // Declared last: ports go before the node they belong to.
-    _node: Node,
+    node: Node,
 }
 
 impl Link {
@@ -92,7 +92,7 @@ impl Link {
             newest: None,
             heard: Instant::now(),
             last_words: None,
-            _node: node,
+            node,
         })
     }
 
@@ -238,6 +238,9 @@ impl Link {
             {
                 self.last_words = Some(Words { level, text: event.text().to_owned() });
             }
+        }
+        for ignored in self.node.newly_ignored() {
+            eprintln!("{ignored}");
         }
         Ok(())
     }

@@ -42,7 +42,7 @@ pub struct ObjectWatch {
     poses: Subscriber<ObjectPose>,
     seen: Vec<Seen>,
     // Declared last: ports go before the node they belong to.
-    _node: Node,
+    node: Node,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -73,7 +73,7 @@ impl ObjectWatch {
     pub fn open(domain: Option<&str>) -> Result<Self, WatchError> {
         const NAME: &str = "calibration capture object";
         let node = domain.map_or_else(|| Node::open(NAME), |domain| Node::open_in(domain, NAME))?;
-        Ok(Self { poses: node.subscriber(OBJECT_POSE)?, seen: Vec::new(), _node: node })
+        Ok(Self { poses: node.subscriber(OBJECT_POSE)?, seen: Vec::new(), node })
     }
 
     /// Forgets what was seen: a clip begins.
@@ -88,6 +88,9 @@ impl ObjectWatch {
     pub fn look(&mut self) -> Result<(), WatchError> {
         while let Some(pose) = self.poses.receive()? {
             self.seen.extend(seen(&pose));
+        }
+        for ignored in self.node.newly_ignored() {
+            eprintln!("{ignored}");
         }
         Ok(())
     }

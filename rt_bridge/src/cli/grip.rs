@@ -64,7 +64,11 @@ impl GripArguments {
         let node = Node::open("rt_bridge_grip")?;
         let states = node.subscriber(topics::GRIPPER)?;
         let orders = node.publisher(topics::GRIPPER_COMMAND)?;
-        if next(&states, PATIENCE)?.is_none() {
+        let first = next(&states, PATIENCE)?;
+        for ignored in node.newly_ignored() {
+            tracing::warn!("{ignored}");
+        }
+        if first.is_none() {
             bail!("no bridge shows a gripper; start one with `rt_bridge run --gripper ...`");
         }
         let order = self.order.command();

@@ -3,7 +3,8 @@
 use super::attendance::Attendance;
 use super::{Device, DeviceFault, RETRY};
 use crate::pump::Notice;
-use shared_mem::transport::{Node, TransportError};
+use shared_mem::msg::event::EventLevel;
+use shared_mem::transport::{Ignored, Node, TransportError};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{self, Sender};
@@ -73,7 +74,7 @@ impl Service {
                 let lines = lines(&node)?;
                 Ok((first, node, lines))
             };
-            let (first, _node, mut lines) = match start() {
+            let (first, node, mut lines) = match start() {
                 Ok(all) => all,
                 Err(e) => {
                     let _gone = opened.send(Err(e));
@@ -82,7 +83,8 @@ impl Service {
             };
             let _gone = opened.send(Ok(()));
             let mut attendance = Attendance::new(device);
-            let ended = attend(first, &mut open, &mut lines, &mut attendance, &notices, &told);
+            let ignored = || node.newly_ignored();
+            let ended = attend(first, &mut open, &mut lines, &mut attendance, ignored, &notices, &told);
             ended.err().map(|e| format!("{name} stopped: {e}")).or_else(|| attendance.missing())
         };
         let handle = thread::Builder::new().name(name.into()).spawn(body).expect("threads can be made");
@@ -115,6 +117,7 @@ fn attend<D: Device>(
     open: &mut impl FnMut() -> Result<D, DeviceFault>,
     lines: &mut impl Lines<D>,
     attendance: &mut Attendance,
+    ignored: impl Fn() -> Vec<Ignored>,
     notices: &Sender<Notice>,
     stop: &AtomicBool,
 ) -> Result<(), TransportError> {
@@ -128,6 +131,9 @@ fn attend<D: Device>(
     let mut tried = Instant::now();
     while !stop.load(Ordering::Relaxed) {
         let order = lines.order()?;
+        for ignored in ignored() {
+            say(Some(Notice { level: EventLevel::Warning, text: ignored.to_string() }));
+        }
         let Some(present) = &mut device else {
             if tried.elapsed() < RETRY {
                 thread::sleep(LOOK_EVERY);
@@ -213,7 +219,8 @@ mod tests {
         let done = Rc::new(Cell::new(false));
         let mut lines = Seen(Vec::new(), done.clone(), stop.clone());
         let mut attendance = Attendance::new("short".into());
-        attend(Short(1, 0), &mut open, &mut lines, &mut attendance, &notices, &stop).expect("no shared memory to fail");
+        attend(Short(1, 0), &mut open, &mut lines, &mut attendance, Vec::new, &notices, &stop)
+            .expect("no shared memory to fail");
         assert!(done.get());
         assert_eq!(lines.0, [1, 1, 1, 2, 2, 2]);
         let said: Vec<_> = said.try_iter().map(|notice| notice.text).collect();

@@ -1,8 +1,7 @@
 //! Shared memory: room, rights, and who sits on it.
 
 use super::Finding;
-use shared_mem::transport::{DOMAIN_VARIABLE, survey};
-use std::path::Path;
+use shared_mem::transport::{DOMAIN_VARIABLE, ForeignFile, PlaceError, book_keeping, foreign_files, survey};
 
 /// Where Linux keeps shared memory.
 const SHM: &str = "/dev/shm";
@@ -12,7 +11,7 @@ const COMFORTABLE_MB: u64 = 512;
 const NEEDED_MB: u64 = 64;
 
 pub(super) fn examine() -> Vec<Finding> {
-    vec![room(), rights(), seats()]
+    vec![room(), rights(), strangers(), seats()]
 }
 
 fn room() -> Finding {
@@ -32,20 +31,26 @@ fn room() -> Finding {
     }
 }
 
-/// iceoryx2 keeps its book-keeping in files that all users of a machine share.
+/// The folder in which this user's processes find each other.
 fn rights() -> Finding {
-    let folder = Path::new("/tmp/iceoryx2");
-    if !folder.exists() {
-        return Finding::ok("book-keeping", format!("{} will be made", folder.display()));
+    match book_keeping() {
+        Ok(folder) => Finding::ok("book-keeping", format!("{} is this user's alone", folder.display())),
+        Err(PlaceError { what, remedy }) => Finding::problem("book-keeping", what, remedy),
     }
-    match rustix::fs::access(folder, rustix::fs::Access::WRITE_OK) {
-        Ok(()) => Finding::ok("book-keeping", format!("{} is writable", folder.display())),
-        Err(_) => Finding::problem(
-            "book-keeping",
-            format!("{} belongs to another user", folder.display()),
-            "let that user stop its processes and remove the folder, or run as that user",
-        ),
-    }
+}
+
+/// Files of other users under this user's names.
+fn strangers() -> Finding {
+    let files = foreign_files();
+    let Some(ForeignFile { path, owner }) = files.first() else {
+        return Finding::ok("other users", "none of their files bears a name of this user's");
+    };
+    let others = if files.len() > 1 { format!(" and {} more", files.len() - 1) } else { String::new() };
+    Finding::problem(
+        "other users",
+        format!("{} belongs to user {owner}{others}", path.display()),
+        format!("remove it as that user or as root: `sudo rm {}`", path.display()),
+    )
 }
 
 fn seats() -> Finding {

@@ -9,7 +9,7 @@ use disk::{Room, room};
 use serde::Serialize;
 use shared_mem::msg::event::{Event, EventLevel, EventSource};
 use shared_mem::recording::{ClipInfo, ClipWriter, WriteError, WriteSummary};
-use shared_mem::transport::{Node, TransportError};
+use shared_mem::transport::{Node, Publisher, TransportError};
 use shared_mem::{time::now_ns, topics};
 use sources::Sources;
 use std::os::unix::process::parent_id;
@@ -97,7 +97,7 @@ pub fn record(settings: &Settings, stop: &AtomicBool) -> Result<Recorded, Record
     let mut writer = ClipWriter::create(out, &settings.info)?;
     events.send(&Event::new(EventLevel::Info, EventSource::Recorder, &announcement(out)))?;
 
-    let reason = keep_writing(settings, stop, &mut sources, &mut writer)?;
+    let reason = keep_writing(settings, stop, (&node, &events), &mut sources, &mut writer)?;
     let stopped = match reason {
         Reason::Told => None,
         Reason::Failed(what) => {
@@ -128,6 +128,7 @@ enum Reason {
 fn keep_writing(
     settings: &Settings,
     stop: &AtomicBool,
+    (node, events): (&Node, &Publisher<Event>),
     sources: &mut Sources,
     writer: &mut ClipWriter,
 ) -> Result<Reason, RecordError> {
@@ -145,6 +146,9 @@ fn keep_writing(
         }
         if now_ns() - flushed_ns >= FLUSH_EVERY_NS {
             flushed_ns = now_ns();
+            for ignored in node.newly_ignored() {
+                events.send(&Event::new(EventLevel::Warning, EventSource::Recorder, &ignored.to_string()))?;
+            }
             if let Err(e) = writer.flush() {
                 return Ok(Reason::Failed(e.to_string()));
             }

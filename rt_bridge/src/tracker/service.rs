@@ -103,7 +103,7 @@ struct Ports {
     wake: Wake,
     poses: Publisher<ObjectPose>,
     // Declared last: ports go before the node they belong to.
-    _node: Node,
+    node: Node,
 }
 
 impl Ports {
@@ -116,7 +116,7 @@ impl Ports {
             states: node.subscriber(topics::ARM_STATE)?,
             wake: node.wake_on(topics::CAMERA_COLOR.name)?,
             poses: node.publisher(topics::OBJECT_POSE)?,
-            _node: node,
+            node,
         })
     }
 }
@@ -139,6 +139,10 @@ impl Desk {
         while !stop.load(Ordering::Relaxed) {
             ports.wake.wait(LONGEST_SLEEP)?;
             ports.poses.greet_new_readers()?;
+            for ignored in ports.node.newly_ignored() {
+                // The pump may have ended before; then nobody listens any more.
+                let _gone = self.notices.send(Notice { level: EventLevel::Warning, text: ignored.to_string() });
+            }
             if let Some(info) = ports.info.newest()? {
                 self.place(&info, &mut shown);
             }

@@ -9,7 +9,7 @@ pub const LARGEST: f64 = 1e9;
 /// Largest stamp [ns] and count: 146 years. Sums and differences of two of them fit into 64 bits with a sign.
 pub const LATEST: u64 = 1 << 62;
 /// Longest side of a picture [pixel].
-pub const LONGEST_SIDE: u32 = 16_384;
+pub const LONGEST_SIDE: u32 = 8192;
 /// How far the length of a quaternion may be from 1.
 const QUATERNION_TOLERANCE: f64 = 1e-2;
 

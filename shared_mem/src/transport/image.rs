@@ -30,6 +30,8 @@ pub struct ImagePublisher {
 pub struct ImageSubscriber {
     topic: &'static str,
     port: SubscriberPort<Service, [u8], ImageHeaderWire>,
+    /// How many pictures wait at most.
+    buffer: usize,
     ignored: Rc<Tally>,
 }
 
@@ -69,7 +71,8 @@ impl Node {
             .buffer_size(topic.limits.buffer)
             .create()
             .map_err(|e| subscriber_error(topic.name, topic.limits, e))?;
-        Ok(ImageSubscriber { topic: topic.name, port, ignored: self.tallies.open(topic.name) })
+        let (buffer, ignored) = (topic.limits.buffer, self.tallies.open(topic.name));
+        Ok(ImageSubscriber { topic: topic.name, port, buffer, ignored })
     }
 
     fn image_service(&self, topic: ImageTopic) -> Result<Factory, TransportError> {
@@ -123,7 +126,8 @@ impl ImageSubscriber {
     /// # Errors
     /// [`TransportError::Port`] when shared memory fails.
     pub fn receive(&self) -> Result<Option<ImageSample>, TransportError> {
-        while let Some(sample) = self.port.receive().map_err(|e| TransportError::port(self.topic, e))? {
+        for _ in 0..self.buffer {
+            let Some(sample) = self.port.receive().map_err(|e| TransportError::port(self.topic, e))? else { break };
             match header_of(&sample) {
                 Ok(header) => return Ok(Some(ImageSample { header, sample })),
                 Err(why) => self.ignored.add(why),

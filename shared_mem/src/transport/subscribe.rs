@@ -22,6 +22,8 @@ const TICK: Duration = Duration::from_micros(100);
 pub struct Subscriber<M: Message> {
     topic: &'static str,
     port: Port<Service, M::Wire, ()>,
+    /// How many messages wait at most.
+    buffer: usize,
     ignored: Rc<Tally>,
 }
 
@@ -44,7 +46,8 @@ impl Node {
             .buffer_size(topic.limits.buffer)
             .create()
             .map_err(|e| subscriber_error(topic.name, topic.limits, e))?;
-        Ok(Subscriber { topic: topic.name, port, ignored: self.tallies.open(topic.name) })
+        let (buffer, ignored) = (topic.limits.buffer, self.tallies.open(topic.name));
+        Ok(Subscriber { topic: topic.name, port, buffer, ignored })
     }
 
     /// Opens something to sleep on until a topic's next message.
@@ -63,7 +66,9 @@ impl<M: Message> Subscriber<M> {
     /// # Errors
     /// [`TransportError::Port`] when shared memory fails.
     pub fn receive(&self) -> Result<Option<M>, TransportError> {
-        while let Some(sample) = self.port.receive().map_err(|e| TransportError::port(self.topic, e))? {
+        // A sender of nonsense may be as fast as this loop: who looks must come back nevertheless.
+        for _ in 0..self.buffer {
+            let Some(sample) = self.port.receive().map_err(|e| TransportError::port(self.topic, e))? else { break };
             // Copied before it is checked: its sender could still change it where it lies.
             let numbers = *sample.payload();
             match M::from_wire(&numbers) {
@@ -86,7 +91,8 @@ impl<M: Message> Subscriber<M> {
     /// [`TransportError::Port`] when shared memory fails.
     pub fn newest(&self) -> Result<Option<M>, TransportError> {
         let mut last = None;
-        while let Some(message) = self.receive()? {
+        for _ in 0..self.buffer {
+            let Some(message) = self.receive()? else { break };
             last = Some(message);
         }
         Ok(last)

@@ -100,6 +100,9 @@ impl Live {
                 self.node.clear_dead_nodes();
                 self.predictions.greet_new_readers()?;
                 self.gaps.greet_new_readers()?;
+                for ignored in self.node.newly_ignored() {
+                    watcher.remark(&ignored.to_string());
+                }
             }
         }
         Ok(self.busy_s)

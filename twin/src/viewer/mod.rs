@@ -145,6 +145,9 @@ impl Viewer {
                 show_picture(time, sample.header(), &self.color, || sample.bytes().to_vec());
                 self.show_beside(time, sample.header(), sample.bytes());
             }
+            for ignored in node.newly_ignored() {
+                tracing::warn!("{ignored}");
+            }
             std::thread::sleep(FRAME);
         }
         self.server.stop().wait_blocking();

@@ -1,0 +1,120 @@
+//! Reads what the bridge commands and what the arm does, and keeps the worst ratio to each limit: 1 is the limit.
+
+use rt_bridge::safety::{Limits, Trace, Workspace};
+use shared_mem::cell::Cell;
+use shared_mem::msg::Joints;
+use shared_mem::msg::arm::{ArmCommand, ArmState};
+use std::collections::BTreeMap;
+use twin::arm::ArmModel;
+
+/// Control period [s].
+const T: f64 = 1e-3;
+/// Below this a joint stands [rad/s]: the rounding of differences of positions.
+const STANDING: f64 = 1e-9;
+
+/// What was commanded last.
+struct Last {
+    cycle: u64,
+    trace: Trace,
+    tau: Joints,
+    /// Commands without a gap before this one: a difference needs one, a second difference two.
+    row: u32,
+}
+
+/// The judge of one arm.
+pub(crate) struct Judge {
+    limits: Limits,
+    workspace: Workspace,
+    model: ArmModel,
+    tip_radius: f64,
+    last: Option<Last>,
+    worst: BTreeMap<&'static str, f64>,
+    /// Commands and states that were judged.
+    pub(crate) judged: [u64; 2],
+    /// Commands that differ from the one before.
+    pub(crate) moved: u64,
+}
+
+impl Judge {
+    pub(crate) fn new(cell: &Cell) -> Self {
+        let model = ArmModel::from_cell(cell).expect("a cell with an arm");
+        Self {
+            limits: Limits::of(cell, &model),
+            workspace: Workspace::of(cell),
+            tip_radius: cell.tool.as_ref().map_or(0.0, |tool| tool.radius),
+            model,
+            last: None,
+            worst: BTreeMap::new(),
+            judged: [0; 2],
+            moved: 0,
+        }
+    }
+
+    /// The worst ratio to each limit.
+    pub(crate) fn worst(&self) -> &BTreeMap<&'static str, f64> {
+        &self.worst
+    }
+
+    pub(crate) fn command(&mut self, command: &ArmCommand) {
+        self.judged[0] += 1;
+        let follows = self.last.take().filter(|last| last.cycle + 1 == command.cycle);
+        let row = follows.as_ref().map_or(0, |last| last.row.saturating_add(1));
+        let (before, tau) = match &follows {
+            Some(last) => (last.trace, last.tau),
+            None => (Trace::at_rest(command.q_d), command.tau_J_d),
+        };
+        let mut trace = before.after(&command.q_d, T);
+        if row < 2 {
+            trace.a = [0.0; 8];
+        }
+        self.moved += u64::from(row > 0 && trace.q != before.q);
+        let limits = self.limits;
+        for (i, joint) in limits.counted().enumerate() {
+            let (q, v) = (trace.q[i], trace.v[i]);
+            let fastest = joint.speed_towards(v.signum(), q, joint.deceleration);
+            self.note("command: position", share_of_range(q, joint.q_min, joint.q_max));
+            self.note("command: speed", if v.abs() < STANDING { 0.0 } else { v.abs() / fastest });
+            self.note("command: desired speed", command.dq_d[i].abs() / joint.velocity);
+            self.note("command: acceleration", trace.a[i].abs() / joint.acceleration);
+            if row >= 3 {
+                self.note("command: jerk", ((trace.a[i] - before.a[i]) / T).abs() / joint.jerk);
+            }
+            self.note("command: torque", command.tau_J_d[i].abs() / joint.torque);
+            self.note("command: torque rate", (command.tau_J_d[i] - tau[i]).abs() / (joint.torque_rate * T));
+        }
+        self.tip("command: workspace", &command.q_d);
+        self.last = Some(Last { cycle: command.cycle, trace, tau: command.tau_J_d, row });
+    }
+
+    pub(crate) fn state(&mut self, state: &ArmState) {
+        self.judged[1] += 1;
+        let limits = self.limits;
+        for (i, joint) in limits.counted().enumerate() {
+            self.note("state: position", share_of_range(state.q[i], joint.q_min, joint.q_max));
+            self.note("state: speed", state.dq[i].abs() / joint.velocity);
+            self.note("state: desired torque", state.tau_J_d[i].abs() / joint.torque);
+        }
+        self.tip("state: workspace", &state.q);
+    }
+
+    /// Where the centre of the tip's cap is, as a share of the box it may be in.
+    fn tip(&mut self, what: &'static str, q: &Joints) {
+        let tip = self.model.tip(q).transform_point(&[0.0, 0.0, -self.tip_radius].into());
+        let Workspace { low, high } = self.workspace;
+        for axis in 0..3 {
+            self.note(what, share_of_range(tip[axis], low[axis], high[axis]));
+        }
+    }
+
+    /// A ratio that is no number counts as infinite.
+    fn note(&mut self, what: &'static str, ratio: f64) {
+        let ratio = if ratio.is_nan() { f64::INFINITY } else { ratio };
+        let worst = self.worst.entry(what).or_insert(0.0);
+        *worst = worst.max(ratio);
+    }
+}
+
+/// 0 in the middle of the range, 1 at its ends.
+fn share_of_range(value: f64, low: f64, high: f64) -> f64 {
+    (value - 0.5 * (low + high)).abs() / (0.5 * (high - low))
+}
