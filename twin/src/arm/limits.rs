@@ -122,6 +122,31 @@ impl Limits {
         self
     }
 
+    /// The narrower of each limit and that of `other`.
+    ///
+    /// # Errors
+    /// The joint, counted from 1, whose ranges have nothing in common.
+    pub fn within(mut self, other: &Self) -> Result<Self, usize> {
+        for (number, (joint, other)) in (1..).zip(self.joints.iter_mut().zip(&other.joints)) {
+            // `min` and `max` pass over a limit that is no number.
+            *joint = JointLimits {
+                q_min: joint.q_min.max(other.q_min),
+                q_max: joint.q_max.min(other.q_max),
+                velocity: joint.velocity.min(other.velocity),
+                acceleration: joint.acceleration.min(other.acceleration),
+                jerk: joint.jerk.min(other.jerk),
+                deceleration: joint.deceleration.min(other.deceleration),
+                velocity_offset: joint.velocity_offset.max(other.velocity_offset),
+                torque: joint.torque.min(other.torque),
+                torque_rate: joint.torque_rate.min(other.torque_rate),
+            };
+            if number <= self.dof && joint.q_min >= joint.q_max {
+                return Err(number);
+            }
+        }
+        Ok(self)
+    }
+
     /// The joints that count.
     pub fn counted(&self) -> impl Iterator<Item = &JointLimits> {
         self.joints.iter().take(self.dof)
@@ -161,6 +186,21 @@ mod tests {
         let torques: Vec<f64> = limits.counted().map(|joint| joint.torque).collect();
         assert_eq!(torques, [87.0, 50.0, 87.0, 87.0, 12.0, 12.0, 12.0]);
         assert_eq!(limits.joints[2], Limits::fr3().joints[2]);
+    }
+
+    #[test]
+    fn of_two_limits_the_narrower_holds_and_ranges_must_overlap() {
+        let mut wide = Limits::fr3();
+        for joint in &mut wide.joints {
+            *joint = JointLimits { torque: f64::NAN, deceleration: f64::INFINITY, ..JointLimits::FREE };
+        }
+        assert_eq!(wide.within(&Limits::fr3()).map(|limits| limits.joints[..7] == Limits::fr3().joints[..7]), Ok(true));
+        (wide.joints[3].q_max, wide.joints[3].velocity, wide.joints[2].torque) = (-1.0, 0.5, 3.0);
+        let both = wide.within(&Limits::fr3()).expect("ranges that overlap");
+        assert_eq!((both.joints[3].q_max, both.joints[3].velocity, both.joints[2].torque), (-1.0, 0.5, 3.0));
+        assert_eq!(both.joints[3].q_min, Limits::fr3().joints[3].q_min);
+        wide.joints[3].q_max = -4.0;
+        assert_eq!(wide.within(&Limits::fr3()), Err(4));
     }
 
     #[test]

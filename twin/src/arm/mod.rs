@@ -12,6 +12,7 @@
 //! | `limits` | [`Limits`]: how far, fast and hard each joint may go |
 //! | `inertia` | mass properties of bodies |
 //! | `kinematics` | flange, Jacobian |
+//! | `hull` | [`ArmHull`]: the space that links and tool take |
 //! | `dynamics` | gravity, Coriolis, mass matrix, accelerations |
 //! | `control` | [`ControlLaw`]: from command to torque |
 //! | `step` | integration over time |
@@ -22,6 +23,7 @@
 mod control;
 mod dynamics;
 mod fr3;
+mod hull;
 mod inertia;
 mod kernel;
 mod kinematics;
@@ -35,6 +37,7 @@ mod yielding;
 
 pub use control::{ControlLaw, GainError};
 pub use dynamics::PointForce;
+pub use hull::{ArmHull, Extent, MOST_BALLS};
 pub use inertia::MassProperties;
 pub use kinematics::Jacobian;
 pub use limits::{JointLimits, Limits, TORQUE_RATE};

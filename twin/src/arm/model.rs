@@ -237,6 +237,21 @@ impl ArmModel {
         self.has_geometry
     }
 
+    /// Whether the links between the joints are those of `other`, to two centimetres and three degrees: more than any arm is off
+    /// from its drawing. How the base stands and what is mounted at the end does not count.
+    #[must_use]
+    pub fn is_built_like(&self, other: &Self) -> bool {
+        let near = |a: &[f64], b: &[f64], off: f64| a.iter().zip(b).all(|(a, b)| (a - b).abs() < off);
+        let alike = |(a, b): (&Link, &Link)| {
+            a.slides == b.slides
+                && near(&a.translation, &b.translation, 0.02)
+                && near(a.rotation.as_flattened(), b.rotation.as_flattened(), 0.05)
+        };
+        self.has_geometry
+            && self.dof == other.dof
+            && self.links.iter().zip(&other.links).take(self.dof).skip(1).all(alike)
+    }
+
     /// Lowest joint positions [rad].
     #[must_use]
     pub fn q_min(&self) -> &Joints {

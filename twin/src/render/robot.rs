@@ -176,6 +176,7 @@ fn about_z(angle: f64) -> UnitQuaternion<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::arm::ArmHull;
     use crate::shipped::shipped;
 
     #[test]
@@ -193,6 +194,32 @@ mod tests {
             let gap = pair[0].iter().map(nearest).fold(f64::INFINITY, f64::min);
             assert!(gap < 0.02, "{gap} m between neighbours");
         }
+    }
+
+    #[test]
+    fn the_hull_of_an_fr3_encloses_the_makers_shapes_closely() {
+        let mut cell = shipped();
+        cell.tool = None;
+        let surface = RobotSurface::new(&cell, Hand::None).expect("a robot");
+        let (hull, links) = (ArmHull::of(&cell, surface.model()).expect("an arm with geometry"), surface.links());
+        let (mut furthest, mut pose) = (0.0_f64, *surface.model().ready());
+        for k in 0..200_u32 {
+            // Steps of the golden ratio's share of a turn, a different multiple for each joint: no pose comes twice.
+            for (i, q) in pose.iter_mut().enumerate().take(7) {
+                *q = (0.618_034 * f64::from(k) * (i as f64 + 1.37)).fract() * std::f64::consts::TAU;
+            }
+            let mut lowest = f64::INFINITY;
+            surface.for_each(&pose, |part, base_from_part| {
+                if links[part] >= 2 {
+                    let heights = surface.parts()[part].points.iter().map(|p| (base_from_part * p.cast::<f64>()).z);
+                    lowest = heights.fold(lowest, f64::min);
+                }
+            });
+            let of_hull = hull.at(&pose).lowest.iter().copied().fold(f64::INFINITY, f64::min);
+            assert!(of_hull <= lowest, "pose {k}: the hull ends {} m above the arm's lowest point", of_hull - lowest);
+            furthest = furthest.max(lowest - of_hull);
+        }
+        assert!(furthest < 0.03, "the hull reaches {furthest} m beyond the arm");
     }
 
     #[test]
