@@ -3,10 +3,11 @@
 //! motions to hand on.
 
 use crate::rt::cycle::Beat;
+use crate::rt::orders::OrderSender;
 use crate::rt::process;
 use crate::rt::remark::Remark;
 use crate::times::Times;
-use rtrb::{Consumer, Producer};
+use rtrb::Consumer;
 use shared_mem::msg::arm::{ArmCommand, ArmState};
 use shared_mem::msg::event::{Event, EventLevel, EventSource};
 use shared_mem::msg::motion::MotionChunk;
@@ -23,6 +24,9 @@ use std::time::Duration;
 /// Longest sleep between two looks: a motion's first chunk waits no longer than this.
 const LONGEST_SLEEP: Duration = Duration::from_millis(5);
 
+/// Chunks that are taken in before states are published again: as many as wait at most.
+const LOOKS: usize = topics::ARM_MOTION.limits.buffer * topics::ARM_MOTION.limits.publishers;
+
 /// The pump's ends of the rings.
 #[derive(Debug)]
 pub struct Rings {
@@ -31,7 +35,7 @@ pub struct Rings {
     /// From the control thread.
     pub remarks: Consumer<Remark>,
     /// To the control thread.
-    pub chunks: Producer<MotionChunk>,
+    pub orders: OrderSender,
     /// From the simulated tracker, where there is one.
     pub poses: Option<Consumer<ObjectPose>>,
     /// From the main thread and the devices: texts for `/events`.
@@ -154,11 +158,12 @@ fn run(mut rings: Rings, node: &Node, ports: &Ports, stop: &AtomicBool) -> Resul
         if last_round {
             return Ok(report);
         }
-        while !rings.chunks.is_full()
-            && let Some(chunk) = ports.motion.receive()?
-        {
-            // There is room: checked above, and only this thread pushes.
-            let _pushed = rings.chunks.push(chunk);
+        rings.orders.hand_on();
+        for _ in 0..LOOKS {
+            // Everything that came is taken in at once, so that a stop does not wait behind a motion. A chunk too many is
+            // dropped; the control thread finds it missing and says so.
+            let Some(chunk) = ports.motion.receive()? else { break };
+            let _fitted = rings.orders.send(&chunk);
         }
         for ignored in node.newly_ignored() {
             say(ports, EventLevel::Warning, &ignored.to_string())?;

@@ -5,19 +5,29 @@ use proptest::prelude::*;
 use rt_bridge::motion::Player;
 use rt_bridge::rt::remark::{BrakeReason, Refusal, Remark};
 use rt_bridge::safety::{Guard, Limits, Trace, Violation, Workspace};
+use shared_mem::cell::{Cell, Robot, Table, Tool};
 use shared_mem::msg::MAX_JOINTS;
 use shared_mem::msg::arm::{ArmState, MotionStatus};
 use shared_mem::msg::motion::{CHUNK_LENGTH, MotionChunk, MotionKind, SetPoint};
+use twin::arm::ArmModel;
 
 const T: f64 = 1e-3;
 const READY: [f64; MAX_JOINTS] = [0.0, -0.785, 0.0, -2.356, 0.0, 1.571, 0.785, 0.0];
+/// The tool is the lowest part of the arm.
+const LOW: [f64; MAX_JOINTS] = [0.0, 0.3, 0.0, -2.0, 0.0, 2.3, 0.785, 0.0];
 
 fn guard() -> Guard {
-    Guard { limits: Limits::fr3(), workspace: Workspace { low: [-1.0, -1.0, 0.0], high: [1.0, 1.0, 1.5] }, period_s: T }
+    above(None)
 }
 
-fn tip(_: &[f64; MAX_JOINTS]) -> [f64; 3] {
-    [0.5, 0.0, 0.3]
+/// The guard of an FR3 with a tool over a table of this height, or none.
+fn above(table: Option<f64>) -> Guard {
+    let tool = Tool { mass: 0.25, length: 0.16, radius: 0.012 };
+    let robot = Robot { model: Some("fr3".into()), ..Robot::default() };
+    let table = table.map(|height| Table { height });
+    let cell = Cell { robot: Some(robot), tool: Some(tool), table, ..Cell::default() };
+    let workspace = Workspace::of(&cell, &ArmModel::from_cell(&cell).expect("an FR3"));
+    Guard { limits: Limits::fr3(), workspace, period_s: T }
 }
 
 fn chunks(motion_id: u64, points: &[SetPoint]) -> Vec<MotionChunk> {
@@ -59,7 +69,7 @@ fn swing(start: &[f64; MAX_JOINTS], amplitude: f64, seconds: f64) -> Vec<SetPoin
 fn run(player: &mut Player, trace: &mut Trace, cycles: usize) -> Vec<Remark> {
     let mut remarks = Vec::new();
     for _ in 0..cycles {
-        let (point, remark) = player.advance(tip);
+        let (point, remark) = player.advance();
         remarks.extend(remark);
         let next = trace.after(&point.q_d, T);
         for (i, joint) in Limits::fr3().counted().enumerate() {
@@ -112,7 +122,7 @@ fn a_sender_that_dies_leaves_the_arm_braked_and_holding() {
     assert!(player.is_at_rest());
     assert_eq!(status(&player).motion, MotionStatus::Braked);
     assert_eq!(status(&player).motion_played, 450);
-    let (held, _) = player.advance(tip);
+    let (held, _) = player.advance();
     assert_eq!(held.q_d, trace.q);
 }
 
@@ -174,9 +184,9 @@ fn a_velocity_above_the_limit_is_refused_though_the_positions_keep_it() {
     for i in 0..7 {
         point.q_d[i] += last.v[i] * T;
     }
-    assert!(guard().check(&last, &point, tip(&READY)).is_ok());
+    assert!(guard().check(&last, &point, &guard().workspace.outside(&READY)).is_ok());
     point.dq_d[0] = limits.joints[0].velocity + 1e-3;
-    assert_eq!(guard().check(&last, &point, tip(&READY)), Err(Violation::Velocity { joint: 1 }));
+    assert_eq!(guard().check(&last, &point, &guard().workspace.outside(&READY)), Err(Violation::Velocity { joint: 1 }));
 }
 
 #[test]
@@ -188,15 +198,96 @@ fn a_motion_that_ends_at_speed_is_braked() {
     assert_eq!(run(&mut player, &mut trace, 3000), [Remark::Braked { motion: 4, why: BrakeReason::EndsMoving }]);
 }
 
+/// Joint 2 forward and joint 4 along, from rest to rest: the tool comes down, or rises where `way` is negative.
+fn lowering(from: &[f64; MAX_JOINTS], way: f64, seconds: f64) -> Vec<SetPoint> {
+    let n = (seconds / T) as u32;
+    let point = |k| {
+        let x = f64::from(k) / f64::from(n);
+        let (part, slope) = (x * x * x * (10.0 - x * (15.0 - 6.0 * x)), 30.0 * (x * (1.0 - x)).powi(2) / seconds);
+        let mut point = SetPoint { q_d: *from, dq_d: [0.0; MAX_JOINTS] };
+        for (joint, share) in [(1, 1.0), (3, 0.3)] {
+            point.q_d[joint] += way * share * part;
+            point.dq_d[joint] = way * share * slope;
+        }
+        point
+    };
+    (0..=n).map(point).collect()
+}
+
+/// Height of the arm's lowest point [m].
+fn height(q: &[f64; MAX_JOINTS]) -> f64 {
+    above(Some(0.0)).workspace.room(q) + 2e-3
+}
+
 #[test]
-fn a_tip_outside_its_space_brakes() {
-    let mut player = Player::new(guard(), READY);
-    for chunk in chunks(4, &swing(&READY, 0.4, 2.0)) {
+fn an_arm_on_its_way_into_the_table_comes_to_rest_above_it_and_near_where_it_is_slow() {
+    for (seconds, near) in [(8.0, 3e-4), (2.0, 4e-3), (0.6, 3e-2)] {
+        let guard = above(Some(height(&LOW) - 0.1));
+        let (mut player, mut trace) = (Player::new(guard.clone(), LOW), Trace::at_rest(LOW));
+        for chunk in chunks(4, &lowering(&LOW, 0.5, seconds)).iter().take(80) {
+            player.take(chunk);
+        }
+        let (mut remarks, mut least) = (Vec::new(), f64::INFINITY);
+        for _ in 0..4000 {
+            remarks.extend(run(&mut player, &mut trace, 1));
+            least = least.min(guard.workspace.room(&trace.q));
+        }
+        let why = BrakeReason::Limit(Violation::Workspace);
+        assert_eq!(remarks, [Remark::Began { motion: 4 }, Remark::Braked { motion: 4, why }][1..], "{seconds} s");
+        assert!((0.0..near).contains(&least), "{seconds} s: {least} m");
+        assert!(least >= -1e-7 && player.is_at_rest());
+    }
+}
+
+#[test]
+fn an_arm_that_is_below_the_table_may_rise_and_not_sink() {
+    let guard = above(Some(height(&LOW) + 0.03));
+    let (mut player, mut trace) = (Player::new(guard.clone(), LOW), Trace::at_rest(LOW));
+    let at_first = guard.workspace.room(&LOW);
+    assert!((at_first + 0.032).abs() < 1e-9);
+    for (motion, way) in [(1, 0.2), (2, 0.2), (3, 0.2)] {
+        for chunk in chunks(motion, &lowering(&trace.q, way, 1.0)) {
+            player.take(&chunk);
+        }
+        let why = BrakeReason::Limit(Violation::Workspace);
+        assert_eq!(run(&mut player, &mut trace, 2000), [Remark::Braked { motion, why }]);
+        assert!(guard.workspace.room(&trace.q) > at_first - 1.001e-3, "{}", guard.workspace.room(&trace.q));
+    }
+    for chunk in chunks(4, &lowering(&trace.q, -0.3, 1.0)) {
         player.take(&chunk);
     }
-    let below = |q: &[f64; MAX_JOINTS]| [0.5, 0.0, if q[0] > 0.1 { -0.01 } else { 0.2 }];
-    let remark = (0..2000).find_map(|_| player.advance(below).1);
-    assert_eq!(remark, Some(Remark::Braked { motion: 4, why: BrakeReason::Limit(Violation::Workspace) }));
+    assert_eq!(run(&mut player, &mut trace, 2000), [Remark::Done { motion: 4 }]);
+    assert!(guard.workspace.room(&trace.q) > 0.0, "and it is out");
+}
+
+/// The robot goes on by itself where it is sent nothing; nobody can keep it from that, but it must not be stuck afterwards.
+#[test]
+fn an_arm_that_lost_set_points_on_its_way_down_is_braked_and_may_rise() {
+    let guard = above(Some(height(&LOW) - 0.1));
+    let (mut player, mut robot) = (Player::new(guard.clone(), LOW), Trace::at_rest(LOW));
+    for chunk in chunks(1, &lowering(&LOW, 0.5, 1.0)) {
+        player.take(&chunk);
+    }
+    let (mut periods, mut remarks) = (1, Vec::new());
+    while remarks.is_empty() {
+        player.reconcile(&robot.q.map(|q| f64::from(q as f32)), periods);
+        let (point, remark) = player.advance();
+        remarks.extend(remark);
+        robot = robot.after(&point.q_d, T);
+        // Shortly before it would have to be braked.
+        periods = if guard.workspace.room(&robot.q) < 0.032 { 20 } else { 1 };
+        robot = (1..periods).fold(robot, |trace, _| trace.onward(T));
+    }
+    let why = BrakeReason::Limit(Violation::Workspace);
+    assert_eq!(remarks, [Remark::Braked { motion: 1, why }]);
+    player.reconcile(&robot.q.map(|q| f64::from(q as f32)), periods);
+    run(&mut player, &mut robot, 1000);
+    let deepest = guard.workspace.room(&robot.q);
+    assert!(player.is_at_rest() && (-0.05..0.0).contains(&deepest), "{deepest}");
+    for chunk in chunks(2, &lowering(&robot.q, -0.3, 1.0)) {
+        player.take(&chunk);
+    }
+    assert_eq!(run(&mut player, &mut robot, 2000), [Remark::Done { motion: 2 }]);
 }
 
 #[test]
@@ -230,7 +321,7 @@ fn beyond_the_end() -> (Player, Trace, [f64; MAX_JOINTS]) {
     let (end, mut done) = (points[600].q_d, None);
     while done.is_none() {
         player.reconcile(&said(&robot), 1);
-        let (point, remark) = player.advance(tip);
+        let (point, remark) = player.advance();
         (robot, done) = (if remark.is_none() { robot.after(&point.q_d, T) } else { robot.onward(T) }, remark);
     }
     assert_eq!(done, Some(Remark::Done { motion: 1 }));
@@ -257,7 +348,7 @@ fn an_arm_on_its_way_back_to_the_end_stops_when_asked() {
     assert_eq!(player.take(&MotionChunk { kind: MotionKind::Stop, ..MotionChunk::default() }), None);
     assert_eq!(run(&mut player, &mut robot, 50), [], "sooner than the way back takes");
     assert!(player.is_at_rest() && status(&player).motion == MotionStatus::Done);
-    let (held, _) = player.advance(tip);
+    let (held, _) = player.advance();
     assert_eq!(held.q_d, robot.q);
 }
 
@@ -280,7 +371,7 @@ proptest! {
         for _ in 0..4000 {
             let said = robot.q.map(|q| f64::from(q as f32));
             player.reconcile(&said, periods);
-            let (point, remark) = player.advance(tip);
+            let (point, remark) = player.advance();
             done |= remark.is_some_and(|r| matches!(r, Remark::Done { .. }));
             prop_assert!(remark.is_none_or(|r| matches!(r, Remark::Done { .. })), "{:?}", remark);
             let (mut came, mut missed) = (true, 0);

@@ -1,4 +1,5 @@
 //! The control loop after a reflex: it takes command again when it is asked to, and never after a stop that a person pressed.
+//! And after a `Stop`, which goes before everything that waits.
 #![allow(missing_docs)]
 
 mod bench;
@@ -6,7 +7,7 @@ mod bench;
 use bench::Bench;
 use rt_bridge::arm::{Arm, ArmFault, Clock, Desired, Read, ReflexErrors};
 use rt_bridge::rt::cycle::Turn;
-use rt_bridge::rt::remark::Remark;
+use rt_bridge::rt::remark::{BrakeReason, Remark};
 use shared_mem::cell::{Cell, Robot};
 use shared_mem::msg::arm::{ArmCommand, ArmMode, ArmState, CommandInterface, MotionStatus};
 use shared_mem::msg::motion::{MotionChunk, MotionKind, SetPoint};
@@ -114,7 +115,25 @@ impl Bridge {
     fn send(&mut self, motion_id: u64, kind: MotionKind) {
         let mut chunk = MotionChunk { motion_id, kind, length: 50, dof: 7, ..MotionChunk::default() };
         chunk.set_points = [SetPoint { q_d: self.last.q_d, dq_d: [0.0; 8] }; 50];
-        self.bench.chunks.push(chunk).expect("room");
+        assert!(self.bench.orders.send(&chunk), "room");
+    }
+
+    /// Sends chunk `index` of a motion that swings the last joint, for ever.
+    fn send_swing(&mut self, motion_id: u64, index: u32) -> bool {
+        let mut chunk = MotionChunk { motion_id, index, length: 50, dof: 7, ..MotionChunk::default() };
+        for (k, point) in (50 * index..).zip(&mut chunk.set_points) {
+            // 0.1 (1 - cos wt)^2 rad at w = 2 rad/s: begins at rest.
+            let (sin, cos) = (2e-3 * f64::from(k)).sin_cos();
+            *point = SetPoint { q_d: READY, dq_d: [0.0; 8] };
+            point.q_d[6] += 0.1 * (1.0 - cos) * (1.0 - cos);
+            point.dq_d[6] = 0.4 * (1.0 - cos) * sin;
+        }
+        self.bench.orders.send(&chunk)
+    }
+
+    fn send_stop(&mut self, motion_id: u64) {
+        let stop = MotionChunk { motion_id, kind: MotionKind::Stop, ..MotionChunk::default() };
+        assert!(self.bench.orders.send(&stop), "a stop needs no room");
     }
 
     fn told(&mut self) -> Vec<Remark> {
@@ -153,4 +172,59 @@ fn nobody_recovers_an_arm_that_is_well_or_that_a_person_stopped() {
     assert_eq!(bridge.turn(20), 0);
     assert_eq!(bridge.script.recoveries.load(Ordering::Relaxed), 0);
     assert!(!bridge.told().contains(&Remark::Recovered));
+}
+
+/// 4 s of set points in the player and 6 s in the ring before it: that long a stop would wait if it waited its turn.
+#[test]
+fn a_stop_brakes_in_the_next_cycle_whatever_is_queued_and_whoever_sends_it() {
+    let mut bridge = Bridge::new();
+    bridge.turn(5);
+    let mut sent = 0;
+    while bridge.send_swing(1, sent) {
+        sent += 1;
+    }
+    bridge.turn(600);
+    while bridge.send_swing(1, sent) {
+        sent += 1;
+    }
+    assert!(bridge.last.motion_queued > 3900 && bridge.last.dq_d[6].abs() > 0.1, "{:?}", bridge.last);
+    // Another sender, which knows nothing of the motion.
+    bridge.send_stop(0);
+    bridge.turn(1);
+    assert_eq!((bridge.last.motion, bridge.last.motion_queued), (MotionStatus::Braked, 0));
+    let mut speed = bridge.last.dq_d[6].abs();
+    for _ in 0..200 {
+        bridge.turn(1);
+        assert!(bridge.last.dq_d[6].abs() <= speed);
+        speed = bridge.last.dq_d[6].abs();
+    }
+    assert!(speed == 0.0 && bridge.bench.orders.is_empty(), "at rest, and nothing of the motion is left");
+    assert!(bridge.send_swing(1, sent), "what its sender still sends is dropped");
+    bridge.turn(5);
+    let why = BrakeReason::Asked;
+    assert_eq!(bridge.told(), [Remark::Began { motion: 1 }, Remark::Braked { motion: 1, why }]);
+    bridge.send(2, MotionKind::Last);
+    bridge.turn(60);
+    assert_eq!((bridge.last.motion_id, bridge.last.motion), (2, MotionStatus::Done));
+}
+
+#[test]
+fn a_motion_that_was_sent_before_a_stop_does_not_begin_after_it() {
+    let mut bridge = Bridge::new();
+    bridge.turn(5);
+    assert!(bridge.send_swing(1, 0));
+    bridge.send_stop(1);
+    assert!(bridge.send_swing(1, 1), "sent by somebody who does not know of the stop yet");
+    bridge.turn(30);
+    assert_eq!((bridge.last.motion_id, bridge.last.motion, bridge.last.q_d), (1, MotionStatus::Braked, READY));
+    assert_eq!(bridge.told(), [Remark::Braked { motion: 1, why: BrakeReason::Asked }]);
+    bridge.send_stop(0);
+    bridge.turn(5);
+    bridge.send(2, MotionKind::Last);
+    bridge.turn(60);
+    assert_eq!(
+        (bridge.last.motion_id, bridge.last.motion),
+        (2, MotionStatus::Done),
+        "a stop stops what was, not what comes"
+    );
 }

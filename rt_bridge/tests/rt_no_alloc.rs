@@ -54,7 +54,7 @@ impl Bridge {
             for (k, point) in chunk.set_points.iter_mut().enumerate() {
                 *point = swing(&self.last, index as usize * CHUNK_LENGTH + k);
             }
-            self.bench.chunks.push(chunk).expect("room for a second of motion");
+            assert!(self.bench.orders.send(&chunk), "room for a second of motion");
         }
     }
 }

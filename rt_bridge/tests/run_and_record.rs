@@ -1,10 +1,14 @@
-//! A whole run of the program on the simulated cell: what it records can be read and replayed, a second bridge is refused,
-//! and Ctrl-C ends it in order. Each test has its own domain of shared memory.
+//! A whole run of the program on the simulated cell: what it records can be read and replayed, a stop overtakes what is queued,
+//! a second bridge is refused, and Ctrl-C ends it in order. Each test has its own domain of shared memory.
 #![allow(missing_docs)]
 
 use rt_bridge::rt::process::ask_to_end;
 use serde_json::Value;
+use shared_mem::msg::arm::{ArmState, MotionStatus};
+use shared_mem::msg::motion::{MotionChunk, MotionKind, SetPoint};
 use shared_mem::recording::{ClipMessages, Payload, read_arm_states};
+use shared_mem::topics::{ARM_MOTION, ARM_STATE};
+use shared_mem::transport::{Node, Subscriber};
 use std::path::Path;
 use std::process::{Child, Command, Output, Stdio};
 use std::time::Duration;
@@ -118,6 +122,62 @@ fn a_running_bridge_passes_orders_on_to_its_gripper() {
     ask_to_end(bridge.id()).expect("it still runs");
     let (output, _) = end(bridge);
     assert!(output.status.success(), "{}", said(&output));
+}
+
+/// Waits for the newest state that `wanted` likes.
+fn wait_for(states: &Subscriber<ArmState>, wanted: impl Fn(&ArmState) -> bool) -> ArmState {
+    for _ in 0..6000 {
+        if let Some(state) = states.newest().expect("shared memory").filter(&wanted) {
+            return state;
+        }
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    panic!("not within half a minute");
+}
+
+/// The last joint swings by `0.1 (1 - cos wt)^2` rad at `w` = 2 rad/s: begins at rest.
+fn swing(from: &ArmState, index: u32) -> MotionChunk {
+    let mut chunk = MotionChunk { motion_id: 7, index, length: 50, dof: 7, ..MotionChunk::default() };
+    for (k, point) in (50 * index..).zip(&mut chunk.set_points) {
+        let (sin, cos) = (2e-3 * f64::from(k)).sin_cos();
+        *point = SetPoint { q_d: from.q_d, dq_d: [0.0; 8] };
+        point.q_d[6] += 0.1 * (1.0 - cos) * (1.0 - cos);
+        point.dq_d[6] = 0.4 * (1.0 - cos) * sin;
+    }
+    chunk
+}
+
+#[test]
+fn a_stop_of_another_sender_overtakes_a_motion_that_fills_every_queue() {
+    let bridge = start("stop", &["--arm", "sim", "--camera", "off", "--duration", "60"]);
+    let node = Node::open_in(&format!("stop{}", std::process::id()), "a test").expect("shared memory");
+    let states = node.subscriber(ARM_STATE).expect("a place");
+    let (motions, stops) = (node.publisher(ARM_MOTION).expect("a place"), node.publisher(ARM_MOTION).expect("a place"));
+    let held = wait_for(&states, |_| true);
+    // 81 chunks fit into the player's queue and 80 before it; the bridge takes a chunk a cycle.
+    for index in 0..160 {
+        motions.send(&swing(&held, index)).expect("shared memory");
+        std::thread::sleep(Duration::from_millis(3));
+    }
+    let full = wait_for(&states, |state| state.motion_queued > 3900);
+    assert_eq!(full.motion, MotionStatus::Playing);
+    // More than shared memory keeps, as fast as it goes: the oldest of them are lost, and the stop is not.
+    let flood = || (160..300).for_each(|index| motions.send(&swing(&held, index)).expect("shared memory"));
+    flood();
+    stops.send(&MotionChunk { kind: MotionKind::Stop, ..MotionChunk::default() }).expect("shared memory");
+    flood();
+    let braked = wait_for(&states, |state| state.motion == MotionStatus::Braked);
+    // Not in its turn, which would be some 4000 cycles later; a busy machine takes its time to hand it over.
+    assert!(braked.motion_played < full.motion_played + 1000, "{} after {}", braked.motion_played, full.motion_played);
+    let rests = wait_for(&states, |state| state.motion == MotionStatus::Braked && state.dq_d[6] == 0.0);
+    assert_eq!((rests.motion_id, rests.motion_queued), (7, 0));
+    motions.send(&swing(&held, 160)).expect("shared memory");
+    let later = wait_for(&states, |state| state.cycle > rests.cycle + 100);
+    assert_eq!((later.motion, later.q_d), (MotionStatus::Braked, rests.q_d));
+    ask_to_end(bridge.id()).expect("it still runs");
+    let (output, _) = end(bridge);
+    assert!(output.status.success(), "{}", said(&output));
+    assert!(!said(&output).contains("refused"), "{}", said(&output));
 }
 
 #[test]

@@ -1,24 +1,17 @@
-//! From any admitted motion to rest, inside acceleration and jerk limits, each joint as fast as it can.
-//!
-//! Planned once by `rsruckig` (velocity interface, target 0), then sampled each cycle. Should planning fail, the arm is
-//! slowed by a constant deceleration instead: rougher, but it stops.
+//! From any admitted motion to rest, inside acceleration and jerk limits, each joint as fast as it can: the way that the
+//! guard looked along when it admitted the motion.
 
-use crate::safety::{Limits, Trace};
-use rsruckig::prelude::*;
+use crate::safety::{Limits, Stopping, Trace};
+use shared_mem::msg::MAX_JOINTS;
 use shared_mem::msg::motion::SetPoint;
-use shared_mem::msg::{Joints, MAX_JOINTS};
 
-/// A stop in progress. Holds its planner: made once, before the loop, because that allocates.
+/// A stop in progress.
 #[derive(Debug)]
 pub struct Brake {
-    planner: Ruckig<MAX_JOINTS, IgnoreErrorHandler>,
-    input: InputParameter<MAX_JOINTS>,
-    plan: Trajectory<MAX_JOINTS>,
+    way: Stopping,
     limits: Limits,
     period_s: f64,
-    elapsed_s: f64,
-    planned: bool,
-    last: SetPoint,
+    periods: u32,
 }
 
 /// One cycle of a stop.
@@ -31,111 +24,70 @@ pub struct BrakeStep {
 }
 
 impl Brake {
-    /// A brake for an arm with `limits`. Allocates.
+    /// A brake for an arm with `limits`, at rest.
     #[must_use]
     pub fn new(limits: Limits, period_s: f64) -> Self {
-        let mut input = InputParameter::new(None);
-        input.control_interface = ControlInterface::Velocity;
-        input.synchronization = Synchronization::None;
-        for (i, joint) in limits.joints.iter().enumerate() {
-            input.max_acceleration[i] = joint.acceleration;
-            input.max_jerk[i] = joint.jerk;
-            input.max_velocity[i] = 1e3; // not used by the velocity interface, but validated
-        }
-        Self {
-            planner: Ruckig::new(None, period_s),
-            input,
-            plan: Trajectory::new(None),
-            limits,
-            period_s,
-            elapsed_s: 0.0,
-            planned: false,
-            last: SetPoint::default(),
-        }
+        let way = Stopping::of(&Trace::at_rest([0.0; MAX_JOINTS]), &limits, period_s);
+        Self { way, limits, period_s, periods: 0 }
     }
 
-    /// Plans the stop of what moves as `trace`. Its numbers must be finite.
+    /// Begins the stop of what moves as `trace`. Its numbers must be finite.
     pub fn begin(&mut self, trace: &Trace) {
-        self.elapsed_s = 0.0;
-        self.last = SetPoint { q_d: trace.q, dq_d: [0.0; MAX_JOINTS] };
-        for (i, joint) in self.limits.joints.iter().enumerate().take(self.limits.dof) {
-            let velocity = trace.velocity_now(i, self.period_s);
-            self.input.current_position[i] = trace.q[i];
-            self.input.current_velocity[i] = velocity;
-            self.input.current_acceleration[i] = trace.a[i].clamp(-joint.acceleration, joint.acceleration);
-            self.last.dq_d[i] = velocity;
-        }
-        self.planned = matches!(self.planner.calculate(&self.input, &mut self.plan), Ok(RuckigResult::Working));
+        (self.way, self.periods) = (Stopping::of(trace, &self.limits, self.period_s), 0);
     }
 
     /// The next set point of the stop.
     pub fn step(&mut self) -> BrakeStep {
-        if self.planned {
-            self.elapsed_s += self.period_s;
-            if let Some(step) = self.sample() {
-                self.last = step.point;
-                return step;
-            }
-            self.planned = false;
-        }
-        self.ramp()
-    }
-
-    /// The plan at the present moment; `None` when its numbers are not finite.
-    fn sample(&self) -> Option<BrakeStep> {
-        let mut q = DataArrayOrVec::Stack([0.0; MAX_JOINTS]);
-        let mut v = DataArrayOrVec::Stack([0.0; MAX_JOINTS]);
-        self.plan.at_time(self.elapsed_s, &mut Some(&mut q), &mut Some(&mut v), &mut None, &mut None, &mut None);
-        let mut point = SetPoint::default();
-        for i in 0..self.limits.dof {
-            point.q_d[i] = *q.get(i)?;
-            point.dq_d[i] = *v.get(i)?;
-        }
-        let finite = |values: &Joints| values.iter().all(|x| x.is_finite());
-        // Two periods beyond the plan's end, so that differences of the commanded positions have come to rest as well.
-        let at_rest = self.elapsed_s > self.plan.get_duration() + 2.0 * self.period_s;
-        if at_rest {
-            point.dq_d = [0.0; MAX_JOINTS];
-        }
-        (finite(&point.q_d) && finite(&point.dq_d)).then_some(BrakeStep { point, at_rest })
-    }
-
-    /// Constant deceleration from the last set point.
-    fn ramp(&mut self) -> BrakeStep {
-        let mut at_rest = true;
-        for (i, joint) in self.limits.joints.iter().enumerate().take(self.limits.dof) {
-            let before = self.last.dq_d[i];
-            let change = joint.acceleration * self.period_s;
-            let after = before - before.clamp(-change, change);
-            self.last.dq_d[i] = after;
-            self.last.q_d[i] += 0.5 * (before + after) * self.period_s;
-            at_rest &= before == 0.0;
-        }
-        BrakeStep { point: self.last, at_rest }
+        self.periods = self.periods.saturating_add(1);
+        let t = f64::from(self.periods) * self.period_s;
+        let moment = self.way.at(t);
+        // Two periods beyond the end, so that differences of the commanded positions have come to rest as well.
+        let at_rest = t > self.way.duration() + 2.0 * self.period_s;
+        BrakeStep { point: SetPoint { q_d: moment.q, dq_d: moment.dq }, at_rest }
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use proptest::prelude::*;
+    use rsruckig::prelude::*;
 
-    #[test]
-    fn without_a_plan_the_ramp_stops_within_the_acceleration_limit() {
-        let mut brake = Brake::new(Limits::fr3(), 1e-3);
-        let trace = Trace { v: [0.7; MAX_JOINTS], ..Trace::at_rest([0.1; MAX_JOINTS]) };
-        brake.begin(&trace);
-        brake.planned = false;
-        let mut last = 0.7;
-        for _ in 0..200 {
-            let step = brake.step();
-            assert!((step.point.dq_d[3] - last).abs() <= 10.0 * 1e-3 + 1e-12);
-            last = step.point.dq_d[3];
-            if step.at_rest {
-                // v² / 2a = 24.5 mm of angle
-                assert!((step.point.q_d[3] - 0.1 - 0.0245).abs() < 1e-9);
-                return;
+    const T: f64 = 1e-3;
+
+    /// The stop of one joint by a library that plans between any two states.
+    fn planned(v: f64, a: f64, joint: &crate::safety::JointLimits) -> Trajectory<1> {
+        let mut input = InputParameter::<1>::new(None);
+        input.control_interface = ControlInterface::Velocity;
+        (input.current_velocity[0], input.current_acceleration[0]) = (v, a);
+        (input.max_velocity[0], input.max_acceleration[0], input.max_jerk[0]) = (1e3, joint.acceleration, joint.jerk);
+        let (mut planner, mut plan) = (Ruckig::<1, IgnoreErrorHandler>::new(None, T), Trajectory::new(None));
+        assert!(matches!(planner.calculate(&input, &mut plan), Ok(RuckigResult::Working)));
+        plan
+    }
+
+    proptest! {
+        #[test]
+        fn each_joint_takes_the_fastest_way_to_rest(v in -5.0..5.0_f64, a in -10.0..10.0_f64) {
+            let limits = Limits::fr3();
+            let mut trace = Trace::at_rest([0.0; MAX_JOINTS]);
+            (trace.v[2], trace.a[2]) = (v - 0.5 * T * a, a);
+            let plan = planned(v, a, &limits.joints[2]);
+            let mut brake = Brake::new(limits, T);
+            brake.begin(&trace);
+            let mut t = 0.0;
+            loop {
+                let step = brake.step();
+                t += T;
+                let (mut q, mut dq) = (DataArrayOrVec::Stack([0.0]), DataArrayOrVec::Stack([0.0]));
+                plan.at_time(t, &mut Some(&mut q), &mut Some(&mut dq), &mut None, &mut None, &mut None);
+                let (off, off_speed) = (step.point.q_d[2] - q[0], step.point.dq_d[2] - dq[0]);
+                prop_assert!(off.abs() < 1e-9 && off_speed.abs() < 1e-9, "after {} s: {} and {}", t, off, off_speed);
+                if step.at_rest {
+                    break;
+                }
             }
+            prop_assert!(t < plan.get_duration() + 4.0 * T);
         }
-        panic!("still moving after 0.2 s");
     }
 }

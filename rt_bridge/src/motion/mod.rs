@@ -7,7 +7,7 @@
 //! | `lost` | what the arm is told to do where set points came too late |
 //! | `ease` | from there back to the plan |
 //! | [`brake`] | from any admitted motion to rest inside the limits |
-//! | [`reach`] | from any motion to a target that may change (with `brake` the only `rsruckig` code) |
+//! | [`reach`] | from any motion to a target that may change (the only `rsruckig` code) |
 
 pub mod brake;
 mod ease;

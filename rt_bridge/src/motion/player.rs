@@ -10,7 +10,7 @@
 use super::ease::Ease;
 use super::{Brake, lost};
 use crate::rt::remark::{BrakeReason, Refusal, Remark};
-use crate::safety::{Guard, Trace};
+use crate::safety::{Guard, Outside, Trace};
 use shared_mem::msg::arm::{ArmState, MotionStatus};
 use shared_mem::msg::motion::{CHUNK_LENGTH, MotionChunk, MotionKind, SetPoint};
 use shared_mem::msg::{Joints, MAX_JOINTS};
@@ -39,6 +39,8 @@ pub struct Player {
     /// What is played, as it was planned, or where the arm is held; and how far off that it still is.
     planned: Trace,
     ease: Ease,
+    /// How far outside the workspace the arm was when it last rested.
+    outside: Outside,
     queue: Queue,
     activity: Activity,
     status: MotionStatus,
@@ -56,6 +58,7 @@ impl Player {
     pub fn new(guard: Guard, q_d: Joints) -> Self {
         Self {
             brake: Brake::new(guard.limits, guard.period_s),
+            outside: guard.workspace.outside(&q_d),
             guard,
             trace: Trace::at_rest(q_d),
             before: Trace::at_rest(q_d),
@@ -78,6 +81,7 @@ impl Player {
         self.trace = Trace::at_rest(q_d);
         (self.before, self.activity) = (self.trace, Activity::Holding);
         (self.planned, self.ease) = (self.trace, Ease::over());
+        self.outside = self.guard.workspace.outside(&q_d);
     }
 
     /// The arm says that it is told to be at `in_force`, `periods` after the state that the last set point answered. Where
@@ -126,7 +130,7 @@ impl Player {
                 Err(why) => self.stop(BrakeReason::Chunk(why)),
             };
         }
-        if chunk.motion_id != 0 && chunk.motion_id == self.dropped_motion {
+        if self.is_dropped(chunk.motion_id) {
             return None;
         }
         match self.startable(chunk) {
@@ -145,6 +149,25 @@ impl Player {
                 Some(Remark::Refused { motion: chunk.motion_id, why })
             }
         }
+    }
+
+    /// A chunk that was sent before a stop which overtook it: it is not played. Returns what there is to say about a motion
+    /// that was to begin with it.
+    pub fn discard(&mut self, chunk: &MotionChunk) -> Option<Remark> {
+        let motion = chunk.motion_id;
+        if motion == 0 || motion == self.motion || self.is_dropped(motion) {
+            return None;
+        }
+        self.dropped_motion = motion;
+        if self.activity == Activity::Holding {
+            (self.motion, self.played, self.status) = (motion, 0, MotionStatus::Braked);
+        }
+        Some(Remark::Braked { motion, why: BrakeReason::Asked })
+    }
+
+    fn is_dropped(&self, motion: u64) -> bool {
+        let braked = self.status == MotionStatus::Braked && motion == self.motion;
+        motion != 0 && (motion == self.dropped_motion || braked)
     }
 
     /// Brakes what is being played, or the way back to where the arm is held, of which nothing is told; nothing when it rests.
@@ -174,14 +197,14 @@ impl Player {
         })
     }
 
-    /// The set point of this cycle. `tip` gives the tool tip of joint positions, base frame [m].
-    pub fn advance(&mut self, tip: impl Fn(&Joints) -> [f64; 3]) -> (SetPoint, Option<Remark>) {
+    /// The set point of this cycle.
+    pub fn advance(&mut self) -> (SetPoint, Option<Remark>) {
         self.before = self.trace;
         match self.activity {
-            Activity::Holding if !self.ease.is_over() => (self.settle(tip), None),
+            Activity::Holding if !self.ease.is_over() => (self.settle(), None),
             Activity::Holding | Activity::Halted => (self.hold(), None),
             Activity::Braking => (self.braked(), None),
-            Activity::Playing => self.play(tip),
+            Activity::Playing => self.play(),
         }
     }
 
@@ -193,7 +216,7 @@ impl Player {
         state.motion = self.status;
     }
 
-    fn play(&mut self, tip: impl Fn(&Joints) -> [f64; 3]) -> (SetPoint, Option<Remark>) {
+    fn play(&mut self) -> (SetPoint, Option<Remark>) {
         let (mut point, at_end) = match self.queue.pop() {
             Some(point) => (point, false),
             None if self.has_last => (SetPoint { q_d: self.planned.q, dq_d: [0.0; MAX_JOINTS] }, self.ease.is_over()),
@@ -204,10 +227,11 @@ impl Player {
         };
         self.planned = self.planned.after(&point.q_d, self.guard.period_s);
         self.ease_back(&mut point);
-        match self.guard.check(&self.trace, &point, tip(&point.q_d)) {
+        match self.guard.check(&self.trace, &point, &self.outside) {
             Ok(_) if at_end => {
                 (self.activity, self.status) = (Activity::Holding, MotionStatus::Done);
                 self.planned = Trace::at_rest(self.planned.q);
+                self.rest();
                 (self.hold(), Some(Remark::Done { motion: self.motion }))
             }
             Ok(next) => {
@@ -224,12 +248,15 @@ impl Player {
     }
 
     /// Holds, and is not yet where it is held.
-    fn settle(&mut self, tip: impl Fn(&Joints) -> [f64; 3]) -> SetPoint {
+    fn settle(&mut self) -> SetPoint {
         let mut point = SetPoint { q_d: self.planned.q, dq_d: [0.0; MAX_JOINTS] };
         self.ease_back(&mut point);
-        match self.guard.check(&self.trace, &point, tip(&point.q_d)) {
+        match self.guard.check(&self.trace, &point, &self.outside) {
             Ok(next) => {
                 self.trace = next;
+                if self.ease.is_over() {
+                    self.rest();
+                }
                 point
             }
             Err(violation) => {
@@ -257,8 +284,14 @@ impl Player {
         if step.at_rest {
             self.activity = Activity::Holding;
             (self.planned, self.ease) = (Trace::at_rest(self.trace.q), Ease::over());
+            self.rest();
         }
         step.point
+    }
+
+    /// The arm came to rest where it is commanded to be.
+    fn rest(&mut self) {
+        self.outside = self.guard.workspace.outside_after(&self.trace.q, &self.outside);
     }
 
     fn hold(&mut self) -> SetPoint {

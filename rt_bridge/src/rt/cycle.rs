@@ -7,19 +7,20 @@
 //! | commanding | the arm follows us; a fault ends it, states go on being read; a reflex may be recovered from |
 
 use super::law::TorquePd;
+use super::orders::Orders;
 use super::remark::{BrakeReason, Remark};
 use super::stats::{ArrivalLine, LoopStats};
 use crate::arm::{Arm, ArmFault, Clock, Desired, PERIOD_NS, Read};
 use crate::motion::Player;
 use crate::rt::deadline::Wake;
 use crate::safety::{Limits, TorqueGuard, Watchdog, watchdog::LONGEST_SILENCE_NS};
-use rtrb::{Consumer, Producer};
+use rtrb::Producer;
 use shared_mem::msg::arm::{ArmCommand, ArmMode, ArmState, CommandInterface};
-use shared_mem::msg::motion::{MotionChunk, MotionKind, SetPoint};
+use shared_mem::msg::motion::{MotionKind, SetPoint};
 use shared_mem::msg::{Joints, MAX_JOINTS};
 use shared_mem::time::now_ns;
 use std::thread::Thread;
-use twin::arm::{ArmModel, JointState};
+use twin::arm::JointState;
 
 /// What a cycle leaves for the pump.
 #[derive(Debug, Clone, Copy)]
@@ -37,8 +38,8 @@ pub struct Link {
     pub beats: Producer<Beat>,
     /// Things to tell.
     pub remarks: Producer<Remark>,
-    /// Motions to play.
-    pub chunks: Consumer<MotionChunk>,
+    /// Motions to play, and stops.
+    pub orders: Orders,
     /// Woken after each beat.
     pub pump: Thread,
 }
@@ -59,10 +60,6 @@ pub struct Plan {
     pub interface: CommandInterface,
     /// The law of [`CommandInterface::Torque`]; not used otherwise.
     pub law: Option<TorquePd>,
-    /// Kinematics of the nominal arm, for the tool tip.
-    pub model: ArmModel,
-    /// Centre of the tip's cap behind the end of the tool [m].
-    pub tip_radius: f64,
     /// Joint limits.
     pub limits: Limits,
     /// Drawn at the start of the bridge.
@@ -242,9 +239,9 @@ impl Cycle {
         {
             self.fail(ArmFault::BadState { joint });
         }
-        self.take_chunk();
+        self.take_orders();
         self.reconcile();
-        let (point, remark) = self.player.advance(|q| tip_of(&self.plan, q));
+        let (point, remark) = self.player.advance();
         if let Some(remark) = remark {
             self.tell(remark);
         }
@@ -300,9 +297,17 @@ impl Cycle {
         }
     }
 
-    fn take_chunk(&mut self) {
+    /// Takes in what was sent: a stop at once, whatever waits before it; of the rest a chunk a cycle, where there is room.
+    fn take_orders(&mut self) {
+        if self.link.orders.is_stopped() {
+            self.to_recover = false;
+            self.player.stop(BrakeReason::Asked).into_iter().for_each(|remark| self.tell(remark));
+            while let Some(chunk) = self.link.orders.overtaken() {
+                self.player.discard(&chunk).into_iter().for_each(|remark| self.tell(remark));
+            }
+        }
         if self.player.has_room()
-            && let Ok(chunk) = self.link.chunks.pop()
+            && let Some(chunk) = self.link.orders.take()
         {
             self.to_recover = chunk.kind == MotionKind::Recover;
             let remark = if self.to_recover { None } else { self.player.take(&chunk) };
@@ -384,13 +389,4 @@ impl Cycle {
         let bad = (0..self.arm.dof().min(MAX_JOINTS)).find(|i| !(good(&self.state.q, *i) && good(&self.state.dq, *i)));
         bad.map(|i| u8::try_from(i + 1).unwrap_or(u8::MAX))
     }
-}
-
-/// Centre of the tip's cap in the base frame [m]; far above any table where the model has no geometry.
-fn tip_of(plan: &Plan, q: &Joints) -> [f64; 3] {
-    if !plan.model.has_geometry() {
-        return [0.0, 0.0, 1.0];
-    }
-    let tip = plan.model.tip(q);
-    tip.transform_point(&[0.0, 0.0, -plan.tip_radius].into()).into()
 }

@@ -8,6 +8,7 @@
 //! | [`cycle`] | one turn: read, check, command, hand to the pump |
 //! | [`deadline`] | the timer's grid |
 //! | [`law`] | the joint-impedance law |
+//! | [`orders`] | motions and stops on their way to the loop |
 //! | [`remark`] | what there is to tell, as numbers |
 //! | [`stats`] | how well time was kept |
 //! | [`process`] | what is asked of Linux (the only `unsafe`) |
@@ -17,6 +18,7 @@ pub mod control;
 pub mod cycle;
 pub mod deadline;
 pub mod law;
+pub mod orders;
 pub mod process;
 pub mod remark;
 pub mod stats;

@@ -7,7 +7,7 @@ use crate::fr3;
 use crate::replay::{ReplayArm, ReplayClock};
 use crate::rt::cycle::Plan;
 use crate::rt::law::TorquePd;
-use crate::safety::Limits;
+use crate::safety::{Limits, Workspace};
 use crate::sim::{World, hidden};
 use crate::tracker::TrackerChoice;
 use crate::wrench::WrenchChoice;
@@ -113,6 +113,7 @@ impl fmt::Display for CameraChoice {
 pub(super) struct Devices {
     pub(super) arm: Box<dyn Arm>,
     pub(super) plan: Plan,
+    pub(super) workspace: Workspace,
     pub(super) world: Option<World>,
     pub(super) pictures: Pictures,
     /// From the simulated tracker, or of the recording, unless another one tracks. They come with the camera off, too.
@@ -147,6 +148,7 @@ impl Devices {
         }
         let hidden = hidden::read(settings.parameters.as_deref(), settings.effects.as_deref())?;
         let plan = plan(settings, cell, &model, hidden.as_ref())?;
+        let workspace = Workspace::of(cell, &model);
         let camera = settings.camera(cell)?;
         let tracker = settings.tracker(cell)?;
         let devices = match &settings.arm {
@@ -162,6 +164,7 @@ impl Devices {
                 Self {
                     arm: Box::new(arm),
                     plan,
+                    workspace,
                     world: Some(world),
                     pictures: match camera {
                         CameraChoice::Sim => Pictures::Scenes(views.scenes, views.camera_effects),
@@ -174,7 +177,7 @@ impl Devices {
             ArmChoice::Fci(host) => {
                 let arm = fr3::connect(host, settings.realtime, cell)?;
                 let pictures = Pictures::beside_the_arm(camera);
-                Self { arm, plan, world: None, pictures, poses: None, wrenches: None }
+                Self { arm, plan, workspace, world: None, pictures, poses: None, wrenches: None }
             }
             ArmChoice::Replay(clip) => {
                 let (arm, poses, clock) = ReplayArm::open(clip, cell, &model)?;
@@ -183,7 +186,7 @@ impl Devices {
                     other => Pictures::beside_the_arm(other),
                 };
                 let poses = (tracker == TrackerChoice::Replay).then_some(poses);
-                Self { arm: Box::new(arm), plan, world: None, pictures, poses, wrenches: None }
+                Self { arm: Box::new(arm), plan, workspace, world: None, pictures, poses, wrenches: None }
             }
         };
         let (has, described) = (devices.arm.dof(), model.dof());
@@ -225,8 +228,6 @@ fn plan(settings: &Settings, cell: &Cell, model: &ArmModel, hidden: Option<&Thet
     Ok(Plan {
         interface: if law.is_some() { CommandInterface::Torque } else { CommandInterface::JointPosition },
         law,
-        model: model.clone(),
-        tip_radius: cell.tool.as_ref().map_or(0.0, |tool| tool.radius),
         limits: Limits::of(cell, model),
         session,
     })

@@ -16,8 +16,9 @@ use crate::recorder::child::{Change, RecorderChild};
 use crate::rt::Realtime;
 use crate::rt::control;
 use crate::rt::cycle::{Cycle, Link, Plan};
+use crate::rt::orders::orders;
 use crate::rt::stats::LoopStats;
-use crate::safety::{Guard, Workspace};
+use crate::safety::Guard;
 use crate::tracker::{self, TrackerChoice};
 use crate::wrench::{self, WrenchChoice};
 use anyhow::{Result, bail, ensure};
@@ -39,6 +40,8 @@ use std::time::{Duration, Instant};
 const BEATS: usize = 4096;
 /// Chunks that can wait for the control thread, beside the set points in its own queue.
 const CHUNKS: usize = 16;
+/// Chunks that can wait before those: what a sender may be ahead beyond the 4 s of the control thread's queue.
+const HELD_CHUNKS: usize = 64;
 /// Remarks that can wait for the pump.
 const REMARKS: usize = 64;
 /// How often the main thread looks after the others.
@@ -200,9 +203,9 @@ pub fn run(settings: &Settings, stop: &Arc<AtomicBool>) -> Result<RunReport> {
 
     let (to_pump, beats) = RingBuffer::new(BEATS);
     let (to_words, remarks) = RingBuffer::new(REMARKS);
-    let (to_control, chunks) = RingBuffer::new(CHUNKS);
+    let (to_control, orders) = orders(CHUNKS, HELD_CHUNKS);
     let (notices, told) = mpsc::channel();
-    let pump = Pump::start(Rings { beats, remarks, chunks: to_control, poses: devices.poses, notices: told })?;
+    let pump = Pump::start(Rings { beats, remarks, orders: to_control, poses: devices.poses, notices: told })?;
     let recorder = match &settings.record {
         Some(file) => {
             let events = node.subscriber(topics::EVENTS)?;
@@ -227,9 +230,9 @@ pub fn run(settings: &Settings, stop: &Arc<AtomicBool>) -> Result<RunReport> {
         TrackerChoice::Rgbd => Some(tracker::serve(&cell, notices.clone())?),
         _ => None,
     };
-    let guard = Guard { limits: devices.plan.limits, workspace: Workspace::of(&cell), period_s: 1e-3 };
+    let guard = Guard { limits: devices.plan.limits, workspace: devices.workspace, period_s: 1e-3 };
     let player = Player::new(guard, joints_from(&[]));
-    let link = Link { beats: to_pump, remarks: to_words, chunks, pump: pump.thread() };
+    let link = Link { beats: to_pump, remarks: to_words, orders, pump: pump.thread() };
     let cycle = Cycle::new(devices.arm, devices.plan, player, link);
 
     let mut watch = Watch { node, recorder, notices, faults: Vec::new() };

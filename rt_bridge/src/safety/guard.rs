@@ -1,7 +1,8 @@
 //! The verdict on the next set point. A set point is admitted when it lies inside every limit *and* braking from it, as
-//! [`super::Brake`] does it, stays inside them too: so whatever comes next, there is always a way to stop.
+//! [`crate::motion::Brake`] does it, stays inside them too, and arm and tool inside the workspace all the way: so whatever
+//! comes next, there is always a way to stop. A set point that is not admitted leaves the way from the one before it.
 
-use super::{JointLimits, Limits, Trace, Workspace};
+use super::{JointLimits, Limits, Outside, Trace, Workspace};
 use shared_mem::msg::motion::SetPoint;
 use std::fmt;
 
@@ -45,7 +46,7 @@ pub enum Violation {
         /// The joint.
         joint: u8,
     },
-    /// The tool tip would leave the space it may be in.
+    /// Arm or tool would leave the space they may be in, here or on the way to a stop.
     Workspace,
 }
 
@@ -58,33 +59,35 @@ impl fmt::Display for Violation {
             Self::Acceleration { joint } => write!(f, "joint {joint} would exceed its acceleration limit"),
             Self::Jerk { joint } => write!(f, "joint {joint} would exceed its jerk limit"),
             Self::Inconsistent { joint } => write!(f, "joint {joint}: dq_d is not the derivative of q_d"),
-            Self::Workspace => f.write_str("the tool tip would leave its workspace (table or reach)"),
+            Self::Workspace => f.write_str("arm or tool could not stop inside the workspace (table or reach)"),
         }
     }
 }
 
 /// Limits in force and the control period.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub struct Guard {
     /// Joint limits.
     pub limits: Limits,
-    /// Where the tool tip may be.
+    /// Where arm and tool may be.
     pub workspace: Workspace,
     /// Control period [s].
     pub period_s: f64,
 }
 
 impl Guard {
-    /// Admits `point` after `last`, or says what is wrong with it. `tip` is the tool tip at `point`, base frame [m].
+    /// Admits `point` after `last`, or says what is wrong with it. `outside` is how far the arm was outside the workspace
+    /// when it last came to rest.
     ///
     /// # Errors
-    /// The first [`Violation`] found, joint by joint.
-    pub fn check(&self, last: &Trace, point: &SetPoint, tip: [f64; 3]) -> Result<Trace, Violation> {
+    /// The first [`Violation`] found, joint by joint, then the workspace.
+    pub fn check(&self, last: &Trace, point: &SetPoint, outside: &Outside) -> Result<Trace, Violation> {
         let next = last.after(&point.q_d, self.period_s);
         for (i, limits) in self.limits.counted().enumerate() {
             self.check_joint(i, limits, last, &next, point)?;
         }
-        if next.q != last.q && !self.workspace.contains(tip) {
+        let holds = next == Trace::at_rest(last.q);
+        if !holds && !self.workspace.keeps(&next, &self.limits, self.period_s, outside) {
             return Err(Violation::Workspace);
         }
         Ok(next)

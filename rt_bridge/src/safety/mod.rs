@@ -4,19 +4,22 @@
 //! |---|---|
 //! | [`trace`] | velocity, acceleration and jerk of what was commanded, as the robot differences it |
 //! | [`guard`] | the verdict on the next set point: it and the braking that may follow it stay inside the limits |
+//! | [`stopping`] | the way of every joint to rest |
 //! | [`torque`] | torque and torque rate, clamped |
-//! | [`workspace`] | where the tool tip may be |
+//! | [`workspace`] | where arm and tool may be |
 //! | [`watchdog`] | how long silence is borne |
 
 pub mod guard;
+pub mod stopping;
 pub mod torque;
 pub mod trace;
 pub mod watchdog;
 pub mod workspace;
 
 pub use guard::{Guard, Violation};
+pub use stopping::Stopping;
 pub use torque::TorqueGuard;
 pub use trace::Trace;
 pub use twin::arm::{JointLimits, Limits, TORQUE_RATE};
 pub use watchdog::Watchdog;
-pub use workspace::Workspace;
+pub use workspace::{Outside, Workspace};

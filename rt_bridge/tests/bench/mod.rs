@@ -4,16 +4,16 @@ use rt_bridge::arm::Arm;
 use rt_bridge::motion::Player;
 use rt_bridge::rt::cycle::{Beat, Cycle, Link, Plan, Turn};
 use rt_bridge::rt::law::TorquePd;
+use rt_bridge::rt::orders::{OrderSender, orders};
 use rt_bridge::rt::remark::Remark;
 use rt_bridge::safety::{Guard, Limits, Workspace};
-use rtrb::{Consumer, Producer, RingBuffer};
+use rtrb::{Consumer, RingBuffer};
 use shared_mem::cell::Cell;
 use shared_mem::msg::arm::CommandInterface;
-use shared_mem::msg::motion::MotionChunk;
 use twin::arm::{ArmModel, ControlLaw};
 
 /// Chunks of a motion that wait at most.
-pub(crate) const WAITING: usize = 128;
+const WAITING: usize = 128;
 
 /// The loop, and the other ends of its rings.
 #[allow(dead_code)] // not every test looks at every end
@@ -21,7 +21,7 @@ pub(crate) struct Bench {
     pub(crate) cycle: Cycle,
     pub(crate) beats: Consumer<Beat>,
     pub(crate) remarks: Consumer<Remark>,
-    pub(crate) chunks: Producer<MotionChunk>,
+    pub(crate) orders: OrderSender,
 }
 
 impl Bench {
@@ -33,18 +33,16 @@ impl Bench {
         let plan = Plan {
             interface,
             law: (interface == CommandInterface::Torque).then(law),
-            tip_radius: cell.tool.as_ref().map_or(0.0, |tool| tool.radius),
             limits: Limits::fr3(),
             session: 1,
-            model: model.clone(),
         };
-        let guard = Guard { limits: Limits::fr3(), workspace: Workspace::of(cell), period_s: 1e-3 };
+        let guard = Guard { limits: Limits::fr3(), workspace: Workspace::of(cell, &model), period_s: 1e-3 };
         let (to_pump, beats) = RingBuffer::new(64);
         let (to_words, remarks) = RingBuffer::new(64);
-        let (chunks, from_pump) = RingBuffer::new(WAITING);
-        let link = Link { beats: to_pump, remarks: to_words, chunks: from_pump, pump: std::thread::current() };
+        let (sender, from_pump) = orders(WAITING, 0);
+        let link = Link { beats: to_pump, remarks: to_words, orders: from_pump, pump: std::thread::current() };
         let mut cycle = Cycle::new(Box::new(arm), plan, Player::new(guard, [0.0; 8]), link);
         assert_eq!(cycle.take_command(), Turn::Continue);
-        Self { cycle, beats, remarks, chunks }
+        Self { cycle, beats, remarks, orders: sender }
     }
 }

@@ -93,7 +93,8 @@ pub enum MotionKind {
     Play = 0,
     /// The last chunk of its motion.
     Last = 1,
-    /// Brake now, whatever is queued; the set points do not count.
+    /// Brake now, whatever is queued and whoever sent it: chunks that the bridge received before are dropped, and so is what
+    /// still comes of the motion that was braked. The set points do not count.
     Stop = 2,
     /// Clear the reflex that ended commanding and hold the arm where it stands; the set points do not count. Nothing
     /// happens unless the arm is in a reflex: a stop that a person pressed is a person's to release.
