@@ -228,9 +228,40 @@ fn plan(settings: &Settings, cell: &Cell, model: &ArmModel, hidden: Option<&Thet
     Ok(Plan {
         interface: if law.is_some() { CommandInterface::Torque } else { CommandInterface::JointPosition },
         law,
-        limits: Limits::of(cell, model),
+        limits: limits(&settings.arm, cell, model)?,
         session,
     })
+}
+
+/// Limits in force: the cell's, and over the network those of the robot that is there, whichever are narrower.
+fn limits(arm: &ArmChoice, cell: &Cell, model: &ArmModel) -> Result<Limits> {
+    let described = Limits::of(cell, model);
+    let ArmChoice::Fci(_) = arm else { return Ok(described) };
+    if let Some(what) = unlike_an_fr3(model) {
+        bail!(
+            "fci:// drives a Franka Research 3, and [robot] in cell.toml {what}: table and limits would not be kept; write \
+             `model = \"fr3\"` there, or give the FR3's own URDF"
+        );
+    }
+    let narrower = described.within(&Limits::fr3());
+    narrower.map_err(|joint| {
+        anyhow::anyhow!(
+            "joint {joint} of [robot] in cell.toml has no position that an FR3's joint {joint} can take; correct its <limit> in \
+             the URDF, or write `model = \"fr3\"`"
+        )
+    })
+}
+
+/// What a described arm has that an FR3 has not.
+fn unlike_an_fr3(model: &ArmModel) -> Option<String> {
+    let fr3 = ArmModel::fr3();
+    if !model.has_geometry() {
+        return Some("names joints only".into());
+    }
+    if model.dof() != fr3.dof() {
+        return Some(format!("describes {} joints", model.dof()));
+    }
+    (!model.is_built_like(&fr3)).then(|| "describes other links".into())
 }
 
 #[cfg(test)]
@@ -244,6 +275,44 @@ mod tests {
         assert_eq!("replay://a/b.mcap".parse(), Ok(ArmChoice::Replay("a/b.mcap".into())));
         for wrong in ["", "fci://", "simulated", "tcp://x"] {
             assert!(wrong.parse::<ArmChoice>().is_err(), "{wrong}");
+        }
+    }
+
+    /// What a run with this `[robot]` is held to, or why there is none.
+    fn limits_over(arm: &str, robot: &str) -> Result<Limits, String> {
+        let folder = tempfile::tempdir().expect("a folder");
+        let at = |name: &str| folder.path().join(name);
+        // The vendor's own, and one that an optimist wrote.
+        let urdf = include_str!("../serve/fr3.urdf");
+        std::fs::write(at("fr3.urdf"), urdf).expect("a file");
+        let generous = urdf.replace("effort=\"87", "effort=\"870").replace("velocity=\"2.62", "velocity=\"26.2");
+        assert_ne!(generous, urdf);
+        std::fs::write(at("generous.urdf"), generous.replace("lower=\"-2.9", "lower=\"-9.9")).expect("a file");
+        std::fs::write(at("elsewhere.urdf"), urdf.replace("0.316", "0.516")).expect("a file");
+        std::fs::write(at("cell.toml"), format!("[robot]\n{robot}\n")).expect("a file");
+        let cell = Cell::read(&at("cell.toml")).expect("a cell");
+        let model = ArmModel::from_cell(&cell).expect("an arm");
+        limits(&arm.parse().expect("an arm"), &cell, &model).map_err(|error| error.to_string())
+    }
+
+    #[test]
+    fn a_robot_on_the_network_is_held_to_its_own_limits_whatever_cell_toml_describes() {
+        let (fr3, fci) = (Limits::fr3(), "fci://127.0.0.1");
+        assert_eq!(limits_over(fci, "model = \"fr3\""), Ok(fr3));
+        let generous = limits_over("sim", "urdf = \"generous.urdf\"").expect("a simulated arm may be anything");
+        assert!(generous.joints[0].torque > 800.0 && generous.joints[0].q_min < -9.0, "{generous:?}");
+        let held = limits_over(fci, "urdf = \"generous.urdf\"").expect("an FR3");
+        for (held, own) in held.counted().zip(fr3.counted()) {
+            assert!(held.q_min >= own.q_min && held.q_max <= own.q_max && held.velocity <= own.velocity);
+            assert!(held.torque <= own.torque && held.torque_rate <= own.torque_rate && held.jerk <= own.jerk);
+            assert!(held.deceleration <= own.deceleration && held.velocity_offset >= own.velocity_offset);
+        }
+        for (robot, what) in [
+            ("joints = [\"a\", \"b\", \"c\", \"d\", \"e\", \"f\", \"g\"]", "names joints only"),
+            ("urdf = \"elsewhere.urdf\"", "describes other links"),
+        ] {
+            let error = limits_over(fci, robot).expect_err("not an FR3");
+            assert!(error.contains(what) && error.contains("model = \"fr3\""), "{error}");
         }
     }
 
