@@ -42,6 +42,22 @@ impl Interrupt {
         Ok(interrupt)
     }
 
+    /// The same for work that ends where it is and keeps nothing that is not kept already: the end is asked of every reader
+    /// and every roll-out too ([`shared_mem::ending`]).
+    ///
+    /// # Errors
+    /// As [`Interrupt::listen`].
+    pub fn listen_to_end_at_once() -> Result<Self, ListenError> {
+        let interrupt = Self::default();
+        let flag = interrupt.clone();
+        ctrlc::set_handler(move || {
+            flag.ask();
+            shared_mem::ending::ask();
+        })?;
+        interrupt.listen_to_pauses()?;
+        Ok(interrupt)
+    }
+
     fn listen_to_pauses(&self) -> io::Result<()> {
         for (signal, value) in [(SIGUSR1, 1), (SIGUSR2, 0)] {
             signal_hook::flag::register_usize(signal, self.pause.clone(), value)?;

@@ -13,12 +13,16 @@
 //! | [`cell`] | `cell.toml`: what the laboratory knows about its cell |
 //! | [`theta`] | `theta.toml`: what was identified, and the effects that were named |
 //! | [`frames`] | typed poses: `Pose<To, From>` |
+//! | [`input`] | the one way in for files: regular ones only, each kind up to a size |
+//! | [`ending`] | whether the process was asked to end |
 //! | [`error_line()`] | an error with its causes in one line |
 //! | [`time`] | the clock that every stamp comes from |
 
 pub mod cell;
+pub mod ending;
 mod error_line;
 pub mod frames;
+pub mod input;
 pub mod msg;
 pub mod recording;
 pub mod theta;

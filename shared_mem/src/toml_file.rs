@@ -1,19 +1,15 @@
 //! Reading a TOML file into a typed structure, with errors a person can act on: file, line, the key, the nearest known name.
 
+use crate::input::{self, InputError};
 use serde::de::DeserializeOwned;
 use std::path::{Path, PathBuf};
 
 /// A TOML file could not be used.
 #[derive(Debug, thiserror::Error)]
 pub enum TomlFileError {
-    /// The file is missing or unreadable.
-    #[error("cannot read {}: {source}; give the path of an existing file", path.display())]
-    Read {
-        /// The file.
-        path: PathBuf,
-        /// What the system said.
-        source: std::io::Error,
-    },
+    /// The file cannot be read.
+    #[error(transparent)]
+    Input(#[from] InputError),
     /// The text is no TOML, or a key or value is not what is expected.
     #[error("{}{}: {what}", path.display(), line.map_or(String::new(), |l| format!(":{l}")))]
     Content {
@@ -31,8 +27,7 @@ pub enum TomlFileError {
 /// # Errors
 /// [`TomlFileError`] when the file cannot be read or does not fit `T`.
 pub fn read<T: DeserializeOwned>(path: &Path) -> Result<T, TomlFileError> {
-    let text = std::fs::read_to_string(path).map_err(|source| TomlFileError::Read { path: path.to_owned(), source })?;
-    parse(&text, path)
+    parse(&input::text(path, input::Kind::Configuration)?, path)
 }
 
 /// Interprets `text` as `T`; `path` only names it in errors.

@@ -377,3 +377,58 @@ fn a_session_without_clips_or_without_cell_toml_says_what_to_do() {
     let error = session.read(&session.clips[0]).unwrap_err().to_string();
     assert!(error.contains("no MCAP file"), "{error}");
 }
+
+const DAY: u64 = 86_400_000_000_000;
+/// Unix time, as bags have it.
+const BEGIN: u64 = 1_700_000_000_000_000_000;
+
+/// Joints at 1 kHz on both topics and poses at 100 Hz for 0.4 s; `stamp(topic, row, usual)` is what a message's header says,
+/// `None` for one that was not recorded.
+fn stroke(stamp: impl Fn(&str, u64, u64) -> Option<u64>) -> Bag {
+    let mut bag = Bag::new();
+    for i in 0..400 {
+        let usual = BEGIN + i * 1_000_000;
+        for topic in [DESIRED, MEASURED] {
+            if let Some(stamp) = stamp(topic, i, usual) {
+                let q = [q(i, 0), q(i, 1)];
+                let dq: Vec<f64> = q.iter().map(|q| 0.1 * q).collect();
+                bag.put(topic, JOINT_STATE, usual, &joint_state(stamp, &NAMES, &q, &dq));
+            }
+        }
+        if i % 4 == 0
+            && let Some(stamp) = stamp("/object/pose", i / 4, usual)
+        {
+            bag.put("/object/pose", "geometry_msgs/msg/PoseStamped", usual, &pose(stamp, "base", [0.0, 0.0, 0.0, 1.0]));
+        }
+    }
+    bag
+}
+
+#[test]
+fn a_row_with_a_stamp_of_zero_or_a_day_off_is_left_out_and_the_rest_is_as_if_it_had_not_been_recorded() {
+    let read = |bag: Bag| bag.read(ClipKind::ControlHitSlide, &cell()).unwrap_or_else(|e| panic!("{e}"));
+    for topic in [DESIRED, MEASURED, "/object/pose"] {
+        for row in [0, 41, 99] {
+            let without = read(stroke(|t, i, usual| (t != topic || i != row).then_some(usual)));
+            for wrong in [0, BEGIN + DAY, BEGIN - DAY] {
+                let clip = read(stroke(|t, i, usual| Some(if t == topic && i == row { wrong } else { usual })));
+                let told = clip.warnings.iter().filter(|w| w.contains(topic) && w.contains("left out")).count();
+                let named = format!("row {row}: ");
+                assert!(told == 1 && clip.warnings.iter().any(|w| w.contains(&named)), "{:?}", clip.warnings);
+                let rest = |clip: &Clip| (clip.measured.clone(), clip.desired.clone(), clip.object.clone());
+                assert_eq!(rest(&clip), rest(&without), "{topic}, row {row}, {wrong}");
+            }
+        }
+    }
+}
+
+#[test]
+fn rows_of_many_days_and_poses_of_another_day_are_refused_in_one_line() {
+    let read = |bag: Bag| bag.read(ClipKind::ControlHitSlide, &cell());
+    let scattered = read(stroke(|topic, i, usual| Some(if topic == MEASURED { usual + i * DAY } else { usual })));
+    let error = scattered.expect_err("no clip");
+    assert!(error.contains(MEASURED) && error.contains("400 places") && !error.contains('\n'), "{error}");
+    let apart = read(stroke(|topic, _, usual| Some(if topic == "/object/pose" { usual + DAY } else { usual })));
+    let error = apart.expect_err("poses of another day");
+    assert!(error.contains("/object/pose") && error.contains("different clocks") && !error.contains('\n'), "{error}");
+}

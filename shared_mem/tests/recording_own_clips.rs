@@ -345,3 +345,57 @@ fn a_file_system_that_fills_up_leaves_a_readable_clip() {
     let states = read_arm_states(&path).expect("a readable clip");
     assert!(states.len() >= 500 && states.len().is_multiple_of(500), "{} states", states.len());
 }
+
+const DAY: u64 = 86_400_000_000_000;
+const BEGIN: u64 = 200_000_000_000_000;
+
+/// 0.4 s of states at 1 kHz and poses at 100 Hz; `change` may change what is written, or leave it out.
+fn stroke(folder: &Path, change: impl Fn(&mut Payload, u64) -> bool) -> shared_mem::recording::Clip {
+    let path = folder.join("clip.mcap");
+    let _not_there = std::fs::remove_file(&path);
+    let mut writer = ClipWriter::create(&path, &info()).expect("a new file");
+    for i in 0..400 {
+        let at = BEGIN + i * 1_000_000;
+        let own = ArmState { stamp_ns: at + (i * 7919) % 60_000, device_ns: BEGIN / 2 + i * 1_000_000, ..state(i) };
+        let mut payloads = vec![Payload::ArmState(Box::new(own))];
+        if i % 4 == 0 {
+            payloads.push(Payload::ObjectPose(Box::new(ObjectPose { stamp_ns: at, ..pose(i / 4) })));
+        }
+        for mut payload in payloads {
+            let row = if matches!(payload, Payload::ArmState(_)) { i } else { i / 4 };
+            if change(&mut payload, row) {
+                write(&mut writer, &payload).expect("room");
+            }
+        }
+    }
+    writer.finish().expect("room");
+    read_clip(&path, ClipKind::ControlHitSlide, &fr3()).unwrap_or_else(|e| panic!("{e}"))
+}
+
+#[test]
+fn a_row_with_a_stamp_of_zero_or_a_day_off_is_left_out_and_the_rest_is_as_if_it_had_not_been_recorded() {
+    type Stamp = fn(&mut Payload) -> Option<&mut u64>;
+    let host: Stamp = |payload| if let Payload::ArmState(s) = payload { Some(&mut s.stamp_ns) } else { None };
+    let device: Stamp = |payload| if let Payload::ArmState(s) = payload { Some(&mut s.device_ns) } else { None };
+    let of_pose: Stamp = |payload| if let Payload::ObjectPose(p) = payload { Some(&mut p.stamp_ns) } else { None };
+    let folder = tempfile::tempdir().expect("a folder");
+    for (stamp, topic) in [(host, "/arm/state"), (device, "/arm/state"), (of_pose, "/object/pose")] {
+        for row in [0, 41, 99] {
+            let without = stroke(folder.path(), |payload, i| stamp(payload).is_none() || i != row);
+            for shift in [0, DAY, DAY.wrapping_neg()] {
+                let clip = stroke(folder.path(), |payload, i| {
+                    if let Some(stamp) = stamp(payload).filter(|_| i == row) {
+                        *stamp = if shift == 0 { 0 } else { stamp.wrapping_add(shift) };
+                    }
+                    true
+                });
+                let told = clip.warnings.iter().filter(|w| w.contains(topic) && w.contains("left out")).count();
+                let named = format!("row {row}: ");
+                assert!(told == 1 && clip.warnings.iter().any(|w| w.contains(&named)), "{:?}", clip.warnings);
+                let rest =
+                    |clip: &shared_mem::recording::Clip| (clip.measured.clone(), clip.desired.clone(), clip.object.clone());
+                assert_eq!(rest(&clip), rest(&without), "{topic}, row {row}, {shift}");
+            }
+        }
+    }
+}

@@ -4,7 +4,6 @@
 use shared_mem::recording::Session;
 use shared_mem::theta::{ArmTheta, Theta};
 use std::path::{Path, PathBuf};
-use std::sync::atomic::AtomicBool;
 use twin::replay::{Options, replay};
 
 /// Largest of the joints' mean errors under the session's own gains and `blocks` [rad RMS].
@@ -17,7 +16,7 @@ fn gap(name: &str, blocks: &str) -> f64 {
     let effects: Theta = shared_mem::toml_file::parse(blocks, Path::new("theta.toml")).expect("a theta.toml");
     let theta = Theta { arm: Some(ArmTheta { stiffness: list("k"), damping: list("d") }), ..effects };
     let session = Session::open(&folder).expect("a session");
-    let gap = replay(&session, &Options { theta: Some(theta), out: None }, &AtomicBool::new(false)).expect("a cell");
+    let gap = replay(&session, &Options { theta: Some(theta), out: None }).expect("a cell");
     let joints = gap.mean.joint_rms_rad.expect("joints");
     joints.into_iter().fold(0.0, f64::max)
 }

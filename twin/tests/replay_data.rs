@@ -4,7 +4,6 @@
 use shared_mem::recording::Session;
 use shared_mem::theta::{ArmTheta, Theta};
 use std::path::{Path, PathBuf};
-use std::sync::atomic::AtomicBool;
 use twin::replay::{Options, SessionGap, replay};
 
 fn data() -> PathBuf {
@@ -13,7 +12,7 @@ fn data() -> PathBuf {
 
 fn replayed(session: &Path, theta: Option<Theta>) -> SessionGap {
     let session = Session::open(session).expect("a session");
-    replay(&session, &Options { theta, out: None }, &AtomicBool::new(false)).expect("a usable cell")
+    replay(&session, &Options { theta, out: None }).expect("a usable cell")
 }
 
 fn true_gains(session: &Path) -> ArmTheta {

@@ -4,7 +4,6 @@
 use shared_mem::recording::Session;
 use shared_mem::theta::{ArmTheta, EffectTheta, ObjectTheta, Theta};
 use std::path::{Path, PathBuf};
-use std::sync::atomic::AtomicBool;
 use twin::replay::{Options, replay};
 
 /// The parameters that made a session, without what was hidden in it.
@@ -37,7 +36,7 @@ fn gap(name: &str, effects: Vec<EffectTheta>) -> [f64; 3] {
     let folder = folder.join("gap_dev").join(name);
     let theta = Theta { effects, ..truth(&folder) };
     let session = Session::open(&folder).expect("a session");
-    let gap = replay(&session, &Options { theta: Some(theta), out: None }, &AtomicBool::new(false)).expect("a cell");
+    let gap = replay(&session, &Options { theta: Some(theta), out: None }).expect("a cell");
     let mut add: Vec<f64> = gap.clips.iter().filter_map(|clip| clip.gap.object_add_m).collect();
     assert_eq!(add.len(), 16);
     add.sort_by(f64::total_cmp);

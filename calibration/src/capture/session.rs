@@ -2,6 +2,7 @@
 //! only once it is complete, and nothing that is there is ever overwritten.
 
 use shared_mem::cell::{Cell, CellError, ClipEntry, ClipKind};
+use shared_mem::input::{self, InputError};
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -22,6 +23,9 @@ pub enum SessionError {
         /// What the system said.
         source: io::Error,
     },
+    /// Its cell.toml cannot be read.
+    #[error(transparent)]
+    Input(#[from] InputError),
     /// Its cell.toml is broken.
     #[error(transparent)]
     Cell(#[from] CellError),
@@ -88,7 +92,7 @@ impl Session {
     pub fn enter(&self, file: &Path, kind: ClipKind) -> Result<(), SessionError> {
         let path = self.cell_file();
         let mut text =
-            std::fs::read_to_string(&path).map_err(|source| SessionError::Write { path: path.clone(), source })?;
+            input::text(&path, input::Kind::Configuration)?;
         let entry = Cell { clips: vec![ClipEntry { file: file.to_owned(), kind }], ..Cell::default() };
         text.push('\n');
         text.push_str(&entry.to_toml());

@@ -12,6 +12,7 @@ use calibration::diagnose;
 use calibration::interrupt::Interrupt;
 use clap::{Parser, Subcommand};
 use serde::Serialize;
+use shared_mem::ending;
 use std::io::Write as _;
 
 /// Records how a robot cell moves, and says where its twin differs.
@@ -61,19 +62,36 @@ enum Verb {
 /// # Errors
 /// One line: what happened, and what to do.
 pub(crate) fn run(arguments: Arguments) -> anyhow::Result<()> {
-    let interrupt = Interrupt::listen()?;
     match arguments.verb {
-        Verb::Capture(capture) => capture::run(capture, &interrupt),
-        Verb::Identify(identify) => identify::run(identify, &interrupt),
-        Verb::Compare(arguments) => compare::run(arguments, &interrupt),
+        // What was recorded is kept and looked at, and a benchmark says what it has, after Ctrl-C too.
+        Verb::Capture(capture) => capture::run(capture, &Interrupt::listen()?),
+        Verb::Demo(arguments) => demo::run(arguments, &Interrupt::listen()?),
+        Verb::Benchmark(arguments) => benchmark::run(arguments, &Interrupt::listen()?),
+        verb => {
+            let done = run_to_the_end(verb, &Interrupt::listen_to_end_at_once()?);
+            match done {
+                // What a reader that was stopped says of its file is not the file's fault.
+                Err(error) if ending::asked() && !error.to_string().starts_with("interrupted") => {
+                    anyhow::bail!("interrupted; start again")
+                }
+                done => done,
+            }
+        }
+    }
+}
+
+/// Verbs that say nothing when they are interrupted.
+fn run_to_the_end(verb: Verb, interrupt: &Interrupt) -> anyhow::Result<()> {
+    match verb {
+        Verb::Identify(identify) => identify::run(identify, interrupt),
+        Verb::Compare(arguments) => compare::run(arguments, interrupt),
         Verb::Diagnose(arguments) => {
-            let found = diagnose::command::run(&arguments, &interrupt)?;
+            let found = diagnose::command::run(&arguments, interrupt)?;
             if arguments.json { print_json(&found) } else { Ok(()) }
         }
-        Verb::Benchmark(arguments) => benchmark::run(arguments, &interrupt),
         Verb::Viewpoint(arguments) => viewpoint::run(*arguments),
         Verb::Export(arguments) => export::run(&arguments),
-        Verb::Demo(arguments) => demo::run(arguments, &interrupt),
+        Verb::Capture(_) | Verb::Demo(_) | Verb::Benchmark(_) => Ok(()),
     }
 }
 

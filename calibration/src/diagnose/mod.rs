@@ -133,7 +133,11 @@ pub enum DiagnoseError {
 /// # Errors
 /// [`DiagnoseError`]. Clips that do not say enough are no error but a verdict.
 pub fn diagnose(session: &Session, options: &Options, interrupt: &Interrupt) -> Result<Diagnosis, DiagnoseError> {
-    match admit(session) {
+    let admitted = admit(session);
+    if interrupt.asked() {
+        return Err(DiagnoseError::Interrupted);
+    }
+    match admitted {
         Err(Refused::NotTestable(why)) => {
             let base = setting::complete(&session.cell, options.theta.as_ref())?;
             Ok(conclude::not_testable(session, options, base, &why))
@@ -198,5 +202,6 @@ fn examine<E: Evidence>(
         return Err(DiagnoseError::Interrupted);
     }
     bar.show(97, "confirm");
-    conclude::conclude(&bench, &split, &found, session, admitted, options)
+    let concluded = conclude::conclude(&bench, &split, &found, session, admitted, options);
+    if interrupt.asked() { Err(DiagnoseError::Interrupted) } else { concluded }
 }

@@ -8,6 +8,7 @@ use crate::estimate::{
 use crate::interrupt::Interrupt;
 use crate::progress::Progress;
 use serde::{Deserialize, Serialize};
+use shared_mem::input;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -76,6 +77,9 @@ pub enum RunError {
         |state| format!("; the same command goes on from {}", state.display())
     ))]
     Interrupted(Option<PathBuf>),
+    /// Ctrl-C behind the search.
+    #[error("interrupted before the answer was written; start again")]
+    Ended,
     /// The state cannot be kept.
     #[error("{path}: {source}; give --out a place that can be written")]
     State {
@@ -244,8 +248,8 @@ impl Run<'_> {
     }
 
     fn read_state(&self) -> State {
-        let read = || -> Option<State> { serde_json::from_slice(&std::fs::read(self.state?).ok()?).ok() };
-        read().filter(|state| state.fingerprint == self.fingerprint).unwrap_or_default()
+        let read = |path: &Path| serde_json::from_slice::<State>(&input::bytes(path, input::Kind::List).ok()?).ok();
+        self.state.and_then(read).filter(|state| state.fingerprint == self.fingerprint).unwrap_or_default()
     }
 
     fn keep(&self, state: &State) -> Result<(), RunError> {

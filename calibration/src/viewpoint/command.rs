@@ -12,6 +12,7 @@ use super::{overlay, refine, session, start, step};
 use anyhow::{Context as _, bail, ensure};
 use nalgebra::{Isometry3, Point3, Quaternion, UnitQuaternion};
 use shared_mem::cell::{Camera, CameraPose, Cell, Intrinsics, Robot};
+use shared_mem::ending;
 use shared_mem::frames::{Base, Camera as CameraFrame, Pose as FramePose};
 use shared_mem::recording::{PictureKind, Session, write_png};
 use std::path::{Path, PathBuf};
@@ -121,14 +122,16 @@ pub fn run(options: &Options) -> anyhow::Result<Viewpoint> {
     };
     let start = start.map(|pose| pose.inverse().isometry());
     let found = match (&start, &options.start) {
-        (Some(start), _) => fit(&frames, &shape, start, &reach, method, options.seed)?,
-        (None, StartFrom::Search) => start::search(&frames, &shape, &lens, method, options.seed)?,
+        (Some(start), _) => fit(&frames, &shape, start, &reach, method, options.seed),
+        (None, StartFrom::Search) => start::search(&frames, &shape, &lens, method, options.seed),
         (None, _) => {
             bail!(
                 "no start: cell.toml has no `[camera] pose`; give --start x,y,z,qw,qx,qy,qz, --board, or --start search"
             )
         }
     };
+    ensure!(!ending::asked(), "interrupted; nothing was written, start again");
+    let found = found?;
     if found.rival.is_some_and(|rival| rival > 0.95 * found.confirmed) {
         warnings.push("another pose explains the pictures nearly as well; add a picture of another arm pose".into());
     }

@@ -8,6 +8,7 @@ use super::pull::Pull;
 use super::shape::Shape;
 use super::silhouette::Silhouette;
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
+use shared_mem::ending;
 use twin::arm::Joints;
 
 /// What a picture shows of the robot.
@@ -161,6 +162,9 @@ impl Frame {
     /// The paper's loss: share of wrong pixels of two masks, at this level; for a photo the outline's distance to edges.
     #[must_use]
     pub fn wrong(&self, level: usize, shape: &Shape, camera_from_base: &Isometry3<f64>) -> f64 {
+        if ending::asked() {
+            return 1.0;
+        }
         match &self.levels[level].kind {
             Kind::Silhouette(silhouette) => {
                 let mut outliner = self.outliner(level);

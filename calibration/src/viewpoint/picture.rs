@@ -6,6 +6,7 @@ use super::frame::Evidence;
 use super::grid::Grid;
 use super::lens::Lens;
 use anyhow::{Context as _, ensure};
+use shared_mem::input;
 use shared_mem::msg::image::{ImageHeader, PixelEncoding};
 use shared_mem::recording::{Picture, read_picture};
 use std::path::Path;
@@ -182,7 +183,7 @@ impl Moment {
         if let Ok(q) = numbers {
             return Ok(Self { q, size: None, pinhole: None, distortion: [0.0; 5] });
         }
-        let file = std::fs::read(text)
+        let file = input::bytes(Path::new(text), input::Kind::List)
             .with_context(|| format!("{text} is neither numbers with commas between them nor a readable JSON file"))?;
         let value: serde_json::Value = serde_json::from_slice(&file).with_context(|| format!("{text} is no JSON"))?;
         let numbers = |value: &serde_json::Value| -> Option<Vec<f64>> {

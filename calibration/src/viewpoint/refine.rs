@@ -9,6 +9,7 @@ use super::outline::{Outliner, Place};
 use super::shape::Shape;
 use super::step::moved;
 use nalgebra::{Isometry3, Matrix6, Point3, Vector3, Vector6};
+use shared_mem::ending;
 use std::ops::Range;
 
 /// A pose and what the pictures say there.
@@ -92,6 +93,9 @@ pub fn refine(frames: &[Frame], shape: &Shape, start: &Isometry3<f64>, which: Ra
         }
         let mut damping = 1e-3;
         for _ in 0..stage.steps {
+            if ending::asked() {
+                return None;
+            }
             let (information, gradient) = here.sums();
             let mut trials = 0;
             let better = loop {

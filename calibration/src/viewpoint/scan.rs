@@ -8,6 +8,7 @@ use super::search::Reach;
 use super::shape::Shape;
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
 use rayon::prelude::*;
+use shared_mem::ending;
 
 /// A pose that is worth a closer look.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -75,7 +76,7 @@ fn look(frames: &[Frame], shape: &Shape, camera_from_base: &Isometry3<f64>, angl
     let rolls = 2 * (angle / ROLL).ceil() as i32 + 1;
     let side = (angle * lens.focal[0] / PIXELS).ceil() as i32;
     let mut found = Vec::new();
-    for roll in 0..rolls {
+    for roll in (0..rolls).take_while(|_| !ending::asked()) {
         let roll = (f64::from(2 * roll + 1) / f64::from(rolls) - 1.0) * angle;
         let mut best: Option<Candidate> = None;
         for number in 0..(2 * side + 1).pow(2) {

@@ -63,7 +63,11 @@ pub(super) fn read<R: Read + Seek>(
         return Err(missing(&topics.object_pose, ("object poses", "object_pose")));
     }
     let base_frame = cell.robot.as_ref().and_then(|robot| robot.base_frame.as_deref());
-    clip.object = collected.object(path, &topics.object_pose, base_frame, &mut clip.warnings)?;
+    let object = collected.object(path, &topics.object_pose, base_frame, &mut clip.warnings)?;
+    let (object, warning) = checks::beside_arm(object, &clip.measured, &topics.object_pose)
+        .map_err(|what| ReadError::content(path, &topics.object_pose, what))?;
+    clip.object = object;
+    clip.warnings.extend(warning);
     Ok(clip)
 }
 

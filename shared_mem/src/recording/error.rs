@@ -1,18 +1,28 @@
 //! Why a recording cannot be used, one line each: what happened and what to do.
 
 use crate::cell::CellError;
+use crate::input::InputError;
 use std::path::{Path, PathBuf};
 
 /// A clip or a session cannot be read.
 #[derive(Debug, thiserror::Error)]
 pub enum ReadError {
-    /// The file is missing or unreadable.
+    /// The file is missing, or the disk fails.
     #[error("cannot read {}: {source}; give the path of an existing clip or session folder", path.display())]
     Io {
         /// The file.
         path: PathBuf,
         /// What the system said.
         source: std::io::Error,
+    },
+    /// The file is missing, no file, or too large.
+    #[error(transparent)]
+    Input(#[from] InputError),
+    /// Ctrl-C.
+    #[error("{}: interrupted while it was read; start again", path.display())]
+    Interrupted {
+        /// The file.
+        path: PathBuf,
     },
     /// The file is no recording of a known kind.
     #[error("{}: {what}", path.display())]

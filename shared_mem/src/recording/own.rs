@@ -64,6 +64,18 @@ impl Rows {
         }
     }
 
+    /// Leaves out rows that were stamped wrongly, before any clock is made of their stamps.
+    fn leave_outlying_out(&mut self) -> Result<Vec<String>, String> {
+        let (kept, warnings) = well_stamped(&self.measured.stamps_ns, &self.device_ns)?;
+        if kept.len() < self.device_ns.len() {
+            for series in [&mut self.measured, &mut self.desired] {
+                *series = series.select_rows(&kept);
+            }
+            self.device_ns = kept.iter().filter_map(|row| self.device_ns.get(*row).copied()).collect();
+        }
+        Ok(warnings)
+    }
+
     fn use_device_clock(&mut self) -> DeviceClock {
         let clock = DeviceClock::new(&self.measured.stamps_ns, &self.device_ns);
         if let Some(stamps_ns) = clock.stamps() {
@@ -73,6 +85,29 @@ impl Rows {
         }
         clock
     }
+}
+
+/// The states, by number, whose stamps by the host and by the robot [ns] both lie among the others', and what there is to
+/// say about the rest. Where many of the robot's lie apart, its clock was set: the host's are better then.
+///
+/// # Errors
+/// A sentence where the host's stamps are of no use.
+pub(super) fn well_stamped(host_ns: &[u64], device_ns: &[u64]) -> Result<(Vec<usize>, Vec<String>), String> {
+    let topic = ArmState::TOPIC;
+    let mut kept: Vec<usize> = (0..host_ns.len()).collect();
+    let mut warnings = Vec::new();
+    if let Some(outlying) = checks::outlying_rows(host_ns, topic)? {
+        kept = outlying.kept;
+        warnings.push(outlying.warning);
+    }
+    let device_ns: Vec<u64> = kept.iter().filter_map(|row| device_ns.get(*row).copied()).collect();
+    if let Ok(Some(outlying)) = checks::outlying_rows(&device_ns, topic)
+        && outlying.few
+    {
+        kept = outlying.kept.iter().filter_map(|row| kept.get(*row).copied()).collect();
+        warnings.push(format!("by the robot's clock {}", outlying.warning));
+    }
+    Ok((kept, warnings))
 }
 
 /// Reads an own clip.
@@ -104,6 +139,8 @@ pub(super) fn read<R: Read + Seek>(
     if kind != ClipKind::Excitation && poses.is_empty() {
         return Err(missing(path, ObjectPose::TOPIC, &messages.present()));
     }
+    let fail = |what| ReadError::content(path, ArmState::TOPIC, what);
+    clip.warnings.extend(rows.leave_outlying_out().map_err(fail)?);
     let clock = rows.use_device_clock();
     // A pose is stamped when it became known, one camera latency after its picture.
     let latency_ns = cell.camera.as_ref().map_or(0, |camera| (camera.latency * 1e9) as u64);
@@ -113,8 +150,10 @@ pub(super) fn read<R: Read + Seek>(
     take_joints(path, cell, rows, &mut clip)?;
     let fail = |what| ReadError::content(path, ObjectPose::TOPIC, what);
     let (object, warnings) = checks::object(poses, ObjectPose::TOPIC).map_err(fail)?;
-    clip.object = object;
     clip.warnings.extend(warnings);
+    let (object, warning) = checks::beside_arm(object, &clip.measured, ObjectPose::TOPIC).map_err(fail)?;
+    clip.object = object;
+    clip.warnings.extend(warning);
     Ok(clip)
 }
 

@@ -3,8 +3,9 @@
 use super::ros2::{CompressedImage, Image};
 use crate::msg::image::{ImageHeader, PixelEncoding, StampDomain};
 
-/// Largest picture that is unpacked [bytes].
-const LARGEST: usize = 256 << 20;
+/// Largest picture that is unpacked [pixels]: more than any camera of a robot has, and 270 MB at 16 bits in four channels.
+/// A compressed file of some kilobytes can claim thousands of times as many.
+const LARGEST: u64 = 1 << 25;
 /// How a PNG file starts.
 const PNG: &[u8] = b"\x89PNG\r\n\x1a\n";
 
@@ -66,6 +67,7 @@ impl Picture {
         let (width, height, step) = (image.width as usize, image.height as usize, image.step as usize);
         let row_size = width.saturating_mul(pixel_size);
         let fits = row_size <= step && step.checked_mul(height).is_some_and(|size| size <= image.data.len());
+        check_size(image.width, image.height)?;
         if width == 0 || height == 0 || !fits {
             return Err(format!("a picture of {width} x {height} pixels holds only {} bytes", image.data.len()));
         }
@@ -86,7 +88,7 @@ impl Picture {
         let behind_header = image.data.get(12..).filter(|bytes| bytes.starts_with(PNG));
         let png = if image.data.starts_with(PNG) { Some(image.data) } else { behind_header };
         match png {
-            Some(bytes) => unpack_png(bytes, image.stamp_ns).map_err(|e| format!("a PNG picture cannot be read: {e}")),
+            Some(bytes) => unpack_png(bytes, image.stamp_ns).map_err(|e| format!("a picture cannot be read: {e}")),
             None => Ok(Self::Compressed {
                 stamp_ns: image.stamp_ns,
                 format: image.format.to_owned(),
@@ -130,14 +132,26 @@ fn header(stamp_ns: u64, (width, height): (u32, u32), encoding: PixelEncoding) -
     }
 }
 
-pub(super) fn unpack_png(bytes: &[u8], stamp_ns: u64) -> Result<Picture, png::DecodingError> {
-    let limits = png::Limits { bytes: LARGEST };
+/// A sentence for a picture of more pixels than are unpacked.
+pub(super) fn check_size(width: u32, height: u32) -> Result<(), String> {
+    if u64::from(width) * u64::from(height) <= LARGEST {
+        return Ok(());
+    }
+    Err(format!("a picture of {width} x {height} pixels is too large: {LARGEST} at most are unpacked; scale it down"))
+}
+
+/// The pixels of a PNG file; a sentence when it is damaged or too large.
+pub(super) fn unpack_png(bytes: &[u8], stamp_ns: u64) -> Result<Picture, String> {
+    // What a PNG carries beside its pixels takes memory of its own.
+    let limits = png::Limits { bytes: 64 << 20 };
     let mut decoder = png::Decoder::new_with_limits(std::io::Cursor::new(bytes), limits);
     decoder.set_transformations(png::Transformations::EXPAND);
-    let mut reader = decoder.read_info()?;
-    let size = reader.output_buffer_size().filter(|size| *size <= LARGEST).ok_or(png::DecodingError::LimitsExceeded)?;
+    let fail = |error: png::DecodingError| format!("the PNG is damaged ({error})");
+    let mut reader = decoder.read_info().map_err(fail)?;
+    check_size(reader.info().width, reader.info().height)?;
+    let size = reader.output_buffer_size().ok_or("the PNG is damaged (its size makes no sense)")?;
     let mut raw = vec![0; size];
-    let frame = reader.next_frame(&mut raw)?;
+    let frame = reader.next_frame(&mut raw).map_err(fail)?;
     raw.truncate(frame.buffer_size());
     let (channels, colours) = match frame.color_type {
         png::ColorType::Grayscale | png::ColorType::Indexed => (1, [0, 0, 0]),

@@ -2,7 +2,8 @@
 //! millimetre (a PNG with 16 bits of grey).
 
 use super::error::ReadError;
-use super::picture::{Picture, unpack_png};
+use super::picture::{Picture, check_size, unpack_png};
+use crate::input;
 use crate::msg::image::{ImageHeader, PixelEncoding, StampDomain};
 use std::io::BufWriter;
 use std::path::Path;
@@ -19,7 +20,7 @@ const LONGEST: usize = 16_384;
 /// # Errors
 /// [`ReadError`] when the file is missing, cut short, or neither of both.
 pub fn read_picture(path: &Path) -> Result<Picture, ReadError> {
-    let bytes = std::fs::read(path).map_err(|e| ReadError::kind(path, format!("cannot be read: {e}")))?;
+    let bytes = input::bytes(path, input::Kind::Picture)?;
     unpack_picture(&bytes, 0).map_err(|what| ReadError::kind(path, what))
 }
 
@@ -29,10 +30,10 @@ pub fn read_picture(path: &Path) -> Result<Picture, ReadError> {
 /// A sentence when the bytes are cut short or neither PNG nor JPEG.
 pub fn unpack_picture(bytes: &[u8], stamp_ns: u64) -> Result<Picture, String> {
     if bytes.starts_with(b"\x89PNG") {
-        return unpack_png(bytes, stamp_ns).map_err(|e| format!("the PNG cannot be read: {e}"));
+        return unpack_png(bytes, stamp_ns);
     }
     if bytes.starts_with(&[0xff, 0xd8]) {
-        return unpack_jpeg(bytes, stamp_ns).map_err(|e| format!("the JPEG cannot be read: {e}"));
+        return unpack_jpeg(bytes, stamp_ns);
     }
     Err("is neither a PNG nor a JPEG picture".into())
 }
@@ -44,8 +45,11 @@ fn unpack_jpeg(bytes: &[u8], stamp_ns: u64) -> Result<Picture, String> {
         .set_max_height(LONGEST)
         .set_strict_mode(true);
     let mut decoder = JpegDecoder::new_with_options(ZCursor::new(bytes), options);
-    let pixels = decoder.decode().map_err(|e| format!("{e:?}"))?;
-    let (width, height) = decoder.dimensions().ok_or("it tells no size")?;
+    let fail = |error: zune_jpeg::errors::DecodeErrors| format!("the JPEG is damaged ({error})").replace('\n', " ");
+    decoder.decode_headers().map_err(fail)?;
+    let (width, height) = decoder.dimensions().ok_or("the JPEG is damaged (it tells no size)")?;
+    check_size(u32::try_from(width).unwrap_or(u32::MAX), u32::try_from(height).unwrap_or(u32::MAX))?;
+    let pixels = decoder.decode().map_err(fail)?;
     if pixels.len() != width * height * 3 {
         return Err(format!("a picture of {width} x {height} pixels holds {} bytes", pixels.len()));
     }

@@ -9,6 +9,7 @@ use super::npy;
 use super::ros2::JointState;
 use crate::cell::{CameraPose, Cell, ClipKind};
 use crate::frames::{Base, Camera, Object, Pose};
+use crate::input;
 use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion};
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
@@ -84,7 +85,7 @@ fn read_poses(path: &Path, cell: &Cell, frames: &[Frame], clip: &mut Clip) -> Re
         ));
         return Ok(());
     };
-    let bytes = std::fs::read(&file).map_err(ReadError::io(&file))?;
+    let bytes = input::bytes(&file, input::Kind::Array)?;
     let array = npy::parse(&bytes).map_err(|what| ReadError::content(path, POSE, what))?;
     let &[count, 4, 4] = array.shape.as_slice() else {
         let what = format!("has the shape {:?}; one 4x4 pose a frame is needed: (frames, 4, 4)", array.shape);
@@ -99,9 +100,12 @@ fn read_poses(path: &Path, cell: &Cell, frames: &[Frame], clip: &mut Clip) -> Re
         (nanoseconds(stamp), camera_from_object(matrix).map(|camera_from_object| base_from_camera * camera_from_object))
     });
     let rows: Vec<(u64, Option<Pose<Base, Object>>)> = rows.collect();
-    let (object, warnings) = checks::object(rows, POSE).map_err(|what| ReadError::content(path, POSE, what))?;
-    clip.object = object;
+    let fail = |what| ReadError::content(path, POSE, what);
+    let (object, warnings) = checks::object(rows, POSE).map_err(fail)?;
     clip.warnings.extend(warnings);
+    let (object, warning) = checks::beside_arm(object, &clip.measured, POSE).map_err(fail)?;
+    clip.object = object;
+    clip.warnings.extend(warning);
     Ok(())
 }
 
@@ -166,7 +170,7 @@ fn nanoseconds(seconds: f64) -> u64 {
 }
 
 fn read_json<T: DeserializeOwned>(path: &Path) -> Result<T, ReadError> {
-    let bytes = std::fs::read(path).map_err(ReadError::io(path))?;
+    let bytes = input::bytes(path, input::Kind::List)?;
     serde_json::from_slice(&bytes)
         .map_err(|e| ReadError::kind(path, format!("is not what a TwinAligner recorder writes ({e}); record it again")))
 }

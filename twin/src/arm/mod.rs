@@ -29,6 +29,7 @@ mod kernel;
 mod kinematics;
 mod limits;
 mod model;
+mod nesting;
 mod spatial;
 mod step;
 mod transmission;

@@ -7,6 +7,7 @@ use super::spatial::{Rot3, Vec3};
 use super::{JointState, Joints, MAX_JOINTS, fr3, urdf};
 use nalgebra::{Isometry3, Matrix3, Rotation3, Unit, Vector3};
 use shared_mem::cell::{Cell, Controller, Robot};
+use shared_mem::input::InputError;
 use shared_mem::msg::joints_from;
 use std::path::PathBuf;
 
@@ -44,7 +45,10 @@ pub enum ModelError {
     /// cell.toml describes no arm.
     #[error("cell.toml has no [robot] block; add one, for example `model = \"fr3\"`")]
     NoRobot,
-    /// The URDF cannot be read.
+    /// The URDF is missing, no file, or too large.
+    #[error("{0} (`robot.urdf` in cell.toml)")]
+    Input(#[from] InputError),
+    /// The URDF makes no sense.
     #[error("{}: {what}; give a URDF that a robot_state_publisher accepts (xacro must be expanded first)", path.display())]
     Read {
         /// The file.

@@ -3,17 +3,22 @@
 
 use super::inertia::MassProperties;
 use super::model::{Chain, Joint, ModelError};
+use super::nesting;
 use nalgebra::{Isometry3, Translation3, Unit, UnitQuaternion, Vector3};
+use shared_mem::input;
 use std::path::Path;
 use urdf_rs::{JointType, Pose, Robot};
 
 /// Reads the serial chain of a URDF. The flange is the end of the fixed joints behind the last movable one, following
 /// the first of them in file order at each fork.
 pub(super) fn chain(file: &Path) -> Result<Chain, ModelError> {
-    let text = std::fs::read_to_string(file)
-        .map_err(|error| ModelError::Read { path: file.to_owned(), what: error.to_string() })?;
-    let robot = urdf_rs::read_from_string(&text)
-        .map_err(|error| ModelError::Read { path: file.to_owned(), what: one_line(&error) })?;
+    let text = input::text(file, input::Kind::Robot)?;
+    let fail = |what: String| ModelError::Read { path: file.to_owned(), what };
+    let depth = nesting::depth(&text);
+    if depth > nesting::DEEPEST {
+        return Err(fail(format!("its elements lie {depth} deep in each other, and {} are read", nesting::DEEPEST)));
+    }
+    let robot = urdf_rs::read_from_string(&text).map_err(|error| fail(one_line(&error)))?;
     Tree { robot: &robot, file }.chain()
 }
 

@@ -1,12 +1,11 @@
 //! `twin replay`: the recorded commands, simulated; real against simulated as a table or as JSON.
 
 use anyhow::{Context, bail};
+use shared_mem::ending;
 use shared_mem::recording::Session;
 use shared_mem::theta::Theta;
 use std::io::Write as _;
 use std::path::PathBuf;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 use twin::replay::{Options, replay};
 
 /// Simulates the recorded commands of a session or clip: real against simulated.
@@ -45,10 +44,8 @@ impl Replay {
     pub(crate) fn run(&self) -> anyhow::Result<()> {
         let session = Session::open_with(&self.path, self.cell.as_deref())?;
         let theta = self.parameters.as_deref().map(Theta::read).transpose()?;
-        let interrupted = Arc::new(AtomicBool::new(false));
-        let flag = Arc::clone(&interrupted);
-        ctrlc::set_handler(move || flag.store(true, Ordering::Relaxed)).context("cannot listen for Ctrl-C")?;
-        let gap = replay(&session, &Options { theta, out: self.out.clone() }, &interrupted)?;
+        ctrlc::set_handler(ending::ask).context("cannot listen for Ctrl-C")?;
+        let gap = replay(&session, &Options { theta, out: self.out.clone() })?;
         for clip in &gap.clips {
             for warning in &clip.warnings {
                 eprintln!("{}: {warning}", clip.file);

@@ -6,10 +6,10 @@ use super::write::write_clip;
 use indicatif::{ProgressBar, ProgressStyle};
 use rayon::prelude::*;
 use shared_mem::cell::ClipEntry;
+use shared_mem::ending;
 use shared_mem::recording::{Session, WriteError};
 use shared_mem::theta::Theta;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicBool, Ordering};
 
 /// How a session is replayed.
 #[derive(Debug, Clone, Default)]
@@ -31,12 +31,12 @@ enum ClipError {
     Interrupted,
 }
 
-/// Replays every clip of a session; clips that have not begun when `interrupted` turns true are left out.
+/// Replays every clip of a session; clips that are not done when the process is asked to end ([`ending`]) are left out.
 ///
 /// # Errors
 /// [`ReplayError`] when cell.toml or the parameters cannot be used for any clip. What is wrong with a single clip is
 /// found in [`SessionGap::failures`].
-pub fn replay(session: &Session, options: &Options, interrupted: &AtomicBool) -> Result<SessionGap, ReplayError> {
+pub fn replay(session: &Session, options: &Options) -> Result<SessionGap, ReplayError> {
     let replayer = Replayer::new(&session.cell, options.theta.as_ref())?;
     let template = "replay [{bar:30}] {pos}/{len} clips {eta}";
     let style = ProgressStyle::with_template(template).expect("a valid template").progress_chars("=> ");
@@ -47,7 +47,7 @@ pub fn replay(session: &Session, options: &Options, interrupted: &AtomicBool) ->
         .par_iter()
         .map(|entry| {
             let out = options.out.as_deref().map(|out| if single { out.to_owned() } else { place(out, entry) });
-            let result = one(&replayer, session, entry, out.as_deref(), interrupted);
+            let result = one(&replayer, session, entry, out.as_deref());
             bar.inc(1);
             (entry, result)
         })
@@ -76,13 +76,15 @@ fn one(
     session: &Session,
     entry: &ClipEntry,
     out: Option<&Path>,
-    interrupted: &AtomicBool,
 ) -> Result<ClipGap, ClipError> {
-    if interrupted.load(Ordering::Relaxed) {
-        return Err(ClipError::Interrupted);
-    }
-    let clip = session.read(entry).map_err(ReplayError::from)?;
-    let (clip, prediction, mut gap) = replayer.replay(clip)?;
+    let interrupted = || if ending::asked() { Err(ClipError::Interrupted) } else { Ok(()) };
+    interrupted()?;
+    let clip = session.read(entry).map_err(ReplayError::from);
+    // What an interrupted reading or run says is not the clip's fault.
+    interrupted()?;
+    let replayed = replayer.replay(clip?);
+    interrupted()?;
+    let (clip, prediction, mut gap) = replayed?;
     gap.file = entry.file.to_string_lossy().into_owned();
     if let Some(out) = out {
         write_clip(out, replayer, &clip, &prediction)?;

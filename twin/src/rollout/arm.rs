@@ -4,6 +4,7 @@
 use super::{ArmMotion, CommandTrack, Drive, Reading, TICK, TICK_NS};
 use crate::arm::{ArmModel, ControlLaw, JointState, MAX_JOINTS};
 use crate::effects::ArmEffects;
+use shared_mem::ending;
 
 /// An arm under its controller.
 #[derive(Debug, Clone, Copy)]
@@ -22,7 +23,8 @@ impl ArmRollout<'_> {
     /// Simulates from `start` at `start_ns` and writes the state at each of the ascending stamps `at_ns` into `out`.
     ///
     /// States are what the encoders read, the start's too. Commands from before `start_ns` are taken into account where
-    /// the command comes late. A stamp before `start_ns` gets the start. Stops when the shorter of `at_ns` and `out` is filled.
+    /// the command comes late. A stamp before `start_ns` gets the start. Stops when the shorter of `at_ns` and `out` is filled;
+    /// once the process is asked to end, with NaN ([`ending`]).
     pub fn run(
         &self,
         start: &JointState,
@@ -63,7 +65,7 @@ impl ArmRollout<'_> {
         while let Some((_, out)) = wanted.next_if(|(at, _)| **at <= start_ns) {
             *out = kept(reading);
         }
-        while wanted.peek().is_some() {
+        while wanted.peek().is_some() && !ending::asked() {
             row = commands.in_force(tick_ns, row);
             let before = reading;
             self.period(&mut motion, &Drive::JointImpedance { q_d: *commands.q_d(row), dq_d: *commands.dq_d(row) });
@@ -73,10 +75,17 @@ impl ArmRollout<'_> {
             }
             tick_ns += TICK_NS;
         }
+        wanted.for_each(|(_, out)| *out = kept(Reading::unknown()));
     }
 }
 
 impl Reading {
+    /// What an interrupted run answers: no number, so that nobody takes it for a prediction.
+    pub(super) fn unknown() -> Self {
+        let nan = [f64::NAN; MAX_JOINTS];
+        Self { state: JointState { q: nan, dq: nan }, tau_J: nan, tau_J_d: nan }
+    }
+
     /// The reading `share` of a period after `before`; torques hold over the period that ends with `self`.
     #[must_use]
     pub(super) fn after(&self, before: &Self, share: f64) -> Self {

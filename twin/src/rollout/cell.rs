@@ -5,6 +5,7 @@ use crate::arm::JointState;
 use crate::effects::CameraMemory;
 use crate::sim::{SimCell, SimError, SimState};
 use shared_mem::cell::Cell;
+use shared_mem::ending;
 use shared_mem::frames::{Base, Object, Pose};
 use shared_mem::theta::Theta;
 
@@ -131,7 +132,8 @@ impl CellRollout {
         self.advance(course, out, Until::Answered);
     }
 
-    /// Runs to the first tick that is not before `until_ns`, answering what is due by then.
+    /// Runs to the first tick that is not before `until_ns`, answering what is due by then; once the process is asked to end,
+    /// no further.
     pub fn run_until(&mut self, until_ns: u64, course: &Course<'_>, out: &mut CellTrace) {
         self.advance(course, out, Until::Stamp(until_ns));
     }
@@ -164,12 +166,24 @@ impl CellRollout {
         }
     }
 
+    /// Answers what is left of an interrupted run.
+    fn give_up(&mut self, course: &Course<'_>, out: &mut CellTrace, until: Until) {
+        if !matches!(until, Until::Stamp(_)) {
+            out.joints.resize(course.joints_ns.len(), Reading::unknown());
+            self.rest(course, out);
+        }
+    }
+
     /// Whether it stopped before a touch.
     fn advance(&mut self, course: &Course<'_>, out: &mut CellTrace, until: Until) -> bool {
         let mut before = (self.reading(), self.cell.object());
         let mut ticks = 0u64;
         self.keep(course, out, &before, &before, 0);
         while self.goes_on(course, out, until) {
+            if ending::asked() {
+                self.give_up(course, out, until);
+                return false;
+            }
             let start_ns = self.cell.time_ns();
             let may_stop = until == Until::Contact && self.contact().is_none() && self.cell.may_touch();
             if may_stop {

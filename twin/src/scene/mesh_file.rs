@@ -3,6 +3,7 @@
 
 use super::ObjectShape;
 use nalgebra::{Point3, Vector3};
+use shared_mem::input::{self, InputError};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
@@ -16,14 +17,9 @@ type Surface = (Vec<Point3<f64>>, Vec<[u32; 3]>);
 /// A mesh file cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum MeshFileError {
-    /// Missing or unreadable.
-    #[error("cannot read the mesh {}: {source}; check `object.mesh` in cell.toml", path.display())]
-    Read {
-        /// The file.
-        path: PathBuf,
-        /// What the system said.
-        source: std::io::Error,
-    },
+    /// Missing, no file, or too large.
+    #[error("{0} (`object.mesh` in cell.toml)")]
+    Input(#[from] InputError),
     /// Not what its name says, or empty.
     #[error("{}: {what}; use a triangulated obj, stl or ply in metres", path.display())]
     Content {
@@ -36,7 +32,7 @@ pub enum MeshFileError {
 
 /// Reads a mesh and moves the middle of its bounding box to the origin.
 pub(super) fn read(path: &Path) -> Result<ObjectShape, MeshFileError> {
-    let bytes = std::fs::read(path).map_err(|source| MeshFileError::Read { path: path.to_owned(), source })?;
+    let bytes = input::bytes(path, input::Kind::Mesh)?;
     let ending = path.extension().and_then(|e| e.to_str()).unwrap_or("").to_ascii_lowercase();
     let surface = match ending.as_str() {
         "obj" => obj(&bytes),
@@ -130,7 +126,7 @@ fn stl(bytes: &[u8]) -> Result<Surface, String> {
     let count = bytes.get(80..84).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]) as usize);
     let mut corners = Vec::new();
     if let Some(count) = count
-        && bytes.len() == 84 + 50 * count
+        && count.checked_mul(50).and_then(|size| size.checked_add(84)) == Some(bytes.len())
     {
         for facet in bytes[84..].chunks_exact(50) {
             corners.extend(facet[12..48].chunks_exact(12).map(|c| {
@@ -176,6 +172,21 @@ enum Scalar {
     Float(usize),
 }
 
+impl Scalar {
+    /// Size of a value in a binary file [bytes].
+    fn bytes(self) -> usize {
+        let (Self::Int(size) | Self::Float(size)) = self;
+        size
+    }
+}
+
+/// A table of a ply: so many rows with the same properties.
+struct Element {
+    name: String,
+    count: usize,
+    properties: Vec<Property>,
+}
+
 fn ply(bytes: &[u8]) -> Result<Surface, String> {
     let marker = b"end_header";
     let end = bytes.windows(marker.len()).position(|w| w == marker).ok_or("it has no `end_header`")? + marker.len();
@@ -188,21 +199,23 @@ fn ply(bytes: &[u8]) -> Result<Surface, String> {
     };
     let mut values = PlyValues { rest: &bytes[body_start..], binary };
     let (mut points, mut triangles) = (Vec::new(), Vec::new());
-    for (name, count, properties) in ply_elements(header)? {
-        for _ in 0..count {
+    for element in ply_elements(header)? {
+        values.expect(&element)?;
+        for _ in 0..element.count {
             let mut xyz = [0.0; 3];
-            for property in &properties {
-                let length = property.list_count.map_or(Ok(1.0), |kind| values.next(kind))?;
-                let list = (0..length as usize).map(|_| values.next(property.kind)).collect::<Result<Vec<_>, _>>()?;
-                match (name.as_str(), ["x", "y", "z"].iter().position(|axis| *axis == property.name)) {
-                    ("vertex", Some(axis)) => xyz[axis] = list[0],
-                    ("face", None) if property.name.starts_with("vertex_ind") => {
-                        fan(&list.iter().map(|v| *v as u32).collect::<Vec<_>>(), &mut triangles);
+            for property in &element.properties {
+                let axis = ["x", "y", "z"].iter().position(|axis| *axis == property.name);
+                match (element.name.as_str(), property.list_count, axis) {
+                    ("vertex", None, Some(axis)) => xyz[axis] = values.next(property.kind)?,
+                    ("face", Some(count), None) if property.name.starts_with("vertex_ind") => {
+                        let corners = values.list(count, property.kind)?;
+                        fan(&corners.iter().map(|v| *v as u32).collect::<Vec<_>>(), &mut triangles);
                     }
-                    _ => {}
+                    (_, Some(count), _) => drop(values.list(count, property.kind)?),
+                    (_, None, _) => drop(values.next(property.kind)?),
                 }
             }
-            if name == "vertex" {
+            if element.name == "vertex" {
                 points.push(Point3::from(xyz));
             }
         }
@@ -210,21 +223,22 @@ fn ply(bytes: &[u8]) -> Result<Surface, String> {
     Ok((points, triangles))
 }
 
-fn ply_elements(header: &str) -> Result<Vec<(String, usize, Vec<Property>)>, String> {
-    let mut elements: Vec<(String, usize, Vec<Property>)> = Vec::new();
+fn ply_elements(header: &str) -> Result<Vec<Element>, String> {
+    let mut elements: Vec<Element> = Vec::new();
     for line in header.lines() {
         let words: Vec<&str> = line.split_whitespace().collect();
         let bad = || format!("its header line `{line}` makes no sense");
         match words.as_slice() {
             ["element", name, count] => {
-                elements.push(((*name).to_owned(), count.parse().map_err(|_| bad())?, Vec::new()));
+                let count = count.parse().map_err(|_| bad())?;
+                elements.push(Element { name: (*name).to_owned(), count, properties: Vec::new() });
             }
-            ["property", "list", count, kind, name] => elements.last_mut().ok_or_else(bad)?.2.push(Property {
+            ["property", "list", count, kind, name] => elements.last_mut().ok_or_else(bad)?.properties.push(Property {
                 name: (*name).to_owned(),
                 kind: scalar(kind).ok_or_else(bad)?,
                 list_count: Some(scalar(count).ok_or_else(bad)?),
             }),
-            ["property", kind, name] => elements.last_mut().ok_or_else(bad)?.2.push(Property {
+            ["property", kind, name] => elements.last_mut().ok_or_else(bad)?.properties.push(Property {
                 name: (*name).to_owned(),
                 kind: scalar(kind).ok_or_else(bad)?,
                 list_count: None,
@@ -253,6 +267,33 @@ struct PlyValues<'a> {
 }
 
 impl PlyValues<'_> {
+    /// Fails where the file is too short for the rows of a table, of which each takes at least a byte.
+    fn expect(&self, element: &Element) -> Result<(), String> {
+        // Text takes a digit and what parts it from the next one.
+        let size = |kind: Scalar| if self.binary { kind.bytes() } else { 2 };
+        let of = |property: &Property| size(property.list_count.unwrap_or(property.kind));
+        let row: usize = element.properties.iter().map(of).sum();
+        let Element { name, count, .. } = element;
+        if row == 0 && *count > 0 {
+            return Err(format!("its table `{name}` has {count} rows without columns"));
+        }
+        // The last number of a text needs nothing behind it.
+        if count.checked_mul(row).is_none_or(|needed| needed > self.rest.len() + 1) {
+            let left = self.rest.len();
+            return Err(format!("its header says {count} rows of `{name}`, and only {left} bytes are left for them"));
+        }
+        Ok(())
+    }
+
+    /// A count and as many values.
+    fn list(&mut self, count: Scalar, kind: Scalar) -> Result<Vec<f64>, String> {
+        let count = self.next(count)?;
+        if !(count >= 0.0 && count <= self.rest.len() as f64) {
+            return Err(format!("a list claims {count} values, and {} bytes are left", self.rest.len()));
+        }
+        (0..count as usize).map(|_| self.next(kind)).collect()
+    }
+
     fn next(&mut self, kind: Scalar) -> Result<f64, String> {
         let cut = || "it ends in the middle".to_owned();
         if !self.binary {
@@ -263,7 +304,7 @@ impl PlyValues<'_> {
             let text = std::str::from_utf8(word).unwrap_or("");
             return text.parse().map_err(|_| format!("`{text}` is no number"));
         }
-        let (Scalar::Int(size) | Scalar::Float(size)) = kind;
+        let size = kind.bytes();
         let (value, rest) = self.rest.split_at_checked(size).ok_or_else(cut)?;
         self.rest = rest;
         let mut eight = [0; 8];

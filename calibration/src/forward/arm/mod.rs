@@ -26,6 +26,7 @@ pub use piece::one_piece;
 use crate::estimate::{ClipModel, Impossible, Random};
 use clip::ArmClip;
 use shared_mem::cell::Cell;
+use shared_mem::ending;
 use shared_mem::msg::{Joints, MAX_JOINTS};
 use shared_mem::recording::Clip;
 use shared_mem::theta::Theta;
@@ -257,6 +258,9 @@ impl<F: Fn(&[f64]) -> Theta + Sync> ArmClips<F> {
             }
             let stamps_ns = &measured.stamps_ns[run.clone()];
             rollout.readings(&start, stamps_ns[0], commands, stamps_ns, &mut out[run.clone()]);
+            if ending::asked() {
+                return Err(Impossible("interrupted".into()));
+            }
             if out[run.end - 1].state.q.iter().any(|q| !q.is_finite()) {
                 return Err(Impossible(
                     "the simulated arm diverges; the damping may be too large for a 1 kHz controller".into(),

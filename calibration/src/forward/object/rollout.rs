@@ -10,6 +10,7 @@ use super::own::{Own, Values};
 use crate::estimate::Impossible;
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use shared_mem::cell::{Cell, ClipKind};
+use shared_mem::ending;
 use shared_mem::frames::Pose;
 use shared_mem::theta::{ObjectTheta, Theta};
 use std::sync::Arc;
@@ -73,6 +74,11 @@ fn impossible(error: impl std::fmt::Display) -> Impossible {
     Impossible(error.to_string())
 }
 
+/// A run that was interrupted has no answer, and its clock stands still.
+fn not_interrupted() -> Result<(), Impossible> {
+    if ending::asked() { Err(impossible("interrupted")) } else { Ok(()) }
+}
+
 impl Job<'_> {
     /// Simulates the clip.
     pub(super) fn run(mut self) -> Result<Outcome, Impossible> {
@@ -99,6 +105,7 @@ impl Job<'_> {
             let (clip, mut rested) = (self.clip, 0);
             while self.worker.now_ns() < clip.end_ns && !(rested > REST_PERIODS && self.worker.now_ns() > clip.rest_ns)
             {
+                not_interrupted()?;
                 self.tick(&mut joints);
                 let still = self.keep(&mut path)?;
                 rested = if still { rested + 1 } else { 0 };
@@ -124,6 +131,7 @@ impl Job<'_> {
         if let Some(from) = &approach.checkpoint {
             self.worker.resume(from);
             while self.worker.now_ns() < self.clip.free_ns {
+                not_interrupted()?;
                 self.tick(&mut joints);
                 self.keep(&mut path)?;
             }
@@ -146,6 +154,7 @@ impl Job<'_> {
         let end_ns = [self.clip.end_ns];
         let course = Course { commands: Some(commands), joints_ns: self.joints_ns, poses_ns: &end_ns };
         let contact_ns = self.worker.run_until_contact(&course, &mut joints);
+        not_interrupted()?;
         let checkpoint = contact_ns.map(|_| self.worker.checkpoint());
         self.worker.set_parameters(self.theta).map_err(impossible)?;
         Ok(Approach { key, joints, checkpoint, contact_ns })
@@ -168,6 +177,7 @@ impl Job<'_> {
         self.worker.start(start_ns, None, Some(&state), None);
         let (mut path, mut rested) = (Path { start_ns, poses: vec![pose] }, 0);
         while self.worker.now_ns() < self.clip.end_ns && rested <= REST_PERIODS {
+            not_interrupted()?;
             self.worker.tick(None);
             rested = if self.keep(&mut path)? { rested + 1 } else { 0 };
         }

@@ -169,6 +169,9 @@ fn identify_material(
     answer.warnings.extend(doubt::doubts(&answer, &finding, &model, &clips, &before));
     answer.advice = advice::next(&finding, &clips);
     clips.fill(&mut answer);
+    if interrupt.asked() {
+        return Err(RunError::Ended.into());
+    }
     if let Some(out) = &options.out {
         write(&settings.theta(&outcome.fit.shared), out)?;
         answer.theta_file = out.display().to_string();

@@ -13,7 +13,7 @@ use crate::estimate::{ClipModel as _, Unknown};
 use crate::forward::object::ObjectClips;
 use crate::forward::{Setting, Settings};
 use crate::identify::answer::Figures;
-use crate::identify::run::{Optimizer, Run};
+use crate::identify::run::{Optimizer, Run, RunError};
 use crate::interrupt::Interrupt;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -76,6 +76,9 @@ pub fn compare(options: &Options, interrupt: &Interrupt) -> Result<Comparison, O
     let swarm = slopeless("particle swarm", Optimizer::Swarm, &problem, &material, options, interrupt)?;
     let evolution = slopeless("CMA-ES", Optimizer::Evolution, &problem, &material, options, interrupt)?;
     let slopes = sloped("gradient without centre of mass", &pin, &material, Searcher::Slopes, interrupt)?;
+    if interrupt.asked() {
+        return Err(RunError::Ended.into());
+    }
     let target = swarm.loss_m;
     let clips = |method: &Method| method.to(target).map(|(clips, _)| clips as f64);
     let fewer = clips(&alone).zip(clips(&swarm)).map(|(alone, swarm)| swarm / alone);

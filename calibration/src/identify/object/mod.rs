@@ -156,6 +156,9 @@ pub fn identify(options: &Options, interrupt: &Interrupt) -> Result<Identificati
     figures::fill(&mut answer, &material, [problem.settings.base(), &theta])?;
     let doubts = doubt::doubts(&answer, &material.cell);
     answer.warnings.extend(doubts);
+    if interrupt.asked() {
+        return Err(RunError::Ended.into());
+    }
     if let Some(out) = &options.out {
         std::fs::write(out, theta.to_toml()).map_err(|source| ObjectError::Write { path: out.clone(), source })?;
         answer.theta_file = out.display().to_string();

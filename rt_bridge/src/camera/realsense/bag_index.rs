@@ -3,8 +3,8 @@
 //! Source: the ROS bag format 2.0 (wiki.ros.org/Bags/Format/2.0): records of a header (fields `name=value`) and data; a bag
 //! header that says where the index begins; there, connections (topics) and, per chunk, messages per connection.
 
+use shared_mem::input::{self, InputError};
 use std::collections::BTreeMap;
-use std::fs::File;
 use std::io::{self, BufReader, Read, Seek, SeekFrom};
 use std::path::Path;
 
@@ -18,6 +18,9 @@ const CONNECTION: u8 = 7;
 /// Why a recording cannot be counted.
 #[derive(Debug, thiserror::Error)]
 pub(super) enum IndexError {
+    /// It is missing, or no file.
+    #[error(transparent)]
+    Input(#[from] InputError),
     /// The disk.
     #[error("{0}")]
     Io(#[from] io::Error),
@@ -31,7 +34,7 @@ pub(super) enum IndexError {
 
 /// Depth pictures in a recording; of the depth stream that has most.
 pub(super) fn depth_pictures(bag: &Path) -> Result<usize, IndexError> {
-    count(BufReader::new(File::open(bag)?))
+    count(BufReader::new(input::open(bag)?))
 }
 
 fn count(mut file: impl Read + Seek) -> Result<usize, IndexError> {

@@ -5,9 +5,11 @@
 mod clocks;
 mod degrees;
 mod object;
+mod outlying;
 mod wraps;
 
-pub(super) use object::object;
+pub(super) use object::{beside_arm, object};
+pub(super) use outlying::find as outlying_rows;
 
 use super::series::JointSeries;
 
@@ -21,6 +23,10 @@ pub(super) fn joints(
     names: &[String],
 ) -> Result<(JointSeries, Vec<String>), String> {
     let mut warnings = Vec::new();
+    if let Some(outlying) = outlying_rows(&series.stamps_ns, topic)? {
+        series = series.select_rows(&outlying.kept);
+        warnings.push(outlying.warning);
+    }
     let moves = (1..series.len()).any(|i| step(&series, 0, i) > 1e-3);
     let dof = series.dof;
     unlogged_block(&mut series.dq, (dof, moves), topic, "velocities", &mut warnings);

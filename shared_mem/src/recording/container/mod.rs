@@ -9,6 +9,7 @@ mod framing;
 pub(super) use framing::Damage;
 
 use super::error::ReadError;
+use crate::{ending, input};
 use fields::{Chunk, Fields};
 use framing::{Framing, PREFIX, op};
 use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
@@ -109,7 +110,7 @@ pub(super) struct Messages<R> {
 impl Messages<BufReader<File>> {
     /// Opens a file.
     pub(super) fn open(path: &Path) -> Result<Self, ReadError> {
-        let file = File::open(path).map_err(ReadError::io(path))?;
+        let file = input::open(path)?;
         if file.metadata().is_ok_and(|about| about.is_file() && about.len() == 0) {
             let what = "is empty: its recorder ended before it wrote anything; record the clip again";
             return Err(ReadError::kind(path, what));
@@ -158,6 +159,9 @@ impl<R: Read + Seek> Messages<R> {
     /// The message that [`Messages::advance`] will go to.
     pub(super) fn peek(&mut self) -> Result<Option<Message<'_>>, ReadError> {
         while self.next >= self.entries.len() {
+            if ending::asked() {
+                return Err(ReadError::Interrupted { path: self.path.clone() });
+            }
             if !self.load().map_err(ReadError::io(&self.path))? {
                 return Ok(None);
             }

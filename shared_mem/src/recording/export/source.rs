@@ -3,12 +3,13 @@
 
 use super::super::container::Messages;
 use super::super::device_clock::DeviceClock;
-use super::super::own::clip_info;
+use super::super::own::{clip_info, well_stamped};
 use super::super::ros2::CompressedImage;
 use super::super::writer::{METADATA, UNIX_OFFSET_NS};
 use super::super::{Clip, ClipMessages, Payload, Picture, ReadError, Session, read_arm_states, twinaligner};
 use super::npz;
 use crate::cell::{Cell, ClipEntry};
+use crate::input;
 use crate::msg::arm::ArmState;
 use crate::msg::image::{CameraInfo, ImageHeader, PixelEncoding, StampDomain};
 use std::path::{Path, PathBuf};
@@ -118,7 +119,11 @@ fn kind_of_file(path: &Path, cell: &Cell) -> Result<Kind, ReadError> {
     let offset = record.and_then(|record| record.pairs.get(UNIX_OFFSET_NS)?.parse().ok());
     // A clip without an arm has no robot's clock.
     let states = read_arm_states(path).unwrap_or_default();
-    let (host, device): (Vec<u64>, Vec<u64>) = states.iter().map(|s| (s.stamp_ns, s.device_ns)).unzip();
+    let stamps = |states: &[ArmState]| states.iter().map(|s| (s.stamp_ns, s.device_ns)).unzip();
+    let (host, device): (Vec<u64>, Vec<u64>) = stamps(&states);
+    let (kept, _already_said_by_the_clip) = well_stamped(&host, &device).map_err(|what| ReadError::kind(path, what))?;
+    let states: Vec<ArmState> = kept.iter().filter_map(|row| states.get(*row).cloned()).collect();
+    let (host, device): (Vec<u64>, Vec<u64>) = stamps(&states);
     Ok(Kind::Own(Own {
         unix_offset_ns: offset.unwrap_or(0),
         clock: DeviceClock::new(&host, &device),
@@ -129,11 +134,11 @@ fn kind_of_file(path: &Path, cell: &Cell) -> Result<Kind, ReadError> {
 
 /// What `cam_K.txt` tells about the camera; `None` where it is not there or no matrix. Its pictures tell their size.
 fn camera(folder: &Path, stamp_ns: u64) -> Option<Beside> {
-    let text = std::fs::read_to_string(folder.join("cam_K.txt")).ok()?;
+    let text = input::text(&folder.join("cam_K.txt"), input::Kind::Configuration).ok()?;
     let numbers: Vec<f64> = text.split_whitespace().map_while(|word| word.parse().ok()).collect();
     let &[fx, _, cx, _, fy, cy, ..] = numbers.as_slice() else { return None };
     // A PNG's size stands behind its signature and the name of its first part.
-    let png = std::fs::read(folder.join("rgb/00000.png")).unwrap_or_default();
+    let png = input::bytes(&folder.join("rgb/00000.png"), input::Kind::Picture).unwrap_or_default();
     let size = |at: usize| png.get(at..at + 4).map_or(0, |b| u32::from_be_bytes([b[0], b[1], b[2], b[3]]));
     let intrinsics = [fx, fy, cx, cy];
     let info = CameraInfo { stamp_ns, width: size(16), height: size(20), intrinsics, ..CameraInfo::default() };
@@ -163,7 +168,8 @@ impl Iterator for FolderPictures<'_> {
             if !file.is_file() {
                 continue;
             }
-            let picture = std::fs::read(&file).map_err(ReadError::io(&file)).and_then(|bytes| {
+            let of = if is_depth { input::Kind::Array } else { input::Kind::Picture };
+            let picture = input::bytes(&file, of).map_err(ReadError::from).and_then(|bytes| {
                 let read = if is_depth { depth(&bytes, stamp_ns) } else { colour(&bytes, stamp_ns) };
                 read.map_err(|what| ReadError::kind(&file, what))
             });

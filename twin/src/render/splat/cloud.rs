@@ -4,6 +4,7 @@
 use super::harmonics::turns;
 use super::{compressed, ply};
 use nalgebra::{Point3, Similarity3, UnitQuaternion, Vector3};
+use shared_mem::input::{self, InputError};
 use std::path::{Path, PathBuf};
 
 /// One splat, without its colour.
@@ -33,10 +34,13 @@ pub struct SplatCloud {
 /// A splat file cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum SplatError {
-    /// Missing or unreadable.
-    #[error("cannot read the splats {}: {source}; check the path", path.display())]
-    Read {
-        /// The file.
+    /// Missing, no file, or too large.
+    #[error(transparent)]
+    Input(#[from] InputError),
+    /// A folder that cannot be listed.
+    #[error("cannot list the splats in {}: {source}; give the path of a folder", path.display())]
+    Folder {
+        /// The folder.
         path: PathBuf,
         /// What the system said.
         source: std::io::Error,
@@ -71,7 +75,7 @@ impl SplatCloud {
     /// # Errors
     /// [`SplatError`] when it is missing, cut short, holds values that are no numbers, or is another kind of file.
     pub fn read(path: &Path) -> Result<Self, SplatError> {
-        let bytes = std::fs::read(path).map_err(|source| SplatError::Read { path: path.to_owned(), source })?;
+        let bytes = input::bytes(path, input::Kind::Splats)?;
         Self::parse(&bytes).map_err(|what| SplatError::Content { path: path.to_owned(), what })
     }
 

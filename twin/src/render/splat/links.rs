@@ -17,7 +17,7 @@ pub fn link_file(link: usize) -> String {
 /// # Errors
 /// [`SplatError`] when there is none, or one cannot be used.
 pub fn read_links(folder: &Path) -> Result<Vec<(usize, SplatCloud)>, SplatError> {
-    let read = |source| SplatError::Read { path: folder.to_owned(), source };
+    let read = |source| SplatError::Folder { path: folder.to_owned(), source };
     let mut files: Vec<_> = std::fs::read_dir(folder).map_err(read)?.filter_map(|e| Some(e.ok()?.path())).collect();
     files.sort();
     let mut out = Vec::new();
