@@ -392,8 +392,9 @@ fn a_row_with_a_stamp_of_zero_or_a_day_off_is_left_out_and_the_rest_is_as_if_it_
                 let told = clip.warnings.iter().filter(|w| w.contains(topic) && w.contains("left out")).count();
                 let named = format!("row {row}: ");
                 assert!(told == 1 && clip.warnings.iter().any(|w| w.contains(&named)), "{:?}", clip.warnings);
-                let rest =
-                    |clip: &shared_mem::recording::Clip| (clip.measured.clone(), clip.desired.clone(), clip.object.clone());
+                let rest = |clip: &shared_mem::recording::Clip| {
+                    (clip.measured.clone(), clip.desired.clone(), clip.object.clone())
+                };
                 assert_eq!(rest(&clip), rest(&without), "{topic}, row {row}, {shift}");
             }
         }

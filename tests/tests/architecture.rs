@@ -61,6 +61,21 @@ fn each_big_dependency_has_one_door() {
 }
 
 #[test]
+fn files_come_in_by_one_door() {
+    let doors = ["shared_mem/src/input.rs", "shared_mem/src/output.rs", "rt_bridge/src/doctor/"];
+    let ways = ["fs::read(", "fs::read_to_string(", "File::open("];
+    for (file, text) in product_sources() {
+        let product = text.split("#[cfg(test)]").next().unwrap_or("");
+        let enters =
+            product.lines().any(|l| !l.trim_start().starts_with("//") && ways.iter().any(|way| l.contains(way)));
+        assert!(
+            !enters || doors.iter().any(|door| file.starts_with(door)),
+            "{file} reads a file by itself; shared_mem::input refuses pipes, devices and files without end"
+        );
+    }
+}
+
+#[test]
 fn every_file_says_what_it_owns_and_stays_readable() {
     for (file, text) in product_sources() {
         assert!(text.starts_with("//!"), "{file} does not begin by saying what it owns (`//!`)");

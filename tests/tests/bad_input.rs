@@ -1,5 +1,8 @@
 //! What people get wrong: each time one line that says what and what to do, exit code 1, and nothing lost.
 
+use shared_mem::msg::arm::ArmState;
+use shared_mem::msg::joints_from;
+use shared_mem::recording::{ClipInfo, ClipWriter};
 use std::io::Write as _;
 use std::time::Duration;
 use tests::{Cell, Finished, lab_cell};
@@ -72,6 +75,100 @@ fn a_file_that_is_no_recording_is_named() {
     std::fs::write(cell.path("no.mcap"), b"not a recording at all").expect("written");
     let end = run(&cell, "twin", &["replay", "{dir}/no.mcap", "--cell", "{cell}"]);
     assert!(end.complaint().contains("no.mcap"), "{}", end.complaint());
+}
+
+#[test]
+fn pipes_devices_folders_and_files_without_end_are_named_at_once() {
+    let cell = Cell::shipped();
+    let (pipe, huge) = (cell.path("pipe"), cell.path("huge.toml"));
+    rustix::fs::mkfifoat(rustix::fs::CWD, &pipe, rustix::fs::Mode::RUSR).expect("a pipe");
+    std::fs::File::create(&huge).and_then(|file| file.set_len(1 << 40)).expect("a file without bytes on the disk");
+    std::fs::create_dir(cell.path("folder.toml")).expect("a folder");
+    let cases = [
+        ("{dir}/pipe", "a pipe"),
+        ("/dev/zero", "a device"),
+        ("{dir}/folder.toml", "a folder"),
+        ("{dir}/huge.toml", "16 MiB at most"),
+    ];
+    for (path, what) in cases {
+        let end = run(&cell, "twin", &["shadow", "--cell", path]);
+        let name = path.rsplit('/').next().unwrap_or("");
+        assert!(end.complaint().contains(what) && end.complaint().contains(name), "{}", end.complaint());
+    }
+    for (path, what) in [("{dir}/pipe", "a pipe"), ("/dev/zero", "a device")] {
+        let end = run(&cell, "twin", &["replay", path, "--cell", "{cell}"]);
+        assert!(end.complaint().contains(what), "{}", end.complaint());
+    }
+}
+
+#[test]
+fn shapes_that_make_no_sense_are_named_at_once() {
+    let object = "[table]\nheight = 0.0\n[object]\nmesh = \"body.ply\"\nmass_range = [0.1, 1.0]\n";
+    let robot = "[robot]\nurdf = \"deep.urdf\"\n[controller]\nstiffness = [1]\ndamping = [1]\n";
+    let floats = "property float x\nproperty float y\nproperty float z\n";
+    let lists = "property list uchar float x\nproperty float y\nproperty float z\n";
+    let ply = |vertices: &str, columns: &str, values: &str| {
+        format!("ply\nformat ascii 1.0\nelement vertex {vertices}\n{columns}end_header\n{values}")
+    };
+    let cases = [
+        (object, "body.ply", ply("4", lists, "0 0 0\n0 0 0\n0 0 0\n0 0 0\n"), "corners"),
+        (object, "body.ply", ply("1000000000000", "", ""), "rows without columns"),
+        (object, "body.ply", ply("1000000000000", floats, "0 0 0\n"), "1000000000000 rows"),
+        (robot, "deep.urdf", "<a>".repeat(300_000), "300000 deep"),
+    ];
+    for (cell, file, text, what) in cases {
+        let cell = Cell::with(cell);
+        std::fs::write(cell.path(file), text).expect("a file");
+        let end = run(&cell, "twin", &["shadow", "--cell", "{cell}"]);
+        assert!(end.complaint().contains(file) && end.complaint().contains(what), "{}", end.complaint());
+    }
+}
+
+/// A clip of the arm at rest with a state every `step` ns; `stamp` may change what a state says.
+fn clip_at_rest(path: &std::path::Path, rows: u64, step: u64, stamp: impl Fn(u64, u64) -> u64) {
+    let mut writer = ClipWriter::create(path, &ClipInfo::default()).expect("a new file");
+    for i in 0..rows {
+        let stamp_ns = stamp(i, 1_000_000_000_000 + i * step);
+        let q = joints_from(&[0.0, -0.785, 0.0, -2.356, 0.0, 1.571, 0.785 + 1e-4 * (i % 7) as f64]);
+        let state = ArmState { stamp_ns, device_ns: stamp_ns, cycle: i, dof: 7, q, q_d: q, ..ArmState::default() };
+        writer.arm_state(&state).expect("room");
+    }
+    writer.finish().expect("room");
+}
+
+#[test]
+fn a_stamp_of_zero_or_a_day_off_costs_its_row_and_a_word() {
+    const DAY: u64 = 86_400_000_000_000;
+    let cell = Cell::shipped();
+    clip_at_rest(&cell.path("clean.mcap"), 500, 1_000_000, |_, usual| usual);
+    let answer = |clip: &str| {
+        let end = run(&cell, "twin", &["replay", &cell.text(clip), "--cell", "{cell}", "--json"]).succeeded();
+        (end.json()["clips"][0]["joint_rms_rad"][0].as_f64().expect("a number"), end.stderr)
+    };
+    let (clean, _) = answer("clean.mcap");
+    for (name, wrong) in [("zero.mcap", 0), ("ahead.mcap", 1_000_000_000_000 + DAY), ("back.mcap", 1_000_000_000)] {
+        clip_at_rest(&cell.path(name), 500, 1_000_000, |i, usual| if i == 250 { wrong } else { usual });
+        let (rms, said) = answer(name);
+        assert!(said.contains(&format!("{name}: ")) && said.contains("1 of 500 rows left out"), "{said}");
+        assert!((rms - clean).abs() < 1e-4, "{rms} against {clean}");
+    }
+}
+
+#[test]
+fn a_replay_that_would_take_an_hour_ends_when_it_is_asked_to() {
+    let cell = Cell::shipped();
+    // A row every 50 s: ten days, which no pause between two rows gives away.
+    clip_at_rest(&cell.path("long.mcap"), 20_000, 50_000_000_000, |_, usual| usual);
+    let replay = cell.start("twin", &["replay", "{dir}/long.mcap", "--cell", "{cell}"]);
+    // Until it listens to signals: bit 1 of the mask is SIGINT.
+    Cell::until("listening", Duration::from_secs(20), || {
+        let status = std::fs::read_to_string(format!("/proc/{}/status", replay.pid())).unwrap_or_default();
+        let mask = status.lines().find_map(|line| line.strip_prefix("SigCgt:"));
+        mask.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok()).is_some_and(|mask| mask >> 1 & 1 == 1)
+    });
+    std::thread::sleep(Duration::from_secs(1));
+    let end = replay.interrupt();
+    assert!(end.complaint().contains("interrupted"), "{}", end.complaint());
 }
 
 #[test]

@@ -91,8 +91,7 @@ impl Session {
     /// [`SessionError`] when cell.toml cannot be read or written.
     pub fn enter(&self, file: &Path, kind: ClipKind) -> Result<(), SessionError> {
         let path = self.cell_file();
-        let mut text =
-            input::text(&path, input::Kind::Configuration)?;
+        let mut text = input::text(&path, input::Kind::Configuration)?;
         let entry = Cell { clips: vec![ClipEntry { file: file.to_owned(), kind }], ..Cell::default() };
         text.push('\n');
         text.push_str(&entry.to_toml());

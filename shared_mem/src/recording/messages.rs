@@ -142,7 +142,7 @@ fn own(message: &Message<'_>) -> Result<Option<Payload>, String> {
             let image = proto::foxglove::RawImage::decode(data)
                 .map_err(|e| format!("a message is no foxglove.RawImage ({e})"))?;
             let Some((header, pixels)) = wire::image_from_wire(image) else { return Ok(None) };
-            Payload::Picture(Picture::Pixels { header, pixels })
+            Payload::Picture(Picture::from_own(header, pixels)?)
         }
         _ => return Ok(None),
     }))

@@ -42,6 +42,21 @@ enum Pixel {
 }
 
 impl Picture {
+    /// From an own clip; a sentence where the pixels are fewer than the header says.
+    pub(super) fn from_own(header: ImageHeader, pixels: Vec<u8>) -> Result<Self, String> {
+        let ImageHeader { width, height, stride, .. } = header;
+        check_size(width, height)?;
+        let bytes = if header.encoding == PixelEncoding::Rgb8 { 3 } else { 2 };
+        let [row, needed] = [u64::from(width) * bytes, u64::from(stride) * u64::from(height)];
+        if row > u64::from(stride) || needed > pixels.len() as u64 {
+            let held = pixels.len();
+            return Err(format!(
+                "a picture of {width} x {height} pixels in rows of {stride} bytes holds only {held} bytes"
+            ));
+        }
+        Ok(Self::Pixels { header, pixels })
+    }
+
     /// From `sensor_msgs/Image`; a sentence for an encoding that has no meaning here.
     pub(super) fn from_image(image: &Image<'_>) -> Result<Self, String> {
         let pixel = match image.encoding {
@@ -210,6 +225,36 @@ mod tests {
     fn a_picture_that_is_shorter_than_its_size_says_is_refused() {
         assert!(Picture::from_image(&image("rgb8", 1000, 3000, &[0; 10])).is_err());
         assert!(Picture::from_image(&image("rgb8", u32::MAX, u32::MAX, &[0; 10])).is_err());
+    }
+
+    #[test]
+    fn a_small_file_that_claims_a_huge_picture_is_refused_before_it_is_unpacked() {
+        // The header of a PNG, with any size and without any pixels behind it.
+        let png = |width: u32, height: u32| {
+            let mut out = PNG.to_vec();
+            let header = [b"IHDR", &width.to_be_bytes()[..], &height.to_be_bytes(), &[8, 6, 0, 0, 0]].concat();
+            out.extend(13_u32.to_be_bytes());
+            out.extend(&header);
+            out.extend(crc32fast::hash(&header).to_be_bytes());
+            let data = [0x78, 0x9c, 0x03, 0x00, 0x00, 0x00, 0x00, 0x01];
+            out.extend(8_u32.to_be_bytes());
+            let part = [&b"IDAT"[..], &data].concat();
+            out.extend(&part);
+            out.extend(crc32fast::hash(&part).to_be_bytes());
+            out
+        };
+        for (width, height) in [(1 << 16, 1 << 16), (i32::MAX as u32, i32::MAX as u32), (1 << 25, 2)] {
+            let error = unpack_png(&png(width, height), 0).expect_err("too large");
+            assert!(error.contains("too large") || error.contains("damaged"), "{error}");
+            let bytes = [vec![0; 12], png(width, height)].concat();
+            let compressed = CompressedImage { stamp_ns: 1, format: "16UC1; compressedDepth png", data: &bytes };
+            assert!(Picture::from_compressed(&compressed).is_err());
+        }
+        let header = ImageHeader { width: 1 << 16, height: 1 << 16, stride: 3 << 16, ..ImageHeader::default() };
+        assert!(Picture::from_own(header, vec![0; 64]).expect_err("too large").contains("too large"));
+        let header = ImageHeader { width: 4, height: 4, stride: 12, ..ImageHeader::default() };
+        assert!(Picture::from_own(header, vec![0; 47]).expect_err("too few").contains("only 47 bytes"));
+        assert!(Picture::from_own(header, vec![0; 48]).is_ok());
     }
 
     #[test]

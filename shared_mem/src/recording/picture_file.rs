@@ -108,6 +108,15 @@ mod tests {
     }
 
     #[test]
+    fn a_jpeg_that_claims_a_huge_picture_is_refused_before_it_is_unpacked() {
+        let mut bytes = jpeg();
+        let frame = bytes.windows(2).position(|marker| marker == [0xff, 0xc0]).expect("a start of frame");
+        bytes[frame + 5..frame + 9].copy_from_slice(&[0x3f, 0xff, 0x3f, 0xff]);
+        let error = unpack_picture(&bytes, 0).expect_err("268 million pixels");
+        assert!(error.contains("16383 x 16383 pixels is too large"), "{error}");
+    }
+
+    #[test]
     fn what_is_written_is_read_back() {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("a.png");

@@ -71,12 +71,7 @@ fn place(out: &Path, entry: &ClipEntry) -> PathBuf {
     out.join(name).with_extension("mcap")
 }
 
-fn one(
-    replayer: &Replayer,
-    session: &Session,
-    entry: &ClipEntry,
-    out: Option<&Path>,
-) -> Result<ClipGap, ClipError> {
+fn one(replayer: &Replayer, session: &Session, entry: &ClipEntry, out: Option<&Path>) -> Result<ClipGap, ClipError> {
     let interrupted = || if ending::asked() { Err(ClipError::Interrupted) } else { Ok(()) };
     interrupted()?;
     let clip = session.read(entry).map_err(ReplayError::from);

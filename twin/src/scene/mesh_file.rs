@@ -397,6 +397,23 @@ mod tests {
     }
 
     #[test]
+    fn a_ply_whose_header_promises_what_is_not_there_is_refused() {
+        let file = |columns: &str, count: &str, values: &str| {
+            format!("ply\nformat ascii 1.0\nelement vertex {count}\n{columns}end_header\n{values}")
+        };
+        let cases = [
+            (file("property list uchar float x\n", "4", "0\n0\n0\n0\n"), "4 corners and 0 triangles"),
+            (file("", "1000000000000", ""), "rows without columns"),
+            (file("property float x\n", "18446744073709551615", "1\n"), "18446744073709551615 rows"),
+            (file("property list uchar float x\n", "1", "1e18 0\n"), "a list claims"),
+        ];
+        for (text, told) in cases {
+            let error = read_as("a.ply", text.as_bytes()).expect_err(told);
+            assert!(error.contains(told), "{error}");
+        }
+    }
+
+    #[test]
     fn a_mesh_inside_out_is_turned_around_and_its_open_edges_are_counted() {
         let inverted: String = FACES.iter().map(|f| format!("f {} {} {}\n", f[1] + 1, f[0] + 1, f[2] + 1)).collect();
         let corners: String = TETRAHEDRON.iter().map(|[x, y, z]| format!("v {x} {y} {z}\n")).collect();

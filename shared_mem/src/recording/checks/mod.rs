@@ -16,6 +16,9 @@ use super::series::JointSeries;
 /// Largest share of rows that may be left out before reading fails.
 const LARGEST_BAD_SHARE: f64 = 0.01;
 
+/// Beyond this no number of a joint was measured [rad, rad/s, N m], and sums of squares lose all others.
+const LARGEST_NUMBER: f64 = 1e6;
+
 /// Mends a joint series and tells what was found; fails with a sentence when too much of it is unusable.
 pub(super) fn joints(
     mut series: JointSeries,
@@ -99,14 +102,14 @@ fn drop_non_finite(
 ) -> Result<JointSeries, String> {
     let bad_joint = |i: usize| {
         let rows = [Some(series.q_row(i)), series.dq_row(i), series.tau_row(i)];
-        rows.into_iter().flatten().find_map(|row| row.iter().position(|v| !v.is_finite()))
+        rows.into_iter().flatten().find_map(|row| row.iter().position(|v| !(v.abs() <= LARGEST_NUMBER)))
     };
     let good: Vec<usize> = (0..series.len()).filter(|&i| bad_joint(i).is_none()).collect();
     let Some((row, joint)) = (0..series.len()).find_map(|i| Some((i, bad_joint(i)?))) else {
         return Ok(series.clone());
     };
     let joint = names.get(joint).map_or_else(|| format!("joint {}", joint + 1), |name| format!("joint `{name}`"));
-    let what = format!("row {row}, {joint} is not finite (NaN or infinite)");
+    let what = format!("row {row}, {joint} is not finite (NaN or infinite) or beyond {LARGEST_NUMBER:e}");
     warnings.push(left_out(topic, series.len() - good.len(), series.len(), &what)?);
     Ok(series.select_rows(&good))
 }

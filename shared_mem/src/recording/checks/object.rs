@@ -7,6 +7,8 @@ use crate::time::seconds_between;
 
 /// No table reaches this far from its robot [m].
 const FARTHEST: f64 = 20.0;
+/// Nothing was ever tracked there, whatever its unit [m].
+const NOWHERE: f64 = 1e6;
 /// A tracker may run this long before an arm moves and after it [ns].
 const LONGEST_ALONE_NS: u64 = 60_000_000_000;
 
@@ -21,11 +23,13 @@ pub(in super::super) fn object(
         rows = outlying.kept.iter().filter_map(|row| rows.get(*row).copied()).collect();
         warnings.push(outlying.warning);
     }
+    let somewhere = |pose: &Pose<Base, Object>| pose.position().iter().all(|v| v.abs() < NOWHERE);
+    rows.iter_mut().for_each(|(_, pose)| *pose = pose.filter(somewhere));
     let total = rows.len();
     let first_bad = rows.iter().position(|(_, pose)| pose.is_none());
     let mut good: Vec<_> = rows.into_iter().filter_map(|(stamp, pose)| Some((stamp, pose?))).collect();
     if let Some(first) = first_bad {
-        let what = format!("the pose of row {first} is not finite or no rotation");
+        let what = format!("the pose of row {first} is not finite, no rotation, or {NOWHERE:e} m away");
         warnings.push(left_out(topic, total - good.len(), total, &what)?);
     }
     if let Some((kept, told)) = clocks::one_time(&good.iter().map(|(stamp, _)| *stamp).collect::<Vec<_>>(), topic) {

@@ -55,7 +55,8 @@ pub(in super::super) fn find(stamps_ns: &[u64], topic: &str) -> Result<Option<Ou
     let bursts = parts(recording, apart);
     let largest = most(&bursts).map_or(0, <[u64]>::len);
     let kept_bursts: Vec<_> = bursts.into_iter().filter(|burst| burst.len() > few || burst.len() == largest).collect();
-    let inside = |stamp: &u64| kept_bursts.iter().any(|burst| burst.first() <= Some(stamp) && Some(stamp) <= burst.last());
+    let inside =
+        |stamp: &u64| kept_bursts.iter().any(|burst| burst.first() <= Some(stamp) && Some(stamp) <= burst.last());
     let (kept, out): (Vec<usize>, Vec<usize>) =
         (0..total).partition(|row| stamps_ns.get(*row).is_some_and(|stamp| inside(stamp)));
     let Some(first) = out.first() else { return Ok(None) };

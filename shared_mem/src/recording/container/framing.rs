@@ -10,8 +10,9 @@ use std::io::{self, Read, Seek, SeekFrom};
 pub(super) const MAGIC: [u8; 8] = [0x89, b'M', b'C', b'A', b'P', b'0', b'\r', b'\n'];
 /// Opcode and length in front of a body.
 pub(super) const PREFIX: usize = 9;
-/// Largest record that is believed [bytes].
-const LARGEST: u64 = 1 << 31;
+/// Largest record that is believed [bytes], and the largest chunk once it is unpacked: writers make chunks of some megabytes,
+/// and hardly ever one that holds a single large picture.
+pub(super) const LARGEST: u64 = 1 << 29;
 /// Bytes of a chunk before its records, without the name of its compression.
 const CHUNK_HEADER: u64 = 40;
 

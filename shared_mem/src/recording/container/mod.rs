@@ -11,7 +11,7 @@ pub(super) use framing::Damage;
 use super::error::ReadError;
 use crate::{ending, input};
 use fields::{Chunk, Fields};
-use framing::{Framing, PREFIX, op};
+use framing::{Framing, LARGEST, PREFIX, op};
 use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use std::collections::{BTreeMap, HashMap};
 use std::fs::File;
@@ -248,7 +248,7 @@ impl<R: Read + Seek> Messages<R> {
             return self.records(chunk.records).ok_or_else(|| "a chunk ends inside a record".into());
         }
         // The largest believable size: what a good compressor reaches, and never more than one record may have.
-        let limit = (64 << 20).max(chunk.records.len().saturating_mul(300)).min(1 << 31);
+        let limit = (64 << 20).max(chunk.records.len().saturating_mul(300)).min(LARGEST as usize);
         if chunk.uncompressed_size > limit as u64 {
             return Err("a chunk's size has changed".into());
         }
