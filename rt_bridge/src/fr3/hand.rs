@@ -2,11 +2,13 @@
 //! and answers an order when the fingers have come to its end.
 //!
 //! The bytes are `franka-rs`'s; its `Gripper` is not used, because it waits for the end of each order and a robot that falls
-//! silent would hang it.
+//! silent would hang it. States are taken from the hand alone, as the arm's are.
 
+use super::believed::Believed;
 use super::session::{ipv4, reason};
+use super::states::States;
 use crate::device::{Device, DeviceFault};
-use franka::network::Network;
+use franka::network::TcpSession;
 use franka::wire::gripper::{
     GRIPPER_COMMAND_PORT, GRIPPER_VERSION, GraspRequest, GripperCommand as Command, GripperCommandResponse,
     GripperConnectRequest, GripperConnectResponse, GripperMoveRequest, GripperState as WireState, GripperStatus,
@@ -14,6 +16,7 @@ use franka::wire::gripper::{
 use franka::wire::{HeaderLayout, parse_response};
 use shared_mem::msg::gripper::{GripperAction, GripperCommand, GripperState};
 use shared_mem::time::now_ns;
+use std::io;
 use std::time::{Duration, Instant};
 use zerocopy::IntoBytes as _;
 
@@ -21,6 +24,8 @@ use zerocopy::IntoBytes as _;
 const CONNECT_TIMEOUT: Duration = Duration::from_secs(2);
 /// How long one wait for a state lasts.
 const STATE_WAIT: Duration = Duration::from_millis(50);
+/// States that are looked at without waiting, at most.
+const PILED_UP: usize = 256;
 /// How long its states may pause before the hand counts as lost.
 const SILENCE: Duration = Duration::from_secs(1);
 /// How far the size of what is held may be from what was asked for [m].
@@ -33,10 +38,11 @@ const GENTLEST: f64 = 10.0;
 /// A connected hand.
 pub struct Hand {
     device: String,
-    network: Network,
+    tcp: TcpSession,
+    states: States,
+    believed: Believed<0>,
     /// When the last state came.
     heard: Instant,
-    last_id: u32,
     /// Orders that are not answered yet.
     under_way: Vec<u32>,
     width_d: Option<f64>,
@@ -57,16 +63,16 @@ impl Hand {
                 .into(),
         };
         let address = ipv4(host, GRIPPER_COMMAND_PORT).ok_or_else(|| failed("that name has no IPv4 address".into()))?;
-        let (address, layout) = (address.to_string(), HeaderLayout::Gripper);
-        let network =
-            Network::connect_with_timeouts(&address, GRIPPER_COMMAND_PORT, layout, CONNECT_TIMEOUT, STATE_WAIT)
-                .map_err(|e| failed(reason(&e)))?;
-        agree_on_version(&network).map_err(failed)?;
+        let tcp =
+            TcpSession::connect(address, CONNECT_TIMEOUT, HeaderLayout::Gripper).map_err(|e| failed(reason(&e)))?;
+        let states = States::of(address.ip(), STATE_WAIT).map_err(|e| failed(e.to_string()))?;
+        agree_on_version(&tcp, states.port()).map_err(failed)?;
         Ok(Self {
             device,
-            network,
+            tcp,
+            states,
+            believed: Believed::new(),
             heard: Instant::now(),
-            last_id: 0,
             under_way: Vec::new(),
             width_d: None,
             refused: false,
@@ -99,7 +105,7 @@ impl Hand {
     }
 
     fn send(&mut self, command: Command, payload: &[u8]) -> Result<(), DeviceFault> {
-        let sent = self.network.tcp.send_request(command.to_u16().into(), payload);
+        let sent = self.tcp.send_request(command.to_u16().into(), payload);
         self.under_way.push(sent.map_err(|e| self.gone(reason(&e)))?);
         Ok(())
     }
@@ -107,7 +113,7 @@ impl Hand {
     /// Takes note of orders that came to their end.
     fn hear_answers(&mut self) -> Result<(), DeviceFault> {
         for ticket in std::mem::take(&mut self.under_way) {
-            let answer = self.network.tcp.try_receive_response(ticket).map_err(|e| self.gone(reason(&e)))?;
+            let answer = self.tcp.try_receive_response(ticket).map_err(|e| self.gone(reason(&e)))?;
             let Some(message) = answer else {
                 self.under_way.push(ticket);
                 continue;
@@ -125,16 +131,20 @@ impl Hand {
     }
 
     /// The newest state that waits, or the next one; `None` when there is none within a while.
-    fn newest(&mut self) -> Option<WireState> {
-        // From the datagrams' own channel: the network's calls of these names end the TCP connection when nothing comes in time,
-        // and a hand that pauses is not lost before `SILENCE`.
-        let states = &self.network.udp;
-        let mut newest = states.blocking_receive_struct::<WireState>().ok();
-        // A datagram of another length is not the hand's and is passed over.
-        while let Ok(Some(newer)) = states.try_receive_struct::<WireState>() {
-            newest = Some(newer);
-        }
-        newest.filter(|state| state.message_id.get() > self.last_id)
+    fn newest(&mut self) -> io::Result<Option<WireState>> {
+        let Self { states, believed, .. } = self;
+        let mut newest = None;
+        let mut believe = |state: &WireState| {
+            let sound = state.width.get().is_finite() && state.max_width.get().is_finite() && state.is_grasped <= 1;
+            let is_new = sound && believed.take(state.message_id.get().into(), [], Instant::now());
+            if is_new {
+                newest = Some(*state);
+            }
+            is_new
+        };
+        states.wait(&mut believe)?;
+        states.look(PILED_UP, believe)?;
+        Ok(newest)
     }
 }
 
@@ -147,8 +157,9 @@ impl Device for Hand {
             self.obey(order)?;
         }
         self.hear_answers()?;
-        let Some(state) = self.newest() else {
-            self.network.tcp.throw_if_connection_closed().map_err(|_| self.gone("it closed the connection".into()))?;
+        let newest = self.newest().map_err(|error| self.gone(error.to_string()))?;
+        let Some(state) = newest else {
+            self.tcp.throw_if_connection_closed().map_err(|_| self.gone("it closed the connection".into()))?;
             if self.heard.elapsed() > SILENCE {
                 return Err(DeviceFault::Silent {
                     device: self.device.clone(),
@@ -157,7 +168,7 @@ impl Device for Hand {
             }
             return Ok(None);
         };
-        (self.heard, self.last_id) = (Instant::now(), state.message_id.get());
+        self.heard = Instant::now();
         let width = state.width.get();
         Ok(Some(GripperState {
             stamp_ns: now_ns(),
@@ -176,13 +187,13 @@ impl Device for Hand {
 }
 
 /// The handshake; why it failed.
-fn agree_on_version(network: &Network) -> Result<(), String> {
-    let request = GripperConnectRequest::new(GRIPPER_VERSION, network.udp.port());
-    let sent = network.tcp.send_request(Command::Connect.to_u16().into(), request.as_bytes());
+fn agree_on_version(tcp: &TcpSession, port: u16) -> Result<(), String> {
+    let request = GripperConnectRequest::new(GRIPPER_VERSION, port);
+    let sent = tcp.send_request(Command::Connect.to_u16().into(), request.as_bytes());
     let ticket = sent.map_err(|e| reason(&e))?;
     let begin = Instant::now();
     let message = loop {
-        match network.tcp.try_receive_response(ticket).map_err(|e| reason(&e))? {
+        match tcp.try_receive_response(ticket).map_err(|e| reason(&e))? {
             Some(message) => break message,
             None if begin.elapsed() > CONNECT_TIMEOUT => {
                 return Err("it accepts the connection but does not speak: another program may be connected".into());
@@ -193,6 +204,7 @@ fn agree_on_version(network: &Network) -> Result<(), String> {
     let response: GripperConnectResponse = parse_response(HeaderLayout::Gripper, &message).map_err(|e| reason(&e))?;
     match (response.status.get(), response.version.get()) {
         (0, _) => Ok(()),
+        (_, GRIPPER_VERSION) => Err("another program may be connected to it already".into()),
         (_, theirs) => Err(format!("it speaks version {theirs}, this bridge speaks {GRIPPER_VERSION}")),
     }
 }

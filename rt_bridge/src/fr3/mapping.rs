@@ -34,6 +34,16 @@ pub(super) fn fill_state(wire: &RobotState, stamp_ns: u64, state: &mut ArmState)
     state.success_rate = f64::from(wire.control_command_success_rate.get());
 }
 
+/// Whether every number that is taken from a state is one, and every flag is set or not: anything else was not laid out by
+/// a robot.
+pub(super) fn is_sound(wire: &RobotState) -> bool {
+    let joints = [&wire.q, &wire.dq, &wire.q_d, &wire.dq_d, &wire.tau_J, &wire.tau_J_d, &wire.tau_ext_hat_filtered];
+    joints.into_iter().flatten().chain(&wire.O_T_EE).all(|number| number.get().is_finite())
+        && wire.control_command_success_rate.get().is_finite()
+        && wire.m_ee.get().is_finite()
+        && wire.errors.iter().chain(&wire.reflex_reason).all(|flag| *flag <= 1)
+}
+
 /// What the robot says it is doing.
 pub(super) fn mode_of(wire: &RobotState) -> ArmMode {
     match wire.robot_mode {

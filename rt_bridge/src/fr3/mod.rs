@@ -5,14 +5,18 @@
 //! one. Torques are without gravity and friction, which the robot compensates itself, for the tool as well: cell.toml's
 //! `[tool]` is declared as load, unless the robot's web page declares an end effector already.
 //!
+//! States are taken from the robot's address alone, and only where they go on from the ones before (`states`, `believed`).
+//!
 //! Frames and units are those of [`shared_mem::msg::arm`]. What runs once a millisecond (`read`, `command`) does not
 //! allocate while states arrive.
 
+mod believed;
 mod hand;
 mod mapping;
 mod motion;
 mod session;
 mod settings;
+mod states;
 mod version;
 
 pub use hand::Hand;

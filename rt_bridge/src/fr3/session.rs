@@ -1,16 +1,21 @@
 //! The two sockets of one FCI session: commands and their replies over TCP, states and set points over UDP. Owns the
 //! handshake and every deadline; knows nothing of motions. Called by [`super::motion`] and [`super::Fr3`].
 //!
-//! The bytes are `franka-rs`'s (its wire structs and its two channels). Its `Robot` is not used, for three reasons: its
+//! The bytes are `franka-rs`'s (its wire structs and its command channel). Its `Robot` is not used, for three reasons: its
 //! waits for a reply have no deadline, so a server that accepts the connection and says nothing would hang the bridge;
 //! its motion handles cannot be handed to another thread; and it reports a reflex as a printed text rather than as data.
+//! Nor is its channel for states, which listens to anybody: [`States`] listens to the robot.
 
+use super::believed::Believed;
+use super::mapping::{DOF, is_sound};
+use super::states::{Heard, States};
 use super::version::{FCI_VERSION, remedy};
 use crate::arm::{ArmFault, ConnectError};
 use franka::FrankaError;
-use franka::network::Network;
+use franka::network::TcpSession;
 use franka::wire::robot::v10::{Command, ConnectRequest, ConnectResponse, RobotCommand, RobotState};
 use franka::wire::{HeaderLayout, ROBOT_COMMAND_PORT, message_payload, parse_response};
+use std::io;
 use std::net::{SocketAddr, ToSocketAddrs};
 use std::time::{Duration, Instant};
 use zerocopy::IntoBytes;
@@ -21,15 +26,19 @@ const CONNECT_TIMEOUT: Duration = Duration::from_secs(2);
 const SILENCE: Duration = Duration::from_secs(1);
 /// How often a pause in the stream looks whether the connection was closed meanwhile.
 const SILENCE_CHECK: Duration = Duration::from_millis(50);
+/// States that are looked at without waiting, at most: more than pile up in a system's buffer, and few enough to be looked
+/// through within a period.
+const PILED_UP: usize = 256;
 /// How often a reply is looked for. Only while nothing moves or the motion is over already.
 const REPLY_POLL: Duration = Duration::from_micros(200);
 
 /// A connection to a robot that speaks our version and has begun to send states.
 #[derive(Debug)]
 pub(super) struct Session {
-    network: Network,
-    /// Counter of the newest state seen [ms]; a command carries it back.
-    last_id: u64,
+    tcp: TcpSession,
+    states: States,
+    /// The states so far; a command carries the newest one's counter back.
+    believed: Believed<DOF>,
 }
 
 /// A request that is on its way.
@@ -41,24 +50,20 @@ impl Session {
     pub(super) fn connect(host: &str) -> Result<Self, ConnectError> {
         let address =
             ipv4(host, ROBOT_COMMAND_PORT).ok_or_else(|| no_answer(host, "that name has no IPv4 address".into()))?;
-        let network = Network::connect_with_timeouts(
-            &address.to_string(),
-            ROBOT_COMMAND_PORT,
-            HeaderLayout::Robot,
-            CONNECT_TIMEOUT,
-            SILENCE_CHECK,
-        )
-        .map_err(|e| no_answer(host, reason(&e)))?;
-        let mut session = Self { network, last_id: 0 };
+        let tcp = TcpSession::connect(address, CONNECT_TIMEOUT, HeaderLayout::Robot)
+            .map_err(|e| no_answer(host, reason(&e)))?;
+        let states = States::of(address.ip(), SILENCE_CHECK)
+            .map_err(|e| no_answer(host, format!("no port for its states can be had here: {e}")))?;
+        let mut session = Self { tcp, states, believed: Believed::new() };
         session.agree_on_version(host)?;
         let mut first = RobotState::default();
         session.receive(&mut first).map_err(|fault| match fault {
             ArmFault::Silent { .. } => {
-                let port = session.network.udp.port();
-                no_answer(
-                    host,
-                    format!("it accepts us but its states do not arrive at UDP port {port}: a firewall here?"),
-                )
+                let port = session.states.port();
+                let from = session.states.stranger().map_or("a firewall here?".into(), |stranger| {
+                    format!("datagrams arrive from {stranger}, connect to that address if it is the robot's")
+                });
+                no_answer(host, format!("it accepts us but its states do not arrive at UDP port {port}: {from}"))
             }
             _ => no_answer(host, "it closed the connection after the handshake".into()),
         })?;
@@ -66,8 +71,8 @@ impl Session {
     }
 
     fn agree_on_version(&self, host: &str) -> Result<(), ConnectError> {
-        let request = ConnectRequest::new(FCI_VERSION, self.network.udp.port());
-        let reply = self.network.tcp.send_request(Command::Connect.to_u32(), request.as_bytes());
+        let request = ConnectRequest::new(FCI_VERSION, self.states.port());
+        let reply = self.tcp.send_request(Command::Connect.to_u32(), request.as_bytes());
         let ticket = Ticket(reply.map_err(|e| no_answer(host, reason(&e)))?);
         let message = self.reply(ticket, CONNECT_TIMEOUT).map_err(|fault| match fault {
             ArmFault::Silent { .. } => no_answer(
@@ -84,7 +89,8 @@ impl Session {
             return Err(ConnectError::Version { host, theirs, ours: FCI_VERSION, remedy: remedy(theirs) });
         }
         if response.status != 0 {
-            let what = format!("the connection (status {})", response.status);
+            let what =
+                format!("the connection (status {}): another program may be connected to it already", response.status);
             return Err(ConnectError::Refused { host: host.to_owned(), what });
         }
         Ok(())
@@ -92,7 +98,7 @@ impl Session {
 
     /// Sends a request; its reply is fetched with [`Self::status`] or [`Self::try_status`].
     pub(super) fn send(&self, command: Command, payload: &[u8]) -> Result<Ticket, ArmFault> {
-        self.network.tcp.send_request(command.to_u32(), payload).map(Ticket).map_err(|e| connection_fault(&e))
+        self.tcp.send_request(command.to_u32(), payload).map(Ticket).map_err(|e| connection_fault(&e))
     }
 
     /// Waits for the reply to `ticket` and returns its status byte. A request may get several replies, one call each.
@@ -102,7 +108,7 @@ impl Session {
 
     /// The status byte of the reply to `ticket`, if it has arrived.
     pub(super) fn try_status(&self, ticket: Ticket) -> Result<Option<u8>, ArmFault> {
-        let reply = self.network.tcp.try_receive_response(ticket.0).map_err(|e| connection_fault(&e))?;
+        let reply = self.tcp.try_receive_response(ticket.0).map_err(|e| connection_fault(&e))?;
         Ok(reply.map(|message| status_byte(&message)))
     }
 
@@ -118,7 +124,7 @@ impl Session {
     fn reply(&self, ticket: Ticket, patience: Duration) -> Result<Vec<u8>, ArmFault> {
         let begin = Instant::now();
         loop {
-            match self.network.tcp.try_receive_response(ticket.0) {
+            match self.tcp.try_receive_response(ticket.0) {
                 Ok(Some(message)) => return Ok(message),
                 Ok(None) if begin.elapsed() > patience => return Err(ArmFault::Silent { ms: millis(begin.elapsed()) }),
                 Ok(None) => std::thread::sleep(REPLY_POLL),
@@ -130,20 +136,20 @@ impl Session {
     /// Sleeps until a state arrives that is newer than the last one, and takes the newest of those that wait: states that
     /// piled up while the caller was late are dropped, because a command can only answer the newest.
     ///
-    /// Does not allocate while states arrive. A datagram of another length is not the robot's and is passed over.
+    /// Does not allocate while states arrive. A datagram that is not the robot's is passed over ([`super::believed`]).
     pub(super) fn receive(&mut self, state: &mut RobotState) -> Result<(), ArmFault> {
         if self.take_waiting(state)? {
             return Ok(());
         }
         let begin = Instant::now();
         loop {
-            match self.network.udp.blocking_receive_struct::<RobotState>() {
-                Ok(newer) if self.accept(&newer, state) => return Ok(()),
-                Ok(_) | Err(FrankaError::Protocol(_)) => {}
-                Err(e) if is_timeout(&e) => {
-                    self.network.tcp.throw_if_connection_closed().map_err(|_| ArmFault::Disconnected)?;
+            let believed = &mut self.believed;
+            match self.states.wait(|newer| believes(believed, newer, state)).map_err(|e| socket_fault(&e))? {
+                Heard::State => return Ok(()),
+                Heard::Other => {}
+                Heard::Nothing => {
+                    self.tcp.throw_if_connection_closed().map_err(|_| ArmFault::Disconnected)?;
                 }
-                Err(e) => return Err(ArmFault::Socket { errno: errno_in(&e) }),
             }
             if begin.elapsed() >= SILENCE {
                 return Err(ArmFault::Silent { ms: millis(begin.elapsed()) });
@@ -152,32 +158,28 @@ impl Session {
     }
 
     fn take_waiting(&mut self, state: &mut RobotState) -> Result<bool, ArmFault> {
-        let mut fresh = false;
-        loop {
-            match self.network.udp.try_receive_struct::<RobotState>() {
-                Ok(Some(newer)) => fresh |= self.accept(&newer, state),
-                Ok(None) => return Ok(fresh),
-                Err(FrankaError::Protocol(_)) => {}
-                Err(e) => return Err(ArmFault::Socket { errno: errno_in(&e) }),
-            }
-        }
-    }
-
-    fn accept(&mut self, newer: &RobotState, state: &mut RobotState) -> bool {
-        let id = newer.message_id.get();
-        let fresh = id > self.last_id;
-        if fresh {
-            self.last_id = id;
-            *state = *newer;
-        }
-        fresh
+        let believed = &mut self.believed;
+        self.states.look(PILED_UP, |newer| believes(believed, newer, state)).map_err(|e| socket_fault(&e))
     }
 
     /// Sends one set point as the answer to the newest state. Neither blocks nor allocates.
     pub(super) fn answer(&self, command: &mut RobotCommand) -> Result<(), ArmFault> {
-        command.message_id = self.last_id.into();
-        self.network.send_udp(command.as_bytes()).map_err(|e| ArmFault::Socket { errno: errno_in(&e) })
+        command.message_id = self.believed.counter().into();
+        self.states.answer(command.as_bytes()).map_err(|e| socket_fault(&e))
     }
+}
+
+/// Whether `newer` is believed; it becomes the `state` then.
+fn believes(believed: &mut Believed<DOF>, newer: &RobotState, state: &mut RobotState) -> bool {
+    let is_new = is_sound(newer) && believed.take(newer.message_id.get(), newer.q.map(|q| q.get()), Instant::now());
+    if is_new {
+        *state = *newer;
+    }
+    is_new
+}
+
+fn socket_fault(error: &io::Error) -> ArmFault {
+    ArmFault::Socket { errno: error.raw_os_error().unwrap_or(0) }
 }
 
 fn status_byte(message: &[u8]) -> u8 {
@@ -213,10 +215,6 @@ fn connection_fault(error: &FrankaError) -> ArmFault {
         0 | libc::ECONNRESET | libc::EPIPE => ArmFault::Disconnected,
         errno => ArmFault::Socket { errno },
     }
-}
-
-fn is_timeout(error: &FrankaError) -> bool {
-    matches!(error, FrankaError::Network(text) if text.ends_with("Timeout"))
 }
 
 /// The operating system's number in `franka-rs`'s text, which ends in what `std::io::Error` prints; 0 where there is none.

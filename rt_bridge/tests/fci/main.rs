@@ -4,6 +4,7 @@
 mod allocation;
 #[path = "../counting/mod.rs"]
 mod counting;
+mod forged;
 mod live;
 mod motion;
 mod refusal;

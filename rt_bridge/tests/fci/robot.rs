@@ -46,6 +46,10 @@ pub(crate) struct Script {
     pub(crate) silent: bool,
     /// The connection is to be dropped.
     pub(crate) gone: bool,
+    /// What is sent before each state and from the same port, by the state and its counter.
+    pub(crate) before_each: fn(&[u8; STATE_LENGTH], u64) -> Vec<[u8; STATE_LENGTH]>,
+    /// Where states go.
+    pub(crate) client: Option<SocketAddr>,
     move_id: Option<u32>,
 }
 
@@ -90,6 +94,8 @@ impl Robot {
             counter: 1000,
             silent: false,
             gone: false,
+            before_each: |_, _| Vec::new(),
+            client: None,
             move_id: None,
         };
         script.modes(IDLE, 0, 3);
@@ -127,6 +133,7 @@ fn serve(listener: &TcpListener, script: &Arc<Mutex<Script>>, status: u8, versio
             0 => {
                 reply = [&[status][..], &version.to_le_bytes()].concat();
                 let port = u16::from_le_bytes([payload[2], payload[3]]);
+                script.lock().expect("not poisoned").client = Some(SocketAddr::new(peer.ip(), port));
                 let script = Arc::clone(script);
                 let writer = tcp.try_clone().expect("a second handle");
                 thread::spawn(move || stream(&script, SocketAddr::new(peer.ip(), port), writer));
@@ -166,6 +173,9 @@ fn stream(script: &Arc<Mutex<Script>>, client: SocketAddr, mut tcp: TcpStream) {
             let counter = script.counter.to_le_bytes();
             script.state[..8].copy_from_slice(&counter);
             if !script.silent {
+                for datagram in (script.before_each)(&script.state, script.counter) {
+                    udp.send_to(&datagram, client).expect("the loopback carries it");
+                }
                 udp.send_to(&script.state, client).expect("the loopback carries it");
             }
         }
