@@ -22,8 +22,8 @@ use std::time::Duration;
     rt_bridge run --cell config/fr3_cell.toml --arm fci://127.0.0.1 --realtime ignore\n  \
     rt_bridge serve --cell config/fr3_cell.toml --effects hidden.toml --bind 0.0.0.0\n  \
     rt_bridge serve --cell config/fr3_cell.toml --port 0 --lock-step --fast --json\n\n\
-    JSON: cycles (the robot's milliseconds), motions, reflexes, lost_commands, clients, slipped (milliseconds that began so\n\
-    late that the robot's clock waited), late_us (how late its thread woke).")]
+    JSON: cycles (the robot's milliseconds), motions, reflexes, lost_commands, clients, refused (connections), slipped\n\
+    (milliseconds that began so late that the robot's clock waited), late_us (how late its thread woke).")]
 pub(super) struct ServeArguments {
     /// What the laboratory knows about its cell; [robot] has to be an FR3
     #[arg(long, value_name = "cell.toml")]
@@ -80,7 +80,7 @@ impl ServeArguments {
                  impedance, do not meet it: torque_delay acts on those"
             );
         }
-        let report = server.run(&stop, self.duration)?;
+        let report = server.run(&stop, self.duration);
         if self.json {
             answer(&serde_json::to_string(&report)?)?;
         } else {
@@ -92,8 +92,9 @@ impl ServeArguments {
 
 fn in_words(report: &Report) -> String {
     format!(
-        "{} clients, {} motions, {} reflexes, {} lost commands in {:.1} s of the robot's time\nwake-up p99.9 {:.1} us, {} cycles slipped",
+        "{} clients, {} connections refused, {} motions, {} reflexes, {} lost commands in {:.1} s of the robot's time\nwake-up p99.9 {:.1} us, {} cycles slipped",
         report.clients,
+        report.refused,
         report.robot.motions,
         report.robot.reflexes,
         report.robot.lost_commands,

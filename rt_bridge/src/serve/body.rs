@@ -2,6 +2,7 @@
 #![allow(non_snake_case)] // the field's own symbols
 
 use super::ServeError;
+use super::generator::rules::PERIOD;
 use super::kinematics::Frame;
 use super::observer::{Observer, Touched};
 use super::self_collision::SelfCollision;
@@ -10,14 +11,23 @@ use nalgebra::Vector6;
 use shared_mem::cell::{Cell, ControllerKind};
 use shared_mem::msg::arm::ArmState;
 use shared_mem::theta::Theta;
-use twin::arm::{ArmModel, GainError, JointState, Joints, MassProperties};
+use twin::arm::{ArmModel, ControlLaw, GainError, JointState, Joints, MassProperties};
 use twin::sim::{Drive, SimCell};
+
+/// Deceleration of a joint whose brake has closed [rad/s²]. The vendor publishes none: this one stops a joint at its
+/// highest speed within 0.05 s.
+const BRAKE: f64 = 100.0;
+
+/// Slower than this a joint stands [rad/s].
+const AT_REST: f64 = 1e-3;
 
 /// The body.
 pub(super) struct Body {
     cell: SimCell,
     /// What is known of the arm before anything is declared, so that there is always a model.
     bare: ArmModel,
+    /// Stiffness of the robot's joint controller before anybody asks for another [N m/rad].
+    stiffness: Joints,
     pub(super) measured: ArmState,
     /// Torques a period ago [N m].
     pub(super) tau_J_before: Joints,
@@ -38,12 +48,14 @@ impl Body {
             return Err(ServeError::NotCompliant);
         }
         let bare = ArmModel::from_cell(cell).map_err(twin::sim::SimError::from)?;
+        let law = ControlLaw::new(cell.controller.as_ref(), None, &bare).map_err(twin::sim::SimError::from)?;
         let mut simulated = SimCell::new(cell, theta)?;
         simulated.make_table_solid(cell);
         let mut measured = ArmState::default();
         simulated.read(&mut measured);
         Ok(Self {
             bare,
+            stiffness: law.stiffness,
             tau_J_before: measured.tau_J,
             itself: SelfCollision::new(cell).map_err(twin::sim::SimError::from)?,
             observer: Observer::new(&JointState { q: measured.q, dq: measured.dq }),
@@ -88,6 +100,40 @@ impl Body {
         let now = JointState { q: self.measured.q, dq: self.measured.dq };
         self.observer.update(model, &now, &self.measured.tau_J);
         self.wrench = self.observer.wrench(&Frame { model, on_flange: settings.F_T_K() }, &now.q);
+    }
+
+    /// Lets a millisecond pass with the brakes closed: each joint comes to rest and stays there, whatever pulls at it.
+    pub(super) fn step_braked(&mut self) {
+        let JointState { q, dq } = self.true_reading();
+        let slower = dq.map(|v| v - v.clamp(-BRAKE * PERIOD, BRAKE * PERIOD));
+        let stopped: Joints = std::array::from_fn(|i| q[i] + 0.5 * (dq[i] + slower[i]) * PERIOD);
+        // The object, if there is one, goes on; the arm is moved by its brakes alone.
+        self.cell.remove_arm();
+        self.cell.step(&self.cell.command());
+        self.cell.set_arm(&stopped, &slower);
+        self.tau_J_before = self.measured.tau_J;
+        self.cell.read(&mut self.measured);
+        // What the sensors say of a joint that is braked is no push from outside.
+        self.observer = Observer::new(&self.joints());
+        self.wrench = [Vector6::zeros(); 2];
+    }
+
+    /// Gives a joint a speed [rad/s], as a push from outside would.
+    #[cfg(test)]
+    pub(super) fn push_at(&mut self, joint: usize, speed: f64) {
+        let JointState { q, mut dq } = self.true_reading();
+        dq[joint] = speed;
+        self.cell.set_arm(&q, &dq);
+    }
+
+    /// Whether the arm stands still.
+    pub(super) fn stands(&self) -> bool {
+        self.true_reading().dq.iter().all(|dq| dq.abs() < AT_REST)
+    }
+
+    /// Has the robot's joint controller act with the stiffness it had at power-on.
+    pub(super) fn restore_stiffness(&mut self) -> Result<(), GainError> {
+        self.cell.ask_stiffness(&self.stiffness)
     }
 
     /// Has the robot's joint controller act with another stiffness [N m/rad].

@@ -37,6 +37,20 @@ impl Hold {
         (self.trace, self.dq_d, self.braking) = (Trace::at_rest(*q), [0.0; MAX_JOINTS], false);
     }
 
+    /// Brings a pose that is held one period closer to `goal`, no joint faster than `speed` [rad/s]. `false` once it is
+    /// there.
+    pub(super) fn approach(&mut self, goal: &Joints, speed: f64) -> bool {
+        let from = self.trace.q;
+        let step: Joints = std::array::from_fn(|i| (goal[i] - from[i]).clamp(-speed * PERIOD, speed * PERIOD));
+        self.trace = Trace::at_rest(std::array::from_fn(|i| from[i] + step[i]));
+        self.dq_d = step.map(|step| step / PERIOD);
+        let moves = step.iter().any(|step| *step != 0.0);
+        if !moves {
+            self.settle(goal);
+        }
+        moves
+    }
+
     /// One period on.
     pub(super) fn step(&mut self) {
         if self.braking {

@@ -11,7 +11,9 @@
 //! | file | owns |
 //! |---|---|
 //! | [`server`] | the ports, who is served, the robot's millisecond: free-running or in lock-step with its client |
+//! | `arrivals` | connections before their first request |
 //! | `session` | one client: its sockets, the handshake, what it is sent and when |
+//! | `notices` | lines on standard error, and how many there may be |
 //! | `framing` | from a stream of bytes to messages |
 //! | `wire` | from messages to requests and set points |
 //! | `robot` | modes, requests and their statuses, the robot's cycle |
@@ -30,10 +32,11 @@
 //! | `kinematics` | frames on the flange |
 //! | `hand` | the Franka Hand |
 //!
-//! Everything but `server`, `session` and the hand's service is without sockets and clocks, and deterministic.
+//! Everything but `server`, `arrivals`, `session`, `notices` and the hand's service is without sockets and clocks, and deterministic.
 //!
 //! Sources: libfranka's documentation and its protocol headers (Apache-2.0), by way of `franka-rs`'s wire structs.
 
+mod arrivals;
 mod body;
 mod faults;
 mod framing;
@@ -44,6 +47,7 @@ mod impedance;
 mod kinematics;
 mod losses;
 mod motion;
+mod notices;
 mod observer;
 mod robot;
 mod self_collision;

@@ -7,7 +7,10 @@
 //! where real time does not matter either, as fast as the client can go.
 
 use super::ServeError;
+use super::arrivals::{Arrivals, Outcome};
+use super::framing::Inbox;
 use super::hand::HandService;
+use super::notices::{About, Notices};
 use super::robot::{Robot, Tally};
 use super::session::{Gone, Session};
 use super::wire::{ROBOT_COMMAND_PORT, SetPoint};
@@ -17,9 +20,8 @@ use serde::Serialize;
 use shared_mem::cell::Cell;
 use shared_mem::theta::Theta;
 use shared_mem::time::now_ns;
-use std::collections::VecDeque;
 use std::io;
-use std::net::{IpAddr, Ipv4Addr, SocketAddr, TcpListener, TcpStream, UdpSocket};
+use std::net::{IpAddr, Ipv4Addr, SocketAddr, TcpListener};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
@@ -67,6 +69,8 @@ pub struct Report {
     pub robot: Tally,
     /// Clients that were served.
     pub clients: u64,
+    /// Connections that were refused: a second client, another version, no handshake, or none of this protocol.
+    pub refused: u64,
     /// Milliseconds that this machine began so late that the robot's clock waited.
     pub slipped: u64,
     /// How late the robot's thread woke [us]; nothing counted in lock-step.
@@ -77,14 +81,26 @@ pub struct Report {
 pub struct Server {
     robot: Robot,
     pace: Pace,
-    listener: TcpListener,
-    udp: UdpSocket,
+    arrivals: Arrivals,
     hand: Option<HandService>,
-    queue: VecDeque<(TcpStream, SocketAddr)>,
     session: Option<Session>,
+    notices: Notices,
     clients: u64,
+    refused: u64,
     slipped: u64,
     late: Times,
+}
+
+/// When to stop serving.
+struct Until<'a> {
+    stop: &'a AtomicBool,
+    end: Option<Instant>,
+}
+
+impl Until<'_> {
+    fn is_over(&self) -> bool {
+        self.stop.load(Ordering::Relaxed) || self.end.is_some_and(|end| Instant::now() >= end)
+    }
 }
 
 impl Server {
@@ -94,23 +110,21 @@ impl Server {
     /// [`ServeError`] when the cell holds no FR3 that can be simulated, or a port cannot be had.
     pub fn open(cell: &Cell, theta: Option<&Theta>, ports: Ports, pace: Pace) -> Result<Self, ServeError> {
         let robot = Robot::new(cell, theta)?;
-        let listener = listen(SocketAddr::new(ports.bind, ports.arm), "--port")?;
-        let at = SocketAddr::new(ports.bind, 0);
-        let open = || {
-            listener.set_nonblocking(true)?;
-            UdpSocket::bind(at)
+        let open = |port, flag, inbox| {
+            let address = SocketAddr::new(ports.bind, port);
+            Arrivals::at(listen(address, flag)?, inbox).map_err(|source| ServeError::Bind { address, source })
         };
-        let udp = open().map_err(|source| ServeError::Bind { address: at, source })?;
-        let hand = ports.hand.map(|port| listen(SocketAddr::new(ports.bind, port), "--hand-port")).transpose()?;
+        let arrivals = open(ports.arm, "--port", Inbox::of_the_arm)?;
+        let hand = ports.hand.map(|port| open(port, "--hand-port", Inbox::of_the_hand)).transpose()?;
         Ok(Self {
             robot,
             pace,
-            listener,
-            udp,
+            arrivals,
             hand: hand.map(HandService::start),
-            queue: VecDeque::new(),
             session: None,
+            notices: Notices::new(),
             clients: 0,
+            refused: 0,
             slipped: 0,
             late: Times::new(),
         })
@@ -121,7 +135,7 @@ impl Server {
     /// # Errors
     /// The system's.
     pub fn address(&self) -> io::Result<SocketAddr> {
-        self.listener.local_addr()
+        self.arrivals.address()
     }
 
     /// Where the hand listens, where there is one.
@@ -130,31 +144,34 @@ impl Server {
         self.hand.as_ref().map(HandService::address)
     }
 
-    /// Serves until `stop` is set or `duration` is over.
-    ///
-    /// # Errors
-    /// The system's, when a socket fails that is no client's.
-    pub fn run(mut self, stop: &AtomicBool, duration: Option<Duration>) -> io::Result<Report> {
+    /// Serves until `stop` is set or `duration` is over, also while a client in lock-step lets the robot wait.
+    pub fn run(mut self, stop: &AtomicBool, duration: Option<Duration>) -> Report {
         if self.pace == Pace::RealTime {
             // It plays the robot, which is always in time; where that is not granted, its clock waits.
             let _not_granted = process::set_fifo(process::SIMULATION_PRIORITY);
         }
-        let begin = Instant::now();
+        let until = Until { stop, end: duration.and_then(|duration| Instant::now().checked_add(duration)) };
         let mut next_ns = now_ns() + PERIOD_NS;
-        while !stop.load(Ordering::Relaxed) && duration.is_none_or(|duration| begin.elapsed() < duration) {
-            self.welcome();
+        while !until.is_over() {
             let awaited = self.pace != Pace::RealTime && self.robot.is_commanded();
             if !(awaited && self.pace == Pace::Fast) {
                 process::sleep_until(next_ns);
                 next_ns = self.woke(next_ns);
             }
-            self.take_requests();
-            let set_point = if awaited { self.await_set_point(stop)? } else { self.take_set_point()? };
+            self.attend();
+            let set_point = if awaited { self.await_set_point(&until) } else { self.take_set_point() };
             self.robot.tick(set_point.as_ref());
-            self.tell();
+            self.report();
         }
-        let late_us = self.late.percentiles();
-        Ok(Report { robot: self.robot.tally(), clients: self.clients, slipped: self.slipped, late_us })
+        self.notices.finish();
+        self.robot.notices.finish();
+        Report {
+            robot: self.robot.tally(),
+            clients: self.clients,
+            refused: self.refused,
+            slipped: self.slipped,
+            late_us: self.late.percentiles(),
+        }
     }
 
     /// Takes note of having woken, and says when to wake next [ns].
@@ -168,35 +185,41 @@ impl Server {
         regular.max(least)
     }
 
-    /// Takes new clients into the queue, and the first of it where nobody is served: a robot has one client at a time, and
-    /// leaves the others without an answer until then.
-    fn welcome(&mut self) {
-        while let Ok((tcp, peer)) = self.listener.accept() {
-            if self.session.is_some() {
-                tracing::warn!("{peer} has to wait: this robot serves one client at a time");
+    /// Takes what the client asks, then new clients: in this order, so that one that has just left is no reason to refuse
+    /// the next.
+    fn attend(&mut self) {
+        if let Some(session) = &mut self.session {
+            let served = session.serve(&mut self.robot, &mut self.notices);
+            self.keep_or_part(served);
+        }
+        for outcome in self.arrivals.look(Instant::now()) {
+            let (peer, opened) = match outcome {
+                Outcome::Asks(arrival, message) => {
+                    (arrival.peer, Session::open(arrival, &message, self.session.is_some()))
+                }
+                Outcome::Closed(peer, gone) => (peer, Err(gone)),
+            };
+            match opened {
+                Ok(session) => {
+                    self.session = Some(session);
+                    self.clients += 1;
+                    self.notices.info(About::Client, format_args!("{peer} is connected"));
+                }
+                // Somebody who only looked whether a robot listens here.
+                Err(Gone::Left) => {}
+                Err(gone) => {
+                    self.refused += 1;
+                    self.notices.warn(About::Refusal, format_args!("{peer}: {gone}"));
+                }
             }
-            self.queue.push_back((tcp, peer));
-        }
-        while self.session.is_none()
-            && let Some((tcp, peer)) = self.queue.pop_front()
-        {
-            self.session = Session::new(tcp, peer).ok();
-            self.clients += 1;
-            tracing::info!("{peer} is connected");
         }
     }
 
-    fn take_requests(&mut self) {
-        let Some(session) = &mut self.session else { return };
-        let served = session.serve(&mut self.robot);
-        self.keep_or_part(served);
-    }
-
-    fn tell(&mut self) {
+    fn report(&mut self) {
         match &mut self.session {
             Some(session) => {
-                let told = session.tell(&mut self.robot, &self.udp);
-                self.keep_or_part(told);
+                let reported = session.report(&mut self.robot);
+                self.keep_or_part(reported);
             }
             None => drop(self.robot.outbox()),
         }
@@ -206,33 +229,31 @@ impl Server {
         if let Err(gone) = served {
             self.session = None;
             self.robot.client_left();
+            let line = format_args!("the client is gone: {gone}");
             match gone {
-                Gone::Left => tracing::info!("the client is gone: {gone}"),
-                Gone::Nonsense(_) | Gone::Broken(_) => tracing::warn!("the client is gone: {gone}"),
+                Gone::Left => self.notices.info(About::Client, line),
+                _ => self.notices.warn(About::Client, line),
             }
         }
     }
 
-    fn take_set_point(&mut self) -> io::Result<Option<SetPoint>> {
-        self.udp.set_nonblocking(true)?;
-        Ok(self.session.as_ref().and_then(|session| session.waiting_set_point(&self.udp, &self.robot.answers())))
+    fn take_set_point(&mut self) -> Option<SetPoint> {
+        self.session.as_ref().and_then(|session| session.waiting_set_point(&self.robot.answers()))
     }
 
     /// The set point of the newest state, for as long as one is owed.
-    fn await_set_point(&mut self, stop: &AtomicBool) -> io::Result<Option<SetPoint>> {
-        loop {
-            if !self.robot.is_commanded() || stop.load(Ordering::Relaxed) {
-                return Ok(None);
+    fn await_set_point(&mut self, until: &Until) -> Option<SetPoint> {
+        while self.robot.is_commanded() && !until.is_over() {
+            let set_point = self.take_set_point();
+            if set_point.is_some() {
+                return set_point;
             }
-            if let Some(set_point) = self.take_set_point()? {
-                return Ok(Some(set_point));
-            }
-            self.udp.set_nonblocking(false)?;
-            self.udp.set_read_timeout(Some(LOOK_EVERY))?;
             // Only to sleep until something is there: the next look takes it.
-            let _something = self.udp.peek_from(&mut [0; 1]);
-            self.take_requests();
+            let waited = self.session.as_ref().map_or(Err(Gone::Left), |session| session.wait(LOOK_EVERY));
+            self.keep_or_part(waited);
+            self.attend();
         }
+        None
     }
 }
 

@@ -1,13 +1,19 @@
-//! One client of the robot: its two sockets, the handshake, and what it is sent in which order.
+//! One client of the robot, from its handshake on: its two sockets, and what it is sent in which order.
+//!
+//! Its datagram socket is connected: the system passes on what comes from the client's address and port, and nobody else's
+//! set points.
 
+use super::arrivals::Arrival;
 use super::framing::{Inbox, Message};
+use super::notices::{About, Notices};
 use super::robot::{Outbox, Reply, Robot};
 use super::wire::{
-    ConnectStatus, NotARequest, ROBOT_VERSION, Request, SetPoint, connect_reply, reply, request, set_point,
+    ConnectStatus, NotARequest, ROBOT_VERSION, Request, SetPoint, busy_reply, connect_reply, reply, request, set_point,
 };
 use std::io::{self, Read as _, Write as _};
-use std::net::{IpAddr, SocketAddr, TcpStream, UdpSocket};
+use std::net::{SocketAddr, TcpStream, UdpSocket};
 use std::ops::RangeInclusive;
+use std::time::Duration;
 use zerocopy::IntoBytes as _;
 
 /// Number of the request that opens a session.
@@ -17,12 +23,26 @@ const DATAGRAM: usize = 512;
 /// Pieces of a stream, and datagrams, that are taken in a millisecond.
 const READS: usize = 64;
 
-/// Why a session is over.
+/// Why a connection is over.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub(super) enum Gone {
     /// In the ordinary way.
     #[error("it closed the connection")]
     Left,
+    /// It did not say what it wants.
+    #[error("it sent no handshake within two seconds; the connection is closed")]
+    Silent,
+    /// Too many others do not say either.
+    #[error("too many connections wait for their handshake; the oldest is closed")]
+    Crowded,
+    /// Somebody else is served.
+    #[error("it is refused: this robot serves one client at a time, end the other one first")]
+    Second,
+    /// Its interface is another.
+    #[error(
+        "its FCI version {0} is refused: this robot speaks version {ROBOT_VERSION}, which is libfranka 0.18 to 0.21"
+    )]
+    Version(u16),
     /// It sent what no client sends.
     #[error("{0}; the connection is closed")]
     Nonsense(String),
@@ -31,97 +51,120 @@ pub(super) enum Gone {
     Broken(io::ErrorKind),
 }
 
+impl From<io::Error> for Gone {
+    fn from(error: io::Error) -> Self {
+        Self::Broken(error.kind())
+    }
+}
+
 /// A connected client.
 #[derive(Debug)]
 pub(super) struct Session {
     tcp: TcpStream,
     inbox: Inbox,
-    /// Where states go and set points come from; none before the handshake.
-    states_to: Option<SocketAddr>,
-    peer: IpAddr,
+    /// Where states go and set points come from.
+    udp: UdpSocket,
+    client: SocketAddr,
 }
 
 impl Session {
-    /// Takes over a connection.
-    pub(super) fn new(tcp: TcpStream, peer: SocketAddr) -> io::Result<Self> {
-        tcp.set_nonblocking(true)?;
-        tcp.set_nodelay(true)?;
-        Ok(Self { tcp, inbox: Inbox::of_the_arm(), states_to: None, peer: peer.ip() })
+    /// Answers the first `message` of a connection, which has to be a handshake; `taken` where somebody else is served.
+    pub(super) fn open(arrival: Arrival, message: &Message, taken: bool) -> Result<Self, Gone> {
+        let Arrival { mut tcp, peer, inbox, .. } = arrival;
+        let Ok(Request::Connect { version, udp_port }) = request(message.number, &message.payload) else {
+            return Err(Gone::Nonsense("it asks for something before the handshake".into()));
+        };
+        let (answer, refused) = if version != ROBOT_VERSION {
+            (connect_reply(ConnectStatus::IncompatibleLibraryVersion), Some(Gone::Version(version)))
+        } else if taken {
+            (busy_reply(), Some(Gone::Second))
+        } else {
+            (connect_reply(ConnectStatus::Success), None)
+        };
+        if let Some(gone) = refused {
+            send(&mut tcp, CONNECT, message.id, &answer)?;
+            return Err(gone);
+        }
+        let client = SocketAddr::new(peer.ip(), udp_port);
+        // The address that the client knows the robot by, where this machine has several.
+        let udp = UdpSocket::bind(SocketAddr::new(tcp.local_addr()?.ip(), 0))?;
+        udp.connect(client)?;
+        udp.set_nonblocking(true)?;
+        send(&mut tcp, CONNECT, message.id, &answer)?;
+        Ok(Self { tcp, inbox, udp, client })
     }
 
     /// Hands the requests that have arrived to the robot and sends what it answers at once.
-    pub(super) fn serve(&mut self, robot: &mut Robot) -> Result<(), Gone> {
+    pub(super) fn serve(&mut self, robot: &mut Robot, notices: &mut Notices) -> Result<(), Gone> {
         read_into(&mut self.tcp, &mut self.inbox)?;
         while let Some(message) = self.inbox.next().map_err(|garbage| Gone::Nonsense(garbage.to_string()))? {
-            self.take(&message, robot)?;
+            self.take(&message, robot, notices)?;
         }
         // At once: a client in lock-step may want its answer before it lets the robot's clock go on.
         let Outbox { before_state, after_state } = robot.outbox();
         before_state.iter().chain(&after_state).try_for_each(|reply| self.send(reply))
     }
 
-    fn take(&mut self, message: &Message, robot: &mut Robot) -> Result<(), Gone> {
+    fn take(&mut self, message: &Message, robot: &mut Robot, notices: &mut Notices) -> Result<(), Gone> {
         let Message { number, id, payload } = message;
-        match (request(*number, payload), self.states_to) {
-            (Ok(Request::Connect { version, udp_port }), _) => self.shake_hands(*id, version, udp_port),
-            (_, None) => Err(Gone::Nonsense("it asks for something before the handshake".into())),
-            (Ok(request), Some(_)) => {
+        match request(*number, payload) {
+            Ok(Request::Connect { .. }) => Err(Gone::Nonsense("it sends a second handshake".into())),
+            Ok(request) => {
                 robot.request(*number, *id, &request);
                 Ok(())
             }
-            (Err(error), Some(_)) => {
-                tracing::warn!("{error}; refused");
+            Err(error) => {
+                notices.warn(About::Refusal, format_args!("{error}; refused"));
                 let status = refusal(*number, error);
                 self.send(&Reply { number: *number, id: *id, payload: vec![status] })
             }
         }
     }
 
-    fn shake_hands(&mut self, id: u32, version: u16, udp_port: u16) -> Result<(), Gone> {
-        let agreed = version == ROBOT_VERSION;
-        if agreed {
-            self.states_to = Some(SocketAddr::new(self.peer, udp_port));
-        } else {
-            tracing::warn!(
-                "a client of FCI version {version} was refused: this robot speaks version {ROBOT_VERSION}, which is libfranka 0.18 to 0.21"
-            );
-        }
-        let status = if agreed { ConnectStatus::Success } else { ConnectStatus::IncompatibleLibraryVersion };
-        self.send(&Reply { number: CONNECT, id, payload: connect_reply(status).to_vec() })
-    }
-
     /// Sends replies that go out before a state, the state, and those that go out after it.
-    pub(super) fn tell(&mut self, robot: &mut Robot, udp: &UdpSocket) -> Result<(), Gone> {
+    pub(super) fn report(&mut self, robot: &mut Robot) -> Result<(), Gone> {
         let outbox = robot.outbox();
-        for reply in &outbox.before_state {
-            self.send(reply)?;
-        }
-        if let Some(to) = self.states_to {
-            // A client that does not listen yet or any more is noticed by its other socket.
-            let _sent = udp.send_to(robot.state().as_bytes(), to);
-        }
+        outbox.before_state.iter().try_for_each(|reply| self.send(reply))?;
+        // A client that does not listen yet or any more is noticed by its other socket.
+        let _sent = self.udp.send(robot.state().as_bytes());
         outbox.after_state.iter().try_for_each(|reply| self.send(reply))
     }
 
     fn send(&mut self, answer: &Reply) -> Result<(), Gone> {
-        // Replies are a few bytes, the longest some kilobytes: a client that leaves no room for one reads none.
-        let message = reply(answer.number, answer.id, &answer.payload);
-        self.tcp.write_all(&message).map_err(|error| Gone::Broken(error.kind()))
+        send(&mut self.tcp, answer.number, answer.id, &answer.payload)
     }
 
     /// The newest set point that answers one of the states `answers`, if one waits at the socket; everything else there is
     /// thrown away.
-    pub(super) fn waiting_set_point(&self, udp: &UdpSocket, answers: &RangeInclusive<u64>) -> Option<SetPoint> {
+    pub(super) fn waiting_set_point(&self, answers: &RangeInclusive<u64>) -> Option<SetPoint> {
         let (mut found, mut datagram) = (None, [0; DATAGRAM]);
         for _ in 0..READS {
-            let Ok((length, from)) = udp.recv_from(&mut datagram) else { break };
-            let point = set_point(&datagram[..length]).filter(|_| Some(from) == self.states_to);
+            let (length, from) = match self.udp.recv_from(&mut datagram) {
+                Ok(received) => received,
+                // The client did not listen when the last state came: its next set point may be there all the same.
+                Err(error) if error.kind() == io::ErrorKind::ConnectionRefused => continue,
+                Err(_) => break,
+            };
+            // What came in before the socket was connected may be from anybody.
+            let point = set_point(&datagram[..length]).filter(|_| from == self.client);
             found = point.filter(|point| answers.contains(&point.answers)).or(found);
         }
         found
     }
+
+    /// Sleeps until a datagram is there, `patience` at most.
+    pub(super) fn wait(&self, patience: Duration) -> Result<(), Gone> {
+        self.udp.set_nonblocking(false)?;
+        self.udp.set_read_timeout(Some(patience))?;
+        let _something = self.udp.peek(&mut [0; 1]);
+        Ok(self.udp.set_nonblocking(true)?)
+    }
 }
 
+fn send(tcp: &mut TcpStream, number: u32, id: u32, payload: &[u8]) -> Result<(), Gone> {
+    // Replies are a few bytes, the longest some kilobytes: a client that leaves no room for one reads none.
+    Ok(tcp.write_all(&reply(number, id, payload))?)
+}
 /// Takes all bytes that have arrived.
 pub(super) fn read_into(tcp: &mut TcpStream, inbox: &mut Inbox) -> Result<(), Gone> {
     let mut bytes = [0; 2048];

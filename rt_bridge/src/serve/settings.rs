@@ -13,8 +13,20 @@ const JOINT_STIFFNESS: f64 = 14_250.0;
 const CARTESIAN_STIFFNESS: [[f64; 2]; 2] = [[10.0, 3000.0], [1.0, 300.0]];
 /// How far from 1 the length of a rotation matrix's column may be.
 const UNIT: f64 = 1e-5;
-/// Heaviest load the robot can be told of [kg]: far over its payload, so that only nonsense is refused.
-const HEAVIEST: f64 = 20.0;
+/// Heaviest load that the robot can be told of [kg]: the FR3's payload, from its data sheet.
+const HEAVIEST: f64 = 3.0;
+/// Largest moment of its weight about the flange's origin [N m]: what the three joints of the wrist can hold, from the data
+/// sheet.
+const WRIST: f64 = 12.0;
+const GRAVITY: f64 = 9.81;
+/// Farthest from the flange that a load or a frame may be [m], and the largest radius of gyration: more than the arm's own
+/// reach of 0.855 m.
+const FARTHEST: f64 = 1.0;
+/// What rounding may take from an inertia, as a share of its largest moment.
+const ROUNDING: f64 = 1e-6;
+/// Highest threshold of contact and collision [N m; N, N m]. No joint and no pose of the arm comes near it, so it never
+/// speaks; a higher one is a slip.
+const DEAF: f64 = 1e4;
 
 /// Collision thresholds before anybody sets others [N m; N, N m]: what libfranka's examples set first. The robot's own
 /// values at power-on are not published.
@@ -98,13 +110,13 @@ impl Settings {
     }
 
     pub(super) fn set_load(&mut self, load: &Load) -> Result<(), Invalid> {
-        let numbers = load.centre.iter().chain(&load.inertia);
-        let sane = (0.0..=HEAVIEST).contains(&load.mass) && numbers.clone().all(|x| x.abs() < 1e3);
-        let inertia = Matrix3::from_column_slice(&load.inertia);
-        if !sane || (inertia - inertia.transpose()).norm() > 1e-9 {
+        let (centre, inertia) = (Vector3::from(load.centre), Matrix3::from_column_slice(&load.inertia));
+        let mass = (0.0..=HEAVIEST).contains(&load.mass);
+        let near = centre.norm() <= FARTHEST && load.mass * GRAVITY * centre.norm() <= WRIST;
+        if !(mass && near && is_possible(load.mass, &inertia)) {
             return Err(Invalid);
         }
-        self.load = MassProperties { mass: load.mass, centre: Vector3::from(load.centre), inertia };
+        self.load = MassProperties { mass: load.mass, centre, inertia };
         Ok(())
     }
 
@@ -128,21 +140,36 @@ impl Thresholds {
     /// A contact is to be noticed no later than a collision, and both above nothing.
     fn are_ordered(&self) -> bool {
         let ordered = |contact: &[f64], collision: &[f64]| {
-            contact.iter().zip(collision).all(|(low, high)| 0.0 <= *low && low <= high && high.is_finite())
+            contact.iter().zip(collision).all(|(low, high)| 0.0 <= *low && low <= high && *high <= DEAF)
         };
         ordered(&self.contact_torque, &self.collision_torque) && ordered(&self.contact_force, &self.collision_force)
     }
 }
 
+/// Whether a body of `mass` can have `inertia` about its centre of mass: symmetric, no principal moment below zero or above
+/// the sum of the other two, none larger than that of the mass at the farthest place.
+fn is_possible(mass: f64, inertia: &Matrix3<f64>) -> bool {
+    if !inertia.iter().all(|x| x.is_finite()) {
+        return false;
+    }
+    let slack = ROUNDING * inertia.abs().max() + 1e-9;
+    let moments = inertia.symmetric_eigenvalues();
+    let (largest, sum) = (moments.max(), moments.sum());
+    (inertia - inertia.transpose()).abs().max() <= slack
+        && moments.min() >= -slack
+        && largest <= sum - largest + slack
+        && largest <= mass * FARTHEST * FARTHEST + slack
+}
+
 /// The rigid transform of a homogeneous matrix, column-major; `None` where it is none: last row 0, 0, 0, 1 exactly, axes
-/// of unit length and orthogonal to 1e-5, right-handed.
+/// of unit length and orthogonal to 1e-5, right-handed, no farther than any end effector.
 pub(super) fn isometry(matrix: &[f64; 16]) -> Option<Isometry3<f64>> {
     let m = Matrix4::from_column_slice(matrix);
     let rotation: Matrix3<f64> = m.fixed_view::<3, 3>(0, 0).into_owned();
     let place: Vector3<f64> = m.fixed_view::<3, 1>(0, 3).into_owned();
     let last_row = [matrix[3], matrix[7], matrix[11], matrix[15]] == [0.0, 0.0, 0.0, 1.0];
     let rigid = (rotation.transpose() * rotation - Matrix3::identity()).abs().max() < UNIT;
-    let sane = last_row && rigid && rotation.determinant() > 0.0 && place.iter().all(|x| x.abs() < 1e3);
+    let sane = last_row && rigid && rotation.determinant() > 0.0 && place.norm() <= FARTHEST;
     sane.then(|| {
         // Rounded to single precision on the way, the matrix is a rotation only nearly.
         let rotation = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(rotation));
@@ -187,8 +214,53 @@ mod tests {
         assert_eq!(settings.cartesian_stiffness, CARTESIAN);
         let upside_down = Thresholds { contact_torque: [30.0; 7], ..Thresholds::everywhere(20.0) };
         assert!(settings.set_thresholds(&[upside_down, Thresholds::everywhere(10.0)]).is_err());
-        let load = Load { mass: -1.0, centre: [0.0; 3], inertia: [0.0; 9] };
-        assert!(settings.set_load(&load).is_err());
-        assert!(settings.set_load(&Load { mass: 1.0, ..load }).is_ok() && settings.load.mass == 1.0);
+        assert!(
+            settings.set_thresholds(&[Thresholds::everywhere(f64::INFINITY), Thresholds::everywhere(10.0)]).is_err()
+        );
+        let mut far = matrix(&Isometry3::identity());
+        far[12] = 900.0;
+        assert!(settings.set_NE_T_EE(&far).is_err() && settings.set_EE_T_K(&far).is_err());
+    }
+
+    #[test]
+    fn a_load_is_a_body_that_exists_and_that_the_arm_can_hold() {
+        let diagonal = |[x, y, z]: [f64; 3]| [x, 0.0, 0.0, 0.0, y, 0.0, 0.0, 0.0, z];
+        let load = |mass, x, moments| Load { mass, centre: [x, 0.0, 0.0], inertia: diagonal(moments) };
+        let mut skew = load(1.0, 0.0, [0.01; 3]);
+        skew.inertia[1] = 1e-3;
+        let mut turned = load(1.0, 0.0, [0.01; 3]);
+        // Principal moments 0.02, 0 and 0.01 along axes that are not the frame's.
+        (turned.inertia[1], turned.inertia[3]) = (0.01, 0.01);
+        let refused = [
+            ("no mass below zero", load(-1.0, 0.0, [0.0; 3])),
+            ("no number", load(f64::NAN, 0.0, [0.0; 3])),
+            ("20 kg at 900 m", load(20.0, 900.0, [0.0; 3])),
+            ("over the payload", load(3.1, 0.0, [0.0; 3])),
+            ("too heavy for the wrist", load(3.0, 0.5, [0.0; 3])),
+            ("farther than the arm reaches", load(0.1, 1.1, [0.0; 3])),
+            ("a centre that is no number", load(1.0, f64::NAN, [0.0; 3])),
+            ("not symmetric", skew),
+            ("a moment over the sum of the others", load(1.0, 0.0, [0.01, 0.01, 0.03])),
+            ("a moment over the sum of the others, in other axes", turned),
+            ("a moment below zero", load(1.0, 0.0, [0.01, 0.01, -0.01])),
+            ("wider than the cell", load(1.0, 0.0, [2.0; 3])),
+            ("nothing that turns heavily", load(0.0, 0.0, [0.01; 3])),
+            ("no end", load(1.0, 0.0, [f64::INFINITY; 3])),
+        ];
+        let mut settings = Settings::at_power_on(None);
+        for (what, load) in refused {
+            assert_eq!(settings.set_load(&load), Err(Invalid), "{what}");
+        }
+        assert_eq!(settings.load, MassProperties::default());
+        // A point, a rod, what the hand's maker declares for it, and the heaviest.
+        for load in [
+            load(1.0, 0.0, [0.0; 3]),
+            load(1.0, 0.2, [0.01, 0.01, 0.0]),
+            load(0.73, -0.01, [0.001, 0.0025, 0.0017]),
+            load(3.0, 0.4, [0.01; 3]),
+        ] {
+            assert_eq!(settings.set_load(&load), Ok(()), "{load:?}");
+            assert_eq!(settings.load.mass, load.mass);
+        }
     }
 }

@@ -1,4 +1,4 @@
-//! What the robot keeps an eye on while it moves, beyond judging set points: what it measures. Pure.
+//! What the robot keeps an eye on beyond judging set points: what it measures, while it moves and while it does not. Pure.
 
 use super::body::Body;
 use super::faults::{Fault, all};
@@ -22,19 +22,7 @@ pub(super) fn objections(body: &mut Body, motion: &Motion, rules: &JointRules, s
         faults.push(Fault::SelfCollision);
     }
     let (measured, limits) = (&body.measured, &rules.limits);
-    if is_outside(body, rules) {
-        faults.push(Fault::JointPositionLimits);
-    }
-    let too_fast = |(i, limits): (usize, &JointLimits)| {
-        measured.dq[i].abs() > MARGIN * highest_speed(limits, measured.q[i], measured.dq[i]).max(MARGIN - 1.0)
-    };
-    if limits.counted().enumerate().any(too_fast) {
-        faults.push(Fault::JointVelocity);
-    }
-    let ee = Surroundings::new(body.model(), rules, settings).ee;
-    if ee.twist(&body.joints()).fixed_rows::<3>(0).norm() > MARGIN * END_EFFECTOR_SPEED {
-        faults.push(Fault::CartesianVelocity);
-    }
+    faults.extend(excesses(body, rules, settings, true));
     if motion.torque().is_some_and(|tau| {
         let gravity = body.model().gravity(&measured.q);
         limits.counted().enumerate().any(|(i, limits)| exceeds((tau[i] + gravity[i]).abs(), limits.torque))
@@ -45,6 +33,39 @@ pub(super) fn objections(body: &mut Body, motion: &Motion, rules: &JointRules, s
         faults.push(Fault::PathPoseDeviation);
     }
     all(&faults)
+}
+
+/// Objections to what an arm does that no client commands: its own controller is to hold it, within its torques. `in_range`:
+/// it has to be inside its range as well.
+pub(super) fn runs_away(body: &Body, rules: &JointRules, settings: &Settings, in_range: bool) -> ReflexErrors {
+    let mut faults = excesses(body, rules, settings, in_range);
+    let gravity = body.model().gravity(&body.measured.q);
+    let too_much =
+        |(i, limits): (usize, &JointLimits)| exceeds((body.measured.tau_J_d[i] + gravity[i]).abs(), limits.torque);
+    if rules.limits.counted().enumerate().any(too_much) {
+        faults.push(Fault::TorqueRange);
+    }
+    all(&faults)
+}
+
+/// What is out of bounds: the range of the joints, their speed, the speed of the end effector.
+fn excesses(body: &Body, rules: &JointRules, settings: &Settings, in_range: bool) -> Vec<Fault> {
+    let (measured, limits, mut faults) = (&body.measured, &rules.limits, Vec::new());
+    if in_range && is_outside(body, rules) {
+        faults.push(Fault::JointPositionLimits);
+    }
+    let too_fast = |(i, limits): (usize, &JointLimits)| {
+        let highest = highest_speed(limits, measured.q[i], measured.dq[i]).max(MARGIN - 1.0);
+        exceeds(measured.dq[i].abs(), MARGIN * highest)
+    };
+    if limits.counted().enumerate().any(too_fast) {
+        faults.push(Fault::JointVelocity);
+    }
+    let ee = Surroundings::new(body.model(), rules, settings).ee;
+    if exceeds(ee.twist(&body.joints()).fixed_rows::<3>(0).norm(), MARGIN * END_EFFECTOR_SPEED) {
+        faults.push(Fault::CartesianVelocity);
+    }
+    faults
 }
 
 /// Looks for contact and, while `motion` runs, for collision.

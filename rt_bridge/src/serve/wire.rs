@@ -241,3 +241,11 @@ pub(super) fn connect_reply(status: ConnectStatus) -> [u8; 3] {
     let [low, high] = ROBOT_VERSION.to_le_bytes();
     [status.to_u8(), low, high]
 }
+
+/// Payload of the reply to the handshake of a client for whom there is no place. The protocol has no status for that, and
+/// libfranka calls every one but 0 and 1 a "protocol error during connection attempt".
+pub(super) fn busy_reply() -> [u8; 3] {
+    const TAKEN: u8 = 2;
+    let [low, high] = ROBOT_VERSION.to_le_bytes();
+    [TAKEN, low, high]
+}

@@ -9,7 +9,9 @@ const PATIENCE: Duration = Duration::from_secs(20);
 
 /// Offsets into a state and a set point.
 pub(crate) mod at {
+    pub(crate) const M_LOAD: usize = 444;
     pub(crate) const Q_D: usize = 624;
+    pub(crate) const DQ: usize = 652;
     pub(crate) const GENERATOR: usize = 1288;
     pub(crate) const CONTROLLER: usize = 1289;
     pub(crate) const ERRORS: usize = 1290;
@@ -35,7 +37,8 @@ pub(crate) type State = [u8; 1377];
 pub(crate) struct Client {
     pub(crate) tcp: TcpStream,
     udp: UdpSocket,
-    from: Option<SocketAddr>,
+    /// Where the last state came from.
+    pub(crate) from: Option<SocketAddr>,
     next_id: u32,
 }
 

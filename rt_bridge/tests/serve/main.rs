@@ -4,6 +4,7 @@
 mod client;
 mod driver;
 mod hand;
+mod hostile;
 mod protocol;
 
 use rt_bridge::serve::{Pace, Ports, Report, Server};
@@ -38,7 +39,7 @@ impl Served {
         let (address, hand) = (server.address().expect("it listens"), server.hand_address().expect("it has a hand"));
         let stop = Arc::new(AtomicBool::new(false));
         let told = stop.clone();
-        let thread = Some(thread::spawn(move || server.run(&told, None).expect("its sockets work")));
+        let thread = Some(thread::spawn(move || server.run(&told, None)));
         Self { address, hand, stop, thread }
     }
 

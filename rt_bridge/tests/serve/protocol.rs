@@ -58,25 +58,6 @@ fn a_request_in_pieces_is_understood_and_garbage_costs_the_connection_alone() {
 }
 
 #[test]
-fn a_second_client_waits_without_an_answer_until_the_first_has_left() {
-    let served = Served::start(Pace::Fast);
-    let mut first = Client::connected(served.address);
-    let mut second = Client::silent(served.address);
-    let handshake = second.handshake(10);
-    second.tcp.write_all(&handshake).expect("the connection is taken");
-    for _ in 0..50 {
-        first.state();
-    }
-    second.tcp.set_nonblocking(true).expect("a socket");
-    assert!(second.tcp.peek(&mut [0]).is_err(), "the second client has an answer");
-    second.tcp.set_nonblocking(false).expect("a socket");
-    assert_eq!(first.ask(2, &[]), 0, "the first one is served");
-    drop(first);
-    assert_eq!(second.reply().payload, [0, 10, 0]);
-    second.state_in_mode(IDLE);
-}
-
-#[test]
 fn a_motion_is_announced_shown_commanded_finished_shown_and_announced() {
     let served = Served::start(Pace::Fast);
     let mut client = Client::connected(served.address);

@@ -3,10 +3,12 @@
 use super::wire::{self, Request, Status};
 use crate::gripper::FRANKA_HAND;
 use crate::gripper::fingers::Fingers;
+use crate::serve::arrivals::{Arrival, Arrivals, Outcome};
 use crate::serve::framing::{Inbox, Message};
-use crate::serve::session::read_into;
+use crate::serve::notices::{About, Notices};
+use crate::serve::session::{Gone, read_into};
 use std::io::Write as _;
-use std::net::{SocketAddr, TcpListener, TcpStream, UdpSocket};
+use std::net::{SocketAddr, TcpStream, UdpSocket};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::{self, JoinHandle};
@@ -24,17 +26,12 @@ pub(in crate::serve) struct HandService {
 }
 
 impl HandService {
-    /// Serves a hand at `listener`.
-    pub(in crate::serve) fn start(listener: TcpListener) -> Self {
-        let address = listener.local_addr().unwrap_or_else(|_| SocketAddr::from(([0, 0, 0, 0], 0)));
+    /// Serves a hand to those who come as `arrivals`.
+    pub(in crate::serve) fn start(arrivals: Arrivals) -> Self {
+        let address = arrivals.address().unwrap_or_else(|_| SocketAddr::from(([0, 0, 0, 0], 0)));
         let stop = Arc::new(AtomicBool::new(false));
-        let told = stop.clone();
-        let body = move || {
-            if let Err(error) = serve(&listener, &told) {
-                tracing::warn!("the hand is out of service ({error}); the arm is not affected");
-            }
-        };
-        let thread = thread::Builder::new().name("hand".into()).spawn(body).ok();
+        let ends = stop.clone();
+        let thread = thread::Builder::new().name("hand".into()).spawn(move || serve(arrivals, &ends)).ok();
         Self { address, stop, thread }
     }
 
@@ -57,40 +54,66 @@ impl Drop for HandService {
 struct Client {
     tcp: TcpStream,
     inbox: Inbox,
-    states_to: Option<SocketAddr>,
-    peer: SocketAddr,
+    udp: UdpSocket,
     /// Number and counter of the request whose action runs.
     running: Option<(u32, u32)>,
 }
 
-fn serve(listener: &TcpListener, stop: &AtomicBool) -> std::io::Result<()> {
-    listener.set_nonblocking(true)?;
-    let udp = UdpSocket::bind(SocketAddr::new(listener.local_addr()?.ip(), 0))?;
+fn serve(mut arrivals: Arrivals, stop: &AtomicBool) {
     let (mut fingers, mut client, begin) = (Fingers::new(FRANKA_HAND), None::<Client>, Instant::now());
+    let mut notices = Notices::new();
     while !stop.load(Ordering::Relaxed) {
-        if client.is_none()
-            && let Ok((tcp, peer)) = listener.accept()
-        {
-            tcp.set_nonblocking(true)?;
-            tcp.set_nodelay(true)?;
-            client = Some(Client { tcp, inbox: Inbox::of_the_hand(), states_to: None, peer, running: None });
-        }
         let ended = fingers.step(CYCLE.as_secs_f64()).map(wire::status);
         let stamp_ms = u32::try_from(begin.elapsed().as_millis()).unwrap_or(u32::MAX);
         if let Some(served) = &mut client
-            && served.cycle(&mut fingers, ended, &udp, stamp_ms).is_none()
+            && served.cycle(&mut fingers, ended, stamp_ms).is_none()
         {
             fingers.stop();
             client = None;
         }
+        for outcome in arrivals.look(Instant::now()) {
+            let (peer, opened) = match outcome {
+                Outcome::Asks(arrival, message) => (arrival.peer, Client::open(arrival, &message, client.is_some())),
+                Outcome::Closed(peer, gone) => (peer, Err(gone)),
+            };
+            match opened {
+                Ok(opened) => client = Some(opened),
+                Err(Gone::Left) => {}
+                Err(gone) => notices.warn(About::Refusal, format_args!("{peer}, of the hand: {gone}")),
+            }
+        }
         thread::sleep(CYCLE);
     }
-    Ok(())
+    notices.finish();
 }
 
 impl Client {
+    /// Answers the first `message` of a connection, which has to be a handshake; `taken` where somebody else is served.
+    fn open(arrival: Arrival, message: &Message, taken: bool) -> Result<Self, Gone> {
+        let Arrival { mut tcp, peer, inbox, .. } = arrival;
+        let Some(Request::Connect { version, udp_port }) = wire::request(message.number, &message.payload) else {
+            return Err(Gone::Nonsense("it asks for something before the handshake".into()));
+        };
+        let refused = if !wire::speaks(version) {
+            Some((wire::version_reply(message.id), Gone::Nonsense(format!("version {version} is none of this hand"))))
+        } else if taken {
+            Some((wire::busy_reply(message.id), Gone::Second))
+        } else {
+            None
+        };
+        if let Some((answer, gone)) = refused {
+            tcp.write_all(&answer)?;
+            return Err(gone);
+        }
+        let udp = UdpSocket::bind(SocketAddr::new(tcp.local_addr()?.ip(), 0))?;
+        udp.connect(SocketAddr::new(peer.ip(), udp_port))?;
+        udp.set_nonblocking(true)?;
+        tcp.write_all(&wire::welcome(message.id))?;
+        Ok(Self { tcp, inbox, udp, running: None })
+    }
+
     /// One cycle; `None` when the client is gone.
-    fn cycle(&mut self, fingers: &mut Fingers, ended: Option<Status>, udp: &UdpSocket, stamp_ms: u32) -> Option<()> {
+    fn cycle(&mut self, fingers: &mut Fingers, ended: Option<Status>, stamp_ms: u32) -> Option<()> {
         if let (Some(status), Some((number, id))) = (ended, self.running) {
             self.running = None;
             self.send(&wire::reply(number, id, status))?;
@@ -99,27 +122,20 @@ impl Client {
         while let Some(message) = self.inbox.next().ok()? {
             self.take(&message, fingers)?;
         }
-        if let Some(to) = self.states_to {
-            let _sent = udp.send_to(&wire::state(fingers, stamp_ms), to);
-        }
+        let _sent = self.udp.send(&wire::state(fingers, stamp_ms));
         Some(())
     }
 
     fn take(&mut self, message: &Message, fingers: &mut Fingers) -> Option<()> {
         let (number, id) = (message.number, message.id);
-        match (wire::request(number, &message.payload), self.states_to) {
-            (Some(Request::Connect { version, udp_port }), _) => {
-                let agreed = wire::speaks(version);
-                self.states_to = agreed.then(|| SocketAddr::new(self.peer.ip(), udp_port));
-                self.send(&wire::connect_reply(id, agreed))
-            }
-            (_, None) => None,
-            (None, Some(_)) => self.send(&wire::reply(number, id, Status::Fail)),
-            (Some(Request::Stop), Some(_)) => {
+        match wire::request(number, &message.payload) {
+            Some(Request::Connect { .. }) => None,
+            None => self.send(&wire::reply(number, id, Status::Fail)),
+            Some(Request::Stop) => {
                 self.cut_off(fingers)?;
                 self.send(&wire::reply(number, id, Status::Success))
             }
-            (Some(Request::Act(action)), Some(_)) => {
+            Some(Request::Act(action)) => {
                 self.cut_off(fingers)?;
                 match fingers.begin(action) {
                     Ok(()) => self.running = Some((number, id)),

@@ -48,10 +48,24 @@ pub(super) fn speaks(version: u16) -> bool {
     version == GRIPPER_VERSION
 }
 
-/// The reply to a handshake.
-pub(super) fn connect_reply(id: u32, agreed: bool) -> Vec<u8> {
-    let status = if agreed { GripperConnectStatus::Success } else { GripperConnectStatus::IncompatibleLibraryVersion };
-    let payload = [status.to_u16().to_le_bytes(), GRIPPER_VERSION.to_le_bytes()].concat();
+/// The reply to a handshake that is accepted.
+pub(super) fn welcome(id: u32) -> Vec<u8> {
+    handshake_reply(id, GripperConnectStatus::Success.to_u16())
+}
+
+/// The reply to a handshake of another version.
+pub(super) fn version_reply(id: u32) -> Vec<u8> {
+    handshake_reply(id, GripperConnectStatus::IncompatibleLibraryVersion.to_u16())
+}
+
+/// The reply to a client for whom there is no place, for which the protocol has no status.
+pub(super) fn busy_reply(id: u32) -> Vec<u8> {
+    const TAKEN: u16 = 2;
+    handshake_reply(id, TAKEN)
+}
+
+fn handshake_reply(id: u32, status: u16) -> Vec<u8> {
+    let payload = [status.to_le_bytes(), GRIPPER_VERSION.to_le_bytes()].concat();
     message(GripperCommand::Connect.to_u16().into(), id, &payload)
 }
 
@@ -97,7 +111,7 @@ mod tests {
     #[test]
     fn messages_have_the_lengths_of_the_protocol() {
         assert_eq!(state(&Fingers::new(crate::gripper::FRANKA_HAND), 7).len(), 23);
-        assert_eq!(connect_reply(0, true).len(), 14);
+        assert_eq!(welcome(0).len(), 14);
         assert_eq!(reply(1, 0, Status::Success).len(), 12);
     }
 

@@ -12,11 +12,17 @@
 //!    +------------------------------------------------------+ once at rest
 //! ```
 //!
+//! In any mode but moving, an arm that is too fast, beyond its range or held by too much torque is a reflex as well, and
+//! its brakes close: there the robot's own controller is what failed.
+//!
 //! Deterministic: the same requests and set points give the same states.
 #![allow(non_snake_case)] // the field's own symbols
 
 #[cfg(test)]
 mod fuzz;
+mod recovery;
+#[cfg(test)]
+mod recovery_tests;
 mod requests;
 #[cfg(test)]
 mod target_tests;
@@ -32,12 +38,13 @@ use super::hold::Hold;
 use super::impedance;
 use super::kinematics::{Frame, least_stretch};
 use super::motion::{Course, Motion};
+use super::notices::{About, Notices};
 use super::settings::Settings;
 use super::state::{Facts, Modes, fill};
-use super::watch::{objections, strays, touches};
+use super::watch::{objections, runs_away, strays, touches};
 use super::wire::{
-    AutomaticErrorRecoveryStatus, Controller, ControllerMode, GeneratorKind, MotionGeneratorMode, MotionRequest,
-    MoveStatus, RobotMode, SetPoint, WireState,
+    Controller, ControllerMode, GeneratorKind, MotionGeneratorMode, MotionRequest, MoveStatus, RobotMode, SetPoint,
+    WireState,
 };
 use crate::arm::ReflexErrors;
 use crate::safety::{Limits, Trace};
@@ -49,9 +56,6 @@ use twin::sim::Drive;
 
 /// A pose whose Jacobian stretches less than this in some direction is no start of a Cartesian motion.
 const SINGULAR: f64 = 0.01;
-
-/// How long a recovering arm gives way [ms]: the joints' damping lets go of a table within a tenth of that.
-const YIELD: u32 = 200;
 
 /// Numbers of the requests that are answered later than at once.
 const MOVE: u32 = 1;
@@ -92,10 +96,11 @@ enum Mode {
     Idle,
     Moving(Box<Motion>),
     Reflex,
-    /// Error recovery, asked for by the request `id`; the arm has given way for `yielded` milliseconds.
+    /// Error recovery, asked for by the request `id` of a client that is still there, for `passed` milliseconds since the
+    /// arm came to rest.
     Recovering {
-        id: u32,
-        yielded: u32,
+        id: Option<u32>,
+        passed: u32,
     },
 }
 
@@ -104,7 +109,11 @@ pub(super) struct Robot {
     body: Body,
     rules: JointRules,
     settings: Settings,
+    /// Those that a new client finds.
+    at_power_on: Settings,
     mode: Mode,
+    /// The arm's brakes are closed.
+    braked: bool,
     /// A motion that was asked for while the arm still came to rest from the one before.
     waiting: Option<(u32, MotionRequest)>,
     hold: Hold,
@@ -113,6 +122,7 @@ pub(super) struct Robot {
     state: WireState,
     outbox: Outbox,
     tally: Tally,
+    pub(super) notices: Notices,
 }
 
 impl Robot {
@@ -120,10 +130,13 @@ impl Robot {
     pub(super) fn new(cell: &Cell, theta: Option<&Theta>) -> Result<Self, ServeError> {
         let body = Body::new(cell, theta)?;
         let limits = Limits::of(cell, body.model());
+        let at_power_on = Settings::at_power_on(cell.tool.as_ref());
         let mut robot = Self {
             rules: JointRules { limits },
-            settings: Settings::at_power_on(cell.tool.as_ref()),
+            settings: at_power_on.clone(),
+            at_power_on,
             mode: Mode::Idle,
+            braked: false,
             waiting: None,
             hold: Hold::at_rest(limits, &body.true_reading().q),
             errors: ReflexErrors::default(),
@@ -131,6 +144,7 @@ impl Robot {
             state: WireState::default(),
             outbox: Outbox::default(),
             tally: Tally { cycles: 1, ..Tally::default() },
+            notices: Notices::new(),
             body,
         };
         robot.show();
@@ -174,13 +188,25 @@ impl Robot {
         }
     }
 
-    /// The client is gone: its motion ends, settings and errors stay.
+    /// The client is gone: its motion ends, and what it has set goes with it. Errors stay.
     pub(super) fn client_left(&mut self) {
         self.waiting = None;
         if self.end().is_some() {
-            tracing::warn!("the client left during a motion; the arm comes to rest");
+            self.notices.warn(About::Client, "the client left during a motion; the arm comes to rest");
         }
+        if let Mode::Recovering { id, .. } = &mut self.mode {
+            *id = None;
+        }
+        self.settings = self.at_power_on.clone();
+        self.hand_on_settings();
         self.outbox = Outbox::default();
+    }
+
+    /// Has the body act by the load and the joint stiffness at power-on.
+    fn hand_on_settings(&mut self) {
+        self.body.declare_load(&self.at_power_on.load);
+        // It fails where cell.toml has no controller, and such a cell is not served.
+        let _has_one = self.body.restore_stiffness();
     }
 
     /// Starts the motion that waits, once the arm is at rest.
@@ -201,32 +227,19 @@ impl Robot {
         self.mode = Mode::Moving(Box::new(motion));
     }
 
-    /// Recovery: once at rest, the arm gives way for a moment, so that it does not press on against what it ran into, and
-    /// holds the pose it is in then.
-    fn go_on_recovering(&mut self) {
-        let Mode::Recovering { id, yielded } = &mut self.mode else { return };
-        if !self.hold.rests() {
-            return;
-        }
-        self.hold.settle(&self.body.measured.q);
-        *yielded += 1;
-        if *yielded > YIELD {
-            let payload = vec![AutomaticErrorRecoveryStatus::Success.to_u8()];
-            self.outbox.after_state.push(Reply { number: RECOVER, id: *id, payload });
-            self.body.touched.forget_collisions();
-            self.errors = ReflexErrors::default();
-            self.mode = Mode::Idle;
-        }
-    }
-
     /// Lets a millisecond pass; `set_point` is the newest that has arrived since the last one.
     pub(super) fn tick(&mut self, set_point: Option<&SetPoint>) {
         self.go_on_recovering();
         self.begin_waiting();
         self.cycle(set_point);
         self.hold.step();
-        let drive = self.drive();
-        self.body.step(&drive, &self.settings);
+        if self.braked {
+            self.body.step_braked();
+            self.hold.settle(&self.body.measured.q);
+        } else {
+            let drive = self.drive();
+            self.body.step(&drive, &self.settings);
+        }
         self.tally.cycles += 1;
         self.watch();
         self.show();
@@ -260,13 +273,20 @@ impl Robot {
                     self.reflex(errors);
                 }
             }
-            Mode::Idle | Mode::Reflex | Mode::Recovering { .. } => drop(touches(body, None, settings)),
+            Mode::Idle | Mode::Reflex | Mode::Recovering { .. } => {
+                drop(touches(body, None, settings));
+                // A recovering arm may be beyond its range: it is on its way back.
+                let errors = runs_away(body, rules, settings, !matches!(mode, Mode::Recovering { .. }));
+                if !self.braked && !errors.is_empty() {
+                    self.brake(errors);
+                }
+            }
         }
     }
 
     /// The robot stops by itself.
     fn reflex(&mut self, errors: ReflexErrors) {
-        tracing::warn!("the robot stopped itself: {errors}");
+        self.notices.warn(About::Robot, format_args!("the robot stopped itself: {errors}"));
         if let Some(id) = self.end() {
             let payload = vec![MoveStatus::ReflexAborted.to_u8()];
             self.outbox.after_state.push(Reply { number: MOVE, id, payload });

@@ -1,11 +1,9 @@
 //! What a client may ask of the robot, when, and with which status it is answered.
 
-use super::{MOVE, Mode, RECOVER, Reply, Robot};
+use super::{MOVE, Mode, Reply, Robot};
 use crate::serve::settings::Invalid;
-use crate::serve::watch::is_outside;
 use crate::serve::wire::{
-    AutomaticErrorRecoveryStatus, Controller, GeneratorKind, GetterSetterStatus, MotionRequest, MoveStatus, Request,
-    StopMoveStatus,
+    Controller, GeneratorKind, GetterSetterStatus, MotionRequest, MoveStatus, Request, StopMoveStatus,
 };
 use shared_mem::msg::joints_from;
 
@@ -89,24 +87,6 @@ impl Robot {
             self.answer_move(id, MoveStatus::Preempted);
         }
         StopMoveStatus::Success
-    }
-
-    fn recover(&mut self, id: u32) {
-        let status = match self.mode {
-            Mode::Idle => AutomaticErrorRecoveryStatus::Success,
-            Mode::Moving(_) | Mode::Recovering { .. } => AutomaticErrorRecoveryStatus::CommandNotPossibleRejected,
-            Mode::Reflex if is_outside(&self.body, &self.rules) => {
-                tracing::warn!(
-                    "a joint is beyond its limit, where only a person could bring it back: start the server again"
-                );
-                AutomaticErrorRecoveryStatus::ManualErrorRecoveryRequiredRejected
-            }
-            Mode::Reflex => {
-                self.mode = Mode::Recovering { id, yielded: 0 };
-                return;
-            }
-        };
-        self.outbox.before_state.push(Reply { number: RECOVER, id, payload: vec![status.to_u8()] });
     }
 }
 
