@@ -16,19 +16,29 @@
 //! | [`input`] | the one way in for files: regular ones only, each kind up to a size |
 //! | [`ending`] | whether the process was asked to end |
 //! | [`error_line()`] | an error with its causes in one line |
+//! | [`answer`] | what a program answers, on standard output |
+//! | [`console`] | what it says on the way, on standard error |
+//! | [`progress`] | how far it is, on a terminal |
+//! | [`printable`] | text as a terminal may show it |
+//! | [`usage`] | help, and what is wrong with a command line |
 //! | [`time`] | the clock that every stamp comes from |
 
+pub mod answer;
 pub mod cell;
+pub mod console;
 pub mod ending;
 mod error_line;
 pub mod frames;
 pub mod input;
 pub mod msg;
+pub mod printable;
+pub mod progress;
 pub mod recording;
 pub mod theta;
 pub mod time;
 pub mod toml_file;
 pub mod topics;
 pub mod transport;
+pub mod usage;
 
 pub use error_line::error_line;
