@@ -1,6 +1,7 @@
 //! What the user wants of long work while it runs: that it ends, or waits. Flags that the work looks at between steps, so
 //! that it can stop cleanly and keep what it has.
 
+use shared_mem::console;
 use signal_hook::consts::{SIGUSR1, SIGUSR2};
 use std::io;
 use std::sync::Arc;
@@ -98,7 +99,7 @@ impl Interrupt {
         if !self.paused() || self.asked() {
             return;
         }
-        eprintln!("paused; the arm holds its pose. p (or SIGUSR2) goes on, q (or Ctrl-C) ends");
+        console::line("paused; the arm holds its pose. p (or SIGUSR2) goes on, q (or Ctrl-C) ends");
         while self.paused() && !self.asked() {
             std::thread::sleep(LOOK);
         }

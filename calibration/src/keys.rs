@@ -6,6 +6,7 @@ use rustix::process::getpgrp;
 use rustix::termios::{
     LocalModes, OptionalActions, SpecialCodeIndex, Termios, isatty, tcgetattr, tcgetpgrp, tcsetattr,
 };
+use shared_mem::console;
 use std::io::{self, Read as _};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -67,7 +68,7 @@ impl Keys {
             }
         };
         let listener = thread::Builder::new().name("keys".into()).spawn(body).ok();
-        eprintln!("p pauses and goes on, q ends; the arm stops inside its limits at any moment");
+        console::line("p pauses and goes on, q ends; the arm stops inside its limits at any moment");
         Some(Self { stop, listener, before })
     }
 }

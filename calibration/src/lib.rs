@@ -15,7 +15,6 @@
 //! | [`viewpoint`] | the camera's pose from pictures of the robot |
 //! | [`processes`] | the other programs as children |
 //! | [`interrupt`] | Ctrl-C |
-//! | [`progress`] | the bar on stderr |
 
 pub mod benchmark;
 pub mod capture;
@@ -27,6 +26,5 @@ pub mod identify;
 pub mod interrupt;
 pub mod keys;
 pub mod processes;
-pub mod progress;
 pub mod report;
 pub mod viewpoint;

@@ -257,7 +257,8 @@ impl Drop for Running {
 }
 
 fn keep_tail(lines: impl BufRead, tail: &Mutex<VecDeque<String>>) {
-    for line in lines.lines().map_while(Result::ok) {
+    for line in lines.split(b'\n').map_while(Result::ok) {
+        let line = String::from_utf8_lossy(&line).into_owned();
         let mut kept = tail.lock().unwrap_or_else(PoisonError::into_inner);
         if kept.len() == TAIL {
             kept.pop_front();

@@ -8,7 +8,7 @@ use std::io::{self, Write};
 /// The answer did not reach its reader.
 #[derive(Debug, thiserror::Error)]
 #[error(
-    "the work is done, but its answer cannot be written to standard output: {0}; keep its reader running, or free some space, and start again"
+    "the answer cannot be written to standard output: {0}; all else is done. Keep its reader running, or free some space, before you ask again"
 )]
 pub struct AnswerError(#[from] io::Error);
 

@@ -99,9 +99,10 @@ fn console() -> &'static Console {
     })
 }
 
-/// Columns of the terminal.
+/// Columns of the terminal; 80 where it does not know.
 fn width() -> usize {
-    rustix::termios::tcgetwinsize(io::stderr()).map_or(0, |size| usize::from(size.ws_col))
+    let known = rustix::termios::tcgetwinsize(io::stderr()).map_or(0, |size| usize::from(size.ws_col));
+    if known == 0 { 80 } else { known }
 }
 
 /// What waits to be written.

@@ -3,7 +3,7 @@
 mod cli;
 
 use clap::{Parser, Subcommand};
-use shared_mem::error_line;
+use shared_mem::{console, error_line, usage};
 use std::process::ExitCode;
 use tracing_subscriber::EnvFilter;
 
@@ -35,9 +35,13 @@ enum Verb {
 }
 
 fn main() -> ExitCode {
-    let arguments = Arguments::parse();
+    let _last_lines = console::start();
+    let arguments = match Arguments::try_parse() {
+        Ok(arguments) => arguments,
+        Err(error) => return usage::say(error.use_stderr(), error.render()),
+    };
     let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new("warn"));
-    tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).init();
+    tracing_subscriber::fmt().with_env_filter(filter).with_ansi(false).with_writer(|| console::Log).init();
     let outcome = match arguments.verb {
         Verb::Shadow(verb) => verb.run(),
         Verb::Replay(verb) => verb.run(),
@@ -47,7 +51,7 @@ fn main() -> ExitCode {
     match outcome {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("twin: {}", error_line(error.as_ref()));
+            console::line(format_args!("twin: {}", error_line(error.as_ref())));
             ExitCode::FAILURE
         }
     }

@@ -4,9 +4,10 @@ use super::rules;
 use super::world::{Fault, Kind, Outside, World};
 use super::{draw, session, trial};
 use crate::interrupt::Interrupt;
-use crate::progress::Progress;
 use crate::report::benchmark::Method;
 use shared_mem::cell::Cell;
+use shared_mem::console;
+use shared_mem::progress::Progress;
 
 /// Which worlds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -58,7 +59,7 @@ pub fn run(plan: &Plan, cell: &Cell, interrupt: &Interrupt) -> Outcome {
         bar.show(done as u64, &format!("world {number}"));
         match judged(&world, plan.clips, interrupt) {
             Ok(cases) => {
-                bar.tell(&cases[0].line());
+                console::line(cases[0].line());
                 methods.iter_mut().zip(cases).for_each(|(method, case)| method.cases.push(case));
             }
             Err(error) => left_out.push(format!("world {number}: {error}")),

@@ -3,6 +3,7 @@
 use super::link::{Link, LinkError};
 use crate::interrupt::Interrupt;
 use crate::processes::{ProcessError, Program, Running, arguments};
+use shared_mem::console;
 use std::path::Path;
 use std::time::Duration;
 
@@ -57,13 +58,13 @@ impl Bridge {
     pub fn find_or_start(link: &mut Link, wanted: &Wanted, interrupt: &Interrupt) -> Result<Self, BridgeError> {
         if link.wait_for_bridge(LOOK, || interrupt.asked())?.is_some() {
             match wanted.arm {
-                Some(arm) => eprintln!("using the bridge that is running; --arm {arm} has no effect"),
-                None => eprintln!("using the bridge that is running"),
+                Some(arm) => console::line(format_args!("using the bridge that is running; --arm {arm} has no effect")),
+                None => console::line("using the bridge that is running"),
             }
             return Ok(Self { started: None });
         }
         let arm = wanted.arm.unwrap_or(DEFAULT_ARM);
-        eprintln!("no bridge is running: starting `rt_bridge run --arm {arm}` for this capture");
+        console::line(format_args!("no bridge is running: starting `rt_bridge run --arm {arm}` for this capture"));
         let mut list = arguments([&"run", &"--cell", &wanted.cell, &"--arm", &arm]);
         list.extend(wanted.realtime.into_iter().flat_map(|way| arguments([&"--realtime", &way])));
         let started = Running::start(Program::Bridge, &list, wanted.domain)?;

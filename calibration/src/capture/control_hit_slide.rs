@@ -15,11 +15,12 @@ use super::stream::{Motion, Outcome, play};
 use super::task::{Summary, Task, cause};
 use super::way::Ways;
 use crate::interrupt::Interrupt;
-use crate::progress::Progress;
 use crate::report;
 use serde::Serialize;
 use shared_mem::cell::{Cell, ClipKind};
+use shared_mem::console;
 use shared_mem::msg::motion::SetPoint;
+use shared_mem::progress::Progress;
 use std::path::PathBuf;
 use std::time::Duration;
 use twin::arm::JointLimits;
@@ -147,7 +148,7 @@ impl Desk<'_> {
                 std::fs::write(file, report::stroke::picture(&next, self.size)).map_err(|error| {
                     anyhow::anyhow!("cannot write {}: {error}; choose another file", file.display())
                 })?;
-                eprintln!("{}: the next stroke; the arm was not moved", file.display());
+                console::line(format_args!("{}: the next stroke; the arm was not moved", file.display()));
                 break;
             }
             let title = format!("clip {} of {wanted}", kept + 1);
@@ -176,7 +177,7 @@ impl Desk<'_> {
                 Ok(next) => return Ok(Some(next)),
                 Err(error) if asked.elapsed() > BY_HAND => return Err(error.into()),
                 Err(error) if !told => {
-                    eprintln!("{error} (waiting {} s; Ctrl-C ends)", BY_HAND.as_secs());
+                    console::line(format_args!("{error} (waiting {} s; Ctrl-C ends)", BY_HAND.as_secs()));
                     told = true;
                 }
                 Err(_) => {}
@@ -203,7 +204,10 @@ impl Desk<'_> {
         let recorder = Recorder::start(&path, &task.cell, task.domain.as_deref(), self.interrupt)?;
         object.begin();
         let (outcome, quality) = self.play(link, object, points, &format!("{title}: stroke")).inspect_err(|_| {
-            eprintln!("{}: the stroke failed; the file stays as far as it goes, but is not entered", path.display());
+            console::line(format_args!(
+                "{}: the stroke failed; the file stays as far as it goes, but is not entered",
+                path.display()
+            ));
         })?;
         let rested = object.standing(COMES_TO_REST, self.interrupt);
         let seen = object.quality();
@@ -235,7 +239,7 @@ impl Desk<'_> {
             messages: recorded.messages,
             bytes: recorded.bytes,
         };
-        eprintln!("{}", clip.line());
+        console::line(clip.line());
         Ok(Some(clip))
     }
 

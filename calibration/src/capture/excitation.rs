@@ -12,11 +12,12 @@ use super::stream::{Motion, Outcome, play};
 use super::task::{Summary, Task, cause};
 use super::transit;
 use crate::interrupt::Interrupt;
-use crate::progress::Progress;
 use serde::Serialize;
 use shared_mem::cell::{Cell, ClipKind};
+use shared_mem::console;
 use shared_mem::msg::Joints;
 use shared_mem::msg::motion::SetPoint;
+use shared_mem::progress::Progress;
 use std::path::{Path, PathBuf};
 use twin::arm::JointLimits;
 
@@ -134,7 +135,7 @@ impl Desk<'_> {
             return Ok(None);
         }
         let (outcome, quality) =
-            self.play(link, &plan, title, note).inspect_err(|_| eprintln!("{}", kept_unfinished(&path)))?;
+            self.play(link, &plan, title, note).inspect_err(|_| console::line(kept_unfinished(&path)))?;
         let recorded = recorder.finish()?;
         let why = match (outcome, &recorded.stopped, quality.verdict(plan.peak_speed)) {
             (Outcome::Stopped, ..) => Some("it was ended by the user".to_owned()),
@@ -150,7 +151,7 @@ impl Desk<'_> {
         let [paused, reflex] = [outcome == Outcome::Paused, outcome == Outcome::Reflex];
         let begin = plan.set_points[0].q_d;
         let clip = ClipSummary { paused, reflex, ..summary(file, why, plan, quality, &recorded) };
-        eprintln!("{}", clip.line());
+        console::line(clip.line());
         if self.recovery.settle(link, self.interrupt)? {
             self.go_back(link, &begin)?;
         }
@@ -165,7 +166,7 @@ impl Desk<'_> {
             first_excess(way, &self.limits, Some(&self.body)).is_none() && !way.iter().any(is_low)
         });
         let Some(set_points) = way else {
-            eprintln!("no free way back to where the clip began: the next one begins here");
+            console::line("no free way back to where the clip began: the next one begins here");
             return Ok(());
         };
         let motion = Motion { set_points: &set_points, dof: self.limits.len() };
@@ -185,7 +186,10 @@ impl Desk<'_> {
         for (joint, bound_by) in plan.bound_by.iter().enumerate() {
             if let Some(quantity) = bound_by {
                 let reached = plan.amplitude[joint];
-                eprintln!("  joint {}: {reached:.3} rad instead of {amplitude:.3}, bound by {quantity}", joint + 1);
+                console::line(format_args!(
+                    "  joint {}: {reached:.3} rad instead of {amplitude:.3}, bound by {quantity}",
+                    joint + 1
+                ));
             }
         }
         Ok(plan)

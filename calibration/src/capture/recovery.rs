@@ -4,6 +4,7 @@
 use super::link::{Link, LinkError};
 use super::stream::Outcome;
 use crate::interrupt::Interrupt;
+use shared_mem::console;
 use std::time::{Duration, Instant};
 
 /// Wait before a reflex is cleared: an object comes to rest, a person sees what happened and can end it.
@@ -75,7 +76,10 @@ impl Recovery {
         }
         self.done += 1;
         let wait = PAUSE.as_secs();
-        eprintln!("{reason}; it is recovered in {wait} s ({} of {} times, Ctrl-C ends)", self.done, self.most);
+        console::line(format_args!(
+            "{reason}; it is recovered in {wait} s ({} of {} times, Ctrl-C ends)",
+            self.done, self.most
+        ));
         let begin = Instant::now();
         while begin.elapsed() < PAUSE && !interrupt.asked() {
             std::thread::sleep(LOOK);

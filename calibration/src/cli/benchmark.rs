@@ -9,6 +9,7 @@ use calibration::report::benchmark::page;
 use calibration::report::terminal;
 use serde_json::json;
 use shared_mem::cell::Cell;
+use shared_mem::console;
 use std::path::PathBuf;
 use std::time::Instant;
 
@@ -70,8 +71,8 @@ pub(super) fn run(arguments: BenchmarkArguments, interrupt: &Interrupt) -> anyho
         std::fs::write(file, page(&methods, &origin))
             .with_context(|| format!("{} cannot be written; give another place", file.display()))?;
     }
-    left_out.iter().for_each(|world| eprintln!("left out: {world}"));
-    eprintln!("{}", terminal::benchmark(&methods));
+    left_out.iter().for_each(|world| console::line(format_args!("left out: {world}")));
+    console::block(terminal::benchmark(&methods));
     if arguments.json {
         let scores: Vec<_> = methods
             .iter()

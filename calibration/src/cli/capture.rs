@@ -6,6 +6,7 @@ use calibration::capture::{control_hit_slide, excitation};
 use calibration::interrupt::Interrupt;
 use calibration::keys::Keys;
 use clap::Subcommand;
+use shared_mem::console;
 use std::path::PathBuf;
 
 #[derive(Debug, Subcommand)]
@@ -115,7 +116,7 @@ fn excite(arguments: ExcitationArguments, interrupt: &Interrupt) -> anyhow::Resu
     let options = excitation::Options { task: task.task(), duration, amplitude, seed };
     let summary = excitation::capture(&options, interrupt, &mut String::new)?;
     let kept = summary.clips.iter().filter(|clip| clip.kept).count();
-    eprintln!("{}: {kept} of {} clips kept", summary.session.display(), options.task.clips);
+    console::line(format_args!("{}: {kept} of {} clips kept", summary.session.display(), options.task.clips));
     if json { print_json(&summary) } else { Ok(()) }
 }
 
@@ -125,7 +126,7 @@ fn strike(arguments: StrokeArguments, interrupt: &Interrupt) -> anyhow::Result<(
     let summary = control_hit_slide::capture(&options, interrupt)?;
     if options.preview.is_none() {
         let kept = summary.clips.iter().filter(|clip| clip.kept).count();
-        eprintln!("{}: {kept} of {} clips kept", summary.session.display(), summary.clips.len());
+        console::line(format_args!("{}: {kept} of {} clips kept", summary.session.display(), summary.clips.len()));
     }
     if json { print_json(&summary) } else { Ok(()) }
 }

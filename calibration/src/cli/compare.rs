@@ -3,6 +3,7 @@
 use super::print_json;
 use calibration::identify::object::{self, compare};
 use calibration::interrupt::Interrupt;
+use shared_mem::console;
 use std::path::PathBuf;
 
 #[derive(Debug, clap::Args)]
@@ -36,6 +37,6 @@ pub(super) fn run(arguments: CompareArguments, interrupt: &Interrupt) -> anyhow:
     let CompareArguments { session, parameters, budget, seed, json } = arguments;
     let options = object::Options { session, parameters, budget: budget as usize, seed, ..object::Options::default() };
     let found = compare::compare(&options, interrupt)?;
-    eprint!("{}", found.table());
+    console::block(found.table());
     if json { print_json(&found) } else { Ok(()) }
 }

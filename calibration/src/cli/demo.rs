@@ -3,6 +3,7 @@
 use super::print_json;
 use calibration::demo;
 use calibration::interrupt::Interrupt;
+use shared_mem::console;
 use std::path::PathBuf;
 
 #[derive(Debug, clap::Args)]
@@ -32,6 +33,6 @@ pub(super) struct DemoArguments {
 pub(super) fn run(arguments: DemoArguments, interrupt: &Interrupt) -> anyhow::Result<()> {
     let DemoArguments { out, seed, clips, json } = arguments;
     let finding = demo::demo(&demo::Options { out, seed, clips }, interrupt)?;
-    eprintln!("{}", finding.table());
+    console::block(finding.table());
     if json { print_json(&finding) } else { Ok(()) }
 }

@@ -3,6 +3,7 @@
 use super::print_json;
 use clap::{Args, ValueEnum};
 use serde::Serialize;
+use shared_mem::console;
 use shared_mem::msg::joints_from;
 use shared_mem::recording::{Exported, Format, Session, export_session};
 use std::path::PathBuf;
@@ -72,9 +73,11 @@ pub(super) fn run(arguments: &ExportArguments) -> anyhow::Result<()> {
     let clips = export_session(&session, arguments.to.into(), &arguments.out, &flange_at, |clip| {
         let Exported { file, measured, desired, poses, pictures, warnings } = clip;
         let file = file.display();
-        eprintln!("{file}: {measured} states, {desired} commands, {poses} poses, {pictures} pictures");
+        console::line(format_args!(
+            "{file}: {measured} states, {desired} commands, {poses} poses, {pictures} pictures"
+        ));
         for warning in warnings {
-            eprintln!("{file}: {warning}");
+            console::line(format_args!("{file}: {warning}"));
         }
     })?;
     if arguments.json { print_json(&Answer { clips }) } else { Ok(()) }

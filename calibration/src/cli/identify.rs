@@ -6,6 +6,7 @@ use calibration::identify::{Identification, Optimizer, arm, object};
 use calibration::interrupt::Interrupt;
 use calibration::report::terminal;
 use clap::{Subcommand, ValueEnum};
+use shared_mem::console;
 use std::path::{Path, PathBuf};
 
 #[derive(Debug, Subcommand)]
@@ -139,6 +140,6 @@ fn tell(found: &Identification, report: Option<&Path>, json: bool) -> anyhow::Re
         std::fs::write(report, sheet.page())
             .with_context(|| format!("{}; give --report a place that can be written", report.display()))?;
     }
-    eprintln!("{}", terminal::identification(&sheet));
+    console::block(terminal::identification(&sheet));
     if json { print_json(found) } else { Ok(()) }
 }

@@ -12,8 +12,8 @@ use calibration::diagnose;
 use calibration::interrupt::Interrupt;
 use clap::{Parser, Subcommand};
 use serde::Serialize;
+use shared_mem::answer;
 use shared_mem::ending;
-use std::io::Write as _;
 
 /// Records how a robot cell moves, and says where its twin differs.
 #[derive(Debug, Parser)]
@@ -105,8 +105,5 @@ fn between<const LO: u32, const HI: u32, const UNIT: u32>(text: &str) -> Result<
 }
 
 fn print_json(answer: &impl Serialize) -> anyhow::Result<()> {
-    let mut stdout = std::io::stdout().lock();
-    serde_json::to_writer(&mut stdout, answer)?;
-    writeln!(stdout)?;
-    Ok(())
+    Ok(answer::json(answer)?)
 }

@@ -7,6 +7,7 @@ use calibration::viewpoint::command::{Options, StartFrom, run as find};
 use calibration::viewpoint::fit::Method;
 use calibration::viewpoint::search::Reach;
 use clap::{Args, ValueEnum};
+use shared_mem::console;
 use shared_mem::recording::PictureKind;
 use std::path::PathBuf;
 use twin::render::Hand;
@@ -150,24 +151,29 @@ pub(super) fn run(arguments: ViewpointArguments) -> anyhow::Result<()> {
 fn tell(found: &Viewpoint) {
     let [x, y, z] = found.camera.position;
     let [qw, qx, qy, qz] = found.camera.orientation;
-    eprintln!("camera in the base frame: {x:.4}, {y:.4}, {z:.4} m; {qw:.5}, {qx:.5}, {qy:.5}, {qz:.5} (w, x, y, z)");
+    console::line(format_args!(
+        "camera in the base frame: {x:.4}, {y:.4}, {z:.4} m; {qw:.5}, {qx:.5}, {qy:.5}, {qz:.5} (w, x, y, z)"
+    ));
     if let Some(interval) = &found.interval {
         let [a, b, c] = interval.position.map(|v| v * 1e3);
         let [d, e, f] = interval.rotation.map(f64::to_degrees);
-        eprintln!("95 % within {a:.1}, {b:.1}, {c:.1} mm and {d:.2}, {e:.2}, {f:.2} degrees");
+        console::line(format_args!("95 % within {a:.1}, {b:.1}, {c:.1} mm and {d:.2}, {e:.2}, {f:.2} degrees"));
     }
     let confirmed = found.confirmed * 100.0;
-    eprintln!("{confirmed:.0} % of the outline confirmed; {} drawings, {:.1} s", found.drawings, found.seconds);
+    console::line(format_args!(
+        "{confirmed:.0} % of the outline confirmed; {} drawings, {:.1} s",
+        found.drawings, found.seconds
+    ));
     if let Some(start) = &found.start {
-        eprintln!(
+        console::line(format_args!(
             "the start was {:.1} mm and {:.2} degrees away, {:.1} pixels in the picture{}",
             start.distance_m * 1e3,
             start.angle_rad.to_degrees(),
             start.reprojection_px,
             if start.excluded { ": outside of the interval" } else { "" }
-        );
+        ));
     }
     for warning in &found.warnings {
-        eprintln!("note: {warning}");
+        console::line(format_args!("note: {warning}"));
     }
 }

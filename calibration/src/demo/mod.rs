@@ -17,6 +17,7 @@ use replay::{Replay, Trace, replay, trace};
 use serde::Serialize;
 use serde_json::Value;
 use shared_mem::cell::Cell;
+use shared_mem::console;
 use shared_mem::recording::Session;
 use shared_mem::theta::{EffectTheta, Theta};
 use stage::{Answers, Stage, worst};
@@ -103,7 +104,11 @@ struct Files {
 pub fn demo(options: &Options, interrupt: &Interrupt) -> anyhow::Result<Finding> {
     let start = Instant::now();
     let files = prepare(options)?;
-    eprintln!("hidden from the twin: gains in {}, effect in {}", files.hidden.display(), files.hidden_effect.display());
+    console::line(format_args!(
+        "hidden from the twin: gains in {}, effect in {}",
+        files.hidden.display(),
+        files.hidden_effect.display()
+    ));
     let (captured, answers, live) = record(options, &files, interrupt)?;
     let kept: Vec<&Path> = captured.clips.iter().filter(|c| c.kept).map(|c| c.file.as_path()).collect();
     if interrupt.asked() {
@@ -112,9 +117,9 @@ pub fn demo(options: &Options, interrupt: &Interrupt) -> anyhow::Result<Finding>
     let Some(first) = kept.first() else {
         bail!("no clip was good enough to keep; run the demo again on a less busy machine");
     };
-    eprintln!("diagnosing the session");
+    console::line("diagnosing the session");
     let found = examine(options, &files, interrupt)?;
-    eprintln!("replaying with cell.toml and with what was found");
+    console::line("replaying with cell.toml and with what was found");
     let told = Told { effect: hidden::effect(options.seed), found: &found };
     let story = compare(options, &files, &files.session.join(first), (live, &told), interrupt)?;
     let report = files.out.join("report.html");
@@ -206,7 +211,7 @@ fn record(
     interrupt: &Interrupt,
 ) -> anyhow::Result<(Summary<ClipSummary>, Answers, Vec<f64>)> {
     let domain = format!("demo-{}", std::process::id());
-    eprintln!("starting the simulated robot and its twin as two processes");
+    console::line("starting the simulated robot and its twin as two processes");
     let mut stage = Stage::start(&files.cell, [&files.hidden, &files.hidden_effect], &domain, interrupt)?;
     let request = excitation::Options {
         task: Task {
@@ -230,7 +235,7 @@ fn record(
     stage.gap().look()?;
     let (answers, gap) = stage.stop()?;
     let (joint, rms) = worst(gap.largest());
-    eprintln!("live, the twin missed joint {} by {:.2} mrad RMS at worst", joint + 1, 1e3 * rms);
+    console::line(format_args!("live, the twin missed joint {} by {:.2} mrad RMS at worst", joint + 1, 1e3 * rms));
     Ok((captured, answers, gap.largest().to_vec()))
 }
 

@@ -10,7 +10,7 @@ use super::split::Split;
 use super::worthy::strays;
 use super::{flat, starts};
 use crate::estimate::{ClipModel, Impossible};
-use crate::progress::Progress;
+use shared_mem::progress::Progress;
 
 /// What leaves more of the gain of the best on the arm's own channels than this share is not what acts there.
 const NEAR_ON_ARM: f64 = 0.1;

@@ -17,8 +17,8 @@ use super::starts;
 use super::straying;
 use super::sweep::{Point, Precision, Swept, sweep};
 use super::worthy::{overlooked, seen_when_clips_stray_little, strays, worthy};
-use crate::progress::Progress;
 use nalgebra::DMatrix;
+use shared_mem::progress::Progress;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// At most so many effects are named.

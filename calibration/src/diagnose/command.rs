@@ -4,6 +4,7 @@ use super::{Diagnosis, Options, diagnose};
 use crate::interrupt::Interrupt;
 use crate::report;
 use anyhow::Context;
+use shared_mem::console;
 use shared_mem::recording::Session;
 use shared_mem::theta::Theta;
 use std::path::{Path, PathBuf};
@@ -62,7 +63,7 @@ pub fn run(arguments: &Arguments, interrupt: &Interrupt) -> anyhow::Result<Diagn
     if let Some(file) = &arguments.report {
         write(file, &report::diagnosis::page(&found))?;
     }
-    eprintln!("{}", report::terminal::diagnosis(&found));
+    console::block(report::terminal::diagnosis(&found));
     Ok(found)
 }
 

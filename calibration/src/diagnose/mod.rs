@@ -78,7 +78,6 @@ pub use answer::{Candidate, Change, Clips, Diagnosis, Gap, Kind, Nearest, Place,
 use crate::forward::object::ObjectClips;
 use crate::forward::setting::{self, BaseError};
 use crate::interrupt::Interrupt;
-use crate::progress::Progress;
 use admit::{Admitted, Refused, admit};
 use arm_clips::ArmClips;
 use cell_clips::CellClips;
@@ -86,6 +85,7 @@ use evidence::Evidence;
 use fit::Bench;
 use library::Library;
 use shared_mem::cell::Cell;
+use shared_mem::progress::Progress;
 use shared_mem::recording::Session;
 use shared_mem::theta::Theta;
 use split::Split;

@@ -6,9 +6,9 @@ use crate::estimate::{
     ClipModel, Evolution, Fit, Found, Impossible, Options, Random, Search, Swarm, Unknown, fit_from, minimise,
 };
 use crate::interrupt::Interrupt;
-use crate::progress::Progress;
 use serde::{Deserialize, Serialize};
 use shared_mem::input;
+use shared_mem::progress::Progress;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};

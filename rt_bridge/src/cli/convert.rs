@@ -1,9 +1,9 @@
 //! `rt_bridge convert`.
 
-use super::answer;
 use crate::camera::{Converted, convert};
 use anyhow::Result;
 use clap::Args;
+use shared_mem::answer;
 use shared_mem::cell::Cell;
 use shared_mem::recording::ClipInfo;
 use std::path::PathBuf;
@@ -44,9 +44,9 @@ impl ConvertArguments {
         let camera = cell.and_then(|cell| cell.camera).unwrap_or_default();
         let converted = convert(&self.bag, &camera, &self.out, &info)?;
         if self.json {
-            answer(&serde_json::to_string(&converted)?)?;
+            answer::json(&converted)?;
         } else {
-            answer(&in_words(&converted))?;
+            answer::words(in_words(&converted))?;
         }
         Ok(())
     }

@@ -1,12 +1,12 @@
 //! `rt_bridge doctor`.
 
-use super::answer;
 use crate::doctor::{Reach, Verdict, examine};
 use crate::gripper::GripperChoice;
 use crate::run::ArmChoice;
 use crate::wrench::WrenchChoice;
 use anyhow::{Result, bail};
 use clap::Args;
+use shared_mem::answer;
 use shared_mem::cell::Cell;
 use std::path::PathBuf;
 
@@ -45,10 +45,10 @@ impl DoctorArguments {
         let cell = self.cell.as_deref().map(Cell::read).transpose()?.unwrap_or_default();
         let report = examine(&Reach { robot, gripper: self.gripper, wrench: self.wrench, cell });
         if self.json {
-            answer(&serde_json::to_string(&report)?)?;
+            answer::json(&report)?;
         } else {
             for finding in &report.findings {
-                answer(&finding.to_string())?;
+                answer::words(finding.to_string())?;
             }
         }
         if report.verdict() == Verdict::Problem {

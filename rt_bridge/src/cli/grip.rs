@@ -1,8 +1,8 @@
 //! `rt_bridge grip`.
 
-use super::answer;
 use anyhow::{Result, bail};
 use clap::{Args, Subcommand};
+use shared_mem::answer;
 use shared_mem::msg::gripper::{GripperAction, GripperCommand, GripperState};
 use shared_mem::time::now_ns;
 use shared_mem::topics;
@@ -80,10 +80,10 @@ impl GripArguments {
             let json = serde_json::json!({
                 "width": width, "width_d": width_d, "force": force, "grasped": grasped, "fault": fault,
             });
-            answer(&json.to_string())?;
+            answer::json(&json)?;
         } else {
             let held = if grasped { ", and hold something" } else { "" };
-            answer(&format!("the fingers are {:.1} mm apart{held}", 1e3 * state.width))?;
+            answer::words(format!("the fingers are {:.1} mm apart{held}", 1e3 * state.width))?;
         }
         Ok(())
     }

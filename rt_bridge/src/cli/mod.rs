@@ -11,7 +11,7 @@ mod run;
 mod serve;
 
 use clap::{Parser, Subcommand};
-use std::io::{IsTerminal as _, Write as _};
+use shared_mem::{console, usage};
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -50,15 +50,19 @@ enum Verb {
 /// Reads the command line and does what it says.
 #[must_use]
 pub fn main() -> ExitCode {
-    let arguments = Arguments::parse();
+    let _last_lines = console::start();
+    let arguments = match Arguments::try_parse() {
+        Ok(arguments) => arguments,
+        Err(error) => return usage::say(error.use_stderr(), error.render()),
+    };
     tracing_subscriber::fmt()
-        .with_writer(std::io::stderr)
+        .with_writer(|| console::Log)
         .with_env_filter(
             tracing_subscriber::EnvFilter::try_from_default_env()
                 .unwrap_or_else(|_| tracing_subscriber::EnvFilter::new("info")),
         )
         .with_target(false)
-        .with_ansi(std::io::stderr().is_terminal())
+        .with_ansi(false)
         .init();
     let done = match arguments.verb {
         Verb::Run(run) => run.execute(),
@@ -72,7 +76,7 @@ pub fn main() -> ExitCode {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             // Every error is one sentence that holds its cause; the chain below would say it twice.
-            eprintln!("error: {error}");
+            console::line(format_args!("error: {error}"));
             ExitCode::FAILURE
         }
     }
@@ -84,11 +88,6 @@ fn stop_flag() -> anyhow::Result<Arc<AtomicBool>> {
     let told = stop.clone();
     ctrlc::set_handler(move || told.store(true, Ordering::Relaxed))?;
     Ok(stop)
-}
-
-/// Writes the answer to standard output.
-fn answer(text: &str) -> std::io::Result<()> {
-    writeln!(std::io::stdout(), "{text}")
 }
 
 /// `--duration` in seconds.

@@ -1,9 +1,10 @@
 //! `rt_bridge record`.
 
-use super::{answer, seconds, stop_flag};
+use super::{seconds, stop_flag};
 use crate::recorder::{Settings, record};
 use anyhow::{Result, bail};
 use clap::Args;
+use shared_mem::answer;
 use shared_mem::cell::Cell;
 use shared_mem::recording::ClipInfo;
 use std::path::PathBuf;
@@ -50,9 +51,9 @@ impl RecordArguments {
         let settings = Settings { out: self.out, duration: self.duration, parent: self.parent, info };
         let recorded = record(&settings, &stop)?;
         if self.json {
-            answer(&serde_json::to_string(&recorded)?)?;
+            answer::json(&recorded)?;
         } else {
-            answer(&recorded.in_words())?;
+            answer::words(recorded.in_words())?;
         }
         match recorded.stopped {
             Some(why) => bail!("{why}"),

@@ -1,6 +1,6 @@
 //! `rt_bridge run`.
 
-use super::{answer, seconds, stop_flag};
+use super::{seconds, stop_flag};
 use crate::gripper::GripperChoice;
 use crate::rt::Realtime;
 use crate::run::{ArmChoice, CameraChoice, ControllerChoice, RunReport, Settings, run};
@@ -8,6 +8,7 @@ use crate::tracker::TrackerChoice;
 use crate::wrench::WrenchChoice;
 use anyhow::{Result, bail};
 use clap::Args;
+use shared_mem::answer;
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -99,9 +100,9 @@ impl RunArguments {
         };
         let report = run(&settings, &stop_flag()?)?;
         if self.json {
-            answer(&serde_json::to_string(&report)?)?;
+            answer::json(&report)?;
         } else {
-            answer(&in_words(&report))?;
+            answer::words(in_words(&report))?;
         }
         match report.faults.first() {
             Some(fault) => bail!("{fault}"),

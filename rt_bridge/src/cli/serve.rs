@@ -1,10 +1,11 @@
 //! `rt_bridge serve`.
 
-use super::{answer, seconds, stop_flag};
+use super::{seconds, stop_flag};
 use crate::serve::{Pace, Ports, Report, Server};
 use crate::sim::hidden;
 use anyhow::Result;
 use clap::Args;
+use shared_mem::answer;
 use shared_mem::cell::Cell;
 use std::net::IpAddr;
 use std::path::PathBuf;
@@ -82,9 +83,9 @@ impl ServeArguments {
         }
         let report = server.run(&stop, self.duration);
         if self.json {
-            answer(&serde_json::to_string(&report)?)?;
+            answer::json(&report)?;
         } else {
-            answer(&in_words(&report))?;
+            answer::words(in_words(&report))?;
         }
         Ok(())
     }

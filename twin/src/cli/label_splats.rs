@@ -3,7 +3,7 @@
 use anyhow::{Context as _, bail, ensure};
 use nalgebra::{Isometry3, Point3, Quaternion, Similarity3, Translation3, UnitQuaternion};
 use shared_mem::cell::Cell;
-use std::io::Write as _;
+use shared_mem::{answer, console};
 use std::path::PathBuf;
 use twin::arm::MAX_JOINTS;
 use twin::reconstruct::{SurfacePoints, align, label};
@@ -91,21 +91,21 @@ impl LabelSplats {
         parts.rest.write(&self.out.join("scene.ply"))?;
         let at = found.base_from_scan;
         let (place, turn) = (at.isometry.translation.vector, at.isometry.rotation.quaternion());
-        eprintln!(
+        console::line(format_args!(
             "{} of {} splats are the robot, in {}; {:.0} % of its surface was scanned, {:.1} mm off (root mean square)",
             counts.iter().sum::<usize>(),
             scan.splats.len(),
             self.out.display(),
             found.seen * 100.0,
             found.rms * 1e3,
-        );
+        ));
         if self.json {
             let answer = serde_json::json!({
                 "scale": at.scaling(), "position": [place.x, place.y, place.z],
                 "orientation_wxyz": [turn.w, turn.i, turn.j, turn.k], "seen": found.seen, "rms_m": found.rms,
                 "links": counts, "rest": parts.rest.splats.len(),
             });
-            writeln!(std::io::stdout().lock(), "{answer}")?;
+            answer::json(&answer)?;
         }
         Ok(())
     }

@@ -1,6 +1,7 @@
 //! How the twin looks and who draws it: the arguments that every verb with pictures has.
 
 use shared_mem::cell::Cell;
+use shared_mem::console;
 use std::path::PathBuf;
 use twin::render::Drawer;
 use twin::render::session::{TwinView, ViewError};
@@ -45,7 +46,7 @@ impl Look {
     pub(crate) fn view(&self, cell: &Cell) -> Result<TwinView, ViewError> {
         let view = TwinView::new(cell, self.splats.as_deref(), self.scanned_at.as_deref(), self.device.into())?;
         if let Some(note) = view.painter().note() {
-            eprintln!("note: the processor draws: {note}");
+            console::line(format_args!("note: the processor draws: {note}"));
         }
         Ok(view)
     }

@@ -3,7 +3,7 @@
 use super::look::Look;
 use anyhow::{Context as _, bail, ensure};
 use shared_mem::recording::{PictureKind, Session, for_pictures, write_png};
-use std::io::Write as _;
+use shared_mem::{answer, console};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use twin::render::session::{ViewError, beside, pixels_of};
@@ -81,22 +81,22 @@ impl Render {
         }
         let difference = apart / f64::from(frames);
         let film = if self.film { film(&self.out, camera.rate / f64::from(self.every))? } else { None };
-        eprintln!(
+        console::line(format_args!(
             "{frames} frames in {}, drawn by {}{}; mean difference {:.1} %",
             self.out.display(),
             view.painter().name(),
             if skipped > 0 { format!(" ({skipped} pictures without joints left out)") } else { String::new() },
             difference * 100.0
-        );
+        ));
         if self.film && film.is_none() {
-            eprintln!("note: ffmpeg is not installed, so there is no film");
+            console::line("note: ffmpeg is not installed, so there is no film");
         }
         if self.json {
             let answer = serde_json::json!({
                 "frames": frames, "without_joints": skipped, "difference": difference, "film": film,
                 "drawn_by": view.painter().name(),
             });
-            writeln!(std::io::stdout().lock(), "{answer}")?;
+            answer::json(&answer)?;
         }
         Ok(())
     }
@@ -110,10 +110,15 @@ fn film(folder: &Path, rate: f64) -> anyhow::Result<Option<PathBuf>> {
     command.args(["-y", "-loglevel", "error", "-framerate", &rate, "-i"]).arg(folder.join("frame_%05d.png"));
     // The usual encoding needs an even number of rows and columns.
     command.args(["-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2", "-pix_fmt", "yuv420p"]).arg(&out);
-    match command.stdin(Stdio::null()).status() {
+    // Its complaints are read here: written past the console, they could wait for a reader for ever.
+    match command.stdin(Stdio::null()).output() {
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(None),
         Err(error) => Err(error).context("ffmpeg cannot be started"),
-        Ok(status) if status.success() => Ok(Some(out)),
-        Ok(status) => bail!("ffmpeg failed ({status}); the frames are there"),
+        Ok(ended) if ended.status.success() => Ok(Some(out)),
+        Ok(ended) => {
+            let complaints = String::from_utf8_lossy(&ended.stderr);
+            let last = complaints.trim_end().lines().last().unwrap_or("without a reason");
+            bail!("ffmpeg failed ({}: {last}); the frames are there", ended.status)
+        }
     }
 }

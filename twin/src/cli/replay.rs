@@ -4,7 +4,7 @@ use anyhow::{Context, bail};
 use shared_mem::ending;
 use shared_mem::recording::Session;
 use shared_mem::theta::Theta;
-use std::io::Write as _;
+use shared_mem::{answer, console};
 use std::path::PathBuf;
 use twin::replay::{Options, replay};
 
@@ -48,20 +48,18 @@ impl Replay {
         let gap = replay(&session, &Options { theta, out: self.out.clone() })?;
         for clip in &gap.clips {
             for warning in &clip.warnings {
-                eprintln!("{}: {warning}", clip.file);
+                console::line(format_args!("{}: {warning}", clip.file));
             }
         }
         // The reason of a lone clip is the whole answer: `bail!` below says it, once.
         let lone = gap.clips.is_empty() && gap.failures().count() == 1;
         for (file, error) in gap.failures().filter(|_| !lone) {
-            eprintln!("{file}: {error}");
+            console::line(format_args!("{file}: {error}"));
         }
-        let mut stdout = std::io::stdout().lock();
         if self.json {
-            serde_json::to_writer(&mut stdout, &gap)?;
-            writeln!(stdout)?;
+            answer::json(&gap)?;
         } else if !gap.clips.is_empty() {
-            write!(stdout, "{gap}")?;
+            answer::words(&gap)?;
         }
         let failed = gap.failures().count();
         if let (true, Some((file, error))) = (lone, gap.failures().next()) {
@@ -71,7 +69,10 @@ impl Replay {
             bail!("none of the {failed} clips could be replayed; the reasons stand above");
         }
         if failed > 0 {
-            eprintln!("{failed} of {} clips left out; the reasons stand above", failed + gap.clips.len());
+            console::line(format_args!(
+                "{failed} of {} clips left out; the reasons stand above",
+                failed + gap.clips.len()
+            ));
         }
         Ok(())
     }

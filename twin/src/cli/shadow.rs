@@ -5,7 +5,7 @@ use anyhow::Context as _;
 use clap::Args;
 use shared_mem::cell::Cell;
 use shared_mem::theta::Theta;
-use std::io::{IsTerminal as _, Write as _};
+use shared_mem::{answer, console};
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -64,16 +64,16 @@ impl Shadow {
         let viewer = self.viewer.then(|| viewer(&cell, &self.look, &stop)).transpose()?;
         let mut terminal = Terminal::new();
         let outcome = Live::open()?.run(&mut shadow, self.duration.map(Duration::from_secs_f64), &stop, &mut terminal);
-        terminal.finish();
+        console::status("");
         stop.store(true, Ordering::Relaxed);
         if let Some(viewer) = viewer {
             viewer.join().map_err(|_| anyhow::anyhow!("the viewer crashed; start without --viewer"))??;
         }
         let (busy_s, summary) = (outcome?, shadow.summary());
         if self.json {
-            writeln!(std::io::stdout(), "{}", summary.json(busy_s))?;
+            answer::json(&summary.json(busy_s))?;
         } else {
-            eprintln!("{}", summary.text(busy_s));
+            console::block(summary.text(busy_s));
         }
         Ok(())
     }
@@ -86,7 +86,7 @@ fn viewer(cell: &Cell, look: &Look, stop: &Arc<AtomicBool>) -> anyhow::Result<Vi
     let camera = cell.camera.as_ref();
     let pictures = camera.map(|camera| Ok::<_, anyhow::Error>(LiveView::new(look.view(cell)?, camera.latency)));
     let viewer = twin::viewer::Viewer::start(cell, pictures.transpose()?)?;
-    eprintln!("viewer: open {} in Foxglove or Lichtblick", viewer.address());
+    console::line(format_args!("viewer: open {} in Foxglove or Lichtblick", viewer.address()));
     let stop = Arc::clone(stop);
     Ok(std::thread::Builder::new().name("viewer".into()).spawn(move || Ok(viewer.run(&stop)?))?)
 }
@@ -96,43 +96,33 @@ fn viewer(_: &Cell, _: &Look, _: &Arc<AtomicBool>) -> anyhow::Result<ViewerThrea
     anyhow::bail!("this program was built without its viewer; build with `--features viewer`, or leave --viewer out")
 }
 
-/// Shows the gap on stderr: one line that is overwritten on a terminal, a line a second elsewhere.
+/// Shows the gap on stderr: a status on a terminal, a line a second elsewhere.
 struct Terminal {
-    overwrites: bool,
     shown: Instant,
-    line_open: bool,
 }
 
 impl Terminal {
     fn new() -> Self {
-        Self { overwrites: std::io::stderr().is_terminal(), shown: Instant::now(), line_open: false }
-    }
-
-    fn finish(&mut self) {
-        if std::mem::take(&mut self.line_open) {
-            eprintln!();
-        }
+        Self { shown: Instant::now() }
     }
 }
 
 impl Watcher for Terminal {
     fn remark(&mut self, text: &str) {
-        self.finish();
-        eprintln!("twin: {text}");
+        console::line(format_args!("twin: {text}"));
     }
 
     fn mirrored(&mut self, mirrored: &Mirrored) {
-        let pause = Duration::from_millis(if self.overwrites { 100 } else { 1000 });
+        let pause = Duration::from_millis(if console::is_terminal() { 100 } else { 1000 });
         if self.shown.elapsed() < pause {
             return;
         }
         self.shown = Instant::now();
         let line = status_line(mirrored);
-        if self.overwrites {
-            eprint!("\r{line}\x1b[K");
-            self.line_open = true;
+        if console::is_terminal() {
+            console::status(&line);
         } else {
-            eprintln!("{line}");
+            console::line(line);
         }
     }
 }

@@ -3,13 +3,14 @@
 use super::predict::{ReplayError, Replayer};
 use super::report::{ClipGap, Failure, SessionGap};
 use super::write::write_clip;
-use indicatif::{ProgressBar, ProgressStyle};
 use rayon::prelude::*;
 use shared_mem::cell::ClipEntry;
 use shared_mem::ending;
+use shared_mem::progress::Progress;
 use shared_mem::recording::{Session, WriteError};
 use shared_mem::theta::Theta;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU64, Ordering};
 
 /// How a session is replayed.
 #[derive(Debug, Clone, Default)]
@@ -38,9 +39,7 @@ enum ClipError {
 /// found in [`SessionGap::failures`].
 pub fn replay(session: &Session, options: &Options) -> Result<SessionGap, ReplayError> {
     let replayer = Replayer::new(&session.cell, options.theta.as_ref())?;
-    let template = "replay [{bar:30}] {pos}/{len} clips {eta}";
-    let style = ProgressStyle::with_template(template).expect("a valid template").progress_chars("=> ");
-    let bar = ProgressBar::new(session.clips.len() as u64).with_style(style);
+    let (bar, done) = (Progress::new("replay", session.clips.len() as u64), AtomicU64::new(0));
     let single = session.clips.len() == 1;
     let results: Vec<_> = session
         .clips
@@ -48,11 +47,12 @@ pub fn replay(session: &Session, options: &Options) -> Result<SessionGap, Replay
         .map(|entry| {
             let out = options.out.as_deref().map(|out| if single { out.to_owned() } else { place(out, entry) });
             let result = one(&replayer, session, entry, out.as_deref());
-            bar.inc(1);
+            let done = done.fetch_add(1, Ordering::Relaxed) + 1;
+            bar.show(done, &format!("{done} of {} clips", session.clips.len()));
             (entry, result)
         })
         .collect();
-    bar.finish_and_clear();
+    drop(bar);
     let (mut clips, mut failed) = (Vec::new(), Vec::new());
     for (entry, result) in results {
         match result {

@@ -11,7 +11,7 @@ use crate::estimate::{ClipModel as _, Unknown};
 use crate::forward::Settings;
 use crate::forward::object::ObjectClips;
 use crate::interrupt::Interrupt;
-use crate::progress::Progress;
+use shared_mem::progress::Progress;
 use shared_mem::recording::Clip;
 
 /// Parts.
