@@ -25,15 +25,20 @@ fn sources(folder: &str) -> Vec<(String, String)> {
 }
 
 fn product_sources() -> Vec<(String, String)> {
-    ["shared_mem/src", "twin/src", "rt_bridge/src", "calibration/src"].iter().flat_map(|f| sources(f)).collect()
+    ["shared_mem/src", "twin/src", "rt_bridge/src", "calibration/src", "urdf/src"]
+        .iter()
+        .flat_map(|f| sources(f))
+        .collect()
 }
 
 #[test]
 fn each_big_dependency_has_one_door() {
-    let doors: [(&str, &[&str]); 12] = [
+    let doors: [(&str, &[&str]); 14] = [
         ("iceoryx2", &["shared_mem/src/transport/", "shared_mem/src/msg/"]),
         ("mcap", &["shared_mem/src/recording/"]),
         ("parry3d_f64", &["twin/src/physics/"]),
+        ("urdf_rs", &["twin/src/arm/urdf.rs"]),
+        ("quick_xml", &["urdf/src/"]),
         ("foxglove", &["twin/src/viewer", "shared_mem/src/recording/"]),
         ("franka", &["rt_bridge/src/fr3/", "rt_bridge/src/serve/"]),
         ("serialport", &["rt_bridge/src/gripper/robotiq/port.rs"]),
@@ -133,11 +138,12 @@ fn dependencies_point_one_way() {
 #[test]
 fn the_readme_names_every_folder_and_only_existing_files() {
     let readme = std::fs::read_to_string(root().join("README.md")).expect("README.md");
-    for folder in ["shared_mem/", "twin/", "rt_bridge/", "calibration/", "tests/", "config/"] {
+    for folder in ["shared_mem/", "twin/", "rt_bridge/", "calibration/", "urdf/", "tests/", "config/"] {
         assert!(readme.contains(folder), "README.md does not mention {folder}");
     }
     let mentioned = readme.split('`').skip(1).step_by(2).filter(|code| {
-        let known = ["shared_mem/", "twin/src", "rt_bridge/src", "calibration/src", "tests/", "config/", "docs/"];
+        let known =
+            ["shared_mem/", "twin/src", "rt_bridge/src", "calibration/src", "urdf/src", "tests/", "config/", "docs/"];
         known.iter().any(|start| code.starts_with(start)) && !code.contains(' ')
     });
     for path in mentioned {

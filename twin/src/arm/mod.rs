@@ -8,7 +8,7 @@
 //! |---|---|
 //! | `model` | [`ArmModel`]: what an arm is, and how cell.toml, tool and payload make one |
 //! | `fr3` | numbers of the built-in Franka FR3 |
-//! | `urdf` | the way in from a URDF file (the only `urdf-rs` code) |
+//! | `urdf` | the way in from a URDF file (the only code that asks `urdf-rs`) |
 //! | `limits` | [`Limits`]: how far, fast and hard each joint may go |
 //! | `inertia` | mass properties of bodies |
 //! | `kinematics` | flange, Jacobian |
@@ -29,7 +29,6 @@ mod kernel;
 mod kinematics;
 mod limits;
 mod model;
-mod nesting;
 mod spatial;
 mod step;
 mod transmission;

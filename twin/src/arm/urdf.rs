@@ -1,9 +1,8 @@
-//! The way in from a URDF file: the only `urdf-rs` code. Finds the one chain of movable joints, folds what is fixed
+//! The way in from a URDF file, which `urdf-rs` reads. Finds the one chain of movable joints, folds what is fixed
 //! into the link it is fixed to, and names joint and remedy where the file is no serial arm.
 
 use super::inertia::MassProperties;
 use super::model::{Chain, Joint, ModelError};
-use super::nesting;
 use nalgebra::{Isometry3, Translation3, Unit, UnitQuaternion, Vector3};
 use shared_mem::input;
 use std::path::Path;
@@ -13,17 +12,9 @@ use urdf_rs::{JointType, Pose, Robot};
 /// the first of them in file order at each fork.
 pub(super) fn chain(file: &Path) -> Result<Chain, ModelError> {
     let text = input::text(file, input::Kind::Robot)?;
-    let fail = |what: String| ModelError::Read { path: file.to_owned(), what };
-    let depth = nesting::depth(&text);
-    if depth > nesting::DEEPEST {
-        return Err(fail(format!("its elements lie {depth} deep in each other, and {} are read", nesting::DEEPEST)));
-    }
-    let robot = urdf_rs::read_from_string(&text).map_err(|error| fail(one_line(&error)))?;
+    let robot = urdf_rs::read_from_string(&text)
+        .map_err(|error| ModelError::Read { path: file.to_owned(), what: error.to_string() })?;
     Tree { robot: &robot, file }.chain()
-}
-
-fn one_line(error: &urdf_rs::UrdfError) -> String {
-    error.to_string().replace('\n', " ")
 }
 
 struct Tree<'a> {
@@ -132,7 +123,7 @@ impl Tree<'_> {
                 )));
             }
         };
-        let axis = Unit::try_new(Vector3::from(*joint.axis.xyz), 1e-9).ok_or_else(|| {
+        let axis = Unit::try_new(Vector3::from(joint.axis.xyz.0), 1e-9).ok_or_else(|| {
             self.error(format!(
                 "joint `{}` has an axis of length 0; give a direction, for example xyz=\"0 0 1\"",
                 joint.name
@@ -174,9 +165,9 @@ fn known_limit(value: f64) -> f64 {
 
 /// URDF angles are roll, pitch, yaw about the fixed axes, as nalgebra's are.
 fn isometry(pose: &Pose) -> Isometry3<f64> {
-    let [roll, pitch, yaw] = *pose.rpy;
+    let [roll, pitch, yaw] = pose.rpy.0;
     Isometry3::from_parts(
-        Translation3::from(Vector3::from(*pose.xyz)),
+        Translation3::from(Vector3::from(pose.xyz.0)),
         UnitQuaternion::from_euler_angles(roll, pitch, yaw),
     )
 }

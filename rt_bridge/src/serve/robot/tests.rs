@@ -380,6 +380,10 @@ fn the_description_it_hands_out_is_the_arm_that_moves() {
     let q: Joints = std::array::from_fn(|i| 0.2 * i as f64 - 0.6);
     let apart = |a: &Joints, b: &Joints| a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
     assert!(apart(&urdf.gravity(&q), &built_in.gravity(&q)) < 1e-9);
+    // A client that computes with the vendor's model finds the same torques in the description.
+    let model = franka::model::Model::from_urdf(requests::URDF).expect("the vendor's model");
+    let theirs = model.gravity_q(&std::array::from_fn(|i| q[i]), 0.0, &[0.0; 3], &[0.0, 0.0, -9.81]);
+    assert!(theirs.iter().zip(&built_in.gravity(&q)).all(|(a, b)| (a - b).abs() < 1e-9), "{theirs:?}");
     let (mut with, mut without) = (urdf.mass_matrix(&q), built_in.mass_matrix(&q));
     for i in 0..7 {
         without[i][i] -= built_in.rotor_inertia()[i];

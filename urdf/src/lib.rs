@@ -1,0 +1,166 @@
+//! Links and joints of a URDF: what the dynamics of an arm need of one, for `twin` and for `franka-rs`.
+//!
+//! The names and shapes are those of the published `urdf-rs` 0.9, as far as `franka-rs` uses them, so that one reader serves
+//! the whole tree. Meaning and defaults follow `urdfdom` (<http://wiki.ros.org/urdf/XML>), versions 1.0 to 1.2 of the format:
+//! lengths in m, angles in rad, masses in kg, inertias in kg m² about the inertial frame's axes. Shapes, materials,
+//! transmissions and everything else are passed over.
+//!
+//! | file | what it owns |
+//! |---|---|
+//! | `lib` | what a URDF says of links and joints |
+//! | `tree` | from the stream of tags to links and joints, and which tags must be there |
+//! | `tag` | the attributes of one tag: names and numbers |
+
+mod tag;
+#[cfg(test)]
+mod tests;
+mod tree;
+
+/// A robot: its links and joints in file order.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Robot {
+    /// Name of the robot; empty where the file gives none.
+    pub name: String,
+    /// Bodies. No two have the same name.
+    pub links: Vec<Link>,
+    /// What connects them. No two have the same name.
+    pub joints: Vec<Joint>,
+}
+
+/// One body.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Link {
+    /// Its name.
+    pub name: String,
+    /// Its mass properties; all zero where the file gives none.
+    pub inertial: Inertial,
+}
+
+/// Mass properties of a link.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Inertial {
+    /// The inertial frame in the link's; its origin is the centre of mass.
+    pub origin: Pose,
+    /// The mass.
+    pub mass: Mass,
+    /// The inertia about the centre of mass, along the inertial frame's axes.
+    pub inertia: Inertia,
+}
+
+/// A mass.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Mass {
+    /// [kg]
+    pub value: f64,
+}
+
+/// The six numbers of a symmetric inertia [kg m²].
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+#[allow(missing_docs)] // the names are the format's own
+pub struct Inertia {
+    pub ixx: f64,
+    pub ixy: f64,
+    pub ixz: f64,
+    pub iyy: f64,
+    pub iyz: f64,
+    pub izz: f64,
+}
+
+/// Three numbers.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Vec3(pub [f64; 3]);
+
+/// Where a frame stands in the one it hangs on.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Pose {
+    /// Its origin [m].
+    pub xyz: Vec3,
+    /// Roll, pitch and yaw about the fixed x, y and z axes, in this order [rad].
+    pub rpy: Vec3,
+}
+
+/// One joint.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Joint {
+    /// Its name.
+    pub name: String,
+    /// How it moves.
+    pub joint_type: JointType,
+    /// The joint's frame at 0 in the parent link's.
+    pub origin: Pose,
+    /// The link that it hangs on.
+    pub parent: LinkName,
+    /// The link that it carries.
+    pub child: LinkName,
+    /// Its axis.
+    pub axis: Axis,
+    /// Its limits.
+    pub limit: JointLimit,
+}
+
+/// How a joint moves.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[allow(missing_docs)] // the names are the format's own
+pub enum JointType {
+    Revolute,
+    Continuous,
+    Prismatic,
+    #[default]
+    Fixed,
+    Floating,
+    Planar,
+    Spherical,
+}
+
+/// A link, by name.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct LinkName {
+    /// The name.
+    pub link: String,
+}
+
+/// The axis of a joint in the joint's frame, of any length.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Axis {
+    /// Its direction.
+    pub xyz: Vec3,
+}
+
+impl Default for Axis {
+    fn default() -> Self {
+        Self { xyz: Vec3([1.0, 0.0, 0.0]) }
+    }
+}
+
+/// Limits of a joint [rad, rad/s, N m, or m, m/s, N]. Before version 1.2 a limit that the file leaves out is 0, from then on
+/// it is infinite.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct JointLimit {
+    /// Lowest position.
+    pub lower: f64,
+    /// Highest position.
+    pub upper: f64,
+    /// Largest torque or force.
+    pub effort: f64,
+    /// Largest speed.
+    pub velocity: f64,
+}
+
+/// What is wrong with a URDF.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("line {line}: {what}")]
+pub struct UrdfError {
+    /// The line, from 1.
+    pub line: usize,
+    /// Element and what is wrong with it, in one line.
+    pub what: String,
+}
+
+/// Reads a URDF. Time and memory grow with its length and with nothing else that it says: no tag calls for recursion, and
+/// entities stand for single characters.
+///
+/// # Errors
+/// The first thing that is no XML, or that a link or a joint lacks or gives twice, or that is no number.
+pub fn read_from_string(text: &str) -> Result<Robot, UrdfError> {
+    tree::read(text)
+}

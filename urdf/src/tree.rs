@@ -1,0 +1,273 @@
+//! From the stream of tags to links and joints: which tag counts where, which must be there, which may come once.
+//! There is no tree of elements: a tag is read when it opens, and only the names of the open ones are kept.
+
+use crate::tag::{Tag, quoted};
+use crate::{Axis, Inertia, Inertial, Joint, JointLimit, JointType, Link, LinkName, Mass, Pose, Robot, UrdfError};
+use quick_xml::Reader;
+use quick_xml::events::{BytesStart, Event};
+use std::collections::HashSet;
+
+/// Tags within tags. A link's shape stands on the fifth level; simulators' extensions add a few.
+const DEEPEST: usize = 64;
+
+/// Links, and joints. An arm with two hands has some 60; who walks the chain compares each with each.
+const MOST: usize = 4096;
+
+pub(crate) fn read(text: &str) -> Result<Robot, UrdfError> {
+    let text = text.strip_prefix('\u{feff}').unwrap_or(text);
+    let mut reader = Reader::from_str(text);
+    reader.config_mut().expand_empty_elements = true;
+    let mut tree = Tree::default();
+    loop {
+        let mut at = reader.buffer_position();
+        let step = match reader.read_event() {
+            Ok(Event::Start(start)) => tree.open(&start),
+            Ok(Event::End(_)) => tree.close(),
+            Ok(Event::Text(text)) if tree.open.is_empty() && !text.trim().is_empty() => {
+                Err(format!("text outside of <robot>: `{}`", quoted(text.trim())))
+            }
+            Ok(Event::Eof) => tree.end(),
+            Ok(_) => Ok(()),
+            Err(error) => {
+                at = reader.error_position();
+                Err(error.to_string().chars().flat_map(|c| if c == '\n' { ' ' } else { c }.escape_debug()).collect())
+            }
+        };
+        step.map_err(|what| UrdfError { line: line(text, at), what })?;
+        if tree.ended {
+            return Ok(tree.robot);
+        }
+    }
+}
+
+fn line(text: &str, at: u64) -> usize {
+    let before = usize::try_from(at).map_or(text.len(), |at| at.min(text.len()));
+    1 + text.as_bytes()[..before].iter().filter(|byte| **byte == b'\n').count()
+}
+
+/// An element that is open, with what was read of it.
+enum Open {
+    Robot,
+    Link { name: String, inertial: Option<Inertial> },
+    Inertial { origin: Option<Pose>, mass: Option<Mass>, inertia: Option<Inertia> },
+    Joint(Box<Parts>),
+    Other,
+}
+
+/// What was read of a joint.
+struct Parts {
+    name: String,
+    joint_type: JointType,
+    origin: Option<Pose>,
+    parent: Option<LinkName>,
+    child: Option<LinkName>,
+    axis: Option<Axis>,
+    limit: Option<JointLimit>,
+}
+
+#[derive(Default)]
+struct Tree {
+    robot: Robot,
+    /// Major and minor version of the format.
+    version: (u32, u32),
+    open: Vec<Open>,
+    names: [HashSet<String>; 2],
+    found: bool,
+    ended: bool,
+}
+
+impl Tree {
+    fn open(&mut self, start: &BytesStart<'_>) -> Result<(), String> {
+        if self.open.len() >= DEEPEST {
+            return Err(format!("elements stand more than {DEEPEST} deep in each other"));
+        }
+        let name = start.name().0;
+        if name.starts_with("xacro:") {
+            return Err(format!(
+                "<{}> is xacro; expand it first, as in `xacro arm.urdf.xacro > arm.urdf`",
+                quoted(name)
+            ));
+        }
+        let (links, joints) = (self.robot.links.len(), self.robot.joints.len());
+        let quaternions = self.version >= (1, 1);
+        let opened = match (self.open.last_mut(), name) {
+            (None, "robot") if !self.found => self.robot(&Tag::new(start, name)?),
+            (None, "robot") => return Err("a second <robot>".into()),
+            (None, _) => return Err(format!("<{}> stands where <robot> must", quoted(name))),
+            (Some(Open::Robot), "link") if links == MOST => return Err(format!("more than {MOST} links")),
+            (Some(Open::Robot), "joint") if joints == MOST => return Err(format!("more than {MOST} joints")),
+            (Some(Open::Robot), "link") => {
+                Open::Link { name: self.unused(0, Tag::new(start, name)?.label("name")?, "link")?, inertial: None }
+            }
+            (Some(Open::Robot), "joint") => self.joint(&Tag::new(start, name)?)?,
+            (Some(Open::Link { inertial: Some(_), name }), "inertial") => {
+                return Err(format!("link `{name}` has a second <inertial>"));
+            }
+            (Some(Open::Link { .. }), "inertial") => Open::Inertial { origin: None, mass: None, inertia: None },
+            (Some(Open::Inertial { origin, mass, inertia }), "origin" | "mass" | "inertia") => {
+                let tag = Tag::new(start, name)?;
+                match name {
+                    "origin" => once(origin, tag.pose(quaternions)?, name)?,
+                    "mass" => once(mass, Mass { value: tag.needed_number("value")? }, name)?,
+                    _ => once(inertia, moments(&tag)?, name)?,
+                }
+                Open::Other
+            }
+            (Some(Open::Joint(parts)), "origin" | "parent" | "child" | "axis" | "limit") => {
+                parts
+                    .fill(name, &Tag::new(start, name)?, self.version)
+                    .map_err(|what| format!("joint `{}`: {what}", parts.name))?;
+                Open::Other
+            }
+            _ => Open::Other,
+        };
+        self.open.push(opened);
+        Ok(())
+    }
+
+    fn robot(&mut self, tag: &Tag<'_>) -> Open {
+        self.found = true;
+        self.robot.name = tag.find("name").unwrap_or_default().to_owned();
+        // A version that cannot be read is 1.0, as in urdfdom.
+        let version = tag.find("version").and_then(|v| v.trim().split_once('.'));
+        self.version = version.and_then(|(a, b)| Some((a.parse().ok()?, b.parse().ok()?))).unwrap_or((1, 0));
+        Open::Robot
+    }
+
+    fn joint(&mut self, tag: &Tag<'_>) -> Result<Open, String> {
+        let name = self.unused(1, tag.label("name")?, "joint")?;
+        let kind = tag.needed("type").map_err(|what| format!("joint `{name}`: {what}"))?;
+        let joint_type = match kind {
+            "revolute" => JointType::Revolute,
+            "continuous" => JointType::Continuous,
+            "prismatic" => JointType::Prismatic,
+            "fixed" => JointType::Fixed,
+            "floating" => JointType::Floating,
+            "planar" => JointType::Planar,
+            "spherical" => JointType::Spherical,
+            _ => {
+                return Err(format!(
+                    "joint `{name}` is of type `{}`; known are revolute, continuous, prismatic, fixed, floating, planar and \
+                     spherical",
+                    quoted(kind)
+                ));
+            }
+        };
+        let (origin, parent, child, axis, limit) = (None, None, None, None, None);
+        Ok(Open::Joint(Box::new(Parts { name, joint_type, origin, parent, child, axis, limit })))
+    }
+
+    /// The name, unless a link (0) or a joint (1) has it already.
+    fn unused(&mut self, set: usize, name: String, kind: &str) -> Result<String, String> {
+        if self.names[set].insert(name.clone()) { Ok(name) } else { Err(format!("a second {kind} is called `{name}`")) }
+    }
+
+    fn close(&mut self) -> Result<(), String> {
+        match self.open.pop() {
+            Some(Open::Link { name, inertial }) => {
+                self.robot.links.push(Link { name, inertial: inertial.unwrap_or_default() });
+            }
+            Some(Open::Inertial { origin, mass, inertia }) => {
+                let Some(Open::Link { name, inertial }) = self.open.last_mut() else { return Ok(()) };
+                let lacks = |what: &str| format!("<inertial> of link `{name}` has no <{what}>");
+                *inertial = Some(Inertial {
+                    origin: origin.unwrap_or_default(),
+                    mass: mass.ok_or_else(|| lacks("mass"))?,
+                    inertia: inertia.ok_or_else(|| lacks("inertia"))?,
+                });
+            }
+            Some(Open::Joint(parts)) => self.robot.joints.push(parts.joint()?),
+            Some(Open::Robot | Open::Other) | None => {}
+        }
+        Ok(())
+    }
+
+    fn end(&mut self) -> Result<(), String> {
+        if !self.found {
+            return Err("there is no <robot>".into());
+        }
+        if let Some(open) = self.open.last() {
+            let within = match open {
+                Open::Link { name, .. } => format!("link `{name}`"),
+                Open::Joint(parts) => format!("joint `{}`", parts.name),
+                _ => format!("{} open elements", self.open.len()),
+            };
+            return Err(format!("the file ends within {within}"));
+        }
+        self.ended = true;
+        Ok(())
+    }
+}
+
+impl Parts {
+    fn fill(&mut self, name: &str, tag: &Tag<'_>, version: (u32, u32)) -> Result<(), String> {
+        match name {
+            "origin" => once(&mut self.origin, tag.pose(version >= (1, 1))?, name),
+            "parent" => once(&mut self.parent, LinkName { link: tag.label("link")? }, name),
+            "child" => once(&mut self.child, LinkName { link: tag.label("link")? }, name),
+            "axis" => once(&mut self.axis, Axis { xyz: tag.needed_vector("xyz")? }, name),
+            _ => once(&mut self.limit, limits(tag, version)?, name),
+        }
+    }
+
+    fn joint(self) -> Result<Joint, String> {
+        let lacks = |what: &str| format!("joint `{}` has no <{what}>", self.name);
+        let parent = self.parent.ok_or_else(|| lacks("parent"))?;
+        let child = self.child.ok_or_else(|| lacks("child"))?;
+        Ok(Joint {
+            joint_type: self.joint_type,
+            origin: self.origin.unwrap_or_default(),
+            axis: self.axis.unwrap_or_default(),
+            limit: self.limit.unwrap_or_default(),
+            parent,
+            child,
+            name: self.name,
+        })
+    }
+}
+
+fn once<T>(slot: &mut Option<T>, value: T, name: &str) -> Result<(), String> {
+    if slot.is_some() {
+        return Err(format!("a second <{name}>"));
+    }
+    *slot = Some(value);
+    Ok(())
+}
+
+fn moments(tag: &Tag<'_>) -> Result<Inertia, String> {
+    Ok(Inertia {
+        ixx: tag.needed_number("ixx")?,
+        ixy: tag.needed_number("ixy")?,
+        ixz: tag.needed_number("ixz")?,
+        iyy: tag.needed_number("iyy")?,
+        iyz: tag.needed_number("iyz")?,
+        izz: tag.needed_number("izz")?,
+    })
+}
+
+/// Before version 1.2 a speed must be given and nothing else is checked; from then on what is left out is unlimited.
+fn limits(tag: &Tag<'_>, version: (u32, u32)) -> Result<JointLimit, String> {
+    let [lower, upper, effort, velocity] =
+        [tag.number("lower")?, tag.number("upper")?, tag.number("effort")?, tag.number("velocity")?];
+    if version < (1, 2) {
+        tag.needed("velocity")?;
+        let [lower, upper, effort, velocity] = [lower, upper, effort, velocity].map(Option::unwrap_or_default);
+        return Ok(JointLimit { lower, upper, effort, velocity });
+    }
+    if let (Some(lower), Some(upper)) = (lower, upper)
+        && upper < lower
+    {
+        return Err(format!("`upper` of <limit> is {upper}, below `lower`, {lower}"));
+    }
+    for (key, value) in [("effort", effort), ("velocity", velocity)] {
+        if value.is_some_and(|value| value < 0.0) {
+            return Err(format!("`{key}` of <limit> is negative"));
+        }
+    }
+    Ok(JointLimit {
+        lower: lower.unwrap_or(f64::NEG_INFINITY),
+        upper: upper.unwrap_or(f64::INFINITY),
+        effort: effort.unwrap_or(f64::INFINITY),
+        velocity: velocity.unwrap_or(f64::INFINITY),
+    })
+}
