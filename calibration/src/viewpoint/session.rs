@@ -45,7 +45,8 @@ pub fn shots(session: &Session, kind: PictureKind, wanted: usize) -> anyhow::Res
     }
     ensure!(
         !known.is_empty(),
-        "no clip of the session holds {} pictures with joints at their time; record with `--camera`, or give images",
+        "{}: no clip of the session holds {} pictures with joints at their time; record with `--camera`, or give images",
+        session.folder.display(),
         if kind == PictureKind::Color { "colour" } else { "depth" }
     );
     let chosen = choose(known, wanted);

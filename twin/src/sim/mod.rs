@@ -95,7 +95,7 @@ pub enum SimError {
         dof: usize,
     },
     /// An effect is not known or its parameters do not fit.
-    #[error(transparent)]
+    #[error("{0} (an `[[effect]]` of theta.toml, or of the file given with --effects)")]
     Effect(#[from] EffectError),
 }
 

@@ -39,7 +39,7 @@ const ROBOT: &str = "[robot]\nmodel = \"fr3\"\nbase_frame = \"fr3_link0\"\n";
 const BOX: &str = "[object]\nshape = \"box\"\nsize = [0.08, 0.06, 0.10]\nmass_range = [0.1, 1.0]\n";
 const THETA: &str = "[arm]\nstiffness = [610, 600, 590, 600, 250, 150, 50]\ndamping = [50, 50, 50, 50, 30, 25, 15]\n\
     [object]\nfriction = 0.28\nmass = 0.31\ncentre_of_mass = [0.0, 0.0, 0.01]\n[[effect]]\nname = \"command_delay\"\ndelay = 0.002\n";
-const EFFECTS: &str = "[[effect]]\nname = \"joint_coulomb_friction\"\ntorque = [0.5, 0.5, 0.5, 0.5, 0.3, 0.3, 0.3]\n\
+const EFFECTS: &str = "[[effect]]\nname = \"joint_coulomb_friction\"\ncoulomb = [0.5, 0.5, 0.5, 0.5, 0.3, 0.3, 0.3]\n\
     [[effect]]\nname = \"command_delay\"\ndelay = 0.004\n";
 
 /// Writes every scenario into a folder of its own below `whole`.
