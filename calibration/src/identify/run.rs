@@ -69,7 +69,7 @@ pub(super) struct Outcome {
 #[derive(Debug, thiserror::Error)]
 pub enum RunError {
     /// The model.
-    #[error("the twin cannot be simulated: {0}")]
+    #[error("the twin cannot be simulated: {0}; check the values of cell.toml and --parameters")]
     Impossible(#[from] Impossible),
     /// Ctrl-C.
     #[error("interrupted{}", .0.as_ref().map_or_else(

@@ -207,7 +207,8 @@ fn camera(cell: &Cell, options: &Options, taken: &[Taken]) -> anyhow::Result<Cam
     let off = [(pinhole.cx, size[0]), (pinhole.cy, size[1])].map(|(at, size)| (at / size as f64 - 0.5).abs());
     ensure!(
         off.iter().all(|off| *off < OFF_CENTRE),
-        "the principal point {:.0}, {:.0} lies far from the middle of {} x {} pixels: intrinsics of another resolution?",
+        "the principal point {:.0}, {:.0} lies far from the middle of {} x {} pixels: give intrinsics of this resolution \
+         (--intrinsics, `K` of the joint file, or `[camera]` of cell.toml)",
         pinhole.cx,
         pinhole.cy,
         size[0],

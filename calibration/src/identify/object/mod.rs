@@ -118,7 +118,7 @@ pub enum ObjectError {
     #[error(transparent)]
     Run(#[from] RunError),
     /// The twin has no answer.
-    #[error("the twin cannot be simulated: {0}")]
+    #[error("the twin cannot be simulated: {0}; check the values of cell.toml and --parameters")]
     Impossible(#[from] Impossible),
     /// The answer cannot be written.
     #[error("{path}: {source}; give --out a place that can be written")]
