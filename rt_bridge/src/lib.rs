@@ -10,6 +10,7 @@
 //! | camera | [`camera`] | the ports for pictures, with a simulated or replayed camera; a RealSense camera has one like the gripper's |
 //! | tracker | [`tracker`] | reads the pictures and joints, owns the port for the object's poses, with `--tracker rgbd` |
 //! | gripper, wrench | [`device`], [`gripper`], [`mod@wrench`] | one device each, and its ports |
+//! | console | [`shared_mem::console`] | standard error: nobody else waits for it |
 //! | main | [`run`] | duration, Ctrl-C, the recorder's process, the report |
 //!
 //! `rt_bridge serve` ([`serve`]) is the other side of the line: it plays the robot.
@@ -32,6 +33,7 @@ pub mod run;
 pub mod safety;
 pub mod serve;
 pub mod sim;
+pub mod starting;
 pub mod times;
 pub mod tracker;
 pub mod wrench;

@@ -6,6 +6,7 @@ use crate::rt::cycle::Beat;
 use crate::rt::orders::OrderSender;
 use crate::rt::process;
 use crate::rt::remark::Remark;
+use crate::starting::{self, ThreadError};
 use crate::times::Times;
 use rtrb::Consumer;
 use shared_mem::msg::arm::{ArmCommand, ArmState};
@@ -16,13 +17,18 @@ use shared_mem::time::now_ns;
 use shared_mem::topics;
 use shared_mem::transport::{Node, Publisher, Subscriber, TransportError};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::mpsc;
 use std::thread::{self, JoinHandle, Thread};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// Longest sleep between two looks: a motion's first chunk waits no longer than this.
 const LONGEST_SLEEP: Duration = Duration::from_millis(5);
+/// Looks at a pump that goes no round before it counts as hung. They are counted and not timed: a process that was stopped
+/// and goes on, or a machine that slept, is no fault of the pump.
+const STILL_LOOKS: u32 = 300;
+/// How long a pump may take to publish what is left: milliseconds, unless it stands still.
+const FINISH_PATIENCE: Duration = Duration::from_secs(5);
 
 /// Chunks that are taken in before states are published again: as many as wait at most.
 const LOOKS: usize = topics::ARM_MOTION.limits.buffer * topics::ARM_MOTION.limits.publishers;
@@ -60,11 +66,51 @@ pub struct PumpReport {
     pub faults: Vec<String>,
 }
 
+/// The pump could not start, or did not run to its end.
+#[derive(Debug, thiserror::Error)]
+pub enum PumpError {
+    /// Shared memory.
+    #[error(transparent)]
+    Transport(#[from] TransportError),
+    /// Its thread.
+    #[error(transparent)]
+    Thread(#[from] ThreadError),
+    /// It stands still.
+    #[error(
+        "states are no longer published: the thread `pump` stands still; look at the machine's load and memory, then start again"
+    )]
+    Hung,
+}
+
 /// The running pump.
 #[derive(Debug)]
 pub struct Pump {
     handle: JoinHandle<Result<PumpReport, TransportError>>,
     stop: Arc<AtomicBool>,
+    rounds: Rounds,
+    /// It once did.
+    stood_still: bool,
+}
+
+/// Whether a thread still goes its rounds, as seen from another one.
+#[derive(Debug, Default)]
+struct Rounds {
+    /// Counted by the thread.
+    count: Arc<AtomicU64>,
+    /// At the last look.
+    seen: u64,
+    /// Looks since the last round.
+    still: u32,
+}
+
+impl Rounds {
+    /// `true` while the last round is not too many looks ago.
+    fn look(&mut self) -> bool {
+        let count = self.count.load(Ordering::Relaxed);
+        self.still = if count == self.seen { self.still.saturating_add(1) } else { 0 };
+        self.seen = count;
+        self.still < STILL_LOOKS
+    }
 }
 
 struct Ports {
@@ -79,15 +125,12 @@ impl Pump {
     /// Starts the pump and waits until its ports are open.
     ///
     /// # Errors
-    /// [`TransportError::Full`] when another bridge runs, other variants when shared memory fails.
-    ///
-    /// # Panics
-    /// When the operating system cannot make a thread.
-    pub fn start(rings: Rings) -> Result<Self, TransportError> {
-        let stop = Arc::new(AtomicBool::new(false));
-        let (opened, wait) = mpsc::channel();
-        let told = stop.clone();
-        let body = move || {
+    /// [`TransportError::Full`] when another bridge runs, other variants when shared memory fails, [`ThreadError`] when
+    /// the operating system cannot make a thread.
+    pub fn start(rings: Rings) -> Result<Self, PumpError> {
+        let (stop, rounds) = (Arc::new(AtomicBool::new(false)), Rounds::default());
+        let (told, count) = (stop.clone(), rounds.count.clone());
+        let body = move |opened: mpsc::Sender<Result<(), PumpError>>| {
             // Just above ordinary threads: the camera's rendering would make states late by milliseconds otherwise. Where
             // it is not granted, states are as fresh as the scheduler lets them be.
             let _not_granted = process::set_fifo(process::PUMP_PRIORITY);
@@ -98,18 +141,17 @@ impl Pump {
             let (node, ports) = match open(rings.poses.is_some()) {
                 Ok(open) => open,
                 Err(e) => {
-                    let _gone = opened.send(Err(e));
+                    let _gone = opened.send(Err(e.into()));
                     return Ok(PumpReport::default());
                 }
             };
             let _gone = opened.send(Ok(()));
-            let report = run(rings, &node, &ports, &told);
+            let report = run(rings, &node, &ports, &told, &count);
             drop(node);
             report
         };
-        let handle = thread::Builder::new().name("pump".into()).spawn(body).expect("threads can be made");
-        wait.recv().expect("the pump answers before it ends")?;
-        Ok(Self { handle, stop })
+        let handle = starting::start("pump", body)?;
+        Ok(Self { handle, stop, rounds, stood_still: false })
     }
 
     /// The thread, to wake it.
@@ -118,23 +160,37 @@ impl Pump {
         self.handle.thread().clone()
     }
 
-    /// `true` when the pump ended by itself: shared memory failed.
-    #[must_use]
-    pub fn has_ended(&self) -> bool {
-        self.handle.is_finished()
+    /// `false` when the pump has ended by itself, or stands still: nobody sees the arm any more. Asked about a hundred
+    /// times a second.
+    pub fn is_well(&mut self) -> bool {
+        let goes_on = self.rounds.look();
+        self.stood_still |= !goes_on && !self.handle.is_finished();
+        goes_on && !self.handle.is_finished()
     }
 
     /// Publishes what is left and ends.
     ///
     /// # Errors
-    /// [`TransportError`] when shared memory failed on the way.
-    ///
-    /// # Panics
-    /// When the pump panicked.
-    pub fn finish(self) -> Result<PumpReport, TransportError> {
+    /// [`TransportError`] when shared memory failed on the way, [`ThreadError`] when the pump panicked,
+    /// [`PumpError::Hung`] when it does not end; its thread is then left to itself.
+    pub fn finish(self) -> Result<PumpReport, PumpError> {
+        self.finish_within(FINISH_PATIENCE)
+    }
+
+    fn finish_within(self, patience: Duration) -> Result<PumpReport, PumpError> {
         self.stop.store(true, Ordering::Release);
         self.handle.thread().unpark();
-        self.handle.join().expect("the pump does not panic")
+        let begin = Instant::now();
+        while !self.handle.is_finished() {
+            if begin.elapsed() > patience {
+                return Err(PumpError::Hung);
+            }
+            thread::sleep(Duration::from_millis(1));
+        }
+        let mut report = self.handle.join().map_err(|_| ThreadError::Failed { name: "pump" })??;
+        // It came back, but too late: the run was ended because of it.
+        report.faults.extend(self.stood_still.then(|| PumpError::Hung.to_string()));
+        Ok(report)
     }
 }
 
@@ -150,9 +206,16 @@ fn open(tracks: bool) -> Result<(Node, Ports), TransportError> {
     Ok((node, ports))
 }
 
-fn run(mut rings: Rings, node: &Node, ports: &Ports, stop: &AtomicBool) -> Result<PumpReport, TransportError> {
+fn run(
+    mut rings: Rings,
+    node: &Node,
+    ports: &Ports,
+    stop: &AtomicBool,
+    count: &AtomicU64,
+) -> Result<PumpReport, TransportError> {
     let mut report = PumpReport::default();
     loop {
+        count.fetch_add(1, Ordering::Relaxed);
         let last_round = stop.load(Ordering::Acquire);
         publish(&mut rings, ports, &mut report)?;
         if last_round {
@@ -208,4 +271,51 @@ fn say(ports: &Ports, level: EventLevel, text: &str) -> Result<(), TransportErro
         EventLevel::Error => tracing::error!("{text}"),
     }
     ports.events.send(&Event::new(level, EventSource::Bridge, text))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_pump_that_goes_no_round_is_noticed_and_one_that_goes_on_is_well_again() {
+        let mut rounds = Rounds::default();
+        for _ in 0..2 {
+            rounds.count.fetch_add(1, Ordering::Relaxed);
+            assert!((0..STILL_LOOKS).all(|_| rounds.look()));
+            assert!(!rounds.look(), "it has not moved for {STILL_LOOKS} looks");
+        }
+    }
+
+    /// A pump whose thread runs `body`.
+    fn pump(body: impl FnOnce() -> Result<PumpReport, TransportError> + Send + 'static) -> Pump {
+        Pump {
+            handle: thread::spawn(body),
+            stop: Arc::new(AtomicBool::new(false)),
+            rounds: Rounds::default(),
+            stood_still: false,
+        }
+    }
+
+    #[test]
+    fn a_pump_that_hangs_or_panics_is_an_error_and_takes_nobody_along() {
+        let (release, held) = mpsc::channel::<()>();
+        let hung = pump(move || {
+            let _released = held.recv();
+            Ok(PumpReport::default())
+        });
+        assert!(matches!(hung.finish_within(Duration::from_millis(10)), Err(PumpError::Hung)));
+        drop(release);
+        let (release, held) = mpsc::channel::<()>();
+        let mut late = pump(move || {
+            let _released = held.recv();
+            Ok(PumpReport::default())
+        });
+        assert!((0..STILL_LOOKS).any(|_| !late.is_well()));
+        drop(release);
+        let faults = late.finish_within(Duration::from_secs(60)).expect("it ends").faults;
+        assert_eq!(faults, [PumpError::Hung.to_string()], "the run was ended, so it has to say why");
+        let failed = pump(|| panic!("on purpose")).finish_within(Duration::from_secs(60));
+        assert!(matches!(failed, Err(PumpError::Thread(ThreadError::Failed { name: "pump" }))), "{failed:?}");
+    }
 }

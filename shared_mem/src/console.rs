@@ -81,9 +81,9 @@ impl Drop for LastLines {
 pub struct Log;
 
 impl Write for Log {
-    fn write(&mut self, line_end: &[u8]) -> io::Result<usize> {
-        line(String::from_utf8_lossy(line_end).trim_end_matches('\n'));
-        Ok(line_end.len())
+    fn write(&mut self, logged: &[u8]) -> io::Result<usize> {
+        line(String::from_utf8_lossy(logged).trim_end_matches('\n'));
+        Ok(logged.len())
     }
 
     fn flush(&mut self) -> io::Result<()> {

@@ -13,6 +13,7 @@ pub use realsense::{convert, serve};
 pub use source::{CameraSource, ConvertError, Converted};
 
 use crate::replay::ReplayClock;
+use crate::starting::{self, ThreadError};
 use rtrb::Consumer;
 use shared_mem::cell::Cell;
 use shared_mem::recording::{ClipMessages, ReadError};
@@ -21,8 +22,8 @@ use shared_mem::transport::{Node, TransportError};
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::{self, Sender};
-use std::thread::{self, JoinHandle};
+use std::sync::mpsc::Sender;
+use std::thread::JoinHandle;
 use twin::effects::CameraEffects;
 use twin::render::Drawer;
 use twin::scene::SceneSnapshot;
@@ -50,6 +51,9 @@ pub enum CameraError {
     /// Shared memory.
     #[error(transparent)]
     Transport(#[from] TransportError),
+    /// Its thread.
+    #[error(transparent)]
+    Thread(#[from] ThreadError),
 }
 
 impl Camera {
@@ -70,14 +74,14 @@ impl Camera {
         }
         let known_ns = cell.camera.as_ref().map_or(0, |camera| (camera.latency * 1e9) as u64);
         let latency_ns = known_ns + effects.latency_ns();
-        Ok(Self::start(move |opened, stop| {
+        Self::start(move |opened, stop| {
             let (_node, ports) = match sim::open(&camera) {
                 Ok(open) => open,
                 Err(e) => return answer(&opened, Err(e)),
             };
             answer(&opened, Ok(()));
             complain(sim::film(camera, scenes, &ports, latency_ns, stop));
-        })?)
+        })
     }
 
     /// Starts to show the pictures of a clip, in step with its replayed arm.
@@ -87,29 +91,25 @@ impl Camera {
     pub fn replayed(clip: &Path, clock: ReplayClock) -> Result<Self, CameraError> {
         let pictures = [topics::CAMERA_COLOR.name, topics::CAMERA_DEPTH.name, topics::CAMERA_INFO.name];
         let messages = ClipMessages::open(clip, &pictures)?;
-        Ok(Self::start(move |opened, stop| {
+        Self::start(move |opened, stop| {
             let node = match Node::open("rt_bridge_camera") {
                 Ok(node) => node,
                 Err(e) => return answer(&opened, Err(e)),
             };
             answer(&opened, Ok(()));
             complain(replay::show(&node, messages, &clock, stop));
-        })?)
+        })
     }
 
     /// Starts the thread and waits until it says whether its topics are open: iceoryx2's ports belong to the thread that
     /// makes them.
     fn start(
-        body: impl FnOnce(Sender<Result<(), TransportError>>, &AtomicBool) + Send + 'static,
-    ) -> Result<Self, TransportError> {
+        body: impl FnOnce(Sender<Result<(), CameraError>>, &AtomicBool) + Send + 'static,
+    ) -> Result<Self, CameraError> {
         let stop = Arc::new(AtomicBool::new(false));
-        let (opened, wait) = mpsc::channel();
         let told = stop.clone();
-        let body = move || body(opened, &told);
-        let handle = thread::Builder::new().name("camera".into()).spawn(body).expect("threads can be made");
-        let camera = Self { stop, handle: Some(handle) };
-        wait.recv().expect("the camera answers before it ends")?;
-        Ok(camera)
+        let handle = starting::start("camera", move |opened| body(opened, &told))?;
+        Ok(Self { stop, handle: Some(handle) })
     }
 }
 
@@ -122,9 +122,9 @@ impl Drop for Camera {
     }
 }
 
-fn answer(opened: &Sender<Result<(), TransportError>>, outcome: Result<(), TransportError>) {
+fn answer(opened: &Sender<Result<(), CameraError>>, outcome: Result<(), TransportError>) {
     // The starter waits for this; it cannot be gone.
-    let _gone = opened.send(outcome);
+    let _gone = opened.send(outcome.map_err(CameraError::from));
 }
 
 fn complain(outcome: Result<(), TransportError>) {

@@ -3,11 +3,12 @@
 use super::attendance::Attendance;
 use super::{Device, DeviceFault, RETRY};
 use crate::pump::Notice;
+use crate::starting::{self, ThreadError};
 use shared_mem::msg::event::EventLevel;
 use shared_mem::transport::{Ignored, Node, TransportError};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::{self, Sender};
+use std::sync::mpsc::Sender;
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
@@ -45,6 +46,9 @@ pub enum ServiceError {
     /// Shared memory.
     #[error(transparent)]
     Transport(#[from] TransportError),
+    /// Its thread.
+    #[error(transparent)]
+    Thread(#[from] ThreadError),
 }
 
 impl Service {
@@ -52,10 +56,7 @@ impl Service {
     /// `lines` opens there. A device that is not there from the start is refused: its name may be misspelt.
     ///
     /// # Errors
-    /// [`ServiceError`] when the device cannot be opened or shared memory fails.
-    ///
-    /// # Panics
-    /// When the operating system cannot make a thread.
+    /// [`ServiceError`] when the device cannot be opened, shared memory fails or there is no thread for it.
     pub fn start<D: Device, L: Lines<D>>(
         name: &'static str,
         device: String,
@@ -64,9 +65,8 @@ impl Service {
         notices: Sender<Notice>,
     ) -> Result<Self, ServiceError> {
         let stop = Arc::new(AtomicBool::new(false));
-        let (opened, wait) = mpsc::channel();
         let told = stop.clone();
-        let body = move || {
+        let body = move |opened: Sender<Result<(), ServiceError>>| {
             // Device and ports belong to the thread that makes them.
             let start = || -> Result<_, ServiceError> {
                 let first = open()?;
@@ -87,10 +87,8 @@ impl Service {
             let ended = attend(first, &mut open, &mut lines, &mut attendance, ignored, &notices, &told);
             ended.err().map(|e| format!("{name} stopped: {e}")).or_else(|| attendance.missing())
         };
-        let handle = thread::Builder::new().name(name.into()).spawn(body).expect("threads can be made");
-        let service = Self { stop, handle: Some(handle) };
-        wait.recv().expect("the thread answers before it ends")?;
-        Ok(service)
+        let handle = starting::start(name, body)?;
+        Ok(Self { stop, handle: Some(handle) })
     }
 
     /// Ends it; what was still wrong then.
@@ -168,6 +166,7 @@ mod tests {
     use std::cell::Cell;
     use std::collections::VecDeque;
     use std::rc::Rc;
+    use std::sync::mpsc;
 
     /// Reports its number three times, then is gone.
     struct Short(u32, u32);

@@ -11,7 +11,7 @@ use crate::camera::{self, Camera};
 use crate::device::Service;
 use crate::gripper::GripperChoice;
 use crate::motion::Player;
-use crate::pump::{Notice, Pump, Rings};
+use crate::pump::{Notice, Pump, PumpReport, Rings};
 use crate::recorder::child::{Change, RecorderChild};
 use crate::rt::Realtime;
 use crate::rt::control;
@@ -19,6 +19,7 @@ use crate::rt::cycle::{Cycle, Link, Plan};
 use crate::rt::orders::orders;
 use crate::rt::stats::LoopStats;
 use crate::safety::Guard;
+use crate::starting::ThreadError;
 use crate::tracker::{self, TrackerChoice};
 use crate::wrench::{self, WrenchChoice};
 use anyhow::{Result, bail, ensure};
@@ -189,8 +190,8 @@ impl Settings {
 /// Runs until `stop` is set, the duration is over, the arm is lost or its recording ends.
 ///
 /// # Errors
-/// One line with a remedy when the run cannot begin, or shared memory fails on the way. Faults of the arm and of the
-/// recorder are no errors here: they are in the report.
+/// One line with a remedy when the run cannot begin. Faults on the way, of the arm, the recorder, shared memory or a thread
+/// of this program, are no errors here: they end the run or not, and are in the report.
 pub fn run(settings: &Settings, stop: &Arc<AtomicBool>) -> Result<RunReport> {
     let cell = Cell::read(&settings.cell)?;
     let devices = Devices::open(settings, &cell)?;
@@ -205,7 +206,7 @@ pub fn run(settings: &Settings, stop: &Arc<AtomicBool>) -> Result<RunReport> {
     let (to_words, remarks) = RingBuffer::new(REMARKS);
     let (to_control, orders) = orders(CHUNKS, HELD_CHUNKS);
     let (notices, told) = mpsc::channel();
-    let pump = Pump::start(Rings { beats, remarks, orders: to_control, poses: devices.poses, notices: told })?;
+    let mut pump = Pump::start(Rings { beats, remarks, orders: to_control, poses: devices.poses, notices: told })?;
     let recorder = match &settings.record {
         Some(file) => {
             let events = node.subscriber(topics::EVENTS)?;
@@ -236,17 +237,20 @@ pub fn run(settings: &Settings, stop: &Arc<AtomicBool>) -> Result<RunReport> {
     let cycle = Cycle::new(devices.arm, devices.plan, player, link);
 
     let mut watch = Watch { node, recorder, notices, faults: Vec::new() };
-    let measured = watch.over(settings, cycle, stop, &pump)?;
+    let driven = watch.over(settings, cycle, stop, &mut pump);
+    // Whatever happened, everything is taken down in this order, and the recording is finished.
     drop(tracker);
     drop(camera);
     let missing: Vec<String> = instruments.into_iter().filter_map(Service::finish).collect();
-    let pumped = pump.finish();
+    let (pumped, pump_failed) = match pump.finish() {
+        Ok(pumped) => (pumped, None),
+        Err(error) => (PumpReport::default(), Some(error.to_string())),
+    };
     let recorded = watch.recorder.and_then(RecorderChild::finish);
-    if let Some(world) = devices.world {
-        world.finish();
-    }
-    let pumped = pumped?;
-    let faults = pumped.faults.into_iter().chain(watch.faults).chain(missing).collect();
+    let world_failed = devices.world.and_then(|world| world.finish().err()).map(|error| error.to_string());
+    let measured = driven?;
+    let failed = pump_failed.into_iter().chain(world_failed);
+    let faults = pumped.faults.into_iter().chain(watch.faults).chain(missing).chain(failed).collect();
     Ok(RunReport::new(&measured, &pumped.age, recorded, faults))
 }
 
@@ -259,8 +263,8 @@ struct Watch {
 }
 
 impl Watch {
-    /// Starts the control thread and stays until it has ended.
-    fn over(&mut self, settings: &Settings, cycle: Cycle, stop: &AtomicBool, pump: &Pump) -> Result<LoopStats> {
+    /// Starts the control thread and stays until it has ended. A pump that fails ends the run: nobody would see the arm.
+    fn over(&mut self, settings: &Settings, cycle: Cycle, stop: &AtomicBool, pump: &mut Pump) -> Result<LoopStats> {
         let end_control = Arc::new(AtomicBool::new(false));
         let control = control::spawn(cycle, settings.realtime, end_control.clone())?;
         tracing::info!("driving {}; it holds its pose until a motion is sent", settings.arm);
@@ -268,14 +272,19 @@ impl Watch {
         let mut cleared = begin;
         while !control.is_finished() {
             let over = settings.duration.is_some_and(|duration| begin.elapsed() >= duration);
-            if over || stop.load(Ordering::Relaxed) || pump.has_ended() {
+            if over || stop.load(Ordering::Relaxed) || !pump.is_well() {
                 end_control.store(true, Ordering::Relaxed);
             }
             self.look(&mut cleared);
             std::thread::sleep(LOOK_EVERY);
         }
-        let ended = control.join().map_err(|_| anyhow::anyhow!("the control thread failed; please report this"))?;
-        Ok(ended?)
+        match control.join() {
+            Ok(ended) => Ok(ended?),
+            Err(_) => {
+                self.faults.push(ThreadError::Failed { name: "control" }.to_string());
+                Ok(LoopStats::default())
+            }
+        }
     }
 
     fn look(&mut self, cleared: &mut Instant) {

@@ -13,4 +13,4 @@ pub(crate) mod hidden;
 mod world;
 
 pub use arm::SimArm;
-pub use world::{Views, World};
+pub use world::{Views, World, WorldError};

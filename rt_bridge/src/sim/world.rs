@@ -3,6 +3,7 @@
 
 use super::SimArm;
 use crate::rt::process;
+use crate::starting::ThreadError;
 use rtrb::{Consumer, Producer, RingBuffer};
 use shared_mem::cell::Cell;
 use shared_mem::msg::arm::{ArmCommand, ArmMode, ArmState, CommandInterface};
@@ -51,6 +52,17 @@ struct Outlets {
     sensor: SimWrench,
 }
 
+/// The cell cannot be simulated.
+#[derive(Debug, thiserror::Error)]
+pub enum WorldError {
+    /// Cell or parameters.
+    #[error(transparent)]
+    Cell(#[from] SimError),
+    /// Its thread.
+    #[error(transparent)]
+    Thread(#[from] ThreadError),
+}
+
 /// The running cell. It ends when its [`SimArm`] is dropped.
 #[derive(Debug)]
 pub struct World {
@@ -62,11 +74,8 @@ impl World {
     /// never told. Returns the arm's end, and what else there is to see.
     ///
     /// # Errors
-    /// [`SimError`] when cell or parameters cannot be simulated.
-    ///
-    /// # Panics
-    /// When the operating system cannot make a thread.
-    pub fn start(cell: &Cell, theta: Option<&Theta>) -> Result<(Self, SimArm, Views), SimError> {
+    /// [`WorldError`] when cell or parameters cannot be simulated, or there is no thread for it.
+    pub fn start(cell: &Cell, theta: Option<&Theta>) -> Result<(Self, SimArm, Views), WorldError> {
         let (tracker, sensor) = (SimTracker::new(cell), SimWrench::new(cell));
         let mut cell = SimCell::new(cell, theta)?;
         let camera_effects = cell.camera_effects();
@@ -92,18 +101,21 @@ impl World {
                 out.give(&mut cell);
             }
         };
-        let handle = thread::Builder::new().name("world".into()).spawn(body).expect("threads can be made");
+        let handle = thread::Builder::new()
+            .name("world".into())
+            .spawn(body)
+            .map_err(|source| ThreadError::Refused { name: "world", source })?;
         let arm = SimArm { dof, states, commands, world: handle.thread().clone() };
         Ok((Self { handle }, arm, Views { scenes, poses, wrenches, camera_effects }))
     }
 
     /// Waits for the thread, after its [`SimArm`] was dropped.
     ///
-    /// # Panics
-    /// When the simulation panicked.
-    pub fn finish(self) {
+    /// # Errors
+    /// [`ThreadError::Failed`] when the simulation panicked.
+    pub fn finish(self) -> Result<(), ThreadError> {
         self.handle.thread().unpark();
-        self.handle.join().expect("the simulation does not panic");
+        self.handle.join().map_err(|_| ThreadError::Failed { name: "world" })
     }
 }
 

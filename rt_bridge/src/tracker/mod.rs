@@ -131,6 +131,9 @@ pub enum TrackerError {
     /// Shared memory.
     #[error(transparent)]
     Transport(#[from] shared_mem::transport::TransportError),
+    /// Its thread.
+    #[error(transparent)]
+    Thread(#[from] crate::starting::ThreadError),
 }
 
 impl Tracker {

@@ -3,6 +3,7 @@
 
 use super::{Estimate, Frame, Reason, Sight, Tracker, TrackerError, View};
 use crate::pump::Notice;
+use crate::starting;
 use shared_mem::cell::Cell;
 use shared_mem::msg::Joints;
 use shared_mem::msg::arm::ArmState;
@@ -15,8 +16,8 @@ use shared_mem::transport::{ImageSample, ImageSubscriber, Node, Publisher, Subsc
 use std::collections::VecDeque;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::{self, Sender};
-use std::thread::{self, JoinHandle};
+use std::sync::mpsc::Sender;
+use std::thread::JoinHandle;
 use std::time::Duration;
 
 /// Who tracks the object.
@@ -63,22 +64,18 @@ impl Drop for Service {
 /// Starts to track the cell's object in the pictures on shared memory.
 ///
 /// # Errors
-/// [`TrackerError`] when there is nothing to track or shared memory fails.
-///
-/// # Panics
-/// When the operating system cannot make a thread.
+/// [`TrackerError`] when there is nothing to track, shared memory fails or there is no thread for it.
 pub fn serve(cell: &Cell, notices: Sender<Notice>) -> Result<Service, TrackerError> {
     let tracker = Tracker::new(cell)?;
     let latency_ns = cell.camera.as_ref().map_or(0, |camera| (camera.latency * 1e9) as u64);
     let stop = Arc::new(AtomicBool::new(false));
-    let (opened, wait) = mpsc::channel();
     let told = stop.clone();
-    let body = move || {
+    let body = move |opened: Sender<Result<(), TrackerError>>| {
         // iceoryx2's ports belong to the thread that makes them.
         let ports = match Ports::open() {
             Ok(ports) => ports,
             Err(e) => {
-                let _gone = opened.send(Err(e));
+                let _gone = opened.send(Err(e.into()));
                 return;
             }
         };
@@ -88,10 +85,8 @@ pub fn serve(cell: &Cell, notices: Sender<Notice>) -> Result<Service, TrackerErr
             tracing::error!("the tracker stopped: {e}");
         }
     };
-    let handle = thread::Builder::new().name("tracker".into()).spawn(body).expect("threads can be made");
-    let service = Service { stop, handle: Some(handle) };
-    wait.recv().expect("the tracker answers before it ends")?;
-    Ok(service)
+    let handle = starting::start("tracker", body)?;
+    Ok(Service { stop, handle: Some(handle) })
 }
 
 /// What the thread reads and writes.
