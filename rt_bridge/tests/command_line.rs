@@ -50,6 +50,20 @@ fn a_missing_cell_is_one_line_with_the_file() {
 }
 
 #[test]
+fn control_characters_in_names_do_not_reach_the_terminal() {
+    let name = "/nowhere/\x1b]0;title\x07\u{9b}2J\nerror: all is well\r.toml";
+    let shown = "/nowhere/\\u{1b}]0;title\\u{7}\\u{9b}2J";
+    let missing = rt_bridge(&["run", "--cell", name, "--arm", "sim"]);
+    let said = text(&missing.stderr);
+    assert!(said.contains(&format!("{shown}\\nerror: all is well\\r.toml")), "{said:?}");
+    assert_eq!((missing.status.code(), said.lines().count()), (Some(1), 1), "{said:?}");
+    let wrong = rt_bridge(&["run", name]);
+    let said = text(&wrong.stderr);
+    assert_eq!(wrong.status.code(), Some(2));
+    assert!(said.contains("nowhere") && !said.contains(|c: char| c.is_control() && c != '\n'), "{said:?}");
+}
+
+#[test]
 fn the_doctor_answers_with_one_object_of_findings() {
     let end = rt_bridge(&["doctor", "--json"]);
     let report: serde_json::Value = serde_json::from_slice(&end.stdout).expect("one JSON object");

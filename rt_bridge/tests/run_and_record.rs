@@ -3,26 +3,33 @@
 #![allow(missing_docs)]
 
 use rt_bridge::rt::process::ask_to_end;
+use rustix::fs::{OFlags, fcntl_setfl};
 use serde_json::Value;
 use shared_mem::msg::arm::{ArmState, MotionStatus};
-use shared_mem::msg::motion::{MotionChunk, MotionKind, SetPoint};
+use shared_mem::msg::motion::{CHUNK_LENGTH, MotionChunk, MotionKind, SetPoint};
 use shared_mem::recording::{ClipMessages, Payload, read_arm_states};
-use shared_mem::topics::{ARM_MOTION, ARM_STATE};
+use shared_mem::topics::{self, ARM_MOTION, ARM_STATE};
 use shared_mem::transport::{Node, Subscriber};
+use std::fs::File;
+use std::io::{PipeReader, PipeWriter, Write as _};
 use std::path::Path;
 use std::process::{Child, Command, Output, Stdio};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 const CELL: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../config/fr3_cell.toml");
 
 fn start(domain: &str, arguments: &[&str]) -> Child {
+    start_into(domain, arguments, Stdio::piped(), Stdio::piped())
+}
+
+fn start_into(domain: &str, arguments: &[&str], stdout: Stdio, stderr: Stdio) -> Child {
     Command::new(env!("CARGO_BIN_EXE_rt_bridge"))
         .env("TWINALIGN_DOMAIN", format!("{domain}{}", std::process::id()))
         .args(["run", "--cell", CELL, "--realtime", "ignore", "--json"])
         .args(arguments)
         .stdin(Stdio::null())
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped())
+        .stdout(stdout)
+        .stderr(stderr)
         .spawn()
         .expect("the program starts")
 }
@@ -204,4 +211,110 @@ fn a_second_bridge_is_refused_in_one_line_and_the_first_goes_on() {
     let (output, answer) = end(first);
     assert!(output.status.success(), "{}", said(&output));
     assert!(answer["cycles"].as_u64() > Some(500), "{answer}");
+}
+
+/// Longest wait for something that takes a second; only a fault uses it up.
+const LONG: Duration = Duration::from_secs(30);
+
+/// Has the arm of a bridge play a motion that holds its pose, so that the bridge has something to say, and waits until
+/// states tell that it is done and go on after it.
+fn play(domain: &str) {
+    let node = Node::open_in(&format!("{domain}{}", std::process::id()), "test").expect("shared memory");
+    let states = node.subscriber(ARM_STATE).expect("a place to read");
+    let motions = node.publisher(ARM_MOTION).expect("a place to write");
+    let wait_for = |what: &str, wanted: &dyn Fn(&ArmState) -> bool| {
+        let begin = Instant::now();
+        loop {
+            match states.newest().expect("a state") {
+                Some(state) if wanted(&state) => return state,
+                _ => assert!(begin.elapsed() < LONG, "{what}: no such state came"),
+            }
+            std::thread::sleep(Duration::from_millis(5));
+        }
+    };
+    let here = wait_for("the bridge is up", &|_| true);
+    let set_points = [SetPoint { q_d: here.q_d, ..SetPoint::default() }; CHUNK_LENGTH];
+    let (kind, length) = (MotionKind::Last, CHUNK_LENGTH as u32);
+    motions
+        .send(&MotionChunk { motion_id: 7, kind, length, dof: here.dof, set_points, ..MotionChunk::default() })
+        .expect("room for a chunk");
+    let done = wait_for("the motion is played", &|state| state.motion_id == 7 && state.motion == MotionStatus::Done);
+    wait_for("the bridge goes on", &|state| state.cycle > done.cycle + 100);
+}
+
+/// Ends a bridge as Ctrl-C does.
+fn interrupt(mut bridge: Child) -> (Output, Value) {
+    ask_to_end(bridge.id()).expect("it still runs");
+    let begin = Instant::now();
+    while bridge.try_wait().expect("a child").is_none() {
+        if begin.elapsed() > LONG {
+            let _dead = bridge.kill();
+            panic!("it does not end: {}", said(&end(bridge).0));
+        }
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    end(bridge)
+}
+
+/// The clip is whole: states without a gap up to the last one, and what the bridge had to say.
+fn assert_recorded(clip: &Path, count: Option<u64>) {
+    let states = read_arm_states(clip).expect("a clip");
+    assert!(states.windows(2).all(|pair| pair[1].cycle == pair[0].cycle + 1));
+    assert!(count.is_none_or(|count| count == states.len() as u64), "{} states of {count:?}", states.len());
+    let messages = ClipMessages::open(clip, &[topics::EVENTS.name]).expect("a clip");
+    let events: Vec<String> = messages
+        .filter_map(|m| match m.expect("a message").payload {
+            Payload::Event(event) => Some(event.text().to_owned()),
+            _ => None,
+        })
+        .collect();
+    assert!(events.iter().any(|text| text == "motion 7 done"), "{events:?}");
+}
+
+/// A pipe that takes nothing more as long as nobody reads.
+fn full_pipe() -> (PipeReader, PipeWriter) {
+    let (reader, mut writer) = std::io::pipe().expect("a pipe");
+    fcntl_setfl(&writer, OFlags::NONBLOCK).expect("a flag");
+    for size in [4096, 1] {
+        while writer.write(&[b'.'; 4096][..size]).is_ok() {}
+    }
+    fcntl_setfl(&writer, OFlags::empty()).expect("a flag");
+    (reader, writer)
+}
+
+#[test]
+fn a_standard_error_that_takes_nothing_stops_neither_arm_nor_recording_nor_the_end() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let (unread, full) = full_pipe();
+    let (reader, closed) = std::io::pipe().expect("a pipe");
+    drop(reader);
+    let disk = File::options().write(true).open("/dev/full").expect("Linux has it");
+    for (name, stderr) in [("full", Stdio::from(full)), ("closed", Stdio::from(closed)), ("disk", Stdio::from(disk))] {
+        let clip = folder.path().join(format!("{name}.mcap"));
+        let clip_path = clip.to_str().expect("a path");
+        let arguments = ["--arm", "sim", "--camera", "off", "--record", clip_path];
+        let bridge = start_into(name, &arguments, Stdio::piped(), stderr);
+        play(name);
+        let (output, answer) = interrupt(bridge);
+        assert_eq!(output.status.code(), Some(0), "{name}: {answer}");
+        assert_eq!(answer["faults"].as_array().map(Vec::len), Some(0), "{name}: {answer}");
+        assert_recorded(&clip, answer["cycles"].as_u64());
+    }
+    drop(unread);
+}
+
+#[test]
+fn an_answer_that_nobody_takes_is_one_line_and_the_recording_is_whole() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let clip = folder.path().join("clip.mcap");
+    let disk = File::options().write(true).open("/dev/full").expect("Linux has it");
+    let arguments = ["--arm", "sim", "--camera", "off", "--record", clip.to_str().expect("a path")];
+    let bridge = start_into("answer", &arguments, Stdio::from(disk), Stdio::piped());
+    play("answer");
+    let (output, _) = interrupt(bridge);
+    assert_eq!(output.status.code(), Some(1), "{}", said(&output));
+    let last = said(&output).lines().last().unwrap_or_default().to_owned();
+    assert!(last.starts_with("error: the answer cannot be written"), "{}", said(&output));
+    assert!(!said(&output).contains("panicked"), "{}", said(&output));
+    assert_recorded(&clip, None);
 }

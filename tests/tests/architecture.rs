@@ -117,6 +117,34 @@ fn the_control_path_reaches_for_no_files_locks_or_logs() {
 }
 
 #[test]
+fn one_file_writes_to_standard_error_and_one_to_standard_output() {
+    let homes = [
+        ("eprint", "shared_mem/src/console.rs"),
+        ("io::stderr", "shared_mem/src/console.rs"),
+        ("io::stdout", "shared_mem/src/answer.rs"),
+    ];
+    for (file, text) in product_sources() {
+        let product = text.split("#[cfg(test)]").next().unwrap_or("");
+        for (word, home) in homes {
+            let found = product.lines().any(|l| !l.trim_start().starts_with("//") && l.contains(word));
+            assert!(!found || file == home, "{file} uses `{word}`; {home} writes without stopping or ending anything");
+        }
+    }
+}
+
+#[test]
+fn a_thread_that_panics_takes_no_other_along() {
+    for (file, text) in product_sources() {
+        let product = text.split("#[cfg(test)]").next().unwrap_or("");
+        let joined = product.split(".join()").skip(1).map(str::trim_start);
+        for after in joined {
+            let panics = [".expect(", ".unwrap()"].iter().any(|call| after.starts_with(call));
+            assert!(!panics, "{file} panics when a thread did; report it as an error");
+        }
+    }
+}
+
+#[test]
 fn dependencies_point_one_way() {
     let rules: [(&str, &[&str]); 4] = [
         ("shared_mem", &["twin", "rt_bridge", "calibration"]),
