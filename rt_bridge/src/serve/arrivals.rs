@@ -86,8 +86,11 @@ impl Arrivals {
 
 impl Arrival {
     fn first_request(&mut self, now: Instant) -> Result<Option<Message>, Gone> {
-        read_into(&mut self.tcp, &mut self.inbox)?;
-        match self.inbox.next().map_err(|garbage| Gone::Nonsense(garbage.to_string()))? {
+        let read = read_into(&mut self.tcp, &mut self.inbox);
+        // Also where it has left already: what it was is counted.
+        let message = self.inbox.next().map_err(|garbage| Gone::Nonsense(garbage.to_string()))?;
+        read?;
+        match message {
             None if now.duration_since(self.since) > PATIENCE => Err(Gone::Silent),
             message => Ok(message),
         }

@@ -1,13 +1,21 @@
 //! The live view: robot and twin in 3D, their joints, the gap as curves, the camera's pictures, as a Foxglove WebSocket
 //! (the only code that knows the foxglove crate). It is one more reader of shared memory, in a thread of its own, so
 //! the shadow's timing does not feel it. Thirty times a second it shows the newest of everything and skips the rest.
+//!
+//! Viewers come in by a door of our own (`front`): four at a time, none from a foreign web page, and each is sent the newest
+//! [`BACKLOG`] messages at most, so that one that does not read costs some tens of megabytes until it is closed.
 
+mod front;
+mod request;
 mod scene;
+#[cfg(test)]
+mod tests;
 
 use crate::arm::ModelError;
 use crate::render::LiveView;
 use foxglove::messages::{FrameTransform, FrameTransforms, PoseInFrame, RawImage, SceneUpdate, Timestamp};
 use foxglove::{Channel, ChannelBuilder, FoxgloveError, RawChannel, Schema, WebSocketServer, WebSocketServerHandle};
+use front::{Front, PATIENCE, hidden_address};
 use scene::{Look, Scene};
 use shared_mem::cell::Cell;
 use shared_mem::frames::{Base, Object, Pose};
@@ -16,18 +24,24 @@ use shared_mem::msg::twin::TwinGap;
 use shared_mem::time::unix_offset_ns;
 use shared_mem::topics::{ARM_STATE, CAMERA_COLOR, CAMERA_DEPTH, CAMERA_INFO, OBJECT_POSE, TWIN_GAP, TWIN_STATE};
 use shared_mem::transport::{ImageSample, ImageSubscriber, Node, TransportError};
+use std::io;
+use std::net::{Ipv4Addr, SocketAddr};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 /// Where the socket listens. This machine only: whoever wants it elsewhere tunnels it on purpose.
-const HOST: &str = "127.0.0.1";
+const HOST: Ipv4Addr = Ipv4Addr::LOCALHOST;
 const PORT: u16 = 8765;
+/// Messages that wait for a viewer; where one more comes, the oldest goes. Two pictures' worth of everything, at 0.9 MB for
+/// the largest.
+const BACKLOG: usize = 32;
 /// Time between two pictures of the scene.
 const FRAME: Duration = Duration::from_millis(33);
 
 /// The live view.
 pub struct Viewer {
+    front: Front,
     server: WebSocketServerHandle,
     scene: Scene,
     scenes: Channel<SceneUpdate>,
@@ -49,7 +63,10 @@ pub struct Viewer {
 pub enum ViewerError {
     /// The socket.
     #[error("cannot listen on {HOST}:{PORT}: {0}; stop the other viewer, or start without --viewer")]
-    Listen(FoxgloveError),
+    Listen(io::Error),
+    /// The server behind it.
+    #[error("the viewer's server cannot be started: {0}; start without --viewer")]
+    Server(FoxgloveError),
     /// A channel.
     #[error("cannot open a channel of the viewer: {0}; start without --viewer")]
     Channel(FoxgloveError),
@@ -68,11 +85,8 @@ impl Viewer {
     /// [`ViewerError`] when the port is taken or cell.toml describes no arm.
     pub fn start(cell: &Cell, live: Option<LiveView>) -> Result<Self, ViewerError> {
         let scene = Scene::new(cell)?;
-        let server = WebSocketServer::new()
-            .name("twinalign shadow")
-            .bind(HOST, PORT)
-            .start_blocking()
-            .map_err(ViewerError::Listen)?;
+        let server = WebSocketServer::new().name("twinalign shadow");
+        let (front, server) = open(server, SocketAddr::from((HOST, PORT)), PATIENCE)?;
         let schema = r#"{"type":"object","properties":{"joint_error":{"type":"array","items":{"type":"number"}},
             "joint_rms":{"type":"array","items":{"type":"number"}},"object_add_m":{"type":"number"},
             "object_add_s_m":{"type":"number"},"age_s":{"type":"number"},"alignments":{"type":"integer"}}}"#;
@@ -82,6 +96,7 @@ impl Viewer {
             .build_raw()
             .map_err(ViewerError::Channel)?;
         Ok(Self {
+            front,
             server,
             scene,
             scenes: Channel::new("/scene"),
@@ -101,7 +116,7 @@ impl Viewer {
     /// Where a person points Foxglove or Lichtblick.
     #[must_use]
     pub fn address(&self) -> String {
-        format!("ws://{HOST}:{}", self.server.port())
+        format!("ws://{}", self.front.address())
     }
 
     /// Shows what happens on shared memory until `stop` is set.
@@ -150,7 +165,10 @@ impl Viewer {
             }
             std::thread::sleep(FRAME);
         }
-        self.server.stop().wait_blocking();
+        let Self { front, server, .. } = self;
+        // First: the server waits for viewers to read its farewell, and one of them may be stuck.
+        drop(front);
+        server.stop().wait_blocking();
         Ok(())
     }
 
@@ -197,6 +215,20 @@ impl Viewer {
             }],
         });
     }
+}
+
+/// Starts `server` behind a socket at `listen` that closes viewers which read nothing for `patience`.
+fn open(
+    server: WebSocketServer,
+    listen: SocketAddr,
+    patience: Duration,
+) -> Result<(Front, WebSocketServerHandle), ViewerError> {
+    let hidden = hidden_address();
+    let server = server.bind(hidden.to_string(), 0).message_backlog_size(BACKLOG);
+    let server = server.start_blocking().map_err(ViewerError::Server)?;
+    let behind = SocketAddr::from((hidden, server.port()));
+    let front = Front::open(listen, behind, patience).map_err(ViewerError::Listen)?;
+    Ok((front, server))
 }
 
 fn newest(reader: &ImageSubscriber) -> Result<Option<ImageSample>, TransportError> {
