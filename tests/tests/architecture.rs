@@ -166,7 +166,7 @@ fn dependencies_point_one_way() {
 #[test]
 fn the_readme_names_every_folder_and_only_existing_files() {
     let readme = std::fs::read_to_string(root().join("README.md")).expect("README.md");
-    for folder in ["shared_mem/", "twin/", "rt_bridge/", "calibration/", "urdf/", "tests/", "config/"] {
+    for folder in ["shared_mem/", "twin/", "rt_bridge/", "calibration/", "urdf/", "tests/", "fuzz/", "config/"] {
         assert!(readme.contains(folder), "README.md does not mention {folder}");
     }
     let mentioned = readme.split('`').skip(1).step_by(2).filter(|code| {

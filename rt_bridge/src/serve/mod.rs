@@ -31,6 +31,7 @@
 //! | `state` | the datagram with all of it |
 //! | `kinematics` | frames on the flange |
 //! | `hand` | the Franka Hand |
+//! | `fuzzing` | what a client can send, for the fuzz targets and tests alone |
 //!
 //! Everything but `server`, `arrivals`, `session`, `notices` and the hand's service is without sockets and clocks, and deterministic.
 //!
@@ -40,6 +41,8 @@ mod arrivals;
 mod body;
 mod faults;
 mod framing;
+#[cfg(any(test, fuzzing))]
+pub mod fuzzing;
 mod generator;
 mod hand;
 mod hold;

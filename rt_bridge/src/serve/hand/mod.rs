@@ -7,7 +7,7 @@
 //! | [`service`] | port, client, the hand's clock |
 
 mod service;
-mod wire;
+pub(super) mod wire;
 
 pub(super) use service::HandService;
 pub(super) use wire::PORT;

@@ -15,14 +15,14 @@ pub(in crate::serve) const PORT: u16 = GRIPPER_COMMAND_PORT;
 
 /// What a client asks the hand.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Request {
+pub(in crate::serve) enum Request {
     Connect { version: u16, udp_port: u16 },
     Act(Action),
     Stop,
 }
 
 /// Reads a request; `None` for what is none.
-pub(super) fn request(number: u32, payload: &[u8]) -> Option<Request> {
+pub(in crate::serve) fn request(number: u32, payload: &[u8]) -> Option<Request> {
     let empty = |request| payload.is_empty().then_some(request);
     match GripperCommand::from_u16(u16::try_from(number).ok()?)? {
         GripperCommand::Connect => {
