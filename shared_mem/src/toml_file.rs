@@ -62,6 +62,46 @@ fn with_nearest_name(message: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::cell::Cell;
+    use crate::theta::Theta;
+    use proptest::prelude::*;
+
+    const CELL: &str = include_str!("../../config/fr3_cell.toml");
+    const THETA: &str = "[arm]\nstiffness = [600.0, 50.0]\ndamping = [50.0, 5.0]\n[object]\nfriction = 0.3\n\
+        [[effect]]\nname = \"payload\"\nmass = 0.5\n";
+
+    proptest! {
+        #[test]
+        fn a_changed_file_is_refused_or_reads_back_from_what_is_written_of_it(
+            changes in proptest::collection::vec(
+                (any::<prop::sample::Index>(), 0_usize..30, "[=\\[\\]{}\"'.,a-z0-9_\n\\\\ -]{0,6}"), 1..4
+            ),
+        ) {
+            let changed = |text: &str| {
+                let mut bytes = text.as_bytes().to_vec();
+                for (at, length, new) in &changes {
+                    let at = at.index(bytes.len());
+                    let end = (at + length).min(bytes.len());
+                    bytes.splice(at..end, new.bytes());
+                    if bytes.is_empty() {
+                        break;
+                    }
+                }
+                String::from_utf8_lossy(&bytes).into_owned()
+            };
+            let path = Path::new("a.toml");
+            match Cell::parse(&changed(CELL), path) {
+                Ok(cell) => prop_assert_eq!(Cell::parse(&cell.to_toml(), path).expect("own text").to_toml(), cell.to_toml()),
+                Err(error) => prop_assert!(error.to_string().starts_with("a.toml"), "{}", error),
+            }
+            match parse::<Theta>(&changed(THETA), path) {
+                Ok(theta) => {
+                    prop_assert_eq!(parse::<Theta>(&theta.to_toml(), path).expect("own text").to_toml(), theta.to_toml());
+                }
+                Err(error) => prop_assert!(error.to_string().starts_with("a.toml"), "{}", error),
+            }
+        }
+    }
 
     #[derive(Debug, serde::Deserialize)]
     #[serde(deny_unknown_fields)]

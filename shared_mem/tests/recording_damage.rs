@@ -3,7 +3,10 @@
 use proptest::prelude::*;
 use shared_mem::msg::arm::ArmState;
 use shared_mem::msg::joints_from;
-use shared_mem::recording::{ClipInfo, ClipMessages, ClipWriter, Payload, read_arm_states, read_clip_info, recover};
+use shared_mem::recording::{
+    ClipInfo, ClipMessages, ClipWriter, Payload, Picture, read_arm_states, read_clip_info, recover, unpack_picture,
+    write_png,
+};
 use std::io::Write;
 use std::path::Path;
 use std::sync::{Arc, Mutex, OnceLock};
@@ -167,4 +170,33 @@ fn a_recovered_file_opens_in_a_strict_reader_and_keeps_what_rode_along() {
     assert_eq!(read_arm_states(&recovered.path).expect("a clip").len() as u64, states);
     assert_eq!(read_clip_info(&recovered.path).expect("a clip"), Some(info()));
     assert!(recover(&path).is_err(), "a second run must not overwrite the first one's file");
+}
+
+proptest! {
+    #[test]
+    fn a_changed_or_cut_png_is_refused_or_has_all_its_pixels(
+        cut in any::<prop::sample::Index>(),
+        changes in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 0..4),
+    ) {
+        static PNG: OnceLock<Vec<u8>> = OnceLock::new();
+        let mut bytes = PNG
+            .get_or_init(|| {
+                let folder = tempfile::tempdir().expect("a folder");
+                let path = folder.path().join("a.png");
+                write_png(&path, 9, 7, &[3; 9 * 7 * 3]).expect("room");
+                std::fs::read(&path).expect("a file")
+            })
+            .clone();
+        for (at, value) in &changes {
+            let at = at.index(bytes.len());
+            bytes[at] = *value;
+        }
+        if changes.len() % 2 == 1 {
+            bytes.truncate(cut.index(bytes.len()));
+        }
+        if let Ok(picture) = unpack_picture(&bytes, 0) {
+            let Picture::Pixels { header, pixels } = &picture else { panic!("{picture:?}") };
+            prop_assert_eq!(pixels.len(), header.stride as usize * header.height as usize);
+        }
+    }
 }

@@ -1,5 +1,6 @@
 //! TwinAligner clip folders.
 
+use proptest::prelude::*;
 use shared_mem::cell::{Cell, ClipKind};
 use shared_mem::recording::{Clip, Session, read_clip};
 use std::fmt::Write as _;
@@ -89,4 +90,36 @@ fn a_clip_folder_is_a_clip_and_no_session() {
     std::fs::write(clip.join("frame.json"), "[{\"id\": 0}]").expect("room");
     let error = session.read(&session.clips[0]).unwrap_err().to_string();
     assert!(error.contains("frame.json") && error.contains("ros_timestamp"), "{error}");
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(150))]
+
+    #[test]
+    fn a_changed_or_cut_file_of_the_folder_is_refused_or_read_as_numbers(
+        file in 0_usize..3,
+        cut in any::<prop::sample::Index>(),
+        changes in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 0..6),
+    ) {
+        let folder = tempfile::tempdir().expect("a folder");
+        write_folder(folder.path());
+        let path = folder.path().join(["control.json", "frame.json", "pose.npy"][file]);
+        let mut bytes = std::fs::read(&path).expect("a file");
+        for (at, value) in &changes {
+            let at = at.index(bytes.len());
+            bytes[at] = *value;
+        }
+        if changes.len() % 2 == 0 {
+            bytes.truncate(cut.index(bytes.len()));
+        }
+        std::fs::remove_file(&path).expect("a file");
+        std::fs::write(&path, bytes).expect("room");
+        let text = format!("[robot]\nmodel = \"fr3\"\n{CAMERA}");
+        let cell = Cell::parse(&text, Path::new("cell.toml")).expect("a valid cell");
+        if let Ok(clip) = read_clip(folder.path(), ClipKind::ControlHitSlide, &cell) {
+            let joints = clip.desired.q.iter().chain(&clip.measured.q);
+            prop_assert!(joints.copied().all(f64::is_finite));
+            prop_assert!(clip.object.poses.iter().all(|pose| pose.position().iter().all(|value| value.is_finite())));
+        }
+    }
 }
