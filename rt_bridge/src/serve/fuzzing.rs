@@ -31,8 +31,8 @@ fn robot() -> Robot {
 
 /// Plays an input to the served arm. It is a row of steps, each begun by a byte `b`: `b % 4` of 0 sends the `b / 4` bytes that
 /// follow over TCP, 1 sends a datagram of as many as a set point has, 2 the same with the counter of the newest state in it,
-/// 3 lets `b / 4` milliseconds pass. Whatever is sent, the arm's state stays numbers.
-pub fn arm(input: &[u8]) {
+/// 3 lets `b / 4` milliseconds pass. Whatever is sent, the arm's state stays numbers. Gives the motions that were started.
+pub fn arm(input: &[u8]) -> u64 {
     let (mut robot, mut inbox, mut passed) = (robot(), Inbox::of_the_arm(), 0);
     let mut rest = input;
     while let Some((&step, after)) = rest.split_first() {
@@ -40,7 +40,7 @@ pub fn arm(input: &[u8]) {
         let count = usize::from(step / 4);
         match step % 4 {
             0 => {
-                let Ok(messages) = arrived(&mut inbox, &take(&mut rest, count)) else { return };
+                let Ok(messages) = arrived(&mut inbox, &take(&mut rest, count)) else { break };
                 for message in messages {
                     if let Ok(asked) = request(message.number, &message.payload) {
                         robot.request(message.number, message.id, &asked);
@@ -70,6 +70,7 @@ pub fn arm(input: &[u8]) {
         let numbers = state.q.iter().chain(&state.dq).chain(&state.q_d).chain(&state.O_T_EE).chain(&state.tau_J);
         assert!(numbers.map(|number| number.get()).all(f32::is_finite), "the state is no numbers any more");
     }
+    robot.tally().motions
 }
 
 /// The messages that are whole with these bytes.
@@ -154,15 +155,25 @@ mod tests {
     /// Seeds, and each of them cut and with a changed byte: a look at what the fuzz targets go through for hours.
     #[test]
     fn damaged_conversations_leave_the_arm_and_the_hand_in_order() {
-        for (seeds, play) in [(super::arm_seeds(), super::arm as fn(&[u8])), (super::hand_seeds(), super::hand)] {
-            for (i, seed) in seeds.into_iter().enumerate() {
-                play(&seed);
-                play(&seed[..seed.len() * 2 / 3]);
-                let mut changed = seed;
-                let at = i * 131 % changed.len();
-                changed[at] ^= 0xFF;
-                play(&changed);
-            }
+        let mut motions = 0;
+        for (i, seed) in super::arm_seeds().into_iter().enumerate() {
+            motions += super::arm(&seed);
+            let (cut, changed) = damaged(&seed, i);
+            super::arm(&cut);
+            super::arm(&changed);
         }
+        assert_eq!(motions, 5, "each of the motions among the seeds starts");
+        for (i, seed) in super::hand_seeds().into_iter().enumerate() {
+            super::hand(&seed);
+            let (cut, changed) = damaged(&seed, i);
+            super::hand(&cut);
+            super::hand(&changed);
+        }
+    }
+
+    fn damaged(seed: &[u8], i: usize) -> (Vec<u8>, Vec<u8>) {
+        let mut changed = seed.to_vec();
+        changed[i * 131 % seed.len()] ^= 0xFF;
+        (seed[..seed.len() * 2 / 3].to_vec(), changed)
     }
 }
