@@ -14,6 +14,7 @@
 //! | [`theta`] | `theta.toml`: what was identified, and the effects that were named |
 //! | [`frames`] | typed poses: `Pose<To, From>` |
 //! | [`input`] | the one way in for files: regular ones only, each kind up to a size |
+//! | [`output`] | files that are whole or not there: every writer but the live recorder goes through it |
 //! | [`ending`] | whether the process was asked to end |
 //! | [`error_line()`] | an error with its causes in one line |
 //! | [`answer`] | what a program answers, on standard output |
@@ -31,6 +32,7 @@ mod error_line;
 pub mod frames;
 pub mod input;
 pub mod msg;
+pub mod output;
 pub mod printable;
 pub mod progress;
 pub mod recording;
