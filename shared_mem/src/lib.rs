@@ -16,6 +16,7 @@
 //! | [`input`] | the one way in for files: regular ones only, each kind up to a size |
 //! | [`output`] | files that are whole or not there: every writer but the live recorder goes through it |
 //! | [`ending`] | whether the process was asked to end |
+//! | [`parent`] | programs that end when the one that started them is gone |
 //! | [`error_line()`] | an error with its causes in one line |
 //! | [`answer`] | what a program answers, on standard output |
 //! | [`console`] | what it says on the way, on standard error |
@@ -33,6 +34,7 @@ pub mod frames;
 pub mod input;
 pub mod msg;
 pub mod output;
+pub mod parent;
 pub mod printable;
 pub mod progress;
 pub mod recording;
