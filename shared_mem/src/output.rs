@@ -28,10 +28,10 @@ pub use error::OutputError;
 pub use folder::OutputFolder;
 pub use unfinished::discard_unfinished;
 
-use std::fs::{File, OpenOptions};
-use std::io::{self, Write};
-use std::path::{Path, PathBuf};
 use error::folder_of;
+use std::fs::{File, OpenOptions};
+use std::io::{self, Seek, SeekFrom, Write};
+use std::path::{Path, PathBuf};
 use unfinished::{Unfinished, sync_folder};
 
 /// Symbolic links that are followed one after the other, as many as Linux does.
@@ -122,8 +122,7 @@ impl Output {
     }
 
     fn beside(path: &Path, target: PathBuf, is_new: bool) -> Result<Self, OutputError> {
-        let (file, temporary) =
-            Unfinished::file(&target).map_err(|error| OutputError::new(path, &error, 0, 0))?;
+        let (file, temporary) = Unfinished::file(&target).map_err(|error| OutputError::new(path, &error, 0, 0))?;
         let place = Place::Beside { temporary, target, is_new };
         Ok(Self { path: path.to_owned(), file, place, written: 0, needed: 0 })
     }
@@ -180,6 +179,12 @@ impl Write for Output {
 
     fn flush(&mut self) -> io::Result<()> {
         Ok(())
+    }
+}
+
+impl Seek for Output {
+    fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
+        self.file.seek(to)
     }
 }
 

@@ -61,7 +61,7 @@ fn sample() -> &'static Sample {
                 flushed.push((memory.0.lock().expect("one writer").len(), i + 1));
             }
         }
-        writer.finish().expect("memory");
+        writer.close().expect("memory");
         let bytes = memory.0.lock().expect("one writer").clone();
         Sample { bytes, flushed }
     })

@@ -229,7 +229,7 @@ fn what_would_have_to_be_guessed_is_refused_and_nothing_is_overwritten() {
     let error = refused(&folders, Format::Own, "guessed");
     assert!(error.contains("different moments") && error.contains("ROS 2 bag"), "{error}");
     let error = refused(&own, Format::Ros2, "folders");
-    assert!(error.contains("is not empty; choose a new folder with --out"), "{error}");
+    assert!(error.contains("it is not empty; choose a new folder"), "{error}");
     assert!(refused(&own, Format::Own, "same").contains("own clip already"));
     let unposed = CELL.replace("pose = {", "# pose = {");
     std::fs::write(folder.path().join("cell.toml"), unposed).expect("room");

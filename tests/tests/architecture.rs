@@ -104,6 +104,24 @@ fn unsafe_code_lives_in_one_file() {
 }
 
 #[test]
+fn outputs_are_written_whole_or_not_at_all() {
+    // A live recording is there from the beginning, and grows.
+    let doors = ["shared_mem/src/output", "shared_mem/src/recording/writer.rs"];
+    let writes = ["fs::write(", "File::create", "OpenOptions", "fs::rename(", "fs::copy("];
+    for (file, text) in product_sources() {
+        let product = text.split("#[cfg(test)]").next().unwrap_or("");
+        let found = product.lines().filter(|line| !line.trim_start().starts_with("//"));
+        let found = found.flat_map(|line| writes.iter().filter(|word| line.contains(**word))).next();
+        let is_test = file.ends_with("/tests.rs") || file.contains("/tests/");
+        assert!(
+            found.is_none() || is_test || doors.iter().any(|door| file.starts_with(door)),
+            "{file} writes a file by `{}`; outputs go through shared_mem::output",
+            found.unwrap_or(&"")
+        );
+    }
+}
+
+#[test]
 fn the_control_path_reaches_for_no_files_locks_or_logs() {
     let forbidden =
         ["std::fs", "println!", "eprintln!", "tracing::", "Mutex", "RwLock", ".unwrap()", ".expect(", "format!("];

@@ -1,9 +1,8 @@
 //! Takes one picture with the simulated camera and writes it as two PNG files: colour, and depth with 0.4 m white and
 //! 2 m black. `cargo run --release -p twin --example simulated_picture -- config/fr3_cell.toml /tmp`
 
-use anyhow::Context as _;
 use shared_mem::cell::Cell;
-use std::fs::File;
+use shared_mem::output::Output;
 use std::path::{Path, PathBuf};
 use twin::sensors::camera::SimCamera;
 use twin::sim::SimCell;
@@ -29,9 +28,11 @@ fn main() -> anyhow::Result<()> {
 }
 
 fn write(path: &Path, color: png::ColorType, (width, height): (u32, u32), bytes: &[u8]) -> anyhow::Result<()> {
-    let file = File::create(path).with_context(|| format!("cannot write {}", path.display()))?;
-    let mut encoder = png::Encoder::new(file, width, height);
+    let mut output = Output::create(path)?;
+    let mut encoder = png::Encoder::new(&mut output, width, height);
     encoder.set_color(color);
-    encoder.write_header()?.write_image_data(bytes)?;
-    Ok(())
+    let mut writer = encoder.write_header()?;
+    writer.write_image_data(bytes)?;
+    writer.finish()?;
+    Ok(output.finish()?)
 }

@@ -20,6 +20,7 @@ use serde::Serialize;
 use shared_mem::cell::{Cell, ClipKind};
 use shared_mem::console;
 use shared_mem::msg::motion::SetPoint;
+use shared_mem::output;
 use shared_mem::progress::Progress;
 use std::path::PathBuf;
 use std::time::Duration;
@@ -145,9 +146,7 @@ impl Desk<'_> {
             }
             let Some(next) = self.next(link, object)? else { break };
             if let Some(file) = &self.options.preview {
-                std::fs::write(file, report::stroke::picture(&next, self.size)).map_err(|error| {
-                    anyhow::anyhow!("cannot write {}: {error}; choose another file", file.display())
-                })?;
+                output::write(file, report::stroke::picture(&next, self.size))?;
                 console::line(format_args!("{}: the next stroke; the arm was not moved", file.display()));
                 break;
             }

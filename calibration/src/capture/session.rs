@@ -3,6 +3,7 @@
 
 use shared_mem::cell::{Cell, CellError, ClipEntry, ClipKind};
 use shared_mem::input::{self, InputError};
+use shared_mem::output::{self, OutputError};
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -15,8 +16,8 @@ pub struct Session {
 /// A session folder cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum SessionError {
-    /// Not writable.
-    #[error("cannot write {}: {source}; choose another folder with --out or free space there", path.display())]
+    /// Not usable.
+    #[error("cannot use {}: {source}; choose another folder with --out or free space there", path.display())]
     Write {
         /// The file or folder.
         path: PathBuf,
@@ -26,6 +27,9 @@ pub enum SessionError {
     /// Its cell.toml cannot be read.
     #[error(transparent)]
     Input(#[from] InputError),
+    /// Its cell.toml cannot be written.
+    #[error(transparent)]
+    Output(#[from] OutputError),
     /// Its cell.toml is broken.
     #[error(transparent)]
     Cell(#[from] CellError),
@@ -100,11 +104,7 @@ impl Session {
 
     /// Replaces cell.toml in one step, so that no reader and no crash ever sees half of it.
     fn write(&self, text: &str) -> Result<(), SessionError> {
-        let path = self.cell_file();
-        let draft = self.folder.join(".cell.toml.draft");
-        std::fs::write(&draft, text)
-            .and_then(|()| std::fs::rename(&draft, &path))
-            .map_err(|source| SessionError::Write { path, source })
+        Ok(output::write(&self.cell_file(), text)?)
     }
 }
 

@@ -1,7 +1,6 @@
 //! `calibration benchmark`.
 
 use super::print_json;
-use anyhow::Context as _;
 use calibration::benchmark::run::{Extent, Outcome, Plan, run as judge};
 use calibration::benchmark::score::Scores;
 use calibration::interrupt::Interrupt;
@@ -10,6 +9,7 @@ use calibration::report::terminal;
 use serde_json::json;
 use shared_mem::cell::Cell;
 use shared_mem::console;
+use shared_mem::output;
 use std::path::PathBuf;
 use std::time::Instant;
 
@@ -68,8 +68,7 @@ pub(super) fn run(arguments: BenchmarkArguments, interrupt: &Interrupt) -> anyho
         let worlds = methods.first().map_or(0, |method| method.cases.len());
         let origin =
             format!("calibration benchmark: {worlds} worlds from number {} on, {seconds:.0} s", arguments.seed);
-        std::fs::write(file, page(&methods, &origin))
-            .with_context(|| format!("{} cannot be written; give another place", file.display()))?;
+        output::write(file, page(&methods, &origin))?;
     }
     left_out.iter().for_each(|world| console::line(format_args!("left out: {world}")));
     console::block(terminal::benchmark(&methods));

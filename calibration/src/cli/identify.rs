@@ -1,12 +1,12 @@
 //! `calibration identify`.
 
 use super::print_json;
-use anyhow::Context as _;
 use calibration::identify::{Identification, Optimizer, arm, object};
 use calibration::interrupt::Interrupt;
 use calibration::report::terminal;
 use clap::{Subcommand, ValueEnum};
 use shared_mem::console;
+use shared_mem::output;
 use std::path::{Path, PathBuf};
 
 #[derive(Debug, Subcommand)]
@@ -137,8 +137,7 @@ pub(super) fn run(identify: Identify, interrupt: &Interrupt) -> anyhow::Result<(
 fn tell(found: &Identification, report: Option<&Path>, json: bool) -> anyhow::Result<()> {
     let sheet = found.sheet();
     if let Some(report) = report {
-        std::fs::write(report, sheet.page())
-            .with_context(|| format!("{}; give --report a place that can be written", report.display()))?;
+        output::write(report, sheet.page())?;
     }
     console::block(terminal::identification(&sheet));
     if json { print_json(found) } else { Ok(()) }

@@ -18,6 +18,7 @@ use serde::Serialize;
 use serde_json::Value;
 use shared_mem::cell::Cell;
 use shared_mem::console;
+use shared_mem::output;
 use shared_mem::recording::Session;
 use shared_mem::theta::{EffectTheta, Theta};
 use stage::{Answers, Stage, worst};
@@ -123,7 +124,7 @@ pub fn demo(options: &Options, interrupt: &Interrupt) -> anyhow::Result<Finding>
     let told = Told { effect: hidden::effect(options.seed), found: &found };
     let story = compare(options, &files, &files.session.join(first), (live, &told), interrupt)?;
     let report = files.out.join("report.html");
-    write(&report, &story.page())?;
+    output::write(&report, story.page())?;
     Ok(Finding {
         text: story.sentence(),
         report,
@@ -162,25 +163,21 @@ fn prepare(options: &Options) -> anyhow::Result<Files> {
         theta: out.join("theta.toml"),
         out,
     };
-    write(&files.cell, CELL)?;
+    output::write(&files.cell, CELL)?;
     let controller = Cell::read(&files.cell)?.controller.context("the shipped cell has no [controller]")?;
     let hidden = hidden::gains(&controller, options.seed).to_toml();
-    write(&files.hidden, &hidden)?;
+    output::write(&files.hidden, hidden)?;
     let effect = Theta { effects: vec![hidden::effect(options.seed)], ..Theta::default() };
-    write(&files.hidden_effect, &effect.to_toml())?;
+    output::write(&files.hidden_effect, effect.to_toml())?;
     Ok(files)
-}
-
-fn write(file: &Path, text: &str) -> anyhow::Result<()> {
-    std::fs::write(file, text).with_context(|| format!("cannot write {}", file.display()))
 }
 
 /// Diagnoses the session and writes page and parameters.
 fn examine(options: &Options, files: &Files, interrupt: &Interrupt) -> anyhow::Result<Diagnosis> {
     let session = Session::open(&files.session)?;
     let found = diagnose(&session, &diagnose::Options { theta: None, seed: options.seed }, interrupt)?;
-    write(&files.theta, &found.theta.to_toml())?;
-    write(&files.diagnosis, &report::diagnosis::page(&found))?;
+    output::write(&files.theta, found.theta.to_toml())?;
+    output::write(&files.diagnosis, report::diagnosis::page(&found))?;
     Ok(found)
 }
 

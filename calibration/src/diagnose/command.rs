@@ -5,9 +5,10 @@ use crate::interrupt::Interrupt;
 use crate::report;
 use anyhow::Context;
 use shared_mem::console;
+use shared_mem::output;
 use shared_mem::recording::Session;
 use shared_mem::theta::Theta;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// Arguments of the verb.
 #[derive(Debug, clap::Args)]
@@ -54,19 +55,15 @@ pub fn run(arguments: &Arguments, interrupt: &Interrupt) -> anyhow::Result<Diagn
     let mut found = diagnose(&session, &Options { theta, seed: arguments.seed }, interrupt)?;
     let beside = arguments.out.as_ref().map(|out| out.with_file_name("theta.toml"));
     if let Some(file) = arguments.theta.clone().or(beside) {
-        write(&file, &found.theta.to_toml())?;
+        output::write(&file, found.theta.to_toml())?;
         found.theta_file = Some(file);
     }
     if let Some(file) = &arguments.out {
-        write(file, &serde_json::to_string_pretty(&found)?)?;
+        output::write(file, serde_json::to_string_pretty(&found)?)?;
     }
     if let Some(file) = &arguments.report {
-        write(file, &report::diagnosis::page(&found))?;
+        output::write(file, report::diagnosis::page(&found))?;
     }
     console::block(report::terminal::diagnosis(&found));
     Ok(found)
-}
-
-fn write(file: &Path, text: &str) -> anyhow::Result<()> {
-    std::fs::write(file, text).with_context(|| format!("{} cannot be written; give another place", file.display()))
 }

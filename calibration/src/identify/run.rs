@@ -8,6 +8,7 @@ use crate::estimate::{
 use crate::interrupt::Interrupt;
 use serde::{Deserialize, Serialize};
 use shared_mem::input;
+use shared_mem::output::{self, OutputError};
 use shared_mem::progress::Progress;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
@@ -81,13 +82,8 @@ pub enum RunError {
     #[error("interrupted before the answer was written; start again")]
     Ended,
     /// The state cannot be kept.
-    #[error("{path}: {source}; give --out a place that can be written")]
-    State {
-        /// The file.
-        path: PathBuf,
-        /// What the system said.
-        source: std::io::Error,
-    },
+    #[error(transparent)]
+    State(#[from] OutputError),
 }
 
 /// What is kept of an unfinished search.
@@ -254,11 +250,7 @@ impl Run<'_> {
 
     fn keep(&self, state: &State) -> Result<(), RunError> {
         let Some(path) = self.state else { return Ok(()) };
-        let fail = |source| RunError::State { path: path.to_owned(), source };
-        // Written aside first: a power cut leaves the old state or the new one.
-        let aside = path.with_extension("tmp");
-        std::fs::write(&aside, serde_json::to_vec(state).expect("numbers have a JSON form")).map_err(fail)?;
-        std::fs::rename(&aside, path).map_err(fail)
+        Ok(output::write(path, serde_json::to_vec(state).expect("numbers have a JSON form"))?)
     }
 }
 

@@ -14,6 +14,7 @@ use nalgebra::{Isometry3, Point3, Quaternion, UnitQuaternion};
 use shared_mem::cell::{Camera, CameraPose, Cell, Intrinsics, Robot};
 use shared_mem::ending;
 use shared_mem::frames::{Base, Camera as CameraFrame, Pose as FramePose};
+use shared_mem::output;
 use shared_mem::recording::{PictureKind, Session, write_png};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -141,8 +142,7 @@ pub fn run(options: &Options) -> anyhow::Result<Viewpoint> {
             pose: CameraPose { position: answer.camera.position, orientation: answer.camera.orientation },
             ..camera
         });
-        std::fs::write(out, cell.to_toml())
-            .with_context(|| format!("{}; give --out a place that can be written", out.display()))?;
+        output::write(out, cell.to_toml())?;
     }
     if let Some(report) = &options.report {
         let (width, height, rgb) = overlay::sheet(&frames, &pixels, &shape, &found.camera_from_base, start.as_ref());

@@ -2,6 +2,7 @@
 
 use crate::device::DeviceFault;
 use serde::Serialize;
+use shared_mem::output::OutputError;
 use shared_mem::recording::{ReadError, WriteError};
 use std::fmt;
 use std::path::PathBuf;
@@ -63,12 +64,7 @@ pub enum ConvertError {
         /// The recording.
         path: PathBuf,
     },
-    /// A file cannot be moved or removed.
-    #[error("{} cannot be written ({source}); check the folder's permissions", path.display())]
-    File {
-        /// The file.
-        path: PathBuf,
-        /// Why.
-        source: std::io::Error,
-    },
+    /// The clip's file.
+    #[error(transparent)]
+    Output(#[from] OutputError),
 }

@@ -5,7 +5,9 @@ use anyhow::Result;
 use clap::Args;
 use shared_mem::answer;
 use shared_mem::cell::Cell;
+use shared_mem::output::discard_unfinished;
 use shared_mem::recording::ClipInfo;
+use std::io::Write as _;
 use std::path::PathBuf;
 
 /// Turn a recording of a RealSense camera into a clip
@@ -34,6 +36,12 @@ pub(super) struct ConvertArguments {
 
 impl ConvertArguments {
     pub(super) fn execute(self) -> Result<()> {
+        ctrlc::set_handler(|| {
+            discard_unfinished();
+            // Whoever reads standard error may be gone.
+            let _told = writeln!(std::io::stderr(), "error: interrupted; nothing was written");
+            std::process::exit(1);
+        })?;
         let cell = self.cell.as_deref().map(Cell::read).transpose()?;
         let info = ClipInfo {
             cell_toml: cell.as_ref().map(Cell::to_toml),

@@ -5,6 +5,7 @@
 use super::{Recorded, announcement};
 use crate::rt::process::ask_to_end;
 use shared_mem::msg::event::Event;
+use shared_mem::parent;
 use shared_mem::transport::Subscriber;
 use std::io::Read as _;
 use std::os::unix::process::{CommandExt as _, ExitStatusExt as _};
@@ -120,10 +121,11 @@ impl RecorderChild {
         }
     }
 
-    /// Asks the recorder to finish and returns what it recorded. Files of recorders that were killed before are not
-    /// counted: nobody knows what is in them before they are read.
+    /// Asks the recorder to finish and returns what it recorded, and what went wrong at the end. Files of recorders that were
+    /// killed before are not counted: nobody knows what is in them before they are read.
     #[must_use]
-    pub fn finish(mut self) -> Option<Recorded> {
+    pub fn finish(mut self) -> (Option<Recorded>, Option<String>) {
+        let mut fault = None;
         if let Some(mut child) = self.running.take() {
             let _ended_already = ask_to_end(child.id());
             let begin = Instant::now();
@@ -131,10 +133,17 @@ impl RecorderChild {
                 std::thread::sleep(Duration::from_millis(2));
             }
             let _ended_already = child.kill();
-            self.done.extend(answer(&mut child));
-            let _status = child.wait();
+            let status = child.wait();
+            match (answer(&mut child), status) {
+                (Some(recorded), _) => {
+                    fault.clone_from(&recorded.stopped);
+                    self.done.push(recorded);
+                }
+                (None, Ok(status)) => fault = Some(last_words(&mut child, status)),
+                (None, Err(error)) => fault = Some(format!("nobody knows how the recorder ended: {error}")),
+            }
         }
-        self.done.pop()
+        (self.done.pop(), fault)
     }
 }
 
@@ -145,7 +154,7 @@ fn spawn(file: &Path, cell: &Path, configuration: &str) -> std::io::Result<Child
         .arg("--cell")
         .arg(cell)
         .args(["--configuration", configuration])
-        .args(["--parent", &std::process::id().to_string()])
+        .args([parent::FLAG, &std::process::id().to_string()])
         .stdin(Stdio::null())
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())

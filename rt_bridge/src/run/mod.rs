@@ -246,10 +246,10 @@ pub fn run(settings: &Settings, stop: &Arc<AtomicBool>) -> Result<RunReport> {
         Ok(pumped) => (pumped, None),
         Err(error) => (PumpReport::default(), Some(error.to_string())),
     };
-    let recorded = watch.recorder.and_then(RecorderChild::finish);
+    let (recorded, unrecorded) = watch.recorder.map_or((None, None), RecorderChild::finish);
     let world_failed = devices.world.and_then(|world| world.finish().err()).map(|error| error.to_string());
     let measured = driven?;
-    let failed = pump_failed.into_iter().chain(world_failed);
+    let failed = pump_failed.into_iter().chain(world_failed).chain(unrecorded);
     let faults = pumped.faults.into_iter().chain(watch.faults).chain(missing).chain(failed).collect();
     Ok(RunReport::new(&measured, &pumped.age, recorded, faults))
 }

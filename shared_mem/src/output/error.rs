@@ -20,9 +20,7 @@ impl OutputError {
     pub(super) fn new(path: &Path, error: &io::Error, needed: u64, written: u64) -> Self {
         let kind = error.kind();
         let (cause, remedy) = match kind {
-            io::ErrorKind::StorageFull => {
-                (full(path, needed, written), "free some space there, or give another place")
-            }
+            io::ErrorKind::StorageFull => (full(path, needed, written), "free some space there, or give another place"),
             io::ErrorKind::QuotaExceeded => {
                 ("the quota of disk space is used up".to_owned(), "free some space there, or give another place")
             }
@@ -37,9 +35,7 @@ impl OutputError {
             io::ErrorKind::PermissionDenied | io::ErrorKind::ReadOnlyFilesystem => {
                 (error.to_string(), "give a place that you may write to")
             }
-            io::ErrorKind::AlreadyExists => {
-                ("it exists, and is not overwritten".to_owned(), "give a new name")
-            }
+            io::ErrorKind::AlreadyExists => ("it exists, and is not overwritten".to_owned(), "give a new name"),
             io::ErrorKind::IsADirectory => ("it is a folder".to_owned(), "give the name of a file"),
             _ => (error.to_string(), "give another place"),
         };

@@ -5,7 +5,7 @@ use super::error::ReadError;
 use super::picture::{Picture, check_size, unpack_png};
 use crate::input;
 use crate::msg::image::{ImageHeader, PixelEncoding, StampDomain};
-use std::io::BufWriter;
+use crate::output::{self, OutputError};
 use std::path::Path;
 use zune_core::bytestream::ZCursor;
 use zune_core::colorspace::ColorSpace;
@@ -69,15 +69,28 @@ fn unpack_jpeg(bytes: &[u8], stamp_ns: u64) -> Result<Picture, String> {
 /// Writes `width * height` pixels of red, green, blue as a PNG.
 ///
 /// # Errors
-/// [`ReadError`] when the file cannot be written or the pixels are not that many.
-pub fn write_png(path: &Path, width: u32, height: u32, rgb: &[u8]) -> Result<(), ReadError> {
-    let cannot = |e: &dyn std::fmt::Display| ReadError::kind(path, format!("cannot be written: {e}"));
-    let file = std::fs::File::create(path).map_err(|e| cannot(&e))?;
-    let mut encoder = png::Encoder::new(BufWriter::new(file), width, height);
+/// [`OutputError`] when the file cannot be written or the pixels are not that many.
+pub fn write_png(path: &Path, width: u32, height: u32, rgb: &[u8]) -> Result<(), OutputError> {
+    let packed = pack_png(width, height, rgb, png::Compression::default());
+    output::write(path, packed.map_err(|error| OutputError::of(path, error.into()))?)
+}
+
+/// `width * height` pixels of red, green, blue as the bytes of a PNG.
+pub(super) fn pack_png(
+    width: u32,
+    height: u32,
+    rgb: &[u8],
+    compression: png::Compression,
+) -> Result<Vec<u8>, png::EncodingError> {
+    let mut bytes = Vec::new();
+    let mut encoder = png::Encoder::new(&mut bytes, width, height);
     encoder.set_color(png::ColorType::Rgb);
     encoder.set_depth(png::BitDepth::Eight);
-    let write = |encoder: png::Encoder<'_, _>| encoder.write_header()?.write_image_data(rgb);
-    write(encoder).map_err(|e| cannot(&e))
+    encoder.set_compression(compression);
+    let mut writer = encoder.write_header()?;
+    writer.write_image_data(rgb)?;
+    writer.finish()?;
+    Ok(bytes)
 }
 
 #[cfg(test)]

@@ -3,13 +3,13 @@
 use super::container::{Channel, Message, Messages};
 use super::error::ReadError;
 use super::writer::WriteError;
+use crate::output::Output;
 use mcap::records::{MessageHeader, Metadata};
 use mcap::write::NoSeek;
 use mcap::{Attachment, Compression, McapError, WriteOptions};
 use std::borrow::Cow;
 use std::collections::HashMap;
-use std::fs::File;
-use std::io::{BufWriter, Read, Seek, Write};
+use std::io::{BufWriter, IntoInnerError, Read, Seek};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -45,12 +45,9 @@ pub fn recover(path: &Path) -> Result<Recovered, RecoverError> {
     let mut messages = Messages::open(path)?;
     let stem = path.file_stem().unwrap_or_default().to_string_lossy();
     let out = path.with_file_name(format!("{stem}_recovered.mcap"));
-    let file = File::create_new(&out).map_err(|source| WriteError::Create { path: out.clone(), source })?;
-    let failed = |error: McapError| {
-        let bytes = std::fs::metadata(&out).map_or(0, |metadata| metadata.len());
-        WriteError::from_mcap(&out, bytes, &error)
-    };
-    let mut copy = Copy::new(file).map_err(failed)?;
+    let failed = |error: McapError| WriteError::from_mcap(&out, 0, &error);
+    let output = Output::create_new(&out).map_err(WriteError::from)?;
+    let mut copy = Copy::new(output).map_err(failed)?;
     while messages.advance()? {
         // In their old place: readers look for them before the first message.
         copy.ride_along(&mut messages).map_err(failed)?;
@@ -59,14 +56,15 @@ pub fn recover(path: &Path) -> Result<Recovered, RecoverError> {
         }
     }
     copy.ride_along(&mut messages).map_err(failed)?;
-    let count = copy.finish().map_err(failed)?;
+    let (count, output) = copy.finish().map_err(failed)?;
+    output.finish().map_err(WriteError::from)?;
     let damage = messages.damage();
     Ok(Recovered { path: out, messages: count, lost_bytes: damage.lost_bytes, damage: damage.summary() })
 }
 
 /// The new file.
 struct Copy {
-    mcap: mcap::Writer<NoSeek<BufWriter<File>>>,
+    mcap: mcap::Writer<NoSeek<BufWriter<Output>>>,
     /// New numbers of the old channels.
     ids: HashMap<*const Channel, u16>,
     /// Keeps the channels of `ids` alive, so that an address names one channel.
@@ -75,13 +73,13 @@ struct Copy {
 }
 
 impl Copy {
-    fn new(file: File) -> Result<Self, McapError> {
+    fn new(output: Output) -> Result<Self, McapError> {
         let mcap = WriteOptions::new()
             .library(concat!("twinalign ", env!("CARGO_PKG_VERSION"), " (recovered)"))
             .compression(Some(Compression::Lz4))
             .compression_threads(0)
             .disable_seeking(true)
-            .create(NoSeek::new(BufWriter::new(file)))?;
+            .create(NoSeek::new(BufWriter::new(output)))?;
         Ok(Self { mcap, ids: HashMap::new(), channels: Vec::new(), messages: 0 })
     }
 
@@ -128,9 +126,9 @@ impl Copy {
         Ok(())
     }
 
-    fn finish(mut self) -> Result<u64, McapError> {
+    fn finish(mut self) -> Result<(u64, Output), McapError> {
         self.mcap.finish()?;
-        self.mcap.into_inner().into_inner().flush()?;
-        Ok(self.messages)
+        let output = self.mcap.into_inner().into_inner().into_inner().map_err(IntoInnerError::into_error)?;
+        Ok((self.messages, output))
     }
 }

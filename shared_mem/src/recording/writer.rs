@@ -1,7 +1,9 @@
-//! Writes own clips. Called by the recorder of the bridge and by `twin replay --out`.
+//! Writes own clips. Called by the recorder of the bridge, `twin replay --out`, `rt_bridge convert` and the export.
 //!
-//! The file only grows: a chunk reaches it whole, so a killed writer loses what came after its last [`ClipWriter::flush`]
-//! and nothing else. Reading needs neither the index nor the footer that [`ClipWriter::finish`] adds.
+//! A live recording ([`ClipWriter::create`]) is there from the beginning and only grows: a chunk reaches it whole, so a
+//! killed writer loses what came after its last [`ClipWriter::flush`] and nothing else. Reading needs neither the index
+//! nor the footer that [`ClipWriter::finish`] adds. Every other clip ([`ClipWriter::whole`]) is an [`Output`]: there
+//! when it is finished, or not at all.
 
 use super::torques;
 use super::wire::{self, UnixClock, Wire};
@@ -12,6 +14,7 @@ use crate::msg::image::{CameraInfo, ImageHeader};
 use crate::msg::object::ObjectPose;
 use crate::msg::twin::{TwinGap, TwinState};
 use crate::msg::wrench::Wrench;
+use crate::output::{Output, OutputError};
 use crate::topics::ImageTopic;
 use mcap::records::{MessageHeader, Metadata};
 use mcap::write::NoSeek;
@@ -81,6 +84,9 @@ pub enum WriteError {
         /// Bytes that were written.
         bytes: u64,
     },
+    /// A clip that is no live recording; nothing of it is there.
+    #[error(transparent)]
+    Output(#[from] OutputError),
     /// Writing failed for another reason.
     #[error("cannot write {} any further ({what}); it is readable up to its last flush; record to another disk", path.display())]
     Failed {
@@ -138,15 +144,49 @@ impl ClipWriter<File> {
         let file = File::create_new(path).map_err(|source| WriteError::Create { path: path.to_owned(), source })?;
         Self::with_sink(file, path, info)
     }
+}
+
+impl ClipWriter<Output> {
+    /// Writes a clip that is there when it is finished, or not at all.
+    ///
+    /// # Errors
+    /// [`WriteError::Output`] when the disk refuses the first bytes.
+    pub fn whole(output: Output, info: &ClipInfo) -> Result<Self, WriteError> {
+        let path = output.path().to_owned();
+        Self::with_sink(output, &path, info)
+    }
 
     /// The same for messages whose stamps are Unix time, as those of a recording made elsewhere: before this machine was
     /// started there is no monotonic time for them.
     ///
     /// # Errors
-    /// As [`Self::create`].
-    pub fn create_in_unix_time(path: &Path, info: &ClipInfo) -> Result<Self, WriteError> {
-        let file = File::create_new(path).map_err(|source| WriteError::Create { path: path.to_owned(), source })?;
-        Self::with_clock(file, path, info, UnixClock(0))
+    /// As [`Self::whole`].
+    pub fn whole_in_unix_time(output: Output, info: &ClipInfo) -> Result<Self, WriteError> {
+        let path = output.path().to_owned();
+        Self::with_clock(output, &path, info, UnixClock(0))
+    }
+
+    /// Completes the clip and gives it its name.
+    ///
+    /// # Errors
+    /// [`WriteError::Output`]; nothing of it is there then.
+    pub fn finish(self) -> Result<WriteSummary, WriteError> {
+        let (summary, output) = self.close()?;
+        output.finish()?;
+        Ok(summary)
+    }
+}
+
+impl ClipWriter<File> {
+    /// Completes the file with index and footer, and takes it to the disk.
+    ///
+    /// # Errors
+    /// As [`ClipWriter::arm_state`].
+    pub fn finish(self) -> Result<WriteSummary, WriteError> {
+        let path = self.path.clone();
+        let (summary, file) = self.close()?;
+        file.sync_all().map_err(|error| WriteError::from_mcap(&path, summary.bytes, &error.into()))?;
+        Ok(summary)
     }
 }
 
@@ -320,17 +360,20 @@ impl<W: Write> ClipWriter<W> {
         self.mcap.flush().map_err(|error| self.failed(&error))
     }
 
-    /// Completes the file with index and footer.
+    /// Adds index and footer, and gives the sink back.
     ///
     /// # Errors
     /// As [`ClipWriter::arm_state`].
-    pub fn finish(mut self) -> Result<WriteSummary, WriteError> {
+    pub fn close(mut self) -> Result<(WriteSummary, W), WriteError> {
         let finished = self.mcap.finish().map(|_| ());
         finished.map_err(|error| self.failed(&error))?;
         let (mcap, path, bytes, messages) = (self.mcap, self.path, self.bytes, self.messages);
         let written = bytes.load(Ordering::Relaxed);
-        mcap.into_inner().into_inner().flush().map_err(|error| WriteError::from_mcap(&path, written, &error.into()))?;
-        Ok(WriteSummary { messages, bytes: bytes.load(Ordering::Relaxed) })
+        let failed = |error: io::Error| WriteError::from_mcap(&path, written, &error.into());
+        let mut buffer = mcap.into_inner().into_inner();
+        buffer.flush().map_err(failed)?;
+        let sink = buffer.into_inner().map_err(|error| failed(error.into_error()))?.sink;
+        Ok((WriteSummary { messages, bytes: bytes.load(Ordering::Relaxed) }, sink))
     }
 
     /// Bytes that reached the file so far; what waits in the open chunk is not among them.
@@ -347,6 +390,11 @@ impl<W: Write> ClipWriter<W> {
 impl WriteError {
     /// `bytes`: how far the file came.
     pub(super) fn from_mcap(path: &Path, bytes: u64, error: &McapError) -> Self {
+        if let McapError::Io(io) = error
+            && let Some(refused) = OutputError::inside(io)
+        {
+            return Self::Output(refused);
+        }
         let path = path.to_owned();
         match error {
             McapError::Io(e) if matches!(e.kind(), io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded) => {

@@ -3,7 +3,9 @@
 use anyhow::{Context as _, bail, ensure};
 use nalgebra::{Isometry3, Point3, Quaternion, Similarity3, Translation3, UnitQuaternion};
 use shared_mem::cell::Cell;
+use shared_mem::output::Output;
 use shared_mem::{answer, console};
+use std::io::Write as _;
 use std::path::PathBuf;
 use twin::arm::MAX_JOINTS;
 use twin::reconstruct::{SurfacePoints, align, label};
@@ -58,6 +60,7 @@ const ON_TABLE: f64 = 0.004;
 
 impl LabelSplats {
     pub(crate) fn run(&self) -> anyhow::Result<()> {
+        super::discard_on_signal()?;
         let mut cell = Cell::read(&self.cell)?;
         // The capsule that stands for the tool is not what was scanned.
         cell.tool = None;
@@ -82,13 +85,21 @@ impl LabelSplats {
         let parts = label(&scan, &found.base_from_scan, &surface, self.reach, table);
         std::fs::create_dir_all(&self.out)
             .with_context(|| format!("{}; give --out a place that can be written", self.out.display()))?;
-        let mut counts = Vec::new();
+        let (mut counts, mut outputs) = (Vec::new(), Vec::new());
+        let mut put = |splats: &SplatCloud, name: &str| -> anyhow::Result<()> {
+            let mut output = Output::create(&self.out.join(name))?;
+            splats.write_to(&mut output)?;
+            outputs.push(output);
+            Ok(())
+        };
         for (link, splats) in parts.links.iter().enumerate() {
             let link_from_base = robot.base_from_link(&q, link).inverse();
-            splats.moved(&Similarity3::from_isometry(link_from_base, 1.0)).write(&self.out.join(link_file(link)))?;
+            put(&splats.moved(&Similarity3::from_isometry(link_from_base, 1.0)), &link_file(link))?;
             counts.push(splats.splats.len());
         }
-        parts.rest.write(&self.out.join("scene.ply"))?;
+        put(&parts.rest, "scene.ply")?;
+        // Once there was room for all of them: the links of two scans make no robot.
+        outputs.into_iter().try_for_each(Output::finish)?;
         let at = found.base_from_scan;
         let (place, turn) = (at.isometry.translation.vector, at.isometry.rotation.quaternion());
         console::line(format_args!(

@@ -5,3 +5,18 @@ pub(crate) mod look;
 pub(crate) mod render;
 pub(crate) mod replay;
 pub(crate) mod shadow;
+
+use anyhow::Context as _;
+use std::io::Write as _;
+
+/// For verbs that do not stop by themselves at Ctrl-C: ends the program, without leaving unfinished files. Those that are
+/// finished stay.
+fn discard_on_signal() -> anyhow::Result<()> {
+    let end = || {
+        shared_mem::output::discard_unfinished();
+        // Whoever reads standard error may be gone.
+        let _told = writeln!(std::io::stderr(), "twin: interrupted; files that were finished stay");
+        std::process::exit(1);
+    };
+    ctrlc::set_handler(end).context("cannot listen for Ctrl-C")
+}

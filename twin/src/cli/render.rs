@@ -2,6 +2,7 @@
 
 use super::look::Look;
 use anyhow::{Context as _, bail, ensure};
+use shared_mem::output::Output;
 use shared_mem::recording::{PictureKind, Session, for_pictures, write_png};
 use shared_mem::{answer, console};
 use std::path::{Path, PathBuf};
@@ -44,6 +45,7 @@ pub(crate) struct Render {
 
 impl Render {
     pub(crate) fn run(&self) -> anyhow::Result<()> {
+        super::discard_on_signal()?;
         let session = Session::open_with(&self.path, self.cell.as_deref())?;
         let mut view = self.look.view(&session.cell)?;
         std::fs::create_dir_all(&self.out)
@@ -105,16 +107,21 @@ impl Render {
 /// The frames as a film; `None` where there is no ffmpeg.
 fn film(folder: &Path, rate: f64) -> anyhow::Result<Option<PathBuf>> {
     let out = folder.join("film.mp4");
+    let unfinished = Output::create(&out)?;
     let rate = rate.to_string();
     let mut command = Command::new("ffmpeg");
     command.args(["-y", "-loglevel", "error", "-framerate", &rate, "-i"]).arg(folder.join("frame_%05d.png"));
     // The usual encoding needs an even number of rows and columns.
-    command.args(["-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2", "-pix_fmt", "yuv420p"]).arg(&out);
+    command.args(["-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2", "-pix_fmt", "yuv420p", "-f", "mp4"]);
+    command.arg(unfinished.unfinished_path());
     // Its complaints are read here: written past the console, they could wait for a reader for ever.
     match command.stdin(Stdio::null()).output() {
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(None),
         Err(error) => Err(error).context("ffmpeg cannot be started"),
-        Ok(ended) if ended.status.success() => Ok(Some(out)),
+        Ok(ended) if ended.status.success() => {
+            unfinished.finish()?;
+            Ok(Some(out))
+        }
         Ok(ended) => {
             let complaints = String::from_utf8_lossy(&ended.stderr);
             let last = complaints.trim_end().lines().last().unwrap_or("without a reason");

@@ -2,6 +2,7 @@
 
 use anyhow::{Context, bail};
 use shared_mem::ending;
+use shared_mem::parent;
 use shared_mem::recording::Session;
 use shared_mem::theta::Theta;
 use shared_mem::{answer, console};
@@ -16,7 +17,7 @@ behind a hole in the commands it starts again; that is told).
 Joint errors are root mean squares over the clip; ADD and ADD-S are means over the recorded object poses.
 
 A clip that cannot be replayed is named on stderr, with the reason, and the others are replayed. The exit code is 1 only
-when none could be.
+when none could be, or when one could not be written.
 
 Examples:
   twin replay session
@@ -35,6 +36,9 @@ pub(crate) struct Replay {
     /// Writes the recording, its simulation and the gap as a new clip; for a session, a folder of clips.
     #[arg(long, value_name = "CLIP.MCAP")]
     out: Option<PathBuf>,
+    /// End when this process is no longer our parent.
+    #[arg(long, hide = true)]
+    parent: Option<u32>,
     /// Prints one JSON object on stdout at the end.
     #[arg(long)]
     json: bool,
@@ -44,6 +48,9 @@ impl Replay {
     pub(crate) fn run(&self) -> anyhow::Result<()> {
         let session = Session::open_with(&self.path, self.cell.as_deref())?;
         let theta = self.parameters.as_deref().map(Theta::read).transpose()?;
+        if let Some(parent) = self.parent {
+            parent::when_gone(parent, ending::ask)?;
+        }
         ctrlc::set_handler(ending::ask).context("cannot listen for Ctrl-C")?;
         let gap = replay(&session, &Options { theta, out: self.out.clone() })?;
         for clip in &gap.clips {
@@ -67,6 +74,9 @@ impl Replay {
         }
         if gap.clips.is_empty() {
             bail!("none of the {failed} clips could be replayed; the reasons stand above");
+        }
+        if let Some(error) = gap.unwritten() {
+            bail!("{error}");
         }
         if failed > 0 {
             console::line(format_args!(

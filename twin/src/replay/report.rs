@@ -34,6 +34,9 @@ pub struct ClipGap {
 pub(super) struct Failure {
     pub(super) file: String,
     pub(super) error: String,
+    /// It was replayed, and its simulation could not be written.
+    #[serde(skip)]
+    pub(super) unwritten: bool,
 }
 
 /// The gaps of a session.
@@ -61,6 +64,12 @@ impl SessionGap {
     /// Why clips could not be replayed: file and reason.
     pub fn failures(&self) -> impl Iterator<Item = (&str, &str)> {
         self.failed.iter().map(|failure| (failure.file.as_str(), failure.error.as_str()))
+    }
+
+    /// Why the first simulation that was asked for could not be written, if one could not.
+    #[must_use]
+    pub fn unwritten(&self) -> Option<&str> {
+        self.failed.iter().find(|failure| failure.unwritten).map(|failure| failure.error.as_str())
     }
 }
 

@@ -58,7 +58,9 @@ pub fn replay(session: &Session, options: &Options) -> Result<SessionGap, Replay
         match result {
             Ok(gap) => clips.push(gap),
             Err(error) => {
-                failed.push(Failure { file: entry.file.to_string_lossy().into_owned(), error: error.to_string() });
+                let (file, unwritten) =
+                    (entry.file.to_string_lossy().into_owned(), matches!(error, ClipError::Write(_)));
+                failed.push(Failure { file, error: error.to_string(), unwritten });
             }
         }
     }

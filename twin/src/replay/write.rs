@@ -6,8 +6,8 @@ use shared_mem::msg::arm::ArmState;
 use shared_mem::msg::joints_from;
 use shared_mem::msg::object::ObjectPose;
 use shared_mem::msg::twin::{TwinGap, TwinState};
+use shared_mem::output::Output;
 use shared_mem::recording::{Clip, ClipInfo, ClipWriter, WriteError};
-use std::fs::File;
 use std::path::Path;
 
 /// Time over which [`TwinGap::joint_rms`] is taken [ns].
@@ -15,7 +15,8 @@ const RMS_WINDOW_NS: u64 = 1_000_000_000;
 /// Stamps from here on are Unix time (that of 2001), those below a machine's monotonic clock [ns].
 const UNIX_FROM_NS: u64 = 1_000_000_000_000_000_000;
 
-/// Writes the clip and its simulation to the new file `path`; folders in between are made.
+/// Writes the clip and its simulation to the new file `path`, which is there when all of it is written; folders in between
+/// are made.
 ///
 /// # Errors
 /// [`WriteError`] when the file exists already or the disk fails.
@@ -29,8 +30,8 @@ pub fn write_clip(path: &Path, replayer: &Replayer, clip: &Clip, prediction: &Pr
         program: concat!("twin ", env!("CARGO_PKG_VERSION"), " replay").to_owned(),
         torques_begin_at_rows: !clip.torques_end_at_rows,
     };
-    let create = if in_unix_time(clip) { ClipWriter::create_in_unix_time } else { ClipWriter::create };
-    let mut writer = create(path, &info)?;
+    let begin = if in_unix_time(clip) { ClipWriter::whole_in_unix_time } else { ClipWriter::whole };
+    let mut writer = begin(Output::create_new(path)?, &info)?;
     let latency_ns = replayer.cell().camera.as_ref().map_or(0, |camera| (camera.latency * 1e9) as u64);
     Simulated { writer: &mut writer, replayer, clip, prediction, latency_ns, pose: 0 }.write()?;
     writer.finish()?;
@@ -44,7 +45,7 @@ fn in_unix_time(clip: &Clip) -> bool {
 }
 
 struct Simulated<'a> {
-    writer: &'a mut ClipWriter<File>,
+    writer: &'a mut ClipWriter<Output>,
     replayer: &'a Replayer,
     clip: &'a Clip,
     prediction: &'a Prediction,

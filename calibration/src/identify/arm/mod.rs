@@ -30,10 +30,11 @@ use crate::interrupt::Interrupt;
 use finding::Finding;
 use session::Material;
 use shared_mem::cell::Cell;
+use shared_mem::output::{self, OutputError};
 use shared_mem::recording::{Clip, ReadError};
 use shared_mem::theta::Theta;
 use shared_mem::toml_file::TomlFileError;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::Instant;
 use twin::arm::ModelError;
 use twin::effects::{EffectInfo, Stage, find, registry};
@@ -95,13 +96,8 @@ pub enum ArmError {
     #[error(transparent)]
     Run(#[from] RunError),
     /// The answer cannot be written.
-    #[error("{path}: {source}; give --out a place that can be written")]
-    Write {
-        /// The file.
-        path: PathBuf,
-        /// What the system said.
-        source: std::io::Error,
-    },
+    #[error(transparent)]
+    Output(#[from] OutputError),
 }
 
 /// What a clip's prediction takes from a vector of numbers.
@@ -173,15 +169,11 @@ fn identify_material(
         return Err(RunError::Ended.into());
     }
     if let Some(out) = &options.out {
-        write(&settings.theta(&outcome.fit.shared), out)?;
+        output::write(out, settings.theta(&outcome.fit.shared).to_toml())?;
         answer.theta_file = out.display().to_string();
     }
     answer.seconds = began.elapsed().as_secs_f64();
     Ok(answer)
-}
-
-fn write(theta: &Theta, out: &Path) -> Result<(), ArmError> {
-    std::fs::write(out, theta.to_toml()).map_err(|source| ArmError::Write { path: out.to_owned(), source })
 }
 
 /// Gains, and the parameters of the effects that were asked for.

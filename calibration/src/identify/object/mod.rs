@@ -51,6 +51,7 @@ use paper::SurfaceLoss;
 use parts::disagreement;
 use polish::{Searched, fit_polished};
 use shared_mem::cell::{Cell, ClipKind};
+use shared_mem::output::{self, OutputError};
 use shared_mem::progress::Progress;
 use shared_mem::recording::{Clip, ReadError};
 use shared_mem::theta::Theta;
@@ -121,13 +122,8 @@ pub enum ObjectError {
     #[error("the twin cannot be simulated: {0}; check the values of cell.toml and --parameters")]
     Impossible(#[from] Impossible),
     /// The answer cannot be written.
-    #[error("{path}: {source}; give --out a place that can be written")]
-    Write {
-        /// The file.
-        path: PathBuf,
-        /// What the system said.
-        source: std::io::Error,
-    },
+    #[error(transparent)]
+    Output(#[from] OutputError),
 }
 
 /// Identifies the object; writes theta.toml where `out` says, with everything that was known before.
@@ -160,7 +156,7 @@ pub fn identify(options: &Options, interrupt: &Interrupt) -> Result<Identificati
         return Err(RunError::Ended.into());
     }
     if let Some(out) = &options.out {
-        std::fs::write(out, theta.to_toml()).map_err(|source| ObjectError::Write { path: out.clone(), source })?;
+        output::write(out, theta.to_toml())?;
         answer.theta_file = out.display().to_string();
     }
     answer.seconds = began.elapsed().as_secs_f64();

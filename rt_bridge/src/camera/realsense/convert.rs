@@ -9,6 +9,7 @@ use crate::camera::{CameraSource, ConvertError, Converted};
 use crate::device::DeviceFault;
 use shared_mem::cell::Camera;
 use shared_mem::msg::image::{CameraInfo, ImageHeader};
+use shared_mem::output::Output;
 use shared_mem::recording::{ClipInfo, ClipWriter};
 use shared_mem::time::now_ns;
 use std::collections::BTreeSet;
@@ -32,17 +33,18 @@ pub fn convert(bag: &Path, camera: &Camera, out: &Path, info: &ClipInfo) -> Resu
     }
     let source = CameraSource::Bag(bag.to_owned());
     let recorded = depth_pictures(bag).map_err(|e| refused(&source, &e))?;
-    let mut conversion = Conversion { source, camera, info, known: BTreeSet::new(), begin: None };
+    let mut conversion = Conversion { source, camera, known: BTreeSet::new(), begin: None };
     let mut passes = Passes::new(out);
     let (mut played, mut fruitless) = (0, 0);
     while played < PASSES && fruitless < FRUITLESS && conversion.known.len() + NEVER_PAIRED < recorded {
         let known = conversion.known.len();
-        let seen = conversion.play(&passes.next_file()?)?;
+        let mut clip = passes.begin(info)?;
+        let seen = conversion.play(&mut clip)?;
         played += 1;
         if conversion.known.len() > known {
+            passes.keep(clip)?;
             fruitless = 0;
         } else {
-            passes.forget_last();
             fruitless += 1;
             // A pass without a loss says more than one that lacked something itself.
             if seen == known {
@@ -67,7 +69,6 @@ fn refused(source: &CameraSource, error: &IndexError) -> ConvertError {
 struct Conversion<'a> {
     source: CameraSource,
     camera: &'a Camera,
-    info: &'a ClipInfo,
     /// Numbers of the pairs written.
     known: BTreeSet<u64>,
     /// How the camera projects; what takes its clock to this machine's [ns].
@@ -75,9 +76,8 @@ struct Conversion<'a> {
 }
 
 impl Conversion<'_> {
-    /// One pass: writes the pairs that are not known yet to the new file `out`. Pairs seen.
-    fn play(&mut self, out: &Path) -> Result<usize, ConvertError> {
-        let mut writer = ClipWriter::create(out, self.info)?;
+    /// One pass: writes the pairs that are not known yet. Pairs seen.
+    fn play(&mut self, clip: &mut ClipWriter<Output>) -> Result<usize, ConvertError> {
         let (known, begin) = (&mut self.known, &mut self.begin);
         let mut seen = BTreeSet::new();
         let mut described = false;
@@ -91,12 +91,11 @@ impl Conversion<'_> {
                 let stamped =
                     |header: ImageHeader| ImageHeader { stamp_ns: header.device_ns.wrapping_add(*shift_ns), ..header };
                 let pair = [(stamped(moment.color), moment.color_pixels), (stamped(moment.depth), moment.depth_pixels)];
-                write(&mut writer, &pair, (!described).then_some(&*camera))?;
+                write(clip, &pair, (!described).then_some(&*camera))?;
                 described = true;
             }
             Ok(())
         })?;
-        writer.finish()?;
         Ok(seen.len())
     }
 }

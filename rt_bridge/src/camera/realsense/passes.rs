@@ -2,9 +2,9 @@
 
 use crate::camera::ConvertError;
 use shared_mem::msg::image::{CameraInfo, ImageHeader};
+use shared_mem::output::Output;
 use shared_mem::recording::{ClipInfo, ClipMessages, ClipWriter, Payload, Picture, ReadError};
 use shared_mem::topics;
-use std::fs;
 use std::iter::Peekable;
 use std::path::{Path, PathBuf};
 
@@ -14,10 +14,10 @@ pub(super) type Pixels = (ImageHeader, Vec<u8>);
 /// Colour and depth of one moment.
 pub(super) type Pair = [Pixels; 2];
 
-/// The files of the passes beside the clip that they become. They go when this goes.
+/// What the passes brought, beside the clip that they become and without a name yet.
 pub(super) struct Passes {
     out: PathBuf,
-    files: Vec<PathBuf>,
+    files: Vec<Output>,
 }
 
 impl Passes {
@@ -26,47 +26,30 @@ impl Passes {
         Self { out: out.to_owned(), files: Vec::new() }
     }
 
-    /// The name of the next pass's file, which is free.
-    pub(super) fn next_file(&mut self) -> Result<PathBuf, ConvertError> {
-        let file = self.out.with_extension(format!("mcap.pass_{}", self.files.len() + 1));
-        match fs::remove_file(&file) {
-            Err(source) if file.exists() => return Err(ConvertError::File { path: file, source }),
-            _ => {}
-        }
-        self.files.push(file.clone());
-        Ok(file)
+    /// Begins the clip of a pass.
+    pub(super) fn begin(&self, info: &ClipInfo) -> Result<ClipWriter<Output>, ConvertError> {
+        Ok(ClipWriter::whole(Output::create_new(&self.out)?, info)?)
     }
 
-    /// Forgets the last pass, which brought nothing.
-    pub(super) fn forget_last(&mut self) {
-        self.files.pop().map(fs::remove_file);
+    /// Keeps what a pass brought.
+    pub(super) fn keep(&mut self, clip: ClipWriter<Output>) -> Result<(), ConvertError> {
+        let (_, file) = clip.close()?;
+        self.files.push(file);
+        Ok(())
     }
 
     /// Makes them one clip, its pairs by the camera's clock; `camera` describes it.
-    pub(super) fn finish(self, camera: &CameraInfo, info: &ClipInfo) -> Result<(), ConvertError> {
-        let failed = |source| ConvertError::File { path: self.out.clone(), source };
-        if let [only] = self.files.as_slice() {
-            return fs::rename(only, &self.out).map_err(failed);
+    pub(super) fn finish(mut self, camera: &CameraInfo, info: &ClipInfo) -> Result<(), ConvertError> {
+        if self.files.len() > 1 {
+            return merge(&self.files, self.begin(info)?, camera);
         }
-        let unfinished = self.out.with_extension("mcap.unfinished");
-        let _not_there = fs::remove_file(&unfinished);
-        merge(&self.files, &unfinished, camera, info)
-            .and_then(|()| fs::rename(&unfinished, &self.out).map_err(failed))
-            .inspect_err(|_| drop(fs::remove_file(&unfinished)))
-    }
-}
-
-impl Drop for Passes {
-    fn drop(&mut self) {
-        for file in &self.files {
-            let _became_the_clip = fs::remove_file(file);
-        }
+        self.files.pop().map_or(Ok(()), |only| Ok(only.finish()?))
     }
 }
 
 /// Writes a pair, with the description of the camera before the first.
 pub(super) fn write(
-    writer: &mut ClipWriter,
+    writer: &mut ClipWriter<Output>,
     [color, depth]: &Pair,
     describe: Option<&CameraInfo>,
 ) -> Result<(), ConvertError> {
@@ -78,10 +61,9 @@ pub(super) fn write(
     Ok(())
 }
 
-fn merge(files: &[PathBuf], out: &Path, camera: &CameraInfo, info: &ClipInfo) -> Result<(), ConvertError> {
-    let mut passes =
-        files.iter().map(|file| Ok(Pairs::open(file)?.peekable())).collect::<Result<Vec<_>, ReadError>>()?;
-    let mut writer = ClipWriter::create(out, info)?;
+fn merge(files: &[Output], mut writer: ClipWriter<Output>, camera: &CameraInfo) -> Result<(), ConvertError> {
+    let open = |file: &Output| Ok(Pairs::open(file.unfinished_path())?.peekable());
+    let mut passes = files.iter().map(open).collect::<Result<Vec<_>, ReadError>>()?;
     let mut describe = Some(camera);
     while let Some(earliest) = earliest(&mut passes) {
         let Some(pair) = passes[earliest].next() else { continue };
@@ -163,14 +145,14 @@ mod tests {
         let (camera, info) = (CameraInfo::default(), ClipInfo::default());
         let mut passes = Passes::new(&out);
         for numbers in [&[2, 3, 6][..], &[4, 7], &[1, 5]] {
-            let mut writer = ClipWriter::create(&passes.next_file().expect("a name"), &info).expect("a file");
+            let mut writer = passes.begin(&info).expect("a file");
             for number in numbers {
                 write(&mut writer, &pair(*number), None).expect("written");
             }
-            writer.finish().expect("finished");
+            passes.keep(writer).expect("kept");
         }
         passes.finish(&camera, &info).expect("one clip");
         assert_eq!(pairs(&out), (1..=7).map(pair).collect::<Vec<_>>());
-        assert_eq!(fs::read_dir(folder.path()).expect("the folder").count(), 1, "nothing else stays");
+        assert_eq!(std::fs::read_dir(folder.path()).expect("the folder").count(), 1, "nothing else stays");
     }
 }

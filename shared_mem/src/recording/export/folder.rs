@@ -5,27 +5,31 @@
 //! any, else of the pictures, else of the joint rows; the joint row that is nearest in time goes with each.
 
 use super::super::picture::Picture;
+use super::super::picture_file::pack_png;
 use super::super::{Payload, ReadError};
 use super::source::Source;
 use super::{ExportError, Exported, FlangeAt, npz};
 use crate::cell::{Camera, CameraPose, Cell};
 use crate::msg::image::{CameraInfo, ImageHeader, PixelEncoding};
+use crate::output::{OutputError, OutputFolder};
 use serde_json::{Map, Value, json};
-use std::fs;
 use std::path::Path;
 
 /// A picture farther than this from its frame belongs to none [ns]: half a frame at 30 Hz.
 const SAME_MOMENT_NS: u64 = 16_000_000;
 
+/// Where the clip goes: the new session, and the clip's name in it.
+type Place<'a> = (&'a OutputFolder, &'a Path);
+
 /// Writes the folder.
 pub(super) fn write(
     source: &Source,
     cell: &Cell,
-    target: &Path,
+    target: Place<'_>,
     flange_at: FlangeAt<'_>,
 ) -> Result<Exported, ExportError> {
     let clip = &source.clip;
-    let mut exported = Exported::of(source, target);
+    let mut exported = Exported::of(source, target.1);
     if clip.measured.is_empty() || clip.desired.is_empty() {
         let what = "has no arm, which a TwinAligner folder needs; export it as a ROS 2 bag".to_owned();
         return Err(ExportError::Unfit { path: source.path.clone(), what });
@@ -33,16 +37,15 @@ pub(super) fn write(
     let origin = clip.measured.stamps_ns[0].min(clip.desired.stamps_ns[0]);
     let seconds = |stamp_ns: u64| crate::time::seconds_between(origin, stamp_ns);
     let frames = frames(source)?;
-    fs::create_dir_all(target).map_err(ExportError::file(target))?;
 
-    put_json(&target.join("init.json"), &init(source, cell))?;
+    put_json(target, "init.json", &init(source, cell))?;
     let controls = clip
         .desired
         .stamps_ns
         .iter()
         .enumerate()
         .map(|(i, stamp)| json!({ "id": i, "ros_timestamp": seconds(*stamp), "cmd": clip.desired.q_row(i) }));
-    put_json(&target.join("control.json"), &controls.collect())?;
+    put_json(target, "control.json", &controls.collect())?;
     let listed = frames.iter().enumerate().map(|(i, frame)| {
         let q = clip.measured.q_row(frame.row);
         let mut entry = Map::new();
@@ -56,7 +59,7 @@ pub(super) fn write(
         }
         Value::Object(entry)
     });
-    put_json(&target.join("frame.json"), &listed.collect())?;
+    put_json(target, "frame.json", &listed.collect())?;
     put_poses(source, cell, target, &mut exported)?;
     let info = put_pictures(source, &frames, target, &mut exported)?;
     put_camera(info, cell, target)?;
@@ -120,7 +123,7 @@ fn init(source: &Source, cell: &Cell) -> Value {
 }
 
 /// `pose.npy`: the object in the camera, one 4x4 a frame.
-fn put_poses(source: &Source, cell: &Cell, target: &Path, exported: &mut Exported) -> Result<(), ExportError> {
+fn put_poses(source: &Source, cell: &Cell, target: Place<'_>, exported: &mut Exported) -> Result<(), ExportError> {
     let object = &source.clip.object;
     if object.is_empty() {
         return Ok(());
@@ -142,14 +145,14 @@ fn put_poses(source: &Source, cell: &Cell, target: &Path, exported: &mut Exporte
         matrix.transpose().as_slice().to_vec()
     });
     let data: Vec<u8> = numbers.flat_map(f64::to_le_bytes).collect();
-    put(&target.join("pose.npy"), &npz::npy("<f8", &[object.len(), 4, 4], &data))
+    put(target, "pose.npy", &npz::npy("<f8", &[object.len(), 4, 4], &data))
 }
 
 /// Pictures under the number of their frame; what the camera told about itself.
 fn put_pictures(
     source: &Source,
     frames: &[Frame],
-    target: &Path,
+    target: Place<'_>,
     exported: &mut Exported,
 ) -> Result<Option<CameraInfo>, ExportError> {
     let stamps: Vec<u64> = frames.iter().map(|frame| frame.stamp_ns).collect();
@@ -180,7 +183,7 @@ fn put_pictures(
     Ok(info)
 }
 
-fn put_picture(target: &Path, frame: usize, header: &ImageHeader, pixels: &[u8]) -> Result<(), ExportError> {
+fn put_picture(target: Place<'_>, frame: usize, header: &ImageHeader, pixels: &[u8]) -> Result<(), ExportError> {
     let (width, height) = (header.width as usize, header.height as usize);
     let depth = header.encoding == PixelEncoding::Depth16;
     let row = width * if depth { 2 } else { 3 };
@@ -190,36 +193,29 @@ fn put_picture(target: &Path, frame: usize, header: &ImageHeader, pixels: &[u8])
         let metres = |pair: &[u8]| (f64::from(u16::from_le_bytes([pair[0], pair[1]])) * header.depth_scale) as f32;
         let data: Vec<u8> = tight.chunks_exact(2).flat_map(|pair| metres(pair).to_le_bytes()).collect();
         let array = npz::npy("<f4", &[height, width], &data);
-        return put(&target.join(format!("depth/{frame:05}.npz")), &npz::npz("depth", &array));
+        return put(target, &format!("depth/{frame:05}.npz"), &npz::npz("depth", &array));
     }
-    let path = target.join(format!("rgb/{frame:05}.png"));
-    let mut bytes = Vec::new();
-    let mut encoder = png::Encoder::new(&mut bytes, header.width, header.height);
-    encoder.set_color(png::ColorType::Rgb);
-    encoder.set_compression(png::Compression::Fast);
-    let written = encoder.write_header().and_then(|mut writer| writer.write_image_data(&tight));
-    written.map_err(|e| ExportError::file(&path)(std::io::Error::other(e.to_string())))?;
-    put(&path, &bytes)
+    let name = format!("rgb/{frame:05}.png");
+    let packed = pack_png(header.width, header.height, &tight, png::Compression::Fast);
+    let bytes = packed.map_err(|error| OutputError::of(&target.1.join(&name), error.into()))?;
+    put(target, &name, &bytes)
 }
 
 /// `cam_K.txt`, where the camera is known.
-fn put_camera(info: Option<CameraInfo>, cell: &Cell, target: &Path) -> Result<(), ExportError> {
+fn put_camera(info: Option<CameraInfo>, cell: &Cell, target: Place<'_>) -> Result<(), ExportError> {
     let described = cell.camera.as_ref().map(|camera| {
         let pinhole = camera.pinhole();
         [pinhole.fx, pinhole.fy, pinhole.cx, pinhole.cy]
     });
     let Some([fx, fy, cx, cy]) = info.map(|info| info.intrinsics).or(described) else { return Ok(()) };
-    put(&target.join("cam_K.txt"), format!("{fx:e} 0 {cx:e}\n0 {fy:e} {cy:e}\n0 0 1\n").as_bytes())
+    put(target, "cam_K.txt", format!("{fx:e} 0 {cx:e}\n0 {fy:e} {cy:e}\n0 0 1\n").as_bytes())
 }
 
-fn put_json(path: &Path, value: &Value) -> Result<(), ExportError> {
+fn put_json(target: Place<'_>, name: &str, value: &Value) -> Result<(), ExportError> {
     let text = serde_json::to_vec(value).unwrap_or_default();
-    put(path, &text)
+    put(target, name, &text)
 }
 
-fn put(path: &Path, bytes: &[u8]) -> Result<(), ExportError> {
-    if let Some(folder) = path.parent() {
-        fs::create_dir_all(folder).map_err(ExportError::file(folder))?;
-    }
-    fs::write(path, bytes).map_err(ExportError::file(path))
+fn put((folder, clip): Place<'_>, name: &str, bytes: &[u8]) -> Result<(), ExportError> {
+    Ok(folder.write(&clip.join(name), bytes)?)
 }

@@ -21,9 +21,9 @@ mod source;
 
 use super::{ReadError, Session, WriteError};
 use crate::cell::ClipEntry;
+use crate::output::{OutputError, OutputFolder};
 use serde::Serialize;
 use source::Source;
-use std::io;
 use std::path::{Path, PathBuf};
 
 /// What a session can be written as.
@@ -66,20 +66,9 @@ pub enum ExportError {
     /// An own clip cannot be written.
     #[error(transparent)]
     Write(#[from] WriteError),
-    /// A file cannot be written.
-    #[error("cannot write {}: {source}; free some space or choose another folder with --out", path.display())]
-    File {
-        /// The file.
-        path: PathBuf,
-        /// What the system said.
-        source: io::Error,
-    },
-    /// The target holds something already.
-    #[error("{} is not empty; choose a new folder with --out", path.display())]
-    NotEmpty {
-        /// The folder.
-        path: PathBuf,
-    },
+    /// A file or the folder cannot be written.
+    #[error(transparent)]
+    Output(#[from] OutputError),
     /// The clip does not fit into the format.
     #[error("{}: {what}", path.display())]
     Unfit {
@@ -90,17 +79,11 @@ pub enum ExportError {
     },
 }
 
-impl ExportError {
-    fn file(path: &Path) -> impl Fn(io::Error) -> Self + '_ {
-        move |source| Self::File { path: path.to_owned(), source }
-    }
-}
-
-/// Writes all clips of `session` and its cell.toml into the new folder `out`. `flange_at` is asked where a format wants
-/// to know it. `told` hears of each clip as it is done.
+/// Writes all clips of `session` and its cell.toml into the new folder `out`, which is there when all of it is written.
+/// `flange_at` is asked where a format wants to know it. `told` hears of each clip as it is done.
 ///
 /// # Errors
-/// [`ExportError`]; clips that were written before stay.
+/// [`ExportError`]; nothing is there then.
 pub fn export_session(
     session: &Session,
     to: Format,
@@ -108,30 +91,29 @@ pub fn export_session(
     flange_at: FlangeAt<'_>,
     mut told: impl FnMut(&Exported),
 ) -> Result<Vec<Exported>, ExportError> {
-    std::fs::create_dir_all(out).map_err(ExportError::file(out))?;
-    if std::fs::read_dir(out).map_err(ExportError::file(out))?.next().is_some() {
-        return Err(ExportError::NotEmpty { path: out.to_owned() });
-    }
+    let folder = OutputFolder::create(out)?;
     let mut cell = session.cell.at_home_anywhere();
     cell.clips.clear();
     let mut done = Vec::new();
     for (number, entry) in session.clips.iter().enumerate() {
         let file = name(&entry.file, to, number);
-        let target = out.join(&file);
         let source = Source::open(session, entry)?;
         let exported = match to {
-            Format::Ros2 => rosbag::write(&source, &cell, &target)?,
-            Format::TwinAligner => folder::write(&source, &cell, &target, flange_at)?,
-            Format::Own => native::write(&source, &cell, &target, flange_at)?,
+            Format::Ros2 => rosbag::write(&source, &cell, folder.file(&file)?)?,
+            Format::TwinAligner => folder::write(&source, &cell, (&folder, &file), flange_at)?,
+            Format::Own => native::write(&source, &cell, folder.file(&file)?, flange_at)?,
         };
         cell.clips.push(ClipEntry { file, kind: entry.kind });
-        let path = out.join("cell.toml");
-        std::fs::write(&path, cell.to_toml()).map_err(ExportError::file(&path))?;
         told(&exported);
         done.push(exported);
     }
+    folder.write(Path::new(CELL_TOML), cell.to_toml().as_bytes())?;
+    folder.finish(CELL_TOML)?;
     Ok(done)
 }
+
+/// What makes a folder a session.
+const CELL_TOML: &str = "cell.toml";
 
 /// Name of a clip in the new session.
 fn name(file: &Path, to: Format, number: usize) -> PathBuf {

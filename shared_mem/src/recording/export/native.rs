@@ -18,6 +18,7 @@ use crate::msg::image::{CameraInfo, ImageHeader, PixelEncoding};
 use crate::msg::object::ObjectPose;
 use crate::msg::wrench::Wrench;
 use crate::msg::{Joints, joints_from};
+use crate::output::Output;
 use crate::topics;
 use std::collections::HashMap;
 use std::path::Path;
@@ -26,7 +27,7 @@ use std::path::Path;
 pub(super) fn write(
     source: &Source,
     cell: &Cell,
-    target: &Path,
+    output: Output,
     flange_at: FlangeAt<'_>,
 ) -> Result<Exported, ExportError> {
     let clip = &source.clip;
@@ -40,14 +41,14 @@ pub(super) fn write(
              guessing; every command reads it as it is, and a ROS 2 bag holds it as it is",
         ));
     }
-    let mut exported = Exported::of(source, target);
+    let mut exported = Exported::of(source, output.path());
     let info = ClipInfo {
         cell_toml: Some(cell.to_toml()),
         configuration: String::new(),
         program: concat!("twinalign ", env!("CARGO_PKG_VERSION"), ", export").into(),
         torques_begin_at_rows: !clip.torques_end_at_rows,
     };
-    let mut writer = ClipWriter::create_in_unix_time(target, &info)?;
+    let mut writer = ClipWriter::whole_in_unix_time(output, &info)?;
     let known = if matches!(source.kind, Kind::Bag) { Known::read(&source.path)? } else { Known::default() };
     let latency_ns = cell.camera.as_ref().map_or(0, |camera| (camera.latency * 1e9) as u64);
     let mut rows = Rows { source, known, flange_at, latency_ns, state: 0, pose: 0 };
@@ -66,7 +67,7 @@ fn put_beside(
     beside: Beside,
     cell: &Cell,
     latency_ns: u64,
-    writer: &mut ClipWriter,
+    writer: &mut ClipWriter<Output>,
     exported: &mut Exported,
 ) -> Result<(), ExportError> {
     let stamp_ns = beside.stamp_ns;
@@ -110,7 +111,7 @@ struct Rows<'a> {
 }
 
 impl Rows<'_> {
-    fn put_until(&mut self, stamp_ns: u64, writer: &mut ClipWriter) -> Result<(), ExportError> {
+    fn put_until(&mut self, stamp_ns: u64, writer: &mut ClipWriter<Output>) -> Result<(), ExportError> {
         let clip = &self.source.clip;
         loop {
             let state = clip.measured.stamps_ns.get(self.state).copied();

@@ -9,12 +9,11 @@ use super::{ExportError, Exported};
 use crate::cell::Cell;
 use crate::frames::{Flange, Pose};
 use crate::msg::image::PixelEncoding;
+use crate::output::{Output, OutputError};
 use mcap::records::MessageHeader;
 use mcap::{Compression, WriteOptions};
 use std::collections::{BTreeMap, HashMap};
-use std::fs::File;
-use std::io::{self, BufWriter};
-use std::path::Path;
+use std::io::{self, BufWriter, Write as _};
 
 /// Topics that cell.toml does not name.
 pub(super) const EXTERNAL_TORQUES: &str = "/franka_robot_state_broadcaster/external_joint_torques";
@@ -30,11 +29,17 @@ const EVENTS: &str = "/events";
 const FLANGE: &str = "fr3_link8";
 
 /// Writes the bag.
-pub(super) fn write(source: &Source, cell: &Cell, target: &Path) -> Result<Exported, ExportError> {
-    let mut exported = Exported::of(source, target);
-    let failed = |error: mcap::McapError| ExportError::file(target)(io::Error::other(error.to_string()));
-    let file = File::create_new(target).map_err(ExportError::file(target))?;
-    let mut bag = Bag::create(file).map_err(failed)?;
+pub(super) fn write(source: &Source, cell: &Cell, output: Output) -> Result<Exported, ExportError> {
+    let target = output.path().to_owned();
+    let mut exported = Exported::of(source, &target);
+    let failed = |error: mcap::McapError| {
+        let error = match error {
+            mcap::McapError::Io(error) => error,
+            other => io::Error::other(other),
+        };
+        OutputError::of(&target, error)
+    };
+    let mut bag = Bag::create(output).map_err(failed)?;
     bag.mcap.write_metadata(&torques::record(source.clip.torques_end_at_rows)).map_err(failed)?;
     let mut rows = Rows::new(source, cell);
     for beside in source.beside()? {
@@ -44,7 +49,7 @@ pub(super) fn write(source: &Source, cell: &Cell, target: &Path) -> Result<Expor
         put_beside(&beside, source.unix_ns(beside.stamp_ns), &mut bag).map_err(failed)?;
     }
     rows.put_until(u64::MAX, &mut bag).map_err(failed)?;
-    bag.mcap.finish().map_err(failed)?;
+    bag.finish().map_err(failed)?.finish()?;
     Ok(exported)
 }
 
@@ -147,19 +152,27 @@ fn flange(m: &[f64; 16]) -> Option<Pose<crate::frames::Base, Flange>> {
 
 /// A bag that is being written.
 struct Bag {
-    mcap: mcap::Writer<BufWriter<File>>,
+    mcap: mcap::Writer<BufWriter<Output>>,
     /// Channel and next sequence number of each topic.
     channels: HashMap<String, (u16, u32)>,
 }
 
 impl Bag {
-    fn create(file: File) -> Result<Self, mcap::McapError> {
+    fn create(output: Output) -> Result<Self, mcap::McapError> {
         let options = WriteOptions::new()
             .profile("ros2")
             .library(concat!("twinalign ", env!("CARGO_PKG_VERSION")))
             .compression(Some(Compression::Zstd))
             .compression_threads(0);
-        Ok(Self { mcap: options.create(BufWriter::new(file))?, channels: HashMap::new() })
+        Ok(Self { mcap: options.create(BufWriter::new(output))?, channels: HashMap::new() })
+    }
+
+    /// Adds index and footer.
+    fn finish(mut self) -> Result<Output, mcap::McapError> {
+        self.mcap.finish()?;
+        let mut buffer = self.mcap.into_inner();
+        buffer.flush()?;
+        Ok(buffer.into_inner().map_err(io::IntoInnerError::into_error)?)
     }
 
     fn put(&mut self, topic: &str, kind: &str, unix_ns: u64, message: &[u8]) -> Result<(), mcap::McapError> {

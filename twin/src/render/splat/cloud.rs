@@ -5,6 +5,8 @@ use super::harmonics::turns;
 use super::{compressed, ply};
 use nalgebra::{Point3, Similarity3, UnitQuaternion, Vector3};
 use shared_mem::input::{self, InputError};
+use shared_mem::output::{self, Output, OutputError};
+use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
 /// One splat, without its colour.
@@ -41,14 +43,6 @@ pub enum SplatError {
     #[error("cannot list the splats in {}: {source}; give the path of a folder", path.display())]
     Folder {
         /// The folder.
-        path: PathBuf,
-        /// What the system said.
-        source: std::io::Error,
-    },
-    /// It cannot be written.
-    #[error("cannot write {}: {source}; give a place that can be written", path.display())]
-    Write {
-        /// The file.
         path: PathBuf,
         /// What the system said.
         source: std::io::Error,
@@ -142,12 +136,20 @@ impl SplatCloud {
         Self { splats: splats.collect(), degree: self.degree, harmonics }
     }
 
-    /// Writes a 3DGS PLY.
+    /// Writes the file `path` as a 3DGS PLY.
     ///
     /// # Errors
-    /// [`SplatError::Write`] where it cannot be written.
-    pub fn write(&self, path: &Path) -> Result<(), SplatError> {
-        std::fs::write(path, ply::write(self)).map_err(|source| SplatError::Write { path: path.to_owned(), source })
+    /// [`OutputError`] where it cannot be written.
+    pub fn write(&self, path: &Path) -> Result<(), OutputError> {
+        output::write(path, ply::write(self))
+    }
+
+    /// Writes a 3DGS PLY into an output, which the caller finishes.
+    ///
+    /// # Errors
+    /// As [`Self::write`].
+    pub fn write_to(&self, output: &mut Output) -> Result<(), OutputError> {
+        output.write_all(&ply::write(self)).map_err(|error| OutputError::of(output.path(), error))
     }
 
     fn check(&self) -> Result<(), String> {
