@@ -1,9 +1,11 @@
 //! The other programs of the project as child processes: found, started, watched, ended, and quoted when they fail.
 //!
 //! Each child runs in a process group of its own, so that Ctrl-C on the terminal reaches only this program, which then
-//! ends its children in an order that loses nothing. A child that is dropped is ended. Called by capture and demo.
+//! ends its children in an order that loses nothing. A child that is dropped is ended, and one whose starter is killed ends
+//! by itself ([`shared_mem::parent`]). Called by capture and demo.
 
 use rustix::process::{Pid, Signal, kill_process_group};
+use shared_mem::parent;
 use shared_mem::transport::DOMAIN_VARIABLE;
 use std::collections::VecDeque;
 use std::ffi::OsString;
@@ -127,7 +129,8 @@ impl Running {
     pub fn start(program: Program, arguments: &[OsString], domain: Option<&str>) -> Result<Self, ProcessError> {
         let path = program.find()?;
         let mut command = Command::new(&path);
-        command.args(arguments).stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
+        command.args(arguments).args([parent::FLAG, &std::process::id().to_string()]);
+        command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
         if let Some(domain) = domain {
             command.env(DOMAIN_VARIABLE, domain);
         }

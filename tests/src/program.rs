@@ -2,6 +2,7 @@
 
 use rustix::process::{Pid, Signal, kill_process};
 use serde_json::Value;
+use shared_mem::parent;
 use std::io::Read;
 use std::path::PathBuf;
 use std::process::{Child, Command, ExitStatus, Stdio};
@@ -44,14 +45,18 @@ pub struct Finished {
 }
 
 impl Program {
-    /// Starts a program in a domain of shared memory.
+    /// Starts a program in a domain of shared memory. One that would run on ends when this process is killed.
     ///
     /// # Panics
     /// When it cannot be started.
     #[must_use]
     pub fn start(name: &str, domain: &str, arguments: &[&str]) -> Self {
+        let runs_on = arguments.first().is_some_and(|verb| ["run", "serve", "record", "shadow"].contains(verb));
+        let own_id = std::process::id().to_string();
+        let parent: &[&str] = if runs_on { &[parent::FLAG, &own_id] } else { &[] };
         let mut child = Command::new(program_path(name))
             .args(arguments)
+            .args(parent)
             .env("TWINALIGN_DOMAIN", domain)
             .stdin(Stdio::null())
             .stdout(Stdio::piped())

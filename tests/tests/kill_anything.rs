@@ -3,6 +3,7 @@
 
 use rand::{RngExt, SeedableRng};
 use rustix::process::{Pid, Signal, kill_process};
+use shared_mem::msg::arm::ArmState;
 use shared_mem::recording;
 use std::path::Path;
 use std::time::Duration;
@@ -109,6 +110,58 @@ fn rounds(count: u32) {
         }
         eprintln!("round {round} after {moment:?}: survived");
     }
+}
+
+/// Processes that a program started, from whichever of its threads.
+fn children_of(pid: u32) -> Vec<u32> {
+    let threads = std::fs::read_dir(format!("/proc/{pid}/task")).into_iter().flatten().flatten();
+    let lists = threads.map(|thread| std::fs::read_to_string(thread.path().join("children")).unwrap_or_default());
+    lists.flat_map(|list| list.split_whitespace().filter_map(|p| p.parse().ok()).collect::<Vec<_>>()).collect()
+}
+
+fn is_alive(pid: u32) -> bool {
+    let stat = std::fs::read_to_string(format!("/proc/{pid}/stat")).unwrap_or_default();
+    !stat.is_empty() && !stat.contains(") Z")
+}
+
+/// Kills a capture that started its own bridge once `now` says so of its children and the arm's newest state. The children
+/// have to end; the last state that the bridge published.
+fn a_dead_capture(cell: &Cell, out: &str, now: impl Fn(&[u32], Option<&ArmState>) -> bool) -> Option<ArmState> {
+    let node = shared_mem::transport::Node::open_in(cell.domain(), "test").expect("shared memory");
+    let states = node.subscriber(shared_mem::topics::ARM_STATE).expect("a place to read");
+    let session = cell.text(out);
+    let arguments =
+        ["capture", "excitation", "--cell", "{cell}", "--clips", "1", "--realtime", "ignore", "--out", &session];
+    let mut capture = cell.start("calibration", &arguments);
+    let (mut children, mut newest) = (Vec::new(), None);
+    Cell::until("the moment to die", Duration::from_secs(60), || {
+        children = children_of(capture.pid());
+        newest = states.newest().expect("a state").or(newest);
+        now(&children, newest.as_ref())
+    });
+    capture.kill_without_warning();
+    Cell::until("the capture's children end", Duration::from_secs(20), || !children.iter().any(|pid| is_alive(*pid)));
+    states.newest().expect("a state").or(newest)
+}
+
+#[test]
+fn a_bridge_brakes_and_ends_when_the_capture_that_started_it_is_killed() {
+    let cell = Cell::shipped();
+    let _before_its_first_state = a_dead_capture(&cell, "born", |children, _| !children.is_empty());
+    let _standing = a_dead_capture(&cell, "standing", |_, state| state.is_some());
+    let fastest = |state: &ArmState| state.dq.iter().fold(0.0_f64, |fastest, dq| fastest.max(dq.abs()));
+    // Bridge and recorder, in the middle of a motion.
+    let moves = |children: &[u32], state: Option<&ArmState>| {
+        children.len() == 2 && state.is_some_and(|state| fastest(state) > 0.05)
+    };
+    let last = a_dead_capture(&cell, "moving", moves).expect("a state");
+    assert!(fastest(&last) < 0.01, "it ended at {} rad/s", fastest(&last));
+    // The recorder finished its file, and it holds how the arm came to rest.
+    let states = recording::read_arm_states(&cell.path("moving/clip_00.mcap")).expect("a clip");
+    assert!(states.iter().any(|state| fastest(state) > 0.05), "nothing moved");
+    assert!(states.last().is_some_and(|state| fastest(state) < 0.01), "the recording ends in motion");
+    let bytes = std::fs::read(cell.path("moving/clip_00.mcap")).expect("a clip");
+    assert!(bytes.ends_with(b"\x89MCAP0\r\n"), "the recording was not finished");
 }
 
 #[test]

@@ -57,8 +57,7 @@ impl Recorder {
     /// # Errors
     /// [`RecordError`] when the recorder cannot be started or opens no file.
     pub fn start(clip: &Path, cell: &Path, domain: Option<&str>, interrupt: &Interrupt) -> Result<Self, RecordError> {
-        let own_id = std::process::id().to_string();
-        let list = arguments([&"record", &"--json", &"--out", &clip, &"--cell", &cell, &"--parent", &own_id]);
+        let list = arguments([&"record", &"--json", &"--out", &clip, &"--cell", &cell]);
         let mut running = Running::start(Program::Bridge, &list, domain)?;
         let start = Instant::now();
         while !clip.exists() && !interrupt.asked() {

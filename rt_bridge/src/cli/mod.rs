@@ -11,7 +11,7 @@ mod run;
 mod serve;
 
 use clap::{Parser, Subcommand};
-use shared_mem::{console, usage};
+use shared_mem::{console, parent, usage};
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -82,11 +82,15 @@ pub fn main() -> ExitCode {
     }
 }
 
-/// A flag that Ctrl-C and `SIGTERM` set.
-fn stop_flag() -> anyhow::Result<Arc<AtomicBool>> {
+/// A flag that Ctrl-C and `SIGTERM` set, and the end of `parent`, where one started this program.
+fn stop_flag(parent: Option<u32>) -> anyhow::Result<Arc<AtomicBool>> {
     let stop = Arc::new(AtomicBool::new(false));
     let told = stop.clone();
     ctrlc::set_handler(move || told.store(true, Ordering::Relaxed))?;
+    if let Some(parent) = parent {
+        let told = stop.clone();
+        parent::when_gone(parent, move || told.store(true, Ordering::Relaxed))?;
+    }
     Ok(stop)
 }
 

@@ -41,7 +41,8 @@ pub(super) struct RecordArguments {
 
 impl RecordArguments {
     pub(super) fn execute(self) -> Result<()> {
-        let stop = stop_flag()?;
+        // The recorder itself looks after the parent: it stays a moment longer.
+        let stop = stop_flag(None)?;
         let info = ClipInfo {
             cell_toml: self.cell.as_deref().map(Cell::read).transpose()?.map(|cell| cell.to_toml()),
             configuration: self.configuration,

@@ -75,6 +75,9 @@ pub(super) struct RunArguments {
     /// Default: enforce with a robot, else ignore
     #[arg(long)]
     realtime: Option<Realtime>,
+    /// End, braking first, when this process is no longer our parent
+    #[arg(long, hide = true)]
+    parent: Option<u32>,
     /// Answer with one JSON object
     #[arg(long)]
     json: bool,
@@ -82,6 +85,8 @@ pub(super) struct RunArguments {
 
 impl RunArguments {
     pub(super) fn execute(self) -> Result<()> {
+        // First of all: whoever started us may be killed at any moment.
+        let stop = stop_flag(self.parent)?;
         let default = if matches!(self.arm, ArmChoice::Fci(_)) { Realtime::Enforce } else { Realtime::Ignore };
         let settings = Settings {
             cell: self.cell,
@@ -98,7 +103,7 @@ impl RunArguments {
             duration: self.duration,
             realtime: self.realtime.unwrap_or(default),
         };
-        let report = run(&settings, &stop_flag()?)?;
+        let report = run(&settings, &stop)?;
         if self.json {
             answer::json(&report)?;
         } else {

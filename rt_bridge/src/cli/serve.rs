@@ -56,6 +56,9 @@ pub(super) struct ServeArguments {
     /// Stop after this many seconds
     #[arg(long, value_name = "S", value_parser = seconds)]
     duration: Option<Duration>,
+    /// End when this process is no longer our parent
+    #[arg(long, hide = true)]
+    parent: Option<u32>,
     /// Answer with one JSON object
     #[arg(long)]
     json: bool,
@@ -72,7 +75,7 @@ impl ServeArguments {
         };
         let hidden = hidden::read(self.parameters.as_deref(), self.effects.as_deref())?;
         let server = Server::open(&cell, hidden.as_ref(), ports, pace)?;
-        let stop = stop_flag()?;
+        let stop = stop_flag(self.parent)?;
         let hand = server.hand_address().map_or(String::new(), |hand| format!(", its hand at {hand}"));
         tracing::info!("an FR3 (FCI version 10) listens at {}{hand}", server.address()?);
         for effect in hidden.iter().flat_map(hidden::on_the_way) {

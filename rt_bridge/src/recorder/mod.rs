@@ -8,19 +8,20 @@ mod sources;
 use disk::{Room, room};
 use serde::Serialize;
 use shared_mem::msg::event::{Event, EventLevel, EventSource};
+use shared_mem::parent;
 use shared_mem::recording::{ClipInfo, ClipWriter, WriteError, WriteSummary};
 use shared_mem::transport::{Node, Publisher, TransportError};
 use shared_mem::{time::now_ns, topics};
 use sources::Sources;
-use std::os::unix::process::parent_id;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 /// A killed recorder loses what came after its last flush.
 const FLUSH_EVERY_NS: u64 = 500_000_000;
-/// How long the recorder goes on after the bridge that started it has died, for what the others have to say [ns].
-const ORPHAN_PATIENCE_NS: u64 = 500_000_000;
+/// How long the recorder goes on after whoever started it has died, for what the others have to say: how the arm brakes,
+/// for one [ns].
+const ORPHAN_PATIENCE_NS: u64 = 1_500_000_000;
 
 /// What to record, and until when.
 #[derive(Debug, Clone, Default)]
@@ -168,7 +169,7 @@ fn over(settings: &Settings, begin_ns: u64, orphan_since: &mut Option<u64>) -> b
     if settings.duration.is_some_and(|d| u128::from(now - begin_ns) >= d.as_nanos()) {
         return true;
     }
-    if settings.parent.is_some_and(|parent| parent != parent_id()) {
+    if settings.parent.is_some_and(parent::is_gone) {
         return now - *orphan_since.get_or_insert(now) >= ORPHAN_PATIENCE_NS;
     }
     false

@@ -1,10 +1,11 @@
 //! A reader of both picture topics that checks every byte: one word fills a picture, so a torn one shows.
 //!
-//! Runs until killed, or for as many seconds as its only argument says; then prints one JSON object.
+//! Runs until killed or its parent is gone, or for as many seconds as its only argument says; then prints one JSON object.
 #![allow(clippy::print_stdout)] // its answer
 
-use shared_mem::topics;
 use shared_mem::transport::{ImageSubscriber, Node};
+use shared_mem::{parent, topics};
+use std::os::unix::process::parent_id;
 use std::time::{Duration, Instant};
 
 /// What one topic brought.
@@ -41,8 +42,8 @@ fn main() {
     let depth = node.image_subscriber(topics::CAMERA_DEPTH).expect("a place to read");
     let wake = node.wake_on(topics::CAMERA_DEPTH.name).expect("a bell");
     let (mut colors, mut depths) = (Tally::default(), Tally::default());
-    let start = Instant::now();
-    while start.elapsed().as_secs_f64() < seconds {
+    let (start, parent) = (Instant::now(), parent_id());
+    while !parent::is_gone(parent) && start.elapsed().as_secs_f64() < seconds {
         let _rung = wake.wait(Duration::from_millis(50)).expect("a bell");
         colors.drain(&color);
         depths.drain(&depth);

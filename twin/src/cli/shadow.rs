@@ -4,6 +4,7 @@ use super::look::Look;
 use anyhow::Context as _;
 use clap::Args;
 use shared_mem::cell::Cell;
+use shared_mem::parent;
 use shared_mem::theta::Theta;
 use shared_mem::{answer, console};
 use std::path::PathBuf;
@@ -40,6 +41,9 @@ pub(crate) struct Shadow {
     viewer: bool,
     #[command(flatten)]
     look: Look,
+    /// End when this process is no longer our parent
+    #[arg(long, hide = true)]
+    parent: Option<u32>,
     /// One JSON object with the figures on stdout at the end
     #[arg(long)]
     json: bool,
@@ -59,6 +63,10 @@ impl Shadow {
         let theta = self.parameters.as_deref().map(Theta::read).transpose()?;
         let mut shadow = Twin::new(&cell, theta.as_ref())?;
         let stop = Arc::new(AtomicBool::new(false));
+        if let Some(parent) = self.parent {
+            let stop = Arc::clone(&stop);
+            parent::when_gone(parent, move || stop.store(true, Ordering::Relaxed))?;
+        }
         let on_signal = Arc::clone(&stop);
         ctrlc::set_handler(move || on_signal.store(true, Ordering::Relaxed)).context("cannot listen for Ctrl-C")?;
         let viewer = self.viewer.then(|| viewer(&cell, &self.look, &stop)).transpose()?;
