@@ -56,6 +56,66 @@ fn a_truncated_clip_gives_all_but_its_end() {
     assert!(said.contains("truncated") || said.contains("cut"), "nobody said that the file is cut:\n{said}");
 }
 
+/// Names of temporary files in a folder of the cell.
+fn unfinished(cell: &Cell, folder: &str) -> Vec<String> {
+    let entries = std::fs::read_dir(cell.path(folder)).into_iter().flatten().flatten();
+    let names = entries.map(|entry| entry.file_name().to_string_lossy().into_owned());
+    names.filter(|name| name.starts_with(".unfinished-")).collect()
+}
+
+#[test]
+fn a_disk_without_room_leaves_the_outputs_of_before_and_is_told() {
+    let cell = Cell::shipped();
+    record(&cell, "clip.mcap", "2");
+    std::fs::create_dir(cell.path("frames")).expect("a folder");
+    std::fs::write(cell.path("frames/frame_00000.png"), "of before").expect("a picture of before");
+    // A limit to the size of files is met like the end of the disk, and needs no root.
+    let program = |name: &str| tests::program_path(name).display().to_string();
+    let limited = |line: &str| {
+        let line = format!("trap '' XFSZ; ulimit -f 8; exec {line}").replace("{dir}/", &cell.text(""));
+        let end = std::process::Command::new("sh").args(["-c", &line]).output().expect("a shell");
+        let said = String::from_utf8_lossy(&end.stderr).trim_end().lines().last().unwrap_or("").to_owned();
+        assert_eq!(end.status.code(), Some(1), "{line}: {said}");
+        said
+    };
+    let (twin, calibration) = (program("twin"), program("calibration"));
+    let said = limited(&format!("{twin} render {{dir}}/clip.mcap --every 10 --out {{dir}}/frames"));
+    assert!(said.contains("frame_00000.png") && said.contains("file of before is unchanged"), "{said}");
+    assert_eq!(std::fs::read(cell.path("frames/frame_00000.png")).expect("a picture"), b"of before");
+    let said = limited(&format!("{twin} replay {{dir}}/clip.mcap --out {{dir}}/twin.mcap"));
+    assert!(said.contains("twin.mcap") && said.contains("ulimit"), "{said}");
+    let said = limited(&format!("{calibration} export {{dir}}/clip.mcap --to ros2 --out {{dir}}/bags"));
+    assert!(said.contains("bags/clip.mcap") && said.contains("ulimit"), "{said}");
+    assert!(!cell.path("twin.mcap").exists() && !cell.path("bags").exists());
+    assert_eq!([unfinished(&cell, ""), unfinished(&cell, "frames")], [[""; 0]; 2]);
+}
+
+#[test]
+fn an_output_of_a_killed_program_is_not_there_and_the_next_run_clears_up() {
+    let cell = Cell::shipped();
+    record(&cell, "clip.mcap", "3");
+    let replay = ["replay", "{dir}/clip.mcap", "--out", "{dir}/twin.mcap"];
+    let killed_while_it_wrote = (0..20).any(|_| {
+        let _of_a_run_that_was_too_fast = std::fs::remove_file(cell.path("twin.mcap"));
+        let mut twin = cell.start("twin", &replay);
+        while twin.is_running() && unfinished(&cell, "").is_empty() {}
+        twin.kill_without_warning();
+        !unfinished(&cell, "").is_empty()
+    });
+    assert!(killed_while_it_wrote && !cell.path("twin.mcap").exists());
+    let _replayed = run(&cell, "twin", &replay).succeeded();
+    assert_eq!(unfinished(&cell, ""), [""; 0]);
+    // At Ctrl-C, pictures that are finished stay, and nothing else.
+    let twin = cell.start("twin", &["render", "{dir}/clip.mcap", "--out", "{dir}/frames"]);
+    Cell::until("a picture", Duration::from_secs(30), || cell.path("frames/frame_00001.png").exists());
+    let end = twin.interrupt();
+    assert!(end.complaint().contains("interrupted"), "{}", end.complaint());
+    assert_eq!(unfinished(&cell, "frames"), [""; 0]);
+    for picture in std::fs::read_dir(cell.path("frames")).expect("a folder") {
+        shared_mem::recording::read_picture(&picture.expect("an entry").path()).expect("a whole picture");
+    }
+}
+
 #[test]
 fn a_flipped_bit_is_noticed() {
     let cell = Cell::shipped();
@@ -217,6 +277,7 @@ fn a_full_disk_stops_the_recording_and_nothing_else() {
         "nobody said that the disk is full:\n{}",
         end.stderr
     );
+    assert_eq!(end.status.code(), Some(1), "a recording that ended early is a failure:\n{}", end.stderr);
     assert!(states.len() > 2000, "only {} states survived", states.len());
     assert!(end.json()["cycles"].as_u64() > Some(7000), "the bridge stopped with its recorder:\n{}", end.stderr);
 }

@@ -1,0 +1,201 @@
+//! The verbs that write, and what they need to be given.
+
+use std::path::Path;
+use std::time::Duration;
+use tests::{Program, lab_cell};
+
+/// Clips of the session that everything is made from: a diagnosis needs as many.
+const CLIPS: &str = "5";
+
+/// What a verb does where its outputs are there already.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Again {
+    /// It replaces them.
+    Replaces,
+    /// It refuses; they have to be removed.
+    WantsNewOutputs,
+    /// It refuses a folder in which anything is.
+    WantsNewFolder,
+    /// It goes on with them.
+    GoesOn,
+}
+
+/// A verb with arguments; `{out}` in them is the folder of its outputs.
+pub(crate) struct Verb {
+    pub(crate) name: &'static str,
+    pub(crate) program: &'static str,
+    pub(crate) arguments: Vec<String>,
+    /// Files, and folders that are sessions.
+    pub(crate) outputs: &'static [&'static str],
+    pub(crate) again: Again,
+    /// Earliest kill [share of its duration].
+    pub(crate) from: f64,
+    pub(crate) kills: u32,
+    pub(crate) full: u32,
+}
+
+impl Verb {
+    fn new(name: &'static str, program: &'static str, line: &str, outputs: &'static [&'static str]) -> Self {
+        let arguments = line.split_whitespace().map(str::to_owned).collect();
+        Self { name, program, arguments, outputs, again: Again::Replaces, from: 0.7, kills: 4, full: 2 }
+    }
+
+    /// A verb whose outputs have to be new.
+    fn anew(self) -> Self {
+        Self { again: Again::WantsNewOutputs, ..self }
+    }
+
+    fn times(self, kills: u32, full: u32) -> Self {
+        Self { kills, full, ..self }
+    }
+}
+
+/// Records the session that the verbs work on, and exports it once.
+pub(crate) fn material(inputs: &Path, domain: &str) {
+    std::fs::create_dir_all(inputs).expect("a folder");
+    std::fs::write(inputs.join("cell.toml"), lab_cell()).expect("cell.toml");
+    let at = |name: &str| inputs.join(name).display().to_string();
+    let run = |program: &str, line: &str| {
+        println!("{program} {line}");
+        let arguments: Vec<&str> = line.split_whitespace().collect();
+        let _done = Program::start(program, domain, &arguments).wait(Duration::from_secs(400)).succeeded();
+    };
+    let (cell, session) = (at("cell.toml"), at("session"));
+    let motion = format!("--clips {CLIPS} --duration 3 --realtime ignore");
+    run("calibration", &format!("capture excitation --cell {cell} --out {session} {motion}"));
+    run("calibration", &format!("export {session} --to ros2 --out {}", at("bags")));
+}
+
+/// Every verb that writes.
+pub(crate) fn verbs(inputs: &Path) -> Vec<Verb> {
+    let at = |name: &str| inputs.join(name).display().to_string();
+    let (cell, session, bags) = (at("cell.toml"), at("session"), at("bags"));
+    let mut verbs = vec![
+        Verb::new(
+            "replay",
+            "twin",
+            &format!("replay {session} --out {{out}}/twin"),
+            &["twin/clip_00.mcap", "twin/clip_01.mcap", "twin/clip_02.mcap", "twin/clip_03.mcap", "twin/clip_04.mcap"],
+        )
+        .anew()
+        .times(6, 2),
+        Verb::new("render", "twin", &format!("render {session} --every 40 --out {{out}}"), &["frame_00000.png"]).times(5, 2),
+        Verb::new("export-ros2", "calibration", &format!("export {session} --to ros2 --out {{out}}/new"), &["new"])
+            .anew()
+            .times(5, 2),
+        Verb::new("export-own", "calibration", &format!("export {bags} --to own --out {{out}}/new"), &["new"])
+            .anew()
+            .times(4, 2),
+        Verb::new(
+            "export-twinaligner",
+            "calibration",
+            &format!("export {session}/clip_00.mcap --to twinaligner --out {{out}}/new"),
+            &["new"],
+        )
+        .anew()
+        .times(4, 2),
+        Verb::new(
+            "identify-arm",
+            "calibration",
+            &format!("identify arm {session} --out {{out}}/theta.toml --report {{out}}/page.html"),
+            &["theta.toml", "page.html"],
+        )
+        .times(6, 2),
+        Verb::new(
+            "diagnose",
+            "calibration",
+            &format!("diagnose {session} --out {{out}}/diagnosis.json --report {{out}}/report.html"),
+            &["theta.toml", "diagnosis.json", "report.html"],
+        )
+        .times(4, 2),
+        Verb::new(
+            "viewpoint",
+            "calibration",
+            &format!("viewpoint {session} --frames 2 --out {{out}}/cell.toml --report {{out}}/outline.png"),
+            &["cell.toml", "outline.png"],
+        )
+        .times(4, 2),
+        Verb::new(
+            "preview",
+            "calibration",
+            &format!(
+                "capture control-hit-slide --cell {cell} --clips 1 --out {}/strokes --realtime ignore --preview {{out}}/next.svg",
+                inputs.display()
+            ),
+            &["next.svg"],
+        )
+        .times(3, 1),
+        Verb::new(
+            "benchmark",
+            "calibration",
+            &format!("benchmark --cell {cell} --null 1 --report {{out}}/benchmark.html"),
+            &["benchmark.html"],
+        )
+        .times(2, 1),
+        Verb {
+            again: Again::GoesOn,
+            from: 0.05,
+            ..Verb::new(
+                "capture",
+                "calibration",
+                &format!("capture excitation --cell {cell} --clips 1 --duration 2 --out {{out}}/session --realtime ignore"),
+                &["session"],
+            )
+            .times(5, 0)
+        },
+        Verb {
+            from: 0.4,
+            ..Verb::new(
+                "run-record",
+                "rt_bridge",
+                &format!("run --cell {cell} --arm sim --realtime ignore --duration 3 --record {{out}}/clip.mcap"),
+                &["clip.mcap"],
+            )
+            .anew()
+            .times(3, 0)
+        },
+        Verb {
+            again: Again::WantsNewFolder,
+            from: 0.2,
+            ..Verb::new(
+                "demo",
+                "calibration",
+                "demo --clips 4 --out {out}/demo",
+                &[
+                    "demo/cell.toml",
+                    "demo/hidden_theta.toml",
+                    "demo/hidden_effect.toml",
+                    "demo/theta.toml",
+                    "demo/diagnosis.html",
+                    "demo/report.html",
+                    "demo/twin_cell.mcap",
+                    "demo/twin_found.mcap",
+                ],
+            )
+            .times(2, 0)
+        },
+    ];
+    if let Ok(scan) = std::env::var("TWINALIGN_SCAN") {
+        let place = "--joints 0.2,-0.6,0.1,-2.2,0.1,1.7,0.6 --start 0,0,0,1,0,0,0,0.41";
+        verbs.push(
+            Verb::new(
+                "label-splats",
+                "twin",
+                &format!("label-splats {scan} --cell {cell} {place} --out {{out}}"),
+                &[
+                    "link0.ply",
+                    "link1.ply",
+                    "link2.ply",
+                    "link3.ply",
+                    "link4.ply",
+                    "link5.ply",
+                    "link6.ply",
+                    "link7.ply",
+                    "scene.ply",
+                ],
+            )
+            .times(4, 2),
+        );
+    }
+    verbs
+}
