@@ -1,6 +1,7 @@
 //! What an effect says about itself, and the list of all effects. The list is the single place that knows them all:
 //! theta.toml is read by it, the diagnosis takes its candidates from it, the documentation its table.
 
+use super::remedy::{Found, Remedy};
 use super::{Effects, arm, camera, hit, slide, values::Values};
 
 /// Part of a clip in which an effect shows first.
@@ -124,6 +125,8 @@ pub struct EffectInfo {
     pub confusable_with: &'static [&'static str],
     /// Adds the effect with these parameters.
     pub(super) install: fn(&Values, &mut Effects),
+    /// What to do about it; asked for by [`EffectInfo::remedy`].
+    pub(super) remedy: fn(&Found<'_>) -> Remedy,
 }
 
 impl Stage {

@@ -8,6 +8,7 @@
 
 use crate::arm::ArmModel;
 use crate::effects::registry::{EffectInfo, Parameter, Place, Stage};
+use crate::effects::remedy::{Remedy, gravity, leaning, list};
 use nalgebra::Vector3;
 
 pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
@@ -17,6 +18,20 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     parameters: &[Parameter::size("tilt", "rad", [-0.1, 0.1], 0.0).vector(2).within(-0.5, 0.5)],
     confusable_with: &["payload", "joint_friction_asymmetry", "torque_gain"],
     install: |values, effects| effects.arm.base_tilt = Some(BaseTilt { tilt: values.vector("tilt") }),
+    remedy: |found| {
+        let tilt = found.vector("tilt");
+        let gravity = list(&gravity(tilt));
+        Remedy::new(
+            format!(
+                "Level the robot's base {}, or tell its controller that gravity is {gravity} m/s^2 in the base frame.",
+                leaning(tilt)
+            ),
+            format!(
+                "Gravity {gravity} m/s^2 in the base frame (MuJoCo: <option gravity>), or the base turned by {} rad about x and y; the controller goes on to compensate an upright one.",
+                list(&tilt)
+            ),
+        )
+    },
 };
 
 #[derive(Debug, Clone, Copy, PartialEq)]

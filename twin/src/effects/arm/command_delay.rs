@@ -7,6 +7,7 @@
 //! - Confused with: command lag (in slow motion exactly), viscous friction, camera latency (where only the camera sees the arm).
 
 use crate::effects::registry::{EffectInfo, Parameter, Place, Stage};
+use crate::effects::remedy::{Remedy, milliseconds, short};
 
 pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     name: "command_delay",
@@ -15,6 +16,16 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     parameters: &[Parameter::size("delay", "s", [0.0, 0.1], 0.0).within(0.0, 2.0)],
     confusable_with: &["command_lag", "joint_viscous_friction", "camera_latency"],
     install: |values, effects| effects.arm.command_delay = Some(CommandDelay { delay: values.number("delay") }),
+    remedy: |found| {
+        let delay = found.number("delay");
+        let (time, steps) = (milliseconds(delay), short(1e3 * delay));
+        Remedy::new(
+            format!(
+                "Commands arrive {time} late: send them so much earlier, or shorten their way (a cable instead of a radio link, fewer buffers and processes between planner and robot)."
+            ),
+            format!("Hold commands back by {time}, {steps} steps of 1 ms, before the controller gets them."),
+        )
+    },
 };
 
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -8,6 +8,7 @@
 
 use crate::arm::Joints;
 use crate::effects::registry::{EffectInfo, Parameter, Place, Stage};
+use crate::effects::remedy::{Remedy, milliseconds, short};
 use crate::rollout::TICK;
 
 pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
@@ -20,6 +21,20 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
         let time_constant = values.number("time_constant");
         let share = -(-TICK / time_constant).exp_m1();
         effects.arm.command_lag = Some(CommandLag { time_constant, share });
+    },
+    remedy: |found| {
+        let constant = found.number("time_constant");
+        let (time, cutoff) = (milliseconds(constant), short((std::f64::consts::TAU * constant).recip()));
+        Remedy::new(
+            format!(
+                "Raise or switch off the low-pass in the command's way: it acts like one of {cutoff} Hz (time constant {time})."
+            ),
+            format!(
+                "A first-order low-pass of time constant {} s before the controller (MuJoCo: dyntype=\"filterexact\" dynprm=\"{}\" on the position actuators).",
+                short(constant),
+                short(constant)
+            ),
+        )
     },
 };
 

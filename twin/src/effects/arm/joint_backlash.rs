@@ -10,6 +10,7 @@
 
 use crate::arm::{Joints, Spring};
 use crate::effects::registry::{EffectInfo, Parameter, Place, Stage};
+use crate::effects::remedy::{Remedy, degrees, short};
 
 pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     name: "joint_backlash",
@@ -28,6 +29,16 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     install: |values, effects| {
         effects.arm.joint_backlash =
             Some(JointBacklash { play: values.joints("play"), compliance: values.joints("compliance") });
+    },
+    remedy: |found| {
+        let play = found.joints_by("play", &|play| format!("{} rad ({})", short(play), degrees(play)));
+        let half = found.joints_by("play", &|play| format!("-{} to {} rad", short(0.5 * play), short(0.5 * play)));
+        Remedy::new(
+            format!(
+                "Have the gears adjusted: play {play}. Until then approach every pose from the same side, or load the joint so that one flank stays pressed."
+            ),
+            format!("A second hinge between motor and link that turns freely from {half} and is stopped there."),
+        )
     },
 };
 

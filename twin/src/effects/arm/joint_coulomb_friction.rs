@@ -10,6 +10,7 @@
 
 use crate::arm::Joints;
 use crate::effects::registry::{EffectInfo, Parameter, Place, Search, Stage};
+use crate::effects::remedy::Remedy;
 
 pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     name: "joint_coulomb_friction",
@@ -20,6 +21,13 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     install: |values, effects| {
         effects.arm.joint_coulomb_friction =
             Some(JointCoulombFriction { coulomb: values.joints("coulomb"), creep: values.joints("creep") });
+    },
+    remedy: |found| {
+        let joints = found.joints("coulomb", "N m");
+        Remedy::new(
+            "Warm the gears up before recording and look after their grease; what is left belongs to the gears, so it goes into the model.",
+            format!("MuJoCo: joint frictionloss {joints}. URDF and SDF: the same numbers as <dynamics friction>."),
+        )
     },
 };
 

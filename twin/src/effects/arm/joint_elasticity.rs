@@ -10,6 +10,7 @@
 
 use crate::arm::{Joints, Spring};
 use crate::effects::registry::{EffectInfo, Parameter, Place, Stage};
+use crate::effects::remedy::Remedy;
 
 pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     name: "joint_elasticity",
@@ -23,6 +24,15 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     install: |values, effects| {
         effects.arm.joint_elasticity =
             Some(JointElasticity { stiffness: values.joints("stiffness"), damping: values.joints("damping") });
+    },
+    remedy: |found| {
+        let (stiffness, damping) = (found.joints("stiffness", "N m/rad"), found.joints("damping", "N m s/rad"));
+        Remedy::new(
+            "Measure the tool's place on the link's side (a camera sees the sag, the encoders do not), and keep accelerations low where it rings.",
+            format!(
+                "A second hinge between motor and link, its spring {stiffness}, its damper {damping}; the armature stays on the motor's side."
+            ),
+        )
     },
 };
 

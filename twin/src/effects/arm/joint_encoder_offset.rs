@@ -8,6 +8,7 @@
 
 use crate::arm::Joints;
 use crate::effects::registry::{EffectInfo, Parameter, Place, Stage};
+use crate::effects::remedy::{Remedy, degrees, short};
 
 pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     name: "joint_encoder_offset",
@@ -17,6 +18,13 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     confusable_with: &["camera_extrinsic_rotation", "camera_extrinsic_translation", "tool_offset", "joint_elasticity"],
     install: |values, effects| {
         effects.arm.joint_encoder_offset = Some(JointEncoderOffset { offset: values.joints("offset") });
+    },
+    remedy: |found| {
+        let reads = found.joints_by("offset", &|offset| format!("{} rad ({})", short(offset), degrees(offset)));
+        Remedy::new(
+            format!("Set the joints' zeros anew: take off the readings {reads}."),
+            format!("Add to the measured joint positions {reads}; the simulated joints themselves stay."),
+        )
     },
 };
 

@@ -11,6 +11,7 @@
 
 use crate::arm::Joints;
 use crate::effects::registry::{EffectInfo, Parameter, Place, Stage};
+use crate::effects::remedy::{Remedy, with_unit};
 
 pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     name: "joint_friction_asymmetry",
@@ -27,6 +28,13 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     install: |values, effects| {
         effects.arm.joint_friction_asymmetry =
             Some(JointFrictionAsymmetry { offset: values.joints("offset"), fading: values.number("fading") });
+    },
+    remedy: |found| {
+        let (offset, force) = (found.joints("offset", "N m"), found.joints_by("offset", &|tau| with_unit(-tau, "N m")));
+        Remedy::new(
+            format!("Add to the commanded torque {offset} as a feed-forward; look for a cable or hose that pulls."),
+            format!("MuJoCo: a constant joint force (qfrc_applied) of {force}. URDF has no word for it."),
+        )
     },
 };
 

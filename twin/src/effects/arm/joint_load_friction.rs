@@ -11,6 +11,7 @@
 use super::joint_coulomb_friction::CREEP;
 use crate::arm::Joints;
 use crate::effects::registry::{EffectInfo, Parameter, Place, Stage};
+use crate::effects::remedy::Remedy;
 
 pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     name: "joint_load_friction",
@@ -21,6 +22,15 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     install: |values, effects| {
         effects.arm.joint_load_friction =
             Some(JointLoadFriction { coefficient: values.joints("coefficient"), creep: values.joints("creep") });
+    },
+    remedy: |found| {
+        let joints = found.joints("coefficient", "1");
+        Remedy::new(
+            "Carry less or work nearer to the base, where the gears bear less torque; the rest belongs to the gears.",
+            format!(
+                "Set the joint friction anew each step to this share of the motor's torque: {joints} (MuJoCo: frictionloss; URDF has no word for it)."
+            ),
+        )
     },
 };
 

@@ -11,6 +11,7 @@
 use super::joint_coulomb_friction::CREEP;
 use crate::arm::Joints;
 use crate::effects::registry::{EffectInfo, Parameter, Place, Stage};
+use crate::effects::remedy::Remedy;
 
 pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     name: "joint_stribeck_friction",
@@ -33,6 +34,17 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
             velocity: values.joints("velocity"),
             creep: values.joints("creep"),
         });
+    },
+    remedy: |found| {
+        let (coulomb, excess) = (found.joints("coulomb", "N m"), found.joints("excess", "N m"));
+        let velocity = found.joints("velocity", "rad/s");
+        Remedy::new(
+            "Avoid creeping: move faster than three times the speeds named for the model, or warm the gears up before recording.",
+            format!(
+                "MuJoCo: joint frictionloss {coulomb}, and as a passive force what creep adds, \
+                 -excess exp(-(dq / v)^2) sgn(dq), with an excess of {excess} and v of {velocity}. URDF: <dynamics friction> holds the first part alone."
+            ),
+        )
     },
 };
 

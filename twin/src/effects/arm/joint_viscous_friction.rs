@@ -10,6 +10,7 @@
 
 use crate::arm::Joints;
 use crate::effects::registry::{EffectInfo, Parameter, Place, Stage};
+use crate::effects::remedy::Remedy;
 
 pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     name: "joint_viscous_friction",
@@ -19,6 +20,13 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     confusable_with: &["torque_delay", "command_delay"],
     install: |values, effects| {
         effects.arm.joint_viscous_friction = Some(JointViscousFriction { viscous: values.joints("viscous") });
+    },
+    remedy: |found| {
+        let joints = found.joints("viscous", "N m s/rad");
+        Remedy::new(
+            "Warm the gears up before recording: cold grease drags most; what is left belongs to the gears, so it goes into the model.",
+            format!("MuJoCo: add to the joint damping {joints}. URDF and SDF: the same numbers as <dynamics damping>."),
+        )
     },
 };
 

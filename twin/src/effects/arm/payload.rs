@@ -8,6 +8,7 @@
 
 use crate::arm::{ArmModel, MassProperties};
 use crate::effects::registry::{EffectInfo, Parameter, Place, Stage};
+use crate::effects::remedy::{Remedy, list, short};
 
 pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     name: "payload",
@@ -23,6 +24,23 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     confusable_with: &["torque_gain", "joint_friction_asymmetry", "base_tilt"],
     install: |values, effects| {
         effects.arm.payload = Some(Payload { mass: values.number("mass"), centre: values.vector("centre") });
+    },
+    remedy: |found| {
+        let (mass, centre) = (found.number("mass"), found.vector::<3>("centre"));
+        let tool = found.cell().tool.as_ref().map(|tool| tool.mass);
+        let total = tool.map_or_else(String::new, |tool| {
+            format!(", or set mass = {} under [tool] in cell.toml where the tool itself is heavier", short(tool + mass))
+        });
+        let (mass, centre) = (short(mass), list(&centre));
+        Remedy::new(
+            format!(
+                "Take off the {mass} kg at {centre} m of the flange frame, or set this load in the robot's own settings{total}."
+            ),
+            format!(
+                "MuJoCo: a body on the flange with <inertial mass=\"{mass}\" pos=\"{}\">. URDF: a link with this mass and origin on a fixed joint at the flange.",
+                centre.replace(['[', ']', ','], "")
+            ),
+        )
     },
 };
 

@@ -9,6 +9,7 @@
 
 use crate::arm::{ArmModel, Joints};
 use crate::effects::registry::{EffectInfo, Parameter, Place, Stage};
+use crate::effects::remedy::{Remedy, list};
 
 pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     name: "rotor_inertia",
@@ -17,6 +18,19 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     parameters: &[Parameter::size("extra", "kg m^2", [-0.1, 0.3], 0.0).per_joint().within(-0.2, f64::MAX)],
     confusable_with: &["payload", "joint_elasticity"],
     install: |values, effects| effects.arm.rotor_inertia = Some(RotorInertia { extra: values.joints("extra") }),
+    remedy: |found| {
+        let extra = found.all("extra");
+        let known =
+            found.cell().controller.as_ref().map(|controller| controller.rotor_inertia.clone()).unwrap_or_default();
+        let joints = found.joints("extra", "kg m^2");
+        let whole: Vec<f64> =
+            known.iter().enumerate().map(|(i, rotor)| rotor + extra.get(i).unwrap_or(&extra[0])).collect();
+        let set = if whole.is_empty() { format!("add {joints}") } else { format!("rotor_inertia = {}", list(&whole)) };
+        Remedy::new(
+            format!("In cell.toml under [controller]: {set}."),
+            format!("MuJoCo: add to the joint armature {joints}. URDF has no word for it."),
+        )
+    },
 };
 
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -7,6 +7,7 @@
 //! - Confused with: a lower damping, viscous friction (adds what this takes), joint elasticity (rings too).
 
 use crate::effects::registry::{EffectInfo, Parameter, Place, Stage};
+use crate::effects::remedy::{Remedy, milliseconds, short};
 
 pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     name: "torque_delay",
@@ -15,6 +16,17 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     parameters: &[Parameter::size("delay", "s", [0.0, 0.003], 0.0).within(0.0, 0.1)],
     confusable_with: &["joint_viscous_friction", "joint_elasticity"],
     install: |values, effects| effects.arm.torque_delay = Some(TorqueDelay { delay: values.number("delay") }),
+    remedy: |found| {
+        let delay = found.number("delay");
+        Remedy::new(
+            format!(
+                "Shorten the way from controller to drives by {}, or raise the damping of each joint by its stiffness times {} s, which is what the delay takes away.",
+                milliseconds(delay),
+                short(delay)
+            ),
+            format!("Hold torques back by {} between controller and joints.", milliseconds(delay)),
+        )
+    },
 };
 
 #[derive(Debug, Clone, Copy, PartialEq)]

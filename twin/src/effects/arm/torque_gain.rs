@@ -8,6 +8,7 @@
 
 use crate::arm::Joints;
 use crate::effects::registry::{EffectInfo, Parameter, Place, Stage};
+use crate::effects::remedy::{Remedy, short};
 
 pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     name: "torque_gain",
@@ -16,6 +17,14 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     parameters: &[Parameter::size("gain", "1", [0.8, 1.2], 1.0).per_joint().within(0.0, 10.0)],
     confusable_with: &["payload", "joint_load_friction"],
     install: |values, effects| effects.arm.torque_gain = Some(TorqueGain { gain: values.joints("gain") }),
+    remedy: |found| {
+        let gain = found.joints("gain", "1");
+        let inverse = found.joints_by("gain", &|gain| short(gain.recip()));
+        Remedy::new(
+            format!("Calibrate the torque constants, or multiply the torque that is asked for by {inverse}."),
+            format!("Multiply the torque of each actuator by {gain} (MuJoCo: gear)."),
+        )
+    },
 };
 
 #[derive(Debug, Clone, Copy, PartialEq)]

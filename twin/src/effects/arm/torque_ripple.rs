@@ -9,6 +9,7 @@
 
 use crate::arm::Joints;
 use crate::effects::registry::{EffectInfo, Parameter, Place, Search, Stage};
+use crate::effects::remedy::Remedy;
 use std::f64::consts::{FRAC_PI_2, PI};
 
 pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
@@ -34,6 +35,18 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
             order: values.joints("order"),
             phase: values.joints("phase"),
         });
+    },
+    remedy: |found| {
+        let (amplitude, order) = (found.joints("amplitude", "N m"), found.joints("order", "1"));
+        let phase = found.joints("phase", "rad");
+        Remedy::new(
+            format!(
+                "Feed forward A sin(order q + phase) with A of {amplitude}, an order of {order} and a phase of {phase}."
+            ),
+            format!(
+                "A passive joint force -A sin(order q + phase) with A of {amplitude}, an order of {order} and a phase of {phase}."
+            ),
+        )
     },
 };
 

@@ -8,6 +8,7 @@
 
 use crate::arm::Joints;
 use crate::effects::registry::{EffectInfo, Parameter, Place, Search, Stage};
+use crate::effects::remedy::Remedy;
 
 pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     name: "torque_saturation",
@@ -19,6 +20,15 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
         .searched(Search::Limit)],
     confusable_with: &["torque_gain", "command_delay"],
     install: |values, effects| effects.arm.torque_saturation = Some(TorqueSaturation { limit: values.joints("limit") }),
+    remedy: |found| {
+        let limit = found.joints("limit", "N m");
+        Remedy::new(
+            format!(
+                "Keep the torques below {limit} (slower or lighter), look why the drives give no more, and put the numbers into torque_limit under [controller] in cell.toml."
+            ),
+            format!("MuJoCo: forcerange of the actuators {limit} either way. URDF: <limit effort>."),
+        )
+    },
 };
 
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -8,6 +8,7 @@
 
 use crate::arm::Joints;
 use crate::effects::registry::{EffectInfo, Parameter, Place, Stage};
+use crate::effects::remedy::Remedy;
 
 pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     name: "torque_sensor_bias",
@@ -16,6 +17,13 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     parameters: &[Parameter::size("bias", "N m", [-2.0, 2.0], 0.0).per_joint()],
     confusable_with: &["joint_friction_asymmetry", "payload"],
     install: |values, effects| effects.arm.torque_sensor_bias = Some(TorqueSensorBias { bias: values.joints("bias") }),
+    remedy: |found| {
+        let bias = found.joints("bias", "N m");
+        Remedy::new(
+            format!("Zero the torque sensors with nothing pulling at them, or take off their readings {bias}."),
+            format!("Add to the measured torques {bias}; the motion stays as it is."),
+        )
+    },
 };
 
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -8,7 +8,8 @@
 //! - Confused with: table tilt (a yaw bends nothing), encoder offset, tool offset.
 
 use crate::effects::registry::{EffectInfo, Parameter, Place, Stage};
-use nalgebra::{Isometry3, UnitQuaternion, Vector3};
+use crate::effects::remedy::{Remedy, list, short};
+use nalgebra::{Isometry3, Rotation3, UnitQuaternion, Vector3};
 
 pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     name: "camera_extrinsic_rotation",
@@ -19,6 +20,33 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     install: |values, effects| {
         effects.camera.camera_extrinsic_rotation =
             Some(CameraExtrinsicRotation { rotation: values.vector("rotation") });
+    },
+    remedy: |found| {
+        let turn: [f64; 3] = found.vector("rotation");
+        let back = Rotation3::new(Vector3::from(turn)).inverse();
+        let pose = found.cell().camera.as_ref().and_then(|camera| camera.base_from_camera());
+        let set = pose.map_or_else(String::new, |pose| {
+            let pose = pose.isometry();
+            let place = back * pose.translation.vector;
+            let turned = UnitQuaternion::from_rotation_matrix(&back) * pose.rotation;
+            let wxyz = [turned.w, turned.i, turned.j, turned.k].map(|x| format!("{x:.6}"));
+            let place = [place.x, place.y, place.z].map(|x| format!("{x:.4}"));
+            format!(
+                "; in cell.toml under [camera]: pose = {{ position = [{}], orientation = [{}] }}",
+                place.join(", "),
+                wxyz.join(", ")
+            )
+        });
+        let words = turn.map(|angle| short(angle.to_degrees())).join(", ");
+        Remedy::new(
+            format!(
+                "Turn the camera's calibrated pose back by {words} degrees about the base's x, y, z axes, or calibrate it anew (`calibration viewpoint`){set}."
+            ),
+            format!(
+                "Nothing in the cell's model; a simulated camera reports poses turned by {} rad about the base's origin.",
+                list(&turn)
+            ),
+        )
     },
 };
 

@@ -7,6 +7,7 @@
 //! - Confused with: encoder offset, tool offset, a rotation seen over a small table.
 
 use crate::effects::registry::{EffectInfo, Parameter, Place, Stage};
+use crate::effects::remedy::{Remedy, list};
 use nalgebra::{Isometry3, Vector3};
 
 pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
@@ -18,6 +19,21 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     install: |values, effects| {
         effects.camera.camera_extrinsic_translation =
             Some(CameraExtrinsicTranslation { translation: values.vector("translation") });
+    },
+    remedy: |found| {
+        let shift: [f64; 3] = found.vector("translation");
+        let set = found.cell().camera.as_ref().map_or_else(String::new, |camera| {
+            let place: Vec<String> =
+                camera.pose.position.iter().zip(shift).map(|(x, shift)| format!("{:.4}", x - shift)).collect();
+            format!("; in cell.toml, in pose under [camera]: position = [{}]", place.join(", "))
+        });
+        Remedy::new(
+            format!(
+                "Take {} mm along x, y, z off the camera's calibrated place, or calibrate it anew (`calibration viewpoint`){set}.",
+                list(&shift.map(|x| 1e3 * x))
+            ),
+            format!("Nothing in the cell's model; a simulated camera reports poses shifted by {} m.", list(&shift)),
+        )
     },
 };
 

@@ -7,6 +7,7 @@
 //! - Confused with: command delay (moves the contact too), tracker smoothing.
 
 use crate::effects::registry::{EffectInfo, Parameter, Place, Stage};
+use crate::effects::remedy::{Remedy, milliseconds, short};
 
 pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     name: "camera_latency",
@@ -16,6 +17,18 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     confusable_with: &["command_delay", "tracker_smoothing"],
     install: |values, effects| {
         effects.camera.camera_latency = Some(CameraLatency { latency: values.number("latency") })
+    },
+    remedy: |found| {
+        let latency = found.number("latency");
+        let known = found.cell().camera.as_ref().map_or(0.0, |camera| camera.latency);
+        Remedy::new(
+            format!(
+                "In cell.toml under [camera]: latency = {} ({} s more than there is).",
+                short(known + latency),
+                short(latency)
+            ),
+            format!("Report poses {} later, or shift the recorded ones by so much.", milliseconds(latency)),
+        )
     },
 };
 

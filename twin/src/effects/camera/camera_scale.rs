@@ -9,6 +9,7 @@
 //! - Confused with: restitution and friction together, an extrinsic translation where the object hardly moves.
 
 use crate::effects::registry::{EffectInfo, Parameter, Place, Stage};
+use crate::effects::remedy::{Remedy, short};
 use nalgebra::{Isometry3, Vector3};
 
 pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
@@ -26,6 +27,17 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     install: |values, effects| {
         let centre: [f64; 3] = values.vector("centre");
         effects.camera.camera_scale = Some(CameraScale { scale: values.number("scale"), centre: centre.into() });
+    },
+    remedy: |found| {
+        let scale = found.number("scale");
+        let (words, factor) = (short(100.0 * scale.abs()), short(1.0 + scale));
+        let longer = if scale < 0.0 { "too short" } else { "too long" };
+        Remedy::new(
+            format!(
+                "Lengths come out {words} % {longer}: measure marker, depth unit and focal length again, or divide what the tracker reports by {factor}."
+            ),
+            format!("Nothing in the cell's model; a simulated camera reports lengths times {factor}."),
+        )
     },
 };
 

@@ -7,6 +7,7 @@
 //! - Confused with: camera latency (no rounding), command lag, contact compliance.
 
 use crate::effects::registry::{EffectInfo, Parameter, Place, Stage};
+use crate::effects::remedy::{Remedy, milliseconds};
 use nalgebra::Isometry3;
 
 pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
@@ -17,6 +18,15 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     confusable_with: &["camera_latency", "command_lag", "contact_compliance"],
     install: |values, effects| {
         effects.camera.tracker_smoothing = Some(TrackerSmoothing { time_constant: values.number("time_constant") });
+    },
+    remedy: |found| {
+        let time = milliseconds(found.number("time_constant"));
+        Remedy::new(
+            format!("Switch the tracker's smoothing off, or shorten its time constant of {time}."),
+            format!(
+                "Nothing in the cell's model; a simulated tracker reports poses through a first-order low-pass of time constant {time}."
+            ),
+        )
     },
 };
 

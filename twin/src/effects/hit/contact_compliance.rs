@@ -7,6 +7,7 @@
 //! - Confused with: restitution, tip friction, tracker smoothing (softens the corner at impact too).
 
 use crate::effects::registry::{EffectInfo, Parameter, Place, Stage};
+use crate::effects::remedy::{Remedy, short};
 use crate::physics::hit::ContactLaw;
 
 pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
@@ -17,6 +18,21 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     confusable_with: &["restitution", "tip_friction", "tracker_smoothing"],
     install: |values, effects| {
         effects.hit.contact_compliance = Some(ContactCompliance { compliance: values.number("compliance") });
+    },
+    remedy: |found| {
+        let compliance = found.number("compliance");
+        let stiffness =
+            if compliance > 0.0 { format!(", a spring of {} N/m", short(compliance.recip())) } else { String::new() };
+        Remedy::new(
+            format!(
+                "Tighten tip and tool and look for a soft cap: the contact yields by {} mm for 100 N more than it should.",
+                short(1e5 * compliance)
+            ),
+            format!(
+                "A softer contact of tip and object: {} m/N in series with what it has{stiffness} (MuJoCo: a longer time constant in solref; SDF: a lower <kp>).",
+                short(compliance)
+            ),
+        )
     },
 };
 

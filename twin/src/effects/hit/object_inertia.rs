@@ -7,6 +7,7 @@
 //! - Confused with: tool offset and tip friction (spin after the hit), pressure distribution (decay of spin).
 
 use crate::effects::registry::{EffectInfo, Parameter, Place, Stage};
+use crate::effects::remedy::{Remedy, short};
 
 pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     name: "object_inertia",
@@ -15,6 +16,15 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     parameters: &[Parameter::size("factor", "1", [0.4, 2.0], 1.0).within(0.01, 100.0)],
     confusable_with: &["tool_offset", "tip_friction", "pressure_distribution"],
     install: |values, effects| effects.hit.object_inertia = Some(ObjectInertia { factor: values.number("factor") }),
+    remedy: |found| {
+        let factor = short(found.number("factor"));
+        Remedy::new(
+            format!(
+                "Nothing is broken: the object's mass lies otherwise than in a solid body, its inertia about the vertical is {factor} times that. Fix loose contents."
+            ),
+            format!("Multiply the object's inertia about its z axis (izz) by {factor}."),
+        )
+    },
 };
 
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -7,6 +7,7 @@
 //! - Confused with: the object's mass and inertia, contact compliance (depends on speed and gains), tip friction.
 
 use crate::effects::registry::{EffectInfo, Parameter, Place, Stage};
+use crate::effects::remedy::{Remedy, short};
 use crate::physics::hit::{ContactLaw, RESTITUTION};
 
 pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
@@ -17,6 +18,22 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     confusable_with: &["object_inertia", "contact_compliance", "tip_friction"],
     install: |values, effects| {
         effects.hit.restitution = Some(Restitution { restitution: values.number("restitution") });
+    },
+    remedy: |found| {
+        let e: f64 = found.number("restitution");
+        let log = e.max(1e-6).ln();
+        let ratio = -log / (std::f64::consts::PI.powi(2) + log * log).sqrt();
+        Remedy::new(
+            format!(
+                "Nothing is broken: tip and object part with {} of the speed at which they meet. A softer or harder tip changes it.",
+                short(e)
+            ),
+            format!(
+                "Restitution {} of tip and object (SDF: <restitution_coefficient>; MuJoCo: a contact damping ratio of about {} in solref).",
+                short(e),
+                short(ratio)
+            ),
+        )
     },
 };
 

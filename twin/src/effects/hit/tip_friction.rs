@@ -7,6 +7,7 @@
 //! - Confused with: tool offset (turns off-centre hits), restitution.
 
 use crate::effects::registry::{EffectInfo, Parameter, Place, Stage};
+use crate::effects::remedy::{Remedy, short};
 use crate::physics::hit::ContactLaw;
 
 pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
@@ -16,6 +17,14 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     parameters: &[Parameter::size("change", "1", [-0.3, 0.3], 0.0).within(-10.0, 10.0)],
     confusable_with: &["tool_offset", "restitution", "object_inertia"],
     install: |values, effects| effects.hit.tip_friction = Some(TipFriction { change: values.number("change") }),
+    remedy: |found| {
+        let change = found.number("change");
+        let (verb, size) = (if change < 0.0 { "lower" } else { "raise" }, short(change.abs()));
+        Remedy::new(
+            format!("Clean or renew the tip; otherwise {verb} tip_friction under [object] in theta.toml by {size}."),
+            format!("{} the friction between tip and object by {size}.", if change < 0.0 { "Lower" } else { "Raise" }),
+        )
+    },
 };
 
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -10,6 +10,7 @@
 
 use crate::arm::ArmModel;
 use crate::effects::registry::{EffectInfo, Parameter, Place, Search, Stage};
+use crate::effects::remedy::{Remedy, list, short};
 use nalgebra::{Translation3, Vector3};
 
 pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
@@ -28,6 +29,20 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
         let effect = ToolOffset { offset: values.vector("offset"), carried: values.number("carried") };
         effects.hit.tool_offset = Some(effect);
         effects.arm.tool_offset = effect.moves_mass().then_some(effect);
+    },
+    remedy: |found| {
+        let offset: [f64; 3] = found.vector("offset");
+        let length = found.cell().tool.as_ref().map(|tool| tool.length);
+        let set = length.map_or_else(String::new, |length| {
+            format!(" (along z it is enough to set length = {} under [tool] in cell.toml)", short(length + offset[2]))
+        });
+        let place = list(&offset.map(|x| 1e3 * x));
+        Remedy::new(
+            format!(
+                "Mount the tool anew, or measure its tip: it sits {place} mm along x, y, z of the flange frame beside where cell.toml has it{set}."
+            ),
+            format!("Move the tool by {} m in the flange frame.", list(&offset)),
+        )
     },
 };
 

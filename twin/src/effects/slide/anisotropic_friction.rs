@@ -11,6 +11,7 @@
 //! - Confused with: table tilt (repeats once), friction patch (follows the place).
 
 use crate::effects::registry::{EffectInfo, Parameter, Place, Search, Stage};
+use crate::effects::remedy::{Remedy, degrees, short};
 use nalgebra::Vector2;
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4};
 
@@ -30,6 +31,21 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     install: |values, effects| {
         let (size, axis, drift) = (values.number("size"), values.number("axis"), values.number("drift"));
         effects.slide.anisotropic_friction = Some(AnisotropicFriction { size, axis: [axis.cos(), axis.sin()], drift });
+    },
+    remedy: |found| {
+        let (size, axis) = (found.number("size"), found.number("axis"));
+        let rough = if size < 0.0 { axis + FRAC_PI_2 } else { axis };
+        let [along, across] = [1.0 + size.abs(), 1.0 - size.abs()].map(short);
+        Remedy::new(
+            format!(
+                "The table is roughest along {} from the base's x axis (a grain, a weave, wear in one direction): lay a sheet without grain, or turn the top so that it no longer matters.",
+                degrees(rough)
+            ),
+            format!(
+                "Friction {along} times the mean along {} from x and {across} times across it (MuJoCo: a contact pair with two sliding coefficients).",
+                degrees(rough)
+            ),
+        )
     },
 };
 

@@ -8,6 +8,7 @@
 //! - Confused with: anisotropic friction and table tilt, where all slides go the same way.
 
 use crate::effects::registry::{EffectInfo, Parameter, Place, Stage};
+use crate::effects::remedy::{Remedy, degrees, short};
 use nalgebra::Vector2;
 use std::f64::consts::PI;
 
@@ -30,6 +31,26 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
             distance: values.number("distance"),
             radius: values.number("radius"),
         });
+    },
+    remedy: |found| {
+        let (factor, direction) = (found.number("factor"), found.number("direction"));
+        let (distance, radius) = (found.number("distance"), found.number("radius"));
+        let place = if radius.is_finite() {
+            let middle = distance + radius;
+            format!(
+                "within {} m of x {} m, y {} m",
+                short(radius),
+                short(middle * direction.cos()),
+                short(middle * direction.sin())
+            )
+        } else {
+            format!("beyond the line {} m from the base towards {}", short(distance), degrees(direction))
+        };
+        let kind = if factor > 1.0 { "rougher" } else { "smoother" };
+        Remedy::new(
+            format!("The table is {kind} {place}: clean or cover it there, or keep the object away."),
+            format!("Friction times {} {place}.", short(factor)),
+        )
     },
 };
 

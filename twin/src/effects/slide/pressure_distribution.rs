@@ -9,6 +9,7 @@
 //! - Confused with: object inertia (spin too, but at the hit already), the object's friction.
 
 use crate::effects::registry::{EffectInfo, Parameter, Place, Search, Stage};
+use crate::effects::remedy::{Remedy, short};
 
 pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     name: "pressure_distribution",
@@ -26,6 +27,20 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     install: |values, effects| {
         let (reach, pivot) = (values.number("reach"), values.number("pivot"));
         effects.slide.pressure_distribution = Some(PressureDistribution { reach, pivot });
+    },
+    remedy: |found| {
+        let (reach, pivot) = (found.number("reach"), found.number("pivot"));
+        Remedy::new(
+            format!(
+                "Set support under [object] in cell.toml to what carries the object (corners, uniform, ring), or give it feet: it presses at {} times the distance from its middle.",
+                short(reach)
+            ),
+            format!(
+                "Let the object stand on feet at {} times the distance of its corners; it tips about {} times.",
+                short(reach),
+                short(pivot)
+            ),
+        )
     },
 };
 

@@ -7,6 +7,7 @@
 //! - Confused with: the object's friction, tracker smoothing (rounds the stop), velocity-dependent friction.
 
 use crate::effects::registry::{EffectInfo, Parameter, Place, Stage};
+use crate::effects::remedy::{Remedy, short};
 
 pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     name: "stribeck_sliding_friction",
@@ -24,6 +25,13 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     install: |values, effects| {
         effects.slide.stribeck_sliding_friction =
             Some(StribeckSlidingFriction { excess: values.number("excess"), velocity: values.number("velocity") });
+    },
+    remedy: |found| {
+        let (excess, velocity) = (found.number("excess"), found.number("velocity"));
+        Remedy::new(
+            "Clean table and object: a film or soft soles hold what is slow. What stays belongs to the materials.",
+            format!("Friction mu + {} exp(-(v / {} m/s)^2) instead of mu.", short(excess), short(velocity)),
+        )
     },
 };
 

@@ -7,6 +7,7 @@
 //! - Confused with: a yaw of the camera, anisotropic friction (repeats after half a turn), friction patch.
 
 use crate::effects::registry::{EffectInfo, Parameter, Place, Stage};
+use crate::effects::remedy::{Remedy, gravity, leaning, list};
 use nalgebra::{Rotation3, Vector3};
 
 pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
@@ -16,6 +17,17 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     parameters: &[Parameter::size("tilt", "rad", [-0.1, 0.1], 0.0).vector(2).within(-1.5, 1.5)],
     confusable_with: &["camera_extrinsic_rotation", "anisotropic_friction", "friction_patch"],
     install: |values, effects| effects.slide.table_tilt = Some(TableTilt { tilt: values.vector("tilt") }),
+    remedy: |found| {
+        let tilt = found.vector("tilt");
+        Remedy::new(
+            format!("Level the table {}.", leaning(tilt)),
+            format!(
+                "Turn the table by {} rad about the base's x and y axes, or let gravity be {} m/s^2 for the object.",
+                list(&tilt),
+                list(&gravity(tilt))
+            ),
+        )
+    },
 };
 
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -7,6 +7,7 @@
 //! - Confused with: viscous sliding drag (the same for one mass), Stribeck friction, camera distortion.
 
 use crate::effects::registry::{EffectInfo, Parameter, Place, Stage};
+use crate::effects::remedy::{Remedy, short};
 
 pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     name: "velocity_dependent_friction",
@@ -16,6 +17,13 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     confusable_with: &["viscous_sliding_drag", "stribeck_sliding_friction"],
     install: |values, effects| {
         effects.slide.velocity_dependent_friction = Some(VelocityDependentFriction { slope: values.number("slope") });
+    },
+    remedy: |found| {
+        let slope = found.number("slope");
+        Remedy::new(
+            "Nothing is broken: the pair of materials does this. A dry, hard sole on a dry, hard table does it least.",
+            format!("Friction mu + v {} s/m, never below 0, instead of mu.", short(slope)),
+        )
     },
 };
 

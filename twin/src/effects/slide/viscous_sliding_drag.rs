@@ -8,6 +8,7 @@
 //! - Confused with: velocity-dependent friction (the same for one mass).
 
 use crate::effects::registry::{EffectInfo, Parameter, Place, Stage};
+use crate::effects::remedy::{Remedy, with_unit};
 
 pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     name: "viscous_sliding_drag",
@@ -17,6 +18,15 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     confusable_with: &["velocity_dependent_friction", "stribeck_sliding_friction"],
     install: |values, effects| {
         effects.slide.viscous_sliding_drag = Some(ViscousSlidingDrag { drag: values.number("drag") });
+    },
+    remedy: |found| {
+        let drag = with_unit(found.number("drag"), "N s/m");
+        Remedy::new(
+            format!("Dry and degrease table and object: a film drags with {drag}."),
+            format!(
+                "A force of -{drag} times its velocity on the object while it lies on the table (MuJoCo: damping of its sliding joints)."
+            ),
+        )
     },
 };
 
