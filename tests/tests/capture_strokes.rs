@@ -37,4 +37,16 @@ fn strokes_are_captured_kept_and_replayed_by_the_twin() {
         replayed["clips"].as_array().expect("clips").iter().filter_map(|clip| clip["object_add_m"].as_f64()).collect();
     assert_eq!(add.len(), 2, "{replayed}");
     assert!(add.iter().all(|add| *add < 0.01), "the twin of the same cell strays: {replayed}");
+    // The same stroke again, in the same place: the simulated cell is started anew with the object there.
+    let mut again = strokes[..4].to_vec();
+    again.extend(strokes[6..10].iter().chain(&["--repeat", "0", "--speed", "0.8", "--json"]));
+    let answer = cell.start("calibration", &again).wait(Duration::from_secs(120)).succeeded().json();
+    let clip = &answer["clips"][0];
+    assert_eq!(
+        (clip["kept"].as_bool(), clip["motion"].as_str()),
+        (Some(true), Some("clip 0 again at 0.8 times the speed"))
+    );
+    let before = kept.iter().find(|clip| clip["file"] == "clip_00.mcap").expect("the first stroke");
+    let share = clip["speed"].as_f64().expect("a speed") / before["speed"].as_f64().expect("a speed");
+    assert!((share - 0.8).abs() < 0.01 && clip["moved"].as_f64() > Some(0.01), "{answer}");
 }

@@ -7,6 +7,7 @@ use crate::capture::body::Body;
 use crate::capture::limits;
 use crate::capture::plan::{self, Request};
 use crate::capture::program::{Program, SPEEDS, Standing, Wish};
+use crate::capture::shape;
 use crate::capture::stroke;
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use rand::{RngExt, SeedableRng};
@@ -94,6 +95,8 @@ impl Studio<'_> {
     fn excitation(&self, index: usize) -> Result<Vec<SetPoint>, SessionError> {
         let request = Request {
             start: *self.body.model().ready(),
+            kind: shape::Kind::Multisine,
+            moving: [true; MAX_JOINTS],
             amplitude: 0.35,
             duration: EXCITATION,
             seed: self.world.number.wrapping_mul(1000) + 500 + index as u64,

@@ -65,12 +65,29 @@ impl Bridge {
         }
         let arm = wanted.arm.unwrap_or(DEFAULT_ARM);
         console::line(format_args!("no bridge is running: starting `rt_bridge run --arm {arm}` for this capture"));
-        let mut list = arguments([&"run", &"--cell", &wanted.cell, &"--arm", &arm]);
-        list.extend(wanted.realtime.into_iter().flat_map(|way| arguments([&"--realtime", &way])));
-        let started = Running::start(Program::Bridge, &list, wanted.domain)?;
-        let mut bridge = Self { started: Some(started) };
+        let mut bridge = Self { started: Some(Self::start(wanted)?) };
         bridge.wait_until_alive(link, interrupt)?;
         Ok(bridge)
+    }
+
+    fn start(wanted: &Wanted) -> Result<Running, ProcessError> {
+        let arm = wanted.arm.unwrap_or(DEFAULT_ARM);
+        let mut list = arguments([&"run", &"--cell", &wanted.cell, &"--arm", &arm]);
+        list.extend(wanted.realtime.into_iter().flat_map(|way| arguments([&"--realtime", &way])));
+        Running::start(Program::Bridge, &list, wanted.domain)
+    }
+
+    /// Ends the bridge that was started here and starts another one as `wanted`.
+    ///
+    /// # Errors
+    /// [`BridgeError`] with the remedy.
+    pub fn start_anew(&mut self, link: &mut Link, wanted: &Wanted, interrupt: &Interrupt) -> Result<(), BridgeError> {
+        if let Some(bridge) = self.started.take() {
+            bridge.stop()?;
+        }
+        link.forget()?;
+        self.started = Some(Self::start(wanted)?);
+        self.wait_until_alive(link, interrupt)
     }
 
     /// Waits for the first arm state of a bridge that was started.

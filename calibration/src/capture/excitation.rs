@@ -3,11 +3,14 @@
 use super::body::Body;
 use super::limits::{self, first_excess};
 use super::link::Link;
-use super::plan::{Plan, RATE, Request, plan};
+use super::pace;
+use super::plan::{self, Plan, RATE, Request, plan};
 use super::quality::{Quality, Verdict, Watch};
+use super::recorded;
 use super::recorder::{Recorded, Recorder};
 use super::recovery::Recovery;
 use super::session::Session;
+use super::shape::Kind;
 use super::stream::{Motion, Outcome, play};
 use super::task::{Summary, Task, cause};
 use super::transit;
@@ -15,8 +18,8 @@ use crate::interrupt::Interrupt;
 use serde::Serialize;
 use shared_mem::cell::{Cell, ClipKind};
 use shared_mem::console;
-use shared_mem::msg::Joints;
 use shared_mem::msg::motion::SetPoint;
+use shared_mem::msg::{Joints, MAX_JOINTS};
 use shared_mem::progress::Progress;
 use std::path::{Path, PathBuf};
 use twin::arm::JointLimits;
@@ -31,7 +34,11 @@ const BACK_PACE: f64 = 0.3;
 pub struct Options {
     /// What every capture is asked for.
     pub task: Task,
-    /// Length of a clip's motion [s].
+    /// What kind of motion.
+    pub kind: Kind,
+    /// Joints that move, from 0; empty: all.
+    pub joints: Vec<usize>,
+    /// Length of a clip's motion before its speed is changed [s].
     pub duration: f64,
     /// Largest excursion of each joint [rad].
     pub amplitude: f64,
@@ -44,6 +51,8 @@ pub struct Options {
 pub struct ClipSummary {
     /// File, relative to the session.
     pub file: PathBuf,
+    /// What was played, in words.
+    pub motion: String,
     /// `true`: entered into cell.toml. A clip that is not stays on disk.
     pub kept: bool,
     /// Why not.
@@ -76,10 +85,14 @@ pub fn capture(
     let cell = Cell::read(&task.cell)?;
     let body = Body::of(&cell)?;
     let session = Session::open(&task.out, &cell)?;
+    let moving = moving(&options.joints, body.model().dof())?;
+    // Before a bridge is started: a clip that cannot be repeated is said at once.
+    let repeats = task.repeat.iter().map(|number| recorded::read(&task.out, *number, ClipKind::Excitation, &body));
+    let repeats = repeats.collect::<Result<Vec<_>, _>>()?;
     let mut link = Link::open(task.domain.as_deref())?;
     let mut bridge = task.bridge(&mut link, interrupt)?;
     let (limits, floor, recovery) = (limits::of(&cell, &body), floor(&cell), Recovery::new(options.task.recover));
-    let mut desk = Desk { options, limits, body, floor, session, interrupt, recovery };
+    let mut desk = Desk { options, moving, repeats, limits, body, floor, session, interrupt, recovery };
     let mut clips = Vec::new();
     loop {
         interrupt.wait_out_pause();
@@ -87,7 +100,7 @@ pub fn capture(
         if interrupt.asked() || count > task.clips as usize {
             break;
         }
-        let clip = match desk.clip(&mut link, &format!("clip {count} of {}", task.clips), note) {
+        let clip = match desk.clip(&mut link, count - 1, note) {
             Ok(clip) => clip,
             Err(error) => return Err(cause(error, &mut bridge)),
         };
@@ -97,6 +110,14 @@ pub fn capture(
     bridge.stop()?;
     let session = desk.session.folder().to_owned();
     Ok(Summary { session, clips, interrupted: interrupt.asked(), own_bridge })
+}
+
+/// Which joints move.
+fn moving(joints: &[usize], dof: usize) -> anyhow::Result<[bool; MAX_JOINTS]> {
+    if let Some(joint) = joints.iter().find(|joint| **joint >= dof) {
+        anyhow::bail!("the arm has joints 1 to {dof}, not {}; give others with --joints", joint + 1);
+    }
+    Ok(std::array::from_fn(|joint| joint < dof && (joints.is_empty() || joints.contains(&joint))))
 }
 
 /// Lowest height for flange and tool: above the table, and above the object that may stand on it [m].
@@ -109,6 +130,8 @@ fn floor(cell: &Cell) -> f64 {
 /// Everything that stays the same from clip to clip.
 struct Desk<'a> {
     options: &'a Options,
+    moving: [bool; MAX_JOINTS],
+    repeats: Vec<recorded::Repeated>,
     limits: Vec<JointLimits>,
     body: Body,
     floor: f64,
@@ -118,15 +141,26 @@ struct Desk<'a> {
 }
 
 impl Desk<'_> {
-    /// One clip. `None`: interrupted before anything was recorded.
+    /// This run's clip number `count`, from 0. `None`: interrupted before anything was recorded.
     fn clip(
         &mut self,
         link: &mut Link,
-        title: &str,
+        count: usize,
         note: &mut dyn FnMut() -> String,
     ) -> anyhow::Result<Option<ClipSummary>> {
         let (number, file) = self.session.next_clip()?;
-        let plan = self.plan(link, number)?;
+        let title = &format!("clip {} of {}", count + 1, self.options.task.clips);
+        let plan = match self.options.task.repeated(count) {
+            None => self.plan(link, number)?,
+            Some(_) => {
+                let plan = self.again(count)?;
+                if !self.go_to_begin(link, &plan)? {
+                    return Ok(None);
+                }
+                plan
+            }
+        };
+        let motion = self.words(count);
         let path = self.session.folder().join(&file);
         let task = &self.options.task;
         let recorder = Recorder::start(&path, &task.cell, task.domain.as_deref(), self.interrupt)?;
@@ -134,6 +168,7 @@ impl Desk<'_> {
             recorder.finish()?;
             return Ok(None);
         }
+        link.announce(&format!("{}: {motion}", file.display()))?;
         let (outcome, quality) =
             self.play(link, &plan, title, note).inspect_err(|_| console::line(kept_unfinished(&path)))?;
         let recorded = recorder.finish()?;
@@ -150,7 +185,7 @@ impl Desk<'_> {
         }
         let [paused, reflex] = [outcome == Outcome::Paused, outcome == Outcome::Reflex];
         let begin = plan.set_points[0].q_d;
-        let clip = ClipSummary { paused, reflex, ..summary(file, why, plan, quality, &recorded) };
+        let clip = ClipSummary { motion, paused, reflex, ..summary(file, why, plan, quality, &recorded) };
         console::line(clip.line());
         if self.recovery.settle(link, self.interrupt)? {
             self.go_back(link, &begin)?;
@@ -158,38 +193,93 @@ impl Desk<'_> {
         Ok(Some(clip))
     }
 
+    /// What is played, in words.
+    fn words(&self, count: usize) -> String {
+        let Options { task, kind, joints, .. } = self.options;
+        let pace = task.pace();
+        if let Some(number) = task.repeated(count) {
+            return format!("clip {number} again{pace}");
+        }
+        let numbers: Vec<String> = joints.iter().map(|joint| (joint + 1).to_string()).collect();
+        let of = if numbers.is_empty() { String::new() } else { format!(" of joints {}", numbers.join(", ")) };
+        format!("{kind}{of}{pace}")
+    }
+
     /// After a reflex: calmly back to where the clip began. Where no way is free, the next clip begins here.
     fn go_back(&mut self, link: &mut Link, begin: &Joints) -> anyhow::Result<()> {
-        let from = link.ready_state()?.q_d;
-        let way = transit::plan(&from, begin, &self.limits, BACK_PACE).filter(|way| {
-            let is_low = |point: &SetPoint| self.body.lowest_point(&point.q_d) < self.floor;
-            first_excess(way, &self.limits, Some(&self.body)).is_none() && !way.iter().any(is_low)
-        });
-        let Some(set_points) = way else {
+        let Some(set_points) = self.way(&link.ready_state()?.q_d, begin, BACK_PACE) else {
             console::line("no free way back to where the clip began: the next one begins here");
             return Ok(());
         };
-        let motion = Motion { set_points: &set_points, dof: self.limits.len() };
-        let outcome = play(link, motion, self.interrupt, |_| {})?;
-        self.recovery.note(outcome, link)?;
+        self.travel(link, &set_points)?;
         self.recovery.settle(link, self.interrupt)?;
         Ok(())
+    }
+
+    /// Calmly to where a clip that is repeated begins. `false`: ended, paused or stopped by the robot on the way.
+    fn go_to_begin(&mut self, link: &mut Link, plan: &Plan) -> anyhow::Result<bool> {
+        let (from, begin) = (link.ready_arm(self.limits.len())?.q_d, plan.set_points[0].q_d);
+        if from == begin {
+            return Ok(true);
+        }
+        let Some(set_points) = self.way(&from, &begin, 1.0) else {
+            anyhow::bail!(
+                "no free way from where the arm stands to where the clip begins; move it near there, then start again"
+            );
+        };
+        let outcome = self.travel(link, &set_points)?;
+        self.recovery.settle(link, self.interrupt)?;
+        Ok(outcome == Outcome::Done)
+    }
+
+    /// From rest to rest, above the floor and inside every limit.
+    fn way(&self, from: &Joints, to: &Joints, pace: f64) -> Option<Vec<SetPoint>> {
+        transit::plan(from, to, &self.limits, pace)
+            .filter(|way| first_excess(way, &self.limits, Some(&self.body)).is_none() && self.lowest(way) >= self.floor)
+    }
+
+    /// Lowest point of flange and tool on a way [m].
+    fn lowest(&self, way: &[SetPoint]) -> f64 {
+        way.iter().map(|point| self.body.lowest_point(&point.q_d)).fold(f64::INFINITY, f64::min)
+    }
+
+    fn travel(&mut self, link: &mut Link, set_points: &[SetPoint]) -> anyhow::Result<Outcome> {
+        let motion = Motion { set_points, dof: self.limits.len() };
+        let outcome = play(link, motion, self.interrupt, |_| {})?;
+        self.recovery.note(outcome, link)?;
+        Ok(outcome)
+    }
+
+    /// The clip that is repeated as this run's clip number `count`, at the speed asked for.
+    fn again(&self, count: usize) -> anyhow::Result<Plan> {
+        let points = &self.repeats[count % self.repeats.len()].set_points;
+        let set_points = pace::paced(points, self.options.task.speed, &self.limits, &self.body)?;
+        let (lowest, floor) = (self.lowest(&set_points), self.floor);
+        anyhow::ensure!(
+            lowest >= floor,
+            "the clip leads the tool down to {lowest:.3} m, below the {floor:.3} m kept free above table and object; repeat another clip"
+        );
+        let dof = self.limits.len();
+        let begin = set_points[0].q_d;
+        let reach = |joint: usize| set_points.iter().map(|p| (p.q_d[joint] - begin[joint]).abs()).fold(0.0, f64::max);
+        let amplitude = (0..dof).map(reach).collect();
+        Ok(Plan { peak_speed: plan::peak_speed(&set_points), dof, amplitude, bound_by: vec![None; dof], set_points })
     }
 
     /// Plans around the pose that the arm is commanded to hold, and says what had to give.
     fn plan(&self, link: &mut Link, number: usize) -> anyhow::Result<Plan> {
         let state = link.ready_arm(self.limits.len())?;
-        let Options { amplitude, duration, seed, .. } = *self.options;
-        let seed = seed.wrapping_add(number as u64);
-        let request = Request { start: state.q_d, amplitude, duration, seed, floor: self.floor };
-        let plan = plan(&request, &self.limits, &self.body)?;
+        let Options { kind, amplitude, duration, seed, .. } = *self.options;
+        let (seed, moving) = (seed.wrapping_add(number as u64), self.moving);
+        let request = Request { start: state.q_d, kind, moving, amplitude, duration, seed, floor: self.floor };
+        let mut plan = plan(&request, &self.limits, &self.body)?;
+        let speed = self.options.task.speed;
+        plan.set_points = pace::paced(&plan.set_points, speed, &self.limits, &self.body)?;
+        plan.peak_speed *= speed;
         for (joint, bound_by) in plan.bound_by.iter().enumerate() {
             if let Some(quantity) = bound_by {
                 let reached = plan.amplitude[joint];
-                console::line(format_args!(
-                    "  joint {}: {reached:.3} rad instead of {amplitude:.3}, bound by {quantity}",
-                    joint + 1
-                ));
+                console::line(format_args!("  joint {}: {reached:.3} rad at most, bound by {quantity}", joint + 1));
             }
         }
         Ok(plan)
@@ -226,6 +316,7 @@ fn summary(file: PathBuf, why: Option<String>, plan: Plan, quality: Quality, rec
     let Recorded { messages, bytes, .. } = *recorded;
     ClipSummary {
         file,
+        motion: String::new(),
         kept: why.is_none(),
         why,
         paused: false,
@@ -247,8 +338,9 @@ impl ClipSummary {
             Some(why) => format!("repeat, because {why}; the file stays, but is not entered into cell.toml"),
         };
         format!(
-            "{}: peak speed {peak_speed:.2} rad/s, follows within {:.1} mrad, {lost_packets} packets lost, {:.1} MB: {verdict}",
+            "{}: {}, peak speed {peak_speed:.2} rad/s, follows within {:.1} mrad, {lost_packets} packets lost, {:.1} MB: {verdict}",
             self.file.display(),
+            self.motion,
             1e3 * tracking_error,
             self.bytes as f64 * 1e-6,
         )

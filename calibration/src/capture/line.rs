@@ -4,6 +4,7 @@
 
 use super::body::Body;
 use super::plan::RATE;
+use super::way::about_itself;
 use nalgebra::{DMatrix, DVector, Isometry3, Translation3, UnitQuaternion, Vector3, Vector6};
 use shared_mem::msg::motion::SetPoint;
 use shared_mem::msg::{Joints, MAX_JOINTS};
@@ -21,6 +22,8 @@ const LARGEST: f64 = 0.2;
 const PEAK: f64 = 1.875;
 /// How fast the tool turns on a way at most [rad/s].
 const TURN: f64 = 0.5;
+/// How far the tool is turned about its own axis between two looks at the joints [rad].
+const TURN_STEP: f64 = 0.15;
 /// No way takes less time [s].
 const SHORTEST: f64 = 0.2;
 
@@ -39,6 +42,19 @@ pub fn reach(body: &Body, from: &Joints, target: &Isometry3<f64>) -> Option<Join
         q.iter_mut().zip(&step).for_each(|(q, step)| *q += share * step);
     }
     None
+}
+
+/// Joints that bring the tool's end to `target` after turning it about its own axis by `turn` [rad], step by step, so that
+/// the arm goes round the shorter way and no other; `None` out of reach.
+#[must_use]
+pub fn reach_turned(body: &Body, from: &Joints, target: &Isometry3<f64>, turn: f64) -> Option<Joints> {
+    let steps = (turn.abs() / TURN_STEP).ceil() as u32;
+    let turned = |k: u32| {
+        let mut target = *target;
+        target.rotation *= about_itself(turn * f64::from(k) / f64::from(steps));
+        target
+    };
+    (1..=steps).try_fold(reach(body, from, target)?, |q, k| reach(body, &q, &turned(k)))
 }
 
 /// Joint velocities that move the tool's end with `velocity` [m/s] and turn it nowhere.

@@ -2,6 +2,7 @@
 //!
 //! Knows no physics. A bridge that falls silent or starts anew is an error with its remedy, never a wait without end.
 
+use shared_mem::console;
 use shared_mem::msg::arm::{ArmMode, ArmState};
 use shared_mem::msg::event::{Event, EventLevel, EventSource};
 use shared_mem::msg::motion::{MotionChunk, MotionKind};
@@ -70,6 +71,7 @@ pub struct Link {
     states: Subscriber<ArmState>,
     events: Subscriber<Event>,
     motions: Publisher<MotionChunk>,
+    remarks: Publisher<Event>,
     newest: Option<ArmState>,
     heard: Instant,
     last_words: Option<Words>,
@@ -89,6 +91,7 @@ impl Link {
             states: node.subscriber(ARM_STATE)?,
             events: node.subscriber(EVENTS)?,
             motions: node.publisher(ARM_MOTION)?,
+            remarks: node.publisher(EVENTS)?,
             newest: None,
             heard: Instant::now(),
             last_words: None,
@@ -134,6 +137,16 @@ impl Link {
             std::thread::sleep(Duration::from_millis(5));
         }
         Ok(None)
+    }
+
+    /// Forgets what a bridge that has ended said: the next state is the first of another bridge.
+    ///
+    /// # Errors
+    /// [`LinkError::Transport`] when shared memory fails.
+    pub fn forget(&mut self) -> Result<(), LinkError> {
+        self.states.newest()?;
+        self.newest = None;
+        Ok(())
     }
 
     /// The newest state, provided the robot may be moved; remarks of earlier motions are forgotten.
@@ -210,6 +223,14 @@ impl Link {
         Ok(self.motions.send(chunk)?)
     }
 
+    /// Says what is about to be played, for everyone who listens and for every recording.
+    ///
+    /// # Errors
+    /// [`LinkError::Transport`] when shared memory fails.
+    pub fn announce(&self, text: &str) -> Result<(), LinkError> {
+        Ok(self.remarks.send(&Event::new(EventLevel::Info, EventSource::Capture, text))?)
+    }
+
     /// The bridge's last warning or error since the link was last ready; waits briefly, because remarks and states travel apart.
     ///
     /// # Errors
@@ -240,7 +261,7 @@ impl Link {
             }
         }
         for ignored in self.node.newly_ignored() {
-            eprintln!("{ignored}");
+            console::line(ignored);
         }
         Ok(())
     }

@@ -1,26 +1,35 @@
 //! Capture: plan a motion, have the bridge play it, record it into a session folder.
 //!
-//! Planning is pure: [`plan`] for excitation on [`multisine`], [`program`], [`stroke`] and [`way`] for Control-Hit-Slide on
+//! Planning is pure: [`plan`] for excitation on a [`shape`] ([`multisine`], [`chirp`], [`ramp`], [`hold`], built of [`jet`]s), or on a clip that was [`recorded`], at a [`pace`], [`program`], [`staged`], [`stroke`] and [`way`] for Control-Hit-Slide on
 //! [`line`] and [`transit`], both within [`limits`] of the [`body`]. Playing goes through shared memory only ([`stream`],
-//! [`link`], [`object_watch`]), with [`recovery`] where the robot stops itself; recording is a process beside us ([`recorder`]). [`excitation`] and [`control_hit_slide`] are the
+//! [`link`], [`object_watch`]), with [`placing`] where the object has to stand somewhere and [`recovery`] where the robot stops itself; recording is a process beside us ([`recorder`]). [`excitation`] and [`control_hit_slide`] are the
 //! verbs that bind them, and [`task`] is what both are asked for.
 
 pub mod body;
 pub mod bridge;
+pub mod chirp;
 pub mod control_hit_slide;
 pub mod excess;
 pub mod excitation;
+pub mod hold;
+pub mod jet;
 pub mod limits;
 pub mod line;
 pub mod link;
 pub mod multisine;
 pub mod object_watch;
+pub mod pace;
+pub mod placing;
 pub mod plan;
 pub mod program;
 pub mod quality;
+pub mod ramp;
+pub mod recorded;
 pub mod recorder;
 pub mod recovery;
 pub mod session;
+pub mod shape;
+pub mod staged;
 pub mod stream;
 pub mod stroke;
 pub mod task;

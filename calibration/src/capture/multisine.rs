@@ -4,6 +4,7 @@
 //! All joints move at once, because gains show best where joints load each other. The derivatives are analytic, so that
 //! set points carry an exact speed.
 
+use super::jet::{Jet, product, window};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use std::f64::consts::TAU;
@@ -14,9 +15,6 @@ const FUNDAMENTAL: f64 = 0.2;
 const MULTIPLES: [f64; 5] = [1.0, 2.0, 3.0, 5.0, 8.0];
 /// Longest rise of the window [s].
 const LONGEST_RISE: f64 = 1.5;
-
-/// Value and first three derivatives in time.
-pub type Jet = [f64; 4];
 
 /// A windowed sum of sines for each joint, normalised so that each joint's largest magnitude is 1.
 #[derive(Debug, Clone, PartialEq)]
@@ -75,44 +73,13 @@ impl Multisine {
                 *total += amplitude * derivative;
             }
         }
-        product(self.window(t), sum)
+        product(window(t, self.duration, self.rise), sum)
     }
-
-    /// The window: rises along a quintic, stays at 1, falls along the mirrored quintic; speed and acceleration are 0 at both ends.
-    fn window(&self, t: f64) -> Jet {
-        if t < self.rise {
-            quintic(t / self.rise, 1.0 / self.rise)
-        } else if t > self.duration - self.rise {
-            quintic((self.duration - t) / self.rise, -1.0 / self.rise)
-        } else {
-            [1.0, 0.0, 0.0, 0.0]
-        }
-    }
-}
-
-/// `10 u³ - 15 u⁴ + 6 u⁵` and its derivatives in time where `du/dt = rate`; 0 before and 1 after.
-fn quintic(u: f64, rate: f64) -> Jet {
-    let u = u.clamp(0.0, 1.0);
-    [
-        u.powi(3) * (10.0 + u * (6.0 * u - 15.0)),
-        30.0 * u.powi(2) * (1.0 - u).powi(2) * rate,
-        60.0 * u * (1.0 - u) * (1.0 - 2.0 * u) * rate.powi(2),
-        60.0 * (1.0 + 6.0 * u * (u - 1.0)) * rate.powi(3),
-    ]
-}
-
-/// Product rule up to the third derivative.
-fn product(a: Jet, b: Jet) -> Jet {
-    [
-        a[0] * b[0],
-        a[1] * b[0] + a[0] * b[1],
-        a[2] * b[0] + 2.0 * a[1] * b[1] + a[0] * b[2],
-        a[3] * b[0] + 3.0 * a[2] * b[1] + 3.0 * a[1] * b[2] + a[0] * b[3],
-    ]
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::jet::tests::assert_derivatives;
     use super::*;
 
     #[test]
@@ -132,16 +99,7 @@ mod tests {
     #[test]
     fn its_derivatives_are_those_of_its_value() {
         let shape = Multisine::draw(2, 6.0, 11);
-        let h = 1e-5;
-        for i in 1..60 {
-            let t = 0.1 * f64::from(i) + 0.003;
-            let (before, here, after) = (shape.at(1, t - h), shape.at(1, t), shape.at(1, t + h));
-            for order in 0..3 {
-                let slope = (after[order] - before[order]) / (2.0 * h);
-                let tolerance = 1e-4 * (1.0 + here[order + 1].abs());
-                assert!((slope - here[order + 1]).abs() < tolerance, "derivative {} at {t} s", order + 1);
-            }
-        }
+        assert_derivatives(|t| shape.at(1, t), (1..60).map(|i| 0.1 * f64::from(i) + 0.003));
     }
 
     #[test]

@@ -4,6 +4,7 @@
 use super::program::Standing;
 use crate::interrupt::Interrupt;
 use serde::Serialize;
+use shared_mem::console;
 use shared_mem::msg::object::ObjectPose;
 use shared_mem::topics::OBJECT_POSE;
 use shared_mem::transport::{Node, Subscriber, TransportError};
@@ -81,6 +82,16 @@ impl ObjectWatch {
         self.seen.clear();
     }
 
+    /// Forgets all poses, those that wait to be taken in as well: the cell was started anew.
+    ///
+    /// # Errors
+    /// [`WatchError::Transport`].
+    pub fn begin_anew(&mut self) -> Result<(), WatchError> {
+        self.poses.newest()?;
+        self.seen.clear();
+        Ok(())
+    }
+
     /// Takes in what has come.
     ///
     /// # Errors
@@ -90,7 +101,7 @@ impl ObjectWatch {
             self.seen.extend(seen(&pose));
         }
         for ignored in self.node.newly_ignored() {
-            eprintln!("{ignored}");
+            console::line(ignored);
         }
         Ok(())
     }

@@ -1,4 +1,4 @@
-//! Plans one excitation clip: a multi-sine around the pose the arm stands in, as large as asked for or as the limits
+//! Plans one excitation clip: a motion of some kind around the pose the arm stands in, as large as asked for or as the limits
 //! of joints, torque and floor allow. Pure: no clock, no shared memory. Units: rad, s, N m, m.
 //!
 //! Called by the capture verb; what it returns is streamed as it is.
@@ -6,7 +6,7 @@
 use super::body::Body;
 use super::excess::{Excess, Quantity};
 use super::limits::SHARE;
-use super::multisine::Multisine;
+use super::shape::{Kind, Shape};
 use super::stream::Motion;
 use shared_mem::msg::motion::SetPoint;
 use shared_mem::msg::{Joints, MAX_JOINTS};
@@ -26,11 +26,15 @@ const SHRINK: f64 = 0.95;
 pub struct Request {
     /// Pose to start, move around and end in [rad].
     pub start: Joints,
+    /// What kind of motion.
+    pub kind: Kind,
+    /// Joints that move; the others hold.
+    pub moving: [bool; MAX_JOINTS],
     /// Largest excursion of each joint [rad].
     pub amplitude: f64,
     /// Length [s].
     pub duration: f64,
-    /// Draws frequencies' amplitudes and phases.
+    /// Draws what the kind leaves open: amplitudes, phases, directions, poses.
     pub seed: u64,
     /// Height in the base frame that flange and tool stay above [m].
     pub floor: f64,
@@ -76,43 +80,54 @@ pub enum PlanError {
 /// [`PlanError`] with joint, value and limit when the start pose breaks a limit or leaves no room.
 pub fn plan(request: &Request, limits: &[JointLimits], body: &Body) -> Result<Plan, PlanError> {
     let dof = limits.len();
-    check_start(request, limits, body)?;
-    let shape = Multisine::draw(dof, request.duration, request.seed);
-    let samples = Samples::of(&shape, dof, request.duration);
-    let mut amplitude = vec![request.amplitude; dof];
+    if let Some(excess) = rest_excess(&request.start, request.floor, limits, body) {
+        return Err(PlanError::Start(excess));
+    }
+    let refuse = |q: &Joints| rest_excess(q, request.floor, limits, body);
+    let shape = Shape::draw(request, limits, body, refuse).map_err(PlanError::NoRoom)?;
+    let samples = Samples::of(&shape, &request.moving, dof);
+    let mut scale: Vec<f64> = samples.peaks.iter().map(|peak| if *peak > 0.0 { 1.0 } else { 0.0 }).collect();
     let mut bound_by = vec![None; dof];
-    for joint in 0..dof {
-        while let Some(excess) = samples.joint_excess(joint, request.start[joint], amplitude[joint], &limits[joint]) {
-            shrink(&mut amplitude[joint], &mut bound_by[joint], excess)?;
+    let mut shrink = |scale: &mut [f64], joint: usize, excess: Excess| {
+        let peak = samples.peaks[joint];
+        if peak > 0.0 {
+            scale[joint] *= SHRINK;
+            bound_by[joint] = Some(excess.quantity);
+        }
+        if peak > 0.0 && scale[joint] * peak < SMALLEST { Err(PlanError::NoRoom(excess)) } else { Ok(()) }
+    };
+    for joint in (0..dof).filter(|joint| samples.peaks[*joint] > 0.0) {
+        while let Some(excess) = samples.joint_excess(joint, request.start[joint], scale[joint], &limits[joint]) {
+            shrink(&mut scale, joint, excess)?;
         }
     }
-    while let Some(excess) = samples.body_excess(request, &amplitude, limits, body) {
-        for joint in 0..dof {
-            shrink(&mut amplitude[joint], &mut bound_by[joint], excess)?;
+    // Round and round until a whole round meets no limit: most of a motion is far from all of them.
+    let (mut at, mut free) = (0, 0);
+    while free < samples.len() {
+        match samples.body_excess(at, request, &scale, limits, body) {
+            None => (at, free) = ((at + 1) % samples.len(), free + 1),
+            Some(excess) => {
+                (0..dof).try_for_each(|joint| shrink(&mut scale, joint, excess))?;
+                free = 0;
+            }
         }
     }
-    let set_points = samples.set_points(&request.start, &amplitude);
-    let peak_speed = set_points.iter().flat_map(|p| p.dq_d).fold(0.0, |peak: f64, dq| peak.max(dq.abs()));
-    Ok(Plan { set_points, dof, amplitude, bound_by, peak_speed })
+    let set_points = samples.set_points(&request.start, &scale);
+    let amplitude = scale.iter().zip(&samples.peaks).map(|(scale, peak)| scale * peak).collect();
+    Ok(Plan { peak_speed: peak_speed(&set_points), set_points, dof, amplitude, bound_by })
 }
 
-/// Makes one amplitude smaller and notes why; an error once it is not worth recording.
-fn shrink(amplitude: &mut f64, bound_by: &mut Option<Quantity>, excess: Excess) -> Result<(), PlanError> {
-    *amplitude *= SHRINK;
-    *bound_by = Some(excess.quantity);
-    if *amplitude < SMALLEST { Err(PlanError::NoRoom(excess)) } else { Ok(()) }
+/// Largest speed of any joint [rad/s].
+#[must_use]
+pub fn peak_speed(set_points: &[SetPoint]) -> f64 {
+    set_points.iter().flat_map(|p| p.dq_d).fold(0.0, |peak: f64, dq| peak.max(dq.abs()))
 }
 
-/// The start pose, at rest, must itself respect stops, torque and floor.
-fn check_start(request: &Request, limits: &[JointLimits], body: &Body) -> Result<(), PlanError> {
-    for (joint, (&q, limits)) in request.start.iter().zip(limits).enumerate() {
-        if let Some(excess) = position_excess(joint, q, limits) {
-            return Err(PlanError::Start(excess));
-        }
-    }
-    let still = JointState::at_rest(request.start);
-    let excess = pose_excess(&still, &[0.0; MAX_JOINTS], request.floor, limits, body);
-    excess.map_or(Ok(()), |excess| Err(PlanError::Start(excess)))
+/// Which limit the arm breaks where it stands still in a pose.
+#[must_use]
+pub fn rest_excess(q: &Joints, floor: f64, limits: &[JointLimits], body: &Body) -> Option<Excess> {
+    let beyond = q.iter().zip(limits).enumerate().find_map(|(joint, (&q, limits))| position_excess(joint, q, limits));
+    beyond.or_else(|| pose_excess(&JointState::at_rest(*q), &[0.0; MAX_JOINTS], floor, limits, body))
 }
 
 fn position_excess(joint: usize, q: f64, limits: &JointLimits) -> Option<Excess> {
@@ -139,26 +154,34 @@ fn pose_excess(state: &JointState, ddq: &Joints, floor: f64, limits: &[JointLimi
     })
 }
 
-/// The shape at each control cycle: value, speed, acceleration and jerk by joint, before scaling.
+/// The shape at each control cycle: value, speed, acceleration and jerk by joint, as asked for.
 struct Samples {
     joints: Vec<Vec<[f64; 4]>>,
+    /// Largest magnitude of each joint's values; 0 where it holds.
+    peaks: Vec<f64>,
 }
 
 impl Samples {
-    fn of(shape: &Multisine, dof: usize, duration: f64) -> Self {
+    fn of(shape: &Shape, moving: &[bool; MAX_JOINTS], dof: usize) -> Self {
+        let duration = shape.duration();
         let last = (duration * RATE).round() as u32;
-        let joint = |j| (0..=last).map(|i| shape.at(j, f64::from(i) * duration / f64::from(last))).collect();
-        Self { joints: (0..dof).map(joint).collect() }
+        let at = |joint: usize, i: u32| match moving[joint] {
+            true => shape.at(joint, f64::from(i) * duration / f64::from(last)),
+            false => [0.0; 4],
+        };
+        let joints: Vec<Vec<[f64; 4]>> = (0..dof).map(|j| (0..=last).map(|i| at(j, i)).collect()).collect();
+        let peaks = joints.iter().map(|all| all.iter().fold(0.0, |peak: f64, x| peak.max(x[0].abs()))).collect();
+        Self { joints, peaks }
     }
 
     fn len(&self) -> usize {
         self.joints.first().map_or(0, Vec::len)
     }
 
-    /// First sample of `joint` beyond its own limits at this amplitude.
-    fn joint_excess(&self, joint: usize, start: f64, amplitude: f64, limits: &JointLimits) -> Option<Excess> {
+    /// First sample of `joint` beyond its own limits at this share of what was asked for.
+    fn joint_excess(&self, joint: usize, start: f64, scale: f64, limits: &JointLimits) -> Option<Excess> {
         self.joints[joint].iter().find_map(|shape| {
-            let [dx, dq, ddq, dddq] = shape.map(|x| amplitude * x);
+            let [dx, dq, ddq, dddq] = shape.map(|x| scale * x);
             let q = start + dx;
             let [slowest, fastest] = limits.speed_bounds(q);
             let speed_limit = SHARE * if dq < 0.0 { -slowest } else { fastest };
@@ -177,29 +200,34 @@ impl Samples {
         })
     }
 
-    /// First sample at which the whole arm meets torque or floor.
-    fn body_excess(&self, request: &Request, amplitude: &[f64], limits: &[JointLimits], body: &Body) -> Option<Excess> {
-        (0..self.len()).find_map(|i| {
-            let (state, ddq) = self.moment(i, &request.start, amplitude);
-            pose_excess(&state, &ddq, request.floor, limits, body)
-        })
+    /// What the whole arm meets of torque and floor at a sample.
+    fn body_excess(
+        &self,
+        sample: usize,
+        request: &Request,
+        scale: &[f64],
+        limits: &[JointLimits],
+        body: &Body,
+    ) -> Option<Excess> {
+        let (state, ddq) = self.moment(sample, &request.start, scale);
+        pose_excess(&state, &ddq, request.floor, limits, body)
     }
 
     /// Desired state and acceleration of sample `i`.
-    fn moment(&self, i: usize, start: &Joints, amplitude: &[f64]) -> (JointState, Joints) {
+    fn moment(&self, i: usize, start: &Joints, scale: &[f64]) -> (JointState, Joints) {
         let (mut state, mut ddq) = (JointState::at_rest(*start), [0.0; MAX_JOINTS]);
-        for (joint, amplitude) in amplitude.iter().enumerate() {
+        for (joint, scale) in scale.iter().enumerate() {
             let [x, dx, ddx, _] = self.joints[joint][i];
-            state.q[joint] += amplitude * x;
-            state.dq[joint] = amplitude * dx;
-            ddq[joint] = amplitude * ddx;
+            state.q[joint] += scale * x;
+            state.dq[joint] = scale * dx;
+            ddq[joint] = scale * ddx;
         }
         (state, ddq)
     }
 
-    fn set_points(&self, start: &Joints, amplitude: &[f64]) -> Vec<SetPoint> {
+    fn set_points(&self, start: &Joints, scale: &[f64]) -> Vec<SetPoint> {
         let point = |i| {
-            let (JointState { q, dq }, _) = self.moment(i, start, amplitude);
+            let (JointState { q, dq }, _) = self.moment(i, start, scale);
             SetPoint { q_d: q, dq_d: dq }
         };
         (0..self.len()).map(point).collect()
@@ -222,8 +250,10 @@ mod tests {
         (body, limits)
     }
 
+    const ALL: [bool; MAX_JOINTS] = [true; MAX_JOINTS];
+
     fn request(start: Joints) -> Request {
-        Request { start, amplitude: 0.3, duration: 4.0, seed: 1, floor: 0.05 }
+        Request { start, kind: Kind::Multisine, moving: ALL, amplitude: 0.3, duration: 4.0, seed: 1, floor: 0.05 }
     }
 
     /// Checks set points as a robot does, by differences from cycle to cycle, against the full limits.
@@ -252,6 +282,29 @@ mod tests {
         }
     }
 
+    /// Plans around a place between the stops and checks every limit, the ends and the joints that are to hold.
+    fn check_plan(kind: Kind, place: [f64; 7], asked: (f64, f64, u64), still: usize) -> Result<(), TestCaseError> {
+        let (body, limits) = arm();
+        let (amplitude, duration, seed) = asked;
+        let mut start = [0.0; MAX_JOINTS];
+        for (joint, limits) in limits.iter().enumerate() {
+            start[joint] = limits.q_min + place[joint] * (limits.q_max - limits.q_min);
+        }
+        let mut moving = ALL;
+        moving[still] = false;
+        let request = Request { start, kind, moving, amplitude, duration, seed, floor: 0.05 };
+        // Too many refusals fail the test: then it would show nothing.
+        let Ok(plan) = plan(&request, &limits, &body) else { return Err(TestCaseError::reject("no room")) };
+        assert_inside(&plan, &limits, &body, request.floor);
+        let (first, last) = (&plan.set_points[0], &plan.set_points[plan.set_points.len() - 1]);
+        for point in [first, last] {
+            prop_assert!(point.q_d.iter().zip(&start).all(|(q, start)| (q - start).abs() < 1e-12));
+            prop_assert!(point.dq_d.iter().all(|dq| dq.abs() < 1e-9));
+        }
+        prop_assert!(plan.set_points.iter().all(|point| point.q_d[still] == start[still]));
+        Ok(())
+    }
+
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(48))]
         #[test]
@@ -260,21 +313,42 @@ mod tests {
             place in proptest::array::uniform7(0.02..0.98_f64),
             amplitude in 0.05..1.5_f64,
             duration in 2.0..6.0_f64,
+            still in 0..8_usize,
         ) {
-            let (body, limits) = arm();
-            let mut start = [0.0; MAX_JOINTS];
-            for (joint, limits) in limits.iter().enumerate() {
-                start[joint] = limits.q_min + place[joint] * (limits.q_max - limits.q_min);
-            }
-            let request = Request { start, amplitude, duration, seed, floor: 0.05 };
-            // Too many refusals fail the test: then it would show nothing.
-            let Ok(plan) = plan(&request, &limits, &body) else { return Err(TestCaseError::reject("no room")) };
-            assert_inside(&plan, &limits, &body, request.floor);
-            let (first, last) = (&plan.set_points[0], &plan.set_points[plan.set_points.len() - 1]);
-            for point in [first, last] {
-                prop_assert!(point.q_d.iter().zip(&start).all(|(q, start)| (q - start).abs() < 1e-12));
-                prop_assert!(point.dq_d.iter().all(|dq| dq.abs() < 1e-9));
-            }
+            check_plan(Kind::Multisine, place, (amplitude, duration, seed), still)?;
+        }
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(8))]
+        #[test]
+        fn every_chirp_respects_every_limit(
+            seed in any::<u64>(),
+            place in proptest::array::uniform7(0.2..0.8_f64),
+            (lo, hi) in (0.1..1.0_f64, 2.0..40.0_f64),
+            amplitude in 0.05..1.0_f64,
+        ) {
+            check_plan(Kind::Chirp { frequency: [lo, hi] }, place, (amplitude, 5.0, seed), 3)?;
+        }
+
+        #[test]
+        fn every_ramp_respects_every_limit(
+            seed in any::<u64>(),
+            place in proptest::array::uniform7(0.2..0.8_f64),
+            (lo, hi) in (0.005..0.1_f64, 0.2..2.0_f64),
+            amplitude in 0.05..1.0_f64,
+        ) {
+            check_plan(Kind::Ramp { speeds: [lo, hi] }, place, (amplitude, 12.0, seed), 7)?;
+        }
+
+        #[test]
+        fn every_hold_respects_every_limit(
+            seed in any::<u64>(),
+            place in proptest::array::uniform7(0.2..0.8_f64),
+            poses in 1..4_usize,
+            amplitude in 0.05..1.0_f64,
+        ) {
+            check_plan(Kind::Hold { poses }, place, (amplitude, 10.0, seed), 0)?;
         }
     }
 

@@ -27,15 +27,17 @@ const HEIGHTS: [f64; 2] = [0.2, 0.5];
 /// How far from a face's normal a stroke may come [rad]: further round it would slip off the edge.
 const OBLIQUE: f64 = 0.35;
 /// Middle of the area that an arm of this class reaches from all sides, and its radius [m].
-const MIDDLE: [f64; 2] = [0.48, 0.0];
+pub const MIDDLE: [f64; 2] = [0.48, 0.0];
 const RADIUS: f64 = 0.13;
 /// Other directions that are tried when the wanted one leads out of the area [rad].
 const TURN: f64 = PI / 9.0;
 /// Shares of the wanted speed that are tried, where no direction allows more.
-const PACES: [f64; 3] = [1.0, 0.8, 0.6];
+pub const PACES: [f64; 3] = [1.0, 0.8, 0.6];
 /// The object slides further than reckoned by this much at most.
 const SLIDES: f64 = 1.3;
 const GRAVITY: f64 = 9.81;
+/// Rest before a stroke and after it [s].
+pub const RESTS: [f64; 2] = [0.3, 0.8];
 
 /// What a stroke should be like.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -89,6 +91,10 @@ pub struct Program<'a> {
     pub table: f64,
     /// Friction that is reckoned with.
     pub friction: f64,
+    /// How many times as fast as it would be every stroke is.
+    pub pace: f64,
+    /// How far the tool is turned about its own axis [rad].
+    pub turn: f64,
 }
 
 /// A stroke that can be done.
@@ -137,6 +143,8 @@ impl<'a> Program<'a> {
             tool: cell.tool.as_ref().map_or(0.0, |tool| tool.radius),
             table: cell.table.as_ref().map_or(0.0, |table| table.height),
             friction: cell.object.as_ref().map_or(0.3, shared_mem::cell::Object::nominal_friction),
+            pace: 1.0,
+            turn: 0.0,
         }
     }
 
@@ -148,7 +156,9 @@ impl<'a> Program<'a> {
     pub fn next(&self, wish: &Wish, object: &Standing, ways: &Ways<'_>, from: &Joints) -> Result<Next, NoStroke> {
         let mut refused = None;
         let turns = (0..=9).flat_map(|k| [f64::from(k), -f64::from(k)]).skip(1);
-        let tries = PACES.into_iter().flat_map(|pace| turns.clone().map(move |turn| (pace, turn)));
+        // A speed that was asked for is the one that is played.
+        let paces = if self.pace == 1.0 { &PACES[..] } else { &PACES[..1] };
+        let tries = paces.iter().flat_map(|pace| turns.clone().map(move |turn| (*pace, turn)));
         for (pace, turn) in tries {
             let (heading, speed) = (wish.heading + turn * TURN, pace * wish.speed);
             let stroke = self.stroke(&Wish { heading, speed, ..*wish }, object);
@@ -166,7 +176,15 @@ impl<'a> Program<'a> {
     }
 
     /// The stroke's motion and the way to it, once there is one back as well.
-    fn whole(&self, stroke: &Stroke, ways: &Ways<'_>, from: &Joints) -> Result<(StrokePlan, Vec<SetPoint>), NoStroke> {
+    ///
+    /// # Errors
+    /// [`NoStroke`] with what stands in the way.
+    pub fn whole(
+        &self,
+        stroke: &Stroke,
+        ways: &Ways<'_>,
+        from: &Joints,
+    ) -> Result<(StrokePlan, Vec<SetPoint>), NoStroke> {
         let plan = stroke::plan(stroke, self.body.model().ready(), self.limits, self.body)?;
         let [begin, .., end] = &plan.set_points[..] else { return Err(NoStroke::Away { place: stroke.object }) };
         let approach = ways.over(from, &begin.q_d)?;
@@ -188,16 +206,19 @@ impl<'a> Program<'a> {
             clearance: 0.5 * x.hypot(y) + self.tool,
             heading: heading.sin().atan2(heading.cos()),
             offset: 0.5 * ASIDE * wish.aside * x.min(y),
-            speed: wish.speed,
+            speed: self.pace * wish.speed,
             height: self.table + (height * z).max(1.5 * self.tool),
-            rise: (0.5 * wish.speed).max(0.35),
+            // Faster or slower, the way stays the same.
+            rise: (0.5 * wish.speed).max(0.35) / self.pace,
             follow_through: 0.0,
-            rest: [0.3, 0.8],
+            rest: RESTS,
+            turn: self.turn,
         }
     }
 
     /// Where the object comes to rest, about: pushed until the tool slows down, then sliding freely.
-    fn rest(&self, stroke: &Stroke) -> [f64; 2] {
+    #[must_use]
+    pub fn rest(&self, stroke: &Stroke) -> [f64; 2] {
         let pushed = 0.25 * stroke.speed * stroke.rise + stroke.clearance + stroke.follow_through;
         let way = pushed.max(SLIDES * stroke.speed * stroke.speed / (2.0 * self.friction * GRAVITY));
         let [x, y] = stroke.object;

@@ -109,7 +109,7 @@ impl Session {
 }
 
 /// `7` of `clip_07.mcap`.
-fn number_of(file: &Path) -> Option<usize> {
+pub(crate) fn number_of(file: &Path) -> Option<usize> {
     file.to_str()?.strip_prefix("clip_")?.strip_suffix(".mcap")?.parse().ok()
 }
 

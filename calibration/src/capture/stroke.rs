@@ -39,6 +39,8 @@ pub struct Stroke {
     pub follow_through: f64,
     /// Rest before the motion and after it [s].
     pub rest: [f64; 2],
+    /// How far the tool is turned about its own axis [rad].
+    pub turn: f64,
 }
 
 /// A stroke's motion, one set point a control cycle; the first and the last are at rest.
@@ -76,12 +78,13 @@ pub fn plan(stroke: &Stroke, near: &Joints, limits: &[JointLimits], body: &Body)
     let aside = Vector3::new(-along.y, along.x, 0.0);
     let middle = Vector3::new(stroke.object[0], stroke.object[1], stroke.height) + aside * stroke.offset;
     let start = middle - along * profile.to_middle;
-    let mut q = *near;
+    let out = |place: &Vector3<f64>| StrokeError::OutOfReach { x: place.x, y: place.y };
+    let mut q = line::reach_turned(body, near, &upright(start, 0.0), stroke.turn).ok_or_else(|| out(&start))?;
     let mut set_points = Vec::with_capacity(profile.samples());
     for i in 0..profile.samples() {
         let (way, speed) = profile.at(i as f64 / RATE);
         let place = start + along * way;
-        q = line::reach(body, &q, &upright(place)).ok_or(StrokeError::OutOfReach { x: place.x, y: place.y })?;
+        q = line::reach(body, &q, &upright(place, stroke.turn)).ok_or_else(|| out(&place))?;
         set_points.push(SetPoint { q_d: q, dq_d: line::joint_velocity(body, &q, &(along * speed)) });
     }
     match first_excess(&set_points, limits, Some(body)) {
@@ -155,6 +158,7 @@ mod tests {
         rise: 0.4,
         follow_through: 0.02,
         rest: [0.25, 0.5],
+        turn: 0.0,
     };
 
     fn planned(stroke: &Stroke) -> Result<(StrokePlan, Body), StrokeError> {
@@ -186,6 +190,18 @@ mod tests {
                 let difference = 0.5 * RATE * (w[2].q_d[joint] - w[0].q_d[joint]);
                 assert!((difference - w[1].dq_d[joint]).abs() < 5e-3, "{difference} {}", w[1].dq_d[joint]);
             }
+        }
+    }
+
+    #[test]
+    fn a_turned_tool_follows_the_same_line_turned_about_its_own_axis() {
+        let (straight, body) = planned(&STROKE).expect("an easy stroke");
+        let (turned, _) = planned(&Stroke { turn: -1.5, ..STROKE }).expect("one with the tool turned");
+        assert_eq!(straight.set_points.len(), turned.set_points.len());
+        for (a, b) in straight.set_points.iter().zip(&turned.set_points).step_by(50) {
+            let [a, b] = [a, b].map(|point| body.model().tip(&point.q_d).isometry());
+            assert!((a.translation.vector - b.translation.vector).norm() < 1e-6);
+            assert!(((a.rotation.inverse() * b.rotation).scaled_axis().z + 1.5).abs() < 1e-6);
         }
     }
 

@@ -13,6 +13,10 @@ pub struct Task {
     pub cell: PathBuf,
     /// Clips to add.
     pub clips: u32,
+    /// Clips of the session that are played again, by their numbers, one after the other and from the first again; empty: new ones.
+    pub repeat: Vec<usize>,
+    /// How many times as fast as it would be every motion that is recorded is played.
+    pub speed: f64,
     /// Session folder.
     pub out: PathBuf,
     /// Arm of a bridge that has to be started, as `rt_bridge run --arm` takes it.
@@ -49,6 +53,18 @@ pub fn cause(error: anyhow::Error, bridge: &mut Bridge) -> anyhow::Error {
 }
 
 impl Task {
+    /// Number of the clip that is played again as this run's clip `count` (from 0); `None`: a new one.
+    #[must_use]
+    pub fn repeated(&self, count: usize) -> Option<usize> {
+        (!self.repeat.is_empty()).then(|| self.repeat[count % self.repeat.len()])
+    }
+
+    /// ` at 0.5 times the speed`, where it is another than usual.
+    #[must_use]
+    pub fn pace(&self) -> String {
+        if self.speed == 1.0 { String::new() } else { format!(" at {} times the speed", self.speed) }
+    }
+
     /// The bridge that runs, or one that is started for this task.
     ///
     /// # Errors

@@ -133,11 +133,17 @@ impl Ways<'_> {
     }
 }
 
-/// The tool's end pointing straight down at a place.
+/// The tool's end pointing straight down at a place, turned about its own axis by `turn` [rad].
 #[must_use]
-pub fn upright(place: Vector3<f64>) -> Isometry3<f64> {
+pub fn upright(place: Vector3<f64>, turn: f64) -> Isometry3<f64> {
     let down = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI);
-    Isometry3::from_parts(Translation3::from(place), down)
+    Isometry3::from_parts(Translation3::from(place), down * about_itself(turn))
+}
+
+/// A turn about the tool's own axis [rad].
+#[must_use]
+pub fn about_itself(turn: f64) -> UnitQuaternion<f64> {
+    UnitQuaternion::from_axis_angle(&Vector3::z_axis(), turn)
 }
 
 fn raised(place: &Isometry3<f64>, height: f64) -> Isometry3<f64> {
@@ -175,7 +181,7 @@ mod tests {
         ) {
             let (body, limits) = arm();
             let ways = Ways { body: &body, limits: &limits, height: 0.2, floor: 0.12 };
-            let at = |x, y, z| line::reach(&body, body.model().ready(), &upright(Vector3::new(x, y, z))).expect("in reach");
+            let at = |x, y, z| line::reach(&body, body.model().ready(), &upright(Vector3::new(x, y, z), 0.0)).expect("in reach");
             let (from, to) = (at(x_from, y_from, 0.03), at(x, y, 0.03));
             let points = ways.over(&from, &to).expect("a way");
             let joined = points.windows(2).all(|w| w[0].q_d.iter().zip(&w[1].q_d).all(|(a, b)| (a - b).abs() < 2e-3));
@@ -194,7 +200,8 @@ mod tests {
     fn after_a_stroke_the_tool_backs_off_and_rises() {
         let (body, limits) = arm();
         let ways = Ways { body: &body, limits: &limits, height: 0.2, floor: 0.12 };
-        let from = line::reach(&body, body.model().ready(), &upright(Vector3::new(0.5, 0.0, 0.03))).expect("in reach");
+        let from =
+            line::reach(&body, body.model().ready(), &upright(Vector3::new(0.5, 0.0, 0.03), 0.0)).expect("in reach");
         let points = ways.away(&from, 0.0).expect("a way");
         let end = body.model().tip(&points[points.len() - 1].q_d).isometry().translation.vector;
         assert!((end - Vector3::new(0.48, 0.0, 0.2)).norm() < 1e-4, "{end}");
@@ -203,7 +210,8 @@ mod tests {
     #[test]
     fn near_a_stop_the_way_down_is_taken_more_slowly() {
         let (body, mut limits) = arm();
-        let to = line::reach(&body, body.model().ready(), &upright(Vector3::new(0.5, 0.0, 0.03))).expect("in reach");
+        let to =
+            line::reach(&body, body.model().ready(), &upright(Vector3::new(0.5, 0.0, 0.03), 0.0)).expect("in reach");
         let over = |limits: &[JointLimits]| {
             Ways { body: &body, limits, height: 0.2, floor: 0.12 }.over(body.model().ready(), &to)
         };

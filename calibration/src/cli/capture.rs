@@ -1,11 +1,13 @@
 //! `calibration capture`.
 
 use super::{between, print_json};
+use calibration::capture::control_hit_slide::Series;
+use calibration::capture::shape::Kind;
 use calibration::capture::task::Task;
-use calibration::capture::{control_hit_slide, excitation};
+use calibration::capture::{control_hit_slide, excitation, ramp};
 use calibration::interrupt::Interrupt;
 use calibration::keys::Keys;
-use clap::Subcommand;
+use clap::{Subcommand, ValueEnum as _};
 use shared_mem::console;
 use std::path::PathBuf;
 
@@ -23,9 +25,12 @@ struct TaskArguments {
     /// What the laboratory knows about its cell.
     #[arg(long, value_name = "CELL.TOML")]
     cell: PathBuf,
-    /// Clips to add.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1000))]
-    clips: u32,
+    /// Plays clip N of the session again instead of a new one: the same set points. Several are played in turn.
+    #[arg(long, value_name = "N[,M..]", value_delimiter = ',')]
+    repeat: Vec<usize>,
+    /// Plays every motion that is recorded at so many times its speed, 0.05 to 10: 0.5 is half, 2 is twice.
+    #[arg(long, value_name = "FACTOR", default_value_t = 1.0, value_parser = between::<5, 1000, 100>)]
+    speed: f64,
     /// Session folder; created, or continued.
     #[arg(long, value_name = "SESSION")]
     out: PathBuf,
@@ -41,16 +46,40 @@ struct TaskArguments {
 }
 
 impl TaskArguments {
-    fn task(self) -> Task {
-        let Self { cell, clips, out, arm, realtime, recover } = self;
-        Task { cell, clips, out, arm, realtime, recover, domain: None }
+    /// `clips`: how many are asked for; else as many as are named.
+    fn task(self, clips: Option<u32>, named: usize) -> Task {
+        let Self { cell, repeat, speed, out, arm, realtime, recover } = self;
+        let clips = clips.unwrap_or_else(|| u32::try_from(repeat.len().max(named)).unwrap_or(u32::MAX));
+        Task { cell, clips, repeat, speed, out, arm, realtime, recover, domain: None }
     }
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum MotionKind {
+    /// Sums of sines, 0.2 to 1.6 Hz: what identifying the arm needs.
+    Multisine,
+    /// Swings of growing frequency: delay, lag, resonance.
+    Chirp,
+    /// Triangles of growing speed: friction at creep, lost motion at reversals.
+    Ramp,
+    /// Rests in several poses, each approached from both sides: sag, sticking, play.
+    Hold,
 }
 
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 The arm starts and ends at rest in the pose it holds, and stays above table and object. An amplitude that breaks a limit
-of position, speed, acceleration, jerk, torque or height is made smaller; which limit it was is said for each joint.
+of position, speed, acceleration, jerk, torque or height is made smaller; which limit it was is said for each joint. A
+--speed that breaks one is refused, with the joint and the largest factor that fits.
+
+  multisine  all joints at once along sums of sines, 0.2 to 1.6 Hz (8 s, 0.25 rad)
+  chirp      swings from the lower to the higher --frequency; above about 1 Hz they get smaller, so that the acceleration
+             stays what it is (20 s, 0.25 rad)
+  ramp       triangles with rounded reversals, their speed growing from level to level over --ramp-speeds (40 s, 0.25 rad)
+  hold       rests in --poses whose gravity torques differ as much as they can, each from both sides (40 s, 0.4 rad)
+
+A clip that is repeated begins where it began: the arm first goes there calmly. Its number is that of its file,
+3 for clip_03.mcap.
 
 A session that exists is continued with the next number; nothing is overwritten. At any moment p (or SIGUSR1)
 pauses: the arm brakes inside its limits and holds, and p (or SIGUSR2) goes on with a fresh try of the same clip. q or
@@ -59,22 +88,93 @@ recovered up to three times 2 s later, the arm goes back and the clip is repeate
 
 Examples:
   calibration capture excitation --cell config/fr3_cell.toml --clips 4 --out session
-  calibration capture excitation --cell lab/cell.toml --clips 8 --out monday --arm fci://172.16.0.2 --amplitude 0.2")]
+  calibration capture excitation --cell lab/cell.toml --clips 8 --out monday --arm fci://172.16.0.2 --amplitude 0.2
+  calibration capture excitation --cell config/fr3_cell.toml --clips 1 --out session --motion chirp --frequency 0.2 10
+  calibration capture excitation --cell config/fr3_cell.toml --clips 1 --out session --motion ramp --joints 1,4
+  calibration capture excitation --cell config/fr3_cell.toml --clips 1 --out session --motion hold --poses 12
+  calibration capture excitation --cell config/fr3_cell.toml --out session --repeat 0,3
+  calibration capture excitation --cell config/fr3_cell.toml --out session --repeat 3 --speed 0.5")]
 pub(super) struct ExcitationArguments {
     #[command(flatten)]
     task: TaskArguments,
-    /// Length of each clip's motion [s], 2 to 600.
-    #[arg(long, value_name = "S", default_value_t = 8.0, value_parser = between::<2, 600, 1>)]
-    duration: f64,
-    /// Largest excursion of each joint from the pose the arm stands in [rad], 0.01 to 1.5.
-    #[arg(long, value_name = "RAD", default_value_t = 0.25, value_parser = between::<1, 150, 100>)]
-    amplitude: f64,
-    /// Seed of the motions; clip number N of a session is drawn from seed + N.
-    #[arg(long, default_value_t = 0)]
-    seed: u64,
+    /// Clips to add; with --repeat as many as it names, where nothing else is said.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1000), required_unless_present = "repeat")]
+    clips: Option<u32>,
+    /// What kind of motion.
+    #[arg(long, value_enum, default_value_t = MotionKind::Multisine)]
+    motion: MotionKind,
+    /// Joints that move, counted from 1; the others hold [default: all].
+    #[arg(long, value_name = "N[,M..]", value_delimiter = ',', value_parser = clap::value_parser!(u32).range(1..=8))]
+    joints: Vec<u32>,
+    /// Length of each clip's motion [s], 2 to 600 (ramp: 12 or more) [default: by kind].
+    #[arg(long, value_name = "S", value_parser = between::<2, 600, 1>)]
+    duration: Option<f64>,
+    /// Largest excursion of each joint from the pose the arm stands in [rad], 0.01 to 1.5 [default: by kind].
+    #[arg(long, value_name = "RAD", value_parser = between::<1, 150, 100>)]
+    amplitude: Option<f64>,
+    /// First and last frequency of a chirp [Hz], 0.05 to 50 [default: 0.2 10].
+    #[arg(long, value_names = ["LO", "HI"], num_args = 2, value_parser = between::<5, 5000, 100>)]
+    frequency: Vec<f64>,
+    /// Speeds of the first and the last ramp [rad/s], 0.001 to 2 [default: 0.005 0.5].
+    #[arg(long, value_names = ["LO", "HI"], num_args = 2, value_parser = between::<1, 2000, 1000>)]
+    ramp_speeds: Vec<f64>,
+    /// Poses to hold, 2 to 64 [default: 8].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(2..=64))]
+    poses: Option<u32>,
+    /// Seed of the motions; clip number N of a session is drawn from seed + N. It may be negative.
+    #[arg(long, default_value_t = 0, allow_negative_numbers = true)]
+    seed: i64,
     /// Prints one JSON object on stdout at the end.
     #[arg(long)]
     json: bool,
+}
+
+impl ExcitationArguments {
+    /// The kind of motion with its own arguments.
+    ///
+    /// # Errors
+    /// What does not go together, in one sentence.
+    fn kind(&self) -> Result<Kind, String> {
+        let Self { motion, frequency, ramp_speeds, poses, duration, task, .. } = self;
+        let only = |flag: &str, given: bool, of: MotionKind| {
+            let odd = given && (*motion != of || !task.repeat.is_empty());
+            let name = of.to_possible_value().map_or_else(String::new, |value| value.get_name().to_owned());
+            if odd { Err(format!("--{flag} is for --motion {name}; leave it out or give that kind")) } else { Ok(()) }
+        };
+        only("frequency", !frequency.is_empty(), MotionKind::Chirp)?;
+        only("ramp-speeds", !ramp_speeds.is_empty(), MotionKind::Ramp)?;
+        only("poses", poses.is_some(), MotionKind::Hold)?;
+        let rising = |flag: &str, given: &[f64], otherwise: [f64; 2]| match given {
+            [lo, hi] if lo < hi => Ok([*lo, *hi]),
+            [] => Ok(otherwise),
+            _ => Err(format!("--{flag} wants the lower number first, then a higher one")),
+        };
+        if *motion == MotionKind::Ramp && duration.is_some_and(|duration| duration < ramp::SHORTEST) {
+            return Err(format!("ramps take {} s or more; give a longer --duration", ramp::SHORTEST));
+        }
+        Ok(match motion {
+            MotionKind::Multisine => Kind::Multisine,
+            MotionKind::Chirp => Kind::Chirp { frequency: rising("frequency", frequency, [0.2, 10.0])? },
+            MotionKind::Ramp => Kind::Ramp { speeds: rising("ramp-speeds", ramp_speeds, [0.005, 0.5])? },
+            MotionKind::Hold => Kind::Hold { poses: poses.unwrap_or(8) as usize },
+        })
+    }
+
+    /// Length [s] and amplitude [rad] where nothing else is asked for.
+    fn usual(&self) -> (f64, f64) {
+        match self.motion {
+            MotionKind::Multisine => (8.0, 0.25),
+            MotionKind::Chirp => (20.0, 0.25),
+            MotionKind::Ramp => (40.0, 0.25),
+            MotionKind::Hold => (40.0, 0.4),
+        }
+    }
+}
+
+/// Ends the program as for any other wrong argument.
+fn refuse(why: &str) -> ! {
+    use clap::CommandFactory as _;
+    super::Arguments::command().error(clap::error::ErrorKind::ArgumentConflict, why).exit()
 }
 
 #[derive(Debug, clap::Args)]
@@ -84,6 +184,10 @@ strikes, waits until the object rests, and steps back. Strokes come from all sid
 the first, so that scatter and drift can be told from a gap. Directions are chosen so that the object stays in reach; one
 that got away is asked for by hand.
 
+With --repeat, --headings and --turn-object every stroke goes out from the same place. The object has to stand there, to
+5 mm and 3 degrees: you are asked to put it back at x, y and a turn, and have two minutes. Where this capture has started the
+simulated cell itself it starts it anew with the object there instead. A stroke that is repeated has the same set points.
+
 A session that exists is continued with the next number; nothing is overwritten. At any moment p (or SIGUSR1)
 pauses: the arm brakes inside its limits and holds, and p (or SIGUSR2) goes on with a fresh try of the same clip. q or
 Ctrl-C ends: the arm brakes, and what was recorded is kept. A robot that stops itself ends it too; with --recover 3 it is
@@ -91,16 +195,59 @@ recovered up to three times 2 s later, the arm goes back and the clip is repeate
 
 Examples:
   calibration capture control-hit-slide --cell config/fr3_cell.toml --clips 12 --out strokes
-  calibration capture control-hit-slide --cell lab/cell.toml --clips 1 --out monday --preview next.svg")]
+  calibration capture control-hit-slide --cell lab/cell.toml --clips 1 --out monday --preview next.svg
+  calibration capture control-hit-slide --cell config/fr3_cell.toml --out strokes --repeat 0,4
+  calibration capture control-hit-slide --cell config/fr3_cell.toml --out strokes --repeat 4 --clips 8
+  calibration capture control-hit-slide --cell config/fr3_cell.toml --clips 6 --out strokes --speed 0.5
+  calibration capture control-hit-slide --cell config/fr3_cell.toml --out strokes --headings 8
+  calibration capture control-hit-slide --cell config/fr3_cell.toml --out strokes --turn-object 0,90,180
+  calibration capture control-hit-slide --cell config/fr3_cell.toml --out strokes --repeat 4 --turn-tool=-90")]
 pub(super) struct StrokeArguments {
     #[command(flatten)]
     task: TaskArguments,
+    /// Clips to add; with --repeat, --headings or --turn-object as many as they name, where nothing else is said.
+    #[arg(
+        long,
+        value_name = "N",
+        value_parser = clap::value_parser!(u32).range(1..=1000),
+        required_unless_present_any = ["repeat", "headings", "turn_object"]
+    )]
+    clips: Option<u32>,
+    /// Straight slides in so many headings, evenly all round, through the same place, 2 to 36.
+    #[arg(
+        long,
+        value_name = "N",
+        value_parser = clap::value_parser!(u32).range(2..=36),
+        conflicts_with_all = ["repeat", "turn_object"]
+    )]
+    headings: Option<u32>,
+    /// One straight stroke on the object turned about the vertical by so much from how it stands, or by each of several.
+    #[arg(
+        long,
+        value_name = "DEG[,DEG..]",
+        value_delimiter = ',',
+        allow_hyphen_values = true,
+        value_parser = turn,
+        conflicts_with = "repeat"
+    )]
+    turn_object: Vec<f64>,
+    /// Turns the tool about its own axis for every stroke; a turn that breaks a joint's limit is refused.
+    #[arg(long, value_name = "DEG", default_value_t = 0.0, allow_negative_numbers = true, value_parser = turn)]
+    turn_tool: f64,
     /// Draws the next stroke into this file and moves nothing.
     #[arg(long, value_name = "FILE.SVG")]
     preview: Option<PathBuf>,
     /// Prints one JSON object on stdout at the end.
     #[arg(long)]
     json: bool,
+}
+
+/// Degrees of a turn.
+fn turn(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(degrees) if degrees.abs() <= 360.0 => Ok(degrees),
+        _ => Err("give degrees from -360 to 360".into()),
+    }
 }
 
 pub(super) fn run(capture: Capture, interrupt: &Interrupt) -> anyhow::Result<()> {
@@ -112,8 +259,17 @@ pub(super) fn run(capture: Capture, interrupt: &Interrupt) -> anyhow::Result<()>
 }
 
 fn excite(arguments: ExcitationArguments, interrupt: &Interrupt) -> anyhow::Result<()> {
-    let ExcitationArguments { task, duration, amplitude, seed, json } = arguments;
-    let options = excitation::Options { task: task.task(), duration, amplitude, seed };
+    let kind = arguments.kind().unwrap_or_else(|why| refuse(&why));
+    let (duration, amplitude) = arguments.usual();
+    let ExcitationArguments { task, clips, joints, duration: asked, amplitude: wide, seed, json, .. } = arguments;
+    let options = excitation::Options {
+        task: task.task(clips, 0),
+        kind,
+        joints: joints.iter().map(|joint| *joint as usize - 1).collect(),
+        duration: asked.unwrap_or(duration),
+        amplitude: wide.unwrap_or(amplitude),
+        seed: seed.cast_unsigned(),
+    };
     let summary = excitation::capture(&options, interrupt, &mut String::new)?;
     let kept = summary.clips.iter().filter(|clip| clip.kept).count();
     console::line(format_args!("{}: {kept} of {} clips kept", summary.session.display(), options.task.clips));
@@ -121,8 +277,15 @@ fn excite(arguments: ExcitationArguments, interrupt: &Interrupt) -> anyhow::Resu
 }
 
 fn strike(arguments: StrokeArguments, interrupt: &Interrupt) -> anyhow::Result<()> {
-    let StrokeArguments { task, preview, json } = arguments;
-    let options = control_hit_slide::Options { task: task.task(), preview };
+    let StrokeArguments { task, clips, headings, turn_object, turn_tool, preview, json } = arguments;
+    let series = match (headings, &turn_object[..]) {
+        (Some(count), _) => Series::Headings(count as usize),
+        (None, []) => Series::Everywhere,
+        (None, turns) => Series::Turned(turns.iter().map(|degrees| degrees.to_radians()).collect()),
+    };
+    let named = headings.map_or(turn_object.len(), |count| count as usize);
+    let task = task.task(clips, named);
+    let options = control_hit_slide::Options { task, series, turn_tool: turn_tool.to_radians(), preview };
     let summary = control_hit_slide::capture(&options, interrupt)?;
     if options.preview.is_none() {
         let kept = summary.clips.iter().filter(|clip| clip.kept).count();

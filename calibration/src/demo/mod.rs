@@ -7,6 +7,7 @@ mod replay;
 mod stage;
 
 use crate::capture::excitation::{self, ClipSummary};
+use crate::capture::shape::Kind;
 use crate::capture::task::{Summary, Task};
 use crate::diagnose::{self, Diagnosis, Verdict, diagnose};
 use crate::interrupt::Interrupt;
@@ -218,8 +219,12 @@ fn record(
             arm: None,
             realtime: None,
             recover: 0,
+            repeat: Vec::new(),
+            speed: 1.0,
             domain: Some(domain),
         },
+        kind: Kind::Multisine,
+        joints: Vec::new(),
         duration: DURATION,
         amplitude: AMPLITUDE,
         seed: options.seed,

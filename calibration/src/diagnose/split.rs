@@ -2,6 +2,8 @@
 //!
 //! Clips of the same command stay together: what was fitted on one would be known on the other.
 
+use crate::capture::recorded;
+use shared_mem::msg::motion::SetPoint;
 use shared_mem::recording::Clip;
 
 /// The three sets, as indices of clips in ascending order.
@@ -48,12 +50,17 @@ impl Split {
 /// Commands that differ by less than this everywhere are the same [rad].
 const SAME: f64 = 1e-4;
 
+/// A clip's commanded motion, from rest to rest; `None` where it is no such motion.
+type Moving = Option<Vec<SetPoint>>;
+
 /// Clips grouped by their commands, groups in the order of their first clips.
 #[must_use]
 pub fn by_command(clips: &[Clip]) -> Vec<Vec<usize>> {
+    let moving: Vec<Moving> = clips.iter().map(|clip| recorded::motion(&clip.desired).ok()).collect();
+    let same = |a: usize, b: usize| same_rows(&clips[a], &clips[b]) || same_motion(&moving[a], &moving[b]);
     let mut groups: Vec<Vec<usize>> = Vec::new();
-    for (index, clip) in clips.iter().enumerate() {
-        match groups.iter_mut().find(|group| same_command(&clips[group[0]], clip)) {
+    for index in 0..clips.len() {
+        match groups.iter_mut().find(|group| same(group[0], index)) {
             Some(group) => group.push(index),
             None => groups.push(vec![index]),
         }
@@ -61,9 +68,16 @@ pub fn by_command(clips: &[Clip]) -> Vec<Vec<usize>> {
     groups
 }
 
-fn same_command(a: &Clip, b: &Clip) -> bool {
+fn same_rows(a: &Clip, b: &Clip) -> bool {
     let (a, b) = (&a.desired, &b.desired);
     !a.q.is_empty() && a.q.len() == b.q.len() && a.q.iter().zip(&b.q).all(|(a, b)| (a - b).abs() < SAME)
+}
+
+/// Whether one repeats the other: how long the arm rested before and after in each clip does not count.
+fn same_motion(a: &Moving, b: &Moving) -> bool {
+    let (Some(a), Some(b)) = (a, b) else { return false };
+    let near = |a: &SetPoint, b: &SetPoint| a.q_d.iter().zip(&b.q_d).all(|(a, b)| (a - b).abs() < SAME);
+    a.len().abs_diff(b.len()) <= 1 && a.iter().zip(b).all(|(a, b)| near(a, b))
 }
 
 #[cfg(test)]
