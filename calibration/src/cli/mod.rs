@@ -107,3 +107,54 @@ fn between<const LO: u32, const HI: u32, const UNIT: u32>(text: &str) -> Result<
 fn print_json(answer: &impl Serialize) -> anyhow::Result<()> {
     Ok(answer::json(answer)?)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use calibration::diagnose::advice;
+    use calibration::diagnose::site::Site;
+    use std::path::Path;
+
+    /// The words a POSIX shell makes of a command.
+    fn words(command: &str) -> Vec<String> {
+        let script = format!("for word in {command}; do printf '%s\\n' \"$word\"; done");
+        let output = std::process::Command::new("sh").args(["-c", &script]).output().expect("a shell");
+        String::from_utf8(output.stdout).expect("UTF-8").lines().map(str::to_owned).collect()
+    }
+
+    #[test]
+    fn every_command_that_a_report_advises_is_accepted() {
+        let mut accepted = std::collections::BTreeSet::new();
+        for (strokes, clips) in [(false, vec![0, 3]), (true, vec![1, 2]), (true, vec![]), (false, vec![])] {
+            for folder in ["monday", "it's monday/strokes"] {
+                let site = Site::new(Path::new(folder), strokes, clips.clone(), 1.62);
+                for command in advice::all(&site).into_iter().flat_map(|advice| advice.commands) {
+                    if accepted.insert(command.clone()) {
+                        Arguments::try_parse_from(words(&command)).unwrap_or_else(|error| panic!("{command}\n{error}"));
+                    }
+                }
+            }
+        }
+        assert!(accepted.len() > 40, "{} commands", accepted.len());
+    }
+
+    #[test]
+    fn what_does_not_go_together_is_refused_and_negative_numbers_are_no_options() {
+        let excitation = "calibration capture excitation --cell cell.toml --out session";
+        let strokes = "calibration capture control-hit-slide --cell cell.toml --out session";
+        for (command, fits) in [
+            (format!("{excitation} --clips 1 --seed=-5"), true),
+            (format!("{excitation} --clips 1 --seed -5"), true),
+            (excitation.to_owned(), false),
+            (format!("{excitation} --repeat 3,4 --speed 0.5"), true),
+            (format!("{excitation} --clips 1 --speed 0"), false),
+            (format!("{excitation} --clips 1 --joints 0"), false),
+            (format!("{strokes} --turn-object -90,0"), true),
+            (format!("{strokes} --headings 8 --repeat 1"), false),
+            (format!("{strokes} --repeat 2 --turn-tool -90"), true),
+            (strokes.to_owned(), false),
+        ] {
+            assert_eq!(Arguments::try_parse_from(words(&command)).is_ok(), fits, "{command}");
+        }
+    }
+}

@@ -1,106 +1,302 @@
-//! The one clip that would separate the leaders, from the pairs that are easily taken for each other.
+//! What to record next: a sentence, and the commands that record it.
+//!
+//! Where two effects are easily taken for each other the table has what separates them; where it has not, the stages they
+//! show in decide. What no capture can do, a weight to be hung or an object to be put somewhere, stands in the sentence first.
 
-/// Pairs and what separates them.
-const PAIRS: &[(&str, &str, &str)] = &[
+use super::site::Site;
+use twin::effects::{Stage, find};
+
+/// What to record next.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Advice {
+    /// The reason and the experiment, in words; steps for hands before those for the keyboard.
+    pub sentence: String,
+    /// Commands that can be typed as they are, in this order.
+    pub commands: Vec<String>,
+}
+
+/// A capture of an advice, without cell and session.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Capture {
+    /// The arm alone, new clips.
+    Arm(&'static str),
+    /// A stroke of the session again, with these arguments; a new one where there is none to repeat.
+    StrokeAgain(&'static str),
+    /// New strokes.
+    Strokes(&'static str),
+    /// New strokes into a session of its own, named so, because something in the cell is another then.
+    Elsewhere(&'static str, &'static str),
+}
+
+use Capture::{Arm, Elsewhere, StrokeAgain, Strokes};
+
+const CHIRP: Capture = Arm("--clips 1 --motion chirp --frequency 0.2 10");
+const FAST_CHIRP: Capture = Arm("--clips 1 --motion chirp --frequency 0.5 40");
+const RAMP: Capture = Arm("--clips 1 --motion ramp --ramp-speeds 0.005 0.5");
+const HOLD: Capture = Arm("--clips 1 --motion hold --poses 8");
+const MANY_HOLDS: Capture = Arm("--clips 1 --motion hold --poses 12 --amplitude 0.8");
+const NEW_MOTION: Capture = Arm("--clips 1");
+const HEADINGS: Capture = Strokes("--headings 8");
+const TURNED: Capture = Strokes("--turn-object 0,90,180");
+const ONE_STROKE: Capture = Strokes("--clips 1");
+
+/// Pairs, what separates them, and what records it.
+const PAIRS: &[(&str, &str, &str, &[Capture])] = &[
     (
         "joint_coulomb_friction",
         "joint_load_friction",
-        "the same slow velocity sweep once with the arm stretched out and once folded",
+        "slow ramps once with the arm stretched out and once folded; move it there by hand before each",
+        &[RAMP, RAMP],
     ),
-    ("joint_coulomb_friction", "joint_stribeck_friction", "slow ramps from 0.005 to 0.5 rad/s with many reversals"),
+    (
+        "joint_coulomb_friction",
+        "joint_stribeck_friction",
+        "slow ramps from 0.005 to 0.5 rad/s with many reversals",
+        &[RAMP],
+    ),
     (
         "joint_viscous_friction",
         "torque_delay",
-        "the same chirp with the nominal damping and with half of it, torques logged",
+        "a chirp up to 40 Hz with torques logged: a delay lags the more the faster it swings, friction does not",
+        &[FAST_CHIRP],
     ),
-    ("command_delay", "command_lag", "a chirp up to 10 Hz: only a lag lowers the gain"),
-    ("command_delay", "camera_latency", "a sharp stop of the arm with the tool in view: compare encoders with poses"),
+    ("command_delay", "command_lag", "a chirp up to 10 Hz: only a lag lowers the gain", &[CHIRP]),
+    (
+        "command_delay",
+        "camera_latency",
+        "a chirp, and a stroke again at half its speed: a late command is late in the encoders too, a late camera only in the poses",
+        &[CHIRP, StrokeAgain("--speed 0.5")],
+    ),
     (
         "joint_stribeck_friction",
         "joint_backlash",
-        "approach one pose from both sides, with and without a weight that keeps the gears pressed",
+        "approach poses from both sides; then hang a weight on the flange that keeps the gears pressed, and do it again in a session of its own whose cell.toml has the weight",
+        &[HOLD],
     ),
     (
         "joint_coulomb_friction",
         "joint_backlash",
-        "approach one pose from both sides, with and without a weight that keeps the gears pressed",
+        "approach poses from both sides, and run slow ramps: friction holds at any load, play only where the torque changes its sign",
+        &[HOLD, RAMP],
     ),
-    ("rotor_inertia", "payload", "the same fast motion in three poses: a payload's inertia changes with the pose"),
-    ("rotor_inertia", "joint_elasticity", "a chirp from 5 to 40 Hz: look for a resonance"),
-    ("payload", "torque_gain", "rest in eight poses or more, gravity pulling either way"),
-    ("payload", "joint_friction_asymmetry", "rest in eight poses or more, gravity pulling either way"),
-    ("payload", "base_tilt", "rest in eight poses or more, turned about the base's axis"),
-    ("torque_sensor_bias", "joint_friction_asymmetry", "hang a known weight on the flange and log the torques"),
-    ("restitution", "contact_compliance", "hits from 0.1 to 0.6 m/s with the nominal stiffness and with half of it"),
-    ("tip_friction", "tool_offset", "straight hits with the object turned by 0, 90 and 180 degrees"),
-    ("object_inertia", "pressure_distribution", "spin the object on the spot by hand, and push it without spin"),
-    ("table_tilt", "anisotropic_friction", "slides in eight headings through the same place"),
-    ("table_tilt", "base_tilt", "rest the arm in eight poses, and slide in eight headings"),
+    (
+        "rotor_inertia",
+        "payload",
+        "the same kind of fast motion in three poses, because a payload's inertia changes with the pose; move the arm by hand before each",
+        &[NEW_MOTION, NEW_MOTION, NEW_MOTION],
+    ),
+    ("rotor_inertia", "joint_elasticity", "a chirp up to 40 Hz: look for a resonance", &[FAST_CHIRP]),
+    ("payload", "torque_gain", "rest in eight poses or more, gravity pulling either way", &[HOLD]),
+    ("payload", "joint_friction_asymmetry", "rest in eight poses or more, gravity pulling either way", &[HOLD]),
+    ("payload", "base_tilt", "rest in eight poses or more, turned about the base's axis", &[MANY_HOLDS]),
+    (
+        "torque_sensor_bias",
+        "joint_friction_asymmetry",
+        "hang a known weight on the flange and rest in eight poses, torques logged",
+        &[HOLD],
+    ),
+    (
+        "restitution",
+        "contact_compliance",
+        "strokes at half their speed beside those there are: restitution keeps the ratio of the speeds, compliance does not",
+        &[StrokeAgain("--speed 0.5"), Strokes("--clips 4 --speed 0.5")],
+    ),
+    (
+        "tip_friction",
+        "tool_offset",
+        "straight hits with the object turned by 0, 90 and 180 degrees, and one with the tool turned about its own axis",
+        &[TURNED, StrokeAgain("--turn-tool=-90")],
+    ),
+    (
+        "object_inertia",
+        "pressure_distribution",
+        "straight hits without spin and others beside the centre: inertia shows in the spin just after the hit, pressure in how it fades",
+        &[TURNED, Strokes("--clips 6")],
+    ),
+    ("table_tilt", "anisotropic_friction", "slides in eight headings through the same place", &[HEADINGS]),
+    ("table_tilt", "base_tilt", "rest the arm in eight poses, and slide in eight headings", &[HOLD, HEADINGS]),
     (
         "anisotropic_friction",
         "friction_patch",
-        "the same heading in different places, the same place with different headings",
+        "the same place in different headings, and different places",
+        &[HEADINGS, Strokes("--clips 8")],
     ),
-    ("velocity_dependent_friction", "viscous_sliding_drag", "the same slides with a known weight on top of the object"),
+    (
+        "velocity_dependent_friction",
+        "viscous_sliding_drag",
+        "fix a known weight on top of the object, put its mass into a cell.toml of its own, and record the same kind of slides",
+        &[Elsewhere("weighted", "--clips 8")],
+    ),
     (
         "camera_latency",
         "tracker_smoothing",
-        "a sharp stop of the object against a wall: smoothing rounds it, latency does not",
+        "fix a block where the object slides to, so that it stops sharply: smoothing rounds the stop, latency does not",
+        &[Strokes("--clips 4")],
     ),
-    ("camera_extrinsic_rotation", "camera_extrinsic_translation", "rest the object in four places far apart"),
-    ("camera_scale", "camera_extrinsic_rotation", "rest the object in places a known distance apart"),
+    (
+        "camera_extrinsic_rotation",
+        "camera_extrinsic_translation",
+        "put the object in a place far from the last one before each of these",
+        &[ONE_STROKE, ONE_STROKE, ONE_STROKE, ONE_STROKE],
+    ),
+    (
+        "camera_scale",
+        "camera_extrinsic_rotation",
+        "put the object a known distance from the last place before each of these",
+        &[ONE_STROKE, ONE_STROKE],
+    ),
 ];
+
+/// What tells effects of a stage apart where nothing more is known of them.
+fn general(stage: Stage) -> (&'static str, &'static [Capture]) {
+    match stage {
+        Stage::Control => ("slow ramps, a chirp and rests in eight poses, torques logged", &[RAMP, CHIRP, HOLD]),
+        Stage::Hit => (
+            "straight hits on the object turned by 0, 90 and 180 degrees, and a stroke again at half its speed",
+            &[TURNED, StrokeAgain("--speed 0.5")],
+        ),
+        Stage::Slide => (
+            "slides in eight headings through the same place, and others at half their speed",
+            &[HEADINGS, Strokes("--clips 4 --speed 0.5")],
+        ),
+        Stage::Camera => {
+            ("strokes that begin in places far apart; put the object there before each", &[ONE_STROKE, ONE_STROKE])
+        }
+    }
+}
 
 /// What to record next to tell these effects apart.
 #[must_use]
-pub fn separating(effects: &[&str]) -> String {
+pub fn separating(effects: &[&str], site: &Site) -> Advice {
     let both = |a: &str, b: &str| effects.contains(&a) && effects.contains(&b);
-    if let Some((a, b, clip)) = PAIRS.iter().find(|(a, b, _)| both(a, b)) {
-        return format!("To tell {a} from {b}: {clip}.");
+    if let Some((a, b, clip, captures)) = PAIRS.iter().find(|(a, b, ..)| both(a, b)) {
+        return site.advice(format!("To tell {a} from {b}: {clip}."), captures);
     }
-    match effects {
-        [] => String::new(),
-        all => format!(
-            "To tell {} apart: slow triangles, a chirp and holds in one clip, with desired and measured torques logged.",
-            all.join(", ")
-        ),
+    if effects.is_empty() {
+        return Advice::default();
     }
+    let mut stages: Vec<Stage> = Vec::new();
+    for stage in effects.iter().filter_map(|name| find(name)).map(|effect| effect.stage) {
+        if !stages.contains(&stage) {
+            stages.push(stage);
+        }
+    }
+    let (words, captures): (Vec<_>, Vec<_>) = stages.into_iter().map(general).unzip();
+    site.advice(format!("To tell {} apart: {}.", effects.join(", "), words.join("; ")), &captures.concat())
 }
 
 /// What to record next to confirm what was found.
 #[must_use]
-pub fn confirming(effects: &[String]) -> String {
-    let effects = effects.join(" and ");
-    format!("To confirm {effects}: repeat two of these clips and add one with half and one with twice the speed.")
+pub fn confirming(effects: &[String], site: &Site) -> Advice {
+    let (words, commands) = site.again(2);
+    site.finished(format!("To confirm {}: {words}.", effects.join(" and ")), commands)
 }
 
 /// What to record where something unknown is left.
 #[must_use]
-pub fn unexplained(place: Option<(&str, &str)>) -> String {
-    let Some((channel, regime)) = place else { return String::new() };
-    format!(
-        "What is left is largest in {channel} ({regime}): repeat one clip eight times there, then once at half and once at \
-         double speed, to see whether it repeats and how it grows."
-    )
+pub fn unexplained(place: Option<(&str, &str)>, site: &Site) -> Advice {
+    let Some((channel, regime)) = place else { return Advice::default() };
+    let (words, commands) = site.again(8);
+    let sentence = format!(
+        "What is left is largest in {channel} ({regime}): {words}, to see whether it repeats and how it grows."
+    );
+    site.finished(sentence, commands)
+}
+
+/// What to record where the clips do not say enough.
+#[must_use]
+pub fn lacking(why: &str, site: &Site) -> Advice {
+    let command = if site.strikes() { Strokes("--clips 12") } else { Arm("--clips 8") };
+    site.advice(format!("Record a session that has what this one lacks: {why}."), &[command])
+}
+
+/// What to record where nothing is open.
+#[must_use]
+pub fn nothing_open(site: &Site) -> Advice {
+    let commands = site.usual();
+    Advice { sentence: "Nothing is open; record the next session as usual.".into(), commands }
+}
+
+/// Every advice there is, for those who check that each can be carried out.
+#[must_use]
+pub fn all(site: &Site) -> Vec<Advice> {
+    let mut all: Vec<Advice> = PAIRS.iter().map(|(a, b, ..)| separating(&[a, b], site)).collect();
+    for effect in twin::effects::registry() {
+        all.extend(effect.confusable_with.iter().map(|other| separating(&[effect.name, other], site)));
+        all.push(separating(&[effect.name], site));
+    }
+    all.push(confirming(&["payload".to_owned()], site));
+    all.push(unexplained(Some(("yaw", "after the slide")), site));
+    all.push(lacking("four clips", site));
+    all.push(nothing_open(site));
+    all
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use twin::effects::find;
+    use std::path::Path;
+    use twin::effects::registry;
+
+    fn strokes() -> Site {
+        Site::new(Path::new("monday strokes"), true, vec![0, 3], 1.37)
+    }
 
     #[test]
     fn advice_names_effects_that_exist() {
-        for (a, b, _) in PAIRS {
+        for (a, b, ..) in PAIRS {
             assert!(find(a).is_some() && find(b).is_some(), "{a} {b}");
         }
     }
 
     #[test]
     fn a_class_of_two_gets_the_clip_that_separates_them_and_two_that_act_together_one_that_confirms_them() {
-        assert!(separating(&["command_lag", "command_delay"]).contains("10 Hz"));
-        assert!(
-            confirming(&["command_delay".into(), "friction_patch".into()]).contains("delay and friction_patch: repeat")
+        let arm = Site::new(Path::new("monday"), false, vec![0, 3], 2.0);
+        let advice = separating(&["command_lag", "command_delay"], &arm);
+        assert!(advice.sentence.contains("10 Hz"));
+        assert_eq!(
+            advice.commands,
+            [
+                "calibration capture excitation --cell monday/cell.toml --out monday --clips 1 --motion chirp --frequency 0.2 10",
+                "calibration diagnose monday --report report.html"
+            ]
         );
+        let advice = confirming(&["command_delay".into(), "friction_patch".into()], &arm);
+        assert!(advice.sentence.contains("delay and friction_patch: repeat two clips"), "{}", advice.sentence);
+        let expected = ["--repeat 0,3", "--repeat 0 --speed 0.5", "--repeat 0 --speed 2"];
+        for (command, end) in advice.commands.iter().zip(expected) {
+            assert!(command.ends_with(end), "{command}");
+        }
+    }
+
+    #[test]
+    fn every_pair_that_is_easily_confused_gets_a_sentence_and_commands() {
+        for site in [strokes(), Site::new(Path::new("monday"), false, Vec::new(), 1.0)] {
+            for effect in registry() {
+                for other in effect.confusable_with {
+                    let advice = separating(&[effect.name, other], &site);
+                    assert!(advice.sentence.ends_with('.') && !advice.commands.is_empty(), "{} {other}", effect.name);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn clips_of_the_other_kind_go_into_a_session_beside_and_a_faster_one_is_no_faster_than_the_limits_allow() {
+        let advice = separating(&["table_tilt", "base_tilt"], &strokes());
+        assert_eq!(
+            advice.commands,
+            [
+                "calibration capture excitation --cell 'monday strokes/cell.toml' --out 'monday strokes_arm' --clips 4",
+                "calibration capture excitation --cell 'monday strokes/cell.toml' --out 'monday strokes_arm' --clips 1 --motion hold --poses 8",
+                "calibration capture control-hit-slide --cell 'monday strokes/cell.toml' --out 'monday strokes' --headings 8",
+                "calibration diagnose 'monday strokes_arm' --report report_arm.html",
+                "calibration diagnose 'monday strokes' --report report.html",
+            ]
+        );
+        let advice = unexplained(Some(("yaw", "rest")), &strokes());
+        assert!(advice.sentence.contains("at 1.37 times the speed, the most that the limits allow"), "{advice:?}");
+        assert!(advice.commands[0].ends_with("--repeat 0 --clips 8") && advice.commands[2].ends_with("--speed 1.37"));
+        assert_eq!(separating(&[], &strokes()), Advice::default());
     }
 }

@@ -1,5 +1,6 @@
 //! The answer of a diagnosis, as it is written to diagnosis.json and shown on the page.
 
+use super::remedies::Remedy;
 use crate::report::Trace;
 use serde::ser::{Serialize, SerializeStruct, Serializer};
 use shared_mem::theta::Theta;
@@ -22,6 +23,10 @@ pub struct Diagnosis {
     pub candidates: Vec<Candidate>,
     /// The one clip that separates the leaders; empty where nothing is left to separate.
     pub next_experiment: String,
+    /// The commands that record it, in this order, as they can be typed.
+    pub next_commands: Vec<String>,
+    /// What to do about the effects that are named, in the cell and in a model.
+    pub remedies: Vec<Remedy>,
     /// Which clips were used for what.
     pub clips: Clips,
     /// What a reader has to know about the clips, one sentence each.

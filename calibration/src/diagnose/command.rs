@@ -16,6 +16,9 @@ use std::path::PathBuf;
 The twin is identified first, then every known effect is tried, alone and with others, on clips that were not used to fit
 it. The verdict is none, named, class (several that these clips cannot tell apart), unexplained or not_testable.
 
+What to record next is printed as commands that can be typed, and of an effect that is named what to do about it in the
+cell and in a model.
+
 The parameters found go to --theta: `twin replay SESSION --parameters theta.toml` shows the same gap, shrunk.
 
 Examples:

@@ -1,16 +1,18 @@
 //! From what the search found to the answer: the confirm clips are opened here, and only here.
 
 use super::admit::Admitted;
-use super::answer::{Change, Clips, Diagnosis, Gap, Nearest, Place, Share};
+use super::advice::Advice;
+use super::answer::{Change, Clips, Diagnosis, Gap, Nearest, Place, Share, Verdict};
 use super::combine::{Found, Step};
 use super::evidence::Evidence;
 use super::fit::{Bench, Hypothesis};
 use super::gap::Residuals;
 use super::leftovers::{self, Left};
 use super::score::foretell;
+use super::site::Site;
 use super::split::Split;
 use super::verdict::{self, Finding};
-use super::{DiagnoseError, Kind, Options, advice, combine, confidence, drift, localise, ranked, settle};
+use super::{DiagnoseError, Kind, Options, advice, combine, confidence, drift, localise, ranked, remedies, settle};
 use crate::report::Trace;
 use shared_mem::recording::Session;
 use shared_mem::theta::Theta;
@@ -25,6 +27,7 @@ const TRACES: usize = 12;
 #[must_use]
 pub fn not_testable(session: &Session, options: &Options, theta: Theta, why: &str) -> Diagnosis {
     let nothing = Share { value: 0.0, ci90: [0.0; 2] };
+    let lacking = advice::lacking(why, &Site::of(session));
     Diagnosis {
         verdict: verdict::not_testable(why),
         gap: Gap {
@@ -41,7 +44,9 @@ pub fn not_testable(session: &Session, options: &Options, theta: Theta, why: &st
         nearest: None,
         places: Vec::new(),
         candidates: Vec::new(),
-        next_experiment: format!("Record a session that has what this one lacks: {why}."),
+        next_experiment: lacking.sentence,
+        next_commands: lacking.commands,
+        remedies: Vec::new(),
         clips: Clips::default(),
         warnings: Vec::new(),
         seconds: 0.0,
@@ -100,6 +105,8 @@ pub fn conclude<E: Evidence>(
     };
     let names = |set: &[usize]| set.iter().map(|clip| admitted.files[*clip].clone()).collect();
     let largest = rest.first().map(|place| (place.channel.as_str(), place.regime.as_str()));
+    let next = next(&verdict, finding.open().is_some(), largest, &Site::of(session));
+    let theta = bench.library.theta(&kept.full);
     Ok(Diagnosis {
         gap,
         candidates: ranked::candidates(
@@ -110,13 +117,9 @@ pub fn conclude<E: Evidence>(
             verdict.kind,
             options.seed,
         ),
-        next_experiment: match verdict.kind {
-            Kind::Unexplained => advice::unexplained(largest),
-            Kind::Named if finding.open().is_some() => advice::unexplained(largest),
-            Kind::None => "Nothing is open; record the next session as usual.".into(),
-            Kind::Named => advice::confirming(&verdict.effects),
-            _ => advice::separating(&verdict.effects.iter().map(String::as_str).collect::<Vec<_>>()),
-        },
+        next_experiment: next.sentence,
+        next_commands: next.commands,
+        remedies: remedies::of(&verdict, &theta, &session.cell),
         verdict,
         places,
         clips: Clips { train: names(&split.train), choose: names(&split.choose), confirm: names(&split.confirm) },
@@ -124,11 +127,24 @@ pub fn conclude<E: Evidence>(
         seconds: 0.0,
         session: session.folder.display().to_string(),
         seed: options.seed,
-        theta: bench.library.theta(&kept.full),
+        theta,
         theta_file: None,
         traces: traces(bench.evidence, (&before, if nearest.is_some() { &after } else { shown }), &admitted.files),
         nearest,
     })
+}
+
+/// What to record next; `open`: only the arm's gap is explained, `largest`: where what is left is largest.
+fn next(verdict: &Verdict, open: bool, largest: Option<(&str, &str)>, site: &Site) -> Advice {
+    match verdict.kind {
+        Kind::Unexplained => advice::unexplained(largest, site),
+        Kind::Named if open => advice::unexplained(largest, site),
+        Kind::None => advice::nothing_open(site),
+        Kind::Named => advice::confirming(&verdict.effects, site),
+        Kind::Class | Kind::NotTestable => {
+            advice::separating(&verdict.effects.iter().map(String::as_str).collect::<Vec<_>>(), site)
+        }
+    }
 }
 
 /// Whether enough of the gap closes on the confirm clips for a cause, in their mean or in a clip like most.

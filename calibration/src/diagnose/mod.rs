@@ -25,7 +25,9 @@
 //! | [`flat`] | which of their numbers nothing depends on |
 //! | [`leftovers`], [`drift`] | what they leave |
 //! | [`gap`], [`localise`] | how large the gap is, and where |
-//! | [`parameters`], [`confidence`], [`verdict`], [`advice`] | what is said about it |
+//! | [`parameters`], [`confidence`], [`verdict`] | what is said about it |
+//! | [`advice`], [`site`] | what to record next, and the commands for it |
+//! | [`remedies`] | what to do about what was named |
 //! | [`ranked`] | what is said of every candidate |
 //! | [`conclude`], [`answer`] | the answer |
 //! | [`command`] | the verb |
@@ -59,11 +61,13 @@ pub mod noise;
 pub mod parameters;
 pub mod quadratic;
 pub mod ranked;
+pub mod remedies;
 pub mod ripple;
 pub mod scatter;
 pub mod score;
 pub mod settle;
 pub mod shortlist;
+pub mod site;
 pub mod split;
 pub mod starts;
 pub mod straying;
@@ -72,6 +76,8 @@ pub mod sweep;
 mod test_bench;
 pub mod verdict;
 pub mod worthy;
+
+pub use remedies::Remedy;
 
 pub use answer::{Candidate, Change, Clips, Diagnosis, Gap, Kind, Nearest, Place, Share, Size, Status, Verdict};
 

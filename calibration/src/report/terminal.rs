@@ -62,6 +62,12 @@ pub fn diagnosis(diagnosis: &Diagnosis) -> String {
     if !diagnosis.next_experiment.is_empty() {
         lines.push(format!("next clip: {}", diagnosis.next_experiment));
     }
+    lines.extend(diagnosis.next_commands.iter().map(|command| format!("    {command}")));
+    for remedy in &diagnosis.remedies {
+        let effect = words(&remedy.effect);
+        lines.push(format!("about {effect}, in the cell: {}", remedy.in_cell));
+        lines.push(format!("about {effect}, in a model: {}", remedy.in_model));
+    }
     let verdict = &diagnosis.verdict;
     let sure = probability(verdict.confidence);
     lines.push(format!("{} (confidence {sure}): {}", verdict_words(verdict.kind), verdict.text));

@@ -29,8 +29,13 @@ pub fn page(diagnosis: &Diagnosis) -> String {
         }
         @if !diagnosis.traces.is_empty() { (residuals(diagnosis)) }
         @if !diagnosis.candidates.is_empty() { (candidates::sections(&diagnosis.candidates)) }
+        @if !diagnosis.remedies.is_empty() { (remedies(diagnosis)) }
         @if !diagnosis.next_experiment.is_empty() {
-            section { h2 { "The next clip" } p.next { (diagnosis.next_experiment) } }
+            section {
+                h2 { "The next clip" }
+                p.next { (diagnosis.next_experiment) }
+                @if !diagnosis.next_commands.is_empty() { pre { code { (diagnosis.next_commands.join("\n")) } } }
+            }
         }
         @if !diagnosis.warnings.is_empty() {
             section { h2 { "Worth knowing" } @for warning in &diagnosis.warnings { p { (warning) } } }
@@ -106,6 +111,20 @@ fn residuals(diagnosis: &Diagnosis) -> Markup {
     figure("Clips never used: measured less predicted", "The worst channel of the worst clips.", &pictures)
 }
 
+fn remedies(diagnosis: &Diagnosis) -> Markup {
+    html! {
+        section {
+            h2 { "What to do about it" }
+            table {
+                tr { th { "effect" } th { "in the cell" } th { "in a model" } }
+                @for remedy in &diagnosis.remedies {
+                    tr { td { (words(&remedy.effect)) } td { (remedy.in_cell) } td { (remedy.in_model) } }
+                }
+            }
+        }
+    }
+}
+
 fn origin(diagnosis: &Diagnosis) -> Markup {
     let clips = &diagnosis.clips;
     let used = [("fitted on", &clips.train), ("chosen on", &clips.choose), ("confirmed on", &clips.confirm)];
@@ -140,7 +159,7 @@ fn clip_list(clips: &[String]) -> String {
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
-    use crate::diagnose::{Candidate, Change, Clips, Gap, Nearest, Place, Share, Size, Status, Verdict};
+    use crate::diagnose::{Candidate, Change, Clips, Gap, Nearest, Place, Remedy, Share, Size, Status, Verdict};
     use crate::report::Trace;
     use shared_mem::theta::Theta;
     use std::collections::BTreeMap;
@@ -201,6 +220,15 @@ pub(super) mod tests {
                 candidate("camera_latency", 0.0, Status::NotTestable),
             ],
             next_experiment: "Play a chirp up to 10 Hz.".into(),
+            next_commands: vec![
+                "calibration capture excitation --motion chirp".into(),
+                "calibration diagnose monday".into(),
+            ],
+            remedies: vec![Remedy {
+                effect: "command_delay".into(),
+                in_cell: "Send commands 12 ms earlier.".into(),
+                in_model: "Hold them back by 12 ms.".into(),
+            }],
             clips: Clips { train: vec!["clip_00.mcap".into(), "clip_01.mcap".into()], ..Clips::default() },
             warnings: Vec::new(),
             seconds: 83.2,
@@ -232,7 +260,11 @@ pub(super) mod tests {
             "the reason of payload",
             "could not have shown",
             "the reason of camera_latency",
+            "What to do about it",
+            "Send commands 12 ms earlier.",
+            "Hold them back by 12 ms.",
             "Play a chirp",
+            "<pre><code>calibration capture excitation --motion chirp\ncalibration diagnose monday</code></pre>",
             "2 clips: clip_00, clip_01",
             "twin replay monday --parameters theta.toml",
         ];

@@ -1,0 +1,61 @@
+//! What to do about effects that were named: in the cell, and in a model. Each effect says it itself, from what was identified.
+
+use super::answer::{Kind, Verdict};
+use shared_mem::cell::Cell;
+use shared_mem::theta::Theta;
+use twin::effects::find;
+
+/// What to do about one effect.
+#[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
+pub struct Remedy {
+    /// Name of the registry.
+    pub effect: String,
+    /// On the hardware, in the robot's settings, or in cell.toml.
+    pub in_cell: String,
+    /// In a model of the cell, whichever simulator it is for.
+    pub in_model: String,
+}
+
+/// A remedy for each effect that the verdict names, with its numbers of `theta`; none where it names none for sure.
+#[must_use]
+pub fn of(verdict: &Verdict, theta: &Theta, cell: &Cell) -> Vec<Remedy> {
+    if verdict.kind != Kind::Named {
+        return Vec::new();
+    }
+    let remedy = |name: &String| {
+        let block = theta.effects.iter().find(|block| block.name == *name)?;
+        let numbers = |parameter: &str| {
+            let number = |value: &toml::Value| value.as_float().or_else(|| value.as_integer().map(|i| i as f64));
+            match block.parameters.get(parameter)? {
+                toml::Value::Array(all) => all.iter().map(number).collect(),
+                single => number(single).map(|number| vec![number]),
+            }
+        };
+        let twin::effects::Remedy { in_cell, in_model } = find(name)?.remedy(cell, &numbers);
+        Some(Remedy { effect: name.clone(), in_cell, in_model })
+    };
+    verdict.effects.iter().filter_map(remedy).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use shared_mem::toml_file;
+    use std::path::Path;
+
+    #[test]
+    fn named_effects_get_a_remedy_with_the_numbers_found_and_a_class_gets_none() {
+        let text = "[[effect]]\nname = \"table_tilt\"\ntilt = [0.0, 0.04]\n[[effect]]\nname = \"command_delay\"\ndelay = 0.012\n";
+        let theta: Theta = toml_file::parse(text, Path::new("theta.toml")).expect("a theta.toml");
+        let effects = vec!["command_delay".to_owned(), "table_tilt".to_owned()];
+        let mut verdict = Verdict { kind: Kind::Named, effects, confidence: 0.9, text: String::new() };
+        let found = of(&verdict, &theta, &Cell::default());
+        assert_eq!(
+            found.iter().map(|remedy| remedy.effect.as_str()).collect::<Vec<_>>(),
+            ["command_delay", "table_tilt"]
+        );
+        assert!(found[0].in_cell.contains("12 ms late") && found[1].in_cell.contains("2.29 degrees"), "{found:?}");
+        verdict.kind = Kind::Class;
+        assert!(of(&verdict, &theta, &Cell::default()).is_empty());
+    }
+}

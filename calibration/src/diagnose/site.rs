@@ -1,0 +1,196 @@
+//! Where an advice is carried out: the session, its clips that can be repeated, and how much faster they may be played. It
+//! makes commands that can be typed of what an advice asks for.
+
+use super::advice::{Advice, Capture};
+use crate::capture::body::Body;
+use crate::capture::session::number_of;
+use crate::capture::{limits, pace, recorded};
+use shared_mem::cell::ClipKind;
+use shared_mem::recording::Session;
+use std::path::Path;
+
+/// Clips that are repeated to confirm something.
+const TWO: usize = 2;
+/// A faster clip is worth it from this factor on.
+const WORTH: f64 = 1.2;
+/// Twice as fast is enough.
+const TWICE: f64 = 2.0;
+
+/// A session and what can be recorded into it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Site {
+    folder: String,
+    /// Whether its clips are strokes; otherwise the arm moves alone.
+    strokes: bool,
+    /// Numbers of clips that can be repeated.
+    clips: Vec<usize>,
+    /// The largest factor at which the first of them can be played.
+    fastest: f64,
+}
+
+impl Site {
+    /// Of a session whose clips lie on disk; where they cannot be read again, nothing can be repeated.
+    #[must_use]
+    pub fn of(session: &Session) -> Self {
+        let strokes =
+            !session.clips.is_empty() && session.clips.iter().all(|clip| clip.kind == ClipKind::ControlHitSlide);
+        let kind = if strokes { ClipKind::ControlHitSlide } else { ClipKind::Excitation };
+        let (mut clips, mut fastest) = (Vec::new(), 1.0);
+        if let Ok(body) = Body::of(&session.cell) {
+            let numbers =
+                session.clips.iter().filter(|clip| clip.kind == kind).filter_map(|clip| number_of(&clip.file));
+            for number in numbers.take(2 * TWO) {
+                let Ok(clip) = recorded::read(&session.folder, number, kind, &body) else { continue };
+                if clips.is_empty() {
+                    fastest = pace::largest(&clip.set_points, &limits::of(&session.cell, &body), &body);
+                }
+                clips.push(number);
+                if clips.len() == TWO {
+                    break;
+                }
+            }
+        }
+        Self::new(&session.folder, strokes, clips, fastest)
+    }
+
+    /// Of a session in `folder` with clips that can be repeated, the first of them `fastest` times as fast at most.
+    #[must_use]
+    pub fn new(folder: &Path, strokes: bool, clips: Vec<usize>, fastest: f64) -> Self {
+        let folder = folder.display().to_string();
+        let folder = if folder.len() > 1 { folder.trim_end_matches('/').to_owned() } else { folder };
+        Self { folder, strokes, clips, fastest }
+    }
+
+    /// Whether its clips are strokes.
+    pub(super) fn strikes(&self) -> bool {
+        self.strokes
+    }
+
+    /// The sentence with the commands of `captures`, and what diagnoses them.
+    pub(super) fn advice(&self, sentence: String, captures: &[Capture]) -> Advice {
+        let mut commands = Vec::new();
+        // A session begins with clips enough to be diagnosed.
+        let beside = captures.iter().find_map(|capture| match capture {
+            Capture::Arm(_) if self.strokes => Some(self.arm("--clips 4")),
+            Capture::StrokeAgain(_) | Capture::Strokes(_) if !self.strokes => Some(self.strokes("--clips 6")),
+            _ => None,
+        });
+        commands.extend(beside);
+        commands.extend(captures.iter().map(|capture| match capture {
+            Capture::Arm(rest) => self.arm(rest),
+            Capture::Strokes(rest) => self.strokes(rest),
+            Capture::StrokeAgain(rest) => match self.clips.first() {
+                Some(number) if self.strokes => self.strokes(&format!("--repeat {number} {rest}")),
+                _ => self.strokes(&format!("--clips 1 {rest}")),
+            },
+            Capture::Elsewhere(name, rest) => {
+                let own = format!("{}_{name}", self.folder);
+                capture_into("control-hit-slide", &format!("{own}.toml"), &own, rest)
+            }
+        }));
+        self.finished(sentence, commands)
+    }
+
+    /// Repeats: the words for it and the commands. Of eight only one clip is repeated, of two both.
+    pub(super) fn again(&self, times: usize) -> (String, Vec<String>) {
+        let fast = (100.0 * self.fastest.min(TWICE)).floor() / 100.0;
+        let speeds = match fast {
+            fast if fast >= TWICE => "one at half and one at twice the speed".to_owned(),
+            fast if fast >= WORTH => {
+                format!("one at half and one at {fast} times the speed, the most that the limits allow")
+            }
+            _ => "one at half the speed".to_owned(),
+        };
+        let what = if times > TWO { "repeat one clip eight times" } else { "repeat two clips" };
+        let Some(first) = self.clips.first() else {
+            let words =
+                format!("record {times} clips more, and {}", speeds.replace("one at half and", "some at half and"));
+            return (words, vec![self.same(&format!("--clips {times}")), self.same("--clips 2 --speed 0.5")]);
+        };
+        let all: Vec<String> = self.clips.iter().take(TWO).map(ToString::to_string).collect();
+        let repeated = if times > TWO {
+            format!("--repeat {first} --clips {times}")
+        } else {
+            format!("--repeat {}", all.join(","))
+        };
+        let mut commands = vec![self.same(&repeated), self.same(&format!("--repeat {first} --speed 0.5"))];
+        if fast >= WORTH {
+            commands.push(self.same(&format!("--repeat {first} --speed {fast}")));
+        }
+        (format!("{what} and add {speeds}"), commands)
+    }
+
+    /// Another session of the same kind.
+    pub(super) fn usual(&self) -> Vec<String> {
+        let (next, cell) = (format!("{}_next", self.folder), self.cell());
+        vec![if self.strokes {
+            capture_into("control-hit-slide", &cell, &next, "--clips 12")
+        } else {
+            capture_into("excitation", &cell, &next, "--clips 8")
+        }]
+    }
+
+    /// The sentence with commands, and after them what diagnoses the sessions they record into.
+    pub(super) fn finished(&self, sentence: String, mut commands: Vec<String>) -> Advice {
+        for (end, page) in [("_arm", "report_arm.html"), ("_strokes", "report_strokes.html"), ("", "report.html")] {
+            let folder = quoted(&format!("{}{end}", self.folder));
+            if commands.iter().any(|command| command.contains(&format!("--out {folder} "))) {
+                commands.push(format!("calibration diagnose {folder} --report {page}"));
+            }
+        }
+        Advice { sentence, commands }
+    }
+
+    fn same(&self, rest: &str) -> String {
+        if self.strokes { self.strokes(rest) } else { self.arm(rest) }
+    }
+
+    fn arm(&self, rest: &str) -> String {
+        let end = if self.strokes { "_arm" } else { "" };
+        capture_into("excitation", &self.cell(), &format!("{}{end}", self.folder), rest)
+    }
+
+    fn strokes(&self, rest: &str) -> String {
+        let end = if self.strokes { "" } else { "_strokes" };
+        capture_into("control-hit-slide", &self.cell(), &format!("{}{end}", self.folder), rest)
+    }
+
+    fn cell(&self) -> String {
+        Path::new(&self.folder).join("cell.toml").display().to_string()
+    }
+}
+
+fn capture_into(verb: &str, cell: &str, folder: &str, rest: &str) -> String {
+    format!("calibration capture {verb} --cell {} --out {} {rest}", quoted(cell), quoted(folder))
+}
+
+/// A path as a shell takes it for one word that is no option.
+fn quoted(path: &str) -> String {
+    let path = if path.starts_with('-') { format!("./{path}") } else { path.to_owned() };
+    let plain = |c: char| c.is_ascii_alphanumeric() || "_-./+=:@%,".contains(c);
+    if !path.is_empty() && path.chars().all(plain) { path } else { format!("'{}'", path.replace('\'', "'\\''")) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_folder_of_any_name_is_one_word_for_the_shell() {
+        for name in ["plain/session_1", "two words", "it's", "-x", "$HOME", "a;b", "ü"] {
+            let output = std::process::Command::new("sh")
+                .args(["-c", &format!("printf '[%s]' {}", quoted(name))])
+                .output()
+                .expect("a shell");
+            let expected = if name == "-x" { "[./-x]".to_owned() } else { format!("[{name}]") };
+            assert_eq!(String::from_utf8_lossy(&output.stdout), expected);
+        }
+    }
+
+    #[test]
+    fn where_nothing_can_be_repeated_new_clips_take_its_place() {
+        let (words, commands) = Site::new(Path::new("bags"), false, Vec::new(), 1.0).again(2);
+        assert!(words.starts_with("record 2 clips more"), "{words}");
+        assert!(commands[0].ends_with("--clips 2") && commands[1].ends_with("--speed 0.5"), "{commands:?}");
+    }
+}
