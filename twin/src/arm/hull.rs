@@ -160,7 +160,7 @@ mod tests {
         let low = shared_mem::msg::joints_from(&[0.0, 0.3, 0.0, -2.0, 0.0, 2.3, 0.785]);
         let (at, end) = (hull.at(&low), hull.model.tip(&low).position());
         let lowest = at.lowest.iter().copied().fold(f64::INFINITY, f64::min);
-        assert!((0.0..0.006).contains(&(end[2] - lowest)) && (at.tip[2] - end[2]).abs() < 0.0121, "{at:?} and {end:?}");
+        assert!((lowest - end[2]).abs() < 1e-9 && (at.tip[2] - 0.012 - end[2]).abs() < 1e-9, "{at:?} and {end:?}");
     }
 
     #[test]
