@@ -14,17 +14,21 @@ use twin::arm::{JointLimits, JointState};
 /// What is taken off the largest factor before it is named: between set points it is reckoned by interpolation.
 const MARGIN: f64 = 0.995;
 
+/// So little beyond the largest factor the limit is looked for that is met there.
+const BEYOND: f64 = 1.02;
+
 /// The motion cannot be played at that pace.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum TooFast {
     /// A slower pace would do.
     #[error(
-        "at {factor} times its speed the motion breaks a limit ({excess}); the largest factor that fits is {largest:.2}: give --speed {largest:.2}"
+        "{factor} times its speed breaks a limit; the largest factor that fits is {largest:.2}, just beyond it comes {excess}: \
+         give --speed {largest:.2}"
     )]
     Slower {
         /// What was asked for.
         factor: f64,
-        /// What it breaks.
+        /// What the motion breaks first when it is played faster and faster.
         excess: Excess,
         /// The largest factor that breaks nothing, rounded down.
         largest: f64,
@@ -44,6 +48,8 @@ pub fn paced(points: &[SetPoint], factor: f64, limits: &[JointLimits], body: &Bo
     let Some(excess) = first_excess(&paced, limits, Some(body)) else { return Ok(paced) };
     let largest = (100.0 * largest(points, limits, body)).floor() / 100.0;
     if largest > 0.0 && largest < factor && excess.quantity.eases() {
+        let beyond = resampled(&times, points, factor.min(BEYOND * largest));
+        let excess = first_excess(&beyond, limits, Some(body)).unwrap_or(excess);
         Err(TooFast::Slower { factor, excess, largest })
     } else {
         Err(TooFast::Never(excess))

@@ -121,8 +121,10 @@ impl Placing<'_> {
 }
 
 fn words(standing: &Standing) -> String {
-    let [x, y] = standing.place;
-    let yaw = standing.yaw.sin().atan2(standing.yaw.cos()).to_degrees();
+    // What rounds to 0 has no sign.
+    let round = |value: f64, steps: f64| (value * steps).round() / steps + 0.0;
+    let [x, y] = standing.place.map(|x| round(x, 1e3));
+    let yaw = round(standing.yaw.sin().atan2(standing.yaw.cos()).to_degrees(), 1.0);
     format!("x {x:.3} m, y {y:.3} m, turned to {yaw:.0} degrees")
 }
 
@@ -155,6 +157,8 @@ mod tests {
             missing(&stands, &wanted),
             "still to move: +20 mm along x, -30 mm along y; still to turn: -11 degrees"
         );
+        let level = Standing { place: [0.55, -1e-5], yaw: -1e-3 };
+        assert_eq!(words(&level), "x 0.550 m, y 0.000 m, turned to 0 degrees");
         let there = Standing { place: [0.503, -0.018], yaw: 3.1 - std::f64::consts::TAU };
         assert!(near(&there, &wanted));
     }

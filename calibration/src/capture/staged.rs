@@ -71,7 +71,7 @@ pub fn headings(
         let standing = Standing { place, yaw: yaw + beside };
         let towards = format!("towards {:.0} degrees", heading.to_degrees());
         match straight(program, heading, &standing, ways) {
-            Ok((stroke, plan)) => possible.push(Staged { standing, stroke, plan, words: format!("a slide {towards}") }),
+            Ok((stroke, plan)) => possible.push(Staged { standing, stroke, plan, words: "a straight slide".into() }),
             Err(error) => refused.push(format!("no slide {towards}: {error}")),
         }
     }
@@ -202,7 +202,7 @@ mod tests {
         let moving = recorded[299..recorded.len() - 799].to_vec();
         let clip = Repeated { number: 3, set_points: moving, object: Some(object) };
         let same = again(&program, &clip).expect("again");
-        assert_eq!(same.plan.set_points.len(), recorded.len() + 1);
+        assert_eq!(same.plan.set_points.len(), recorded.len() + 2);
         assert!(same.plan.set_points[1..].iter().zip(&recorded).all(|(a, b)| a.q_d == b.q_d));
         assert!((same.stroke.heading - asked.heading).abs() < 1e-6 && (same.stroke.speed - 0.4).abs() < 1e-3);
         assert!((same.stroke.offset - asked.offset).abs() < 1e-6, "{} {}", same.stroke.offset, asked.offset);
