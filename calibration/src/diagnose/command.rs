@@ -3,7 +3,6 @@
 use super::{Diagnosis, Options, diagnose};
 use crate::interrupt::Interrupt;
 use crate::report;
-use anyhow::Context;
 use shared_mem::console;
 use shared_mem::output;
 use shared_mem::recording::Session;

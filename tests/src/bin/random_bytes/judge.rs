@@ -1,5 +1,6 @@
 //! Reads what the bridge commands and what the arm does, and keeps the worst ratio to each limit: 1 is the limit.
 
+use rt_bridge::safety::workspace::TABLE_GAP;
 use rt_bridge::safety::{Limits, Trace, Workspace};
 use shared_mem::cell::Cell;
 use shared_mem::msg::Joints;
@@ -25,8 +26,6 @@ struct Last {
 pub(crate) struct Judge {
     limits: Limits,
     workspace: Workspace,
-    model: ArmModel,
-    tip_radius: f64,
     last: Option<Last>,
     worst: BTreeMap<&'static str, f64>,
     /// Commands and states that were judged.
@@ -40,9 +39,7 @@ impl Judge {
         let model = ArmModel::from_cell(cell).expect("a cell with an arm");
         Self {
             limits: Limits::of(cell, &model),
-            workspace: Workspace::of(cell),
-            tip_radius: cell.tool.as_ref().map_or(0.0, |tool| tool.radius),
-            model,
+            workspace: Workspace::of(cell, &model),
             last: None,
             worst: BTreeMap::new(),
             judged: [0; 2],
@@ -82,7 +79,7 @@ impl Judge {
             self.note("command: torque", command.tau_J_d[i].abs() / joint.torque);
             self.note("command: torque rate", (command.tau_J_d[i] - tau[i]).abs() / (joint.torque_rate * T));
         }
-        self.tip("command: workspace", &command.q_d);
+        self.place("command: workspace", &command.q_d, 0.0);
         self.last = Some(Last { cycle: command.cycle, trace, tau: command.tau_J_d, row });
     }
 
@@ -94,16 +91,14 @@ impl Judge {
             self.note("state: speed", state.dq[i].abs() / joint.velocity);
             self.note("state: desired torque", state.tau_J_d[i].abs() / joint.torque);
         }
-        self.tip("state: workspace", &state.q);
+        // The arm does not follow exactly; the gap above the table is there for that.
+        self.place("state: workspace", &state.q, TABLE_GAP);
     }
 
-    /// Where the centre of the tip's cap is, as a share of the box it may be in.
-    fn tip(&mut self, what: &'static str, q: &Joints) {
-        let tip = self.model.tip(q).transform_point(&[0.0, 0.0, -self.tip_radius].into());
-        let Workspace { low, high } = self.workspace;
-        for axis in 0..3 {
-            self.note(what, share_of_range(tip[axis], low[axis], high[axis]));
-        }
+    /// How near arm and tool come to the nearest bound of their workspace: 1 less the distance to it [m], of which `spare` is
+    /// not counted.
+    fn place(&mut self, what: &'static str, q: &Joints, spare: f64) {
+        self.note(what, 1.0 - (self.workspace.room(q) + spare));
     }
 
     /// A ratio that is no number counts as infinite.
