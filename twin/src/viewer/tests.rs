@@ -6,7 +6,7 @@ use foxglove::{ChannelBuilder, Context, RawChannel, WebSocketServer, WebSocketSe
 use std::io::{ErrorKind, Read as _, Write as _};
 use std::net::{SocketAddr, TcpStream};
 use std::sync::Arc;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// Long enough for a busy machine; nothing is asserted about it.
 const LONG: Duration = Duration::from_secs(60);
@@ -68,9 +68,16 @@ impl Shown {
 
     /// Waits until so many viewers have their place.
     fn wait_for(&self, viewers: usize) {
-        while self.front.viewers() != viewers {
-            std::thread::sleep(Duration::from_millis(5));
-        }
+        until(|| self.front.viewers() == viewers);
+    }
+}
+
+/// Waits until `holds` does.
+fn until(mut holds: impl FnMut() -> bool) {
+    let begin = Instant::now();
+    while !holds() {
+        assert!(begin.elapsed() < LONG, "it never comes to that");
+        std::thread::sleep(Duration::from_millis(5));
     }
 }
 
@@ -85,9 +92,7 @@ fn viewers_that_do_not_read_cost_little_and_disturb_nobody() {
     let shown = shown(LONG);
     let stuck: Vec<TcpStream> = (0..MOST - 1).map(|_| shown.viewer()).collect();
     let mut reads = shown.viewer();
-    while !shown.channel.has_sinks() {
-        std::thread::sleep(Duration::from_millis(5));
-    }
+    until(|| shown.channel.has_sinks());
     let before = resident();
     let reader = std::thread::spawn(move || {
         let (mut total, mut bytes) = (0, vec![0; MESSAGE]);
@@ -133,9 +138,7 @@ fn one_viewer_too_many_is_refused_and_finds_a_place_when_another_has_left() {
     shown.wait_for(MOST - 1);
     viewers.push(shown.viewer());
     shown.wait_for(MOST);
-    while shown.server.client_count() != MOST {
-        std::thread::sleep(Duration::from_millis(5));
-    }
+    until(|| shown.server.client_count() == MOST);
 }
 
 #[test]
@@ -163,14 +166,12 @@ fn a_page_of_somebody_else_sees_nothing_and_takes_no_place() {
 fn a_viewer_that_reads_nothing_any_more_gives_its_place_back() {
     let shown = shown(Duration::from_millis(200));
     let stuck: Vec<TcpStream> = (0..MOST).map(|_| shown.viewer()).collect();
-    while !shown.channel.has_sinks() {
-        std::thread::sleep(Duration::from_millis(5));
-    }
+    until(|| shown.channel.has_sinks());
     let message = vec![7; MESSAGE];
-    while shown.front.viewers() > 0 || shown.server.client_count() > 0 {
+    until(|| {
         shown.channel.log(&message);
-        std::thread::sleep(Duration::from_millis(1));
-    }
+        shown.front.viewers() == 0 && shown.server.client_count() == 0
+    });
     let _viewer = shown.viewer();
     shown.wait_for(1);
     drop(stuck);
