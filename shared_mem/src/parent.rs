@@ -43,11 +43,11 @@ mod tests {
 
     #[test]
     fn the_parent_is_there_and_another_process_is_not_the_parent() {
-        let (told, heard) = channel();
-        let tell = told.clone();
-        when_gone(parent_id(), move || tell.send("parent").expect("a listener")).expect("a thread");
-        when_gone(std::process::id(), move || told.send("stranger").expect("a listener")).expect("a thread");
-        assert_eq!(heard.recv(), Ok("stranger"));
-        assert_eq!(heard.recv_timeout(3 * LOOK), Err(RecvTimeoutError::Timeout));
+        let (sender, receiver) = channel();
+        let first = sender.clone();
+        when_gone(parent_id(), move || first.send("parent").expect("a receiver")).expect("a thread");
+        when_gone(std::process::id(), move || sender.send("no parent").expect("a receiver")).expect("a thread");
+        assert_eq!(receiver.recv(), Ok("no parent"));
+        assert_eq!(receiver.recv_timeout(3 * LOOK), Err(RecvTimeoutError::Timeout));
     }
 }

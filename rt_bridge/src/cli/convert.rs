@@ -39,7 +39,7 @@ impl ConvertArguments {
         ctrlc::set_handler(|| {
             discard_unfinished();
             // Whoever reads standard error may be gone.
-            let _told = writeln!(std::io::stderr(), "error: interrupted; nothing was written");
+            let _written = writeln!(std::io::stderr(), "error: interrupted; nothing was written");
             std::process::exit(1);
         })?;
         let cell = self.cell.as_deref().map(Cell::read).transpose()?;

@@ -15,7 +15,7 @@ fn discard_on_signal() -> anyhow::Result<()> {
     let end = || {
         shared_mem::output::discard_unfinished();
         // Whoever reads standard error may be gone.
-        let _told = writeln!(std::io::stderr(), "twin: interrupted; files that were finished stay");
+        let _written = writeln!(std::io::stderr(), "twin: interrupted; files that were finished stay");
         std::process::exit(1);
     };
     ctrlc::set_handler(end).context("cannot listen for Ctrl-C")

@@ -72,11 +72,11 @@ impl Replay {
         if let (true, Some((file, error))) = (lone, gap.failures().next()) {
             bail!("{file}: {error}");
         }
-        if gap.clips.is_empty() {
-            bail!("none of the {failed} clips could be replayed; the reasons stand above");
-        }
         if let Some(error) = gap.unwritten() {
             bail!("{error}");
+        }
+        if gap.clips.is_empty() {
+            bail!("none of the {failed} clips could be replayed; the reasons stand above");
         }
         if failed > 0 {
             console::line(format_args!(

@@ -36,6 +36,9 @@ impl fmt::Display for Found {
 
 /// Looks at an output: a file by its ending, a folder as a session.
 pub(crate) fn look(path: &Path) -> Found {
+    if path.is_dir() && names_nothing(path) {
+        return Found::Absent;
+    }
     if path.is_dir() {
         return session(path).map_or_else(Found::Half, |()| Found::New);
     }
@@ -61,6 +64,11 @@ pub(crate) fn look(path: &Path) -> Found {
         other => Err(format!("nobody knows what a whole .{other} is")),
     };
     whole.map_or_else(Found::Half, |()| Found::New)
+}
+
+/// Whether a folder holds nothing but temporary files: somebody began to write into it.
+fn names_nothing(folder: &Path) -> bool {
+    paths(folder).iter().all(|path| path.file_name().is_some_and(|name| name.to_string_lossy().starts_with('.')))
 }
 
 /// A session whose clips are all whole.
@@ -126,10 +134,9 @@ pub(crate) fn halves(folder: &Path) -> Vec<(String, String)> {
         if name.starts_with('.') {
             continue;
         }
-        let is_session = path.is_dir() && path.read_dir().is_ok_and(|mut entries| entries.next().is_some());
         match look(&path) {
             Found::Half(_) if path.is_dir() && !path.join("cell.toml").exists() => found.extend(halves(&path)),
-            Found::Half(why) if is_session || !path.is_dir() => found.push((name, why)),
+            Found::Half(why) => found.push((name, why)),
             _ => {}
         }
     }

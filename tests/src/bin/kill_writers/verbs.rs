@@ -70,132 +70,102 @@ pub(crate) fn material(inputs: &Path, domain: &str) {
 pub(crate) fn verbs(inputs: &Path) -> Vec<Verb> {
     let at = |name: &str| inputs.join(name).display().to_string();
     let (cell, session, bags) = (at("cell.toml"), at("session"), at("bags"));
-    let mut verbs = vec![
-        Verb::new(
-            "replay",
-            "twin",
-            &format!("replay {session} --out {{out}}/twin"),
-            &["twin/clip_00.mcap", "twin/clip_01.mcap", "twin/clip_02.mcap", "twin/clip_03.mcap", "twin/clip_04.mcap"],
-        )
-        .anew()
-        .times(6, 2),
-        Verb::new("render", "twin", &format!("render {session} --every 40 --out {{out}}"), &["frame_00000.png"]).times(5, 2),
-        Verb::new("export-ros2", "calibration", &format!("export {session} --to ros2 --out {{out}}/new"), &["new"])
-            .anew()
+    let scan = std::env::var("TWINALIGN_SCAN").ok().map(|scan| splats(&scan, &cell));
+    let mut verbs = clips_and_pictures(&session, &bags);
+    verbs.extend(answers(&session, &cell, &at("strokes")));
+    verbs.extend(live(&cell));
+    verbs.extend(scan);
+    verbs
+}
+
+/// Verbs that write clips and pictures of a session.
+fn clips_and_pictures(session: &str, bags: &str) -> Vec<Verb> {
+    let clips: &[&str] =
+        &["twin/clip_00.mcap", "twin/clip_01.mcap", "twin/clip_02.mcap", "twin/clip_03.mcap", "twin/clip_04.mcap"];
+    let export = |name, from: &str, to: &str| {
+        let line = format!("export {from} --to {to} --out {{out}}/new");
+        Verb::new(name, "calibration", &line, &["new"]).anew()
+    };
+    vec![
+        Verb::new("replay", "twin", &format!("replay {session} --out {{out}}/twin"), clips).anew().times(6, 2),
+        Verb::new("render", "twin", &format!("render {session} --every 40 --out {{out}}"), &["frame_00000.png"])
             .times(5, 2),
-        Verb::new("export-own", "calibration", &format!("export {bags} --to own --out {{out}}/new"), &["new"])
-            .anew()
-            .times(4, 2),
-        Verb::new(
-            "export-twinaligner",
-            "calibration",
-            &format!("export {session}/clip_00.mcap --to twinaligner --out {{out}}/new"),
-            &["new"],
-        )
-        .anew()
-        .times(4, 2),
-        Verb::new(
+        export("export-ros2", session, "ros2").times(5, 2),
+        export("export-own", bags, "own"),
+        export("export-twinaligner", &format!("{session}/clip_00.mcap"), "twinaligner"),
+    ]
+}
+
+/// Verbs that write what they found.
+fn answers(session: &str, cell: &str, strokes: &str) -> Vec<Verb> {
+    let verb = |name, line: &str, outputs| Verb::new(name, "calibration", line, outputs);
+    let stroke = format!("capture control-hit-slide --cell {cell} --clips 1 --out {strokes} --realtime ignore");
+    vec![
+        verb(
             "identify-arm",
-            "calibration",
             &format!("identify arm {session} --out {{out}}/theta.toml --report {{out}}/page.html"),
             &["theta.toml", "page.html"],
         )
         .times(6, 2),
-        Verb::new(
+        verb(
             "diagnose",
-            "calibration",
             &format!("diagnose {session} --out {{out}}/diagnosis.json --report {{out}}/report.html"),
             &["theta.toml", "diagnosis.json", "report.html"],
-        )
-        .times(4, 2),
-        Verb::new(
+        ),
+        verb(
             "viewpoint",
-            "calibration",
             &format!("viewpoint {session} --frames 2 --out {{out}}/cell.toml --report {{out}}/outline.png"),
             &["cell.toml", "outline.png"],
-        )
-        .times(4, 2),
-        Verb::new(
-            "preview",
-            "calibration",
-            &format!(
-                "capture control-hit-slide --cell {cell} --clips 1 --out {}/strokes --realtime ignore --preview {{out}}/next.svg",
-                inputs.display()
-            ),
-            &["next.svg"],
-        )
-        .times(3, 1),
-        Verb::new(
+        ),
+        verb("preview", &format!("{stroke} --preview {{out}}/next.svg"), &["next.svg"]).times(3, 1),
+        verb(
             "benchmark",
-            "calibration",
             &format!("benchmark --cell {cell} --null 1 --report {{out}}/benchmark.html"),
             &["benchmark.html"],
         )
         .times(2, 1),
-        Verb {
-            again: Again::GoesOn,
-            from: 0.05,
-            ..Verb::new(
-                "capture",
-                "calibration",
-                &format!("capture excitation --cell {cell} --clips 1 --duration 2 --out {{out}}/session --realtime ignore"),
-                &["session"],
-            )
-            .times(5, 0)
-        },
-        Verb {
-            from: 0.4,
-            ..Verb::new(
-                "run-record",
-                "rt_bridge",
-                &format!("run --cell {cell} --arm sim --realtime ignore --duration 3 --record {{out}}/clip.mcap"),
-                &["clip.mcap"],
-            )
-            .anew()
-            .times(3, 0)
-        },
-        Verb {
-            again: Again::WantsNewFolder,
-            from: 0.2,
-            ..Verb::new(
-                "demo",
-                "calibration",
-                "demo --clips 4 --out {out}/demo",
-                &[
-                    "demo/cell.toml",
-                    "demo/hidden_theta.toml",
-                    "demo/hidden_effect.toml",
-                    "demo/theta.toml",
-                    "demo/diagnosis.html",
-                    "demo/report.html",
-                    "demo/twin_cell.mcap",
-                    "demo/twin_found.mcap",
-                ],
-            )
-            .times(2, 0)
-        },
+    ]
+}
+
+/// Verbs that move the simulated arm. What they record grows, and is judged as far as it was entered into the session.
+fn live(cell: &str) -> Vec<Verb> {
+    let capture =
+        format!("capture excitation --cell {cell} --clips 1 --duration 2 --out {{out}}/session --realtime ignore");
+    let run = format!("run --cell {cell} --arm sim --realtime ignore --duration 3 --record {{out}}/clip.mcap");
+    let demo: &[&str] = &[
+        "demo/cell.toml",
+        "demo/hidden_theta.toml",
+        "demo/hidden_effect.toml",
+        "demo/theta.toml",
+        "demo/diagnosis.html",
+        "demo/report.html",
+        "demo/twin_cell.mcap",
+        "demo/twin_found.mcap",
     ];
-    if let Ok(scan) = std::env::var("TWINALIGN_SCAN") {
-        let place = "--joints 0.2,-0.6,0.1,-2.2,0.1,1.7,0.6 --start 0,0,0,1,0,0,0,0.41";
-        verbs.push(
-            Verb::new(
-                "label-splats",
-                "twin",
-                &format!("label-splats {scan} --cell {cell} {place} --out {{out}}"),
-                &[
-                    "link0.ply",
-                    "link1.ply",
-                    "link2.ply",
-                    "link3.ply",
-                    "link4.ply",
-                    "link5.ply",
-                    "link6.ply",
-                    "link7.ply",
-                    "scene.ply",
-                ],
-            )
-            .times(4, 2),
-        );
-    }
-    verbs
+    let capture = Verb::new("capture", "calibration", &capture, &["session"]).times(5, 0);
+    let record = Verb::new("run-record", "rt_bridge", &run, &["clip.mcap"]).anew().times(3, 0);
+    let demo = Verb::new("demo", "calibration", "demo --clips 4 --out {out}/demo", demo).times(2, 0);
+    vec![
+        Verb { again: Again::GoesOn, from: 0.05, ..capture },
+        Verb { from: 0.4, ..record },
+        Verb { again: Again::WantsNewFolder, from: 0.2, ..demo },
+    ]
+}
+
+/// The links of a scanned robot.
+fn splats(scan: &str, cell: &str) -> Verb {
+    let place = "--joints 0.2,-0.6,0.1,-2.2,0.1,1.7,0.6 --start 0,0,0,1,0,0,0,0.41";
+    let line = format!("label-splats {scan} --cell {cell} {place} --out {{out}}");
+    let links: &[&str] = &[
+        "link0.ply",
+        "link1.ply",
+        "link2.ply",
+        "link3.ply",
+        "link4.ply",
+        "link5.ply",
+        "link6.ply",
+        "link7.ply",
+        "scene.ply",
+    ];
+    Verb::new("label-splats", "twin", &line, links)
 }
