@@ -1,6 +1,8 @@
 //! The program from outside: it explains itself, refuses wrong arguments with 2, and fails in one line with 1.
 #![allow(missing_docs)]
 
+use std::fs::{self, Permissions};
+use std::os::unix::fs::{MetadataExt as _, PermissionsExt as _, chown};
 use std::process::{Command, Output};
 
 fn rt_bridge(arguments: &[&str]) -> Output {
@@ -72,4 +74,45 @@ fn the_doctor_answers_with_one_object_of_findings() {
         assert!(checks.iter().any(|c| *c == check), "{check} is not looked at: {checks:?}");
     }
     assert!(report["wake_us"]["p999"].as_f64() > Some(0.0));
+}
+
+/// Whoever may write in the folder, or owns a file under a name of ours, could stop a bridge at any moment.
+#[test]
+fn what_other_users_may_write_or_put_in_the_way_is_refused_in_one_line() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let domain = format!("foreign-{}", std::process::id());
+    let start = |arguments: &[&str]| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_rt_bridge"));
+        command.args(arguments).env("XDG_RUNTIME_DIR", folder.path()).env("TWINALIGN_DOMAIN", &domain);
+        command.output().expect("the program runs")
+    };
+    let cell = concat!(env!("CARGO_MANIFEST_DIR"), "/../config/fr3_cell.toml");
+    let refusal = || {
+        let end = start(&["run", "--cell", cell, "--arm", "sim", "--realtime", "ignore", "--duration", "1"]);
+        assert_eq!(end.status.code(), Some(1), "{}", text(&end.stderr));
+        text(&end.stderr).lines().last().unwrap_or_default().to_owned()
+    };
+    let mode = |mode| fs::set_permissions(folder.path(), Permissions::from_mode(mode)).expect("its mode");
+    mode(0o777);
+    let said = refusal();
+    assert!(said.contains("can be written by others (mode 777)") && said.contains("`chmod go-w /"), "{said}");
+    mode(0o700);
+    if fs::metadata(folder.path()).expect("a folder").uid() != 0 {
+        return; // only root can give files away
+    }
+    let file = format!("/dev/shm/twinalign_0_{domain}_node");
+    fs::write(&file, "").expect("a file");
+    chown(&file, Some(12_345), None).expect("given away");
+    let said = refusal();
+    let report: serde_json::Value =
+        serde_json::from_slice(&start(&["doctor", "--json"]).stdout).expect("one JSON object");
+    fs::remove_file(&file).expect("removed");
+    assert!(said.contains(&format!("{file} belongs to user 12345, not to user 0; have that user")), "{said}");
+    let findings = report["findings"].as_array().expect("findings");
+    let others = findings.iter().find(|finding| finding["check"] == "other users").expect("a look at other users");
+    assert!(others["remedy"].as_str().is_some_and(|remedy| remedy.contains(&format!("`sudo rm {file}`"))), "{others}");
+    assert_eq!(
+        start(&["run", "--cell", cell, "--arm", "sim", "--realtime", "ignore", "--duration", "0.2"]).status.code(),
+        Some(0)
+    );
 }

@@ -54,7 +54,10 @@ fn memory(domain: &str) -> (u64, u64) {
     let shared = std::fs::read_dir("/dev/shm")
         .expect("/dev/shm")
         .filter_map(Result::ok)
-        .filter(|e| e.file_name().to_string_lossy().contains(&format!("twinalign_{domain}_")))
+        .filter(|e| {
+            e.file_name().to_string_lossy().starts_with("twinalign_")
+                && e.file_name().to_string_lossy().contains(&format!("_{domain}_"))
+        })
         .filter_map(|e| e.metadata().ok())
         .map(|m| m.len())
         .sum();

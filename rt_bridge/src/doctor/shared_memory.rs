@@ -11,7 +11,7 @@ const COMFORTABLE_MB: u64 = 512;
 const NEEDED_MB: u64 = 64;
 
 pub(super) fn examine() -> Vec<Finding> {
-    vec![room(), rights(), strangers(), seats()]
+    vec![room(), rights(), foreign(), seats()]
 }
 
 fn room() -> Finding {
@@ -40,7 +40,7 @@ fn rights() -> Finding {
 }
 
 /// Files of other users under this user's names.
-fn strangers() -> Finding {
+fn foreign() -> Finding {
     let files = foreign_files();
     let Some(ForeignFile { path, owner }) = files.first() else {
         return Finding::ok("other users", "none of their files bears a name of this user's");

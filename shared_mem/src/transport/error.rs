@@ -13,8 +13,8 @@ use std::fmt::Debug;
 
 /// Processes that may have one topic open at once.
 pub(super) const MOST_NODES: usize = 32;
-/// Senders, and likewise sleepers, that may be attached to the bell of one topic at once.
-pub(super) const MOST_BELLS: usize = 16;
+/// Senders that may wake the readers of one topic, and readers that may sleep on it.
+pub(super) const MOST_EVENT_PORTS: usize = 16;
 
 /// Shared memory cannot be used.
 #[derive(Debug, thiserror::Error)]
@@ -114,7 +114,7 @@ pub(super) fn service_error(topic: &'static str, error: PublishSubscribeOpenOrCr
     }
 }
 
-pub(super) fn bell_error(topic: &'static str, error: EventOpenOrCreateError) -> TransportError {
+pub(super) fn event_error(topic: &'static str, error: EventOpenOrCreateError) -> TransportError {
     use EventOpenError as Open;
     let EventOpenOrCreateError::EventOpenError(reason) = error else {
         return TransportError::open(topic, error);
@@ -159,7 +159,7 @@ pub(super) fn subscriber_error(topic: &'static str, limits: Limits, error: Subsc
 
 pub(super) fn notifier_error(topic: &'static str, error: NotifierCreateError) -> TransportError {
     match error {
-        NotifierCreateError::ExceedsMaxSupportedNotifiers => TransportError::full(topic, MOST_BELLS, "senders"),
+        NotifierCreateError::ExceedsMaxSupportedNotifiers => TransportError::full(topic, MOST_EVENT_PORTS, "senders"),
         _ => TransportError::open(topic, error),
     }
 }
@@ -167,7 +167,7 @@ pub(super) fn notifier_error(topic: &'static str, error: NotifierCreateError) ->
 pub(super) fn listener_error(topic: &'static str, error: ListenerCreateError) -> TransportError {
     match error {
         ListenerCreateError::ExceedsMaxSupportedListeners => {
-            TransportError::full(topic, MOST_BELLS, "sleeping readers")
+            TransportError::full(topic, MOST_EVENT_PORTS, "sleeping readers")
         }
         _ => TransportError::open(topic, error),
     }
@@ -179,5 +179,45 @@ fn owner_of(topic: &str) -> &'static str {
         "/twin/state" | "/twin/gap" => "twin shadow",
         "/arm/motion" => "capture",
         _ => "rt_bridge",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::topics::ARM_STATE;
+
+    #[test]
+    fn iceoryx2s_reasons_become_ours_by_their_variant() {
+        use PublishSubscribeOpenOrCreateError::PublishSubscribeOpenError as Opening;
+        let limits = ARM_STATE.limits;
+        let service = |reason| service_error("/arm/state", Opening(reason));
+        let event = |reason| event_error("/arm/state", EventOpenOrCreateError::EventOpenError(reason));
+        let buffer = SubscriberCreateError::BufferSizeExceedsMaxSupportedBufferSizeOfService;
+        for incompatible in [
+            service(PublishSubscribeOpenError::IncompatibleTypes),
+            service(PublishSubscribeOpenError::DoesNotSupportRequestedAmountOfPublishers),
+            event(EventOpenError::VersionMismatch),
+            subscriber_error("/arm/state", limits, buffer),
+        ] {
+            assert!(matches!(incompatible, TransportError::Incompatible { .. }), "{incompatible}");
+        }
+        for full in [
+            service(PublishSubscribeOpenError::ExceedsMaxNumberOfNodes),
+            event(EventOpenError::ExceedsMaxNumberOfNodes),
+            publisher_error("/arm/state", limits, PublisherCreateError::ExceedsMaxSupportedPublishers),
+            subscriber_error("/arm/state", limits, SubscriberCreateError::ExceedsMaxSupportedSubscribers),
+            notifier_error("/arm/state", NotifierCreateError::ExceedsMaxSupportedNotifiers),
+            listener_error("/arm/state", ListenerCreateError::ExceedsMaxSupportedListeners),
+        ] {
+            assert!(matches!(full, TransportError::Full { .. }), "{full}");
+        }
+        for other in [
+            service(PublishSubscribeOpenError::HangsInCreation),
+            service_error("/arm/state", PublishSubscribeOpenOrCreateError::SystemInFlux),
+            publisher_error("/arm/state", limits, PublisherCreateError::UnableToCreateDataSegment),
+        ] {
+            assert!(matches!(other, TransportError::Open { .. }), "{other}");
+        }
     }
 }

@@ -1,4 +1,4 @@
-//! Messages that failed their check: counted where they are received, told of by the program that receives them.
+//! Messages that failed their check: counted where they are received, reported by the program that receives them.
 
 use crate::msg::Wrong;
 use std::cell::{Cell, RefCell};
@@ -30,8 +30,8 @@ pub(super) struct Tally {
     topic: &'static str,
     count: Cell<u64>,
     why: Cell<Option<Wrong>>,
-    /// The count when it was last told.
-    told: Cell<u64>,
+    /// The count when it was last reported.
+    reported: Cell<u64>,
 }
 
 impl Tally {
@@ -57,16 +57,16 @@ pub(super) struct Tallies {
 
 impl Tallies {
     pub(super) fn open(&self, topic: &'static str) -> Rc<Tally> {
-        let tally = Rc::new(Tally { topic, count: Cell::new(0), why: Cell::new(None), told: Cell::new(0) });
+        let tally = Rc::new(Tally { topic, count: Cell::new(0), why: Cell::new(None), reported: Cell::new(0) });
         self.all.borrow_mut().push(tally.clone());
         tally
     }
 
     /// Those worth a remark: at the first message, and each time there are ten times as many.
     pub(super) fn news(&self) -> Vec<Ignored> {
-        let is_news = |tally: &&Rc<Tally>| tally.count.get() >= (10 * tally.told.get()).max(1);
+        let is_news = |tally: &&Rc<Tally>| tally.count.get() >= (10 * tally.reported.get()).max(1);
         let all = self.all.borrow();
-        let news = all.iter().filter(is_news).inspect(|tally| tally.told.set(tally.count.get()));
+        let news = all.iter().filter(is_news).inspect(|tally| tally.reported.set(tally.count.get()));
         news.filter_map(|tally| tally.ignored()).collect()
     }
 }

@@ -138,24 +138,24 @@ pub(super) fn folder(user: u32) -> Result<PathBuf, PlaceError> {
 fn folder_below(named: Option<&Path>, usual: &Path, shared: &Path, user: u32) -> Result<PathBuf, PlaceError> {
     let path = match named {
         Some(named) => {
-            refuse_unless_own(named, user)?;
+            refuse_unless_own(named, fs::metadata(named), user)?;
             named.join("twinalign")
         }
-        None if refuse_unless_own(usual, user).is_ok() => usual.join("twinalign"),
+        None if refuse_unless_own(usual, fs::metadata(usual), user).is_ok() => usual.join("twinalign"),
         None => shared.join(format!("twinalign-{user}")),
     };
     match fs::DirBuilder::new().mode(0o700).create(&path) {
         Err(e) if e.kind() != ErrorKind::AlreadyExists => return Err(unusable(&path, &e)),
         _ => {}
     }
-    refuse_unless_own(&path, user)?;
+    // Not followed: a link may be pointed elsewhere by whoever made it.
+    refuse_unless_own(&path, fs::symlink_metadata(&path), user)?;
     Ok(path)
 }
 
-/// A folder that belongs to this user, into which nobody else may write.
-fn refuse_unless_own(path: &Path, user: u32) -> Result<(), PlaceError> {
-    // Not followed: a link may be pointed elsewhere by whoever made it.
-    let found = fs::symlink_metadata(path).map_err(|e| unusable(path, &e))?;
+/// A folder that belongs to this user, into which nobody else may write; `found` is what is there.
+fn refuse_unless_own(path: &Path, found: io::Result<fs::Metadata>, user: u32) -> Result<(), PlaceError> {
+    let found = found.map_err(|e| unusable(path, &e))?;
     let refused = |what: String, remedy: String| Err(PlaceError { what: format!("{} {what}", path.display()), remedy });
     if found.uid() != user {
         let what = format!("belongs to user {}, not to user {user}", found.uid());

@@ -1,6 +1,6 @@
 //! Sending messages of fixed size, and waking those who wait for them.
 
-use super::error::{MOST_BELLS, MOST_NODES, bell_error, notifier_error, publisher_error, service_error};
+use super::error::{MOST_EVENT_PORTS, MOST_NODES, event_error, notifier_error, publisher_error, service_error};
 use super::{Node, Service, TransportError, service_name};
 use crate::msg::Message;
 use crate::topics::{Limits, Topic};
@@ -61,12 +61,12 @@ impl Node {
         self.inner
             .service_builder(&service_name(topic)?)
             .event()
-            .max_listeners(MOST_BELLS)
-            .max_notifiers(MOST_BELLS)
+            .max_listeners(MOST_EVENT_PORTS)
+            .max_notifiers(MOST_EVENT_PORTS)
             .max_nodes(MOST_NODES)
             .event_id_max_value(4)
             .open_or_create()
-            .map_err(|e| bell_error(topic, e))
+            .map_err(|e| event_error(topic, e))
     }
 
     pub(super) fn bell(&self, topic: &'static str) -> Result<Notifier<Service>, TransportError> {
