@@ -1,5 +1,5 @@
-//! What the numbers of a message may be. Every message passes these checks when it is received, so that code behind the
-//! door indexes, adds and multiplies without asking again. Nothing here allocates.
+//! What the numbers of a message may be. Every message passes these checks when it is received, so that the code
+//! that gets it indexes, adds and multiplies without asking again. Nothing here allocates.
 
 use super::{Joints, MAX_JOINTS};
 
@@ -37,8 +37,16 @@ pub enum Wrong {
         most: u64,
     },
     /// A quantity is not finite or absurdly large.
-    #[error("{field} holds {value}, not a number of at most {LARGEST:e}")]
+    #[error("{field} holds {value:e}, not a number of at most {LARGEST:e}")]
     Number {
+        /// Field of the message.
+        field: &'static str,
+        /// What it holds.
+        value: f64,
+    },
+    /// A joint that the arm does not have is given something.
+    #[error("{field} holds {value:e} for a joint beyond dof")]
+    Unused {
         /// Field of the message.
         field: &'static str,
         /// What it holds.
@@ -110,6 +118,14 @@ pub(super) fn number_or_none(field: &'static str, value: f64) -> Result<(), Wron
 
 pub(super) fn joints(fields: &[(&'static str, &Joints)]) -> Result<(), Wrong> {
     fields.iter().try_for_each(|(field, values)| numbers(field, *values))
+}
+
+/// 0 for the joints beyond `dof`.
+pub(super) fn unused(field: &'static str, values: &Joints, dof: u32) -> Result<(), Wrong> {
+    match values.iter().skip(dof as usize).find(|value| **value != 0.0) {
+        None => Ok(()),
+        Some(value) => Err(Wrong::Unused { field, value: *value }),
+    }
 }
 
 pub(super) fn quaternion(field: &'static str, wxyz: &[f64; 4]) -> Result<(), Wrong> {

@@ -67,11 +67,16 @@ impl Default for MotionChunk {
 }
 
 impl MotionChunk {
-    /// The set points are left to the bridge's limits, which refuse a motion by its number: its sender learns of it.
+    /// Set points of the joints that count are left to the bridge's limits, which refuse a motion by its number: its sender
+    /// learns of it. Of the others nobody else would: what they hold ends in the bridge's own messages.
     fn check(&self) -> Result<(), Wrong> {
         check::running("stamp_ns", self.stamp_ns)?;
         check::count("length", self.length, 0, CHUNK_LENGTH as u64)?;
-        check::dof(self.dof)
+        check::dof(self.dof)?;
+        self.set_points.iter().take(self.length as usize).try_for_each(|point| {
+            check::unused("q_d", &point.q_d, self.dof)?;
+            check::unused("dq_d", &point.dq_d, self.dof)
+        })
     }
 }
 

@@ -191,6 +191,11 @@ fn each_check_names_its_field() {
         why(&ArmState { cycle: u64::MAX, ..ArmState::default() }),
         "cycle is 18446744073709551615, not 0 to 4611686018427387904"
     );
+    let mut chunk = MotionChunk { dof: 7, length: 1, ..MotionChunk::default() };
+    chunk.set_points[1].dq_d[7] = -1.9e157;
+    assert_eq!(why(&chunk), "valid", "only the first set point counts");
+    chunk.set_points[0].dq_d[7] = -1.9e157;
+    assert_eq!(why(&chunk), "dq_d holds -1.9e157 for a joint beyond dof");
     assert_eq!(why(&MotionChunk { length: 51, ..MotionChunk::default() }), "length is 51, not 0 to 50");
     assert_eq!(
         why(&ObjectPose { wxyz: [0.0; 4], ..ObjectPose::default() }),

@@ -30,6 +30,8 @@ pub(crate) struct Judge {
     worst: BTreeMap<&'static str, f64>,
     /// Commands and states that were judged.
     pub(crate) judged: [u64; 2],
+    /// Commands and states that failed their check, and so could not be judged.
+    pub(crate) overlooked: u64,
     /// Commands that differ from the one before.
     pub(crate) moved: u64,
 }
@@ -43,6 +45,7 @@ impl Judge {
             last: None,
             worst: BTreeMap::new(),
             judged: [0; 2],
+            overlooked: 0,
             moved: 0,
         }
     }
