@@ -100,8 +100,7 @@ pub(super) fn side(field: &'static str, value: u32) -> Result<(), Wrong> {
 }
 
 pub(super) fn numbers(field: &'static str, values: &[f64]) -> Result<(), Wrong> {
-    // NaN fails every comparison.
-    match values.iter().find(|value| !(value.abs() <= LARGEST)) {
+    match values.iter().find(|value| value.is_nan() || value.abs() > LARGEST) {
         None => Ok(()),
         Some(value) => Err(Wrong::Number { field, value: *value }),
     }
