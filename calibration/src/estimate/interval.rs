@@ -87,6 +87,10 @@ pub fn at_bounds(unknowns: &[Unknown], shared: &[f64]) -> Vec<bool> {
 /// their numbers, which then have variance 0 and count as not known.
 fn inverse(information: &DMatrix<f64>, free: &[usize]) -> DMatrix<f64> {
     let n = free.len();
+    if n == 0 {
+        // Where the clips tell nothing, there is no number whose variance could be given.
+        return DMatrix::zeros(0, 0);
+    }
     let scale: Vec<f64> = free.iter().map(|k| information[(*k, *k)].sqrt()).collect();
     let scaled = DMatrix::from_fn(n, n, |i, j| information[(free[i], free[j])] / (scale[i] * scale[j]));
     let eigen = scaled.symmetric_eigen();
@@ -184,6 +188,11 @@ mod tests {
             (0..2).filter(|k| fit.shared[*k].abs() < intervals.half_width[*k]).count() as f64
         };
         (0..200).map(inside).sum::<f64>() / 400.0
+    }
+
+    #[test]
+    fn where_nothing_can_be_told_there_is_no_inverse_and_no_panic() {
+        assert!(inverse(&DMatrix::zeros(3, 3), &[]).is_empty());
     }
 
     #[test]

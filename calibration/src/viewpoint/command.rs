@@ -73,6 +73,8 @@ pub enum StartFrom {
 const REACH_OF_MASKS: Reach = Reach { angle: 0.36, distance: 0.32 };
 const REACH_OF_PHOTOS: Reach = Reach { angle: 0.25, distance: 0.15 };
 
+/// Focal lengths of lenses, in widths and heights of a picture: from fisheyes to telescopes.
+const FOCAL: std::ops::Range<f64> = 0.05..100.0;
 /// A principal point further from the middle than this share of the picture is one of another resolution or crop.
 const OFF_CENTRE: f64 = 0.12;
 
@@ -211,6 +213,16 @@ fn camera(cell: &Cell, options: &Options, taken: &[Taken]) -> anyhow::Result<Cam
          (--intrinsics, `K` of the joint file, or `[camera]` of cell.toml)",
         pinhole.cx,
         pinhole.cy,
+        size[0],
+        size[1]
+    );
+    let focal = [(pinhole.fx, size[0]), (pinhole.fy, size[1])].map(|(focal, size)| focal / size as f64);
+    ensure!(
+        focal.iter().all(|focal| FOCAL.contains(focal)),
+        "focal lengths of {} and {} pixels belong to no picture of {} x {} pixels: check --intrinsics, `K` of the joint file, or \
+         `[camera]` of cell.toml",
+        pinhole.fx,
+        pinhole.fy,
         size[0],
         size[1]
     );
