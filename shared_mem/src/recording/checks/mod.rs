@@ -102,7 +102,7 @@ fn drop_non_finite(
 ) -> Result<JointSeries, String> {
     let bad_joint = |i: usize| {
         let rows = [Some(series.q_row(i)), series.dq_row(i), series.tau_row(i)];
-        rows.into_iter().flatten().find_map(|row| row.iter().position(|v| !(v.abs() <= LARGEST_NUMBER)))
+        rows.into_iter().flatten().find_map(|row| row.iter().position(|v| v.is_nan() || v.abs() > LARGEST_NUMBER))
     };
     let good: Vec<usize> = (0..series.len()).filter(|&i| bad_joint(i).is_none()).collect();
     let Some((row, joint)) = (0..series.len()).find_map(|i| Some((i, bad_joint(i)?))) else {

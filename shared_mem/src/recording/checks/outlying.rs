@@ -57,8 +57,7 @@ pub(in super::super) fn find(stamps_ns: &[u64], topic: &str) -> Result<Option<Ou
     let kept_bursts: Vec<_> = bursts.into_iter().filter(|burst| burst.len() > few || burst.len() == largest).collect();
     let inside =
         |stamp: &u64| kept_bursts.iter().any(|burst| burst.first() <= Some(stamp) && Some(stamp) <= burst.last());
-    let (kept, out): (Vec<usize>, Vec<usize>) =
-        (0..total).partition(|row| stamps_ns.get(*row).is_some_and(|stamp| inside(stamp)));
+    let (kept, out): (Vec<usize>, Vec<usize>) = (0..total).partition(|row| stamps_ns.get(*row).is_some_and(&inside));
     let Some(first) = out.first() else { return Ok(None) };
     let far = far_from(recording, stamps_ns.get(*first).copied().unwrap_or(0));
     let few = out.len() <= few;
