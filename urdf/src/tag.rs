@@ -18,11 +18,11 @@ impl<'a> Tag<'a> {
     pub(crate) fn new(start: &'a BytesStart<'_>, name: &'a str) -> Result<Self, String> {
         let mut attributes = Vec::new();
         for attribute in start.attributes() {
-            let attribute = attribute.map_err(|error| format!("<{name}>: {error}"))?;
+            let attribute = attribute.map_err(|error| format!("<{name}>: {}", one_line(&error)))?;
             let key = attribute.key.0;
             let value = attribute
                 .normalized_value(XmlVersion::Implicit1_0)
-                .map_err(|error| format!("`{}` of <{name}>: {error}", quoted(key)))?;
+                .map_err(|error| format!("`{}` of <{name}>: {}", quoted(key), one_line(&error)))?;
             attributes.push((key, value.into_owned()));
         }
         Ok(Self { name, attributes })
@@ -112,4 +112,9 @@ impl<'a> Tag<'a> {
 /// The beginning of a value from the file, on one line.
 pub(crate) fn quoted(value: &str) -> String {
     value.chars().take(40).flat_map(char::escape_debug).collect()
+}
+
+/// What the XML reader says, on one line: it quotes the file as it stands, and as much of it as there is.
+pub(crate) fn one_line(error: &dyn std::fmt::Display) -> String {
+    error.to_string().chars().take(200).flat_map(|c| if c == '\n' { ' ' } else { c }.escape_debug()).collect()
 }

@@ -112,6 +112,7 @@ fn what_is_wrong_is_named_with_line_and_element() {
         ("<link name=\"base\"/>", "<xacro:arm/>", "line 6: <xacro:arm> is xacro; expand it first"),
         ("<link name=\"base\"/>", "<link name=\"base\" name=\"b\"/>", "line 6: <link>: "),
         ("<link name=\"base\"/>", "<link name=\"&base;\"/>", "line 6: `name` of <link>: "),
+        ("<link name=\"base\"/>", "<link name=\"& a\n\u{7f} b;\"/>", "line 6: `name` of <link>: "),
         ("</joint>", "", "line 24: "),
         ("</robot>", "", "line 25: the file ends within 1 open elements"),
         ("</robot>", "</robot>\n<robot/>", "line 25: a second <robot>"),

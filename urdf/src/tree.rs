@@ -1,7 +1,7 @@
 //! From the stream of tags to links and joints: which tag counts where, which must be there, which may come once.
 //! There is no tree of elements: a tag is read when it opens, and only the names of the open ones are kept.
 
-use crate::tag::{Tag, quoted};
+use crate::tag::{Tag, one_line, quoted};
 use crate::{Axis, Inertia, Inertial, Joint, JointLimit, JointType, Link, LinkName, Mass, Pose, Robot, UrdfError};
 use quick_xml::Reader;
 use quick_xml::events::{BytesStart, Event};
@@ -30,7 +30,7 @@ pub(crate) fn read(text: &str) -> Result<Robot, UrdfError> {
             Ok(_) => Ok(()),
             Err(error) => {
                 at = reader.error_position();
-                Err(error.to_string().chars().flat_map(|c| if c == '\n' { ' ' } else { c }.escape_debug()).collect())
+                Err(one_line(&error))
             }
         };
         step.map_err(|what| UrdfError { line: line(text, at), what })?;
