@@ -40,7 +40,8 @@ fn main() -> ExitCode {
         Ok(arguments) => arguments,
         Err(error) => return usage::say(error.use_stderr(), error.render()),
     };
-    let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new("warn"));
+    // The viewer's library writes a line for each message of a viewer that it cannot read: a viewer could fill the log.
+    let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new("warn,foxglove=off"));
     tracing_subscriber::fmt().with_env_filter(filter).with_ansi(false).with_writer(|| console::Log).init();
     let outcome = match arguments.verb {
         Verb::Shadow(verb) => verb.run(),
