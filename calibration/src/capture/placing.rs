@@ -155,7 +155,7 @@ mod tests {
         assert!(!near(&stands, &wanted));
         assert_eq!(
             missing(&stands, &wanted),
-            "still to move: +20 mm along x, -30 mm along y; still to turn: -11 degrees"
+            "still to move: +20 mm along x, -30 mm along y; still to turn: -10 degrees"
         );
         let level = Standing { place: [0.55, -1e-5], yaw: -1e-3 };
         assert_eq!(words(&level), "x 0.550 m, y 0.000 m, turned to 0 degrees");
