@@ -31,7 +31,8 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
         let total = tool.map_or_else(String::new, |tool| {
             format!(", or set mass = {} under [tool] in cell.toml where the tool itself is heavier", short(tool + mass))
         });
-        let (mass, centre) = (short(mass), list(&centre));
+        // A tenth of a millimetre is more than anyone can use.
+        let (mass, centre) = (short(mass), list(&centre.map(|x| (1e4 * x).round() * 1e-4 + 0.0)));
         Remedy::new(
             format!(
                 "Take off the {mass} kg at {centre} m of the flange frame, or set this load in the robot's own settings{total}."
