@@ -66,6 +66,11 @@ pub fn start() -> LastLines {
     LastLines(console)
 }
 
+/// Gives the lines that wait a last chance, before the program is ended where nothing is dropped.
+pub fn flush() {
+    console().flush(PATIENCE);
+}
+
 /// Dropping it gives the lines that wait a last chance.
 #[derive(Debug)]
 pub struct LastLines(&'static Console);

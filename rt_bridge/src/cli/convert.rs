@@ -3,11 +3,10 @@
 use crate::camera::{Converted, convert};
 use anyhow::Result;
 use clap::Args;
-use shared_mem::answer;
 use shared_mem::cell::Cell;
 use shared_mem::output::discard_unfinished;
 use shared_mem::recording::ClipInfo;
-use std::io::Write as _;
+use shared_mem::{answer, console};
 use std::path::PathBuf;
 
 /// Turn a recording of a RealSense camera into a clip
@@ -38,8 +37,8 @@ impl ConvertArguments {
     pub(super) fn execute(self) -> Result<()> {
         ctrlc::set_handler(|| {
             discard_unfinished();
-            // Whoever reads standard error may be gone.
-            let _written = writeln!(std::io::stderr(), "error: interrupted; nothing was written");
+            console::line("error: interrupted; nothing was written");
+            console::flush();
             std::process::exit(1);
         })?;
         let cell = self.cell.as_deref().map(Cell::read).transpose()?;

@@ -8,6 +8,7 @@ use super::wire::{request, set_point};
 use crate::gripper::FRANKA_HAND;
 use crate::gripper::fingers::Fingers;
 use shared_mem::cell::Cell;
+use std::f64::consts::TAU;
 use std::path::Path;
 use std::sync::OnceLock;
 
@@ -105,7 +106,7 @@ pub fn arm_seeds() -> Vec<Vec<u8>> {
         (0..13_u32).flat_map(|n| [0, 4, 7, 48, 56, 104, 128, 416].map(|length| asked(n, length))).collect();
     for (controller, generator) in [(0_u32, 0_u32), (0, 1), (1, 2), (1, 3), (2, 4)] {
         let mut motion = [controller.to_le_bytes(), generator.to_le_bytes()].concat();
-        motion.extend([10.0, 3.12, 6.28, 10.0, 3.12, 6.28_f64].iter().flat_map(|v| v.to_le_bytes()));
+        motion.extend([10.0, 3.12, TAU, 10.0, 3.12, TAU].iter().flat_map(|v| v.to_le_bytes()));
         motion.extend([0; 57]); // no planned targets, and their speeds
         let begin = over_tcp(&super::wire::reply(1, 7, &motion));
         let set_point = [&[2][..], &[0; SET_POINT]].concat();

@@ -5,7 +5,6 @@ use nalgebra::{Isometry3, Point3, Quaternion, Similarity3, Translation3, UnitQua
 use shared_mem::cell::Cell;
 use shared_mem::output::Output;
 use shared_mem::{answer, console};
-use std::io::Write as _;
 use std::path::PathBuf;
 use twin::arm::MAX_JOINTS;
 use twin::reconstruct::{SurfacePoints, align, label};

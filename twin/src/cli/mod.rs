@@ -7,15 +7,15 @@ pub(crate) mod replay;
 pub(crate) mod shadow;
 
 use anyhow::Context as _;
-use std::io::Write as _;
+use shared_mem::console;
 
 /// For verbs that do not stop by themselves at Ctrl-C: ends the program, without leaving unfinished files. Those that are
 /// finished stay.
 fn discard_on_signal() -> anyhow::Result<()> {
     let end = || {
         shared_mem::output::discard_unfinished();
-        // Whoever reads standard error may be gone.
-        let _written = writeln!(std::io::stderr(), "twin: interrupted; files that were finished stay");
+        console::line("twin: interrupted; files that were finished stay");
+        console::flush();
         std::process::exit(1);
     };
     ctrlc::set_handler(end).context("cannot listen for Ctrl-C")
