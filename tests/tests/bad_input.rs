@@ -164,7 +164,7 @@ fn pipes_devices_folders_and_files_without_end_are_named_at_once() {
 #[test]
 fn shapes_that_make_no_sense_are_named_at_once() {
     let object = "[table]\nheight = 0.0\n[object]\nmesh = \"body.ply\"\nmass_range = [0.1, 1.0]\n";
-    let robot = "[robot]\nurdf = \"deep.urdf\"\n[controller]\nstiffness = [1]\ndamping = [1]\n";
+    let robot = "[robot]\nurdf = \"deep.urdf\"\n[controller]\nkind = \"joint_pd\"\nstiffness = [1]\ndamping = [1]\n";
     let floats = "property float x\nproperty float y\nproperty float z\n";
     let lists = "property list uchar float x\nproperty float y\nproperty float z\n";
     let ply = |vertices: &str, columns: &str, values: &str| {

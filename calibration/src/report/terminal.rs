@@ -218,6 +218,10 @@ command lag     possible   2 %    closes 81 [76, 85] %   delay 11.9 [11.2, 12.6]
 command delay   named      97 %   closes 81 [76, 85] %   delay 11.9 [11.2, 12.6] ms
 1 ruled out, 1 not testable
 next clip: Play a chirp up to 10 Hz.
+    calibration capture excitation --motion chirp
+    calibration diagnose monday
+about command delay, in the cell: Send commands 12 ms earlier.
+about command delay, in a model: Hold them back by 12 ms.
 cause named (confidence 97 %): Commands reach the robot 12 ms late <here>.";
         assert_eq!(text, expected);
     }

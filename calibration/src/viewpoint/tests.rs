@@ -168,7 +168,7 @@ fn what_cannot_be_fitted_is_refused_in_one_line() {
         (Options { masks: vec![black], ..options.clone() }, "nothing to fit"),
         (Options { joints: vec!["0,0".into()], ..options.clone() }, "7 joints"),
         (Options { joints: Vec::new(), ..options.clone() }, "one for each"),
-        (Options { intrinsics: Some([600.0, 600.0, 320.0, 240.0]), ..options.clone() }, "another resolution"),
+        (Options { intrinsics: Some([600.0, 600.0, 320.0, 240.0]), ..options.clone() }, "of this resolution"),
         (Options { method: Method::Swarm(100), ..options }, "silhouettes"),
     ];
     for (options, told) in refused {

@@ -188,11 +188,12 @@ impl Server {
     /// Takes what the client asks, then new clients: in this order, so that one that has just left is no reason to refuse
     /// the next.
     fn attend(&mut self) {
-        if let Some(session) = &mut self.session {
-            let served = session.serve(&mut self.robot, &mut self.notices);
-            self.keep_or_part(served);
-        }
+        self.serve();
         for outcome in self.arrivals.look(Instant::now()) {
+            if matches!(outcome, Outcome::Asks(..)) {
+                // The one before may have left since it was looked at.
+                self.serve();
+            }
             let (peer, opened) = match outcome {
                 Outcome::Asks(arrival, message) => {
                     (arrival.peer, Session::open(arrival, &message, self.session.is_some()))
@@ -212,6 +213,14 @@ impl Server {
                     self.notices.warn(About::Refusal, format_args!("{peer}: {gone}"));
                 }
             }
+        }
+    }
+
+    /// Takes what the connected client asks, or that it has left.
+    fn serve(&mut self) {
+        if let Some(session) = &mut self.session {
+            let served = session.serve(&mut self.robot, &mut self.notices);
+            self.keep_or_part(served);
         }
     }
 

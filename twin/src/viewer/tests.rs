@@ -117,7 +117,8 @@ fn viewers_that_do_not_read_cost_little_and_disturb_nobody() {
     }
     assert!(reader.join().expect("it does not panic") >= 20 * MESSAGE, "the one that reads is served");
     assert!(most < 400 << 20, "{} MB for viewers that do not read", most >> 20);
-    assert_eq!(shown.front.viewers(), MOST);
+    // The one that read has left.
+    assert!(shown.front.viewers() >= MOST - 1);
     let Shown { front, server, context, .. } = shown;
     drop(front);
     server.stop().wait_blocking();
