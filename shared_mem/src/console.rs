@@ -3,7 +3,7 @@
 //! A terminal that is held with Ctrl-S, a pipe that nobody reads or a full disk must not stop a robot's bridge, so whoever
 //! has something to say only puts it into a queue; one thread writes it out and may wait as long as it likes. What finds
 //! the queue full, or cannot be written, is dropped and counted, and the count is written in its place as soon as
-//! something can be written again. A program ends without waiting longer than [`PATIENCE`] for its last lines.
+//! something can be written again. A program ends without waiting longer than half a second for its last lines.
 //!
 //! On a terminal there may be a status below all lines: it is overwritten in place and makes room for each line.
 

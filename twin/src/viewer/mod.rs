@@ -3,7 +3,7 @@
 //! the shadow's timing does not feel it. Thirty times a second it shows the newest of everything and skips the rest.
 //!
 //! Viewers come in by a door of our own (`front`): four at a time, none from a foreign web page, and each is sent the newest
-//! [`BACKLOG`] messages at most, so that one that does not read costs some tens of megabytes until it is closed.
+//! 32 messages at most, so that one that does not read costs some tens of megabytes until it is closed.
 
 mod front;
 mod request;
