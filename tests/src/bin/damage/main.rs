@@ -47,7 +47,7 @@ struct Arguments {
     #[arg(long, value_delimiter = ',', default_value = "twin,calibration,rt_bridge")]
     programs: Vec<String>,
     /// Folder for the files of cases that went wrong.
-    #[arg(long, default_value = "damage")]
+    #[arg(long, default_value = "target/damage")]
     keep: PathBuf,
 }
 
