@@ -98,23 +98,12 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// A grey square of 16 pixels: quantisation of 1, one coefficient a block, the shortest Huffman tables.
-    fn jpeg() -> Vec<u8> {
-        let mut out = vec![0xff, 0xd8, 0xff, 0xdb, 0, 67, 0];
-        out.extend([1; 64]);
-        out.extend([0xff, 0xc0, 0, 11, 8, 0, 16, 0, 16, 1, 1, 0x11, 0]);
-        // DC: one code of two bits for size 0 and one for size 8; AC: one code of two bits for "end of block".
-        out.extend([0xff, 0xc4, 0, 21, 0x00, 0, 2, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 8]);
-        out.extend([0xff, 0xc4, 0, 20, 0x10, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0]);
-        out.extend([0xff, 0xda, 0, 8, 1, 1, 0, 0, 63, 0]);
-        // First block: size 8 (01), value 200 (11001000), end (00); three more: size 0 (00), end (00); ones to the end.
-        out.extend([0b0111_0010, 0b0000_0000, 0b0000_0000, 0xff, 0xd9]);
-        out
-    }
+    /// A grey square of 16 pixels. Its only numbers: quantisation of 1, one coefficient a block, of which the first is 200.
+    const JPEG: &[u8] = include_bytes!("../../tests/data/grey_16.jpg");
 
     #[test]
     fn a_jpeg_becomes_colour_pixels() {
-        let Ok(Picture::Pixels { header, pixels }) = unpack_picture(&jpeg(), 3) else { panic!("no picture") };
+        let Ok(Picture::Pixels { header, pixels }) = unpack_picture(JPEG, 3) else { panic!("no picture") };
         assert_eq!((header.width, header.height, header.stride, header.stamp_ns), (16, 16, 48, 3));
         // A mean of 200 / 8 over the middle grey of 128.
         assert!(pixels.iter().all(|v| v.abs_diff(153) <= 1), "{:?}", &pixels[..6]);
@@ -122,7 +111,7 @@ mod tests {
 
     #[test]
     fn a_jpeg_that_claims_a_huge_picture_is_refused_before_it_is_unpacked() {
-        let mut bytes = jpeg();
+        let mut bytes = JPEG.to_vec();
         let frame = bytes.windows(2).position(|marker| marker == [0xff, 0xc0]).expect("a start of frame");
         bytes[frame + 5..frame + 9].copy_from_slice(&[0x3f, 0xff, 0x3f, 0xff]);
         let error = unpack_picture(&bytes, 0).expect_err("268 million pixels");
@@ -145,7 +134,7 @@ mod tests {
     proptest! {
         #[test]
         fn a_damaged_file_is_refused_or_read_but_never_a_panic(cut in 0usize..250, at in 0usize..200, value in any::<u8>()) {
-            let mut bytes = jpeg();
+            let mut bytes = JPEG.to_vec();
             let at = at.min(bytes.len() - 1);
             bytes[at] = value;
             bytes.truncate(cut);

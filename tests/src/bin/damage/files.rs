@@ -274,19 +274,8 @@ fn pictures(folder: &Path) {
     };
     put(&folder.join("joints.json"), joints(WIDTH, HEIGHT));
     put(&folder.join("photo.json"), joints(16, 16));
-    put(&folder.join("photo.jpg"), jpeg());
+    put(&folder.join("photo.jpg"), JPEG);
 }
 
-/// A grey square of 16 pixels: quantisation of 1, one coefficient a block, the shortest Huffman tables.
-fn jpeg() -> Vec<u8> {
-    let mut out = vec![0xff, 0xd8, 0xff, 0xdb, 0, 67, 0];
-    out.extend([1; 64]);
-    out.extend([0xff, 0xc0, 0, 11, 8, 0, 16, 0, 16, 1, 1, 0x11, 0]);
-    // DC: one code of two bits for size 0 and one for size 8; AC: one code of two bits for "end of block".
-    out.extend([0xff, 0xc4, 0, 21, 0x00, 0, 2, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 8]);
-    out.extend([0xff, 0xc4, 0, 20, 0x10, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0]);
-    out.extend([0xff, 0xda, 0, 8, 1, 1, 0, 0, 63, 0]);
-    // First block: size 8 (01), value 200 (11001000), end (00); three more: size 0 (00), end (00); ones to the end.
-    out.extend([0b0111_0010, 0b0000_0000, 0b0000_0000, 0xff, 0xd9]);
-    out
-}
+/// A grey square of 16 pixels.
+const JPEG: &[u8] = include_bytes!("../../../../shared_mem/tests/data/grey_16.jpg");
