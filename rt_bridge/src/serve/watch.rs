@@ -29,7 +29,7 @@ pub(super) fn objections(body: &mut Body, motion: &Motion, rules: &JointRules, s
     }) {
         faults.push(Fault::TorqueRange);
     }
-    if strays(body, motion, &motion.request.path_deviation, rules, settings) {
+    if deviates(body, motion, &motion.request.path_deviation, rules, settings) {
         faults.push(Fault::PathPoseDeviation);
     }
     all(&faults)
@@ -86,7 +86,7 @@ pub(super) fn is_outside(body: &Body, rules: &JointRules) -> bool {
 }
 
 /// Whether the arm is farther from where it should be than the client allows: translation [m], rotation [rad], elbow [rad].
-pub(super) fn strays(
+pub(super) fn deviates(
     body: &Body,
     motion: &Motion,
     allowed: &[f64; 3],

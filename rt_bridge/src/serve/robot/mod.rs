@@ -41,7 +41,7 @@ use super::motion::{Course, Motion};
 use super::notices::{About, Notices};
 use super::settings::Settings;
 use super::state::{Facts, Modes, fill};
-use super::watch::{objections, runs_away, strays, touches};
+use super::watch::{deviates, objections, runs_away, touches};
 use super::wire::{
     Controller, ControllerMode, GeneratorKind, MotionGeneratorMode, MotionRequest, MoveStatus, RobotMode, SetPoint,
     WireState,
@@ -251,7 +251,7 @@ impl Robot {
         let around = Surroundings::new(body.model(), rules, settings);
         match motion.cycle(set_point, now, &body.measured.tau_J_d, &around) {
             Ok(Course::Runs) => {}
-            Ok(Course::Finished) if strays(body, motion, &motion.request.goal_deviation, rules, settings) => {
+            Ok(Course::Finished) if deviates(body, motion, &motion.request.goal_deviation, rules, settings) => {
                 self.reflex(Fault::GoalPoseDeviation.alone());
             }
             Ok(Course::Finished) => {
