@@ -175,10 +175,42 @@ fn a_urdf_double_pendulum_moves_as_the_closed_form_says() {
 
 #[test]
 fn a_urdf_that_is_no_serial_arm_is_refused_with_joint_and_remedy() {
-    let fork = DOUBLE_PENDULUM.replace("</robot>", r#"<link name="other"/><joint name="second" type="continuous"><parent link="weight"/><child link="other"/></joint><link name="third"/><joint name="finger" type="prismatic"><parent link="lower"/><child link="third"/><limit lower="0" upper="1" effort="1" velocity="1"/></joint></robot>"#);
+    let arm = |name: &str, parent: &str| {
+        format!(
+            r#"<link name="{name}_a"/><link name="{name}_b"/>
+<joint name="{name}_1" type="continuous"><parent link="{parent}"/><child link="{name}_a"/></joint>
+<joint name="{name}_2" type="continuous"><parent link="{name}_a"/><child link="{name}_b"/></joint>
+"#
+        )
+    };
+    let fork =
+        DOUBLE_PENDULUM.replace("</robot>", &format!("{}{}</robot>", arm("left", "lower"), arm("right", "weight")));
     let (_folder, cell) = urdf_cell(&fork, Controller::default());
     let error = ArmModel::from_cell(&cell).unwrap_err().to_string();
-    assert!(error.contains("`finger`") && error.contains("`second`") && error.contains("fixed"), "{error}");
+    assert!(error.contains("line 10: joints `left_1` (line 10) and `right_1` (line 13) branch off"), "{error}");
+    assert!(error.contains("make all but one of them fixed"), "{error}");
+
+    for (from, to, told) in [
+        ("type=\"revolute\"", "type=\"floating\"", "line 7: joint `elbow` is neither revolute"),
+        ("<link name=\"lower\"/>", "", "line 7: link `lower` is used by joint `elbow`"),
+        ("<parent link=\"upper\"/>", "<parent link=\"weight\"/>", "line 4: link `lower` hangs in a loop"),
+        ("<axis xyz=\"0 1 0\"/>", "<axis xyz=\"0 0 0\"/>", "line 7: joint `elbow` has an axis of length 0"),
+        (
+            "<child link=\"lower\"/>",
+            "<child link=\"upper\"/>",
+            "line 7: link `upper` hangs on joints `shoulder` (line 6)",
+        ),
+        (
+            "<link name=\"upper\">",
+            "<link name=\"moon\"/><link name=\"upper\">",
+            "line 3: links `base` (line 2) and `moon`",
+        ),
+    ] {
+        assert!(DOUBLE_PENDULUM.contains(from), "{from}");
+        let (_folder, cell) = urdf_cell(&DOUBLE_PENDULUM.replacen(from, to, 1), Controller::default());
+        let error = ArmModel::from_cell(&cell).expect_err(told).to_string();
+        assert!(error.contains(told) && !error.contains('\n'), "{error}\n{told}");
+    }
 
     let massless = DOUBLE_PENDULUM.replace("<mass value=\"0.7\"/>", "<mass value=\"0\"/>");
     let (_folder, cell) = urdf_cell(&massless, Controller::default());
@@ -188,6 +220,42 @@ fn a_urdf_that_is_no_serial_arm_is_refused_with_joint_and_remedy() {
     let (_folder, cell) = urdf_cell("<robot name=\"x\"><link", Controller::default());
     let error = ArmModel::from_cell(&cell).unwrap_err().to_string();
     assert!(error.contains("arm.urdf") && !error.contains('\n'), "{error}");
+}
+
+/// A hand as ROS describes one: two fingers that slide apart, the second following the first, on a body that is fixed to the
+/// arm's last link.
+#[test]
+fn fingers_are_no_joints_of_the_arm_and_their_mass_hangs_on_its_last_link() {
+    let finger = |name: &str, y: f64, mimic: &str| {
+        format!(
+            r#"<link name="{name}"><inertial><origin xyz="0 0 -0.1"/><mass value="0.05"/><inertia ixx="0" ixy="0" ixz="0" iyy="0" iyz="0" izz="0"/></inertial></link>
+<joint name="{name}_joint" type="prismatic"><parent link="weight"/><child link="{name}"/><axis xyz="0 {y} 0"/><limit lower="0" upper="0.04" effort="20" velocity="0.2"/>{mimic}</joint>"#
+        )
+    };
+    let hand = [finger("finger_1", 1.0, ""), finger("finger_2", -1.0, "<mimic joint=\"finger_1_joint\"/>")].concat();
+    let (_folder, cell) =
+        urdf_cell(&DOUBLE_PENDULUM.replace("</robot>", &format!("{hand}</robot>")), Controller::default());
+    let arm = ArmModel::from_cell(&cell).expect("ROS shows this robot");
+    assert_eq!(
+        (arm.joint_names(), arm.held_joints()),
+        (
+            &["shoulder".to_owned(), "elbow".to_owned()][..],
+            &["finger_1_joint".to_owned(), "finger_2_joint".to_owned()][..]
+        )
+    );
+    // The same arm with the fingers' mass in the weight.
+    let heavier = DOUBLE_PENDULUM.replace("<mass value=\"0.7\"/>", "<mass value=\"0.8\"/>");
+    let (_folder, cell) = urdf_cell(&heavier, Controller::default());
+    let other = ArmModel::from_cell(&cell).expect("a serial chain");
+    let state = JointState { q: joints_from(&[0.4, 0.9]), dq: joints_from(&[1.1, -0.6]) };
+    let [a, b] = [&arm, &other].map(|arm| arm.accelerations(&state, &[0.0; MAX_JOINTS]));
+    assert!((a[0] - b[0]).abs() < 1e-9 && (a[1] - b[1]).abs() < 1e-9, "{a:?} {b:?}");
+    assert_eq!(arm.flange(&state.q).position(), other.flange(&state.q).position());
+    // A wheel or a camera that turns beside the arm does not hide it.
+    let beside = r#"<link name="wheel"/><joint name="wheel_joint" type="continuous"><parent link="base"/><child link="wheel"/></joint>"#;
+    let (_folder, cell) =
+        urdf_cell(&DOUBLE_PENDULUM.replace("</robot>", &format!("{beside}</robot>")), Controller::default());
+    assert_eq!(ArmModel::from_cell(&cell).expect("an arm and a wheel").joint_names(), ["shoulder", "elbow"]);
 }
 
 #[test]

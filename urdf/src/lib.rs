@@ -1,9 +1,10 @@
 //! Links and joints of a URDF: what the dynamics of an arm need of one, for `twin` and for `franka-rs`.
 //!
 //! The names and shapes are those of the published `urdf-rs` 0.9, as far as `franka-rs` uses them, so that one reader serves
-//! the whole tree. Meaning and defaults follow `urdfdom` (<http://wiki.ros.org/urdf/XML>), versions 1.0 to 1.2 of the format:
-//! lengths in m, angles in rad, masses in kg, inertias in kg m² about the inertial frame's axes. Shapes, materials,
-//! transmissions and everything else are passed over.
+//! the whole tree; `line` and `mimicked` are our own. Meaning and defaults follow `urdfdom` (<http://wiki.ros.org/urdf/XML>),
+//! versions 1.0 to 1.2 of the format: lengths in m, angles in rad, masses in kg, inertias in kg m² about the inertial frame's
+//! axes. Of an element that stands where one is expected twice the first counts, as there. Shapes, materials, transmissions and
+//! everything else are passed over.
 //!
 //! | file | what it owns |
 //! |---|---|
@@ -34,6 +35,8 @@ pub struct Link {
     pub name: String,
     /// Its mass properties; all zero where the file gives none.
     pub inertial: Inertial,
+    /// Where it stands in the file, from 1.
+    pub line: usize,
 }
 
 /// Mass properties of a link.
@@ -96,6 +99,10 @@ pub struct Joint {
     pub axis: Axis,
     /// Its limits.
     pub limit: JointLimit,
+    /// The joint whose position it follows (`<mimic>`), if it does.
+    pub mimicked: Option<String>,
+    /// Where it stands in the file, from 1.
+    pub line: usize,
 }
 
 /// How a joint moves.
@@ -160,7 +167,7 @@ pub struct UrdfError {
 /// entities stand for single characters.
 ///
 /// # Errors
-/// The first thing that is no XML, or that a link or a joint lacks or gives twice, or that is no number.
+/// The first thing that is no XML, or that a link or a joint lacks, or that is no number, or a name that is given twice.
 pub fn read_from_string(text: &str) -> Result<Robot, UrdfError> {
     tree::read(text)
 }

@@ -1,4 +1,4 @@
-//! From the stream of tags to links and joints: which tag counts where, which must be there, which may come once.
+//! From the stream of tags to links and joints: which tag counts where, which must be there. Of two of a kind the first counts.
 //! There is no tree of elements: a tag is read when it opens, and only the names of the open ones are kept.
 
 use crate::tag::{Tag, one_line, quoted};
@@ -17,11 +17,17 @@ pub(crate) fn read(text: &str) -> Result<Robot, UrdfError> {
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
     let mut reader = Reader::from_str(text);
     reader.config_mut().expand_empty_elements = true;
-    let mut tree = Tree::default();
+    let mut tree = Tree { line: 1, ..Tree::default() };
+    let mut counted = 0;
     loop {
         let mut at = reader.buffer_position();
         let step = match reader.read_event() {
-            Ok(Event::Start(start)) => tree.open(&start),
+            Ok(Event::Start(start)) => {
+                // Counted on from the tag before: a file of 16 MiB may have thousands of them.
+                tree.line += newlines(text, counted, at);
+                counted = at;
+                tree.open(&start)
+            }
             Ok(Event::End(_)) => tree.close(),
             Ok(Event::Text(text)) if tree.open.is_empty() && !text.trim().is_empty() => {
                 Err(format!("text outside of <robot>: `{}`", quoted(text.trim())))
@@ -41,14 +47,19 @@ pub(crate) fn read(text: &str) -> Result<Robot, UrdfError> {
 }
 
 fn line(text: &str, at: u64) -> usize {
-    let before = usize::try_from(at).map_or(text.len(), |at| at.min(text.len()));
-    1 + text.as_bytes()[..before].iter().filter(|byte| **byte == b'\n').count()
+    1 + newlines(text, 0, at)
+}
+
+/// Line breaks between two places in the text.
+fn newlines(text: &str, from: u64, to: u64) -> usize {
+    let [from, to] = [from, to].map(|at| usize::try_from(at).map_or(text.len(), |at| at.min(text.len())));
+    text.as_bytes().get(from..to).map_or(0, |bytes| bytes.iter().filter(|byte| **byte == b'\n').count())
 }
 
 /// An element that is open, with what was read of it.
 enum Open {
     Robot,
-    Link { name: String, inertial: Option<Inertial> },
+    Link { name: String, line: usize, inertial: Option<Inertial> },
     Inertial { origin: Option<Pose>, mass: Option<Mass>, inertia: Option<Inertia> },
     Joint(Box<Parts>),
     Other,
@@ -57,12 +68,14 @@ enum Open {
 /// What was read of a joint.
 struct Parts {
     name: String,
+    line: usize,
     joint_type: JointType,
     origin: Option<Pose>,
     parent: Option<LinkName>,
     child: Option<LinkName>,
     axis: Option<Axis>,
     limit: Option<JointLimit>,
+    mimicked: Option<String>,
 }
 
 #[derive(Default)]
@@ -72,6 +85,8 @@ struct Tree {
     version: (u32, u32),
     open: Vec<Open>,
     names: [HashSet<String>; 2],
+    /// Of the tag that was read last, from 1.
+    line: usize,
     found: bool,
     ended: bool,
 }
@@ -97,23 +112,23 @@ impl Tree {
             (Some(Open::Robot), "link") if links == MOST => return Err(format!("more than {MOST} links")),
             (Some(Open::Robot), "joint") if joints == MOST => return Err(format!("more than {MOST} joints")),
             (Some(Open::Robot), "link") => {
-                Open::Link { name: self.unused(0, Tag::new(start, name)?.label("name")?, "link")?, inertial: None }
+                let name = self.unused(0, Tag::new(start, name)?.label("name")?, "link")?;
+                Open::Link { name, line: self.line, inertial: None }
             }
             (Some(Open::Robot), "joint") => self.joint(&Tag::new(start, name)?)?,
-            (Some(Open::Link { inertial: Some(_), name }), "inertial") => {
-                return Err(format!("link `{name}` has a second <inertial>"));
+            (Some(Open::Link { inertial: None, .. }), "inertial") => {
+                Open::Inertial { origin: None, mass: None, inertia: None }
             }
-            (Some(Open::Link { .. }), "inertial") => Open::Inertial { origin: None, mass: None, inertia: None },
             (Some(Open::Inertial { origin, mass, inertia }), "origin" | "mass" | "inertia") => {
                 let tag = Tag::new(start, name)?;
                 match name {
-                    "origin" => once(origin, tag.pose(quaternions)?, name)?,
-                    "mass" => once(mass, Mass { value: tag.needed_number("value")? }, name)?,
-                    _ => once(inertia, moments(&tag)?, name)?,
+                    "origin" => first(origin, || tag.pose(quaternions))?,
+                    "mass" => first(mass, || Ok(Mass { value: tag.needed_number("value")? }))?,
+                    _ => first(inertia, || moments(&tag))?,
                 }
                 Open::Other
             }
-            (Some(Open::Joint(parts)), "origin" | "parent" | "child" | "axis" | "limit") => {
+            (Some(Open::Joint(parts)), "origin" | "parent" | "child" | "axis" | "limit" | "mimic") => {
                 parts
                     .fill(name, &Tag::new(start, name)?, self.version)
                     .map_err(|what| format!("joint `{}`: {what}", parts.name))?;
@@ -153,8 +168,8 @@ impl Tree {
                 ));
             }
         };
-        let (origin, parent, child, axis, limit) = (None, None, None, None, None);
-        Ok(Open::Joint(Box::new(Parts { name, joint_type, origin, parent, child, axis, limit })))
+        let (origin, parent, child, axis, limit, mimicked, line) = (None, None, None, None, None, None, self.line);
+        Ok(Open::Joint(Box::new(Parts { name, line, joint_type, origin, parent, child, axis, limit, mimicked })))
     }
 
     /// The name, unless a link (0) or a joint (1) has it already.
@@ -164,11 +179,11 @@ impl Tree {
 
     fn close(&mut self) -> Result<(), String> {
         match self.open.pop() {
-            Some(Open::Link { name, inertial }) => {
-                self.robot.links.push(Link { name, inertial: inertial.unwrap_or_default() });
+            Some(Open::Link { name, line, inertial }) => {
+                self.robot.links.push(Link { name, inertial: inertial.unwrap_or_default(), line });
             }
             Some(Open::Inertial { origin, mass, inertia }) => {
-                let Some(Open::Link { name, inertial }) = self.open.last_mut() else { return Ok(()) };
+                let Some(Open::Link { name, inertial, .. }) = self.open.last_mut() else { return Ok(()) };
                 let lacks = |what: &str| format!("<inertial> of link `{name}` has no <{what}>");
                 *inertial = Some(Inertial {
                     origin: origin.unwrap_or_default(),
@@ -202,11 +217,12 @@ impl Tree {
 impl Parts {
     fn fill(&mut self, name: &str, tag: &Tag<'_>, version: (u32, u32)) -> Result<(), String> {
         match name {
-            "origin" => once(&mut self.origin, tag.pose(version >= (1, 1))?, name),
-            "parent" => once(&mut self.parent, LinkName { link: tag.label("link")? }, name),
-            "child" => once(&mut self.child, LinkName { link: tag.label("link")? }, name),
-            "axis" => once(&mut self.axis, Axis { xyz: tag.needed_vector("xyz")? }, name),
-            _ => once(&mut self.limit, limits(tag, version)?, name),
+            "origin" => first(&mut self.origin, || tag.pose(version >= (1, 1))),
+            "parent" => first(&mut self.parent, || Ok(LinkName { link: tag.label("link")? })),
+            "child" => first(&mut self.child, || Ok(LinkName { link: tag.label("link")? })),
+            "axis" => first(&mut self.axis, || Ok(Axis { xyz: tag.needed_vector("xyz")? })),
+            "mimic" => first(&mut self.mimicked, || tag.label("joint")),
+            _ => first(&mut self.limit, || limits(tag, version)),
         }
     }
 
@@ -222,15 +238,17 @@ impl Parts {
             parent,
             child,
             name: self.name,
+            mimicked: self.mimicked,
+            line: self.line,
         })
     }
 }
 
-fn once<T>(slot: &mut Option<T>, value: T, name: &str) -> Result<(), String> {
-    if slot.is_some() {
-        return Err(format!("a second <{name}>"));
+/// Reads into an empty slot; what comes later is passed over, as `urdfdom` does.
+fn first<T>(slot: &mut Option<T>, read: impl FnOnce() -> Result<T, String>) -> Result<(), String> {
+    if slot.is_none() {
+        *slot = Some(read()?);
     }
-    *slot = Some(value);
     Ok(())
 }
 

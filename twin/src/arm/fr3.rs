@@ -89,6 +89,7 @@ pub(super) fn chain() -> Chain {
             let (q_min, q_max, velocity, torque, rotor_inertia) = LIMITS[i];
             Joint {
                 name: format!("fr3_joint{}", i + 1),
+                link: format!("fr3_link{}", i + 1),
                 slides: false,
                 origin: Isometry3::from_parts(
                     Translation3::from(Vector3::new(a, 0.0, 0.0) + roll * Vector3::z() * d),
@@ -104,5 +105,5 @@ pub(super) fn chain() -> Chain {
             }
         })
         .collect();
-    Chain { joints, base_frame: "fr3_link0".into(), flange: Isometry3::translation(0.0, 0.0, FLANGE) }
+    Chain { joints, flange: Isometry3::translation(0.0, 0.0, FLANGE), held: Vec::new() }
 }

@@ -5,7 +5,7 @@ use super::inertia::{MassProperties, TenParameters};
 use super::kernel::Link;
 use super::spatial::{Rot3, Vec3};
 use super::{JointState, Joints, MAX_JOINTS, fr3, urdf};
-use nalgebra::{Isometry3, Matrix3, Rotation3, Unit, Vector3};
+use nalgebra::{Isometry3, Matrix3, Rotation3, Unit, UnitQuaternion, Vector3};
 use shared_mem::cell::{Cell, Controller, Robot};
 use shared_mem::input::InputError;
 use shared_mem::msg::joints_from;
@@ -31,7 +31,10 @@ pub struct ArmModel {
     pub(super) tool: MassProperties,
     has_geometry: bool,
     joint_names: Vec<String>,
-    base_frame: String,
+    /// Names of the links behind the joints, and each one's frame here in that of its source.
+    link_names: Vec<String>,
+    turns: Vec<UnitQuaternion<f64>>,
+    held_joints: Vec<String>,
     q_min: Joints,
     q_max: Joints,
     velocity_limit: Joints,
@@ -87,14 +90,17 @@ pub enum ModelError {
 /// An arm as its source tells it, before it is laid out for computing.
 pub(super) struct Chain {
     pub(super) joints: Vec<Joint>,
-    pub(super) base_frame: String,
     /// The flange in the last link's frame.
     pub(super) flange: Isometry3<f64>,
+    /// Movable joints of its source that are no joints of the arm, such as fingers.
+    pub(super) held: Vec<String>,
 }
 
 /// One movable joint and the body behind it.
 pub(super) struct Joint {
     pub(super) name: String,
+    /// The link that it carries.
+    pub(super) link: String,
     pub(super) slides: bool,
     /// The joint's frame at 0 in the link before.
     pub(super) origin: Isometry3<f64>,
@@ -128,9 +134,6 @@ impl ArmModel {
             None if known => joints_only(robot),
             None => fr3::chain(),
         };
-        if let Some(base) = &robot.base_frame {
-            chain.base_frame.clone_from(base);
-        }
         if let Some(controller) = &cell.controller {
             apply_controller(&mut chain, controller)?;
         }
@@ -170,8 +173,10 @@ impl ArmModel {
             velocity_limit: per_joint(|j| j.velocity),
             torque_limit: per_joint(|j| j.torque),
             ready: per_joint(|j| j.ready),
+            turns: chain.joints.iter().map(|j| z_onto(&j.axis).into()).collect(),
+            link_names: chain.joints.iter().map(|j| j.link.clone()).collect(),
             joint_names: chain.joints.into_iter().map(|j| j.name).collect(),
-            base_frame: chain.base_frame,
+            held_joints: chain.held,
         };
         arm.check_inertia()?;
         Ok(arm)
@@ -229,10 +234,18 @@ impl ArmModel {
         &self.joint_names
     }
 
-    /// Name of the base frame.
+    /// Name of each link behind a joint and its frame in the base at joint positions `q` [rad], as the arm's source names and
+    /// turns them: for a URDF those that ROS has, too.
+    pub fn named_links(&self, q: &Joints) -> impl Iterator<Item = (&str, Isometry3<f64>)> {
+        let turned = self.link_frames(q).into_iter().zip(&self.turns).map(|(frame, turn)| frame * turn.inverse());
+        self.link_names.iter().map(String::as_str).zip(turned)
+    }
+
+    /// Movable joints of the URDF that are no joints of the arm, by name: fingers and the like, which are held where they are at
+    /// 0, or as near to it as their limits allow.
     #[must_use]
-    pub fn base_frame(&self) -> &str {
-        &self.base_frame
+    pub fn held_joints(&self) -> &[String] {
+        &self.held_joints
     }
 
     /// `false` where only joint names are known: then positions in space mean nothing.
@@ -336,6 +349,7 @@ fn joints_only(robot: &Robot) -> Chain {
         .iter()
         .map(|name| Joint {
             name: name.clone(),
+            link: name.clone(),
             slides: false,
             origin: Isometry3::identity(),
             axis: Vector3::z_axis(),
@@ -347,7 +361,7 @@ fn joints_only(robot: &Robot) -> Chain {
             ready: 0.0,
         })
         .collect();
-    Chain { joints, base_frame: "base".into(), flange: Isometry3::identity() }
+    Chain { joints, flange: Isometry3::identity(), held: Vec::new() }
 }
 
 fn apply_controller(chain: &mut Chain, controller: &Controller) -> Result<(), ModelError> {

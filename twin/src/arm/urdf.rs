@@ -1,10 +1,15 @@
 //! The way in from a URDF file, which `urdf-rs` reads. Finds the one chain of movable joints, folds what is fixed
-//! into the link it is fixed to, and names joint and remedy where the file is no serial arm.
+//! into the link it is fixed to, and names line, joint and remedy where the file is no serial arm.
+//!
+//! Joints that branch off the chain and have no further joint behind them, fingers above all, are no joints of the arm, nor
+//! are those that follow another one (`<mimic>`): they are held at 0, or at the end of their range that is nearest to it, and
+//! what they carry is folded into the link that they hang on.
 
 use super::inertia::MassProperties;
 use super::model::{Chain, Joint, ModelError};
 use nalgebra::{Isometry3, Translation3, Unit, UnitQuaternion, Vector3};
 use shared_mem::input;
+use std::collections::HashMap;
 use std::path::Path;
 use urdf_rs::{JointType, Pose, Robot};
 
@@ -14,76 +19,135 @@ pub(super) fn chain(file: &Path) -> Result<Chain, ModelError> {
     let text = input::text(file, input::Kind::Robot)?;
     let robot = urdf_rs::read_from_string(&text)
         .map_err(|error| ModelError::Read { path: file.to_owned(), what: error.to_string() })?;
-    Tree { robot: &robot, file }.chain()
+    Tree::of(&robot, file)?.chain()
 }
 
 struct Tree<'a> {
     robot: &'a Robot,
     file: &'a Path,
+    root: &'a str,
+    /// By link: the joints that start on it, in file order.
+    joints: HashMap<&'a str, Vec<&'a urdf_rs::Joint>>,
+    /// By link: joints of an arm on the longest way from it to an end.
+    reach: HashMap<&'a str, usize>,
 }
 
-impl Tree<'_> {
+impl<'a> Tree<'a> {
+    fn of(robot: &'a Robot, file: &'a Path) -> Result<Self, ModelError> {
+        let (mut joints, mut parents): (HashMap<_, Vec<_>>, HashMap<&str, &urdf_rs::Joint>) = Default::default();
+        for joint in &robot.joints {
+            joints.entry(joint.parent.link.as_str()).or_default().push(joint);
+            if let Some(other) = parents.insert(&joint.child.link, joint) {
+                let what = format!(
+                    "link `{}` hangs on joints `{}` (line {}) and `{}`; a link hangs on one joint",
+                    joint.child.link, other.name, other.line, joint.name
+                );
+                return Err(at_line(file, joint.line, &what));
+            }
+        }
+        let mut tree = Self { robot, file, root: root(robot, file, &parents)?, joints, reach: HashMap::new() };
+        tree.measure();
+        match robot.links.iter().find(|link| !tree.reach.contains_key(link.name.as_str())) {
+            Some(link) => {
+                Err(tree.error(link.line, &format!("link `{}` hangs in a loop of joints; cut it", link.name)))
+            }
+            None => Ok(tree),
+        }
+    }
+
+    /// From the ends to the root. Every link hangs on one joint, so each is met once.
+    fn measure(&mut self) {
+        let (mut order, mut next) = (vec![self.root], 0);
+        while let Some(link) = order.get(next).copied() {
+            order.extend(self.behind(link).map(|joint| joint.child.link.as_str()).collect::<Vec<_>>());
+            next += 1;
+        }
+        for link in order.into_iter().rev() {
+            let longest = self.behind(link).map(|joint| self.joints_from(joint)).max().unwrap_or(0);
+            self.reach.insert(link, longest);
+        }
+    }
+
+    fn behind(&self, link: &str) -> impl Iterator<Item = &'a urdf_rs::Joint> {
+        self.joints.get(link).into_iter().flatten().copied()
+    }
+
+    /// Joints of an arm on the longest way that begins with `joint`.
+    fn joints_from(&self, joint: &urdf_rs::Joint) -> usize {
+        let counts = joint.joint_type != JointType::Fixed && joint.mimicked.is_none();
+        usize::from(counts) + self.reach.get(joint.child.link.as_str()).copied().unwrap_or(0)
+    }
+
     fn chain(&self) -> Result<Chain, ModelError> {
-        let root = self.root()?;
-        let mut chain = Chain { joints: Vec::new(), base_frame: root.to_owned(), flange: Isometry3::identity() };
-        let mut link = root;
+        let mut chain = Chain { joints: Vec::new(), flange: Isometry3::identity(), held: Vec::new() };
+        let mut link = self.root;
         loop {
-            let rigid = self.rigid_group(link)?;
+            let next = self.next(link, chain.joints.is_empty())?;
+            let rigid = self.rigid_group(link, next)?;
             if let Some(last) = chain.joints.last_mut() {
                 last.body = rigid.body;
             }
-            let [(joint, at)] = &rigid.movable[..] else {
-                if let Some((joint, _)) = rigid.movable.first() {
-                    let others = rigid.movable[1..].iter().map(|(j, _)| format!("`{}`", j.name)).collect::<Vec<_>>();
-                    return Err(self.error(format!(
-                        "joints `{}` and {} branch off link `{link}`; only serial arms are supported: make all but one of them fixed",
-                        joint.name,
-                        others.join(", ")
-                    )));
-                }
+            chain.held.extend(rigid.held);
+            let (Some(joint), Some(at)) = (next, rigid.next) else {
                 chain.flange = rigid.end;
                 return Ok(chain);
             };
-            if chain.joints.len() > self.robot.joints.len() {
-                return Err(self.error(format!("joint `{}` closes a loop; only serial arms are supported", joint.name)));
-            }
-            chain.joints.push(self.movable(joint, at)?);
+            chain.joints.push(self.movable(joint, &at)?);
             link = &joint.child.link;
         }
     }
 
-    fn root(&self) -> Result<&str, ModelError> {
-        let mut roots = self.robot.links.iter().filter(|l| self.robot.joints.iter().all(|j| j.child.link != l.name));
-        match (roots.next(), roots.next()) {
-            (Some(root), None) => Ok(&root.name),
-            (Some(a), Some(b)) => Err(self.error(format!(
-                "links `{}` and `{}` both hang on nothing; join them with a fixed joint",
-                a.name, b.name
-            ))),
-            _ => Err(self.error("no link is the root; the joints form a loop, cut it".into())),
+    /// The joint with which the arm goes on behind the rigid body of `link`; `None` at its end.
+    fn next(&self, link: &str, first: bool) -> Result<Option<&'a urdf_rs::Joint>, ModelError> {
+        let (mut movable, mut open) = (Vec::new(), vec![link]);
+        while let Some(link) = open.pop() {
+            for joint in self.behind(link) {
+                match joint.joint_type {
+                    JointType::Fixed => open.push(&joint.child.link),
+                    _ => movable.push(joint),
+                }
+            }
+        }
+        movable.sort_by_key(|joint| joint.line);
+        let with =
+            |least: usize| movable.iter().copied().filter(|joint| self.joints_from(joint) >= least).collect::<Vec<_>>();
+        match (&with(2)[..], &with(1)[..]) {
+            ([arm], _) => Ok(Some(*arm)),
+            ([], [last]) if first || movable.len() == 1 => Ok(Some(*last)),
+            ([], branches) if !first || branches.is_empty() => Ok(None),
+            (several, branches) => {
+                let branches = if several.is_empty() { branches } else { several };
+                let names: Vec<_> = branches.iter().map(|j| format!("`{}` (line {})", j.name, j.line)).collect();
+                let line = branches.first().map_or(1, |joint| joint.line);
+                Err(self.error(
+                    line,
+                    &format!(
+                        "joints {} branch off link `{link}`; only serial arms are supported: make all but one of them fixed",
+                        names.join(" and ")
+                    ),
+                ))
+            }
         }
     }
 
-    /// Everything fixed to `link`: its mass, the movable joints that start on it, and the end of the fixed joints.
-    fn rigid_group(&self, link: &str) -> Result<RigidGroup<'_>, ModelError> {
+    /// Everything rigid with `link`: its mass, where `next` starts, the joints that are held, and the end of the fixed joints.
+    fn rigid_group(&self, link: &str, next: Option<&urdf_rs::Joint>) -> Result<RigidGroup, ModelError> {
         let mut group = RigidGroup::default();
         let mut end = None;
-        let mut open = vec![(link.to_owned(), Isometry3::identity(), true)];
-        let mut visited = 0;
+        let mut open = vec![(link, Isometry3::identity(), true)];
         while let Some((name, at, on_path)) = open.pop() {
-            visited += 1;
-            if visited > self.robot.links.len() {
-                return Err(self.error(format!("fixed joints behind link `{link}` form a loop; cut it")));
-            }
-            group.body = group.body.joined_with(&self.body(&name)?.seen_from(&at));
+            group.body = group.body.joined_with(&self.body(name)?.seen_from(&at));
             let mut path_goes_on = false;
-            for joint in self.robot.joints.iter().filter(|j| j.parent.link == name) {
+            for joint in self.behind(name) {
                 let to_joint = at * isometry(&joint.origin);
-                if joint.joint_type == JointType::Fixed {
-                    open.push((joint.child.link.clone(), to_joint, on_path && !path_goes_on));
+                if next.is_some_and(|next| next.name == joint.name) {
+                    group.next = Some(to_joint);
+                } else if joint.joint_type == JointType::Fixed {
+                    open.push((&joint.child.link, to_joint, on_path && !path_goes_on));
                     path_goes_on = true;
                 } else {
-                    group.movable.push((joint, to_joint));
+                    group.held.push(joint.name.clone());
+                    open.push((&joint.child.link, to_joint * self.held(joint)?, false));
                 }
             }
             if on_path && !path_goes_on {
@@ -94,20 +158,33 @@ impl Tree<'_> {
         Ok(group)
     }
 
+    /// Where a joint that is held holds what it carries, in the joint's frame at 0.
+    fn held(&self, joint: &urdf_rs::Joint) -> Result<Isometry3<f64>, ModelError> {
+        let (lower, upper) = (joint.limit.lower, joint.limit.upper);
+        let at =
+            if joint.joint_type != JointType::Continuous && upper > lower { 0.0_f64.clamp(lower, upper) } else { 0.0 };
+        if at == 0.0 {
+            return Ok(Isometry3::identity());
+        }
+        let axis = self.axis(joint)?;
+        Ok(match joint.joint_type {
+            JointType::Prismatic => Translation3::from(axis.into_inner() * at).into(),
+            _ => Isometry3::from_parts(Translation3::identity(), UnitQuaternion::from_axis_angle(&axis, at)),
+        })
+    }
+
     fn body(&self, name: &str) -> Result<MassProperties, ModelError> {
-        let link = self
-            .robot
-            .links
-            .iter()
-            .find(|l| l.name == name)
-            .ok_or_else(|| self.error(format!("link `{name}` is used by a joint but not described; add it")))?;
+        let link = self.robot.links.iter().find(|link| link.name == name).ok_or_else(|| {
+            let user = self.robot.joints.iter().find(|joint| joint.child.link == name || joint.parent.link == name);
+            let (line, joint) = user.map_or((1, ""), |joint| (joint.line, joint.name.as_str()));
+            self.error(line, &format!("link `{name}` is used by joint `{joint}` but not described; add it"))
+        })?;
         let i = &link.inertial.inertia;
         let local = MassProperties::new(link.inertial.mass.value, [0.0; 3], [i.ixx, i.iyy, i.izz, i.ixy, i.ixz, i.iyz]);
         let numbers = [local.mass, i.ixx, i.iyy, i.izz, i.ixy, i.ixz, i.iyz];
         if numbers.iter().any(|v| !v.is_finite()) || numbers[..4].iter().any(|v| *v < 0.0) {
-            return Err(
-                self.error(format!("link `{name}` has a negative or infinite mass or inertia; correct its <inertial>"))
-            );
+            let what = format!("link `{name}` has a negative or infinite mass or inertia; correct its <inertial>");
+            return Err(self.error(link.line, &what));
         }
         Ok(local.seen_from(&isometry(&link.inertial.origin)))
     }
@@ -117,23 +194,27 @@ impl Tree<'_> {
             JointType::Revolute | JointType::Continuous => false,
             JointType::Prismatic => true,
             _ => {
-                return Err(self.error(format!(
+                let what = format!(
                     "joint `{}` is neither revolute, continuous, prismatic nor fixed; only those are supported",
                     joint.name
-                )));
+                );
+                return Err(self.error(joint.line, &what));
             }
         };
-        let axis = Unit::try_new(Vector3::from(joint.axis.xyz.0), 1e-9).ok_or_else(|| {
-            self.error(format!(
-                "joint `{}` has an axis of length 0; give a direction, for example xyz=\"0 0 1\"",
+        if let Some(other) = &joint.mimicked {
+            let what = format!(
+                "joint `{}` follows `{other}` (<mimic>) and carries further joints; only serial arms are supported: make it fixed",
                 joint.name
-            ))
-        })?;
+            );
+            return Err(self.error(joint.line, &what));
+        }
+        let axis = self.axis(joint)?;
         let limit = &joint.limit;
         let bounded = joint.joint_type != JointType::Continuous && limit.upper > limit.lower;
         let position = if bounded { [limit.lower, limit.upper] } else { [f64::NEG_INFINITY, f64::INFINITY] };
         Ok(Joint {
             name: joint.name.clone(),
+            link: joint.child.link.clone(),
             slides,
             origin: *at,
             axis,
@@ -146,15 +227,46 @@ impl Tree<'_> {
         })
     }
 
-    fn error(&self, what: String) -> ModelError {
-        ModelError::Chain { path: self.file.to_owned(), what }
+    fn axis(&self, joint: &urdf_rs::Joint) -> Result<Unit<Vector3<f64>>, ModelError> {
+        Unit::try_new(Vector3::from(joint.axis.xyz.0), 1e-9).ok_or_else(|| {
+            let what =
+                format!("joint `{}` has an axis of length 0; give a direction, for example xyz=\"0 0 1\"", joint.name);
+            self.error(joint.line, &what)
+        })
+    }
+
+    fn error(&self, line: usize, what: &str) -> ModelError {
+        at_line(self.file, line, what)
+    }
+}
+
+fn at_line(file: &Path, line: usize, what: &str) -> ModelError {
+    ModelError::Chain { path: file.to_owned(), what: format!("line {line}: {what}") }
+}
+
+/// The one link that hangs on nothing.
+fn root<'a>(robot: &'a Robot, file: &Path, parents: &HashMap<&str, &urdf_rs::Joint>) -> Result<&'a str, ModelError> {
+    let mut roots = robot.links.iter().filter(|link| !parents.contains_key(link.name.as_str()));
+    match (roots.next(), roots.next()) {
+        (Some(root), None) => Ok(&root.name),
+        (Some(a), Some(b)) => {
+            let what = format!(
+                "links `{}` (line {}) and `{}` both hang on nothing; join them with a fixed joint",
+                a.name, a.line, b.name
+            );
+            Err(at_line(file, b.line, &what))
+        }
+        _ => Err(at_line(file, 1, "no link is the root; the joints form a loop, cut it")),
     }
 }
 
 #[derive(Default)]
-struct RigidGroup<'a> {
+struct RigidGroup {
     body: MassProperties,
-    movable: Vec<(&'a urdf_rs::Joint, Isometry3<f64>)>,
+    /// Where the arm's next joint starts.
+    next: Option<Isometry3<f64>>,
+    /// Joints that are held, by name.
+    held: Vec<String>,
     end: Isometry3<f64>,
 }
 
