@@ -126,6 +126,15 @@ impl Cell {
         Ok(self)
     }
 
+    /// Name of the base frame in force: that of `[robot]`, else the built-in model's first link, else `base`. Recordings, bags and
+    /// viewers name it alike.
+    #[must_use]
+    pub fn base_frame(&self) -> &str {
+        let robot = self.robot.as_ref();
+        let built_in = robot.and_then(|robot| robot.model.as_deref()).map(|_| "fr3_link0");
+        robot.and_then(|robot| robot.base_frame.as_deref()).or(built_in).unwrap_or("base")
+    }
+
     /// The same cell with paths that hold from any folder.
     #[must_use]
     pub fn at_home_anywhere(&self) -> Self {

@@ -17,7 +17,8 @@ pub struct Robot {
     /// Joint names in the order of the recordings, where no model is known: one second-order model a joint then.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub joints: Vec<String>,
-    /// Name of the base frame. Default: the model's root link.
+    /// Name of the base frame, in recordings, bags and viewers alike; [`Cell::base_frame`](super::Cell::base_frame) is the name in
+    /// force.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub base_frame: Option<String>,
 }

@@ -7,6 +7,7 @@
 
 use super::torques;
 use super::wire::{self, UnixClock, Wire};
+use crate::cell::Cell;
 use crate::msg::arm::{ArmCommand, ArmState};
 use crate::msg::event::Event;
 use crate::msg::gripper::GripperState;
@@ -131,6 +132,8 @@ pub struct ClipWriter<W: Write = File> {
     channels: HashMap<&'static str, Channel>,
     messages: u64,
     bytes: Arc<AtomicU64>,
+    /// Name of the frame that the object's poses are in.
+    base_frame: String,
     /// Encoded message, reused.
     scratch: Vec<u8>,
 }
@@ -212,9 +215,10 @@ impl<W: Write> ClipWriter<W> {
             .disable_seeking(true)
             .create(NoSeek::new(BufWriter::new(counted)))
             .map_err(failed)?;
-        let channels = HashMap::new();
-        let path = path.to_owned();
-        let mut writer = Self { path, mcap, clock, channels, messages: 0, bytes, scratch: Vec::new() };
+        // A cell.toml that cannot be read names no frame; whoever reads the clip is told what is wrong with it.
+        let cell = info.cell_toml.as_deref().and_then(|text| Cell::parse(text, path).ok()).unwrap_or_default();
+        let (path, base_frame, channels) = (path.to_owned(), cell.base_frame().to_owned(), HashMap::new());
+        let mut writer = Self { path, mcap, clock, channels, messages: 0, bytes, base_frame, scratch: Vec::new() };
         writer.ride_along(info).map_err(|error| writer.failed(&error))?;
         Ok(writer)
     }
@@ -262,7 +266,9 @@ impl<W: Write> ClipWriter<W> {
     /// # Errors
     /// As [`ClipWriter::arm_state`].
     pub fn object_pose(&mut self, message: &ObjectPose) -> Result<(), WriteError> {
-        self.message(message)
+        let mut wire = message.to_wire(self.clock);
+        wire.frame_id.clone_from(&self.base_frame);
+        self.encoded::<ObjectPose>(message.stamp_ns, &wire)
     }
 
     /// Records intrinsics and pose of the camera.
@@ -324,10 +330,14 @@ impl<W: Write> ClipWriter<W> {
     }
 
     fn message<T: Wire>(&mut self, message: &T) -> Result<(), WriteError> {
+        self.encoded::<T>(message.stamp_ns(), &message.to_wire(self.clock))
+    }
+
+    fn encoded<T: Wire>(&mut self, stamp_ns: u64, message: &T::Message) -> Result<(), WriteError> {
         self.scratch.clear();
-        let encoded = message.to_wire(self.clock).encode(&mut self.scratch);
+        let encoded = message.encode(&mut self.scratch);
         debug_assert!(encoded.is_ok(), "a vector grows as needed");
-        self.put(T::TOPIC, T::SCHEMA, message.stamp_ns()).map_err(|error| self.failed(&error))
+        self.put(T::TOPIC, T::SCHEMA, stamp_ns).map_err(|error| self.failed(&error))
     }
 
     /// Writes the scratch buffer as one message.

@@ -1,25 +1,38 @@
 //! The live view: robot and twin in 3D, their joints, the gap as curves, the camera's pictures, as a Foxglove WebSocket
 //! (the only code that knows the foxglove crate). It is one more reader of shared memory, in a thread of its own, so
-//! the shadow's timing does not feel it. Thirty times a second it shows the newest of everything and skips the rest.
+//! the shadow's timing does not feel it. Thirty times a second it shows the newest of everything and skips the rest. The
+//! robot's shapes are sent once to everybody who comes; from then on the frames move them.
 //!
 //! Viewers come in by a door of our own (`front`): four at a time, none from a foreign web page, and each is sent the newest
 //! 32 messages at most, so that one that does not read costs some tens of megabytes until it is closed.
 
+mod frames;
 mod front;
+mod newcomers;
 mod request;
 mod scene;
 #[cfg(test)]
+mod shown_tests;
+#[cfg(test)]
+mod test_client;
+#[cfg(test)]
 mod tests;
 
-use crate::arm::ModelError;
+use crate::arm::{Joints, ModelError};
 use crate::render::LiveView;
-use foxglove::messages::{FrameTransform, FrameTransforms, PoseInFrame, RawImage, SceneUpdate, Timestamp};
-use foxglove::{Channel, ChannelBuilder, FoxgloveError, RawChannel, Schema, WebSocketServer, WebSocketServerHandle};
+use foxglove::messages::{
+    CameraCalibration, FrameTransforms, JointStates, PoseInFrame, RawImage, SceneUpdate, Timestamp,
+};
+use foxglove::{
+    Channel, ChannelBuilder, Context, Encode, FoxgloveError, RawChannel, Schema, WebSocketServer, WebSocketServerHandle,
+};
+use frames::{CAMERA, Look};
 use front::{Front, PATIENCE, hidden_address};
-use scene::{Look, Scene};
+use newcomers::Newcomers;
+use scene::Scene;
 use shared_mem::cell::Cell;
 use shared_mem::frames::{Base, Object, Pose};
-use shared_mem::msg::image::ImageHeader;
+use shared_mem::msg::image::{CameraInfo, ImageHeader};
 use shared_mem::msg::twin::TwinGap;
 use shared_mem::time::unix_offset_ns;
 use shared_mem::topics::{ARM_STATE, CAMERA_COLOR, CAMERA_DEPTH, CAMERA_INFO, OBJECT_POSE, TWIN_GAP, TWIN_STATE};
@@ -36,6 +49,8 @@ const PORT: u16 = 8765;
 /// Messages that wait for a viewer; where one more comes, the oldest goes. Two pictures' worth of everything, at 0.9 MB for
 /// the largest.
 const BACKLOG: usize = 32;
+/// Robot, twin and object.
+const SCENE: &str = "/scene";
 /// Time between two pictures of the scene.
 const FRAME: Duration = Duration::from_millis(33);
 
@@ -45,17 +60,22 @@ pub struct Viewer {
     server: WebSocketServerHandle,
     scene: Scene,
     scenes: Channel<SceneUpdate>,
-    real_joints: Channel<foxglove::messages::JointStates>,
-    twin_joints: Channel<foxglove::messages::JointStates>,
+    /// Whoever has just come to the scene.
+    newcomers: Arc<Newcomers>,
+    real_joints: Channel<JointStates>,
+    twin_joints: Channel<JointStates>,
     real_object: Channel<PoseInFrame>,
     twin_object: Channel<PoseInFrame>,
     transforms: Channel<FrameTransforms>,
+    calibration: Channel<CameraCalibration>,
     color: Channel<RawImage>,
     depth: Channel<RawImage>,
     /// The twin as the camera sees it, where the cell has a camera; on twin, blend, difference.
     live: Option<LiveView>,
     beside: [Channel<RawImage>; 3],
     gap: Arc<RawChannel>,
+    /// Server and channels find each other through it, and do not keep it.
+    _context: Arc<Context>,
 }
 
 /// The live view cannot be shown.
@@ -84,32 +104,42 @@ impl Viewer {
     /// # Errors
     /// [`ViewerError`] when the port is taken or cell.toml describes no arm.
     pub fn start(cell: &Cell, live: Option<LiveView>) -> Result<Self, ViewerError> {
+        Self::listening_at(SocketAddr::from((HOST, PORT)), cell, live)
+    }
+
+    fn listening_at(listen: SocketAddr, cell: &Cell, live: Option<LiveView>) -> Result<Self, ViewerError> {
         let scene = Scene::new(cell)?;
-        let server = WebSocketServer::new().name("twinalign shadow");
-        let (front, server) = open(server, SocketAddr::from((HOST, PORT)), PATIENCE)?;
+        let newcomers = Arc::new(Newcomers::to(SCENE));
+        let context = Context::new();
+        let server = WebSocketServer::new().name("twinalign shadow").context(&context).listener(newcomers.clone());
+        let (front, server) = open(server, listen, PATIENCE)?;
         let schema = r#"{"type":"object","properties":{"joint_error":{"type":"array","items":{"type":"number"}},
             "joint_rms":{"type":"array","items":{"type":"number"}},"object_add_m":{"type":"number"},
             "object_add_s_m":{"type":"number"},"age_s":{"type":"number"},"alignments":{"type":"integer"}}}"#;
         let gap = ChannelBuilder::new(TWIN_GAP.name)
             .message_encoding("json")
             .schema(Schema::new("twinalign.Gap", "jsonschema", schema.as_bytes().to_vec()))
+            .context(&context)
             .build_raw()
             .map_err(ViewerError::Channel)?;
         Ok(Self {
             front,
             server,
             scene,
-            scenes: Channel::new("/scene"),
-            real_joints: Channel::new("/arm/joints"),
-            twin_joints: Channel::new("/twin/joints"),
-            real_object: Channel::new(OBJECT_POSE.name),
-            twin_object: Channel::new("/twin/object"),
-            transforms: Channel::new("/tf"),
-            color: Channel::new(CAMERA_COLOR.name),
-            depth: Channel::new(CAMERA_DEPTH.name),
+            scenes: channel(&context, SCENE),
+            newcomers,
+            real_joints: channel(&context, "/arm/joints"),
+            twin_joints: channel(&context, "/twin/joints"),
+            real_object: channel(&context, OBJECT_POSE.name),
+            twin_object: channel(&context, "/twin/object"),
+            transforms: channel(&context, "/tf"),
+            calibration: channel(&context, CAMERA_INFO.name),
+            color: channel(&context, CAMERA_COLOR.name),
+            depth: channel(&context, CAMERA_DEPTH.name),
             live,
-            beside: ["/camera/twin", "/camera/blend", "/camera/difference"].map(Channel::new),
+            beside: ["/camera/twin", "/camera/blend", "/camera/difference"].map(|topic| channel(&context, topic)),
             gap,
+            _context: context,
         })
     }
 
@@ -123,21 +153,27 @@ impl Viewer {
     ///
     /// # Errors
     /// [`ViewerError::Transport`] when shared memory fails.
-    pub fn run(mut self, stop: &AtomicBool) -> Result<(), ViewerError> {
-        let node = Node::open("twin_viewer")?;
+    pub fn run(self, stop: &AtomicBool) -> Result<(), ViewerError> {
+        self.run_on(&Node::open("twin_viewer")?, stop)
+    }
+
+    fn run_on(mut self, node: &Node, stop: &AtomicBool) -> Result<(), ViewerError> {
         let (arm, twin) = (node.subscriber(ARM_STATE)?, node.subscriber(TWIN_STATE)?);
         let (gaps, poses) = (node.subscriber(TWIN_GAP)?, node.subscriber(OBJECT_POSE)?);
         let info = node.subscriber(CAMERA_INFO)?;
         let (color, depth) = (node.image_subscriber(CAMERA_COLOR)?, node.image_subscriber(CAMERA_DEPTH)?);
         while !stop.load(Ordering::Relaxed) {
             let time = timestamp(shared_mem::time::now_ns());
+            if self.newcomers.any() {
+                self.scene.shapes(time).iter().for_each(|shapes| self.scenes.log(shapes));
+            }
             if let Some(state) = arm.newest()? {
                 self.real_joints.log(&self.scene.joints(time, &state.q, &state.dq, &state.tau_J));
-                self.scenes.log(&self.scene.arm(time, Look::Real, &state.q));
+                self.show_arm(time, Look::Real, &state.q);
             }
             if let Some(state) = twin.newest()? {
                 self.twin_joints.log(&self.scene.joints(time, &state.q, &state.dq, &state.tau_J));
-                self.scenes.log(&self.scene.arm(time, Look::Twin, &state.q));
+                self.show_arm(time, Look::Twin, &state.q);
                 let pose = Pose::from_parts(state.object_position, state.object_wxyz);
                 self.show_object(time, Look::Twin, pose.filter(|_| state.has_object == 1));
                 if let Some(live) = &mut self.live {
@@ -151,7 +187,7 @@ impl Viewer {
                 self.gap.log(gap_json(&gap).to_string().as_bytes());
             }
             if let Some(info) = info.newest()? {
-                self.show_camera_frame(time, info.position, info.wxyz);
+                self.show_camera(time, &info);
             }
             if let Some(sample) = newest(&depth)? {
                 show_picture(time, sample.header(), &self.depth, || sample.bytes().to_vec());
@@ -172,10 +208,16 @@ impl Viewer {
         Ok(())
     }
 
+    fn show_arm(&self, time: Timestamp, look: Look, q: &Joints) {
+        self.transforms.log(&self.scene.transforms(time, look, q));
+        self.scene.capsules(time, look, q).iter().for_each(|capsules| self.scenes.log(capsules));
+    }
+
     fn show_object(&self, time: Timestamp, look: Look, pose: Option<Pose<Base, Object>>) {
         let Some(pose) = pose else { return };
         let channel = if look == Look::Real { &self.real_object } else { &self.twin_object };
         channel.log(&self.scene.pose_in_base(time, &pose.isometry()));
+        self.transforms.log(&self.scene.frames().object(time, look, &pose.isometry()));
         if let Some(update) = self.scene.object(time, look, &pose.isometry()) {
             self.scenes.log(&update);
         }
@@ -202,19 +244,28 @@ impl Viewer {
         }
     }
 
-    fn show_camera_frame(&self, time: Timestamp, position: [f64; 3], wxyz: [f64; 4]) {
-        let Some(pose) = Pose::<Base, shared_mem::frames::Camera>::from_parts(position, wxyz) else { return };
-        let (translation, rotation) = scene::parts(&pose.isometry());
-        self.transforms.log(&FrameTransforms {
-            transforms: vec![FrameTransform {
-                timestamp: Some(time),
-                parent_frame_id: self.scene.base_frame().to_owned(),
-                child_frame_id: "camera".into(),
-                translation: Some(translation),
-                rotation: Some(rotation),
-            }],
+    /// Where the camera stands and how it projects.
+    fn show_camera(&self, time: Timestamp, info: &CameraInfo) {
+        if let Some(pose) = Pose::<Base, shared_mem::frames::Camera>::from_parts(info.position, info.wxyz) {
+            self.transforms.log(&self.scene.frames().camera(time, &pose.isometry()));
+        }
+        let [fx, fy, cx, cy] = info.intrinsics;
+        self.calibration.log(&CameraCalibration {
+            timestamp: Some(time),
+            frame_id: CAMERA.into(),
+            width: info.width,
+            height: info.height,
+            distortion_model: "plumb_bob".into(),
+            d: info.distortion.to_vec(),
+            k: vec![fx, 0.0, cx, 0.0, fy, cy, 0.0, 0.0, 1.0],
+            r: vec![1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0],
+            p: vec![fx, 0.0, cx, 0.0, 0.0, fy, cy, 0.0, 0.0, 0.0, 1.0, 0.0],
         });
     }
+}
+
+fn channel<T: Encode>(context: &Arc<Context>, topic: &str) -> Channel<T> {
+    ChannelBuilder::new(topic).context(context).build()
 }
 
 /// Starts `server` behind a socket at `listen` that closes viewers which read nothing for `patience`.
@@ -246,7 +297,7 @@ fn show_picture(time: Timestamp, header: &ImageHeader, channel: &Channel<RawImag
     }
     channel.log(&RawImage {
         timestamp: Some(time),
-        frame_id: "camera".into(),
+        frame_id: CAMERA.into(),
         width: header.width,
         height: header.height,
         encoding: header.encoding.name().into(),

@@ -1,28 +1,23 @@
-//! Robot, twin and object as Foxglove primitives. Base frame, metres.
+//! Robot, twin and object as Foxglove primitives, metres: what hangs on a link in the link's frame, all else in the base frame.
 
+use super::frames::{Frames, Look, parts};
 use crate::arm::{Joints, ModelError};
+use crate::render::{Hand, Mesh, RobotSurface};
 use crate::scene::{ArmOutline, ObjectModel};
 use foxglove::messages::{
-    Color, CubePrimitive, CylinderPrimitive, JointState, JointStates, Pose, PoseInFrame, Quaternion, SceneEntity,
-    SceneUpdate, SpherePrimitive, Timestamp, Vector3,
+    Color, CubePrimitive, CylinderPrimitive, FrameTransforms, JointState, JointStates, Point3, Pose, PoseInFrame,
+    SceneEntity, SceneUpdate, SpherePrimitive, Timestamp, TriangleListPrimitive, Vector3,
 };
 use nalgebra::{Isometry3, Translation3};
 use shared_mem::cell::Cell;
 
-/// Whose picture it is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Look {
-    /// The real cell: solid.
-    Real,
-    /// The twin: a blue ghost, a hair larger, so that it shows where the two agree.
-    Twin,
-}
-
 /// What does not change while it is shown.
 pub(super) struct Scene {
     outline: ArmOutline,
+    /// The robot's own shapes, where they are known.
+    surface: Option<RobotSurface>,
+    frames: Frames,
     object_size: Option<nalgebra::Vector3<f64>>,
-    base_frame: String,
 }
 
 /// Share by which the twin is drawn larger.
@@ -33,15 +28,17 @@ impl Scene {
         let outline = ArmOutline::new(cell)?;
         // A mesh that cannot be read was refused when the twin was made.
         let object = ObjectModel::new(cell, None).ok().flatten();
+        let surface = RobotSurface::new(cell, Hand::None)?;
         Ok(Self {
-            base_frame: outline.model().base_frame().to_owned(),
+            frames: Frames::of(cell, outline.model()),
+            surface: surface.is_measured().then_some(surface),
             object_size: object.map(|model| model.shape.half_extents() * 2.0),
             outline,
         })
     }
 
-    pub(super) fn base_frame(&self) -> &str {
-        &self.base_frame
+    pub(super) fn frames(&self) -> &Frames {
+        &self.frames
     }
 
     pub(super) fn joints(&self, time: Timestamp, q: &Joints, dq: &Joints, tau: &Joints) -> JointStates {
@@ -55,8 +52,35 @@ impl Scene {
         JointStates { timestamp: Some(time), joints: joints.collect() }
     }
 
-    /// The arm: a cylinder and two balls for each capsule.
-    pub(super) fn arm(&self, time: Timestamp, look: Look, q: &Joints) -> SceneUpdate {
+    /// The frames of the arm at joint positions `q` [rad].
+    pub(super) fn transforms(&self, time: Timestamp, look: Look, q: &Joints) -> FrameTransforms {
+        self.frames.arm(time, look, self.outline.model(), q)
+    }
+
+    /// The shapes of the robot's links and of its tool, each fixed to its link's frame: sent to everybody who comes, and moved by
+    /// the frames from then on. Nothing where only the joints' places are known.
+    pub(super) fn shapes(&self, time: Timestamp) -> Option<SceneUpdate> {
+        let surface = self.surface.as_ref()?;
+        let mut entities = Vec::new();
+        for look in [Look::Real, Look::Twin] {
+            let of_links = (0..=surface.model().dof() + 1).map(|link| {
+                let mut entity = self.entity(time, look, &format!("link{link}"));
+                entity.frame_id = self.frames.link(look, link);
+                entity.frame_locked = true;
+                let parts = surface.parts().iter().zip(surface.links()).filter(|(_, of)| *of == link);
+                entity.triangles = parts.map(|(mesh, _)| triangles(mesh, look)).collect();
+                entity
+            });
+            entities.extend(of_links.filter(|entity| !entity.triangles.is_empty()));
+        }
+        Some(SceneUpdate { deletions: Vec::new(), entities })
+    }
+
+    /// An arm whose shapes are not known: a cylinder and two balls for each capsule from joint to joint, in the base frame.
+    pub(super) fn capsules(&self, time: Timestamp, look: Look, q: &Joints) -> Option<SceneUpdate> {
+        if self.surface.is_some() {
+            return None;
+        }
         let mut entity = self.entity(time, look, "arm");
         self.outline.for_each(q, |number, base_from_part| {
             let part = self.outline.parts()[number];
@@ -73,7 +97,7 @@ impl Scene {
             let size = Some(Vector3 { x: width, y: width, z: width });
             entity.spheres.extend([0.0, part.length].map(|z| SpherePrimitive { pose: at(z), size, color }));
         });
-        SceneUpdate { deletions: Vec::new(), entities: vec![entity] }
+        Some(SceneUpdate { deletions: Vec::new(), entities: vec![entity] })
     }
 
     /// The object's bounding box; `None` where the cell has no object.
@@ -89,17 +113,32 @@ impl Scene {
     }
 
     pub(super) fn pose_in_base(&self, time: Timestamp, place: &Isometry3<f64>) -> PoseInFrame {
-        PoseInFrame { timestamp: Some(time), frame_id: self.base_frame.clone(), pose: Some(pose(place)) }
+        PoseInFrame { timestamp: Some(time), frame_id: self.frames.base().to_owned(), pose: Some(pose(place)) }
     }
 
     fn entity(&self, time: Timestamp, look: Look, what: &str) -> SceneEntity {
         let whose = if look == Look::Real { "real" } else { "twin" };
         SceneEntity {
             timestamp: Some(time),
-            frame_id: self.base_frame.clone(),
+            frame_id: self.frames.base().to_owned(),
             id: format!("{whose}/{what}"),
             ..SceneEntity::default()
         }
+    }
+}
+
+/// A part of the robot in its link's frame; the twin's is grown around its middle.
+fn triangles(mesh: &Mesh, look: Look) -> TriangleListPrimitive {
+    let points = mesh.points.iter().map(|point| point.cast::<f64>().coords);
+    let middle = points.clone().sum::<nalgebra::Vector3<f64>>() / mesh.points.len().max(1) as f64;
+    let grown = if look == Look::Twin { GHOST } else { 1.0 };
+    let place = |point: nalgebra::Vector3<f64>| middle + (point - middle) * grown;
+    TriangleListPrimitive {
+        pose: Some(pose(&Isometry3::identity())),
+        points: points.map(place).map(|p| Point3 { x: p.x, y: p.y, z: p.z }).collect(),
+        color: color(look, mesh.color.map(|value| f64::from(value) / 255.0)),
+        colors: Vec::new(),
+        indices: mesh.triangles.iter().flatten().copied().collect(),
     }
 }
 
@@ -108,12 +147,6 @@ fn color(look: Look, [r, g, b]: [f64; 3]) -> Option<Color> {
         Look::Real => Color { r, g, b, a: 1.0 },
         Look::Twin => Color { r: 0.2 * r, g: 0.5 * g, b: 1.0, a: 0.45 },
     })
-}
-
-/// Position and orientation in Foxglove's types.
-pub(super) fn parts(isometry: &Isometry3<f64>) -> (Vector3, Quaternion) {
-    let (p, q) = (isometry.translation.vector, isometry.rotation.quaternion());
-    (Vector3 { x: p.x, y: p.y, z: p.z }, Quaternion { x: q.i, y: q.j, z: q.k, w: q.w })
 }
 
 fn pose(isometry: &Isometry3<f64>) -> Pose {

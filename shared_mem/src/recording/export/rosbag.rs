@@ -88,7 +88,7 @@ struct Rows<'a> {
 
 impl<'a> Rows<'a> {
     fn new(source: &'a Source, cell: &'a Cell) -> Self {
-        let frame = cell.robot.as_ref().and_then(|robot| robot.base_frame.clone()).unwrap_or_else(|| "base".into());
+        let frame = cell.base_frame().to_owned();
         let states: Box<dyn Iterator<Item = _>> = Box::new(source.states());
         Self { source, cell, frame, next: [0; 3], states: states.peekable() }
     }

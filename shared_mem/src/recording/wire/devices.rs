@@ -11,8 +11,7 @@ use crate::topics;
 use prost::Message as _;
 use prost::encoding::{WireType, encode_key, encode_varint};
 
-/// Frame names as Foxglove shows them.
-const BASE: &str = "base";
+/// Name of the camera's frame, as Foxglove shows it. That of the base is the cell's, which the writer of a clip knows.
 const CAMERA: &str = "camera";
 /// Field number of the pixels in `foxglove.RawImage`.
 const PIXELS: u32 = 6;
@@ -32,7 +31,7 @@ impl Wire for ObjectPose {
         let known = self.covariance.iter().any(|v| *v != 0.0);
         foxglove::PoseInFrame {
             timestamp: clock.timestamp(self.stamp_ns),
-            frame_id: BASE.into(),
+            frame_id: String::new(),
             pose: Some(foxglove::Pose {
                 position: Some(foxglove::Vector3 { x, y, z }),
                 orientation: Some(foxglove::Quaternion { x: qx, y: qy, z: qz, w: qw }),
