@@ -2,6 +2,7 @@
 
 use shared_mem::cell::Cell;
 use shared_mem::console;
+use shared_mem::quantity::number;
 use std::path::PathBuf;
 use twin::render::Drawer;
 use twin::render::session::{TwinView, ViewError};
@@ -13,11 +14,16 @@ pub(crate) struct Look {
     #[arg(long, value_name = "FOLDER")]
     splats: Option<PathBuf>,
     /// Joint positions [rad], with commas between them, at which the arm was scanned: then all splats are in its base frame
-    #[arg(long, value_name = "Q", requires = "splats", allow_hyphen_values = true, value_delimiter = ',')]
+    #[arg(long, value_name = "Q", requires = "splats", allow_hyphen_values = true, value_delimiter = ',', value_parser = joint)]
     scanned_at: Option<Vec<f64>>,
     /// Who draws the twin
     #[arg(long, value_enum, default_value_t = Device::Auto)]
     device: Device,
+}
+
+/// A joint's position [rad]: degrees would lie outside.
+pub(super) fn joint(text: &str) -> Result<f64, String> {
+    number(text, -7.0..=7.0, "rad, or m where a joint slides")
 }
 
 /// Who draws, as it is asked for.
@@ -42,12 +48,14 @@ impl From<Device> for Drawer {
 }
 
 impl Look {
-    /// The twin as the cell's camera sees it; says on stderr why a device does not draw although it might.
+    /// The twin as the cell's camera sees it; says on stderr why a device does not draw although it might, and which splats lie
+    /// beside their link.
     pub(crate) fn view(&self, cell: &Cell) -> Result<TwinView, ViewError> {
         let view = TwinView::new(cell, self.splats.as_deref(), self.scanned_at.as_deref(), self.device.into())?;
         if let Some(note) = view.painter().note() {
             console::line(format_args!("note: the processor draws: {note}"));
         }
+        view.remarks().iter().for_each(|remark| console::line(format_args!("note: {remark}")));
         Ok(view)
     }
 }

@@ -47,6 +47,7 @@ impl Render {
     pub(crate) fn run(&self) -> anyhow::Result<()> {
         super::discard_on_signal()?;
         let session = Session::open_with(&self.path, self.cell.as_deref())?;
+        refuse_old_frames(&self.out)?;
         let mut view = self.look.view(&session.cell)?;
         std::fs::create_dir_all(&self.out)
             .with_context(|| format!("{}; give --out a place that can be written", self.out.display()))?;
@@ -102,6 +103,19 @@ impl Render {
         }
         Ok(())
     }
+}
+
+/// Frames of before would stand behind the new ones, in the folder and in the film.
+fn refuse_old_frames(folder: &Path) -> anyhow::Result<()> {
+    let names = std::fs::read_dir(folder).into_iter().flatten().filter_map(|entry| Some(entry.ok()?.file_name()));
+    let is_frame = |name: &str| name.starts_with("frame_") && name.ends_with(".png");
+    let old = names.filter(|name| name.to_str().is_some_and(is_frame)).count();
+    ensure!(
+        old == 0,
+        "{0} holds {old} frames of before; give another --out, or remove them with `rm {0}/frame_*.png`",
+        folder.display()
+    );
+    Ok(())
 }
 
 /// The frames as a film; `None` where there is no ffmpeg.

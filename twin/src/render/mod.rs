@@ -17,6 +17,7 @@ mod robot;
 pub mod session;
 mod shown;
 pub mod splat;
+mod stray;
 
 pub use live::{Beside, LiveView};
 pub use mesh::Mesh;
@@ -24,3 +25,4 @@ pub use painter::{Drawer, Model, PaintError, Painter};
 pub use raster::{Pinhole, Raster};
 pub use robot::{Hand, RobotSurface};
 pub(crate) use shown::{ScannedLink, Shown};
+pub(crate) use stray::strays;

@@ -1,7 +1,7 @@
 //! A recorded session beside its twin: the camera's picture, what the twin shows at the same joints, and where they differ.
 
 use super::splat::{Lens, SplatError, read_links};
-use super::{Drawer, Hand, PaintError, Painter, RobotSurface, ScannedLink, Shown, looks};
+use super::{Drawer, Hand, PaintError, Painter, RobotSurface, ScannedLink, Shown, looks, strays};
 use crate::arm::{Joints, MAX_JOINTS, ModelError};
 use crate::scene::MeshFileError;
 use nalgebra::Isometry3;
@@ -18,6 +18,7 @@ pub struct TwinView {
     camera_from_base: Isometry3<f64>,
     robot: RobotSurface,
     shown: Shown,
+    remarks: Vec<String>,
 }
 
 /// The twin cannot be drawn.
@@ -74,20 +75,30 @@ impl TwinView {
         let robot = RobotSurface::new(cell, Hand::None)?;
         let table = cell.table.map(|table| looks::table_top(table.height as f32));
         let object = looks::object(cell)?;
-        let scans = splats.map(read_links).transpose()?.unwrap_or_default().into_iter().map(|(link, splats)| {
-            let link_from_scan =
-                scanned_at.map_or_else(Isometry3::identity, |q| robot.base_from_link(&joints(q), link).inverse());
-            ScannedLink { link, link_from_scan, splats }
-        });
+        let scans = splats.map(read_links).transpose()?.unwrap_or_default().into_iter();
+        let scans: Vec<_> = scans
+            .map(|(link, splats)| {
+                let link_from_scan =
+                    scanned_at.map_or_else(Isometry3::identity, |q| robot.base_from_link(&joints(q), link).inverse());
+                ScannedLink { link, link_from_scan, splats }
+            })
+            .collect();
+        let remarks = strays(&robot, &scans, scanned_at.is_some());
         let size = [camera.width as usize, camera.height as usize];
-        let shown = Shown::new(&robot, table.as_slice(), object.as_ref(), scans.collect(), drawer, (lens, size))?;
-        Ok(Self { size, camera_from_base: base_from_camera.inverse().isometry(), robot, shown })
+        let shown = Shown::new(&robot, table.as_slice(), object.as_ref(), scans, drawer, (lens, size))?;
+        Ok(Self { size, camera_from_base: base_from_camera.inverse().isometry(), robot, shown, remarks })
     }
 
     /// Columns and rows.
     #[must_use]
     pub fn size(&self) -> [usize; 2] {
         self.size
+    }
+
+    /// What is odd about the splats, one sentence each.
+    #[must_use]
+    pub fn remarks(&self) -> &[String] {
+        &self.remarks
     }
 
     /// Who draws.

@@ -9,7 +9,7 @@ use super::{camera_clock_ns, generator};
 use crate::effects::CameraEffects;
 use crate::render::session::ViewError;
 use crate::render::splat::{Lens, Picture, read_links};
-use crate::render::{Drawer, Hand, Mesh, Pinhole, Raster, RobotSurface, ScannedLink, Shown, looks};
+use crate::render::{Drawer, Hand, Mesh, Pinhole, Raster, RobotSurface, ScannedLink, Shown, looks, strays};
 use crate::scene::SceneSnapshot;
 use crate::sim::SimError;
 use nalgebra::{Isometry3, Vector3};
@@ -26,8 +26,9 @@ pub struct SimCamera {
     still: Vec<Mesh>,
     robot: Option<RobotSurface>,
     object: Option<Mesh>,
-    /// The same with the robot of splats.
+    /// The same with the robot of splats, and what is odd about them.
     scanned: Option<Shown>,
+    remarks: Vec<String>,
     /// How much older a picture is than its stamp says.
     older_ns: u64,
     sequence: u64,
@@ -66,6 +67,7 @@ impl SimCamera {
             robot: cell.robot.as_ref().map(|_| RobotSurface::new(cell, Hand::None)).transpose()?,
             object: looks::object(cell)?,
             scanned: None,
+            remarks: Vec::new(),
             older_ns: 0,
             sequence: 0,
             next_picture_ns: 0,
@@ -93,9 +95,17 @@ impl SimCamera {
         if let Some(robot) = &self.robot {
             let scans = read_links(folder)?.into_iter();
             let scans = scans.map(|(link, splats)| ScannedLink { link, link_from_scan: Isometry3::identity(), splats });
-            self.scanned = Some(Shown::new(robot, &self.still, self.object.as_ref(), scans.collect(), drawer, view)?);
+            let scans: Vec<_> = scans.collect();
+            self.remarks = strays(robot, &scans, false);
+            self.scanned = Some(Shown::new(robot, &self.still, self.object.as_ref(), scans, drawer, view)?);
         }
         Ok(self)
+    }
+
+    /// What is odd about the splats, one sentence each.
+    #[must_use]
+    pub fn remarks(&self) -> &[String] {
+        &self.remarks
     }
 
     /// Bytes of a colour picture.
