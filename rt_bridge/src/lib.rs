@@ -10,6 +10,7 @@
 //! | camera | [`camera`] | the ports for pictures, with a simulated or replayed camera; a RealSense camera has one like the gripper's |
 //! | tracker | [`tracker`] | reads the pictures and joints, owns the port for the object's poses, with `--tracker rgbd` |
 //! | gripper, wrench | [`device`], [`gripper`], [`mod@wrench`] | one device each, and its ports |
+//! | instruments | [`replay`] | the ports of a recording's gripper and force sensor, with `--arm replay://` |
 //! | console | [`shared_mem::console`] | standard error: nobody else waits for it |
 //! | main | [`run`] | duration, Ctrl-C, the recorder's process, the report |
 //!

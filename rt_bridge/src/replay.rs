@@ -1,5 +1,10 @@
 //! A recording as an arm: its states come at the pace they were recorded with, its commands are what was commanded then.
-//! What the bridge is told to play is refused.
+//! What the bridge is told to play is refused. Beside it go the recording's pictures ([`crate::camera`]), and its force sensor and
+//! gripper ([`Instruments`]).
+
+mod instruments;
+
+pub use instruments::{InstrumentError, Instruments};
 
 use crate::arm::{Arm, ArmFault, Clock, Desired, Read};
 use crate::rt::process::sleep_until;
@@ -12,10 +17,14 @@ use shared_mem::recording::{Clip, ReadError, read_clip};
 use shared_mem::time::now_ns;
 use std::path::Path;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::time::Duration;
 use twin::arm::ArmModel;
 
-/// When the replay of a clip began: turns its stamps into moments of now. Shared by its arm and its camera.
+/// Longest sleep before looking whether to stop.
+const LONGEST_SLEEP: Duration = Duration::from_millis(20);
+
+/// When the replay of a clip began: turns its stamps into moments of now. Shared by its arm and all that goes beside it.
 #[derive(Debug, Clone, Default)]
 pub struct ReplayClock(Arc<AtomicU64>);
 
@@ -27,6 +36,24 @@ impl ReplayClock {
         match self.0.load(Ordering::Relaxed) {
             0 => None,
             shift_ns => Some(stamp_ns.wrapping_add(shift_ns)),
+        }
+    }
+
+    /// Sleeps until the replay has come to `stamp_ns`; `false` when it is to stop before.
+    #[must_use]
+    pub fn wait_for(&self, stamp_ns: u64, stop: &AtomicBool) -> bool {
+        loop {
+            if stop.load(Ordering::Relaxed) {
+                return false;
+            }
+            let left = match self.moment_of(stamp_ns) {
+                Some(moment_ns) => Duration::from_nanos(moment_ns.saturating_sub(now_ns())),
+                None => LONGEST_SLEEP,
+            };
+            if left.is_zero() {
+                return true;
+            }
+            std::thread::sleep(left.min(LONGEST_SLEEP));
         }
     }
 

@@ -7,7 +7,9 @@ use rustix::fs::{OFlags, fcntl_setfl};
 use serde_json::Value;
 use shared_mem::msg::arm::{ArmState, MotionStatus};
 use shared_mem::msg::motion::{CHUNK_LENGTH, MotionChunk, MotionKind, SetPoint};
+use shared_mem::msg::twin::TwinState;
 use shared_mem::recording::{ClipMessages, Payload, read_arm_states};
+use shared_mem::time::now_ns;
 use shared_mem::topics::{self, ARM_MOTION, ARM_STATE};
 use shared_mem::transport::{Node, Subscriber};
 use std::fs::File;
@@ -44,10 +46,16 @@ fn said(output: &Output) -> String {
     String::from_utf8_lossy(&output.stderr).into_owned()
 }
 
-fn replay(clip: &Path) {
-    let (output, answer) = end(start("replay", &["--arm", &format!("replay://{}", clip.display())]));
+/// Replays a clip and records that; the messages of the kind that `wanted` likes.
+fn replay(clip: &Path, again: &Path, wanted: fn(&Payload) -> bool) -> usize {
+    let arguments = ["--arm", &format!("replay://{}", clip.display()), "--record", again.to_str().expect("a path")];
+    let (output, answer) = end(start("replay", &arguments));
     assert!(output.status.success(), "{}", said(&output));
     assert!(answer["cycles"].as_u64() > Some(1000), "{answer}");
+    let twin = "the recording's /twin/state and /twin/gap are not shown again; `twin shadow`";
+    assert_eq!(said(&output).matches(twin).count(), 1, "{}", said(&output));
+    let messages = ClipMessages::open(again, &[]).expect("a clip");
+    messages.filter(|m| m.as_ref().is_ok_and(|m| wanted(&m.payload))).count()
 }
 
 #[test]
@@ -56,7 +64,18 @@ fn what_was_recorded_holds_every_cycle_pictures_and_poses_and_can_be_replayed() 
     let clip = folder.path().join("clip.mcap");
     let clip_path = clip.to_str().expect("a path");
     let arguments = ["--arm", "sim", "--gripper", "sim", "--wrench", "sim", "--duration", "2", "--record", clip_path];
-    let (output, answer) = end(start("record", &arguments));
+    let bridge = start("record", &arguments);
+    // What a twin says beside it is recorded, too.
+    let node = Node::open_in(&format!("record{}", std::process::id()), "a twin").expect("shared memory");
+    let (states, twin) =
+        (node.subscriber(ARM_STATE).expect("a place"), node.publisher(topics::TWIN_STATE).expect("a place"));
+    let state = wait_for(&states, |_| true);
+    for _ in 0..10 {
+        let mirrored = TwinState { stamp_ns: now_ns(), dof: 7, q: state.q, ..TwinState::default() };
+        twin.send(&mirrored).expect("shared memory");
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    let (output, answer) = end(bridge);
     assert!(output.status.success(), "{}", said(&output));
     assert_eq!(answer["recorded"]["lost"], 0, "{answer}");
     let states = read_arm_states(&clip).expect("a clip");
@@ -74,7 +93,15 @@ fn what_was_recorded_holds_every_cycle_pictures_and_poses_and_can_be_replayed() 
     assert!(count(|p| matches!(p, Payload::Gripper(_))) > 0);
     // The sensor carries the tool, which hangs still.
     assert!(count(|p| matches!(p, Payload::Wrench(w) if (w.force[2] - 2.4525).abs() < 0.1)) > 100);
-    replay(&clip);
+    // Replayed, force sensor and gripper are there again, the twin of then is not.
+    let (again, wrenches) = (folder.path().join("again.mcap"), count(|p| matches!(p, Payload::Wrench(_))));
+    assert!(count(|p| matches!(p, Payload::TwinState(_))) > 5);
+    let replayed = replay(&clip, &again, |p| matches!(p, Payload::Wrench(w) if (w.force[2] - 2.4525).abs() < 0.1));
+    assert!(2 * replayed > wrenches, "{replayed} of {wrenches}");
+    let third = folder.path().join("third.mcap");
+    assert!(replay(&clip, &third, |p| matches!(p, Payload::Gripper(_))) > 0);
+    let twins = ClipMessages::open(&third, &[topics::TWIN_STATE.name]).expect("a clip").count();
+    assert_eq!(twins, 0, "nobody made a twin");
 }
 
 #[test]
@@ -126,6 +153,17 @@ fn a_running_bridge_passes_orders_on_to_its_gripper() {
     let answer = told(&["move", "0.03"]);
     assert_eq!((answer["width"].as_f64(), answer["width_d"].as_f64()), (Some(0.03), Some(0.03)));
     assert_eq!(told(&["home"])["width"].as_f64(), Some(0.08));
+    // Nothing stands between the fingers, and they open no wider.
+    for (order, why) in [
+        (["grasp", "0.04"], "nothing is held"),
+        (["grasp", "0.002"], "nothing is held"),
+        (["move", "0.3"], "opens no further than 0.080 m"),
+    ] {
+        let output = ask(&order);
+        assert_eq!(output.status.code(), Some(1), "{order:?}: {}", said(&output));
+        assert!(said(&output).contains(why), "{order:?}: {}", said(&output));
+        assert!(serde_json::from_slice::<Value>(&output.stdout).expect("one object")["width"].is_f64());
+    }
     ask_to_end(bridge.id()).expect("it still runs");
     let (output, _) = end(bridge);
     assert!(output.status.success(), "{}", said(&output));

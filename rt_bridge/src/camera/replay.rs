@@ -6,12 +6,7 @@ use shared_mem::recording::{ClipMessages, Payload, Picture};
 use shared_mem::time::now_ns;
 use shared_mem::topics::{self, ImageTopic};
 use shared_mem::transport::{ImagePublisher, Node, Publisher, TransportError};
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::thread;
-use std::time::Duration;
-
-/// Longest sleep before looking whether to stop.
-const LONGEST_SLEEP: Duration = Duration::from_millis(20);
+use std::sync::atomic::AtomicBool;
 
 /// Shows all pictures of a clip once, each when its arm has come to that moment.
 pub(super) fn show(
@@ -32,13 +27,13 @@ pub(super) fn show(
         };
         match message.payload {
             Payload::CameraInfo(message) => {
-                if !wait_for(message.stamp_ns, clock, stop) {
+                if !clock.wait_for(message.stamp_ns, stop) {
                     return Ok(());
                 }
                 info.send(&CameraInfo { stamp_ns: now_ns(), ..*message })?;
             }
             Payload::Picture(Picture::Pixels { header, pixels }) => {
-                if !wait_for(header.stamp_ns, clock, stop) {
+                if !clock.wait_for(header.stamp_ns, stop) {
                     return Ok(());
                 }
                 let screen = if message.topic == topics::CAMERA_DEPTH.name { &mut depth } else { &mut color };
@@ -48,23 +43,6 @@ pub(super) fn show(
         }
     }
     Ok(())
-}
-
-/// Sleeps until the replay has come to `stamp_ns`; `false` when it is to stop before.
-fn wait_for(stamp_ns: u64, clock: &ReplayClock, stop: &AtomicBool) -> bool {
-    loop {
-        if stop.load(Ordering::Relaxed) {
-            return false;
-        }
-        let left = match clock.moment_of(stamp_ns) {
-            Some(moment_ns) => Duration::from_nanos(moment_ns.saturating_sub(now_ns())),
-            None => LONGEST_SLEEP,
-        };
-        if left.is_zero() {
-            return true;
-        }
-        thread::sleep(left.min(LONGEST_SLEEP));
-    }
 }
 
 /// One picture topic, opened at its first picture, whose size it keeps.

@@ -44,6 +44,8 @@ pub enum GripperChoice {
     Serial(PathBuf),
     /// The Franka Hand of the robot at this address.
     Fci(String),
+    /// What a recording holds of one.
+    Replay,
     /// None.
     Off,
 }
@@ -54,10 +56,13 @@ impl FromStr for GripperChoice {
     fn from_str(text: &str) -> Result<Self, String> {
         match text.split_once("://") {
             None if text == "sim" => Ok(Self::Sim),
+            None if text == "replay" => Ok(Self::Replay),
             None if text == "off" => Ok(Self::Off),
             Some(("serial", path)) if Path::new(path).is_absolute() => Ok(Self::Serial(path.into())),
             Some(("fci", host)) if !host.is_empty() => Ok(Self::Fci(host.to_owned())),
-            _ => Err("use sim, serial:///dev/ttyUSB0 (a Robotiq 2F), fci://HOST (the Franka Hand) or off".into()),
+            _ => {
+                Err("use sim, serial:///dev/ttyUSB0 (a Robotiq 2F), fci://HOST (the Franka Hand), replay or off".into())
+            }
         }
     }
 }
@@ -68,13 +73,14 @@ impl fmt::Display for GripperChoice {
             Self::Sim => f.write_str("sim"),
             Self::Serial(port) => write!(f, "serial://{}", port.display()),
             Self::Fci(host) => write!(f, "fci://{host}"),
+            Self::Replay => f.write_str("replay"),
             Self::Off => f.write_str("off"),
         }
     }
 }
 
 impl GripperChoice {
-    /// Opens it; `None` for none. What cell.toml does not say is what the maker ships: a 2F-85 on a serial port.
+    /// Opens it; `None` for none, and for a recording's. What cell.toml does not say is what the maker ships: a 2F-85 on a serial port.
     ///
     /// # Errors
     /// [`DeviceFault`] when it cannot be reached.
@@ -89,16 +95,16 @@ impl GripperChoice {
                 Some(Box::new(robotiq::Robotiq::open(path, &gripper)?))
             }
             Self::Fci(host) => Some(Box::new(fr3::Hand::connect(host)?)),
-            Self::Off => None,
+            Self::Replay | Self::Off => None,
         })
     }
 
-    /// Puts it to work; `None` for none.
+    /// Puts it to work; `None` for none, and for a recording's.
     ///
     /// # Errors
     /// [`ServiceError`] when it cannot be reached or shared memory fails.
     pub fn serve(&self, cell: &Cell, notices: Sender<Notice>) -> Result<Option<Service>, ServiceError> {
-        if *self == Self::Off {
+        if matches!(self, Self::Replay | Self::Off) {
             return Ok(None);
         }
         let (choice, cell) = (self.clone(), cell.clone());
@@ -152,7 +158,7 @@ mod tests {
 
     #[test]
     fn a_gripper_is_named_by_its_kind_and_its_place() {
-        for text in ["sim", "off", "serial:///dev/ttyUSB0", "fci://172.16.0.2"] {
+        for text in ["sim", "replay", "off", "serial:///dev/ttyUSB0", "fci://172.16.0.2"] {
             assert_eq!(text.parse::<GripperChoice>().expect("a gripper").to_string(), text);
         }
         for wrong in ["", "serial://", "serial://ttyUSB0", "fci://", "robotiq", "can://can0"] {

@@ -118,6 +118,8 @@ pub(super) struct Devices {
     pub(super) pictures: Pictures,
     /// From the simulated tracker, or of the recording, unless another one tracks. They come with the camera off, too.
     pub(super) poses: Option<Consumer<ObjectPose>>,
+    /// The recording that is replayed, and its clock.
+    pub(super) replay: Option<(PathBuf, ReplayClock)>,
     /// Of the simulated cell's force sensor, where it is to be there.
     pub(super) wrenches: Option<Consumer<Wrench>>,
 }
@@ -143,6 +145,9 @@ impl Pictures {
 impl Devices {
     pub(super) fn open(settings: &Settings, cell: &Cell) -> Result<Self> {
         let model = ArmModel::from_cell(cell)?;
+        if let held @ [_, ..] = model.held_joints() {
+            tracing::info!("no joints of the arm, and held at 0: {} of the URDF", held.join(", "));
+        }
         if settings.arm != ArmChoice::Sim && (settings.effects.is_some() || settings.parameters.is_some()) {
             bail!("--effects and --parameters change the simulated cell only; use them with --arm sim");
         }
@@ -166,6 +171,7 @@ impl Devices {
                     plan,
                     workspace,
                     world: Some(world),
+                    replay: None,
                     pictures: match camera {
                         CameraChoice::Sim => Pictures::Scenes(views.scenes, views.camera_effects),
                         other => Pictures::beside_the_arm(other),
@@ -177,16 +183,17 @@ impl Devices {
             ArmChoice::Fci(host) => {
                 let arm = fr3::connect(host, settings.realtime, cell)?;
                 let pictures = Pictures::beside_the_arm(camera);
-                Self { arm, plan, workspace, world: None, pictures, poses: None, wrenches: None }
+                Self { arm, plan, workspace, world: None, pictures, poses: None, replay: None, wrenches: None }
             }
             ArmChoice::Replay(clip) => {
                 let (arm, poses, clock) = ReplayArm::open(clip, cell, &model)?;
                 let pictures = match camera {
-                    CameraChoice::Replay => Pictures::Clip(clip.clone(), clock),
+                    CameraChoice::Replay => Pictures::Clip(clip.clone(), clock.clone()),
                     other => Pictures::beside_the_arm(other),
                 };
                 let poses = (tracker == TrackerChoice::Replay).then_some(poses);
-                Self { arm: Box::new(arm), plan, workspace, world: None, pictures, poses, wrenches: None }
+                let replay = Some((clip.clone(), clock));
+                Self { arm: Box::new(arm), plan, workspace, world: None, pictures, poses, replay, wrenches: None }
             }
         };
         let (has, described) = (devices.arm.dof(), model.dof());

@@ -13,6 +13,7 @@ use crate::gripper::GripperChoice;
 use crate::motion::Player;
 use crate::pump::{Notice, Pump, PumpReport, Rings};
 use crate::recorder::child::{Change, RecorderChild};
+use crate::replay::Instruments;
 use crate::rt::Realtime;
 use crate::rt::control;
 use crate::rt::cycle::{Cycle, Link, Plan};
@@ -68,9 +69,11 @@ pub struct Settings {
     /// Who tracks the object; none: the simulated cell with the simulated arm, the recording's poses with a recording,
     /// the bridge with a RealSense camera, else nobody.
     pub tracker: Option<TrackerChoice>,
-    /// The gripper; none: simulated with the simulated arm where cell.toml has a `[gripper]`, else off.
+    /// The gripper; none: simulated with the simulated arm where cell.toml has a `[gripper]`, the recording's with a recording,
+    /// else off.
     pub gripper: Option<GripperChoice>,
-    /// The force/torque sensor; none: simulated with the simulated arm where cell.toml has a `[wrench]`, else off.
+    /// The force/torque sensor; none: simulated with the simulated arm where cell.toml has a `[wrench]`, the recording's with a
+    /// recording, else off.
     pub wrench: Option<WrenchChoice>,
     /// Effects of the simulated cell.
     pub effects: Option<PathBuf>,
@@ -151,20 +154,31 @@ impl Settings {
     }
 
     /// The gripper in force.
-    fn gripper(&self, cell: &Cell) -> GripperChoice {
-        let simulated = self.arm == ArmChoice::Sim && cell.gripper.is_some();
-        let default = if simulated { GripperChoice::Sim } else { GripperChoice::Off };
-        self.gripper.clone().unwrap_or(default)
+    fn gripper(&self, cell: &Cell) -> Result<GripperChoice> {
+        let recorded = matches!(self.arm, ArmChoice::Replay(_));
+        match &self.gripper {
+            Some(GripperChoice::Replay) if !recorded => {
+                bail!("--gripper replay shows a recording's gripper; use it with --arm replay://CLIP.mcap")
+            }
+            Some(choice) => Ok(choice.clone()),
+            None if recorded => Ok(GripperChoice::Replay),
+            None if self.arm == ArmChoice::Sim && cell.gripper.is_some() => Ok(GripperChoice::Sim),
+            None => Ok(GripperChoice::Off),
+        }
     }
 
     /// The force sensor in force.
     fn wrench(&self, cell: &Cell) -> Result<WrenchChoice> {
-        let simulated = self.arm == ArmChoice::Sim;
+        let (simulated, recorded) = (self.arm == ArmChoice::Sim, matches!(self.arm, ArmChoice::Replay(_)));
         match &self.wrench {
+            Some(WrenchChoice::Replay) if !recorded => {
+                bail!("--wrench replay shows a recording's force sensor; use it with --arm replay://CLIP.mcap")
+            }
             Some(WrenchChoice::Sim) if !simulated => {
                 bail!("--wrench sim measures in the simulated cell; use it with --arm sim")
             }
             Some(choice) => Ok(choice.clone()),
+            None if recorded => Ok(WrenchChoice::Replay),
             None if simulated && cell.wrench.is_some() => Ok(WrenchChoice::Sim),
             None => Ok(WrenchChoice::Off),
         }
@@ -177,7 +191,7 @@ impl Settings {
         wrenches: Option<Consumer<Wrench>>,
         notices: &mpsc::Sender<Notice>,
     ) -> Result<Vec<Service>> {
-        let gripper = self.gripper(cell).serve(cell, notices.clone())?;
+        let gripper = self.gripper(cell)?.serve(cell, notices.clone())?;
         let wrench = match (self.wrench(cell)?, wrenches) {
             (WrenchChoice::Can(interface), _) => Some(wrench::serve_can(&interface, cell, notices.clone())?),
             (WrenchChoice::Sim, Some(samples)) => Some(wrench::serve_simulated(samples, notices.clone())?),
@@ -215,6 +229,15 @@ pub fn run(settings: &Settings, stop: &Arc<AtomicBool>) -> Result<RunReport> {
         None => None,
     };
     let mut instruments = settings.instruments(&cell, devices.wrenches, &notices)?;
+    let replayed = match devices.replay {
+        // A TwinAligner folder holds neither.
+        Some((clip, clock)) if clip.is_file() => {
+            let wrench = settings.wrench(&cell)? == WrenchChoice::Replay;
+            let gripper = settings.gripper(&cell)? == GripperChoice::Replay;
+            Some(Instruments::replayed(&clip, clock, wrench, gripper)?)
+        }
+        _ => None,
+    };
     let camera = match devices.pictures {
         Pictures::Scenes(scenes, effects) => {
             Some(Camera::simulated(&cell, scenes, &effects, settings.splats.as_deref())?)
@@ -241,6 +264,7 @@ pub fn run(settings: &Settings, stop: &Arc<AtomicBool>) -> Result<RunReport> {
     // Whatever happened, everything is taken down in this order, and the recording is finished.
     drop(tracker);
     drop(camera);
+    drop(replayed);
     let missing: Vec<String> = instruments.into_iter().filter_map(Service::finish).collect();
     let (pumped, pump_failed) = match pump.finish() {
         Ok(pumped) => (pumped, None),

@@ -30,6 +30,8 @@ pub enum WrenchChoice {
     Sim,
     /// One on this CAN interface.
     Can(String),
+    /// What a recording holds of one.
+    Replay,
     /// None.
     Off,
 }
@@ -40,12 +42,13 @@ impl FromStr for WrenchChoice {
     fn from_str(text: &str) -> Result<Self, String> {
         match text.split_once("://") {
             None if text == "sim" => Ok(Self::Sim),
+            None if text == "replay" => Ok(Self::Replay),
             None if text == "off" => Ok(Self::Off),
             // Longest name of a network interface: 15 bytes.
             Some(("can", name)) if (1..16).contains(&name.len()) && !name.contains(['/', ' ']) => {
                 Ok(Self::Can(name.to_owned()))
             }
-            _ => Err("use sim, can://INTERFACE (for example can://can0) or off".into()),
+            _ => Err("use sim, can://INTERFACE (for example can://can0), replay or off".into()),
         }
     }
 }
@@ -55,6 +58,7 @@ impl fmt::Display for WrenchChoice {
         match self {
             Self::Sim => f.write_str("sim"),
             Self::Can(interface) => write!(f, "can://{interface}"),
+            Self::Replay => f.write_str("replay"),
             Self::Off => f.write_str("off"),
         }
     }
@@ -125,7 +129,7 @@ mod tests {
 
     #[test]
     fn a_sensor_is_named_by_its_interface() {
-        for text in ["sim", "off", "can://can0", "can://vcan0"] {
+        for text in ["sim", "replay", "off", "can://can0", "can://vcan0"] {
             assert_eq!(text.parse::<WrenchChoice>().expect("a sensor").to_string(), text);
         }
         for wrong in ["", "can0", "can://", "can:///dev/can0", "can://a-name-that-is-too-long", "serial:///dev/ttyUSB0"]
