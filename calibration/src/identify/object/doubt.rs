@@ -14,9 +14,17 @@ pub(super) fn doubts(answer: &Identification, cell: &Cell) -> Vec<String> {
     let noise = noise_of(cell).position;
     let mut doubts = Vec::new();
     if let Some(add) = answer.gap.train.object_add_m.filter(|add| *add > NOT_NOISE * noise) {
+        // Diagnosing takes an arm: where there is none, nothing but the recording can be looked at.
+        let advice = match cell.robot {
+            Some(_) => {
+                "something else acts, or its poses are not where the arm's frame puts them; `calibration diagnose` says what"
+            }
+            None => {
+                "something else acts; look at the shape, size and support of [object] in cell.toml and at the tracker's poses"
+            }
+        };
         doubts.push(format!(
-            "on the very clips that were fitted the object is {:.1} mm off, {:.0} times the tracker's noise: something else \
-             acts, or its poses are not where the arm's frame puts them; `calibration diagnose` says what",
+            "on the very clips that were fitted the object is {:.1} mm off, {:.0} times the tracker's noise: {advice}",
             add * 1e3,
             add / noise
         ));
@@ -41,23 +49,28 @@ pub(super) fn doubts(answer: &Identification, cell: &Cell) -> Vec<String> {
 mod tests {
     use super::*;
     use crate::identify::answer::Figures;
+    use shared_mem::cell::Robot;
 
-    fn told(fitted: [f64; 5]) -> Vec<String> {
+    fn told(fitted: [f64; 5], cell: &Cell) -> Vec<String> {
         let figures = |add: f64| Figures { object_add_m: Some(add), ..Figures::default() };
         let clip =
             |(i, add): (usize, &f64)| ClipGap { file: format!("{i}"), after: figures(*add), ..ClipGap::default() };
         let mut answer =
             Identification { by_clip: fitted.iter().enumerate().map(clip).collect(), ..Default::default() };
         answer.gap.train = figures(fitted.iter().sum::<f64>() / 5.0);
-        doubts(&answer, &Cell::default())
+        doubts(&answer, cell)
     }
 
     #[test]
     fn errors_that_are_no_noise_and_a_clip_unlike_the_others_are_told() {
-        assert_eq!(told([0.002, 0.003, 0.003, 0.004, 0.002]), [""; 0]);
-        let all = told([0.02, 0.03, 0.03, 0.04, 0.02]);
+        let cell = Cell { robot: Some(Robot::default()), ..Cell::default() };
+        assert_eq!(told([0.002, 0.003, 0.003, 0.004, 0.002], &cell), [""; 0]);
+        let all = told([0.02, 0.03, 0.03, 0.04, 0.02], &cell);
         assert!(all.len() == 1 && all[0].contains("28.0 mm off") && all[0].contains("diagnose"), "{all:?}");
-        let one = told([0.002, 0.003, 0.002, 0.018, 0.002]);
+        // An object alone cannot be diagnosed, so nobody is sent there.
+        let alone = told([0.02, 0.03, 0.03, 0.04, 0.02], &Cell::default());
+        assert!(alone[0].contains("28.0 mm off") && !alone[0].contains("diagnose"), "{alone:?}");
+        let one = told([0.002, 0.003, 0.002, 0.018, 0.002], &cell);
         assert!(one.len() == 1 && one[0].starts_with("3: the object is 18.0 mm off"), "{one:?}");
     }
 }

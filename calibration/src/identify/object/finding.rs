@@ -108,9 +108,9 @@ impl<'a> Finding<'a> {
         let remedy = remedy(setting, material);
         if self.held[k] {
             let end = if value - unknown.lower < unknown.upper - value { "lower" } else { "upper" };
+            let or = if material.cell.robot.is_some() { ", or ask `calibration diagnose` what else acts" } else { "" };
             return Some(format!(
-                "the best value lies at or beyond {value:.4}, the {end} bound of its range in cell.toml: widen the range, \
-                 or ask `calibration diagnose` what else acts"
+                "the best value lies at or beyond {value:.4}, the {end} bound of its range in cell.toml: widen the range{or}"
             ));
         }
         if information * (unknown.upper - unknown.lower).powi(2) < 1.0 {

@@ -123,7 +123,10 @@ impl<R: Read + Seek> Messages<R> {
     /// Reads from any source; `path` only names it in errors.
     pub(super) fn from_source(source: R, path: &Path) -> Result<Self, ReadError> {
         let framing = Framing::open(source).map_err(ReadError::io(path))?.ok_or_else(|| {
-            ReadError::kind(path, "is no MCAP file; give a clip, a ROS 2 bag (storage mcap) or a TwinAligner folder")
+            let what = "is no MCAP file; record one with `rt_bridge record --out clip.mcap` or `ros2 bag record -s mcap -a`; a ROS 2 \
+                        bag of another storage becomes one with `ros2 bag convert -i BAG -o out.yaml`, out.yaml being \
+                        `output_bags: [{uri: out, storage_id: mcap, all: true}]`";
+            ReadError::kind(path, what)
         })?;
         Ok(Self {
             path: path.to_owned(),
