@@ -28,6 +28,16 @@ pub fn words(text: impl Display) -> Result<(), AnswerError> {
     words_to(&mut io::stdout().lock(), &text.to_string())
 }
 
+/// Writes `bytes` as they are: a script for a shell.
+///
+/// # Errors
+/// [`AnswerError`] when standard output takes no more.
+pub fn bytes(bytes: &[u8]) -> Result<(), AnswerError> {
+    let mut out = io::stdout().lock();
+    out.write_all(bytes)?;
+    Ok(out.flush()?)
+}
+
 fn json_to(out: &mut impl Write, answer: &impl Serialize) -> Result<(), AnswerError> {
     let mut text = serde_json::to_vec(answer).map_err(io::Error::from)?;
     text.push(b'\n');

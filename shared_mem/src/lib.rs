@@ -22,11 +22,14 @@
 //! | [`console`] | what it says on the way, on standard error |
 //! | [`progress`] | how far it is, on a terminal |
 //! | [`printable`] | text as a terminal may show it |
+//! | [`command_line`] | what the command lines of all programs have in common: help, version, completions, manual pages |
 //! | [`usage`] | help, and what is wrong with a command line |
+//! | [`quantity`] | numbers with a unit, as they are typed |
 //! | [`time`] | the clock that every stamp comes from |
 
 pub mod answer;
 pub mod cell;
+pub mod command_line;
 pub mod console;
 pub mod ending;
 mod error_line;
@@ -37,6 +40,7 @@ pub mod output;
 pub mod parent;
 pub mod printable;
 pub mod progress;
+pub mod quantity;
 pub mod recording;
 pub mod theta;
 pub mod time;

@@ -3,14 +3,15 @@
 mod cli;
 
 use clap::{Parser, Subcommand};
-use shared_mem::{console, error_line, usage};
+use git_version::git_version;
+use shared_mem::command_line::{self, Build};
+use shared_mem::{console, error_line};
 use std::process::ExitCode;
 use tracing_subscriber::EnvFilter;
 
 /// A robot cell in simulation: mirrors a running one, replays recordings, and says how far reality is away.
 #[derive(Parser)]
 #[command(
-    version,
     about,
     arg_required_else_help = true,
     after_help = "\
@@ -34,11 +35,17 @@ enum Verb {
     LabelSplats(cli::label_splats::LabelSplats),
 }
 
+const BUILD: Build = Build {
+    version: env!("CARGO_PKG_VERSION"),
+    commit: git_version!(args = ["--always", "--abbrev=12", "--exclude=*", "--dirty=-modified"], fallback = ""),
+    features: &[("viewer", cfg!(feature = "viewer")), ("render", cfg!(feature = "render"))],
+};
+
 fn main() -> ExitCode {
     let _last_lines = console::start();
-    let arguments = match Arguments::try_parse() {
+    let arguments: Arguments = match command_line::parse(&BUILD) {
         Ok(arguments) => arguments,
-        Err(error) => return usage::say(error.use_stderr(), error.render()),
+        Err(code) => return code,
     };
     // The viewer's library writes a line for each message of a viewer that it cannot read: a viewer could fill the log.
     let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new("warn,foxglove=off"));

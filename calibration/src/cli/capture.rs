@@ -1,6 +1,6 @@
 //! `calibration capture`.
 
-use super::{between, print_json};
+use super::print_json;
 use calibration::capture::control_hit_slide::Series;
 use calibration::capture::shape::Kind;
 use calibration::capture::task::Task;
@@ -9,6 +9,7 @@ use calibration::interrupt::Interrupt;
 use calibration::keys::Keys;
 use clap::{Subcommand, ValueEnum as _};
 use shared_mem::console;
+use shared_mem::quantity::number;
 use std::path::PathBuf;
 
 #[derive(Debug, Subcommand)]
@@ -29,7 +30,7 @@ struct TaskArguments {
     #[arg(long, value_name = "N[,M..]", value_delimiter = ',')]
     repeat: Vec<usize>,
     /// Plays every motion that is recorded at so many times its speed, 0.05 to 10: 0.5 is half, 2 is twice.
-    #[arg(long, value_name = "FACTOR", default_value_t = 1.0, value_parser = between::<5, 1000, 100>)]
+    #[arg(long, value_name = "FACTOR", default_value_t = 1.0, value_parser = |text: &str| number(text, 0.05..=10.0, ""))]
     speed: f64,
     /// Session folder; created, or continued.
     #[arg(long, value_name = "SESSION")]
@@ -107,16 +108,16 @@ pub(super) struct ExcitationArguments {
     #[arg(long, value_name = "N[,M..]", value_delimiter = ',', value_parser = clap::value_parser!(u32).range(1..=8))]
     joints: Vec<u32>,
     /// Length of each clip's motion [s], 2 to 600 (ramp: 12 or more) [default: by kind].
-    #[arg(long, value_name = "S", value_parser = between::<2, 600, 1>)]
+    #[arg(long, value_name = "S", value_parser = |text: &str| number(text, 2.0..=600.0, "s"))]
     duration: Option<f64>,
     /// Largest excursion of each joint from the pose the arm stands in [rad], 0.01 to 1.5 [default: by kind].
-    #[arg(long, value_name = "RAD", value_parser = between::<1, 150, 100>)]
+    #[arg(long, value_name = "RAD", value_parser = |text: &str| number(text, 0.01..=1.5, "rad"))]
     amplitude: Option<f64>,
     /// First and last frequency of a chirp [Hz], 0.05 to 50 [default: 0.2 10].
-    #[arg(long, value_names = ["LO", "HI"], num_args = 2, value_parser = between::<5, 5000, 100>)]
+    #[arg(long, value_names = ["LO", "HI"], num_args = 2, value_parser = |text: &str| number(text, 0.05..=50.0, "Hz"))]
     frequency: Vec<f64>,
     /// Speeds of the first and the last ramp [rad/s], 0.001 to 2 [default: 0.005 0.5].
-    #[arg(long, value_names = ["LO", "HI"], num_args = 2, value_parser = between::<1, 2000, 1000>)]
+    #[arg(long, value_names = ["LO", "HI"], num_args = 2, value_parser = |text: &str| number(text, 0.001..=2.0, "rad/s"))]
     ramp_speeds: Vec<f64>,
     /// Poses to hold, 2 to 64 [default: 8].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(2..=64))]
@@ -244,10 +245,7 @@ pub(super) struct StrokeArguments {
 
 /// Degrees of a turn.
 fn turn(text: &str) -> Result<f64, String> {
-    match text.parse::<f64>() {
-        Ok(degrees) if degrees.abs() <= 360.0 => Ok(degrees),
-        _ => Err("give degrees from -360 to 360".into()),
-    }
+    number(text, -360.0..=360.0, "degrees")
 }
 
 pub(super) fn run(capture: Capture, interrupt: &Interrupt) -> anyhow::Result<()> {

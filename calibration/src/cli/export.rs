@@ -23,6 +23,7 @@ Examples:
 JSON: clips [{file, measured, desired, poses, pictures, warnings}].")]
 pub(super) struct ExportArguments {
     /// Session folder, or one clip.
+    #[arg(value_name = "SESSION|CLIP")]
     session: PathBuf,
     /// The format.
     #[arg(long, value_enum)]

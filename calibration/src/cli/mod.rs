@@ -18,7 +18,6 @@ use shared_mem::ending;
 /// Records how a robot cell moves, and says where its twin differs.
 #[derive(Debug, Parser)]
 #[command(
-    version,
     arg_required_else_help = true,
     after_help = "\
 Examples:
@@ -92,15 +91,6 @@ fn run_to_the_end(verb: Verb, interrupt: &Interrupt) -> anyhow::Result<()> {
         Verb::Viewpoint(arguments) => viewpoint::run(*arguments),
         Verb::Export(arguments) => export::run(&arguments),
         Verb::Capture(_) | Verb::Demo(_) | Verb::Benchmark(_) => Ok(()),
-    }
-}
-
-/// A number from `LO / UNIT` to `HI / UNIT`.
-fn between<const LO: u32, const HI: u32, const UNIT: u32>(text: &str) -> Result<f64, String> {
-    let [lo, hi] = [LO, HI].map(|bound| f64::from(bound) / f64::from(UNIT));
-    match text.parse::<f64>() {
-        Ok(value) if (lo..=hi).contains(&value) => Ok(value),
-        _ => Err(format!("give a number from {lo} to {hi}")),
     }
 }
 

@@ -8,6 +8,7 @@ use calibration::viewpoint::fit::Method;
 use calibration::viewpoint::search::Reach;
 use clap::{Args, ValueEnum};
 use shared_mem::console;
+use shared_mem::quantity::{self, number};
 use shared_mem::recording::PictureKind;
 use std::path::PathBuf;
 use twin::render::Hand;
@@ -21,13 +22,13 @@ Examples:
 A joint file is JSON: a list of positions, or an object with `q`; `K`, `D`, `width`, `height` beside it are intrinsics as ROS names them.")]
 pub(crate) struct ViewpointArguments {
     /// A session folder, a clip, or pictures (png, jpg) of one camera that did not move.
-    #[arg(required = true)]
+    #[arg(required = true, value_name = "SESSION|CLIP|PICTURE")]
     targets: Vec<PathBuf>,
     /// The cell: arm, tool, intrinsics, first pose of the camera; a session brings its own.
     #[arg(long)]
     cell: Option<PathBuf>,
     /// Joint positions [rad] of a picture, with commas between them or as a JSON file; one for each picture.
-    #[arg(long, allow_hyphen_values = true)]
+    #[arg(long, value_name = "Q,...|FILE.json", allow_hyphen_values = true)]
     joints: Vec<String>,
     /// Mask of a picture, as an outside segmenter writes it: the robot white, all else black; one for each picture.
     #[arg(long)]
@@ -54,7 +55,7 @@ pub(crate) struct ViewpointArguments {
     #[arg(long, default_value = "cell", allow_hyphen_values = true, value_parser = start)]
     start: StartFrom,
     /// How far the start may be from the truth: degrees,metres [default: 20,0.32 with silhouettes, 14,0.15 with photos].
-    #[arg(long, value_parser = numbers::<2>)]
+    #[arg(long, value_parser = reach)]
     reach: Option<[f64; 2]>,
     /// outline: least squares on the outline; swarm: the paper's particle swarm on the silhouettes.
     #[arg(long, value_enum, default_value_t = MethodName::Outline)]
@@ -65,17 +66,17 @@ pub(crate) struct ViewpointArguments {
     /// At most so many pictures of a session.
     #[arg(long, default_value_t = 6, value_parser = clap::value_parser!(u8).range(1..=100))]
     frames: u8,
-    /// A Franka Hand is mounted, its fingers this far apart [m].
-    #[arg(long)]
+    /// A Franka Hand is mounted, its fingers this far apart [m], 0 to 0.08.
+    #[arg(long, allow_negative_numbers = true, value_parser = |text: &str| number(text, 0.0..=0.08, "m"))]
     hand: Option<f64>,
     /// Seed of what is drawn by lot.
     #[arg(long, default_value_t = 1)]
     seed: u64,
     /// Writes the cell with the pose found.
-    #[arg(long)]
+    #[arg(long, value_name = "CELL.TOML")]
     out: Option<PathBuf>,
     /// Writes the pictures with the outline (red: found, green: start) as a PNG.
-    #[arg(long)]
+    #[arg(long, value_name = "PICTURE.PNG")]
     report: Option<PathBuf>,
     /// Prints the answer as one JSON object.
     #[arg(long)]
@@ -92,6 +93,12 @@ fn numbers<const N: usize>(text: &str) -> Result<[f64; N], String> {
     let parts: Result<Vec<f64>, _> = text.split(',').map(|part| part.trim().parse::<f64>()).collect();
     let parts = parts.ok().filter(|parts| parts.iter().all(|value| value.is_finite()));
     parts.and_then(|parts| parts.try_into().ok()).ok_or_else(|| format!("give {N} numbers with commas between them"))
+}
+
+/// Degrees and metres around the start.
+fn reach(text: &str) -> Result<[f64; 2], String> {
+    let [degrees, metres] = quantity::numbers(text, 0.0..=180.0, "degrees")?;
+    Ok([degrees, number(&metres.to_string(), 0.0..=10.0, "m")?])
 }
 
 fn pose(text: &str) -> Result<([f64; 3], [f64; 4]), String> {

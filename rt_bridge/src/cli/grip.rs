@@ -4,6 +4,7 @@ use anyhow::{Result, bail};
 use clap::{Args, Subcommand};
 use shared_mem::answer;
 use shared_mem::msg::gripper::{GripperAction, GripperCommand, GripperState};
+use shared_mem::quantity::number;
 use shared_mem::time::now_ns;
 use shared_mem::topics;
 use shared_mem::transport::{Node, Subscriber};
@@ -19,6 +20,8 @@ const LONGEST: Duration = Duration::from_secs(30);
 const REST: u32 = 35;
 /// Less than this is standing still [m].
 const STILL: f64 = 2e-4;
+/// How far the fingers may rest from where they were to go [m]: grippers count in steps of up to 0.6 mm.
+const REACHED: f64 = 2e-3;
 /// Pause between two looks.
 const LOOK: Duration = Duration::from_millis(10);
 
@@ -26,7 +29,8 @@ const LOOK: Duration = Duration::from_millis(10);
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  rt_bridge grip home\n  rt_bridge grip move 0.03 --speed 0.05\n  \
     rt_bridge grip grasp 0.04 --force 40 --json\n\n\
-    JSON: width, width_d [m], force [N], grasped, fault.")]
+    JSON: width, width_d [m], force [N] (null where the gripper does not tell), grasped, fault. Exit code 1 when the gripper\n\
+    cannot open as wide, or holds nothing after `grasp`.")]
 pub(super) struct GripArguments {
     #[command(subcommand)]
     order: Order,
@@ -39,24 +43,41 @@ pub(super) struct GripArguments {
 enum Order {
     /// Open or close to a width
     Move {
-        /// Between the fingers [m]
+        /// Between the fingers [m], 0 to 0.5: 0.03 is 30 mm
+        #[arg(value_name = "WIDTH", allow_negative_numbers = true, value_parser = width)]
         width: f64,
-        /// How fast [m/s]. Default: as fast as it goes
-        #[arg(long, default_value_t = 0.0, hide_default_value = true)]
-        speed: f64,
+        /// How fast [m/s], 0.001 to 1. Default: as fast as it goes
+        #[arg(long, value_name = "SPEED", allow_negative_numbers = true, value_parser = speed)]
+        speed: Option<f64>,
     },
     /// Close until something of about this width is held
     Grasp {
-        /// Of the object [m]
+        /// Of the object [m], 0 to 0.5: 0.03 is 30 mm
+        #[arg(value_name = "WIDTH", allow_negative_numbers = true, value_parser = width)]
         width: f64,
-        /// How hard [N]. Default: as gently as it can
-        #[arg(long, default_value_t = 0.0, hide_default_value = true)]
-        force: f64,
+        /// How hard [N], 0.1 to 500. Default: as gently as it can
+        #[arg(long, value_name = "FORCE", allow_negative_numbers = true, value_parser = force)]
+        force: Option<f64>,
     },
     /// Stay where the fingers are
     Stop,
     /// Find out how far the fingers go; they open and close once
     Home,
+}
+
+/// An opening [m]: the widest that a cell.toml can describe is half a metre.
+fn width(text: &str) -> Result<f64, String> {
+    number(text, 0.0..=0.5, "m")
+}
+
+/// A finger's speed [m/s]: the fastest gripper that is known goes at a quarter of the highest.
+fn speed(text: &str) -> Result<f64, String> {
+    number(text, 0.001..=1.0, "m/s")
+}
+
+/// A gripping force [N]: the strongest gripper that is known has half the largest.
+fn force(text: &str) -> Result<f64, String> {
+    number(text, 0.1..=500.0, "N")
 }
 
 impl GripArguments {
@@ -69,7 +90,10 @@ impl GripArguments {
             tracing::warn!("{ignored}");
         }
         if first.is_none() {
-            bail!("no bridge shows a gripper; start one with `rt_bridge run --gripper ...`");
+            bail!(
+                "no bridge showed a gripper within {} s; start one with `rt_bridge run --cell cell.toml --arm sim --gripper sim` (a real one: --gripper serial:///dev/ttyUSB0 or fci://HOST)",
+                PATIENCE.as_secs()
+            );
         }
         let order = self.order.command();
         orders.send(&order)?;
@@ -78,14 +102,14 @@ impl GripArguments {
         if self.json {
             let GripperState { width, width_d, force, fault, .. } = state;
             let json = serde_json::json!({
-                "width": width, "width_d": width_d, "force": force, "grasped": grasped, "fault": fault,
+                "width": width, "width_d": width_d, "force": force.is_finite().then_some(force), "grasped": grasped, "fault": fault,
             });
             answer::json(&json)?;
         } else {
             let held = if grasped { ", and hold something" } else { "" };
             answer::words(format!("the fingers are {:.1} mm apart{held}", 1e3 * state.width))?;
         }
-        Ok(())
+        self.order.unmet(&state).map_or(Ok(()), |why| bail!(why))
     }
 }
 
@@ -93,10 +117,34 @@ impl Order {
     fn command(&self) -> GripperCommand {
         let command = GripperCommand { stamp_ns: now_ns(), ..GripperCommand::default() };
         match *self {
-            Self::Move { width, speed } => GripperCommand { width, speed, ..command },
-            Self::Grasp { width, force } => GripperCommand { action: GripperAction::Grasp, width, force, ..command },
+            Self::Move { width, speed } => GripperCommand { width, speed: speed.unwrap_or(0.0), ..command },
+            Self::Grasp { width, force } => {
+                GripperCommand { action: GripperAction::Grasp, width, force: force.unwrap_or(0.0), ..command }
+            }
             Self::Stop => GripperCommand { action: GripperAction::Stop, ..command },
             Self::Home => GripperCommand { action: GripperAction::Home, ..command },
+        }
+    }
+}
+
+impl Order {
+    /// What of the order the gripper did not do, now that its fingers rest.
+    fn unmet(&self, state: &GripperState) -> Option<String> {
+        match *self {
+            Self::Move { width, .. } if (state.width_d - width).abs() > REACHED => Some(format!(
+                "this gripper opens no further than {:.3} m and was asked for {width} m; ask for less, for example `rt_bridge grip move {:.3}`",
+                state.width_d,
+                0.5 * state.width_d
+            )),
+            Self::Grasp { width, .. } if state.grasped == 0 => Some(format!(
+                "nothing is held: nothing of about {width} m was between the fingers, which are {:.3} m apart; put it there, or give its width in metres",
+                state.width
+            )),
+            Self::Move { width, .. } if (state.width - width).abs() > REACHED => Some(format!(
+                "the fingers rest {:.3} m apart and not {width} m: something is in the way, or the gripper opens no further; try `rt_bridge grip home`",
+                state.width
+            )),
+            _ => None,
         }
     }
 }
@@ -131,4 +179,40 @@ fn rest(states: &Subscriber<GripperState>, ordered_ns: u64) -> Result<GripperSta
         }
     }
     bail!("the fingers still move after {} s; stop them with `rt_bridge grip stop`", LONGEST.as_secs())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_grasp_of_nothing_and_an_opening_beyond_the_gripper_are_no_success() {
+        let state = |width: f64, width_d: f64, grasped: u32| GripperState {
+            width,
+            width_d,
+            grasped,
+            ..GripperState::default()
+        };
+        let open = |width: f64| Order::Move { width, speed: None };
+        let grasp = Order::Grasp { width: 0.04, force: None };
+        assert_eq!(open(0.03).unmet(&state(0.0301, 0.03, 0)), None);
+        let beyond = open(0.3).unmet(&state(0.08, 0.08, 0)).expect("a gripper opens 80 mm");
+        assert!(beyond.contains("no further than 0.080 m") && beyond.contains("asked for 0.3 m"), "{beyond}");
+        let blocked = open(0.01).unmet(&state(0.04, 0.01, 0)).expect("something is in the way");
+        assert!(blocked.contains("rest 0.040 m apart"), "{blocked}");
+        assert_eq!(grasp.unmet(&state(0.0405, 0.04, 1)), None);
+        let nothing = grasp.unmet(&state(0.0, 0.04, 0)).expect("nothing is held");
+        assert!(nothing.starts_with("nothing is held") && nothing.contains("0.04 m"), "{nothing}");
+        assert_eq!(Order::Home.unmet(&state(0.08, 0.08, 0)), None);
+    }
+
+    #[test]
+    fn numbers_that_no_gripper_has_are_refused_with_range_and_unit() {
+        for wrong in ["30", "-0.01", "nan", "inf"] {
+            assert_eq!(width(wrong), Err("give a number from 0 to 0.5 [m]".into()), "{wrong}");
+        }
+        assert_eq!(force("1e9"), Err("give a number from 0.1 to 500 [N]".into()));
+        assert_eq!(speed("0"), Err("give a number from 0.001 to 1 [m/s]".into()));
+        assert_eq!((width("0.03"), force("40"), speed("0.05")), (Ok(0.03), Ok(40.0), Ok(0.05)));
+    }
 }

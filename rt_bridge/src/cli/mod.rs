@@ -11,7 +11,8 @@ mod run;
 mod serve;
 
 use clap::{Parser, Subcommand};
-use shared_mem::{console, parent, usage};
+use shared_mem::command_line::{self, Build};
+use shared_mem::{console, parent};
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -20,9 +21,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 ///
 /// The arm may be a Franka Research 3, the simulated cell, or a recording: whoever reads from shared memory cannot tell.
 #[derive(Debug, Parser)]
-#[command(
-    version,
-    after_help = "Examples:\n  \
+#[command(after_help = "Examples:\n  \
         rt_bridge doctor                                               what this machine lacks for real time\n  \
         rt_bridge run --cell config/fr3_cell.toml --arm sim            hold the simulated arm until Ctrl-C\n  \
         rt_bridge run --cell cell.toml --arm fci://172.16.0.2 --record clip.mcap\n  \
@@ -30,8 +29,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
         rt_bridge convert table.bag --out table.mcap                   a RealSense recording as a clip\n  \
         rt_bridge grip move 0.03                                       tell the gripper of a running bridge\n  \
         rt_bridge serve --cell config/fr3_cell.toml                    play a Franka robot for any libfranka program\n\n\
-        Processes meet when the environment variable TWINALIGN_DOMAIN agrees (default 0)."
-)]
+        Processes meet when the environment variable TWINALIGN_DOMAIN agrees (default 0).")]
 struct Arguments {
     #[command(subcommand)]
     verb: Verb,
@@ -49,11 +47,11 @@ enum Verb {
 
 /// Reads the command line and does what it says.
 #[must_use]
-pub fn main() -> ExitCode {
+pub fn main(build: &Build) -> ExitCode {
     let _last_lines = console::start();
-    let arguments = match Arguments::try_parse() {
+    let arguments: Arguments = match command_line::parse(build) {
         Ok(arguments) => arguments,
-        Err(error) => return usage::say(error.use_stderr(), error.render()),
+        Err(code) => return code,
     };
     tracing_subscriber::fmt()
         .with_writer(|| console::Log)
@@ -94,16 +92,6 @@ fn stop_flag(parent: Option<u32>) -> anyhow::Result<Arc<AtomicBool>> {
     Ok(stop)
 }
 
-/// `--duration` in seconds.
-fn seconds(text: &str) -> Result<std::time::Duration, String> {
-    let seconds: f64 = text.parse().map_err(|_| "give seconds, for example 60 or 0.5".to_owned())?;
-    if seconds > 0.0 && seconds < 1e8 {
-        Ok(std::time::Duration::from_secs_f64(seconds))
-    } else {
-        Err("give a positive number of seconds".into())
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -116,14 +104,6 @@ mod tests {
         for verb in command.get_subcommands_mut() {
             let help = verb.render_long_help().to_string();
             assert!(help.contains("Example"), "{} has no example", verb.get_name());
-        }
-    }
-
-    #[test]
-    fn a_duration_is_a_positive_number_of_seconds() {
-        assert_eq!(seconds("0.5"), Ok(std::time::Duration::from_millis(500)));
-        for wrong in ["", "ten", "0", "-1", "nan", "inf"] {
-            assert!(seconds(wrong).is_err(), "{wrong}");
         }
     }
 }

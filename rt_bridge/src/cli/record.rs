@@ -1,18 +1,20 @@
 //! `rt_bridge record`.
 
-use super::{seconds, stop_flag};
+use super::stop_flag;
 use crate::recorder::{Settings, record};
 use anyhow::{Result, bail};
 use clap::Args;
 use shared_mem::answer;
 use shared_mem::cell::Cell;
+use shared_mem::quantity::seconds;
 use shared_mem::recording::ClipInfo;
 use std::path::PathBuf;
 use std::time::Duration;
 
 /// Record everything on shared memory to a new clip, until Ctrl-C
 ///
-/// A process of its own: `rt_bridge run --record` starts one, and it can be started beside a bridge that runs already.
+/// A process of its own: `rt_bridge run --record` starts one, and it can be started beside a bridge that runs already, or
+/// before it. Where nothing is sent within --wait it ends with exit code 1 and leaves no file.
 #[derive(Debug, Args)]
 #[command(after_help = "Example:\n  \
     rt_bridge record --cell config/fr3_cell.toml --out clip.mcap --duration 10 --json\n\n\
@@ -25,8 +27,11 @@ pub(super) struct RecordArguments {
     /// Rides along in the file, so that the clip explains itself
     #[arg(long, value_name = "cell.toml")]
     cell: Option<PathBuf>,
+    /// How long to wait for the first message [s]
+    #[arg(long, value_name = "SECONDS", value_parser = seconds, default_value = "30")]
+    wait: Duration,
     /// Stop after this many seconds
-    #[arg(long, value_name = "S", value_parser = seconds)]
+    #[arg(long, value_name = "SECONDS", value_parser = seconds)]
     duration: Option<Duration>,
     /// Finish when this process is no longer our parent
     #[arg(long, hide = true)]
@@ -49,7 +54,9 @@ impl RecordArguments {
             program: concat!("rt_bridge ", env!("CARGO_PKG_VERSION")).into(),
             torques_begin_at_rows: false,
         };
-        let settings = Settings { out: self.out, duration: self.duration, parent: self.parent, info };
+        // The bridge that started this recorder may take its time, and answers for itself.
+        let patience = self.parent.is_none().then_some(self.wait);
+        let settings = Settings { out: self.out, duration: self.duration, patience, parent: self.parent, info };
         let recorded = record(&settings, &stop)?;
         if self.json {
             answer::json(&recorded)?;

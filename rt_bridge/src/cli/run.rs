@@ -1,14 +1,16 @@
 //! `rt_bridge run`.
 
-use super::{seconds, stop_flag};
+use super::stop_flag;
 use crate::gripper::GripperChoice;
 use crate::rt::Realtime;
 use crate::run::{ArmChoice, CameraChoice, ControllerChoice, RunReport, Settings, run};
+use crate::times;
 use crate::tracker::TrackerChoice;
 use crate::wrench::WrenchChoice;
 use anyhow::{Result, bail};
 use clap::Args;
 use shared_mem::answer;
+use shared_mem::quantity::seconds;
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -16,6 +18,9 @@ use std::time::Duration;
 ///
 /// The arm holds its pose until somebody sends a motion (`calibration capture` does). Every set point passes the
 /// safety limits; a motion that breaks one, or whose sender dies, is braked and held.
+///
+/// With --arm replay:// the recording's states, object, pictures, force sensor and gripper are sent again at their pace; its
+/// /twin/state and /twin/gap are not, because `twin shadow` makes them anew.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  \
     rt_bridge run --cell config/fr3_cell.toml --arm sim\n  \
@@ -25,7 +30,8 @@ use std::time::Duration;
     rt_bridge run --cell config/fr3_cell.toml --arm sim --tracker rgbd\n  \
     rt_bridge run --cell cell.toml --arm replay://clip.mcap\n\n\
     JSON: cycles, missed_cycles (deadlines that passed unused), overruns (work longer than a period), lost_packets,\n\
-    wake_us (wake-up latency), exec_us, period_us, age_us (a state's arrival to shared memory), recorded, faults.")]
+    wake_us (wake-up latency), exec_us, period_us, age_us (a state's arrival to shared memory), recorded, faults; null for\n\
+    what was not measured.")]
 pub(super) struct RunArguments {
     /// What the laboratory knows about its cell
     #[arg(long, value_name = "cell.toml")]
@@ -51,12 +57,12 @@ pub(super) struct RunArguments {
     /// camera, else off
     #[arg(long)]
     tracker: Option<TrackerChoice>,
-    /// sim, serial:///dev/ttyUSB0 (a Robotiq 2F), fci://HOST (the Franka Hand) or off.
-    /// Default: sim where the arm is simulated and cell.toml has a [gripper], else off
+    /// sim, serial:///dev/ttyUSB0 (a Robotiq 2F), fci://HOST (the Franka Hand), replay or off.
+    /// Default: sim where the arm is simulated and cell.toml has a [gripper], replay with a recording, else off
     #[arg(long, value_name = "GRIPPER")]
     gripper: Option<GripperChoice>,
-    /// Force/torque sensor: sim, can://INTERFACE or off.
-    /// Default: sim where the arm is simulated and cell.toml has a [wrench], else off
+    /// Force/torque sensor: sim, can://INTERFACE, replay or off.
+    /// Default: sim where the arm is simulated and cell.toml has a [wrench], replay with a recording, else off
     #[arg(long, value_name = "SENSOR")]
     wrench: Option<WrenchChoice>,
     /// Effects of the simulated cell that nobody else is told
@@ -118,14 +124,14 @@ impl RunArguments {
 
 fn in_words(report: &RunReport) -> String {
     let mut text = format!(
-        "{} cycles, {} missed, {} overruns, {} lost packets\nwake-up p99.9 {:.1} us, work p99.9 {:.1} us, age p99 {:.1} us",
+        "{} cycles, {} missed, {} overruns, {} lost packets\nwake-up p99.9 {}, work p99.9 {}, age p99 {}",
         report.cycles,
         report.missed_cycles,
         report.overruns,
         report.lost_packets,
-        report.wake_us.p999,
-        report.exec_us.p999,
-        report.age_us.p99
+        times::in_words(report.wake_us.p999),
+        times::in_words(report.exec_us.p999),
+        times::in_words(report.age_us.p99)
     );
     if let Some(recorded) = &report.recorded {
         text += &format!("\n{}", recorded.in_words());

@@ -1,12 +1,14 @@
 //! `rt_bridge serve`.
 
-use super::{seconds, stop_flag};
+use super::stop_flag;
 use crate::serve::{Pace, Ports, Report, Server};
 use crate::sim::hidden;
+use crate::times;
 use anyhow::Result;
 use clap::Args;
 use shared_mem::answer;
 use shared_mem::cell::Cell;
+use shared_mem::quantity::seconds;
 use std::net::IpAddr;
 use std::path::PathBuf;
 use std::time::Duration;
@@ -19,8 +21,8 @@ use std::time::Duration;
 /// real-time kernel where there is none (franka::RealtimeConfig::kIgnore, or --realtime ignore with rt_bridge run).
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  \
-    rt_bridge serve --cell config/fr3_cell.toml                      then, elsewhere:\n  \
-    rt_bridge run --cell config/fr3_cell.toml --arm fci://127.0.0.1 --realtime ignore\n  \
+    rt_bridge serve --cell config/fr3_cell.toml\n  \
+    rt_bridge run --cell config/fr3_cell.toml --arm fci://127.0.0.1 --realtime ignore   in another terminal, drives it\n  \
     rt_bridge serve --cell config/fr3_cell.toml --effects hidden.toml --bind 0.0.0.0\n  \
     rt_bridge serve --cell config/fr3_cell.toml --port 0 --lock-step --fast --json\n\n\
     JSON: cycles (the robot's milliseconds), motions, reflexes, lost_commands, clients, refused (connections), slipped\n\
@@ -96,14 +98,14 @@ impl ServeArguments {
 
 fn in_words(report: &Report) -> String {
     format!(
-        "{} clients, {} connections refused, {} motions, {} reflexes, {} lost commands in {:.1} s of the robot's time\nwake-up p99.9 {:.1} us, {} cycles slipped",
+        "{} clients, {} connections refused, {} motions, {} reflexes, {} lost commands in {:.1} s of the robot's time\nwake-up p99.9 {}, {} cycles slipped",
         report.clients,
         report.refused,
         report.robot.motions,
         report.robot.reflexes,
         report.robot.lost_commands,
         report.robot.cycles as f64 * 1e-3,
-        report.late_us.p999,
+        times::in_words(report.late_us.p999),
         report.slipped
     )
 }

@@ -1,9 +1,11 @@
 //! `twin label-splats`: the robot out of a scanned cell, one splat file for each link.
 
+use super::look::joint;
 use anyhow::{Context as _, bail, ensure};
 use nalgebra::{Isometry3, Point3, Quaternion, Similarity3, Translation3, UnitQuaternion};
 use shared_mem::cell::Cell;
 use shared_mem::output::Output;
+use shared_mem::quantity::number;
 use shared_mem::{answer, console};
 use std::path::PathBuf;
 use twin::arm::MAX_JOINTS;
@@ -30,24 +32,38 @@ pub(crate) struct LabelSplats {
     #[arg(long, value_name = "CELL.toml")]
     cell: PathBuf,
     /// Joint positions of the robot in the scan [rad], with commas between them
-    #[arg(long, value_name = "Q", allow_hyphen_values = true, value_delimiter = ',', required = true)]
+    #[arg(long, value_name = "Q", allow_hyphen_values = true, value_delimiter = ',', required = true, value_parser = joint)]
     joints: Vec<f64>,
     /// Folder for the parts
     #[arg(long, value_name = "FOLDER")]
     out: PathBuf,
     /// Roughly where the scan's frame lies in the base: x,y,z,qw,qx,qy,qz, and metres for one of its units [default: at the
     /// base, in metres]
-    #[arg(long, value_name = "POSE", allow_hyphen_values = true, value_delimiter = ',')]
+    #[arg(long, value_name = "POSE", allow_hyphen_values = true, value_delimiter = ',', value_parser = part_of_pose)]
     start: Option<Vec<f64>>,
-    /// The Franka Hand is mounted, its fingers so far apart [m]
-    #[arg(long, value_name = "WIDTH")]
+    /// The Franka Hand is mounted, its fingers so far apart [m], 0 to 0.08
+    #[arg(long, value_name = "WIDTH", allow_negative_numbers = true, value_parser = hand)]
     hand: Option<f64>,
-    /// A splat belongs to a link whose surface is nearer than this [m]
-    #[arg(long, value_name = "DISTANCE", default_value_t = 0.015)]
+    /// A splat belongs to a link whose surface is nearer than this [m], 0.0001 to 0.2
+    #[arg(long, value_name = "DISTANCE", default_value_t = 0.015, allow_negative_numbers = true, value_parser = reach)]
     reach: f64,
     /// Prints one JSON object on stdout at the end
     #[arg(long)]
     json: bool,
+}
+
+/// One of the eight numbers of a pose with a scale.
+fn part_of_pose(text: &str) -> Result<f64, String> {
+    number(text, -1000.0..=1000.0, "m, or of a quaternion")
+}
+
+/// Opening of a Franka Hand [m].
+fn hand(text: &str) -> Result<f64, String> {
+    number(text, 0.0..=0.08, "m")
+}
+
+fn reach(text: &str) -> Result<f64, String> {
+    number(text, 1e-4..=0.2, "m")
 }
 
 /// Splats fainter than this are haze and say nothing of a surface.
@@ -67,8 +83,6 @@ impl LabelSplats {
         let robot = RobotSurface::new(&cell, hand)?;
         let dof = robot.model().dof();
         ensure!(self.joints.len() == dof, "--joints has {} values, the arm {dof} joints", self.joints.len());
-        ensure!(self.joints.iter().all(|q| q.is_finite()), "--joints holds a value that is no finite number");
-        ensure!((1e-4..=0.2).contains(&self.reach), "--reach is a distance from 0.1 mm to 200 mm, in metres");
         let mut q = [0.0; MAX_JOINTS];
         q[..dof].copy_from_slice(&self.joints);
         let start = self.start()?;
@@ -128,8 +142,7 @@ impl LabelSplats {
             Some(values) => bail!("--start has {} values; it is x,y,z,qw,qx,qy,qz and a scale", values.len()),
         };
         let turn = Quaternion::new(values[3], values[4], values[5], values[6]);
-        let sound = values.iter().all(|value| value.is_finite()) && turn.norm() > 1e-6;
-        ensure!(sound && scale.is_finite() && scale > 0.0, "--start holds no pose: check its quaternion and its scale");
+        ensure!(turn.norm() > 1e-6 && scale > 0.0, "--start holds no pose: check its quaternion and its scale");
         let place = Translation3::new(values[0], values[1], values[2]);
         let pose = Isometry3::from_parts(place, UnitQuaternion::from_quaternion(turn));
         Ok(Similarity3::from_isometry(pose, scale))

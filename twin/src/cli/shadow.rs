@@ -1,31 +1,35 @@
 //! `twin shadow`: mirrors a running bridge and publishes the gap.
 
 use super::look::Look;
-use anyhow::Context as _;
+use anyhow::{Context as _, bail};
 use clap::Args;
 use shared_mem::cell::Cell;
 use shared_mem::parent;
+use shared_mem::quantity::seconds;
 use shared_mem::theta::Theta;
 use shared_mem::{answer, console};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 #[cfg(feature = "viewer")]
 use twin::render::LiveView;
 use twin::shadow::live::{Live, Watcher};
-use twin::shadow::{Mirrored, Shadow as Twin};
+use twin::shadow::{Mirrored, Shadow as Twin, Summary};
 
 /// Mirror a running cell in simulation and publish how far the two are apart.
 ///
 /// Attaches to `rt_bridge run` through shared memory, whichever of the two is started first, and survives its restarts.
-/// Sends the twin's state on /twin/state and the gap on /twin/gap.
+/// Where no state comes within --wait it ends with exit code 1. Sends the twin's state on /twin/state and the gap on
+/// /twin/gap.
 #[derive(Args)]
 #[command(after_help = "Examples:\n  \
     twin shadow --cell config/fr3_cell.toml                       until Ctrl-C, gap on the terminal\n  \
     twin shadow --cell config/fr3_cell.toml --viewer              in Foxglove or Lichtblick: ws://127.0.0.1:8765\n  \
     twin shadow --cell cell.toml --viewer --splats fr3_splats     the twin's pictures from a scanned robot\n  \
-    twin shadow --cell cell.toml --parameters theta.toml --duration 60 --json")]
+    twin shadow --cell cell.toml --parameters theta.toml --duration 60 --json\n\n\
+    JSON: cycles, real_time_factor, dropped, alignments, age_us, gap (joint_rms_rad, object_add_m, object_add_s_m); null for\n\
+    what was not measured.")]
 pub(crate) struct Shadow {
     /// What is known about the cell; the same file the bridge runs with
     #[arg(long, value_name = "CELL.toml")]
@@ -33,9 +37,12 @@ pub(crate) struct Shadow {
     /// Identified parameters for the twin
     #[arg(long, value_name = "THETA.toml")]
     parameters: Option<PathBuf>,
+    /// How long to wait for the first state of a bridge [s]
+    #[arg(long, value_name = "SECONDS", value_parser = seconds, default_value = "30")]
+    wait: Duration,
     /// Stop after so many seconds; without it, on Ctrl-C
     #[arg(long, value_name = "SECONDS", value_parser = seconds)]
-    duration: Option<f64>,
+    duration: Option<Duration>,
     /// Show robot and twin in 3D, and the camera's picture beside the twin's: a Foxglove WebSocket on 127.0.0.1:8765
     #[arg(long)]
     viewer: bool,
@@ -49,15 +56,8 @@ pub(crate) struct Shadow {
     json: bool,
 }
 
-fn seconds(text: &str) -> Result<f64, String> {
-    match text.parse::<f64>() {
-        Ok(value) if value > 0.0 && value < 1e9 => Ok(value),
-        _ => Err("give a positive number of seconds".into()),
-    }
-}
-
 impl Shadow {
-    /// Runs until its duration is over or a signal asks it to end.
+    /// Runs until its duration is over, a signal asks it to end, or no bridge comes.
     pub(crate) fn run(self) -> anyhow::Result<()> {
         let cell = Cell::read(&self.cell)?;
         let theta = self.parameters.as_deref().map(Theta::read).transpose()?;
@@ -70,21 +70,46 @@ impl Shadow {
         let on_signal = Arc::clone(&stop);
         ctrlc::set_handler(move || on_signal.store(true, Ordering::Relaxed)).context("cannot listen for Ctrl-C")?;
         let viewer = self.viewer.then(|| viewer(&cell, &self.look, &stop)).transpose()?;
-        let mut terminal = Terminal::new();
-        let outcome = Live::open()?.run(&mut shadow, self.duration.map(Duration::from_secs_f64), &stop, &mut terminal);
+        let mut terminal = Terminal::new(&self.cell);
+        let begin = Instant::now();
+        let outcome = Live::open()?.run(&mut shadow, (self.wait, self.duration), &stop, &mut terminal);
+        let waited = begin.elapsed();
         console::status("");
         stop.store(true, Ordering::Relaxed);
         if let Some(viewer) = viewer {
             viewer.join().map_err(|_| anyhow::anyhow!("the viewer crashed; start without --viewer"))??;
         }
         let (busy_s, summary) = (outcome?, shadow.summary());
+        let text = summary.text(busy_s);
         if self.json {
             answer::json(&summary.json(busy_s))?;
-        } else {
-            console::block(summary.text(busy_s));
+        } else if let Some(text) = &text {
+            console::block(text);
         }
-        Ok(())
+        match text {
+            Some(_) => Ok(()),
+            None => bail!(why_nothing(&summary, &self.cell, waited)),
+        }
     }
+}
+
+/// Why nothing was mirrored, and what to do.
+fn why_nothing(summary: &Summary, cell: &Path, waited: Duration) -> String {
+    match summary.dropped {
+        0 => format!(
+            "no arm state came within {:.1} s, so nothing was mirrored; start a bridge with {}",
+            waited.as_secs_f64(),
+            bridge(cell)
+        ),
+        dropped => format!(
+            "none of {dropped} arm states could be mirrored: they came late or held no numbers; give the twin a core of its own"
+        ),
+    }
+}
+
+/// The command that starts a bridge for this cell.
+fn bridge(cell: &Path) -> String {
+    format!("`rt_bridge run --cell {} --arm sim` (a robot: --arm fci://HOST)", cell.display())
 }
 
 type ViewerThread = std::thread::JoinHandle<anyhow::Result<()>>;
@@ -105,19 +130,28 @@ fn viewer(_: &Cell, _: &Look, _: &Arc<AtomicBool>) -> anyhow::Result<ViewerThrea
 }
 
 /// Shows the gap on stderr: a status on a terminal, a line a second elsewhere.
-struct Terminal {
+struct Terminal<'a> {
     shown: Instant,
+    cell: &'a Path,
 }
 
-impl Terminal {
-    fn new() -> Self {
-        Self { shown: Instant::now() }
+impl<'a> Terminal<'a> {
+    fn new(cell: &'a Path) -> Self {
+        Self { shown: Instant::now(), cell }
     }
 }
 
-impl Watcher for Terminal {
+impl Watcher for Terminal<'_> {
     fn remark(&mut self, text: &str) {
         console::line(format_args!("twin: {text}"));
+    }
+
+    fn silent(&mut self, patience: Option<Duration>) {
+        let waiting = match patience {
+            Some(patience) => format!("waiting {:.0} s for", patience.as_secs_f64()),
+            None => "waiting for".to_owned(),
+        };
+        self.remark(&format!("no arm state for a second; {waiting} {}", bridge(self.cell)));
     }
 
     fn mirrored(&mut self, mirrored: &Mirrored) {

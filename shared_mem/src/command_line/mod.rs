@@ -1,0 +1,130 @@
+//! What the command lines of all programs have in common: help that fits into 80 columns, a version that says what was
+//! built, completions for shells and manual pages. The programs' own arguments are theirs.
+//!
+//! | file | owns |
+//! |---|---|
+//! | `layout` | texts below the options: paragraphs, rows, and examples that can be typed as they stand |
+//! | `pages` | manual pages |
+//! | `placeholders` | what stands for a value, spelled alike |
+
+mod layout;
+mod pages;
+mod placeholders;
+
+use crate::{answer, console, error_line, usage};
+use clap::{Arg, ArgMatches, Command, Parser, value_parser};
+use clap_complete::Shell;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+/// Columns of a help text, whatever the terminal has: a narrower one folds lines itself, and what is copied stays whole.
+const WIDTH: usize = 80;
+
+/// What was built.
+#[derive(Debug, Clone, Copy)]
+pub struct Build {
+    /// Version of the program.
+    pub version: &'static str,
+    /// The commit it was built from, `-modified` where there was more than that; empty where nobody knows.
+    pub commit: &'static str,
+    /// Its optional features, and whether each was built in.
+    pub features: &'static [(&'static str, bool)],
+}
+
+impl Build {
+    /// `0.1.0 (commit 0123456789ab; features: viewer)`.
+    fn line(&self) -> String {
+        let commit = if self.commit.is_empty() { "unknown" } else { self.commit };
+        let built: Vec<&str> = self.features.iter().filter(|(_, in_it)| *in_it).map(|(name, _)| *name).collect();
+        let features = if built.is_empty() { "none".to_owned() } else { built.join(", ") };
+        format!("{} (commit {commit}; features: {features})", self.version)
+    }
+}
+
+/// Reads the program's command line.
+///
+/// # Errors
+/// The exit code of a program that has nothing more to do: its help, its version, completions or manual pages were asked for
+/// and said, or its arguments are wrong and that was said.
+pub fn parse<A: Parser>(build: &Build) -> Result<A, ExitCode> {
+    let mut command = command::<A>(build);
+    let matches = command
+        .try_get_matches_from_mut(std::env::args_os())
+        .map_err(|error| usage::say(error.use_stderr(), error.render()))?;
+    match matches.subcommand() {
+        Some((COMPLETIONS, asked)) => Err(completions(&mut command, asked)),
+        Some((MANPAGES, asked)) => Err(manpages(&command, asked)),
+        _ => A::from_arg_matches(&matches).map_err(|error| usage::say(error.use_stderr(), error.render())),
+    }
+}
+
+const COMPLETIONS: &str = "completions";
+const MANPAGES: &str = "manpages";
+
+/// The whole command line of a program.
+fn command<A: Parser>(build: &Build) -> Command {
+    let command = A::command().version(build.line());
+    let name = command.get_name().to_owned();
+    let completions = Command::new(COMPLETIONS)
+        .about("Print completions for a shell")
+        .arg(Arg::new("shell").value_name("SHELL").required(true).value_parser(value_parser!(Shell)).help("The shell"))
+        .after_help(format!(
+            "Examples:\n  {name} completions bash > ~/.local/share/bash-completion/completions/{name}\n  \
+             {name} completions zsh > ~/.zfunc/_{name}\n  \
+             {name} completions fish > ~/.config/fish/completions/{name}.fish"
+        ));
+    let manpages = Command::new(MANPAGES)
+        .about("Write a manual page for the program and for each of its verbs")
+        .arg(
+            Arg::new("out")
+                .long("out")
+                .value_name("FOLDER")
+                .required(true)
+                .value_parser(value_parser!(PathBuf))
+                .help("Folder for the pages; it is made where it is missing"),
+        )
+        .after_help(format!(
+            "Examples:\n  {name} manpages --out ~/.local/share/man/man1\n  man {name}    the page of a verb: man {name}-VERB"
+        ));
+    layout::fitted(placeholders::spelled(command.subcommand(completions).subcommand(manpages)), WIDTH)
+}
+
+fn completions(command: &mut Command, asked: &ArgMatches) -> ExitCode {
+    let Some(shell) = asked.get_one::<Shell>("shell") else { return ExitCode::FAILURE };
+    let (name, mut script) = (command.get_name().to_owned(), Vec::new());
+    clap_complete::generate(*shell, command, name, &mut script);
+    ended(answer::bytes(&script))
+}
+
+fn manpages(command: &Command, asked: &ArgMatches) -> ExitCode {
+    let Some(folder) = asked.get_one::<PathBuf>("out") else { return ExitCode::FAILURE };
+    match pages::write(command, folder) {
+        Ok(count) => ended(answer::words(format!("{count} manual pages in {}", folder.display()))),
+        Err(error) => ended(Err(error)),
+    }
+}
+
+fn ended(outcome: Result<(), impl std::error::Error + 'static>) -> ExitCode {
+    match outcome {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            console::line(format_args!("error: {}", error_line(&error)));
+            ExitCode::FAILURE
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_version_says_what_was_built() {
+        let built = |commit, features| Build { version: "0.1.0", commit, features }.line();
+        assert_eq!(
+            built("0123456789ab", &[("viewer", true), ("render", false)]),
+            "0.1.0 (commit 0123456789ab; features: viewer)"
+        );
+        assert_eq!(built("", &[("render", false)]), "0.1.0 (commit unknown; features: none)");
+    }
+}
