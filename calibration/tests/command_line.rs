@@ -25,8 +25,18 @@ fn every_verb_teaches_with_an_example() {
 #[test]
 fn wrong_arguments_exit_with_2_and_say_what_is_allowed() {
     let common = ["capture", "excitation", "--cell", "cell.toml", "--out", "session", "--clips"];
-    for (wrong, allowed) in [(&["0"][..], "1..=1000"), (&["1", "--amplitude", "7"][..], "from 0.01 to 1.5")] {
-        let output = calibration(&[&common[..], wrong].concat());
+    let viewpoint = ["viewpoint", "photo.png"];
+    let cases: [(&[&str], &[&str], &str); 7] = [
+        (&common, &["0"], "1..=1000"),
+        (&common, &["1", "--amplitude", "7"], "from 0.01 to 1.5 [rad]"),
+        (&common, &["1", "--duration", "nan"], "from 2 to 600 [s]"),
+        (&common, &["1", "--frequency", "0.2", "1e9"], "from 0.05 to 50 [Hz]"),
+        (&viewpoint, &["--hand", "30"], "from 0 to 0.08 [m]"),
+        (&viewpoint, &["--reach", "20,-1"], "from 0 to 180 [degrees]"),
+        (&viewpoint, &["--reach", "20,50"], "from 0 to 10 [m]"),
+    ];
+    for (common, wrong, allowed) in cases {
+        let output = calibration(&[common, wrong].concat());
         assert_eq!(output.status.code(), Some(2));
         assert!(text(&output.stderr).contains(allowed), "{}", text(&output.stderr));
     }

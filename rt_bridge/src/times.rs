@@ -38,25 +38,32 @@ impl Times {
         self.0.len()
     }
 
-    /// Percentiles in microseconds; all 0 when nothing was counted.
+    /// Percentiles in microseconds; all `None` when nothing was counted.
     #[must_use]
     pub fn percentiles(&self) -> Percentiles {
-        let at = |quantile: f64| self.0.value_at_quantile(quantile) as f64 * 1e-3;
-        Percentiles { p50: at(0.5), p99: at(0.99), p999: at(0.999), max: self.0.max() as f64 * 1e-3 }
+        let counted = |ns: u64| (!self.0.is_empty()).then_some(ns as f64 * 1e-3);
+        let at = |quantile: f64| counted(self.0.value_at_quantile(quantile));
+        Percentiles { p50: at(0.5), p99: at(0.99), p999: at(0.999), max: counted(self.0.max()) }
     }
 }
 
-/// Percentiles of a distribution of times [us].
+/// Percentiles of a distribution of times [us]; `None` (`null`) where nothing was measured.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Percentiles {
     /// Half of all are shorter.
-    pub p50: f64,
+    pub p50: Option<f64>,
     /// 99 % are shorter.
-    pub p99: f64,
+    pub p99: Option<f64>,
     /// 99.9 % are shorter.
-    pub p999: f64,
+    pub p999: Option<f64>,
     /// The longest.
-    pub max: f64,
+    pub max: Option<f64>,
+}
+
+/// A time [us] for people.
+#[must_use]
+pub fn in_words(time_us: Option<f64>) -> String {
+    time_us.map_or_else(|| "not measured".to_owned(), |us| format!("{us:.1} us"))
 }
 
 #[cfg(test)]
@@ -70,14 +77,21 @@ mod tests {
             times.record(us * 1000);
         }
         let p = times.percentiles();
-        assert!((p.p50 - 500.0).abs() < 1.0 && (p.p99 - 990.0).abs() < 2.0, "{p:?}");
-        assert!((p.max - 1000.0).abs() < 1.0 && times.count() == 1000);
+        let near = |time: Option<f64>, us: f64| time.is_some_and(|time| (time - us).abs() < 2.0);
+        assert!(near(p.p50, 500.0) && near(p.p99, 990.0) && near(p.max, 1000.0) && times.count() == 1000, "{p:?}");
+    }
+
+    #[test]
+    fn what_was_not_measured_is_null_and_no_zero() {
+        let json = serde_json::to_value(Times::new().percentiles()).expect("JSON");
+        assert_eq!(json, serde_json::json!({ "p50": null, "p99": null, "p999": null, "max": null }));
+        assert_eq!((in_words(None), in_words(Some(12.34))), ("not measured".into(), "12.3 us".into()));
     }
 
     #[test]
     fn a_time_beyond_the_longest_counts_as_the_longest() {
         let mut times = Times::new();
         times.record(u64::MAX);
-        assert!(times.percentiles().max >= 1e7);
+        assert!(times.percentiles().max >= Some(1e7));
     }
 }

@@ -34,6 +34,46 @@ fn wrong_arguments_exit_with_two_and_name_what_there_is() {
 }
 
 #[test]
+fn a_number_with_a_unit_is_refused_outside_of_its_range_which_is_told() {
+    let run = ["run", "--cell", "cell.toml", "--arm", "sim"];
+    let serve = ["serve", "--cell", "cell.toml"];
+    let cases: [(&[&str], &str, &str); 9] = [
+        (&["grip", "move"], "30", "from 0 to 0.5 [m]"),
+        (&["grip", "move"], "-0.01", "from 0 to 0.5 [m]"),
+        (&["grip", "grasp"], "nan", "from 0 to 0.5 [m]"),
+        (&["grip", "grasp", "0.04"], "--force=1e9", "from 0.1 to 500 [N]"),
+        (&["grip", "move", "0.04"], "--speed=inf", "from 0.001 to 1 [m/s]"),
+        (&run, "--duration=-1", "from 0.001 to 10000000 [s]"),
+        (&["record", "--out", "clip.mcap"], "--wait=1e30", "from 0.001 to 10000000 [s]"),
+        (&serve, "--port=65536", "0..=65535"),
+        (&serve, "--hand-port=-1", "0..=65535"),
+    ];
+    for (common, wrong, allowed) in cases {
+        let end = rt_bridge(&[common, &[wrong]].concat());
+        assert_eq!(end.status.code(), Some(2), "{common:?} {wrong}");
+        assert!(text(&end.stderr).contains(allowed), "{common:?} {wrong}: {}", text(&end.stderr));
+    }
+}
+
+#[test]
+fn a_recording_of_nothing_is_an_error_with_the_command_that_starts_a_bridge_and_leaves_no_file() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let clip = folder.path().join("clip.mcap");
+    for limit in ["--wait", "--duration"] {
+        let end = Command::new(env!("CARGO_BIN_EXE_rt_bridge"))
+            .env("TWINALIGN_DOMAIN", format!("silent{}", std::process::id()))
+            .args(["record", limit, "0.3", "--json", "--out"])
+            .arg(&clip)
+            .output()
+            .expect("the program runs");
+        let said = text(&end.stderr);
+        assert_eq!(end.status.code(), Some(1), "{limit}: {said}");
+        assert!(said.contains("nothing was sent within 0.") && said.contains("`rt_bridge run --cell"), "{said}");
+        assert!(said.trim_end().lines().count() == 1 && end.stdout.is_empty() && !clip.exists(), "{limit}: {said}");
+    }
+}
+
+#[test]
 #[cfg(not(feature = "realsense"))]
 fn a_program_without_librealsense_says_how_to_get_it() {
     let end = rt_bridge(&["convert", "table.bag", "--out", "/nowhere/table.mcap"]);

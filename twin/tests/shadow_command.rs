@@ -20,13 +20,23 @@ fn text(bytes: &[u8]) -> String {
 }
 
 #[test]
-fn without_a_bridge_it_waits_says_so_and_answers_with_empty_figures() {
-    let out = shadow("wait", &["--cell", "fr3_cell.toml", "--duration", "1.5", "--json"]);
-    assert!(out.status.success(), "{}", text(&out.stderr));
-    assert!(text(&out.stderr).contains("waiting for `rt_bridge run"), "{}", text(&out.stderr));
-    let json: serde_json::Value = serde_json::from_slice(&out.stdout).expect("one JSON object");
-    assert_eq!(json["cycles"], 0);
-    assert!(json["gap"]["object_add_m"].is_null());
+fn without_a_bridge_it_waits_as_long_as_it_says_and_fails_with_the_command_that_starts_one() {
+    for limit in ["--wait", "--duration"] {
+        let out = shadow("wait", &["--cell", "fr3_cell.toml", limit, "1.5", "--json"]);
+        let said = text(&out.stderr);
+        assert_eq!(out.status.code(), Some(1), "{limit}: {said}");
+        let expected =
+            if limit == "--wait" { "waiting 2 s for `rt_bridge run" } else { "waiting 30 s for `rt_bridge run" };
+        assert!(said.contains(expected), "{said}");
+        let complaint = said.trim_end().lines().last().expect("a complaint");
+        assert!(complaint.contains("no arm state came within 1.5 s"), "{complaint}");
+        assert!(complaint.contains("`rt_bridge run --cell fr3_cell.toml --arm sim`"), "{complaint}");
+        let json: serde_json::Value = serde_json::from_slice(&out.stdout).expect("one JSON object");
+        assert_eq!(json["cycles"], 0);
+        for figure in ["/real_time_factor", "/age_us/p50", "/age_us/max", "/gap/joint_rms_rad", "/gap/object_add_m"] {
+            assert!(json.pointer(figure).is_some_and(serde_json::Value::is_null), "{figure}: {json}");
+        }
+    }
 }
 
 #[test]
@@ -41,7 +51,11 @@ fn a_missing_cell_is_one_line_with_a_remedy() {
 
 #[test]
 fn wrong_arguments_end_with_two() {
-    assert_eq!(shadow("args", &["--cell", "fr3_cell.toml", "--duration", "-3"]).status.code(), Some(2));
+    for wrong in ["--duration=-3", "--duration=inf", "--wait=0", "--wait=1e9"] {
+        let out = shadow("args", &["--cell", "fr3_cell.toml", wrong]);
+        assert_eq!(out.status.code(), Some(2), "{wrong}");
+        assert!(text(&out.stderr).contains("from 0.001 to 10000000 [s]"), "{}", text(&out.stderr));
+    }
     assert_eq!(shadow("args", &[]).status.code(), Some(2));
 }
 

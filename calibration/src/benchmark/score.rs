@@ -213,10 +213,11 @@ pub fn reliability(cases: &[Case]) -> Vec<(f64, Rate)> {
     filled.map(|bin| (mean(bin), Rate::count(bin.iter().map(|case| case.right())))).collect()
 }
 
-/// Mean distance of confidence from the share of true verdicts, over the bins, weighted by cases (Naeini 2015).
+/// Mean distance of confidence from the share of true verdicts, over the bins, weighted by cases (Naeini 2015); NaN, in JSON
+/// `null`, without cases.
 fn calibration_error(cases: &[Case]) -> f64 {
     let distance = |(confidence, right): (f64, Rate)| right.of as f64 * (confidence - right.value()).abs();
-    reliability(cases).into_iter().map(distance).sum::<f64>() / cases.len().max(1) as f64
+    reliability(cases).into_iter().map(distance).sum::<f64>() / cases.len() as f64
 }
 
 /// The rate at which `hits` or more of `of` come about with probability `tail`, by bisection on the binomial sum.
@@ -297,5 +298,6 @@ mod tests {
     fn an_effect_that_hardly_shows_is_asked_of_nobody() {
         let hidden = Case { detectability: 2.0, ..case(one("payload"), "none", &[], 0.5) };
         assert_eq!(Scores::of(&[hidden]).top1.of, 0);
+        assert!(Scores::of(&[]).calibration_error.is_nan(), "nothing was scored");
     }
 }

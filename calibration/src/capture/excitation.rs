@@ -337,11 +337,16 @@ impl ClipSummary {
             None => "keep".to_owned(),
             Some(why) => format!("repeat, because {why}; the file stays, but is not entered into cell.toml"),
         };
+        let seen = match (peak_speed, tracking_error) {
+            (Some(speed), Some(error)) => {
+                format!("peak speed {speed:.2} rad/s, follows within {:.1} mrad", 1e3 * error)
+            }
+            _ => "no state seen".to_owned(),
+        };
         format!(
-            "{}: {}, peak speed {peak_speed:.2} rad/s, follows within {:.1} mrad, {lost_packets} packets lost, {:.1} MB: {verdict}",
+            "{}: {}, {seen}, {lost_packets} packets lost, {:.1} MB: {verdict}",
             self.file.display(),
             self.motion,
-            1e3 * tracking_error,
             self.bytes as f64 * 1e-6,
         )
     }

@@ -23,10 +23,10 @@ pub struct Quality {
     pub states: u64,
     /// States missing in the robot's own counter.
     pub lost_packets: u64,
-    /// Largest measured joint speed [rad/s].
-    pub peak_speed: f64,
-    /// Largest distance between desired and measured joint position [rad].
-    pub tracking_error: f64,
+    /// Largest measured joint speed [rad/s]; `None` without states.
+    pub peak_speed: Option<f64>,
+    /// Largest distance between desired and measured joint position [rad]; `None` without states.
+    pub tracking_error: Option<f64>,
 }
 
 /// Whether a clip is worth keeping.
@@ -50,8 +50,9 @@ impl Watch {
         self.last_device_ns = Some(state.device_ns);
         let dof = (state.dof as usize).min(state.q.len());
         for joint in 0..dof {
-            seen.peak_speed = seen.peak_speed.max(state.dq[joint].abs());
-            seen.tracking_error = seen.tracking_error.max((state.q_d[joint] - state.q[joint]).abs());
+            let (speed, error) = (state.dq[joint].abs(), (state.q_d[joint] - state.q[joint]).abs());
+            seen.peak_speed = Some(seen.peak_speed.map_or(speed, |peak| peak.max(speed)));
+            seen.tracking_error = Some(seen.tracking_error.map_or(error, |worst| worst.max(error)));
         }
     }
 
@@ -71,8 +72,10 @@ impl Quality {
         if lost > LOSS_BEARABLE {
             return Verdict::Repeat(format!("{:.1} % of the packets are lost", 100.0 * lost));
         }
-        if self.peak_speed < SPEED_EXPECTED * planned_speed {
-            let seen = self.peak_speed;
+        let Some(seen) = self.peak_speed else {
+            return Verdict::Repeat("no state of the arm came while it was played".to_owned());
+        };
+        if seen < SPEED_EXPECTED * planned_speed {
             return Verdict::Repeat(format!("the arm reached {seen:.2} rad/s of {planned_speed:.2} planned"));
         }
         Verdict::Keep
@@ -97,7 +100,8 @@ mod tests {
     #[test]
     fn a_complete_clip_is_kept() {
         let quality = states(0..2000);
-        assert_eq!(quality, Quality { states: 2000, lost_packets: 0, peak_speed: 0.8, tracking_error: 0.02 });
+        let expected = Quality { states: 2000, lost_packets: 0, peak_speed: Some(0.8), tracking_error: Some(0.02) };
+        assert_eq!(quality, expected);
         assert_eq!(quality.verdict(0.9), Verdict::Keep);
     }
 
@@ -106,6 +110,13 @@ mod tests {
         let quality = states((0..2000).filter(|ms| ms % 50 != 7));
         assert_eq!(quality.lost_packets, 40);
         assert!(matches!(quality.verdict(0.9), Verdict::Repeat(why) if why.contains("2.0 %")));
+    }
+
+    #[test]
+    fn what_was_not_seen_is_null_and_no_zero() {
+        let json = serde_json::to_value(states([])).expect("JSON");
+        assert!(json["peak_speed"].is_null() && json["tracking_error"].is_null(), "{json}");
+        assert!(matches!(states([]).verdict(0.0), Verdict::Repeat(_)));
     }
 
     #[test]

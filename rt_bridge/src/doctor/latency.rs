@@ -3,7 +3,7 @@
 use super::Finding;
 use crate::rt::deadline::Grid;
 use crate::rt::process;
-use crate::times::{Percentiles, Times};
+use crate::times::{Percentiles, Times, in_words};
 use shared_mem::time::now_ns;
 
 /// Cycles of the test: two seconds.
@@ -14,8 +14,8 @@ const GOOD_US: f64 = 150.0;
 pub(super) fn examine() -> (Finding, Percentiles) {
     let times = std::thread::spawn(measure).join().unwrap_or_default();
     let wake = times.percentiles();
-    let found = format!("wakes {:.0} us late (p99.9 of {CYCLES}), at worst {:.0} us", wake.p999, wake.max);
-    let finding = if wake.p999 <= GOOD_US {
+    let found = format!("wakes {} late (p99.9 of {CYCLES}), at worst {}", in_words(wake.p999), in_words(wake.max));
+    let finding = if wake.p999.is_some_and(|us| us <= GOOD_US) {
         Finding::ok("wake-up", found)
     } else {
         let remedy = "close other programs; a real-time kernel, the performance governor and an isolated core help, in this order";

@@ -5,7 +5,7 @@ use crate::arm::{Arm, ArmFault, Read};
 use crate::fr3;
 use crate::rt::Realtime;
 use crate::rt::stats::ArrivalLine;
-use crate::times::Times;
+use crate::times::{Times, in_words};
 use shared_mem::cell::Cell;
 use shared_mem::msg::arm::{ArmMode, ArmState};
 
@@ -56,14 +56,18 @@ impl Line {
     fn finding(&self, host: &str) -> Finding {
         let late = self.late.percentiles();
         let found = format!(
-            "{host} speaks FCI version 10, is in mode {:?}; {STATES} states, {} lost, {:.0} us late (p99), at worst {:.0} us",
-            self.mode, self.lost, late.p99, late.max
+            "{host} speaks FCI version 10, is in mode {:?}; {} states, {} lost, {} late (p99), at worst {}",
+            self.mode,
+            self.late.count(),
+            self.lost,
+            in_words(late.p99),
+            in_words(late.max)
         );
         if !matches!(self.mode, ArmMode::Idle | ArmMode::Move) {
             let remedy = "release the user stop, unlock the joints and activate FCI in the robot's web page";
             return Finding::warning("robot", found, remedy);
         }
-        if self.lost > 0 || late.p99 > GOOD_US {
+        if self.lost > 0 || late.p99.is_none_or(|us| us > GOOD_US) {
             let remedy =
                 "connect it directly, without switch or Wi-Fi: state, computing and command share one millisecond";
             return Finding::warning("robot", found, remedy);

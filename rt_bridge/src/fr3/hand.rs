@@ -175,7 +175,7 @@ impl Device for Hand {
             width,
             width_d: self.width_d.unwrap_or(width),
             // The hand does not tell how hard it holds.
-            force: 0.0,
+            force: f64::NAN,
             grasped: u32::from(state.is_grasped != 0),
             fault: 0,
         }))

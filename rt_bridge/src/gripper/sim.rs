@@ -58,7 +58,8 @@ impl SimGripper {
             width: self.fingers.width(),
             width_d: self.width_d,
             force: 0.0,
-            grasped: u32::from(self.fingers.has_grasped()),
+            // The fingers met each other: whatever width was asked for, there is nothing between them.
+            grasped: u32::from(self.fingers.has_grasped() && self.fingers.width() > 0.0),
             fault: 0,
         }
     }
@@ -96,6 +97,8 @@ mod tests {
         assert_eq!(gripper.advance(10.0).width, 0.085);
         gripper.take(&GripperCommand { action: GripperAction::Grasp, width: 0.03, ..GripperCommand::default() });
         assert_eq!(gripper.advance(10.0).grasped, 0, "there is nothing to hold");
+        gripper.take(&GripperCommand { action: GripperAction::Grasp, width: 0.002, ..GripperCommand::default() });
+        assert_eq!(gripper.advance(10.0).grasped, 0, "nor anything thinner than what widths may be off");
         gripper.take(&GripperCommand { action: GripperAction::Home, ..GripperCommand::default() });
         let (_closing, open) = (gripper.advance(10.0), gripper.advance(10.0));
         assert_eq!(open.width, 0.085);

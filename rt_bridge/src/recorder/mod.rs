@@ -30,6 +30,8 @@ pub struct Settings {
     pub out: PathBuf,
     /// Stop after this long.
     pub duration: Option<Duration>,
+    /// How long to wait for the first message; `None`: as long as it takes.
+    pub patience: Option<Duration>,
     /// The bridge that started this recorder: when it is gone, the file is finished.
     pub parent: Option<u32>,
     /// What rides along.
@@ -74,6 +76,17 @@ pub enum RecordError {
         /// Free space.
         megabytes: u64,
     },
+    /// Nobody sent anything, so there is no recording.
+    #[error(
+        "nothing was sent within {:.1} s, so nothing was recorded and {} was removed; start a bridge with `rt_bridge run --cell cell.toml --arm sim` (a robot: --arm fci://HOST)",
+        waited.as_secs_f64(), path.display()
+    )]
+    Nothing {
+        /// The file.
+        path: PathBuf,
+        /// How long it was waited.
+        waited: Duration,
+    },
     /// The file.
     #[error(transparent)]
     Write(#[from] WriteError),
@@ -82,11 +95,13 @@ pub enum RecordError {
     Transport(#[from] TransportError),
 }
 
-/// Records until `stop` is set, the duration is over, the parent is gone, or the disk fills up.
+/// Records until `stop` is set, the duration is over, the parent is gone, the disk fills up, or nothing came within the
+/// patience.
 ///
 /// # Errors
-/// [`RecordError`] when it cannot begin, or shared memory fails. A disk that fills up is no error: what was kept is
-/// reported, with the reason in `stopped`.
+/// [`RecordError`] when it cannot begin, shared memory fails, or nobody sent anything: then the new file is removed, unless a
+/// bridge started this recorder, whose own answer says what it did. A disk that fills up is no error: what was kept is reported,
+/// with the reason in `stopped`.
 pub fn record(settings: &Settings, stop: &AtomicBool) -> Result<Recorded, RecordError> {
     let out = &settings.out;
     if let Room::TooLittleToStart { megabytes } | Room::TooLittleToGoOn { megabytes } = room(out) {
@@ -98,7 +113,13 @@ pub fn record(settings: &Settings, stop: &AtomicBool) -> Result<Recorded, Record
     let mut writer = ClipWriter::create(out, &settings.info)?;
     events.send(&Event::new(EventLevel::Info, EventSource::Recorder, &announcement(out)))?;
 
+    let begin_ns = now_ns();
     let reason = keep_writing(settings, stop, (&node, &events), &mut sources, &mut writer)?;
+    if !sources.heard() && settings.parent.is_none() && matches!(reason, Reason::Told) {
+        drop(writer);
+        std::fs::remove_file(out).map_err(|source| WriteError::Create { path: out.clone(), source })?;
+        return Err(RecordError::Nothing { path: out.clone(), waited: Duration::from_nanos(now_ns() - begin_ns) });
+    }
     let stopped = match reason {
         Reason::Told => None,
         Reason::Failed(what) => {
@@ -138,7 +159,10 @@ fn keep_writing(
     let mut orphan_since = None;
     loop {
         // Read before draining: what is sent before a stop was asked for is still recorded.
-        let told = stop.load(Ordering::Relaxed) || over(settings, begin_ns, &mut orphan_since);
+        let silent = settings
+            .patience
+            .is_some_and(|patience| !sources.heard() && u128::from(now_ns() - begin_ns) >= patience.as_nanos());
+        let told = silent || stop.load(Ordering::Relaxed) || over(settings, begin_ns, &mut orphan_since);
         if let Err(e) = sources.drain_into(writer)? {
             return Ok(Reason::Failed(e.to_string()));
         }

@@ -35,6 +35,8 @@ pub(super) struct Sources {
 #[derive(Debug, Default)]
 struct Counted {
     taken: u64,
+    /// Of those taken, remarks for people: this recorder sends some itself.
+    remarks: u64,
     lost: u64,
     state: Option<(u64, u64)>,
     color: Option<u64>,
@@ -83,6 +85,11 @@ impl Sources {
         self.counted.taken
     }
 
+    /// Whether anything came from the cell, remarks for people apart.
+    pub(super) fn heard(&self) -> bool {
+        self.counted.taken > self.counted.remarks
+    }
+
     /// Messages lost so far.
     pub(super) fn lost(&self) -> u64 {
         self.counted.lost
@@ -125,7 +132,9 @@ impl Sources {
         drain!(gripper, gripper);
         drain!(twin_state, twin_state);
         drain!(twin_gap, twin_gap);
+        let before = counted.taken;
         drain!(events, event);
+        counted.remarks += counted.taken - before;
         Ok(Ok(()))
     }
 

@@ -16,7 +16,7 @@ pub struct GripperState {
     pub width: f64,
     /// Opening asked for [m].
     pub width_d: f64,
-    /// Gripping force, or its estimate from the motor current [N].
+    /// Gripping force, or its estimate from the motor current [N]; NaN where the device does not tell.
     pub force: f64,
     /// 1 when something is held between the fingers.
     pub grasped: u32,
@@ -28,7 +28,7 @@ impl GripperState {
     fn check(&self) -> Result<(), Wrong> {
         check::running("stamp_ns", self.stamp_ns)?;
         check::numbers("width", &[self.width, self.width_d])?;
-        check::number("force", self.force)?;
+        check::number_or_none("force", self.force)?;
         check::flag("grasped", self.grasped)
     }
 }

@@ -61,10 +61,9 @@ impl JointGap {
         self.window.map(|sum| (sum.max(0.0) / count).sqrt())
     }
 
-    /// Over everything.
-    pub(super) fn overall(&self) -> Joints {
-        let count = self.count.max(1) as f64;
-        self.total.map(|sum| (sum / count).sqrt())
+    /// Over everything; `None` before the first state.
+    pub(super) fn overall(&self) -> Option<Joints> {
+        (self.count > 0).then(|| self.total.map(|sum| (sum / self.count as f64).sqrt()))
     }
 }
 
@@ -75,12 +74,13 @@ mod tests {
     #[test]
     fn the_window_forgets_what_is_older_than_a_second() {
         let mut gap = JointGap::new(1);
+        assert_eq!(gap.overall(), None);
         let with = |v: f64| std::array::from_fn(|i| if i == 0 { v } else { 0.0 });
         (0..500).for_each(|_| gap.add(&with(3.0)));
         assert!((gap.recent()[0] - 3.0).abs() < 1e-12);
         (0..1000).for_each(|_| gap.add(&with(1.0)));
         assert!((gap.recent()[0] - 1.0).abs() < 1e-12);
-        assert!((gap.overall()[0] - (5500.0f64 / 1500.0).sqrt()).abs() < 1e-12);
+        assert!((gap.overall().expect("states")[0] - (5500.0f64 / 1500.0).sqrt()).abs() < 1e-12);
         gap.start_anew();
         gap.add(&with(2.0));
         assert_eq!(gap.recent()[0], 2.0);

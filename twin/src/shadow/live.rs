@@ -28,6 +28,9 @@ const PRIORITY: u8 = 20;
 pub trait Watcher {
     /// Something happened that a person should read.
     fn remark(&mut self, text: &str);
+    /// No state came for a second; `patience`: how long the first one is waited for from the start on, `None` where the
+    /// bridge was there and went.
+    fn silent(&mut self, patience: Option<Duration>);
     /// The newest prediction and gap; called for every state.
     fn mirrored(&mut self, mirrored: &Mirrored);
 }
@@ -73,27 +76,31 @@ impl Live {
         })
     }
 
-    /// Mirrors until `stop` is set or `duration` has passed. Answers with the time spent computing [s].
+    /// Mirrors until `stop` is set, `duration` has passed, or no state came at all within `patience`. Answers with the time
+    /// spent computing [s]; whether anything was mirrored, the shadow's summary tells.
     ///
     /// # Errors
     /// [`LiveError`] when shared memory fails or the bridge drives another arm.
     pub fn run(
         &mut self,
         shadow: &mut Shadow,
-        duration: Option<Duration>,
+        (patience, duration): (Duration, Option<Duration>),
         stop: &AtomicBool,
         watcher: &mut dyn Watcher,
     ) -> Result<f64, LiveError> {
         ask_for_priority();
         let start = Instant::now();
-        let (mut heard, mut silent, mut cleaned) = (start, false, start);
+        let (mut heard, mut silent, mut cleaned) = (None, false, start);
         while !stop.load(Ordering::Relaxed) && duration.is_none_or(|d| start.elapsed() < d) {
+            if heard.is_none() && start.elapsed() > patience {
+                break;
+            }
             self.wake.wait(NAP)?;
             if self.mirror_all(shadow, watcher)? {
-                (heard, silent) = (Instant::now(), false);
-            } else if !silent && heard.elapsed() > SILENCE {
+                (heard, silent) = (Some(Instant::now()), false);
+            } else if !silent && heard.unwrap_or(start).elapsed() > SILENCE {
                 silent = true;
-                watcher.remark("no arm state for a second; waiting for `rt_bridge run --cell CELL` on this machine");
+                watcher.silent(heard.is_none().then_some(patience));
             }
             if cleaned.elapsed() > HOUSEKEEPING {
                 cleaned = Instant::now();

@@ -187,7 +187,7 @@ impl Shadow {
             dropped: self.dropped,
             alignments: self.alignments,
             ages: self.ages.clone(),
-            joint_rms: self.joints.overall()[..self.dof].to_vec(),
+            joint_rms: self.joints.overall().map(|rms| rms[..self.dof].to_vec()),
             object: self.object.as_ref().and_then(ObjectMirror::mean_gap),
         }
     }

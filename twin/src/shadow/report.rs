@@ -1,4 +1,4 @@
-//! The figures of a run: what `twin shadow` prints at its end.
+//! The figures of a run: what `twin shadow` prints at its end. What was not measured is `null`, never 0.
 
 use hdrhistogram::Histogram;
 use serde_json::{Value, json};
@@ -21,16 +21,16 @@ impl Ages {
         self.nanoseconds.saturating_record(age_ns);
     }
 
-    /// Age that a share of the states did not exceed, 0 to 1 [µs].
+    /// Age that a share of the states did not exceed, 0 to 1 [µs]; `None` without states.
     #[must_use]
-    pub fn quantile_us(&self, share: f64) -> f64 {
-        self.nanoseconds.value_at_quantile(share) as f64 * 1e-3
+    pub fn quantile_us(&self, share: f64) -> Option<f64> {
+        (!self.nanoseconds.is_empty()).then(|| self.nanoseconds.value_at_quantile(share) as f64 * 1e-3)
     }
 
     fn json(&self) -> Value {
         json!({
             "p50": self.quantile_us(0.5), "p99": self.quantile_us(0.99), "p999": self.quantile_us(0.999),
-            "max": self.nanoseconds.max() as f64 * 1e-3,
+            "max": (!self.nanoseconds.is_empty()).then(|| self.nanoseconds.max() as f64 * 1e-3),
         })
     }
 }
@@ -46,8 +46,8 @@ pub struct Summary {
     pub alignments: u32,
     /// Ages of the states on arrival.
     pub ages: Ages,
-    /// Root mean square of twin minus robot over the run, per joint [rad].
-    pub joint_rms: Vec<f64>,
+    /// Root mean square of twin minus robot over the run, per joint [rad]; `None` where nothing was mirrored.
+    pub joint_rms: Option<Vec<f64>>,
     /// Mean ADD and ADD-S over the object's poses [m]; `None` without poses.
     pub object: Option<(f64, f64)>,
 }
@@ -71,29 +71,29 @@ impl Summary {
         })
     }
 
-    /// The same for people.
+    /// The same for people; `None` where nothing was mirrored.
     #[must_use]
-    pub fn text(&self, busy_s: f64) -> String {
-        let worst = self.joint_rms.iter().copied().fold(0.0, f64::max);
+    pub fn text(&self, busy_s: f64) -> Option<String> {
+        let worst = self.joint_rms.as_ref()?.iter().copied().fold(0.0, f64::max);
         let object = self.object.map_or_else(
             || "no object was seen".to_owned(),
             |(add, add_s)| format!("object ADD {:.2} mm, ADD-S {:.2} mm", add * 1e3, add_s * 1e3),
         );
-        format!(
+        Some(format!(
             "mirrored {} cycles, dropped {}, aligned {} times; {:.0} times faster than real time\n\
              age of a state: median {:.0} µs, 99 % {:.0} µs\n\
              joint gap: {:.1} µrad RMS in the worst joint; {object}",
             self.cycles,
             self.dropped,
             self.alignments,
-            self.real_time_factor(busy_s),
-            self.ages.quantile_us(0.5),
-            self.ages.quantile_us(0.99),
+            self.real_time_factor(busy_s)?,
+            self.ages.quantile_us(0.5)?,
+            self.ages.quantile_us(0.99)?,
             worst * 1e6,
-        )
+        ))
     }
 
-    fn real_time_factor(&self, busy_s: f64) -> f64 {
-        self.cycles as f64 * crate::sim::PERIOD / busy_s.max(1e-9)
+    fn real_time_factor(&self, busy_s: f64) -> Option<f64> {
+        (self.cycles > 0).then(|| self.cycles as f64 * crate::sim::PERIOD / busy_s.max(1e-9))
     }
 }

@@ -101,7 +101,7 @@ fn hidden_gains_open_a_gap_and_the_right_parameters_close_it() {
         let mut robot = Robot::new(&cell, Some(&hidden));
         let mut shadow = Shadow::new(&cell, theta).expect("a shadow");
         mirror_cycles(&mut shadow, &mut robot, 1500);
-        shadow.summary().joint_rms.iter().copied().fold(0.0, f64::max)
+        shadow.summary().joint_rms.expect("states").into_iter().fold(0.0, f64::max)
     };
     assert!(gap(None) > 1e-4, "{}", gap(None));
     assert!(gap(Some(&hidden)) < 1e-9);
@@ -189,6 +189,12 @@ fn the_json_has_the_keys_that_others_read() {
     let cell = shipped_exact();
     let mut robot = Robot::new(&cell, None);
     let mut shadow = Shadow::new(&cell, None).expect("a shadow");
+    // What was not measured is no zero.
+    let nothing = shadow.summary();
+    let json = nothing.json(0.01);
+    assert!(json["real_time_factor"].is_null() && json["gap"]["joint_rms_rad"].is_null(), "{json}");
+    assert!(["p50", "p99", "p999", "max"].iter().all(|key| json["age_us"][key].is_null()), "{json}");
+    assert_eq!(nothing.text(0.01), None);
     mirror_cycles(&mut shadow, &mut robot, 100);
     let json = shadow.summary().json(0.01);
     assert_eq!(json["cycles"], 100);
