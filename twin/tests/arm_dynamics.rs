@@ -190,6 +190,19 @@ fn a_urdf_that_is_no_serial_arm_is_refused_with_joint_and_remedy() {
     assert!(error.contains("line 10: joints `left_1` (line 10) and `right_1` (line 13) branch off"), "{error}");
     assert!(error.contains("make all but one of them fixed"), "{error}");
 
+    // Two that turn at the arm's end: either may be its last joint.
+    let turn = |name: &str| {
+        format!(
+            r#"<link name="{name}"/><joint name="{name}_joint" type="continuous"><parent link="weight"/><child link="{name}"/></joint>"#
+        )
+    };
+    let (_folder, cell) = urdf_cell(
+        &DOUBLE_PENDULUM.replace("</robot>", &format!("{}\n{}</robot>", turn("a"), turn("b"))),
+        Controller::default(),
+    );
+    let error = ArmModel::from_cell(&cell).expect_err("no serial arm").to_string();
+    assert!(error.contains("joints `a_joint` (line 9) and `b_joint` (line 10) branch off"), "{error}");
+
     for (from, to, told) in [
         ("type=\"revolute\"", "type=\"floating\"", "line 7: joint `elbow` is neither revolute"),
         ("<link name=\"lower\"/>", "", "line 7: link `lower` is used by joint `elbow`"),

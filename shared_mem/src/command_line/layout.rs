@@ -6,22 +6,51 @@ use clap::Command;
 
 /// Columns between an example and what it is for.
 const GAP: &str = "  ";
+/// What stands before a usage.
+const USAGE: &str = "Usage: ";
 /// What a continued example begins with.
 const CONTINUED: &str = "      ";
 
 /// The command and its verbs with texts of at most so many columns.
 pub(super) fn fitted(command: Command, width: usize) -> Command {
     let name = command.get_name().to_owned();
-    fitted_below(command, &name, width).term_width(width)
+    // Only a command that is built knows how its verbs are called.
+    let mut built = command.clone();
+    built.build();
+    fitted_below(command, &mut built, &name, width).term_width(width)
 }
 
-fn fitted_below(command: Command, program: &str, width: usize) -> Command {
-    let after = command.get_after_help().map(|text| text_of(&text.to_string(), program, width));
-    let command = command.mut_subcommands(|verb| fitted_below(verb, program, width));
-    match after {
-        Some(text) => command.after_help(text),
-        None => command,
+fn fitted_below(mut command: Command, built: &mut Command, program: &str, width: usize) -> Command {
+    if let Some(text) = command.get_after_help().map(|text| text_of(&text.to_string(), program, width)) {
+        command = command.after_help(text);
     }
+    let usage = built.render_usage().to_string();
+    if let Some(usage) = usage.strip_prefix(USAGE).filter(|usage| USAGE.len() + usage.trim_end().len() > width) {
+        command = command.override_usage(usage_of(usage, width));
+    }
+    command.mut_subcommands(|verb| match built.find_subcommand_mut(verb.get_name().to_owned()) {
+        Some(built) => fitted_below(verb, built, program, width),
+        None => verb,
+    })
+}
+
+/// A line of usage, continued below its arguments.
+fn usage_of(usage: &str, width: usize) -> String {
+    let mut lines = Vec::new();
+    let mut line = String::new();
+    let mut words = usage.split_whitespace().peekable();
+    while let Some(word) = words.next() {
+        let mut part = word.to_owned();
+        while let Some(value) = words.next_if(|next| word.starts_with('-') && next.starts_with('<')) {
+            part = format!("{part} {value}");
+        }
+        if !line.is_empty() && USAGE.len() + line.len() + 1 + part.len() > width {
+            lines.push(std::mem::take(&mut line));
+        }
+        line = if line.is_empty() { part } else { format!("{line} {part}") };
+    }
+    lines.push(line);
+    lines.join(&format!("\n{}", " ".repeat(USAGE.len())))
 }
 
 /// A text laid out anew.
@@ -167,6 +196,24 @@ Examples:
 Every verb has its own --help.";
         assert_eq!(text, expected);
         assert_eq!(text_of(&text, "twin", 80), text, "what was laid out stays as it is");
+    }
+
+    #[test]
+    fn a_usage_that_is_too_long_goes_on_below_its_arguments() {
+        let verb = Command::new("control-hit-slide").args(
+            ["cell", "out", "clips"]
+                .map(|name| clap::Arg::new(name).long(name).value_name("A_LONG_NAME").required(true)),
+        );
+        let command = Command::new("calibration").subcommand(Command::new("capture").subcommand(verb));
+        let mut command = fitted(command, 80);
+        command.build();
+        let verb =
+            command.find_subcommand_mut("capture").and_then(|verb| verb.find_subcommand_mut("control-hit-slide"));
+        let usage = verb.expect("it is there").render_usage().to_string();
+        assert_eq!(
+            usage.trim_end(),
+            "Usage: calibration capture control-hit-slide --cell <A_LONG_NAME>\n       --out <A_LONG_NAME> --clips <A_LONG_NAME>"
+        );
     }
 
     #[test]

@@ -1,9 +1,9 @@
 //! The way in from a URDF file, which `urdf-rs` reads. Finds the one chain of movable joints, folds what is fixed
 //! into the link it is fixed to, and names line, joint and remedy where the file is no serial arm.
 //!
-//! Joints that branch off the chain and have no further joint behind them, fingers above all, are no joints of the arm, nor
-//! are those that follow another one (`<mimic>`): they are held at 0, or at the end of their range that is nearest to it, and
-//! what they carry is folded into the link that they hang on.
+//! Joints that branch off and have no further joint behind them are no joints of the arm where it goes on beside them, or ends
+//! there and they slide, as fingers do; nor are those that follow another one (`<mimic>`). They are held at 0, or at the end of
+//! their range that is nearest to it, and what they carry is folded into the link that they hang on.
 
 use super::inertia::MassProperties;
 use super::model::{Chain, Joint, ModelError};
@@ -114,7 +114,7 @@ impl<'a> Tree<'a> {
         match (&with(2)[..], &with(1)[..]) {
             ([arm], _) => Ok(Some(*arm)),
             ([], [last]) if first || movable.len() == 1 => Ok(Some(*last)),
-            ([], branches) if !first || branches.is_empty() => Ok(None),
+            ([], branches) if !first && are_fingers(branches) || branches.is_empty() => Ok(None),
             (several, branches) => {
                 let branches = if several.is_empty() { branches } else { several };
                 let names: Vec<_> = branches.iter().map(|j| format!("`{}` (line {})", j.name, j.line)).collect();
@@ -238,6 +238,11 @@ impl<'a> Tree<'a> {
     fn error(&self, line: usize, what: &str) -> ModelError {
         at_line(self.file, line, what)
     }
+}
+
+/// Whether joints without further ones behind them may be a gripper's: one that is driven, or several that slide.
+fn are_fingers(joints: &[&urdf_rs::Joint]) -> bool {
+    joints.len() < 2 || joints.iter().all(|joint| joint.joint_type == JointType::Prismatic)
 }
 
 fn at_line(file: &Path, line: usize, what: &str) -> ModelError {

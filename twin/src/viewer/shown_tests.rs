@@ -21,7 +21,10 @@ use std::net::SocketAddr;
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::Duration;
+use std::time::{Duration, Instant};
+
+/// Long enough for a busy machine; only a fault uses it up.
+const LONG: Duration = Duration::from_secs(60);
 
 const TOPICS: [(&str, &str); 4] = [
     ("/scene", "foxglove.SceneUpdate"),
@@ -113,21 +116,26 @@ fn shown(name: &str, cell: &Cell, viewers: usize, enough: impl Fn(&Seen) -> bool
             let stamp_ns = now_ns();
             let state = ArmState { stamp_ns, dof: 7, q: REAL, ..ArmState::default() };
             arm.send(&state).expect("room");
-            twin.send(&TwinState { stamp_ns, dof: 7, q: TWIN, ..TwinState::default() }).expect("room");
+            let object_position = [0.5, 0.1, 0.05];
+            let mirrored =
+                TwinState { stamp_ns, dof: 7, q: TWIN, has_object: 1, object_position, ..TwinState::default() };
+            twin.send(&mirrored).expect("room");
             let intrinsics = [600.0, 601.0, 319.5, 239.5];
             let place = ([1.0, 0.2, 0.7], [1.0, 0.0, 0.0, 0.0]);
             let info = CameraInfo { stamp_ns, width: 640, height: 480, intrinsics, ..CameraInfo::default() };
             camera.send(&CameraInfo { position: place.0, wxyz: place.1, ..info }).expect("room");
-            let pose = ObjectPose { stamp_ns, position: [0.5, 0.1, 0.05], ..ObjectPose::default() };
+            let pose = ObjectPose { stamp_ns, position: object_position, ..ObjectPose::default() };
             poses.send(&pose).expect("room");
             std::thread::sleep(Duration::from_millis(10));
         }
     });
     let look = || {
-        let (mut client, mut seen) = (TestClient::of(address, &TOPICS), Seen::default());
+        let (mut client, mut seen, begin) = (TestClient::of(address, &TOPICS), Seen::default(), Instant::now());
         while !enough(&seen) {
             let (topic, data) = client.next();
             seen.take(&topic, &data);
+            let (frames, entities) = (seen.frames.len(), seen.entities.len());
+            assert!(begin.elapsed() < LONG, "{frames} frames and {entities} entities are all that is shown");
         }
         seen
     };
@@ -156,7 +164,7 @@ fn everybody_who_comes_sees_the_robots_own_shapes_where_robot_and_twin_are() {
                 assert!(seen.frames.contains_key(&format!("{own}{name}")), "{own}{name}");
             }
         }
-        let looks = [("real/", REAL, 1e-5), ("twin/", TWIN, 2e-3)];
+        let looks = [("real/", REAL, 1e-5), ("twin/", TWIN, 5e-3)];
         for (look, q, off) in looks {
             let shown = seen.corners("bench", |id| id.starts_with(look));
             let mut expected = Vec::new();
