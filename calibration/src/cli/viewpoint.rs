@@ -61,7 +61,7 @@ pub(crate) struct ViewpointArguments {
     #[arg(long, value_enum, default_value_t = MethodName::Outline)]
     method: MethodName,
     /// Pictures drawn by the swarm, for each frame.
-    #[arg(long, default_value_t = 10_000, value_parser = clap::value_parser!(u32).range(40..=1_000_000))]
+    #[arg(long, value_name = "N", default_value_t = 10_000, value_parser = clap::value_parser!(u32).range(40..=1_000_000))]
     budget: u32,
     /// At most so many pictures of a session.
     #[arg(long, default_value_t = 6, value_parser = clap::value_parser!(u8).range(1..=100))]

@@ -35,7 +35,7 @@ pub(super) struct GripArguments {
     #[command(subcommand)]
     order: Order,
     /// Answer with one JSON object
-    #[arg(long)]
+    #[arg(long, global = true)]
     json: bool,
 }
 

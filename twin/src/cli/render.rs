@@ -46,8 +46,8 @@ pub(crate) struct Render {
 impl Render {
     pub(crate) fn run(&self) -> anyhow::Result<()> {
         super::discard_on_signal()?;
-        let session = Session::open_with(&self.path, self.cell.as_deref())?;
         refuse_old_frames(&self.out)?;
+        let session = Session::open_with(&self.path, self.cell.as_deref())?;
         let mut view = self.look.view(&session.cell)?;
         std::fs::create_dir_all(&self.out)
             .with_context(|| format!("{}; give --out a place that can be written", self.out.display()))?;
