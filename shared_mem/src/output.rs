@@ -12,18 +12,23 @@
 //! * A symbolic link stays: the file that it leads to is replaced. Hard links are parted.
 //! * Devices and pipes (`/dev/null`, `/dev/stdout`) are written straight; there, nothing can be kept back.
 //!
+//! Work that takes long looks at its outputs' places first: [`Destination`].
+//!
 //! | file | owns |
 //! |---|---|
+//! | `destination` | what may be written where, asked before the work begins |
 //! | `error` | why an output cannot be written, and the remedy |
 //! | `folder` | outputs of many files: [`OutputFolder`] |
 //! | `unfinished` | temporary names: which are in use, which are left over |
 
+mod destination;
 mod error;
 mod folder;
 #[cfg(test)]
 mod tests;
 mod unfinished;
 
+pub use destination::Destination;
 pub use error::OutputError;
 pub use folder::OutputFolder;
 pub use unfinished::discard_unfinished;

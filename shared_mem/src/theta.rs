@@ -1,6 +1,8 @@
 //! `theta.toml`: what was identified about a cell. Written by identification and diagnosis, read by everything that
 //! simulates. What is absent keeps the value of cell.toml.
 
+use crate::input;
+use crate::output::{self, OutputError};
 use crate::toml_file::{self, TomlFileError};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -76,11 +78,54 @@ impl Theta {
     pub fn to_toml(&self) -> String {
         toml::to_string_pretty(self).expect("numbers, strings and arrays have a TOML form")
     }
+
+    /// Writes the file, whole or not at all. Of one that is there, comments and whatever this says nothing about stay; its
+    /// effects are replaced by these.
+    ///
+    /// # Errors
+    /// [`OutputError`]; what was there before is unchanged.
+    pub fn write(&self, path: &Path) -> Result<(), OutputError> {
+        let before = input::text(path, input::Kind::Configuration).ok().filter(|_| path.is_file());
+        let text = before.and_then(|before| toml_file::updated(&before, &self.to_toml(), &["effect"]));
+        output::write(path, text.unwrap_or_else(|| self.to_toml()))
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_file_that_is_there_keeps_its_comments_and_what_was_not_found() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("theta.toml");
+        let text = "# monday, new gripper\n[arm]\nstiffness = [1.0, 2.0] # soft\ndamping = [3.0, 4.0]\n\n# weighed twice\n\
+            [object]\nmass = 0.31\n\n[[effect]]\nname = \"payload\"\nmass = 0.5 # the flange\n\n[[effect]]\nname = \"torque_delay\"\ndelay = 0.001\n";
+        std::fs::write(&path, text).expect("room");
+        let effect = |mass: f64| EffectTheta {
+            name: "payload".into(),
+            parameters: [("mass".to_owned(), toml::Value::Float(mass))].into(),
+        };
+        let found = Theta {
+            arm: Some(ArmTheta { stiffness: vec![5.0, 6.0], damping: vec![7.0, 8.0] }),
+            object: None,
+            effects: vec![effect(0.7)],
+        };
+        found.write(&path).expect("room");
+        let written = std::fs::read_to_string(&path).expect("a file");
+        let read = Theta::read(&path).expect("a theta.toml");
+        assert_eq!((read.arm, read.effects), (found.arm.clone(), found.effects.clone()));
+        assert_eq!(read.object.and_then(|object| object.mass), Some(0.31));
+        for comment in ["# monday, new gripper", "# soft", "# weighed twice", "# the flange"] {
+            assert!(written.contains(comment), "{comment} is gone:\n{written}");
+        }
+        let none = Theta { effects: Vec::new(), ..found };
+        none.write(&path).expect("room");
+        assert_eq!(Theta::read(&path).expect("a theta.toml").effects, []);
+        std::fs::write(&path, "no = [toml").expect("room");
+        none.write(&path).expect("room");
+        assert_eq!(Theta::read(&path).expect("a theta.toml"), none);
+    }
 
     #[test]
     fn what_is_written_is_read_back() {

@@ -1,8 +1,10 @@
 //! Reading a TOML file into a typed structure, with errors a person can act on: file, line, the key, the nearest known name.
+//! And bringing one up to date that a person wrote: with comments and all that the update says nothing about.
 
 use crate::input::{self, InputError};
 use serde::de::DeserializeOwned;
 use std::path::{Path, PathBuf};
+use toml_edit::{ArrayOfTables, DocumentMut, Item, TableLike};
 
 /// A TOML file could not be used.
 #[derive(Debug, thiserror::Error)]
@@ -39,6 +41,54 @@ pub fn parse<T: DeserializeOwned>(text: &str, path: &Path) -> Result<T, TomlFile
         let line = error.span().map(|span| text[..span.start.min(text.len())].matches('\n').count() + 1);
         TomlFileError::Content { path: path.to_owned(), line, what: with_nearest_name(error.message()) }
     })
+}
+
+/// The text `before` with the values of `update`; everything else of it stays, but for the arrays of blocks in `whole`, which
+/// hold what `update` has of them and nothing else. `None` where one of the two is no TOML.
+#[must_use]
+pub fn updated(before: &str, update: &str, whole: &[&str]) -> Option<String> {
+    let mut document: DocumentMut = before.parse().ok()?;
+    let update: DocumentMut = update.parse().ok()?;
+    for name in whole {
+        if !update.contains_key(name) {
+            document.remove(name);
+        }
+    }
+    update_table(document.as_table_mut(), update.as_table());
+    Some(document.to_string())
+}
+
+fn update_table(before: &mut dyn TableLike, update: &dyn TableLike) {
+    for (key, new) in update.iter() {
+        match (before.get_mut(key), new) {
+            (Some(Item::Value(old)), Item::Value(new)) if !(old.is_inline_table() && new.is_inline_table()) => {
+                // The comment behind a value belongs to its line.
+                let decor = old.decor().clone();
+                *old = new.clone();
+                *old.decor_mut() = decor;
+            }
+            (Some(Item::ArrayOfTables(old)), Item::ArrayOfTables(new)) => *old = update_blocks(old, new),
+            (Some(old), new) => match (old.as_table_like_mut(), new.as_table_like()) {
+                (Some(old), Some(new)) => update_table(old, new),
+                _ => *old = new.clone(),
+            },
+            (None, new) => drop(before.insert(key, new.clone())),
+        }
+    }
+}
+
+/// The blocks of `update`, each in the place of the one of the same name.
+fn update_blocks(before: &ArrayOfTables, update: &ArrayOfTables) -> ArrayOfTables {
+    let name = |table: &toml_edit::Table| table.get("name").and_then(Item::as_str).map(str::to_owned);
+    let one = |new: &toml_edit::Table| match before.iter().find(|old| name(old).is_some() && name(old) == name(new)) {
+        Some(old) => {
+            let mut block = old.clone();
+            update_table(&mut block, new);
+            block
+        }
+        None => new.clone(),
+    };
+    update.iter().map(one).collect()
 }
 
 /// Turns serde's "unknown field `x`, expected one of `a`, `b`" into advice.

@@ -48,6 +48,12 @@ impl OutputError {
         Self { path: path.to_owned(), kind, cause: cause.to_owned(), had_file: false, remedy }
     }
 
+    /// A file that is there, and whose replacement nobody asked for.
+    pub(super) fn kept(path: &Path) -> Self {
+        let remedy = "give another name, or replace it with --force";
+        Self::refused(path, io::ErrorKind::AlreadyExists, "it exists, and is kept", remedy)
+    }
+
     /// The output has its name, but the folder could not be taken to the disk.
     pub(super) fn unsafe_name(path: &Path, error: &io::Error) -> Self {
         let cause = format!("it has its name, which a power cut may take back: {error}");

@@ -1,7 +1,7 @@
 //! An output of many files: a folder that is whole or not there.
 
 use super::error::folder_of;
-use super::unfinished::{Unfinished, clear, sync_folder};
+use super::unfinished::{MadeFolders, Unfinished, clear, sync_folder};
 use super::{Output, OutputError, Place};
 use std::fs::{self, File};
 use std::io::{self, Write as _};
@@ -10,13 +10,23 @@ use std::path::{Path, PathBuf};
 /// A folder that is being filled. It gets its name with [`OutputFolder::finish`]; dropped before, it leaves nothing.
 ///
 /// A folder that does not exist yet appears in one step. One that exists, and is empty, is filled at the end: it may be a
-/// mount point, or the folder that somebody works in.
+/// mount point, or the folder that somebody works in. One that is to be replaced changes places with the new one in one step.
 #[derive(Debug)]
 pub struct OutputFolder {
     /// The name that was asked for.
     path: PathBuf,
     staging: Unfinished,
-    exists: bool,
+    /// Folders on the way that were made for it; they go after what is in them.
+    made: MadeFolders,
+    before: Before,
+}
+
+/// What has the name before the end.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Before {
+    Nothing,
+    EmptyFolder,
+    Replaced,
 }
 
 impl OutputFolder {
@@ -39,14 +49,27 @@ impl OutputFolder {
         if exists {
             clear(path);
             if fs::read_dir(path).map_err(failed)?.next().is_some() {
-                let kind = io::ErrorKind::DirectoryNotEmpty;
-                return Err(OutputError::refused(path, kind, "it is not empty", "choose a new folder"));
+                let (kind, remedy) =
+                    (io::ErrorKind::DirectoryNotEmpty, "choose a new folder, or replace it with --force");
+                return Err(OutputError::refused(path, kind, "it is not empty", remedy));
             }
-        } else {
-            fs::create_dir_all(parent).map_err(failed)?;
         }
+        let made = if exists { MadeFolders::default() } else { MadeFolders::make(parent).map_err(failed)? };
         let staging = Unfinished::folder(parent, path).map_err(failed)?;
-        Ok(Self { path: path.to_owned(), staging, exists })
+        let before = if exists { Before::EmptyFolder } else { Before::Nothing };
+        Ok(Self { path: path.to_owned(), staging, made, before })
+    }
+
+    /// Begins a folder that takes the place of the folder `path` at the end; all that was in that one is gone then.
+    ///
+    /// # Errors
+    /// [`OutputError`] when there is no such folder, or its place cannot be written.
+    pub fn replacing(path: &Path) -> Result<Self, OutputError> {
+        let failed = |error: io::Error| OutputError::new(path, &error, 0, 0);
+        // A link stays, and what it leads to is replaced.
+        let path = path.canonicalize().map_err(failed)?;
+        let staging = Unfinished::folder(folder_of(&path), &path).map_err(failed)?;
+        Ok(Self { path, staging, made: MadeFolders::default(), before: Before::Replaced })
     }
 
     /// Begins a file in the folder; folders in between are made.
@@ -77,12 +100,20 @@ impl OutputFolder {
     /// # Errors
     /// [`OutputError`]; the folder is then missing, or without `last`.
     pub fn finish(self, last: &str) -> Result<(), OutputError> {
-        let Self { path, staging, exists } = self;
+        let Self { path, staging, made, before } = self;
         let named = || {
             sync_all(staging.path())?;
-            if !exists {
-                staging.becomes(&path, true)?;
-                return sync_folder(folder_of(&path));
+            match before {
+                Before::Nothing => {
+                    staging.becomes(&path, true)?;
+                    made.keep();
+                    return sync_folder(folder_of(&path));
+                }
+                Before::Replaced => {
+                    staging.changes_places_with(&path)?;
+                    return sync_folder(folder_of(&path));
+                }
+                Before::EmptyFolder => {}
             }
             let entries = fs::read_dir(staging.path())?.collect::<io::Result<Vec<_>>>()?;
             let mut names: Vec<_> = entries.iter().map(fs::DirEntry::file_name).collect();

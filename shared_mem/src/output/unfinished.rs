@@ -5,6 +5,7 @@
 //! knows no such locks, left-over ones stay.
 
 use super::error::folder_of;
+use rustix::fs::{CWD, RenameFlags};
 use std::collections::HashSet;
 use std::fs::{self, File, Permissions, TryLockError};
 use std::io;
@@ -25,6 +26,8 @@ const TRIES: usize = 20;
 #[derive(Debug, Default)]
 struct Known {
     writing: HashSet<PathBuf>,
+    /// Folders that were made on the way to them, innermost first.
+    made: Vec<PathBuf>,
     searched: HashSet<PathBuf>,
 }
 
@@ -42,6 +45,7 @@ pub fn discard_unfinished() {
         // What has just got its name is not there any more.
         let _gone = if path.is_dir() { fs::remove_dir_all(path) } else { fs::remove_file(path) };
     }
+    remove_empty(&known.made);
     std::mem::forget(known);
 }
 
@@ -67,6 +71,45 @@ struct Listed(PathBuf);
 impl Drop for Listed {
     fn drop(&mut self) {
         known().writing.remove(&self.0);
+    }
+}
+
+/// Folders that were made on the way to an output: they go with it where it does not come about, as far as they are empty.
+#[derive(Debug, Default)]
+pub(super) struct MadeFolders(Vec<PathBuf>);
+
+impl MadeFolders {
+    /// Makes `folder` and those on the way that are not there.
+    pub(super) fn make(folder: &Path) -> io::Result<Self> {
+        let missing = |folder: &&Path| !folder.as_os_str().is_empty() && !folder.exists();
+        let made = Self(folder.ancestors().take_while(missing).map(Path::to_owned).collect());
+        known().made.splice(0..0, made.0.iter().cloned());
+        fs::create_dir_all(folder)?;
+        Ok(made)
+    }
+
+    /// The output is there: so do they stay.
+    pub(super) fn keep(mut self) {
+        self.forget();
+    }
+
+    fn forget(&mut self) -> Vec<PathBuf> {
+        known().made.retain(|folder| !self.0.contains(folder));
+        std::mem::take(&mut self.0)
+    }
+}
+
+impl Drop for MadeFolders {
+    fn drop(&mut self) {
+        remove_empty(&self.forget());
+    }
+}
+
+/// Removes folders as far as they are empty, innermost first.
+fn remove_empty(folders: &[PathBuf]) {
+    for folder in folders {
+        // Whoever put something there meanwhile needs it.
+        let _stays = fs::remove_dir(folder);
     }
 }
 
@@ -130,6 +173,13 @@ impl Unfinished {
             }
         }
         drop(listed);
+        Ok(())
+    }
+
+    /// Gives a folder the name of another one, in one step, and removes that other one with all that is in it.
+    pub(super) fn changes_places_with(self, target: &Path) -> io::Result<()> {
+        rustix::fs::renameat_with(CWD, self.path(), CWD, target, RenameFlags::EXCHANGE)?;
+        // What has the temporary name now goes as this goes.
         Ok(())
     }
 }
