@@ -1,15 +1,16 @@
 //! Sessions there and back: what a format can hold survives it, what it cannot is told, and nothing is guessed.
 
 use shared_mem::cell::{Cell, ClipKind};
-use shared_mem::msg::arm::ArmState;
+use shared_mem::msg::arm::{ArmCommand, ArmState};
 use shared_mem::msg::event::{Event, EventLevel, EventSource};
 use shared_mem::msg::gripper::GripperState;
 use shared_mem::msg::image::{CameraInfo, ImageHeader, PixelEncoding};
 use shared_mem::msg::object::ObjectPose;
+use shared_mem::msg::twin::{TwinGap, TwinState};
 use shared_mem::msg::wrench::Wrench;
 use shared_mem::recording::{
-    Clip, ClipInfo, ClipMessages, ClipWriter, Exported, Format, Payload, Picture, Session, export_session,
-    read_arm_states,
+    Clip, ClipInfo, ClipMessages, ClipWriter, Exported, Format, LeftOut, Order, Payload, Picture, Session,
+    export_session, read_arm_states,
 };
 use shared_mem::topics;
 use std::path::{Path, PathBuf};
@@ -93,7 +94,8 @@ fn record(folder: &Path) -> Session {
 /// Exports into a new folder.
 fn export(session: &Session, to: Format, into: &Path) -> (Session, Vec<Exported>) {
     let flange_at = |q: &[f64]| Some(([q[0], 0.0, 0.5], [1.0, 0.0, 0.0, 0.0]));
-    let done = export_session(session, to, into, &flange_at, |_| {}).unwrap_or_else(|e| panic!("{e}"));
+    let order = Order { to, out: into, force: false, flange_at: &flange_at };
+    let done = export_session(session, order, |_| {}).unwrap_or_else(|e| panic!("{e}"));
     (Session::open(into).expect("a session"), done)
 }
 
@@ -218,23 +220,130 @@ fn a_twinaligner_folder_holds_commands_frames_poses_and_pictures_and_survives_a_
 }
 
 #[test]
-fn what_would_have_to_be_guessed_is_refused_and_nothing_is_overwritten() {
+fn an_own_session_survives_a_twinaligner_folder_and_comes_back() {
     let folder = tempfile::tempdir().expect("a folder");
     let own = record(folder.path());
     let (folders, _) = export(&own, Format::TwinAligner, &folder.path().join("folders"));
-    let refused = |session: &Session, to: Format, out: &str| {
-        let error = export_session(session, to, &folder.path().join(out), &|_| None, |_| {}).unwrap_err();
-        error.to_string()
+    let (back, done) = export(&folders, Format::Own, &folder.path().join("back"));
+    assert_eq!((done[0].desired, done[0].measured, done[0].poses, done[0].pictures), (400, 13, 13, 26), "{done:?}");
+    assert_eq!(done[0].left_out, [LeftOut { topic: "init.json".into(), messages: 1 }]);
+    let (theirs, ours) = (clip(&folders), clip(&back));
+    same(&theirs, &ours, 1e-15);
+    assert_eq!(ours.warnings, Vec::<String>::new());
+    // What a folder does not hold is not 0 afterwards.
+    assert!([&ours.measured, &ours.desired].iter().all(|series| series.dq.is_empty() && series.tau.is_empty()));
+    assert_eq!(pictures(&own), pictures(&back));
+    let states = read_arm_states(&back.folder.join(&back.clips[0].file)).expect("states");
+    assert_eq!(states.len(), 13);
+    // The newest command, for whoever reads states alone.
+    let newest = ours.desired.stamps_ns.partition_point(|stamp| *stamp <= ours.measured.stamps_ns[12]) - 1;
+    assert_eq!(states[12].q_d[..7], *ours.desired.q_row(newest));
+    let (again, _) = export(&back, Format::TwinAligner, &folder.path().join("again"));
+    same(&theirs, &clip(&again), 1e-14);
+}
+
+#[test]
+fn an_own_clip_becomes_an_own_clip_bit_by_bit() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let own = record(folder.path());
+    let (copy, done) = export(&own, Format::Own, &folder.path().join("copy"));
+    assert_eq!((done[0].measured, done[0].pictures, done[0].left_out.len()), (400, 26, 0), "{done:?}");
+    let bytes = |session: &Session| std::fs::read(session.folder.join(&session.clips[0].file)).expect("a clip");
+    assert_eq!(bytes(&own), bytes(&copy));
+}
+
+/// Messages of every topic that was left out.
+fn left_out(done: &[Exported]) -> Vec<(&str, usize)> {
+    done[0].left_out.iter().map(|left| (left.topic.as_str(), left.messages)).collect()
+}
+
+#[test]
+fn every_topic_that_is_not_carried_over_is_named() {
+    let folder = tempfile::tempdir().expect("a folder");
+    std::fs::write(folder.path().join("cell.toml"), CELL).expect("room");
+    let mut writer = ClipWriter::create(&folder.path().join("clip_00.mcap"), &ClipInfo::default()).expect("a new file");
+    for i in 0..400 {
+        let state = state(i);
+        let stamp_ns = state.stamp_ns;
+        writer.arm_state(&state).expect("room");
+        writer.twin_state(&TwinState { stamp_ns, dof: 7, ..TwinState::default() }).expect("room");
+        if i % 2 == 0 {
+            writer.arm_command(&ArmCommand { stamp_ns, dof: 7, ..ArmCommand::default() }).expect("room");
+            writer.twin_gap(&TwinGap { stamp_ns, dof: 7, ..TwinGap::default() }).expect("room");
+        }
+        if i % 20 == 0 {
+            writer.wrench(&Wrench { stamp_ns, ..Wrench::default() }).expect("room");
+            let position = [0.5 + 1e-3 * i as f64, 0.1, 0.05];
+            writer.object_pose(&ObjectPose { stamp_ns, position, ..ObjectPose::default() }).expect("room");
+        }
+    }
+    writer.finish().expect("room");
+    let own = Session::open(folder.path()).expect("a session");
+    let twin = [("/arm/command", 200), ("/twin/gap", 200), ("/twin/state", 400)];
+    let (bags, done) = export(&own, Format::Ros2, &folder.path().join("bags"));
+    assert_eq!(left_out(&done), twin);
+    let (_, done) = export(&own, Format::TwinAligner, &folder.path().join("folders"));
+    assert_eq!(left_out(&done), [&twin[..], &[("/wrench", 20)]].concat());
+    let (_, done) = export(&bags, Format::Own, &folder.path().join("back"));
+    assert_eq!(left_out(&done), []);
+    // A bag's own extras are for own clips alone.
+    let (_, done) = export(&bags, Format::Ros2, &folder.path().join("again"));
+    let extras =
+        ["/franka_robot_state_broadcaster/current_pose", "/franka_robot_state_broadcaster/external_joint_torques"];
+    assert_eq!(left_out(&done), extras.map(|topic| (topic, 400)));
+}
+
+#[test]
+fn on_failure_nothing_stays_behind_not_even_a_folder_on_the_way() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let own = record(folder.path());
+    let clip = folder.path().join("clip_00.mcap");
+    std::fs::write(&clip, b"no clip at all").expect("room");
+    let out = folder.path().join("new/deep/out");
+    let order = Order { to: Format::Ros2, out: &out, force: false, flange_at: &|_| None };
+    let error = export_session(&own, order, |_| {}).expect_err("no clip").to_string();
+    assert!(error.contains("clip_00.mcap"), "{error}");
+    assert!(!folder.path().join("new").exists(), "an empty folder stayed behind");
+}
+
+#[test]
+fn a_session_is_replaced_only_where_that_was_asked_for_and_nothing_else_lies_in_it() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let own = record(folder.path());
+    let (folders, _) = export(&own, Format::TwinAligner, &folder.path().join("folders"));
+    let export_to = |session: &Session, out: &Path, force: bool| {
+        let order = Order { to: Format::Ros2, out, force, flange_at: &|_| None };
+        export_session(session, order, |_| {}).map_err(|error| error.to_string())
     };
-    let error = refused(&folders, Format::Own, "guessed");
-    assert!(error.contains("different moments") && error.contains("ROS 2 bag"), "{error}");
-    let error = refused(&own, Format::Ros2, "folders");
-    assert!(error.contains("it is not empty; choose a new folder"), "{error}");
-    assert!(refused(&own, Format::Own, "same").contains("own clip already"));
+    let error = export_to(&own, &folders.folder, false).expect_err("it is full");
+    assert!(error.contains("folders") && error.contains("it is not empty") && error.contains("--force"), "{error}");
+    assert!(folders.folder.join("traj_00000/control.json").is_file());
+    let error = export_to(&folders, &folders.folder, true).expect_err("the source");
+    assert!(error.contains("it holds what is exported"), "{error}");
+    let notes = folders.folder.join("notes.txt");
+    std::fs::write(&notes, "mine").expect("room");
+    let error = export_to(&own, &folders.folder, true).expect_err("somebody's notes");
+    assert!(error.contains("notes.txt"), "{error}");
+    std::fs::remove_file(&notes).expect("it is there");
+    export_to(&own, &folders.folder, true).expect("asked for");
+    let names: Vec<String> = std::fs::read_dir(&folders.folder)
+        .expect("a folder")
+        .map(|entry| entry.expect("an entry").file_name().to_string_lossy().into_owned())
+        .collect();
+    assert!(names.len() == 2 && names.contains(&"clip_00.mcap".to_owned()), "{names:?}");
+    let beside = std::fs::read_dir(folder.path()).expect("a folder").count();
+    assert_eq!(beside, 3, "what was replaced is gone: cell.toml, clip_00.mcap, folders");
+}
+
+#[test]
+fn a_folder_s_poses_need_a_camera_s_place() {
+    let folder = tempfile::tempdir().expect("a folder");
+    record(folder.path());
     let unposed = CELL.replace("pose = {", "# pose = {");
     std::fs::write(folder.path().join("cell.toml"), unposed).expect("room");
     let session = Session::open(folder.path()).expect("a session");
     let (_, done) = export(&session, Format::TwinAligner, &folder.path().join("unposed"));
     assert!(done[0].poses == 0 && done[0].warnings.iter().any(|w| w.contains("[camera] pose")), "{done:?}");
+    assert!(left_out(&done).contains(&("/object/pose", 13)), "{done:?}");
     let _ = Cell::read(&folder.path().join("unposed/cell.toml")).expect("a cell");
 }

@@ -5,22 +5,23 @@ use clap::{Args, ValueEnum};
 use serde::Serialize;
 use shared_mem::console;
 use shared_mem::msg::joints_from;
-use shared_mem::recording::{Exported, Format, Session, export_session};
+use shared_mem::recording::{Exported, Format, Order, Session, export_session};
 use std::path::PathBuf;
 use twin::arm::ArmModel;
 
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Any session can be written as any format, and every command here reads all three. What a format cannot hold is left out
-and said: a TwinAligner folder has neither velocities nor torques and one joint state a picture; an own clip wants what
-the arm did and what it was told stamped alike, and is refused otherwise. The new folder gets a cell.toml of its own.
+and said, topic by topic: no format but twinalign's own holds what a twin said, and a TwinAligner folder has neither
+velocities nor torques and one joint state a picture. The new folder gets a cell.toml of its own. It is there when all of it
+is; a folder that is there already is kept, and with --force a session that nothing else lies in is replaced.
 
 Examples:
   calibration export session --to ros2 --out bags            # then: ros2 bag play bags/clip_00.mcap
   calibration export session --to twinaligner --out folders
   calibration export bags --to own --out back --json
 
-JSON: clips [{file, measured, desired, poses, pictures, warnings}].")]
+JSON: clips [{file, measured, desired, poses, pictures, left_out [{topic, messages}], warnings}].")]
 pub(super) struct ExportArguments {
     /// Session folder, or one clip.
     #[arg(value_name = "SESSION|CLIP")]
@@ -31,6 +32,9 @@ pub(super) struct ExportArguments {
     /// New folder.
     #[arg(long, value_name = "FOLDER")]
     out: PathBuf,
+    /// Replaces a session that is there already.
+    #[arg(long)]
+    force: bool,
     /// Prints one JSON object on stdout at the end.
     #[arg(long)]
     json: bool,
@@ -71,15 +75,22 @@ pub(super) fn run(arguments: &ExportArguments) -> anyhow::Result<()> {
         let flange = model.as_ref().filter(|model| model.dof() == q.len())?.flange(&joints_from(q));
         Some((flange.position(), flange.wxyz()))
     };
-    let clips = export_session(&session, arguments.to.into(), &arguments.out, &flange_at, |clip| {
-        let Exported { file, measured, desired, poses, pictures, warnings } = clip;
+    let ExportArguments { to, out, force, json, .. } = arguments;
+    let order = Order { to: (*to).into(), out, force: *force, flange_at: &flange_at };
+    let clips = export_session(&session, order, |clip| {
+        let Exported { file, measured, desired, poses, pictures, left_out, warnings } = clip;
         let file = file.display();
         console::line(format_args!(
             "{file}: {measured} states, {desired} commands, {poses} poses, {pictures} pictures"
         ));
+        if !left_out.is_empty() {
+            let topics: Vec<String> =
+                left_out.iter().map(|left| format!("{} ({})", left.topic, left.messages)).collect();
+            console::line(format_args!("{file}: left out: {}", topics.join(", ")));
+        }
         for warning in warnings {
             console::line(format_args!("{file}: {warning}"));
         }
     })?;
-    if arguments.json { print_json(&Answer { clips }) } else { Ok(()) }
+    if *json { print_json(&Answer { clips }) } else { Ok(()) }
 }

@@ -8,7 +8,7 @@
 //! |---|---|
 //! | `container` | MCAP records and messages of a file that may be cut or changed |
 //! | `cdr`, `ros2` | ROS 2 messages |
-//! | `own` | an own recording as a clip |
+//! | `own`, `logged` | an own recording as a clip, and what of its states to believe |
 //! | `messages`, `picture`, `picture_file`, `pictures` | all messages one by one, a picture, pictures as files, a clip's pictures |
 //! | `bag` | a ROS 2 bag as a clip |
 //! | `twinaligner`, `npy` | a TwinAligner folder as a clip |
@@ -28,6 +28,7 @@ mod device_clock;
 mod error;
 mod export;
 mod joint_log;
+mod logged;
 mod messages;
 mod npy;
 mod own;
@@ -45,11 +46,11 @@ mod writer;
 
 pub use clip::{Clip, read_clip};
 pub use error::ReadError;
-pub use export::{ExportError, Exported, FlangeAt, Format, export_session};
+pub use export::{ExportError, Exported, FlangeAt, Format, LeftOut, Order, export_session};
 pub use messages::{ClipMessage, ClipMessages, Payload};
 pub use own::{read_arm_states, read_clip_info};
 pub use picture::Picture;
-pub use picture_file::{read_picture, unpack_picture, write_png};
+pub use picture_file::{read_picture, unpack_picture, write_png, write_png_to};
 pub use pictures::{PictureKind, for_pictures};
 pub use recover::{RecoverError, Recovered, recover};
 pub use series::{JointSeries, ObjectSeries};

@@ -6,13 +6,15 @@ use super::clip::{Clip, numbered_joints};
 use super::container::Messages;
 use super::device_clock::DeviceClock;
 use super::error::ReadError;
+use super::logged::Logged;
 use super::messages::decode;
 use super::series::JointSeries;
 use super::torques;
 use super::wire::Wire;
 use super::writer::{CELL_TOML, CONFIGURATION, ClipInfo, METADATA, PROGRAM};
 use crate::cell::{Cell, ClipKind};
-use crate::msg::arm::ArmState;
+use crate::msg::Joints;
+use crate::msg::arm::{ArmCommand, ArmState};
 use crate::msg::object::ObjectPose;
 use std::io::{Read, Seek};
 use std::path::Path;
@@ -36,6 +38,8 @@ struct Rows {
     measured: JointSeries,
     desired: JointSeries,
     device_ns: Vec<u64>,
+    /// What the arm was told, where that has stamps of its own.
+    commands: JointSeries,
     /// States of another number of joints than the first.
     odd: usize,
 }
@@ -52,16 +56,24 @@ impl Rows {
             return;
         }
         self.device_ns.push(state.device_ns);
-        let blocks = [
-            (&mut self.measured, [&state.q, &state.dq, &state.tau_J]),
-            (&mut self.desired, [&state.q_d, &state.dq_d, &state.tau_J_d]),
-        ];
-        for (series, [q, dq, tau]) in blocks {
-            series.stamps_ns.push(state.stamp_ns);
-            series.q.extend(q.iter().take(dof));
-            series.dq.extend(dq.iter().take(dof));
-            series.tau.extend(tau.iter().take(dof));
+        push_row(&mut self.measured, state.stamp_ns, [&state.q, &state.dq, &state.tau_J]);
+        push_row(&mut self.desired, state.stamp_ns, [&state.q_d, &state.dq_d, &state.tau_J_d]);
+    }
+
+    /// A command, where what the arm was told has stamps of its own.
+    fn push_command(&mut self, command: &ArmCommand) {
+        if self.commands.is_empty() {
+            self.commands.dof = command.dof as usize;
         }
+        if command.dof as usize == self.commands.dof && command.dof > 0 {
+            push_row(&mut self.commands, command.stamp_ns, [&command.q_d, &command.dq_d, &command.tau_J_d]);
+        }
+    }
+
+    /// Takes what the file says about itself into account.
+    fn believe(&mut self, logged: Logged) {
+        let desired = if logged.commands_apart { &mut self.commands } else { &mut self.desired };
+        logged.strip(&mut self.measured, desired);
     }
 
     /// Leaves out rows that were stamped wrongly, before any clock is made of their stamps.
@@ -85,6 +97,14 @@ impl Rows {
         }
         clock
     }
+}
+
+/// Adds the numbers of the joints that count.
+fn push_row(series: &mut JointSeries, stamp_ns: u64, [q, dq, tau]: [&Joints; 3]) {
+    series.stamps_ns.push(stamp_ns);
+    series.q.extend(q.iter().take(series.dof));
+    series.dq.extend(dq.iter().take(series.dof));
+    series.tau.extend(tau.iter().take(series.dof));
 }
 
 /// The states, by number, whose stamps by the host and by the robot [ns] both lie among the others', and what there is to
@@ -118,11 +138,15 @@ pub(super) fn read<R: Read + Seek>(
     cell: &Cell,
 ) -> Result<Clip, ReadError> {
     let (mut rows, mut poses) = (Rows::default(), Vec::new());
+    // It stands before the first message.
+    messages.peek()?;
+    let logged = Logged::read(&messages);
     while let Some(message) = messages.next()? {
         let topic = &message.channel.topic;
         let fail = |what: String| ReadError::content(path, topic, what);
         match message.channel.type_name() {
             ArmState::SCHEMA => rows.push(&decode(message.data).map_err(fail)?),
+            ArmCommand::SCHEMA if logged.commands_apart => rows.push_command(&decode(message.data).map_err(fail)?),
             ObjectPose::SCHEMA => {
                 let pose: ObjectPose = decode(message.data).map_err(fail)?;
                 poses.push((pose.stamp_ns, pose.pose()));
@@ -139,9 +163,11 @@ pub(super) fn read<R: Read + Seek>(
     if kind != ClipKind::Excitation && poses.is_empty() {
         return Err(missing(path, ObjectPose::TOPIC, &messages.present()));
     }
+    rows.believe(logged);
     let fail = |what| ReadError::content(path, ArmState::TOPIC, what);
     clip.warnings.extend(rows.leave_outlying_out().map_err(fail)?);
     let clock = rows.use_device_clock();
+    rows.commands.stamps_ns.iter_mut().for_each(|stamp| *stamp = clock.map(*stamp));
     // A pose is stamped when it became known, one camera latency after its picture.
     let latency_ns = cell.camera.as_ref().map_or(0, |camera| (camera.latency * 1e9) as u64);
     for (stamp_ns, _) in &mut poses {
@@ -159,7 +185,6 @@ pub(super) fn read<R: Read + Seek>(
 
 fn take_joints(path: &Path, cell: &Cell, rows: Rows, clip: &mut Clip) -> Result<(), ReadError> {
     let topic = ArmState::TOPIC;
-    let fail = |what| ReadError::content(path, topic, what);
     clip.joint_names = numbered_joints(cell, rows.measured.dof);
     if rows.odd > 0 {
         let what =
@@ -168,11 +193,18 @@ fn take_joints(path: &Path, cell: &Cell, rows: Rows, clip: &mut Clip) -> Result<
     }
     // The robot's own clock tells lost packets from a late arrival.
     clip.warnings.extend(checks::gaps(&rows.device_ns, topic));
-    for (series, into) in [(rows.measured, &mut clip.measured), (rows.desired, &mut clip.desired)] {
+    let apart = !rows.commands.is_empty();
+    let (commands, told) = if apart { (rows.commands, ArmCommand::TOPIC) } else { (rows.desired, topic) };
+    for (series, topic, into) in [(rows.measured, topic, &mut clip.measured), (commands, told, &mut clip.desired)] {
+        let fail = |what| ReadError::content(path, topic, what);
         let (series, warnings) = checks::joints(series, topic, &clip.joint_names).map_err(fail)?;
         *into = series;
         let new: Vec<String> = warnings.into_iter().filter(|w| !clip.warnings.contains(w)).collect();
         clip.warnings.extend(new);
+    }
+    if apart {
+        clip.warnings.extend(checks::gaps(&clip.desired.stamps_ns, told));
+        clip.warnings.extend(checks::pair(&mut clip.desired, &mut clip.measured));
     }
     Ok(())
 }

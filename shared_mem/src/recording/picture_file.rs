@@ -5,7 +5,7 @@ use super::error::ReadError;
 use super::picture::{Picture, check_size, unpack_png};
 use crate::input;
 use crate::msg::image::{ImageHeader, PixelEncoding, StampDomain};
-use crate::output::{self, OutputError};
+use crate::output::{self, Destination, OutputError};
 use std::path::Path;
 use zune_core::bytestream::ZCursor;
 use zune_core::colorspace::ColorSpace;
@@ -73,6 +73,15 @@ fn unpack_jpeg(bytes: &[u8], stamp_ns: u64) -> Result<Picture, String> {
 pub fn write_png(path: &Path, width: u32, height: u32, rgb: &[u8]) -> Result<(), OutputError> {
     let packed = pack_png(width, height, rgb, png::Compression::default());
     output::write(path, packed.map_err(|error| OutputError::of(path, error.into()))?)
+}
+
+/// The same to a place that was looked at before.
+///
+/// # Errors
+/// As [`write_png`].
+pub fn write_png_to(place: &Destination, width: u32, height: u32, rgb: &[u8]) -> Result<(), OutputError> {
+    let packed = pack_png(width, height, rgb, png::Compression::default());
+    place.write(packed.map_err(|error| OutputError::of(place.path(), error.into()))?)
 }
 
 /// `width * height` pixels of red, green, blue as the bytes of a PNG.

@@ -15,9 +15,9 @@ use serde::Deserialize;
 use serde::de::DeserializeOwned;
 use std::path::Path;
 
-const CONTROL: &str = "control.json";
-const FRAME: &str = "frame.json";
-const POSE: &str = "pose.npy";
+pub(super) const CONTROL: &str = "control.json";
+pub(super) const FRAME: &str = "frame.json";
+pub(super) const POSE: &str = "pose.npy";
 
 /// One command.
 #[derive(Debug, Deserialize)]

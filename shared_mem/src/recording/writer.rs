@@ -245,6 +245,11 @@ impl<W: Write> ClipWriter<W> {
         self.mcap.flush()
     }
 
+    /// A record about the clip as a whole.
+    pub(super) fn note(&mut self, record: &Metadata) -> Result<(), WriteError> {
+        self.mcap.write_metadata(record).map_err(|error| self.failed(&error))
+    }
+
     /// Records a state of the arm.
     ///
     /// # Errors

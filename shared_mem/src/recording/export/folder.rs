@@ -7,6 +7,7 @@
 use super::super::picture::Picture;
 use super::super::picture_file::pack_png;
 use super::super::{Payload, ReadError};
+use super::left_out::Carried;
 use super::source::Source;
 use super::{ExportError, Exported, FlangeAt, npz};
 use crate::cell::{Camera, CameraPose, Cell};
@@ -24,7 +25,7 @@ type Place<'a> = (&'a OutputFolder, &'a Path);
 /// Writes the folder.
 pub(super) fn write(
     source: &Source,
-    cell: &Cell,
+    (cell, carried): (&Cell, &mut Carried),
     target: Place<'_>,
     flange_at: FlangeAt<'_>,
 ) -> Result<Exported, ExportError> {
@@ -61,7 +62,7 @@ pub(super) fn write(
     });
     put_json(target, "frame.json", &listed.collect())?;
     put_poses(source, cell, target, &mut exported)?;
-    let info = put_pictures(source, &frames, target, &mut exported)?;
+    let info = put_pictures(source, &frames, target, (&mut exported, carried))?;
     put_camera(info, cell, target)?;
     if frames.len() < clip.measured.len() {
         let what =
@@ -153,14 +154,17 @@ fn put_pictures(
     source: &Source,
     frames: &[Frame],
     target: Place<'_>,
-    exported: &mut Exported,
+    (exported, carried): (&mut Exported, &mut Carried),
 ) -> Result<Option<CameraInfo>, ExportError> {
     let stamps: Vec<u64> = frames.iter().map(|frame| frame.stamp_ns).collect();
-    let (mut info, mut homeless, mut others) = (None, 0_usize, 0_usize);
+    let (mut info, mut homeless) = (None, 0_usize);
     for beside in source.beside()? {
         let beside = beside?;
         match &beside.payload {
-            Payload::CameraInfo(found) => info = Some(**found),
+            Payload::CameraInfo(found) => {
+                info = Some(**found);
+                carried.one(&beside.topic);
+            }
             Payload::Picture(Picture::Pixels { header, pixels }) => {
                 let frame = nearest(&stamps, beside.stamp_ns);
                 if stamps[frame].abs_diff(beside.stamp_ns) > SAME_MOMENT_NS {
@@ -169,16 +173,14 @@ fn put_pictures(
                 }
                 put_picture(target, frame, header, pixels)?;
                 exported.pictures += 1;
+                carried.one(&beside.topic);
             }
             Payload::Picture(Picture::Compressed { .. }) => homeless += 1,
-            _ => others += 1,
+            _ => {}
         }
     }
     if homeless > 0 {
         exported.warnings.push(format!("{homeless} pictures belong to no frame, or are JPEGs; they were left out"));
-    }
-    if others > 0 {
-        exported.warnings.push(format!("{others} messages of devices and remarks have no room in the format"));
     }
     Ok(info)
 }

@@ -10,18 +10,23 @@
 //! | `rosbag`, `encode`, `definitions` | a ROS 2 bag |
 //! | `folder`, `npz` | a TwinAligner clip folder |
 //! | `native` | an own clip |
+//! | `left_out` | what of the source is not in it |
 
 mod definitions;
 mod encode;
 mod folder;
+mod left_out;
 mod native;
 mod npz;
 mod rosbag;
 mod source;
 
+pub use left_out::LeftOut;
+
 use super::{ReadError, Session, WriteError};
 use crate::cell::ClipEntry;
 use crate::output::{OutputError, OutputFolder};
+use left_out::{Carried, left_out};
 use serde::Serialize;
 use source::Source;
 use std::path::{Path, PathBuf};
@@ -53,6 +58,8 @@ pub struct Exported {
     pub poses: usize,
     /// Pictures.
     pub pictures: usize,
+    /// Topics of the source that were left out, wholly or in part.
+    pub left_out: Vec<LeftOut>,
     /// What was odd in it, or found no room in the format.
     pub warnings: Vec<String>,
 }
@@ -77,32 +84,56 @@ pub enum ExportError {
         /// Why, and what to do.
         what: String,
     },
+    /// The folder that is to be replaced is no session that nothing else lies in.
+    #[error("cannot replace {}: {what}; choose a new folder", path.display())]
+    NotReplaced {
+        /// The folder.
+        path: PathBuf,
+        /// Why.
+        what: String,
+    },
 }
 
-/// Writes all clips of `session` and its cell.toml into the new folder `out`, which is there when all of it is written.
-/// `flange_at` is asked where a format wants to know it. `told` hears of each clip as it is done.
+/// How a session is exported.
+#[derive(Clone, Copy)]
+pub struct Order<'a> {
+    /// The format.
+    pub to: Format,
+    /// The new folder, which is there when all of it is written.
+    pub out: &'a Path,
+    /// Whether a session that is there already is replaced.
+    pub force: bool,
+    /// Asked where a format wants to know where the flange is.
+    pub flange_at: FlangeAt<'a>,
+}
+
+/// Writes all clips of `session` and its cell.toml into a new folder. `told` hears of each clip as it is done.
 ///
 /// # Errors
-/// [`ExportError`]; nothing is there then.
+/// [`ExportError`]; nothing is there then, and what was there before is unchanged.
 pub fn export_session(
     session: &Session,
-    to: Format,
-    out: &Path,
-    flange_at: FlangeAt<'_>,
+    order: Order<'_>,
     mut told: impl FnMut(&Exported),
 ) -> Result<Vec<Exported>, ExportError> {
-    let folder = OutputFolder::create(out)?;
+    let Order { to, flange_at, .. } = order;
+    let folder = begin(session, order)?;
     let mut cell = session.cell.at_home_anywhere();
     cell.clips.clear();
     let mut done = Vec::new();
     for (number, entry) in session.clips.iter().enumerate() {
         let file = name(&entry.file, to, number);
         let source = Source::open(session, entry)?;
-        let exported = match to {
-            Format::Ros2 => rosbag::write(&source, &cell, folder.file(&file)?)?,
-            Format::TwinAligner => folder::write(&source, &cell, (&folder, &file), flange_at)?,
-            Format::Own => native::write(&source, &cell, folder.file(&file)?, flange_at)?,
+        let mut carried = Carried::default();
+        let into = (&cell, &mut carried);
+        let mut exported = match to {
+            Format::Ros2 => rosbag::write(&source, into, folder.file(&file)?)?,
+            Format::TwinAligner => folder::write(&source, into, (&folder, &file), flange_at)?,
+            Format::Own => native::write(&source, into, folder.file(&file)?, flange_at)?,
         };
+        if !(to == Format::Own && source.is_own()) {
+            exported.left_out = left_out(&source, &cell, to, (&exported, &carried))?;
+        }
         cell.clips.push(ClipEntry { file, kind: entry.kind });
         told(&exported);
         done.push(exported);
@@ -110,6 +141,28 @@ pub fn export_session(
     folder.write(Path::new(CELL_TOML), cell.to_toml().as_bytes())?;
     folder.finish(CELL_TOML)?;
     Ok(done)
+}
+
+/// The new folder; in place of another session only where that was asked for.
+fn begin(session: &Session, Order { out, force, .. }: Order<'_>) -> Result<OutputFolder, ExportError> {
+    let is_full = std::fs::read_dir(out).is_ok_and(|mut entries| entries.next().is_some());
+    if !force || !is_full {
+        return Ok(OutputFolder::create(out)?);
+    }
+    let refused = |what: String| Err(ExportError::NotReplaced { path: out.to_owned(), what });
+    let whole = |path: &Path| path.canonicalize().unwrap_or_else(|_| path.to_owned());
+    let sources = session.clips.iter().map(|entry| session.folder.join(&entry.file));
+    if sources.chain([session.folder.clone()]).any(|source| whole(&source).starts_with(whole(out))) {
+        return refused("it holds what is exported".into());
+    }
+    for entry in std::fs::read_dir(out).map_err(ReadError::io(out))? {
+        let name = entry.map_err(ReadError::io(out))?.file_name().to_string_lossy().into_owned();
+        let of_session = name == CELL_TOML || name.ends_with(".mcap") || name.starts_with("traj_");
+        if !of_session {
+            return refused(format!("it holds {name}, which is no part of a session"));
+        }
+    }
+    Ok(OutputFolder::replacing(out)?)
 }
 
 /// What makes a folder a session.
@@ -138,6 +191,7 @@ impl Exported {
             desired: clip.desired.len(),
             poses: clip.object.len(),
             pictures: 0,
+            left_out: Vec::new(),
             warnings,
         }
     }

@@ -1,24 +1,27 @@
-//! A foreign clip as an own one. An own state holds what the arm did and what it was told at one moment, so both have to
-//! be stamped alike; what nobody recorded is 0.
+//! A clip as an own one. An own state holds what the arm did and what it was told at one moment; where they were stamped at
+//! different ones, what it was told goes into messages of its own. What nobody recorded is 0, and the clip says so.
 
 use super::super::cdr::CdrError;
 use super::super::container::Messages;
+use super::super::logged::Logged;
 use super::super::ros2::{JointState, StampedPose};
 use super::super::writer::{ClipInfo, ClipWriter};
 use super::super::{Payload, Picture, ReadError};
+use super::left_out::Carried;
 use super::rosbag::{EXTERNAL_TORQUES, FLANGE_POSE};
 use super::source::{Beside, Kind, Source};
 use super::{ExportError, Exported, FlangeAt};
 use crate::cell::Cell;
 use crate::frames::{Base, Flange, Pose};
-use crate::msg::arm::{ArmMode, ArmState};
+use crate::input;
+use crate::msg::arm::{ArmCommand, ArmMode, ArmState, CommandInterface};
 use crate::msg::event::Event;
 use crate::msg::gripper::GripperState;
 use crate::msg::image::{CameraInfo, ImageHeader, PixelEncoding};
 use crate::msg::object::ObjectPose;
 use crate::msg::wrench::Wrench;
 use crate::msg::{Joints, joints_from};
-use crate::output::Output;
+use crate::output::{Output, OutputError};
 use crate::topics;
 use std::collections::HashMap;
 use std::path::Path;
@@ -26,21 +29,14 @@ use std::path::Path;
 /// Writes the clip.
 pub(super) fn write(
     source: &Source,
-    cell: &Cell,
+    (cell, carried): (&Cell, &mut Carried),
     output: Output,
     flange_at: FlangeAt<'_>,
 ) -> Result<Exported, ExportError> {
+    if source.is_own() {
+        return copy(source, output);
+    }
     let clip = &source.clip;
-    let unfit = |what: &str| ExportError::Unfit { path: source.path.clone(), what: what.to_owned() };
-    if matches!(source.kind, Kind::Own(_)) {
-        return Err(unfit("is an own clip already; choose another format with --to"));
-    }
-    if clip.measured.stamps_ns != clip.desired.stamps_ns {
-        return Err(unfit(
-            "stamps what the arm did and what it was told at different moments, which an own clip cannot hold without \
-             guessing; every command reads it as it is, and a ROS 2 bag holds it as it is",
-        ));
-    }
     let mut exported = Exported::of(source, output.path());
     let info = ClipInfo {
         cell_toml: Some(cell.to_toml()),
@@ -49,17 +45,34 @@ pub(super) fn write(
         torques_begin_at_rows: !clip.torques_end_at_rows,
     };
     let mut writer = ClipWriter::whole_in_unix_time(output, &info)?;
+    let logged = Logged::of(clip);
+    if let Some(record) = logged.record() {
+        writer.note(&record)?;
+    }
     let known = if matches!(source.kind, Kind::Bag) { Known::read(&source.path)? } else { Known::default() };
     let latency_ns = cell.camera.as_ref().map_or(0, |camera| (camera.latency * 1e9) as u64);
-    let mut rows = Rows { source, known, flange_at, latency_ns, state: 0, pose: 0 };
+    let commands = if logged.commands_apart { &clip.desired.stamps_ns[..] } else { &[] };
+    let mut rows = Rows { source, known, flange_at, latency_ns, commands, state: 0, command: 0, pose: 0 };
     for beside in source.beside()? {
         let beside = beside?;
         rows.put_until(beside.stamp_ns, &mut writer)?;
         exported.pictures += usize::from(matches!(beside.payload, Payload::Picture(_)));
-        put_beside(beside, cell, latency_ns, &mut writer, &mut exported)?;
+        put_beside(beside, cell, latency_ns, &mut writer, (&mut exported, carried))?;
     }
     rows.put_until(u64::MAX, &mut writer)?;
     writer.finish()?;
+    Ok(exported)
+}
+
+/// An own clip is one already: bit by bit.
+fn copy(source: &Source, mut output: Output) -> Result<Exported, ExportError> {
+    let mut exported = Exported::of(source, output.path());
+    for beside in source.beside()? {
+        exported.pictures += usize::from(matches!(beside?.payload, Payload::Picture(_)));
+    }
+    let mut file = input::open(&source.path).map_err(ReadError::from)?;
+    std::io::copy(&mut file, &mut output).map_err(|error| OutputError::of(output.path(), error))?;
+    output.finish()?;
     Ok(exported)
 }
 
@@ -68,7 +81,7 @@ fn put_beside(
     cell: &Cell,
     latency_ns: u64,
     writer: &mut ClipWriter<Output>,
-    exported: &mut Exported,
+    (exported, carried): (&mut Exported, &mut Carried),
 ) -> Result<(), ExportError> {
     let stamp_ns = beside.stamp_ns;
     match beside.payload {
@@ -86,6 +99,7 @@ fn put_beside(
             if !exported.warnings.iter().any(|w| w == what) {
                 exported.warnings.push(what.into());
             }
+            return Ok(());
         }
         Payload::CameraInfo(info) => {
             let stands = cell.camera.as_ref().map(|camera| camera.pose);
@@ -95,18 +109,22 @@ fn put_beside(
         Payload::Wrench(wrench) => writer.wrench(&Wrench { stamp_ns, ..wrench })?,
         Payload::Gripper(gripper) => writer.gripper(&GripperState { stamp_ns, ..gripper })?,
         Payload::Event(event) => writer.event(&Event { stamp_ns, ..*event })?,
-        _ => {}
+        _ => return Ok(()),
     }
+    carried.one(&beside.topic);
     Ok(())
 }
 
-/// States and poses, written in between the rest in the order of their stamps.
+/// States, commands and poses, written in between the rest in the order of their stamps.
 struct Rows<'a> {
     source: &'a Source,
     known: Known,
     flange_at: FlangeAt<'a>,
     latency_ns: u64,
+    /// Stamps of commands that have messages of their own [ns].
+    commands: &'a [u64],
     state: usize,
+    command: usize,
     pose: usize,
 }
 
@@ -116,9 +134,15 @@ impl Rows<'_> {
         loop {
             let state = clip.measured.stamps_ns.get(self.state).copied();
             let pose = clip.object.stamps_ns.get(self.pose).copied();
-            let Some(first) = state.into_iter().chain(pose).min().filter(|first| *first <= stamp_ns) else {
+            let command = self.commands.get(self.command).copied();
+            let Some(first) = state.into_iter().chain(command).chain(pose).min().filter(|first| *first <= stamp_ns)
+            else {
                 return Ok(());
             };
+            if command == Some(first) {
+                writer.arm_command(&self.arm_command(self.command, first))?;
+                self.command += 1;
+            }
             if state == Some(first) {
                 writer.arm_state(&self.arm_state(self.state, first))?;
                 self.state += 1;
@@ -139,8 +163,25 @@ impl Rows<'_> {
         }
     }
 
+    fn arm_command(&self, row: usize, stamp_ns: u64) -> ArmCommand {
+        let desired = &self.source.clip.desired;
+        let of = |values: Option<&[f64]>| joints_from(values.unwrap_or(&[]));
+        ArmCommand {
+            stamp_ns,
+            answers_device_ns: stamp_ns,
+            cycle: row as u64,
+            dof: desired.dof as u32,
+            interface: CommandInterface::JointPosition,
+            q_d: joints_from(desired.q_row(row)),
+            dq_d: of(desired.dq_row(row)),
+            tau_J_d: of(desired.tau_row(row)),
+        }
+    }
+
     fn arm_state(&self, row: usize, stamp_ns: u64) -> ArmState {
         let clip = &self.source.clip;
+        // What it was told last; before anything was, what it is told first.
+        let told = clip.desired.stamps_ns.partition_point(|stamp| *stamp <= stamp_ns).saturating_sub(1);
         let of = |values: Option<&[f64]>| joints_from(values.unwrap_or(&[]));
         let q = clip.measured.q_row(row);
         let flange = self.known.flange.get(&stamp_ns).copied().or_else(|| {
@@ -155,10 +196,10 @@ impl Rows<'_> {
             mode: ArmMode::Other,
             q: joints_from(q),
             dq: of(clip.measured.dq_row(row)),
-            q_d: joints_from(clip.desired.q_row(row)),
-            dq_d: of(clip.desired.dq_row(row)),
+            q_d: joints_from(clip.desired.q_row(told)),
+            dq_d: of(clip.desired.dq_row(told)),
             tau_J: of(clip.measured.tau_row(row)),
-            tau_J_d: of(clip.desired.tau_row(row)),
+            tau_J_d: of(clip.desired.tau_row(told)),
             tau_ext: self.known.tau_ext.get(&stamp_ns).copied().unwrap_or_default(),
             ..ArmState::default()
         };

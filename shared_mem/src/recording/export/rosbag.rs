@@ -4,6 +4,7 @@ use super::super::ros2::{self, JointState, StampedPose};
 use super::super::{Payload, Picture, torques};
 use super::definitions::definition;
 use super::encode;
+use super::left_out::Carried;
 use super::source::{Beside, Source};
 use super::{ExportError, Exported};
 use crate::cell::Cell;
@@ -29,7 +30,11 @@ const EVENTS: &str = "/events";
 const FLANGE: &str = "fr3_link8";
 
 /// Writes the bag.
-pub(super) fn write(source: &Source, cell: &Cell, output: Output) -> Result<Exported, ExportError> {
+pub(super) fn write(
+    source: &Source,
+    (cell, carried): (&Cell, &mut Carried),
+    output: Output,
+) -> Result<Exported, ExportError> {
     let target = output.path().to_owned();
     let mut exported = Exported::of(source, &target);
     let failed = |error: mcap::McapError| {
@@ -47,6 +52,7 @@ pub(super) fn write(source: &Source, cell: &Cell, output: Output) -> Result<Expo
         rows.put_until(beside.stamp_ns, &mut bag).map_err(failed)?;
         exported.pictures += usize::from(matches!(beside.payload, Payload::Picture(_)));
         put_beside(&beside, source.unix_ns(beside.stamp_ns), &mut bag).map_err(failed)?;
+        carried.one(&beside.topic);
     }
     rows.put_until(u64::MAX, &mut bag).map_err(failed)?;
     bag.finish().map_err(failed)?.finish()?;

@@ -14,6 +14,11 @@ use crate::msg::arm::ArmState;
 use crate::msg::image::{CameraInfo, ImageHeader, PixelEncoding, StampDomain};
 use std::path::{Path, PathBuf};
 
+/// What a TwinAligner folder holds beside joints and poses.
+const CAMERA: &str = "cam_K.txt";
+const COLOUR: &str = "rgb";
+const DEPTH: &str = "depth";
+
 /// A clip that is to be written in another format.
 pub(super) struct Source {
     pub(super) clip: Clip,
@@ -42,6 +47,8 @@ pub(super) struct Own {
 
 /// Something beside joints and poses.
 pub(super) struct Beside {
+    /// Where the source has it: a topic, or in a folder the file or the folder of files.
+    pub(super) topic: String,
     /// On the clock of the clip's series [ns].
     pub(super) stamp_ns: u64,
     pub(super) payload: Payload,
@@ -53,6 +60,10 @@ impl Source {
         let clip = session.read(entry)?;
         let kind = if path.is_dir() { Kind::Folder } else { kind_of_file(&path, &session.cell)? };
         Ok(Self { clip, path, kind })
+    }
+
+    pub(super) fn is_own(&self) -> bool {
+        matches!(self.kind, Kind::Own(_))
     }
 
     /// Unix time of a stamp of the clip, where it has one; the stamp itself otherwise [ns].
@@ -73,12 +84,12 @@ impl Source {
         let messages = ClipMessages::open(&self.path, &[])?;
         Ok(Box::new(messages.filter_map(|message| match message {
             Err(error) => Some(Err(error)),
-            Ok(message) => self.place(message.payload).map(Ok),
+            Ok(message) => self.place(message.topic, message.payload).map(Ok),
         })))
     }
 
     /// `None` for joints, poses and what a twin said.
-    fn place(&self, payload: Payload) -> Option<Beside> {
+    fn place(&self, topic: String, payload: Payload) -> Option<Beside> {
         let (stamp_ns, seen) = match &payload {
             Payload::CameraInfo(info) => (info.stamp_ns, false),
             Payload::Picture(Picture::Pixels { header, .. }) => (header.stamp_ns, true),
@@ -88,7 +99,7 @@ impl Source {
             Payload::Event(event) => (event.stamp_ns, false),
             _ => return None,
         };
-        Some(Beside { stamp_ns: self.clip_ns(stamp_ns, seen), payload })
+        Some(Beside { topic, stamp_ns: self.clip_ns(stamp_ns, seen), payload })
     }
 
     /// A recorded stamp by the clock of the clip's series; what was `seen` is stamped when its picture was taken.
@@ -134,7 +145,7 @@ fn kind_of_file(path: &Path, cell: &Cell) -> Result<Kind, ReadError> {
 
 /// What `cam_K.txt` tells about the camera; `None` where it is not there or no matrix. Its pictures tell their size.
 fn camera(folder: &Path, stamp_ns: u64) -> Option<Beside> {
-    let text = input::text(&folder.join("cam_K.txt"), input::Kind::Configuration).ok()?;
+    let text = input::text(&folder.join(CAMERA), input::Kind::Configuration).ok()?;
     let numbers: Vec<f64> = text.split_whitespace().map_while(|word| word.parse().ok()).collect();
     let &[fx, _, cx, _, fy, cy, ..] = numbers.as_slice() else { return None };
     // A PNG's size stands behind its signature and the name of its first part.
@@ -142,7 +153,7 @@ fn camera(folder: &Path, stamp_ns: u64) -> Option<Beside> {
     let size = |at: usize| png.get(at..at + 4).map_or(0, |b| u32::from_be_bytes([b[0], b[1], b[2], b[3]]));
     let intrinsics = [fx, fy, cx, cy];
     let info = CameraInfo { stamp_ns, width: size(16), height: size(20), intrinsics, ..CameraInfo::default() };
-    Some(Beside { stamp_ns, payload: Payload::CameraInfo(Box::new(info)) })
+    Some(Beside { topic: CAMERA.into(), stamp_ns, payload: Payload::CameraInfo(Box::new(info)) })
 }
 
 /// Colour and depth of each frame of a TwinAligner folder, as far as they are there.
@@ -161,10 +172,8 @@ impl Iterator for FolderPictures<'_> {
             let (frame, is_depth) = (self.next / 2, self.next % 2 == 1);
             let stamp_ns = *self.stamps.get(frame)?;
             self.next += 1;
-            let file = match is_depth {
-                false => self.folder.join(format!("rgb/{frame:05}.png")),
-                true => self.folder.join(format!("depth/{frame:05}.npz")),
-            };
+            let topic = if is_depth { DEPTH } else { COLOUR };
+            let file = self.folder.join(topic).join(format!("{frame:05}.{}", if is_depth { "npz" } else { "png" }));
             if !file.is_file() {
                 continue;
             }
@@ -173,7 +182,11 @@ impl Iterator for FolderPictures<'_> {
                 let read = if is_depth { depth(&bytes, stamp_ns) } else { colour(&bytes, stamp_ns) };
                 read.map_err(|what| ReadError::kind(&file, what))
             });
-            return Some(picture.map(|picture| Beside { stamp_ns, payload: Payload::Picture(picture) }));
+            return Some(picture.map(|picture| Beside {
+                topic: topic.into(),
+                stamp_ns,
+                payload: Payload::Picture(picture),
+            }));
         }
     }
 }

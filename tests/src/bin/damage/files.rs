@@ -3,7 +3,7 @@
 use shared_mem::msg::arm::ArmState;
 use shared_mem::msg::image::{CameraInfo, ImageHeader, PixelEncoding};
 use shared_mem::msg::object::ObjectPose;
-use shared_mem::recording::{ClipInfo, ClipWriter, Format, Session, export_session, write_png};
+use shared_mem::recording::{ClipInfo, ClipWriter, Format, Order, Session, export_session, write_png};
 use shared_mem::topics;
 use std::fmt::Write as _;
 use std::fs;
@@ -57,12 +57,15 @@ pub(crate) fn write(whole: &Path) {
     stroke(&own.join("clip_00.mcap"));
     let session = Session::open(&own).expect("a session");
     let flange_at = |_: &[f64]| Some(([0.4, 0.0, 0.5], [1.0, 0.0, 0.0, 0.0]));
+    let export = |to, out: &Path| {
+        export_session(&session, Order { to, out, force: false, flange_at: &flange_at }, |_| {}).expect("an export")
+    };
     let (bag, chunked) = (folder("bag"), whole.join("chunked_bag"));
-    export_session(&session, Format::Ros2, &chunked, &flange_at, |_| {}).expect("a bag");
+    export(Format::Ros2, &chunked);
     // Without chunks nothing vouches for a message, so that what has changed in it arrives.
     without_chunks(&chunked.join("clip_00.mcap"), &bag.join("clip_00.mcap"));
     fs::copy(chunked.join("cell.toml"), bag.join("cell.toml")).expect("room");
-    export_session(&session, Format::TwinAligner, &whole.join("folder"), &flange_at, |_| {}).expect("a clip folder");
+    export(Format::TwinAligner, &whole.join("folder"));
     let plain = folder("plain");
     without_chunks(&own.join("clip_00.mcap"), &plain.join("clip_00.mcap"));
     for file in ["cell.toml", "theta.toml"] {
