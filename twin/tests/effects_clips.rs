@@ -16,7 +16,7 @@ fn gap(name: &str, blocks: &str) -> f64 {
     let effects: Theta = shared_mem::toml_file::parse(blocks, Path::new("theta.toml")).expect("a theta.toml");
     let theta = Theta { arm: Some(ArmTheta { stiffness: list("k"), damping: list("d") }), ..effects };
     let session = Session::open(&folder).expect("a session");
-    let gap = replay(&session, &Options { theta: Some(theta), out: None }).expect("a cell");
+    let gap = replay(&session, &Options { theta: Some(theta), ..Options::default() }).expect("a cell");
     let joints = gap.mean.joint_rms_rad.expect("joints");
     joints.into_iter().fold(0.0, f64::max)
 }

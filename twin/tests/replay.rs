@@ -4,6 +4,7 @@ use shared_mem::cell::{Cell, ClipEntry, ClipKind};
 use shared_mem::msg::arm::ArmState;
 use shared_mem::msg::joints_from;
 use shared_mem::msg::object::ObjectPose;
+use shared_mem::output::Destination;
 use shared_mem::recording::{Clip, ClipInfo, ClipMessages, ClipWriter, JointSeries, Payload, read_clip};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
@@ -173,8 +174,13 @@ fn a_simulated_clip_is_written_and_reads_back_as_the_recording() {
         let apart = real.iter().zip(twin).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
         assert!(apart < 0.05 && twin[1].abs() > 1.0, "the arm's weight and motion: {real:?}, {twin:?}");
     }
+    let before = std::fs::read(&out).expect("the clip");
     let again = twin(&[text(&path.join("b.mcap")), "--out", text(&out)]);
     assert_eq!(again.status.code(), Some(1), "an existing clip is not overwritten");
+    assert!(stderr(&again).contains("simulated.mcap") && stderr(&again).contains("--force"), "{}", stderr(&again));
+    assert_eq!(std::fs::read(&out).expect("the clip"), before);
+    let forced = twin(&[text(&path.join("b.mcap")), "--out", text(&out), "--force"]);
+    assert!(forced.status.success(), "{}", stderr(&forced));
 }
 
 #[test]
@@ -189,7 +195,8 @@ fn a_recording_from_before_this_machine_was_started_keeps_its_stamps() {
     let replayer = Replayer::new(&cell, None).expect("a twin");
     let (clip, prediction, _) = replayer.replay(clip).expect("an arm that follows");
     let out = path.join("simulated.mcap");
-    write_clip(&out, &replayer, &clip, &prediction).expect("room");
+    let place = Destination::new(&out, false).expect("a new file");
+    write_clip(&place, &replayer, &clip, &prediction).expect("room");
     let messages =
         ClipMessages::open(&out, &["/twin/state"]).expect("a clip").map(|message| message.expect("a message"));
     let logged: Vec<u64> = messages.map(|message| message.log_time_ns).collect();

@@ -12,7 +12,7 @@ fn data() -> PathBuf {
 
 fn replayed(session: &Path, theta: Option<Theta>) -> SessionGap {
     let session = Session::open(session).expect("a session");
-    replay(&session, &Options { theta, out: None }).expect("a usable cell")
+    replay(&session, &Options { theta, ..Options::default() }).expect("a usable cell")
 }
 
 fn true_gains(session: &Path) -> ArmTheta {

@@ -36,7 +36,7 @@ fn gap(name: &str, effects: Vec<EffectTheta>) -> [f64; 3] {
     let folder = folder.join("gap_dev").join(name);
     let theta = Theta { effects, ..truth(&folder) };
     let session = Session::open(&folder).expect("a session");
-    let gap = replay(&session, &Options { theta: Some(theta), out: None }).expect("a cell");
+    let gap = replay(&session, &Options { theta: Some(theta), ..Options::default() }).expect("a cell");
     let mut add: Vec<f64> = gap.clips.iter().filter_map(|clip| clip.gap.object_add_m).collect();
     assert_eq!(add.len(), 16);
     add.sort_by(f64::total_cmp);

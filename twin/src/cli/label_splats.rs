@@ -4,7 +4,7 @@ use super::look::joint;
 use anyhow::{Context as _, bail, ensure};
 use nalgebra::{Isometry3, Point3, Quaternion, Similarity3, Translation3, UnitQuaternion};
 use shared_mem::cell::Cell;
-use shared_mem::output::Output;
+use shared_mem::output::{Destination, Output};
 use shared_mem::quantity::number;
 use shared_mem::{answer, console};
 use std::path::PathBuf;
@@ -37,6 +37,9 @@ pub(crate) struct LabelSplats {
     /// Folder for the parts
     #[arg(long, value_name = "FOLDER")]
     out: PathBuf,
+    /// Replaces parts that are in the folder already
+    #[arg(long)]
+    force: bool,
     /// Roughly where the scan's frame lies in the base: x,y,z,qw,qx,qy,qz, and metres for one of its units [default: at the
     /// base, in metres]
     #[arg(long, value_name = "POSE", allow_hyphen_values = true, value_delimiter = ',', value_parser = part_of_pose)]
@@ -73,6 +76,9 @@ const BLURRED: f64 = 0.05;
 /// So near above the table a splat is the table's [m].
 const ON_TABLE: f64 = 0.004;
 
+/// What is no robot.
+const REST: &str = "scene.ply";
+
 impl LabelSplats {
     pub(crate) fn run(&self) -> anyhow::Result<()> {
         super::discard_on_signal()?;
@@ -86,6 +92,9 @@ impl LabelSplats {
         let mut q = [0.0; MAX_JOINTS];
         q[..dof].copy_from_slice(&self.joints);
         let start = self.start()?;
+        let links = (0..robot.parts().len()).map(link_file);
+        let place = |name: String| Destination::in_new_folder(&self.out.join(name), self.force);
+        let mut places = links.chain([REST.to_owned()]).map(place).collect::<Result<Vec<_>, _>>()?.into_iter();
         let scan = SplatCloud::read(&self.scan)?;
         let surface = SurfacePoints::new(&robot, &q, |_| true);
         let clear = scan
@@ -96,21 +105,19 @@ impl LabelSplats {
         let found = align(&points, &surface, &start)?;
         let table = cell.table.map(|table| table.height + ON_TABLE);
         let parts = label(&scan, &found.base_from_scan, &surface, self.reach, table);
-        std::fs::create_dir_all(&self.out)
-            .with_context(|| format!("{}; give --out a place that can be written", self.out.display()))?;
         let (mut counts, mut outputs) = (Vec::new(), Vec::new());
-        let mut put = |splats: &SplatCloud, name: &str| -> anyhow::Result<()> {
-            let mut output = Output::create(&self.out.join(name))?;
+        let mut put = |splats: &SplatCloud| -> anyhow::Result<()> {
+            let mut output = places.next().context("as many places as parts")?.begin()?;
             splats.write_to(&mut output)?;
             outputs.push(output);
             Ok(())
         };
         for (link, splats) in parts.links.iter().enumerate() {
             let link_from_base = robot.base_from_link(&q, link).inverse();
-            put(&splats.moved(&Similarity3::from_isometry(link_from_base, 1.0)), &link_file(link))?;
+            put(&splats.moved(&Similarity3::from_isometry(link_from_base, 1.0)))?;
             counts.push(splats.splats.len());
         }
-        put(&parts.rest, "scene.ply")?;
+        put(&parts.rest)?;
         // Once there was room for all of them: the links of two scans make no robot.
         outputs.into_iter().try_for_each(Output::finish)?;
         let at = found.base_from_scan;

@@ -2,7 +2,7 @@
 
 use super::look::Look;
 use anyhow::{Context as _, bail, ensure};
-use shared_mem::output::Output;
+use shared_mem::output::Destination;
 use shared_mem::recording::{PictureKind, Session, for_pictures, write_png};
 use shared_mem::{answer, console};
 use std::path::{Path, PathBuf};
@@ -30,6 +30,9 @@ pub(crate) struct Render {
     /// Folder for the frames.
     #[arg(long, value_name = "FOLDER")]
     out: PathBuf,
+    /// Replaces the frames and the film that are in the folder already.
+    #[arg(long)]
+    force: bool,
     /// Draws every so many pictures only.
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
     every: u32,
@@ -46,11 +49,10 @@ pub(crate) struct Render {
 impl Render {
     pub(crate) fn run(&self) -> anyhow::Result<()> {
         super::discard_on_signal()?;
-        refuse_old_frames(&self.out)?;
+        self.refuse_old_frames()?;
         let session = Session::open_with(&self.path, self.cell.as_deref())?;
         let mut view = self.look.view(&session.cell)?;
-        std::fs::create_dir_all(&self.out)
-            .with_context(|| format!("{}; give --out a place that can be written", self.out.display()))?;
+        let film_file = self.look_at_the_folder()?;
         let camera = session.cell.camera.as_ref().context("cell.toml has no `[camera]`")?;
         let latency_ns = (camera.latency * 1e9) as u64;
         let (mut frames, mut skipped, mut number) = (0u32, 0u32, 0u32);
@@ -74,7 +76,7 @@ impl Render {
                 let sum: u64 = real.iter().zip(&twin).map(|(a, b)| u64::from(a.abs_diff(*b))).sum();
                 apart += sum as f64 / (255.0 * real.len() as f64);
                 let (width, height, rgb) = beside(of_pictures, &real, &twin);
-                write_png(&self.out.join(format!("frame_{frames:05}.png")), width, height, &rgb)?;
+                write_png(&frame_file(&self.out, frames), width, height, &rgb)?;
                 frames += 1;
                 Ok(())
             })?;
@@ -83,7 +85,12 @@ impl Render {
             bail!("no clip holds colour pictures with joints at their time; record with `rt_bridge run --camera`");
         }
         let difference = apart / f64::from(frames);
-        let film = if self.film { film(&self.out, camera.rate / f64::from(self.every))? } else { None };
+        // Those of a longer film before would be taken for this one's.
+        for frame in frames_in(&self.out).iter().filter(|frame| **frame >= frame_file(&self.out, frames)) {
+            std::fs::remove_file(frame).with_context(|| format!("cannot replace {}", frame.display()))?;
+        }
+        let rate = camera.rate / f64::from(self.every);
+        let film = film_file.map(|file| film(&self.out, &file, rate)).transpose()?.flatten();
         console::line(format_args!(
             "{frames} frames in {}, drawn by {}{}; mean difference {:.1} %",
             self.out.display(),
@@ -105,23 +112,47 @@ impl Render {
     }
 }
 
-/// Frames of before would stand behind the new ones, in the folder and in the film.
-fn refuse_old_frames(folder: &Path) -> anyhow::Result<()> {
-    let names = std::fs::read_dir(folder).into_iter().flatten().filter_map(|entry| Some(entry.ok()?.file_name()));
-    let is_frame = |name: &str| name.starts_with("frame_") && name.ends_with(".png");
-    let old = names.filter(|name| name.to_str().is_some_and(is_frame)).count();
-    ensure!(
-        old == 0,
-        "{0} holds {old} frames of before; give another --out, or remove them with `rm {0}/frame_*.png`",
-        folder.display()
-    );
-    Ok(())
+impl Render {
+    /// Frames of another film would stand behind the new ones.
+    fn refuse_old_frames(&self) -> anyhow::Result<()> {
+        if let (Some(frame), false) = (frames_in(&self.out).first(), self.force) {
+            Destination::new(frame, false)?;
+        }
+        Ok(())
+    }
+
+    /// Whether frames can go to the folder; where the film goes, if one is wanted.
+    fn look_at_the_folder(&self) -> anyhow::Result<Option<Destination>> {
+        let film = self.film.then(|| Destination::in_new_folder(&self.out.join(FILM), self.force)).transpose()?;
+        std::fs::create_dir_all(&self.out)
+            .with_context(|| format!("{}; give --out a place that can be written", self.out.display()))?;
+        Destination::new(&frame_file(&self.out, 0), self.force)?;
+        Ok(film)
+    }
+}
+
+/// The film's name in the folder.
+const FILM: &str = "film.mp4";
+
+fn frame_file(folder: &Path, number: u32) -> PathBuf {
+    folder.join(format!("frame_{number:05}.png"))
+}
+
+/// Frames that are in a folder, in their order.
+fn frames_in(folder: &Path) -> Vec<PathBuf> {
+    let entries = std::fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path());
+    let is_frame = |path: &PathBuf| {
+        let number = path.file_name().and_then(|name| name.to_str()?.strip_prefix("frame_")?.strip_suffix(".png"));
+        number.is_some_and(|number| !number.is_empty() && number.bytes().all(|byte| byte.is_ascii_digit()))
+    };
+    let mut frames: Vec<PathBuf> = entries.filter(is_frame).collect();
+    frames.sort();
+    frames
 }
 
 /// The frames as a film; `None` where there is no ffmpeg.
-fn film(folder: &Path, rate: f64) -> anyhow::Result<Option<PathBuf>> {
-    let out = folder.join("film.mp4");
-    let unfinished = Output::create(&out)?;
+fn film(folder: &Path, place: &Destination, rate: f64) -> anyhow::Result<Option<PathBuf>> {
+    let unfinished = place.begin()?;
     let rate = rate.to_string();
     let mut command = Command::new("ffmpeg");
     command.args(["-y", "-loglevel", "error", "-framerate", &rate, "-i"]).arg(folder.join("frame_%05d.png"));
@@ -134,7 +165,7 @@ fn film(folder: &Path, rate: f64) -> anyhow::Result<Option<PathBuf>> {
         Err(error) => Err(error).context("ffmpeg cannot be started"),
         Ok(ended) if ended.status.success() => {
             unfinished.finish()?;
-            Ok(Some(out))
+            Ok(Some(place.path().to_owned()))
         }
         Ok(ended) => {
             let complaints = String::from_utf8_lossy(&ended.stderr);

@@ -36,6 +36,9 @@ pub(crate) struct Replay {
     /// Writes the recording, its simulation and the gap as a new clip; for a session, a folder of clips.
     #[arg(long, value_name = "CLIP.MCAP")]
     out: Option<PathBuf>,
+    /// Replaces clips that are there already.
+    #[arg(long, requires = "out")]
+    force: bool,
     /// End when this process is no longer our parent.
     #[arg(long, hide = true)]
     parent: Option<u32>,
@@ -52,7 +55,7 @@ impl Replay {
             parent::when_gone(parent, ending::ask)?;
         }
         ctrlc::set_handler(ending::ask).context("cannot listen for Ctrl-C")?;
-        let gap = replay(&session, &Options { theta, out: self.out.clone() })?;
+        let gap = replay(&session, &Options { theta, out: self.out.clone(), force: self.force })?;
         for clip in &gap.clips {
             for warning in &clip.warnings {
                 console::line(format_args!("{}: {warning}", clip.file));

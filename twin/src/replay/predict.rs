@@ -11,6 +11,7 @@ use crate::scene::{MeshFileError, ObjectModel};
 use crate::sim::SimError;
 use shared_mem::cell::{Cell, ClipKind};
 use shared_mem::frames::{Base, Object, Pose};
+use shared_mem::output::OutputError;
 use shared_mem::recording::{Clip, ObjectSeries, ReadError};
 use shared_mem::theta::Theta;
 use shared_mem::time::seconds_between;
@@ -62,6 +63,9 @@ pub enum ReplayError {
     /// The object cannot be where the poses say.
     #[error("{0}: {1}")]
     Buried(String, Buried),
+    /// The simulated clip has no place.
+    #[error(transparent)]
+    Output(#[from] OutputError),
     /// The simulation left all bounds.
     #[error(
         "{0}: the simulated arm diverges; the damping may be too large for a 1 kHz controller or the inertia too small: check `damping` and `rotor_inertia`"

@@ -6,6 +6,7 @@ use super::write::write_clip;
 use rayon::prelude::*;
 use shared_mem::cell::ClipEntry;
 use shared_mem::ending;
+use shared_mem::output::{Destination, OutputError};
 use shared_mem::progress::Progress;
 use shared_mem::recording::{Session, WriteError};
 use shared_mem::theta::Theta;
@@ -19,6 +20,8 @@ pub struct Options {
     pub theta: Option<Theta>,
     /// Where simulated clips go: a file for a single clip, else a folder.
     pub out: Option<PathBuf>,
+    /// Whether clips that are there already are replaced.
+    pub force: bool,
 }
 
 /// One clip failed.
@@ -35,18 +38,24 @@ enum ClipError {
 /// Replays every clip of a session; clips that are not done when the process is asked to end ([`ending`]) are left out.
 ///
 /// # Errors
-/// [`ReplayError`] when cell.toml or the parameters cannot be used for any clip. What is wrong with a single clip is
+/// [`ReplayError`] when cell.toml or the parameters cannot be used for any clip, or the output has no place. What is wrong with a single clip is
 /// found in [`SessionGap::failures`].
 pub fn replay(session: &Session, options: &Options) -> Result<SessionGap, ReplayError> {
     let replayer = Replayer::new(&session.cell, options.theta.as_ref())?;
-    let (bar, done) = (Progress::new("replay", session.clips.len() as u64), AtomicU64::new(0));
     let single = session.clips.len() == 1;
+    let places = session.clips.iter().map(|entry| {
+        let out = options.out.as_deref().map(|out| if single { out.to_owned() } else { place(out, entry) });
+        out.map(|out| Destination::in_new_folder(&out, options.force)).transpose()
+    });
+    // All of them before the first is simulated.
+    let places: Vec<Option<Destination>> = places.collect::<Result<_, OutputError>>()?;
+    let (bar, done) = (Progress::new("replay", session.clips.len() as u64), AtomicU64::new(0));
     let results: Vec<_> = session
         .clips
         .par_iter()
-        .map(|entry| {
-            let out = options.out.as_deref().map(|out| if single { out.to_owned() } else { place(out, entry) });
-            let result = one(&replayer, session, entry, out.as_deref());
+        .zip(&places)
+        .map(|(entry, place)| {
+            let result = one(&replayer, session, entry, place.as_ref());
             let done = done.fetch_add(1, Ordering::Relaxed) + 1;
             bar.show(done, &format!("{done} of {} clips", session.clips.len()));
             (entry, result)
@@ -73,7 +82,12 @@ fn place(out: &Path, entry: &ClipEntry) -> PathBuf {
     out.join(name).with_extension("mcap")
 }
 
-fn one(replayer: &Replayer, session: &Session, entry: &ClipEntry, out: Option<&Path>) -> Result<ClipGap, ClipError> {
+fn one(
+    replayer: &Replayer,
+    session: &Session,
+    entry: &ClipEntry,
+    out: Option<&Destination>,
+) -> Result<ClipGap, ClipError> {
     let interrupted = || if ending::asked() { Err(ClipError::Interrupted) } else { Ok(()) };
     interrupted()?;
     let clip = session.read(entry).map_err(ReplayError::from);

@@ -6,24 +6,24 @@ use shared_mem::msg::arm::ArmState;
 use shared_mem::msg::joints_from;
 use shared_mem::msg::object::ObjectPose;
 use shared_mem::msg::twin::{TwinGap, TwinState};
-use shared_mem::output::Output;
+use shared_mem::output::{Destination, Output};
 use shared_mem::recording::{Clip, ClipInfo, ClipWriter, WriteError};
-use std::path::Path;
 
 /// Time over which [`TwinGap::joint_rms`] is taken [ns].
 const RMS_WINDOW_NS: u64 = 1_000_000_000;
 /// Stamps from here on are Unix time (that of 2001), those below a machine's monotonic clock [ns].
 const UNIX_FROM_NS: u64 = 1_000_000_000_000_000_000;
 
-/// Writes the clip and its simulation to the new file `path`, which is there when all of it is written; folders in between
-/// are made.
+/// Writes the clip and its simulation to a file, which is there when all of it is written.
 ///
 /// # Errors
-/// [`WriteError`] when the file exists already or the disk fails.
-pub fn write_clip(path: &Path, replayer: &Replayer, clip: &Clip, prediction: &Prediction) -> Result<(), WriteError> {
-    if let Some(folder) = path.parent() {
-        std::fs::create_dir_all(folder).map_err(|source| WriteError::Create { path: path.to_owned(), source })?;
-    }
+/// [`WriteError`] when the file appeared meanwhile or the disk fails.
+pub fn write_clip(
+    place: &Destination,
+    replayer: &Replayer,
+    clip: &Clip,
+    prediction: &Prediction,
+) -> Result<(), WriteError> {
     let info = ClipInfo {
         cell_toml: Some(replayer.cell().to_toml()),
         configuration: replayer.theta().map_or_else(String::new, |theta| theta.to_toml()),
@@ -31,7 +31,7 @@ pub fn write_clip(path: &Path, replayer: &Replayer, clip: &Clip, prediction: &Pr
         torques_begin_at_rows: !clip.torques_end_at_rows,
     };
     let begin = if in_unix_time(clip) { ClipWriter::whole_in_unix_time } else { ClipWriter::whole };
-    let mut writer = begin(Output::create_new(path)?, &info)?;
+    let mut writer = begin(place.begin()?, &info)?;
     let latency_ns = replayer.cell().camera.as_ref().map_or(0, |camera| (camera.latency * 1e9) as u64);
     Simulated { writer: &mut writer, replayer, clip, prediction, latency_ns, pose: 0 }.write()?;
     writer.finish()?;
