@@ -29,6 +29,11 @@ pub fn serve(source: &CameraSource, _cell: &Cell, _notices: Sender<Notice>) -> R
 ///
 /// # Errors
 /// Always, with the remedy.
-pub fn convert(bag: &Path, _camera: &Camera, _out: &Path, _info: &ClipInfo) -> Result<Converted, ConvertError> {
+pub fn convert(
+    bag: &Path,
+    _camera: &Camera,
+    (_out, _force): (&Path, bool),
+    _info: &ClipInfo,
+) -> Result<Converted, ConvertError> {
     Err(fault(&CameraSource::Bag(bag.to_owned())).into())
 }

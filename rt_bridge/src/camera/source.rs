@@ -52,12 +52,6 @@ pub enum ConvertError {
     /// What a pass wrote.
     #[error(transparent)]
     Read(#[from] ReadError),
-    /// There is a file already.
-    #[error("{} exists and is not overwritten; choose another name", path.display())]
-    Exists {
-        /// The file.
-        path: PathBuf,
-    },
     /// Nothing in it.
     #[error("{} holds no pair of colour and depth; record both streams", path.display())]
     Empty {

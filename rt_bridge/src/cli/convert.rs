@@ -25,6 +25,9 @@ pub(super) struct ConvertArguments {
     /// The new file
     #[arg(long, value_name = "CLIP.mcap")]
     out: PathBuf,
+    /// Replaces a file that is there already
+    #[arg(long)]
+    force: bool,
     /// Says where the camera stands, and rides along in the file
     #[arg(long, value_name = "cell.toml")]
     cell: Option<PathBuf>,
@@ -49,7 +52,7 @@ impl ConvertArguments {
             torques_begin_at_rows: false,
         };
         let camera = cell.and_then(|cell| cell.camera).unwrap_or_default();
-        let converted = convert(&self.bag, &camera, &self.out, &info)?;
+        let converted = convert(&self.bag, &camera, (&self.out, self.force), &info)?;
         if self.json {
             answer::json(&converted)?;
         } else {

@@ -24,6 +24,9 @@ pub(super) struct RecordArguments {
     /// The new file
     #[arg(long, value_name = "CLIP.mcap")]
     out: PathBuf,
+    /// Replaces a file that is there already
+    #[arg(long)]
+    force: bool,
     /// Rides along in the file, so that the clip explains itself
     #[arg(long, value_name = "cell.toml")]
     cell: Option<PathBuf>,
@@ -56,7 +59,8 @@ impl RecordArguments {
         };
         // The bridge that started this recorder may take its time, and answers for itself.
         let patience = self.parent.is_none().then_some(self.wait);
-        let settings = Settings { out: self.out, duration: self.duration, patience, parent: self.parent, info };
+        let (out, force, duration, parent) = (self.out, self.force, self.duration, self.parent);
+        let settings = Settings { out, force, duration, patience, parent, info };
         let recorded = record(&settings, &stop)?;
         if self.json {
             answer::json(&recorded)?;

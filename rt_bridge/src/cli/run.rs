@@ -10,6 +10,7 @@ use crate::wrench::WrenchChoice;
 use anyhow::{Result, bail};
 use clap::Args;
 use shared_mem::answer;
+use shared_mem::output::Destination;
 use shared_mem::quantity::seconds;
 use std::path::PathBuf;
 use std::time::Duration;
@@ -74,6 +75,9 @@ pub(super) struct RunArguments {
     /// Record everything on shared memory to this new file
     #[arg(long, value_name = "CLIP.mcap")]
     record: Option<PathBuf>,
+    /// Replaces the file of --record where it is there already
+    #[arg(long, requires = "record")]
+    force: bool,
     /// Stop after this many seconds
     #[arg(long, value_name = "S", value_parser = seconds)]
     duration: Option<Duration>,
@@ -93,6 +97,8 @@ impl RunArguments {
     pub(super) fn execute(self) -> Result<()> {
         // First of all: whoever started us may be killed at any moment.
         let stop = stop_flag(self.parent)?;
+        // Before an arm is asked to do anything.
+        Destination::of(self.record.as_deref(), self.force)?;
         let default = if matches!(self.arm, ArmChoice::Fci(_)) { Realtime::Enforce } else { Realtime::Ignore };
         let settings = Settings {
             cell: self.cell,
@@ -106,6 +112,7 @@ impl RunArguments {
             effects: self.effects,
             parameters: self.parameters,
             record: self.record,
+            force: self.force,
             duration: self.duration,
             realtime: self.realtime.unwrap_or(default),
         };

@@ -58,17 +58,18 @@ pub struct RecorderChild {
 }
 
 impl RecorderChild {
-    /// Starts a recorder for `file` and waits until it listens; `events` tells when.
+    /// Starts a recorder for `file`, in place of one that is there where it may (`force`), and waits until it listens; `events`
+    /// tells when.
     ///
     /// # Errors
     /// [`ChildError`] in the recorder's own words.
     pub fn start(
-        file: &Path,
+        (file, force): (&Path, bool),
         cell: &Path,
         configuration: String,
         events: &Subscriber<Event>,
     ) -> Result<Self, ChildError> {
-        let mut child = spawn(file, cell, &configuration).map_err(ChildError::Spawn)?;
+        let mut child = spawn((file, force), cell, &configuration).map_err(ChildError::Spawn)?;
         let begin = Instant::now();
         let wanted = announcement(file);
         loop {
@@ -111,7 +112,7 @@ impl RecorderChild {
             return Some(Change::Ended(words));
         }
         let next = numbered(&self.first, self.files.len() + 1);
-        match spawn(&next, &self.cell, &self.configuration) {
+        match spawn((&next, false), &self.cell, &self.configuration) {
             Ok(child) => {
                 self.running = Some(child);
                 self.files.push(next.clone());
@@ -147,10 +148,11 @@ impl RecorderChild {
     }
 }
 
-fn spawn(file: &Path, cell: &Path, configuration: &str) -> std::io::Result<Child> {
+fn spawn((file, force): (&Path, bool), cell: &Path, configuration: &str) -> std::io::Result<Child> {
     Command::new(std::env::current_exe()?)
         .args(["record", "--json", "--out"])
         .arg(file)
+        .args(force.then_some("--force"))
         .arg("--cell")
         .arg(cell)
         .args(["--configuration", configuration])

@@ -8,6 +8,7 @@ mod sources;
 use disk::{Room, room};
 use serde::Serialize;
 use shared_mem::msg::event::{Event, EventLevel, EventSource};
+use shared_mem::output::Destination;
 use shared_mem::parent;
 use shared_mem::recording::{ClipInfo, ClipWriter, WriteError, WriteSummary};
 use shared_mem::transport::{Node, Publisher, TransportError};
@@ -28,6 +29,8 @@ const ORPHAN_PATIENCE_NS: u64 = 1_500_000_000;
 pub struct Settings {
     /// The new file.
     pub out: PathBuf,
+    /// Whether it is replaced where it is there already.
+    pub force: bool,
     /// Stop after this long.
     pub duration: Option<Duration>,
     /// How long to wait for the first message; `None`: as long as it takes.
@@ -104,12 +107,14 @@ pub enum RecordError {
 /// with the reason in `stopped`.
 pub fn record(settings: &Settings, stop: &AtomicBool) -> Result<Recorded, RecordError> {
     let out = &settings.out;
+    let place = Destination::new(out, settings.force).map_err(WriteError::from)?;
     if let Room::TooLittleToStart { megabytes } | Room::TooLittleToGoOn { megabytes } = room(out) {
         return Err(RecordError::NoRoom { path: out.clone(), megabytes });
     }
     let node = Node::open("rt_bridge_recorder")?;
     let mut sources = Sources::open(&node)?;
     let events = node.publisher(topics::EVENTS)?;
+    place.clear().map_err(WriteError::from)?;
     let mut writer = ClipWriter::create(out, &settings.info)?;
     events.send(&Event::new(EventLevel::Info, EventSource::Recorder, &announcement(out)))?;
 

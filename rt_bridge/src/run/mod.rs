@@ -81,6 +81,8 @@ pub struct Settings {
     pub parameters: Option<PathBuf>,
     /// Record to this new file.
     pub record: Option<PathBuf>,
+    /// Whether that file is replaced where it is there already.
+    pub force: bool,
     /// Stop after this long.
     pub duration: Option<Duration>,
     /// What to do without real-time guarantees.
@@ -224,7 +226,12 @@ pub fn run(settings: &Settings, stop: &Arc<AtomicBool>) -> Result<RunReport> {
     let recorder = match &settings.record {
         Some(file) => {
             let events = node.subscriber(topics::EVENTS)?;
-            Some(RecorderChild::start(file, &settings.cell, settings.in_force(&devices.plan), &events)?)
+            Some(RecorderChild::start(
+                (file, settings.force),
+                &settings.cell,
+                settings.in_force(&devices.plan),
+                &events,
+            )?)
         }
         None => None,
     };

@@ -9,7 +9,7 @@ use crate::camera::{CameraSource, ConvertError, Converted};
 use crate::device::DeviceFault;
 use shared_mem::cell::Camera;
 use shared_mem::msg::image::{CameraInfo, ImageHeader};
-use shared_mem::output::Output;
+use shared_mem::output::{Destination, Output};
 use shared_mem::recording::{ClipInfo, ClipWriter};
 use shared_mem::time::now_ns;
 use std::collections::BTreeSet;
@@ -22,19 +22,22 @@ const FRUITLESS: u32 = 4;
 /// The synchroniser gives out no pair for the very first picture.
 const NEVER_PAIRED: usize = 1;
 
-/// Writes colour, aligned depth and intrinsics of `bag` to the new clip `out`. Stamps keep the distances of the camera's
+/// Writes colour, aligned depth and intrinsics of `bag` to the clip `out`; `force`: in place of one that is there. Stamps keep the distances of the camera's
 /// clock; `camera` says where the camera stands.
 ///
 /// # Errors
 /// [`ConvertError`] when the recording cannot be read or the clip not written.
-pub fn convert(bag: &Path, camera: &Camera, out: &Path, info: &ClipInfo) -> Result<Converted, ConvertError> {
-    if out.exists() {
-        return Err(ConvertError::Exists { path: out.to_owned() });
-    }
+pub fn convert(
+    bag: &Path,
+    camera: &Camera,
+    (out, force): (&Path, bool),
+    info: &ClipInfo,
+) -> Result<Converted, ConvertError> {
+    let place = Destination::new(out, force)?;
     let source = CameraSource::Bag(bag.to_owned());
     let recorded = depth_pictures(bag).map_err(|e| refused(&source, &e))?;
     let mut conversion = Conversion { source, camera, known: BTreeSet::new(), begin: None };
-    let mut passes = Passes::new(out);
+    let mut passes = Passes::new(place);
     let (mut played, mut fruitless) = (0, 0);
     while played < PASSES && fruitless < FRUITLESS && conversion.known.len() + NEVER_PAIRED < recorded {
         let known = conversion.known.len();

@@ -2,7 +2,7 @@
 
 use crate::camera::ConvertError;
 use shared_mem::msg::image::{CameraInfo, ImageHeader};
-use shared_mem::output::Output;
+use shared_mem::output::{Destination, Output};
 use shared_mem::recording::{ClipInfo, ClipMessages, ClipWriter, Payload, Picture, ReadError};
 use shared_mem::topics;
 use std::iter::Peekable;
@@ -16,19 +16,19 @@ pub(super) type Pair = [Pixels; 2];
 
 /// What the passes brought, beside the clip that they become and without a name yet.
 pub(super) struct Passes {
-    out: PathBuf,
+    out: Destination,
     files: Vec<Output>,
 }
 
 impl Passes {
     /// None yet.
-    pub(super) fn new(out: &Path) -> Self {
-        Self { out: out.to_owned(), files: Vec::new() }
+    pub(super) fn new(out: Destination) -> Self {
+        Self { out, files: Vec::new() }
     }
 
     /// Begins the clip of a pass.
     pub(super) fn begin(&self, info: &ClipInfo) -> Result<ClipWriter<Output>, ConvertError> {
-        Ok(ClipWriter::whole(Output::create_new(&self.out)?, info)?)
+        Ok(ClipWriter::whole(self.out.begin()?, info)?)
     }
 
     /// Keeps what a pass brought.
