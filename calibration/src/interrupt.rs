@@ -1,22 +1,51 @@
-//! What the user wants of long work while it runs: that it ends, or waits. Flags that the work looks at between steps, so
-//! that it can stop cleanly and keep what it has.
+//! What the user wants of long work while it runs: that it ends, waits, or takes no longer than so much. Flags that the work
+//! looks at between steps, so that it can stop cleanly and keep what it has. Where it does not come to look in time, the
+//! process says its farewell and ends without it.
 
-use shared_mem::console;
+use shared_mem::{console, ending, output};
 use signal_hook::consts::{SIGUSR1, SIGUSR2};
 use std::io;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
-use std::time::Duration;
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, Instant};
 
 /// How often paused work looks whether to go on.
 const LOOK: Duration = Duration::from_millis(20);
+/// How long work that keeps nothing beside its farewell may take until it has ended by itself.
+const PATIENCE: Duration = Duration::from_millis(400);
 
-/// Whether the user (or the system, with a signal) asked to end or to pause. Clones share the flags.
+/// Whether the user (or the system, with a signal) asked to end or to pause, or the time is spent. Clones share the flags.
 #[derive(Debug, Clone, Default)]
 pub struct Interrupt {
     end: Arc<AtomicBool>,
     /// 1 while paused.
     pause: Arc<AtomicUsize>,
+    deadline: Option<Instant>,
+    last: Arc<Mutex<Last>>,
+}
+
+/// What the process does and says at last where its work does not end by itself.
+type Farewell = Box<dyn FnOnce() -> String + Send>;
+
+/// Who ends the process.
+#[derive(Default)]
+enum Last {
+    /// Nobody yet; what is said where the work takes too long.
+    #[default]
+    Open,
+    Prepared(Farewell),
+    /// The work: it has come to its end.
+    Work,
+}
+
+impl std::fmt::Debug for Last {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::Open => "Open",
+            Self::Prepared(_) => "Prepared",
+            Self::Work => "Work",
+        })
+    }
 }
 
 /// Work cannot be interrupted.
@@ -43,8 +72,25 @@ impl Interrupt {
         Ok(interrupt)
     }
 
-    /// The same for work that ends where it is and keeps nothing that is not kept already: the end is asked of every reader
-    /// and every roll-out too ([`shared_mem::ending`]).
+    /// The same for work that says at its end what it has, and cuts short what it is doing: the end is asked of every reader and
+    /// every roll-out too ([`shared_mem::ending`]).
+    ///
+    /// # Errors
+    /// As [`Interrupt::listen`].
+    pub fn listen_and_cut_short() -> Result<Self, ListenError> {
+        let interrupt = Self::default();
+        let flag = interrupt.clone();
+        ctrlc::set_handler(move || {
+            // In this order: what the end of a reader leaves is seen to be no result.
+            flag.ask();
+            ending::ask();
+        })?;
+        interrupt.listen_to_pauses()?;
+        Ok(interrupt)
+    }
+
+    /// The same for work that ends where it is and keeps nothing that is not kept already: what does not come to look within
+    /// a moment is not waited for.
     ///
     /// # Errors
     /// As [`Interrupt::listen`].
@@ -53,10 +99,43 @@ impl Interrupt {
         let flag = interrupt.clone();
         ctrlc::set_handler(move || {
             flag.ask();
-            shared_mem::ending::ask();
+            ending::ask();
+            std::thread::sleep(PATIENCE);
+            flag.leave();
         })?;
         interrupt.listen_to_pauses()?;
         Ok(interrupt)
+    }
+
+    /// What is to be done at last where the work is interrupted and does not end by itself in time; it gives the words.
+    pub fn prepare(&self, farewell: impl FnOnce() -> String + Send + 'static) {
+        let mut last = self.last.lock().unwrap_or_else(PoisonError::into_inner);
+        if !matches!(*last, Last::Work) {
+            *last = Last::Prepared(Box::new(farewell));
+        }
+    }
+
+    /// The work has come to its end: from here on it is waited for, whatever it still writes.
+    pub fn work_is_over(&self) {
+        *self.last.lock().unwrap_or_else(PoisonError::into_inner) = Last::Work;
+    }
+
+    /// Ends the process, unless its work has come to its end by itself.
+    fn leave(&self) {
+        // Held to the end: the work waits here, should it come to its end now.
+        let mut last = self.last.lock().unwrap_or_else(PoisonError::into_inner);
+        let words = match std::mem::take(&mut *last) {
+            Last::Work => {
+                *last = Last::Work;
+                return;
+            }
+            Last::Open => "interrupted; start again".to_owned(),
+            Last::Prepared(farewell) => farewell(),
+        };
+        output::discard_unfinished();
+        console::line(format_args!("calibration: {words}"));
+        console::flush();
+        std::process::exit(1);
     }
 
     fn listen_to_pauses(&self) -> io::Result<()> {
@@ -68,13 +147,32 @@ impl Interrupt {
 
     /// Asks for the end.
     pub fn ask(&self) {
-        self.end.store(true, Ordering::Relaxed);
+        self.end.store(true, Ordering::SeqCst);
     }
 
-    /// Whether the end was asked for.
+    /// The same, for work that shall end once so much time is over, too.
+    #[must_use]
+    pub fn within(&self, budget: Option<Duration>) -> Self {
+        let deadline = budget.and_then(|budget| Instant::now().checked_add(budget));
+        Self { deadline, ..self.clone() }
+    }
+
+    /// Whether the end was asked for, or the time is spent.
     #[must_use]
     pub fn asked(&self) -> bool {
-        self.end.load(Ordering::Relaxed)
+        self.cancelled() || self.spent()
+    }
+
+    /// Whether the end was asked for: nobody waits for an answer any more.
+    #[must_use]
+    pub fn cancelled(&self) -> bool {
+        self.end.load(Ordering::SeqCst)
+    }
+
+    /// Whether the time is spent: the best answer so far is waited for.
+    #[must_use]
+    pub fn spent(&self) -> bool {
+        self.deadline.is_some_and(|deadline| Instant::now() >= deadline)
     }
 
     /// Asks for a pause, or to go on.
@@ -124,5 +222,15 @@ mod tests {
         interrupt.ask();
         interrupt.wait_out_pause();
         assert!(interrupt.asked());
+    }
+
+    #[test]
+    fn a_budget_that_is_spent_asks_for_the_end_of_its_own_work_alone() {
+        let whole = Interrupt::default();
+        let (spent, ample) = (whole.within(Some(Duration::ZERO)), whole.within(Some(Duration::from_secs(3600))));
+        assert!(spent.asked() && spent.spent() && !spent.cancelled());
+        assert!(!ample.asked() && !whole.within(None).asked() && !whole.asked());
+        whole.ask();
+        assert!(ample.cancelled() && !ample.spent());
     }
 }

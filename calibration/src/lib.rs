@@ -13,8 +13,10 @@
 //! | [`identify`] | the parameters that a session tells, and what it cannot tell |
 //! | [`report`] | pages with plots |
 //! | [`viewpoint`] | the camera's pose from pictures of the robot |
+//! | [`typed`] | commands as they are typed |
 //! | [`processes`] | the other programs as children |
-//! | [`interrupt`] | Ctrl-C |
+//! | [`interrupt`] | Ctrl-C, and a budget of time |
+//! | [`kept`] | what long work has found so far, for when it is interrupted |
 
 pub mod benchmark;
 pub mod capture;
@@ -24,7 +26,9 @@ pub mod estimate;
 pub mod forward;
 pub mod identify;
 pub mod interrupt;
+pub mod kept;
 pub mod keys;
 pub mod processes;
 pub mod report;
+pub mod typed;
 pub mod viewpoint;

@@ -6,7 +6,7 @@ use calibration::interrupt::Interrupt;
 use calibration::report::terminal;
 use clap::{Subcommand, ValueEnum};
 use shared_mem::console;
-use shared_mem::output;
+use shared_mem::output::{Destination, OutputError};
 use std::path::{Path, PathBuf};
 
 #[derive(Debug, Subcommand)]
@@ -22,7 +22,8 @@ pub(super) enum Identify {
 The recorded commands are simulated until the twin's joints move as the robot's did. A quarter of the motions is held
 out: the error on them is what the twin is worth. What the clips cannot tell is said, with the reason.
 
-Ctrl-C keeps what was found so far beside --out; the same command goes on from there.
+Ctrl-C keeps what was found so far, beside --out or in the session's folder; the same command goes on from there, and ends
+where it would have ended. What no clip tells is not written.
 
 Examples:
   calibration identify arm monday --out theta.toml --report page.html
@@ -38,6 +39,9 @@ pub(super) struct ArmArguments {
     /// Where the parameters go: a theta.toml that every other command takes.
     #[arg(long, value_name = "THETA.TOML")]
     out: Option<PathBuf>,
+    /// Replaces the files of --out and --report; of a theta.toml, comments and what is not found stay.
+    #[arg(long)]
+    force: bool,
     /// Parameters that are known already.
     #[arg(long, value_name = "THETA.TOML")]
     parameters: Option<PathBuf>,
@@ -64,7 +68,8 @@ The recorded commands are simulated, hit and slide included, until object and ar
 found first, from the way to the object in the same clips, unless --parameters brings them. A quarter of the strokes is
 held out. Clips in which the object topples, is lost or not hit are left out, and that is said; so is what cannot be told.
 
-Ctrl-C keeps what was found so far beside --out; the same command goes on from there.
+Ctrl-C keeps what was found so far, beside --out or in the session's folder; the same command goes on from there, and ends
+where it would have ended. What no clip tells is not written.
 
 Examples:
   calibration identify object strokes --out theta.toml --report page.html
@@ -79,6 +84,9 @@ pub(super) struct ObjectArguments {
     /// Where the parameters go: a theta.toml that every other command takes.
     #[arg(long, value_name = "THETA.TOML")]
     out: Option<PathBuf>,
+    /// Replaces the files of --out and --report; of a theta.toml, comments and what is not found stay.
+    #[arg(long)]
+    force: bool,
     /// Parameters that are known already: the arm's gains, effects.
     #[arg(long, value_name = "THETA.TOML")]
     parameters: Option<PathBuf>,
@@ -120,24 +128,33 @@ impl Way {
 pub(super) fn run(identify: Identify, interrupt: &Interrupt) -> anyhow::Result<()> {
     match identify {
         Identify::Arm(arguments) => {
-            let ArmArguments { session, optimizer, out, parameters, also, budget, seed, json, report } = arguments;
+            let ArmArguments { session, optimizer, out, force, parameters, also, budget, seed, json, report } =
+                arguments;
+            let page = places(out.as_deref(), report.as_deref(), force)?;
             let (optimizer, budget) = (optimizer.optimizer(), budget as usize);
             let options = arm::Options { session, optimizer, out, parameters, also, budget, seed };
-            tell(&arm::identify(&options, interrupt)?, report.as_deref(), json)
+            tell(&arm::identify(&options, interrupt)?, page, json)
         }
         Identify::Object(arguments) => {
-            let ObjectArguments { session, optimizer, out, parameters, budget, seed, json, report } = arguments;
+            let ObjectArguments { session, optimizer, out, force, parameters, budget, seed, json, report } = arguments;
+            let page = places(out.as_deref(), report.as_deref(), force)?;
             let (optimizer, budget) = (optimizer.optimizer(), budget as usize);
             let options = object::Options { session, optimizer, out, parameters, budget, seed };
-            tell(&object::identify(&options, interrupt)?, report.as_deref(), json)
+            tell(&object::identify(&options, interrupt)?, page, json)
         }
     }
 }
 
-fn tell(found: &Identification, report: Option<&Path>, json: bool) -> anyhow::Result<()> {
+/// Looks at where the outputs go, before they are worked out; the page's place.
+fn places(out: Option<&Path>, report: Option<&Path>, force: bool) -> Result<Option<Destination>, OutputError> {
+    Destination::of(out, force)?;
+    Destination::of(report, force)
+}
+
+fn tell(found: &Identification, page: Option<Destination>, json: bool) -> anyhow::Result<()> {
     let sheet = found.sheet();
-    if let Some(report) = report {
-        output::write(report, sheet.page())?;
+    if let Some(page) = page {
+        page.write(sheet.page())?;
     }
     console::block(terminal::identification(&sheet));
     if json { print_json(found) } else { Ok(()) }

@@ -5,6 +5,7 @@ use super::advice::{Advice, Capture};
 use crate::capture::body::Body;
 use crate::capture::session::number_of;
 use crate::capture::{limits, pace, recorded};
+use crate::typed::quoted;
 use shared_mem::cell::ClipKind;
 use shared_mem::recording::Session;
 use std::path::Path;
@@ -164,28 +165,9 @@ fn capture_into(verb: &str, cell: &str, folder: &str, rest: &str) -> String {
     format!("calibration capture {verb} --cell {} --out {} {rest}", quoted(cell), quoted(folder))
 }
 
-/// A path as a shell takes it for one word that is no option.
-fn quoted(path: &str) -> String {
-    let path = if path.starts_with('-') { format!("./{path}") } else { path.to_owned() };
-    let plain = |c: char| c.is_ascii_alphanumeric() || "_-./+=:@%,".contains(c);
-    if !path.is_empty() && path.chars().all(plain) { path } else { format!("'{}'", path.replace('\'', "'\\''")) }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn a_folder_of_any_name_is_one_word_for_the_shell() {
-        for name in ["plain/session_1", "two words", "it's", "-x", "$HOME", "a;b", "ü"] {
-            let output = std::process::Command::new("sh")
-                .args(["-c", &format!("printf '[%s]' {}", quoted(name))])
-                .output()
-                .expect("a shell");
-            let expected = if name == "-x" { "[./-x]".to_owned() } else { format!("[{name}]") };
-            assert_eq!(String::from_utf8_lossy(&output.stdout), expected);
-        }
-    }
 
     #[test]
     fn where_nothing_can_be_repeated_new_clips_take_its_place() {

@@ -5,6 +5,7 @@ use super::problem::{ClipModel, Impossible, Random, Unknown};
 use super::views::{Counted, Given, Subset};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
 /// When to stop.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -23,7 +24,7 @@ impl Default for Options {
 }
 
 /// The best numbers found, and every clip linearised there.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Fit {
     /// The shared numbers, in the order of the unknowns.
     pub shared: Vec<f64>,
@@ -93,26 +94,64 @@ pub fn fit_from(
     options: &Options,
     watch: impl Fn(f64, &[f64]) -> bool,
 ) -> Result<Fit, Impossible> {
+    let now = begin(model, (unknowns, random), (shared, own))?;
+    go_on(model, (unknowns, random), now, options, |now| watch(now.fit.deviance(), &now.fit.shared))
+}
+
+/// A fit on its way: all that it takes to go on from here as if it had never stopped.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct Underway {
+    /// The best numbers so far.
+    pub fit: Fit,
+    damping: f64,
+}
+
+/// A fit before its first step: the clips linearised at the start.
+///
+/// # Errors
+/// As [`fit`].
+pub fn begin(
+    model: &impl ClipModel,
+    (unknowns, random): (&[Unknown], &[Random]),
+    (shared, own): (Vec<f64>, Vec<Vec<f64>>),
+) -> Result<Underway, Impossible> {
     let counted = Counted::new(model);
     let clips = linearise(&counted, unknowns, random, &shared, &own)?;
-    let mut best = Fit { shared, clips, converged: false, evaluations: 0, history: Vec::new() };
-    best.history.push(best.deviance());
-    let mut damping = 1e-6;
-    for _ in 0..options.iterations {
-        if !watch(best.deviance(), &best.shared) {
+    let mut fit = Fit { shared, clips, converged: false, evaluations: counted.calls(), history: Vec::new() };
+    fit.history.push(fit.deviance());
+    Ok(Underway { fit, damping: 1e-6 })
+}
+
+/// A fit from where it is to its end; `watch` sees it before every step.
+///
+/// # Errors
+/// As [`fit`].
+pub fn go_on(
+    model: &impl ClipModel,
+    (unknowns, random): (&[Unknown], &[Random]),
+    mut now: Underway,
+    options: &Options,
+    watch: impl Fn(&Underway) -> bool,
+) -> Result<Fit, Impossible> {
+    let counted = Counted::new(model);
+    let before = now.fit.evaluations;
+    while now.fit.history.len() <= options.iterations {
+        if !watch(&now) {
             break;
         }
-        match improve(&counted, unknowns, random, &mut best, &mut damping, options.tolerance)? {
-            Progress::Better => best.history.push(best.deviance()),
+        let Underway { fit, damping } = &mut now;
+        let progress = improve(&counted, unknowns, random, fit, damping, options.tolerance)?;
+        fit.evaluations = before + counted.calls();
+        match progress {
+            Progress::Better => fit.history.push(fit.deviance()),
             Progress::Arrived => {
-                best.converged = true;
+                fit.converged = true;
                 break;
             }
             Progress::Stuck => break,
         }
     }
-    best.evaluations = counted.calls();
-    Ok(best)
+    Ok(now.fit)
 }
 
 /// Every clip at shared numbers that are given, its own numbers at their best: how clips that were not fitted are judged.
@@ -330,6 +369,28 @@ mod tests {
         let model = Decay { offsets: vec![0.0], a: 12.0, b: 0.7 };
         let fit = fit(&model, &unknowns(1.0, 0.1), &[], &Options::default(), |_, _| true).expect("an answer");
         assert_eq!(fit.shared[0], 10.0);
+    }
+
+    #[test]
+    fn a_fit_that_was_stopped_goes_on_to_the_same_bits() {
+        let model = Decay { offsets: vec![0.1, -0.05, 0.02], a: 2.0, b: 0.7 };
+        let (unknowns, random, options) = (unknowns(1.0, 0.1), [OFFSET], Options::default());
+        let whole = fit(&model, &unknowns, &random, &options, |_, _| true).expect("an answer");
+        assert!(whole.history.len() > 4, "{:?}", whole.history);
+        for steps in 1..whole.history.len() {
+            let stopped = std::cell::RefCell::new(None);
+            let own = vec![vec![0.0]; 3];
+            let start = begin(&model, (&unknowns, &random), (vec![1.0, 0.1], own)).expect("an answer");
+            let told = |now: &Underway| {
+                *stopped.borrow_mut() = Some(now.clone());
+                now.fit.history.len() <= steps
+            };
+            go_on(&model, (&unknowns, &random), start, &options, told).expect("an answer");
+            let kept = stopped.into_inner().expect("it was told");
+            let resumed = go_on(&model, (&unknowns, &random), kept, &options, |_| true).expect("an answer");
+            assert_eq!((&resumed.shared, &resumed.history), (&whole.shared, &whole.history));
+            assert_eq!((resumed.evaluations, resumed.converged), (whole.evaluations, whole.converged));
+        }
     }
 
     #[test]

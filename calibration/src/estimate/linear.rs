@@ -5,11 +5,13 @@
 //! Schur complement. Its log-likelihood is that of a Gaussian whose covariance is `1 + B L^-1 B'`.
 
 use super::problem::{ClipModel, Impossible, Random, Unknown};
+use crate::kept::numbers::{matrix, vector, vectors};
 use nalgebra::{Cholesky, DMatrix, DVector};
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
 /// A clip, linearised. `P` shared numbers, `Q` own ones.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct ClipFit {
     /// Number of residuals.
     pub rows: usize,
@@ -18,17 +20,23 @@ pub struct ClipFit {
     /// The clip's own numbers there, `Q`.
     pub own: Vec<f64>,
     /// Their covariance given the shared ones, `Q x Q`.
+    #[serde(with = "matrix")]
     pub own_covariance: DMatrix<f64>,
     /// `-2 ln` of the clip's likelihood with the own numbers integrated out, without the constant of the noise.
     pub deviance: f64,
     /// Half the slope of [`Self::deviance`] by the shared numbers, `P` (the volume term taken as constant).
+    #[serde(with = "vector")]
     pub gradient: DVector<f64>,
     /// Information on the shared numbers, `P x P`.
+    #[serde(with = "matrix")]
     pub information: DMatrix<f64>,
     /// What each stretch of the clip adds to [`Self::gradient`]; a single one where the model tells no stretches.
+    #[serde(with = "vectors")]
     pub scores: Vec<DVector<f64>>,
     /// How the own numbers answer to the shared ones and where they want to go: [`ClipFit::own_part_way`].
+    #[serde(with = "vector")]
     own_step: DVector<f64>,
+    #[serde(with = "matrix")]
     own_answer: DMatrix<f64>,
 }
 

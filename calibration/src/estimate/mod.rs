@@ -32,7 +32,7 @@ mod views;
 
 pub use evolution::Evolution;
 pub use interval::{Intervals, at_bounds};
-pub use least_squares::{Fit, Options, fit, fit_from, score};
+pub use least_squares::{Fit, Options, Underway, begin, fit, fit_from, go_on, score};
 pub use leverage::without_leaning;
 pub use linear::ClipFit;
 pub use problem::{ClipModel, Impossible, Random, Unknown};

@@ -1,16 +1,15 @@
-//! One search over clips: by least squares or without slopes, with a bar, and so that Ctrl-C loses nothing: what was
-//! found so far lies in a file beside the answer, and the same command goes on from there.
+//! One search over clips: by least squares or without slopes, with a bar, and so that Ctrl-C loses nothing: every step is kept
+//! ([`Kept`]), and the same command goes on from there to the same answer.
 
 use crate::estimate::search;
 use crate::estimate::{
-    ClipModel, Evolution, Fit, Found, Impossible, Options, Random, Search, Swarm, Unknown, fit_from, minimise,
+    ClipModel, Evolution, Fit, Found, Impossible, Options, Random, Search, Swarm, Underway, Unknown, begin, fit_from,
+    go_on, minimise,
 };
 use crate::interrupt::Interrupt;
-use serde::{Deserialize, Serialize};
-use shared_mem::input;
-use shared_mem::output::{self, OutputError};
+use crate::kept::{Fingerprint, Kept};
+use crate::typed;
 use shared_mem::progress::Progress;
-use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
@@ -50,9 +49,7 @@ pub(super) struct Run<'a> {
     pub(super) seed: u64,
     /// Points whose cost a search without slopes may ask for.
     pub(super) budget: usize,
-    /// What is searched where: a file of another search is not gone on from.
-    pub(super) fingerprint: String,
-    pub(super) state: Option<&'a Path>,
+    pub(super) kept: &'a Kept,
     pub(super) interrupt: &'a Interrupt,
 }
 
@@ -72,32 +69,19 @@ pub enum RunError {
     /// The model.
     #[error("the twin cannot be simulated: {0}; check the values of cell.toml and --parameters")]
     Impossible(#[from] Impossible),
-    /// Ctrl-C.
-    #[error("interrupted{}", .0.as_ref().map_or_else(
-        || "; with --out FILE it would have been kept".to_owned(),
-        |state| format!("; the same command goes on from {}", state.display())
-    ))]
-    Interrupted(Option<PathBuf>),
-    /// Ctrl-C behind the search.
-    #[error("interrupted before the answer was written; start again")]
-    Ended,
-    /// The state cannot be kept.
-    #[error(transparent)]
-    State(#[from] OutputError),
+    /// Ctrl-C. What was found is kept, and the words say where.
+    #[error("{0}")]
+    Interrupted(String),
 }
 
-/// What is kept of an unfinished search.
-#[derive(Debug, Default, Serialize, Deserialize)]
-struct State {
-    fingerprint: String,
-    shared: Option<Vec<f64>>,
-    told: Vec<Vec<f64>>,
+/// Steps of a search, by name.
+fn step(name: &str) -> Fingerprint {
+    Fingerprint::of(name)
 }
 
 impl Run<'_> {
     /// Searches; `model` has the clips to be fitted, `first` those of them that a rough fit may begin with.
     pub(super) fn search<M: ClipModel>(&self, model: &M, first: &impl ClipModel) -> Result<Outcome, RunError> {
-        let state = self.read_state();
         let per_point = model.clips();
         let expected = match self.optimizer {
             Optimizer::LeastSquares => USUAL_LINEARISATIONS * (1 + self.unknowns.len()) * per_point,
@@ -105,23 +89,17 @@ impl Run<'_> {
         };
         let watch = Watch::new(expected, self.interrupt);
         let outcome = match self.optimizer {
-            Optimizer::LeastSquares => self.least_squares(&watch, model, first, state),
+            Optimizer::LeastSquares => self.least_squares(&watch, model, first),
             Optimizer::Swarm => {
                 let swarm = Swarm::new(&search::start(self.unknowns), self.seed);
-                self.without_slopes(&watch, model, swarm, state)
+                self.without_slopes(&watch, model, swarm)
             }
             Optimizer::Evolution => {
                 let evolution = Evolution::new(&search::start(self.unknowns), self.seed);
-                self.without_slopes(&watch, model, evolution, state)
+                self.without_slopes(&watch, model, evolution)
             }
         };
-        if self.interrupt.asked() {
-            return Err(RunError::Interrupted(self.state.map(Path::to_owned)));
-        }
-        if let (Some(path), Ok(_)) = (self.state, &outcome) {
-            // A state that is not there need not be removed.
-            let _ = std::fs::remove_file(path);
-        }
+        stopped(self.kept, self.interrupt)?;
         outcome
     }
 
@@ -130,40 +108,38 @@ impl Run<'_> {
         watch: &Watch<'_>,
         model: &M,
         first: &impl ClipModel,
-        state: State,
     ) -> Result<Outcome, RunError> {
         let start: Vec<f64> = self.unknowns.iter().map(|unknown| unknown.start).collect();
-        let own = |model: &dyn Fn() -> usize| vec![vec![0.0; self.random.len()]; model()];
-        let shared = match state.shared {
-            Some(shared) => shared,
-            None if first.clips() < model.clips() => {
-                let few = Watched { model: first, watch };
-                let options = Options { iterations: 3, ..Options::default() };
-                let from = (start, own(&|| first.clips()));
-                fit_from(&few, self.unknowns, self.random, from, &options, |_, _| !self.interrupt.asked())?.shared
-            }
-            None => start,
-        };
-        let (convergence, failed) = (Mutex::new(Vec::new()), Mutex::new(None));
+        let nothing = |clips: usize| vec![vec![0.0; self.random.len()]; clips];
         let all = Watched { model, watch };
-        let rows = AtomicUsize::new(1);
-        let from = (shared, own(&|| model.clips()));
-        let fit = fit_from(&all, self.unknowns, self.random, from, &Options::default(), |deviance, shared| {
-            let point = [watch.simulated() as f64, deviance];
-            convergence.lock().expect("no holder panics").push(point);
-            let kept = State { shared: Some(shared.to_vec()), told: Vec::new(), fingerprint: self.fingerprint.clone() };
-            if let Err(error) = self.keep(&kept) {
-                *failed.lock().expect("no holder panics") = Some(error);
-                return false;
+        type Way = (Underway, Vec<[f64; 2]>);
+        let (now, way): Way = match self.kept.known(&step("way")) {
+            Some(known) => known,
+            None => {
+                let start = if first.clips() < model.clips() {
+                    let few = Watched { model: first, watch };
+                    let options = Options { iterations: 3, ..Options::default() };
+                    let from = (start, nothing(first.clips()));
+                    fit_from(&few, self.unknowns, self.random, from, &options, |_, _| !self.interrupt.asked())?.shared
+                } else {
+                    start
+                };
+                (begin(&all, (self.unknowns, self.random), (start, nothing(model.clips())))?, Vec::new())
             }
+        };
+        watch.already(way.last().map_or(0, |[simulated, _]| *simulated as usize));
+        let way = Mutex::new(way);
+        let fit = go_on(&all, (self.unknowns, self.random), now, &Options::default(), |now| {
+            let mut way = way.lock().expect("no holder panics");
+            // Once: what is gone on from stands there already.
+            if way.len() < now.fit.history.len() {
+                way.push([watch.simulated() as f64, now.fit.deviance()]);
+            }
+            self.kept.keep(&step("way"), &(now, &*way));
             !self.interrupt.asked()
         })?;
-        if let Some(error) = failed.into_inner().expect("no holder panics") {
-            return Err(error);
-        }
-        rows.store(fit.clips.iter().map(|clip| clip.rows).sum::<usize>().max(1), Ordering::Relaxed);
-        let rows = rows.into_inner() as f64;
-        let mut convergence = convergence.into_inner().expect("no holder panics");
+        let rows = fit.clips.iter().map(|clip| clip.rows).sum::<usize>().max(1) as f64;
+        let mut convergence = way.into_inner().expect("no holder panics");
         convergence.iter_mut().for_each(|point| point[1] /= rows);
         let arrived = fit.converged;
         Ok(Outcome { fit, simulated: watch.simulated(), convergence, arrived })
@@ -174,34 +150,34 @@ impl Run<'_> {
         watch: &Watch<'_>,
         model: &M,
         mut search: impl Search,
-        mut state: State,
     ) -> Result<Outcome, RunError> {
         let all = Watched { model, watch };
-        let told = std::mem::take(&mut state.told);
-        state = State { fingerprint: self.fingerprint.clone(), shared: None, told: told.clone() };
-        let mut failed = None;
-        let mut convergence = Vec::new();
+        let told: Vec<Vec<f64>> = self.kept.known(&step("told")).unwrap_or_default();
+        watch.already(told.iter().map(Vec::len).sum::<usize>() * model.clips());
+        let mut so_far = told.clone();
         let found: Found = minimise(
             &mut search,
             self.unknowns,
             self.budget,
             &told,
             |x| self.cost(&all, x),
-            |costs, best| {
+            |costs, _| {
                 if self.interrupt.asked() {
                     return false;
                 }
-                state.told.push(costs.to_vec());
-                convergence.push([watch.simulated() as f64, best.cost]);
-                failed = self.keep(&state).err();
-                failed.is_none()
+                so_far.push(costs.to_vec());
+                self.kept.keep(&step("told"), &so_far);
+                true
             },
         );
-        if let Some(error) = failed {
-            return Err(error);
-        }
         let own = vec![vec![0.0; self.random.len()]; model.clips()];
         let once = Options { iterations: 0, ..Options::default() };
+        let mut simulated = 0;
+        let point = |(costs, best): (&Vec<f64>, &f64)| {
+            simulated += costs.len() * model.clips();
+            [simulated as f64, *best]
+        };
+        let convergence = so_far.iter().zip(&found.history).map(point).collect();
         let fit = fit_from(&all, self.unknowns, self.random, (found.numbers, own), &once, |_, _| true)?;
         Ok(Outcome { fit, simulated: watch.simulated(), convergence, arrived: found.arrived })
     }
@@ -219,39 +195,11 @@ impl Run<'_> {
         }
         sum / rows.max(1) as f64
     }
+}
 
-    /// The numbers that an interrupted search of another kind kept.
-    pub(super) fn kept_numbers(&self) -> Option<Vec<f64>> {
-        self.read_state().shared.filter(|shared| shared.len() == self.unknowns.len())
-    }
-
-    /// Keeps numbers for [`Run::kept_numbers`].
-    pub(super) fn keep_numbers(&self, shared: &[f64]) -> Result<(), RunError> {
-        let shared = Some(shared.to_vec());
-        self.keep(&State { shared, told: Vec::new(), fingerprint: self.fingerprint.clone() })
-    }
-
-    /// The end of a search of another kind: its state is not needed any more, unless it was interrupted.
-    pub(super) fn finished(&self) -> Result<(), RunError> {
-        if self.interrupt.asked() {
-            return Err(RunError::Interrupted(self.state.map(Path::to_owned)));
-        }
-        if let Some(path) = self.state {
-            // A state that is not there need not be removed.
-            let _ = std::fs::remove_file(path);
-        }
-        Ok(())
-    }
-
-    fn read_state(&self) -> State {
-        let read = |path: &Path| serde_json::from_slice::<State>(&input::bytes(path, input::Kind::List).ok()?).ok();
-        self.state.and_then(read).filter(|state| state.fingerprint == self.fingerprint).unwrap_or_default()
-    }
-
-    fn keep(&self, state: &State) -> Result<(), RunError> {
-        let Some(path) = self.state else { return Ok(()) };
-        Ok(output::write(path, serde_json::to_vec(state).expect("numbers have a JSON form"))?)
-    }
+/// Whether the user asked for the end: then what was found so far is taken to its file.
+pub(super) fn stopped(kept: &Kept, interrupt: &Interrupt) -> Result<(), RunError> {
+    if interrupt.asked() { Err(RunError::Interrupted(kept.farewell(&typed::command()))) } else { Ok(()) }
 }
 
 /// The bar and the interruption of a search.
@@ -267,6 +215,11 @@ impl<'a> Watch<'a> {
     fn new(expected: usize, interrupt: &'a Interrupt) -> Self {
         let bar = Progress::new("identify", expected as u64);
         Self { done: AtomicUsize::new(0), expected, began: Instant::now(), bar, interrupt }
+    }
+
+    /// So many were simulated before the search was interrupted.
+    fn already(&self, simulated: usize) {
+        self.done.fetch_add(simulated, Ordering::Relaxed);
     }
 
     fn simulated(&self) -> usize {

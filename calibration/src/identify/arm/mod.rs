@@ -21,16 +21,17 @@ mod start;
 mod verdict;
 
 use super::answer::Identification;
-use super::run::{Optimizer, Outcome, Run, RunError};
+use super::run::{Optimizer, Outcome, Run, RunError, stopped};
 use crate::estimate::{Random, Subset, Unknown};
 use crate::forward::arm::ArmClips;
 use crate::forward::setting::{BaseError, complete, effect_settings, gains};
 use crate::forward::{Setting, Settings};
 use crate::interrupt::Interrupt;
+use crate::kept::{self, Fingerprint, Kept};
 use finding::Finding;
 use session::Material;
 use shared_mem::cell::Cell;
-use shared_mem::output::{self, OutputError};
+use shared_mem::output::OutputError;
 use shared_mem::recording::{Clip, ReadError};
 use shared_mem::theta::Theta;
 use shared_mem::toml_file::TomlFileError;
@@ -126,17 +127,39 @@ pub fn identify_clips(
     identify_material(Material { cell: cell.clone(), clips, left_out: Vec::new() }, options, interrupt)
 }
 
-fn identify_material(
-    Material { cell, clips, left_out }: Material,
-    options: &Options,
-    interrupt: &Interrupt,
-) -> Result<Identification, ArmError> {
+fn identify_material(material: Material, options: &Options, interrupt: &Interrupt) -> Result<Identification, ArmError> {
     let began = Instant::now();
-    if cell.robot.is_none() || cell.controller.is_none() {
-        return Err(ArmError::NoArm(if cell.robot.is_none() { "[robot]" } else { "[controller]" }));
+    if material.cell.robot.is_none() || material.cell.controller.is_none() {
+        return Err(ArmError::NoArm(if material.cell.robot.is_none() { "[robot]" } else { "[controller]" }));
     }
     let given = options.parameters.as_deref().map(Theta::read).transpose()?;
-    let base = complete(&cell, given.as_ref())?;
+    let question = Fingerprint::of("identify arm")
+        .with(&(options.optimizer.name(), options.budget, options.seed, &options.also))
+        .with(&(material.cell.to_toml(), given.as_ref().map(Theta::to_toml)))
+        .with_clips(&material.clips);
+    let kept = kept::for_work((options.out.as_deref(), &options.session, "identify_arm"), &question, interrupt);
+    let found = identify_kept(material, given.as_ref(), options, (&kept, interrupt));
+    interrupt.work_is_over();
+    // What work says that was cut short is no answer.
+    stopped(&kept, interrupt)?;
+    let (mut answer, theta) = found?;
+    if let Some(out) = &options.out {
+        theta.write(out)?;
+        answer.theta_file = out.display().to_string();
+    }
+    kept.done();
+    answer.seconds = began.elapsed().as_secs_f64();
+    Ok(answer)
+}
+
+/// The answer, and the parameters that are written.
+fn identify_kept(
+    Material { cell, clips, left_out }: Material,
+    given: Option<&Theta>,
+    options: &Options,
+    (kept, interrupt): (&Kept, &Interrupt),
+) -> Result<(Identification, Theta), ArmError> {
+    let base = complete(&cell, given)?;
     let (settings, mut unknowns): (Vec<_>, Vec<_>) = searched(&cell, &base, &options.also)?.into_iter().unzip();
     let settings = Settings::new(base, settings);
     let numbers: Numbers<'_> = Box::new(|shared| settings.theta(shared));
@@ -145,8 +168,13 @@ fn identify_material(
     let free = unknowns.clone();
     session::hold_dead(&model, &clips, settings.settings(), &mut unknowns);
     let before: Vec<f64> = unknowns.iter().map(|unknown| unknown.start).collect();
-    start::improve(&cell, &model, &clips.split.train, settings.settings(), &mut unknowns, interrupt);
-    saturation::improve(&model, &clips.split.train, settings.settings(), &mut unknowns, interrupt);
+    let starts: Vec<f64> = kept.once(&Fingerprint::of("starts"), || {
+        let mut unknowns = unknowns.clone();
+        start::improve(&cell, &model, &clips.split.train, settings.settings(), &mut unknowns, interrupt);
+        saturation::improve(&model, &clips.split.train, settings.settings(), &mut unknowns, interrupt);
+        unknowns.into_iter().map(|unknown| unknown.start).collect()
+    });
+    unknowns.iter_mut().zip(starts).for_each(|(unknown, start)| unknown.start = start);
     model.settle_dead_joints(&unknowns.iter().map(|unknown| unknown.start).collect::<Vec<_>>());
     // What moves unseen shows in its neighbours.
     for (unknown, free) in unknowns.iter_mut().zip(&free) {
@@ -154,7 +182,7 @@ fn identify_material(
     }
     session::hold_dead(&model, &clips, settings.settings(), &mut unknowns);
     let random = model.random();
-    let mut outcome = search(options, &model, &clips, (&unknowns, &random), interrupt)?;
+    let mut outcome = search(options, &model, &clips, (&unknowns, &random), (kept, interrupt))?;
     saturation::forget_unreached(&model, settings.settings(), &mut outcome.fit);
     let finding = Finding::new(&settings, &unknowns, &outcome);
     let mut answer = finding.answer(&before);
@@ -165,15 +193,10 @@ fn identify_material(
     answer.warnings.extend(doubt::doubts(&answer, &finding, &model, &clips, &before));
     answer.advice = advice::next(&finding, &clips);
     clips.fill(&mut answer);
-    if interrupt.asked() {
-        return Err(RunError::Ended.into());
-    }
-    if let Some(out) = &options.out {
-        output::write(out, settings.theta(&outcome.fit.shared).to_toml())?;
-        answer.theta_file = out.display().to_string();
-    }
-    answer.seconds = began.elapsed().as_secs_f64();
-    Ok(answer)
+    // Of an object nothing was found.
+    let object = given.and_then(|given| given.object.clone());
+    let theta = Theta { object, ..settings.theta(&outcome.fit.shared) };
+    Ok((answer, theta))
 }
 
 /// Gains, and the parameters of the effects that were asked for.
@@ -196,22 +219,15 @@ fn search(
     model: &Model<'_>,
     clips: &session::Used,
     (unknowns, random): (&[Unknown], &[Random]),
-    interrupt: &Interrupt,
+    (kept, interrupt): (&Kept, &Interrupt),
 ) -> Result<Outcome, ArmError> {
-    let state = options.out.as_ref().map(|out| {
-        let mut name = out.clone().into_os_string();
-        name.push(".state.json");
-        PathBuf::from(name)
-    });
-    let names: Vec<&str> = unknowns.iter().map(|unknown| unknown.name.as_str()).collect();
     let run = Run {
         unknowns,
         random,
         optimizer: options.optimizer,
         seed: options.seed,
         budget: options.budget,
-        fingerprint: format!("{} {} {names:?} {:?}", options.optimizer.name(), options.seed, clips.fitted()),
-        state: state.as_deref(),
+        kept,
         interrupt,
     };
     let train = &clips.split.train;

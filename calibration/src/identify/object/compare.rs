@@ -13,8 +13,9 @@ use crate::estimate::{ClipModel as _, Unknown};
 use crate::forward::object::ObjectClips;
 use crate::forward::{Setting, Settings};
 use crate::identify::answer::Figures;
-use crate::identify::run::{Optimizer, Run, RunError};
+use crate::identify::run::{Optimizer, Run, stopped};
 use crate::interrupt::Interrupt;
+use crate::kept::Kept;
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -66,7 +67,7 @@ pub struct Method {
 /// [`ObjectError`] naming what is wrong and the remedy.
 pub fn compare(options: &Options, interrupt: &Interrupt) -> Result<Comparison, ObjectError> {
     let material = Material::open(&options.session, options.seed)?;
-    let problem = Problem::new(&material, options, interrupt)?;
+    let problem = Problem::new(&material, options, (Kept::nothing(), interrupt))?;
     let without: Vec<usize> = (0..problem.unknowns.len())
         .filter(|k| !matches!(problem.settings.settings()[*k], Setting::CentreOfMass(_)))
         .collect();
@@ -76,9 +77,7 @@ pub fn compare(options: &Options, interrupt: &Interrupt) -> Result<Comparison, O
     let swarm = slopeless("particle swarm", Optimizer::Swarm, &problem, &material, options, interrupt)?;
     let evolution = slopeless("CMA-ES", Optimizer::Evolution, &problem, &material, options, interrupt)?;
     let slopes = sloped("gradient without centre of mass", &pin, &material, Searcher::Slopes, interrupt)?;
-    if interrupt.asked() {
-        return Err(RunError::Ended.into());
-    }
+    stopped(Kept::nothing(), interrupt)?;
     let target = swarm.loss_m;
     let clips = |method: &Method| method.to(target).map(|(clips, _)| clips as f64);
     let fewer = clips(&alone).zip(clips(&swarm)).map(|(alone, swarm)| swarm / alone);
@@ -103,6 +102,7 @@ impl Problem {
         Self {
             settings: Settings::new(self.settings.base().clone(), settings),
             unknowns: numbers.iter().map(|k| self.unknowns[*k].clone()).collect(),
+            known: self.known.clone(),
             warnings: self.warnings.clone(),
         }
     }
@@ -134,14 +134,15 @@ fn sloped(
         steps.lock().expect("no holder panics").push((numbers.to_vec(), evaluations, began.elapsed().as_secs_f64()));
         !interrupt.asked()
     };
+    let trail = (Kept::nothing(), "");
     let (numbers, evaluations) = match searcher {
         Searcher::Usual(seed) => {
-            let found = fit_polished(&mut clips, problem.searched(&shape, seed), &start, watch)?;
+            let found = fit_polished(&mut clips, problem.searched(&shape, seed), &start, trail, watch)?;
             (found.at.shared, found.evaluations)
         }
         Searcher::PosesAlone(seed) => fit_poses_alone(&mut clips, problem.searched(&shape, seed), &start, watch)?,
         Searcher::Slopes => {
-            let found = fit_object(&mut clips, &problem.unknowns, &start, watch)?;
+            let found = fit_object(&mut clips, &problem.unknowns, &start, trail, watch)?;
             (found.at.shared, found.evaluations)
         }
     };
@@ -172,8 +173,7 @@ fn slopeless(
         optimizer,
         seed: options.seed,
         budget: options.budget,
-        fingerprint: String::new(),
-        state: None,
+        kept: Kept::nothing(),
         interrupt,
     };
     let began = Instant::now();

@@ -10,6 +10,7 @@ use super::step::{Linearised, Question};
 use super::vicinity::points;
 use crate::estimate::{ClipModel as _, Impossible, Random, Unknown};
 use crate::forward::object::{ALL, Channel, ModelError, ObjectClips, Own, Part};
+use crate::kept::{Fingerprint, Kept, Trail};
 use rayon::prelude::*;
 use shared_mem::cell::PoseNoise;
 
@@ -58,9 +59,10 @@ pub(super) fn fit_object(
     clips: &mut ObjectClips,
     unknowns: &[Unknown],
     start: &[f64],
+    trail: Trail<'_>,
     watch: impl Fn(&[f64], usize) -> bool,
 ) -> Result<ObjectFit, Impossible> {
-    let mut search = Search { convergence: Vec::new(), evaluations: 0, watch: &watch, stopped: false };
+    let mut search = Search::new(trail, &watch);
     let mut at = search.first(clips, unknowns, start, FIRST_STEPS)?;
     let random = scattered(clips);
     for _ in 0..ROUNDS {
@@ -69,10 +71,12 @@ pub(super) fn fit_object(
         }
         clips.set_model_error(model_error(clips, &at)?);
         let (shared, own) = (at.shared.clone(), at.own());
-        at = search.steps(Question { clips, unknowns, random: &random }, (&shared, &own), 2)?;
+        at = search.steps(&Question { clips, unknowns, random: &random }, (&shared, &own), 2)?;
     }
     let Search { evaluations, convergence, stopped, .. } = search;
-    let (widths, looks) = Question { clips, unknowns, random: &random }.widths(&at)?;
+    let looked = Fingerprint::of(trail.1).with(&"widths");
+    let look = || Question { clips, unknowns, random: &random }.widths(&at);
+    let (widths, looks): (Vec<f64>, usize) = trail.0.once_if_ok(&looked, look)?;
     let evaluations = evaluations + looks;
     Ok(ObjectFit { converged: at.small && !stopped, at, widths, evaluations, convergence })
 }
@@ -87,7 +91,7 @@ pub(super) fn roughly(
     start: &[f64],
     watch: impl Fn(&[f64], usize) -> bool,
 ) -> Result<(Linearised, usize), Impossible> {
-    let mut search = Search { convergence: Vec::new(), evaluations: 0, watch: &watch, stopped: false };
+    let mut search = Search::new((Kept::nothing(), ""), &watch);
     let at = search.first(clips, unknowns, start, ROUGH_STEPS)?;
     Ok((at, search.evaluations))
 }
@@ -122,11 +126,27 @@ pub(super) fn widths(clips: &ObjectClips, unknowns: &[Unknown], at: &Linearised)
 struct Search<'a, W> {
     convergence: Vec<[f64; 2]>,
     evaluations: usize,
+    trail: Trail<'a>,
     watch: &'a W,
     stopped: bool,
 }
 
-impl<W: Fn(&[f64], usize) -> bool> Search<'_, W> {
+impl<'a, W: Fn(&[f64], usize) -> bool> Search<'a, W> {
+    fn new(trail: Trail<'a>, watch: &'a W) -> Self {
+        Self { convergence: Vec::new(), evaluations: 0, trail, watch, stopped: false }
+    }
+
+    /// A step from there, worked out unless it is known.
+    fn improved(
+        &self,
+        question: &Question<'_>,
+        (shared, own): (&[f64], &[Vec<f64>]),
+    ) -> Result<Linearised, Impossible> {
+        let (kept, name) = self.trail;
+        let step = Fingerprint::of(name).with(&("step", self.convergence.len()));
+        kept.once_if_ok(&step, || question.improved(shared, own))
+    }
+
     /// From far away to where resting places agree, no clip having numbers of its own.
     fn first(
         &mut self,
@@ -138,16 +158,16 @@ impl<W: Fn(&[f64], usize) -> bool> Search<'_, W> {
         clips.set_model_error(FIRST_ERROR);
         let random = held(clips);
         let own = vec![vec![0.0; random.len()]; clips.clips()];
-        self.steps(Question { clips, unknowns, random: &random }, (start, &own), most)
+        self.steps(&Question { clips, unknowns, random: &random }, (start, &own), most)
     }
 
     fn steps(
         &mut self,
-        question: Question<'_>,
+        question: &Question<'_>,
         (shared, own): (&[f64], &[Vec<f64>]),
         most: usize,
     ) -> Result<Linearised, Impossible> {
-        let mut at = question.improved(shared, own)?;
+        let mut at = self.improved(question, (shared, own))?;
         for step in 1.. {
             self.evaluations += at.evaluations;
             let rows: usize = at.clips.iter().map(|clip| clip.rows).sum();
@@ -156,7 +176,7 @@ impl<W: Fn(&[f64], usize) -> bool> Search<'_, W> {
             if at.small || self.stopped || step >= most {
                 break;
             }
-            at = question.improved(&at.shared, &at.own())?;
+            at = self.improved(question, (&at.shared, &at.own()))?;
         }
         Ok(at)
     }

@@ -37,13 +37,14 @@ mod test_clip;
 mod vicinity;
 
 use super::answer::Identification;
-use super::run::{Optimizer, Outcome, Run, RunError};
+use super::run::{Optimizer, Outcome, Run, RunError, stopped};
 use crate::estimate::{Impossible, Options as FitOptions, Unknown, fit as fit_clips};
 use crate::forward::arm::{ArmClips, Channel};
 use crate::forward::object::ObjectClips;
 use crate::forward::setting::{BaseError, complete, gains, object_parameters};
 use crate::forward::{Setting, Settings};
 use crate::interrupt::Interrupt;
+use crate::kept::{self, Fingerprint, Kept};
 use finding::Finding;
 use fit::{ObjectFit, fit_object, linearise_object};
 use material::Material;
@@ -51,11 +52,11 @@ use paper::SurfaceLoss;
 use parts::disagreement;
 use polish::{Searched, fit_polished};
 use shared_mem::cell::{Cell, ClipKind};
-use shared_mem::output::{self, OutputError};
+use shared_mem::output::OutputError;
 use shared_mem::progress::Progress;
 use shared_mem::recording::{Clip, ReadError};
 use shared_mem::theta::Theta;
-use shared_mem::toml_file::TomlFileError;
+use shared_mem::toml_file::{self, TomlFileError};
 use std::path::PathBuf;
 use std::time::Instant;
 use twin::arm::ModelError;
@@ -133,14 +134,40 @@ pub enum ObjectError {
 pub fn identify(options: &Options, interrupt: &Interrupt) -> Result<Identification, ObjectError> {
     let began = Instant::now();
     let material = Material::open(&options.session, options.seed)?;
-    let problem = Problem::new(&material, options, interrupt)?;
+    let parameters = options.parameters.as_deref().map(Theta::read).transpose()?;
+    let question = Fingerprint::of("identify object")
+        .with(&(options.optimizer.name(), options.budget, options.seed))
+        .with(&(material.cell.to_toml(), parameters.map(|theta| theta.to_toml())))
+        .with_clips(material.usable.iter().map(|usable| &usable.clip));
+    let kept = kept::for_work((options.out.as_deref(), &options.session, "identify_object"), &question, interrupt);
+    let found = identify_kept(&material, options, (&kept, interrupt));
+    interrupt.work_is_over();
+    // What work says that was cut short is no answer.
+    stopped(&kept, interrupt)?;
+    let (mut answer, theta) = found?;
+    if let Some(out) = &options.out {
+        theta.write(out)?;
+        answer.theta_file = out.display().to_string();
+    }
+    kept.done();
+    answer.seconds = began.elapsed().as_secs_f64();
+    Ok(answer)
+}
+
+/// The answer, and the parameters that are written.
+fn identify_kept(
+    material: &Material,
+    options: &Options,
+    (kept, interrupt): (&Kept, &Interrupt),
+) -> Result<(Identification, Theta), ObjectError> {
+    let problem = Problem::new(material, options, (kept, interrupt))?;
     let mut clips = ObjectClips::new(&material.cell, material.train(), problem.settings.clone())?;
-    let found = problem.search(&mut clips, options, interrupt)?;
+    let found = problem.search(&mut clips, options, (kept, interrupt))?;
     let searched = (&problem.settings, &problem.unknowns[..]);
-    let disagreement = disagreement(&found.at.shared, &clips, searched, interrupt)?;
+    let disagreement = disagreement(&found.at.shared, &clips, searched, (kept, interrupt))?;
     let finding = Finding::new(searched, &found, disagreement.as_deref().unwrap_or_default());
     let theta = problem.settings.theta(&found.at.shared);
-    let mut answer = finding.answer(&material);
+    let mut answer = finding.answer(material);
     answer.session = options.session.display().to_string();
     answer.optimizer = options.optimizer.name().into();
     answer.warnings.extend(problem.warnings.iter().cloned());
@@ -149,29 +176,29 @@ pub fn identify(options: &Options, interrupt: &Interrupt) -> Result<Identificati
             .warnings
             .push("ended before parts of the tosses were asked: the intervals are too narrow; run it again".into());
     }
-    figures::fill(&mut answer, &material, [problem.settings.base(), &theta])?;
+    figures::fill(&mut answer, material, [problem.settings.base(), &theta])?;
     let doubts = doubt::doubts(&answer, &material.cell);
     answer.warnings.extend(doubts);
-    if interrupt.asked() {
-        return Err(RunError::Ended.into());
-    }
-    if let Some(out) = &options.out {
-        output::write(out, theta.to_toml())?;
-        answer.theta_file = out.display().to_string();
-    }
-    answer.seconds = began.elapsed().as_secs_f64();
-    Ok(answer)
+    // Gains of cell.toml were not found.
+    let theta = Theta { arm: problem.known.arm.clone(), ..theta };
+    Ok((answer, theta))
 }
 
 /// What is searched, and what is known.
 struct Problem {
     settings: Settings,
     unknowns: Vec<Unknown>,
+    /// What was given, with the gains that were found first.
+    known: Theta,
     warnings: Vec<String>,
 }
 
 impl Problem {
-    fn new(material: &Material, options: &Options, interrupt: &Interrupt) -> Result<Self, ObjectError> {
+    fn new(
+        material: &Material,
+        options: &Options,
+        (kept, interrupt): (&Kept, &Interrupt),
+    ) -> Result<Self, ObjectError> {
         let mut given = options.parameters.as_deref().map(Theta::read).transpose()?.unwrap_or_default();
         let mut warnings = Vec::new();
         if given.arm.is_none() && material.cell.robot.is_some() {
@@ -179,33 +206,30 @@ impl Problem {
             let hits: Vec<Clip> = clips.into_iter().filter(|clip| clip.kind == ClipKind::ControlHitSlide).collect();
             if !hits.is_empty() {
                 warnings.push("the arm's gains were found first, from the way to the object in the same clips".into());
-                given = with_gains(&material.cell, &given, hits, interrupt)?;
+                let find = || with_gains(&material.cell, &given, hits, interrupt);
+                // As text: what a person may read a number of effects in is no plain list of fields.
+                let text = kept.once_if_ok(&Fingerprint::of("gains"), || find().map(|theta| theta.to_toml()))?;
+                given = toml_file::parse(&text, std::path::Path::new("theta.toml"))?;
             }
         }
         let base = complete(&material.cell, Some(&given))?;
         let (settings, unknowns) = searched(&material.cell, base);
-        Ok(Self { settings, unknowns, warnings })
+        Ok(Self { settings, unknowns, known: given, warnings })
     }
 
     fn search(
         &self,
         clips: &mut ObjectClips,
         options: &Options,
-        interrupt: &Interrupt,
+        (kept, interrupt): (&Kept, &Interrupt),
     ) -> Result<ObjectFit, ObjectError> {
-        let state = options.out.as_ref().map(|out| {
-            let mut name = out.clone().into_os_string();
-            name.push(".state.json");
-            PathBuf::from(name)
-        });
         let run = Run {
             unknowns: &self.unknowns,
             random: &[],
             optimizer: options.optimizer,
             seed: options.seed,
             budget: options.budget,
-            fingerprint: format!("object {} {} {:?}", options.optimizer.name(), options.seed, options.session),
-            state: state.as_deref(),
+            kept,
             interrupt,
         };
         if options.optimizer == Optimizer::LeastSquares {
@@ -224,18 +248,13 @@ impl Problem {
 
     fn least_squares(&self, clips: &mut ObjectClips, run: &Run<'_>) -> Result<ObjectFit, ObjectError> {
         let start: Vec<f64> = self.unknowns.iter().map(|unknown| unknown.start).collect();
-        let start = run.kept_numbers().unwrap_or(start);
         let bar = Progress::new("identify", fit::usual_evaluations(clips, &self.unknowns) as u64);
-        let kept = std::sync::Mutex::new(Ok(()));
         let shape = self.shape(clips)?;
-        let found = fit_polished(clips, self.searched(&shape, run.seed), &start, |numbers, evaluations| {
+        let trail = (run.kept, "fit");
+        Ok(fit_polished(clips, self.searched(&shape, run.seed), &start, trail, |_, evaluations| {
             bar.show(evaluations as u64, &format!("{evaluations} clips simulated"));
-            *kept.lock().expect("no holder panics") = run.keep_numbers(numbers);
             !run.interrupt.asked()
-        })?;
-        kept.into_inner().expect("no holder panics")?;
-        run.finished()?;
-        Ok(found)
+        })?)
     }
 
     fn searched<'a>(&'a self, shape: &'a ObjectShape, seed: u64) -> Searched<'a> {
@@ -270,7 +289,8 @@ pub fn refine(cell: &Cell, clips: Vec<Clip>, base: &Theta, interrupt: &Interrupt
     let (settings, unknowns) = searched(cell, base.clone());
     let mut clips = ObjectClips::new(cell, clips, settings.clone())?;
     let start: Vec<f64> = unknowns.iter().map(|unknown| unknown.start).collect();
-    let found = fit_object(&mut clips, &unknowns, &start, |_, _| !interrupt.asked())?;
+    let trail = (Kept::nothing(), "");
+    let found = fit_object(&mut clips, &unknowns, &start, trail, |_, _| !interrupt.asked())?;
     Ok(settings.theta(&found.at.shared))
 }
 

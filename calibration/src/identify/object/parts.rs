@@ -11,6 +11,7 @@ use crate::estimate::{ClipModel as _, Unknown};
 use crate::forward::Settings;
 use crate::forward::object::ObjectClips;
 use crate::interrupt::Interrupt;
+use crate::kept::Kept;
 use shared_mem::progress::Progress;
 use shared_mem::recording::Clip;
 
@@ -28,7 +29,7 @@ pub(super) fn disagreement(
     at: &[f64],
     clips: &ObjectClips,
     (settings, unknowns): (&Settings, &[Unknown]),
-    interrupt: &Interrupt,
+    (kept, interrupt): (&Kept, &Interrupt),
 ) -> Result<Option<Vec<f64>>, ObjectError> {
     if !let_go(clips) || clips.clips() < PARTS * LEAST {
         return Ok(Some(vec![0.0; at.len()]));
@@ -39,7 +40,8 @@ pub(super) fn disagreement(
         let of_part = |clip: &usize| clip % PARTS == part;
         let own: Vec<Clip> = (0..clips.clips()).filter(of_part).map(|clip| clips.clip(clip).clone()).collect();
         let mut own = ObjectClips::new(clips.cell(), own, settings.clone())?;
-        answers.push(fit_object(&mut own, unknowns, at, |_, _| !interrupt.asked())?.at.shared);
+        let name = format!("part {part}");
+        answers.push(fit_object(&mut own, unknowns, at, (kept, &name), |_, _| !interrupt.asked())?.at.shared);
         if interrupt.asked() {
             return Ok(None);
         }

@@ -10,6 +10,7 @@ use super::vicinity::descend;
 use crate::estimate::{ClipModel as _, Impossible, Unknown};
 use crate::forward::Setting;
 use crate::forward::object::ObjectClips;
+use crate::kept::{Kept, Trail};
 use nalgebra::{DMatrix, DVector};
 use shared_mem::cell::ClipKind;
 use twin::scene::ObjectShape;
@@ -35,16 +36,17 @@ pub(super) fn fit_polished(
     clips: &mut ObjectClips,
     searched: Searched<'_>,
     start: &[f64],
+    trail: Trail<'_>,
     watch: impl Fn(&[f64], usize) -> bool,
 ) -> Result<ObjectFit, Impossible> {
-    let found = fit_object(clips, searched.unknowns, start, &watch)?;
+    let found = fit_object(clips, searched.unknowns, start, trail, &watch)?;
     if let_go(clips) || !watch(&found.at.shared, found.evaluations) {
         return Ok(found);
     }
     let (numbers, more) = {
         let loss = SurfaceLoss::new(clips, searched.shape);
         let free = |setting: &Setting| *setting != Setting::Mass;
-        polish(&loss, searched, (&found.at, free), |numbers, more| watch(numbers, found.evaluations + more))
+        polish(&loss, searched, (&found.at, free), trail, |numbers, more| watch(numbers, found.evaluations + more))
     };
     // How much wider intervals are was told where the deviance is least; here it may fall to a side.
     let at = linearise_object(clips, searched.unknowns, &numbers)?;
@@ -64,8 +66,9 @@ pub(super) fn fit_poses_alone(
 ) -> Result<(Vec<f64>, usize), Impossible> {
     let (found, evaluations) = roughly(clips, searched.unknowns, start, &watch)?;
     let loss = SurfaceLoss::new(clips, searched.shape);
+    let trail = (Kept::nothing(), "");
     let (numbers, more) =
-        polish(&loss, searched, (&found, |_| true), |numbers, more| watch(numbers, evaluations + more));
+        polish(&loss, searched, (&found, |_| true), trail, |numbers, more| watch(numbers, evaluations + more));
     Ok((numbers, evaluations + more))
 }
 
@@ -79,6 +82,7 @@ fn polish(
     loss: &SurfaceLoss<'_>,
     searched: Searched<'_>,
     (from, free): (&Linearised, impl Fn(&Setting) -> bool),
+    trail: Trail<'_>,
     watch: impl Fn(&[f64], usize) -> bool,
 ) -> (Vec<f64>, usize) {
     let Searched { unknowns, settings, seed, .. } = searched;
@@ -92,7 +96,7 @@ fn polish(
         numbers
     };
     let (z, simulated) =
-        descend(loss, &from.weights, (free.len(), seed), place, |z, simulated| watch(&place(z), simulated));
+        descend(loss, &from.weights, (free.len(), seed), place, trail, |z, simulated| watch(&place(z), simulated));
     (place(&z), simulated)
 }
 

@@ -8,6 +8,7 @@ use crate::estimate::{ClipFit, ClipModel, Impossible, Options, Random, Unknown, 
 use crate::forward::object::ObjectClips;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
 /// What is asked of the clips.
 #[derive(Clone, Copy)]
@@ -21,7 +22,7 @@ pub(super) struct Question<'a> {
 }
 
 /// All clips around one point, own numbers at their best.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub(super) struct Linearised {
     /// The shared numbers.
     pub(super) shared: Vec<f64>,

@@ -8,11 +8,13 @@
 
 use super::paper::{Slip, SurfaceLoss};
 use crate::estimate::{ClipModel as _, Evolution, Impossible, Unknown, minimise, search};
+use crate::kept::{Fingerprint, Trail};
 use nalgebra::{Cholesky, DMatrix, DVector};
 use rand::{RngExt as _, SeedableRng as _};
 use rand_distr::StandardNormal;
 use rand_pcg::Pcg64;
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
 /// Times that points are scattered.
 const ROUNDS: usize = 3;
@@ -40,10 +42,11 @@ const fn scattered(coordinates: usize) -> usize {
 }
 
 /// A place asked for.
+#[derive(Serialize, Deserialize)]
 struct Asked {
     at: Vec<f64>,
     /// Where the modelled poses went: clip by clip, pose by pose, six numbers each.
-    slips: Vec<Vec<Slip>>,
+    slips: Vec<Vec<[f64; 6]>>,
     loss: f64,
 }
 
@@ -54,6 +57,7 @@ pub(super) fn descend(
     weights: &[f64],
     (coordinates, seed): (usize, u64),
     place: impl Fn(&[f64]) -> Vec<f64> + Sync,
+    (kept, name): Trail<'_>,
     watch: impl Fn(&[f64], usize) -> bool,
 ) -> (Vec<f64>, usize) {
     let mut random = Pcg64::seed_from_u64(seed);
@@ -61,10 +65,11 @@ pub(super) fn descend(
     let (mut middle, mut width, mut simulated) = (vec![0.0; coordinates], WIDTH, loss.clips());
     let mut asked: Vec<Asked> = ask(&middle).into_iter().collect();
     let mut middles: Vec<(f64, Vec<f64>)> = asked.iter().map(|first| (first.loss, first.at.clone())).collect();
-    for _ in 0..ROUNDS {
+    for round in 0..ROUNDS {
         let scattered = scatter(&middle, width, &mut random);
         simulated += (scattered.len() + 1) * loss.clips();
-        asked.extend(scattered.par_iter().filter_map(ask).collect::<Vec<_>>());
+        let of_round = Fingerprint::of(name).with(&("round", round));
+        asked.extend(kept.once(&of_round, || scattered.par_iter().filter_map(ask).collect::<Vec<_>>()));
         let Some(vicinity) = Vicinity::through(&asked, &middle, width) else { break };
         middle = vicinity.lowest(loss, weights, seed);
         if let Some(there) = ask(&middle) {
@@ -81,11 +86,10 @@ pub(super) fn descend(
 }
 
 fn ask(loss: &SurfaceLoss<'_>, weights: &[f64], at: &[f64], numbers: &[f64]) -> Result<Asked, Impossible> {
-    let mut slips = loss.slips(numbers)?;
+    let slips = loss.slips(numbers)?;
     let mean = loss.mean_of(&slips, weights);
-    for of_clip in &mut slips {
-        *of_clip = of_clip.iter().step_by(EVERY).copied().collect();
-    }
+    let some = |of_clip: &Vec<Slip>| of_clip.iter().step_by(EVERY).map(|slip| (*slip).into()).collect();
+    let slips = slips.iter().map(some).collect();
     Ok(Asked { at: at.to_vec(), slips, loss: mean })
 }
 
@@ -169,11 +173,7 @@ mod tests {
         let mut random = Pcg64::seed_from_u64(2);
         let rough = |at: &[f64]| {
             let ripple = 0.002 * (90.0 * at[0]).sin();
-            Asked {
-                at: at.to_vec(),
-                slips: vec![vec![Slip::repeat(0.03 - 0.01 * at[0] + 0.02 * at[1] + ripple)]],
-                loss: 0.0,
-            }
+            Asked { at: at.to_vec(), slips: vec![vec![[0.03 - 0.01 * at[0] + 0.02 * at[1] + ripple; 6]]], loss: 0.0 }
         };
         let asked: Vec<Asked> =
             (0..4).flat_map(|_| scatter(&[1.0, 0.5], 1.0, &mut random)).map(|at| rough(&at)).collect();
