@@ -28,7 +28,7 @@ pub fn all<E: Evidence>(bench: &Bench<'_, E>, split: &Split, baseline: &Hypothes
     let (full, free) = (&baseline.full[..], &baseline.free[..]);
     let point = Point { full, free, probed: &probed, clips: &clips, precision: Precision::Joints };
     let nothing = || said(&[]);
-    let Ok(swept) = sweep(bench.evidence, bench.library, &point, &Scatter::default(), &|| {}) else {
+    let Ok(swept) = sweep(bench.evidence, bench.library, &point, &Scatter::default(), &|_| true) else {
         return NAMES.map(|_| nothing()).to_vec();
     };
     let even = vec![1.0; bench.evidence.channels().len()];

@@ -43,7 +43,7 @@ pub struct Outcome {
     pub left_out: Vec<String>,
 }
 
-/// Runs the benchmark. Ctrl-C ends it after the world in hand.
+/// Runs the benchmark. Ctrl-C ends it, without the world in hand.
 #[must_use]
 pub fn run(plan: &Plan, cell: &Cell, interrupt: &Interrupt) -> Outcome {
     let worlds = plan.worlds();
@@ -57,7 +57,12 @@ pub fn run(plan: &Plan, cell: &Cell, interrupt: &Interrupt) -> Outcome {
         }
         let world = World::draw(number, kind, fault, cell);
         bar.show(done as u64, &format!("world {number}"));
-        match judged(&world, plan.clips, interrupt) {
+        let judged = judged(&world, plan.clips, interrupt);
+        if interrupt.asked() {
+            // What was cut short is no answer.
+            break;
+        }
+        match judged {
             Ok(cases) => {
                 console::line(cases[0].line());
                 methods.iter_mut().zip(cases).for_each(|(method, case)| method.cases.push(case));

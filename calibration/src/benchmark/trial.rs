@@ -18,6 +18,7 @@ use crate::diagnose::{DiagnoseError, Diagnosis, Kind, Options, diagnose_clips, p
 use crate::forward::object::ObjectClips;
 use crate::forward::setting;
 use crate::interrupt::Interrupt;
+use crate::kept::Kept;
 use shared_mem::cell::{ClipEntry, ClipKind};
 use shared_mem::recording::{Clip, Session};
 
@@ -38,7 +39,7 @@ pub fn examine(world: &World, clips: Vec<Clip>, interrupt: &Interrupt) -> Result
     };
     let with_object = clips.iter().all(|clip| clip.kind == ClipKind::ControlHitSlide);
     let admitted = Admitted { groups: split::by_command(&clips), clips, files, with_object, warnings: Vec::new() };
-    let options = Options { theta: None, seed: world.number };
+    let options = Options { seed: world.number, ..Options::default() };
     let found = diagnose_clips(&session, &admitted, &options, interrupt)?;
     let base = setting::complete(&world.cell, None)?;
     let peaks = peaks(&world.cell, &admitted, &base)?;
@@ -65,7 +66,13 @@ struct Court<'a> {
 
 impl Court<'_> {
     fn cases<E: Evidence>(&self, evidence: &E, found: &Diagnosis) -> Result<Vec<Case>, DiagnoseError> {
-        let bench = Bench { evidence, library: self.library, scatter: evidence.scatter(), interrupt: self.interrupt };
+        let bench = Bench {
+            evidence,
+            library: self.library,
+            scatter: evidence.scatter(),
+            interrupt: self.interrupt,
+            trail: (Kept::nothing(), ""),
+        };
         let even = vec![1.0; evidence.channels().len()];
         // The diagnosis' own: what its parameters make up for is no gap that anyone could explain.
         let baseline = baseline::identify(&bench, &self.split, &self.world.cell, self.admitted);

@@ -62,6 +62,9 @@ impl Step {
         let mut places: Vec<usize> = (0..self.trials.len()).filter(|k| wanted(*k, &self.trials[*k])).collect();
         places.sort_by(|a, b| self.trials[*b].nats().total_cmp(&self.trials[*a].nats()));
         for place in places.into_iter().take(TRIED_AGAIN) {
+            if bench.interrupt.asked() {
+                return;
+            }
             let Some((fit, _)) = self.trials[place].fitted.clone() else { continue };
             let effort = bench.trying(self.trials[place].scored.candidate, FIRST_PASS);
             let from = |full| bench.fit((&fit.effects, full), &split.train, &self.weights, Some(&fit), effort);

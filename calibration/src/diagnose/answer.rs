@@ -31,6 +31,8 @@ pub struct Diagnosis {
     pub clips: Clips,
     /// What a reader has to know about the clips, one sentence each.
     pub warnings: Vec<String>,
+    /// Whether the time that was given was spent before everything was tried: then this is the best answer so far.
+    pub budget_spent: bool,
     /// Wall-clock time [s].
     pub seconds: f64,
     /// The session's folder.
@@ -44,6 +46,14 @@ pub struct Diagnosis {
     /// Residuals of the confirm clips without and with the effects, for the page.
     #[serde(skip)]
     pub traces: Vec<Trace>,
+}
+
+impl Diagnosis {
+    /// Whether any parameter was identified: clips that say too little tell none.
+    #[must_use]
+    pub fn identifies(&self) -> bool {
+        !self.clips.train.is_empty()
+    }
 }
 
 /// The finding.

@@ -21,7 +21,9 @@ pub struct ArmAlone<'a, E>(pub &'a E);
 impl<E: Evidence> ArmAlone<'_, E> {
     /// A bench for these.
     pub fn bench<'b>(&'b self, whole: &Bench<'b, E>) -> Bench<'b, Self> {
-        Bench { evidence: self, library: whole.library, scatter: Scatter::default(), interrupt: whole.interrupt }
+        let (evidence, scatter) = (self, Scatter::default());
+        let trail = (whole.trail.0, "the arm alone");
+        Bench { evidence, library: whole.library, scatter, interrupt: whole.interrupt, trail }
     }
 }
 
@@ -45,7 +47,7 @@ impl Step {
             let scored = &self.trials[*place].scored;
             bar.show(50, bench.library.candidates[scored.candidate].effect.name);
             let effects = [&self.from.effects[..], &[scored.candidate]].concat();
-            let starts = starts::of(&arm, at, scored, overlooked).into_iter();
+            let starts = starts::kept(&arm, at, scored, overlooked).into_iter();
             let begun = starts.filter_map(|start| fit(&effects, start, HEAT));
             let best = begun.min_by(|a, b| a.deviance().total_cmp(&b.deviance()))?;
             Some((*place, fit(&effects, best.full, FIRST_PASS)?))

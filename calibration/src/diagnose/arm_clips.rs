@@ -3,6 +3,7 @@
 #![allow(non_snake_case)] // the Franka Control Interface's own symbols
 
 use super::evidence::{Channel, Evidence, Row, StageName};
+use super::recent::Recent;
 use super::scatter::Scatter;
 use crate::estimate::{ClipModel, Impossible};
 use crate::forward::arm::noise;
@@ -45,6 +46,7 @@ struct Prepared {
     /// Each followed by the one a control period later: some logs have the torque that acts from a tick on.
     stamps_ns: Vec<u64>,
     rows: Vec<Row>,
+    recent: Recent,
 }
 
 impl<F: Fn(&[f64]) -> Theta + Sync> ArmClips<F> {
@@ -129,7 +131,7 @@ impl Prepared {
                 rows.push(Row { channel, stage: StageName::Control, regime: regime(dq, top[channel % dof]), time });
             }
         }
-        Some(Self { recorded, commands, kept, stamps_ns, rows })
+        Some(Self { recorded, commands, kept, stamps_ns, rows, recent: Recent::default() })
     }
 }
 
@@ -163,12 +165,19 @@ impl<F: Fn(&[f64]) -> Theta + Sync> ClipModel for ArmClips<F> {
     }
 
     fn residuals(&self, clip: usize, shared: &[f64], _own: &[f64], out: &mut Vec<f64>) -> Result<(), Impossible> {
-        let readings = self.readings(clip, shared)?;
-        self.compare(&self.clips[clip], &readings, out)
+        let residuals = self.clips[clip].recent.at(shared, |out| self.simulated(clip, shared, out))?;
+        out.clone_from(&residuals);
+        Ok(())
     }
 }
 
 impl<F: Fn(&[f64]) -> Theta + Sync> ArmClips<F> {
+    /// The residuals as a simulation gives them, known or not.
+    pub(super) fn simulated(&self, clip: usize, shared: &[f64], out: &mut Vec<f64>) -> Result<(), Impossible> {
+        let readings = self.readings(clip, shared)?;
+        self.compare(&self.clips[clip], &readings, out)
+    }
+
     /// Largest torque that the controller asks of each joint in any of the clips, gravity included [N m].
     ///
     /// # Errors

@@ -9,14 +9,14 @@
 use super::arm_clips::ArmClips;
 use super::evidence::{Channel, Evidence, Reach, Row, StageName};
 use super::library::Library;
+use super::recent::Recent;
 use super::scatter::Scatter;
 use crate::estimate::{ClipModel, Impossible, Random};
 use crate::forward::Setting;
 use crate::forward::object::{self, ALL, ObjectClips, Own, Part};
 use shared_mem::cell::{ClipKind, PoseNoise};
 use shared_mem::theta::Theta;
-use std::collections::VecDeque;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
 
 /// Coordinates of a pose.
 const COORDINATES: [(&str, &str); 6] = [
@@ -97,13 +97,8 @@ pub struct CellClips<'a, F> {
     first: usize,
     /// For each clip the last numbers that the arm feels with its residuals there: most of what a search turns is the
     /// object's.
-    arm_alone: Vec<Mutex<VecDeque<Arm>>>,
+    arm_alone: Vec<Recent>,
 }
-
-/// The arm's numbers, and its residuals there.
-type Arm = (Vec<f64>, Arc<Vec<f64>>);
-/// Kept for a clip: a linearisation turns the numbers of a few effects on joints.
-const ARMS: usize = 16;
 
 impl<'a, F: Fn(&[f64]) -> Theta + Sync> CellClips<'a, F> {
     /// Both on the same clips in the same order.
@@ -122,25 +117,14 @@ impl<'a, F: Fn(&[f64]) -> Theta + Sync> CellClips<'a, F> {
         }
         let friction = library.settings.settings().iter().position(|setting| *setting == Setting::Friction);
         let scatter = scatter(&object);
-        let arm_alone = rows.iter().map(|_| Mutex::default()).collect();
+        let arm_alone = rows.iter().map(|_| Recent::default()).collect();
         Self { library, arm, object, channels, rows, straying, scatter, friction, first, arm_alone }
     }
 
     /// The arm's residuals at numbers; none where there is no arm.
     fn arm(&self, clip: usize, shared: &[f64]) -> Result<Arc<Vec<f64>>, Impossible> {
         let Some(arm) = &self.arm else { return Ok(Arc::default()) };
-        let felt = self.library.felt_by_arm(shared);
-        let kept = || self.arm_alone[clip].lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some((_, residuals)) = kept().iter().find(|(numbers, _)| *numbers == felt) {
-            return Ok(Arc::clone(residuals));
-        }
-        let mut residuals = Vec::new();
-        arm.residuals(clip, shared, &[], &mut residuals)?;
-        let residuals = Arc::new(residuals);
-        let mut kept = kept();
-        kept.truncate(ARMS - 1);
-        kept.push_front((felt, Arc::clone(&residuals)));
-        Ok(residuals)
+        self.arm_alone[clip].at(&self.library.felt_by_arm(shared), |out| arm.simulated(clip, shared, out))
     }
 
     /// The poses' residuals at numbers, a clip's own among them.

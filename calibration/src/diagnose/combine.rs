@@ -11,15 +11,13 @@ use super::leftovers::{Left, NUMERICS, ROUGHNESS};
 use super::library::Library;
 use super::score::{Advantage, Foretold, foretell};
 use super::settle::{settled, without_superfluous};
-use super::shortlist::{self, Scored};
+use super::shortlist::Scored;
+use super::signatures;
 use super::split::Split;
 use super::starts;
-use super::straying;
-use super::sweep::{Point, Precision, Swept, sweep};
+use super::sweep::Precision;
 use super::worthy::{overlooked, seen_when_clips_stray_little, strays, worthy};
-use nalgebra::DMatrix;
 use shared_mem::progress::Progress;
-use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// At most so many effects are named.
 pub const MOST: usize = 4;
@@ -173,12 +171,20 @@ pub fn search<E: Evidence>(
     let mut now = baseline;
     loop {
         if let Some(first) = steps.first().filter(|first| spent(bench, split, first, &now)) {
-            let last = last_step(bench, split, &now, first)?;
+            let last = untried(bench, split, &now, Some(first))?;
             now = last.from.clone();
             steps.push(last);
             break;
         }
-        let mut step = step(bench, split, (&now, steps.first().map(|first| &first.left)), refined, bar)?;
+        let step = step(bench, split, (&now, steps.first().map(|first| &first.left)), refined, bar);
+        let Some(mut step) = step else {
+            // Cut short by its budget: what was found before stands.
+            let stands = if bench.interrupt.spent() { untried(bench, split, &now, steps.first()) } else { None };
+            let last = stands?;
+            now = last.from.clone();
+            steps.push(last);
+            break;
+        };
         step.reconsider(bench, split, refined);
         let best = step.best(bench).map(|(_, fit, _)| fit.clone());
         now = step.from.clone();
@@ -193,6 +199,13 @@ pub fn search<E: Evidence>(
                 if let Some(other) = other {
                     now = settled(bench, split, (&other, &weights), refined)?;
                 }
+            }
+            // The best so far, as far as it was fitted.
+            Some(best) if bench.interrupt.spent() && now.effects.len() < MOST => {
+                let last = untried(bench, split, &best, steps.first())?;
+                now = last.from.clone();
+                steps.push(last);
+                break;
             }
             _ => break,
         }
@@ -250,28 +263,9 @@ fn step<E: Evidence>(
     refined: &impl Fn(&[f64]) -> Option<Vec<f64>>,
     bar: &Progress,
 ) -> Option<Step> {
-    let mut swept = swept(bench, split, from, bar)?;
-    let mut weights = vec![1.0; bench.evidence.channels().len()];
-    // Weights depend on what the richest hypothesis leaves, and that on the weights: twice is enough.
-    for _ in 0..2 {
-        let left = floor::richest_residuals(&swept, bench.evidence, bench.library, &weights);
-        weights = floor::weights(bench.evidence, &left);
-    }
-    let scores = |swept: &Swept| {
-        let size = 1 + swept.columns.len();
-        let forms = swept.reduced(bench.evidence, &weights);
-        let sum = forms.iter().fold(DMatrix::zeros(size, size), |sum, clip| sum + &clip.form);
-        shortlist::score(swept, &sum, bench.library)
-    };
-    let mut scored = scores(&swept);
-    // Where clips of the right hypothesis stray little, the usual straying hides a small effect altogether.
-    swept.scatter = bench.scatter.narrowed(straying::LEAST);
-    let narrow = scores(&swept);
-    drop(swept);
+    let (weights, mut scored, narrow) = signatures::around(bench, split, from, bar)?;
     let from = bench.fit((&from.effects, from.full.clone()), &split.train, &weights, Some(from), FIRST_PASS)?;
     let foretold = foretell(bench, &from, &split.choose, &weights)?;
-    let of_arm = |row: &&Row| bench.evidence.channels()[row.channel].joint.is_some();
-    let arm_rows = split.open().iter().map(|clip| bench.evidence.rows(*clip).iter().filter(of_arm).count()).sum();
     let left = Residuals::at(bench, &from, &split.open()).map(|left| left.typical()).unwrap_or_default();
     let whole = whole.unwrap_or(&left).clone();
     let mut promising = worthy(bench, (&from, &weights), &scored, (&whole, &left));
@@ -285,7 +279,7 @@ fn step<E: Evidence>(
     let own_numbers = bench.scatter.count() > 0;
     let trial = |scored: &Scored| Trial { scored: scored.clone(), fitted: None, closes: 0.0, own_numbers };
     let trials = scored.iter().map(trial).collect();
-    let mut step = Step { from, foretold, trials, weights, arm_rows, left, whole };
+    let mut step = Step { from, foretold, trials, weights, arm_rows: arm_rows(bench, split), left, whole };
     step.fit(bench, split, (&promising, false), refined, bar);
     if step.best(bench).is_none() {
         let rest = overlooked(bench, &step);
@@ -294,14 +288,22 @@ fn step<E: Evidence>(
     Some(step)
 }
 
-/// The step at whose start nothing is left that could be tried: the hypothesis with the weights that it leaves itself.
-fn last_step<E: Evidence>(bench: &Bench<'_, E>, split: &Split, now: &Hypothesis, first: &Step) -> Option<Step> {
+/// A step in which nothing is tried: the hypothesis with the weights that it leaves itself. `first`: the first step, where this
+/// is not the first.
+fn untried<E: Evidence>(bench: &Bench<'_, E>, split: &Split, now: &Hypothesis, first: Option<&Step>) -> Option<Step> {
     let left = Residuals::at(bench, now, &split.train)?;
     let weights = floor::weights(bench.evidence, &left.clips);
     let from = bench.fit((&now.effects, now.full.clone()), &split.train, &weights, Some(now), FIRST_PASS)?;
     let foretold = foretell(bench, &from, &split.choose, &weights)?;
     let left = Residuals::at(bench, &from, &split.open())?.typical();
-    Some(Step { from, foretold, trials: Vec::new(), weights, left, ..first.clone() })
+    let whole = first.map_or_else(|| left.clone(), |first| first.whole.clone());
+    Some(Step { from, foretold, trials: Vec::new(), weights, arm_rows: arm_rows(bench, split), left, whole })
+}
+
+/// How many residuals of the arm the judged clips have.
+fn arm_rows<E: Evidence>(bench: &Bench<'_, E>, split: &Split) -> usize {
+    let of_arm = |row: &&Row| bench.evidence.channels()[row.channel].joint.is_some();
+    split.open().iter().map(|clip| bench.evidence.rows(*clip).iter().filter(of_arm).count()).sum()
 }
 
 impl Step {
@@ -329,7 +331,7 @@ impl Step {
             }
             let scored = &self.trials[place].scored;
             bar.show(50 + (done as u64 * 5).min(45), bench.library.candidates[scored.candidate].effect.name);
-            let starts = starts::of(bench, (&self.from, &self.weights), scored, overlooked);
+            let starts = starts::kept(bench, (&self.from, &self.weights), scored, overlooked);
             let effort = bench.trying(scored.candidate, HEAT);
             let heat = |start| bench.extend(&self.from, (scored.candidate, start), &split.train, &self.weights, effort);
             let mut heats: Vec<Hypothesis> = starts.into_iter().filter_map(heat).collect();
@@ -393,18 +395,4 @@ impl Step {
         let next = rivals.filter_map(worth).fold(0.0, f64::max);
         own.into_iter().find_map(worth).is_some_and(|own| next < 0.5 * own)
     }
-}
-
-fn swept<E: Evidence>(bench: &Bench<'_, E>, split: &Split, from: &Hypothesis, bar: &Progress) -> Option<Swept> {
-    let count = bench.scatter.count();
-    let clips: Vec<(usize, Vec<f64>)> = split.train.iter().map(|clip| (*clip, from.own(*clip, count))).collect();
-    let probed: Vec<usize> = (0..bench.library.candidates.len()).filter(|k| !from.effects.contains(k)).collect();
-    let point =
-        Point { full: &from.full, free: &from.free, probed: &probed, clips: &clips, precision: Precision::Joints };
-    let done = AtomicUsize::new(0);
-    let told = || {
-        let done = done.fetch_add(1, Ordering::Relaxed) + 1;
-        bar.show((50 * done / clips.len()) as u64, "signatures");
-    };
-    sweep(bench.evidence, bench.library, &point, &bench.scatter, &told).ok()
 }

@@ -1,13 +1,15 @@
 //! The verb `calibration diagnose`: arguments, files, and what is printed.
 
-use super::{Diagnosis, Options, diagnose};
+use super::{Diagnosis, Options, diagnose_kept};
 use crate::interrupt::Interrupt;
 use crate::report;
+use crate::typed;
 use shared_mem::console;
-use shared_mem::output;
+use shared_mem::output::Destination;
 use shared_mem::recording::Session;
 use shared_mem::theta::Theta;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 /// Arguments of the verb.
 #[derive(Debug, clap::Args)]
@@ -18,11 +20,16 @@ it. The verdict is none, named, class (several that these clips cannot tell apar
 What to record next is printed as commands that can be typed, and of an effect that is named what to do about it in the
 cell and in a model.
 
-The parameters found go to --theta: `twin replay SESSION --parameters theta.toml` shows the same gap, shrunk.
+The parameters found go to --theta: `twin replay SESSION --parameters theta.toml` shows the same gap, shrunk. With --out alone
+they go to theta.toml beside it, unless there is one already. What no clip tells is not written.
+
+Ctrl-C keeps what was found so far, beside --out or in the session's folder; the same command goes on from there. So it does
+after a --budget that was spent: of that the answer is the best so far, and says so.
 
 Examples:
   calibration diagnose session --report report.html
-  calibration diagnose session --out diagnosis.json --seed 7 --json")]
+  calibration diagnose session --out diagnosis.json --seed 7 --json
+  calibration diagnose session --budget 120 --out diagnosis.json")]
 pub struct Arguments {
     /// Folder with cell.toml and at least four different clips.
     #[arg(value_name = "SESSION")]
@@ -36,9 +43,15 @@ pub struct Arguments {
     /// Where the page goes.
     #[arg(long, value_name = "REPORT.HTML")]
     report: Option<PathBuf>,
-    /// Where the parameters and the effects named go [default: theta.toml beside --out, where that is given].
+    /// Where the parameters and the effects named go [default: theta.toml beside --out, where there is none].
     #[arg(long, value_name = "THETA.TOML")]
     theta: Option<PathBuf>,
+    /// Replaces the files of --out, --report and --theta; of a theta.toml, comments and what is not found stay.
+    #[arg(long)]
+    force: bool,
+    /// After so many seconds the best answer so far counts, 1 to 1000000 [default: as long as it takes].
+    #[arg(long, value_name = "SECONDS", value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
+    budget: Option<u64>,
     /// Draws which clips are for what, and the intervals.
     #[arg(long, default_value_t = 0)]
     seed: u64,
@@ -52,20 +65,58 @@ pub struct Arguments {
 /// # Errors
 /// What cannot be read, diagnosed or written, in one line with the remedy.
 pub fn run(arguments: &Arguments, interrupt: &Interrupt) -> anyhow::Result<Diagnosis> {
+    let Arguments { out, report, force, .. } = arguments;
+    let page = Destination::of(report.as_deref(), *force)?;
+    let answer = Destination::of(out.as_deref(), *force)?;
+    let theta_file = theta_file(arguments)?;
     let session = Session::open(&arguments.session)?;
     let theta = arguments.parameters.as_deref().map(Theta::read).transpose()?;
-    let mut found = diagnose(&session, &Options { theta, seed: arguments.seed }, interrupt)?;
-    let beside = arguments.out.as_ref().map(|out| out.with_file_name("theta.toml"));
-    if let Some(file) = arguments.theta.clone().or(beside) {
-        output::write(&file, found.theta.to_toml())?;
-        found.theta_file = Some(file);
+    let budget = arguments.budget.map(Duration::from_secs);
+    let options = Options { theta, seed: arguments.seed, budget, out: out.clone() };
+    let (mut found, kept) = diagnose_kept(&session, &options, interrupt)?;
+    match theta_file {
+        Some(file) if found.identifies() => {
+            found.theta.write(&file)?;
+            found.theta_file = Some(file);
+        }
+        Some(file) => console::line(format_args!("{}: not written, because no parameter was found", file.display())),
+        None => {}
     }
-    if let Some(file) = &arguments.out {
-        output::write(file, serde_json::to_string_pretty(&found)?)?;
+    if let Some(answer) = answer {
+        answer.write(serde_json::to_string_pretty(&found)?)?;
     }
-    if let Some(file) = &arguments.report {
-        output::write(file, report::diagnosis::page(&found))?;
+    if let Some(page) = page {
+        page.write(report::diagnosis::page(&found))?;
     }
     console::block(report::terminal::diagnosis(&found));
+    if !found.budget_spent {
+        kept.done();
+    } else if let Some(state) = kept.save()? {
+        console::line(format_args!(
+            "what was found is in {}; `{}` goes on from there",
+            state.display(),
+            typed::with("--force", *force || (out.is_none() && report.is_none() && arguments.theta.is_none()))
+        ));
+    }
     Ok(found)
+}
+
+/// Where the parameters go: where they are told to, or beside the answer. There nobody named the file, so one that is there
+/// stays.
+fn theta_file(arguments: &Arguments) -> anyhow::Result<Option<PathBuf>> {
+    if let Some(file) = &arguments.theta {
+        return Ok(Some(Destination::new(file, arguments.force)?.path().to_owned()));
+    }
+    let Some(file) = arguments.out.as_ref().map(|out| out.with_file_name("theta.toml")) else { return Ok(None) };
+    if is_there(&file) {
+        let name = file.display();
+        console::line(format_args!("{name} is there, and is kept; --theta FILE says where the parameters go"));
+        return Ok(None);
+    }
+    Ok(Some(Destination::new(&file, false)?.path().to_owned()))
+}
+
+/// A link that leads nowhere is there, too.
+fn is_there(file: &Path) -> bool {
+    file.symlink_metadata().is_ok()
 }

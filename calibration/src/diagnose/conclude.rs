@@ -25,7 +25,7 @@ const TRACES: usize = 12;
 
 /// The answer where the clips do not say enough.
 #[must_use]
-pub fn not_testable(session: &Session, options: &Options, theta: Theta, why: &str) -> Diagnosis {
+pub fn not_testable(session: &Session, options: &Options, why: &str) -> Diagnosis {
     let nothing = Share { value: 0.0, ci90: [0.0; 2] };
     let lacking = advice::lacking(why, &Site::of(session));
     Diagnosis {
@@ -49,10 +49,12 @@ pub fn not_testable(session: &Session, options: &Options, theta: Theta, why: &st
         remedies: Vec::new(),
         clips: Clips::default(),
         warnings: Vec::new(),
+        budget_spent: false,
         seconds: 0.0,
         session: session.folder.display().to_string(),
         seed: options.seed,
-        theta,
+        // What was known before; nothing was found.
+        theta: options.theta.clone().unwrap_or_default(),
         theta_file: None,
         traces: Vec::new(),
     }
@@ -107,6 +109,9 @@ pub fn conclude<E: Evidence>(
     let largest = rest.first().map(|place| (place.channel.as_str(), place.regime.as_str()));
     let next = next(&verdict, finding.open().is_some(), largest, &Site::of(session));
     let theta = bench.library.theta(&kept.full);
+    // Of an object that no clip shows nothing was found but what was given.
+    let given = options.theta.as_ref().and_then(|theta| theta.object.clone());
+    let object = if admitted.with_object { theta.object.clone() } else { given };
     Ok(Diagnosis {
         gap,
         candidates: ranked::candidates(
@@ -124,10 +129,11 @@ pub fn conclude<E: Evidence>(
         places,
         clips: Clips { train: names(&split.train), choose: names(&split.choose), confirm: names(&split.confirm) },
         warnings: admitted.warnings.clone(),
+        budget_spent: false,
         seconds: 0.0,
         session: session.folder.display().to_string(),
         seed: options.seed,
-        theta,
+        theta: Theta { object, ..theta },
         theta_file: None,
         traces: traces(bench.evidence, (&before, if nearest.is_some() { &after } else { shown }), &admitted.files),
         nearest,

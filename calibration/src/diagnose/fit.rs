@@ -1,16 +1,16 @@
 //! Hypotheses fitted to clips: the baseline's numbers and those of the effects that act, together, by bounded Gauss-Newton
 //! steps over the sweeps of [`super::sweep`].
 
-use super::evidence::{Evidence, Selected};
+use super::evidence::Evidence;
 use super::library::Library;
 use super::quadratic;
 use super::scatter::Scatter;
 use super::shortlist::{Scored, hold_numbers};
 use super::sweep::{Point, Precision, Reduced, Swept, sweep};
-use crate::estimate::ClipModel;
 use crate::interrupt::Interrupt;
+use crate::kept::{Fingerprint, Trail};
 use nalgebra::{DMatrix, DVector};
-use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 use twin::effects::{EffectInfo, Place, Role};
 
 /// What every step of the diagnosis is given.
@@ -21,15 +21,17 @@ pub struct Bench<'a, E> {
     pub library: &'a Library,
     /// What varies from clip to clip.
     pub scatter: Scatter,
-    /// Whether the user asked for the end.
+    /// Whether the user asked for the end, or the time is spent.
     pub interrupt: &'a Interrupt,
+    /// Where what is found is kept.
+    pub trail: Trail<'a>,
 }
 
 /// Clips, each with its own numbers.
 pub(super) type Clips = Vec<(usize, Vec<f64>)>;
 
 /// A clip at a hypothesis.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct FittedClip {
     /// Index of the clip.
     pub clip: usize,
@@ -48,7 +50,7 @@ impl FittedClip {
 }
 
 /// A hypothesis with its numbers.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Hypothesis {
     /// Candidates that act, in the order in which they were found.
     pub effects: Vec<usize>,
@@ -76,7 +78,7 @@ impl Hypothesis {
 }
 
 /// How a fit is made.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Hash)]
 pub struct Effort {
     /// At most so many linearisations.
     pub iterations: usize,
@@ -134,18 +136,37 @@ impl<E: Evidence> Bench<'_, E> {
     #[must_use]
     pub fn fit(
         &self,
-        (effects, mut full): (&[usize], Vec<f64>),
+        (effects, full): (&[usize], Vec<f64>),
         clips: &[usize],
         weights: &[f64],
         near: Option<&Hypothesis>,
         effort: Effort,
     ) -> Option<Hypothesis> {
+        let count = self.scatter.count();
+        let own = |clip: &usize| (*clip, near.map_or_else(|| vec![0.0; count], |near| near.own(*clip, count)));
+        let from: Clips = clips.iter().map(own).collect();
+        let step = self.step("fit").with(&(effects, clips, effort)).with_numbers(&full).with_numbers(weights);
+        let step = step.with_numbers(from.iter().flat_map(|(_, own)| own));
+        self.trail.0.once(&step, || self.fitted((effects, full), from, weights, effort))
+    }
+
+    /// A step of this bench by its name.
+    #[must_use]
+    pub fn step(&self, name: &str) -> Fingerprint {
+        Fingerprint::of(name).with(&self.trail.1)
+    }
+
+    fn fitted(
+        &self,
+        (effects, mut full): (&[usize], Vec<f64>),
+        from: Clips,
+        weights: &[f64],
+        effort: Effort,
+    ) -> Option<Hypothesis> {
         let free = self.free(effects);
         let holds = |k: &usize| effort.holds_joints && self.library.joints[*k].is_some();
         let moving: Vec<usize> = free.iter().copied().filter(|k| !holds(k)).collect();
-        let count = self.scatter.count();
-        let own = |clip: &usize| (*clip, near.map_or_else(|| vec![0.0; count], |near| near.own(*clip, count)));
-        let mut clips = self.settled(&full, clips.iter().map(own).collect(), weights)?;
+        let mut clips = self.settled(&full, from, weights)?;
         clips = self.freed(&full, clips, weights);
         let mut damping = 1e-4;
         let mut best = None;
@@ -179,7 +200,8 @@ impl<E: Evidence> Bench<'_, E> {
         precision: Precision,
     ) -> Option<Swept> {
         let point = Point { full, free, probed: &[], clips, precision };
-        sweep(self.evidence, self.library, &point, &self.scatter, &|| ()).ok()
+        // Not to be cut short: what was found is known only once the clips are linearised there.
+        sweep(self.evidence, self.library, &point, &self.scatter, &|_| true).ok()
     }
 
     /// A point with a lower cost, along damped steps; `None` when there is none that is worth it.
@@ -256,32 +278,6 @@ impl<E: Evidence> Bench<'_, E> {
         }
     }
 
-    /// Sum of squared weighted residuals and of the own numbers in their sigmas.
-    fn cost(&self, full: &[f64], clips: &[(usize, Vec<f64>)], weights: &[f64]) -> Option<f64> {
-        Some(self.costs(full, clips, weights)?.iter().sum::<f64>()).filter(|cost| cost.is_finite())
-    }
-
-    /// The same clip by clip.
-    pub(super) fn costs(&self, full: &[f64], clips: &[(usize, Vec<f64>)], weights: &[f64]) -> Option<Vec<f64>> {
-        let one = |(clip, own): &(usize, Vec<f64>)| {
-            let selected =
-                Selected { evidence: self.evidence, full: full.to_vec(), free: vec![], clips: vec![*clip], weights };
-            let mut out = Vec::new();
-            selected.residuals(0, &[], own, &mut out).ok()?;
-            Some(out.iter().map(|r| r * r).sum::<f64>() + self.scatter.penalty(own))
-        };
-        clips.par_iter().map(one).collect()
-    }
-
-    /// The cost of the clips of a hypothesis at other shared numbers, their own numbers at rest: where they were fitted
-    /// they hide a part of the gap.
-    #[must_use]
-    pub fn plain_cost(&self, from: &Hypothesis, full: &[f64], weights: &[f64]) -> Option<f64> {
-        let nothing = vec![0.0; self.scatter.count()];
-        let clips: Vec<_> = from.fitted.iter().map(|fitted| (fitted.clip, nothing.clone())).collect();
-        self.cost(full, &clips, weights)
-    }
-
     /// The effort of a trial of a candidate: one beyond the arm leaves the joints' numbers alone.
     #[must_use]
     pub fn trying(&self, candidate: usize, effort: Effort) -> Effort {
@@ -337,6 +333,11 @@ impl<E: Evidence> Bench<'_, E> {
     /// Clips that were not fitted, at a hypothesis' numbers with their own ones at their best.
     #[must_use]
     pub fn judge(&self, hypothesis: &Hypothesis, clips: &[usize], weights: &[f64]) -> Option<Vec<FittedClip>> {
+        let step = self.step("judge").with(&clips).with_numbers(&hypothesis.full).with_numbers(weights);
+        self.trail.0.once(&step, || self.judged(hypothesis, clips, weights))
+    }
+
+    fn judged(&self, hypothesis: &Hypothesis, clips: &[usize], weights: &[f64]) -> Option<Vec<FittedClip>> {
         let nothing = vec![0.0; self.scatter.count()];
         let clips = clips.iter().map(|clip| (*clip, nothing.clone())).collect();
         let at = self.settled(&hypothesis.full, clips, weights)?;

@@ -82,6 +82,7 @@ mod tests {
     use crate::estimate::{ClipModel, Impossible, Random};
     use crate::forward::setting;
     use crate::interrupt::Interrupt;
+    use crate::kept::Kept;
     use shared_mem::msg::MAX_JOINTS;
 
     const SIGMA: f64 = 0.02;
@@ -127,8 +128,13 @@ mod tests {
         let row = Row { channel: 0, stage: StageName::Slide, regime: "free", time: 0.0 };
         let evidence = TouchedTwice([channel], [row]);
         let interrupt = Interrupt::default();
-        let bench =
-            Bench { evidence: &evidence, library: &library, scatter: evidence.scatter(), interrupt: &interrupt };
+        let bench = Bench {
+            evidence: &evidence,
+            library: &library,
+            scatter: evidence.scatter(),
+            interrupt: &interrupt,
+            trail: (Kept::nothing(), ""),
+        };
         let full = library.start();
         let rest: Clips = (0..5).map(|clip| (clip, vec![0.0; 2])).collect();
         let freed = bench.freed(&full, rest.clone(), &[1.0]);

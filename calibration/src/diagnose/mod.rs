@@ -10,14 +10,15 @@
 //! | [`length`] | how much of long clips counts |
 //! | [`split`] | which clips are for what |
 //! | [`evidence`], [`arm_clips`], [`cell_clips`] | what is measured against the twin, and where in a clip |
+//! | `recent` | where a search has just been |
 //! | [`scatter`] | what every clip has of its own |
 //! | [`library`], [`ground`] | the candidates as numbers, and where on the table they can show |
 //! | [`baseline`] | the paper's parameters identified |
 //! | [`noise`], [`floor`] | how far residuals can be trusted |
-//! | [`sweep`], [`quadratic`] | every candidate's signature, linearised once |
+//! | [`signatures`], [`sweep`], [`quadratic`] | every candidate's signature, linearised once |
 //! | [`shortlist`] | how much of the gap each signature explains |
 //! | [`worthy`], [`arm_alone`], [`starts`], [`ripple`] | which of them are fitted, to the arm first, and where a fit begins |
-//! | [`fit`], [`freed`] | hypotheses fitted, and clips whose own numbers got stuck |
+//! | [`cost`], [`fit`], [`freed`] | hypotheses fitted, and clips whose own numbers got stuck |
 //! | [`score`] | how well they foretell clips |
 //! | [`straying`] | how far clips stray under one of them |
 //! | [`closing`] | how much of the gap they close |
@@ -45,6 +46,7 @@ pub mod combine;
 pub mod command;
 pub mod conclude;
 pub mod confidence;
+pub mod cost;
 pub mod drift;
 pub mod evidence;
 pub mod fit;
@@ -61,12 +63,14 @@ pub mod noise;
 pub mod parameters;
 pub mod quadratic;
 pub mod ranked;
+mod recent;
 pub mod remedies;
 pub mod ripple;
 pub mod scatter;
 pub mod score;
 pub mod settle;
 pub mod shortlist;
+pub mod signatures;
 pub mod site;
 pub mod split;
 pub mod starts;
@@ -84,6 +88,8 @@ pub use answer::{Candidate, Change, Clips, Diagnosis, Gap, Kind, Nearest, Place,
 use crate::forward::object::ObjectClips;
 use crate::forward::setting::{self, BaseError};
 use crate::interrupt::Interrupt;
+use crate::kept::{self, Fingerprint, Kept, Trail};
+use crate::typed;
 use admit::{Admitted, Refused, admit};
 use arm_clips::ArmClips;
 use cell_clips::CellClips;
@@ -95,7 +101,9 @@ use shared_mem::progress::Progress;
 use shared_mem::recording::Session;
 use shared_mem::theta::Theta;
 use split::Split;
-use std::time::Instant;
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
 use twin::arm::Joints;
 use twin::replay::ReplayError;
 use twin::sim::SimError;
@@ -107,6 +115,10 @@ pub struct Options {
     pub theta: Option<Theta>,
     /// Draws the split and the bootstrap.
     pub seed: u64,
+    /// After so long the best answer so far counts.
+    pub budget: Option<Duration>,
+    /// Where the answer will go: what was found so far is kept beside it; else in the session's folder.
+    pub out: Option<PathBuf>,
 }
 
 /// A session cannot be diagnosed.
@@ -129,27 +141,54 @@ pub enum DiagnoseError {
         "the twin cannot follow the clips with the parameters of cell.toml; try `twin replay` and follow its advice"
     )]
     NoBaseline,
-    /// Ctrl-C.
-    #[error("interrupted; nothing was written, start again")]
-    Interrupted,
+    /// Ctrl-C. What was found is kept, and the words say where.
+    #[error("{0}")]
+    Interrupted(String),
 }
 
-/// Diagnoses a session.
+/// Diagnoses a session; what was found on the way is kept until the answer is there.
 ///
 /// # Errors
 /// [`DiagnoseError`]. Clips that do not say enough are no error but a verdict.
 pub fn diagnose(session: &Session, options: &Options, interrupt: &Interrupt) -> Result<Diagnosis, DiagnoseError> {
+    let (found, kept) = diagnose_kept(session, options, interrupt)?;
+    kept.done();
+    Ok(found)
+}
+
+/// The same, with what was found on the way: to be given up ([`Kept::done`]) once the answer is where it belongs.
+///
+/// # Errors
+/// As [`diagnose`].
+pub fn diagnose_kept(
+    session: &Session,
+    options: &Options,
+    interrupt: &Interrupt,
+) -> Result<(Diagnosis, Arc<Kept>), DiagnoseError> {
+    let interrupt = &interrupt.within(options.budget);
     let admitted = admit(session);
-    if interrupt.asked() {
-        return Err(DiagnoseError::Interrupted);
+    if interrupt.cancelled() {
+        return Err(DiagnoseError::Interrupted("interrupted; start again".into()));
     }
-    match admitted {
+    let admitted = match admitted {
         Err(Refused::NotTestable(why)) => {
-            let base = setting::complete(&session.cell, options.theta.as_ref())?;
-            Ok(conclude::not_testable(session, options, base, &why))
+            // A cell that cannot be simulated is an error all the same.
+            setting::complete(&session.cell, options.theta.as_ref())?;
+            return Ok((conclude::not_testable(session, options, &why), Arc::new(Kept::default())));
         }
-        admitted => diagnose_clips(session, &admitted?, options, interrupt),
+        admitted => admitted?,
+    };
+    let question = Fingerprint::of("diagnose")
+        .with(&(session.cell.to_toml(), options.theta.as_ref().map(Theta::to_toml), options.seed))
+        .with_clips(&admitted.clips);
+    let kept = kept::for_work((options.out.as_deref(), &session.folder, "diagnose"), &question, interrupt);
+    let found = diagnosed(session, &admitted, options, (interrupt, (&kept, "")));
+    interrupt.work_is_over();
+    // What work says that was cut short is no answer.
+    if interrupt.cancelled() {
+        return Err(DiagnoseError::Interrupted(kept.farewell(&typed::command())));
     }
+    Ok((found?, kept))
 }
 
 /// Diagnoses clips that were admitted already; of the session only the cell and the name count.
@@ -162,6 +201,16 @@ pub fn diagnose_clips(
     options: &Options,
     interrupt: &Interrupt,
 ) -> Result<Diagnosis, DiagnoseError> {
+    let found = diagnosed(session, admitted, options, (interrupt, (Kept::nothing(), "")));
+    if interrupt.cancelled() { Err(DiagnoseError::Interrupted("interrupted; start again".into())) } else { found }
+}
+
+fn diagnosed(
+    session: &Session,
+    admitted: &Admitted,
+    options: &Options,
+    work: Work<'_>,
+) -> Result<Diagnosis, DiagnoseError> {
     let began = Instant::now();
     let base = setting::complete(&session.cell, options.theta.as_ref())?;
     let peaks = peaks(&session.cell, admitted, &base)?;
@@ -171,14 +220,17 @@ pub fn diagnose_clips(
         let arm = ArmClips::new(&session.cell, &admitted.clips, theta).map_err(Refused::from)?;
         let object = ObjectClips::new(&session.cell, admitted.clips.clone(), library.settings.clone())?;
         let evidence = CellClips::new(Some(arm), object, &library);
-        examine(&evidence, &library, session, admitted, options, interrupt)?
+        examine(&evidence, &library, session, admitted, options, work)?
     } else {
         let evidence = ArmClips::new(&session.cell, &admitted.clips, theta).map_err(Refused::from)?;
-        examine(&evidence, &library, session, admitted, options, interrupt)?
+        examine(&evidence, &library, session, admitted, options, work)?
     };
     diagnosis.seconds = began.elapsed().as_secs_f64();
     Ok(diagnosis)
 }
+
+/// What cuts work short, and where its steps are kept.
+type Work<'a> = (&'a Interrupt, Trail<'a>);
 
 /// The largest torque that each joint is asked for in the clips where nothing is wrong [N m].
 ///
@@ -195,19 +247,24 @@ fn examine<E: Evidence>(
     session: &Session,
     admitted: &Admitted,
     options: &Options,
-    interrupt: &Interrupt,
+    (interrupt, trail): Work<'_>,
 ) -> Result<Diagnosis, DiagnoseError> {
-    let bench = Bench { evidence, library, scatter: evidence.scatter(), interrupt };
+    let bench = Bench { evidence, library, scatter: evidence.scatter(), interrupt, trail };
     let split = Split::new(&admitted.groups, options.seed);
     let bar = Progress::new("diagnose", 100);
     bar.show(0, "baseline");
     let baseline = baseline::identify(&bench, &split, &session.cell, admitted).ok_or(DiagnoseError::NoBaseline)?;
-    let refined = |full: &[f64]| baseline::refined(&bench, &split, &session.cell, admitted, full);
+    let refined = |full: &[f64]| {
+        let step = bench.step("refined").with_numbers(full);
+        trail.0.once(&step, || baseline::refined(&bench, &split, &session.cell, admitted, full))
+    };
     let found = combine::search(&bench, &split, baseline, &refined, &bar).ok_or(DiagnoseError::NoBaseline)?;
-    if interrupt.asked() {
-        return Err(DiagnoseError::Interrupted);
-    }
+    let cut_short = interrupt.spent();
     bar.show(97, "confirm");
-    let concluded = conclude::conclude(&bench, &split, &found, session, admitted, options);
-    if interrupt.asked() { Err(DiagnoseError::Interrupted) } else { concluded }
+    let mut concluded = conclude::conclude(&bench, &split, &found, session, admitted, options)?;
+    if interrupt.spent() {
+        concluded.budget_spent = true;
+        concluded.verdict = concluded.verdict.so_far(options.budget.unwrap_or_default(), cut_short);
+    }
+    Ok(concluded)
 }

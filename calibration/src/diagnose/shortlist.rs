@@ -4,9 +4,10 @@ use super::library::Library;
 use super::quadratic::{bounded_minimum, eliminate};
 use super::sweep::{Column, Swept};
 use nalgebra::DMatrix;
+use serde::{Deserialize, Serialize};
 
 /// What a candidate's signature says.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Scored {
     /// Index of the candidate.
     pub candidate: usize,

@@ -31,8 +31,19 @@ const STEPPED: [f64; 6] = [0.95, 1.05, 1.15, 1.3, 1.6, 2.2];
 /// Units of a probe at which a number that only the object tells is tried: all of what is met in practice.
 const ALL_ALONG: [f64; 10] = [-9.0, -7.0, -5.0, -3.0, -1.0, 1.0, 3.0, 5.0, 7.0, 9.0];
 
+/// [`of`], worked out unless it is known.
+pub(super) fn kept<E: Evidence>(
+    bench: &Bench<'_, E>,
+    (from, weights): (&Hypothesis, &[f64]),
+    scored: &Scored,
+    overlooked: bool,
+) -> Vec<Vec<f64>> {
+    let step = bench.step("starts").with(&(scored.candidate, overlooked)).with_numbers(&from.full);
+    bench.trail.0.once(&step.with_numbers(weights), || of(bench, (from, weights), scored, overlooked))
+}
+
 /// Numbers at which fits of a candidate begin; `overlooked`: the score test did not point to it.
-pub(super) fn of<E: Evidence>(
+fn of<E: Evidence>(
     bench: &Bench<'_, E>,
     at: (&Hypothesis, &[f64]),
     scored: &Scored,
@@ -89,7 +100,8 @@ pub(super) fn has_places<E>(bench: &Bench<'_, E>, candidate: usize) -> bool {
 fn placed<E: Evidence>(bench: &Bench<'_, E>, at: (&Hypothesis, &[f64]), scored: &Scored) -> Vec<Vec<f64>> {
     let friction = bench.library.settings.settings().iter().position(|setting| *setting == Setting::Friction);
     let forms = 0..bench.library.candidates[scored.candidate].alternatives.len();
-    let in_form = |alternative: usize| {
+    let mut places: Vec<(f64, Vec<f64>)> = Vec::new();
+    for alternative in forms {
         let starts = aside(bench, &Scored { alternative, ..scored.clone() }, &PLACED);
         let numbers = starts.into_iter().flat_map(|start| {
             BESIDE.map(|share| {
@@ -98,10 +110,11 @@ fn placed<E: Evidence>(bench: &Bench<'_, E>, at: (&Hypothesis, &[f64]), scored: 
                 full
             })
         });
-        cheapest(bench, at, numbers)
-    };
-    let mut places: Vec<(f64, Vec<f64>)> = forms.filter_map(in_form).collect();
-    places.sort_by(|a, b| a.0.total_cmp(&b.0));
+        // A place that costs more than those that are fitted anyway is not fitted.
+        let bound = places.get(PLACES - 1).map_or(f64::INFINITY, |(cost, _)| *cost);
+        places.extend(cheapest_below(bench, at, numbers, bound));
+        places.sort_by(|a, b| a.0.total_cmp(&b.0));
+    }
     places.into_iter().take(PLACES).map(|(_, full)| full).collect()
 }
 
@@ -114,7 +127,7 @@ fn scanned<E: Evidence>(bench: &Bench<'_, E>, at: (&Hypothesis, &[f64]), scored:
     let ripples = bench.library.candidates[scored.candidate].is_searched(Search::InStep);
     let in_step = if ripples { ripple::start(bench, at, scored.candidate) } else { None };
     let most = ASTRAY * bench.plain_cost(at.0, &at.0.full, at.1).unwrap_or(f64::INFINITY);
-    let start = cheapest(bench, at, numbers.chain(in_step)).filter(|(cost, _)| *cost < most);
+    let start = cheapest_below(bench, at, numbers.chain(in_step), most);
     start.map(|(_, full)| full).into_iter().collect()
 }
 
@@ -189,14 +202,34 @@ fn with_nominal_object<E: Evidence>(bench: &Bench<'_, E>, mut full: Vec<f64>) ->
     full
 }
 
-/// Which numbers make the fitted clips cost least, and how much.
-fn cheapest<E: Evidence>(
+/// Which numbers make the fitted clips cost least, and how much, where that is less than `bound`. Of numbers that cost more
+/// before all clips were asked the others are not.
+fn cheapest_below<E: Evidence>(
     bench: &Bench<'_, E>,
     (from, weights): (&Hypothesis, &[f64]),
     numbers: impl Iterator<Item = Vec<f64>>,
+    bound: f64,
 ) -> Option<(f64, Vec<f64>)> {
-    let costs = numbers.map(|full| (bench.plain_cost(from, &full, weights).unwrap_or(f64::INFINITY), full));
-    costs.min_by(|a, b| a.0.total_cmp(&b.0))
+    let mut best: Option<(f64, Vec<f64>)> = None;
+    for full in numbers {
+        if bench.interrupt.asked() {
+            break;
+        }
+        let bound = best.as_ref().map_or(bound, |(cost, _)| *cost);
+        if let Some(cost) = bench.plain_cost_below(from, &full, weights, bound) {
+            best = Some((cost, full));
+        }
+    }
+    best
+}
+
+/// The same whatever they cost.
+fn cheapest<E: Evidence>(
+    bench: &Bench<'_, E>,
+    at: (&Hypothesis, &[f64]),
+    numbers: impl Iterator<Item = Vec<f64>>,
+) -> Option<(f64, Vec<f64>)> {
+    cheapest_below(bench, at, numbers, f64::INFINITY)
 }
 
 /// A candidate at shares of the strongest that is met in practice, either way where it acts both ways.

@@ -6,7 +6,9 @@
 //! costs no simulation.
 
 use super::scatter::Scatter;
+use crate::kept::numbers::matrix;
 use nalgebra::{Cholesky, DMatrix, DVector};
+use serde::{Deserialize, Serialize};
 
 /// Least scale that is tried, of what clips usually stray: nothing real strays less than an eighth of it.
 pub const LEAST: f64 = 0.125;
@@ -16,9 +18,10 @@ const SCALES: [f64; 4] = [1.0, 0.5, 0.25, LEAST];
 const STEPS: usize = 12;
 
 /// A clip around its own numbers.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Around {
     /// Products of (residual, own numbers), weighted.
+    #[serde(with = "matrix")]
     pub gram: DMatrix<f64>,
     /// The own numbers there.
     pub own: Vec<f64>,

@@ -14,8 +14,10 @@ use super::library::{Alternative, Library};
 use super::scatter::Scatter;
 use super::straying::Around;
 use crate::estimate::Impossible;
+use crate::kept::numbers::matrix;
 use nalgebra::{Cholesky, DMatrix, DVector};
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
 /// A column: a free number, or a probe.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -27,7 +29,7 @@ pub enum Column {
 }
 
 /// How columns are taken.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Precision {
     /// Joints together, each told by its own channels.
     Joints,
@@ -58,9 +60,10 @@ pub struct Swept {
 }
 
 /// One clip with its own numbers eliminated.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Reduced {
     /// Quadratic form over (residual, columns).
+    #[serde(with = "matrix")]
     pub form: DMatrix<f64>,
     /// Logarithm of the volume that the own numbers were integrated over; part of the deviance.
     pub volume: f64,
@@ -88,13 +91,14 @@ type Batch = Vec<usize>;
 /// Linearises.
 ///
 /// # Errors
-/// [`Impossible`] when the point itself has no answer. A column without an answer counts as one that changes nothing.
+/// [`Impossible`] when the point itself has no answer, or `go_on` says no; it is told, before each simulation, which share of a
+/// clip's that is. A column without an answer counts as one that changes nothing.
 pub fn sweep(
     evidence: &impl Evidence,
     library: &Library,
     point: &Point<'_>,
     scatter: &Scatter,
-    done: &(impl Fn() + Sync),
+    go_on: &(impl Fn(f64) -> bool + Sync),
 ) -> Result<Swept, Impossible> {
     let mut columns: Vec<Column> = point.free.iter().map(|k| Column::Number(*k)).collect();
     for candidate in point.probed {
@@ -104,10 +108,8 @@ pub fn sweep(
     }
     let batches = batches(library, &columns, point.precision);
     let one = |(clip, own): &(usize, Vec<f64>)| {
-        let work = Work { evidence, library, full: point.full, columns: &columns, batches: &batches, scatter };
-        let swept = work.clip(*clip, own);
-        done();
-        swept
+        let work = Work { evidence, library, full: point.full, columns: &columns, batches: &batches, scatter, go_on };
+        work.clip(*clip, own)
     };
     let clips = point.clips.par_iter().map(one).collect::<Result<_, _>>()?;
     Ok(Swept { columns, scatter: scatter.clone(), clips })
@@ -147,21 +149,26 @@ fn joint_of(library: &Library, column: Column) -> Option<usize> {
     }
 }
 
-struct Work<'a, E> {
+struct Work<'a, E, G> {
     evidence: &'a E,
     library: &'a Library,
     full: &'a [f64],
     columns: &'a [Column],
     batches: &'a [Batch],
     scatter: &'a Scatter,
+    go_on: &'a G,
 }
 
-impl<E: Evidence> Work<'_, E> {
+impl<E: Evidence, G: Fn(f64) -> bool + Sync> Work<'_, E, G> {
     fn clip(&self, clip: usize, own: &[f64]) -> Result<SweptClip, Impossible> {
         let mut base = Vec::new();
         self.evidence.residuals(clip, self.full, own, &mut base)?;
-        let shared: Vec<Vec<(usize, Vec<f64>)>> =
-            self.batches.par_iter().map(|batch| self.batch(batch, clip, own, &base)).collect();
+        let share = 1.0 / self.batches.len().max(1) as f64;
+        let batch = |batch: &Batch| {
+            let goes_on = (self.go_on)(share);
+            if goes_on { Ok(self.batch(batch, clip, own, &base)) } else { Err(Impossible("cut short".into())) }
+        };
+        let shared: Vec<Vec<(usize, Vec<f64>)>> = self.batches.par_iter().map(batch).collect::<Result<_, _>>()?;
         let owns: Vec<Vec<f64>> =
             (0..self.scatter.count()).into_par_iter().map(|k| self.own(k, clip, own, &base)).collect();
         let count = 1 + self.columns.len();

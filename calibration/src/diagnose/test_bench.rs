@@ -14,6 +14,7 @@ use crate::benchmark::world::{Fault, Kind, World};
 use crate::forward::object::ObjectClips;
 use crate::forward::setting;
 use crate::interrupt::Interrupt;
+use crate::kept::Kept;
 use shared_mem::cell::Cell;
 use shared_mem::msg::MAX_JOINTS;
 use shared_mem::theta::Theta;
@@ -52,7 +53,13 @@ pub(super) fn on_bench<R>(
     let clips = record(world, 2).expect("a session");
     let evidence = ArmClips::new(cell, &clips, &theta as Parameters<'_>).expect("an arm");
     let interrupt = Interrupt::default();
-    let bench = Bench { evidence: &evidence, library, scatter: evidence.scatter(), interrupt: &interrupt };
+    let bench = Bench {
+        evidence: &evidence,
+        library,
+        scatter: evidence.scatter(),
+        interrupt: &interrupt,
+        trail: (Kept::nothing(), ""),
+    };
     ask(&bench, &vec![1.0; evidence.channels().len()])
 }
 
@@ -69,7 +76,13 @@ pub(super) fn on_strokes<R>(
     let object = ObjectClips::new(cell, clips, library.settings.clone()).expect("an object");
     let evidence = CellClips::new(Some(arm), object, &library);
     let interrupt = Interrupt::default();
-    let bench = Bench { evidence: &evidence, library: &library, scatter: evidence.scatter(), interrupt: &interrupt };
+    let bench = Bench {
+        evidence: &evidence,
+        library: &library,
+        scatter: evidence.scatter(),
+        interrupt: &interrupt,
+        trail: (Kept::nothing(), ""),
+    };
     ask(&bench, &vec![1.0; evidence.channels().len()])
 }
 

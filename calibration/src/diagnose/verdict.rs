@@ -2,6 +2,7 @@
 
 use super::answer::{Kind, Verdict};
 use super::leftovers::Left;
+use std::time::Duration;
 
 /// What a verdict is drawn from.
 #[derive(Debug, Clone)]
@@ -172,6 +173,24 @@ impl Finding<'_> {
 #[must_use]
 pub fn not_testable(why: &str) -> Verdict {
     Verdict { kind: Kind::NotTestable, effects: Vec::new(), confidence: 1.0, text: format!("Not testable: {why}.") }
+}
+
+impl Verdict {
+    /// The same of a diagnosis whose time was spent. `cut_short`: not everything was tried, so that what is unexplained need not
+    /// be.
+    #[must_use]
+    pub fn so_far(self, budget: Duration, cut_short: bool) -> Self {
+        let kind = if cut_short && self.kind == Kind::Unexplained { Kind::NotTestable } else { self.kind };
+        let budget = budget.as_secs_f64();
+        let text = if kind == self.kind {
+            format!("{} This is the best answer so far: the budget of {budget} s was spent.", self.text)
+        } else {
+            format!(
+                "There is a gap, and the budget of {budget} s was spent before a cause was found; give it more time."
+            )
+        };
+        Self { kind, text, ..self }
+    }
 }
 
 #[cfg(test)]

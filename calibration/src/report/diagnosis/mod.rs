@@ -231,6 +231,7 @@ pub(super) mod tests {
             }],
             clips: Clips { train: vec!["clip_00.mcap".into(), "clip_01.mcap".into()], ..Clips::default() },
             warnings: Vec::new(),
+            budget_spent: false,
             seconds: 83.2,
             session: "monday".into(),
             seed: 7,

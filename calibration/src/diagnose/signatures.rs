@@ -1,0 +1,63 @@
+//! All candidates' signatures around a hypothesis, and what the score test says of each.
+
+use super::evidence::Evidence;
+use super::fit::{Bench, Hypothesis};
+use super::shortlist::{self, Scored};
+use super::split::Split;
+use super::sweep::{Point, Precision, Swept, sweep};
+use super::{floor, straying};
+use nalgebra::DMatrix;
+use shared_mem::progress::Progress;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+/// Weights of the channels, and what the score test says of all candidates, best first: with the usual straying, and with
+/// little of it.
+pub(super) type Signatures = (Vec<f64>, Vec<Scored>, Vec<Scored>);
+
+/// The signatures on the clips that are fitted; `None` where the twin has no answer, or the time is spent before all are there.
+pub(super) fn around<E: Evidence>(
+    bench: &Bench<'_, E>,
+    split: &Split,
+    from: &Hypothesis,
+    bar: &Progress,
+) -> Option<Signatures> {
+    let step = bench.step("signatures").with(&from.effects).with_numbers(&from.full);
+    let step = step.with_numbers(from.fitted.iter().flat_map(|clip| &clip.own));
+    bench.trail.0.once(&step, || taken(bench, split, from, bar))
+}
+
+fn taken<E: Evidence>(bench: &Bench<'_, E>, split: &Split, from: &Hypothesis, bar: &Progress) -> Option<Signatures> {
+    let mut swept = swept(bench, split, from, bar)?;
+    let mut weights = vec![1.0; bench.evidence.channels().len()];
+    // Weights depend on what the richest hypothesis leaves, and that on the weights: twice is enough.
+    for _ in 0..2 {
+        let left = floor::richest_residuals(&swept, bench.evidence, bench.library, &weights);
+        weights = floor::weights(bench.evidence, &left);
+    }
+    let scores = |swept: &Swept| {
+        let size = 1 + swept.columns.len();
+        let forms = swept.reduced(bench.evidence, &weights);
+        let sum = forms.iter().fold(DMatrix::zeros(size, size), |sum, clip| sum + &clip.form);
+        shortlist::score(swept, &sum, bench.library)
+    };
+    let scored = scores(&swept);
+    // Where clips of the right hypothesis stray little, the usual straying hides a small effect altogether.
+    swept.scatter = bench.scatter.narrowed(straying::LEAST);
+    let narrow = scores(&swept);
+    Some((weights, scored, narrow))
+}
+
+fn swept<E: Evidence>(bench: &Bench<'_, E>, split: &Split, from: &Hypothesis, bar: &Progress) -> Option<Swept> {
+    let count = bench.scatter.count();
+    let clips: Vec<(usize, Vec<f64>)> = split.train.iter().map(|clip| (*clip, from.own(*clip, count))).collect();
+    let probed: Vec<usize> = (0..bench.library.candidates.len()).filter(|k| !from.effects.contains(k)).collect();
+    let point =
+        Point { full: &from.full, free: &from.free, probed: &probed, clips: &clips, precision: Precision::Joints };
+    let done = AtomicUsize::new(0);
+    let told = |part: f64| {
+        let done = done.fetch_add(1, Ordering::Relaxed) as f64;
+        bar.show((50.0 * done * part / clips.len() as f64) as u64, "signatures");
+        !bench.interrupt.asked()
+    };
+    sweep(bench.evidence, bench.library, &point, &bench.scatter, &told).ok()
+}
