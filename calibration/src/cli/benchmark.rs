@@ -9,7 +9,7 @@ use calibration::report::terminal;
 use serde_json::json;
 use shared_mem::cell::Cell;
 use shared_mem::console;
-use shared_mem::output;
+use shared_mem::output::Destination;
 use std::path::PathBuf;
 use std::time::Instant;
 
@@ -48,6 +48,9 @@ pub(super) struct BenchmarkArguments {
     /// Where the page goes.
     #[arg(long, value_name = "REPORT.HTML")]
     report: Option<PathBuf>,
+    /// Replaces the file of --report.
+    #[arg(long, requires = "report")]
+    force: bool,
     /// Prints one JSON object on stdout at the end.
     #[arg(long)]
     json: bool,
@@ -55,6 +58,7 @@ pub(super) struct BenchmarkArguments {
 
 pub(super) fn run(arguments: BenchmarkArguments, interrupt: &Interrupt) -> anyhow::Result<()> {
     let began = Instant::now();
+    let page_file = Destination::of(arguments.report.as_deref(), arguments.force)?;
     let cell = Cell::read(&arguments.cell)?;
     let extent = match (arguments.short, arguments.null) {
         (true, _) => Extent::Short,
@@ -64,11 +68,11 @@ pub(super) fn run(arguments: BenchmarkArguments, interrupt: &Interrupt) -> anyho
     let plan = Plan { extent, clips: usize::try_from(arguments.clips)?, seed: arguments.seed };
     let Outcome { methods, left_out } = judge(&plan, &cell, interrupt);
     let seconds = began.elapsed().as_secs_f64();
-    if let Some(file) = &arguments.report {
+    if let Some(file) = &page_file {
         let worlds = methods.first().map_or(0, |method| method.cases.len());
         let origin =
             format!("calibration benchmark: {worlds} worlds from number {} on, {seconds:.0} s", arguments.seed);
-        output::write(file, page(&methods, &origin))?;
+        file.write(page(&methods, &origin))?;
     }
     left_out.iter().for_each(|world| console::line(format_args!("left out: {world}")));
     console::block(terminal::benchmark(&methods));

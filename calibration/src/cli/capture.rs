@@ -10,6 +10,7 @@ use calibration::keys::Keys;
 use clap::{Subcommand, ValueEnum as _};
 use shared_mem::console;
 use shared_mem::quantity::number;
+use shared_mem::output::Destination;
 use std::path::PathBuf;
 
 #[derive(Debug, Subcommand)]
@@ -238,6 +239,9 @@ pub(super) struct StrokeArguments {
     /// Draws the next stroke into this file and moves nothing.
     #[arg(long, value_name = "FILE.SVG")]
     preview: Option<PathBuf>,
+    /// Replaces the file of --preview.
+    #[arg(long, requires = "preview")]
+    force: bool,
     /// Prints one JSON object on stdout at the end.
     #[arg(long)]
     json: bool,
@@ -275,7 +279,8 @@ fn excite(arguments: ExcitationArguments, interrupt: &Interrupt) -> anyhow::Resu
 }
 
 fn strike(arguments: StrokeArguments, interrupt: &Interrupt) -> anyhow::Result<()> {
-    let StrokeArguments { task, clips, headings, turn_object, turn_tool, preview, json } = arguments;
+    let StrokeArguments { task, clips, headings, turn_object, turn_tool, preview, force, json } = arguments;
+    Destination::of(preview.as_deref(), force)?;
     let series = match (headings, &turn_object[..]) {
         (Some(count), _) => Series::Headings(count as usize),
         (None, []) => Series::Everywhere,

@@ -19,6 +19,9 @@ pub(super) struct DemoArguments {
     /// Folder to create.
     #[arg(long, value_name = "FOLDER", default_value = "demo")]
     out: PathBuf,
+    /// Replaces what an earlier demo wrote there.
+    #[arg(long)]
+    force: bool,
     /// Draws the hidden gains, the hidden effect and the motions.
     #[arg(long, default_value_t = 1)]
     seed: u64,
@@ -31,8 +34,8 @@ pub(super) struct DemoArguments {
 }
 
 pub(super) fn run(arguments: DemoArguments, interrupt: &Interrupt) -> anyhow::Result<()> {
-    let DemoArguments { out, seed, clips, json } = arguments;
-    let finding = demo::demo(&demo::Options { out, seed, clips }, interrupt)?;
+    let DemoArguments { out, force, seed, clips, json } = arguments;
+    let finding = demo::demo(&demo::Options { out, force, seed, clips }, interrupt)?;
     console::block(finding.table());
     if json { print_json(&finding) } else { Ok(()) }
 }

@@ -65,9 +65,11 @@ pub(crate) fn run(arguments: Arguments) -> anyhow::Result<()> {
         // What was recorded is kept and looked at, and a benchmark says what it has, after Ctrl-C too.
         Verb::Capture(capture) => capture::run(capture, &Interrupt::listen()?),
         Verb::Demo(arguments) => demo::run(arguments, &Interrupt::listen()?),
-        Verb::Benchmark(arguments) => benchmark::run(arguments, &Interrupt::listen()?),
+        Verb::Benchmark(arguments) => benchmark::run(arguments, &Interrupt::listen_and_cut_short()?),
         verb => {
-            let done = run_to_the_end(verb, &Interrupt::listen_to_end_at_once()?);
+            let interrupt = Interrupt::listen_to_end_at_once()?;
+            let done = run_to_the_end(verb, &interrupt);
+            interrupt.work_is_over();
             match done {
                 // What a reader that was stopped says of its file is not the file's fault.
                 Err(error) if ending::asked() && !error.to_string().starts_with("interrupted") => {

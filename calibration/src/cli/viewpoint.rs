@@ -9,6 +9,7 @@ use calibration::viewpoint::search::Reach;
 use clap::{Args, ValueEnum};
 use shared_mem::console;
 use shared_mem::quantity::{self, number};
+use shared_mem::output::Destination;
 use shared_mem::recording::PictureKind;
 use std::path::PathBuf;
 use twin::render::Hand;
@@ -75,6 +76,9 @@ pub(crate) struct ViewpointArguments {
     /// Writes the cell with the pose found.
     #[arg(long, value_name = "CELL.TOML")]
     out: Option<PathBuf>,
+    /// Replaces the files of --out and --report; of a cell.toml, all but the camera's block stays.
+    #[arg(long)]
+    force: bool,
     /// Writes the pictures with the outline (red: found, green: start) as a PNG.
     #[arg(long, value_name = "PICTURE.PNG")]
     report: Option<PathBuf>,
@@ -148,8 +152,8 @@ pub(super) fn run(arguments: ViewpointArguments) -> anyhow::Result<()> {
         frames: usize::from(arguments.frames),
         hand: arguments.hand.map_or(Hand::None, |width| Hand::Franka { width }),
         seed: arguments.seed,
-        out: arguments.out,
-        report: arguments.report,
+        out: Destination::of(arguments.out.as_deref(), arguments.force)?,
+        report: Destination::of(arguments.report.as_deref(), arguments.force)?,
     })?;
     tell(&found);
     if arguments.json { print_json(&found) } else { Ok(()) }

@@ -38,6 +38,8 @@ const AMPLITUDE: f64 = 0.25;
 pub struct Options {
     /// Folder to create.
     pub out: PathBuf,
+    /// Whether what an earlier demo wrote there is replaced.
+    pub force: bool,
     /// Draws the hidden gains, the hidden effect and the motions.
     pub seed: u64,
     /// Clips to record.
@@ -113,14 +115,19 @@ pub fn demo(options: &Options, interrupt: &Interrupt) -> anyhow::Result<Finding>
     ));
     let (captured, answers, live) = record(options, &files, interrupt)?;
     let kept: Vec<&Path> = captured.clips.iter().filter(|c| c.kept).map(|c| c.file.as_path()).collect();
+    let stays = || format!("ended early; what was recorded stays in {}", files.session.display());
     if interrupt.asked() {
-        bail!("ended early; what was recorded stays in {}", files.session.display());
+        bail!(stays());
     }
     let Some(first) = kept.first() else {
         bail!("no clip was good enough to keep; run the demo again on a less busy machine");
     };
     console::line("diagnosing the session");
-    let found = examine(options, &files, interrupt)?;
+    let found = examine(options, &files, interrupt);
+    if interrupt.asked() {
+        bail!(stays());
+    }
+    let found = found?;
     console::line("replaying with cell.toml and with what was found");
     let told = Told { effect: hidden::effect(options.seed), found: &found };
     let story = compare(options, &files, &files.session.join(first), (live, &told), interrupt)?;
@@ -147,19 +154,26 @@ pub fn demo(options: &Options, interrupt: &Interrupt) -> anyhow::Result<Finding>
 /// Creates the folder with what the laboratory knows and what it does not.
 fn prepare(options: &Options) -> anyhow::Result<Files> {
     let out = options.out.clone();
-    if out.read_dir().is_ok_and(|mut entries| entries.next().is_some()) {
-        bail!("{} is not empty; choose another folder with --out, or remove it", out.display());
+    let is_full = out.read_dir().is_ok_and(|mut entries| entries.next().is_some());
+    if is_full && !options.force {
+        bail!(
+            "{} is not empty; choose another folder with --out, or replace an earlier demo with --force",
+            out.display()
+        );
     }
     // Before anything is written: whoever builds what is missing calls again with the same folder.
     for program in [Program::Bridge, Program::Twin] {
         program.find()?;
     }
     std::fs::create_dir_all(&out).with_context(|| format!("cannot create {}", out.display()))?;
+    if is_full {
+        clear(&out)?;
+    }
     let files = Files {
         cell: out.join("cell.toml"),
         hidden: out.join("hidden_theta.toml"),
         hidden_effect: out.join("hidden_effect.toml"),
-        session: out.join("session"),
+        session: out.join(SESSION),
         diagnosis: out.join("diagnosis.html"),
         theta: out.join("theta.toml"),
         out,
@@ -173,10 +187,35 @@ fn prepare(options: &Options) -> anyhow::Result<Files> {
     Ok(files)
 }
 
+/// What a demo writes into its folder: files, and the session.
+const FILES: [&str; 8] = [
+    "cell.toml",
+    "hidden_theta.toml",
+    "hidden_effect.toml",
+    "diagnosis.html",
+    "theta.toml",
+    "report.html",
+    "twin_cell.mcap",
+    "twin_found.mcap",
+];
+const SESSION: &str = "session";
+
+/// Removes what an earlier demo wrote, and nothing else.
+fn clear(out: &Path) -> anyhow::Result<()> {
+    let gone = |result: std::io::Result<()>| match result {
+        Err(error) if error.kind() != std::io::ErrorKind::NotFound => Err(error),
+        _ => Ok(()),
+    };
+    let files = FILES.iter().map(|name| gone(std::fs::remove_file(out.join(name))));
+    let session = gone(std::fs::remove_dir_all(out.join(SESSION)));
+    files.chain([session]).collect::<std::io::Result<()>>().with_context(|| format!("cannot replace {}", out.display()))
+}
+
 /// Diagnoses the session and writes page and parameters.
 fn examine(options: &Options, files: &Files, interrupt: &Interrupt) -> anyhow::Result<Diagnosis> {
     let session = Session::open(&files.session)?;
-    let found = diagnose(&session, &diagnose::Options { theta: None, seed: options.seed }, interrupt)?;
+    let found =
+        diagnose(&session, &diagnose::Options { seed: options.seed, ..diagnose::Options::default() }, interrupt)?;
     output::write(&files.theta, found.theta.to_toml())?;
     output::write(&files.diagnosis, report::diagnosis::page(&found))?;
     Ok(found)

@@ -14,8 +14,10 @@ use nalgebra::{Isometry3, Point3, Quaternion, UnitQuaternion};
 use shared_mem::cell::{Camera, CameraPose, Cell, Intrinsics, Robot};
 use shared_mem::ending;
 use shared_mem::frames::{Base, Camera as CameraFrame, Pose as FramePose};
-use shared_mem::output;
-use shared_mem::recording::{PictureKind, Session, write_png};
+use shared_mem::input;
+use shared_mem::output::Destination;
+use shared_mem::recording::{PictureKind, Session, write_png_to};
+use shared_mem::toml_file;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 use twin::arm::{Joints, MAX_JOINTS};
@@ -51,9 +53,9 @@ pub struct Options {
     /// Seed of what is drawn by lot.
     pub seed: u64,
     /// Where the cell with the found pose goes.
-    pub out: Option<PathBuf>,
+    pub out: Option<Destination>,
     /// Where the pictures with the outline go.
-    pub report: Option<PathBuf>,
+    pub report: Option<Destination>,
 }
 
 /// Where to begin.
@@ -144,13 +146,20 @@ pub fn run(options: &Options) -> anyhow::Result<Viewpoint> {
             pose: CameraPose { position: answer.camera.position, orientation: answer.camera.orientation },
             ..camera
         });
-        output::write(out, cell.to_toml())?;
+        out.write(cell_text(&cell, out.path()))?;
     }
     if let Some(report) = &options.report {
         let (width, height, rgb) = overlay::sheet(&frames, &pixels, &shape, &found.camera_from_base, start.as_ref());
-        write_png(report, width, height, &rgb)?;
+        write_png_to(report, width, height, &rgb)?;
     }
     Ok(answer)
+}
+
+/// The cell's text; of a file that is there, all but the camera's block stays as a person wrote it.
+fn cell_text(cell: &Cell, file: &Path) -> String {
+    let before = input::text(file, input::Kind::Configuration).ok().filter(|_| file.is_file());
+    let camera = Cell { camera: cell.camera.clone(), ..Cell::default() };
+    before.and_then(|before| toml_file::updated(&before, &camera.to_toml(), &[])).unwrap_or_else(|| cell.to_toml())
 }
 
 /// The cell and the pictures.

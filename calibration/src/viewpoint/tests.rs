@@ -13,6 +13,7 @@ use super::step;
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use shared_mem::cell::{Camera, Cell};
 use shared_mem::frames::Pose;
+use shared_mem::output::Destination;
 use shared_mem::recording::{PictureKind, write_png};
 use std::path::{Path, PathBuf};
 use twin::render::{Hand, RobotSurface};
@@ -84,8 +85,8 @@ fn photo(cell: &Cell, folder: &Path) -> Options {
         frames: 1,
         hand: Hand::None,
         seed: 1,
-        out: Some(folder.join("found.toml")),
-        report: Some(folder.join("outline.png")),
+        out: Destination::of(Some(&folder.join("found.toml")), true).expect("a place"),
+        report: Destination::of(Some(&folder.join("outline.png")), true).expect("a place"),
     }
 }
 
