@@ -91,8 +91,26 @@ impl Program {
     /// When it does not end within 20 s.
     #[must_use]
     pub fn interrupt(self) -> Finished {
-        self.signal(Signal::INT);
+        self.end_by(Signal::INT)
+    }
+
+    /// Asks it to end by a signal, and waits.
+    ///
+    /// # Panics
+    /// When it does not end within 20 s.
+    #[must_use]
+    pub fn end_by(self, signal: Signal) -> Finished {
+        self.signal(signal);
         self.wait(Duration::from_secs(20))
+    }
+
+    /// Whether it has a handler for the signal.
+    #[must_use]
+    pub fn listens_to(&self, signal: Signal) -> bool {
+        let status = std::fs::read_to_string(format!("/proc/{}/status", self.pid())).unwrap_or_default();
+        let mask = status.lines().find_map(|line| line.strip_prefix("SigCgt:"));
+        let mask = mask.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok()).unwrap_or(0);
+        mask >> (signal.as_raw() - 1) & 1 == 1
     }
 
     /// Waits for the end.

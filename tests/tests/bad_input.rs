@@ -1,5 +1,6 @@
 //! What people get wrong: each time one line that says what and what to do, exit code 1, and nothing lost.
 
+use rustix::process::Signal;
 use shared_mem::msg::arm::ArmState;
 use shared_mem::msg::joints_from;
 use shared_mem::recording::{ClipInfo, ClipWriter};
@@ -79,7 +80,7 @@ fn a_disk_without_room_leaves_the_outputs_of_before_and_is_told() {
         said
     };
     let (twin, calibration) = (program("twin"), program("calibration"));
-    let said = limited(&format!("{twin} render {{dir}}/clip.mcap --every 10 --out {{dir}}/frames"));
+    let said = limited(&format!("{twin} render {{dir}}/clip.mcap --every 10 --out {{dir}}/frames --force"));
     assert!(said.contains("frame_00000.png") && said.contains("file of before is unchanged"), "{said}");
     assert_eq!(std::fs::read(cell.path("frames/frame_00000.png")).expect("a picture"), b"of before");
     let said = limited(&format!("{twin} replay {{dir}}/clip.mcap --out {{dir}}/twin.mcap"));
@@ -220,12 +221,7 @@ fn a_replay_that_would_take_an_hour_ends_when_it_is_asked_to() {
     // A row every 50 s: ten days, which no pause between two rows gives away.
     clip_at_rest(&cell.path("long.mcap"), 20_000, 50_000_000_000, |_, usual| usual);
     let replay = cell.start("twin", &["replay", "{dir}/long.mcap", "--cell", "{cell}"]);
-    // Until it listens to signals: bit 1 of the mask is SIGINT.
-    Cell::until("listening", Duration::from_secs(20), || {
-        let status = std::fs::read_to_string(format!("/proc/{}/status", replay.pid())).unwrap_or_default();
-        let mask = status.lines().find_map(|line| line.strip_prefix("SigCgt:"));
-        mask.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok()).is_some_and(|mask| mask >> 1 & 1 == 1)
-    });
+    Cell::until("listening", Duration::from_secs(20), || replay.listens_to(Signal::INT));
     std::thread::sleep(Duration::from_secs(1));
     let end = replay.interrupt();
     assert!(end.complaint().contains("interrupted"), "{}", end.complaint());

@@ -91,6 +91,13 @@ fn clips_and_pictures(session: &str, bags: &str) -> Vec<Verb> {
         Verb::new("render", "twin", &format!("render {session} --every 40 --out {{out}}"), &["frame_00000.png"])
             .anew()
             .times(5, 2),
+        Verb::new(
+            "render",
+            "twin",
+            &format!("render {session} --every 40 --out {{out}} --force"),
+            &["frame_00000.png"],
+        )
+        .times(5, 2),
         export("export-ros2", session, "ros2").times(5, 2),
         export("export-own", bags, "own"),
         export("export-twinaligner", &format!("{session}/clip_00.mcap"), "twinaligner"),
@@ -104,24 +111,27 @@ fn answers(session: &str, cell: &str, strokes: &str) -> Vec<Verb> {
     vec![
         verb(
             "identify-arm",
-            &format!("identify arm {session} --out {{out}}/theta.toml --report {{out}}/page.html"),
+            &format!("identify arm {session} --out {{out}}/theta.toml --report {{out}}/page.html --force"),
             &["theta.toml", "page.html"],
         )
         .times(6, 2),
         verb(
             "diagnose",
-            &format!("diagnose {session} --out {{out}}/diagnosis.json --report {{out}}/report.html"),
+            &format!(
+                "diagnose {session} --out {{out}}/diagnosis.json --theta {{out}}/theta.toml --report {{out}}/report.html \
+                 --force"
+            ),
             &["theta.toml", "diagnosis.json", "report.html"],
         ),
         verb(
             "viewpoint",
-            &format!("viewpoint {session} --frames 2 --out {{out}}/cell.toml --report {{out}}/outline.png"),
+            &format!("viewpoint {session} --frames 2 --out {{out}}/cell.toml --report {{out}}/outline.png --force"),
             &["cell.toml", "outline.png"],
         ),
-        verb("preview", &format!("{stroke} --preview {{out}}/next.svg"), &["next.svg"]).times(3, 1),
+        verb("preview", &format!("{stroke} --preview {{out}}/next.svg --force"), &["next.svg"]).times(3, 1),
         verb(
             "benchmark",
-            &format!("benchmark --cell {cell} --null 1 --report {{out}}/benchmark.html"),
+            &format!("benchmark --cell {cell} --null 1 --report {{out}}/benchmark.html --force"),
             &["benchmark.html"],
         )
         .times(2, 1),
@@ -156,7 +166,7 @@ fn live(cell: &str) -> Vec<Verb> {
 /// The links of a scanned robot.
 fn splats(scan: &str, cell: &str) -> Verb {
     let place = "--joints 0.2,-0.6,0.1,-2.2,0.1,1.7,0.6 --start 0,0,0,1,0,0,0,0.41";
-    let line = format!("label-splats {scan} --cell {cell} {place} --out {{out}}");
+    let line = format!("label-splats {scan} --cell {cell} {place} --out {{out}} --force");
     let links: &[&str] = &[
         "link0.ply",
         "link1.ply",
