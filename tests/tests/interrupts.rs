@@ -136,8 +136,10 @@ fn ended(
     });
     std::thread::sleep(moment);
     if !running.is_running() {
-        let _outputs_make_room =
-            [std::fs::remove_file(cell.path("theta.toml")), std::fs::remove_file(cell.path("d.json"))];
+        // Its outputs make room for the next one.
+        let files =
+            ["theta.toml", "swarm.toml", "d.json", "found.toml"].map(|name| std::fs::remove_file(cell.path(name)));
+        let _may_not_be_there = (files, std::fs::remove_dir_all(cell.path("new")));
         return None;
     }
     let end = running.end_by(signal);

@@ -6,7 +6,7 @@ use shared_mem::output::{Destination, Output};
 use shared_mem::recording::{ClipInfo, ClipMessages, ClipWriter, Payload, Picture, ReadError};
 use shared_mem::topics;
 use std::iter::Peekable;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// A picture's header and its pixels.
 pub(super) type Pixels = (ImageHeader, Vec<u8>);
@@ -143,7 +143,7 @@ mod tests {
         let folder = tempfile::tempdir().expect("a folder");
         let out = folder.path().join("clip.mcap");
         let (camera, info) = (CameraInfo::default(), ClipInfo::default());
-        let mut passes = Passes::new(&out);
+        let mut passes = Passes::new(Destination::new(&out, false).expect("a place"));
         for numbers in [&[2, 3, 6][..], &[4, 7], &[1, 5]] {
             let mut writer = passes.begin(&info).expect("a file");
             for number in numbers {
