@@ -9,8 +9,8 @@ use calibration::interrupt::Interrupt;
 use calibration::keys::Keys;
 use clap::{Subcommand, ValueEnum as _};
 use shared_mem::console;
-use shared_mem::quantity::number;
 use shared_mem::output::Destination;
+use shared_mem::quantity::number;
 use std::path::PathBuf;
 
 #[derive(Debug, Subcommand)]

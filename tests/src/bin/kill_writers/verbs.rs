@@ -88,9 +88,6 @@ fn clips_and_pictures(session: &str, bags: &str) -> Vec<Verb> {
     };
     vec![
         Verb::new("replay", "twin", &format!("replay {session} --out {{out}}/twin"), clips).anew().times(6, 2),
-        Verb::new("render", "twin", &format!("render {session} --every 40 --out {{out}}"), &["frame_00000.png"])
-            .anew()
-            .times(5, 2),
         Verb::new(
             "render",
             "twin",
