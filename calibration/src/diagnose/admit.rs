@@ -7,6 +7,7 @@ use crate::identify::object::screen::{Screened, screened};
 use crate::identify::remarks::grouped;
 use shared_mem::cell::{Cell, ClipKind};
 use shared_mem::recording::{Clip, ReadError, Session};
+use std::path::PathBuf;
 use twin::arm::{ArmModel, ModelError};
 
 /// Clips that can be used.
@@ -41,6 +42,15 @@ pub enum Refused {
     /// The arm.
     #[error(transparent)]
     Arm(#[from] ModelError),
+    /// An object alone.
+    #[error(
+        "cell.toml has no [robot], and a diagnosis explains how an arm and what it hits move; what an object alone tells is found by `calibration identify object {}`",
+        session.display()
+    )]
+    NoRobot {
+        /// The session.
+        session: PathBuf,
+    },
     /// The clips do not say enough.
     #[error("{0}")]
     NotTestable(String),
@@ -54,12 +64,15 @@ const FEWEST: usize = 4;
 /// # Errors
 /// [`Refused`] with what is missing.
 pub fn admit(session: &Session) -> Result<Admitted, Refused> {
-    let arm = session.cell.robot.as_ref().map(|_| ArmModel::from_cell(&session.cell)).transpose()?;
+    if session.cell.robot.is_none() {
+        return Err(Refused::NoRobot { session: session.folder.clone() });
+    }
+    let arm = ArmModel::from_cell(&session.cell)?;
     let (mut clips, mut files, mut out, mut remarks) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
     for entry in &session.clips {
         let file = entry.file.to_string_lossy().into_owned();
         let read = session.read(entry).map_err(|error| error.to_string());
-        match read.and_then(|clip| looked_at(clip, &session.cell, arm.as_ref())) {
+        match read.and_then(|clip| looked_at(clip, &session.cell, &arm)) {
             Ok((clip, odd)) => {
                 clips.push(clip);
                 remarks.extend(odd.into_iter().map(|remark| (file.clone(), remark)));
@@ -96,11 +109,11 @@ pub fn admit(session: &Session) -> Result<Admitted, Refused> {
 
 /// The clip with what could be mended mended and its joints in the model's order, and what is odd about it; the reason why
 /// it cannot be used otherwise.
-fn looked_at(mut clip: Clip, cell: &Cell, arm: Option<&ArmModel>) -> Result<(Clip, Vec<String>), String> {
+fn looked_at(mut clip: Clip, cell: &Cell, arm: &ArmModel) -> Result<(Clip, Vec<String>), String> {
     let mut remarks: Vec<String> = clip.warnings.iter().chain(&clip.damage).cloned().collect();
     // What a session lacks as a whole is said of the session.
     let complete = !clip.measured.is_empty() && !clip.desired.is_empty();
-    if let Some(arm) = arm.filter(|_| complete) {
+    if complete {
         (clip, remarks) = one_piece(clip, cell, arm).map_err(|why| why.to_string())?;
     }
     if clip.kind == ClipKind::Excitation || clip.object.is_empty() {
@@ -159,10 +172,17 @@ mod tests {
     }
 
     #[test]
+    fn a_session_without_a_robot_is_sent_to_where_an_object_alone_is_understood() {
+        let session = Session { folder: "tosses".into(), cell: Cell::default(), clips: Vec::new() };
+        let why = admit(&session).expect_err("no arm").to_string();
+        assert!(why.contains("no [robot]") && why.contains("`calibration identify object tosses`"), "{why}");
+    }
+
+    #[test]
     fn a_clip_without_faults_is_taken_as_it_is() {
         for kind in [Kind::Excitation, Kind::Strokes] {
             let (cell, arm, clip) = recorded(kind);
-            let (taken, remarks) = looked_at(clip.clone(), &cell, Some(&arm)).expect("a usable clip");
+            let (taken, remarks) = looked_at(clip.clone(), &cell, &arm).expect("a usable clip");
             assert_eq!((&taken.measured, &taken.object), (&clip.measured, &clip.object));
             assert!(remarks.is_empty(), "{remarks:?}");
         }
@@ -173,12 +193,12 @@ mod tests {
         let (cell, arm, mut clip) = recorded(Kind::Excitation);
         let rows = clip.desired.len();
         without_commands(&mut clip, rows / 4..rows / 4 + 200);
-        let (taken, remarks) = looked_at(clip, &cell, Some(&arm)).expect("a usable clip");
+        let (taken, remarks) = looked_at(clip, &cell, &arm).expect("a usable clip");
         assert!((rows / 2..rows * 3 / 4).contains(&taken.measured.len()), "{} of {rows}", taken.measured.len());
         assert!(remarks.iter().any(|remark| remark.contains("no commands for 0.20")), "{remarks:?}");
         let (cell, arm, mut clip) = recorded(Kind::Strokes);
         without_commands(&mut clip, rows / 4..rows / 4 + 200);
-        let why = looked_at(clip, &cell, Some(&arm)).expect_err("a reason");
+        let why = looked_at(clip, &cell, &arm).expect_err("a reason");
         assert!(why.contains("no commands for 0.20") && why.contains("record it again"), "{why}");
     }
 
@@ -187,13 +207,13 @@ mod tests {
         let (cell, arm, mut clip) = recorded(Kind::Excitation);
         let stays = clip.measured.q[3];
         clip.measured.q.iter_mut().skip(3).step_by(7).for_each(|q| *q = stays);
-        let why = looked_at(clip, &cell, Some(&arm)).expect_err("a reason");
+        let why = looked_at(clip, &cell, &arm).expect_err("a reason");
         assert!(why.contains("joint 4") && why.contains("enabled"), "{why}");
         let (cell, arm, mut clip) = recorded(Kind::Strokes);
         for pose in &mut clip.object.poses {
             *pose = Pose::from_isometry(Translation3::new(0.0, 0.4, 0.0) * pose.isometry());
         }
-        let (_, remarks) = looked_at(clip, &cell, Some(&arm)).expect("a clip");
+        let (_, remarks) = looked_at(clip, &cell, &arm).expect("a clip");
         assert!(remarks.iter().any(|remark| remark.contains("never comes nearer")), "{remarks:?}");
     }
 }

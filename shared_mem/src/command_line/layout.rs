@@ -28,7 +28,7 @@ fn fitted_below(mut command: Command, built: &mut Command, program: &str, width:
     if let Some(usage) = usage.strip_prefix(USAGE).filter(|usage| USAGE.len() + usage.trim_end().len() > width) {
         command = command.override_usage(usage_of(usage, width));
     }
-    command.mut_subcommands(|verb| match built.find_subcommand_mut(verb.get_name().to_owned()) {
+    command.mut_subcommands(|verb| match built.find_subcommand_mut(verb.get_name()) {
         Some(built) => fitted_below(verb, built, program, width),
         None => verb,
     })

@@ -53,7 +53,7 @@ pub fn parse<A: Parser>(build: &Build) -> Result<A, ExitCode> {
         .map_err(|error| usage::say(error.use_stderr(), error.render()))?;
     match matches.subcommand() {
         Some((COMPLETIONS, asked)) => Err(completions(&mut command, asked)),
-        Some((MANPAGES, asked)) => Err(manpages(&command, asked)),
+        Some((MANPAGES, asked)) => Err(manpages(self::command::<A>(build), asked)),
         _ => A::from_arg_matches(&matches).map_err(|error| usage::say(error.use_stderr(), error.render())),
     }
 }
@@ -96,7 +96,7 @@ fn completions(command: &mut Command, asked: &ArgMatches) -> ExitCode {
     ended(answer::bytes(&script))
 }
 
-fn manpages(command: &Command, asked: &ArgMatches) -> ExitCode {
+fn manpages(command: Command, asked: &ArgMatches) -> ExitCode {
     let Some(folder) = asked.get_one::<PathBuf>("out") else { return ExitCode::FAILURE };
     match pages::write(command, folder) {
         Ok(count) => ended(answer::words(format!("{count} manual pages in {}", folder.display()))),

@@ -47,7 +47,7 @@ use std::time::Duration;
 const HOST: Ipv4Addr = Ipv4Addr::LOCALHOST;
 const PORT: u16 = 8765;
 /// Messages that wait for a viewer; where one more comes, the oldest goes. Two pictures' worth of everything, at 0.9 MB for
-/// the largest.
+/// the largest; the robot's shapes are 2 MB, once.
 const BACKLOG: usize = 32;
 /// Robot, twin and object.
 const SCENE: &str = "/scene";
