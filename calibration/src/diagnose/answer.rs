@@ -96,7 +96,7 @@ pub struct Gap {
     pub after: f64,
     /// What noise and scatter alone leave.
     pub floor: f64,
-    /// `1 - after / before`.
+    /// `1 - after / before`, at least -1: a gap that more than doubles.
     pub shrink: Share,
     /// `(before - after) / (before - floor)`.
     pub explainable_fraction: f64,

@@ -79,11 +79,15 @@ impl Residuals {
         mean(&self.sums, &(0..self.clips.len()).collect::<Vec<_>>())
     }
 
-    /// Share by which the mean square shrinks from `before` to this, with an interval from drawing clips anew.
+    /// Share by which the mean square shrinks from `before` to this, with an interval from drawing clips anew; at least
+    /// [`DOUBLED`].
     #[must_use]
     pub fn shrink(&self, before: &Self, seed: u64) -> Share {
         let (before, after) = (&before.sums, &self.sums);
-        let of = |drawn: &[usize]| 1.0 - mean(after, drawn) / mean(before, drawn).max(f64::MIN_POSITIVE);
+        let of = |drawn: &[usize]| {
+            let ratio = mean(after, drawn) / mean(before, drawn).max(f64::MIN_POSITIVE);
+            (1.0 - ratio).max(DOUBLED)
+        };
         let all: Vec<usize> = (0..after.len()).collect();
         let mut rng = Pcg64::seed_from_u64(seed);
         let mut drawn: Vec<f64> =
@@ -92,6 +96,11 @@ impl Residuals {
         Share { value: of(&all), ci90: [drawn[DRAWS / 20], drawn[DRAWS - 1 - DRAWS / 20]] }
     }
 }
+
+/// The share by which a gap shrinks that becomes twice as large. Numbers that fit some clips may be anything in others, up
+/// to an arm that swings without end: beyond twice the gap the share tells how soon a simulation was given up, not how
+/// wrong the numbers are.
+pub const DOUBLED: f64 = -1.0;
 
 /// Draws of the bootstrap.
 const DRAWS: usize = 1000;
@@ -145,6 +154,13 @@ mod tests {
     fn one_clip_that_went_its_own_way_does_not_make_the_typical_one() {
         let [typical] = residuals(&[1.0, 1.0, 1.0, 30.0]).typical()[..] else { panic!("one group") };
         assert!((typical.mean_square - 30f64.sqrt()).abs() < 1e-9 && typical.floor == 1.0, "{typical:?}");
+    }
+
+    #[test]
+    fn a_fit_that_flies_apart_in_other_clips_doubles_the_gap_and_no_more() {
+        let shrink = residuals(&[1e53, 1.0, 1.0, 1.0]).shrink(&residuals(&[2.0; 4]), 1);
+        assert_eq!((shrink.value, shrink.ci90[0]), (DOUBLED, DOUBLED));
+        assert!(shrink.ci90[1] <= 0.75, "{shrink:?}");
     }
 
     #[test]

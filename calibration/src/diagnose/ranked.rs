@@ -4,11 +4,16 @@ use super::answer::{Candidate, Share, Status};
 use super::combine::{Found, Step, Trial};
 use super::evidence::Evidence;
 use super::fit::Bench;
-use super::gap::Residuals;
+use super::gap::{DOUBLED, Residuals};
 use super::shortlist::{Scored, TESTABLE};
 use super::split::Split;
 use super::verdict::Finding;
 use super::{Kind, confidence, parameters};
+
+/// What nobody fitted closes nothing.
+const NOT_FITTED: Share = Share { value: 0.0, ci90: [0.0; 2] };
+/// Of numbers with which the twin has no answer in the clips kept for confirming.
+const FLOWN: Share = Share { value: DOUBLED, ci90: [DOUBLED; 2] };
 
 /// What is said of every candidate: what was named first, then what is possible, then the likelier.
 pub(super) fn candidates<E: Evidence>(
@@ -29,10 +34,14 @@ pub(super) fn candidates<E: Evidence>(
         let step = judged_in(found, effect, believed);
         let trial = step.trials.iter().find(|trial| trial.scored.candidate == effect).unwrap_or(trial);
         let on_confirm = |fit| Residuals::at(bench, fit, &split.confirm);
-        let fitted = trial.fitted.as_ref().and_then(|(fit, _)| on_confirm(fit));
-        let shrink = match &step.from.effects[..] {
-            [] => fitted.map(|fitted| fitted.shrink(before, seed)),
-            _ => fitted.zip(on_confirm(&step.from)).map(|(fitted, from)| fitted.shrink(&from, seed)),
+        let beneath = match &step.from.effects[..] {
+            [] => None,
+            _ => on_confirm(&step.from),
+        };
+        let from = beneath.as_ref().unwrap_or(before);
+        let shrink = match &trial.fitted {
+            None => NOT_FITTED,
+            Some((fit, _)) => on_confirm(fit).map_or(FLOWN, |fitted| fitted.shrink(from, seed)),
         };
         let beside: Vec<&str> = step.from.effects.iter().map(|k| bench.library.candidates[*k].effect.name).collect();
         let fit = if kept { Some(&found.last) } else { trial.fitted.as_ref().map(|(fit, _)| fit) };
@@ -42,10 +51,10 @@ pub(super) fn candidates<E: Evidence>(
             effect: name.into(),
             probability: if kept { probability.max(finding.confidence) } else { probability },
             parameters: fit.map(|fit| parameters::of_effect(bench, fit, effect)).unwrap_or_default(),
-            shrink: shrink.unwrap_or(Share { value: 0.0, ci90: [0.0; 2] }),
+            shrink,
             confusable_with: confusable(first, effect, unforeseen, bench),
             status,
-            why: why(trial, &beside, status),
+            why: format!("{}{}", why(trial, &beside, status), carried_over(&shrink)),
         }
     };
     let mut all: Vec<Candidate> = first.trials.iter().map(one).collect();
@@ -85,6 +94,14 @@ fn status(scored: &Scored, kept: bool, rival: bool, kind: Kind) -> Status {
 fn confusable<E: Evidence>(first: &Step, effect: usize, unforeseen: f64, bench: &Bench<'_, E>) -> Vec<String> {
     let near = confidence::rivals(first, effect, unforeseen);
     near.iter().map(|other| bench.library.candidates[*other].effect.name.to_owned()).collect()
+}
+
+/// What is added to the reason where numbers that fit some clips are wrong in the others.
+fn carried_over(shrink: &Share) -> &'static str {
+    if shrink.value > DOUBLED {
+        return "";
+    }
+    "; its numbers fit the clips they were found on alone: on those kept for confirming the gap more than doubles"
 }
 
 fn why(trial: &Trial, beside: &[&str], status: Status) -> String {
@@ -168,6 +185,13 @@ mod tests {
         let all = |believed| [0, 1, 2, 3, 4].map(|effect| judged(effect, believed));
         assert_eq!(all(true), [0, 1, 0, 1, 2]);
         assert_eq!(all(false), [0; 5], "beside what is not believed nothing is judged");
+    }
+
+    #[test]
+    fn numbers_that_fit_some_clips_alone_are_told() {
+        assert!(carried_over(&FLOWN).contains("more than doubles"));
+        assert_eq!(carried_over(&Share { value: -0.4, ci90: [-0.6, 0.1] }), "");
+        assert_eq!(carried_over(&NOT_FITTED), "");
     }
 
     #[test]
