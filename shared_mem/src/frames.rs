@@ -20,7 +20,10 @@ pub struct Tip;
 /// The colour camera's optical frame: z forward, x right, y down.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Camera;
-/// The object: origin in its geometric centre, axes along its edges as listed in `object.size`.
+/// The object: axes along a box's edges as listed in `object.size`, or those of the mesh's file; origin in its geometric
+/// centre. That is the middle of its bounding box along these axes, of a box and of a mesh alike: neither the origin of the
+/// mesh's file nor the centroid of its corners or of its volume. Poses of the object, its centre of mass and its ranges all
+/// count from there.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Object;
 

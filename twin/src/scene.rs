@@ -33,7 +33,8 @@ pub struct ObjectModel {
     pub shape: ObjectShape,
     /// Mass [kg].
     pub mass: f64,
-    /// Centre of mass from the geometric centre, object frame [m].
+    /// Centre of mass from the geometric centre, object frame [m]; there itself where nothing is known, also of a mesh
+    /// whose volume has its centroid elsewhere.
     pub centre_of_mass: Vector3<f64>,
     /// Coulomb friction on the table.
     pub friction: f64,
@@ -60,7 +61,7 @@ pub struct ObjectParameters {
     pub restitution: f64,
 }
 
-/// Surface of the object around its geometric centre [m].
+/// Surface of the object around its geometric centre, the origin of [`shared_mem::frames::Object`] [m].
 #[derive(Debug, Clone, PartialEq)]
 pub enum ObjectShape {
     /// A box.

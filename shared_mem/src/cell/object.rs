@@ -12,7 +12,8 @@ pub struct Object {
     /// `"box"`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub shape: Option<String>,
-    /// Mesh file (obj, stl, ply), relative to cell.toml, instead of `shape`.
+    /// Mesh file (obj, stl, ply), relative to cell.toml, instead of `shape`. Where in the file the origin lies does not matter:
+    /// the object's is the geometric centre, the middle of the mesh's bounding box.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub mesh: Option<PathBuf>,
     /// Edge lengths along the object's x, y, z [m].
@@ -30,7 +31,7 @@ pub struct Object {
     /// Where the friction on the table may lie.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub friction_range: Option<Range>,
-    /// Where the centre of mass may lie, from the geometric centre, object frame [m].
+    /// Where the centre of mass may lie, from the geometric centre ([`crate::frames::Object`]), object frame [m].
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub centre_of_mass_range: Option<[Range; 3]>,
     /// Where the friction against the tool may lie.

@@ -30,7 +30,7 @@ pub enum MeshFileError {
     },
 }
 
-/// Reads a mesh and moves the middle of its bounding box to the origin.
+/// Reads a mesh and moves its geometric centre, the middle of its bounding box, to the origin.
 pub(super) fn read(path: &Path) -> Result<ObjectShape, MeshFileError> {
     let bytes = input::bytes(path, input::Kind::Mesh)?;
     let ending = path.extension().and_then(|e| e.to_str()).unwrap_or("").to_ascii_lowercase();
@@ -394,6 +394,17 @@ mod tests {
             let (points, triangles) = shape.triangles();
             assert_eq!((points.len(), triangles.len()), (4, 4), "{name}");
         }
+    }
+
+    #[test]
+    fn the_geometric_centre_is_the_middle_of_the_bounding_box_wherever_origin_and_centroid_of_the_file_are() {
+        // The tetrahedron's corners have their centroid at (0.25, 0.25, 0.5), the volume too.
+        let moved: String =
+            TETRAHEDRON.iter().map(|[x, y, z]| format!("v {} {} {}\n", x + 7.0, y - 3.0, z + 0.5)).collect();
+        let faces: String = FACES.iter().map(|f| format!("f {} {} {}\n", f[0] + 1, f[1] + 1, f[2] + 1)).collect();
+        let (points, _) = read_as("a.obj", (moved + &faces).as_bytes()).expect("a body").triangles();
+        let expected = TETRAHEDRON.map(|[x, y, z]| Point3::new(x - 0.5, y - 0.5, z - 1.0));
+        assert!(points.iter().zip(&expected).all(|(a, b)| (a - b).norm() < 1e-12), "{points:?}");
     }
 
     #[test]
