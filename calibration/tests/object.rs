@@ -6,7 +6,7 @@ use calibration::estimate::ClipModel as _;
 use calibration::forward::Settings;
 use calibration::forward::object::{ModelError, ObjectClips, Own};
 use calibration::forward::setting::{complete, object_parameters};
-use calibration::identify::object::{Options, identify};
+use calibration::identify::object::{Options, identify, identify_clips};
 use calibration::identify::{Identification, Optimizer};
 use calibration::interrupt::Interrupt;
 use std::path::{Path, PathBuf};
@@ -97,4 +97,33 @@ fn strokes_of_another_engine_tell_friction_mass_and_centre_of_mass() {
     let centre = value("centre_of_mass");
     assert!((centre[0] + 0.007_316).abs() < 1.5e-3 && (centre[1] - 0.001_015).abs() < 1.5e-3, "{centre:?}");
     assert!(found.gap.holdout.object_add_m.is_some_and(|add| add < 3e-3), "{:?}", found.gap.holdout);
+}
+
+#[test]
+fn where_an_object_lies_still_no_number_is_told_and_that_is_said() {
+    use nalgebra::Isometry3;
+    use shared_mem::cell::ClipKind;
+    use shared_mem::recording::{Clip, JointSeries, ObjectSeries};
+    let text = "[table]\nheight = 0.0\n[object]\nshape = \"box\"\nsize = [0.08, 0.06, 0.1]\n";
+    let cell = shared_mem::toml_file::parse(text, Path::new("cell.toml")).expect("a cell.toml");
+    let clip = |number: u64| {
+        let place = shared_mem::frames::Pose::from_isometry(Isometry3::translation(0.5, 0.02 * number as f64, 0.05));
+        let stamps_ns: Vec<u64> = (0..60).map(|row| row * 16_666_667).collect();
+        Clip {
+            file: format!("clip_{number:02}.mcap").into(),
+            kind: ClipKind::FreeMotion,
+            torques_end_at_rows: false,
+            joint_names: Vec::new(),
+            desired: JointSeries::default(),
+            measured: JointSeries::default(),
+            object: ObjectSeries { poses: vec![place; stamps_ns.len()], stamps_ns },
+            warnings: Vec::new(),
+            damage: None,
+        }
+    };
+    let found = identify_clips(&cell, (0..3).map(clip).collect(), &Options::default(), &Interrupt::default());
+    let found = found.expect("an answer");
+    assert_eq!(found.not_identifiable.len(), found.names.len(), "{:?}", found.not_identifiable);
+    assert!(found.warnings.iter().any(|warning| warning.contains("nothing in these clips depends")), "{found:?}");
+    assert!(found.parameters.values().all(|parameter| parameter.value == parameter.start), "{:?}", found.parameters);
 }

@@ -32,7 +32,7 @@ use cache::ClipCache;
 use clip::ObjectClip;
 use nalgebra::Isometry3;
 use rollout::{Job, Outcome};
-use shared_mem::cell::{Cell, PoseNoise};
+use shared_mem::cell::{Cell, ClipKind, PoseNoise};
 use shared_mem::frames::{Base, Object, Pose};
 use shared_mem::recording::Clip;
 use std::sync::{Arc, Mutex};
@@ -58,12 +58,16 @@ pub struct ModelError {
     pub rest: PoseNoise,
     /// Of the joints from the hit on [rad]; `None` leaves the arm out.
     pub joints: Option<f64>,
+    /// Whether strokes are held against their motion along the table alone. A hit object tips, and how far depends on how the
+    /// table yields under its edges, which the twin's rigid one does not: read as structure it would be a centre of mass
+    /// that lies too low.
+    pub flat: bool,
 }
 
 impl Default for ModelError {
     fn default() -> Self {
         let none = PoseNoise { position: 0.0, rotation: 0.0 };
-        Self { hit: PoseNoise { position: 3e-3, rotation: 0.03 }, rest: none, joints: None }
+        Self { hit: PoseNoise { position: 3e-3, rotation: 0.03 }, rest: none, joints: None, flat: false }
     }
 }
 
@@ -212,7 +216,9 @@ impl ObjectClips {
             Part::Slide => noise.hypot(rest),
             Part::After => noise.hypot(rest * many),
         };
+        let flat = error.flat && self.clips[clip].recorded.kind != ClipKind::FreeMotion;
         let sigma = |row: &Row| match row.channel {
+            Channel::Position(2) | Channel::Rotation(0 | 1) if flat => f64::INFINITY,
             Channel::Position(_) => of(row, noise.position, error.hit.position, error.rest.position),
             Channel::Rotation(_) => of(row, noise.rotation, error.hit.rotation, error.rest.rotation),
             Channel::Joint(_) => error.joints.unwrap_or(1.0),

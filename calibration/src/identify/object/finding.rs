@@ -63,6 +63,13 @@ impl<'a> Finding<'a> {
         for (file, weight) in clips.train.iter().zip(&self.found.at.weights).filter(|(_, w)| **w < FULL_WEIGHT) {
             warnings.push(format!("{file} fits worse than the others and counts {:.0} %", weight * 100.0));
         }
+        if (0..self.unknowns.len()).all(|k| !self.shows(k)) {
+            warnings.push(
+                "nothing in these clips depends on any of the numbers: all of them stay where the search began; record \
+                 clips in which the object is hit and slides"
+                    .into(),
+            );
+        }
         Identification {
             target: "object".into(),
             parameters: self.parameters(),
@@ -104,7 +111,6 @@ impl<'a> Finding<'a> {
     fn why(&self, k: usize, material: &Material) -> Option<String> {
         let (setting, unknown) = (&self.settings.settings()[k], &self.unknowns[k]);
         let (value, half) = (self.fit.shared[k], self.intervals.half_width[k]);
-        let information = self.fit.information()[(k, k)];
         let remedy = remedy(setting, material);
         if self.held[k] {
             let end = if value - unknown.lower < unknown.upper - value { "lower" } else { "upper" };
@@ -113,7 +119,7 @@ impl<'a> Finding<'a> {
                 "the best value lies at or beyond {value:.4}, the {end} bound of its range in cell.toml: widen the range{or}"
             ));
         }
-        if information * (unknown.upper - unknown.lower).powi(2) < 1.0 {
+        if !self.shows(k) {
             return Some(format!("nothing in these clips depends on it; {remedy}"));
         }
         let relative = matches!(setting, Setting::Friction | Setting::Mass) && half > VALUE_SHARE * value;
@@ -126,6 +132,12 @@ impl<'a> Finding<'a> {
         let unit = setting.physical_unit();
         let unit = if unit == "1" { String::new() } else { format!(" {unit}") };
         Some(format!("its 95 % interval is as wide as ±{half:.3}{unit};{together} {remedy}"))
+    }
+
+    /// Whether the clips would tell one end of a number's range from the other.
+    fn shows(&self, k: usize) -> bool {
+        let unknown = &self.unknowns[k];
+        self.fit.information()[(k, k)] * (unknown.upper - unknown.lower).powi(2) >= 1.0
     }
 
     /// The number that this one moves together with most closely, and their correlation.

@@ -34,6 +34,7 @@ const FIRST_ERROR: ModelError = ModelError {
     hit: PoseNoise { position: 0.02, rotation: 0.2 },
     rest: PoseNoise { position: 0.0, rotation: 0.0 },
     joints: Some(1e-4),
+    flat: true,
 };
 /// Most steps of the first way, and of one that need not arrive.
 const FIRST_STEPS: usize = 12;
@@ -223,5 +224,5 @@ fn model_error(clips: &ObjectClips, at: &Linearised) -> Result<ModelError, Impos
     };
     let joints = rms(&|channel, _| matches!(channel, Channel::Joint(_)));
     let joints = Some(joints.max(LEAST_JOINT_ERROR) * ROWS_ALIKE.sqrt());
-    Ok(ModelError { hit: pose(Part::Hit, ROWS_ALIKE.sqrt()), rest: pose(Part::After, 1.0), joints })
+    Ok(ModelError { hit: pose(Part::Hit, ROWS_ALIKE.sqrt()), rest: pose(Part::After, 1.0), joints, flat: true })
 }

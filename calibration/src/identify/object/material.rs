@@ -7,7 +7,7 @@ use crate::identify::answer::{Clips, LeftOut};
 use crate::identify::remarks::grouped;
 use crate::identify::split::{Split, split};
 use rayon::prelude::*;
-use shared_mem::cell::{Cell, ClipKind};
+use shared_mem::cell::{Cell, ClipEntry, ClipKind};
 use shared_mem::recording::{Clip, Session};
 use std::path::Path;
 use twin::arm::ArmModel;
@@ -32,19 +32,30 @@ pub(super) struct Material {
 impl Material {
     pub(super) fn open(path: &Path, seed: u64) -> Result<Self, ObjectError> {
         let session = Session::open(path)?;
-        if session.cell.object.is_none() {
+        let entries: Vec<_> = session.clips.iter().filter(|clip| clip.kind != ClipKind::Excitation).collect();
+        let read = |entry: &&ClipEntry| {
+            let clip = session.read(entry).map_err(|error| error.to_string());
+            (entry.file.display().to_string(), clip)
+        };
+        let read = entries.par_iter().map(read).collect();
+        Self::of(session.cell, read, (path, seed))
+    }
+
+    /// Of clips that were read, or the reason why one could not be; `path`: what the session is called in errors.
+    pub(super) fn of(
+        cell: Cell,
+        read: Vec<(String, Result<Clip, String>)>,
+        (path, seed): (&Path, u64),
+    ) -> Result<Self, ObjectError> {
+        if cell.object.is_none() {
             return Err(ObjectError::NoObject);
         }
-        let arm = session.cell.robot.as_ref().map(|_| ArmModel::from_cell(&session.cell)).transpose()?;
-        let entries: Vec<_> = session.clips.iter().filter(|clip| clip.kind != ClipKind::Excitation).collect();
-        let read: Vec<_> = entries
-            .par_iter()
-            .map(|entry| {
-                let clip = session.read(entry).map_err(|error| error.to_string());
-                let clip = clip.and_then(|clip| in_one_piece(clip, &session.cell, arm.as_ref()));
-                (entry.file.display().to_string(), clip.map(|clip| screened(clip, &session.cell)))
-            })
-            .collect();
+        let arm = cell.robot.as_ref().map(|_| ArmModel::from_cell(&cell)).transpose()?;
+        let looked_at = |(file, clip): (String, Result<Clip, String>)| {
+            let clip = clip.and_then(|clip| in_one_piece(clip, &cell, arm.as_ref()));
+            (file, clip.map(|clip| screened(clip, &cell)))
+        };
+        let read: Vec<_> = read.into_par_iter().map(looked_at).collect();
         let (mut usable, mut left_out) = (Vec::new(), Vec::new());
         for (file, answer) in read {
             let why = match answer {
@@ -64,7 +75,7 @@ impl Material {
         }
         let clips: Vec<&Clip> = usable.iter().map(|usable| &usable.clip).collect();
         let split = split(&clips, seed);
-        Ok(Self { cell: session.cell, split, usable, left_out })
+        Ok(Self { cell, split, usable, left_out })
     }
 
     /// The clips that are fitted.

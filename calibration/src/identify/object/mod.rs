@@ -154,6 +154,24 @@ pub fn identify(options: &Options, interrupt: &Interrupt) -> Result<Identificati
     Ok(answer)
 }
 
+/// The same from clips in memory; nothing is kept or written.
+///
+/// # Errors
+/// As [`identify`].
+pub fn identify_clips(
+    cell: &Cell,
+    clips: Vec<Clip>,
+    options: &Options,
+    interrupt: &Interrupt,
+) -> Result<Identification, ObjectError> {
+    let began = Instant::now();
+    let named = clips.into_iter().map(|clip| (clip.file.display().to_string(), Ok(clip))).collect();
+    let material = Material::of(cell.clone(), named, (&options.session, options.seed))?;
+    let (mut answer, _) = identify_kept(&material, options, (Kept::nothing(), interrupt))?;
+    answer.seconds = began.elapsed().as_secs_f64();
+    Ok(answer)
+}
+
 /// The answer, and the parameters that are written.
 fn identify_kept(
     material: &Material,

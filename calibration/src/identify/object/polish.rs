@@ -1,7 +1,11 @@
 //! The last stretch to the paper's loss. Slopes lead near it and no further: a hit is so rough that the lowest place has
 //! none to follow. From there points scattered in the shape that the slopes gave lead on.
 //!
-//! The loss sees poses alone, and they hardly tell a heavy object from a light one: the mass stays what the arm felt.
+//! The loss sees poses alone, and they hardly tell a heavy object from a light one: the mass stays what the arm felt. Nor do
+//! they tell how high the centre of mass lies but by how the object tips, which is not as in the twin ([`ModelError::flat`]):
+//! the height stays what the way along the table tells.
+//!
+//! [`ModelError::flat`]: crate::forward::object::ModelError::flat
 
 use super::fit::{ObjectFit, fit_object, linearise_object, roughly};
 use super::paper::SurfaceLoss;
@@ -45,7 +49,7 @@ pub(super) fn fit_polished(
     }
     let (numbers, more) = {
         let loss = SurfaceLoss::new(clips, searched.shape);
-        let free = |setting: &Setting| *setting != Setting::Mass;
+        let free = |setting: &Setting| !matches!(setting, Setting::Mass | Setting::CentreOfMass(2));
         polish(&loss, searched, (&found.at, free), trail, |numbers, more| watch(numbers, found.evaluations + more))
     };
     // How much wider intervals are was told where the deviance is least; here it may fall to a side.
