@@ -38,9 +38,13 @@ pub(crate) struct ViewpointArguments {
     #[arg(long)]
     background: Option<PathBuf>,
     /// Silhouettes from depth pictures alone, a session's or given ones: whatever hangs together and stands out of table,
-    /// floor and walls; the robot has to be the largest such thing in view.
+    /// floor and walls; the robot has to be the largest such thing in view. Of a session this is the way that is gone where it
+    /// holds such pictures and they show the robot.
     #[arg(long, conflicts_with_all = ["mask", "board"])]
     depth: bool,
+    /// The colour pictures of a session although it holds depth.
+    #[arg(long, conflicts_with = "depth")]
+    color: bool,
     /// Focal lengths and principal point [pixel]: fx,fy,cx,cy.
     #[arg(long, value_parser = numbers::<4>)]
     intrinsics: Option<[f64; 4]>,
@@ -144,7 +148,11 @@ pub(super) fn run(arguments: ViewpointArguments) -> anyhow::Result<()> {
         joints,
         masks: mask,
         background,
-        kind: if arguments.depth { PictureKind::Depth } else { PictureKind::Color },
+        kind: match (arguments.depth, arguments.color) {
+            (true, _) => Some(PictureKind::Depth),
+            (_, true) => Some(PictureKind::Color),
+            _ => None,
+        },
         intrinsics,
         start,
         reach: reach.map(|[degrees, distance]| Reach { angle: degrees.to_radians(), distance }),
@@ -171,8 +179,9 @@ fn tell(found: &Viewpoint) {
         console::line(format_args!("95 % within {a:.1}, {b:.1}, {c:.1} mm and {d:.2}, {e:.2}, {f:.2} degrees"));
     }
     let confirmed = found.confirmed * 100.0;
+    let (pictures, kind) = (found.frames.len(), if found.pictures == "depth" { "depth" } else { "colour" });
     console::line(format_args!(
-        "{confirmed:.0} % of the outline confirmed; {} drawings, {:.1} s",
+        "{confirmed:.0} % of the outline confirmed in {pictures} {kind} pictures; {} drawings, {:.1} s",
         found.drawings, found.seconds
     ));
     if let Some(start) = &found.start {

@@ -23,6 +23,8 @@ pub struct Viewpoint {
     pub frames: Vec<FrameAnswer>,
     /// `outline` or `swarm`.
     pub method: &'static str,
+    /// Which pictures were used: `depth` or `color`.
+    pub pictures: &'static str,
     /// How many times the robot was drawn.
     pub drawings: usize,
     /// Time spent [s].

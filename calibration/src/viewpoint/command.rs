@@ -36,8 +36,9 @@ pub struct Options {
     pub masks: Vec<PathBuf>,
     /// A picture without the robot.
     pub background: Option<PathBuf>,
-    /// Which pictures of a session.
-    pub kind: PictureKind,
+    /// Which pictures of a session; unless given depth where there is some, which tells the robot from what lies behind it,
+    /// whatever light falls on both.
+    pub kind: Option<PictureKind>,
     /// fx, fy, cx, cy.
     pub intrinsics: Option<[f64; 4]>,
     /// Where to begin.
@@ -87,26 +88,24 @@ struct Taken {
     moment: Moment,
 }
 
+/// Everything that a pose is found from.
+struct Prepared {
+    cell: Cell,
+    camera: Camera,
+    lens: Lens,
+    shape: Shape,
+    frames: Vec<Frame>,
+    pixels: Vec<Pixels>,
+    warnings: Vec<String>,
+}
+
 /// Finds the pose.
 ///
 /// # Errors
 /// One line: what is missing or does not fit together, and what to do.
 pub fn run(options: &Options) -> anyhow::Result<Viewpoint> {
     let began = Instant::now();
-    let (mut cell, taken) = gather(options)?;
-    let mut warnings = Vec::new();
-    let camera = camera(&cell, options, &taken)?;
-    let lens = Lens::new(&camera.pinhole());
-    let surface = RobotSurface::new(&cell, options.hand)?;
-    ensure!(
-        !surface.parts().is_empty(),
-        "the arm's shape is not known: give `robot.model = \"fr3\"` or a URDF in cell.toml"
-    );
-    if !surface.is_measured() {
-        warnings.push("only the FR3's shape is known exactly; this arm is drawn as capsules along its links".into());
-    }
-    let shape = Shape::new(surface);
-    let (frames, pixels) = frames(options, &camera, &lens, &shape, taken)?;
+    let Prepared { mut cell, camera, lens, shape, frames, pixels, mut warnings } = prepared(options)?;
     let method = options.method;
     let masked = frames.iter().all(Frame::has_mask);
     ensure!(
@@ -140,7 +139,8 @@ pub fn run(options: &Options) -> anyhow::Result<Viewpoint> {
     if found.rival.is_some_and(|rival| rival > 0.95 * found.confirmed) {
         warnings.push("another pose explains the pictures nearly as well; add a picture of another arm pose".into());
     }
-    let answer = answer(&frames, &shape, &lens, &found, start.as_ref(), warnings, began, method);
+    let pictures = if pixels.iter().all(Pixels::is_depth) { "depth" } else { "color" };
+    let answer = answer(&frames, &shape, &lens, &found, start.as_ref(), warnings, began, (method, pictures));
     if let Some(out) = &options.out {
         cell.camera = Some(Camera {
             pose: CameraPose { position: answer.camera.position, orientation: answer.camera.orientation },
@@ -162,8 +162,57 @@ fn cell_text(cell: &Cell, file: &Path) -> String {
     before.and_then(|before| toml_file::updated(&before, &camera.to_toml(), &[])).unwrap_or_else(|| cell.to_toml())
 }
 
-/// The cell and the pictures.
-fn gather(options: &Options) -> anyhow::Result<(Cell, Vec<Taken>)> {
+/// Kinds of pictures to try, the better first.
+pub(super) fn kinds(options: &Options) -> Vec<PictureKind> {
+    // A board is printed, and masks are drawn over what an eye sees.
+    let beside = !options.masks.is_empty() || options.background.is_some();
+    match options.kind {
+        Some(kind) => vec![kind],
+        None if beside || matches!(options.start, StartFrom::Board(..)) => vec![PictureKind::Color],
+        None => vec![PictureKind::Depth, PictureKind::Color],
+    }
+}
+
+/// With the first kind of pictures that can be used.
+fn prepared(options: &Options) -> anyhow::Result<Prepared> {
+    let kinds = kinds(options);
+    let (mut why, last) = (None, kinds.len() - 1);
+    for (number, kind) in kinds.into_iter().enumerate() {
+        let (cell, taken) = gather(options, kind)?;
+        if taken.is_empty() && number < last {
+            continue;
+        }
+        match of_pictures(options, cell, taken) {
+            Err(error) if number < last => why = Some(error),
+            Err(error) => return Err(error),
+            Ok(mut prepared) => {
+                prepared.warnings.extend(why.map(|why| format!("colour was used, because depth cannot be: {why:#}")));
+                return Ok(prepared);
+            }
+        }
+    }
+    bail!("no pictures")
+}
+
+fn of_pictures(options: &Options, cell: Cell, taken: Vec<Taken>) -> anyhow::Result<Prepared> {
+    let mut warnings = Vec::new();
+    let camera = camera(&cell, options, &taken)?;
+    let lens = Lens::new(&camera.pinhole());
+    let surface = RobotSurface::new(&cell, options.hand)?;
+    ensure!(
+        !surface.parts().is_empty(),
+        "the arm's shape is not known: give `robot.model = \"fr3\"` or a URDF in cell.toml"
+    );
+    if !surface.is_measured() {
+        warnings.push("only the FR3's shape is known exactly; this arm is drawn as capsules along its links".into());
+    }
+    let shape = Shape::new(surface);
+    let (frames, pixels) = frames(options, &camera, &lens, &shape, taken)?;
+    Ok(Prepared { cell, camera, lens, shape, frames, pixels, warnings })
+}
+
+/// The cell and the pictures of a kind; files are of the kind they are.
+fn gather(options: &Options, kind: PictureKind) -> anyhow::Result<(Cell, Vec<Taken>)> {
     let is_picture = |path: &Path| {
         let ending = path.extension().and_then(|e| e.to_str()).unwrap_or("").to_ascii_lowercase();
         ["png", "jpg", "jpeg"].contains(&ending.as_str())
@@ -182,7 +231,7 @@ fn gather(options: &Options) -> anyhow::Result<(Cell, Vec<Taken>)> {
         let taken = options.targets.iter().zip(&options.joints).map(|(path, joints)| {
             let name = path.display().to_string();
             let pixels = Pixels::read(path)?;
-            let wanted = options.kind == PictureKind::Color || pixels.is_depth();
+            let wanted = options.kind != Some(PictureKind::Depth) || pixels.is_depth();
             ensure!(wanted, "{name} shows colours: give depth pictures, or leave --depth out");
             Ok(Taken { name, pixels, moment: Moment::parse(joints)? })
         });
@@ -190,7 +239,14 @@ fn gather(options: &Options) -> anyhow::Result<(Cell, Vec<Taken>)> {
     }
     let [target] = &options.targets[..] else { bail!("give either one session or clip, or pictures (png, jpg)") };
     let session = Session::open_with(target, options.cell.as_deref())?;
-    let shots = session::shots(&session, options.kind, options.frames)?;
+    let shots = session::shots(&session, kind, options.frames)?;
+    let given = options.kind.is_some() || kind == PictureKind::Color;
+    ensure!(
+        !shots.is_empty() || !given,
+        "{}: no clip of the session holds {} pictures with joints at their time; record with `--camera`, or give images",
+        session.folder.display(),
+        if kind == PictureKind::Color { "colour" } else { "depth" }
+    );
     let taken = shots.into_iter().map(|shot| {
         let moment = Moment { q: shot.q, size: None, pinhole: None, distortion: [0.0; 5] };
         Taken { name: shot.name, pixels: shot.pixels, moment }
@@ -303,7 +359,7 @@ fn answer(
     start: Option<&Isometry3<f64>>,
     warnings: Vec<String>,
     began: Instant,
-    method: Method,
+    (method, pictures): (Method, &'static str),
 ) -> Viewpoint {
     let pose = |camera_from_base: &Isometry3<f64>| {
         let pose = FramePose::<Base, CameraFrame>::from_isometry(camera_from_base.inverse());
@@ -349,6 +405,7 @@ fn answer(
         start,
         frames: frames.iter().map(frame_answer).collect(),
         method: if method == Method::Outline { "outline" } else { "swarm" },
+        pictures,
         drawings: found.drawings,
         seconds: began.elapsed().as_secs_f64(),
         warnings,

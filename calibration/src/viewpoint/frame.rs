@@ -184,7 +184,7 @@ impl Frame {
         }
     }
 
-    /// The drawn robot smoothed, for [`Self::pull_smooth`]; `None` for a photo.
+    /// The drawn robot smoothed, for [`Self::pull_exact`]; `None` for a photo.
     #[must_use]
     pub fn smoothed(&self, level: usize, outliner: &Outliner) -> Option<Grid> {
         match &self.levels[level].kind {
@@ -193,12 +193,13 @@ impl Frame {
         }
     }
 
-    /// What a silhouette says about a place of the outline, compared with the drawn robot.
+    /// What the picture says about a place that lies nearly on the border, finer than pixels: a silhouette compared with the
+    /// drawn robot, a photo by all that is seen across the edge.
     #[must_use]
-    pub fn pull_smooth(&self, level: usize, place: &Place, drawn: &Grid) -> Option<Pull> {
+    pub fn pull_exact(&self, level: usize, place: &Place, drawn: Option<&Grid>) -> Option<Pull> {
         match &self.levels[level].kind {
-            Kind::Silhouette(silhouette) => silhouette.pull_smooth(place, drawn),
-            Kind::Photo(_) => None,
+            Kind::Silhouette(silhouette) => silhouette.pull_smooth(place, drawn?),
+            Kind::Photo(photo) => photo.pull_exact(place),
         }
     }
 }

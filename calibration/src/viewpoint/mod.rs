@@ -7,7 +7,7 @@
 //! | [`picture`], [`session`] | pictures, masks, differences, joints: from files and from clips |
 //! | [`depth`] | the robot in a depth picture without one of the empty cell |
 //! | [`frame`] | one picture with its joints, at three resolutions |
-//! | [`silhouette`], [`photo`], [`pull`] | what a mask and what a photo without one say about the outline |
+//! | [`silhouette`], [`photo`], [`pull`], `profile` | what a mask and what a photo without one say about the outline, and where an edge lies between pixels |
 //! | [`shape`], [`outline`] | the robot's meshes, and their outline from a pose |
 //! | [`scan`], [`refine`], [`fit`] | the fast way: look everywhere, least squares, keep the best |
 //! | [`search`] | the paper's way: a particle swarm |
@@ -33,6 +33,7 @@ pub mod overlay;
 pub mod photo;
 pub mod picture;
 pub mod planar;
+mod profile;
 pub mod pull;
 pub mod refine;
 pub mod scan;

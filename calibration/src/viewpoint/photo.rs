@@ -7,6 +7,7 @@
 use super::distance::distance;
 use super::grid::Grid;
 use super::outline::Place;
+use super::profile::{Profiles, SIDE, Samples};
 use super::pull::Pull;
 
 /// A photo at one resolution.
@@ -33,6 +34,8 @@ const OUTSIDE: f64 = 0.5;
 const EDGES: f64 = 0.08;
 /// Contrast of one grey level is noise [1/pixel].
 const NOISE: f64 = 1.0;
+/// Height of a step over the largest contrast that is left of it when it is blurred [pixel].
+const STEEPEST: f64 = 3.0;
 
 impl Photo {
     /// From red, green and blue, 0 to 255. `searched`: distances for a search from afar are wanted too.
@@ -69,6 +72,29 @@ impl Photo {
         (sum + OUTSIDE * outside) / (total + outside).max(1e-9)
     }
 
+    /// The edge that explains the picture across a place that lies nearly on it: not where contrast is largest, which light
+    /// shifts.
+    #[must_use]
+    pub fn pull_exact(&self, place: &Place) -> Option<Pull> {
+        let along = |step: i32| [0, 1].map(|i| place.pixel[i] + f64::from(step) * place.outward[i]);
+        let mut profile = [Samples::zeros(); 3];
+        for (row, step) in (-SIDE..=SIDE).enumerate() {
+            let [u, v] = along(step);
+            for (samples, channel) in profile.iter_mut().zip(&self.channels) {
+                samples[row] = channel.sample(u, v)?;
+            }
+        }
+        let edge = Profiles::all().edge(&profile)?;
+        // Over a blurred step contrast rises to a third of the step's height.
+        let weight = edge.explained * edge.contrast / (edge.contrast + STEEPEST * self.clear);
+        (edge.contrast > NOISE).then_some(Pull {
+            offset: -edge.away,
+            direction: place.outward,
+            weight,
+            doubt: -edge.otherwise,
+        })
+    }
+
     /// The clearest edge on the normal of a place, not further than `range` [pixel].
     #[must_use]
     pub fn pull(&self, place: &Place, range: f64) -> Option<Pull> {
@@ -96,7 +122,7 @@ impl Photo {
                 let weight = b / (b + self.clear);
                 let score = weight * (-2.0 * (away / range).powi(2)).exp();
                 if best.is_none_or(|(most, _)| score > most) {
-                    best = Some((score, Pull { offset: -away, direction: place.outward, weight }));
+                    best = Some((score, Pull { offset: -away, direction: place.outward, weight, doubt: 0.0 }));
                 }
             }
             (before, here) = (here, beyond);

@@ -9,4 +9,6 @@ pub struct Pull {
     pub direction: [f64; 2],
     /// How clear the picture is there, 0 to 1.
     pub weight: f64,
+    /// How much larger the offset would be if what is seen were explained otherwise [pixel].
+    pub doubt: f64,
 }

@@ -25,6 +25,8 @@ pub struct Refined {
     pub pivot: Point3<f64>,
     /// How many times the robot was drawn.
     pub drawings: usize,
+    /// Whether all links may look thicker or thinner than their meshes by one number, which is found with the pose.
+    pub swells: bool,
 }
 
 /// Normal equations of the places of one link in one frame.
@@ -42,6 +44,10 @@ pub struct Group {
     pub weight: f64,
     /// What the gradient would be if this link were a pixel thicker than it is.
     pub swell: Vector6<f64>,
+    /// Sum of weighted offsets [pixel², of outline].
+    pub outward: f64,
+    /// By how much the gradient, and [`Self::outward`], would be larger if what is seen were explained otherwise.
+    pub doubt: (Vector6<f64>, f64),
 }
 
 /// One stage: a level, how far a place looks [pixel of the level], and where an offset counts half [pixel].
@@ -50,24 +56,24 @@ struct Stage {
     range: f64,
     half: f64,
     steps: usize,
-    /// Silhouettes are compared with the drawn robot instead of with their border alone.
-    smooth: bool,
+    /// Places are found finer than pixels: silhouettes compared with the drawn robot, edges by all that is seen across them.
+    exact: bool,
 }
 
 /// From far to near.
 const STAGES: [Stage; 6] = [
-    Stage { level: 0, range: 8.0, half: 4.0, steps: 12, smooth: false },
-    Stage { level: 0, range: 4.0, half: 2.0, steps: 10, smooth: false },
-    Stage { level: 1, range: 5.0, half: 2.0, steps: 10, smooth: false },
-    Stage { level: 2, range: 6.0, half: 2.0, steps: 10, smooth: false },
-    Stage { level: 2, range: 3.0, half: 1.0, steps: 20, smooth: false },
-    Stage { level: 2, range: 3.0, half: 1.0, steps: 10, smooth: true },
+    Stage { level: 0, range: 8.0, half: 4.0, steps: 12, exact: false },
+    Stage { level: 0, range: 4.0, half: 2.0, steps: 10, exact: false },
+    Stage { level: 1, range: 5.0, half: 2.0, steps: 10, exact: false },
+    Stage { level: 2, range: 6.0, half: 2.0, steps: 10, exact: false },
+    Stage { level: 2, range: 3.0, half: 1.0, steps: 20, exact: false },
+    Stage { level: 2, range: 3.0, half: 1.0, steps: 10, exact: true },
 ];
 /// The stages that begin far away, and those that end at the finest pictures.
 pub const COARSE: Range<usize> = 0..3;
 /// See [`COARSE`].
 pub const FINE: Range<usize> = 2..5;
-/// The last stage, which is finer than pixels for silhouettes.
+/// The last stage, which is finer than pixels.
 pub const LAST: Range<usize> = 5..6;
 /// Steps with growing damping before a stage ends.
 const TRIALS: usize = 5;
@@ -85,7 +91,7 @@ pub fn refine(frames: &[Frame], shape: &Shape, start: &Isometry3<f64>, which: Ra
         let from = best.as_ref().map_or(*start, |best| best.camera_from_base);
         let mut work = Work::new(frames, shape, stage);
         let mut here = work.at(&from)?;
-        if stage.smooth {
+        if stage.exact {
             // Whatever cuts or adds to a silhouette then weighs little against what it shows exactly.
             let typical = median(&mut work.offsets).unwrap_or(0.0);
             work.half = (OUTLIERS * typical).clamp(FINEST_HALF, stage.half);
@@ -102,7 +108,7 @@ pub fn refine(frames: &[Frame], shape: &Shape, start: &Isometry3<f64>, which: Ra
                 let step = solve(&information, &gradient, damping)?;
                 let there = work.at(&moved(&here.camera_from_base, &here.pivot, &step));
                 // Near the end the cost flickers with the places that come and go, while the step stays true.
-                match there.filter(|there| stage.smooth || there.cost < here.cost) {
+                match there.filter(|there| stage.exact || there.cost < here.cost) {
                     Some(there) => break Some((there, step)),
                     None if trials == TRIALS => break None,
                     None => (damping, trials) = (damping * 10.0, trials + 1),
@@ -134,7 +140,26 @@ impl Refined {
     #[must_use]
     pub fn sums(&self) -> (Matrix6<f64>, Vector6<f64>) {
         let sum = (Matrix6::zeros(), Vector6::zeros());
-        self.groups.iter().fold(sum, |(h, g), group| (h + group.information, g + group.gradient))
+        self.freed().fold(sum, |(h, g), group| (h + group.information, g + group.gradient))
+    }
+
+    /// The groups' equations for the pose alone, what all links look thicker by eliminated: a lens, a mask's border and a
+    /// threshold draw all of them too thick or too thin alike, and taken for the pose that would be a camera nearer by.
+    pub fn freed(&self) -> impl Iterator<Item = Group> + '_ {
+        let all = self.groups.iter().fold((0.0, 0.0, Vector6::zeros()), |(weight, outward, swell), group| {
+            (weight + group.weight, outward + group.outward, swell + group.swell)
+        });
+        let (weight, outward, swell) = if self.swells && all.0 > 0.0 { all } else { (1.0, 0.0, Vector6::zeros()) };
+        let (thicker, along) = (outward / weight, swell / weight);
+        self.groups.iter().map(move |group| {
+            let cross = group.swell * along.transpose();
+            let information = group.information - cross - cross.transpose() + along * along.transpose() * group.weight;
+            let left = group.outward - thicker * group.weight;
+            let gradient = group.gradient - group.swell * thicker - along * left;
+            let doubt = (group.doubt.0 - along * group.doubt.1, group.doubt.1);
+            let swell = group.swell - along * group.weight;
+            Group { information, gradient, doubt, swell, ..group.clone() }
+        })
     }
 }
 
@@ -197,7 +222,7 @@ impl<'a> Work<'a> {
         }
         let pivot = Point3::from(sum / length);
         let smoothed: Vec<_> = (self.frames.iter().zip(&self.outliners))
-            .map(|(frame, outliner)| if self.stage.smooth { frame.smoothed(self.stage.level, outliner) } else { None })
+            .map(|(frame, outliner)| if self.stage.exact { frame.smoothed(self.stage.level, outliner) } else { None })
             .collect();
         self.offsets.clear();
         let (mut groups, mut cost, mut total) = (Vec::<Group>::new(), 0.0, 0.0);
@@ -208,9 +233,10 @@ impl<'a> Work<'a> {
                     continue;
                 }
                 total += length;
-                let pull = match &smoothed[number] {
-                    Some(drawn) => frame.pull_smooth(self.stage.level, place, drawn),
-                    None => frame.pull(self.stage.level, place, self.stage.range),
+                let pull = if self.stage.exact {
+                    frame.pull_exact(self.stage.level, place, smoothed[number].as_ref())
+                } else {
+                    frame.pull(self.stage.level, place, self.stage.range)
                 };
                 let Some(pull) = pull else {
                     cost += length;
@@ -229,7 +255,16 @@ impl<'a> Work<'a> {
                     None => {
                         let (information, gradient) = (Matrix6::zeros(), Vector6::zeros());
                         let (frame, link, swell) = (number, place.link, gradient);
-                        groups.push(Group { frame, link, information, gradient, weight: 0.0, swell });
+                        groups.push(Group {
+                            frame,
+                            link,
+                            information,
+                            gradient,
+                            weight: 0.0,
+                            swell,
+                            outward: 0.0,
+                            doubt: (gradient, 0.0),
+                        });
                         groups.last_mut()?
                     }
                 };
@@ -237,10 +272,14 @@ impl<'a> Work<'a> {
                 group.gradient += weight * pull.offset * slope;
                 group.weight += weight;
                 group.swell += weight * slope;
+                group.outward += weight * pull.offset;
+                group.doubt.0 += weight * pull.doubt * slope;
+                group.doubt.1 += weight * pull.doubt;
             }
         }
         let camera_from_base = *camera_from_base;
-        Some(Refined { camera_from_base, cost: cost / total.max(1e-9), groups, pivot, drawings: 0 })
+        let (cost, swells) = (cost / total.max(1e-9), self.stage.exact);
+        Some(Refined { camera_from_base, cost, groups, pivot, drawings: 0, swells })
     }
 }
 

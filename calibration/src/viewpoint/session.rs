@@ -2,7 +2,6 @@
 //! are.
 
 use super::picture::Pixels;
-use anyhow::ensure;
 use shared_mem::recording::{PictureKind, Session, for_pictures};
 
 /// A picture of a session.
@@ -26,10 +25,10 @@ struct Known {
     speed: f64,
 }
 
-/// At most `wanted` pictures of a kind in the session.
+/// At most `wanted` pictures of a kind in the session; none where no clip holds such pictures with joints at their time.
 ///
 /// # Errors
-/// When a clip cannot be read or holds no such pictures with joints.
+/// When a clip cannot be read.
 pub fn shots(session: &Session, kind: PictureKind, wanted: usize) -> anyhow::Result<Vec<Shot>> {
     let latency_ns = session.cell.camera.as_ref().map_or(0, |camera| (camera.latency * 1e9) as u64);
     let mut known = Vec::new();
@@ -43,12 +42,6 @@ pub fn shots(session: &Session, kind: PictureKind, wanted: usize) -> anyhow::Res
             anyhow::Ok(())
         })?;
     }
-    ensure!(
-        !known.is_empty(),
-        "{}: no clip of the session holds {} pictures with joints at their time; record with `--camera`, or give images",
-        session.folder.display(),
-        if kind == PictureKind::Color { "colour" } else { "depth" }
-    );
     let chosen = choose(known, wanted);
     let mut out = Vec::new();
     for (number, entry) in session.clips.iter().enumerate() {

@@ -92,7 +92,7 @@ impl Silhouette {
             return None;
         }
         let offset = 2.0 * (drawn.sample(u, v)? - self.smooth.sample(u, v)?) / fall;
-        Some(Pull { offset, direction: place.outward, weight: 1.0 })
+        Some(Pull { offset, direction: place.outward, weight: 1.0, doubt: 0.0 })
     }
 
     /// Where the border is, seen from a place of the outline.
@@ -108,6 +108,11 @@ impl Silhouette {
             self.distance.sample(u, v + 0.5)? - self.distance.sample(u, v - 0.5)?,
         ];
         let steep = slope[0].hypot(slope[1]);
-        (steep > 0.2).then(|| Pull { offset: offset / steep, direction: slope.map(|s| s / steep), weight: 1.0 })
+        (steep > 0.2).then(|| Pull {
+            offset: offset / steep,
+            direction: slope.map(|s| s / steep),
+            weight: 1.0,
+            doubt: 0.0,
+        })
     }
 }

@@ -1,6 +1,6 @@
 //! The whole way, on the simulated camera.
 
-use super::command::{Options, StartFrom, run};
+use super::command::{Options, StartFrom, kinds, run};
 use super::depth;
 use super::fit::{Method, NoFit, fit};
 use super::frame::{Evidence, Frame};
@@ -77,7 +77,7 @@ fn photo(cell: &Cell, folder: &Path) -> Options {
         joints: vec![q[..7].iter().map(f64::to_string).collect::<Vec<_>>().join(",")],
         masks: Vec::new(),
         background: None,
-        kind: PictureKind::Color,
+        kind: Some(PictureKind::Color),
         intrinsics: None,
         start: StartFrom::Pose(base_from_camera.translation.vector.into(), [turn.w, turn.i, turn.j, turn.k]),
         reach: Some(REACH),
@@ -153,6 +153,16 @@ fn a_plain_photo_is_enough_and_the_answer_goes_into_the_cell() {
 }
 
 #[test]
+fn depth_is_tried_before_colour_unless_something_else_was_asked_for() {
+    let (cell, folder) = (shipped(), tempfile::tempdir().expect("a folder"));
+    let options = Options { kind: None, ..photo(&cell, folder.path()) };
+    assert_eq!(kinds(&options), [PictureKind::Depth, PictureKind::Color]);
+    assert_eq!(kinds(&Options { kind: Some(PictureKind::Color), ..options.clone() }), [PictureKind::Color]);
+    assert_eq!(kinds(&Options { background: Some("empty.png".into()), ..options.clone() }), [PictureKind::Color]);
+    assert_eq!(run(&options).expect("a pose").pictures, "color", "files are of the kind they are");
+}
+
+#[test]
 fn what_cannot_be_fitted_is_refused_in_one_line() {
     let (cell, folder) = (shipped(), tempfile::tempdir().expect("a folder"));
     let options = photo(&cell, folder.path());
@@ -163,7 +173,7 @@ fn what_cannot_be_fitted_is_refused_in_one_line() {
     };
     let (black, wide) = (file("black.png", 0, 320), file("wide.png", 9, 640));
     let refused: [(Options, &str); 8] = [
-        (Options { kind: PictureKind::Depth, ..options.clone() }, "leave --depth out"),
+        (Options { kind: Some(PictureKind::Depth), ..options.clone() }, "leave --depth out"),
         (Options { targets: vec![black.clone()], ..options.clone() }, "shows nothing"),
         (Options { targets: vec![wide], ..options.clone() }, "intrinsics are for 320 x 240"),
         (Options { masks: vec![black], ..options.clone() }, "nothing to fit"),
