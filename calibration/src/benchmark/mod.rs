@@ -8,7 +8,9 @@
 //! | [`rules`] | the simple rules |
 //! | [`score`] | rates, intervals, calibration |
 //! | [`run`] | all worlds of a benchmark |
+//! | [`coverage`] | whether printed intervals hold the truth |
 
+pub mod coverage;
 pub mod draw;
 pub mod rules;
 pub mod run;

@@ -30,15 +30,7 @@ const EFFORT: Effort = Effort::of(8, Precision::Joints);
 /// # Errors
 /// [`DiagnoseError`] when the session cannot be diagnosed at all.
 pub fn examine(world: &World, clips: Vec<Clip>, interrupt: &Interrupt) -> Result<Vec<Case>, DiagnoseError> {
-    let files: Vec<String> = clips.iter().map(|clip| clip.file.display().to_string()).collect();
-    let entry = |clip: &Clip| ClipEntry { file: clip.file.clone(), kind: clip.kind };
-    let session = Session {
-        folder: format!("world {}", world.number).into(),
-        cell: world.cell.clone(),
-        clips: clips.iter().map(entry).collect(),
-    };
-    let with_object = clips.iter().all(|clip| clip.kind == ClipKind::ControlHitSlide);
-    let admitted = Admitted { groups: split::by_command(&clips), clips, files, with_object, warnings: Vec::new() };
+    let (session, admitted) = sealed(world, clips);
     let options = Options { seed: world.number, ..Options::default() };
     let found = diagnose_clips(&session, &admitted, &options, interrupt)?;
     let base = setting::complete(&world.cell, None)?;
@@ -48,12 +40,26 @@ pub fn examine(world: &World, clips: Vec<Clip>, interrupt: &Interrupt) -> Result
     let arm = ArmClips::new(&world.cell, &admitted.clips, theta).map_err(Refused::from)?;
     let split = Split::new(&admitted.groups, options.seed);
     let court = Court { world, library: &library, split, admitted: &admitted, interrupt };
-    if with_object {
+    if admitted.with_object {
         let object = ObjectClips::new(&world.cell, admitted.clips.clone(), library.settings.clone())?;
         court.cases(&CellClips::new(Some(arm), object, &library), &found)
     } else {
         court.cases(&arm, &found)
     }
+}
+
+/// A world's clips as a session that was read and admitted.
+pub(super) fn sealed(world: &World, clips: Vec<Clip>) -> (Session, Admitted) {
+    let files: Vec<String> = clips.iter().map(|clip| clip.file.display().to_string()).collect();
+    let entry = |clip: &Clip| ClipEntry { file: clip.file.clone(), kind: clip.kind };
+    let session = Session {
+        folder: format!("world {}", world.number).into(),
+        cell: world.cell.clone(),
+        clips: clips.iter().map(entry).collect(),
+    };
+    let with_object = clips.iter().all(|clip| clip.kind == ClipKind::ControlHitSlide);
+    let admitted = Admitted { groups: split::by_command(&clips), clips, files, with_object, warnings: Vec::new() };
+    (session, admitted)
 }
 
 struct Court<'a> {

@@ -1,0 +1,300 @@
+//! Whether the intervals that identification and diagnosis print hold the truth as often as they say: sessions of sealed
+//! worlds, every number that is printed with an interval, and how often the truth lies inside.
+
+use super::score::{Rate, Truth};
+use super::session::record;
+use super::world::{Fault, Kind, World};
+use super::{draw, trial};
+use crate::diagnose::{self, Diagnosis, diagnose_clips};
+use crate::identify::{Identification, arm, object};
+use crate::interrupt::Interrupt;
+use serde::{Deserialize, Serialize};
+use shared_mem::cell::Cell;
+use shared_mem::theta::Theta;
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+use toml::Value;
+
+/// Whose intervals are held against the truth.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Subject {
+    /// `identify arm`; with an effect that acts and is searched besides.
+    Arm(Option<String>),
+    /// `identify object`.
+    Object,
+    /// `diagnose`, in worlds with one effect; its numbers count where it is named.
+    Diagnosis(Kind),
+}
+
+/// A number that was printed with an interval, and what it is.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Told {
+    /// Its name in reports.
+    pub name: String,
+    /// Its true value.
+    pub truth: f64,
+    /// The value printed.
+    pub value: f64,
+    /// The interval printed.
+    pub interval: [f64; 2],
+}
+
+/// What one world's session told.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Session {
+    /// Number of the world.
+    pub world: u64,
+    /// All numbers that were printed with an interval; none where nothing was.
+    pub told: Vec<Told>,
+    /// Why there is nothing.
+    pub left_out: Option<String>,
+}
+
+impl Subject {
+    /// How often its intervals say that they hold the truth.
+    #[must_use]
+    pub const fn level(&self) -> f64 {
+        match self {
+            Self::Arm(_) | Self::Object => 0.95,
+            Self::Diagnosis(_) => 0.9,
+        }
+    }
+
+    /// The world of a number.
+    ///
+    /// # Errors
+    /// When there is no effect of the name that was asked for.
+    pub fn world(&self, number: u64, cell: &Cell) -> anyhow::Result<World> {
+        let (kind, fault) = match self {
+            Self::Arm(None) => (Kind::Excitation, Fault::Nothing),
+            Self::Arm(Some(name)) => {
+                let all = draw::candidates(false);
+                let which = all.iter().position(|effect| effect.name == name);
+                let known = || all.iter().map(|effect| effect.name).collect::<Vec<_>>().join(", ");
+                let which =
+                    which.ok_or_else(|| anyhow::anyhow!("no effect on the arm is called {name}: {}", known()))?;
+                (Kind::Excitation, Fault::Single(which))
+            }
+            Self::Object => (Kind::Strokes, Fault::Nothing),
+            Self::Diagnosis(kind) => (*kind, Fault::Single(usize::try_from(number)?)),
+        };
+        Ok(World::draw(number, kind, fault, cell))
+    }
+
+    /// What the session of a world tells, of so many clips.
+    #[must_use]
+    pub fn examine(&self, world: &World, clips: usize, interrupt: &Interrupt) -> Session {
+        let (told, left_out) = match self.told(world, clips, interrupt) {
+            Ok(told) => (told, None),
+            Err(error) => (Vec::new(), Some(error.to_string())),
+        };
+        Session { world: world.number, told, left_out }
+    }
+
+    fn told(&self, world: &World, clips: usize, interrupt: &Interrupt) -> anyhow::Result<Vec<Told>> {
+        let (clips, seed) = (record(world, clips)?, world.number);
+        match self {
+            Self::Arm(effect) => {
+                let also = effect.iter().cloned().collect();
+                let options = arm::Options { also, seed, ..arm::Options::default() };
+                let cell = Cell { object: None, ..world.cell.clone() };
+                let found = arm::identify_clips(&cell, clips, &options, interrupt)?;
+                Ok(of_identification(&found, &world.hidden))
+            }
+            Self::Object => {
+                let options = object::Options { seed, ..object::Options::default() };
+                let found = object::identify_clips(&world.cell, clips, &options, interrupt)?;
+                Ok(of_identification(&found, &world.hidden))
+            }
+            Self::Diagnosis(_) => {
+                let (session, admitted) = trial::sealed(world, clips);
+                let options = diagnose::Options { theta: None, seed };
+                Ok(of_diagnosis(&diagnose_clips(&session, &admitted, &options, interrupt)?, world))
+            }
+        }
+    }
+}
+
+fn of_identification(found: &Identification, truth: &Theta) -> Vec<Told> {
+    let of = |(name, parameter): (&String, &crate::identify::answer::Parameter)| {
+        let values = parameter.value.iter().copied().zip(parameter.ci95.iter().copied());
+        told(name, values, &numbers(truth, name))
+    };
+    found.parameters.iter().flat_map(of).collect()
+}
+
+fn of_diagnosis(found: &Diagnosis, world: &World) -> Vec<Told> {
+    let Truth::Effects(effects) = &world.truth else { return Vec::new() };
+    let named = found.candidates.iter().filter(|candidate| candidate.status == diagnose::Status::Named);
+    let right = named.filter(|candidate| effects.contains(&candidate.effect));
+    let of = |candidate: &diagnose::Candidate| -> Vec<Told> {
+        let sizes = candidate.parameters.iter().flat_map(|(parameter, size)| {
+            let name = format!("{}.{parameter}", candidate.effect);
+            let values = size.values.iter().copied().zip(size.ci90.iter().copied());
+            told(&name, values, &numbers(&world.hidden, &name))
+        });
+        sizes.collect()
+    };
+    right.flat_map(of).collect()
+}
+
+/// Those of a parameter's numbers whose truth is known and whose interval ends.
+fn told(name: &str, values: impl Iterator<Item = (f64, [f64; 2])>, truth: &[f64]) -> Vec<Told> {
+    let values: Vec<(f64, [f64; 2])> = values.collect();
+    let single = values.len() == 1;
+    let of = |(k, (value, interval)): (usize, (f64, [f64; 2]))| {
+        // One number stands for all joints.
+        let truth = *truth.get(k).or(truth.first().filter(|_| truth.len() == 1))?;
+        let name = if single { name.to_owned() } else { format!("{name}[{k}]") };
+        let ends = interval.iter().all(|end| end.is_finite());
+        ends.then_some(Told { name, truth, value, interval })
+    };
+    values.into_iter().enumerate().filter_map(of).collect()
+}
+
+/// The numbers of a parameter in a theta, by its name in reports; none where it does not say.
+fn numbers(theta: &Theta, name: &str) -> Vec<f64> {
+    let (arm, object) = (theta.arm.as_ref(), theta.object.as_ref());
+    let one = |value: Option<f64>| value.into_iter().collect();
+    match name {
+        "stiffness" => arm.map(|arm| arm.stiffness.clone()).unwrap_or_default(),
+        "damping" => arm.map(|arm| arm.damping.clone()).unwrap_or_default(),
+        "friction" => one(object.and_then(|object| object.friction)),
+        "mass" => one(object.and_then(|object| object.mass)),
+        "tip_friction" => one(object.and_then(|object| object.tip_friction)),
+        "centre_of_mass" => object.and_then(|object| object.centre_of_mass).map(Vec::from).unwrap_or_default(),
+        _ => {
+            let Some((effect, parameter)) = name.split_once('.') else { return Vec::new() };
+            let block = theta.effects.iter().find(|block| block.name == effect);
+            match block.and_then(|block| block.parameters.get(parameter)) {
+                Some(Value::Array(values)) => values.iter().filter_map(Value::as_float).collect(),
+                Some(value) => one(value.as_float()),
+                None => Vec::new(),
+            }
+        }
+    }
+}
+
+/// Of one number how often its intervals held the truth.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Covered {
+    /// Sessions in which the truth lay inside.
+    pub inside: Rate,
+    /// Sessions in which it lay below and above the interval.
+    pub beside: [usize; 2],
+    /// Root mean square of the error over half the interval, times the quantile of the level: 1 where intervals are right.
+    pub spread: f64,
+    /// Median half width over the truth's size; of the half width itself where the truth may be zero.
+    pub half_width: f64,
+}
+
+/// Every number that sessions told, by name.
+#[must_use]
+pub fn covered(sessions: &[Session], level: f64) -> BTreeMap<String, Covered> {
+    let mut by_name: BTreeMap<String, Vec<&Told>> = BTreeMap::new();
+    for told in sessions.iter().flat_map(|session| &session.told) {
+        by_name.entry(told.name.clone()).or_default().push(told);
+    }
+    by_name.into_iter().map(|(name, told)| (name, Covered::of(&told, level))).collect()
+}
+
+/// Quantile of a normal distribution at the level, in sigmas.
+fn quantile(level: f64) -> f64 {
+    if level > 0.92 { 1.96 } else { 1.645 }
+}
+
+impl Covered {
+    fn of(told: &[&Told], level: f64) -> Self {
+        let count = |of: fn(&Told) -> bool| told.iter().filter(|told| of(told)).count();
+        let half = |told: &Told| 0.5 * (told.interval[1] - told.interval[0]);
+        let z = |told: &&&Told| {
+            let half = half(told);
+            (half > 0.0).then(|| quantile(level) * (told.value - told.truth) / half)
+        };
+        let z: Vec<f64> = told.iter().filter_map(|told| z(&told)).collect();
+        let mut halves: Vec<f64> = told.iter().map(|told| half(told)).collect();
+        halves.sort_by(f64::total_cmp);
+        Self {
+            inside: Rate::count(told.iter().map(|told| told.holds())),
+            beside: [count(|told| told.truth < told.interval[0]), count(|told| told.truth > told.interval[1])],
+            spread: (z.iter().map(|z| z * z).sum::<f64>() / z.len().max(1) as f64).sqrt(),
+            half_width: halves.get(halves.len() / 2).copied().unwrap_or(0.0),
+        }
+    }
+}
+
+impl Told {
+    /// Whether the interval holds the truth.
+    #[must_use]
+    pub fn holds(&self) -> bool {
+        (self.interval[0]..=self.interval[1]).contains(&self.truth)
+    }
+}
+
+/// A line for each number, and one for all together.
+#[must_use]
+pub fn table(sessions: &[Session], level: f64) -> String {
+    let told: Vec<&Told> = sessions.iter().flat_map(|session| &session.told).collect();
+    let mut all: Vec<(String, Covered)> = covered(sessions, level).into_iter().collect();
+    all.push(("all".to_owned(), Covered::of(&told, level)));
+    let mut out = String::new();
+    let _ = writeln!(
+        out,
+        "{:<44}{:>5}{:>8}{:>16}{:>7}{:>7}{:>8}{:>13}",
+        "number", "n", "inside", "(95 %)", "below", "above", "spread", "half width"
+    );
+    for (name, Covered { inside, beside: [below, above], spread, half_width }) in all {
+        let [low, high] = inside.ci95.map(|end| 100.0 * end);
+        let (share, n) = (100.0 * inside.value(), inside.of);
+        let _ = writeln!(
+            out,
+            "{name:<44}{n:>5}{share:>7.1} %{:>16}{below:>7}{above:>7}{spread:>8.2}{half_width:>13.3e}",
+            format!("{low:.1} to {high:.1}")
+        );
+    }
+    let _ = writeln!(
+        out,
+        "{} sessions, {} left out; the intervals say {:.0} %; spread: rms error in sigmas of the interval, 1 where it is right",
+        sessions.len(),
+        sessions.iter().filter(|session| session.left_out.is_some()).count(),
+        100.0 * level
+    );
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::path::Path;
+
+    fn cell() -> Cell {
+        let text = include_str!("../../../config/fr3_cell.toml");
+        shared_mem::toml_file::parse(text, Path::new("fr3_cell.toml")).expect("the shipped file")
+    }
+
+    #[test]
+    fn every_number_that_can_be_printed_finds_its_truth() {
+        for (subject, names) in [
+            (Subject::Arm(None), vec!["stiffness", "damping"]),
+            (Subject::Arm(Some("command_delay".into())), vec!["command_delay.delay"]),
+            (Subject::Object, vec!["friction", "mass", "centre_of_mass", "tip_friction"]),
+        ] {
+            let world = subject.world(3, &cell()).expect("a world");
+            for name in names {
+                assert!(!numbers(&world.hidden, name).is_empty(), "{name}");
+            }
+        }
+        assert!(Subject::Arm(Some("no_such".into())).world(3, &cell()).is_err());
+    }
+
+    #[test]
+    fn a_truth_below_inside_and_above_is_counted_where_it_lies() {
+        let told = |value: f64| Told { name: "a".into(), truth: 0.0, value, interval: [value - 1.0, value + 1.0] };
+        let session = |world, value| Session { world, told: vec![told(value)], left_out: None };
+        let sessions = [session(1, 2.0), session(2, 0.5), session(3, -2.0), session(4, -0.5)];
+        let covered = &covered(&sessions, 0.95)["a"];
+        assert_eq!((covered.inside.hits, covered.inside.of, covered.beside), (2, 4, [1, 1]));
+        assert!((covered.spread - 1.96 * (8.5f64 / 4.0).sqrt()).abs() < 1e-12 && covered.half_width == 1.0);
+        assert!(table(&sessions, 0.95).contains("50.0 %"));
+    }
+}
