@@ -1,14 +1,15 @@
 //! The numbers of an effect as a person reads them: in the effect's own units, each with a 90 % interval.
 //!
 //! An interval is the wider of two: from the curvature of the weighted deviance, and from how the number moves when clips are
-//! left out one by one (jackknife). Where a hit lies between a number and what is seen, the step over which its slope was
-//! taken comes on top: the answer to less than that is rough. Of a size on which nothing depends ([`super::flat`]) all that is
-//! met in practice is possible.
+//! left out one by one (jackknife), with Student's t for as few clips as there are. Where a hit lies between a number and
+//! what is seen, the step over which its slope was taken comes on top: the answer to less than that is rough. Of a size on
+//! which nothing depends ([`super::flat`]) all that is met in practice is possible.
 
 use super::answer::Size;
 use super::evidence::Evidence;
 use super::fit::{Bench, Hypothesis};
 use super::quadratic::minimum;
+use crate::estimate::interval::student;
 use crate::forward::setting::Setting;
 use nalgebra::DMatrix;
 use std::collections::BTreeMap;
@@ -23,7 +24,7 @@ pub const UNBOUNDED: f64 = 1e9;
 /// The parameters of one of a hypothesis' effects.
 #[must_use]
 pub fn of_effect<E: Evidence>(bench: &Bench<'_, E>, hypothesis: &Hypothesis, effect: usize) -> BTreeMap<String, Size> {
-    let spread = spread(bench, hypothesis);
+    let half_widths = half_widths(bench, hypothesis);
     let candidate = &bench.library.candidates[effect];
     let rough = !candidate.is_of_arm();
     let mut sizes = BTreeMap::new();
@@ -37,11 +38,11 @@ pub fn of_effect<E: Evidence>(bench: &Bench<'_, E>, hypothesis: &Hypothesis, eff
                 continue;
             }
             let value = hypothesis.full[k];
-            let sigma = hypothesis.free.iter().position(|free| *free == k).map_or(0.0, |place| spread[place]);
-            let sigma = if rough && sigma > 0.0 { sigma.hypot(bench.library.unknowns[k].step) } else { sigma };
+            let half = hypothesis.free.iter().position(|free| *free == k).map_or(0.0, |place| half_widths[place]);
+            let half = if rough && half > 0.0 { half.hypot(NINETY * bench.library.unknowns[k].step) } else { half };
             let open = candidate.sizes.contains(&k) && !hypothesis.free.contains(&k);
             let interval = match parameter.plausible {
-                _ if !open => [value - NINETY * sigma, value + NINETY * sigma],
+                _ if !open => [value - half, value + half],
                 [low, _] if inverse => [0.0, low.recip()],
                 plausible => plausible,
             };
@@ -67,8 +68,8 @@ fn readable(value: f64, [low, high]: [f64; 2], inverse: bool, possible: [f64; 2]
     (value, [low.max(possible[0]), high.min(possible[1])])
 }
 
-/// One sigma of every free number.
-fn spread<E: Evidence>(bench: &Bench<'_, E>, hypothesis: &Hypothesis) -> Vec<f64> {
+/// Half the 90 % interval of every free number.
+fn half_widths<E: Evidence>(bench: &Bench<'_, E>, hypothesis: &Hypothesis) -> Vec<f64> {
     let total = bench.held(hypothesis);
     let count = hypothesis.free.len();
     let inner: DMatrix<f64> = total.view((1, 1), (count, count)).into_owned();
@@ -84,5 +85,6 @@ fn spread<E: Evidence>(bench: &Bench<'_, E>, hypothesis: &Hypothesis) -> Vec<f64
         let squares: f64 = shifts.iter().map(|shift| (shift[k] - mean).powi(2)).sum();
         (squares * (clips - 1.0) / clips).sqrt()
     };
-    (0..count).map(|k| curvature[k].max(jackknife(k))).collect()
+    let t = student(NINETY, hypothesis.fitted.len().saturating_sub(1));
+    (0..count).map(|k| (NINETY * curvature[k]).max(t * jackknife(k))).collect()
 }
