@@ -108,7 +108,7 @@ impl Subject {
             }
             Self::Diagnosis(_) => {
                 let (session, admitted) = trial::sealed(world, clips);
-                let options = diagnose::Options { theta: None, seed };
+                let options = diagnose::Options { seed, ..diagnose::Options::default() };
                 Ok(of_diagnosis(&diagnose_clips(&session, &admitted, &options, interrupt)?, world))
             }
         }
