@@ -186,7 +186,7 @@ fn placed(random: &mut Pcg64) -> Isometry3<f64> {
     let mut within = |low: f64, high: f64| low + (high - low) * random.random::<f64>();
     let (far, azimuth, height) = (within(1.2, 1.9), within(-1.3, 1.3), within(0.2, 0.9));
     let middle = Point3::new(0.25 + within(-0.1, 0.1), within(-0.1, 0.1), 0.35 + within(-0.1, 0.1));
-    let flat = far * (height as f64).cos();
+    let flat = far * height.cos();
     let eye = middle + Vector3::new(flat * azimuth.cos(), flat * azimuth.sin(), far * height.sin());
     let z = (middle - eye).normalize();
     let x = z.cross(&Vector3::z()).normalize();

@@ -60,11 +60,9 @@ mod tests {
             }
         }
         let slope = |x: f64| DVector::from_column_slice(&[1.0, x]);
-        let sum =
-            |of: &dyn Fn(&(usize, f64, f64)) -> DVector<f64>| rows.iter().fold(DVector::zeros(2), |s, r| s + of(r));
         let information = rows.iter().fold(DMatrix::zeros(2, 2), |s, r| s + slope(r.1) * slope(r.1).transpose());
         let inverse = information.clone().try_inverse().expect("a line");
-        let at = &inverse * sum(&|r| slope(r.1) * r.2);
+        let at = &inverse * rows.iter().fold(DVector::zeros(2), |s, r| s + slope(r.1) * r.2);
         let of = |witness: usize| {
             let own = || rows.iter().filter(|r| r.0 == witness);
             Witness {
