@@ -12,7 +12,6 @@ use crate::typed;
 use shared_mem::progress::Progress;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
-use std::time::Instant;
 
 /// Ways of searching.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -205,8 +204,6 @@ pub(super) fn stopped(kept: &Kept, interrupt: &Interrupt) -> Result<(), RunError
 /// The bar and the interruption of a search.
 struct Watch<'a> {
     done: AtomicUsize,
-    expected: usize,
-    began: Instant,
     bar: Progress,
     interrupt: &'a Interrupt,
 }
@@ -214,7 +211,7 @@ struct Watch<'a> {
 impl<'a> Watch<'a> {
     fn new(expected: usize, interrupt: &'a Interrupt) -> Self {
         let bar = Progress::new("identify", expected as u64);
-        Self { done: AtomicUsize::new(0), expected, began: Instant::now(), bar, interrupt }
+        Self { done: AtomicUsize::new(0), bar, interrupt }
     }
 
     /// So many were simulated before the search was interrupted.
@@ -228,9 +225,7 @@ impl<'a> Watch<'a> {
 
     fn one_more(&self) {
         let done = self.done.fetch_add(1, Ordering::Relaxed) + 1;
-        let seconds = self.began.elapsed().as_secs_f64();
-        let left = seconds / done as f64 * self.expected.saturating_sub(done) as f64;
-        self.bar.show(done.min(self.expected) as u64, &format!("{done} clips simulated, about {left:.0} s left"));
+        self.bar.show(done as u64, &format!("{done} clips simulated"));
     }
 }
 

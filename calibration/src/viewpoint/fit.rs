@@ -11,6 +11,8 @@ use nalgebra::{Isometry3, Vector6};
 use rand::{RngExt as _, SeedableRng as _};
 use rand_pcg::Pcg64;
 use rayon::prelude::*;
+use shared_mem::progress::{Planned, Progress};
+use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Which way to go.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -104,14 +106,18 @@ fn by_outline(frames: &[Frame], shape: &Shape, start: &Isometry3<f64>, reach: &R
     // A silhouette has one border, a photo many edges: there the best pose needs more company.
     let masks = frames.iter().all(Frame::has_mask);
     let (wanted, rounds) = if masks { (CANDIDATES / 3, 0) } else { (CANDIDATES, ROUNDS) };
+    let bar = Progress::planned("viewpoint", &PLAN, 1);
     let (candidates, mut drawings) = scan(few, shape, start, reach, wanted);
     let mut poses: Vec<Isometry3<f64>> = candidates.iter().map(|c| c.camera_from_base).collect();
     poses.push(*start);
-    let coarse = refined(&poses, &mut drawings, |pose| refine(few, shape, pose, refine::COARSE));
+    bar.stage(COARSE, poses.len() as u64);
+    let coarse = refined(&poses, (&mut drawings, &bar), |pose| refine(few, shape, pose, refine::COARSE));
     let poses: Vec<_> = coarse.iter().take(FULLY).map(|found| found.camera_from_base).collect();
-    let mut found = refined(&poses, &mut drawings, |pose| refine(frames, shape, pose, refine::FINE));
+    bar.stage(FINE, poses.len() as u64);
+    let mut found = refined(&poses, (&mut drawings, &bar), |pose| refine(frames, shape, pose, refine::FINE));
     let mut random = Pcg64::seed_from_u64(seed);
     for _ in 0..rounds {
+        bar.stage(FINE, SHAKES as u64);
         let Some(best) = found.first() else { break };
         let far = best.pivot.coords.norm();
         let shaken: Vec<_> = (0..SHAKES)
@@ -122,7 +128,7 @@ fn by_outline(frames: &[Frame], shape: &Shape, start: &Isometry3<f64>, reach: &R
                 moved(&best.camera_from_base, &best.pivot, &by)
             })
             .collect();
-        found.extend(refined(&shaken, &mut drawings, |pose| refine(frames, shape, pose, refine::FINE)));
+        found.extend(refined(&shaken, (&mut drawings, &bar), |pose| refine(frames, shape, pose, refine::FINE)));
         found.sort_by(|a, b| a.cost.total_cmp(&b.cost));
     }
     let best = found.first().ok_or(NoFit::OutOfView)?;
@@ -145,13 +151,24 @@ fn by_outline(frames: &[Frame], shape: &Shape, start: &Isometry3<f64>, reach: &R
     })
 }
 
+/// Stages of the search, with about how long they take beside each other.
+const PLAN: [Planned; 3] = [("scan", 1.0), (COARSE, 1.0), (FINE, 1.0)];
+const COARSE: &str = "coarse";
+const FINE: &str = "fine";
+
 /// Every pose refined, the best first.
 fn refined(
     poses: &[Isometry3<f64>],
-    drawings: &mut usize,
+    (drawings, bar): (&mut usize, &Progress),
     refine: impl Fn(&Isometry3<f64>) -> Option<Refined> + Send + Sync,
 ) -> Vec<Refined> {
-    let mut found: Vec<Refined> = poses.par_iter().filter_map(refine).collect();
+    let done = AtomicU64::new(0);
+    let one = |pose: &Isometry3<f64>| {
+        let found = refine(pose);
+        bar.show(done.fetch_add(1, Ordering::Relaxed) + 1, "");
+        found
+    };
+    let mut found: Vec<Refined> = poses.par_iter().filter_map(one).collect();
     *drawings += found.iter().map(|found| found.drawings).sum::<usize>();
     found.sort_by(|a, b| a.cost.total_cmp(&b.cost));
     found

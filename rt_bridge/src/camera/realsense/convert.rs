@@ -10,6 +10,7 @@ use crate::device::DeviceFault;
 use shared_mem::cell::Camera;
 use shared_mem::msg::image::{CameraInfo, ImageHeader};
 use shared_mem::output::{Destination, Output};
+use shared_mem::progress::Progress;
 use shared_mem::recording::{ClipInfo, ClipWriter};
 use shared_mem::time::now_ns;
 use std::collections::BTreeSet;
@@ -36,7 +37,8 @@ pub fn convert(
     let place = Destination::new(out, force)?;
     let source = CameraSource::Bag(bag.to_owned());
     let recorded = depth_pictures(bag).map_err(|e| refused(&source, &e))?;
-    let mut conversion = Conversion { source, camera, known: BTreeSet::new(), begin: None };
+    let bar = Progress::new("convert", recorded as u64);
+    let mut conversion = Conversion { source, camera, known: BTreeSet::new(), begin: None, bar };
     let mut passes = Passes::new(place);
     let (mut played, mut fruitless) = (0, 0);
     while played < PASSES && fruitless < FRUITLESS && conversion.known.len() + NEVER_PAIRED < recorded {
@@ -76,18 +78,20 @@ struct Conversion<'a> {
     known: BTreeSet<u64>,
     /// How the camera projects; what takes its clock to this machine's [ns].
     begin: Option<(CameraInfo, u64)>,
+    bar: Progress,
 }
 
 impl Conversion<'_> {
     /// One pass: writes the pairs that are not known yet. Pairs seen.
     fn play(&mut self, clip: &mut ClipWriter<Output>) -> Result<usize, ConvertError> {
-        let (known, begin) = (&mut self.known, &mut self.begin);
+        let (known, begin, bar) = (&mut self.known, &mut self.begin, &self.bar);
         let mut seen = BTreeSet::new();
         let mut described = false;
         stream::play(&self.source, self.camera, |moment| -> Result<(), ConvertError> {
             let number = moment.depth.sequence;
             seen.insert(number);
             if known.insert(number) {
+                bar.show(known.len() as u64, "");
                 // The camera's clock, begun at this machine's now.
                 let begun = || (moment.info, now_ns().wrapping_sub(moment.depth.device_ns));
                 let (camera, shift_ns) = begin.get_or_insert_with(begun);
