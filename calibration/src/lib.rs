@@ -17,6 +17,7 @@
 //! | [`processes`] | the other programs as children |
 //! | [`interrupt`] | Ctrl-C, and a budget of time |
 //! | [`kept`] | what long work has found so far, for when it is interrupted |
+//! | [`seed`] | what is drawn is drawn from it |
 
 pub mod benchmark;
 pub mod capture;
@@ -30,5 +31,6 @@ pub mod kept;
 pub mod keys;
 pub mod processes;
 pub mod report;
+pub mod seed;
 pub mod typed;
 pub mod viewpoint;

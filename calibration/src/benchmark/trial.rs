@@ -20,6 +20,7 @@ use crate::forward::setting;
 use crate::interrupt::Interrupt;
 use crate::kept::Kept;
 use shared_mem::cell::{ClipEntry, ClipKind};
+use shared_mem::progress::Progress;
 use shared_mem::recording::{Clip, Session};
 
 /// Linearisations of the fits that the oracle and the rules rest on.
@@ -80,8 +81,9 @@ impl Court<'_> {
             trail: (Kept::nothing(), ""),
         };
         let even = vec![1.0; evidence.channels().len()];
+        let bar = Progress::new("baseline", baseline::steps(self.admitted));
         // The diagnosis' own: what its parameters make up for is no gap that anyone could explain.
-        let baseline = baseline::identify(&bench, &self.split, &self.world.cell, self.admitted);
+        let baseline = baseline::identify(&bench, &self.split, &self.world.cell, self.admitted, &bar);
         let baseline = baseline.ok_or(DiagnoseError::NoBaseline)?;
         let (detectability, oracle_shrink) = self.oracle(&bench, &baseline, &even);
         let case = |said| Case {

@@ -1,6 +1,6 @@
 //! `calibration benchmark`.
 
-use super::print_json;
+use super::print;
 use calibration::benchmark::run::{Extent, Outcome, Plan, run as judge};
 use calibration::benchmark::score::Scores;
 use calibration::interrupt::Interrupt;
@@ -15,10 +15,10 @@ use std::time::Instant;
 
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
-Worlds are drawn from their numbers: gains, object, motions, scatter, and what is wrong. Nothing of it is told to the
-diagnosis, and they are integrated in other steps than the twin's. With --size 1 every effect is met once in each kind of
+Worlds are drawn from their numbers: gains, object, motions, scatter, and what is wrong. The diagnosis knows
+nothing of it, and they are integrated in other steps than the twin's. With --size 1 every effect is met once in each kind of
 session, beside half as many worlds without any, a quarter as many with two, and disturbances that no effect describes; a
-larger size repeats that with other numbers. Each world is told on stderr as soon as it is scored.
+larger size repeats that with other numbers. Each world is reported on stderr as soon as it is scored.
 
 Ctrl-C scores the worlds that are done.
 
@@ -43,7 +43,7 @@ pub(super) struct BenchmarkArguments {
     #[arg(long, value_name = "N", default_value_t = 8, value_parser = clap::value_parser!(u64).range(8..=64))]
     clips: u64,
     /// Number of the first world.
-    #[arg(long, default_value_t = 1)]
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = calibration::seed::parse, allow_negative_numbers = true)]
     seed: u64,
     /// Where the page goes.
     #[arg(long, value_name = "REPORT.HTML")]
@@ -75,14 +75,9 @@ pub(super) fn run(arguments: BenchmarkArguments, interrupt: &Interrupt) -> anyho
         file.write(page(&methods, &origin))?;
     }
     left_out.iter().for_each(|world| console::line(format_args!("left out: {world}")));
-    console::block(terminal::benchmark(&methods));
-    if arguments.json {
-        let scores: Vec<_> = methods
-            .iter()
-            .map(|method| json!({ "method": method.name, "scores": Scores::of(&method.cases) }))
-            .collect();
-        let cases = methods.first().map(|method| &method.cases);
-        print_json(&json!({ "scores": scores, "cases": cases, "left_out": left_out, "seconds": seconds }))?;
-    }
-    Ok(())
+    let scores: Vec<_> =
+        methods.iter().map(|method| json!({ "method": method.name, "scores": Scores::of(&method.cases) })).collect();
+    let cases = methods.first().map(|method| &method.cases);
+    let answer = json!({ "scores": scores, "cases": cases, "left_out": left_out, "seconds": seconds });
+    print(arguments.json, &answer, terminal::benchmark(&methods))
 }

@@ -1,6 +1,6 @@
 //! `calibration capture`.
 
-use super::print_json;
+use super::print;
 use calibration::capture::control_hit_slide::Series;
 use calibration::capture::shape::Kind;
 use calibration::capture::task::Task;
@@ -8,7 +8,6 @@ use calibration::capture::{control_hit_slide, excitation, ramp};
 use calibration::interrupt::Interrupt;
 use calibration::keys::Keys;
 use clap::{Subcommand, ValueEnum as _};
-use shared_mem::console;
 use shared_mem::output::Destination;
 use shared_mem::quantity::number;
 use std::path::PathBuf;
@@ -183,7 +182,7 @@ fn refuse(why: &str) -> ! {
 #[command(after_help = "\
 cell.toml needs [tool], [table] and [object]. The arm finds the object by its tracked pose, goes above it to the stroke's start, comes down, waits until all is still,
 strikes, waits until the object rests, and steps back. Strokes come from all sides at all speeds, and every sixth repeats
-the first, so that scatter and drift can be told from a gap. Directions are chosen so that the object stays in reach; one
+the first, so that scatter and drift can be separated from a gap. Directions are chosen so that the object stays in reach; one
 that got away is asked for by hand.
 
 With --repeat, --headings and --turn-object every stroke goes out from the same place. The object has to stand there, to
@@ -274,8 +273,8 @@ fn excite(arguments: ExcitationArguments, interrupt: &Interrupt) -> anyhow::Resu
     };
     let summary = excitation::capture(&options, interrupt, &mut String::new)?;
     let kept = summary.clips.iter().filter(|clip| clip.kept).count();
-    console::line(format_args!("{}: {kept} of {} clips kept", summary.session.display(), options.task.clips));
-    if json { print_json(&summary) } else { Ok(()) }
+    let words = format!("{}: {kept} of {} clips kept", summary.session.display(), options.task.clips);
+    print(json, &summary, words)
 }
 
 fn strike(arguments: StrokeArguments, interrupt: &Interrupt) -> anyhow::Result<()> {
@@ -290,9 +289,10 @@ fn strike(arguments: StrokeArguments, interrupt: &Interrupt) -> anyhow::Result<(
     let task = task.task(clips, named);
     let options = control_hit_slide::Options { task, series, turn_tool: turn_tool.to_radians(), preview };
     let summary = control_hit_slide::capture(&options, interrupt)?;
-    if options.preview.is_none() {
-        let kept = summary.clips.iter().filter(|clip| clip.kept).count();
-        console::line(format_args!("{}: {kept} of {} clips kept", summary.session.display(), summary.clips.len()));
-    }
-    if json { print_json(&summary) } else { Ok(()) }
+    let kept = summary.clips.iter().filter(|clip| clip.kept).count();
+    let words = match &options.preview {
+        Some(file) => format!("the next stroke is drawn in {}", file.display()),
+        None => format!("{}: {kept} of {} clips kept", summary.session.display(), summary.clips.len()),
+    };
+    print(json, &summary, words)
 }

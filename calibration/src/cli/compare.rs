@@ -1,9 +1,9 @@
 //! `calibration compare`.
 
-use super::print_json;
+use super::print;
 use calibration::identify::object::{self, compare};
 use calibration::interrupt::Interrupt;
-use shared_mem::console;
+use shared_mem::output;
 use std::path::PathBuf;
 
 #[derive(Debug, clap::Args)]
@@ -14,11 +14,15 @@ what each way cost, and how many strokes had to be simulated to come as near as 
 
 Examples:
   calibration compare strokes
+  calibration compare strokes --out comparison.json
   calibration compare strokes --budget 2000 --parameters arm.toml --json")]
 pub(super) struct CompareArguments {
     /// Session folder.
     #[arg(value_name = "SESSION")]
     session: PathBuf,
+    /// What the laboratory knows about its cell [default: cell.toml beside the clips].
+    #[arg(long, value_name = "CELL.TOML")]
+    cell: Option<PathBuf>,
     /// Parameters that are known already: the arm's gains, effects.
     #[arg(long, value_name = "THETA.TOML")]
     parameters: Option<PathBuf>,
@@ -26,17 +30,23 @@ pub(super) struct CompareArguments {
     #[arg(long, value_name = "N", default_value_t = 1200, value_parser = clap::value_parser!(u32).range(1..))]
     budget: u32,
     /// Draws the strokes that are held out, and the searches.
-    #[arg(long, default_value_t = 0)]
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = calibration::seed::parse, allow_negative_numbers = true)]
     seed: u64,
+    /// Where the answer goes, as JSON.
+    #[arg(long, value_name = "COMPARISON.JSON")]
+    out: Option<PathBuf>,
     /// Prints one JSON object on stdout at the end.
     #[arg(long)]
     json: bool,
 }
 
 pub(super) fn run(arguments: CompareArguments, interrupt: &Interrupt) -> anyhow::Result<()> {
-    let CompareArguments { session, parameters, budget, seed, json } = arguments;
-    let options = object::Options { session, parameters, budget: budget as usize, seed, ..object::Options::default() };
+    let CompareArguments { session, cell, parameters, budget, seed, out, json } = arguments;
+    let options =
+        object::Options { session, cell, parameters, budget: budget as usize, seed, ..object::Options::default() };
     let found = compare::compare(&options, interrupt)?;
-    console::block(found.table());
-    if json { print_json(&found) } else { Ok(()) }
+    if let Some(file) = &out {
+        output::write(file, serde_json::to_string_pretty(&found)?)?;
+    }
+    print(json, &found, found.table())
 }

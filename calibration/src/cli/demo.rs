@@ -1,9 +1,8 @@
 //! `calibration demo`.
 
-use super::print_json;
+use super::print;
 use calibration::demo;
 use calibration::interrupt::Interrupt;
-use shared_mem::console;
 use std::path::PathBuf;
 
 #[derive(Debug, clap::Args)]
@@ -23,7 +22,7 @@ pub(super) struct DemoArguments {
     #[arg(long)]
     force: bool,
     /// Draws the hidden gains, the hidden effect and the motions.
-    #[arg(long, default_value_t = 1)]
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = calibration::seed::parse, allow_negative_numbers = true)]
     seed: u64,
     /// Clips to record; a diagnosis needs at least four.
     #[arg(long, value_name = "N", default_value_t = 6, value_parser = clap::value_parser!(u32).range(4..=100))]
@@ -36,6 +35,5 @@ pub(super) struct DemoArguments {
 pub(super) fn run(arguments: DemoArguments, interrupt: &Interrupt) -> anyhow::Result<()> {
     let DemoArguments { out, force, seed, clips, json } = arguments;
     let finding = demo::demo(&demo::Options { out, force, seed, clips }, interrupt)?;
-    console::block(finding.table());
-    if json { print_json(&finding) } else { Ok(()) }
+    print(json, &finding, finding.table())
 }

@@ -1,10 +1,11 @@
 //! `calibration export`.
 
-use super::print_json;
+use super::print;
 use clap::{Args, ValueEnum};
 use serde::Serialize;
 use shared_mem::console;
 use shared_mem::msg::joints_from;
+use shared_mem::progress::Progress;
 use shared_mem::recording::{Exported, Format, Order, Session, export_session};
 use std::path::PathBuf;
 use twin::arm::ArmModel;
@@ -26,6 +27,9 @@ pub(super) struct ExportArguments {
     /// Session folder, or one clip.
     #[arg(value_name = "SESSION|CLIP")]
     session: PathBuf,
+    /// What the laboratory knows about its cell [default: cell.toml beside the clips].
+    #[arg(long, value_name = "CELL.TOML")]
+    cell: Option<PathBuf>,
     /// The format.
     #[arg(long, value_enum)]
     to: Target,
@@ -68,7 +72,7 @@ struct Answer {
 }
 
 pub(super) fn run(arguments: &ExportArguments) -> anyhow::Result<()> {
-    let session = Session::open(&arguments.session)?;
+    let session = Session::open_with(&arguments.session, arguments.cell.as_deref())?;
     let model = session.cell.robot.as_ref().and_then(|_| ArmModel::from_cell(&session.cell).ok());
     let model = model.filter(ArmModel::has_geometry);
     let flange_at = |q: &[f64]| {
@@ -77,7 +81,10 @@ pub(super) fn run(arguments: &ExportArguments) -> anyhow::Result<()> {
     };
     let ExportArguments { to, out, force, json, .. } = arguments;
     let order = Order { to: (*to).into(), out, force: *force, flange_at: &flange_at };
+    let (bar, mut done) = (Progress::new("export", session.clips.len() as u64), 0);
     let clips = export_session(&session, order, |clip| {
+        done += 1;
+        bar.show(done, "");
         let Exported { file, measured, desired, poses, pictures, left_out, warnings } = clip;
         let file = file.display();
         console::line(format_args!(
@@ -92,5 +99,7 @@ pub(super) fn run(arguments: &ExportArguments) -> anyhow::Result<()> {
             console::line(format_args!("{file}: {warning}"));
         }
     })?;
-    if *json { print_json(&Answer { clips }) } else { Ok(()) }
+    drop(bar);
+    let words = format!("{} clips in {}", clips.len(), out.display());
+    print(*json, &Answer { clips }, words)
 }

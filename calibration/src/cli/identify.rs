@@ -1,11 +1,10 @@
 //! `calibration identify`.
 
-use super::print_json;
+use super::print;
 use calibration::identify::{Identification, Optimizer, arm, object};
 use calibration::interrupt::Interrupt;
 use calibration::report::terminal;
 use clap::{Subcommand, ValueEnum};
-use shared_mem::console;
 use shared_mem::output::{Destination, OutputError};
 use std::path::{Path, PathBuf};
 
@@ -20,7 +19,7 @@ pub(super) enum Identify {
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 The recorded commands are simulated until the twin's joints move as the robot's did. A quarter of the motions is held
-out: the error on them is what the twin is worth. What the clips cannot tell is said, with the reason.
+out: the error on them is what the twin is worth. What is not identifiable from the clips is said, with the reason.
 
 Ctrl-C keeps what was found so far, beside --out or in the session's folder; the same command goes on from there, and ends
 where it would have ended. What no clip tells is not written.
@@ -33,6 +32,9 @@ pub(super) struct ArmArguments {
     /// Session folder, or one clip beside a cell.toml.
     #[arg(value_name = "SESSION")]
     session: PathBuf,
+    /// What the laboratory knows about its cell [default: cell.toml beside the clips].
+    #[arg(long, value_name = "CELL.TOML")]
+    cell: Option<PathBuf>,
     /// The way of searching.
     #[arg(long, value_enum, default_value_t = Way::LeastSquares)]
     optimizer: Way,
@@ -52,7 +54,7 @@ pub(super) struct ArmArguments {
     #[arg(long, value_name = "N", default_value_t = 4000, value_parser = clap::value_parser!(u32).range(1..))]
     budget: u32,
     /// Draws the clips that are held out, and the searches.
-    #[arg(long, default_value_t = 0)]
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = calibration::seed::parse, allow_negative_numbers = true)]
     seed: u64,
     /// Prints one JSON object on stdout at the end.
     #[arg(long)]
@@ -66,7 +68,7 @@ pub(super) struct ArmArguments {
 #[command(after_help = "\
 The recorded commands are simulated, hit and slide included, until object and arm move as they did. The arm's gains are
 found first, from the way to the object in the same clips, unless --parameters brings them. A quarter of the strokes is
-held out. Clips in which the object topples, is lost or not hit are left out, and that is said; so is what cannot be told.
+held out. Clips in which the object topples, is lost or not hit are left out, and that is said; so is what is not identifiable.
 
 Ctrl-C keeps what was found so far, beside --out or in the session's folder; the same command goes on from there, and ends
 where it would have ended. What no clip tells is not written.
@@ -78,6 +80,9 @@ pub(super) struct ObjectArguments {
     /// Session folder, or one clip beside a cell.toml.
     #[arg(value_name = "SESSION")]
     session: PathBuf,
+    /// What the laboratory knows about its cell [default: cell.toml beside the clips].
+    #[arg(long, value_name = "CELL.TOML")]
+    cell: Option<PathBuf>,
     /// The way of searching; pso and cma go by ADD + ADD-S.
     #[arg(long, value_enum, default_value_t = Way::LeastSquares)]
     optimizer: Way,
@@ -94,7 +99,7 @@ pub(super) struct ObjectArguments {
     #[arg(long, value_name = "N", default_value_t = 1200, value_parser = clap::value_parser!(u32).range(1..))]
     budget: u32,
     /// Draws the clips that are held out, and the searches.
-    #[arg(long, default_value_t = 0)]
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = calibration::seed::parse, allow_negative_numbers = true)]
     seed: u64,
     /// Prints one JSON object on stdout at the end.
     #[arg(long)]
@@ -128,19 +133,20 @@ impl Way {
 pub(super) fn run(identify: Identify, interrupt: &Interrupt) -> anyhow::Result<()> {
     match identify {
         Identify::Arm(arguments) => {
-            let ArmArguments { session, optimizer, out, force, parameters, also, budget, seed, json, report } =
+            let ArmArguments { session, cell, optimizer, out, force, parameters, also, budget, seed, json, report } =
                 arguments;
             let page = places(out.as_deref(), report.as_deref(), force)?;
             let (optimizer, budget) = (optimizer.optimizer(), budget as usize);
-            let options = arm::Options { session, optimizer, out, parameters, also, budget, seed };
-            tell(&arm::identify(&options, interrupt)?, page, json)
+            let options = arm::Options { session, cell, optimizer, out, parameters, also, budget, seed };
+            conclude(&arm::identify(&options, interrupt)?, page, json)
         }
         Identify::Object(arguments) => {
-            let ObjectArguments { session, optimizer, out, force, parameters, budget, seed, json, report } = arguments;
+            let ObjectArguments { session, cell, optimizer, out, force, parameters, budget, seed, json, report } =
+                arguments;
             let page = places(out.as_deref(), report.as_deref(), force)?;
             let (optimizer, budget) = (optimizer.optimizer(), budget as usize);
-            let options = object::Options { session, optimizer, out, parameters, budget, seed };
-            tell(&object::identify(&options, interrupt)?, page, json)
+            let options = object::Options { session, cell, optimizer, out, parameters, budget, seed };
+            conclude(&object::identify(&options, interrupt)?, page, json)
         }
     }
 }
@@ -151,11 +157,10 @@ fn places(out: Option<&Path>, report: Option<&Path>, force: bool) -> Result<Opti
     Destination::of(report, force)
 }
 
-fn tell(found: &Identification, page: Option<Destination>, json: bool) -> anyhow::Result<()> {
+fn conclude(found: &Identification, page: Option<Destination>, json: bool) -> anyhow::Result<()> {
     let sheet = found.sheet();
     if let Some(page) = page {
         page.write(sheet.page())?;
     }
-    console::block(terminal::identification(&sheet));
-    if json { print_json(found) } else { Ok(()) }
+    print(json, found, terminal::identification(&sheet))
 }

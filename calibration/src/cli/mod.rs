@@ -10,10 +10,12 @@ mod viewpoint;
 
 use calibration::diagnose;
 use calibration::interrupt::Interrupt;
+use calibration::report::terminal;
 use clap::{Parser, Subcommand};
 use serde::Serialize;
 use shared_mem::answer;
 use shared_mem::ending;
+use std::fmt::Display;
 
 /// Records how a robot cell moves, and says where its twin differs.
 #[derive(Debug, Parser)]
@@ -39,7 +41,7 @@ enum Verb {
     /// Moves the arm through a running bridge (or starts one) and records clips into a session folder.
     #[command(subcommand)]
     Capture(capture::Capture),
-    /// Finds the parameters of controller or object from a session, with intervals, and says what it cannot tell.
+    /// Finds the parameters of controller or object from a session, with intervals, and says which are not identifiable.
     #[command(subcommand)]
     Identify(identify::Identify),
     /// Ways of finding an object's parameters side by side: error, and what it cost.
@@ -88,7 +90,7 @@ fn run_to_the_end(verb: Verb, interrupt: &Interrupt) -> anyhow::Result<()> {
         Verb::Compare(arguments) => compare::run(arguments, interrupt),
         Verb::Diagnose(arguments) => {
             let found = diagnose::command::run(&arguments, interrupt)?;
-            if arguments.json { print_json(&found) } else { Ok(()) }
+            print(arguments.json, &found, terminal::diagnosis(&found))
         }
         Verb::Viewpoint(arguments) => viewpoint::run(*arguments),
         Verb::Export(arguments) => export::run(&arguments),
@@ -96,8 +98,9 @@ fn run_to_the_end(verb: Verb, interrupt: &Interrupt) -> anyhow::Result<()> {
     }
 }
 
-fn print_json(answer: &impl Serialize) -> anyhow::Result<()> {
-    Ok(answer::json(answer)?)
+/// The answer, on standard output: one JSON object, or words for people.
+fn print(json: bool, answer: &impl Serialize, words: impl Display) -> anyhow::Result<()> {
+    Ok(if json { answer::json(answer) } else { answer::words(words) }?)
 }
 
 #[cfg(test)]
@@ -145,6 +148,11 @@ mod tests {
             (format!("{strokes} --headings 8 --repeat 1"), false),
             (format!("{strokes} --repeat 2 --turn-tool -90"), true),
             (strokes.to_owned(), false),
+            ("calibration diagnose monday --cell cell.toml --seed -5".to_owned(), true),
+            ("calibration demo --seed=-5".to_owned(), true),
+            ("calibration compare strokes --seed -5 --out comparison.json".to_owned(), true),
+            ("calibration identify arm clip.mcap --cell cell.toml --seed -5".to_owned(), true),
+            ("calibration identify object strokes --seed 1.5".to_owned(), false),
         ] {
             assert_eq!(Arguments::try_parse_from(words(&command)).is_ok(), fits, "{command}");
         }

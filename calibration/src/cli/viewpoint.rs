@@ -1,13 +1,12 @@
 //! `calibration viewpoint`.
 
-use super::print_json;
+use super::print;
 use calibration::viewpoint::answer::Viewpoint;
 use calibration::viewpoint::board::Board;
 use calibration::viewpoint::command::{Options, StartFrom, run as find};
 use calibration::viewpoint::fit::Method;
 use calibration::viewpoint::search::Reach;
 use clap::{Args, ValueEnum};
-use shared_mem::console;
 use shared_mem::output::Destination;
 use shared_mem::quantity::{self, number};
 use shared_mem::recording::PictureKind;
@@ -75,7 +74,7 @@ pub(crate) struct ViewpointArguments {
     #[arg(long, allow_negative_numbers = true, value_parser = |text: &str| number(text, 0.0..=0.08, "m"))]
     hand: Option<f64>,
     /// Seed of what is drawn by lot.
-    #[arg(long, default_value_t = 1)]
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = calibration::seed::parse, allow_negative_numbers = true)]
     seed: u64,
     /// Writes the cell with the pose found.
     #[arg(long, value_name = "CELL.TOML")]
@@ -163,29 +162,29 @@ pub(super) fn run(arguments: ViewpointArguments) -> anyhow::Result<()> {
         out: Destination::of(arguments.out.as_deref(), arguments.force)?,
         report: Destination::of(arguments.report.as_deref(), arguments.force)?,
     })?;
-    tell(&found);
-    if arguments.json { print_json(&found) } else { Ok(()) }
+    print(arguments.json, &found, in_words(&found))
 }
 
-fn tell(found: &Viewpoint) {
+/// The answer for people.
+fn in_words(found: &Viewpoint) -> String {
     let [x, y, z] = found.camera.position;
     let [qw, qx, qy, qz] = found.camera.orientation;
-    console::line(format_args!(
+    let mut lines = vec![format!(
         "camera in the base frame: {x:.4}, {y:.4}, {z:.4} m; {qw:.5}, {qx:.5}, {qy:.5}, {qz:.5} (w, x, y, z)"
-    ));
+    )];
     if let Some(interval) = &found.interval {
         let [a, b, c] = interval.position.map(|v| v * 1e3);
         let [d, e, f] = interval.rotation.map(f64::to_degrees);
-        console::line(format_args!("95 % within {a:.1}, {b:.1}, {c:.1} mm and {d:.2}, {e:.2}, {f:.2} degrees"));
+        lines.push(format!("95 % within {a:.1}, {b:.1}, {c:.1} mm and {d:.2}, {e:.2}, {f:.2} degrees"));
     }
     let confirmed = found.confirmed * 100.0;
     let (pictures, kind) = (found.frames.len(), if found.pictures == "depth" { "depth" } else { "colour" });
-    console::line(format_args!(
+    lines.push(format!(
         "{confirmed:.0} % of the outline confirmed in {pictures} {kind} pictures; {} drawings, {:.1} s",
         found.drawings, found.seconds
     ));
     if let Some(start) = &found.start {
-        console::line(format_args!(
+        lines.push(format!(
             "the start was {:.1} mm and {:.2} degrees away, {:.1} pixels in the picture{}",
             start.distance_m * 1e3,
             start.angle_rad.to_degrees(),
@@ -193,7 +192,6 @@ fn tell(found: &Viewpoint) {
             if start.excluded { ": outside of the interval" } else { "" }
         ));
     }
-    for warning in &found.warnings {
-        console::line(format_args!("note: {warning}"));
-    }
+    lines.extend(found.warnings.iter().map(|warning| format!("note: {warning}")));
+    lines.join("\n")
 }

@@ -9,6 +9,7 @@ mod stage;
 use crate::capture::excitation::{self, ClipSummary};
 use crate::capture::shape::Kind;
 use crate::capture::task::{Summary, Task};
+use crate::diagnose::headline::words;
 use crate::diagnose::{self, Diagnosis, Verdict, diagnose};
 use crate::interrupt::Interrupt;
 use crate::processes::Program;
@@ -129,8 +130,8 @@ pub fn demo(options: &Options, interrupt: &Interrupt) -> anyhow::Result<Finding>
     }
     let found = found?;
     console::line("replaying with cell.toml and with what was found");
-    let told = Told { effect: hidden::effect(options.seed), found: &found };
-    let story = compare(options, &files, &files.session.join(first), (live, &told), interrupt)?;
+    let outcome = Outcome { effect: hidden::effect(options.seed), found: &found };
+    let story = compare(options, &files, &files.session.join(first), (live, &outcome), interrupt)?;
     let report = files.out.join("report.html");
     output::write(&report, story.page())?;
     Ok(Finding {
@@ -222,21 +223,21 @@ fn examine(options: &Options, files: &Files, interrupt: &Interrupt) -> anyhow::R
 }
 
 /// What was hidden, and what was found.
-struct Told<'a> {
+struct Outcome<'a> {
     effect: EffectTheta,
     found: &'a Diagnosis,
 }
 
-impl Told<'_> {
+impl Outcome<'_> {
     /// The hidden effect, and the verdict on it, in two sentences.
     fn words(&self) -> [String; 2] {
         let values: Vec<String> = self
             .effect
             .parameters
             .iter()
-            .map(|(name, value)| format!("{name} {:.4}", value.as_float().unwrap_or(0.0)))
+            .map(|(name, value)| format!("{} {:.4}", words(name), value.as_float().unwrap_or(0.0)))
             .collect();
-        let hidden = format!("Hidden was {} ({}).", self.effect.name, values.join(", "));
+        let hidden = format!("Hidden was {} ({}).", words(&self.effect.name), values.join(", "));
         [self.found.verdict.text.clone(), hidden]
     }
 }
@@ -285,7 +286,7 @@ fn compare(
     options: &Options,
     files: &Files,
     clip: &Path,
-    (live, told): (Vec<f64>, &Told<'_>),
+    (live, outcome): (Vec<f64>, &Outcome<'_>),
     interrupt: &Interrupt,
 ) -> anyhow::Result<Story> {
     let session = |found| -> anyhow::Result<Replay> { replay(&files.session, found, None, interrupt) };
@@ -299,11 +300,11 @@ fn compare(
     };
     let by_cell = follow("twin_cell.mcap", None)?;
     let by_found = follow("twin_found.mcap", found)?;
-    let [verdict, hidden] = told.words();
+    let [verdict, hidden] = outcome.words();
     Ok(Story {
         setting: format!(
             "A simulated FR3 moved all joints at once through {} clips of {DURATION} s. Its stiffness and damping had been \
-             drawn within 20 % of cell.toml, and it had an effect that its twin does not model; the twin was told neither. {hidden}",
+             drawn within 20 % of cell.toml, and it had an effect that its twin does not model; the twin knew neither. {hidden}",
             options.clips
         ),
         verdict,

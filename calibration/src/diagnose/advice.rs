@@ -3,7 +3,9 @@
 //! Where two effects are easily taken for each other the table has what separates them; where it has not, the stages they
 //! show in decide. What no capture can do, a weight to be hung or an object to be put somewhere, stands in the sentence first.
 
+use super::headline::words;
 use super::site::Site;
+use crate::report::channel_in_words;
 use twin::effects::{Stage, find};
 
 /// What to record next.
@@ -147,7 +149,7 @@ const PAIRS: &[(&str, &str, &str, &[Capture])] = &[
     ),
 ];
 
-/// What tells effects of a stage apart where nothing more is known of them.
+/// What separates effects of a stage where nothing more is known of them.
 fn general(stage: Stage) -> (&'static str, &'static [Capture]) {
     match stage {
         Stage::Control => ("slow ramps, a chirp and rests in eight poses, torques logged", &[RAMP, CHIRP, HOLD]),
@@ -165,12 +167,12 @@ fn general(stage: Stage) -> (&'static str, &'static [Capture]) {
     }
 }
 
-/// What to record next to tell these effects apart.
+/// What to record next to separate these effects.
 #[must_use]
 pub fn separating(effects: &[&str], site: &Site) -> Advice {
     let both = |a: &str, b: &str| effects.contains(&a) && effects.contains(&b);
     if let Some((a, b, clip, captures)) = PAIRS.iter().find(|(a, b, ..)| both(a, b)) {
-        return site.advice(format!("To tell {a} from {b}: {clip}."), captures);
+        return site.advice(format!("To separate {} from {}: {clip}.", words(a), words(b)), captures);
     }
     if effects.is_empty() {
         return Advice::default();
@@ -181,24 +183,27 @@ pub fn separating(effects: &[&str], site: &Site) -> Advice {
             stages.push(stage);
         }
     }
-    let (words, captures): (Vec<_>, Vec<_>) = stages.into_iter().map(general).unzip();
-    site.advice(format!("To tell {} apart: {}.", effects.join(", "), words.join("; ")), &captures.concat())
+    let (clips, captures): (Vec<_>, Vec<_>) = stages.into_iter().map(general).unzip();
+    let effects: Vec<String> = effects.iter().map(|effect| words(effect)).collect();
+    site.advice(format!("To separate {}: {}.", effects.join(", "), clips.join("; ")), &captures.concat())
 }
 
 /// What to record next to confirm what was found.
 #[must_use]
 pub fn confirming(effects: &[String], site: &Site) -> Advice {
-    let (words, commands) = site.again(2);
-    site.finished(format!("To confirm {}: {words}.", effects.join(" and ")), commands)
+    let (clips, commands) = site.again(2);
+    let effects: Vec<String> = effects.iter().map(|effect| words(effect)).collect();
+    site.finished(format!("To confirm {}: {clips}.", effects.join(" and ")), commands)
 }
 
 /// What to record where something unknown is left.
 #[must_use]
 pub fn unexplained(place: Option<(&str, &str)>, site: &Site) -> Advice {
     let Some((channel, regime)) = place else { return Advice::default() };
-    let (words, commands) = site.again(8);
+    let (clips, commands) = site.again(8);
+    let channel = channel_in_words(channel);
     let sentence = format!(
-        "What is left is largest in {channel} ({regime}): {words}, to see whether it repeats and how it grows."
+        "What is left is largest in {channel} ({regime}): {clips}, to see whether it repeats and how it grows."
     );
     site.finished(sentence, commands)
 }
@@ -262,7 +267,7 @@ mod tests {
             ]
         );
         let advice = confirming(&["command_delay".into(), "friction_patch".into()], &arm);
-        assert!(advice.sentence.contains("delay and friction_patch: repeat two clips"), "{}", advice.sentence);
+        assert!(advice.sentence.contains("delay and friction patch: repeat two clips"), "{}", advice.sentence);
         let expected = ["--repeat 0,3", "--repeat 0 --speed 0.5", "--repeat 0 --speed 2"];
         for (command, end) in advice.commands.iter().zip(expected) {
             assert!(command.ends_with(end), "{command}");

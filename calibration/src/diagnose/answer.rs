@@ -69,6 +69,20 @@ pub struct Verdict {
     pub text: String,
 }
 
+/// What the confidence of a verdict is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Basis {
+    /// Estimated from the clips of the session.
+    Estimate,
+    /// The largest that is ever given: so many verdicts of the kind were right on simulated sessions, however much the clips
+    /// say.
+    Limit,
+    /// How often verdicts of the kind were right on simulated sessions; the clips of the session are not in it.
+    Rate,
+    /// There is nothing to be sure of.
+    Nothing,
+}
+
 /// The five verdicts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "snake_case")]
@@ -96,7 +110,7 @@ pub struct Gap {
     pub after: f64,
     /// What noise and scatter alone leave.
     pub floor: f64,
-    /// `1 - after / before`, at least -1: a gap that more than doubles.
+    /// [`super::gap::Residuals::shrink`]: `1 - after / before`, at least -1: a gap that more than doubles.
     pub shrink: Share,
     /// `(before - after) / (before - floor)`.
     pub explainable_fraction: f64,
@@ -113,7 +127,7 @@ pub struct Gap {
 pub struct Nearest {
     /// Names of the registry.
     pub effects: Vec<String>,
-    /// Share of the squared gap that they close together on the confirm clips.
+    /// [`Gap::shrink`] with them.
     pub shrink: Share,
 }
 
@@ -157,7 +171,7 @@ pub struct Candidate {
     pub probability: f64,
     /// Its parameters, by name; empty where it was not fitted.
     pub parameters: BTreeMap<String, Size>,
-    /// Share of the gap that it closes alone.
+    /// What it adds to [`Gap::shrink`]: alone, or beside the effects that were named before it.
     pub shrink: Share,
     /// Effects that these clips cannot tell from it.
     pub confusable_with: Vec<String>,
@@ -190,6 +204,14 @@ pub struct Size {
     pub ci90: Vec<[f64; 2]>,
     /// SI unit; `1` without.
     pub unit: String,
+}
+
+impl Size {
+    /// Whether the `k`-th number was fitted; else it was held at its default, and its interval has no width.
+    #[must_use]
+    pub fn is_fitted(&self, k: usize) -> bool {
+        self.ci90.get(k).is_none_or(|[low, high]| high > low)
+    }
 }
 
 impl Serialize for Size {

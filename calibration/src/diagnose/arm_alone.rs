@@ -5,10 +5,11 @@
 use super::combine::{FIRST_PASS, HEAT, LOOK, NEAR, Step};
 use super::evidence::{Channel, Evidence, Reach, Row};
 use super::fit::{Bench, Hypothesis};
+use super::headline::words;
 use super::scatter::Scatter;
 use super::split::Split;
 use super::worthy::strays;
-use super::{flat, starts};
+use super::{flat, stages, starts};
 use crate::estimate::{ClipModel, Impossible};
 use shared_mem::progress::Progress;
 
@@ -30,30 +31,38 @@ impl<E: Evidence> ArmAlone<'_, E> {
 impl Step {
     /// Fits trials of effects in the joints, at their `places`: to the arm's own channels first; those that explain these about
     /// as well as the best of them are looked at once with the object as well. What an object does after it was hit a little
-    /// elsewhere is no judge of joints.
+    /// elsewhere is no judge of joints. `others`: trials that the caller fits next, for the bar.
     pub(super) fn fitted_to_the_arm_first<E: Evidence>(
         &self,
         bench: &Bench<'_, E>,
         split: &Split,
         (places, overlooked): (&[usize], bool),
         refined: &impl Fn(&[f64]) -> Option<Vec<f64>>,
-        bar: &Progress,
+        (bar, others): (&Progress, usize),
     ) -> Vec<(usize, Hypothesis)> {
+        if places.is_empty() {
+            bar.stage(stages::FITS, others as u64);
+            return Vec::new();
+        }
         let (evidence, weights) = (ArmAlone(bench.evidence), &self.weights);
         let arm = evidence.bench(bench);
         let at = (&self.from, &weights[..]);
         let fit = |effects: &[usize], full, effort| arm.fit((effects, full), &split.train, weights, None, effort);
+        let name = |place: usize| words(bench.library.candidates[self.trials[place].scored.candidate].effect.name);
+        bar.stage(stages::ARM_FITS, places.len() as u64);
         let alone = |place: &usize| {
             let scored = &self.trials[*place].scored;
-            bar.show(50, bench.library.candidates[scored.candidate].effect.name);
             let effects = [&self.from.effects[..], &[scored.candidate]].concat();
             let starts = starts::kept(&arm, at, scored, overlooked).into_iter();
             let begun = starts.filter_map(|start| fit(&effects, start, HEAT));
             let best = begun.min_by(|a, b| a.deviance().total_cmp(&b.deviance()))?;
             Some((*place, fit(&effects, best.full, FIRST_PASS)?))
         };
-        let told = |place: &usize| if bench.interrupt.asked() { None } else { alone(place) };
-        let all: Vec<(usize, Hypothesis)> = places.iter().filter_map(told).collect();
+        let unless_asked = |(done, place): (usize, &usize)| {
+            bar.show(done as u64, &format!("{}: {}", stages::ARM_FITS, name(*place)));
+            if bench.interrupt.asked() { None } else { alone(place) }
+        };
+        let all: Vec<(usize, Hypothesis)> = places.iter().enumerate().filter_map(unless_asked).collect();
         let Some(from) = fit(&self.from.effects, self.from.full.clone(), LOOK) else { return Vec::new() };
         let best = all.iter().fold(&from, |best, (_, fit)| if fit.deviance() < best.deviance() { fit } else { best });
         let near = best.deviance() + NEAR.max(NEAR_ON_ARM * (from.deviance() - best.deviance()));
@@ -71,7 +80,13 @@ impl Step {
             let looks = starts.filter_map(look);
             Some((place, looks.min_by(|a, b| a.deviance().total_cmp(&b.deviance()))?))
         };
-        all.into_iter().filter(|(_, alone)| alone.deviance() < near).filter_map(with_object).collect()
+        let near: Vec<(usize, Hypothesis)> = all.into_iter().filter(|(_, alone)| alone.deviance() < near).collect();
+        bar.stage(stages::FITS, (near.len() + others) as u64);
+        let shown = |(done, one): (usize, (usize, Hypothesis))| {
+            bar.show(done as u64, &format!("{}: {}", stages::FITS, name(one.0)));
+            with_object(one)
+        };
+        near.into_iter().enumerate().filter_map(shown).collect()
     }
 }
 
@@ -180,7 +195,13 @@ mod tests {
                 let group = |of_object, mean_square| Typical { mean_square, floor: 1.5, of_object };
                 step.left = vec![group(false, arm), group(true, 100.0)];
                 step.whole = step.left.clone();
-                object(step.fitted_to_the_arm_first(bench, &split, (&[0], false), &anew, &Progress::new("nothing", 1)))
+                object(step.fitted_to_the_arm_first(
+                    bench,
+                    &split,
+                    (&[0], false),
+                    &anew,
+                    (&Progress::new("nothing", 1), 0),
+                ))
             };
             assert_eq!(fitted(1.5), library.with_object_of(hidden.clone(), &astray), "the arm is where it was");
             assert_eq!(fitted(50.0), hidden);
@@ -197,7 +218,7 @@ mod tests {
             let asked = ["base_tilt", "joint_encoder_offset"].map(|name| library.find(name).expect("a candidate"));
             let (step, split) = step(bench, hidden_baseline(library, &world), even, &asked);
             let bar = Progress::new("nothing", 1);
-            let found = step.fitted_to_the_arm_first(bench, &split, (&[0, 1], false), &|_: &[f64]| None, &bar);
+            let found = step.fitted_to_the_arm_first(bench, &split, (&[0, 1], false), &|_: &[f64]| None, (&bar, 0));
             let [(1, fit)] = &found[..] else { panic!("{} fits", found.len()) };
             let sizes = &library.candidates[asked[1]].sizes;
             let [turned, lifted] = [0, 1].map(|joint| (fit.full[sizes[joint]], hidden[sizes[joint]].expect("hidden")));

@@ -8,9 +8,11 @@ use super::arm_alone::ArmAlone;
 use super::evidence::Evidence;
 use super::fit::{Bench, Effort, Hypothesis};
 use super::split::Split;
+use super::stages;
 use super::sweep::Precision;
 use crate::identify::object;
 use shared_mem::cell::Cell;
+use shared_mem::progress::Progress;
 use shared_mem::recording::Clip;
 use shared_mem::theta::ObjectTheta;
 
@@ -21,6 +23,12 @@ const LAST: Effort = Effort::of(8, Precision::Exact);
 /// reason that is not in the twin yet would bend them until the hit lands where it helps.
 const TOGETHER: Effort = Effort::of(8, Precision::Joints);
 
+/// Steps in which [`identify`] shows how far it is.
+#[must_use]
+pub fn steps(admitted: &Admitted) -> u64 {
+    if admitted.with_object { 4 } else { 2 }
+}
+
 /// Identifies; `None` when the twin has no answer at the nominal parameters.
 #[must_use]
 pub fn identify<E: Evidence>(
@@ -28,17 +36,22 @@ pub fn identify<E: Evidence>(
     split: &Split,
     cell: &Cell,
     admitted: &Admitted,
+    bar: &Progress,
 ) -> Option<Hypothesis> {
     let channels = bench.evidence.channels();
     let even = vec![1.0; channels.len()];
     let arm = ArmAlone(bench.evidence);
     let alone = arm.bench(bench);
+    bar.show(0, stages::BASELINE);
     let arm = alone.fit((&[], bench.library.start()), &split.train, &even, None, WAY)?;
+    bar.show(1, stages::BASELINE);
     let arm = alone.fit((&[], arm.full.clone()), &split.train, &even, Some(&arm), LAST)?;
     if !admitted.with_object {
         return Some(arm);
     }
+    bar.show(2, stages::BASELINE);
     let full = refined(bench, split, cell, admitted, &arm.full).unwrap_or_else(|| arm.full.clone());
+    bar.show(3, stages::BASELINE);
     bench.fit((&[], full), &split.train, &even, None, TOGETHER)
 }
 

@@ -45,12 +45,12 @@ const TIPPING: PoseNoise = PoseNoise { position: 3e-3, rotation: 0.05 };
 /// Sigmas are what strokes of another engine stray from the twin that is given their true parameters: 1 mm and 0.012 rad
 /// at the end of the path in a clip like most.
 const STRAYING: [(&str, Coordinate, Shape, f64); 6] = [
-    ("stray x", Coordinate::X, Shape::End, 1e-3),
-    ("stray y", Coordinate::Y, Shape::End, 1e-3),
-    ("stray yaw", Coordinate::Yaw, Shape::End, 0.012),
-    ("stray x on the way", Coordinate::X, Shape::Way, 0.5e-3),
-    ("stray y on the way", Coordinate::Y, Shape::Way, 0.5e-3),
-    ("stray yaw on the way", Coordinate::Yaw, Shape::Way, 0.006),
+    ("x at the end", Coordinate::X, Shape::End, 1e-3),
+    ("y at the end", Coordinate::Y, Shape::End, 1e-3),
+    ("yaw at the end", Coordinate::Yaw, Shape::End, 0.012),
+    ("x on the way", Coordinate::X, Shape::Way, 0.5e-3),
+    ("y on the way", Coordinate::Y, Shape::Way, 0.5e-3),
+    ("yaw on the way", Coordinate::Yaw, Shape::Way, 0.006),
 ];
 /// Places of friction and clock among the own numbers; those of [`STRAYING`] follow.
 const FRICTION: usize = 0;

@@ -1,4 +1,4 @@
-//! Which effects act together: effects are added while that foretells clips better, and dropped or swapped when they are
+//! Which effects act together: effects are added while clips are predicted better with them, and dropped or swapped when they are
 //! not needed any more.
 
 use super::closing::closes;
@@ -7,6 +7,7 @@ use super::fit::{Bench, Effort, Hypothesis};
 use super::flat;
 use super::floor;
 use super::gap::{Residuals, Typical};
+use super::headline::words;
 use super::leftovers::{Left, NUMERICS, ROUGHNESS};
 use super::library::Library;
 use super::score::{Advantage, Foretold, foretell};
@@ -14,6 +15,7 @@ use super::settle::{settled, without_superfluous};
 use super::shortlist::Scored;
 use super::signatures;
 use super::split::Split;
+use super::stages;
 use super::starts;
 use super::sweep::Precision;
 use super::worthy::{overlooked, seen_when_clips_stray_little, strays, worthy};
@@ -33,10 +35,10 @@ const NEAR_SHARE: f64 = 0.4;
 /// A new effect must be worth at least this [nats], more than twice its error, and more than its numbers cost.
 pub(super) const LEAST: f64 = 4.0;
 /// ... of the arm more than this for each of its residuals: there are so many that the least numerics add up.
-const WORTHWHILE: f64 = 0.0025;
+pub(super) const WORTHWHILE: f64 = 0.0025;
 /// ... and close at least this share of the gap: what helps only beside numbers that clips have of their own is no cause.
 pub const CLOSES: f64 = 0.1;
-/// ... unless it closes so much of the gap and foretells so many of the clips better that one which it foretells worse does
+/// ... unless it closes so much of the gap and predicts so many of the clips better that one which it predicts worse does
 /// not matter: 11 of 12 clips do not agree by chance (p = 0.003).
 pub(super) const PLAIN: f64 = 0.3;
 pub(super) const NEARLY_ALL: f64 = 0.85;
@@ -192,7 +194,12 @@ pub fn search<E: Evidence>(
         steps.push(step);
         match best {
             Some(best) if now.effects.len() < MOST && !bench.interrupt.asked() => {
+                bar.stage(stages::REFINEMENT, 2);
+                if steps.len() > 1 {
+                    bar.insert(&stages::FURTHER);
+                }
                 now = settled(bench, split, (&best, &weights), refined)?;
+                bar.show(1, stages::REFINEMENT);
                 let step = steps.last_mut()?;
                 step.try_again(bench, split, &now, refined);
                 let other = step.best(bench).map(|(_, fit, _)| fit.clone()).filter(|fit| fit.effects != now.effects);
@@ -283,6 +290,7 @@ fn step<E: Evidence>(
     step.fit(bench, split, (&promising, false), refined, bar);
     if step.best(bench).is_none() {
         let rest = overlooked(bench, &step);
+        bar.insert(&stages::MORE_FITS);
         step.fit(bench, split, (&rest, true), refined, bar);
     }
     Some(step)
@@ -324,13 +332,15 @@ impl Step {
                 && bench.library.candidates[self.trials[*place].scored.candidate].is_of_arm()
         };
         let (of_arm, others): (Vec<usize>, Vec<usize>) = asked.into_iter().partition(on_arm);
-        let mut fits = self.fitted_to_the_arm_first(bench, split, (&of_arm, overlooked), refined, bar);
+        let mut fits = self.fitted_to_the_arm_first(bench, split, (&of_arm, overlooked), refined, (bar, others.len()));
+        let before = fits.len();
         for (done, place) in others.into_iter().enumerate() {
             if bench.interrupt.asked() {
                 return;
             }
             let scored = &self.trials[place].scored;
-            bar.show(50 + (done as u64 * 5).min(45), bench.library.candidates[scored.candidate].effect.name);
+            let name = words(bench.library.candidates[scored.candidate].effect.name);
+            bar.show((before + done) as u64, &format!("{}: {name}", stages::FITS));
             let starts = starts::kept(bench, (&self.from, &self.weights), scored, overlooked);
             let effort = bench.trying(scored.candidate, HEAT);
             let heat = |start| bench.extend(&self.from, (scored.candidate, start), &split.train, &self.weights, effort);
@@ -349,7 +359,9 @@ impl Step {
         }
         let best = fits.iter().map(|(_, fit)| fit.deviance()).fold(self.from.deviance(), f64::min);
         let near = best + NEAR.max(NEAR_SHARE * (self.from.deviance() - best));
-        for (place, fit) in fits {
+        bar.stage(stages::LAST_FITS, fits.len() as u64);
+        for (done, (place, fit)) in fits.into_iter().enumerate() {
+            bar.show(done as u64, stages::LAST_FITS);
             let effort = bench.trying(self.trials[place].scored.candidate, FIRST_PASS);
             let more = || bench.fit((&fit.effects, fit.full.clone()), &split.train, &self.weights, Some(&fit), effort);
             let nearer = if fit.deviance() < near { more() } else { None };

@@ -15,12 +15,14 @@ use std::time::Duration;
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 The twin is identified first, then every known effect is tried, alone and with others, on clips that were not used to fit
-it. The verdict is none, named, class (several that these clips cannot tell apart), unexplained or not_testable.
+it. The verdict is none, named, class (several that these clips cannot separate), unexplained or not_testable.
 
 What to record next is printed as commands that can be typed, and of an effect that is named what to do about it in the
 cell and in a model.
 
-The parameters found go to --theta: `twin replay SESSION --parameters theta.toml` shows the same gap, shrunk. With --out alone
+How far the gap shrinks is one figure, 1 - after / before of the mean squared residual on held-out clips, in units of the
+noise (docs/measuring.md). The parameters found go to --theta: `twin replay SESSION --parameters theta.toml` gives the errors of joints
+and object with them. With --out alone
 they go to theta.toml beside it, unless there is one already. What no clip tells is not written.
 
 Ctrl-C keeps what was found so far, beside --out or in the session's folder; the same command goes on from there. So it does
@@ -34,6 +36,9 @@ pub struct Arguments {
     /// Folder with cell.toml and at least four different clips.
     #[arg(value_name = "SESSION")]
     session: PathBuf,
+    /// What the laboratory knows about its cell [default: cell.toml beside the clips].
+    #[arg(long, value_name = "CELL.TOML")]
+    cell: Option<PathBuf>,
     /// Parameters that are known already; effects among them act and are no candidates.
     #[arg(long, value_name = "THETA.TOML")]
     parameters: Option<PathBuf>,
@@ -53,14 +58,14 @@ pub struct Arguments {
     #[arg(long, value_name = "SECONDS", value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
     budget: Option<u64>,
     /// Draws which clips are for what, and the intervals.
-    #[arg(long, default_value_t = 0)]
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = crate::seed::parse, allow_negative_numbers = true)]
     seed: u64,
     /// Prints one JSON object on stdout at the end.
     #[arg(long)]
     pub json: bool,
 }
 
-/// Runs the verb; what was found is also on stderr.
+/// Runs the verb; the caller prints what was found.
 ///
 /// # Errors
 /// What cannot be read, diagnosed or written, in one line with the remedy.
@@ -69,7 +74,7 @@ pub fn run(arguments: &Arguments, interrupt: &Interrupt) -> anyhow::Result<Diagn
     let page = Destination::of(report.as_deref(), *force)?;
     let answer = Destination::of(out.as_deref(), *force)?;
     let theta_file = theta_file(arguments)?;
-    let session = Session::open(&arguments.session)?;
+    let session = Session::open_with(&arguments.session, arguments.cell.as_deref())?;
     let theta = arguments.parameters.as_deref().map(Theta::read).transpose()?;
     let budget = arguments.budget.map(Duration::from_secs);
     let options = Options { theta, seed: arguments.seed, budget, out: out.clone() };
@@ -88,7 +93,6 @@ pub fn run(arguments: &Arguments, interrupt: &Interrupt) -> anyhow::Result<Diagn
     if let Some(page) = page {
         page.write(report::diagnosis::page(&found))?;
     }
-    console::block(report::terminal::diagnosis(&found));
     if !found.budget_spent {
         kept.done();
     } else if let Some(state) = kept.save()? {

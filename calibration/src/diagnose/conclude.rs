@@ -7,13 +7,16 @@ use super::combine::{Found, Step};
 use super::evidence::Evidence;
 use super::fit::{Bench, Hypothesis};
 use super::gap::Residuals;
+use super::headline::{self, Facts};
 use super::leftovers::{self, Left};
 use super::score::foretell;
 use super::site::Site;
 use super::split::Split;
 use super::verdict::{self, Finding};
-use super::{DiagnoseError, Kind, Options, advice, combine, confidence, drift, localise, ranked, remedies, settle};
-use crate::report::Trace;
+use super::{
+    DiagnoseError, Kind, Options, advice, combine, confidence, drift, localise, parameters, ranked, remedies, settle,
+};
+use crate::report::{Trace, channel_in_words, effect_in_words, in_unit};
 use shared_mem::recording::Session;
 use shared_mem::theta::Theta;
 use twin::replay::{ReplayError, Replayer};
@@ -83,17 +86,27 @@ pub fn conclude<E: Evidence>(
         .ok_or(DiagnoseError::NoBaseline)?;
     let confirmed = confirms(&before, &after);
     let unforeseen = found.unforeseen(bench);
-    let finding = finding(bench, (split, found), &unforeseen, (left, confirmed), &rest);
-    let verdict = finding.verdict();
-    let believed = matches!(verdict.kind, Kind::Named | Kind::Class);
+    let finding = finding(bench, (split, found), &unforeseen, (left, confirmed));
+    let decision = finding.decide();
+    let believed = matches!(decision.kind, Kind::Named | Kind::Class);
     let kept = if believed { &found.last } else { &first.from };
     let shown = if believed { &after } else { &before };
-    let some = verdict.kind == Kind::Unexplained && confirmed && !finding.effects.is_empty();
+    let some = decision.kind == Kind::Unexplained && confirmed && !finding.effects.is_empty();
     let nearest = some.then(|| Nearest {
         effects: finding.effects.iter().map(|name| (*name).to_owned()).collect(),
         shrink: after.shrink(&before, options.seed),
     });
     let [joints, add, add_s] = replayed(bench, [&first.from, kept], session, (admitted, split))?;
+    let of_object = places.first().is_some_and(|place| !place.channel.starts_with("joint"));
+    let facts = Facts {
+        size: size_in_words(joints.before, add.before.filter(|_| of_object)),
+        place: places.first().map_or_else(String::new, place_in_words),
+        rest: rest.first().map_or_else(String::new, place_in_words),
+        effects: found.last.effects.iter().map(|effect| with_size(bench, &found.last, *effect)).collect(),
+        shrink: after.shrink(&before, options.seed).value,
+    };
+    let text = headline::sentence(&decision, &finding, &facts);
+    let verdict = decision.said(text);
     let gap = Gap {
         unit: "sigma",
         before: before.mean_square(),
@@ -118,7 +131,7 @@ pub fn conclude<E: Evidence>(
             bench,
             (found, unforeseen[0]),
             split,
-            (&before, &finding),
+            (&before, &after, &finding),
             verdict.kind,
             options.seed,
         ),
@@ -138,6 +151,26 @@ pub fn conclude<E: Evidence>(
         traces: traces(bench.evidence, (&before, if nearest.is_some() { &after } else { shown }), &admitted.files),
         nearest,
     })
+}
+
+/// How large the gap is, in units of the hand: of the object where there is such a figure, else of the joints.
+fn size_in_words(joints: Option<f64>, add: Option<f64>) -> String {
+    match (joints, add) {
+        (_, Some(add)) => format!("{} ADD", in_unit("m", add)),
+        (Some(rms), None) => format!("{} RMS over all joints", in_unit("rad", rms)),
+        (None, None) => "of unknown size".into(),
+    }
+}
+
+/// `joint 2 (reversal)`.
+fn place_in_words(place: &Place) -> String {
+    format!("{} ({})", channel_in_words(&place.channel), place.regime)
+}
+
+/// `command delay (delay 11.9 ms)`.
+fn with_size<E: Evidence>(bench: &Bench<'_, E>, hypothesis: &Hypothesis, effect: usize) -> String {
+    let name = bench.library.candidates[effect].effect.name;
+    effect_in_words(name, &parameters::of_effect(bench, hypothesis, effect))
 }
 
 /// What to record next; `open`: only the arm's gap is explained, `largest`: where what is left is largest.
@@ -165,7 +198,6 @@ fn finding<'a, E: Evidence>(
     (split, found): (&Split, &Found),
     unforeseen: &[f64],
     (left, confirmed): (Vec<Left>, bool),
-    rest: &[Place],
 ) -> Finding<'a> {
     let name = |effect: &usize| bench.library.candidates[*effect].effect.name;
     let mut rivals = Vec::new();
@@ -189,7 +221,6 @@ fn finding<'a, E: Evidence>(
         confirmed,
         implausible: !leftovers::implausible(bench, &found.last).is_empty(),
         drift: drift::of_friction(&bench.scatter, &found.last),
-        place: rest.first().map_or_else(String::new, |place| format!("{} ({})", place.channel, place.regime)),
     }
 }
 
@@ -263,7 +294,7 @@ fn traces(evidence: &impl Evidence, (before, after): (&Residuals, &Residuals), f
         };
         Trace {
             clip: files[clip].clone(),
-            channel: format!("{} of {}", info.quantity, info.place),
+            channel: format!("{} of {}", info.quantity, channel_in_words(&info.place)),
             unit: "σ".into(),
             sigma: 1.0,
             before: points(&before.clips[place].1),

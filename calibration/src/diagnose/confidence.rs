@@ -12,6 +12,8 @@ const ALIKE: f64 = 0.5;
 /// What is kept for causes outside the library even where everything fits; from the simulated sessions on which this was
 /// measured: of named findings this share was wrong.
 const NONE_OF_THESE: f64 = 0.04;
+/// The largest probability of a candidate: its limit, whatever the clips say.
+pub const MOST: f64 = 1.0 - NONE_OF_THESE;
 /// Nats count less than they say: twins are never exact. The temperature that made shares agree with frequencies.
 const TEMPERATURE: f64 = 4.0;
 
@@ -26,7 +28,7 @@ pub fn probabilities(trials: &[Trial], none: bool) -> Vec<(usize, f64)> {
     let weight = |worth: f64| ((worth - best) / TEMPERATURE).exp();
     let nothing = if none { 1.0 / NONE_OF_THESE } else { weight(0.0) };
     let total: f64 = fitted.iter().map(|(_, worth)| weight(*worth)).sum::<f64>() + nothing;
-    fitted.iter().map(|(candidate, worth)| (*candidate, (1.0 - NONE_OF_THESE) * weight(*worth) / total)).collect()
+    fitted.iter().map(|(candidate, worth)| (*candidate, MOST * weight(*worth) / total)).collect()
 }
 
 /// Candidates of a step that explain it as well as the chosen one: whose gains, clip by clip, are not less beyond chance, and
@@ -91,7 +93,7 @@ mod tests {
     }
 
     #[test]
-    fn a_candidate_that_closes_nothing_takes_no_probability_however_well_it_foretells() {
+    fn a_candidate_that_closes_nothing_takes_no_probability_however_well_it_predicts() {
         let sure = |trials: &[Trial]| {
             let all = probabilities(trials, false);
             all.iter().find(|(candidate, _)| *candidate == 0).map_or(0.0, |(_, p)| *p)

@@ -7,7 +7,7 @@ use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 use rayon::prelude::*;
 
-/// Residuals of clips as the twin alone foretells them, not weighted: what a clip has of its own is not fitted, it is part
+/// Residuals of clips as the twin alone predicts them, not weighted: what a clip has of its own is not fitted, it is part
 /// of the floor.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Residuals {
@@ -79,16 +79,21 @@ impl Residuals {
         mean(&self.sums, &(0..self.clips.len()).collect::<Vec<_>>())
     }
 
-    /// Share by which the mean square shrinks from `before` to this, with an interval from drawing clips anew; at least
-    /// [`DOUBLED`].
+    /// The shrink `1 - after / before` of the mean square from `before` to this, with an interval from drawing clips anew.
     #[must_use]
     pub fn shrink(&self, before: &Self, seed: u64) -> Share {
-        let (before, after) = (&before.sums, &self.sums);
+        self.shrink_added(before, before, seed)
+    }
+
+    /// What a step from `from` to this adds to the shrink: `(from - after) / before`. Steps that follow each other add up to
+    /// the shrink of the whole. At least [`DOUBLED`].
+    #[must_use]
+    pub fn shrink_added(&self, from: &Self, before: &Self, seed: u64) -> Share {
         let of = |drawn: &[usize]| {
-            let ratio = mean(after, drawn) / mean(before, drawn).max(f64::MIN_POSITIVE);
-            (1.0 - ratio).max(DOUBLED)
+            let [from, after, before] = [from, self, before].map(|residuals| mean(&residuals.sums, drawn));
+            ((from - after) / before.max(f64::MIN_POSITIVE)).max(DOUBLED)
         };
-        let all: Vec<usize> = (0..after.len()).collect();
+        let all: Vec<usize> = (0..self.sums.len()).collect();
         let mut rng = Pcg64::seed_from_u64(seed);
         let mut drawn: Vec<f64> =
             (0..DRAWS).map(|_| of(&all.iter().map(|_| rng.random_range(0..all.len())).collect::<Vec<_>>())).collect();
@@ -169,5 +174,12 @@ mod tests {
         assert!((shrink.value - (1.0 - (1.0 + 1.0 + 1.44 + 0.81) / (4.0 + 4.41 + 4.84 + 3.61))).abs() < 1e-12);
         assert!(shrink.ci90[0] < shrink.value && shrink.value < shrink.ci90[1], "{shrink:?}");
         assert!(shrink.ci90[1] - shrink.ci90[0] < 0.1, "{shrink:?}");
+    }
+
+    #[test]
+    fn what_steps_add_to_the_shrink_sums_to_the_shrink_of_the_whole() {
+        let [before, between, after] = [[3.0, 4.0], [2.0, 3.0], [1.0, 1.5]].map(|sizes| residuals(&sizes));
+        let steps = between.shrink_added(&before, &before, 1).value + after.shrink_added(&between, &before, 1).value;
+        assert!((steps - after.shrink(&before, 1).value).abs() < 1e-12, "{steps}");
     }
 }

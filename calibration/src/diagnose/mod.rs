@@ -19,17 +19,18 @@
 //! | [`shortlist`] | how much of the gap each signature explains |
 //! | [`worthy`], [`arm_alone`], [`starts`], [`ripple`] | which of them are fitted, to the arm first, and where a fit begins |
 //! | [`cost`], [`fit`], [`freed`] | hypotheses fitted, and clips whose own numbers got stuck |
-//! | [`score`] | how well they foretell clips |
+//! | [`score`] | how well they predict clips: leave-one-clip-out log-likelihood |
 //! | [`straying`] | how far clips stray under one of them |
 //! | [`closing`] | how much of the gap they close |
 //! | [`combine`], [`again`], [`settle`] | which effects act together |
+//! | `stages` | how long each part of the search takes |
 //! | [`flat`] | which of their numbers nothing depends on |
 //! | [`leftovers`], [`drift`] | what they leave |
 //! | [`gap`], [`localise`] | how large the gap is, and where |
-//! | [`parameters`], [`confidence`], [`verdict`] | what is said about it |
+//! | [`parameters`], [`confidence`], [`verdict`], [`headline`] | what is said about it |
 //! | [`advice`], [`site`] | what to record next, and the commands for it |
 //! | [`remedies`] | what to do about what was named |
-//! | [`ranked`] | what is said of every candidate |
+//! | [`ranked`], `reason` | what is said of every candidate, and why |
 //! | [`conclude`], [`answer`] | the answer |
 //! | [`command`] | the verb |
 
@@ -55,6 +56,7 @@ pub mod floor;
 pub mod freed;
 pub mod gap;
 pub mod ground;
+pub mod headline;
 pub mod leftovers;
 pub mod length;
 pub mod library;
@@ -63,6 +65,7 @@ pub mod noise;
 pub mod parameters;
 pub mod quadratic;
 pub mod ranked;
+mod reason;
 mod recent;
 pub mod remedies;
 pub mod ripple;
@@ -73,6 +76,7 @@ pub mod shortlist;
 pub mod signatures;
 pub mod site;
 pub mod split;
+mod stages;
 pub mod starts;
 pub mod straying;
 pub mod sweep;
@@ -83,7 +87,7 @@ pub mod worthy;
 
 pub use remedies::Remedy;
 
-pub use answer::{Candidate, Change, Clips, Diagnosis, Gap, Kind, Nearest, Place, Share, Size, Status, Verdict};
+pub use answer::{Basis, Candidate, Change, Clips, Diagnosis, Gap, Kind, Nearest, Place, Share, Size, Status, Verdict};
 
 use crate::forward::object::ObjectClips;
 use crate::forward::setting::{self, BaseError};
@@ -251,16 +255,17 @@ fn examine<E: Evidence>(
 ) -> Result<Diagnosis, DiagnoseError> {
     let bench = Bench { evidence, library, scatter: evidence.scatter(), interrupt, trail };
     let split = Split::new(&admitted.groups, options.seed);
-    let bar = Progress::new("diagnose", 100);
-    bar.show(0, "baseline");
-    let baseline = baseline::identify(&bench, &split, &session.cell, admitted).ok_or(DiagnoseError::NoBaseline)?;
+    let plan: &[_] = if admitted.with_object { &stages::OBJECT } else { &stages::ARM };
+    let bar = Progress::planned("diagnose", plan, baseline::steps(admitted));
+    let baseline =
+        baseline::identify(&bench, &split, &session.cell, admitted, &bar).ok_or(DiagnoseError::NoBaseline)?;
     let refined = |full: &[f64]| {
         let step = bench.step("refined").with_numbers(full);
         trail.0.once(&step, || baseline::refined(&bench, &split, &session.cell, admitted, full))
     };
     let found = combine::search(&bench, &split, baseline, &refined, &bar).ok_or(DiagnoseError::NoBaseline)?;
     let cut_short = interrupt.spent();
-    bar.show(97, "confirm");
+    bar.stage(stages::CONCLUSION, 1);
     let mut concluded = conclude::conclude(&bench, &split, &found, session, admitted, options)?;
     if interrupt.spent() {
         concluded.budget_spent = true;

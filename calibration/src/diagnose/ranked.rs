@@ -1,14 +1,16 @@
-//! What is said of every candidate: how likely it is, how much it closes, and why it is or is not the cause.
+//! What is said of every candidate: how likely it is, how much it shrinks the gap, and what became of it. [`super::reason`]
+//! says why.
 
 use super::answer::{Candidate, Share, Status};
 use super::combine::{Found, Step, Trial};
 use super::evidence::Evidence;
-use super::fit::Bench;
+use super::fit::{Bench, Hypothesis};
 use super::gap::{DOUBLED, Residuals};
+use super::reason::{Judged, reason};
 use super::shortlist::{Scored, TESTABLE};
 use super::split::Split;
 use super::verdict::Finding;
-use super::{Kind, confidence, parameters};
+use super::{Kind, confidence, parameters, worthy};
 
 /// What nobody fitted closes nothing.
 const NOT_FITTED: Share = Share { value: 0.0, ci90: [0.0; 2] };
@@ -20,33 +22,39 @@ pub(super) fn candidates<E: Evidence>(
     bench: &Bench<'_, E>,
     (found, unforeseen): (&Found, f64),
     split: &Split,
-    (before, finding): (&Residuals, &Finding<'_>),
+    (before, after, finding): (&Residuals, &Residuals, &Finding<'_>),
     kind: Kind,
     seed: u64,
 ) -> Vec<Candidate> {
     let first = &found.steps[0];
     let believed = matches!(kind, Kind::Named | Kind::Class);
     let likely = confidence::probabilities(&first.trials, found.last.effects.is_empty());
+    let on_confirm = |fit: &Hypothesis| Residuals::at(bench, fit, &split.confirm);
+    // What every step left on the confirm clips: the baseline is known, and others are what their candidates are measured from.
+    let left: Vec<Option<Residuals>> = (found.steps.iter())
+        .map(|step| if step.from.effects.is_empty() { Some(before.clone()) } else { on_confirm(&step.from) })
+        .collect();
     let one = |trial: &Trial| {
         let effect = trial.scored.candidate;
         let name = bench.library.candidates[effect].effect.name;
         let kept = believed && found.last.effects.contains(&effect);
-        let step = judged_in(found, effect, believed);
+        let place = judged_in(found, effect, believed);
+        let step = &found.steps[place];
         let trial = step.trials.iter().find(|trial| trial.scored.candidate == effect).unwrap_or(trial);
-        let on_confirm = |fit| Residuals::at(bench, fit, &split.confirm);
-        let beneath = match &step.from.effects[..] {
-            [] => None,
-            _ => on_confirm(&step.from),
+        let with = match &trial.fitted {
+            _ if kept => after_keeping(found, &left, after, place),
+            Some((fit, _)) => on_confirm(fit),
+            None => None,
         };
-        let from = beneath.as_ref().unwrap_or(before);
-        let shrink = match &trial.fitted {
-            None => NOT_FITTED,
-            Some((fit, _)) => on_confirm(fit).map_or(FLOWN, |fitted| fitted.shrink(from, seed)),
-        };
+        let closed = with.as_ref().zip(left[place].as_ref()).map(|(with, from)| with.shrink_added(from, before, seed));
+        let shrink = closed.unwrap_or(if trial.fitted.is_some() { FLOWN } else { NOT_FITTED });
         let beside: Vec<&str> = step.from.effects.iter().map(|k| bench.library.candidates[*k].effect.name).collect();
         let fit = if kept { Some(&found.last) } else { trial.fitted.as_ref().map(|(fit, _)| fit) };
         let probability = likely.iter().find(|(candidate, _)| *candidate == effect).map_or(0.0, |(_, p)| *p);
-        let status = status(&trial.scored, kept, finding.rivals.contains(&name), kind);
+        let hidden = is_hidden_by_the_arm(bench, step, trial);
+        let status = status(&trial.scored, kept, finding.rivals.contains(&name), (kind, hidden));
+        let times_noise = with.as_ref().map(|with| (with.mean_square() / with.floor()).sqrt());
+        let judged = Judged { trial, place, beside: &beside, status, hidden, times_noise, kind, finding };
         Candidate {
             effect: name.into(),
             probability: if kept { probability.max(finding.confidence) } else { probability },
@@ -54,7 +62,7 @@ pub(super) fn candidates<E: Evidence>(
             shrink,
             confusable_with: confusable(first, effect, unforeseen, bench),
             status,
-            why: format!("{}{}", why(trial, &beside, status), carried_over(&shrink)),
+            why: format!("{}{}", reason(bench, found, &judged), carried_over(&shrink)),
         }
     };
     let mut all: Vec<Candidate> = first.trials.iter().map(one).collect();
@@ -65,28 +73,47 @@ pub(super) fn candidates<E: Evidence>(
     all
 }
 
-/// The step that tells most about an effect. One that was kept is judged by what those before it left. Another one by its fit
-/// to the whole gap; where it was given none, as what an object shows while the arm strays, beside what was believed in the
-/// end.
-fn judged_in(found: &Found, effect: usize, believed: bool) -> &Step {
-    let of =
-        |step: &Step| step.trials.iter().find(|trial| trial.scored.candidate == effect).map(|t| t.fitted.is_some());
-    let all_kept = |step: &&Step| step.from.effects.iter().all(|other| found.last.effects.contains(other));
-    let beside = || found.steps.iter().rev().filter(|step| believed && all_kept(step));
-    let added = found.kept().find(|(_, added)| believed && *added == effect).map(|(place, _)| &found.steps[place]);
-    let first = &found.steps[0];
-    added
-        .or_else(|| (of(first) == Some(true)).then_some(first))
-        .or_else(|| beside().find(|step| of(step) == Some(true)))
-        .or_else(|| beside().find(|step| of(step).is_some()))
-        .unwrap_or(first)
+/// What the hypothesis left once the effect that was added in the step at `place` was in it: what the next step began with,
+/// and at the last effect that was kept what the search ended with.
+fn after_keeping(found: &Found, left: &[Option<Residuals>], after: &Residuals, place: usize) -> Option<Residuals> {
+    match found.kept().map(|(place, _)| place).max() {
+        Some(last) if place < last => left.get(place + 1).cloned().flatten(),
+        _ => Some(after.clone()),
+    }
 }
 
-fn status(scored: &Scored, kept: bool, rival: bool, kind: Kind) -> Status {
+/// Whether an effect on the object was not fitted because the arm's gap was open: where the arm is elsewhere, what it hits
+/// says nothing of the object.
+fn is_hidden_by_the_arm<E: Evidence>(bench: &Bench<'_, E>, step: &Step, trial: &Trial) -> bool {
+    let effect = trial.scored.candidate;
+    let felt = bench.library.candidates[effect].is_of_arm() || bench.library.arm_may_feel(effect);
+    trial.fitted.is_none() && !felt && worthy::strays(&step.whole, &step.left)
+}
+
+/// The step that says most about an effect. One that was kept is judged by what those before it left. Another one by its fit
+/// to the whole gap; where it was given none, as what an object shows while the arm's gap is open, beside what was believed
+/// in the end.
+fn judged_in(found: &Found, effect: usize, believed: bool) -> usize {
+    let of = |place: &usize| {
+        let trials = &found.steps[*place].trials;
+        trials.iter().find(|trial| trial.scored.candidate == effect).map(|trial| trial.fitted.is_some())
+    };
+    let all_kept =
+        |place: &usize| found.steps[*place].from.effects.iter().all(|other| found.last.effects.contains(other));
+    let beside = || (0..found.steps.len()).rev().filter(|place| believed && all_kept(place));
+    let added = found.kept().find(|(_, added)| believed && *added == effect).map(|(place, _)| place);
+    added
+        .or_else(|| (of(&0) == Some(true)).then_some(0))
+        .or_else(|| beside().find(|place| of(place) == Some(true)))
+        .or_else(|| beside().find(|place| of(place).is_some()))
+        .unwrap_or(0)
+}
+
+fn status(scored: &Scored, kept: bool, rival: bool, (kind, hidden): (Kind, bool)) -> Status {
     match kind {
         Kind::Named if kept => Status::Named,
         Kind::Class if kept || rival => Status::Possible,
-        _ if scored.signal < TESTABLE => Status::NotTestable,
+        _ if hidden || scored.signal < TESTABLE => Status::NotTestable,
         _ => Status::RuledOut,
     }
 }
@@ -102,33 +129,6 @@ fn carried_over(shrink: &Share) -> &'static str {
         return "";
     }
     "; its numbers fit the clips they were found on alone: on those kept for confirming the gap more than doubles"
-}
-
-fn why(trial: &Trial, beside: &[&str], status: Status) -> String {
-    let scored = &trial.scored;
-    match (&trial.fitted, status) {
-        (_, Status::NotTestable) => format!(
-            "even at its largest it would show by {:.1} sigma beyond what the other parameters can imitate",
-            scored.signal
-        ),
-        (Some((_, advantage)), _) => format!(
-            "{}foretells the clips better by {:.0} ± {:.0} nats, in {:.0} % of them, for {} numbers; {} {:.0} % of {}",
-            if beside.is_empty() { String::new() } else { format!("beside {} it ", beside.join(" and ")) },
-            advantage.nats,
-            advantage.error,
-            100.0 * advantage.share,
-            scored.cost,
-            if beside.is_empty() { "alone it closes" } else { "there it closes" },
-            100.0 * trial.closes.clamp(0.0, 1.0),
-            if beside.is_empty() { "the gap" } else { "what is left" },
-        ),
-        (None, _) => format!(
-            "its signature explains {:.1} % of what {} leaves; other parameters imitate {:.0} % of that signature",
-            100.0 * scored.cosine.powi(2),
-            if beside.is_empty() { "the baseline".to_owned() } else { beside.join(" and ") },
-            100.0 * scored.imitated
-        ),
-    }
 }
 
 #[cfg(test)]
@@ -174,14 +174,14 @@ mod tests {
 
     #[test]
     fn an_effect_is_judged_where_most_was_seen_of_it() {
-        // The arm strays at first, and nothing of the object is fitted; 0 is named, then 1 beside it.
+        // The arm's gap is open at first, and nothing of the object is fitted; 0 is named, then 1 beside it.
         let steps = vec![
             step(&[], &[(0, true), (1, false), (2, true), (3, false), (4, false)]),
             step(&[0], &[(1, true), (2, true), (3, true), (4, false)]),
             step(&[0, 1], &[(2, false), (3, false), (4, false)]),
         ];
         let found = Found { steps, last: hypothesis(&[0, 1]) };
-        let judged = |effect, believed| judged_in(&found, effect, believed).from.effects.len();
+        let judged = |effect, believed| found.steps[judged_in(&found, effect, believed)].from.effects.len();
         let all = |believed| [0, 1, 2, 3, 4].map(|effect| judged(effect, believed));
         assert_eq!(all(true), [0, 1, 0, 1, 2]);
         assert_eq!(all(false), [0; 5], "beside what is not believed nothing is judged");
@@ -192,14 +192,5 @@ mod tests {
         assert!(carried_over(&FLOWN).contains("more than doubles"));
         assert_eq!(carried_over(&Share { value: -0.4, ci90: [-0.6, 0.1] }), "");
         assert_eq!(carried_over(&NOT_FITTED), "");
-    }
-
-    #[test]
-    fn reasons_tell_beside_what_they_hold() {
-        let of = |from, fitted| step(from, &[(3, fitted)]).trials.remove(0);
-        let told = |trial: &Trial, beside: &[&str]| why(trial, beside, Status::RuledOut);
-        assert!(told(&of(&[], false), &[]).contains("25.0 % of what the baseline leaves"));
-        assert!(told(&of(&[0], false), &["command_delay"]).contains("25.0 % of what command_delay leaves"));
-        assert!(told(&of(&[0], true), &["command_delay"]).starts_with("beside command_delay it foretells"));
     }
 }

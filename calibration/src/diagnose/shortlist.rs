@@ -34,6 +34,9 @@ pub struct Scored {
 /// Below this projected signal the clips cannot show a candidate [sigma].
 pub const TESTABLE: f64 = 3.0;
 
+/// A gain in deviance that noise alone reaches with this probability is chance.
+pub const BY_CHANCE: f64 = 0.2;
+
 /// So many forms next to the best are remembered.
 const NEXT: usize = 3;
 

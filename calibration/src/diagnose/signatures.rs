@@ -5,7 +5,7 @@ use super::fit::{Bench, Hypothesis};
 use super::shortlist::{self, Scored};
 use super::split::Split;
 use super::sweep::{Point, Precision, Swept, sweep};
-use super::{floor, straying};
+use super::{floor, stages, straying};
 use nalgebra::DMatrix;
 use shared_mem::progress::Progress;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -54,10 +54,11 @@ fn swept<E: Evidence>(bench: &Bench<'_, E>, split: &Split, from: &Hypothesis, ba
     let point =
         Point { full: &from.full, free: &from.free, probed: &probed, clips: &clips, precision: Precision::Joints };
     let done = AtomicUsize::new(0);
-    let told = |part: f64| {
+    bar.stage(stages::SIGNATURES, 100);
+    let goes_on = |part: f64| {
         let done = done.fetch_add(1, Ordering::Relaxed) as f64;
-        bar.show((50.0 * done * part / clips.len() as f64) as u64, "signatures");
+        bar.show((100.0 * done * part / clips.len() as f64) as u64, stages::SIGNATURES);
         !bench.interrupt.asked()
     };
-    sweep(bench.evidence, bench.library, &point, &bench.scatter, &told).ok()
+    sweep(bench.evidence, bench.library, &point, &bench.scatter, &goes_on).ok()
 }

@@ -5,7 +5,7 @@ use super::evidence::Evidence;
 use super::fit::{Bench, Hypothesis};
 use super::gap::Typical;
 use super::leftovers::{Left, ROUGHNESS};
-use super::shortlist::{Scored, TESTABLE};
+use super::shortlist::{BY_CHANCE, Scored, TESTABLE};
 use super::starts;
 use twin::effects::Stage;
 
@@ -53,12 +53,12 @@ pub(super) fn worthy<E: Evidence>(
         let Some(best) = group.first() else { continue };
         let likely = |s: &&&Scored| {
             let visible = !bench.negligible(s.candidate, &bench.begun(from.full.clone(), s));
-            s.p < 0.2 && s.gain > CLOSE * best.gain && visible
+            s.p < BY_CHANCE && s.gain > CLOSE * best.gain && visible
         };
         let partners = effect(best).confusable_with;
         let first = group.iter().filter(likely).take(FITTED);
         let confusable = (group.iter())
-            .filter(|s| partners.contains(&effect(s).name) && s.p < 0.2 && s.gain > 0.5 * CLOSE * best.gain);
+            .filter(|s| partners.contains(&effect(s).name) && s.p < BY_CHANCE && s.gain > 0.5 * CLOSE * best.gain);
         all.extend(first.chain(confusable).map(|s| s.candidate));
     }
     let more = |wanted: &dyn Fn(&Scored) -> bool| -> Vec<usize> {

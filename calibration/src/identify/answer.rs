@@ -1,7 +1,7 @@
 //! What an identification found: one structure for the JSON answer, the page and the terminal. SI units.
 
-use crate::report::Trace;
 use crate::report::identification::{Clip as SheetClip, Error as SheetError, Parameter as SheetParameter, Sheet};
+use crate::report::{Trace, number_in_words};
 use serde::ser::SerializeStruct as _;
 use serde::{Serialize, Serializer};
 use std::collections::BTreeMap;
@@ -15,7 +15,7 @@ pub struct Identification {
     pub session: String,
     /// What was found, by name.
     pub parameters: BTreeMap<String, Parameter>,
-    /// What the clips cannot tell.
+    /// What is not identifiable from the clips.
     pub not_identifiable: Vec<Untold>,
     /// How far the twin is off.
     pub gap: Gap,
@@ -87,7 +87,7 @@ impl Serialize for Parameter {
     }
 }
 
-/// A number that the clips cannot tell.
+/// A number that is not identifiable from the clips.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize)]
 pub struct Untold {
     /// Its name.
@@ -227,13 +227,17 @@ impl Identification {
             session: self.session.clone(),
             sentence: self.sentence(),
             parameters: parameters.collect(),
-            not_identifiable: self.not_identifiable.iter().map(|u| [u.parameter.clone(), u.why.clone()]).collect(),
+            not_identifiable: self
+                .not_identifiable
+                .iter()
+                .map(|u| [number_in_words(&u.parameter), u.why.clone()])
+                .collect(),
             errors,
             clips: self.by_clip.iter().map(clip).chain(self.clips.left_out.iter().map(left_out)).collect(),
             clip_error: if self.gap.train.object_add_m.is_some() { ["ADD", "m"] } else { ["joint error (RMS)", "rad"] },
             traces: self.traces.clone(),
             convergence: self.convergence.clone(),
-            names: self.names.clone(),
+            names: self.names.iter().map(|name| number_in_words(name)).collect(),
             correlation: self.correlation.clone(),
             advice: self.advice.iter().map(Advice::sentence).collect(),
             notes: self.warnings.clone(),
@@ -249,7 +253,7 @@ impl Identification {
     /// The finding in one sentence.
     #[must_use]
     pub fn sentence(&self) -> String {
-        let told = self.names.len() - self.not_identifiable.len().min(self.names.len());
+        let known = self.names.len() - self.not_identifiable.len().min(self.names.len());
         let figure = |f: &Figures| {
             f.object_add_m
                 .map(|m| format!("{:.2} mm ADD", m * 1e3))
@@ -258,15 +262,15 @@ impl Identification {
         let (set, before, after) = if self.clips.holdout.is_empty() {
             ("the clips it was fitted to", &self.gap.train_before, &self.gap.train)
         } else {
-            ("clips it has never seen", &self.gap.holdout_before, &self.gap.holdout)
+            ("held-out clips", &self.gap.holdout_before, &self.gap.holdout)
         };
         let end = if self.converged { "" } else { "; the search did not arrive at an end" };
         match (figure(before), figure(after)) {
             (Some(before), Some(after)) => format!(
-                "{told} of {} numbers can be told; on {set} the twin is off by {after} instead of {before}{end}",
+                "{known} of {} numbers are identifiable; on {set} the twin is off by {after} instead of {before}{end}",
                 self.names.len()
             ),
-            _ => format!("{told} of {} numbers can be told{end}", self.names.len()),
+            _ => format!("{known} of {} numbers are identifiable{end}", self.names.len()),
         }
     }
 
@@ -277,7 +281,7 @@ impl Identification {
             if self.at_bounds.contains(&part) {
                 return Some("at a bound of its search".to_owned());
             }
-            self.not_identifiable.iter().any(|u| u.parameter == part).then(|| "cannot be told".to_owned())
+            self.not_identifiable.iter().any(|u| u.parameter == part).then(|| "not identifiable".to_owned())
         };
         SheetParameter {
             name: name.into(),
@@ -293,6 +297,6 @@ impl Identification {
 impl Advice {
     fn sentence(&self) -> String {
         let share = 100.0 * (1.0 - self.predicted / self.now);
-        format!("{} narrows the interval of {} by {share:.0} %", self.record, self.parameter)
+        format!("{} narrows the interval of {} by {share:.0} %", self.record, number_in_words(&self.parameter))
     }
 }

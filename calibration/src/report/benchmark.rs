@@ -29,7 +29,7 @@ pub fn page(methods: &[Method], origin: &str) -> String {
         @if let (Some((_, first)), Some(method)) = (scores.first(), methods.first()) {
             (figure("Effect by effect", "Worlds with this effect alone in which exactly it was named.", &by_effect(first)))
             (figure("What was taken for what", "True down, said across; blue is right.", &confusion(&first.confusion, is_right)))
-            (figure("Was the confidence earned?", &calibration_words(first), &curve(&method.cases)))
+            (figure("Are verdicts right as often as their confidence says?", &calibration_words(first), &curve(&method.cases)))
         }
     };
     frame("benchmark of the diagnosis", origin, &body)
@@ -67,8 +67,8 @@ fn table(scores: &[(&str, Scores)]) -> Markup {
             @for (what, rate) in RATES {
                 tr { td { (what) } @for (_, scores) in scores { td.nowrap { (cell(rate(scores))) } } }
             }
-            tr { td { "gap closed, of what the true effect closes (median)" } @for (_, s) in scores { td { (percent(s.shrink_of_oracle)) } } }
-            tr { td { "distance of confidence from truth" } @for (_, s) in scores { td { (percent(s.calibration_error)) } } }
+            tr { td { "shrink, as a share of the shrink with the true effect (median)" } @for (_, s) in scores { td { (percent(s.shrink_of_oracle)) } } }
+            tr { td { "mean distance of confidence from the share that was right" } @for (_, s) in scores { td { (percent(s.calibration_error)) } } }
         }
     }
 }
@@ -104,7 +104,7 @@ fn is_right(truth: &str, said: &str) -> bool {
 
 fn calibration_words(scores: &Scores) -> String {
     format!(
-        "Numbers beside the dots count verdicts. Confidence that is earned lies on the dashed line; on average it is {} off.",
+        "Numbers beside the dots count verdicts. On the dashed line confidence and share agree; on average they are {} apart.",
         percent(scores.calibration_error)
     )
 }
@@ -145,7 +145,13 @@ pub(super) mod tests {
         let rule = Method { name: "largest RMSE".into(), cases: cases.clone() };
         let html = page(&[Method { name: "twinalign".into(), cases }, rule], "calibration benchmark");
         assert!(html.contains("The true effect was named in 50\u{a0}% of 2\u{a0}worlds"), "{html}");
-        for text in ["largest RMSE", "1 of 2", "outside: wear", "payload (2)", "Was the confidence earned?"] {
+        for text in [
+            "largest RMSE",
+            "1 of 2",
+            "outside: wear",
+            "payload (2)",
+            "Are verdicts right as often as their confidence says?",
+        ] {
             assert!(html.contains(text), "no {text}");
         }
         assert_eq!(html.matches("<svg").count(), 3);

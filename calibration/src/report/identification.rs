@@ -12,10 +12,10 @@ use maud::{Markup, html};
 
 /// Clips whose residuals are shown.
 const SHOWN_CLIPS: usize = 3;
-/// Errors told under the sentence.
+/// Errors shown under the sentence.
 const SHOWN_ERRORS: usize = 3;
 
-/// Everything the page tells. SI units.
+/// Everything on the page. SI units.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Sheet {
     /// `arm` or `object`.
@@ -26,13 +26,13 @@ pub struct Sheet {
     pub sentence: String,
     /// What was found.
     pub parameters: Vec<Parameter>,
-    /// Parameters that the clips cannot tell, and why.
+    /// Parameters that are not identifiable from the clips, and why.
     pub not_identifiable: Vec<[String; 2]>,
     /// How far off the twin is, by kind of error and set of clips.
     pub errors: Vec<Error>,
     /// The same by clip.
     pub clips: Vec<Clip>,
-    /// Which error is told by clip, and its SI unit.
+    /// Which error is shown by clip, and its SI unit.
     pub clip_error: [&'static str; 2],
     /// Residuals by clip and channel.
     pub traces: Vec<Trace>,
@@ -104,7 +104,7 @@ impl Sheet {
             h1 { (unbroken(&self.sentence)) }
             (self.facts())
             (figure("What was found", "Dot and bar: value and 95 % interval. Upright line: cell.toml, or the middle of its range.", &self.forest()))
-            (self.untold())
+            (self.not_identifiable())
             (figure("How far off the twin is", "", &self.bars()))
             @if !self.traces.is_empty() { (self.residuals()) }
             (self.table())
@@ -146,12 +146,12 @@ impl Sheet {
         forest(&groups)
     }
 
-    fn untold(&self) -> Markup {
+    fn not_identifiable(&self) -> Markup {
         html! {
             @if !self.not_identifiable.is_empty() {
                 section {
-                    h2 { "What these clips cannot tell" }
-                    dl { @for [name, why] in &self.not_identifiable { dt { (name.replace('_', " ")) } dd { (why) } } }
+                    h2 { "Not identifiable from these clips" }
+                    dl { @for [name, why] in &self.not_identifiable { dt { (name) } dd { (why) } } }
                 }
             }
         }
@@ -221,7 +221,7 @@ impl Sheet {
             logarithmic: true,
             size: [600.0, 200.0],
         };
-        let reading = "In hundredths: numbers near \u{b1}100 are told apart badly, only their combination is known.";
+        let reading = "In hundredths: of numbers near \u{b1}100 only a combination is identifiable.";
         html! {
             @if self.correlation.len() > 1 {
                 (figure("Which numbers hang together", reading, &correlations(&self.names, &self.correlation)))
@@ -295,7 +295,7 @@ mod tests {
     }
 
     #[test]
-    fn the_page_tells_values_doubts_and_where_to_go_on() {
+    fn the_page_shows_values_doubts_and_where_to_go_on() {
         let page = sheet().page();
         for text in [
             "<h1>The gains explain the motion.</h1>",

@@ -30,10 +30,32 @@ pub mod terminal;
 pub mod trace;
 
 pub use demo_page::Story;
+pub use parameters::{effect_in_words, number_in_words};
+pub use quantity::in_unit;
+pub use share::percent;
 pub use trace::Trace;
 
 /// Root mean square over the joints.
 #[must_use]
 pub fn root_mean_square(values: &[f64]) -> f64 {
     (values.iter().map(|v| v * v).sum::<f64>() / values.len().max(1) as f64).sqrt()
+}
+
+/// A channel as words: `joint2` as `joint 2`, others as they are.
+#[must_use]
+pub fn channel_in_words(channel: &str) -> String {
+    match channel.strip_prefix("joint") {
+        Some(number) if !number.is_empty() && number.bytes().all(|c| c.is_ascii_digit()) => format!("joint {number}"),
+        _ => channel.to_owned(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn joints_are_counted_from_1_in_words() {
+        assert_eq!([channel_in_words("joint5"), channel_in_words("yaw")], ["joint 5", "yaw"]);
+    }
 }

@@ -2,6 +2,8 @@
 
 use super::figure::forest::{Group, Row};
 use super::quantity::Unit;
+use crate::diagnose::Size;
+use std::collections::BTreeMap;
 use twin::effects::{Shape, find};
 
 /// A parameter of one or several numbers.
@@ -25,10 +27,19 @@ const MOST: usize = 3;
 impl Numbers<'_> {
     /// The parameter in a line: `delay 11.9 [11.2, 12.6] ms`, `coulomb 0.28 to 1.10 N m over 7 joints`.
     pub(super) fn line(&self) -> String {
+        self.written(|unit, value, interval| unit.interval(value, interval))
+    }
+
+    /// The same without intervals: `delay 11.9 ms`.
+    pub(super) fn brief(&self) -> String {
+        self.written(|unit, value, _| unit.with_unit(value))
+    }
+
+    fn written(&self, number: impl Fn(&Unit, f64, [f64; 2]) -> String) -> String {
         let name = self.name.replace('_', " ");
         let unit = self.shown();
         if self.values.len() <= MOST {
-            let numbers: Vec<String> = self.pairs().map(|(value, interval)| unit.interval(value, interval)).collect();
+            let numbers: Vec<String> = self.pairs().map(|(value, interval)| number(&unit, value, interval)).collect();
             return format!("{name} {}", numbers.join(", "));
         }
         let [lo, hi] = super::scale::span(self.values.iter().copied());
@@ -64,6 +75,32 @@ impl Numbers<'_> {
     }
 }
 
+/// An effect with what was fitted of it: `command delay (delay 11.9 ms)`; what was held at its default is left out.
+#[must_use]
+pub fn effect_in_words(effect: &str, parameters: &BTreeMap<String, Size>) -> String {
+    let fitted = parameters.iter().filter(|(_, size)| (0..size.values.len()).any(|k| size.is_fitted(k)));
+    let sizes: Vec<String> = fitted.map(|(name, size)| numbers(effect, name, size).brief()).collect();
+    let name = effect.replace('_', " ");
+    if sizes.is_empty() { name } else { format!("{name} ({})", sizes.join("; ")) }
+}
+
+/// A parameter of an effect.
+pub(super) fn numbers<'a>(effect: &str, name: &'a str, size: &'a Size) -> Numbers<'a> {
+    let joints = of_joints(&format!("{effect}.{name}"));
+    Numbers { name, joints, unit: &size.unit, values: &size.values, intervals: &size.ci90 }
+}
+
+/// A number by its name in files as words: `stiffness[4]` as `stiffness, joint 5`, `centre_of_mass[0]` as `centre of mass, x`.
+#[must_use]
+pub fn number_in_words(name: &str) -> String {
+    let split = name.strip_suffix(']').and_then(|rest| rest.split_once('['));
+    let Some((parameter, Ok(k))) = split.map(|(parameter, k)| (parameter, k.parse::<usize>())) else {
+        return name.replace('_', " ");
+    };
+    let of = part(of_joints(parameter), usize::MAX, k);
+    format!("{}, {of}", parameter.replace('_', " ").replace('.', ": "))
+}
+
 /// Whether a parameter, `stiffness` or `effect.parameter`, holds one number a joint.
 pub(super) fn of_joints(name: &str) -> bool {
     let Some((effect, parameter)) = name.split_once('.') else { return matches!(name, "stiffness" | "damping") };
@@ -87,10 +124,25 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_registry_tells_what_belongs_to_joints() {
+    fn the_registry_knows_what_belongs_to_joints() {
         assert!(of_joints("damping") && of_joints("joint_coulomb_friction.coulomb"));
         assert!(!of_joints("centre_of_mass") && !of_joints("command_delay.delay") && !of_joints("no.such"));
         assert_eq!([part(true, 1, 0), part(false, 3, 2), part(false, 1, 0)], ["joint 1", "z", ""]);
+        let names = ["stiffness[4]", "centre_of_mass[0]", "tip_friction", "joint_coulomb_friction.coulomb[1]"];
+        assert_eq!(
+            names.map(number_in_words),
+            ["stiffness, joint 5", "centre of mass, x", "tip friction", "joint coulomb friction: coulomb, joint 2"]
+        );
+    }
+
+    #[test]
+    fn an_effect_is_named_with_what_was_fitted_of_it_and_not_with_its_defaults() {
+        let size = |values: Vec<f64>, ci90| Size { values, ci90, unit: "N m".into() };
+        let coulomb = size(vec![0.3, 0.4], vec![[0.2, 0.4], [0.3, 0.5]]);
+        let creep = size(vec![0.002, 0.002], vec![[0.002; 2]; 2]);
+        let parameters = BTreeMap::from([("coulomb".to_owned(), coulomb), ("creep".to_owned(), creep)]);
+        let words = effect_in_words("joint_coulomb_friction", &parameters);
+        assert_eq!(words, "joint coulomb friction (coulomb 0.300 N m, 0.400 N m)");
     }
 
     #[test]

@@ -62,6 +62,12 @@ impl Unit {
     }
 }
 
+/// A value in SI with the prefix that suits it: `2.13 mrad`.
+#[must_use]
+pub fn in_unit(si: &str, value: f64) -> String {
+    Unit::suited(si, value).with_unit(value)
+}
+
 /// A number with three digits that count, two where it is small: `1.23`, `0.0042`, `1230`; `-` where there is none.
 pub(super) fn short(value: f64) -> String {
     if !value.is_finite() {

@@ -2,11 +2,12 @@
 
 use super::quantity::Unit;
 
-/// Above this a share is told as more than it.
+/// Above this a share is shown as more than it.
 const NEARLY_ALL: f64 = 0.9999;
 
 /// A share as percent: `41 %`, `0.4 %`, `99.97 %`.
-pub(super) fn percent(share: f64) -> String {
+#[must_use]
+pub fn percent(share: f64) -> String {
     if share > NEARLY_ALL && share < 1.0 {
         return "> 99.99 %".into();
     }
@@ -45,12 +46,18 @@ pub(super) fn probability(value: f64) -> String {
     }
 }
 
+/// A probability that is never given beyond `most`: there it is a limit and no estimate.
+pub(super) fn limited(value: f64, most: f64) -> String {
+    let words = probability(value);
+    if value < most - 0.005 { words } else { format!("{words} (limit)") }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
-    fn shares_are_told_in_percent_with_the_digits_that_matter() {
+    fn shares_are_shown_in_percent_with_the_digits_that_matter() {
         assert_eq!(percent(0.4123), "41 %");
         assert_eq!(percent(0.9997), "99.97 %");
         assert_eq!(percent(0.0001), "< 0.1 %");
@@ -59,5 +66,6 @@ mod tests {
         assert_eq!(percent_interval(0.994, [0.993, 0.995]), "99.40 [99.30, 99.50] %");
         assert_eq!(percent_interval(0.81, [0.76, 0.85]), "81 [76, 85] %");
         assert_eq!((probability(1.0), probability(0.0)), ("> 99 %".into(), "< 1 %".into()));
+        assert_eq!((limited(0.96, 0.96), limited(0.8, 0.96)), ("96 % (limit)".into(), "80 %".into()));
     }
 }

@@ -1,18 +1,20 @@
-//! What verbs print on stderr for a person: a short table, aligned, and the sentence at the end, where eyes are.
+//! What verbs print for a person: a short table, aligned, and the sentence at the end, where eyes are.
 
 use super::benchmark::{Method, RATES};
-use super::diagnosis::{has_effects, is_known, sizes, together, verdict_words, words};
+use super::channel_in_words;
+use super::diagnosis::{confidence, has_effects, is_known, sizes, together, verdict_words, words};
 use super::identification::{Parameter, Sheet};
 use super::quantity::{Unit, short};
 use super::scale::span;
-use super::share::{percent, percent_interval, probability};
+use super::share::{limited, percent, percent_interval};
 use crate::benchmark::score::Scores;
+use crate::diagnose::confidence::MOST;
 use crate::diagnose::{Candidate, Diagnosis, Status};
 
 /// Places of the gap that are named.
 const SHOWN_PLACES: usize = 3;
 
-/// An identification: each number with its interval and what was believed, the errors, what cannot be told, what to do next.
+/// An identification: each number with its interval and what was believed, the errors, what is not identifiable, what to do next.
 #[must_use]
 pub fn identification(sheet: &Sheet) -> String {
     let mut lines = table(sheet.parameters.iter().flat_map(numbers).collect());
@@ -21,15 +23,15 @@ pub fn identification(sheet: &Sheet) -> String {
         let before = error.before.map_or_else(String::new, |before| format!("{} -> ", short(unit.scaled(before))));
         format!("{}: {before}{}", error.name, unit.with_unit(error.after))
     }));
-    lines.extend(untold(&sheet.not_identifiable));
+    lines.extend(not_identifiable(&sheet.not_identifiable));
     lines.extend(sheet.notes.iter().map(|note| format!("note: {note}")));
     lines.extend(sheet.advice.iter().map(|advice| format!("next: {advice}")));
     lines.push(sheet.sentence.clone());
     lines.join("\n")
 }
 
-/// What cannot be told, a line a reason.
-fn untold(all: &[[String; 2]]) -> Vec<String> {
+/// What is not identifiable, a line a reason.
+fn not_identifiable(all: &[[String; 2]]) -> Vec<String> {
     let mut reasons: Vec<(&str, Vec<&str>)> = Vec::new();
     for [name, why] in all {
         match reasons.iter_mut().find(|(known, _)| known == why) {
@@ -37,7 +39,7 @@ fn untold(all: &[[String; 2]]) -> Vec<String> {
             None => reasons.push((why, vec![name])),
         }
     }
-    reasons.into_iter().map(|(why, names)| format!("cannot tell {}: {why}", names.join(", "))).collect()
+    reasons.into_iter().map(|(why, names)| format!("not identifiable: {}: {why}", names.join("; "))).collect()
 }
 
 /// A diagnosis: gap, place, candidates in question, how many others, what to do next, and the verdict.
@@ -49,12 +51,18 @@ pub fn diagnosis(diagnosis: &Diagnosis) -> String {
     let places: Vec<String> = places
         .iter()
         .take(SHOWN_PLACES)
-        .map(|place| format!("{} {} {} {}", place.stage, place.channel, place.regime, percent(place.share)))
+        .map(|place| {
+            format!("{} {} ({}) {}", place.stage, channel_in_words(&place.channel), place.regime, percent(place.share))
+        })
         .collect();
     if !places.is_empty() {
         lines.push(format!("where: {}", places.join(", ")));
     }
-    lines.extend(table(diagnosis.candidates.iter().filter_map(candidate).collect()));
+    let (rows, sizes): (Vec<_>, Vec<_>) = diagnosis.candidates.iter().filter_map(candidate).unzip();
+    for (row, sizes) in table(rows).into_iter().zip(sizes) {
+        lines.push(row);
+        lines.extend(sizes.into_iter().map(|size| format!("    {size}")));
+    }
     if !diagnosis.candidates.is_empty() {
         lines.push(others(&diagnosis.candidates));
     }
@@ -69,8 +77,8 @@ pub fn diagnosis(diagnosis: &Diagnosis) -> String {
         lines.push(format!("about {effect}, in a model: {}", remedy.in_model));
     }
     let verdict = &diagnosis.verdict;
-    let sure = probability(verdict.confidence);
-    lines.push(format!("{} (confidence {sure}): {}", verdict_words(verdict.kind), verdict.text));
+    lines.extend(confidence(verdict).map(|(value, what)| format!("confidence: {value}, {what}")));
+    lines.push(format!("{}: {}", verdict_words(verdict.kind), verdict.text));
     lines.join("\n")
 }
 
@@ -89,13 +97,13 @@ fn gap(diagnosis: &Diagnosis) -> Vec<String> {
         if both { format!("{} -> {}", short(unit.scaled(before)), unit.with_unit(after)) } else { before_only }
     };
     let sigma = Unit::suited("sigma^2", gap.before);
-    let closed =
-        if both { format!(", closed {}", percent_interval(gap.shrink.value, gap.shrink.ci90)) } else { String::new() };
+    let shrink =
+        if both { format!(", shrink {}", percent_interval(gap.shrink.value, gap.shrink.ci90)) } else { String::new() };
     let noise = short(gap.floor);
-    let mut lines = vec![format!("gap: {} (noise alone {noise}){closed}", arrow(&sigma, gap.before, gap.after))];
+    let mut lines = vec![format!("gap: {} (noise alone {noise}){shrink}", arrow(&sigma, gap.before, gap.after))];
     if let Some(nearest) = &diagnosis.nearest {
-        let closed = percent_interval(nearest.shrink.value, nearest.shrink.ci90);
-        lines.push(format!("nearest: {} closes {closed} of it on clips held out", together(&nearest.effects)));
+        let shrink = percent_interval(nearest.shrink.value, nearest.shrink.ci90);
+        lines.push(format!("nearest: {}, shrink {shrink}, leaves more than a cause does", together(&nearest.effects)));
     }
     let human =
         [("joints", "rad", gap.joint_rms_rad), ("ADD", "m", gap.object_add_m), ("ADD-S", "m", gap.object_add_s_m)];
@@ -107,16 +115,16 @@ fn gap(diagnosis: &Diagnosis) -> Vec<String> {
     lines
 }
 
-/// A row for a candidate that is named or possible.
-fn candidate(candidate: &Candidate) -> Option<Vec<String>> {
+/// A row for a candidate that is named or possible, and its sizes.
+fn candidate(candidate: &Candidate) -> Option<(Vec<String>, Vec<String>)> {
     let status = match candidate.status {
         Status::Named => "named",
         Status::Possible => "possible",
         Status::RuledOut | Status::NotTestable => return None,
     };
-    let closes = format!("closes {}", percent_interval(candidate.shrink.value, candidate.shrink.ci90));
-    let sizes = sizes(candidate).join("; ");
-    Some(vec![words(&candidate.effect), status.to_owned(), probability(candidate.probability), closes, sizes])
+    let shrink = format!("shrink {}", percent_interval(candidate.shrink.value, candidate.shrink.ci90));
+    let row = vec![words(&candidate.effect), status.to_owned(), limited(candidate.probability, MOST), shrink];
+    Some((row, sizes(candidate)))
 }
 
 /// Rows of a parameter: name, value with interval, what was believed, remark.
@@ -201,7 +209,7 @@ mod tests {
 centre of mass, x   5.1 [4.2, 6.0] mm      began at 0
 centre of mass, y   -2.0 [-3.0, -1.0] mm   began at 0   at its lower bound
 ADD, held-out clips: 13.9 -> 2.00 mm
-cannot tell mass, load: the arm is much heavier; weigh it
+not identifiable: mass; load: the arm is much heavier; weigh it
 The object is known.";
         assert_eq!(identification(&sheet), expected);
     }
@@ -210,19 +218,24 @@ The object is known.";
     fn a_diagnosis_fits_a_screen_and_ends_with_the_verdict() {
         let text = diagnosis(&crate::report::diagnosis::tests::named());
         let expected = "\
-gap: 38.4 -> 1.40 sigma^2 (noise alone 1.00), closed 96.3 [95.1, 97.2] %
+gap: 38.4 -> 1.40 sigma^2 (noise alone 1.00), shrink 96.3 [95.1, 97.2] %
 joints: 2.13 -> 0.180 mrad
 ADD: 13.9 -> 1.20 mm
-where: control joint2 reversal 41 %
-command lag     possible   2 %    closes 81 [76, 85] %   delay 11.9 [11.2, 12.6] ms
-command delay   named      97 %   closes 81 [76, 85] %   delay 11.9 [11.2, 12.6] ms
+where: control joint 2 (reversal) 41 %
+command lag     possible   2 %            shrink 81 [76, 85] %
+    creep 2.00 ms (default, not fitted)
+    delay 11.9 [11.2, 12.6] ms
+command delay   named      97 % (limit)   shrink 81 [76, 85] %
+    creep 2.00 ms (default, not fitted)
+    delay 11.9 [11.2, 12.6] ms
 1 ruled out, 1 not testable
 next clip: Play a chirp up to 10 Hz.
     calibration capture excitation --motion chirp
     calibration diagnose monday
 about command delay, in the cell: Send commands 12 ms earlier.
 about command delay, in a model: Hold them back by 12 ms.
-cause named (confidence 97 %): Commands reach the robot 12 ms late <here>.";
+confidence: at most 97 %, the limit: so many such verdicts were right on simulated sessions
+cause named: Commands reach the robot 12 ms late <here>.";
         assert_eq!(text, expected);
     }
 

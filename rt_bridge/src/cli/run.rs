@@ -66,10 +66,10 @@ pub(super) struct RunArguments {
     /// Default: sim where the arm is simulated and cell.toml has a [wrench], replay with a recording, else off
     #[arg(long, value_name = "SENSOR")]
     wrench: Option<WrenchChoice>,
-    /// Effects of the simulated cell that nobody else is told
+    /// Effects of the simulated cell that nobody else knows of
     #[arg(long, value_name = "hidden.toml")]
     effects: Option<PathBuf>,
-    /// Parameters of the simulated cell that nobody else is told
+    /// Parameters of the simulated cell that nobody else knows of
     #[arg(long, value_name = "theta.toml")]
     parameters: Option<PathBuf>,
     /// Record everything on shared memory to this new file

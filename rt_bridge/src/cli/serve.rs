@@ -17,7 +17,7 @@ use std::time::Duration;
 ///
 /// Point any libfranka program (0.18 to 0.21) at this address instead of a robot's. Torque, joint and Cartesian
 /// interfaces, impedance, load, collision thresholds, reflexes, error recovery and the packet-loss rule act as on a robot,
-/// on the twin's dynamics; the table and the object are there to be hit. A program has to be told not to insist on a
+/// on the twin's dynamics; the table and the object are there to be hit. A program must be set not to insist on a
 /// real-time kernel where there is none (franka::RealtimeConfig::kIgnore, or --realtime ignore with rt_bridge run).
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  \
@@ -43,10 +43,10 @@ pub(super) struct ServeArguments {
     /// No hand
     #[arg(long, conflicts_with = "hand_port")]
     no_hand: bool,
-    /// Effects of the simulated cell that no client is told
+    /// Effects of the simulated cell that no client knows of
     #[arg(long, value_name = "hidden.toml")]
     effects: Option<PathBuf>,
-    /// Parameters of the simulated cell that no client is told
+    /// Parameters of the simulated cell that no client knows of
     #[arg(long, value_name = "theta.toml")]
     parameters: Option<PathBuf>,
     /// While a motion is commanded, let the robot's clock wait for each command instead of losing it

@@ -103,7 +103,7 @@ impl RecorderChild {
         let status = child.try_wait().ok().flatten()?;
         let mut child = self.running.take()?;
         if let Some(recorded) = answer(&mut child) {
-            let why = recorded.stopped.clone().unwrap_or_else(|| "the recorder was told to stop".into());
+            let why = recorded.stopped.clone().unwrap_or_else(|| "the recorder was asked to stop".into());
             self.done.push(recorded);
             return Some(Change::Ended(why));
         }

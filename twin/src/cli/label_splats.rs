@@ -3,10 +3,10 @@
 use super::look::joint;
 use anyhow::{Context as _, bail, ensure};
 use nalgebra::{Isometry3, Point3, Quaternion, Similarity3, Translation3, UnitQuaternion};
+use shared_mem::answer;
 use shared_mem::cell::Cell;
 use shared_mem::output::{Destination, Output};
 use shared_mem::quantity::number;
-use shared_mem::{answer, console};
 use std::path::PathBuf;
 use twin::arm::MAX_JOINTS;
 use twin::reconstruct::{SurfacePoints, align, label};
@@ -122,14 +122,14 @@ impl LabelSplats {
         outputs.into_iter().try_for_each(Output::finish)?;
         let at = found.base_from_scan;
         let (place, turn) = (at.isometry.translation.vector, at.isometry.rotation.quaternion());
-        console::line(format_args!(
+        let words = format!(
             "{} of {} splats are the robot, in {}; {:.0} % of its surface was scanned, {:.1} mm off (root mean square)",
             counts.iter().sum::<usize>(),
             scan.splats.len(),
             self.out.display(),
             found.seen * 100.0,
             found.rms * 1e3,
-        ));
+        );
         if self.json {
             let answer = serde_json::json!({
                 "scale": at.scaling(), "position": [place.x, place.y, place.z],
@@ -137,6 +137,8 @@ impl LabelSplats {
                 "links": counts, "rest": parts.rest.splats.len(),
             });
             answer::json(&answer)?;
+        } else {
+            answer::words(words)?;
         }
         Ok(())
     }

@@ -3,6 +3,7 @@
 use super::look::Look;
 use anyhow::{Context as _, bail, ensure};
 use shared_mem::output::Destination;
+use shared_mem::progress::Progress;
 use shared_mem::recording::{PictureKind, Session, for_pictures, write_png};
 use shared_mem::{answer, console};
 use std::path::{Path, PathBuf};
@@ -57,7 +58,9 @@ impl Render {
         let latency_ns = (camera.latency * 1e9) as u64;
         let (mut frames, mut skipped, mut number) = (0u32, 0u32, 0u32);
         let mut apart = 0.0;
-        for entry in &session.clips {
+        let bar = Progress::new("render", session.clips.len() as u64);
+        for (done, entry) in session.clips.iter().enumerate() {
+            bar.show(done as u64, &format!("{frames} frames"));
             let clip = session.read(entry)?;
             for_pictures(&session.folder.join(&entry.file), PictureKind::Color, |stamp_ns, picture| {
                 number += 1;
@@ -81,6 +84,7 @@ impl Render {
                 Ok(())
             })?;
         }
+        drop(bar);
         if frames == 0 {
             bail!("no clip holds colour pictures with joints at their time; record with `rt_bridge run --camera`");
         }
@@ -91,13 +95,13 @@ impl Render {
         }
         let rate = camera.rate / f64::from(self.every);
         let film = film_file.map(|file| film(&self.out, &file, rate)).transpose()?.flatten();
-        console::line(format_args!(
+        let words = format!(
             "{frames} frames in {}, drawn by {}{}; mean difference {:.1} %",
             self.out.display(),
             view.painter().name(),
             if skipped > 0 { format!(" ({skipped} pictures without joints left out)") } else { String::new() },
             difference * 100.0
-        ));
+        );
         if self.film && film.is_none() {
             console::line("note: ffmpeg is not installed, so there is no film");
         }
@@ -107,6 +111,8 @@ impl Render {
                 "drawn_by": view.painter().name(),
             });
             answer::json(&answer)?;
+        } else {
+            answer::words(words)?;
         }
         Ok(())
     }

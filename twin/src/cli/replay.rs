@@ -13,8 +13,9 @@ use twin::replay::{Options, replay};
 #[derive(clap::Args)]
 #[command(after_help = "\
 The twin starts in the recorded state, gets the recorded commands at their stamps, and is not corrected on the way (but
-behind a hole in the commands it starts again; that is told).
-Joint errors are root mean squares over the clip; ADD and ADD-S are means over the recorded object poses.
+behind a hole in the commands it starts again, with a note).
+Joint errors are root mean squares over the clip; ADD and ADD-S are means over the recorded object poses. How far a gap
+shrinks is what `calibration diagnose` measures, on held-out clips and in units of the noise (docs/measuring.md).
 
 A clip that cannot be replayed is named on stderr, with the reason, and the others are replayed. The exit code is 1 only
 when none could be, or when one could not be written.

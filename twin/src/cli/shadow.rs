@@ -84,7 +84,7 @@ impl Shadow {
         if self.json {
             answer::json(&summary.json(busy_s))?;
         } else if let Some(text) = &text {
-            console::block(text);
+            answer::words(text)?;
         }
         match text {
             Some(_) => Ok(()),

@@ -8,7 +8,7 @@ use parry3d_f64::shape::SharedShape;
 
 /// The mesh encloses no volume, so it cannot be a body.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("the object's mesh is flat or empty; give a mesh that encloses a volume as `object.mesh` in cell.toml")]
+#[error("the object's mesh has no volume; give a mesh that encloses a volume as `object.mesh` in cell.toml")]
 pub struct FlatMesh;
 
 /// Corners of a mesh that are all asked for, and directions in which the outermost are looked for where it has more.

@@ -61,7 +61,7 @@ pub(super) use with_places;
 
 /// The base spans no polygon that could carry a load.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("the base spans no area or has more than {MAX_POINTS} corners; give a mesh with a flat, simpler base")]
+#[error("the base spans no area or has more than {MAX_POINTS} corners; give a mesh with a plane, simpler base")]
 pub struct PatchError;
 
 impl Patch {

@@ -67,7 +67,7 @@ pub(super) fn doubts(
     let gap = &answer.gap;
     if !clips.split.holdout.is_empty() && rms(&gap.holdout) > NO_BETTER * rms(&gap.holdout_before) {
         doubts.push(
-            "on clips it has never seen the twin is no better than with the values it began with: `calibration diagnose` \
+            "on held-out clips the twin is no better than with the values it began with: `calibration diagnose` \
              says what else acts"
                 .into(),
         );

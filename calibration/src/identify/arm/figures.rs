@@ -85,7 +85,7 @@ fn one(
     let worst = (0..joint_rms_rad.len()).max_by(|a, b| joint_rms_rad[*a].total_cmp(&joint_rms_rad[*b])).unwrap_or(0);
     let trace = Trace {
         clip: model.name(clip),
-        channel: format!("joint{}", worst + 1),
+        channel: format!("joint {}", worst + 1),
         unit: "rad".into(),
         sigma: model.sigma(Channel::Position, worst),
         before: before.as_ref().map_or_else(Vec::new, |errors| line(errors, worst)),

@@ -45,6 +45,8 @@ use twin::effects::{EffectInfo, Stage, find, registry};
 pub struct Options {
     /// The session's folder, or a clip beside a cell.toml.
     pub session: PathBuf,
+    /// The cell.toml, where it does not lie beside the clips.
+    pub cell: Option<PathBuf>,
     /// The way of searching.
     pub optimizer: Optimizer,
     /// Where the parameters go.
@@ -111,7 +113,7 @@ type Model<'a> = ArmClips<Numbers<'a>>;
 /// # Errors
 /// [`ArmError`] naming file, key or clip, and the remedy.
 pub fn identify(options: &Options, interrupt: &Interrupt) -> Result<Identification, ArmError> {
-    identify_material(session::open(&options.session)?, options, interrupt)
+    identify_material(session::open(&options.session, options.cell.as_deref())?, options, interrupt)
 }
 
 /// The same from clips in memory.

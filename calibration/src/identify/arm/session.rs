@@ -31,8 +31,8 @@ pub(super) struct Used {
     warnings: Vec<String>,
 }
 
-pub(super) fn open(path: &Path) -> Result<Material, ReadError> {
-    let session = Session::open(path)?;
+pub(super) fn open(path: &Path, cell: Option<&Path>) -> Result<Material, ReadError> {
+    let session = Session::open_with(path, cell)?;
     let with_arm: Vec<_> = session.clips.iter().filter(|clip| clip.kind != ClipKind::FreeMotion).collect();
     let read: Vec<_> = with_arm.par_iter().map(|entry| (&entry.file, session.read(entry))).collect();
     let (mut clips, mut left_out) = (Vec::new(), Vec::new());

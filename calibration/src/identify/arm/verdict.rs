@@ -6,6 +6,7 @@ use super::session::{Used, joint_of};
 use crate::forward::Setting;
 use crate::identify::answer::Untold;
 use crate::identify::run::Optimizer;
+use crate::report::number_in_words;
 use twin::effects::find;
 
 /// A gain whose 95 % interval is wider than this share of it, to either side, is not told.
@@ -50,7 +51,7 @@ fn why(finding: &Finding<'_>, k: usize, model: &Model<'_>, clips: &Used) -> Opti
     }
     let half = finding.intervals.half_width[k];
     if half.is_infinite() {
-        return Some("it cannot be told from other numbers: only a combination of them shows".into());
+        return Some("not identifiable apart from other numbers: only a combination of them shows".into());
     }
     let (size, share) = match setting {
         Setting::Stiffness(_) | Setting::Damping(_) => (finding.outcome.fit.shared[k].abs(), GAIN_SHARE),
@@ -88,11 +89,11 @@ fn at_bound(finding: &Finding<'_>, k: usize) -> Option<String> {
 }
 
 /// The number that this one moves together with most closely, and their correlation.
-fn partner<'a>(finding: &'a Finding<'_>, k: usize) -> Option<(&'a str, f64)> {
+fn partner(finding: &Finding<'_>, k: usize) -> Option<(String, f64)> {
     let correlation = &finding.intervals.correlation;
     let others = (0..correlation.ncols()).filter(|other| *other != k).map(|other| (other, correlation[(k, other)]));
     let (other, r) = others.max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()))?;
-    (r.abs() > TOGETHER).then(|| (finding.unknowns[other].name.as_str(), r))
+    (r.abs() > TOGETHER).then(|| (number_in_words(&finding.unknowns[other].name), r))
 }
 
 /// Farthest travel of a joint's command in a clip that was fitted [rad].

@@ -4,7 +4,7 @@
 //! (PIN-WM).
 
 use super::figures::{figures, gaps};
-use super::fit::fit_object;
+use super::fit::{fit_object, usual_evaluations};
 use super::material::Material;
 use super::paper::SurfaceLoss;
 use super::polish::{fit_polished, fit_poses_alone};
@@ -17,6 +17,7 @@ use crate::identify::run::{Optimizer, Run, stopped};
 use crate::interrupt::Interrupt;
 use crate::kept::Kept;
 use serde::Serialize;
+use shared_mem::progress::Progress;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::sync::Mutex;
@@ -66,7 +67,7 @@ pub struct Method {
 /// # Errors
 /// [`ObjectError`] naming what is wrong and the remedy.
 pub fn compare(options: &Options, interrupt: &Interrupt) -> Result<Comparison, ObjectError> {
-    let material = Material::open(&options.session, options.seed)?;
+    let material = Material::open(options)?;
     let problem = Problem::new(&material, options, (Kept::nothing(), interrupt))?;
     let without: Vec<usize> = (0..problem.unknowns.len())
         .filter(|k| !matches!(problem.settings.settings()[*k], Setting::CentreOfMass(_)))
@@ -130,7 +131,9 @@ fn sloped(
     let start: Vec<f64> = problem.unknowns.iter().map(|unknown| unknown.start).collect();
     let (began, steps) = (Instant::now(), Mutex::new(Vec::new()));
     let shape = problem.shape(&clips)?;
+    let bar = Progress::new(name, usual_evaluations(&clips, &problem.unknowns) as u64);
     let watch = |numbers: &[f64], evaluations: usize| {
+        bar.show(evaluations as u64, &format!("{evaluations} clips simulated"));
         steps.lock().expect("no holder panics").push((numbers.to_vec(), evaluations, began.elapsed().as_secs_f64()));
         !interrupt.asked()
     };

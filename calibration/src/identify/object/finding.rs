@@ -5,6 +5,7 @@ use super::material::Material;
 use crate::estimate::{Fit, Intervals, Unknown, at_bounds, without_leaning};
 use crate::forward::{Setting, Settings};
 use crate::identify::answer::{Advice, Identification, Parameter, Untold};
+use crate::report::number_in_words;
 use std::collections::BTreeMap;
 
 /// An interval wider than this share of the search's range, to either side, tells nothing.
@@ -141,11 +142,11 @@ impl<'a> Finding<'a> {
     }
 
     /// The number that this one moves together with most closely, and their correlation.
-    fn partner(&self, k: usize) -> Option<(&str, f64)> {
+    fn partner(&self, k: usize) -> Option<(String, f64)> {
         let row = self.intervals.correlation.row(k);
         let (other, r) =
             (0..row.len()).filter(|i| *i != k).map(|i| (i, row[i])).max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()))?;
-        (r.abs() > TOGETHER).then(|| (self.unknowns[other].name.as_str(), r))
+        (r.abs() > TOGETHER).then(|| (number_in_words(&self.unknowns[other].name), r))
     }
 
     /// Motions that sharpen the worst number most.

@@ -1,7 +1,7 @@
 //! A session's clips with an object, sorted by their use.
 
-use super::ObjectError;
 use super::screen::{Screened, screened};
+use super::{ObjectError, Options};
 use crate::forward::arm::one_piece;
 use crate::identify::answer::{Clips, LeftOut};
 use crate::identify::remarks::grouped;
@@ -30,15 +30,15 @@ pub(super) struct Material {
 }
 
 impl Material {
-    pub(super) fn open(path: &Path, seed: u64) -> Result<Self, ObjectError> {
-        let session = Session::open(path)?;
+    pub(super) fn open(options: &Options) -> Result<Self, ObjectError> {
+        let session = Session::open_with(&options.session, options.cell.as_deref())?;
         let entries: Vec<_> = session.clips.iter().filter(|clip| clip.kind != ClipKind::Excitation).collect();
         let read = |entry: &&ClipEntry| {
             let clip = session.read(entry).map_err(|error| error.to_string());
             (entry.file.display().to_string(), clip)
         };
         let read = entries.par_iter().map(read).collect();
-        Self::of(session.cell, read, (path, seed))
+        Self::of(session.cell, read, (&options.session, options.seed))
     }
 
     /// Of clips that were read, or the reason why one could not be; `path`: what the session is called in errors.

@@ -69,6 +69,8 @@ use twin::sim::SimError;
 pub struct Options {
     /// The session's folder, or a clip beside a cell.toml.
     pub session: PathBuf,
+    /// The cell.toml, where it does not lie beside the clips.
+    pub cell: Option<PathBuf>,
     /// The way of searching.
     pub optimizer: Optimizer,
     /// Where the parameters go.
@@ -133,7 +135,7 @@ pub enum ObjectError {
 /// [`ObjectError`] naming what is wrong and the remedy.
 pub fn identify(options: &Options, interrupt: &Interrupt) -> Result<Identification, ObjectError> {
     let began = Instant::now();
-    let material = Material::open(&options.session, options.seed)?;
+    let material = Material::open(options)?;
     let parameters = options.parameters.as_deref().map(Theta::read).transpose()?;
     let question = Fingerprint::of("identify object")
         .with(&(options.optimizer.name(), options.budget, options.seed))

@@ -1,11 +1,12 @@
 //! The candidates: those in question as a table, those ruled out folded away, those that could not have been seen by name.
 
 use super::words;
+use crate::diagnose::confidence::MOST;
 use crate::diagnose::{Candidate, Size, Status};
 use crate::report::canvas::Canvas;
 use crate::report::figure::forest::{Group, forest};
-use crate::report::parameters::{Numbers, of_joints};
-use crate::report::share::{percent_interval, probability};
+use crate::report::parameters::{Numbers, numbers};
+use crate::report::share::{limited, percent_interval, probability};
 use maud::{Markup, html};
 
 /// Width of a probability's bar.
@@ -24,7 +25,11 @@ pub(super) fn sections(candidates: &[Candidate]) -> Markup {
     html! {
         section {
             h2 { "Candidates" }
-            p.note { (candidates.len()) " effects were tested; intervals are to hold the truth in 90 % of cases." }
+            p.note {
+                (candidates.len()) " effects were tested; intervals are to hold the truth in 90 % of cases. The shrink of an effect \
+                is what it adds, alone or beside those named before it. No probability is given beyond " (probability(MOST))
+                ": a cause outside of the library is never excluded."
+            }
             @if open.is_empty() { p { "None of them is named or still possible." } } @else { (table(&open)) }
             @for candidate in open.iter().filter(|candidate| candidate.status == Status::Named) { (joints(candidate)) }
             @if !out.is_empty() { (folded(&out)) }
@@ -36,13 +41,13 @@ pub(super) fn sections(candidates: &[Candidate]) -> Markup {
 fn table(candidates: &[&Candidate]) -> Markup {
     html! {
         table {
-            tr { th { "effect" } th { "probability" } th { "size" } th { "gap closed" } th { "why" } }
+            tr { th { "effect" } th { "probability" } th { "size" } th { "shrink" } th { "why" } }
             @for candidate in candidates {
                 tr.lead {
                     td { (words(&candidate.effect)) (mark(candidate.status)) }
                     td.nowrap { (bar(candidate.probability)) }
                     td.wide { @for line in sizes(candidate) { div { (line) } } }
-                    td.nowrap { (percent_interval(candidate.shrink.value, candidate.shrink.ci90)) }
+                    td.nowrap { (shrink(candidate)) }
                     td { (candidate.why) (confusable(candidate)) }
                 }
             }
@@ -52,10 +57,12 @@ fn table(candidates: &[&Candidate]) -> Markup {
 
 /// The numbers of a named effect one by one, where they are many.
 fn joints(candidate: &Candidate) -> Markup {
-    let many = candidate.parameters.iter().filter(|(_, size)| size.values.len() > 1);
-    let named: Vec<(String, Numbers)> =
-        many.map(|(name, size)| (name.replace('_', " "), numbers(&candidate.effect, name, size))).collect();
-    let groups: Vec<Group> = named.iter().map(|(heading, numbers)| numbers.group(heading, &[], |_| None)).collect();
+    let many = candidate.parameters.iter().filter(|(_, size)| size.values.len() > 1 && fitted(size));
+    let named: Vec<(String, Numbers, &Size)> =
+        many.map(|(name, size)| (name.replace('_', " "), numbers(&candidate.effect, name, size), size)).collect();
+    let not_fitted = |size: &Size, k| (!size.is_fitted(k)).then(|| "not fitted".to_owned());
+    let groups: Vec<Group> =
+        named.iter().map(|(heading, numbers, size)| numbers.group(heading, &[], |k| not_fitted(size, k))).collect();
     html! {
         @if !groups.is_empty() {
             figure { figcaption { "Size of " (words(&candidate.effect)) } (forest(&groups)) }
@@ -63,14 +70,25 @@ fn joints(candidate: &Candidate) -> Markup {
     }
 }
 
-/// The parameters of a candidate, one a line.
+/// The parameters of a candidate, one a line, with what was not fitted marked so.
 pub(in crate::report) fn sizes(candidate: &Candidate) -> Vec<String> {
-    candidate.parameters.iter().map(|(name, size)| numbers(&candidate.effect, name, size).line()).collect()
+    let line = |(name, size): (&String, &Size)| {
+        let line = numbers(&candidate.effect, name, size).line();
+        if fitted(size) { line } else { format!("{line} (default, not fitted)") }
+    };
+    candidate.parameters.iter().map(line).collect()
 }
 
-fn numbers<'a>(effect: &str, name: &'a str, size: &'a Size) -> Numbers<'a> {
-    let joints = of_joints(&format!("{effect}.{name}"));
-    Numbers { name, joints, unit: &size.unit, values: &size.values, intervals: &size.ci90 }
+fn fitted(size: &Size) -> bool {
+    (0..size.values.len()).any(|k| size.is_fitted(k))
+}
+
+/// What it adds to the shrink; nothing where it was not fitted.
+fn shrink(candidate: &Candidate) -> String {
+    if candidate.parameters.is_empty() {
+        return "not fitted".into();
+    }
+    percent_interval(candidate.shrink.value, candidate.shrink.ci90)
 }
 
 fn mark(status: Status) -> Markup {
@@ -87,7 +105,8 @@ fn bar(value: f64) -> Markup {
     let mut canvas = Canvas::new();
     canvas.rect("track", [0.0, 2.0], [BAR, 9.0]);
     canvas.rect("after", [0.0, 2.0], [BAR * value.clamp(0.0, 1.0), 9.0]);
-    html! { div { (probability(value)) } (canvas.finish([BAR, 13.0], &probability(value))) }
+    let words = limited(value, MOST);
+    html! { div { (words) } (canvas.finish([BAR, 13.0], &words)) }
 }
 
 fn confusable(candidate: &Candidate) -> Markup {
@@ -100,11 +119,11 @@ fn folded(candidates: &[&Candidate]) -> Markup {
         details {
             summary { (candidates.len()) " ruled out, with the reason" }
             table {
-                tr { th { "effect" } th { "gap closed" } th { "why not" } }
+                tr { th { "effect" } th { "shrink" } th { "why not" } }
                 @for candidate in candidates {
                     tr {
                         td { (words(&candidate.effect)) }
-                        td.nowrap { (percent_interval(candidate.shrink.value, candidate.shrink.ci90)) }
+                        td.nowrap { (shrink(candidate)) }
                         td { (candidate.why) }
                     }
                 }

@@ -14,9 +14,10 @@ pub(in crate::report) fn is_known(diagnosis: &Diagnosis) -> bool {
 /// How to read the bars.
 pub(super) fn reading(diagnosis: &Diagnosis) -> &'static str {
     if has_effects(diagnosis) {
-        "On clips that were used for nothing else. What lies beyond the dashed line can be explained."
+        "On held-out clips. Shrink: 1 \u{2212} after / before of the mean squared residual in \u{3c3}, the first pair of bars; an \
+         effect can at best bring it down to the dashed line."
     } else {
-        "On clips that were used for nothing else. What lies beyond the dashed line is more than noise."
+        "On held-out clips. What lies beyond the dashed line is more than noise."
     }
 }
 
@@ -26,7 +27,7 @@ pub(super) fn picture(diagnosis: &Diagnosis) -> Markup {
     let both = has_effects(diagnosis);
     let values = |before: f64, after: f64| if both { vec![before, after] } else { vec![before] };
     let mut rows = vec![Row {
-        name: "mean square, in sigma",
+        name: "mean squared residual",
         unit: "\u{3c3}\u{b2}",
         values: values(gap.before, gap.after),
         floor: Some(gap.floor),
@@ -41,8 +42,11 @@ pub(super) fn picture(diagnosis: &Diagnosis) -> Markup {
             rows.push(Row { name, unit, values: values(before, after), floor: None });
         }
     }
-    let entries =
-        [("before", "parameters identified first"), ("after", "with the effect"), ("floor", "what noise alone leaves")];
+    let entries = [
+        ("before", "baseline: gains and object identified"),
+        ("after", "with the effect"),
+        ("floor", "what noise alone leaves"),
+    ];
     html! {
         @if both { (legend(&entries)) } @else { (legend(&[entries[0], entries[2]])) }
         (bars(&["before", "after"], &rows))

@@ -8,9 +8,10 @@ pub(super) use gap::is_known;
 
 use super::figure::where_map::{Cell, where_map};
 use super::frame::{facts, figure, frame, unbroken};
-use super::share::{percent, percent_interval, probability};
+use super::share::{percent_interval, probability};
 use super::trace::gallery;
-use crate::diagnose::{Diagnosis, Kind};
+pub(super) use crate::diagnose::headline::words;
+use crate::diagnose::{Basis, Diagnosis, Kind, Verdict};
 use maud::{Markup, html};
 
 /// Clips whose residuals are shown.
@@ -22,7 +23,7 @@ pub fn page(diagnosis: &Diagnosis) -> String {
     let body = html! {
         (head(diagnosis))
         @if gap::is_known(diagnosis) {
-            (figure("How large the gap is, and how much of it goes", gap::reading(diagnosis), &gap::picture(diagnosis)))
+            (figure("How large the gap is, and how far it shrinks", gap::reading(diagnosis), &gap::picture(diagnosis)))
         }
         @if !diagnosis.places.is_empty() {
             (figure("Where it lies", "Share of the squared gap in each stage, channel and regime.", &map(diagnosis)))
@@ -53,13 +54,23 @@ pub(super) fn verdict_words(kind: Kind) -> &'static str {
         Kind::Named => "cause named",
         Kind::Class => "one of several causes",
         Kind::Unexplained => "cause unknown",
-        Kind::NotTestable => "cannot be told",
+        Kind::NotTestable => "not testable",
     }
 }
 
-/// An effect's name as words.
-pub(super) fn words(effect: &str) -> String {
-    effect.replace('_', " ")
+/// How sure a verdict is, and what that figure is; nothing where there is nothing to be sure of.
+pub(super) fn confidence(verdict: &Verdict) -> Option<(String, &'static str)> {
+    let value = probability(verdict.confidence);
+    match verdict.basis() {
+        Basis::Estimate => Some((value, "estimated from these clips")),
+        Basis::Limit => {
+            Some((format!("at most {value}"), "the limit: so many such verdicts were right on simulated sessions"))
+        }
+        Basis::Rate => {
+            Some((value, "so many such verdicts were right on simulated sessions; these clips are not in that figure"))
+        }
+        Basis::Nothing => None,
+    }
 }
 
 /// Names of effects that act together, as words.
@@ -74,21 +85,21 @@ pub(super) fn has_effects(diagnosis: &Diagnosis) -> bool {
 
 fn head(diagnosis: &Diagnosis) -> Markup {
     let (verdict, gap) = (&diagnosis.verdict, &diagnosis.gap);
-    let mut entries = vec![(probability(verdict.confidence), "confidence in this verdict")];
+    let mut entries: Vec<(String, &str)> = Vec::new();
     if has_effects(diagnosis) {
-        let closed = percent_interval(gap.shrink.value, gap.shrink.ci90);
-        entries.push((closed, "of the squared gap closed (90 % interval)"));
-        entries.push((percent(gap.explainable_fraction), "of what can be explained"));
+        entries.push((percent_interval(gap.shrink.value, gap.shrink.ci90), "shrink of the gap (90 % interval)"));
     }
-    let closed_by = diagnosis.nearest.as_ref().map(|nearest| {
-        let closed = percent_interval(nearest.shrink.value, nearest.shrink.ci90);
-        (closed, format!("of the squared gap closed by {} on clips held out", together(&nearest.effects)))
+    let nearest = diagnosis.nearest.as_ref().map(|nearest| {
+        let shrink = percent_interval(nearest.shrink.value, nearest.shrink.ci90);
+        (shrink, format!("shrink of the gap with {}, which leaves more than a cause does", together(&nearest.effects)))
     });
-    entries.extend(closed_by.iter().map(|(closed, what)| (closed.clone(), what.as_str())));
+    entries.extend(nearest.iter().map(|(shrink, what)| (shrink.clone(), what.as_str())));
+    let sure = confidence(verdict).map(|(value, what)| (value, format!("confidence: {what}")));
+    entries.extend(sure.iter().map(|(value, what)| (value.clone(), what.as_str())));
     html! {
         p.kicker { "Diagnosis of " b { (diagnosis.session) } ": " (verdict_words(verdict.kind)) }
         h1 { (unbroken(&verdict.text)) }
-        (facts(&entries))
+        @if !entries.is_empty() { (facts(&entries)) }
     }
 }
 
@@ -107,8 +118,8 @@ fn residuals(diagnosis: &Diagnosis) -> Markup {
         Kind::Class => format!("with {}", effects.iter().map(|effect| words(effect)).collect::<Vec<_>>().join(" or ")),
         _ => format!("with {}", together(effects)),
     };
-    let pictures = gallery(&diagnosis.traces, SHOWN_CLIPS, ["parameters identified first", &added]);
-    figure("Clips never used: measured less predicted", "The worst channel of the worst clips.", &pictures)
+    let pictures = gallery(&diagnosis.traces, SHOWN_CLIPS, ["baseline", &added]);
+    figure("Residuals on held-out clips: measured less predicted", "The worst channel of the worst clips.", &pictures)
 }
 
 fn remedies(diagnosis: &Diagnosis) -> Markup {
@@ -127,7 +138,8 @@ fn remedies(diagnosis: &Diagnosis) -> Markup {
 
 fn origin(diagnosis: &Diagnosis) -> Markup {
     let clips = &diagnosis.clips;
-    let used = [("fitted on", &clips.train), ("chosen on", &clips.choose), ("confirmed on", &clips.confirm)];
+    let used =
+        [("fitted to", &clips.train), ("chosen on", &clips.choose), ("held out: gap and shrink", &clips.confirm)];
     html! {
         section {
             h2 { "Where this comes from" }
@@ -138,7 +150,7 @@ fn origin(diagnosis: &Diagnosis) -> Markup {
                 dt { "took" } dd { (format!("{:.0} s", diagnosis.seconds)) }
             }
             @if let Some(file) = &diagnosis.theta_file {
-                p { "The parameters are in " code { (file.display()) } ". The gap with them, clip by clip:" }
+                p { "The parameters are in " code { (file.display()) } ". Joint and object errors with them, of every clip:" }
                 pre { code { "twin replay " (diagnosis.session) " --parameters " (file.display()) } }
             }
             details { summary { "theta.toml" } pre { code { (diagnosis.theta.to_toml()) } } }
@@ -166,10 +178,11 @@ pub(super) mod tests {
 
     fn candidate(effect: &str, probability: f64, status: Status) -> Candidate {
         let delay = Size { values: vec![0.0119], ci90: vec![[0.0112, 0.0126]], unit: "s".into() };
+        let creep = Size { values: vec![0.002], ci90: vec![[0.002; 2]], unit: "s".into() };
         Candidate {
             effect: effect.into(),
             probability,
-            parameters: BTreeMap::from([("delay".to_owned(), delay)]),
+            parameters: BTreeMap::from([("delay".to_owned(), delay), ("creep".to_owned(), creep)]),
             shrink: Share { value: 0.81, ci90: [0.76, 0.85] },
             confusable_with: vec!["camera_latency".into()],
             status,
@@ -182,7 +195,7 @@ pub(super) mod tests {
         let before = (0..30).map(|i| [0.1 * f64::from(i), 2.0 + f64::from(i).sin()]).collect();
         let trace = Trace {
             clip: "clip_05.mcap".into(),
-            channel: "joint2".into(),
+            channel: "joint 2".into(),
             unit: "rad".into(),
             sigma: 1.0,
             before,
@@ -247,13 +260,13 @@ pub(super) mod tests {
         let place = |text: &str| html.find(text).unwrap_or_else(|| panic!("no {text} in {html}"));
         let order = [
             "<h1>Commands reach the robot 12\u{a0}ms late &lt;here&gt;.</h1>",
-            "97 %",
             "96.3 [95.1, 97.2] %",
+            "at most 97 %",
             "38.4 \u{3c3}\u{b2}",
             "noise alone: 1.00 \u{3c3}\u{b2}",
             "13.9 mm",
             ">reversal<",
-            "clip_05, joint2",
+            "clip_05, joint 2",
             "\u{25cf} named",
             "delay 11.9 [11.2, 12.6] ms",
             "\u{25cb} possible",
@@ -273,6 +286,8 @@ pub(super) mod tests {
             assert!(place(pair[0]) < place(pair[1]), "{} comes after {}", pair[0], pair[1]);
         }
         assert!(!html.contains("ADD-S"), "what was not measured is not shown");
+        assert_eq!(html.matches("98.9 %").count(), 0, "one figure says how far the gap shrinks");
+        assert!(html.contains("creep 2.00 ms (default, not fitted)"), "a default is no result");
     }
 
     #[test]
@@ -288,14 +303,17 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn what_comes_nearest_to_an_unknown_cause_is_shown_with_what_it_closes() {
+    fn what_comes_nearest_to_an_unknown_cause_is_shown_with_its_shrink() {
         let mut diagnosis = named();
         diagnosis.verdict = Verdict { kind: Kind::Unexplained, effects: vec![], ..diagnosis.verdict };
         let effects = vec!["payload".into(), "joint_viscous_friction".into()];
         diagnosis.nearest = Some(Nearest { effects, shrink: Share { value: 0.84, ci90: [0.8, 0.88] } });
         let html = page(&diagnosis);
-        for text in ["84 [80, 88] %", "closed by payload and joint viscous friction", "with payload and joint viscous"]
-        {
+        for text in [
+            "84 [80, 88] %",
+            "with payload and joint viscous friction, which leaves more",
+            "so many such verdicts were right",
+        ] {
             assert!(html.contains(text), "no {text} in {html}");
         }
     }
@@ -309,7 +327,10 @@ pub(super) mod tests {
         diagnosis.places.clear();
         let html = page(&diagnosis);
         assert!(
-            html.contains("cannot be told") && !html.contains("How large the gap is") && !html.contains("Candidates")
+            html.contains("not testable")
+                && !html.contains("confidence")
+                && !html.contains("How large the gap is")
+                && !html.contains("Candidates")
         );
     }
 }

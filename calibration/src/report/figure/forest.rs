@@ -27,7 +27,7 @@ pub(in crate::report) struct Row {
     pub(in crate::report) interval: [f64; 2],
     /// What cell.toml says.
     pub(in crate::report) nominal: Option<f64>,
-    /// A remark: `at its bound`, `cannot be told`.
+    /// A remark: `at its bound`, `not identifiable`.
     pub(in crate::report) warning: Option<String>,
 }
 

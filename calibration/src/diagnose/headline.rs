@@ -1,0 +1,187 @@
+//! The finding in one sentence of plain words: how large the gap is and where, which effect causes it, how far it shrinks.
+
+use super::answer::Kind;
+use super::verdict::{Decision, Finding};
+use crate::report::percent;
+
+/// What the sentence is made of, beside the finding itself.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Facts {
+    /// How large the gap is: `2.13 mrad RMS`.
+    pub size: String,
+    /// Where it is largest: `joint 2 (reversal)`; empty where it is nowhere.
+    pub place: String,
+    /// Where it is largest once the effects are in the twin.
+    pub rest: String,
+    /// The effects found, each with its size: `command delay (delay 11.9 ms)`.
+    pub effects: Vec<String>,
+    /// The shrink with all of them in the twin, see [`super::gap::Residuals::shrink`].
+    pub shrink: f64,
+}
+
+/// Residuals beyond this multiple of the noise are said, even where they are no gap.
+const ROUGH: f64 = 1.25;
+
+/// The sentence.
+#[must_use]
+pub fn sentence(decision: &Decision, finding: &Finding<'_>, facts: &Facts) -> String {
+    match decision.kind {
+        Kind::None => none(finding, facts),
+        Kind::Named => named(finding, facts),
+        Kind::Class => class(finding, facts),
+        Kind::Unexplained | Kind::NotTestable => unexplained(decision, finding, facts),
+    }
+}
+
+/// The shrink as it stands in a sentence.
+fn shrink(facts: &Facts) -> String {
+    percent(facts.shrink).replace("> ", "more than ").replace("< ", "less than ")
+}
+
+/// An effect's name as words.
+#[must_use]
+pub fn words(effect: &str) -> String {
+    effect.replace('_', " ")
+}
+
+fn none(finding: &Finding<'_>, Facts { size, .. }: &Facts) -> String {
+    let times = finding.times_noise();
+    if times < ROUGH {
+        return format!(
+            "No gap: with the parameters identified, twin and cell differ by {size}, as noise alone makes them."
+        );
+    }
+    format!(
+        "No gap to explain: with the parameters identified, twin and cell differ by {size}, {times:.1} times what noise alone \
+         leaves but no more than two simulations of one cell, and no effect predicts the difference."
+    )
+}
+
+fn named(finding: &Finding<'_>, facts: &Facts) -> String {
+    let (verb, these) = if facts.effects.len() == 1 { ("causes", "it") } else { ("together cause", "them") };
+    let (whose, rest) = match finding.open() {
+        Some(_) if !facts.rest.is_empty() => (
+            "the arm's part of the gap",
+            format!("; what the object does, most of it in {}, stays unexplained", facts.rest),
+        ),
+        _ => ("the gap", String::new()),
+    };
+    format!(
+        "{} {verb} {whose}, {}: with {these} in the twin the gap shrinks by {} on held-out clips{rest}.",
+        facts.effects.join(" and "),
+        size_and_place(facts),
+        shrink(facts)
+    )
+}
+
+fn class(finding: &Finding<'_>, facts: &Facts) -> String {
+    let rivals = finding.rivals.iter().map(|rival| words(rival));
+    let all: Vec<String> = facts.effects.iter().cloned().chain(rivals).collect();
+    let these = if facts.effects.len() == 1 { "the first" } else { "those whose size is given" };
+    format!(
+        "One of {} causes the gap, {}: with {these} in the twin the gap shrinks by {} on held-out clips, and these clips cannot \
+         separate them.",
+        all.join(", "),
+        size_and_place(facts),
+        shrink(facts)
+    )
+}
+
+fn unexplained(decision: &Decision, finding: &Finding<'_>, facts: &Facts) -> String {
+    let nearest = if facts.effects.is_empty() {
+        String::new()
+    } else {
+        let strength = if finding.implausible { ", stronger than it is met in practice," } else { "" };
+        let shrinks = if finding.confirmed {
+            format!("shrinks it by {} on held-out clips and leaves more than a cause does", shrink(facts))
+        } else {
+            "does not shrink it on the clips kept for confirming".to_owned()
+        };
+        format!("; {} comes nearest{strength} but {shrinks}", facts.effects.join(" with "))
+    };
+    let drift = finding.drift.map_or_else(String::new, |change| {
+        let (verb, share) = (if change > 0.0 { "rises" } else { "falls" }, percent(change.abs()));
+        format!(
+            "; from the first clip to the last the friction {verb} by {share}, as where a table wears or gets dirty"
+        )
+    });
+    let weak = if decision.little {
+        "; an effect of the library may also act too weakly to be identified in so small a gap"
+    } else {
+        ""
+    };
+    format!(
+        "No effect of the library explains the gap, {}, {:.1} times what noise alone leaves{nearest}{drift}{weak}.",
+        size_and_place(facts),
+        finding.times_noise()
+    )
+}
+
+/// `2.13 mrad RMS, largest in joint 2 (reversal)`.
+fn size_and_place(Facts { size, place, .. }: &Facts) -> String {
+    if place.is_empty() { size.clone() } else { format!("{size}, largest in {place}") }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::verdict::tests::finding;
+    use super::*;
+
+    fn facts(effects: &[&str]) -> Facts {
+        Facts {
+            size: "2.13 mrad RMS".into(),
+            place: "joint 2 (reversal)".into(),
+            rest: "yaw (after the slide)".into(),
+            effects: effects.iter().map(|name| (*name).to_owned()).collect(),
+            shrink: 0.963,
+        }
+    }
+
+    fn said(finding: &Finding<'_>, effects: &[&str]) -> String {
+        sentence(&finding.decide(), finding, &facts(effects))
+    }
+
+    #[test]
+    fn the_headline_says_effect_size_place_and_the_one_shrink() {
+        assert_eq!(
+            said(&finding(vec!["command_delay"], 500.0, 1.5), &["command delay (delay 11.9 ms)"]),
+            "command delay (delay 11.9 ms) causes the gap, 2.13 mrad RMS, largest in joint 2 (reversal): with it in the twin \
+             the gap shrinks by 96 % on held-out clips."
+        );
+        let class = Finding { rivals: vec!["command_lag"], ..finding(vec!["command_delay"], 500.0, 1.5) };
+        let text = said(&class, &["command delay (delay 11.9 ms)"]);
+        assert!(
+            text.starts_with("One of command delay (delay 11.9 ms), command lag causes the gap, 2.13 mrad"),
+            "{text}"
+        );
+        assert!(text.contains("with the first in the twin the gap shrinks by 96 %"), "{text}");
+    }
+
+    #[test]
+    fn where_nothing_is_found_the_size_is_said_in_noise() {
+        let text = said(&finding(vec![], 4.0, 4.0), &[]);
+        assert!(text.contains("2.0 times what noise alone leaves"), "{text}");
+        assert!(said(&finding(vec![], 1.5, 1.5), &[]).starts_with("No gap: "));
+        let text = said(&finding(vec!["payload"], 500.0, 200.0), &["payload (mass 0.4 kg)"]);
+        assert!(text.starts_with("No effect of the library explains the gap, 2.13 mrad RMS"), "{text}");
+        assert!(text.contains("payload (mass 0.4 kg) comes nearest but shrinks it by 96 %"), "{text}");
+        let pushed = Finding { implausible: true, ..finding(vec!["payload"], 500.0, 6.5) };
+        assert!(said(&pushed, &["payload"]).contains("stronger than it is met in practice"));
+        let worn = Finding { drift: Some(0.38), ..finding(vec![], 4.0, 4.0) };
+        assert!(said(&worn, &[]).contains("the friction rises by 38 %"));
+    }
+
+    #[test]
+    fn where_only_the_arm_is_explained_it_is_said_what_the_object_leaves() {
+        use super::super::leftovers::Left;
+        let mut found = finding(vec!["command_delay"], 5e5, 1.5);
+        let arm = found.left[0];
+        found.left.push(Left { of_object: true, before: 301.0, after: 91.0, ..arm });
+        let text = said(&found, &["command delay"]);
+        assert!(text.starts_with("command delay causes the arm's part of the gap"), "{text}");
+        assert!(
+            text.ends_with("what the object does, most of it in yaw (after the slide), stays unexplained."),
+            "{text}"
+        );
+    }
+}
