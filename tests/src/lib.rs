@@ -5,6 +5,7 @@
 
 mod bench;
 mod program;
+pub mod texts;
 
 pub use bench::{Cell, lab_cell};
 pub use program::{Finished, Program, program_path};
