@@ -12,6 +12,8 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
+/// A bar and what stands behind it are at most so many columns wide.
+const COLUMNS: usize = 79;
 /// Signs of a full bar.
 const SIGNS: usize = 20;
 /// How often a bar is drawn at most.
@@ -147,7 +149,9 @@ fn bar(title: &str, share: f64, left: Option<Duration>, note: &str) -> String {
     let done = (share * SIGNS as f64) as usize;
     let head = if done < SIGNS { ">" } else { "" };
     let signs = format!("{}{head}", "=".repeat(done));
-    format!("{title} [{signs:SIGNS$}] {}", state(share, left, note))
+    let line = format!("{title} [{signs:SIGNS$}] {}", state(share, left, note));
+    // A line that a terminal breaks is not overwritten by the next one.
+    line.chars().take(COLUMNS).collect()
 }
 
 /// `identify: 40 %, 2 min 10 s left, 120 clips simulated`

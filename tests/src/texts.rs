@@ -38,12 +38,13 @@ impl Verb {
         let mut open = false;
         for line in after.lines() {
             let begins = line.starts_with(&begin);
-            // A long one goes on in the next line, which is indented as well.
-            match found.last_mut().filter(|_| open && !begins && line.starts_with("  ")) {
-                Some(example) => *example = format!("{example} {}", line.trim()),
-                None => found.extend(begins.then(|| line.trim().to_owned())),
+            // A long one goes on in the next line, as for a shell.
+            let text = line.trim().trim_end_matches('\\').trim_end();
+            match found.last_mut().filter(|_| open) {
+                Some(example) => *example = format!("{example} {text}"),
+                None => found.extend(begins.then(|| text.to_owned())),
             }
-            open = line.starts_with("  ");
+            open = line.ends_with('\\') && (open || begins);
         }
         found
     }
@@ -199,7 +200,7 @@ mod tests {
         assert_eq!(flags_in("give --start x, `--cell=a` or a--b; -- no"), ["start", "cell"]);
         assert_eq!(
             code_in("say `twin replay` or\n```sh\ncargo build\n```\n`x`"),
-            ["twin replay", "sh", "cargo build", "", "x"]
+            ["twin replay", "sh", "cargo build", "x"]
         );
     }
 }

@@ -121,10 +121,9 @@ fn one_option_has_one_placeholder_and_all_are_spelled_alike() {
             }
         }
     }
-    // What is written, drawn or begun from differs from verb to verb; what is read does not.
-    for option in
-        ["--cell", "--parameters", "--effects", "--duration", "--wait", "--budget", "--seed", "--hand", "--arm"]
-    {
+    // What is written, drawn or begun from differs from verb to verb, and a budget is one of simulations or of seconds; what is
+    // read does not.
+    for option in ["--cell", "--parameters", "--effects", "--duration", "--wait", "--seed", "--hand", "--arm"] {
         let names = placeholders.get(option).unwrap_or_else(|| panic!("no verb has {option}"));
         assert_eq!(names.len(), 1, "{option}: {names:?}");
     }

@@ -136,14 +136,14 @@ fn ended(
         running.listens_to(signal) || !running.is_running()
     });
     std::thread::sleep(moment);
-    if !running.is_running() {
-        // Its outputs make room for the next one.
+    let end = if running.is_running() { Some(running.end_by(signal)) } else { None };
+    let Some(end) = end.filter(|end| says.is_empty() || !end.status.success()) else {
+        // It was done before the signal came. Its outputs make room for the next one.
         let files =
             ["theta.toml", "swarm.toml", "d.json", "found.toml"].map(|name| std::fs::remove_file(cell.path(name)));
         let _may_not_be_there = (files, std::fs::remove_dir_all(cell.path("new")));
         return None;
-    }
-    let end = running.end_by(signal);
+    };
     assert!(end.stderr.contains(says), "{program} {line}, {signal:?} after {moment:?}:\n{}", end.stderr);
     assert!(!end.stderr.contains("panicked"), "{}", end.stderr);
     Some(end.took)

@@ -151,21 +151,21 @@ impl Run<'_> {
         mut search: impl Search,
     ) -> Result<Outcome, RunError> {
         let all = Watched { model, watch };
-        let told: Vec<Vec<f64>> = self.kept.known(&step("told")).unwrap_or_default();
-        watch.already(told.iter().map(Vec::len).sum::<usize>() * model.clips());
-        let mut so_far = told.clone();
+        let answers: Vec<Vec<f64>> = self.kept.known(&step("answers")).unwrap_or_default();
+        watch.already(answers.iter().map(Vec::len).sum::<usize>() * model.clips());
+        let mut so_far = answers.clone();
         let found: Found = minimise(
             &mut search,
             self.unknowns,
             self.budget,
-            &told,
+            &answers,
             |x| self.cost(&all, x),
             |costs, _| {
                 if self.interrupt.asked() {
                     return false;
                 }
                 so_far.push(costs.to_vec());
-                self.kept.keep(&step("told"), &so_far);
+                self.kept.keep(&step("answers"), &so_far);
                 true
             },
         );

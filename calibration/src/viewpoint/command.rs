@@ -243,7 +243,7 @@ fn gather(options: &Options, kind: PictureKind) -> anyhow::Result<(Cell, Vec<Tak
     let given = options.kind.is_some() || kind == PictureKind::Color;
     ensure!(
         !shots.is_empty() || !given,
-        "{}: no clip of the session holds {} pictures with joints at their time; record with `--camera`, or give images",
+        "{}: no clip of the session holds {} pictures with joints at their time; record with `rt_bridge run --camera`, or give images",
         session.folder.display(),
         if kind == PictureKind::Color { "colour" } else { "depth" }
     );

@@ -190,7 +190,7 @@ mod tests {
         for middle in [38.2, 39.0, 39.5, 40.4] {
             let row = |i: usize, _| grid.sample(middle + i as f64 - f64::from(SIDE), 1.0).expect("inside");
             let edge = profiles.edge(&[Samples::from_fn(row)]).expect("an edge");
-            assert!((middle + edge.away - 39.5).abs() < 0.05, "{edge:?} from {middle}");
+            assert!((middle + edge.away - 39.5).abs() < 0.1, "{edge:?} from {middle}");
             assert!((edge.contrast - 110.0).abs() < 12.0 && edge.explained > 0.99, "{edge:?}");
         }
         let even = Samples::repeat(7.0);

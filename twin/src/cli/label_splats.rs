@@ -92,7 +92,8 @@ impl LabelSplats {
         let mut q = [0.0; MAX_JOINTS];
         q[..dof].copy_from_slice(&self.joints);
         let start = self.start()?;
-        let links = (0..robot.parts().len()).map(link_file);
+        let count = robot.links().into_iter().max().map_or(0, |most| most + 1);
+        let links = (0..count).map(link_file);
         let place = |name: String| Destination::in_new_folder(&self.out.join(name), self.force);
         let mut places = links.chain([REST.to_owned()]).map(place).collect::<Result<Vec<_>, _>>()?.into_iter();
         let scan = SplatCloud::read(&self.scan)?;
