@@ -175,10 +175,14 @@ fn every_command_that_takes_long_ends_within_a_second() {
     let cell = material();
     for (number, command) in commands().iter().enumerate() {
         let signal = if number % 2 == 0 { Signal::INT } else { Signal::TERM };
-        let took = ended(&cell, command, signal, Duration::from_millis(300));
+        // On a fast machine some are done soon.
+        let took = [300, 100, 30, 0].into_iter().find_map(|moment| {
+            let took = ended(&cell, command, signal, Duration::from_millis(moment));
+            clear(&cell);
+            took
+        });
         let took = took.unwrap_or_else(|| panic!("{} was done before it could be interrupted", command.1));
         assert!(took < most(command), "{} {}: {took:?} from {signal:?} to its end", command.0, command.1);
-        clear(&cell);
     }
 }
 

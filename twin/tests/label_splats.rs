@@ -112,13 +112,13 @@ fn the_command_writes_links_that_can_be_drawn_and_refuses_what_shows_no_robot() 
     let (file, out) = (folder.path().join("scan.ply"), folder.path().join("links"));
     let (in_base, _) = scanned_cell();
     in_base.moved(&base_from_scan().inverse()).write(&file).expect("written");
-    let run = |joints: &str, start: &str| {
+    let run = |out: &Path, joints: &str, start: &str| {
         let mut command = Command::new(env!("CARGO_BIN_EXE_twin"));
         command.arg("label-splats").arg(&file).arg("--cell").arg(cell_file());
-        command.args(["--joints", joints, "--start", start, "--json", "--out"]).arg(&out);
+        command.args(["--joints", joints, "--start", start, "--json", "--out"]).arg(out);
         command.output().expect("the twin binary")
     };
-    let good = run(JOINTS, "0,0,0,1,0,0,0,0.41");
+    let good = run(&out, JOINTS, "0,0,0,1,0,0,0,0.41");
     assert!(good.status.success(), "{}", String::from_utf8_lossy(&good.stderr));
     let json: serde_json::Value = serde_json::from_slice(&good.stdout).expect("one JSON object");
     assert!((json["scale"].as_f64().expect("a scale") - 0.41).abs() < 0.002, "{json}");
@@ -135,7 +135,7 @@ fn the_command_writes_links_that_can_be_drawn_and_refuses_what_shows_no_robot() 
         ("0,0,0", "0,0,0,1,0,0,0,0.41", "7 joints"),
         (JOINTS, "0,0,0,0,0,0,0", "no pose"),
     ] {
-        let bad = run(joints, start);
+        let bad = run(&folder.path().join("none"), joints, start);
         let line = String::from_utf8_lossy(&bad.stderr).into_owned();
         assert!(!bad.status.success() && line.contains(told) && line.lines().count() == 1, "{line}");
     }
