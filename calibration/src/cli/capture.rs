@@ -123,7 +123,7 @@ pub(super) struct ExcitationArguments {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(2..=64))]
     poses: Option<u32>,
     /// Seed of the motions; clip number N of a session is drawn from seed + N. It may be negative.
-    #[arg(value_name = "N", long, default_value_t = 0, allow_negative_numbers = true)]
+    #[arg(long, value_name = "N", default_value_t = 0, allow_negative_numbers = true)]
     seed: i64,
     /// Prints one JSON object on stdout at the end.
     #[arg(long)]

@@ -67,6 +67,27 @@ pub struct Verdict {
     pub confidence: f64,
     /// One sentence that a person understands.
     pub text: String,
+    /// Share of the squared gap that the effects close on held-out clips, where they are named on a gap that is not closed
+    /// whole.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub explained_share: Option<Share>,
+    /// What they leave of it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rest: Option<Rest>,
+}
+
+/// What named effects leave of a gap, on held-out clips.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct Rest {
+    /// Root mean square over joints and time [rad]; none without an arm.
+    pub joint_rms_rad: Option<f64>,
+    /// Mean ADD [m]; none without an object.
+    pub object_add_m: Option<f64>,
+    /// Where it is largest, in words: `joint 2 (fast forward)`.
+    #[serde(rename = "where")]
+    pub place: String,
+    /// The effect whose signature explains most of it; none where no effect's explains much.
+    pub looks_like: Option<String>,
 }
 
 /// What the confidence of a verdict is.

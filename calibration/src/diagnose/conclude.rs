@@ -2,7 +2,7 @@
 
 use super::admit::Admitted;
 use super::advice::Advice;
-use super::answer::{Change, Clips, Diagnosis, Gap, Nearest, Place, Share, Verdict};
+use super::answer::{Change, Clips, Diagnosis, Gap, Nearest, Place, Rest, Share, Verdict};
 use super::combine::{Found, Step};
 use super::evidence::Evidence;
 use super::fit::{Bench, Hypothesis};
@@ -14,7 +14,8 @@ use super::site::Site;
 use super::split::Split;
 use super::verdict::{self, Finding};
 use super::{
-    DiagnoseError, Kind, Options, advice, combine, confidence, drift, localise, parameters, ranked, remedies, settle,
+    DiagnoseError, Kind, Options, advice, combine, confidence, drift, localise, parameters, partly, ranked, remedies,
+    settle,
 };
 use crate::report::{Trace, channel_in_words, effect_in_words, in_unit};
 use shared_mem::recording::Session;
@@ -88,10 +89,14 @@ pub fn conclude<E: Evidence>(
     let unforeseen = found.unforeseen(bench);
     let finding = finding(bench, (split, found), &unforeseen, (left, confirmed));
     let decision = finding.decide();
-    let believed = matches!(decision.kind, Kind::Named | Kind::Class);
+    let tried = decision.kind == Kind::Unexplained;
+    let partly = tried.then(|| partly::proven(bench, (split, found), &before, &unforeseen, options.seed)).flatten();
+    let (found, after) = partly.as_ref().map_or((found, &after), |partly| (&partly.found, &partly.after));
+    let rest = if partly.is_some() { localise::localise(bench.evidence, after) } else { rest };
+    let believed = partly.is_some() || matches!(decision.kind, Kind::Named | Kind::Class);
     let kept = if believed { &found.last } else { &first.from };
-    let shown = if believed { &after } else { &before };
-    let some = decision.kind == Kind::Unexplained && confirmed && !finding.effects.is_empty();
+    let shown = if believed { after } else { &before };
+    let some = tried && partly.is_none() && confirmed && !finding.effects.is_empty();
     let nearest = some.then(|| Nearest {
         effects: finding.effects.iter().map(|name| (*name).to_owned()).collect(),
         shrink: after.shrink(&before, options.seed),
@@ -105,8 +110,25 @@ pub fn conclude<E: Evidence>(
         effects: found.last.effects.iter().map(|effect| with_size(bench, &found.last, *effect)).collect(),
         shrink: after.shrink(&before, options.seed).value,
     };
-    let text = headline::sentence(&decision, &finding, &facts);
-    let verdict = decision.said(text);
+    let verdict = match &partly {
+        Some(partly) => {
+            let looks_like = partly.looks_like(bench);
+            let stays = size_in_words(joints.after, add.after.filter(|_| of_object));
+            let text = headline::in_part(&facts, &partly.share, &stays, looks_like);
+            let rest = Rest {
+                joint_rms_rad: joints.after,
+                object_add_m: add.after,
+                place: facts.rest.clone(),
+                looks_like: looks_like.map(str::to_owned),
+            };
+            let (kind, effects, confidence) = (Kind::Named, partly.effects(bench), sureness(found));
+            Verdict { kind, effects, confidence, text, explained_share: Some(partly.share), rest: Some(rest) }
+        }
+        None => {
+            let text = headline::sentence(&decision, &finding, &facts);
+            decision.said(text)
+        }
+    };
     let gap = Gap {
         unit: "sigma",
         before: before.mean_square(),
@@ -120,7 +142,8 @@ pub fn conclude<E: Evidence>(
     };
     let names = |set: &[usize]| set.iter().map(|clip| admitted.files[*clip].clone()).collect();
     let largest = rest.first().map(|place| (place.channel.as_str(), place.regime.as_str()));
-    let next = next(&verdict, finding.open().is_some(), largest, &Site::of(session));
+    let open = partly.is_some() || finding.open().is_some();
+    let next = next(&verdict, open, largest, &Site::of(session));
     let theta = bench.library.theta(&kept.full);
     // Of an object that no clip shows nothing was found but what was given.
     let given = options.theta.as_ref().and_then(|theta| theta.object.clone());
@@ -131,7 +154,7 @@ pub fn conclude<E: Evidence>(
             bench,
             (found, unforeseen[0]),
             split,
-            (&before, &after, &finding),
+            (&before, after, &finding),
             verdict.kind,
             options.seed,
         ),
@@ -148,7 +171,7 @@ pub fn conclude<E: Evidence>(
         seed: options.seed,
         theta: Theta { object, ..theta },
         theta_file: None,
-        traces: traces(bench.evidence, (&before, if nearest.is_some() { &after } else { shown }), &admitted.files),
+        traces: traces(bench.evidence, (&before, if nearest.is_some() { after } else { shown }), &admitted.files),
         nearest,
     })
 }
@@ -201,20 +224,18 @@ fn finding<'a, E: Evidence>(
 ) -> Finding<'a> {
     let name = |effect: &usize| bench.library.candidates[*effect].effect.name;
     let mut rivals = Vec::new();
-    let (mut sure, mut clear): (f64, bool) = (1.0, true);
+    let mut clear = true;
     for (place, effect) in found.kept() {
         let step = &found.steps[place];
         clear &= step.is_clear(bench.library, effect);
         let others = confidence::rivals(step, effect, unforeseen[place]);
         let others = others.into_iter().filter(|other| !found.last.effects.contains(other));
         rivals.extend(others.filter(|other| stands_in(bench, split, found, (step, effect), *other)).map(|k| name(&k)));
-        let all = confidence::probabilities(&step.trials, false);
-        sure = sure.min(all.iter().find(|(candidate, _)| *candidate == effect).map_or(0.5, |(_, p)| *p));
     }
     Finding {
         effects: found.last.effects.iter().map(name).collect(),
         rivals,
-        confidence: sure,
+        confidence: sureness(found),
         clear,
         of_arm: found.last.effects.iter().all(|effect| bench.library.candidates[*effect].is_of_arm()),
         left,
@@ -222,6 +243,15 @@ fn finding<'a, E: Evidence>(
         implausible: !leftovers::implausible(bench, &found.last).is_empty(),
         drift: drift::of_friction(&bench.scatter, &found.last),
     }
+}
+
+/// How sure the weakest of the effects that were found is.
+fn sureness(found: &Found) -> f64 {
+    let of = |(place, effect): (usize, usize)| {
+        let all = confidence::probabilities(&found.steps[place].trials, false);
+        all.iter().find(|(candidate, _)| *candidate == effect).map_or(0.5, |(_, p)| *p)
+    };
+    found.kept().map(of).fold(1.0, f64::min)
 }
 
 /// Whether a rival of an effect does as well in its place beside all the others that were found: where several act, what one

@@ -15,6 +15,8 @@ pub struct Residuals {
     pub clips: Vec<(usize, Vec<f64>)>,
     /// For each clip and group of sensors (arm, object; those that there are) the sum of squares and the number of residuals.
     sums: Vec<Vec<(f64, f64)>>,
+    /// The same of every piece of a clip: whole clips where there are enough of them.
+    pieces: Vec<Vec<(f64, f64)>>,
     /// The same of what noise and straying alone would leave.
     floors: Vec<Vec<(f64, f64)>>,
 }
@@ -44,9 +46,12 @@ impl Residuals {
             Some((*clip, out))
         };
         let clips: Vec<(usize, Vec<f64>)> = clips.par_iter().map(one).collect::<Option<_>>()?;
+        let cut = DRAWN_FROM.div_ceil(clips.len().max(1));
+        let in_pieces = |(clip, residuals): &(usize, Vec<f64>)| pieces(bench.evidence, *clip, residuals, cut);
+        let pieces = clips.iter().flat_map(in_pieces).collect();
         let sums = clips.iter().map(|(clip, residuals)| sums(bench.evidence, *clip, residuals)).collect();
         let floors = clips.iter().map(|(clip, _)| sums_of_noise(bench, *clip)).collect();
-        Some(Self { clips, sums, floors })
+        Some(Self { clips, sums, pieces, floors })
     }
 
     /// What noise and straying alone would leave of [`Self::mean_square`].
@@ -79,7 +84,8 @@ impl Residuals {
         mean(&self.sums, &(0..self.clips.len()).collect::<Vec<_>>())
     }
 
-    /// The shrink `1 - after / before` of the mean square from `before` to this, with an interval from drawing clips anew.
+    /// The shrink `1 - after / before` of the mean square from `before` to this, with an interval from drawing clips anew,
+    /// or pieces of them where there are few.
     #[must_use]
     pub fn shrink(&self, before: &Self, seed: u64) -> Share {
         self.shrink_added(before, before, seed)
@@ -90,10 +96,10 @@ impl Residuals {
     #[must_use]
     pub fn shrink_added(&self, from: &Self, before: &Self, seed: u64) -> Share {
         let of = |drawn: &[usize]| {
-            let [from, after, before] = [from, self, before].map(|residuals| mean(&residuals.sums, drawn));
+            let [from, after, before] = [from, self, before].map(|residuals| mean(&residuals.pieces, drawn));
             ((from - after) / before.max(f64::MIN_POSITIVE)).max(DOUBLED)
         };
-        let all: Vec<usize> = (0..self.sums.len()).collect();
+        let all: Vec<usize> = (0..self.pieces.len()).collect();
         let mut rng = Pcg64::seed_from_u64(seed);
         let mut drawn: Vec<f64> =
             (0..DRAWS).map(|_| of(&all.iter().map(|_| rng.random_range(0..all.len())).collect::<Vec<_>>())).collect();
@@ -110,13 +116,24 @@ pub const DOUBLED: f64 = -1.0;
 /// Draws of the bootstrap.
 const DRAWS: usize = 1000;
 
+/// It draws from at least so many pieces: from fewer an interval is far too narrow.
+const DRAWN_FROM: usize = 8;
+
 fn sums(evidence: &impl Evidence, clip: usize, residuals: &[f64]) -> Vec<(f64, f64)> {
-    let mut sums = vec![(0.0, 0.0); 2];
-    for (row, residual) in evidence.rows(clip).iter().zip(residuals) {
-        let group = &mut sums[usize::from(evidence.channels()[row.channel].joint.is_none())];
+    pieces(evidence, clip, residuals, 1).swap_remove(0)
+}
+
+/// Sums of a clip cut into so many pieces of the same duration.
+fn pieces(evidence: &impl Evidence, clip: usize, residuals: &[f64], cut: usize) -> Vec<Vec<(f64, f64)>> {
+    let rows = evidence.rows(clip);
+    let last = rows.iter().map(|row| row.time).fold(f64::MIN_POSITIVE, f64::max);
+    let mut pieces = vec![vec![(0.0, 0.0); 2]; cut];
+    for (row, residual) in rows.iter().zip(residuals) {
+        let piece = ((row.time / last * cut as f64) as usize).min(cut - 1);
+        let group = &mut pieces[piece][usize::from(evidence.channels()[row.channel].joint.is_none())];
         *group = (group.0 + residual * residual, group.1 + 1.0);
     }
-    sums
+    pieces
 }
 
 /// The sums that noise of one sigma and own numbers that stray as assumed would give.
@@ -147,12 +164,19 @@ fn mean(sums: &[Vec<(f64, f64)>], drawn: &[usize]) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use super::super::library::Library;
+    use super::super::test_bench::{ONCE, on_bench, shipped, truth, with_effect};
     use super::*;
+    use crate::benchmark::world::Kind;
+    use crate::forward::setting;
+    use shared_mem::msg::MAX_JOINTS;
 
     fn residuals(sizes: &[f64]) -> Residuals {
         let clips = sizes.iter().enumerate().map(|(clip, size)| (clip, vec![*size; 10])).collect();
         let sums = |size: &f64| vec![(10.0 * size * size, 10.0), (0.0, 0.0)];
-        Residuals { clips, sums: sizes.iter().map(sums).collect(), floors: sizes.iter().map(|_| sums(&1.0)).collect() }
+        let floors = sizes.iter().map(|_| sums(&1.0)).collect();
+        let sums: Vec<_> = sizes.iter().map(sums).collect();
+        Residuals { clips, pieces: sums.clone(), sums, floors }
     }
 
     #[test]
@@ -166,6 +190,21 @@ mod tests {
         let shrink = residuals(&[1e53, 1.0, 1.0, 1.0]).shrink(&residuals(&[2.0; 4]), 1);
         assert_eq!((shrink.value, shrink.ci90[0]), (DOUBLED, DOUBLED));
         assert!(shrink.ci90[1] <= 0.75, "{shrink:?}");
+    }
+
+    #[test]
+    fn the_shrink_of_a_single_clip_has_an_interval() {
+        let (cell, base) = (shipped(), setting::complete(&shipped(), None).expect("a cell"));
+        let world = with_effect("command_delay", 3, Kind::Excitation, &cell);
+        let library = Library::new(&cell, &base, None, &[87.0; MAX_JOINTS]);
+        on_bench((&cell, &world), &library, |bench, even| {
+            let [baseline, found] = [library.start(), truth(&library, &world)]
+                .map(|full| bench.fit((&[], full), &[0], even, None, ONCE).expect("a fit"));
+            let [before, after] =
+                [baseline, found].map(|fit| Residuals::at(bench, &fit, &[1]).expect("it can be simulated"));
+            let shrink = after.shrink(&before, 1);
+            assert!(before.pieces.len() == DRAWN_FROM && shrink.ci90[1] - shrink.ci90[0] > 1e-4, "{shrink:?}");
+        });
     }
 
     #[test]

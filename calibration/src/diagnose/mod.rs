@@ -27,6 +27,7 @@
 //! | [`flat`] | which of their numbers nothing depends on |
 //! | [`leftovers`], [`drift`] | what they leave |
 //! | [`gap`], [`localise`] | how large the gap is, and where |
+//! | `partly` | what is proven although a part of the gap stays |
 //! | [`parameters`], [`confidence`], [`verdict`], [`headline`] | what is said about it |
 //! | [`advice`], [`site`] | what to record next, and the commands for it |
 //! | [`remedies`] | what to do about what was named |
@@ -63,6 +64,7 @@ pub mod library;
 pub mod localise;
 pub mod noise;
 pub mod parameters;
+mod partly;
 pub mod quadratic;
 pub mod ranked;
 mod reason;
@@ -87,7 +89,9 @@ pub mod worthy;
 
 pub use remedies::Remedy;
 
-pub use answer::{Basis, Candidate, Change, Clips, Diagnosis, Gap, Kind, Nearest, Place, Share, Size, Status, Verdict};
+pub use answer::{
+    Basis, Candidate, Change, Clips, Diagnosis, Gap, Kind, Nearest, Place, Rest, Share, Size, Status, Verdict,
+};
 
 use crate::forward::object::ObjectClips;
 use crate::forward::setting::{self, BaseError};

@@ -48,7 +48,8 @@ mod tests {
         let text = "[[effect]]\nname = \"table_tilt\"\ntilt = [0.0, 0.04]\n[[effect]]\nname = \"command_delay\"\ndelay = 0.012\n";
         let theta: Theta = toml_file::parse(text, Path::new("theta.toml")).expect("a theta.toml");
         let effects = vec!["command_delay".to_owned(), "table_tilt".to_owned()];
-        let mut verdict = Verdict { kind: Kind::Named, effects, confidence: 0.9, text: String::new() };
+        let (text, explained_share, rest) = (String::new(), None, None);
+        let mut verdict = Verdict { kind: Kind::Named, effects, confidence: 0.9, text, explained_share, rest };
         let found = of(&verdict, &theta, &Cell::default());
         assert_eq!(
             found.iter().map(|remedy| remedy.effect.as_str()).collect::<Vec<_>>(),

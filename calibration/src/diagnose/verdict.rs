@@ -45,7 +45,8 @@ impl Decision {
     /// The verdict with its sentence.
     #[must_use]
     pub fn said(self, text: String) -> Verdict {
-        Verdict { kind: self.kind, effects: self.effects, confidence: self.confidence, text }
+        let Self { kind, effects, confidence, .. } = self;
+        Verdict { kind, effects, confidence, text, explained_share: None, rest: None }
     }
 }
 
@@ -146,7 +147,8 @@ impl Finding<'_> {
 /// The verdict when the clips do not say enough.
 #[must_use]
 pub fn not_testable(why: &str) -> Verdict {
-    Verdict { kind: Kind::NotTestable, effects: Vec::new(), confidence: 1.0, text: format!("Not testable: {why}.") }
+    let decision = Decision { kind: Kind::NotTestable, effects: Vec::new(), confidence: 1.0, little: false };
+    decision.said(format!("Not testable: {why}."))
 }
 
 impl Verdict {

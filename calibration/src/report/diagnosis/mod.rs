@@ -207,6 +207,8 @@ pub(super) mod tests {
                 effects: vec!["command_delay".into()],
                 confidence: 0.97,
                 text: "Commands reach the robot 12 ms late <here>.".into(),
+                explained_share: None,
+                rest: None,
             },
             gap: Gap {
                 unit: "sigma",
@@ -293,7 +295,13 @@ pub(super) mod tests {
     #[test]
     fn a_page_without_a_cause_shows_no_after() {
         let mut diagnosis = named();
-        diagnosis.verdict = Verdict { kind: Kind::None, effects: vec![], confidence: 0.99, text: "No gap.".into() };
+        diagnosis.verdict = Verdict {
+            kind: Kind::None,
+            effects: vec![],
+            confidence: 0.99,
+            text: "No gap.".into(),
+            ..diagnosis.verdict
+        };
         diagnosis.candidates.retain(|candidate| candidate.status == Status::RuledOut);
         diagnosis.places.clear();
         diagnosis.traces.clear();

@@ -1,0 +1,139 @@
+//! Causes that are proven although a part of the gap stays: no model of a real cell is ever complete, and what a laboratory
+//! needs is what acts, how much of the gap it closes, and what is left.
+//!
+//! Effects are taken in the order in which they were found. They are believed as long as each stood out on clips that were
+//! not fitted (nearly all of them, far beyond chance, no other effect half as good), is no stronger than what is met in
+//! practice, and all together close a real share of the squared gap on the clips kept for confirming: the whole 90 %
+//! interval of the share lies above it. What comes after them in the search belongs to the rest.
+
+use super::answer::Share;
+use super::combine::{Found, Step};
+use super::evidence::Evidence;
+use super::fit::Bench;
+use super::gap::Residuals;
+use super::split::Split;
+use super::{confidence, leftovers};
+
+/// More than half of the squared gap: then what was found is larger than all that was not.
+const REAL_SHARE: f64 = 0.5;
+/// A signature that explains more of the rest than this share looks like it.
+const LOOKS_LIKE: f64 = 0.3;
+
+/// What is proven.
+pub(super) struct Partly {
+    /// The search as if it had ended here.
+    pub(super) found: Found,
+    /// What it leaves on the clips kept for confirming.
+    pub(super) after: Residuals,
+    /// Share of the squared gap that it closes there.
+    pub(super) share: Share,
+}
+
+/// The most effects that are proven; `None` where not even the first is. `before`: what the baseline leaves on the clips kept
+/// for confirming; `unforeseen`: see [`Found::unforeseen`].
+pub(super) fn proven<E: Evidence>(
+    bench: &Bench<'_, E>,
+    (split, found): (&Split, &Found),
+    before: &Residuals,
+    unforeseen: &[f64],
+    seed: u64,
+) -> Option<Partly> {
+    let all = found.last.effects.len();
+    let one = |count: usize| {
+        let last = if count == all { &found.last } else { &with_effects(&found.steps, count)?.from };
+        let until = Found { steps: found.steps.clone(), last: last.clone() };
+        if !each_stands_out(bench, &until, unforeseen) || !leftovers::implausible(bench, last).is_empty() {
+            return None;
+        }
+        let after = Residuals::at(bench, last, &split.confirm)?;
+        let share = after.shrink(before, seed);
+        (share.ci90[0] > REAL_SHARE).then_some(Partly { found: until, after, share })
+    };
+    (1..=all).rev().find_map(one)
+}
+
+fn with_effects(steps: &[Step], count: usize) -> Option<&Step> {
+    steps.iter().find(|step| step.from.effects.len() == count)
+}
+
+fn each_stands_out<E: Evidence>(bench: &Bench<'_, E>, found: &Found, unforeseen: &[f64]) -> bool {
+    let added: Vec<(usize, usize)> = found.kept().collect();
+    added.len() == found.last.effects.len()
+        && added.iter().all(|(place, effect)| {
+            let step = &found.steps[*place];
+            let rivals = confidence::rivals(step, *effect, unforeseen[*place]);
+            step.is_clear(bench.library, *effect) && rivals.iter().all(|rival| found.last.effects.contains(rival))
+        })
+}
+
+impl Partly {
+    /// Names of the effects that are proven.
+    pub(super) fn effects<E>(&self, bench: &Bench<'_, E>) -> Vec<String> {
+        self.found.last.effects.iter().map(|effect| bench.library.candidates[*effect].effect.name.to_owned()).collect()
+    }
+
+    /// The effect whose signature explains most of what stays; `None` where none explains much of it.
+    pub(super) fn looks_like<E>(&self, bench: &Bench<'_, E>) -> Option<&'static str> {
+        let step = self.found.steps.iter().find(|step| step.from.effects == self.found.last.effects)?;
+        let best = step.trials.iter().max_by(|a, b| a.scored.cosine.total_cmp(&b.scored.cosine))?;
+        let alike = best.scored.cosine.powi(2) > LOOKS_LIKE;
+        alike.then(|| bench.library.candidates[best.scored.candidate].effect.name)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::combine::Trial;
+    use super::super::fit::Hypothesis;
+    use super::super::library::Library;
+    use super::super::score::Foretold;
+    use super::super::shortlist::Scored;
+    use super::super::test_bench::{ONCE, nothing_said_of, on_bench, shipped, truth, with_effect};
+    use super::*;
+    use crate::benchmark::world::Kind;
+    use crate::forward::setting;
+    use shared_mem::msg::MAX_JOINTS;
+
+    #[test]
+    fn an_effect_is_proven_where_it_stands_out_alone_and_closes_most_of_the_gap() {
+        let (cell, base) = (shipped(), setting::complete(&shipped(), None).expect("a cell"));
+        let world = with_effect("command_delay", 3, Kind::Excitation, &cell);
+        let library = Library::new(&cell, &base, None, &[87.0; MAX_JOINTS]);
+        on_bench((&cell, &world), &library, |bench, even| {
+            let [effect, other] = ["command_delay", "payload"].map(|name| library.find(name).expect("a candidate"));
+            let with = truth(&library, &world);
+            let mut without = with.clone();
+            library.candidates[effect].numbers.clone().for_each(|k| without[k] = library.start()[k]);
+            let fit = |effects: &[usize], full| bench.fit((effects, full), &[0], even, None, ONCE).expect("a fit");
+            let (baseline, last) = (fit(&[], without), fit(&[effect], with));
+            let likelier = |nats: f64| Foretold { clips: (0..12).map(|clip| (clip, 1000.0 - nats / 6.0)).collect() };
+            let trial = |candidate, fitted: &Hypothesis, nats| Trial {
+                scored: Scored { signal: 30.0, ..nothing_said_of(&library, candidate) },
+                fitted: Some((fitted.clone(), likelier(nats).over(&likelier(0.0)))),
+                closes: 0.9,
+                own_numbers: false,
+            };
+            let found = |rival: f64, last: &Hypothesis| {
+                let step = |from: &Hypothesis, trials| Step {
+                    from: from.clone(),
+                    trials,
+                    foretold: likelier(0.0),
+                    weights: vec![1.0; even.len()],
+                    arm_rows: 100,
+                    left: Vec::new(),
+                    whole: Vec::new(),
+                };
+                let trials = vec![trial(effect, last, 300.0), trial(other, &baseline, rival)];
+                Found { steps: vec![step(&baseline, trials), step(last, Vec::new())], last: last.clone() }
+            };
+            let split = Split { train: vec![0], choose: Vec::new(), confirm: vec![1] };
+            let before = Residuals::at(bench, &baseline, &split.confirm).expect("it can be simulated");
+            let proven = |found: &Found| proven(bench, (&split, found), &before, &[1.0; 2], 0);
+            let partly = proven(&found(20.0, &last)).expect("it is");
+            assert!(partly.share.ci90[0] > 0.9 && partly.effects(bench) == ["command_delay"], "{:?}", partly.share);
+            assert!(proven(&found(290.0, &last)).is_none(), "another effect does as well");
+            let useless = Hypothesis { effects: vec![effect], ..baseline.clone() };
+            assert!(proven(&found(20.0, &useless)).is_none(), "nothing of the gap closes");
+        });
+    }
+}
