@@ -9,13 +9,13 @@ use super::fit::{Bench, Hypothesis};
 use super::gap::Residuals;
 use super::headline::{self, Facts};
 use super::leftovers::{self, Left};
+use super::partly::{self, Partly};
 use super::score::foretell;
 use super::site::Site;
 use super::split::Split;
 use super::verdict::{self, Finding};
 use super::{
-    DiagnoseError, Kind, Options, advice, combine, confidence, drift, localise, parameters, partly, ranked, remedies,
-    settle,
+    DiagnoseError, Kind, Options, advice, combine, confidence, drift, localise, parameters, ranked, remedies, settle,
 };
 use crate::report::{Trace, channel_in_words, effect_in_words, in_unit};
 use shared_mem::recording::Session;
@@ -103,27 +103,10 @@ pub fn conclude<E: Evidence>(
     });
     let [joints, add, add_s] = replayed(bench, [&first.from, kept], session, (admitted, split))?;
     let of_object = places.first().is_some_and(|place| !place.channel.starts_with("joint"));
-    let facts = Facts {
-        size: size_in_words(joints.before, add.before.filter(|_| of_object)),
-        place: places.first().map_or_else(String::new, place_in_words),
-        rest: rest.first().map_or_else(String::new, place_in_words),
-        effects: found.last.effects.iter().map(|effect| with_size(bench, &found.last, *effect)).collect(),
-        shrink: after.shrink(&before, options.seed).value,
-    };
+    let size = size_in_words(joints.before, add.before.filter(|_| of_object));
+    let facts = facts(bench, found, size, [&places, &rest], after.shrink(&before, options.seed).value);
     let verdict = match &partly {
-        Some(partly) => {
-            let looks_like = partly.looks_like(bench);
-            let stays = size_in_words(joints.after, add.after.filter(|_| of_object));
-            let text = headline::in_part(&facts, &partly.share, &stays, looks_like);
-            let rest = Rest {
-                joint_rms_rad: joints.after,
-                object_add_m: add.after,
-                place: facts.rest.clone(),
-                looks_like: looks_like.map(str::to_owned),
-            };
-            let (kind, effects, confidence) = (Kind::Named, partly.effects(bench), sureness(found));
-            Verdict { kind, effects, confidence, text, explained_share: Some(partly.share), rest: Some(rest) }
-        }
+        Some(partly) => in_part(bench, partly, &facts, (joints.after, add.after), of_object),
         None => {
             let text = headline::sentence(&decision, &finding, &facts);
             decision.said(text)
@@ -174,6 +157,35 @@ pub fn conclude<E: Evidence>(
         traces: traces(bench.evidence, (&before, if nearest.is_some() { after } else { shown }), &admitted.files),
         nearest,
     })
+}
+
+/// What the sentence is made of; where the gap lies without and with what was found.
+fn facts<E: Evidence>(bench: &Bench<'_, E>, found: &Found, size: String, places: [&[Place]; 2], shrink: f64) -> Facts {
+    let [place, rest] = places.map(|places| places.first().map_or_else(String::new, place_in_words));
+    let effects = found.last.effects.iter().map(|effect| with_size(bench, &found.last, *effect)).collect();
+    Facts { size, place, rest, effects, shrink }
+}
+
+/// The verdict where what was found is proven, but a part of the gap stays: so much of the joints [rad] and the object [m].
+fn in_part<E: Evidence>(
+    bench: &Bench<'_, E>,
+    partly: &Partly,
+    facts: &Facts,
+    (joint_rms_rad, object_add_m): (Option<f64>, Option<f64>),
+    of_object: bool,
+) -> Verdict {
+    let looks_like = partly.looks_like(bench);
+    let stays = size_in_words(joint_rms_rad, object_add_m.filter(|_| of_object));
+    let text = headline::in_part(facts, &partly.share, &stays, looks_like);
+    let (place, looks_like) = (facts.rest.clone(), looks_like.map(str::to_owned));
+    Verdict {
+        kind: Kind::Named,
+        effects: partly.effects(bench),
+        confidence: sureness(&partly.found),
+        text,
+        explained_share: Some(partly.share),
+        rest: Some(Rest { joint_rms_rad, object_add_m, place, looks_like }),
+    }
 }
 
 /// How large the gap is, in units of the hand: of the object where there is such a figure, else of the joints.

@@ -1,4 +1,4 @@
-//! What is said of every candidate: how likely it is, how much it shrinks the gap, and what became of it. [`super::reason`]
+//! What is said of every candidate: how likely it is, how much it shrinks the gap, and what became of it. `reason.rs`
 //! says why.
 
 use super::answer::{Candidate, Share, Status};
