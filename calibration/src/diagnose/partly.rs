@@ -16,8 +16,8 @@ use super::{confidence, leftovers};
 
 /// More than half of the squared gap: then what was found is larger than all that was not.
 const REAL_SHARE: f64 = 0.5;
-/// A signature that explains more of the rest than this share looks like it.
-const LOOKS_LIKE: f64 = 0.3;
+/// An effect whose signature explains more than half of the rest is said to explain most of it.
+const LOOKS_LIKE: f64 = 0.5;
 
 /// What is proven.
 pub(super) struct Partly {
