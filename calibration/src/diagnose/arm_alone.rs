@@ -7,8 +7,8 @@ use super::evidence::{Channel, Evidence, Reach, Row};
 use super::fit::{Bench, Hypothesis};
 use super::headline::words;
 use super::scatter::Scatter;
+use super::screening::arm_gap_is_open;
 use super::split::Split;
-use super::worthy::strays;
 use super::{flat, stages, starts};
 use crate::estimate::{ClipModel, Impossible};
 use shared_mem::progress::Progress;
@@ -66,7 +66,7 @@ impl Step {
         let Some(from) = fit(&self.from.effects, self.from.full.clone(), LOOK) else { return Vec::new() };
         let best = all.iter().fold(&from, |best, (_, fit)| if fit.deviance() < best.deviance() { fit } else { best });
         let near = best.deviance() + NEAR.max(NEAR_ON_ARM * (from.deviance() - best.deviance()));
-        let anew = if strays(&self.whole, &self.left) { refined(&best.full) } else { None };
+        let anew = if arm_gap_is_open(&self.whole, &self.left) { refined(&best.full) } else { None };
         let with_object = |(place, alone): (usize, Hypothesis)| {
             let candidate = self.trials[place].scored.candidate;
             let mut open = flat::seen_by_nothing(&arm, &alone, candidate);
@@ -138,7 +138,7 @@ mod tests {
     use super::super::fit::Effort;
     use super::super::gap::Typical;
     use super::super::library::Library;
-    use super::super::score::Foretold;
+    use super::super::score::Predicted;
     use super::super::sweep::Precision;
     use super::super::test_bench::{nothing_said_of, on_strokes, shipped, with_effect};
     use super::*;
@@ -163,7 +163,7 @@ mod tests {
         };
         let step = Step {
             from: bench.fit((&[], full), &[0, 1], even, None, LOOK).expect("a fit"),
-            foretold: Foretold { clips: Vec::new() },
+            predicted: Predicted { clips: Vec::new() },
             trials: asked.iter().map(trial).collect(),
             weights: even.to_vec(),
             arm_rows: 0,

@@ -10,7 +10,8 @@ use super::gap::{Residuals, Typical};
 use super::headline::words;
 use super::leftovers::{Left, NUMERICS, ROUGHNESS};
 use super::library::Library;
-use super::score::{Advantage, Foretold, foretell};
+use super::score::{Advantage, Predicted, predict};
+use super::screening::{arm_gap_is_open, overlooked, seen_when_clips_stray_little, to_fit};
 use super::settle::{settled, without_superfluous};
 use super::shortlist::Scored;
 use super::signatures;
@@ -18,7 +19,6 @@ use super::split::Split;
 use super::stages;
 use super::starts;
 use super::sweep::Precision;
-use super::worthy::{overlooked, seen_when_clips_stray_little, strays, worthy};
 use shared_mem::progress::Progress;
 
 /// At most so many effects are named.
@@ -66,7 +66,7 @@ pub struct Trial {
 }
 
 impl Trial {
-    /// Whether enough of the gap closes with it for a cause, however much better the clips are foretold.
+    /// Whether enough of the gap closes with it for a cause, however much better the clips are predicted.
     #[must_use]
     pub fn is_cause(&self) -> bool {
         self.closes > CLOSES
@@ -85,7 +85,7 @@ impl Trial {
         other.scored.cost < self.scored.cost && alike && !self.closes_more_than(other)
     }
 
-    /// Whether it closes so much more of the gap that its additional numbers are worth it although clips are foretold as well
+    /// Whether it closes so much more of the gap that its additional numbers are worth it although clips are predicted as well
     /// without them.
     #[must_use]
     pub fn closes_more_than(&self, other: &Self) -> bool {
@@ -98,8 +98,8 @@ impl Trial {
 pub struct Step {
     /// What was extended.
     pub from: Hypothesis,
-    /// How it foretells.
-    pub foretold: Foretold,
+    /// How it predicts.
+    pub predicted: Predicted,
     /// All candidates, best first by the score test.
     pub trials: Vec<Trial>,
     /// Weights of the channels in this step.
@@ -235,7 +235,7 @@ impl Step {
     /// The trial that is worth most among those worth it.
     #[must_use]
     pub fn best<E: Evidence>(&self, bench: &Bench<'_, E>) -> Option<(&Trial, &Hypothesis, &Advantage)> {
-        let worthy: Vec<(&Trial, &Hypothesis, &Advantage)> = (self.trials.iter())
+        let convincing_ones: Vec<(&Trial, &Hypothesis, &Advantage)> = (self.trials.iter())
             .filter_map(|trial| trial.fitted.as_ref().map(|(fit, advantage)| (trial, fit, advantage)))
             .filter(|(trial, _, advantage)| {
                 let of_arm = bench.library.candidates[trial.scored.candidate].is_of_arm();
@@ -255,9 +255,10 @@ impl Step {
             .filter(|(trial, fit, _)| !bench.negligible(trial.scored.candidate, &fit.full))
             .filter(|(trial, fit, _)| !bench.is_convention(trial.scored.candidate, fit))
             .collect();
-        let simplest = |(trial, ..): &&(&Trial, _, _)| !worthy.iter().any(|(other, ..)| trial.is_outdone_by(other));
+        let simplest =
+            |(trial, ..): &&(&Trial, _, _)| !convincing_ones.iter().any(|(other, ..)| trial.is_outdone_by(other));
         let worth = |(trial, _, advantage): &(&Trial, _, &Advantage)| net(advantage, trial.scored.cost);
-        worthy.iter().filter(simplest).max_by(|a, b| worth(a).total_cmp(&worth(b))).copied()
+        convincing_ones.iter().filter(simplest).max_by(|a, b| worth(a).total_cmp(&worth(b))).copied()
     }
 }
 
@@ -272,11 +273,12 @@ fn step<E: Evidence>(
 ) -> Option<Step> {
     let (weights, mut scored, narrow) = signatures::around(bench, split, from, bar)?;
     let from = bench.fit((&from.effects, from.full.clone()), &split.train, &weights, Some(from), FIRST_PASS)?;
-    let foretold = foretell(bench, &from, &split.choose, &weights)?;
+    let predicted = predict(bench, &from, &split.choose, &weights)?;
     let left = Residuals::at(bench, &from, &split.open()).map(|left| left.typical()).unwrap_or_default();
     let whole = whole.unwrap_or(&left).clone();
-    let mut promising = worthy(bench, (&from, &weights), &scored, (&whole, &left));
-    let seen = if strays(&whole, &left) { Vec::new() } else { seen_when_clips_stray_little(bench, &from, &narrow) };
+    let mut promising = to_fit(bench, (&from, &weights), &scored, (&whole, &left));
+    let seen =
+        if arm_gap_is_open(&whole, &left) { Vec::new() } else { seen_when_clips_stray_little(bench, &from, &narrow) };
     for seen in seen {
         if !promising.contains(&seen.candidate) {
             promising.push(seen.candidate);
@@ -286,7 +288,7 @@ fn step<E: Evidence>(
     let own_numbers = bench.scatter.count() > 0;
     let trial = |scored: &Scored| Trial { scored: scored.clone(), fitted: None, closes: 0.0, own_numbers };
     let trials = scored.iter().map(trial).collect();
-    let mut step = Step { from, foretold, trials, weights, arm_rows: arm_rows(bench, split), left, whole };
+    let mut step = Step { from, predicted, trials, weights, arm_rows: arm_rows(bench, split), left, whole };
     step.fit(bench, split, (&promising, false), refined, bar);
     if step.best(bench).is_none() {
         let rest = overlooked(bench, &step);
@@ -302,10 +304,10 @@ fn untried<E: Evidence>(bench: &Bench<'_, E>, split: &Split, now: &Hypothesis, f
     let left = Residuals::at(bench, now, &split.train)?;
     let weights = floor::weights(bench.evidence, &left.clips);
     let from = bench.fit((&now.effects, now.full.clone()), &split.train, &weights, Some(now), FIRST_PASS)?;
-    let foretold = foretell(bench, &from, &split.choose, &weights)?;
+    let predicted = predict(bench, &from, &split.choose, &weights)?;
     let left = Residuals::at(bench, &from, &split.open())?.typical();
     let whole = first.map_or_else(|| left.clone(), |first| first.whole.clone());
-    Some(Step { from, foretold, trials: Vec::new(), weights, arm_rows: arm_rows(bench, split), left, whole })
+    Some(Step { from, predicted, trials: Vec::new(), weights, arm_rows: arm_rows(bench, split), left, whole })
 }
 
 /// How many residuals of the arm the judged clips have.
@@ -369,12 +371,12 @@ impl Step {
         }
     }
 
-    /// Notes a fit of a trial with what it foretells and closes.
+    /// Notes a fit of a trial with what it predicts and closes.
     pub(super) fn judge<E: Evidence>(&mut self, bench: &Bench<'_, E>, split: &Split, place: usize, fit: Hypothesis) {
-        if let Some(ahead) = foretell(bench, &fit, &split.choose, &self.weights) {
+        if let Some(ahead) = predict(bench, &fit, &split.choose, &self.weights) {
             let closes = closes(bench, split, &self.whole, [&self.from, &fit]);
             let trial = &mut self.trials[place];
-            (trial.closes, trial.fitted) = (closes, Some((fit, ahead.over(&self.foretold))));
+            (trial.closes, trial.fitted) = (closes, Some((fit, ahead.over(&self.predicted))));
         }
     }
 

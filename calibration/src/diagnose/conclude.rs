@@ -10,7 +10,7 @@ use super::gap::Residuals;
 use super::headline::{self, Facts};
 use super::leftovers::{self, Left};
 use super::partly::{self, Partly};
-use super::score::foretell;
+use super::score::predict;
 use super::site::Site;
 use super::split::Split;
 use super::verdict::{self, Finding};
@@ -285,8 +285,8 @@ fn stands_in<E: Evidence>(
     bench.library.candidates[effect].numbers.clone().for_each(|k| full[k] = bench.library.unknowns[k].start);
     bench.library.candidates[rival].numbers.clone().for_each(|k| full[k] = fit.full[k]);
     let swapped = bench.fit((&effects, full), &split.train, weights, Some(last), settle::last_pass(bench));
-    let foretold = |hypothesis| foretell(bench, hypothesis, &split.choose, weights);
-    let Some((with, instead)) = foretold(last).zip(swapped.as_ref().and_then(foretold)) else { return true };
+    let predicted = |hypothesis| predict(bench, hypothesis, &split.choose, weights);
+    let Some((with, instead)) = predicted(last).zip(swapped.as_ref().and_then(predicted)) else { return true };
     let advantage = with.over(&instead);
     confidence::alike(advantage.nats, advantage.error, advantage.clips())
 }

@@ -69,12 +69,13 @@ fn chance(clips: usize) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::super::fit::Hypothesis;
-    use super::super::score::Foretold;
+    use super::super::score::Predicted;
     use super::super::shortlist::Scored;
     use super::*;
 
     fn trial(candidate: usize, nats: f64, closes: f64) -> Trial {
-        let foretold = |gain: f64| Foretold { clips: (0..12).map(|clip| (clip, 1000.0 - 2.0 * gain / 12.0)).collect() };
+        let predicted =
+            |gain: f64| Predicted { clips: (0..12).map(|clip| (clip, 1000.0 - 2.0 * gain / 12.0)).collect() };
         let (units, next) = (vec![1.0], Vec::new());
         let scored = Scored {
             candidate,
@@ -89,7 +90,7 @@ mod tests {
             p: 0.0,
         };
         let fit = Hypothesis { effects: vec![candidate], full: Vec::new(), free: Vec::new(), fitted: Vec::new() };
-        Trial { scored, fitted: Some((fit, foretold(nats).over(&foretold(0.0)))), closes, own_numbers: true }
+        Trial { scored, fitted: Some((fit, predicted(nats).over(&predicted(0.0)))), closes, own_numbers: true }
     }
 
     #[test]

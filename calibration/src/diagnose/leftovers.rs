@@ -25,7 +25,7 @@ const GAP_OF_OBJECT: f64 = 13.0;
 /// below 7 squared sigmas of the object all six had none, between 8 and 11 three of five, beyond 15 none of five.
 const DOUBTFUL: f64 = 0.75;
 const TURNS_WITHIN: f64 = 0.12;
-/// A cause leaves no more than this share of the gap it closes: of the arm's, and of the object's, whose hits are foretold
+/// A cause leaves no more than this share of the gap it closes: of the arm's, and of the object's, whose hits are predicted
 /// less exactly.
 pub const SUBSTITUTE: f64 = 0.03;
 /// See [`SUBSTITUTE`].

@@ -17,7 +17,7 @@
 //! | [`noise`], [`floor`] | how far residuals can be trusted |
 //! | [`signatures`], [`sweep`], [`quadratic`] | every candidate's signature, linearised once |
 //! | [`shortlist`] | how much of the gap each signature explains |
-//! | [`worthy`], [`arm_alone`], [`starts`], [`ripple`] | which of them are fitted, to the arm first, and where a fit begins |
+//! | [`screening`], [`arm_alone`], [`starts`], [`ripple`] | which of them are fitted, to the arm first, and where a fit begins |
 //! | [`cost`], [`fit`], [`freed`] | hypotheses fitted, and clips whose own numbers got stuck |
 //! | [`score`] | how well they predict clips: leave-one-clip-out log-likelihood |
 //! | [`straying`] | how far clips stray under one of them |
@@ -73,6 +73,7 @@ pub mod remedies;
 pub mod ripple;
 pub mod scatter;
 pub mod score;
+pub mod screening;
 pub mod settle;
 pub mod shortlist;
 pub mod signatures;
@@ -85,7 +86,6 @@ pub mod sweep;
 #[cfg(test)]
 mod test_bench;
 pub mod verdict;
-pub mod worthy;
 
 pub use remedies::Remedy;
 

@@ -86,7 +86,7 @@ mod tests {
     use super::super::combine::Trial;
     use super::super::fit::Hypothesis;
     use super::super::library::Library;
-    use super::super::score::Foretold;
+    use super::super::score::Predicted;
     use super::super::shortlist::Scored;
     use super::super::test_bench::{ONCE, nothing_said_of, on_bench, shipped, truth, with_effect};
     use super::*;
@@ -106,7 +106,7 @@ mod tests {
             library.candidates[effect].numbers.clone().for_each(|k| without[k] = library.start()[k]);
             let fit = |effects: &[usize], full| bench.fit((effects, full), &[0], even, None, ONCE).expect("a fit");
             let (baseline, last) = (fit(&[], without), fit(&[effect], with));
-            let likelier = |nats: f64| Foretold { clips: (0..12).map(|clip| (clip, 1000.0 - nats / 6.0)).collect() };
+            let likelier = |nats: f64| Predicted { clips: (0..12).map(|clip| (clip, 1000.0 - nats / 6.0)).collect() };
             let trial = |candidate, fitted: &Hypothesis, nats| Trial {
                 scored: Scored { signal: 30.0, ..nothing_said_of(&library, candidate) },
                 fitted: Some((fitted.clone(), likelier(nats).over(&likelier(0.0)))),
@@ -117,7 +117,7 @@ mod tests {
                 let step = |from: &Hypothesis, trials| Step {
                     from: from.clone(),
                     trials,
-                    foretold: likelier(0.0),
+                    predicted: likelier(0.0),
                     weights: vec![1.0; even.len()],
                     arm_rows: 100,
                     left: Vec::new(),

@@ -10,7 +10,7 @@ use super::reason::{Judged, reason};
 use super::shortlist::{Scored, TESTABLE};
 use super::split::Split;
 use super::verdict::Finding;
-use super::{Kind, confidence, parameters, worthy};
+use super::{Kind, confidence, parameters, screening};
 
 /// What nobody fitted closes nothing.
 const NOT_FITTED: Share = Share { value: 0.0, ci90: [0.0; 2] };
@@ -87,7 +87,7 @@ fn after_keeping(found: &Found, left: &[Option<Residuals>], after: &Residuals, p
 fn is_hidden_by_the_arm<E: Evidence>(bench: &Bench<'_, E>, step: &Step, trial: &Trial) -> bool {
     let effect = trial.scored.candidate;
     let felt = bench.library.candidates[effect].is_of_arm() || bench.library.arm_may_feel(effect);
-    trial.fitted.is_none() && !felt && worthy::strays(&step.whole, &step.left)
+    trial.fitted.is_none() && !felt && screening::arm_gap_is_open(&step.whole, &step.left)
 }
 
 /// The step that says most about an effect. One that was kept is judged by what those before it left. Another one by its fit
@@ -134,7 +134,7 @@ fn carried_over(shrink: &Share) -> &'static str {
 #[cfg(test)]
 mod tests {
     use super::super::fit::Hypothesis;
-    use super::super::score::Foretold;
+    use super::super::score::Predicted;
     use super::*;
 
     fn hypothesis(effects: &[usize]) -> Hypothesis {
@@ -143,7 +143,7 @@ mod tests {
 
     /// A step from these effects on, with candidates that were fitted in it or only looked at.
     fn step(from: &[usize], candidates: &[(usize, bool)]) -> Step {
-        let foretold = Foretold { clips: vec![(0, 1000.0), (1, 1000.0)] };
+        let predicted = Predicted { clips: vec![(0, 1000.0), (1, 1000.0)] };
         let trial = |(candidate, fitted): &(usize, bool)| Trial {
             scored: Scored {
                 candidate: *candidate,
@@ -157,14 +157,14 @@ mod tests {
                 imitated: 0.1,
                 p: 0.0,
             },
-            fitted: fitted.then(|| (hypothesis(&[from, &[*candidate]].concat()), foretold.over(&foretold))),
+            fitted: fitted.then(|| (hypothesis(&[from, &[*candidate]].concat()), predicted.over(&predicted))),
             closes: 0.0,
             own_numbers: true,
         };
         Step {
             from: hypothesis(from),
             trials: candidates.iter().map(trial).collect(),
-            foretold: foretold.clone(),
+            predicted: predicted.clone(),
             weights: Vec::new(),
             arm_rows: 0,
             left: Vec::new(),

@@ -203,7 +203,7 @@ fn times_noise(judged: &Judged<'_>) -> String {
 mod tests {
     use super::super::combine::Step;
     use super::super::fit::Hypothesis;
-    use super::super::score::Foretold;
+    use super::super::score::Predicted;
     use super::super::shortlist::Scored;
     use super::super::test_bench::{nothing_said_of, on_strokes, shipped};
     use super::super::verdict::tests::finding;
@@ -215,8 +215,8 @@ mod tests {
     }
 
     /// Twelve clips that are likelier by so many nats together than without any effect.
-    fn likelier(nats: f64) -> Foretold {
-        Foretold { clips: (0..12).map(|clip| (clip, 1000.0 - 2.0 * nats / 12.0)).collect() }
+    fn likelier(nats: f64) -> Predicted {
+        Predicted { clips: (0..12).map(|clip| (clip, 1000.0 - 2.0 * nats / 12.0)).collect() }
     }
 
     #[test]
@@ -237,7 +237,7 @@ mod tests {
                 let step = |from: &[usize], trials: Vec<Trial>| Step {
                     from: hypothesis(from, &start),
                     trials,
-                    foretold: likelier(0.0),
+                    predicted: likelier(0.0),
                     weights: Vec::new(),
                     arm_rows: 100,
                     left: Vec::new(),

@@ -1,6 +1,6 @@
-//! How well a hypothesis foretells clips: `-2 ln` of the likelihood of each clip at numbers that were not fitted to it.
+//! How well a hypothesis predicts clips: `-2 ln` of the likelihood of each clip at numbers that were not fitted to it.
 //!
-//! Clips of the choosing set were not fitted. Those of the training set are foretold by the numbers the others give: one
+//! Clips of the choosing set were not fitted. Those of the training set are predicted by the numbers the others give: one
 //! Newton step away from the joint fit. What a clip costs there its linearisation knows already; where that says much more
 //! than it costs at the joint fit, it is simulated: a hit is not linear for long.
 
@@ -12,7 +12,7 @@ use super::straying::{Around, eased};
 
 /// Deviance of every judged clip out of sample, and what it says about numbers.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Foretold {
+pub struct Predicted {
     /// Clip and deviance, training clips first.
     pub clips: Vec<(usize, f64)>,
 }
@@ -39,12 +39,12 @@ const DOUBTED: f64 = 100.0;
 
 /// Foretells training and choosing clips.
 #[must_use]
-pub fn foretell<E: Evidence>(
+pub fn predict<E: Evidence>(
     bench: &Bench<'_, E>,
     hypothesis: &Hypothesis,
     choose: &[usize],
     weights: &[f64],
-) -> Option<Foretold> {
+) -> Option<Predicted> {
     let mut clips = left_out(bench, hypothesis, weights);
     let judged = bench.judge(hypothesis, choose, weights)?;
     clips.extend(judged.iter().map(|clip| (clip.clip, clip.deviance())));
@@ -52,7 +52,7 @@ pub fn foretell<E: Evidence>(
     for ((_, deviance), change) in clips.iter_mut().zip(eased(&around, &bench.scatter)) {
         *deviance += change;
     }
-    Some(Foretold { clips })
+    Some(Predicted { clips })
 }
 
 fn left_out<E: Evidence>(bench: &Bench<'_, E>, hypothesis: &Hypothesis, weights: &[f64]) -> Vec<(usize, f64)> {
@@ -89,7 +89,7 @@ fn bounded<E: Evidence>(bench: &Bench<'_, E>, hypothesis: &Hypothesis, shift: &[
     hypothesis.free.iter().zip(shift).map(within).collect()
 }
 
-impl Foretold {
+impl Predicted {
     /// Sum of the deviances.
     #[must_use]
     pub fn deviance(&self) -> f64 {
@@ -144,7 +144,7 @@ mod tests {
         let world = World::draw(3, Kind::Strokes, Fault::Nothing, &cell);
         on_strokes((&cell, &world), |bench, even| {
             let mut fit = bench.fit((&[], bench.library.start()), &[0, 1], even, None, ONCE).expect("a fit");
-            let told = |fit: &Hypothesis| foretell(bench, fit, &[], even).expect("strokes").clips[0].1;
+            let told = |fit: &Hypothesis| predict(bench, fit, &[], even).expect("strokes").clips[0].1;
             let nearly_straight = told(&fit);
             // As if the first clip lay on an edge: at the point everything is steep, and a step away nothing is.
             fit.fitted[0].reduced.form.view_mut((1, 1), (fit.free.len(), fit.free.len())).fill_diagonal(1e12);
@@ -154,19 +154,19 @@ mod tests {
 
     #[test]
     fn one_clip_that_gains_far_more_than_the_others_makes_them_no_less_certain() {
-        let before = Foretold { clips: (0..6).map(|clip| (clip, 9000.0)).collect() };
+        let before = Predicted { clips: (0..6).map(|clip| (clip, 9000.0)).collect() };
         let gains = [20.0, 24.0, 8000.0, 30.0, 18.0, 22.0];
-        let after = Foretold { clips: gains.iter().enumerate().map(|(clip, gain)| (clip, 9000.0 - gain)).collect() };
+        let after = Predicted { clips: gains.iter().enumerate().map(|(clip, gain)| (clip, 9000.0 - gain)).collect() };
         let advantage = after.over(&before);
         assert!(advantage.nats > 2.0 * advantage.error && advantage.nats < 150.0, "{advantage:?}");
     }
 
     #[test]
     fn hypotheses_that_gain_on_the_same_clips_differ_by_the_difference_only() {
-        let before = Foretold { clips: (0..6).map(|clip| (clip, 900.0)).collect() };
+        let before = Predicted { clips: (0..6).map(|clip| (clip, 900.0)).collect() };
         let over = |gains: [f64; 6]| {
             let clips = gains.iter().enumerate().map(|(clip, gain)| (clip, 900.0 - 2.0 * gain)).collect();
-            Foretold { clips }.over(&before)
+            Predicted { clips }.over(&before)
         };
         let [better, worse] = [over([40.0, 10.0, 60.0, 25.0, 55.0, 20.0]), over([38.0, 8.5, 57.5, 23.0, 53.0, 18.0])];
         let (nats, error) = better.beyond(&worse);
@@ -175,9 +175,9 @@ mod tests {
 
     #[test]
     fn an_advantage_that_one_clip_alone_gives_is_uncertain() {
-        let before = Foretold { clips: (0..6).map(|clip| (clip, 100.0)).collect() };
-        let even = Foretold { clips: (0..6).map(|clip| (clip, 90.0 + clip as f64 * 0.1)).collect() };
-        let one = Foretold { clips: (0..6).map(|clip| (clip, if clip == 3 { 40.0 } else { 100.0 })).collect() };
+        let before = Predicted { clips: (0..6).map(|clip| (clip, 100.0)).collect() };
+        let even = Predicted { clips: (0..6).map(|clip| (clip, 90.0 + clip as f64 * 0.1)).collect() };
+        let one = Predicted { clips: (0..6).map(|clip| (clip, if clip == 3 { 40.0 } else { 100.0 })).collect() };
         let [even, one] = [even.over(&before), one.over(&before)];
         assert!(even.nats > 25.0 && even.nats > 10.0 * even.error && even.share == 1.0, "{even:?}");
         assert!(one.nats < 2.0 * one.error, "{one:?}");

@@ -5,7 +5,7 @@ use super::combine::{FIRST_PASS, LEAST, NEARLY_ALL, convincing};
 use super::evidence::Evidence;
 use super::fit::{Bench, Effort, Hypothesis};
 use super::library::Alternative;
-use super::score::foretell;
+use super::score::predict;
 use super::split::Split;
 use super::sweep::Precision;
 
@@ -91,14 +91,14 @@ pub(super) fn without_superfluous<E: Evidence>(
     weights: &[f64],
 ) -> Hypothesis {
     while now.effects.len() > 1 && !bench.interrupt.asked() {
-        let Some(whole) = foretell(bench, &now, &split.choose, weights) else { break };
+        let Some(whole) = predict(bench, &now, &split.choose, weights) else { break };
         let dropped = now.effects.iter().find_map(|effect| {
             let others: Vec<usize> = now.effects.iter().copied().filter(|other| other != effect).collect();
             let mut full = now.full.clone();
             let candidate = &bench.library.candidates[*effect];
             candidate.numbers.clone().for_each(|k| full[k] = bench.library.unknowns[k].start);
             let fit = bench.fit((&others, full), &split.train, weights, Some(&now), FIRST_PASS)?;
-            let less = foretell(bench, &fit, &split.choose, weights)?;
+            let less = predict(bench, &fit, &split.choose, weights)?;
             let cost = candidate.alternatives[0].probes.len();
             let loss = whole.over(&less);
             let missed = loss.share > NEARLY_ALL && loss.nats > LEAST;

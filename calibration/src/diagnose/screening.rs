@@ -30,7 +30,7 @@ const SPARES: f64 = 0.2;
 /// is: how an object is hit by an arm that is elsewhere tells nothing of the object. Where the object's gap is not small all effects
 /// on the slide are fitted, where it is large all on the hit as well, and those of the camera that spare much of it
 /// somewhere: a blow answers so unevenly that slopes at one point tell little.
-pub(super) fn worthy<E: Evidence>(
+pub(super) fn to_fit<E: Evidence>(
     bench: &Bench<'_, E>,
     (from, weights): (&Hypothesis, &[f64]),
     scored: &[Scored],
@@ -43,11 +43,11 @@ pub(super) fn worthy<E: Evidence>(
         group.map_or(0.0, |group| group.mean_square - group.floor)
     };
     let quiet = left.len() > 1 && beyond(false) < QUIET;
-    let strays = strays(whole, left);
-    for of_arm in [true, false].into_iter().filter(|of_arm| if *of_arm { !quiet } else { !strays }) {
+    let arm_open = arm_gap_is_open(whole, left);
+    for of_arm in [true, false].into_iter().filter(|of_arm| if *of_arm { !quiet } else { !arm_open }) {
         let of_group = |s: &&Scored| {
             let is_of_arm = bench.library.candidates[s.candidate].is_of_arm();
-            is_of_arm == of_arm || (strays && bench.library.arm_may_feel(s.candidate))
+            is_of_arm == of_arm || (arm_open && bench.library.arm_may_feel(s.candidate))
         };
         let group: Vec<&Scored> = scored.iter().filter(of_group).collect();
         let Some(best) = group.first() else { continue };
@@ -65,7 +65,7 @@ pub(super) fn worthy<E: Evidence>(
         let wanted = scored.iter().filter(|s| s.signal > TESTABLE && wanted(s));
         wanted.map(|s| s.candidate).collect()
     };
-    if strays {
+    if arm_open {
         return all;
     }
     if beyond(true) > SLID {
@@ -86,7 +86,7 @@ pub(super) fn worthy<E: Evidence>(
 }
 
 /// Whether the arm strays by more than numerics beside an object.
-pub(super) fn strays(whole: &[Typical], left: &[Typical]) -> bool {
+pub(super) fn arm_gap_is_open(whole: &[Typical], left: &[Typical]) -> bool {
     left.len() > 1 && Left::of_groups(whole, left).iter().any(|left| !left.of_object && left.too_much(false))
 }
 
@@ -135,7 +135,7 @@ mod tests {
             let fitted = |mean_square: f64| {
                 let group = |of_object, mean_square| Typical { mean_square, floor: 1.5, of_object };
                 let left = [group(false, 1.5), group(true, mean_square)];
-                worthy(bench, (&from, even), &all, (&left, &left))
+                to_fit(bench, (&from, even), &all, (&left, &left))
             };
             let slides = bench.library.candidates.iter().filter(|c| c.effect.stage == Stage::Slide).count();
             assert_eq!(fitted(1.5 + 0.9 * SLID).len(), 0);
@@ -161,8 +161,8 @@ mod tests {
             let fitted = |arm: f64| -> Vec<Stage> {
                 let group = |of_object, mean_square| Typical { mean_square, floor: 1.5, of_object };
                 let left = [group(false, arm), group(true, 100.0)];
-                let worthy = worthy(bench, (&from, even), &all, (&left, &left));
-                worthy.into_iter().map(|c| bench.library.candidates[c].effect.stage).collect()
+                let fitted = to_fit(bench, (&from, even), &all, (&left, &left));
+                fitted.into_iter().map(|c| bench.library.candidates[c].effect.stage).collect()
             };
             assert!(fitted(3.0).contains(&Stage::Slide));
             let straying = fitted(50.0);
