@@ -1,6 +1,7 @@
 //! One search over clips: by least squares or without slopes, with a bar, and so that Ctrl-C loses nothing: every step is kept
 //! ([`Kept`]), and the same command goes on from there to the same answer.
 
+use super::answer::Identification;
 use crate::estimate::search;
 use crate::estimate::{
     ClipModel, Evolution, Fit, Found, Impossible, Options, Random, Search, Swarm, Underway, Unknown, begin, fit_from,
@@ -9,9 +10,13 @@ use crate::estimate::{
 use crate::interrupt::Interrupt;
 use crate::kept::{Fingerprint, Kept};
 use crate::typed;
+use shared_mem::output::OutputError;
 use shared_mem::progress::Progress;
+use shared_mem::theta::Theta;
+use std::path::Path;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
+use std::time::Instant;
 
 /// Ways of searching.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -199,6 +204,26 @@ impl Run<'_> {
 /// Whether the user asked for the end: then what was found so far is taken to its file.
 pub(super) fn stopped(kept: &Kept, interrupt: &Interrupt) -> Result<(), RunError> {
     if interrupt.asked() { Err(RunError::Interrupted(kept.farewell(&typed::command()))) } else { Ok(()) }
+}
+
+/// The answer of work whose steps were kept, once its parameters are in their file; then nothing needs to be kept any more.
+pub(super) fn concluded<E: From<RunError> + From<OutputError>>(
+    found: Result<(Identification, Theta), E>,
+    out: Option<&Path>,
+    began: Instant,
+    (kept, interrupt): (&Kept, &Interrupt),
+) -> Result<Identification, E> {
+    interrupt.work_is_over();
+    // What work says that was cut short is no answer.
+    stopped(kept, interrupt)?;
+    let (mut answer, theta) = found?;
+    if let Some(out) = out {
+        theta.write(out)?;
+        answer.theta_file = out.display().to_string();
+    }
+    kept.done();
+    answer.seconds = began.elapsed().as_secs_f64();
+    Ok(answer)
 }
 
 /// The bar and the interruption of a search.

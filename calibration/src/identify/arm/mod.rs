@@ -21,7 +21,7 @@ mod start;
 mod verdict;
 
 use super::answer::Identification;
-use super::run::{Optimizer, Outcome, Run, RunError, stopped};
+use super::run::{Optimizer, Outcome, Run, RunError, concluded};
 use crate::estimate::{Random, Subset, Unknown};
 use crate::forward::arm::ArmClips;
 use crate::forward::setting::{BaseError, complete, effect_settings, gains};
@@ -141,17 +141,7 @@ fn identify_material(material: Material, options: &Options, interrupt: &Interrup
         .with_clips(&material.clips);
     let kept = kept::for_work((options.out.as_deref(), &options.session, "identify_arm"), &question, interrupt);
     let found = identify_kept(material, given.as_ref(), options, (&kept, interrupt));
-    interrupt.work_is_over();
-    // What work says that was cut short is no answer.
-    stopped(&kept, interrupt)?;
-    let (mut answer, theta) = found?;
-    if let Some(out) = &options.out {
-        theta.write(out)?;
-        answer.theta_file = out.display().to_string();
-    }
-    kept.done();
-    answer.seconds = began.elapsed().as_secs_f64();
-    Ok(answer)
+    concluded(found, options.out.as_deref(), began, (&kept, interrupt))
 }
 
 /// The answer, and the parameters that are written.

@@ -37,7 +37,7 @@ mod test_clip;
 mod vicinity;
 
 use super::answer::Identification;
-use super::run::{Optimizer, Outcome, Run, RunError, stopped};
+use super::run::{Optimizer, Outcome, Run, RunError, concluded};
 use crate::estimate::{Impossible, Options as FitOptions, Unknown, fit as fit_clips};
 use crate::forward::arm::{ArmClips, Channel};
 use crate::forward::object::ObjectClips;
@@ -143,17 +143,7 @@ pub fn identify(options: &Options, interrupt: &Interrupt) -> Result<Identificati
         .with_clips(material.usable.iter().map(|usable| &usable.clip));
     let kept = kept::for_work((options.out.as_deref(), &options.session, "identify_object"), &question, interrupt);
     let found = identify_kept(&material, options, (&kept, interrupt));
-    interrupt.work_is_over();
-    // What work says that was cut short is no answer.
-    stopped(&kept, interrupt)?;
-    let (mut answer, theta) = found?;
-    if let Some(out) = &options.out {
-        theta.write(out)?;
-        answer.theta_file = out.display().to_string();
-    }
-    kept.done();
-    answer.seconds = began.elapsed().as_secs_f64();
-    Ok(answer)
+    concluded(found, options.out.as_deref(), began, (&kept, interrupt))
 }
 
 /// The same from clips in memory; nothing is kept or written.
