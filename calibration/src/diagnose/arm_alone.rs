@@ -3,7 +3,7 @@
 //! the joints are compared there first, and few of them are taken on to the object.
 
 use super::combine::{FIRST_PASS, HEAT, LOOK, NEAR, Step};
-use super::evidence::{Channel, Evidence, Reach, Row};
+use super::evidence::{Base, Channel, Evidence, Reach, Row};
 use super::fit::{Bench, Hypothesis};
 use super::headline::words;
 use super::scatter::Scatter;
@@ -97,7 +97,8 @@ impl<E: Evidence> ClipModel for ArmAlone<'_, E> {
 
     fn residuals(&self, clip: usize, shared: &[f64], own: &[f64], out: &mut Vec<f64>) -> Result<(), Impossible> {
         let nothing = vec![0.0; self.rows(clip).len()];
-        self.0.changed(clip, (shared, own), (Reach::Arm, &nothing), out)
+        let base = Base { numbers: shared, residuals: &nothing };
+        self.0.changed(clip, (shared, own), (Reach::Arm, base), out)
     }
 }
 
@@ -106,16 +107,19 @@ impl<E: Evidence> Evidence for ArmAlone<'_, E> {
         &self,
         clip: usize,
         numbers: (&[f64], &[f64]),
-        (reach, base): (Reach, &[f64]),
+        (reach, base): (Reach, Base<'_>),
         out: &mut Vec<f64>,
     ) -> Result<(), Impossible> {
         match reach {
             Reach::Object => {
                 out.clear();
-                out.extend_from_slice(base);
+                out.extend_from_slice(base.residuals);
                 Ok(())
             }
-            Reach::All | Reach::Arm => self.0.changed(clip, numbers, (Reach::Arm, base), out),
+            // What is in contact stays as it is.
+            Reach::All | Reach::Arm => {
+                self.0.changed(clip, numbers, (Reach::Arm, Base { numbers: numbers.0, ..base }), out)
+            }
         }
     }
 
@@ -135,6 +139,7 @@ impl<E: Evidence> Evidence for ArmAlone<'_, E> {
 #[cfg(test)]
 mod tests {
     use super::super::combine::Trial;
+    use super::super::evidence::Group;
     use super::super::fit::Effort;
     use super::super::gap::Typical;
     use super::super::library::Library;
@@ -236,7 +241,7 @@ mod tests {
             let (mut all, mut some) = (Vec::new(), Vec::new());
             evidence.residuals(0, &library.start(), &[], &mut all).expect("a stroke");
             alone.residuals(0, &library.start(), &[], &mut some).expect("a stroke");
-            let of_joint = |row: &Row| evidence.channels()[row.channel].joint.is_some();
+            let of_joint = |row: &Row| evidence.channels()[row.channel].group == Group::Arm;
             for ((row, all), some) in evidence.rows(0).iter().zip(&all).zip(&some) {
                 assert_eq!(*some, if of_joint(row) { *all } else { 0.0 });
             }

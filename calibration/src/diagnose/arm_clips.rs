@@ -2,7 +2,7 @@
 //! sensors. In clips with an object only what comes before the touch counts: the arm alone is simulated.
 #![allow(non_snake_case)] // the Franka Control Interface's own symbols
 
-use super::evidence::{Channel, Evidence, Row, StageName};
+use super::evidence::{Channel, Evidence, Group, Row, StageName};
 use super::recent::Recent;
 use super::scatter::Scatter;
 use crate::estimate::{ClipModel, Impossible};
@@ -48,7 +48,9 @@ struct Prepared {
     /// Each followed by the one a control period later: some logs have the torque that acts from a tick on.
     stamps_ns: Vec<u64>,
     rows: Vec<Row>,
-    recent: Recent,
+    recent: Recent<Vec<f64>>,
+    /// From here on the tool may touch the object.
+    alone_until_ns: u64,
 }
 
 impl<F: Fn(&[f64]) -> Theta + Sync> ArmClips<F> {
@@ -67,7 +69,10 @@ impl<F: Fn(&[f64]) -> Theta + Sync> ArmClips<F> {
             _ => true,
         });
         let joints = |quantity| {
-            (0..dof).map(move |joint| Channel { quantity, place: format!("joint{}", joint + 1), joint: Some(joint) })
+            (0..dof).map(move |joint| {
+                let place = format!("joint{}", joint + 1);
+                Channel { quantity, place, joint: Some(joint), group: Group::Arm }
+            })
         };
         let channels: Vec<Channel> = quantities.flat_map(joints).collect();
         let sigma = (0..channels.len()).map(|channel| sensor_sigma(clips, &channels[channel], channel % dof)).collect();
@@ -133,7 +138,8 @@ impl Prepared {
                 rows.push(Row { channel, stage: StageName::Control, regime: regime(dq, top[channel % dof]), time });
             }
         }
-        Some(Self { recorded, commands, kept, stamps_ns, rows, recent: Recent::default() })
+        let recent = Recent::default();
+        Some(Self { recorded, commands, kept, stamps_ns, rows, recent, alone_until_ns: end_ns })
     }
 }
 
@@ -167,19 +173,21 @@ impl<F: Fn(&[f64]) -> Theta + Sync> ClipModel for ArmClips<F> {
     }
 
     fn residuals(&self, clip: usize, shared: &[f64], _own: &[f64], out: &mut Vec<f64>) -> Result<(), Impossible> {
-        let residuals = self.clips[clip].recent.at(shared, |out| self.simulated(clip, shared, out))?;
+        let residuals = self.clips[clip].recent.at(shared, || Ok(self.alone(clip, shared, &[])?.residuals))?;
         out.clone_from(&residuals);
         Ok(())
     }
 }
 
-impl<F: Fn(&[f64]) -> Theta + Sync> ArmClips<F> {
-    /// The residuals as a simulation gives them, known or not.
-    pub(super) fn simulated(&self, clip: usize, shared: &[f64], out: &mut Vec<f64>) -> Result<(), Impossible> {
-        let readings = self.readings(clip, shared)?;
-        self.compare(&self.clips[clip], &readings, out)
-    }
+/// What the arm does when nothing is in its way.
+pub struct Alone {
+    /// Of the rows of [`ArmClips::rows`].
+    pub residuals: Vec<f64>,
+    /// What the encoders would read later, one list of joints for each stamp asked for [rad].
+    pub q: Vec<Joints>,
+}
 
+impl<F: Fn(&[f64]) -> Theta + Sync> ArmClips<F> {
     /// Largest torque that the controller asks of each joint in any of the clips, gravity included [N m].
     ///
     /// # Errors
@@ -187,7 +195,7 @@ impl<F: Fn(&[f64]) -> Theta + Sync> ArmClips<F> {
     pub fn peaks(&self, shared: &[f64]) -> Result<Joints, Impossible> {
         let mut peaks = [0.0; MAX_JOINTS];
         for clip in 0..self.clips.len() {
-            for reading in self.readings(clip, shared)? {
+            for reading in self.readings(clip, shared, &[])? {
                 let gravity = self.nominal.gravity(&reading.state.q);
                 let asked = reading.tau_J_d.iter().zip(gravity).map(|(tau, gravity)| (tau + gravity).abs());
                 peaks.iter_mut().zip(asked).for_each(|(peak, asked)| *peak = asked.max(*peak));
@@ -196,8 +204,25 @@ impl<F: Fn(&[f64]) -> Theta + Sync> ArmClips<F> {
         Ok(peaks)
     }
 
-    /// At every moment that counts, and a control period later.
-    fn readings(&self, clip: usize, shared: &[f64]) -> Result<Vec<Reading>, Impossible> {
+    /// From which stamp on the tool of a clip may touch the object [ns].
+    pub fn alone_until_ns(&self, clip: usize) -> u64 {
+        self.clips[clip].alone_until_ns
+    }
+
+    /// Residuals of a clip, as a simulation gives them, known or not, and what the encoders would read at stamps after its rows if the arm went on alone.
+    ///
+    /// # Errors
+    /// [`Impossible`] when the cell cannot be simulated with these numbers.
+    pub fn alone(&self, clip: usize, shared: &[f64], later_ns: &[u64]) -> Result<Alone, Impossible> {
+        let readings = self.readings(clip, shared, later_ns)?;
+        let (rows, later) = readings.split_at(readings.len() - later_ns.len());
+        let mut residuals = Vec::new();
+        self.compare(&self.clips[clip], rows, &mut residuals)?;
+        Ok(Alone { residuals, q: later.iter().map(|reading| reading.state.q).collect() })
+    }
+
+    /// At every moment that counts, and a control period later; then at later stamps.
+    fn readings(&self, clip: usize, shared: &[f64], later_ns: &[u64]) -> Result<Vec<Reading>, Impossible> {
         let fail = |error: &dyn std::fmt::Display| Impossible(error.to_string());
         let clip = &self.clips[clip];
         let theta = (self.theta)(shared);
@@ -207,8 +232,9 @@ impl<F: Fn(&[f64]) -> Theta + Sync> ArmClips<F> {
         let start = rollout.start_state(&clip.recorded.measured, 0, &clip.commands);
         let start = start.ok_or_else(|| Impossible("no measured joints".into()))?;
         let first = clip.recorded.measured.stamps_ns[0];
-        let mut readings = vec![Reading::default(); clip.stamps_ns.len()];
-        rollout.readings(&start, first, &clip.commands, &clip.stamps_ns, &mut readings);
+        let stamps_ns = [&clip.stamps_ns[..], later_ns].concat();
+        let mut readings = vec![Reading::default(); stamps_ns.len()];
+        rollout.readings(&start, first, &clip.commands, &stamps_ns, &mut readings);
         Ok(readings)
     }
 
@@ -300,7 +326,7 @@ mod tests {
         let recorded = clip(&cell, &Theta::default(), true);
         let arm = ArmClips::new(&cell, &[recorded], |_: &[f64]| Theta::default()).expect("an arm");
         let told = |away: f64| {
-            let mut readings = arm.readings(0, &[]).expect("it can be simulated");
+            let mut readings = arm.readings(0, &[], &[]).expect("it can be simulated");
             readings[200].state.q[3] += away;
             arm.compare(&arm.clips[0], &readings, &mut Vec::new())
         };

@@ -1,19 +1,24 @@
-//! Clips with an object as evidence: the arm before the touch ([`ArmClips`]) and the object's poses ([`ObjectClips`]), each
-//! in sigmas of its sensor.
+//! Clips with an object as evidence: the arm before the touch ([`ArmClips`]), the object's poses and the arm's joints while
+//! the tool pushes the object ([`ObjectClips`]), each in sigmas of its sensor.
+//!
+//! Under an impedance controller the joints yield to the contact force by `J' F / K_P`: a push of 1 N moves an encoder by a
+//! hundred times its resolution. When and where the tool touches, and how the object resists, shows there more sharply than
+//! in any tracked pose, and no straying of the object's path bears on it.
 //!
 //! Every clip has a friction and a clock of its own, and its object strays from the simulated path: nobody simulates a
 //! blow exactly, and what it leaves behind grows along the way. That straying is a part of the measurement, added to the
 //! simulated poses, so it costs no simulation; how far clips stray is what an effect must beat to be believed
 //! ([`super::straying`]).
 
-use super::arm_clips::ArmClips;
-use super::evidence::{Channel, Evidence, Reach, Row, StageName};
+use super::arm_clips::{Alone, ArmClips};
+use super::contact::Contact;
+use super::evidence::{Base, Channel, Evidence, Group, Reach, Row, StageName};
 use super::library::Library;
 use super::recent::Recent;
 use super::scatter::Scatter;
 use crate::estimate::{ClipModel, Impossible, Random};
 use crate::forward::Setting;
-use crate::forward::object::{self, ALL, ObjectClips, Own, Part};
+use crate::forward::object::{self, ALL, ModelError, ObjectClips, Own, Part};
 use shared_mem::cell::{ClipKind, PoseNoise};
 use shared_mem::theta::Theta;
 use std::sync::Arc;
@@ -95,40 +100,56 @@ pub struct CellClips<'a, F> {
     friction: Option<usize>,
     /// Index of the object's first channel.
     first: usize,
+    /// For each clip the joints' residuals in contact.
+    contact: Vec<Contact>,
     /// For each clip the last numbers that the arm feels with its residuals there: most of what a search turns is the
     /// object's.
-    arm_alone: Vec<Recent>,
+    arm_alone: Vec<Recent<Alone>>,
 }
 
 impl<'a, F: Fn(&[f64]) -> Theta + Sync> CellClips<'a, F> {
     /// Both on the same clips in the same order.
-    pub fn new(arm: Option<ArmClips<F>>, object: ObjectClips, library: &'a Library) -> Self {
+    pub fn new(arm: Option<ArmClips<F>>, mut object: ObjectClips, library: &'a Library) -> Self {
+        object.set_model_error(ModelError { joints: arm.as_ref().map(|_| 1.0), ..object.model_error() });
         let mut channels = arm.as_ref().map_or_else(Vec::new, |arm| arm.channels().to_vec());
         let first = channels.len();
         for _ in 0..PARTS {
-            let of = |(quantity, place): (&'static str, &str)| Channel { quantity, place: place.into(), joint: None };
+            let of = |(quantity, place): (&'static str, &str)| Channel {
+                quantity,
+                place: place.into(),
+                joint: None,
+                group: Group::Object,
+            };
             channels.extend(COORDINATES.map(of));
         }
-        let (mut rows, mut straying) = (Vec::new(), Vec::new());
+        let in_contact = channels.len();
+        let encoders: Vec<Channel> =
+            channels[..first].iter().filter(|channel| channel.quantity == "q").cloned().collect();
+        channels.extend(encoders.into_iter().map(|encoder| Channel { group: Group::Contact, ..encoder }));
+        let (mut rows, mut straying, mut contact) = (Vec::new(), Vec::new(), Vec::new());
         for clip in 0..object.clips() {
             let of_arm = arm.as_ref().map_or(&[][..], |arm| arm.rows(clip));
-            straying.push(strays(&object, clip, of_arm.len()));
-            rows.push([of_arm, &pose_rows(&object, clip, first)].concat());
+            let joints = Contact::of(arm.as_ref(), &object, clip);
+            let poses = pose_rows(&object, clip, first);
+            straying.push(strays(&object, clip, of_arm.len(), joints.rows.len()));
+            rows.push([of_arm, &poses, &joints.evidence(&object.rows(clip), in_contact)].concat());
+            contact.push(joints);
         }
         let friction = library.settings.settings().iter().position(|setting| *setting == Setting::Friction);
         let scatter = scatter(&object);
         let arm_alone = rows.iter().map(|_| Recent::default()).collect();
-        Self { library, arm, object, channels, rows, straying, scatter, friction, first, arm_alone }
+        Self { library, arm, object, channels, rows, straying, scatter, friction, first, contact, arm_alone }
     }
 
-    /// The arm's residuals at numbers; none where there is no arm.
-    fn arm(&self, clip: usize, shared: &[f64]) -> Result<Arc<Vec<f64>>, Impossible> {
-        let Some(arm) = &self.arm else { return Ok(Arc::default()) };
-        self.arm_alone[clip].at(&self.library.felt_by_arm(shared), |out| arm.simulated(clip, shared, out))
+    /// What the arm does alone at numbers; nothing where there is no arm.
+    fn arm(&self, clip: usize, shared: &[f64]) -> Result<Arc<Alone>, Impossible> {
+        let Some(arm) = &self.arm else { return Ok(Arc::new(Alone { residuals: Vec::new(), q: Vec::new() })) };
+        let alone = || arm.alone(clip, shared, &self.contact[clip].stamps_ns);
+        self.arm_alone[clip].at(&self.library.felt_by_arm(shared), alone)
     }
 
-    /// The poses' residuals at numbers, a clip's own among them.
-    fn poses(&self, clip: usize, shared: &[f64], own: &[f64]) -> Result<Vec<f64>, Impossible> {
+    /// The residuals of the poses and of the joints in contact at numbers, a clip's own among them.
+    fn since_touch(&self, clip: usize, shared: &[f64], own: &[f64]) -> Result<Vec<f64>, Impossible> {
         let mut shared = shared.to_vec();
         if let (Some(friction), Some(own)) = (self.friction, own.get(FRICTION)) {
             shared[friction] *= own.exp();
@@ -136,8 +157,10 @@ impl<'a, F: Fn(&[f64]) -> Theta + Sync> CellClips<'a, F> {
         let clock = own.get(CLOCK).copied().unwrap_or(0.0);
         let of_object = ALL.map(|number| if number == Own::Clock { clock } else { 0.0 });
         let mut residuals = self.object.errors(clip, &shared, &of_object)?;
-        let noise = self.object.noise();
-        let of_arm = self.rows[clip].len() - residuals.len();
+        let (noise, contact) = (self.object.noise(), &self.contact[clip]);
+        let joints: Vec<f64> = residuals[contact.rows.clone()].to_vec();
+        residuals.truncate(self.poses(clip));
+        let of_arm = self.of_arm(clip);
         for (residual, row) in residuals.iter_mut().zip(&self.rows[clip][of_arm..]) {
             let coordinate = (row.channel - self.first) % COORDINATES.len();
             let (noise, tipping) =
@@ -148,7 +171,18 @@ impl<'a, F: Fn(&[f64]) -> Theta + Sync> CellClips<'a, F> {
         for (stray, value) in self.straying[clip].iter().zip(own.iter().skip(FIRST_STRAY)).filter(|(_, u)| **u != 0.0) {
             residuals.iter_mut().zip(&stray[of_arm..]).for_each(|(residual, slope)| *residual += slope * value);
         }
+        residuals.extend(contact.in_sigmas(&joints));
         Ok(residuals)
+    }
+
+    /// How many rows the arm has that moves alone.
+    fn of_arm(&self, clip: usize) -> usize {
+        self.arm.as_ref().map_or(0, |arm| arm.rows(clip).len())
+    }
+
+    /// How many rows the object's poses have.
+    fn poses(&self, clip: usize) -> usize {
+        self.rows[clip].len() - self.of_arm(clip) - self.contact[clip].rows.len()
     }
 }
 
@@ -187,9 +221,11 @@ fn pose_rows(object: &ObjectClips, clip: usize, first: usize) -> Vec<Row> {
     rows.iter().filter_map(one).collect()
 }
 
-/// What one unit of every number of [`STRAYING`] takes off the residuals of a clip, after `of_arm` rows of the arm.
-fn strays(object: &ObjectClips, clip: usize, of_arm: usize) -> Vec<Vec<f64>> {
-    let (rows, noise) = (object.rows(clip), object.noise());
+/// What one unit of every number of [`STRAYING`] takes off the residuals of a clip, between `of_arm` rows of the arm alone
+/// and `in_contact` of the arm in contact.
+fn strays(object: &ObjectClips, clip: usize, of_arm: usize, in_contact: usize) -> Vec<Vec<f64>> {
+    let (mut rows, noise) = (object.rows(clip), object.noise());
+    rows.retain(|row| !matches!(row.channel, object::Channel::Joint(_)));
     let along = shares(object, clip, &rows);
     let one = |(_, coordinate, shape, _): (&str, Coordinate, Shape, f64)| {
         let slope = |(row, share): (&object::Row, &f64)| match (row.channel, coordinate) {
@@ -201,6 +237,7 @@ fn strays(object: &ObjectClips, clip: usize, of_arm: usize) -> Vec<Vec<f64>> {
         };
         let mut slopes = vec![0.0; of_arm];
         slopes.extend(rows.iter().zip(&along).map(slope));
+        slopes.extend(std::iter::repeat_n(0.0, in_contact));
         slopes
     };
     STRAYING.map(one).to_vec()
@@ -239,10 +276,10 @@ impl<F: Fn(&[f64]) -> Theta + Sync> ClipModel for CellClips<'_, F> {
     }
 
     fn residuals(&self, clip: usize, shared: &[f64], own: &[f64], out: &mut Vec<f64>) -> Result<(), Impossible> {
-        let poses = self.poses(clip, shared, own)?;
+        let others = self.since_touch(clip, shared, own)?;
         out.clear();
-        out.extend_from_slice(&self.arm(clip, shared)?);
-        out.extend(poses);
+        out.extend_from_slice(&self.arm(clip, shared)?.residuals);
+        out.extend(others);
         Ok(())
     }
 }
@@ -252,21 +289,25 @@ impl<F: Fn(&[f64]) -> Theta + Sync> Evidence for CellClips<'_, F> {
         &self,
         clip: usize,
         (shared, own): (&[f64], &[f64]),
-        (reach, base): (Reach, &[f64]),
+        (reach, base): (Reach, Base<'_>),
         out: &mut Vec<f64>,
     ) -> Result<(), Impossible> {
-        let of_arm = self.arm.as_ref().map_or(0, |arm| arm.rows(clip).len());
+        let (of_arm, contact) = (self.of_arm(clip), &self.contact[clip]);
         match (reach, &self.arm) {
             (Reach::Arm, Some(_)) => {
+                let alone = self.arm(clip, shared)?;
                 out.clear();
-                out.extend_from_slice(&self.arm(clip, shared)?);
-                out.extend(&base[of_arm..]);
+                out.extend_from_slice(&alone.residuals);
+                out.extend(&base.residuals[of_arm..of_arm + self.poses(clip)]);
+                if !contact.rows.is_empty() {
+                    out.extend(contact.moved(base.residuals, &*self.arm(clip, base.numbers)?, &alone));
+                }
             }
             (Reach::Object, _) => {
-                let poses = self.poses(clip, shared, own)?;
+                let others = self.since_touch(clip, shared, own)?;
                 out.clear();
-                out.extend(&base[..of_arm]);
-                out.extend(poses);
+                out.extend(&base.residuals[..of_arm]);
+                out.extend(others);
             }
             _ => self.residuals(clip, shared, own, out)?,
         }

@@ -1,6 +1,6 @@
 //! How much of the gap a fit closes when nothing of a clip's own is fitted.
 
-use super::evidence::Evidence;
+use super::evidence::{Evidence, Group};
 use super::fit::{Bench, Hypothesis};
 use super::gap::{Residuals, Typical};
 use super::leftovers::Left;
@@ -22,12 +22,20 @@ pub fn closes<E: Evidence>(
 ) -> f64 {
     let on = |clips: &[usize]| -> Option<Vec<f64>> {
         let [before, after] = hypotheses.map(|hypothesis| Residuals::at(bench, hypothesis, clips));
-        let left = Left::of_groups(&before?.typical(), &after?.typical());
-        Some(left.iter().zip(whole).map(|(left, whole)| share(left, whole.mean_square)).collect())
+        let (before, after) = (before?, after?);
+        let left = Left::of_groups(&before.typical(), &after.typical());
+        let shares = left.iter().zip(whole).map(|(left, whole)| share(left, whole.mean_square));
+        let in_contact = before.typical_of(Group::Contact).zip(after.typical_of(Group::Contact));
+        Some(shares.chain(in_contact.map(|(before, after)| way(&before, &after))).collect())
     };
     let (Some(open), Some(choose)) = (on(&split.open()), on(&split.choose)) else { return 0.0 };
     let harmless = |(_, choose): &(&f64, &f64)| **choose > -HARM;
     open.iter().zip(&choose).filter(harmless).map(|(open, _)| *open).fold(0.0, f64::max)
+}
+
+/// How much of the way down to noise is gone in contact.
+fn way(before: &Typical, after: &Typical) -> f64 {
+    (before.mean_square / after.mean_square).ln() / (before.mean_square / before.floor).max(LEAST_GAP).ln()
 }
 
 /// How much of the way from the gap down to noise is gone, on a logarithmic scale. A real arm's gap lies so far above the

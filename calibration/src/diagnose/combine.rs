@@ -2,7 +2,7 @@
 //! not needed any more.
 
 use super::closing::closes;
-use super::evidence::{Evidence, Row};
+use super::evidence::{Evidence, Group, Row};
 use super::fit::{Bench, Effort, Hypothesis};
 use super::flat;
 use super::floor;
@@ -312,7 +312,7 @@ fn untried<E: Evidence>(bench: &Bench<'_, E>, split: &Split, now: &Hypothesis, f
 
 /// How many residuals of the arm the judged clips have.
 fn arm_rows<E: Evidence>(bench: &Bench<'_, E>, split: &Split) -> usize {
-    let of_arm = |row: &&Row| bench.evidence.channels()[row.channel].joint.is_some();
+    let of_arm = |row: &&Row| bench.evidence.channels()[row.channel].group == Group::Arm;
     split.open().iter().map(|clip| bench.evidence.rows(*clip).iter().filter(of_arm).count()).sum()
 }
 

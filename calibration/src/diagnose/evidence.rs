@@ -32,6 +32,17 @@ impl StageName {
     }
 }
 
+/// Whose sensors a channel belongs to, and while what happens.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Group {
+    /// The arm's, while it moves alone.
+    Arm,
+    /// The object's poses.
+    Object,
+    /// The arm's, from the first touch until the tool has let go of the object: its joints yield to the contact force.
+    Contact,
+}
+
 /// One measured quantity.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Channel {
@@ -41,6 +52,8 @@ pub struct Channel {
     pub place: String,
     /// The joint it belongs to, from 0; `None` for the object's.
     pub joint: Option<usize>,
+    /// Whose sensors.
+    pub group: Group,
 }
 
 /// Where a residual stands.
@@ -61,10 +74,20 @@ pub struct Row {
 pub enum Reach {
     /// Anything.
     All,
-    /// The arm's residuals; what it does to the object by way of the arm is left out.
+    /// The arm's residuals, those in contact as if the contact force stayed what it was; what it does to the object by way
+    /// of the arm is left out.
     Arm,
-    /// The object's residuals alone.
+    /// All but the residuals of the arm that moves alone.
     Object,
+}
+
+/// Where a clip's residuals are known already.
+#[derive(Debug, Clone, Copy)]
+pub struct Base<'a> {
+    /// All numbers.
+    pub numbers: &'a [f64],
+    /// The residuals there.
+    pub residuals: &'a [f64],
 }
 
 /// Clips that tell what each of their residuals is.
@@ -78,7 +101,7 @@ pub trait Evidence: ClipModel {
         &self,
         clip: usize,
         (shared, own): (&[f64], &[f64]),
-        (_reach, _base): (Reach, &[f64]),
+        (_reach, _base): (Reach, Base<'_>),
         out: &mut Vec<f64>,
     ) -> Result<(), Impossible> {
         self.residuals(clip, shared, own, out)

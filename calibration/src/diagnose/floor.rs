@@ -4,7 +4,7 @@
 //! Sensors are white, but a twin is never exact: what is left is larger than the sensor's noise and says the same thing
 //! many times over. Taken at face value it would make any two hypotheses differ by thousands of nats.
 
-use super::evidence::Evidence;
+use super::evidence::{Evidence, Group};
 use super::noise::{correlation_length, median};
 use super::quadratic::minimum;
 use super::sweep::{Column, Swept};
@@ -34,7 +34,8 @@ fn weight(evidence: &impl Evidence, clips: &[(usize, Vec<f64>)], channel: usize)
     }
     let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
     // Some strokes go their own way, and where a hit is linearised some clips tell nothing: they must not silence the others.
-    let power = if evidence.channels()[channel].joint.is_some() { mean(&powers) } else { median(&powers) };
+    let alone = evidence.channels()[channel].group == Group::Arm;
+    let power = if alone { mean(&powers) } else { median(&powers) };
     let (power, length) = (power.max(1.0), mean(&lengths).max(1.0));
     // White residuals of a channel have a length a little above one by chance.
     let length = if length < 1.5 { 1.0 } else { length };

@@ -74,7 +74,7 @@ fn outstanding(costs: &[f64]) -> Vec<usize> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::evidence::{Channel, Row, StageName};
+    use super::super::evidence::{Channel, Group, Row, StageName};
     use super::super::library::Library;
     use super::super::scatter::Scatter;
     use super::super::test_bench::shipped;
@@ -124,7 +124,7 @@ mod tests {
         let cell = shipped();
         let base = setting::complete(&cell, None).expect("a cell");
         let library = Library::new(&cell, &base, None, &[87.0; MAX_JOINTS]);
-        let channel = Channel { quantity: "position", place: "x".into(), joint: None };
+        let channel = Channel { quantity: "position", place: "x".into(), joint: None, group: Group::Object };
         let row = Row { channel: 0, stage: StageName::Slide, regime: "free", time: 0.0 };
         let evidence = TouchedTwice([channel], [row]);
         let interrupt = Interrupt::default();

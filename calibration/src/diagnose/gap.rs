@@ -1,7 +1,7 @@
 //! The gap: mean square of residuals in sigmas of the sensors, and by how much it shrinks from one hypothesis to another.
 
 use super::answer::Share;
-use super::evidence::Evidence;
+use super::evidence::{Evidence, Group};
 use super::fit::{Bench, Hypothesis};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
@@ -13,7 +13,7 @@ use rayon::prelude::*;
 pub struct Residuals {
     /// Clip and residuals.
     pub clips: Vec<(usize, Vec<f64>)>,
-    /// For each clip and group of sensors (arm, object; those that there are) the sum of squares and the number of residuals.
+    /// For each clip and group of sensors (arm, object, arm in contact) the sum of squares and the number of residuals.
     sums: Vec<Vec<(f64, f64)>>,
     /// The same of every piece of a clip: whole clips where there are enough of them.
     pieces: Vec<Vec<(f64, f64)>>,
@@ -32,8 +32,18 @@ pub struct Typical {
     pub of_object: bool,
 }
 
-/// Place of the object's group of sensors.
-const OBJECT: usize = 1;
+/// The groups whose gap is said. The arm in contact is evidence for causes, and no gap of its own: how far a joint yields
+/// to a push says how the object resists.
+const SAID: [Group; 2] = [Group::Arm, Group::Object];
+
+/// Place of a group's sums.
+fn place(group: Group) -> usize {
+    match group {
+        Group::Arm => 0,
+        Group::Object => 1,
+        Group::Contact => 2,
+    }
+}
 
 impl Residuals {
     /// Of clips that were not fitted.
@@ -64,18 +74,20 @@ impl Residuals {
     /// decides little, and a cause that shows in some clips only is seen.
     #[must_use]
     pub fn typical(&self) -> Vec<Typical> {
-        let groups = self.sums.first().map_or(0, Vec::len);
-        let usual = |sums: &[Vec<(f64, f64)>], group: usize| {
-            let of = |clip: &Vec<(f64, f64)>| (clip[group].1 > 0.0).then(|| clip[group].0 / clip[group].1);
-            let values: Vec<f64> = sums.iter().filter_map(of).collect();
+        SAID.into_iter().filter_map(|group| self.typical_of(group)).collect()
+    }
+
+    /// The same of one group; `None` where no clip has any of it.
+    #[must_use]
+    pub fn typical_of(&self, group: Group) -> Option<Typical> {
+        let usual = |sums: &[Vec<(f64, f64)>]| {
+            let of_group = sums.iter().filter_map(|clip| clip.get(place(group)));
+            let values: Vec<f64> = of_group.filter(|(_, count)| *count > 0.0).map(|(sum, count)| sum / count).collect();
             let logarithms = values.iter().map(|value| value.max(f64::MIN_POSITIVE).ln());
             (!values.is_empty()).then(|| (logarithms.sum::<f64>() / values.len() as f64).exp())
         };
-        let of = |group: usize| {
-            let (mean_square, floor) = (usual(&self.sums, group)?, usual(&self.floors, group)?);
-            Some(Typical { mean_square, floor, of_object: group == OBJECT })
-        };
-        (0..groups).filter_map(of).collect()
+        let (mean_square, floor) = (usual(&self.sums)?, usual(&self.floors)?);
+        Some(Typical { mean_square, floor, of_object: group == Group::Object })
     }
 
     /// Mean square: the mean over the groups of sensors, so that a thousand encoder rows do not drown the object.
@@ -127,10 +139,10 @@ fn sums(evidence: &impl Evidence, clip: usize, residuals: &[f64]) -> Vec<(f64, f
 fn pieces(evidence: &impl Evidence, clip: usize, residuals: &[f64], cut: usize) -> Vec<Vec<(f64, f64)>> {
     let rows = evidence.rows(clip);
     let last = rows.iter().map(|row| row.time).fold(f64::MIN_POSITIVE, f64::max);
-    let mut pieces = vec![vec![(0.0, 0.0); 2]; cut];
+    let mut pieces = vec![vec![(0.0, 0.0); 3]; cut];
     for (row, residual) in rows.iter().zip(residuals) {
         let piece = ((row.time / last * cut as f64) as usize).min(cut - 1);
-        let group = &mut pieces[piece][usize::from(evidence.channels()[row.channel].joint.is_none())];
+        let group = &mut pieces[piece][place(evidence.channels()[row.channel].group)];
         *group = (group.0 + residual * residual, group.1 + 1.0);
     }
     pieces
@@ -148,13 +160,13 @@ fn sums_of_noise<E: Evidence>(bench: &Bench<'_, E>, clip: usize) -> Vec<(f64, f6
 }
 
 fn group_means(sums: &[Vec<(f64, f64)>], drawn: &[usize]) -> Vec<f64> {
-    let groups = sums.first().map_or(0, Vec::len);
-    let of = |group: usize| {
-        let add = |(sum, count): (f64, f64), k: &usize| (sum + sums[*k][group].0, count + sums[*k][group].1);
-        let (sum, count) = drawn.iter().fold((0.0, 0.0), add);
+    let of = |group: Group| {
+        let of_clip = |k: &usize| sums[*k][place(group)];
+        let add = |(sum, count): (f64, f64), (more, rows): (f64, f64)| (sum + more, count + rows);
+        let (sum, count) = drawn.iter().map(of_clip).fold((0.0, 0.0), add);
         (count > 0.0).then(|| sum / count)
     };
-    (0..groups).filter_map(of).collect()
+    SAID.into_iter().filter_map(of).collect()
 }
 
 fn mean(sums: &[Vec<(f64, f64)>], drawn: &[usize]) -> f64 {
@@ -173,7 +185,7 @@ mod tests {
 
     fn residuals(sizes: &[f64]) -> Residuals {
         let clips = sizes.iter().enumerate().map(|(clip, size)| (clip, vec![*size; 10])).collect();
-        let sums = |size: &f64| vec![(10.0 * size * size, 10.0), (0.0, 0.0)];
+        let sums = |size: &f64| vec![(10.0 * size * size, 10.0), (0.0, 0.0), (0.0, 0.0)];
         let floors = sizes.iter().map(|_| sums(&1.0)).collect();
         let sums: Vec<_> = sizes.iter().map(sums).collect();
         Residuals { clips, pieces: sums.clone(), sums, floors }

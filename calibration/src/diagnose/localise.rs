@@ -1,7 +1,7 @@
 //! Where the gap lies: the share of every cell of stage, channel and regime in the squared residual beyond the noise.
 
 use super::answer::Place;
-use super::evidence::Evidence;
+use super::evidence::{Evidence, Group};
 use super::gap::Residuals;
 use std::collections::BTreeMap;
 
@@ -15,6 +15,9 @@ pub fn localise(evidence: &impl Evidence, residuals: &Residuals) -> Vec<Place> {
     for (clip, residuals) in &residuals.clips {
         for (row, residual) in evidence.rows(*clip).iter().zip(residuals) {
             let channel = &evidence.channels()[row.channel];
+            if channel.group == Group::Contact {
+                continue;
+            }
             let key = (row.stage.name().to_owned(), channel.place.clone(), row.regime);
             *cells.entry(key).or_default() += residual * residual - 1.0;
         }

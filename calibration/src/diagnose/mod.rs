@@ -9,7 +9,7 @@
 //! | [`admit`] | can the clips be diagnosed at all |
 //! | [`length`] | how much of long clips counts |
 //! | [`split`] | which clips are for what |
-//! | [`evidence`], [`arm_clips`], [`cell_clips`] | what is measured against the twin, and where in a clip |
+//! | [`evidence`], [`arm_clips`], [`contact`], [`cell_clips`] | what is measured against the twin, and where in a clip |
 //! | `recent` | where a search has just been |
 //! | [`scatter`] | what every clip has of its own |
 //! | [`library`], [`ground`] | the candidates as numbers, and where on the table they can show |
@@ -48,6 +48,7 @@ pub mod combine;
 pub mod command;
 pub mod conclude;
 pub mod confidence;
+pub mod contact;
 pub mod cost;
 pub mod drift;
 pub mod evidence;

@@ -11,33 +11,37 @@ const PLACES: usize = 32;
 
 /// The last places of one clip, the oldest given up first. Two threads that miss the same at the same time both work it out, and
 /// find the same.
-#[derive(Debug, Default)]
-pub(super) struct Recent(Mutex<VecDeque<Place>>);
+#[derive(Debug)]
+pub(super) struct Recent<T>(Mutex<VecDeque<Place<T>>>);
 
-/// Numbers, and the residuals there.
-type Place = (Vec<f64>, Arc<Vec<f64>>);
+/// Numbers, and what was found there.
+type Place<T> = (Vec<f64>, Arc<T>);
 
-impl Recent {
-    /// The residuals at `numbers`, worked out unless they are known.
+impl<T> Default for Recent<T> {
+    fn default() -> Self {
+        Self(Mutex::default())
+    }
+}
+
+impl<T> Recent<T> {
+    /// What is found at `numbers`, worked out unless it is known.
     ///
     /// # Errors
     /// Those of the work.
     pub(super) fn at(
         &self,
         numbers: &[f64],
-        work: impl FnOnce(&mut Vec<f64>) -> Result<(), Impossible>,
-    ) -> Result<Arc<Vec<f64>>, Impossible> {
+        work: impl FnOnce() -> Result<T, Impossible>,
+    ) -> Result<Arc<T>, Impossible> {
         let kept = || self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some((_, residuals)) = kept().iter().find(|(known, _)| known == numbers) {
-            return Ok(Arc::clone(residuals));
+        if let Some((_, found)) = kept().iter().find(|(known, _)| known == numbers) {
+            return Ok(Arc::clone(found));
         }
-        let mut residuals = Vec::new();
-        work(&mut residuals)?;
-        let residuals = Arc::new(residuals);
+        let found = Arc::new(work()?);
         let mut kept = kept();
         kept.truncate(PLACES - 1);
-        kept.push_front((numbers.to_vec(), Arc::clone(&residuals)));
-        Ok(residuals)
+        kept.push_front((numbers.to_vec(), Arc::clone(&found)));
+        Ok(found)
     }
 }
 
@@ -50,12 +54,11 @@ mod tests {
     fn a_place_is_worked_out_once_until_many_others_were_and_a_failure_is_no_place() {
         let (recent, worked) = (Recent::default(), Cell::new(0));
         let at = |number: f64| {
-            let square = |out: &mut Vec<f64>| {
+            let square = || {
                 worked.set(worked.get() + 1);
-                out.push(number * number);
-                if number < 0.0 { Err(Impossible("below zero".into())) } else { Ok(()) }
+                if number < 0.0 { Err(Impossible("below zero".into())) } else { Ok(number * number) }
             };
-            recent.at(&[number], square).ok().map(|residuals| residuals[0])
+            recent.at(&[number], square).ok().map(|square| *square)
         };
         assert_eq!((at(3.0), at(3.0), worked.get()), (Some(9.0), Some(9.0), 1));
         assert!(at(-1.0).is_none() && at(-1.0).is_none() && worked.get() == 3);

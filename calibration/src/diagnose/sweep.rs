@@ -9,7 +9,7 @@
 //! ([`Precision::Joints`]): a stiff controller leaves little of one joint in another. That costs a seventh of turning
 //! them one by one ([`Precision::Exact`]).
 
-use super::evidence::{Evidence, Reach};
+use super::evidence::{Base, Evidence, Reach};
 use super::library::{Alternative, Library};
 use super::scatter::Scatter;
 use super::straying::Around;
@@ -189,7 +189,8 @@ impl<E: Evidence, G: Fn(f64) -> bool + Sync> Work<'_, E, G> {
         let units: Vec<f64> = batch.iter().map(|k| self.turn(&mut numbers, self.columns[*k])).collect();
         let mut out = Vec::with_capacity(base.len());
         let reach = self.reach(batch, &numbers);
-        let answer = self.evidence.changed(clip, (&numbers, own), (reach, base), &mut out);
+        let at = Base { numbers: self.full, residuals: base };
+        let answer = self.evidence.changed(clip, (&numbers, own), (reach, at), &mut out);
         let answered = answer.is_ok() && out.len() == base.len();
         if !answered {
             return Vec::new();
@@ -246,7 +247,8 @@ impl<E: Evidence, G: Fn(f64) -> bool + Sync> Work<'_, E, G> {
         let effect = &self.scatter.random[k];
         let (mut moved, mut out) = (own.to_vec(), Vec::new());
         moved[k] += effect.step;
-        let changed = |out: &mut Vec<f64>| self.evidence.changed(clip, (self.full, &moved), (Reach::Object, base), out);
+        let at = Base { numbers: self.full, residuals: base };
+        let changed = |out: &mut Vec<f64>| self.evidence.changed(clip, (self.full, &moved), (Reach::Object, at), out);
         let turned = effect.sigma > 0.0 && changed(&mut out).is_ok();
         if !turned || out.len() != base.len() {
             return vec![0.0; base.len()];
