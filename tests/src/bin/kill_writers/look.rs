@@ -80,9 +80,11 @@ fn session(folder: &Path) -> Result<(), String> {
     session.clips.iter().try_for_each(|entry| undamaged(&session, entry))
 }
 
+/// A recording is written while it is made. One that ended before the arm had sent anything holds what had come until then.
 fn clip(path: &Path) -> Result<(), String> {
     let session = Session::open(path).map_err(|e| e.to_string())?;
-    undamaged(&session, &session.clips[0])
+    let ended_early = |why: &String| why.contains("`/arm/state`: no messages");
+    undamaged(&session, &session.clips[0]).or_else(|why| if ended_early(&why) { Ok(()) } else { Err(why) })
 }
 
 fn undamaged(session: &Session, entry: &shared_mem::cell::ClipEntry) -> Result<(), String> {
