@@ -9,7 +9,7 @@ use super::headline::words;
 use super::scatter::Scatter;
 use super::screening::arm_gap_is_open;
 use super::split::Split;
-use super::{flat, stages, starts};
+use super::{stages, starts, undetermined};
 use crate::estimate::{ClipModel, Impossible};
 use shared_mem::progress::Progress;
 
@@ -69,7 +69,7 @@ impl Step {
         let anew = if arm_gap_is_open(&self.whole, &self.left) { refined(&best.full) } else { None };
         let with_object = |(place, alone): (usize, Hypothesis)| {
             let candidate = self.trials[place].scored.candidate;
-            let mut open = flat::seen_by_nothing(&arm, &alone, candidate);
+            let mut open = undetermined::sizes(&arm, &alone, candidate);
             open.retain(|k| bench.library.joints[*k].is_none());
             let object = |other: &Vec<f64>| bench.library.with_object_of(alone.full.clone(), other);
             let starts = [Some(alone.full.clone()), anew.as_ref().map(object)].into_iter().flatten();
@@ -179,18 +179,18 @@ mod tests {
     }
 
     #[test]
-    fn an_object_that_was_found_under_an_arm_that_strays_is_found_anew() {
+    fn an_object_that_was_found_under_an_arm_that_is_wrong_is_found_anew() {
         let cell = shipped();
         let world = with_effect("command_delay", 40, Kind::Strokes, &cell);
         on_strokes((&cell, &world), |bench, even| {
             let library = bench.library;
             let hidden = hidden_baseline(library, &world);
-            let mut astray = hidden.clone();
+            let mut wrong = hidden.clone();
             for k in library.baseline.clone().filter(|k| !library.arm_feels(*k, &hidden)) {
-                astray[k] = library.start()[k];
+                wrong[k] = library.start()[k];
             }
             let candidate = library.find("command_delay").expect("a candidate");
-            let (mut step, split) = step(bench, astray.clone(), even, &[candidate]);
+            let (mut step, split) = step(bench, wrong.clone(), even, &[candidate]);
             let object = |fits: Vec<(usize, Hypothesis)>| {
                 let [(0, fit)] = &fits[..] else { panic!("{} fits", fits.len()) };
                 library.with_object_of(hidden.clone(), &fit.full)
@@ -208,7 +208,7 @@ mod tests {
                     (&Progress::new("nothing", 1), 0),
                 ))
             };
-            assert_eq!(fitted(1.5), library.with_object_of(hidden.clone(), &astray), "the arm is where it was");
+            assert_eq!(fitted(1.5), library.with_object_of(hidden.clone(), &wrong), "the arm is where it was");
             assert_eq!(fitted(50.0), hidden);
         });
     }

@@ -19,7 +19,7 @@ use shared_mem::theta::ObjectTheta;
 /// The way there, and the last steps.
 const WAY: Effort = Effort::of(8, Precision::Joints);
 const LAST: Effort = Effort::of(8, Precision::Exact);
-/// Arm and object together: with slopes joint by joint only the arm says what its gains are. An object that strays for a
+/// Arm and object together: with slopes joint by joint only the arm says what its gains are. An object that deviates for a
 /// reason that is not in the twin yet would bend them until the hit lands where it helps.
 const TOGETHER: Effort = Effort::of(8, Precision::Joints);
 
@@ -71,7 +71,7 @@ pub fn refined<E: Evidence>(
     }
     let clips: Vec<Clip> = split.train.iter().map(|clip| admitted.clips[*clip].clone()).collect();
     let mut base = bench.library.theta(given);
-    // What stood in for an effect leads astray once that effect acts: only the friction is where it was.
+    // What stood in for an effect is wrong once that effect acts: only the friction is where it was.
     let nominal = bench.library.theta(&bench.library.start()).object;
     if let (Some(object), Some(nominal)) = (&mut base.object, nominal) {
         *object = ObjectTheta { friction: object.friction, ..nominal };

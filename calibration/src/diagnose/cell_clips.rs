@@ -3,12 +3,12 @@
 //!
 //! Under an impedance controller the joints yield to the contact force by `J' F / K_P`: a push of 1 N moves an encoder by a
 //! hundred times its resolution. When and where the tool touches, and how the object resists, shows there more sharply than
-//! in any tracked pose, and no straying of the object's path bears on it.
+//! in any tracked pose, and no deviation of the object's path bears on it.
 //!
-//! Every clip has a friction and a clock of its own, and its object strays from the simulated path: nobody simulates a
-//! blow exactly, and what it leaves behind grows along the way. That straying is a part of the measurement, added to the
-//! simulated poses, so it costs no simulation; how far clips stray is what an effect must beat to be believed
-//! ([`super::straying`]).
+//! Every clip has a friction and a clock of its own, and its object deviates from the simulated path: nobody simulates an
+//! impact exactly, and the error grows along the path. That deviation is a random effect, added to the simulated poses, so it
+//! costs no simulation; its scale is what an effect must beat to be believed
+//! ([`super::scatter_scale`]).
 
 use super::arm_clips::{Alone, ArmClips};
 use super::contact::Contact;
@@ -45,11 +45,11 @@ const IN_THE_PLANE: [usize; 3] = [0, 1, 5];
 /// under a blow is not modelled well enough to learn from.
 const TIPPING: PoseNoise = PoseNoise { position: 3e-3, rotation: 0.05 };
 
-/// The own numbers: how far a clip strays at the end of its path, and on the way there more than in proportion.
+/// The own numbers: the deviation of a clip at the end of its path, and on the way there more than in proportion.
 ///
-/// Sigmas are what strokes of another engine stray from the twin that is given their true parameters: 1 mm and 0.012 rad
+/// Sigmas are the deviations of strokes of another engine from the twin that is given their true parameters: 1 mm and 0.012 rad
 /// at the end of the path in a clip like most.
-const STRAYING: [(&str, Coordinate, Shape, f64); 6] = [
+const PATH_DEVIATIONS: [(&str, Coordinate, Shape, f64); 6] = [
     ("x at the end", Coordinate::X, Shape::End, 1e-3),
     ("y at the end", Coordinate::Y, Shape::End, 1e-3),
     ("yaw at the end", Coordinate::Yaw, Shape::End, 0.012),
@@ -57,10 +57,10 @@ const STRAYING: [(&str, Coordinate, Shape, f64); 6] = [
     ("y on the way", Coordinate::Y, Shape::Way, 0.5e-3),
     ("yaw on the way", Coordinate::Yaw, Shape::Way, 0.006),
 ];
-/// Places of friction and clock among the own numbers; those of [`STRAYING`] follow.
+/// Places of friction and clock among the own numbers; those of [`PATH_DEVIATIONS`] follow.
 const FRICTION: usize = 0;
 const CLOCK: usize = 1;
-const FIRST_STRAY: usize = 2;
+const FIRST_DEVIATION: usize = 2;
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Coordinate {
@@ -93,8 +93,8 @@ pub struct CellClips<'a, F> {
     object: ObjectClips,
     channels: Vec<Channel>,
     rows: Vec<Vec<Row>>,
-    /// For each clip and number of [`STRAYING`], what one unit of it takes off every residual.
-    straying: Vec<Vec<Vec<f64>>>,
+    /// For each clip and number of [`PATH_DEVIATIONS`], what one unit of it takes off every residual.
+    deviations: Vec<Vec<Vec<f64>>>,
     scatter: Scatter,
     /// Index of the shared friction among the numbers.
     friction: Option<usize>,
@@ -126,19 +126,19 @@ impl<'a, F: Fn(&[f64]) -> Theta + Sync> CellClips<'a, F> {
         let encoders: Vec<Channel> =
             channels[..first].iter().filter(|channel| channel.quantity == "q").cloned().collect();
         channels.extend(encoders.into_iter().map(|encoder| Channel { group: Group::Contact, ..encoder }));
-        let (mut rows, mut straying, mut contact) = (Vec::new(), Vec::new(), Vec::new());
+        let (mut rows, mut deviations, mut contact) = (Vec::new(), Vec::new(), Vec::new());
         for clip in 0..object.clips() {
             let of_arm = arm.as_ref().map_or(&[][..], |arm| arm.rows(clip));
             let joints = Contact::of(arm.as_ref(), &object, clip);
             let poses = pose_rows(&object, clip, first);
-            straying.push(strays(&object, clip, of_arm.len(), joints.rows.len()));
+            deviations.push(deviation_slopes(&object, clip, of_arm.len(), joints.rows.len()));
             rows.push([of_arm, &poses, &joints.evidence(&object.rows(clip), in_contact)].concat());
             contact.push(joints);
         }
         let friction = library.settings.settings().iter().position(|setting| *setting == Setting::Friction);
         let scatter = scatter(&object);
         let arm_alone = rows.iter().map(|_| Recent::default()).collect();
-        Self { library, arm, object, channels, rows, straying, scatter, friction, first, contact, arm_alone }
+        Self { library, arm, object, channels, rows, deviations, scatter, friction, first, contact, arm_alone }
     }
 
     /// What the arm does alone at numbers; nothing where there is no arm.
@@ -168,8 +168,10 @@ impl<'a, F: Fn(&[f64]) -> Theta + Sync> CellClips<'a, F> {
             let tips = row.stage != StageName::Rest && !IN_THE_PLANE.contains(&coordinate);
             *residual /= if tips { noise.hypot(tipping) } else { noise };
         }
-        for (stray, value) in self.straying[clip].iter().zip(own.iter().skip(FIRST_STRAY)).filter(|(_, u)| **u != 0.0) {
-            residuals.iter_mut().zip(&stray[of_arm..]).for_each(|(residual, slope)| *residual += slope * value);
+        for (slopes, value) in
+            self.deviations[clip].iter().zip(own.iter().skip(FIRST_DEVIATION)).filter(|(_, u)| **u != 0.0)
+        {
+            residuals.iter_mut().zip(&slopes[of_arm..]).for_each(|(residual, slope)| *residual += slope * value);
         }
         residuals.extend(contact.in_sigmas(&joints));
         Ok(residuals)
@@ -186,15 +188,15 @@ impl<'a, F: Fn(&[f64]) -> Theta + Sync> CellClips<'a, F> {
     }
 }
 
-/// Friction and clock as identification has them, and how far clips stray.
+/// Friction and clock as identification has them, and the deviations of paths.
 fn scatter(object: &ObjectClips) -> Scatter {
     let light = [Own::LnFriction, Own::Clock];
     let kind = ClipKind::ControlHitSlide;
     let mut random: Vec<Random> =
         light.iter().map(|own| Random { sigma: own.sigma(object.cell(), kind), ..own.random() }).collect();
-    let stray = |(name, _, _, sigma): (&str, _, _, f64)| Random { name: name.into(), sigma, step: sigma };
-    random.extend(STRAYING.map(stray));
-    Scatter { heavy: FIRST_STRAY..random.len(), forgiving: 1.0, random }
+    let random_effect = |(name, _, _, sigma): (&str, _, _, f64)| Random { name: name.into(), sigma, step: sigma };
+    random.extend(PATH_DEVIATIONS.map(random_effect));
+    Scatter { heavy: FIRST_DEVIATION..random.len(), forgiving: 1.0, random }
 }
 
 fn pose_rows(object: &ObjectClips, clip: usize, first: usize) -> Vec<Row> {
@@ -221,9 +223,9 @@ fn pose_rows(object: &ObjectClips, clip: usize, first: usize) -> Vec<Row> {
     rows.iter().filter_map(one).collect()
 }
 
-/// What one unit of every number of [`STRAYING`] takes off the residuals of a clip, between `of_arm` rows of the arm alone
+/// What one unit of every number of [`PATH_DEVIATIONS`] takes off the residuals of a clip, between `of_arm` rows of the arm alone
 /// and `in_contact` of the arm in contact.
-fn strays(object: &ObjectClips, clip: usize, of_arm: usize, in_contact: usize) -> Vec<Vec<f64>> {
+fn deviation_slopes(object: &ObjectClips, clip: usize, of_arm: usize, in_contact: usize) -> Vec<Vec<f64>> {
     let (mut rows, noise) = (object.rows(clip), object.noise());
     rows.retain(|row| !matches!(row.channel, object::Channel::Joint(_)));
     let along = shares(object, clip, &rows);
@@ -240,7 +242,7 @@ fn strays(object: &ObjectClips, clip: usize, of_arm: usize, in_contact: usize) -
         slopes.extend(std::iter::repeat_n(0.0, in_contact));
         slopes
     };
-    STRAYING.map(one).to_vec()
+    PATH_DEVIATIONS.map(one).to_vec()
 }
 
 /// How far along its path the recorded object was at every row, 0 to 1: along the straight line between its two resting
@@ -327,6 +329,6 @@ impl<F: Fn(&[f64]) -> Theta + Sync> Evidence for CellClips<'_, F> {
     }
 
     fn own_slope(&self, clip: usize, own: usize) -> Option<&[f64]> {
-        Some(self.straying[clip].get(own.checked_sub(FIRST_STRAY)?)?)
+        Some(self.deviations[clip].get(own.checked_sub(FIRST_DEVIATION)?)?)
     }
 }

@@ -3,7 +3,7 @@
 use super::evidence::{Evidence, Group};
 use super::fit::{Bench, Hypothesis};
 use super::gap::{Residuals, Typical};
-use super::leftovers::Left;
+use super::remainder::Left;
 use super::split::Split;
 
 /// A gap smaller than this, over its floor, is taken for this size.
@@ -52,7 +52,7 @@ fn share(left: &Left, whole: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::super::leftovers::{NUMERICS, SUBSTITUTE};
+    use super::super::remainder::{NUMERICS, SUBSTITUTE};
     use super::*;
 
     #[test]

@@ -4,21 +4,21 @@
 use super::closing::closes;
 use super::evidence::{Evidence, Group, Row};
 use super::fit::{Bench, Effort, Hypothesis};
-use super::flat;
 use super::floor;
 use super::gap::{Residuals, Typical};
 use super::headline::words;
-use super::leftovers::{Left, NUMERICS, ROUGHNESS};
 use super::library::Library;
+use super::refit::{refitted, without_superfluous};
+use super::remainder::{Left, NUMERICS, ROUGHNESS};
 use super::score::{Advantage, Predicted, predict};
-use super::screening::{arm_gap_is_open, overlooked, seen_when_clips_stray_little, to_fit};
-use super::settle::{settled, without_superfluous};
+use super::screening::{arm_gap_is_open, overlooked, seen_at_the_least_scatter, to_fit};
 use super::shortlist::Scored;
 use super::signatures;
 use super::split::Split;
 use super::stages;
 use super::starts;
 use super::sweep::Precision;
+use super::undetermined;
 use shared_mem::progress::Progress;
 
 /// At most so many effects are named.
@@ -124,9 +124,9 @@ pub struct Found {
 impl Found {
     /// For every step, how many times what the search left of an arm's clips exceeds what was taken for noise in it, at least
     /// 1: so many times less do differences between candidates say. Weights come from slopes, with all candidates at once; a
-    /// real arm strays far more under all that is named. Clips with numbers of their own take such leftovers up.
+    /// real arm deviates far more under all that is named. Clips with numbers of their own take that up.
     #[must_use]
-    pub fn unforeseen<E: Evidence>(&self, bench: &Bench<'_, E>) -> Vec<f64> {
+    pub fn overdispersion<E: Evidence>(&self, bench: &Bench<'_, E>) -> Vec<f64> {
         let clips: Vec<usize> = self.last.fitted.iter().map(|clip| clip.clip).collect();
         let left = (bench.scatter.count() == 0).then(|| Residuals::at(bench, &self.last, &clips)).flatten();
         let Some(left) = left else { return vec![1.0; self.steps.len()] };
@@ -198,13 +198,13 @@ pub fn search<E: Evidence>(
                 if steps.len() > 1 {
                     bar.insert(&stages::FURTHER);
                 }
-                now = settled(bench, split, (&best, &weights), refined)?;
+                now = refitted(bench, split, (&best, &weights), refined)?;
                 bar.show(1, stages::REFINEMENT);
                 let step = steps.last_mut()?;
-                step.try_again(bench, split, &now, refined);
+                step.reidentify_rivals(bench, split, &now, refined);
                 let other = step.best(bench).map(|(_, fit, _)| fit.clone()).filter(|fit| fit.effects != now.effects);
                 if let Some(other) = other {
-                    now = settled(bench, split, (&other, &weights), refined)?;
+                    now = refitted(bench, split, (&other, &weights), refined)?;
                 }
             }
             // The best so far, as far as it was fitted.
@@ -217,7 +217,7 @@ pub fn search<E: Evidence>(
             _ => break,
         }
     }
-    let last = flat::without(bench, &without_superfluous(bench, split, now, &steps.last()?.weights));
+    let last = undetermined::without(bench, &without_superfluous(bench, split, now, &steps.last()?.weights));
     Some(Found { steps, last })
 }
 
@@ -278,7 +278,7 @@ fn step<E: Evidence>(
     let whole = whole.unwrap_or(&left).clone();
     let mut promising = to_fit(bench, (&from, &weights), &scored, (&whole, &left));
     let seen =
-        if arm_gap_is_open(&whole, &left) { Vec::new() } else { seen_when_clips_stray_little(bench, &from, &narrow) };
+        if arm_gap_is_open(&whole, &left) { Vec::new() } else { seen_at_the_least_scatter(bench, &from, &narrow) };
     for seen in seen {
         if !promising.contains(&seen.candidate) {
             promising.push(seen.candidate);
@@ -380,7 +380,7 @@ impl Step {
         }
     }
 
-    /// Whether the object strays by more than in strokes of another engine with nothing wrong.
+    /// Whether the object's gap is larger than in strokes of another engine with nothing wrong.
     fn object_gap(&self) -> bool {
         self.left.iter().any(|group| group.of_object && group.mean_square - group.floor > ROUGHNESS)
     }

@@ -8,14 +8,14 @@ use super::evidence::Evidence;
 use super::fit::{Bench, Hypothesis};
 use super::gap::Residuals;
 use super::headline::{self, Facts};
-use super::leftovers::{self, Left};
 use super::partly::{self, Partly};
+use super::remainder::{self, Left};
 use super::score::predict;
 use super::site::Site;
 use super::split::Split;
 use super::verdict::{self, Finding};
 use super::{
-    DiagnoseError, Kind, Options, advice, combine, confidence, drift, localise, parameters, ranked, remedies, settle,
+    DiagnoseError, Kind, Options, advice, combine, confidence, drift, localise, parameters, ranked, refit, remedies,
 };
 use crate::report::{Trace, channel_in_words, effect_in_words, in_unit};
 use shared_mem::recording::Session;
@@ -86,11 +86,11 @@ pub fn conclude<E: Evidence>(
         .map(|(before, after)| Left::of_groups(&before, &after))
         .ok_or(DiagnoseError::NoBaseline)?;
     let confirmed = confirms(&before, &after);
-    let unforeseen = found.unforeseen(bench);
-    let finding = finding(bench, (split, found), &unforeseen, (left, confirmed));
+    let overdispersion = found.overdispersion(bench);
+    let finding = finding(bench, (split, found), &overdispersion, (left, confirmed));
     let decision = finding.decide();
     let tried = decision.kind == Kind::Unexplained;
-    let partly = tried.then(|| partly::proven(bench, (split, found), &before, &unforeseen, options.seed)).flatten();
+    let partly = tried.then(|| partly::proven(bench, (split, found), &before, &overdispersion, options.seed)).flatten();
     let (found, after) = partly.as_ref().map_or((found, &after), |partly| (&partly.found, &partly.after));
     let rest = if partly.is_some() { localise::localise(bench.evidence, after) } else { rest };
     let believed = partly.is_some() || matches!(decision.kind, Kind::Named | Kind::Class);
@@ -118,7 +118,7 @@ pub fn conclude<E: Evidence>(
         after: shown.mean_square(),
         floor: before.floor(),
         shrink: shown.shrink(&before, options.seed),
-        explainable_fraction: leftovers::explained(before.mean_square(), shown.mean_square(), before.floor()),
+        explainable_fraction: remainder::explained(before.mean_square(), shown.mean_square(), before.floor()),
         joint_rms_rad: joints,
         object_add_m: add,
         object_add_s_m: add_s,
@@ -135,7 +135,7 @@ pub fn conclude<E: Evidence>(
         gap,
         candidates: ranked::candidates(
             bench,
-            (found, unforeseen[0]),
+            (found, overdispersion[0]),
             split,
             (&before, after, &finding),
             verdict.kind,
@@ -223,7 +223,7 @@ fn next(verdict: &Verdict, open: bool, largest: Option<(&str, &str)>, site: &Sit
 
 /// Whether enough of the gap closes on the confirm clips for a cause, in their mean or in a clip like most.
 fn confirms(before: &Residuals, after: &Residuals) -> bool {
-    let mean = leftovers::explained(before.mean_square(), after.mean_square(), before.floor());
+    let mean = remainder::explained(before.mean_square(), after.mean_square(), before.floor());
     let usual = Left::of_groups(&before.typical(), &after.typical()).iter().map(Left::explained).fold(mean, f64::max);
     after.mean_square() < before.mean_square() && usual > combine::CLOSES
 }
@@ -231,7 +231,7 @@ fn confirms(before: &Residuals, after: &Residuals) -> bool {
 fn finding<'a, E: Evidence>(
     bench: &Bench<'a, E>,
     (split, found): (&Split, &Found),
-    unforeseen: &[f64],
+    overdispersion: &[f64],
     (left, confirmed): (Vec<Left>, bool),
 ) -> Finding<'a> {
     let name = |effect: &usize| bench.library.candidates[*effect].effect.name;
@@ -240,7 +240,7 @@ fn finding<'a, E: Evidence>(
     for (place, effect) in found.kept() {
         let step = &found.steps[place];
         clear &= step.is_clear(bench.library, effect);
-        let others = confidence::rivals(step, effect, unforeseen[place]);
+        let others = confidence::rivals(step, effect, overdispersion[place]);
         let others = others.into_iter().filter(|other| !found.last.effects.contains(other));
         rivals.extend(others.filter(|other| stands_in(bench, split, found, (step, effect), *other)).map(|k| name(&k)));
     }
@@ -252,7 +252,7 @@ fn finding<'a, E: Evidence>(
         of_arm: found.last.effects.iter().all(|effect| bench.library.candidates[*effect].is_of_arm()),
         left,
         confirmed,
-        implausible: !leftovers::implausible(bench, &found.last).is_empty(),
+        implausible: !remainder::implausible(bench, &found.last).is_empty(),
         drift: drift::of_friction(&bench.scatter, &found.last),
     }
 }
@@ -284,7 +284,7 @@ fn stands_in<E: Evidence>(
     let mut full = last.full.clone();
     bench.library.candidates[effect].numbers.clone().for_each(|k| full[k] = bench.library.unknowns[k].start);
     bench.library.candidates[rival].numbers.clone().for_each(|k| full[k] = fit.full[k]);
-    let swapped = bench.fit((&effects, full), &split.train, weights, Some(last), settle::last_pass(bench));
+    let swapped = bench.fit((&effects, full), &split.train, weights, Some(last), refit::last_pass(bench));
     let predicted = |hypothesis| predict(bench, hypothesis, &split.choose, weights);
     let Some((with, instead)) = predicted(last).zip(swapped.as_ref().and_then(predicted)) else { return true };
     let advantage = with.over(&instead);

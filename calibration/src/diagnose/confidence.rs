@@ -32,10 +32,10 @@ pub fn probabilities(trials: &[Trial], none: bool) -> Vec<(usize, f64)> {
 }
 
 /// Candidates of a step that explain it as well as the chosen one: whose gains, clip by clip, are not less beyond chance, and
-/// that close as much of the gap; with more numbers than the chosen one, markedly more of it. Differences count `unforeseen`
+/// that close as much of the gap; with more numbers than the chosen one, markedly more of it. Differences count `overdispersion`
 /// times less.
 #[must_use]
-pub fn rivals(step: &Step, chosen: usize, unforeseen: f64) -> Vec<usize> {
+pub fn rivals(step: &Step, chosen: usize, overdispersion: f64) -> Vec<usize> {
     let of = |candidate: usize| {
         let trial = step.trials.iter().find(|trial| trial.scored.candidate == candidate)?;
         trial.fitted.as_ref().map(|(_, advantage)| (advantage, trial))
@@ -44,7 +44,7 @@ pub fn rivals(step: &Step, chosen: usize, unforeseen: f64) -> Vec<usize> {
     let near = |candidate: &usize| {
         let Some((other, trial)) = of(*candidate).filter(|_| *candidate != chosen) else { return false };
         let (beyond, error) = best.beyond(other);
-        let (beyond, error) = (beyond / unforeseen, error / unforeseen);
+        let (beyond, error) = (beyond / overdispersion, error / overdispersion);
         let alike = alike(beyond, error, best.clips()) && other.nats > other.error;
         let dearer = trial.scored.cost > chosen_trial.scored.cost;
         let enough =

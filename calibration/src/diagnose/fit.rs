@@ -166,8 +166,8 @@ impl<E: Evidence> Bench<'_, E> {
         let free = self.free(effects);
         let holds = |k: &usize| effort.holds_joints && self.library.joints[*k].is_some();
         let moving: Vec<usize> = free.iter().copied().filter(|k| !holds(k)).collect();
-        let mut clips = self.settled(&full, from, weights)?;
-        clips = self.freed(&full, clips, weights);
+        let mut clips = self.own_fitted(&full, from, weights)?;
+        clips = self.restarted(&full, clips, weights);
         let mut damping = 1e-4;
         let mut best = None;
         for _ in 1..effort.iterations {
@@ -182,13 +182,13 @@ impl<E: Evidence> Bench<'_, E> {
             };
             (full, clips) = (to, to_own);
         }
-        let freed = self.freed(&full, clips.clone(), weights);
-        let at = match best.filter(|_| moving.len() == free.len() && freed == clips) {
+        let restarted = self.restarted(&full, clips.clone(), weights);
+        let at = match best.filter(|_| moving.len() == free.len() && restarted == clips) {
             Some(at) => at,
-            None => self.linearise(&full, &free, &freed, effort.precision)?,
+            None => self.linearise(&full, &free, &restarted, effort.precision)?,
         };
         let forms = at.reduced(self.evidence, weights);
-        let fitted = freed.into_iter().zip(forms).map(|((clip, own), reduced)| FittedClip { clip, own, reduced });
+        let fitted = restarted.into_iter().zip(forms).map(|((clip, own), reduced)| FittedClip { clip, own, reduced });
         Some(Hypothesis { effects: effects.to_vec(), full, free, fitted: fitted.collect() })
     }
 
@@ -224,8 +224,8 @@ impl<E: Evidence> Bench<'_, E> {
             free.iter().zip(step.iter()).for_each(|(k, step)| to[*k] += step);
             let own = |clip: &super::sweep::SweptClip| (clip.clip, at.own_after(clip, self.evidence, weights, &step));
             let to_own = at.clips.iter().map(own).collect();
-            let settled = self.settled(&to, to_own, weights).map(|to_own| self.freed(&to, to_own, weights));
-            let Some(to_own) = settled else {
+            let fitted = self.own_fitted(&to, to_own, weights).map(|to_own| self.restarted(&to, to_own, weights));
+            let Some(to_own) = fitted else {
                 *damping = (*damping * 20.0).max(1e-3);
                 continue;
             };
@@ -340,8 +340,8 @@ impl<E: Evidence> Bench<'_, E> {
     fn judged(&self, hypothesis: &Hypothesis, clips: &[usize], weights: &[f64]) -> Option<Vec<FittedClip>> {
         let nothing = vec![0.0; self.scatter.count()];
         let clips = clips.iter().map(|clip| (*clip, nothing.clone())).collect();
-        let at = self.settled(&hypothesis.full, clips, weights)?;
-        let at = self.freed(&hypothesis.full, at, weights);
+        let at = self.own_fitted(&hypothesis.full, clips, weights)?;
+        let at = self.restarted(&hypothesis.full, at, weights);
         let swept = self.linearise(&hypothesis.full, &[], &at, Precision::Exact)?;
         let forms = swept.reduced(self.evidence, weights);
         let judged = at.into_iter().zip(forms).map(|((clip, own), reduced)| FittedClip { clip, own, reduced });
@@ -349,7 +349,7 @@ impl<E: Evidence> Bench<'_, E> {
     }
 
     /// Clips with their own numbers at their best for shared ones that are given.
-    fn settled(&self, full: &[f64], mut clips: Clips, weights: &[f64]) -> Option<Clips> {
+    fn own_fitted(&self, full: &[f64], mut clips: Clips, weights: &[f64]) -> Option<Clips> {
         let steps = if self.scatter.count() == 0 { 0 } else { OWN_STEPS };
         for _ in 0..steps {
             let swept = self.linearise(full, &[], &clips, Precision::Exact)?;

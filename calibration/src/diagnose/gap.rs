@@ -17,7 +17,7 @@ pub struct Residuals {
     sums: Vec<Vec<(f64, f64)>>,
     /// The same of every piece of a clip: whole clips where there are enough of them.
     pieces: Vec<Vec<(f64, f64)>>,
-    /// The same of what noise and straying alone would leave.
+    /// The same of what noise and the scatter between clips alone would leave.
     floors: Vec<Vec<(f64, f64)>>,
 }
 
@@ -26,7 +26,7 @@ pub struct Residuals {
 pub struct Typical {
     /// Geometric mean over clips of the mean square of the residuals.
     pub mean_square: f64,
-    /// What noise and straying alone would leave of it.
+    /// What noise and the scatter between clips alone would leave of it.
     pub floor: f64,
     /// Whether it is the object's group; else the arm's.
     pub of_object: bool,
@@ -64,7 +64,7 @@ impl Residuals {
         Some(Self { clips, sums, pieces, floors })
     }
 
-    /// What noise and straying alone would leave of [`Self::mean_square`].
+    /// What noise and the scatter between clips alone would leave of [`Self::mean_square`].
     #[must_use]
     pub fn floor(&self) -> f64 {
         mean(&self.floors, &(0..self.clips.len()).collect::<Vec<_>>())
@@ -148,7 +148,7 @@ fn pieces(evidence: &impl Evidence, clip: usize, residuals: &[f64], cut: usize) 
     pieces
 }
 
-/// The sums that noise of one sigma and own numbers that stray as assumed would give.
+/// The sums that noise of one sigma and own numbers that scatter as assumed would give.
 fn sums_of_noise<E: Evidence>(bench: &Bench<'_, E>, clip: usize) -> Vec<(f64, f64)> {
     let rows = bench.evidence.rows(clip);
     let mut squares = vec![1.0; rows.len()];

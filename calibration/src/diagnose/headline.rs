@@ -208,7 +208,7 @@ mod tests {
 
     #[test]
     fn where_only_the_arm_is_explained_it_is_said_what_the_object_leaves() {
-        use super::super::leftovers::Left;
+        use super::super::remainder::Left;
         let mut found = finding(vec!["command_delay"], 5e5, 1.5);
         let arm = found.left[0];
         found.left.push(Left { of_object: true, before: 301.0, after: 91.0, ..arm });

@@ -18,14 +18,14 @@
 //! | [`signatures`], [`sweep`], [`quadratic`] | every candidate's signature, linearised once |
 //! | [`shortlist`] | how much of the gap each signature explains |
 //! | [`screening`], [`arm_alone`], [`starts`], [`ripple`] | which of them are fitted, to the arm first, and where a fit begins |
-//! | [`cost`], [`fit`], [`freed`] | hypotheses fitted, and clips whose own numbers got stuck |
+//! | [`cost`], [`fit`], [`restart`] | hypotheses fitted, and restarts of clips whose own numbers are stuck in a local minimum |
 //! | [`score`] | how well they predict clips: leave-one-clip-out log-likelihood |
-//! | [`straying`] | how far clips stray under one of them |
+//! | [`scatter_scale`] | how widely clips scatter under one of them |
 //! | [`closing`] | how much of the gap they close |
-//! | [`combine`], [`again`], [`settle`] | which effects act together |
+//! | [`combine`], [`reidentify`], [`refit`] | which effects act together |
 //! | `stages` | how long each part of the search takes |
-//! | [`flat`] | which of their numbers nothing depends on |
-//! | [`leftovers`], [`drift`] | what they leave |
+//! | [`undetermined`] | which of their numbers nothing depends on |
+//! | [`remainder`], [`drift`] | what they leave |
 //! | [`gap`], [`localise`] | how large the gap is, and where |
 //! | `partly` | what is proven although a part of the gap stays |
 //! | [`parameters`], [`confidence`], [`verdict`], [`headline`] | what is said about it |
@@ -37,7 +37,6 @@
 
 pub mod admit;
 pub mod advice;
-pub mod again;
 pub mod answer;
 pub mod arm_alone;
 pub mod arm_clips;
@@ -53,13 +52,10 @@ pub mod cost;
 pub mod drift;
 pub mod evidence;
 pub mod fit;
-pub mod flat;
 pub mod floor;
-pub mod freed;
 pub mod gap;
 pub mod ground;
 pub mod headline;
-pub mod leftovers;
 pub mod length;
 pub mod library;
 pub mod localise;
@@ -70,22 +66,26 @@ pub mod quadratic;
 pub mod ranked;
 mod reason;
 mod recent;
+pub mod refit;
+pub mod reidentify;
+pub mod remainder;
 pub mod remedies;
+pub mod restart;
 pub mod ripple;
 pub mod scatter;
+pub mod scatter_scale;
 pub mod score;
 pub mod screening;
-pub mod settle;
 pub mod shortlist;
 pub mod signatures;
 pub mod site;
 pub mod split;
 mod stages;
 pub mod starts;
-pub mod straying;
 pub mod sweep;
 #[cfg(test)]
 mod test_bench;
+pub mod undetermined;
 pub mod verdict;
 
 pub use remedies::Remedy;

@@ -3,7 +3,7 @@
 //! An interval is the wider of two: from the curvature of the weighted deviance, and from how the number moves when clips are
 //! left out one by one (jackknife), with Student's t for as few clips as there are. Where a hit lies between a number and
 //! what is seen, the step over which its slope was taken comes on top: the answer to less than that is rough. Of a size on
-//! which nothing depends ([`super::flat`]) all that is met in practice is possible.
+//! which nothing depends ([`super::undetermined`]) all that is met in practice is possible.
 
 use super::answer::Size;
 use super::evidence::Evidence;

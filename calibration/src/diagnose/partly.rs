@@ -12,7 +12,7 @@ use super::evidence::Evidence;
 use super::fit::Bench;
 use super::gap::Residuals;
 use super::split::Split;
-use super::{confidence, leftovers};
+use super::{confidence, remainder};
 
 /// More than half of the squared gap: then what was found is larger than all that was not.
 const REAL_SHARE: f64 = 0.5;
@@ -30,19 +30,19 @@ pub(super) struct Partly {
 }
 
 /// The most effects that are proven; `None` where not even the first is. `before`: what the baseline leaves on the clips kept
-/// for confirming; `unforeseen`: see [`Found::unforeseen`].
+/// for confirming; `overdispersion`: see [`Found::overdispersion`].
 pub(super) fn proven<E: Evidence>(
     bench: &Bench<'_, E>,
     (split, found): (&Split, &Found),
     before: &Residuals,
-    unforeseen: &[f64],
+    overdispersion: &[f64],
     seed: u64,
 ) -> Option<Partly> {
     let all = found.last.effects.len();
     let one = |count: usize| {
         let last = if count == all { &found.last } else { &with_effects(&found.steps, count)?.from };
         let until = Found { steps: found.steps.clone(), last: last.clone() };
-        if !each_stands_out(bench, &until, unforeseen) || !leftovers::implausible(bench, last).is_empty() {
+        if !each_stands_out(bench, &until, overdispersion) || !remainder::implausible(bench, last).is_empty() {
             return None;
         }
         let after = Residuals::at(bench, last, &split.confirm)?;
@@ -56,12 +56,12 @@ fn with_effects(steps: &[Step], count: usize) -> Option<&Step> {
     steps.iter().find(|step| step.from.effects.len() == count)
 }
 
-fn each_stands_out<E: Evidence>(bench: &Bench<'_, E>, found: &Found, unforeseen: &[f64]) -> bool {
+fn each_stands_out<E: Evidence>(bench: &Bench<'_, E>, found: &Found, overdispersion: &[f64]) -> bool {
     let added: Vec<(usize, usize)> = found.kept().collect();
     added.len() == found.last.effects.len()
         && added.iter().all(|(place, effect)| {
             let step = &found.steps[*place];
-            let rivals = confidence::rivals(step, *effect, unforeseen[*place]);
+            let rivals = confidence::rivals(step, *effect, overdispersion[*place]);
             step.is_clear(bench.library, *effect) && rivals.iter().all(|rival| found.last.effects.contains(rival))
         })
 }

@@ -20,7 +20,7 @@ const FLOWN: Share = Share { value: DOUBLED, ci90: [DOUBLED; 2] };
 /// What is said of every candidate: what was named first, then what is possible, then the likelier.
 pub(super) fn candidates<E: Evidence>(
     bench: &Bench<'_, E>,
-    (found, unforeseen): (&Found, f64),
+    (found, overdispersion): (&Found, f64),
     split: &Split,
     (before, after, finding): (&Residuals, &Residuals, &Finding<'_>),
     kind: Kind,
@@ -60,7 +60,7 @@ pub(super) fn candidates<E: Evidence>(
             probability: if kept { probability.max(finding.confidence) } else { probability },
             parameters: fit.map(|fit| parameters::of_effect(bench, fit, effect)).unwrap_or_default(),
             shrink,
-            confusable_with: confusable(first, effect, unforeseen, bench),
+            confusable_with: confusable(first, effect, overdispersion, bench),
             status,
             why: format!("{}{}", reason(bench, found, &judged), carried_over(&shrink)),
         }
@@ -118,8 +118,8 @@ fn status(scored: &Scored, kept: bool, rival: bool, (kind, hidden): (Kind, bool)
     }
 }
 
-fn confusable<E: Evidence>(first: &Step, effect: usize, unforeseen: f64, bench: &Bench<'_, E>) -> Vec<String> {
-    let near = confidence::rivals(first, effect, unforeseen);
+fn confusable<E: Evidence>(first: &Step, effect: usize, overdispersion: f64, bench: &Bench<'_, E>) -> Vec<String> {
+    let near = confidence::rivals(first, effect, overdispersion);
     near.iter().map(|other| bench.library.candidates[*other].effect.name.to_owned()).collect()
 }
 

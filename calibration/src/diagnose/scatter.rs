@@ -1,4 +1,4 @@
-//! What every clip has of its own, and how far it is believed to stray.
+//! What every clip has of its own, and how widely that scatters.
 //!
 //! Friction and the clock scatter like normal numbers. The way a real object takes from a hit differs from any simulated
 //! one by a little in most clips and by a lot in some: a blow on an edge, a second touch. Those numbers follow a Student
@@ -28,7 +28,7 @@ impl Default for Scatter {
 }
 
 impl Scatter {
-    /// The same where clips stray so many times as far.
+    /// The same with the heavy-tailed numbers so many times as wide.
     #[must_use]
     pub fn scaled(&self, scale: f64) -> Self {
         let mut scaled = self.clone();
@@ -36,7 +36,7 @@ impl Scatter {
         scaled
     }
 
-    /// Held to so many times less straying, but for the clips that went their own way before.
+    /// Held to so many times less scatter, but for the clips that went their own way before.
     #[must_use]
     pub fn narrowed(&self, scale: f64) -> Self {
         Self { forgiving: 1.0 / scale, ..self.scaled(scale) }
@@ -49,14 +49,14 @@ impl Scatter {
     }
 
     /// Sum of squares of the heavy numbers in their sigmas.
-    fn strayed(&self, own: &[f64]) -> f64 {
+    fn heavy_square(&self, own: &[f64]) -> f64 {
         self.heavy.clone().map(|k| (own[k] / (self.forgiving * self.random[k].sigma)).powi(2)).sum()
     }
 
     /// By how much more (or less) than at one sigma the heavy numbers of a clip are held: the weight with which
     /// reweighted least squares find the most likely values.
     fn hold(&self, own: &[f64]) -> f64 {
-        (FREEDOM + self.heavy.len() as f64) / (FREEDOM + self.strayed(own))
+        (FREEDOM + self.heavy.len() as f64) / (FREEDOM + self.heavy_square(own))
     }
 
     /// Prior precision of every number near `own`; 1 for those that do not scatter, which keeps them where they are.
@@ -81,7 +81,7 @@ impl Scatter {
     }
 
     fn tails(&self, own: &[f64]) -> f64 {
-        (FREEDOM + self.heavy.len() as f64) * (self.strayed(own) / FREEDOM).ln_1p()
+        (FREEDOM + self.heavy.len() as f64) * (self.heavy_square(own) / FREEDOM).ln_1p()
     }
 
     /// What a normal prior with [`Self::precision`] counts less than the heavy-tailed one, as part of a deviance whose
@@ -89,7 +89,7 @@ impl Scatter {
     #[must_use]
     pub fn correction(&self, own: &[f64]) -> f64 {
         let hold = self.hold(own);
-        self.tails(own) - hold * self.strayed(own) + self.heavy.len() as f64 * hold.ln()
+        self.tails(own) - hold * self.heavy_square(own) + self.heavy.len() as f64 * hold.ln()
     }
 }
 
@@ -113,7 +113,7 @@ mod tests {
     }
 
     #[test]
-    fn a_far_clip_costs_little_more_the_further_it_strays_and_a_light_number_ever_more() {
+    fn a_far_clip_costs_little_more_the_further_it_is_off_and_a_light_number_ever_more() {
         let scatter = two();
         let rise = |a: [f64; 2], b: [f64; 2]| scatter.penalty(&b) - scatter.penalty(&a);
         assert!(rise([0.0, 50.0], [0.0, 100.0]) < 6.0);

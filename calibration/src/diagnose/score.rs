@@ -8,7 +8,7 @@ use super::evidence::Evidence;
 use super::fit::{Bench, FittedClip, Hypothesis};
 use super::noise::median;
 use super::quadratic::{minimum, value};
-use super::straying::{Around, eased};
+use super::scatter_scale::{Around, at_the_best_scale};
 
 /// Deviance of every judged clip out of sample, and what it says about numbers.
 #[derive(Debug, Clone, PartialEq)]
@@ -37,7 +37,7 @@ const LEAST: f64 = 4.0;
 /// A linearisation is believed that the cost of a clip left out rises by no more than this.
 const DOUBTED: f64 = 100.0;
 
-/// Foretells training and choosing clips.
+/// Predicts training and choosing clips.
 #[must_use]
 pub fn predict<E: Evidence>(
     bench: &Bench<'_, E>,
@@ -49,7 +49,7 @@ pub fn predict<E: Evidence>(
     let judged = bench.judge(hypothesis, choose, weights)?;
     clips.extend(judged.iter().map(|clip| (clip.clip, clip.deviance())));
     let around: Vec<&Around> = hypothesis.fitted.iter().chain(&judged).map(|clip| &clip.reduced.around).collect();
-    for ((_, deviance), change) in clips.iter_mut().zip(eased(&around, &bench.scatter)) {
+    for ((_, deviance), change) in clips.iter_mut().zip(at_the_best_scale(&around, &bench.scatter)) {
         *deviance += change;
     }
     Some(Predicted { clips })

@@ -4,18 +4,18 @@ use super::combine::Step;
 use super::evidence::Evidence;
 use super::fit::{Bench, Hypothesis};
 use super::gap::Typical;
-use super::leftovers::{Left, ROUGHNESS};
+use super::remainder::{Left, ROUGHNESS};
 use super::shortlist::{BY_CHANCE, Scored, TESTABLE};
 use super::starts;
 use twin::effects::Stage;
 
 /// So many candidates are fitted at each step.
 const FITTED: usize = 5;
-/// An arm that strays from the twin by less than this in squared sigmas is not the cause of what an object does.
+/// An arm whose gap is smaller than this in squared sigmas is not the cause of what an object does.
 const QUIET: f64 = 0.5;
 /// Candidates whose signature explains less than this share of what the best one does are not fitted.
 const CLOSE: f64 = 0.1;
-/// So many candidates are fitted beside them because they stand out where clips stray little: those whose signature explains
+/// So many candidates are fitted beside them because they stand out at the least scatter: those whose signature explains
 /// this share of what the best one does there.
 const STANDING_OUT: usize = 2;
 const ALIKE: f64 = 0.5;
@@ -26,7 +26,7 @@ const SLID: f64 = 0.5 * ROUGHNESS;
 const SPARES: f64 = 0.2;
 
 /// Candidates worth a fit, the arm's and the object's each among themselves: those that the score test cannot rule out, the
-/// best first; of the others only partners that the best is easily taken for. While the arm strays only what the arm feels
+/// best first; of the others only partners that the best is easily taken for. While the arm has a gap of its own, only what the arm feels
 /// is: how an object is hit by an arm that is elsewhere tells nothing of the object. Where the object's gap is not small all effects
 /// on the slide are fitted, where it is large all on the hit as well, and those of the camera that spare much of it
 /// somewhere: a blow answers so unevenly that slopes at one point tell little.
@@ -85,13 +85,13 @@ pub(super) fn to_fit<E: Evidence>(
     all
 }
 
-/// Whether the arm strays by more than numerics beside an object.
+/// Whether the arm's gap is larger than numerics beside an object.
 pub(super) fn arm_gap_is_open(whole: &[Typical], left: &[Typical]) -> bool {
     left.len() > 1 && Left::of_groups(whole, left).iter().any(|left| !left.of_object && left.too_much(false))
 }
 
-/// The object's candidates that stand out once clips are held to stray little, whatever else the score test says.
-pub(super) fn seen_when_clips_stray_little<'a, E: Evidence>(
+/// The object's candidates that stand out once clips are held to the least scatter, whatever else the score test says.
+pub(super) fn seen_at_the_least_scatter<'a, E: Evidence>(
     bench: &Bench<'_, E>,
     from: &Hypothesis,
     narrow: &'a [Scored],
@@ -144,7 +144,7 @@ mod tests {
     }
 
     #[test]
-    fn while_the_arm_strays_only_what_it_feels_is_fitted() {
+    fn while_the_arm_has_a_gap_only_what_it_feels_is_fitted() {
         let cell = shipped();
         let world = World::draw(3, Kind::Strokes, Fault::Nothing, &cell);
         on_strokes((&cell, &world), |bench, even| {
@@ -165,8 +165,8 @@ mod tests {
                 fitted.into_iter().map(|c| bench.library.candidates[c].effect.stage).collect()
             };
             assert!(fitted(3.0).contains(&Stage::Slide));
-            let straying = fitted(50.0);
-            assert!(straying.contains(&Stage::Control) && !straying.contains(&Stage::Slide), "{straying:?}");
+            let with_gap = fitted(50.0);
+            assert!(with_gap.contains(&Stage::Control) && !with_gap.contains(&Stage::Slide), "{with_gap:?}");
         });
     }
 }

@@ -5,12 +5,12 @@ use super::fit::{Bench, Hypothesis};
 use super::shortlist::{self, Scored};
 use super::split::Split;
 use super::sweep::{Point, Precision, Swept, sweep};
-use super::{floor, stages, straying};
+use super::{floor, scatter_scale, stages};
 use nalgebra::DMatrix;
 use shared_mem::progress::Progress;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-/// Weights of the channels, and what the score test says of all candidates, best first: with the usual straying, and with
+/// Weights of the channels, and what the score test says of all candidates, best first: with the usual scatter, and with
 /// little of it.
 pub(super) type Signatures = (Vec<f64>, Vec<Scored>, Vec<Scored>);
 
@@ -41,8 +41,8 @@ fn taken<E: Evidence>(bench: &Bench<'_, E>, split: &Split, from: &Hypothesis, ba
         shortlist::score(swept, &sum, bench.library)
     };
     let scored = scores(&swept);
-    // Where clips of the right hypothesis stray little, the usual straying hides a small effect altogether.
-    swept.scatter = bench.scatter.narrowed(straying::LEAST);
+    // Where clips of the right hypothesis scatter little, the usual scatter hides a small effect altogether.
+    swept.scatter = bench.scatter.narrowed(scatter_scale::LEAST);
     let narrow = scores(&swept);
     Some((weights, scored, narrow))
 }

@@ -24,7 +24,7 @@ const SCANNED: [f64; 4] = [0.06, 0.2, 0.5, 1.0];
 
 /// A start that costs more than this many times what the hypothesis without the candidate does is far from anything that
 /// acts: an effect whose strength is right spares something, though the other numbers still stand in for it.
-const ASTRAY: f64 = 2.0;
+const FAR_OFF: f64 = 2.0;
 
 /// Units of a probe at which each direction of one with a threshold is tried.
 const STEPPED: [f64; 6] = [0.95, 1.05, 1.15, 1.3, 1.6, 2.2];
@@ -126,7 +126,7 @@ fn scanned<E: Evidence>(bench: &Bench<'_, E>, at: (&Hypothesis, &[f64]), scored:
     let numbers = starts.map(|start| bench.begun(at.0.full.clone(), &start));
     let ripples = bench.library.candidates[scored.candidate].is_searched(Search::InStep);
     let in_step = if ripples { ripple::start(bench, at, scored.candidate) } else { None };
-    let most = ASTRAY * bench.plain_cost(at.0, &at.0.full, at.1).unwrap_or(f64::INFINITY);
+    let most = FAR_OFF * bench.plain_cost(at.0, &at.0.full, at.1).unwrap_or(f64::INFINITY);
     let start = cheapest_below(bench, at, numbers.chain(in_step), most);
     start.map(|(_, full)| full).into_iter().collect()
 }

@@ -12,7 +12,7 @@
 use super::evidence::{Base, Evidence, Reach};
 use super::library::{Alternative, Library};
 use super::scatter::Scatter;
-use super::straying::Around;
+use super::scatter_scale::Around;
 use crate::estimate::Impossible;
 use crate::kept::numbers::matrix;
 use nalgebra::{Cholesky, DMatrix, DVector};

@@ -2,7 +2,7 @@
 
 use super::answer::{Basis, Kind, Verdict};
 use super::confidence;
-use super::leftovers::Left;
+use super::remainder::Left;
 use std::time::Duration;
 
 /// What a verdict is drawn from.
@@ -171,7 +171,7 @@ impl Verdict {
 
 #[cfg(test)]
 pub(super) mod tests {
-    use super::super::leftovers::{NUMERICS, SUBSTITUTE};
+    use super::super::remainder::{NUMERICS, SUBSTITUTE};
     use super::*;
 
     pub(in crate::diagnose) fn finding<'a>(effects: Vec<&'a str>, before: f64, after: f64) -> Finding<'a> {

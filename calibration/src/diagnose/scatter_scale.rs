@@ -1,7 +1,7 @@
-//! How far the clips of one hypothesis stray: a number of the hypothesis, not of nature.
+//! How widely clips scatter under one hypothesis: a number of the hypothesis, not of nature.
 //!
-//! Clips may stray as far as those of another engine do from a twin that is given everything ([`Scatter`]). Where they
-//! stray less under one hypothesis than under another, that speaks for it: the scale of the scatter is set to what makes
+//! Clips may deviate as far as those of another engine do from a twin that is given everything ([`Scatter`]). Where they
+//! deviate less under one hypothesis than under another, that speaks for it: the scale of the scatter is set to what makes
 //! the clips most likely (empirical Bayes), for every hypothesis by itself. Own numbers act linearly, so another scale
 //! costs no simulation.
 
@@ -10,7 +10,7 @@ use crate::kept::numbers::matrix;
 use nalgebra::{Cholesky, DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
-/// Least scale that is tried, of what clips usually stray: nothing real strays less than an eighth of it.
+/// Least scale that is tried, of the usual scatter: nothing real scatters less than an eighth of it.
 pub const LEAST: f64 = 0.125;
 /// Scales that are tried.
 const SCALES: [f64; 4] = [1.0, 0.5, 0.25, LEAST];
@@ -30,7 +30,7 @@ pub struct Around {
 /// What every clip's deviance changes by at the scale at which all of them together are most likely; nothing where no
 /// number has heavy tails.
 #[must_use]
-pub fn eased(clips: &[&Around], scatter: &Scatter) -> Vec<f64> {
+pub fn at_the_best_scale(clips: &[&Around], scatter: &Scatter) -> Vec<f64> {
     if scatter.heavy.is_empty() {
         return vec![0.0; clips.len()];
     }
@@ -72,29 +72,30 @@ mod tests {
     use super::*;
     use crate::estimate::Random;
 
-    /// Clips with one number that strays, each seen a hundred times with a noise of one sigma.
-    fn clips(strays: &[f64]) -> Vec<Around> {
-        let gram =
-            |stray: f64| DMatrix::from_row_slice(2, 2, &[100.0 * stray * stray, 100.0 * stray, 100.0 * stray, 100.0]);
-        strays.iter().map(|stray| Around { gram: gram(*stray), own: vec![0.0] }).collect()
+    /// Clips with one random effect, each seen a hundred times with a noise of one sigma.
+    fn clips(deviations: &[f64]) -> Vec<Around> {
+        let gram = |deviation: f64| {
+            DMatrix::from_row_slice(2, 2, &[100.0 * deviation * deviation, 100.0 * deviation, 100.0 * deviation, 100.0])
+        };
+        deviations.iter().map(|deviation| Around { gram: gram(*deviation), own: vec![0.0] }).collect()
     }
 
     fn scatter(heavy: std::ops::Range<usize>) -> Scatter {
-        let random = vec![Random { name: "stray".into(), sigma: 4.0, step: 4.0 }];
+        let random = vec![Random { name: "deviation".into(), sigma: 4.0, step: 4.0 }];
         Scatter { random, heavy, forgiving: 1.0 }
     }
 
-    fn changes(strays: &[f64], heavy: std::ops::Range<usize>) -> f64 {
+    fn changes(deviations: &[f64], heavy: std::ops::Range<usize>) -> f64 {
         let scatter = scatter(heavy);
-        let clips = clips(strays);
-        eased(&clips.iter().collect::<Vec<_>>(), &scatter).iter().sum()
+        let clips = clips(deviations);
+        at_the_best_scale(&clips.iter().collect::<Vec<_>>(), &scatter).iter().sum()
     }
 
     #[test]
-    fn clips_that_stray_little_become_likelier_and_those_that_stray_as_usual_stay_as_they_are() {
+    fn clips_that_deviate_little_become_likelier_and_those_that_deviate_as_usual_stay_as_they_are() {
         let usual = [4.0, -5.0, 3.0, -3.5, 6.0, -4.0, 2.0, 5.0];
         assert_eq!(changes(&usual, 0..1), 0.0);
-        let little = usual.map(|stray| 0.1 * stray);
+        let little = usual.map(|deviation| 0.1 * deviation);
         // Of eight numbers held to a quarter or an eighth, each becomes likelier by at most the logarithm of that, twice.
         let gain = -changes(&little, 0..1);
         assert!((0.5..1.0).contains(&(gain / (8.0 * 2.0 * 8_f64.ln()))), "{gain}");
@@ -105,7 +106,7 @@ mod tests {
     fn a_clip_at_its_best_is_found_from_wherever_it_was_left() {
         let scatter = scatter(0..1);
         let at = |own: f64| {
-            // The residual of a stray of 3 that `own` takes off already.
+            // The residual of a deviation of 3 that `own` takes off already.
             let left = 3.0 + own;
             let gram = DMatrix::from_row_slice(2, 2, &[100.0 * left * left, 100.0 * left, 100.0 * left, 100.0]);
             deviance(&Around { gram, own: vec![own] }, &scatter)

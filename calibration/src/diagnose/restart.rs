@@ -1,6 +1,6 @@
-//! Clips freed from where their own numbers got stuck.
+//! Restarts of clips whose own numbers are stuck in a local minimum.
 //!
-//! An object that is touched twice in the twin and once in the clip, or the other way round, strays by centimetres, and no
+//! An object that is touched twice in the twin and once in the clip, or the other way round, is off by centimetres, and no
 //! slope leads from one to the other, though a little more friction in that clip would. So clips that stand out are tried
 //! some way along each of their own numbers too.
 
@@ -21,7 +21,7 @@ const KEPT: [f64; 2] = [0.5, 1.0];
 
 impl<E: Evidence> Bench<'_, E> {
     /// Clips with their own numbers, those that stand out where they cost least; those without an answer as they were.
-    pub(super) fn freed(&self, full: &[f64], mut clips: Clips, weights: &[f64]) -> Clips {
+    pub(super) fn restarted(&self, full: &[f64], mut clips: Clips, weights: &[f64]) -> Clips {
         if self.scatter.count() == self.scatter.heavy.len() {
             return clips;
         }
@@ -120,7 +120,7 @@ mod tests {
     }
 
     #[test]
-    fn a_clip_that_is_touched_twice_is_freed_and_the_others_stay() {
+    fn a_clip_that_is_touched_twice_is_restarted_and_the_others_stay() {
         let cell = shipped();
         let base = setting::complete(&cell, None).expect("a cell");
         let library = Library::new(&cell, &base, None, &[87.0; MAX_JOINTS]);
@@ -137,10 +137,10 @@ mod tests {
         };
         let full = library.start();
         let rest: Clips = (0..5).map(|clip| (clip, vec![0.0; 2])).collect();
-        let freed = bench.freed(&full, rest.clone(), &[1.0]);
-        let friction = freed[3].1[0];
+        let restarted = bench.restarted(&full, rest.clone(), &[1.0]);
+        let friction = restarted[3].1[0];
         assert!((EDGE..=3.0 * SIGMA).contains(&friction), "no further than it must: {friction}");
-        let changed: Vec<usize> = (0..5).filter(|place| freed[*place] != rest[*place]).collect();
+        let changed: Vec<usize> = (0..5).filter(|place| restarted[*place] != rest[*place]).collect();
         assert_eq!(changed, [3]);
     }
 

@@ -15,7 +15,7 @@ const LEAST: f64 = 1.0;
 pub fn without<E: Evidence>(bench: &Bench<'_, E>, hypothesis: &Hypothesis) -> Hypothesis {
     let mut out = hypothesis.clone();
     for effect in &hypothesis.effects {
-        for k in seen_by_nothing(bench, hypothesis, *effect) {
+        for k in sizes(bench, hypothesis, *effect) {
             out = held(out, k, bench.library.unknowns[k].start);
         }
     }
@@ -24,7 +24,7 @@ pub fn without<E: Evidence>(bench: &Bench<'_, E>, hypothesis: &Hypothesis) -> Hy
 
 /// The sizes of an effect on the arm that nothing depends on.
 #[must_use]
-pub fn seen_by_nothing<E: Evidence>(bench: &Bench<'_, E>, hypothesis: &Hypothesis, effect: usize) -> Vec<usize> {
+pub fn sizes<E: Evidence>(bench: &Bench<'_, E>, hypothesis: &Hypothesis, effect: usize) -> Vec<usize> {
     let candidate = &bench.library.candidates[effect];
     // Of one number it is known that something depends on it: it was found.
     if !candidate.is_of_arm() || candidate.sizes.len() < 2 {

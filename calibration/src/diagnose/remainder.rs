@@ -66,7 +66,7 @@ impl Left {
         before.iter().zip(after).map(one).collect()
     }
 
-    /// What the twin without any effect strays by beyond the noise, in least gaps: of 1 on it is a gap.
+    /// The gap of the twin without any effect beyond the noise, in least gaps: of 1 on it is a gap.
     #[must_use]
     pub fn gaps(&self) -> f64 {
         (self.before - self.floor) / if self.of_object { GAP_OF_OBJECT } else { NUMERICS }
@@ -158,7 +158,7 @@ mod tests {
     }
 
     #[test]
-    fn what_numerics_leave_is_no_leftover() {
+    fn what_numerics_leave_is_no_remainder() {
         assert!(
             !Left { before: 2.0, after: 2.0, floor: 1.0, numerics: NUMERICS, substitute: SUBSTITUTE, of_object: false }
                 .too_much(false)

@@ -16,7 +16,7 @@ impl Step {
     /// Compares the best trial, fitted to the end, with its nearest rivals once more, each with the object found anew under
     /// it: with an object that stands in for part of an effect a fit ends somewhere else than with the right one. What acts on
     /// the arm the arm's own channels tell apart, so there only those are rivals that still look alike.
-    pub(super) fn try_again<E: Evidence>(
+    pub(super) fn reidentify_rivals<E: Evidence>(
         &mut self,
         bench: &Bench<'_, E>,
         split: &Split,

@@ -13,12 +13,12 @@ use super::sweep::Precision;
 const LAST_PASS: Effort = Effort::of(6, Precision::Exact);
 
 /// Where in its range a held form is tried, and how often the best of these is then looked for halfway to its neighbours.
-const LOOSENED: [f64; 9] = [0.0, 0.01, 0.02, 0.05, 0.1, 0.2, 0.4, 0.7, 1.0];
+const SCANNED: [f64; 9] = [0.0, 0.01, 0.02, 0.05, 0.1, 0.2, 0.4, 0.7, 1.0];
 const HALVINGS: usize = 5;
 
 /// A fit to the end, from where it is and from elsewhere: an effect frees the object's parameters from what they stood in
 /// for, so they are found anew under it, and under the other way in which it could act where there are two.
-pub(super) fn settled<E: Evidence>(
+pub(super) fn refitted<E: Evidence>(
     bench: &Bench<'_, E>,
     split: &Split,
     (fit, weights): (&Hypothesis, &[f64]),
@@ -28,13 +28,13 @@ pub(super) fn settled<E: Evidence>(
     let starts = [Some(fit.full.clone()), other_way(bench, fit)];
     let anew = starts.iter().flatten().filter_map(|full| refined(full)).filter_map(from);
     let best = anew.chain(from(fit.full.clone())).min_by(|a, b| a.deviance().total_cmp(&b.deviance()))?;
-    let loosened = loosened(bench, &best, weights).and_then(from).filter(|other| other.deviance() < best.deviance());
-    Some(loosened.unwrap_or(best))
+    let scanned = scanned(bench, &best, weights).and_then(from).filter(|other| other.deviance() < best.deviance());
+    Some(scanned.unwrap_or(best))
 }
 
 /// The numbers of a fit whose last effect is one of the arm, with what is held of it where the arm's channels cost least, the
 /// same for all joints; `None` where that is where it was.
-fn loosened<E: Evidence>(bench: &Bench<'_, E>, fit: &Hypothesis, weights: &[f64]) -> Option<Vec<f64>> {
+fn scanned<E: Evidence>(bench: &Bench<'_, E>, fit: &Hypothesis, weights: &[f64]) -> Option<Vec<f64>> {
     let candidate = &bench.library.candidates[*fit.effects.last()?];
     let held: Vec<usize> = candidate.numbers.clone().filter(|k| !candidate.turned.contains(k)).collect();
     if held.is_empty() || !candidate.is_of_arm() {
@@ -51,7 +51,7 @@ fn loosened<E: Evidence>(bench: &Bench<'_, E>, fit: &Hypothesis, weights: &[f64]
         full
     };
     let cost = |full: &[f64]| arm.plain_cost(fit, full, weights).unwrap_or(f64::INFINITY);
-    let mut tried: Vec<(f64, f64)> = LOOSENED.iter().map(|share| (*share, cost(&at(*share)))).collect();
+    let mut tried: Vec<(f64, f64)> = SCANNED.iter().map(|share| (*share, cost(&at(*share)))).collect();
     let least = |tried: &[(f64, f64)]| (0..tried.len()).min_by(|a, b| tried[*a].1.total_cmp(&tried[*b].1)).unwrap_or(0);
     for _ in 0..HALVINGS {
         let best = least(&tried);
@@ -139,7 +139,7 @@ mod tests {
             held.iter().for_each(|k| usual[*k] = library.start()[*k]);
             let found = |full: Vec<f64>| {
                 let fit = bench.fit((&[candidate], full), &[0, 1], even, None, Effort::of(0, Precision::Joints));
-                loosened(bench, &fit.expect("a fit"), even)
+                scanned(bench, &fit.expect("a fit"), even)
             };
             // Noise may shift it a little.
             let near = |found: Vec<f64>| {
