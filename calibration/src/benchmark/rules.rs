@@ -9,6 +9,7 @@
 use super::score::Said;
 use crate::diagnose::evidence::Evidence;
 use crate::diagnose::fit::{Bench, Hypothesis};
+use crate::diagnose::floor;
 use crate::diagnose::quadratic::minimum;
 use crate::diagnose::scatter::Scatter;
 use crate::diagnose::shortlist;
@@ -31,7 +32,7 @@ pub fn all<E: Evidence>(bench: &Bench<'_, E>, split: &Split, baseline: &Hypothes
     let Ok(swept) = sweep(bench.evidence, bench.library, &point, &Scatter::default(), &|_| true) else {
         return NAMES.map(|_| nothing()).to_vec();
     };
-    let even = vec![1.0; bench.evidence.channels().len()];
+    let even = floor::sensors_alone(bench.evidence);
     let size = 1 + swept.columns.len();
     let reduced = swept.reduced(bench.evidence, &even);
     let sum = reduced.iter().fold(DMatrix::zeros(size, size), |sum, clip| sum + &clip.form);

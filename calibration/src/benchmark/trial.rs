@@ -10,6 +10,7 @@ use crate::diagnose::baseline;
 use crate::diagnose::cell_clips::CellClips;
 use crate::diagnose::evidence::Evidence;
 use crate::diagnose::fit::{Bench, Effort, FittedClip, Hypothesis};
+use crate::diagnose::floor;
 use crate::diagnose::gap::Residuals;
 use crate::diagnose::library::Library;
 use crate::diagnose::split::{self, Split};
@@ -80,7 +81,7 @@ impl Court<'_> {
             interrupt: self.interrupt,
             trail: (Kept::nothing(), ""),
         };
-        let even = vec![1.0; evidence.channels().len()];
+        let even = floor::sensors_alone(evidence);
         let bar = Progress::new("baseline", baseline::steps(self.admitted));
         // The diagnosis' own: what its parameters make up for is no gap that anyone could explain.
         let baseline = baseline::identify(&bench, &self.split, &self.world.cell, self.admitted, &bar);

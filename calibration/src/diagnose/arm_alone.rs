@@ -3,7 +3,7 @@
 //! the joints are compared there first, and few of them are taken on to the object.
 
 use super::combine::{FIRST_PASS, HEAT, LOOK, NEAR, Step};
-use super::evidence::{Base, Channel, Evidence, Reach, Row};
+use super::evidence::{Channel, Evidence, Reach, Row};
 use super::fit::{Bench, Hypothesis};
 use super::headline::words;
 use super::scatter::Scatter;
@@ -97,8 +97,7 @@ impl<E: Evidence> ClipModel for ArmAlone<'_, E> {
 
     fn residuals(&self, clip: usize, shared: &[f64], own: &[f64], out: &mut Vec<f64>) -> Result<(), Impossible> {
         let nothing = vec![0.0; self.rows(clip).len()];
-        let base = Base { numbers: shared, residuals: &nothing };
-        self.0.changed(clip, (shared, own), (Reach::Arm, base), out)
+        self.0.changed(clip, (shared, own), (Reach::Arm, &nothing), out)
     }
 }
 
@@ -107,19 +106,16 @@ impl<E: Evidence> Evidence for ArmAlone<'_, E> {
         &self,
         clip: usize,
         numbers: (&[f64], &[f64]),
-        (reach, base): (Reach, Base<'_>),
+        (reach, base): (Reach, &[f64]),
         out: &mut Vec<f64>,
     ) -> Result<(), Impossible> {
         match reach {
             Reach::Object => {
                 out.clear();
-                out.extend_from_slice(base.residuals);
+                out.extend_from_slice(base);
                 Ok(())
             }
-            // What is in contact stays as it is.
-            Reach::All | Reach::Arm => {
-                self.0.changed(clip, numbers, (Reach::Arm, Base { numbers: numbers.0, ..base }), out)
-            }
+            Reach::All | Reach::Arm => self.0.changed(clip, numbers, (Reach::Arm, base), out),
         }
     }
 

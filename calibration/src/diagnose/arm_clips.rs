@@ -173,18 +173,10 @@ impl<F: Fn(&[f64]) -> Theta + Sync> ClipModel for ArmClips<F> {
     }
 
     fn residuals(&self, clip: usize, shared: &[f64], _own: &[f64], out: &mut Vec<f64>) -> Result<(), Impossible> {
-        let residuals = self.clips[clip].recent.at(shared, || Ok(self.alone(clip, shared, &[])?.residuals))?;
+        let residuals = self.clips[clip].recent.at(shared, || self.simulated(clip, shared))?;
         out.clone_from(&residuals);
         Ok(())
     }
-}
-
-/// What the arm does when nothing is in its way.
-pub struct Alone {
-    /// Of the rows of [`ArmClips::rows`].
-    pub residuals: Vec<f64>,
-    /// What the encoders would read later, one list of joints for each stamp asked for [rad].
-    pub q: Vec<Joints>,
 }
 
 impl<F: Fn(&[f64]) -> Theta + Sync> ArmClips<F> {
@@ -195,7 +187,7 @@ impl<F: Fn(&[f64]) -> Theta + Sync> ArmClips<F> {
     pub fn peaks(&self, shared: &[f64]) -> Result<Joints, Impossible> {
         let mut peaks = [0.0; MAX_JOINTS];
         for clip in 0..self.clips.len() {
-            for reading in self.readings(clip, shared, &[])? {
+            for reading in self.readings(clip, shared)? {
                 let gravity = self.nominal.gravity(&reading.state.q);
                 let asked = reading.tau_J_d.iter().zip(gravity).map(|(tau, gravity)| (tau + gravity).abs());
                 peaks.iter_mut().zip(asked).for_each(|(peak, asked)| *peak = asked.max(*peak));
@@ -209,20 +201,19 @@ impl<F: Fn(&[f64]) -> Theta + Sync> ArmClips<F> {
         self.clips[clip].alone_until_ns
     }
 
-    /// Residuals of a clip, as a simulation gives them, known or not, and what the encoders would read at stamps after its rows if the arm went on alone.
+    /// The residuals of a clip as a simulation gives them, known or not.
     ///
     /// # Errors
     /// [`Impossible`] when the cell cannot be simulated with these numbers.
-    pub fn alone(&self, clip: usize, shared: &[f64], later_ns: &[u64]) -> Result<Alone, Impossible> {
-        let readings = self.readings(clip, shared, later_ns)?;
-        let (rows, later) = readings.split_at(readings.len() - later_ns.len());
+    pub(super) fn simulated(&self, clip: usize, shared: &[f64]) -> Result<Vec<f64>, Impossible> {
+        let readings = self.readings(clip, shared)?;
         let mut residuals = Vec::new();
-        self.compare(&self.clips[clip], rows, &mut residuals)?;
-        Ok(Alone { residuals, q: later.iter().map(|reading| reading.state.q).collect() })
+        self.compare(&self.clips[clip], &readings, &mut residuals)?;
+        Ok(residuals)
     }
 
-    /// At every moment that counts, and a control period later; then at later stamps.
-    fn readings(&self, clip: usize, shared: &[f64], later_ns: &[u64]) -> Result<Vec<Reading>, Impossible> {
+    /// At every moment that counts, and a control period later.
+    fn readings(&self, clip: usize, shared: &[f64]) -> Result<Vec<Reading>, Impossible> {
         let fail = |error: &dyn std::fmt::Display| Impossible(error.to_string());
         let clip = &self.clips[clip];
         let theta = (self.theta)(shared);
@@ -232,9 +223,8 @@ impl<F: Fn(&[f64]) -> Theta + Sync> ArmClips<F> {
         let start = rollout.start_state(&clip.recorded.measured, 0, &clip.commands);
         let start = start.ok_or_else(|| Impossible("no measured joints".into()))?;
         let first = clip.recorded.measured.stamps_ns[0];
-        let stamps_ns = [&clip.stamps_ns[..], later_ns].concat();
-        let mut readings = vec![Reading::default(); stamps_ns.len()];
-        rollout.readings(&start, first, &clip.commands, &stamps_ns, &mut readings);
+        let mut readings = vec![Reading::default(); clip.stamps_ns.len()];
+        rollout.readings(&start, first, &clip.commands, &clip.stamps_ns, &mut readings);
         Ok(readings)
     }
 
@@ -326,7 +316,7 @@ mod tests {
         let recorded = clip(&cell, &Theta::default(), true);
         let arm = ArmClips::new(&cell, &[recorded], |_: &[f64]| Theta::default()).expect("an arm");
         let told = |away: f64| {
-            let mut readings = arm.readings(0, &[], &[]).expect("it can be simulated");
+            let mut readings = arm.readings(0, &[]).expect("it can be simulated");
             readings[200].state.q[3] += away;
             arm.compare(&arm.clips[0], &readings, &mut Vec::new())
         };

@@ -5,11 +5,11 @@
 
 use super::admit::Admitted;
 use super::arm_alone::ArmAlone;
-use super::evidence::{Channel, Evidence, Group};
+use super::evidence::Evidence;
 use super::fit::{Bench, Effort, Hypothesis};
 use super::split::Split;
-use super::stages;
 use super::sweep::Precision;
+use super::{floor, stages};
 use crate::identify::object;
 use shared_mem::cell::Cell;
 use shared_mem::progress::Progress;
@@ -38,9 +38,7 @@ pub fn identify<E: Evidence>(
     admitted: &Admitted,
     bar: &Progress,
 ) -> Option<Hypothesis> {
-    // How far the joints are off in contact for other reasons than noise is told only by what is left at the end.
-    let known = |channel: &Channel| if channel.group == Group::Contact { 0.0 } else { 1.0 };
-    let even: Vec<f64> = bench.evidence.channels().iter().map(known).collect();
+    let even = floor::sensors_alone(bench.evidence);
     let arm = ArmAlone(bench.evidence);
     let alone = arm.bench(bench);
     bar.show(0, stages::BASELINE);

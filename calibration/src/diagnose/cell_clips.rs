@@ -10,9 +10,9 @@
 //! costs no simulation; its scale is what an effect must beat to be believed
 //! ([`super::scatter_scale`]).
 
-use super::arm_clips::{Alone, ArmClips};
+use super::arm_clips::ArmClips;
 use super::contact::Contact;
-use super::evidence::{Base, Channel, Evidence, Group, Reach, Row, StageName};
+use super::evidence::{Channel, Evidence, Group, Reach, Row, StageName};
 use super::library::Library;
 use super::recent::Recent;
 use super::scatter::Scatter;
@@ -104,7 +104,7 @@ pub struct CellClips<'a, F> {
     contact: Vec<Contact>,
     /// For each clip the last numbers that the arm feels with its residuals there: most of what a search turns is the
     /// object's.
-    arm_alone: Vec<Recent<Alone>>,
+    arm_alone: Vec<Recent<Vec<f64>>>,
 }
 
 impl<'a, F: Fn(&[f64]) -> Theta + Sync> CellClips<'a, F> {
@@ -141,11 +141,10 @@ impl<'a, F: Fn(&[f64]) -> Theta + Sync> CellClips<'a, F> {
         Self { library, arm, object, channels, rows, deviations, scatter, friction, first, contact, arm_alone }
     }
 
-    /// What the arm does alone at numbers; nothing where there is no arm.
-    fn arm(&self, clip: usize, shared: &[f64]) -> Result<Arc<Alone>, Impossible> {
-        let Some(arm) = &self.arm else { return Ok(Arc::new(Alone { residuals: Vec::new(), q: Vec::new() })) };
-        let alone = || arm.alone(clip, shared, &self.contact[clip].stamps_ns);
-        self.arm_alone[clip].at(&self.library.felt_by_arm(shared), alone)
+    /// The residuals of the arm that moves alone at numbers; none where there is no arm.
+    fn arm(&self, clip: usize, shared: &[f64]) -> Result<Arc<Vec<f64>>, Impossible> {
+        let Some(arm) = &self.arm else { return Ok(Arc::default()) };
+        self.arm_alone[clip].at(&self.library.felt_by_arm(shared), || arm.simulated(clip, shared))
     }
 
     /// The residuals of the poses and of the joints in contact at numbers, a clip's own among them.
@@ -280,7 +279,7 @@ impl<F: Fn(&[f64]) -> Theta + Sync> ClipModel for CellClips<'_, F> {
     fn residuals(&self, clip: usize, shared: &[f64], own: &[f64], out: &mut Vec<f64>) -> Result<(), Impossible> {
         let others = self.since_touch(clip, shared, own)?;
         out.clear();
-        out.extend_from_slice(&self.arm(clip, shared)?.residuals);
+        out.extend_from_slice(&self.arm(clip, shared)?);
         out.extend(others);
         Ok(())
     }
@@ -291,24 +290,20 @@ impl<F: Fn(&[f64]) -> Theta + Sync> Evidence for CellClips<'_, F> {
         &self,
         clip: usize,
         (shared, own): (&[f64], &[f64]),
-        (reach, base): (Reach, Base<'_>),
+        (reach, base): (Reach, &[f64]),
         out: &mut Vec<f64>,
     ) -> Result<(), Impossible> {
-        let (of_arm, contact) = (self.of_arm(clip), &self.contact[clip]);
+        let of_arm = self.of_arm(clip);
         match (reach, &self.arm) {
             (Reach::Arm, Some(_)) => {
-                let alone = self.arm(clip, shared)?;
                 out.clear();
-                out.extend_from_slice(&alone.residuals);
-                out.extend(&base.residuals[of_arm..of_arm + self.poses(clip)]);
-                if !contact.rows.is_empty() {
-                    out.extend(contact.moved(base.residuals, &*self.arm(clip, base.numbers)?, &alone));
-                }
+                out.extend_from_slice(&self.arm(clip, shared)?);
+                out.extend(&base[of_arm..]);
             }
             (Reach::Object, _) => {
                 let others = self.since_touch(clip, shared, own)?;
                 out.clear();
-                out.extend(&base.residuals[..of_arm]);
+                out.extend(&base[..of_arm]);
                 out.extend(others);
             }
             _ => self.residuals(clip, shared, own, out)?,

@@ -276,7 +276,7 @@ fn step<E: Evidence>(
     let predicted = predict(bench, &from, &split.choose, &weights)?;
     let left = Residuals::at(bench, &from, &split.open()).map(|left| left.typical()).unwrap_or_default();
     let whole = whole.unwrap_or(&left).clone();
-    let mut promising = to_fit(bench, (&from, &weights), &scored, (&whole, &left));
+    let mut promising = to_fit(bench, &from, &scored, (&whole, &left));
     let seen =
         if arm_gap_is_open(&whole, &left) { Vec::new() } else { seen_at_the_least_scatter(bench, &from, &narrow) };
     for seen in seen {

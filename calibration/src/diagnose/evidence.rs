@@ -74,20 +74,10 @@ pub struct Row {
 pub enum Reach {
     /// Anything.
     All,
-    /// The arm's residuals, those in contact as if the contact force stayed what it was; what it does to the object by way
-    /// of the arm is left out.
+    /// The residuals of the arm that moves alone; what it does in contact and to the object by way of the arm is left out.
     Arm,
     /// All but the residuals of the arm that moves alone.
     Object,
-}
-
-/// Where a clip's residuals are known already.
-#[derive(Debug, Clone, Copy)]
-pub struct Base<'a> {
-    /// All numbers.
-    pub numbers: &'a [f64],
-    /// The residuals there.
-    pub residuals: &'a [f64],
 }
 
 /// Clips that tell what each of their residuals is.
@@ -101,7 +91,7 @@ pub trait Evidence: ClipModel {
         &self,
         clip: usize,
         (shared, own): (&[f64], &[f64]),
-        (_reach, _base): (Reach, Base<'_>),
+        (_reach, _base): (Reach, &[f64]),
         out: &mut Vec<f64>,
     ) -> Result<(), Impossible> {
         self.residuals(clip, shared, own, out)

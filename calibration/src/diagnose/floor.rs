@@ -4,12 +4,20 @@
 //! Sensors are white, but a twin is never exact: what is left is larger than the sensor's noise and says the same thing
 //! many times over. Taken at face value it would make any two hypotheses differ by thousands of nats.
 
-use super::evidence::{Evidence, Group};
+use super::evidence::{Channel, Evidence, Group};
 use super::noise::{correlation_length, median};
 use super::quadratic::minimum;
 use super::sweep::{Column, Swept};
 use super::{library::Library, shortlist};
 use nalgebra::{DMatrix, DVector};
+
+/// Factors while nothing is known of how far the twin is off: the sensors' noise alone. The joints in contact are left out: any
+/// engine is off there by many times their noise.
+#[must_use]
+pub fn sensors_alone(evidence: &impl Evidence) -> Vec<f64> {
+    let known = |channel: &Channel| if channel.group == Group::Contact { 0.0 } else { 1.0 };
+    evidence.channels().iter().map(known).collect()
+}
 
 /// Factor on each channel of residuals given clip by clip, one list of values a row.
 #[must_use]

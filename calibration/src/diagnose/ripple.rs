@@ -4,7 +4,7 @@
 //! slope leads from one to the other. So all orders are tried in steps that a fit can bridge, every joint by itself (a
 //! periodogram over the position instead of over time, by least squares: Lomb 1976).
 
-use super::evidence::{Base, Evidence, Reach};
+use super::evidence::{Evidence, Reach};
 use super::fit::{Bench, Hypothesis};
 use nalgebra::{Matrix2, Vector2};
 use rayon::prelude::*;
@@ -59,8 +59,7 @@ pub(super) fn start<E: Evidence>(
         bench.evidence.residuals(clip, &from.full, &own, &mut base).ok()?;
         let column = |full: &[f64]| {
             let mut out = Vec::new();
-            let at = Base { numbers: &from.full, residuals: &base };
-            bench.evidence.changed(clip, (full, &own), (Reach::Arm, at), &mut out).ok()?;
+            bench.evidence.changed(clip, (full, &own), (Reach::Arm, &base), &mut out).ok()?;
             Some(out)
         };
         let waves = |order: &f64| {

@@ -6,7 +6,6 @@ use super::fit::{Bench, Hypothesis};
 use super::gap::Typical;
 use super::remainder::{Left, ROUGHNESS};
 use super::shortlist::{BY_CHANCE, Scored, TESTABLE};
-use super::starts;
 use twin::effects::Stage;
 
 /// So many candidates are fitted at each step.
@@ -22,17 +21,14 @@ const ALIKE: f64 = 0.5;
 /// An object's gap beyond this, half of what two engines differ by, has all effects on the slide fitted: which of them it is
 /// shows in how far fits get.
 const SLID: f64 = 0.5 * ROUGHNESS;
-/// Where the score test tells little, a candidate of the camera must spare this share of the cost somewhere.
-const SPARES: f64 = 0.2;
 
 /// Candidates worth a fit, the arm's and the object's each among themselves: those that the score test cannot rule out, the
 /// best first; of the others only partners that the best is easily taken for. While the arm has a gap of its own, only what the arm feels
 /// is: how an object is hit by an arm that is elsewhere tells nothing of the object. Where the object's gap is not small all effects
-/// on the slide are fitted, where it is large all on the hit as well, and those of the camera that spare much of it
-/// somewhere: a blow answers so unevenly that slopes at one point tell little.
+/// on the slide are fitted, where it is large all on the hit and of the camera as well: an impact answers so unevenly that slopes at one point tell little.
 pub(super) fn to_fit<E: Evidence>(
     bench: &Bench<'_, E>,
-    (from, weights): (&Hypothesis, &[f64]),
+    from: &Hypothesis,
     scored: &[Scored],
     (whole, left): (&[Typical], &[Typical]),
 ) -> Vec<usize> {
@@ -72,15 +68,7 @@ pub(super) fn to_fit<E: Evidence>(
         all.extend(more(&|s| effect(s).stage == Stage::Slide && !all.contains(&s.candidate)));
     }
     if beyond(true) > ROUGHNESS {
-        let now = bench.plain_cost(from, &from.full, weights).unwrap_or(f64::INFINITY);
-        let spares = |s: &Scored| {
-            starts::least_cost_aside(bench, (from, weights), s).is_some_and(|(cost, _)| cost < (1.0 - SPARES) * now)
-        };
-        all.extend(more(&|s| match effect(s).stage {
-            Stage::Hit => true,
-            Stage::Camera => !all.contains(&s.candidate) && spares(s),
-            _ => false,
-        }));
+        all.extend(more(&|s| matches!(effect(s).stage, Stage::Hit | Stage::Camera) && !all.contains(&s.candidate)));
     }
     all
 }
@@ -135,11 +123,14 @@ mod tests {
             let fitted = |mean_square: f64| {
                 let group = |of_object, mean_square| Typical { mean_square, floor: 1.5, of_object };
                 let left = [group(false, 1.5), group(true, mean_square)];
-                to_fit(bench, (&from, even), &all, (&left, &left))
+                to_fit(bench, &from, &all, (&left, &left))
             };
             let slides = bench.library.candidates.iter().filter(|c| c.effect.stage == Stage::Slide).count();
             assert_eq!(fitted(1.5 + 0.9 * SLID).len(), 0);
             assert_eq!(fitted(1.5 + 1.1 * SLID).len(), slides);
+            let beside = |stage| bench.library.candidates.iter().filter(|c| c.effect.stage == stage).count();
+            let all_beyond = slides + beside(Stage::Hit) + beside(Stage::Camera);
+            assert_eq!(fitted(1.5 + 1.1 * ROUGHNESS).len(), all_beyond, "those of the hit and the camera as well");
         });
     }
 
@@ -161,7 +152,7 @@ mod tests {
             let fitted = |arm: f64| -> Vec<Stage> {
                 let group = |of_object, mean_square| Typical { mean_square, floor: 1.5, of_object };
                 let left = [group(false, arm), group(true, 100.0)];
-                let fitted = to_fit(bench, (&from, even), &all, (&left, &left));
+                let fitted = to_fit(bench, &from, &all, (&left, &left));
                 fitted.into_iter().map(|c| bench.library.candidates[c].effect.stage).collect()
             };
             assert!(fitted(3.0).contains(&Stage::Slide));

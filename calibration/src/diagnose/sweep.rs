@@ -9,7 +9,7 @@
 //! ([`Precision::Joints`]): a stiff controller leaves little of one joint in another. That costs a seventh of turning
 //! them one by one ([`Precision::Exact`]).
 
-use super::evidence::{Base, Evidence, Reach};
+use super::evidence::{Evidence, Group, Reach};
 use super::library::{Alternative, Library};
 use super::scatter::Scatter;
 use super::scatter_scale::Around;
@@ -189,8 +189,7 @@ impl<E: Evidence, G: Fn(f64) -> bool + Sync> Work<'_, E, G> {
         let units: Vec<f64> = batch.iter().map(|k| self.turn(&mut numbers, self.columns[*k])).collect();
         let mut out = Vec::with_capacity(base.len());
         let reach = self.reach(batch, &numbers);
-        let at = Base { numbers: self.full, residuals: base };
-        let answer = self.evidence.changed(clip, (&numbers, own), (reach, at), &mut out);
+        let answer = self.evidence.changed(clip, (&numbers, own), (reach, base), &mut out);
         let answered = answer.is_ok() && out.len() == base.len();
         if !answered {
             return Vec::new();
@@ -199,8 +198,13 @@ impl<E: Evidence, G: Fn(f64) -> bool + Sync> Work<'_, E, G> {
         let column = |(k, units): (&usize, &f64)| {
             let joint = joint_of(self.library, self.columns[*k]).filter(|_| batch.len() > 1);
             let slope = |((out, base), row): ((&f64, &f64), &super::evidence::Row)| {
-                let foreign = joint.is_some_and(|joint| channels[row.channel].joint != Some(joint));
-                if foreign { 0.0 } else { (out - base) / units }
+                let channel = &channels[row.channel];
+                let foreign = joint.is_some_and(|joint| channel.joint != Some(joint));
+                if foreign || (reach != Reach::Object && channel.group == Group::Contact) {
+                    0.0
+                } else {
+                    (out - base) / units
+                }
             };
             (*k, out.iter().zip(base).zip(rows).map(slope).collect())
         };
@@ -247,8 +251,7 @@ impl<E: Evidence, G: Fn(f64) -> bool + Sync> Work<'_, E, G> {
         let effect = &self.scatter.random[k];
         let (mut moved, mut out) = (own.to_vec(), Vec::new());
         moved[k] += effect.step;
-        let at = Base { numbers: self.full, residuals: base };
-        let changed = |out: &mut Vec<f64>| self.evidence.changed(clip, (self.full, &moved), (Reach::Object, at), out);
+        let changed = |out: &mut Vec<f64>| self.evidence.changed(clip, (self.full, &moved), (Reach::Object, base), out);
         let turned = effect.sigma > 0.0 && changed(&mut out).is_ok();
         if !turned || out.len() != base.len() {
             return vec![0.0; base.len()];

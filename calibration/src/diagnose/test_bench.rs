@@ -4,6 +4,7 @@ use super::arm_clips::ArmClips;
 use super::cell_clips::CellClips;
 use super::evidence::Evidence as _;
 use super::fit::{Bench, Effort};
+use super::floor;
 use super::ground::Ground;
 use super::library::Library;
 use super::shortlist::Scored;
@@ -60,7 +61,7 @@ pub(super) fn on_bench<R>(
         interrupt: &interrupt,
         trail: (Kept::nothing(), ""),
     };
-    ask(&bench, &vec![1.0; evidence.channels().len()])
+    ask(&bench, &floor::sensors_alone(&evidence))
 }
 
 /// Asks the bench on which the world's strokes lie, with the library of all effects that they could show.
@@ -83,7 +84,7 @@ pub(super) fn on_strokes<R>(
         interrupt: &interrupt,
         trail: (Kept::nothing(), ""),
     };
-    ask(&bench, &vec![1.0; evidence.channels().len()])
+    ask(&bench, &floor::sensors_alone(&evidence))
 }
 
 /// A candidate of which the score test says nothing.

@@ -3,6 +3,7 @@
 
 use super::evidence::Evidence;
 use super::fit::{Bench, FittedClip, Hypothesis};
+use super::floor;
 use twin::effects::Search;
 
 /// What a number may change of the clips' squared residuals, as a share and at least, and still be one that nothing depends
@@ -30,7 +31,7 @@ pub fn sizes<E: Evidence>(bench: &Bench<'_, E>, hypothesis: &Hypothesis, effect:
     if !candidate.is_of_arm() || candidate.sizes.len() < 2 {
         return Vec::new();
     }
-    let even = vec![1.0; bench.evidence.channels().len()];
+    let even = floor::sensors_alone(bench.evidence);
     let cost = |full: &[f64]| bench.plain_cost(hypothesis, full, &even).unwrap_or(f64::INFINITY);
     let now = cost(&hypothesis.full);
     let mut full = hypothesis.full.clone();
