@@ -258,7 +258,7 @@ impl Candidate {
             _ => false,
         };
         let sizes: Vec<usize> = (at..numbers.len()).filter(|k| is_size(&numbers[*k].0)).collect();
-        let turned = (at..numbers.len()).filter(|k| search_of(&numbers[*k].0) != Some(Search::Held)).collect();
+        let turned = (at..numbers.len()).filter(|k| !is_held(&numbers[*k].0)).collect();
         let alternatives = alternatives(effect, at, &sizes, numbers, met);
         Self { effect, numbers: at..numbers.len(), turned, sizes, alternatives }
     }
@@ -278,6 +278,11 @@ fn bound_of(setting: &Setting, peaks: &Joints) -> Option<f64> {
 fn search_of(setting: &Setting) -> Option<Search> {
     let Setting::Effect { name, parameter, .. } = setting else { return None };
     find(name)?.parameters.iter().find(|p| p.name == *parameter).map(|p| p.search)
+}
+
+/// Whether a number of an effect does not move along with the others.
+fn is_held(setting: &Setting) -> bool {
+    matches!(search_of(setting), Some(Search::Held | Search::Middle))
 }
 
 /// A limit of its own for every joint: what it does depends on how hard the clips drive that joint, and above that it does
@@ -329,6 +334,11 @@ fn alternatives(
             with(vec![(direction, patch.direction), (distance, patch.distance), (radius, patch.curvature)])
         };
         return ground.map(Ground::patches).unwrap_or_default().into_iter().map(place).collect();
+    }
+    if let Some(place) = effect.parameters.iter().find(|parameter| parameter.search == Search::Middle) {
+        let at = |place_is: [f64; 3]| with(index(place.name).into_iter().zip(place_is).collect());
+        let middle = ground.map(|ground| [ground.middle[0], ground.middle[1], 0.0]);
+        return [Some([place.resting_value(); 3]), middle].into_iter().flatten().map(at).collect();
     }
     match effect.parameters.iter().find(|parameter| !parameter.begun_at.is_empty()) {
         Some(form) => {

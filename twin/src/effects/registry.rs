@@ -85,6 +85,9 @@ pub enum Search {
     },
     /// It changes a hit, of which slopes at one point tell little.
     Uneven,
+    /// A place in the base frame that a search does not move: its default, or the middle of where the objects were. A camera is
+    /// calibrated for the place where it is used, so an error of its direction or scale is least there.
+    Middle,
 }
 
 /// One parameter of an effect.

@@ -1,13 +1,15 @@
 //! The camera looks into another direction than its calibration says.
 //!
-//! - Equation: `pose_reported = R(rotation) pose`, about the base's origin; about the camera instead it differs by a
-//!   constant shift, which is `camera_extrinsic_translation`.
+//! - Equation: `position_reported = centre + R(rotation) (position - centre)`, `orientation_reported = R(rotation) orientation`;
+//!   the place that stays where it is is the base's origin, or wherever the camera was aligned. About another place it differs
+//!   by a constant shift, which is `camera_extrinsic_translation`.
 //! - Source: hand-eye calibration error.
-//! - Unit: rad, rotation vector in the base frame. Plausible: -0.1 to 0.1 (0.02 after calibration).
+//! - Units: rotation rad, a rotation vector in the base frame; centre m, in the base frame. Plausible: rotation -0.1 to 0.1
+//!   (0.02 after calibration); centre within a metre of the base.
 //! - Signature (V1): poses at rest are wrong too, by as much more as they are further away; all clips alike.
 //! - Confused with: table tilt (a yaw bends nothing), encoder offset, tool offset.
 
-use crate::effects::registry::{EffectInfo, Parameter, Place, Stage};
+use crate::effects::registry::{EffectInfo, Parameter, Place, Search, Stage};
 use crate::effects::remedy::{Remedy, list, short};
 use nalgebra::{Isometry3, Rotation3, UnitQuaternion, Vector3};
 
@@ -15,19 +17,23 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     name: "camera_extrinsic_rotation",
     stage: Stage::Camera,
     acts_on: Place::ObjectObservation,
-    parameters: &[Parameter::size("rotation", "rad", [-0.1, 0.1], 0.0).vector(3).within(-3.2, 3.2)],
+    parameters: &[
+        Parameter::size("rotation", "rad", [-0.1, 0.1], 0.0).vector(3).within(-3.2, 3.2),
+        Parameter::form("centre", "m", [-1.0, 1.0], 0.0).vector(3).searched(Search::Middle),
+    ],
     confusable_with: &["camera_extrinsic_translation", "joint_encoder_offset", "tool_offset", "table_tilt"],
     install: |values, effects| {
+        let centre: [f64; 3] = values.vector("centre");
         effects.camera.camera_extrinsic_rotation =
-            Some(CameraExtrinsicRotation { rotation: values.vector("rotation") });
+            Some(CameraExtrinsicRotation { rotation: values.vector("rotation"), centre: centre.into() });
     },
     remedy: |found| {
-        let turn: [f64; 3] = found.vector("rotation");
+        let (turn, centre): ([f64; 3], [f64; 3]) = (found.vector("rotation"), found.vector("centre"));
         let back = Rotation3::new(Vector3::from(turn)).inverse();
         let pose = found.cell().camera.as_ref().and_then(|camera| camera.base_from_camera());
         let set = pose.map_or_else(String::new, |pose| {
             let pose = pose.isometry();
-            let place = back * pose.translation.vector;
+            let place = Vector3::from(centre) + back * (pose.translation.vector - Vector3::from(centre));
             let turned = UnitQuaternion::from_rotation_matrix(&back) * pose.rotation;
             let wxyz = [turned.w, turned.i, turned.j, turned.k].map(|x| format!("{x:.6}"));
             let place = [place.x, place.y, place.z].map(|x| format!("{x:.4}"));
@@ -40,11 +46,13 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
         let words = turn.map(|angle| short(angle.to_degrees())).join(", ");
         Remedy::new(
             format!(
-                "Turn the camera's calibrated pose back by {words} degrees about the base's x, y, z axes, or calibrate it anew (`calibration viewpoint`){set}."
+                "Turn the camera's calibrated pose back by {words} degrees about the base's x, y, z axes through {} m, or calibrate it anew (`calibration viewpoint`){set}.",
+                list(&centre)
             ),
             format!(
-                "Nothing in the cell's model; a simulated camera reports poses turned by {} rad about the base's origin.",
-                list(&turn)
+                "Nothing in the cell's model; a simulated camera reports poses turned by {} rad about {} m.",
+                list(&turn),
+                list(&centre)
             ),
         )
     },
@@ -53,19 +61,21 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(in crate::effects) struct CameraExtrinsicRotation {
     rotation: [f64; 3],
+    centre: Vector3<f64>,
 }
 
 impl CameraExtrinsicRotation {
     pub(super) fn apply(&self, pose: &mut Isometry3<f64>) {
-        *pose = self.turn() * *pose;
+        *pose = self.about_the_centre() * *pose;
     }
 
     pub(super) fn undo(&self, pose: &mut Isometry3<f64>) {
-        *pose = self.turn().inverse() * *pose;
+        *pose = self.about_the_centre().inverse() * *pose;
     }
 
-    fn turn(&self) -> UnitQuaternion<f64> {
-        UnitQuaternion::from_scaled_axis(Vector3::from(self.rotation))
+    fn about_the_centre(&self) -> Isometry3<f64> {
+        let turn = UnitQuaternion::from_scaled_axis(Vector3::from(self.rotation));
+        Isometry3::from_parts((self.centre - turn * self.centre).into(), turn)
     }
 }
 
@@ -84,5 +94,19 @@ mod tests {
             Isometry3::new(Vector3::new(0.5 * 0.02f64.cos(), 0.5 * 0.02f64.sin(), 0.05), Vector3::z() * 0.32);
         assert!((seen.translation.vector - expected.translation.vector).norm() < 1e-15);
         assert!(seen.rotation.angle_to(&expected.rotation) < 1e-7);
+    }
+
+    #[test]
+    fn a_yaw_about_a_place_leaves_that_place_and_moves_what_lies_beside_it() {
+        let effects = effects(
+            "[[effect]]\nname = \"camera_extrinsic_rotation\"\nrotation = [0.0, 0.0, 0.02]\ncentre = [0.5, 0.1, 0.0]",
+        );
+        let seen = |x| effects.report(&mut CameraMemory::default(), 0, &Isometry3::translation(x, 0.1, 0.05));
+        assert!((seen(0.5).translation.vector - Vector3::new(0.5, 0.1, 0.05)).norm() < 1e-15);
+        let beside = Vector3::new(0.5 + 0.1 * 0.02f64.cos(), 0.1 + 0.1 * 0.02f64.sin(), 0.05);
+        assert!((seen(0.6).translation.vector - beside).norm() < 1e-15);
+        let pose = Isometry3::new(Vector3::new(0.62, -0.2, 0.1), Vector3::z() * 0.3);
+        let back = effects.undistorted(&effects.report(&mut CameraMemory::default(), 0, &pose));
+        assert!((back.translation.vector - pose.translation.vector).norm() < 1e-15);
     }
 }

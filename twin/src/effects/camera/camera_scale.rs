@@ -8,7 +8,7 @@
 //! - Signature (V2): in proportion to the distance, at rest too; speeds and decelerations grow alike.
 //! - Confused with: restitution and friction together, an extrinsic translation where the object hardly moves.
 
-use crate::effects::registry::{EffectInfo, Parameter, Place, Stage};
+use crate::effects::registry::{EffectInfo, Parameter, Place, Search, Stage};
 use crate::effects::remedy::{Remedy, short};
 use nalgebra::{Isometry3, Vector3};
 
@@ -18,10 +18,7 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     acts_on: Place::ObjectObservation,
     parameters: &[
         Parameter::size("scale", "1", [-0.1, 0.1], 0.0).within(-0.99, 100.0),
-        Parameter::form("centre", "m", [-1.0, 1.0], 0.0)
-            .vector(3)
-            // The base, and the middle of a table in front of it.
-            .begun_at(&[&[0.0, 0.0, 0.0], &[0.5, 0.0, 0.0]]),
+        Parameter::form("centre", "m", [-1.0, 1.0], 0.0).vector(3).searched(Search::Middle),
     ],
     confusable_with: &["camera_extrinsic_translation", "restitution"],
     install: |values, effects| {
