@@ -196,6 +196,14 @@ impl<F: Fn(&[f64]) -> Theta + Sync> ArmClips<F> {
         Ok(peaks)
     }
 
+    /// By how much a vertical force of 1 N at the tip turns each joint at measured joints [N m].
+    pub fn vertical_lever(&self, measured: &[f64]) -> Joints {
+        let mut q = [0.0; MAX_JOINTS];
+        q[..measured.len()].copy_from_slice(measured);
+        let tip = self.nominal.tip(&q).position();
+        self.nominal.jacobian(&q, tip).map(|column| column[2])
+    }
+
     /// From which stamp on the tool of a clip may touch the object [ns].
     pub fn alone_until_ns(&self, clip: usize) -> u64 {
         self.clips[clip].alone_until_ns

@@ -172,7 +172,8 @@ impl<'a, F: Fn(&[f64]) -> Theta + Sync> CellClips<'a, F> {
         {
             residuals.iter_mut().zip(&slopes[of_arm..]).for_each(|(residual, slope)| *residual += slope * value);
         }
-        residuals.extend(contact.in_sigmas(&joints));
+        let arm = self.library.theta(&shared).arm;
+        residuals.extend(arm.map_or_else(Vec::new, |arm| contact.in_sigmas(&joints, &arm.stiffness)));
         Ok(residuals)
     }
 

@@ -5,12 +5,18 @@
 //! They say nothing about what the arm itself feels: gains and friction are known from where it moves alone to a ten
 //! thousandth, and no engine yields to a contact as another does, so the little by which the contact force is off would bend
 //! them. Their slopes by what the arm feels count as zero (a cut, as in modular inference: Liu, Bayarri and Berger 2009).
+//!
+//! Nor do they say anything about a vertical force. A tip that pushes and does not slip may hold the object down or lift it by up to
+//! its friction; how much, rigid bodies leave open, and two engines differ there by hundreds of microradians in strokes whose
+//! objects go the same way. So the direction in which a vertical force at the tip turns the joints, `K_P^-1 J_z'`, is taken out.
 
 use super::arm_clips::ArmClips;
 use super::evidence::{Row, StageName};
 use crate::forward::object::{self, ObjectClips};
+use nalgebra::DVector;
 use shared_mem::theta::Theta;
 use std::ops::Range;
+use twin::arm::Joints;
 use twin::rollout::TICK_NS;
 
 /// The joints of a clip in contact: from when the tool may first touch until it has let go.
@@ -20,6 +26,8 @@ pub struct Contact {
     pub rows: Range<usize>,
     /// One sigma of each joint's encoder [rad].
     sigma: Vec<f64>,
+    /// For each stamp by how much a vertical force of 1 N at the tip turns each joint [N m].
+    levers: Vec<Joints>,
 }
 
 impl Contact {
@@ -32,8 +40,14 @@ impl Contact {
         let is_joint = |row: &object::Row| matches!(row.channel, object::Channel::Joint(_));
         let first = rows.iter().position(|row| is_joint(row) && row.stamp_ns >= from_ns).unwrap_or(rows.len());
         let ones = rows[first..].iter().filter(|row| row.channel == object::Channel::Joint(0));
-        let dof = (rows.len() - first).checked_div(ones.count()).unwrap_or(0);
-        Self { rows: first..rows.len(), sigma: arm.sigma()[..dof].to_vec() }
+        let measured = &object.clip(clip).measured;
+        let lever = |row: &object::Row| {
+            let place = measured.stamps_ns.partition_point(|stamp| *stamp < row.stamp_ns);
+            arm.vertical_lever(measured.q_row(place.min(measured.len() - 1)))
+        };
+        let levers: Vec<Joints> = ones.map(lever).collect();
+        let dof = (rows.len() - first).checked_div(levers.len()).unwrap_or(0);
+        Self { rows: first..rows.len(), sigma: arm.sigma()[..dof].to_vec(), levers }
     }
 
     /// What its residuals are about. `all`: [`ObjectClips::rows`]; `first`: index of the first joint's channel.
@@ -47,9 +61,20 @@ impl Contact {
         all[self.rows.clone()].iter().enumerate().map(one).collect()
     }
 
-    /// Errors of the joints [rad] in sigmas of their encoders.
-    pub fn in_sigmas(&self, errors: &[f64]) -> impl Iterator<Item = f64> {
-        errors.iter().zip(self.sigma.iter().cycle()).map(|(error, sigma)| error / sigma)
+    /// Errors of the joints [rad] in sigmas of their encoders, but for what a vertical force would make of them under these
+    /// gains [N m/rad].
+    #[must_use]
+    pub fn in_sigmas(&self, errors: &[f64], stiffness: &[f64]) -> Vec<f64> {
+        let dof = self.sigma.len().max(1);
+        let at = |(errors, lever): (&[f64], &Joints)| {
+            let errors =
+                DVector::from_iterator(dof, errors.iter().zip(&self.sigma).map(|(error, sigma)| error / sigma));
+            let yielded = (0..dof).map(|joint| lever[joint] / (stiffness[joint] * self.sigma[joint]));
+            let vertical = DVector::from_iterator(dof, yielded);
+            let share = errors.dot(&vertical) / vertical.norm_squared().max(f64::MIN_POSITIVE);
+            (errors - vertical * share).as_slice().to_vec()
+        };
+        errors.chunks_exact(dof).zip(&self.levers).flat_map(at).collect()
     }
 }
 
@@ -59,7 +84,9 @@ mod tests {
     use super::super::fit::Bench;
     use super::super::sweep::Precision;
     use super::super::test_bench::{on_strokes, shipped};
+    use super::Contact;
     use crate::benchmark::world::{Fault, Kind, World};
+    use twin::arm::MAX_JOINTS;
 
     /// The largest slope in a group of a number of the baseline, by its name [sigma for 1 % of it].
     fn slope<E: Evidence>(bench: &Bench<'_, E>, name: &str, group: Group) -> f64 {
@@ -71,6 +98,18 @@ mod tests {
         let rows = bench.evidence.rows(0).iter().zip(slopes.iter());
         let of_group = rows.filter(|(row, _)| bench.evidence.channels()[row.channel].group == group);
         of_group.fold(0.0, |largest: f64, (_, slope)| largest.max((0.01 * numbers[k] * slope).abs()))
+    }
+
+    #[test]
+    fn a_vertical_force_leaves_no_residual_and_a_horizontal_one_does() {
+        let (stiffness, sigma) = ([600.0, 500.0, 50.0], vec![4e-6, 4e-6, 8e-6]);
+        let mut lever = [0.0; MAX_JOINTS];
+        lever[..3].copy_from_slice(&[0.02, -0.5, 0.1]);
+        let contact = Contact { rows: 0..3, sigma, levers: vec![lever] };
+        let turned = |lever: [f64; 3]| [0, 1, 2].map(|joint| 2.0 * lever[joint] / stiffness[joint]);
+        let left = |lever| contact.in_sigmas(&turned(lever), &stiffness).iter().fold(0.0, |a: f64, b| a.max(b.abs()));
+        assert!(left([0.02, -0.5, 0.1]) < 1e-9);
+        assert!(left([0.4, 0.1, 0.05]) > 100.0);
     }
 
     #[test]

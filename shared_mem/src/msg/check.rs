@@ -53,7 +53,7 @@ pub enum Wrong {
         value: f64,
     },
     /// An orientation is no unit quaternion.
-    #[error("{field} is no unit quaternion: its length is {length}")]
+    #[error("{field} is no unit quaternion: its length is {length:.4}")]
     Quaternion {
         /// Field of the message.
         field: &'static str,

@@ -2,7 +2,8 @@
 //!
 //! A stage goes on at the pace at which its steps were done until now. A stage that is still to come takes as long as the last one
 //! of its name, and where there was none, its share of the plan at the pace at which the plan was worked off. The share that
-//! is done never goes back: where there is more to do than was planned, it stands until the work has caught up.
+//! is done never goes back: where there is more to do than was planned, it stands until the work has caught up, and how long the
+//! rest takes is then not known.
 
 use std::collections::VecDeque;
 use std::time::Duration;
@@ -90,6 +91,10 @@ impl Estimate {
 
     /// Seconds left.
     fn left(&self, now: f64) -> Option<f64> {
+        let Stage { steps, done, last, .. } = self.current;
+        if done > 0 && done == steps && self.ahead.is_empty() && now > last {
+            return None;
+        }
         let current = self.left_of_current(now)?;
         let took = now - self.current.begun + current;
         let ahead = self.ahead.iter().map(|(name, planned)| {
@@ -152,6 +157,7 @@ mod tests {
         assert!((left(&mut work, 35.0) - 20.0).abs() < 1e-9, "a long step counts no others as done");
         work.done(4, seconds(40.0));
         assert_eq!(work.at(seconds(40.0)), (NEARLY, Some(Duration::ZERO)));
+        assert_eq!(work.at(seconds(41.0)), (NEARLY, None), "it takes longer than planned, nobody knows how long");
     }
 
     /// Plays a diagnosis of two steps of the search against a clock of its own and compares every estimate with what came.
