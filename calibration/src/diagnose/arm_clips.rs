@@ -1,5 +1,6 @@
 //! Clips of an arm as evidence: positions, velocities and both torques of every joint against the twin's, in sigmas of the
-//! sensors. In clips with an object only what comes before the touch counts: the arm alone is simulated.
+//! sensors. In clips with an object only what comes before the touch counts: the arm alone is simulated. What its joints do from
+//! then on belongs to [`super::contact`].
 #![allow(non_snake_case)] // the Franka Control Interface's own symbols
 
 use super::evidence::{Channel, Evidence, Group, Row, StageName};

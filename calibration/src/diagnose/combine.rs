@@ -397,11 +397,7 @@ impl Step {
     /// Whether no other effect that could be the cause is worth half as much, but for those that are known to look alike:
     /// that some of them act stands out even where it does not show which.
     fn is_alone(&self, library: &Library, candidate: usize) -> bool {
-        let effect = library.candidates[candidate].effect;
-        let looks_alike = |trial: &&Trial| {
-            let other = library.candidates[trial.scored.candidate].effect;
-            effect.confusable_with.contains(&other.name) || other.confusable_with.contains(&effect.name)
-        };
+        let looks_alike = |trial: &&Trial| library.look_alike(candidate, trial.scored.candidate);
         let worth = |trial: &Trial| trial.fitted.as_ref().map(|(_, advantage)| net(advantage, trial.scored.cost));
         let (own, others): (Vec<&Trial>, Vec<&Trial>) =
             self.trials.iter().partition(|trial| trial.scored.candidate == candidate);

@@ -240,7 +240,7 @@ fn finding<'a, E: Evidence>(
     for (place, effect) in found.kept() {
         let step = &found.steps[place];
         clear &= step.is_clear(bench.library, effect);
-        let others = confidence::rivals(step, effect, overdispersion[place]);
+        let others = confidence::rivals(step, bench.library, effect, overdispersion[place]);
         let others = others.into_iter().filter(|other| !found.last.effects.contains(other));
         rivals.extend(others.filter(|other| stands_in(bench, split, found, (step, effect), *other)).map(|k| name(&k)));
     }

@@ -1,6 +1,7 @@
 //! How sure a finding is: shares of the evidence among rivals, less what experience with simulated sessions takes off.
 
 use super::combine::{Step, Trial, net};
+use super::library::Library;
 use crate::estimate::interval::student;
 
 /// Rivals this close cannot be told apart [nats].
@@ -32,10 +33,11 @@ pub fn probabilities(trials: &[Trial], none: bool) -> Vec<(usize, f64)> {
 }
 
 /// Candidates of a step that explain it as well as the chosen one: whose gains, clip by clip, are not less beyond chance, and
-/// that close as much of the gap; with more numbers than the chosen one, markedly more of it. Differences count `overdispersion`
-/// times less.
+/// that close as much of the gap; with more numbers than the chosen one, markedly more of it. Of one that is known to look alike
+/// it is enough that it closes a cause's share: how much any of the two closes depends on how far their fits have come.
+/// Differences count `overdispersion` times less.
 #[must_use]
-pub fn rivals(step: &Step, chosen: usize, overdispersion: f64) -> Vec<usize> {
+pub fn rivals(step: &Step, library: &Library, chosen: usize, overdispersion: f64) -> Vec<usize> {
     let of = |candidate: usize| {
         let trial = step.trials.iter().find(|trial| trial.scored.candidate == candidate)?;
         trial.fitted.as_ref().map(|(_, advantage)| (advantage, trial))
@@ -47,8 +49,11 @@ pub fn rivals(step: &Step, chosen: usize, overdispersion: f64) -> Vec<usize> {
         let (beyond, error) = (beyond / overdispersion, error / overdispersion);
         let alike = alike(beyond, error, best.clips()) && other.nats > other.error;
         let dearer = trial.scored.cost > chosen_trial.scored.cost;
-        let enough =
-            if dearer { trial.closes_more_than(chosen_trial) } else { trial.closes > ALIKE * chosen_trial.closes };
+        let enough = match dearer {
+            true => trial.closes_more_than(chosen_trial),
+            false if library.look_alike(*candidate, chosen) => trial.is_cause(),
+            false => trial.closes > ALIKE * chosen_trial.closes,
+        };
         alike && enough
     };
     step.trials.iter().map(|trial| trial.scored.candidate).filter(near).collect()
@@ -69,9 +74,13 @@ fn chance(clips: usize) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::super::fit::Hypothesis;
+    use super::super::ground::Ground;
     use super::super::score::Predicted;
     use super::super::shortlist::Scored;
+    use super::super::test_bench::shipped;
     use super::*;
+    use crate::forward::setting;
+    use shared_mem::msg::MAX_JOINTS;
 
     fn trial(candidate: usize, nats: f64, closes: f64) -> Trial {
         let predicted =
@@ -113,6 +122,39 @@ mod tests {
         assert!(sure(&[cause.clone(), dearer.clone()]) < 0.6, "one that closes markedly more does");
         dearer.own_numbers = false;
         assert!((sure(&[cause, dearer]) - (1.0 - NONE_OF_THESE)).abs() < 1e-6);
+    }
+
+    #[test]
+    fn what_is_known_to_look_alike_is_a_rival_however_much_less_its_fit_closes() {
+        let cell = shipped();
+        let base = setting::complete(&cell, None).expect("a cell");
+        let ground = Ground { middle: [0.5, 0.0], spread: 0.1 };
+        let library = Library::new(&cell, &base, Some(&ground), &[87.0; MAX_JOINTS]);
+        let named = |name| library.find(name).expect("a candidate");
+        let [tool, camera, friction] = ["tool_offset", "camera_extrinsic_translation", "tip_friction"].map(named);
+        // On every other clip the second predicts better, so that the two cannot be told apart by chance.
+        let as_good = |candidate, closes| {
+            let mut other = trial(candidate, 1500.0, closes);
+            let gain = |clip: usize| if clip % 2 == 0 { 85.0 } else { 165.0 };
+            let predicted = |gain: &dyn Fn(usize) -> f64| Predicted {
+                clips: (0..12).map(|c| (c, 1000.0 - 2.0 * gain(c))).collect(),
+            };
+            if let Some((_, advantage)) = &mut other.fitted {
+                *advantage = predicted(&gain).over(&predicted(&|_| 0.0));
+            }
+            other
+        };
+        let trials = vec![trial(tool, 1530.0, 0.5), as_good(camera, 0.15), as_good(friction, 0.15)];
+        let step = Step {
+            from: trials[0].fitted.as_ref().expect("it is").0.clone(),
+            predicted: Predicted { clips: Vec::new() },
+            trials,
+            weights: Vec::new(),
+            arm_rows: 0,
+            left: Vec::new(),
+            whole: Vec::new(),
+        };
+        assert_eq!(rivals(&step, &library, tool, 1.0), [camera]);
     }
 
     #[test]

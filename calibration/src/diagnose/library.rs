@@ -178,6 +178,13 @@ impl Library {
         (0..numbers.len()).filter(|k| self.arm_feels(*k, numbers)).map(|k| numbers[k]).collect()
     }
 
+    /// Whether two candidates are known to look alike in some recordings.
+    #[must_use]
+    pub fn look_alike(&self, a: usize, b: usize) -> bool {
+        let [a, b] = [a, b].map(|candidate| self.candidates[candidate].effect);
+        a.confusable_with.contains(&b.name) || b.confusable_with.contains(&a.name)
+    }
+
     /// Index of the candidate with this name.
     #[must_use]
     pub fn find(&self, name: &str) -> Option<usize> {

@@ -61,7 +61,7 @@ fn each_stands_out<E: Evidence>(bench: &Bench<'_, E>, found: &Found, overdispers
     added.len() == found.last.effects.len()
         && added.iter().all(|(place, effect)| {
             let step = &found.steps[*place];
-            let rivals = confidence::rivals(step, *effect, overdispersion[*place]);
+            let rivals = confidence::rivals(step, bench.library, *effect, overdispersion[*place]);
             step.is_clear(bench.library, *effect) && rivals.iter().all(|rival| found.last.effects.contains(rival))
         })
 }

@@ -119,7 +119,7 @@ fn status(scored: &Scored, kept: bool, rival: bool, (kind, hidden): (Kind, bool)
 }
 
 fn confusable<E: Evidence>(first: &Step, effect: usize, overdispersion: f64, bench: &Bench<'_, E>) -> Vec<String> {
-    let near = confidence::rivals(first, effect, overdispersion);
+    let near = confidence::rivals(first, bench.library, effect, overdispersion);
     near.iter().map(|other| bench.library.candidates[*other].effect.name.to_owned()).collect()
 }
 

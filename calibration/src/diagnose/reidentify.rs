@@ -28,7 +28,7 @@ impl Step {
         self.judge(bench, split, added, best.clone());
         let chosen = self.trials[added].scored.candidate;
         if bench.library.candidates[chosen].is_of_arm() {
-            let alike = confidence::rivals(self, chosen, 1.0);
+            let alike = confidence::rivals(self, bench.library, chosen, 1.0);
             self.with_object_anew(bench, split, |_, trial| alike.contains(&trial.scored.candidate), refined);
         } else {
             let least = RIVAL * self.trials[added].nats();
