@@ -135,7 +135,7 @@ mod tests {
         // On every other clip the second predicts better, so that the two cannot be told apart by chance.
         let as_good = |candidate, closes| {
             let mut other = trial(candidate, 1500.0, closes);
-            let gain = |clip: usize| if clip % 2 == 0 { 85.0 } else { 165.0 };
+            let gain = |clip: usize| if clip.is_multiple_of(2) { 85.0 } else { 165.0 };
             let predicted = |gain: &dyn Fn(usize) -> f64| Predicted {
                 clips: (0..12).map(|c| (c, 1000.0 - 2.0 * gain(c))).collect(),
             };
