@@ -1,0 +1,75 @@
+"""What every hidden effect can do. One class is one effect; each overrides only where it acts.
+
+`name` is the diagnosis's own spelling where it knows the effect; what it does not know has `known = False`.
+"""
+import numpy as np
+
+
+class Effect:
+    name = ""
+    known = True
+    acts = False  # whether `step` does something
+
+    @classmethod
+    def draw(cls, rng, cell):
+        """One of a size drawn by lot; `cell` is the draw of everything else."""
+        raise NotImplementedError
+
+    def sizes(self):
+        """What is hidden, with the unit in the key."""
+        raise NotImplementedError
+
+    def blocks(self):
+        """[[effect]] blocks with which the twin comes nearest; none where it knows no such effect."""
+        return []
+
+    # Before and at the beginning of a clip.
+    def build(self, build):
+        """Changes the model's numbers."""
+
+    def clip(self, share, rng):
+        """A clip begins; `share` of the session has passed."""
+
+    def begin(self, plant, q):
+        """The arm rests at its first command `q`."""
+
+    # In each millisecond, in this order.
+    def encoder(self, q, dq):
+        return q, dq
+
+    def command(self, q_d, dq_d):
+        return q_d, dq_d
+
+    def torque(self, tau):
+        return tau
+
+    def step(self, plant):
+        """Before a step of the engine, as often as there are substeps."""
+
+    def torque_sensor(self, tau):
+        return tau
+
+    # What the tracker makes of it.
+    latency = 0.0  # [s]
+
+    def seen(self, t, place, turn):
+        """Place [m] and quaternion (w, x, y, z) as reported at `t` seconds."""
+        return place, turn
+
+
+def log_uniform(rng, usual, most):
+    """A size from a tenth of the usual one to three times the largest plausible one."""
+    return float(np.exp(rng.uniform(np.log(0.1 * usual), np.log(3.0 * most))))
+
+
+def sign(rng):
+    return 1.0 if rng.random() < 0.5 else -1.0
+
+
+def rounded(values, digits=6):
+    """As it stands in files."""
+    return [round(float(v), digits) for v in values]
+
+
+def block(name, **parameters):
+    return {"name": name, **parameters}

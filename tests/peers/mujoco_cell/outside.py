@@ -1,0 +1,229 @@
+"""What the diagnosis has no name for: the right verdict is `unexplained`."""
+import numpy as np
+
+from . import fr3
+from .camera_effects import turned
+from .effect import Effect, log_uniform, rounded
+from .model import MIDDLE, contact
+
+
+class Outside(Effect):
+    known = False
+
+
+class SloshingLoad(Outside):
+    """A vessel at the flange whose contents swing as a pendulum."""
+
+    name = "sloshing load"
+
+    def __init__(self, mass, length, damping):
+        self.mass, self.length, self.damping = mass, length, damping
+
+    @classmethod
+    def draw(cls, rng, cell):
+        return cls(rng.uniform(0.3, 1.2), rng.uniform(0.03, 0.12), rng.uniform(0.0005, 0.004))
+
+    def sizes(self):
+        return {"mass_kg": self.mass, "length_m": self.length, "damping_N_m_s_per_rad": self.damping}
+
+    def build(self, build):
+        joint = f'damping="{self.damping:.9g}" armature="1e-5"'
+        build.at_flange.append(
+            f'<body name="slosh" pos="0 0 0.02"><joint axis="1 0 0" {joint}/><joint axis="0 1 0" {joint}/>'
+            f'<inertial mass="{self.mass:.9g}" pos="0 0 {self.length:.9g}" diaginertia="1e-5 1e-5 1e-5"/></body>')
+
+
+class WarmingGears(Outside):
+    """Viscous friction that falls from clip to clip as the grease warms up."""
+
+    name = "warming gears"
+    acts = True
+
+    def __init__(self, cold):
+        self.cold = np.asarray(cold)
+
+    @classmethod
+    def draw(cls, rng, cell):
+        return cls(fr3.by_size(rng.uniform(3.0, 10.0)))
+
+    def sizes(self):
+        return {"cold_N_m_s_per_rad": rounded(self.cold)}
+
+    def clip(self, share, rng):
+        self.now = self.cold * np.exp(-3 * share)
+
+    def step(self, plant):
+        plant.lost += self.now * plant.data.qvel[plant.motor]
+
+
+class Hose(Outside):
+    """A hose that pulls one joint back beyond an angle."""
+
+    name = "hose"
+    acts = True
+
+    def __init__(self, joint, stiffness, slack):
+        self.joint, self.stiffness, self.slack = joint, stiffness, slack
+
+    @classmethod
+    def draw(cls, rng, cell):
+        return cls(int(rng.integers(0, 4)), rng.uniform(8, 50), rng.uniform(0.02, 0.08))
+
+    def sizes(self):
+        return {"joint": self.joint + 1, "stiffness_N_m_per_rad": self.stiffness, "slack_rad": self.slack}
+
+    def begin(self, plant, q):
+        self.from_ = q[self.joint] + self.slack
+
+    def step(self, plant):
+        beyond = plant.data.qpos[plant.position[self.joint]] - self.from_
+        plant.lost[self.joint] += self.stiffness * max(0.0, beyond)
+
+
+class HeldCommands(Outside):
+    """A sender that stalls now and then: the last command is held, and the log does not tell."""
+
+    name = "held commands"
+
+    def __init__(self, longest):
+        self.longest = longest
+
+    @classmethod
+    def draw(cls, rng, cell):
+        return cls(int(rng.integers(15, 60)))
+
+    def sizes(self):
+        return {"longest_ms": self.longest}
+
+    def clip(self, share, rng):
+        self.rng, self.left, self.held = rng, 0, None
+
+    def command(self, q_d, dq_d):
+        if self.left <= 0:
+            self.held = q_d, dq_d
+            self.left = int(self.rng.integers(3, self.longest)) if self.rng.random() < 0.02 else 0
+        self.left -= 1
+        return self.held
+
+
+class Magnet(Outside):
+    """A magnet under the table pulls at an iron core in the box."""
+
+    name = "magnet"
+    acts = True
+
+    def __init__(self, force, place, reach):
+        self.force, self.place, self.reach = force, np.asarray(place), reach
+
+    @classmethod
+    def draw(cls, rng, cell):
+        weight = 9.81 * cell.box.mass
+        return cls(weight * rng.uniform(0.3, 1.0), MIDDLE[:2] + rng.uniform(-0.1, 0.1, 2), rng.uniform(0.05, 0.10))
+
+    def sizes(self):
+        return {"force_N": self.force, "place_m": rounded(self.place), "reach_m": self.reach}
+
+    def step(self, plant):
+        away = np.array([*(self.place - plant.data.xipos[plant.box][:2]), -self.reach])
+        distance = np.linalg.norm(away)
+        plant.push_box(self.force * (self.reach / distance) ** 3 * away / distance)
+
+
+class Wind(Outside):
+    """A fan blows over the table in gusts."""
+
+    name = "wind"
+    acts = True
+
+    def __init__(self, force, direction, gust, frequency):
+        self.force, self.direction, self.gust, self.frequency = force, direction, gust, frequency
+
+    @classmethod
+    def draw(cls, rng, cell):
+        holds = 9.81 * cell.box.mass * cell.box.friction
+        return cls(holds * rng.uniform(0.1, 0.3), rng.uniform(-np.pi, np.pi), rng.uniform(0.6, 1.0), rng.uniform(0.8, 2.5))
+
+    def sizes(self):
+        return {"force_N": self.force, "direction_rad": self.direction, "gust": self.gust, "frequency_Hz": self.frequency}
+
+    def clip(self, share, rng):
+        self.phase = rng.uniform(0, 2 * np.pi)
+
+    def step(self, plant):
+        blow = self.force * (1 + self.gust * np.sin(2 * np.pi * self.frequency * plant.clock + self.phase))
+        plant.push_box(blow * np.array([np.cos(self.direction), np.sin(self.direction), 0.0]))
+
+
+class DriftingFriction(Outside):
+    """A table that wears: its friction goes on changing from clip to clip."""
+
+    name = "drifting friction"
+
+    def __init__(self, change):
+        self.change = change
+
+    @classmethod
+    def draw(cls, rng, cell):
+        return cls(rng.choice([-1, 1]) * rng.uniform(0.25, 0.6))
+
+    def sizes(self):
+        return {"change_of_ln_mu": self.change}
+
+    def clip(self, share, rng):
+        self.factor = np.exp(self.change * (share - 0.5))
+
+    def build(self, build):
+        build.box.friction *= self.factor
+
+
+class SecondObject(Outside):
+    """A small block that nobody tracks stands in the way."""
+
+    name = "second object"
+
+    def __init__(self, mass, place):
+        self.mass, self.place = mass, np.asarray(place)
+
+    @classmethod
+    def draw(cls, rng, cell):
+        angle = rng.uniform(-np.pi, np.pi)
+        return cls(rng.uniform(0.08, 0.3), MIDDLE[:2] + rng.uniform(0.11, 0.13) * np.array([np.cos(angle), np.sin(angle)]))
+
+    def sizes(self):
+        return {"mass_kg": self.mass, "place_m": rounded(self.place)}
+
+    def build(self, build):
+        x, y = self.place
+        build.on_table.append(f'<body name="block" pos="{x:.9g} {y:.9g} 0.03"><freejoint/>'
+                              f'<geom name="block" type="box" size="0.02 0.03 0.03" mass="{self.mass:.9g}"/></body>')
+        time, ratio = build.engine.foot_time, build.engine.foot_ratio
+        for other, mu in (("table", 0.35), ("box", 0.3), ("tool", 0.3)):
+            build.pairs.append(contact(build, "block", other, (mu, mu), time, ratio))
+
+
+class NoddingTracker(Outside):
+    """The tracker's stand sways: its direction swings about the table's middle."""
+
+    name = "nodding tracker"
+
+    def __init__(self, angle, frequency, axis):
+        self.angle, self.frequency, self.axis = angle, frequency, np.asarray(axis)
+
+    @classmethod
+    def draw(cls, rng, cell):
+        axis = rng.normal(size=3) * [0.3, 0.3, 1.0]
+        return cls(rng.uniform(0.02, 0.08), rng.uniform(0.6, 2.0), axis / np.linalg.norm(axis))
+
+    def sizes(self):
+        return {"angle_rad": self.angle, "frequency_Hz": self.frequency, "axis": rounded(self.axis)}
+
+    def clip(self, share, rng):
+        self.phase = rng.uniform(0, 2 * np.pi)
+
+    def seen(self, t, place, turn):
+        swing = self.angle * np.sin(2 * np.pi * self.frequency * t + self.phase)
+        return turned(swing * self.axis, place, turn, MIDDLE + [0.1, 0.1, 0.0])
+
+
+OUTSIDE_ARM = [SloshingLoad, WarmingGears, Hose, HeldCommands]
+OUTSIDE_STROKES = [Magnet, Wind, DriftingFriction, SecondObject, NoddingTracker]

@@ -1,0 +1,81 @@
+"""Scores verdicts against what was hidden, and prints the table."""
+import math
+import statistics
+
+RIGHT = ("exact", "class", "right")
+COLUMNS = ("exact", "class", "part", "wrong", "none", "unexplained", "other")
+KEY = """exact: the very name, or names where two are hidden; where nothing is hidden `none`, and outside of the library `unexplained`
+class: a class that holds all that is hidden    part: names or a class that hold one of two    wrong: any name or class beside the truth
+other: not testable, or no answer    right: exact and class, with its 95 % interval (Wilson)"""
+
+
+def outcome(truth, verdict):
+    """Column of a verdict. `truth` as in truth.json, `verdict` as in the diagnosis."""
+    kind, said = verdict["kind"], set(verdict.get("effects", []))
+    hidden = set(truth["effects"]) if truth["known"] else set()
+    if kind in ("none", "unexplained"):
+        right = "none" if not truth["effects"] else "unexplained" if not truth["known"] else None
+        return "exact" if kind == right else kind
+    if kind not in ("named", "class"):
+        return "other"
+    if kind == "named" and hidden and said in (hidden, set(truth["blocks"])):
+        return "exact"
+    if kind == "class" and hidden and hidden <= said:
+        return "class"
+    if len(hidden) > 1 and (said < hidden if kind == "named" else said & hidden):
+        return "part"
+    return "wrong"
+
+
+def wilson(right, all_, z=1.96):
+    """95 % interval of a share."""
+    if all_ == 0:
+        return 0.0, 1.0
+    share = right / all_
+    middle = share + z * z / (2 * all_)
+    half = z * math.sqrt(share * (1 - share) / all_ + z * z / (4 * all_ * all_))
+    return (middle - half) / (1 + z * z / all_), (middle + half) / (1 + z * z / all_)
+
+
+def calibration_error(results, bins=5):
+    """Expected calibration error of the confidences given, or None."""
+    given = [(r["confidence"], r["outcome"] in RIGHT) for r in results if r["confidence"] is not None]
+    if not given:
+        return None
+    error = 0.0
+    for i in range(bins):
+        part = [(c, right) for c, right in given if min(int(c * bins), bins - 1) == i]
+        if part:
+            error += abs(sum(c for c, _ in part) - sum(right for _, right in part)) / len(given)
+    return error
+
+
+def row(name, results):
+    counts = {column: sum(r["outcome"] == column for r in results) for column in COLUMNS}
+    right = sum(r["outcome"] in RIGHT for r in results)
+    low, high = wilson(right, len(results))
+    shrinks = [r["shrink"] for r in results if r["shrink"] is not None]
+    seconds = [r["seconds"] for r in results]
+    cells = [f"{name:28s}", f"{len(results):4d}"] + [f"{counts[column]:5d}" for column in COLUMNS]
+    cells.append(f"{right / len(results):5.0%} [{low:4.0%}, {high:4.0%}]")
+    cells.append(f"{statistics.median(shrinks):6.2f}" if shrinks else "     -")
+    cells.append(f"{statistics.median(seconds):6.0f} {max(seconds):6.0f}")
+    return "  ".join(cells)
+
+
+def table(results):
+    """The whole table as text: per kind, per effect, in all."""
+    if not results:
+        return "no session was diagnosed yet\n"
+    head = "  ".join([f"{'':28s}", "  n "] + [f"{column[:5]:>5s}" for column in COLUMNS] + [f"{'right':18s}", "shrink", "median  worst s"])
+    lines = [head]
+    for kind in dict.fromkeys(r["kind"] for r in results):
+        lines.append(row(kind, [r for r in results if r["kind"] == kind]))
+    lines.append(row("all", results))
+    lines.append("")
+    for hidden in sorted({"+".join(r["truth"]) or "nothing" for r in results}):
+        lines.append(row(hidden[:28], [r for r in results if ("+".join(r["truth"]) or "nothing") == hidden]))
+    error = calibration_error(results)
+    lines += ["", "expected calibration error of the confidence: " + ("-" if error is None else f"{error:.3f}"), "", KEY, ""]
+    lines += [f"{r['session']:24s} {'+'.join(r['truth']) or 'nothing':44s} {r['outcome']:12s} said {r['said']}" for r in results]
+    return "\n".join(lines) + "\n"
