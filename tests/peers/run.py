@@ -15,7 +15,7 @@ import verdicts
 from mujoco_cell import session, world
 from program import Failed, answer, ending_by_signals, note
 
-SHORT = 12
+SHORT = 20
 EPILOG = """
 Each session lies in FOLDER/NUMBER_KIND: session/ is what a laboratory has, truth.json what is hidden, diagnosis.json the answer,
 result.json the score. All are written whole or not at all: after Ctrl-C or a kill the same command goes on where it was, inside
@@ -80,6 +80,15 @@ def read(path):
         return json.load(stream)
 
 
+def same_draw(given):
+    """Whether the folder holds sessions of this draw, or none yet."""
+    path = os.path.join(given.out, "draw.json")
+    draw = {"seed": given.seed, "kinds": given.kinds, "effect": given.effect}
+    if not os.path.exists(path):
+        whole(path, json.dumps(draw, indent=1) + "\n")
+    return read(path) == draw
+
+
 def which(given, kind, turn):
     """The effect of a kind's session number `turn`: all in an order drawn by lot, then again."""
     if given.effect is not None:
@@ -137,6 +146,9 @@ def main():
     given = arguments()
     ending_by_signals()
     os.makedirs(given.out, exist_ok=True)
+    if not same_draw(given):
+        note(f"{given.out} holds sessions of another --seed, --kinds or --effect; give another --out")
+        sys.exit(1)
     results, began = [], time.monotonic()
     try:
         for number in range(given.sessions):

@@ -2,10 +2,11 @@
 import math
 import statistics
 
-RIGHT = ("exact", "class", "right")
-COLUMNS = ("exact", "class", "part", "wrong", "none", "unexplained", "other")
+RIGHT = ("exact", "class")
+COLUMNS = ("exact", "class", "part", "wrong", "beside", "none", "unexplained", "other")
 KEY = """exact: the very name, or names where two are hidden; where nothing is hidden `none`, and outside of the library `unexplained`
-class: a class that holds all that is hidden    part: names or a class that hold one of two    wrong: any name or class beside the truth
+class: a class that holds all that is hidden    part: names or a class that hold one of two    wrong: another name, said as named
+beside: a class without what is hidden    none, unexplained: said where that is not so
 other: not testable, or no answer    right: exact and class, with its 95 % interval (Wilson)"""
 
 
@@ -24,7 +25,7 @@ def outcome(truth, verdict):
         return "class"
     if len(hidden) > 1 and (said < hidden if kind == "named" else said & hidden):
         return "part"
-    return "wrong"
+    return "wrong" if kind == "named" else "beside"
 
 
 def wilson(right, all_, z=1.96):
@@ -56,7 +57,7 @@ def row(name, results):
     low, high = wilson(right, len(results))
     shrinks = [r["shrink"] for r in results if r["shrink"] is not None]
     seconds = [r["seconds"] for r in results]
-    cells = [f"{name:28s}", f"{len(results):4d}"] + [f"{counts[column]:5d}" for column in COLUMNS]
+    cells = [f"{name:28s}", f"{len(results):4d}"] + [f"{counts[column]:6d}" for column in COLUMNS]
     cells.append(f"{right / len(results):5.0%} [{low:4.0%}, {high:4.0%}]")
     cells.append(f"{statistics.median(shrinks):6.2f}" if shrinks else "     -")
     cells.append(f"{statistics.median(seconds):6.0f} {max(seconds):6.0f}")
@@ -67,7 +68,7 @@ def table(results):
     """The whole table as text: per kind, per effect, in all."""
     if not results:
         return "no session was diagnosed yet\n"
-    head = "  ".join([f"{'':28s}", "  n "] + [f"{column[:5]:>5s}" for column in COLUMNS] + [f"{'right':18s}", "shrink", "median  worst s"])
+    head = "  ".join([f"{'':28s}", "  n "] + [f"{column[:6]:>6s}" for column in COLUMNS] + [f"{'right':18s}", "shrink", "median  worst s"])
     lines = [head]
     for kind in dict.fromkeys(r["kind"] for r in results):
         lines.append(row(kind, [r for r in results if r["kind"] == kind]))

@@ -180,6 +180,16 @@ def compiled(build):
     return mujoco.MjModel.from_xml_string(mjcf(build))
 
 
-def nominal(tool, engine=None):
+def nominal(tool):
     """The arm with its tool as the laboratory knows it, alone: what the controller compensates."""
-    return compiled(Build(engine or Engine(), tool))
+    return compiled(Build(Engine(), tool))
+
+
+def leaning(tilt):
+    """Gravity in the axes of something that is turned by `tilt` about x and y [m/s^2]."""
+    angle = np.hypot(*tilt)
+    if angle == 0:
+        return np.array([0.0, 0.0, -GRAVITY])
+    axis = np.array([tilt[0], tilt[1], 0.0]) / angle
+    down = np.array([0.0, 0.0, -GRAVITY])
+    return down * np.cos(angle) - np.cross(axis, down) * np.sin(angle)

@@ -3,7 +3,7 @@ import numpy as np
 
 from . import fr3
 from .camera_effects import turned
-from .effect import Effect, log_uniform, rounded
+from .effect import Effect, rounded
 from .model import MIDDLE, contact
 
 

@@ -11,8 +11,8 @@ import shutil
 import numpy as np
 
 from . import bag, laboratory, model
-from .arm_effects import TICK
 from .camera_effects import turned
+from .control_effects import TICK
 from .plant import Plant
 from .strokes import Planner, Refused, draw
 from .world import motion

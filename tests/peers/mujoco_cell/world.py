@@ -7,22 +7,24 @@ from dataclasses import dataclass
 import numpy as np
 
 from . import fr3, model
-from .arm_effects import ARM, JointEncoderOffset
 from .camera_effects import CAMERA
+from .control_effects import CONTROL, JointEncoderOffset
 from .controller import Controller
 from .excitation import multisine
-from .object_effects import HIT, SLIDE
+from .hit_effects import HIT
+from .joint_effects import JOINT
 from .outside import OUTSIDE_ARM, OUTSIDE_STROKES
+from .slide_effects import SLIDE
 
 # What a kind of session hides, and whether there is a box.
 KINDS = {
     "none-arm": (False, []),
     "none-strokes": (True, []),
-    "arm": (False, ARM),
+    "arm": (False, CONTROL + JOINT),
     "hit": (True, HIT),
     "slide": (True, SLIDE),
     "camera": (True, CAMERA),
-    "pair-arm": (False, ARM),
+    "pair-arm": (False, CONTROL + JOINT),
     "pair-strokes": (True, HIT + SLIDE + CAMERA + [JointEncoderOffset]),
     "outside-arm": (False, OUTSIDE_ARM),
     "outside-strokes": (True, OUTSIDE_STROKES),

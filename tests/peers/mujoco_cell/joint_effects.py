@@ -1,0 +1,266 @@
+"""Effects in the joints and on the arm's bodies: frictions, gears that yield, loads, a base that leans."""
+import numpy as np
+
+from . import fr3
+from .effect import Effect, block, log_uniform, rounded, sign
+from .model import Gear, leaning
+
+
+class JointCoulombFriction(Effect):
+    """The engine's own dry friction."""
+
+    name = "joint_coulomb_friction"
+
+    def __init__(self, coulomb):
+        self.coulomb = np.asarray(coulomb)
+
+    @classmethod
+    def draw(cls, rng, cell):
+        return cls(fr3.by_size(log_uniform(rng, 0.8, 0.9)) * rng.uniform(0.7, 1.3, fr3.DOF))
+
+    def sizes(self):
+        return {"coulomb_N_m": rounded(self.coulomb)}
+
+    def blocks(self):
+        return [block(self.name, coulomb=rounded(self.coulomb))]
+
+    def build(self, build):
+        build.coulomb = build.coulomb + self.coulomb
+
+
+class JointViscousFriction(Effect):
+    name = "joint_viscous_friction"
+
+    def __init__(self, viscous):
+        self.viscous = np.asarray(viscous)
+
+    @classmethod
+    def draw(cls, rng, cell):
+        return cls(fr3.by_size(log_uniform(rng, 1.5, 3.0)) * rng.uniform(0.7, 1.3, fr3.DOF))
+
+    def sizes(self):
+        return {"viscous_N_m_s_per_rad": rounded(self.viscous)}
+
+    def blocks(self):
+        return [block(self.name, viscous=rounded(self.viscous))]
+
+    def build(self, build):
+        build.viscous = build.viscous + self.viscous
+
+
+class JointStribeckFriction(Effect):
+    name = "joint_stribeck_friction"
+    acts = True
+
+    def __init__(self, coulomb, excess, velocity):
+        self.coulomb, self.excess, self.velocity = np.asarray(coulomb), np.asarray(excess), velocity
+
+    @classmethod
+    def draw(cls, rng, cell):
+        coulomb = fr3.by_size(log_uniform(rng, 0.6, 0.7))
+        return cls(coulomb, coulomb * rng.uniform(0.5, 1.0), rng.uniform(0.03, 0.12))
+
+    def sizes(self):
+        return {"coulomb_N_m": rounded(self.coulomb), "excess_N_m": rounded(self.excess), "velocity_rad_per_s": self.velocity}
+
+    def blocks(self):
+        return [block(self.name, coulomb=rounded(self.coulomb), excess=rounded(self.excess), velocity=self.velocity)]
+
+    def build(self, build):
+        # Present from the start, so that the engine makes room for it.
+        build.coulomb = build.coulomb + self.coulomb
+
+    def step(self, plant):
+        ratio = plant.data.qvel[plant.motor] / self.velocity
+        plant.model.dof_frictionloss[plant.motor] = self.coulomb + self.excess * np.exp(-ratio * ratio)
+
+
+class JointLoadFriction(Effect):
+    name = "joint_load_friction"
+    acts = True
+
+    def __init__(self, coefficient):
+        self.coefficient = coefficient
+
+    @classmethod
+    def draw(cls, rng, cell):
+        return cls(log_uniform(rng, 0.05, 0.08))
+
+    def sizes(self):
+        return {"coefficient": self.coefficient}
+
+    def blocks(self):
+        return [block(self.name, coefficient=self.coefficient)]
+
+    def build(self, build):
+        build.coulomb = build.coulomb + 1e-3
+
+    def step(self, plant):
+        plant.model.dof_frictionloss[plant.motor] = self.coefficient * np.abs(plant.asked) + 1e-9
+
+
+class JointFrictionAsymmetry(Effect):
+    name = "joint_friction_asymmetry"
+    acts = True
+
+    def __init__(self, offset):
+        self.offset = np.asarray(offset)
+
+    @classmethod
+    def draw(cls, rng, cell):
+        return cls(fr3.by_size(log_uniform(rng, 0.2, 0.3)) * rng.choice([-1, 1], fr3.DOF))
+
+    def sizes(self):
+        return {"offset_N_m": rounded(self.offset)}
+
+    def blocks(self):
+        return [block(self.name, offset=rounded(self.offset))]
+
+    def step(self, plant):
+        plant.lost += self.offset
+
+
+class TorqueRipple(Effect):
+    name = "torque_ripple"
+    acts = True
+
+    def __init__(self, amplitude, order, phase):
+        self.amplitude, self.order, self.phase = np.asarray(amplitude), order, np.asarray(phase)
+
+    @classmethod
+    def draw(cls, rng, cell):
+        return cls(fr3.by_size(log_uniform(rng, 0.2, 0.2)), float(rng.choice([20, 30, 50, 100, 160])), rng.uniform(-3, 3, fr3.DOF))
+
+    def sizes(self):
+        return {"amplitude_N_m": rounded(self.amplitude), "order": self.order, "phase_rad": rounded(self.phase)}
+
+    def blocks(self):
+        return [block(self.name, amplitude=rounded(self.amplitude), order=self.order, phase=rounded(self.phase))]
+
+    def step(self, plant):
+        plant.lost += self.amplitude * np.sin(self.order * plant.data.qpos[plant.position] + self.phase)
+
+
+class JointElasticity(Effect):
+    name = "joint_elasticity"
+
+    def __init__(self, stiffness, damping):
+        self.stiffness, self.damping = np.asarray(stiffness), damping
+
+    @classmethod
+    def draw(cls, rng, cell):
+        yields = log_uniform(rng, 1 / 6000, 1 / 3500)  # [rad/(N m)]
+        return cls(fr3.STIFFNESS / fr3.STIFFNESS.max() / yields * np.array([1, 1, 1, 1, 1.44, 1.6, 3.0]), rng.uniform(1, 4))
+
+    def sizes(self):
+        return {"stiffness_N_m_per_rad": rounded(self.stiffness), "damping_N_m_s_per_rad": self.damping}
+
+    def blocks(self):
+        return [block(self.name, stiffness=rounded(self.stiffness), damping=self.damping)]
+
+    def build(self, build):
+        for joint in range(fr3.DOF):
+            build.gears[joint] = Gear(stiffness=self.stiffness[joint], damping=self.damping)
+
+    def begin(self, plant, q):
+        load_springs(plant, q)
+
+
+class JointBacklash(Effect):
+    """Play in one to three joints."""
+
+    name = "joint_backlash"
+
+    def __init__(self, play):
+        self.play = np.asarray(play)
+
+    @classmethod
+    def draw(cls, rng, cell):
+        worn = np.zeros(fr3.DOF)
+        worn[rng.choice(6, rng.integers(1, 4), replace=False)] = log_uniform(rng, 0.002, 0.003)
+        return cls(worn)
+
+    def sizes(self):
+        return {"play_rad": rounded(self.play)}
+
+    def blocks(self):
+        return [block(self.name, play=rounded(self.play))]
+
+    def build(self, build):
+        for joint in np.flatnonzero(self.play):
+            build.gears[int(joint)] = Gear(play=self.play[joint], damping=0.01)
+
+
+def load_springs(plant, q):
+    """Lets each spring carry the weight that rests on it."""
+    _, gravity = plant.controller.torque(q, np.zeros(fr3.DOF), q, np.zeros(fr3.DOF))
+    for joint, gear in plant.build.gears.items():
+        if gear.stiffness > 0:
+            plant.data.joint(f"gear{joint}").qpos[0] = -gravity[joint] / gear.stiffness
+
+
+class RotorInertia(Effect):
+    name = "rotor_inertia"
+
+    def __init__(self, extra):
+        self.extra = np.asarray(extra)
+
+    @classmethod
+    def draw(cls, rng, cell):
+        size = sign(rng) * log_uniform(rng, 0.05, 0.1)
+        return cls(np.maximum(size * fr3.ROTOR / fr3.ROTOR.max(), -0.6 * fr3.ROTOR))
+
+    def sizes(self):
+        return {"extra_kg_m2": rounded(self.extra)}
+
+    def blocks(self):
+        return [block(self.name, extra=rounded(self.extra))]
+
+    def build(self, build):
+        build.rotor = build.rotor + self.extra
+
+
+class Payload(Effect):
+    name = "payload"
+
+    def __init__(self, mass, centre):
+        self.mass, self.centre = mass, np.asarray(centre)
+
+    @classmethod
+    def draw(cls, rng, cell):
+        return cls(log_uniform(rng, 0.3, 0.5), rng.uniform([-0.03, -0.03, 0.0], [0.03, 0.03, 0.08]))
+
+    def sizes(self):
+        return {"mass_kg": self.mass, "centre_m": rounded(self.centre)}
+
+    def blocks(self):
+        return [block(self.name, mass=self.mass, centre=rounded(self.centre))]
+
+    def build(self, build):
+        centre = " ".join(f"{x:.9g}" for x in self.centre)
+        build.at_flange.append(f'<body name="load" pos="{centre}"><inertial mass="{self.mass:.9g}" pos="0 0 0" diaginertia="1e-9 1e-9 1e-9"/></body>')
+
+
+class BaseTilt(Effect):
+    name = "base_tilt"
+
+    def __init__(self, tilt):
+        self.tilt = np.asarray(tilt)
+
+    @classmethod
+    def draw(cls, rng, cell):
+        size, angle = log_uniform(rng, 0.01, 0.03), rng.uniform(0, 2 * np.pi)
+        return cls(size * np.array([np.cos(angle), np.sin(angle)]))
+
+    def sizes(self):
+        return {"tilt_rad": rounded(self.tilt)}
+
+    def blocks(self):
+        return [block(self.name, tilt=rounded(self.tilt))]
+
+    def build(self, build):
+        build.gravity = leaning(self.tilt)
+
+
+JOINT = [JointCoulombFriction, JointViscousFriction, JointStribeckFriction, JointLoadFriction, JointFrictionAsymmetry,
+         TorqueRipple, JointElasticity, JointBacklash, RotorInertia, Payload, BaseTilt]
