@@ -176,6 +176,22 @@ class DriftingFriction(Outside):
         build.box.friction *= self.factor
 
 
+class FrictionPyramid(Outside):
+    """A table that holds least along its diagonals: |f_x| + |f_y| <= mu f_n, as engines with a pyramid for a cone have it."""
+
+    name = "friction pyramid"
+
+    @classmethod
+    def draw(cls, rng, cell):
+        return cls()
+
+    def sizes(self):
+        return {"friction_along_diagonals": np.sqrt(0.5)}
+
+    def build(self, build):
+        build.engine.cone = "pyramidal"
+
+
 class SecondObject(Outside):
     """A small block that nobody tracks stands in the way."""
 
@@ -226,4 +242,4 @@ class NoddingTracker(Outside):
 
 
 OUTSIDE_ARM = [SloshingLoad, WarmingGears, Hose, HeldCommands]
-OUTSIDE_STROKES = [Magnet, Wind, DriftingFriction, SecondObject, NoddingTracker]
+OUTSIDE_STROKES = [Magnet, Wind, DriftingFriction, FrictionPyramid, SecondObject, NoddingTracker]

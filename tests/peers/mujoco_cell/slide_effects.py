@@ -108,8 +108,6 @@ class AnisotropicFriction(Effect):
         return [block(self.name, size=self.size, axis=1.570796 if self.along_y else 0.0)]
 
     def build(self, build):
-        # An L1 cone has no axes of its own choice.
-        build.engine.cone = "elliptic"
         factors = np.array([1 + self.size, 1 - self.size])
         build.foot_friction = build.foot_friction * (factors[::-1] if self.along_y else factors)
 
