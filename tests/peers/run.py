@@ -149,18 +149,22 @@ def main():
     if not same_draw(given):
         note(f"{given.out} holds sessions of another --seed, --kinds or --effect; give another --out")
         sys.exit(1)
-    results, began = [], time.monotonic()
+    results, times = [], []
     try:
         for number in range(given.sessions):
+            began = time.monotonic()
             folder = recorded(given, number)
-            if folder is not None and given.program is not None:
+            if folder is None:
+                continue
+            done = f"{number + 1}/{given.sessions} {folder}"
+            if given.program is not None:
                 results.append(diagnosed(given, folder))
                 last = results[-1]
-                left = (time.monotonic() - began) / (number + 1) * (given.sessions - number - 1)
-                note(f"{number + 1}/{given.sessions} {last['session']}: {'+'.join(last['truth']) or 'nothing'}: {last['outcome']}, "
-                     f"said {last['said']}; {last['seconds']:.0f} s, about {left / 60:.0f} min left")
-            elif folder is not None:
-                note(f"{number + 1}/{given.sessions} {folder}")
+                done += f": {'+'.join(last['truth']) or 'nothing'}: {last['outcome']}, said {last['said']}; {last['seconds']:.0f} s"
+            times.append(time.monotonic() - began)
+            # One that was there already takes no time.
+            fresh = [took for took in times if took > 1.0]
+            note(f"{done}; about {sum(fresh) / max(1, len(fresh)) * (given.sessions - number - 1) / 60:.0f} min left")
     except KeyboardInterrupt:
         note("interrupted; the same command goes on from here")
         if results:
