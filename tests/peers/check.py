@@ -17,20 +17,22 @@ from program import Failed, answer, ending_by_signals, note
 def arguments():
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter,
-        epilog="Joints: mean over joints 1 to 6 of the root mean square, in microrad; box: mean and median ADD in mm. Six minutes for all on one core.")
+        epilog="Joints: mean over joints 1 to 6 of the root mean square, in microrad; box: mean and median ADD in mm. Nine minutes for\n"
+               "all on one core.")
     parser.add_argument("--program", required=True, metavar="TWIN", help="the built `twin`")
     parser.add_argument("--only", default="", metavar="A,B", help="only these effects, or `nothing` [default: all]")
+    parser.add_argument("--kinds", default="", metavar="A,B", help="only these kinds of sessions, as in run.py [default: all]")
     parser.add_argument("--seed", type=int, default=1, metavar="S")
     parser.add_argument("--clips", type=int, default=4, metavar="N", help="of each session [default: 4]")
     return parser.parse_args()
 
 
-def cases(only):
+def cases(only, kinds):
     """Kind and place in its list of everything that is checked."""
     found = [("none-arm", None, "nothing"), ("none-strokes", None, "nothing")]
-    for kind in ("arm", "hit", "slide", "camera"):
+    for kind in ("arm", "hit", "slide", "camera", "arm-strokes"):
         found += [(kind, i, effect.name) for i, effect in enumerate(world.KINDS[kind][1])]
-    return [case for case in found if not only or case[2] in only]
+    return [case for case in found if (not only or case[2] in only) and (not kinds or case[0] in kinds)]
 
 
 def left(program, folder, text):
@@ -47,8 +49,8 @@ def left(program, folder, text):
 def main():
     given = arguments()
     ending_by_signals()
-    print(f"{'hidden':30s} {'without: joints':>15s} {'box':>11s} {'with: joints':>15s} {'box':>10s}   size")
-    for kind, which, name in cases(given.only.split(",") if given.only else []):
+    print(f"{'kind':12s} {'hidden':27s} {'without: joints':>15s} {'box':>11s} {'with: joints':>15s} {'box':>10s}   size")
+    for kind, which, name in cases(given.only.split(",") if given.only else [], given.kinds.split(",") if given.kinds else []):
         with tempfile.TemporaryDirectory() as place:
             folder, drawn = os.path.join(place, "one"), world.draw(given.seed, 0, kind, which)
             try:
@@ -58,7 +60,7 @@ def main():
                 note(f"{name}: {error}")
                 continue
             sizes = "; ".join(f"{key} {value}" for effect in drawn.effects for key, value in effect.sizes().items())
-            print(f"{name:30s} {without:>27s} {with_:>27s}   {sizes[:90]}", flush=True)
+            print(f"{kind:12s} {name:27s} {without:>27s} {with_:>27s}   {sizes[:90]}", flush=True)
 
 
 if __name__ == "__main__":

@@ -15,7 +15,8 @@ import verdicts
 from mujoco_cell import session, world
 from program import Failed, answer, ending_by_signals, note
 
-SHORT = 20
+SHORT = 22
+SINGLE = ("arm", "hit", "slide", "camera", "arm-strokes")
 EPILOG = """
 Each session lies in FOLDER/NUMBER_KIND: session/ is what a laboratory has, truth.json what is hidden, diagnosis.json the answer,
 result.json the score. All are written whole or not at all: after Ctrl-C or a kill the same command goes on where it was, inside
@@ -25,6 +26,7 @@ kinds, in turn until there are so many sessions:
   none-arm, none-strokes        nothing is hidden; in half of the strokes friction scatters twice as much as cell.toml says
   arm, hit, slide, camera       one effect of the diagnosis's own list, each in turn, from a tenth of its usual size to three times
                                 the largest plausible one
+  arm-strokes                   one effect on the arm, seen in strokes
   pair-arm, pair-strokes        two of them
   outside-arm, outside-strokes  something that the list lacks: a sloshing load, a magnet, wind, a second object, ...
 
@@ -51,9 +53,10 @@ def arguments():
         if kind not in world.KINDS:
             parser.error(f"no kind is called `{kind}`; there are {', '.join(world.KINDS)}")
     if given.effect is not None:
-        given.kinds = [kind for kind in ("arm", "hit", "slide", "camera") if given.effect in names(kind)]
+        given.kinds = [kind for kind in SINGLE if given.effect in names(kind)][:1]
         if not given.kinds:
-            parser.error(f"no effect is called `{given.effect}`; there are {', '.join(n for kind in ('arm', 'hit', 'slide', 'camera') for n in names(kind))}")
+            known = ", ".join(name for kind in SINGLE for name in names(kind))
+            parser.error(f"no effect is called `{given.effect}`; there are {known}")
     if given.program is not None and not os.access(given.program, os.X_OK):
         parser.error(f"{given.program} is no program; build it with `cargo build --release`")
     if given.short:

@@ -238,11 +238,13 @@ class Payload(Effect):
 
     def build(self, build):
         centre = " ".join(f"{x:.9g}" for x in self.centre)
-        build.at_flange.append(f'<body name="load" pos="{centre}"><inertial mass="{self.mass:.9g}" pos="0 0 0" diaginertia="1e-9 1e-9 1e-9"/></body>')
+        inertial = f'<inertial mass="{self.mass:.9g}" pos="0 0 0" diaginertia="1e-9 1e-9 1e-9"/>'
+        build.at_flange.append(f'<body name="load" pos="{centre}">{inertial}</body>')
 
 
 class BaseTilt(Effect):
     name = "base_tilt"
+    acts = True
 
     def __init__(self, tilt):
         self.tilt = np.asarray(tilt)
@@ -260,6 +262,11 @@ class BaseTilt(Effect):
 
     def build(self, build):
         build.gravity = leaning(self.tilt)
+
+    def step(self, plant):
+        # The box stands on a level table.
+        if plant.box is not None:
+            plant.push_box(plant.build.box.mass * (leaning((0, 0)) - plant.build.gravity))
 
 
 JOINT = [JointCoulombFriction, JointViscousFriction, JointStribeckFriction, JointLoadFriction, JointFrictionAsymmetry,

@@ -85,7 +85,7 @@ class Build:
     viscous: np.ndarray = field(default_factory=lambda: np.zeros(fr3.DOF))
     coulomb: np.ndarray = field(default_factory=lambda: np.zeros(fr3.DOF))
     gears: dict = field(default_factory=dict)  # joint -> Gear
-    gravity: np.ndarray = field(default_factory=lambda: np.array([0.0, 0.0, -GRAVITY]))
+    gravity: np.ndarray = field(default_factory=lambda: np.array([0.0, 0.0, -GRAVITY]))  # on the arm
     tool_offset: np.ndarray = field(default_factory=lambda: np.zeros(3))
     at_flange: list = field(default_factory=list)  # more MJCF inside of the flange
     on_table: list = field(default_factory=list)  # more bodies

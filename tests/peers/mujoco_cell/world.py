@@ -1,6 +1,7 @@
 """Draws a world: how the cell really is. A world is a pure function of seed, number and kind.
 
-True gains lie within 20 % of the nominal ones, the object well inside of the ranges that the laboratory knows. In every other world friction scatters from clip to clip twice as much as cell.toml says.
+True gains lie within 20 % of the nominal ones, the object well inside of the ranges that the laboratory knows. In half of the
+worlds friction scatters from clip to clip twice as much as cell.toml says.
 """
 from dataclasses import dataclass
 
@@ -8,11 +9,11 @@ import numpy as np
 
 from . import fr3, model
 from .camera_effects import CAMERA
-from .control_effects import CONTROL, JointEncoderOffset
+from .control_effects import CONTROL, CommandDelay, CommandLag, JointEncoderOffset, TorqueDelay, TorqueGain
 from .controller import Controller
 from .excitation import multisine
 from .hit_effects import HIT
-from .joint_effects import JOINT
+from .joint_effects import JOINT, JointCoulombFriction
 from .outside import OUTSIDE_ARM, OUTSIDE_STROKES
 from .slide_effects import SLIDE
 
@@ -25,9 +26,10 @@ KINDS = {
     "slide": (True, SLIDE),
     "camera": (True, CAMERA),
     "pair-arm": (False, CONTROL + JOINT),
-    "pair-strokes": (True, HIT + SLIDE + CAMERA + [JointEncoderOffset]),
+    "pair-strokes": (True, HIT + SLIDE + CAMERA + [CommandDelay, JointCoulombFriction, JointEncoderOffset]),
     "outside-arm": (False, OUTSIDE_ARM),
     "outside-strokes": (True, OUTSIDE_STROKES),
+    "arm-strokes": (True, [CommandDelay, CommandLag, TorqueDelay, TorqueGain, JointEncoderOffset, *JOINT]),
 }
 
 DECLARED_SCATTER = 0.02
