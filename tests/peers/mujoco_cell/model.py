@@ -148,7 +148,7 @@ def contact(build, one, other, friction, time, ratio, torsion=0.0):
     along, across = friction
     low = build.engine.impedance
     condim = 4 if torsion > 0 else 3
-    return (f'<pair geom1="{one}" geom2="{other}" condim="{condim}" friction="{along:.9g} {across:.9g} {max(torsion, 1e-6):.9g} 1e-6 1e-6" '
+    return (f'<pair name="{one}-{other}" geom1="{one}" geom2="{other}" condim="{condim}" friction="{along:.9g} {across:.9g} {max(torsion, 1e-6):.9g} 1e-6 1e-6" '
             f'solref="{time:.9g} {ratio:.9g}" solimp="{low} {min(0.999, low + 0.015)} 0.0005"/>')
 
 

@@ -46,8 +46,7 @@ class Plant:
             self.box_at, self.box_dof = self.model.jnt_qposadr[joint], self.model.jnt_dofadr[joint]
             feet = [name(mujoco.mjtObj.mjOBJ_GEOM, f"foot{i}") for i in range(4)]
             self.feet = np.array([self.model.geom_pos[foot] for foot in feet])
-            self.foot_pairs = [int(np.flatnonzero(self.model.pair_geom1 == foot)[0]) if (self.model.pair_geom1 == foot).any()
-                               else int(np.flatnonzero(self.model.pair_geom2 == foot)[0]) for foot in feet]
+            self.foot_pairs = [name(mujoco.mjtObj.mjOBJ_PAIR, f"foot{i}-table") for i in range(4)]
             self.tool, self.body_of_box = (name(mujoco.mjtObj.mjOBJ_GEOM, text) for text in ("tool", "box"))
         self.clock = 0.0  # since the first recorded row [s]
         self.asked = np.zeros(fr3.DOF)  # of the motors [N m]

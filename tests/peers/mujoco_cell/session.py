@@ -28,7 +28,7 @@ class Unusable(Exception):
     """A world that gives no session."""
 
 
-def record(world, folder, whole=None, progress=lambda done, whole: None):
+def record(world, folder, whole=None):
     """Writes the session of `world`, of `whole` clips, into `folder`, which must not be there."""
     whole = whole or (STROKES if world.box is not None else ARM_CLIPS)
     nominal = model.nominal(world.tool)
@@ -42,7 +42,6 @@ def record(world, folder, whole=None, progress=lambda done, whole: None):
             clips.append(f"clip_{index:02d}.mcap")
             with open(os.path.join(unfinished, "session", clips[-1]), "wb") as stream:
                 bag.write(stream, *reported(world, trace, commands, world.rng(300 + index)))
-            progress(index + 1, whole)
         texts = {"session/cell.toml": laboratory.cell_toml(world, clips), "truth.json": truth(world), "truth.toml": theta(world)}
         for name, text in texts.items():
             with open(os.path.join(unfinished, name), "w") as stream:
