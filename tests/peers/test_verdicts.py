@@ -46,6 +46,9 @@ class Scores(unittest.TestCase):
         self.assertEqual(scored(hidden, "unexplained"), "exact")
         self.assertEqual(scored(hidden, "none"), "none")
         self.assertEqual(scored(hidden, "named", "table_tilt"), "wrong")
+        vessel = truth("sloshing load", known=False, blocks=[]) | {"near": ["payload"]}
+        self.assertEqual(scored(vessel, "named", "payload"), "part")
+        self.assertEqual(scored(vessel, "named", "payload", "table_tilt"), "wrong")
 
     def test_wilson_interval_of_eight_in_ten(self):
         low, high = wilson(8, 10)

@@ -5,7 +5,7 @@ import statistics
 RIGHT = ("exact", "class")
 COLUMNS = ("exact", "class", "part", "wrong", "beside", "none", "unexplained", "other")
 KEY = """exact: the very name, or names where two are hidden; where nothing is hidden `none`, and outside of the library `unexplained`
-class: a class that holds all that is hidden    part: names or a class that hold one of two    wrong: another name, said as named
+class: a class that holds all that is hidden    part: names or a class that hold one of two, or a known effect that is in an unknown one    wrong: another name, said as named
 beside: a class without what is hidden    none, unexplained: said where that is not so
 other: not testable, or no answer    right: exact and class, with its 95 % interval (Wilson)"""
 
@@ -23,6 +23,8 @@ def outcome(truth, verdict):
         return "exact"
     if kind == "class" and hidden and hidden <= said:
         return "class"
+    if kind == "named" and said and said <= set(truth.get("near", [])):
+        return "part"
     if len(hidden) > 1 and (said < hidden if kind == "named" else said & hidden):
         return "part"
     return "wrong" if kind == "named" else "beside"

@@ -8,6 +8,7 @@ import numpy as np
 class Effect:
     name = ""
     known = True
+    near = ()  # of what the diagnosis does not know: the effects that are a part of it
     acts = False  # whether `step` does something
 
     @classmethod

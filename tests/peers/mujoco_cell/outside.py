@@ -15,6 +15,7 @@ class SloshingLoad(Outside):
     """A vessel at the flange whose contents swing as a pendulum."""
 
     name = "sloshing load"
+    near = ("payload",)
 
     def __init__(self, mass, length, damping):
         self.mass, self.length, self.damping = mass, length, damping
@@ -37,6 +38,7 @@ class WarmingGears(Outside):
     """Viscous friction that falls from clip to clip as the grease warms up."""
 
     name = "warming gears"
+    near = ("joint_viscous_friction",)
     acts = True
 
     def __init__(self, cold):

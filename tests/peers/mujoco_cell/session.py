@@ -146,6 +146,7 @@ def truth(world):
         "effects": [effect.name for effect in world.effects],
         "blocks": [block["name"] for block in blocks(world)],
         "known": all(effect.known for effect in world.effects),
+        "near": [name for effect in world.effects for name in effect.near],
         "hidden": {effect.name: {key: round(value, 9) if isinstance(value, float) else value for key, value in effect.sizes().items()}
                    for effect in world.effects},
         "gains": {"stiffness_N_m_per_rad": laboratory.plain(world.gains[0]), "damping_N_m_s_per_rad": laboratory.plain(world.gains[1])},
