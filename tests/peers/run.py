@@ -130,10 +130,12 @@ def diagnosed(given, folder):
     except Failed as error:
         note(f"{folder}: {error}")
         found, verdict = {}, {"kind": "failed", "effects": []}
-    shrink = ((found.get("gap") or {}).get("shrink") or {}).get("value")
+    gap = found.get("gap") or {}
+    before, floor = gap.get("before"), gap.get("floor")
     result = {
         "session": os.path.basename(folder), "kind": truth["kind"], "truth": truth["effects"], "outcome": verdicts.outcome(truth, verdict),
-        "said": " ".join([verdict["kind"], *verdict["effects"]]), "confidence": verdict.get("confidence"), "shrink": shrink,
+        "said": " ".join([verdict["kind"], *verdict["effects"]]), "confidence": verdict.get("confidence"),
+        "shrink": (gap.get("shrink") or {}).get("value"), "gap": before / floor if before is not None and floor else None,
         "seconds": found.get("seconds", time.monotonic() - began)}
     whole(path, json.dumps(result, indent=1) + "\n")
     return result

@@ -5,9 +5,10 @@ import statistics
 RIGHT = ("exact", "class")
 COLUMNS = ("exact", "class", "part", "wrong", "beside", "none", "unexplained", "other")
 KEY = """exact: the very name, or names where two are hidden; where nothing is hidden `none`, and outside of the library `unexplained`
-class: a class that holds all that is hidden    part: names or a class that hold one of two, or a known effect that is in an unknown one    wrong: another name, said as named
-beside: a class without what is hidden    none, unexplained: said where that is not so
-other: not testable, or no answer    right: exact and class, with its 95 % interval (Wilson)"""
+class: a class that holds all that is hidden    part: names or a class that hold one of two, or a known effect that is in an unknown one
+wrong: another name, said as named    beside: a class without what is hidden    none, unexplained: said where that is not so
+other: not testable, or no answer    right: exact and class, with its 95 % interval (Wilson)
+x noise: mean squared residual on held-out clips over what noise alone leaves, before any effect: near 1 there is nothing to find"""
 
 
 def outcome(truth, verdict):
@@ -78,7 +79,10 @@ def table(results):
     lines.append("")
     for hidden in sorted({"+".join(r["truth"]) or "nothing" for r in results}):
         lines.append(row(hidden[:28], [r for r in results if ("+".join(r["truth"]) or "nothing") == hidden]))
-    error = calibration_error(results)
-    lines += ["", "expected calibration error of the confidence: " + ("-" if error is None else f"{error:.3f}"), "", KEY, ""]
-    lines += [f"{r['session']:24s} {'+'.join(r['truth']) or 'nothing':44s} {r['outcome']:12s} said {r['said']}" for r in results]
+    errors = [calibration_error(part) for part in (results, [r for r in results if not r["said"].startswith("none")])]
+    errors = ["-" if error is None else f"{error:.3f}" for error in errors]
+    lines += ["", f"expected calibration error of the confidence: {errors[0]}; of verdicts other than `none`: {errors[1]}", "", KEY, ""]
+    for r in results:
+        times = f"{r['gap']:9.1f} x noise" if r.get("gap") is not None else f"{'-':>9s}        "
+        lines.append(f"{r['session']:24s} {'+'.join(r['truth']) or 'nothing':44s} {times}  {r['outcome']:12s} said {r['said']}")
     return "\n".join(lines) + "\n"

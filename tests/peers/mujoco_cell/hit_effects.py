@@ -15,7 +15,7 @@ class Restitution(Effect):
     @classmethod
     def draw(cls, rng, cell):
         away = log_uniform(rng, 0.3, 0.2)
-        return cls(max(0.03, 0.25 - away) if rng.random() < 0.3 else 0.25 + away)
+        return cls(max(0.03, 0.25 - away) if rng.random() < 0.2 else 0.25 + away)
 
     def sizes(self):
         return {"restitution": self.e}
