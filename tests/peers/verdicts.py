@@ -20,7 +20,7 @@ def outcome(truth, verdict):
         return "exact" if kind == right else kind
     if kind not in ("named", "class"):
         return "other"
-    if kind == "named" and hidden and said in (hidden, set(truth["blocks"])):
+    if kind == "named" and hidden and said == hidden:
         return "exact"
     if kind == "class" and hidden and hidden <= said:
         return "class"

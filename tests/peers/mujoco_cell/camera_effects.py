@@ -36,7 +36,7 @@ class CameraLatency(Effect):
 
 
 class CameraExtrinsicRotation(Effect):
-    """About the table's middle, where a camera is aligned: about the base's origin that is a shift besides."""
+    """About the table's middle, where a camera is aligned."""
 
     name = "camera_extrinsic_rotation"
 
@@ -52,9 +52,7 @@ class CameraExtrinsicRotation(Effect):
         return {"rotation_rad": rounded(self.rotation), "about_m": rounded(MIDDLE)}
 
     def blocks(self):
-        shift, _ = turned(self.rotation, np.zeros(3), np.array([1.0, 0, 0, 0]), MIDDLE)
-        return [block(self.name, rotation=rounded(self.rotation)),
-                block("camera_extrinsic_translation", translation=rounded(shift))]
+        return [block(self.name, rotation=rounded(self.rotation), centre=rounded(MIDDLE))]
 
     def seen(self, t, place, turn):
         return turned(self.rotation, place, turn, MIDDLE)

@@ -129,13 +129,8 @@ def between(trace, row):
 
 
 def blocks(world):
-    """What is hidden in the twin's own terms; of two blocks of one name the sizes are added."""
-    merged = {}
-    for block in (block for effect in world.effects for block in effect.blocks()):
-        known = merged.setdefault(block["name"], block)
-        if known is not block:
-            known["translation"] = [a + b for a, b in zip(known["translation"], block["translation"])]
-    return list(merged.values())
+    """What is hidden in the twin's own terms."""
+    return [block for effect in world.effects for block in effect.blocks()]
 
 
 def truth(world):
@@ -144,7 +139,6 @@ def truth(world):
     return json.dumps({
         "kind": world.kind,
         "effects": [effect.name for effect in world.effects],
-        "blocks": [block["name"] for block in blocks(world)],
         "known": all(effect.known for effect in world.effects),
         "near": [name for effect in world.effects for name in effect.near],
         "hidden": {effect.name: {key: round(value, 9) if isinstance(value, float) else value for key, value in effect.sizes().items()}
