@@ -131,7 +131,7 @@ mod tests {
         let ground = Ground { middle: [0.5, 0.0], spread: 0.1 };
         let library = Library::new(&cell, &base, Some(&ground), &[87.0; MAX_JOINTS]);
         let named = |name| library.find(name).expect("a candidate");
-        let [tool, camera, friction] = ["tool_offset", "camera_extrinsic_translation", "tip_friction"].map(named);
+        let [tool, camera, friction] = ["tool_offset", "camera_extrinsic_translation", "table_tilt"].map(named);
         // On every other clip the second predicts better, so that the two cannot be told apart by chance.
         let as_good = |candidate, closes| {
             let mut other = trial(candidate, 1500.0, closes);

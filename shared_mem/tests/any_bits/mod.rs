@@ -199,7 +199,7 @@ fn each_check_names_its_field() {
     assert_eq!(why(&MotionChunk { length: 51, ..MotionChunk::default() }), "length is 51, not 0 to 50");
     assert_eq!(
         why(&ObjectPose { wxyz: [0.0; 4], ..ObjectPose::default() }),
-        "wxyz is no unit quaternion: its length is 0"
+        "wxyz is no unit quaternion: its length is 0.0000"
     );
     assert_eq!(why(&TwinGap { object_add_m: f64::NAN, ..TwinGap::default() }), "valid", "no object, no gap of it");
     assert_eq!(
