@@ -1,9 +1,5 @@
 //! Clips with an object as evidence: the arm before the touch ([`ArmClips`]), the object's poses and the arm's joints while
-//! the tool pushes the object ([`ObjectClips`]), each in sigmas of its sensor.
-//!
-//! Under an impedance controller the joints yield to the contact force by `J' F / K_P`: a push of 1 N moves an encoder by a
-//! hundred times its resolution. When and where the tool touches, and how the object resists, shows there more sharply than
-//! in any tracked pose, and no deviation of the object's path bears on it.
+//! the tool pushes the object ([`ObjectClips`], [`Contact`]), each in sigmas of its sensor.
 //!
 //! Every clip has a friction and a clock of its own, and its object deviates from the simulated path: nobody simulates an
 //! impact exactly, and the error grows along the path. That deviation is a random effect, added to the simulated poses, so it

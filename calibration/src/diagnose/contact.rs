@@ -69,8 +69,9 @@ impl Contact {
         let at = |(errors, lever): (&[f64], &Joints)| {
             let errors =
                 DVector::from_iterator(dof, errors.iter().zip(&self.sigma).map(|(error, sigma)| error / sigma));
-            let yielded = (0..dof).map(|joint| lever[joint] / (stiffness[joint] * self.sigma[joint]));
-            let vertical = DVector::from_iterator(dof, yielded);
+            // A joint that no spring holds shows no force by where it stands.
+            let yields = |joint: usize| if stiffness[joint] > 0.0 { lever[joint] / stiffness[joint] } else { 0.0 };
+            let vertical = DVector::from_iterator(dof, (0..dof).map(|joint| yields(joint) / self.sigma[joint]));
             let share = errors.dot(&vertical) / vertical.norm_squared().max(f64::MIN_POSITIVE);
             (errors - vertical * share).as_slice().to_vec()
         };
@@ -110,6 +111,8 @@ mod tests {
         let left = |lever| contact.in_sigmas(&turned(lever), &stiffness).iter().fold(0.0, |a: f64, b| a.max(b.abs()));
         assert!(left([0.02, -0.5, 0.1]) < 1e-9);
         assert!(left([0.4, 0.1, 0.05]) > 100.0);
+        let limp = contact.in_sigmas(&[4e-6, 8e-6, 8e-6], &[0.0; 3]);
+        assert!(limp.iter().zip([1.0, 2.0, 1.0]).all(|(a, b)| (a - b).abs() < 1e-9), "{limp:?}");
     }
 
     #[test]
