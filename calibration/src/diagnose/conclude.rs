@@ -4,7 +4,7 @@ use super::admit::Admitted;
 use super::advice::Advice;
 use super::answer::{Change, Clips, Diagnosis, Gap, Nearest, Place, Rest, Share, Verdict};
 use super::combine::{Found, Step};
-use super::evidence::Evidence;
+use super::evidence::{Evidence, Group};
 use super::fit::{Bench, Hypothesis};
 use super::gap::Residuals;
 use super::headline::{self, Facts};
@@ -334,9 +334,10 @@ fn traces(evidence: &impl Evidence, (before, after): (&Residuals, &Residuals), f
             let rows = evidence.rows(clip).iter().zip(residuals).filter(|(row, _)| row.channel == channel);
             rows.map(|(row, residual)| [row.time, *residual]).collect::<Vec<_>>()
         };
+        let when = if info.group == Group::Contact { " in contact" } else { "" };
         Trace {
             clip: files[clip].clone(),
-            channel: format!("{} of {}", info.quantity, channel_in_words(&info.place)),
+            channel: format!("{} of {}{when}", info.quantity, channel_in_words(&info.place)),
             unit: "σ".into(),
             sigma: 1.0,
             before: points(&before.clips[place].1),
