@@ -94,6 +94,8 @@ pub struct CellClips<'a, F> {
     scatter: Scatter,
     /// Index of the shared friction among the numbers.
     friction: Option<usize>,
+    /// Indices of the joints' stiffnesses among them.
+    stiffness: Vec<usize>,
     /// Index of the object's first channel.
     first: usize,
     /// For each clip the joints' residuals in contact.
@@ -131,10 +133,26 @@ impl<'a, F: Fn(&[f64]) -> Theta + Sync> CellClips<'a, F> {
             rows.push([of_arm, &poses, &joints.evidence(&object.rows(clip), in_contact)].concat());
             contact.push(joints);
         }
-        let friction = library.settings.settings().iter().position(|setting| *setting == Setting::Friction);
+        let numbers = || library.settings.settings().iter().enumerate();
+        let friction = numbers().find(|(_, setting)| **setting == Setting::Friction).map(|(k, _)| k);
+        let stiffness =
+            numbers().filter(|(_, setting)| matches!(setting, Setting::Stiffness(_))).map(|(k, _)| k).collect();
         let scatter = scatter(&object);
         let arm_alone = rows.iter().map(|_| Recent::default()).collect();
-        Self { library, arm, object, channels, rows, deviations, scatter, friction, first, contact, arm_alone }
+        Self {
+            library,
+            arm,
+            object,
+            channels,
+            rows,
+            deviations,
+            scatter,
+            friction,
+            stiffness,
+            first,
+            contact,
+            arm_alone,
+        }
     }
 
     /// The residuals of the arm that moves alone at numbers; none where there is no arm.
@@ -168,8 +186,8 @@ impl<'a, F: Fn(&[f64]) -> Theta + Sync> CellClips<'a, F> {
         {
             residuals.iter_mut().zip(&slopes[of_arm..]).for_each(|(residual, slope)| *residual += slope * value);
         }
-        let arm = self.library.theta(&shared).arm;
-        residuals.extend(arm.map_or_else(Vec::new, |arm| contact.in_sigmas(&joints, &arm.stiffness)));
+        let stiffness: Vec<f64> = self.stiffness.iter().map(|k| shared[*k]).collect();
+        residuals.extend(contact.in_sigmas(&joints, &stiffness));
         Ok(residuals)
     }
 

@@ -26,22 +26,23 @@ pub fn closes<E: Evidence>(
         let left = Left::of_groups(&before.typical(), &after.typical());
         let shares = left.iter().zip(whole).map(|(left, whole)| share(left, whole.mean_square));
         let in_contact = before.typical_of(Group::Contact).zip(after.typical_of(Group::Contact));
-        Some(shares.chain(in_contact.map(|(before, after)| way(&before, &after))).collect())
+        let contact = in_contact.map(|(before, after)| way(before.mean_square, after.mean_square, before.floor));
+        Some(shares.chain(contact).collect())
     };
     let (Some(open), Some(choose)) = (on(&split.open()), on(&split.choose)) else { return 0.0 };
     let harmless = |(_, choose): &(&f64, &f64)| **choose > -HARM;
     open.iter().zip(&choose).filter(harmless).map(|(open, _)| *open).fold(0.0, f64::max)
 }
 
-/// How much of the way down to noise is gone in contact.
-fn way(before: &Typical, after: &Typical) -> f64 {
-    (before.mean_square / after.mean_square).ln() / (before.mean_square / before.floor).max(LEAST_GAP).ln()
+/// How much of the way from the gap down to noise is gone, on a logarithmic scale.
+fn way(before: f64, after: f64, floor: f64) -> f64 {
+    (before / after).ln() / (before / floor).max(LEAST_GAP).ln()
 }
 
-/// How much of the way from the gap down to noise is gone, on a logarithmic scale. A real arm's gap lies so far above the
-/// noise that nobody comes down to it: there the plain share of the baseline's gap counts, where that is more.
+/// The same of what is left of a gap. A real arm's gap lies so far above the noise that nobody comes down to it: there the plain
+/// share of the baseline's gap counts, where that is more.
 fn share(left: &Left, whole: f64) -> f64 {
-    let way = (left.before / left.after).ln() / (left.before / left.floor).max(LEAST_GAP).ln();
+    let way = way(left.before, left.after, left.floor);
     let beyond_numerics = left.before - left.floor > left.numerics;
     if way > 0.0 && beyond_numerics && !left.of_object {
         way.max((left.before - left.after) / (whole - left.floor))

@@ -132,7 +132,7 @@ mod tests {
         let library = Library::new(&cell, &base, Some(&ground), &[87.0; MAX_JOINTS]);
         let named = |name| library.find(name).expect("a candidate");
         let [tool, camera, friction] = ["tool_offset", "camera_extrinsic_translation", "table_tilt"].map(named);
-        // On every other clip the second predicts better, so that the two cannot be told apart by chance.
+        // On every other clip the second predicts better, so that the difference is within chance.
         let as_good = |candidate, closes| {
             let mut other = trial(candidate, 1500.0, closes);
             let gain = |clip: usize| if clip.is_multiple_of(2) { 85.0 } else { 165.0 };

@@ -169,7 +169,8 @@ fn screened<E: Evidence>(bench: &Bench<'_, E>, found: &Found, judged: &Judged<'_
         );
     }
     let kept = found.kept().find(|(place, _)| *place == judged.place).map(|(_, effect)| effect);
-    let better = || step.trials.iter().map(|trial| &trial.scored).filter(|other| other.gain > scored.gain);
+    let fitted = || step.trials.iter().filter(|trial| trial.fitted.is_some());
+    let better = || fitted().map(|trial| &trial.scored).filter(|other| other.gain > scored.gain);
     match better().find(|other| Some(other.candidate) == kept).or_else(|| better().next()) {
         Some(best) => format!(
             "screening: its signature would raise the log-likelihood by {:.0} nats, that of {} by {:.0}",

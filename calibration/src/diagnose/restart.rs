@@ -77,12 +77,11 @@ mod tests {
     use super::super::evidence::{Channel, Group, Row, StageName};
     use super::super::library::Library;
     use super::super::scatter::Scatter;
-    use super::super::test_bench::shipped;
+    use super::super::test_bench::{bench, shipped};
     use super::*;
     use crate::estimate::{ClipModel, Impossible, Random};
     use crate::forward::setting;
     use crate::interrupt::Interrupt;
-    use crate::kept::Kept;
     use shared_mem::msg::MAX_JOINTS;
 
     const SIGMA: f64 = 0.02;
@@ -128,13 +127,7 @@ mod tests {
         let row = Row { channel: 0, stage: StageName::Slide, regime: "free", time: 0.0 };
         let evidence = TouchedTwice([channel], [row]);
         let interrupt = Interrupt::default();
-        let bench = Bench {
-            evidence: &evidence,
-            library: &library,
-            scatter: evidence.scatter(),
-            interrupt: &interrupt,
-            trail: (Kept::nothing(), ""),
-        };
+        let bench = bench(&evidence, &library, &interrupt);
         let full = library.start();
         let rest: Clips = (0..5).map(|clip| (clip, vec![0.0; 2])).collect();
         let restarted = bench.restarted(&full, rest.clone(), &[1.0]);

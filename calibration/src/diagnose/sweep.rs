@@ -200,6 +200,7 @@ impl<E: Evidence, G: Fn(f64) -> bool + Sync> Work<'_, E, G> {
             let slope = |((out, base), row): ((&f64, &f64), &super::evidence::Row)| {
                 let channel = &channels[row.channel];
                 let foreign = joint.is_some_and(|joint| channel.joint != Some(joint));
+                // What the arm feels is not learned from contact: see `contact.rs`.
                 if foreign || (reach != Reach::Object && channel.group == Group::Contact) {
                     0.0
                 } else {

@@ -2,7 +2,7 @@
 
 use super::arm_clips::ArmClips;
 use super::cell_clips::CellClips;
-use super::evidence::Evidence as _;
+use super::evidence::Evidence;
 use super::fit::{Bench, Effort};
 use super::floor;
 use super::ground::Ground;
@@ -44,7 +44,12 @@ pub(super) fn truth(library: &Library, world: &World) -> Vec<f64> {
     library.start().into_iter().zip(hidden).map(|(start, hidden)| hidden.unwrap_or(start)).collect()
 }
 
-/// Asks the bench on which the world's clips lie; every channel weighs the same.
+/// A bench of any evidence; nothing of its work is kept.
+pub(super) fn bench<'a, E: Evidence>(evidence: &'a E, library: &'a Library, interrupt: &'a Interrupt) -> Bench<'a, E> {
+    Bench { evidence, library, scatter: evidence.scatter(), interrupt, trail: (Kept::nothing(), "") }
+}
+
+/// Asks the bench on which the world's clips lie; residuals weigh what the sensors' noise alone makes of them.
 pub(super) fn on_bench<R>(
     (cell, world): (&Cell, &World),
     library: &Library,
@@ -54,14 +59,7 @@ pub(super) fn on_bench<R>(
     let clips = record(world, 2).expect("a session");
     let evidence = ArmClips::new(cell, &clips, &theta as Parameters<'_>).expect("an arm");
     let interrupt = Interrupt::default();
-    let bench = Bench {
-        evidence: &evidence,
-        library,
-        scatter: evidence.scatter(),
-        interrupt: &interrupt,
-        trail: (Kept::nothing(), ""),
-    };
-    ask(&bench, &floor::sensors_alone(&evidence))
+    ask(&bench(&evidence, library, &interrupt), &floor::sensors_alone(&evidence))
 }
 
 /// Asks the bench on which the world's strokes lie, with the library of all effects that they could show.
@@ -77,14 +75,7 @@ pub(super) fn on_strokes<R>(
     let object = ObjectClips::new(cell, clips, library.settings.clone()).expect("an object");
     let evidence = CellClips::new(Some(arm), object, &library);
     let interrupt = Interrupt::default();
-    let bench = Bench {
-        evidence: &evidence,
-        library: &library,
-        scatter: evidence.scatter(),
-        interrupt: &interrupt,
-        trail: (Kept::nothing(), ""),
-    };
-    ask(&bench, &floor::sensors_alone(&evidence))
+    ask(&bench(&evidence, &library, &interrupt), &floor::sensors_alone(&evidence))
 }
 
 /// A candidate of which the score test says nothing.
