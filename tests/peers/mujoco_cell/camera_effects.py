@@ -2,7 +2,7 @@
 import mujoco
 import numpy as np
 
-from .effect import Effect, block, log_uniform, rounded, sign
+from .effect import Effect, log_uniform, sign
 from .model import MIDDLE
 
 
@@ -20,60 +20,36 @@ def turned(rotation, place, turn, about):
 
 class CameraLatency(Effect):
     name = "camera_latency"
-
-    def __init__(self, latency):
-        self.latency = latency
+    parameters = {"latency": "s"}
 
     @classmethod
     def draw(cls, rng, cell):
         return cls(log_uniform(rng, 0.02, 0.03))
-
-    def sizes(self):
-        return {"latency_s": self.latency}
-
-    def blocks(self):
-        return [block(self.name, latency=self.latency)]
 
 
 class CameraExtrinsicRotation(Effect):
     """About the table's middle, where a camera is aligned."""
 
     name = "camera_extrinsic_rotation"
-
-    def __init__(self, rotation):
-        self.rotation = np.asarray(rotation)
+    parameters = {"rotation": "rad", "centre": "m"}
 
     @classmethod
     def draw(cls, rng, cell):
         axis = np.array([0.0, 0.0, 1.0]) if rng.random() < 0.5 else rng.normal(size=3)
-        return cls(sign(rng) * log_uniform(rng, 0.015, 0.03) * axis / np.linalg.norm(axis))
-
-    def sizes(self):
-        return {"rotation_rad": rounded(self.rotation), "about_m": rounded(MIDDLE)}
-
-    def blocks(self):
-        return [block(self.name, rotation=rounded(self.rotation), centre=rounded(MIDDLE))]
+        return cls(sign(rng) * log_uniform(rng, 0.015, 0.03) * axis / np.linalg.norm(axis), MIDDLE)
 
     def seen(self, t, place, turn):
-        return turned(self.rotation, place, turn, MIDDLE)
+        return turned(self.rotation, place, turn, self.centre)
 
 
 class CameraExtrinsicTranslation(Effect):
     name = "camera_extrinsic_translation"
-
-    def __init__(self, translation):
-        self.translation = np.asarray(translation)
+    parameters = {"translation": "m"}
 
     @classmethod
     def draw(cls, rng, cell):
         way = rng.normal(size=3) * [1, 1, 0.5]
         return cls(log_uniform(rng, 0.005, 0.008) * way / np.linalg.norm(way))
-
-    def sizes(self):
-        return {"translation_m": rounded(self.translation)}
-
-    def blocks(self):
-        return [block(self.name, translation=rounded(self.translation))]
 
     def seen(self, t, place, turn):
         return place + self.translation, turn
@@ -81,19 +57,11 @@ class CameraExtrinsicTranslation(Effect):
 
 class CameraScale(Effect):
     name = "camera_scale"
-
-    def __init__(self, scale, centre):
-        self.scale, self.centre = scale, np.asarray(centre)
+    parameters = {"scale": "", "centre": "m"}
 
     @classmethod
     def draw(cls, rng, cell):
         return cls(sign(rng) * log_uniform(rng, 0.02, 0.03), MIDDLE if rng.random() < 0.5 else np.zeros(3))
-
-    def sizes(self):
-        return {"scale": self.scale, "centre_m": rounded(self.centre)}
-
-    def blocks(self):
-        return [block(self.name, scale=self.scale, centre=rounded(self.centre))]
 
     def seen(self, t, place, turn):
         return place + self.scale * (place - self.centre), turn
@@ -101,19 +69,11 @@ class CameraScale(Effect):
 
 class TrackerSmoothing(Effect):
     name = "tracker_smoothing"
-
-    def __init__(self, constant):
-        self.constant, self.last = constant, None
+    parameters = {"time_constant": "s"}
 
     @classmethod
     def draw(cls, rng, cell):
         return cls(log_uniform(rng, 0.03, 0.05))
-
-    def sizes(self):
-        return {"time_constant_s": self.constant}
-
-    def blocks(self):
-        return [block(self.name, time_constant=self.constant)]
 
     def clip(self, share, rng):
         self.last = None
@@ -121,7 +81,7 @@ class TrackerSmoothing(Effect):
     def seen(self, t, place, turn):
         if self.last is not None:
             before, then, was = self.last
-            share = 1 - np.exp(-(t - before) / self.constant)
+            share = 1 - np.exp(-(t - before) / self.time_constant)
             place = then + share * (place - then)
             turn = was + share * ((turn if was @ turn > 0 else -turn) - was)
             turn = turn / np.linalg.norm(turn)

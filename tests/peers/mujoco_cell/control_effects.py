@@ -2,7 +2,7 @@
 import numpy as np
 
 from . import fr3
-from .effect import Effect, block, log_uniform, rounded, sign
+from .effect import Effect, log_uniform, sign
 
 TICK = 1e-3  # of the controller [s]
 
@@ -24,19 +24,11 @@ class Delay:
 
 class CommandDelay(Effect):
     name = "command_delay"
-
-    def __init__(self, delay):
-        self.delay = delay
+    parameters = {"delay": "s"}
 
     @classmethod
     def draw(cls, rng, cell):
         return cls(log_uniform(rng, 0.010, 0.025))
-
-    def sizes(self):
-        return {"delay_s": self.delay}
-
-    def blocks(self):
-        return [block(self.name, delay=self.delay)]
 
     def begin(self, plant, q):
         self.line = Delay(self.delay)
@@ -48,44 +40,28 @@ class CommandDelay(Effect):
 
 class CommandLag(Effect):
     name = "command_lag"
-
-    def __init__(self, constant):
-        self.constant = constant
+    parameters = {"time_constant": "s"}
 
     @classmethod
     def draw(cls, rng, cell):
         return cls(log_uniform(rng, 0.005, 0.012))
 
-    def sizes(self):
-        return {"time_constant_s": self.constant}
-
-    def blocks(self):
-        return [block(self.name, time_constant=self.constant)]
-
     def begin(self, plant, q):
         self.now = np.concatenate([q, np.zeros(fr3.DOF)])
 
     def command(self, q_d, dq_d):
-        share = 1 - np.exp(-TICK / self.constant)
+        share = 1 - np.exp(-TICK / self.time_constant)
         self.now = self.now + share * (np.concatenate([q_d, dq_d]) - self.now)
         return self.now[:fr3.DOF], self.now[fr3.DOF:]
 
 
 class TorqueDelay(Effect):
     name = "torque_delay"
-
-    def __init__(self, delay):
-        self.delay = delay
+    parameters = {"delay": "s"}
 
     @classmethod
     def draw(cls, rng, cell):
         return cls(log_uniform(rng, 0.001, 0.001))
-
-    def sizes(self):
-        return {"delay_s": self.delay}
-
-    def blocks(self):
-        return [block(self.name, delay=self.delay)]
 
     def begin(self, plant, q):
         self.line = Delay(self.delay)
@@ -96,19 +72,11 @@ class TorqueDelay(Effect):
 
 class TorqueGain(Effect):
     name = "torque_gain"
-
-    def __init__(self, gain):
-        self.gain = np.asarray(gain)
+    parameters = {"gain": ""}
 
     @classmethod
     def draw(cls, rng, cell):
         return cls(1 + sign(rng) * log_uniform(rng, 0.03, 0.06) * rng.uniform(0.7, 1.0, fr3.DOF))
-
-    def sizes(self):
-        return {"gain": rounded(self.gain)}
-
-    def blocks(self):
-        return [block(self.name, gain=rounded(self.gain))]
 
     def torque(self, tau):
         return self.gain * tau
@@ -118,9 +86,7 @@ class TorqueSaturation(Effect):
     """Limits between what holds the arm up and the largest torque that its motions ask for."""
 
     name = "torque_saturation"
-
-    def __init__(self, limit):
-        self.limit = np.asarray(limit)
+    parameters = {"limit": "N_m"}
 
     @classmethod
     def draw(cls, rng, cell):
@@ -128,31 +94,17 @@ class TorqueSaturation(Effect):
         peak, held = cell.torques
         return cls(1.1 * held + (1 - lacking) * np.maximum(peak - 1.1 * held, 0.05))
 
-    def sizes(self):
-        return {"limit_N_m": rounded(self.limit)}
-
-    def blocks(self):
-        return [block(self.name, limit=rounded(self.limit))]
-
     def torque(self, tau):
         return np.clip(tau, -self.limit, self.limit)
 
 
 class JointEncoderOffset(Effect):
     name = "joint_encoder_offset"
-
-    def __init__(self, offset):
-        self.offset = np.asarray(offset)
+    parameters = {"offset": "rad"}
 
     @classmethod
     def draw(cls, rng, cell):
         return cls(log_uniform(rng, 0.003, 0.006) * rng.uniform(-1, 1, fr3.DOF))
-
-    def sizes(self):
-        return {"offset_rad": rounded(self.offset)}
-
-    def blocks(self):
-        return [block(self.name, offset=rounded(self.offset))]
 
     def begin(self, plant, q):
         plant.data.qpos[plant.position] -= self.offset
@@ -163,19 +115,11 @@ class JointEncoderOffset(Effect):
 
 class TorqueSensorBias(Effect):
     name = "torque_sensor_bias"
-
-    def __init__(self, bias):
-        self.bias = np.asarray(bias)
+    parameters = {"bias": "N_m"}
 
     @classmethod
     def draw(cls, rng, cell):
         return cls(log_uniform(rng, 0.3, 0.6) * rng.uniform(-1, 1, fr3.DOF))
-
-    def sizes(self):
-        return {"bias_N_m": rounded(self.bias)}
-
-    def blocks(self):
-        return [block(self.name, bias=rounded(self.bias))]
 
     def torque_sensor(self, tau):
         return tau + self.bias

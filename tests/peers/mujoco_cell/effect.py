@@ -10,6 +10,13 @@ class Effect:
     known = True
     near = ()  # of what the diagnosis does not know: the effects that are a part of it
     acts = False  # whether `step` does something
+    # What is hidden: numbers, or arrays of one for each joint or axis. Each is an attribute of this name, a key of the twin's own
+    # [[effect]] block, and with its unit behind it a key of truth.json.
+    parameters = {}
+
+    def __init__(self, *values):
+        for name, value in zip(self.parameters, values, strict=True):
+            setattr(self, name, np.asarray(value) if np.ndim(value) else value)
 
     @classmethod
     def draw(cls, rng, cell):
@@ -18,11 +25,15 @@ class Effect:
 
     def sizes(self):
         """What is hidden, with the unit in the key."""
-        raise NotImplementedError
+        return {f"{name}_{unit}" if unit else name: self.written(name) for name, unit in self.parameters.items()}
 
-    def blocks(self):
-        """[[effect]] blocks with which the twin comes nearest; none where it knows no such effect."""
-        return []
+    def block(self):
+        """The [[effect]] block with which the twin comes nearest."""
+        return {"name": self.name, **{name: self.written(name) for name in self.parameters}}
+
+    def written(self, name):
+        value = getattr(self, name)
+        return rounded(value) if np.ndim(value) else value
 
     # Before and at the beginning of a clip.
     def build(self, build):
@@ -63,6 +74,12 @@ def log_uniform(rng, usual, most):
     return float(np.exp(rng.uniform(np.log(0.1 * usual), np.log(3.0 * most))))
 
 
+def any_way(rng, length):
+    """A vector in the plane of the table, in any direction."""
+    angle = rng.uniform(0, 2 * np.pi)
+    return length * np.array([np.cos(angle), np.sin(angle)])
+
+
 def sign(rng):
     return 1.0 if rng.random() < 0.5 else -1.0
 
@@ -70,7 +87,3 @@ def sign(rng):
 def rounded(values, digits=6):
     """As it stands in files."""
     return [round(float(v), digits) for v in values]
-
-
-def block(name, **parameters):
-    return {"name": name, **parameters}

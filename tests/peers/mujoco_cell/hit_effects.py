@@ -1,50 +1,34 @@
 """Effects on the hit: contact of tip and box, where the tip is, how hard the box is to turn."""
 import numpy as np
 
-from .effect import Effect, block, log_uniform, rounded, sign
+from .effect import Effect, log_uniform, sign
 
 
 class Restitution(Effect):
     """A spring and damper that return `e` of the approach speed, as quick as the nominal contact."""
 
     name = "restitution"
-
-    def __init__(self, e):
-        self.e = e
+    parameters = {"restitution": ""}
 
     @classmethod
     def draw(cls, rng, cell):
         away = log_uniform(rng, 0.3, 0.2)
         return cls(max(0.03, 0.25 - away) if rng.random() < 0.2 else 0.25 + away)
 
-    def sizes(self):
-        return {"restitution": self.e}
-
-    def blocks(self):
-        return [block(self.name, restitution=self.e)]
-
     def build(self, build):
         engine = build.engine
         frequency = 1 / (engine.tip_time * engine.tip_ratio)
-        engine.tip_ratio = ratio_of(self.e)
+        engine.tip_ratio = ratio_of(self.restitution)
         engine.tip_time = max(2.1 * engine.step, 1 / (frequency * engine.tip_ratio))
 
 
 class ContactCompliance(Effect):
     name = "contact_compliance"
-
-    def __init__(self, compliance):
-        self.compliance = compliance
+    parameters = {"compliance": "m_per_N"}
 
     @classmethod
     def draw(cls, rng, cell):
         return cls(log_uniform(rng, 1e-4, 3e-4))
-
-    def sizes(self):
-        return {"compliance_m_per_N": self.compliance}
-
-    def blocks(self):
-        return [block(self.name, compliance=self.compliance)]
 
     def build(self, build):
         engine, mass = build.engine, build.box.mass
@@ -55,20 +39,12 @@ class ContactCompliance(Effect):
 
 class TipFriction(Effect):
     name = "tip_friction"
-
-    def __init__(self, change):
-        self.change = change
+    parameters = {"change": ""}
 
     @classmethod
     def draw(cls, rng, cell):
         change = sign(rng) * log_uniform(rng, 0.1, 0.2)
         return cls(max(change, 0.02 - cell.box.tip_friction))
-
-    def sizes(self):
-        return {"change": self.change}
-
-    def blocks(self):
-        return [block(self.name, change=self.change)]
 
     def build(self, build):
         build.box.tip_friction += self.change
@@ -76,20 +52,15 @@ class TipFriction(Effect):
 
 class ToolOffset(Effect):
     name = "tool_offset"
-
-    def __init__(self, offset):
-        self.offset = np.asarray(offset)
+    parameters = {"offset": "m"}
 
     @classmethod
     def draw(cls, rng, cell):
         way = rng.normal(size=3)
         return cls(log_uniform(rng, 0.003, 0.005) * way / np.linalg.norm(way))
 
-    def sizes(self):
-        return {"offset_m": rounded(self.offset)}
-
-    def blocks(self):
-        return [block(self.name, offset=rounded(self.offset), carried=1.0)]
+    def block(self):
+        return {**super().block(), "carried": 1.0}
 
     def build(self, build):
         build.tool_offset = build.tool_offset + self.offset
@@ -97,20 +68,12 @@ class ToolOffset(Effect):
 
 class ObjectInertia(Effect):
     name = "object_inertia"
-
-    def __init__(self, factor):
-        self.factor = factor
+    parameters = {"factor": ""}
 
     @classmethod
     def draw(cls, rng, cell):
         more = log_uniform(rng, 0.3, 0.3)
         return cls(1 + more if rng.random() < 0.6 else 1 / (1 + more))
-
-    def sizes(self):
-        return {"factor": self.factor}
-
-    def blocks(self):
-        return [block(self.name, factor=self.factor)]
 
     def build(self, build):
         build.yaw_inertia *= self.factor

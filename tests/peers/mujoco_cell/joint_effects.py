@@ -2,7 +2,7 @@
 import numpy as np
 
 from . import fr3
-from .effect import Effect, block, log_uniform, rounded, sign
+from .effect import Effect, any_way, log_uniform, sign
 from .model import Gear, leaning
 
 
@@ -10,19 +10,11 @@ class JointCoulombFriction(Effect):
     """The engine's own dry friction."""
 
     name = "joint_coulomb_friction"
-
-    def __init__(self, coulomb):
-        self.coulomb = np.asarray(coulomb)
+    parameters = {"coulomb": "N_m"}
 
     @classmethod
     def draw(cls, rng, cell):
         return cls(fr3.by_size(log_uniform(rng, 0.8, 0.9)) * rng.uniform(0.7, 1.3, fr3.DOF))
-
-    def sizes(self):
-        return {"coulomb_N_m": rounded(self.coulomb)}
-
-    def blocks(self):
-        return [block(self.name, coulomb=rounded(self.coulomb))]
 
     def build(self, build):
         build.coulomb = build.coulomb + self.coulomb
@@ -30,19 +22,11 @@ class JointCoulombFriction(Effect):
 
 class JointViscousFriction(Effect):
     name = "joint_viscous_friction"
-
-    def __init__(self, viscous):
-        self.viscous = np.asarray(viscous)
+    parameters = {"viscous": "N_m_s_per_rad"}
 
     @classmethod
     def draw(cls, rng, cell):
         return cls(fr3.by_size(log_uniform(rng, 1.5, 3.0)) * rng.uniform(0.7, 1.3, fr3.DOF))
-
-    def sizes(self):
-        return {"viscous_N_m_s_per_rad": rounded(self.viscous)}
-
-    def blocks(self):
-        return [block(self.name, viscous=rounded(self.viscous))]
 
     def build(self, build):
         build.viscous = build.viscous + self.viscous
@@ -51,20 +35,12 @@ class JointViscousFriction(Effect):
 class JointStribeckFriction(Effect):
     name = "joint_stribeck_friction"
     acts = True
-
-    def __init__(self, coulomb, excess, velocity):
-        self.coulomb, self.excess, self.velocity = np.asarray(coulomb), np.asarray(excess), velocity
+    parameters = {"coulomb": "N_m", "excess": "N_m", "velocity": "rad_per_s"}
 
     @classmethod
     def draw(cls, rng, cell):
         coulomb = fr3.by_size(log_uniform(rng, 0.6, 0.7))
         return cls(coulomb, coulomb * rng.uniform(0.5, 1.0), rng.uniform(0.03, 0.12))
-
-    def sizes(self):
-        return {"coulomb_N_m": rounded(self.coulomb), "excess_N_m": rounded(self.excess), "velocity_rad_per_s": self.velocity}
-
-    def blocks(self):
-        return [block(self.name, coulomb=rounded(self.coulomb), excess=rounded(self.excess), velocity=self.velocity)]
 
     def build(self, build):
         # Present from the start, so that the engine makes room for it.
@@ -78,19 +54,11 @@ class JointStribeckFriction(Effect):
 class JointLoadFriction(Effect):
     name = "joint_load_friction"
     acts = True
-
-    def __init__(self, coefficient):
-        self.coefficient = coefficient
+    parameters = {"coefficient": ""}
 
     @classmethod
     def draw(cls, rng, cell):
         return cls(log_uniform(rng, 0.05, 0.08))
-
-    def sizes(self):
-        return {"coefficient": self.coefficient}
-
-    def blocks(self):
-        return [block(self.name, coefficient=self.coefficient)]
 
     def build(self, build):
         build.coulomb = build.coulomb + 1e-3
@@ -102,19 +70,11 @@ class JointLoadFriction(Effect):
 class JointFrictionAsymmetry(Effect):
     name = "joint_friction_asymmetry"
     acts = True
-
-    def __init__(self, offset):
-        self.offset = np.asarray(offset)
+    parameters = {"offset": "N_m"}
 
     @classmethod
     def draw(cls, rng, cell):
         return cls(fr3.by_size(log_uniform(rng, 0.2, 0.3)) * rng.choice([-1, 1], fr3.DOF))
-
-    def sizes(self):
-        return {"offset_N_m": rounded(self.offset)}
-
-    def blocks(self):
-        return [block(self.name, offset=rounded(self.offset))]
 
     def step(self, plant):
         plant.lost += self.offset
@@ -123,19 +83,11 @@ class JointFrictionAsymmetry(Effect):
 class TorqueRipple(Effect):
     name = "torque_ripple"
     acts = True
-
-    def __init__(self, amplitude, order, phase):
-        self.amplitude, self.order, self.phase = np.asarray(amplitude), order, np.asarray(phase)
+    parameters = {"amplitude": "N_m", "order": "", "phase": "rad"}
 
     @classmethod
     def draw(cls, rng, cell):
         return cls(fr3.by_size(log_uniform(rng, 0.2, 0.2)), float(rng.choice([20, 30, 50, 100, 160])), rng.uniform(-3, 3, fr3.DOF))
-
-    def sizes(self):
-        return {"amplitude_N_m": rounded(self.amplitude), "order": self.order, "phase_rad": rounded(self.phase)}
-
-    def blocks(self):
-        return [block(self.name, amplitude=rounded(self.amplitude), order=self.order, phase=rounded(self.phase))]
 
     def step(self, plant):
         plant.lost += self.amplitude * np.sin(self.order * plant.data.qpos[plant.position] + self.phase)
@@ -143,20 +95,12 @@ class TorqueRipple(Effect):
 
 class JointElasticity(Effect):
     name = "joint_elasticity"
-
-    def __init__(self, stiffness, damping):
-        self.stiffness, self.damping = np.asarray(stiffness), damping
+    parameters = {"stiffness": "N_m_per_rad", "damping": "N_m_s_per_rad"}
 
     @classmethod
     def draw(cls, rng, cell):
         yields = log_uniform(rng, 1 / 6000, 1 / 3500)  # [rad/(N m)]
         return cls(fr3.STIFFNESS / fr3.STIFFNESS.max() / yields * np.array([1, 1, 1, 1, 1.44, 1.6, 3.0]), rng.uniform(1, 4))
-
-    def sizes(self):
-        return {"stiffness_N_m_per_rad": rounded(self.stiffness), "damping_N_m_s_per_rad": self.damping}
-
-    def blocks(self):
-        return [block(self.name, stiffness=rounded(self.stiffness), damping=self.damping)]
 
     def build(self, build):
         for joint in range(fr3.DOF):
@@ -170,21 +114,13 @@ class JointBacklash(Effect):
     """Play in one to three joints."""
 
     name = "joint_backlash"
-
-    def __init__(self, play):
-        self.play = np.asarray(play)
+    parameters = {"play": "rad"}
 
     @classmethod
     def draw(cls, rng, cell):
         worn = np.zeros(fr3.DOF)
         worn[rng.choice(6, rng.integers(1, 4), replace=False)] = log_uniform(rng, 0.002, 0.003)
         return cls(worn)
-
-    def sizes(self):
-        return {"play_rad": rounded(self.play)}
-
-    def blocks(self):
-        return [block(self.name, play=rounded(self.play))]
 
     def build(self, build):
         for joint in np.flatnonzero(self.play):
@@ -201,20 +137,12 @@ def load_springs(plant, q):
 
 class RotorInertia(Effect):
     name = "rotor_inertia"
-
-    def __init__(self, extra):
-        self.extra = np.asarray(extra)
+    parameters = {"extra": "kg_m2"}
 
     @classmethod
     def draw(cls, rng, cell):
         size = sign(rng) * log_uniform(rng, 0.05, 0.1)
         return cls(np.maximum(size * fr3.ROTOR / fr3.ROTOR.max(), -0.6 * fr3.ROTOR))
-
-    def sizes(self):
-        return {"extra_kg_m2": rounded(self.extra)}
-
-    def blocks(self):
-        return [block(self.name, extra=rounded(self.extra))]
 
     def build(self, build):
         build.rotor = build.rotor + self.extra
@@ -222,19 +150,11 @@ class RotorInertia(Effect):
 
 class Payload(Effect):
     name = "payload"
-
-    def __init__(self, mass, centre):
-        self.mass, self.centre = mass, np.asarray(centre)
+    parameters = {"mass": "kg", "centre": "m"}
 
     @classmethod
     def draw(cls, rng, cell):
         return cls(log_uniform(rng, 0.3, 0.5), rng.uniform([-0.03, -0.03, 0.0], [0.03, 0.03, 0.08]))
-
-    def sizes(self):
-        return {"mass_kg": self.mass, "centre_m": rounded(self.centre)}
-
-    def blocks(self):
-        return [block(self.name, mass=self.mass, centre=rounded(self.centre))]
 
     def build(self, build):
         centre = " ".join(f"{x:.9g}" for x in self.centre)
@@ -245,20 +165,11 @@ class Payload(Effect):
 class BaseTilt(Effect):
     name = "base_tilt"
     acts = True
-
-    def __init__(self, tilt):
-        self.tilt = np.asarray(tilt)
+    parameters = {"tilt": "rad"}
 
     @classmethod
     def draw(cls, rng, cell):
-        size, angle = log_uniform(rng, 0.01, 0.03), rng.uniform(0, 2 * np.pi)
-        return cls(size * np.array([np.cos(angle), np.sin(angle)]))
-
-    def sizes(self):
-        return {"tilt_rad": rounded(self.tilt)}
-
-    def blocks(self):
-        return [block(self.name, tilt=rounded(self.tilt))]
+        return cls(any_way(rng, log_uniform(rng, 0.01, 0.03)))
 
     def build(self, build):
         build.gravity = leaning(self.tilt)

@@ -3,7 +3,7 @@ import numpy as np
 
 from . import fr3
 from .camera_effects import turned
-from .effect import Effect, rounded
+from .effect import Effect
 from .model import MIDDLE, contact
 
 
@@ -16,16 +16,11 @@ class SloshingLoad(Outside):
 
     name = "sloshing load"
     near = ("payload",)
-
-    def __init__(self, mass, length, damping):
-        self.mass, self.length, self.damping = mass, length, damping
+    parameters = {"mass": "kg", "length": "m", "damping": "N_m_s_per_rad"}
 
     @classmethod
     def draw(cls, rng, cell):
         return cls(rng.uniform(0.3, 1.2), rng.uniform(0.03, 0.12), rng.uniform(0.0005, 0.004))
-
-    def sizes(self):
-        return {"mass_kg": self.mass, "length_m": self.length, "damping_N_m_s_per_rad": self.damping}
 
     def build(self, build):
         joint = f'damping="{self.damping:.9g}" armature="1e-5"'
@@ -40,16 +35,11 @@ class WarmingGears(Outside):
     name = "warming gears"
     near = ("joint_viscous_friction",)
     acts = True
-
-    def __init__(self, cold):
-        self.cold = np.asarray(cold)
+    parameters = {"cold": "N_m_s_per_rad"}
 
     @classmethod
     def draw(cls, rng, cell):
         return cls(fr3.by_size(rng.uniform(3.0, 10.0)))
-
-    def sizes(self):
-        return {"cold_N_m_s_per_rad": rounded(self.cold)}
 
     def clip(self, share, rng):
         self.now = self.cold * np.exp(-3 * share)
@@ -63,16 +53,14 @@ class Hose(Outside):
 
     name = "hose"
     acts = True
-
-    def __init__(self, joint, stiffness, slack):
-        self.joint, self.stiffness, self.slack = joint, stiffness, slack
+    parameters = {"joint": "", "stiffness": "N_m_per_rad", "slack": "rad"}
 
     @classmethod
     def draw(cls, rng, cell):
         return cls(int(rng.integers(0, 4)), rng.uniform(8, 50), rng.uniform(0.02, 0.08))
 
     def sizes(self):
-        return {"joint": self.joint + 1, "stiffness_N_m_per_rad": self.stiffness, "slack_rad": self.slack}
+        return {**super().sizes(), "joint": self.joint + 1}
 
     def begin(self, plant, q):
         self.from_ = q[self.joint] + self.slack
@@ -86,16 +74,11 @@ class HeldCommands(Outside):
     """A sender that stalls now and then: the last command is held, and the log does not tell."""
 
     name = "held commands"
-
-    def __init__(self, longest):
-        self.longest = longest
+    parameters = {"longest": "ms"}
 
     @classmethod
     def draw(cls, rng, cell):
         return cls(int(rng.integers(15, 60)))
-
-    def sizes(self):
-        return {"longest_ms": self.longest}
 
     def clip(self, share, rng):
         self.rng, self.left, self.held = rng, 0, None
@@ -113,17 +96,12 @@ class Magnet(Outside):
 
     name = "magnet"
     acts = True
-
-    def __init__(self, force, place, reach):
-        self.force, self.place, self.reach = force, np.asarray(place), reach
+    parameters = {"force": "N", "place": "m", "reach": "m"}
 
     @classmethod
     def draw(cls, rng, cell):
         weight = 9.81 * cell.box.mass
         return cls(weight * rng.uniform(0.3, 1.0), MIDDLE[:2] + rng.uniform(-0.1, 0.1, 2), rng.uniform(0.05, 0.10))
-
-    def sizes(self):
-        return {"force_N": self.force, "place_m": rounded(self.place), "reach_m": self.reach}
 
     def step(self, plant):
         away = np.array([*(self.place - plant.data.xipos[plant.box][:2]), -self.reach])
@@ -136,17 +114,12 @@ class Wind(Outside):
 
     name = "wind"
     acts = True
-
-    def __init__(self, force, direction, gust, frequency):
-        self.force, self.direction, self.gust, self.frequency = force, direction, gust, frequency
+    parameters = {"force": "N", "direction": "rad", "gust": "", "frequency": "Hz"}
 
     @classmethod
     def draw(cls, rng, cell):
         holds = 9.81 * cell.box.mass * cell.box.friction
         return cls(holds * rng.uniform(0.1, 0.3), rng.uniform(-np.pi, np.pi), rng.uniform(0.6, 1.0), rng.uniform(0.8, 2.5))
-
-    def sizes(self):
-        return {"force_N": self.force, "direction_rad": self.direction, "gust": self.gust, "frequency_Hz": self.frequency}
 
     def clip(self, share, rng):
         self.phase = rng.uniform(0, 2 * np.pi)
@@ -160,16 +133,11 @@ class DriftingFriction(Outside):
     """A table that wears: its friction goes on changing from clip to clip."""
 
     name = "drifting friction"
-
-    def __init__(self, change):
-        self.change = change
+    parameters = {"change": "of_ln_mu"}
 
     @classmethod
     def draw(cls, rng, cell):
         return cls(rng.choice([-1, 1]) * rng.uniform(0.25, 0.6))
-
-    def sizes(self):
-        return {"change_of_ln_mu": self.change}
 
     def clip(self, share, rng):
         self.factor = np.exp(self.change * (share - 0.5))
@@ -198,17 +166,12 @@ class SecondObject(Outside):
     """A small block that nobody tracks stands in the way."""
 
     name = "second object"
-
-    def __init__(self, mass, place):
-        self.mass, self.place = mass, np.asarray(place)
+    parameters = {"mass": "kg", "place": "m"}
 
     @classmethod
     def draw(cls, rng, cell):
         angle = rng.uniform(-np.pi, np.pi)
         return cls(rng.uniform(0.08, 0.3), MIDDLE[:2] + rng.uniform(0.11, 0.13) * np.array([np.cos(angle), np.sin(angle)]))
-
-    def sizes(self):
-        return {"mass_kg": self.mass, "place_m": rounded(self.place)}
 
     def build(self, build):
         x, y = self.place
@@ -223,17 +186,12 @@ class NoddingTracker(Outside):
     """The tracker's stand sways: its direction swings about the table's middle."""
 
     name = "nodding tracker"
-
-    def __init__(self, angle, frequency, axis):
-        self.angle, self.frequency, self.axis = angle, frequency, np.asarray(axis)
+    parameters = {"angle": "rad", "frequency": "Hz", "axis": ""}
 
     @classmethod
     def draw(cls, rng, cell):
         axis = rng.normal(size=3) * [0.3, 0.3, 1.0]
         return cls(rng.uniform(0.02, 0.08), rng.uniform(0.6, 2.0), axis / np.linalg.norm(axis))
-
-    def sizes(self):
-        return {"angle_rad": self.angle, "frequency_Hz": self.frequency, "axis": rounded(self.axis)}
 
     def clip(self, share, rng):
         self.phase = rng.uniform(0, 2 * np.pi)

@@ -128,11 +128,6 @@ def between(trace, row):
     return (1 - share) * trace.place[low] + share * trace.place[low + 1], turn / np.linalg.norm(turn)
 
 
-def blocks(world):
-    """What is hidden in the twin's own terms."""
-    return [block for effect in world.effects for block in effect.blocks()]
-
-
 def truth(world):
     """truth.json."""
     box, engine = world.box, world.engine
@@ -157,6 +152,6 @@ def theta(world, with_effects=True):
     if (box := world.box) is not None:
         text += (f"\n[object]\nfriction = {box.friction}\nmass = {box.mass}\n"
                  f"centre_of_mass = {laboratory.plain(box.centre_of_mass)}\ntip_friction = {box.tip_friction}\n")
-    for block in blocks(world) if with_effects else []:
+    for block in [effect.block() for effect in world.effects if effect.known] if with_effects else []:
         text += "\n[[effect]]\n" + "".join(f"{key} = {json.dumps(value, default=float)}\n" for key, value in block.items())
     return text
