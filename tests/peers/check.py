@@ -8,10 +8,14 @@ import os
 import sys
 import tempfile
 
-import numpy as np
+from program import Failed, answer, built, ending_by_signals, note
 
-from mujoco_cell import session, world
-from program import Failed, answer, ending_by_signals, note
+try:
+    import numpy as np
+
+    from mujoco_cell import session, world
+except ModuleNotFoundError as missing:
+    sys.exit(f"{missing.name} is not installed; `pip install -r tests/peers/requirements.txt` in a virtual environment")
 
 
 def arguments():
@@ -19,7 +23,7 @@ def arguments():
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter,
         epilog="Joints: mean over joints 1 to 6 of the root mean square, in microrad; box: mean and median ADD in mm. Nine minutes for\n"
                "all on one core.")
-    parser.add_argument("--program", required=True, metavar="TWIN", help="the built `twin`")
+    parser.add_argument("--program", required=True, type=built, metavar="TWIN", help="the built `twin`")
     parser.add_argument("--only", default="", metavar="A,B", help="only these effects, or `nothing` [default: all]")
     parser.add_argument("--kinds", default="", metavar="A,B", help="only these kinds of sessions, as in run.py [default: all]")
     parser.add_argument("--seed", type=int, default=1, metavar="S")
@@ -49,8 +53,11 @@ def left(program, folder, text):
 def main():
     given = arguments()
     ending_by_signals()
+    chosen = cases(given.only.split(",") if given.only else [], given.kinds.split(",") if given.kinds else [])
+    if not chosen:
+        sys.exit("nothing is called so; `run.py --help` lists the kinds, docs/effects.md the effects")
     print(f"{'kind':12s} {'hidden':27s} {'without: joints':>15s} {'box':>11s} {'with: joints':>15s} {'box':>10s}   size")
-    for kind, which, name in cases(given.only.split(",") if given.only else [], given.kinds.split(",") if given.kinds else []):
+    for kind, which, name in chosen:
         with tempfile.TemporaryDirectory() as place:
             folder, drawn = os.path.join(place, "one"), world.draw(given.seed, 0, kind, which)
             try:

@@ -1,5 +1,7 @@
 """Runs a program of this project and takes its JSON answer; ends it within a second when this process is asked to end."""
+import argparse
 import json
+import os
 import signal
 import subprocess
 import sys
@@ -9,6 +11,13 @@ GRACE = 0.7  # [s]
 
 class Failed(Exception):
     """A program gave no answer; its last line says why."""
+
+
+def built(path):
+    """An argument that names a program."""
+    if not os.access(path, os.X_OK) or os.path.isdir(path):
+        raise argparse.ArgumentTypeError(f"{path} is no program; build it with `cargo build --release`")
+    return path
 
 
 def ending_by_signals():

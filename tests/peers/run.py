@@ -9,11 +9,15 @@ import os
 import sys
 import time
 
-import numpy as np
-
 import verdicts
-from mujoco_cell import session, world
-from program import Failed, answer, ending_by_signals, note
+from program import Failed, answer, built, ending_by_signals, note
+
+try:
+    import numpy as np
+
+    from mujoco_cell import session, world
+except ModuleNotFoundError as missing:
+    sys.exit(f"{missing.name} is not installed; `pip install -r tests/peers/requirements.txt` in a virtual environment")
 
 SHORT = 22
 SINGLE = ("arm", "hit", "slide", "camera", "arm-strokes")
@@ -41,7 +45,7 @@ examples:
 def arguments():
     parser = argparse.ArgumentParser(description=__doc__, epilog=EPILOG, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--out", required=True, metavar="FOLDER", help="where sessions and results go, or lie already")
-    parser.add_argument("--program", metavar="CALIBRATION", help="the built `calibration`; without it sessions are only recorded")
+    parser.add_argument("--program", type=built, metavar="CALIBRATION", help="the built `calibration`; without it sessions are only recorded")
     parser.add_argument("--sessions", type=int, default=40, metavar="N", help="how many [default: 40]")
     parser.add_argument("--seed", type=int, default=1, metavar="S", help="another seed, other worlds [default: 1]")
     parser.add_argument("--kinds", default=",".join(world.KINDS), metavar="A,B", help="kinds of sessions, see below [default: all]")
@@ -57,8 +61,6 @@ def arguments():
         if not given.kinds:
             known = ", ".join(name for kind in SINGLE for name in names(kind))
             parser.error(f"no effect is called `{given.effect}`; there are {known}")
-    if given.program is not None and not os.access(given.program, os.X_OK):
-        parser.error(f"{given.program} is no program; build it with `cargo build --release`")
     if given.short:
         given.sessions = SHORT
     return given
@@ -150,10 +152,12 @@ def report(given, results):
 def main():
     given = arguments()
     ending_by_signals()
-    os.makedirs(given.out, exist_ok=True)
+    try:
+        os.makedirs(given.out, exist_ok=True)
+    except OSError as error:
+        sys.exit(f"{given.out}: {error.strerror}; give --out a folder that can be written")
     if not same_draw(given):
-        note(f"{given.out} holds sessions of another --seed, --kinds or --effect; give another --out")
-        sys.exit(1)
+        sys.exit(f"{given.out} holds sessions of another --seed, --kinds or --effect; give another --out")
     results, times = [], []
     try:
         for number in range(given.sessions):
