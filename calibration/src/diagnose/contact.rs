@@ -7,8 +7,8 @@
 //! them. Their slopes by what the arm feels count as zero (a cut, as in modular inference: Liu, Bayarri and Berger 2009).
 //!
 //! Nor do they say anything about a vertical force. A tip that pushes and does not slip may hold the object down or lift it by up to
-//! its friction; how much, rigid bodies leave open, and two engines differ there by hundreds of microradians in strokes whose
-//! objects go the same way. So the direction in which a vertical force at the tip turns the joints, `K_P^-1 J_z'`, is taken out.
+//! its friction; how much, rigid bodies leave open, and two engines differ there by ten and more times the encoders' noise in
+//! strokes whose objects go the same way (`tests/peers/README.md`). So the direction in which a vertical force at the tip turns the joints, `K_P^-1 J_z'`, is taken out.
 
 use super::arm_clips::ArmClips;
 use super::evidence::{Row, StageName};
