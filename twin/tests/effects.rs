@@ -2,7 +2,7 @@
 
 use shared_mem::theta::{EffectTheta, Theta};
 use twin::arm::{ArmModel, ControlLaw, JointState};
-use twin::effects::{Effects, Role, Shape, registry};
+use twin::effects::{Effects, Elsewhere, Role, Shape, registry};
 use twin::rollout::{ArmRollout, CommandTrack};
 
 /// Every name that reports and files may rely on.
@@ -142,7 +142,15 @@ fn row(effect: &twin::effects::EffectInfo) -> String {
         };
         // Four places behind the point, or all of a number that would have none of them.
         let [low, high] = p.plausible.map(|v| if v.abs() < 1e-4 { v } else { (v * 1e4).round() / 1e4 });
-        format!("`{}` [{}]{count}: {low} to {high}, {rest}", p.name, p.unit)
+        let of = |[low, high]: [f64; 2], whole: &str| format!(" (elsewhere {low} to {high}{whole})");
+        let elsewhere = match p.elsewhere {
+            Elsewhere::Same => String::new(),
+            Elsewhere::Range(range) => of(range, ""),
+            Elsewhere::OfTorqueLimit(share) => of(share, " of the torque limit"),
+            Elsewhere::OfInertia(share) => of(share, " of the joint's inertia"),
+            Elsewhere::OfMass(share) => of(share, " of the links' mass"),
+        };
+        format!("`{}` [{}]{count}: {low} to {high}{elsewhere}, {rest}", p.name, p.unit)
     };
     let parameters: Vec<String> = effect.parameters.iter().map(parameter).collect();
     let others = effect.confusable_with.join(", ");

@@ -1,6 +1,6 @@
 //! Where the search begins: the paper's parameters identified on the clips for fitting.
 //!
-//! In order: the arm by itself, since a gain that is off moves the hit, and a hit elsewhere tells nothing about the gain;
+//! In order: where gains that are known by range alone may begin; the arm by itself, since a gain that is off moves the hit, and a hit elsewhere tells nothing about the gain;
 //! then the object's parameters under that arm, by the identification's own way over rough hits; then all together.
 
 use super::admit::Admitted;
@@ -10,7 +10,7 @@ use super::fit::{Bench, Effort, Hypothesis};
 use super::split::Split;
 use super::sweep::Precision;
 use super::{floor, stages};
-use crate::identify::object;
+use crate::identify::{arm, object};
 use shared_mem::cell::Cell;
 use shared_mem::progress::Progress;
 use shared_mem::recording::Clip;
@@ -39,10 +39,10 @@ pub fn identify<E: Evidence>(
     bar: &Progress,
 ) -> Option<Hypothesis> {
     let even = floor::sensors_alone(bench.evidence);
-    let arm = ArmAlone(bench.evidence);
-    let alone = arm.bench(bench);
+    let without_object = ArmAlone(bench.evidence);
+    let alone = without_object.bench(bench);
     bar.show(0, stages::BASELINE);
-    let arm = alone.fit((&[], bench.library.start()), &split.train, &even, None, WAY)?;
+    let arm = alone.fit((&[], start(bench, split, cell, admitted)), &split.train, &even, None, WAY)?;
     bar.show(1, stages::BASELINE);
     let arm = alone.fit((&[], arm.full.clone()), &split.train, &even, Some(&arm), LAST)?;
     if !admitted.with_object {
@@ -52,6 +52,19 @@ pub fn identify<E: Evidence>(
     let full = refined(bench, split, cell, admitted, &arm.full).unwrap_or_else(|| arm.full.clone());
     bar.show(3, stages::BASELINE);
     bench.fit((&[], full), &split.train, &even, None, TOGETHER)
+}
+
+/// Where the fit begins.
+fn start<E: Evidence>(bench: &Bench<'_, E>, split: &Split, cell: &Cell, admitted: &Admitted) -> Vec<f64> {
+    let mut start = bench.library.start();
+    let clips = split.train.iter().map(|clip| admitted.clips[*clip].clone()).collect();
+    let Ok(theta) = arm::begun(cell, clips, &bench.library.theta(&start), bench.interrupt) else { return start };
+    let numbers = bench.library.settings.numbers(&theta);
+    for k in bench.library.baseline.clone() {
+        let unknown = &bench.library.unknowns[k];
+        start[k] = numbers[k].unwrap_or(start[k]).clamp(unknown.lower, unknown.upper);
+    }
+    start
 }
 
 /// Numbers with the object's parameters that fit the strokes best under the arm and the effects that are given, by

@@ -11,8 +11,9 @@ use crate::forward::setting::{self, Setting, Settings};
 use shared_mem::cell::Cell;
 use shared_mem::theta::Theta;
 use std::ops::Range;
+use twin::arm::ArmModel;
 use twin::arm::Joints;
-use twin::effects::{EffectInfo, Role, Search, Shape, Stage, find, registry};
+use twin::effects::{EffectInfo, Parameter, Robot, Role, Search, Shape, Stage, find, registry};
 
 /// All numbers of all hypotheses.
 #[derive(Debug, Clone)]
@@ -30,6 +31,8 @@ pub struct Library {
     pub baseline: Range<usize>,
     /// Effects.
     pub candidates: Vec<Candidate>,
+    /// How strong they may be on this robot.
+    robot: Robot,
 }
 
 /// One effect as a hypothesis.
@@ -105,6 +108,7 @@ impl Library {
             keep_known_gains(cell, unknown);
         }
         let baseline = 0..numbers.len();
+        let robot = ArmModel::from_cell(cell).map_or_else(|_| Robot::unknown(), |arm| Robot::of(&arm));
         let mut candidates = Vec::new();
         let fits = |effect: &&EffectInfo| {
             let known = base.effects.iter().any(|given| given.name == effect.name);
@@ -113,20 +117,20 @@ impl Library {
         };
         for effect in registry().iter().filter(fits) {
             let at = numbers.len();
-            numbers.extend(setting::effect_settings(effect, dof));
+            numbers.extend(setting::effect_settings(effect, &robot, dof));
             for (setting, unknown) in &mut numbers[at..] {
                 if let Some(bound) = bound_of(setting, peaks) {
                     unknown.step = BOUND_STEP / bound;
                 }
             }
-            candidates.push(Candidate::new(effect, at, &numbers, (ground, peaks)));
+            candidates.push(Candidate::new(effect, at, &numbers, (ground, peaks, &robot)));
         }
         let joint = |setting| joint_of(setting).filter(|_| !(with_object && moves_the_tip_unseen(setting)));
         let joints = numbers.iter().map(|(setting, _)| joint(setting)).collect();
         let carried = numbers.iter().position(|(setting, _)| is_carried(setting));
         let reaches = numbers.iter().map(|(setting, _)| arm_reach(setting, carried)).collect();
         let (all, unknowns): (Vec<Setting>, Vec<Unknown>) = numbers.into_iter().unzip();
-        Self { settings: Settings::new(base.clone(), all), unknowns, joints, reaches, baseline, candidates }
+        Self { settings: Settings::new(base.clone(), all), unknowns, joints, reaches, baseline, candidates, robot }
     }
 
     /// Where every search begins: the baseline's values, all effects at rest.
@@ -178,6 +182,19 @@ impl Library {
         (0..numbers.len()).filter(|k| self.arm_feels(*k, numbers)).map(|k| numbers[k]).collect()
     }
 
+    /// Values of the parameter behind a number of an effect that are met in practice on this robot; `None` for numbers of the
+    /// baseline.
+    #[must_use]
+    pub fn met(&self, number: usize) -> Option<[f64; 2]> {
+        met(&self.robot, &self.settings.settings()[number])
+    }
+
+    /// How strong effects may be on this robot.
+    #[must_use]
+    pub fn robot(&self) -> &Robot {
+        &self.robot
+    }
+
     /// Whether two candidates are known to look alike in some recordings.
     #[must_use]
     pub fn look_alike(&self, a: usize, b: usize) -> bool {
@@ -195,10 +212,7 @@ impl Library {
 fn joint_of(setting: &Setting) -> Option<usize> {
     match *setting {
         Setting::Stiffness(joint) | Setting::Damping(joint) => Some(joint),
-        Setting::Effect { name, parameter, index, .. } => {
-            let info = find(name)?.parameters.iter().find(|p| p.name == parameter)?;
-            if info.shape == Shape::PerJoint { index } else { None }
-        }
+        Setting::Effect { index, .. } => parameter_of(setting).filter(|p| p.shape == Shape::PerJoint).and(index),
         _ => None,
     }
 }
@@ -281,10 +295,15 @@ fn bound_of(setting: &Setting, peaks: &Joints) -> Option<f64> {
     }
 }
 
+/// The parameter behind a number of an effect.
+fn parameter_of(setting: &Setting) -> Option<&'static Parameter> {
+    let Setting::Effect { name, parameter, .. } = setting else { return None };
+    find(name)?.parameters.iter().find(|p| p.name == *parameter)
+}
+
 /// How a search comes by a number of an effect.
 fn search_of(setting: &Setting) -> Option<Search> {
-    let Setting::Effect { name, parameter, .. } = setting else { return None };
-    find(name)?.parameters.iter().find(|p| p.name == *parameter).map(|p| p.search)
+    parameter_of(setting).map(|parameter| parameter.search)
 }
 
 /// Whether a number of an effect does not move along with the others.
@@ -308,19 +327,25 @@ const LOWEST_LIMIT: f64 = 0.25;
 /// The step of a probe as a share of what is met in practice.
 const PROBE_SHARE: f64 = 0.1;
 
-/// Where objects slid, and what the joints were asked for [N m].
-type Met<'a> = (Option<&'a Ground>, &'a Joints);
+/// Where objects slid, what the joints were asked for [N m], and what is met on such a robot.
+type Met<'a> = (Option<&'a Ground>, &'a Joints, &'a Robot);
+
+/// Values of the parameter behind a number of an effect that are met in practice on a robot.
+fn met(robot: &Robot, setting: &Setting) -> Option<[f64; 2]> {
+    let Setting::Effect { index, .. } = *setting else { return None };
+    parameter_of(setting).map(|parameter| robot.range(parameter, index))
+}
 
 fn alternatives(
     effect: &EffectInfo,
     at: usize,
     sizes: &[usize],
     numbers: &[(Setting, Unknown)],
-    (ground, peaks): Met<'_>,
+    (ground, peaks, robot): Met<'_>,
 ) -> Vec<Alternative> {
     let probe = |k: &usize| match bound_of(&numbers[*k].0, peaks) {
         Some(peak) => biting(*k, peak, &numbers[*k].1),
-        None => probe(effect, *k, &numbers[*k]),
+        None => probe(*k, &numbers[*k], robot),
     };
     let index = |parameter: &str| -> Vec<usize> {
         let is = |setting: &Setting| matches!(setting, Setting::Effect { parameter: p, .. } if *p == parameter);
@@ -331,7 +356,9 @@ fn alternatives(
         _ => None,
     });
     let probes: Vec<Probe> = match angle {
-        Some((angles, quarter)) => [0.0, quarter].map(|angle| across(effect, sizes, (&angles, angle))).concat(),
+        Some((angles, quarter)) => {
+            [0.0, quarter].map(|angle| across((sizes, numbers), (&angles, angle), robot)).concat()
+        }
         None => sizes.iter().map(probe).collect(),
     };
     let with = |form: Vec<(usize, f64)>| Alternative { form, probes: probes.clone() };
@@ -358,22 +385,23 @@ fn alternatives(
 }
 
 /// Every size at an angle, as strong as a probe of it is.
-fn across(effect: &EffectInfo, sizes: &[usize], (angles, angle): (&[usize], f64)) -> Vec<Probe> {
-    let size = effect.parameters.iter().find(|p| matches!(p.role, Role::Size { .. })).expect("an effect has a size");
+fn across(
+    (sizes, numbers): (&[usize], &[(Setting, Unknown)]),
+    (angles, angle): (&[usize], f64),
+    robot: &Robot,
+) -> Vec<Probe> {
     let share = 2.0 * PROBE_SHARE;
-    let strength = share * size.plausible[1];
-    let of = |(size, number): (&usize, &usize)| Probe {
-        moves: vec![(*size, strength), (*number, angle)],
-        one_sided: false,
-        largest: share.recip(),
+    let of = |(size, number): (&usize, &usize)| {
+        let [_, strongest] = met(robot, &numbers[*size].0).expect("a size is a parameter");
+        Probe { moves: vec![(*size, share * strongest), (*number, angle)], one_sided: false, largest: share.recip() }
     };
     sizes.iter().zip(angles).map(of).collect()
 }
 
-fn probe(effect: &EffectInfo, number: usize, (setting, unknown): &(Setting, Unknown)) -> Probe {
-    let Setting::Effect { parameter, inverse, .. } = setting else { unreachable!("sizes belong to effects") };
-    let info = effect.parameters.iter().find(|p| p.name == *parameter).expect("a size is a parameter");
-    let [lo, hi] = info.plausible;
+fn probe(number: usize, (setting, unknown): &(Setting, Unknown), robot: &Robot) -> Probe {
+    let Setting::Effect { inverse, .. } = setting else { unreachable!("sizes belong to effects") };
+    let info = parameter_of(setting).expect("a size is a parameter");
+    let [lo, hi] = met(robot, setting).expect("a size is a parameter");
     let reach = match info.usual {
         _ if *inverse => lo.recip(),
         Some(usual) => (usual - unknown.start).abs(),

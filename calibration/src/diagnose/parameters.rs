@@ -41,7 +41,7 @@ pub fn of_effect<E: Evidence>(bench: &Bench<'_, E>, hypothesis: &Hypothesis, eff
             let half = hypothesis.free.iter().position(|free| *free == k).map_or(0.0, |place| half_widths[place]);
             let half = if rough && half > 0.0 { half.hypot(NINETY * bench.library.unknowns[k].step) } else { half };
             let open = candidate.sizes.contains(&k) && !hypothesis.free.contains(&k);
-            let interval = match parameter.plausible {
+            let interval = match bench.library.met(k).unwrap_or(parameter.plausible) {
                 _ if !open => [value - half, value + half],
                 [low, _] if inverse => [0.0, low.recip()],
                 plausible => plausible,

@@ -112,12 +112,14 @@ pub fn implausible<E: Evidence>(bench: &Bench<'_, E>, hypothesis: &Hypothesis) -
         let sizes = parameters::of_effect(bench, hypothesis, *effect);
         let info = bench.library.candidates[*effect].effect.parameters.iter();
         info.filter(|parameter| matches!(parameter.role, Role::Size { .. })).any(|parameter| {
-            let [lo, hi] = parameter.plausible;
-            let room = BEYOND * (hi - lo);
-            // What fades out towards infinity is met from its strongest on.
-            let hi = if parameter.resting_value().is_infinite() { f64::INFINITY } else { hi };
-            let outside = |[low, high]: &[f64; 2]| *low > hi + room || *high < lo - room;
-            sizes.get(parameter.name).is_some_and(|size| size.ci90.iter().any(outside))
+            let outside = |(index, [low, high]): (usize, &[f64; 2])| {
+                let [lo, hi] = bench.library.robot().range(parameter, Some(index));
+                let room = BEYOND * (hi - lo);
+                // What fades out towards infinity is met from its strongest on.
+                let hi = if parameter.resting_value().is_infinite() { f64::INFINITY } else { hi };
+                *low > hi + room || *high < lo - room
+            };
+            sizes.get(parameter.name).is_some_and(|size| size.ci90.iter().enumerate().any(outside))
         })
     };
     hypothesis.effects.iter().copied().filter(beyond).collect()

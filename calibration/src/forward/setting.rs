@@ -295,7 +295,8 @@ mod tests {
     fn every_effect_can_be_turned_from_neutral_and_is_accepted_at_both_ends() {
         let base = complete(&cell(), None).expect("a complete cell");
         for info in registry() {
-            let (settings, unknowns): (Vec<_>, Vec<_>) = effect_settings(info, 7).into_iter().unzip();
+            let (settings, unknowns): (Vec<_>, Vec<_>) =
+                effect_settings(info, &twin::effects::Robot::unknown(), 7).into_iter().unzip();
             let settings = Settings::new(base.clone(), settings);
             let at = |of: fn(&Unknown) -> f64| {
                 let theta = settings.theta(&unknowns.iter().map(of).collect::<Vec<_>>());

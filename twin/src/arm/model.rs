@@ -305,6 +305,12 @@ impl ArmModel {
         self.links.map(|link| link.rotor)
     }
 
+    /// Mass of all links and what is mounted on them [kg]; 0 where only joints are known.
+    #[must_use]
+    pub fn moving_mass(&self) -> f64 {
+        self.links.iter().take(self.dof).map(|link| link.body.mass).sum()
+    }
+
     /// Flange to the end of the tool along the flange's z axis [m]; 0 without a tool.
     #[must_use]
     pub fn tool_length(&self) -> f64 {

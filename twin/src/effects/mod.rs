@@ -19,6 +19,7 @@ mod camera;
 mod hit;
 mod registry;
 mod remedy;
+mod robot;
 mod slide;
 mod values;
 
@@ -26,8 +27,9 @@ pub(crate) use arm::JointMemory;
 pub use arm::{ArmEffects, ArmMemory};
 pub use camera::{CameraEffects, CameraMemory};
 pub use hit::HitEffects;
-pub use registry::{EffectInfo, Parameter, Place, Role, Search, Shape, Stage, find, registry};
+pub use registry::{EffectInfo, Elsewhere, Parameter, Place, Role, Search, Shape, Stage, find, registry};
 pub use remedy::{Found, Remedy};
+pub use robot::Robot;
 pub use slide::{SlideEffects, TableFriction};
 pub use values::EffectError;
 

@@ -90,6 +90,21 @@ pub enum Search {
     Middle,
 }
 
+/// What is met on robots that are built unlike the FR3.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Elsewhere {
+    /// The same.
+    Same,
+    /// Another range.
+    Range([f64; 2]),
+    /// So many times the joint's torque limit in N m; the same where that is not known.
+    OfTorqueLimit([f64; 2]),
+    /// So many times the inertia that the joint moves in the ready pose, in kg m².
+    OfInertia([f64; 2]),
+    /// So many times the mass of all links that move, in kg; the same where none has any.
+    OfMass([f64; 2]),
+}
+
 /// One parameter of an effect.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Parameter {
@@ -99,8 +114,10 @@ pub struct Parameter {
     pub unit: &'static str,
     /// How many numbers.
     pub shape: Shape,
-    /// Values that are met in practice: the range of a search.
+    /// Values that are met in practice on the FR3 and its kin: the range of a search. [`super::Robot::range`] has those of others.
     pub plausible: [f64; 2],
+    /// The same on robots built otherwise.
+    pub elsewhere: Elsewhere,
     /// The strongest that is met in arms of laboratories, where simpler machines have more: by this a search takes its steps.
     pub usual: Option<f64>,
     /// Values that have a meaning.
@@ -153,6 +170,7 @@ impl Parameter {
             unit,
             shape: Shape::Number,
             plausible,
+            elsewhere: Elsewhere::Same,
             usual: None,
             possible: [f64::MIN, f64::MAX],
             role: Role::Size { neutral },
@@ -176,6 +194,10 @@ impl Parameter {
 
     pub(super) const fn within(self, lowest: f64, highest: f64) -> Self {
         Self { possible: [lowest, highest], ..self }
+    }
+
+    pub(super) const fn elsewhere(self, elsewhere: Elsewhere) -> Self {
+        Self { elsewhere, ..self }
     }
 
     pub(super) const fn usually_up_to(self, strongest: f64) -> Self {

@@ -4,7 +4,7 @@ use super::Setting;
 use crate::estimate::Unknown;
 use shared_mem::cell::{Cell, Range};
 use shared_mem::theta::Theta;
-use twin::effects::{EffectInfo, Parameter, Role, Shape, Stage};
+use twin::effects::{EffectInfo, Parameter, Robot, Role, Shape, Stage};
 use twin::scene::ObjectModel;
 
 /// Gains stated by value are searched this far: the values are right to 20 %, and a bound must not be mistaken for them.
@@ -88,9 +88,9 @@ const EFFECT_STEP: f64 = 2e-3;
 /// roughness averages out.
 const ROUGH_STEP: f64 = 2e-2;
 
-/// Every number of an effect, for an arm of `dof` joints, beginning where the effect changes nothing.
+/// Every number of an effect, for an arm of `dof` joints on such a robot, beginning where the effect changes nothing.
 #[must_use]
-pub fn effect_settings(info: &'static EffectInfo, dof: usize) -> Vec<(Setting, Unknown)> {
+pub fn effect_settings(info: &'static EffectInfo, robot: &Robot, dof: usize) -> Vec<(Setting, Unknown)> {
     let mut all = Vec::new();
     for parameter in info.parameters {
         let indices: Vec<Option<usize>> = match parameter.shape {
@@ -99,22 +99,21 @@ pub fn effect_settings(info: &'static EffectInfo, dof: usize) -> Vec<(Setting, U
             Shape::Vector(n) => (0..n).map(Some).collect(),
         };
         let inverse = parameter.resting_value().is_infinite();
-        let [lo, hi] = searched(parameter, inverse);
         let hits = info.stage != Stage::Control || info.name == "joint_backlash";
         let share = if hits { ROUGH_STEP } else { EFFECT_STEP };
-        let step = share * width(parameter, inverse);
         let start = if inverse { 0.0 } else { parameter.resting_value() };
         for index in indices {
+            let met = robot.range(parameter, index);
             let setting = Setting::Effect { name: info.name, parameter: parameter.name, index, inverse };
-            all.push(unknown(setting, start, [lo, hi], step));
+            all.push(unknown(setting, start, searched(parameter, met, inverse), share * width(met, inverse)));
         }
     }
     all
 }
 
-/// The range of the number that is turned.
-fn searched(parameter: &Parameter, inverse: bool) -> Range {
-    let [lo, hi] = parameter.plausible;
+/// The range of the number that is turned; `met`: values of the parameter that are met in practice.
+fn searched(parameter: &Parameter, met: Range, inverse: bool) -> Range {
+    let [lo, hi] = met;
     if inverse {
         return [0.0, (1.0 + WIDENED) / lo];
     }
@@ -126,8 +125,7 @@ fn searched(parameter: &Parameter, inverse: bool) -> Range {
     [(lo - more).max(least).min(rest), (hi + more).min(most).max(rest)]
 }
 
-fn width(parameter: &Parameter, inverse: bool) -> f64 {
-    let [lo, hi] = parameter.plausible;
+fn width([lo, hi]: Range, inverse: bool) -> f64 {
     if inverse { lo.recip() } else { hi - lo }
 }
 

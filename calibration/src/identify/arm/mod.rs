@@ -22,7 +22,7 @@ mod verdict;
 
 use super::answer::Identification;
 use super::run::{Optimizer, Outcome, Run, RunError, concluded};
-use crate::estimate::{Random, Subset, Unknown};
+use crate::estimate::{ClipModel as _, Random, Subset, Unknown};
 use crate::forward::arm::ArmClips;
 use crate::forward::setting::{BaseError, complete, effect_settings, gains};
 use crate::forward::{Setting, Settings};
@@ -37,8 +37,8 @@ use shared_mem::theta::Theta;
 use shared_mem::toml_file::TomlFileError;
 use std::path::PathBuf;
 use std::time::Instant;
-use twin::arm::ModelError;
-use twin::effects::{EffectInfo, Stage, find, registry};
+use twin::arm::{ArmModel, ModelError};
+use twin::effects::{EffectInfo, Robot, Stage, find, registry};
 
 /// What to identify, and how.
 #[derive(Debug, Clone, Default)]
@@ -191,17 +191,33 @@ fn identify_kept(
     Ok((answer, theta))
 }
 
+/// Parameters from which a fit of gains by their slopes arrives: where cell.toml knows gains by range alone, the best of a coarse
+/// grid on the first few clips, joint by joint; elsewhere those given.
+///
+/// # Errors
+/// [`ArmError`] when the arm cannot be simulated at all.
+pub fn begun(cell: &Cell, clips: Vec<Clip>, base: &Theta, interrupt: &Interrupt) -> Result<Theta, ArmError> {
+    let (settings, mut unknowns): (Vec<_>, Vec<_>) = gains(cell, base).into_iter().unzip();
+    let settings = Settings::new(base.clone(), settings);
+    let numbers: Numbers<'_> = Box::new(|shared| settings.theta(shared));
+    let (model, _) = ArmClips::new(cell, clips, session::CHANNELS, numbers)?;
+    let all: Vec<usize> = (0..model.clips()).collect();
+    start::improve(cell, &model, &all, settings.settings(), &mut unknowns, interrupt);
+    Ok(settings.theta(&unknowns.iter().map(|unknown| unknown.start).collect::<Vec<_>>()))
+}
+
 /// Gains, and the parameters of the effects that were asked for.
 fn searched(cell: &Cell, base: &Theta, also: &[String]) -> Result<Vec<(Setting, Unknown)>, ArmError> {
     let mut all = gains(cell, base);
     let dof = base.arm.as_ref().map_or(0, |arm| arm.stiffness.len());
+    let robot = Robot::of(&ArmModel::from_cell(cell)?);
     for name in also {
         let on_arm = |effect: &&EffectInfo| effect.stage == Stage::Control;
         let effect = find(name).filter(|effect| on_arm(effect)).ok_or_else(|| {
             let known: Vec<&str> = registry().iter().filter(on_arm).map(|effect| effect.name).collect();
             ArmError::Effect { given: name.clone(), known: known.join(", ") }
         })?;
-        all.extend(effect_settings(effect, dof));
+        all.extend(effect_settings(effect, &robot, dof));
     }
     Ok(all)
 }

@@ -7,7 +7,7 @@ use crate::forward::Setting;
 use crate::identify::answer::Untold;
 use crate::identify::run::Optimizer;
 use crate::report::number_in_words;
-use twin::effects::find;
+use twin::effects::{Robot, find};
 
 /// A gain whose 95 % interval is wider than this share of it, to either side, is not told.
 const GAIN_SHARE: f64 = 0.25;
@@ -55,7 +55,7 @@ fn why(finding: &Finding<'_>, k: usize, model: &Model<'_>, clips: &Used) -> Opti
     }
     let (size, share) = match setting {
         Setting::Stiffness(_) | Setting::Damping(_) => (finding.outcome.fit.shared[k].abs(), GAIN_SHARE),
-        _ => (plausible(setting).unwrap_or(unknown.upper - unknown.lower), EFFECT_SHARE),
+        _ => (met_width(model, setting).unwrap_or(unknown.upper - unknown.lower), EFFECT_SHARE),
     };
     if half <= share * size {
         return None;
@@ -107,9 +107,10 @@ fn commanded(joint: usize, model: &Model<'_>, clips: &Used) -> f64 {
     clips.split.train.iter().map(travel).fold(0.0, f64::max)
 }
 
-/// Width of what is met in practice.
-fn plausible(setting: &Setting) -> Option<f64> {
-    let Setting::Effect { name, parameter, inverse, .. } = setting else { return None };
-    let [lo, hi] = find(name)?.parameters.iter().find(|p| p.name == *parameter)?.plausible;
+/// Width of what is met in practice on this arm.
+fn met_width(model: &Model<'_>, setting: &Setting) -> Option<f64> {
+    let Setting::Effect { name, parameter, index, inverse } = setting else { return None };
+    let parameter = find(name)?.parameters.iter().find(|p| p.name == *parameter)?;
+    let [lo, hi] = Robot::of(model.arm()).range(parameter, *index);
     Some(if *inverse { lo.recip() } else { hi - lo })
 }

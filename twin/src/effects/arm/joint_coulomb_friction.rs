@@ -9,14 +9,20 @@
 //! - Confused with: load friction (alike in one pose), backlash (lost motion too), Stribeck friction (needs creep).
 
 use crate::arm::Joints;
-use crate::effects::registry::{EffectInfo, Parameter, Place, Search, Stage};
+use crate::effects::registry::{EffectInfo, Elsewhere, Parameter, Place, Search, Stage};
 use crate::effects::remedy::Remedy;
 
 pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     name: "joint_coulomb_friction",
     stage: Stage::Control,
     acts_on: Place::Joint,
-    parameters: &[Parameter::size("coulomb", "N m", [0.0, 3.0], 0.0).per_joint().within(0.0, f64::MAX), CREEP],
+    parameters: &[
+        Parameter::size("coulomb", "N m", [0.0, 3.0], 0.0)
+            .per_joint()
+            .within(0.0, f64::MAX)
+            .elsewhere(Elsewhere::OfTorqueLimit([0.0, 0.25])),
+        CREEP,
+    ],
     confusable_with: &["joint_load_friction", "joint_stribeck_friction", "joint_backlash"],
     install: |values, effects| {
         effects.arm.joint_coulomb_friction =

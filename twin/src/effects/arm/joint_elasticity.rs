@@ -9,7 +9,7 @@
 //! - Confused with: payload and camera extrinsics (static sag), torque delay (rings too), rotor inertia below resonance.
 
 use crate::arm::{Joints, Spring};
-use crate::effects::registry::{EffectInfo, Parameter, Place, Stage};
+use crate::effects::registry::{EffectInfo, Elsewhere, Parameter, Place, Stage};
 use crate::effects::remedy::Remedy;
 
 pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
@@ -17,7 +17,10 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     stage: Stage::Control,
     acts_on: Place::Joint,
     parameters: &[
-        Parameter::size("stiffness", "N m/rad", [1e3, 2e4], f64::INFINITY).per_joint().within(1.0, f64::MAX),
+        Parameter::size("stiffness", "N m/rad", [1e3, 2e4], f64::INFINITY)
+            .per_joint()
+            .within(1.0, f64::MAX)
+            .elsewhere(Elsewhere::OfTorqueLimit([12.0, 230.0])),
         Parameter::form("damping", "N m s/rad", [0.0, 10.0], 2.0).per_joint().within(0.0, f64::MAX),
     ],
     confusable_with: &["payload", "rotor_inertia", "torque_delay", "camera_extrinsic_rotation"],

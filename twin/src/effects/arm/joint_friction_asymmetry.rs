@@ -10,7 +10,7 @@
 //! - Confused with: payload and base tilt (even as well, but follow the pose), torque sensor bias (leaves the motion alone).
 
 use crate::arm::Joints;
-use crate::effects::registry::{EffectInfo, Parameter, Place, Stage};
+use crate::effects::registry::{EffectInfo, Elsewhere, Parameter, Place, Stage};
 use crate::effects::remedy::{Remedy, with_unit};
 
 pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
@@ -18,7 +18,7 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     stage: Stage::Control,
     acts_on: Place::Joint,
     parameters: &[
-        Parameter::size("offset", "N m", [-1.0, 1.0], 0.0).per_joint(),
+        Parameter::size("offset", "N m", [-1.0, 1.0], 0.0).per_joint().elsewhere(Elsewhere::OfTorqueLimit([-0.1, 0.1])),
         Parameter::form("fading", "rad/s", [0.0, 0.05], 0.0)
             .within(0.0, f64::MAX)
             // At rest as in motion, and none at rest.

@@ -10,14 +10,20 @@
 
 use super::joint_coulomb_friction::CREEP;
 use crate::arm::Joints;
-use crate::effects::registry::{EffectInfo, Parameter, Place, Stage};
+use crate::effects::registry::{EffectInfo, Elsewhere, Parameter, Place, Stage};
 use crate::effects::remedy::Remedy;
 
 pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     name: "joint_load_friction",
     stage: Stage::Control,
     acts_on: Place::Joint,
-    parameters: &[Parameter::size("coefficient", "1", [0.0, 0.25], 0.0).per_joint().within(0.0, 1.0), CREEP],
+    parameters: &[
+        Parameter::size("coefficient", "1", [0.0, 0.25], 0.0)
+            .per_joint()
+            .within(0.0, 1.0)
+            .elsewhere(Elsewhere::Range([0.0, 0.8])),
+        CREEP,
+    ],
     confusable_with: &["joint_coulomb_friction", "torque_gain", "payload"],
     install: |values, effects| {
         effects.arm.joint_load_friction =

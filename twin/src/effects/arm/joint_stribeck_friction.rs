@@ -10,7 +10,7 @@
 
 use super::joint_coulomb_friction::CREEP;
 use crate::arm::Joints;
-use crate::effects::registry::{EffectInfo, Parameter, Place, Stage};
+use crate::effects::registry::{EffectInfo, Elsewhere, Parameter, Place, Stage};
 use crate::effects::remedy::Remedy;
 
 pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
@@ -18,8 +18,14 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     stage: Stage::Control,
     acts_on: Place::Joint,
     parameters: &[
-        Parameter::size("coulomb", "N m", [0.0, 3.0], 0.0).per_joint().within(0.0, f64::MAX),
-        Parameter::size("excess", "N m", [0.0, 3.0], 0.0).per_joint().within(0.0, f64::MAX),
+        Parameter::size("coulomb", "N m", [0.0, 3.0], 0.0)
+            .per_joint()
+            .within(0.0, f64::MAX)
+            .elsewhere(Elsewhere::OfTorqueLimit([0.0, 0.25])),
+        Parameter::size("excess", "N m", [0.0, 3.0], 0.0)
+            .per_joint()
+            .within(0.0, f64::MAX)
+            .elsewhere(Elsewhere::OfTorqueLimit([0.0, 0.25])),
         Parameter::form("velocity", "rad/s", [0.01, 0.2], 0.05)
             .per_joint()
             .within(1e-6, f64::MAX)

@@ -9,14 +9,17 @@
 //!   delay (takes damping away), command delay.
 
 use crate::arm::Joints;
-use crate::effects::registry::{EffectInfo, Parameter, Place, Stage};
+use crate::effects::registry::{EffectInfo, Elsewhere, Parameter, Place, Stage};
 use crate::effects::remedy::Remedy;
 
 pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     name: "joint_viscous_friction",
     stage: Stage::Control,
     acts_on: Place::Joint,
-    parameters: &[Parameter::size("viscous", "N m s/rad", [0.0, 10.0], 0.0).per_joint().within(0.0, f64::MAX)],
+    parameters: &[Parameter::size("viscous", "N m s/rad", [0.0, 10.0], 0.0)
+        .per_joint()
+        .within(0.0, f64::MAX)
+        .elsewhere(Elsewhere::OfTorqueLimit([0.0, 0.25]))],
     confusable_with: &["torque_delay", "command_delay"],
     install: |values, effects| {
         effects.arm.joint_viscous_friction = Some(JointViscousFriction { viscous: values.joints("viscous") });

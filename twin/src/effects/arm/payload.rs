@@ -7,7 +7,7 @@
 //! - Confused with: torque gain, friction asymmetry (the same in every pose), base tilt.
 
 use crate::arm::{ArmModel, MassProperties};
-use crate::effects::registry::{EffectInfo, Parameter, Place, Stage};
+use crate::effects::registry::{EffectInfo, Elsewhere, Parameter, Place, Stage};
 use crate::effects::remedy::{Remedy, list, short};
 
 pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
@@ -15,7 +15,7 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     stage: Stage::Control,
     acts_on: Place::ArmModel,
     parameters: &[
-        Parameter::size("mass", "kg", [0.0, 1.5], 0.0).within(0.0, 100.0),
+        Parameter::size("mass", "kg", [0.0, 1.5], 0.0).within(0.0, 100.0).elsewhere(Elsewhere::OfMass([0.0, 0.3])),
         Parameter::form("centre", "m", [-0.15, 0.15], 0.0)
             .vector(3)
             // At the flange, and in a hand.

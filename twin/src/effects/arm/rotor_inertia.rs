@@ -8,14 +8,17 @@
 //! - Confused with: payload (depends on the pose), joint elasticity, a stiffness at one frequency.
 
 use crate::arm::{ArmModel, Joints};
-use crate::effects::registry::{EffectInfo, Parameter, Place, Stage};
+use crate::effects::registry::{EffectInfo, Elsewhere, Parameter, Place, Stage};
 use crate::effects::remedy::{Remedy, list};
 
 pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     name: "rotor_inertia",
     stage: Stage::Control,
     acts_on: Place::ArmModel,
-    parameters: &[Parameter::size("extra", "kg m^2", [-0.1, 0.3], 0.0).per_joint().within(-0.2, f64::MAX)],
+    parameters: &[Parameter::size("extra", "kg m^2", [-0.1, 0.3], 0.0)
+        .per_joint()
+        .within(-0.2, f64::MAX)
+        .elsewhere(Elsewhere::OfInertia([-0.5, 1.0]))],
     confusable_with: &["payload", "joint_elasticity"],
     install: |values, effects| effects.arm.rotor_inertia = Some(RotorInertia { extra: values.joints("extra") }),
     remedy: |found| {

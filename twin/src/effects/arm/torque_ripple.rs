@@ -8,7 +8,7 @@
 //! - Confused with: joint elasticity (a fixed frequency), noise.
 
 use crate::arm::Joints;
-use crate::effects::registry::{EffectInfo, Parameter, Place, Search, Stage};
+use crate::effects::registry::{EffectInfo, Elsewhere, Parameter, Place, Search, Stage};
 use crate::effects::remedy::Remedy;
 use std::f64::consts::{FRAC_PI_2, PI};
 
@@ -17,7 +17,9 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     stage: Stage::Control,
     acts_on: Place::Joint,
     parameters: &[
-        Parameter::size("amplitude", "N m", [0.0, 0.5], 0.0).per_joint(),
+        Parameter::size("amplitude", "N m", [0.0, 0.5], 0.0)
+            .per_joint()
+            .elsewhere(Elsewhere::OfTorqueLimit([0.0, 0.05])),
         Parameter::form("order", "1", [1.0, 400.0], 200.0).per_joint().searched(Search::InStep).begun_at(&[
             &[10.0],
             &[20.0],

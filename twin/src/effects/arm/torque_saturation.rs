@@ -7,7 +7,7 @@
 //! - Confused with: torque gain (acts at every torque), command delay (in fast motion).
 
 use crate::arm::Joints;
-use crate::effects::registry::{EffectInfo, Parameter, Place, Search, Stage};
+use crate::effects::registry::{EffectInfo, Elsewhere, Parameter, Place, Search, Stage};
 use crate::effects::remedy::Remedy;
 
 pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
@@ -17,6 +17,7 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     parameters: &[Parameter::size("limit", "N m", [1.0, 87.0], f64::INFINITY)
         .per_joint()
         .within(0.0, f64::MAX)
+        .elsewhere(Elsewhere::OfTorqueLimit([0.05, 1.0]))
         .searched(Search::Limit)],
     confusable_with: &["torque_gain", "command_delay"],
     install: |values, effects| effects.arm.torque_saturation = Some(TorqueSaturation { limit: values.joints("limit") }),

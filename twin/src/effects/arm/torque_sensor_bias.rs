@@ -7,14 +7,16 @@
 //! - Confused with: friction asymmetry and payload (change the motion).
 
 use crate::arm::Joints;
-use crate::effects::registry::{EffectInfo, Parameter, Place, Stage};
+use crate::effects::registry::{EffectInfo, Elsewhere, Parameter, Place, Stage};
 use crate::effects::remedy::Remedy;
 
 pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     name: "torque_sensor_bias",
     stage: Stage::Control,
     acts_on: Place::JointSensing,
-    parameters: &[Parameter::size("bias", "N m", [-2.0, 2.0], 0.0).per_joint()],
+    parameters: &[Parameter::size("bias", "N m", [-2.0, 2.0], 0.0)
+        .per_joint()
+        .elsewhere(Elsewhere::OfTorqueLimit([-0.1, 0.1]))],
     confusable_with: &["joint_friction_asymmetry", "payload"],
     install: |values, effects| effects.arm.torque_sensor_bias = Some(TorqueSensorBias { bias: values.joints("bias") }),
     remedy: |found| {
