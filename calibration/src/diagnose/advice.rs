@@ -208,6 +208,13 @@ pub fn unexplained(place: Option<(&str, &str)>, site: &Site) -> Advice {
     site.finished(sentence, commands)
 }
 
+/// What to record where an effect is likely, and so many clips more would prove it.
+#[must_use]
+pub fn proving(effect: &str, more: usize, site: &Site) -> Advice {
+    let sentence = format!("Record {more} clips more with other motions, which prove or refute {}.", words(effect));
+    site.more(sentence, more)
+}
+
 /// What to record where the clips do not say enough.
 #[must_use]
 pub fn lacking(why: &str, site: &Site) -> Advice {
@@ -233,6 +240,7 @@ pub fn all(site: &Site) -> Vec<Advice> {
     all.push(confirming(&["payload".to_owned()], site));
     all.push(unexplained(Some(("yaw", "after the slide")), site));
     all.push(lacking("four clips", site));
+    all.push(proving("payload", 5, site));
     all.push(nothing_open(site));
     all
 }

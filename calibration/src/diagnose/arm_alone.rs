@@ -171,7 +171,7 @@ mod tests {
             left: Vec::new(),
             whole: Vec::new(),
         };
-        (step, Split { train: vec![0, 1], choose: Vec::new(), confirm: Vec::new() })
+        (step, Split { train: vec![0, 1], ..Split::default() })
     }
 
     #[test]

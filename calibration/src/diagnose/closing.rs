@@ -29,7 +29,7 @@ pub fn closes<E: Evidence>(
         let contact = in_contact.map(|(before, after)| way(before.mean_square, after.mean_square, before.floor));
         Some(shares.chain(contact).collect())
     };
-    let (Some(open), Some(choose)) = (on(&split.open()), on(&split.choose)) else { return 0.0 };
+    let (Some(open), Some(choose)) = (on(&split.open()), on(split.elsewhere())) else { return 0.0 };
     let harmless = |(_, choose): &(&f64, &f64)| **choose > -HARM;
     open.iter().zip(&choose).filter(harmless).map(|(open, _)| *open).fold(0.0, f64::max)
 }

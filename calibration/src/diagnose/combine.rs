@@ -224,7 +224,7 @@ pub fn search<E: Evidence>(
 /// Whether the effects found so far leave no more than numerics do: a further one would only name how engines differ. The
 /// first effect is never held back by this.
 fn spent<E: Evidence>(bench: &Bench<'_, E>, split: &Split, first: &Step, now: &Hypothesis) -> bool {
-    let typical = |hypothesis| Residuals::at(bench, hypothesis, &split.choose).map(|left| left.typical());
+    let typical = |hypothesis| Residuals::at(bench, hypothesis, split.elsewhere()).map(|left| left.typical());
     let (Some(before), Some(after)) = (typical(&first.from), typical(now)) else { return false };
     Left::of_groups(&before, &after)
         .iter()

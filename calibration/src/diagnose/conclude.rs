@@ -8,11 +8,13 @@ use super::evidence::{Evidence, Group};
 use super::fit::{Bench, Hypothesis};
 use super::gap::Residuals;
 use super::headline::{self, Facts};
+use super::held_out::{self, Fits};
 use super::partly::{self, Partly};
 use super::remainder::{self, Left};
 use super::score::predict;
 use super::site::Site;
-use super::split::Split;
+use super::split::{self, Split};
+use super::unproven::{self, Unproven};
 use super::verdict::{self, Finding};
 use super::{
     DiagnoseError, Kind, Options, advice, combine, confidence, drift, localise, parameters, ranked, refit, remedies,
@@ -20,7 +22,7 @@ use super::{
 use crate::report::{Trace, channel_in_words, effect_in_words, in_unit};
 use shared_mem::recording::Session;
 use shared_mem::theta::Theta;
-use twin::replay::{ReplayError, Replayer};
+use twin::replay::Replayer;
 
 /// What noise alone leaves: residuals are in sigmas of the sensors.
 const FLOOR: f64 = 1.0;
@@ -77,8 +79,12 @@ pub fn conclude<E: Evidence>(
     options: &Options,
 ) -> Result<Diagnosis, DiagnoseError> {
     let first = &found.steps[0];
-    let before = Residuals::at(bench, &first.from, &split.confirm).ok_or(DiagnoseError::NoBaseline)?;
-    let after = Residuals::at(bench, &found.last, &split.confirm).ok_or(DiagnoseError::NoBaseline)?;
+    let last_weights = &found.steps.last().unwrap_or(first).weights;
+    let unseen = |hypothesis, weights| held_out::fits(bench, split, (hypothesis, weights));
+    let baseline = unseen(&first.from, &first.weights).ok_or(DiagnoseError::NoBaseline)?;
+    let with = unseen(&found.last, last_weights).ok_or(DiagnoseError::NoBaseline)?;
+    let before = Residuals::of(bench, &baseline).ok_or(DiagnoseError::NoBaseline)?;
+    let after = Residuals::of(bench, &with).ok_or(DiagnoseError::NoBaseline)?;
     let (places, rest) = (localise::localise(bench.evidence, &before), localise::localise(bench.evidence, &after));
     let all: Vec<usize> = (0..admitted.clips.len()).collect();
     let typical = |hypothesis| Residuals::at(bench, hypothesis, &all).map(|left| left.typical());
@@ -101,10 +107,13 @@ pub fn conclude<E: Evidence>(
         effects: finding.effects.iter().map(|name| (*name).to_owned()).collect(),
         shrink: after.shrink(&before, options.seed),
     });
-    let [joints, add, add_s] = replayed(bench, [&first.from, kept], session, (admitted, split))?;
+    let shown_fits = partly.as_ref().map_or(if believed { &with } else { &baseline }, |partly| &partly.fits);
+    let [joints, add, add_s] = replayed(bench, [&baseline, shown_fits], session, admitted)?;
     let of_object = places.first().is_some_and(|place| !place.channel.starts_with("joint"));
     let size = size_in_words(joints.before, add.before.filter(|_| of_object));
-    let facts = facts(bench, found, size, [&places, &rest], after.shrink(&before, options.seed).value);
+    let unproven = unproven::unproven(bench, found);
+    let facts =
+        facts(bench, found, (size, unproven.as_ref()), [&places, &rest], after.shrink(&before, options.seed).value);
     let verdict = match &partly {
         Some(partly) => in_part(bench, partly, &facts, (joints.after, add.after), of_object),
         None => {
@@ -126,7 +135,13 @@ pub fn conclude<E: Evidence>(
     let names = |set: &[usize]| set.iter().map(|clip| admitted.files[*clip].clone()).collect();
     let largest = rest.first().map(|place| (place.channel.as_str(), place.regime.as_str()));
     let open = partly.is_some() || finding.open().is_some();
-    let next = next(&verdict, open, largest, &Site::of(session));
+    let site = Site::of(session);
+    let next = match &unproven {
+        Some(open) if verdict.kind == Kind::Unexplained => {
+            advice::proving(bench.library.candidates[open.trial.scored.candidate].effect.name, open.more, &site)
+        }
+        _ => next(&verdict, open, largest, &site),
+    };
     let theta = bench.library.theta(&kept.full);
     // Of an object that no clip shows nothing was found but what was given.
     let given = options.theta.as_ref().and_then(|theta| theta.object.clone());
@@ -147,7 +162,7 @@ pub fn conclude<E: Evidence>(
         verdict,
         places,
         clips: Clips { train: names(&split.train), choose: names(&split.choose), confirm: names(&split.confirm) },
-        warnings: admitted.warnings.clone(),
+        warnings: admitted.warnings.iter().cloned().chain(few(split)).collect(),
         budget_spent: false,
         seconds: 0.0,
         session: session.folder.display().to_string(),
@@ -159,11 +174,32 @@ pub fn conclude<E: Evidence>(
     })
 }
 
+/// What has to be known about clips of few commands.
+fn few(split: &Split) -> Option<String> {
+    let count = split.in_turn.len();
+    (count > 0).then(|| {
+        format!(
+            "only {count} different commands: effects are chosen by all of them, and each in turn is left out of the fit that its gap is \
+             measured with; record {} more to have clips that nothing was chosen by",
+            split::FEW - count
+        )
+    })
+}
+
 /// What the sentence is made of; where the gap lies without and with what was found.
-fn facts<E: Evidence>(bench: &Bench<'_, E>, found: &Found, size: String, places: [&[Place]; 2], shrink: f64) -> Facts {
+fn facts<E: Evidence>(
+    bench: &Bench<'_, E>,
+    found: &Found,
+    (size, unproven): (String, Option<&Unproven<'_>>),
+    places: [&[Place]; 2],
+    shrink: f64,
+) -> Facts {
     let [place, rest] = places.map(|places| places.first().map_or_else(String::new, place_in_words));
     let effects = found.last.effects.iter().map(|effect| with_size(bench, &found.last, *effect)).collect();
-    Facts { size, place, rest, effects, shrink }
+    let unproven = unproven.map(|open| {
+        (with_size(bench, open.fit, open.trial.scored.candidate), open.trial.closes, [open.clips, open.more])
+    });
+    Facts { size, place, rest, effects, unproven, shrink }
 }
 
 /// The verdict where what was found is proven, but a part of the gap stays: so much of the joints [rad] and the object [m].
@@ -291,19 +327,23 @@ fn stands_in<E: Evidence>(
     confidence::alike(advantage.nats, advantage.error, advantage.clips())
 }
 
-/// Mean joint error, ADD and ADD-S of the confirm clips at two hypotheses, by the code of `twin replay`.
+/// Mean joint error, ADD and ADD-S of the confirm clips at two hypotheses, each with numbers that were not fitted to them, by the code of `twin replay`.
 fn replayed<E: Evidence>(
     bench: &Bench<'_, E>,
-    hypotheses: [&Hypothesis; 2],
+    both: [&Fits; 2],
     session: &Session,
-    (admitted, split): (&Admitted, &Split),
+    admitted: &Admitted,
 ) -> Result<[Change; 3], DiagnoseError> {
     let mut changes = [Change::default(); 3];
-    for (place, hypothesis) in hypotheses.into_iter().enumerate() {
-        let replayer = Replayer::new(&session.cell, Some(&bench.library.theta(&hypothesis.full)))?;
-        let gaps: Result<Vec<_>, ReplayError> =
-            split.confirm.iter().map(|clip| replayer.replay(admitted.clips[*clip].clone())).collect();
-        let gaps: Vec<_> = gaps?.into_iter().map(|(_, _, report)| report.gap).collect();
+    for (place, fits) in both.into_iter().enumerate() {
+        let mut gaps = Vec::new();
+        for (hypothesis, clips) in fits {
+            let replayer = Replayer::new(&session.cell, Some(&bench.library.theta(&hypothesis.full)))?;
+            for clip in clips {
+                let (_, _, report) = replayer.replay(admitted.clips[*clip].clone())?;
+                gaps.push(report.gap);
+            }
+        }
         let mean = |values: Vec<f64>| (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64);
         let squares = gaps.iter().filter_map(|gap| gap.joint_rms_rad.as_ref()).flatten().map(|rms| rms * rms).collect();
         let figures = [

@@ -46,13 +46,24 @@ fn place(group: Group) -> usize {
 }
 
 impl Residuals {
-    /// Of clips that were not fitted.
+    /// Of clips at the numbers of a hypothesis.
     #[must_use]
     pub fn at<E: Evidence>(bench: &Bench<'_, E>, hypothesis: &Hypothesis, clips: &[usize]) -> Option<Self> {
+        Self::each(bench, &clips.iter().map(|clip| (*clip, &hypothesis.full[..])).collect::<Vec<_>>())
+    }
+
+    /// Of clips that were not fitted, each at its own numbers.
+    #[must_use]
+    pub fn of<E: Evidence>(bench: &Bench<'_, E>, fits: &[(Hypothesis, Vec<usize>)]) -> Option<Self> {
+        let clips = fits.iter().flat_map(|(fit, clips)| clips.iter().map(|clip| (*clip, &fit.full[..])));
+        Self::each(bench, &clips.collect::<Vec<_>>())
+    }
+
+    fn each<E: Evidence>(bench: &Bench<'_, E>, clips: &[(usize, &[f64])]) -> Option<Self> {
         let nothing = vec![0.0; bench.scatter.count()];
-        let one = |clip: &usize| {
+        let one = |(clip, full): &(usize, &[f64])| {
             let mut out = Vec::new();
-            bench.evidence.residuals(*clip, &hypothesis.full, &nothing, &mut out).ok()?;
+            bench.evidence.residuals(*clip, full, &nothing, &mut out).ok()?;
             Some((*clip, out))
         };
         let clips: Vec<(usize, Vec<f64>)> = clips.par_iter().map(one).collect::<Option<_>>()?;

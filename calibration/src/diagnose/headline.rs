@@ -15,6 +15,8 @@ pub struct Facts {
     pub rest: String,
     /// The effects found, each with its size: `command delay (delay 11.9 ms)`.
     pub effects: Vec<String>,
+    /// An effect with its size, the share of the gap that it closes, and how many clips do not prove it and how many more would.
+    pub unproven: Option<(String, f64, [usize; 2])>,
     /// The shrink with all of them in the twin, see [`super::gap::Residuals::shrink`].
     pub shrink: f64,
 }
@@ -108,7 +110,13 @@ fn class(finding: &Finding<'_>, facts: &Facts) -> String {
 
 fn unexplained(decision: &Decision, finding: &Finding<'_>, facts: &Facts) -> String {
     let nearest = if facts.effects.is_empty() {
-        String::new()
+        let unproven = |(effect, share, [clips, more]): &(String, f64, [usize; 2])| {
+            let share = percent(*share);
+            format!(
+                "; {effect} closes {share} of it, but in {clips} clips that may be chance: about {more} more would prove it"
+            )
+        };
+        facts.unproven.as_ref().map_or_else(String::new, unproven)
     } else {
         let strength = if finding.implausible { ", stronger than it is met in practice," } else { "" };
         let shrinks = if finding.confirmed {
@@ -152,6 +160,7 @@ mod tests {
             place: "joint 2 (reversal)".into(),
             rest: "yaw (after the slide)".into(),
             effects: effects.iter().map(|name| (*name).to_owned()).collect(),
+            unproven: None,
             shrink: 0.963,
         }
     }
@@ -202,6 +211,13 @@ mod tests {
         assert!(text.contains("payload (mass 0.4 kg) comes nearest but shrinks it by 96 %"), "{text}");
         let pushed = Finding { implausible: true, ..finding(vec!["payload"], 500.0, 6.5) };
         assert!(said(&pushed, &["payload"]).contains("stronger than it is met in practice"));
+        let open = Facts { unproven: Some(("payload (mass 0.4 kg)".into(), 0.63, [4, 5])), ..facts(&[]) };
+        let found = finding(vec![], 500.0, 500.0);
+        let text = sentence(&found.decide(), &found, &open);
+        assert!(
+            text.contains("payload (mass 0.4 kg) closes 63 % of it, but in 4 clips that may be chance: about 5 more"),
+            "{text}"
+        );
         let worn = Finding { drift: Some(0.38), ..finding(vec![], 4.0, 4.0) };
         assert!(said(&worn, &[]).contains("the friction rises by 38 %"));
     }

@@ -21,12 +21,14 @@
 //! | [`cost`], [`fit`], [`restart`] | hypotheses fitted, and restarts of clips whose own numbers are stuck in a local minimum |
 //! | [`score`] | how well they predict clips: leave-one-clip-out log-likelihood |
 //! | [`scatter_scale`] | how widely clips scatter under one of them |
+//! | `held_out` | numbers for clips that they were not fitted to |
 //! | [`closing`] | how much of the gap they close |
 //! | [`combine`], [`reidentify`], [`refit`] | which effects act together |
 //! | `stages` | how long each part of the search takes |
 //! | [`undetermined`] | which of their numbers nothing depends on |
 //! | [`remainder`], [`drift`] | what they leave |
 //! | [`gap`], [`localise`] | how large the gap is, and where |
+//! | `unproven` | what more clips would prove |
 //! | `partly` | what is proven although a part of the gap stays |
 //! | [`parameters`], [`confidence`], [`verdict`], [`headline`] | what is said about it |
 //! | [`advice`], [`site`] | what to record next, and the commands for it |
@@ -56,6 +58,7 @@ pub mod floor;
 pub mod gap;
 pub mod ground;
 pub mod headline;
+mod held_out;
 pub mod length;
 pub mod library;
 pub mod localise;
@@ -86,6 +89,7 @@ pub mod sweep;
 #[cfg(test)]
 mod test_bench;
 pub mod undetermined;
+mod unproven;
 pub mod verdict;
 
 pub use remedies::Remedy;

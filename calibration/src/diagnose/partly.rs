@@ -11,6 +11,7 @@ use super::combine::{Found, Step};
 use super::evidence::Evidence;
 use super::fit::Bench;
 use super::gap::Residuals;
+use super::held_out::{self, Fits};
 use super::split::Split;
 use super::{confidence, remainder};
 
@@ -23,7 +24,9 @@ const LOOKS_LIKE: f64 = 0.5;
 pub(super) struct Partly {
     /// The search as if it had ended here.
     pub(super) found: Found,
-    /// What it leaves on the clips kept for confirming.
+    /// Its numbers for clips that they were not fitted to.
+    pub(super) fits: Fits,
+    /// What they leave there.
     pub(super) after: Residuals,
     /// Share of the squared gap that it closes there.
     pub(super) share: Share,
@@ -40,14 +43,16 @@ pub(super) fn proven<E: Evidence>(
 ) -> Option<Partly> {
     let all = found.last.effects.len();
     let one = |count: usize| {
+        let weights = &with_effects(&found.steps, count).or(found.steps.last())?.weights;
         let last = if count == all { &found.last } else { &with_effects(&found.steps, count)?.from };
         let until = Found { steps: found.steps.clone(), last: last.clone() };
         if !each_stands_out(bench, &until, overdispersion) || !remainder::implausible(bench, last).is_empty() {
             return None;
         }
-        let after = Residuals::at(bench, last, &split.confirm)?;
+        let fits = held_out::fits(bench, split, (last, weights))?;
+        let after = Residuals::of(bench, &fits)?;
         let share = after.shrink(before, seed);
-        (share.ci90[0] > REAL_SHARE).then_some(Partly { found: until, after, share })
+        (share.ci90[0] > REAL_SHARE).then_some(Partly { found: until, fits, after, share })
     };
     (1..=all).rev().find_map(one)
 }
@@ -126,7 +131,7 @@ mod tests {
                 let trials = vec![trial(effect, last, 300.0), trial(other, &baseline, rival)];
                 Found { steps: vec![step(&baseline, trials), step(last, Vec::new())], last: last.clone() }
             };
-            let split = Split { train: vec![0], choose: Vec::new(), confirm: vec![1] };
+            let split = Split { train: vec![0], confirm: vec![1], ..Split::default() };
             let before = Residuals::at(bench, &baseline, &split.confirm).expect("it can be simulated");
             let proven = |found: &Found| proven(bench, (&split, found), &before, &[1.0; 2], 0);
             let partly = proven(&found(20.0, &last)).expect("it is");

@@ -10,7 +10,7 @@ use super::reason::{Judged, reason};
 use super::shortlist::{Scored, TESTABLE};
 use super::split::Split;
 use super::verdict::Finding;
-use super::{Kind, confidence, parameters, screening};
+use super::{Kind, confidence, held_out, parameters, screening};
 
 /// What nobody fitted closes nothing.
 const NOT_FITTED: Share = Share { value: 0.0, ci90: [0.0; 2] };
@@ -29,10 +29,10 @@ pub(super) fn candidates<E: Evidence>(
     let first = &found.steps[0];
     let believed = matches!(kind, Kind::Named | Kind::Class);
     let likely = confidence::probabilities(&first.trials, found.last.effects.is_empty());
-    let on_confirm = |fit: &Hypothesis| Residuals::at(bench, fit, &split.confirm);
+    let on_confirm = |fit: &Hypothesis, step: &Step| held_out::residuals(bench, split, (fit, &step.weights));
     // What every step left on the confirm clips: the baseline is known, and others are what their candidates are measured from.
     let left: Vec<Option<Residuals>> = (found.steps.iter())
-        .map(|step| if step.from.effects.is_empty() { Some(before.clone()) } else { on_confirm(&step.from) })
+        .map(|step| if step.from.effects.is_empty() { Some(before.clone()) } else { on_confirm(&step.from, step) })
         .collect();
     let one = |trial: &Trial| {
         let effect = trial.scored.candidate;
@@ -43,7 +43,7 @@ pub(super) fn candidates<E: Evidence>(
         let trial = step.trials.iter().find(|trial| trial.scored.candidate == effect).unwrap_or(trial);
         let with = match &trial.fitted {
             _ if kept => after_keeping(found, &left, after, place),
-            Some((fit, _)) => on_confirm(fit),
+            Some((fit, _)) => on_confirm(fit, step),
             None => None,
         };
         let closed = with.as_ref().zip(left[place].as_ref()).map(|(with, from)| with.shrink_added(from, before, seed));

@@ -37,6 +37,9 @@ const LEAST: f64 = 4.0;
 /// A linearisation is believed that the cost of a clip left out rises by no more than this.
 const DOUBTED: f64 = 100.0;
 
+/// What would take more than so many times the clips at hand is no promise.
+const MOST_TIMES: f64 = 6.0;
+
 /// Predicts training and choosing clips.
 #[must_use]
 pub fn predict<E: Evidence>(
@@ -115,6 +118,19 @@ impl Advantage {
         self.gains.len()
     }
 
+    /// How many clips more would make it twice its error, gaining as those at hand do; `None` where more would prove nothing, at
+    /// most as many as there are five times over, or it is proven.
+    #[must_use]
+    pub fn clips_more(&self) -> Option<usize> {
+        if self.nats <= 0.0 || self.nats > 2.0 * self.error {
+            return None;
+        }
+        // The sum grows with the number of clips, its error with the root of it.
+        let count = self.clips() as f64;
+        let needed = count * (2.0 * self.error / self.nats).powi(2);
+        (needed <= MOST_TIMES * count).then(|| (needed - count).ceil().max(1.0) as usize)
+    }
+
     /// By how much more this is worth than another on the same clips, and the standard error of that from the scatter of the
     /// difference between clips [nats]: what two hypotheses gain alike on a clip says nothing about which is right.
     #[must_use]
@@ -171,6 +187,23 @@ mod tests {
         let [better, worse] = [over([40.0, 10.0, 60.0, 25.0, 55.0, 20.0]), over([38.0, 8.5, 57.5, 23.0, 53.0, 18.0])];
         let (nats, error) = better.beyond(&worse);
         assert!((nats - 12.0).abs() < 1e-9 && error < 1.0 && better.error > 40.0, "{nats} {error}");
+    }
+
+    #[test]
+    fn clips_that_gain_unevenly_need_more_of_their_kind_and_even_ones_none() {
+        let before = Predicted { clips: (0..4).map(|clip| (clip, 100.0)).collect() };
+        let over = |gains: [f64; 4]| {
+            let clips = gains.iter().enumerate().map(|(clip, gain)| (clip, 100.0 - 2.0 * gain)).collect();
+            Predicted { clips }.over(&before)
+        };
+        assert_eq!(over([20.0, 22.0, 19.0, 21.0]).clips_more(), None, "proven");
+        let uneven = over([-5.0, 30.0, 70.0, 25.0]);
+        let more = uneven.clips_more().expect("unproven") as f64;
+        // With the same mean and scatter in so many more clips.
+        let scale = (4.0 + more) / 4.0;
+        assert!(uneven.nats * scale >= 2.0 * uneven.error * scale.sqrt() && more <= 20.0, "{more} {uneven:?}");
+        assert_eq!(over([-30.0, 30.0, -20.0, 21.0]).clips_more(), None, "hardly a gain at all");
+        assert_eq!(over([-30.0, -3.0, -20.0, 2.0]).clips_more(), None);
     }
 
     #[test]

@@ -121,6 +121,11 @@ impl Site {
         (format!("{what} and add {speeds}"), commands)
     }
 
+    /// The sentence with the command of so many clips more of the same kind.
+    pub(super) fn more(&self, sentence: String, clips: usize) -> Advice {
+        self.finished(sentence, vec![self.same(&format!("--clips {clips}"))])
+    }
+
     /// Another session of the same kind.
     pub(super) fn usual(&self) -> Vec<String> {
         let (next, cell) = (format!("{}_next", self.folder), self.cell());

@@ -1,0 +1,32 @@
+//! An effect that predicts clips better and closes a real part of the gap, but not in enough clips to be no chance: what more
+//! clips would prove.
+
+use super::combine::{Found, PLAIN, Trial, convincing};
+use super::evidence::Evidence;
+use super::fit::{Bench, Hypothesis};
+
+/// An effect in the balance.
+pub(super) struct Unproven<'a> {
+    /// The trial of it.
+    pub(super) trial: &'a Trial,
+    /// Its fit.
+    pub(super) fit: &'a Hypothesis,
+    /// How many clips judged.
+    pub(super) clips: usize,
+    /// How many clips more would prove it, if they gained as those at hand do.
+    pub(super) more: usize,
+}
+
+/// The likeliest such effect; `None` where something was found, or where none closes a real part of the gap.
+pub(super) fn unproven<'a, E: Evidence>(bench: &Bench<'_, E>, found: &'a Found) -> Option<Unproven<'a>> {
+    let step = found.steps.first().filter(|_| found.last.effects.is_empty())?;
+    let one = |trial: &'a Trial| {
+        let (fit, advantage) = trial.fitted.as_ref()?;
+        let more =
+            advantage.clips_more().filter(|_| trial.closes > PLAIN && !convincing(advantage, trial.scored.cost))?;
+        let real =
+            !bench.negligible(trial.scored.candidate, &fit.full) && !bench.is_convention(trial.scored.candidate, fit);
+        real.then(|| Unproven { trial, fit, clips: advantage.clips(), more })
+    };
+    step.trials.iter().filter_map(one).max_by(|a, b| a.trial.nats().total_cmp(&b.trial.nats()))
+}
