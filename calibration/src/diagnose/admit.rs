@@ -1,12 +1,12 @@
 //! Whether the recorded clips can be diagnosed at all; if not, what is missing.
 
 use super::ground::Ground;
-use super::{length, split};
+use super::{length, split, torques};
 use crate::forward::arm::one_piece;
 use crate::identify::object::screen::{Screened, screened};
 use crate::identify::remarks::grouped;
-use shared_mem::cell::{Cell, ClipKind};
-use shared_mem::recording::{Clip, ReadError, Session};
+use shared_mem::cell::{Cell, ClipKind, ControllerKind};
+use shared_mem::recording::{Clip, JointSeries, ReadError, Session};
 use std::path::PathBuf;
 use twin::arm::{ArmModel, ModelError};
 
@@ -51,6 +51,11 @@ pub enum Refused {
         /// The session.
         session: PathBuf,
     },
+    /// Torques cannot be predicted.
+    #[error(
+        "torques can be predicted from a model with masses alone: give cell.toml a [controller], and a `urdf` or `model` under [robot] in place of `joints`"
+    )]
+    NoModel,
     /// The clips do not say enough.
     #[error("{0}")]
     NotTestable(String),
@@ -85,7 +90,7 @@ pub fn admit(session: &Session) -> Result<Admitted, Refused> {
     if clips.is_empty() && !out.is_empty() {
         return Err(Refused::NotTestable(format!("no clip can be used: {reasons}")));
     }
-    check_channels(&clips)?;
+    check_channels(&clips, is_tracking(&session.cell))?;
     let groups = split::by_command(&clips);
     if groups.len() < FEWEST {
         let without = if out.is_empty() { String::new() } else { format!(" (left out: {reasons})") };
@@ -97,26 +102,38 @@ pub fn admit(session: &Session) -> Result<Admitted, Refused> {
             clips.len() + out.len()
         )));
     }
+    let tracking = is_tracking(&session.cell);
+    if tracking {
+        // Clips of one command are told by the command, not by two motions that differ by their noise.
+        let all: Option<Vec<Clip>> = clips.into_iter().map(torques::followed).collect();
+        let short = || Refused::NotTestable("clips are too short for their motion to be smoothed".into());
+        clips = all.ok_or_else(short)?;
+    }
     let mut warnings = grouped(remarks.iter().map(|(file, remark)| (file.as_str(), remark.as_str())));
     if !out.is_empty() {
         let all = out.len() + clips.len();
         warnings.insert(0, format!("{} of {all} clips were left out: {reasons}", out.len()));
     }
     warnings.extend(length::liveliest(&mut clips));
-    let with_object = clips.iter().all(|clip| clip.kind == ClipKind::ControlHitSlide);
+    let with_object = !tracking && clips.iter().all(|clip| clip.kind == ClipKind::ControlHitSlide);
     Ok(Admitted { clips, files, groups, with_object, warnings })
 }
 
 /// The clip with what could be mended mended and its joints in the model's order, and what is odd about it; the reason why
 /// it cannot be used otherwise.
 fn looked_at(mut clip: Clip, cell: &Cell, arm: &ArmModel) -> Result<(Clip, Vec<String>), String> {
+    let tracking = is_tracking(cell);
+    if tracking && clip.desired.is_empty() {
+        // Where no command was logged, the motion itself says what moves.
+        clip.desired = JointSeries { tau: Vec::new(), ..clip.measured.clone() };
+    }
     let mut remarks: Vec<String> = clip.warnings.iter().chain(&clip.damage).cloned().collect();
     // What a session lacks as a whole is said of the session.
     let complete = !clip.measured.is_empty() && !clip.desired.is_empty();
     if complete {
         (clip, remarks) = one_piece(clip, cell, arm).map_err(|why| why.to_string())?;
     }
-    if clip.kind == ClipKind::Excitation || clip.object.is_empty() {
+    if tracking || clip.kind == ClipKind::Excitation || clip.object.is_empty() {
         return Ok((clip, remarks));
     }
     (clip.warnings, clip.damage) = (Vec::new(), None);
@@ -126,14 +143,30 @@ fn looked_at(mut clip: Clip, cell: &Cell, arm: &ArmModel) -> Result<(Clip, Vec<S
     unusable.map_or(Ok((clip, remarks)), Err)
 }
 
-fn check_channels(clips: &[Clip]) -> Result<(), Refused> {
+/// Whether the arm goes along what was measured, whatever its controller was.
+fn is_tracking(cell: &Cell) -> bool {
+    cell.controller.as_ref().is_some_and(|law| law.kind == ControllerKind::Tracking)
+}
+
+fn check_channels(clips: &[Clip], tracking: bool) -> Result<(), Refused> {
     let lacks = |what: &str, remedy: &str| Err(Refused::NotTestable(format!("the clips hold no {what}; {remedy}")));
     let moving = || clips.iter().filter(|clip| clip.kind != ClipKind::FreeMotion);
     if moving().any(|clip| clip.measured.is_empty()) {
         return lacks("measured joint states", "log measured_joint_states with every clip");
     }
     if moving().any(|clip| clip.desired.is_empty()) {
-        return lacks("commands", "log desired_joint_states: without the command the twin cannot be driven");
+        return lacks(
+            "commands",
+            "log desired_joint_states: without the command the twin cannot be driven; where torques were logged, --torques explains those",
+        );
+    }
+    if tracking {
+        let without = moving().any(|clip| clip.measured.tau.is_empty());
+        return if without {
+            lacks("torques", "log the effort of measured_joint_states, or leave --torques out")
+        } else {
+            Ok(())
+        };
     }
     if clips.iter().any(|clip| clip.kind != ClipKind::Excitation && clip.object.is_empty()) {
         return lacks("object poses", "log the object's pose, or set the clips' kind to \"excitation\"");

@@ -137,6 +137,10 @@ pub struct Gap {
     pub explainable_fraction: f64,
     /// Root mean square over joints and time [rad].
     pub joint_rms_rad: Change,
+    /// Root mean square of each joint's torque beyond the predicted one [N m], where torques along the measured motion are
+    /// explained.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub torque_rms: Option<[Vec<f64>; 2]>,
     /// Mean ADD [m].
     pub object_add_m: Change,
     /// Mean ADD-S [m].

@@ -9,7 +9,7 @@ use super::scatter::Scatter;
 use crate::estimate::{ClipModel, Impossible};
 use crate::forward::arm::noise;
 use crate::forward::object;
-use shared_mem::cell::{Cell, ClipKind};
+use shared_mem::cell::{Cell, ClipKind, ControllerKind};
 use shared_mem::recording::{Clip, JointSeries};
 use shared_mem::theta::Theta;
 use twin::arm::{ArmModel, Joints, MAX_JOINTS, ModelError};
@@ -29,6 +29,8 @@ const FAST: f64 = 0.5;
 
 /// The four quantities, in the order of their rows.
 const QUANTITIES: [&str; 4] = ["q", "dq", "tau_J", "tau_J_d"];
+/// Where the arm goes along what was measured: the torque that this takes.
+const TORQUE: &str = "tau";
 
 /// Arm clips and what numbers mean for the cell.
 pub struct ArmClips<F> {
@@ -63,7 +65,9 @@ impl<F: Fn(&[f64]) -> Theta + Sync> ArmClips<F> {
         let nominal = ArmModel::from_cell(cell)?;
         let dof = nominal.dof();
         let logged = |has: fn(&Clip) -> bool| clips.iter().all(has);
-        let quantities = QUANTITIES.into_iter().filter(|quantity| match *quantity {
+        let tracking = cell.controller.as_ref().is_some_and(|law| law.kind == ControllerKind::Tracking);
+        let looked_at = if tracking { &[TORQUE][..] } else { &QUANTITIES[..] };
+        let quantities = looked_at.iter().copied().filter(|quantity| match *quantity {
             "dq" => logged(|clip| !clip.measured.dq.is_empty()),
             "tau_J" => logged(|clip| !clip.measured.tau.is_empty()),
             "tau_J_d" => logged(|clip| !clip.desired.tau.is_empty()),
@@ -92,7 +96,7 @@ impl<F: Fn(&[f64]) -> Theta + Sync> ArmClips<F> {
 fn series<'a>(clip: &'a Clip, channel: &Channel) -> (&'a JointSeries, &'a [f64]) {
     match channel.quantity {
         "dq" => (&clip.measured, &clip.measured.dq),
-        "tau_J" => (&clip.measured, &clip.measured.tau),
+        "tau_J" | TORQUE => (&clip.measured, &clip.measured.tau),
         "tau_J_d" => (&clip.desired, &clip.desired.tau),
         _ => (&clip.measured, &clip.measured.q),
     }
@@ -249,6 +253,10 @@ impl<F: Fn(&[f64]) -> Theta + Sync> ArmClips<F> {
                     "q" => readings[2 * moment].state.q[joint],
                     "dq" => readings[2 * moment].state.dq[joint],
                     "tau_J" => readings[2 * moment + later].tau_J[joint],
+                    TORQUE => {
+                        let reading = &readings[2 * moment];
+                        reading.tau_J_d[joint] + self.nominal.gravity(&reading.state.q)[joint]
+                    }
                     _ => readings[2 * moment + later].tau_J_d[joint],
                 };
                 out.push((values[row * log.dof + joint] - predicted) / sigma);
@@ -274,6 +282,10 @@ impl<F: Fn(&[f64]) -> Theta + Sync> Evidence for ArmClips<F> {
 
     fn scatter(&self) -> Scatter {
         Scatter::default()
+    }
+
+    fn torque_sigma(&self) -> Option<&[f64]> {
+        self.channels.iter().all(|channel| channel.quantity == TORQUE).then_some(&self.sigma[..])
     }
 }
 

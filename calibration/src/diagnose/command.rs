@@ -31,6 +31,7 @@ after a --budget that was spent: of that the answer is the best so far, and says
 Examples:
   calibration diagnose session --report report.html
   calibration diagnose session --out diagnosis.json --seed 7 --json
+  calibration diagnose session --torques --report torques.html
   calibration diagnose session --budget 120 --out diagnosis.json")]
 pub struct Arguments {
     /// Folder with cell.toml and at least four different clips.
@@ -57,6 +58,10 @@ pub struct Arguments {
     /// After so many seconds the best answer so far counts, 1 to 1000000 [default: as long as it takes].
     #[arg(long, value_name = "SECONDS", value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
     budget: Option<u64>,
+    /// Explains the measured torques along the measured motion instead of how commands are followed: for logs without
+    /// commands, and where the control law is not known. Needs a model with masses.
+    #[arg(long)]
+    torques: bool,
     /// Draws which clips are for what, and the intervals.
     #[arg(long, value_name = "N", default_value_t = 0, value_parser = crate::seed::parse, allow_negative_numbers = true)]
     seed: u64,
@@ -77,7 +82,7 @@ pub fn run(arguments: &Arguments, interrupt: &Interrupt) -> anyhow::Result<Diagn
     let session = Session::open_with(&arguments.session, arguments.cell.as_deref())?;
     let theta = arguments.parameters.as_deref().map(Theta::read).transpose()?;
     let budget = arguments.budget.map(Duration::from_secs);
-    let options = Options { theta, seed: arguments.seed, budget, out: out.clone() };
+    let options = Options { theta, seed: arguments.seed, torques: arguments.torques, budget, out: out.clone() };
     let (mut found, kept) = diagnose_kept(&session, &options, interrupt)?;
     match theta_file {
         Some(file) if found.identifies() => {

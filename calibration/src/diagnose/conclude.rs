@@ -44,6 +44,7 @@ pub fn not_testable(session: &Session, options: &Options, why: &str) -> Diagnosi
             shrink: nothing,
             explainable_fraction: 0.0,
             joint_rms_rad: Change::default(),
+            torque_rms: None,
             object_add_m: Change::default(),
             object_add_s_m: Change::default(),
         },
@@ -108,14 +109,22 @@ pub fn conclude<E: Evidence>(
         shrink: after.shrink(&before, options.seed),
     });
     let shown_fits = partly.as_ref().map_or(if believed { &with } else { &baseline }, |partly| &partly.fits);
-    let [joints, add, add_s] = replayed(bench, [&baseline, shown_fits], session, admitted)?;
+    let torque_rms = torque_rms(bench.evidence, [&before, shown]);
+    let torques = torque_rms.as_ref().map(|both| both.each_ref().map(|joints| root_mean_square(joints)));
+    let [joints, add, add_s] = match torque_rms {
+        // Joints go where they were measured.
+        Some(_) => [Change::default(); 3],
+        None => replayed(bench, [&baseline, shown_fits], session, admitted)?,
+    };
     let of_object = places.first().is_some_and(|place| !place.channel.starts_with("joint"));
-    let size = size_in_words(joints.before, add.before.filter(|_| of_object));
+    let size = size_in_words((torques.map(|both| both[0]), joints.before), add.before.filter(|_| of_object));
     let unproven = unproven::unproven(bench, found);
     let facts =
         facts(bench, found, (size, unproven.as_ref()), [&places, &rest], after.shrink(&before, options.seed).value);
     let verdict = match &partly {
-        Some(partly) => in_part(bench, partly, &facts, (joints.after, add.after), of_object),
+        Some(partly) => {
+            in_part(bench, partly, &facts, (torques.map(|both| both[1]), joints.after, add.after), of_object)
+        }
         None => {
             let text = headline::sentence(&decision, &finding, &facts);
             decision.said(text)
@@ -129,6 +138,7 @@ pub fn conclude<E: Evidence>(
         shrink: shown.shrink(&before, options.seed),
         explainable_fraction: remainder::explained(before.mean_square(), shown.mean_square(), before.floor()),
         joint_rms_rad: joints,
+        torque_rms,
         object_add_m: add,
         object_add_s_m: add_s,
     };
@@ -207,11 +217,11 @@ fn in_part<E: Evidence>(
     bench: &Bench<'_, E>,
     partly: &Partly,
     facts: &Facts,
-    (joint_rms_rad, object_add_m): (Option<f64>, Option<f64>),
+    (torque_rms, joint_rms_rad, object_add_m): (Option<f64>, Option<f64>, Option<f64>),
     of_object: bool,
 ) -> Verdict {
     let looks_like = partly.looks_like(bench);
-    let stays = size_in_words(joint_rms_rad, object_add_m.filter(|_| of_object));
+    let stays = size_in_words((torque_rms, joint_rms_rad), object_add_m.filter(|_| of_object));
     let text = headline::in_part(facts, &partly.share, &stays, looks_like);
     let (place, looks_like) = (facts.rest.clone(), looks_like.map(str::to_owned));
     Verdict {
@@ -225,7 +235,10 @@ fn in_part<E: Evidence>(
 }
 
 /// How large the gap is, in units of the hand: of the object where there is such a figure, else of the joints.
-fn size_in_words(joints: Option<f64>, add: Option<f64>) -> String {
+fn size_in_words((torques, joints): (Option<f64>, Option<f64>), add: Option<f64>) -> String {
+    if let Some(torques) = torques {
+        return format!("{} RMS over all joints", in_unit("N m", torques));
+    }
     match (joints, add) {
         (_, Some(add)) => format!("{} ADD", in_unit("m", add)),
         (Some(rms), None) => format!("{} RMS over all joints", in_unit("rad", rms)),
@@ -356,6 +369,24 @@ fn replayed<E: Evidence>(
         }
     }
     Ok(changes)
+}
+
+/// Root mean square of each joint's torque beyond the predicted one at two hypotheses [N m]; `None` where torques are no channel
+/// of their own.
+fn torque_rms(evidence: &impl Evidence, both: [&Residuals; 2]) -> Option<[Vec<f64>; 2]> {
+    let sigma = evidence.torque_sigma()?;
+    Some(both.map(|residuals| {
+        let of = |(channel, sigma): (usize, &f64)| {
+            let rows = residuals.clips.iter().flat_map(|(clip, values)| evidence.rows(*clip).iter().zip(values));
+            let of_channel = rows.filter(|(row, _)| row.channel == channel).map(|(_, residual)| residual * sigma);
+            root_mean_square(&of_channel.collect::<Vec<_>>())
+        };
+        sigma.iter().enumerate().map(of).collect()
+    }))
+}
+
+fn root_mean_square(values: &[f64]) -> f64 {
+    (values.iter().map(|value| value * value).sum::<f64>() / values.len().max(1) as f64).sqrt()
 }
 
 /// Residuals of the channels with the largest gap, before and after, on the confirm clips.

@@ -103,6 +103,10 @@ pub trait Evidence: ClipModel {
     fn rows(&self, clip: usize) -> &[Row];
     /// What varies from clip to clip.
     fn scatter(&self) -> Scatter;
+    /// One sigma of each channel [N m], where torques along the measured motion are all that is looked at.
+    fn torque_sigma(&self) -> Option<&[f64]> {
+        None
+    }
     /// The slopes of a clip's residuals by a number of its own, where they are known without a simulation.
     fn own_slope(&self, _clip: usize, _own: usize) -> Option<&[f64]> {
         None

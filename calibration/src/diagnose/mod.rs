@@ -7,6 +7,7 @@
 //! | module | step |
 //! |---|---|
 //! | [`admit`] | can the clips be diagnosed at all |
+//! | `torques` | torques along the measured motion, where no control law is known |
 //! | [`length`] | how much of long clips counts |
 //! | [`split`] | which clips are for what |
 //! | [`evidence`], [`arm_clips`], [`contact`], [`cell_clips`] | what is measured against the twin, and where in a clip |
@@ -88,6 +89,7 @@ pub mod starts;
 pub mod sweep;
 #[cfg(test)]
 mod test_bench;
+mod torques;
 pub mod undetermined;
 mod unproven;
 pub mod verdict;
@@ -128,6 +130,8 @@ pub struct Options {
     pub theta: Option<Theta>,
     /// Draws the split and the bootstrap.
     pub seed: u64,
+    /// Whether torques along the measured motion are explained, and not how commands are followed.
+    pub torques: bool,
     /// After so long the best answer so far counts.
     pub budget: Option<Duration>,
     /// Where the answer will go: what was found so far is kept beside it; else in the session's folder.
@@ -179,6 +183,13 @@ pub fn diagnose_kept(
     interrupt: &Interrupt,
 ) -> Result<(Diagnosis, Arc<Kept>), DiagnoseError> {
     let interrupt = &interrupt.within(options.budget);
+    let tracking = if options.torques { torques::cell(&session.cell) } else { None };
+    let tracking = tracking.map(|cell| Session { cell, ..session.clone() });
+    let session = match &tracking {
+        None if options.torques => return Err(Refused::NoModel.into()),
+        None => session,
+        Some(tracking) => tracking,
+    };
     let admitted = admit(session);
     if interrupt.cancelled() {
         return Err(DiagnoseError::Interrupted("interrupted; start again".into()));
@@ -192,7 +203,7 @@ pub fn diagnose_kept(
         admitted => admitted?,
     };
     let question = Fingerprint::of("diagnose")
-        .with(&(session.cell.to_toml(), options.theta.as_ref().map(Theta::to_toml), options.seed))
+        .with(&(session.cell.to_toml(), options.theta.as_ref().map(Theta::to_toml), options.seed, options.torques))
         .with_clips(&admitted.clips);
     let kept = kept::for_work((options.out.as_deref(), &session.folder, "diagnose"), &question, interrupt);
     let found = diagnosed(session, &admitted, options, (interrupt, (&kept, "")));

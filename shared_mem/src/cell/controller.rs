@@ -28,6 +28,26 @@ pub struct Controller {
     /// Largest torque [N m].
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub torque_limit: Vec<f64>,
+    /// Where logged torques are measured.
+    #[serde(default, skip_serializing_if = "TorqueSensing::is_joint")]
+    pub torque_sensing: TorqueSensing,
+}
+
+/// Where the torques of a log are measured.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum TorqueSensing {
+    /// Behind the gear, as in a Franka: what turns the rotor is not in them.
+    #[default]
+    Joint,
+    /// In the motor, as where a current was logged times its torque constant: the rotor is in them.
+    Motor,
+}
+
+impl TorqueSensing {
+    fn is_joint(&self) -> bool {
+        *self == Self::Joint
+    }
 }
 
 /// Lower and upper bound.
@@ -42,6 +62,9 @@ pub enum ControllerKind {
     JointImpedance,
     /// `tau = k (q_d - q) - d dq`: a servo, nothing compensated.
     JointPd,
+    /// No law that a robot has: the joints go along the desired motion, by whatever torque that takes. Not for cell.toml.
+    #[serde(skip_deserializing)]
+    Tracking,
 }
 
 impl Controller {

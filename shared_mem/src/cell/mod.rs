@@ -11,7 +11,7 @@ mod simulation;
 mod wrench;
 
 pub use camera::{Camera, CameraPose, Intrinsics};
-pub use controller::{Controller, ControllerKind, Range};
+pub use controller::{Controller, ControllerKind, Range, TorqueSensing};
 pub use gripper::{Gripper, GripperModel};
 pub use object::{Object, PoseNoise, Support};
 pub use robot::{Robot, Table, Tool, Topics};

@@ -130,7 +130,9 @@ impl ArmRollout<'_> {
     /// What an arm is to follow that is just what its controller believes it to be.
     pub(crate) fn exactly_known<'d>(&self, drive: &'d Drive) -> Option<(&'d Joints, &'d Joints)> {
         match drive {
-            Drive::JointImpedance { q_d, dq_d } if std::ptr::eq(self.arm, self.nominal) => Some((q_d, dq_d)),
+            Drive::JointImpedance { q_d, dq_d } if std::ptr::eq(self.arm, self.nominal) && self.law.needs_no_mass() => {
+                Some((q_d, dq_d))
+            }
             _ => None,
         }
     }

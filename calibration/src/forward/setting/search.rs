@@ -2,7 +2,7 @@
 
 use super::Setting;
 use crate::estimate::Unknown;
-use shared_mem::cell::{Cell, Range};
+use shared_mem::cell::{Cell, ControllerKind, Range};
 use shared_mem::theta::Theta;
 use twin::effects::{EffectInfo, Parameter, Robot, Role, Shape, Stage};
 use twin::scene::ObjectModel;
@@ -12,10 +12,13 @@ const GAIN_FACTOR: f64 = 2.0;
 /// Difference step of a gain over the gain.
 const GAIN_STEP: f64 = 1e-4;
 
-/// Stiffness and damping of every joint, beginning at the base's.
+/// Stiffness and damping of every joint, beginning at the base's; none where no law leads the arm.
 #[must_use]
 pub fn gains(cell: &Cell, base: &Theta) -> Vec<(Setting, Unknown)> {
     let (Some(controller), Some(arm)) = (&cell.controller, &base.arm) else { return Vec::new() };
+    if controller.kind == ControllerKind::Tracking {
+        return Vec::new();
+    }
     let stiffness = Gain { starts: &arm.stiffness, nominal: &controller.stiffness, range: controller.stiffness_range };
     let damping = Gain { starts: &arm.damping, nominal: &controller.damping, range: controller.damping_range };
     let mut all = stiffness.unknowns(Setting::Stiffness);

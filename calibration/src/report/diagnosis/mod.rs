@@ -218,6 +218,7 @@ pub(super) mod tests {
                 shrink: Share { value: 0.963, ci90: [0.951, 0.972] },
                 explainable_fraction: 0.989,
                 joint_rms_rad: Change { before: Some(0.00213), after: Some(0.00018) },
+                torque_rms: None,
                 object_add_m: Change { before: Some(0.0139), after: Some(0.0012) },
                 object_add_s_m: Change::default(),
             },

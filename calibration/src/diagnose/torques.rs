@@ -1,0 +1,122 @@
+//! Measured torques against the model along the measured motion, whatever controller led the arm: for logs without commands, and
+//! where the control law is not known.
+//!
+//! The arm of the twin is moved along what was measured, smoothed, by whatever torque that takes
+//! ([`ControllerKind::Tracking`]), and this torque is held against the measured one. Effects on the way of a command do not show;
+//! friction, payloads, base tilts and the like do, gains and delays or not.
+
+use shared_mem::cell::{Cell, Controller, ControllerKind, TorqueSensing};
+use shared_mem::recording::{Clip, JointSeries};
+use twin::rollout::TICK_NS;
+
+/// Half the time over which motion is smoothed [ns], rows counting less the farther away they are: as a cubic over 80 ms alone
+/// would, that passes 10 Hz, and no arm is driven faster.
+const HALF_NS: u64 = 80_000_000;
+/// Slow logs are smoothed over at least so many rows to either side: a cubic has four coefficients.
+const ROWS: u64 = 4;
+/// What is left of a rotor whose torque no sensor shows: sensors behind the gear do not feel it [kg m²]. Not 0, since a link
+/// without any inertia of its own can be simulated then, too.
+const UNFELT: f64 = 1e-4;
+
+/// The cell whose arm goes where it was measured; `None` where cell.toml has no controller, or only joints without bodies, of
+/// which no torque can be predicted.
+pub(super) fn cell(cell: &Cell) -> Option<Cell> {
+    let controller = cell.controller.as_ref()?;
+    if cell.robot.as_ref().is_none_or(|robot| !robot.joints.is_empty()) {
+        return None;
+    }
+    let sensing = controller.torque_sensing;
+    let rotor_inertia = match sensing {
+        TorqueSensing::Joint => controller.rotor_inertia.iter().map(|_| UNFELT).collect(),
+        TorqueSensing::Motor => controller.rotor_inertia.clone(),
+    };
+    let controller =
+        Controller { kind: ControllerKind::Tracking, rotor_inertia, torque_sensing: sensing, ..Controller::default() };
+    Some(Cell { controller: Some(controller), ..cell.clone() })
+}
+
+/// A clip whose command is its own measured motion, smoothed; `None` where it is too short for that. Its ends, where a fit has rows on one side
+/// only, are left out.
+pub(super) fn followed(mut clip: Clip) -> Option<Clip> {
+    let measured = &clip.measured;
+    let (first, last) = (*measured.stamps_ns.first()?, *measured.stamps_ns.last()?);
+    let usual = (last - first) / (measured.len() as u64 - 1).max(1);
+    let half = HALF_NS.max(ROWS * usual);
+    let (from, to) = (first + half, last.checked_sub(half)?);
+    if to <= from {
+        return None;
+    }
+    let grid: Vec<u64> = (from..=to).step_by(TICK_NS as usize).collect();
+    let desired = smoothed(measured, &grid, half);
+    let kept = measured.between(from..=to);
+    let motion = smoothed(measured, &kept.stamps_ns, half);
+    clip.measured = JointSeries { tau: kept.tau, ..motion };
+    clip.desired = desired;
+    // A torque belongs to the row that it was logged with.
+    clip.torques_end_at_rows = true;
+    (!clip.measured.is_empty()).then_some(clip)
+}
+
+/// Positions and velocities at stamps, each from a cubic through the rows around it.
+fn smoothed(measured: &JointSeries, at_ns: &[u64], half: u64) -> JointSeries {
+    let dof = measured.dof;
+    let mut out = JointSeries { dof, stamps_ns: at_ns.to_vec(), ..JointSeries::default() };
+    let stamps = &measured.stamps_ns;
+    let (mut begin, mut end) = (0, 0);
+    for at in at_ns {
+        begin += stamps[begin..].partition_point(|stamp| stamp + half < *at);
+        end = end.max(begin);
+        end += stamps[end..].partition_point(|stamp| *stamp <= at + half);
+        let times: Vec<f64> =
+            stamps[begin..end].iter().map(|stamp| (*stamp as f64 - *at as f64) / half as f64).collect();
+        for joint in 0..dof {
+            let values = (begin..end).map(|row| measured.q[row * dof + joint]);
+            let [q, slope] = cubic(&times, values);
+            out.q.push(q);
+            out.dq.push(slope / (half as f64 * 1e-9));
+        }
+    }
+    out
+}
+
+/// Value and slope at 0 of the cubic that fits values best, weighted by the tricube of their distance (Cleveland 1979): rows that
+/// come and go at the ends with full weight would make the motion jerk.
+fn cubic(times: &[f64], values: impl Iterator<Item = f64> + Clone) -> [f64; 2] {
+    let mut normal = nalgebra::Matrix4::<f64>::zeros();
+    let mut right = nalgebra::Vector4::<f64>::zeros();
+    // Positions far from 0 would cost digits.
+    let middle = values.clone().next().unwrap_or_default();
+    for (t, value) in times.iter().zip(values) {
+        let powers = nalgebra::Vector4::new(1.0, *t, t * t, t * t * t);
+        let weight = (1.0 - t.abs().powi(3)).max(0.0).powi(3);
+        normal += weight * powers * powers.transpose();
+        right += weight * powers * (value - middle);
+    }
+    let fit = normal.cholesky().map_or_else(nalgebra::Vector4::zeros, |normal| normal.solve(&right));
+    [middle + fit[0], fit[1]]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_cubic_motion_is_followed_exactly_and_noise_averages_out() {
+        let stamps: Vec<u64> = (0..500).map(|row| row * 2_000_000).collect();
+        let position = |t: f64| 1.5 + 0.3 * t - 2.0 * t * t + 4.0 * t * t * t;
+        let noise = |row: usize| if row % 2 == 0 { 1e-5 } else { -1e-5 };
+        let q = |noisy: bool| -> Vec<f64> {
+            let at =
+                |(row, stamp): (usize, &u64)| position(*stamp as f64 * 1e-9) + if noisy { noise(row) } else { 0.0 };
+            stamps.iter().enumerate().map(at).collect()
+        };
+        let series = |q| JointSeries { stamps_ns: stamps.clone(), dof: 1, q, ..JointSeries::default() };
+        let at = [500_000_000];
+        for (noisy, close) in [(false, [1e-10, 1e-8]), (true, [3e-6, 1e-3])] {
+            let out = smoothed(&series(q(noisy)), &at, HALF_NS);
+            let slope = 0.3 - 4.0 * 0.5 + 12.0 * 0.25;
+            assert!((out.q[0] - position(0.5)).abs() < close[0], "{}", out.q[0] - position(0.5));
+            assert!((out.dq[0] - slope).abs() < close[1], "{}", out.dq[0] - slope);
+        }
+    }
+}
