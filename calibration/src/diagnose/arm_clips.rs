@@ -9,12 +9,12 @@ use super::scatter::Scatter;
 use crate::estimate::{ClipModel, Impossible};
 use crate::forward::arm::noise;
 use crate::forward::object;
-use shared_mem::cell::{Cell, ClipKind, ControllerKind};
+use shared_mem::cell::{Cell, ClipKind, ControllerKind, TorqueSensing};
 use shared_mem::recording::{Clip, JointSeries};
 use shared_mem::theta::Theta;
 use twin::arm::{ArmModel, Joints, MAX_JOINTS, ModelError};
 use twin::effects::Effects;
-use twin::rollout::{CommandTrack, Plant, Reading, TICK_NS};
+use twin::rollout::{CommandTrack, Plant, Reading, TICK, TICK_NS};
 
 /// At most so many moments of a clip count; more would cost time and, in smooth motion, tell little.
 const MOMENTS: usize = 250;
@@ -31,6 +31,8 @@ const FAST: f64 = 0.5;
 const QUANTITIES: [&str; 4] = ["q", "dq", "tau_J", "tau_J_d"];
 /// Where the arm goes along what was measured: the torque that this takes.
 const TORQUE: &str = "tau";
+/// Until then it has come onto that way from where it was put: fifteen time constants of the law that keeps it there [ns].
+const SETTLED_NS: u64 = 50_000_000;
 
 /// Arm clips and what numbers mean for the cell.
 pub struct ArmClips<F> {
@@ -65,8 +67,7 @@ impl<F: Fn(&[f64]) -> Theta + Sync> ArmClips<F> {
         let nominal = ArmModel::from_cell(cell)?;
         let dof = nominal.dof();
         let logged = |has: fn(&Clip) -> bool| clips.iter().all(has);
-        let tracking = cell.controller.as_ref().is_some_and(|law| law.kind == ControllerKind::Tracking);
-        let looked_at = if tracking { &[TORQUE][..] } else { &QUANTITIES[..] };
+        let looked_at = if is_tracking(cell) { &[TORQUE][..] } else { &QUANTITIES[..] };
         let quantities = looked_at.iter().copied().filter(|quantity| match *quantity {
             "dq" => logged(|clip| !clip.measured.dq.is_empty()),
             "tau_J" => logged(|clip| !clip.measured.tau.is_empty()),
@@ -90,6 +91,10 @@ impl<F: Fn(&[f64]) -> Theta + Sync> ArmClips<F> {
     pub fn sigma(&self) -> &[f64] {
         &self.sigma
     }
+}
+
+fn is_tracking(cell: &Cell) -> bool {
+    cell.controller.as_ref().is_some_and(|law| law.kind == ControllerKind::Tracking)
 }
 
 /// Columns of a recorded series that belong to a channel.
@@ -131,7 +136,11 @@ impl Prepared {
         let stride = used.div_ceil(MOMENTS).max(1);
         let first = *stamps.first()?;
         // What acted in the period before the first state is not known: neither are its torques.
-        let known = usize::from(recorded.torques_end_at_rows);
+        let known = if is_tracking(cell) {
+            stamps.partition_point(|stamp| *stamp < first + SETTLED_NS)
+        } else {
+            usize::from(recorded.torques_end_at_rows)
+        };
         let kept: Vec<usize> = (known..used).step_by(stride).collect();
         let stamps_ns: Vec<u64> = kept.iter().flat_map(|row| [stamps[*row], stamps[*row] + TICK_NS]).collect();
         let dof = recorded.measured.dof;
@@ -241,6 +250,18 @@ impl<F: Fn(&[f64]) -> Theta + Sync> ArmClips<F> {
         Ok(readings)
     }
 
+    /// Torque that a joint's sensor shows of what its motor gives [N m]; `later`: a control period after `now`. What friction takes is
+    /// in it on either side of the gear: where it arises in a real one is not known.
+    fn taken(&self, joint: usize, now: &Reading, later: &Reading) -> f64 {
+        let motor = now.tau_J_d[joint] + self.nominal.gravity(&now.state.q)[joint];
+        let sensing = self.cell.controller.as_ref().map(|controller| controller.torque_sensing);
+        if sensing == Some(TorqueSensing::Motor) {
+            return motor;
+        }
+        let acceleration = (later.state.dq[joint] - now.state.dq[joint]) / TICK;
+        motor - self.nominal.rotor_inertia()[joint] * acceleration
+    }
+
     fn compare(&self, clip: &Prepared, readings: &[Reading], out: &mut Vec<f64>) -> Result<(), Impossible> {
         let dof = self.nominal.dof();
         out.clear();
@@ -253,10 +274,7 @@ impl<F: Fn(&[f64]) -> Theta + Sync> ArmClips<F> {
                     "q" => readings[2 * moment].state.q[joint],
                     "dq" => readings[2 * moment].state.dq[joint],
                     "tau_J" => readings[2 * moment + later].tau_J[joint],
-                    TORQUE => {
-                        let reading = &readings[2 * moment];
-                        reading.tau_J_d[joint] + self.nominal.gravity(&reading.state.q)[joint]
-                    }
+                    TORQUE => self.taken(joint, &readings[2 * moment], &readings[2 * moment + 1]),
                     _ => readings[2 * moment + later].tau_J_d[joint],
                 };
                 out.push((values[row * log.dof + joint] - predicted) / sigma);
@@ -291,6 +309,7 @@ impl<F: Fn(&[f64]) -> Theta + Sync> Evidence for ArmClips<F> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::torques;
     use super::*;
     use shared_mem::msg::arm::ArmState;
     use shared_mem::recording::ObjectSeries;
@@ -344,6 +363,37 @@ mod tests {
         assert_eq!(told(0.0), Ok(()));
         assert_eq!(told(std::f64::consts::TAU), Ok(()), "a reading that wraps around");
         assert!(told(1e47).is_err_and(|why| why.0.contains("left all bounds")));
+    }
+
+    #[test]
+    fn along_a_measured_motion_the_torque_is_what_moves_links_and_overcomes_friction() {
+        let text = include_str!("../../../config/fr3_cell.toml");
+        let mut cell = Cell { object: None, ..Cell::parse(text, Path::new("cell.toml")).expect("the shipped cell") };
+        (cell.simulation.q_noise, cell.simulation.dq_noise) = (0.0, 0.0);
+        let recorded = clip(&cell, &Theta::default(), true);
+        let tracking = torques::cell(&cell).expect("a model");
+        let followed = torques::followed(recorded.clone()).expect("long enough");
+        let viscous = EffectTheta {
+            name: "joint_viscous_friction".into(),
+            parameters: [("viscous".to_owned(), 2.0.into())].into(),
+        };
+        let left = |effects: Vec<EffectTheta>| {
+            let theta = Theta { effects, ..Theta::default() };
+            let arm = ArmClips::new(&tracking, &[followed.clone()], move |_: &[f64]| theta.clone()).expect("an arm");
+            let mut out = Vec::new();
+            arm.residuals(0, &[], &[], &mut out).expect("it can be simulated");
+            let dq = |k: usize| followed.measured.dq_row(arm.clips[0].kept[k]).expect("velocities")[3];
+            let of_joint = |k: &usize| arm.rows(0)[*k].channel == 3;
+            let first = (0..out.len()).find(of_joint).expect("a row");
+            (0..out.len()).filter(of_joint).map(|k| (dq(k - first), out[k] * arm.sigma()[3])).collect::<Vec<_>>()
+        };
+        // The clip's own torques are those behind the gear.
+        for (dq, rest) in left(Vec::new()) {
+            assert!(rest.abs() < 0.05, "{rest} N m at {dq} rad/s");
+        }
+        for (dq, rest) in left(vec![viscous]) {
+            assert!((rest + 2.0 * dq).abs() < 0.06, "{rest} N m at {dq} rad/s");
+        }
     }
 
     #[test]

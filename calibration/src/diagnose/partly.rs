@@ -67,7 +67,12 @@ fn each_stands_out<E: Evidence>(bench: &Bench<'_, E>, found: &Found, overdispers
         && added.iter().all(|(place, effect)| {
             let step = &found.steps[*place];
             let rivals = confidence::rivals(step, bench.library, *effect, overdispersion[*place]);
-            step.is_clear(bench.library, *effect) && rivals.iter().all(|rival| found.last.effects.contains(rival))
+            let trial = |candidate| step.trials.iter().find(|trial| trial.scored.candidate == candidate);
+            // What does the same with more numbers is no other cause: dry friction that may fall with speed, and does not.
+            let more_of_it =
+                |rival: &usize| trial(*rival).zip(trial(*effect)).is_some_and(|(rival, own)| rival.is_outdone_by(own));
+            let stands_for_itself = |rival: &usize| found.last.effects.contains(rival) || more_of_it(rival);
+            step.is_clear(bench.library, *effect) && rivals.iter().all(stands_for_itself)
         })
 }
 

@@ -5,19 +5,19 @@
 //! ([`ControllerKind::Tracking`]), and this torque is held against the measured one. Effects on the way of a command do not show;
 //! friction, payloads, base tilts and the like do, gains and delays or not.
 
-use shared_mem::cell::{Cell, Controller, ControllerKind, TorqueSensing};
+use shared_mem::cell::{Cell, Controller, ControllerKind};
 use shared_mem::recording::{Clip, JointSeries};
 use twin::rollout::TICK_NS;
 
 /// Half the time over which motion is smoothed [ns], rows counting less the farther away they are: as a cubic over 80 ms alone
 /// would, that passes 10 Hz, and no arm is driven faster.
 const HALF_NS: u64 = 80_000_000;
+/// The same where stamps are uneven: what arrives a millisecond late at 1 rad/s is 1 mrad off, hundreds of times the encoder's noise.
+const UNEVEN_HALF_NS: u64 = 160_000_000;
+/// Stamps are uneven where more than this share of the steps differs from the usual one by more than a quarter of it.
+const UNEVEN: f64 = 0.02;
 /// Slow logs are smoothed over at least so many rows to either side: a cubic has four coefficients.
 const ROWS: u64 = 4;
-/// What is left of a rotor whose torque no sensor shows: sensors behind the gear do not feel it [kg m²]. Not 0, since a link
-/// without any inertia of its own can be simulated then, too.
-const UNFELT: f64 = 1e-4;
-
 /// The cell whose arm goes where it was measured; `None` where cell.toml has no controller, or only joints without bodies, of
 /// which no torque can be predicted.
 pub(super) fn cell(cell: &Cell) -> Option<Cell> {
@@ -25,13 +25,12 @@ pub(super) fn cell(cell: &Cell) -> Option<Cell> {
     if cell.robot.as_ref().is_none_or(|robot| !robot.joints.is_empty()) {
         return None;
     }
-    let sensing = controller.torque_sensing;
-    let rotor_inertia = match sensing {
-        TorqueSensing::Joint => controller.rotor_inertia.iter().map(|_| UNFELT).collect(),
-        TorqueSensing::Motor => controller.rotor_inertia.clone(),
+    let controller = Controller {
+        kind: ControllerKind::Tracking,
+        rotor_inertia: controller.rotor_inertia.clone(),
+        torque_sensing: controller.torque_sensing,
+        ..Controller::default()
     };
-    let controller =
-        Controller { kind: ControllerKind::Tracking, rotor_inertia, torque_sensing: sensing, ..Controller::default() };
     Some(Cell { controller: Some(controller), ..cell.clone() })
 }
 
@@ -41,7 +40,7 @@ pub(super) fn followed(mut clip: Clip) -> Option<Clip> {
     let measured = &clip.measured;
     let (first, last) = (*measured.stamps_ns.first()?, *measured.stamps_ns.last()?);
     let usual = (last - first) / (measured.len() as u64 - 1).max(1);
-    let half = HALF_NS.max(ROWS * usual);
+    let half = if uneven(&measured.stamps_ns) { UNEVEN_HALF_NS } else { HALF_NS }.max(ROWS * usual);
     let (from, to) = (first + half, last.checked_sub(half)?);
     if to <= from {
         return None;
@@ -55,6 +54,14 @@ pub(super) fn followed(mut clip: Clip) -> Option<Clip> {
     // A torque belongs to the row that it was logged with.
     clip.torques_end_at_rows = true;
     (!clip.measured.is_empty()).then_some(clip)
+}
+
+fn uneven(stamps: &[u64]) -> bool {
+    let mut steps: Vec<u64> = stamps.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    steps.sort_unstable();
+    let usual = steps.get(steps.len() / 2).copied().unwrap_or(1);
+    let odd = steps.iter().filter(|step| 4 * step.abs_diff(usual) > usual).count();
+    odd as f64 > UNEVEN * steps.len() as f64
 }
 
 /// Positions and velocities at stamps, each from a cubic through the rows around it.
