@@ -14,12 +14,14 @@ use super::remainder::{self, Left};
 use super::score::predict;
 use super::site::Site;
 use super::split::{self, Split};
+use super::tolerance::{self, Measured};
 use super::unproven::{self, Unproven};
 use super::verdict::{self, Finding};
 use super::{
     DiagnoseError, Kind, Options, advice, combine, confidence, drift, localise, parameters, ranked, refit, remedies,
 };
 use crate::report::{Trace, channel_in_words, effect_in_words, in_unit};
+use shared_mem::cell::Tolerance;
 use shared_mem::recording::Session;
 use shared_mem::theta::Theta;
 use twin::replay::Replayer;
@@ -94,7 +96,8 @@ pub fn conclude<E: Evidence>(
         .ok_or(DiagnoseError::NoBaseline)?;
     let confirmed = confirms(&before, &after);
     let overdispersion = found.overdispersion(bench);
-    let finding = finding(bench, (split, found), &overdispersion, (left, confirmed));
+    let within_tolerance = within_tolerance(bench, ([&baseline, &with], [&before, &after]), session, admitted)?;
+    let finding = finding(bench, (split, found), &overdispersion, (left, confirmed, within_tolerance));
     let decision = finding.decide();
     let tried = decision.kind == Kind::Unexplained;
     let partly = tried.then(|| partly::proven(bench, (split, found), &before, &overdispersion, options.seed)).flatten();
@@ -277,11 +280,32 @@ fn confirms(before: &Residuals, after: &Residuals) -> bool {
     after.mean_square() < before.mean_square() && usual > combine::CLOSES
 }
 
+/// Whether the gap is of no interest without effects and with them.
+fn within_tolerance<E: Evidence>(
+    bench: &Bench<'_, E>,
+    (fits, left): ([&Fits; 2], [&Residuals; 2]),
+    session: &Session,
+    admitted: &Admitted,
+) -> Result<[bool; 2], DiagnoseError> {
+    let stated = &session.cell.tolerance;
+    let of = |measured: [Measured; 2]| measured.map(|measured| tolerance::holds(stated, measured));
+    if let Some(torques) = torque_rms(bench.evidence, left) {
+        let torques = torques.map(|joints| Some(root_mean_square(&joints)));
+        return Ok(of(torques.map(|torques| Measured { torques, ..Measured::default() })));
+    }
+    if *stated == Tolerance::default() {
+        return Ok([false; 2]);
+    }
+    let [joints, add, _] = replayed(bench, fits, session, admitted)?;
+    let measured = |joints, object| Measured { joints, object, torques: None };
+    Ok(of([measured(joints.before, add.before), measured(joints.after, add.after)]))
+}
+
 fn finding<'a, E: Evidence>(
     bench: &Bench<'a, E>,
     (split, found): (&Split, &Found),
     overdispersion: &[f64],
-    (left, confirmed): (Vec<Left>, bool),
+    (left, confirmed, within_tolerance): (Vec<Left>, bool, [bool; 2]),
 ) -> Finding<'a> {
     let name = |effect: &usize| bench.library.candidates[*effect].effect.name;
     let mut rivals = Vec::new();
@@ -302,6 +326,7 @@ fn finding<'a, E: Evidence>(
         left,
         confirmed,
         implausible: !remainder::implausible(bench, &found.last).is_empty(),
+        within_tolerance,
         drift: drift::of_friction(&bench.scatter, &found.last),
     }
 }

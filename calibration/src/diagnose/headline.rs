@@ -48,6 +48,11 @@ pub fn words(effect: &str) -> String {
 
 fn none(finding: &Finding<'_>, Facts { size, .. }: &Facts) -> String {
     let times = finding.times_noise();
+    if finding.within_tolerance[0] && times >= ROUGH {
+        return format!(
+            "No gap of interest: with the parameters identified, twin and cell differ by {size}, less than the tolerance."
+        );
+    }
     if times < ROUGH {
         return format!(
             "No gap: with the parameters identified, twin and cell differ by {size}, as noise alone makes them."

@@ -30,6 +30,7 @@
 //! | [`remainder`], [`drift`] | what they leave |
 //! | [`gap`], [`localise`] | how large the gap is, and where |
 //! | `unproven` | what more clips would prove |
+//! | `tolerance` | whether a gap is of interest |
 //! | `partly` | what is proven although a part of the gap stays |
 //! | [`parameters`], [`confidence`], [`verdict`], [`headline`] | what is said about it |
 //! | [`advice`], [`site`] | what to record next, and the commands for it |
@@ -89,6 +90,7 @@ pub mod starts;
 pub mod sweep;
 #[cfg(test)]
 mod test_bench;
+mod tolerance;
 mod torques;
 pub mod undetermined;
 mod unproven;

@@ -24,6 +24,8 @@ pub struct Finding<'a> {
     pub confirmed: bool,
     /// Whether an effect is stronger than what is met in practice.
     pub implausible: bool,
+    /// Whether the gap is of no interest without effects, and with them.
+    pub within_tolerance: [bool; 2],
     /// How much the friction of the last clip is over that of the first, less 1, where it drifts over the session.
     pub drift: Option<f64>,
 }
@@ -87,13 +89,18 @@ impl Finding<'_> {
     /// The verdict.
     #[must_use]
     pub fn decide(&self) -> Decision {
+        if self.within_tolerance[0] {
+            return self.none();
+        }
         let unlikely = self.rivals.is_empty() && self.confidence < LIKELY;
         if self.effects.is_empty() || !self.confirmed || unlikely {
             let gap = self.left.iter().any(|left| left.gaps() > 1.0);
             return if gap || self.drift.is_some() { self.unexplained() } else { self.none() };
         }
         let pushed = self.implausible && self.percent() < ALL_BUT_EXACT;
-        if pushed || self.left.iter().any(|left| left.too_much(self.clear) && !(left.of_object && self.moves_the_arm()))
+        if pushed
+            || !self.within_tolerance[1]
+                && self.left.iter().any(|left| left.too_much(self.clear) && !(left.of_object && self.moves_the_arm()))
         {
             return self.unexplained();
         }
@@ -119,6 +126,8 @@ impl Finding<'_> {
 
     fn none(&self) -> Decision {
         let nothing = self.left.iter().map(Left::is_nothing).fold(1.0, f64::min);
+        // What is of no interest is a matter of size, which is measured.
+        let nothing = if self.within_tolerance[0] { 1.0 } else { nothing };
         Decision { kind: Kind::None, effects: Vec::new(), confidence: NONE * nothing, little: false }
     }
 
@@ -186,6 +195,7 @@ pub(super) mod tests {
             left,
             confirmed: true,
             implausible: false,
+            within_tolerance: [false; 2],
             drift: None,
         }
     }

@@ -8,6 +8,7 @@ mod gripper;
 mod object;
 mod robot;
 mod simulation;
+mod tolerance;
 mod wrench;
 
 pub use camera::{Camera, CameraPose, Intrinsics};
@@ -16,6 +17,7 @@ pub use gripper::{Gripper, GripperModel};
 pub use object::{Object, PoseNoise, Support};
 pub use robot::{Robot, Table, Tool, Topics};
 pub use simulation::Simulation;
+pub use tolerance::Tolerance;
 pub use wrench::{WrenchNoise, WrenchSensor};
 
 use crate::toml_file::{self, TomlFileError};
@@ -53,6 +55,9 @@ pub struct Cell {
     /// The force/torque sensor.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub wrench: Option<WrenchSensor>,
+    /// Which gaps are of no interest.
+    #[serde(default, skip_serializing_if = "Tolerance::is_default")]
+    pub tolerance: Tolerance,
     /// Where the simulated cell starts; the real one ignores it.
     #[serde(default, skip_serializing_if = "Simulation::is_default")]
     pub simulation: Simulation,
@@ -193,6 +198,7 @@ impl Cell {
         if let Some(wrench) = &self.wrench {
             wrench.check()?;
         }
+        self.tolerance.check()?;
         self.simulation.check()
     }
 }
