@@ -25,7 +25,7 @@ fn sources(folder: &str) -> Vec<(String, String)> {
 }
 
 fn product_sources() -> Vec<(String, String)> {
-    ["shared_mem/src", "twin/src", "rt_bridge/src", "calibration/src", "urdf/src"]
+    ["shared_mem/src", "twin/src", "rt_bridge/src", "calibration/src", "import/src", "urdf/src"]
         .iter()
         .flat_map(|f| sources(f))
         .collect()
@@ -50,7 +50,7 @@ fn product_lines() -> Vec<(String, Vec<String>)> {
 
 #[test]
 fn each_big_dependency_has_one_door() {
-    let doors: [(&str, &[&str]); 17] = [
+    let doors: [(&str, &[&str]); 23] = [
         ("iceoryx2", &["shared_mem/src/transport/", "shared_mem/src/msg/"]),
         ("mcap", &["shared_mem/src/recording/"]),
         ("parry3d_f64", &["twin/src/physics/"]),
@@ -69,6 +69,12 @@ fn each_big_dependency_has_one_door() {
         // Whatever asks for the commit is built again after each.
         ("git_version", &["twin/src/main.rs", "rt_bridge/src/main.rs", "calibration/src/main.rs"]),
         ("rsruckig", &["rt_bridge/src/motion/", "calibration/src/capture/transit.rs"]),
+        ("parquet", &["import/src/sources/parquet.rs"]),
+        ("rusqlite", &["import/src/sources/sqlite.rs"]),
+        ("bzip2", &["import/src/sources/ros1.rs"]),
+        ("lz4_flex", &["import/src/sources/ros1.rs"]),
+        ("csv", &["import/src/sources/table.rs"]),
+        ("zip", &["import/src/sources/npz.rs"]),
     ];
     for (file, text) in product_sources() {
         for (dependency, allowed) in doors {
@@ -179,10 +185,11 @@ fn a_thread_that_panics_takes_no_other_along() {
 
 #[test]
 fn dependencies_point_one_way() {
-    let rules: [(&str, &[&str]); 4] = [
-        ("shared_mem", &["twin", "rt_bridge", "calibration"]),
-        ("twin", &["rt_bridge", "calibration"]),
-        ("rt_bridge", &["calibration"]),
+    let rules: [(&str, &[&str]); 5] = [
+        ("shared_mem", &["twin", "rt_bridge", "calibration", "import"]),
+        ("import", &["twin", "rt_bridge", "calibration", "urdf"]),
+        ("twin", &["rt_bridge", "calibration", "import"]),
+        ("rt_bridge", &["calibration", "import"]),
         ("calibration", &["rt_bridge"]),
     ];
     for (package, forbidden) in rules {
@@ -199,12 +206,23 @@ fn dependencies_point_one_way() {
 #[test]
 fn the_readme_names_every_folder_and_only_existing_files() {
     let readme = std::fs::read_to_string(root().join("README.md")).expect("README.md");
-    for folder in ["shared_mem/", "twin/", "rt_bridge/", "calibration/", "urdf/", "tests/", "fuzz/", "config/"] {
+    for folder in
+        ["shared_mem/", "twin/", "rt_bridge/", "calibration/", "import/", "urdf/", "tests/", "fuzz/", "config/"]
+    {
         assert!(readme.contains(folder), "README.md does not mention {folder}");
     }
     let mentioned = readme.split('`').skip(1).step_by(2).filter(|code| {
-        let known =
-            ["shared_mem/", "twin/src", "rt_bridge/src", "calibration/src", "urdf/src", "tests/", "config/", "docs/"];
+        let known = [
+            "shared_mem/",
+            "twin/src",
+            "rt_bridge/src",
+            "calibration/src",
+            "import/",
+            "urdf/src",
+            "tests/",
+            "config/",
+            "docs/",
+        ];
         known.iter().any(|start| code.starts_with(start)) && !code.contains(' ')
     });
     for path in mentioned {

@@ -16,7 +16,8 @@ use twin::sim::{Drive, SimCell};
 /// Flags that programs give each other, or that belong to programs of others.
 const OF_OTHERS: [&str; 5] = ["parent", "configuration", "shm-size", "features", "release"];
 /// A folder of the sources, and the verbs of which one must have the flags that its messages name.
-const SPOKEN_BY: [(&str, &[&str]); 7] = [
+const SPOKEN_BY: [(&str, &[&str]); 8] = [
+    ("import/src/", &["calibration import"]),
     ("calibration/src/viewpoint/", &["calibration viewpoint"]),
     ("calibration/src/capture/", &["calibration capture excitation", "calibration capture control-hit-slide"]),
     ("calibration/src/demo/", &["calibration demo"]),
@@ -26,8 +27,8 @@ const SPOKEN_BY: [(&str, &[&str]); 7] = [
     ("twin/src/reconstruct/", &["twin label-splats"]),
 ];
 /// Folders whose files are named in texts by their path.
-const FOLDERS: [&str; 8] =
-    ["shared_mem/", "twin/", "rt_bridge/", "calibration/", "urdf/", "tests/", "config/", "docs/"];
+const FOLDERS: [&str; 9] =
+    ["shared_mem/", "twin/", "rt_bridge/", "calibration/", "import/", "urdf/", "tests/", "config/", "docs/"];
 
 fn named(verb: &Verb) -> String {
     verb.path.join(" ")
@@ -262,6 +263,7 @@ fn examples_that_need_no_robot_do_what_they_say_and_answer_on_standard_output() 
         "calibration export session --to ros2 --out bags",
         "calibration export session --to twinaligner --out folders",
         "calibration export bags --to own --out back --json",
+        "calibration import bags --out imported --json",
     ];
     for case in cases {
         assert!(examples.iter().any(|example| words(example) == words(case)), "no example `{case}`");
@@ -275,7 +277,7 @@ fn examples_that_need_no_robot_do_what_they_say_and_answer_on_standard_output() 
         } else {
             assert!(!answer.trim().is_empty(), "{case} answers nothing on standard output");
         }
-        for out in ["theta.toml", "page.html", "simulated.mcap", "bags", "folders", "back"] {
+        for out in ["theta.toml", "page.html", "simulated.mcap", "bags", "folders", "back", "imported"] {
             assert!(!words(case).contains(&out) || lab.path().join(out).exists(), "{case} wrote no {out}");
         }
     }

@@ -6,6 +6,7 @@ mod compare;
 mod demo;
 mod export;
 mod identify;
+mod import;
 mod viewpoint;
 
 use calibration::diagnose;
@@ -28,6 +29,7 @@ Examples:
   calibration identify arm session --out theta.toml --report page.html
   calibration diagnose session --report report.html
   calibration viewpoint session --out cell.toml --report outline.png
+  calibration import last_week --out session
   calibration export session --to ros2 --out bags
 Every verb has its own --help with an example. Logs and progress go to stderr (RUST_LOG=debug for more)."
 )]
@@ -52,6 +54,8 @@ enum Verb {
     Benchmark(benchmark::BenchmarkArguments),
     /// Finds where the camera stands, from pictures of the robot and its joints.
     Viewpoint(Box<viewpoint::ViewpointArguments>),
+    /// Makes a session of logs of other programs: bags, data sets, tables.
+    Import(import::ImportArguments),
     /// Writes a session as ROS 2 bags, TwinAligner clip folders or own clips.
     Export(export::ExportArguments),
     /// The whole story on the simulated cell: shadow, record, replay, explain.
@@ -93,6 +97,7 @@ fn run_to_the_end(verb: Verb, interrupt: &Interrupt) -> anyhow::Result<()> {
             print(arguments.json, &found, terminal::diagnosis(&found))
         }
         Verb::Viewpoint(arguments) => viewpoint::run(*arguments),
+        Verb::Import(arguments) => import::run(&arguments),
         Verb::Export(arguments) => export::run(&arguments),
         Verb::Capture(_) | Verb::Demo(_) | Verb::Benchmark(_) => Ok(()),
     }

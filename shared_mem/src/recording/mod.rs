@@ -15,6 +15,7 @@
 //! | `joint_log` | joint rows: one publisher, one joint order |
 //! | `checks` | faults that foreign logs have, each told in a sentence |
 //! | `wire`, `writer` | own clips: messages and file |
+//! | `raw` | messages as bytes, for readers of other programs' bags |
 //! | `recover` | a damaged file, rewritten |
 //! | `export` | a session in another format |
 //! | `clip`, `series`, `session` | what callers get |
@@ -35,6 +36,7 @@ mod own;
 mod picture;
 mod picture_file;
 mod pictures;
+mod raw;
 mod recover;
 mod ros2;
 mod series;
@@ -46,12 +48,17 @@ mod writer;
 
 pub use clip::{Clip, read_clip};
 pub use error::ReadError;
-pub use export::{ExportError, Exported, FlangeAt, Format, LeftOut, Order, export_session};
+pub use export::{
+    ExportError, Exported, FlangeAt, Format, LeftOut, Order, export_session, ros2_definition, session_folder,
+    write_clip,
+};
 pub use messages::{ClipMessage, ClipMessages, Payload};
+pub use npy::{Array, parse as parse_npy};
 pub use own::{read_arm_states, read_clip_info};
 pub use picture::Picture;
 pub use picture_file::{read_picture, unpack_picture, write_png, write_png_to};
 pub use pictures::{PictureKind, for_pictures};
+pub use raw::{RawMessage, RawMessages};
 pub use recover::{RecoverError, Recovered, recover};
 pub use series::{JointSeries, ObjectSeries};
 pub use session::Session;

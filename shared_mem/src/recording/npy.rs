@@ -1,25 +1,29 @@
-//! NumPy's `.npy` files: little-endian floats in C order. Bytes in, numbers out.
+//! NumPy's `.npy` files: little-endian floats and integers. Bytes in, numbers out.
 
 /// Shape and numbers of an array, row-major.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Array {
-    pub(super) shape: Vec<usize>,
-    pub(super) values: Vec<f64>,
+pub struct Array {
+    /// Length of each axis; empty for a single number.
+    pub shape: Vec<usize>,
+    /// The numbers, row by row.
+    pub values: Vec<f64>,
 }
 
-/// Reads an array; a sentence when it is none or of another kind.
-pub(super) fn parse(bytes: &[u8]) -> Result<Array, String> {
+/// Reads an array of little-endian numbers.
+///
+/// # Errors
+/// A sentence when it is none or of another kind, to be put behind the file's name.
+pub fn parse(bytes: &[u8]) -> Result<Array, String> {
     let (header, data) = split(bytes).ok_or("is no complete .npy file; save it with numpy.save")?;
-    let size = match text_behind(header, "'descr':").and_then(|v| v.split('\'').nth(1)) {
-        Some("<f8") => 8,
-        Some("<f4") => 4,
-        other => {
-            let found = other.unwrap_or("nothing");
-            return Err(format!("holds numbers of type `{found}`; save float64 or float32, little-endian"));
-        }
-    };
-    if !text_behind(header, "'fortran_order':").is_some_and(|v| v.trim_start().starts_with("False")) {
-        return Err("is stored column by column; save numpy.ascontiguousarray of it".into());
+    let descr = text_behind(header, "'descr':").and_then(|v| v.trim_start().strip_prefix('\'')?.split('\'').next());
+    let (size, number) = descr.and_then(kind).ok_or_else(|| {
+        let found = descr.unwrap_or("a record");
+        format!("holds numbers of type `{found}`; save arrays of float64, float32 or integers, little-endian")
+    })?;
+    let order = text_behind(header, "'fortran_order':").map(str::trim_start).unwrap_or("");
+    let by_columns = order.starts_with("True");
+    if !by_columns && !order.starts_with("False") {
+        return Err("does not say in which order its numbers stand; save it with numpy.save".into());
     }
     let shape: Option<Vec<usize>> =
         text_behind(header, "'shape':").and_then(|v| v.split_once('(')?.1.split_once(')')).and_then(|(list, _)| {
@@ -29,12 +33,41 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Array, String> {
     let count = shape.iter().try_fold(1usize, |product, n| product.checked_mul(*n));
     let needed = count.and_then(|count| count.checked_mul(size));
     let data = needed.and_then(|needed| data.get(..needed)).ok_or("is cut: it holds fewer numbers than its shape")?;
-    let values = data.chunks_exact(size).map(|number| match *number {
-        [a, b, c, d] => f64::from(f32::from_le_bytes([a, b, c, d])),
-        [a, b, c, d, e, f, g, h] => f64::from_le_bytes([a, b, c, d, e, f, g, h]),
-        _ => f64::NAN,
-    });
-    Ok(Array { shape, values: values.collect() })
+    let mut values: Vec<f64> = data.chunks_exact(size).map(number).collect();
+    match *shape.as_slice() {
+        _ if !by_columns => {}
+        [_] | [] => {}
+        [rows, columns] => {
+            let stored = values;
+            let at = |i: usize| stored.get((i % columns) * rows + i / columns).copied().unwrap_or(f64::NAN);
+            values = (0..stored.len()).map(at).collect();
+        }
+        _ => return Err("is stored column by column; save numpy.ascontiguousarray of it".into()),
+    }
+    Ok(Array { shape, values })
+}
+
+/// Bytes of a number, and how it is read from them.
+type NumberKind = (usize, fn(&[u8]) -> f64);
+
+fn kind(descr: &str) -> Option<NumberKind> {
+    /// The first bytes; a chunk has as many as its number.
+    fn array<const N: usize>(bytes: &[u8]) -> [u8; N] {
+        bytes.first_chunk().copied().unwrap_or([0; N])
+    }
+    Some(match descr {
+        "<f8" => (8, |b| f64::from_le_bytes(array(b))),
+        "<f4" => (4, |b| f64::from(f32::from_le_bytes(array(b)))),
+        "<i8" => (8, |b| i64::from_le_bytes(array(b)) as f64),
+        "<u8" => (8, |b| u64::from_le_bytes(array(b)) as f64),
+        "<i4" => (4, |b| f64::from(i32::from_le_bytes(array(b)))),
+        "<u4" => (4, |b| f64::from(u32::from_le_bytes(array(b)))),
+        "<i2" => (2, |b| f64::from(i16::from_le_bytes(array(b)))),
+        "<u2" => (2, |b| f64::from(u16::from_le_bytes(array(b)))),
+        "|i1" => (1, |b| f64::from(i8::from_le_bytes(array(b)))),
+        "|u1" | "|b1" => (1, |b| f64::from(u8::from_le_bytes(array(b)))),
+        _ => return None,
+    })
 }
 
 /// Header text and data.
@@ -79,10 +112,21 @@ mod tests {
     }
 
     #[test]
+    fn integers_and_columns_are_read_and_records_are_refused() {
+        let stamps: Vec<u8> = [1_500_000_000_000_i64, -3].iter().flat_map(|v| v.to_le_bytes()).collect();
+        let array = parse(&file("{'descr': '<i8', 'fortran_order': False, 'shape': (2,), }\n", &stamps));
+        assert_eq!(array, Ok(Array { shape: vec![2], values: vec![1.5e12, -3.0] }));
+        let array = parse(&file("{'descr': '|u1', 'fortran_order': True, 'shape': (2, 3), }\n", &[1, 4, 2, 5, 3, 6]));
+        assert_eq!(array, Ok(Array { shape: vec![2, 3], values: vec![1.0, 2.0, 3.0, 4.0, 5.0, 6.0] }));
+        let error = parse(&file("{'descr': [('q', '<f8')], 'fortran_order': False, 'shape': (2,), }\n", &[0; 16]));
+        assert!(error.is_err_and(|what| what.contains("a record")));
+    }
+
+    #[test]
     fn a_cut_file_and_a_huge_shape_are_refused() {
         let header = "{'descr': '<f8', 'fortran_order': False, 'shape': (18446744073709551615, 4, 4), }\n";
         assert!(parse(&file(header, &[0; 64])).is_err());
-        assert!(parse(&file("{'descr': '<f8', 'fortran_order': True, 'shape': (1,), }", &[0; 8])).is_err());
+        assert!(parse(&file("{'descr': '<f8', 'fortran_order': True, 'shape': (2, 2, 2), }", &[0; 64])).is_err());
     }
 
     proptest! {

@@ -10,8 +10,9 @@ const POSE: &str = "MSG: geometry_msgs/Pose\ngeometry_msgs/Point position\ngeome
 const WRENCH: &str = "MSG: geometry_msgs/Wrench\ngeometry_msgs/Vector3 force\ngeometry_msgs/Vector3 torque\n";
 const REGION: &str = "MSG: sensor_msgs/RegionOfInterest\nuint32 x_offset\nuint32 y_offset\nuint32 height\nuint32 width\nbool do_rectify\n";
 
-/// Text of a type's definition; empty for types that are never written.
-pub(super) fn definition(type_name: &str) -> String {
+/// Text of a ROS 2 type's definition (`sensor_msgs/msg/JointState`); empty for types that are never written.
+#[must_use]
+pub fn definition(type_name: &str) -> String {
     let (own, used): (&str, &[&str]) = match type_name {
         "sensor_msgs/msg/JointState" => (
             "std_msgs/Header header\nstring[] name\nfloat64[] position\nfloat64[] velocity\nfloat64[] effort\n",

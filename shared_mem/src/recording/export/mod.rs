@@ -21,7 +21,9 @@ mod npz;
 mod rosbag;
 mod source;
 
+pub use definitions::definition as ros2_definition;
 pub use left_out::LeftOut;
+pub use native::write_clip;
 
 use super::{ReadError, Session, WriteError};
 use crate::cell::ClipEntry;
@@ -145,19 +147,30 @@ pub fn export_session(
 
 /// The new folder; in place of another session only where that was asked for.
 fn begin(session: &Session, Order { out, force, .. }: Order<'_>) -> Result<OutputFolder, ExportError> {
+    let clips = session.clips.iter().map(|entry| session.folder.join(&entry.file));
+    let sources: Vec<PathBuf> = clips.chain([session.folder.clone()]).collect();
+    session_folder(out, force, &sources)
+}
+
+/// Begins a folder for a new session. With `force` it takes the place of another session that nothing else lies in, and none of
+/// the `sources` that it is made of.
+///
+/// # Errors
+/// [`ExportError`] when there is something that is kept, or the folder cannot be written.
+pub fn session_folder(out: &Path, force: bool, sources: &[PathBuf]) -> Result<OutputFolder, ExportError> {
     let is_full = std::fs::read_dir(out).is_ok_and(|mut entries| entries.next().is_some());
     if !force || !is_full {
         return Ok(OutputFolder::create(out)?);
     }
     let refused = |what: String| Err(ExportError::NotReplaced { path: out.to_owned(), what });
     let whole = |path: &Path| path.canonicalize().unwrap_or_else(|_| path.to_owned());
-    let sources = session.clips.iter().map(|entry| session.folder.join(&entry.file));
-    if sources.chain([session.folder.clone()]).any(|source| whole(&source).starts_with(whole(out))) {
-        return refused("it holds what is exported".into());
+    if sources.iter().any(|source| whole(source).starts_with(whole(out))) {
+        return refused("it holds what is exported or imported".into());
     }
     for entry in std::fs::read_dir(out).map_err(ReadError::io(out))? {
         let name = entry.map_err(ReadError::io(out))?.file_name().to_string_lossy().into_owned();
-        let of_session = name == CELL_TOML || name.ends_with(".mcap") || name.starts_with("traj_");
+        let of_session =
+            name == CELL_TOML || name == IMPORT_TOML || name.ends_with(".mcap") || name.starts_with("traj_");
         if !of_session {
             return refused(format!("it holds {name}, which is no part of a session"));
         }
@@ -167,6 +180,8 @@ fn begin(session: &Session, Order { out, force, .. }: Order<'_>) -> Result<Outpu
 
 /// What makes a folder a session.
 const CELL_TOML: &str = "cell.toml";
+/// What a session that was imported keeps beside it.
+const IMPORT_TOML: &str = "import.toml";
 
 /// Name of a clip in the new session.
 fn name(file: &Path, to: Format, number: usize) -> PathBuf {

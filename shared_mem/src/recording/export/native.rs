@@ -6,7 +6,7 @@ use super::super::container::Messages;
 use super::super::logged::Logged;
 use super::super::ros2::{JointState, StampedPose};
 use super::super::writer::{ClipInfo, ClipWriter};
-use super::super::{Payload, Picture, ReadError};
+use super::super::{Clip, Payload, Picture, ReadError, WriteError, WriteSummary};
 use super::left_out::Carried;
 use super::rosbag::{EXTERNAL_TORQUES, FLANGE_POSE};
 use super::source::{Beside, Kind, Source};
@@ -50,9 +50,8 @@ pub(super) fn write(
         writer.note(&record)?;
     }
     let known = if matches!(source.kind, Kind::Bag) { Known::read(&source.path)? } else { Known::default() };
-    let latency_ns = cell.camera.as_ref().map_or(0, |camera| (camera.latency * 1e9) as u64);
-    let commands = if logged.commands_apart { &clip.desired.stamps_ns[..] } else { &[] };
-    let mut rows = Rows { source, known, flange_at, latency_ns, commands, state: 0, command: 0, pose: 0 };
+    let latency_ns = latency_ns(cell);
+    let mut rows = Rows::new(clip, logged, known, flange_at, latency_ns);
     for beside in source.beside()? {
         let beside = beside?;
         rows.put_until(beside.stamp_ns, &mut writer)?;
@@ -62,6 +61,31 @@ pub(super) fn write(
     rows.put_until(u64::MAX, &mut writer)?;
     writer.finish()?;
     Ok(exported)
+}
+
+/// Writes a clip that was put together elsewhere, in Unix time or in time since its beginning; `program` names what did it.
+///
+/// # Errors
+/// [`WriteError`]; nothing of it is there then.
+pub fn write_clip(clip: &Clip, cell: &Cell, program: &str, output: Output) -> Result<WriteSummary, WriteError> {
+    let info = ClipInfo {
+        cell_toml: Some(cell.to_toml()),
+        configuration: String::new(),
+        program: program.into(),
+        torques_begin_at_rows: !clip.torques_end_at_rows,
+    };
+    let mut writer = ClipWriter::whole_in_unix_time(output, &info)?;
+    let logged = Logged::of(clip);
+    if let Some(record) = logged.record() {
+        writer.note(&record)?;
+    }
+    let mut rows = Rows::new(clip, logged, Known::default(), &|_| None, latency_ns(cell));
+    rows.put_until(u64::MAX, &mut writer)?;
+    writer.finish()
+}
+
+fn latency_ns(cell: &Cell) -> u64 {
+    cell.camera.as_ref().map_or(0, |camera| (camera.latency * 1e9) as u64)
 }
 
 /// An own clip is one already: bit by bit.
@@ -117,7 +141,7 @@ fn put_beside(
 
 /// States, commands and poses, written in between the rest in the order of their stamps.
 struct Rows<'a> {
-    source: &'a Source,
+    clip: &'a Clip,
     known: Known,
     flange_at: FlangeAt<'a>,
     latency_ns: u64,
@@ -128,9 +152,14 @@ struct Rows<'a> {
     pose: usize,
 }
 
-impl Rows<'_> {
-    fn put_until(&mut self, stamp_ns: u64, writer: &mut ClipWriter<Output>) -> Result<(), ExportError> {
-        let clip = &self.source.clip;
+impl<'a> Rows<'a> {
+    fn new(clip: &'a Clip, logged: Logged, known: Known, flange_at: FlangeAt<'a>, latency_ns: u64) -> Self {
+        let commands = if logged.commands_apart { &clip.desired.stamps_ns[..] } else { &[] };
+        Self { clip, known, flange_at, latency_ns, commands, state: 0, command: 0, pose: 0 }
+    }
+
+    fn put_until(&mut self, stamp_ns: u64, writer: &mut ClipWriter<Output>) -> Result<(), WriteError> {
+        let clip = self.clip;
         loop {
             let state = clip.measured.stamps_ns.get(self.state).copied();
             let pose = clip.object.stamps_ns.get(self.pose).copied();
@@ -164,7 +193,7 @@ impl Rows<'_> {
     }
 
     fn arm_command(&self, row: usize, stamp_ns: u64) -> ArmCommand {
-        let desired = &self.source.clip.desired;
+        let desired = &self.clip.desired;
         let of = |values: Option<&[f64]>| joints_from(values.unwrap_or(&[]));
         ArmCommand {
             stamp_ns,
@@ -179,7 +208,7 @@ impl Rows<'_> {
     }
 
     fn arm_state(&self, row: usize, stamp_ns: u64) -> ArmState {
-        let clip = &self.source.clip;
+        let clip = self.clip;
         // What it was told last; before anything was, what it is told first.
         let told = clip.desired.stamps_ns.partition_point(|stamp| *stamp <= stamp_ns).saturating_sub(1);
         let of = |values: Option<&[f64]>| joints_from(values.unwrap_or(&[]));

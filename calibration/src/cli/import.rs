@@ -1,0 +1,132 @@
+//! `calibration import`.
+
+use super::print;
+use calibration::typed;
+use clap::Args;
+use import::{Gravity, Imported, Note, Order, Outcome};
+use serde::Serialize;
+use shared_mem::cell::Cell;
+use shared_mem::console;
+use shared_mem::msg::joints_from;
+use shared_mem::progress::Progress;
+use std::path::{Path, PathBuf};
+use twin::arm::ArmModel;
+
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Reads ROS 2 bags (mcap and sqlite3, files or folders), ROS 1 bags, LeRobot data sets (v2 and v3), CSV and TSV with a line of
+names, npz, logs of libfranka and folders of SAGE; of a folder, all of these in it. Which columns are q, dq and tau, their
+units, the order and sign of the joints, the clock and which torque it is, is proposed from names and numbers and said with
+the reason. It stands in import.toml of the new session, to be changed and given back with --mapping. What cannot be known
+is asked once: import.toml is written here with the open lines marked. Pictures are not imported. A damaged log is refused,
+and then nothing is written.
+
+Examples:
+  calibration import last_week --out session          # every log in the folder
+  calibration import bags --out imported --json
+  calibration import run_1.csv run_2.csv --out session --mapping import.toml
+  calibration import lerobot_so101 --out session      # an episode a clip
+  calibration import push.bag --out strokes --cell cell.toml
+
+Then: `twin replay session`, `calibration identify arm session`, `calibration diagnose session`.
+
+JSON: clips [{file, source, format, measured, desired, poses, left_out [{what, why, count}], warnings}], notes [{line, why,
+open}].")]
+pub(super) struct ImportArguments {
+    /// Logs, or folders of logs.
+    #[arg(value_name = "FILES", required = true)]
+    files: Vec<PathBuf>,
+    /// New session folder.
+    #[arg(long, value_name = "SESSION")]
+    out: PathBuf,
+    /// What the columns mean, as an import before has written it [default: proposed from the log].
+    #[arg(long, value_name = "IMPORT.TOML")]
+    mapping: Option<PathBuf>,
+    /// What the laboratory knows about its cell [default: what the log tells, and the rest as usual].
+    #[arg(long, value_name = "CELL.TOML")]
+    cell: Option<PathBuf>,
+    /// Replaces a session that is there already, and an import.toml with open lines.
+    #[arg(long)]
+    force: bool,
+    /// Prints one JSON object on stdout at the end.
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Serialize)]
+struct Answer {
+    clips: Vec<Imported>,
+    notes: Vec<Note>,
+}
+
+pub(super) fn run(arguments: &ImportArguments) -> anyhow::Result<()> {
+    let ImportArguments { files, out, mapping, cell, force, json } = arguments;
+    let command = |mapping: &Path| command(arguments, mapping);
+    let order = Order {
+        files,
+        out,
+        mapping: mapping.as_deref(),
+        cell: cell.as_deref(),
+        force: *force,
+        questions: Path::new("import.toml"),
+        model: &gravity,
+        command: &command,
+    };
+    let bar = Progress::new("import", 100);
+    let outcome = import::import(order, |clip, (done, all)| {
+        bar.show(100 * done / all.max(1), "");
+        say(clip);
+    })?;
+    drop(bar);
+    match outcome {
+        Outcome::Open { file, notes } => {
+            let (open, known): (Vec<&Note>, Vec<&Note>) = notes.iter().partition(|note| note.open);
+            known.iter().chain(&open).for_each(|note| console::line(format_args!("{}: {}", note.line, note.why)));
+            let lines: Vec<&str> = open.iter().map(|note| note.line.as_str()).collect();
+            let file = file.as_path();
+            anyhow::bail!(
+                "the log does not tell all; fill in {} in {}, then: {}",
+                lines.join(", "),
+                file.display(),
+                command(file)
+            );
+        }
+        Outcome::Done { clips, notes } => {
+            notes.iter().for_each(|note| console::line(format_args!("{}: {}", note.line, note.why)));
+            let words = format!("{} clips in {}", clips.len(), out.display());
+            print(*json, &Answer { clips, notes }, words)
+        }
+    }
+}
+
+/// What there is to say about a clip.
+fn say(clip: &Imported) {
+    let Imported { file, source, format, measured, desired, poses, left_out, warnings } = clip;
+    let file = file.display();
+    let source = source.display();
+    console::line(format_args!("{file}: {measured} states, {desired} commands, {poses} poses of {source} ({format})"));
+    for out in left_out {
+        console::line(format_args!("{file}: left out: {} ({}): {}", out.what, out.count, out.why));
+    }
+    for warning in warnings {
+        console::line(format_args!("{file}: {warning}"));
+    }
+}
+
+/// Gravity's torques by the arm's model, where cell.toml names one.
+fn gravity(cell: &Cell) -> Option<Gravity> {
+    let model = cell.robot.as_ref().and_then(|_| ArmModel::from_cell(cell).ok()).filter(ArmModel::has_geometry)?;
+    Some(Box::new(move |q: &[f64]| {
+        (q.len() == model.dof()).then(|| model.gravity(&joints_from(q)).get(..q.len()).unwrap_or(&[]).to_vec())
+    }))
+}
+
+/// The same import, with a mapping.
+fn command(arguments: &ImportArguments, mapping: &Path) -> String {
+    let quoted = |path: &Path| typed::quoted(&path.to_string_lossy());
+    let files: Vec<String> = arguments.files.iter().map(|file| quoted(file)).collect();
+    let cell = arguments.cell.as_ref().map_or_else(String::new, |cell| format!(" --cell {}", quoted(cell)));
+    let force = if arguments.force { " --force" } else { "" };
+    let (files, out, mapping) = (files.join(" "), quoted(&arguments.out), quoted(mapping));
+    format!("calibration import {files} --out {out} --mapping {mapping}{cell}{force}")
+}

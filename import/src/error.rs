@@ -1,0 +1,57 @@
+//! Why logs cannot be imported, one line each: what happened and what to do.
+
+use shared_mem::cell::CellError;
+use shared_mem::input::InputError;
+use shared_mem::output::OutputError;
+use shared_mem::printable;
+use shared_mem::recording::{ExportError, ReadError, WriteError};
+use shared_mem::toml_file::TomlFileError;
+use std::path::{Path, PathBuf};
+
+/// Logs cannot be imported. No session is there then.
+#[derive(Debug, thiserror::Error)]
+pub enum ImportError {
+    /// A recording cannot be read.
+    #[error(transparent)]
+    Read(#[from] ReadError),
+    /// A file is missing, no file, or too large.
+    #[error(transparent)]
+    Input(#[from] InputError),
+    /// The session cannot be written.
+    #[error(transparent)]
+    Output(#[from] OutputError),
+    /// The session's folder is taken.
+    #[error(transparent)]
+    Folder(#[from] ExportError),
+    /// A clip cannot be written.
+    #[error(transparent)]
+    Write(#[from] WriteError),
+    /// The mapping is no import.toml.
+    #[error(transparent)]
+    Mapping(#[from] TomlFileError),
+    /// The given cell.toml cannot be used.
+    #[error(transparent)]
+    Cell(#[from] CellError),
+    /// A log is damaged, or of no known kind.
+    #[error("{}: {what}", path.display())]
+    Log {
+        /// The file or folder.
+        path: PathBuf,
+        /// What is wrong and how to mend it.
+        what: String,
+    },
+    /// Ctrl-C.
+    #[error("{}: interrupted while it was read; start again", path.display())]
+    Interrupted {
+        /// The file.
+        path: PathBuf,
+    },
+}
+
+impl ImportError {
+    /// What is wrong with the log at `path`.
+    pub(crate) fn log(path: &Path, what: impl Into<String>) -> Self {
+        // What a log holds may be quoted, and be anything.
+        Self::Log { path: path.to_owned(), what: printable::one_line(&what.into()) }
+    }
+}

@@ -1,0 +1,32 @@
+//! Logs of other programs as a session: what they hold, what it means, and clips of it.
+//!
+//! | file | owns |
+//! |---|---|
+//! | `sources` | formats: ROS 2 and ROS 1 bags, LeRobot data sets, text tables, npz, libfranka's log, SAGE's folders |
+//! | `ros` | ROS messages of any type as rows of numbers |
+//! | `log` | what every format is read into: tables of named columns with stamps |
+//! | `naming` | what the names of columns say |
+//! | `mapping` | `import.toml`: which columns are which quantity, in which unit |
+//! | `propose` | a mapping out of a log, with the reasons |
+//! | `clip` | a log by its mapping, in SI |
+//! | `cell` | the cell.toml of the new session |
+//! | `session` | the whole way |
+
+mod cell;
+mod clip;
+mod error;
+mod log;
+mod mapping;
+mod naming;
+mod propose;
+mod ros;
+mod session;
+mod sources;
+
+pub use clip::Gravity;
+pub use error::ImportError;
+pub use log::LeftOut;
+pub use mapping::{
+    AngleUnit, JointColumns, LengthUnit, Mapping, Note, PoseColumns, RateUnit, TimeUnit, Torque, TorquesAct,
+};
+pub use session::{Imported, Model, Order, Outcome, import};

@@ -1,0 +1,152 @@
+//! `import.toml`: which columns of a log are which quantity, in which unit and by which clock. Proposed from the log, written
+//! with the reasons, and final once it is given.
+
+mod text;
+mod units;
+
+pub use text::Note;
+pub(crate) use text::to_toml;
+pub use units::{AngleUnit, LengthUnit, RateUnit, TimeUnit, Torque, TorquesAct};
+
+use serde::{Deserialize, Serialize};
+use shared_mem::cell::ClipKind;
+use shared_mem::toml_file::{self, TomlFileError};
+use std::path::Path;
+
+/// What the columns of a log are.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Mapping {
+    /// What was done in the clips.
+    pub kind: ClipKind,
+    /// Joint names, in the order of the columns below. Empty where no arm was recorded.
+    #[serde(default)]
+    pub joints: Vec<String>,
+    /// What the arm did.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub measured: Option<JointColumns>,
+    /// What the arm was told.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub desired: Option<JointColumns>,
+    /// Where the object was.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub object: Option<PoseColumns>,
+}
+
+/// Columns of joints.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, expecting = "a block of columns")]
+pub struct JointColumns {
+    /// Topic, file of a folder, or `rows`.
+    pub table: String,
+    /// Column of stamps, or `header` for those that the format itself gives.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub stamps: Option<String>,
+    /// Unit of that column.
+    #[serde(default)]
+    pub stamp_unit: TimeUnit,
+    /// Rows a second where there are no stamps.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rate: Option<f64>,
+    /// What is added to the stamps [s].
+    #[serde(default)]
+    pub shift: f64,
+    /// Columns of the positions, one a joint. Empty: not known yet.
+    pub q: Vec<String>,
+    /// Their unit.
+    #[serde(default)]
+    pub q_unit: AngleUnit,
+    /// 1 or -1 a joint; empty: all 1.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub sign: Vec<f64>,
+    /// Columns of the velocities; empty: none.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub dq: Vec<String>,
+    /// Their unit.
+    #[serde(default)]
+    pub dq_unit: RateUnit,
+    /// Columns of the torques [N m]; empty: none.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub tau: Vec<String>,
+    /// Which torque it is.
+    #[serde(default)]
+    pub torque: Torque,
+    /// In which control period it acted.
+    #[serde(default)]
+    pub torques_act: TorquesAct,
+}
+
+/// Columns of the object's pose in the base frame.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, expecting = "a block of columns")]
+pub struct PoseColumns {
+    /// Topic, file of a folder, or `rows`.
+    pub table: String,
+    /// As for joints.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub stamps: Option<String>,
+    /// As for joints.
+    #[serde(default)]
+    pub stamp_unit: TimeUnit,
+    /// As for joints.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rate: Option<f64>,
+    /// As for joints.
+    #[serde(default)]
+    pub shift: f64,
+    /// Columns of x, y, z.
+    pub position: [String; 3],
+    /// Their unit.
+    #[serde(default)]
+    pub position_unit: LengthUnit,
+    /// Columns of the quaternion's w, x, y, z.
+    pub orientation: [String; 4],
+}
+
+impl Mapping {
+    /// Reads an import.toml.
+    ///
+    /// # Errors
+    /// [`TomlFileError`] with file, line, and the nearest known name.
+    pub fn read(path: &Path) -> Result<Self, TomlFileError> {
+        toml_file::read(path)
+    }
+
+    /// The same with what one block says for the other: a rate for both where they are of one table; and with names for joints
+    /// that have none.
+    #[must_use]
+    pub(crate) fn completed(mut self) -> Self {
+        if let (Some(measured), Some(desired)) = (&self.measured, &mut self.desired)
+            && measured.table == desired.table
+            && desired.stamps.is_none()
+            && desired.rate.is_none()
+        {
+            desired.rate = measured.rate;
+        }
+        if self.joints.is_empty() {
+            let count = self.measured.as_ref().map_or(0, |measured| measured.q.len());
+            self.joints = (1..=count).map(|i| format!("joint{i}")).collect();
+        }
+        self
+    }
+
+    /// The first line that is still to be filled in: its key.
+    #[must_use]
+    pub fn open_line(&self) -> Option<&'static str> {
+        let (measured, desired) = (self.measured.as_ref(), self.desired.as_ref());
+        let lacks_clock = |c: &JointColumns| c.stamps.is_none() && c.rate.is_none_or(|rate| rate <= 0.0);
+        if measured.is_some_and(|m| m.q.is_empty()) {
+            Some("[measured] q")
+        } else if measured.is_some() && desired.is_none_or(|d| d.q.is_empty()) {
+            Some("[desired] q")
+        } else if measured.is_some_and(lacks_clock) {
+            Some("[measured] rate")
+        } else if desired.is_some_and(lacks_clock) {
+            Some("[desired] rate")
+        } else if measured.is_none() && self.object.is_none() {
+            Some("[measured] q")
+        } else {
+            None
+        }
+    }
+}

@@ -1,0 +1,111 @@
+//! Where a table's stamps are, and in which unit.
+
+use super::Notes;
+use crate::clip::HEADER;
+use crate::log::{Column, Log, Table};
+use crate::mapping::TimeUnit;
+use crate::naming;
+
+/// Rows of a robot's log come between these rates [Hz]; a thousand apart, so that one unit alone fits.
+const SLOWEST: f64 = 4.0;
+const FASTEST: f64 = 4000.0;
+const UNITS: [(TimeUnit, &str); 4] = [
+    (TimeUnit::Second, "seconds"),
+    (TimeUnit::Millisecond, "milliseconds"),
+    (TimeUnit::Microsecond, "microseconds"),
+    (TimeUnit::Nanosecond, "nanoseconds"),
+];
+
+/// The stamps of a table.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub(super) struct Clock {
+    pub(super) stamps: Option<String>,
+    pub(super) unit: TimeUnit,
+    pub(super) rate: Option<f64>,
+}
+
+pub(super) fn choose(log: &Log, table: &Table, block: &str, notes: &mut Notes) -> Clock {
+    if table.stamps_ns.is_some() {
+        if let Some(rate) = log.facts.rate {
+            notes.why(&format!("{block}.stamps"), format!("the data set says {rate} rows a second"));
+        }
+        return Clock { stamps: Some(HEADER.into()), ..Clock::default() };
+    }
+    let Some(column) = column(table) else {
+        let question = "the log has no stamps: how many rows a second?";
+        notes.open(&format!("{block}.rate"), question);
+        return Clock::default();
+    };
+    let line = format!("{block}.stamp_unit");
+    let (unit, why) = unit(log, &column.name, &column.values);
+    notes.why(&line, why);
+    Clock { stamps: Some(column.name.clone()), unit, rate: None }
+}
+
+/// Whether a table has no stamps at all.
+pub(super) fn is_missing(table: &Table) -> bool {
+    table.stamps_ns.is_none() && column(table).is_none()
+}
+
+/// The column of stamps: named so, and rising.
+fn column(table: &Table) -> Option<&Column> {
+    let rises = |values: &[f64]| {
+        values.len() > 1 && values.windows(2).filter(|w| w[1] > w[0]).count() * 10 >= 9 * (values.len() - 1)
+    };
+    let named = table.columns.iter().filter(|column| naming::is_time(&column.name) && rises(&column.values));
+    named.min_by_key(|column| naming::words(&column.name).len())
+}
+
+fn unit(log: &Log, name: &str, values: &[f64]) -> (TimeUnit, String) {
+    let of = |seconds: f64| {
+        UNITS.iter().find(|(unit, _)| (unit.seconds() - seconds).abs() < 1e-3 * seconds).map(|(unit, _)| *unit)
+    };
+    if let Some((seconds, why)) = log.facts.stamp_unit
+        && let Some(unit) = of(seconds)
+    {
+        return (unit, why.to_owned());
+    }
+    if let Some(unit) = naming::time_unit(name).and_then(of) {
+        return (unit, format!("`{name}` names its unit"));
+    }
+    let mut steps: Vec<f64> = values.windows(2).map(|w| w[1] - w[0]).filter(|step| *step > 0.0).collect();
+    steps.sort_by(f64::total_cmp);
+    let step = steps.get(steps.len() / 2).copied().unwrap_or(f64::NAN);
+    let fits = |(unit, _): &&(TimeUnit, &str)| (SLOWEST..FASTEST).contains(&(1.0 / (step * unit.seconds())));
+    match UNITS.iter().find(fits) {
+        Some((unit, word)) => {
+            let rate = 1.0 / (step * unit.seconds());
+            (*unit, format!("`{name}` rises by {step} a row: {rate:.0} rows a second in {word}"))
+        }
+        None => {
+            (TimeUnit::Second, format!("`{name}` rises by {step} a row, which fits no unit of a robot's log: check it"))
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn seconds_milli_micro_and_nanoseconds_are_told_by_the_rate_they_give() {
+        for (step, expected) in [
+            (0.001, TimeUnit::Second),
+            (0.02, TimeUnit::Second),
+            (1.0, TimeUnit::Millisecond),
+            (33.3, TimeUnit::Millisecond),
+            (20_000.0, TimeUnit::Microsecond),
+            (5e6, TimeUnit::Nanosecond),
+        ] {
+            let values: Vec<f64> = (0..100).map(|i| 1e3 + f64::from(i) * step).collect();
+            let table = Table { columns: vec![Column { name: "t".into(), values }], ..Table::default() };
+            let mut notes = Notes::default();
+            let clock = choose(&Log::default(), &table, "measured", &mut notes);
+            assert_eq!((clock.stamps.as_deref(), clock.unit), (Some("t"), expected), "{step}");
+            assert!(notes.0[0].why.contains("rows a second in"), "{:?}", notes.0);
+        }
+        let mut notes = Notes::default();
+        choose(&Log::default(), &Table::default(), "measured", &mut notes);
+        assert!(notes.0[0].open && notes.0[0].line == "measured.rate");
+    }
+}

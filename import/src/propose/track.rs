@@ -1,0 +1,92 @@
+//! Numbers of joints over time, as far as a mapping gives them so far.
+
+use crate::clip::HEADER;
+use crate::log::Table;
+use crate::mapping::JointColumns;
+use shared_mem::time::seconds_between;
+
+/// Rows that are looked at: evenly taken ones of a longer log would hide fast motion, so its first are.
+const MOST_ROWS: usize = 60_000;
+
+/// Positions, velocities and torques in SI, joint by joint.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub(super) struct Track {
+    /// From the table's first stamp, or from 1970 where that is how they count [s].
+    pub(super) t: Vec<f64>,
+    /// [rad], or as far as its unit is known.
+    pub(super) q: Vec<Vec<f64>>,
+    /// As logged; empty where there is none.
+    pub(super) dq: Vec<Vec<f64>>,
+    /// [N m]; empty where there is none.
+    pub(super) tau: Vec<Vec<f64>>,
+}
+
+impl Track {
+    /// `None` where there are no positions or no clock.
+    pub(super) fn of(table: &Table, columns: &JointColumns) -> Option<Self> {
+        let rows = table.rows().min(MOST_ROWS);
+        let t: Vec<f64> = match (&columns.stamps, columns.rate) {
+            (Some(name), _) if name == HEADER => {
+                table.stamps_ns.as_ref()?.iter().take(rows).map(|stamp| seconds_between(0, *stamp)).collect()
+            }
+            (Some(name), _) => {
+                table.column(name)?.values.iter().take(rows).map(|v| v * columns.stamp_unit.seconds()).collect()
+            }
+            (None, Some(rate)) => (0..rows).map(|row| row as f64 / rate).collect(),
+            (None, None) => return None,
+        };
+        let sign = |i: usize| columns.sign.get(i).copied().unwrap_or(1.0);
+        let pick = |names: &[String], factor: f64| -> Option<Vec<Vec<f64>>> {
+            let of = |(i, name): (usize, &String)| {
+                Some(table.column(name)?.values.iter().take(rows).map(|v| v * factor * sign(i)).collect::<Vec<f64>>())
+            };
+            names.iter().enumerate().map(of).collect()
+        };
+        let q = pick(&columns.q, columns.q_unit.si()).filter(|q| !q.is_empty())?;
+        let (dq, tau) = (pick(&columns.dq, 1.0)?, pick(&columns.tau, 1.0)?);
+        // Rows of other tables' stamps, or without position, are none of this one's.
+        let good: Vec<usize> = (0..t.len())
+            .filter(|row| t[*row].is_finite() && q.iter().all(|column| column.get(*row).is_some_and(|v| v.is_finite())))
+            .collect();
+        let at =
+            |values: &[f64]| good.iter().map(|row| values.get(*row).copied().unwrap_or(f64::NAN)).collect::<Vec<f64>>();
+        let all = |columns: &[Vec<f64>]| columns.iter().map(|column| at(column)).collect();
+        (good.len() > 2).then(|| Self { t: at(&t), q: all(&q), dq: all(&dq), tau: all(&tau) })
+    }
+
+    /// Slopes of a joint's positions, in the middle between the rows around each [1/s]; NaN at both ends.
+    pub(super) fn slopes(&self, joint: usize) -> Vec<f64> {
+        let q = &self.q[joint];
+        let mut slopes = vec![f64::NAN; q.len()];
+        for i in 1..q.len().saturating_sub(1) {
+            let dt = self.t[i + 1] - self.t[i - 1];
+            if dt > 0.0 {
+                slopes[i] = (q[i + 1] - q[i - 1]) / dt;
+            }
+        }
+        slopes
+    }
+
+    /// A joint's positions at other times [s], in between linear; NaN beyond the ends.
+    pub(super) fn at(&self, joint: usize, times: &[f64]) -> Vec<f64> {
+        let q = &self.q[joint];
+        let one = |time: &f64| {
+            let next = self.t.partition_point(|t| t < time);
+            match (next.checked_sub(1), next < self.t.len()) {
+                (_, true) if self.t[next] == *time => q[next],
+                (Some(before), true) => {
+                    let share = (time - self.t[before]) / (self.t[next] - self.t[before]);
+                    q[before] + share * (q[next] - q[before])
+                }
+                _ => f64::NAN,
+            }
+        };
+        times.iter().map(one).collect()
+    }
+}
+
+/// Root of the mean square of what is finite.
+pub(super) fn rms<'a>(values: impl Iterator<Item = &'a f64>) -> f64 {
+    let (sum, count) = values.filter(|v| v.is_finite()).fold((0.0, 0), |(sum, count), v| (sum + v * v, count + 1));
+    if count == 0 { 0.0 } else { (sum / f64::from(count)).sqrt() }
+}

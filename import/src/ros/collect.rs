@@ -1,0 +1,201 @@
+//! The messages of a bag as tables: one a topic and publisher, with the numbers that may be of use.
+
+use super::definition::{self, Arity, Field, Kind};
+use super::flat::Flat;
+use super::known;
+use super::wire::{Encoding, Reader};
+use crate::log::{Column, LeftOut, Table};
+use crate::naming;
+use std::collections::{BTreeMap, HashMap};
+use std::rc::Rc;
+
+/// Publishers, or transforms, of one topic that are told apart.
+const MOST_LAYOUTS: usize = 64;
+
+/// Why a topic is left out.
+const PICTURES: &str = "pictures and other arrays of bytes are not imported";
+const UNDEFINED: &str = "the bag holds no definition of its type";
+const NUMBERLESS: &str = "it holds no number that a clip has a place for";
+const CROWDED: &str = "its messages have too many forms";
+
+/// Takes messages and gives tables.
+pub(crate) struct Collector {
+    encoding: Encoding,
+    types: HashMap<String, Option<Rc<Vec<Field>>>>,
+    topics: BTreeMap<String, Topic>,
+}
+
+/// What came on one topic.
+#[derive(Default)]
+struct Topic {
+    layouts: Vec<Layout>,
+    left_out: BTreeMap<&'static str, u64>,
+}
+
+/// Messages of one shape, under one set of names.
+struct Layout {
+    shape: Vec<usize>,
+    texts: Vec<String>,
+    names: Vec<String>,
+    /// Which of the numbers are kept.
+    kept: Vec<usize>,
+    columns: Vec<Vec<f64>>,
+    stamps_ns: Vec<u64>,
+    log_times_ns: Vec<u64>,
+}
+
+/// A message as it comes.
+pub(crate) struct Incoming<'a> {
+    pub(crate) topic: &'a str,
+    pub(crate) type_name: &'a str,
+    /// Empty where the bag has none.
+    pub(crate) definition: &'a [u8],
+    pub(crate) log_time_ns: u64,
+    pub(crate) data: &'a [u8],
+}
+
+impl Collector {
+    pub(crate) fn new(encoding: Encoding) -> Self {
+        Self { encoding, types: HashMap::new(), topics: BTreeMap::new() }
+    }
+
+    /// Takes a message over; a sentence where it is not what its type says.
+    pub(crate) fn take(&mut self, message: &Incoming<'_>) -> Result<(), String> {
+        let fields = self.fields(message);
+        let topic = match self.topics.get_mut(message.topic) {
+            Some(topic) => topic,
+            None => self.topics.entry(message.topic.to_owned()).or_default(),
+        };
+        let Some(fields) = fields else {
+            topic.leave_out(UNDEFINED);
+            return Ok(());
+        };
+        let broken = |_| {
+            format!(
+                "a message on `{}` is no {}: the bag is damaged; take it from its source again",
+                message.topic, message.type_name
+            )
+        };
+        let mut reader = Reader::new(message.data, self.encoding).map_err(broken)?;
+        // A list of messages is as many of them: transforms.
+        if let [Field { kind: Kind::Message(inner), arity: Arity::Sequence, .. }] = &fields[..] {
+            for _ in 0..reader.length().map_err(broken)? {
+                topic.row(inner, &mut reader, message.log_time_ns).map_err(broken)?;
+            }
+        } else {
+            topic.row(&fields, &mut reader, message.log_time_ns).map_err(broken)?;
+        }
+        if reader.is_at_end() { Ok(()) } else { Err(broken(super::wire::Broken)) }
+    }
+
+    fn fields(&mut self, message: &Incoming<'_>) -> Option<Rc<Vec<Field>>> {
+        if let Some(known) = self.types.get(message.type_name) {
+            return known.clone();
+        }
+        let own = std::str::from_utf8(message.definition).ok().filter(|text| !text.trim().is_empty());
+        let fields = own.and_then(|text| definition::parse(message.type_name, text)).or_else(|| {
+            let text = known::definition(message.type_name);
+            if text.is_empty() { None } else { definition::parse(message.type_name, &text) }
+        });
+        let fields = fields.map(Rc::new);
+        self.types.insert(message.type_name.to_owned(), fields.clone());
+        fields
+    }
+
+    /// The tables, and what is in none of them.
+    pub(crate) fn finish(self) -> (Vec<Table>, Vec<LeftOut>) {
+        let (mut tables, mut left_out) = (Vec::new(), Vec::new());
+        for (name, topic) in self.topics {
+            left_out.extend(topic.left_out.iter().map(|(why, count)| LeftOut {
+                what: name.clone(),
+                why,
+                count: *count,
+            }));
+            tables.extend(topic.tables(&name));
+        }
+        (tables, left_out)
+    }
+}
+
+impl Topic {
+    fn leave_out(&mut self, why: &'static str) {
+        *self.left_out.entry(why).or_default() += 1;
+    }
+
+    fn row(&mut self, fields: &[Field], reader: &mut Reader<'_>, log_time_ns: u64) -> Result<(), super::wire::Broken> {
+        let again = reader.clone();
+        let flat = Flat::read(fields, reader, false)?;
+        if flat.has_bytes {
+            self.leave_out(PICTURES);
+            return Ok(());
+        }
+        let known = self.layouts.iter().position(|l| l.shape == flat.shape && l.texts == flat.texts);
+        let at = match known {
+            Some(at) => at,
+            None if self.layouts.len() >= MOST_LAYOUTS => {
+                self.leave_out(CROWDED);
+                return Ok(());
+            }
+            None => {
+                let named = Flat::read(fields, &mut again.clone(), true)?;
+                self.layouts.push(Layout::new(&named));
+                self.layouts.len() - 1
+            }
+        };
+        if self.layouts.get(at).is_none_or(|layout| layout.kept.is_empty()) {
+            self.leave_out(NUMBERLESS);
+        } else if let Some(layout) = self.layouts.get_mut(at) {
+            layout.push(&flat, log_time_ns);
+        }
+        Ok(())
+    }
+
+    fn tables(self, topic: &str) -> Vec<Table> {
+        let mut layouts: Vec<Layout> = self.layouts.into_iter().filter(|layout| !layout.stamps_ns.is_empty()).collect();
+        // The publisher of most numbers has the topic's name; transforms have the name of where they lead to.
+        layouts.sort_by_key(|layout| std::cmp::Reverse(layout.stamps_ns.len() * layout.kept.len()));
+        let is_frames = layouts.iter().all(|layout| layout.shape.is_empty() && layout.texts.len() == 1);
+        let table = |(number, layout): (usize, Layout)| {
+            let label = layout.texts.first().cloned().unwrap_or_else(|| (number + 1).to_string());
+            let name = if is_frames || number > 0 { format!("{topic}:{label}") } else { topic.to_owned() };
+            layout.into_table(name)
+        };
+        layouts.into_iter().enumerate().map(table).collect()
+    }
+}
+
+impl Layout {
+    fn new(flat: &Flat<'_>) -> Self {
+        let names = flat.names();
+        let kept: Vec<usize> =
+            (0..names.len()).filter(|i| names.get(*i).is_some_and(|n| naming::may_serve(n))).collect();
+        Self {
+            shape: flat.shape.clone(),
+            texts: flat.texts.iter().map(|&text| text.to_owned()).collect(),
+            columns: vec![Vec::new(); kept.len()],
+            names,
+            kept,
+            stamps_ns: Vec::new(),
+            log_times_ns: Vec::new(),
+        }
+    }
+
+    fn push(&mut self, flat: &Flat<'_>, log_time_ns: u64) {
+        for (column, at) in self.columns.iter_mut().zip(&self.kept) {
+            column.push(flat.numbers.get(*at).copied().unwrap_or(f64::NAN));
+        }
+        self.stamps_ns.push(flat.stamp_ns.unwrap_or(0));
+        self.log_times_ns.push(log_time_ns);
+    }
+
+    /// Stamps are the headers', or, where nobody filled these in, the times of recording.
+    fn into_table(self, name: String) -> Table {
+        let unstamped = self.stamps_ns.iter().all(|stamp| *stamp == 0);
+        let names = self.kept.iter().filter_map(|at| self.names.get(*at)).cloned();
+        Table {
+            name,
+            stamps_ns: Some(if unstamped { self.log_times_ns } else { self.stamps_ns }),
+            columns: names.zip(self.columns).map(|(name, values)| Column { name, values }).collect(),
+        }
+    }
+}

@@ -1,0 +1,271 @@
+//! The whole way: logs, their mapping, clips, a session. Nothing is there before all of it is.
+
+use crate::cell;
+use crate::clip::{self, Gravity};
+use crate::error::ImportError;
+use crate::log::{LeftOut, Log};
+use crate::mapping::{Mapping, Note, to_toml};
+use crate::propose::{Proposal, propose};
+use crate::sources::{self, Source};
+use serde::Serialize;
+use shared_mem::cell::{Cell, ClipEntry, ClipKind};
+use shared_mem::output::{Destination, OutputFolder};
+use shared_mem::recording::{read_clip, session_folder, write_clip};
+use std::collections::HashSet;
+use std::path::{Path, PathBuf};
+
+/// Names in the session.
+const CELL_TOML: &str = "cell.toml";
+const IMPORT_TOML: &str = "import.toml";
+const PROGRAM: &str = concat!("twinalign ", env!("CARGO_PKG_VERSION"), ", import");
+
+/// Makes gravity's torques out of a cell's model; `None` where it knows none.
+pub type Model<'a> = &'a dyn Fn(&Cell) -> Option<Gravity>;
+
+/// What is to be imported.
+#[derive(Clone, Copy)]
+pub struct Order<'a> {
+    /// Logs, or folders of logs.
+    pub files: &'a [PathBuf],
+    /// The new session.
+    pub out: &'a Path,
+    /// An import.toml, which is final.
+    pub mapping: Option<&'a Path>,
+    /// What the laboratory knows about its cell.
+    pub cell: Option<&'a Path>,
+    /// Whether what is there already is replaced.
+    pub force: bool,
+    /// Where an import.toml with open lines goes.
+    pub questions: &'a Path,
+    /// The nominal model.
+    pub model: Model<'a>,
+    /// The command that imports with an import.toml, for its first lines: from the path of that file.
+    pub command: &'a dyn Fn(&Path) -> String,
+}
+
+/// A clip that was made.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Imported {
+    /// File in the session.
+    pub file: PathBuf,
+    /// The log that it was made of.
+    pub source: PathBuf,
+    /// That log's format.
+    pub format: &'static str,
+    /// Joint rows of what the arm did.
+    pub measured: usize,
+    /// Joint rows of what the arm was told.
+    pub desired: usize,
+    /// Poses of the object.
+    pub poses: usize,
+    /// What is there and was not imported.
+    pub left_out: Vec<LeftOut>,
+    /// What was odd in it.
+    pub warnings: Vec<String>,
+}
+
+/// What came of it.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Outcome {
+    /// A session.
+    Done {
+        /// Its clips.
+        clips: Vec<Imported>,
+        /// Why the columns were taken as they were; empty where the mapping was given.
+        notes: Vec<Note>,
+    },
+    /// An import.toml with lines that are to be filled in, and no session.
+    Open {
+        /// That file.
+        file: PathBuf,
+        /// Its lines that are open, and why the others are as they are.
+        notes: Vec<Note>,
+    },
+}
+
+/// Imports logs. `told` hears of each clip as it is done, with the number of logs that are done and of all.
+///
+/// # Errors
+/// [`ImportError`]; nothing is there then, and what was there before is unchanged.
+pub fn import(order: Order<'_>, mut told: impl FnMut(&Imported, (u64, u64))) -> Result<Outcome, ImportError> {
+    let mut found = Vec::new();
+    for file in order.files {
+        found.extend(sources::find(file)?);
+    }
+    let given = order.cell.map(Cell::read).transpose()?;
+    let mut first = None;
+    let (mapping, notes) = match order.mapping {
+        Some(path) => (given_mapping(path)?, Vec::new()),
+        None => {
+            let (number, logs) = largest(&found)?;
+            let log = longest(&logs, found[number].path())?;
+            let Proposal { mapping, notes } =
+                propose(log, given.as_ref(), &|joints| (order.model)(&cell_of(given.as_ref(), log, joints)?));
+            if mapping.clone().completed().open_line().is_some() {
+                return open(order, log, &mapping, notes);
+            }
+            first = Some((number, logs));
+            (mapping, notes)
+        }
+    };
+    let paths: Vec<PathBuf> = found.iter().map(|source| source.path().to_owned()).collect();
+    let folder = session_folder(order.out, order.force, &paths)?;
+    let mut writing = Writing {
+        folder: &folder,
+        mapping: &mapping,
+        given: given.as_ref(),
+        model: order.model,
+        taken: HashSet::new(),
+        entries: vec![],
+        about: None,
+    };
+    let (mut clips, all) = (Vec::new(), found.len() as u64);
+    for (number, source) in found.iter().enumerate() {
+        let logs = match first.take() {
+            Some((read, logs)) if read == number => logs,
+            other => {
+                first = other;
+                source.read()?
+            }
+        };
+        for log in &logs {
+            let imported = writing.clip(log)?;
+            told(&imported, (number as u64 + 1, all));
+            clips.push(imported);
+        }
+    }
+    writing.finish(order, &notes)?;
+    folder.finish(CELL_TOML)?;
+    Ok(Outcome::Done { clips, notes })
+}
+
+fn given_mapping(path: &Path) -> Result<Mapping, ImportError> {
+    let mapping = Mapping::read(path)?.completed();
+    match mapping.open_line() {
+        Some(line) => {
+            Err(ImportError::log(path, format!("`{line}` is still to be filled in; its question stands above it")))
+        }
+        None => Ok(mapping),
+    }
+}
+
+/// The source with most bytes, and its logs: its numbers tell most.
+fn largest(found: &[Source]) -> Result<(usize, Vec<Log>), ImportError> {
+    let number =
+        (0..found.len()).max_by_key(|number| (found[*number].bytes(), std::cmp::Reverse(*number))).unwrap_or(0);
+    Ok((number, found[number].read()?))
+}
+
+fn longest<'a>(logs: &'a [Log], path: &Path) -> Result<&'a Log, ImportError> {
+    let rows = |log: &&Log| log.tables.iter().map(crate::log::Table::rows).max();
+    let log = logs.iter().filter(|log| !log.is_empty()).max_by_key(rows);
+    log.ok_or_else(|| {
+        let out = logs.first().map_or(&[][..], |log| &log.left_out);
+        let there: Vec<String> = out.iter().take(8).map(|out| format!("`{}` ({})", out.what, out.why)).collect();
+        let there = if there.is_empty() { "nothing".to_owned() } else { there.join(", ") };
+        ImportError::log(path, format!("holds no numbers of a robot, but {there}; record joint states with it"))
+    })
+}
+
+/// The given cell, or the one that is proposed for these joints.
+fn cell_of(given: Option<&Cell>, log: &Log, joints: &[String]) -> Option<Cell> {
+    match given {
+        Some(cell) => Some(cell.clone()),
+        None => Cell::parse(&cell::proposed(log, joints), Path::new(CELL_TOML)).ok(),
+    }
+}
+
+/// Writes the mapping with its open lines to where the command is typed.
+fn open(order: Order<'_>, log: &Log, mapping: &Mapping, notes: Vec<Note>) -> Result<Outcome, ImportError> {
+    let file = order.questions.to_owned();
+    let place = Destination::new(&file, order.force)?;
+    place.write(to_toml(mapping, &notes, log, &(order.command)(&file)))?;
+    Ok(Outcome::Open { file, notes })
+}
+
+/// A session as it grows.
+struct Writing<'a> {
+    folder: &'a OutputFolder,
+    mapping: &'a Mapping,
+    given: Option<&'a Cell>,
+    model: Model<'a>,
+    taken: HashSet<String>,
+    entries: Vec<ClipEntry>,
+    /// What the first log makes of cell.toml, and the first log without its numbers.
+    about: Option<(String, Cell, Log)>,
+}
+
+impl Writing<'_> {
+    fn clip(&mut self, log: &Log) -> Result<Imported, ImportError> {
+        let failed = |what: String| ImportError::log(&log.file, what);
+        if self.about.is_none() {
+            let text = match self.given {
+                Some(cell) => {
+                    let mut cell = cell.at_home_anywhere();
+                    cell.clips.clear();
+                    cell.to_toml()
+                }
+                None => cell::proposed(log, &self.mapping.joints),
+            };
+            let cell = Cell::parse(&text, Path::new(CELL_TOML))?;
+            if self.mapping.kind != ClipKind::Excitation && cell.object.is_none() {
+                let what = "holds poses of an object that no cell.toml describes; give one with an `[object]` block: --cell cell.toml";
+                return Err(failed(what.into()));
+            }
+            self.about = Some((text, cell, log.without_numbers()));
+        }
+        let name = self.name(&log.name);
+        let Some((_, cell, _)) = &self.about else { return Err(failed("holds nothing".into())) };
+        let gravity = (self.model)(cell);
+        let clip = clip::clip(log, self.mapping, gravity.as_ref()).map_err(failed)?;
+        let file = PathBuf::from(format!("{name}.mcap"));
+        let output = self.folder.file(&file)?;
+        let place = output.unfinished_path().to_owned();
+        write_clip(&clip, cell, PROGRAM, output)?;
+        // What every command here will find in it.
+        let read = read_clip(&place, self.mapping.kind, cell).map_err(|error| {
+            let name = place.display().to_string();
+            failed(error.to_string().replace(&format!("{name}: "), ""))
+        })?;
+        let mut warnings = clip.warnings;
+        warnings.extend(read.warnings);
+        self.entries.push(ClipEntry { file: file.clone(), kind: self.mapping.kind });
+        Ok(Imported {
+            file,
+            source: log.file.clone(),
+            format: log.format,
+            measured: read.measured.len(),
+            desired: read.desired.len(),
+            poses: read.object.len(),
+            left_out: log.left_out.clone(),
+            warnings,
+        })
+    }
+
+    /// A name that no other clip has, of characters that every program takes.
+    fn name(&mut self, name: &str) -> String {
+        let plain: String =
+            name.chars().map(|c| if c.is_alphanumeric() || "-_.".contains(c) { c } else { '_' }).collect();
+        let plain = plain.trim_start_matches('.');
+        let plain = if plain.is_empty() { "clip" } else { plain };
+        let mut unique = plain.to_owned();
+        let mut number = 1;
+        while !self.taken.insert(unique.clone()) {
+            number += 1;
+            unique = format!("{plain}_{number}");
+        }
+        unique
+    }
+
+    fn finish(self, order: Order<'_>, notes: &[Note]) -> Result<(), ImportError> {
+        let Some((text, _, log)) = self.about else {
+            let path = order.files.first().map_or(Path::new("."), PathBuf::as_path);
+            return Err(ImportError::log(path, "holds no log"));
+        };
+        let text = text + &cell::clips(&self.entries);
+        self.folder.write(Path::new(CELL_TOML), text.as_bytes())?;
+        let command = (order.command)(&order.out.join(IMPORT_TOML));
+        let mapping = to_toml(self.mapping, notes, &log, &command);
+        Ok(self.folder.write(Path::new(IMPORT_TOML), mapping.as_bytes())?)
+    }
+}

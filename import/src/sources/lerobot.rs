@@ -1,0 +1,192 @@
+//! LeRobot data sets: `meta/info.json` and parquet files, one an episode (version 2) or many episodes in one (version 3). Each
+//! episode is a log.
+
+use super::{parquet, stem};
+use crate::error::ImportError;
+use crate::log::{Column, Facts, LeftOut, Log, Table};
+use serde::Deserialize;
+use shared_mem::input::{self, Kind};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+/// The only table of an episode.
+const FRAMES: &str = "frames";
+/// Counters that are no quantities.
+const EPISODE: &str = "episode_index";
+const FRAME: &str = "frame_index";
+const COUNTERS: [&str; 5] = [EPISODE, FRAME, "index", "task_index", "next.done"];
+
+/// What `meta/info.json` says, as far as it is used.
+#[derive(Debug, Deserialize)]
+struct Info {
+    codebase_version: String,
+    #[serde(default)]
+    robot_type: Option<String>,
+    fps: f64,
+    total_frames: usize,
+    total_episodes: usize,
+    features: BTreeMap<String, Feature>,
+}
+
+#[derive(Debug, Deserialize)]
+struct Feature {
+    dtype: String,
+    #[serde(default)]
+    names: serde_json::Value,
+}
+
+pub(super) fn is_data_set(folder: &Path) -> bool {
+    folder.join("meta/info.json").is_file() && folder.join("data").is_dir()
+}
+
+pub(super) fn read(folder: &Path) -> Result<Vec<Log>, ImportError> {
+    let path = folder.join("meta/info.json");
+    let info: Info = serde_json::from_str(&input::text(&path, Kind::List)?)
+        .map_err(|e| ImportError::log(&path, format!("is no info.json of a LeRobot data set ({e}); copy it again")))?;
+    if !info.codebase_version.starts_with("v2") && !info.codebase_version.starts_with("v3") {
+        let what =
+            format!("is of version {}; convert the data set to v3.0 with LeRobot's own scripts", info.codebase_version);
+        return Err(ImportError::log(&path, what));
+    }
+    if !(info.fps.is_finite() && info.fps > 0.0) {
+        return Err(ImportError::log(&path, format!("says {} frames a second; write the data set's rate", info.fps)));
+    }
+    let mut files = Vec::new();
+    parquet_files(&folder.join("data"), &mut files)?;
+    files.sort();
+    let mut episodes: BTreeMap<u64, Log> = BTreeMap::new();
+    let mut frames = 0;
+    for file in &files {
+        frames += take(file, folder, &info, &mut episodes)?;
+    }
+    if frames != info.total_frames || episodes.len() != info.total_episodes {
+        let what = format!(
+            "is not whole: {frames} of {} frames and {} of {} episodes are there; download it again",
+            info.total_frames,
+            episodes.len(),
+            info.total_episodes
+        );
+        return Err(ImportError::log(folder, what));
+    }
+    Ok(episodes.into_values().collect())
+}
+
+fn parquet_files(folder: &Path, found: &mut Vec<PathBuf>) -> Result<(), ImportError> {
+    let failed = |e: std::io::Error| ImportError::log(folder, format!("cannot be read ({e}); look at its permissions"));
+    for entry in std::fs::read_dir(folder).map_err(failed)? {
+        let path = entry.map_err(failed)?.path();
+        if path.is_dir() {
+            parquet_files(&path, found)?;
+        } else if path.extension().is_some_and(|e| e == "parquet") {
+            found.push(path);
+        }
+    }
+    Ok(())
+}
+
+/// Takes the episodes of a file over; how many frames it has.
+fn take(file: &Path, folder: &Path, info: &Info, episodes: &mut BTreeMap<u64, Log>) -> Result<usize, ImportError> {
+    let (rows, columns) = parquet::read(file)?;
+    let counter = |name: &str| {
+        let column = columns.iter().find(|column| column.name == name && column.width == 1);
+        column.ok_or_else(|| {
+            ImportError::log(file, format!("has no column `{name}`: it is no file of a LeRobot data set"))
+        })
+    };
+    let (of_row, frame) = (counter(EPISODE)?, counter(FRAME)?);
+    let count = |value: f64| (value >= 0.0 && value < 1e15 && value.fract() == 0.0).then_some(value as u64);
+    for row in 0..rows {
+        let (Some(episode), Some(frame)) =
+            (of_row.values.get(row).and_then(|v| count(*v)), frame.values.get(row).and_then(|v| count(*v)))
+        else {
+            return Err(ImportError::log(
+                file,
+                format!("row {row} belongs to no episode: the file is damaged; download it again"),
+            ));
+        };
+        let log = episodes.entry(episode).or_insert_with(|| empty(folder, info, episode));
+        let Some(table) = log.tables.first_mut() else { continue };
+        // Stamps in the file are single precision; frames are counted.
+        table.stamps_ns.get_or_insert_default().push((frame as f64 / info.fps * 1e9).round() as u64);
+        let numbers =
+            columns.iter().filter(|column| !COUNTERS.contains(&column.name.as_str()) && column.name != "timestamp");
+        for column in numbers {
+            push(table, column, row, info);
+        }
+    }
+    Ok(rows)
+}
+
+fn push(table: &mut Table, numbers: &parquet::Numbers, row: usize, info: &Info) {
+    let filled = table.stamps_ns.as_ref().map_or(0, Vec::len);
+    let first = format!("{}{}", numbers.name, label(info, numbers, 0));
+    let at = match table.columns.iter().position(|column| column.name == first) {
+        Some(at) => at,
+        None => {
+            table.columns.extend((0..numbers.width).map(|i| Column {
+                name: format!("{}{}", numbers.name, label(info, numbers, i)),
+                values: vec![f64::NAN; filled.saturating_sub(1)],
+            }));
+            table.columns.len() - numbers.width
+        }
+    };
+    for i in 0..numbers.width {
+        if let (Some(column), Some(value)) =
+            (table.columns.get_mut(at + i), numbers.values.get(row * numbers.width + i))
+        {
+            column.values.push(*value);
+        }
+    }
+}
+
+/// `[shoulder_pan.pos]` where the data set names the numbers of a feature.
+fn label(info: &Info, numbers: &parquet::Numbers, i: usize) -> String {
+    let names = info.features.get(&numbers.name).and_then(|feature| names(&feature.names, numbers.width));
+    match names.as_ref().and_then(|names| names.get(i)) {
+        Some(name) => format!("[{}]", name.strip_suffix(".pos").unwrap_or(name)),
+        None if numbers.width == 1 => String::new(),
+        None => format!("[{i}]"),
+    }
+}
+
+/// A list of names, wherever the versions keep it.
+fn names(value: &serde_json::Value, width: usize) -> Option<Vec<String>> {
+    if let Some(list) = value.as_array() {
+        let texts: Vec<String> = list.iter().filter_map(|name| name.as_str().map(str::to_owned)).collect();
+        return if texts.len() == width { Some(texts) } else { list.iter().find_map(|inside| names(inside, width)) };
+    }
+    value.as_object()?.values().find_map(|inside| names(inside, width))
+}
+
+fn empty(folder: &Path, info: &Info, episode: u64) -> Log {
+    let seen = info.features.iter().filter(|(_, feature)| matches!(feature.dtype.as_str(), "video" | "image"));
+    let left_out = seen.map(|(name, _)| LeftOut { what: name.clone(), why: "pictures are not imported", count: 1 });
+    Log {
+        file: folder.to_owned(),
+        name: format!("{}_{episode:04}", stem(folder)),
+        format: "LeRobot data set",
+        tables: vec![Table { name: FRAMES.into(), ..Table::default() }],
+        facts: Facts { rate: Some(info.fps), robot: info.robot_type.clone(), ..Facts::default() },
+        left_out: left_out.collect(),
+        warnings: Vec::new(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_are_found_wherever_a_version_keeps_them() {
+        for text in [
+            r#"["a.pos","b.pos"]"#,
+            r#"{"axes":["a.pos","b.pos"]}"#,
+            r#"{"motors":["a.pos","b.pos"]}"#,
+            r#"[["a.pos","b.pos"]]"#,
+        ] {
+            let value = serde_json::from_str(text).expect("JSON");
+            assert_eq!(names(&value, 2), Some(vec!["a.pos".into(), "b.pos".into()]), "{text}");
+        }
+        assert_eq!(names(&serde_json::Value::Null, 2), None);
+    }
+}

@@ -1,0 +1,41 @@
+//! Formats of other programs, one file each, all read into [`Log`]s. Which one a path is, is found out, not asked.
+//!
+//! | file | owns |
+//! |---|---|
+//! | `find` | which logs lie at a path |
+//! | `rosbag2` | ROS 2 bags of both storages |
+//! | `sqlite` | the storage sqlite3 (the only SQLite code) |
+//! | `ros1` | ROS 1 bags |
+//! | `lerobot` | LeRobot data sets, versions 2 and 3 |
+//! | `parquet` | columns of a parquet file (the only parquet code) |
+//! | `table` | CSV, TSV and other text tables (the only csv code) |
+//! | `libfranka` | what libfranka's log says about a table's columns |
+//! | `sage` | SAGE's folders of a motion |
+//! | `npz` | NumPy's archives (the only zip code) |
+
+mod find;
+mod lerobot;
+mod libfranka;
+mod npz;
+mod parquet;
+mod ros1;
+mod rosbag2;
+mod sage;
+mod sqlite;
+mod table;
+
+pub(crate) use find::{Source, find};
+
+use crate::error::ImportError;
+use shared_mem::ending;
+use std::path::Path;
+
+/// Stops where the process was asked to end.
+fn go_on(path: &Path) -> Result<(), ImportError> {
+    if ending::asked() { Err(ImportError::Interrupted { path: path.to_owned() }) } else { Ok(()) }
+}
+
+/// File or folder name without extension.
+fn stem(path: &Path) -> String {
+    path.file_stem().map_or_else(|| "clip".to_owned(), |stem| stem.to_string_lossy().into_owned())
+}

@@ -1,0 +1,67 @@
+//! NumPy's archives: each array is a column, or the columns of one quantity.
+
+use super::{go_on, stem};
+use crate::error::ImportError;
+use crate::log::{Column, LeftOut, Log, Table};
+use shared_mem::input::{self, Kind};
+use shared_mem::recording::{Array, parse_npy};
+use std::collections::BTreeMap;
+use std::io::{Cursor, Read as _};
+use std::path::Path;
+
+/// A wider array is no quantity of joints.
+const WIDEST: usize = 64;
+
+pub(super) fn read(path: &Path) -> Result<Log, ImportError> {
+    let bytes = input::bytes(path, Kind::Array)?;
+    let broken = |what: &dyn std::fmt::Display| {
+        ImportError::log(
+            path,
+            format!("is no whole .npz ({what}); copy it from its source again, or save it with numpy.savez"),
+        )
+    };
+    let mut archive = zip::ZipArchive::new(Cursor::new(bytes)).map_err(|e| broken(&e))?;
+    let mut by_rows: BTreeMap<usize, Vec<(String, Array)>> = BTreeMap::new();
+    let mut log = Log { file: path.to_owned(), name: stem(path), format: "npz", ..Log::default() };
+    for number in 0..archive.len() {
+        go_on(path)?;
+        let file = archive.by_index(number).map_err(|e| broken(&e))?;
+        let entry = file.name().map_err(|e| broken(&e))?.into_owned();
+        let Some(name) = entry.strip_suffix(".npy").map(str::to_owned) else { continue };
+        let mut npy = Vec::new();
+        file.take(Kind::Array.limit()).read_to_end(&mut npy).map_err(|e| broken(&e))?;
+        match parse_npy(&npy) {
+            Ok(array) => match (array.shape.first(), array.shape.len(), array.shape.get(1)) {
+                (Some(rows), 1, _) => by_rows.entry(*rows).or_default().push((name, array)),
+                (Some(rows), 2, Some(width)) if *width <= WIDEST => {
+                    by_rows.entry(*rows).or_default().push((name, array))
+                }
+                _ => log.left_out.push(LeftOut { what: name, why: "it has no row of numbers a stamp", count: 1 }),
+            },
+            Err(what) if what.contains("is cut") || what.contains("no complete") => {
+                return Err(broken(&format!("`{name}` {what}")));
+            }
+            Err(_) => log.left_out.push(LeftOut { what: name, why: "it is no array of numbers", count: 1 }),
+        }
+    }
+    // The rows that most arrays have are those of the clip.
+    let mut tables: Vec<(usize, Vec<(String, Array)>)> = by_rows.into_iter().filter(|(rows, _)| *rows > 1).collect();
+    tables.sort_by_key(|(_, arrays)| std::cmp::Reverse(arrays.len()));
+    for (number, (_, arrays)) in tables.into_iter().enumerate() {
+        let first = arrays.first().map_or("", |(name, _)| name);
+        let name = if number == 0 { super::table::ROWS.to_owned() } else { format!("rows of {first}") };
+        let columns = arrays.into_iter().flat_map(|(name, array)| columns(&name, &array)).collect();
+        log.tables.push(Table { name, stamps_ns: None, columns });
+    }
+    Ok(log)
+}
+
+fn columns(name: &str, array: &Array) -> Vec<Column> {
+    match array.shape.as_slice() {
+        [_, width] => {
+            let column = |i: usize| array.values.iter().skip(i).step_by((*width).max(1)).copied().collect();
+            (0..*width).map(|i| Column { name: format!("{name}[{i}]"), values: column(i) }).collect()
+        }
+        _ => vec![Column { name: name.to_owned(), values: array.values.clone() }],
+    }
+}

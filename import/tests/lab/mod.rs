@@ -1,0 +1,91 @@
+//! What the tests share: the motion in the fixtures, and an import of one of them.
+#![allow(dead_code, reason = "each test uses its part")]
+
+use import::{Gravity, ImportError, Order, Outcome, import};
+use shared_mem::cell::{Cell, ClipEntry};
+use shared_mem::recording::{Clip, Session};
+use std::path::{Path, PathBuf};
+
+pub(crate) const ROWS: usize = 60;
+pub(crate) const LAG: f64 = 0.03;
+pub(crate) const STEP_NS: u64 = 20_000_000;
+
+/// Position [rad] and velocity [rad/s] of joint `i` in row `k`, as make_fixtures.py writes them.
+pub(crate) fn motion(k: usize, i: usize, lag: f64) -> (f64, f64) {
+    let w = std::f64::consts::TAU * (0.8 + 0.1 * i as f64);
+    let t = k as f64 * 0.02 - lag;
+    (0.2 * (w * t).sin() + 0.1 * i as f64, 0.2 * w * (w * t).cos())
+}
+
+pub(crate) fn fixture(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures").join(name)
+}
+
+pub(crate) fn no_model(_: &Cell) -> Option<Gravity> {
+    None
+}
+
+pub(crate) fn order<'a>(files: &'a [PathBuf], out: &'a Path, questions: &'a Path) -> Order<'a> {
+    Order {
+        questions,
+        files,
+        out,
+        mapping: None,
+        cell: None,
+        force: false,
+        model: &no_model,
+        command: &|mapping| format!("calibration import ... --mapping {}", mapping.display()),
+    }
+}
+
+/// Imports with everything proposed; questions go beside the session.
+pub(crate) fn run(file: &Path, out: &Path) -> Result<Outcome, ImportError> {
+    import(order(&[file.to_owned()], out, &out.with_extension("toml")), |_, _| {})
+}
+
+/// The session that comes of a fixture, in a folder that is gone with it.
+pub(crate) struct Imported {
+    pub(crate) folder: tempfile::TempDir,
+    pub(crate) outcome: Outcome,
+    pub(crate) session: Session,
+}
+
+pub(crate) fn imported(name: &str) -> Imported {
+    let folder = tempfile::tempdir().expect("a folder");
+    let out = folder.path().join("session");
+    let outcome = run(&fixture(name), &out).unwrap_or_else(|e| panic!("{name}: {e}"));
+    assert!(matches!(outcome, Outcome::Done { .. }), "{name}: {outcome:?}");
+    let session = Session::open(&out).unwrap_or_else(|e| panic!("{name}: {e}"));
+    Imported { folder, outcome, session }
+}
+
+impl Imported {
+    pub(crate) fn clip(&self, number: usize) -> Clip {
+        let entry: &ClipEntry = &self.session.clips[number];
+        self.session.read(entry).expect("a clip")
+    }
+
+    /// The reason of a line of the mapping.
+    pub(crate) fn why(&self, line: &str) -> String {
+        let (Outcome::Done { notes, .. } | Outcome::Open { notes, .. }) = &self.outcome;
+        notes.iter().filter(|note| note.line == line).map(|note| note.why.as_str()).collect()
+    }
+}
+
+/// Holds a clip against the motion: `rows` from the fixture's row `first` on, joints in the fixture's order.
+pub(crate) fn holds_the_motion(clip: &Clip, (first, rows): (usize, usize), dof: usize, near: f64) {
+    for (series, lag) in [(&clip.measured, LAG), (&clip.desired, 0.0)] {
+        assert_eq!((series.len(), series.dof), (rows, dof));
+        for row in 0..rows {
+            assert_eq!(series.stamps_ns[row] - series.stamps_ns[0], row as u64 * STEP_NS);
+            for (i, q) in series.q_row(row).iter().enumerate() {
+                let (expected, velocity) = motion(first + row, i, lag);
+                assert!((q - expected).abs() <= near, "row {row}, joint {i}: {q} for {expected}");
+                if let Some(dq) = series.dq_row(row) {
+                    let (dq, near) = (dq[i], near * 30.0);
+                    assert!((dq - velocity).abs() <= near, "row {row}, joint {i}: {dq} for {velocity}");
+                }
+            }
+        }
+    }
+}
