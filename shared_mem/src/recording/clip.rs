@@ -113,6 +113,35 @@ impl Clip {
         self.joint_names = names.to_vec();
         Ok(self)
     }
+
+    /// The clip as if it had just been read with these rows: what is mended in reading is mended, and what is odd stands in
+    /// [`Clip::warnings`]. For clips that were made or changed in memory.
+    ///
+    /// # Errors
+    /// [`ReadError::Content`] when more than 1 % of its rows cannot be used.
+    pub fn checked(mut self) -> Result<Self, ReadError> {
+        let file = self.file.clone();
+        let fail = |topic: &str| {
+            let (file, topic) = (file.clone(), topic.to_owned());
+            move |what: String| ReadError::content(&file, &topic, what)
+        };
+        if !self.measured.is_empty() {
+            let measured = (std::mem::take(&mut self.measured), "measured");
+            let desired = (std::mem::take(&mut self.desired), "desired");
+            let (measured, desired, found) = mended(&file, &self.joint_names, measured, desired)?;
+            (self.measured, self.desired) = (measured, desired);
+            self.warnings.extend(found);
+        }
+        let topic = "object";
+        let ObjectSeries { stamps_ns, poses } = std::mem::take(&mut self.object);
+        let rows = stamps_ns.into_iter().zip(poses.into_iter().map(Some)).collect();
+        let (object, found) = checks::object(rows, topic).map_err(fail(topic))?;
+        self.warnings.extend(found);
+        let (object, warning) = checks::beside_arm(object, &self.measured, topic).map_err(fail(topic))?;
+        self.object = object;
+        self.warnings.extend(warning);
+        Ok(self)
+    }
 }
 
 /// Joint order that a cell.toml asks for.
@@ -158,11 +187,8 @@ pub(super) fn joints(
         move |what: String| ReadError::content(path, &topic, what)
     };
     let ordered = measured.log.finish(measured.topic, wanted).map_err(fail(measured.topic))?;
-    let names = ordered.names;
+    let (names, measured_series) = (ordered.names, ordered.series);
     let mut warnings = ordered.warnings;
-    let (mut measured_series, found) =
-        checks::joints(ordered.series, measured.topic, &names).map_err(fail(measured.topic))?;
-    warnings.extend(found);
     let wanted = match wanted {
         Wanted::Any => &Wanted::Names(names.clone()),
         given => given,
@@ -170,12 +196,58 @@ pub(super) fn joints(
     let ordered = desired.log.finish(desired.topic, wanted).map_err(fail(desired.topic))?;
     // What holds for both topics is said once.
     warnings.extend(ordered.warnings.into_iter().filter(|warning| !warnings.contains(warning)).collect::<Vec<_>>());
-    let (mut desired_series, found) =
-        checks::joints(ordered.series, desired.topic, &names).map_err(fail(desired.topic))?;
+    let (measured, desired) = ((measured_series, measured.topic), (ordered.series, desired.topic));
+    let (measured, desired, found) = mended(path, &names, measured, desired)?;
     warnings.extend(found);
-    for (series, topic) in [(&measured_series, measured.topic), (&desired_series, desired.topic)] {
+    Ok(Joints { names, desired, measured, warnings })
+}
+
+/// Checks the two joint topics, each with its name, alone and side by side: both as mended, and what was found.
+fn mended(
+    path: &Path,
+    names: &[String],
+    measured: (JointSeries, &str),
+    desired: (JointSeries, &str),
+) -> Result<(JointSeries, JointSeries, Vec<String>), ReadError> {
+    let mut warnings = Vec::new();
+    let mut alone = |(series, topic): (JointSeries, &str)| -> Result<JointSeries, ReadError> {
+        let (series, found) =
+            checks::joints(series, topic, names).map_err(|what| ReadError::content(path, topic, what))?;
+        warnings.extend(found);
+        Ok(series)
+    };
+    let topics = [measured.1.to_owned(), desired.1.to_owned()];
+    let (mut measured, mut desired) = (alone(measured)?, alone(desired)?);
+    for (series, topic) in [&measured, &desired].into_iter().zip(&topics) {
         warnings.extend(checks::gaps(&series.stamps_ns, topic));
     }
-    warnings.extend(checks::pair(&mut desired_series, &mut measured_series));
-    Ok(Joints { names, desired: desired_series, measured: measured_series, warnings })
+    warnings.extend(checks::pair(&mut desired, &mut measured));
+    Ok((measured, desired, warnings))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_clip_made_in_memory_is_mended_as_one_that_is_read() {
+        let series = JointSeries {
+            stamps_ns: (0..100).map(|i| i * 1_000_000).collect(),
+            dof: 1,
+            q: (0..100).map(|i| f64::from(i) * 1e-3).collect(),
+            dq: vec![],
+            tau: vec![],
+        };
+        let mut clip = Clip {
+            joint_names: vec!["a".into()],
+            desired: series.clone(),
+            measured: series,
+            ..Clip::empty(Path::new("a"), ClipKind::Excitation)
+        };
+        assert_eq!(clip.clone().checked().expect("a clip"), clip);
+        clip.measured.q[0] = 1.0;
+        let mended = clip.checked().expect("a clip");
+        assert_eq!(mended.measured.len(), 99);
+        assert!(mended.warnings[0].contains("`measured`: the first row lies 0.999 rad"), "{:?}", mended.warnings);
+    }
 }

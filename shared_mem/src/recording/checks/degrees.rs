@@ -10,14 +10,26 @@ const IN_DEGREES: std::ops::Range<f64> = 40.0..80.0;
 /// Velocities that exceed the positions' own slopes so many times are in degrees too.
 const TOO_FAST: f64 = 10.0;
 
-/// Puts the topic that is in degrees into radians when the other one is in radians; a sentence when it did.
+/// Puts the topic that is in degrees into radians when the other one is in radians; a sentence when it did. The larger one
+/// is in degrees where its angles are beyond any in radians or exceed the integral of its velocities; else the smaller one
+/// may as well have been divided by 57.3 once too often, and both stay as they are.
 pub(super) fn against_each_other(desired: &mut JointSeries, measured: &mut JointSeries) -> Option<String> {
     let ratio = rms(&desired.q) / rms(&measured.q);
-    let (series, ratio, which) = match ratio {
-        ratio if IN_DEGREES.contains(&ratio) => (desired, ratio, "desired"),
-        ratio if IN_DEGREES.contains(&ratio.recip()) => (measured, ratio.recip(), "measured"),
+    let (series, ratio, which, other) = match ratio {
+        ratio if IN_DEGREES.contains(&ratio) => (desired, ratio, "desired", "measured"),
+        ratio if IN_DEGREES.contains(&ratio.recip()) => (measured, ratio.recip(), "measured", "desired"),
         _ => return None,
     };
+    let slope = rms(&slopes(series));
+    let beyond = series.q.iter().any(|q| q.abs() > LARGEST_ANGLE);
+    let outruns = !series.dq.is_empty() && IN_DEGREES.contains(&(slope / rms(&series.dq)));
+    if !beyond && !outruns {
+        return Some(format!(
+            "the {which} positions are {ratio:.0} times the {other} ones, and are plausible as radians: the {other} ones were \
+             divided by 57.3 once too often, or both are small and the {which} ones in degrees; both stay as they are: publish \
+             radians on both"
+        ));
+    }
     series.q.iter_mut().for_each(|q| *q = q.to_radians());
     if !series.dq.is_empty() && rms(&series.dq) > TOO_FAST * rms(&slopes(series)) {
         series.dq.iter_mut().for_each(|dq| *dq = dq.to_radians());
@@ -88,5 +100,27 @@ mod tests {
         assert!(near(&desired));
         let (mut desired, mut measured) = (good.clone(), good.clone());
         assert_eq!(against_each_other(&mut desired, &mut measured), None);
+    }
+
+    #[test]
+    fn commands_that_were_divided_once_too_often_are_not_mended_on_the_measured_side() {
+        let wave = |size: f64| JointSeries {
+            stamps_ns: (0..500).map(|i| i * 1_000_000).collect(),
+            dof: 1,
+            q: (0..500).map(|i| size * (f64::from(i) * 0.01).sin()).collect(),
+            dq: (0..500).map(|i| 10.0 * size * (f64::from(i) * 0.01).cos()).collect(),
+            tau: vec![],
+        };
+        let (mut desired, mut measured) = (wave(1f64.to_radians()), wave(1.0));
+        let told = against_each_other(&mut desired, &mut measured).expect("a sentence");
+        assert!(told.contains("the desired ones were divided by 57.3 once too often"), "{told}");
+        assert_eq!((desired, measured), (wave(1f64.to_radians()), wave(1.0)));
+        // Small angles in degrees are known by velocities in radians.
+        let (mut desired, mut measured) =
+            (wave(0.05), JointSeries { q: wave(0.05).q.iter().map(|q| q.to_degrees()).collect(), ..wave(0.05) });
+        assert!(
+            against_each_other(&mut desired, &mut measured).is_some_and(|told| told.contains("in degrees and was put"))
+        );
+        assert!(measured.q.iter().zip(&desired.q).all(|(a, b)| (a - b).abs() < 1e-12));
     }
 }
