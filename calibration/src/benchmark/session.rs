@@ -57,8 +57,16 @@ pub enum SessionError {
 /// # Errors
 /// [`SessionError`] when the cell has no arm, or none that can do the motions.
 pub fn record(world: &World, count: usize) -> Result<Vec<Clip>, SessionError> {
+    record_paced(world, &vec![1.0; count])
+}
+
+/// The same with a clip for each pace: how many times as fast as planned its motion is played.
+///
+/// # Errors
+/// As [`record`].
+pub fn record_paced(world: &World, paces: &[f64]) -> Result<Vec<Clip>, SessionError> {
     let studio = Studio { world, body: Body::of(&world.cell)? };
-    (0..count).map(|i| studio.clip(i, count)).collect()
+    paces.iter().enumerate().map(|(i, pace)| studio.clip(i, paces.len(), *pace)).collect()
 }
 
 struct Studio<'a> {
@@ -67,13 +75,14 @@ struct Studio<'a> {
 }
 
 impl Studio<'_> {
-    fn clip(&self, index: usize, count: usize) -> Result<Clip, SessionError> {
+    fn clip(&self, index: usize, count: usize, pace: f64) -> Result<Clip, SessionError> {
         let mut rng = Pcg64::seed_from_u64(self.world.number.wrapping_mul(1000) + index as u64);
         let object = self.place(&mut rng);
         let points = match self.world.kind {
             Kind::Excitation => self.excitation(index)?,
             Kind::Strokes => self.stroke(&object, &mut rng)?,
         };
+        let points = if pace == 1.0 { points } else { paced(&points, pace) };
         let joints_ns: Vec<u64> = (0..points.len() as u64).map(|i| START_NS + i * 1_000_000).collect();
         let desired = self.desired(&points, &joints_ns);
         let acting = self.acting(&desired, &mut rng);
@@ -269,6 +278,22 @@ impl Studio<'_> {
     }
 }
 
+/// The same way, so many times as fast.
+fn paced(points: &[SetPoint], pace: f64) -> Vec<SetPoint> {
+    let rows = ((points.len() - 1) as f64 / pace) as usize + 1;
+    let at = |row: usize| {
+        let place = row as f64 * pace;
+        let before = (place as usize).min(points.len() - 1);
+        let (a, b) = (&points[before], &points[(before + 1).min(points.len() - 1)]);
+        let share = place - before as f64;
+        let mix = |of: fn(&SetPoint) -> &[f64; MAX_JOINTS], times: f64| {
+            std::array::from_fn(|joint| times * (of(a)[joint] + share * (of(b)[joint] - of(a)[joint])))
+        };
+        SetPoint { q_d: mix(|p| &p.q_d, 1.0), dq_d: mix(|p| &p.dq_d, pace), ..*a }
+    };
+    (0..rows).map(at).collect()
+}
+
 /// Stamp of a clip's first row [ns].
 const START_NS: u64 = 1_000_000_000;
 
@@ -339,6 +364,21 @@ mod tests {
         let (once, again) = (session(Kind::Excitation, Fault::Single(3)), session(Kind::Excitation, Fault::Single(3)));
         assert!(once == again, "another session");
         assert!(once[0].measured.q != once[1].measured.q, "the same clip twice");
+    }
+
+    #[test]
+    fn a_motion_at_half_its_pace_goes_the_same_way_in_twice_the_time() {
+        let world = World::draw(3, Kind::Excitation, Fault::Nothing, &shipped());
+        let (whole, half) = (record(&world, 1).expect("a session"), record_paced(&world, &[0.5]).expect("a session"));
+        let (whole, half) = (&whole[0].desired, &half[0].desired);
+        assert!(half.len().abs_diff(2 * whole.len()) <= 2);
+        for row in (0..whole.len()).step_by(100) {
+            for joint in 0..whole.dof {
+                assert!((whole.q_row(row)[joint] - half.q_row(2 * row)[joint]).abs() < 1e-9);
+                let [fast, slow] = [(whole, row), (half, 2 * row)].map(|(s, row)| s.dq_row(row).expect("dq")[joint]);
+                assert!((0.5 * fast - slow).abs() < 1e-9);
+            }
+        }
     }
 
     #[test]
