@@ -289,7 +289,7 @@ fn paced(points: &[SetPoint], pace: f64) -> Vec<SetPoint> {
         let mix = |of: fn(&SetPoint) -> &[f64; MAX_JOINTS], times: f64| {
             std::array::from_fn(|joint| times * (of(a)[joint] + share * (of(b)[joint] - of(a)[joint])))
         };
-        SetPoint { q_d: mix(|p| &p.q_d, 1.0), dq_d: mix(|p| &p.dq_d, pace), ..*a }
+        SetPoint { q_d: mix(|p| &p.q_d, 1.0), dq_d: mix(|p| &p.dq_d, pace) }
     };
     (0..rows).map(at).collect()
 }
