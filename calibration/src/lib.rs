@@ -6,6 +6,7 @@
 //! | module | owns |
 //! |---|---|
 //! | [`capture`] | planning a motion, having the bridge play it, recording it into a session folder |
+//! | [`check`] | the doctor of a recording: whether the data can mean what they say |
 //! | [`demo`] | the whole story on the simulated cell, in one command |
 //! | [`diagnose`] | where the gap lies, what causes it, how far it shrinks |
 //! | [`estimate`] | fits over clips: what all clips share, what varies from clip to clip |
@@ -43,6 +44,7 @@
 
 pub mod benchmark;
 pub mod capture;
+pub mod check;
 pub mod demo;
 pub mod diagnose;
 pub mod estimate;

@@ -47,6 +47,7 @@ fn an_output_that_is_there_is_kept_and_the_way_to_replace_it_is_told_at_once() {
         ("calibration diagnose {dir}/none --out {dir}/there.json", "there.json"),
         ("calibration diagnose {dir}/none --report {dir}/there.html", "there.html"),
         ("calibration diagnose {dir}/none --theta {dir}/there.toml", "there.toml"),
+        ("calibration check {dir}/none --report {dir}/there.html", "there.html"),
         ("calibration benchmark --short --cell {cell} --report {dir}/there.html", "there.html"),
         ("calibration viewpoint {dir}/none --out {dir}/there.toml", "there.toml"),
         ("calibration viewpoint {dir}/none --report {dir}/there.html", "there.html"),

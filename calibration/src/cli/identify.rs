@@ -1,11 +1,13 @@
 //! `calibration identify`.
 
 use super::print;
+use calibration::check::{Remark, gate};
 use calibration::identify::{Identification, Optimizer, arm, object};
 use calibration::interrupt::Interrupt;
 use calibration::report::terminal;
 use clap::{Subcommand, ValueEnum};
 use shared_mem::output::{Destination, OutputError};
+use shared_mem::recording::Session;
 use std::path::{Path, PathBuf};
 
 #[derive(Debug, Subcommand)]
@@ -56,6 +58,9 @@ pub(super) struct ArmArguments {
     /// Draws the clips that are held out, and the searches.
     #[arg(long, value_name = "N", default_value_t = 0, value_parser = calibration::seed::parse, allow_negative_numbers = true)]
     seed: u64,
+    /// Takes the data as they were recorded where `calibration check` says that they cannot mean what they say.
+    #[arg(long)]
+    as_recorded: bool,
     /// Prints one JSON object on stdout at the end.
     #[arg(long)]
     json: bool,
@@ -101,6 +106,9 @@ pub(super) struct ObjectArguments {
     /// Draws the clips that are held out, and the searches.
     #[arg(long, value_name = "N", default_value_t = 0, value_parser = calibration::seed::parse, allow_negative_numbers = true)]
     seed: u64,
+    /// Takes the data as they were recorded where `calibration check` says that they cannot mean what they say.
+    #[arg(long)]
+    as_recorded: bool,
     /// Prints one JSON object on stdout at the end.
     #[arg(long)]
     json: bool,
@@ -133,20 +141,45 @@ impl Way {
 pub(super) fn run(identify: Identify, interrupt: &Interrupt) -> anyhow::Result<()> {
     match identify {
         Identify::Arm(arguments) => {
-            let ArmArguments { session, cell, optimizer, out, force, parameters, also, budget, seed, json, report } =
-                arguments;
+            let ArmArguments {
+                session,
+                cell,
+                optimizer,
+                out,
+                force,
+                parameters,
+                also,
+                budget,
+                seed,
+                as_recorded,
+                json,
+                report,
+            } = arguments;
             let page = places(out.as_deref(), report.as_deref(), force)?;
+            let odd = gate::look(&Session::open_with(&session, cell.as_deref())?, as_recorded)?;
             let (optimizer, budget) = (optimizer.optimizer(), budget as usize);
             let options = arm::Options { session, cell, optimizer, out, parameters, also, budget, seed };
-            conclude(&arm::identify(&options, interrupt)?, page, json)
+            conclude(arm::identify(&options, interrupt)?, odd.as_ref(), page, json)
         }
         Identify::Object(arguments) => {
-            let ObjectArguments { session, cell, optimizer, out, force, parameters, budget, seed, json, report } =
-                arguments;
+            let ObjectArguments {
+                session,
+                cell,
+                optimizer,
+                out,
+                force,
+                parameters,
+                budget,
+                seed,
+                as_recorded,
+                json,
+                report,
+            } = arguments;
             let page = places(out.as_deref(), report.as_deref(), force)?;
+            let odd = gate::look(&Session::open_with(&session, cell.as_deref())?, as_recorded)?;
             let (optimizer, budget) = (optimizer.optimizer(), budget as usize);
             let options = object::Options { session, cell, optimizer, out, parameters, budget, seed };
-            conclude(&object::identify(&options, interrupt)?, page, json)
+            conclude(object::identify(&options, interrupt)?, odd.as_ref(), page, json)
         }
     }
 }
@@ -157,10 +190,16 @@ fn places(out: Option<&Path>, report: Option<&Path>, force: bool) -> Result<Opti
     Destination::of(report, force)
 }
 
-fn conclude(found: &Identification, page: Option<Destination>, json: bool) -> anyhow::Result<()> {
+fn conclude(
+    mut found: Identification,
+    odd: Option<&Remark>,
+    page: Option<Destination>,
+    json: bool,
+) -> anyhow::Result<()> {
+    gate::add(&mut found.warnings, odd);
     let sheet = found.sheet();
     if let Some(page) = page {
         page.write(sheet.page())?;
     }
-    print(json, found, terminal::identification(&sheet))
+    print(json, &found, terminal::identification(&sheet))
 }

@@ -2,6 +2,7 @@
 
 mod benchmark;
 mod capture;
+mod check;
 mod compare;
 mod demo;
 mod export;
@@ -26,6 +27,7 @@ use std::fmt::Display;
 Examples:
   calibration demo --out demo
   calibration capture excitation --cell config/fr3_cell.toml --clips 4 --out session
+  calibration check session --report check.html
   calibration identify arm session --out theta.toml --report page.html
   calibration diagnose session --report report.html
   calibration viewpoint session --out cell.toml --report outline.png
@@ -52,6 +54,8 @@ enum Verb {
     Diagnose(diagnose::command::Arguments),
     /// How often the diagnosis is right, on simulated worlds of which the truth is known.
     Benchmark(benchmark::BenchmarkArguments),
+    /// The doctor of a recording: whether the data can mean what they say, and what each clip is good for.
+    Check(check::CheckArguments),
     /// Finds where the camera stands, from pictures of the robot and its joints.
     Viewpoint(Box<viewpoint::ViewpointArguments>),
     /// Makes a session of logs of other programs: bags, data sets, tables.
@@ -96,6 +100,7 @@ fn run_to_the_end(verb: Verb, interrupt: &Interrupt) -> anyhow::Result<()> {
             let found = diagnose::command::run(&arguments, interrupt)?;
             print(arguments.json, &found, terminal::diagnosis(&found))
         }
+        Verb::Check(arguments) => check::run(&arguments),
         Verb::Viewpoint(arguments) => viewpoint::run(*arguments),
         Verb::Import(arguments) => import::run(&arguments),
         Verb::Export(arguments) => export::run(&arguments),

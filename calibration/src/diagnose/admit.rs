@@ -121,7 +121,7 @@ pub fn admit(session: &Session) -> Result<Admitted, Refused> {
 
 /// The clip with what could be mended mended and its joints in the model's order, and what is odd about it; the reason why
 /// it cannot be used otherwise.
-fn looked_at(mut clip: Clip, cell: &Cell, arm: &ArmModel) -> Result<(Clip, Vec<String>), String> {
+pub(crate) fn looked_at(mut clip: Clip, cell: &Cell, arm: &ArmModel) -> Result<(Clip, Vec<String>), String> {
     let tracking = is_tracking(cell);
     if tracking && clip.desired.is_empty() {
         // Where no command was logged, the motion itself says what moves.

@@ -1,6 +1,7 @@
 //! The verb `calibration diagnose`: arguments, files, and what is printed.
 
 use super::{Diagnosis, Options, diagnose_kept};
+use crate::check::gate;
 use crate::interrupt::Interrupt;
 use crate::report;
 use crate::typed;
@@ -16,6 +17,9 @@ use std::time::Duration;
 #[command(after_help = "\
 The twin is identified first, then every known effect is tried, alone and with others, on clips that were not used to fit
 it. The verdict is none, named, class (several that these clips cannot separate), unexplained or not_testable.
+
+A recording that cannot mean what it says (units, order, sign, misaligned logs) is not explained, unless --as-recorded says
+so: `calibration check` shows what is wrong.
 
 What to record next is printed as commands that can be typed, and of an effect that is named what to do about it in the
 cell and in a model.
@@ -55,6 +59,9 @@ pub struct Arguments {
     /// Replaces the files of --out, --report and --theta; of a theta.toml, comments and what is not found stay.
     #[arg(long)]
     force: bool,
+    /// Takes the data as they were recorded where `calibration check` says that they cannot mean what they say.
+    #[arg(long)]
+    as_recorded: bool,
     /// After so many seconds the best answer so far counts, 1 to 1000000 [default: as long as it takes].
     #[arg(long, value_name = "SECONDS", value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
     budget: Option<u64>,
@@ -80,10 +87,12 @@ pub fn run(arguments: &Arguments, interrupt: &Interrupt) -> anyhow::Result<Diagn
     let answer = Destination::of(out.as_deref(), *force)?;
     let theta_file = theta_file(arguments)?;
     let session = Session::open_with(&arguments.session, arguments.cell.as_deref())?;
+    let odd = gate::look(&session, arguments.as_recorded)?;
     let theta = arguments.parameters.as_deref().map(Theta::read).transpose()?;
     let budget = arguments.budget.map(Duration::from_secs);
     let options = Options { theta, seed: arguments.seed, torques: arguments.torques, budget, out: out.clone() };
     let (mut found, kept) = diagnose_kept(&session, &options, interrupt)?;
+    gate::add(&mut found.warnings, odd.as_ref());
     match theta_file {
         Some(file) if found.identifies() => {
             found.theta.write(&file)?;

@@ -3,6 +3,7 @@
 //! | module | owns |
 //! |---|---|
 //! | [`diagnosis`] | the page of a diagnosis |
+//! | [`check`] | the page of what is odd about a recording |
 //! | [`benchmark`] | the page of how good the diagnosis is |
 //! | [`demo_page`] | the page of the demo |
 //! | [`identification`] | the page of what was identified about arm or object |
@@ -16,6 +17,7 @@
 
 pub mod benchmark;
 mod canvas;
+pub mod check;
 pub mod demo_page;
 pub mod diagnosis;
 mod figure;

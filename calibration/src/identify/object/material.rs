@@ -52,21 +52,15 @@ impl Material {
         }
         let arm = cell.robot.as_ref().map(|_| ArmModel::from_cell(&cell)).transpose()?;
         let looked_at = |(file, clip): (String, Result<Clip, String>)| {
-            let clip = clip.and_then(|clip| in_one_piece(clip, &cell, arm.as_ref()));
-            (file, clip.map(|clip| screened(clip, &cell)))
+            (file, clip.and_then(|clip| shows_object(clip, &cell, arm.as_ref())))
         };
         let read: Vec<_> = read.into_par_iter().map(looked_at).collect();
         let (mut usable, mut left_out) = (Vec::new(), Vec::new());
         for (file, answer) in read {
-            let why = match answer {
-                Ok(Screened { clip, remarks, unusable: None, elsewhere: None }) => {
-                    usable.push(Usable { file, clip, remarks });
-                    continue;
-                }
-                Ok(Screened { unusable, elsewhere, .. }) => unusable.or(elsewhere).unwrap_or_default(),
-                Err(why) => why,
-            };
-            left_out.push(LeftOut { file, why });
+            match answer {
+                Ok((clip, remarks)) => usable.push(Usable { file, clip, remarks }),
+                Err(why) => left_out.push(LeftOut { file, why }),
+            }
         }
         if usable.is_empty() {
             let reasons = reasons(&left_out);
@@ -106,6 +100,15 @@ impl Material {
         let remarks = self.usable.iter().flat_map(|u| u.remarks.iter().map(|r| (u.file.as_str(), r.as_str())));
         warnings.extend(grouped(remarks));
         warnings
+    }
+}
+
+/// The clip with what could be mended mended, and what is odd about it; the reason why it tells nothing about the object
+/// otherwise.
+pub(crate) fn shows_object(clip: Clip, cell: &Cell, arm: Option<&ArmModel>) -> Result<(Clip, Vec<String>), String> {
+    match screened(in_one_piece(clip, cell, arm)?, cell) {
+        Screened { clip, remarks, unusable: None, elsewhere: None } => Ok((clip, remarks)),
+        Screened { unusable, elsewhere, .. } => Err(unusable.or(elsewhere).unwrap_or_default()),
     }
 }
 

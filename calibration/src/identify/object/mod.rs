@@ -48,6 +48,7 @@ use crate::kept::{self, Fingerprint, Kept};
 use finding::Finding;
 use fit::{ObjectFit, fit_object, linearise_object};
 use material::Material;
+pub(crate) use material::shows_object;
 use paper::SurfaceLoss;
 use parts::disagreement;
 use polish::{Searched, fit_polished};

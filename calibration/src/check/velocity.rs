@@ -1,0 +1,147 @@
+//! Velocities against the slope of the positions: another unit or sign, a filter, spikes where an angle wraps.
+//!
+//! Over windows the integral of dq is held against the way of q: `integral of dq = a (q_b - q_a) - delay (dq_b - dq_a)`. Of a
+//! velocity that is the slope of q the factor is 1 and the delay 0; a low pass of time constant T has the delay T.
+
+use super::columns::{Columns, Signals};
+use super::conversion;
+use super::limits::{FILTER_DELAY, FILTER_STEPS, LEAST_MOTION, MOVES, NEAR_TURN, NOT_ITS_SLOPE, WINDOW, WINDOW_ROWS};
+use super::remark::{Fault, Remark, Severity, Size};
+use super::statistics::{Slope, deviation, median, plane, quantile, range, root_mean_square};
+use std::f64::consts::TAU;
+
+/// A joint's velocity beside its slope.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Compared {
+    pub(super) joint: usize,
+    /// How many times the slope it is [1].
+    pub(super) factor: Slope,
+    /// How much later it comes [s].
+    pub(super) delay: Slope,
+}
+
+/// Every joint that moves enough to tell.
+pub(super) fn compared(signals: &Signals) -> Vec<Compared> {
+    (0..signals.dq.len()).filter_map(|joint| compare(signals, joint)).collect()
+}
+
+fn compare(signals: &Signals, joint: usize) -> Option<Compared> {
+    let (t, q, dq) = (&signals.t, &signals.q[joint], &signals.dq[joint]);
+    let rows = WINDOW_ROWS.max((WINDOW / signals.step().max(1e-12)).round() as usize).min(t.len() / 4);
+    if rows < 2 {
+        return None;
+    }
+    let ends = (0..t.len() - rows).step_by(rows).map(|from| (from, from + rows));
+    let window = |(a, b): (usize, usize)| {
+        let way = (a..b).map(|i| 0.5 * (dq[i] + dq[i + 1]) * (t[i + 1] - t[i])).sum::<f64>();
+        [q[b] - q[a], dq[a] - dq[b], way]
+    };
+    let windows: Vec<[f64; 3]> = ends.map(window).collect();
+    let moved = root_mean_square(&windows.iter().map(|w| w[0]).collect::<Vec<_>>());
+    if moved <= MOVES * signals.noise[joint] || deviation(q) < LEAST_MOTION {
+        return None;
+    }
+    // Windows at rest agree with any factor.
+    let moving: Vec<[f64; 3]> = windows.into_iter().filter(|window| window[0].abs() > 0.1 * moved).collect();
+    let [factor, delay] = plane(&moving)?;
+    Some(Compared { joint, factor, delay })
+}
+
+/// Remarks on both topics of a clip.
+pub(super) fn remarks(clip: &Columns) -> Vec<Remark> {
+    let of = |(topic, signals): (&'static str, &Signals)| {
+        let joints = compared(signals);
+        let mut found = unit(clip, topic, &joints);
+        if found.is_empty() {
+            found.extend(filter(clip, topic, signals, &joints));
+        }
+        found.extend(wraps(clip, topic, signals));
+        found
+    };
+    clip.topics().into_iter().flat_map(of).collect()
+}
+
+fn unit(clip: &Columns, topic: &str, joints: &[Compared]) -> Vec<Remark> {
+    let odd = |c: &&Compared| (c.factor.value - 1.0).abs() > NOT_ITS_SLOPE.max(5.0 * c.factor.sigma);
+    let odd: Vec<&Compared> = joints.iter().filter(odd).collect();
+    let factors: Vec<f64> = odd.iter().map(|c| c.factor.value).collect();
+    let Some(interval) = range(&factors) else { return Vec::new() };
+    let value = median(factors);
+    let whole = odd.len() * 2 > joints.len();
+    let channel = if whole { format!("{topic} dq") } else { format!("{topic} dq, {}", clip.joint(odd[0].joint)) };
+    let who = if whole {
+        format!("the {topic} velocities are")
+    } else {
+        format!("the {topic} velocity of {} is", clip.joint(odd[0].joint))
+    };
+    let (severity, meaning) = match conversion::known(value) {
+        Some((_, what)) => (Severity::Wrong, format!(": {what}")),
+        None if (value + 1.0).abs() < NOT_ITS_SLOPE => (Severity::Wrong, ": counted the other way round".into()),
+        None => (Severity::Warning, ": not the slope of these positions".into()),
+    };
+    let remedy =
+        format!("publish dq in rad/s of the same joints as q, or leave dq out of `{topic}`: it is then taken from q");
+    vec![
+        Remark::new(
+            Fault::VelocityUnit,
+            &clip.file,
+            channel,
+            format!("{who} {value:.3} times the slope of the positions{meaning}"),
+        )
+        .sized(Size { value, interval, unit: "1" })
+        .mended_by(remedy)
+        .weighed(severity),
+    ]
+}
+
+fn filter(clip: &Columns, topic: &str, signals: &Signals, joints: &[Compared]) -> Option<Remark> {
+    let delays: Vec<f64> = joints.iter().map(|c| c.delay.value).collect();
+    let [lo, hi] = range(&delays)?;
+    let value = median(delays);
+    let sure = |c: &&Compared| c.delay.value - 2.0 * c.delay.sigma > 0.5 * FILTER_DELAY;
+    let most = joints.iter().filter(sure).count() * 3 >= joints.len() * 2;
+    (most && value > FILTER_DELAY.max(FILTER_STEPS * signals.step())).then(|| {
+        Remark::new(
+            Fault::VelocityFilter,
+            &clip.file,
+            format!("{topic} dq"),
+            format!(
+                "the {topic} velocities come {:.1} ms behind the slope of the positions: they were filtered",
+                value * 1e3
+            ),
+        )
+        .sized(Size { value, interval: [lo, hi], unit: "s" })
+        .mended_by("log the unfiltered velocity, or set the filter of the driver to its highest frequency")
+    })
+}
+
+/// Velocities that are off the slope by a turn within a step.
+fn wraps(clip: &Columns, topic: &str, signals: &Signals) -> Option<Remark> {
+    let t = &signals.t;
+    let mut rows: Vec<(usize, usize)> = Vec::new();
+    for (joint, dq) in signals.dq.iter().enumerate() {
+        let q = &signals.q[joint];
+        let off = |i: &usize| dq[*i] - (q[i + 1] - q[i - 1]) / (t[i + 1] - t[i - 1]);
+        let mut sizes: Vec<f64> =
+            (1..t.len().saturating_sub(1)).map(|i| off(&i).abs()).filter(|v| v.is_finite()).collect();
+        let usual = quantile(&mut sizes, 0.5);
+        let turns = |i: &usize| off(i).abs() * (t[*i] - t[i - 1]) / TAU;
+        rows.extend(
+            (1..t.len().saturating_sub(1))
+                .filter(|i| off(i).abs() > MOVES * usual && (turns(i) - 1.0).abs() < NEAR_TURN)
+                .map(|i| (i, joint)),
+        );
+    }
+    let (row, joint) = *rows.iter().min()?;
+    Some(
+        Remark::new(
+            Fault::AngleWraps,
+            &clip.file,
+            format!("{topic} dq"),
+            format!("{} velocities of the {topic} joints are a whole turn within one step off: computed across a wrap of the angle", rows.len()),
+        )
+        .at(t[row])
+        .sized(Size::count(rows.len() as f64, "rows"))
+        .mended_by(format!("compute the velocity of {} before its angle is wrapped, or unwrap q first", clip.joint(joint))),
+    )
+}
