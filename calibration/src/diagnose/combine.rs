@@ -394,6 +394,22 @@ impl Step {
         advantage.is_some_and(clear) && self.is_alone(library, candidate)
     }
 
+    /// Whether a trial leads: as clear as one that stands out, and ahead of every other cause that does not look like it, by half of
+    /// what it is worth or clip by clip far beyond chance.
+    #[must_use]
+    pub fn leads(&self, library: &Library, candidate: usize) -> bool {
+        let fitted = |trial: &Trial| trial.fitted.as_ref().map(|(_, advantage)| advantage.clone());
+        let own = self.trials.iter().find(|trial| trial.scored.candidate == candidate).and_then(fitted);
+        let Some(own) = own.filter(|a| a.share > NEARLY_ALL && a.nats > CLEAR * a.error) else { return false };
+        let ahead_of = |trial: &Trial| {
+            let (beyond, error) = trial.fitted.as_ref().map_or((f64::INFINITY, 0.0), |(_, other)| own.beyond(other));
+            beyond > CLEAR * error
+        };
+        let others = self.trials.iter().filter(|trial| trial.scored.candidate != candidate && trial.is_cause());
+        let mut rivals = others.filter(|trial| !library.look_alike(candidate, trial.scored.candidate));
+        self.is_alone(library, candidate) || rivals.all(ahead_of)
+    }
+
     /// Whether no other effect that could be the cause is worth half as much, but for those that are known to look alike:
     /// that some of them act stands out even where it does not show which.
     fn is_alone(&self, library: &Library, candidate: usize) -> bool {

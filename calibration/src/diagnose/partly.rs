@@ -72,7 +72,7 @@ fn each_stands_out<E: Evidence>(bench: &Bench<'_, E>, found: &Found, overdispers
             let more_of_it =
                 |rival: &usize| trial(*rival).zip(trial(*effect)).is_some_and(|(rival, own)| rival.is_outdone_by(own));
             let stands_for_itself = |rival: &usize| found.last.effects.contains(rival) || more_of_it(rival);
-            step.is_clear(bench.library, *effect) && rivals.iter().all(stands_for_itself)
+            step.leads(bench.library, *effect) && rivals.iter().all(stands_for_itself)
         })
 }
 
