@@ -44,6 +44,8 @@ pub(super) const PLAIN: f64 = 0.3;
 pub(super) const NEARLY_ALL: f64 = 0.85;
 /// An advantage of so many of its errors is no chance.
 const CLEAR: f64 = 3.5;
+/// An effect that leads is worth this share more than others: two effects of nearly the same worth do the same.
+const AHEAD: f64 = 0.2;
 /// Engines integrate one and the same effect differently by a hundredth of it, so by this share of the squared gap.
 const NUMERICS_SHARE: f64 = 1e-4;
 /// ... and what more numbers make of that difference by this share of the gain: friction at rest is every engine's own.
@@ -395,7 +397,7 @@ impl Step {
     }
 
     /// Whether a trial leads: as clear as one that stands out, and ahead of every other cause that does not look like it, by half of
-    /// what it is worth or clip by clip far beyond chance.
+    /// what it is worth, or by a fifth and clip by clip far beyond chance.
     #[must_use]
     pub fn leads(&self, library: &Library, candidate: usize) -> bool {
         let fitted = |trial: &Trial| trial.fitted.as_ref().map(|(_, advantage)| advantage.clone());
@@ -403,7 +405,7 @@ impl Step {
         let Some(own) = own.filter(|a| a.share > NEARLY_ALL && a.nats > CLEAR * a.error) else { return false };
         let ahead_of = |trial: &Trial| {
             let (beyond, error) = trial.fitted.as_ref().map_or((f64::INFINITY, 0.0), |(_, other)| own.beyond(other));
-            beyond > CLEAR * error
+            beyond > CLEAR * error && beyond > AHEAD * own.nats
         };
         let others = self.trials.iter().filter(|trial| trial.scored.candidate != candidate && trial.is_cause());
         let mut rivals = others.filter(|trial| !library.look_alike(candidate, trial.scored.candidate));

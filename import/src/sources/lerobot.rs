@@ -1,7 +1,7 @@
 //! LeRobot data sets: `meta/info.json` and parquet files, one an episode (version 2) or many episodes in one (version 3). Each
 //! episode is a log.
 
-use super::{parquet, stem};
+use super::{parquet_file, stem};
 use crate::error::ImportError;
 use crate::log::{Column, Facts, LeftOut, Log, Table};
 use serde::Deserialize;
@@ -86,7 +86,7 @@ fn parquet_files(folder: &Path, found: &mut Vec<PathBuf>) -> Result<(), ImportEr
 
 /// Takes the episodes of a file over; how many frames it has.
 fn take(file: &Path, folder: &Path, info: &Info, episodes: &mut BTreeMap<u64, Log>) -> Result<usize, ImportError> {
-    let (rows, columns) = parquet::read(file)?;
+    let (rows, columns) = parquet_file::read(file)?;
     let counter = |name: &str| {
         let column = columns.iter().find(|column| column.name == name && column.width == 1);
         column.ok_or_else(|| {
@@ -117,7 +117,7 @@ fn take(file: &Path, folder: &Path, info: &Info, episodes: &mut BTreeMap<u64, Lo
     Ok(rows)
 }
 
-fn push(table: &mut Table, numbers: &parquet::Numbers, row: usize, info: &Info) {
+fn push(table: &mut Table, numbers: &parquet_file::Numbers, row: usize, info: &Info) {
     let filled = table.stamps_ns.as_ref().map_or(0, Vec::len);
     let first = format!("{}{}", numbers.name, label(info, numbers, 0));
     let at = match table.columns.iter().position(|column| column.name == first) {
@@ -140,7 +140,7 @@ fn push(table: &mut Table, numbers: &parquet::Numbers, row: usize, info: &Info) 
 }
 
 /// `[shoulder_pan.pos]` where the data set names the numbers of a feature.
-fn label(info: &Info, numbers: &parquet::Numbers, i: usize) -> String {
+fn label(info: &Info, numbers: &parquet_file::Numbers, i: usize) -> String {
     let names = info.features.get(&numbers.name).and_then(|feature| names(&feature.names, numbers.width));
     match names.as_ref().and_then(|names| names.get(i)) {
         Some(name) => format!("[{}]", name.strip_suffix(".pos").unwrap_or(name)),

@@ -7,7 +7,7 @@
 //! | `sqlite` | the storage sqlite3 (the only SQLite code) |
 //! | `ros1` | ROS 1 bags |
 //! | `lerobot` | LeRobot data sets, versions 2 and 3 |
-//! | `parquet` | columns of a parquet file (the only parquet code) |
+//! | `parquet_file` | columns of a parquet file (the only parquet code) |
 //! | `table` | CSV, TSV and other text tables (the only csv code) |
 //! | `libfranka` | what libfranka's log says about a table's columns |
 //! | `sage` | SAGE's folders of a motion |
@@ -17,7 +17,7 @@ mod find;
 mod lerobot;
 mod libfranka;
 mod npz;
-mod parquet;
+mod parquet_file;
 mod ros1;
 mod rosbag2;
 mod sage;
