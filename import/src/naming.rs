@@ -195,6 +195,11 @@ pub(crate) fn role(table: &str, group: &Group) -> Option<Role> {
     }
     let own = words(&group.base);
     let around = words(table);
+    // A coordinate in space is no joint's.
+    let space = ["x", "y", "z", "w", "qx", "qy", "qz", "qw"];
+    if own.iter().any(|word| word == "pose") || own.last().is_some_and(|word| space.contains(&word.as_str())) {
+        return None;
+    }
     let has = |words: &[String], list: &[&str]| words.iter().any(|word| list.contains(&word.as_str()));
     let quantity = if has(&own, &VELOCITY) {
         Quantity::Velocity
@@ -274,6 +279,8 @@ mod tests {
             ("rows", "tau_ext_hat_filtered[2]", None),
             ("rows", "ddq_d[2]", None),
             ("rows", "O_T_EE[2]", None),
+            ("/object/pose", "pose.position.z", None),
+            ("rows", "object_pos_x", None),
             ("rows", "temperature1", None),
             ("rows", "time", None),
         ] {

@@ -199,3 +199,25 @@ fn what_cannot_be_known_is_asked_once() {
     let session = shared_mem::recording::Session::open(&out).expect("a session");
     holds_the_motion(&session.read(&session.clips[0]).expect("a clip"), (0, ROWS), 2, EXACT);
 }
+
+#[test]
+fn an_object_alone_is_a_free_motion_once_cell_toml_describes_it() {
+    let lab = tempfile::tempdir().expect("a folder");
+    let (file, out, cell) = (lab.path().join("toss.csv"), lab.path().join("session"), lab.path().join("cell.toml"));
+    let row = |k: u32| format!("{},{},100,50,1,0,0,0\n", f64::from(k) * 0.01, 500.0 + f64::from(k));
+    let rows: String = (0..80).map(row).collect();
+    let names = "t,cube_x,cube_y,cube_z,cube_qw,cube_qx,cube_qy,cube_qz\n";
+    std::fs::write(&file, format!("{names}{rows}")).expect("room");
+    let files = [file];
+    let questions = lab.path().join("import.toml");
+    let order = lab::order(&files, &out, &questions);
+    let error = import::import(order, |_, _| {}).expect_err("no cell").to_string();
+    assert!(error.contains("--cell") && error.lines().count() == 1 && !out.exists(), "{error}");
+    std::fs::write(&cell, "[table]\nheight = 0.0\n[object]\nshape = \"box\"\nsize = [0.1, 0.1, 0.1]\n").expect("room");
+    import::import(import::Order { cell: Some(&cell), ..order }, |_, _| {}).expect("an object");
+    let session = shared_mem::recording::Session::open(&out).expect("a session");
+    let clip = session.read(&session.clips[0]).expect("a clip");
+    assert_eq!((clip.kind, clip.object.len()), (ClipKind::FreeMotion, 80));
+    // Millimetres.
+    assert!((clip.object.poses[10].position()[0] - 0.51).abs() < EXACT);
+}
