@@ -1,6 +1,8 @@
 //! Damaged logs: refused in one line with nothing written, or, where a format has no checksum and the damage shows nowhere, a
 //! session that loads.
 
+#![allow(clippy::print_stdout)] // its table
+
 mod lab;
 
 use lab::fixture;

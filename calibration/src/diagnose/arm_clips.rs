@@ -379,7 +379,8 @@ mod tests {
         };
         let left = |effects: Vec<EffectTheta>| {
             let theta = Theta { effects, ..Theta::default() };
-            let arm = ArmClips::new(&tracking, &[followed.clone()], move |_: &[f64]| theta.clone()).expect("an arm");
+            let arm = ArmClips::new(&tracking, std::slice::from_ref(&followed), move |_: &[f64]| theta.clone())
+                .expect("an arm");
             let mut out = Vec::new();
             arm.residuals(0, &[], &[], &mut out).expect("it can be simulated");
             let dq = |k: usize| followed.measured.dq_row(arm.clips[0].kept[k]).expect("velocities")[3];

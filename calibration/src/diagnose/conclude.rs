@@ -13,18 +13,16 @@ use super::partly::{self, Partly};
 use super::remainder::{self, Left};
 use super::score::predict;
 use super::site::Site;
+use super::sizes::{self, Sizes};
 use super::split::{self, Split};
-use super::tolerance::{self, Measured};
 use super::unproven::{self, Unproven};
 use super::verdict::{self, Finding};
 use super::{
     DiagnoseError, Kind, Options, advice, combine, confidence, drift, localise, parameters, ranked, refit, remedies,
 };
-use crate::report::{Trace, channel_in_words, effect_in_words, in_unit};
-use shared_mem::cell::Tolerance;
+use crate::report::{Trace, channel_in_words, effect_in_words};
 use shared_mem::recording::Session;
 use shared_mem::theta::Theta;
-use twin::replay::Replayer;
 
 /// What noise alone leaves: residuals are in sigmas of the sensors.
 const FLOOR: f64 = 1.0;
@@ -83,11 +81,8 @@ pub fn conclude<E: Evidence>(
 ) -> Result<Diagnosis, DiagnoseError> {
     let first = &found.steps[0];
     let last_weights = &found.steps.last().unwrap_or(first).weights;
-    let unseen = |hypothesis, weights| held_out::fits(bench, split, (hypothesis, weights));
-    let baseline = unseen(&first.from, &first.weights).ok_or(DiagnoseError::NoBaseline)?;
-    let with = unseen(&found.last, last_weights).ok_or(DiagnoseError::NoBaseline)?;
-    let before = Residuals::of(bench, &baseline).ok_or(DiagnoseError::NoBaseline)?;
-    let after = Residuals::of(bench, &with).ok_or(DiagnoseError::NoBaseline)?;
+    let (baseline, before) = unseen(bench, split, (&first.from, &first.weights))?;
+    let (with, after) = unseen(bench, split, (&found.last, last_weights))?;
     let (places, rest) = (localise::localise(bench.evidence, &before), localise::localise(bench.evidence, &after));
     let all: Vec<usize> = (0..admitted.clips.len()).collect();
     let typical = |hypothesis| Residuals::at(bench, hypothesis, &all).map(|left| left.typical());
@@ -96,7 +91,7 @@ pub fn conclude<E: Evidence>(
         .ok_or(DiagnoseError::NoBaseline)?;
     let confirmed = confirms(&before, &after);
     let overdispersion = found.overdispersion(bench);
-    let within_tolerance = within_tolerance(bench, ([&baseline, &with], [&before, &after]), session, admitted)?;
+    let within_tolerance = sizes::within_tolerance(bench, ([&baseline, &with], [&before, &after]), session, admitted)?;
     let finding = finding(bench, (split, found), &overdispersion, (left, confirmed, within_tolerance));
     let decision = finding.decide();
     let tried = decision.kind == Kind::Unexplained;
@@ -112,47 +107,25 @@ pub fn conclude<E: Evidence>(
         shrink: after.shrink(&before, options.seed),
     });
     let shown_fits = partly.as_ref().map_or(if believed { &with } else { &baseline }, |partly| &partly.fits);
-    let torque_rms = torque_rms(bench.evidence, [&before, shown]);
-    let torques = torque_rms.as_ref().map(|both| both.each_ref().map(|joints| root_mean_square(joints)));
-    let [joints, add, add_s] = match torque_rms {
-        // Joints go where they were measured.
-        Some(_) => [Change::default(); 3],
-        None => replayed(bench, [&baseline, shown_fits], session, admitted)?,
-    };
     let of_object = places.first().is_some_and(|place| !place.channel.starts_with("joint"));
-    let size = size_in_words((torques.map(|both| both[0]), joints.before), add.before.filter(|_| of_object));
+    let sizes = Sizes::of(bench, ([&baseline, shown_fits], [&before, shown]), session, admitted)?;
+    let [size, stays] = sizes.in_words(of_object);
     let unproven = unproven::unproven(bench, found);
     let facts =
         facts(bench, found, (size, unproven.as_ref()), [&places, &rest], after.shrink(&before, options.seed).value);
     let verdict = match &partly {
-        Some(partly) => {
-            in_part(bench, partly, &facts, (torques.map(|both| both[1]), joints.after, add.after), of_object)
-        }
+        Some(partly) => in_part(bench, partly, &facts, (&stays, &sizes)),
         None => {
             let text = headline::sentence(&decision, &finding, &facts);
             decision.said(text)
         }
-    };
-    let gap = Gap {
-        unit: "sigma",
-        before: before.mean_square(),
-        after: shown.mean_square(),
-        floor: before.floor(),
-        shrink: shown.shrink(&before, options.seed),
-        explainable_fraction: remainder::explained(before.mean_square(), shown.mean_square(), before.floor()),
-        joint_rms_rad: joints,
-        torque_rms,
-        object_add_m: add,
-        object_add_s_m: add_s,
     };
     let names = |set: &[usize]| set.iter().map(|clip| admitted.files[*clip].clone()).collect();
     let largest = rest.first().map(|place| (place.channel.as_str(), place.regime.as_str()));
     let open = partly.is_some() || finding.open().is_some();
     let site = Site::of(session);
     let next = match &unproven {
-        Some(open) if verdict.kind == Kind::Unexplained => {
-            advice::proving(bench.library.candidates[open.trial.scored.candidate].effect.name, open.more, &site)
-        }
+        Some(open) if verdict.kind == Kind::Unexplained => advice::proving(open.effect(bench), open.more, &site),
         _ => next(&verdict, open, largest, &site),
     };
     let theta = bench.library.theta(&kept.full);
@@ -160,7 +133,7 @@ pub fn conclude<E: Evidence>(
     let given = options.theta.as_ref().and_then(|theta| theta.object.clone());
     let object = if admitted.with_object { theta.object.clone() } else { given };
     Ok(Diagnosis {
-        gap,
+        gap: sizes.gap([&before, shown], options.seed),
         candidates: ranked::candidates(
             bench,
             (found, overdispersion[0]),
@@ -185,6 +158,17 @@ pub fn conclude<E: Evidence>(
         traces: traces(bench.evidence, (&before, if nearest.is_some() { after } else { shown }), &admitted.files),
         nearest,
     })
+}
+
+/// Numbers for the clips that they were not fitted to, and what they leave there.
+fn unseen<E: Evidence>(
+    bench: &Bench<'_, E>,
+    split: &Split,
+    hypothesis: (&Hypothesis, &[f64]),
+) -> Result<(Fits, Residuals), DiagnoseError> {
+    let fits = held_out::fits(bench, split, hypothesis).ok_or(DiagnoseError::NoBaseline)?;
+    let left = Residuals::of(bench, &fits).ok_or(DiagnoseError::NoBaseline)?;
+    Ok((fits, left))
 }
 
 /// What has to be known about clips of few commands.
@@ -220,12 +204,10 @@ fn in_part<E: Evidence>(
     bench: &Bench<'_, E>,
     partly: &Partly,
     facts: &Facts,
-    (torque_rms, joint_rms_rad, object_add_m): (Option<f64>, Option<f64>, Option<f64>),
-    of_object: bool,
+    (stays, sizes): (&str, &Sizes),
 ) -> Verdict {
     let looks_like = partly.looks_like(bench);
-    let stays = size_in_words((torque_rms, joint_rms_rad), object_add_m.filter(|_| of_object));
-    let text = headline::in_part(facts, &partly.share, &stays, looks_like);
+    let text = headline::in_part(facts, &partly.share, stays, looks_like);
     let (place, looks_like) = (facts.rest.clone(), looks_like.map(str::to_owned));
     Verdict {
         kind: Kind::Named,
@@ -233,19 +215,7 @@ fn in_part<E: Evidence>(
         confidence: sureness(&partly.found),
         text,
         explained_share: Some(partly.share),
-        rest: Some(Rest { joint_rms_rad, object_add_m, place, looks_like }),
-    }
-}
-
-/// How large the gap is, in units of the hand: of the object where there is such a figure, else of the joints.
-fn size_in_words((torques, joints): (Option<f64>, Option<f64>), add: Option<f64>) -> String {
-    if let Some(torques) = torques {
-        return format!("{} RMS over all joints", in_unit("N m", torques));
-    }
-    match (joints, add) {
-        (_, Some(add)) => format!("{} ADD", in_unit("m", add)),
-        (Some(rms), None) => format!("{} RMS over all joints", in_unit("rad", rms)),
-        (None, None) => "of unknown size".into(),
+        rest: Some(Rest { joint_rms_rad: sizes.joints.after, object_add_m: sizes.add.after, place, looks_like }),
     }
 }
 
@@ -278,27 +248,6 @@ fn confirms(before: &Residuals, after: &Residuals) -> bool {
     let mean = remainder::explained(before.mean_square(), after.mean_square(), before.floor());
     let usual = Left::of_groups(&before.typical(), &after.typical()).iter().map(Left::explained).fold(mean, f64::max);
     after.mean_square() < before.mean_square() && usual > combine::CLOSES
-}
-
-/// Whether the gap is of no interest without effects and with them.
-fn within_tolerance<E: Evidence>(
-    bench: &Bench<'_, E>,
-    (fits, left): ([&Fits; 2], [&Residuals; 2]),
-    session: &Session,
-    admitted: &Admitted,
-) -> Result<[bool; 2], DiagnoseError> {
-    let stated = &session.cell.tolerance;
-    let of = |measured: [Measured; 2]| measured.map(|measured| tolerance::holds(stated, measured));
-    if let Some(torques) = torque_rms(bench.evidence, left) {
-        let torques = torques.map(|joints| Some(root_mean_square(&joints)));
-        return Ok(of(torques.map(|torques| Measured { torques, ..Measured::default() })));
-    }
-    if *stated == Tolerance::default() {
-        return Ok([false; 2]);
-    }
-    let [joints, add, _] = replayed(bench, fits, session, admitted)?;
-    let measured = |joints, object| Measured { joints, object, torques: None };
-    Ok(of([measured(joints.before, add.before), measured(joints.after, add.after)]))
 }
 
 fn finding<'a, E: Evidence>(
@@ -363,55 +312,6 @@ fn stands_in<E: Evidence>(
     let Some((with, instead)) = predicted(last).zip(swapped.as_ref().and_then(predicted)) else { return true };
     let advantage = with.over(&instead);
     confidence::alike(advantage.nats, advantage.error, advantage.clips())
-}
-
-/// Mean joint error, ADD and ADD-S of the confirm clips at two hypotheses, each with numbers that were not fitted to them, by the code of `twin replay`.
-fn replayed<E: Evidence>(
-    bench: &Bench<'_, E>,
-    both: [&Fits; 2],
-    session: &Session,
-    admitted: &Admitted,
-) -> Result<[Change; 3], DiagnoseError> {
-    let mut changes = [Change::default(); 3];
-    for (place, fits) in both.into_iter().enumerate() {
-        let mut gaps = Vec::new();
-        for (hypothesis, clips) in fits {
-            let replayer = Replayer::new(&session.cell, Some(&bench.library.theta(&hypothesis.full)))?;
-            for clip in clips {
-                let (_, _, report) = replayer.replay(admitted.clips[*clip].clone())?;
-                gaps.push(report.gap);
-            }
-        }
-        let mean = |values: Vec<f64>| (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64);
-        let squares = gaps.iter().filter_map(|gap| gap.joint_rms_rad.as_ref()).flatten().map(|rms| rms * rms).collect();
-        let figures = [
-            mean(squares).map(f64::sqrt),
-            mean(gaps.iter().filter_map(|gap| gap.object_add_m).collect()),
-            mean(gaps.iter().filter_map(|gap| gap.object_add_s_m).collect()),
-        ];
-        for (change, figure) in changes.iter_mut().zip(figures) {
-            if place == 0 { change.before = figure } else { change.after = figure }
-        }
-    }
-    Ok(changes)
-}
-
-/// Root mean square of each joint's torque beyond the predicted one at two hypotheses [N m]; `None` where torques are no channel
-/// of their own.
-fn torque_rms(evidence: &impl Evidence, both: [&Residuals; 2]) -> Option<[Vec<f64>; 2]> {
-    let sigma = evidence.torque_sigma()?;
-    Some(both.map(|residuals| {
-        let of = |(channel, sigma): (usize, &f64)| {
-            let rows = residuals.clips.iter().flat_map(|(clip, values)| evidence.rows(*clip).iter().zip(values));
-            let of_channel = rows.filter(|(row, _)| row.channel == channel).map(|(_, residual)| residual * sigma);
-            root_mean_square(&of_channel.collect::<Vec<_>>())
-        };
-        sigma.iter().enumerate().map(of).collect()
-    }))
-}
-
-fn root_mean_square(values: &[f64]) -> f64 {
-    (values.iter().map(|value| value * value).sum::<f64>() / values.len().max(1) as f64).sqrt()
 }
 
 /// Residuals of the channels with the largest gap, before and after, on the confirm clips.

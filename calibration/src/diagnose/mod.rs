@@ -28,7 +28,7 @@
 //! | `stages` | how long each part of the search takes |
 //! | [`undetermined`] | which of their numbers nothing depends on |
 //! | [`remainder`], [`drift`] | what they leave |
-//! | [`gap`], [`localise`] | how large the gap is, and where |
+//! | [`gap`], [`localise`], `sizes` | how large the gap is, and where |
 //! | `unproven` | what more clips would prove |
 //! | `tolerance` | whether a gap is of interest |
 //! | `partly` | what is proven although a part of the gap stays |
@@ -84,6 +84,7 @@ pub mod screening;
 pub mod shortlist;
 pub mod signatures;
 pub mod site;
+mod sizes;
 pub mod split;
 mod stages;
 pub mod starts;

@@ -111,7 +111,7 @@ mod tests {
     fn a_cubic_motion_is_followed_exactly_and_noise_averages_out() {
         let stamps: Vec<u64> = (0..500).map(|row| row * 2_000_000).collect();
         let position = |t: f64| 1.5 + 0.3 * t - 2.0 * t * t + 4.0 * t * t * t;
-        let noise = |row: usize| if row % 2 == 0 { 1e-5 } else { -1e-5 };
+        let noise = |row: usize| if row.is_multiple_of(2) { 1e-5 } else { -1e-5 };
         let q = |noisy: bool| -> Vec<f64> {
             let at =
                 |(row, stamp): (usize, &u64)| position(*stamp as f64 * 1e-9) + if noisy { noise(row) } else { 0.0 };

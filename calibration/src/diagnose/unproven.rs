@@ -17,6 +17,13 @@ pub(super) struct Unproven<'a> {
     pub(super) more: usize,
 }
 
+impl Unproven<'_> {
+    /// Its name.
+    pub(super) fn effect<E>(&self, bench: &Bench<'_, E>) -> &'static str {
+        bench.library.candidates[self.trial.scored.candidate].effect.name
+    }
+}
+
 /// The likeliest such effect; `None` where something was found, or where none closes a real part of the gap.
 pub(super) fn unproven<'a, E: Evidence>(bench: &Bench<'_, E>, found: &'a Found) -> Option<Unproven<'a>> {
     let step = found.steps.first().filter(|_| found.last.effects.is_empty())?;

@@ -83,13 +83,11 @@ fn kind(mapping: &mut Mapping, cell: Option<&Cell>, notes: &mut Notes) {
     }
 }
 
+/// The gravity of a model with joints of these names, where there is one.
+type Model<'a> = &'a dyn Fn(&[String]) -> Option<Gravity>;
+
 /// The two blocks of joints, with everything that their numbers tell.
-fn joints(
-    log: &Log,
-    chosen: &Chosen,
-    (mapping, gravity): (&mut Mapping, &dyn Fn(&[String]) -> Option<Gravity>),
-    notes: &mut Notes,
-) {
+fn joints(log: &Log, chosen: &Chosen, (mapping, gravity): (&mut Mapping, Model<'_>), notes: &mut Notes) {
     let mut measured = block(log, "measured", chosen.measured.as_ref(), notes);
     let mut desired = block(log, "desired", chosen.desired.as_ref(), notes);
     for columns in [&mut measured, &mut desired] {

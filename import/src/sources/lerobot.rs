@@ -94,7 +94,7 @@ fn take(file: &Path, folder: &Path, info: &Info, episodes: &mut BTreeMap<u64, Lo
         })
     };
     let (of_row, frame) = (counter(EPISODE)?, counter(FRAME)?);
-    let count = |value: f64| (value >= 0.0 && value < 1e15 && value.fract() == 0.0).then_some(value as u64);
+    let count = |value: f64| ((0.0..1e15).contains(&value) && value.fract() == 0.0).then_some(value as u64);
     for row in 0..rows {
         let (Some(episode), Some(frame)) =
             (of_row.values.get(row).and_then(|v| count(*v)), frame.values.get(row).and_then(|v| count(*v)))

@@ -131,8 +131,11 @@ fn message(
 /// The source ends within a record.
 struct Cut;
 
-/// Header and data of the next record; `None` at the end.
-fn record(source: &mut impl Read) -> Result<Option<(Vec<u8>, Vec<u8>)>, Cut> {
+/// Header and data.
+type Record = (Vec<u8>, Vec<u8>);
+
+/// The next record; `None` at the end.
+fn record(source: &mut impl Read) -> Result<Option<Record>, Cut> {
     let mut first = [0; 1];
     if source.read(&mut first).map_err(|_| Cut)? == 0 {
         return Ok(None);
