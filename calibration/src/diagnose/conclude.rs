@@ -111,8 +111,9 @@ pub fn conclude<E: Evidence>(
     let sizes = Sizes::of(bench, ([&baseline, shown_fits], [&before, shown]), session, admitted)?;
     let [size, stays] = sizes.in_words(of_object);
     let unproven = unproven::unproven(bench, found);
-    let facts =
-        facts(bench, found, (size, unproven.as_ref()), [&places, &rest], after.shrink(&before, options.seed).value);
+    let closed = |open| share_of(bench, split, (open, &first.weights), (&before, options.seed));
+    let open = unproven.as_ref().and_then(|open| Some((open, closed(open)?)));
+    let facts = facts(bench, found, (size, open), [&places, &rest], after.shrink(&before, options.seed).value);
     let verdict = match &partly {
         Some(partly) => in_part(bench, partly, &facts, (&stays, &sizes)),
         None => {
@@ -122,11 +123,11 @@ pub fn conclude<E: Evidence>(
     };
     let names = |set: &[usize]| set.iter().map(|clip| admitted.files[*clip].clone()).collect();
     let largest = rest.first().map(|place| (place.channel.as_str(), place.regime.as_str()));
-    let open = partly.is_some() || finding.open().is_some();
+    let rest_is_open = partly.is_some() || finding.open().is_some();
     let site = Site::of(session);
     let next = match &unproven {
         Some(open) if verdict.kind == Kind::Unexplained => advice::proving(open.effect(bench), open.more, &site),
-        _ => next(&verdict, open, largest, &site),
+        _ => next(&verdict, rest_is_open, largest, &site),
     };
     let theta = bench.library.theta(&kept.full);
     // Of an object that no clip shows nothing was found but what was given.
@@ -171,6 +172,16 @@ fn unseen<E: Evidence>(
     Ok((fits, left))
 }
 
+/// How far the gap shrinks with an effect that is not proven.
+fn share_of<E: Evidence>(
+    bench: &Bench<'_, E>,
+    split: &Split,
+    (open, weights): (&Unproven<'_>, &[f64]),
+    (before, seed): (&Residuals, u64),
+) -> Option<f64> {
+    Some(held_out::residuals(bench, split, (open.fit, weights))?.shrink(before, seed).value)
+}
+
 /// What has to be known about clips of few commands.
 fn few(split: &Split) -> Option<String> {
     let count = split.in_turn.len();
@@ -187,15 +198,14 @@ fn few(split: &Split) -> Option<String> {
 fn facts<E: Evidence>(
     bench: &Bench<'_, E>,
     found: &Found,
-    (size, unproven): (String, Option<&Unproven<'_>>),
+    (size, unproven): (String, Option<(&Unproven<'_>, f64)>),
     places: [&[Place]; 2],
     shrink: f64,
 ) -> Facts {
     let [place, rest] = places.map(|places| places.first().map_or_else(String::new, place_in_words));
     let effects = found.last.effects.iter().map(|effect| with_size(bench, &found.last, *effect)).collect();
-    let unproven = unproven.map(|open| {
-        (with_size(bench, open.fit, open.trial.scored.candidate), open.trial.closes, [open.clips, open.more])
-    });
+    let unproven = unproven
+        .map(|(open, share)| (with_size(bench, open.fit, open.trial.scored.candidate), share, [open.clips, open.more]));
     Facts { size, place, rest, effects, unproven, shrink }
 }
 
