@@ -2,7 +2,7 @@
 //! the noise that a channel itself shows; the others separate a fault from the nearest thing that is none.
 
 /// Distance between a joint and its commands that a fault must exceed, beyond noise, root mean square over a clip [rad]: three
-/// steps of a coarse encoder (1.5 mrad). Joints whose commands are nearer to each other cannot be told apart.
+/// steps of a coarse encoder (1.5 mrad). Joints whose commands are nearer to each other cannot be distinguished.
 pub(super) const LEAST_MISMATCH: f64 = 5e-3;
 /// A fit under the hypothesis of a fault leaves less than this share of the distance [1]. Two joints that move alike still
 /// differ by more than a fifth of what separates either from a third.

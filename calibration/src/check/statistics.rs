@@ -61,7 +61,7 @@ pub(super) struct Slope {
 }
 
 /// `y = a x + b z` by least squares through the origin, outliers beyond ten median residuals left out once; the slopes on `x`
-/// and `z`. `None` where they cannot be told apart.
+/// and `z`. `None` where they cannot be distinguished.
 pub(super) fn plane(rows: &[[f64; 3]]) -> Option<[Slope; 2]> {
     let all = fitted(rows)?;
     let left = |[x, z, y]: &[f64; 3]| (y - all[0].value * x - all[1].value * z).abs();

@@ -1,11 +1,12 @@
 //! Whether the recorded clips can be diagnosed at all; if not, what is missing.
 
 use super::ground::Ground;
-use super::{length, split, torques};
+use super::torques::{self, is_tracking};
+use super::{length, split};
 use crate::forward::arm::one_piece;
 use crate::identify::object::screen::{Screened, screened};
 use crate::identify::remarks::grouped;
-use shared_mem::cell::{Cell, ClipKind, ControllerKind};
+use shared_mem::cell::{Cell, ClipKind};
 use shared_mem::recording::{Clip, JointSeries, ReadError, Session};
 use std::path::PathBuf;
 use twin::arm::{ArmModel, ModelError};
@@ -102,19 +103,19 @@ pub fn admit(session: &Session) -> Result<Admitted, Refused> {
             clips.len() + out.len()
         )));
     }
-    let tracking = is_tracking(&session.cell);
-    if tracking {
-        // Clips of one command are told by the command, not by two motions that differ by their noise.
-        let all: Option<Vec<Clip>> = clips.into_iter().map(torques::followed).collect();
-        let short = || Refused::NotTestable("clips are too short for their motion to be smoothed".into());
-        clips = all.ok_or_else(short)?;
-    }
     let mut warnings = grouped(remarks.iter().map(|(file, remark)| (file.as_str(), remark.as_str())));
     if !out.is_empty() {
         let all = out.len() + clips.len();
         warnings.insert(0, format!("{} of {all} clips were left out: {reasons}", out.len()));
     }
     warnings.extend(length::liveliest(&mut clips));
+    let tracking = is_tracking(&session.cell);
+    if tracking {
+        // Not before clips are grouped by their commands: two motions of one command differ by noise.
+        let all: Option<Vec<Clip>> = clips.into_iter().map(torques::followed).collect();
+        let short = || Refused::NotTestable("clips are too short for their motion to be smoothed".into());
+        clips = all.ok_or_else(short)?;
+    }
     let with_object = !tracking && clips.iter().all(|clip| clip.kind == ClipKind::ControlHitSlide);
     Ok(Admitted { clips, files, groups, with_object, warnings })
 }
@@ -141,11 +142,6 @@ pub(crate) fn looked_at(mut clip: Clip, cell: &Cell, arm: &ArmModel) -> Result<(
     // Poses elsewhere than the tool may be what is to be found: a camera that looks from another place.
     remarks.extend(odd.into_iter().chain(elsewhere));
     unusable.map_or(Ok((clip, remarks)), Err)
-}
-
-/// Whether the arm goes along what was measured, whatever its controller was.
-fn is_tracking(cell: &Cell) -> bool {
-    cell.controller.as_ref().is_some_and(|law| law.kind == ControllerKind::Tracking)
 }
 
 fn check_channels(clips: &[Clip], tracking: bool) -> Result<(), Refused> {

@@ -140,11 +140,31 @@ pub struct Gap {
     /// Root mean square of each joint's torque beyond the predicted one [N m], where torques along the measured motion are
     /// explained.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub torque_rms: Option<[Vec<f64>; 2]>,
+    pub torque_rms: Option<TorqueRms>,
     /// Mean ADD [m].
     pub object_add_m: Change,
     /// Mean ADD-S [m].
     pub object_add_s_m: Change,
+}
+
+/// Root mean square over time of each joint's torque beyond the predicted one [N m].
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct TorqueRms {
+    /// Without the effects.
+    pub before: Vec<f64>,
+    /// With them.
+    pub after: Vec<f64>,
+}
+
+impl TorqueRms {
+    /// Over all joints, too.
+    #[must_use]
+    pub fn over_joints(&self) -> Change {
+        let all = |joints: &[f64]| {
+            Some((joints.iter().map(|joint| joint * joint).sum::<f64>() / joints.len().max(1) as f64).sqrt())
+        };
+        Change { before: all(&self.before), after: all(&self.after) }
+    }
 }
 
 /// Effects that close a part of the gap but leave more than a cause does.

@@ -6,10 +6,11 @@
 use super::evidence::{Channel, Evidence, Group, Row, StageName};
 use super::recent::Recent;
 use super::scatter::Scatter;
+use super::torques::is_tracking;
 use crate::estimate::{ClipModel, Impossible};
 use crate::forward::arm::noise;
 use crate::forward::object;
-use shared_mem::cell::{Cell, ClipKind, ControllerKind, TorqueSensing};
+use shared_mem::cell::{Cell, ClipKind, TorqueSensing};
 use shared_mem::recording::{Clip, JointSeries};
 use shared_mem::theta::Theta;
 use twin::arm::{ArmModel, Joints, MAX_JOINTS, ModelError};
@@ -31,7 +32,7 @@ const FAST: f64 = 0.5;
 const QUANTITIES: [&str; 4] = ["q", "dq", "tau_J", "tau_J_d"];
 /// Where the arm goes along what was measured: the torque that this takes.
 const TORQUE: &str = "tau";
-/// Until then it has come onto that way from where it was put: fifteen time constants of the law that keeps it there [ns].
+/// Within this time the simulated arm settles on that motion: fifteen time constants of the law that keeps it there [ns].
 const SETTLED_NS: u64 = 50_000_000;
 
 /// Arm clips and what numbers mean for the cell.
@@ -91,10 +92,6 @@ impl<F: Fn(&[f64]) -> Theta + Sync> ArmClips<F> {
     pub fn sigma(&self) -> &[f64] {
         &self.sigma
     }
-}
-
-fn is_tracking(cell: &Cell) -> bool {
-    cell.controller.as_ref().is_some_and(|law| law.kind == ControllerKind::Tracking)
 }
 
 /// Columns of a recorded series that belong to a channel.

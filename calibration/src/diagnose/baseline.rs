@@ -1,6 +1,7 @@
 //! Where the search begins: the paper's parameters identified on the clips for fitting.
 //!
-//! In order: where gains that are known by range alone may begin; the arm by itself, since a gain that is off moves the hit, and a hit elsewhere tells nothing about the gain;
+//! In order: where gains that are known by range alone may begin; the arm by itself, since a gain that is off moves the hit,
+//! and a hit elsewhere tells nothing about the gain;
 //! then the object's parameters under that arm, by the identification's own way over rough hits; then all together.
 
 use super::admit::Admitted;
@@ -57,8 +58,8 @@ pub fn identify<E: Evidence>(
 /// Where the fit begins.
 fn start<E: Evidence>(bench: &Bench<'_, E>, split: &Split, cell: &Cell, admitted: &Admitted) -> Vec<f64> {
     let mut start = bench.library.start();
-    let clips = split.train.iter().map(|clip| admitted.clips[*clip].clone()).collect();
-    let Ok(theta) = arm::begun(cell, clips, &bench.library.theta(&start), bench.interrupt) else { return start };
+    let clips: Vec<&Clip> = split.train.iter().map(|clip| &admitted.clips[*clip]).collect();
+    let Ok(theta) = arm::begun(cell, &clips, &bench.library.theta(&start), bench.interrupt) else { return start };
     let numbers = bench.library.settings.numbers(&theta);
     for k in bench.library.baseline.clone() {
         let unknown = &bench.library.unknowns[k];

@@ -100,7 +100,8 @@ pub mod verdict;
 pub use remedies::Remedy;
 
 pub use answer::{
-    Basis, Candidate, Change, Clips, Diagnosis, Gap, Kind, Nearest, Place, Rest, Share, Size, Status, Verdict,
+    Basis, Candidate, Change, Clips, Diagnosis, Gap, Kind, Nearest, Place, Rest, Share, Size, Status, TorqueRms,
+    Verdict,
 };
 
 use crate::forward::object::ObjectClips;
@@ -252,6 +253,9 @@ fn diagnosed(
         let evidence = ArmClips::new(&session.cell, &admitted.clips, theta).map_err(Refused::from)?;
         examine(&evidence, &library, session, admitted, options, work)?
     };
+    if torques::is_tracking(&session.cell) {
+        diagnosis.theta = torques::without_law(diagnosis.theta, options.theta.as_ref());
+    }
     diagnosis.seconds = began.elapsed().as_secs_f64();
     Ok(diagnosis)
 }

@@ -2,7 +2,7 @@
 
 use super::DiagnoseError;
 use super::admit::Admitted;
-use super::answer::{Change, Gap};
+use super::answer::{Change, Gap, TorqueRms};
 use super::evidence::Evidence;
 use super::fit::Bench;
 use super::gap::Residuals;
@@ -23,7 +23,7 @@ pub(super) struct Sizes {
     /// Mean ADD-S [m].
     add_s: Change,
     /// Root mean square of each joint's torque beyond the predicted one [N m], along the measured motion.
-    torque_rms: Option<[Vec<f64>; 2]>,
+    torque_rms: Option<TorqueRms>,
 }
 
 impl Sizes {
@@ -48,11 +48,10 @@ impl Sizes {
 
     /// Without effects and with them; `of_object`: most of the gap is the object's.
     pub(super) fn in_words(&self, of_object: bool) -> [String; 2] {
-        let torques = self.torque_rms.as_ref().map(|both| both.each_ref().map(|joints| root_mean_square(joints)));
-        let [before, after] = [0, 1].map(|side| torques.map(|both| both[side]));
+        let torques = self.torque_rms.as_ref().map(TorqueRms::over_joints).unwrap_or_default();
         [
-            size_in_words((before, self.joints.before), self.add.before.filter(|_| of_object)),
-            size_in_words((after, self.joints.after), self.add.after.filter(|_| of_object)),
+            size_in_words((torques.before, self.joints.before), self.add.before.filter(|_| of_object)),
+            size_in_words((torques.after, self.joints.after), self.add.after.filter(|_| of_object)),
         ]
     }
 
@@ -83,8 +82,8 @@ pub(super) fn within_tolerance<E: Evidence>(
     let stated = &session.cell.tolerance;
     let of = |measured: [Measured; 2]| measured.map(|measured| tolerance::holds(stated, measured));
     if let Some(torques) = torque_rms(bench.evidence, left) {
-        let torques = torques.map(|joints| Some(root_mean_square(&joints)));
-        return Ok(of(torques.map(|torques| Measured { torques, ..Measured::default() })));
+        let Change { before, after } = torques.over_joints();
+        return Ok(of([before, after].map(|torques| Measured { torques, ..Measured::default() })));
     }
     if *stated == Tolerance::default() {
         return Ok([false; 2]);
@@ -139,18 +138,18 @@ fn replayed<E: Evidence>(
 
 /// Root mean square of each joint's torque beyond the predicted one at two hypotheses [N m]; `None` where torques are no channel
 /// of their own.
-fn torque_rms(evidence: &impl Evidence, both: [&Residuals; 2]) -> Option<[Vec<f64>; 2]> {
+fn torque_rms(evidence: &impl Evidence, both: [&Residuals; 2]) -> Option<TorqueRms> {
     let sigma = evidence.torque_sigma()?;
-    Some(both.map(|residuals| {
+    let [before, after] = both.map(|residuals| {
         let of = |(channel, sigma): (usize, &f64)| {
             let rows = residuals.clips.iter().flat_map(|(clip, values)| evidence.rows(*clip).iter().zip(values));
-            let of_channel = rows.filter(|(row, _)| row.channel == channel).map(|(_, residual)| residual * sigma);
-            root_mean_square(&of_channel.collect::<Vec<_>>())
+            let squares: Vec<f64> = rows
+                .filter(|(row, _)| row.channel == channel)
+                .map(|(_, residual)| (residual * sigma).powi(2))
+                .collect();
+            (squares.iter().sum::<f64>() / squares.len().max(1) as f64).sqrt()
         };
         sigma.iter().enumerate().map(of).collect()
-    }))
-}
-
-fn root_mean_square(values: &[f64]) -> f64 {
-    (values.iter().map(|value| value * value).sum::<f64>() / values.len().max(1) as f64).sqrt()
+    });
+    Some(TorqueRms { before, after })
 }

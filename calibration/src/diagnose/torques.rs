@@ -5,19 +5,33 @@
 //! ([`ControllerKind::Tracking`]), and this torque is held against the measured one. Effects on the way of a command do not show;
 //! friction, payloads, base tilts and the like do, gains and delays or not.
 
+use nalgebra::{Matrix4, Vector4};
 use shared_mem::cell::{Cell, Controller, ControllerKind};
 use shared_mem::recording::{Clip, JointSeries};
+use shared_mem::theta::Theta;
 use twin::rollout::TICK_NS;
 
 /// Half the time over which motion is smoothed [ns], rows counting less the farther away they are: as a cubic over 80 ms alone
 /// would, that passes 10 Hz, and no arm is driven faster.
 const HALF_NS: u64 = 80_000_000;
-/// The same where stamps are uneven: what arrives a millisecond late at 1 rad/s is 1 mrad off, hundreds of times the encoder's noise.
+/// The same where stamps are uneven: what arrives a millisecond late at 1 rad/s is 1 mrad off, hundreds of times the encoder's
+/// noise.
 const UNEVEN_HALF_NS: u64 = 160_000_000;
 /// Stamps are uneven where more than this share of the steps differs from the usual one by more than a quarter of it.
 const UNEVEN: f64 = 0.02;
 /// Slow logs are smoothed over at least so many rows to either side: a cubic has four coefficients.
 const ROWS: u64 = 4;
+
+/// Whether the arm of a cell goes along what was measured, whatever its controller was.
+pub(super) fn is_tracking(cell: &Cell) -> bool {
+    cell.controller.as_ref().is_some_and(|law| law.kind == ControllerKind::Tracking)
+}
+
+/// What was found, without the gains of the law that kept the arm on its way: no robot has those. `given`: what was known before.
+pub(super) fn without_law(theta: Theta, given: Option<&Theta>) -> Theta {
+    Theta { arm: given.and_then(|given| given.arm.clone()), ..theta }
+}
+
 /// The cell whose arm goes where it was measured; `None` where cell.toml has no controller, or only joints without bodies, of
 /// which no torque can be predicted.
 pub(super) fn cell(cell: &Cell) -> Option<Cell> {
@@ -34,8 +48,8 @@ pub(super) fn cell(cell: &Cell) -> Option<Cell> {
     Some(Cell { controller: Some(controller), ..cell.clone() })
 }
 
-/// A clip whose command is its own measured motion, smoothed; `None` where it is too short for that. Its ends, where a fit has rows on one side
-/// only, are left out.
+/// A clip whose command is its own measured motion, smoothed; `None` where it is too short for that. Its ends, where a fit has
+/// rows on one side only, are left out.
 pub(super) fn followed(mut clip: Clip) -> Option<Clip> {
     let measured = &clip.measured;
     let (first, last) = (*measured.stamps_ns.first()?, *measured.stamps_ns.last()?);
@@ -76,36 +90,40 @@ fn smoothed(measured: &JointSeries, at_ns: &[u64], half: u64) -> JointSeries {
         end += stamps[end..].partition_point(|stamp| *stamp <= at + half);
         let times: Vec<f64> =
             stamps[begin..end].iter().map(|stamp| (*stamp as f64 - *at as f64) / half as f64).collect();
+        let shares = cubic(&times);
         for joint in 0..dof {
-            let values = (begin..end).map(|row| measured.q[row * dof + joint]);
-            let [q, slope] = cubic(&times, values);
-            out.q.push(q);
+            // Positions far from 0 would cost digits.
+            let middle = measured.q[begin * dof + joint];
+            let (mut q, mut slope) = (0.0, 0.0);
+            for (row, [value, rate]) in (begin..end).zip(&shares) {
+                let away = measured.q[row * dof + joint] - middle;
+                (q, slope) = (q + value * away, slope + rate * away);
+            }
+            out.q.push(middle + q);
             out.dq.push(slope / (half as f64 * 1e-9));
         }
     }
     out
 }
 
-/// Value and slope at 0 of the cubic that fits values best, weighted by the tricube of their distance (Cleveland 1979): rows that
-/// come and go at the ends with full weight would make the motion jerk.
-fn cubic(times: &[f64], values: impl Iterator<Item = f64> + Clone) -> [f64; 2] {
-    let mut normal = nalgebra::Matrix4::<f64>::zeros();
-    let mut right = nalgebra::Vector4::<f64>::zeros();
-    // Positions far from 0 would cost digits.
-    let middle = values.clone().next().unwrap_or_default();
-    for (t, value) in times.iter().zip(values) {
-        let powers = nalgebra::Vector4::new(1.0, *t, t * t, t * t * t);
-        let weight = (1.0 - t.abs().powi(3)).max(0.0).powi(3);
-        normal += weight * powers * powers.transpose();
-        right += weight * powers * (value - middle);
-    }
-    let fit = normal.cholesky().map_or_else(nalgebra::Vector4::zeros, |normal| normal.solve(&right));
-    [middle + fit[0], fit[1]]
+/// What each row adds to value and slope at 0 of the cubic that fits best, rows weighted by the tricube of their distance
+/// (Cleveland 1979): with full weight those that come and go at the ends would make the motion jerk.
+fn cubic(times: &[f64]) -> Vec<[f64; 2]> {
+    let powers = |t: f64| Vector4::new(1.0, t, t * t, t * t * t);
+    let weight = |t: f64| (1.0 - t.abs().powi(3)).max(0.0).powi(3);
+    let normal: Matrix4<f64> = times.iter().map(|t| weight(*t) * powers(*t) * powers(*t).transpose()).sum();
+    let inverse = normal.cholesky().map_or_else(Matrix4::zeros, |normal| normal.inverse());
+    let share = |t: &f64| {
+        let fit = weight(*t) * inverse * powers(*t);
+        [fit[0], fit[1]]
+    };
+    times.iter().map(share).collect()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use shared_mem::theta::ArmTheta;
 
     #[test]
     fn a_cubic_motion_is_followed_exactly_and_noise_averages_out() {
@@ -125,5 +143,13 @@ mod tests {
             assert!((out.q[0] - position(0.5)).abs() < close[0], "{}", out.q[0] - position(0.5));
             assert!((out.dq[0] - slope).abs() < close[1], "{}", out.dq[0] - slope);
         }
+    }
+
+    #[test]
+    fn gains_of_the_law_that_keeps_the_arm_on_its_way_are_no_finding() {
+        let found = Theta { arm: Some(ArmTheta { stiffness: vec![9e4], damping: vec![600.0] }), ..Theta::default() };
+        assert_eq!(without_law(found.clone(), None).arm, None);
+        let known = Theta { arm: Some(ArmTheta { stiffness: vec![500.0], damping: vec![40.0] }), ..Theta::default() };
+        assert_eq!(without_law(found, Some(&known)).arm, known.arm);
     }
 }

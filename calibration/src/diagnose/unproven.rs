@@ -5,7 +5,7 @@ use super::combine::{Found, PLAIN, Trial, convincing};
 use super::evidence::Evidence;
 use super::fit::{Bench, Hypothesis};
 
-/// An effect in the balance.
+/// An effect that is likely, and not proven.
 pub(super) struct Unproven<'a> {
     /// The trial of it.
     pub(super) trial: &'a Trial,

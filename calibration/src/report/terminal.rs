@@ -9,7 +9,7 @@ use super::scale::span;
 use super::share::{limited, percent, percent_interval};
 use crate::benchmark::score::Scores;
 use crate::diagnose::confidence::MOST;
-use crate::diagnose::{Candidate, Diagnosis, Status};
+use crate::diagnose::{Candidate, Diagnosis, Status, TorqueRms};
 
 /// Places of the gap that are named.
 const SHOWN_PLACES: usize = 3;
@@ -105,8 +105,13 @@ fn gap(diagnosis: &Diagnosis) -> Vec<String> {
         let shrink = percent_interval(nearest.shrink.value, nearest.shrink.ci90);
         lines.push(format!("nearest: {}, shrink {shrink}, leaves more than a cause does", together(&nearest.effects)));
     }
-    let human =
-        [("joints", "rad", gap.joint_rms_rad), ("ADD", "m", gap.object_add_m), ("ADD-S", "m", gap.object_add_s_m)];
+    let torques = gap.torque_rms.as_ref().map(TorqueRms::over_joints).unwrap_or_default();
+    let human = [
+        ("joints", "rad", gap.joint_rms_rad),
+        ("torques", "N m", torques),
+        ("ADD", "m", gap.object_add_m),
+        ("ADD-S", "m", gap.object_add_s_m),
+    ];
     for (name, si, change) in human {
         if let (Some(before), Some(after)) = (change.before, change.after) {
             lines.push(format!("{name}: {}", arrow(&Unit::suited(si, before), before, after)));

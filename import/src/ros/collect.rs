@@ -9,7 +9,7 @@ use crate::naming;
 use std::collections::{BTreeMap, HashMap};
 use std::rc::Rc;
 
-/// Publishers, or transforms, of one topic that are told apart.
+/// Publishers, or transforms, of one topic that are read separately.
 const MOST_LAYOUTS: usize = 64;
 
 /// Why a topic is left out.

@@ -196,7 +196,11 @@ fn identify_kept(
 ///
 /// # Errors
 /// [`ArmError`] when the arm cannot be simulated at all.
-pub fn begun(cell: &Cell, clips: Vec<Clip>, base: &Theta, interrupt: &Interrupt) -> Result<Theta, ArmError> {
+pub fn begun(cell: &Cell, clips: &[&Clip], base: &Theta, interrupt: &Interrupt) -> Result<Theta, ArmError> {
+    if !start::is_ranged(cell) {
+        return Ok(base.clone());
+    }
+    let clips = clips.iter().map(|clip| (*clip).clone()).collect();
     let (settings, mut unknowns): (Vec<_>, Vec<_>) = gains(cell, base).into_iter().unzip();
     let settings = Settings::new(base.clone(), settings);
     let numbers: Numbers<'_> = Box::new(|shared| settings.theta(shared));

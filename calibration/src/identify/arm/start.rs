@@ -34,8 +34,7 @@ pub(super) fn improve(
     unknowns: &mut [Unknown],
     interrupt: &Interrupt,
 ) {
-    let controller = cell.controller.as_ref();
-    let ranged = controller.is_some_and(|c| c.stiffness_range.is_some() || c.damping_range.is_some());
+    let ranged = is_ranged(cell);
     let delayed = settings.iter().any(is_delay);
     if !ranged && !delayed {
         return;
@@ -53,6 +52,12 @@ pub(super) fn improve(
         })
         .collect();
     choose(model.arm().dof(), &all, settings, unknowns);
+}
+
+/// Whether cell.toml knows gains by range alone.
+pub(super) fn is_ranged(cell: &Cell) -> bool {
+    let controller = cell.controller.as_ref();
+    controller.is_some_and(|law| law.stiffness_range.is_some() || law.damping_range.is_some())
 }
 
 fn is_delay(setting: &Setting) -> bool {

@@ -1,7 +1,7 @@
 //! The gap in numbers: before, after, and what noise alone leaves.
 
 use super::has_effects;
-use crate::diagnose::Diagnosis;
+use crate::diagnose::{Diagnosis, TorqueRms};
 use crate::report::figure::bars::{Row, bars};
 use crate::report::frame::legend;
 use maud::{Markup, html};
@@ -32,8 +32,10 @@ pub(super) fn picture(diagnosis: &Diagnosis) -> Markup {
         values: values(gap.before, gap.after),
         floor: Some(gap.floor),
     }];
+    let torques = gap.torque_rms.as_ref().map(TorqueRms::over_joints).unwrap_or_default();
     let human = [
         ("joints, RMS", "rad", gap.joint_rms_rad),
+        ("torques, RMS", "N m", torques),
         ("object, ADD", "m", gap.object_add_m),
         ("object, ADD-S", "m", gap.object_add_s_m),
     ];
