@@ -2,6 +2,7 @@
 //! makes commands that can be typed of what an advice asks for.
 
 use super::advice::{Advice, Capture};
+use super::torques::is_tracking;
 use crate::capture::body::Body;
 use crate::capture::session::number_of;
 use crate::capture::{limits, pace, recorded};
@@ -27,6 +28,8 @@ pub struct Site {
     clips: Vec<usize>,
     /// The largest factor at which the first of them can be played.
     fastest: f64,
+    /// Whether torques along the measured motion are asked about.
+    torques: bool,
 }
 
 impl Site {
@@ -51,7 +54,7 @@ impl Site {
                 }
             }
         }
-        Self::new(&session.folder, strokes, clips, fastest)
+        Self { torques: is_tracking(&session.cell), ..Self::new(&session.folder, strokes, clips, fastest) }
     }
 
     /// Of a session in `folder` with clips that can be repeated, the first of them `fastest` times as fast at most.
@@ -59,7 +62,7 @@ impl Site {
     pub fn new(folder: &Path, strokes: bool, clips: Vec<usize>, fastest: f64) -> Self {
         let folder = folder.display().to_string();
         let folder = if folder.len() > 1 { folder.trim_end_matches('/').to_owned() } else { folder };
-        Self { folder, strokes, clips, fastest }
+        Self { folder, strokes, clips, fastest, torques: false }
     }
 
     /// Whether its clips are strokes.
@@ -141,7 +144,8 @@ impl Site {
         for (end, page) in [("_arm", "report_arm.html"), ("_strokes", "report_strokes.html"), ("", "report.html")] {
             let folder = quoted(&format!("{}{end}", self.folder));
             if commands.iter().any(|command| command.contains(&format!("--out {folder} "))) {
-                commands.push(format!("calibration diagnose {folder} --report {page}"));
+                let torques = if self.torques { " --torques" } else { "" };
+                commands.push(format!("calibration diagnose {folder}{torques} --report {page}"));
             }
         }
         Advice { sentence, commands }
@@ -173,6 +177,13 @@ fn capture_into(verb: &str, cell: &str, folder: &str, rest: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_question_about_torques_is_asked_again() {
+        let site = Site { torques: true, ..Site::new(Path::new("bags"), false, Vec::new(), 1.0) };
+        let advice = site.more("Record more.".into(), 4);
+        assert_eq!(advice.commands[1], "calibration diagnose bags --torques --report report.html");
+    }
 
     #[test]
     fn where_nothing_can_be_repeated_new_clips_take_its_place() {

@@ -44,11 +44,10 @@ pub(super) fn picture(diagnosis: &Diagnosis) -> Markup {
             rows.push(Row { name, unit, values: values(before, after), floor: None });
         }
     }
-    let entries = [
-        ("before", "baseline: gains and object identified"),
-        ("after", "with the effect"),
-        ("floor", "what noise alone leaves"),
-    ];
+    let along_measured = gap.torque_rms.is_some();
+    let baseline =
+        if along_measured { "baseline: the model of cell.toml" } else { "baseline: gains and object identified" };
+    let entries = [("before", baseline), ("after", "with the effect"), ("floor", "what noise alone leaves")];
     html! {
         @if both { (legend(&entries)) } @else { (legend(&[entries[0], entries[2]])) }
         (bars(&["before", "after"], &rows))
