@@ -12,6 +12,7 @@
 //! | [`estimate`] | fits over clips: what all clips share, what varies from clip to clip |
 //! | [`forward`] | what the twin makes of recorded clips, as residuals |
 //! | [`identify`] | the parameters that a session tells, and what it cannot tell |
+//! | [`model`] | what was found as a model file of MuJoCo, ROS or Gazebo |
 //! | [`report`] | pages with plots |
 //! | [`viewpoint`] | the camera's pose from pictures of the robot |
 //! | [`typed`] | commands as they are typed |
@@ -53,6 +54,7 @@ pub mod identify;
 pub mod interrupt;
 pub mod kept;
 pub mod keys;
+pub mod model;
 pub mod processes;
 pub mod report;
 pub mod seed;

@@ -61,6 +61,18 @@ pub struct EffectTheta {
     pub parameters: BTreeMap<String, toml::Value>,
 }
 
+impl EffectTheta {
+    /// The numbers of a parameter, one or many; `None` where it is not given or is none.
+    #[must_use]
+    pub fn numbers(&self, parameter: &str) -> Option<Vec<f64>> {
+        let number = |value: &toml::Value| value.as_float().or_else(|| value.as_integer().map(|i| i as f64));
+        match self.parameters.get(parameter)? {
+            toml::Value::Array(all) => all.iter().map(number).collect(),
+            single => number(single).map(|number| vec![number]),
+        }
+    }
+}
+
 impl Theta {
     /// Reads a theta.toml.
     ///

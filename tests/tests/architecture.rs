@@ -60,7 +60,7 @@ fn each_big_dependency_has_one_door() {
         ("mcap", &["shared_mem/src/recording/"]),
         ("parry3d_f64", &["twin/src/physics/"]),
         ("urdf_rs", &["twin/src/arm/urdf.rs"]),
-        ("quick_xml", &["urdf/src/"]),
+        ("quick_xml", &["urdf/src/", "calibration/src/model/xml.rs"]),
         ("foxglove", &["twin/src/viewer", "shared_mem/src/recording/"]),
         ("franka", &["rt_bridge/src/fr3/", "rt_bridge/src/serve/"]),
         ("serialport", &["rt_bridge/src/gripper/robotiq/port.rs"]),

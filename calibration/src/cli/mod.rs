@@ -6,6 +6,7 @@ mod check;
 mod compare;
 mod demo;
 mod export;
+mod export_model;
 mod identify;
 mod import;
 mod viewpoint;
@@ -33,6 +34,7 @@ Examples:
   calibration viewpoint session --out cell.toml --report outline.png
   calibration import last_week --out session
   calibration export session --to ros2 --out bags
+  calibration export-model theta.toml --cell cell.toml --to mjcf --out cell.xml
 Every verb has its own --help with an example. Logs and progress go to stderr (RUST_LOG=debug for more)."
 )]
 pub(crate) struct Arguments {
@@ -62,6 +64,8 @@ enum Verb {
     Import(import::ImportArguments),
     /// Writes a session as ROS 2 bags, TwinAligner clip folders or own clips.
     Export(export::ExportArguments),
+    /// Writes what was found as a model of MuJoCo, ROS or Gazebo, to run or to bring your own model up to date with.
+    ExportModel(export_model::ExportModelArguments),
     /// The whole story on the simulated cell: shadow, record, replay, explain.
     Demo(demo::DemoArguments),
 }
@@ -104,6 +108,7 @@ fn run_to_the_end(verb: Verb, interrupt: &Interrupt) -> anyhow::Result<()> {
         Verb::Viewpoint(arguments) => viewpoint::run(*arguments),
         Verb::Import(arguments) => import::run(&arguments),
         Verb::Export(arguments) => export::run(&arguments),
+        Verb::ExportModel(arguments) => export_model::run(&arguments),
         Verb::Capture(_) | Verb::Demo(_) | Verb::Benchmark(_) => Ok(()),
     }
 }

@@ -24,13 +24,7 @@ pub fn of(verdict: &Verdict, theta: &Theta, cell: &Cell) -> Vec<Remedy> {
     }
     let remedy = |name: &String| {
         let block = theta.effects.iter().find(|block| block.name == *name)?;
-        let numbers = |parameter: &str| {
-            let number = |value: &toml::Value| value.as_float().or_else(|| value.as_integer().map(|i| i as f64));
-            match block.parameters.get(parameter)? {
-                toml::Value::Array(all) => all.iter().map(number).collect(),
-                single => number(single).map(|number| vec![number]),
-            }
-        };
+        let numbers = |parameter: &str| block.numbers(parameter);
         let twin::effects::Remedy { in_cell, in_model } = find(name)?.remedy(cell, &numbers);
         Some(Remedy { effect: name.clone(), in_cell, in_model })
     };

@@ -95,6 +95,15 @@ impl TenParameters {
         Self { mass: m, moment: (c * m).into(), inertia: [i(0, 0), i(1, 1), i(2, 2), i(0, 1), i(0, 2), i(1, 2)] }
     }
 
+    /// Back to the centre of mass.
+    pub(super) fn properties(&self) -> MassProperties {
+        let (m, [xx, yy, zz, xy, xz, yz]) = (self.mass, self.inertia);
+        let centre = if m > 0.0 { Vector3::from(self.moment) / m } else { Vector3::zeros() };
+        let moved = m * (Matrix3::identity() * centre.norm_squared() - centre * centre.transpose());
+        let about_origin = MassProperties::new(m, centre.into(), [xx, yy, zz, xy, xz, yz]);
+        MassProperties { inertia: about_origin.inertia - moved, ..about_origin }
+    }
+
     /// The body seen from the base, when its frame lies there at rotation `r` and origin `p`.
     #[inline(always)]
     pub(super) fn seen_from_base(&self, r: &Rot3, p: Vec3) -> Self {

@@ -241,6 +241,16 @@ impl ArmModel {
         self.link_names.iter().map(String::as_str).zip(turned)
     }
 
+    /// Name of the link behind each joint.
+    pub(super) fn link_names(&self) -> &[String] {
+        &self.link_names
+    }
+
+    /// The frame of each joint here in that of its source.
+    pub(super) fn turns(&self) -> &[UnitQuaternion<f64>] {
+        &self.turns
+    }
+
     /// Movable joints of the URDF that are no joints of the arm, by name: fingers and the like, which are held where they are at
     /// 0, or as near to it as their limits allow.
     #[must_use]

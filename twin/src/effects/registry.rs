@@ -1,6 +1,7 @@
 //! What an effect says about itself, and the list of all effects. The list is the single place that knows them all:
 //! theta.toml is read by it, the diagnosis takes its candidates from it, the documentation its table.
 
+use super::change::Change;
 use super::remedy::{Found, Remedy};
 use super::{Effects, arm, camera, hit, slide, values::Values};
 
@@ -147,6 +148,8 @@ pub struct EffectInfo {
     pub(super) install: fn(&Values, &mut Effects),
     /// What to do about it; asked for by [`EffectInfo::remedy`].
     pub(super) remedy: fn(&Found<'_>) -> Remedy,
+    /// What it changes in a model; asked for by [`EffectInfo::changes`].
+    pub(super) model: fn(&Found<'_>) -> Vec<Change>,
 }
 
 impl Stage {

@@ -31,7 +31,7 @@ impl EffectInfo {
     /// resting value.
     #[must_use]
     pub fn remedy(&'static self, cell: &Cell, numbers: &dyn Fn(&str) -> Option<Vec<f64>>) -> Remedy {
-        (self.remedy)(&Found { effect: self, numbers, cell })
+        (self.remedy)(&Found::new(self, numbers, cell))
     }
 }
 
@@ -41,7 +41,15 @@ impl Remedy {
     }
 }
 
-impl Found<'_> {
+impl<'a> Found<'a> {
+    pub(super) fn new(
+        effect: &'static EffectInfo,
+        numbers: &'a dyn Fn(&str) -> Option<Vec<f64>>,
+        cell: &'a Cell,
+    ) -> Self {
+        Self { effect, numbers, cell }
+    }
+
     /// The cell it was found in.
     pub(super) fn cell(&self) -> &Cell {
         self.cell

@@ -117,6 +117,18 @@ impl Press {
 }
 
 impl ContactMotion {
+    /// Of the undamped oscillation [rad/s].
+    #[must_use]
+    pub fn frequency(&self) -> f64 {
+        self.frequency
+    }
+
+    /// Damping over the critical one.
+    #[must_use]
+    pub fn damping_ratio(&self) -> f64 {
+        self.damping_ratio
+    }
+
     /// A step that follows the contact: a twentieth of its duration [s].
     #[must_use]
     pub fn step(&self) -> f64 {

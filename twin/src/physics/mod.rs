@@ -8,6 +8,7 @@
 mod convert;
 pub mod hit;
 mod impulses;
+mod outline;
 mod push;
 mod shape;
 mod surface;
@@ -15,6 +16,7 @@ mod table_object;
 pub mod touch;
 mod tumble;
 
+pub use outline::Outline;
 pub use shape::FlatMesh;
 pub use surface::Surface;
 pub use table_object::{ObjectMotion, TableObject};

@@ -7,6 +7,7 @@
 //! - Confused with: payload, friction asymmetry, torque gain.
 
 use crate::arm::ArmModel;
+use crate::effects::change::Change;
 use crate::effects::registry::{EffectInfo, Parameter, Place, Stage};
 use crate::effects::remedy::{Remedy, gravity, leaning, list};
 use nalgebra::Vector3;
@@ -32,6 +33,7 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
             ),
         )
     },
+    model: |found| vec![Change::ArmGravity(gravity(found.vector("tilt")))],
 };
 
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -6,6 +6,7 @@
 //! - Signature (C13): phase lag linear in frequency, no change of gain; error of about `delay dq`.
 //! - Confused with: command lag (in slow motion exactly), viscous friction, camera latency (where only the camera sees the arm).
 
+use crate::effects::change::Change;
 use crate::effects::registry::{EffectInfo, Parameter, Place, Stage};
 use crate::effects::remedy::{Remedy, milliseconds, short};
 
@@ -26,6 +27,7 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
             format!("Hold commands back by {time}, {steps} steps of 1 ms, before the controller gets them."),
         )
     },
+    model: |found| vec![Change::CommandDelay(found.number("delay"))],
 };
 
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -7,6 +7,7 @@
 //! - Confused with: command delay (in slow motion exactly; a chirp to 10 Hz tells by the gain).
 
 use crate::arm::Joints;
+use crate::effects::change::Change;
 use crate::effects::registry::{EffectInfo, Parameter, Place, Stage};
 use crate::effects::remedy::{Remedy, milliseconds, short};
 use crate::rollout::TICK;
@@ -36,6 +37,7 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
             ),
         )
     },
+    model: |found| vec![Change::CommandLag(found.number("time_constant"))],
 };
 
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -9,6 +9,7 @@
 //! - Confused with: Coulomb and Stribeck friction; a load that keeps one flank pressed makes it vanish.
 
 use crate::arm::{Joints, Spring};
+use crate::effects::change::Change;
 use crate::effects::registry::{EffectInfo, Parameter, Place, Stage};
 use crate::effects::remedy::{Remedy, degrees, short};
 
@@ -40,6 +41,7 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
             format!("A second hinge between motor and link that turns freely from {half} and is stopped there."),
         )
     },
+    model: |_| vec![Change::Beyond("play between motor and link")],
 };
 
 /// Damping of a flank [N m s/rad]: links part again with little speed.

@@ -9,6 +9,7 @@
 //! - Confused with: load friction (alike in one pose), backlash (lost motion too), Stribeck friction (needs creep).
 
 use crate::arm::Joints;
+use crate::effects::change::Change;
 use crate::effects::registry::{EffectInfo, Elsewhere, Parameter, Place, Search, Stage};
 use crate::effects::remedy::Remedy;
 
@@ -35,6 +36,7 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
             format!("MuJoCo: joint frictionloss {joints}. URDF and SDF: the same numbers as <dynamics friction>."),
         )
     },
+    model: |found| vec![Change::DryFriction { level: found.all("coulomb"), creep: found.all("creep") }],
 };
 
 #[derive(Debug, Clone, Copy, PartialEq)]

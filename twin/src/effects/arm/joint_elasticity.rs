@@ -9,6 +9,7 @@
 //! - Confused with: payload and camera extrinsics (static sag), torque delay (rings too), rotor inertia below resonance.
 
 use crate::arm::{Joints, Spring};
+use crate::effects::change::Change;
 use crate::effects::registry::{EffectInfo, Elsewhere, Parameter, Place, Stage};
 use crate::effects::remedy::Remedy;
 
@@ -37,6 +38,7 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
             ),
         )
     },
+    model: |_| vec![Change::Beyond("a spring between motor and link")],
 };
 
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -7,6 +7,7 @@
 //! - Confused with: camera extrinsics, tool offset, joint elasticity (follows the load).
 
 use crate::arm::Joints;
+use crate::effects::change::Change;
 use crate::effects::registry::{EffectInfo, Parameter, Place, Stage};
 use crate::effects::remedy::{Remedy, degrees, short};
 
@@ -26,6 +27,7 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
             format!("Add to the measured joint positions {reads}; the simulated joints themselves stay."),
         )
     },
+    model: |found| vec![Change::EncoderOffset(found.all("offset"))],
 };
 
 #[derive(Debug, Clone, Copy, PartialEq)]

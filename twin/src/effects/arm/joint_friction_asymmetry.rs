@@ -10,6 +10,7 @@
 //! - Confused with: payload and base tilt (even as well, but follow the pose), torque sensor bias (leaves the motion alone).
 
 use crate::arm::Joints;
+use crate::effects::change::Change;
 use crate::effects::registry::{EffectInfo, Elsewhere, Parameter, Place, Stage};
 use crate::effects::remedy::{Remedy, with_unit};
 
@@ -35,6 +36,12 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
             format!("Add to the commanded torque {offset} as a feed-forward; look for a cable or hose that pulls."),
             format!("MuJoCo: a constant joint force (qfrc_applied) of {force}. URDF has no word for it."),
         )
+    },
+    model: |found| {
+        if found.number("fading") > 0.0 {
+            return vec![Change::Beyond("friction that differs between the two directions, and is the same at rest")];
+        }
+        vec![Change::ConstantTorque(found.all("offset").into_iter().map(|offset| -offset).collect())]
     },
 };
 

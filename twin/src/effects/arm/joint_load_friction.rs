@@ -10,6 +10,7 @@
 
 use super::joint_coulomb_friction::CREEP;
 use crate::arm::Joints;
+use crate::effects::change::Change;
 use crate::effects::registry::{EffectInfo, Elsewhere, Parameter, Place, Stage};
 use crate::effects::remedy::Remedy;
 
@@ -38,6 +39,7 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
             ),
         )
     },
+    model: |_| vec![Change::Beyond("dry friction that follows the torque")],
 };
 
 #[derive(Debug, Clone, Copy, PartialEq)]

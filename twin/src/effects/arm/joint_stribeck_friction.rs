@@ -10,6 +10,7 @@
 
 use super::joint_coulomb_friction::CREEP;
 use crate::arm::Joints;
+use crate::effects::change::Change;
 use crate::effects::registry::{EffectInfo, Elsewhere, Parameter, Place, Stage};
 use crate::effects::remedy::Remedy;
 
@@ -51,6 +52,12 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
                  -excess exp(-(dq / v)^2) sgn(dq), with an excess of {excess} and v of {velocity}. URDF: <dynamics friction> holds the first part alone."
             ),
         )
+    },
+    model: |found| {
+        vec![
+            Change::DryFriction { level: found.all("coulomb"), creep: found.all("creep") },
+            Change::Beyond("what dry friction has more of at creep"),
+        ]
     },
 };
 

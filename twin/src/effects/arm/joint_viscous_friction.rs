@@ -9,6 +9,7 @@
 //!   delay (takes damping away), command delay.
 
 use crate::arm::Joints;
+use crate::effects::change::Change;
 use crate::effects::registry::{EffectInfo, Elsewhere, Parameter, Place, Stage};
 use crate::effects::remedy::Remedy;
 
@@ -31,6 +32,7 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
             format!("MuJoCo: add to the joint damping {joints}. URDF and SDF: the same numbers as <dynamics damping>."),
         )
     },
+    model: |found| vec![Change::Damping(found.all("viscous"))],
 };
 
 #[derive(Debug, Clone, Copy, PartialEq)]

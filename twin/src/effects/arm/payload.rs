@@ -7,6 +7,7 @@
 //! - Confused with: torque gain, friction asymmetry (the same in every pose), base tilt.
 
 use crate::arm::{ArmModel, MassProperties};
+use crate::effects::change::Change;
 use crate::effects::registry::{EffectInfo, Elsewhere, Parameter, Place, Stage};
 use crate::effects::remedy::{Remedy, list, short};
 
@@ -43,6 +44,7 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
             ),
         )
     },
+    model: |found| vec![Change::FlangeLoad { mass: found.number("mass"), centre: found.vector("centre") }],
 };
 
 #[derive(Debug, Clone, Copy, PartialEq)]

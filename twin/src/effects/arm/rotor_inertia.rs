@@ -8,6 +8,7 @@
 //! - Confused with: payload (depends on the pose), joint elasticity, a stiffness at one frequency.
 
 use crate::arm::{ArmModel, Joints};
+use crate::effects::change::Change;
 use crate::effects::registry::{EffectInfo, Elsewhere, Parameter, Place, Stage};
 use crate::effects::remedy::{Remedy, list};
 
@@ -34,6 +35,7 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
             format!("MuJoCo: add to the joint armature {joints}. URDF has no word for it."),
         )
     },
+    model: |found| vec![Change::Armature(found.all("extra"))],
 };
 
 #[derive(Debug, Clone, Copy, PartialEq)]

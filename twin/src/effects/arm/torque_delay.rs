@@ -6,6 +6,7 @@
 //! - Signature (C14): less damping, ringing after fast motion; nothing at rest.
 //! - Confused with: a lower damping, viscous friction (adds what this takes), joint elasticity (rings too).
 
+use crate::effects::change::Change;
 use crate::effects::registry::{EffectInfo, Parameter, Place, Stage};
 use crate::effects::remedy::{Remedy, milliseconds, short};
 
@@ -27,6 +28,7 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
             format!("Hold torques back by {} between controller and joints.", milliseconds(delay)),
         )
     },
+    model: |_| vec![Change::Beyond("torque that comes later than the control law asks for it")],
 };
 
 #[derive(Debug, Clone, Copy, PartialEq)]

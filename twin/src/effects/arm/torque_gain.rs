@@ -7,6 +7,7 @@
 //! - Confused with: payload, and a stiffness where gravity does not act.
 
 use crate::arm::Joints;
+use crate::effects::change::Change;
 use crate::effects::registry::{EffectInfo, Parameter, Place, Stage};
 use crate::effects::remedy::{Remedy, short};
 
@@ -25,6 +26,7 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
             format!("Multiply the torque of each actuator by {gain} (MuJoCo: gear)."),
         )
     },
+    model: |found| vec![Change::TorqueGain(found.all("gain"))],
 };
 
 #[derive(Debug, Clone, Copy, PartialEq)]

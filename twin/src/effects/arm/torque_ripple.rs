@@ -8,6 +8,7 @@
 //! - Confused with: joint elasticity (a fixed frequency), noise.
 
 use crate::arm::Joints;
+use crate::effects::change::Change;
 use crate::effects::registry::{EffectInfo, Elsewhere, Parameter, Place, Search, Stage};
 use crate::effects::remedy::Remedy;
 use std::f64::consts::{FRAC_PI_2, PI};
@@ -50,6 +51,7 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
             ),
         )
     },
+    model: |_| vec![Change::Beyond("torque that varies with the position")],
 };
 
 #[derive(Debug, Clone, Copy, PartialEq)]

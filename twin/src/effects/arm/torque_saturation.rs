@@ -7,6 +7,7 @@
 //! - Confused with: torque gain (acts at every torque), command delay (in fast motion).
 
 use crate::arm::Joints;
+use crate::effects::change::Change;
 use crate::effects::registry::{EffectInfo, Elsewhere, Parameter, Place, Search, Stage};
 use crate::effects::remedy::Remedy;
 
@@ -30,6 +31,7 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
             format!("MuJoCo: forcerange of the actuators {limit} either way. URDF: <limit effort>."),
         )
     },
+    model: |found| vec![Change::TorqueLimit(found.all("limit"))],
 };
 
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -7,6 +7,7 @@
 //! - Confused with: friction asymmetry and payload (change the motion).
 
 use crate::arm::Joints;
+use crate::effects::change::Change;
 use crate::effects::registry::{EffectInfo, Elsewhere, Parameter, Place, Stage};
 use crate::effects::remedy::Remedy;
 
@@ -26,6 +27,7 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
             format!("Add to the measured torques {bias}; the motion stays as it is."),
         )
     },
+    model: |_| vec![Change::Beyond("zeros of the torque sensors, which move nothing")],
 };
 
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -9,6 +9,7 @@
 //! - Signature (V1): poses at rest are wrong too, by as much more as they are further away; all clips alike.
 //! - Confused with: table tilt (a yaw bends nothing), encoder offset, tool offset.
 
+use crate::effects::change::Change;
 use crate::effects::registry::{EffectInfo, Parameter, Place, Search, Stage};
 use crate::effects::remedy::{Remedy, list, short};
 use nalgebra::{Isometry3, Rotation3, UnitQuaternion, Vector3};
@@ -56,6 +57,7 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
             ),
         )
     },
+    model: |found| vec![Change::CameraTurn { rotation: found.vector("rotation"), centre: found.vector("centre") }],
 };
 
 #[derive(Debug, Clone, Copy, PartialEq)]

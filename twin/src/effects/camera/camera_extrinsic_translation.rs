@@ -6,6 +6,7 @@
 //! - Signature (V1): every pose is off by the same, at rest too.
 //! - Confused with: encoder offset, tool offset, a rotation seen over a small table.
 
+use crate::effects::change::Change;
 use crate::effects::registry::{EffectInfo, Parameter, Place, Stage};
 use crate::effects::remedy::{Remedy, list};
 use nalgebra::{Isometry3, Vector3};
@@ -35,6 +36,7 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
             format!("Nothing in the cell's model; a simulated camera reports poses shifted by {} m.", list(&shift)),
         )
     },
+    model: |found| vec![Change::CameraShift(found.vector("translation"))],
 };
 
 #[derive(Debug, Clone, Copy, PartialEq)]

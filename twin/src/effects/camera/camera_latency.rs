@@ -6,6 +6,7 @@
 //! - Signature (V4): error of `latency v`, none at rest; contact seems late.
 //! - Confused with: command delay (moves the contact too), tracker smoothing.
 
+use crate::effects::change::Change;
 use crate::effects::registry::{EffectInfo, Parameter, Place, Stage};
 use crate::effects::remedy::{Remedy, milliseconds, short};
 
@@ -30,6 +31,7 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
             format!("Report poses {} later, or shift the recorded ones by so much.", milliseconds(latency)),
         )
     },
+    model: |found| vec![Change::PoseLatency(found.number("latency"))],
 };
 
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -8,6 +8,7 @@
 //! - Signature (V2): in proportion to the distance, at rest too; speeds and decelerations grow alike.
 //! - Confused with: restitution and friction together, an extrinsic translation where the object hardly moves.
 
+use crate::effects::change::Change;
 use crate::effects::registry::{EffectInfo, Parameter, Place, Search, Stage};
 use crate::effects::remedy::{Remedy, short};
 use nalgebra::{Isometry3, Vector3};
@@ -36,6 +37,7 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
             format!("Nothing in the cell's model; a simulated camera reports lengths times {factor}."),
         )
     },
+    model: |_| vec![Change::Beyond("a factor on the lengths that the tracker reports")],
 };
 
 #[derive(Debug, Clone, Copy, PartialEq)]

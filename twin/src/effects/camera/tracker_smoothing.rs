@@ -6,6 +6,7 @@
 //! - Signature (V10): lags in motion, rounds the corner at the impact and the stop; none at rest.
 //! - Confused with: camera latency (no rounding), command lag, contact compliance.
 
+use crate::effects::change::Change;
 use crate::effects::registry::{EffectInfo, Parameter, Place, Stage};
 use crate::effects::remedy::{Remedy, milliseconds};
 use nalgebra::Isometry3;
@@ -28,6 +29,7 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
             ),
         )
     },
+    model: |_| vec![Change::Beyond("a low-pass in the tracker")],
 };
 
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -6,6 +6,7 @@
 //! - Signature (H8): extra impulse from the controller, which depends on its gains and on the follow-through.
 //! - Confused with: restitution, tip friction, tracker smoothing (softens the corner at impact too).
 
+use crate::effects::change::Change;
 use crate::effects::registry::{EffectInfo, Parameter, Place, Stage};
 use crate::effects::remedy::{Remedy, short};
 use crate::physics::hit::ContactLaw;
@@ -34,6 +35,7 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
             ),
         )
     },
+    model: |found| vec![Change::Compliance(found.number("compliance"))],
 };
 
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -6,6 +6,7 @@
 //! - Signature (H11): less or more spin after an off-centre hit, and a spin that lasts longer or shorter.
 //! - Confused with: tool offset and tip friction (spin after the hit), pressure distribution (decay of spin).
 
+use crate::effects::change::Change;
 use crate::effects::registry::{EffectInfo, Parameter, Place, Stage};
 use crate::effects::remedy::{Remedy, short};
 
@@ -25,6 +26,7 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
             format!("Multiply the object's inertia about its z axis (izz) by {factor}."),
         )
     },
+    model: |found| vec![Change::YawInertia(found.number("factor"))],
 };
 
 #[derive(Debug, Clone, Copy, PartialEq)]

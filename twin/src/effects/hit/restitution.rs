@@ -6,6 +6,7 @@
 //! - Signature (H1): the same ratio of speeds after and before at all speeds.
 //! - Confused with: the object's mass and inertia, contact compliance (depends on speed and gains), tip friction.
 
+use crate::effects::change::Change;
 use crate::effects::registry::{EffectInfo, Parameter, Place, Stage};
 use crate::effects::remedy::{Remedy, short};
 use crate::physics::hit::{ContactLaw, RESTITUTION};
@@ -35,6 +36,7 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
             ),
         )
     },
+    model: |found| vec![Change::Restitution(found.number("restitution"))],
 };
 
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -6,6 +6,7 @@
 //! - Signature (H5): oblique hits deflect and spin the object more or less, up to a limit.
 //! - Confused with: tool offset (turns off-centre hits), restitution.
 
+use crate::effects::change::Change;
 use crate::effects::registry::{EffectInfo, Parameter, Place, Stage};
 use crate::effects::remedy::{Remedy, short};
 use crate::physics::hit::ContactLaw;
@@ -25,6 +26,7 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
             format!("{} the friction between tip and object by {size}.", if change < 0.0 { "Lower" } else { "Raise" }),
         )
     },
+    model: |found| vec![Change::TipFriction(found.number("change"))],
 };
 
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -9,6 +9,7 @@
 //! - Confused with: tip friction, encoder offset, camera extrinsics.
 
 use crate::arm::ArmModel;
+use crate::effects::change::Change;
 use crate::effects::registry::{EffectInfo, Parameter, Place, Search, Stage};
 use crate::effects::remedy::{Remedy, list, short};
 use nalgebra::{Translation3, Vector3};
@@ -44,6 +45,7 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
             format!("Move the tool by {} m in the flange frame.", list(&offset)),
         )
     },
+    model: |found| vec![Change::ToolShift { offset: found.vector("offset"), carried: found.number("carried") }],
 };
 
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -10,6 +10,7 @@
 //! - Signature (S7): deceleration repeats twice over a full turn of the heading; paths bend towards the smoother axis.
 //! - Confused with: table tilt (repeats once), friction patch (follows the place).
 
+use crate::effects::change::Change;
 use crate::effects::registry::{EffectInfo, Parameter, Place, Search, Stage};
 use crate::effects::remedy::{Remedy, degrees, short};
 use nalgebra::Vector2;
@@ -46,6 +47,12 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
                 degrees(rough)
             ),
         )
+    },
+    model: |found| {
+        let along = Change::FrictionAlong { size: found.number("size"), axis: found.number("axis") };
+        // Engines with a friction ellipse turn the slip aside as far as it goes.
+        let straight = (found.number("drift") < 0.5).then_some(Change::Beyond("friction that stays against the slip"));
+        std::iter::once(along).chain(straight).collect()
     },
 };
 

@@ -7,6 +7,7 @@
 //! - Signature (S8): follows the place, whatever the heading and speed.
 //! - Confused with: anisotropic friction and table tilt, where all slides go the same way.
 
+use crate::effects::change::Change;
 use crate::effects::registry::{EffectInfo, Parameter, Place, Stage};
 use crate::effects::remedy::{Remedy, degrees, short};
 use nalgebra::Vector2;
@@ -52,6 +53,7 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
             format!("Friction times {} {place}.", short(factor)),
         )
     },
+    model: |_| vec![Change::Beyond("friction that differs from place to place")],
 };
 
 #[derive(Debug, Clone, Copy, PartialEq)]

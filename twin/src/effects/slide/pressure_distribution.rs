@@ -8,6 +8,7 @@
 //! - Signature (S10): spin decays slower with less reach; travel without spin stays, unless the hit tips the object.
 //! - Confused with: object inertia (spin too, but at the hit already), the object's friction.
 
+use crate::effects::change::Change;
 use crate::effects::registry::{EffectInfo, Parameter, Place, Search, Stage};
 use crate::effects::remedy::{Remedy, short};
 
@@ -42,6 +43,7 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
             ),
         )
     },
+    model: |found| vec![Change::PressureReach(found.number("reach"))],
 };
 
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -6,6 +6,7 @@
 //! - Signature (S3): only the last centimetres of a slide are shorter.
 //! - Confused with: the object's friction, tracker smoothing (rounds the stop), velocity-dependent friction.
 
+use crate::effects::change::Change;
 use crate::effects::registry::{EffectInfo, Parameter, Place, Stage};
 use crate::effects::remedy::{Remedy, short};
 
@@ -33,6 +34,7 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
             format!("Friction mu + {} exp(-(v / {} m/s)^2) instead of mu.", short(excess), short(velocity)),
         )
     },
+    model: |_| vec![Change::Beyond("friction of a slow slide that is another than that of a fast one")],
 };
 
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -6,6 +6,7 @@
 //! - Signature (S6): faster one way and slower the other; paths across bend.
 //! - Confused with: a yaw of the camera, anisotropic friction (repeats after half a turn), friction patch.
 
+use crate::effects::change::Change;
 use crate::effects::registry::{EffectInfo, Parameter, Place, Stage};
 use crate::effects::remedy::{Remedy, gravity, leaning, list};
 use nalgebra::{Rotation3, Vector3};
@@ -28,6 +29,7 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
             ),
         )
     },
+    model: |found| vec![Change::ObjectGravity(gravity(found.vector("tilt")))],
 };
 
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -6,6 +6,7 @@
 //! - Signature (S2): deceleration bends over speed; the same for light and heavy objects.
 //! - Confused with: viscous sliding drag (the same for one mass), Stribeck friction, camera distortion.
 
+use crate::effects::change::Change;
 use crate::effects::registry::{EffectInfo, Parameter, Place, Stage};
 use crate::effects::remedy::{Remedy, short};
 
@@ -25,6 +26,7 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
             format!("Friction mu + v {} s/m, never below 0, instead of mu.", short(slope)),
         )
     },
+    model: |_| vec![Change::Beyond("friction that changes with speed")],
 };
 
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -7,6 +7,7 @@
 //! - Signature (S4): deceleration linear in speed, and twice as much for half the mass.
 //! - Confused with: velocity-dependent friction (the same for one mass).
 
+use crate::effects::change::Change;
 use crate::effects::registry::{EffectInfo, Parameter, Place, Stage};
 use crate::effects::remedy::{Remedy, with_unit};
 
@@ -28,6 +29,7 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
             ),
         )
     },
+    model: |_| vec![Change::Beyond("drag in proportion to the speed of a slide")],
 };
 
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -1,0 +1,104 @@
+//! `calibration export-model`.
+
+use super::print;
+use calibration::model::{self, Format, LeftOut, Line, ModelFile};
+use clap::{Args, ValueEnum};
+use serde::Serialize;
+use shared_mem::answer;
+use shared_mem::cell::Cell;
+use shared_mem::console;
+use shared_mem::output::Destination;
+use shared_mem::theta::Theta;
+use std::path::{Path, PathBuf};
+
+#[derive(Debug, Args)]
+#[command(after_help = "\
+What was identified and diagnosed, in the keys of your simulator: rotor inertia, friction and limits of the joints,
+gains and delay of the controller, loads, the object's mass, inertia and friction, the contact of tip and object, the
+camera's true place. Elements carry the names of the robot's joints, so that a model of your own is brought up to
+date by name (docs/export_model.md has the lines for it); the file loads as it stands, too. Above each number a comment
+says what it is, its unit and where it comes from.
+
+What the format has no key for is left out: it is named in the file, here, and in --json. Without a theta.toml the
+numbers are those of cell.toml.
+
+Examples:
+  calibration export-model session --to mjcf --out cell.xml
+  calibration export-model theta.toml --cell cell.toml --to urdf --out arm.urdf
+  calibration export-model session --parameters theta.toml --to sdf --out world.sdf --json
+
+JSON: to, file, lines [{of, what, values, unit, from}], left_out [{what, why}].")]
+pub(super) struct ExportModelArguments {
+    /// Session folder, or a theta.toml.
+    #[arg(value_name = "SESSION|THETA.TOML")]
+    from: PathBuf,
+    /// What the laboratory knows about its cell [default: cell.toml in the session, or beside theta.toml].
+    #[arg(long, value_name = "CELL.TOML")]
+    cell: Option<PathBuf>,
+    /// What was identified in the session [default: theta.toml in its folder, where there is one].
+    #[arg(long, value_name = "THETA.TOML")]
+    parameters: Option<PathBuf>,
+    /// The format.
+    #[arg(long, value_enum)]
+    to: Target,
+    /// Where the model goes [default: standard output].
+    #[arg(long, value_name = "MODEL")]
+    out: Option<PathBuf>,
+    /// Replaces the file of --out.
+    #[arg(long, requires = "out")]
+    force: bool,
+    /// Prints one JSON object on stdout at the end.
+    #[arg(long, requires = "out")]
+    json: bool,
+}
+
+/// Formats by their names on the command line.
+#[derive(Debug, Clone, Copy, ValueEnum, Serialize)]
+#[serde(rename_all = "lowercase")]
+enum Target {
+    /// MuJoCo.
+    Mjcf,
+    /// ROS: the arm alone.
+    Urdf,
+    /// Gazebo.
+    Sdf,
+}
+
+#[derive(Serialize)]
+struct Answer<'a> {
+    to: Target,
+    file: &'a Path,
+    lines: &'a [Line],
+    left_out: &'a [LeftOut],
+}
+
+pub(super) fn run(arguments: &ExportModelArguments) -> anyhow::Result<()> {
+    let ExportModelArguments { from, cell, parameters, to, out, force, json } = arguments;
+    let place = Destination::of(out.as_deref(), *force)?;
+    let is_session = from.is_dir();
+    let folder = if is_session { from.as_path() } else { from.parent().unwrap_or(Path::new("")) };
+    let cell = Cell::read(&cell.clone().unwrap_or_else(|| folder.join("cell.toml")))?;
+    let beside = folder.join("theta.toml");
+    let theta = match parameters {
+        Some(file) => Theta::read(file)?,
+        None if !is_session => Theta::read(from)?,
+        None if beside.is_file() => Theta::read(&beside)?,
+        None => Theta::default(),
+    };
+    let format = match to {
+        Target::Mjcf => Format::Mjcf,
+        Target::Urdf => Format::Urdf,
+        Target::Sdf => Format::Sdf,
+    };
+    let ModelFile { text, lines, left_out } = model::write(&cell, &theta, format)?;
+    let Some(place) = place else {
+        left_out.iter().for_each(|LeftOut { what, why }| console::line(format_args!("left out: {what}: {why}")));
+        return Ok(answer::bytes(text.as_bytes())?);
+    };
+    place.write(text)?;
+    let mut words = format!("{} numbers in {}", lines.len(), place.path().display());
+    for LeftOut { what, why } in &left_out {
+        words += &format!("\nleft out: {what}: {why}");
+    }
+    print(*json, &Answer { to: *to, file: place.path(), lines: &lines, left_out: &left_out }, words)
+}
