@@ -185,6 +185,11 @@ impl File {
 
     pub(super) fn sensors(&mut self, model: &CellModel) {
         if model.object.is_none() {
+            if model.latency.is_known() {
+                let latency = number(model.latency.value);
+                self.sheet
+                    .lacks(format!("latency of poses {latency} s"), "cell.toml has no object whose pose could be late");
+            }
             return;
         }
         self.sheet.xml.open("sensor", &[]);
