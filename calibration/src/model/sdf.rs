@@ -44,6 +44,9 @@ pub(super) fn write(model: &CellModel) -> Sheet {
     file.sheet
 }
 
+/// What, its unit, where it stands in a joint, and why it is left out.
+type Lacking = (&'static str, &'static str, fn(&Joint) -> &Known, &'static str);
+
 struct File {
     sheet: Sheet,
 }
@@ -162,6 +165,12 @@ impl File {
             (0..2).for_each(|_| self.sheet.xml.close());
             return;
         };
+        self.touches(object, half);
+        (0..2).for_each(|_| self.sheet.xml.close());
+    }
+
+    /// The box of the object and its surface.
+    fn touches(&mut self, object: &Object, half: Vector3<f64>) {
         let [x, y] = [&object.friction[0], &object.friction[1]];
         let tip = &object.tip_friction;
         let lines = [
@@ -199,7 +208,7 @@ impl File {
         self.sheet.xml.close();
         self.sheet.xml.close();
         self.surface([x.value.max(tip.value), y.value.max(tip.value)], Some(object));
-        (0..3).for_each(|_| self.sheet.xml.close());
+        self.sheet.xml.close();
         if object.reach.value != 1.0 {
             self.sheet.lacks(
                 format!(
@@ -384,7 +393,7 @@ impl File {
     }
 
     fn lacks_of_arm(&mut self, arm: &Arm) {
-        let lists: [(&str, &str, fn(&Joint) -> &Known, &str); 4] = [
+        let lists: [Lacking; 4] = [
             (
                 "armature",
                 "kg m^2",
