@@ -8,6 +8,7 @@
 
 use super::arm_clips::ArmClips;
 use super::contact::Contact;
+use super::deviations;
 use super::evidence::{Channel, Evidence, Group, Reach, Row, StageName};
 use super::library::Library;
 use super::recent::Recent;
@@ -32,55 +33,16 @@ const COORDINATES: [(&str, &str); 6] = [
 const PARTS: usize = 3;
 /// The blow and what it does to the object at once [s]; what comes after is sliding, pushed or free.
 const HIT: f64 = 0.05;
-/// A path shorter than this says nothing about how far along it the object is [m].
-const SHORT: f64 = 0.01;
-
 /// Coordinates that sliding changes: x, y, yaw.
 const IN_THE_PLANE: [usize; 3] = [0, 1, 5];
 /// How far a moving object may tip and rise otherwise than simulated, one sigma [m, rad]: how a table and its edges yield
 /// under a blow is not modelled well enough to learn from.
 const TIPPING: PoseNoise = PoseNoise { position: 3e-3, rotation: 0.05 };
 
-/// The own numbers: the deviation of a clip at the end of its path, and on the way there more than in proportion.
-///
-/// Sigmas are the deviations of strokes of another engine from the twin that is given their true parameters: 1 mm and 0.012 rad
-/// at the end of the path in a clip like most.
-const PATH_DEVIATIONS: [(&str, Coordinate, Shape, f64); 6] = [
-    ("x at the end", Coordinate::X, Shape::End, 1e-3),
-    ("y at the end", Coordinate::Y, Shape::End, 1e-3),
-    ("yaw at the end", Coordinate::Yaw, Shape::End, 0.012),
-    ("x on the way", Coordinate::X, Shape::Way, 0.5e-3),
-    ("y on the way", Coordinate::Y, Shape::Way, 0.5e-3),
-    ("yaw on the way", Coordinate::Yaw, Shape::Way, 0.006),
-];
-/// Places of friction and clock among the own numbers; those of [`PATH_DEVIATIONS`] follow.
+/// Places of friction and clock among the own numbers; those of [`deviations`] follow.
 const FRICTION: usize = 0;
 const CLOCK: usize = 1;
 const FIRST_DEVIATION: usize = 2;
-
-#[derive(Debug, Clone, Copy, PartialEq)]
-enum Coordinate {
-    X,
-    Y,
-    Yaw,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq)]
-enum Shape {
-    /// Zero at the start, one at the end of the path.
-    End,
-    /// Zero at both ends, one half way.
-    Way,
-}
-
-impl Shape {
-    fn at(self, share: f64) -> f64 {
-        match self {
-            Self::End => share,
-            Self::Way => 4.0 * share * (1.0 - share),
-        }
-    }
-}
 
 /// The arm where there is one, and the object.
 pub struct CellClips<'a, F> {
@@ -89,7 +51,7 @@ pub struct CellClips<'a, F> {
     object: ObjectClips,
     channels: Vec<Channel>,
     rows: Vec<Vec<Row>>,
-    /// For each clip and number of [`PATH_DEVIATIONS`], what one unit of it takes off every residual.
+    /// For each clip and number of [`deviations`], what one unit of it takes off every residual.
     deviations: Vec<Vec<Vec<f64>>>,
     scatter: Scatter,
     /// Index of the shared friction among the numbers.
@@ -129,7 +91,7 @@ impl<'a, F: Fn(&[f64]) -> Theta + Sync> CellClips<'a, F> {
             let of_arm = arm.as_ref().map_or(&[][..], |arm| arm.rows(clip));
             let joints = Contact::of(arm.as_ref(), &object, clip);
             let poses = pose_rows(&object, clip, first);
-            deviations.push(deviation_slopes(&object, clip, of_arm.len(), joints.rows.len()));
+            deviations.push(deviations::slopes(&object, clip, of_arm.len(), joints.rows.len()));
             rows.push([of_arm, &poses, &joints.evidence(&object.rows(clip), in_contact)].concat());
             contact.push(joints);
         }
@@ -208,8 +170,7 @@ fn scatter(object: &ObjectClips) -> Scatter {
     let kind = ClipKind::ControlHitSlide;
     let mut random: Vec<Random> =
         light.iter().map(|own| Random { sigma: own.sigma(object.cell(), kind), ..own.random() }).collect();
-    let random_effect = |(name, _, _, sigma): (&str, _, _, f64)| Random { name: name.into(), sigma, step: sigma };
-    random.extend(PATH_DEVIATIONS.map(random_effect));
+    random.extend(deviations::random());
     Scatter { heavy: FIRST_DEVIATION..random.len(), forgiving: 1.0, random }
 }
 
@@ -235,55 +196,6 @@ fn pose_rows(object: &ObjectClips, clip: usize, first: usize) -> Vec<Row> {
         Some(Row { channel: first + part * COORDINATES.len() + coordinate, stage, regime, time })
     };
     rows.iter().filter_map(one).collect()
-}
-
-/// What one unit of every number of [`PATH_DEVIATIONS`] takes off the residuals of a clip, between `of_arm` rows of the arm alone
-/// and `in_contact` of the arm in contact.
-fn deviation_slopes(object: &ObjectClips, clip: usize, of_arm: usize, in_contact: usize) -> Vec<Vec<f64>> {
-    let (mut rows, noise) = (object.rows(clip), object.noise());
-    rows.retain(|row| !matches!(row.channel, object::Channel::Joint(_)));
-    let along = shares(object, clip, &rows);
-    let one = |(_, coordinate, shape, _): (&str, Coordinate, Shape, f64)| {
-        let slope = |(row, share): (&object::Row, &f64)| match (row.channel, coordinate) {
-            (object::Channel::Position(0), Coordinate::X) | (object::Channel::Position(1), Coordinate::Y) => {
-                -shape.at(*share) / noise.position
-            }
-            (object::Channel::Rotation(2), Coordinate::Yaw) => -shape.at(*share) / noise.rotation,
-            _ => 0.0,
-        };
-        let mut slopes = vec![0.0; of_arm];
-        slopes.extend(rows.iter().zip(&along).map(slope));
-        slopes.extend(std::iter::repeat_n(0.0, in_contact));
-        slopes
-    };
-    PATH_DEVIATIONS.map(one).to_vec()
-}
-
-/// How far along its path the recorded object was at every row, 0 to 1: along the straight line between its two resting
-/// places, or in time where these are too near to each other.
-fn shares(object: &ObjectClips, clip: usize, rows: &[object::Row]) -> Vec<f64> {
-    let recorded = &object.clip(clip).object;
-    let place = |k: usize| nalgebra::Vector3::from(recorded.poses[k].position());
-    let last = recorded.len().saturating_sub(1);
-    let way = place(last) - place(0);
-    let moving: Vec<u64> =
-        rows.iter().filter(|row| matches!(row.part, Part::Hit | Part::Slide)).map(|row| row.stamp_ns).collect();
-    let (Some(first_ns), Some(last_ns)) = (moving.first(), moving.last()) else { return vec![0.0; rows.len()] };
-    let mut furthest: f64 = 0.0;
-    let of = |row: &object::Row| {
-        let share = match row.part {
-            Part::Before => 0.0,
-            Part::After => 1.0,
-            _ if way.norm() > SHORT => {
-                let k = recorded.stamps_ns.partition_point(|stamp| *stamp < row.stamp_ns).min(last);
-                (place(k) - place(0)).dot(&way) / way.norm_squared()
-            }
-            _ => (row.stamp_ns - first_ns) as f64 / (last_ns - first_ns).max(1) as f64,
-        };
-        furthest = furthest.max(share.clamp(0.0, 1.0));
-        furthest
-    };
-    rows.iter().map(of).collect()
 }
 
 impl<F: Fn(&[f64]) -> Theta + Sync> ClipModel for CellClips<'_, F> {

@@ -7,7 +7,7 @@ use crate::estimate::interval::student;
 /// Rivals this close cannot be told apart [nats].
 const NEAR: f64 = 4.0;
 /// ... or within so many standard errors of their difference, were these known exactly.
-const CHANCE: f64 = 1.5;
+const CHANCE: f64 = 2.0;
 /// A rival closes at least this share of the gap that the chosen one closes.
 const ALIKE: f64 = 0.5;
 /// What is kept for causes outside the library even where everything fits; from the simulated sessions on which this was
@@ -54,7 +54,7 @@ pub fn rivals(step: &Step, library: &Library, chosen: usize, overdispersion: f64
             false if library.look_alike(*candidate, chosen) => trial.is_cause(),
             false => trial.closes > ALIKE * chosen_trial.closes,
         };
-        alike && enough
+        alike && enough && trial.comes_as_near_as(chosen_trial, step.from.deviance())
     };
     step.trials.iter().map(|trial| trial.scored.candidate).filter(near).collect()
 }

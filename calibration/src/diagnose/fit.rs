@@ -192,6 +192,28 @@ impl<E: Evidence> Bench<'_, E> {
         Some(Hypothesis { effects: effects.to_vec(), full, free, fitted: fitted.collect() })
     }
 
+    /// The clips of a hypothesis fitted by chosen numbers alone from `full` on, in at most so many linearisations: what they cost
+    /// then, and the numbers. `None` when the twin has no answer at the start.
+    pub(super) fn turned(
+        &self,
+        (from, full): (&Hypothesis, Vec<f64>),
+        chosen: &[usize],
+        weights: &[f64],
+        iterations: usize,
+    ) -> Option<(f64, Vec<f64>)> {
+        let own = |fitted: &FittedClip| (fitted.clip, fitted.own.clone());
+        let (mut full, mut clips): (_, Clips) = (full, from.fitted.iter().map(own).collect());
+        let mut damping = 1e-4;
+        for _ in 0..iterations {
+            let at = self.linearise(&full, chosen, &clips, Precision::Joints)?;
+            let forms = at.reduced(self.evidence, weights);
+            let better = self.improved(&full, chosen, (&at, &forms), weights, &mut damping);
+            let Some((to, to_own)) = better.filter(|_| !self.interrupt.asked()) else { break };
+            (full, clips) = (to, to_own);
+        }
+        Some((self.cost(&full, &clips, weights)?, full))
+    }
+
     pub(super) fn linearise(
         &self,
         full: &[f64],

@@ -322,7 +322,7 @@ fn biting(number: usize, peak: f64, unknown: &Unknown) -> Probe {
 /// this share of it no limit is looked for.
 const BITES: f64 = 0.9;
 const BOUND_STEP: f64 = 0.01;
-const LOWEST_LIMIT: f64 = 0.25;
+const LOWEST_LIMIT: f64 = 0.03;
 
 /// The step of a probe as a share of what is met in practice.
 const PROBE_SHARE: f64 = 0.1;

@@ -11,6 +11,7 @@
 //! | [`length`] | how much of long clips counts |
 //! | [`split`] | which clips are for what |
 //! | [`evidence`], [`arm_clips`], [`contact`], [`cell_clips`] | what is measured against the twin, and where in a clip |
+//! | `deviations` | how the object of a clip deviates from any simulated path |
 //! | `recent` | where a search has just been |
 //! | [`scatter`] | what every clip has of its own |
 //! | [`library`], [`ground`] | the candidates as numbers, and where on the table they can show |
@@ -53,6 +54,7 @@ pub mod conclude;
 pub mod confidence;
 pub mod contact;
 pub mod cost;
+mod deviations;
 pub mod drift;
 pub mod evidence;
 pub mod fit;

@@ -4,6 +4,7 @@
 
 use super::evidence::Evidence;
 use super::fit::{Bench, Hypothesis};
+use super::library::Candidate;
 use super::ripple;
 use super::shortlist::Scored;
 use crate::forward::Setting;
@@ -27,7 +28,12 @@ const SCANNED: [f64; 4] = [0.06, 0.2, 0.5, 1.0];
 const FAR_OFF: f64 = 2.0;
 
 /// Units of a probe at which each direction of one with a threshold is tried.
-const STEPPED: [f64; 6] = [0.95, 1.05, 1.15, 1.3, 1.6, 2.2];
+const STEPPED: [f64; 9] = [0.95, 1.05, 1.15, 1.3, 1.6, 2.2, 4.0, 10.0, 25.0];
+/// A further limit leaves less than this share of what the clips cost.
+const SPARES: f64 = 0.98;
+/// Shares of the strongest that is usual at which an effect in a joint is tried with the gains of that joint: simpler machines
+/// have more.
+const BY_JOINT: [f64; 4] = [0.1, 0.3, 1.0, 3.0];
 /// Units of a probe at which a number that only the object tells is tried: all of what is met in practice.
 const ALL_ALONG: [f64; 10] = [-9.0, -7.0, -5.0, -3.0, -1.0, 1.0, 3.0, 5.0, 7.0, 9.0];
 
@@ -78,6 +84,10 @@ fn pointed_at<E: Evidence>(bench: &Bench<'_, E>, at: (&Hypothesis, &[f64]), scor
     }
     if candidate.is_searched(Search::Limit) {
         numbers.push(one_by_one(bench, at, numbers[0].clone(), &candidate.sizes, &STEPPED));
+        numbers.push(limits(bench, at, candidate, with_nominal_arm(bench, at.0.full.clone())));
+    }
+    if candidate.is_searched(Search::Threshold) {
+        numbers.push(joint_by_joint(bench, at, candidate));
     }
     if candidate.is_searched(Search::InStep) {
         numbers.extend(ripple::start(bench, at, scored.candidate));
@@ -128,7 +138,80 @@ fn scanned<E: Evidence>(bench: &Bench<'_, E>, at: (&Hypothesis, &[f64]), scored:
     let in_step = if ripples { ripple::start(bench, at, scored.candidate) } else { None };
     let most = FAR_OFF * bench.plain_cost(at.0, &at.0.full, at.1).unwrap_or(f64::INFINITY);
     let start = cheapest_below(bench, at, numbers.chain(in_step), most);
-    start.map(|(_, full)| full).into_iter().collect()
+    let candidate = &bench.library.candidates[scored.candidate];
+    let by_joint = candidate.is_searched(Search::Threshold).then(|| joint_by_joint(bench, at, candidate));
+    start.map(|(_, full)| full).into_iter().chain(by_joint).collect()
+}
+
+/// Limits of joints, each time that of the joint where the clips then cost least, for as long as that spares something: until the
+/// worst is limited, those of the others mean nothing.
+fn limits<E: Evidence>(
+    bench: &Bench<'_, E>,
+    at: (&Hypothesis, &[f64]),
+    candidate: &Candidate,
+    mut full: Vec<f64>,
+) -> Vec<f64> {
+    let mut cost = bench.plain_cost(at.0, &full, at.1).unwrap_or(f64::INFINITY);
+    for _ in &candidate.sizes {
+        let probes = candidate.alternatives[0].probes.iter().filter_map(|probe| probe.moves.first());
+        let tried = probes.flat_map(|(size, probed)| {
+            let unknown = &bench.library.unknowns[*size];
+            let value = move |units: f64| {
+                (unknown.start + units * (probed - unknown.start)).clamp(unknown.lower, unknown.upper)
+            };
+            STEPPED.map(|units| (*size, value(units)))
+        });
+        let numbers = tried.map(|(size, value)| {
+            let mut tried = full.clone();
+            tried[size] = value;
+            tried
+        });
+        let Some((less, better)) = cheapest_below(bench, at, numbers.collect::<Vec<_>>().into_iter(), SPARES * cost)
+        else {
+            break;
+        };
+        (cost, full) = (less, better);
+    }
+    full
+}
+
+/// Sizes of an effect in the joints, one joint after the other, where the clips cost least once the gains of that joint are fitted
+/// beside it: gains that were fitted without the effect stand in for it.
+fn joint_by_joint<E: Evidence>(
+    bench: &Bench<'_, E>,
+    (from, weights): (&Hypothesis, &[f64]),
+    candidate: &Candidate,
+) -> Vec<f64> {
+    let (library, mut full) = (bench.library, from.full.clone());
+    for probe in &candidate.alternatives[0].probes {
+        let Some(&(size, probed)) = probe.moves.first() else { continue };
+        let beside = library.baseline.clone().filter(|k| library.joints[*k] == library.joints[size]);
+        let chosen: Vec<usize> = beside.chain([size]).collect();
+        let unknown = &library.unknowns[size];
+        let with = |share: f64| {
+            let mut tried = full.clone();
+            let value = unknown.start + share * probe.largest * (probed - unknown.start);
+            tried[size] = value.clamp(unknown.lower, unknown.upper);
+            tried
+        };
+        let tried = BY_JOINT.iter().filter_map(|share| bench.turned((from, with(*share)), &chosen, weights, 1));
+        let best = tried.min_by(|a, b| a.0.total_cmp(&b.0));
+        let now = bench.plain_cost(from, &full, weights).unwrap_or(f64::INFINITY);
+        full = best.filter(|(cost, _)| *cost < now).map_or(full, |(_, better)| better);
+        if bench.interrupt.asked() {
+            break;
+        }
+    }
+    full
+}
+
+/// The numbers with gains as cell.toml has them: where an arm is driven into its limits, gains that were fitted without these mean
+/// nothing.
+fn with_nominal_arm<E: Evidence>(bench: &Bench<'_, E>, mut full: Vec<f64>) -> Vec<f64> {
+    for k in bench.library.baseline.clone().filter(|k| bench.library.joints[*k].is_some()) {
+        full[k] = bench.library.unknowns[k].start;
+    }
+    full
 }
 
 /// Some way to either side along each of a candidate's directions, in any of its forms: what the clips cost where they cost

@@ -75,6 +75,9 @@ pub enum Search {
     /// Not along with the others, since few clips show it well enough to be worth a number of its own: only what was found is
     /// tried at other values of it.
     Held,
+    /// Joint by joint, each with the gains of that joint: it acts as a whole from the smallest size on, no slope leads there, and
+    /// gains that were fitted without it stand in for it.
+    Threshold,
     /// A limit: as long as it is not reached nothing happens, and no slope leads there.
     Limit,
     /// As the teeth of a gear: a little out of step it does nothing.

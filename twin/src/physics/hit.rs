@@ -72,6 +72,11 @@ impl ContactLaw {
         Self { stiffness: STIFFNESS, restitution: RESTITUTION, friction }
     }
 
+    /// Puts another spring in series with the contact's [m/N].
+    pub fn yield_by(&mut self, compliance: f64) {
+        self.stiffness = 1.0 / (1.0 / self.stiffness + compliance);
+    }
+
     /// What it asks of an object of `mass` [kg].
     #[must_use]
     pub fn motion(&self, mass: f64) -> ContactMotion {

@@ -10,7 +10,7 @@
 
 use crate::arm::{Joints, Spring};
 use crate::effects::change::Change;
-use crate::effects::registry::{EffectInfo, Parameter, Place, Stage};
+use crate::effects::registry::{EffectInfo, Parameter, Place, Search, Stage};
 use crate::effects::remedy::{Remedy, degrees, short};
 
 pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
@@ -19,7 +19,11 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     acts_on: Place::Joint,
     parameters: &[
         // Hobby servos reach the end of the range; gears of an arm have a tenth of that play.
-        Parameter::size("play", "rad", [0.0, 0.03], 0.0).per_joint().within(0.0, 1.0).usually_up_to(3e-3),
+        Parameter::size("play", "rad", [0.0, 0.03], 0.0)
+            .per_joint()
+            .within(0.0, 1.0)
+            .usually_up_to(3e-3)
+            .searched(Search::Threshold),
         Parameter::form("compliance", "rad/(N m)", [1e-7, 1e-4], 1e-7)
             .per_joint()
             .within(1e-7, 1e-2)

@@ -15,7 +15,7 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     name: "torque_saturation",
     stage: Stage::Control,
     acts_on: Place::TorquePath,
-    parameters: &[Parameter::size("limit", "N m", [1.0, 87.0], f64::INFINITY)
+    parameters: &[Parameter::size("limit", "N m", [0.1, 87.0], f64::INFINITY)
         .per_joint()
         .within(0.0, f64::MAX)
         .elsewhere(Elsewhere::OfTorqueLimit([0.05, 1.0]))

@@ -2,23 +2,28 @@
 //!
 //! - Equation: `1 / k = 1 / k_nominal + compliance`.
 //! - Source: springs in series; Hunt and Crossley 1975 for the law around it.
-//! - Unit: m/N. Plausible: 0 to 1e-3, a stiffness down to 1e3 N/m; contacts of 1 to 20 ms.
+//! - Unit: m/N. Plausible: 0 to 1e-3, a stiffness down to 1e3 N/m; contacts of 1 to 20 ms. Rubber returns another share of the
+//!   speed than what is hard does: `restitution`, by default the nominal contact's.
 //! - Signature (H8): extra impulse from the controller, which depends on its gains and on the follow-through.
 //! - Confused with: restitution, tip friction, tracker smoothing (softens the corner at impact too).
 
 use crate::effects::change::Change;
 use crate::effects::registry::{EffectInfo, Parameter, Place, Stage};
 use crate::effects::remedy::{Remedy, short};
-use crate::physics::hit::ContactLaw;
+use crate::physics::hit::{ContactLaw, RESTITUTION};
 
 pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     name: "contact_compliance",
     stage: Stage::Hit,
     acts_on: Place::ToolContact,
-    parameters: &[Parameter::size("compliance", "m/N", [0.0, 1e-3], 0.0).within(0.0, 1.0)],
+    parameters: &[
+        Parameter::size("compliance", "m/N", [0.0, 1e-3], 0.0).within(0.0, 1.0),
+        Parameter::form("restitution", "1", [0.02, 0.5], RESTITUTION).within(0.0, 1.0),
+    ],
     confusable_with: &["restitution", "tip_friction", "tracker_smoothing"],
     install: |values, effects| {
-        effects.hit.contact_compliance = Some(ContactCompliance { compliance: values.number("compliance") });
+        let [compliance, restitution] = ["compliance", "restitution"].map(|name| values.number(name));
+        effects.hit.contact_compliance = Some(ContactCompliance { compliance, restitution });
     },
     remedy: |found| {
         let compliance = found.number("compliance");
@@ -35,17 +40,22 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
             ),
         )
     },
-    model: |found| vec![Change::Compliance(found.number("compliance"))],
+    model: |found| {
+        let [compliance, restitution] = ["compliance", "restitution"].map(|name| found.number(name));
+        vec![Change::Compliance(compliance), Change::Restitution(restitution)]
+    },
 };
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(in crate::effects) struct ContactCompliance {
     compliance: f64,
+    restitution: f64,
 }
 
 impl ContactCompliance {
     pub(super) fn apply(&self, law: &mut ContactLaw) {
-        law.stiffness = 1.0 / (1.0 / law.stiffness + self.compliance);
+        law.yield_by(self.compliance);
+        law.restitution = self.restitution;
     }
 }
 

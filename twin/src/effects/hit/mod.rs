@@ -27,10 +27,11 @@ impl HitEffects {
     #[must_use]
     pub fn real_law(&self, nominal: ContactLaw) -> ContactLaw {
         let mut law = nominal;
-        if let Some(effect) = &self.restitution {
+        if let Some(effect) = &self.contact_compliance {
             effect.apply(&mut law);
         }
-        if let Some(effect) = &self.contact_compliance {
+        // After the compliance: a restitution that is stated counts for the softer contact too.
+        if let Some(effect) = &self.restitution {
             effect.apply(&mut law);
         }
         if let Some(effect) = &self.tip_friction {
