@@ -169,3 +169,53 @@ fn progress(series: &ObjectSeries, rows: &[Row]) -> Vec<Progress> {
     };
     rows.iter().map(at).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::Isometry3;
+    use shared_mem::frames::Pose;
+
+    /// Pushed 20 mm along x in 50 ms, then free along y for 0.2 s under Coulomb friction, 40 mm, a pose every 10 ms.
+    fn stroke() -> (ObjectSeries, Vec<Row>) {
+        let (mut series, mut rows) = (ObjectSeries::default(), Vec::new());
+        for k in 0..40_u32 {
+            let t = 0.01 * f64::from(k) - 0.1;
+            let (pushed, free) = ((t / 0.05).clamp(0.0, 1.0), ((t - 0.05) / 0.2).clamp(0.0, 1.0));
+            let place = [0.02 * pushed, 0.04 * (2.0 * free - free * free)];
+            series.stamps_ns.push(u64::from(k) * 10_000_000);
+            series.poses.push(Pose::from_isometry(Isometry3::translation(place[0], place[1], 0.05)));
+            let part = match t {
+                t if t < 0.005 => Part::Before,
+                t if t < 0.045 => Part::Hit,
+                t if t < 0.255 => Part::Slide,
+                _ => Part::After,
+            };
+            rows.push(Row { stamp_ns: u64::from(k) * 10_000_000, part, channel: Channel::Position(0) });
+        }
+        (series, rows)
+    }
+
+    #[test]
+    fn a_faster_object_is_ahead_in_proportion_to_time_and_one_that_left_aside_is_beside_in_proportion_to_its_way() {
+        let (series, rows) = stroke();
+        let along = direction(&series, &rows);
+        assert!(along[0].abs() < 1e-9 && (along[1] - 1.0).abs() < 1e-9, "{along:?}");
+        let progress = progress(&series, &rows);
+        let nothing = Progress { held: 0.0, time: 0.0, way: 0.0 };
+        assert_eq!(progress[10], nothing, "the touch");
+        assert_eq!(progress[39], Progress { held: 1.0, time: 1.0, way: 1.0 });
+        // Half of the time of the slide: three quarters of its way.
+        let half = progress[25];
+        assert!((half.time - 0.5).abs() < 1e-9 && (half.way - 0.75).abs() < 1e-9 && half.held == 1.0, "{half:?}");
+        assert!((0.4..0.8).contains(&progress[13].held) && progress[13].time == 0.0, "{:?}", progress[13]);
+    }
+
+    #[test]
+    fn an_object_that_somebody_let_go_is_not_shifted_at_its_start() {
+        let (series, mut rows) = stroke();
+        rows.retain(|row| row.part != Part::Hit);
+        let progress = progress(&series, &rows);
+        assert!(progress.iter().all(|progress| progress.held == 0.0));
+    }
+}

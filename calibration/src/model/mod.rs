@@ -1,7 +1,7 @@
 //! What was identified and diagnosed, as a model of the cell for another simulator: to run as it is, or to bring the user's own
 //! model up to date with, joint by joint of the same name.
 //!
-//! cell.toml and theta.toml become one [`cell_model::CellModel`] in numbers that every simulator means the same by. An effect says
+//! cell.toml and theta.toml become one `CellModel` in numbers that every simulator means the same by. An effect says
 //! itself what it changes there ([`twin::effects::Change`]); a writer for each format knows which keys hold it. What the format
 //! has no key for, or no law, is left out and named.
 
