@@ -72,6 +72,8 @@ pub(super) struct Joint {
 /// A point mass on the flange.
 #[derive(Debug, Clone)]
 pub(super) struct Load {
+    /// Of its body.
+    pub(super) name: String,
     pub(super) mass: Known,
     pub(super) centre: [f64; 3],
 }
@@ -257,7 +259,9 @@ impl Arm {
             Change::CommandDelay(delay) => self.command_delay.add(*delay, from),
             Change::CommandLag(lag) => self.command_lag.add(*lag, from),
             Change::FlangeLoad { mass, centre } => {
-                self.loads.push(Load { mass: Known::new(*mass, from), centre: *centre });
+                let before = self.loads.len();
+                let name = if before == 0 { "payload".to_owned() } else { format!("payload_{}", before + 1) };
+                self.loads.push(Load { name, mass: Known::new(*mass, from), centre: *centre });
             }
             Change::ToolShift { offset, carried } if self.tool.is_some() => {
                 set(&mut self.tool_at, offset, from);

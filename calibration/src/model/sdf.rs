@@ -1,8 +1,8 @@
 //! SDF for Gazebo: a world with arm, object and table. Joint gains go into Gazebo's joint position controllers.
 
 use super::cell_model::{Arm, CellModel, Joint, Object};
-use super::known::{Known, Line, number, numbers};
-use super::sheet::Sheet;
+use super::known::{Line, number, numbers};
+use super::sheet::{Lacking, Sheet};
 use nalgebra::{Isometry3, Vector3};
 use twin::arm::MassProperties;
 
@@ -43,9 +43,6 @@ pub(super) fn write(model: &CellModel) -> Sheet {
     }
     file.sheet
 }
-
-/// What, its unit, where it stands in a joint, and why it is left out.
-type Lacking = (&'static str, &'static str, fn(&Joint) -> &Known, &'static str);
 
 struct File {
     sheet: Sheet,
@@ -308,16 +305,16 @@ impl File {
             }
             (0..2).for_each(|_| self.sheet.xml.close());
         }
-        for (i, load) in arm.loads.iter().enumerate() {
-            let name = if i == 0 { "payload".to_owned() } else { format!("payload_{}", i + 1) };
+        for load in &arm.loads {
+            let name = load.name.as_str();
             let comment = self
                 .sheet
-                .note("mass", Line::new(&name, "a load that the controller does not compensate", "kg", &load.mass));
+                .note("mass", Line::new(name, "a load that the controller does not compensate", "kg", &load.mass));
             self.sheet.xml.comment(&format!("{name} {comment}; pose [m] in the flange frame"));
             let link = format!("{name}_link");
-            self.fixed(&name, "flange_link", &link, &Isometry3::identity());
+            self.fixed(name, "flange_link", &link, &Isometry3::identity());
             let body = MassProperties::new(load.mass.value, load.centre, [1e-9, 1e-9, 1e-9, 0.0, 0.0, 0.0]);
-            self.link(&link, &name, &body, false);
+            self.link(&link, name, &body, false);
             self.sheet.xml.close();
         }
     }
@@ -414,25 +411,10 @@ impl File {
                 "it is in p_gain and d_gain, and not in the compensation of gravity",
             ),
         ];
-        for (what, unit, field, why) in lists {
-            if arm.joints.iter().any(|joint| field(joint).is_known()) {
-                let values = arm.joints.iter().map(|joint| number(field(joint).value)).collect::<Vec<_>>().join(", ");
-                let unit = if unit == "1" { String::new() } else { format!(" {unit}") };
-                self.sheet.lacks(format!("{what} [{values}]{unit}"), why);
-            }
-        }
-        for (what, known) in
-            [("delay of commands", &arm.command_delay), ("time constant of the command's low-pass", &arm.command_lag)]
-        {
-            if known.is_known() {
-                self.sheet.lacks(
-                    format!("{what} {} s", number(known.value)),
-                    "SDF has no key; hold commands back before they are published",
-                );
-            }
-        }
-        if arm.joints.iter().any(|joint| joint.dry.value > 0.0 && joint.creep > 0.0) {
-            self.sheet.lacks("the speed over which dry friction builds up", "SDF has one number for dry friction");
-        }
+        self.sheet.lacks_in_joints(arm, &lists);
+        self.sheet.lacks_in_time(
+            arm,
+            ["SDF has no key; hold commands back before they are published", "SDF has one number for dry friction"],
+        );
     }
 }

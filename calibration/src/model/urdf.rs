@@ -2,7 +2,7 @@
 
 use super::cell_model::{Arm, CellModel, Joint};
 use super::known::{Line, number, numbers};
-use super::sheet::Sheet;
+use super::sheet::{Lacking, Sheet};
 use nalgebra::{Isometry3, Vector3};
 use twin::arm::MassProperties;
 
@@ -73,14 +73,14 @@ impl File {
             let centre = properties.centre + at * (arm.carried - 1.0);
             self.link("tool", &MassProperties { centre, ..properties });
         }
-        for (i, load) in arm.loads.iter().enumerate() {
-            let name = if i == 0 { "payload".to_owned() } else { format!("payload_{}", i + 1) };
+        for load in &arm.loads {
+            let name = load.name.as_str();
             let comment = self
                 .sheet
-                .note("mass", Line::new(&name, "a load that the controller does not compensate", "kg", &load.mass));
+                .note("mass", Line::new(name, "a load that the controller does not compensate", "kg", &load.mass));
             self.sheet.xml.comment(&format!("{name} {comment}; origin [m] in the flange frame"));
-            self.fixed(&format!("{name}_joint"), "flange", &name, &Isometry3::identity());
-            self.link(&name, &MassProperties::new(load.mass.value, load.centre, [1e-9, 1e-9, 1e-9, 0.0, 0.0, 0.0]));
+            self.fixed(&format!("{name}_joint"), "flange", name, &Isometry3::identity());
+            self.link(name, &MassProperties::new(load.mass.value, load.centre, [1e-9, 1e-9, 1e-9, 0.0, 0.0, 0.0]));
         }
     }
 
@@ -168,11 +168,11 @@ impl File {
 
     /// What was found or stated of the arm and has no key here.
     fn lacks_of_arm(&mut self, arm: &Arm) {
-        let lists = [
+        let lists: [Lacking; 6] = [
             (
                 "armature",
                 "kg m^2",
-                (|j: &Joint| &j.armature) as fn(&Joint) -> &super::known::Known,
+                |j| &j.armature,
                 "URDF has no rotor inertia; give it to the simulator itself (MuJoCo: armature)",
             ),
             (
@@ -196,26 +196,11 @@ impl File {
                 "URDF has no key; add it to measured positions",
             ),
         ];
-        for (what, unit, field, why) in lists {
-            if arm.joints.iter().any(|joint| field(joint).is_known()) {
-                let values = arm.joints.iter().map(|joint| number(field(joint).value)).collect::<Vec<_>>().join(", ");
-                let unit = if unit == "1" { String::new() } else { format!(" {unit}") };
-                self.sheet.lacks(format!("{what} [{values}]{unit}"), why);
-            }
-        }
-        for (what, known) in
-            [("delay of commands", &arm.command_delay), ("time constant of the command's low-pass", &arm.command_lag)]
-        {
-            if known.is_known() {
-                self.sheet.lacks(
-                    format!("{what} {} s", number(known.value)),
-                    "URDF has no controller; hold commands back before it",
-                );
-            }
-        }
-        if arm.joints.iter().any(|joint| joint.dry.value > 0.0 && joint.creep > 0.0) {
-            self.sheet.lacks("the speed over which dry friction builds up", "URDF has one number for dry friction");
-        }
+        self.sheet.lacks_in_joints(arm, &lists);
+        self.sheet.lacks_in_time(
+            arm,
+            ["URDF has no controller; hold commands back before it", "URDF has one number for dry friction"],
+        );
     }
 
     fn lacks_of_cell(&mut self, model: &CellModel) {

@@ -149,13 +149,13 @@ impl File {
             );
             self.sheet.xml.close();
         }
-        for (i, load) in arm.loads.iter().enumerate() {
-            let name = if i == 0 { "payload".to_owned() } else { format!("payload_{}", i + 1) };
+        for load in &arm.loads {
+            let name = load.name.as_str();
             let comment = self
                 .sheet
-                .note("mass", Line::new(&name, "a load that the controller does not compensate", "kg", &load.mass));
+                .note("mass", Line::new(name, "a load that the controller does not compensate", "kg", &load.mass));
             self.sheet.xml.comment(&format!("{name} {comment}; pos [m] in the flange frame"));
-            self.sheet.xml.open("body", &[("name", name)]);
+            self.sheet.xml.open("body", &[("name", name.into())]);
             // A point, as far as MuJoCo allows one.
             self.sheet.xml.leaf(
                 "inertial",
