@@ -33,6 +33,7 @@ const COORDINATES: [(&str, &str); 6] = [
 const PARTS: usize = 3;
 /// The blow and what it does to the object at once [s]; what comes after is sliding, pushed or free.
 const HIT: f64 = 0.05;
+
 /// Coordinates that sliding changes: x, y, yaw.
 const IN_THE_PLANE: [usize; 3] = [0, 1, 5];
 /// How far a moving object may tip and rise otherwise than simulated, one sigma [m, rad]: how a table and its edges yield

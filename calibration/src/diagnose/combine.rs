@@ -42,8 +42,6 @@ pub const CLOSES: f64 = 0.1;
 /// not matter: 11 of 12 clips do not agree by chance (p = 0.003).
 pub(super) const PLAIN: f64 = 0.3;
 pub(super) const NEARLY_ALL: f64 = 0.85;
-/// Half of the way from what clips cost to what they cost with an effect, see [`Trial::comes_as_near_as`].
-const HALF_WAY: f64 = 0.5;
 /// An advantage of so many of its errors is no chance.
 const CLEAR: f64 = 3.5;
 /// An effect that leads is worth this share more than others: two effects of nearly the same worth do the same.
@@ -79,15 +77,6 @@ impl Trial {
     /// What it is worth as fitted [nats]; 0 where it was not.
     pub(super) fn nats(&self) -> f64 {
         self.fitted.as_ref().map_or(0.0, |(_, advantage)| advantage.nats)
-    }
-
-    /// Whether its fit comes at least half as near to the clips, on a logarithmic scale, as that of another from what they cost
-    /// without either: an effect after which next to nothing is left has no equal in one that leaves most of it. Numbers of the
-    /// clips' own would hide that, so where they have some it is not asked.
-    pub(super) fn comes_as_near_as(&self, other: &Self, without: f64) -> bool {
-        let way = |trial: &Self| trial.fitted.as_ref().map(|(fit, _)| (without / fit.deviance()).ln());
-        let (Some(mine), Some(its)) = (way(self), way(other)) else { return false };
-        self.own_numbers || !its.is_finite() || mine > HALF_WAY * its
     }
 
     /// Whether another does the same with fewer numbers: what is better about this one is no more than engines differ by.

@@ -8,7 +8,7 @@ use crate::estimate::interval::student;
 const NEAR: f64 = 4.0;
 /// ... or within so many standard errors of their difference, were these known exactly.
 const CHANCE: f64 = 2.0;
-/// A rival closes at least this share of the gap that the chosen one closes.
+/// A rival closes at least this share of the gap that the chosen one closes, and of its way down to noise.
 const ALIKE: f64 = 0.5;
 /// What is kept for causes outside the library even where everything fits; from the simulated sessions on which this was
 /// measured: of named findings this share was wrong.
@@ -54,9 +54,17 @@ pub fn rivals(step: &Step, library: &Library, chosen: usize, overdispersion: f64
             false if library.look_alike(*candidate, chosen) => trial.is_cause(),
             false => trial.closes > ALIKE * chosen_trial.closes,
         };
-        alike && enough && trial.comes_as_near_as(chosen_trial, step.from.deviance())
+        alike && enough && comes_as_near(trial, chosen_trial, step.from.deviance())
     };
     step.trials.iter().map(|trial| trial.scored.candidate).filter(near).collect()
+}
+
+/// Whether a rival's fit goes as much of the way from what clips cost without it to what they cost with the chosen one, on a
+/// logarithmic scale: an effect after which next to nothing is left of an arm's gap has no equal in one that leaves most of it, however
+/// much single clips differ. Where clips have numbers of their own, these hide it, and it is not asked.
+fn comes_as_near(rival: &Trial, chosen: &Trial, without: f64) -> bool {
+    let way = |trial: &Trial| trial.fitted.as_ref().map_or(0.0, |(fit, _)| (without / fit.deviance()).ln());
+    rival.own_numbers || way(rival) > ALIKE * way(chosen)
 }
 
 /// Whether an advantage over a rival could be chance.
@@ -73,13 +81,16 @@ fn chance(clips: usize) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::super::fit::Hypothesis;
+    use super::super::fit::{FittedClip, Hypothesis};
     use super::super::ground::Ground;
+    use super::super::scatter_scale::Around;
     use super::super::score::Predicted;
     use super::super::shortlist::Scored;
+    use super::super::sweep::Reduced;
     use super::super::test_bench::shipped;
     use super::*;
     use crate::forward::setting;
+    use nalgebra::DMatrix;
     use shared_mem::msg::MAX_JOINTS;
 
     fn trial(candidate: usize, nats: f64, closes: f64) -> Trial {
@@ -155,6 +166,24 @@ mod tests {
             whole: Vec::new(),
         };
         assert_eq!(rivals(&step, &library, tool, 1.0), [camera]);
+    }
+
+    #[test]
+    fn what_leaves_most_of_an_arm_s_gap_is_no_equal_of_what_leaves_next_to_nothing() {
+        let leaves = |deviance: f64, own_numbers| {
+            let around = Around { gram: DMatrix::zeros(1, 1), own: Vec::new() };
+            let reduced = Reduced { form: DMatrix::from_element(1, 1, deviance), volume: 0.0, around };
+            let mut leaves = trial(0, 100.0, 0.9);
+            leaves.own_numbers = own_numbers;
+            if let Some((fit, _)) = &mut leaves.fitted {
+                fit.fitted = vec![FittedClip { clip: 0, own: Vec::new(), reduced }];
+            }
+            leaves
+        };
+        let all_but_noise = leaves(1e3, false);
+        assert!(!comes_as_near(&leaves(4e5, false), &all_but_noise, 1e6), "60 % of the gap, a seventh of the way");
+        assert!(comes_as_near(&leaves(5e3, false), &all_but_noise, 1e6));
+        assert!(comes_as_near(&leaves(4e5, true), &all_but_noise, 1e6), "own numbers of clips may hide it");
     }
 
     #[test]

@@ -19,8 +19,9 @@ const SHORT: f64 = 0.01;
 /// The own numbers: the deviation of a clip when the tool has let go, on the way there more than in proportion, and what
 /// the free slide makes of it by its end.
 ///
-/// Sigmas are the deviations of strokes of another engine from the twin that is given their true parameters: 1 mm and 0.012 rad
-/// at the end of the path in a clip like most.
+/// Sigmas: strokes of another engine deviate from the twin that is given their true parameters by 1 mm and 0.012 rad at the end of the
+/// path in a clip like most. Each of the two stages is allowed as much; how widely a session's clips scatter is estimated anyway
+/// ([`super::scatter_scale`]).
 const DEVIATIONS: [(&str, Coordinate, Shape, f64); 9] = [
     ("x when let go", Coordinate::X, Shape::Held, 1e-3),
     ("y when let go", Coordinate::Y, Shape::Held, 1e-3),
@@ -56,9 +57,9 @@ enum Shape {
     InWay,
 }
 
-/// How far a clip has come at a row, each 0 to 1.
+/// What part of a clip lies behind at a row, each 0 to 1.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Progress {
+struct Fractions {
     /// Of the path on which the tool has hold of the object.
     held: f64,
     /// Of the time of the free slide.
@@ -68,12 +69,12 @@ struct Progress {
 }
 
 impl Shape {
-    fn at(self, progress: &Progress) -> f64 {
+    fn at(self, fractions: &Fractions) -> f64 {
         match self {
-            Self::Held => progress.held,
-            Self::Way => 4.0 * progress.held * (1.0 - progress.held),
-            Self::InTime => progress.time,
-            Self::InWay => progress.way,
+            Self::Held => fractions.held,
+            Self::Way => 4.0 * fractions.held * (1.0 - fractions.held),
+            Self::InTime => fractions.time,
+            Self::InWay => fractions.way,
         }
     }
 }
@@ -90,7 +91,7 @@ pub(super) fn slopes(object: &ObjectClips, clip: usize, of_arm: usize, in_contac
     rows.retain(|row| !matches!(row.channel, Channel::Joint(_)));
     let series = &object.clip(clip).object;
     let along = direction(series, &rows);
-    let progress = progress(series, &rows);
+    let fractions = fractions(series, &rows);
     let one = |(_, coordinate, shape, _): (&str, Coordinate, Shape, f64)| {
         let share = |channel: Channel| match (channel, coordinate) {
             (Channel::Position(0), Coordinate::X) | (Channel::Position(1), Coordinate::Y) => 1.0 / noise.position,
@@ -101,7 +102,7 @@ pub(super) fn slopes(object: &ObjectClips, clip: usize, of_arm: usize, in_contac
             _ => 0.0,
         };
         let mut slopes = vec![0.0; of_arm];
-        slopes.extend(rows.iter().zip(&progress).map(|(row, progress)| -shape.at(progress) * share(row.channel)));
+        slopes.extend(rows.iter().zip(&fractions).map(|(row, fractions)| -shape.at(fractions) * share(row.channel)));
         slopes.extend(std::iter::repeat_n(0.0, in_contact));
         slopes
     };
@@ -128,43 +129,39 @@ fn direction(series: &ObjectSeries, rows: &[Row]) -> [f64; 2] {
     if length > SHORT { [way.x / length, way.y / length] } else { [0.0; 2] }
 }
 
-/// How far along the straight way between two stamps the object is at a third, or in time where the way is too short.
-fn share(series: &ObjectSeries, [first, last]: [u64; 2], stamp_ns: u64) -> f64 {
+/// How far the object is along the straight way between two stamps at a third, or in time where the way is too short.
+fn of_way(series: &ObjectSeries, [first, last]: [u64; 2], stamp_ns: u64) -> f64 {
     let (from, way) = (place(series, first), place(series, last) - place(series, first));
-    let share = if way.norm() > SHORT {
-        (place(series, stamp_ns) - from).dot(&way) / way.norm_squared()
+    if way.norm() > SHORT {
+        ((place(series, stamp_ns) - from).dot(&way) / way.norm_squared()).clamp(0.0, 1.0)
     } else {
-        stamp_ns.saturating_sub(first) as f64 / last.saturating_sub(first).max(1) as f64
-    };
-    share.clamp(0.0, 1.0)
+        of_time([first, last], stamp_ns)
+    }
 }
 
-fn progress(series: &ObjectSeries, rows: &[Row]) -> Vec<Progress> {
+fn of_time([first, last]: [u64; 2], stamp_ns: u64) -> f64 {
+    stamp_ns.saturating_sub(first) as f64 / last.saturating_sub(first).max(1) as f64
+}
+
+fn fractions(series: &ObjectSeries, rows: &[Row]) -> Vec<Fractions> {
     let (held, slide) = (span(rows, Part::Hit), span(rows, Part::Slide));
     // The hand-over: the first pose of the free slide, or the last that the tool moves.
     let held = held.map(|[first, last]| [first, slide.map_or(last, |[begins, _]| begins)]);
-    // An object that somebody let go slides from the start.
-    let let_go = if held.is_none() && slide.is_some() { 0.0 } else { 1.0 };
-    let mut furthest = Progress { held: 0.0, time: 0.0, way: 0.0 };
+    let mut furthest = Fractions { held: 0.0, time: 0.0, way: 0.0 };
     let at = |row: &Row| {
+        let stamp_ns = row.stamp_ns;
         let now = match row.part {
-            Part::Before => Progress { held: 0.0, time: 0.0, way: 0.0 },
-            Part::Hit => {
-                Progress { held: held.map_or(0.0, |held| share(series, held, row.stamp_ns)), time: 0.0, way: 0.0 }
-            }
-            Part::Slide => {
-                let time = slide.map_or(0.0, |[first, last]| {
-                    row.stamp_ns.saturating_sub(first) as f64 / last.saturating_sub(first).max(1) as f64
-                });
-                Progress { held: let_go, time, way: slide.map_or(0.0, |slide| share(series, slide, row.stamp_ns)) }
-            }
-            Part::After => Progress { held: let_go, time: 1.0, way: 1.0 },
+            Part::Before => furthest,
+            Part::Hit => Fractions { held: held.map_or(0.0, |held| of_way(series, held, stamp_ns)), ..furthest },
+            Part::Slide => Fractions {
+                held: 1.0,
+                time: slide.map_or(0.0, |slide| of_time(slide, stamp_ns)),
+                way: slide.map_or(0.0, |slide| of_way(series, slide, stamp_ns)),
+            },
+            Part::After => Fractions { held: 1.0, time: 1.0, way: 1.0 },
         };
-        furthest = Progress {
-            held: furthest.held.max(now.held),
-            time: furthest.time.max(now.time),
-            way: furthest.way.max(now.way),
-        };
+        // A tracker's noise moves nothing back.
+        furthest = Fractions { held: furthest.held.max(now.held), time: now.time, way: furthest.way.max(now.way) };
         furthest
     };
     rows.iter().map(at).collect()
@@ -201,21 +198,13 @@ mod tests {
         let (series, rows) = stroke();
         let along = direction(&series, &rows);
         assert!(along[0].abs() < 1e-9 && (along[1] - 1.0).abs() < 1e-9, "{along:?}");
-        let progress = progress(&series, &rows);
-        let nothing = Progress { held: 0.0, time: 0.0, way: 0.0 };
-        assert_eq!(progress[10], nothing, "the touch");
-        assert_eq!(progress[39], Progress { held: 1.0, time: 1.0, way: 1.0 });
+        let fractions = fractions(&series, &rows);
+        let nothing = Fractions { held: 0.0, time: 0.0, way: 0.0 };
+        assert_eq!(fractions[10], nothing, "the touch");
+        assert_eq!(fractions[39], Fractions { held: 1.0, time: 1.0, way: 1.0 });
         // Half of the time of the slide: three quarters of its way.
-        let half = progress[25];
+        let half = fractions[25];
         assert!((half.time - 0.5).abs() < 1e-9 && (half.way - 0.75).abs() < 1e-9 && half.held == 1.0, "{half:?}");
-        assert!((0.4..0.8).contains(&progress[13].held) && progress[13].time == 0.0, "{:?}", progress[13]);
-    }
-
-    #[test]
-    fn an_object_that_somebody_let_go_is_not_shifted_at_its_start() {
-        let (series, mut rows) = stroke();
-        rows.retain(|row| row.part != Part::Hit);
-        let progress = progress(&series, &rows);
-        assert!(progress.iter().all(|progress| progress.held == 0.0));
+        assert!((0.4..0.8).contains(&fractions[13].held) && fractions[13].time == 0.0, "{:?}", fractions[13]);
     }
 }

@@ -158,7 +158,7 @@ impl<E: Evidence> Bench<'_, E> {
 
     fn fitted(
         &self,
-        (effects, mut full): (&[usize], Vec<f64>),
+        (effects, full): (&[usize], Vec<f64>),
         from: Clips,
         weights: &[f64],
         effort: Effort,
@@ -166,22 +166,10 @@ impl<E: Evidence> Bench<'_, E> {
         let free = self.free(effects);
         let holds = |k: &usize| effort.holds_joints && self.library.joints[*k].is_some();
         let moving: Vec<usize> = free.iter().copied().filter(|k| !holds(k)).collect();
-        let mut clips = self.own_fitted(&full, from, weights)?;
-        clips = self.restarted(&full, clips, weights);
-        let mut damping = 1e-4;
-        let mut best = None;
-        for _ in 1..effort.iterations {
-            if self.interrupt.asked() {
-                break;
-            }
-            let at = self.linearise(&full, &moving, &clips, effort.precision)?;
-            let forms = at.reduced(self.evidence, weights);
-            let Some((to, to_own)) = self.improved(&full, &moving, (&at, &forms), weights, &mut damping) else {
-                best = Some(at);
-                break;
-            };
-            (full, clips) = (to, to_own);
-        }
+        let clips = self.own_fitted(&full, from, weights)?;
+        let clips = self.restarted(&full, clips, weights);
+        let before_last = Effort { iterations: effort.iterations.saturating_sub(1), ..effort };
+        let (full, clips, best) = self.descended((full, clips), &moving, weights, before_last)?;
         let restarted = self.restarted(&full, clips.clone(), weights);
         let at = match best.filter(|_| moving.len() == free.len() && restarted == clips) {
             Some(at) => at,
@@ -192,25 +180,39 @@ impl<E: Evidence> Bench<'_, E> {
         Some(Hypothesis { effects: effects.to_vec(), full, free, fitted: fitted.collect() })
     }
 
-    /// The clips of a hypothesis fitted by chosen numbers alone from `full` on, in at most so many linearisations: what they cost
-    /// then, and the numbers. `None` when the twin has no answer at the start.
-    pub(super) fn turned(
+    /// Damped steps of some numbers and of the clips' own; the last linearisation too, where no step from it was worth it.
+    fn descended(
         &self,
-        (from, full): (&Hypothesis, Vec<f64>),
-        chosen: &[usize],
+        (mut full, mut clips): (Vec<f64>, Clips),
+        moving: &[usize],
         weights: &[f64],
-        iterations: usize,
-    ) -> Option<(f64, Vec<f64>)> {
-        let own = |fitted: &FittedClip| (fitted.clip, fitted.own.clone());
-        let (mut full, mut clips): (_, Clips) = (full, from.fitted.iter().map(own).collect());
+        effort: Effort,
+    ) -> Option<(Vec<f64>, Clips, Option<Swept>)> {
         let mut damping = 1e-4;
-        for _ in 0..iterations {
-            let at = self.linearise(&full, chosen, &clips, Precision::Joints)?;
+        for _ in 0..effort.iterations {
+            if self.interrupt.asked() {
+                break;
+            }
+            let at = self.linearise(&full, moving, &clips, effort.precision)?;
             let forms = at.reduced(self.evidence, weights);
-            let better = self.improved(&full, chosen, (&at, &forms), weights, &mut damping);
-            let Some((to, to_own)) = better.filter(|_| !self.interrupt.asked()) else { break };
+            let Some((to, to_own)) = self.improved(&full, moving, (&at, &forms), weights, &mut damping) else {
+                return Some((full, clips, Some(at)));
+            };
             (full, clips) = (to, to_own);
         }
+        Some((full, clips, None))
+    }
+
+    /// What the clips of a hypothesis cost at `full` after one step of some numbers alone, and the numbers then. `None` when the
+    /// twin has no answer there.
+    pub(super) fn after_a_step(
+        &self,
+        (from, full): (&Hypothesis, Vec<f64>),
+        moving: &[usize],
+        weights: &[f64],
+    ) -> Option<(f64, Vec<f64>)> {
+        let clips = from.fitted.iter().map(|fitted| (fitted.clip, fitted.own.clone())).collect();
+        let (full, clips, _) = self.descended((full, clips), moving, weights, Effort::of(1, Precision::Joints))?;
         Some((self.cost(&full, &clips, weights)?, full))
     }
 

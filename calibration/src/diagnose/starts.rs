@@ -82,13 +82,7 @@ fn pointed_at<E: Evidence>(bench: &Bench<'_, E>, at: (&Hypothesis, &[f64]), scor
     if has_places(bench, scored.candidate) {
         numbers.extend(placed(bench, at, scored));
     }
-    if candidate.is_searched(Search::Limit) {
-        numbers.push(one_by_one(bench, at, numbers[0].clone(), &candidate.sizes, &STEPPED));
-        numbers.push(limits(bench, at, candidate, with_nominal_arm(bench, at.0.full.clone())));
-    }
-    if candidate.is_searched(Search::Threshold) {
-        numbers.push(joint_by_joint(bench, at, candidate));
-    }
+    numbers.extend(without_a_slope(bench, at, candidate));
     if candidate.is_searched(Search::InStep) {
         numbers.extend(ripple::start(bench, at, scored.candidate));
     }
@@ -139,8 +133,21 @@ fn scanned<E: Evidence>(bench: &Bench<'_, E>, at: (&Hypothesis, &[f64]), scored:
     let most = FAR_OFF * bench.plain_cost(at.0, &at.0.full, at.1).unwrap_or(f64::INFINITY);
     let start = cheapest_below(bench, at, numbers.chain(in_step), most);
     let candidate = &bench.library.candidates[scored.candidate];
-    let by_joint = candidate.is_searched(Search::Threshold).then(|| joint_by_joint(bench, at, candidate));
-    start.map(|(_, full)| full).into_iter().chain(by_joint).collect()
+    start.map(|(_, full)| full).into_iter().chain(without_a_slope(bench, at, candidate)).collect()
+}
+
+/// Numbers of an effect to which no slope leads, joint by joint.
+fn without_a_slope<E: Evidence>(
+    bench: &Bench<'_, E>,
+    at: (&Hypothesis, &[f64]),
+    candidate: &Candidate,
+) -> Vec<Vec<f64>> {
+    let fitted = at.0.full.clone();
+    if candidate.is_searched(Search::Limit) {
+        let nominal = with_nominal_arm(bench, fitted.clone());
+        return vec![limits(bench, at, candidate, fitted), limits(bench, at, candidate, nominal)];
+    }
+    if candidate.is_searched(Search::Threshold) { vec![joint_by_joint(bench, at, candidate)] } else { Vec::new() }
 }
 
 /// Limits of joints, each time that of the joint where the clips then cost least, for as long as that spares something: until the
@@ -194,7 +201,7 @@ fn joint_by_joint<E: Evidence>(
             tried[size] = value.clamp(unknown.lower, unknown.upper);
             tried
         };
-        let tried = BY_JOINT.iter().filter_map(|share| bench.turned((from, with(*share)), &chosen, weights, 1));
+        let tried = BY_JOINT.iter().filter_map(|share| bench.after_a_step((from, with(*share)), &chosen, weights));
         let best = tried.min_by(|a, b| a.0.total_cmp(&b.0));
         let now = bench.plain_cost(from, &full, weights).unwrap_or(f64::INFINITY);
         full = best.filter(|(cost, _)| *cost < now).map_or(full, |(_, better)| better);
@@ -207,10 +214,13 @@ fn joint_by_joint<E: Evidence>(
 
 /// The numbers with gains as cell.toml has them: where an arm is driven into its limits, gains that were fitted without these mean
 /// nothing.
-fn with_nominal_arm<E: Evidence>(bench: &Bench<'_, E>, mut full: Vec<f64>) -> Vec<f64> {
-    for k in bench.library.baseline.clone().filter(|k| bench.library.joints[*k].is_some()) {
-        full[k] = bench.library.unknowns[k].start;
-    }
+fn with_nominal_arm<E: Evidence>(bench: &Bench<'_, E>, full: Vec<f64>) -> Vec<f64> {
+    with_nominal(bench, full, |k| bench.library.joints[k].is_some())
+}
+
+/// The numbers with some of the baseline's as cell.toml has them.
+fn with_nominal<E: Evidence>(bench: &Bench<'_, E>, mut full: Vec<f64>, which: impl Fn(usize) -> bool) -> Vec<f64> {
+    bench.library.baseline.clone().filter(|k| which(*k)).for_each(|k| full[k] = bench.library.unknowns[k].start);
     full
 }
 
@@ -276,13 +286,9 @@ fn one_by_one<E: Evidence>(
 
 /// The numbers with the baseline's object as cell.toml has it, but for its friction: how far it slides tells that whatever
 /// the hit was like.
-fn with_nominal_object<E: Evidence>(bench: &Bench<'_, E>, mut full: Vec<f64>) -> Vec<f64> {
-    let library = bench.library;
-    let of_object = |k: &usize| !library.arm_feels(*k, &full) && library.settings.settings()[*k] != Setting::Friction;
-    for k in library.baseline.clone().filter(of_object).collect::<Vec<_>>() {
-        full[k] = library.unknowns[k].start;
-    }
-    full
+fn with_nominal_object<E: Evidence>(bench: &Bench<'_, E>, full: Vec<f64>) -> Vec<f64> {
+    let (library, at) = (bench.library, full.clone());
+    with_nominal(bench, full, |k| !library.arm_feels(k, &at) && library.settings.settings()[k] != Setting::Friction)
 }
 
 /// Which numbers make the fitted clips cost least, and how much, where that is less than `bound`. Of numbers that cost more
@@ -346,18 +352,15 @@ mod tests {
         let peaks = arm.peaks(&[]).expect("it can be simulated");
         // Two joints are cut short, each to its own share of what it needs.
         let shares = [None, Some(0.8), None, Some(0.88), None, None, None];
-        let limits = shares.iter().zip(peaks).map(|(share, peak)| share.map_or(1e3, |share: f64| share * peak));
-        let limits = limits.collect::<Vec<f64>>();
-        let parameters = [("limit".to_owned(), limits.clone().into())].into();
+        let cut_short = shares.iter().zip(peaks).map(|(share, peak)| share.map_or(1e3, |share: f64| share * peak));
+        let parameters = [("limit".to_owned(), cut_short.collect::<Vec<f64>>().into())].into();
         let cut = EffectTheta { name: "torque_saturation".into(), parameters };
         let world = World { hidden: Theta { effects: vec![cut], ..well.hidden.clone() }, ..well };
         let library = Library::new(&cell, &base, None, &peaks);
         let candidate = library.find("torque_saturation").expect("a candidate");
-        let scored = nothing_said_of(&library, candidate);
         let begun = on_bench((&cell, &world), &library, |bench, even| {
             let baseline = bench.fit((&[], library.start()), &[0, 1], even, None, ONCE).expect("a fit");
-            let from = bench.begun(library.start(), &scored);
-            one_by_one(bench, (&baseline, even), from, &library.candidates[candidate].sizes, &STEPPED)
+            limits(bench, (&baseline, even), &library.candidates[candidate], library.start())
         });
         for ((size, share), peak) in library.candidates[candidate].sizes.iter().zip(shares).zip(peaks) {
             let found = (begun[*size] * peak).recip();
