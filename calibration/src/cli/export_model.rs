@@ -77,7 +77,14 @@ pub(super) fn run(arguments: &ExportModelArguments) -> anyhow::Result<()> {
     let place = Destination::of(out.as_deref(), *force)?;
     let is_session = from.is_dir();
     let folder = if is_session { from.as_path() } else { from.parent().unwrap_or(Path::new("")) };
-    let cell = Cell::read(&cell.clone().unwrap_or_else(|| folder.join("cell.toml")))?;
+    anyhow::ensure!(from.exists(), "there is no {}; give a session folder or a theta.toml", from.display());
+    let stated = cell.clone().unwrap_or_else(|| folder.join("cell.toml"));
+    anyhow::ensure!(
+        cell.is_some() || stated.is_file(),
+        "there is no {}; say with --cell which cell.toml it is",
+        stated.display()
+    );
+    let cell = Cell::read(&stated)?;
     let beside = folder.join("theta.toml");
     let theta = match parameters {
         Some(file) => Theta::read(file)?,

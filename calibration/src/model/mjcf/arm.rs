@@ -22,7 +22,7 @@ impl File {
         if arm.compensates {
             self.sheet.lacks(
                 "the controller's compensation of Coriolis torques",
-                "MJCF compensates gravity alone: add them as qfrc_applied, as docs/export_model.md does in four lines",
+                "MJCF compensates gravity alone: add them as qfrc_applied, as docs/export_model.md does",
             );
         }
         for joint in &arm.joints {
