@@ -44,6 +44,8 @@ pub(super) const PLAIN: f64 = 0.3;
 pub(super) const NEARLY_ALL: f64 = 0.85;
 /// An advantage of so many of its errors is no chance.
 const CLEAR: f64 = 3.5;
+/// More than half of a gap is most of it.
+const MOST_OF_IT: f64 = 0.5;
 /// An effect that leads is worth this share more than others: two effects of nearly the same worth do the same.
 const AHEAD: f64 = 0.2;
 /// Engines integrate one and the same effect differently by a hundredth of it, so by this share of the squared gap.
@@ -400,9 +402,13 @@ impl Step {
     /// what it is worth, or by a fifth and clip by clip far beyond chance.
     #[must_use]
     pub fn leads(&self, library: &Library, candidate: usize) -> bool {
-        let fitted = |trial: &Trial| trial.fitted.as_ref().map(|(_, advantage)| advantage.clone());
-        let own = self.trials.iter().find(|trial| trial.scored.candidate == candidate).and_then(fitted);
-        let Some(own) = own.filter(|a| a.share > NEARLY_ALL && a.nats > CLEAR * a.error) else { return false };
+        let Some(trial) = self.trials.iter().find(|trial| trial.scored.candidate == candidate) else { return false };
+        let Some((_, own)) = trial.fitted.as_ref() else { return false };
+        // Where every clip gains and most of the gap closes, the scatter between gains says how unequal clips are.
+        let in_all = own.share == 1.0 && trial.closes > MOST_OF_IT;
+        if own.share <= NEARLY_ALL || !in_all && own.nats <= CLEAR * own.error {
+            return false;
+        }
         let ahead_of = |trial: &Trial| {
             let (beyond, error) = trial.fitted.as_ref().map_or((f64::INFINITY, 0.0), |(_, other)| own.beyond(other));
             beyond > CLEAR * error && beyond > AHEAD * own.nats

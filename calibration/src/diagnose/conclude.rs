@@ -7,7 +7,7 @@ use super::combine::{Found, Step};
 use super::evidence::{Evidence, Group};
 use super::fit::{Bench, Hypothesis};
 use super::gap::Residuals;
-use super::headline::{self, Facts};
+use super::headline::{self, Facts, Shrunk};
 use super::held_out::{self, Fits};
 use super::partly::{self, Partly};
 use super::remainder::{self, Left};
@@ -113,7 +113,7 @@ pub fn conclude<E: Evidence>(
     let unproven = unproven::unproven(bench, found);
     let closed = |open| share_of(bench, split, (open, &first.weights), (&before, options.seed));
     let open = unproven.as_ref().and_then(|open| Some((open, closed(open)?)));
-    let facts = facts(bench, found, (size, open), [&places, &rest], after.shrink(&before, options.seed).value);
+    let facts = facts(bench, found, (size, open), [&places, &rest], shrunk(&before, after, options.seed));
     let verdict = match &partly {
         Some(partly) => in_part(bench, partly, &facts, (&stays, &sizes)),
         None => {
@@ -200,7 +200,7 @@ fn facts<E: Evidence>(
     found: &Found,
     (size, unproven): (String, Option<(&Unproven<'_>, f64)>),
     places: [&[Place]; 2],
-    shrink: f64,
+    shrink: Shrunk,
 ) -> Facts {
     let [place, rest] = places.map(|places| places.first().map_or_else(String::new, place_in_words));
     let effects = found.last.effects.iter().map(|effect| with_size(bench, &found.last, *effect)).collect();
@@ -217,7 +217,7 @@ fn in_part<E: Evidence>(
     (stays, sizes): (&str, &Sizes),
 ) -> Verdict {
     let looks_like = partly.looks_like(bench);
-    let text = headline::in_part(facts, &partly.share, stays, looks_like);
+    let text = headline::in_part(facts, (&partly.share, partly.unusual), stays, looks_like);
     let (place, looks_like) = (facts.rest.clone(), looks_like.map(str::to_owned));
     Verdict {
         kind: Kind::Named,
@@ -253,11 +253,23 @@ fn next(verdict: &Verdict, open: bool, largest: Option<(&str, &str)>, site: &Sit
     }
 }
 
-/// Whether enough of the gap closes on the confirm clips for a cause, in their mean or in a clip like most.
+/// The share that is explained of what is not noise in a clip like most, in the group of sensors of which that is most.
+fn usual(before: &Residuals, after: &Residuals) -> f64 {
+    Left::of_groups(&before.typical(), &after.typical()).iter().map(Left::explained).fold(0.0, f64::max)
+}
+
+/// How far the gap shrinks on the confirm clips.
+fn shrunk(before: &Residuals, after: &Residuals, seed: u64) -> Shrunk {
+    let (mean, clips) = (after.shrink(before, seed).value, after.clips_that_shrink(before));
+    Shrunk { mean, usual: usual(before, after), clips }
+}
+
+/// Whether enough of the gap closes on the confirm clips for a cause: in the mean of most of them, or in a clip like most. One hit
+/// that goes another way, because it met a corner or did not, outweighs all other clips in the mean of squares.
 fn confirms(before: &Residuals, after: &Residuals) -> bool {
     let mean = remainder::explained(before.mean_square(), after.mean_square(), before.floor());
-    let usual = Left::of_groups(&before.typical(), &after.typical()).iter().map(Left::explained).fold(mean, f64::max);
-    after.mean_square() < before.mean_square() && usual > combine::CLOSES
+    let [shrinks, all] = after.clips_that_shrink(before);
+    2 * shrinks > all && mean.max(usual(before, after)) > combine::CLOSES
 }
 
 fn finding<'a, E: Evidence>(

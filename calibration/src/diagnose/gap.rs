@@ -107,6 +107,13 @@ impl Residuals {
         mean(&self.sums, &(0..self.clips.len()).collect::<Vec<_>>())
     }
 
+    /// In how many clips the mean square is smaller than `before`, and how many clips there are.
+    #[must_use]
+    pub fn clips_that_shrink(&self, before: &Self) -> [usize; 2] {
+        let falls = |clip: &usize| mean(&self.sums, &[*clip]) < mean(&before.sums, &[*clip]);
+        [(0..self.clips.len()).filter(falls).count(), self.clips.len()]
+    }
+
     /// The shrink `1 - after / before` of the mean square from `before` to this, with an interval from drawing clips anew,
     /// or pieces of them where there are few.
     #[must_use]
@@ -206,6 +213,11 @@ mod tests {
     fn one_clip_that_went_its_own_way_does_not_make_the_typical_one() {
         let [typical] = residuals(&[1.0, 1.0, 1.0, 30.0]).typical()[..] else { panic!("one group") };
         assert!((typical.mean_square - 30f64.sqrt()).abs() < 1e-9 && typical.floor == 1.0, "{typical:?}");
+    }
+
+    #[test]
+    fn clips_are_counted_in_which_the_gap_shrinks() {
+        assert_eq!(residuals(&[1.0, 1.9, 9.0]).clips_that_shrink(&residuals(&[2.0; 3])), [2, 3]);
     }
 
     #[test]

@@ -1,6 +1,7 @@
 //! The finding in one sentence of plain words: how large the gap is and where, which effect causes it, how far it shrinks.
 
 use super::answer::{Kind, Share};
+use super::combine::CLOSES;
 use super::verdict::{Decision, Finding};
 use crate::report::percent;
 
@@ -17,8 +18,31 @@ pub struct Facts {
     pub effects: Vec<String>,
     /// An effect with its size, the share of the gap that it closes, and how many clips do not prove it and how many more would.
     pub unproven: Option<(String, f64, [usize; 2])>,
-    /// The shrink with all of them in the twin, see [`super::gap::Residuals::shrink`].
-    pub shrink: f64,
+    /// The shrink with all of them in the twin.
+    pub shrink: Shrunk,
+}
+
+/// How far the gap shrinks on held-out clips.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Shrunk {
+    /// Of the mean squared residual, see [`super::gap::Residuals::shrink`].
+    pub mean: f64,
+    /// Of what is not noise in a clip like most, see [`super::remainder::Left::explained`].
+    pub usual: f64,
+    /// In how many clips it does, and of how many.
+    pub clips: [usize; 2],
+}
+
+impl Shrunk {
+    /// `by 96 % on held-out clips`. Where one clip outweighs all others, what most do, and in how many it grows.
+    fn in_words(&self) -> String {
+        let [shrinks, all] = self.clips;
+        if self.mean >= CLOSES || shrinks == all {
+            let percent = percent(self.mean).replace("> ", "more than ").replace("< ", "less than ");
+            return format!("by {percent} on held-out clips");
+        }
+        format!("by {} in a held-out clip like most, but grows in {} of {all}", percent(self.usual), all - shrinks)
+    }
 }
 
 /// Residuals beyond this multiple of the noise are said, even where they are no gap.
@@ -33,11 +57,6 @@ pub fn sentence(decision: &Decision, finding: &Finding<'_>, facts: &Facts) -> St
         Kind::Class => class(finding, facts),
         Kind::Unexplained | Kind::NotTestable => unexplained(decision, finding, facts),
     }
-}
-
-/// The shrink as it stands in a sentence.
-fn shrink(facts: &Facts) -> String {
-    percent(facts.shrink).replace("> ", "more than ").replace("< ", "less than ")
 }
 
 /// An effect's name as words.
@@ -74,16 +93,18 @@ fn named(finding: &Finding<'_>, facts: &Facts) -> String {
         _ => ("the gap", String::new()),
     };
     format!(
-        "{} {verb} {whose}, {}: with {these} in the twin the gap shrinks by {} on held-out clips{rest}.",
+        "{} {verb} {whose}, {}: with {these} in the twin the gap shrinks {}{rest}.",
         facts.effects.join(" and "),
         size_and_place(facts),
-        shrink(facts)
+        facts.shrink.in_words()
     )
 }
 
-/// The sentence where what was found is proven, but a part of the gap stays. `after`: how large that is.
+/// The sentence where what was found is proven, but a part of the gap stays. `share`: what it explains, and whether it is stronger
+/// than what is met in practice; `after`: how large what stays is.
 #[must_use]
-pub fn in_part(facts: &Facts, share: &Share, after: &str, looks_like: Option<&str>) -> String {
+pub fn in_part(facts: &Facts, (share, unusual): (&Share, bool), after: &str, looks_like: Option<&str>) -> String {
+    let strength = if unusual { ", stronger than it is met in practice," } else { "" };
     let (verb, these) = if facts.effects.len() == 1 { ("explains", "it") } else { ("together explain", "them") };
     let alike = match looks_like {
         Some(effect) => format!("; {} explains most of that", words(effect)),
@@ -91,10 +112,10 @@ pub fn in_part(facts: &Facts, share: &Share, after: &str, looks_like: Option<&st
     };
     let [low, high] = share.ci90.map(percent);
     format!(
-        "{} {verb} {} of the squared gap ({low} to {high}), {}: with {these} in the twin {after} stay on held-out clips, largest \
+        "{}{strength} {verb} {} of the squared gap ({low} to {high}), {}: with {these} in the twin {after} stay on held-out clips, largest \
          in {}{alike}.",
         facts.effects.join(" and "),
-        shrink(facts),
+        percent(share.value),
         size_and_place(facts),
         facts.rest
     )
@@ -105,11 +126,10 @@ fn class(finding: &Finding<'_>, facts: &Facts) -> String {
     let all: Vec<String> = facts.effects.iter().cloned().chain(rivals).collect();
     let these = if facts.effects.len() == 1 { "the first" } else { "those whose size is given" };
     format!(
-        "One of {} causes the gap, {}: with {these} in the twin the gap shrinks by {} on held-out clips, and these clips cannot \
-         separate them.",
+        "One of {} causes the gap, {}: with {these} in the twin the gap shrinks {}, and these clips cannot separate them.",
         all.join(", "),
         size_and_place(facts),
-        shrink(facts)
+        facts.shrink.in_words()
     )
 }
 
@@ -125,7 +145,7 @@ fn unexplained(decision: &Decision, finding: &Finding<'_>, facts: &Facts) -> Str
     } else {
         let strength = if finding.implausible { ", stronger than it is met in practice," } else { "" };
         let shrinks = if finding.confirmed {
-            format!("shrinks it by {} on held-out clips and leaves more than a cause does", shrink(facts))
+            format!("shrinks it {} and leaves more than a cause does", facts.shrink.in_words())
         } else {
             "does not shrink it on the clips kept for confirming".to_owned()
         };
@@ -166,7 +186,7 @@ mod tests {
             rest: "yaw (after the slide)".into(),
             effects: effects.iter().map(|name| (*name).to_owned()).collect(),
             unproven: None,
-            shrink: 0.963,
+            shrink: Shrunk { mean: 0.963, usual: 0.97, clips: [4, 4] },
         }
     }
 
@@ -191,19 +211,26 @@ mod tests {
     }
 
     #[test]
+    fn a_clip_that_outweighs_the_others_is_said_and_not_averaged() {
+        let shrink = Shrunk { mean: -0.15, usual: 0.62, clips: [3, 4] };
+        let found = finding(vec!["camera_scale"], 30.0, 1.5);
+        let text = sentence(&found.decide(), &found, &Facts { shrink, ..facts(&["camera scale (scale 0.02)"]) });
+        assert!(text.ends_with("the gap shrinks by 62 % in a held-out clip like most, but grows in 1 of 4."), "{text}");
+    }
+
+    #[test]
     fn what_is_proven_is_said_with_what_stays() {
         let share = Share { value: 0.963, ci90: [0.94, 0.98] };
-        let text = in_part(&facts(&["command lag (lag 15.4 ms)"]), &share, "0.40 mrad RMS", Some("payload"));
+        let text = in_part(&facts(&["command lag (lag 15.4 ms)"]), (&share, false), "0.40 mrad RMS", Some("payload"));
         assert_eq!(
             text,
             "command lag (lag 15.4 ms) explains 96 % of the squared gap (94 % to 98 %), 2.13 mrad RMS, largest in joint 2 \
              (reversal): with it in the twin 0.40 mrad RMS stay on held-out clips, largest in yaw (after the slide); payload \
              explains most of that."
         );
-        assert!(
-            in_part(&facts(&["payload"]), &share, "1 mm", None)
-                .ends_with("no effect of the library explains much of that.")
-        );
+        let text = in_part(&facts(&["payload"]), (&share, true), "1 mm", None);
+        assert!(text.ends_with("no effect of the library explains much of that."), "{text}");
+        assert!(text.starts_with("payload, stronger than it is met in practice, explains 96 %"), "{text}");
     }
 
     #[test]

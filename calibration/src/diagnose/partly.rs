@@ -2,9 +2,10 @@
 //! needs is what acts, how much of the gap it closes, and what is left.
 //!
 //! Effects are taken in the order in which they were found. They are believed as long as each stood out on clips that were
-//! not fitted (nearly all of them, far beyond chance, no other effect half as good), is no stronger than what is met in
-//! practice, and all together close a real share of the squared gap on the clips kept for confirming: the whole 90 %
-//! interval of the share lies above it. What comes after them in the search belongs to the rest.
+//! not fitted (nearly all of them, far beyond chance, no other effect half as good), and all together close a real share of the
+//! squared gap on the clips kept for confirming: the whole 90 % interval of the share lies above it. One that is stronger than
+//! what is met in practice is said to be unusual: a range is what is known beforehand, and no bar for what the clips show.
+//! What comes after them in the search belongs to the rest.
 
 use super::answer::Share;
 use super::combine::{Found, Step};
@@ -30,6 +31,8 @@ pub(super) struct Partly {
     pub(super) after: Residuals,
     /// Share of the squared gap that it closes there.
     pub(super) share: Share,
+    /// Whether an effect is stronger than what is met in practice.
+    pub(super) unusual: bool,
 }
 
 /// The most effects that are proven; `None` where not even the first is. `before`: what the baseline leaves on the clips kept
@@ -46,13 +49,14 @@ pub(super) fn proven<E: Evidence>(
         let weights = &with_effects(&found.steps, count).or(found.steps.last())?.weights;
         let last = if count == all { &found.last } else { &with_effects(&found.steps, count)?.from };
         let until = Found { steps: found.steps.clone(), last: last.clone() };
-        if !each_stands_out(bench, &until, overdispersion) || !remainder::implausible(bench, last).is_empty() {
+        if !each_stands_out(bench, &until, overdispersion) {
             return None;
         }
         let fits = held_out::fits(bench, split, (last, weights))?;
         let after = Residuals::of(bench, &fits)?;
         let share = after.shrink(before, seed);
-        (share.ci90[0] > REAL_SHARE).then_some(Partly { found: until, fits, after, share })
+        let unusual = !remainder::implausible(bench, last).is_empty();
+        (share.ci90[0] > REAL_SHARE).then_some(Partly { found: until, fits, after, share, unusual })
     };
     (1..=all).rev().find_map(one)
 }
