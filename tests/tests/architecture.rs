@@ -189,6 +189,28 @@ fn a_thread_that_panics_takes_no_other_along() {
 }
 
 #[test]
+fn what_identifies_and_diagnoses_names_no_effect() {
+    let of = |(_, text): (String, String)| {
+        let (_, after) = text.split_once("EffectInfo = EffectInfo {\n    name: \"")?;
+        after.split_once('"').map(|(name, _)| format!("\"{name}\""))
+    };
+    let effects: Vec<String> = sources("twin/src/effects").into_iter().filter_map(of).collect();
+    assert!(effects.len() > 30, "{effects:?}");
+    let folders = ["check", "diagnose", "estimate", "forward", "identify"].map(|f| format!("calibration/src/{f}/"));
+    for (file, text) in product_sources().into_iter().filter(|(file, _)| folders.iter().any(|f| file.starts_with(f))) {
+        let is_test = file.contains("test_") || file.contains("/injected/");
+        let product = text.split("#[cfg(test)]").next().unwrap_or("").lines();
+        for line in product.filter(|line| !is_test && !line.trim_start().starts_with("//")) {
+            let named = effects.iter().find(|name| line.contains(name.as_str()));
+            assert!(
+                named.is_none() || line.contains("Self::TipFriction"),
+                "{file}: {line}: an effect speaks for itself"
+            );
+        }
+    }
+}
+
+#[test]
 fn dependencies_point_one_way() {
     let rules: [(&str, &[&str]); 5] = [
         ("shared_mem", &["twin", "rt_bridge", "calibration", "import"]),

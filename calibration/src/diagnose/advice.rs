@@ -1,12 +1,12 @@
 //! What to record next: a sentence, and the commands that record it.
 //!
-//! Where two effects are easily taken for each other the table has what separates them; where it has not, the stages they
+//! Where two effects are easily taken for each other one of them says what separates them; where neither does, the stages they
 //! show in decide. What no capture can do, a weight to be hung or an object to be put somewhere, stands in the sentence first.
 
 use super::headline::words;
 use super::site::Site;
 use crate::report::channel_in_words;
-use twin::effects::{Stage, find};
+use twin::effects::{Experiment, Separation, Stage, find};
 
 /// What to record next.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
@@ -33,121 +33,43 @@ pub(super) enum Capture {
 use Capture::{Arm, Elsewhere, StrokeAgain, Strokes};
 
 const CHIRP: Capture = Arm("--clips 1 --motion chirp --frequency 0.2 10");
-const FAST_CHIRP: Capture = Arm("--clips 1 --motion chirp --frequency 0.5 40");
 const RAMP: Capture = Arm("--clips 1 --motion ramp --ramp-speeds 0.005 0.5");
 const HOLD: Capture = Arm("--clips 1 --motion hold --poses 8");
-const MANY_HOLDS: Capture = Arm("--clips 1 --motion hold --poses 12 --amplitude 0.8");
-const NEW_MOTION: Capture = Arm("--clips 1");
 const HEADINGS: Capture = Strokes("--headings 8");
 const TURNED: Capture = Strokes("--turn-object 0,90,180");
 const ONE_STROKE: Capture = Strokes("--clips 1");
+const AGAIN_SLOWER: Capture = StrokeAgain("--speed 0.5");
+const SLOWER: Capture = Strokes("--clips 4 --speed 0.5");
 
-/// Pairs, what separates them, and what records it.
-const PAIRS: &[(&str, &str, &str, &[Capture])] = &[
-    (
-        "joint_coulomb_friction",
-        "joint_load_friction",
-        "slow ramps once with the arm stretched out and once folded; move it there by hand before each",
-        &[RAMP, RAMP],
-    ),
-    (
-        "joint_coulomb_friction",
-        "joint_stribeck_friction",
-        "slow ramps from 0.005 to 0.5 rad/s with many reversals",
-        &[RAMP],
-    ),
-    (
-        "joint_viscous_friction",
-        "torque_delay",
-        "a chirp up to 40 Hz with torques logged: a delay lags the more the faster it swings, friction does not",
-        &[FAST_CHIRP],
-    ),
-    ("command_delay", "command_lag", "a chirp up to 10 Hz: only a lag lowers the gain", &[CHIRP]),
-    (
-        "command_delay",
-        "camera_latency",
-        "a chirp, and a stroke again at half its speed: a late command is late in the encoders too, a late camera only in the poses",
-        &[CHIRP, StrokeAgain("--speed 0.5")],
-    ),
-    (
-        "joint_stribeck_friction",
-        "joint_backlash",
-        "approach poses from both sides; then hang a weight on the flange that keeps the gears pressed, and do it again in a session of its own whose cell.toml has the weight",
-        &[HOLD],
-    ),
-    (
-        "joint_coulomb_friction",
-        "joint_backlash",
-        "approach poses from both sides, and run slow ramps: friction holds at any load, play only where the torque changes its sign",
-        &[HOLD, RAMP],
-    ),
-    (
-        "rotor_inertia",
-        "payload",
-        "the same kind of fast motion in three poses, because a payload's inertia changes with the pose; move the arm by hand before each",
-        &[NEW_MOTION, NEW_MOTION, NEW_MOTION],
-    ),
-    ("rotor_inertia", "joint_elasticity", "a chirp up to 40 Hz: look for a resonance", &[FAST_CHIRP]),
-    ("payload", "torque_gain", "rest in eight poses or more, gravity pulling either way", &[HOLD]),
-    ("payload", "joint_friction_asymmetry", "rest in eight poses or more, gravity pulling either way", &[HOLD]),
-    ("payload", "base_tilt", "rest in eight poses or more, turned about the base's axis", &[MANY_HOLDS]),
-    (
-        "torque_sensor_bias",
-        "joint_friction_asymmetry",
-        "hang a known weight on the flange and rest in eight poses, torques logged",
-        &[HOLD],
-    ),
-    (
-        "restitution",
-        "contact_compliance",
-        "strokes at half their speed beside those there are: restitution keeps the ratio of the speeds, compliance does not",
-        &[StrokeAgain("--speed 0.5"), Strokes("--clips 4 --speed 0.5")],
-    ),
-    (
-        "tip_friction",
-        "tool_offset",
-        "straight hits with the object turned by 0, 90 and 180 degrees, and one with the tool turned about its own axis",
-        &[TURNED, StrokeAgain("--turn-tool=-90")],
-    ),
-    (
-        "object_inertia",
-        "pressure_distribution",
-        "straight hits without spin and others beside the centre: inertia shows in the spin just after the hit, pressure in how it fades",
-        &[TURNED, Strokes("--clips 6")],
-    ),
-    ("table_tilt", "anisotropic_friction", "slides in eight headings through the same place", &[HEADINGS]),
-    ("table_tilt", "base_tilt", "rest the arm in eight poses, and slide in eight headings", &[HOLD, HEADINGS]),
-    (
-        "anisotropic_friction",
-        "friction_patch",
-        "the same place in different headings, and different places",
-        &[HEADINGS, Strokes("--clips 8")],
-    ),
-    (
-        "velocity_dependent_friction",
-        "viscous_sliding_drag",
-        "fix a known weight on top of the object, put its mass into a cell.toml of its own, and record the same kind of slides",
-        &[Elsewhere("weighted", "--clips 8")],
-    ),
-    (
-        "camera_latency",
-        "tracker_smoothing",
-        "fix a block where the object slides to, so that it stops sharply: smoothing rounds the stop, latency does not",
-        &[Strokes("--clips 4")],
-    ),
-    (
-        "camera_extrinsic_rotation",
-        "camera_extrinsic_translation",
-        "put the object in a place far from the last one before each of these",
-        &[ONE_STROKE, ONE_STROKE, ONE_STROKE, ONE_STROKE],
-    ),
-    (
-        "camera_scale",
-        "camera_extrinsic_rotation",
-        "put the object a known distance from the last place before each of these",
-        &[ONE_STROKE, ONE_STROKE],
-    ),
-];
+/// What records an experiment.
+fn capture(experiment: Experiment) -> Capture {
+    match experiment {
+        Experiment::Chirp => CHIRP,
+        Experiment::FastChirp => Arm("--clips 1 --motion chirp --frequency 0.5 40"),
+        Experiment::Ramps => RAMP,
+        Experiment::Holds => HOLD,
+        Experiment::ManyHolds => Arm("--clips 1 --motion hold --poses 12 --amplitude 0.8"),
+        Experiment::NewMotion => Arm("--clips 1"),
+        Experiment::StrokeAgainSlower => AGAIN_SLOWER,
+        Experiment::StrokeAgainToolTurned => StrokeAgain("--turn-tool=-90"),
+        Experiment::OneStroke => ONE_STROKE,
+        Experiment::Strokes => Strokes("--clips 8"),
+        Experiment::StrokesSlower => SLOWER,
+        Experiment::Headings => HEADINGS,
+        Experiment::ObjectTurned => TURNED,
+        Experiment::StrokesWeighted => Elsewhere("weighted", "--clips 8"),
+    }
+}
+
+/// What separates two effects, and their names in the order of the sentence.
+fn separation(a: &str, b: &str) -> Option<([&'static str; 2], &'static Separation)> {
+    let of = |one: &str, other: &str| {
+        let effect = find(one)?;
+        let apart = effect.separated.iter().find(|apart| apart.from == other)?;
+        Some(([effect.name, apart.from], apart))
+    };
+    of(a, b).or_else(|| of(b, a))
+}
 
 /// What separates effects of a stage where nothing more is known of them.
 fn general(stage: Stage) -> (&'static str, &'static [Capture]) {
@@ -155,12 +77,11 @@ fn general(stage: Stage) -> (&'static str, &'static [Capture]) {
         Stage::Control => ("slow ramps, a chirp and rests in eight poses, torques logged", &[RAMP, CHIRP, HOLD]),
         Stage::Hit => (
             "straight hits on the object turned by 0, 90 and 180 degrees, and a stroke again at half its speed",
-            &[TURNED, StrokeAgain("--speed 0.5")],
+            &[TURNED, AGAIN_SLOWER],
         ),
-        Stage::Slide => (
-            "slides in eight headings through the same place, and others at half their speed",
-            &[HEADINGS, Strokes("--clips 4 --speed 0.5")],
-        ),
+        Stage::Slide => {
+            ("slides in eight headings through the same place, and others at half their speed", &[HEADINGS, SLOWER])
+        }
         Stage::Camera => {
             ("strokes that begin in places far apart; put the object there before each", &[ONE_STROKE, ONE_STROKE])
         }
@@ -170,9 +91,10 @@ fn general(stage: Stage) -> (&'static str, &'static [Capture]) {
 /// What to record next to separate these effects.
 #[must_use]
 pub fn separating(effects: &[&str], site: &Site) -> Advice {
-    let both = |a: &str, b: &str| effects.contains(&a) && effects.contains(&b);
-    if let Some((a, b, clip, captures)) = PAIRS.iter().find(|(a, b, ..)| both(a, b)) {
-        return site.advice(format!("To separate {} from {}: {clip}.", words(a), words(b)), captures);
+    let pairs = effects.iter().enumerate().flat_map(|(k, a)| effects[k + 1..].iter().map(move |b| (*a, *b)));
+    if let Some(([a, b], apart)) = pairs.filter_map(|(a, b)| separation(a, b)).next() {
+        let captures: Vec<Capture> = apart.record.iter().map(|experiment| capture(*experiment)).collect();
+        return site.advice(format!("To separate {} from {}: {}.", words(a), words(b), apart.by), &captures);
     }
     if effects.is_empty() {
         return Advice::default();
@@ -232,15 +154,17 @@ pub fn nothing_open(site: &Site) -> Advice {
 /// Every advice there is, for those who check that each can be carried out.
 #[must_use]
 pub fn all(site: &Site) -> Vec<Advice> {
-    let mut all: Vec<Advice> = PAIRS.iter().map(|(a, b, ..)| separating(&[a, b], site)).collect();
+    let mut all: Vec<Advice> = Vec::new();
     for effect in twin::effects::registry() {
+        all.extend(effect.separated.iter().map(|apart| separating(&[effect.name, apart.from], site)));
         all.extend(effect.confusable_with.iter().map(|other| separating(&[effect.name, other], site)));
         all.push(separating(&[effect.name], site));
     }
-    all.push(confirming(&["payload".to_owned()], site));
+    let some = twin::effects::registry()[0].name;
+    all.push(confirming(&[some.to_owned()], site));
     all.push(unexplained(Some(("yaw", "after the slide")), site));
     all.push(lacking("four clips", site));
-    all.push(proving("payload", 5, site));
+    all.push(proving(some, 5, site));
     all.push(nothing_open(site));
     all
 }
@@ -253,13 +177,6 @@ mod tests {
 
     fn strokes() -> Site {
         Site::new(Path::new("monday strokes"), true, vec![0, 3], 1.37)
-    }
-
-    #[test]
-    fn advice_names_effects_that_exist() {
-        for (a, b, ..) in PAIRS {
-            assert!(find(a).is_some() && find(b).is_some(), "{a} {b}");
-        }
     }
 
     #[test]

@@ -13,7 +13,7 @@ use shared_mem::theta::Theta;
 use std::ops::Range;
 use twin::arm::ArmModel;
 use twin::arm::Joints;
-use twin::effects::{EffectInfo, Parameter, Robot, Role, Search, Shape, Stage, find, registry};
+use twin::effects::{EffectInfo, OnTable, Robot, Role, Search, Shape, Stage, find, registry};
 
 /// All numbers of all hypotheses.
 #[derive(Debug, Clone)]
@@ -127,8 +127,8 @@ impl Library {
         }
         let joint = |setting| joint_of(setting).filter(|_| !(with_object && moves_the_tip_unseen(setting)));
         let joints = numbers.iter().map(|(setting, _)| joint(setting)).collect();
-        let carried = numbers.iter().position(|(setting, _)| is_carried(setting));
-        let reaches = numbers.iter().map(|(setting, _)| arm_reach(setting, carried)).collect();
+        let felt = (numbers.iter().enumerate()).find_map(|(number, (setting, _))| Some((felt_with(setting)?, number)));
+        let reaches = numbers.iter().map(|(setting, _)| arm_reach(setting, felt)).collect();
         let (all, unknowns): (Vec<Setting>, Vec<Unknown>) = numbers.into_iter().unzip();
         Self { settings: Settings::new(base.clone(), all), unknowns, joints, reaches, baseline, candidates, robot }
     }
@@ -212,7 +212,7 @@ impl Library {
 fn joint_of(setting: &Setting) -> Option<usize> {
     match *setting {
         Setting::Stiffness(joint) | Setting::Damping(joint) => Some(joint),
-        Setting::Effect { index, .. } => parameter_of(setting).filter(|p| p.shape == Shape::PerJoint).and(index),
+        Setting::Effect { index, .. } => setting.of_effect().filter(|p| p.shape == Shape::PerJoint).and(index),
         _ => None,
     }
 }
@@ -220,7 +220,7 @@ fn joint_of(setting: &Setting) -> Option<usize> {
 /// Whether a number of a joint moves the tip by what no sensor of the arm need show: nothing tells of a vertical joint's
 /// encoder but what the tip hits.
 fn moves_the_tip_unseen(setting: &Setting) -> bool {
-    matches!(setting, Setting::Effect { name: "joint_encoder_offset", .. })
+    setting.of_effect().is_some_and(|parameter| parameter.moves_tip_unseen)
 }
 
 /// Whether the arm feels a number.
@@ -232,10 +232,11 @@ enum ArmReach {
     With(usize),
 }
 
-fn arm_reach(setting: &Setting, carried: Option<usize>) -> ArmReach {
-    match (*setting, carried) {
+/// `felt`: the effect on the hit that the arm may feel, and the number on which that depends.
+fn arm_reach(setting: &Setting, felt: Option<(&str, usize)>) -> ArmReach {
+    match (*setting, felt) {
         (Setting::Stiffness(_) | Setting::Damping(_), _) => ArmReach::Always,
-        (Setting::Effect { name: TOOL_OFFSET, .. }, Some(carried)) => ArmReach::With(carried),
+        (Setting::Effect { name, .. }, Some((felt, number))) if name == felt => ArmReach::With(number),
         (Setting::Effect { name, .. }, _) if find(name).is_some_and(|effect| effect.stage == Stage::Control) => {
             ArmReach::Always
         }
@@ -243,14 +244,10 @@ fn arm_reach(setting: &Setting, carried: Option<usize>) -> ArmReach {
     }
 }
 
-/// The one effect on the hit that the arm may feel: where the tool's mass stands off with its tip.
-const TOOL_OFFSET: &str = "tool_offset";
-const CARRIED: &str = "carried";
-/// The one effect whose forms are places on the table: those where a change of friction shows depend on the strokes.
-const FRICTION_PATCH: &str = "friction_patch";
-
-fn is_carried(setting: &Setting) -> bool {
-    matches!(setting, Setting::Effect { name: TOOL_OFFSET, parameter: CARRIED, .. })
+/// The effect that the arm feels where a number is not 0, though it shows in a later stage.
+fn felt_with(setting: &Setting) -> Option<&'static str> {
+    let Setting::Effect { name, .. } = *setting else { return None };
+    setting.of_effect().filter(|parameter| parameter.felt_by_arm).map(|_| name)
 }
 
 /// How far gains stated by value may be off: cell.toml's own statement, and a quarter more.
@@ -288,27 +285,16 @@ impl Candidate {
 /// The torque at which a limit of a joint begins to bite [N m], where a number is such a limit.
 fn bound_of(setting: &Setting, peaks: &Joints) -> Option<f64> {
     match *setting {
-        Setting::Effect { index: Some(joint), .. } if search_of(setting) == Some(Search::Limit) => {
+        Setting::Effect { index: Some(joint), .. } if setting.search() == Some(Search::Limit) => {
             Some(peaks[joint]).filter(|peak| *peak > 0.0)
         }
         _ => None,
     }
 }
 
-/// The parameter behind a number of an effect.
-fn parameter_of(setting: &Setting) -> Option<&'static Parameter> {
-    let Setting::Effect { name, parameter, .. } = setting else { return None };
-    find(name)?.parameters.iter().find(|p| p.name == *parameter)
-}
-
-/// How a search comes by a number of an effect.
-fn search_of(setting: &Setting) -> Option<Search> {
-    parameter_of(setting).map(|parameter| parameter.search)
-}
-
 /// Whether a number of an effect does not move along with the others.
 fn is_held(setting: &Setting) -> bool {
-    matches!(search_of(setting), Some(Search::Held | Search::Middle))
+    matches!(setting.search(), Some(Search::Held | Search::Middle))
 }
 
 /// A limit of its own for every joint: what it does depends on how hard the clips drive that joint, and above that it does
@@ -333,7 +319,7 @@ type Met<'a> = (Option<&'a Ground>, &'a Joints, &'a Robot);
 /// Values of the parameter behind a number of an effect that are met in practice on a robot.
 fn met(robot: &Robot, setting: &Setting) -> Option<[f64; 2]> {
     let Setting::Effect { index, .. } = *setting else { return None };
-    parameter_of(setting).map(|parameter| robot.range(parameter, index))
+    setting.of_effect().map(|parameter| robot.range(parameter, index))
 }
 
 fn alternatives(
@@ -362,10 +348,20 @@ fn alternatives(
         None => sizes.iter().map(probe).collect(),
     };
     let with = |form: Vec<(usize, f64)>| Alternative { form, probes: probes.clone() };
-    if effect.name == FRICTION_PATCH {
-        let [direction, distance, radius] = ["direction", "distance", "radius"].map(|form| index(form)[0]);
+    let on_table: Vec<(usize, OnTable)> = (effect.parameters.iter())
+        .filter_map(|parameter| match parameter.search {
+            Search::OnTable(coordinate) => Some((index(parameter.name)[0], coordinate)),
+            _ => None,
+        })
+        .collect();
+    if !on_table.is_empty() {
         let place = |patch: Patch| {
-            with(vec![(direction, patch.direction), (distance, patch.distance), (radius, patch.curvature)])
+            let coordinate = |(number, coordinate): &(usize, OnTable)| match coordinate {
+                OnTable::Direction => (*number, patch.direction),
+                OnTable::Distance => (*number, patch.distance),
+                OnTable::Radius => (*number, patch.curvature),
+            };
+            with(on_table.iter().map(coordinate).collect())
         };
         return ground.map(Ground::patches).unwrap_or_default().into_iter().map(place).collect();
     }
@@ -400,7 +396,7 @@ fn across(
 
 fn probe(number: usize, (setting, unknown): &(Setting, Unknown), robot: &Robot) -> Probe {
     let Setting::Effect { inverse, .. } = setting else { unreachable!("sizes belong to effects") };
-    let info = parameter_of(setting).expect("a size is a parameter");
+    let info = setting.of_effect().expect("a size is a parameter");
     let [lo, hi] = met(robot, setting).expect("a size is a parameter");
     let reach = match info.usual {
         _ if *inverse => lo.recip(),

@@ -12,7 +12,7 @@ use shared_mem::theta::{ArmTheta, EffectTheta, ObjectTheta, Theta};
 use std::collections::BTreeMap;
 use toml::Value;
 use twin::arm::{ArmModel, ControlLaw, GainError, ModelError};
-use twin::effects::{Parameter, Shape, find};
+use twin::effects::{Parameter, Search, Shape, find};
 use twin::scene::{MeshFileError, ObjectModel};
 
 /// One number of a [`Theta`].
@@ -58,6 +58,19 @@ pub enum BaseError {
 }
 
 impl Setting {
+    /// The parameter of an effect behind it.
+    #[must_use]
+    pub fn of_effect(&self) -> Option<&'static Parameter> {
+        let Self::Effect { name, parameter, .. } = self else { return None };
+        parameter_of(name, parameter)
+    }
+
+    /// How a search comes by a number of an effect.
+    #[must_use]
+    pub fn search(&self) -> Option<Search> {
+        self.of_effect().map(|parameter| parameter.search)
+    }
+
     /// Name in reports: `stiffness[2]`, `command_delay.delay`, `1/joint_elasticity.stiffness[0]`.
     #[must_use]
     pub fn name(&self) -> String {

@@ -1,7 +1,7 @@
 //! Everything the nominal cell lacks: effects that a real cell has and that a simulated cell can be given.
 //!
 //! One effect is one file: its equation, source, plausible range, signature, what it is confused with, how a search comes
-//! by it, what to do about it, what it changes in a model for another simulator, its code and its test. [`registry()`] lists them all. A new effect is a new file, its line in the registry, and a field in the struct
+//! by it, what separates it from others, what to do about it, what it changes in a model for another simulator, its code and its test. [`registry()`] lists them all. A new effect is a new file, its line in the registry, and a field in the struct
 //! of its stage. Effects combine freely; one whose sizes are all neutral is not installed, so it changes no bit.
 //!
 //! | folder | acts on | read by |
@@ -21,6 +21,7 @@ mod hit;
 mod registry;
 mod remedy;
 mod robot;
+mod separation;
 mod slide;
 mod values;
 
@@ -29,9 +30,10 @@ pub use arm::{ArmEffects, ArmMemory};
 pub use camera::{CameraEffects, CameraMemory};
 pub use change::Change;
 pub use hit::HitEffects;
-pub use registry::{EffectInfo, Elsewhere, Parameter, Place, Role, Search, Shape, Stage, find, registry};
+pub use registry::{EffectInfo, Elsewhere, OnTable, Parameter, Place, Role, Search, Shape, Stage, find, registry};
 pub use remedy::{Found, Remedy};
 pub use robot::Robot;
+pub use separation::{Experiment, Separation};
 pub use slide::{SlideEffects, TableFriction};
 pub use values::EffectError;
 

@@ -3,6 +3,7 @@
 
 use super::change::Change;
 use super::remedy::{Found, Remedy};
+use super::separation::Separation;
 use super::{Effects, arm, camera, hit, slide, values::Values};
 
 /// Part of a clip in which an effect shows first.
@@ -72,6 +73,10 @@ pub enum Role {
 pub enum Search {
     /// Along its slope.
     Slope,
+    /// A time by which all joints come late. Gains that were fitted without it stand in for it.
+    Lateness,
+    /// A coordinate of a place on the table: tried wherever objects slid.
+    OnTable(OnTable),
     /// Not along with the others, since few clips show it well enough to be worth a number of its own: only what was found is
     /// tried at other values of it.
     Held,
@@ -92,6 +97,17 @@ pub enum Search {
     /// A place in the base frame that a search does not move: its default, or the middle of where the objects were. A camera is
     /// calibrated for the place where it is used, so an error of its direction or scale is least there.
     Middle,
+}
+
+/// Coordinates of a place on the table that begins at a line, or is a disc beyond it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum OnTable {
+    /// The line's normal, from the base's x axis [rad].
+    Direction,
+    /// Of the line from the base's origin [m].
+    Distance,
+    /// Of the disc [m].
+    Radius,
 }
 
 /// What is met on robots that are built unlike the FR3.
@@ -132,6 +148,10 @@ pub struct Parameter {
     pub search: Search,
     /// Values from each of which a search begins, where its resting value is not enough; of a vector all components.
     pub begun_at: &'static [&'static [f64]],
+    /// Whether the arm feels the effect where this is not 0, though it shows first in the hit, the slide or the camera.
+    pub felt_by_arm: bool,
+    /// Whether it moves the tip while the arm's own sensors see nothing: in strokes it is the object that tells it.
+    pub moves_tip_unseen: bool,
 }
 
 /// One effect: what the nominal cell lacks.
@@ -147,6 +167,8 @@ pub struct EffectInfo {
     pub parameters: &'static [Parameter],
     /// Names of effects that look alike in some recordings.
     pub confusable_with: &'static [&'static str],
+    /// What separates it from some of them.
+    pub separated: &'static [Separation],
     /// Adds the effect with these parameters.
     pub(super) install: fn(&Values, &mut Effects),
     /// What to do about it; asked for by [`EffectInfo::remedy`].
@@ -182,6 +204,8 @@ impl Parameter {
             role: Role::Size { neutral },
             search: Search::Slope,
             begun_at: &[],
+            felt_by_arm: false,
+            moves_tip_unseen: false,
         }
     }
 
@@ -216,6 +240,14 @@ impl Parameter {
 
     pub(super) const fn begun_at(self, begun_at: &'static [&'static [f64]]) -> Self {
         Self { begun_at, ..self }
+    }
+
+    pub(super) const fn felt_by_arm(self) -> Self {
+        Self { felt_by_arm: true, ..self }
+    }
+
+    pub(super) const fn moves_tip_unseen(self) -> Self {
+        Self { moves_tip_unseen: true, ..self }
     }
 
     /// The value that changes nothing, or the default of a parameter that says how.

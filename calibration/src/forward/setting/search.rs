@@ -4,7 +4,7 @@ use super::Setting;
 use crate::estimate::Unknown;
 use shared_mem::cell::{Cell, ControllerKind, Range};
 use shared_mem::theta::Theta;
-use twin::effects::{EffectInfo, Parameter, Robot, Role, Shape, Stage};
+use twin::effects::{EffectInfo, Parameter, Robot, Role, Search, Shape, Stage};
 use twin::scene::ObjectModel;
 
 /// Gains stated by value are searched this far: the values are right to 20 %, and a bound must not be mistaken for them.
@@ -102,7 +102,8 @@ pub fn effect_settings(info: &'static EffectInfo, robot: &Robot, dof: usize) -> 
             Shape::Vector(n) => (0..n).map(Some).collect(),
         };
         let inverse = parameter.resting_value().is_infinite();
-        let hits = info.stage != Stage::Control || info.name == "joint_backlash";
+        let flanks = info.parameters.iter().any(|parameter| parameter.search == Search::Threshold);
+        let hits = info.stage != Stage::Control || flanks;
         let share = if hits { ROUGH_STEP } else { EFFECT_STEP };
         let start = if inverse { 0.0 } else { parameter.resting_value() };
         for index in indices {

@@ -8,6 +8,7 @@ use crate::estimate::{ClipFit, Fit};
 use crate::forward::Setting;
 use crate::identify::answer::{Figures, Identification};
 use nalgebra::DMatrix;
+use twin::effects::{Parameter, Search, registry};
 
 /// Residuals this many times as large as their sigmas are no noise.
 const NOT_NOISE: f64 = 3.0;
@@ -43,9 +44,9 @@ pub(super) fn doubts(
             100.0 * alone(fit)
         ));
     }
-    let searched = |name: &str| {
-        finding.settings.settings().iter().any(|s| matches!(s, Setting::Effect { name: n, .. } if *n == name))
-    };
+    let is_lateness = |parameter: &Parameter| parameter.search == Search::Lateness;
+    let searched = finding.settings.settings().iter().filter_map(Setting::of_effect).any(is_lateness);
+    let late = registry().iter().find(|effect| effect.parameters.iter().any(is_lateness));
     // Gains that were turned until they imitate a delay hide it.
     let delays = [&fit.shared[..], before].into_iter().filter_map(|numbers| delay(numbers, model, clips));
     let delay = delays.max_by(|a, b| a.1.total_cmp(&b.1));
@@ -56,10 +57,11 @@ pub(super) fn doubts(
                 "{share:.0} % of the error goes with the joints' speeds, as if they were {ms:.1} ms ahead of their \
                  commands: the two topics are not stamped by one clock; let one machine stamp both"
             ));
-        } else if !searched("command_delay") {
+        } else if let Some(late) = late.filter(|_| !searched) {
             doubts.push(format!(
                 "{share:.0} % of the error goes with the joints' speeds, as if all came {ms:.1} ms late: identify with \
-                 `--also command_delay`"
+                 `--also {}`",
+                late.name
             ));
         }
     }

@@ -8,6 +8,7 @@ use crate::estimate::{ClipModel, Fit, Options, Subset, Unknown, fit};
 use crate::forward::Setting;
 use crate::interrupt::Interrupt;
 use rayon::prelude::*;
+use twin::effects::Search;
 
 /// Limits that are tried, each this many times lower than the one before [1]...
 const RATIO: f64 = 1.4;
@@ -91,5 +92,5 @@ fn bring_near(
 
 /// The joint whose limit a number is.
 fn limited(setting: &Setting) -> Option<usize> {
-    matches!(setting, Setting::Effect { name: "torque_saturation", .. }).then(|| joint_of(setting))?
+    joint_of(setting).filter(|_| setting.search() == Some(Search::Limit))
 }

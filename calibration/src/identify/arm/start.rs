@@ -10,6 +10,7 @@ use crate::interrupt::Interrupt;
 use rayon::prelude::*;
 use shared_mem::cell::Cell;
 use shared_mem::msg::{Joints, MAX_JOINTS};
+use twin::effects::Search;
 
 /// Gains are tried at these powers of two times where they begin.
 const POWERS: std::ops::RangeInclusive<i32> = -4..=4;
@@ -61,7 +62,7 @@ pub(super) fn is_ranged(cell: &Cell) -> bool {
 }
 
 fn is_delay(setting: &Setting) -> bool {
-    matches!(setting, Setting::Effect { name: "command_delay", .. })
+    setting.search() == Some(Search::Lateness)
 }
 
 fn place(settings: &[Setting], unknowns: &[Unknown], delay: f64, power: i32) -> Vec<f64> {

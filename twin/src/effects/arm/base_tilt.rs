@@ -18,6 +18,7 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     acts_on: Place::ArmModel,
     parameters: &[Parameter::size("tilt", "rad", [-0.1, 0.1], 0.0).vector(2).within(-0.5, 0.5)],
     confusable_with: &["payload", "joint_friction_asymmetry", "torque_gain"],
+    separated: &[],
     install: |values, effects| effects.arm.base_tilt = Some(BaseTilt { tilt: values.vector("tilt") }),
     remedy: |found| {
         let tilt = found.vector("tilt");

@@ -7,15 +7,28 @@
 //! - Confused with: command lag (in slow motion exactly), viscous friction, camera latency (where only the camera sees the arm).
 
 use crate::effects::change::Change;
-use crate::effects::registry::{EffectInfo, Parameter, Place, Stage};
+use crate::effects::registry::{EffectInfo, Parameter, Place, Search, Stage};
 use crate::effects::remedy::{Remedy, milliseconds, short};
+use crate::effects::separation::{Experiment, Separation};
 
 pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     name: "command_delay",
     stage: Stage::Control,
     acts_on: Place::CommandPath,
-    parameters: &[Parameter::size("delay", "s", [0.0, 0.1], 0.0).within(0.0, 2.0)],
+    parameters: &[Parameter::size("delay", "s", [0.0, 0.1], 0.0).within(0.0, 2.0).searched(Search::Lateness)],
     confusable_with: &["command_lag", "joint_viscous_friction", "camera_latency"],
+    separated: &[
+        Separation {
+            from: "command_lag",
+            by: "a chirp up to 10 Hz: only a lag lowers the gain",
+            record: &[Experiment::Chirp],
+        },
+        Separation {
+            from: "camera_latency",
+            by: "a chirp, and a stroke again at half its speed: a late command is late in the encoders too, a late camera only in the poses",
+            record: &[Experiment::Chirp, Experiment::StrokeAgainSlower],
+        },
+    ],
     install: |values, effects| effects.arm.command_delay = Some(CommandDelay { delay: values.number("delay") }),
     remedy: |found| {
         let delay = found.number("delay");

@@ -18,6 +18,7 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     acts_on: Place::CommandPath,
     parameters: &[Parameter::size("time_constant", "s", [0.0, 0.05], 0.0).within(0.0, 10.0)],
     confusable_with: &["command_delay", "joint_viscous_friction", "tracker_smoothing"],
+    separated: &[],
     install: |values, effects| {
         let time_constant = values.number("time_constant");
         let share = -(-TICK / time_constant).exp_m1();

@@ -31,6 +31,7 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
             .begun_at(&[&[1e-7], &[4e-5]]),
     ],
     confusable_with: &["joint_coulomb_friction", "joint_stribeck_friction"],
+    separated: &[],
     install: |values, effects| {
         effects.arm.joint_backlash =
             Some(JointBacklash { play: values.joints("play"), compliance: values.joints("compliance") });

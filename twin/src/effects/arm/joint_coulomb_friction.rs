@@ -12,6 +12,7 @@ use crate::arm::Joints;
 use crate::effects::change::Change;
 use crate::effects::registry::{EffectInfo, Elsewhere, Parameter, Place, Search, Stage};
 use crate::effects::remedy::Remedy;
+use crate::effects::separation::{Experiment, Separation};
 
 pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     name: "joint_coulomb_friction",
@@ -25,6 +26,23 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
         CREEP,
     ],
     confusable_with: &["joint_load_friction", "joint_stribeck_friction", "joint_backlash"],
+    separated: &[
+        Separation {
+            from: "joint_load_friction",
+            by: "slow ramps once with the arm stretched out and once folded; move it there by hand before each",
+            record: &[Experiment::Ramps, Experiment::Ramps],
+        },
+        Separation {
+            from: "joint_stribeck_friction",
+            by: "slow ramps from 0.005 to 0.5 rad/s with many reversals",
+            record: &[Experiment::Ramps],
+        },
+        Separation {
+            from: "joint_backlash",
+            by: "approach poses from both sides, and run slow ramps: friction holds at any load, play only where the torque changes its sign",
+            record: &[Experiment::Holds, Experiment::Ramps],
+        },
+    ],
     install: |values, effects| {
         effects.arm.joint_coulomb_friction =
             Some(JointCoulombFriction { coulomb: values.joints("coulomb"), creep: values.joints("creep") });

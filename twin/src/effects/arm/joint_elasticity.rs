@@ -25,6 +25,7 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
         Parameter::form("damping", "N m s/rad", [0.0, 10.0], 2.0).per_joint().within(0.0, f64::MAX),
     ],
     confusable_with: &["payload", "rotor_inertia", "torque_delay", "camera_extrinsic_rotation"],
+    separated: &[],
     install: |values, effects| {
         effects.arm.joint_elasticity =
             Some(JointElasticity { stiffness: values.joints("stiffness"), damping: values.joints("damping") });

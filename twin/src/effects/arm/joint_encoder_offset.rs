@@ -15,8 +15,9 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     name: "joint_encoder_offset",
     stage: Stage::Control,
     acts_on: Place::JointSensing,
-    parameters: &[Parameter::size("offset", "rad", [-0.02, 0.02], 0.0).per_joint()],
+    parameters: &[Parameter::size("offset", "rad", [-0.02, 0.02], 0.0).per_joint().moves_tip_unseen()],
     confusable_with: &["camera_extrinsic_rotation", "camera_extrinsic_translation", "tool_offset", "joint_elasticity"],
+    separated: &[],
     install: |values, effects| {
         effects.arm.joint_encoder_offset = Some(JointEncoderOffset { offset: values.joints("offset") });
     },

@@ -26,6 +26,7 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
             .begun_at(&[&[0.0], &[0.01]]),
     ],
     confusable_with: &["payload", "base_tilt", "torque_sensor_bias"],
+    separated: &[],
     install: |values, effects| {
         effects.arm.joint_friction_asymmetry =
             Some(JointFrictionAsymmetry { offset: values.joints("offset"), fading: values.number("fading") });

@@ -26,6 +26,7 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
         CREEP,
     ],
     confusable_with: &["joint_coulomb_friction", "torque_gain", "payload"],
+    separated: &[],
     install: |values, effects| {
         effects.arm.joint_load_friction =
             Some(JointLoadFriction { coefficient: values.joints("coefficient"), creep: values.joints("creep") });

@@ -13,6 +13,7 @@ use crate::arm::Joints;
 use crate::effects::change::Change;
 use crate::effects::registry::{EffectInfo, Elsewhere, Parameter, Place, Stage};
 use crate::effects::remedy::Remedy;
+use crate::effects::separation::{Experiment, Separation};
 
 pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     name: "joint_stribeck_friction",
@@ -34,6 +35,11 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
         CREEP,
     ],
     confusable_with: &["joint_coulomb_friction", "joint_backlash"],
+    separated: &[Separation {
+        from: "joint_backlash",
+        by: "approach poses from both sides; then hang a weight on the flange that keeps the gears pressed, and do it again in a session of its own whose cell.toml has the weight",
+        record: &[Experiment::Holds],
+    }],
     install: |values, effects| {
         effects.arm.joint_stribeck_friction = Some(JointStribeckFriction {
             coulomb: values.joints("coulomb"),

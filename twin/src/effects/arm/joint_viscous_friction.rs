@@ -12,6 +12,7 @@ use crate::arm::Joints;
 use crate::effects::change::Change;
 use crate::effects::registry::{EffectInfo, Elsewhere, Parameter, Place, Stage};
 use crate::effects::remedy::Remedy;
+use crate::effects::separation::{Experiment, Separation};
 
 pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     name: "joint_viscous_friction",
@@ -22,6 +23,11 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
         .within(0.0, f64::MAX)
         .elsewhere(Elsewhere::OfTorqueLimit([0.0, 0.25]))],
     confusable_with: &["torque_delay", "command_delay"],
+    separated: &[Separation {
+        from: "torque_delay",
+        by: "a chirp up to 40 Hz with torques logged: a delay lags the more the faster it swings, friction does not",
+        record: &[Experiment::FastChirp],
+    }],
     install: |values, effects| {
         effects.arm.joint_viscous_friction = Some(JointViscousFriction { viscous: values.joints("viscous") });
     },

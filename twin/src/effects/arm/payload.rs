@@ -10,6 +10,7 @@ use crate::arm::{ArmModel, MassProperties};
 use crate::effects::change::Change;
 use crate::effects::registry::{EffectInfo, Elsewhere, Parameter, Place, Stage};
 use crate::effects::remedy::{Remedy, list, short};
+use crate::effects::separation::{Experiment, Separation};
 
 pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     name: "payload",
@@ -23,6 +24,23 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
             .begun_at(&[&[0.0, 0.0, 0.0], &[0.0, 0.0, 0.06]]),
     ],
     confusable_with: &["torque_gain", "joint_friction_asymmetry", "base_tilt"],
+    separated: &[
+        Separation {
+            from: "torque_gain",
+            by: "rest in eight poses or more, gravity pulling either way",
+            record: &[Experiment::Holds],
+        },
+        Separation {
+            from: "joint_friction_asymmetry",
+            by: "rest in eight poses or more, gravity pulling either way",
+            record: &[Experiment::Holds],
+        },
+        Separation {
+            from: "base_tilt",
+            by: "rest in eight poses or more, turned about the base's axis",
+            record: &[Experiment::ManyHolds],
+        },
+    ],
     install: |values, effects| {
         effects.arm.payload = Some(Payload { mass: values.number("mass"), centre: values.vector("centre") });
     },

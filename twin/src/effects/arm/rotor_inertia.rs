@@ -11,6 +11,7 @@ use crate::arm::{ArmModel, Joints};
 use crate::effects::change::Change;
 use crate::effects::registry::{EffectInfo, Elsewhere, Parameter, Place, Stage};
 use crate::effects::remedy::{Remedy, list};
+use crate::effects::separation::{Experiment, Separation};
 
 pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     name: "rotor_inertia",
@@ -21,6 +22,18 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
         .within(-0.2, f64::MAX)
         .elsewhere(Elsewhere::OfInertia([-0.5, 1.0]))],
     confusable_with: &["payload", "joint_elasticity"],
+    separated: &[
+        Separation {
+            from: "payload",
+            by: "the same kind of fast motion in three poses, because a payload's inertia changes with the pose; move the arm by hand before each",
+            record: &[Experiment::NewMotion, Experiment::NewMotion, Experiment::NewMotion],
+        },
+        Separation {
+            from: "joint_elasticity",
+            by: "a chirp up to 40 Hz: look for a resonance",
+            record: &[Experiment::FastChirp],
+        },
+    ],
     install: |values, effects| effects.arm.rotor_inertia = Some(RotorInertia { extra: values.joints("extra") }),
     remedy: |found| {
         let extra = found.all("extra");

@@ -16,6 +16,7 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     acts_on: Place::TorquePath,
     parameters: &[Parameter::size("delay", "s", [0.0, 0.003], 0.0).within(0.0, 0.1)],
     confusable_with: &["joint_viscous_friction", "joint_elasticity"],
+    separated: &[],
     install: |values, effects| effects.arm.torque_delay = Some(TorqueDelay { delay: values.number("delay") }),
     remedy: |found| {
         let delay = found.number("delay");

@@ -17,6 +17,7 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     acts_on: Place::TorquePath,
     parameters: &[Parameter::size("gain", "1", [0.8, 1.2], 1.0).per_joint().within(0.0, 10.0)],
     confusable_with: &["payload", "joint_load_friction"],
+    separated: &[],
     install: |values, effects| effects.arm.torque_gain = Some(TorqueGain { gain: values.joints("gain") }),
     remedy: |found| {
         let gain = found.joints("gain", "1");

@@ -32,6 +32,7 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
         Parameter::form("phase", "rad", [-PI, PI], 0.0).per_joint().searched(Search::Angle { quarter: FRAC_PI_2 }),
     ],
     confusable_with: &["joint_elasticity", "joint_coulomb_friction"],
+    separated: &[],
     install: |values, effects| {
         effects.arm.torque_ripple = Some(TorqueRipple {
             amplitude: values.joints("amplitude"),

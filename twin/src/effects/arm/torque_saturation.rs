@@ -21,6 +21,7 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
         .elsewhere(Elsewhere::OfTorqueLimit([0.05, 1.0]))
         .searched(Search::Limit)],
     confusable_with: &["torque_gain", "command_delay"],
+    separated: &[],
     install: |values, effects| effects.arm.torque_saturation = Some(TorqueSaturation { limit: values.joints("limit") }),
     remedy: |found| {
         let limit = found.joints("limit", "N m");

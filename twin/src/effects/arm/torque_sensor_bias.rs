@@ -10,6 +10,7 @@ use crate::arm::Joints;
 use crate::effects::change::Change;
 use crate::effects::registry::{EffectInfo, Elsewhere, Parameter, Place, Stage};
 use crate::effects::remedy::Remedy;
+use crate::effects::separation::{Experiment, Separation};
 
 pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     name: "torque_sensor_bias",
@@ -19,6 +20,11 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
         .per_joint()
         .elsewhere(Elsewhere::OfTorqueLimit([-0.1, 0.1]))],
     confusable_with: &["joint_friction_asymmetry", "payload"],
+    separated: &[Separation {
+        from: "joint_friction_asymmetry",
+        by: "hang a known weight on the flange and rest in eight poses, torques logged",
+        record: &[Experiment::Holds],
+    }],
     install: |values, effects| effects.arm.torque_sensor_bias = Some(TorqueSensorBias { bias: values.joints("bias") }),
     remedy: |found| {
         let bias = found.joints("bias", "N m");

@@ -12,6 +12,7 @@
 use crate::effects::change::Change;
 use crate::effects::registry::{EffectInfo, Parameter, Place, Search, Stage};
 use crate::effects::remedy::{Remedy, list, short};
+use crate::effects::separation::{Experiment, Separation};
 use nalgebra::{Isometry3, Rotation3, UnitQuaternion, Vector3};
 
 pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
@@ -23,6 +24,11 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
         Parameter::form("centre", "m", [-1.0, 1.0], 0.0).vector(3).searched(Search::Middle),
     ],
     confusable_with: &["camera_extrinsic_translation", "joint_encoder_offset", "tool_offset", "table_tilt"],
+    separated: &[Separation {
+        from: "camera_extrinsic_translation",
+        by: "put the object in a place far from the last one before each of these",
+        record: &[Experiment::OneStroke, Experiment::OneStroke, Experiment::OneStroke, Experiment::OneStroke],
+    }],
     install: |values, effects| {
         let centre: [f64; 3] = values.vector("centre");
         effects.camera.camera_extrinsic_rotation =

@@ -17,6 +17,7 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     acts_on: Place::ObjectObservation,
     parameters: &[Parameter::size("translation", "m", [-0.03, 0.03], 0.0).vector(3)],
     confusable_with: &["camera_extrinsic_rotation", "joint_encoder_offset", "tool_offset"],
+    separated: &[],
     install: |values, effects| {
         effects.camera.camera_extrinsic_translation =
             Some(CameraExtrinsicTranslation { translation: values.vector("translation") });

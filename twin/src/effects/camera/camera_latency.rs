@@ -9,6 +9,7 @@
 use crate::effects::change::Change;
 use crate::effects::registry::{EffectInfo, Parameter, Place, Stage};
 use crate::effects::remedy::{Remedy, milliseconds, short};
+use crate::effects::separation::{Experiment, Separation};
 
 pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     name: "camera_latency",
@@ -16,6 +17,11 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     acts_on: Place::ObjectObservation,
     parameters: &[Parameter::size("latency", "s", [0.0, 0.1], 0.0).within(0.0, 10.0)],
     confusable_with: &["command_delay", "tracker_smoothing"],
+    separated: &[Separation {
+        from: "tracker_smoothing",
+        by: "fix a block where the object slides to, so that it stops sharply: smoothing rounds the stop, latency does not",
+        record: &[Experiment::Strokes],
+    }],
     install: |values, effects| {
         effects.camera.camera_latency = Some(CameraLatency { latency: values.number("latency") })
     },

@@ -11,6 +11,7 @@
 use crate::effects::change::Change;
 use crate::effects::registry::{EffectInfo, Parameter, Place, Search, Stage};
 use crate::effects::remedy::{Remedy, short};
+use crate::effects::separation::{Experiment, Separation};
 use nalgebra::{Isometry3, Vector3};
 
 pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
@@ -22,6 +23,11 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
         Parameter::form("centre", "m", [-1.0, 1.0], 0.0).vector(3).searched(Search::Middle),
     ],
     confusable_with: &["camera_extrinsic_translation", "restitution"],
+    separated: &[Separation {
+        from: "camera_extrinsic_rotation",
+        by: "put the object a known distance from the last place before each of these",
+        record: &[Experiment::OneStroke, Experiment::OneStroke],
+    }],
     install: |values, effects| {
         let centre: [f64; 3] = values.vector("centre");
         effects.camera.camera_scale = Some(CameraScale { scale: values.number("scale"), centre: centre.into() });

@@ -17,6 +17,7 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     acts_on: Place::ObjectObservation,
     parameters: &[Parameter::size("time_constant", "s", [0.0, 0.2], 0.0).within(0.0, 10.0)],
     confusable_with: &["camera_latency", "command_lag", "contact_compliance"],
+    separated: &[],
     install: |values, effects| {
         effects.camera.tracker_smoothing = Some(TrackerSmoothing { time_constant: values.number("time_constant") });
     },

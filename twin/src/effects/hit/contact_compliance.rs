@@ -21,6 +21,7 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
         Parameter::form("restitution", "1", [0.02, 0.5], RESTITUTION).within(0.0, 1.0),
     ],
     confusable_with: &["restitution", "tip_friction", "tracker_smoothing"],
+    separated: &[],
     install: |values, effects| {
         let [compliance, restitution] = ["compliance", "restitution"].map(|name| values.number(name));
         effects.hit.contact_compliance = Some(ContactCompliance { compliance, restitution });

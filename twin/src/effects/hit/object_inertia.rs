@@ -9,6 +9,7 @@
 use crate::effects::change::Change;
 use crate::effects::registry::{EffectInfo, Parameter, Place, Stage};
 use crate::effects::remedy::{Remedy, short};
+use crate::effects::separation::{Experiment, Separation};
 
 pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     name: "object_inertia",
@@ -16,6 +17,11 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     acts_on: Place::Object,
     parameters: &[Parameter::size("factor", "1", [0.4, 2.0], 1.0).within(0.01, 100.0)],
     confusable_with: &["tool_offset", "tip_friction", "pressure_distribution"],
+    separated: &[Separation {
+        from: "pressure_distribution",
+        by: "straight hits without spin and others beside the centre: inertia shows in the spin just after the hit, pressure in how it fades",
+        record: &[Experiment::ObjectTurned, Experiment::Strokes],
+    }],
     install: |values, effects| effects.hit.object_inertia = Some(ObjectInertia { factor: values.number("factor") }),
     remedy: |found| {
         let factor = short(found.number("factor"));

@@ -10,6 +10,7 @@
 use crate::effects::change::Change;
 use crate::effects::registry::{EffectInfo, Parameter, Place, Stage};
 use crate::effects::remedy::{Remedy, short};
+use crate::effects::separation::{Experiment, Separation};
 use crate::physics::hit::{ContactLaw, RESTITUTION};
 
 pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
@@ -21,6 +22,11 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
         Parameter::form("compliance", "m/N", [0.0, 5e-5], 0.0).within(0.0, 1.0),
     ],
     confusable_with: &["object_inertia", "contact_compliance", "tip_friction"],
+    separated: &[Separation {
+        from: "contact_compliance",
+        by: "strokes at half their speed beside those there are: restitution keeps the ratio of the speeds, compliance does not",
+        record: &[Experiment::StrokeAgainSlower, Experiment::StrokesSlower],
+    }],
     install: |values, effects| {
         let [restitution, compliance] = ["restitution", "compliance"].map(|name| values.number(name));
         effects.hit.restitution = Some(Restitution { restitution, compliance });

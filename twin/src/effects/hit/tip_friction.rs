@@ -9,6 +9,7 @@
 use crate::effects::change::Change;
 use crate::effects::registry::{EffectInfo, Parameter, Place, Stage};
 use crate::effects::remedy::{Remedy, short};
+use crate::effects::separation::{Experiment, Separation};
 use crate::physics::hit::ContactLaw;
 
 pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
@@ -17,6 +18,11 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     acts_on: Place::ToolContact,
     parameters: &[Parameter::size("change", "1", [-0.3, 0.3], 0.0).within(-10.0, 10.0)],
     confusable_with: &["tool_offset", "restitution", "object_inertia"],
+    separated: &[Separation {
+        from: "tool_offset",
+        by: "straight hits with the object turned by 0, 90 and 180 degrees, and one with the tool turned about its own axis",
+        record: &[Experiment::ObjectTurned, Experiment::StrokeAgainToolTurned],
+    }],
     install: |values, effects| effects.hit.tip_friction = Some(TipFriction { change: values.number("change") }),
     remedy: |found| {
         let change = found.number("change");

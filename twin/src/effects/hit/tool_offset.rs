@@ -23,9 +23,11 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
         Parameter::form("carried", "1", [0.0, 1.0], 0.0)
             .within(0.0, 1.0)
             .searched(Search::Held)
-            .begun_at(&[&[0.0], &[1.0]]),
+            .begun_at(&[&[0.0], &[1.0]])
+            .felt_by_arm(),
     ],
     confusable_with: &["tip_friction", "joint_encoder_offset", "camera_extrinsic_translation"],
+    separated: &[],
     install: |values, effects| {
         let effect = ToolOffset { offset: values.vector("offset"), carried: values.number("carried") };
         effects.hit.tool_offset = Some(effect);

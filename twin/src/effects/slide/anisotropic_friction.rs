@@ -13,6 +13,7 @@
 use crate::effects::change::Change;
 use crate::effects::registry::{EffectInfo, Parameter, Place, Search, Stage};
 use crate::effects::remedy::{Remedy, degrees, short};
+use crate::effects::separation::{Experiment, Separation};
 use nalgebra::Vector2;
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4};
 
@@ -29,6 +30,11 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
             .begun_at(&[&[1.0], &[0.0]]),
     ],
     confusable_with: &["table_tilt", "friction_patch"],
+    separated: &[Separation {
+        from: "friction_patch",
+        by: "the same place in different headings, and different places",
+        record: &[Experiment::Headings, Experiment::Strokes],
+    }],
     install: |values, effects| {
         let (size, axis, drift) = (values.number("size"), values.number("axis"), values.number("drift"));
         effects.slide.anisotropic_friction = Some(AnisotropicFriction { size, axis: [axis.cos(), axis.sin()], drift });

@@ -8,7 +8,7 @@
 //! - Confused with: anisotropic friction and table tilt, where all slides go the same way.
 
 use crate::effects::change::Change;
-use crate::effects::registry::{EffectInfo, Parameter, Place, Stage};
+use crate::effects::registry::{EffectInfo, OnTable, Parameter, Place, Search, Stage};
 use crate::effects::remedy::{Remedy, degrees, short};
 use nalgebra::Vector2;
 use std::f64::consts::PI;
@@ -19,11 +19,14 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     acts_on: Place::Table,
     parameters: &[
         Parameter::size("factor", "1", [0.5, 1.5], 1.0).within(0.0, 100.0),
-        Parameter::form("direction", "rad", [-PI, PI], 0.0),
-        Parameter::form("distance", "m", [-0.8, 0.8], 0.0),
-        Parameter::form("radius", "m", [0.02, 0.5], f64::INFINITY).within(0.0, f64::MAX),
+        Parameter::form("direction", "rad", [-PI, PI], 0.0).searched(Search::OnTable(OnTable::Direction)),
+        Parameter::form("distance", "m", [-0.8, 0.8], 0.0).searched(Search::OnTable(OnTable::Distance)),
+        Parameter::form("radius", "m", [0.02, 0.5], f64::INFINITY)
+            .within(0.0, f64::MAX)
+            .searched(Search::OnTable(OnTable::Radius)),
     ],
     confusable_with: &["anisotropic_friction", "table_tilt"],
+    separated: &[],
     install: |values, effects| {
         let direction = values.number("direction");
         effects.slide.friction_patch = Some(FrictionPatch {

@@ -25,6 +25,7 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
             .begun_at(&[&[0.75], &[1.0]]),
     ],
     confusable_with: &["object_inertia", "tool_offset"],
+    separated: &[],
     install: |values, effects| {
         let (reach, pivot) = (values.number("reach"), values.number("pivot"));
         effects.slide.pressure_distribution = Some(PressureDistribution { reach, pivot });

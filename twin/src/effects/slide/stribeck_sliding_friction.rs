@@ -23,6 +23,7 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
         ]),
     ],
     confusable_with: &["velocity_dependent_friction", "tracker_smoothing"],
+    separated: &[],
     install: |values, effects| {
         effects.slide.stribeck_sliding_friction =
             Some(StribeckSlidingFriction { excess: values.number("excess"), velocity: values.number("velocity") });

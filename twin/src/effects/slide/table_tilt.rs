@@ -9,6 +9,7 @@
 use crate::effects::change::Change;
 use crate::effects::registry::{EffectInfo, Parameter, Place, Stage};
 use crate::effects::remedy::{Remedy, gravity, leaning, list};
+use crate::effects::separation::{Experiment, Separation};
 use nalgebra::{Rotation3, Vector3};
 
 pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
@@ -17,6 +18,18 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     acts_on: Place::Table,
     parameters: &[Parameter::size("tilt", "rad", [-0.1, 0.1], 0.0).vector(2).within(-1.5, 1.5)],
     confusable_with: &["camera_extrinsic_rotation", "anisotropic_friction", "friction_patch"],
+    separated: &[
+        Separation {
+            from: "anisotropic_friction",
+            by: "slides in eight headings through the same place",
+            record: &[Experiment::Headings],
+        },
+        Separation {
+            from: "base_tilt",
+            by: "rest the arm in eight poses, and slide in eight headings",
+            record: &[Experiment::Holds, Experiment::Headings],
+        },
+    ],
     install: |values, effects| effects.slide.table_tilt = Some(TableTilt { tilt: values.vector("tilt") }),
     remedy: |found| {
         let tilt = found.vector("tilt");

@@ -9,6 +9,7 @@
 use crate::effects::change::Change;
 use crate::effects::registry::{EffectInfo, Parameter, Place, Stage};
 use crate::effects::remedy::{Remedy, short};
+use crate::effects::separation::{Experiment, Separation};
 
 pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     name: "velocity_dependent_friction",
@@ -16,6 +17,11 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     acts_on: Place::Table,
     parameters: &[Parameter::size("slope", "s/m", [-0.3, 0.3], 0.0)],
     confusable_with: &["viscous_sliding_drag", "stribeck_sliding_friction"],
+    separated: &[Separation {
+        from: "viscous_sliding_drag",
+        by: "fix a known weight on top of the object, put its mass into a cell.toml of its own, and record the same kind of slides",
+        record: &[Experiment::StrokesWeighted],
+    }],
     install: |values, effects| {
         effects.slide.velocity_dependent_friction = Some(VelocityDependentFriction { slope: values.number("slope") });
     },

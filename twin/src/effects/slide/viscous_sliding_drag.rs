@@ -17,6 +17,7 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     acts_on: Place::Table,
     parameters: &[Parameter::size("drag", "N s/m", [0.0, 2.0], 0.0).within(0.0, f64::MAX)],
     confusable_with: &["velocity_dependent_friction", "stribeck_sliding_friction"],
+    separated: &[],
     install: |values, effects| {
         effects.slide.viscous_sliding_drag = Some(ViscousSlidingDrag { drag: values.number("drag") });
     },
