@@ -79,7 +79,9 @@ fn no_line_is_longer_than_a_terminal_has_columns_and_every_example_is_accepted()
         for line in text.lines() {
             assert!(line.chars().count() <= COLUMNS, "{name} --help has {} columns:\n{line}", line.chars().count());
         }
-        for example in examples(name, text) {
+        let given = examples(name, text);
+        assert!(!given.is_empty(), "{name} --help gives no example");
+        for example in given {
             // With --help behind it an example does nothing; what no verb knows, and values that none takes, are refused before.
             let words = words(&example);
             let output = run(&words[0], &[&words[1..], &["--help".to_owned()]].concat());

@@ -45,10 +45,22 @@ pub(crate) struct Arguments {
 #[derive(Debug, Subcommand)]
 enum Verb {
     /// Moves the arm through a running bridge (or starts one) and records clips into a session folder.
-    #[command(subcommand)]
+    #[command(
+        subcommand,
+        after_help = "\
+Examples:
+  calibration capture excitation --cell config/fr3_cell.toml --clips 8 --out session
+  calibration capture control-hit-slide --cell config/fr3_cell.toml --clips 12 --out strokes"
+    )]
     Capture(capture::Capture),
     /// Finds the parameters of controller or object from a session, with intervals, and says which are not identifiable.
-    #[command(subcommand)]
+    #[command(
+        subcommand,
+        after_help = "\
+Examples:
+  calibration identify arm session --out theta.toml --report page.html
+  calibration identify object strokes --parameters theta.toml --out object.toml"
+    )]
     Identify(identify::Identify),
     /// Ways of finding an object's parameters side by side: error, and what it cost.
     Compare(compare::CompareArguments),

@@ -42,6 +42,7 @@ pub(super) struct GripArguments {
 #[derive(Debug, Subcommand)]
 enum Order {
     /// Open or close to a width
+    #[command(after_help = "Examples:\n  rt_bridge grip move 0.03 --speed 0.05")]
     Move {
         /// Between the fingers [m], 0 to 0.5: 0.03 is 30 mm
         #[arg(value_name = "WIDTH", allow_negative_numbers = true, value_parser = width)]
@@ -51,6 +52,7 @@ enum Order {
         speed: Option<f64>,
     },
     /// Close until something of about this width is held
+    #[command(after_help = "Examples:\n  rt_bridge grip grasp 0.04 --force 40 --json")]
     Grasp {
         /// Of the object [m], 0 to 0.5: 0.03 is 30 mm
         #[arg(value_name = "WIDTH", allow_negative_numbers = true, value_parser = width)]
@@ -60,8 +62,10 @@ enum Order {
         force: Option<f64>,
     },
     /// Stay where the fingers are
+    #[command(after_help = "Examples:\n  rt_bridge grip stop")]
     Stop,
     /// Find out how far the fingers go; they open and close once
+    #[command(after_help = "Examples:\n  rt_bridge grip home")]
     Home,
 }
 
