@@ -7,12 +7,12 @@
 pub mod numbers;
 
 use crate::interrupt::Interrupt;
-use crate::typed;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use shared_mem::input;
 use shared_mem::output::{self, OutputError};
 use shared_mem::recording::Clip;
+use shared_mem::typed;
 use std::collections::BTreeMap;
 use std::hash::{DefaultHasher, Hash, Hasher as _};
 use std::path::{Path, PathBuf};

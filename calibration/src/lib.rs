@@ -15,7 +15,6 @@
 //! | [`model`] | what was found as a model file of MuJoCo, ROS or Gazebo |
 //! | [`report`] | pages with plots |
 //! | [`viewpoint`] | the camera's pose from pictures of the robot |
-//! | [`typed`] | commands as they are typed |
 //! | [`processes`] | the other programs as children |
 //! | [`interrupt`] | Ctrl-C, and a budget of time |
 //! | [`kept`] | what long work has found so far, for when it is interrupted |
@@ -58,5 +57,4 @@ pub mod model;
 pub mod processes;
 pub mod report;
 pub mod seed;
-pub mod typed;
 pub mod viewpoint;

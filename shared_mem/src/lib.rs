@@ -23,6 +23,7 @@
 //! | [`progress`] | how far it is, on a terminal |
 //! | [`printable`] | text as a terminal may show it |
 //! | [`command_line`] | what the command lines of all programs have in common: help, version, completions, manual pages |
+//! | [`typed`] | commands as a person types them |
 //! | [`usage`] | help, and what is wrong with a command line |
 //! | [`quantity`] | numbers with a unit, as they are typed |
 //! | [`time`] | the clock that every stamp comes from |
@@ -47,6 +48,7 @@ pub mod time;
 pub mod toml_file;
 pub mod topics;
 pub mod transport;
+pub mod typed;
 pub mod usage;
 
 pub use error_line::error_line;

@@ -284,6 +284,25 @@ fn examples_that_need_no_robot_do_what_they_say_and_answer_on_standard_output() 
 }
 
 #[test]
+fn a_command_on_a_page_does_what_it_says_where_names_hold_spaces_and_the_cell_lies_elsewhere() {
+    let lab = tempfile::tempdir().expect("a folder");
+    record(&lab.path().join("on monday"));
+    std::fs::rename(lab.path().join("on monday/cell.toml"), lab.path().join("the cell.toml")).expect("room");
+    let words = ["calibration", "identify", "arm", "on monday", "--cell", "the cell.toml"];
+    let outputs = ["--out", "what was found.toml", "--report", "page.html"];
+    let output = start(lab.path(), &[&words[..], &outputs[..]].concat()).wait_with_output().expect("it ends");
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let page = std::fs::read_to_string(lab.path().join("page.html")).expect("a page");
+    let command = page.split("<pre><code>").nth(1).and_then(|rest| rest.split("</code>").next()).expect("a command");
+    let programs = program_path("twin").parent().expect("a folder").to_owned();
+    let path = format!("{}:{}", programs.display(), std::env::var("PATH").unwrap_or_default());
+    let typed = Command::new("sh").args(["-c", command]).current_dir(lab.path()).env("PATH", path).output();
+    let typed = typed.expect("a shell");
+    assert!(typed.status.success(), "{command}\n{}", String::from_utf8_lossy(&typed.stderr));
+    assert!(!typed.stdout.is_empty(), "{command} answers nothing");
+}
+
+#[test]
 fn json_is_answered_whether_it_is_asked_for_before_or_behind_the_order() {
     let folder = tempfile::tempdir().expect("a folder");
     for place in ["grip --json stop", "grip stop --json"] {

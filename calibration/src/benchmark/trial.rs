@@ -22,7 +22,7 @@ use crate::interrupt::Interrupt;
 use crate::kept::Kept;
 use shared_mem::cell::{ClipEntry, ClipKind};
 use shared_mem::progress::Progress;
-use shared_mem::recording::{Clip, Session};
+use shared_mem::recording::{Clip, Session, SessionFiles};
 
 /// Linearisations of the fits that the oracle and the rules rest on.
 const EFFORT: Effort = Effort::of(8, Precision::Joints);
@@ -58,6 +58,7 @@ pub(super) fn sealed(world: &World, clips: Vec<Clip>) -> (Session, Admitted) {
         folder: format!("world {}", world.number).into(),
         cell: world.cell.clone(),
         clips: clips.iter().map(entry).collect(),
+        files: SessionFiles::default(),
     };
     let with_object = clips.iter().all(|clip| clip.kind == ClipKind::ControlHitSlide);
     let admitted = Admitted { groups: split::by_command(&clips), clips, files, with_object, warnings: Vec::new() };

@@ -10,6 +10,7 @@ use shared_mem::cell::{ClipEntry, ClipKind};
 use shared_mem::msg::joints_from;
 use shared_mem::msg::motion::SetPoint;
 use shared_mem::recording::{Clip, JointSeries, ReadError, Session};
+use shared_mem::typed::Command;
 use std::path::{Path, PathBuf};
 
 /// What moves less is at rest [rad/s].
@@ -38,14 +39,14 @@ pub enum RepeatError {
         known: String,
     },
     /// It is of the other kind.
-    #[error("clip {number} {was}; repeat it with `calibration capture {verb} --repeat {number}`")]
+    #[error("clip {number} {was}; repeat it with `{command}`")]
     Other {
         /// Its number.
         number: usize,
         /// What was done in it.
         was: &'static str,
-        /// The verb that repeats it.
-        verb: &'static str,
+        /// What repeats it.
+        command: Command,
     },
     /// Its desired positions are no motion that can be played.
     #[error("{} cannot be repeated: {why}; repeat another clip", file.display())]
@@ -78,13 +79,17 @@ pub fn read(folder: &Path, number: usize, kind: ClipKind, body: &Body) -> Result
         let known = session.clips.iter().map(|clip| clip.file.display().to_string()).collect::<Vec<_>>().join(", ");
         return Err(RepeatError::Unknown { folder: folder.to_owned(), number, known });
     };
+    let repeats = |verb: &str| {
+        let command = Command::new("calibration capture").words(verb).option("--cell", &folder.join("cell.toml"));
+        command.option("--out", folder).words(&format!("--repeat {number}"))
+    };
     match entry.kind {
         same if same == kind => {}
         ClipKind::Excitation => {
-            return Err(RepeatError::Other { number, was: "moves the arm alone", verb: "excitation" });
+            return Err(RepeatError::Other { number, was: "moves the arm alone", command: repeats("excitation") });
         }
         ClipKind::ControlHitSlide => {
-            return Err(RepeatError::Other { number, was: "is a stroke", verb: "control-hit-slide" });
+            return Err(RepeatError::Other { number, was: "is a stroke", command: repeats("control-hit-slide") });
         }
         ClipKind::FreeMotion => {
             return Err(RepeatError::Unfit { file: entry.file.clone(), why: "no arm moved in it" });

@@ -2,17 +2,15 @@
 
 use super::remark::{Remark, Severity};
 use super::session::{Found, Read, check_clips};
-use crate::typed;
 use shared_mem::console;
 use shared_mem::recording::Session;
+use shared_mem::typed::{self, Command};
 
 /// The data cannot mean what they say.
 #[derive(Debug, thiserror::Error)]
-#[error(
-    "{remark}: the data cannot mean what they say; `calibration check {session}` shows it, `{command}` goes on all the same"
-)]
+#[error("{remark}: the data cannot mean what they say; `{check}` shows it, `{command}` goes on all the same")]
 pub struct Stopped {
-    session: String,
+    check: Command,
     remark: String,
     command: String,
 }
@@ -26,13 +24,12 @@ pub fn look(session: &Session, as_recorded: bool) -> Result<Option<Remark>, Stop
     // Clips that cannot be read are left out by the verbs, and said to be.
     let Found { remarks, .. } = check_clips(&session.cell, &Read::of(session).clips);
     let Some(worst) = remarks.into_iter().next() else { return Ok(None) };
-    let folder = session.folder.display().to_string();
-    let folder = typed::quoted(if folder.is_empty() { "." } else { &folder });
+    let check = session.files.command("calibration check");
     if worst.severity == Severity::Wrong && !as_recorded {
         let remark = format!("{}: {}", worst.clips_in_words(), worst.what);
-        return Err(Stopped { session: folder, remark, command: typed::with("--as-recorded", false) });
+        return Err(Stopped { check, remark, command: typed::with("--as-recorded", false) });
     }
-    console::line(format_args!("warning: {worst} (`calibration check {folder}` shows all that is odd)"));
+    console::line(format_args!("warning: {worst} (`{check}` shows all that is odd)"));
     Ok(Some(worst))
 }
 

@@ -147,7 +147,7 @@ impl Rules {
     /// `of`: whether the arm is to be explained, or with it the object.
     fn diagnose(&self, session: &Session, clip: &Clip, of: ClipKind) -> Answer {
         if session.cell.robot.is_none() {
-            return Err(Refused::NoRobot { session: session.folder.clone() }.to_string());
+            return Err(Refused::NoRobot { session: session.files.clone() }.to_string());
         }
         if of == ClipKind::ControlHitSlide && clip.kind != of {
             return Err("no object is hit in it".into());

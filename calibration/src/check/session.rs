@@ -12,7 +12,7 @@ use nalgebra::Point3;
 use rayon::prelude::*;
 use serde::Serialize;
 use shared_mem::cell::{Cell, ClipEntry, ClipKind};
-use shared_mem::recording::{Clip, Session};
+use shared_mem::recording::{Clip, Session, SessionFiles};
 use twin::arm::ArmModel;
 use twin::replay::in_model_order;
 
@@ -21,6 +21,9 @@ use twin::replay::in_model_order;
 pub struct Checked {
     /// The session's folder.
     pub session: String,
+    /// How it was named.
+    #[serde(skip)]
+    pub files: SessionFiles,
     /// What is odd about it, worst first.
     pub remarks: Vec<Remark>,
     /// Its clips.
@@ -207,7 +210,8 @@ pub fn check(session: &Session) -> Checked {
     });
     let clips: Vec<ClipFacts> = facts.collect();
     let missing = good_for::missing(session, &clips);
-    Checked { session: session.folder.display().to_string(), remarks: merged(remarks), clips, missing, pictures }
+    let (folder, files) = (session.folder.display().to_string(), session.files.clone());
+    Checked { session: folder, files, remarks: merged(remarks), clips, missing, pictures }
 }
 
 /// The clips of a session.

@@ -1,7 +1,6 @@
 //! `calibration import`.
 
 use super::print;
-use calibration::typed;
 use clap::Args;
 use import::{Gravity, Imported, Note, Order, Outcome};
 use serde::Serialize;
@@ -9,6 +8,7 @@ use shared_mem::cell::Cell;
 use shared_mem::console;
 use shared_mem::msg::joints_from;
 use shared_mem::progress::Progress;
+use shared_mem::typed::Command;
 use std::path::{Path, PathBuf};
 use twin::arm::ArmModel;
 
@@ -123,10 +123,7 @@ fn gravity(cell: &Cell) -> Option<Gravity> {
 
 /// The same import, with a mapping.
 fn command(arguments: &ImportArguments, mapping: &Path) -> String {
-    let quoted = |path: &Path| typed::quoted(&path.to_string_lossy());
-    let files: Vec<String> = arguments.files.iter().map(|file| quoted(file)).collect();
-    let cell = arguments.cell.as_ref().map_or_else(String::new, |cell| format!(" --cell {}", quoted(cell)));
-    let force = if arguments.force { " --force" } else { "" };
-    let (files, out, mapping) = (files.join(" "), quoted(&arguments.out), quoted(mapping));
-    format!("calibration import {files} --out {out} --mapping {mapping}{cell}{force}")
+    let files = arguments.files.iter().fold(Command::new("calibration import"), |command, file| command.path(file));
+    let command = files.option("--out", &arguments.out).option("--mapping", mapping);
+    command.option_of("--cell", arguments.cell.as_deref()).words(if arguments.force { "--force" } else { "" }).into()
 }

@@ -7,8 +7,7 @@ use crate::forward::arm::one_piece;
 use crate::identify::object::screen::{Screened, screened};
 use crate::identify::remarks::grouped;
 use shared_mem::cell::{Cell, ClipKind};
-use shared_mem::recording::{Clip, JointSeries, ReadError, Session};
-use std::path::PathBuf;
+use shared_mem::recording::{Clip, JointSeries, ReadError, Session, SessionFiles};
 use twin::arm::{ArmModel, ModelError};
 
 /// Clips that can be used.
@@ -45,12 +44,12 @@ pub enum Refused {
     Arm(#[from] ModelError),
     /// An object alone.
     #[error(
-        "cell.toml has no [robot], and a diagnosis explains how an arm and what it hits move; what an object alone tells is found by `calibration identify object {}`",
-        session.display()
+        "cell.toml has no [robot], and a diagnosis explains how an arm and what it hits move; what an object alone tells is found by `{}`",
+        session.command("calibration identify object")
     )]
     NoRobot {
         /// The session.
-        session: PathBuf,
+        session: SessionFiles,
     },
     /// Torques cannot be predicted.
     #[error(
@@ -71,7 +70,7 @@ const FEWEST: usize = 4;
 /// [`Refused`] with what is missing.
 pub fn admit(session: &Session) -> Result<Admitted, Refused> {
     if session.cell.robot.is_none() {
-        return Err(Refused::NoRobot { session: session.folder.clone() });
+        return Err(Refused::NoRobot { session: session.files.clone() });
     }
     let arm = ArmModel::from_cell(&session.cell)?;
     let (mut clips, mut files, mut out, mut remarks) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
@@ -202,9 +201,14 @@ mod tests {
 
     #[test]
     fn a_session_without_a_robot_is_sent_to_where_an_object_alone_is_understood() {
-        let session = Session { folder: "tosses".into(), cell: Cell::default(), clips: Vec::new() };
+        let files = SessionFiles { session: "my tosses".into(), cell: Some("the cell.toml".into()) };
+        let session = Session { folder: "my tosses".into(), cell: Cell::default(), clips: Vec::new(), files };
         let why = admit(&session).expect_err("no arm").to_string();
-        assert!(why.contains("no [robot]") && why.contains("`calibration identify object tosses`"), "{why}");
+        assert!(
+            why.contains("no [robot]")
+                && why.contains("`calibration identify object 'my tosses' --cell 'the cell.toml'`"),
+            "{why}"
+        );
     }
 
     #[test]

@@ -3,6 +3,7 @@
 use super::remedies::Remedy;
 use crate::report::Trace;
 use serde::ser::{Serialize, SerializeStruct, Serializer};
+use shared_mem::recording::SessionFiles;
 use shared_mem::theta::Theta;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -37,6 +38,9 @@ pub struct Diagnosis {
     pub seconds: f64,
     /// The session's folder.
     pub session: String,
+    /// How it was named.
+    #[serde(skip)]
+    pub files: SessionFiles,
     /// What everything random was drawn from.
     pub seed: u64,
     /// The parameters identified first, and the effects named.

@@ -4,11 +4,11 @@ use super::{Diagnosis, Options, diagnose_kept};
 use crate::check::gate;
 use crate::interrupt::Interrupt;
 use crate::report;
-use crate::typed;
 use shared_mem::console;
 use shared_mem::output::Destination;
 use shared_mem::recording::Session;
 use shared_mem::theta::Theta;
+use shared_mem::typed;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 

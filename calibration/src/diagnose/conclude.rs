@@ -59,6 +59,7 @@ pub fn not_testable(session: &Session, options: &Options, why: &str) -> Diagnosi
         budget_spent: false,
         seconds: 0.0,
         session: session.folder.display().to_string(),
+        files: session.files.clone(),
         seed: options.seed,
         // What was known before; nothing was found.
         theta: options.theta.clone().unwrap_or_default(),
@@ -153,6 +154,7 @@ pub fn conclude<E: Evidence>(
         budget_spent: false,
         seconds: 0.0,
         session: session.folder.display().to_string(),
+        files: session.files.clone(),
         seed: options.seed,
         theta: Theta { object, ..theta },
         theta_file: None,

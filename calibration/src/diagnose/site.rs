@@ -6,10 +6,10 @@ use super::torques::is_tracking;
 use crate::capture::body::Body;
 use crate::capture::session::number_of;
 use crate::capture::{limits, pace, recorded};
-use crate::typed::quoted;
 use shared_mem::cell::ClipKind;
 use shared_mem::recording::Session;
-use std::path::Path;
+use shared_mem::typed::{Command, quoted};
+use std::path::{Path, PathBuf};
 
 /// Clips that are repeated to confirm something.
 const TWO: usize = 2;
@@ -21,7 +21,12 @@ const TWICE: f64 = 2.0;
 /// A session and what can be recorded into it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Site {
-    folder: String,
+    /// The session that clips are added to.
+    folder: PathBuf,
+    /// What captures are told about the cell.
+    cell: PathBuf,
+    /// Whether that session is still to be made.
+    is_new: bool,
     /// Whether its clips are strokes; otherwise the arm moves alone.
     strokes: bool,
     /// Numbers of clips that can be repeated.
@@ -33,11 +38,18 @@ pub struct Site {
 }
 
 impl Site {
-    /// Of a session whose clips lie on disk; where they cannot be read again, nothing can be repeated.
+    /// Of a session whose clips lie on disk; where they cannot be read again, nothing can be repeated. Where a cell.toml was
+    /// given besides, clips go into a session of their own, which is captured with it: the folder's own cell.toml is another
+    /// one, or there is none, and the one given lists no new clips.
     #[must_use]
     pub fn of(session: &Session) -> Self {
         let strokes =
             !session.clips.is_empty() && session.clips.iter().all(|clip| clip.kind == ClipKind::ControlHitSlide);
+        let torques = is_tracking(&session.cell);
+        if let Some(cell) = &session.files.cell {
+            let folder = named_after(&session.folder, "next");
+            return Self { cell: cell.clone(), is_new: true, torques, ..Self::new(&folder, strokes, Vec::new(), 1.0) };
+        }
         let kind = if strokes { ClipKind::ControlHitSlide } else { ClipKind::Excitation };
         let (mut clips, mut fastest) = (Vec::new(), 1.0);
         if let Ok(body) = Body::of(&session.cell) {
@@ -54,15 +66,16 @@ impl Site {
                 }
             }
         }
-        Self { torques: is_tracking(&session.cell), ..Self::new(&session.folder, strokes, clips, fastest) }
+        Self { torques, ..Self::new(&session.folder, strokes, clips, fastest) }
     }
 
     /// Of a session in `folder` with clips that can be repeated, the first of them `fastest` times as fast at most.
     #[must_use]
     pub fn new(folder: &Path, strokes: bool, clips: Vec<usize>, fastest: f64) -> Self {
-        let folder = folder.display().to_string();
-        let folder = if folder.len() > 1 { folder.trim_end_matches('/').to_owned() } else { folder };
-        Self { folder, strokes, clips, fastest, torques: false }
+        // Without a slash at its end, and never nothing: a clip may lie where the program runs.
+        let folder: PathBuf = folder.components().collect();
+        let folder = if folder.as_os_str().is_empty() { ".".into() } else { folder };
+        Self { cell: folder.join("cell.toml"), folder, is_new: false, strokes, clips, fastest, torques: false }
     }
 
     /// Whether its clips are strokes.
@@ -88,8 +101,8 @@ impl Site {
                 _ => self.strokes(&format!("--clips 1 {rest}")),
             },
             Capture::Elsewhere(name, rest) => {
-                let own = format!("{}_{name}", self.folder);
-                capture_into("control-hit-slide", &format!("{own}.toml"), &own, rest)
+                let cell = named_after(&self.folder, &format!("{name}.toml"));
+                capture_into("control-hit-slide", &cell, &named_after(&self.folder, name), rest)
             }
         }));
         self.finished(sentence, commands)
@@ -131,21 +144,29 @@ impl Site {
 
     /// Another session of the same kind.
     pub(super) fn usual(&self) -> Vec<String> {
-        let (next, cell) = (format!("{}_next", self.folder), self.cell());
+        let next = if self.is_new { self.folder.clone() } else { named_after(&self.folder, "next") };
         vec![if self.strokes {
-            capture_into("control-hit-slide", &cell, &next, "--clips 12")
+            capture_into("control-hit-slide", &self.cell, &next, "--clips 12")
         } else {
-            capture_into("excitation", &cell, &next, "--clips 8")
+            capture_into("excitation", &self.cell, &next, "--clips 8")
         }]
     }
 
     /// The sentence with commands, and after them what diagnoses the sessions they record into.
     pub(super) fn finished(&self, sentence: String, mut commands: Vec<String>) -> Advice {
-        for (end, page) in [("_arm", "report_arm.html"), ("_strokes", "report_strokes.html"), ("", "report.html")] {
-            let folder = quoted(&format!("{}{end}", self.folder));
-            if commands.iter().any(|command| command.contains(&format!("--out {folder} "))) {
-                let torques = if self.torques { " --torques" } else { "" };
-                commands.push(format!("calibration diagnose {folder}{torques} --report {page}"));
+        let fill = |commands: &[String], folder: &Path| {
+            commands.iter().any(|command| command.contains(&format!("--out {} ", quoted(folder))))
+        };
+        // A session begins with clips enough to be diagnosed.
+        if self.is_new && fill(&commands, &self.folder) {
+            commands.insert(0, self.same(if self.strokes { "--clips 6" } else { "--clips 4" }));
+        }
+        let beside = ["arm", "strokes"].map(|end| (named_after(&self.folder, end), format!("report_{end}.html")));
+        for (folder, page) in beside.into_iter().chain([(self.folder.clone(), "report.html".to_owned())]) {
+            if fill(&commands, &folder) {
+                let torques = if self.torques { "--torques" } else { "" };
+                let command = Command::new("calibration diagnose").path(&folder).words(torques);
+                commands.push(command.option("--report", Path::new(&page)).into());
             }
         }
         Advice { sentence, commands }
@@ -156,33 +177,59 @@ impl Site {
     }
 
     fn arm(&self, rest: &str) -> String {
-        let end = if self.strokes { "_arm" } else { "" };
-        capture_into("excitation", &self.cell(), &format!("{}{end}", self.folder), rest)
+        let folder = if self.strokes { named_after(&self.folder, "arm") } else { self.folder.clone() };
+        capture_into("excitation", &self.cell, &folder, rest)
     }
 
     fn strokes(&self, rest: &str) -> String {
-        let end = if self.strokes { "" } else { "_strokes" };
-        capture_into("control-hit-slide", &self.cell(), &format!("{}{end}", self.folder), rest)
-    }
-
-    fn cell(&self) -> String {
-        Path::new(&self.folder).join("cell.toml").display().to_string()
+        let folder = if self.strokes { self.folder.clone() } else { named_after(&self.folder, "strokes") };
+        capture_into("control-hit-slide", &self.cell, &folder, rest)
     }
 }
 
-fn capture_into(verb: &str, cell: &str, folder: &str, rest: &str) -> String {
-    format!("calibration capture {verb} --cell {} --out {} {rest}", quoted(cell), quoted(folder))
+fn capture_into(verb: &str, cell: &Path, folder: &Path, rest: &str) -> String {
+    let command = Command::new("calibration capture").words(verb).option("--cell", cell).option("--out", folder);
+    command.words(rest).into()
+}
+
+/// A session beside another one: `monday_arm`.
+fn named_after(folder: &Path, end: &str) -> PathBuf {
+    match folder.file_name() {
+        Some(name) => folder.with_file_name(format!("{}_{end}", name.to_string_lossy())),
+        None => folder.join(end),
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use shared_mem::cell::Cell;
+    use shared_mem::recording::SessionFiles;
 
     #[test]
     fn the_question_about_torques_is_asked_again() {
         let site = Site { torques: true, ..Site::new(Path::new("bags"), false, Vec::new(), 1.0) };
         let advice = site.more("Record more.".into(), 4);
         assert_eq!(advice.commands[1], "calibration diagnose bags --torques --report report.html");
+    }
+
+    #[test]
+    fn with_a_cell_of_elsewhere_clips_go_into_a_session_that_is_captured_with_it() {
+        let files = SessionFiles { session: "my clips/".into(), cell: Some("the lab/cell.toml".into()) };
+        let session = Session { folder: "my clips/".into(), cell: Cell::default(), clips: Vec::new(), files };
+        let advice = Site::of(&session).more("Record more.".into(), 3);
+        let capture = "calibration capture excitation --cell 'the lab/cell.toml' --out 'my clips_next' --clips";
+        let expected = [format!("{capture} 4"), format!("{capture} 3")];
+        assert_eq!(advice.commands[..2], expected);
+        assert_eq!(advice.commands[2], "calibration diagnose 'my clips_next' --report report.html");
+        assert_eq!(Site::of(&session).usual(), [format!("{capture} 8")]);
+    }
+
+    #[test]
+    fn a_clip_that_lies_where_the_program_runs_has_a_folder_too() {
+        let advice = Site::new(Path::new(""), true, vec![2], 1.0).advice(String::new(), &[Capture::Arm("--clips 2")]);
+        assert_eq!(advice.commands[0], "calibration capture excitation --cell ./cell.toml --out ./arm --clips 4");
+        assert_eq!(advice.commands[2], "calibration diagnose ./arm --report report_arm.html");
     }
 
     #[test]

@@ -4,7 +4,9 @@ use crate::report::identification::{Clip as SheetClip, Error as SheetError, Para
 use crate::report::{Trace, number_in_words};
 use serde::ser::SerializeStruct as _;
 use serde::{Serialize, Serializer};
+use shared_mem::recording::SessionFiles;
 use std::collections::BTreeMap;
+use std::path::PathBuf;
 
 /// An identification; what is not marked as an index is in SI units.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
@@ -13,6 +15,9 @@ pub struct Identification {
     pub target: String,
     /// The session's folder.
     pub session: String,
+    /// How it was named.
+    #[serde(skip)]
+    pub files: SessionFiles,
     /// What was found, by name.
     pub parameters: BTreeMap<String, Parameter>,
     /// What is not identifiable from the clips.
@@ -52,7 +57,7 @@ pub struct Identification {
     pub traces: Vec<Trace>,
     /// Where the parameters were written.
     #[serde(skip)]
-    pub theta_file: String,
+    pub theta_file: Option<PathBuf>,
 }
 
 /// One parameter of one or several numbers. As JSON, a single number is a number and no list.
@@ -225,6 +230,7 @@ impl Identification {
         Sheet {
             target: self.target.clone(),
             session: self.session.clone(),
+            files: self.files.clone(),
             sentence: self.sentence(),
             parameters: parameters.collect(),
             not_identifiable: self

@@ -9,10 +9,10 @@ use crate::estimate::{
 };
 use crate::interrupt::Interrupt;
 use crate::kept::{Fingerprint, Kept};
-use crate::typed;
 use shared_mem::output::OutputError;
 use shared_mem::progress::Progress;
 use shared_mem::theta::Theta;
+use shared_mem::typed;
 use std::path::Path;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -219,7 +219,7 @@ pub(super) fn concluded<E: From<RunError> + From<OutputError>>(
     let (mut answer, theta) = found?;
     if let Some(out) = out {
         theta.write(out)?;
-        answer.theta_file = out.display().to_string();
+        answer.theta_file = Some(out.to_owned());
     }
     kept.done();
     answer.seconds = began.elapsed().as_secs_f64();

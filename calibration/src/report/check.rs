@@ -90,7 +90,7 @@ pub fn page(found: &Checked) -> String {
         (clips(&found.clips))
         @if !found.missing.is_empty() { (missing(found)) }
     };
-    frame(&format!("check of {}", found.session), &format!("calibration check {}", found.session), &body)
+    frame(&format!("check of {}", found.session), &found.files.command("calibration check").to_string(), &body)
 }
 
 fn overview(found: &Checked) -> Markup {
@@ -201,6 +201,7 @@ mod tests {
     use crate::check::remark::Fault;
     use crate::report::canvas::tests::assert_well_formed;
     use shared_mem::cell::ClipKind;
+    use shared_mem::recording::SessionFiles;
 
     fn found(remarks: Vec<Remark>) -> Checked {
         let fitness =
@@ -221,7 +222,15 @@ mod tests {
             unit: "s",
             lines: vec![("after", "measured", vec![[0.0, 1e-3], [1.0, f64::NAN], [2.0, 9e-3]])],
         };
-        Checked { session: "monday".into(), remarks, clips: vec![clip], missing: Vec::new(), pictures: vec![picture] }
+        let files = SessionFiles { session: "my monday".into(), cell: Some("the cell.toml".into()) };
+        Checked {
+            session: "monday".into(),
+            files,
+            remarks,
+            clips: vec![clip],
+            missing: Vec::new(),
+            pictures: vec![picture],
+        }
     }
 
     #[test]

@@ -9,6 +9,8 @@ use super::parameters::{Numbers, of_joints, part};
 use super::quantity::{Unit, short};
 use super::trace::{Trace, gallery};
 use maud::{Markup, html};
+use shared_mem::recording::SessionFiles;
+use std::path::PathBuf;
 
 /// Clips whose residuals are shown.
 const SHOWN_CLIPS: usize = 3;
@@ -22,6 +24,8 @@ pub struct Sheet {
     pub target: String,
     /// The session's folder.
     pub session: String,
+    /// How it was named.
+    pub files: SessionFiles,
     /// The finding in one sentence.
     pub sentence: String,
     /// What was found.
@@ -49,7 +53,7 @@ pub struct Sheet {
     /// Facts about the run: what, and its value.
     pub provenance: Vec<[String; 2]>,
     /// Where the parameters were written.
-    pub theta_file: String,
+    pub theta_file: Option<PathBuf>,
 }
 
 /// A parameter of one or several numbers.
@@ -116,7 +120,7 @@ impl Sheet {
             (self.origin())
         };
         let title = format!("{} of {}", self.target, self.session);
-        frame(&title, &format!("calibration identify {} {}", self.target, self.session), &body)
+        frame(&title, &self.files.command(&format!("calibration identify {}", self.target)).to_string(), &body)
     }
 
     fn facts(&self) -> Markup {
@@ -235,9 +239,9 @@ impl Sheet {
             section {
                 h2 { "Where this comes from" }
                 dl { @for [what, value] in &self.provenance { dt { (what) } dd { (value) } } }
-                @if !self.theta_file.is_empty() {
+                @if let Some(file) = &self.theta_file {
                     p { "To see the gap with these parameters, clip by clip:" }
-                    pre { code { "twin replay " (self.session) " --parameters " (self.theta_file) } }
+                    pre { code { (self.files.command("twin replay").option("--parameters", file)) } }
                 }
             }
         }
@@ -272,6 +276,7 @@ mod tests {
         Sheet {
             target: "arm".into(),
             session: "monday & <co>".into(),
+            files: SessionFiles { session: "monday & <co>".into(), cell: Some("lab/cell.toml".into()) },
             sentence: "The gains explain the motion.".into(),
             parameters: vec![stiffness],
             not_identifiable: vec![["payload".into(), "no clip holds still under load".into()]],
@@ -289,7 +294,7 @@ mod tests {
             advice: vec!["Move joint 7 faster.".into()],
             notes: vec!["The clock of clip_03 jumped.".into()],
             provenance: vec![["optimiser".into(), "least squares".into()]],
-            theta_file: "theta.toml".into(),
+            theta_file: Some("theta.toml".into()),
             traces: vec![Trace { clip: "clip_07.mcap".into(), channel: "joint7".into(), ..Trace::default() }],
         }
     }
@@ -307,7 +312,8 @@ mod tests {
             "Clip by clip: joint error (RMS)",
             "Move joint 7 faster.",
             "The clock of clip_03 jumped.",
-            "twin replay monday &amp; &lt;co&gt; --parameters theta.toml",
+            "twin replay 'monday &amp; &lt;co&gt;' --cell lab/cell.toml --parameters theta.toml",
+            "calibration identify arm 'monday &amp; &lt;co&gt;' --cell lab/cell.toml",
         ] {
             assert!(page.contains(text), "no {text}");
         }

@@ -2,6 +2,7 @@
 
 use super::Finding;
 use shared_mem::transport::{DOMAIN_VARIABLE, ForeignFile, PlaceError, book_keeping, foreign_files, survey};
+use shared_mem::typed::Command;
 
 /// Where Linux keeps shared memory.
 const SHM: &str = "/dev/shm";
@@ -49,7 +50,7 @@ fn foreign() -> Finding {
     Finding::problem(
         "other users",
         format!("{} belongs to user {owner}{others}", path.display()),
-        format!("remove it as that user or as root: `sudo rm {}`", path.display()),
+        format!("remove it as that user or as root: `{}`", Command::new("sudo rm").path(path)),
     )
 }
 

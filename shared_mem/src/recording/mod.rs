@@ -61,5 +61,5 @@ pub use pictures::{PictureKind, for_pictures};
 pub use raw::{RawMessage, RawMessages};
 pub use recover::{RecoverError, Recovered, recover};
 pub use series::{JointSeries, ObjectSeries};
-pub use session::Session;
+pub use session::{Session, SessionFiles};
 pub use writer::{ClipInfo, ClipWriter, WriteError, WriteSummary};

@@ -2,6 +2,7 @@
 
 use super::error::ReadError;
 use crate::cell::{Cell, ClipEntry, ClipKind};
+use crate::typed::Command;
 use std::path::{Path, PathBuf};
 
 /// Clips and the cell they were recorded in.
@@ -13,6 +14,25 @@ pub struct Session {
     pub cell: Cell,
     /// Clips, in the order of cell.toml.
     pub clips: Vec<ClipEntry>,
+    /// How it was named.
+    pub files: SessionFiles,
+}
+
+/// How a person names a session: the folder or the clip, and the cell.toml where another one than the session's own counts.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct SessionFiles {
+    /// The folder or the clip.
+    pub session: PathBuf,
+    /// The cell.toml that was given.
+    pub cell: Option<PathBuf>,
+}
+
+impl SessionFiles {
+    /// A command about this session, as it is typed.
+    #[must_use]
+    pub fn command(&self, verb: &str) -> Command {
+        Command::new(verb).path(&self.session).option_of("--cell", self.cell.as_deref())
+    }
 }
 
 impl Session {
@@ -31,13 +51,14 @@ impl Session {
     /// As [`Session::open`].
     pub fn open_with(path: &Path, cell_toml: Option<&Path>) -> Result<Self, ReadError> {
         let metadata = std::fs::metadata(path).map_err(ReadError::io(path))?;
+        let files = SessionFiles { session: path.to_owned(), cell: cell_toml.map(Path::to_owned) };
         let is_session = metadata.is_dir() && !super::twinaligner::is_clip_folder(path);
         if is_session {
             let cell = Cell::read(&cell_toml.map_or_else(|| path.join("cell.toml"), Path::to_owned))?;
             if cell.clips.is_empty() {
                 return Err(ReadError::kind(path, "cell.toml lists no clips; add `[[clip]] file = \"...\"` blocks"));
             }
-            return Ok(Self { folder: path.to_owned(), clips: cell.clips.clone(), cell });
+            return Ok(Self { folder: path.to_owned(), clips: cell.clips.clone(), cell, files });
         }
         let folder = path.parent().map_or_else(PathBuf::new, Path::to_owned);
         let beside = folder.join("cell.toml");
@@ -52,7 +73,7 @@ impl Session {
             Some(clip) => clip,
             None => ClipEntry { kind: kind_of(path, &cell)?, file },
         };
-        Ok(Self { folder, clips: vec![clip], cell })
+        Ok(Self { folder, clips: vec![clip], cell, files })
     }
 
     /// Reads one of the clips.
@@ -80,4 +101,15 @@ fn kind_of(path: &Path, cell: &Cell) -> Result<ClipKind, ReadError> {
         (Some(_), Some(_)) if super::clip::shows_object(path, cell)? => ClipKind::ControlHitSlide,
         (Some(_), _) => ClipKind::Excitation,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_command_about_a_session_names_it_as_it_was_named() {
+        let files = SessionFiles { session: "on monday".into(), cell: Some("the cell.toml".into()) };
+        assert_eq!(files.command("twin replay").to_string(), "twin replay 'on monday' --cell 'the cell.toml'");
+    }
 }

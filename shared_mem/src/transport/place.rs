@@ -5,6 +5,7 @@
 //! kills the process that reads it (SIGBUS). So all of it is made for this user alone, and what is not is refused.
 
 use super::{DOMAIN_VARIABLE, TransportError};
+use crate::typed::Command;
 use iceoryx2::config::Config;
 use iceoryx2::prelude::{FileName, Path as IceoryxPath, SemanticString as _};
 use std::io::ErrorKind;
@@ -169,7 +170,7 @@ fn refuse_unless_own(path: &Path, found: io::Result<fs::Metadata>, user: u32) ->
     }
     if found.mode() & 0o022 != 0 {
         let what = format!("of user {user} can be written by others (mode {:o})", found.mode() & 0o777);
-        return refused(what, format!("take that right away: `chmod go-w {}`", path.display()));
+        return refused(what, format!("take that right away: `{}`", Command::new("chmod go-w").path(path)));
     }
     Ok(())
 }

@@ -7,6 +7,7 @@ use shared_mem::cell::Cell;
 use shared_mem::parent;
 use shared_mem::quantity::seconds;
 use shared_mem::theta::Theta;
+use shared_mem::typed::Command;
 use shared_mem::{answer, console};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -109,7 +110,8 @@ fn why_nothing(summary: &Summary, cell: &Path, waited: Duration) -> String {
 
 /// The command that starts a bridge for this cell.
 fn bridge(cell: &Path) -> String {
-    format!("`rt_bridge run --cell {} --arm sim` (a robot: --arm fci://HOST)", cell.display())
+    let command = Command::new("rt_bridge run").option("--cell", cell).words("--arm sim");
+    format!("`{command}` (a robot: --arm fci://HOST)")
 }
 
 type ViewerThread = std::thread::JoinHandle<anyhow::Result<()>>;

@@ -32,7 +32,7 @@ use finding::Finding;
 use session::Material;
 use shared_mem::cell::Cell;
 use shared_mem::output::OutputError;
-use shared_mem::recording::{Clip, ReadError};
+use shared_mem::recording::{Clip, ReadError, SessionFiles};
 use shared_mem::theta::Theta;
 use shared_mem::toml_file::TomlFileError;
 use std::path::PathBuf;
@@ -179,6 +179,7 @@ fn identify_kept(
     let finding = Finding::new(&settings, &unknowns, &outcome);
     let mut answer = finding.answer(&before);
     answer.session = options.session.display().to_string();
+    answer.files = SessionFiles { session: options.session.clone(), cell: options.cell.clone() };
     answer.optimizer = options.optimizer.name().into();
     figures::fill(&mut answer, &model, &clips, &random, [&before, &outcome.fit.shared])?;
     answer.not_identifiable = verdict::untold(&finding, &model, &clips, options.optimizer);

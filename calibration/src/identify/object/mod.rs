@@ -55,7 +55,7 @@ use polish::{Searched, fit_polished};
 use shared_mem::cell::{Cell, ClipKind};
 use shared_mem::output::OutputError;
 use shared_mem::progress::Progress;
-use shared_mem::recording::{Clip, ReadError};
+use shared_mem::recording::{Clip, ReadError, SessionFiles};
 use shared_mem::theta::Theta;
 use shared_mem::toml_file::{self, TomlFileError};
 use std::path::PathBuf;
@@ -180,6 +180,7 @@ fn identify_kept(
     let theta = problem.settings.theta(&found.at.shared);
     let mut answer = finding.answer(material);
     answer.session = options.session.display().to_string();
+    answer.files = SessionFiles { session: options.session.clone(), cell: options.cell.clone() };
     answer.optimizer = options.optimizer.name().into();
     answer.warnings.extend(problem.warnings.iter().cloned());
     if disagreement.is_none() {

@@ -43,7 +43,8 @@ pub fn page(diagnosis: &Diagnosis) -> String {
         }
         (origin(diagnosis))
     };
-    let command = format!("calibration diagnose {} --seed {}", diagnosis.session, diagnosis.seed);
+    let command =
+        diagnosis.files.command("calibration diagnose").words(&format!("--seed {}", diagnosis.seed)).to_string();
     frame(&format!("diagnosis of {}", diagnosis.session), &command, &body)
 }
 
@@ -151,7 +152,7 @@ fn origin(diagnosis: &Diagnosis) -> Markup {
             }
             @if let Some(file) = &diagnosis.theta_file {
                 p { "The parameters are in " code { (file.display()) } ". Joint and object errors with them, of every clip:" }
-                pre { code { "twin replay " (diagnosis.session) " --parameters " (file.display()) } }
+                pre { code { (diagnosis.files.command("twin replay").option("--parameters", file)) } }
             }
             details { summary { "theta.toml" } pre { code { (diagnosis.theta.to_toml()) } } }
         }
@@ -173,6 +174,7 @@ pub(super) mod tests {
     use super::*;
     use crate::diagnose::{Candidate, Change, Clips, Gap, Nearest, Place, Remedy, Share, Size, Status, Verdict};
     use crate::report::Trace;
+    use shared_mem::recording::SessionFiles;
     use shared_mem::theta::Theta;
     use std::collections::BTreeMap;
 
@@ -249,7 +251,8 @@ pub(super) mod tests {
             warnings: Vec::new(),
             budget_spent: false,
             seconds: 83.2,
-            session: "monday".into(),
+            session: "my monday".into(),
+            files: SessionFiles { session: "my monday".into(), cell: Some("lab/cell.toml".into()) },
             seed: 7,
             theta: Theta::default(),
             theta_file: Some("theta.toml".into()),
@@ -283,7 +286,8 @@ pub(super) mod tests {
             "Play a chirp",
             "<pre><code>calibration capture excitation --motion chirp\ncalibration diagnose monday</code></pre>",
             "2 clips: clip_00, clip_01",
-            "twin replay monday --parameters theta.toml",
+            "twin replay 'my monday' --cell lab/cell.toml --parameters theta.toml",
+            "calibration diagnose 'my monday' --cell lab/cell.toml --seed 7",
         ];
         for pair in order.windows(2) {
             assert!(place(pair[0]) < place(pair[1]), "{} comes after {}", pair[0], pair[1]);

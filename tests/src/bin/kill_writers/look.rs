@@ -2,7 +2,7 @@
 //! should not be there.
 
 use shared_mem::cell::Cell;
-use shared_mem::recording::{Session, read_picture};
+use shared_mem::recording::{Session, SessionFiles, read_picture};
 use shared_mem::theta::Theta;
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -76,7 +76,8 @@ fn names_nothing(folder: &Path) -> bool {
 /// A session whose clips are all whole.
 fn session(folder: &Path) -> Result<(), String> {
     let cell = Cell::read(&folder.join("cell.toml")).map_err(|e| e.to_string())?;
-    let session = Session { folder: folder.to_owned(), clips: cell.clips.clone(), cell };
+    let files = SessionFiles::default();
+    let session = Session { folder: folder.to_owned(), clips: cell.clips.clone(), cell, files };
     session.clips.iter().try_for_each(|entry| undamaged(&session, entry))
 }
 
