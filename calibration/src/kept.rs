@@ -2,13 +2,14 @@
 //! for; the same command finds it again and ends, bit by bit, where it would have ended without the interruption.
 //!
 //! The file is written whole, now and then and when the work is interrupted. It belongs to one question: other clips,
-//! settings or another version of the program have a [`Fingerprint`] of their own and begin anew.
+//! settings or another build of the program have a [`Fingerprint`] of their own and begin anew.
 
 pub mod numbers;
 
 use crate::interrupt::Interrupt;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
+use shared_mem::command_line;
 use shared_mem::input;
 use shared_mem::output::{self, OutputError};
 use shared_mem::recording::Clip;
@@ -27,11 +28,15 @@ const SAVED_EVERY: Duration = Duration::from_secs(30);
 pub struct Fingerprint(DefaultHasher);
 
 impl Fingerprint {
-    /// Of a command, in this version of the program.
+    /// Of a command, in this build of the program.
     #[must_use]
     pub fn of(command: &str) -> Self {
+        Self::in_build(command, command_line::fingerprint())
+    }
+
+    fn in_build(command: &str, build: &str) -> Self {
         let mut hasher = DefaultHasher::new();
-        (command, env!("CARGO_PKG_VERSION")).hash(&mut hasher);
+        (command, env!("CARGO_PKG_VERSION"), build).hash(&mut hasher);
         Self(hasher)
     }
 
@@ -281,6 +286,23 @@ mod tests {
         assert!(!open("another").holds_something());
         open("one").done();
         assert!(!file.exists());
+    }
+
+    #[test]
+    fn what_another_build_kept_is_not_gone_on_from() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let file = folder.path().join("d.json.state");
+        let open = |build: &str| {
+            let question = Fingerprint::in_build("diagnose", build);
+            Kept::in_file(Some(file.clone()), &question, &Interrupt::default())
+        };
+        let [before, after] =
+            ["0.1.0 (commit 0123456789ab; features: none)", "0.1.0 (commit ba9876543210; features: none)"];
+        let kept = open(before);
+        kept.keep(&step(1), &7);
+        kept.save().expect("room");
+        assert_eq!(open(before).known::<i32>(&step(1)), Some(7));
+        assert!(!open(after).holds_something());
     }
 
     #[test]

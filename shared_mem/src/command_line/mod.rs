@@ -16,6 +16,8 @@ use clap::{Arg, ArgMatches, Command, Parser, value_parser};
 use clap_complete::Shell;
 use std::path::PathBuf;
 use std::process::ExitCode;
+use std::sync::OnceLock;
+use std::time::SystemTime;
 
 /// Columns of a help text, whatever the terminal has: a narrower one folds lines itself, and what is copied stays whole.
 const WIDTH: usize = 80;
@@ -39,6 +41,29 @@ impl Build {
         let features = if built.is_empty() { "none".to_owned() } else { built.join(", ") };
         format!("{} (commit {commit}; features: {features})", self.version)
     }
+
+    /// The line; where builds that differ have the same one, with size and time of the program's file behind it.
+    fn fingerprint(&self) -> String {
+        let line = self.line();
+        if !self.commit.is_empty() && !self.commit.ends_with(MODIFIED) {
+            return line;
+        }
+        let file = std::env::current_exe().and_then(std::fs::metadata);
+        let since = |time: SystemTime| time.duration_since(SystemTime::UNIX_EPOCH).ok().map(|since| since.as_nanos());
+        let written = file.as_ref().ok().and_then(|file| since(file.modified().ok()?));
+        format!("{line} {:?}", (file.as_ref().map(std::fs::Metadata::len).ok(), written))
+    }
+}
+
+/// Behind the commit of sources that hold more than that.
+const MODIFIED: &str = "-modified";
+/// Of the program that runs.
+static FINGERPRINT: OnceLock<String> = OnceLock::new();
+
+/// What tells this build of the program from others: what `--version` says. Empty in a process that called no [`parse`].
+#[must_use]
+pub fn fingerprint() -> &'static str {
+    FINGERPRINT.get().map_or("", String::as_str)
 }
 
 /// Reads the program's command line.
@@ -47,6 +72,7 @@ impl Build {
 /// The exit code of a program that has nothing more to do: its help, its version, completions or manual pages were asked for
 /// and said, or its arguments are wrong and that was said.
 pub fn parse<A: Parser>(build: &Build) -> Result<A, ExitCode> {
+    let _fingerprint = FINGERPRINT.get_or_init(|| build.fingerprint());
     let mut command = command::<A>(build);
     let matches = command
         .try_get_matches_from_mut(std::env::args_os())
@@ -126,5 +152,16 @@ mod tests {
             "0.1.0 (commit 0123456789ab; features: viewer)"
         );
         assert_eq!(built("", &[("render", false)]), "0.1.0 (commit unknown; features: none)");
+    }
+
+    #[test]
+    fn builds_of_sources_that_no_commit_holds_are_told_apart_by_the_programs_file() {
+        let of = |commit| Build { version: "0.1.0", commit, features: &[] };
+        assert_eq!(of("0123456789ab").fingerprint(), of("0123456789ab").line());
+        for commit in ["", "0123456789ab-modified"] {
+            let (line, fingerprint) = (of(commit).line(), of(commit).fingerprint());
+            let file = fingerprint.strip_prefix(&line).expect("the line first");
+            assert!(file.contains("(Some(") && !file.contains("None"), "{fingerprint}");
+        }
     }
 }
