@@ -2,14 +2,13 @@
 
 use super::front::{Front, MOST};
 use super::open;
+use super::test_client::{LONG, connect, say};
 use foxglove::{ChannelBuilder, Context, RawChannel, WebSocketServer, WebSocketServerHandle};
 use std::io::{ErrorKind, Read as _, Write as _};
 use std::net::{SocketAddr, TcpStream};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-/// Long enough for a busy machine; nothing is asserted about it.
-const LONG: Duration = Duration::from_secs(60);
 /// Bytes of a message.
 const MESSAGE: usize = 256 * 1024;
 
@@ -33,23 +32,7 @@ fn shown(patience: Duration) -> Shown {
 impl Shown {
     /// A connection from a page of `origin`, and the first line of the reply to its request.
     fn connect(&self, origin: &str) -> (TcpStream, String) {
-        let address = self.front.address();
-        let mut tcp = TcpStream::connect(address).expect("it listens");
-        tcp.set_read_timeout(Some(LONG)).expect("a timeout above zero");
-        let request = format!(
-            "GET / HTTP/1.1\r\nHost: {address}\r\nOrigin: {origin}\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n\
-             Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n\
-             Sec-WebSocket-Protocol: foxglove.sdk.v1\r\n\r\n"
-        );
-        tcp.write_all(request.as_bytes()).expect("it reads");
-        let mut reply = Vec::new();
-        while !reply.ends_with(b"\r\n\r\n") {
-            let mut byte = [0];
-            tcp.read_exact(&mut byte).expect("a reply");
-            reply.push(byte[0]);
-        }
-        let reply = String::from_utf8(reply).expect("text");
-        (tcp, reply.lines().next().expect("a status").to_owned())
+        connect(self.front.address(), Some(origin))
     }
 
     /// A viewer that asks for the pictures.
@@ -60,9 +43,7 @@ impl Shown {
             r#"{{"op":"subscribe","subscriptions":[{{"id":1,"channelId":{}}}]}}"#,
             u64::from(self.channel.id())
         );
-        // A text of up to 125 bytes whose mask is zero.
-        let header = [0x81, 0x80 | u8::try_from(subscribe.len()).expect("a short text"), 0, 0, 0, 0];
-        tcp.write_all(&[&header, subscribe.as_bytes()].concat()).expect("it reads");
+        say(&mut tcp, &subscribe);
         tcp
     }
 
