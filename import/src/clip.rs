@@ -1,7 +1,7 @@
 //! A log by its mapping: a clip in SI, joints in one order, stamps in nanoseconds.
 
 use crate::log::{Column, Log, Table};
-use crate::mapping::{JointColumns, Mapping, PoseColumns, TimeUnit, Torque, TorquesAct};
+use crate::mapping::{Clock, JointColumns, Mapping, PoseColumns, Torque, TorquesAct};
 use shared_mem::frames::Pose;
 use shared_mem::msg::MAX_JOINTS;
 use shared_mem::recording::{Clip, JointSeries, ObjectSeries};
@@ -85,12 +85,7 @@ fn series(
     };
     let q = pick("q", &columns.q)?;
     let has_position = |row: &usize| q.iter().any(|values| values.get(*row).is_some_and(|v| !v.is_nan()));
-    let rows = stamps(
-        table,
-        (columns.stamps.as_ref(), columns.stamp_unit, columns.rate, columns.shift),
-        has_position,
-        warnings,
-    )?;
+    let rows = stamps(table, columns.clock(), has_position, warnings)?;
     let gather = |values: &[&[f64]], factor: f64| -> Vec<f64> {
         let row = |row: &usize| {
             let of = |(i, column): (usize, &&[f64])| column.get(*row).map_or(f64::NAN, |v| v * factor * sign(i));
@@ -146,8 +141,7 @@ fn poses(log: &Log, columns: &PoseColumns, warnings: &mut Vec<String>) -> Result
         let p: [f64; 3] = std::array::from_fn(|i| at(&position, i, row) * metres);
         Pose::from_parts(p, std::array::from_fn(|i| at(&orientation, i, row)))
     };
-    let clock = (columns.stamps.as_ref(), columns.stamp_unit, columns.rate, columns.shift);
-    let rows = stamps(table, clock, |row| !at(&position, 0, *row).is_nan(), warnings)?;
+    let rows = stamps(table, columns.clock(), |row| !at(&position, 0, *row).is_nan(), warnings)?;
     let (mut poses, mut kept) = (Vec::new(), Vec::new());
     for (row, stamp) in rows.kept.iter().zip(&rows.stamps_ns) {
         if let Some(pose) = pose(*row) {
@@ -163,7 +157,7 @@ fn poses(log: &Log, columns: &PoseColumns, warnings: &mut Vec<String>) -> Result
 /// Stamps of the rows for which `is_there`.
 fn stamps(
     table: &Table,
-    (name, unit, rate, shift): (Option<&String>, TimeUnit, Option<f64>, f64),
+    Clock { stamps: name, unit, rate, shift }: Clock<'_>,
     is_there: impl Fn(&usize) -> bool,
     warnings: &mut Vec<String>,
 ) -> Result<Rows, String> {

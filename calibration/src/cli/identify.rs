@@ -1,14 +1,14 @@
 //! `calibration identify`.
 
 use super::print;
-use calibration::check::{Remark, gate};
+use calibration::check::gate;
 use calibration::identify::{Identification, Optimizer, arm, object};
 use calibration::interrupt::Interrupt;
 use calibration::report::terminal;
 use clap::{Subcommand, ValueEnum};
-use shared_mem::output::{Destination, OutputError};
+use shared_mem::output::Destination;
 use shared_mem::recording::Session;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 #[derive(Debug, Subcommand)]
 pub(super) enum Identify {
@@ -16,6 +16,41 @@ pub(super) enum Identify {
     Arm(ArmArguments),
     /// Friction, mass, centre of mass and tip friction of the object, from clips in which the arm hits it.
     Object(ObjectArguments),
+}
+
+/// What both are asked for.
+#[derive(Debug, clap::Args)]
+struct Task {
+    /// Session folder, or one clip beside a cell.toml.
+    #[arg(value_name = "SESSION")]
+    session: PathBuf,
+    /// What the laboratory knows about its cell [default: cell.toml beside the clips].
+    #[arg(long, value_name = "CELL.TOML")]
+    cell: Option<PathBuf>,
+    /// The way of searching; for an object pso and cma go by ADD + ADD-S.
+    #[arg(long, value_enum, default_value_t = Way::LeastSquares)]
+    optimizer: Way,
+    /// Where the parameters go: a theta.toml that every other command takes.
+    #[arg(long, value_name = "THETA.TOML")]
+    out: Option<PathBuf>,
+    /// Replaces the files of --out and --report; of a theta.toml, comments and what is not found stay.
+    #[arg(long)]
+    force: bool,
+    /// Parameters that are known already: effects, and for an object the arm's gains.
+    #[arg(long, value_name = "THETA.TOML")]
+    parameters: Option<PathBuf>,
+    /// Draws the clips that are held out, and the searches.
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = calibration::seed::parse, allow_negative_numbers = true)]
+    seed: u64,
+    /// Takes the data as they were recorded where `calibration check` says that they cannot mean what they say.
+    #[arg(long)]
+    as_recorded: bool,
+    /// Prints one JSON object on stdout at the end.
+    #[arg(long)]
+    json: bool,
+    /// Writes a page with pictures.
+    #[arg(long, value_name = "PAGE.HTML")]
+    report: Option<PathBuf>,
 }
 
 #[derive(Debug, clap::Args)]
@@ -31,42 +66,14 @@ Examples:
   calibration identify arm monday --also command_delay,joint_coulomb_friction --out theta.toml
   calibration identify arm monday --optimizer pso --json")]
 pub(super) struct ArmArguments {
-    /// Session folder, or one clip beside a cell.toml.
-    #[arg(value_name = "SESSION")]
-    session: PathBuf,
-    /// What the laboratory knows about its cell [default: cell.toml beside the clips].
-    #[arg(long, value_name = "CELL.TOML")]
-    cell: Option<PathBuf>,
-    /// The way of searching.
-    #[arg(long, value_enum, default_value_t = Way::LeastSquares)]
-    optimizer: Way,
-    /// Where the parameters go: a theta.toml that every other command takes.
-    #[arg(long, value_name = "THETA.TOML")]
-    out: Option<PathBuf>,
-    /// Replaces the files of --out and --report; of a theta.toml, comments and what is not found stay.
-    #[arg(long)]
-    force: bool,
-    /// Parameters that are known already.
-    #[arg(long, value_name = "THETA.TOML")]
-    parameters: Option<PathBuf>,
+    #[command(flatten)]
+    task: Task,
     /// Effects to search besides, by the names of docs/effects.md: command_delay,rotor_inertia,payload,...
     #[arg(long, value_name = "NAME,...", value_delimiter = ',')]
     also: Vec<String>,
     /// Points that pso and cma may try.
     #[arg(long, value_name = "N", default_value_t = 4000, value_parser = clap::value_parser!(u32).range(1..))]
     budget: u32,
-    /// Draws the clips that are held out, and the searches.
-    #[arg(long, value_name = "N", default_value_t = 0, value_parser = calibration::seed::parse, allow_negative_numbers = true)]
-    seed: u64,
-    /// Takes the data as they were recorded where `calibration check` says that they cannot mean what they say.
-    #[arg(long)]
-    as_recorded: bool,
-    /// Prints one JSON object on stdout at the end.
-    #[arg(long)]
-    json: bool,
-    /// Writes a page with pictures.
-    #[arg(long, value_name = "PAGE.HTML")]
-    report: Option<PathBuf>,
 }
 
 #[derive(Debug, clap::Args)]
@@ -82,39 +89,11 @@ Examples:
   calibration identify object strokes --out theta.toml --report page.html
   calibration identify object strokes --parameters arm.toml --optimizer pso --budget 1200 --json")]
 pub(super) struct ObjectArguments {
-    /// Session folder, or one clip beside a cell.toml.
-    #[arg(value_name = "SESSION")]
-    session: PathBuf,
-    /// What the laboratory knows about its cell [default: cell.toml beside the clips].
-    #[arg(long, value_name = "CELL.TOML")]
-    cell: Option<PathBuf>,
-    /// The way of searching; pso and cma go by ADD + ADD-S.
-    #[arg(long, value_enum, default_value_t = Way::LeastSquares)]
-    optimizer: Way,
-    /// Where the parameters go: a theta.toml that every other command takes.
-    #[arg(long, value_name = "THETA.TOML")]
-    out: Option<PathBuf>,
-    /// Replaces the files of --out and --report; of a theta.toml, comments and what is not found stay.
-    #[arg(long)]
-    force: bool,
-    /// Parameters that are known already: the arm's gains, effects.
-    #[arg(long, value_name = "THETA.TOML")]
-    parameters: Option<PathBuf>,
+    #[command(flatten)]
+    task: Task,
     /// Points that pso and cma may try.
     #[arg(long, value_name = "N", default_value_t = 1200, value_parser = clap::value_parser!(u32).range(1..))]
     budget: u32,
-    /// Draws the clips that are held out, and the searches.
-    #[arg(long, value_name = "N", default_value_t = 0, value_parser = calibration::seed::parse, allow_negative_numbers = true)]
-    seed: u64,
-    /// Takes the data as they were recorded where `calibration check` says that they cannot mean what they say.
-    #[arg(long)]
-    as_recorded: bool,
-    /// Prints one JSON object on stdout at the end.
-    #[arg(long)]
-    json: bool,
-    /// Writes a page with pictures.
-    #[arg(long, value_name = "PAGE.HTML")]
-    report: Option<PathBuf>,
 }
 
 /// Ways of searching, by their names on the command line.
@@ -140,66 +119,37 @@ impl Way {
 
 pub(super) fn run(identify: Identify, interrupt: &Interrupt) -> anyhow::Result<()> {
     match identify {
-        Identify::Arm(arguments) => {
-            let ArmArguments {
-                session,
-                cell,
-                optimizer,
-                out,
-                force,
-                parameters,
-                also,
-                budget,
-                seed,
-                as_recorded,
-                json,
-                report,
-            } = arguments;
-            let page = places(out.as_deref(), report.as_deref(), force)?;
-            let odd = gate::look(&Session::open_with(&session, cell.as_deref())?, as_recorded)?;
+        Identify::Arm(ArmArguments { task, also, budget }) => task.run(|task| {
+            let Task { session, cell, optimizer, out, parameters, seed, .. } = task;
             let (optimizer, budget) = (optimizer.optimizer(), budget as usize);
             let options = arm::Options { session, cell, optimizer, out, parameters, also, budget, seed };
-            conclude(arm::identify(&options, interrupt)?, odd.as_ref(), page, json)
-        }
-        Identify::Object(arguments) => {
-            let ObjectArguments {
-                session,
-                cell,
-                optimizer,
-                out,
-                force,
-                parameters,
-                budget,
-                seed,
-                as_recorded,
-                json,
-                report,
-            } = arguments;
-            let page = places(out.as_deref(), report.as_deref(), force)?;
-            let odd = gate::look(&Session::open_with(&session, cell.as_deref())?, as_recorded)?;
+            arm::identify(&options, interrupt)
+        }),
+        Identify::Object(ObjectArguments { task, budget }) => task.run(|task| {
+            let Task { session, cell, optimizer, out, parameters, seed, .. } = task;
             let (optimizer, budget) = (optimizer.optimizer(), budget as usize);
             let options = object::Options { session, cell, optimizer, out, parameters, budget, seed };
-            conclude(object::identify(&options, interrupt)?, odd.as_ref(), page, json)
+            object::identify(&options, interrupt)
+        }),
+    }
+}
+
+impl Task {
+    /// Looks at where the outputs go and at the recording, has the rest done, and says and writes what was found.
+    fn run<E>(self, identify: impl FnOnce(Self) -> Result<Identification, E>) -> anyhow::Result<()>
+    where
+        E: std::error::Error + Send + Sync + 'static,
+    {
+        Destination::of(self.out.as_deref(), self.force)?;
+        let page = Destination::of(self.report.as_deref(), self.force)?;
+        let odd = gate::look(&Session::open_with(&self.session, self.cell.as_deref())?, self.as_recorded)?;
+        let json = self.json;
+        let mut found = identify(self)?;
+        gate::add(&mut found.warnings, odd.as_ref());
+        let sheet = found.sheet();
+        if let Some(page) = page {
+            page.write(sheet.page())?;
         }
+        print(json, &found, terminal::identification(&sheet))
     }
-}
-
-/// Looks at where the outputs go, before they are worked out; the page's place.
-fn places(out: Option<&Path>, report: Option<&Path>, force: bool) -> Result<Option<Destination>, OutputError> {
-    Destination::of(out, force)?;
-    Destination::of(report, force)
-}
-
-fn conclude(
-    mut found: Identification,
-    odd: Option<&Remark>,
-    page: Option<Destination>,
-    json: bool,
-) -> anyhow::Result<()> {
-    gate::add(&mut found.warnings, odd);
-    let sheet = found.sheet();
-    if let Some(page) = page {
-        page.write(sheet.page())?;
-    }
-    print(json, &found, terminal::identification(&sheet))
 }

@@ -33,74 +33,94 @@ pub struct Mapping {
     pub object: Option<PoseColumns>,
 }
 
-/// Columns of joints.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, expecting = "a block of columns")]
-pub struct JointColumns {
-    /// Topic, file of a folder, or `rows`.
-    pub table: String,
-    /// Column of stamps, or `header` for those that the format itself gives.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub stamps: Option<String>,
-    /// Unit of that column.
-    #[serde(default)]
-    pub stamp_unit: TimeUnit,
-    /// Rows a second where there are no stamps.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub rate: Option<f64>,
-    /// What is added to the stamps [s].
-    #[serde(default)]
-    pub shift: f64,
-    /// Columns of the positions, one a joint. Empty: not known yet.
-    pub q: Vec<String>,
-    /// Their unit.
-    #[serde(default)]
-    pub q_unit: AngleUnit,
-    /// 1 or -1 a joint; empty: all 1.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub sign: Vec<f64>,
-    /// Columns of the velocities; empty: none.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub dq: Vec<String>,
-    /// Their unit.
-    #[serde(default)]
-    pub dq_unit: RateUnit,
-    /// Columns of the torques [N m]; empty: none.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub tau: Vec<String>,
-    /// Which torque it is.
-    #[serde(default)]
-    pub torque: Torque,
-    /// In which control period it acted.
-    #[serde(default)]
-    pub torques_act: TorquesAct,
+/// A block of columns of one table: the table and its clock, which all blocks have, and what is the block's own. Flattened
+/// structures would say neither the line nor the nearest name of a key that is not known.
+macro_rules! block {
+    ($(#[$of_block:meta])* pub struct $name:ident { $($own:tt)* }) => {
+        $(#[$of_block])*
+        #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+        #[serde(deny_unknown_fields, expecting = "a block of columns")]
+        pub struct $name {
+            /// Topic, file of a folder, or `rows`.
+            pub table: String,
+            /// Column of stamps, or `header` for those that the format itself gives.
+            #[serde(default, skip_serializing_if = "Option::is_none")]
+            pub stamps: Option<String>,
+            /// Unit of that column.
+            #[serde(default)]
+            pub stamp_unit: TimeUnit,
+            /// Rows a second where there are no stamps.
+            #[serde(default, skip_serializing_if = "Option::is_none")]
+            pub rate: Option<f64>,
+            /// What is added to the stamps [s].
+            #[serde(default)]
+            pub shift: f64,
+            $($own)*
+        }
+
+        impl $name {
+            /// When its rows are.
+            pub(crate) fn clock(&self) -> Clock<'_> {
+                let Self { stamps, stamp_unit: unit, rate, shift, .. } = self;
+                Clock { stamps: stamps.as_deref(), unit: *unit, rate: *rate, shift: *shift }
+            }
+        }
+    };
 }
 
-/// Columns of the object's pose in the base frame.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, expecting = "a block of columns")]
-pub struct PoseColumns {
-    /// Topic, file of a folder, or `rows`.
-    pub table: String,
-    /// As for joints.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub stamps: Option<String>,
-    /// As for joints.
-    #[serde(default)]
-    pub stamp_unit: TimeUnit,
-    /// As for joints.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub rate: Option<f64>,
-    /// As for joints.
-    #[serde(default)]
-    pub shift: f64,
-    /// Columns of x, y, z.
-    pub position: [String; 3],
-    /// Their unit.
-    #[serde(default)]
-    pub position_unit: LengthUnit,
-    /// Columns of the quaternion's w, x, y, z.
-    pub orientation: [String; 4],
+/// When the rows of a block are.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Clock<'a> {
+    /// Column of stamps, or `header`.
+    pub(crate) stamps: Option<&'a str>,
+    /// Unit of that column.
+    pub(crate) unit: TimeUnit,
+    /// Rows a second where there are no stamps.
+    pub(crate) rate: Option<f64>,
+    /// What is added to the stamps [s].
+    pub(crate) shift: f64,
+}
+
+block! {
+    /// Columns of joints.
+    pub struct JointColumns {
+        /// Columns of the positions, one a joint. Empty: not known yet.
+        pub q: Vec<String>,
+        /// Their unit.
+        #[serde(default)]
+        pub q_unit: AngleUnit,
+        /// 1 or -1 a joint; empty: all 1.
+        #[serde(default, skip_serializing_if = "Vec::is_empty")]
+        pub sign: Vec<f64>,
+        /// Columns of the velocities; empty: none.
+        #[serde(default, skip_serializing_if = "Vec::is_empty")]
+        pub dq: Vec<String>,
+        /// Their unit.
+        #[serde(default)]
+        pub dq_unit: RateUnit,
+        /// Columns of the torques [N m]; empty: none.
+        #[serde(default, skip_serializing_if = "Vec::is_empty")]
+        pub tau: Vec<String>,
+        /// Which torque it is.
+        #[serde(default)]
+        pub torque: Torque,
+        /// In which control period it acted.
+        #[serde(default)]
+        pub torques_act: TorquesAct,
+    }
+}
+
+block! {
+    /// Columns of the object's pose in the base frame.
+    pub struct PoseColumns {
+        /// Columns of x, y, z.
+        pub position: [String; 3],
+        /// Their unit.
+        #[serde(default)]
+        pub position_unit: LengthUnit,
+        /// Columns of the quaternion's w, x, y, z.
+        pub orientation: [String; 4],
+    }
 }
 
 impl Mapping {

@@ -1,6 +1,6 @@
 //! import.toml as it is written: every line with its reason above it, and what is still to be filled in marked.
 
-use super::{JointColumns, Mapping, PoseColumns};
+use super::{Clock, JointColumns, Mapping, PoseColumns};
 use crate::log::Log;
 use serde::Serialize;
 
@@ -68,7 +68,7 @@ impl Text<'_> {
         }
     }
 
-    fn clock(&mut self, block: &str, stamps: Option<&String>, unit: impl Serialize, rate: Option<f64>, shift: f64) {
+    fn clock(&mut self, block: &str, Clock { stamps, unit, rate, shift }: Clock<'_>) {
         match stamps {
             Some(stamps) => {
                 self.entry(block, "stamps", stamps);
@@ -87,7 +87,7 @@ impl Text<'_> {
         self.line("");
         self.line(&format!("[{block}]"));
         self.entry(block, "table", &columns.table);
-        self.clock(block, columns.stamps.as_ref(), columns.stamp_unit, columns.rate, columns.shift);
+        self.clock(block, columns.clock());
         self.entry(block, "q", &columns.q);
         self.entry(block, "q_unit", columns.q_unit);
         if !columns.sign.is_empty() {
@@ -104,7 +104,7 @@ impl Text<'_> {
         self.line("");
         self.line("[object]");
         self.entry("object", "table", &columns.table);
-        self.clock("object", columns.stamps.as_ref(), columns.stamp_unit, columns.rate, columns.shift);
+        self.clock("object", columns.clock());
         self.entry("object", "position", &columns.position);
         self.entry("object", "position_unit", columns.position_unit);
         self.entry("object", "orientation", &columns.orientation);
