@@ -140,6 +140,7 @@ impl Task {
     where
         E: std::error::Error + Send + Sync + 'static,
     {
+        Destination::apart(&[self.out.as_deref(), self.report.as_deref()])?;
         Destination::of(self.out.as_deref(), self.force)?;
         let page = Destination::of(self.report.as_deref(), self.force)?;
         let odd = gate::look(&Session::open_with(&self.session, self.cell.as_deref())?, self.as_recorded)?;

@@ -141,6 +141,7 @@ pub(super) fn run(arguments: ViewpointArguments) -> anyhow::Result<()> {
         MethodName::Outline => Method::Outline,
         MethodName::Swarm => Method::Swarm(arguments.budget as usize),
     };
+    Destination::apart(&[arguments.out.as_deref(), arguments.report.as_deref()])?;
     let found = find(&Options {
         targets,
         cell,

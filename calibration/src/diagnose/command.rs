@@ -86,6 +86,7 @@ pub fn run(arguments: &Arguments, interrupt: &Interrupt) -> anyhow::Result<Diagn
     let page = Destination::of(report.as_deref(), *force)?;
     let answer = Destination::of(out.as_deref(), *force)?;
     let theta_file = theta_file(arguments)?;
+    Destination::apart(&[out.as_deref(), report.as_deref(), theta_file.as_deref()])?;
     let session = Session::open_with(&arguments.session, arguments.cell.as_deref())?;
     let odd = gate::look(&session, arguments.as_recorded)?;
     let theta = arguments.parameters.as_deref().map(Theta::read).transpose()?;

@@ -53,6 +53,33 @@ impl Destination {
         path.map(|path| Self::new(path, force)).transpose()
     }
 
+    /// Refuses outputs of one command that would take each other's place.
+    ///
+    /// # Errors
+    /// [`OutputError`] with the second of two that are one file.
+    pub fn apart(outputs: &[Option<&Path>]) -> Result<(), OutputError> {
+        let mut taken = Vec::new();
+        for path in outputs.iter().flatten() {
+            let target = target_of(path).map_err(|error| OutputError::new(path, &error, 0, 0))?;
+            // Into a device all of them may go.
+            let Target::File { path: target, .. } = target else { continue };
+            let folder = folder_of(&target).canonicalize();
+            let place = folder.map(|folder| folder.join(target.file_name().unwrap_or_default()));
+            let place = place.map_err(|error| OutputError::new(path, &error, 0, 0))?;
+            if taken.contains(&place) {
+                let kind = io::ErrorKind::InvalidInput;
+                return Err(OutputError::refused(
+                    path,
+                    kind,
+                    "it is another output's place",
+                    "give each a name of its own",
+                ));
+            }
+            taken.push(place);
+        }
+        Ok(())
+    }
+
     /// The name that was asked for.
     #[must_use]
     pub fn path(&self) -> &Path {
@@ -110,6 +137,19 @@ mod tests {
         assert_eq!(fs::read(&path).expect("the file"), b"of before");
         Destination::new(&path, true).and_then(|place| place.write("new")).expect("asked for");
         assert_eq!(fs::read(&path).expect("the file"), b"new");
+    }
+
+    #[test]
+    fn two_outputs_of_one_place_are_refused_however_they_are_written() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = |name: &str| folder.path().join(name);
+        let apart = |a: &str, b: &str| Destination::apart(&[Some(&path(a)), None, Some(&path(b))]);
+        apart("a.json", "b.json").expect("two places");
+        for other in ["a.json", "./a.json"] {
+            let line = apart("a.json", other).expect_err("one place").to_string();
+            assert!(line.contains("another output's place; give each a name of its own"), "{line}");
+        }
+        Destination::apart(&[Some(Path::new("/dev/null")); 2]).expect("a device takes both");
     }
 
     #[test]

@@ -54,11 +54,19 @@ impl Session {
         let files = SessionFiles { session: path.to_owned(), cell: cell_toml.map(Path::to_owned) };
         let is_session = metadata.is_dir() && !super::twinaligner::is_clip_folder(path);
         if is_session {
+            if cell_toml.is_none() && path.join("cell.toml").symlink_metadata().is_err() {
+                let what = "has no cell.toml; give one with `--cell cell.toml`, or make a session of its logs with `calibration \
+                            import`";
+                return Err(ReadError::kind(path, what));
+            }
             let cell = Cell::read(&cell_toml.map_or_else(|| path.join("cell.toml"), Path::to_owned))?;
             if cell.clips.is_empty() {
                 return Err(ReadError::kind(path, "cell.toml lists no clips; add `[[clip]] file = \"...\"` blocks"));
             }
             return Ok(Self { folder: path.to_owned(), clips: cell.clips.clone(), cell, files });
+        }
+        if path.extension().is_some_and(|ending| ending == "toml") {
+            return Err(ReadError::kind(path, "is a TOML file and no clip; give the session's folder, or a clip"));
         }
         let folder = path.parent().map_or_else(PathBuf::new, Path::to_owned);
         let beside = folder.join("cell.toml");
@@ -106,6 +114,17 @@ fn kind_of(path: &Path, cell: &Cell) -> Result<ClipKind, ReadError> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_folder_without_a_cell_and_a_cell_in_place_of_a_session_are_told_what_is_wanted() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let why = |path: &Path| Session::open(path).expect_err("no session").to_string();
+        let bare = why(folder.path());
+        assert!(bare.contains("has no cell.toml") && bare.contains("`calibration import`"), "{bare}");
+        let cell = folder.path().join("cell.toml");
+        std::fs::write(&cell, "").expect("room");
+        assert!(why(&cell).contains("give the session's folder"), "{}", why(&cell));
+    }
 
     #[test]
     fn a_command_about_a_session_names_it_as_it_was_named() {
