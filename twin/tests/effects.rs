@@ -188,7 +188,7 @@ fn swing(effects: &Effects) -> JointState {
     let mut out = [JointState::default()];
     let effects = (!effects.arm.is_none()).then_some(&effects.arm);
     let arm = if effects.is_some() { &arm } else { &nominal };
-    let rollout = ArmRollout { arm, nominal: &nominal, law: &law, effects };
+    let rollout = ArmRollout { arm, nominal: &nominal, law: &law, effects, parts: 1 };
     rollout.run(&JointState::at_rest(*nominal.ready()), 0, &commands, &[2_000_000_000], &mut out);
     out[0]
 }

@@ -73,6 +73,14 @@ impl Intervals {
     }
 }
 
+/// How far the numbers move, to first order, when the slope at the fit changes by `slope`. Those in `held` stay.
+#[must_use]
+pub fn moved_by(fit: &Fit, held: &[bool], slope: &DVector<f64>) -> DVector<f64> {
+    let (n, information) = (fit.shared.len(), fit.information());
+    let free: Vec<usize> = (0..n).filter(|k| !held[*k] && information[(*k, *k)] > 0.0).collect();
+    -spread(&inverse(&information, &free), &free, n) * slope
+}
+
 /// Which numbers rest on a bound of their search.
 #[must_use]
 pub fn at_bounds(unknowns: &[Unknown], shared: &[f64]) -> Vec<bool> {

@@ -33,11 +33,11 @@ pub mod swarm;
 mod views;
 
 pub use evolution::Evolution;
-pub use interval::{Intervals, at_bounds};
+pub use interval::{Intervals, at_bounds, moved_by};
 pub use least_squares::{Fit, Options, Underway, begin, fit, fit_from, go_on, score};
 pub use leverage::without_leaning;
 pub use linear::ClipFit;
 pub use problem::{ClipModel, Impossible, Random, Unknown};
 pub use search::{Found, Search, minimise};
 pub use swarm::Swarm;
-pub use views::Subset;
+pub use views::{Shifted, Subset};

@@ -1,4 +1,4 @@
-//! A model seen another way: its calls counted, its shared numbers given, some of its clips alone.
+//! A model seen another way: its calls counted, its shared numbers given, its residuals shifted, some of its clips alone.
 
 use super::problem::{ClipModel, Impossible};
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -47,6 +47,30 @@ impl<M: ClipModel> ClipModel for Given<'_, M> {
 
     fn residuals(&self, clip: usize, _: &[f64], own: &[f64], out: &mut Vec<f64>) -> Result<(), Impossible> {
         self.model.residuals(clip, self.shared, own, out)
+    }
+
+    fn stretches(&self, clip: usize) -> Vec<usize> {
+        self.model.stretches(clip)
+    }
+}
+
+/// A model whose residuals are larger by what is known of each clip.
+pub struct Shifted<'a, M> {
+    /// The model.
+    pub model: &'a M,
+    /// What is added to the residuals, clip by clip.
+    pub by: &'a [Vec<f64>],
+}
+
+impl<M: ClipModel> ClipModel for Shifted<'_, M> {
+    fn clips(&self) -> usize {
+        self.model.clips()
+    }
+
+    fn residuals(&self, clip: usize, shared: &[f64], own: &[f64], out: &mut Vec<f64>) -> Result<(), Impossible> {
+        self.model.residuals(clip, shared, own, out)?;
+        out.iter_mut().zip(&self.by[clip]).for_each(|(residual, by)| *residual += by);
+        Ok(())
     }
 
     fn stretches(&self, clip: usize) -> Vec<usize> {

@@ -17,6 +17,8 @@ pub struct ArmRollout<'a> {
     pub law: &'a ControlLaw,
     /// What acts besides; `arm` is then the real arm that they make of `nominal`.
     pub effects: Option<&'a ArmEffects>,
+    /// In so many parts a period is integrated; 1 is how the twin does it.
+    pub parts: u32,
 }
 
 impl ArmRollout<'_> {

@@ -116,15 +116,23 @@ impl ArmRollout<'_> {
     /// Lets one control period pass without anything touching the arm.
     pub(crate) fn period(&self, motion: &mut ArmMotion, drive: &Drive) {
         let before = motion.state.dq;
-        if let Some((q_d, dq_d)) = self.exactly_known(drive) {
+        if let Some((q_d, dq_d)) = self.exactly_known(drive).filter(|_| self.parts == 1) {
             let (tau, gravity) = self.arm.controlled_step(&mut motion.state, self.law, q_d, dq_d, TICK);
             motion.command(&tau, &gravity);
             self.sense(motion, &before);
             return;
         }
         self.begin(motion, drive);
-        self.advance(motion, &[0.0; MAX_JOINTS], TICK);
-        self.sense(motion, &before);
+        let (share, mut sensed) = (1.0 / f64::from(self.parts), [0.0; MAX_JOINTS]);
+        for _ in 0..self.parts {
+            self.advance(motion, &[0.0; MAX_JOINTS], share * TICK);
+            self.sense(motion, &before);
+            sensed.iter_mut().zip(&motion.tau_J).for_each(|(sum, torque)| *sum += share * torque);
+        }
+        // Effects tell of each part by itself; else the velocities at both ends of the period do.
+        if motion.memory.is_some() {
+            motion.tau_J = sensed;
+        }
     }
 
     /// What an arm is to follow that is just what its controller believes it to be.

@@ -65,7 +65,8 @@ impl Plant {
             Some((effects, arm)) => (arm, Some(effects)),
             None => (&self.nominal, None),
         };
-        ArmRollout { arm, nominal: self.nominal(), law: self.asked.as_ref().unwrap_or(&self.law), effects }
+        let law = self.asked.as_ref().unwrap_or(&self.law);
+        ArmRollout { arm, nominal: self.nominal(), law, effects, parts: 1 }
     }
 
     /// The arm that moves.

@@ -34,7 +34,7 @@ use std::ops::Range;
 use std::sync::Mutex;
 use twin::arm::{ArmModel, JointState, ModelError};
 use twin::effects::Effects;
-use twin::rollout::{Plant, Reading};
+use twin::rollout::{ArmRollout, Plant, Reading};
 
 /// What a robot logs about a joint.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -234,19 +234,58 @@ impl<F: Fn(&[f64]) -> Theta + Sync> ArmClips<F> {
     /// # Errors
     /// [`Impossible`] when the cell cannot be simulated with these numbers.
     pub fn predict(&self, clip: usize, shared: &[f64], own: &[f64]) -> Result<Vec<Reading>, Impossible> {
-        let mut out = Vec::new();
-        self.simulate(&self.clips[clip], &(self.theta)(shared), own, &mut out)?;
+        self.predict_in(1, (clip, shared, own))
+    }
+
+    /// The same with every control period integrated in `parts`.
+    ///
+    /// # Errors
+    /// As [`ArmClips::predict`].
+    pub fn predict_in(&self, parts: u32, of: (usize, &[f64], &[f64])) -> Result<Vec<Reading>, Impossible> {
+        let ((clip, shared, own), mut out) = (of, Vec::new());
+        self.simulate(&self.clips[clip], &(self.theta)(shared), (own, parts), &mut out)?;
         Ok(out)
     }
 
-    fn simulate(&self, clip: &ArmClip, theta: &Theta, own: &[f64], out: &mut Vec<Reading>) -> Result<(), Impossible> {
+    /// [`ClipModel::residuals`] with every control period integrated in `parts`; 1 is how the twin does it.
+    ///
+    /// # Errors
+    /// [`Impossible`] as there.
+    pub fn residuals_in(
+        &self,
+        parts: u32,
+        (clip, shared, own): (usize, &[f64], &[f64]),
+        out: &mut Vec<f64>,
+    ) -> Result<(), Impossible> {
+        let mut predicted = self.spare.lock().expect("no evaluation panics").pop().unwrap_or_default();
+        let clip = &self.clips[clip];
+        let answer = self.simulate(clip, &(self.theta)(shared), (own, parts), &mut predicted);
+        if answer.is_ok() {
+            out.clear();
+            for bin in &clip.bins {
+                for channel in &self.channels {
+                    self.differences(clip, *channel, bin, &predicted, out);
+                }
+            }
+        }
+        self.spare.lock().expect("no evaluation panics").push(predicted);
+        answer
+    }
+
+    fn simulate(
+        &self,
+        clip: &ArmClip,
+        theta: &Theta,
+        (own, parts): (&[f64], u32),
+        out: &mut Vec<Reading>,
+    ) -> Result<(), Impossible> {
         let fail = |error: &dyn std::fmt::Display| Impossible(error.to_string());
         let effects = Effects::from_theta(&theta.effects, self.nominal.dof()).map_err(|e| fail(&e))?;
         let age = encoder_age::of(own.get(2 * self.nominal.dof()));
         let seen = encoder_age::controlled(&self.cell, &clip.recorded.desired, theta, age);
         let (theta, commands) = seen.as_ref().map_or((theta, &clip.commands), |(theta, commands)| (theta, commands));
         let plant = Plant::new(&self.cell, self.nominal.clone(), Some(theta), &effects.arm).map_err(|e| fail(&e))?;
-        let rollout = plant.rollout();
+        let rollout = ArmRollout { parts, ..plant.rollout() };
         let measured = &clip.recorded.measured;
         out.clear();
         out.resize(measured.len(), Reading::default());
@@ -313,19 +352,7 @@ impl<F: Fn(&[f64]) -> Theta + Sync> ClipModel for ArmClips<F> {
     }
 
     fn residuals(&self, clip: usize, shared: &[f64], own: &[f64], out: &mut Vec<f64>) -> Result<(), Impossible> {
-        let mut predicted = self.spare.lock().expect("no evaluation panics").pop().unwrap_or_default();
-        let clip = &self.clips[clip];
-        let answer = self.simulate(clip, &(self.theta)(shared), own, &mut predicted);
-        if answer.is_ok() {
-            out.clear();
-            for bin in &clip.bins {
-                for channel in &self.channels {
-                    self.differences(clip, *channel, bin, &predicted, out);
-                }
-            }
-        }
-        self.spare.lock().expect("no evaluation panics").push(predicted);
-        answer
+        self.residuals_in(1, (clip, shared, own), out)
     }
 
     fn stretches(&self, clip: usize) -> Vec<usize> {

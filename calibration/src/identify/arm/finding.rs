@@ -1,14 +1,10 @@
 //! What a fit tells about the arm, number by number: values, intervals, correlations.
 
 use crate::estimate::{Intervals, Unknown, at_bounds};
-use crate::forward::{Setting, Settings};
+use crate::forward::Settings;
 use crate::identify::answer::{Identification, Parameter};
 use crate::identify::run::Outcome;
 use std::collections::BTreeMap;
-
-/// What the twin's time step of 1 ms does to an identified gain, as a share of it: measured on arms simulated with a
-/// quarter of that step, where no gain is off by more than 1.5 times as much.
-const TIME_STEP: f64 = 1e-4;
 
 /// Everything that a fit tells.
 pub(super) struct Finding<'a> {
@@ -21,16 +17,11 @@ pub(super) struct Finding<'a> {
 }
 
 impl<'a> Finding<'a> {
-    pub(super) fn new(settings: &'a Settings, unknowns: &'a [Unknown], outcome: &'a Outcome) -> Self {
+    /// `open`: half widths of what the fit itself does not know to be open.
+    pub(super) fn new(settings: &'a Settings, unknowns: &'a [Unknown], outcome: &'a Outcome, open: &[f64]) -> Self {
         let held = at_bounds(unknowns, &outcome.fit.shared);
         let mut intervals = Intervals::new(&outcome.fit, &held);
-        for ((half, value), setting) in
-            intervals.half_width.iter_mut().zip(&outcome.fit.shared).zip(settings.settings())
-        {
-            if matches!(setting, Setting::Stiffness(_) | Setting::Damping(_)) {
-                *half = half.hypot(TIME_STEP * value);
-            }
-        }
+        intervals.half_width.iter_mut().zip(open).for_each(|(half, open)| *half = half.hypot(*open));
         Self { settings, unknowns, held, outcome, intervals }
     }
 

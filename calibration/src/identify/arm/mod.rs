@@ -5,6 +5,7 @@
 //! | `session` | which clips of a session can be used, and for what |
 //! | `start` | where the search begins when little is known |
 //! | `saturation` | the same for a limit of the torques |
+//! | `time_step` | what the twin's time step does to the numbers, and that it is taken out |
 //! | `finding` | what a fit tells, number by number |
 //! | `figures` | how far the twin is off |
 //! | `verdict` | what the clips cannot tell, and why |
@@ -18,6 +19,7 @@ mod finding;
 mod saturation;
 mod session;
 mod start;
+mod time_step;
 mod verdict;
 
 use super::answer::Identification;
@@ -175,8 +177,12 @@ fn identify_kept(
     session::hold_dead(&model, &clips, settings.settings(), &mut unknowns);
     let random = model.random();
     let mut outcome = search(options, &model, &clips, (&unknowns, &random), (kept, interrupt))?;
+    let error = kept.once_if_ok(&Fingerprint::of("time step"), || {
+        time_step::error(&model, &clips.split.train, (&unknowns, &random), &outcome.fit)
+    });
+    let open = time_step::taken_out(&mut outcome.fit, &unknowns, &error.map_err(RunError::Impossible)?);
     saturation::forget_unreached(&model, settings.settings(), &mut outcome.fit);
-    let finding = Finding::new(&settings, &unknowns, &outcome);
+    let finding = Finding::new(&settings, &unknowns, &outcome, &open);
     let mut answer = finding.answer(&before);
     answer.session = options.session.display().to_string();
     answer.files = SessionFiles { session: options.session.clone(), cell: options.cell.clone() };
