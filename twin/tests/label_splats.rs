@@ -85,7 +85,7 @@ fn a_scan_of_another_scale_is_laid_onto_the_robot_and_parted() {
     let points: Vec<Point3<f64>> = scan.splats.iter().map(|splat| splat.centre.cast()).collect();
     let surface = SurfacePoints::new(&robot, &q, |_| true);
     let start = Similarity3::from_scaling(0.45);
-    let found = align(&points, &surface, &start).expect("a robot");
+    let found = align(&points, &surface, &start, |_| ()).expect("a robot");
     let off = wanted.inverse() * found.base_from_scan;
     let (angle, scale) = (off.isometry.rotation.angle().to_degrees(), off.scaling() - 1.0);
     let flange = Point3::new(0.45, 0.1, 0.5);

@@ -3,7 +3,7 @@
 use super::frame::Frame;
 use super::interval::{Interval, interval};
 use super::refine::{self, Refined, refine};
-use super::scan::scan;
+use super::scan::{places, scan};
 use super::search::{Moves, Reach, mean};
 use super::shape::Shape;
 use super::step::moved;
@@ -83,10 +83,24 @@ pub fn fit(
     method: Method,
     seed: u64,
 ) -> Result<Fit, NoFit> {
+    let bar = Progress::planned("viewpoint", &[&[BEGIN], &plan(frames, method)[..]].concat(), 1);
+    fit_shown(frames, shape, start, (reach, method, seed), &bar)
+}
+
+/// The same, shown as stages of a longer work.
+pub(super) fn fit_shown(
+    frames: &[Frame],
+    shape: &Shape,
+    start: &Isometry3<f64>,
+    (reach, method, seed): (&Reach, Method, u64),
+    bar: &Progress,
+) -> Result<Fit, NoFit> {
     match method {
-        Method::Outline => by_outline(frames, shape, start, reach, seed),
+        Method::Outline => by_outline(frames, shape, start, (reach, seed), bar),
         Method::Swarm(evaluations) => {
-            let searched = Moves::new(frames, start, reach).swarm(frames, shape, evaluations, seed);
+            bar.stage(SWARM, evaluations as u64);
+            let done = |evaluations: usize| bar.show(evaluations as u64, SWARM);
+            let searched = Moves::new(frames, start, reach).swarm(frames, shape, (evaluations, seed), done);
             let there = refine::at(frames, shape, &searched.camera_from_base).ok_or(NoFit::OutOfView)?;
             let confirmed = 1.0 - there.cost;
             Ok(Fit {
@@ -101,20 +115,27 @@ pub fn fit(
     }
 }
 
-fn by_outline(frames: &[Frame], shape: &Shape, start: &Isometry3<f64>, reach: &Reach, seed: u64) -> Result<Fit, NoFit> {
+fn by_outline(
+    frames: &[Frame],
+    shape: &Shape,
+    start: &Isometry3<f64>,
+    (reach, seed): (&Reach, u64),
+    bar: &Progress,
+) -> Result<Fit, NoFit> {
     let few = &frames[..frames.len().min(LOOKED_AT)];
-    // A silhouette has one border, a photo many edges: there the best pose needs more company.
-    let masks = frames.iter().all(Frame::has_mask);
-    let (wanted, rounds) = if masks { (CANDIDATES / 3, 0) } else { (CANDIDATES, ROUNDS) };
-    let bar = Progress::planned("viewpoint", &PLAN, 1);
-    let (candidates, mut drawings) = scan(few, shape, start, reach, wanted);
+    let rounds = rounds(frames);
+    let wanted = if rounds == 0 { CANDIDATES / 3 } else { CANDIDATES };
+    bar.stage(SCAN, places(start, reach).len() as u64);
+    let looked = AtomicU64::new(0);
+    let (candidates, mut drawings) =
+        scan(few, shape, start, reach, wanted, || bar.show(looked.fetch_add(1, Ordering::Relaxed) + 1, SCAN));
     let mut poses: Vec<Isometry3<f64>> = candidates.iter().map(|c| c.camera_from_base).collect();
     poses.push(*start);
     bar.stage(COARSE, poses.len() as u64);
-    let coarse = refined(&poses, (&mut drawings, &bar), |pose| refine(few, shape, pose, refine::COARSE));
+    let coarse = refined(&poses, (&mut drawings, bar, COARSE), |pose| refine(few, shape, pose, refine::COARSE));
     let poses: Vec<_> = coarse.iter().take(FULLY).map(|found| found.camera_from_base).collect();
     bar.stage(FINE, poses.len() as u64);
-    let mut found = refined(&poses, (&mut drawings, &bar), |pose| refine(frames, shape, pose, refine::FINE));
+    let mut found = refined(&poses, (&mut drawings, bar, FINE), |pose| refine(frames, shape, pose, refine::FINE));
     let mut random = Pcg64::seed_from_u64(seed);
     for _ in 0..rounds {
         bar.stage(FINE, SHAKES as u64);
@@ -128,7 +149,7 @@ fn by_outline(frames: &[Frame], shape: &Shape, start: &Isometry3<f64>, reach: &R
                 moved(&best.camera_from_base, &best.pivot, &by)
             })
             .collect();
-        found.extend(refined(&shaken, (&mut drawings, &bar), |pose| refine(frames, shape, pose, refine::FINE)));
+        found.extend(refined(&shaken, (&mut drawings, bar, FINE), |pose| refine(frames, shape, pose, refine::FINE)));
         found.sort_by(|a, b| a.cost.total_cmp(&b.cost));
     }
     let best = found.first().ok_or(NoFit::OutOfView)?;
@@ -139,6 +160,7 @@ fn by_outline(frames: &[Frame], shape: &Shape, start: &Isometry3<f64>, reach: &R
         let (distance, angle) = super::step::apart(&other.camera_from_base, &best.camera_from_base);
         distance > SAME * best.pivot.coords.norm() || angle > SAME
     });
+    bar.stage(LAST, 1);
     let last = refine(frames, shape, &best.camera_from_base, refine::LAST).unwrap_or_else(|| best.clone());
     let pose = last.camera_from_base;
     Ok(Fit {
@@ -151,21 +173,41 @@ fn by_outline(frames: &[Frame], shape: &Shape, start: &Isometry3<f64>, reach: &R
     })
 }
 
-/// Stages of the search, with about how long they take beside each other.
-const PLAN: [Planned; 3] = [("scan", 1.0), (COARSE, 1.0), (FINE, 1.0)];
+/// Before the first stage.
+pub(super) const BEGIN: Planned = ("begin", 0.0);
+const SCAN: &str = "scan";
 const COARSE: &str = "coarse";
 const FINE: &str = "fine";
+const LAST: &str = "last";
+const SWARM: &str = "swarm";
+
+/// How often the best pose is shaken: a silhouette has one border, a photo many edges, and there the best pose needs more
+/// company.
+fn rounds(frames: &[Frame]) -> usize {
+    if frames.iter().all(Frame::has_mask) { 0 } else { ROUNDS }
+}
+
+/// Stages of the search, with about how long they take beside each other.
+pub(super) fn plan(frames: &[Frame], method: Method) -> Vec<Planned> {
+    match method {
+        Method::Outline => {
+            let again = std::iter::repeat_n((FINE, 1.0), rounds(frames));
+            [(SCAN, 1.0), (COARSE, 1.0), (FINE, 1.0)].into_iter().chain(again).chain([(LAST, 1.0)]).collect()
+        }
+        Method::Swarm(_) => vec![(SWARM, 1.0)],
+    }
+}
 
 /// Every pose refined, the best first.
 fn refined(
     poses: &[Isometry3<f64>],
-    (drawings, bar): (&mut usize, &Progress),
+    (drawings, bar, stage): (&mut usize, &Progress, &str),
     refine: impl Fn(&Isometry3<f64>) -> Option<Refined> + Send + Sync,
 ) -> Vec<Refined> {
     let done = AtomicU64::new(0);
     let one = |pose: &Isometry3<f64>| {
         let found = refine(pose);
-        bar.show(done.fetch_add(1, Ordering::Relaxed) + 1, "");
+        bar.show(done.fetch_add(1, Ordering::Relaxed) + 1, stage);
         found
     };
     let mut found: Vec<Refined> = poses.par_iter().filter_map(one).collect();

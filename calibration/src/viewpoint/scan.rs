@@ -28,28 +28,36 @@ const PLACES: usize = 5;
 /// So many places of the outline are looked up.
 const LOOKED_UP: usize = 150;
 
-/// The best poses around `start`, the best first and each of its own; and how many times the robot was drawn.
+/// Where the camera is looked from, as shifts from `start` [m].
+pub(super) fn places(start: &Isometry3<f64>, reach: &Reach) -> Vec<Vector3<f64>> {
+    let far = (start * Point3::new(0.0, 0.0, 0.4)).z.max(0.3);
+    let count = |half: f64, step: f64, most: usize| (2 * (half / step).ceil() as usize + 1).min(most) as i32;
+    let places = count(reach.distance, SHARE * far, PLACES);
+    let shift = |number: i32| f64::from(2 * number - places + 1) / f64::from((places - 1).max(1)) * reach.distance;
+    (0..places.pow(3))
+        .map(|n| Vector3::new(shift(n % places), shift(n / places % places), shift(n / places / places)))
+        .filter(|by| by.norm() <= 1.3 * reach.distance)
+        .collect()
+}
+
+/// The best poses around `start`, the best first and each of its own; and how many times the robot was drawn. `looked` is told
+/// of every one of the [`places`] once it was looked from.
 #[must_use]
-pub fn scan(
+pub(super) fn scan(
     frames: &[Frame],
     shape: &Shape,
     start: &Isometry3<f64>,
     reach: &Reach,
     wanted: usize,
+    looked: impl Fn() + Sync,
 ) -> (Vec<Candidate>, usize) {
-    let far = (start * Point3::new(0.0, 0.0, 0.4)).z.max(0.3);
-    let count = |half: f64, step: f64, most: usize| (2 * (half / step).ceil() as usize + 1).min(most) as i32;
-    let places = count(reach.distance, SHARE * far, PLACES);
-    let shift = |number: i32| f64::from(2 * number - places + 1) / f64::from((places - 1).max(1)) * reach.distance;
-    let shifts: Vec<Vector3<f64>> = (0..places.pow(3))
-        .map(|n| Vector3::new(shift(n % places), shift(n / places % places), shift(n / places / places)))
-        .filter(|by| by.norm() <= 1.3 * reach.distance)
-        .collect();
-    let found: Vec<Candidate> = shifts
-        .par_iter()
-        .map(|by| look(frames, shape, &(Translation3::from(-by) * start), reach.angle))
-        .collect::<Vec<_>>()
-        .concat();
+    let shifts = places(start, reach);
+    let from = |by: &Vector3<f64>| {
+        let found = look(frames, shape, &(Translation3::from(-by) * start), reach.angle);
+        looked();
+        found
+    };
+    let found: Vec<Candidate> = shifts.par_iter().map(from).collect::<Vec<_>>().concat();
     (distinct(found, wanted), shifts.len() * frames.len())
 }
 

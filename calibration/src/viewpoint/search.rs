@@ -62,12 +62,18 @@ impl Moves {
         moved(&self.start, &self.pivot, &Vector6::from_column_slice(numbers))
     }
 
-    /// The paper's way: a particle swarm on the share of wrong pixels.
+    /// The paper's way: a particle swarm on the share of wrong pixels. `done` hears how many of the losses are computed.
     #[must_use]
-    pub fn swarm(&self, frames: &[Frame], shape: &Shape, evaluations: usize, seed: u64) -> Searched {
+    pub fn swarm(
+        &self,
+        frames: &[Frame],
+        shape: &Shape,
+        (evaluations, seed): (usize, u64),
+        done: impl FnMut(usize),
+    ) -> Searched {
         let loss = |pose: &Isometry3<f64>| mean(frames.iter().map(|frame| frame.wrong(Frame::FINEST, shape, pose)));
         let search = Swarm::new(&estimate_search::start(&self.unknowns), seed);
-        self.minimise(search, evaluations, loss)
+        self.minimise(search, evaluations, loss, done)
     }
 
     fn minimise(
@@ -75,9 +81,13 @@ impl Moves {
         mut search: impl estimate_search::Search,
         evaluations: usize,
         loss: impl Fn(&Isometry3<f64>) -> f64 + Sync,
+        mut done: impl FnMut(usize),
     ) -> Searched {
         let cost = |numbers: &[f64]| loss(&self.pose(numbers));
-        let found = estimate_search::minimise(&mut search, &self.unknowns, evaluations, &[], cost, |_, _| true);
+        let found = estimate_search::minimise(&mut search, &self.unknowns, evaluations, &[], cost, |_, found| {
+            done(found.evaluations);
+            true
+        });
         Searched { camera_from_base: self.pose(&found.numbers), loss: found.cost, evaluations: found.evaluations }
     }
 }

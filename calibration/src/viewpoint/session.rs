@@ -2,6 +2,7 @@
 //! are.
 
 use super::picture::Pixels;
+use shared_mem::progress::Progress;
 use shared_mem::recording::{PictureKind, Session, for_pictures};
 
 /// A picture of a session.
@@ -31,8 +32,12 @@ struct Known {
 /// When a clip cannot be read.
 pub fn shots(session: &Session, kind: PictureKind, wanted: usize) -> anyhow::Result<Vec<Shot>> {
     let latency_ns = session.cell.camera.as_ref().map_or(0, |camera| (camera.latency * 1e9) as u64);
+    // Each clip is read twice.
+    let clips = session.clips.len();
+    let bar = Progress::new("pictures", 2 * clips as u64);
     let mut known = Vec::new();
     for (number, entry) in session.clips.iter().enumerate() {
+        bar.show(number as u64, "");
         let path = session.folder.join(&entry.file);
         let clip = session.read(entry)?;
         for_pictures(&path, kind, |stamp_ns, _| {
@@ -45,6 +50,7 @@ pub fn shots(session: &Session, kind: PictureKind, wanted: usize) -> anyhow::Res
     let chosen = choose(known, wanted);
     let mut out = Vec::new();
     for (number, entry) in session.clips.iter().enumerate() {
+        bar.show((clips + number) as u64, "");
         if !chosen.iter().any(|known| known.clip == number) {
             continue;
         }

@@ -1,12 +1,13 @@
 //! Where nothing is known: the camera stands somewhere around the robot, upright, and looks at it.
 
-use super::fit::{Fit, Method, NoFit, fit};
+use super::fit::{BEGIN, Fit, Method, NoFit, fit_shown, plan};
 use super::frame::Frame;
 use super::lens::Lens;
 use super::scan::scan;
 use super::search::Reach;
 use super::shape::Shape;
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
+use shared_mem::progress::Progress;
 
 /// Places looked from: around, and from the table's height to far above [rad], away from the robot [m].
 const AROUND: usize = 16;
@@ -17,6 +18,8 @@ const MIDDLE: f64 = 0.4;
 /// The turn within which each place is looked at, and so many places that are followed.
 const TURN: f64 = 0.35;
 const FOLLOWED: usize = 5;
+/// Name of the stage.
+const PLACES: &str = "places";
 
 /// The pose that explains the frames best, from anywhere around the robot.
 ///
@@ -26,14 +29,20 @@ pub fn search(frames: &[Frame], shape: &Shape, lens: &Lens, method: Method, seed
     let reach = Reach { angle: TURN, distance: 0.0 };
     let mut seen = Vec::new();
     let mut drawings = 0;
-    for place in 0..AROUND * HEIGHTS.len() * DISTANCES.len() {
+    let places = AROUND * HEIGHTS.len() * DISTANCES.len();
+    let followed = std::iter::repeat_n(plan(frames, method), FOLLOWED).flatten();
+    let stages: Vec<_> = [BEGIN, (PLACES, 1.0)].into_iter().chain(followed).collect();
+    let bar = Progress::planned("viewpoint", &stages, 1);
+    bar.stage(PLACES, places as u64);
+    for place in 0..places {
         let around = std::f64::consts::TAU * (place % AROUND) as f64 / AROUND as f64;
         let height = HEIGHTS[place / AROUND % HEIGHTS.len()];
         // A long lens stands further away: what is far is told by the field of view.
         let away =
             DISTANCES[place / AROUND / HEIGHTS.len()] * (lens.focal[1] / (2.0 * lens.centre[1].max(1.0))).max(0.5);
         let from = Vector3::new(around.cos() * height.cos(), around.sin() * height.cos(), height.sin()) * away;
-        let (candidates, drawn) = scan(&frames[..1], shape, &looking(&from), &reach, 1);
+        let (candidates, drawn) = scan(&frames[..1], shape, &looking(&from), &reach, 1, || ());
+        bar.show(place as u64 + 1, PLACES);
         drawings += drawn;
         seen.extend(candidates);
     }
@@ -41,7 +50,7 @@ pub fn search(frames: &[Frame], shape: &Shape, lens: &Lens, method: Method, seed
     let reach = Reach { angle: 0.3, distance: 0.3 };
     let mut best: Result<Fit, NoFit> = Err(NoFit::OutOfView);
     for candidate in seen.iter().take(FOLLOWED) {
-        let found = fit(frames, shape, &candidate.camera_from_base, &reach, method, seed);
+        let found = fit_shown(frames, shape, &candidate.camera_from_base, (&reach, method, seed), &bar);
         drawings += found.as_ref().map_or(0, |found| found.drawings);
         best = match (best, found) {
             (Ok(best), Ok(found)) if found.confirmed > best.confirmed => Ok(found),

@@ -6,10 +6,11 @@ use nalgebra::{Isometry3, Point3, Quaternion, Similarity3, Translation3, UnitQua
 use shared_mem::answer;
 use shared_mem::cell::Cell;
 use shared_mem::output::{Destination, Output};
+use shared_mem::progress::{Planned, Progress};
 use shared_mem::quantity::number;
 use std::path::PathBuf;
 use twin::arm::MAX_JOINTS;
-use twin::reconstruct::{SurfacePoints, align, label};
+use twin::reconstruct::{STARTS, SurfacePoints, align, label};
 use twin::render::splat::{SplatCloud, link_file};
 use twin::render::{Hand, RobotSurface};
 
@@ -76,6 +77,13 @@ const BLURRED: f64 = 0.05;
 /// So near above the table a splat is the table's [m].
 const ON_TABLE: f64 = 0.004;
 
+/// Stages of the work, with about how long they take beside each other.
+const PLAN: [Planned; 5] = [("read", 1.0), (PREPARE, 1.0), (ALIGN, 1.0), (LABEL, 1.0), (WRITE, 1.0)];
+const PREPARE: &str = "prepare";
+const ALIGN: &str = "align";
+const LABEL: &str = "label";
+const WRITE: &str = "write";
+
 /// What is no robot.
 const REST: &str = "scene.ply";
 
@@ -96,21 +104,27 @@ impl LabelSplats {
         let links = (0..count).map(link_file);
         let place = |name: String| Destination::in_new_folder(&self.out.join(name), self.force);
         let mut places = links.chain([REST.to_owned()]).map(place).collect::<Result<Vec<_>, _>>()?.into_iter();
+        let bar = Progress::planned("label-splats", &PLAN, 1);
         let scan = SplatCloud::read(&self.scan)?;
+        bar.stage(PREPARE, 1);
         let surface = SurfacePoints::new(&robot, &q, |_| true);
         let clear = scan
             .splats
             .iter()
             .filter(|splat| splat.opacity >= FAINT && f64::from(splat.sigma.max()) * start.scaling() < BLURRED);
         let points: Vec<Point3<f64>> = clear.map(|splat| splat.centre.cast()).collect();
-        let found = align(&points, &surface, &start)?;
+        bar.stage(ALIGN, STARTS as u64);
+        let found = align(&points, &surface, &start, |tried| bar.show(tried as u64, ALIGN))?;
+        bar.stage(LABEL, 1);
         let table = cell.table.map(|table| table.height + ON_TABLE);
         let parts = label(&scan, &found.base_from_scan, &surface, self.reach, table);
         let (mut counts, mut outputs) = (Vec::new(), Vec::new());
+        bar.stage(WRITE, places.len() as u64);
         let mut put = |splats: &SplatCloud| -> anyhow::Result<()> {
             let mut output = places.next().context("as many places as parts")?.begin()?;
             splats.write_to(&mut output)?;
             outputs.push(output);
+            bar.show(outputs.len() as u64, WRITE);
             Ok(())
         };
         for (link, splats) in parts.links.iter().enumerate() {
@@ -121,6 +135,7 @@ impl LabelSplats {
         put(&parts.rest)?;
         // Once there was room for all of them: the links of two scans make no robot.
         outputs.into_iter().try_for_each(Output::finish)?;
+        drop(bar);
         let at = found.base_from_scan;
         let (place, turn) = (at.isometry.translation.vector, at.isometry.rotation.quaternion());
         let words = format!(

@@ -7,6 +7,7 @@ use super::nearest::Nearest;
 use super::surface::SurfacePoints;
 use nalgebra::{Point3, SMatrix, SVector, Similarity3, Translation3, UnitQuaternion, Vector3};
 use rayon::prelude::*;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// How far points may be apart to be a pair, at first and at last [m].
 const GATE: [f64; 2] = [0.12, 0.012];
@@ -23,6 +24,8 @@ const LEAST: f64 = 0.2;
 /// What else is tried beside the start: larger and smaller, and turned about each axis [rad].
 const SCALES: [f64; 3] = [1.0, 0.87, 1.15];
 const TURN: f64 = 0.25;
+/// So many starts are followed: every scale, upright and turned either way about each of three axes.
+pub const STARTS: usize = SCALES.len() * 7;
 
 /// A scan that lies on the robot.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -51,11 +54,17 @@ pub enum AlignError {
     Apart(f64),
 }
 
-/// Puts a scan's points onto the robot, beginning with `start` and what is around it.
+/// Puts a scan's points onto the robot, beginning with `start` and what is around it. `tried` hears how many of
+/// these [`STARTS`] were followed.
 ///
 /// # Errors
 /// [`AlignError`] when that leads nowhere.
-pub fn align(scan: &[Point3<f64>], robot: &SurfacePoints, start: &Similarity3<f64>) -> Result<Alignment, AlignError> {
+pub fn align(
+    scan: &[Point3<f64>],
+    robot: &SurfacePoints,
+    start: &Similarity3<f64>,
+    tried: impl Fn(usize) + Sync,
+) -> Result<Alignment, AlignError> {
     let middle = robot.points.iter().map(|p| p.coords).sum::<Vector3<f64>>() / robot.points.len().max(1) as f64;
     let pair = Pair {
         middle: Point3::from(middle),
@@ -78,9 +87,11 @@ pub fn align(scan: &[Point3<f64>], robot: &SurfacePoints, start: &Similarity3<f6
         [Vector3::zeros()].into_iter().chain(axes.iter().flat_map(|axis| [axis * TURN, axis * -TURN])).collect();
     let starts: Vec<Similarity3<f64>> =
         SCALES.iter().flat_map(|scale| turns.iter().map(|turn| around(*scale, *turn))).collect();
+    let done = AtomicUsize::new(0);
     let best = (starts.par_iter())
         .map(|start| {
             let end = pair.settle(*start, FEW, &GATE, STEPS);
+            tried(done.fetch_add(1, Ordering::Relaxed) + 1);
             (pair.quality(&end, FEW).0, end)
         })
         .max_by(|a, b| a.0.total_cmp(&b.0));

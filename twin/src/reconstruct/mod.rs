@@ -12,6 +12,6 @@ mod label;
 mod nearest;
 mod surface;
 
-pub use align::{AlignError, Alignment, align};
+pub use align::{AlignError, Alignment, STARTS, align};
 pub use label::{Labelled, label};
 pub use surface::SurfacePoints;
