@@ -187,14 +187,14 @@ fn rounds(frames: &[Frame]) -> usize {
     if frames.iter().all(Frame::has_mask) { 0 } else { ROUNDS }
 }
 
-/// Stages of the search, with about how long they take beside each other.
+/// Stages of the search, with how long they took of one photo [s].
 pub(super) fn plan(frames: &[Frame], method: Method) -> Vec<Planned> {
     match method {
         Method::Outline => {
-            let again = std::iter::repeat_n((FINE, 1.0), rounds(frames));
-            [(SCAN, 1.0), (COARSE, 1.0), (FINE, 1.0)].into_iter().chain(again).chain([(LAST, 1.0)]).collect()
+            let fine = std::iter::repeat_n((FINE, 1.6), 1 + rounds(frames));
+            [(SCAN, 4.6), (COARSE, 2.6)].into_iter().chain(fine).chain([(LAST, 0.2)]).collect()
         }
-        Method::Swarm(_) => vec![(SWARM, 1.0)],
+        Method::Swarm(_) => vec![(SWARM, 10.0)],
     }
 }
 
