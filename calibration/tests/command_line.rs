@@ -53,6 +53,31 @@ fn a_missing_cell_fails_in_one_line_that_names_the_file() {
 }
 
 #[test]
+fn a_clip_that_is_not_there_to_be_repeated_leaves_the_folder_as_it_was() {
+    let logs = tempfile::tempdir().expect("a folder");
+    let (cell, out) = ("../config/fr3_cell.toml", logs.path().display().to_string());
+    for verb in ["excitation", "control-hit-slide"] {
+        let output = calibration(&["capture", verb, "--cell", cell, "--out", &out, "--repeat", "9"]);
+        let said = text(&output.stderr);
+        assert_eq!(output.status.code(), Some(1), "{said}");
+        assert!(said.contains("no clip 9 to repeat; it has none"), "{said}");
+        assert_eq!(logs.path().read_dir().expect("a folder").count(), 0, "{verb} left something");
+    }
+}
+
+#[test]
+fn two_outputs_that_are_one_file_are_refused_before_anything_is_read() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let place = folder.path().join("theta.toml").display().to_string();
+    for verb in [&["identify", "arm", "nowhere", "--report", &place][..], &["diagnose", "nowhere"]] {
+        let output = calibration(&[verb, &["--out", &place]].concat());
+        let said = text(&output.stderr);
+        assert_eq!(output.status.code(), Some(1), "{said}");
+        assert!(said.contains("another output's place; give each a name of its own"), "{said}");
+    }
+}
+
+#[test]
 fn a_demo_that_lacks_a_program_leaves_its_folder_for_the_next_call() {
     let alone = tempfile::tempdir().expect("a folder");
     let [program, out] = ["calibration", "demo"].map(|name| alone.path().join(name));

@@ -106,10 +106,10 @@ pub fn capture(options: &Options, interrupt: &Interrupt) -> anyhow::Result<Summa
     let body = Body::of(&cell)?;
     let size = size_of(&cell)?;
     let domain = task.domain.as_deref();
-    let session = Session::open(&task.out, &cell)?;
     // Before a bridge is started: a clip that cannot be repeated is said at once.
     let repeats = task.repeat.iter().map(|number| recorded::read(&task.out, *number, ClipKind::ControlHitSlide, &body));
     let repeats = repeats.collect::<Result<Vec<_>, _>>()?;
+    let session = Session::open(&task.out, &cell)?;
     let mut link = Link::open(domain)?;
     let mut object = ObjectWatch::open(domain)?;
     let mut bridge = task.bridge(&mut link, interrupt)?;

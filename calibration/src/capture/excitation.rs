@@ -84,11 +84,11 @@ pub fn capture(
     let task = &options.task;
     let cell = Cell::read(&task.cell)?;
     let body = Body::of(&cell)?;
-    let session = Session::open(&task.out, &cell)?;
     let moving = moving(&options.joints, body.model().dof())?;
     // Before a bridge is started: a clip that cannot be repeated is said at once.
     let repeats = task.repeat.iter().map(|number| recorded::read(&task.out, *number, ClipKind::Excitation, &body));
     let repeats = repeats.collect::<Result<Vec<_>, _>>()?;
+    let session = Session::open(&task.out, &cell)?;
     let mut link = Link::open(task.domain.as_deref())?;
     let mut bridge = task.bridge(&mut link, interrupt)?;
     let (limits, floor, recovery) = (limits::of(&cell, &body), floor(&cell), Recovery::new(options.task.recover));

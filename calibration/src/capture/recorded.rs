@@ -74,6 +74,9 @@ pub struct Repeated {
 /// # Errors
 /// [`RepeatError`] with the clips there are, or why this one cannot be repeated.
 pub fn read(folder: &Path, number: usize, kind: ClipKind, body: &Body) -> Result<Repeated, RepeatError> {
+    if !folder.join("cell.toml").exists() {
+        return Err(RepeatError::Unknown { folder: folder.to_owned(), number, known: "none".into() });
+    }
     let session = Session::open(folder)?;
     let Some(entry) = session.clips.iter().find(|clip| number_of(&clip.file) == Some(number)) else {
         let known = session.clips.iter().map(|clip| clip.file.display().to_string()).collect::<Vec<_>>().join(", ");

@@ -158,8 +158,11 @@ impl Site {
             commands.iter().any(|command| command.contains(&format!("--out {} ", quoted(folder))))
         };
         // A session begins with clips enough to be diagnosed.
-        if self.is_new && fill(&commands, &self.folder) {
-            commands.insert(0, self.same(if self.strokes { "--clips 6" } else { "--clips 4" }));
+        let enough = if self.strokes { 6 } else { 4 };
+        let clips = |command: &String| command.rsplit_once(" --clips ")?.1.parse::<usize>().ok();
+        if self.is_new && fill(&commands, &self.folder) && commands.iter().filter_map(clips).all(|clips| clips < enough)
+        {
+            commands.insert(0, self.same(&format!("--clips {enough}")));
         }
         let beside = ["arm", "strokes"].map(|end| (named_after(&self.folder, end), format!("report_{end}.html")));
         for (folder, page) in beside.into_iter().chain([(self.folder.clone(), "report.html".to_owned())]) {
@@ -223,6 +226,8 @@ mod tests {
         assert_eq!(advice.commands[..2], expected);
         assert_eq!(advice.commands[2], "calibration diagnose 'my clips_next' --report report.html");
         assert_eq!(Site::of(&session).usual(), [format!("{capture} 8")]);
+        // Eight clips are enough to be diagnosed.
+        assert_eq!(Site::of(&session).more(String::new(), 8).commands.len(), 2);
     }
 
     #[test]

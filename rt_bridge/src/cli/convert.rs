@@ -6,7 +6,7 @@ use clap::Args;
 use shared_mem::cell::Cell;
 use shared_mem::output::discard_unfinished;
 use shared_mem::recording::ClipInfo;
-use shared_mem::{answer, console};
+use shared_mem::{answer, console, input};
 use std::path::PathBuf;
 
 /// Turn a recording of a RealSense camera into a clip
@@ -44,6 +44,8 @@ impl ConvertArguments {
             console::flush();
             std::process::exit(1);
         })?;
+        // A program that cannot read recordings says that of those that are there.
+        drop(input::open(&self.bag)?);
         let cell = self.cell.as_deref().map(Cell::read).transpose()?;
         let info = ClipInfo {
             cell_toml: cell.as_ref().map(Cell::to_toml),
