@@ -7,7 +7,7 @@ use super::scan::scan;
 use super::search::Reach;
 use super::shape::Shape;
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
-use shared_mem::progress::Progress;
+use shared_mem::progress::{Planned, Progress};
 
 /// Places looked from: around, and from the table's height to far above [rad], away from the robot [m].
 const AROUND: usize = 16;
@@ -18,8 +18,8 @@ const MIDDLE: f64 = 0.4;
 /// The turn within which each place is looked at, and so many places that are followed.
 const TURN: f64 = 0.35;
 const FOLLOWED: usize = 5;
-/// Name of the stage.
-const PLACES: &str = "places";
+/// The stage in which they are looked from, beside those of a fit as one photo took them.
+const LOOK: Planned = ("places", 46.0);
 
 /// The pose that explains the frames best, from anywhere around the robot.
 ///
@@ -31,9 +31,9 @@ pub fn search(frames: &[Frame], shape: &Shape, lens: &Lens, method: Method, seed
     let mut drawings = 0;
     let places = AROUND * HEIGHTS.len() * DISTANCES.len();
     let followed = std::iter::repeat_n(plan(frames, method), FOLLOWED).flatten();
-    let stages: Vec<_> = [BEGIN, (PLACES, 1.0)].into_iter().chain(followed).collect();
+    let stages: Vec<_> = [BEGIN, LOOK].into_iter().chain(followed).collect();
     let bar = Progress::planned("viewpoint", &stages, 1);
-    bar.stage(PLACES, places as u64);
+    bar.stage(LOOK.0, places as u64);
     for place in 0..places {
         let around = std::f64::consts::TAU * (place % AROUND) as f64 / AROUND as f64;
         let height = HEIGHTS[place / AROUND % HEIGHTS.len()];
@@ -42,7 +42,7 @@ pub fn search(frames: &[Frame], shape: &Shape, lens: &Lens, method: Method, seed
             DISTANCES[place / AROUND / HEIGHTS.len()] * (lens.focal[1] / (2.0 * lens.centre[1].max(1.0))).max(0.5);
         let from = Vector3::new(around.cos() * height.cos(), around.sin() * height.cos(), height.sin()) * away;
         let (candidates, drawn) = scan(&frames[..1], shape, &looking(&from), &reach, 1, || ());
-        bar.show(place as u64 + 1, PLACES);
+        bar.show(place as u64 + 1, LOOK.0);
         drawings += drawn;
         seen.extend(candidates);
     }
