@@ -11,6 +11,7 @@
 //! | [`diagnose`] | where the gap lies, what causes it, how far it shrinks |
 //! | [`estimate`] | fits over clips: what all clips share, what varies from clip to clip |
 //! | [`forward`] | what the twin makes of recorded clips, as residuals |
+//! | [`init`] | a cell.toml to begin with, commented |
 //! | [`identify`] | the parameters that a session tells, and what it cannot tell |
 //! | [`model`] | what was found as a model file of MuJoCo, ROS or Gazebo |
 //! | [`report`] | pages with plots |
@@ -50,6 +51,7 @@ pub mod diagnose;
 pub mod estimate;
 pub mod forward;
 pub mod identify;
+pub mod init;
 pub mod interrupt;
 pub mod kept;
 pub mod keys;

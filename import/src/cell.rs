@@ -7,9 +7,19 @@ use shared_mem::cell::ClipEntry;
 /// Parts of joint names that say that an arm is built like the FR3.
 const FAMILY: [&str; 4] = ["fr3", "fer", "panda", "franka"];
 
-const FRANKA_CONTROLLER: &str = "\
-# The log does not say how the arm is controlled. These are the usual gains of a Franka's joint impedance, with wide ranges to
-# look for the true ones in: write yours where you know them.
+/// A `[controller]` block for an arm of which nobody said how it is controlled.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct UsualController {
+    /// What it is taken from, and what to do about it: one sentence or two.
+    pub remark: &'static str,
+    /// The block as TOML.
+    pub toml: &'static str,
+}
+
+const FRANKA_CONTROLLER: UsualController = UsualController {
+    remark: "No log says how the arm is controlled. These are the usual gains of a Franka's joint impedance, with wide ranges to \
+             look for the true ones in: write yours where you know them.",
+    toml: "\
 [controller]
 kind = \"joint_impedance\"
 stiffness = [600, 600, 600, 600, 250, 150, 50]
@@ -18,16 +28,25 @@ damping = [50, 50, 50, 50, 30, 25, 15]
 damping_range = [0.5, 1000.0]
 rotor_inertia = [0.195, 0.195, 0.195, 0.195, 0.074, 0.074, 0.074]
 torque_limit = [87, 87, 87, 87, 12, 12, 12]
-";
+",
+};
 
-const SERVO_CONTROLLER: &str = "\
-# The log does not say how the joints are controlled. Servos are taken, with wide ranges to look for their gains in: write
-# yours where you know them.
+const SERVO_CONTROLLER: UsualController = UsualController {
+    remark: "No log says how the joints are controlled. Servos are taken, with wide ranges to look for their gains in: write \
+             yours where you know them.",
+    toml: "\
 [controller]
 kind = \"joint_pd\"
 stiffness_range = [0.5, 2000.0]
 damping_range = [0.0, 200.0]
-";
+",
+};
+
+/// What is usual for an arm with joints of these names: a Franka's joint impedance, or servos.
+#[must_use]
+pub fn usual_controller(joints: &[String]) -> UsualController {
+    if is_franka(joints) { FRANKA_CONTROLLER } else { SERVO_CONTROLLER }
+}
 
 /// The file's text without clips, for these joints.
 pub(crate) fn proposed(log: &Log, joints: &[String]) -> String {
@@ -45,17 +64,24 @@ pub(crate) fn proposed(log: &Log, joints: &[String]) -> String {
     if is_franka(joints) {
         let robot = "[robot]\nmodel = \"fr3\"                 # a Panda is built alike, of other masses: for one, give its urdf instead\n\
                      base_frame = \"fr3_link0\"\n";
-        return format!("{head}{robot}\n{FRANKA_CONTROLLER}");
+        return format!("{head}{robot}\n{}", controller(joints));
     }
     let robot = format!(
         "[robot]\n# One second-order model a joint; with a URDF the arm's own: urdf = \"robot.urdf\" in place of joints.\njoints = {}\n",
         toml_value(joints)
     );
-    format!("{head}{robot}\n{SERVO_CONTROLLER}")
+    format!("{head}{robot}\n{}", controller(joints))
 }
 
-/// Seven joints of a Franka, in their order.
-fn is_franka(joints: &[String]) -> bool {
+/// The block with its remark above it.
+fn controller(joints: &[String]) -> String {
+    let UsualController { remark, toml } = usual_controller(joints);
+    format!("# {remark}\n{toml}")
+}
+
+/// Whether these are the seven joints of a Franka, in their order.
+#[must_use]
+pub fn is_franka(joints: &[String]) -> bool {
     let numbered = |(i, name): (usize, &String)| {
         let name = name.to_ascii_lowercase();
         name.ends_with(&format!("joint{}", i + 1)) && FAMILY.iter().any(|arm| name.contains(arm))

@@ -11,9 +11,11 @@
 //! | `clip` | a log by its mapping, in SI |
 //! | `cell` | the cell.toml of the new session |
 //! | `session` | the whole way |
+//! | `contents` | what a log holds of a robot, for those who only look |
 
 mod cell;
 mod clip;
+mod contents;
 mod error;
 mod log;
 mod mapping;
@@ -23,7 +25,9 @@ mod ros;
 mod session;
 mod sources;
 
+pub use cell::{UsualController, is_franka, usual_controller};
 pub use clip::Gravity;
+pub use contents::{Contents, look};
 pub use error::ImportError;
 pub use log::LeftOut;
 pub use mapping::{

@@ -56,6 +56,8 @@ pub(crate) struct Facts {
     pub(crate) franka: bool,
     /// What the format says the robot is.
     pub(crate) robot: Option<String>,
+    /// The robot's URDF, where the log holds it.
+    pub(crate) description: Option<String>,
 }
 
 /// Something that is there and is not imported.

@@ -156,7 +156,7 @@ fn largest(found: &[Source]) -> Result<(usize, Vec<Log>), ImportError> {
     Ok((number, found[number].read()?))
 }
 
-fn longest<'a>(logs: &'a [Log], path: &Path) -> Result<&'a Log, ImportError> {
+pub(crate) fn longest<'a>(logs: &'a [Log], path: &Path) -> Result<&'a Log, ImportError> {
     let rows = |log: &&Log| log.tables.iter().map(crate::log::Table::rows).max();
     let log = logs.iter().filter(|log| !log.is_empty()).max_by_key(rows);
     log.ok_or_else(|| {

@@ -16,7 +16,8 @@ use twin::sim::{Drive, SimCell};
 /// Flags that programs give each other, or that belong to programs of others.
 const OF_OTHERS: [&str; 5] = ["parent", "configuration", "shm-size", "features", "release"];
 /// A folder of the sources, and the verbs of which one must have the flags that its messages name.
-const SPOKEN_BY: [(&str, &[&str]); 8] = [
+const SPOKEN_BY: [(&str, &[&str]); 9] = [
+    ("calibration/src/init/", &["calibration init"]),
     ("import/src/", &["calibration import"]),
     ("calibration/src/viewpoint/", &["calibration viewpoint"]),
     ("calibration/src/capture/", &["calibration capture excitation", "calibration capture control-hit-slide"]),

@@ -9,6 +9,7 @@ mod export;
 mod export_model;
 mod identify;
 mod import;
+mod init;
 mod viewpoint;
 
 use calibration::diagnose;
@@ -33,6 +34,7 @@ Examples:
   calibration diagnose session --report report.html
   calibration viewpoint session --out cell.toml --report outline.png
   calibration import last_week --out session
+  calibration init --urdf arm.urdf --out cell.toml
   calibration export session --to ros2 --out bags
   calibration export-model theta.toml --cell cell.toml --to mjcf --out cell.xml
 Every verb has its own --help with an example. Logs and progress go to stderr (RUST_LOG=debug for more)."
@@ -74,6 +76,8 @@ Examples:
     Viewpoint(Box<viewpoint::ViewpointArguments>),
     /// Makes a session of logs of other programs: bags, data sets, tables.
     Import(import::ImportArguments),
+    /// Writes a cell.toml to begin with, commented: from a URDF, a bag, recorded clips, or by questions.
+    Init(Box<init::InitArguments>),
     /// Writes a session as ROS 2 bags, TwinAligner clip folders or own clips.
     Export(export::ExportArguments),
     /// Writes what was found as a model of MuJoCo, ROS or Gazebo, to run or to bring your own model up to date with.
@@ -119,6 +123,7 @@ fn run_to_the_end(verb: Verb, interrupt: &Interrupt) -> anyhow::Result<()> {
         Verb::Check(arguments) => check::run(&arguments),
         Verb::Viewpoint(arguments) => viewpoint::run(*arguments),
         Verb::Import(arguments) => import::run(&arguments),
+        Verb::Init(arguments) => init::run(*arguments),
         Verb::Export(arguments) => export::run(&arguments),
         Verb::ExportModel(arguments) => export_model::run(&arguments),
         Verb::Capture(_) | Verb::Demo(_) | Verb::Benchmark(_) => Ok(()),

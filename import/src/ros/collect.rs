@@ -18,11 +18,17 @@ const UNDEFINED: &str = "the bag holds no definition of its type";
 const NUMBERLESS: &str = "it holds no number that a clip has a place for";
 const CROWDED: &str = "its messages have too many forms";
 
+/// Types of a text, in ROS 2 and ROS 1.
+const TEXT: [&str; 2] = ["std_msgs/msg/String", "std_msgs/String"];
+/// What the topic of the robot's URDF is called, whatever namespace it lies in.
+const DESCRIPTION: &str = "robot_description";
+
 /// Takes messages and gives tables.
 pub(crate) struct Collector {
     encoding: Encoding,
     types: HashMap<String, Option<Rc<Vec<Field>>>>,
     topics: BTreeMap<String, Topic>,
+    description: Option<String>,
 }
 
 /// What came on one topic.
@@ -56,7 +62,7 @@ pub(crate) struct Incoming<'a> {
 
 impl Collector {
     pub(crate) fn new(encoding: Encoding) -> Self {
-        Self { encoding, types: HashMap::new(), topics: BTreeMap::new() }
+        Self { encoding, types: HashMap::new(), topics: BTreeMap::new(), description: None }
     }
 
     /// Takes a message over; a sentence where it is not what its type says.
@@ -77,6 +83,9 @@ impl Collector {
             )
         };
         let mut reader = Reader::new(message.data, self.encoding).map_err(broken)?;
+        if TEXT.contains(&message.type_name) && message.topic.ends_with(DESCRIPTION) {
+            self.description = Some(reader.clone().text().map_err(broken)?.to_owned());
+        }
         // A list of messages is as many of them: transforms.
         if let [Field { kind: Kind::Message(inner), arity: Arity::Sequence, .. }] = &fields[..] {
             for _ in 0..reader.length().map_err(broken)? {
@@ -100,6 +109,11 @@ impl Collector {
         let fields = fields.map(Rc::new);
         self.types.insert(message.type_name.to_owned(), fields.clone());
         fields
+    }
+
+    /// The robot's URDF, where it was published.
+    pub(crate) fn description(&mut self) -> Option<String> {
+        self.description.take()
     }
 
     /// The tables, and what is in none of them.

@@ -23,6 +23,7 @@ pub(super) fn read(path: &Path, files: &[PathBuf]) -> Result<Log, ImportError> {
             sqlite::read(file, &mut collector)?;
         }
     }
+    let description = collector.description();
     let (tables, mut out) = collector.finish();
     out.extend(left_out.into_iter().map(|(what, count)| LeftOut { what, why: NOT_CDR, count }));
     let franka = tables.iter().any(|table| table.name.contains("franka"));
@@ -33,7 +34,7 @@ pub(super) fn read(path: &Path, files: &[PathBuf]) -> Result<Log, ImportError> {
         name: stem(path),
         format: if is_mcap { "ROS 2 bag (mcap)" } else { "ROS 2 bag (sqlite3)" },
         tables,
-        facts: Facts { franka, torque, ..Facts::default() },
+        facts: Facts { franka, torque, description, ..Facts::default() },
         left_out: out,
         warnings: Vec::new(),
     })

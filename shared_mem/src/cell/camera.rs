@@ -2,10 +2,11 @@
 
 use super::within;
 use crate::frames::{Base, Camera as CameraFrame, Pose};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// The camera.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, expecting = "a [camera] block")]
 pub struct Camera {
     /// Columns.
@@ -32,7 +33,7 @@ pub struct Camera {
 }
 
 /// Pinhole intrinsics [pixel].
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, expecting = "a table of fx, fy, cx and cy [pixel]")]
 pub struct Intrinsics {
     /// Focal length along a row.
@@ -46,7 +47,7 @@ pub struct Intrinsics {
 }
 
 /// The optical frame (z forward, x right, y down) in the base frame.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, expecting = "a table of position [m] and orientation (w, x, y, z)")]
 pub struct CameraPose {
     /// Position [m].

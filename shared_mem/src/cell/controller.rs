@@ -2,10 +2,11 @@
 
 use super::within;
 use crate::msg::MAX_JOINTS;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// The joint controller. Vectors hold one number a joint; an empty one is "not known".
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, expecting = "a [controller] block")]
 pub struct Controller {
     /// The law.
@@ -34,7 +35,7 @@ pub struct Controller {
 }
 
 /// Where the torques of a log are measured.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum TorqueSensing {
     /// Behind the gear, as in a Franka: what turns the rotor is not in them.
@@ -54,7 +55,7 @@ impl TorqueSensing {
 pub type Range = [f64; 2];
 
 /// The law between command and torque, evaluated at 1 kHz and held in between.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum ControllerKind {
     /// `tau = k (q_d - q) + d (dq_d - dq) + gravity(q) + coriolis(q, dq)` of the nominal model.

@@ -1,10 +1,11 @@
 //! `[gripper]`: which gripper the arm carries. Its mass belongs to `[tool]`.
 
 use super::within;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// The gripper.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, expecting = "a [gripper] block")]
 pub struct Gripper {
     /// Which one.
@@ -18,7 +19,7 @@ pub struct Gripper {
 }
 
 /// Grippers that are known.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub enum GripperModel {
     /// Robotiq 2F-85.
     #[serde(rename = "robotiq_2f_85")]

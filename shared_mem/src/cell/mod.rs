@@ -7,6 +7,7 @@ mod controller;
 mod gripper;
 mod object;
 mod robot;
+mod schema;
 mod simulation;
 mod tolerance;
 mod wrench;
@@ -21,11 +22,12 @@ pub use tolerance::Tolerance;
 pub use wrench::{WrenchNoise, WrenchSensor};
 
 use crate::toml_file::{self, TomlFileError};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
-/// Everything a cell.toml says.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+/// What the laboratory knows about its cell. Units are SI, quaternions `w, x, y, z`.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Cell {
     /// The arm; absent where an object moves alone.
@@ -61,7 +63,7 @@ pub struct Cell {
     /// Where the simulated cell starts; the real one ignores it.
     #[serde(default, skip_serializing_if = "Simulation::is_default")]
     pub simulation: Simulation,
-    /// Clips of the session this file describes.
+    /// Clips of the session that this file describes, one block each.
     #[serde(default, rename = "clip", skip_serializing_if = "Vec::is_empty")]
     pub clips: Vec<ClipEntry>,
     /// Folder of the file: relative paths in it start here.
@@ -70,7 +72,7 @@ pub struct Cell {
 }
 
 /// One clip of a session.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, expecting = "a [[clip]] block")]
 pub struct ClipEntry {
     /// File or folder, relative to cell.toml.
@@ -80,7 +82,7 @@ pub struct ClipEntry {
 }
 
 /// What was done in a clip.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum ClipKind {
     /// The arm moved freely.

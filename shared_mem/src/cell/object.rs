@@ -2,14 +2,15 @@
 
 use super::controller::Range;
 use super::within;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
 /// The object. Ranges say where a parameter may lie; a plain `mass` says that it was weighed.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, expecting = "an [object] block")]
 pub struct Object {
-    /// `"box"`.
+    /// `"box"`, with its `size`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub shape: Option<String>,
     /// Mesh file (obj, stl, ply), relative to cell.toml, instead of `shape`. Where in the file the origin lies does not matter:
@@ -31,7 +32,7 @@ pub struct Object {
     /// Where the friction on the table may lie.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub friction_range: Option<Range>,
-    /// Where the centre of mass may lie, from the geometric centre ([`crate::frames::Object`]), object frame [m].
+    /// Where the centre of mass may lie, from the geometric centre along the object's axes [m].
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub centre_of_mass_range: Option<[Range; 3]>,
     /// Where the friction against the tool may lie.
@@ -49,7 +50,7 @@ pub struct Object {
 }
 
 /// How the base carries the load.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Support {
     /// On its corners.
@@ -62,7 +63,7 @@ pub enum Support {
 }
 
 /// Noise of the tracker, one sigma.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, expecting = "a table of position [m] and rotation [rad]")]
 pub struct PoseNoise {
     /// Of each coordinate [m].

@@ -1,11 +1,12 @@
 //! `[robot]`, `[tool]`, `[table]`, `[topics]`.
 
 use super::within;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
 /// The arm: a built-in model, a URDF, or only joint names where no model is known.
-#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, expecting = "a [robot] block")]
 pub struct Robot {
     /// Built-in model: `"fr3"`.
@@ -17,26 +18,26 @@ pub struct Robot {
     /// Joint names in the order of the recordings, where no model is known: one second-order model a joint then.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub joints: Vec<String>,
-    /// Name of the base frame, in recordings, bags and viewers alike; [`Cell::base_frame`](super::Cell::base_frame) is the name in
-    /// force.
+    /// Name of the base frame, in recordings, bags and viewers alike; absent: the first link of the model, else `base`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub base_frame: Option<String>,
 }
 
 /// The tool: a solid capsule along the flange's z axis.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, expecting = "a [tool] block")]
 pub struct Tool {
     /// Mass, spread evenly over the capsule [kg].
     pub mass: f64,
-    /// Flange to the end of the tip [m]. The capsule's axis runs from the flange's origin to `length - radius`, with caps of `radius` at both ends.
+    /// Flange to the end of the tip [m]. The capsule's axis runs from the flange's origin to `length - radius`, with caps of
+    /// `radius` at both ends.
     pub length: f64,
     /// Radius [m].
     pub radius: f64,
 }
 
 /// The table: a horizontal plane.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, expecting = "a [table] block")]
 pub struct Table {
     /// Height of its surface in the base frame [m].
@@ -50,7 +51,7 @@ impl Table {
 }
 
 /// Where a ROS 2 bag keeps what is needed.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default, expecting = "a [topics] block")]
 pub struct Topics {
     /// `sensor_msgs/JointState`: q, dq and, where logged, `tau_J`.

@@ -1,10 +1,11 @@
 //! `[simulation]`: where the simulated cell starts. A real cell ignores it.
 
 use super::within;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Start of the simulated cell.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default, expecting = "a [simulation] block")]
 pub struct Simulation {
     /// Joint positions at the start [rad]; empty: the model's ready pose.

@@ -1,11 +1,12 @@
 //! `[tolerance]`: gaps that matter to nobody.
 
 use super::within;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Root mean squares below which a gap is of no interest to the laboratory; absent ones are 0, and every gap beyond the noise
 /// counts.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, expecting = "a [tolerance] block")]
 pub struct Tolerance {
     /// Of joint positions [rad].

@@ -1,10 +1,11 @@
 //! `[wrench]`: the force/torque sensor between flange and tool, its axes along the flange's.
 
 use super::within;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// The sensor.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default, expecting = "a [wrench] block")]
 pub struct WrenchSensor {
     /// Base identifier on the CAN bus: the upper seven bits of the eleven.
@@ -20,7 +21,7 @@ pub struct WrenchSensor {
 }
 
 /// Noise of one sample, one sigma.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default, expecting = "a table of force [N] and torque [N m]")]
 pub struct WrenchNoise {
     /// Of each force [N].

@@ -9,7 +9,7 @@ use nalgebra::{Isometry3, Matrix3, Rotation3, Unit, UnitQuaternion, Vector3};
 use shared_mem::cell::{Cell, Controller, Robot};
 use shared_mem::input::InputError;
 use shared_mem::msg::joints_from;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Standard acceleration of free fall as simulators and the vendor's model use it [m/s²].
 const GRAVITY: Vec3 = [0.0, 0.0, -9.81];
@@ -120,6 +120,14 @@ impl ArmModel {
     #[must_use]
     pub fn fr3() -> Self {
         Self::from_chain(fr3::chain()).expect("the built-in chain has seven joints with inertia")
+    }
+
+    /// The arm of a URDF's text, as a robot publishes it; `name` stands for the file in errors.
+    ///
+    /// # Errors
+    /// [`ModelError`] naming joint or link, and the remedy.
+    pub fn from_urdf(text: &str, name: &Path) -> Result<Self, ModelError> {
+        Self::from_chain(urdf::chain_of(text, name)?)
     }
 
     /// The arm of a cell.toml: robot, rotor inertia and torque limits of its controller, tool.

@@ -16,8 +16,12 @@ use urdf_rs::{JointType, Pose, Robot};
 /// Reads the serial chain of a URDF. The flange is the end of the fixed joints behind the last movable one, following
 /// the first of them in file order at each fork.
 pub(super) fn chain(file: &Path) -> Result<Chain, ModelError> {
-    let text = input::text(file, input::Kind::Robot)?;
-    let robot = urdf_rs::read_from_string(&text)
+    chain_of(&input::text(file, input::Kind::Robot)?, file)
+}
+
+/// The same of a text; `file` names it in errors.
+pub(super) fn chain_of(text: &str, file: &Path) -> Result<Chain, ModelError> {
+    let robot = urdf_rs::read_from_string(text)
         .map_err(|error| ModelError::Read { path: file.to_owned(), what: error.to_string() })?;
     Tree::of(&robot, file)?.chain()
 }

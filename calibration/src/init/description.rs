@@ -1,0 +1,55 @@
+//! The robot's URDF: a file, a xacro file that the program `xacro` expands, or the text that a bag holds.
+
+use anyhow::{Context as _, bail, ensure};
+use shared_mem::input;
+use shared_mem::printable;
+use std::io;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use twin::arm::ArmModel;
+
+/// A URDF that was read and is an arm.
+pub(super) struct Description {
+    /// The file that cell.toml names.
+    pub(super) path: PathBuf,
+    /// What is to be written there; `None` where the file is there.
+    pub(super) text: Option<String>,
+    pub(super) arm: ArmModel,
+}
+
+impl Description {
+    /// Of a file; what xacro makes of it goes beside the cell.toml `out`.
+    pub(super) fn of_file(file: &Path, out: &Path) -> anyhow::Result<Self> {
+        if file.extension().is_some_and(|end| end == "xacro") {
+            return Self::of_text(expanded(file)?, out);
+        }
+        let text = input::text(file, input::Kind::Robot)?;
+        let arm = ArmModel::from_urdf(&text, file)?;
+        Ok(Self { path: file.to_owned(), text: None, arm })
+    }
+
+    /// Of a text, which goes beside the cell.toml `out`.
+    pub(super) fn of_text(text: String, out: &Path) -> anyhow::Result<Self> {
+        let path = out.with_extension("urdf");
+        let arm = ArmModel::from_urdf(&text, &path)?;
+        Ok(Self { path, text: Some(text), arm })
+    }
+}
+
+/// What `xacro` makes of a file.
+fn expanded(file: &Path) -> anyhow::Result<String> {
+    ensure!(file.is_file(), "there is no {}; give an existing .xacro or .urdf file", file.display());
+    let shown = file.display();
+    let output = match Command::new("xacro").arg(file).output() {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => bail!(
+            "{shown} is a xacro file, and no program `xacro` is installed; where ROS is: `xacro {shown} > arm.urdf`, and give that"
+        ),
+        output => output.with_context(|| format!("`xacro {shown}` cannot be started"))?,
+    };
+    if !output.status.success() {
+        let said = String::from_utf8_lossy(&output.stderr);
+        let last = said.lines().rev().find(|line| !line.trim().is_empty()).unwrap_or("it says nothing");
+        bail!("`xacro {shown}` failed: {}; expand it by hand and give the .urdf", printable::one_line(last));
+    }
+    String::from_utf8(output.stdout).with_context(|| format!("`xacro {shown}` gave no text"))
+}

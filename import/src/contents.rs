@@ -1,0 +1,51 @@
+//! What a log holds of a robot: its joints, its URDF, and the topics that carry measurements, commands and an object's pose. For
+//! those who describe the cell that it was recorded in, without importing it.
+
+use crate::error::ImportError;
+use crate::propose::propose;
+use crate::session::longest;
+use crate::sources;
+use std::path::Path;
+
+/// What a log holds.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Contents {
+    /// Name of the format.
+    pub format: &'static str,
+    /// The robot's URDF, where the log holds it: in a ROS 2 bag, what was published on `robot_description`.
+    pub description: Option<String>,
+    /// Names of the joints, in the order that they were measured in; empty where no arm was recorded.
+    pub joints: Vec<String>,
+    /// Topic, or table, of what the arm did.
+    pub measured: Option<String>,
+    /// Topic, or table, of what the arm was told.
+    pub desired: Option<String>,
+    /// Topic, or table, of the object's pose.
+    pub object_pose: Option<String>,
+}
+
+/// Looks into the log at `path`; of several, into the longest.
+///
+/// # Errors
+/// [`ImportError`] when there is no log that can be read, or none of a robot.
+pub fn look(path: &Path) -> Result<Contents, ImportError> {
+    let mut logs = Vec::new();
+    for source in sources::find(path)? {
+        logs.extend(source.read()?);
+    }
+    let log = longest(&logs, path)?;
+    let mapping = propose(log, None, &|_| None).mapping;
+    // A second publisher on a topic is a table of its own, behind a colon.
+    let topic = |table: &str| table.split(':').next().unwrap_or(table).to_owned();
+    let joints = |columns: Option<crate::JointColumns>| {
+        columns.filter(|columns| !columns.q.is_empty()).map(|columns| topic(&columns.table))
+    };
+    Ok(Contents {
+        format: log.format,
+        description: log.facts.description.clone(),
+        joints: mapping.joints.clone(),
+        measured: joints(mapping.measured),
+        desired: joints(mapping.desired),
+        object_pose: mapping.object.map(|columns| topic(&columns.table)),
+    })
+}

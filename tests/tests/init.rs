@@ -1,0 +1,111 @@
+//! `calibration init` as it is typed: what flags, a xacro file, a bag and clips make a cell.toml of, and what is refused.
+
+use serde_json::Value;
+use shared_mem::cell::Cell;
+use std::io::Write as _;
+use std::path::Path;
+use std::process::{Command, Output, Stdio};
+use tests::program_path;
+use tests::texts::root;
+
+const ARM: &str = "\
+<robot name='arm'>
+  <link name='base'/>
+  <link name='upper'><inertial><mass value='1.0'/><inertia ixx='0.01' iyy='0.01' izz='0.01' ixy='0' ixz='0' iyz='0'/></inertial></link>
+  <joint name='shoulder' type='revolute'>
+    <parent link='base'/><child link='upper'/><axis xyz='0 0 1'/><limit lower='-1' upper='1' effort='10' velocity='2'/>
+  </joint>
+</robot>
+";
+
+fn run(folder: &Path, words: &[&str]) -> Output {
+    let mut command = Command::new(program_path("calibration"));
+    command.args(words).current_dir(folder).stdin(Stdio::null()).env("PATH", folder.join("bin"));
+    command.output().expect("it runs")
+}
+
+fn line(output: &Output) -> String {
+    assert_eq!(output.status.code(), Some(1));
+    let text = String::from_utf8(output.stderr.clone()).expect("UTF-8");
+    assert_eq!(text.lines().count(), 1, "{text}");
+    text
+}
+
+fn written(folder: &Path, words: &[&str]) -> (Value, Cell) {
+    let output = run(folder, &[words, &["--json"]].concat());
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let answer: Value = serde_json::from_slice(&output.stdout).expect("one JSON object");
+    let cell = Cell::read(&folder.join(answer["file"].as_str().expect("a file"))).expect("a cell");
+    (answer, cell)
+}
+
+#[test]
+fn a_file_that_is_there_is_kept_and_without_a_terminal_nothing_is_asked() {
+    let lab = tempfile::tempdir().expect("a folder");
+    let asked = line(&run(lab.path(), &["init"]));
+    assert!(asked.contains("--urdf FILE") && asked.contains("--model fr3"), "{asked}");
+    let (answer, cell) = written(lab.path(), &["init", "--model", "fr3", "--table", "-0.01"]);
+    assert_eq!(cell.table.map(|table| table.height), Some(-0.01));
+    assert!(answer["not_known"].as_array().is_some_and(|list| list.contains(&"object".into())), "{answer}");
+    let before = std::fs::read(lab.path().join("cell.toml")).expect("the file");
+    let kept = line(&run(lab.path(), &["init", "--joints", "a,b"]));
+    assert!(kept.contains("cell.toml") && kept.contains("--force"), "{kept}");
+    assert_eq!(std::fs::read(lab.path().join("cell.toml")).expect("the file"), before);
+    let (_, cell) = written(lab.path(), &["init", "--joints", "a,b", "--force"]);
+    assert_eq!(cell.robot.expect("a robot").joints, ["a", "b"]);
+}
+
+#[test]
+fn a_urdf_is_named_from_the_folder_of_the_file_and_a_xacro_file_is_expanded() {
+    let lab = tempfile::tempdir().expect("a folder");
+    std::fs::create_dir_all(lab.path().join("bin")).expect("room");
+    std::fs::create_dir_all(lab.path().join("cells/robots")).expect("room");
+    std::fs::write(lab.path().join("cells/robots/arm.urdf"), ARM).expect("room");
+    let (answer, cell) = written(lab.path(), &["init", "--urdf", "cells/robots/arm.urdf", "--out", "cells/cell.toml"]);
+    assert_eq!(cell.robot.and_then(|robot| robot.urdf), Some("robots/arm.urdf".into()));
+    assert_eq!(answer["urdf"], Value::Null);
+
+    std::fs::write(lab.path().join("arm.xacro"), ARM).expect("room");
+    let absent = line(&run(lab.path(), &["init", "--urdf", "arm.xacro"]));
+    assert!(
+        absent.contains("no program `xacro` is installed") && absent.contains("xacro arm.xacro > arm.urdf"),
+        "{absent}"
+    );
+    // Stands in for ROS's own, which copies where nothing is to be expanded.
+    let stand_in = lab.path().join("bin/xacro");
+    let mut script = std::fs::File::create(&stand_in).expect("room");
+    script.write_all(b"#!/bin/sh\n/bin/cat \"$1\"\n").expect("room");
+    drop(script);
+    std::fs::set_permissions(&stand_in, std::os::unix::fs::PermissionsExt::from_mode(0o755)).expect("its owner");
+    let (answer, cell) = written(lab.path(), &["init", "--urdf", "arm.xacro"]);
+    assert_eq!(
+        (&answer["urdf"], cell.robot.and_then(|robot| robot.urdf)),
+        (&"cell.urdf".into(), Some("cell.urdf".into()))
+    );
+    assert_eq!(std::fs::read_to_string(lab.path().join("cell.urdf")).expect("the file"), ARM);
+}
+
+#[test]
+fn a_bag_tells_its_robot_and_its_topics() {
+    let lab = tempfile::tempdir().expect("a folder");
+    let bag = root().join("import/tests/fixtures/rosbag2_mcap");
+    let bag = bag.to_str().expect("UTF-8");
+    let (answer, cell) = written(lab.path(), &["init", "--bag", bag]);
+    assert_eq!(cell.robot.and_then(|robot| robot.model).as_deref(), Some("fr3"));
+    assert_eq!(cell.clips.len(), 1);
+    let text = std::fs::read_to_string(lab.path().join("cell.toml")).expect("the file");
+    assert!(text.contains("# 50 states/s, 50 commands/s"), "{text}");
+    assert!(answer["taken"].to_string().contains("its joint names"), "{answer}");
+    // The verbs that need no more than clips and gains run on it as it is.
+    let check = run(lab.path(), &["check", "."]);
+    assert!(check.status.success(), "{}", String::from_utf8_lossy(&check.stderr));
+}
+
+#[test]
+fn the_schema_is_one_json_object_that_names_the_blocks() {
+    let lab = tempfile::tempdir().expect("a folder");
+    let output = run(lab.path(), &["init", "--schema"]);
+    let schema: Value = serde_json::from_slice(&output.stdout).expect("one JSON object");
+    assert!(output.status.success() && schema["properties"]["controller"].is_object());
+    assert!(!lab.path().join("cell.toml").exists());
+}
