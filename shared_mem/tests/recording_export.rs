@@ -94,7 +94,7 @@ fn record(folder: &Path) -> Session {
 /// Exports into a new folder.
 fn export(session: &Session, to: Format, into: &Path) -> (Session, Vec<Exported>) {
     let flange_at = |q: &[f64]| Some(([q[0], 0.0, 0.5], [1.0, 0.0, 0.0, 0.0]));
-    let order = Order { to, out: into, force: false, flange_at: &flange_at };
+    let order = Order { to, out: into, force: false, flange_at: &flange_at, robot: None };
     let done = export_session(session, order, |_| {}).unwrap_or_else(|e| panic!("{e}"));
     (Session::open(into).expect("a session"), done)
 }
@@ -300,7 +300,7 @@ fn on_failure_nothing_stays_behind_not_even_a_folder_on_the_way() {
     let clip = folder.path().join("clip_00.mcap");
     std::fs::write(&clip, b"no clip at all").expect("room");
     let out = folder.path().join("new/deep/out");
-    let order = Order { to: Format::Ros2, out: &out, force: false, flange_at: &|_| None };
+    let order = Order { to: Format::Ros2, out: &out, force: false, flange_at: &|_| None, robot: None };
     let error = export_session(&own, order, |_| {}).expect_err("no clip").to_string();
     assert!(error.contains("clip_00.mcap"), "{error}");
     assert!(!folder.path().join("new").exists(), "an empty folder stayed behind");
@@ -312,7 +312,7 @@ fn a_session_is_replaced_only_where_that_was_asked_for_and_nothing_else_lies_in_
     let own = record(folder.path());
     let (folders, _) = export(&own, Format::TwinAligner, &folder.path().join("folders"));
     let export_to = |session: &Session, out: &Path, force: bool| {
-        let order = Order { to: Format::Ros2, out, force, flange_at: &|_| None };
+        let order = Order { to: Format::Ros2, out, force, flange_at: &|_| None, robot: None };
         export_session(session, order, |_| {}).map_err(|error| error.to_string())
     };
     let error = export_to(&own, &folders.folder, false).expect_err("it is full");

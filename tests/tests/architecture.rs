@@ -59,7 +59,7 @@ fn each_big_dependency_has_one_door() {
         ("iceoryx2", &["shared_mem/src/transport/", "shared_mem/src/msg/"]),
         ("mcap", &["shared_mem/src/recording/"]),
         ("parry3d_f64", &["twin/src/physics/"]),
-        ("urdf_rs", &["twin/src/arm/urdf.rs"]),
+        ("urdf_rs", &["twin/src/arm/urdf.rs", "twin/src/arm/urdf/"]),
         ("quick_xml", &["urdf/src/", "calibration/src/model/xml.rs"]),
         ("foxglove", &["twin/src/viewer", "shared_mem/src/recording/"]),
         ("franka", &["rt_bridge/src/fr3/", "rt_bridge/src/serve/"]),

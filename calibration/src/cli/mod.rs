@@ -35,7 +35,7 @@ Examples:
   calibration viewpoint session --out cell.toml --report outline.png
   calibration import last_week --out session
   calibration init --urdf arm.urdf --out cell.toml
-  calibration export session --to ros2 --out bags
+  calibration export session --to rosbag2 --out bags
   calibration export-model theta.toml --cell cell.toml --to mjcf --out cell.xml
 Every verb has its own --help with an example. Logs and progress go to stderr (RUST_LOG=debug for more)."
 )]

@@ -7,6 +7,7 @@ use shared_mem::cell::{Cell, ClipEntry, ClipKind};
 use shared_mem::recording::{Clip, read_clip, read_clip_info};
 use std::path::{Path, PathBuf};
 use twin::arm::ArmModel;
+use twin::replay::in_model_order;
 
 /// What the first of some clips tells.
 #[derive(Debug, Clone, Default)]
@@ -91,7 +92,7 @@ pub(super) fn listed(
     }
     let remark = recorded(&read);
     if let Some(arm) = arm.filter(|_| !read.joint_names.is_empty()) {
-        read.reorder(arm.joint_names())?;
+        in_model_order(read, arm)?;
     }
     Ok((ClipEntry { file: relative(clip, out), kind }, remark))
 }

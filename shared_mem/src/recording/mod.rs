@@ -49,8 +49,8 @@ mod writer;
 pub use clip::{Clip, read_clip};
 pub use error::ReadError;
 pub use export::{
-    ExportError, Exported, FlangeAt, Format, LeftOut, Order, export_session, ros2_definition, session_folder,
-    write_clip,
+    ExportError, Exported, FlangeAt, Format, FramesAt, LeftOut, Order, ROS_CAMERA_FRAME, RobotModel, Transform,
+    export_session, ros2_definition, session_folder, write_clip,
 };
 pub use messages::{ClipMessage, ClipMessages, Payload};
 pub use npy::{Array, parse as parse_npy};

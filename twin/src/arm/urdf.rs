@@ -5,6 +5,10 @@
 //! there and they slide, as fingers do; nor are those that follow another one (`<mimic>`). They are held at 0, or at the end of
 //! their range that is nearest to it, and what they carry is folded into the link that they hang on.
 
+mod frames;
+
+pub use frames::{LinkFrame, UrdfFrames};
+
 use super::inertia::MassProperties;
 use super::model::{Chain, Joint, ModelError};
 use nalgebra::{Isometry3, Translation3, Unit, UnitQuaternion, Vector3};
@@ -21,9 +25,11 @@ pub(super) fn chain(file: &Path) -> Result<Chain, ModelError> {
 
 /// The same of a text; `file` names it in errors.
 pub(super) fn chain_of(text: &str, file: &Path) -> Result<Chain, ModelError> {
-    let robot = urdf_rs::read_from_string(text)
-        .map_err(|error| ModelError::Read { path: file.to_owned(), what: error.to_string() })?;
-    Tree::of(&robot, file)?.chain()
+    Tree::of(&read(text, file)?, file)?.chain()
+}
+
+fn read(text: &str, file: &Path) -> Result<Robot, ModelError> {
+    urdf_rs::read_from_string(text).map_err(|error| ModelError::Read { path: file.to_owned(), what: error.to_string() })
 }
 
 struct Tree<'a> {
@@ -164,9 +170,7 @@ impl<'a> Tree<'a> {
 
     /// Where a joint that is held holds what it carries, in the joint's frame at 0.
     fn held(&self, joint: &urdf_rs::Joint) -> Result<Isometry3<f64>, ModelError> {
-        let (lower, upper) = (joint.limit.lower, joint.limit.upper);
-        let at =
-            if joint.joint_type != JointType::Continuous && upper > lower { 0.0_f64.clamp(lower, upper) } else { 0.0 };
+        let at = rest(joint);
         if at == 0.0 {
             return Ok(Isometry3::identity());
         }
@@ -242,6 +246,12 @@ impl<'a> Tree<'a> {
     fn error(&self, line: usize, what: &str) -> ModelError {
         at_line(self.file, line, what)
     }
+}
+
+/// Where a joint is when nobody says where: at 0, or as near to it as its range allows.
+fn rest(joint: &urdf_rs::Joint) -> f64 {
+    let (lower, upper) = (joint.limit.lower, joint.limit.upper);
+    if joint.joint_type != JointType::Continuous && upper > lower { 0.0_f64.clamp(lower, upper) } else { 0.0 }
 }
 
 /// Whether joints without further ones behind them may be a gripper's: one that is driven, or several that slide.

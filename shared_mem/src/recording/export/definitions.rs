@@ -8,6 +8,9 @@ const POINT: &str = "MSG: geometry_msgs/Point\nfloat64 x\nfloat64 y\nfloat64 z\n
 const QUATERNION: &str = "MSG: geometry_msgs/Quaternion\nfloat64 x 0\nfloat64 y 0\nfloat64 z 0\nfloat64 w 1\n";
 const POSE: &str = "MSG: geometry_msgs/Pose\ngeometry_msgs/Point position\ngeometry_msgs/Quaternion orientation\n";
 const WRENCH: &str = "MSG: geometry_msgs/Wrench\ngeometry_msgs/Vector3 force\ngeometry_msgs/Vector3 torque\n";
+const TRANSFORM: &str =
+    "MSG: geometry_msgs/Transform\ngeometry_msgs/Vector3 translation\ngeometry_msgs/Quaternion rotation\n";
+const STAMPED: &str = "MSG: geometry_msgs/TransformStamped\nstd_msgs/Header header\nstring child_frame_id\ngeometry_msgs/Transform transform\n";
 const REGION: &str = "MSG: sensor_msgs/RegionOfInterest\nuint32 x_offset\nuint32 y_offset\nuint32 height\nuint32 width\nbool do_rectify\n";
 
 /// Text of a ROS 2 type's definition (`sensor_msgs/msg/JointState`); empty for types that are never written.
@@ -23,6 +26,10 @@ pub fn definition(type_name: &str) -> String {
         }
         "geometry_msgs/msg/WrenchStamped" => {
             ("std_msgs/Header header\ngeometry_msgs/Wrench wrench\n", &[HEADER, TIME, WRENCH, VECTOR])
+        }
+        "std_msgs/msg/String" => ("string data\n", &[]),
+        "tf2_msgs/msg/TFMessage" => {
+            ("geometry_msgs/TransformStamped[] transforms\n", &[STAMPED, HEADER, TIME, TRANSFORM, VECTOR, QUATERNION])
         }
         "sensor_msgs/msg/Image" => (
             "std_msgs/Header header\nuint32 height\nuint32 width\nstring encoding\nuint8 is_bigendian\nuint32 step\nuint8[] data\n",

@@ -3,19 +3,27 @@
 use super::super::cdr::CdrWriter;
 use super::super::picture::Picture;
 use super::super::ros2;
+use super::robot::Transform;
 use crate::msg::event::{Event, EventLevel, EventSource};
 use crate::msg::image::{CameraInfo, PixelEncoding};
 use crate::msg::wrench::Wrench;
 
 /// Depth counts of this many metres are what `16UC1` means in ROS.
 const MILLIMETRE: f64 = 1e-3;
-/// Optical frame of the pictures.
-const CAMERA: &str = "camera_color_optical_frame";
+/// Optical frame of the pictures in a ROS 2 bag: z forward, x right, y down.
+pub const ROS_CAMERA_FRAME: &str = "camera_color_optical_frame";
+/// Types of texts and of frames.
+pub(super) const TEXT: &str = "std_msgs/msg/String";
+pub(super) const TRANSFORMS: &str = "tf2_msgs/msg/TFMessage";
 
 /// `builtin_interfaces/Time`, which ends in 2038.
 fn stamp(stamp_ns: u64) -> CdrWriter {
+    stamped(CdrWriter::default(), stamp_ns)
+}
+
+fn stamped(message: CdrWriter, stamp_ns: u64) -> CdrWriter {
     let seconds = i32::try_from(stamp_ns / 1_000_000_000).unwrap_or(i32::MAX);
-    CdrWriter::default().u32(seconds.cast_unsigned()).u32((stamp_ns % 1_000_000_000) as u32)
+    message.u32(seconds.cast_unsigned()).u32((stamp_ns % 1_000_000_000) as u32)
 }
 
 fn header(stamp_ns: u64, frame: &str) -> CdrWriter {
@@ -33,6 +41,20 @@ pub(super) fn pose(stamp_ns: u64, frame: &str, position: [f64; 3], [w, x, y, z]:
     header(stamp_ns, frame).f64s(&position).f64s(&[x, y, z, w]).message()
 }
 
+/// `std_msgs/String`.
+pub(super) fn text(text: &str) -> Vec<u8> {
+    CdrWriter::default().text(text).message()
+}
+
+/// `tf2_msgs/TFMessage`.
+pub(super) fn transforms(stamp_ns: u64, transforms: &[Transform]) -> Vec<u8> {
+    let count = u32::try_from(transforms.len()).unwrap_or(u32::MAX);
+    let one = |message: CdrWriter, Transform { parent, child, position, wxyz: [w, x, y, z] }: &Transform| {
+        stamped(message, stamp_ns).text(parent).text(child).f64s(position).f64s(&[*x, *y, *z, *w])
+    };
+    transforms.iter().fold(CdrWriter::default().u32(count), one).message()
+}
+
 /// `geometry_msgs/WrenchStamped`.
 pub(super) fn wrench(stamp_ns: u64, frame: &str, wrench: &Wrench) -> Vec<u8> {
     header(stamp_ns, frame).f64s(&wrench.force).f64s(&wrench.torque).message()
@@ -42,7 +64,7 @@ pub(super) fn wrench(stamp_ns: u64, frame: &str, wrench: &Wrench) -> Vec<u8> {
 pub(super) fn picture(stamp_ns: u64, picture: &Picture) -> (&'static str, Vec<u8>) {
     match picture {
         Picture::Compressed { format, bytes, .. } => {
-            (ros2::COMPRESSED_IMAGE, header(stamp_ns, CAMERA).text(format).byte_sequence(bytes).message())
+            (ros2::COMPRESSED_IMAGE, header(stamp_ns, ROS_CAMERA_FRAME).text(format).byte_sequence(bytes).message())
         }
         Picture::Pixels { header: head, pixels } => {
             let counts = head.encoding == PixelEncoding::Depth16;
@@ -54,7 +76,7 @@ pub(super) fn picture(stamp_ns: u64, picture: &Picture) -> (&'static str, Vec<u8
             } else {
                 (head.encoding.name(), head.stride, std::borrow::Cow::Borrowed(pixels))
             };
-            let message = header(stamp_ns, CAMERA).u32(head.height).u32(head.width).text(encoding).u8(0);
+            let message = header(stamp_ns, ROS_CAMERA_FRAME).u32(head.height).u32(head.width).text(encoding).u8(0);
             (ros2::IMAGE, message.u32(step).byte_sequence(&data).message())
         }
     }
@@ -63,7 +85,7 @@ pub(super) fn picture(stamp_ns: u64, picture: &Picture) -> (&'static str, Vec<u8
 /// `sensor_msgs/CameraInfo`.
 pub(super) fn camera_info(stamp_ns: u64, info: &CameraInfo) -> Vec<u8> {
     let [fx, fy, cx, cy] = info.intrinsics;
-    header(stamp_ns, CAMERA)
+    header(stamp_ns, ROS_CAMERA_FRAME)
         .u32(info.height)
         .u32(info.width)
         .text("plumb_bob")

@@ -8,6 +8,8 @@
 //! |---|---|
 //! | `source` | a clip of any kind with everything beside its joints and poses |
 //! | `rosbag`, `encode`, `definitions` | a ROS 2 bag |
+//! | `robot` | the robot's description, joints and frames in it |
+//! | `metadata` | the `metadata.yaml` of a bag that is a folder |
 //! | `folder`, `npz` | a TwinAligner clip folder |
 //! | `native` | an own clip |
 //! | `left_out` | what of the source is not in it |
@@ -16,14 +18,18 @@ mod definitions;
 mod encode;
 mod folder;
 mod left_out;
+mod metadata;
 mod native;
 mod npz;
+mod robot;
 mod rosbag;
 mod source;
 
 pub use definitions::definition as ros2_definition;
+pub use encode::ROS_CAMERA_FRAME;
 pub use left_out::LeftOut;
 pub use native::write_clip;
+pub use robot::{FramesAt, RobotModel, Transform};
 
 use super::{ReadError, Session, WriteError};
 use crate::cell::ClipEntry;
@@ -36,8 +42,10 @@ use std::path::{Path, PathBuf};
 /// What a session can be written as.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Format {
-    /// ROS 2 bags (storage mcap, messages in CDR).
+    /// ROS 2 bags (storage mcap, messages in CDR), each one file.
     Ros2,
+    /// The same, each a folder with a `metadata.yaml` as `ros2 bag record` writes it.
+    Rosbag2,
     /// TwinAligner clip folders.
     TwinAligner,
     /// Own clips.
@@ -107,6 +115,8 @@ pub struct Order<'a> {
     pub force: bool,
     /// Asked where a format wants to know where the flange is.
     pub flange_at: FlangeAt<'a>,
+    /// The robot, where its kinematics are known: a ROS 2 bag then holds its description, joint states and frames.
+    pub robot: Option<RobotModel<'a>>,
 }
 
 /// Writes all clips of `session` and its cell.toml into a new folder. `told` hears of each clip as it is done.
@@ -118,7 +128,7 @@ pub fn export_session(
     order: Order<'_>,
     mut told: impl FnMut(&Exported),
 ) -> Result<Vec<Exported>, ExportError> {
-    let Order { to, flange_at, .. } = order;
+    let Order { to, flange_at, robot, .. } = order;
     let folder = begin(session, order)?;
     let mut cell = session.cell.at_home_anywhere();
     cell.clips.clear();
@@ -129,13 +139,20 @@ pub fn export_session(
         let mut carried = Carried::default();
         let into = (&cell, &mut carried);
         let mut exported = match to {
-            Format::Ros2 => rosbag::write(&source, into, folder.file(&file)?)?,
+            Format::Ros2 => rosbag::write(&source, into, folder.file(&file)?, robot)?.0,
+            Format::Rosbag2 => {
+                let (exported, contents) = rosbag::write(&source, into, folder.file(&file)?, robot)?;
+                let text = metadata::text(&exported.file.to_string_lossy(), &contents);
+                folder.write(&file.with_file_name(METADATA_YAML), text.as_bytes())?;
+                exported
+            }
             Format::TwinAligner => folder::write(&source, into, (&folder, &file), flange_at)?,
             Format::Own => native::write(&source, into, folder.file(&file)?, flange_at)?,
         };
         if !(to == Format::Own && source.is_own()) {
             exported.left_out = left_out(&source, &cell, to, (&exported, &carried))?;
         }
+        exported.file.clone_from(&file);
         cell.clips.push(ClipEntry { file, kind: entry.kind });
         told(&exported);
         done.push(exported);
@@ -171,6 +188,7 @@ pub fn session_folder(out: &Path, force: bool, sources: &[PathBuf]) -> Result<Ou
         let name = entry.map_err(ReadError::io(out))?.file_name().to_string_lossy().into_owned();
         let of_session =
             name == CELL_TOML || name == IMPORT_TOML || name.ends_with(".mcap") || name.starts_with("traj_");
+        let of_session = of_session || out.join(&name).join(METADATA_YAML).is_file();
         if !of_session {
             return refused(format!("it holds {name}, which is no part of a session"));
         }
@@ -180,6 +198,8 @@ pub fn session_folder(out: &Path, force: bool, sources: &[PathBuf]) -> Result<Ou
 
 /// What makes a folder a session.
 const CELL_TOML: &str = "cell.toml";
+/// What makes a folder a ROS 2 bag.
+const METADATA_YAML: &str = "metadata.yaml";
 /// What a session that was imported keeps beside it.
 const IMPORT_TOML: &str = "import.toml";
 
@@ -187,12 +207,19 @@ const IMPORT_TOML: &str = "import.toml";
 fn name(file: &Path, to: Format, number: usize) -> PathBuf {
     match to {
         Format::TwinAligner => format!("traj_{number:05}").into(),
-        Format::Ros2 | Format::Own => {
-            let stem =
-                file.file_stem().map_or_else(|| format!("clip_{number:02}"), |s| s.to_string_lossy().into_owned());
-            format!("{stem}.mcap").into()
+        Format::Ros2 | Format::Own => format!("{}.mcap", stem(file, number)).into(),
+        Format::Rosbag2 => {
+            let stem = stem(file, number);
+            format!("{stem}/{stem}_0.mcap").into()
         }
     }
+}
+
+/// Name of a clip without extension; of the first file of a bag's folder that of the folder.
+fn stem(file: &Path, number: usize) -> String {
+    let stem = file.file_stem().map_or_else(|| format!("clip_{number:02}"), |stem| stem.to_string_lossy().into_owned());
+    let folder = file.parent().and_then(Path::file_name).map(|name| name.to_string_lossy().into_owned());
+    folder.filter(|folder| stem == format!("{folder}_0")).unwrap_or(stem)
 }
 
 impl Exported {

@@ -5,6 +5,8 @@ use super::super::{Payload, Picture, torques};
 use super::definitions::definition;
 use super::encode;
 use super::left_out::Carried;
+use super::metadata::{Contents, TopicCount, latched_profile};
+use super::robot::{RobotModel, RobotTopics};
 use super::source::{Beside, Source};
 use super::{ExportError, Exported};
 use crate::cell::Cell;
@@ -29,12 +31,13 @@ const EVENTS: &str = "/events";
 /// Frame of a force sensor at the flange.
 const FLANGE: &str = "fr3_link8";
 
-/// Writes the bag.
+/// Writes the bag, and says what it holds.
 pub(super) fn write(
     source: &Source,
     (cell, carried): (&Cell, &mut Carried),
     output: Output,
-) -> Result<Exported, ExportError> {
+    robot: Option<RobotModel<'_>>,
+) -> Result<(Exported, Contents), ExportError> {
     let target = output.path().to_owned();
     let mut exported = Exported::of(source, &target);
     let failed = |error: mcap::McapError| {
@@ -46,7 +49,7 @@ pub(super) fn write(
     };
     let mut bag = Bag::create(output).map_err(failed)?;
     bag.mcap.write_metadata(&torques::record(source.clip.torques_end_at_rows)).map_err(failed)?;
-    let mut rows = Rows::new(source, cell);
+    let mut rows = Rows::new(source, cell, robot);
     for beside in source.beside()? {
         let beside = beside?;
         rows.put_until(beside.stamp_ns, &mut bag).map_err(failed)?;
@@ -55,8 +58,9 @@ pub(super) fn write(
         carried.one(&beside.topic);
     }
     rows.put_until(u64::MAX, &mut bag).map_err(failed)?;
-    bag.finish().map_err(failed)?.finish()?;
-    Ok(exported)
+    let (output, contents) = bag.finish().map_err(failed)?;
+    output.finish()?;
+    Ok((exported, contents))
 }
 
 fn put_beside(beside: &Beside, unix_ns: u64, bag: &mut Bag) -> Result<(), mcap::McapError> {
@@ -90,13 +94,18 @@ struct Rows<'a> {
     /// Next row of measured joints, desired joints and poses.
     next: [usize; 3],
     states: std::iter::Peekable<Box<dyn Iterator<Item = (u64, &'a crate::msg::arm::ArmState)> + 'a>>,
+    names: &'a [String],
+    robot: Option<RobotTopics<'a>>,
 }
 
 impl<'a> Rows<'a> {
-    fn new(source: &'a Source, cell: &'a Cell) -> Self {
+    fn new(source: &'a Source, cell: &'a Cell, robot: Option<RobotModel<'a>>) -> Self {
         let frame = cell.base_frame().to_owned();
         let states: Box<dyn Iterator<Item = _>> = Box::new(source.states());
-        Self { source, cell, frame, next: [0; 3], states: states.peekable() }
+        let recorded = &source.clip.joint_names[..];
+        let names = robot.map_or(recorded, |model| model.names(recorded));
+        let robot = robot.map(|model| RobotTopics::new(model, names, &cell.topics.measured));
+        Self { source, cell, frame, next: [0; 3], states: states.peekable(), names, robot }
     }
 
     /// Writes every row that is not later than `stamp_ns`.
@@ -118,8 +127,11 @@ impl<'a> Rows<'a> {
                     let row = self.next[kind];
                     let of = |values: Option<&'a [f64]>| values.unwrap_or(&[]);
                     let numbers = [series.q_row(row), of(series.dq_row(row)), of(series.tau_row(row))];
-                    let message = encode::joint_state(unix_ns, &clip.joint_names, numbers);
+                    let message = encode::joint_state(unix_ns, self.names, numbers);
                     bag.put(topic, JointState::TYPE, unix_ns, &message)?;
+                    if let Some(robot) = self.robot.as_mut().filter(|_| kind == 0) {
+                        robot.put(series, row, unix_ns, bag)?;
+                    }
                     self.next[kind] += 1;
                 }
             }
@@ -134,7 +146,7 @@ impl<'a> Rows<'a> {
             {
                 let dof = (state.dof as usize).min(state.tau_ext.len());
                 let torques = [&[], &[], &state.tau_ext[..dof]];
-                let message = encode::joint_state(unix_ns, &clip.joint_names, torques);
+                let message = encode::joint_state(unix_ns, self.names, torques);
                 bag.put(EXTERNAL_TORQUES, JointState::TYPE, unix_ns, &message)?;
                 if let Some(flange) = flange(&state.O_T_EE) {
                     let message = encode::pose(unix_ns, &self.frame, flange.position(), flange.wxyz());
@@ -157,10 +169,11 @@ fn flange(m: &[f64; 16]) -> Option<Pose<crate::frames::Base, Flange>> {
 }
 
 /// A bag that is being written.
-struct Bag {
+pub(super) struct Bag {
     mcap: mcap::Writer<BufWriter<Output>>,
-    /// Channel and next sequence number of each topic.
-    channels: HashMap<String, (u16, u32)>,
+    /// Channel and next sequence number of each topic, and its place in what the bag holds.
+    channels: HashMap<String, (u16, u32, usize)>,
+    contents: Contents,
 }
 
 impl Bag {
@@ -170,28 +183,64 @@ impl Bag {
             .library(concat!("twinalign ", env!("CARGO_PKG_VERSION")))
             .compression(Some(Compression::Zstd))
             .compression_threads(0);
-        Ok(Self { mcap: options.create(BufWriter::new(output))?, channels: HashMap::new() })
+        Ok(Self {
+            mcap: options.create(BufWriter::new(output))?,
+            channels: HashMap::new(),
+            contents: Contents::default(),
+        })
     }
 
     /// Adds index and footer.
-    fn finish(mut self) -> Result<Output, mcap::McapError> {
+    fn finish(mut self) -> Result<(Output, Contents), mcap::McapError> {
         self.mcap.finish()?;
         let mut buffer = self.mcap.into_inner();
         buffer.flush()?;
-        Ok(buffer.into_inner().map_err(io::IntoInnerError::into_error)?)
+        Ok((buffer.into_inner().map_err(io::IntoInnerError::into_error)?, self.contents))
     }
 
-    fn put(&mut self, topic: &str, kind: &str, unix_ns: u64, message: &[u8]) -> Result<(), mcap::McapError> {
-        let (channel_id, sequence) = match self.channels.get(topic) {
+    /// A message on a topic that late subscribers get the last message of.
+    pub(super) fn put_latched(
+        &mut self,
+        topic: &str,
+        kind: &'static str,
+        unix_ns: u64,
+        message: &[u8],
+    ) -> Result<(), mcap::McapError> {
+        self.put_with(topic, (kind, true), unix_ns, message)
+    }
+
+    pub(super) fn put(
+        &mut self,
+        topic: &str,
+        kind: &'static str,
+        unix_ns: u64,
+        message: &[u8],
+    ) -> Result<(), mcap::McapError> {
+        self.put_with(topic, (kind, false), unix_ns, message)
+    }
+
+    fn put_with(
+        &mut self,
+        topic: &str,
+        (kind, is_latched): (&'static str, bool),
+        unix_ns: u64,
+        message: &[u8],
+    ) -> Result<(), mcap::McapError> {
+        let (channel_id, sequence, at) = match self.channels.get(topic) {
             Some(known) => *known,
             None => {
                 let schema = self.mcap.add_schema(kind, "ros2msg", definition(kind).as_bytes())?;
                 // rosbag2 asks for the key even where it is empty.
-                let metadata = BTreeMap::from([("offered_qos_profiles".to_owned(), String::new())]);
-                (self.mcap.add_channel(schema, topic, "cdr", &metadata)?, 0)
+                let profile = if is_latched { latched_profile() } else { String::new() };
+                let metadata = BTreeMap::from([("offered_qos_profiles".to_owned(), profile)]);
+                self.contents.topics.push(TopicCount { name: topic.to_owned(), kind, is_latched, messages: 0 });
+                (self.mcap.add_channel(schema, topic, "cdr", &metadata)?, 0, self.contents.topics.len() - 1)
             }
         };
-        self.channels.insert(topic.to_owned(), (channel_id, sequence.wrapping_add(1)));
+        self.channels.insert(topic.to_owned(), (channel_id, sequence.wrapping_add(1), at));
+        self.contents.topics[at].messages += 1;
+        let (first, last) = self.contents.span_ns.unwrap_or((unix_ns, unix_ns));
+        self.contents.span_ns = Some((first.min(unix_ns), last.max(unix_ns)));
         let header = MessageHeader { channel_id, sequence, log_time: unix_ns, publish_time: unix_ns };
         self.mcap.write_to_known_channel(&header, message)
     }

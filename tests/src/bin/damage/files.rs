@@ -58,7 +58,8 @@ pub(crate) fn write(whole: &Path) {
     let session = Session::open(&own).expect("a session");
     let flange_at = |_: &[f64]| Some(([0.4, 0.0, 0.5], [1.0, 0.0, 0.0, 0.0]));
     let export = |to, out: &Path| {
-        export_session(&session, Order { to, out, force: false, flange_at: &flange_at }, |_| {}).expect("an export")
+        export_session(&session, Order { to, out, force: false, flange_at: &flange_at, robot: None }, |_| {})
+            .expect("an export")
     };
     let (bag, chunked) = (folder("bag"), whole.join("chunked_bag"));
     export(Format::Ros2, &chunked);
