@@ -66,7 +66,7 @@ pub(super) fn gains(text: &str) -> Result<Vec<f64>, String> {
 /// Mass [kg], length [m] and radius [m].
 ///
 /// # Errors
-/// As [`gains`].
+/// How the three are to be given.
 pub fn tool(text: &str) -> Result<[f64; 3], String> {
     let [mass, length, radius] = numbers(text, 0.0..=50.0, "")?;
     if length <= radius || radius < 1e-4 {
@@ -81,7 +81,7 @@ pub fn tool(text: &str) -> Result<[f64; 3], String> {
 /// Edge lengths [m].
 ///
 /// # Errors
-/// As [`gains`].
+/// How many, and in which range they must be.
 pub fn edges(text: &str) -> Result<[f64; 3], String> {
     numbers(text, 1e-3..=10.0, "m")
 }
@@ -89,7 +89,7 @@ pub fn edges(text: &str) -> Result<[f64; 3], String> {
 /// A height [m].
 ///
 /// # Errors
-/// As [`gains`].
+/// In which range it must be.
 pub fn height(text: &str) -> Result<f64, String> {
     number(text, -10.0..=10.0, "m")
 }
