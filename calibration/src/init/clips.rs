@@ -4,10 +4,13 @@ use super::known::relative;
 use anyhow::{Context as _, ensure};
 use import::Contents;
 use shared_mem::cell::{Cell, ClipEntry, ClipKind};
-use shared_mem::recording::{Clip, read_clip, read_clip_info};
+use shared_mem::recording::{Clip, ObjectSeries, read_clip, read_clip_info};
 use std::path::{Path, PathBuf};
 use twin::arm::ArmModel;
 use twin::replay::in_model_order;
+
+/// An object that was hit slides farther than this, and no tracker is off by as much [m].
+const SHORTEST_SLIDE: f64 = 0.01;
 
 /// What the first of some clips tells.
 #[derive(Debug, Clone, Default)]
@@ -86,7 +89,7 @@ pub(super) fn listed(
     let mut kind = kind;
     if cell.robot.is_some() && cell.object.is_some() {
         let strokes = read_clip(clip, ClipKind::ControlHitSlide, cell);
-        if let Some(strokes) = strokes.ok().filter(|strokes| !strokes.object.is_empty()) {
+        if let Some(strokes) = strokes.ok().filter(|strokes| has_moved(&strokes.object)) {
             (read, kind) = (strokes, ClipKind::ControlHitSlide);
         }
     }
@@ -95,6 +98,15 @@ pub(super) fn listed(
         in_model_order(read, arm)?;
     }
     Ok((ClipEntry { file: relative(clip, out), kind }, remark))
+}
+
+/// Whether the object lies elsewhere in the end than in the beginning: an arm may have moved beside one that nothing hit.
+fn has_moved(object: &ObjectSeries) -> bool {
+    let ends = object.poses.first().zip(object.poses.last());
+    ends.is_some_and(|(first, last)| {
+        let squares = first.position().into_iter().zip(last.position()).map(|(a, b)| (a - b).powi(2));
+        squares.sum::<f64>().sqrt() > SHORTEST_SLIDE
+    })
 }
 
 /// Rows a second of each series.
@@ -122,4 +134,25 @@ fn rate(stamps_ns: &[u64]) -> Option<f64> {
     let rate = (seconds > 0.0).then(|| (stamps_ns.len() - 1) as f64 / seconds)?;
     let scale = 10_f64.powf(2.0 - rate.log10().floor());
     Some((rate * scale).round() / scale)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use shared_mem::frames::Pose;
+
+    #[test]
+    fn an_object_that_trembles_was_not_hit() {
+        let at = |x: f64| Pose::from_parts([x, 0.1, 0.05], [1.0, 0.0, 0.0, 0.0]).expect("a pose");
+        let series = |poses: Vec<_>| ObjectSeries { stamps_ns: (0..poses.len() as u64).collect(), poses };
+        assert!(!has_moved(&ObjectSeries::default()));
+        assert!(!has_moved(&series(vec![at(0.5), at(0.502), at(0.499)])));
+        assert!(has_moved(&series(vec![at(0.5), at(0.51), at(0.62)])));
+    }
+
+    #[test]
+    fn rates_have_three_figures() {
+        assert_eq!(rate(&[0, 20_040_000, 40_080_000]), Some(49.9));
+        assert_eq!((rate(&[5]), rate(&[5, 5])), (None, None));
+    }
 }
