@@ -6,12 +6,13 @@ use twin::effects::{Effects, Elsewhere, Role, Shape, registry};
 use twin::rollout::{ArmRollout, CommandTrack};
 
 /// Every name that reports and files may rely on.
-const NAMES: [&str; 35] = [
+const NAMES: [&str; 37] = [
     "joint_coulomb_friction",
     "joint_viscous_friction",
     "joint_stribeck_friction",
     "joint_friction_asymmetry",
     "joint_load_friction",
+    "joint_presliding_friction",
     "command_delay",
     "command_lag",
     "torque_delay",
@@ -22,6 +23,7 @@ const NAMES: [&str; 35] = [
     "joint_backlash",
     "joint_encoder_offset",
     "torque_saturation",
+    "voltage_saturation",
     "torque_ripple",
     "torque_sensor_bias",
     "base_tilt",

@@ -8,26 +8,13 @@ pub(super) const LEAST_MISMATCH: f64 = 5e-3;
 /// differ by more than a fifth of what separates either from a third.
 pub(super) const BETTER_FIT: f64 = 0.2;
 
+pub(super) use crate::forward::arm::velocity::{LEAST_MOTION, MOVES};
+
 /// A ratio of two quantities is a known conversion when it comes this near to it [1]: half-way between 57.3 and the next
 /// conversion (60) is 2.3 %; the controller adds errors of some percent, and no other conversion is near any of these.
 pub(super) const NEAR_CONVERSION: f64 = 0.12;
 /// A slope this far from 1 is none of the same quantity [1]: filters and noise stay within a tenth, conversions begin at 2 pi.
 pub(super) const NOT_ITS_SLOPE: f64 = 0.5;
-/// Motion must exceed the noise of a channel so many times before a ratio is formed from it [sigma]: the error of the ratio
-/// is then below 5 %.
-pub(super) const MOVES: f64 = 20.0;
-/// A joint moves when it leaves its mean by this, one sigma over the clip [rad].
-pub(super) const LEAST_MOTION: f64 = 1e-3;
-
-/// Velocities are compared with slopes over windows of so many rows, and at least of this length [s]: long enough that the
-/// noise of two positions is small beside the way between them, short beside the motions of an arm (below 10 Hz).
-pub(super) const WINDOW_ROWS: usize = 8;
-pub(super) const WINDOW: f64 = 0.04;
-/// A velocity that comes later than the slope by more than so many steps of its log [1] and by more than this [s] was
-/// filtered. Half a step is what a difference of two rows is late by, a whole one what a log that is written before the
-/// state is updated adds.
-pub(super) const FILTER_STEPS: f64 = 1.6;
-pub(super) const FILTER_DELAY: f64 = 2.5e-3;
 /// A velocity that is off its slope by a turn within a step, to this share [1], was computed across a wrap.
 pub(super) const NEAR_TURN: f64 = 0.25;
 

@@ -1,4 +1,4 @@
-//! Quantiles, and slopes through the origin with their intervals: what the detectors share.
+//! Quantiles and deviations: what the detectors share.
 
 /// The value below which this share of the values lies; 0 of none.
 pub(super) fn quantile(values: &mut [f64], share: f64) -> f64 {
@@ -53,39 +53,6 @@ pub(super) fn student(freedom: usize) -> f64 {
     }
 }
 
-/// A slope and one sigma of it.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Slope {
-    pub(super) value: f64,
-    pub(super) sigma: f64,
-}
-
-/// `y = a x + b z` by least squares through the origin, outliers beyond ten median residuals left out once; the slopes on `x`
-/// and `z`. `None` where they cannot be distinguished.
-pub(super) fn plane(rows: &[[f64; 3]]) -> Option<[Slope; 2]> {
-    let all = fitted(rows)?;
-    let left = |[x, z, y]: &[f64; 3]| (y - all[0].value * x - all[1].value * z).abs();
-    let most = 10.0 * median(rows.iter().map(left).collect());
-    let kept: Vec<[f64; 3]> = rows.iter().filter(|row| left(row) <= most).copied().collect();
-    if kept.len() * 2 < rows.len() { Some(all) } else { fitted(&kept) }
-}
-
-fn fitted(rows: &[[f64; 3]]) -> Option<[Slope; 2]> {
-    let sum = |f: fn(&[f64; 3]) -> f64| rows.iter().map(f).sum::<f64>();
-    let (xx, xz, zz) = (sum(|r| r[0] * r[0]), sum(|r| r[0] * r[1]), sum(|r| r[1] * r[1]));
-    let (xy, zy) = (sum(|r| r[0] * r[2]), sum(|r| r[1] * r[2]));
-    let determinant = xx * zz - xz * xz;
-    if rows.len() < 5 || determinant <= 1e-9 * xx * zz {
-        return None;
-    }
-    let (a, b) = ((xy * zz - zy * xz) / determinant, (zy * xx - xy * xz) / determinant);
-    let left = rows.iter().map(|[x, z, y]| (y - a * x - b * z).powi(2)).sum::<f64>() / (rows.len() - 2) as f64;
-    Some([
-        Slope { value: a, sigma: (left * zz / determinant).sqrt() },
-        Slope { value: b, sigma: (left * xx / determinant).sqrt() },
-    ])
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -98,20 +65,5 @@ mod tests {
         for (freedom, table) in [(3, 3.182), (7, 2.365), (30, 2.042)] {
             assert!((student(freedom) - table).abs() < 0.03, "{freedom}: {}", student(freedom));
         }
-    }
-
-    #[test]
-    fn both_slopes_are_found_although_some_rows_are_spoilt() {
-        let rows: Vec<[f64; 3]> = (0..200)
-            .map(|i| {
-                let (x, z) = ((f64::from(i) * 0.1).sin(), (f64::from(i) * 0.17).cos());
-                let noise = 1e-3 * (f64::from(i) * 12.9898).sin();
-                [x, z, 2.0 * x - 0.3 * z + if i % 40 == 0 { 50.0 } else { noise }]
-            })
-            .collect();
-        let [a, b] = plane(&rows).expect("two directions");
-        assert!((a.value - 2.0).abs() < 3.0 * a.sigma + 1e-6 && a.sigma < 1e-3, "{a:?}");
-        assert!((b.value + 0.3).abs() < 3.0 * b.sigma + 1e-6, "{b:?}");
-        assert_eq!(plane(&[[1.0, 2.0, 3.0]; 9]), None);
     }
 }

@@ -1,50 +1,21 @@
 //! Velocities against the slope of the positions: another unit or sign, a filter, spikes where an angle wraps.
 //!
-//! Over windows the integral of dq is held against the way of q: `integral of dq = a (q_b - q_a) - delay (dq_b - dq_a)`. Of a
-//! velocity that is the slope of q the factor is 1 and the delay 0; a low pass of time constant T has the delay T.
-
 use super::columns::{Columns, Signals};
 use super::conversion;
-use super::limits::{FILTER_DELAY, FILTER_STEPS, LEAST_MOTION, MOVES, NEAR_TURN, NOT_ITS_SLOPE, WINDOW, WINDOW_ROWS};
+use super::limits::{MOVES, NEAR_TURN, NOT_ITS_SLOPE};
 use super::remark::{Fault, Remark, Severity, Size};
-use super::statistics::{Slope, deviation, median, plane, quantile, range, root_mean_square};
+use super::statistics::{median, quantile, range};
+use crate::forward::arm::velocity::{Compared, Motion, late};
 use std::f64::consts::TAU;
-
-/// A joint's velocity beside its slope.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Compared {
-    pub(super) joint: usize,
-    /// How many times the slope it is [1].
-    pub(super) factor: Slope,
-    /// How much later it comes [s].
-    pub(super) delay: Slope,
-}
 
 /// Every joint that moves enough to tell.
 pub(super) fn compared(signals: &Signals) -> Vec<Compared> {
-    (0..signals.dq.len()).filter_map(|joint| compare(signals, joint)).collect()
-}
-
-fn compare(signals: &Signals, joint: usize) -> Option<Compared> {
-    let (t, q, dq) = (&signals.t, &signals.q[joint], &signals.dq[joint]);
-    let rows = WINDOW_ROWS.max((WINDOW / signals.step().max(1e-12)).round() as usize).min(t.len() / 4);
-    if rows < 2 {
-        return None;
-    }
-    let ends = (0..t.len() - rows).step_by(rows).map(|from| (from, from + rows));
-    let window = |(a, b): (usize, usize)| {
-        let way = (a..b).map(|i| 0.5 * (dq[i] + dq[i + 1]) * (t[i + 1] - t[i])).sum::<f64>();
-        [q[b] - q[a], dq[a] - dq[b], way]
+    let of = |joint: usize| {
+        let motion =
+            Motion { t: &signals.t, q: &signals.q[joint], dq: &signals.dq[joint], noise: signals.noise[joint] };
+        motion.compared(joint)
     };
-    let windows: Vec<[f64; 3]> = ends.map(window).collect();
-    let moved = root_mean_square(&windows.iter().map(|w| w[0]).collect::<Vec<_>>());
-    if moved <= MOVES * signals.noise[joint] || deviation(q) < LEAST_MOTION {
-        return None;
-    }
-    // Windows at rest agree with any factor.
-    let moving: Vec<[f64; 3]> = windows.into_iter().filter(|window| window[0].abs() > 0.1 * moved).collect();
-    let [factor, delay] = plane(&moving)?;
-    Some(Compared { joint, factor, delay })
+    (0..signals.dq.len()).filter_map(of).collect()
 }
 
 /// Remarks on both topics of a clip.
@@ -95,24 +66,20 @@ fn unit(clip: &Columns, topic: &str, joints: &[Compared]) -> Vec<Remark> {
 }
 
 fn filter(clip: &Columns, topic: &str, signals: &Signals, joints: &[Compared]) -> Option<Remark> {
-    let delays: Vec<f64> = joints.iter().map(|c| c.delay.value).collect();
-    let [lo, hi] = range(&delays)?;
-    let value = median(delays);
-    let sure = |c: &&Compared| c.delay.value - 2.0 * c.delay.sigma > 0.5 * FILTER_DELAY;
-    let most = joints.iter().filter(sure).count() * 3 >= joints.len() * 2;
-    (most && value > FILTER_DELAY.max(FILTER_STEPS * signals.step())).then(|| {
+    let late = late(joints, signals.step())?;
+    Some(
         Remark::new(
             Fault::VelocityFilter,
             &clip.file,
             format!("{topic} dq"),
             format!(
                 "the {topic} velocities come {:.1} ms behind the slope of the positions: they were filtered",
-                value * 1e3
+                late.delay * 1e3
             ),
         )
-        .sized(Size { value, interval: [lo, hi], unit: "s" })
-        .mended_by("log the unfiltered velocity, or set the filter of the driver to its highest frequency")
-    })
+        .sized(Size { value: late.delay, interval: late.interval, unit: "s" })
+        .mended_by("log the unfiltered velocity, or set the filter of the driver to its highest frequency"),
+    )
 }
 
 /// Velocities that are off the slope by a turn within a step.

@@ -15,6 +15,7 @@
 //! | [`swarm`], [`evolution`] | two of them |
 //! | `views` | a model with its calls counted, with numbers given, with some of its clips |
 //! | [`sandwich`] | how far an answer scatters, by witnesses that are each wrong in their own way |
+//! | [`plane`] | slopes through the origin, with their standard errors |
 //! | [`scatter`] | how much own numbers scatter, from the clips |
 //!
 //! Residuals are in units of their standard deviation. Everything is deterministic: clips are worked on by many threads,
@@ -25,6 +26,7 @@ pub mod interval;
 pub mod least_squares;
 pub mod leverage;
 pub mod linear;
+pub mod plane;
 pub mod problem;
 pub mod sandwich;
 pub mod scatter;

@@ -21,6 +21,7 @@
 //! | `kernel`, `spatial` | the arithmetic below |
 
 mod control;
+mod dry_friction;
 mod dynamics;
 mod fr3;
 mod hull;
@@ -37,6 +38,7 @@ mod urdf;
 mod yielding;
 
 pub use control::{ControlLaw, GainError};
+pub use dry_friction::Presliding;
 pub use dynamics::PointForce;
 pub use hull::{ArmHull, Extent, MOST_BALLS};
 pub use inertia::MassProperties;

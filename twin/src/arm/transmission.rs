@@ -5,11 +5,13 @@
 //! torque behind the gear. A rigid gear moves motor and link as one. A gear that yields is a spring over the twist
 //! `motor - link`; its force is taken implicitly, so no stiffness is too high for the step. Dry friction is a bound:
 //! whatever up to it brings the motor to rest or keeps it there, the bound itself against the motion otherwise. A joint that
-//! creeps under it does not rest: its friction is `bound tanh(speed / creep)` at the end of the step, found by secants. Which
-//! of the two holds in which joint is found by least-index pivoting (Murty 1974), which ends because `M` is positive
-//! definite. Explicit midpoint rule around it, as in [`super::step`].
+//! creeps under it does not rest: its friction is `bound tanh(speed / creep)` at the end of the step, found by secants. So is
+//! that of a joint whose bristles bend before it slips ([`Presliding`]). Which of the two holds in which joint is found by
+//! least-index pivoting (Murty 1974), which ends because `M` is positive definite. Explicit midpoint rule around it, as in
+//! [`super::step`].
 #![allow(non_snake_case)] // tau_J is the Franka Control Interface's own symbol
 
+use super::dry_friction::{Presliding, Yields};
 use super::kernel::{Chain, factor, filled, first, solve, with_dof};
 use super::{ArmModel, JointState, Joints};
 
@@ -35,15 +37,18 @@ pub trait Transmission {
     /// Motor speed at which dry friction is `tanh(1)` of its bound [rad/s]; 0 where a joint sticks exactly.
     fn creep(&self, joint: usize) -> f64;
 
+    /// How a joint's dry friction builds up, in place of creep; `None` where it needs no way for that.
+    fn presliding(&self, joint: usize) -> Option<Presliding>;
+
     /// Torque that a motor loses otherwise [N m], at its position [rad] and velocity [rad/s].
     fn drag(&self, joint: usize, q: f64, dq: f64) -> f64;
 }
 
 /// Pivots before the last pattern is kept: seven joints need at most a dozen.
 const PIVOTS: usize = 40;
-/// Secants to the friction of a creeping joint: each halves what the one before left, or better.
+/// Secants to the friction of a joint that yields: each halves what the one before left, or better.
 const SECANTS: usize = 5;
-/// A creeping joint's speed at the end of the step is known when it changes the friction by less than this share.
+/// The speed of a joint that yields is known at the end of the step when it changes the friction by less than this share.
 const SETTLED: f64 = 1e-4;
 /// Inertia of a link that weighs nothing, as seen by a gear that yields [kg m²].
 const LEAST_INERTIA: f64 = 1e-6;
@@ -55,7 +60,7 @@ const HELD: f64 = 1e6;
 enum Dry {
     /// It moves, or would, with this sign; 0 without friction.
     Slips(f64),
-    /// It rests, or creeps.
+    /// It rests, or yields within the friction.
     Sticks,
 }
 
@@ -78,8 +83,10 @@ struct Side {
     rotor: f64,
     drive: f64,
     dry: f64,
-    creep: f64,
-    /// Of a creeping joint's friction: the secant from rest to some speed [N m s/rad].
+    yields: Yields,
+    /// Friction of a joint that yields, were it at rest at the end of the stage [N m].
+    held: f64,
+    /// The secant of its friction from rest to some speed at the end of the stage [N m s/rad].
     viscosity: f64,
     spring: Option<Spring>,
 }
@@ -113,18 +120,19 @@ struct Answer<const N: usize> {
 
 impl ArmModel {
     /// Moves `link` and `motor` on by `dt` seconds under constant motor torques `tau` and external torques at the links,
-    /// and returns the mean torque behind the gears. Where the gear is rigid, `motor` follows `link`.
+    /// and returns the mean torque behind the gears. Where the gear is rigid, `motor` follows `link`. `bent`: by what share of
+    /// what they can the bristles of [`Presliding`] are bent, -1 to 1.
     pub fn step_through(
         &self,
         transmission: &impl Transmission,
-        (link, motor): (&mut JointState, &mut JointState),
+        (link, motor, bent): (&mut JointState, &mut JointState, &mut Joints),
         (tau, external): (&Joints, &Joints),
         dt: f64,
     ) -> Passed {
         with_dof!(self, N => {
-            let sides = |at: &JointState| self.sides::<N>(transmission, (link, motor), at, tau);
+            let sides = |at: &JointState, dt: f64| self.sides::<N>(transmission, (link, motor, bent), (at, tau), dt);
             let mut modes = None;
-            let half = self.stage(link, sides(motor), external, 0.5 * dt).answer(&mut modes);
+            let half = self.stage(link, sides(motor, 0.5 * dt), external, 0.5 * dt).answer(&mut modes);
             let middle = |state: &JointState, acceleration: &[f64; N]| {
                 let mut out = *state;
                 for (i, acceleration) in acceleration.iter().enumerate() {
@@ -133,12 +141,14 @@ impl ArmModel {
                 }
                 out
             };
-            let sides = sides(&middle(motor, &half.motor));
+            let sides = sides(&middle(motor, &half.motor), dt);
             let mut stage = self.stage(&middle(link, &half.link), sides, external, dt);
             let answer = stage.answer(&mut modes);
             let modes = modes.expect("an answer leaves its pattern");
             for (i, (dry, gear)) in modes.into_iter().enumerate() {
-                let sticks = dry == Dry::Sticks && transmission.creep(i) <= 0.0;
+                let side = &stage.sides[i];
+                let sticks = dry == Dry::Sticks && side.yields == Yields::Nowhere;
+                bent[i] = side.yields.bent((side.motor_speed, side.motor_speed + dt * answer.motor[i]), dt);
                 advance(link, i, answer.link[i], sticks && gear == Gear::Rigid, dt);
                 match gear {
                     Gear::Rigid => (motor.q[i], motor.dq[i]) = (link.q[i], link.dq[i]),
@@ -153,11 +163,12 @@ impl ArmModel {
     fn sides<const N: usize>(
         &self,
         transmission: &impl Transmission,
-        (link, motor): (&JointState, &JointState),
-        at: &JointState,
-        tau: &Joints,
+        (link, motor, bent): (&JointState, &JointState, &Joints),
+        (at, tau): (&JointState, &Joints),
+        dt: f64,
     ) -> [Side; N] {
         let side = |i: usize| Side {
+            held: 0.0,
             viscosity: 0.0,
             link_speed: link.dq[i],
             motor_speed: motor.dq[i],
@@ -165,12 +176,12 @@ impl ArmModel {
             rotor: self.links[i].rotor,
             drive: tau[i] - transmission.drag(i, at.q[i], at.dq[i]),
             dry: transmission.dry_friction(i, at.dq[i].abs(), tau[i]),
-            creep: transmission.creep(i),
+            yields: Yields::of(transmission.creep(i), transmission.presliding(i), bent[i]),
             // Without a rotor nothing could turn on the motor's side of a spring.
             spring: transmission.spring(i).filter(|_| self.links[i].rotor > 0.0),
         };
         // At the end of the step, as far as `at` tells: where that is right, the friction is found at once.
-        std::array::from_fn(|i| side(i).creeping_at(2.0 * at.dq[i] - motor.dq[i]))
+        std::array::from_fn(|i| side(i).yielding_at(2.0 * at.dq[i] - motor.dq[i], dt))
     }
 
     fn stage<const N: usize>(&self, at: &JointState, sides: [Side; N], external: &Joints, dt: f64) -> Stage<N> {
@@ -196,7 +207,7 @@ fn advance(state: &mut JointState, i: usize, acceleration: f64, stops: bool, dt:
 }
 
 impl<const N: usize> Stage<N> {
-    /// Solves for the pattern and for the speeds of creeping joints.
+    /// Solves for the pattern and for the speeds of joints that yield.
     fn answer(&mut self, modes: &mut Option<[(Dry, Gear); N]>) -> Answer<N> {
         let mut answer = self.pattern(modes);
         for _ in 0..SECANTS {
@@ -204,7 +215,7 @@ impl<const N: usize> Stage<N> {
             for (side, motor) in self.sides.iter_mut().zip(&answer.motor) {
                 let speed = side.motor_speed + self.dt * motor;
                 let before = side.viscosity;
-                *side = side.creeping_at(speed);
+                *side = side.yielding_at(speed, self.dt);
                 // What the friction was taken for, in speeds, differs by this much from what it is.
                 settled &= ((side.viscosity - before) * speed).abs() <= SETTLED * side.dry;
             }
@@ -237,7 +248,8 @@ impl<const N: usize> Stage<N> {
         let mut force = self.force;
         let locked: [Option<f64>; N] = std::array::from_fn(|i| {
             let side = &self.sides[i];
-            (modes[i] == (Dry::Sticks, Gear::Rigid) && side.creep <= 0.0).then_some(-side.link_speed / self.dt)
+            (modes[i] == (Dry::Sticks, Gear::Rigid) && side.yields == Yields::Nowhere)
+                .then_some(-side.link_speed / self.dt)
         });
         for i in 0..N {
             let (inertia, torque) = self.sides[i].seen_by_link(modes[i], self.dt);
@@ -263,7 +275,7 @@ impl<const N: usize> Stage<N> {
         for i in 0..N {
             let side = &self.sides[i];
             (answer.motor[i], answer.gear[i]) = match modes[i].1 {
-                // The diagonal holds the rotor and what creep adds to it, which lie before the gear.
+                // The diagonal holds the rotor and what friction that yields adds to it, which lie before the gear.
                 Gear::Rigid => (link[i], passed(i) - (side.rotor + side.seen_by_link(modes[i], self.dt).0) * link[i]),
                 _ => side.motor_and_gear(modes[i], link[i], self.dt),
             };
@@ -276,7 +288,7 @@ impl Side {
     /// What will hold unless the step turns it around.
     fn likely(self) -> (Dry, Gear) {
         let dry = match self.dry > 0.0 {
-            true if self.motor_speed == 0.0 || self.creep > 0.0 => Dry::Sticks,
+            true if self.motor_speed == 0.0 || self.yields != Yields::Nowhere => Dry::Sticks,
             true => Dry::Slips(self.motor_speed.signum()),
             false => Dry::Slips(0.0),
         };
@@ -289,16 +301,10 @@ impl Side {
         (dry, gear)
     }
 
-    /// The same with the friction of a creeping joint as it is at `speed`.
-    fn creeping_at(self, speed: f64) -> Self {
-        let viscosity = if self.creep <= 0.0 {
-            0.0
-        } else if speed.abs() < 1e-3 * self.creep {
-            self.dry / self.creep
-        } else {
-            self.dry * (speed / self.creep).tanh() / speed
-        };
-        Self { viscosity, ..self }
+    /// The same with the friction of a joint that yields as it is where the stage of `dt` ends at `speed`.
+    fn yielding_at(self, speed: f64, dt: f64) -> Self {
+        let (held, viscosity) = self.yields.secant(self.dry, (self.motor_speed, speed), dt);
+        Self { held, viscosity, ..self }
     }
 
     /// Spring torque `s = s0 + g (motor acceleration - link acceleration)`: at the middle of the stage, or at its end
@@ -316,22 +322,21 @@ impl Side {
     fn motor(&self, dry: Dry, dt: f64) -> Option<(f64, f64)> {
         match dry {
             Dry::Slips(sign) => Some((self.rotor, self.drive - sign * self.dry)),
-            Dry::Sticks if self.creep > 0.0 => {
-                Some((self.rotor + self.viscosity * dt, self.drive - self.viscosity * self.motor_speed))
+            Dry::Sticks if self.yields == Yields::Nowhere => None,
+            Dry::Sticks => {
+                let drive = self.drive - self.held - self.viscosity * self.motor_speed;
+                Some((self.rotor + self.viscosity * dt, drive))
             }
-            Dry::Sticks => None,
         }
     }
 
     /// [`Passed::grip`] at the end of a step with this acceleration of the motor.
     fn grip(&self, (dry, gear): (Dry, Gear), motor: f64, dt: f64) -> f64 {
         let speed = self.motor_speed + dt * motor;
-        let tangent = match dry {
-            Dry::Sticks if self.creep > 0.0 => self.dry / self.creep * (1.0 - (speed / self.creep).tanh().powi(2)),
-            _ => 0.0,
-        };
+        let tangent =
+            if dry == Dry::Sticks { self.yields.tangent(self.dry, (self.motor_speed, speed), dt) } else { 0.0 };
         match (dry, gear) {
-            (Dry::Sticks, Gear::Rigid) if self.creep <= 0.0 => HELD,
+            (Dry::Sticks, Gear::Rigid) if self.yields == Yields::Nowhere => HELD,
             _ => Self { viscosity: tangent, ..*self }.seen_by_link((dry, gear), dt).0,
         }
     }
@@ -369,7 +374,7 @@ impl Side {
     fn corrected(&self, (dry, gear): (Dry, Gear), link: f64, motor: f64, torque: f64, dt: f64) -> (Dry, Gear) {
         let dry = match dry {
             Dry::Slips(sign) if sign * (self.motor_speed + dt * motor) < 0.0 => Dry::Sticks,
-            Dry::Sticks if self.creep <= 0.0 => {
+            Dry::Sticks if self.yields == Yields::Nowhere => {
                 let needed = self.drive - torque - self.rotor * motor;
                 if needed.abs() > self.dry { Dry::Slips(needed.signum()) } else { dry }
             }

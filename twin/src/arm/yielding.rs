@@ -121,7 +121,7 @@ fn combined(columns: &[Joints; 6], wrench: &Vector6<f64>) -> Joints {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::arm::{PointForce, Spring, Transmission};
+    use crate::arm::{PointForce, Presliding, Spring, Transmission};
 
     fn moving() -> JointState {
         let q = *ArmModel::fr3().ready();
@@ -163,6 +163,7 @@ mod tests {
     struct Dry {
         bound: f64,
         creep: f64,
+        presliding: Option<Presliding>,
     }
 
     impl Transmission for Dry {
@@ -178,6 +179,10 @@ mod tests {
             self.creep
         }
 
+        fn presliding(&self, _joint: usize) -> Option<Presliding> {
+            self.presliding
+        }
+
         fn drag(&self, _joint: usize, _q: f64, _dq: f64) -> f64 {
             0.0
         }
@@ -190,11 +195,14 @@ mod tests {
         let still = JointState { dq: [0.0; 8], ..slow };
         let (gravity, dt) = (arm.gravity(&slow.q), 1e-3);
         let wrench = Vector6::new(0.05, -0.08, 0.03, 0.0, 0.0, 0.0);
-        for (state, creep) in [(slow, 4e-3), (slow, 1e-4), (still, 0.0)] {
-            let dry = Dry { bound: 0.6, creep };
+        let bristles = Some(Presliding { displacement: 2e-6, damping: 0.3 });
+        for (state, creep, presliding) in
+            [(slow, 4e-3, None), (slow, 1e-4, None), (still, 0.0, None), (slow, 0.0, bristles), (still, 0.0, bristles)]
+        {
+            let dry = Dry { bound: 0.6, creep, presliding };
             let step = |external: &Joints| {
                 let (mut link, mut motor) = (state, state);
-                let passed = arm.step_through(&dry, (&mut link, &mut motor), (&gravity, external), dt);
+                let passed = arm.step_through(&dry, (&mut link, &mut motor, &mut [0.0; 8]), (&gravity, external), dt);
                 (link.dq, passed.grip)
             };
             let (alone, grip) = step(&[0.0; 8]);

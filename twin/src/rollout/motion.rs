@@ -172,10 +172,20 @@ impl ArmRollout<'_> {
         };
         motion.tau_J_d = std::array::from_fn(|i| asked[i] - gravity[i]);
         motion.motor = match (self.effects, &mut motion.memory) {
-            (Some(effects), Some(memory)) => effects.motor_torque(memory, &asked),
+            (Some(effects), Some(memory)) => effects.motor_torque(memory, &asked, &self.damped(drive, &reading)),
             _ => asked,
         };
         motion.external = [0.0; MAX_JOINTS];
+    }
+
+    /// What the controller's damping takes at the joints' own velocities [N m]; nothing where no gains are known.
+    fn damped(&self, drive: &Drive, reading: &JointState) -> Joints {
+        match drive {
+            Drive::JointImpedance { .. } if self.law.needs_no_mass() => {
+                std::array::from_fn(|i| self.law.damping[i] * reading.dq[i])
+            }
+            Drive::JointImpedance { .. } | Drive::Torque { .. } => [0.0; MAX_JOINTS],
+        }
     }
 
     /// Moves on by `dt` under the period's motor torque and torques from outside [N m].

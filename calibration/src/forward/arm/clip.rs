@@ -1,6 +1,7 @@
 //! One recorded clip, prepared for being held against the twin: joints in the model's order, stretches that can be
 //! simulated, rows that are averaged, joints that are dead. Stamps of the recording, SI.
 
+use super::velocity;
 use shared_mem::cell::{Cell, ClipKind, PoseNoise};
 use shared_mem::msg::MAX_JOINTS;
 use shared_mem::recording::{Clip, JointSeries, ReadError};
@@ -123,6 +124,12 @@ impl ArmClip {
         hold_dead(&mut recorded, &dead);
         let commands = CommandTrack::new(&recorded.desired).ok_or(ArmClipError::Empty("commands"))?;
         let mut warnings = warnings(&recorded, &commands, &dead);
+        if velocity::late_in(&recorded.measured).is_some() {
+            // What the filter did is no gap of the twin; the positions say the same without it.
+            recorded.measured.dq.clear();
+            warnings
+                .push("the measured velocities were filtered and come late: the positions count in their place".into());
+        }
         let jump = clock_jump(&recorded.measured, step_ns);
         let until_ns = jump.map_or(u64::MAX, |row| recorded.measured.stamps_ns[row]);
         if let Some(row) = jump {

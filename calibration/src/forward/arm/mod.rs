@@ -19,6 +19,7 @@ mod encoder_age;
 pub mod noise;
 mod piece;
 mod torque_time;
+pub mod velocity;
 
 pub use clip::ArmClipError;
 pub use piece::one_piece;

@@ -30,7 +30,7 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
             // Rigid flanks, and such as yield like the gears of an arm.
             .begun_at(&[&[1e-7], &[4e-5]]),
     ],
-    confusable_with: &["joint_coulomb_friction", "joint_stribeck_friction"],
+    confusable_with: &["joint_coulomb_friction", "joint_stribeck_friction", "joint_presliding_friction"],
     separated: &[],
     install: |values, effects| {
         effects.arm.joint_backlash =

@@ -25,7 +25,7 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
             .elsewhere(Elsewhere::OfTorqueLimit([0.0, 0.25])),
         CREEP,
     ],
-    confusable_with: &["joint_load_friction", "joint_stribeck_friction", "joint_backlash"],
+    confusable_with: &["joint_load_friction", "joint_stribeck_friction", "joint_backlash", "joint_presliding_friction"],
     separated: &[
         Separation {
             from: "joint_load_friction",

@@ -24,7 +24,13 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
             .elsewhere(Elsewhere::OfTorqueLimit([12.0, 230.0])),
         Parameter::form("damping", "N m s/rad", [0.0, 10.0], 2.0).per_joint().within(0.0, f64::MAX),
     ],
-    confusable_with: &["payload", "rotor_inertia", "torque_delay", "camera_extrinsic_rotation"],
+    confusable_with: &[
+        "payload",
+        "rotor_inertia",
+        "torque_delay",
+        "camera_extrinsic_rotation",
+        "joint_presliding_friction",
+    ],
     separated: &[],
     install: |values, effects| {
         effects.arm.joint_elasticity =

@@ -34,7 +34,7 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
             .begun_at(&[&[0.03], &[0.1]]),
         CREEP,
     ],
-    confusable_with: &["joint_coulomb_friction", "joint_backlash"],
+    confusable_with: &["joint_coulomb_friction", "joint_backlash", "joint_presliding_friction"],
     separated: &[Separation {
         from: "joint_backlash",
         by: "approach poses from both sides; then hang a weight on the flange that keeps the gears pressed, and do it again in a session of its own whose cell.toml has the weight",

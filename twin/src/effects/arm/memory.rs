@@ -14,6 +14,8 @@ pub struct ArmMemory {
     pub(super) lagging: JointState,
     pub(super) torque: DelayLine,
     pub(super) motor: JointState,
+    /// By what share of what they can the bristles of presliding friction are bent; `None` before the first step.
+    pub(super) bent: Option<Joints>,
     /// Torque behind the gears, mean over the last step [N m].
     pub(super) tau_J: Joints,
     /// What joints resisted a push with in the last step, beyond their inertia [kg m²].
@@ -31,7 +33,7 @@ impl Clone for ArmMemory {
         self.q_d.clone_from(&source.q_d);
         self.dq_d.clone_from(&source.dq_d);
         self.torque.clone_from(&source.torque);
-        (self.lagging, self.motor) = (source.lagging, source.motor);
+        (self.lagging, self.motor, self.bent) = (source.lagging, source.motor, source.bent);
         (self.tau_J, self.grip) = (source.tau_J, source.grip);
     }
 }
@@ -40,13 +42,14 @@ impl Clone for ArmMemory {
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct JointMemory {
     motor: JointState,
+    bent: Option<Joints>,
     tau_J: Joints,
 }
 
 impl ArmMemory {
     /// What a step of the arm changes.
     pub(crate) fn joints(&self) -> JointMemory {
-        JointMemory { motor: self.motor, tau_J: self.tau_J }
+        JointMemory { motor: self.motor, bent: self.bent, tau_J: self.tau_J }
     }
 
     /// [`crate::arm::Passed::grip`] of the last step.
@@ -56,7 +59,7 @@ impl ArmMemory {
 
     /// Takes a step of the arm back.
     pub(crate) fn set_joints(&mut self, joints: &JointMemory) {
-        (self.motor, self.tau_J) = (joints.motor, joints.tau_J);
+        (self.motor, self.bent, self.tau_J) = (joints.motor, joints.bent, joints.tau_J);
     }
 
     /// As if the arm had had this command for long.
@@ -64,6 +67,7 @@ impl ArmMemory {
         self.q_d.restart(q_d);
         self.dq_d.restart(dq_d);
         self.torque.clear();
+        self.bent = None;
         self.lagging = JointState { q: *q_d, dq: *dq_d };
     }
 
@@ -76,6 +80,7 @@ impl ArmMemory {
             lagging: JointState { q: *q_d, dq: *dq_d },
             torque: DelayLine::empty(torque),
             motor: JointState::default(),
+            bent: None,
             tau_J: Joints::default(),
             grip: Joints::default(),
         }

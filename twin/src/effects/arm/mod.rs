@@ -15,6 +15,7 @@ pub(super) mod joint_elasticity;
 pub(super) mod joint_encoder_offset;
 pub(super) mod joint_friction_asymmetry;
 pub(super) mod joint_load_friction;
+pub(super) mod joint_presliding_friction;
 pub(super) mod joint_stribeck_friction;
 pub(super) mod joint_viscous_friction;
 mod memory;
@@ -28,6 +29,7 @@ pub(super) mod torque_ripple;
 pub(super) mod torque_saturation;
 pub(super) mod torque_sensor_bias;
 mod transmission;
+pub(super) mod voltage_saturation;
 
 pub use memory::ArmMemory;
 pub(crate) use memory::JointMemory;
@@ -44,6 +46,7 @@ pub struct ArmEffects {
     pub(super) joint_stribeck_friction: Option<joint_stribeck_friction::JointStribeckFriction>,
     pub(super) joint_friction_asymmetry: Option<joint_friction_asymmetry::JointFrictionAsymmetry>,
     pub(super) joint_load_friction: Option<joint_load_friction::JointLoadFriction>,
+    pub(super) joint_presliding_friction: Option<joint_presliding_friction::JointPreslidingFriction>,
     pub(super) command_delay: Option<command_delay::CommandDelay>,
     pub(super) command_lag: Option<command_lag::CommandLag>,
     pub(super) torque_delay: Option<torque_delay::TorqueDelay>,
@@ -55,6 +58,7 @@ pub struct ArmEffects {
     pub(super) joint_backlash: Option<joint_backlash::JointBacklash>,
     pub(super) joint_encoder_offset: Option<joint_encoder_offset::JointEncoderOffset>,
     pub(super) torque_saturation: Option<torque_saturation::TorqueSaturation>,
+    pub(super) voltage_saturation: Option<voltage_saturation::VoltageSaturation>,
     pub(super) torque_ripple: Option<torque_ripple::TorqueRipple>,
     pub(super) torque_sensor_bias: Option<torque_sensor_bias::TorqueSensorBias>,
     pub(super) base_tilt: Option<base_tilt::BaseTilt>,
@@ -150,15 +154,19 @@ impl ArmEffects {
         reading
     }
 
-    /// The motors' torque for the torque that the controller asks for, one tick after the other [N m].
+    /// The motors' torque for the torque that the controller asks for, one tick after the other [N m]. `damped`: what of that the
+    /// controller's damping takes at the joints' own velocities [N m].
     #[must_use]
-    pub fn motor_torque(&self, memory: &mut ArmMemory, tau: &Joints) -> Joints {
+    pub fn motor_torque(&self, memory: &mut ArmMemory, tau: &Joints, damped: &Joints) -> Joints {
         let mut tau = *tau;
         if self.torque_delay.is_some() {
             tau = memory.torque.after(&tau);
         }
         if let Some(effect) = &self.torque_gain {
             tau = effect.apply(&tau);
+        }
+        if let Some(effect) = &self.voltage_saturation {
+            tau = effect.apply(&tau, damped);
         }
         if let Some(effect) = &self.torque_saturation {
             tau = effect.apply(&tau);
@@ -176,7 +184,7 @@ impl ArmEffects {
         dt: f64,
     ) {
         if self.acts_in_joints() {
-            let passed = self.advance_through(&mut memory.motor, arm, state, (motor_torque, external), dt);
+            let passed = self.advance_through(memory, arm, state, (motor_torque, external), dt);
             (memory.tau_J, memory.grip) = (passed.tau_J, passed.grip);
             return;
         }

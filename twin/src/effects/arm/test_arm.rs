@@ -47,7 +47,7 @@ pub(super) fn run(
     let (mut state, mut memory) = effects.start(arm, &start, &start.q, &[0.0; MAX_JOINTS]);
     let mut states = vec![state];
     for tick in 0..ticks {
-        let tau = effects.motor_torque(&mut memory, &first(torque(tick, &state)));
+        let tau = effects.motor_torque(&mut memory, &first(torque(tick, &state)), &[0.0; MAX_JOINTS]);
         effects.advance(&mut memory, arm, &mut state, (&tau, &[0.0; MAX_JOINTS]), TICK);
         states.push(state);
     }

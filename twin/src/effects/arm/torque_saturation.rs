@@ -4,7 +4,7 @@
 //! - Source: current limit of the drives; 87 and 12 N m on the FR3's joints by data sheet.
 //! - Unit: N m. Plausible: 1 to 87, neutral without bound (`inf`).
 //! - Signature (C19): nothing below the limit, flat tops above; peaks only.
-//! - Confused with: torque gain (acts at every torque), command delay (in fast motion).
+//! - Confused with: voltage saturation (less in fast motion), torque gain (acts at every torque), command delay (in fast motion).
 
 use crate::arm::Joints;
 use crate::effects::change::Change;
@@ -20,7 +20,7 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
         .within(0.0, f64::MAX)
         .elsewhere(Elsewhere::OfTorqueLimit([0.05, 1.0]))
         .searched(Search::Limit)],
-    confusable_with: &["torque_gain", "command_delay"],
+    confusable_with: &["voltage_saturation", "torque_gain", "command_delay"],
     separated: &[],
     install: |values, effects| effects.arm.torque_saturation = Some(TorqueSaturation { limit: values.joints("limit") }),
     remedy: |found| {

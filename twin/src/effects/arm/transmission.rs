@@ -1,12 +1,14 @@
-//! All effects between motor and link together: dry frictions add up to one bound (that creeps as the one
-//! that creeps most), the other losses to one drag, and
-//! elasticity and backlash to one spring with play.
+//! All effects between motor and link together: dry frictions add up to one bound (that creeps as the one that creeps most, or
+//! builds up over the way of presliding friction), the other losses to one drag, and elasticity and backlash to one spring
+//! with play.
 
-use super::ArmEffects;
-use crate::arm::{ArmModel, JointState, Joints, Passed, Spring, Transmission};
+use super::{ArmEffects, ArmMemory};
+use crate::arm::{ArmModel, JointState, Joints, MAX_JOINTS, Passed, Presliding, Spring, Transmission};
 
 /// Longest step of a gear that yields [s]: a wrist link on its spring rings at up to 200 Hz.
 const LONGEST_STEP: f64 = 2.5e-4;
+/// A joint that is slower rests when it is first seen [rad/s]: encoders' noise, and a tenth of the slowest motions.
+const AT_REST: f64 = 1e-3;
 
 impl ArmEffects {
     /// Whether friction or a gear that yields lies between motors and links.
@@ -16,6 +18,7 @@ impl ArmEffects {
             || self.joint_stribeck_friction.is_some()
             || self.joint_friction_asymmetry.is_some()
             || self.joint_load_friction.is_some()
+            || self.joint_presliding_friction.is_some()
             || self.torque_ripple.is_some()
             || self.yields()
     }
@@ -36,24 +39,43 @@ impl ArmEffects {
     /// [`ArmEffects::advance`] where something acts in the joints.
     pub(super) fn advance_through(
         &self,
-        motor: &mut JointState,
+        memory: &mut ArmMemory,
         arm: &ArmModel,
         state: &mut JointState,
         torques: (&Joints, &Joints),
         dt: f64,
     ) -> Passed {
+        let motor = &mut memory.motor;
+        if self.joint_presliding_friction.is_none() {
+            memory.bent = Some([0.0; MAX_JOINTS]);
+        }
+        let bent = memory.bent.get_or_insert_with(|| self.bent_at(arm, state, torques));
         if !self.yields() {
             *motor = *state;
-            return arm.step_through(self, (state, motor), torques, dt);
+            return arm.step_through(self, (state, motor, bent), torques, dt);
         }
         let steps = (dt / LONGEST_STEP - 1e-9).ceil().max(1.0);
         let mut whole = Passed::default();
         for _ in 0..steps as usize {
-            let part = arm.step_through(self, (state, motor), torques, dt / steps);
+            let part = arm.step_through(self, (state, motor, bent), torques, dt / steps);
             whole.grip = part.grip;
             whole.tau_J = std::array::from_fn(|i| whole.tau_J[i] + part.tau_J[i] / steps);
         }
         whole
+    }
+
+    /// How far bristles are bent where nothing is known of what was before: as far as keeps a joint at rest, wholly in motion.
+    fn bent_at(&self, arm: &ArmModel, state: &JointState, (motor_torque, external): (&Joints, &Joints)) -> Joints {
+        let bias = arm.bias(state);
+        std::array::from_fn(|i| {
+            let bound = self.dry_friction(i, state.dq[i].abs(), motor_torque[i]);
+            let load = motor_torque[i] + external[i] - bias[i];
+            match bound > 0.0 {
+                true if state.dq[i].abs() > AT_REST => state.dq[i].signum(),
+                true => (load / bound).clamp(-1.0, 1.0),
+                false => 0.0,
+            }
+        })
     }
 }
 
@@ -70,6 +92,11 @@ impl Transmission for ArmEffects {
         self.joint_coulomb_friction.map_or(0.0, |effect| effect.coulomb[joint])
             + self.joint_stribeck_friction.map_or(0.0, |effect| effect.level(joint, speed))
             + self.joint_load_friction.map_or(0.0, |effect| effect.level(joint, motor_torque))
+            + self.joint_presliding_friction.map_or(0.0, |effect| effect.coulomb[joint])
+    }
+
+    fn presliding(&self, joint: usize) -> Option<Presliding> {
+        self.joint_presliding_friction.map(|effect| effect.bristles(joint))
     }
 
     fn creep(&self, joint: usize) -> f64 {
