@@ -111,9 +111,11 @@ pub fn conclude<E: Evidence>(
     let of_object = places.first().is_some_and(|place| !place.channel.starts_with("joint"));
     let sizes = Sizes::of(bench, ([&baseline, shown_fits], [&before, shown]), session, admitted)?;
     let [size, stays] = sizes.in_words(of_object);
-    let unproven = unproven::unproven(bench, found);
-    let closed = |open| share_of(bench, split, (open, &first.weights), (&before, options.seed));
-    let open = unproven.as_ref().and_then(|open| Some((open, closed(open)?)));
+    let closed = |open: &Unproven<'_>| share_of(bench, split, (open, &first.weights), (&before, options.seed));
+    let unproven = unproven::unproven(bench, found).and_then(|open| closed(&open).map(|share| (open, share)));
+    // What widens the gap of the clips that are left out is no lead.
+    let unproven = unproven.filter(|(_, share)| *share > 0.0);
+    let open = unproven.as_ref().map(|(open, share)| (open, *share));
     let facts = facts(bench, found, (size, open), [&places, &rest], shrunk(&before, after, options.seed));
     let verdict = match &partly {
         Some(partly) => in_part(bench, partly, &facts, (&stays, &sizes)),
@@ -127,7 +129,7 @@ pub fn conclude<E: Evidence>(
     let rest_is_open = partly.is_some() || finding.open().is_some();
     let site = Site::of(session);
     let next = match &unproven {
-        Some(open) if verdict.kind == Kind::Unexplained => advice::proving(open.effect(bench), open.more, &site),
+        Some((open, _)) if verdict.kind == Kind::Unexplained => advice::proving(open.effect(bench), open.more, &site),
         _ => next(&verdict, rest_is_open, largest, &site),
     };
     let theta = bench.library.theta(&kept.full);
@@ -219,12 +221,15 @@ fn in_part<E: Evidence>(
     (stays, sizes): (&str, &Sizes),
 ) -> Verdict {
     let looks_like = partly.looks_like(bench);
-    let text = headline::in_part(facts, (&partly.share, partly.unusual), stays, looks_like);
+    let [own, rivals] = partly.effects(bench);
+    let text = headline::in_part(facts, (&partly.share, partly.unusual), (stays, looks_like), &rivals);
     let (place, looks_like) = (facts.rest.clone(), looks_like.map(str::to_owned));
+    let (kind, confidence) =
+        if rivals.is_empty() { (Kind::Named, sureness(&partly.found)) } else { (Kind::Class, verdict::CLASS) };
     Verdict {
-        kind: Kind::Named,
-        effects: partly.effects(bench),
-        confidence: sureness(&partly.found),
+        kind,
+        confidence,
+        effects: [own, rivals].concat(),
         text,
         explained_share: Some(partly.share),
         rest: Some(Rest { joint_rms_rad: sizes.joints.after, object_add_m: sizes.add.after, place, looks_like }),

@@ -101,20 +101,36 @@ fn named(finding: &Finding<'_>, facts: &Facts) -> String {
 }
 
 /// The sentence where what was found is proven, but a part of the gap stays. `share`: what it explains, and whether it is stronger
-/// than what is met in practice; `after`: how large what stays is.
+/// than what is met in practice; `after`: how large what stays is; `rivals`: effects that do as well as one of those found.
 #[must_use]
-pub fn in_part(facts: &Facts, (share, unusual): (&Share, bool), after: &str, looks_like: Option<&str>) -> String {
+pub fn in_part(
+    facts: &Facts,
+    (share, unusual): (&Share, bool),
+    (after, looks_like): (&str, Option<&str>),
+    rivals: &[String],
+) -> String {
     let strength = if unusual { ", stronger than it is met in practice," } else { "" };
-    let (verb, these) = if facts.effects.len() == 1 { ("explains", "it") } else { ("together explain", "them") };
+    let (verb, these) = match (facts.effects.len(), rivals.is_empty()) {
+        (1, true) => ("explains", "it"),
+        (_, true) => ("together explain", "them"),
+        (1, false) => ("explains", "the first"),
+        (_, false) => ("explain", "those whose size is given"),
+    };
+    let first = if rivals.is_empty() { "" } else { "One of " };
+    let who = if rivals.is_empty() {
+        facts.effects.join(" and ")
+    } else {
+        facts.effects.iter().cloned().chain(rivals.iter().map(|rival| words(rival))).collect::<Vec<_>>().join(", ")
+    };
+    let apart = if rivals.is_empty() { "" } else { "; these clips cannot separate them" };
     let alike = match looks_like {
         Some(effect) => format!("; {} explains most of that", words(effect)),
         None => "; no effect of the library explains much of that".to_owned(),
     };
     let [low, high] = share.ci90.map(percent);
     format!(
-        "{}{strength} {verb} {} of the squared gap ({low} to {high}), {}: with {these} in the twin {after} stay on held-out clips, largest \
-         in {}{alike}.",
-        facts.effects.join(" and "),
+        "{first}{who}{strength} {verb} {} of the squared gap ({low} to {high}), {}: with {these} in the twin {after} stay on held-out \
+         clips, largest in {}{alike}{apart}.",
         percent(share.value),
         size_and_place(facts),
         facts.rest
@@ -221,16 +237,24 @@ mod tests {
     #[test]
     fn what_is_proven_is_said_with_what_stays() {
         let share = Share { value: 0.963, ci90: [0.94, 0.98] };
-        let text = in_part(&facts(&["command lag (lag 15.4 ms)"]), (&share, false), "0.40 mrad RMS", Some("payload"));
+        let text =
+            in_part(&facts(&["command lag (lag 15.4 ms)"]), (&share, false), ("0.40 mrad RMS", Some("payload")), &[]);
         assert_eq!(
             text,
             "command lag (lag 15.4 ms) explains 96 % of the squared gap (94 % to 98 %), 2.13 mrad RMS, largest in joint 2 \
              (reversal): with it in the twin 0.40 mrad RMS stay on held-out clips, largest in yaw (after the slide); payload \
              explains most of that."
         );
-        let text = in_part(&facts(&["payload"]), (&share, true), "1 mm", None);
+        let text = in_part(&facts(&["payload"]), (&share, true), ("1 mm", None), &[]);
         assert!(text.ends_with("no effect of the library explains much of that."), "{text}");
         assert!(text.starts_with("payload, stronger than it is met in practice, explains 96 %"), "{text}");
+        let rivals = ["joint_coulomb_friction".to_owned()];
+        let text = in_part(&facts(&["load friction (0.44)"]), (&share, false), ("1 mm", None), &rivals);
+        assert!(text.starts_with("One of load friction (0.44), joint coulomb friction explains 96 %"), "{text}");
+        assert!(
+            text.contains("with the first in the twin 1 mm stay") && text.ends_with("cannot separate them."),
+            "{text}"
+        );
     }
 
     #[test]

@@ -3,7 +3,8 @@
 //!
 //! Effects are taken in the order in which they were found. They are believed as long as each stood out on clips that were
 //! not fitted (nearly all of them, far beyond chance, no other effect half as good), and all together close a real share of the
-//! squared gap on the clips kept for confirming: the whole 90 % interval of the share lies above it. One that is stronger than
+//! squared gap on the clips kept for confirming: the whole 90 % interval of the share lies above it. Where an effect that is
+//! known to look alike does as well, it is proven that one of the two acts, and both are said. One that is stronger than
 //! what is met in practice is said to be unusual: a range is what is known beforehand, and no bar for what the clips show.
 //! What comes after them in the search belongs to the rest.
 
@@ -33,6 +34,8 @@ pub(super) struct Partly {
     pub(super) share: Share,
     /// Whether an effect is stronger than what is met in practice.
     pub(super) unusual: bool,
+    /// Effects that do as well as one of those that were found: candidates.
+    rivals: Vec<usize>,
 }
 
 /// The most effects that are proven; `None` where not even the first is. `before`: what the baseline leaves on the clips kept
@@ -49,14 +52,12 @@ pub(super) fn proven<E: Evidence>(
         let weights = &with_effects(&found.steps, count).or(found.steps.last())?.weights;
         let last = if count == all { &found.last } else { &with_effects(&found.steps, count)?.from };
         let until = Found { steps: found.steps.clone(), last: last.clone() };
-        if !each_stands_out(bench, &until, overdispersion) {
-            return None;
-        }
+        let rivals = beside_what_stands_out(bench, &until, overdispersion)?;
         let fits = held_out::fits(bench, split, (last, weights))?;
         let after = Residuals::of(bench, &fits)?;
         let share = after.shrink(before, seed);
         let unusual = !remainder::implausible(bench, last).is_empty();
-        (share.ci90[0] > REAL_SHARE).then_some(Partly { found: until, fits, after, share, unusual })
+        (share.ci90[0] > REAL_SHARE).then_some(Partly { found: until, fits, after, share, unusual, rivals })
     };
     (1..=all).rev().find_map(one)
 }
@@ -65,25 +66,36 @@ fn with_effects(steps: &[Step], count: usize) -> Option<&Step> {
     steps.iter().find(|step| step.from.effects.len() == count)
 }
 
-fn each_stands_out<E: Evidence>(bench: &Bench<'_, E>, found: &Found, overdispersion: &[f64]) -> bool {
+/// Effects that do as well as those that were found, where each of these stands out but for what is known to look like it.
+fn beside_what_stands_out<E: Evidence>(
+    bench: &Bench<'_, E>,
+    found: &Found,
+    overdispersion: &[f64],
+) -> Option<Vec<usize>> {
     let added: Vec<(usize, usize)> = found.kept().collect();
-    added.len() == found.last.effects.len()
-        && added.iter().all(|(place, effect)| {
-            let step = &found.steps[*place];
-            let rivals = confidence::rivals(step, bench.library, *effect, overdispersion[*place]);
-            let trial = |candidate| step.trials.iter().find(|trial| trial.scored.candidate == candidate);
-            // What does the same with more numbers is no other cause: dry friction that may fall with speed, and does not.
-            let more_of_it =
-                |rival: &usize| trial(*rival).zip(trial(*effect)).is_some_and(|(rival, own)| rival.is_outdone_by(own));
-            let stands_for_itself = |rival: &usize| found.last.effects.contains(rival) || more_of_it(rival);
-            step.leads(bench.library, *effect) && rivals.iter().all(stands_for_itself)
-        })
+    let mut all = Vec::new();
+    for (place, effect) in &added {
+        let step = &found.steps[*place];
+        let mut rivals = confidence::rivals(step, bench.library, *effect, overdispersion[*place]);
+        let trial = |candidate| step.trials.iter().find(|trial| trial.scored.candidate == candidate);
+        // What does the same with more numbers is no other cause: dry friction that may fall with speed, and does not.
+        let more_of_it =
+            |rival: usize| trial(rival).zip(trial(*effect)).is_some_and(|(rival, own)| rival.is_outdone_by(own));
+        rivals.retain(|rival| !found.last.effects.contains(rival) && !more_of_it(*rival));
+        let known = |rival: &usize| bench.library.look_alike(*rival, *effect);
+        if !step.leads(bench.library, *effect) || !rivals.iter().all(known) {
+            return None;
+        }
+        all.extend(rivals);
+    }
+    (added.len() == found.last.effects.len()).then_some(all)
 }
 
 impl Partly {
-    /// Names of the effects that are proven.
-    pub(super) fn effects<E>(&self, bench: &Bench<'_, E>) -> Vec<String> {
-        self.found.last.effects.iter().map(|effect| bench.library.candidates[*effect].effect.name.to_owned()).collect()
+    /// Names of the effects that are proven, and of those that do as well as one of them.
+    pub(super) fn effects<E>(&self, bench: &Bench<'_, E>) -> [Vec<String>; 2] {
+        let name = |effect: &usize| bench.library.candidates[*effect].effect.name.to_owned();
+        [&self.found.last.effects, &self.rivals].map(|effects| effects.iter().map(name).collect())
     }
 
     /// The effect whose signature explains most of what stays; `None` where none explains much of it.
@@ -144,8 +156,18 @@ mod tests {
             let before = Residuals::at(bench, &baseline, &split.confirm).expect("it can be simulated");
             let proven = |found: &Found| proven(bench, (&split, found), &before, &[1.0; 2], 0);
             let partly = proven(&found(20.0, &last)).expect("it is");
-            assert!(partly.share.ci90[0] > 0.9 && partly.effects(bench) == ["command_delay"], "{:?}", partly.share);
+            assert!(
+                partly.share.ci90[0] > 0.9 && partly.effects(bench)[0] == ["command_delay"] && partly.rivals.is_empty(),
+                "{:?}",
+                partly.share
+            );
             assert!(proven(&found(290.0, &last)).is_none(), "another effect does as well");
+            let alike = library.find("command_lag").expect("a candidate");
+            let step = &found(20.0, &last).steps[0];
+            let beside = Step { trials: vec![trial(effect, &last, 300.0), trial(alike, &last, 295.0)], ..step.clone() };
+            let both = Found { steps: vec![beside, found(20.0, &last).steps[1].clone()], last: last.clone() };
+            let [named, rivals] = proven(&both).expect("one of two that look alike acts").effects(bench);
+            assert_eq!([named, rivals], [vec!["command_delay".to_owned()], vec!["command_lag".to_owned()]]);
             let useless = Hypothesis { effects: vec![effect], ..baseline.clone() };
             assert!(proven(&found(20.0, &useless)).is_none(), "nothing of the gap closes");
         });

@@ -78,7 +78,7 @@ const LIKELY: f64 = 0.5;
 /// How often it is right, as met in sessions of another engine, that nothing is there where the twin is as near as noise allows, ...
 const NONE: f64 = 0.96;
 /// ... that one of a class is the cause, ...
-const CLASS: f64 = 0.9;
+pub(super) const CLASS: f64 = 0.9;
 /// ... and that the cause of a plain gap is unknown (seven of ten); else it was an effect too far from its model.
 const UNKNOWN: f64 = 0.7;
 /// A gap of less than three least ones is seldom that (one of eight): mostly an effect that is too weak to be believed.
