@@ -67,6 +67,27 @@ class JointLoadFriction(Effect):
         plant.model.dof_frictionloss[plant.motor] = self.coefficient * np.abs(plant.asked) + 1e-9
 
 
+class JointPreslidingFriction(Effect):
+    """Bristles that bend before they slip: Dahl's law, solved exactly for the speed of each step."""
+
+    name = "joint_presliding_friction"
+    acts = True
+    parameters = {"coulomb": "N_m", "displacement": "rad"}
+
+    @classmethod
+    def draw(cls, rng, cell):
+        return cls(fr3.by_size(log_uniform(rng, 0.8, 0.9)) * rng.uniform(0.7, 1.3, fr3.DOF), float(10 ** rng.uniform(-3.3, -2.3)))
+
+    def begin(self, plant, q):
+        self.bent = np.zeros(fr3.DOF)
+
+    def step(self, plant):
+        speed = plant.data.qvel[plant.motor]
+        share = np.exp(-np.abs(speed) * plant.model.opt.timestep / self.displacement)
+        self.bent = np.sign(speed) + (self.bent - np.sign(speed)) * share
+        plant.lost += self.coulomb * self.bent
+
+
 class JointFrictionAsymmetry(Effect):
     name = "joint_friction_asymmetry"
     acts = True
@@ -180,5 +201,5 @@ class BaseTilt(Effect):
             plant.push_box(plant.build.box.mass * (leaning((0, 0)) - plant.build.gravity))
 
 
-JOINT = [JointCoulombFriction, JointViscousFriction, JointStribeckFriction, JointLoadFriction, JointFrictionAsymmetry,
-         TorqueRipple, JointElasticity, JointBacklash, RotorInertia, Payload, BaseTilt]
+JOINT = [JointCoulombFriction, JointViscousFriction, JointStribeckFriction, JointLoadFriction, JointPreslidingFriction,
+         JointFrictionAsymmetry, TorqueRipple, JointElasticity, JointBacklash, RotorInertia, Payload, BaseTilt]
