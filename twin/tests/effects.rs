@@ -6,7 +6,7 @@ use twin::effects::{Effects, Elsewhere, Role, Shape, registry};
 use twin::rollout::{ArmRollout, CommandTrack};
 
 /// Every name that reports and files may rely on.
-const NAMES: [&str; 37] = [
+const NAMES: [&str; 38] = [
     "joint_coulomb_friction",
     "joint_viscous_friction",
     "joint_stribeck_friction",
@@ -15,6 +15,7 @@ const NAMES: [&str; 37] = [
     "joint_presliding_friction",
     "command_delay",
     "command_lag",
+    "integral_action",
     "torque_delay",
     "rotor_inertia",
     "payload",

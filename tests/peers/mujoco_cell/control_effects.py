@@ -55,6 +55,33 @@ class CommandLag(Effect):
         return self.now[:fr3.DOF], self.now[fr3.DOF:]
 
 
+class IntegralAction(Effect):
+    """The controller sums up what a joint is off."""
+
+    name = "integral_action"
+    parameters = {"rate": "per_s"}
+
+    @classmethod
+    def draw(cls, rng, cell):
+        return cls(log_uniform(rng, 1.5, 2.0) * rng.uniform(0.7, 1.3, fr3.DOF))
+
+    def begin(self, plant, q):
+        self.gain, self.sum = self.rate * plant.controller.stiffness, np.zeros(fr3.DOF)
+
+    def encoder(self, q, dq):
+        self.q = q
+        return q, dq
+
+    def command(self, q_d, dq_d):
+        self.q_d = q_d
+        return q_d, dq_d
+
+    def asked(self, tau):
+        asked = tau + self.sum
+        self.sum = self.sum + self.gain * (self.q_d - self.q) * TICK
+        return asked
+
+
 class TorqueDelay(Effect):
     name = "torque_delay"
     parameters = {"delay": "s"}
@@ -125,4 +152,4 @@ class TorqueSensorBias(Effect):
         return tau + self.bias
 
 
-CONTROL = [CommandDelay, CommandLag, TorqueDelay, TorqueGain, TorqueSaturation, TorqueSensorBias]
+CONTROL = [CommandDelay, CommandLag, IntegralAction, TorqueDelay, TorqueGain, TorqueSaturation, TorqueSensorBias]

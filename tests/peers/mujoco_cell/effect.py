@@ -52,6 +52,10 @@ class Effect:
     def command(self, q_d, dq_d):
         return q_d, dq_d
 
+    def asked(self, tau):
+        """What the controller asks for."""
+        return tau
+
     def torque(self, tau):
         return tau
 

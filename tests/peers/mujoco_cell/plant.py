@@ -96,6 +96,8 @@ class Plant:
         for effect in self.effects:
             q_d, dq_d = effect.command(q_d, dq_d)
         tau, gravity = self.controller.torque(q, dq, q_d, dq_d)
+        for effect in self.effects:
+            tau = effect.asked(tau)
         wanted = tau - gravity
         for effect in self.effects:
             tau = effect.torque(tau)

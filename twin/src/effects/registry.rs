@@ -281,6 +281,7 @@ static EFFECTS: &[EffectInfo] = &[
     arm::joint_presliding_friction::EFFECT,
     arm::command_delay::EFFECT,
     arm::command_lag::EFFECT,
+    arm::integral_action::EFFECT,
     arm::torque_delay::EFFECT,
     arm::rotor_inertia::EFFECT,
     arm::payload::EFFECT,

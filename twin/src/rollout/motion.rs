@@ -163,7 +163,13 @@ impl ArmRollout<'_> {
                     (Some(effects), Some(memory)) => effects.command(memory, q_d, dq_d),
                     _ => (*q_d, *dq_d),
                 };
-                self.law.torque(self.nominal, &reading, &q_d, &dq_d)
+                let tau = self.law.torque(self.nominal, &reading, &q_d, &dq_d);
+                match (self.effects, &mut motion.memory) {
+                    (Some(effects), Some(memory)) => {
+                        effects.asked(memory, (self.arm, self.law), (&reading, &q_d), &tau)
+                    }
+                    _ => tau,
+                }
             }
             Drive::Torque { tau_J_d } => {
                 let limit = &self.law.torque_limit;

@@ -12,6 +12,8 @@ pub struct ArmMemory {
     pub(super) dq_d: DelayLine,
     /// The lagging command: positions and velocities.
     pub(super) lagging: JointState,
+    /// What the controller's integral action asks for [N m]; `None` before the first tick.
+    pub(super) summed: Option<Joints>,
     pub(super) torque: DelayLine,
     pub(super) motor: JointState,
     /// By what share of what they can the bristles of presliding friction are bent; `None` before the first step.
@@ -34,6 +36,7 @@ impl Clone for ArmMemory {
         self.dq_d.clone_from(&source.dq_d);
         self.torque.clone_from(&source.torque);
         (self.lagging, self.motor, self.bent) = (source.lagging, source.motor, source.bent);
+        self.summed = source.summed;
         (self.tau_J, self.grip) = (source.tau_J, source.grip);
     }
 }
@@ -67,7 +70,7 @@ impl ArmMemory {
         self.q_d.restart(q_d);
         self.dq_d.restart(dq_d);
         self.torque.clear();
-        self.bent = None;
+        (self.bent, self.summed) = (None, None);
         self.lagging = JointState { q: *q_d, dq: *dq_d };
     }
 
@@ -78,6 +81,7 @@ impl ArmMemory {
             q_d: DelayLine::new(command, q_d),
             dq_d: DelayLine::new(command, dq_d),
             lagging: JointState { q: *q_d, dq: *dq_d },
+            summed: None,
             torque: DelayLine::empty(torque),
             motor: JointState::default(),
             bent: None,

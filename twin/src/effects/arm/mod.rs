@@ -9,6 +9,7 @@ pub(super) mod base_tilt;
 pub(super) mod command_delay;
 pub(super) mod command_lag;
 mod delay_line;
+pub(super) mod integral_action;
 pub(super) mod joint_backlash;
 pub(super) mod joint_coulomb_friction;
 pub(super) mod joint_elasticity;
@@ -35,8 +36,9 @@ pub use memory::ArmMemory;
 pub(crate) use memory::JointMemory;
 
 use super::hit::tool_offset::ToolOffset;
-use crate::arm::{ArmModel, JointState, Joints};
+use crate::arm::{ArmModel, ControlLaw, JointState, Joints};
 use crate::rollout::TICK;
+use shared_mem::cell::ControllerKind;
 
 /// The effects on an arm that are installed. Constant over time: one set may serve many rollouts at once.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -49,6 +51,7 @@ pub struct ArmEffects {
     pub(super) joint_presliding_friction: Option<joint_presliding_friction::JointPreslidingFriction>,
     pub(super) command_delay: Option<command_delay::CommandDelay>,
     pub(super) command_lag: Option<command_lag::CommandLag>,
+    pub(super) integral_action: Option<integral_action::IntegralAction>,
     pub(super) torque_delay: Option<torque_delay::TorqueDelay>,
     pub(super) rotor_inertia: Option<rotor_inertia::RotorInertia>,
     pub(super) payload: Option<payload::Payload>,
@@ -152,6 +155,23 @@ impl ArmEffects {
             reading.q = std::array::from_fn(|i| reading.q[i] + effect.offset[i]);
         }
         reading
+    }
+
+    /// What the controller asks for where it does more than its law, one tick after the other [N m]. `tau`: what the law asks for at
+    /// `reading` under the command `q_d` that reaches it, gravity included.
+    #[must_use]
+    pub fn asked(
+        &self,
+        memory: &mut ArmMemory,
+        (arm, law): (&ArmModel, &ControlLaw),
+        (reading, q_d): (&JointState, &Joints),
+        tau: &Joints,
+    ) -> Joints {
+        let Some(effect) = self.integral_action.as_ref().filter(|_| law.kind != ControllerKind::Tracking) else {
+            return *tau;
+        };
+        let summed = memory.summed.get_or_insert_with(|| effect.settled(arm, reading, tau));
+        effect.asked(summed, law, (reading, q_d), tau)
     }
 
     /// The motors' torque for the torque that the controller asks for, one tick after the other [N m]. `damped`: what of that the

@@ -8,7 +8,7 @@ use crate::arm::{ArmModel, JointState, Joints, MAX_JOINTS, Passed, Presliding, S
 /// Longest step of a gear that yields [s]: a wrist link on its spring rings at up to 200 Hz.
 const LONGEST_STEP: f64 = 2.5e-4;
 /// A joint that is slower rests when it is first seen [rad/s]: encoders' noise, and a tenth of the slowest motions.
-const AT_REST: f64 = 1e-3;
+pub(super) const AT_REST: f64 = 1e-3;
 
 impl ArmEffects {
     /// Whether friction or a gear that yields lies between motors and links.
