@@ -164,7 +164,7 @@ mod tests {
             assert!(proven(&found(290.0, &last)).is_none(), "another effect does as well");
             let alike = library.find("command_lag").expect("a candidate");
             let step = &found(20.0, &last).steps[0];
-            let beside = Step { trials: vec![trial(effect, &last, 300.0), trial(alike, &last, 295.0)], ..step.clone() };
+            let beside = Step { trials: vec![trial(effect, &last, 300.0), trial(alike, &last, 298.0)], ..step.clone() };
             let both = Found { steps: vec![beside, found(20.0, &last).steps[1].clone()], last: last.clone() };
             let [named, rivals] = proven(&both).expect("one of two that look alike acts").effects(bench);
             assert_eq!([named, rivals], [vec!["command_delay".to_owned()], vec!["command_lag".to_owned()]]);
