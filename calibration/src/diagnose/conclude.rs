@@ -113,8 +113,6 @@ pub fn conclude<E: Evidence>(
     let [size, stays] = sizes.in_words(of_object);
     let closed = |open: &Unproven<'_>| share_of(bench, split, (open, &first.weights), (&before, options.seed));
     let unproven = unproven::unproven(bench, found).and_then(|open| closed(&open).map(|share| (open, share)));
-    // What widens the gap of the clips that are left out is no lead.
-    let unproven = unproven.filter(|(_, share)| *share > 0.0);
     let open = unproven.as_ref().map(|(open, share)| (open, *share));
     let facts = facts(bench, found, (size, open), [&places, &rest], shrunk(&before, after, options.seed));
     let verdict = match &partly {
@@ -176,14 +174,15 @@ fn unseen<E: Evidence>(
     Ok((fits, left))
 }
 
-/// How far the gap shrinks with an effect that is not proven.
+/// How far the gap shrinks with an effect that is not proven; `None` where it widens: that is no lead.
 fn share_of<E: Evidence>(
     bench: &Bench<'_, E>,
     split: &Split,
     (open, weights): (&Unproven<'_>, &[f64]),
     (before, seed): (&Residuals, u64),
 ) -> Option<f64> {
-    Some(held_out::residuals(bench, split, (open.fit, weights))?.shrink(before, seed).value)
+    let share = held_out::residuals(bench, split, (open.fit, weights))?.shrink(before, seed).value;
+    (share > 0.0).then_some(share)
 }
 
 /// What has to be known about clips of few commands.
