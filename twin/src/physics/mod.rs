@@ -7,6 +7,7 @@
 
 mod convert;
 pub mod hit;
+mod hull;
 mod impulses;
 mod outline;
 mod push;
@@ -16,6 +17,7 @@ mod table_object;
 pub mod touch;
 mod tumble;
 
+pub use hull::{Face, Hull};
 pub use outline::Outline;
 pub use shape::FlatMesh;
 pub use surface::Surface;

@@ -1,6 +1,7 @@
 //! The object's collision shape: a box or the convex hull of a mesh. Object frame, SI.
 
 use super::convert;
+use super::hull::Hull;
 use crate::scene::ObjectShape;
 use nalgebra::{Matrix3, Point3, Vector3};
 use parry3d_f64::math::Vector;
@@ -33,16 +34,18 @@ impl CollisionShape {
     /// # Errors
     /// [`FlatMesh`] when there is no convex hull.
     pub(super) fn new(outline: &ObjectShape) -> Result<Self, FlatMesh> {
-        let shape = match outline {
-            ObjectShape::Box { half_extents: h } => SharedShape::cuboid(h.x, h.y, h.z),
+        let (shape, unit_inertia) = match outline {
+            ObjectShape::Box { half_extents: h } => {
+                let square = h.component_mul(h);
+                let moments = (Vector3::repeat(square.sum()) - square) / 3.0;
+                (SharedShape::cuboid(h.x, h.y, h.z), Matrix3::from_diagonal(&moments))
+            }
             ObjectShape::Mesh { points, .. } => {
-                let points: Vec<Vector> = outermost(points).iter().map(convert::point).collect();
-                SharedShape::convex_hull(&points).ok_or(FlatMesh)?
+                let points = outermost(points);
+                let shape = SharedShape::convex_hull(&points.iter().map(convert::point).collect::<Vec<_>>());
+                (shape.ok_or(FlatMesh)?, Hull::of(&points).ok_or(FlatMesh)?.unit_inertia)
             }
         };
-        let mut properties = shape.mass_properties(1.0);
-        properties.set_mass(1.0, true);
-        let unit_inertia = convert::to_matrix(&properties.reconstruct_inertia_matrix());
         unit_inertia.try_inverse().ok_or(FlatMesh)?;
         let corners = hull_corners(&shape);
         let half_extents = shape.as_cuboid().map(|cuboid| convert::to_vector(cuboid.half_extents));
@@ -147,6 +150,16 @@ mod tests {
         assert!(ball.corners.len() <= DIRECTIONS, "{}", ball.corners.len());
         let inertia = 0.4 * 0.05 * 0.05;
         assert!((ball.unit_inertia[(0, 0)] / inertia - 1.0).abs() < 0.03, "{}", ball.unit_inertia);
+    }
+
+    #[test]
+    fn the_inertia_of_a_box_is_that_of_its_mesh() {
+        let shape = ObjectShape::Box { half_extents: Vector3::new(0.04, 0.03, 0.05) };
+        let (points, triangles) = shape.triangles();
+        let [boxed, mesh] =
+            [shape, ObjectShape::Mesh { points, triangles }].map(|s| CollisionShape::new(&s).expect("it"));
+        let off = (boxed.unit_inertia - mesh.unit_inertia).amax();
+        assert!(off < 1e-9, "{} {}", boxed.unit_inertia, mesh.unit_inertia);
     }
 
     #[test]
