@@ -28,8 +28,8 @@ const SPOKEN_BY: [(&str, &[&str]); 9] = [
     ("twin/src/reconstruct/", &["twin label-splats"]),
 ];
 /// Folders whose files are named in texts by their path.
-const FOLDERS: [&str; 9] =
-    ["shared_mem/", "twin/", "rt_bridge/", "calibration/", "import/", "urdf/", "tests/", "config/", "docs/"];
+const FOLDERS: [&str; 10] =
+    ["shared_mem/", "twin/", "rt_bridge/", "calibration/", "import/", "urdf/", "tests/", "config/", "tasks/", "docs/"];
 
 fn named(verb: &Verb) -> String {
     verb.path.join(" ")

@@ -15,5 +15,7 @@ pub mod shadow;
 mod shipped;
 pub mod sim;
 pub mod sliding;
+pub mod task;
 #[cfg(feature = "viewer")]
 pub mod viewer;
+pub mod world;

@@ -19,6 +19,7 @@ Examples:
   twin shadow --cell config/fr3_cell.toml --viewer
   twin replay session --parameters theta.toml
   twin render session --out frames
+  twin task tasks/push_milk.toml
   twin label-splats scan.ply --cell cell.toml --joints 0,-0.78,0,-2.36,0,1.57,0.78 --out fr3_splats
 Every verb has its own --help with examples. Logs and progress go to stderr (RUST_LOG=debug for more)."
 )]
@@ -32,6 +33,7 @@ enum Verb {
     Shadow(cli::shadow::Shadow),
     Replay(cli::replay::Replay),
     Render(cli::render::Render),
+    Task(cli::task::Task),
     LabelSplats(cli::label_splats::LabelSplats),
 }
 
@@ -54,6 +56,7 @@ fn main() -> ExitCode {
         Verb::Shadow(verb) => verb.run(),
         Verb::Replay(verb) => verb.run(),
         Verb::Render(verb) => verb.run(),
+        Verb::Task(verb) => verb.run(),
         Verb::LabelSplats(verb) => verb.run(),
     };
     match outcome {

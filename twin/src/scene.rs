@@ -6,6 +6,7 @@ mod mesh_file;
 
 pub use arm_outline::{ArmOutline, Part};
 pub use mesh_file::MeshFileError;
+pub(crate) use mesh_file::{open_edges, read as read_mesh};
 
 use nalgebra::{Point3, Vector3};
 use shared_mem::cell::{Cell, Object, Support};

@@ -5,6 +5,7 @@ pub(crate) mod look;
 pub(crate) mod render;
 pub(crate) mod replay;
 pub(crate) mod shadow;
+pub(crate) mod task;
 
 use anyhow::Context as _;
 use shared_mem::console;

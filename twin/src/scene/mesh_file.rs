@@ -31,7 +31,7 @@ pub enum MeshFileError {
 }
 
 /// Reads a mesh and moves its geometric centre, the middle of its bounding box, to the origin.
-pub(super) fn read(path: &Path) -> Result<ObjectShape, MeshFileError> {
+pub(crate) fn read(path: &Path) -> Result<ObjectShape, MeshFileError> {
     let bytes = input::bytes(path, input::Kind::Mesh)?;
     let ending = path.extension().and_then(|e| e.to_str()).unwrap_or("").to_ascii_lowercase();
     let surface = match ending.as_str() {
@@ -85,7 +85,7 @@ fn volume(points: &[Point3<f64>], triangles: &[[u32; 3]]) -> f64 {
 }
 
 /// Edges that belong to an odd number of faces. Corners at one place are one corner: an stl repeats them.
-fn open_edges(points: &[Point3<f64>], triangles: &[[u32; 3]]) -> usize {
+pub(crate) fn open_edges(points: &[Point3<f64>], triangles: &[[u32; 3]]) -> usize {
     let place = |i: u32| points[i as usize].coords.map(|v| (v * 1e7).round() as i64);
     let mut edges: HashMap<[[i64; 3]; 2], usize> = HashMap::new();
     for triangle in triangles {

@@ -1,0 +1,120 @@
+//! `twin task`: a task's bodies placed and simulated; did they come to rest, where, and was it a success.
+
+use anyhow::Context as _;
+use serde::Serialize;
+use shared_mem::answer;
+use shared_mem::output::Destination;
+use shared_mem::progress::Progress;
+use shared_mem::quantity::seconds;
+use std::fmt::Write as _;
+use std::io::Write as _;
+use std::path::PathBuf;
+use std::time::Duration;
+use twin::task::{Episode, Task as TaskFile};
+
+/// Places the bodies of a task, simulates them, and says whether they come to rest, where, and whether it is a success.
+#[derive(clap::Args)]
+#[command(after_help = "\
+A task file holds bodies of convex pieces (free, on joints, held, moved), where they may start, what counts as success, and
+a scripted motion; docs/tasks.md has every key. An episode ends with success, or after the task's horizon.
+
+Examples:
+  twin task tasks/push_milk.toml
+  twin task tasks/stack_boxes.toml --seed 3 --duration 5
+  twin task tasks/close_laptop.toml --episodes 50 --out laptop.json
+  twin task tasks/pick_carrot.toml --json
+
+JSON: task, successes, and for each of episodes seed, duration_s, at_rest, at_rest_since_s, success, contacts (names of bodies
+that press on each other), and bodies: name, start and end (position, orientation_wxyz, joint), speed_m_s.")]
+pub(crate) struct Task {
+    /// The task file
+    #[arg(value_name = "TASK.toml")]
+    file: PathBuf,
+    /// The start of the first episode; the others follow it
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    seed: u64,
+    /// Episodes, each with its own start
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    episodes: u32,
+    /// Simulated time of an episode, at most [default: the task's horizon]
+    #[arg(long, value_name = "SECONDS", value_parser = seconds)]
+    duration: Option<Duration>,
+    /// Writes the JSON answer to a file as well
+    #[arg(long, value_name = "FILE.json")]
+    out: Option<PathBuf>,
+    /// Replaces a file that is there already
+    #[arg(long, requires = "out")]
+    force: bool,
+    /// Prints one JSON object on stdout at the end
+    #[arg(long)]
+    json: bool,
+}
+
+/// The whole answer.
+#[derive(Serialize)]
+struct Answer {
+    task: String,
+    successes: usize,
+    episodes: Vec<Episode>,
+}
+
+impl Task {
+    pub(crate) fn run(&self) -> anyhow::Result<()> {
+        super::discard_on_signal()?;
+        let task = TaskFile::read(&self.file)?;
+        let place = Destination::of(self.out.as_deref(), self.force)?;
+        let duration = self.duration.map_or(task.horizon(), |duration| duration.as_secs_f64());
+        let bar = Progress::new("task", self.episodes.into());
+        let mut episodes = Vec::new();
+        for i in 0..u64::from(self.episodes) {
+            let seed = self.seed.checked_add(i).context("--seed is too large for so many --episodes")?;
+            episodes.push(task.episode(seed, duration).with_context(|| format!("seed {seed}"))?);
+            bar.show(i + 1, "");
+        }
+        drop(bar);
+        let successes = episodes.iter().filter(|episode| episode.success).count();
+        let answer = Answer { task: self.file.display().to_string(), successes, episodes };
+        if let Some(place) = place {
+            let mut output = place.begin()?;
+            output.write_all(&serde_json::to_vec_pretty(&answer)?)?;
+            output.finish()?;
+        }
+        if self.json {
+            answer::json(&answer)?;
+        } else {
+            answer::words(answer.words())?;
+        }
+        Ok(())
+    }
+}
+
+impl Answer {
+    fn words(&self) -> String {
+        let mut text = String::new();
+        for episode in &self.episodes {
+            let rest = match episode.at_rest_since_s {
+                Some(since) => format!("at rest since {since:.3} s"),
+                None => {
+                    let fastest = episode.bodies.iter().max_by(|a, b| a.speed_m_s.total_cmp(&b.speed_m_s));
+                    let named = |body: &twin::task::BodyEnd| format!(", `{}` at {:.3} m/s", body.name, body.speed_m_s);
+                    format!("not at rest{}", fastest.map_or(String::new(), named))
+                }
+            };
+            let outcome = if episode.success { "success" } else { "no success" };
+            let _ = writeln!(text, "seed {}: {outcome} after {:.3} s, {rest}", episode.seed, episode.duration_s);
+        }
+        match self.episodes.as_slice() {
+            [episode] => {
+                for body in &episode.bodies {
+                    let [x, y, z] = body.end.position;
+                    let joint = body.end.joint.map_or(String::new(), |at| format!("  joint {at:.4}"));
+                    let _ = writeln!(text, "  {:16} {x:8.4} {y:8.4} {z:8.4} m{joint}", body.name);
+                }
+            }
+            episodes => {
+                let _ = writeln!(text, "{} of {} episodes are a success", self.successes, episodes.len());
+            }
+        }
+        text
+    }
+}

@@ -1,0 +1,125 @@
+//! One run of a task: did it come to rest, where, and was it a success.
+
+use super::Task;
+use super::start::{Placed, StartError};
+use crate::world::{STEP, World};
+use nalgebra::Isometry3;
+use serde::Serialize;
+
+/// A body whose fastest point is slower than this is at rest [m/s], once it has been for so long [s].
+const STILL: f64 = 1e-4;
+const STILL_FOR: f64 = 0.1;
+
+/// What came of one run.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Episode {
+    /// By which the start was drawn.
+    pub seed: u64,
+    /// Simulated time [s]: until success, or all that was asked for.
+    pub duration_s: f64,
+    /// Whether every body that moves by itself was at rest at the end.
+    pub at_rest: bool,
+    /// Since when it was [s].
+    pub at_rest_since_s: Option<f64>,
+    /// Whether all conditions held for as long as they have to.
+    pub success: bool,
+    /// Every body.
+    pub bodies: Vec<BodyEnd>,
+    /// Bodies that press on each other at the end, by name.
+    pub contacts: Vec<[String; 2]>,
+}
+
+/// A body at the start and at the end.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct BodyEnd {
+    /// Name.
+    pub name: String,
+    /// Where it started.
+    pub start: Place,
+    /// Where it is.
+    pub end: Place,
+    /// Its fastest point at the end [m/s].
+    pub speed_m_s: f64,
+}
+
+/// A pose of a body's origin.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Place {
+    /// World [m].
+    pub position: [f64; 3],
+    /// Quaternion.
+    pub orientation_wxyz: [f64; 4],
+    /// Of its joint, where it has one [rad or m].
+    pub joint: Option<f64>,
+}
+
+impl Task {
+    /// Simulates an episode for at most `duration` seconds.
+    ///
+    /// # Errors
+    /// [`StartError`] when bodies overlap wherever they start, or nothing is left to do.
+    pub fn episode(&self, seed: u64, duration: f64) -> Result<Episode, StartError> {
+        let Placed { mut world, yaws } = self.placed(seed)?;
+        let poses: Vec<Isometry3<f64>> = (0..self.bodies.len()).map(|body| world.pose(body)).collect();
+        let motions = self.motions.placed(&world, &yaws);
+        let starts: Vec<Place> = (0..self.bodies.len()).map(|body| Place::of(&world, body)).collect();
+        let steps = (duration / STEP).round().max(1.0) as usize;
+        let mut run = Run { done: 0, moved: 0, failed: 0 };
+        while run.done < steps && !run.is_success(self.hold) {
+            motions.act(&mut world, &poses, run.done);
+            world.step();
+            run.done += 1;
+            if (0..self.bodies.len()).any(|body| world.speed(body) > STILL) {
+                run.moved = run.done;
+            }
+            if !self.conditions.iter().all(|condition| condition.holds(&world)) {
+                run.failed = run.done;
+            }
+        }
+        let at_rest = (run.done - run.moved) as f64 * STEP > STILL_FOR;
+        let bodies = starts.into_iter().enumerate().map(|(body, start)| BodyEnd {
+            name: self.bodies[body].name.clone(),
+            start,
+            end: Place::of(&world, body),
+            speed_m_s: world.speed(body),
+        });
+        Ok(Episode {
+            seed,
+            duration_s: run.done as f64 * STEP,
+            at_rest,
+            at_rest_since_s: at_rest.then_some(run.moved as f64 * STEP),
+            success: run.is_success(self.hold),
+            bodies: bodies.collect(),
+            contacts: self.contacts(&world),
+        })
+    }
+
+    fn contacts(&self, world: &World) -> Vec<[String; 2]> {
+        let count = self.bodies.len();
+        let pairs = (0..count).flat_map(|first| (first + 1..count).map(move |second| [first, second]));
+        let touching = pairs.filter(|[first, second]| world.touch(*first, *second));
+        touching.map(|pair| pair.map(|body| self.bodies[body].name.clone())).collect()
+    }
+}
+
+/// Steps done, and the last ones in which something moved and in which a condition did not hold.
+struct Run {
+    done: usize,
+    moved: usize,
+    failed: usize,
+}
+
+impl Run {
+    fn is_success(&self, hold: f64) -> bool {
+        self.done > 0 && (self.done - self.failed) as f64 * STEP >= hold
+    }
+}
+
+impl Place {
+    fn of(world: &World, body: usize) -> Self {
+        let pose = world.pose(body);
+        let q = pose.rotation.quaternion();
+        let position = pose.translation.vector.into();
+        Self { position, orientation_wxyz: [q.w, q.i, q.j, q.k], joint: world.joint(body) }
+    }
+}

@@ -1,0 +1,60 @@
+//! Tasks: bodies, where they may start, what counts as success, and a scripted motion that shows it. Read from a task file
+//! (docs/tasks.md has every key), placed by a seed, simulated in a [`crate::world`].
+//!
+//! | file | owns |
+//! |---|---|
+//! | `file` | the keys of a task file |
+//! | `read` | bodies, conditions and motions out of it, and what is wrong with it |
+//! | `surface` | the convex pieces of a body |
+//! | `start` | where bodies start: drawn by a seed until none overlap |
+//! | `condition` | what counts as success |
+//! | `motion` | where moved bodies go and what drives do, by time |
+//! | `episode` | one run: did it come to rest, where, and was it a success |
+
+mod condition;
+mod episode;
+mod file;
+mod motion;
+mod read;
+mod start;
+mod surface;
+
+pub use episode::{BodyEnd, Episode, Place};
+pub use start::StartError;
+
+use crate::world::{BodyPlan, World};
+use condition::Condition;
+use motion::Motions;
+use shared_mem::toml_file::TomlFileError;
+use start::StartRange;
+use std::path::Path;
+
+/// A task, ready to be started as often as wanted.
+#[derive(Debug, Clone)]
+pub struct Task {
+    bodies: Vec<BodyPlan>,
+    world: World,
+    starts: Vec<StartRange>,
+    conditions: Vec<Condition>,
+    motions: Motions,
+    /// For how long all conditions have to hold [s].
+    hold: f64,
+    /// How long an episode takes at most [s].
+    horizon: f64,
+}
+
+impl Task {
+    /// Reads a task file; meshes lie relative to it.
+    ///
+    /// # Errors
+    /// [`TomlFileError`] with file, line and key of what is wrong.
+    pub fn read(path: &Path) -> Result<Self, TomlFileError> {
+        read::read(path)
+    }
+
+    /// How long an episode takes at most [s].
+    #[must_use]
+    pub fn horizon(&self) -> f64 {
+        self.horizon
+    }
+}

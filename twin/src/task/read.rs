@@ -1,0 +1,281 @@
+//! A task out of its file, and what is wrong with it: file, line, key.
+
+use super::Task;
+use super::condition::Condition;
+use super::file::{BodyEntry, HoldEntry, JointEntry, KindEntry, MotionEntry, SuccessEntry, TaskFile};
+use super::motion::{Motions, Order, Waypoint};
+use super::start::{StartError, StartRange};
+use super::surface::pose;
+use crate::world::{BodyPlan, Drive, Hold, JointKind, JointPlan, PlanError, World};
+use nalgebra::{Unit, Vector3};
+use shared_mem::input;
+use shared_mem::toml_file::{self, TomlFileError};
+use std::path::Path;
+
+/// Most bodies: contacts are looked for between any two.
+const MOST_BODIES: usize = 32;
+
+/// What is wrong with a block: the key at fault, and what would do.
+type Fault = (&'static str, String);
+
+/// The text, to say where something stands in it.
+struct Source<'a> {
+    path: &'a Path,
+    text: &'a str,
+}
+
+pub(super) fn read(path: &Path) -> Result<Task, TomlFileError> {
+    let text = input::text(path, input::Kind::Configuration)?;
+    parse(&text, path)
+}
+
+pub(super) fn parse(text: &str, path: &Path) -> Result<Task, TomlFileError> {
+    let file: TaskFile = toml_file::parse(text, path)?;
+    let source = Source { path, text };
+    for (key, value) in [("horizon", file.horizon), ("hold", file.hold)] {
+        if !(1e-3..=3600.0).contains(&value) {
+            return Err(source.error(0, (key, format!("it is {value}; give seconds from 0.001 to 3600"))));
+        }
+    }
+    if file.body.is_empty() || file.body.len() > MOST_BODIES {
+        let count = file.body.len();
+        return Err(source.error(0, ("body", format!("there are {count} [[body]] blocks; give 1 to {MOST_BODIES}"))));
+    }
+    let folder = path.parent().unwrap_or(Path::new(""));
+    let names: Vec<&str> = file.body.iter().map(|entry| entry.as_ref().name.as_str()).collect();
+    let (mut bodies, mut starts) = (Vec::new(), Vec::new());
+    for (i, entry) in file.body.iter().enumerate() {
+        let at = entry.span().start;
+        let plan = body(entry.as_ref(), &names[..i], folder).map_err(|fault| source.error(at, fault))?;
+        starts.extend(start_range(entry.as_ref(), i, &plan).map_err(|fault| source.error(at, fault))?);
+        bodies.push(plan);
+    }
+    let world = World::new(&bodies).map_err(|PlanError { body, key, what }| {
+        let at = names.iter().position(|name| *name == body).map_or(0, |i| file.body[i].span().start);
+        source.error(at, (key, what))
+    })?;
+    let mut conditions = Vec::new();
+    for entry in &file.success {
+        let found = condition(entry.as_ref(), &names, &bodies);
+        conditions.push(found.map_err(|fault| source.error(entry.span().start, fault))?);
+    }
+    if conditions.is_empty() {
+        return Err(source.error(0, ("success", "there is no [[success]] block; say what counts as success".into())));
+    }
+    let mut motions = Motions::default();
+    for entry in &file.motion {
+        motion(entry.as_ref(), &names, &bodies, &mut motions)
+            .map_err(|fault| source.error(entry.span().start, fault))?;
+    }
+    motions.waypoints.sort_by(|a, b| a.time.total_cmp(&b.time));
+    let task = Task { bodies, world, starts, conditions, motions, hold: file.hold, horizon: file.horizon };
+    task.placed(0).map_err(|error| match &error {
+        StartError::Crowded { second, .. } => {
+            let at = names.iter().position(|name| name == second).map_or(0, |i| file.body[i].span().start);
+            source.error(at, ("position", error.to_string()))
+        }
+        StartError::AlreadyDone => source.error(file.success[0].span().start, ("success", error.to_string())),
+    })?;
+    Ok(task)
+}
+
+impl Source<'_> {
+    /// An error at a key of the block that begins at `at`, or at the block where the key does not stand there.
+    fn error(&self, at: usize, (key, what): Fault) -> TomlFileError {
+        let after = &self.text[at.min(self.text.len())..];
+        let block = after.find("\n[[").map_or(after, |end| &after[..end]);
+        let place = block.match_indices(key).map(|(place, _)| place).find(|place| {
+            let before = block[..*place].chars().next_back();
+            let behind = block[place + key.len()..].trim_start().chars().next();
+            before.is_none_or(|c| c.is_whitespace() || c == '{' || c == ',') && behind == Some('=')
+        });
+        let line = self.text[..at.min(self.text.len()) + place.unwrap_or(0)].matches('\n').count() + 1;
+        TomlFileError::Content { path: self.path.to_owned(), line: Some(line), what: format!("`{key}`: {what}") }
+    }
+}
+
+/// Index of the body of that name among those given.
+fn named(name: &str, names: &[&str], key: &'static str) -> Result<usize, Fault> {
+    names
+        .iter()
+        .position(|known| *known == name)
+        .ok_or_else(|| (key, format!("no body is called `{name}` up to here; there are: {}", names.join(", "))))
+}
+
+fn finite(key: &'static str, values: &[f64]) -> Result<(), Fault> {
+    match values.iter().find(|value| value.is_nan() || value.abs() > 1e3) {
+        Some(bad) => Err((key, format!("it holds {bad}; give a number from -1000 to 1000 (SI units)"))),
+        None => Ok(()),
+    }
+}
+
+fn not_negative(key: &'static str, value: f64) -> Result<(), Fault> {
+    if (0.0..=1e6).contains(&value) { Ok(()) } else { Err((key, format!("it is {value}; give 0 or more (SI units)"))) }
+}
+
+fn body(entry: &BodyEntry, names: &[&str], folder: &Path) -> Result<BodyPlan, Fault> {
+    if names.contains(&entry.name.as_str()) {
+        return Err(("name", format!("two bodies are called `{}`; give each a name of its own", entry.name)));
+    }
+    finite("position", &entry.position)?;
+    finite("rotation", &entry.rotation)?;
+    not_negative("friction", entry.friction)?;
+    not_negative("pad_radius", entry.pad_radius)?;
+    for piece in &entry.piece {
+        finite("position", &piece.position)?;
+        finite("rotation", &piece.rotation)?;
+    }
+    let pieces = entry.piece.iter().map(|piece| piece.piece(folder)).collect::<Result<Vec<_>, _>>()?;
+    if pieces.is_empty() {
+        return Err(("piece", format!("`{}` is made of nothing; give it a piece", entry.name)));
+    }
+    let at = pose(entry.position, entry.rotation);
+    let hold = match (&entry.joint, entry.hold) {
+        (Some(joint), HoldEntry::Free) => Hold::Joint(joint_plan(joint, at, names)?),
+        (Some(_), _) => return Err(("hold", "a body on a joint cannot be held as well; leave `hold` out".into())),
+        (None, HoldEntry::Free) => Hold::Free(at),
+        (None, HoldEntry::Fixed) => Hold::Fixed(at),
+        (None, HoldEntry::Moved) => Hold::Moved(at),
+    };
+    let movable = matches!(hold, Hold::Free(_) | Hold::Joint(_));
+    let mass = match entry.mass {
+        Some(mass) if mass > 0.0 && mass <= 1e4 => mass,
+        Some(mass) => return Err(("mass", format!("it is {mass}; give kilograms above 0 and up to 10000"))),
+        None if movable => return Err(("mass", format!("`{}` moves by itself and needs a mass [kg]", entry.name))),
+        None => 1.0,
+    };
+    let plan = BodyPlan::homogeneous(&entry.name, pieces, mass, hold).with_friction(entry.friction);
+    let centre_of_mass = entry.centre_of_mass.map_or(plan.centre_of_mass, Vector3::from);
+    finite("centre_of_mass", centre_of_mass.as_slice())?;
+    Ok(BodyPlan { centre_of_mass, pad_radius: entry.pad_radius, ..plan })
+}
+
+fn joint_plan(joint: &JointEntry, at: nalgebra::Isometry3<f64>, names: &[&str]) -> Result<JointPlan, Fault> {
+    let parent = joint.parent.as_deref().map(|name| named(name, names, "parent")).transpose()?;
+    let Some(axis) = Unit::try_new(Vector3::from(joint.axis), 1e-6) else {
+        return Err(("axis", "it has no length; give a direction such as [0, 1, 0]".into()));
+    };
+    not_negative("friction", joint.friction)?;
+    not_negative("damping", joint.damping)?;
+    if let Some(drive) = &joint.drive {
+        finite("drive", &[drive.target])?;
+        not_negative("drive", drive.speed)?;
+        not_negative("drive", drive.force)?;
+    }
+    if let Some(led) = joint.follows.as_ref() {
+        finite("follows", &[led.ratio])?;
+    }
+    let follows = joint.follows.as_ref().map(|led| Ok((named(&led.body, names, "follows")?, led.ratio))).transpose()?;
+    let limits = match (joint.limits, &follows) {
+        (Some(limits), _) => limits,
+        (None, Some(_)) => [0.0, 0.0],
+        (None, None) => {
+            let what = "it has no limits; give the least and the largest position, `limits = [low, high]`";
+            return Err(("joint", what.into()));
+        }
+    };
+    Ok(JointPlan {
+        parent,
+        at,
+        kind: match joint.kind {
+            KindEntry::Revolute => JointKind::Revolute,
+            KindEntry::Prismatic => JointKind::Prismatic,
+        },
+        axis,
+        limits,
+        start: joint.start,
+        friction: joint.friction,
+        damping: joint.damping,
+        drive: joint.drive.map(|drive| Drive { target: drive.target, speed: drive.speed, force: drive.force }),
+        follows,
+    })
+}
+
+fn start_range(entry: &BodyEntry, body: usize, plan: &BodyPlan) -> Result<Option<StartRange>, Fault> {
+    let Some(start) = entry.start else { return Ok(None) };
+    let (Hold::Free(nominal) | Hold::Fixed(nominal) | Hold::Moved(nominal)) = plan.hold else {
+        return Err(("start", "a body on a joint starts where its joint does; give `start` to what carries it".into()));
+    };
+    for range in [start.x, start.y, start.yaw] {
+        finite("start", &range)?;
+        if range[0] > range[1] {
+            return Err(("start", format!("{range:?} is no range; give [low, high]")));
+        }
+    }
+    Ok(Some(StartRange { body, nominal, x: start.x, y: start.y, yaw: start.yaw }))
+}
+
+fn condition(entry: &SuccessEntry, names: &[&str], bodies: &[BodyPlan]) -> Result<Condition, Fault> {
+    let pair = |key, [first, second]: &[String; 2]| Ok([named(first, names, key)?, named(second, names, key)?]);
+    match entry {
+        SuccessEntry {
+            body: Some(name),
+            low: Some(low),
+            high: Some(high),
+            of,
+            tilt,
+            touching: None,
+            apart: None,
+            joint: None,
+            between: None,
+        } => {
+            let body = named(name, names, "body")?;
+            let of = of.as_deref().map(|name| named(name, names, "of")).transpose()?;
+            if (0..3).any(|k| low[k] > high[k] || low[k].is_nan() || high[k].is_nan()) {
+                return Err(("low", "it lies above `high`; give the least x, y, z first".into()));
+            }
+            let tilt = tilt.unwrap_or(std::f64::consts::PI);
+            Ok(Condition::Inside { body, of, low: (*low).into(), high: (*high).into(), tilt })
+        }
+        SuccessEntry { touching: Some(names), apart: None, body: None, joint: None, .. } => {
+            Ok(Condition::Touching { bodies: pair("touching", names)?, wanted: true })
+        }
+        SuccessEntry { apart: Some(names), touching: None, body: None, joint: None, .. } => {
+            Ok(Condition::Touching { bodies: pair("apart", names)?, wanted: false })
+        }
+        SuccessEntry {
+            joint: Some(name), between: Some([low, high]), body: None, touching: None, apart: None, ..
+        } => {
+            let body = named(name, names, "joint")?;
+            if !matches!(bodies[body].hold, Hold::Joint(_)) {
+                return Err(("joint", format!("`{name}` is on no joint; name a body with a `joint`")));
+            }
+            Ok(Condition::Joint { body, low: *low, high: *high })
+        }
+        _ => Err((
+            "success",
+            "give one of `body` with `low` and `high`, `touching`, `apart`, or `joint` with `between`".into(),
+        )),
+    }
+}
+
+fn motion(entry: &MotionEntry, names: &[&str], bodies: &[BodyPlan], motions: &mut Motions) -> Result<(), Fault> {
+    let body = named(&entry.body, names, "body")?;
+    if !(entry.time >= 0.0 && entry.time <= 3600.0) {
+        return Err(("time", format!("it is {}; give seconds from 0 to 3600", entry.time)));
+    }
+    match (&bodies[body].hold, entry.position, entry.target) {
+        (Hold::Moved(_), Some(position), None) => {
+            finite("position", &position)?;
+            finite("rotation", &entry.rotation)?;
+            let relative_to = entry.relative_to.as_deref().map(|name| named(name, names, "relative_to")).transpose()?;
+            let pose = pose(position, entry.rotation);
+            motions.waypoints.push(Waypoint { body, time: entry.time, pose, relative_to });
+        }
+        (Hold::Joint(joint), None, Some(target)) => {
+            let Some(drive) = joint.drive else {
+                return Err(("target", format!("the joint of `{}` has no `drive`", entry.body)));
+            };
+            finite("target", &[target])?;
+            let force = entry.force.unwrap_or(drive.force);
+            not_negative("force", force)?;
+            motions.orders.push(Order { body, time: entry.time, target, force });
+        }
+        _ => {
+            let what =
+                "give a `position` for a body with `hold = \"moved\"`, or a `target` for one on a joint with a `drive`";
+            return Err(("body", what.into()));
+        }
+    }
+    Ok(())
+}

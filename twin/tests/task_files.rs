@@ -1,0 +1,136 @@
+//! Task files: those that ship succeed from any start, and what is wrong with one is said in a line with its place.
+
+use std::path::{Path, PathBuf};
+use twin::task::Task;
+
+fn shipped(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../tasks").join(name)
+}
+
+#[test]
+fn the_scripted_motion_of_each_task_succeeds_from_ten_starts() {
+    for name in ["push_milk.toml", "stack_boxes.toml", "pick_carrot.toml", "close_laptop.toml"] {
+        let task = Task::read(&shipped(name)).unwrap_or_else(|error| panic!("{error}"));
+        for seed in 0..10 {
+            let episode = task.episode(seed, task.horizon()).expect("room for all");
+            assert!(episode.success && episode.at_rest, "{name}, seed {seed}: {episode:?}");
+        }
+    }
+}
+
+#[test]
+fn a_start_is_that_of_its_seed_and_another_seed_has_another() {
+    let task = Task::read(&shipped("stack_boxes.toml")).expect("a task");
+    let [one, again, other] = [1, 1, 2].map(|seed| task.episode(seed, 0.001).expect("room for all"));
+    assert_eq!(one, again);
+    assert_ne!(one.bodies[1].start, other.bodies[1].start);
+}
+
+/// A table, a box on it, and a box that has to get to x = 1.
+const GOOD: &str = r#"horizon = 1.0
+[[body]]
+name = "table"
+hold = "fixed"
+friction = 0.5
+piece = [{ shape = "box", size = [1.0, 1.0, 0.1], position = [0.0, 0.0, -0.05] }]
+[[body]]
+name = "box"
+mass = 0.2
+friction = 0.5
+position = [0.0, 0.0, 0.03]
+piece = [{ shape = "box", size = [0.06, 0.06, 0.06] }]
+[[body]]
+name = "lid"
+mass = 0.2
+friction = 0.5
+position = [0.3, 0.0, 0.2]
+piece = [{ shape = "box", size = [0.06, 0.06, 0.06] }]
+joint = { kind = "revolute", axis = [0.0, 1.0, 0.0], limits = [0.0, 1.0] }
+[[success]]
+body = "box"
+low = [0.9, -1.0, 0.0]
+high = [1.1, 1.0, 0.1]
+"#;
+
+#[test]
+fn what_is_wrong_with_a_task_is_said_in_one_line_with_line_and_key() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let open = "v 0 0 0\nv 0.1 0 0\nv 0 0.1 0\nv 0 0 0.1\nf 1 3 2\nf 1 2 4\nf 2 3 4\n";
+    // A tetrahedron whose middle of one side is pushed in.
+    let dented = "v 0 0 0\nv 0.1 0 0\nv 0 0.1 0\nv 0 0 0.1\nv 0.02 0.02 0.02\n\
+        f 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 5\nf 3 4 5\nf 4 2 5\n";
+    std::fs::write(folder.path().join("open.obj"), open).expect("room");
+    std::fs::write(folder.path().join("dented.obj"), dented).expect("room");
+    let piece = "piece = [{ shape = \"box\", size = [0.06, 0.06, 0.06] }]\n[[body]]\nname = \"lid\"";
+    let mesh = |file: &str| format!("piece = [{{ mesh = \"{file}\" }}]\n[[body]]\nname = \"lid\"");
+    let cases: [(&str, &str, &str, &str); 18] = [
+        ("", "", "", ""),
+        (
+            "position = [0.0, 0.0, 0.03]",
+            "position = [0.0, 0.0, 0.02]",
+            "11",
+            "`table` and `box` overlap where they start",
+        ),
+        (", limits = [0.0, 1.0]", "", "19", "`joint`: it has no limits"),
+        ("limits = [0.0, 1.0]", "limits = [1.0, 0.0]", "19", "`limits`: [1, 0] is no range"),
+        (piece, &mesh("open.obj"), "12", "`mesh`: FOLDER/open.obj is open at 3 edges"),
+        (piece, &mesh("dented.obj"), "12", "FOLDER/dented.obj is not convex"),
+        (piece, &mesh("none.obj"), "12", "No such file"),
+        ("low = [0.9,", "low = [-1.0,", "20", "`success`: all of it holds at the start already"),
+        (
+            "friction = 0.5\nposition = [0.0",
+            "fricton = 0.5\nposition = [0.0",
+            "10",
+            "unknown key `fricton`; did you mean `friction`?",
+        ),
+        (
+            "mass = 0.2\nfriction = 0.5\nposition = [0.0",
+            "friction = 0.5\nposition = [0.0",
+            "7",
+            "`mass`: `box` moves by itself",
+        ),
+        (
+            "mass = 0.2\nfriction = 0.5\nposition = [0.0",
+            "mass = -1.0\nfriction = 0.5\nposition = [0.0",
+            "9",
+            "`mass`: it is -1",
+        ),
+        ("axis = [0.0, 1.0, 0.0]", "axis = [0.0, 0.0, 0.0]", "19", "`axis`: it has no length"),
+        ("body = \"box\"", "body = \"bok\"", "21", "no body is called `bok`"),
+        ("name = \"lid\"", "name = \"box\"", "14", "two bodies are called `box`"),
+        ("size = [0.06, 0.06, 0.06] }]\n[[body]]", "size = [0.06, 0.0, 0.06] }]\n[[body]]", "12", "`size` holds 0"),
+        (
+            "limits = [0.0, 1.0]",
+            "limits = [0.0, 1.0], drive = { target = 0.5, speed = -1.0, force = 1.0 }",
+            "19",
+            "`drive`: it is -1",
+        ),
+        ("0.06] }]\n[[body]]", "0.06], position = [nan, 0.0, 0.0] }]\n[[body]]", "11", "`position`: it holds NaN"),
+        ("horizon = 1.0", "horizon = nan", "1", "`horizon`: it is NaN"),
+    ];
+    for (before, after, line, said) in cases {
+        assert!(GOOD.contains(before), "{before}");
+        let path = folder.path().join("task.toml");
+        std::fs::write(&path, GOOD.replacen(before, after, 1)).expect("room");
+        let outcome = Task::read(&path);
+        if said.is_empty() {
+            outcome.expect("a good task");
+            continue;
+        }
+        let error = outcome.expect_err(said).to_string();
+        let said = said.replace("FOLDER", &folder.path().display().to_string());
+        assert!(error.starts_with(&format!("{}:{line}: ", path.display())), "{said}: {error}");
+        assert!(error.contains(&said) && !error.contains('\n'), "{said}: {error}");
+    }
+}
+
+#[test]
+fn bodies_that_find_no_room_are_named() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("task.toml");
+    let text =
+        GOOD.replacen("position = [0.0, 0.0, 0.03]", "position = [0.0, 0.0, 0.02]\nstart = { x = [-0.1, 0.1] }", 1);
+    std::fs::write(&path, text).expect("room");
+    let error = Task::read(&path).expect_err("no room").to_string();
+    assert!(error.contains("`table` and `box` overlap where they start in 1000 drawings out of 1000"), "{error}");
+}
