@@ -9,9 +9,11 @@
 //! | [`score`] | rates, intervals, calibration |
 //! | [`run`] | all worlds of a benchmark |
 //! | [`coverage`] | whether printed intervals hold the truth |
+//! | [`pairs`] | two sessions of one world, of which something changed or nothing did |
 
 pub mod coverage;
 pub mod draw;
+pub mod pairs;
 pub mod rules;
 pub mod run;
 pub mod score;

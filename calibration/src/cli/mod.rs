@@ -116,6 +116,10 @@ fn run_to_the_end(verb: Verb, interrupt: &Interrupt) -> anyhow::Result<()> {
     match verb {
         Verb::Identify(identify) => identify::run(identify, interrupt),
         Verb::Compare(arguments) => compare::run(arguments, interrupt),
+        Verb::Diagnose(arguments) if arguments.against.is_some() => {
+            let found = diagnose::against::command::run(&arguments, interrupt)?;
+            print(arguments.json, &found, terminal::comparison(&found))
+        }
         Verb::Diagnose(arguments) => {
             let found = diagnose::command::run(&arguments, interrupt)?;
             print(arguments.json, &found, terminal::diagnosis(&found))
@@ -181,6 +185,8 @@ mod tests {
             (format!("{strokes} --repeat 2 --turn-tool -90"), true),
             (strokes.to_owned(), false),
             ("calibration diagnose monday --cell cell.toml --seed -5".to_owned(), true),
+            ("calibration diagnose monday --against tuesday --torques".to_owned(), true),
+            ("calibration diagnose monday --against tuesday --budget 60".to_owned(), false),
             ("calibration demo --seed=-5".to_owned(), true),
             ("calibration compare strokes --seed -5 --out comparison.json".to_owned(), true),
             ("calibration identify arm clip.mcap --cell cell.toml --seed -5".to_owned(), true),

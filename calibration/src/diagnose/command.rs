@@ -21,6 +21,10 @@ it. The verdict is none, named, class (several that these clips cannot separate)
 A recording that cannot mean what it says (units, order, sign, misaligned logs) is not explained, unless --as-recorded says
 so: `calibration check` shows what is wrong.
 
+With --against B the question is another: what changed from this session, A, to B, of one robot under one control law (a payload, a
+wiped table, a gain, wear). A's parameters and effects count for both, and the change is told with a 95 % interval and the
+share of B's gap under A's model that it closes; or that nothing changed, and how small a change would have been seen.
+
 What to record next is printed as commands that can be typed, and of an effect that is named what to do about it in the
 cell and in a model.
 
@@ -36,42 +40,46 @@ Examples:
   calibration diagnose session --report report.html
   calibration diagnose session --out diagnosis.json --seed 7 --json
   calibration diagnose session --torques --report torques.html
-  calibration diagnose session --budget 120 --out diagnosis.json")]
+  calibration diagnose session --budget 120 --out diagnosis.json
+  calibration diagnose monday --against tuesday --report changes.html")]
 pub struct Arguments {
     /// Folder with cell.toml and at least four different clips.
     #[arg(value_name = "SESSION")]
-    session: PathBuf,
+    pub(super) session: PathBuf,
+    /// Another session of the same robot: what changed from SESSION to this one, B. --theta then gets the parameters of B.
+    #[arg(long, value_name = "SESSION", conflicts_with = "budget")]
+    pub against: Option<PathBuf>,
     /// What the laboratory knows about its cell [default: cell.toml beside the clips].
     #[arg(long, value_name = "CELL.TOML")]
-    cell: Option<PathBuf>,
+    pub(super) cell: Option<PathBuf>,
     /// Parameters that are known already; effects among them act and are no candidates.
     #[arg(long, value_name = "THETA.TOML")]
-    parameters: Option<PathBuf>,
+    pub(super) parameters: Option<PathBuf>,
     /// Where the answer goes, as JSON.
     #[arg(long, value_name = "DIAGNOSIS.JSON")]
-    out: Option<PathBuf>,
+    pub(super) out: Option<PathBuf>,
     /// Where the page goes.
     #[arg(long, value_name = "REPORT.HTML")]
-    report: Option<PathBuf>,
+    pub(super) report: Option<PathBuf>,
     /// Where the parameters and the effects named go [default: theta.toml beside --out, where there is none].
     #[arg(long, value_name = "THETA.TOML")]
     theta: Option<PathBuf>,
     /// Replaces the files of --out, --report and --theta; of a theta.toml, comments and what is not found stay.
     #[arg(long)]
-    force: bool,
+    pub(super) force: bool,
     /// Takes the data as they were recorded where `calibration check` says that they cannot mean what they say.
     #[arg(long)]
-    as_recorded: bool,
+    pub(super) as_recorded: bool,
     /// After so many seconds the best answer so far counts, 1 to 1000000 [default: as long as it takes].
     #[arg(long, value_name = "SECONDS", value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
     budget: Option<u64>,
     /// Explains the measured torques along the measured motion instead of how commands are followed: for logs without
     /// commands, and where the control law is not known. Needs a model with masses.
     #[arg(long)]
-    torques: bool,
+    pub(super) torques: bool,
     /// Draws which clips are for what, and the intervals.
     #[arg(long, value_name = "N", default_value_t = 0, value_parser = crate::seed::parse, allow_negative_numbers = true)]
-    seed: u64,
+    pub(super) seed: u64,
     /// Prints one JSON object on stdout at the end.
     #[arg(long)]
     pub json: bool,
@@ -122,7 +130,7 @@ pub fn run(arguments: &Arguments, interrupt: &Interrupt) -> anyhow::Result<Diagn
 
 /// Where the parameters go: where they are told to, or beside the answer. There nobody named the file, so one that is there
 /// stays.
-fn theta_file(arguments: &Arguments) -> anyhow::Result<Option<PathBuf>> {
+pub(super) fn theta_file(arguments: &Arguments) -> anyhow::Result<Option<PathBuf>> {
     if let Some(file) = &arguments.theta {
         return Ok(Some(Destination::new(file, arguments.force)?.path().to_owned()));
     }

@@ -133,6 +133,27 @@ impl Library {
         Self { settings: Settings::new(base.clone(), all), unknowns, joints, reaches, baseline, candidates, robot }
     }
 
+    /// Some of its numbers, one of them perhaps several times, each with its own bounds, as the baseline of a library without
+    /// candidates.
+    pub(super) fn of_numbers(&self, chosen: Vec<(usize, Unknown)>) -> Self {
+        let turned = |number: usize| chosen.iter().any(|(k, _)| *k == number);
+        let reach = |k: usize| match self.reaches[k] {
+            ArmReach::With(other) if turned(other) => ArmReach::Always,
+            ArmReach::With(_) => ArmReach::Never,
+            plain => plain,
+        };
+        let all = self.settings.settings();
+        Self {
+            settings: Settings::new(self.settings.base().clone(), chosen.iter().map(|(k, _)| all[*k]).collect()),
+            joints: chosen.iter().map(|(k, _)| self.joints[*k]).collect(),
+            reaches: chosen.iter().map(|(k, _)| reach(*k)).collect(),
+            baseline: 0..chosen.len(),
+            candidates: Vec::new(),
+            robot: self.robot.clone(),
+            unknowns: chosen.into_iter().map(|(_, unknown)| unknown).collect(),
+        }
+    }
+
     /// Where every search begins: the baseline's values, all effects at rest.
     #[must_use]
     pub fn start(&self) -> Vec<f64> {

@@ -38,10 +38,12 @@
 //! | [`remedies`] | what to do about what was named |
 //! | [`ranked`], `reason` | what is said of every candidate, and why |
 //! | [`conclude`], [`answer`] | the answer |
+//! | [`against`] | what changed between two sessions of one robot |
 //! | [`command`] | the verb |
 
 pub mod admit;
 pub mod advice;
+pub mod against;
 pub mod answer;
 pub mod arm_alone;
 pub mod arm_clips;

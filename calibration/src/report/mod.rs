@@ -3,6 +3,7 @@
 //! | module | owns |
 //! |---|---|
 //! | [`diagnosis`] | the page of a diagnosis |
+//! | [`against`] | the page of what changed between two sessions |
 //! | [`check`] | the page of what is odd about a recording |
 //! | [`benchmark`] | the page of how good the diagnosis is |
 //! | [`demo_page`] | the page of the demo |
@@ -13,10 +14,13 @@
 //! | `frame` | what all pages share: style, headings, legends |
 //! | `figure` | pictures of plain numbers: bars, map, lines, intervals, matrix |
 //! | `canvas`, `scale` | SVG, axes |
+//! | `change` | what a number was and what it is |
 //! | `quantity`, `share`, `parameters` | numbers, units, shares and intervals as people read them |
 
+pub mod against;
 pub mod benchmark;
 mod canvas;
+mod change;
 pub mod check;
 pub mod demo_page;
 pub mod diagnosis;
@@ -31,6 +35,7 @@ pub mod stroke;
 pub mod terminal;
 pub mod trace;
 
+pub use change::{between, smallest_in_words};
 pub use demo_page::Story;
 pub use parameters::{effect_in_words, number_in_words};
 pub use quantity::in_unit;

@@ -1,6 +1,7 @@
 //! What verbs print for a person: a short table, aligned, and the sentence at the end, where eyes are.
 
 use super::benchmark::{Method, RATES};
+use super::change;
 use super::channel_in_words;
 use super::diagnosis::{confidence, has_effects, is_known, sizes, together, verdict_words, words};
 use super::identification::{Parameter, Sheet};
@@ -8,8 +9,9 @@ use super::quantity::{Unit, short};
 use super::scale::span;
 use super::share::{limited, percent, percent_interval};
 use crate::benchmark::score::Scores;
+use crate::diagnose::against::{Candidate as Compared, Comparison};
 use crate::diagnose::confidence::MOST;
-use crate::diagnose::{Candidate, Diagnosis, Status, TorqueRms};
+use crate::diagnose::{Candidate, Diagnosis, Kind, Status, TorqueRms};
 
 /// Places of the gap that are named.
 const SHOWN_PLACES: usize = 3;
@@ -79,6 +81,46 @@ pub fn diagnosis(diagnosis: &Diagnosis) -> String {
     let verdict = &diagnosis.verdict;
     lines.extend(confidence(verdict).map(|(value, what)| format!("confidence: {value}, {what}")));
     lines.push(format!("{}: {}", verdict_words(verdict.kind), verdict.text));
+    lines.join("\n")
+}
+
+/// A comparison of two sessions: B's gap, what changed number by number, and the verdict.
+#[must_use]
+pub fn comparison(found: &Comparison) -> String {
+    let gap = &found.gap;
+    let both = matches!(found.verdict.kind, Kind::Named | Kind::Class);
+    let after = if both {
+        let shrink = percent_interval(gap.shrink.value, gap.shrink.ci90);
+        format!(" -> {} with what changed, shrink {shrink}", short(gap.after))
+    } else {
+        String::new()
+    };
+    let mut lines = vec![format!(
+        "gap: A {}, B under A's model {}{after} sigma^2 (noise alone {})",
+        short(found.gap_of_a),
+        short(gap.before),
+        short(gap.floor)
+    )];
+    if !found.shared.is_empty() {
+        lines.push(format!("in both: {}", found.shared.iter().map(|name| words(name)).collect::<Vec<_>>().join(", ")));
+    }
+    let open = |candidate: &&Compared| matches!(candidate.status, Status::Named | Status::Possible);
+    for candidate in found.candidates.iter().filter(open) {
+        lines.push(format!("{}   {}", words(&candidate.name), limited(candidate.probability, MOST)));
+        let rows = candidate.parameters.iter().flat_map(|(name, values)| change::rows(&candidate.name, name, values));
+        let rows = rows.map(|[number, a, b, change]| {
+            vec![format!("    {number}"), format!("{a} -> {b}"), format!("change {change}")]
+        });
+        lines.extend(table(rows.collect()));
+    }
+    let count = |status| found.candidates.iter().filter(|candidate| candidate.status == status).count();
+    lines.push(format!("{} ruled out, {} not testable", count(Status::RuledOut), count(Status::NotTestable)));
+    lines.extend(found.warnings.iter().map(|warning| format!("note: {warning}")));
+    if !found.next_experiment.is_empty() {
+        lines.push(format!("next clip: {}", found.next_experiment));
+    }
+    lines.extend(found.next_commands.iter().map(|command| format!("    {command}")));
+    lines.push(format!("{}: {}", super::against::verdict_words(found.verdict.kind), found.verdict.text));
     lines.join("\n")
 }
 

@@ -1,0 +1,44 @@
+//! `calibration diagnose A --against B`: files, and what is printed.
+
+use super::super::Options;
+use super::super::command::{Arguments, theta_file};
+use super::{Comparison, compare_kept};
+use crate::check::gate;
+use crate::interrupt::Interrupt;
+use crate::report;
+use shared_mem::output::Destination;
+use shared_mem::recording::Session;
+use shared_mem::theta::Theta;
+
+/// Runs the verb; the caller prints what was found.
+///
+/// # Errors
+/// What cannot be read, compared or written, in one line with the remedy.
+pub fn run(arguments: &Arguments, interrupt: &Interrupt) -> anyhow::Result<Comparison> {
+    let Arguments { out, report, force, cell, .. } = arguments;
+    let page = Destination::of(report.as_deref(), *force)?;
+    let answer = Destination::of(out.as_deref(), *force)?;
+    let theta_file = theta_file(arguments)?;
+    Destination::apart(&[out.as_deref(), report.as_deref(), theta_file.as_deref()])?;
+    let against = arguments.against.as_ref().unwrap_or(&arguments.session);
+    let (a, b) =
+        (Session::open_with(&arguments.session, cell.as_deref())?, Session::open_with(against, cell.as_deref())?);
+    let odd = [gate::look(&a, arguments.as_recorded)?, gate::look(&b, arguments.as_recorded)?];
+    let theta = arguments.parameters.as_deref().map(Theta::read).transpose()?;
+    let (seed, torques) = (arguments.seed, arguments.torques);
+    let options = Options { theta, seed, torques, budget: None, out: out.clone() };
+    let (mut found, kept) = compare_kept([&a, &b], &options, interrupt)?;
+    odd.iter().for_each(|odd| gate::add(&mut found.warnings, odd.as_ref()));
+    if let Some(file) = theta_file {
+        found.theta.write(&file)?;
+        found.theta_file = Some(file);
+    }
+    if let Some(answer) = answer {
+        answer.write(serde_json::to_string_pretty(&found)?)?;
+    }
+    if let Some(page) = page {
+        page.write(report::against::page(&found))?;
+    }
+    kept.done();
+    Ok(found)
+}

@@ -1,0 +1,270 @@
+//! From what the search found to the answer: the clips kept for confirming are opened here, and only here.
+
+use super::super::answer::{Clips, Kind, Share, Status};
+use super::super::evidence::Evidence;
+use super::super::fit::Hypothesis;
+use super::super::gap::Residuals;
+use super::super::remainder::Left;
+use super::super::sizes::Sizes;
+use super::super::{DiagnoseError, Options, advice, localise, site::Site};
+use super::answer::{Candidate, Comparison, Smallest, Verdict};
+use super::changes;
+use super::fits::{Court, numbers};
+use super::headline::{self, Facts};
+use super::pair::Pair;
+use super::scores::Score;
+use super::search::{Found, Step, Trial, smallest_seen};
+use super::subjects::Subject;
+use super::turned::Side;
+use crate::forward::Setting;
+use shared_mem::recording::Session;
+use std::collections::BTreeMap;
+
+/// Likelihoods count less than they say: twins are never exact.
+const TEMPERATURE: f64 = 4.0;
+/// What is kept for causes outside of the library, and how sure a class and an open gap are, as for one session.
+const MOST: f64 = 0.96;
+const CLASS: f64 = 0.9;
+const OPEN: f64 = 0.7;
+/// B deviates where it leaves more than this many times what A leaves under its own model.
+const MORE_THAN_A: f64 = 2.0;
+
+/// What a conclusion is drawn from.
+pub(super) struct Case<'a> {
+    /// The sessions, A first.
+    pub(super) sessions: [&'a Session; 2],
+    /// Their clips.
+    pub(super) pair: &'a Pair,
+    /// What was found on A alone.
+    pub(super) of_a: &'a Hypothesis,
+    /// What may have changed.
+    pub(super) subjects: &'a [Subject],
+    /// What was found.
+    pub(super) found: &'a Found,
+}
+
+/// Opens the clips kept for confirming and says what was found.
+///
+/// # Errors
+/// [`DiagnoseError`] when the twin has no answer on them.
+pub(super) fn conclude<E: Evidence>(
+    court: &Court<'_, E>,
+    case: &Case<'_>,
+    options: &Options,
+) -> Result<Comparison, DiagnoseError> {
+    let (found, session) = (case.found, case.sessions[1]);
+    let held_out = court.held_out(&found.last, &found.weights).ok_or(DiagnoseError::NoBaseline)?;
+    let with = Residuals::of(court.bench, &held_out).ok_or(DiagnoseError::NoBaseline)?;
+    let under_a: Vec<_> = held_out.iter().map(|(_, clips)| (numbers(case.of_a.full.clone()), clips.clone())).collect();
+    let before = Residuals::of(court.bench, &under_a).ok_or(DiagnoseError::NoBaseline)?;
+    let shrink = with.shrink(&before, options.seed);
+    let rivals = rivals(court, case);
+    let deviates = deviates(court, case);
+    let kind = match (found.changed.is_empty() || shrink.value <= 0.0, rivals.is_empty()) {
+        (true, _) if deviates.is_some() => Kind::Unexplained,
+        (true, _) => Kind::None,
+        (false, true) => Kind::Named,
+        (false, false) => Kind::Class,
+    };
+    let believed = matches!(kind, Kind::Named | Kind::Class);
+    let after = if believed { &with } else { &before };
+    let fits = if believed { &held_out } else { &under_a };
+    let gap = Sizes::of(court.bench, ([&under_a, fits], [&before, after]), session, &case.pair.admitted)?
+        .gap([&before, after], options.seed);
+    let (gap_of_a, places) = (of_a(court, case), localise::localise(court.bench.evidence, &before));
+    let candidates = candidates(court, case, (kind, &rivals), (&before, options.seed));
+    let changes: Vec<String> = if believed { named(case, &rivals) } else { Vec::new() };
+    let facts = Facts::of(&candidates, gap.shrink, deviates.unwrap_or(1.0), places.first());
+    let text = headline::sentence(kind, &facts);
+    let names: Vec<&str> = changes.iter().map(String::as_str).collect();
+    let next =
+        if kind == Kind::Class { advice::separating(&names, &Site::of(session)) } else { advice::Advice::default() };
+    let files = |set: &[usize]| set.iter().map(|clip| case.pair.admitted.files[*clip].clone()).collect();
+    let in_b = if believed { found.last.model.of(Side::B) } else { found.without.model.of(Side::B) };
+    Ok(Comparison {
+        verdict: Verdict { kind, changes, confidence: confidence(kind, &candidates), text },
+        gap,
+        gap_of_a,
+        places,
+        shared: shared(court, case),
+        candidates,
+        next_experiment: next.sentence,
+        next_commands: next.commands,
+        clips: Clips {
+            train: files(&court.split.train),
+            choose: files(&court.split.choose),
+            confirm: files(&court.split.confirm),
+        },
+        warnings: case.pair.admitted.warnings.clone(),
+        seconds: 0.0,
+        session: case.sessions[0].folder.display().to_string(),
+        against: session.folder.display().to_string(),
+        files: case.sessions.map(|session| session.files.clone()),
+        seed: options.seed,
+        theta: court.bench.library.theta(in_b),
+        theta_file: None,
+    })
+}
+
+/// What A's own clips kept for confirming leave under what was found on A.
+fn of_a<E: Evidence>(court: &Court<'_, E>, case: &Case<'_>) -> f64 {
+    let clips: Vec<usize> = court.split.confirm.iter().copied().filter(|clip| !court.is_of_b(*clip)).collect();
+    court.left(&case.of_a.full, &clips).map_or(0.0, |left| left.mean_square())
+}
+
+/// How many times as much B leaves although both share everything as A does under its own model, in a clip like most; `None`
+/// where that is not plainly more.
+fn deviates<E: Evidence>(court: &Court<'_, E>, case: &Case<'_>) -> Option<f64> {
+    let (of_b, of_a): (Vec<usize>, Vec<usize>) = court.split.open().into_iter().partition(|clip| court.is_of_b(*clip));
+    let b = court.left(case.found.without.model.of(Side::B), &of_b)?;
+    let a = court.left(&case.of_a.full, &of_a)?;
+    let groups = Left::of_groups(&b.typical(), &a.typical());
+    let more = groups.iter().filter(|left| left.gaps() > 1.0).map(|left| left.before / left.after);
+    more.filter(|times| *times > MORE_THAN_A).max_by(f64::total_cmp)
+}
+
+/// Subjects that do as well as one that changed, beside all the others that did.
+fn rivals<E: Evidence>(court: &Court<'_, E>, case: &Case<'_>) -> Vec<usize> {
+    let found = case.found;
+    let mut rivals = Vec::new();
+    for step in found.steps.iter().filter(|step| step.added.is_some_and(|added| found.changed.contains(&added))) {
+        let others = step.rivals(court).into_iter().filter(|trial| !found.changed.contains(&trial.subject));
+        let alike =
+            others.filter(|trial| found.changed.len() == 1 || found.stands_in(court, case.subjects, (step, trial)));
+        rivals.extend(alike.map(|trial| trial.subject));
+    }
+    rivals.sort_unstable();
+    rivals.dedup();
+    rivals
+}
+
+fn named(case: &Case<'_>, rivals: &[usize]) -> Vec<String> {
+    case.found.changed.iter().chain(rivals).map(|subject| case.subjects[*subject].name.clone()).collect()
+}
+
+/// Effects that act in both sessions alike.
+fn shared<E: Evidence>(court: &Court<'_, E>, case: &Case<'_>) -> Vec<String> {
+    let (library, model) = (court.bench.library, &case.found.last.model);
+    let acts = |subject: &&Subject| {
+        let rests = |k: &usize| model.of(Side::A)[*k] == library.unknowns[*k].start;
+        let changed = case.found.changed.iter().any(|changed| case.subjects[*changed].name == subject.name);
+        subject.effect.is_some() && !changed && !subject.sizes.iter().all(rests)
+    };
+    case.subjects.iter().filter(acts).map(|subject| subject.name.clone()).collect()
+}
+
+/// What is said of everything that may have changed.
+fn candidates<E: Evidence>(
+    court: &Court<'_, E>,
+    case: &Case<'_>,
+    (kind, rivals): (Kind, &[usize]),
+    (before, seed): (&Residuals, u64),
+) -> Vec<Candidate> {
+    let (found, first) = (case.found, &case.found.steps[0]);
+    let likely = probabilities(&found.steps);
+    let one = |(index, subject): (usize, &Subject)| {
+        let changed = found.changed.contains(&index) && matches!(kind, Kind::Named | Kind::Class);
+        let trial =
+            found.steps.iter().filter_map(|step| step.trials.iter().find(|trial| trial.subject == index)).last();
+        let fitted = if changed { Some(&found.last) } else { trial.map(|trial| &trial.fitted) };
+        let with = fitted
+            .filter(|_| changed || rivals.contains(&index))
+            .and_then(|fitted| Residuals::of(court.bench, &court.held_out(fitted, &found.weights)?));
+        let shrink = with.map_or(Share { value: 0.0, ci90: [0.0; 2] }, |with| with.shrink(before, seed));
+        let score = first.scores.iter().find(|score| score.subject == index);
+        let smallest = score.map(|score| smallest(court, score)).unwrap_or_default();
+        let seen = score.is_some_and(|score| could_be_seen(court, score));
+        let status = match kind {
+            Kind::Named if changed => Status::Named,
+            Kind::Class if changed || rivals.contains(&index) => Status::Possible,
+            _ if !seen => Status::NotTestable,
+            _ => Status::RuledOut,
+        };
+        let alike: Vec<String> =
+            if changed { rivals } else { &[][..] }.iter().map(|rival| case.subjects[*rival].name.clone()).collect();
+        Candidate {
+            name: subject.name.clone(),
+            is_effect: subject.effect.is_some(),
+            probability: likely.get(&index).copied().unwrap_or(0.0),
+            parameters: fitted.map(|fitted| changes::of_subject(court, fitted, subject)).unwrap_or_default(),
+            shrink,
+            confusable_with: alike,
+            status,
+            why: headline::reason(status, score.map(|score| (score.p, score.gain)), trial),
+            smallest_seen: smallest,
+        }
+    };
+    let mut all: Vec<Candidate> = case.subjects.iter().enumerate().map(one).collect();
+    let place = |candidate: &Candidate| {
+        let index = case
+            .subjects
+            .iter()
+            .position(|subject| subject.name == candidate.name && subject.effect.is_some() == candidate.is_effect);
+        first.scores.iter().position(|score| Some(score.subject) == index).unwrap_or(usize::MAX)
+    };
+    all.sort_by_key(|candidate| {
+        (
+            candidate.status != Status::Named,
+            candidate.status != Status::Possible,
+            candidate.status == Status::NotTestable,
+            place(candidate),
+        )
+    });
+    all
+}
+
+/// How likely each change is that was proven: shares of the evidence in the step in which it was.
+fn probabilities(steps: &[Step]) -> BTreeMap<usize, f64> {
+    let mut all = BTreeMap::new();
+    for step in steps {
+        let proven: Vec<&Trial> = step.proven().collect();
+        let best = proven.iter().map(|trial| trial.whole.nats).fold(0.0, f64::max);
+        let weight = |nats: f64| ((nats - best) / TEMPERATURE).exp();
+        let total: f64 = proven.iter().map(|trial| weight(trial.whole.nats)).sum::<f64>() + weight(0.0);
+        for trial in proven {
+            let probability = MOST * weight(trial.whole.nats) / total;
+            all.entry(trial.subject)
+                .and_modify(|known: &mut f64| *known = known.max(probability))
+                .or_insert(probability);
+        }
+    }
+    all
+}
+
+fn confidence(kind: Kind, candidates: &[Candidate]) -> f64 {
+    let named = candidates.iter().filter(|candidate| candidate.status == Status::Named);
+    match kind {
+        Kind::Named => named.map(|candidate| candidate.probability).fold(MOST, f64::min),
+        Kind::None => MOST,
+        Kind::Class => CLASS,
+        Kind::Unexplained => OPEN,
+        Kind::NotTestable => 1.0,
+    }
+}
+
+/// The smallest change of every size that would have been seen, by parameter.
+fn smallest<E: Evidence>(court: &Court<'_, E>, score: &Score) -> BTreeMap<String, Smallest> {
+    let mut all: BTreeMap<String, Smallest> = BTreeMap::new();
+    for (number, sigma) in &score.sigma {
+        let setting = &court.bench.library.settings.settings()[*number];
+        // Of a stiffness that is turned as its inverse no change has a size of its own.
+        if matches!(setting, Setting::Effect { inverse: true, .. }) {
+            continue;
+        }
+        let unit = setting.physical_unit();
+        let parameter =
+            all.entry(changes::name(&setting.parameter())).or_insert_with(|| Smallest { values: Vec::new(), unit });
+        parameter.values.push(smallest_seen(*sigma, score.cost));
+    }
+    all
+}
+
+/// Whether a change as large as what is met in practice would have been seen in any of its numbers.
+fn could_be_seen<E: Evidence>(court: &Court<'_, E>, score: &Score) -> bool {
+    let library = court.bench.library;
+    score.sigma.iter().any(|(number, sigma)| {
+        let unknown = &library.unknowns[*number];
+        let largest = (unknown.upper - unknown.start).max(unknown.start - unknown.lower);
+        smallest_seen(*sigma, score.cost) < largest
+    })
+}

@@ -1,0 +1,227 @@
+//! Two sessions of one robot, everything shared but one or two effects: what changed from the first to the second.
+//!
+//! What acts in the first session, A, is found as in any diagnosis. Then the clips of both sessions are explained together: the
+//! parameters and the effects of A's model are shared, and one after the other each of them, and each further effect, may have
+//! another value in the second session, B. A change counts where it predicts clips that it was not fitted to better than the
+//! same thing in both sessions does. What A does not tell well is refitted with every change, so that its uncertainty is no
+//! change.
+//!
+//! | module | step |
+//! |---|---|
+//! | [`pair`] | whether two sessions can be compared, and their clips as those of one cell |
+//! | `turned` | numbers that both sessions share and numbers that each has of its own |
+//! | `subjects` | what may have changed |
+//! | `scores` | what the slopes say of every change, and how small a change they would show |
+//! | `fits` | models of both sessions fitted, and what one is worth over another |
+//! | `search` | changes added while they are worth it |
+//! | `changes` | values in A and B, and the change with its interval |
+//! | `conclude`, `headline`, [`answer`] | the answer |
+//! | [`command`] | files, and what is printed |
+
+pub mod answer;
+mod changes;
+pub mod command;
+mod conclude;
+mod fits;
+mod headline;
+pub mod pair;
+mod scores;
+mod search;
+mod subjects;
+mod turned;
+
+pub use answer::{Candidate, Comparison, Smallest, Values, Verdict};
+pub use pair::{Pair, Unlike};
+
+use super::admit::Refused;
+use super::arm_clips::ArmClips;
+use super::cell_clips::CellClips;
+use super::evidence::Evidence;
+use super::fit::{Bench, Hypothesis};
+use super::gap::Residuals;
+use super::library::Library;
+use super::remainder::Left;
+use super::split::{FEW, Split};
+use super::{DiagnoseError, Options, Work, baseline, combine, peaks, stages, torques};
+use crate::forward::object::ObjectClips;
+use crate::forward::setting;
+use crate::interrupt::Interrupt;
+use crate::kept::{self, Fingerprint, Kept};
+use fits::Court;
+use shared_mem::progress::Progress;
+use shared_mem::recording::Session;
+use shared_mem::theta::Theta;
+use shared_mem::typed;
+use std::sync::Arc;
+use std::time::Instant;
+use turned::{SIDES, Side, side_of};
+
+/// Two sessions cannot be compared.
+#[derive(Debug, thiserror::Error)]
+pub enum AgainstError {
+    /// They are not alike enough.
+    #[error(transparent)]
+    Unlike(#[from] Unlike),
+    /// The work on them.
+    #[error(transparent)]
+    Diagnose(#[from] DiagnoseError),
+}
+
+/// What changed from the first session to the second, with what was found on the way: to be given up ([`Kept::done`]) once the
+/// answer is where it belongs.
+///
+/// # Errors
+/// [`AgainstError`].
+pub fn compare_kept(
+    sessions: [&Session; 2],
+    options: &Options,
+    interrupt: &Interrupt,
+) -> Result<(Comparison, Arc<Kept>), AgainstError> {
+    let tracking = |session: &Session| torques::cell(&session.cell).map(|cell| Session { cell, ..session.clone() });
+    let owned: Option<Vec<Session>> = if options.torques { sessions.into_iter().map(tracking).collect() } else { None };
+    let sessions = match &owned {
+        Some(both) => [&both[0], &both[1]],
+        None if options.torques => return Err(DiagnoseError::from(Refused::NoModel).into()),
+        None => sessions,
+    };
+    let pair = pair::pair(sessions)?;
+    let cells = sessions.map(|session| session.cell.to_toml());
+    let question = Fingerprint::of("diagnose against")
+        .with(&(cells, options.theta.as_ref().map(Theta::to_toml), options.seed, options.torques, pair.first_of_b))
+        .with_clips(&pair.admitted.clips);
+    let kept = kept::for_work((options.out.as_deref(), &sessions[1].folder, "against"), &question, interrupt);
+    let found = compared(sessions, &pair, options, (interrupt, (&kept, "")));
+    interrupt.work_is_over();
+    if interrupt.cancelled() {
+        return Err(DiagnoseError::Interrupted(kept.farewell(&typed::command())).into());
+    }
+    Ok((found?, kept))
+}
+
+/// The same of clips that were admitted already; of the sessions only cells and names count.
+///
+/// # Errors
+/// [`DiagnoseError`].
+pub fn compare_clips(
+    sessions: [&Session; 2],
+    pair: &Pair,
+    options: &Options,
+    interrupt: &Interrupt,
+) -> Result<Comparison, DiagnoseError> {
+    compared(sessions, pair, options, (interrupt, (Kept::nothing(), "")))
+}
+
+fn compared(
+    sessions: [&Session; 2],
+    pair: &Pair,
+    options: &Options,
+    work: Work<'_>,
+) -> Result<Comparison, DiagnoseError> {
+    let began = Instant::now();
+    let (cell, admitted) = (&sessions[0].cell, &pair.admitted);
+    let base = setting::complete(cell, options.theta.as_ref())?;
+    let peaks = peaks(cell, admitted, &base)?;
+    let library = Library::new(cell, &base, admitted.ground().as_ref(), &peaks);
+    let theta = |numbers: &[f64]| library.theta(numbers);
+    let arm = ArmClips::new(cell, &admitted.clips, theta).map_err(Refused::from)?;
+    let mut comparison = if admitted.with_object {
+        let object = ObjectClips::new(cell, admitted.clips.clone(), library.settings.clone())?;
+        examine(&CellClips::new(Some(arm), object, &library), &library, (sessions, pair), options, work)?
+    } else {
+        examine(&arm, &library, (sessions, pair), options, work)?
+    };
+    if torques::is_tracking(cell) {
+        comparison.theta = torques::without_law(comparison.theta, options.theta.as_ref());
+    }
+    comparison.seconds = began.elapsed().as_secs_f64();
+    Ok(comparison)
+}
+
+fn examine<E: Evidence>(
+    evidence: &E,
+    library: &Library,
+    (sessions, pair): ([&Session; 2], &Pair),
+    options: &Options,
+    (interrupt, trail): Work<'_>,
+) -> Result<Comparison, DiagnoseError> {
+    let bench = Bench { evidence, library, scatter: evidence.scatter(), interrupt, trail };
+    let (admitted, cell) = (&pair.admitted, &sessions[0].cell);
+    let split = split_of(&admitted.groups, pair.first_of_b, options.seed);
+    let of_a = of_a(&split, pair.first_of_b);
+    let plan: &[_] = if admitted.with_object { &stages::OBJECT } else { &stages::ARM };
+    let plan = [plan, &search::STAGES].concat();
+    let bar = Progress::planned("diagnose", &plan, baseline::steps(admitted));
+    let begun = baseline::identify(&bench, &of_a, cell, admitted, &bar).ok_or(DiagnoseError::NoBaseline)?;
+    let refined = |full: &[f64]| {
+        let step = bench.step("refined of A").with_numbers(full);
+        trail.0.once(&step, || baseline::refined(&bench, &of_a, cell, admitted, full))
+    };
+    let on_a = if is_explained(&bench, &of_a, &begun) {
+        begun
+    } else {
+        combine::search(&bench, &of_a, begun, &refined, &bar).ok_or(DiagnoseError::NoBaseline)?.last
+    };
+    let court = Court { bench: &bench, first_of_b: pair.first_of_b, split: &split };
+    let subjects = subjects::all(library);
+    let found = search::search(&court, &subjects, &on_a, &bar).ok_or(DiagnoseError::NoBaseline)?;
+    bar.stage(stages::CONCLUSION, 1);
+    let case = conclude::Case { sessions, pair, of_a: &on_a, subjects: &subjects, found: &found };
+    conclude::conclude(&court, &case, options)
+}
+
+/// Whether the parameters alone leave of A so little beyond the noise that an effect has nothing to explain.
+fn is_explained<E: Evidence>(bench: &Bench<'_, E>, of_a: &Split, baseline: &Hypothesis) -> bool {
+    let Some(left) = Residuals::at(bench, baseline, &of_a.open()) else { return false };
+    Left::of_groups(&left.typical(), &left.typical()).iter().all(|left| left.gaps() < LITTLE)
+}
+
+/// So much of the least gap is none: engines that integrate in other steps differ by less.
+const LITTLE: f64 = 0.25;
+
+/// Which clips of both are for what: as of one session where each has enough commands; else each command of A is left out in
+/// turn, together with one of B.
+fn split_of(groups: &[Vec<usize>], first_of_b: usize, seed: u64) -> Split {
+    let of = |side: Side| -> Vec<Vec<usize>> {
+        let own = |group: &Vec<usize>| -> Vec<usize> {
+            group.iter().copied().filter(|clip| side_of(*clip, first_of_b) == side).collect()
+        };
+        groups.iter().map(own).filter(|group| !group.is_empty()).collect()
+    };
+    let [of_a, of_b] = SIDES.map(of);
+    if of_a.len().min(of_b.len()) >= FEW {
+        return Split::new(groups, seed);
+    }
+    let nothing = Vec::new();
+    let both = |k: usize| [of_a.get(k).unwrap_or(&nothing).clone(), of_b.get(k).unwrap_or(&nothing).clone()].concat();
+    let in_turn: Vec<Vec<usize>> = (0..of_a.len().max(of_b.len())).map(both).collect();
+    let mut all = groups.concat();
+    all.sort_unstable();
+    Split { train: all.clone(), choose: Vec::new(), confirm: all, in_turn }
+}
+
+/// The part of a split that belongs to A.
+fn of_a(split: &Split, first_of_b: usize) -> Split {
+    let of = |clips: &[usize]| clips.iter().copied().filter(|clip| *clip < first_of_b).collect::<Vec<_>>();
+    let in_turn = split.in_turn.iter().map(|group| of(group)).filter(|group| !group.is_empty()).collect();
+    Split { train: of(&split.train), choose: of(&split.choose), confirm: of(&split.confirm), in_turn }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn split(of_a: usize, of_b: usize) -> Split {
+        let groups: Vec<Vec<usize>> = (0..of_a + of_b).map(|clip| vec![clip]).collect();
+        split_of(&groups, of_a, 0)
+    }
+
+    #[test]
+    fn of_few_commands_one_of_each_session_is_left_out_in_turn_and_of_many_some_are_kept() {
+        let few = split(4, 5);
+        assert_eq!(few.in_turn, [vec![0, 4], vec![1, 5], vec![2, 6], vec![3, 7], vec![8]]);
+        assert_eq!(of_a(&few, 4).in_turn, [[0], [1], [2], [3]]);
+        let many = split(8, 8);
+        assert!(many.in_turn.is_empty() && many.confirm.iter().any(|clip| *clip >= 8));
+        assert!(of_a(&many, 8).confirm.iter().all(|clip| *clip < 8));
+    }
+}
