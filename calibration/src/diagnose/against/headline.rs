@@ -2,7 +2,7 @@
 
 use super::super::answer::{Kind, Place, Share, Status};
 use super::super::headline::words;
-use super::answer::{Candidate, Smallest};
+use super::answer::{Candidate, Smallest, Values};
 use super::search::Trial;
 use crate::report::{between, channel_in_words, percent, smallest_in_words};
 
@@ -82,10 +82,13 @@ pub(super) fn sentence(kind: Kind, facts: &Facts) -> String {
 
 /// `payload changed: mass 0 to 0.52 kg (change 0.52 [0.50, 0.54] kg)`.
 fn change(candidate: &Candidate) -> String {
-    let numbers: Vec<String> = candidate.parameters.iter().map(|(name, values)| between(name, values)).collect();
-    let own = candidate.parameters.keys().any(|name| *name == candidate.name);
-    let subject = if own { String::new() } else { format!("{} ", words(&candidate.name)) };
-    if numbers.is_empty() { format!("{subject}changed") } else { format!("{subject}changed: {}", numbers.join("; ")) }
+    let name = words(&candidate.name);
+    let number = |(parameter, values): (&String, &Values)| {
+        let text = between(parameter, values);
+        text.strip_prefix(&format!("{name} ")).map_or(text.clone(), str::to_owned)
+    };
+    let numbers: Vec<String> = candidate.parameters.iter().map(number).collect();
+    if numbers.is_empty() { format!("{name} changed") } else { format!("{name} changed: {}", numbers.join("; ")) }
 }
 
 fn said_smallest(candidate: &Candidate) -> Option<String> {

@@ -3,7 +3,7 @@
 use super::super::admit::{Admitted, Refused, admit};
 use super::super::split;
 use super::super::torques::is_tracking;
-use shared_mem::cell::{Cell, Object};
+use shared_mem::cell::{Cell, ControllerKind, Object};
 use shared_mem::recording::Session;
 use twin::arm::ArmModel;
 
@@ -108,7 +108,13 @@ fn difference(a: &Cell, b: &Cell) -> Option<(&'static str, String)> {
     }
     let law = |cell: &Cell| cell.controller.as_ref().map(|controller| controller.kind);
     if law(a) != law(b) {
-        let named = |cell| law(cell).map_or_else(|| "none".to_owned(), |kind| format!("{kind:?}"));
+        let named = |cell| {
+            law(cell).map_or("none", |kind| match kind {
+                ControllerKind::JointImpedance => "joint_impedance",
+                ControllerKind::JointPd => "joint_pd",
+                ControllerKind::Tracking => "none",
+            })
+        };
         return Some(("robot", format!("the control laws are {} and {}", named(a), named(b))));
     }
     let alike = |a: &Object, b: &Object| a.shape == b.shape && a.size == b.size && a.mass == b.mass;
@@ -132,4 +138,41 @@ fn remarks([a, b]: [&Cell; 2]) -> Vec<String> {
         remarks.push("the tools that cell.toml states differ: that of A counts for both".into());
     }
     remarks
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::super::test_bench::shipped;
+    use super::*;
+    use shared_mem::cell::Tool;
+    use shared_mem::recording::SessionFiles;
+
+    fn why(change: impl FnOnce(&mut Cell)) -> Option<String> {
+        let (a, mut b) = (shipped(), shipped());
+        change(&mut b);
+        difference(&a, &b).map(|(kind, what)| format!("{kind}: {what}"))
+    }
+
+    #[test]
+    fn another_law_and_another_object_are_refused_and_another_tool_or_gain_is_what_may_have_changed() {
+        let law = why(|cell| cell.controller.as_mut().expect("a law").kind = ControllerKind::JointPd).expect("refused");
+        assert!(law.contains("joint_impedance and joint_pd"), "{law}");
+        let object = why(|cell| cell.object.as_mut().expect("an object").size = Some([0.1; 3])).expect("refused");
+        assert!(object.starts_with("object: "), "{object}");
+        let heavier = |cell: &mut Cell| cell.tool = Some(Tool { mass: 0.7, length: 0.16, radius: 0.012 });
+        assert_eq!(why(heavier), None);
+        let stiffer = |cell: &mut Cell| cell.controller.as_mut().expect("a law").stiffness[0] = 900.0;
+        assert_eq!(why(stiffer), None);
+        let (a, mut b) = (shipped(), shipped());
+        (heavier(&mut b), stiffer(&mut b));
+        assert_eq!(remarks([&a, &b]).len(), 2);
+    }
+
+    #[test]
+    fn a_session_is_not_held_against_itself() {
+        let files = SessionFiles { session: "monday".into(), cell: None };
+        let session = Session { folder: "monday".into(), cell: shipped(), clips: Vec::new(), files };
+        let refused = pair([&session, &session]).expect_err("the same").to_string();
+        assert!(refused.contains("monday is given twice") && !refused.contains('\n'), "{refused}");
+    }
 }

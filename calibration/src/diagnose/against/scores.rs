@@ -14,7 +14,8 @@ use super::super::shortlist::{Scored, chance};
 use super::super::sweep::{Column, Point, Precision, Swept, sweep};
 use super::subjects::Subject;
 use super::turned::{Acts, Model, SIDES, Side, side_of};
-use nalgebra::DMatrix;
+use crate::estimate::interval::student;
+use nalgebra::{DMatrix, DVector};
 
 /// A change as the slopes have it.
 #[derive(Debug, Clone)]
@@ -41,6 +42,8 @@ pub(super) struct Slopes {
     /// Factors on the channels: what the richest model leaves is taken for noise.
     pub(super) weights: Vec<f64>,
     forms: [DMatrix<f64>; 2],
+    /// The same clip by clip.
+    clips: [Vec<DMatrix<f64>>; 2],
 }
 
 /// A column of the form of both sessions: its place in the form of each that it belongs to.
@@ -69,25 +72,70 @@ impl Slopes {
         };
         let swept = [one(Side::A)?, one(Side::B)?];
         let weights = known_weights.map_or_else(|| weights(bench, &swept), <[f64]>::to_vec);
-        let forms = [0, 1].map(|side| {
-            let swept: &Swept = &swept[side];
-            let size = 1 + swept.columns.len();
-            let reduced = swept.reduced(bench.evidence, &weights);
-            reduced.iter().fold(DMatrix::zeros(size, size), |sum, clip| sum + &clip.form)
+        let clips = [0, 1].map(|side: usize| -> Vec<DMatrix<f64>> {
+            let reduced = swept[side].reduced(bench.evidence, &weights);
+            reduced.into_iter().map(|clip| clip.form).collect()
         });
-        Some(Self { swept, weights, forms })
+        let forms = [0, 1].map(|side: usize| {
+            let size = 1 + swept[side].columns.len();
+            clips[side].iter().fold(DMatrix::zeros(size, size), |sum, form| sum + form)
+        });
+        Some(Self { swept, weights, forms, clips })
     }
 
     /// The form over the residual and columns of both sessions.
     fn form(&self, columns: &[Place]) -> DMatrix<f64> {
-        let places: Vec<Place> = std::iter::once([Some(0), Some(0)]).chain(columns.iter().copied()).collect();
-        let product = |i: usize, k: usize| {
-            let of_side = |side: usize| Some(self.forms[side][(places[i][side]?, places[k][side]?)]);
-            of_side(0).unwrap_or(0.0) + of_side(1).unwrap_or(0.0)
-        };
-        DMatrix::from_fn(places.len(), places.len(), product)
+        over(self.forms.each_ref().map(Some), columns)
     }
 
+    /// One sigma of the coefficient of a column, those of the others at their best: the larger of what the curvature says and what
+    /// the scatter of the clips' slopes says (a sandwich).
+    fn sigma(&self, (others, held): (&[Place], &[f64]), column: Place) -> f64 {
+        let columns = [others, &[column]].concat();
+        let form = self.form(&columns);
+        let count = others.len();
+        let mut inner = form.view((1, 1), (count, count)).into_owned();
+        for (k, held) in held.iter().enumerate() {
+            inner[(k, k)] += held + RIDGE * inner[(k, k)] + f64::MIN_POSITIVE.sqrt();
+        }
+        let Some(inner) = inner.cholesky() else { return f64::INFINITY };
+        // Residual and column with what the others imitate taken out.
+        let freed = |of: usize| {
+            let imitated = inner.solve(&form.view((1, of), (count, 1)));
+            let mut freed = DVector::zeros(count + 2);
+            freed.rows_mut(1, count).copy_from(&-imitated);
+            freed[of] = 1.0;
+            freed
+        };
+        let (residual, own) = (freed(0), freed(count + 1));
+        let information = own.dot(&(&form * &own)).max(f64::MIN_POSITIVE);
+        let of_clip = |(side, form): (usize, &DMatrix<f64>)| {
+            let sides = if side == 0 { [Some(form), None] } else { [None, Some(form)] };
+            residual.dot(&(over(sides, &columns) * &own))
+        };
+        let clips = (0..2).flat_map(|side| self.clips[side].iter().map(move |form| (side, form)));
+        let slopes: Vec<f64> = clips.map(of_clip).collect();
+        let count = slopes.len();
+        let spread = slopes.iter().map(|slope| slope * slope).sum::<f64>() * count as f64 / (count.max(2) - 1) as f64;
+        let by_clips = student(1.0, count.saturating_sub(1)) * spread.sqrt() / information;
+        information.sqrt().recip().max(by_clips)
+    }
+}
+
+/// Relative ridge: columns that say the same to this many digits are one.
+const RIDGE: f64 = 1e-9;
+
+/// The form over the residual and columns, of those sessions that are given.
+fn over(forms: [Option<&DMatrix<f64>>; 2], columns: &[Place]) -> DMatrix<f64> {
+    let places: Vec<Place> = std::iter::once([Some(0), Some(0)]).chain(columns.iter().copied()).collect();
+    let product = |i: usize, k: usize| {
+        let of_side = |side: usize| Some(forms[side]?[(places[i][side]?, places[k][side]?)]);
+        of_side(0).unwrap_or(0.0) + of_side(1).unwrap_or(0.0)
+    };
+    DMatrix::from_fn(places.len(), places.len(), product)
+}
+
+impl Slopes {
     fn place(&self, side: Side, column: Column) -> Option<usize> {
         self.swept[side as usize].columns.iter().position(|known| *known == column).map(|at| at + 1)
     }
@@ -149,8 +197,9 @@ impl Slopes {
             in_b[*number] += step;
         }
         let same = model.values.clone();
-        let sigma = turned.iter().enumerate().filter(|(_, k)| subject.sizes.contains(k));
-        let sigma = sigma.map(|(at, k)| (*k, left[(at + 1, at + 1)].max(f64::MIN_POSITIVE).sqrt().recip())).collect();
+        let (others, held) = self.nuisance(library, model);
+        let sigma = extra.iter().zip(&turned).filter(|(_, k)| subject.sizes.contains(k));
+        let sigma = sigma.map(|((column, _), k)| (*k, self.sigma((&others, &held), *column))).collect();
         let cost = turned.len();
         (cost > 0).then(|| Score {
             subject: index,
@@ -190,10 +239,10 @@ impl Slopes {
             let apart = bounded_minimum(&left, &(1..=2 * count).collect::<Vec<_>>(), &one_sided.repeat(2));
             let together = same_in_both(&left, count);
             let both = bounded_minimum(&together, &(1..=count).collect::<Vec<_>>(), &one_sided);
-            Some((alternative, left, apart, both))
+            Some((alternative, apart, both))
         };
         let forms = (0..info.alternatives.len()).filter_map(of_form);
-        let (alternative, left, apart, both) = forms.max_by(|a, b| a.2.gain.total_cmp(&b.2.gain))?;
+        let (alternative, apart, both) = forms.max_by(|a, b| a.1.gain.total_cmp(&b.1.gain))?;
         let probes = &info.alternatives[alternative].probes;
         let count = probes.len();
         let begun =
@@ -203,10 +252,13 @@ impl Slopes {
             SIDES.map(|side| begun(side, &both.at)),
         ];
         let gain = (apart.gain - both.gain).max(0.0);
+        let (others, held) = self.nuisance(library, model);
         let sigma = (probes.iter().enumerate()).map(|(probe, info)| {
             let (size, at_one) = info.moves[0];
-            let change = change_alone(&left, count, probe);
-            (size, (at_one - library.unknowns[size].start).abs() * change.max(f64::MIN_POSITIVE).sqrt().recip())
+            let [in_a, in_b] = SIDES.map(|side| self.place(side, Column::Probe(candidate, alternative, probe)));
+            let others = [&others[..], &[[in_a, in_b]]].concat();
+            let held = [&held[..], &[info.largest.powi(-2)]].concat();
+            (size, (at_one - library.unknowns[size].start).abs() * self.sigma((&others, &held), [None, in_b]))
         });
         let sigma = sigma.collect();
         Some(Score { subject: index, gain, gain_shared: both.gain, cost: count, p: chance(gain, count), starts, sigma })
@@ -232,14 +284,6 @@ fn same_in_both(form: &DMatrix<f64>, count: usize) -> DMatrix<f64> {
     })
 }
 
-/// The information about the change of one probe alone, what both sessions have of it at its best.
-fn change_alone(form: &DMatrix<f64>, count: usize, probe: usize) -> f64 {
-    let (a, b) = (probe + 1, probe + 1 + count);
-    let both = form[(a, a)] + 2.0 * form[(a, b)] + form[(b, b)];
-    let cross = form[(a, b)] + form[(b, b)];
-    form[(b, b)] - cross * cross / both.max(f64::MIN_POSITIVE)
-}
-
 fn pointed(candidate: usize, alternative: usize, units: &[f64]) -> Scored {
     let (units, next) = (units.to_vec(), Vec::new());
     Scored { candidate, alternative, units, next, gain: 0.0, cost: 0, cosine: 0.0, signal: 0.0, imitated: 0.0, p: 1.0 }
@@ -259,6 +303,7 @@ fn weights<E: Evidence>(bench: &Bench<'_, E>, swept: &[Swept; 2]) -> Vec<f64> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::super::scatter::Scatter;
     use super::*;
 
     /// (1 - a - 2 b)^2 + (3 - b)^2 over (1, a, b).
@@ -273,9 +318,21 @@ mod tests {
         assert_eq!(both, DMatrix::from_row_slice(2, 2, &[10.0, -6.0, -6.0, 10.0]));
     }
 
+    /// Sessions of four clips with one column, of which noise or the clips' own ways make the slopes.
+    fn sigma(slopes: [f64; 4]) -> f64 {
+        let clip = |slope: &f64| DMatrix::from_row_slice(2, 2, &[slope * slope, *slope, *slope, 1.0]);
+        let clips = [slopes[..2].iter().map(clip).collect::<Vec<_>>(), slopes[2..].iter().map(clip).collect()];
+        let forms = clips.each_ref().map(|clips: &Vec<DMatrix<f64>>| &clips[0] + &clips[1]);
+        let nothing = || Swept { columns: Vec::new(), scatter: Scatter::default(), clips: Vec::new() };
+        let slopes = Slopes { swept: [nothing(), nothing()], weights: Vec::new(), forms, clips };
+        slopes.sigma((&[[Some(1), Some(1)]], &[0.0]), [None, Some(1)])
+    }
+
     #[test]
-    fn a_change_is_known_as_well_as_what_both_have_of_it_leaves_it() {
-        // a = s, b = s + d: (1 - 3 s - 2 d)^2 + (3 - s - d)^2; with s at its best d has 5 - 7^2 / 10.
-        assert!((change_alone(&form(), 1, 0) - 0.1).abs() < 1e-12);
+    fn a_change_is_as_uncertain_as_its_curvature_or_its_clips_say() {
+        // Two clips in each session: the difference of two means of two numbers of variance 1.
+        assert!((sigma([0.1, -0.1, 0.1, -0.1]) - 1.0).abs() < 1e-6);
+        let scattered = sigma([10.0, -10.0, 10.0, -10.0]);
+        assert!((scattered / sigma([5.0, -5.0, 5.0, -5.0]) - 2.0).abs() < 1e-6 && scattered > 10.0, "{scattered}");
     }
 }
