@@ -70,15 +70,13 @@ fn main() -> anyhow::Result<()> {
             continue;
         }
         let outcome = match changed.examine(number, (clips, &cell), &interrupt) {
+            _ if interrupt.asked() => break,
             Ok(outcome) => outcome,
             Err(error) => {
                 println!("world {number}: {error}");
                 continue;
             }
         };
-        if interrupt.asked() {
-            break;
-        }
         let right = if outcome.is_right() { "right" } else { "WRONG" };
         println!("{right} {}", serde_json::to_string(&outcome)?);
         done.push(outcome);

@@ -149,7 +149,7 @@ impl Library {
             reaches: chosen.iter().map(|(k, _)| reach(*k)).collect(),
             baseline: 0..chosen.len(),
             candidates: Vec::new(),
-            robot: self.robot.clone(),
+            robot: self.robot,
             unknowns: chosen.into_iter().map(|(_, unknown)| unknown).collect(),
         }
     }

@@ -164,8 +164,7 @@ fn candidates<E: Evidence>(
     let likely = probabilities(&found.steps);
     let one = |(index, subject): (usize, &Subject)| {
         let changed = found.changed.contains(&index) && matches!(kind, Kind::Named | Kind::Class);
-        let trial =
-            found.steps.iter().filter_map(|step| step.trials.iter().find(|trial| trial.subject == index)).last();
+        let trial = found.steps.iter().rev().find_map(|step| step.trials.iter().find(|trial| trial.subject == index));
         let fitted = if changed { Some(&found.last) } else { trial.map(|trial| &trial.fitted) };
         let with = fitted
             .filter(|_| changed || rivals.contains(&index))

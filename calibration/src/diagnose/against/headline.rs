@@ -34,9 +34,9 @@ impl Facts {
         let fitted =
             |candidate: &&&Candidate| !candidate.confusable_with.is_empty() || candidate.status == Status::Named;
         let (changes, rivals): (Vec<&Candidate>, Vec<&Candidate>) =
-            open.iter().partition(|candidate| fitted(&candidate));
+            open.iter().partition(|candidate| fitted(candidate));
         let seen = candidates.iter().filter(|candidate| candidate.status == Status::RuledOut);
-        let seen = seen.filter_map(|candidate| Some(said_smallest(candidate)?)).take(SAID).collect();
+        let seen = seen.filter_map(said_smallest).take(SAID).collect();
         let [low, high] = shrink.ci90.map(percent);
         Self {
             changes: changes.into_iter().map(change).collect(),

@@ -108,7 +108,8 @@ pub fn compare_clips(
     options: &Options,
     interrupt: &Interrupt,
 ) -> Result<Comparison, DiagnoseError> {
-    compared(sessions, pair, options, (interrupt, (Kept::nothing(), "")))
+    let found = compared(sessions, pair, options, (interrupt, (Kept::nothing(), "")));
+    if interrupt.cancelled() { Err(DiagnoseError::Interrupted("interrupted; start again".into())) } else { found }
 }
 
 fn compared(

@@ -21,7 +21,7 @@ pub struct Pair {
 pub enum Unlike {
     /// One of them cannot be diagnosed at all.
     #[error("{0}: {1}")]
-    One(String, Refused),
+    One(String, Box<Refused>),
     /// Both are the same.
     #[error("{0} is given twice; give the session from before the change and the one from after it")]
     Same(String),
@@ -51,8 +51,8 @@ pub fn pair([a, b]: [&Session; 2]) -> Result<Pair, Unlike> {
     if let Some((kind, what)) = difference(&a.cell, &b.cell) {
         return Err(Unlike::Other { kind, what, a: name_a, b: name_b });
     }
-    let of_a = admit(a).map_err(|why| Unlike::One(name_a.clone(), why))?;
-    let of_b = admit(b).map_err(|why| Unlike::One(name_b.clone(), why))?;
+    let of_a = admit(a).map_err(|why| Unlike::One(name_a.clone(), Box::new(why)))?;
+    let of_b = admit(b).map_err(|why| Unlike::One(name_b.clone(), Box::new(why)))?;
     Ok(Pair::of([of_a, of_b], is_tracking(&a.cell), remarks([&a.cell, &b.cell])))
 }
 
@@ -164,7 +164,8 @@ mod tests {
         let stiffer = |cell: &mut Cell| cell.controller.as_mut().expect("a law").stiffness[0] = 900.0;
         assert_eq!(why(stiffer), None);
         let (a, mut b) = (shipped(), shipped());
-        (heavier(&mut b), stiffer(&mut b));
+        heavier(&mut b);
+        stiffer(&mut b);
         assert_eq!(remarks([&a, &b]).len(), 2);
     }
 

@@ -235,10 +235,18 @@ fn placed(model: &Model, subject: &Subject, others: &[Vec<f64>; 2]) -> Model {
     model
 }
 
-/// The best of fits from several starts.
+/// A fit from the first of several starts from which it comes to more than the model `near` it.
 fn fit_from<E: Evidence>(court: &Court<'_, E>, starts: Vec<Model>, near: &Fitted, weights: &[f64]) -> Option<Fitted> {
-    let heats = starts.into_iter().filter_map(|start| court.fit(start, weights, Some(near), HEAT));
-    let best = heats.min_by(|a, b| a.hypothesis.deviance().total_cmp(&b.hypothesis.deviance()))?;
+    let mut best: Option<Fitted> = None;
+    for start in starts {
+        let heat = court.fit(start, weights, Some(near), HEAT);
+        let least = best.as_ref().map_or(f64::INFINITY, |best| best.hypothesis.deviance());
+        best = heat.filter(|heat| heat.hypothesis.deviance() < least).or(best);
+        if best.as_ref().is_some_and(|best| best.hypothesis.deviance() < near.hypothesis.deviance()) {
+            break;
+        }
+    }
+    let best = best?;
     court.fit(best.model.clone(), weights, Some(&best), FIRST_PASS)
 }
 
