@@ -22,7 +22,7 @@ A recording that cannot mean what it says (units, order, sign, misaligned logs) 
 so: `calibration check` shows what is wrong.
 
 With --against B the question is another: what changed from this session, A, to B, of one robot under one control law (a payload, a
-wiped table, a gain, wear). A's parameters and effects count for both, and the change is told with a 95 % interval and the
+wiped table, a gain, wear). A's parameters and effects count for both, and the change is given with a 95 % interval and the
 share of B's gap under A's model that it closes; or that nothing changed, and how small a change would have been seen.
 
 What to record next is printed as commands that can be typed, and of an effect that is named what to do about it in the

@@ -26,7 +26,7 @@ pub enum Unlike {
     #[error("{0} is given twice; give the session from before the change and the one from after it")]
     Same(String),
     /// What must be the same is not.
-    #[error("{what}: {a} and {b} are not of one {kind}; what changed can be told only where all else is the same")]
+    #[error("{what}: {a} and {b} are not of one {kind}; what changed can be found only where all else is the same")]
     Other {
         /// What is compared: `robot`, `object`.
         kind: &'static str,
