@@ -9,7 +9,7 @@ use super::super::evidence::Evidence;
 use super::super::parameters::UNBOUNDED;
 use super::super::quadratic::minimum;
 use super::answer::Values;
-use super::fits::{Court, Fitted};
+use super::fits::{Fitted, PairBench};
 use super::subjects::Subject;
 use super::turned::{Acts, Side, Turned};
 use crate::estimate::interval::student;
@@ -21,12 +21,12 @@ const NINETY_FIVE: f64 = 1.96;
 
 /// The parameters of a subject that each session has of its own.
 pub(super) fn of_subject<E: Evidence>(
-    court: &Court<'_, E>,
+    pair_bench: &PairBench<'_, E>,
     fitted: &Fitted,
     subject: &Subject,
 ) -> BTreeMap<String, Values> {
-    let library = court.bench.library;
-    let spread = Spread::of(court, fitted);
+    let library = pair_bench.bench.library;
+    let spread = Spread::of(pair_bench, fitted);
     let rough = subject.effect.is_some_and(|effect| !library.candidates[effect].is_of_arm());
     let mut all: BTreeMap<String, Values> = BTreeMap::new();
     for number in subject.numbers.clone() {
@@ -64,9 +64,9 @@ struct Spread {
 }
 
 impl Spread {
-    fn of<E: Evidence>(court: &Court<'_, E>, fitted: &Fitted) -> Self {
+    fn of<E: Evidence>(pair_bench: &PairBench<'_, E>, fitted: &Fitted) -> Self {
         let hypothesis = &fitted.hypothesis;
-        let total = court.on_bench(&fitted.model, |bench| Some(bench.held(hypothesis)));
+        let total = pair_bench.on_bench(&fitted.model, |bench| Some(bench.held(hypothesis)));
         let Some(total) = total else { return Self { covariance: None, shifts: Vec::new() } };
         let count = hypothesis.free.len();
         let inner: DMatrix<f64> = total.view((1, 1), (count, count)).into_owned();

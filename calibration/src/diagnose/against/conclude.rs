@@ -9,7 +9,7 @@ use super::super::sizes::Sizes;
 use super::super::{DiagnoseError, Options, advice, localise, site::Site};
 use super::answer::{Candidate, Comparison, Smallest, Verdict};
 use super::changes;
-use super::fits::{Court, numbers};
+use super::fits::{PairBench, numbers};
 use super::headline::{self, Facts};
 use super::pair::Pair;
 use super::scores::Score;
@@ -48,18 +48,18 @@ pub(super) struct Case<'a> {
 /// # Errors
 /// [`DiagnoseError`] when the twin has no answer on them.
 pub(super) fn conclude<E: Evidence>(
-    court: &Court<'_, E>,
+    pair_bench: &PairBench<'_, E>,
     case: &Case<'_>,
     options: &Options,
 ) -> Result<Comparison, DiagnoseError> {
     let (found, session) = (case.found, case.sessions[1]);
-    let held_out = court.held_out(&found.last, &found.weights).ok_or(DiagnoseError::NoBaseline)?;
-    let with = Residuals::of(court.bench, &held_out).ok_or(DiagnoseError::NoBaseline)?;
+    let held_out = pair_bench.held_out(&found.last, &found.weights).ok_or(DiagnoseError::NoBaseline)?;
+    let with = Residuals::of(pair_bench.bench, &held_out).ok_or(DiagnoseError::NoBaseline)?;
     let under_a: Vec<_> = held_out.iter().map(|(_, clips)| (numbers(case.of_a.full.clone()), clips.clone())).collect();
-    let before = Residuals::of(court.bench, &under_a).ok_or(DiagnoseError::NoBaseline)?;
+    let before = Residuals::of(pair_bench.bench, &under_a).ok_or(DiagnoseError::NoBaseline)?;
     let shrink = with.shrink(&before, options.seed);
-    let rivals = rivals(court, case);
-    let deviates = deviates(court, case);
+    let rivals = rivals(pair_bench, case);
+    let deviates = deviates(pair_bench, case);
     let kind = match (found.changed.is_empty() || shrink.value <= 0.0, rivals.is_empty()) {
         (true, _) if deviates.is_some() => Kind::Unexplained,
         (true, _) => Kind::None,
@@ -69,10 +69,10 @@ pub(super) fn conclude<E: Evidence>(
     let believed = matches!(kind, Kind::Named | Kind::Class);
     let after = if believed { &with } else { &before };
     let fits = if believed { &held_out } else { &under_a };
-    let gap = Sizes::of(court.bench, ([&under_a, fits], [&before, after]), session, &case.pair.admitted)?
+    let gap = Sizes::of(pair_bench.bench, ([&under_a, fits], [&before, after]), session, &case.pair.admitted)?
         .gap([&before, after], options.seed);
-    let (gap_of_a, places) = (of_a(court, case), localise::localise(court.bench.evidence, &before));
-    let candidates = candidates(court, case, (kind, &rivals), (&before, options.seed));
+    let (gap_of_a, places) = (of_a(pair_bench, case), localise::localise(pair_bench.bench.evidence, &before));
+    let candidates = candidates(pair_bench, case, (kind, &rivals), (&before, options.seed));
     let changes: Vec<String> = if believed { named(case, &rivals) } else { Vec::new() };
     let facts = Facts::of(&candidates, gap.shrink, deviates.unwrap_or(1.0), places.first());
     let text = headline::sentence(kind, &facts);
@@ -86,14 +86,14 @@ pub(super) fn conclude<E: Evidence>(
         gap,
         gap_of_a,
         places,
-        shared: shared(court, case),
+        shared: shared(pair_bench, case),
         candidates,
         next_experiment: next.sentence,
         next_commands: next.commands,
         clips: Clips {
-            train: files(&court.split.train),
-            choose: files(&court.split.choose),
-            confirm: files(&court.split.confirm),
+            train: files(&pair_bench.split.train),
+            choose: files(&pair_bench.split.choose),
+            confirm: files(&pair_bench.split.confirm),
         },
         warnings: case.pair.admitted.warnings.clone(),
         seconds: 0.0,
@@ -101,36 +101,38 @@ pub(super) fn conclude<E: Evidence>(
         against: session.folder.display().to_string(),
         files: case.sessions.map(|session| session.files.clone()),
         seed: options.seed,
-        theta: court.bench.library.theta(in_b),
+        theta: pair_bench.bench.library.theta(in_b),
         theta_file: None,
     })
 }
 
 /// What A's own clips kept for confirming leave under what was found on A.
-fn of_a<E: Evidence>(court: &Court<'_, E>, case: &Case<'_>) -> f64 {
-    let clips: Vec<usize> = court.split.confirm.iter().copied().filter(|clip| !court.is_of_b(*clip)).collect();
-    court.left(&case.of_a.full, &clips).map_or(0.0, |left| left.mean_square())
+fn of_a<E: Evidence>(pair_bench: &PairBench<'_, E>, case: &Case<'_>) -> f64 {
+    let clips: Vec<usize> =
+        pair_bench.split.confirm.iter().copied().filter(|clip| !pair_bench.is_of_b(*clip)).collect();
+    pair_bench.left(&case.of_a.full, &clips).map_or(0.0, |left| left.mean_square())
 }
 
 /// How many times as much B leaves although both share everything as A does under its own model, in a clip like most; `None`
 /// where that is not plainly more.
-fn deviates<E: Evidence>(court: &Court<'_, E>, case: &Case<'_>) -> Option<f64> {
-    let (of_b, of_a): (Vec<usize>, Vec<usize>) = court.split.open().into_iter().partition(|clip| court.is_of_b(*clip));
-    let b = court.left(case.found.without.model.of(Side::B), &of_b)?;
-    let a = court.left(&case.of_a.full, &of_a)?;
+fn deviates<E: Evidence>(pair_bench: &PairBench<'_, E>, case: &Case<'_>) -> Option<f64> {
+    let (of_b, of_a): (Vec<usize>, Vec<usize>) =
+        pair_bench.split.open().into_iter().partition(|clip| pair_bench.is_of_b(*clip));
+    let b = pair_bench.left(case.found.without.model.of(Side::B), &of_b)?;
+    let a = pair_bench.left(&case.of_a.full, &of_a)?;
     let groups = Left::of_groups(&b.typical(), &a.typical());
     let more = groups.iter().filter(|left| left.gaps() > 1.0).map(|left| left.before / left.after);
     more.filter(|times| *times > MORE_THAN_A).max_by(f64::total_cmp)
 }
 
 /// Subjects that do as well as one that changed, beside all the others that did.
-fn rivals<E: Evidence>(court: &Court<'_, E>, case: &Case<'_>) -> Vec<usize> {
+fn rivals<E: Evidence>(pair_bench: &PairBench<'_, E>, case: &Case<'_>) -> Vec<usize> {
     let found = case.found;
     let mut rivals = Vec::new();
     for step in found.steps.iter().filter(|step| step.added.is_some_and(|added| found.changed.contains(&added))) {
-        let others = step.rivals(court).into_iter().filter(|trial| !found.changed.contains(&trial.subject));
-        let alike =
-            others.filter(|trial| found.changed.len() == 1 || found.stands_in(court, case.subjects, (step, trial)));
+        let others = step.rivals(pair_bench).into_iter().filter(|trial| !found.changed.contains(&trial.subject));
+        let alike = others
+            .filter(|trial| found.changed.len() == 1 || found.stands_in(pair_bench, case.subjects, (step, trial)));
         rivals.extend(alike.map(|trial| trial.subject));
     }
     rivals.sort_unstable();
@@ -143,8 +145,8 @@ fn named(case: &Case<'_>, rivals: &[usize]) -> Vec<String> {
 }
 
 /// Effects that act in both sessions alike.
-fn shared<E: Evidence>(court: &Court<'_, E>, case: &Case<'_>) -> Vec<String> {
-    let (library, model) = (court.bench.library, &case.found.last.model);
+fn shared<E: Evidence>(pair_bench: &PairBench<'_, E>, case: &Case<'_>) -> Vec<String> {
+    let (library, model) = (pair_bench.bench.library, &case.found.last.model);
     let acts = |subject: &&Subject| {
         let rests = |k: &usize| model.of(Side::A)[*k] == library.unknowns[*k].start;
         let changed = case.found.changed.iter().any(|changed| case.subjects[*changed].name == subject.name);
@@ -155,7 +157,7 @@ fn shared<E: Evidence>(court: &Court<'_, E>, case: &Case<'_>) -> Vec<String> {
 
 /// What is said of everything that may have changed.
 fn candidates<E: Evidence>(
-    court: &Court<'_, E>,
+    pair_bench: &PairBench<'_, E>,
     case: &Case<'_>,
     (kind, rivals): (Kind, &[usize]),
     (before, seed): (&Residuals, u64),
@@ -168,11 +170,11 @@ fn candidates<E: Evidence>(
         let fitted = if changed { Some(&found.last) } else { trial.map(|trial| &trial.fitted) };
         let with = fitted
             .filter(|_| changed || rivals.contains(&index))
-            .and_then(|fitted| Residuals::of(court.bench, &court.held_out(fitted, &found.weights)?));
+            .and_then(|fitted| Residuals::of(pair_bench.bench, &pair_bench.held_out(fitted, &found.weights)?));
         let shrink = with.map_or(Share { value: 0.0, ci90: [0.0; 2] }, |with| with.shrink(before, seed));
         let score = first.scores.iter().find(|score| score.subject == index);
-        let smallest = score.map(|score| smallest(court, score)).unwrap_or_default();
-        let seen = score.is_some_and(|score| could_be_seen(court, score));
+        let smallest = score.map(|score| smallest(pair_bench, score)).unwrap_or_default();
+        let seen = score.is_some_and(|score| could_be_seen(pair_bench, score));
         let status = match kind {
             Kind::Named if changed => Status::Named,
             Kind::Class if changed || rivals.contains(&index) => Status::Possible,
@@ -185,7 +187,7 @@ fn candidates<E: Evidence>(
             name: subject.name.clone(),
             is_effect: subject.effect.is_some(),
             probability: likely.get(&index).copied().unwrap_or(0.0),
-            parameters: fitted.map(|fitted| changes::of_subject(court, fitted, subject)).unwrap_or_default(),
+            parameters: fitted.map(|fitted| changes::of_subject(pair_bench, fitted, subject)).unwrap_or_default(),
             shrink,
             confusable_with: alike,
             status,
@@ -242,10 +244,10 @@ fn confidence(kind: Kind, candidates: &[Candidate]) -> f64 {
 }
 
 /// The smallest change of every size that would have been seen, by parameter.
-fn smallest<E: Evidence>(court: &Court<'_, E>, score: &Score) -> BTreeMap<String, Smallest> {
+fn smallest<E: Evidence>(pair_bench: &PairBench<'_, E>, score: &Score) -> BTreeMap<String, Smallest> {
     let mut all: BTreeMap<String, Smallest> = BTreeMap::new();
     for (number, sigma) in &score.sigma {
-        let setting = &court.bench.library.settings.settings()[*number];
+        let setting = &pair_bench.bench.library.settings.settings()[*number];
         // Of a stiffness that is turned as its inverse no change has a size of its own.
         if matches!(setting, Setting::Effect { inverse: true, .. }) {
             continue;
@@ -259,8 +261,8 @@ fn smallest<E: Evidence>(court: &Court<'_, E>, score: &Score) -> BTreeMap<String
 }
 
 /// Whether a change as large as what is met in practice would have been seen in any of its numbers.
-fn could_be_seen<E: Evidence>(court: &Court<'_, E>, score: &Score) -> bool {
-    let library = court.bench.library;
+fn could_be_seen<E: Evidence>(pair_bench: &PairBench<'_, E>, score: &Score) -> bool {
+    let library = pair_bench.bench.library;
     score.sigma.iter().any(|(number, sigma)| {
         let unknown = &library.unknowns[*number];
         let largest = (unknown.upper - unknown.start).max(unknown.start - unknown.lower);

@@ -12,7 +12,7 @@ use super::turned::{Model, SIDES, Side, TwoSessions, side_of};
 use crate::estimate::interval::student;
 
 /// What all fits share.
-pub(super) struct Court<'a, E> {
+pub(super) struct PairBench<'a, E> {
     /// All clips under the whole library.
     pub(super) bench: &'a Bench<'a, E>,
     /// Index of B's first clip.
@@ -87,7 +87,7 @@ impl Worth {
     }
 }
 
-impl<E: Evidence> Court<'_, E> {
+impl<E: Evidence> PairBench<'_, E> {
     /// Fits a model from where it is, each clip's own numbers from where `near` has them.
     pub(super) fn fit(&self, model: Model, weights: &[f64], near: Option<&Fitted>, effort: Effort) -> Option<Fitted> {
         let (hypothesis, predicted) = self.on_bench(&model, |bench| {

@@ -47,7 +47,7 @@ use crate::forward::object::ObjectClips;
 use crate::forward::setting;
 use crate::interrupt::Interrupt;
 use crate::kept::{self, Fingerprint, Kept};
-use fits::Court;
+use fits::PairBench;
 use shared_mem::progress::Progress;
 use shared_mem::recording::Session;
 use shared_mem::theta::Theta;
@@ -162,12 +162,12 @@ fn examine<E: Evidence>(
     } else {
         combine::search(&bench, &of_a, begun, &refined, &bar).ok_or(DiagnoseError::NoBaseline)?.last
     };
-    let court = Court { bench: &bench, first_of_b: pair.first_of_b, split: &split };
+    let pair_bench = PairBench { bench: &bench, first_of_b: pair.first_of_b, split: &split };
     let subjects = subjects::all(library);
-    let found = search::search(&court, &subjects, &on_a, &bar).ok_or(DiagnoseError::NoBaseline)?;
+    let found = search::search(&pair_bench, &subjects, &on_a, &bar).ok_or(DiagnoseError::NoBaseline)?;
     bar.stage(stages::CONCLUSION, 1);
     let case = conclude::Case { sessions, pair, of_a: &on_a, subjects: &subjects, found: &found };
-    conclude::conclude(&court, &case, options)
+    conclude::conclude(&pair_bench, &case, options)
 }
 
 /// Whether the parameters alone leave of A so little beyond the noise that an effect has nothing to explain.

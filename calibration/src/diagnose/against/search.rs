@@ -5,7 +5,7 @@ use super::super::evidence::Evidence;
 use super::super::fit::Hypothesis;
 use super::super::refit::last_pass;
 use super::super::stages;
-use super::fits::{Court, Fitted, LEAST, Worth};
+use super::fits::{Fitted, LEAST, PairBench, Worth};
 use super::scores::{Score, Slopes, is_apart};
 use super::subjects::Subject;
 use super::turned::Model;
@@ -82,23 +82,23 @@ pub(super) struct Found {
 
 /// Searches from a hypothesis that was found on A alone. `None` where the twin has no answer, or the time is over.
 pub(super) fn search<E: Evidence>(
-    court: &Court<'_, E>,
+    pair_bench: &PairBench<'_, E>,
     subjects: &[Subject],
     of_a: &Hypothesis,
     bar: &Progress,
 ) -> Option<Found> {
     let start = Model::shared(of_a.full.clone(), &of_a.free);
     bar.stage(SLOPES, 1);
-    let slopes = Slopes::around(court.bench, &start, (&at(court, of_a), court.first_of_b), None)?;
+    let slopes = Slopes::around(pair_bench.bench, &start, (&at(pair_bench, of_a), pair_bench.first_of_b), None)?;
     let weights = slopes.weights.clone();
-    let mut now = court.fit(start.clone(), &weights, None, last_pass(court.bench))?;
+    let mut now = pair_bench.fit(start.clone(), &weights, None, last_pass(pair_bench.bench))?;
     let mut without = now.clone();
     let (mut steps, mut changed, mut shared): (Vec<Step>, Vec<usize>, usize) = (Vec::new(), Vec::new(), 0);
     // Slopes around A's own numbers show a change as it is; those around a mean of both sessions show half of it either way.
-    let mut scores = slopes.scores(court.bench, &start, subjects);
+    let mut scores = slopes.scores(pair_bench.bench, &start, subjects);
     loop {
         let mut step = Step { scores, trials: Vec::new(), added: None };
-        let in_both = step.fit(court, subjects, (&now, &weights), bar)?;
+        let in_both = step.fit(pair_bench, subjects, (&now, &weights), bar)?;
         let best = step.best().map(|trial| (trial.subject, trial.fitted.clone(), trial.net()));
         let ahead = best.as_ref().map_or(0.0, |(_, _, net)| *net);
         let more = in_both.filter(|(_, net)| *net > ahead && shared < MOST_SHARED);
@@ -109,7 +109,9 @@ pub(super) fn search<E: Evidence>(
                 without = now.clone();
             }
         } else if let Some((subject, fitted, _)) = best.filter(|_| changed.len() < MOST) {
-            now = court.fit(fitted.model.clone(), &weights, Some(&fitted), last_pass(court.bench)).unwrap_or(fitted);
+            now = pair_bench
+                .fit(fitted.model.clone(), &weights, Some(&fitted), last_pass(pair_bench.bench))
+                .unwrap_or(fitted);
             changed.push(subject);
             step.added = Some(subject);
         } else {
@@ -118,18 +120,22 @@ pub(super) fn search<E: Evidence>(
         }
         steps.push(step);
         bar.stage(SLOPES, 1);
-        let slopes =
-            Slopes::around(court.bench, &now.model, (&at(court, &now.hypothesis), court.first_of_b), Some(&weights))?;
-        scores = slopes.scores(court.bench, &now.model, subjects);
+        let slopes = Slopes::around(
+            pair_bench.bench,
+            &now.model,
+            (&at(pair_bench, &now.hypothesis), pair_bench.first_of_b),
+            Some(&weights),
+        )?;
+        scores = slopes.scores(pair_bench.bench, &now.model, subjects);
     }
-    let (last, changed) = without_superfluous(court, subjects, (now, changed), &weights);
+    let (last, changed) = without_superfluous(pair_bench, subjects, (now, changed), &weights);
     Some(Found { steps, without, last, changed, weights })
 }
 
 /// Clips that are fitted, each with its own numbers.
-fn at<E: Evidence>(court: &Court<'_, E>, hypothesis: &Hypothesis) -> Vec<(usize, Vec<f64>)> {
-    let count = court.bench.scatter.count();
-    court.split.train.iter().map(|clip| (*clip, hypothesis.own(*clip, count))).collect()
+fn at<E: Evidence>(pair_bench: &PairBench<'_, E>, hypothesis: &Hypothesis) -> Vec<(usize, Vec<f64>)> {
+    let count = pair_bench.bench.scatter.count();
+    pair_bench.split.train.iter().map(|clip| (*clip, hypothesis.own(*clip, count))).collect()
 }
 
 impl Step {
@@ -137,7 +143,7 @@ impl Step {
     /// worth. `None` when the time is over.
     fn fit<E: Evidence>(
         &mut self,
-        court: &Court<'_, E>,
+        pair_bench: &PairBench<'_, E>,
         subjects: &[Subject],
         (now, weights): (&Fitted, &[f64]),
         bar: &Progress,
@@ -150,7 +156,7 @@ impl Step {
         for (done, score) in wanted.iter().enumerate() {
             let subject = &subjects[score.subject];
             bar.show(done as u64, &format!("{CHANGES}: {}", subject.name.replace('_', " ")));
-            if court.bench.interrupt.asked() {
+            if pair_bench.bench.interrupt.asked() {
                 return None;
             }
             let known = subject.is_in(|k| now.model.turned.iter().any(|turned| turned.number == k));
@@ -158,15 +164,15 @@ impl Step {
                 None
             } else {
                 let model = placed(&now.model, subject, &score.starts[1]).with(&subject.turned);
-                fit_from(court, vec![model], now, weights)
+                fit_from(pair_bench, vec![model], now, weights)
             };
             let over = same.as_ref().unwrap_or(now);
             let parted = subject.parted(known);
             let split =
                 |model: Model| if known { model.apart(&parted) } else { model.with(&subject.turned).apart(&parted) };
             let starts = vec![split(placed(&now.model, subject, &score.starts[0])), split(over.model.clone())];
-            let Some(fitted) = fit_from(court, starts, over, weights) else { continue };
-            let worth = |a: &Fitted, b: &Fitted| Worth::of(&a.predicted, &b.predicted, court.first_of_b);
+            let Some(fitted) = fit_from(pair_bench, starts, over, weights) else { continue };
+            let worth = |a: &Fitted, b: &Fitted| Worth::of(&a.predicted, &b.predicted, pair_bench.first_of_b);
             let (change, whole) = (worth(&fitted, over), worth(&fitted, now));
             let cost = if known { parted.len() } else { subject.turned.len() + parted.len() };
             self.trials.push(Trial { subject: score.subject, fitted, change, whole, cost });
@@ -192,12 +198,12 @@ impl Step {
     }
 
     /// What does as well as the change that was added, with no more numbers.
-    pub(super) fn rivals<E>(&self, court: &Court<'_, E>) -> Vec<&Trial> {
+    pub(super) fn rivals<E>(&self, pair_bench: &PairBench<'_, E>) -> Vec<&Trial> {
         let Some(added) = self.added.and_then(|added| self.trials.iter().find(|trial| trial.subject == added)) else {
             return Vec::new();
         };
         let alike = |trial: &&Trial| {
-            let ahead = Worth::of(&added.fitted.predicted, &trial.fitted.predicted, court.first_of_b);
+            let ahead = Worth::of(&added.fitted.predicted, &trial.fitted.predicted, pair_bench.first_of_b);
             trial.subject != added.subject && trial.cost <= added.cost && ahead.nats < ALIKE.max(ahead.chance())
         };
         self.proven().filter(alike).collect()
@@ -208,7 +214,7 @@ impl Found {
     /// Whether a rival of the change that a step added does as well in its place beside all others that were found.
     pub(super) fn stands_in<E: Evidence>(
         &self,
-        court: &Court<'_, E>,
+        pair_bench: &PairBench<'_, E>,
         subjects: &[Subject],
         (step, rival): (&Step, &Trial),
     ) -> bool {
@@ -218,9 +224,9 @@ impl Found {
         let own: Vec<usize> = subject.numbers.clone().filter(|k| is_apart(&rival.fitted.model, *k)).collect();
         let model = placed(&self.last.model.clone().together(&numbers), subject, &rival.fitted.model.values);
         let model = model.with(&subject.turned).apart(&own);
-        let swapped = court.fit(model, &self.weights, Some(&self.last), FIRST_PASS);
+        let swapped = pair_bench.fit(model, &self.weights, Some(&self.last), FIRST_PASS);
         swapped.is_none_or(|swapped| {
-            let ahead = Worth::of(&self.last.predicted, &swapped.predicted, court.first_of_b);
+            let ahead = Worth::of(&self.last.predicted, &swapped.predicted, pair_bench.first_of_b);
             ahead.nats < ALIKE.max(ahead.chance())
         })
     }
@@ -236,10 +242,15 @@ fn placed(model: &Model, subject: &Subject, others: &[Vec<f64>; 2]) -> Model {
 }
 
 /// A fit from the first of several starts from which it comes to more than the model `near` it.
-fn fit_from<E: Evidence>(court: &Court<'_, E>, starts: Vec<Model>, near: &Fitted, weights: &[f64]) -> Option<Fitted> {
+fn fit_from<E: Evidence>(
+    pair_bench: &PairBench<'_, E>,
+    starts: Vec<Model>,
+    near: &Fitted,
+    weights: &[f64],
+) -> Option<Fitted> {
     let mut best: Option<Fitted> = None;
     for start in starts {
-        let heat = court.fit(start, weights, Some(near), HEAT);
+        let heat = pair_bench.fit(start, weights, Some(near), HEAT);
         let least = best.as_ref().map_or(f64::INFINITY, |best| best.hypothesis.deviance());
         best = heat.filter(|heat| heat.hypothesis.deviance() < least).or(best);
         if best.as_ref().is_some_and(|best| best.hypothesis.deviance() < near.hypothesis.deviance()) {
@@ -247,22 +258,23 @@ fn fit_from<E: Evidence>(court: &Court<'_, E>, starts: Vec<Model>, near: &Fitted
         }
     }
     let best = best?;
-    court.fit(best.model.clone(), weights, Some(&best), FIRST_PASS)
+    pair_bench.fit(best.model.clone(), weights, Some(&best), FIRST_PASS)
 }
 
 /// Drops changes that those found after them make superfluous.
 fn without_superfluous<E: Evidence>(
-    court: &Court<'_, E>,
+    pair_bench: &PairBench<'_, E>,
     subjects: &[Subject],
     (mut now, mut changed): (Fitted, Vec<usize>),
     weights: &[f64],
 ) -> (Fitted, Vec<usize>) {
-    while changed.len() > 1 && !court.bench.interrupt.asked() {
+    while changed.len() > 1 && !pair_bench.bench.interrupt.asked() {
         let dropped = changed.iter().position(|subject| {
             let numbers: Vec<usize> = subjects[*subject].numbers.clone().filter(|k| is_apart(&now.model, *k)).collect();
-            let fit = court.fit(now.model.clone().together(&numbers), weights, Some(&now), last_pass(court.bench));
+            let fit =
+                pair_bench.fit(now.model.clone().together(&numbers), weights, Some(&now), last_pass(pair_bench.bench));
             let superfluous = fit.filter(|fit| {
-                let loss = Worth::of(&now.predicted, &fit.predicted, court.first_of_b);
+                let loss = Worth::of(&now.predicted, &fit.predicted, pair_bench.first_of_b);
                 !loss.is_proven(numbers.len())
             });
             superfluous.map(|fit| now = fit).is_some()
