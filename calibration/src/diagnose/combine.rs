@@ -206,9 +206,16 @@ pub fn search<E: Evidence>(
                 bar.show(1, stages::REFINEMENT);
                 let step = steps.last_mut()?;
                 step.reidentify_rivals(bench, split, &now, refined);
-                let other = step.best(bench).map(|(_, fit, _)| fit.clone()).filter(|fit| fit.effects != now.effects);
-                if let Some(other) = other {
-                    now = refitted(bench, split, (&other, &weights), refined)?;
+                match step.best(bench).map(|(_, fit, _)| fit.clone()) {
+                    Some(other) if other.effects != now.effects => {
+                        now = refitted(bench, split, (&other, &weights), refined)?;
+                    }
+                    Some(_) => {}
+                    // Fitted to the end it predicts clips no better than chance: what it did before was the fit's.
+                    None => {
+                        now = step.from.clone();
+                        break;
+                    }
                 }
             }
             // The best so far, as far as it was fitted.

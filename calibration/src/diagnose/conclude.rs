@@ -4,6 +4,7 @@ use super::admit::Admitted;
 use super::advice::Advice;
 use super::answer::{Change, Clips, Diagnosis, Gap, Nearest, Place, Rest, Share, Verdict};
 use super::combine::{Found, Step};
+use super::confirm::{Confirmation, confirm};
 use super::evidence::{Evidence, Group};
 use super::fit::{Bench, Hypothesis};
 use super::gap::Residuals;
@@ -17,9 +18,7 @@ use super::sizes::{self, Sizes};
 use super::split::{self, Split};
 use super::unproven::{self, Unproven};
 use super::verdict::{self, Finding};
-use super::{
-    DiagnoseError, Kind, Options, advice, combine, confidence, drift, localise, parameters, ranked, refit, remedies,
-};
+use super::{DiagnoseError, Kind, Options, advice, confidence, drift, localise, parameters, ranked, refit, remedies};
 use crate::report::{Trace, channel_in_words, effect_in_words};
 use shared_mem::recording::Session;
 use shared_mem::theta::Theta;
@@ -90,7 +89,8 @@ pub fn conclude<E: Evidence>(
     let left = (typical(&first.from).zip(typical(&found.last)))
         .map(|(before, after)| Left::of_groups(&before, &after))
         .ok_or(DiagnoseError::NoBaseline)?;
-    let confirmed = confirms(&before, &after);
+    let judged = confirm(bench, &first.weights, [(&baseline, &before), (&with, &after)], options.seed);
+    let Confirmation { holds: confirmed, shrink } = judged.ok_or(DiagnoseError::NoBaseline)?;
     let overdispersion = found.overdispersion(bench);
     let within_tolerance = sizes::within_tolerance(bench, ([&baseline, &with], [&before, &after]), session, admitted)?;
     let finding = finding(bench, (split, found), &overdispersion, (left, confirmed, within_tolerance));
@@ -114,7 +114,7 @@ pub fn conclude<E: Evidence>(
     let closed = |open: &Unproven<'_>| share_of(bench, split, (open, &first.weights), (&before, options.seed));
     let unproven = unproven::unproven(bench, found).and_then(|open| closed(&open).map(|share| (open, share)));
     let open = unproven.as_ref().map(|(open, share)| (open, *share));
-    let facts = facts(bench, found, (size, open), [&places, &rest], shrunk(&before, after, options.seed));
+    let facts = facts(bench, found, (size, open), [&places, &rest], shrink);
     let verdict = match &partly {
         Some(partly) => in_part(bench, partly, &facts, (&stays, &sizes)),
         None => {
@@ -257,25 +257,6 @@ fn next(verdict: &Verdict, open: bool, largest: Option<(&str, &str)>, site: &Sit
             advice::separating(&verdict.effects.iter().map(String::as_str).collect::<Vec<_>>(), site)
         }
     }
-}
-
-/// The share that is explained of what is not noise in a clip like most, in the group of sensors of which that is most.
-fn usual(before: &Residuals, after: &Residuals) -> f64 {
-    Left::of_groups(&before.typical(), &after.typical()).iter().map(Left::explained).fold(0.0, f64::max)
-}
-
-/// How far the gap shrinks on the confirm clips.
-fn shrunk(before: &Residuals, after: &Residuals, seed: u64) -> Shrunk {
-    let (mean, clips) = (after.shrink(before, seed).value, after.clips_that_shrink(before));
-    Shrunk { mean, usual: usual(before, after), clips }
-}
-
-/// Whether enough of the gap closes on the confirm clips for a cause: in the mean of most of them, or in a clip like most. One hit
-/// that goes another way, because it met a corner or did not, outweighs all other clips in the mean of squares.
-fn confirms(before: &Residuals, after: &Residuals) -> bool {
-    let mean = remainder::explained(before.mean_square(), after.mean_square(), before.floor());
-    let [shrinks, all] = after.clips_that_shrink(before);
-    2 * shrinks > all && mean.max(usual(before, after)) > combine::CLOSES
 }
 
 fn finding<'a, E: Evidence>(

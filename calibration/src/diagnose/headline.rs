@@ -29,8 +29,12 @@ pub struct Shrunk {
     pub mean: f64,
     /// Of what is not noise in a clip like most, see [`super::remainder::Left::explained`].
     pub usual: f64,
+    /// The same of the joints in contact; 0 where no tool touches anything.
+    pub contact: f64,
     /// In how many clips it does, and of how many.
     pub clips: [usize; 2],
+    /// How many clips are predicted better, and of how many.
+    pub better: [usize; 2],
 }
 
 impl Shrunk {
@@ -41,7 +45,9 @@ impl Shrunk {
             let percent = percent(self.mean).replace("> ", "more than ").replace("< ", "less than ");
             return format!("by {percent} on held-out clips");
         }
-        format!("by {} in a held-out clip like most, but grows in {} of {all}", percent(self.usual), all - shrinks)
+        let (share, whose) =
+            if self.usual > CLOSES { (self.usual, "") } else { (self.contact, "the joints in contact of ") };
+        format!("by {} in {whose}a held-out clip like most, but grows in {} of {all}", percent(share), all - shrinks)
     }
 }
 
@@ -202,7 +208,7 @@ mod tests {
             rest: "yaw (after the slide)".into(),
             effects: effects.iter().map(|name| (*name).to_owned()).collect(),
             unproven: None,
-            shrink: Shrunk { mean: 0.963, usual: 0.97, clips: [4, 4] },
+            shrink: Shrunk { mean: 0.963, usual: 0.97, contact: 0.0, clips: [4, 4], better: [4, 4] },
         }
     }
 
@@ -228,7 +234,7 @@ mod tests {
 
     #[test]
     fn a_clip_that_outweighs_the_others_is_said_and_not_averaged() {
-        let shrink = Shrunk { mean: -0.15, usual: 0.62, clips: [3, 4] };
+        let shrink = Shrunk { mean: -0.15, usual: 0.62, clips: [3, 4], ..Shrunk::default() };
         let found = finding(vec!["camera_scale"], 30.0, 1.5);
         let text = sentence(&found.decide(), &found, &Facts { shrink, ..facts(&["camera scale (scale 0.02)"]) });
         assert!(text.ends_with("the gap shrinks by 62 % in a held-out clip like most, but grows in 1 of 4."), "{text}");

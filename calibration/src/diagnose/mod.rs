@@ -24,6 +24,7 @@
 //! | [`score`] | how well they predict clips: leave-one-clip-out log-likelihood |
 //! | [`scatter_scale`] | how widely clips scatter under one of them |
 //! | `held_out` | numbers for clips that they were not fitted to |
+//! | `confirm` | whether the clips kept for confirming speak for what was found |
 //! | [`closing`] | how much of the gap they close |
 //! | [`combine`], [`reidentify`], [`refit`] | which effects act together |
 //! | `stages` | how long each part of the search takes |
@@ -54,6 +55,7 @@ pub mod combine;
 pub mod command;
 pub mod conclude;
 pub mod confidence;
+mod confirm;
 pub mod contact;
 pub mod cost;
 mod deviations;

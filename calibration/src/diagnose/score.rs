@@ -6,6 +6,7 @@
 
 use super::evidence::Evidence;
 use super::fit::{Bench, FittedClip, Hypothesis};
+use super::held_out::Fits;
 use super::noise::median;
 use super::quadratic::{minimum, value};
 use super::scatter_scale::{Around, at_the_best_scale};
@@ -48,14 +49,29 @@ pub fn predict<E: Evidence>(
     choose: &[usize],
     weights: &[f64],
 ) -> Option<Predicted> {
-    let mut clips = left_out(bench, hypothesis, weights);
+    let left_out = left_out(bench, hypothesis, weights);
     let judged = bench.judge(hypothesis, choose, weights)?;
-    clips.extend(judged.iter().map(|clip| (clip.clip, clip.deviance())));
-    let around: Vec<&Around> = hypothesis.fitted.iter().chain(&judged).map(|clip| &clip.reduced.around).collect();
-    for ((_, deviance), change) in clips.iter_mut().zip(at_the_best_scale(&around, &bench.scatter)) {
+    let all: Vec<&FittedClip> = hypothesis.fitted.iter().chain(&judged).collect();
+    let deviances = left_out.into_iter().chain(judged.iter().map(|clip| (clip.clip, clip.deviance()))).collect();
+    Some(at_one_scale(bench, &all, deviances))
+}
+
+/// Predicts clips by numbers that were fitted to others.
+#[must_use]
+pub(super) fn predict_unseen<E: Evidence>(bench: &Bench<'_, E>, fits: &Fits, weights: &[f64]) -> Option<Predicted> {
+    let judged: Option<Vec<_>> = fits.iter().map(|(fit, clips)| bench.judge(fit, clips, weights)).collect();
+    let judged = judged?.concat();
+    let deviances = judged.iter().map(|clip| (clip.clip, clip.deviance())).collect();
+    Some(at_one_scale(bench, &judged.iter().collect::<Vec<_>>(), deviances))
+}
+
+/// With the scatter between clips as wide as makes all of them most likely.
+fn at_one_scale<E>(bench: &Bench<'_, E>, clips: &[&FittedClip], mut deviances: Vec<(usize, f64)>) -> Predicted {
+    let around: Vec<&Around> = clips.iter().map(|clip| &clip.reduced.around).collect();
+    for ((_, deviance), change) in deviances.iter_mut().zip(at_the_best_scale(&around, &bench.scatter)) {
         *deviance += change;
     }
-    Some(Predicted { clips })
+    Predicted { clips: deviances }
 }
 
 fn left_out<E: Evidence>(bench: &Bench<'_, E>, hypothesis: &Hypothesis, weights: &[f64]) -> Vec<(usize, f64)> {
@@ -112,6 +128,12 @@ impl Predicted {
 }
 
 impl Advantage {
+    /// How many clips it predicts better, and how many judged.
+    #[must_use]
+    pub fn better(&self) -> [usize; 2] {
+        [self.gains.iter().filter(|gain| **gain > 0.0).count(), self.gains.len()]
+    }
+
     /// How many clips judged.
     #[must_use]
     pub fn clips(&self) -> usize {
