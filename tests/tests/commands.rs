@@ -304,6 +304,26 @@ fn a_command_on_a_page_does_what_it_says_where_names_hold_spaces_and_the_cell_li
 }
 
 #[test]
+fn the_page_of_an_advised_command_has_a_free_name_however_often_it_is_asked() {
+    let lab = tempfile::tempdir().expect("a folder");
+    record(&lab.path().join("monday"));
+    let file = lab.path().join("monday/cell.toml");
+    let mut cell = CellToml::read(&file).expect("a cell");
+    // Too few to be told anything: the answer is what to record.
+    cell.clips.truncate(1);
+    std::fs::write(file, cell.to_toml()).expect("room");
+    let mut command = "calibration diagnose monday --report report.html".to_owned();
+    for page in ["report.html", "report_2.html", "report_3.html"] {
+        assert!(!lab.path().join(page).exists(), "{page}");
+        let output = done(lab.path(), &format!("{command} --json"));
+        assert!(lab.path().join(page).is_file(), "{command}");
+        let answer: serde_json::Value = serde_json::from_slice(&output.stdout).expect("JSON");
+        let next = answer["next_commands"].as_array().and_then(|commands| commands.last()?.as_str());
+        next.expect("a command").clone_into(&mut command);
+    }
+}
+
+#[test]
 fn json_is_answered_whether_it_is_asked_for_before_or_behind_the_order() {
     let folder = tempfile::tempdir().expect("a folder");
     for place in ["grip --json stop", "grip stop --json"] {

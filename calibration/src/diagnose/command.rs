@@ -99,7 +99,8 @@ pub fn run(arguments: &Arguments, interrupt: &Interrupt) -> anyhow::Result<Diagn
     let odd = gate::look(&session, arguments.as_recorded)?;
     let theta = arguments.parameters.as_deref().map(Theta::read).transpose()?;
     let budget = arguments.budget.map(Duration::from_secs);
-    let options = Options { theta, seed: arguments.seed, torques: arguments.torques, budget, out: out.clone() };
+    let (seed, torques) = (arguments.seed, arguments.torques);
+    let options = Options { theta, seed, torques, budget, out: out.clone(), report: report.clone() };
     let (mut found, kept) = diagnose_kept(&session, &options, interrupt)?;
     gate::add(&mut found.warnings, odd.as_ref());
     match theta_file {

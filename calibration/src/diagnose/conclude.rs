@@ -32,7 +32,7 @@ const TRACES: usize = 12;
 #[must_use]
 pub fn not_testable(session: &Session, options: &Options, why: &str) -> Diagnosis {
     let nothing = Share { value: 0.0, ci90: [0.0; 2] };
-    let lacking = advice::lacking(why, &Site::of(session));
+    let lacking = advice::lacking(why, &Site::of(session, options.report.as_deref()));
     Diagnosis {
         verdict: verdict::not_testable(why),
         gap: Gap {
@@ -125,7 +125,7 @@ pub fn conclude<E: Evidence>(
     let names = |set: &[usize]| set.iter().map(|clip| admitted.files[*clip].clone()).collect();
     let largest = rest.first().map(|place| (place.channel.as_str(), place.regime.as_str()));
     let rest_is_open = partly.is_some() || finding.open().is_some();
-    let site = Site::of(session);
+    let site = Site::of(session, options.report.as_deref());
     let next = match &unproven {
         Some((open, _)) if verdict.kind == Kind::Unexplained => advice::proving(open.effect(bench), open.more, &site),
         _ => next(&verdict, rest_is_open, largest, &site),

@@ -146,6 +146,8 @@ pub struct Options {
     pub budget: Option<Duration>,
     /// Where the answer will go: what was found so far is kept beside it; else in the session's folder.
     pub out: Option<PathBuf>,
+    /// Where the page will go: commands that are advised write pages of other names.
+    pub report: Option<PathBuf>,
 }
 
 /// A session cannot be diagnosed.

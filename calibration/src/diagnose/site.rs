@@ -35,14 +35,20 @@ pub struct Site {
     fastest: f64,
     /// Whether torques along the measured motion are asked about.
     torques: bool,
+    /// The page of the command that advises; it keeps its name.
+    page: Option<PathBuf>,
 }
 
 impl Site {
     /// Of a session whose clips lie on disk; where they cannot be read again, nothing can be repeated. Where a cell.toml was
     /// given besides, clips go into a session of their own, which is captured with it: the folder's own cell.toml is another
-    /// one, or there is none, and the one given lists no new clips.
+    /// one, or there is none, and the one given lists no new clips. `page`: where the command that advises writes its own.
     #[must_use]
-    pub fn of(session: &Session) -> Self {
+    pub fn of(session: &Session, page: Option<&Path>) -> Self {
+        Self { page: page.map(Path::to_owned), ..Self::found(session) }
+    }
+
+    fn found(session: &Session) -> Self {
         let strokes =
             !session.clips.is_empty() && session.clips.iter().all(|clip| clip.kind == ClipKind::ControlHitSlide);
         let torques = is_tracking(&session.cell);
@@ -75,7 +81,16 @@ impl Site {
         // Without a slash at its end, and never nothing: a clip may lie where the program runs.
         let folder: PathBuf = folder.components().collect();
         let folder = if folder.as_os_str().is_empty() { ".".into() } else { folder };
-        Self { cell: folder.join("cell.toml"), folder, is_new: false, strokes, clips, fastest, torques: false }
+        Self {
+            cell: folder.join("cell.toml"),
+            folder,
+            is_new: false,
+            strokes,
+            clips,
+            fastest,
+            torques: false,
+            page: None,
+        }
     }
 
     /// Whether its clips are strokes.
@@ -164,15 +179,24 @@ impl Site {
         {
             commands.insert(0, self.same(&format!("--clips {enough}")));
         }
-        let beside = ["arm", "strokes"].map(|end| (named_after(&self.folder, end), format!("report_{end}.html")));
-        for (folder, page) in beside.into_iter().chain([(self.folder.clone(), "report.html".to_owned())]) {
+        let beside = ["arm", "strokes"].map(|end| (named_after(&self.folder, end), format!("report_{end}")));
+        for (folder, page) in beside.into_iter().chain([(self.folder.clone(), "report".to_owned())]) {
             if fill(&commands, &folder) {
                 let torques = if self.torques { "--torques" } else { "" };
                 let command = Command::new("calibration diagnose").path(&folder).words(torques);
-                commands.push(command.option("--report", Path::new(&page)).into());
+                commands.push(command.option("--report", &self.free_page(&page)).into());
             }
         }
         Advice { sentence, commands }
+    }
+
+    /// A page whose name is not taken where the program runs: one that is there is kept, and the command refused.
+    fn free_page(&self, name: &str) -> PathBuf {
+        let own = self.page.as_deref().and_then(Path::file_name);
+        let taken = |page: &Path| page.file_name() == own || page.symlink_metadata().is_ok();
+        let numbered = (2..).map(|number| format!("{name}_{number}.html"));
+        let mut names = std::iter::once(format!("{name}.html")).chain(numbered).map(PathBuf::from);
+        names.find(|page| !taken(page)).expect("numbers do not end")
     }
 
     fn same(&self, rest: &str) -> String {
@@ -220,14 +244,24 @@ mod tests {
     fn with_a_cell_of_elsewhere_clips_go_into_a_session_that_is_captured_with_it() {
         let files = SessionFiles { session: "my clips/".into(), cell: Some("the lab/cell.toml".into()) };
         let session = Session { folder: "my clips/".into(), cell: Cell::default(), clips: Vec::new(), files };
-        let advice = Site::of(&session).more("Record more.".into(), 3);
+        let advice = Site::of(&session, None).more("Record more.".into(), 3);
         let capture = "calibration capture excitation --cell 'the lab/cell.toml' --out 'my clips_next' --clips";
         let expected = [format!("{capture} 4"), format!("{capture} 3")];
         assert_eq!(advice.commands[..2], expected);
         assert_eq!(advice.commands[2], "calibration diagnose 'my clips_next' --report report.html");
-        assert_eq!(Site::of(&session).usual(), [format!("{capture} 8")]);
+        assert_eq!(Site::of(&session, None).usual(), [format!("{capture} 8")]);
         // Eight clips are enough to be diagnosed.
-        assert_eq!(Site::of(&session).more(String::new(), 8).commands.len(), 2);
+        assert_eq!(Site::of(&session, None).more(String::new(), 8).commands.len(), 2);
+    }
+
+    #[test]
+    fn a_page_gets_a_name_that_neither_this_command_nor_one_before_has_taken() {
+        let asked = |page: &str| {
+            let site = Site { page: Some(page.into()), ..Site::new(Path::new("bags"), false, Vec::new(), 1.0) };
+            site.more("Record more.".into(), 4).commands[1].clone()
+        };
+        assert!(asked("./report.html").ends_with("--report report_2.html"), "{}", asked("./report.html"));
+        assert!(asked("other.html").ends_with("--report report.html"), "{}", asked("other.html"));
     }
 
     #[test]

@@ -77,8 +77,8 @@ pub(super) fn conclude<E: Evidence>(
     let facts = Facts::of(&candidates, gap.shrink, deviates.unwrap_or(1.0), places.first());
     let text = headline::sentence(kind, &facts);
     let names: Vec<&str> = changes.iter().map(String::as_str).collect();
-    let next =
-        if kind == Kind::Class { advice::separating(&names, &Site::of(session)) } else { advice::Advice::default() };
+    let site = Site::of(session, options.report.as_deref());
+    let next = if kind == Kind::Class { advice::separating(&names, &site) } else { advice::Advice::default() };
     let files = |set: &[usize]| set.iter().map(|clip| case.pair.admitted.files[*clip].clone()).collect();
     let in_b = if believed { found.last.model.of(Side::B) } else { found.without.model.of(Side::B) };
     Ok(Comparison {
