@@ -4,31 +4,9 @@
 //! show in decide. What no capture can do, a weight to be hung or an object to be put somewhere, stands in the sentence first.
 
 use super::headline::words;
-use super::site::Site;
+use super::site::{Advice, Capture, Site};
 use crate::report::channel_in_words;
 use twin::effects::{Experiment, Separation, Stage, find};
-
-/// What to record next.
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub struct Advice {
-    /// The reason and the experiment, in words; steps for hands before those for the keyboard.
-    pub sentence: String,
-    /// Commands that can be typed as they are, in this order.
-    pub commands: Vec<String>,
-}
-
-/// A capture of an advice, without cell and session.
-#[derive(Debug, Clone, Copy)]
-pub(super) enum Capture {
-    /// The arm alone, new clips.
-    Arm(&'static str),
-    /// A stroke of the session again, with these arguments; a new one where there is none to repeat.
-    StrokeAgain(&'static str),
-    /// New strokes.
-    Strokes(&'static str),
-    /// New strokes into a session of its own, named so, because something in the cell is another then.
-    Elsewhere(&'static str, &'static str),
-}
 
 use Capture::{Arm, Elsewhere, StrokeAgain, Strokes};
 

@@ -1,6 +1,5 @@
 //! The answer of a diagnosis, as it is written to diagnosis.json and shown on the page.
 
-use super::remedies::Remedy;
 use crate::report::Trace;
 use serde::ser::{Serialize, SerializeStruct, Serializer};
 use shared_mem::recording::SessionFiles;
@@ -288,6 +287,17 @@ pub struct Clips {
     pub choose: Vec<String>,
     /// Opened once, at the end.
     pub confirm: Vec<String>,
+}
+
+/// What to do about one effect.
+#[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
+pub struct Remedy {
+    /// Name of the registry.
+    pub effect: String,
+    /// On the hardware, in the robot's settings, or in cell.toml.
+    pub in_cell: String,
+    /// In a model of the cell, whichever simulator it is for.
+    pub in_model: String,
 }
 
 #[cfg(test)]

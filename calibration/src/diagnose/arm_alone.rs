@@ -2,13 +2,13 @@
 //! joints needs no object, and simulating the arm up to the touch takes a tenth of the time of a whole stroke. So effects in
 //! the joints are compared there first, and few of them are taken on to the object.
 
-use super::combine::{FIRST_PASS, HEAT, LOOK, NEAR, Step};
+use super::effort::{FIRST_PASS, HEAT, LOOK, NEAR};
 use super::evidence::{Channel, Evidence, Reach, Row};
 use super::fit::{Bench, Hypothesis};
-use super::headline::words;
 use super::scatter::Scatter;
 use super::screening::arm_gap_is_open;
 use super::split::Split;
+use super::trial::Step;
 use super::{stages, starts, undetermined};
 use crate::estimate::{ClipModel, Impossible};
 use shared_mem::progress::Progress;
@@ -48,7 +48,7 @@ impl Step {
         let arm = evidence.bench(bench);
         let at = (&self.from, &weights[..]);
         let fit = |effects: &[usize], full, effort| arm.fit((effects, full), &split.train, weights, None, effort);
-        let name = |place: usize| words(bench.library.candidates[self.trials[place].scored.candidate].effect.name);
+        let name = |place: usize| bench.library.candidates[self.trials[place].scored.candidate].in_words();
         bar.stage(stages::ARM_FITS, places.len() as u64);
         let alone = |place: &usize| {
             let scored = &self.trials[*place].scored;
@@ -134,14 +134,14 @@ impl<E: Evidence> Evidence for ArmAlone<'_, E> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::combine::Trial;
+    use super::super::effort::Effort;
     use super::super::evidence::Group;
-    use super::super::fit::Effort;
     use super::super::gap::Typical;
     use super::super::library::Library;
     use super::super::score::Predicted;
     use super::super::sweep::Precision;
     use super::super::test_bench::{nothing_said_of, on_strokes, shipped, with_effect};
+    use super::super::trial::Trial;
     use super::*;
     use crate::benchmark::world::{Fault, Kind, World};
 

@@ -6,8 +6,9 @@
 
 use super::admit::Admitted;
 use super::arm_alone::ArmAlone;
+use super::effort::Effort;
 use super::evidence::Evidence;
-use super::fit::{Bench, Effort, Hypothesis};
+use super::fit::{Bench, Hypothesis};
 use super::split::Split;
 use super::sweep::Precision;
 use super::{floor, stages};

@@ -1,21 +1,22 @@
 //! From what the search found to the answer: the confirm clips are opened here, and only here.
 
 use super::admit::Admitted;
-use super::advice::Advice;
 use super::answer::{Change, Clips, Diagnosis, Gap, Nearest, Place, Rest, Share, Verdict};
-use super::combine::{Found, Step};
 use super::confirm::{Confirmation, confirm};
 use super::evidence::{Evidence, Group};
 use super::fit::{Bench, Hypothesis};
 use super::gap::Residuals;
-use super::headline::{self, Facts, Shrunk};
+use super::gap::Shrunk;
+use super::headline::{self, Facts};
 use super::held_out::{self, Fits};
 use super::partly::{self, Partly};
 use super::remainder::{self, Left};
 use super::score::predict;
+use super::site::Advice;
 use super::site::Site;
 use super::sizes::{self, Sizes};
 use super::split::{self, Split};
+use super::trial::{Found, Step};
 use super::unproven::{self, Unproven};
 use super::verdict::{self, Finding};
 use super::{DiagnoseError, Kind, Options, advice, confidence, drift, localise, parameters, ranked, refit, remedies};

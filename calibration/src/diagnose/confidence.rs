@@ -1,7 +1,7 @@
 //! How sure a finding is: shares of the evidence among rivals, less what experience with simulated sessions takes off.
 
-use super::combine::{Step, Trial, net};
 use super::library::Library;
+use super::trial::{Step, Trial, net};
 use crate::estimate::interval::student;
 
 /// Rivals this close cannot be told apart [nats].

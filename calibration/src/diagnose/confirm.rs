@@ -4,14 +4,13 @@
 //! meets a corner, or misses it, ends elsewhere by more than any cause explains. So how far its path shrinks in the mean of
 //! squares is a matter of single clips; the likelihood knows how far objects deviate, and what the joints in contact show.
 
-use super::combine::CLOSES;
 use super::evidence::{Evidence, Group};
 use super::fit::Bench;
-use super::gap::Residuals;
-use super::headline::Shrunk;
+use super::gap::{Residuals, Shrunk};
 use super::held_out::Fits;
 use super::remainder::{self, Left};
 use super::score::{Advantage, predict_unseen};
+use super::trial::CLOSES;
 
 /// What they say.
 pub(super) struct Confirmation {

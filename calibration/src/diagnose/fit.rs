@@ -1,6 +1,7 @@
 //! Hypotheses fitted to clips: the baseline's numbers and those of the effects that act, together, by bounded Gauss-Newton
 //! steps over the sweeps of [`super::sweep`].
 
+use super::effort::Effort;
 use super::evidence::Evidence;
 use super::library::Library;
 use super::quadratic;
@@ -74,26 +75,6 @@ impl Hypothesis {
     pub fn own(&self, clip: usize, count: usize) -> Vec<f64> {
         let fitted = self.fitted.iter().find(|fitted| fitted.clip == clip);
         fitted.map_or_else(|| vec![0.0; count], |fitted| fitted.own.clone())
-    }
-}
-
-/// How a fit is made.
-#[derive(Debug, Clone, Copy, Hash)]
-pub struct Effort {
-    /// At most so many linearisations.
-    pub iterations: usize,
-    /// How they are taken.
-    pub precision: Precision,
-    /// Whether numbers that the arm alone tells stay where they are: an effect beyond the arm does not change what its joints
-    /// say, and the arm need not be simulated again.
-    pub holds_joints: bool,
-}
-
-impl Effort {
-    /// So many linearisations, taken like this, of all numbers.
-    #[must_use]
-    pub const fn of(iterations: usize, precision: Precision) -> Self {
-        Self { iterations, precision, holds_joints: false }
     }
 }
 

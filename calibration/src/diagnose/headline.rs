@@ -1,7 +1,8 @@
 //! The finding in one sentence of plain words: how large the gap is and where, which effect causes it, how far it shrinks.
 
 use super::answer::{Kind, Share};
-use super::combine::CLOSES;
+use super::gap::Shrunk;
+use super::trial::CLOSES;
 use super::verdict::{Decision, Finding};
 use crate::report::percent;
 
@@ -20,21 +21,6 @@ pub struct Facts {
     pub unproven: Option<(String, f64, [usize; 2])>,
     /// The shrink with all of them in the twin.
     pub shrink: Shrunk,
-}
-
-/// How far the gap shrinks on held-out clips.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct Shrunk {
-    /// Of the mean squared residual, see [`super::gap::Residuals::shrink`].
-    pub mean: f64,
-    /// Of what is not noise in a clip like most, see [`super::remainder::Left::explained`].
-    pub usual: f64,
-    /// The same of the joints in contact; 0 where no tool touches anything.
-    pub contact: f64,
-    /// In how many clips it does, and of how many.
-    pub clips: [usize; 2],
-    /// How many clips are predicted better, and of how many.
-    pub better: [usize; 2],
 }
 
 impl Shrunk {

@@ -1,8 +1,9 @@
 //! Numbers for clips that they were not fitted to. Clips kept for confirming are seen by no fit at all; where there are too few
 //! commands to keep any, every command is left out of a fit of its own in turn, and judged by that.
 
+use super::effort::Effort;
 use super::evidence::Evidence;
-use super::fit::{Bench, Effort, Hypothesis};
+use super::fit::{Bench, Hypothesis};
 use super::gap::Residuals;
 use super::split::Split;
 use super::sweep::Precision;

@@ -60,6 +60,7 @@ pub mod contact;
 pub mod cost;
 mod deviations;
 pub mod drift;
+pub mod effort;
 pub mod evidence;
 pub mod fit;
 pub mod floor;
@@ -99,15 +100,14 @@ pub mod sweep;
 mod test_bench;
 mod tolerance;
 mod torques;
+pub mod trial;
 pub mod undetermined;
 mod unproven;
 pub mod verdict;
 
-pub use remedies::Remedy;
-
 pub use answer::{
-    Basis, Candidate, Change, Clips, Diagnosis, Gap, Kind, Nearest, Place, Rest, Share, Size, Status, TorqueRms,
-    Verdict,
+    Basis, Candidate, Change, Clips, Diagnosis, Gap, Kind, Nearest, Place, Remedy, Rest, Share, Size, Status,
+    TorqueRms, Verdict,
 };
 
 use crate::forward::object::ObjectClips;

@@ -9,12 +9,12 @@
 //! What comes after them in the search belongs to the rest.
 
 use super::answer::Share;
-use super::combine::{Found, Step};
 use super::evidence::Evidence;
 use super::fit::Bench;
 use super::gap::Residuals;
 use super::held_out::{self, Fits};
 use super::split::Split;
+use super::trial::{Found, Step};
 use super::{confidence, remainder};
 
 /// More than half of the squared gap: then what was found is larger than all that was not.
@@ -109,12 +109,12 @@ impl Partly {
 
 #[cfg(test)]
 mod tests {
-    use super::super::combine::Trial;
     use super::super::fit::Hypothesis;
     use super::super::library::Library;
     use super::super::score::Predicted;
     use super::super::shortlist::Scored;
     use super::super::test_bench::{ONCE, nothing_said_of, on_bench, shipped, truth, with_effect};
+    use super::super::trial::Trial;
     use super::*;
     use crate::benchmark::world::Kind;
     use crate::forward::setting;

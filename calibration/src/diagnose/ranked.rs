@@ -2,13 +2,13 @@
 //! says why.
 
 use super::answer::{Candidate, Share, Status};
-use super::combine::{Found, Step, Trial};
 use super::evidence::Evidence;
 use super::fit::{Bench, Hypothesis};
 use super::gap::{DOUBLED, Residuals};
 use super::reason::{Judged, reason};
 use super::shortlist::{Scored, TESTABLE};
 use super::split::Split;
+use super::trial::{Found, Step, Trial};
 use super::verdict::Finding;
 use super::{Kind, confidence, held_out, parameters, screening};
 

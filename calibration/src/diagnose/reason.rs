@@ -1,12 +1,12 @@
 //! Why a candidate is the cause or is not, in words: every reason for ruling one out speaks against it.
 
 use super::answer::{Kind, Status};
-use super::combine::{Found, NEARLY_ALL, PLAIN, Trial, WORTHWHILE, convincing};
 use super::evidence::Evidence;
 use super::fit::Bench;
 use super::headline::words;
 use super::score::Advantage;
 use super::shortlist::{BY_CHANCE, TESTABLE};
+use super::trial::{Found, NEARLY_ALL, PLAIN, Trial, WORTHWHILE, convincing};
 use super::verdict::Finding;
 
 /// A candidate with all that its reason is drawn from.
@@ -202,11 +202,11 @@ fn times_noise(judged: &Judged<'_>) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::super::combine::Step;
     use super::super::fit::Hypothesis;
     use super::super::score::Predicted;
     use super::super::shortlist::Scored;
     use super::super::test_bench::{nothing_said_of, on_strokes, shipped};
+    use super::super::trial::Step;
     use super::super::verdict::tests::finding;
     use super::*;
     use crate::benchmark::world::{Fault, World};

@@ -1,13 +1,14 @@
 //! The end of each step of the search: what was chosen is fitted to the end, and what it makes superfluous is dropped.
 
 use super::arm_alone::ArmAlone;
-use super::combine::{FIRST_PASS, LEAST, NEARLY_ALL, convincing};
+use super::effort::{Effort, FIRST_PASS};
 use super::evidence::Evidence;
-use super::fit::{Bench, Effort, Hypothesis};
+use super::fit::{Bench, Hypothesis};
 use super::library::Alternative;
 use super::score::predict;
 use super::split::Split;
 use super::sweep::Precision;
+use super::trial::{LEAST, NEARLY_ALL, convincing};
 
 /// The winner gets so many linearisations more.
 const LAST_PASS: Effort = Effort::of(6, Precision::Exact);

@@ -1,11 +1,12 @@
 //! Trials that are fitted once more with the object found anew: its parameters were identified without the effect, and
 //! stand in for a part of it.
 
-use super::combine::{FIRST_PASS, LEAST, PLAIN, Step, Trial};
 use super::confidence;
+use super::effort::FIRST_PASS;
 use super::evidence::Evidence;
 use super::fit::{Bench, Hypothesis};
 use super::split::Split;
+use super::trial::{LEAST, PLAIN, Step, Trial};
 
 /// Rivals of the best that are worth this share of it are fitted again.
 const RIVAL: f64 = 0.5;

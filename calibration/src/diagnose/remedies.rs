@@ -1,20 +1,9 @@
 //! What to do about effects that were named: in the cell, and in a model. Each effect says it itself, from what was identified.
 
-use super::answer::{Kind, Verdict};
+use super::answer::{Kind, Remedy, Verdict};
 use shared_mem::cell::Cell;
 use shared_mem::theta::Theta;
 use twin::effects::find;
-
-/// What to do about one effect.
-#[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
-pub struct Remedy {
-    /// Name of the registry.
-    pub effect: String,
-    /// On the hardware, in the robot's settings, or in cell.toml.
-    pub in_cell: String,
-    /// In a model of the cell, whichever simulator it is for.
-    pub in_model: String,
-}
 
 /// A remedy for each effect that the verdict names, with its numbers of `theta`; none where it names none for sure.
 #[must_use]

@@ -1,11 +1,11 @@
 //! Which candidates are worth a fit.
 
-use super::combine::Step;
 use super::evidence::Evidence;
 use super::fit::{Bench, Hypothesis};
 use super::gap::Typical;
 use super::remainder::{Left, ROUGHNESS};
 use super::shortlist::{BY_CHANCE, Scored, TESTABLE};
+use super::trial::Step;
 use twin::effects::Stage;
 
 /// So many candidates are fitted at each step.

@@ -1,7 +1,6 @@
 //! Where an advice is carried out: the session, its clips that can be repeated, and how much faster they may be played. It
 //! makes commands that can be typed of what an advice asks for.
 
-use super::advice::{Advice, Capture};
 use super::torques::is_tracking;
 use crate::capture::body::Body;
 use crate::capture::session::number_of;
@@ -17,6 +16,28 @@ const TWO: usize = 2;
 const WORTH: f64 = 1.2;
 /// Twice as fast is enough.
 const TWICE: f64 = 2.0;
+
+/// What to record next.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Advice {
+    /// The reason and the experiment, in words; steps for hands before those for the keyboard.
+    pub sentence: String,
+    /// Commands that can be typed as they are, in this order.
+    pub commands: Vec<String>,
+}
+
+/// A capture of an advice, without cell and session.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Capture {
+    /// The arm alone, new clips.
+    Arm(&'static str),
+    /// A stroke of the session again, with these arguments; a new one where there is none to repeat.
+    StrokeAgain(&'static str),
+    /// New strokes.
+    Strokes(&'static str),
+    /// New strokes into a session of its own, named so, because something in the cell is another then.
+    Elsewhere(&'static str, &'static str),
+}
 
 /// A session and what can be recorded into it.
 #[derive(Debug, Clone, PartialEq)]

@@ -2,8 +2,9 @@
 
 use super::arm_clips::ArmClips;
 use super::cell_clips::CellClips;
+use super::effort::Effort;
 use super::evidence::Evidence;
-use super::fit::{Bench, Effort};
+use super::fit::Bench;
 use super::floor;
 use super::ground::Ground;
 use super::library::Library;

@@ -1,9 +1,9 @@
 //! An effect that predicts clips better and closes a real part of the gap, but not in enough clips to be no chance: what more
 //! clips would prove.
 
-use super::combine::{Found, PLAIN, Trial, convincing};
 use super::evidence::Evidence;
 use super::fit::{Bench, Hypothesis};
+use super::trial::{Found, PLAIN, Trial, convincing};
 
 /// An effect that is likely, and not proven.
 pub(super) struct Unproven<'a> {

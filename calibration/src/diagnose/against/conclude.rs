@@ -5,8 +5,9 @@ use super::super::evidence::Evidence;
 use super::super::fit::Hypothesis;
 use super::super::gap::Residuals;
 use super::super::remainder::Left;
+use super::super::site::{Advice, Site};
 use super::super::sizes::Sizes;
-use super::super::{DiagnoseError, Options, advice, localise, site::Site};
+use super::super::{DiagnoseError, Options, advice, localise};
 use super::answer::{Candidate, Comparison, Smallest, Verdict};
 use super::changes;
 use super::fits::{PairBench, numbers};
@@ -78,7 +79,7 @@ pub(super) fn conclude<E: Evidence>(
     let text = headline::sentence(kind, &facts);
     let names: Vec<&str> = changes.iter().map(String::as_str).collect();
     let site = Site::of(session, options.report.as_deref());
-    let next = if kind == Kind::Class { advice::separating(&names, &site) } else { advice::Advice::default() };
+    let next = if kind == Kind::Class { advice::separating(&names, &site) } else { Advice::default() };
     let files = |set: &[usize]| set.iter().map(|clip| case.pair.admitted.files[*clip].clone()).collect();
     let in_b = if believed { found.last.model.of(Side::B) } else { found.without.model.of(Side::B) };
     Ok(Comparison {

@@ -1,13 +1,14 @@
 //! Models of two sessions fitted to the clips of both, and how well they predict clips that they were not fitted to.
 
-use super::super::combine::NEARLY_ALL;
+use super::super::effort::Effort;
 use super::super::evidence::Evidence;
-use super::super::fit::{Bench, Effort, Hypothesis};
+use super::super::fit::{Bench, Hypothesis};
 use super::super::gap::Residuals;
 use super::super::held_out;
 use super::super::noise::median;
 use super::super::score::{Predicted, predict};
 use super::super::split::Split;
+use super::super::trial::NEARLY_ALL;
 use super::turned::{Model, SIDES, Side, TwoSessions, side_of};
 use crate::estimate::interval::student;
 

@@ -1,6 +1,6 @@
 //! What changed: changes are added while the clips of both sessions are predicted better with them than with the same thing in both.
 
-use super::super::combine::{FIRST_PASS, HEAT};
+use super::super::effort::{FIRST_PASS, HEAT};
 use super::super::evidence::Evidence;
 use super::super::fit::Hypothesis;
 use super::super::refit::last_pass;
