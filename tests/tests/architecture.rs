@@ -212,6 +212,22 @@ fn what_identifies_and_diagnoses_names_no_effect() {
 }
 
 #[test]
+fn the_diagnosis_goes_one_way() {
+    let steps = ["clips", "library", "evidence", "fit", "judge", "propose", "search", "conclude"];
+    let step = |file: &str| {
+        let within = file.strip_prefix("calibration/src/diagnose/")?.split('/').next()?;
+        steps.iter().position(|step| within.strip_suffix(".rs").unwrap_or(within) == *step)
+    };
+    for (file, lines) in product_lines() {
+        let Some(own) = step(&file) else { continue };
+        for later in &steps[own + 1..] {
+            let needs = lines.iter().find(|line| line.contains(&format!("crate::diagnose::{later}")));
+            assert!(needs.is_none(), "{file} needs {later}, a later step: {}", needs.unwrap_or(&String::new()));
+        }
+    }
+}
+
+#[test]
 fn dependencies_point_one_way() {
     let rules: [(&str, &[&str]); 5] = [
         ("shared_mem", &["twin", "rt_bridge", "calibration", "import"]),

@@ -7,14 +7,14 @@
 //! None of them treats what varies from clip to clip as such, and none of them can refuse.
 
 use super::score::Said;
-use crate::diagnose::evidence::Evidence;
-use crate::diagnose::fit::{Bench, Hypothesis};
-use crate::diagnose::floor;
-use crate::diagnose::quadratic::minimum;
-use crate::diagnose::scatter::Scatter;
-use crate::diagnose::shortlist;
-use crate::diagnose::split::Split;
-use crate::diagnose::sweep::{Column, Point, Precision, Swept, sweep};
+use crate::diagnose::clips::split::Split;
+use crate::diagnose::evidence::measured::Evidence;
+use crate::diagnose::evidence::scatter::Scatter;
+use crate::diagnose::fit::bench::{Bench, Hypothesis};
+use crate::diagnose::fit::floor;
+use crate::diagnose::fit::quadratic::minimum;
+use crate::diagnose::fit::shortlist;
+use crate::diagnose::fit::sweep::{Column, Point, Precision, Swept, sweep};
 use nalgebra::DMatrix;
 
 /// Names in the order of [`all`].

@@ -305,8 +305,8 @@ fn effect(name: &str, parameter: &str, value: f64) -> EffectTheta {
 mod tests {
     use super::super::world::Fault;
     use super::*;
-    use crate::diagnose::arm_clips::ArmClips;
-    use crate::diagnose::evidence::Evidence;
+    use crate::diagnose::evidence::arm_clips::ArmClips;
+    use crate::diagnose::evidence::measured::Evidence;
     use crate::estimate::ClipModel;
     use shared_mem::cell::Cell;
     use std::path::Path;

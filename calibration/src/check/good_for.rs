@@ -2,7 +2,7 @@
 
 use super::remark::{Remark, Severity};
 use super::session::ClipFacts;
-use crate::diagnose::admit::{self, Refused};
+use crate::diagnose::clips::admit::{self, Refused};
 use crate::forward::arm::{ArmClips, Channel};
 use crate::identify::arm::ArmError;
 use crate::identify::object::{ObjectError, shows_object};

@@ -142,8 +142,8 @@ fn print(json: bool, answer: &impl Serialize, words: impl Display) -> anyhow::Re
 #[cfg(test)]
 mod tests {
     use super::*;
-    use calibration::diagnose::advice;
-    use calibration::diagnose::site::Site;
+    use calibration::diagnose::conclude::advice;
+    use calibration::diagnose::conclude::site::Site;
     use std::path::Path;
 
     /// The words a POSIX shell makes of a command.

@@ -9,7 +9,7 @@ mod stage;
 use crate::capture::excitation::{self, ClipSummary};
 use crate::capture::shape::Kind;
 use crate::capture::task::{Summary, Task};
-use crate::diagnose::headline::words;
+use crate::diagnose::conclude::headline::words;
 use crate::diagnose::{self, Diagnosis, Verdict, diagnose};
 use crate::interrupt::Interrupt;
 use crate::processes::Program;

@@ -134,7 +134,7 @@ pub struct Gap {
     pub after: f64,
     /// What noise and scatter alone leave.
     pub floor: f64,
-    /// [`super::gap::Residuals::shrink`]: `1 - after / before`, at least -1: a gap that more than doubles.
+    /// [`crate::diagnose::judge::gap::Residuals::shrink`]: `1 - after / before`, at least -1: a gap that more than doubles.
     pub shrink: Share,
     /// `(before - after) / (before - floor)`.
     pub explainable_fraction: f64,

@@ -5,7 +5,7 @@
 //! play and saturation have no slope there. An effect with a form beside its size (a place, an axis, a speed) has one
 //! alternative for each of a few forms.
 
-use super::ground::{Ground, Patch};
+use crate::diagnose::clips::ground::{Ground, Patch};
 use crate::estimate::Unknown;
 use crate::forward::setting::{self, Setting, Settings};
 use shared_mem::cell::Cell;

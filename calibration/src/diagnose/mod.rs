@@ -4,106 +4,34 @@
 //! and with others. Clips are split by command: parameters are fitted on some, effects chosen on others, and the shrink is
 //! measured on the rest, which are opened once. The clip is the unit of evidence throughout.
 //!
-//! | module | step |
+//! | folder | step |
 //! |---|---|
-//! | [`admit`] | can the clips be diagnosed at all |
-//! | `torques` | torques along the measured motion, where no control law is known |
-//! | [`length`] | how much of long clips counts |
-//! | [`split`] | which clips are for what |
-//! | [`evidence`], [`arm_clips`], [`contact`], [`cell_clips`] | what is measured against the twin, and where in a clip |
-//! | `deviations` | how the object of a clip deviates from any simulated path |
-//! | `recent` | where a search has just been |
-//! | [`scatter`] | what every clip has of its own |
-//! | [`library`], [`ground`] | the candidates as numbers, and where on the table they can show |
-//! | [`baseline`] | the paper's parameters identified |
-//! | [`noise`], [`floor`] | how far residuals can be trusted |
-//! | [`signatures`], [`sweep`], [`quadratic`] | every candidate's signature, linearised once |
-//! | [`shortlist`] | how much of the gap each signature explains |
-//! | [`screening`], [`arm_alone`], [`starts`], [`ripple`] | which of them are fitted, to the arm first, and where a fit begins |
-//! | [`cost`], [`fit`], [`restart`] | hypotheses fitted, and restarts of clips whose own numbers are stuck in a local minimum |
-//! | [`score`] | how well they predict clips: leave-one-clip-out log-likelihood |
-//! | [`scatter_scale`] | how widely clips scatter under one of them |
-//! | `held_out` | numbers for clips that they were not fitted to |
-//! | `confirm` | whether the clips kept for confirming speak for what was found |
-//! | [`closing`] | how much of the gap they close |
-//! | [`combine`], [`reidentify`], [`refit`] | which effects act together |
-//! | `stages` | how long each part of the search takes |
-//! | [`undetermined`] | which of their numbers nothing depends on |
-//! | [`remainder`], [`drift`] | what they leave |
-//! | [`gap`], [`localise`], `sizes` | how large the gap is, and where |
-//! | `unproven` | what more clips would prove |
-//! | `tolerance` | whether a gap is of interest |
-//! | `partly` | what is proven although a part of the gap stays |
-//! | [`parameters`], [`confidence`], [`verdict`], [`headline`] | what is said about it |
-//! | [`advice`], [`site`] | what to record next, and the commands for it |
-//! | [`remedies`] | what to do about what was named |
-//! | [`ranked`], `reason` | what is said of every candidate, and why |
-//! | [`conclude`], [`answer`] | the answer |
+//! | [`clips`] | which recorded clips can be diagnosed, how much of them counts, and what each is for |
+//! | [`library`] | the candidates as numbers |
+//! | [`evidence`] | what is measured against the twin, where in a clip, and how far clips deviate by themselves |
+//! | [`fit`] | hypotheses linearised around clips and fitted to them |
+//! | [`judge`] | how well a hypothesis predicts clips, how much of the gap it closes, how sure that is, and what is left |
+//! | [`propose`] | which candidates are tried, on what, and where their fits begin |
+//! | [`search`] | from the identified baseline to the effects that act together |
+//! | [`conclude`], [`answer`] | the verdict in words and numbers, what to do about it, and what to record next |
 //! | [`against`] | what changed between two sessions of one robot |
 //! | [`command`] | the verb |
+//!
+//! Each needs only those above it.
 
-pub mod admit;
-pub mod advice;
 pub mod against;
 pub mod answer;
-pub mod arm_alone;
-pub mod arm_clips;
-pub mod baseline;
-pub mod cell_clips;
-pub mod closing;
-pub mod combine;
+pub mod clips;
 pub mod command;
 pub mod conclude;
-pub mod confidence;
-mod confirm;
-pub mod contact;
-pub mod cost;
-mod deviations;
-pub mod drift;
-pub mod effort;
 pub mod evidence;
 pub mod fit;
-pub mod floor;
-pub mod gap;
-pub mod ground;
-pub mod headline;
-mod held_out;
-pub mod length;
+pub mod judge;
 pub mod library;
-pub mod localise;
-pub mod noise;
-pub mod parameters;
-mod partly;
-pub mod quadratic;
-pub mod ranked;
-mod reason;
-mod recent;
-pub mod refit;
-pub mod reidentify;
-pub mod remainder;
-pub mod remedies;
-pub mod restart;
-pub mod ripple;
-pub mod scatter;
-pub mod scatter_scale;
-pub mod score;
-pub mod screening;
-pub mod shortlist;
-pub mod signatures;
-pub mod site;
-mod sizes;
-pub mod split;
-mod stages;
-pub mod starts;
-pub mod sweep;
+pub mod propose;
+pub mod search;
 #[cfg(test)]
 mod test_bench;
-mod tolerance;
-mod torques;
-pub mod trial;
-pub mod undetermined;
-mod unproven;
-pub mod verdict;
 
 pub use answer::{
     Basis, Candidate, Change, Clips, Diagnosis, Gap, Kind, Nearest, Place, Remedy, Rest, Share, Size, Status,
@@ -114,18 +42,18 @@ use crate::forward::object::ObjectClips;
 use crate::forward::setting::{self, BaseError};
 use crate::interrupt::Interrupt;
 use crate::kept::{self, Fingerprint, Kept, Trail};
-use admit::{Admitted, Refused, admit};
-use arm_clips::ArmClips;
-use cell_clips::CellClips;
-use evidence::Evidence;
-use fit::Bench;
+use clips::admit::{Admitted, Refused, admit};
+use clips::split::Split;
+use evidence::arm_clips::ArmClips;
+use evidence::cell_clips::CellClips;
+use evidence::measured::Evidence;
+use fit::bench::Bench;
 use library::Library;
 use shared_mem::cell::Cell;
 use shared_mem::progress::Progress;
 use shared_mem::recording::Session;
 use shared_mem::theta::Theta;
 use shared_mem::typed;
-use split::Split;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -195,7 +123,7 @@ pub fn diagnose_kept(
     interrupt: &Interrupt,
 ) -> Result<(Diagnosis, Arc<Kept>), DiagnoseError> {
     let interrupt = &interrupt.within(options.budget);
-    let tracking = if options.torques { torques::cell(&session.cell) } else { None };
+    let tracking = if options.torques { clips::torques::cell(&session.cell) } else { None };
     let tracking = tracking.map(|cell| Session { cell, ..session.clone() });
     let session = match &tracking {
         None if options.torques => return Err(Refused::NoModel.into()),
@@ -210,7 +138,7 @@ pub fn diagnose_kept(
         Err(Refused::NotTestable(why)) => {
             // A cell that cannot be simulated is an error all the same.
             setting::complete(&session.cell, options.theta.as_ref())?;
-            return Ok((conclude::not_testable(session, options, &why), Arc::new(Kept::default())));
+            return Ok((conclude::conclusion::not_testable(session, options, &why), Arc::new(Kept::default())));
         }
         admitted => admitted?,
     };
@@ -261,8 +189,8 @@ fn diagnosed(
         let evidence = ArmClips::new(&session.cell, &admitted.clips, theta).map_err(Refused::from)?;
         examine(&evidence, &library, session, admitted, options, work)?
     };
-    if torques::is_tracking(&session.cell) {
-        diagnosis.theta = torques::without_law(diagnosis.theta, options.theta.as_ref());
+    if clips::torques::is_tracking(&session.cell) {
+        diagnosis.theta = clips::torques::without_law(diagnosis.theta, options.theta.as_ref());
     }
     diagnosis.seconds = began.elapsed().as_secs_f64();
     Ok(diagnosis)
@@ -290,18 +218,18 @@ fn examine<E: Evidence>(
 ) -> Result<Diagnosis, DiagnoseError> {
     let bench = Bench { evidence, library, scatter: evidence.scatter(), interrupt, trail };
     let split = Split::new(&admitted.groups, options.seed);
-    let plan: &[_] = if admitted.with_object { &stages::OBJECT } else { &stages::ARM };
-    let bar = Progress::planned("diagnose", plan, baseline::steps(admitted));
+    let plan: &[_] = if admitted.with_object { &fit::stages::OBJECT } else { &fit::stages::ARM };
+    let bar = Progress::planned("diagnose", plan, search::baseline::steps(admitted));
     let baseline =
-        baseline::identify(&bench, &split, &session.cell, admitted, &bar).ok_or(DiagnoseError::NoBaseline)?;
+        search::baseline::identify(&bench, &split, &session.cell, admitted, &bar).ok_or(DiagnoseError::NoBaseline)?;
     let refined = |full: &[f64]| {
         let step = bench.step("refined").with_numbers(full);
-        trail.0.once(&step, || baseline::refined(&bench, &split, &session.cell, admitted, full))
+        trail.0.once(&step, || search::baseline::refined(&bench, &split, &session.cell, admitted, full))
     };
-    let found = combine::search(&bench, &split, baseline, &refined, &bar).ok_or(DiagnoseError::NoBaseline)?;
+    let found = search::combine::search(&bench, &split, baseline, &refined, &bar).ok_or(DiagnoseError::NoBaseline)?;
     let cut_short = interrupt.spent();
-    bar.stage(stages::CONCLUSION, 1);
-    let mut concluded = conclude::conclude(&bench, &split, &found, session, admitted, options)?;
+    bar.stage(fit::stages::CONCLUSION, 1);
+    let mut concluded = conclude::conclusion::conclude(&bench, &split, &found, session, admitted, options)?;
     if interrupt.spent() {
         concluded.budget_spent = true;
         concluded.verdict = concluded.verdict.so_far(options.budget.unwrap_or_default(), cut_short);

@@ -1,18 +1,18 @@
 //! Two recorded clips of a world on a bench, to try the steps of the search on.
 
-use super::arm_clips::ArmClips;
-use super::cell_clips::CellClips;
-use super::effort::Effort;
-use super::evidence::Evidence;
-use super::fit::Bench;
-use super::floor;
-use super::ground::Ground;
 use super::library::Library;
-use super::shortlist::Scored;
-use super::sweep::Precision;
 use crate::benchmark::draw;
 use crate::benchmark::session::record;
 use crate::benchmark::world::{Fault, Kind, World};
+use crate::diagnose::clips::ground::Ground;
+use crate::diagnose::evidence::arm_clips::ArmClips;
+use crate::diagnose::evidence::cell_clips::CellClips;
+use crate::diagnose::evidence::measured::Evidence;
+use crate::diagnose::fit::bench::Bench;
+use crate::diagnose::fit::effort::Effort;
+use crate::diagnose::fit::floor;
+use crate::diagnose::fit::shortlist::Scored;
+use crate::diagnose::fit::sweep::Precision;
 use crate::forward::object::ObjectClips;
 use crate::forward::setting;
 use crate::interrupt::Interrupt;

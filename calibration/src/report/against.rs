@@ -6,7 +6,7 @@ use super::figure::bars::{Row, bars};
 use super::frame::{facts, figure, frame, legend, unbroken};
 use super::share::{limited, percent_interval, probability};
 use crate::diagnose::against::{Candidate, Comparison};
-use crate::diagnose::confidence::MOST;
+use crate::diagnose::judge::confidence::MOST;
 use crate::diagnose::{Kind, Status};
 use maud::{Markup, html};
 

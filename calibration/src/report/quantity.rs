@@ -1,6 +1,6 @@
 //! Numbers for people: SI prefixes where they help, as many digits as the interval allows, never an exponent that can be avoided.
 
-use crate::diagnose::parameters::UNBOUNDED;
+use crate::diagnose::fit::parameters::UNBOUNDED;
 
 /// How a unit is shown: factor from SI, and the name.
 #[derive(Debug, Clone, PartialEq)]

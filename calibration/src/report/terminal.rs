@@ -10,7 +10,7 @@ use super::scale::span;
 use super::share::{limited, percent, percent_interval};
 use crate::benchmark::score::Scores;
 use crate::diagnose::against::{Candidate as Compared, Comparison};
-use crate::diagnose::confidence::MOST;
+use crate::diagnose::judge::confidence::MOST;
 use crate::diagnose::{Candidate, Diagnosis, Kind, Status, TorqueRms};
 
 /// Places of the gap that are named.

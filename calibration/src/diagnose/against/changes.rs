@@ -5,13 +5,13 @@
 //! are left out one by one (jackknife, with Student's t). Where a hit lies between a number and what is seen, the step over
 //! which its slope was taken comes on top.
 
-use super::super::evidence::Evidence;
-use super::super::parameters::UNBOUNDED;
-use super::super::quadratic::minimum;
 use super::answer::Values;
 use super::fits::{Fitted, PairBench};
 use super::subjects::Subject;
 use super::turned::{Acts, Side, Turned};
+use crate::diagnose::evidence::measured::Evidence;
+use crate::diagnose::fit::parameters::UNBOUNDED;
+use crate::diagnose::fit::quadratic::minimum;
 use crate::estimate::interval::student;
 use nalgebra::{DMatrix, DVector};
 use std::collections::BTreeMap;

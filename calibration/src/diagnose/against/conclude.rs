@@ -1,13 +1,7 @@
 //! From what the search found to the answer: the clips kept for confirming are opened here, and only here.
 
 use super::super::answer::{Clips, Kind, Share, Status};
-use super::super::evidence::Evidence;
-use super::super::fit::Hypothesis;
-use super::super::gap::Residuals;
-use super::super::remainder::Left;
-use super::super::site::{Advice, Site};
-use super::super::sizes::Sizes;
-use super::super::{DiagnoseError, Options, advice, localise};
+use super::super::{DiagnoseError, Options};
 use super::answer::{Candidate, Comparison, Smallest, Verdict};
 use super::changes;
 use super::fits::{PairBench, numbers};
@@ -17,6 +11,14 @@ use super::scores::Score;
 use super::search::{Found, Step, Trial, smallest_seen};
 use super::subjects::Subject;
 use super::turned::Side;
+use crate::diagnose::conclude::advice;
+use crate::diagnose::conclude::site::{Advice, Site};
+use crate::diagnose::evidence::measured::Evidence;
+use crate::diagnose::fit::bench::Hypothesis;
+use crate::diagnose::judge::gap::Residuals;
+use crate::diagnose::judge::localise;
+use crate::diagnose::judge::remainder::Left;
+use crate::diagnose::judge::sizes::Sizes;
 use crate::forward::Setting;
 use shared_mem::recording::Session;
 use std::collections::BTreeMap;

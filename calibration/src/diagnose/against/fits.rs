@@ -1,15 +1,15 @@
 //! Models of two sessions fitted to the clips of both, and how well they predict clips that they were not fitted to.
 
-use super::super::effort::Effort;
-use super::super::evidence::Evidence;
-use super::super::fit::{Bench, Hypothesis};
-use super::super::gap::Residuals;
-use super::super::held_out;
-use super::super::noise::median;
-use super::super::score::{Predicted, predict};
-use super::super::split::Split;
-use super::super::trial::NEARLY_ALL;
 use super::turned::{Model, SIDES, Side, TwoSessions, side_of};
+use crate::diagnose::clips::split::Split;
+use crate::diagnose::evidence::measured::Evidence;
+use crate::diagnose::evidence::noise::median;
+use crate::diagnose::fit::bench::{Bench, Hypothesis};
+use crate::diagnose::fit::effort::Effort;
+use crate::diagnose::judge::gap::Residuals;
+use crate::diagnose::judge::held_out;
+use crate::diagnose::judge::score::{Predicted, predict};
+use crate::diagnose::judge::trial::NEARLY_ALL;
 use crate::estimate::interval::student;
 
 /// What all fits share.

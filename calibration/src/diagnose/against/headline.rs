@@ -1,9 +1,9 @@
 //! The finding in one sentence, and the reason for every candidate.
 
 use super::super::answer::{Kind, Place, Share, Status};
-use super::super::headline::words;
 use super::answer::{Candidate, Smallest, Values};
 use super::search::Trial;
+use crate::diagnose::conclude::headline::words;
 use crate::report::{between, channel_in_words, percent, smallest_in_words};
 
 /// What the sentence is made of.

@@ -1,8 +1,8 @@
 //! Whether two sessions can be held against each other, and their clips as those of one cell.
 
-use super::super::admit::{Admitted, Refused, admit};
-use super::super::split;
-use super::super::torques::is_tracking;
+use crate::diagnose::clips::admit::{Admitted, Refused, admit};
+use crate::diagnose::clips::split;
+use crate::diagnose::clips::torques::is_tracking;
 use shared_mem::cell::{Cell, ControllerKind, Object};
 use shared_mem::recording::Session;
 use twin::arm::ArmModel;

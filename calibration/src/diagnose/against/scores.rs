@@ -5,15 +5,15 @@
 //! the quadratic form of the weighted deviance the gain of a change is what it lowers the minimum by beyond that, with
 //! everything that is shared at its best.
 
-use super::super::evidence::Evidence;
-use super::super::fit::Bench;
-use super::super::floor;
 use super::super::library::Library;
-use super::super::quadratic::{bounded_minimum, eliminate, minimum};
-use super::super::shortlist::{Scored, chance};
-use super::super::sweep::{Column, Point, Precision, Swept, sweep};
 use super::subjects::Subject;
 use super::turned::{Acts, Model, SIDES, Side, side_of};
+use crate::diagnose::evidence::measured::Evidence;
+use crate::diagnose::fit::bench::Bench;
+use crate::diagnose::fit::floor;
+use crate::diagnose::fit::quadratic::{bounded_minimum, eliminate, minimum};
+use crate::diagnose::fit::shortlist::{Scored, chance};
+use crate::diagnose::fit::sweep::{Column, Point, Precision, Swept, sweep};
 use crate::estimate::interval::student;
 use nalgebra::{DMatrix, DVector};
 
@@ -303,8 +303,8 @@ fn weights<E: Evidence>(bench: &Bench<'_, E>, swept: &[Swept; 2]) -> Vec<f64> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::super::scatter::Scatter;
     use super::*;
+    use crate::diagnose::evidence::scatter::Scatter;
 
     /// (1 - a - 2 b)^2 + (3 - b)^2 over (1, a, b).
     fn form() -> DMatrix<f64> {

@@ -1,14 +1,14 @@
 //! What changed: changes are added while the clips of both sessions are predicted better with them than with the same thing in both.
 
-use super::super::effort::{FIRST_PASS, HEAT};
-use super::super::evidence::Evidence;
-use super::super::fit::Hypothesis;
-use super::super::refit::last_pass;
-use super::super::stages;
 use super::fits::{Fitted, LEAST, PairBench, Worth};
 use super::scores::{Score, Slopes, is_apart};
 use super::subjects::Subject;
 use super::turned::Model;
+use crate::diagnose::evidence::measured::Evidence;
+use crate::diagnose::fit::bench::Hypothesis;
+use crate::diagnose::fit::effort::{FIRST_PASS, HEAT};
+use crate::diagnose::fit::stages;
+use crate::diagnose::search::refit::last_pass;
 use shared_mem::progress::{Planned, Progress};
 
 /// At most so many changes are named, and so many effects that both sessions have are found on the way.

@@ -3,9 +3,9 @@
 //! The clips of both lie in one evidence, those of the second behind those of the first. A model says which numbers of the
 //! library are turned and in which session each acts; what is not turned stays where it is.
 
-use super::super::evidence::{Channel, Evidence, Reach, Row};
 use super::super::library::Library;
-use super::super::scatter::Scatter;
+use crate::diagnose::evidence::measured::{Channel, Evidence, Reach, Row};
+use crate::diagnose::evidence::scatter::Scatter;
 use crate::estimate::{ClipModel, Impossible, Unknown};
 use crate::forward::Setting;
 

@@ -1,7 +1,7 @@
 //! The candidates: those in question as a table, those ruled out folded away, those that could not have been seen by name.
 
 use super::words;
-use crate::diagnose::confidence::MOST;
+use crate::diagnose::judge::confidence::MOST;
 use crate::diagnose::{Candidate, Size, Status};
 use crate::report::canvas::Canvas;
 use crate::report::figure::forest::{Group, forest};

@@ -10,7 +10,7 @@ use super::figure::where_map::{Cell, where_map};
 use super::frame::{facts, figure, frame, unbroken};
 use super::share::{percent_interval, probability};
 use super::trace::gallery;
-pub(super) use crate::diagnose::headline::words;
+pub(super) use crate::diagnose::conclude::headline::words;
 use crate::diagnose::{Basis, Diagnosis, Kind, Verdict};
 use maud::{Markup, html};
 

@@ -1,0 +1,286 @@
+//! The finding in one sentence of plain words: how large the gap is and where, which effect causes it, how far it shrinks.
+
+use super::verdict::{Decision, Finding};
+use crate::diagnose::answer::{Kind, Share};
+use crate::diagnose::judge::gap::Shrunk;
+use crate::diagnose::judge::trial::CLOSES;
+use crate::report::percent;
+
+/// What the sentence is made of, beside the finding itself.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Facts {
+    /// How large the gap is: `2.13 mrad RMS`.
+    pub size: String,
+    /// Where it is largest: `joint 2 (reversal)`; empty where it is nowhere.
+    pub place: String,
+    /// Where it is largest once the effects are in the twin.
+    pub rest: String,
+    /// The effects found, each with its size: `command delay (delay 11.9 ms)`.
+    pub effects: Vec<String>,
+    /// An effect with its size, the share of the gap that it closes, and how many clips do not prove it and how many more would.
+    pub unproven: Option<(String, f64, [usize; 2])>,
+    /// The shrink with all of them in the twin.
+    pub shrink: Shrunk,
+}
+
+impl Shrunk {
+    /// `by 96 % on held-out clips`. Where one clip outweighs all others, what most do, and in how many it grows.
+    fn in_words(&self) -> String {
+        let [shrinks, all] = self.clips;
+        if self.mean >= CLOSES || shrinks == all {
+            let percent = percent(self.mean).replace("> ", "more than ").replace("< ", "less than ");
+            return format!("by {percent} on held-out clips");
+        }
+        let (share, whose) =
+            if self.usual > CLOSES { (self.usual, "") } else { (self.contact, "the joints in contact of ") };
+        format!("by {} in {whose}a held-out clip like most, but grows in {} of {all}", percent(share), all - shrinks)
+    }
+}
+
+/// Residuals beyond this multiple of the noise are said, even where they are no gap.
+const ROUGH: f64 = 1.25;
+
+/// The sentence.
+#[must_use]
+pub fn sentence(decision: &Decision, finding: &Finding<'_>, facts: &Facts) -> String {
+    match decision.kind {
+        Kind::None => none(finding, facts),
+        Kind::Named => named(finding, facts),
+        Kind::Class => class(finding, facts),
+        Kind::Unexplained | Kind::NotTestable => unexplained(decision, finding, facts),
+    }
+}
+
+/// An effect's name as words.
+#[must_use]
+pub fn words(effect: &str) -> String {
+    effect.replace('_', " ")
+}
+
+fn none(finding: &Finding<'_>, Facts { size, .. }: &Facts) -> String {
+    let times = finding.times_noise();
+    if finding.within_tolerance[0] && times >= ROUGH {
+        return format!(
+            "No gap of interest: with the parameters identified, twin and cell differ by {size}, less than the tolerance."
+        );
+    }
+    if times < ROUGH {
+        return format!(
+            "No gap: with the parameters identified, twin and cell differ by {size}, as noise alone makes them."
+        );
+    }
+    format!(
+        "No gap to explain: with the parameters identified, twin and cell differ by {size}, {times:.1} times what noise alone \
+         leaves but no more than two simulations of one cell, and no effect predicts the difference."
+    )
+}
+
+fn named(finding: &Finding<'_>, facts: &Facts) -> String {
+    let (verb, these) = if facts.effects.len() == 1 { ("causes", "it") } else { ("together cause", "them") };
+    let (whose, rest) = match finding.open() {
+        Some(_) if !facts.rest.is_empty() => (
+            "the arm's part of the gap",
+            format!("; what the object does, most of it in {}, stays unexplained", facts.rest),
+        ),
+        _ => ("the gap", String::new()),
+    };
+    format!(
+        "{} {verb} {whose}, {}: with {these} in the twin the gap shrinks {}{rest}.",
+        facts.effects.join(" and "),
+        size_and_place(facts),
+        facts.shrink.in_words()
+    )
+}
+
+/// The sentence where what was found is proven, but a part of the gap stays. `share`: what it explains, and whether it is stronger
+/// than what is met in practice; `after`: how large what stays is; `rivals`: effects that do as well as one of those found.
+#[must_use]
+pub fn in_part(
+    facts: &Facts,
+    (share, unusual): (&Share, bool),
+    (after, looks_like): (&str, Option<&str>),
+    rivals: &[String],
+) -> String {
+    let strength = if unusual { ", stronger than it is met in practice," } else { "" };
+    let (verb, these) = match (facts.effects.len(), rivals.is_empty()) {
+        (1, true) => ("explains", "it"),
+        (_, true) => ("together explain", "them"),
+        (1, false) => ("explains", "the first"),
+        (_, false) => ("explain", "those whose size is given"),
+    };
+    let first = if rivals.is_empty() { "" } else { "One of " };
+    let who = if rivals.is_empty() {
+        facts.effects.join(" and ")
+    } else {
+        facts.effects.iter().cloned().chain(rivals.iter().map(|rival| words(rival))).collect::<Vec<_>>().join(", ")
+    };
+    let apart = if rivals.is_empty() { "" } else { "; these clips cannot separate them" };
+    let alike = match looks_like {
+        Some(effect) => format!("; {} explains most of that", words(effect)),
+        None => "; no effect of the library explains much of that".to_owned(),
+    };
+    let [low, high] = share.ci90.map(percent);
+    format!(
+        "{first}{who}{strength} {verb} {} of the squared gap ({low} to {high}), {}: with {these} in the twin {after} stay on held-out \
+         clips, largest in {}{alike}{apart}.",
+        percent(share.value),
+        size_and_place(facts),
+        facts.rest
+    )
+}
+
+fn class(finding: &Finding<'_>, facts: &Facts) -> String {
+    let rivals = finding.rivals.iter().map(|rival| words(rival));
+    let all: Vec<String> = facts.effects.iter().cloned().chain(rivals).collect();
+    let these = if facts.effects.len() == 1 { "the first" } else { "those whose size is given" };
+    format!(
+        "One of {} causes the gap, {}: with {these} in the twin the gap shrinks {}, and these clips cannot separate them.",
+        all.join(", "),
+        size_and_place(facts),
+        facts.shrink.in_words()
+    )
+}
+
+fn unexplained(decision: &Decision, finding: &Finding<'_>, facts: &Facts) -> String {
+    let nearest = if facts.effects.is_empty() {
+        let unproven = |(effect, share, [clips, more]): &(String, f64, [usize; 2])| {
+            let share = percent(*share);
+            format!(
+                "; {effect} closes {share} of it, but in {clips} clips that may be chance: about {more} more would prove it"
+            )
+        };
+        facts.unproven.as_ref().map_or_else(String::new, unproven)
+    } else {
+        let strength = if finding.implausible { ", stronger than it is met in practice," } else { "" };
+        let shrinks = if finding.confirmed {
+            format!("shrinks it {} and leaves more than a cause does", facts.shrink.in_words())
+        } else {
+            "does not shrink it on the clips kept for confirming".to_owned()
+        };
+        format!("; {} comes nearest{strength} but {shrinks}", facts.effects.join(" with "))
+    };
+    let drift = finding.drift.map_or_else(String::new, |change| {
+        let (verb, share) = (if change > 0.0 { "rises" } else { "falls" }, percent(change.abs()));
+        format!(
+            "; from the first clip to the last the friction {verb} by {share}, as where a table wears or gets dirty"
+        )
+    });
+    let weak = if decision.little {
+        "; an effect of the library may also act too weakly to be identified in so small a gap"
+    } else {
+        ""
+    };
+    format!(
+        "No effect of the library explains the gap, {}, {:.1} times what noise alone leaves{nearest}{drift}{weak}.",
+        size_and_place(facts),
+        finding.times_noise()
+    )
+}
+
+/// `2.13 mrad RMS, largest in joint 2 (reversal)`.
+fn size_and_place(Facts { size, place, .. }: &Facts) -> String {
+    if place.is_empty() { size.clone() } else { format!("{size}, largest in {place}") }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::verdict::tests::finding;
+    use super::*;
+
+    fn facts(effects: &[&str]) -> Facts {
+        Facts {
+            size: "2.13 mrad RMS".into(),
+            place: "joint 2 (reversal)".into(),
+            rest: "yaw (after the slide)".into(),
+            effects: effects.iter().map(|name| (*name).to_owned()).collect(),
+            unproven: None,
+            shrink: Shrunk { mean: 0.963, usual: 0.97, contact: 0.0, clips: [4, 4], better: [4, 4] },
+        }
+    }
+
+    fn said(finding: &Finding<'_>, effects: &[&str]) -> String {
+        sentence(&finding.decide(), finding, &facts(effects))
+    }
+
+    #[test]
+    fn the_headline_says_effect_size_place_and_the_one_shrink() {
+        assert_eq!(
+            said(&finding(vec!["command_delay"], 500.0, 1.5), &["command delay (delay 11.9 ms)"]),
+            "command delay (delay 11.9 ms) causes the gap, 2.13 mrad RMS, largest in joint 2 (reversal): with it in the twin \
+             the gap shrinks by 96 % on held-out clips."
+        );
+        let class = Finding { rivals: vec!["command_lag"], ..finding(vec!["command_delay"], 500.0, 1.5) };
+        let text = said(&class, &["command delay (delay 11.9 ms)"]);
+        assert!(
+            text.starts_with("One of command delay (delay 11.9 ms), command lag causes the gap, 2.13 mrad"),
+            "{text}"
+        );
+        assert!(text.contains("with the first in the twin the gap shrinks by 96 %"), "{text}");
+    }
+
+    #[test]
+    fn a_clip_that_outweighs_the_others_is_said_and_not_averaged() {
+        let shrink = Shrunk { mean: -0.15, usual: 0.62, clips: [3, 4], ..Shrunk::default() };
+        let found = finding(vec!["camera_scale"], 30.0, 1.5);
+        let text = sentence(&found.decide(), &found, &Facts { shrink, ..facts(&["camera scale (scale 0.02)"]) });
+        assert!(text.ends_with("the gap shrinks by 62 % in a held-out clip like most, but grows in 1 of 4."), "{text}");
+    }
+
+    #[test]
+    fn what_is_proven_is_said_with_what_stays() {
+        let share = Share { value: 0.963, ci90: [0.94, 0.98] };
+        let text =
+            in_part(&facts(&["command lag (lag 15.4 ms)"]), (&share, false), ("0.40 mrad RMS", Some("payload")), &[]);
+        assert_eq!(
+            text,
+            "command lag (lag 15.4 ms) explains 96 % of the squared gap (94 % to 98 %), 2.13 mrad RMS, largest in joint 2 \
+             (reversal): with it in the twin 0.40 mrad RMS stay on held-out clips, largest in yaw (after the slide); payload \
+             explains most of that."
+        );
+        let text = in_part(&facts(&["payload"]), (&share, true), ("1 mm", None), &[]);
+        assert!(text.ends_with("no effect of the library explains much of that."), "{text}");
+        assert!(text.starts_with("payload, stronger than it is met in practice, explains 96 %"), "{text}");
+        let rivals = ["joint_coulomb_friction".to_owned()];
+        let text = in_part(&facts(&["load friction (0.44)"]), (&share, false), ("1 mm", None), &rivals);
+        assert!(text.starts_with("One of load friction (0.44), joint coulomb friction explains 96 %"), "{text}");
+        assert!(
+            text.contains("with the first in the twin 1 mm stay") && text.ends_with("cannot separate them."),
+            "{text}"
+        );
+    }
+
+    #[test]
+    fn where_nothing_is_found_the_size_is_said_in_noise() {
+        let text = said(&finding(vec![], 4.0, 4.0), &[]);
+        assert!(text.contains("2.0 times what noise alone leaves"), "{text}");
+        assert!(said(&finding(vec![], 1.5, 1.5), &[]).starts_with("No gap: "));
+        let text = said(&finding(vec!["payload"], 500.0, 200.0), &["payload (mass 0.4 kg)"]);
+        assert!(text.starts_with("No effect of the library explains the gap, 2.13 mrad RMS"), "{text}");
+        assert!(text.contains("payload (mass 0.4 kg) comes nearest but shrinks it by 96 %"), "{text}");
+        let pushed = Finding { implausible: true, ..finding(vec!["payload"], 500.0, 6.5) };
+        assert!(said(&pushed, &["payload"]).contains("stronger than it is met in practice"));
+        let open = Facts { unproven: Some(("payload (mass 0.4 kg)".into(), 0.63, [4, 5])), ..facts(&[]) };
+        let found = finding(vec![], 500.0, 500.0);
+        let text = sentence(&found.decide(), &found, &open);
+        assert!(
+            text.contains("payload (mass 0.4 kg) closes 63 % of it, but in 4 clips that may be chance: about 5 more"),
+            "{text}"
+        );
+        let worn = Finding { drift: Some(0.38), ..finding(vec![], 4.0, 4.0) };
+        assert!(said(&worn, &[]).contains("the friction rises by 38 %"));
+    }
+
+    #[test]
+    fn where_only_the_arm_is_explained_it_is_said_what_the_object_leaves() {
+        use crate::diagnose::judge::remainder::Left;
+        let mut found = finding(vec!["command_delay"], 5e5, 1.5);
+        let arm = found.left[0];
+        found.left.push(Left { of_object: true, before: 301.0, after: 91.0, ..arm });
+        let text = said(&found, &["command delay"]);
+        assert!(text.starts_with("command delay causes the arm's part of the gap"), "{text}");
+        assert!(
+            text.ends_with("what the object does, most of it in yaw (after the slide), stays unexplained."),
+            "{text}"
+        );
+    }
+}

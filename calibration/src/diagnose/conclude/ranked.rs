@@ -1,0 +1,199 @@
+//! What is said of every candidate: how likely it is, how much it shrinks the gap, and what became of it. `reason.rs`
+//! says why.
+
+use super::reason::{Judged, reason};
+use super::verdict::Finding;
+use crate::diagnose::Kind;
+use crate::diagnose::answer::{Candidate, Share, Status};
+use crate::diagnose::clips::split::Split;
+use crate::diagnose::evidence::measured::Evidence;
+use crate::diagnose::fit::bench::{Bench, Hypothesis};
+use crate::diagnose::fit::parameters;
+use crate::diagnose::fit::shortlist::{Scored, TESTABLE};
+use crate::diagnose::judge::gap::{DOUBLED, Residuals};
+use crate::diagnose::judge::trial::{Found, Step, Trial};
+use crate::diagnose::judge::{confidence, held_out};
+use crate::diagnose::propose::screening;
+
+/// What nobody fitted closes nothing.
+const NOT_FITTED: Share = Share { value: 0.0, ci90: [0.0; 2] };
+/// Of numbers with which the twin has no answer in the clips kept for confirming.
+const FLOWN: Share = Share { value: DOUBLED, ci90: [DOUBLED; 2] };
+
+/// What is said of every candidate: what was named first, then what is possible, then the likelier.
+pub(in crate::diagnose) fn candidates<E: Evidence>(
+    bench: &Bench<'_, E>,
+    (found, overdispersion): (&Found, f64),
+    split: &Split,
+    (before, after, finding): (&Residuals, &Residuals, &Finding<'_>),
+    kind: Kind,
+    seed: u64,
+) -> Vec<Candidate> {
+    let first = &found.steps[0];
+    let believed = matches!(kind, Kind::Named | Kind::Class);
+    let likely = confidence::probabilities(&first.trials, found.last.effects.is_empty());
+    let on_confirm = |fit: &Hypothesis, step: &Step| held_out::residuals(bench, split, (fit, &step.weights));
+    // What every step left on the confirm clips: the baseline is known, and others are what their candidates are measured from.
+    let left: Vec<Option<Residuals>> = (found.steps.iter())
+        .map(|step| if step.from.effects.is_empty() { Some(before.clone()) } else { on_confirm(&step.from, step) })
+        .collect();
+    let one = |trial: &Trial| {
+        let effect = trial.scored.candidate;
+        let name = bench.library.candidates[effect].effect.name;
+        let kept = believed && found.last.effects.contains(&effect);
+        let place = judged_in(found, effect, believed);
+        let step = &found.steps[place];
+        let trial = step.trials.iter().find(|trial| trial.scored.candidate == effect).unwrap_or(trial);
+        let with = match &trial.fitted {
+            _ if kept => after_keeping(found, &left, after, place),
+            Some((fit, _)) => on_confirm(fit, step),
+            None => None,
+        };
+        let closed = with.as_ref().zip(left[place].as_ref()).map(|(with, from)| with.shrink_added(from, before, seed));
+        let shrink = closed.unwrap_or(if trial.fitted.is_some() { FLOWN } else { NOT_FITTED });
+        let beside: Vec<&str> = step.from.effects.iter().map(|k| bench.library.candidates[*k].effect.name).collect();
+        let fit = if kept { Some(&found.last) } else { trial.fitted.as_ref().map(|(fit, _)| fit) };
+        let probability = likely.iter().find(|(candidate, _)| *candidate == effect).map_or(0.0, |(_, p)| *p);
+        let hidden = is_hidden_by_the_arm(bench, step, trial);
+        let status = status(&trial.scored, kept, finding.rivals.contains(&name), (kind, hidden));
+        let times_noise = with.as_ref().map(|with| (with.mean_square() / with.floor()).sqrt());
+        let judged = Judged { trial, place, beside: &beside, status, hidden, times_noise, kind, finding };
+        Candidate {
+            effect: name.into(),
+            probability: if kept { probability.max(finding.confidence) } else { probability },
+            parameters: fit.map(|fit| parameters::of_effect(bench, fit, effect)).unwrap_or_default(),
+            shrink,
+            confusable_with: confusable(first, effect, overdispersion, bench),
+            status,
+            why: format!("{}{}", reason(bench, found, &judged), carried_over(&shrink)),
+        }
+    };
+    let mut all: Vec<Candidate> = first.trials.iter().map(one).collect();
+    all.sort_by(|a, b| {
+        let key = |c: &Candidate| (c.status != Status::Named, c.status != Status::Possible, -c.probability);
+        key(a).partial_cmp(&key(b)).unwrap_or(std::cmp::Ordering::Equal)
+    });
+    all
+}
+
+/// What the hypothesis left once the effect that was added in the step at `place` was in it: what the next step began with,
+/// and at the last effect that was kept what the search ended with.
+fn after_keeping(found: &Found, left: &[Option<Residuals>], after: &Residuals, place: usize) -> Option<Residuals> {
+    match found.kept().map(|(place, _)| place).max() {
+        Some(last) if place < last => left.get(place + 1).cloned().flatten(),
+        _ => Some(after.clone()),
+    }
+}
+
+/// Whether an effect on the object was not fitted because the arm's gap was open: where the arm is elsewhere, what it hits
+/// says nothing of the object.
+fn is_hidden_by_the_arm<E: Evidence>(bench: &Bench<'_, E>, step: &Step, trial: &Trial) -> bool {
+    let effect = trial.scored.candidate;
+    let felt = bench.library.candidates[effect].is_of_arm() || bench.library.arm_may_feel(effect);
+    trial.fitted.is_none() && !felt && screening::arm_gap_is_open(&step.whole, &step.left)
+}
+
+/// The step that says most about an effect. One that was kept is judged by what those before it left. Another one by its fit
+/// to the whole gap; where it was given none, as what an object shows while the arm's gap is open, beside what was believed
+/// in the end.
+fn judged_in(found: &Found, effect: usize, believed: bool) -> usize {
+    let of = |place: &usize| {
+        let trials = &found.steps[*place].trials;
+        trials.iter().find(|trial| trial.scored.candidate == effect).map(|trial| trial.fitted.is_some())
+    };
+    let all_kept =
+        |place: &usize| found.steps[*place].from.effects.iter().all(|other| found.last.effects.contains(other));
+    let beside = || (0..found.steps.len()).rev().filter(|place| believed && all_kept(place));
+    let added = found.kept().find(|(_, added)| believed && *added == effect).map(|(place, _)| place);
+    added
+        .or_else(|| (of(&0) == Some(true)).then_some(0))
+        .or_else(|| beside().find(|place| of(place) == Some(true)))
+        .or_else(|| beside().find(|place| of(place).is_some()))
+        .unwrap_or(0)
+}
+
+fn status(scored: &Scored, kept: bool, rival: bool, (kind, hidden): (Kind, bool)) -> Status {
+    match kind {
+        Kind::Named if kept => Status::Named,
+        Kind::Class if kept || rival => Status::Possible,
+        _ if hidden || scored.signal < TESTABLE => Status::NotTestable,
+        _ => Status::RuledOut,
+    }
+}
+
+fn confusable<E: Evidence>(first: &Step, effect: usize, overdispersion: f64, bench: &Bench<'_, E>) -> Vec<String> {
+    let near = confidence::rivals(first, bench.library, effect, overdispersion);
+    near.iter().map(|other| bench.library.candidates[*other].effect.name.to_owned()).collect()
+}
+
+/// What is added to the reason where numbers that fit some clips are wrong in the others.
+fn carried_over(shrink: &Share) -> &'static str {
+    if shrink.value > DOUBLED {
+        return "";
+    }
+    "; its numbers fit the clips they were found on alone: on those kept for confirming the gap more than doubles"
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diagnose::fit::bench::Hypothesis;
+    use crate::diagnose::judge::score::Predicted;
+
+    fn hypothesis(effects: &[usize]) -> Hypothesis {
+        Hypothesis { effects: effects.to_vec(), full: Vec::new(), free: Vec::new(), fitted: Vec::new() }
+    }
+
+    /// A step from these effects on, with candidates that were fitted in it or only looked at.
+    fn step(from: &[usize], candidates: &[(usize, bool)]) -> Step {
+        let predicted = Predicted { clips: vec![(0, 1000.0), (1, 1000.0)] };
+        let trial = |(candidate, fitted): &(usize, bool)| Trial {
+            scored: Scored {
+                candidate: *candidate,
+                alternative: 0,
+                units: vec![0.0],
+                next: Vec::new(),
+                gain: 0.0,
+                cost: 1,
+                cosine: 0.5,
+                signal: 30.0,
+                imitated: 0.1,
+                p: 0.0,
+            },
+            fitted: fitted.then(|| (hypothesis(&[from, &[*candidate]].concat()), predicted.over(&predicted))),
+            closes: 0.0,
+            own_numbers: true,
+        };
+        Step {
+            from: hypothesis(from),
+            trials: candidates.iter().map(trial).collect(),
+            predicted: predicted.clone(),
+            weights: Vec::new(),
+            arm_rows: 0,
+            left: Vec::new(),
+            whole: Vec::new(),
+        }
+    }
+
+    #[test]
+    fn an_effect_is_judged_where_most_was_seen_of_it() {
+        // The arm's gap is open at first, and nothing of the object is fitted; 0 is named, then 1 beside it.
+        let steps = vec![
+            step(&[], &[(0, true), (1, false), (2, true), (3, false), (4, false)]),
+            step(&[0], &[(1, true), (2, true), (3, true), (4, false)]),
+            step(&[0, 1], &[(2, false), (3, false), (4, false)]),
+        ];
+        let found = Found { steps, last: hypothesis(&[0, 1]) };
+        let judged = |effect, believed| found.steps[judged_in(&found, effect, believed)].from.effects.len();
+        let all = |believed| [0, 1, 2, 3, 4].map(|effect| judged(effect, believed));
+        assert_eq!(all(true), [0, 1, 0, 1, 2]);
+        assert_eq!(all(false), [0; 5], "beside what is not believed nothing is judged");
+    }
+
+    #[test]
+    fn numbers_that_fit_some_clips_alone_are_told() {
+        assert!(carried_over(&FLOWN).contains("more than doubles"));
+        assert_eq!(carried_over(&Share { value: -0.4, ci90: [-0.6, 0.1] }), "");
+        assert_eq!(carried_over(&NOT_FITTED), "");
+    }
+}

@@ -1,0 +1,301 @@
+//! Where an advice is carried out: the session, its clips that can be repeated, and how much faster they may be played. It
+//! makes commands that can be typed of what an advice asks for.
+
+use crate::capture::body::Body;
+use crate::capture::session::number_of;
+use crate::capture::{limits, pace, recorded};
+use crate::diagnose::clips::torques::is_tracking;
+use shared_mem::cell::ClipKind;
+use shared_mem::recording::Session;
+use shared_mem::typed::{Command, quoted};
+use std::path::{Path, PathBuf};
+
+/// Clips that are repeated to confirm something.
+const TWO: usize = 2;
+/// A faster clip is worth it from this factor on.
+const WORTH: f64 = 1.2;
+/// Twice as fast is enough.
+const TWICE: f64 = 2.0;
+
+/// What to record next.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Advice {
+    /// The reason and the experiment, in words; steps for hands before those for the keyboard.
+    pub sentence: String,
+    /// Commands that can be typed as they are, in this order.
+    pub commands: Vec<String>,
+}
+
+/// A capture of an advice, without cell and session.
+#[derive(Debug, Clone, Copy)]
+pub(in crate::diagnose) enum Capture {
+    /// The arm alone, new clips.
+    Arm(&'static str),
+    /// A stroke of the session again, with these arguments; a new one where there is none to repeat.
+    StrokeAgain(&'static str),
+    /// New strokes.
+    Strokes(&'static str),
+    /// New strokes into a session of its own, named so, because something in the cell is another then.
+    Elsewhere(&'static str, &'static str),
+}
+
+/// A session and what can be recorded into it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Site {
+    /// The session that clips are added to.
+    folder: PathBuf,
+    /// What captures are told about the cell.
+    cell: PathBuf,
+    /// Whether that session is still to be made.
+    is_new: bool,
+    /// Whether its clips are strokes; otherwise the arm moves alone.
+    strokes: bool,
+    /// Numbers of clips that can be repeated.
+    clips: Vec<usize>,
+    /// The largest factor at which the first of them can be played.
+    fastest: f64,
+    /// Whether torques along the measured motion are asked about.
+    torques: bool,
+    /// The page of the command that advises; it keeps its name.
+    page: Option<PathBuf>,
+}
+
+impl Site {
+    /// Of a session whose clips lie on disk; where they cannot be read again, nothing can be repeated. Where a cell.toml was
+    /// given besides, clips go into a session of their own, which is captured with it: the folder's own cell.toml is another
+    /// one, or there is none, and the one given lists no new clips. `page`: where the command that advises writes its own.
+    #[must_use]
+    pub fn of(session: &Session, page: Option<&Path>) -> Self {
+        Self { page: page.map(Path::to_owned), ..Self::found(session) }
+    }
+
+    fn found(session: &Session) -> Self {
+        let strokes =
+            !session.clips.is_empty() && session.clips.iter().all(|clip| clip.kind == ClipKind::ControlHitSlide);
+        let torques = is_tracking(&session.cell);
+        if let Some(cell) = &session.files.cell {
+            let folder = named_after(&session.folder, "next");
+            return Self { cell: cell.clone(), is_new: true, torques, ..Self::new(&folder, strokes, Vec::new(), 1.0) };
+        }
+        let kind = if strokes { ClipKind::ControlHitSlide } else { ClipKind::Excitation };
+        let (mut clips, mut fastest) = (Vec::new(), 1.0);
+        if let Ok(body) = Body::of(&session.cell) {
+            let numbers =
+                session.clips.iter().filter(|clip| clip.kind == kind).filter_map(|clip| number_of(&clip.file));
+            for number in numbers.take(2 * TWO) {
+                let Ok(clip) = recorded::read(&session.folder, number, kind, &body) else { continue };
+                if clips.is_empty() {
+                    fastest = pace::largest(&clip.set_points, &limits::of(&session.cell, &body), &body);
+                }
+                clips.push(number);
+                if clips.len() == TWO {
+                    break;
+                }
+            }
+        }
+        Self { torques, ..Self::new(&session.folder, strokes, clips, fastest) }
+    }
+
+    /// Of a session in `folder` with clips that can be repeated, the first of them `fastest` times as fast at most.
+    #[must_use]
+    pub fn new(folder: &Path, strokes: bool, clips: Vec<usize>, fastest: f64) -> Self {
+        // Without a slash at its end, and never nothing: a clip may lie where the program runs.
+        let folder: PathBuf = folder.components().collect();
+        let folder = if folder.as_os_str().is_empty() { ".".into() } else { folder };
+        Self {
+            cell: folder.join("cell.toml"),
+            folder,
+            is_new: false,
+            strokes,
+            clips,
+            fastest,
+            torques: false,
+            page: None,
+        }
+    }
+
+    /// Whether its clips are strokes.
+    pub(in crate::diagnose) fn strikes(&self) -> bool {
+        self.strokes
+    }
+
+    /// The sentence with the commands of `captures`, and what diagnoses them.
+    pub(in crate::diagnose) fn advice(&self, sentence: String, captures: &[Capture]) -> Advice {
+        let mut commands = Vec::new();
+        // A session begins with clips enough to be diagnosed.
+        let beside = captures.iter().find_map(|capture| match capture {
+            Capture::Arm(_) if self.strokes => Some(self.arm("--clips 4")),
+            Capture::StrokeAgain(_) | Capture::Strokes(_) if !self.strokes => Some(self.strokes("--clips 6")),
+            _ => None,
+        });
+        commands.extend(beside);
+        commands.extend(captures.iter().map(|capture| match capture {
+            Capture::Arm(rest) => self.arm(rest),
+            Capture::Strokes(rest) => self.strokes(rest),
+            Capture::StrokeAgain(rest) => match self.clips.first() {
+                Some(number) if self.strokes => self.strokes(&format!("--repeat {number} {rest}")),
+                _ => self.strokes(&format!("--clips 1 {rest}")),
+            },
+            Capture::Elsewhere(name, rest) => {
+                let cell = named_after(&self.folder, &format!("{name}.toml"));
+                capture_into("control-hit-slide", &cell, &named_after(&self.folder, name), rest)
+            }
+        }));
+        self.finished(sentence, commands)
+    }
+
+    /// Repeats: the words for it and the commands. Of eight only one clip is repeated, of two both.
+    pub(in crate::diagnose) fn again(&self, times: usize) -> (String, Vec<String>) {
+        let fast = (100.0 * self.fastest.min(TWICE)).floor() / 100.0;
+        let speeds = match fast {
+            fast if fast >= TWICE => "one at half and one at twice the speed".to_owned(),
+            fast if fast >= WORTH => {
+                format!("one at half and one at {fast} times the speed, the most that the limits allow")
+            }
+            _ => "one at half the speed".to_owned(),
+        };
+        let what = if times > TWO { "repeat one clip eight times" } else { "repeat two clips" };
+        let Some(first) = self.clips.first() else {
+            let words =
+                format!("record {times} clips more, and {}", speeds.replace("one at half and", "some at half and"));
+            return (words, vec![self.same(&format!("--clips {times}")), self.same("--clips 2 --speed 0.5")]);
+        };
+        let all: Vec<String> = self.clips.iter().take(TWO).map(ToString::to_string).collect();
+        let repeated = if times > TWO {
+            format!("--repeat {first} --clips {times}")
+        } else {
+            format!("--repeat {}", all.join(","))
+        };
+        let mut commands = vec![self.same(&repeated), self.same(&format!("--repeat {first} --speed 0.5"))];
+        if fast >= WORTH {
+            commands.push(self.same(&format!("--repeat {first} --speed {fast}")));
+        }
+        (format!("{what} and add {speeds}"), commands)
+    }
+
+    /// The sentence with the command of so many clips more of the same kind.
+    pub(in crate::diagnose) fn more(&self, sentence: String, clips: usize) -> Advice {
+        self.finished(sentence, vec![self.same(&format!("--clips {clips}"))])
+    }
+
+    /// Another session of the same kind.
+    pub(in crate::diagnose) fn usual(&self) -> Vec<String> {
+        let next = if self.is_new { self.folder.clone() } else { named_after(&self.folder, "next") };
+        vec![if self.strokes {
+            capture_into("control-hit-slide", &self.cell, &next, "--clips 12")
+        } else {
+            capture_into("excitation", &self.cell, &next, "--clips 8")
+        }]
+    }
+
+    /// The sentence with commands, and after them what diagnoses the sessions they record into.
+    pub(in crate::diagnose) fn finished(&self, sentence: String, mut commands: Vec<String>) -> Advice {
+        let fill = |commands: &[String], folder: &Path| {
+            commands.iter().any(|command| command.contains(&format!("--out {} ", quoted(folder))))
+        };
+        // A session begins with clips enough to be diagnosed.
+        let enough = if self.strokes { 6 } else { 4 };
+        let clips = |command: &String| command.rsplit_once(" --clips ")?.1.parse::<usize>().ok();
+        if self.is_new && fill(&commands, &self.folder) && commands.iter().filter_map(clips).all(|clips| clips < enough)
+        {
+            commands.insert(0, self.same(&format!("--clips {enough}")));
+        }
+        let beside = ["arm", "strokes"].map(|end| (named_after(&self.folder, end), format!("report_{end}")));
+        for (folder, page) in beside.into_iter().chain([(self.folder.clone(), "report".to_owned())]) {
+            if fill(&commands, &folder) {
+                let torques = if self.torques { "--torques" } else { "" };
+                let command = Command::new("calibration diagnose").path(&folder).words(torques);
+                commands.push(command.option("--report", &self.free_page(&page)).into());
+            }
+        }
+        Advice { sentence, commands }
+    }
+
+    /// A page whose name is not taken where the program runs: one that is there is kept, and the command refused.
+    fn free_page(&self, name: &str) -> PathBuf {
+        let own = self.page.as_deref().and_then(Path::file_name);
+        let taken = |page: &Path| page.file_name() == own || page.symlink_metadata().is_ok();
+        let numbered = (2..).map(|number| format!("{name}_{number}.html"));
+        let mut names = std::iter::once(format!("{name}.html")).chain(numbered).map(PathBuf::from);
+        names.find(|page| !taken(page)).expect("numbers do not end")
+    }
+
+    fn same(&self, rest: &str) -> String {
+        if self.strokes { self.strokes(rest) } else { self.arm(rest) }
+    }
+
+    fn arm(&self, rest: &str) -> String {
+        let folder = if self.strokes { named_after(&self.folder, "arm") } else { self.folder.clone() };
+        capture_into("excitation", &self.cell, &folder, rest)
+    }
+
+    fn strokes(&self, rest: &str) -> String {
+        let folder = if self.strokes { self.folder.clone() } else { named_after(&self.folder, "strokes") };
+        capture_into("control-hit-slide", &self.cell, &folder, rest)
+    }
+}
+
+fn capture_into(verb: &str, cell: &Path, folder: &Path, rest: &str) -> String {
+    let command = Command::new("calibration capture").words(verb).option("--cell", cell).option("--out", folder);
+    command.words(rest).into()
+}
+
+/// A session beside another one: `monday_arm`.
+fn named_after(folder: &Path, end: &str) -> PathBuf {
+    match folder.file_name() {
+        Some(name) => folder.with_file_name(format!("{}_{end}", name.to_string_lossy())),
+        None => folder.join(end),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use shared_mem::cell::Cell;
+    use shared_mem::recording::SessionFiles;
+
+    #[test]
+    fn the_question_about_torques_is_asked_again() {
+        let site = Site { torques: true, ..Site::new(Path::new("bags"), false, Vec::new(), 1.0) };
+        let advice = site.more("Record more.".into(), 4);
+        assert_eq!(advice.commands[1], "calibration diagnose bags --torques --report report.html");
+    }
+
+    #[test]
+    fn with_a_cell_of_elsewhere_clips_go_into_a_session_that_is_captured_with_it() {
+        let files = SessionFiles { session: "my clips/".into(), cell: Some("the lab/cell.toml".into()) };
+        let session = Session { folder: "my clips/".into(), cell: Cell::default(), clips: Vec::new(), files };
+        let advice = Site::of(&session, None).more("Record more.".into(), 3);
+        let capture = "calibration capture excitation --cell 'the lab/cell.toml' --out 'my clips_next' --clips";
+        let expected = [format!("{capture} 4"), format!("{capture} 3")];
+        assert_eq!(advice.commands[..2], expected);
+        assert_eq!(advice.commands[2], "calibration diagnose 'my clips_next' --report report.html");
+        assert_eq!(Site::of(&session, None).usual(), [format!("{capture} 8")]);
+        // Eight clips are enough to be diagnosed.
+        assert_eq!(Site::of(&session, None).more(String::new(), 8).commands.len(), 2);
+    }
+
+    #[test]
+    fn a_page_gets_a_name_that_neither_this_command_nor_one_before_has_taken() {
+        let asked = |page: &str| {
+            let site = Site { page: Some(page.into()), ..Site::new(Path::new("bags"), false, Vec::new(), 1.0) };
+            site.more("Record more.".into(), 4).commands[1].clone()
+        };
+        assert!(asked("./report.html").ends_with("--report report_2.html"), "{}", asked("./report.html"));
+        assert!(asked("other.html").ends_with("--report report.html"), "{}", asked("other.html"));
+    }
+
+    #[test]
+    fn a_clip_that_lies_where_the_program_runs_has_a_folder_too() {
+        let advice = Site::new(Path::new(""), true, vec![2], 1.0).advice(String::new(), &[Capture::Arm("--clips 2")]);
+        assert_eq!(advice.commands[0], "calibration capture excitation --cell ./cell.toml --out ./arm --clips 4");
+        assert_eq!(advice.commands[2], "calibration diagnose ./arm --report report_arm.html");
+    }
+
+    #[test]
+    fn where_nothing_can_be_repeated_new_clips_take_its_place() {
+        let (words, commands) = Site::new(Path::new("bags"), false, Vec::new(), 1.0).again(2);
+        assert!(words.starts_with("record 2 clips more"), "{words}");
+        assert!(commands[0].ends_with("--clips 2") && commands[1].ends_with("--speed 0.5"), "{commands:?}");
+    }
+}

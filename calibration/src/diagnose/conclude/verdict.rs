@@ -1,0 +1,282 @@
+//! The finding: one of five verdicts, with the effects and how sure it is. [`super::headline`] says it in a sentence.
+
+use crate::diagnose::answer::{Basis, Kind, Verdict};
+use crate::diagnose::judge::confidence;
+use crate::diagnose::judge::remainder::Left;
+use std::time::Duration;
+
+/// What a verdict is drawn from.
+#[derive(Debug, Clone)]
+pub struct Finding<'a> {
+    /// Effects that were found, in the order in which they were.
+    pub effects: Vec<&'a str>,
+    /// Effects that would do as well as one of them.
+    pub rivals: Vec<&'a str>,
+    /// How sure the weakest of them is.
+    pub confidence: f64,
+    /// Whether each of them stood out: nearly all clips spoke for it, and for no other.
+    pub clear: bool,
+    /// Whether all of them act on the arm.
+    pub of_arm: bool,
+    /// The gap before and after, of every group of sensors.
+    pub left: Vec<Left>,
+    /// Whether the gap shrinks on the clips that were kept for confirming.
+    pub confirmed: bool,
+    /// Whether an effect is stronger than what is met in practice.
+    pub implausible: bool,
+    /// Whether the gap is of no interest without effects, and with them.
+    pub within_tolerance: [bool; 2],
+    /// How much the friction of the last clip is over that of the first, less 1, where it drifts over the session.
+    pub drift: Option<f64>,
+}
+
+/// The verdict without its sentence.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Decision {
+    /// Which of the five it is.
+    pub kind: Kind,
+    /// Effects named, or the members of the class.
+    pub effects: Vec<String>,
+    /// How sure, 0 to 1.
+    pub confidence: f64,
+    /// Whether a gap that nothing explains is so small that an effect may be too weak to be identified in it.
+    pub little: bool,
+}
+
+impl Decision {
+    /// The verdict with its sentence.
+    #[must_use]
+    pub fn said(self, text: String) -> Verdict {
+        let Self { kind, effects, confidence, .. } = self;
+        Verdict { kind, effects, confidence, text, explained_share: None, rest: None }
+    }
+}
+
+impl Verdict {
+    /// What [`Verdict::confidence`] is.
+    #[must_use]
+    pub fn basis(&self) -> Basis {
+        let most = match self.kind {
+            Kind::Named => confidence::MOST,
+            Kind::None => NONE,
+            Kind::Class | Kind::Unexplained => return Basis::Rate,
+            Kind::NotTestable => return Basis::Nothing,
+        };
+        if self.confidence < most - HAIR { Basis::Estimate } else { Basis::Limit }
+    }
+}
+
+/// So near its limit a confidence is shown as the limit.
+const HAIR: f64 = 0.005;
+
+/// What is stronger than what is met in practice is believed where it explains this much [%]: a substitute does not.
+const ALL_BUT_EXACT: f64 = 99.5;
+
+/// What is less likely than not is not named.
+const LIKELY: f64 = 0.5;
+
+/// How often it is right, as met in sessions of another engine, that nothing is there where the twin is as near as noise allows, ...
+const NONE: f64 = 0.96;
+/// ... that one of a class is the cause, ...
+pub(in crate::diagnose) const CLASS: f64 = 0.9;
+/// ... and that the cause of a plain gap is unknown (seven of ten); else it was an effect too far from its model.
+const UNKNOWN: f64 = 0.7;
+/// A gap of less than three least ones is seldom that (one of eight): mostly an effect that is too weak to be believed.
+const PLAIN: f64 = 3.0;
+const UNKNOWN_OF_LITTLE: f64 = 0.2;
+
+impl Finding<'_> {
+    /// The verdict.
+    #[must_use]
+    pub fn decide(&self) -> Decision {
+        if self.within_tolerance[0] {
+            return self.none();
+        }
+        let unlikely = self.rivals.is_empty() && self.confidence < LIKELY;
+        if self.effects.is_empty() || !self.confirmed || unlikely {
+            let gap = self.left.iter().any(|left| left.gaps() > 1.0);
+            return if gap || self.drift.is_some() { self.unexplained() } else { self.none() };
+        }
+        let pushed = self.implausible && self.percent() < ALL_BUT_EXACT;
+        if pushed
+            || !self.within_tolerance[1]
+                && self.left.iter().any(|left| left.too_much(self.clear) && !(left.of_object && self.moves_the_arm()))
+        {
+            return self.unexplained();
+        }
+        if self.rivals.is_empty() { self.named() } else { self.class() }
+    }
+
+    /// The first group of sensors of which the effects leave too much.
+    pub(in crate::diagnose) fn open(&self) -> Option<&Left> {
+        self.left.iter().find(|left| left.too_much(self.clear))
+    }
+
+    /// Whether the effects are what moves the arm, whatever an object does besides: a gap that is plain, and a cause that
+    /// leaves nothing of it.
+    fn moves_the_arm(&self) -> bool {
+        let arm = self.left.iter().find(|left| !left.of_object);
+        self.of_arm && arm.is_some_and(|arm| arm.gaps() > PLAIN && arm.explained() > 1.0 - arm.substitute)
+    }
+
+    /// How many times what noise alone leaves the residuals are without any effect.
+    pub(in crate::diagnose) fn times_noise(&self) -> f64 {
+        self.left.iter().map(|left| left.before / left.floor).fold(1.0, f64::max).sqrt()
+    }
+
+    fn none(&self) -> Decision {
+        let nothing = self.left.iter().map(Left::is_nothing).fold(1.0, f64::min);
+        // What is of no interest is a matter of size, which is measured.
+        let nothing = if self.within_tolerance[0] { 1.0 } else { nothing };
+        Decision { kind: Kind::None, effects: Vec::new(), confidence: NONE * nothing, little: false }
+    }
+
+    fn named(&self) -> Decision {
+        let names = self.effects.iter().map(|name| (*name).to_owned()).collect();
+        Decision { kind: Kind::Named, effects: names, confidence: self.confidence, little: false }
+    }
+
+    fn class(&self) -> Decision {
+        let all = self.effects.iter().chain(&self.rivals).map(|name| (*name).to_owned()).collect();
+        Decision { kind: Kind::Class, effects: all, confidence: CLASS, little: false }
+    }
+
+    /// How much of what is not noise the effects explain, in the group of sensors in which they explain most [%].
+    fn percent(&self) -> f64 {
+        100.0 * self.left.iter().map(Left::explained).fold(0.0, f64::max)
+    }
+
+    fn unexplained(&self) -> Decision {
+        let plain = self.drift.is_some() || self.left.iter().any(|left| left.gaps() > PLAIN);
+        let confidence = if plain { UNKNOWN } else { UNKNOWN_OF_LITTLE };
+        Decision { kind: Kind::Unexplained, effects: Vec::new(), confidence, little: !plain }
+    }
+}
+
+/// The verdict when the clips do not say enough.
+#[must_use]
+pub fn not_testable(why: &str) -> Verdict {
+    let decision = Decision { kind: Kind::NotTestable, effects: Vec::new(), confidence: 1.0, little: false };
+    decision.said(format!("Not testable: {why}."))
+}
+
+impl Verdict {
+    /// The same of a diagnosis whose time was spent. `cut_short`: not everything was tried, so that what is unexplained need not
+    /// be.
+    #[must_use]
+    pub fn so_far(self, budget: Duration, cut_short: bool) -> Self {
+        let kind = if cut_short && self.kind == Kind::Unexplained { Kind::NotTestable } else { self.kind };
+        let budget = budget.as_secs_f64();
+        let text = if kind == self.kind {
+            format!("{} This is the best answer so far: the budget of {budget} s was spent.", self.text)
+        } else {
+            format!(
+                "There is a gap, and the budget of {budget} s was spent before a cause was found; give it more time."
+            )
+        };
+        Self { kind, text, ..self }
+    }
+}
+
+#[cfg(test)]
+pub(in crate::diagnose) mod tests {
+    use super::*;
+    use crate::diagnose::judge::remainder::{NUMERICS, SUBSTITUTE};
+
+    pub(in crate::diagnose) fn finding<'a>(effects: Vec<&'a str>, before: f64, after: f64) -> Finding<'a> {
+        let left =
+            vec![Left { before, after, floor: 1.0, numerics: NUMERICS, substitute: SUBSTITUTE, of_object: false }];
+        Finding {
+            effects,
+            rivals: Vec::new(),
+            confidence: 0.95,
+            clear: false,
+            of_arm: true,
+            left,
+            confirmed: true,
+            implausible: false,
+            within_tolerance: [false; 2],
+            drift: None,
+        }
+    }
+
+    #[test]
+    fn friction_that_drifts_is_said_even_where_every_clip_can_be_followed() {
+        let worn = Finding { drift: Some(0.38), ..finding(vec![], 4.0, 4.0) }.decide();
+        assert_eq!(worn.kind, Kind::Unexplained);
+        let named = Finding { drift: Some(0.38), ..finding(vec!["payload"], 500.0, 1.5) }.decide();
+        assert_eq!(named.kind, Kind::Named);
+    }
+
+    #[test]
+    fn the_larger_the_residuals_the_less_sure_it_is_that_nothing_is_there() {
+        let object = |before: f64| {
+            let mut nothing = finding(vec![], before, before);
+            nothing.left[0].of_object = true;
+            nothing.decide()
+        };
+        let (near, rough, far) = (object(1.5), object(10.5), object(16.0));
+        assert!(near.kind == Kind::None && near.confidence > 0.95, "{near:?}");
+        assert!(rough.kind == Kind::None && (0.4..0.7).contains(&rough.confidence), "{rough:?}");
+        assert!(far.kind == Kind::Unexplained && far.confidence < 0.5 && far.little, "{far:?}");
+        assert!(object(100.0).confidence > 0.6 && !object(100.0).little);
+    }
+
+    #[test]
+    fn the_five_verdicts() {
+        assert_eq!(finding(vec![], 1.5, 1.5).decide().kind, Kind::None);
+        assert_eq!(finding(vec![], 500.0, 500.0).decide().kind, Kind::Unexplained);
+        assert_eq!(finding(vec!["payload"], 500.0, 1.5).decide().kind, Kind::Named);
+        assert_eq!(finding(vec!["payload"], 500.0, 200.0).decide().kind, Kind::Unexplained);
+        let class = Finding { rivals: vec!["base_tilt"], ..finding(vec!["payload"], 500.0, 1.5) }.decide();
+        assert_eq!((class.kind, class.effects.len()), (Kind::Class, 2));
+        assert_eq!(not_testable("one clip").kind, Kind::NotTestable);
+    }
+
+    #[test]
+    fn a_confidence_at_its_limit_is_no_estimate() {
+        let basis = |finding: &Finding<'_>| finding.decide().said(String::new()).basis();
+        let named = |confidence| Finding { confidence, ..finding(vec!["payload"], 500.0, 1.5) };
+        assert_eq!(basis(&named(confidence::MOST)), Basis::Limit);
+        assert_eq!(basis(&named(0.8)), Basis::Estimate);
+        assert_eq!(basis(&finding(vec![], 1.5, 1.5)), Basis::Limit);
+        assert_eq!(basis(&finding(vec![], 500.0, 500.0)), Basis::Rate);
+        assert_eq!(not_testable("one clip").basis(), Basis::Nothing);
+    }
+
+    #[test]
+    fn what_widens_the_gap_on_clips_kept_for_confirming_is_not_named() {
+        let refuted = Finding { confirmed: false, ..finding(vec!["payload"], 500.0, 1.5) };
+        assert_eq!(refuted.decide().kind, Kind::Unexplained);
+        assert_eq!(Finding { confirmed: false, ..finding(vec!["payload"], 2.0, 1.5) }.decide().kind, Kind::None);
+    }
+
+    #[test]
+    fn what_is_less_likely_than_not_is_not_named_alone() {
+        let unlikely = Finding { confidence: 0.1, ..finding(vec!["restitution"], 5.0, 1.5) };
+        assert_eq!(unlikely.decide().kind, Kind::None);
+        assert_eq!(Finding { rivals: vec!["tip_friction"], ..unlikely }.decide().kind, Kind::Class);
+        let in_a_gap = Finding { confidence: 0.1, ..finding(vec!["restitution"], 500.0, 1.5) };
+        assert_eq!(in_a_gap.decide().kind, Kind::Unexplained);
+    }
+
+    #[test]
+    fn where_only_the_arm_is_explained_its_cause_is_named() {
+        let mut found = finding(vec!["command_delay"], 5e5, 1.5);
+        let arm = found.left[0];
+        found.left.push(Left { of_object: true, before: 301.0, after: 91.0, ..arm });
+        assert_eq!(found.decide().kind, Kind::Named);
+        assert_eq!(Finding { of_arm: false, ..found.clone() }.decide().kind, Kind::Unexplained);
+        let mut little = found.clone();
+        (little.left[0].before, little.left[0].after) = (15.0, 1.2);
+        assert_eq!(little.decide().kind, Kind::Unexplained, "a substitute closes so small a gap as well");
+    }
+
+    #[test]
+    fn an_effect_beyond_what_is_met_in_practice_is_a_substitute() {
+        let exact = Finding { implausible: true, ..finding(vec!["payload"], 500.0, 1.5) };
+        assert_eq!(exact.decide().kind, Kind::Named, "stronger than usual, and exactly that");
+        let pushed = Finding { implausible: true, ..finding(vec!["payload"], 500.0, 6.5) };
+        assert_eq!(pushed.decide().kind, Kind::Unexplained);
+    }
+}

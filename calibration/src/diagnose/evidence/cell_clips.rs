@@ -1,0 +1,257 @@
+//! Clips with an object as evidence: the arm before the touch ([`ArmClips`]), the object's poses and the arm's joints while
+//! the tool pushes the object ([`ObjectClips`], [`Contact`]), each in sigmas of its sensor.
+//!
+//! Every clip has a friction and a clock of its own, and its object deviates from the simulated path: nobody simulates an
+//! impact exactly, and the error grows along the path. That deviation is a random effect, added to the simulated poses, so it
+//! costs no simulation; its scale is what an effect must beat to be believed
+//! ([`super::scatter_scale`]).
+
+use super::arm_clips::ArmClips;
+use super::contact::Contact;
+use super::deviations;
+use super::measured::{Channel, Evidence, Group, Reach, Row, StageName};
+use super::recent::Recent;
+use super::scatter::Scatter;
+use crate::diagnose::library::Library;
+use crate::estimate::{ClipModel, Impossible, Random};
+use crate::forward::Setting;
+use crate::forward::object::{self, ALL, ModelError, ObjectClips, Own, Part};
+use shared_mem::cell::{ClipKind, PoseNoise};
+use shared_mem::theta::Theta;
+use std::sync::Arc;
+
+/// Coordinates of a pose.
+const COORDINATES: [(&str, &str); 6] = [
+    ("position", "x"),
+    ("position", "y"),
+    ("position", "z"),
+    ("rotation", "roll"),
+    ("rotation", "pitch"),
+    ("rotation", "yaw"),
+];
+/// Parts of a clip with weights of their own: a twin is right about rest long before it is right about a hit.
+const PARTS: usize = 3;
+/// The blow and what it does to the object at once [s]; what comes after is sliding, pushed or free.
+const HIT: f64 = 0.05;
+
+/// Coordinates that sliding changes: x, y, yaw.
+const IN_THE_PLANE: [usize; 3] = [0, 1, 5];
+/// How far a moving object may tip and rise otherwise than simulated, one sigma [m, rad]: how a table and its edges yield
+/// under a blow is not modelled well enough to learn from.
+const TIPPING: PoseNoise = PoseNoise { position: 3e-3, rotation: 0.05 };
+
+/// Places of friction and clock among the own numbers; those of [`deviations`] follow.
+const FRICTION: usize = 0;
+const CLOCK: usize = 1;
+const FIRST_DEVIATION: usize = 2;
+
+/// The arm where there is one, and the object.
+pub struct CellClips<'a, F> {
+    library: &'a Library,
+    arm: Option<ArmClips<F>>,
+    object: ObjectClips,
+    channels: Vec<Channel>,
+    rows: Vec<Vec<Row>>,
+    /// For each clip and number of [`deviations`], what one unit of it takes off every residual.
+    deviations: Vec<Vec<Vec<f64>>>,
+    scatter: Scatter,
+    /// Index of the shared friction among the numbers.
+    friction: Option<usize>,
+    /// Indices of the joints' stiffnesses among them.
+    stiffness: Vec<usize>,
+    /// Index of the object's first channel.
+    first: usize,
+    /// For each clip the joints' residuals in contact.
+    contact: Vec<Contact>,
+    /// For each clip the last numbers that the arm feels with its residuals there: most of what a search turns is the
+    /// object's.
+    arm_alone: Vec<Recent<Vec<f64>>>,
+}
+
+impl<'a, F: Fn(&[f64]) -> Theta + Sync> CellClips<'a, F> {
+    /// Both on the same clips in the same order.
+    pub fn new(arm: Option<ArmClips<F>>, mut object: ObjectClips, library: &'a Library) -> Self {
+        object.set_model_error(ModelError { joints: arm.as_ref().map(|_| 1.0), ..object.model_error() });
+        let mut channels = arm.as_ref().map_or_else(Vec::new, |arm| arm.channels().to_vec());
+        let first = channels.len();
+        for _ in 0..PARTS {
+            let of = |(quantity, place): (&'static str, &str)| Channel {
+                quantity,
+                place: place.into(),
+                joint: None,
+                group: Group::Object,
+            };
+            channels.extend(COORDINATES.map(of));
+        }
+        let in_contact = channels.len();
+        let encoders: Vec<Channel> =
+            channels[..first].iter().filter(|channel| channel.quantity == "q").cloned().collect();
+        channels.extend(encoders.into_iter().map(|encoder| Channel { group: Group::Contact, ..encoder }));
+        let (mut rows, mut deviations, mut contact) = (Vec::new(), Vec::new(), Vec::new());
+        for clip in 0..object.clips() {
+            let of_arm = arm.as_ref().map_or(&[][..], |arm| arm.rows(clip));
+            let joints = Contact::of(arm.as_ref(), &object, clip);
+            let poses = pose_rows(&object, clip, first);
+            deviations.push(deviations::slopes(&object, clip, of_arm.len(), joints.rows.len()));
+            rows.push([of_arm, &poses, &joints.evidence(&object.rows(clip), in_contact)].concat());
+            contact.push(joints);
+        }
+        let numbers = || library.settings.settings().iter().enumerate();
+        let friction = numbers().find(|(_, setting)| **setting == Setting::Friction).map(|(k, _)| k);
+        let stiffness =
+            numbers().filter(|(_, setting)| matches!(setting, Setting::Stiffness(_))).map(|(k, _)| k).collect();
+        let scatter = scatter(&object);
+        let arm_alone = rows.iter().map(|_| Recent::default()).collect();
+        Self {
+            library,
+            arm,
+            object,
+            channels,
+            rows,
+            deviations,
+            scatter,
+            friction,
+            stiffness,
+            first,
+            contact,
+            arm_alone,
+        }
+    }
+
+    /// The residuals of the arm that moves alone at numbers; none where there is no arm.
+    fn arm(&self, clip: usize, shared: &[f64]) -> Result<Arc<Vec<f64>>, Impossible> {
+        let Some(arm) = &self.arm else { return Ok(Arc::default()) };
+        self.arm_alone[clip].at(&self.library.felt_by_arm(shared), || arm.simulated(clip, shared))
+    }
+
+    /// The residuals of the poses and of the joints in contact at numbers, a clip's own among them.
+    fn since_touch(&self, clip: usize, shared: &[f64], own: &[f64]) -> Result<Vec<f64>, Impossible> {
+        let mut shared = shared.to_vec();
+        if let (Some(friction), Some(own)) = (self.friction, own.get(FRICTION)) {
+            shared[friction] *= own.exp();
+        }
+        let clock = own.get(CLOCK).copied().unwrap_or(0.0);
+        let of_object = ALL.map(|number| if number == Own::Clock { clock } else { 0.0 });
+        let mut residuals = self.object.errors(clip, &shared, &of_object)?;
+        let (noise, contact) = (self.object.noise(), &self.contact[clip]);
+        let joints: Vec<f64> = residuals[contact.rows.clone()].to_vec();
+        residuals.truncate(self.poses(clip));
+        let of_arm = self.of_arm(clip);
+        for (residual, row) in residuals.iter_mut().zip(&self.rows[clip][of_arm..]) {
+            let coordinate = (row.channel - self.first) % COORDINATES.len();
+            let (noise, tipping) =
+                if coordinate < 3 { (noise.position, TIPPING.position) } else { (noise.rotation, TIPPING.rotation) };
+            let tips = row.stage != StageName::Rest && !IN_THE_PLANE.contains(&coordinate);
+            *residual /= if tips { noise.hypot(tipping) } else { noise };
+        }
+        for (slopes, value) in
+            self.deviations[clip].iter().zip(own.iter().skip(FIRST_DEVIATION)).filter(|(_, u)| **u != 0.0)
+        {
+            residuals.iter_mut().zip(&slopes[of_arm..]).for_each(|(residual, slope)| *residual += slope * value);
+        }
+        let stiffness: Vec<f64> = self.stiffness.iter().map(|k| shared[*k]).collect();
+        residuals.extend(contact.in_sigmas(&joints, &stiffness));
+        Ok(residuals)
+    }
+
+    /// How many rows the arm has that moves alone.
+    fn of_arm(&self, clip: usize) -> usize {
+        self.arm.as_ref().map_or(0, |arm| arm.rows(clip).len())
+    }
+
+    /// How many rows the object's poses have.
+    fn poses(&self, clip: usize) -> usize {
+        self.rows[clip].len() - self.of_arm(clip) - self.contact[clip].rows.len()
+    }
+}
+
+/// Friction and clock as identification has them, and the deviations of paths.
+fn scatter(object: &ObjectClips) -> Scatter {
+    let light = [Own::LnFriction, Own::Clock];
+    let kind = ClipKind::ControlHitSlide;
+    let mut random: Vec<Random> =
+        light.iter().map(|own| Random { sigma: own.sigma(object.cell(), kind), ..own.random() }).collect();
+    random.extend(deviations::random());
+    Scatter { heavy: FIRST_DEVIATION..random.len(), forgiving: 1.0, random }
+}
+
+fn pose_rows(object: &ObjectClips, clip: usize, first: usize) -> Vec<Row> {
+    let rows = object.rows(clip);
+    let start_ns = rows.first().map_or(0, |row| row.stamp_ns);
+    let onset_ns = rows.iter().filter(|row| row.part == Part::Before).map(|row| row.stamp_ns).max().unwrap_or(start_ns);
+    let one = |row: &object::Row| {
+        let coordinate = match row.channel {
+            object::Channel::Position(axis) => axis,
+            object::Channel::Rotation(axis) => 3 + axis,
+            object::Channel::Joint(_) => return None,
+        };
+        let since = row.stamp_ns.saturating_sub(onset_ns) as f64 * 1e-9;
+        let (part, stage, regime) = match row.part {
+            Part::Before => (0, StageName::Rest, "before the hit"),
+            Part::After => (0, StageName::Rest, "after the slide"),
+            _ if since < HIT => (1, StageName::Hit, "blow"),
+            Part::Hit => (2, StageName::Slide, "beside the tool"),
+            Part::Slide => (2, StageName::Slide, "free"),
+        };
+        let time = row.stamp_ns.saturating_sub(start_ns) as f64 * 1e-9;
+        Some(Row { channel: first + part * COORDINATES.len() + coordinate, stage, regime, time })
+    };
+    rows.iter().filter_map(one).collect()
+}
+
+impl<F: Fn(&[f64]) -> Theta + Sync> ClipModel for CellClips<'_, F> {
+    fn clips(&self) -> usize {
+        self.object.clips()
+    }
+
+    fn residuals(&self, clip: usize, shared: &[f64], own: &[f64], out: &mut Vec<f64>) -> Result<(), Impossible> {
+        let others = self.since_touch(clip, shared, own)?;
+        out.clear();
+        out.extend_from_slice(&self.arm(clip, shared)?);
+        out.extend(others);
+        Ok(())
+    }
+}
+
+impl<F: Fn(&[f64]) -> Theta + Sync> Evidence for CellClips<'_, F> {
+    fn changed(
+        &self,
+        clip: usize,
+        (shared, own): (&[f64], &[f64]),
+        (reach, base): (Reach, &[f64]),
+        out: &mut Vec<f64>,
+    ) -> Result<(), Impossible> {
+        let of_arm = self.of_arm(clip);
+        match (reach, &self.arm) {
+            (Reach::Arm, Some(_)) => {
+                out.clear();
+                out.extend_from_slice(&self.arm(clip, shared)?);
+                out.extend(&base[of_arm..]);
+            }
+            (Reach::Object, _) => {
+                let others = self.since_touch(clip, shared, own)?;
+                out.clear();
+                out.extend(&base[..of_arm]);
+                out.extend(others);
+            }
+            _ => self.residuals(clip, shared, own, out)?,
+        }
+        Ok(())
+    }
+
+    fn channels(&self) -> &[Channel] {
+        &self.channels
+    }
+
+    fn rows(&self, clip: usize) -> &[Row] {
+        &self.rows[clip]
+    }
+
+    fn scatter(&self) -> Scatter {
+        self.scatter.clone()
+    }
+
+    fn own_slope(&self, clip: usize, own: usize) -> Option<&[f64]> {
+        Some(self.deviations[clip].get(own.checked_sub(FIRST_DEVIATION)?)?)
+    }
+}

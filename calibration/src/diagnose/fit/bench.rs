@@ -1,0 +1,410 @@
+//! Hypotheses fitted to clips: the baseline's numbers and those of the effects that act, together, by bounded Gauss-Newton
+//! steps over the sweeps of [`super::sweep`].
+
+use super::effort::Effort;
+use super::quadratic;
+use super::shortlist::{Scored, hold_numbers};
+use super::sweep::{Point, Precision, Reduced, Swept, sweep};
+use crate::diagnose::evidence::measured::Evidence;
+use crate::diagnose::evidence::scatter::Scatter;
+use crate::diagnose::library::Library;
+use crate::interrupt::Interrupt;
+use crate::kept::{Fingerprint, Trail};
+use nalgebra::{DMatrix, DVector};
+use serde::{Deserialize, Serialize};
+use twin::effects::{EffectInfo, Place, Role};
+
+/// What every step of the diagnosis is given.
+pub struct Bench<'a, E> {
+    /// The clips.
+    pub evidence: &'a E,
+    /// The candidates.
+    pub library: &'a Library,
+    /// What varies from clip to clip.
+    pub scatter: Scatter,
+    /// Whether the user asked for the end, or the time is spent.
+    pub interrupt: &'a Interrupt,
+    /// Where what is found is kept.
+    pub trail: Trail<'a>,
+}
+
+/// Clips, each with its own numbers.
+pub(in crate::diagnose) type Clips = Vec<(usize, Vec<f64>)>;
+
+/// A clip at a hypothesis.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct FittedClip {
+    /// Index of the clip.
+    pub clip: usize,
+    /// Its own numbers.
+    pub own: Vec<f64>,
+    /// Over (residual, free numbers), weighted, own numbers eliminated.
+    pub reduced: Reduced,
+}
+
+impl FittedClip {
+    /// `-2 ln` of its likelihood.
+    #[must_use]
+    pub fn deviance(&self) -> f64 {
+        self.reduced.form[(0, 0)] + self.reduced.volume
+    }
+}
+
+/// A hypothesis with its numbers.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct Hypothesis {
+    /// Candidates that act, in the order in which they were found.
+    pub effects: Vec<usize>,
+    /// All numbers.
+    pub full: Vec<f64>,
+    /// Indices of the free ones.
+    pub free: Vec<usize>,
+    /// Clips it was fitted to.
+    pub fitted: Vec<FittedClip>,
+}
+
+impl Hypothesis {
+    /// `-2 ln` of the likelihood of the clips it was fitted to.
+    #[must_use]
+    pub fn deviance(&self) -> f64 {
+        self.fitted.iter().map(FittedClip::deviance).sum()
+    }
+
+    /// A clip's own numbers where it was fitted, else at rest.
+    #[must_use]
+    pub fn own(&self, clip: usize, count: usize) -> Vec<f64> {
+        let fitted = self.fitted.iter().find(|fitted| fitted.clip == clip);
+        fitted.map_or_else(|| vec![0.0; count], |fitted| fitted.own.clone())
+    }
+}
+
+/// A fit has converged when a step promises less than this of the deviance: a fiftieth of a nat decides nothing.
+const TOLERANCE: f64 = 0.05;
+/// An effect weaker than this share of the strongest that is met in practice is none: two engines with other steps and other
+/// rules of integration differ by as much (0.35 % of a rotor's inertia and 0.02 % of viscous friction, measured on sessions
+/// of another engine with nothing wrong).
+const NEGLIGIBLE: f64 = 0.008;
+/// A control period and a half [s].
+const CONVENTION: f64 = 1.5e-3;
+/// Steps in which a clip finds its own numbers.
+const OWN_STEPS: usize = 2;
+/// Most trials with growing damping before a point counts as the best there is.
+const TRIALS: usize = 6;
+
+/// Share of the strongest from which on an effect counts. What fades out towards infinity, as a gear's stiffness, is met
+/// in practice from the far end of its plausible range on; beyond, it is the ordinary stiffness of anything.
+fn least(effect: &EffectInfo) -> f64 {
+    let fades = effect.parameters.iter().find(|parameter| parameter.resting_value().is_infinite());
+    match fades {
+        Some(parameter) if matches!(parameter.role, Role::Size { .. }) => {
+            parameter.plausible[0] / parameter.plausible[1]
+        }
+        _ => NEGLIGIBLE,
+    }
+}
+
+impl<E: Evidence> Bench<'_, E> {
+    /// Numbers that are free when these effects act.
+    #[must_use]
+    pub fn free(&self, effects: &[usize]) -> Vec<usize> {
+        let of_effects = effects.iter().flat_map(|effect| self.library.candidates[*effect].turned.clone());
+        self.library.baseline.clone().chain(of_effects).collect()
+    }
+
+    /// Fits effects on clips from `full` on, each clip's own numbers from `near` on.
+    ///
+    /// `None` when the twin has no answer at the start.
+    #[must_use]
+    pub fn fit(
+        &self,
+        (effects, full): (&[usize], Vec<f64>),
+        clips: &[usize],
+        weights: &[f64],
+        near: Option<&Hypothesis>,
+        effort: Effort,
+    ) -> Option<Hypothesis> {
+        let count = self.scatter.count();
+        let own = |clip: &usize| (*clip, near.map_or_else(|| vec![0.0; count], |near| near.own(*clip, count)));
+        let from: Clips = clips.iter().map(own).collect();
+        let step = self.step("fit").with(&(effects, clips, effort)).with_numbers(&full).with_numbers(weights);
+        let step = step.with_numbers(from.iter().flat_map(|(_, own)| own));
+        self.trail.0.once(&step, || self.fitted((effects, full), from, weights, effort))
+    }
+
+    /// A step of this bench by its name.
+    #[must_use]
+    pub fn step(&self, name: &str) -> Fingerprint {
+        Fingerprint::of(name).with(&self.trail.1)
+    }
+
+    fn fitted(
+        &self,
+        (effects, full): (&[usize], Vec<f64>),
+        from: Clips,
+        weights: &[f64],
+        effort: Effort,
+    ) -> Option<Hypothesis> {
+        let free = self.free(effects);
+        let holds = |k: &usize| effort.holds_joints && self.library.joints[*k].is_some();
+        let moving: Vec<usize> = free.iter().copied().filter(|k| !holds(k)).collect();
+        let clips = self.own_fitted(&full, from, weights)?;
+        let clips = self.restarted(&full, clips, weights);
+        let before_last = Effort { iterations: effort.iterations.saturating_sub(1), ..effort };
+        let (full, clips, best) = self.descended((full, clips), &moving, weights, before_last)?;
+        let restarted = self.restarted(&full, clips.clone(), weights);
+        let at = match best.filter(|_| moving.len() == free.len() && restarted == clips) {
+            Some(at) => at,
+            None => self.linearise(&full, &free, &restarted, effort.precision)?,
+        };
+        let forms = at.reduced(self.evidence, weights);
+        let fitted = restarted.into_iter().zip(forms).map(|((clip, own), reduced)| FittedClip { clip, own, reduced });
+        Some(Hypothesis { effects: effects.to_vec(), full, free, fitted: fitted.collect() })
+    }
+
+    /// Damped steps of some numbers and of the clips' own; the last linearisation too, where no step from it was worth it.
+    fn descended(
+        &self,
+        (mut full, mut clips): (Vec<f64>, Clips),
+        moving: &[usize],
+        weights: &[f64],
+        effort: Effort,
+    ) -> Option<(Vec<f64>, Clips, Option<Swept>)> {
+        let mut damping = 1e-4;
+        for _ in 0..effort.iterations {
+            if self.interrupt.asked() {
+                break;
+            }
+            let at = self.linearise(&full, moving, &clips, effort.precision)?;
+            let forms = at.reduced(self.evidence, weights);
+            let Some((to, to_own)) = self.improved(&full, moving, (&at, &forms), weights, &mut damping) else {
+                return Some((full, clips, Some(at)));
+            };
+            (full, clips) = (to, to_own);
+        }
+        Some((full, clips, None))
+    }
+
+    /// What the clips of a hypothesis cost at `full` after one step of some numbers alone, and the numbers then. `None` when the
+    /// twin has no answer there.
+    pub(in crate::diagnose) fn after_a_step(
+        &self,
+        (from, full): (&Hypothesis, Vec<f64>),
+        moving: &[usize],
+        weights: &[f64],
+    ) -> Option<(f64, Vec<f64>)> {
+        let clips = from.fitted.iter().map(|fitted| (fitted.clip, fitted.own.clone())).collect();
+        let (full, clips, _) = self.descended((full, clips), moving, weights, Effort::of(1, Precision::Joints))?;
+        Some((self.cost(&full, &clips, weights)?, full))
+    }
+
+    pub(in crate::diagnose) fn linearise(
+        &self,
+        full: &[f64],
+        free: &[usize],
+        clips: &[(usize, Vec<f64>)],
+        precision: Precision,
+    ) -> Option<Swept> {
+        let point = Point { full, free, probed: &[], clips, precision };
+        // Not to be cut short: what was found is known only once the clips are linearised there.
+        sweep(self.evidence, self.library, &point, &self.scatter, &|_| true).ok()
+    }
+
+    /// A point with a lower cost, along damped steps; `None` when there is none that is worth it.
+    fn improved(
+        &self,
+        full: &[f64],
+        free: &[usize],
+        (at, forms): (&Swept, &[Reduced]),
+        weights: &[f64],
+        damping: &mut f64,
+    ) -> Option<(Vec<f64>, Clips)> {
+        let size = 1 + free.len();
+        let sum = forms.iter().fold(DMatrix::zeros(size, size), |sum, reduced| sum + &reduced.form);
+        let kept: Clips = at.clips.iter().map(|clip| (clip.clip, clip.own.clone())).collect();
+        let now = self.cost(full, &kept, weights)?;
+        for _ in 0..TRIALS {
+            let step = self.bounded_step(full, free, &sum, *damping);
+            let promised = sum[(0, 0)] - quadratic::value(&sum, &(1..size).collect::<Vec<_>>(), step.as_slice());
+            let mut to = full.to_vec();
+            free.iter().zip(step.iter()).for_each(|(k, step)| to[*k] += step);
+            let own = |clip: &super::sweep::SweptClip| (clip.clip, at.own_after(clip, self.evidence, weights, &step));
+            let to_own = at.clips.iter().map(own).collect();
+            let fitted = self.own_fitted(&to, to_own, weights).map(|to_own| self.restarted(&to, to_own, weights));
+            let Some(to_own) = fitted else {
+                *damping = (*damping * 20.0).max(1e-3);
+                continue;
+            };
+            if self.cost(&to, &to_own, weights).is_some_and(|cost| cost < now) {
+                *damping = (*damping * 0.1).max(1e-9);
+                return Some((to, to_own));
+            }
+            if promised < TOLERANCE {
+                return None;
+            }
+            *damping = (*damping * 20.0).max(1e-3);
+        }
+        None
+    }
+
+    /// A damped step that keeps numbers at a bound there when they are pushed against it.
+    fn bounded_step(&self, full: &[f64], free: &[usize], sum: &DMatrix<f64>, damping: f64) -> DVector<f64> {
+        let mut form = sum.clone();
+        for k in 1..form.ncols() {
+            form[(k, k)] *= 1.0 + damping;
+        }
+        let room = |i: usize| {
+            let unknown = &self.library.unknowns[free[i]];
+            (unknown.lower - full[free[i]], unknown.upper - full[free[i]])
+        };
+        let mut step = DVector::zeros(free.len());
+        let mut held = vec![false; free.len()];
+        loop {
+            let moving: Vec<usize> = (0..free.len()).filter(|i| !held[*i]).collect();
+            // What is held at a bound pulls on the others: its share of the slope moves into the constant column.
+            let fixed: Vec<usize> = (0..free.len()).filter(|i| held[*i]).collect();
+            let mut pulled = form.clone();
+            for j in 0..form.ncols() {
+                let pull: f64 = fixed.iter().map(|i| form[(j, i + 1)] * step[*i]).sum();
+                pulled[(j, 0)] += pull;
+            }
+            let found = quadratic::minimum(&pulled, &moving.iter().map(|i| i + 1).collect::<Vec<_>>());
+            let mut newly = false;
+            for (i, value) in moving.iter().zip(&found.at) {
+                let (low, high) = room(*i);
+                step[*i] = value.clamp(low, high);
+                if *value < low || *value > high {
+                    held[*i] = true;
+                    newly = true;
+                }
+            }
+            if !newly {
+                return step;
+            }
+        }
+    }
+
+    /// The effort of a trial of a candidate: one beyond the arm leaves the joints' numbers alone.
+    #[must_use]
+    pub fn trying(&self, candidate: usize, effort: Effort) -> Effort {
+        Effort { holds_joints: !self.library.candidates[candidate].is_of_arm(), ..effort }
+    }
+
+    /// Adds a candidate to a hypothesis and fits both from `full` on.
+    #[must_use]
+    pub fn extend(
+        &self,
+        from: &Hypothesis,
+        (candidate, full): (usize, Vec<f64>),
+        clips: &[usize],
+        weights: &[f64],
+        effort: Effort,
+    ) -> Option<Hypothesis> {
+        let mut effects = from.effects.clone();
+        effects.push(candidate);
+        self.fit((&effects, full), clips, weights, Some(from), effort)
+    }
+
+    /// `full` with the candidate as strong as the score test says, within what is met in practice.
+    #[must_use]
+    pub fn begun(&self, mut full: Vec<f64>, scored: &Scored) -> Vec<f64> {
+        let alternative = &self.library.candidates[scored.candidate].alternatives[scored.alternative];
+        for (k, value) in &alternative.form {
+            full[*k] = *value;
+        }
+        let mut vectors: Vec<Polar> = Vec::new();
+        for (probe, units) in alternative.probes.iter().zip(&scored.units) {
+            let [(size, value), rest @ ..] = &probe.moves[..] else { continue };
+            let resting = self.library.unknowns[*size].start;
+            let strength = units.clamp(-probe.largest, probe.largest) * (value - resting);
+            match (rest, vectors.iter_mut().find(|polar| polar.size == *size)) {
+                ([(_, quarter)], Some(polar)) => (polar.across, polar.quarter) = (strength, *quarter),
+                ([(angle, _)], None) => {
+                    vectors.push(Polar { size: *size, angle: *angle, along: strength, across: 0.0, quarter: 0.0 });
+                }
+                _ => full[*size] = resting + strength,
+            }
+        }
+        for Polar { size, angle, along, across, quarter } in vectors {
+            full[size] = along.hypot(across);
+            full[angle] = across.atan2(along) * quarter / std::f64::consts::FRAC_PI_2;
+        }
+        for k in self.library.candidates[scored.candidate].numbers.clone() {
+            let unknown = &self.library.unknowns[k];
+            full[k] = full[k].clamp(unknown.lower, unknown.upper);
+        }
+        full
+    }
+
+    /// Clips that were not fitted, at a hypothesis' numbers with their own ones at their best.
+    #[must_use]
+    pub fn judge(&self, hypothesis: &Hypothesis, clips: &[usize], weights: &[f64]) -> Option<Vec<FittedClip>> {
+        let step = self.step("judge").with(&clips).with_numbers(&hypothesis.full).with_numbers(weights);
+        self.trail.0.once(&step, || self.judged(hypothesis, clips, weights))
+    }
+
+    fn judged(&self, hypothesis: &Hypothesis, clips: &[usize], weights: &[f64]) -> Option<Vec<FittedClip>> {
+        let nothing = vec![0.0; self.scatter.count()];
+        let clips = clips.iter().map(|clip| (*clip, nothing.clone())).collect();
+        let at = self.own_fitted(&hypothesis.full, clips, weights)?;
+        let at = self.restarted(&hypothesis.full, at, weights);
+        let swept = self.linearise(&hypothesis.full, &[], &at, Precision::Exact)?;
+        let forms = swept.reduced(self.evidence, weights);
+        let judged = at.into_iter().zip(forms).map(|((clip, own), reduced)| FittedClip { clip, own, reduced });
+        Some(judged.collect())
+    }
+
+    /// Clips with their own numbers at their best for shared ones that are given.
+    fn own_fitted(&self, full: &[f64], mut clips: Clips, weights: &[f64]) -> Option<Clips> {
+        let steps = if self.scatter.count() == 0 { 0 } else { OWN_STEPS };
+        for _ in 0..steps {
+            let swept = self.linearise(full, &[], &clips, Precision::Exact)?;
+            let nothing = DVector::zeros(0);
+            let own = |clip: &super::sweep::SweptClip| swept.own_after(clip, self.evidence, weights, &nothing);
+            clips = swept.clips.iter().map(|clip| (clip.clip, own(clip))).collect();
+        }
+        Some(clips)
+    }
+
+    /// Whether an effect of a hypothesis is so weak that any two simulations differ as much.
+    #[must_use]
+    pub fn negligible(&self, effect: usize, full: &[f64]) -> bool {
+        let candidate = &self.library.candidates[effect];
+        let shares = candidate.sizes.iter().filter_map(|size| {
+            let resting = self.library.unknowns[*size].start;
+            let strongest = candidate.strongest(*size, resting)?;
+            Some(((full[*size] - resting) / (strongest - resting)).abs())
+        });
+        shares.fold(0.0, f64::max) < least(candidate.effect)
+    }
+
+    /// Whether an effect of a hypothesis does no more to commands that another changes already than shift them by a control
+    /// period: from which period on a filtered command acts is every engine's own.
+    #[must_use]
+    pub fn is_convention(&self, effect: usize, hypothesis: &Hypothesis) -> bool {
+        let of_commands = |k: &usize| self.library.candidates[*k].effect.acts_on == Place::CommandPath;
+        let weak = |size: &usize| hypothesis.full[*size] - self.library.unknowns[*size].start < CONVENTION;
+        of_commands(&effect)
+            && hypothesis.effects.iter().any(|other| *other != effect && of_commands(other))
+            && self.library.candidates[effect].sizes.iter().all(weak)
+    }
+
+    /// The sum of fitted clips' forms, numbers held to their known ranges.
+    #[must_use]
+    pub fn held(&self, hypothesis: &Hypothesis) -> DMatrix<f64> {
+        let size = 1 + hypothesis.free.len();
+        let mut sum = hypothesis.fitted.iter().fold(DMatrix::zeros(size, size), |sum, clip| sum + &clip.reduced.form);
+        let columns: Vec<_> = hypothesis.free.iter().map(|k| super::sweep::Column::Number(*k)).collect();
+        hold_numbers(&mut sum, &columns, self.library);
+        sum
+    }
+}
+
+/// Two probes that turn the same size, along and across: length and angle of a vector.
+struct Polar {
+    size: usize,
+    angle: usize,
+    along: f64,
+    across: f64,
+    /// The angle at which the size acts across.
+    quarter: f64,
+}

@@ -1,0 +1,32 @@
+//! How much work a fit gets.
+
+use super::sweep::Precision;
+
+/// How a fit is made.
+#[derive(Debug, Clone, Copy, Hash)]
+pub struct Effort {
+    /// At most so many linearisations.
+    pub iterations: usize,
+    /// How they are taken.
+    pub precision: Precision,
+    /// Whether numbers that the arm alone tells stay where they are: an effect beyond the arm does not change what its joints
+    /// say, and the arm need not be simulated again.
+    pub holds_joints: bool,
+}
+
+impl Effort {
+    /// So many linearisations, taken like this, of all numbers.
+    #[must_use]
+    pub const fn of(iterations: usize, precision: Precision) -> Self {
+        Self { iterations, precision, holds_joints: false }
+    }
+}
+
+/// Every candidate's fit gets so many linearisations from its signature on; those that come near the best get more.
+pub(in crate::diagnose) const HEAT: Effort = Effort::of(3, Precision::Joints);
+/// A look at an object's clips with what was fitted to the arm alone.
+pub(in crate::diagnose) const LOOK: Effort = Effort::of(1, Precision::Joints);
+/// A candidate that came near the best.
+pub(in crate::diagnose) const FIRST_PASS: Effort = Effort::of(6, Precision::Joints);
+/// Near is this far from the best deviance, or a share of what the best gains.
+pub(in crate::diagnose) const NEAR: f64 = 40.0;

@@ -1,0 +1,105 @@
+//! How far residuals can be trusted: a factor on every channel that makes what the richest hypothesis leaves look like
+//! independent noise of unit variance.
+//!
+//! Sensors are white, but a twin is never exact: what is left is larger than the sensor's noise and says the same thing
+//! many times over. Taken at face value it would make any two hypotheses differ by thousands of nats.
+
+use super::quadratic::minimum;
+use super::shortlist;
+use super::sweep::{Column, Swept};
+use crate::diagnose::evidence::measured::{Channel, Evidence, Group};
+use crate::diagnose::evidence::noise::{correlation_length, median};
+use crate::diagnose::library::Library;
+use nalgebra::{DMatrix, DVector};
+
+/// Factors while nothing is known of how far the twin is off: the sensors' noise alone. The joints in contact are left out: any
+/// engine is off there by many times their noise.
+#[must_use]
+pub fn sensors_alone(evidence: &impl Evidence) -> Vec<f64> {
+    let known = |channel: &Channel| if channel.group == Group::Contact { 0.0 } else { 1.0 };
+    evidence.channels().iter().map(known).collect()
+}
+
+/// Factor on each channel of residuals given clip by clip, one list of values a row.
+#[must_use]
+pub fn weights(evidence: &impl Evidence, clips: &[(usize, Vec<f64>)]) -> Vec<f64> {
+    let channels = evidence.channels().len();
+    (0..channels).map(|channel| weight(evidence, clips, channel)).collect()
+}
+
+fn weight(evidence: &impl Evidence, clips: &[(usize, Vec<f64>)], channel: usize) -> f64 {
+    let of_clip = |(clip, residuals): &(usize, Vec<f64>)| {
+        let of_channel: Vec<f64> = (evidence.rows(*clip).iter().zip(residuals))
+            .filter(|(row, _)| row.channel == channel)
+            .map(|(_, residual)| *residual)
+            .collect();
+        let count = of_channel.len() as f64;
+        let power = of_channel.iter().map(|r| r * r).sum::<f64>() / count;
+        (count > 0.0).then(|| (power, correlation_length(&of_channel)))
+    };
+    let (powers, lengths): (Vec<f64>, Vec<f64>) = clips.iter().filter_map(of_clip).unzip();
+    if powers.is_empty() {
+        return 0.0;
+    }
+    let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
+    // Some strokes go their own way, and where a hit is linearised some clips tell nothing: they must not silence the others.
+    let alone = evidence.channels()[channel].group == Group::Arm;
+    let power = if alone { mean(&powers) } else { median(&powers) };
+    let (power, length) = (power.max(1.0), mean(&lengths).max(1.0));
+    // White residuals of a channel have a length a little above one by chance.
+    let length = if length < 1.5 { 1.0 } else { length };
+    (power * length).sqrt().recip()
+}
+
+/// What the richest hypothesis leaves: all numbers and every candidate's best form at once, each clip's own numbers at
+/// their best.
+#[must_use]
+pub fn richest_residuals(
+    swept: &Swept,
+    evidence: &impl Evidence,
+    library: &Library,
+    weights: &[f64],
+) -> Vec<(usize, Vec<f64>)> {
+    let reduced = swept.reduced(evidence, weights);
+    let size = 1 + swept.columns.len();
+    let mut sum = reduced.iter().fold(DMatrix::zeros(size, size), |sum, clip| sum + &clip.form);
+    shortlist::hold_numbers(&mut sum, &swept.columns, library);
+    let scored = shortlist::score(swept, &sum, library);
+    let in_best = |column: &Column| match column {
+        Column::Number(_) => true,
+        Column::Probe(candidate, a, _) => {
+            scored.iter().any(|s| s.candidate == *candidate && s.alternative == *a && s.p < 0.2)
+        }
+    };
+    let free: Vec<usize> = (0..swept.columns.len()).filter(|k| in_best(&swept.columns[*k])).map(|k| k + 1).collect();
+    for k in &free {
+        if let Column::Probe(candidate, a, p) = swept.columns[k - 1] {
+            let largest = library.candidates[candidate].alternatives[a].probes[p].largest;
+            sum[(*k, *k)] += largest.powi(-2);
+        }
+    }
+    let at = minimum(&sum, &free).at;
+    residuals_at(swept, evidence, weights, &free, &at)
+}
+
+/// Residuals of a sweep's clips at coefficients of some columns, each clip's own numbers at their best; not weighted.
+#[must_use]
+pub fn residuals_at(
+    swept: &Swept,
+    evidence: &impl Evidence,
+    weights: &[f64],
+    free: &[usize],
+    at: &[f64],
+) -> Vec<(usize, Vec<f64>)> {
+    let mut all = DVector::zeros(swept.columns.len());
+    free.iter().zip(at).for_each(|(k, value)| all[k - 1] = *value);
+    let one = |clip: &super::sweep::SweptClip| {
+        let mut left = clip.matrix.column(0) + clip.matrix.columns(1, all.len()) * &all;
+        let own = swept.own_after(clip, evidence, weights, &all);
+        for (k, (to, from)) in own.iter().zip(&clip.own).enumerate() {
+            left.axpy(to - from, &clip.matrix.column(1 + all.len() + k), 1.0);
+        }
+        (clip.clip, left.as_slice().to_vec())
+    };
+    swept.clips.iter().map(one).collect()
+}

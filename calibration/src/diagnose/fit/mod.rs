@@ -1,0 +1,23 @@
+//! Hypotheses as numbers: clips linearised around them, and fitted to them.
+//!
+//! | module | |
+//! |---|---|
+//! | `sweep`, `quadratic` | clips linearised by numbers and probes of candidates, and the quadratic forms that come of it |
+//! | `floor` | weights of the channels: how far residuals can be trusted |
+//! | `shortlist` | how much of the gap each candidate's signature explains |
+//! | `bench`, `cost`, `effort` | hypotheses fitted, what they cost, and how much work a fit gets |
+//! | `restart` | restarts of clips whose own numbers are stuck in a local minimum |
+//! | `parameters`, `undetermined` | its numbers with their intervals, and those that nothing depends on |
+//! | `stages` | how long each part of the search takes |
+
+pub mod bench;
+pub mod cost;
+pub mod effort;
+pub mod floor;
+pub mod parameters;
+pub mod quadratic;
+pub mod restart;
+pub mod shortlist;
+pub(super) mod stages;
+pub mod sweep;
+pub mod undetermined;

@@ -1,0 +1,146 @@
+//! Restarts of clips whose own numbers are stuck in a local minimum.
+//!
+//! An object that is touched twice in the twin and once in the clip, or the other way round, is off by centimetres, and no
+//! slope leads from one to the other, though a little more friction in that clip would. So clips that stand out are tried
+//! some way along each of their own numbers too.
+
+use super::bench::{Bench, Clips};
+use super::sweep::Precision;
+use crate::diagnose::evidence::measured::Evidence;
+use crate::diagnose::evidence::noise::median;
+use nalgebra::DVector;
+
+/// A clip stands out that costs so many times the typical distance from the median more than the median does, and at least
+/// so much more.
+const OUTSTANDING: f64 = 4.0;
+const LEAST: f64 = 100.0;
+/// Where along each of its own numbers it is tried [sigma], and what share of that is then kept: the way back to the likeliest
+/// value may lead over the edge again.
+const TRIED: [f64; 4] = [-5.0, -2.5, 2.5, 5.0];
+const KEPT: [f64; 2] = [0.5, 1.0];
+
+impl<E: Evidence> Bench<'_, E> {
+    /// Clips with their own numbers, those that stand out where they cost least; those without an answer as they were.
+    pub(in crate::diagnose) fn restarted(&self, full: &[f64], mut clips: Clips, weights: &[f64]) -> Clips {
+        if self.scatter.count() == self.scatter.heavy.len() {
+            return clips;
+        }
+        let Some(costs) = self.costs(full, &clips, weights) else { return clips };
+        for place in outstanding(&costs) {
+            let Some((cost, own)) = self.elsewhere(full, clips[place].0, weights) else { continue };
+            if cost < costs[place] {
+                tracing::debug!("clip {} costs {cost:.0} elsewhere instead of {:.0}", clips[place].0, costs[place]);
+                clips[place].1 = own;
+            }
+        }
+        clips
+    }
+
+    /// What a clip costs where it costs least some way along its own numbers, and these. What has heavy tails follows by one
+    /// step: it acts evenly.
+    fn elsewhere(&self, full: &[f64], clip: usize, weights: &[f64]) -> Option<(f64, Vec<f64>)> {
+        let even = &self.scatter.heavy;
+        let numbers = (0..self.scatter.count()).filter(|number| !even.contains(number));
+        let begun = numbers.flat_map(|number| {
+            TRIED.map(|sigmas| {
+                let mut own = vec![0.0; self.scatter.count()];
+                own[number] = sigmas * self.scatter.random[number].sigma;
+                (clip, own)
+            })
+        });
+        let begun: Clips = begun.collect();
+        let swept = self.linearise(full, &[], &begun, Precision::Exact)?;
+        let mut tried = Clips::new();
+        for (at, (_, begun)) in swept.clips.iter().zip(&begun) {
+            let after = swept.own_after(at, self.evidence, weights, &DVector::zeros(0));
+            tried.push((clip, after.clone()));
+            tried.extend(KEPT.map(|share| {
+                let kept = |k: usize| if even.contains(&k) { after[k] } else { share * begun[k] };
+                (clip, (0..after.len()).map(kept).collect())
+            }));
+        }
+        let costs = self.costs(full, &tried, weights)?;
+        costs.into_iter().zip(tried).map(|(cost, (_, own))| (cost, own)).min_by(|a, b| a.0.total_cmp(&b.0))
+    }
+}
+
+/// Those that stand out among costs.
+fn outstanding(costs: &[f64]) -> Vec<usize> {
+    let middle = median(costs);
+    let typical = median(&costs.iter().map(|cost| (cost - middle).abs()).collect::<Vec<_>>());
+    let most = middle + LEAST.max(OUTSTANDING * typical);
+    (0..costs.len()).filter(|place| costs[*place] > most).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diagnose::evidence::measured::{Channel, Group, Row, StageName};
+    use crate::diagnose::evidence::scatter::Scatter;
+    use crate::diagnose::library::Library;
+    use crate::diagnose::test_bench::{bench, shipped};
+    use crate::estimate::{ClipModel, Impossible, Random};
+    use crate::forward::setting;
+    use crate::interrupt::Interrupt;
+    use shared_mem::msg::MAX_JOINTS;
+
+    const SIGMA: f64 = 0.02;
+    /// Where the second touch begins.
+    const EDGE: f64 = 2.0 * SIGMA;
+
+    /// Clips of which the fourth fits only with some friction of its own.
+    struct TouchedTwice([Channel; 1], [Row; 1]);
+
+    impl ClipModel for TouchedTwice {
+        fn clips(&self) -> usize {
+            5
+        }
+
+        fn residuals(&self, clip: usize, _: &[f64], own: &[f64], out: &mut Vec<f64>) -> Result<(), Impossible> {
+            let touched = if clip == 3 && own[0] < EDGE { 30.0 } else { 0.0 };
+            *out = vec![1.0 + touched + own[0] + own[1]];
+            Ok(())
+        }
+    }
+
+    impl Evidence for TouchedTwice {
+        fn channels(&self) -> &[Channel] {
+            &self.0
+        }
+
+        fn rows(&self, _: usize) -> &[Row] {
+            &self.1
+        }
+
+        fn scatter(&self) -> Scatter {
+            let random = |name: &str, sigma| Random { name: name.into(), sigma, step: 1e-3 };
+            Scatter { random: vec![random("friction", SIGMA), random("x", 1.0)], heavy: 1..2, forgiving: 1.0 }
+        }
+    }
+
+    #[test]
+    fn a_clip_that_is_touched_twice_is_restarted_and_the_others_stay() {
+        let cell = shipped();
+        let base = setting::complete(&cell, None).expect("a cell");
+        let library = Library::new(&cell, &base, None, &[87.0; MAX_JOINTS]);
+        let channel = Channel { quantity: "position", place: "x".into(), joint: None, group: Group::Object };
+        let row = Row { channel: 0, stage: StageName::Slide, regime: "free", time: 0.0 };
+        let evidence = TouchedTwice([channel], [row]);
+        let interrupt = Interrupt::default();
+        let bench = bench(&evidence, &library, &interrupt);
+        let full = library.start();
+        let rest: Clips = (0..5).map(|clip| (clip, vec![0.0; 2])).collect();
+        let restarted = bench.restarted(&full, rest.clone(), &[1.0]);
+        let friction = restarted[3].1[0];
+        assert!((EDGE..=3.0 * SIGMA).contains(&friction), "no further than it must: {friction}");
+        let changed: Vec<usize> = (0..5).filter(|place| restarted[*place] != rest[*place]).collect();
+        assert_eq!(changed, [3]);
+    }
+
+    #[test]
+    fn clips_of_one_kind_do_not_stand_out() {
+        assert_eq!(outstanding(&[3140.0, 3256.0, 3039.0, 3342.0, 3090.0, 3380.0]), [] as [usize; 0]);
+        assert_eq!(outstanding(&[3134.0, 3424.0, 3358.0, 3057.0, 4002.0, 3127.0]), [4]);
+        assert_eq!(outstanding(&[10.0, 10.0, 10.0, 90.0]), [] as [usize; 0], "too little to be worth it");
+    }
+}

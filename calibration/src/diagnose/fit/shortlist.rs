@@ -1,0 +1,143 @@
+//! Which candidates are worth fitting: a score test of each at the present hypothesis, all that is uncertain projected out.
+
+use super::quadratic::{bounded_minimum, eliminate};
+use super::sweep::{Column, Swept};
+use crate::diagnose::library::Library;
+use nalgebra::DMatrix;
+use serde::{Deserialize, Serialize};
+
+/// What a candidate's signature says.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct Scored {
+    /// Index of the candidate.
+    pub candidate: usize,
+    /// Its best form.
+    pub alternative: usize,
+    /// Units of that form's probes.
+    pub units: Vec<f64>,
+    /// The forms next to the best, with their units.
+    pub next: Vec<(usize, Vec<f64>)>,
+    /// By how much the deviance would fall.
+    pub gain: f64,
+    /// Numbers that the gain costs.
+    pub cost: usize,
+    /// Cosine between its signature and what is left of the residual.
+    pub cosine: f64,
+    /// Its signal at the strongest that is met in practice, in sigmas, what baseline numbers can imitate taken out.
+    pub signal: f64,
+    /// Share of that signal's power that baseline numbers imitate.
+    pub imitated: f64,
+    /// Probability of such a gain by chance.
+    pub p: f64,
+}
+
+/// Below this projected signal the clips cannot show a candidate [sigma].
+pub const TESTABLE: f64 = 3.0;
+
+/// A gain in deviance that noise alone reaches with this probability is chance.
+pub const BY_CHANCE: f64 = 0.2;
+
+/// So many forms next to the best are remembered.
+const NEXT: usize = 3;
+
+/// Prior precision that keeps baseline numbers within their known ranges, added to a form's diagonal.
+pub fn hold_numbers(form: &mut DMatrix<f64>, columns: &[Column], library: &Library) {
+    for (k, column) in columns.iter().enumerate() {
+        if let Column::Number(number) = column {
+            let unknown = &library.unknowns[*number];
+            let spread = 0.5 * (unknown.upper - unknown.lower);
+            form[(k + 1, k + 1)] += spread.powi(-2);
+        }
+    }
+}
+
+/// Scores all candidates of a sweep on the sum of its clips' forms, best first.
+#[must_use]
+pub fn score(swept: &Swept, sum: &DMatrix<f64>, library: &Library) -> Vec<Scored> {
+    let mut form = sum.clone();
+    hold_numbers(&mut form, &swept.columns, library);
+    let place = |wanted: Column| swept.columns.iter().position(|column| *column == wanted).map(|at| at + 1);
+    let numbers: Vec<usize> = (swept.columns.iter().enumerate())
+        .filter(|(_, column)| matches!(column, Column::Number(_)))
+        .map(|(at, _)| at + 1)
+        .collect();
+    let left = eliminate(&form, &numbers);
+    let mut scored: Vec<Scored> = Vec::new();
+    for (candidate, info) in library.candidates.iter().enumerate() {
+        let forms = info.alternatives.iter().enumerate().filter_map(|(a, alternative)| {
+            let free: Vec<usize> =
+                (0..alternative.probes.len()).filter_map(|p| place(Column::Probe(candidate, a, p))).collect();
+            if free.len() != alternative.probes.len() {
+                return None;
+            }
+            let one_sided: Vec<bool> = alternative.probes.iter().map(|probe| probe.one_sided).collect();
+            let found = bounded_minimum(&left, &free, &one_sided);
+            let strongest = |form: &DMatrix<f64>| {
+                let largest = alternative.probes.iter().map(|probe| probe.largest);
+                free.iter().zip(largest).map(|(k, at)| at * at * form[(*k, *k)]).fold(0.0, f64::max)
+            };
+            let (power, beyond) = (strongest(&form), strongest(&left));
+            let (signal, imitated) = (beyond.sqrt(), (1.0 - beyond / power.max(f64::MIN_POSITIVE)).max(0.0));
+            let cost = free.len() + alternative.form.len().min(1);
+            let cosine = (found.gain.max(0.0) / left[(0, 0)].max(f64::MIN_POSITIVE)).sqrt().min(1.0);
+            let p = chance(found.gain, cost);
+            let (units, next, gain) = (found.at, Vec::new(), found.gain);
+            Some(Scored { candidate, alternative: a, units, next, gain, cost, cosine, signal, imitated, p })
+        });
+        let mut forms: Vec<Scored> = forms.collect();
+        forms.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+        let mut forms = forms.into_iter();
+        if let Some(best) = forms.next() {
+            let next = forms.take(NEXT).map(|form| (form.alternative, form.units)).collect();
+            scored.push(Scored { next, ..best });
+        }
+    }
+    scored.sort_by(|a, b| worth(b).total_cmp(&worth(a)));
+    scored
+}
+
+/// Gain less what its numbers gain from noise.
+fn worth(scored: &Scored) -> f64 {
+    scored.gain - 2.0 * scored.cost as f64
+}
+
+/// Probability that a chi-square of `freedom` exceeds `value` (Wilson and Hilferty 1931: its cube root is nearly normal).
+#[must_use]
+pub fn chance(value: f64, freedom: usize) -> f64 {
+    if value <= 0.0 {
+        return 1.0;
+    }
+    let k = freedom.max(1) as f64;
+    let spread = 2.0 / (9.0 * k);
+    let z = ((value / k).cbrt() - (1.0 - spread)) / spread.sqrt();
+    upper_tail(z)
+}
+
+/// Probability that a standard normal number exceeds `z` (Abramowitz and Stegun 26.2.17, error below 1e-7; beyond z = 6 the
+/// leading term of the asymptotic series).
+#[must_use]
+pub fn upper_tail(z: f64) -> f64 {
+    if z < 0.0 {
+        return 1.0 - upper_tail(-z);
+    }
+    let density = (-0.5 * z * z).exp() / std::f64::consts::TAU.sqrt();
+    if z > 6.0 {
+        return density / z;
+    }
+    let t = 1.0 / (1.0 + 0.231_641_9 * z);
+    let series = [0.319_381_530, -0.356_563_782, 1.781_477_937, -1.821_255_978, 1.330_274_429];
+    density * series.iter().rev().fold(0.0, |sum, c| (sum + c) * t)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn chances_agree_with_tables_of_the_chi_square() {
+        for (value, freedom, p) in [(3.841, 1, 0.05), (6.635, 1, 0.01), (14.067, 7, 0.05), (29.141, 14, 0.01)] {
+            let found = chance(value, freedom);
+            assert!((found / p - 1.0).abs() < 0.07, "{value} {freedom}: {found} instead of {p}");
+        }
+    }
+}

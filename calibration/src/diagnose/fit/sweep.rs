@@ -1,0 +1,332 @@
+//! All signatures at once: every clip linearised around one point by all free numbers, all numbers of its own, and all
+//! probes of all candidates that are not in the hypothesis yet.
+//!
+//! A column of a probe is the change of the residuals over one unit of it. Columns of numbers are slopes. What varies from
+//! clip to clip is eliminated with its prior ([`Swept::reduced`]), so that what remains is a quadratic form in the shared
+//! numbers and the probes' units alone.
+//!
+//! Numbers of different joints are turned in one simulation and told apart by the joint in which they show
+//! ([`Precision::Joints`]): a stiff controller leaves little of one joint in another. That costs a seventh of turning
+//! them one by one ([`Precision::Exact`]).
+
+use crate::diagnose::evidence::measured::{Evidence, Group, Reach};
+use crate::diagnose::evidence::scatter::Scatter;
+use crate::diagnose::evidence::scatter_scale::Around;
+use crate::diagnose::library::{Alternative, Library};
+use crate::estimate::Impossible;
+use crate::kept::numbers::matrix;
+use nalgebra::{Cholesky, DMatrix, DVector};
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+/// A column: a free number, or a probe.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Column {
+    /// A free number, by its index.
+    Number(usize),
+    /// A probe: candidate, alternative, probe.
+    Probe(usize, usize, usize),
+}
+
+/// How columns are taken.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Precision {
+    /// Joints together, each told by its own channels.
+    Joints,
+    /// One simulation for each column.
+    Exact,
+}
+
+/// One clip's residuals and columns, rows as in the evidence, not weighted.
+#[derive(Debug, Clone)]
+pub struct SweptClip {
+    /// Index of the clip.
+    pub clip: usize,
+    /// Column 0 the residuals, then [`Swept::columns`], then the clip's own numbers.
+    pub matrix: DMatrix<f64>,
+    /// The clip's own numbers there.
+    pub own: Vec<f64>,
+}
+
+/// All clips around one point.
+#[derive(Debug, Clone)]
+pub struct Swept {
+    /// What the columns are.
+    pub columns: Vec<Column>,
+    /// What varies from clip to clip.
+    pub scatter: Scatter,
+    /// Clips.
+    pub clips: Vec<SweptClip>,
+}
+
+/// One clip with its own numbers eliminated.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct Reduced {
+    /// Quadratic form over (residual, columns).
+    #[serde(with = "matrix")]
+    pub form: DMatrix<f64>,
+    /// Logarithm of the volume that the own numbers were integrated over; part of the deviance.
+    pub volume: f64,
+    /// The clip around its own numbers.
+    pub around: Around,
+}
+
+/// Where a sweep stands.
+pub struct Point<'a> {
+    /// All numbers.
+    pub full: &'a [f64],
+    /// Free numbers.
+    pub free: &'a [usize],
+    /// Candidates to probe.
+    pub probed: &'a [usize],
+    /// Clips, each with its own numbers.
+    pub clips: &'a [(usize, Vec<f64>)],
+    /// How columns are taken.
+    pub precision: Precision,
+}
+
+/// Columns that are taken in one simulation.
+type Batch = Vec<usize>;
+
+/// Linearises.
+///
+/// # Errors
+/// [`Impossible`] when the point itself has no answer, or `go_on` says no; it is told, before each simulation, which share of a
+/// clip's that is. A column without an answer counts as one that changes nothing.
+pub fn sweep(
+    evidence: &impl Evidence,
+    library: &Library,
+    point: &Point<'_>,
+    scatter: &Scatter,
+    go_on: &(impl Fn(f64) -> bool + Sync),
+) -> Result<Swept, Impossible> {
+    let mut columns: Vec<Column> = point.free.iter().map(|k| Column::Number(*k)).collect();
+    for candidate in point.probed {
+        for (a, alternative) in library.candidates[*candidate].alternatives.iter().enumerate() {
+            columns.extend((0..alternative.probes.len()).map(|p| Column::Probe(*candidate, a, p)));
+        }
+    }
+    let batches = batches(library, &columns, point.precision);
+    let one = |(clip, own): &(usize, Vec<f64>)| {
+        let work = Work { evidence, library, full: point.full, columns: &columns, batches: &batches, scatter, go_on };
+        work.clip(*clip, own)
+    };
+    let clips = point.clips.par_iter().map(one).collect::<Result<_, _>>()?;
+    Ok(Swept { columns, scatter: scatter.clone(), clips })
+}
+
+/// Neighbouring columns that belong to different joints and to one form go together.
+fn batches(library: &Library, columns: &[Column], precision: Precision) -> Vec<Batch> {
+    let mut batches: Vec<Batch> = Vec::new();
+    let form = |column: Column| match column {
+        Column::Number(_) => None,
+        Column::Probe(candidate, alternative, _) => Some((candidate, alternative)),
+    };
+    for (k, column) in columns.iter().enumerate() {
+        let joint = joint_of(library, *column);
+        let joins = precision == Precision::Joints
+            && joint.is_some()
+            && batches.last().is_some_and(|batch| {
+                batch.iter().all(|other| {
+                    let there = joint_of(library, columns[*other]);
+                    there.is_some() && there != joint && form(columns[*other]) == form(*column)
+                })
+            });
+        match batches.last_mut().filter(|_| joins) {
+            Some(batch) => batch.push(k),
+            None => batches.push(vec![k]),
+        }
+    }
+    batches
+}
+
+fn joint_of(library: &Library, column: Column) -> Option<usize> {
+    match column {
+        Column::Number(k) => library.joints[k],
+        Column::Probe(candidate, a, p) => {
+            library.joints[library.candidates[candidate].alternatives[a].probes[p].moves[0].0]
+        }
+    }
+}
+
+struct Work<'a, E, G> {
+    evidence: &'a E,
+    library: &'a Library,
+    full: &'a [f64],
+    columns: &'a [Column],
+    batches: &'a [Batch],
+    scatter: &'a Scatter,
+    go_on: &'a G,
+}
+
+impl<E: Evidence, G: Fn(f64) -> bool + Sync> Work<'_, E, G> {
+    fn clip(&self, clip: usize, own: &[f64]) -> Result<SweptClip, Impossible> {
+        let mut base = Vec::new();
+        self.evidence.residuals(clip, self.full, own, &mut base)?;
+        let share = 1.0 / self.batches.len().max(1) as f64;
+        let batch = |batch: &Batch| {
+            let goes_on = (self.go_on)(share);
+            if goes_on { Ok(self.batch(batch, clip, own, &base)) } else { Err(Impossible("cut short".into())) }
+        };
+        let shared: Vec<Vec<(usize, Vec<f64>)>> = self.batches.par_iter().map(batch).collect::<Result<_, _>>()?;
+        let owns: Vec<Vec<f64>> =
+            (0..self.scatter.count()).into_par_iter().map(|k| self.own(k, clip, own, &base)).collect();
+        let count = 1 + self.columns.len();
+        let mut matrix = DMatrix::zeros(base.len(), count + owns.len());
+        matrix.column_mut(0).copy_from_slice(&base);
+        for (k, column) in shared.iter().flatten() {
+            matrix.column_mut(k + 1).copy_from_slice(column);
+        }
+        for (k, column) in owns.iter().enumerate() {
+            matrix.column_mut(count + k).copy_from_slice(column);
+        }
+        Ok(SweptClip { clip, matrix, own: own.to_vec() })
+    }
+
+    /// The columns of a batch.
+    fn batch(&self, batch: &[usize], clip: usize, own: &[f64], base: &[f64]) -> Vec<(usize, Vec<f64>)> {
+        let mut numbers = self.full.to_vec();
+        let units: Vec<f64> = batch.iter().map(|k| self.turn(&mut numbers, self.columns[*k])).collect();
+        let mut out = Vec::with_capacity(base.len());
+        let reach = self.reach(batch, &numbers);
+        let answer = self.evidence.changed(clip, (&numbers, own), (reach, base), &mut out);
+        let answered = answer.is_ok() && out.len() == base.len();
+        if !answered {
+            return Vec::new();
+        }
+        let (rows, channels) = (self.evidence.rows(clip), self.evidence.channels());
+        let column = |(k, units): (&usize, &f64)| {
+            let joint = joint_of(self.library, self.columns[*k]).filter(|_| batch.len() > 1);
+            let slope = |((out, base), row): ((&f64, &f64), &crate::diagnose::evidence::measured::Row)| {
+                let channel = &channels[row.channel];
+                let foreign = joint.is_some_and(|joint| channel.joint != Some(joint));
+                // What the arm feels is not learned from contact: see `contact.rs`.
+                if foreign || (reach != Reach::Object && channel.group == Group::Contact) {
+                    0.0
+                } else {
+                    (out - base) / units
+                }
+            };
+            (*k, out.iter().zip(base).zip(rows).map(slope).collect())
+        };
+        batch.iter().zip(&units).map(column).collect()
+    }
+
+    /// What the columns of a batch can change; several joints at once are told apart by the arm alone.
+    fn reach(&self, batch: &[usize], numbers: &[f64]) -> Reach {
+        let number = |k: &usize| match self.columns[*k] {
+            Column::Number(k) => k,
+            Column::Probe(candidate, a, p) => self.library.candidates[candidate].alternatives[a].probes[p].moves[0].0,
+        };
+        match batch {
+            [_, _, ..] => Reach::Arm,
+            _ if !batch.iter().any(|k| self.library.arm_feels(number(k), numbers)) => Reach::Object,
+            _ => Reach::All,
+        }
+    }
+
+    /// Moves numbers one step along a column; by how many of its units.
+    fn turn(&self, numbers: &mut [f64], column: Column) -> f64 {
+        match column {
+            Column::Number(k) => {
+                let unknown = &self.library.unknowns[k];
+                let step = if unknown.upper - numbers[k] < unknown.step { -unknown.step } else { unknown.step };
+                numbers[k] += step;
+                step
+            }
+            Column::Probe(candidate, a, p) => {
+                let Alternative { form, probes } = &self.library.candidates[candidate].alternatives[a];
+                for (k, value) in form.iter().chain(&probes[p].moves) {
+                    numbers[*k] = *value;
+                }
+                1.0
+            }
+        }
+    }
+
+    /// The slope by a number of the clip's own.
+    fn own(&self, k: usize, clip: usize, own: &[f64], base: &[f64]) -> Vec<f64> {
+        if let Some(slope) = self.evidence.own_slope(clip, k) {
+            return slope.to_vec();
+        }
+        let effect = &self.scatter.random[k];
+        let (mut moved, mut out) = (own.to_vec(), Vec::new());
+        moved[k] += effect.step;
+        let changed = |out: &mut Vec<f64>| self.evidence.changed(clip, (self.full, &moved), (Reach::Object, base), out);
+        let turned = effect.sigma > 0.0 && changed(&mut out).is_ok();
+        if !turned || out.len() != base.len() {
+            return vec![0.0; base.len()];
+        }
+        out.iter().zip(base).map(|(out, base)| (out - base) / effect.step).collect()
+    }
+}
+
+impl Swept {
+    /// Each clip with channel weights and its own numbers eliminated.
+    #[must_use]
+    pub fn reduced(&self, evidence: &impl Evidence, weights: &[f64]) -> Vec<Reduced> {
+        self.clips.par_iter().map(|clip| self.reduce(clip, evidence, weights)).collect()
+    }
+
+    fn reduce(&self, clip: &SweptClip, evidence: &impl Evidence, weights: &[f64]) -> Reduced {
+        let gram = gram(clip, evidence, weights);
+        let kept = 1 + self.columns.len();
+        let outer = gram.view((0, 0), (kept, kept)).into_owned();
+        // The residual and the clip's own numbers, without the columns between them.
+        let of_clip = |k: usize| if k == 0 { 0 } else { self.columns.len() + k };
+        let alone = 1 + self.scatter.count();
+        let alone = DMatrix::from_fn(alone, alone, |i, k| gram[(of_clip(i), of_clip(k))]);
+        let around = Around { gram: alone, own: clip.own.clone() };
+        if self.scatter.count() == 0 {
+            return Reduced { form: outer, volume: 0.0, around };
+        }
+        let (inner, cross, precision) = self.own_part(clip, &gram);
+        let constant: f64 = precision.iter().zip(&clip.own).map(|(p, u)| p * u * u).sum();
+        let inner = Cholesky::new(inner).expect("a Gram matrix plus positive precisions is positive definite");
+        let mut form = outer - cross.tr_mul(&inner.solve(&cross));
+        form[(0, 0)] += constant;
+        let volume = inner.ln_determinant() - precision.iter().map(|p| p.ln()).sum::<f64>();
+        Reduced { form, volume: volume + self.scatter.correction(&clip.own), around }
+    }
+
+    fn own_part(&self, clip: &SweptClip, gram: &DMatrix<f64>) -> (DMatrix<f64>, DMatrix<f64>, Vec<f64>) {
+        let (kept, own) = (1 + self.columns.len(), self.scatter.count());
+        let mut inner = gram.view((kept, kept), (own, own)).into_owned();
+        let mut cross = gram.view((kept, 0), (own, kept)).into_owned();
+        let precision = self.scatter.precision(&clip.own);
+        for (k, precision) in precision.iter().enumerate() {
+            inner[(k, k)] += precision;
+            cross[(k, 0)] += precision * clip.own[k];
+        }
+        (inner, cross, precision)
+    }
+
+    /// A clip's own numbers at their best for coefficients of all columns.
+    #[must_use]
+    pub fn own_after(
+        &self,
+        clip: &SweptClip,
+        evidence: &impl Evidence,
+        weights: &[f64],
+        at: &DVector<f64>,
+    ) -> Vec<f64> {
+        if self.scatter.count() == 0 {
+            return Vec::new();
+        }
+        let (inner, cross, _) = self.own_part(clip, &gram(clip, evidence, weights));
+        let inner = Cholesky::new(inner).expect("a Gram matrix plus positive precisions is positive definite");
+        let step = inner.solve(&(cross * at.clone().insert_row(0, 1.0)));
+        clip.own.iter().zip(step.iter()).map(|(own, step)| own - step).collect()
+    }
+}
+
+/// Products of all columns of a clip, weighted.
+fn gram(clip: &SweptClip, evidence: &impl Evidence, weights: &[f64]) -> DMatrix<f64> {
+    let mut weighted = clip.matrix.clone();
+    let factors: Vec<f64> = evidence.rows(clip.clip).iter().map(|row| weights[row.channel]).collect();
+    for mut column in weighted.column_iter_mut() {
+        column.iter_mut().zip(&factors).for_each(|(value, factor)| *value *= factor);
+    }
+    // As a product of matrices: nalgebra's `tr_mul` takes one dot product after another, several times slower.
+    weighted.transpose() * weighted
+}

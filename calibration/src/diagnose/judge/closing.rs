@@ -1,0 +1,75 @@
+//! How much of the gap a fit closes when nothing of a clip's own is fitted.
+
+use super::gap::{Residuals, Typical};
+use super::remainder::Left;
+use crate::diagnose::clips::split::Split;
+use crate::diagnose::evidence::measured::{Evidence, Group};
+use crate::diagnose::fit::bench::{Bench, Hypothesis};
+
+/// A gap smaller than this, over its floor, is taken for this size.
+const LEAST_GAP: f64 = 1.2;
+/// A gap widened by less than this share is chance.
+const HARM: f64 = 0.1;
+
+/// How much of the way is gone between two hypotheses on all clips but those for confirming, of the group of sensors in which it is largest; 0
+/// where the gap widens on clips that were not fitted. `whole`: what the baseline leaves.
+#[must_use]
+pub fn closes<E: Evidence>(
+    bench: &Bench<'_, E>,
+    split: &Split,
+    whole: &[Typical],
+    hypotheses: [&Hypothesis; 2],
+) -> f64 {
+    let on = |clips: &[usize]| -> Option<Vec<f64>> {
+        let [before, after] = hypotheses.map(|hypothesis| Residuals::at(bench, hypothesis, clips));
+        let (before, after) = (before?, after?);
+        let left = Left::of_groups(&before.typical(), &after.typical());
+        let shares = left.iter().zip(whole).map(|(left, whole)| share(left, whole.mean_square));
+        let in_contact = before.typical_of(Group::Contact).zip(after.typical_of(Group::Contact));
+        let contact = in_contact.map(|(before, after)| way(before.mean_square, after.mean_square, before.floor));
+        Some(shares.chain(contact).collect())
+    };
+    let (Some(open), Some(choose)) = (on(&split.open()), on(split.elsewhere())) else { return 0.0 };
+    let harmless = |(_, choose): &(&f64, &f64)| **choose > -HARM;
+    open.iter().zip(&choose).filter(harmless).map(|(open, _)| *open).fold(0.0, f64::max)
+}
+
+/// How much of the way from the gap down to noise is gone, on a logarithmic scale.
+fn way(before: f64, after: f64, floor: f64) -> f64 {
+    (before / after).ln() / (before / floor).max(LEAST_GAP).ln()
+}
+
+/// The same of what is left of a gap. A real arm's gap lies so far above the noise that nobody comes down to it: there the plain
+/// share of the baseline's gap counts, where that is more.
+fn share(left: &Left, whole: f64) -> f64 {
+    let way = way(left.before, left.after, left.floor);
+    let beyond_numerics = left.before - left.floor > left.numerics;
+    if way > 0.0 && beyond_numerics && !left.of_object {
+        way.max((left.before - left.after) / (whole - left.floor))
+    } else {
+        way
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::remainder::{NUMERICS, SUBSTITUTE};
+    use super::*;
+
+    #[test]
+    fn far_above_the_noise_the_plain_share_of_the_whole_gap_counts() {
+        let left = |before, after| Left {
+            before,
+            after,
+            floor: 1.0,
+            numerics: NUMERICS,
+            substitute: SUBSTITUTE,
+            of_object: false,
+        };
+        assert!((share(&left(1e5, 2e4), 1e5) - 0.8).abs() < 1e-3, "four fifths, and 14 % of the way");
+        // A fifth of what a first effect left, itself a hundredth: of the whole next to nothing.
+        assert!(share(&left(1e3, 8e2), 1e5) < 0.05);
+        assert!((share(&left(1e3, 1.0), 1e5) - 1.0).abs() < 1e-9, "all the way down");
+        assert!(share(&left(2.0, 3.0), 2.0) < 0.0);
+    }
+}

@@ -1,0 +1,196 @@
+//! How sure a finding is: shares of the evidence among rivals, less what experience with simulated sessions takes off.
+
+use super::trial::{Step, Trial, net};
+use crate::diagnose::library::Library;
+use crate::estimate::interval::student;
+
+/// Rivals this close cannot be told apart [nats].
+const NEAR: f64 = 4.0;
+/// ... or within so many standard errors of their difference, were these known exactly.
+const CHANCE: f64 = 2.0;
+/// A rival closes at least this share of the gap that the chosen one closes, and of its way down to noise.
+const ALIKE: f64 = 0.5;
+/// What is kept for causes outside the library even where everything fits; from the simulated sessions on which this was
+/// measured: of named findings this share was wrong.
+const NONE_OF_THESE: f64 = 0.04;
+/// The largest probability of a candidate: its limit, whatever the clips say.
+pub const MOST: f64 = 1.0 - NONE_OF_THESE;
+/// Nats count less than they say: twins are never exact. The temperature that made shares agree with frequencies.
+const TEMPERATURE: f64 = 4.0;
+
+/// Probability of every candidate tried in a step that could be the cause, and what is left for none of them.
+#[must_use]
+pub fn probabilities(trials: &[Trial], none: bool) -> Vec<(usize, f64)> {
+    let fitted: Vec<(usize, f64)> = (trials.iter())
+        .filter(|trial| trial.is_cause() && !trials.iter().any(|other| other.is_cause() && trial.is_outdone_by(other)))
+        .filter_map(|trial| trial.fitted.as_ref().map(|(_, a)| (trial.scored.candidate, net(a, trial.scored.cost))))
+        .collect();
+    let best = fitted.iter().map(|(_, worth)| *worth).fold(0.0, f64::max);
+    let weight = |worth: f64| ((worth - best) / TEMPERATURE).exp();
+    let nothing = if none { 1.0 / NONE_OF_THESE } else { weight(0.0) };
+    let total: f64 = fitted.iter().map(|(_, worth)| weight(*worth)).sum::<f64>() + nothing;
+    fitted.iter().map(|(candidate, worth)| (*candidate, MOST * weight(*worth) / total)).collect()
+}
+
+/// Candidates of a step that explain it as well as the chosen one: whose gains, clip by clip, are not less beyond chance, and
+/// that close as much of the gap; with more numbers than the chosen one, markedly more of it. Of one that is known to look alike
+/// it is enough that it closes a cause's share: how much any of the two closes depends on how far their fits have come.
+/// Differences count `overdispersion` times less.
+#[must_use]
+pub fn rivals(step: &Step, library: &Library, chosen: usize, overdispersion: f64) -> Vec<usize> {
+    let of = |candidate: usize| {
+        let trial = step.trials.iter().find(|trial| trial.scored.candidate == candidate)?;
+        trial.fitted.as_ref().map(|(_, advantage)| (advantage, trial))
+    };
+    let Some((best, chosen_trial)) = of(chosen) else { return Vec::new() };
+    let near = |candidate: &usize| {
+        let Some((other, trial)) = of(*candidate).filter(|_| *candidate != chosen) else { return false };
+        let (beyond, error) = best.beyond(other);
+        let (beyond, error) = (beyond / overdispersion, error / overdispersion);
+        let alike = alike(beyond, error, best.clips()) && other.nats > other.error;
+        let dearer = trial.scored.cost > chosen_trial.scored.cost;
+        let enough = match dearer {
+            true => trial.closes_more_than(chosen_trial),
+            false if library.look_alike(*candidate, chosen) => trial.is_cause(),
+            false => trial.closes > ALIKE * chosen_trial.closes,
+        };
+        alike && enough && comes_as_near(trial, chosen_trial, step.from.deviance())
+    };
+    step.trials.iter().map(|trial| trial.scored.candidate).filter(near).collect()
+}
+
+/// Whether a rival's fit goes as much of the way from what clips cost without it to what they cost with the chosen one, on a
+/// logarithmic scale: an effect after which next to nothing is left of an arm's gap has no equal in one that leaves most of it, however
+/// much single clips differ. Where clips have numbers of their own, these hide it, and it is not asked.
+fn comes_as_near(rival: &Trial, chosen: &Trial, without: f64) -> bool {
+    let way = |trial: &Trial| trial.fitted.as_ref().map_or(0.0, |(fit, _)| (without / fit.deviance()).ln());
+    rival.own_numbers || way(rival) > ALIKE * way(chosen)
+}
+
+/// Whether an advantage over a rival could be chance.
+#[must_use]
+pub fn alike(beyond: f64, error: f64, clips: usize) -> bool {
+    beyond < NEAR.max(chance(clips) * error)
+}
+
+/// [`CHANCE`] where the error is itself told from so few clips: the quantile of Student's distribution at the same
+/// probability.
+fn chance(clips: usize) -> f64 {
+    student(CHANCE, clips.saturating_sub(1))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::score::Predicted;
+    use super::*;
+    use crate::diagnose::clips::ground::Ground;
+    use crate::diagnose::evidence::scatter_scale::Around;
+    use crate::diagnose::fit::bench::{FittedClip, Hypothesis};
+    use crate::diagnose::fit::shortlist::Scored;
+    use crate::diagnose::fit::sweep::Reduced;
+    use crate::diagnose::test_bench::shipped;
+    use crate::forward::setting;
+    use nalgebra::DMatrix;
+    use shared_mem::msg::MAX_JOINTS;
+
+    fn trial(candidate: usize, nats: f64, closes: f64) -> Trial {
+        let predicted =
+            |gain: f64| Predicted { clips: (0..12).map(|clip| (clip, 1000.0 - 2.0 * gain / 12.0)).collect() };
+        let (units, next) = (vec![1.0], Vec::new());
+        let scored = Scored {
+            candidate,
+            alternative: 0,
+            units,
+            next,
+            gain: 2.0 * nats,
+            cost: 1,
+            cosine: 0.5,
+            signal: 30.0,
+            imitated: 0.1,
+            p: 0.0,
+        };
+        let fit = Hypothesis { effects: vec![candidate], full: Vec::new(), free: Vec::new(), fitted: Vec::new() };
+        Trial { scored, fitted: Some((fit, predicted(nats).over(&predicted(0.0)))), closes, own_numbers: true }
+    }
+
+    #[test]
+    fn a_candidate_that_closes_nothing_takes_no_probability_however_well_it_predicts() {
+        let sure = |trials: &[Trial]| {
+            let all = probabilities(trials, false);
+            all.iter().find(|(candidate, _)| *candidate == 0).map_or(0.0, |(_, p)| *p)
+        };
+        let cause = trial(0, 100.0, 0.4);
+        assert!((sure(&[cause.clone(), trial(1, 150.0, 0.05)]) - (1.0 - NONE_OF_THESE)).abs() < 1e-6);
+        assert!(sure(&[cause.clone(), trial(1, 150.0, 0.4)]) < 0.1, "one that closes as much does");
+        let mut dearer = trial(1, 103.0, 0.41);
+        dearer.scored.cost = 8;
+        assert!(
+            (sure(&[cause.clone(), dearer.clone()]) - (1.0 - NONE_OF_THESE)).abs() < 1e-6,
+            "one with more numbers does not"
+        );
+        // ... unless it closes markedly more, where own numbers of clips could hide that from the likelihood.
+        dearer.closes = 0.5;
+        assert!(sure(&[cause.clone(), dearer.clone()]) < 0.6, "one that closes markedly more does");
+        dearer.own_numbers = false;
+        assert!((sure(&[cause, dearer]) - (1.0 - NONE_OF_THESE)).abs() < 1e-6);
+    }
+
+    #[test]
+    fn what_is_known_to_look_alike_is_a_rival_however_much_less_its_fit_closes() {
+        let cell = shipped();
+        let base = setting::complete(&cell, None).expect("a cell");
+        let ground = Ground { middle: [0.5, 0.0], spread: 0.1 };
+        let library = Library::new(&cell, &base, Some(&ground), &[87.0; MAX_JOINTS]);
+        let named = |name| library.find(name).expect("a candidate");
+        let [tool, camera, friction] = ["tool_offset", "camera_extrinsic_translation", "table_tilt"].map(named);
+        // On every other clip the second predicts better, so that the difference is within chance.
+        let as_good = |candidate, closes| {
+            let mut other = trial(candidate, 1500.0, closes);
+            let gain = |clip: usize| if clip.is_multiple_of(2) { 85.0 } else { 165.0 };
+            let predicted = |gain: &dyn Fn(usize) -> f64| Predicted {
+                clips: (0..12).map(|c| (c, 1000.0 - 2.0 * gain(c))).collect(),
+            };
+            if let Some((_, advantage)) = &mut other.fitted {
+                *advantage = predicted(&gain).over(&predicted(&|_| 0.0));
+            }
+            other
+        };
+        let trials = vec![trial(tool, 1530.0, 0.5), as_good(camera, 0.15), as_good(friction, 0.15)];
+        let step = Step {
+            from: trials[0].fitted.as_ref().expect("it is").0.clone(),
+            predicted: Predicted { clips: Vec::new() },
+            trials,
+            weights: Vec::new(),
+            arm_rows: 0,
+            left: Vec::new(),
+            whole: Vec::new(),
+        };
+        assert_eq!(rivals(&step, &library, tool, 1.0), [camera]);
+    }
+
+    #[test]
+    fn what_leaves_most_of_an_arm_s_gap_is_no_equal_of_what_leaves_next_to_nothing() {
+        let leaves = |deviance: f64, own_numbers| {
+            let around = Around { gram: DMatrix::zeros(1, 1), own: Vec::new() };
+            let reduced = Reduced { form: DMatrix::from_element(1, 1, deviance), volume: 0.0, around };
+            let mut leaves = trial(0, 100.0, 0.9);
+            leaves.own_numbers = own_numbers;
+            if let Some((fit, _)) = &mut leaves.fitted {
+                fit.fitted = vec![FittedClip { clip: 0, own: Vec::new(), reduced }];
+            }
+            leaves
+        };
+        let all_but_noise = leaves(1e3, false);
+        assert!(!comes_as_near(&leaves(4e5, false), &all_but_noise, 1e6), "60 % of the gap, a seventh of the way");
+        assert!(comes_as_near(&leaves(5e3, false), &all_but_noise, 1e6));
+        assert!(comes_as_near(&leaves(4e5, true), &all_but_noise, 1e6), "own numbers of clips may hide it");
+    }
+
+    #[test]
+    fn few_clips_must_differ_by_more() {
+        // Quantiles of Student's distribution at 0.977250, from tables.
+        for (clips, quantile) in [(3, 4.527), (6, 2.649), (12, 2.255), (1000, 2.003)] {
+            assert!((chance(clips) / quantile - 1.0).abs() < 0.04, "{clips}: {}", chance(clips));
+        }
+    }
+}

@@ -1,0 +1,105 @@
+//! What the clips kept for confirming say about what was found: whether they speak for it, and how far the gap shrinks there.
+//!
+//! They speak for it where they are predicted better, and where in a clip like most a real part of the gap closes. An object that
+//! meets a corner, or misses it, ends elsewhere by more than any cause explains. So how far its path shrinks in the mean of
+//! squares is a matter of single clips; the likelihood knows how far objects deviate, and what the joints in contact show.
+
+use super::gap::{Residuals, Shrunk};
+use super::held_out::Fits;
+use super::remainder::{self, Left};
+use super::score::{Advantage, predict_unseen};
+use super::trial::CLOSES;
+use crate::diagnose::evidence::measured::{Evidence, Group};
+use crate::diagnose::fit::bench::Bench;
+
+/// What they say.
+pub(in crate::diagnose) struct Confirmation {
+    /// Whether they speak for it.
+    pub(in crate::diagnose) holds: bool,
+    /// How far the gap shrinks.
+    pub(in crate::diagnose) shrink: Shrunk,
+}
+
+/// Compares the baseline and what was found, each with what it leaves on the clips kept for confirming; `weights` of the channels in
+/// the step in which the search began. `None` where the twin has no answer.
+pub(in crate::diagnose) fn confirm<E: Evidence>(
+    bench: &Bench<'_, E>,
+    weights: &[f64],
+    [without, with]: [(&Fits, &Residuals); 2],
+    seed: u64,
+) -> Option<Confirmation> {
+    let [before, after] = [without, with].map(|(fits, _)| predict_unseen(bench, fits, weights));
+    let advantage = after?.over(&before?);
+    let shrink = shrunk([without.1, with.1], &advantage, seed);
+    Some(Confirmation { holds: speaks_for(&advantage, &shrink, mean([without.1, with.1])), shrink })
+}
+
+/// How far the gap shrinks.
+pub(in crate::diagnose) fn shrunk([before, after]: [&Residuals; 2], advantage: &Advantage, seed: u64) -> Shrunk {
+    Shrunk {
+        mean: after.shrink(before, seed).value,
+        usual: usual(before, after),
+        contact: contact(before, after),
+        clips: after.clips_that_shrink(before),
+        better: advantage.better(),
+    }
+}
+
+/// Whether they speak for it: more of them are predicted better than worse, and in sum they are, and enough of the gap closes: in the
+/// mean of squares, or in a clip like most.
+fn speaks_for(advantage: &Advantage, shrink: &Shrunk, mean: f64) -> bool {
+    let [better, all] = shrink.better;
+    2 * better > all && advantage.nats > 0.0 && mean.max(shrink.usual).max(shrink.contact) > CLOSES
+}
+
+fn mean([before, after]: [&Residuals; 2]) -> f64 {
+    remainder::explained(before.mean_square(), after.mean_square(), before.floor())
+}
+
+/// The share that is explained of what is not noise in a clip like most, in the group of sensors of which that is most.
+fn usual(before: &Residuals, after: &Residuals) -> f64 {
+    Left::of_groups(&before.typical(), &after.typical()).iter().map(Left::explained).fold(0.0, f64::max)
+}
+
+/// The same of the joints in contact; 0 where no tool touches anything.
+fn contact(before: &Residuals, after: &Residuals) -> f64 {
+    let [before, after] = [before, after].map(|left| left.typical_of(Group::Contact));
+    before
+        .zip(after)
+        .map_or(0.0, |(before, after)| remainder::explained(before.mean_square, after.mean_square, before.floor))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::score::Predicted;
+    use super::*;
+
+    /// What four clips gain by being predicted with what was found [nats].
+    fn gains(gains: [f64; 4]) -> Advantage {
+        let predicted = |gains: [f64; 4]| {
+            let clips = gains.iter().enumerate().map(|(clip, gain)| (clip, 4000.0 - 2.0 * gain)).collect();
+            Predicted { clips }
+        };
+        predicted(gains).over(&predicted([0.0; 4]))
+    }
+
+    fn shrink(usual: f64, contact: f64, advantage: &Advantage) -> Shrunk {
+        Shrunk { mean: -1.0, usual, contact, clips: [2, 4], better: advantage.better() }
+    }
+
+    #[test]
+    fn clips_that_are_predicted_better_confirm_although_the_object_of_one_goes_another_way() {
+        let all = gains([98.0, 133.0, 31.0, 50.0]);
+        assert!(speaks_for(&all, &shrink(0.0, 0.9, &all), -1.0), "the joints in contact close");
+        assert!(speaks_for(&all, &shrink(0.6, 0.0, &all), -1.0), "a clip like most does");
+        assert!(!speaks_for(&all, &shrink(0.05, 0.02, &all), -1.0), "nothing closes");
+    }
+
+    #[test]
+    fn clips_that_are_predicted_worse_do_not_confirm_however_much_closes() {
+        let half = gains([98.0, 133.0, -31.0, -50.0]);
+        assert!(!speaks_for(&half, &shrink(0.9, 0.9, &half), 0.9));
+        let in_sum = gains([2.0, 3.0, 1.0, -400.0]);
+        assert!(in_sum.better() == [3, 4] && !speaks_for(&in_sum, &shrink(0.9, 0.9, &in_sum), 0.9), "{in_sum:?}");
+    }
+}

@@ -1,0 +1,66 @@
+//! Whether the friction drifts from clip to clip over a session, as on a table that wears or gets dirty.
+//!
+//! Clips scatter in friction anyway, so that a twin may follow each of them; but chance knows no order. A straight line
+//! through the logarithm of their friction, in the order in which they were recorded, tells (Student's t of its slope), if it
+//! leads further than clips scatter.
+
+use crate::diagnose::evidence::scatter::Scatter;
+use crate::diagnose::fit::bench::Hypothesis;
+use crate::estimate::interval::student;
+use crate::forward::object::Own;
+
+/// A slope of so many sigmas of a normal distribution, or as unlikely a one of few clips, is no chance: p = 0.02.
+const NO_CHANCE: f64 = 2.33;
+/// ... and over the session the friction changes by so many sigmas of its scatter from clip to clip.
+const LEAST: f64 = 6.0;
+/// A line through fewer clips tells nothing.
+const FEWEST: usize = 5;
+
+/// How much the friction of the last clip is over that of the first, less 1; `None` where it does not drift.
+#[must_use]
+pub fn of_friction(scatter: &Scatter, hypothesis: &Hypothesis) -> Option<f64> {
+    let name = Own::LnFriction.name();
+    let number = scatter.random.iter().position(|random| random.name == name)?;
+    let points: Vec<(f64, f64)> =
+        hypothesis.fitted.iter().map(|fitted| (fitted.clip as f64, fitted.own[number])).collect();
+    let change = trend(&points)?;
+    (change.abs() > LEAST * scatter.random[number].sigma).then(|| change.exp_m1())
+}
+
+/// By how much the line through points rises from the first to the last, where its slope is no chance.
+fn trend(points: &[(f64, f64)]) -> Option<f64> {
+    let count = points.len();
+    if count < FEWEST {
+        return None;
+    }
+    let mean = |of: fn(&(f64, f64)) -> f64| points.iter().map(of).sum::<f64>() / count as f64;
+    let (x, y) = (mean(|p| p.0), mean(|p| p.1));
+    let moment = |of: &dyn Fn(f64, f64) -> f64| points.iter().map(|p| of(p.0 - x, p.1 - y)).sum::<f64>();
+    let (xx, xy, yy) = (moment(&|dx, _| dx * dx), moment(&|dx, dy| dx * dy), moment(&|_, dy| dy * dy));
+    let (slope, degrees) = (xy / xx, count - 2);
+    let error = ((yy - slope * xy).max(0.0) / degrees as f64 / xx).sqrt();
+    let span = points.last()?.0 - points.first()?.0;
+    (slope.abs() > student(NO_CHANCE, degrees) * error).then_some(slope * span)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Scatter of 0.02 without order, on eight clips, with a rise on top.
+    fn clips(rise: f64) -> Vec<(f64, f64)> {
+        let scatter = [0.013, -0.022, 0.005, 0.031, -0.018, 0.009, -0.027, 0.016];
+        scatter.iter().enumerate().map(|(k, own)| (2.0 * k as f64, own + rise * k as f64 / 7.0)).collect()
+    }
+
+    #[test]
+    fn a_rise_is_told_from_scatter() {
+        assert_eq!(trend(&clips(0.0)), None);
+        assert_eq!(trend(&clips(0.02)), None, "as much as chance makes of such a scatter");
+        for rise in [0.4, -0.3] {
+            let found = trend(&clips(rise)).expect("a trend");
+            assert!((found - rise).abs() < 0.05, "{found}");
+        }
+        assert_eq!(trend(&clips(0.4)[..4]), None, "too few");
+    }
+}

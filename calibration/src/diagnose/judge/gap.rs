@@ -1,0 +1,275 @@
+//! The gap: mean square of residuals in sigmas of the sensors, and by how much it shrinks from one hypothesis to another.
+
+use crate::diagnose::answer::Share;
+use crate::diagnose::evidence::measured::{Evidence, Group};
+use crate::diagnose::fit::bench::{Bench, Hypothesis};
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64;
+use rayon::prelude::*;
+
+/// Residuals of clips as the twin alone predicts them, not weighted: what a clip has of its own is not fitted, it is part
+/// of the floor.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Residuals {
+    /// Clip and residuals.
+    pub clips: Vec<(usize, Vec<f64>)>,
+    /// For each clip and group of sensors (arm, object, arm in contact) the sum of squares and the number of residuals.
+    sums: Vec<Vec<(f64, f64)>>,
+    /// The same of every piece of a clip: whole clips where there are enough of them.
+    pieces: Vec<Vec<(f64, f64)>>,
+    /// The same of what noise and the scatter between clips alone would leave.
+    floors: Vec<Vec<(f64, f64)>>,
+}
+
+/// How far the gap shrinks on held-out clips.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Shrunk {
+    /// Of the mean squared residual, see [`Residuals::shrink`].
+    pub mean: f64,
+    /// Of what is not noise in a clip like most, see [`super::remainder::Left::explained`].
+    pub usual: f64,
+    /// The same of the joints in contact; 0 where no tool touches anything.
+    pub contact: f64,
+    /// In how many clips it does, and of how many.
+    pub clips: [usize; 2],
+    /// How many clips are predicted better, and of how many.
+    pub better: [usize; 2],
+}
+
+/// A group of sensors in a clip like most.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Typical {
+    /// Geometric mean over clips of the mean square of the residuals.
+    pub mean_square: f64,
+    /// What noise and the scatter between clips alone would leave of it.
+    pub floor: f64,
+    /// Whether it is the object's group; else the arm's.
+    pub of_object: bool,
+}
+
+/// The groups whose gap is said. The arm in contact is evidence for causes, and no gap of its own: how far a joint yields
+/// to a push says how the object resists.
+const SAID: [Group; 2] = [Group::Arm, Group::Object];
+
+/// Place of a group's sums.
+fn place(group: Group) -> usize {
+    match group {
+        Group::Arm => 0,
+        Group::Object => 1,
+        Group::Contact => 2,
+    }
+}
+
+impl Residuals {
+    /// Of clips at the numbers of a hypothesis.
+    #[must_use]
+    pub fn at<E: Evidence>(bench: &Bench<'_, E>, hypothesis: &Hypothesis, clips: &[usize]) -> Option<Self> {
+        Self::each(bench, &clips.iter().map(|clip| (*clip, &hypothesis.full[..])).collect::<Vec<_>>())
+    }
+
+    /// Of clips that were not fitted, each at its own numbers.
+    #[must_use]
+    pub fn of<E: Evidence>(bench: &Bench<'_, E>, fits: &[(Hypothesis, Vec<usize>)]) -> Option<Self> {
+        let clips = fits.iter().flat_map(|(fit, clips)| clips.iter().map(|clip| (*clip, &fit.full[..])));
+        Self::each(bench, &clips.collect::<Vec<_>>())
+    }
+
+    fn each<E: Evidence>(bench: &Bench<'_, E>, clips: &[(usize, &[f64])]) -> Option<Self> {
+        let nothing = vec![0.0; bench.scatter.count()];
+        let one = |(clip, full): &(usize, &[f64])| {
+            let mut out = Vec::new();
+            bench.evidence.residuals(*clip, full, &nothing, &mut out).ok()?;
+            Some((*clip, out))
+        };
+        let clips: Vec<(usize, Vec<f64>)> = clips.par_iter().map(one).collect::<Option<_>>()?;
+        let cut = DRAWN_FROM.div_ceil(clips.len().max(1));
+        let in_pieces = |(clip, residuals): &(usize, Vec<f64>)| pieces(bench.evidence, *clip, residuals, cut);
+        let pieces = clips.iter().flat_map(in_pieces).collect();
+        let sums = clips.iter().map(|(clip, residuals)| sums(bench.evidence, *clip, residuals)).collect();
+        let floors = clips.iter().map(|(clip, _)| sums_of_noise(bench, *clip)).collect();
+        Some(Self { clips, sums, pieces, floors })
+    }
+
+    /// What noise and the scatter between clips alone would leave of [`Self::mean_square`].
+    #[must_use]
+    pub fn floor(&self) -> f64 {
+        mean(&self.floors, &(0..self.clips.len()).collect::<Vec<_>>())
+    }
+
+    /// Of every group of sensors, the geometric mean over clips of their mean squares: one stroke that went its own way
+    /// decides little, and a cause that shows in some clips only is seen.
+    #[must_use]
+    pub fn typical(&self) -> Vec<Typical> {
+        SAID.into_iter().filter_map(|group| self.typical_of(group)).collect()
+    }
+
+    /// The same of one group; `None` where no clip has any of it.
+    #[must_use]
+    pub fn typical_of(&self, group: Group) -> Option<Typical> {
+        let usual = |sums: &[Vec<(f64, f64)>]| {
+            let of_group = sums.iter().filter_map(|clip| clip.get(place(group)));
+            let values: Vec<f64> = of_group.filter(|(_, count)| *count > 0.0).map(|(sum, count)| sum / count).collect();
+            let logarithms = values.iter().map(|value| value.max(f64::MIN_POSITIVE).ln());
+            (!values.is_empty()).then(|| (logarithms.sum::<f64>() / values.len() as f64).exp())
+        };
+        let (mean_square, floor) = (usual(&self.sums)?, usual(&self.floors)?);
+        Some(Typical { mean_square, floor, of_object: group == Group::Object })
+    }
+
+    /// Mean square: the mean over the groups of sensors, so that a thousand encoder rows do not drown the object.
+    #[must_use]
+    pub fn mean_square(&self) -> f64 {
+        mean(&self.sums, &(0..self.clips.len()).collect::<Vec<_>>())
+    }
+
+    /// In how many clips the mean square is smaller than `before`, and how many clips there are.
+    #[must_use]
+    pub fn clips_that_shrink(&self, before: &Self) -> [usize; 2] {
+        let falls = |clip: &usize| mean(&self.sums, &[*clip]) < mean(&before.sums, &[*clip]);
+        [(0..self.clips.len()).filter(falls).count(), self.clips.len()]
+    }
+
+    /// The shrink `1 - after / before` of the mean square from `before` to this, with an interval from drawing clips anew,
+    /// or pieces of them where there are few.
+    #[must_use]
+    pub fn shrink(&self, before: &Self, seed: u64) -> Share {
+        self.shrink_added(before, before, seed)
+    }
+
+    /// What a step from `from` to this adds to the shrink: `(from - after) / before`. Steps that follow each other add up to
+    /// the shrink of the whole. At least [`DOUBLED`].
+    #[must_use]
+    pub fn shrink_added(&self, from: &Self, before: &Self, seed: u64) -> Share {
+        let of = |drawn: &[usize]| {
+            let [from, after, before] = [from, self, before].map(|residuals| mean(&residuals.pieces, drawn));
+            ((from - after) / before.max(f64::MIN_POSITIVE)).max(DOUBLED)
+        };
+        let all: Vec<usize> = (0..self.pieces.len()).collect();
+        let mut rng = Pcg64::seed_from_u64(seed);
+        let mut drawn: Vec<f64> =
+            (0..DRAWS).map(|_| of(&all.iter().map(|_| rng.random_range(0..all.len())).collect::<Vec<_>>())).collect();
+        drawn.sort_unstable_by(f64::total_cmp);
+        Share { value: of(&all), ci90: [drawn[DRAWS / 20], drawn[DRAWS - 1 - DRAWS / 20]] }
+    }
+}
+
+/// The share by which a gap shrinks that becomes twice as large. Numbers that fit some clips may be anything in others, up
+/// to an arm that swings without end: beyond twice the gap the share tells how soon a simulation was given up, not how
+/// wrong the numbers are.
+pub const DOUBLED: f64 = -1.0;
+
+/// Draws of the bootstrap.
+const DRAWS: usize = 1000;
+
+/// It draws from at least so many pieces: from fewer an interval is far too narrow.
+const DRAWN_FROM: usize = 8;
+
+fn sums(evidence: &impl Evidence, clip: usize, residuals: &[f64]) -> Vec<(f64, f64)> {
+    pieces(evidence, clip, residuals, 1).swap_remove(0)
+}
+
+/// Sums of a clip cut into so many pieces of the same duration.
+fn pieces(evidence: &impl Evidence, clip: usize, residuals: &[f64], cut: usize) -> Vec<Vec<(f64, f64)>> {
+    let rows = evidence.rows(clip);
+    let last = rows.iter().map(|row| row.time).fold(f64::MIN_POSITIVE, f64::max);
+    let mut pieces = vec![vec![(0.0, 0.0); 3]; cut];
+    for (row, residual) in rows.iter().zip(residuals) {
+        let piece = ((row.time / last * cut as f64) as usize).min(cut - 1);
+        let group = &mut pieces[piece][place(evidence.channels()[row.channel].group)];
+        *group = (group.0 + residual * residual, group.1 + 1.0);
+    }
+    pieces
+}
+
+/// The sums that noise of one sigma and own numbers that scatter as assumed would give.
+fn sums_of_noise<E: Evidence>(bench: &Bench<'_, E>, clip: usize) -> Vec<(f64, f64)> {
+    let rows = bench.evidence.rows(clip);
+    let mut squares = vec![1.0; rows.len()];
+    for (k, random) in bench.scatter.random.iter().enumerate() {
+        let slopes = bench.evidence.own_slope(clip, k).unwrap_or_default();
+        squares.iter_mut().zip(slopes).for_each(|(square, slope)| *square += (slope * random.sigma).powi(2));
+    }
+    sums(bench.evidence, clip, &squares.into_iter().map(f64::sqrt).collect::<Vec<_>>())
+}
+
+fn group_means(sums: &[Vec<(f64, f64)>], drawn: &[usize]) -> Vec<f64> {
+    let of = |group: Group| {
+        let of_clip = |k: &usize| sums[*k][place(group)];
+        let add = |(sum, count): (f64, f64), (more, rows): (f64, f64)| (sum + more, count + rows);
+        let (sum, count) = drawn.iter().map(of_clip).fold((0.0, 0.0), add);
+        (count > 0.0).then(|| sum / count)
+    };
+    SAID.into_iter().filter_map(of).collect()
+}
+
+fn mean(sums: &[Vec<(f64, f64)>], drawn: &[usize]) -> f64 {
+    let means = group_means(sums, drawn);
+    means.iter().sum::<f64>() / means.len().max(1) as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::benchmark::world::Kind;
+    use crate::diagnose::library::Library;
+    use crate::diagnose::test_bench::{ONCE, on_bench, shipped, truth, with_effect};
+    use crate::forward::setting;
+    use shared_mem::msg::MAX_JOINTS;
+
+    fn residuals(sizes: &[f64]) -> Residuals {
+        let clips = sizes.iter().enumerate().map(|(clip, size)| (clip, vec![*size; 10])).collect();
+        let sums = |size: &f64| vec![(10.0 * size * size, 10.0), (0.0, 0.0), (0.0, 0.0)];
+        let floors = sizes.iter().map(|_| sums(&1.0)).collect();
+        let sums: Vec<_> = sizes.iter().map(sums).collect();
+        Residuals { clips, pieces: sums.clone(), sums, floors }
+    }
+
+    #[test]
+    fn one_clip_that_went_its_own_way_does_not_make_the_typical_one() {
+        let [typical] = residuals(&[1.0, 1.0, 1.0, 30.0]).typical()[..] else { panic!("one group") };
+        assert!((typical.mean_square - 30f64.sqrt()).abs() < 1e-9 && typical.floor == 1.0, "{typical:?}");
+    }
+
+    #[test]
+    fn clips_are_counted_in_which_the_gap_shrinks() {
+        assert_eq!(residuals(&[1.0, 1.9, 9.0]).clips_that_shrink(&residuals(&[2.0; 3])), [2, 3]);
+    }
+
+    #[test]
+    fn a_fit_that_flies_apart_in_other_clips_doubles_the_gap_and_no_more() {
+        let shrink = residuals(&[1e53, 1.0, 1.0, 1.0]).shrink(&residuals(&[2.0; 4]), 1);
+        assert_eq!((shrink.value, shrink.ci90[0]), (DOUBLED, DOUBLED));
+        assert!(shrink.ci90[1] <= 0.75, "{shrink:?}");
+    }
+
+    #[test]
+    fn the_shrink_of_a_single_clip_has_an_interval() {
+        let (cell, base) = (shipped(), setting::complete(&shipped(), None).expect("a cell"));
+        let world = with_effect("command_delay", 3, Kind::Excitation, &cell);
+        let library = Library::new(&cell, &base, None, &[87.0; MAX_JOINTS]);
+        on_bench((&cell, &world), &library, |bench, even| {
+            let [baseline, found] = [library.start(), truth(&library, &world)]
+                .map(|full| bench.fit((&[], full), &[0], even, None, ONCE).expect("a fit"));
+            let [before, after] =
+                [baseline, found].map(|fit| Residuals::at(bench, &fit, &[1]).expect("it can be simulated"));
+            let shrink = after.shrink(&before, 1);
+            assert!(before.pieces.len() == DRAWN_FROM, "{} pieces", before.pieces.len());
+            assert!(shrink.ci90[0] < shrink.value && shrink.value < shrink.ci90[1], "{shrink:?}");
+        });
+    }
+
+    #[test]
+    fn the_shrink_is_one_less_the_ratio_of_mean_squares_and_lies_in_its_interval() {
+        let shrink = residuals(&[1.0, 1.0, 1.2, 0.9]).shrink(&residuals(&[2.0, 2.1, 2.2, 1.9]), 1);
+        assert!((shrink.value - (1.0 - (1.0 + 1.0 + 1.44 + 0.81) / (4.0 + 4.41 + 4.84 + 3.61))).abs() < 1e-12);
+        assert!(shrink.ci90[0] < shrink.value && shrink.value < shrink.ci90[1], "{shrink:?}");
+        assert!(shrink.ci90[1] - shrink.ci90[0] < 0.1, "{shrink:?}");
+    }
+
+    #[test]
+    fn what_steps_add_to_the_shrink_sums_to_the_shrink_of_the_whole() {
+        let [before, between, after] = [[3.0, 4.0], [2.0, 3.0], [1.0, 1.5]].map(|sizes| residuals(&sizes));
+        let steps = between.shrink_added(&before, &before, 1).value + after.shrink_added(&between, &before, 1).value;
+        assert!((steps - after.shrink(&before, 1).value).abs() < 1e-12, "{steps}");
+    }
+}

@@ -1,0 +1,70 @@
+//! Numbers for clips that they were not fitted to. Clips kept for confirming are seen by no fit at all; where there are too few
+//! commands to keep any, every command is left out of a fit of its own in turn, and judged by that.
+
+use super::gap::Residuals;
+use crate::diagnose::clips::split::Split;
+use crate::diagnose::evidence::measured::Evidence;
+use crate::diagnose::fit::bench::{Bench, Hypothesis};
+use crate::diagnose::fit::effort::Effort;
+use crate::diagnose::fit::sweep::Precision;
+
+/// Enough for a fit that begins where all clips together have it.
+const EFFORT: Effort = Effort::of(8, Precision::Joints);
+
+/// A hypothesis for every clip that is judged: numbers, and clips that they were not fitted to.
+pub(in crate::diagnose) type Fits = Vec<(Hypothesis, Vec<usize>)>;
+
+/// `None` where the twin has no answer without one of the commands.
+pub(in crate::diagnose) fn fits<E: Evidence>(
+    bench: &Bench<'_, E>,
+    split: &Split,
+    (hypothesis, weights): (&Hypothesis, &[f64]),
+) -> Option<Fits> {
+    if split.in_turn.is_empty() {
+        return Some(vec![(hypothesis.clone(), split.confirm.clone())]);
+    }
+    let without = |out: &Vec<usize>| {
+        let others: Vec<usize> = split.train.iter().copied().filter(|clip| !out.contains(clip)).collect();
+        let full = hypothesis.full.clone();
+        Some((bench.fit((&hypothesis.effects, full), &others, weights, Some(hypothesis), EFFORT)?, out.clone()))
+    };
+    split.in_turn.iter().map(without).collect()
+}
+
+/// What a hypothesis leaves on clips that its numbers were not fitted to.
+pub(in crate::diagnose) fn residuals<E: Evidence>(
+    bench: &Bench<'_, E>,
+    split: &Split,
+    hypothesis: (&Hypothesis, &[f64]),
+) -> Option<Residuals> {
+    Residuals::of(bench, &fits(bench, split, hypothesis)?)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::benchmark::world::Kind;
+    use crate::diagnose::library::Library;
+    use crate::diagnose::test_bench::{ONCE, on_bench, shipped, truth, with_effect};
+    use crate::forward::setting;
+    use shared_mem::msg::MAX_JOINTS;
+
+    #[test]
+    fn a_command_is_judged_by_numbers_that_were_found_without_it() {
+        let (cell, base) = (shipped(), setting::complete(&shipped(), None).expect("a cell"));
+        let world = with_effect("payload", 3, Kind::Excitation, &cell);
+        let library = Library::new(&cell, &base, None, &[87.0; MAX_JOINTS]);
+        on_bench((&cell, &world), &library, |bench, even| {
+            let split = Split::new(&[vec![0], vec![1]], 0);
+            assert_eq!(split.in_turn.len(), 2);
+            let all = bench.fit((&[], truth(&library, &world)), &split.train, even, None, ONCE).expect("a fit");
+            let fits = fits(bench, &split, (&all, even)).expect("two fits");
+            for (fit, out) in &fits {
+                let seen: Vec<usize> = fit.fitted.iter().map(|clip| clip.clip).collect();
+                assert!(seen.len() == 1 && !out.contains(&seen[0]), "{seen:?} {out:?}");
+            }
+            let left = Residuals::of(bench, &fits).expect("residuals");
+            assert_eq!(left.clips.iter().map(|(clip, _)| *clip).collect::<Vec<_>>(), [0, 1]);
+        });
+    }
+}

@@ -1,0 +1,30 @@
+//! What a fitted hypothesis is worth: how well it predicts clips, how much of the gap it closes, how sure that is, and what is left.
+//!
+//! | module | |
+//! |---|---|
+//! | `score` | how well it predicts clips: leave-one-clip-out log-likelihood |
+//! | `held_out` | numbers for clips that it was not fitted to |
+//! | `confirm` | whether the clips kept for confirming speak for what was found |
+//! | `closing` | how much of the gap it closes |
+//! | `remainder`, `drift` | what it leaves |
+//! | `gap`, `localise`, `sizes` | how large the gap is, and where |
+//! | `unproven` | what more clips would prove |
+//! | `tolerance` | whether a gap is of interest |
+//! | `partly` | what is proven although a part of the gap stays |
+//! | `confidence` | how sure a finding is, and what its rivals are |
+//! | `trial` | candidates tried on top of a hypothesis, and what makes one of them a cause |
+
+pub mod closing;
+pub mod confidence;
+pub(super) mod confirm;
+pub mod drift;
+pub mod gap;
+pub(super) mod held_out;
+pub mod localise;
+pub(super) mod partly;
+pub mod remainder;
+pub mod score;
+pub(super) mod sizes;
+pub(super) mod tolerance;
+pub mod trial;
+pub(super) mod unproven;

@@ -1,0 +1,175 @@
+//! Causes that are proven although a part of the gap stays: no model of a real cell is ever complete, and what a laboratory
+//! needs is what acts, how much of the gap it closes, and what is left.
+//!
+//! Effects are taken in the order in which they were found. They are believed as long as each stood out on clips that were
+//! not fitted (nearly all of them, far beyond chance, no other effect half as good), and all together close a real share of the
+//! squared gap on the clips kept for confirming: the whole 90 % interval of the share lies above it. Where an effect that is
+//! known to look alike does as well, it is proven that one of the two acts, and both are said. One that is stronger than
+//! what is met in practice is said to be unusual: a range is what is known beforehand, and no bar for what the clips show.
+//! What comes after them in the search belongs to the rest.
+
+use super::gap::Residuals;
+use super::held_out::{self, Fits};
+use super::trial::{Found, Step};
+use super::{confidence, remainder};
+use crate::diagnose::answer::Share;
+use crate::diagnose::clips::split::Split;
+use crate::diagnose::evidence::measured::Evidence;
+use crate::diagnose::fit::bench::Bench;
+
+/// More than half of the squared gap: then what was found is larger than all that was not.
+const REAL_SHARE: f64 = 0.5;
+/// An effect whose signature explains more than half of the rest is said to explain most of it.
+const LOOKS_LIKE: f64 = 0.5;
+
+/// What is proven.
+pub(in crate::diagnose) struct Partly {
+    /// The search as if it had ended here.
+    pub(in crate::diagnose) found: Found,
+    /// Its numbers for clips that they were not fitted to.
+    pub(in crate::diagnose) fits: Fits,
+    /// What they leave there.
+    pub(in crate::diagnose) after: Residuals,
+    /// Share of the squared gap that it closes there.
+    pub(in crate::diagnose) share: Share,
+    /// Whether an effect is stronger than what is met in practice.
+    pub(in crate::diagnose) unusual: bool,
+    /// Effects that do as well as one of those that were found: candidates.
+    rivals: Vec<usize>,
+}
+
+/// The most effects that are proven; `None` where not even the first is. `before`: what the baseline leaves on the clips kept
+/// for confirming; `overdispersion`: see [`Found::overdispersion`].
+pub(in crate::diagnose) fn proven<E: Evidence>(
+    bench: &Bench<'_, E>,
+    (split, found): (&Split, &Found),
+    before: &Residuals,
+    overdispersion: &[f64],
+    seed: u64,
+) -> Option<Partly> {
+    let all = found.last.effects.len();
+    let one = |count: usize| {
+        let weights = &with_effects(&found.steps, count).or(found.steps.last())?.weights;
+        let last = if count == all { &found.last } else { &with_effects(&found.steps, count)?.from };
+        let until = Found { steps: found.steps.clone(), last: last.clone() };
+        let rivals = beside_what_stands_out(bench, &until, overdispersion)?;
+        let fits = held_out::fits(bench, split, (last, weights))?;
+        let after = Residuals::of(bench, &fits)?;
+        let share = after.shrink(before, seed);
+        let unusual = !remainder::implausible(bench, last).is_empty();
+        (share.ci90[0] > REAL_SHARE).then_some(Partly { found: until, fits, after, share, unusual, rivals })
+    };
+    (1..=all).rev().find_map(one)
+}
+
+fn with_effects(steps: &[Step], count: usize) -> Option<&Step> {
+    steps.iter().find(|step| step.from.effects.len() == count)
+}
+
+/// Effects that do as well as those that were found, where each of these stands out but for what is known to look like it.
+fn beside_what_stands_out<E: Evidence>(
+    bench: &Bench<'_, E>,
+    found: &Found,
+    overdispersion: &[f64],
+) -> Option<Vec<usize>> {
+    let added: Vec<(usize, usize)> = found.kept().collect();
+    let mut all = Vec::new();
+    for (place, effect) in &added {
+        let step = &found.steps[*place];
+        let mut rivals = confidence::rivals(step, bench.library, *effect, overdispersion[*place]);
+        let trial = |candidate| step.trials.iter().find(|trial| trial.scored.candidate == candidate);
+        // What does the same with more numbers is no other cause: dry friction that may fall with speed, and does not.
+        let more_of_it =
+            |rival: usize| trial(rival).zip(trial(*effect)).is_some_and(|(rival, own)| rival.is_outdone_by(own));
+        rivals.retain(|rival| !found.last.effects.contains(rival) && !more_of_it(*rival));
+        let known = |rival: &usize| bench.library.look_alike(*rival, *effect);
+        if !step.leads(bench.library, *effect) || !rivals.iter().all(known) {
+            return None;
+        }
+        all.extend(rivals);
+    }
+    (added.len() == found.last.effects.len()).then_some(all)
+}
+
+impl Partly {
+    /// Names of the effects that are proven, and of those that do as well as one of them.
+    pub(in crate::diagnose) fn effects<E>(&self, bench: &Bench<'_, E>) -> [Vec<String>; 2] {
+        let name = |effect: &usize| bench.library.candidates[*effect].effect.name.to_owned();
+        [&self.found.last.effects, &self.rivals].map(|effects| effects.iter().map(name).collect())
+    }
+
+    /// The effect whose signature explains most of what stays; `None` where none explains much of it.
+    pub(in crate::diagnose) fn looks_like<E>(&self, bench: &Bench<'_, E>) -> Option<&'static str> {
+        let step = self.found.steps.iter().find(|step| step.from.effects == self.found.last.effects)?;
+        let best = step.trials.iter().max_by(|a, b| a.scored.cosine.total_cmp(&b.scored.cosine))?;
+        let alike = best.scored.cosine.powi(2) > LOOKS_LIKE;
+        alike.then(|| bench.library.candidates[best.scored.candidate].effect.name)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::score::Predicted;
+    use super::super::trial::Trial;
+    use super::*;
+    use crate::benchmark::world::Kind;
+    use crate::diagnose::fit::bench::Hypothesis;
+    use crate::diagnose::fit::shortlist::Scored;
+    use crate::diagnose::library::Library;
+    use crate::diagnose::test_bench::{ONCE, nothing_said_of, on_bench, shipped, truth, with_effect};
+    use crate::forward::setting;
+    use shared_mem::msg::MAX_JOINTS;
+
+    #[test]
+    fn an_effect_is_proven_where_it_stands_out_alone_and_closes_most_of_the_gap() {
+        let (cell, base) = (shipped(), setting::complete(&shipped(), None).expect("a cell"));
+        let world = with_effect("command_delay", 3, Kind::Excitation, &cell);
+        let library = Library::new(&cell, &base, None, &[87.0; MAX_JOINTS]);
+        on_bench((&cell, &world), &library, |bench, even| {
+            let [effect, other] = ["command_delay", "payload"].map(|name| library.find(name).expect("a candidate"));
+            let with = truth(&library, &world);
+            let mut without = with.clone();
+            library.candidates[effect].numbers.clone().for_each(|k| without[k] = library.start()[k]);
+            let fit = |effects: &[usize], full| bench.fit((effects, full), &[0], even, None, ONCE).expect("a fit");
+            let (baseline, last) = (fit(&[], without), fit(&[effect], with));
+            let likelier = |nats: f64| Predicted { clips: (0..12).map(|clip| (clip, 1000.0 - nats / 6.0)).collect() };
+            let trial = |candidate, fitted: &Hypothesis, nats| Trial {
+                scored: Scored { signal: 30.0, ..nothing_said_of(&library, candidate) },
+                fitted: Some((fitted.clone(), likelier(nats).over(&likelier(0.0)))),
+                closes: 0.9,
+                own_numbers: false,
+            };
+            let found = |rival: f64, last: &Hypothesis| {
+                let step = |from: &Hypothesis, trials| Step {
+                    from: from.clone(),
+                    trials,
+                    predicted: likelier(0.0),
+                    weights: vec![1.0; even.len()],
+                    arm_rows: 100,
+                    left: Vec::new(),
+                    whole: Vec::new(),
+                };
+                let trials = vec![trial(effect, last, 300.0), trial(other, &baseline, rival)];
+                Found { steps: vec![step(&baseline, trials), step(last, Vec::new())], last: last.clone() }
+            };
+            let split = Split { train: vec![0], confirm: vec![1], ..Split::default() };
+            let before = Residuals::at(bench, &baseline, &split.confirm).expect("it can be simulated");
+            let proven = |found: &Found| proven(bench, (&split, found), &before, &[1.0; 2], 0);
+            let partly = proven(&found(20.0, &last)).expect("it is");
+            assert!(
+                partly.share.ci90[0] > 0.9 && partly.effects(bench)[0] == ["command_delay"] && partly.rivals.is_empty(),
+                "{:?}",
+                partly.share
+            );
+            assert!(proven(&found(290.0, &last)).is_none(), "another effect does as well");
+            let alike = library.find("command_lag").expect("a candidate");
+            let step = &found(20.0, &last).steps[0];
+            let beside = Step { trials: vec![trial(effect, &last, 300.0), trial(alike, &last, 298.0)], ..step.clone() };
+            let both = Found { steps: vec![beside, found(20.0, &last).steps[1].clone()], last: last.clone() };
+            let [named, rivals] = proven(&both).expect("one of two that look alike acts").effects(bench);
+            assert_eq!([named, rivals], [vec!["command_delay".to_owned()], vec!["command_lag".to_owned()]]);
+            let useless = Hypothesis { effects: vec![effect], ..baseline.clone() };
+            assert!(proven(&found(20.0, &useless)).is_none(), "nothing of the gap closes");
+        });
+    }
+}

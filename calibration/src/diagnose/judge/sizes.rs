@@ -1,0 +1,155 @@
+//! How large the gap is in units of the hand, without effects and with what was found: joints, torques, the object.
+
+use super::gap::Residuals;
+use super::held_out::Fits;
+use super::remainder;
+use super::tolerance::{self, Measured};
+use crate::diagnose::DiagnoseError;
+use crate::diagnose::answer::{Change, Gap, TorqueRms};
+use crate::diagnose::clips::admit::Admitted;
+use crate::diagnose::evidence::measured::Evidence;
+use crate::diagnose::fit::bench::Bench;
+use crate::report::in_unit;
+use shared_mem::cell::Tolerance;
+use shared_mem::recording::Session;
+use twin::replay::Replayer;
+
+/// Figures on held-out clips.
+pub(in crate::diagnose) struct Sizes {
+    /// Root mean square over joints and time [rad].
+    pub(in crate::diagnose) joints: Change,
+    /// Mean ADD [m].
+    pub(in crate::diagnose) add: Change,
+    /// Mean ADD-S [m].
+    add_s: Change,
+    /// Root mean square of each joint's torque beyond the predicted one [N m], along the measured motion.
+    torque_rms: Option<TorqueRms>,
+}
+
+impl Sizes {
+    /// Of two hypotheses, each with numbers that were not fitted to the clips that it is measured by.
+    ///
+    /// # Errors
+    /// [`DiagnoseError`] when a clip cannot be replayed.
+    pub(in crate::diagnose) fn of<E: Evidence>(
+        bench: &Bench<'_, E>,
+        (fits, left): ([&Fits; 2], [&Residuals; 2]),
+        session: &Session,
+        admitted: &Admitted,
+    ) -> Result<Self, DiagnoseError> {
+        let torque_rms = torque_rms(bench.evidence, left);
+        let [joints, add, add_s] = match torque_rms {
+            // Joints go where they were measured.
+            Some(_) => [Change::default(); 3],
+            None => replayed(bench, fits, session, admitted)?,
+        };
+        Ok(Self { joints, add, add_s, torque_rms })
+    }
+
+    /// Without effects and with them; `of_object`: most of the gap is the object's.
+    pub(in crate::diagnose) fn in_words(&self, of_object: bool) -> [String; 2] {
+        let torques = self.torque_rms.as_ref().map(TorqueRms::over_joints).unwrap_or_default();
+        [
+            size_in_words((torques.before, self.joints.before), self.add.before.filter(|_| of_object)),
+            size_in_words((torques.after, self.joints.after), self.add.after.filter(|_| of_object)),
+        ]
+    }
+
+    /// With the gap in sigmas: what two hypotheses leave.
+    pub(in crate::diagnose) fn gap(self, [before, shown]: [&Residuals; 2], seed: u64) -> Gap {
+        Gap {
+            unit: "sigma",
+            before: before.mean_square(),
+            after: shown.mean_square(),
+            floor: before.floor(),
+            shrink: shown.shrink(before, seed),
+            explainable_fraction: remainder::explained(before.mean_square(), shown.mean_square(), before.floor()),
+            joint_rms_rad: self.joints,
+            torque_rms: self.torque_rms,
+            object_add_m: self.add,
+            object_add_s_m: self.add_s,
+        }
+    }
+}
+
+/// Whether the gap is of no interest without effects and with them.
+pub(in crate::diagnose) fn within_tolerance<E: Evidence>(
+    bench: &Bench<'_, E>,
+    (fits, left): ([&Fits; 2], [&Residuals; 2]),
+    session: &Session,
+    admitted: &Admitted,
+) -> Result<[bool; 2], DiagnoseError> {
+    let stated = &session.cell.tolerance;
+    let of = |measured: [Measured; 2]| measured.map(|measured| tolerance::holds(stated, measured));
+    if let Some(torques) = torque_rms(bench.evidence, left) {
+        let Change { before, after } = torques.over_joints();
+        return Ok(of([before, after].map(|torques| Measured { torques, ..Measured::default() })));
+    }
+    if *stated == Tolerance::default() {
+        return Ok([false; 2]);
+    }
+    let [joints, add, _] = replayed(bench, fits, session, admitted)?;
+    let measured = |joints, object| Measured { joints, object, torques: None };
+    Ok(of([measured(joints.before, add.before), measured(joints.after, add.after)]))
+}
+
+/// How large the gap is, in units of the hand: of the object where there is such a figure, else of the joints.
+fn size_in_words((torques, joints): (Option<f64>, Option<f64>), add: Option<f64>) -> String {
+    if let Some(torques) = torques {
+        return format!("{} RMS over all joints", in_unit("N m", torques));
+    }
+    match (joints, add) {
+        (_, Some(add)) => format!("{} ADD", in_unit("m", add)),
+        (Some(rms), None) => format!("{} RMS over all joints", in_unit("rad", rms)),
+        (None, None) => "of unknown size".into(),
+    }
+}
+
+/// Mean joint error, ADD and ADD-S of the confirm clips at two hypotheses, each with numbers that were not fitted to them, by the code of `twin replay`.
+fn replayed<E: Evidence>(
+    bench: &Bench<'_, E>,
+    both: [&Fits; 2],
+    session: &Session,
+    admitted: &Admitted,
+) -> Result<[Change; 3], DiagnoseError> {
+    let mut changes = [Change::default(); 3];
+    for (place, fits) in both.into_iter().enumerate() {
+        let mut gaps = Vec::new();
+        for (hypothesis, clips) in fits {
+            let replayer = Replayer::new(&session.cell, Some(&bench.library.theta(&hypothesis.full)))?;
+            for clip in clips {
+                let (_, _, report) = replayer.replay(admitted.clips[*clip].clone())?;
+                gaps.push(report.gap);
+            }
+        }
+        let mean = |values: Vec<f64>| (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64);
+        let squares = gaps.iter().filter_map(|gap| gap.joint_rms_rad.as_ref()).flatten().map(|rms| rms * rms).collect();
+        let figures = [
+            mean(squares).map(f64::sqrt),
+            mean(gaps.iter().filter_map(|gap| gap.object_add_m).collect()),
+            mean(gaps.iter().filter_map(|gap| gap.object_add_s_m).collect()),
+        ];
+        for (change, figure) in changes.iter_mut().zip(figures) {
+            if place == 0 { change.before = figure } else { change.after = figure }
+        }
+    }
+    Ok(changes)
+}
+
+/// Root mean square of each joint's torque beyond the predicted one at two hypotheses [N m]; `None` where torques are no channel
+/// of their own.
+fn torque_rms(evidence: &impl Evidence, both: [&Residuals; 2]) -> Option<TorqueRms> {
+    let sigma = evidence.torque_sigma()?;
+    let [before, after] = both.map(|residuals| {
+        let of = |(channel, sigma): (usize, &f64)| {
+            let rows = residuals.clips.iter().flat_map(|(clip, values)| evidence.rows(*clip).iter().zip(values));
+            let squares: Vec<f64> = rows
+                .filter(|(row, _)| row.channel == channel)
+                .map(|(_, residual)| (residual * sigma).powi(2))
+                .collect();
+            (squares.iter().sum::<f64>() / squares.len().max(1) as f64).sqrt()
+        };
+        sigma.iter().enumerate().map(of).collect()
+    });
+    Some(TorqueRms { before, after })
+}

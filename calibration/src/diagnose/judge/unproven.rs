@@ -1,0 +1,39 @@
+//! An effect that predicts clips better and closes a real part of the gap, but not in enough clips to be no chance: what more
+//! clips would prove.
+
+use super::trial::{Found, PLAIN, Trial, convincing};
+use crate::diagnose::evidence::measured::Evidence;
+use crate::diagnose::fit::bench::{Bench, Hypothesis};
+
+/// An effect that is likely, and not proven.
+pub(in crate::diagnose) struct Unproven<'a> {
+    /// The trial of it.
+    pub(in crate::diagnose) trial: &'a Trial,
+    /// Its fit.
+    pub(in crate::diagnose) fit: &'a Hypothesis,
+    /// How many clips judged.
+    pub(in crate::diagnose) clips: usize,
+    /// How many clips more would prove it, if they gained as those at hand do.
+    pub(in crate::diagnose) more: usize,
+}
+
+impl Unproven<'_> {
+    /// Its name.
+    pub(in crate::diagnose) fn effect<E>(&self, bench: &Bench<'_, E>) -> &'static str {
+        bench.library.candidates[self.trial.scored.candidate].effect.name
+    }
+}
+
+/// The likeliest such effect; `None` where something was found, or where none closes a real part of the gap.
+pub(in crate::diagnose) fn unproven<'a, E: Evidence>(bench: &Bench<'_, E>, found: &'a Found) -> Option<Unproven<'a>> {
+    let step = found.steps.first().filter(|_| found.last.effects.is_empty())?;
+    let one = |trial: &'a Trial| {
+        let (fit, advantage) = trial.fitted.as_ref()?;
+        let more =
+            advantage.clips_more().filter(|_| trial.closes > PLAIN && !convincing(advantage, trial.scored.cost))?;
+        let real =
+            !bench.negligible(trial.scored.candidate, &fit.full) && !bench.is_convention(trial.scored.candidate, fit);
+        real.then(|| Unproven { trial, fit, clips: advantage.clips(), more })
+    };
+    step.trials.iter().filter_map(one).max_by(|a, b| a.trial.nats().total_cmp(&b.trial.nats()))
+}

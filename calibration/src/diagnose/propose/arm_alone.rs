@@ -1,0 +1,261 @@
+//! Clips with an object as if only the arm had been recorded. What the joints' own channels tell about an effect in the
+//! joints needs no object, and simulating the arm up to the touch takes a tenth of the time of a whole stroke. So effects in
+//! the joints are compared there first, and few of them are taken on to the object.
+
+use super::screening::arm_gap_is_open;
+use super::starts;
+use crate::diagnose::clips::split::Split;
+use crate::diagnose::evidence::measured::{Channel, Evidence, Reach, Row};
+use crate::diagnose::evidence::scatter::Scatter;
+use crate::diagnose::fit::bench::{Bench, Hypothesis};
+use crate::diagnose::fit::effort::{FIRST_PASS, HEAT, LOOK, NEAR};
+use crate::diagnose::fit::{stages, undetermined};
+use crate::diagnose::judge::trial::Step;
+use crate::estimate::{ClipModel, Impossible};
+use shared_mem::progress::Progress;
+
+/// What leaves more of the gain of the best on the arm's own channels than this share is not what acts there.
+const NEAR_ON_ARM: f64 = 0.1;
+
+/// The same clips, rows and channels; residuals of the object are zero, and clips have no numbers of their own.
+pub struct ArmAlone<'a, E>(pub &'a E);
+
+impl<E: Evidence> ArmAlone<'_, E> {
+    /// A bench for these.
+    pub fn bench<'b>(&'b self, whole: &Bench<'b, E>) -> Bench<'b, Self> {
+        let (evidence, scatter) = (self, Scatter::default());
+        let trail = (whole.trail.0, "the arm alone");
+        Bench { evidence, library: whole.library, scatter, interrupt: whole.interrupt, trail }
+    }
+}
+
+impl Step {
+    /// Fits trials of effects in the joints, at their `places`: to the arm's own channels first; those that explain these about
+    /// as well as the best of them are looked at once with the object as well. What an object does after it was hit a little
+    /// elsewhere is no judge of joints. `others`: trials that the caller fits next, for the bar.
+    pub(in crate::diagnose) fn fitted_to_the_arm_first<E: Evidence>(
+        &self,
+        bench: &Bench<'_, E>,
+        split: &Split,
+        (places, overlooked): (&[usize], bool),
+        refined: &impl Fn(&[f64]) -> Option<Vec<f64>>,
+        (bar, others): (&Progress, usize),
+    ) -> Vec<(usize, Hypothesis)> {
+        if places.is_empty() {
+            bar.stage(stages::FITS, others as u64);
+            return Vec::new();
+        }
+        let (evidence, weights) = (ArmAlone(bench.evidence), &self.weights);
+        let arm = evidence.bench(bench);
+        let at = (&self.from, &weights[..]);
+        let fit = |effects: &[usize], full, effort| arm.fit((effects, full), &split.train, weights, None, effort);
+        let name = |place: usize| bench.library.candidates[self.trials[place].scored.candidate].in_words();
+        bar.stage(stages::ARM_FITS, places.len() as u64);
+        let alone = |place: &usize| {
+            let scored = &self.trials[*place].scored;
+            let effects = [&self.from.effects[..], &[scored.candidate]].concat();
+            let starts = starts::kept(&arm, at, scored, overlooked).into_iter();
+            let begun = starts.filter_map(|start| fit(&effects, start, HEAT));
+            let best = begun.min_by(|a, b| a.deviance().total_cmp(&b.deviance()))?;
+            Some((*place, fit(&effects, best.full, FIRST_PASS)?))
+        };
+        let unless_asked = |(done, place): (usize, &usize)| {
+            bar.show(done as u64, &format!("{}: {}", stages::ARM_FITS, name(*place)));
+            if bench.interrupt.asked() { None } else { alone(place) }
+        };
+        let all: Vec<(usize, Hypothesis)> = places.iter().enumerate().filter_map(unless_asked).collect();
+        let Some(from) = fit(&self.from.effects, self.from.full.clone(), LOOK) else { return Vec::new() };
+        let best = all.iter().fold(&from, |best, (_, fit)| if fit.deviance() < best.deviance() { fit } else { best });
+        let near = best.deviance() + NEAR.max(NEAR_ON_ARM * (from.deviance() - best.deviance()));
+        let anew = if arm_gap_is_open(&self.whole, &self.left) { refined(&best.full) } else { None };
+        let with_object = |(place, alone): (usize, Hypothesis)| {
+            let candidate = self.trials[place].scored.candidate;
+            let mut open = undetermined::sizes(&arm, &alone, candidate);
+            open.retain(|k| bench.library.joints[*k].is_none());
+            let object = |other: &Vec<f64>| bench.library.with_object_of(alone.full.clone(), other);
+            let starts = [Some(alone.full.clone()), anew.as_ref().map(object)].into_iter().flatten();
+            let look = |start: Vec<f64>| {
+                let full = starts::seen_by_the_object(bench, at, start, &open);
+                bench.extend(&self.from, (candidate, full), &split.train, weights, LOOK)
+            };
+            let looks = starts.filter_map(look);
+            Some((place, looks.min_by(|a, b| a.deviance().total_cmp(&b.deviance()))?))
+        };
+        let near: Vec<(usize, Hypothesis)> = all.into_iter().filter(|(_, alone)| alone.deviance() < near).collect();
+        bar.stage(stages::FITS, (near.len() + others) as u64);
+        let shown = |(done, one): (usize, (usize, Hypothesis))| {
+            bar.show(done as u64, &format!("{}: {}", stages::FITS, name(one.0)));
+            with_object(one)
+        };
+        near.into_iter().enumerate().filter_map(shown).collect()
+    }
+}
+
+impl<E: Evidence> ClipModel for ArmAlone<'_, E> {
+    fn clips(&self) -> usize {
+        self.0.clips()
+    }
+
+    fn residuals(&self, clip: usize, shared: &[f64], own: &[f64], out: &mut Vec<f64>) -> Result<(), Impossible> {
+        let nothing = vec![0.0; self.rows(clip).len()];
+        self.0.changed(clip, (shared, own), (Reach::Arm, &nothing), out)
+    }
+}
+
+impl<E: Evidence> Evidence for ArmAlone<'_, E> {
+    fn changed(
+        &self,
+        clip: usize,
+        numbers: (&[f64], &[f64]),
+        (reach, base): (Reach, &[f64]),
+        out: &mut Vec<f64>,
+    ) -> Result<(), Impossible> {
+        match reach {
+            Reach::Object => {
+                out.clear();
+                out.extend_from_slice(base);
+                Ok(())
+            }
+            Reach::All | Reach::Arm => self.0.changed(clip, numbers, (Reach::Arm, base), out),
+        }
+    }
+
+    fn channels(&self) -> &[Channel] {
+        self.0.channels()
+    }
+
+    fn rows(&self, clip: usize) -> &[Row] {
+        self.0.rows(clip)
+    }
+
+    fn scatter(&self) -> Scatter {
+        Scatter::default()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::benchmark::world::{Fault, Kind, World};
+    use crate::diagnose::evidence::measured::Group;
+    use crate::diagnose::fit::effort::Effort;
+    use crate::diagnose::fit::sweep::Precision;
+    use crate::diagnose::judge::gap::Typical;
+    use crate::diagnose::judge::score::Predicted;
+    use crate::diagnose::judge::trial::Trial;
+    use crate::diagnose::library::Library;
+    use crate::diagnose::test_bench::{nothing_said_of, on_strokes, shipped, with_effect};
+
+    /// The baseline as it is hidden in a world.
+    fn hidden_baseline(library: &Library, world: &World) -> Vec<f64> {
+        let (hidden, mut full) = (library.settings.numbers(&world.hidden), library.start());
+        for k in library.baseline.clone() {
+            full[k] = hidden[k].unwrap_or(full[k]);
+        }
+        full
+    }
+
+    /// A step from these numbers on two strokes, in which trials of these candidates are to be fitted.
+    fn step<E: Evidence>(bench: &Bench<'_, E>, full: Vec<f64>, even: &[f64], asked: &[usize]) -> (Step, Split) {
+        let trial = |candidate: &usize| Trial {
+            scored: nothing_said_of(bench.library, *candidate),
+            fitted: None,
+            closes: 0.0,
+            own_numbers: true,
+        };
+        let step = Step {
+            from: bench.fit((&[], full), &[0, 1], even, None, LOOK).expect("a fit"),
+            predicted: Predicted { clips: Vec::new() },
+            trials: asked.iter().map(trial).collect(),
+            weights: even.to_vec(),
+            arm_rows: 0,
+            left: Vec::new(),
+            whole: Vec::new(),
+        };
+        (step, Split { train: vec![0, 1], ..Split::default() })
+    }
+
+    #[test]
+    fn an_object_that_was_found_under_an_arm_that_is_wrong_is_found_anew() {
+        let cell = shipped();
+        let world = with_effect("command_delay", 40, Kind::Strokes, &cell);
+        on_strokes((&cell, &world), |bench, even| {
+            let library = bench.library;
+            let hidden = hidden_baseline(library, &world);
+            let mut wrong = hidden.clone();
+            for k in library.baseline.clone().filter(|k| !library.arm_feels(*k, &hidden)) {
+                wrong[k] = library.start()[k];
+            }
+            let candidate = library.find("command_delay").expect("a candidate");
+            let (mut step, split) = step(bench, wrong.clone(), even, &[candidate]);
+            let object = |fits: Vec<(usize, Hypothesis)>| {
+                let [(0, fit)] = &fits[..] else { panic!("{} fits", fits.len()) };
+                library.with_object_of(hidden.clone(), &fit.full)
+            };
+            let anew = |given: &[f64]| Some(library.with_object_of(given.to_vec(), &hidden));
+            let mut fitted = |arm: f64| {
+                let group = |of_object, mean_square| Typical { mean_square, floor: 1.5, of_object };
+                step.left = vec![group(false, arm), group(true, 100.0)];
+                step.whole = step.left.clone();
+                object(step.fitted_to_the_arm_first(
+                    bench,
+                    &split,
+                    (&[0], false),
+                    &anew,
+                    (&Progress::new("nothing", 1), 0),
+                ))
+            };
+            assert_eq!(fitted(1.5), library.with_object_of(hidden.clone(), &wrong), "the arm is where it was");
+            assert_eq!(fitted(50.0), hidden);
+        });
+    }
+
+    #[test]
+    fn the_arm_tells_its_effects_apart_and_the_object_what_the_arm_leaves_open() {
+        let cell = shipped();
+        let world = with_effect("joint_encoder_offset", 48, Kind::Strokes, &cell);
+        on_strokes((&cell, &world), |bench, even| {
+            let library = bench.library;
+            let hidden = library.settings.numbers(&world.hidden);
+            let asked = ["base_tilt", "joint_encoder_offset"].map(|name| library.find(name).expect("a candidate"));
+            let (step, split) = step(bench, hidden_baseline(library, &world), even, &asked);
+            let bar = Progress::new("nothing", 1);
+            let found = step.fitted_to_the_arm_first(bench, &split, (&[0, 1], false), &|_: &[f64]| None, (&bar, 0));
+            let [(1, fit)] = &found[..] else { panic!("{} fits", found.len()) };
+            let sizes = &library.candidates[asked[1]].sizes;
+            let [turned, lifted] = [0, 1].map(|joint| (fit.full[sizes[joint]], hidden[sizes[joint]].expect("hidden")));
+            assert!((lifted.0 - lifted.1).abs() < 1e-4, "gravity tells it: {lifted:?}");
+            assert!((turned.0 - turned.1).abs() < 5e-3, "only the hit tells it: {turned:?}");
+        });
+    }
+
+    #[test]
+    fn the_object_is_silent_and_fits_turn_what_they_may() {
+        let cell = shipped();
+        let world = World::draw(3, Kind::Strokes, Fault::Nothing, &cell);
+        on_strokes((&cell, &world), |whole, even| {
+            let (evidence, library, alone) = (whole.evidence, whole.library, ArmAlone(whole.evidence));
+            let (mut all, mut some) = (Vec::new(), Vec::new());
+            evidence.residuals(0, &library.start(), &[], &mut all).expect("a stroke");
+            alone.residuals(0, &library.start(), &[], &mut some).expect("a stroke");
+            let of_joint = |row: &Row| evidence.channels()[row.channel].group == Group::Arm;
+            for ((row, all), some) in evidence.rows(0).iter().zip(&all).zip(&some) {
+                assert_eq!(*some, if of_joint(row) { *all } else { 0.0 });
+            }
+
+            let step = Effort::of(2, Precision::Joints);
+            let moved = |numbers: Vec<f64>| -> Vec<usize> {
+                let of_baseline = library.baseline.clone();
+                of_baseline.filter(|k| numbers[*k] != library.unknowns[*k].start).collect()
+            };
+            let (gains, of_object): (Vec<usize>, Vec<usize>) =
+                library.baseline.clone().partition(|k| library.joints[*k].is_some());
+            let fit = alone.bench(whole).fit((&[], library.start()), &[0, 1], even, None, step).expect("a fit");
+            assert_eq!(moved(fit.full), gains, "joints' channels tell the gains, and nothing of the object");
+            let effort = Effort { holds_joints: true, ..step };
+            let fit = whole.fit((&[], library.start()), &[0, 1], even, None, effort).expect("a fit");
+            let moved = moved(fit.full);
+            assert!(!moved.is_empty() && moved.iter().all(|k| of_object.contains(k)), "{moved:?} of {of_object:?}");
+        });
+    }
+}

@@ -1,0 +1,99 @@
+//! Where the search begins: the paper's parameters identified on the clips for fitting.
+//!
+//! In order: where gains that are known by range alone may begin; the arm by itself, since a gain that is off moves the hit,
+//! and a hit elsewhere tells nothing about the gain;
+//! then the object's parameters under that arm, by the identification's own way over rough hits; then all together.
+
+use crate::diagnose::clips::admit::Admitted;
+use crate::diagnose::clips::split::Split;
+use crate::diagnose::evidence::measured::Evidence;
+use crate::diagnose::fit::bench::{Bench, Hypothesis};
+use crate::diagnose::fit::effort::Effort;
+use crate::diagnose::fit::sweep::Precision;
+use crate::diagnose::fit::{floor, stages};
+use crate::diagnose::propose::arm_alone::ArmAlone;
+use crate::identify::{arm, object};
+use shared_mem::cell::Cell;
+use shared_mem::progress::Progress;
+use shared_mem::recording::Clip;
+use shared_mem::theta::ObjectTheta;
+
+/// The way there, and the last steps.
+const WAY: Effort = Effort::of(8, Precision::Joints);
+const LAST: Effort = Effort::of(8, Precision::Exact);
+/// Arm and object together: with slopes joint by joint only the arm says what its gains are. An object that deviates for a
+/// reason that is not in the twin yet would bend them until the hit lands where it helps.
+const TOGETHER: Effort = Effort::of(8, Precision::Joints);
+
+/// Steps in which [`identify`] shows how far it is.
+#[must_use]
+pub fn steps(admitted: &Admitted) -> u64 {
+    if admitted.with_object { 4 } else { 2 }
+}
+
+/// Identifies; `None` when the twin has no answer at the nominal parameters.
+#[must_use]
+pub fn identify<E: Evidence>(
+    bench: &Bench<'_, E>,
+    split: &Split,
+    cell: &Cell,
+    admitted: &Admitted,
+    bar: &Progress,
+) -> Option<Hypothesis> {
+    let even = floor::sensors_alone(bench.evidence);
+    let without_object = ArmAlone(bench.evidence);
+    let alone = without_object.bench(bench);
+    bar.show(0, stages::BASELINE);
+    let arm = alone.fit((&[], start(bench, split, cell, admitted)), &split.train, &even, None, WAY)?;
+    bar.show(1, stages::BASELINE);
+    let arm = alone.fit((&[], arm.full.clone()), &split.train, &even, Some(&arm), LAST)?;
+    if !admitted.with_object {
+        return Some(arm);
+    }
+    bar.show(2, stages::BASELINE);
+    let full = refined(bench, split, cell, admitted, &arm.full).unwrap_or_else(|| arm.full.clone());
+    bar.show(3, stages::BASELINE);
+    bench.fit((&[], full), &split.train, &even, None, TOGETHER)
+}
+
+/// Where the fit begins.
+fn start<E: Evidence>(bench: &Bench<'_, E>, split: &Split, cell: &Cell, admitted: &Admitted) -> Vec<f64> {
+    let mut start = bench.library.start();
+    let clips: Vec<&Clip> = split.train.iter().map(|clip| &admitted.clips[*clip]).collect();
+    let Ok(theta) = arm::begun(cell, &clips, &bench.library.theta(&start), bench.interrupt) else { return start };
+    let numbers = bench.library.settings.numbers(&theta);
+    for k in bench.library.baseline.clone() {
+        let unknown = &bench.library.unknowns[k];
+        start[k] = numbers[k].unwrap_or(start[k]).clamp(unknown.lower, unknown.upper);
+    }
+    start
+}
+
+/// Numbers with the object's parameters that fit the strokes best under the arm and the effects that are given, by
+/// identification's own way over rough hits; `None` where strokes tell nothing about the object.
+#[must_use]
+pub fn refined<E: Evidence>(
+    bench: &Bench<'_, E>,
+    split: &Split,
+    cell: &Cell,
+    admitted: &Admitted,
+    given: &[f64],
+) -> Option<Vec<f64>> {
+    if !admitted.with_object {
+        return None;
+    }
+    let clips: Vec<Clip> = split.train.iter().map(|clip| admitted.clips[*clip].clone()).collect();
+    let mut base = bench.library.theta(given);
+    // What stood in for an effect is wrong once that effect acts: only the friction is where it was.
+    let nominal = bench.library.theta(&bench.library.start()).object;
+    if let (Some(object), Some(nominal)) = (&mut base.object, nominal) {
+        *object = ObjectTheta { friction: object.friction, ..nominal };
+    }
+    let theta = object::refine(cell, clips, &base, bench.interrupt).ok()?;
+    let numbers = bench.library.settings.numbers(&theta);
+    let mut full = given.to_vec();
+    for k in bench.library.baseline.clone() {
+        full[k] = numbers[k].unwrap_or(full[k]);
+    }
+    Some(full)
+}

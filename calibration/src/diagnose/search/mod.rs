@@ -1,0 +1,12 @@
+//! From the identified baseline to the effects that act together.
+//!
+//! | module | |
+//! |---|---|
+//! | `baseline` | the paper's parameters identified |
+//! | `combine` | which effects act together |
+//! | `refit`, `reidentify` | what was chosen fitted to the end, and its nearest rivals with it |
+
+pub mod baseline;
+pub mod combine;
+pub mod refit;
+pub mod reidentify;

@@ -1,0 +1,153 @@
+//! The end of each step of the search: what was chosen is fitted to the end, and what it makes superfluous is dropped.
+
+use crate::diagnose::clips::split::Split;
+use crate::diagnose::evidence::measured::Evidence;
+use crate::diagnose::fit::bench::{Bench, Hypothesis};
+use crate::diagnose::fit::effort::{Effort, FIRST_PASS};
+use crate::diagnose::fit::sweep::Precision;
+use crate::diagnose::judge::score::predict;
+use crate::diagnose::judge::trial::{LEAST, NEARLY_ALL, convincing};
+use crate::diagnose::library::Alternative;
+use crate::diagnose::propose::arm_alone::ArmAlone;
+
+/// The winner gets so many linearisations more.
+const LAST_PASS: Effort = Effort::of(6, Precision::Exact);
+
+/// Where in its range a held form is tried, and how often the best of these is then looked for halfway to its neighbours.
+const SCANNED: [f64; 9] = [0.0, 0.01, 0.02, 0.05, 0.1, 0.2, 0.4, 0.7, 1.0];
+const HALVINGS: usize = 5;
+
+/// A fit to the end, from where it is and from elsewhere: an effect frees the object's parameters from what they stood in
+/// for, so they are found anew under it, and under the other way in which it could act where there are two.
+pub(in crate::diagnose) fn refitted<E: Evidence>(
+    bench: &Bench<'_, E>,
+    split: &Split,
+    (fit, weights): (&Hypothesis, &[f64]),
+    refined: &impl Fn(&[f64]) -> Option<Vec<f64>>,
+) -> Option<Hypothesis> {
+    let from = |full| bench.fit((&fit.effects, full), &split.train, weights, Some(fit), last_pass(bench));
+    let starts = [Some(fit.full.clone()), other_way(bench, fit)];
+    let anew = starts.iter().flatten().filter_map(|full| refined(full)).filter_map(from);
+    let best = anew.chain(from(fit.full.clone())).min_by(|a, b| a.deviance().total_cmp(&b.deviance()))?;
+    let scanned = scanned(bench, &best, weights).and_then(from).filter(|other| other.deviance() < best.deviance());
+    Some(scanned.unwrap_or(best))
+}
+
+/// The numbers of a fit whose last effect is one of the arm, with what is held of it where the arm's channels cost least, the
+/// same for all joints; `None` where that is where it was.
+fn scanned<E: Evidence>(bench: &Bench<'_, E>, fit: &Hypothesis, weights: &[f64]) -> Option<Vec<f64>> {
+    let candidate = &bench.library.candidates[*fit.effects.last()?];
+    let held: Vec<usize> = candidate.numbers.clone().filter(|k| !candidate.turned.contains(k)).collect();
+    if held.is_empty() || !candidate.is_of_arm() {
+        return None;
+    }
+    let evidence = ArmAlone(bench.evidence);
+    let arm = evidence.bench(bench);
+    let at = |share: f64| {
+        let mut full = fit.full.clone();
+        for k in &held {
+            let unknown = &bench.library.unknowns[*k];
+            full[*k] = unknown.lower + share * (unknown.upper - unknown.lower);
+        }
+        full
+    };
+    let cost = |full: &[f64]| arm.plain_cost(fit, full, weights).unwrap_or(f64::INFINITY);
+    let mut tried: Vec<(f64, f64)> = SCANNED.iter().map(|share| (*share, cost(&at(*share)))).collect();
+    let least = |tried: &[(f64, f64)]| (0..tried.len()).min_by(|a, b| tried[*a].1.total_cmp(&tried[*b].1)).unwrap_or(0);
+    for _ in 0..HALVINGS {
+        let best = least(&tried);
+        // The upper neighbour first: what is put below shifts it.
+        for upper in [best + 1, best] {
+            if (1..tried.len()).contains(&upper) {
+                let share = 0.5 * (tried[upper - 1].0 + tried[upper].0);
+                tried.insert(upper, (share, cost(&at(share))));
+            }
+        }
+    }
+    let (share, lowest) = tried[least(&tried)];
+    (lowest < cost(&fit.full)).then(|| at(share))
+}
+
+/// The numbers of a fit whose last effect has two forms, in the form that is further from what was fitted.
+fn other_way<E: Evidence>(bench: &Bench<'_, E>, fit: &Hypothesis) -> Option<Vec<f64>> {
+    let [one, two] = &bench.library.candidates[*fit.effects.last()?].alternatives[..] else { return None };
+    let far = |form: &Alternative| form.form.iter().map(|(k, value)| (fit.full[*k] - value).abs()).sum::<f64>();
+    let mut full = fit.full.clone();
+    let other = if far(one) > far(two) { one } else { two };
+    other.form.iter().for_each(|(k, value)| full[*k] = *value);
+    Some(full)
+}
+
+/// The effort of a fit to the end. Clips with an object take a simulation for each number of their own; joints one by one
+/// besides would take too long.
+pub fn last_pass<E: Evidence>(bench: &Bench<'_, E>) -> Effort {
+    if bench.scatter.count() == 0 { LAST_PASS } else { Effort { precision: Precision::Joints, ..LAST_PASS } }
+}
+
+/// Drops effects that the others make superfluous, one after the other.
+pub(in crate::diagnose) fn without_superfluous<E: Evidence>(
+    bench: &Bench<'_, E>,
+    split: &Split,
+    mut now: Hypothesis,
+    weights: &[f64],
+) -> Hypothesis {
+    while now.effects.len() > 1 && !bench.interrupt.asked() {
+        let Some(whole) = predict(bench, &now, &split.choose, weights) else { break };
+        let dropped = now.effects.iter().find_map(|effect| {
+            let others: Vec<usize> = now.effects.iter().copied().filter(|other| other != effect).collect();
+            let mut full = now.full.clone();
+            let candidate = &bench.library.candidates[*effect];
+            candidate.numbers.clone().for_each(|k| full[k] = bench.library.unknowns[k].start);
+            let fit = bench.fit((&others, full), &split.train, weights, Some(&now), FIRST_PASS)?;
+            let less = predict(bench, &fit, &split.choose, weights)?;
+            let cost = candidate.alternatives[0].probes.len();
+            let loss = whole.over(&less);
+            let missed = loss.share > NEARLY_ALL && loss.nats > LEAST;
+            (!missed && !convincing(&loss, cost)).then_some(fit)
+        });
+        match dropped {
+            Some(fit) => now = fit,
+            None => break,
+        }
+    }
+    now
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::benchmark::world::Kind;
+    use crate::diagnose::library::Library;
+    use crate::diagnose::test_bench::{on_bench, shipped, truth, with_effect};
+    use crate::forward::setting;
+    use shared_mem::msg::MAX_JOINTS;
+
+    #[test]
+    fn friction_that_creeps_further_than_usual_is_found_to_do_so() {
+        let cell = shipped();
+        let mut world = with_effect("joint_coulomb_friction", 3, Kind::Excitation, &cell);
+        let base = setting::complete(&cell, None).expect("a cell");
+        let library = Library::new(&cell, &base, None, &[87.0; MAX_JOINTS]);
+        let joints = cell.controller.as_ref().expect("a controller").stiffness.len();
+        let creeps = 0.0173 * 0.02;
+        world.hidden.effects[0].parameters.insert("creep".into(), vec![creeps; joints].into());
+        on_bench((&cell, &world), &library, |bench, even| {
+            let candidate = library.find("joint_coulomb_friction").expect("a candidate");
+            let at = &library.candidates[candidate];
+            let held: Vec<usize> = at.numbers.clone().filter(|k| !at.turned.contains(k)).collect();
+            let truth = truth(&library, &world);
+            let mut usual = truth.clone();
+            held.iter().for_each(|k| usual[*k] = library.start()[*k]);
+            let found = |full: Vec<f64>| {
+                let fit = bench.fit((&[candidate], full), &[0, 1], even, None, Effort::of(0, Precision::Joints));
+                scanned(bench, &fit.expect("a fit"), even)
+            };
+            // Noise may shift it a little.
+            let near = |found: Vec<f64>| {
+                found.iter().zip(&truth).all(|(found, truth)| (found - truth).abs() <= 0.1 * truth.abs())
+            };
+            assert!(found(truth.clone()).is_none_or(near));
+            assert!(near(found(usual).expect("elsewhere")));
+        });
+    }
+}
