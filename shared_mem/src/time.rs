@@ -5,6 +5,11 @@
 
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
+/// Period of the control loop [ns]: the Franka Control Interface runs at 1 kHz, and whatever plays its part with it.
+pub const TICK_NS: u64 = 1_000_000;
+/// The same [s].
+pub const TICK: f64 = 1e-3;
+
 /// Nanoseconds of the machine's monotonic clock.
 ///
 /// `std::time::Instant` reads the same clock but hides its value, which two processes need to compare.

@@ -10,12 +10,14 @@ mod stroke;
 use criterion::{Criterion, criterion_group, criterion_main};
 use shared_mem::cell::{Cell, Table};
 use shared_mem::msg::arm::ArmState;
+use shared_mem::time::TICK_NS;
 use std::hint::black_box;
 use std::path::Path;
 use stroke::{Stroke, theta};
 use twin::arm::ArmModel;
+use twin::control::Drive;
 use twin::shadow::Shadow;
-use twin::sim::{Drive, PERIOD_NS, SimCell};
+use twin::sim::SimCell;
 
 fn shipped() -> Cell {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../config/fr3_cell.toml");
@@ -89,8 +91,8 @@ fn shadow(criterion: &mut Criterion) {
     let mut shadow = Shadow::new(&description, None).expect("a shadow");
     criterion.bench_function("a cycle of the shadow", |bencher| {
         bencher.iter(|| {
-            state.device_ns += PERIOD_NS;
-            state.stamp_ns += PERIOD_NS;
+            state.device_ns += TICK_NS;
+            state.stamp_ns += TICK_NS;
             state.cycle += 1;
             black_box(shadow.on_state(&state, 0)).expect("the same arm");
         });

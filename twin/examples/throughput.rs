@@ -10,8 +10,9 @@ use shared_mem::theta::Theta;
 use std::path::PathBuf;
 use std::time::Instant;
 use twin::arm::JointState;
+use twin::control::CommandTrack;
 use twin::replay::object_start;
-use twin::rollout::{CellRollout, CellTrace, Checkpoint, CommandTrack, Course, ObjectState, Workers};
+use twin::rollout::{CellRollout, CellTrace, Checkpoint, Course, ObjectState, Workers};
 use twin::scene::ObjectModel;
 
 /// A clip with everything a rollout of it starts from.

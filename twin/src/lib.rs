@@ -1,6 +1,8 @@
 //! The cell in simulation: arm, contact, sensors, live shadow, replay.
 
 pub mod arm;
+pub mod contact_law;
+pub mod control;
 pub mod effects;
 pub mod metrics;
 pub mod physics;

@@ -2,8 +2,8 @@
 
 use shared_mem::theta::{EffectTheta, Theta};
 use twin::arm::{ArmModel, ControlLaw, JointState};
+use twin::control::{ArmRollout, CommandTrack};
 use twin::effects::{Effects, Elsewhere, Role, Shape, registry};
-use twin::rollout::{ArmRollout, CommandTrack};
 
 /// Every name that reports and files may rely on.
 const NAMES: [&str; 38] = [

@@ -8,8 +8,9 @@ use shared_mem::output::Destination;
 use shared_mem::recording::{Clip, ClipInfo, ClipMessages, ClipWriter, JointSeries, Payload, read_clip};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
+use twin::control::Drive;
 use twin::replay::{Replayer, write_clip};
-use twin::sim::{Drive, SimCell};
+use twin::sim::SimCell;
 
 const MILLISECOND: u64 = 1_000_000;
 const START: [f64; 7] = [0.0, -0.3, 0.0, -2.2, 0.0, 1.9, 0.785];

@@ -21,7 +21,8 @@ use shared_mem::recording::{Clip, JointSeries, ObjectSeries};
 use shared_mem::theta::{EffectTheta, Theta};
 use std::f64::consts::PI;
 use twin::arm::{JointState, ModelError};
-use twin::rollout::{CellRollout, CellTrace, CommandTrack, Course, ObjectState};
+use twin::control::CommandTrack;
+use twin::rollout::{CellRollout, CellTrace, Course, ObjectState};
 use twin::sim::SimError;
 
 /// One sigma of what the arm reports: positions [rad], velocities [rad/s], torques [N m].

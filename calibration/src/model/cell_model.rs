@@ -6,9 +6,10 @@ use nalgebra::{Isometry3, Vector3};
 use shared_mem::cell::{Camera, Cell, ControllerKind, Tool};
 use shared_mem::theta::{EffectTheta, Theta};
 use twin::arm::{ArmModel, Part};
+use twin::contact_law::ContactLaw;
 use twin::effects::{Change, Effects, find};
 use twin::physics::Outline;
-use twin::physics::hit::{ContactLaw, ContactMotion};
+use twin::physics::hit::ContactMotion;
 use twin::scene::{ObjectModel, ObjectShape};
 
 pub(super) const CELL: &str = "cell.toml";

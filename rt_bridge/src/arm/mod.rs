@@ -12,9 +12,6 @@ pub use reflex::ReflexErrors;
 
 use shared_mem::msg::arm::{ArmCommand, ArmState, CommandInterface};
 
-/// Nominal control period of every arm here: 1 ms.
-pub const PERIOD_NS: u64 = 1_000_000;
-
 /// Who says when a cycle begins.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Clock {

@@ -9,11 +9,10 @@ use franka::wire::robot::v10::{RobotCommand, RobotState};
 use franka::wire::{f32s_to_f64, f64s_to_wire};
 use shared_mem::msg::arm::{ArmCommand, ArmMode, ArmState, CommandInterface};
 use shared_mem::msg::joints_from;
+use shared_mem::time::TICK_NS;
 
 /// Joints of an FR3.
 pub(super) const DOF: usize = 7;
-/// One tick of the robot's counter [ns].
-const TICK_NS: u64 = 1_000_000;
 
 /// Fills all of `state` that the robot knows; the arrival is `stamp_ns` [ns]. `q_d` and `dq_d` are what the robot's own
 /// controller follows, or followed last where torques are commanded.

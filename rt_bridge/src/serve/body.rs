@@ -2,7 +2,6 @@
 #![allow(non_snake_case)] // the field's own symbols
 
 use super::ServeError;
-use super::generator::rules::PERIOD;
 use super::kinematics::Frame;
 use super::observer::{Observer, Touched};
 use super::self_collision::SelfCollision;
@@ -11,8 +10,10 @@ use nalgebra::Vector6;
 use shared_mem::cell::{Cell, ControllerKind};
 use shared_mem::msg::arm::ArmState;
 use shared_mem::theta::Theta;
+use shared_mem::time::TICK;
 use twin::arm::{ArmModel, ControlLaw, GainError, JointState, Joints, MassProperties};
-use twin::sim::{Drive, SimCell};
+use twin::control::Drive;
+use twin::sim::SimCell;
 
 /// Deceleration of a joint whose brake has closed [rad/s²]. The vendor publishes none: this one stops a joint at its
 /// highest speed within 0.05 s.
@@ -105,8 +106,8 @@ impl Body {
     /// Lets a millisecond pass with the brakes closed: each joint comes to rest and stays there, whatever pulls at it.
     pub(super) fn step_braked(&mut self) {
         let JointState { q, dq } = self.true_reading();
-        let slower = dq.map(|v| v - v.clamp(-BRAKE * PERIOD, BRAKE * PERIOD));
-        let stopped: Joints = std::array::from_fn(|i| q[i] + 0.5 * (dq[i] + slower[i]) * PERIOD);
+        let slower = dq.map(|v| v - v.clamp(-BRAKE * TICK, BRAKE * TICK));
+        let stopped: Joints = std::array::from_fn(|i| q[i] + 0.5 * (dq[i] + slower[i]) * TICK);
         // The object, if there is one, goes on; the arm is moved by its brakes alone.
         self.cell.remove_arm();
         self.cell.step(&self.cell.command());

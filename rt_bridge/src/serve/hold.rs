@@ -1,9 +1,9 @@
 //! What the arm does while nobody commands it: come to rest inside its limits, then hold that pose.
 
-use super::generator::rules::PERIOD;
 use crate::motion::Brake;
 use crate::safety::{Limits, Trace};
 use shared_mem::msg::MAX_JOINTS;
+use shared_mem::time::TICK;
 use twin::arm::Joints;
 
 /// The arm's own set points.
@@ -18,7 +18,7 @@ pub(super) struct Hold {
 impl Hold {
     /// At rest at `q`.
     pub(super) fn at_rest(limits: Limits, q: &Joints) -> Self {
-        Self { brake: Brake::new(limits, PERIOD), trace: Trace::at_rest(*q), dq_d: [0.0; MAX_JOINTS], braking: false }
+        Self { brake: Brake::new(limits, TICK), trace: Trace::at_rest(*q), dq_d: [0.0; MAX_JOINTS], braking: false }
     }
 
     /// Stops what was to move as `trace`.
@@ -41,9 +41,9 @@ impl Hold {
     /// there.
     pub(super) fn approach(&mut self, goal: &Joints, speed: f64) -> bool {
         let from = self.trace.q;
-        let step: Joints = std::array::from_fn(|i| (goal[i] - from[i]).clamp(-speed * PERIOD, speed * PERIOD));
+        let step: Joints = std::array::from_fn(|i| (goal[i] - from[i]).clamp(-speed * TICK, speed * TICK));
         self.trace = Trace::at_rest(std::array::from_fn(|i| from[i] + step[i]));
-        self.dq_d = step.map(|step| step / PERIOD);
+        self.dq_d = step.map(|step| step / TICK);
         let moves = step.iter().any(|step| *step != 0.0);
         if !moves {
             self.settle(goal);
@@ -56,7 +56,7 @@ impl Hold {
         if self.braking {
             let step = self.brake.step();
             self.trace =
-                if step.at_rest { Trace::at_rest(step.point.q_d) } else { self.trace.after(&step.point.q_d, PERIOD) };
+                if step.at_rest { Trace::at_rest(step.point.q_d) } else { self.trace.after(&step.point.q_d, TICK) };
             (self.dq_d, self.braking) = (step.point.dq_d, !step.at_rest);
         }
     }

@@ -3,18 +3,18 @@
 #![allow(non_snake_case)] // the field's own symbols
 
 use super::faults::{Fault, Verdict};
-use super::generator::rules::PERIOD;
 use super::generator::{Generator, Surroundings};
 use super::losses::Losses;
 use super::wire::{Controller, GeneratorKind, MotionRequest, SetPoint};
 use crate::arm::ReflexErrors;
 use crate::safety::TORQUE_RATE;
 use shared_mem::msg::{MAX_JOINTS, joints_from};
+use shared_mem::time::TICK;
 use std::ops::RangeInclusive;
 use twin::arm::Joints;
 
 /// What a client's single-precision echo of a torque of 64 to 128 N m may be off, as a rate [N m/s].
-const ECHO_RATE: f64 = 4e-6 / PERIOD;
+const ECHO_RATE: f64 = 4e-6 / TICK;
 
 /// What a cycle of a motion came to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -109,7 +109,7 @@ impl Motion {
     fn take_torque(&mut self, set_point: &SetPoint, held: &Joints) -> Verdict {
         let (asked, zero) = (joints_from(&set_point.tau_J_d), [0.0; MAX_JOINTS]);
         let continuous = |before: &Joints| {
-            let rate = |(now, before): (&f64, &f64)| (now - before).abs() / PERIOD;
+            let rate = |(now, before): (&f64, &f64)| (now - before).abs() / TICK;
             asked.iter().zip(before).map(rate).all(|rate| rate <= TORQUE_RATE + ECHO_RATE)
         };
         let fits = match &self.tau_J_d {

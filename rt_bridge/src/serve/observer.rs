@@ -10,10 +10,9 @@ use super::kinematics::{Frame, least_stretch, seven, turned};
 use super::wire::Thresholds;
 use nalgebra::Vector6;
 use shared_mem::msg::MAX_JOINTS;
+use shared_mem::time::TICK;
 use twin::arm::{ArmModel, JointState, Joints};
 
-/// Period of the sensors [s].
-const PERIOD: f64 = 1e-3;
 /// Time constant of the estimate [s]. The robot's own is not published; this one passes 10 Hz and leaves 0.05 N m of what
 /// the encoders' noise makes of an acceleration.
 const LAG: f64 = 0.016;
@@ -40,11 +39,11 @@ impl Observer {
             dq: std::array::from_fn(|i| 0.5 * (self.last.dq[i] + now.dq[i])),
         };
         let (mass, bias, rotor) = (model.mass_matrix(&middle.q), model.bias(&middle), model.rotor_inertia());
-        let ddq: Joints = std::array::from_fn(|i| (now.dq[i] - self.last.dq[i]) / PERIOD);
+        let ddq: Joints = std::array::from_fn(|i| (now.dq[i] - self.last.dq[i]) / TICK);
         for i in 0..model.dof() {
             let with_rotor: f64 = mass[i].iter().zip(&ddq).map(|(m, ddq)| m * ddq).sum();
             let expected = with_rotor - rotor[i] * ddq[i] + bias[i];
-            self.tau_ext[i] += (tau_J[i] - expected - self.tau_ext[i]) * PERIOD / (PERIOD + LAG);
+            self.tau_ext[i] += (tau_J[i] - expected - self.tau_ext[i]) * TICK / (TICK + LAG);
         }
         self.last = *now;
     }

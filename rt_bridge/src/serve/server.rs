@@ -19,14 +19,13 @@ use crate::times::{Percentiles, Times};
 use serde::Serialize;
 use shared_mem::cell::Cell;
 use shared_mem::theta::Theta;
+use shared_mem::time::TICK_NS;
 use shared_mem::time::now_ns;
 use std::io;
 use std::net::{IpAddr, Ipv4Addr, SocketAddr, TcpListener};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-/// The robot's period [ns].
-const PERIOD_NS: u64 = 1_000_000;
 /// What a client is left of it at least, however late the thread woke [ns].
 const LEAST_NS: u64 = 800_000;
 /// How long a set point is waited for between two looks at the client's other socket, in lock-step.
@@ -151,7 +150,7 @@ impl Server {
             let _not_granted = process::set_fifo(process::SIMULATION_PRIORITY);
         }
         let until = Until { stop, end: duration.and_then(|duration| Instant::now().checked_add(duration)) };
-        let mut next_ns = now_ns() + PERIOD_NS;
+        let mut next_ns = now_ns() + TICK_NS;
         while !until.is_over() {
             let awaited = self.pace != Pace::RealTime && self.robot.is_commanded();
             if !(awaited && self.pace == Pace::Fast) {
@@ -177,7 +176,7 @@ impl Server {
     /// Takes note of having woken, and says when to wake next [ns].
     fn woke(&mut self, planned_ns: u64) -> u64 {
         let now = now_ns();
-        let (regular, least) = (planned_ns + PERIOD_NS, now + LEAST_NS);
+        let (regular, least) = (planned_ns + TICK_NS, now + LEAST_NS);
         if self.pace == Pace::RealTime {
             self.slipped += u64::from(least > regular);
             self.late.record(now.saturating_sub(planned_ns));

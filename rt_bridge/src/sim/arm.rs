@@ -1,8 +1,9 @@
 //! The control thread's end of the simulated cell.
 
-use crate::arm::{Arm, ArmFault, Clock, Desired, PERIOD_NS, Read};
+use crate::arm::{Arm, ArmFault, Clock, Desired, Read};
 use rtrb::{Consumer, Producer};
 use shared_mem::msg::arm::{ArmCommand, ArmState, CommandInterface};
+use shared_mem::time::TICK_NS;
 use shared_mem::time::now_ns;
 use std::thread::Thread;
 
@@ -24,7 +25,7 @@ impl Arm for SimArm {
     }
 
     fn clock(&self) -> Clock {
-        Clock::Timer { period_ns: PERIOD_NS }
+        Clock::Timer { period_ns: TICK_NS }
     }
 
     fn start(&mut self, _interface: CommandInterface) -> Result<Desired, ArmFault> {

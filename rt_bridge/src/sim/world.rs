@@ -12,11 +12,12 @@ use shared_mem::msg::wrench::Wrench;
 use shared_mem::theta::Theta;
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
+use twin::control::Drive;
 use twin::effects::CameraEffects;
 use twin::scene::SceneSnapshot;
 use twin::sensors::tracker::SimTracker;
 use twin::sensors::wrench::SimWrench;
-use twin::sim::{Drive, SimCell, SimError};
+use twin::sim::{SimCell, SimError};
 
 /// States and commands that can be under way: one of each in lock-step.
 const IN_FLIGHT: usize = 2;

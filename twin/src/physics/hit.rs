@@ -10,6 +10,7 @@
 //! than its oscillation: it goes to where it rests, and counts on what accelerates both sides meanwhile.
 
 use super::touch::Touch;
+use crate::contact_law::ContactLaw;
 use nalgebra::Vector3;
 
 /// Angle of the oscillator in a step [rad]. Half of it moves the mean gap of the clips in `tests/sliding_clips.rs` by 0.3 mm
@@ -21,17 +22,6 @@ const STEP_ANGLE: f64 = 0.15;
 const PUSHING: f64 = 3.0;
 /// A contact is steady while its oscillation adds less than this [m/s²].
 const CALM: f64 = 12.0;
-
-/// The law's numbers.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ContactLaw {
-    /// Stiffness of tip and object in series [N/m].
-    pub stiffness: f64,
-    /// Share of the approach speed with which the two part again, 0 to 1.
-    pub restitution: f64,
-    /// Coulomb friction between tool and object.
-    pub friction: f64,
-}
 
 /// The tool against one place of the object.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -59,24 +49,7 @@ pub struct ContactMotion {
     pub(super) friction: f64,
 }
 
-/// A hard tip on a hard box: 0.3 kg part from the tool after 1 to 2 ms. Half or twice as much moves the mean gap of the
-/// clips in `tests/sliding_clips.rs` by up to 0.6 mm.
-pub const STIFFNESS: f64 = 2.0e6;
-/// Such tips and boxes bounce little. 0.135, that of a critically damped contact, and 0.3 move the same gap by up to 1 mm.
-pub const RESTITUTION: f64 = 0.25;
-
 impl ContactLaw {
-    /// The nominal law with an object's friction.
-    #[must_use]
-    pub fn nominal(friction: f64) -> Self {
-        Self { stiffness: STIFFNESS, restitution: RESTITUTION, friction }
-    }
-
-    /// Puts another spring in series with the contact's [m/N].
-    pub fn yield_by(&mut self, compliance: f64) {
-        self.stiffness = 1.0 / (1.0 / self.stiffness + compliance);
-    }
-
     /// What it asks of an object of `mass` [kg].
     #[must_use]
     pub fn motion(&self, mass: f64) -> ContactMotion {

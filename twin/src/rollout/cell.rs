@@ -1,13 +1,15 @@
 //! One worker for a whole cell: made once, then started, run, stopped and resumed without allocating.
 
-use super::{ArmRollout, CellTrace, CommandTrack, ContactSpan, Course, Drive, ObjectState, Reading, TICK_NS};
+use super::{CellTrace, ContactSpan, Course, ObjectState};
 use crate::arm::JointState;
+use crate::control::{ArmRollout, CommandTrack, Drive, Reading};
 use crate::effects::CameraMemory;
 use crate::sim::{SimCell, SimError, SimState};
 use shared_mem::cell::Cell;
 use shared_mem::ending;
 use shared_mem::frames::{Base, Object, Pose};
 use shared_mem::theta::Theta;
+use shared_mem::time::TICK_NS;
 
 /// Arm, tool, object and table of one cell under one set of parameters, somewhere in a clip.
 ///

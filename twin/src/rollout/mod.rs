@@ -2,7 +2,7 @@
 //!
 //! [`CellRollout`] is a worker for one cell: arm, tool, object, table and effects. It is made once, takes other
 //! parameters cheaply, and from then on starts, runs, is stopped and resumed without allocating. [`Workers`] runs many
-//! jobs on all cores. [`ArmRollout`] is the arm alone, for callers that hold its model themselves.
+//! jobs on all cores. [`crate::control::ArmRollout`] is the arm alone, for callers that hold its model themselves.
 //!
 //! Time runs on a grid of 1 ms control ticks from the start stamp. At a tick the controller sees the state of that
 //! moment and the newest command, and its torque holds until the next tick. Predictions between ticks are interpolated,
@@ -11,34 +11,14 @@
 //!
 //! | file | owns |
 //! |---|---|
-//! | `commands` | [`CommandTrack`]: what the robot was told |
-//! | `plant` | [`Plant`]: arm, controller and hidden effects of a cell |
-//! | `motion` | one control period of an arm: the only implementation of it |
-//! | `arm` | [`ArmRollout`] over a whole clip |
-//! | `start` | the state an arm was in when its recording begins |
 //! | `cell` | [`CellRollout`] |
 //! | `trace` | what a rollout is asked for and what it answers |
 //! | `workers` | [`Workers`]: many jobs on all cores |
 
-mod arm;
 mod cell;
-mod commands;
-mod motion;
-mod plant;
-mod start;
 mod trace;
 mod workers;
 
-pub use arm::{ArmRollout, between};
 pub use cell::{CellRollout, Checkpoint};
-pub use commands::{CommandTrack, Hole};
-pub(crate) use motion::ArmMotion;
-pub use motion::{Drive, Reading};
-pub use plant::Plant;
 pub use trace::{CellTrace, ContactSpan, Course, ObjectState};
 pub use workers::Workers;
-
-/// Period of the controller [ns].
-pub const TICK_NS: u64 = 1_000_000;
-/// Period of the controller [s].
-pub const TICK: f64 = 1e-3;

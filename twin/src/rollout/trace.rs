@@ -1,6 +1,6 @@
 //! What a rollout is asked for and what it answers. Stamps integer nanoseconds, base frame, SI.
 
-use super::{CommandTrack, Reading};
+use crate::control::{CommandTrack, Reading};
 use nalgebra::Vector3;
 use shared_mem::frames::{Base, Object, Pose};
 

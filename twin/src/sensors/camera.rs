@@ -4,14 +4,15 @@
 //! Called by the camera thread of the bridge: allocates nothing after its first picture, unless the robot is drawn from
 //! splats.
 
+use super::camera_clock_ns;
 use super::depth::{self, DepthSensor};
-use super::{camera_clock_ns, generator};
 use crate::effects::CameraEffects;
 use crate::render::session::ViewError;
 use crate::render::splat::{Lens, Picture, read_links};
 use crate::render::{Drawer, Hand, Mesh, Pinhole, Raster, RobotSurface, ScannedLink, Shown, looks, strays};
 use crate::scene::SceneSnapshot;
 use crate::sim::SimError;
+use crate::sim::generator;
 use nalgebra::{Isometry3, Vector3};
 use shared_mem::cell::{Camera, Cell};
 use shared_mem::msg::image::{CameraInfo, ImageHeader, PixelEncoding, StampDomain};

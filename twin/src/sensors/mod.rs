@@ -1,10 +1,9 @@
-//! What the simulated cell's instruments report: encoders, a depth camera, an object tracker, a force
-//! sensor. Each takes the true
-//! state of [`crate::sim::SimCell`] and adds what the real instrument adds: noise, latency, its own clock.
+//! What the instruments around the simulated cell report: a depth camera, an object tracker, a force sensor. Each takes the true
+//! state of [`crate::sim::SimCell`] and adds what the real instrument adds: noise, latency, its own clock. Encoders belong to
+//! the simulated arm itself.
 
 pub mod camera;
 mod depth;
-pub mod joint;
 pub mod tracker;
 pub mod wrench;
 
@@ -15,10 +14,4 @@ const CAMERA_EPOCH_NS: u64 = 86_400_123_456_789;
 #[must_use]
 pub fn camera_clock_ns(time_ns: u64) -> u64 {
     CAMERA_EPOCH_NS + time_ns
-}
-
-/// The generator behind one instrument: the cell's seed, and a stream of its own for each instrument, so that adding
-/// one instrument does not change what another reports.
-fn generator(cell: &shared_mem::cell::Cell, stream: u64) -> rand_pcg::Pcg64 {
-    rand_pcg::Pcg64::new(u128::from(cell.simulation.seed), u128::from(stream))
 }

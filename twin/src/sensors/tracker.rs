@@ -1,9 +1,10 @@
 //! A simulated object tracker: looks at the object whenever the camera takes a picture, and tells its pose one latency
 //! later, with noise. Base frame.
 
-use super::{camera_clock_ns, generator};
+use super::camera_clock_ns;
 use crate::effects::{CameraEffects, CameraMemory};
 use crate::scene::SceneSnapshot;
+use crate::sim::generator;
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use rand_distr::{Distribution as _, StandardNormal};
 use shared_mem::cell::{Cell, PoseNoise};

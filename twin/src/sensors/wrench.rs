@@ -7,11 +7,12 @@
 //! frame, which is the flange's.
 
 use crate::arm::{FlangeMotion, MassProperties};
-use crate::sim::{PERIOD, SimCell};
+use crate::sim::SimCell;
 use nalgebra::Vector3;
 use rand_distr::{Distribution as _, Normal};
 use shared_mem::cell::{Cell, WrenchSensor};
 use shared_mem::msg::wrench::Wrench;
+use shared_mem::time::TICK;
 
 /// Gravity in the base frame [m/s²].
 const GRAVITY: Vector3<f64> = Vector3::new(0.0, 0.0, -9.81);
@@ -39,7 +40,7 @@ impl SimWrench {
             described,
             tool: cell.tool.as_ref().map(MassProperties::of_tool).unwrap_or_default(),
             noise: [normal(described.noise.force), normal(described.noise.torque)],
-            generator: super::generator(cell, 4),
+            generator: crate::sim::generator(cell, 4),
             before: None,
             due_ns: 0,
             sequence: 0,
@@ -86,8 +87,8 @@ fn felt(
 ) -> [Vector3<f64>; 2] {
     let rotation = now.pose.rotation;
     let (origin, omega) = (now.pose.translation.vector, now.angular_velocity);
-    let acceleration = (now.velocity - before.velocity) / PERIOD;
-    let alpha = (omega - before.angular_velocity) / PERIOD;
+    let acceleration = (now.velocity - before.velocity) / TICK;
+    let alpha = (omega - before.angular_velocity) / TICK;
     let arm = rotation * tool.centre;
     let of_centre = acceleration + alpha.cross(&arm) + omega.cross(&omega.cross(&arm));
     let turn = rotation.to_rotation_matrix();
@@ -102,7 +103,7 @@ fn felt(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::sim::Drive;
+    use crate::control::Drive;
     use std::path::Path;
 
     const SHIPPED: &str = include_str!("../../../config/fr3_cell.toml");

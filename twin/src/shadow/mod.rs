@@ -16,8 +16,9 @@ mod tests;
 pub use object::ObjectEvent;
 pub use report::{Ages, Summary};
 
+use crate::control::Drive;
 use crate::scene::{MeshFileError, ObjectModel};
-use crate::sim::{Drive, PERIOD_NS, SimCell, SimError};
+use crate::sim::{SimCell, SimError};
 use gap::JointGap;
 use object::ObjectMirror;
 use shared_mem::cell::Cell;
@@ -26,6 +27,7 @@ use shared_mem::msg::object::ObjectPose;
 use shared_mem::msg::twin::{TwinGap, TwinState};
 use shared_mem::msg::{Joints, MAX_JOINTS};
 use shared_mem::theta::Theta;
+use shared_mem::time::TICK_NS;
 use std::fmt;
 
 /// Missing cycles that are bridged by simulating them; a longer hole aligns the twin anew.
@@ -204,7 +206,7 @@ impl Shadow {
             return Step::Align(Event::ClockWentBack);
         }
         // Rounded: a robot's own clock may jitter against the period.
-        let periods = (state.device_ns - last.device_ns + PERIOD_NS / 2) / PERIOD_NS;
+        let periods = (state.device_ns - last.device_ns + TICK_NS / 2) / TICK_NS;
         if periods > LONGEST_HOLE + 1 {
             return Step::Align(Event::Hole(periods - 1));
         }

@@ -94,6 +94,6 @@ impl Summary {
     }
 
     fn real_time_factor(&self, busy_s: f64) -> Option<f64> {
-        (self.cycles > 0).then(|| self.cycles as f64 * crate::sim::PERIOD / busy_s.max(1e-9))
+        (self.cycles > 0).then(|| self.cycles as f64 * shared_mem::time::TICK / busy_s.max(1e-9))
     }
 }

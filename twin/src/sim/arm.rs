@@ -2,15 +2,16 @@
 #![allow(non_snake_case)] // the Franka Control Interface's own symbols
 
 use super::SimError;
+use super::joint_noise::JointNoise;
 use super::tool_path::{Reaction, ToolPath};
 use crate::arm::{ArmModel, FlangeMotion, JointState, Joints, MAX_JOINTS};
+use crate::control::{ArmMotion, CommandTrack, Drive, Plant, Reading};
 use crate::effects::{ArmEffects, ArmMemory, JointMemory};
-use crate::rollout::{ArmMotion, CommandTrack, Drive, Plant, Reading, TICK};
-use crate::sensors::joint::JointNoise;
 use shared_mem::cell::{Cell, Controller};
 use shared_mem::msg::arm::{ArmMode, ArmState};
 use shared_mem::msg::joints_from;
 use shared_mem::theta::Theta;
+use shared_mem::time::TICK;
 
 #[derive(Clone)]
 pub(super) struct SimArm {

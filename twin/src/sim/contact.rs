@@ -2,17 +2,19 @@
 //! another; a touch begins inside the period where the gap closes, is followed in short steps, and its force acts on both
 //! at the same point with opposite signs.
 
+use super::Drive;
 use super::arm::SimArm;
 use super::tool_path::{ToolMotion, ToolPath};
-use super::{Drive, PERIOD};
 use crate::arm::{FlangeMotion, Joints};
+use crate::contact_law::ContactLaw;
 use crate::effects::HitEffects;
 use crate::physics::TableObject;
-use crate::physics::hit::{ContactLaw, ContactMotion, Press};
+use crate::physics::hit::{ContactMotion, Press};
 use crate::physics::touch::{Capsule, Touch};
 use crate::scene::ObjectParameters;
 use nalgebra::{Isometry3, Point3, Translation3, Vector3};
 use shared_mem::cell::Tool;
+use shared_mem::time::TICK;
 
 /// A gap that is wider than this plus a period's approach stays open for the period [m].
 const MARGIN: f64 = 1e-3;
@@ -85,7 +87,7 @@ impl ToolContact {
     /// One period of an object that nothing touches.
     pub(super) fn pass(&self, object: &mut TableObject) {
         for _ in 0..self.parts {
-            object.step(PERIOD / f64::from(self.parts), &[]);
+            object.step(TICK / f64::from(self.parts), &[]);
         }
     }
 
@@ -99,7 +101,7 @@ impl ToolContact {
         };
         arm.begin_period(drive);
         let stretches = arm.stretches();
-        let length = PERIOD / f64::from(stretches);
+        let length = TICK / f64::from(stretches);
         for stretch in 0..stretches {
             let from = if stretch == 0 { from } else { arm.flange_motion() };
             let mut close = Close { contact: self, object, tool: &tool, motion: &motion };
@@ -144,7 +146,7 @@ impl ToolContact {
             let moving = ToolMotion::from(flange);
             let approach = (moving.velocity_at(&touch.point) - object.velocity_at(&touch.point)).norm();
             gap = -touch.depth;
-            if gap.is_nan() || gap < MARGIN + approach * PERIOD {
+            if gap.is_nan() || gap < MARGIN + approach * TICK {
                 return Outlook::Near(flange);
             }
         }
@@ -152,7 +154,7 @@ impl ToolContact {
         let of_tool = flange.velocity.norm() + flange.angular_velocity.norm() * reach;
         let of_object = object.centre_velocity().norm() + object.angular_velocity().norm() * object.bounding_radius();
         let open = time_to_close(gap - MARGIN, of_tool + of_object);
-        Outlook::Open { periods: ((open / PERIOD) as u32).max(1) }
+        Outlook::Open { periods: ((open / TICK) as u32).max(1) }
     }
 
     /// Arm or object are somewhere else now.
@@ -230,12 +232,12 @@ impl Close<'_> {
         let dt = left / (left * f64::from(self.contact.parts) / step).ceil();
         let forces = self.object.step(dt, &presses);
         let pressing: f64 = touches.iter().zip(&forces).map(|(touch, force)| force.dot(&touch.normal)).sum();
-        self.contact.record.mean_force += pressing * dt / PERIOD;
+        self.contact.record.mean_force += pressing * dt / TICK;
         let on_tool = [0, 1].map(|i| (touches[i].point, -forces[i]));
         let [force, moment] = &mut self.contact.record.on_tool;
         for (point, push) in &on_tool {
-            *force += push * (dt / PERIOD);
-            *moment += point.coords.cross(push) * (dt / PERIOD);
+            *force += push * (dt / TICK);
+            *moment += point.coords.cross(push) * (dt / TICK);
         }
         path.advance(dt, &on_tool, &tool.pose.translation.vector);
     }

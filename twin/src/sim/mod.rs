@@ -9,19 +9,21 @@
 
 mod arm;
 mod contact;
+mod generator;
+mod joint_noise;
 mod state;
 mod table;
 #[cfg(test)]
 mod tests;
 mod tool_path;
 
-pub use crate::rollout::Drive;
+pub(crate) use generator::generator;
 pub use state::SimState;
 
 use crate::arm::{ArmModel, GainError, JointState, Joints, MassProperties, ModelError};
+use crate::control::{CommandTrack, Drive, Plant, Reading};
 use crate::effects::{CameraEffects, EffectError, Effects};
 use crate::physics::{FlatMesh, TableObject};
-use crate::rollout::{CommandTrack, Plant, Reading};
 use crate::scene::{MeshFileError, ObjectModel, ObjectParameters, ParameterError, SceneSnapshot};
 use arm::SimArm;
 use contact::{ContactRecord, ToolContact};
@@ -30,12 +32,8 @@ use shared_mem::cell::{Cell, Controller, Tool};
 use shared_mem::frames::{Base, Object, Pose};
 use shared_mem::msg::arm::ArmState;
 use shared_mem::theta::Theta;
+use shared_mem::time::TICK_NS;
 use table::SolidTable;
-
-/// One control period [ns].
-pub const PERIOD_NS: u64 = 1_000_000;
-/// One control period [s].
-pub const PERIOD: f64 = 1e-3;
 
 /// The simulated cell.
 #[derive(Clone)]
@@ -174,7 +172,7 @@ impl SimCell {
             (None, Some(object)) => contact.pass(object),
             (None, None) => {}
         }
-        self.time_ns += PERIOD_NS;
+        self.time_ns += TICK_NS;
     }
 
     /// Lets the arm collide with the table, where the cell has an arm of known shape and a table. Off by default: a

@@ -2,8 +2,8 @@
 
 use super::contact::ContactRecord;
 use super::{SimCell, TakesPart};
+use crate::control::ArmMotion;
 use crate::physics::ObjectMotion;
-use crate::rollout::ArmMotion;
 
 /// The whole state of a cell at one moment, without the noise of its sensors.
 #[derive(Debug)]

@@ -4,6 +4,7 @@
 use super::*;
 use crate::arm::{ControlLaw, JointState, PointForce};
 use crate::shipped::shipped_exact;
+use shared_mem::time::TICK;
 
 /// The shipped cell with the table lifted to 30 mm under the tip and the box 20 mm beside it, so that turning joint 1
 /// strikes it.
@@ -20,7 +21,7 @@ fn striking() -> Cell {
 fn strike(cell: &mut SimCell, periods: u64, mut each: impl FnMut(&mut SimCell)) {
     let start = cell.q();
     for k in 0..periods {
-        let (share, rate) = smooth(k as f64 * PERIOD);
+        let (share, rate) = smooth(k as f64 * TICK);
         let (mut q_d, mut dq_d) = (start, [0.0; 8]);
         q_d[0] += 0.6 * share;
         dq_d[0] = 0.6 * rate;
@@ -79,7 +80,7 @@ fn the_client_s_torque_and_the_robot_s_own_controller_move_the_arm_alike() {
     let law = ControlLaw::new(description.controller.as_ref(), None, &model).expect("gains");
     let start = inside.q();
     for k in 0..1000 {
-        let (share, rate) = smooth(f64::from(k) * PERIOD);
+        let (share, rate) = smooth(f64::from(k) * TICK);
         let q_d = std::array::from_fn(|i| start[i] + if i < 7 { 0.2 * share } else { 0.0 });
         let dq_d = std::array::from_fn(|i| if i < 7 { 0.2 * rate } else { 0.0 });
         inside.step(&Drive::JointImpedance { q_d, dq_d });

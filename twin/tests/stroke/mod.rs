@@ -7,7 +7,8 @@ use shared_mem::recording::JointSeries;
 use shared_mem::theta::Theta;
 use std::path::Path;
 use twin::arm::{ArmModel, JointState};
-use twin::rollout::{CellRollout, CellTrace, CommandTrack, Course, ObjectState};
+use twin::control::CommandTrack;
+use twin::rollout::{CellRollout, CellTrace, Course, ObjectState};
 
 pub(crate) struct Stroke {
     pub(crate) cell: Cell,

@@ -9,7 +9,7 @@ use nalgebra::{Matrix4, Vector4};
 use shared_mem::cell::{Cell, Controller, ControllerKind};
 use shared_mem::recording::{Clip, JointSeries};
 use shared_mem::theta::Theta;
-use twin::rollout::TICK_NS;
+use shared_mem::time::TICK_NS;
 
 /// Half the time over which motion is smoothed [ns], rows counting less the farther away they are: as a cubic over 80 ms alone
 /// would, that passes 10 Hz, and no arm is driven faster.

@@ -13,9 +13,10 @@ use crate::forward::object;
 use shared_mem::cell::{Cell, ClipKind, TorqueSensing};
 use shared_mem::recording::{Clip, JointSeries};
 use shared_mem::theta::Theta;
+use shared_mem::time::{TICK, TICK_NS};
 use twin::arm::{ArmModel, Joints, MAX_JOINTS, ModelError};
+use twin::control::{CommandTrack, Plant, Reading};
 use twin::effects::Effects;
-use twin::rollout::{CommandTrack, Plant, Reading, TICK, TICK_NS};
 
 /// At most so many moments of a clip count; more would cost time and, in smooth motion, tell little.
 const MOMENTS: usize = 250;
@@ -312,7 +313,8 @@ mod tests {
     use shared_mem::recording::ObjectSeries;
     use shared_mem::theta::EffectTheta;
     use std::path::Path;
-    use twin::sim::{Drive, SimCell};
+    use twin::control::Drive;
+    use twin::sim::SimCell;
 
     /// A payload, so that torques are not those of an arm at rest, and a joint that swings under it.
     fn clip(cell: &Cell, theta: &Theta, torques_end_at_rows: bool) -> Clip {

@@ -15,9 +15,9 @@ use super::measured::{Row, StageName};
 use crate::forward::object::{self, ObjectClips};
 use nalgebra::DVector;
 use shared_mem::theta::Theta;
+use shared_mem::time::TICK_NS;
 use std::ops::Range;
 use twin::arm::Joints;
-use twin::rollout::TICK_NS;
 
 /// The joints of a clip in contact: from when the tool may first touch until it has let go.
 #[derive(Debug, Default)]

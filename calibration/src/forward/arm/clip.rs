@@ -8,8 +8,8 @@ use shared_mem::recording::{Clip, JointSeries, ReadError};
 use shared_mem::time::seconds_between;
 use std::ops::{Range, RangeInclusive};
 use twin::arm::ArmModel;
+use twin::control::CommandTrack;
 use twin::replay::in_model_order;
-use twin::rollout::CommandTrack;
 
 /// Rows within this time are averaged: no motion of an arm is that fast, and the average of white noise loses nothing [ns].
 const AVERAGED_NS: u64 = 5_000_000;

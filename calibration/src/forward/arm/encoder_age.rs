@@ -6,7 +6,7 @@ use crate::estimate::Random;
 use shared_mem::cell::{Cell, ControllerKind};
 use shared_mem::recording::JointSeries;
 use shared_mem::theta::Theta;
-use twin::rollout::{CommandTrack, Reading};
+use twin::control::{CommandTrack, Reading};
 
 /// One sigma of what is known beforehand [s]: a twentieth of a control period.
 const SIGMA: f64 = 5e-5;

@@ -34,8 +34,8 @@ use shared_mem::theta::Theta;
 use std::ops::Range;
 use std::sync::Mutex;
 use twin::arm::{ArmModel, JointState, ModelError};
+use twin::control::{ArmRollout, Plant, Reading};
 use twin::effects::Effects;
-use twin::rollout::{ArmRollout, Plant, Reading};
 
 /// What a robot logs about a joint.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]

@@ -6,8 +6,8 @@ use nalgebra::Vector3;
 use shared_mem::cell::Cell;
 use shared_mem::frames::{Base, Object, Pose};
 use shared_mem::recording::{Clip, ObjectSeries};
+use twin::control::CommandTrack;
 use twin::effects::CameraEffects;
-use twin::rollout::CommandTrack;
 
 /// Poses this far from the last (or first) ones move, in sigmas of the noise: 1 of 100 000 resting poses is.
 const MOVING_SIGMAS: f64 = 8.0;

@@ -13,11 +13,12 @@ use shared_mem::cell::{Cell, ClipKind};
 use shared_mem::ending;
 use shared_mem::frames::Pose;
 use shared_mem::theta::{ObjectTheta, Theta};
+use shared_mem::time::TICK_NS;
 use std::sync::Arc;
 use twin::arm::Joints;
 use twin::effects::CameraEffects;
 use twin::replay::object_start;
-use twin::rollout::{CellRollout, CellTrace, Course, ObjectState, TICK_NS};
+use twin::rollout::{CellRollout, CellTrace, Course, ObjectState};
 use twin::scene::ObjectModel;
 
 /// The simulation ends when the object has rested for so many periods and no recorded pose moves any more.

@@ -6,13 +6,14 @@
 
 use super::Surroundings;
 use super::inverse::solve;
-use super::rules::{FOLLOWING, JointRules, PERIOD, check_end_effector, check_end_effector_end, exceeds};
+use super::rules::{FOLLOWING, JointRules, check_end_effector, check_end_effector_end, exceeds};
 use crate::safety::Trace;
 use crate::serve::faults::{Fault, Verdict};
 use crate::serve::kinematics::{ELBOW, difference, elbow};
 use crate::serve::settings::isometry;
 use crate::serve::wire::SetPoint;
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3, Vector6};
+use shared_mem::time::TICK;
 use twin::arm::Joints;
 
 /// How far from the arm's desired pose a motion may begin [m, rad], and from its elbow [rad]. The robot's own
@@ -74,11 +75,11 @@ impl CartesianGenerator {
         if joint_3.is_some_and(|position| !(elbow.q_min..=elbow.q_max).contains(&position)) {
             return Err(Fault::ElbowLimit.alone());
         }
-        let jerk = (next.acceleration - self.trace.acceleration) / PERIOD;
+        let jerk = (next.acceleration - self.trace.acceleration) / TICK;
         check_end_effector(&next.twist, &next.acceleration, &jerk)?;
         let q = solve(&around.ee, &self.joints.q, &next.pose, joint_3)
             .ok_or(Fault::CartesianJointVelocityLimits.alone())?;
-        let joints = self.joints.after(&q, PERIOD);
+        let joints = self.joints.after(&q, TICK);
         around.rules.check(&self.joints, &joints, &FOLLOWING)?;
         (self.begun, self.trace, self.joints) = (true, next, joints);
         Ok(())
@@ -110,12 +111,12 @@ impl CartesianGenerator {
     /// One period on at the same acceleration; where no joint position has that pose, the joints go on alone.
     fn go_on(&mut self, around: &Surroundings) {
         let CartesianTrace { pose, twist, acceleration } = self.trace;
-        let twist = twist + acceleration * PERIOD;
+        let twist = twist + acceleration * TICK;
         let pose = moved(&pose, &twist);
         self.trace = CartesianTrace { pose, twist, acceleration };
         self.joints = match solve(&around.ee, &self.joints.q, &pose, None) {
-            Some(q) => self.joints.after(&q, PERIOD),
-            None => self.joints.onward(PERIOD),
+            Some(q) => self.joints.after(&q, TICK),
+            None => self.joints.onward(TICK),
         };
     }
 
@@ -128,8 +129,8 @@ impl CartesianGenerator {
 impl CartesianTrace {
     /// The trace after `pose` was commanded.
     fn to(&self, pose: &Isometry3<f64>) -> Self {
-        let twist = difference(&self.pose, pose) / PERIOD;
-        Self { pose: *pose, twist, acceleration: (twist - self.twist) / PERIOD }
+        let twist = difference(&self.pose, pose) / TICK;
+        Self { pose: *pose, twist, acceleration: (twist - self.twist) / TICK }
     }
 }
 
@@ -138,7 +139,7 @@ fn moved(pose: &Isometry3<f64>, twist: &Vector6<f64>) -> Isometry3<f64> {
     let (linear, angular): (Vector3<f64>, Vector3<f64>) =
         (twist.fixed_rows::<3>(0).into_owned(), twist.fixed_rows::<3>(3).into_owned());
     Isometry3::from_parts(
-        Translation3::from(pose.translation.vector + linear * PERIOD),
-        UnitQuaternion::from_scaled_axis(angular * PERIOD) * pose.rotation,
+        Translation3::from(pose.translation.vector + linear * TICK),
+        UnitQuaternion::from_scaled_axis(angular * TICK) * pose.rotation,
     )
 }

@@ -1,10 +1,11 @@
 //! Joint positions and joint velocities as set points.
 
-use super::rules::{COMMANDED, JointRules, PERIOD, exceeds};
+use super::rules::{COMMANDED, JointRules, exceeds};
 use crate::safety::Trace;
 use crate::serve::faults::{Fault, Verdict};
 use crate::serve::wire::SetPoint;
 use shared_mem::msg::joints_from;
+use shared_mem::time::TICK;
 use twin::arm::Joints;
 
 /// How far from the arm's desired positions a motion may begin [rad]. The robot's own tolerance is not published; it
@@ -35,12 +36,12 @@ impl JointGenerator {
     pub(super) fn follow(&mut self, set_point: Option<&SetPoint>, rules: &JointRules) -> Verdict {
         let last = self.trace;
         let Some(set_point) = set_point else {
-            self.trace = last.onward(PERIOD);
+            self.trace = last.onward(TICK);
             return Ok(());
         };
         let q = if self.velocities {
             let dq_c = joints_from(&set_point.dq_c);
-            std::array::from_fn(|i| last.q[i] + dq_c[i] * PERIOD)
+            std::array::from_fn(|i| last.q[i] + dq_c[i] * TICK)
         } else {
             joints_from(&set_point.q_c)
         };
@@ -48,7 +49,7 @@ impl JointGenerator {
         {
             return Err(Fault::JointStartPose.alone());
         }
-        let next = last.after(&q, PERIOD);
+        let next = last.after(&q, TICK);
         rules.check(&last, &next, &COMMANDED)?;
         (self.begun, self.trace) = (true, next);
         Ok(())

@@ -4,9 +4,8 @@
 use crate::safety::{JointLimits, Limits, Trace};
 use crate::serve::faults::{Fault, Verdict, all};
 use nalgebra::Vector6;
+use shared_mem::time::TICK;
 
-/// Period by which the robot differentiates [s].
-pub(in crate::serve) const PERIOD: f64 = 1e-3;
 /// What single precision loses of an angle between 2 and 4 rad, or of 2 to 4 m. A client that builds on the state's echo
 /// builds this into its set points, and each difference divides it by the period once more.
 const ECHO: f64 = 1.2e-7;
@@ -47,14 +46,14 @@ impl JointRules {
     pub(super) fn check(&self, last: &Trace, next: &Trace, names: &Names) -> Verdict {
         let (mut jumps, mut speeding, mut outside) = (Vec::new(), false, false);
         for (i, limits) in self.limits.counted().enumerate() {
-            let jerk = (next.a[i] - last.a[i]) / PERIOD;
-            if exceeds(next.a[i].abs(), limits.acceleration + 2.0 * ECHO / (PERIOD * PERIOD)) {
+            let jerk = (next.a[i] - last.a[i]) / TICK;
+            if exceeds(next.a[i].abs(), limits.acceleration + 2.0 * ECHO / (TICK * TICK)) {
                 jumps.push(names.acceleration);
             }
-            if exceeds(jerk.abs(), limits.jerk + 4.0 * ECHO / (PERIOD * PERIOD * PERIOD)) {
+            if exceeds(jerk.abs(), limits.jerk + 4.0 * ECHO / (TICK * TICK * TICK)) {
                 jumps.push(names.jerk);
             }
-            speeding |= next.v[i].abs() > highest_speed(limits, last.q[i], next.v[i]) + ECHO / PERIOD;
+            speeding |= next.v[i].abs() > highest_speed(limits, last.q[i], next.v[i]) + ECHO / TICK;
             outside |= !(limits.q_min..=limits.q_max).contains(&next.q[i]);
         }
         match (jumps.is_empty(), outside, speeding) {
@@ -68,7 +67,7 @@ impl JointRules {
 
     /// Judges a motion that ends with `last`: it has to be at rest, as far as one period can stop it.
     pub(super) fn check_end(&self, last: &Trace, names: &Names) -> Verdict {
-        let at_rest = |(i, limits): (usize, &JointLimits)| last.v[i].abs() / PERIOD <= limits.acceleration;
+        let at_rest = |(i, limits): (usize, &JointLimits)| last.v[i].abs() / TICK <= limits.acceleration;
         if self.limits.counted().enumerate().all(at_rest) { Ok(()) } else { Err(names.acceleration.alone()) }
     }
 }
@@ -86,7 +85,7 @@ pub(in crate::serve) fn highest_speed(limits: &JointLimits, q: f64, v: f64) -> f
 /// Judges the end effector by its twist, its rate and the rate of that: linear part, then angular, in SI units.
 pub(super) fn check_end_effector(twist: &Vector6<f64>, acceleration: &Vector6<f64>, jerk: &Vector6<f64>) -> Verdict {
     let too_much = |v: &Vector6<f64>, order: usize| {
-        let slack = ECHO * 2.0_f64.powi(order as i32) / PERIOD.powi(order as i32 + 1);
+        let slack = ECHO * 2.0_f64.powi(order as i32) / TICK.powi(order as i32 + 1);
         let (linear, angular) = (v.fixed_rows::<3>(0).norm(), v.fixed_rows::<3>(3).norm());
         exceeds(linear, TRANSLATION[order] + slack) || exceeds(angular, ROTATION[order] + 2.0 * slack)
     };
@@ -109,7 +108,7 @@ pub(super) fn check_end_effector(twist: &Vector6<f64>, acceleration: &Vector6<f6
 /// Judges an end effector that stops here.
 pub(super) fn check_end_effector_end(twist: &Vector6<f64>) -> Verdict {
     let (linear, angular) = (twist.fixed_rows::<3>(0).norm(), twist.fixed_rows::<3>(3).norm());
-    let at_rest = linear / PERIOD <= TRANSLATION[1] && angular / PERIOD <= ROTATION[1];
+    let at_rest = linear / TICK <= TRANSLATION[1] && angular / TICK <= ROTATION[1];
     if at_rest { Ok(()) } else { Err(Fault::CartesianVelocityDiscontinuity.alone()) }
 }
 

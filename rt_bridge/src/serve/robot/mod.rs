@@ -33,7 +33,7 @@ use super::ServeError;
 use super::body::Body;
 use super::faults::Fault;
 use super::generator::Surroundings;
-use super::generator::rules::{JointRules, PERIOD};
+use super::generator::rules::JointRules;
 use super::hold::Hold;
 use super::impedance;
 use super::kinematics::{Frame, least_stretch};
@@ -50,9 +50,10 @@ use crate::arm::ReflexErrors;
 use crate::safety::{Limits, Trace};
 use shared_mem::cell::Cell;
 use shared_mem::theta::Theta;
+use shared_mem::time::TICK;
 use std::ops::RangeInclusive;
 use twin::arm::{JointState, Joints};
-use twin::sim::Drive;
+use twin::control::Drive;
 
 /// A pose whose Jacobian stretches less than this in some direction is no start of a Cartesian motion.
 const SINGULAR: f64 = 0.01;
@@ -388,6 +389,6 @@ impl Robot {
 
 /// Where the joints should be and how fast, at the end of the period that a set point speaks of.
 fn aim(trace: &Trace) -> JointState {
-    let dq: Joints = std::array::from_fn(|i| trace.velocity_now(i, PERIOD));
+    let dq: Joints = std::array::from_fn(|i| trace.velocity_now(i, TICK));
     JointState { q: trace.q, dq }
 }

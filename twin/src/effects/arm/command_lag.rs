@@ -10,7 +10,7 @@ use crate::arm::Joints;
 use crate::effects::change::Change;
 use crate::effects::registry::{EffectInfo, Parameter, Place, Stage};
 use crate::effects::remedy::{Remedy, milliseconds, short};
-use crate::rollout::TICK;
+use shared_mem::time::TICK;
 
 pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     name: "command_lag",

@@ -1,7 +1,7 @@
 //! Joint values that come later by a time that need not be a whole number of ticks.
 
 use crate::arm::Joints;
-use crate::rollout::TICK;
+use shared_mem::time::TICK;
 
 /// Values of the last ticks. A fraction of a tick is a straight line between two of them: the mean of a held signal over
 /// a tick, and continuous in the delay.

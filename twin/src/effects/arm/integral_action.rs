@@ -13,7 +13,7 @@ use crate::effects::change::Change;
 use crate::effects::registry::{EffectInfo, Parameter, Place, Stage};
 use crate::effects::remedy::Remedy;
 use crate::effects::separation::{Experiment, Separation};
-use crate::rollout::TICK;
+use shared_mem::time::TICK;
 
 pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     name: "integral_action",
@@ -80,7 +80,7 @@ impl IntegralAction {
 mod tests {
     use super::super::test_arm::{ROTOR, effects, first, joint};
     use crate::arm::{ControlLaw, JointState, MAX_JOINTS};
-    use crate::rollout::{ArmMotion, ArmRollout, Drive};
+    use crate::control::{ArmMotion, ArmRollout, Drive};
     use shared_mem::cell::ControllerKind;
 
     const INERTIA: f64 = ROTOR + 0.07;

@@ -37,8 +37,8 @@ pub(crate) use memory::JointMemory;
 
 use super::hit::tool_offset::ToolOffset;
 use crate::arm::{ArmModel, ControlLaw, JointState, Joints};
-use crate::rollout::TICK;
 use shared_mem::cell::ControllerKind;
+use shared_mem::time::TICK;
 
 /// The effects on an arm that are installed. Constant over time: one set may serve many rollouts at once.
 #[derive(Debug, Clone, Default, PartialEq)]

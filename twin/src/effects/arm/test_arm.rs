@@ -3,9 +3,9 @@
 use super::ArmEffects;
 use crate::arm::{ArmModel, JointState, Joints, MAX_JOINTS, MassProperties};
 use crate::effects::Effects;
-use crate::rollout::TICK;
 use shared_mem::cell::{Cell, Controller, Robot};
 use shared_mem::theta::Theta;
+use shared_mem::time::TICK;
 use std::path::Path;
 
 /// Rotor inertia of the joint [kg m²].

@@ -62,7 +62,7 @@ impl VoltageSaturation {
 mod tests {
     use super::super::test_arm::{ROTOR, effects, first, joint};
     use crate::arm::{ControlLaw, JointState};
-    use crate::rollout::{ArmMotion, ArmRollout, Drive};
+    use crate::control::{ArmMotion, ArmRollout, Drive};
     use shared_mem::cell::ControllerKind;
 
     #[test]

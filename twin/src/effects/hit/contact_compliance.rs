@@ -7,10 +7,10 @@
 //! - Signature (H8): extra impulse from the controller, which depends on its gains and on the follow-through.
 //! - Confused with: restitution, tip friction, tracker smoothing (softens the corner at impact too).
 
+use crate::contact_law::{ContactLaw, RESTITUTION};
 use crate::effects::change::Change;
 use crate::effects::registry::{EffectInfo, Parameter, Place, Stage};
 use crate::effects::remedy::{Remedy, short};
-use crate::physics::hit::{ContactLaw, RESTITUTION};
 
 pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     name: "contact_compliance",
@@ -63,7 +63,7 @@ impl ContactCompliance {
 #[cfg(test)]
 mod tests {
     use super::super::test_hit::effects;
-    use crate::physics::hit::ContactLaw;
+    use crate::contact_law::ContactLaw;
 
     #[test]
     fn a_compliance_equal_to_the_nominal_one_halves_the_stiffness() {

@@ -9,7 +9,7 @@ mod test_hit;
 pub(super) mod tip_friction;
 pub(in crate::effects) mod tool_offset;
 
-use crate::physics::hit::ContactLaw;
+use crate::contact_law::ContactLaw;
 use nalgebra::Translation3;
 
 /// The effects on a hit that are installed.

@@ -7,11 +7,11 @@
 //! - Signature (H1): the same ratio of speeds after and before at all speeds.
 //! - Confused with: the object's mass and inertia, contact compliance (depends on speed and gains), tip friction.
 
+use crate::contact_law::{ContactLaw, RESTITUTION};
 use crate::effects::change::Change;
 use crate::effects::registry::{EffectInfo, Parameter, Place, Stage};
 use crate::effects::remedy::{Remedy, short};
 use crate::effects::separation::{Experiment, Separation};
-use crate::physics::hit::{ContactLaw, RESTITUTION};
 
 pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     name: "restitution",
@@ -71,7 +71,7 @@ impl Restitution {
 #[cfg(test)]
 mod tests {
     use super::super::test_hit::effects;
-    use crate::physics::hit::ContactLaw;
+    use crate::contact_law::ContactLaw;
 
     #[test]
     fn it_takes_the_place_of_the_nominal_one_and_leaves_the_rest() {

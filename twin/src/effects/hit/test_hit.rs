@@ -2,9 +2,10 @@
 
 use super::HitEffects;
 use crate::arm::ArmModel;
+use crate::control::Drive;
 use crate::effects::Effects;
 use crate::shipped::shipped;
-use crate::sim::{Drive, SimCell};
+use crate::sim::SimCell;
 use nalgebra::{UnitQuaternion, Vector3};
 use shared_mem::cell::{Cell, Table};
 use shared_mem::theta::Theta;

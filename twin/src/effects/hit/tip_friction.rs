@@ -6,11 +6,11 @@
 //! - Signature (H5): oblique hits deflect and spin the object more or less, up to a limit.
 //! - Confused with: tool offset (turns off-centre hits), restitution.
 
+use crate::contact_law::ContactLaw;
 use crate::effects::change::Change;
 use crate::effects::registry::{EffectInfo, Parameter, Place, Stage};
 use crate::effects::remedy::{Remedy, short};
 use crate::effects::separation::{Experiment, Separation};
-use crate::physics::hit::ContactLaw;
 
 pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     name: "tip_friction",
@@ -49,7 +49,7 @@ impl TipFriction {
 #[cfg(test)]
 mod tests {
     use super::super::test_hit::effects;
-    use crate::physics::hit::ContactLaw;
+    use crate::contact_law::ContactLaw;
 
     #[test]
     fn it_adds_to_the_known_friction_and_never_makes_it_negative() {

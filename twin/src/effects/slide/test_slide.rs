@@ -1,8 +1,9 @@
 //! A box on a table, without an arm, to try effects on.
 
 use super::{SlideEffects, TableFriction};
+use crate::control::Drive;
 use crate::effects::Effects;
-use crate::sim::{Drive, SimCell};
+use crate::sim::SimCell;
 use crate::sliding::SlidingFriction as _;
 use nalgebra::{Isometry3, Vector2, Vector3};
 use shared_mem::cell::{Cell, Object, Table};

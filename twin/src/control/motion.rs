@@ -2,9 +2,10 @@
 //! arm (a rollout, the simulated cell, the shadow) comes through here. SI, joint arrays as in [`crate::arm`].
 #![allow(non_snake_case)] // the Franka Control Interface's own symbols
 
-use super::{ArmRollout, CommandTrack, TICK, TICK_NS};
+use super::{ArmRollout, CommandTrack};
 use crate::arm::{JointState, Joints, MAX_JOINTS, Yielding};
 use crate::effects::ArmMemory;
+use shared_mem::time::{TICK, TICK_NS};
 
 /// What an arm is told for one control period.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -6,7 +6,7 @@ use shared_mem::msg::Joints;
 
 /// Adds noise to measured joint positions and velocities.
 #[derive(Debug, Clone)]
-pub struct JointNoise {
+pub(super) struct JointNoise {
     position: Normal<f64>,
     velocity: Normal<f64>,
     position_step: f64,
@@ -17,7 +17,7 @@ pub struct JointNoise {
 impl JointNoise {
     /// Noise of a cell's encoders; none where cell.toml gives none.
     #[must_use]
-    pub fn new(cell: &Cell) -> Self {
+    pub(super) fn new(cell: &Cell) -> Self {
         let normal =
             |sigma: f64| Normal::new(0.0, sigma.abs()).unwrap_or_else(|_| Normal::new(0.0, 0.0).expect("zero"));
         Self {
@@ -30,7 +30,7 @@ impl JointNoise {
     }
 
     /// Adds a fresh draw to the first `dof` joints of `q` [rad] and `dq` [rad/s] and rounds them to the encoder's steps.
-    pub fn add(&mut self, dof: usize, q: &mut Joints, dq: &mut Joints) {
+    pub(super) fn add(&mut self, dof: usize, q: &mut Joints, dq: &mut Joints) {
         for (q, dq) in q.iter_mut().zip(dq).take(dof) {
             *q = rounded(*q + self.position.sample(&mut self.generator), self.position_step);
             *dq = rounded(*dq + self.velocity.sample(&mut self.generator), self.velocity_step);

@@ -1,10 +1,11 @@
 //! The arm of a cell with its controller and with what the controller does not know about it.
 
-use super::{ArmRollout, TICK};
+use super::ArmRollout;
 use crate::arm::{ArmModel, ControlLaw, GainError, Joints, MassProperties, Transmission, Yielding};
 use crate::effects::ArmEffects;
 use shared_mem::cell::{Cell, Controller};
 use shared_mem::theta::Theta;
+use shared_mem::time::TICK;
 
 /// Arm, controller and hidden effects. Constant over time.
 #[derive(Debug, Clone)]

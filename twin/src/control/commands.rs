@@ -1,9 +1,9 @@
 //! A recorded command series, laid out for the control loop.
 
-use super::TICK_NS;
 use crate::arm::{Joints, MAX_JOINTS};
 use shared_mem::msg::joints_from;
 use shared_mem::recording::JointSeries;
+use shared_mem::time::TICK_NS;
 
 /// A log at most this far apart is the control loop's own: a missing row was lost on its way to the log, not to the
 /// robot [ns].

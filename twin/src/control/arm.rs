@@ -1,10 +1,11 @@
 //! An arm simulated alone under a recorded command series.
 #![allow(non_snake_case)] // the Franka Control Interface's own symbols
 
-use super::{ArmMotion, CommandTrack, Drive, Reading, TICK, TICK_NS};
+use super::{ArmMotion, CommandTrack, Drive, Reading};
 use crate::arm::{ArmModel, ControlLaw, JointState, MAX_JOINTS};
 use crate::effects::ArmEffects;
 use shared_mem::ending;
+use shared_mem::time::{TICK, TICK_NS};
 
 /// An arm under its controller.
 #[derive(Debug, Clone, Copy)]
@@ -83,14 +84,14 @@ impl ArmRollout<'_> {
 
 impl Reading {
     /// What an interrupted run answers: no number, so that nobody takes it for a prediction.
-    pub(super) fn unknown() -> Self {
+    pub(crate) fn unknown() -> Self {
         let nan = [f64::NAN; MAX_JOINTS];
         Self { state: JointState { q: nan, dq: nan }, tau_J: nan, tau_J_d: nan }
     }
 
     /// The reading `share` of a period after `before`; torques hold over the period that ends with `self`.
     #[must_use]
-    pub(super) fn after(&self, before: &Self, share: f64) -> Self {
+    pub(crate) fn after(&self, before: &Self, share: f64) -> Self {
         Self { state: between(&before.state, &self.state, share), ..*self }
     }
 }

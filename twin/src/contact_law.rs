@@ -1,0 +1,31 @@
+//! Numbers of the contact between tool and object: what effects change of it, and what [`crate::physics::hit`] follows.
+
+/// The law's numbers.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ContactLaw {
+    /// Stiffness of tip and object in series [N/m].
+    pub stiffness: f64,
+    /// Share of the approach speed with which the two part again, 0 to 1.
+    pub restitution: f64,
+    /// Coulomb friction between tool and object.
+    pub friction: f64,
+}
+
+/// A hard tip on a hard box: 0.3 kg part from the tool after 1 to 2 ms. Half or twice as much moves the mean gap of the
+/// clips in `tests/sliding_clips.rs` by up to 0.6 mm.
+pub const STIFFNESS: f64 = 2.0e6;
+/// Such tips and boxes bounce little. 0.135, that of a critically damped contact, and 0.3 move the same gap by up to 1 mm.
+pub const RESTITUTION: f64 = 0.25;
+
+impl ContactLaw {
+    /// The nominal law with an object's friction.
+    #[must_use]
+    pub fn nominal(friction: f64) -> Self {
+        Self { stiffness: STIFFNESS, restitution: RESTITUTION, friction }
+    }
+
+    /// Puts another spring in series with the contact's [m/N].
+    pub fn yield_by(&mut self, compliance: f64) {
+        self.stiffness = 1.0 / (1.0 / self.stiffness + compliance);
+    }
+}
