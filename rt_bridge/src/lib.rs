@@ -28,6 +28,7 @@ pub mod gripper;
 pub mod motion;
 pub mod pump;
 pub mod recorder;
+pub mod remark;
 pub mod replay;
 pub mod rt;
 pub mod run;

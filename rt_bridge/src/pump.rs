@@ -2,10 +2,10 @@
 //! thread of a run that owns the arm's ports. It is woken by each beat, and looks by itself every few milliseconds for
 //! motions to hand on.
 
+use crate::remark::Remark;
 use crate::rt::cycle::Beat;
 use crate::rt::orders::OrderSender;
 use crate::rt::process;
-use crate::rt::remark::Remark;
 use crate::starting::{self, ThreadError};
 use crate::times::Times;
 use rtrb::Consumer;

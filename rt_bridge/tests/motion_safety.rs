@@ -3,7 +3,7 @@
 
 use proptest::prelude::*;
 use rt_bridge::motion::Player;
-use rt_bridge::rt::remark::{BrakeReason, Refusal, Remark};
+use rt_bridge::remark::{BrakeReason, Refusal, Remark};
 use rt_bridge::safety::{Guard, Limits, Trace, Violation, Workspace};
 use shared_mem::cell::{Cell, Robot, Table, Tool};
 use shared_mem::msg::MAX_JOINTS;

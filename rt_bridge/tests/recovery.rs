@@ -6,8 +6,8 @@ mod bench;
 
 use bench::Bench;
 use rt_bridge::arm::{Arm, ArmFault, Clock, Desired, Read, ReflexErrors};
+use rt_bridge::remark::{BrakeReason, Remark};
 use rt_bridge::rt::cycle::Turn;
-use rt_bridge::rt::remark::{BrakeReason, Remark};
 use shared_mem::cell::{Cell, Robot};
 use shared_mem::msg::arm::{ArmCommand, ArmMode, ArmState, CommandInterface, MotionStatus};
 use shared_mem::msg::motion::{MotionChunk, MotionKind, SetPoint};

@@ -7,10 +7,10 @@ mod counting;
 
 use bench::Bench;
 use counting::allocations;
+use rt_bridge::remark::{BrakeReason, Remark};
 use rt_bridge::rt::cycle::Turn;
 use rt_bridge::rt::deadline::Grid;
 use rt_bridge::rt::process::sleep_until;
-use rt_bridge::rt::remark::{BrakeReason, Remark};
 use rt_bridge::sim::World;
 use shared_mem::cell::Cell;
 use shared_mem::msg::arm::{ArmState, CommandInterface, MotionStatus};

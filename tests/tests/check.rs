@@ -10,7 +10,8 @@ use std::process::{Command, Output};
 use tests::program_path;
 use tests::texts::root;
 use twin::arm::ArmModel;
-use twin::sim::{Drive, SimCell};
+use twin::control::Drive;
+use twin::sim::SimCell;
 
 /// Two short clips in which the shipped arm moves; `turned`: a joint that is logged the other way round.
 fn record(folder: &Path, turned: Option<usize>) {

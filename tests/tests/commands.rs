@@ -11,7 +11,8 @@ use std::process::{Command, Output, Stdio};
 use std::time::{Duration, Instant};
 use tests::program_path;
 use tests::texts::{PROGRAMS, Verb, code_in, documents, flags_in, literals, root, verbs};
-use twin::sim::{Drive, SimCell};
+use twin::control::Drive;
+use twin::sim::SimCell;
 
 /// Flags that programs give each other, or that belong to programs of others.
 const OF_OTHERS: [&str; 5] = ["parent", "configuration", "shm-size", "features", "release"];

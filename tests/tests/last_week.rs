@@ -11,7 +11,8 @@ use std::process::Command;
 use tests::program_path;
 use tests::texts::root;
 use twin::arm::ArmModel;
-use twin::sim::{Drive, SimCell};
+use twin::control::Drive;
+use twin::sim::SimCell;
 
 /// Rows of a clip: 3 s.
 const ROWS: u64 = 3000;

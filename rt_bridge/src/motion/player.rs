@@ -9,7 +9,7 @@
 
 use super::ease::Ease;
 use super::{Brake, lost};
-use crate::rt::remark::{BrakeReason, Refusal, Remark};
+use crate::remark::{BrakeReason, Refusal, Remark};
 use crate::safety::{Guard, Outside, Trace};
 use shared_mem::msg::arm::{ArmState, MotionStatus};
 use shared_mem::msg::motion::{CHUNK_LENGTH, MotionChunk, MotionKind, SetPoint};

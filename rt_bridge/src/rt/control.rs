@@ -1,13 +1,13 @@
 //! The control thread: asks the machine for real time, then turns the cycle until it is told to stop.
 
 use super::Realtime;
-use super::claim::Claim;
 use super::cycle::{Cycle, Turn};
 use super::deadline::Grid;
 use super::process;
-use super::remark::Remark;
 use super::stats::LoopStats;
 use crate::arm::Clock;
+use crate::remark::Claim;
+use crate::remark::Remark;
 use shared_mem::time::now_ns;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};

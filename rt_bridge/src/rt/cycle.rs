@@ -8,16 +8,17 @@
 
 use super::law::TorquePd;
 use super::orders::Orders;
-use super::remark::{BrakeReason, Remark};
 use super::stats::{ArrivalLine, LoopStats};
-use crate::arm::{Arm, ArmFault, Clock, Desired, PERIOD_NS, Read};
+use crate::arm::{Arm, ArmFault, Clock, Desired, Read};
 use crate::motion::Player;
+use crate::remark::{BrakeReason, Remark};
 use crate::rt::deadline::Wake;
 use crate::safety::{Limits, TorqueGuard, Watchdog, watchdog::LONGEST_SILENCE_NS};
 use rtrb::Producer;
 use shared_mem::msg::arm::{ArmCommand, ArmMode, ArmState, CommandInterface};
 use shared_mem::msg::motion::{MotionKind, SetPoint};
 use shared_mem::msg::{Joints, MAX_JOINTS};
+use shared_mem::time::TICK_NS;
 use shared_mem::time::now_ns;
 use std::thread::Thread;
 use twin::arm::JointState;
@@ -260,7 +261,7 @@ impl Cycle {
         self.link.pump.unpark();
         let exec_ns = now_ns().saturating_sub(begin_ns);
         self.stats.exec.record(exec_ns);
-        self.stats.overruns += u64::from(exec_ns > PERIOD_NS);
+        self.stats.overruns += u64::from(exec_ns > TICK_NS);
         Turn::Continue
     }
 
@@ -271,7 +272,7 @@ impl Cycle {
         self.state.dof = u32::try_from(self.arm.dof()).unwrap_or(0);
         if self.last_begin_ns != 0 {
             self.stats.period.record(begin_ns.saturating_sub(self.last_begin_ns));
-            let steps = self.state.device_ns.saturating_sub(self.last_device_ns) / PERIOD_NS;
+            let steps = self.state.device_ns.saturating_sub(self.last_device_ns) / TICK_NS;
             if device_clocked && self.desired != Desired::Recorded {
                 self.stats.lost_packets += steps.saturating_sub(1);
             }
@@ -291,8 +292,7 @@ impl Cycle {
             CommandInterface::Torque => self.torque.resume(&self.state.tau_J_d),
             CommandInterface::JointPosition if !self.arm.extrapolates() => {}
             CommandInterface::JointPosition => {
-                self.player
-                    .reconcile(&self.state.q_d, self.state.device_ns.saturating_sub(self.answered_ns) / PERIOD_NS);
+                self.player.reconcile(&self.state.q_d, self.state.device_ns.saturating_sub(self.answered_ns) / TICK_NS);
             }
         }
     }
@@ -327,7 +327,7 @@ impl Cycle {
         };
         if let (CommandInterface::Torque, Some(law)) = (self.plan.interface, &self.plan.law) {
             let wanted = law.torque(&JointState { q: self.state.q, dq: self.state.dq }, point);
-            let clamped = self.torque.clamp(&wanted, &self.plan.limits, PERIOD_NS as f64 * 1e-9);
+            let clamped = self.torque.clamp(&wanted, &self.plan.limits, TICK_NS as f64 * 1e-9);
             command.tau_J_d = clamped.tau;
             self.stats.clamped += u64::from(clamped.held_back);
         }

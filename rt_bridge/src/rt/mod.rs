@@ -3,24 +3,22 @@
 //!
 //! | file | owns |
 //! |---|---|
-//! | [`claim`] | what the machine grants |
+//! | `claim` | what the machine is asked for |
 //! | [`control`] | the thread: real time, the loop, its end |
 //! | [`cycle`] | one turn: read, check, command, hand to the pump |
 //! | [`deadline`] | the timer's grid |
 //! | [`law`] | the joint-impedance law |
 //! | [`orders`] | motions and stops on their way to the loop |
-//! | [`remark`] | what there is to tell, as numbers |
 //! | [`stats`] | how well time was kept |
 //! | [`process`] | what is asked of Linux (the only `unsafe`) |
 
-pub mod claim;
+mod claim;
 pub mod control;
 pub mod cycle;
 pub mod deadline;
 pub mod law;
 pub mod orders;
 pub mod process;
-pub mod remark;
 pub mod stats;
 
 /// What to do when the machine does not grant real-time scheduling and locked memory.

@@ -2,10 +2,10 @@
 
 use rt_bridge::arm::Arm;
 use rt_bridge::motion::Player;
+use rt_bridge::remark::Remark;
 use rt_bridge::rt::cycle::{Beat, Cycle, Link, Plan, Turn};
 use rt_bridge::rt::law::TorquePd;
 use rt_bridge::rt::orders::{OrderSender, orders};
-use rt_bridge::rt::remark::Remark;
 use rt_bridge::safety::{Guard, Limits, Workspace};
 use rtrb::{Consumer, RingBuffer};
 use shared_mem::cell::Cell;

@@ -9,7 +9,8 @@ use rt_bridge::rt::Realtime;
 use rt_bridge::serve::Pace;
 use shared_mem::msg::arm::{ArmCommand, ArmMode, ArmState, CommandInterface};
 use twin::arm::{ArmModel, ControlLaw, JointState, Joints};
-use twin::sim::{Drive, SimCell};
+use twin::control::Drive;
+use twin::sim::SimCell;
 
 /// Cycles of a motion.
 const CYCLES: usize = 800;

@@ -17,7 +17,7 @@ use twin::sensors::camera::SimCamera;
 
 /// Frames in a clip.
 pub(crate) const FRAMES: u64 = 60;
-const PERIOD_NS: u64 = 33_333_333;
+const TICK_NS: u64 = 33_333_333;
 const SPEED: f64 = 0.5;
 
 /// The shipped cell with a box of this size, its camera and its noise.
@@ -83,7 +83,7 @@ pub(crate) fn standing(cell: &Cell, x: f64, y: f64, yaw: f64, frame: u64) -> Sce
     let model = ArmModel::from_cell(cell).expect("an arm");
     let half = cell.object.as_ref().and_then(|o| o.size).map_or(0.0, |size| size[2] / 2.0);
     SceneSnapshot {
-        time_ns: frame * PERIOD_NS,
+        time_ns: frame * TICK_NS,
         dof: 7,
         q: *model.ready(),
         object: Some(Pose::from_isometry(Isometry3::new(Vector3::new(x, y, half), Vector3::z() * yaw))),
@@ -107,7 +107,7 @@ pub(crate) fn clip(cell: &Cell, seed: u64) -> Vec<SceneSnapshot> {
     let mut q = *model.ready();
     (0..FRAMES)
         .map(|frame| {
-            let time = frame as f64 * PERIOD_NS as f64 * 1e-9 - stand;
+            let time = frame as f64 * TICK_NS as f64 * 1e-9 - stand;
             let slide = (time - pushed).clamp(0.0, SPEED / braking);
             let way = SPEED * time.clamp(0.0, pushed) + SPEED * slide - 0.5 * braking * slide * slide;
             let turned = spin * way / SPEED;
@@ -116,7 +116,7 @@ pub(crate) fn clip(cell: &Cell, seed: u64) -> Vec<SceneSnapshot> {
             q = reaching(&model, &q, &Vector3::new(tip.x, tip.y, 0.04));
             let place = start + along * way;
             let object = Isometry3::new(place, Vector3::z() * (yaw + turned));
-            SceneSnapshot { time_ns: frame * PERIOD_NS, dof: 7, q, object: Some(Pose::from_isometry(object)) }
+            SceneSnapshot { time_ns: frame * TICK_NS, dof: 7, q, object: Some(Pose::from_isometry(object)) }
         })
         .collect()
 }

@@ -1,8 +1,10 @@
 //! What the control thread has to tell people: `Copy` values that go through a ring to the pump, which words them.
 
-use super::claim::Claim;
+mod claim;
+
 use crate::arm::ArmFault;
 use crate::safety::Violation;
+pub use claim::Claim;
 use shared_mem::msg::event::EventLevel;
 use std::fmt;
 
