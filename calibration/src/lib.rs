@@ -14,6 +14,7 @@
 //! | [`init`] | a cell.toml to begin with, commented |
 //! | [`identify`] | the parameters that a session tells, and what it cannot tell |
 //! | [`model`] | what was found as a model file of MuJoCo, ROS or Gazebo |
+//! | [`page`] | what all pages are made of: words for numbers, pictures of plain numbers |
 //! | [`report`] | pages with plots |
 //! | [`viewpoint`] | the camera's pose from pictures of the robot |
 //! | [`processes`] | the other programs as children |
@@ -56,6 +57,7 @@ pub mod interrupt;
 pub mod kept;
 pub mod keys;
 pub mod model;
+pub mod page;
 pub mod processes;
 pub mod report;
 pub mod seed;

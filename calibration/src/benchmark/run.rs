@@ -1,10 +1,10 @@
 //! A whole benchmark: draws the worlds, records their sessions, has them diagnosed.
 
 use super::rules;
+use super::score::Method;
 use super::world::{Fault, Kind, Outside, World};
 use super::{draw, session, trial};
 use crate::interrupt::Interrupt;
-use crate::report::benchmark::Method;
 use shared_mem::cell::Cell;
 use shared_mem::console;
 use shared_mem::progress::Progress;

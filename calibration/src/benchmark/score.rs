@@ -248,6 +248,15 @@ fn at_least(hits: usize, of: usize, rate: f64) -> f64 {
     sum
 }
 
+/// What one method said about the worlds.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Method {
+    /// Its name in the table.
+    pub name: String,
+    /// World by world.
+    pub cases: Vec<Case>,
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

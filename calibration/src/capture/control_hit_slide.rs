@@ -19,7 +19,6 @@ use super::stroke::StrokeError;
 use super::task::{Summary, Task, cause};
 use super::way::Ways;
 use crate::interrupt::Interrupt;
-use crate::report;
 use serde::Serialize;
 use shared_mem::cell::{Cell, ClipKind};
 use shared_mem::console;
@@ -174,7 +173,7 @@ impl<'a> Desk<'a> {
             };
             let Some((next, motion)) = next else { break };
             if let Some(file) = &self.options.preview {
-                output::write(file, report::stroke::picture(&next, self.size))?;
+                output::write(file, super::picture::picture(&next, self.size))?;
                 console::line(format_args!("{}: the next stroke; the arm was not moved", file.display()));
                 break;
             }

@@ -19,6 +19,7 @@ pub mod link;
 pub mod multisine;
 pub mod object_watch;
 pub mod pace;
+mod picture;
 pub mod placing;
 pub mod plan;
 pub mod program;

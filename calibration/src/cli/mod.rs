@@ -1,10 +1,12 @@
 //! The command line of `calibration`: one file a verb.
 
+mod against;
 mod benchmark;
 mod capture;
 mod check;
 mod compare;
 mod demo;
+mod diagnose;
 mod export;
 mod export_model;
 mod identify;
@@ -12,7 +14,6 @@ mod import;
 mod init;
 mod viewpoint;
 
-use calibration::diagnose;
 use calibration::interrupt::Interrupt;
 use calibration::report::terminal;
 use clap::{Parser, Subcommand};
@@ -67,7 +68,7 @@ Examples:
     /// Ways of finding an object's parameters side by side: error, and what it cost.
     Compare(compare::CompareArguments),
     /// Where the twin differs from the cell, which effect causes it, and how far the gap shrinks with it.
-    Diagnose(diagnose::command::Arguments),
+    Diagnose(diagnose::Arguments),
     /// How often the diagnosis is right, on simulated worlds of which the truth is known.
     Benchmark(benchmark::BenchmarkArguments),
     /// The doctor of a recording: whether the data can mean what they say, and what each clip is good for.
@@ -117,11 +118,11 @@ fn run_to_the_end(verb: Verb, interrupt: &Interrupt) -> anyhow::Result<()> {
         Verb::Identify(identify) => identify::run(identify, interrupt),
         Verb::Compare(arguments) => compare::run(arguments, interrupt),
         Verb::Diagnose(arguments) if arguments.against.is_some() => {
-            let found = diagnose::against::command::run(&arguments, interrupt)?;
+            let found = against::run(&arguments, interrupt)?;
             print(arguments.json, &found, terminal::comparison(&found))
         }
         Verb::Diagnose(arguments) => {
-            let found = diagnose::command::run(&arguments, interrupt)?;
+            let found = diagnose::run(&arguments, interrupt)?;
             print(arguments.json, &found, terminal::diagnosis(&found))
         }
         Verb::Check(arguments) => check::run(&arguments),

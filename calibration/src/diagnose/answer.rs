@@ -1,7 +1,6 @@
 //! The answer of a diagnosis, as it is written to diagnosis.json and shown on the page.
 
-use crate::report::Trace;
-use serde::ser::{Serialize, SerializeStruct, Serializer};
+use crate::page::{Size, Trace};
 use shared_mem::recording::SessionFiles;
 use shared_mem::theta::Theta;
 use std::collections::BTreeMap;
@@ -241,41 +240,6 @@ pub enum Status {
     RuledOut,
     /// It could not have been seen.
     NotTestable,
-}
-
-/// A parameter of one or several numbers, in SI.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Size {
-    /// The numbers.
-    pub values: Vec<f64>,
-    /// A 90 % interval each.
-    pub ci90: Vec<[f64; 2]>,
-    /// SI unit; `1` without.
-    pub unit: String,
-}
-
-impl Size {
-    /// Whether the `k`-th number was fitted; else it was held at its default, and its interval has no width.
-    #[must_use]
-    pub fn is_fitted(&self, k: usize) -> bool {
-        self.ci90.get(k).is_none_or(|[low, high]| high > low)
-    }
-}
-
-impl Serialize for Size {
-    /// `{"value", "ci90", "unit"}`: a single number stands by itself, several as lists.
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let mut out = serializer.serialize_struct("Size", 3)?;
-        if let ([value], [interval]) = (&self.values[..], &self.ci90[..]) {
-            out.serialize_field("value", value)?;
-            out.serialize_field("ci90", interval)?;
-        } else {
-            out.serialize_field("value", &self.values)?;
-            out.serialize_field("ci90", &self.ci90)?;
-        }
-        out.serialize_field("unit", &self.unit)?;
-        out.end()
-    }
 }
 
 /// Files of the clips by use.

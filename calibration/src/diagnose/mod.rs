@@ -15,14 +15,12 @@
 //! | [`search`] | from the identified baseline to the effects that act together |
 //! | [`conclude`], [`answer`] | the verdict in words and numbers, what to do about it, and what to record next |
 //! | [`against`] | what changed between two sessions of one robot |
-//! | [`command`] | the verb |
 //!
 //! Each needs only those above it.
 
 pub mod against;
 pub mod answer;
 pub mod clips;
-pub mod command;
 pub mod conclude;
 pub mod evidence;
 pub mod fit;
@@ -34,8 +32,8 @@ pub mod search;
 mod test_bench;
 
 pub use answer::{
-    Basis, Candidate, Change, Clips, Diagnosis, Gap, Kind, Nearest, Place, Remedy, Rest, Share, Size, Status,
-    TorqueRms, Verdict,
+    Basis, Candidate, Change, Clips, Diagnosis, Gap, Kind, Nearest, Place, Remedy, Rest, Share, Status, TorqueRms,
+    Verdict,
 };
 
 use crate::forward::object::ObjectClips;

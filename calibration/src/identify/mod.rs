@@ -15,6 +15,7 @@ pub mod arm;
 pub mod object;
 pub(crate) mod remarks;
 mod run;
+pub mod sheet;
 pub mod split;
 
 pub use answer::Identification;

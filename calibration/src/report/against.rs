@@ -1,13 +1,13 @@
 //! The page of a comparison of two sessions: what changed, by how much, and what would have been seen.
 
-use super::change::{rows, smallest_in_words};
 use super::diagnosis::words;
-use super::figure::bars::{Row, bars};
-use super::frame::{facts, figure, frame, legend, unbroken};
-use super::share::{limited, percent_interval, probability};
+use crate::diagnose::against::change::{rows, smallest_in_words};
 use crate::diagnose::against::{Candidate, Comparison};
 use crate::diagnose::judge::confidence::MOST;
 use crate::diagnose::{Kind, Status};
+use crate::page::figure::bars::{Row, bars};
+use crate::page::frame::{facts, figure, frame, legend, unbroken};
+use crate::page::share::{limited, percent_interval, probability};
 use maud::{Markup, html};
 
 /// The page.

@@ -1,21 +1,12 @@
 //! The page of the benchmark: how often the diagnosis was right, false or silent, beside the simple rules, on the same worlds.
 
-use super::figure::calibration_curve::{Bin, calibration_curve};
-use super::figure::forest::{Group, Row, forest};
-use super::figure::matrix::confusion;
-use super::frame::{figure, frame, unbroken};
-use super::share::{percent, percent_interval};
-use crate::benchmark::score::{Case, Rate, Scores, reliability};
+use crate::benchmark::score::{Case, Method, Rate, Scores, reliability};
+use crate::page::figure::calibration_curve::{Bin, calibration_curve};
+use crate::page::figure::forest::{Group, Row, forest};
+use crate::page::figure::matrix::confusion;
+use crate::page::frame::{figure, frame, unbroken};
+use crate::page::share::{percent, percent_interval};
 use maud::{Markup, html};
-
-/// What one method said about the worlds.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Method {
-    /// Its name in the table.
-    pub name: String,
-    /// World by world.
-    pub cases: Vec<Case>,
-}
 
 /// The page. The first method is the one in question, the others stand beside it. `origin`: the command, the time it took.
 #[must_use]

@@ -1,12 +1,12 @@
 //! What the doctor of a recording says: one page, and lines for a terminal.
 
-use super::figure::chart::{Chart, Line};
-use super::frame::{facts, frame, legend, unbroken};
 use crate::check::good_for::VERBS;
 use crate::check::picture::Picture;
 use crate::check::remark::Size;
 use crate::check::session::ClipFacts;
 use crate::check::{Checked, Remark, Severity};
+use crate::page::figure::chart::{Chart, Line};
+use crate::page::frame::{facts, frame, legend, unbroken};
 use maud::{Markup, html};
 
 /// Width and height of a picture.
@@ -41,7 +41,7 @@ pub fn sentence(found: &Checked) -> String {
 }
 
 fn size(size: &Size) -> String {
-    let number = super::quantity::short;
+    let number = crate::page::quantity::short;
     let [lo, hi] = size.interval;
     let interval = if lo == hi { String::new() } else { format!(" [{}, {}]", number(lo), number(hi)) };
     let unit = if size.unit == "1" { String::new() } else { format!(" {}", size.unit) };
@@ -199,7 +199,7 @@ mod tests {
     use super::*;
     use crate::check::good_for::Fitness;
     use crate::check::remark::Fault;
-    use crate::report::canvas::tests::assert_well_formed;
+    use crate::page::canvas::tests::assert_well_formed;
     use shared_mem::cell::ClipKind;
     use shared_mem::recording::SessionFiles;
 

@@ -1,10 +1,10 @@
 //! The page of the demo: a robot against its twin, before and after the twin was given what the diagnosis found.
 
-use super::canvas::WIDTH;
-use super::figure::bars::{Row, bars};
-use super::figure::chart::{Chart, Line};
-use super::frame::{figure, frame, legend, unbroken};
-use super::root_mean_square;
+use crate::page::canvas::WIDTH;
+use crate::page::figure::bars::{Row, bars};
+use crate::page::figure::chart::{Chart, Line};
+use crate::page::frame::{figure, frame, legend, unbroken};
+use crate::page::root_mean_square;
 use maud::{Markup, html};
 
 /// What the page shows. Angles in rad, times in s.

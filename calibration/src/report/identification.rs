@@ -1,103 +1,20 @@
 //! The page of an identification: what the clips say about the arm or the object, how sure that is, and what they cannot say.
 
-use super::figure::bars::{Row, bars};
-use super::figure::chart::{Chart, Line};
-use super::figure::forest::forest;
-use super::figure::matrix::correlations;
-use super::frame::{facts, figure, frame, legend, unbroken};
-use super::parameters::{Numbers, of_joints, part};
-use super::quantity::{Unit, short};
-use super::trace::{Trace, gallery};
+use crate::identify::sheet::{Parameter, Sheet};
+use crate::page::figure::bars::{Row, bars};
+use crate::page::figure::chart::{Chart, Line};
+use crate::page::figure::forest::forest;
+use crate::page::figure::matrix::correlations;
+use crate::page::frame::{facts, figure, frame, legend, unbroken};
+use crate::page::parameters::{Numbers, of_joints, part};
+use crate::page::quantity::{Unit, short};
+use crate::page::trace::gallery;
 use maud::{Markup, html};
-use shared_mem::recording::SessionFiles;
-use std::path::PathBuf;
 
 /// Clips whose residuals are shown.
 const SHOWN_CLIPS: usize = 3;
 /// Errors shown under the sentence.
 const SHOWN_ERRORS: usize = 3;
-
-/// Everything on the page. SI units.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct Sheet {
-    /// `arm` or `object`.
-    pub target: String,
-    /// The session's folder.
-    pub session: String,
-    /// How it was named.
-    pub files: SessionFiles,
-    /// The finding in one sentence.
-    pub sentence: String,
-    /// What was found.
-    pub parameters: Vec<Parameter>,
-    /// Parameters that are not identifiable from the clips, and why.
-    pub not_identifiable: Vec<[String; 2]>,
-    /// How far off the twin is, by kind of error and set of clips.
-    pub errors: Vec<Error>,
-    /// The same by clip.
-    pub clips: Vec<Clip>,
-    /// Which error is shown by clip, and its SI unit.
-    pub clip_error: [&'static str; 2],
-    /// Residuals by clip and channel.
-    pub traces: Vec<Trace>,
-    /// Evaluations so far, and the best loss then.
-    pub convergence: Vec<[f64; 2]>,
-    /// Names of all numbers, in the order of the correlations.
-    pub names: Vec<String>,
-    /// Correlations of the estimates, row by row.
-    pub correlation: Vec<Vec<f64>>,
-    /// What to record next.
-    pub advice: Vec<String>,
-    /// What a reader has to know.
-    pub notes: Vec<String>,
-    /// Facts about the run: what, and its value.
-    pub provenance: Vec<[String; 2]>,
-    /// Where the parameters were written.
-    pub theta_file: Option<PathBuf>,
-}
-
-/// A parameter of one or several numbers.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct Parameter {
-    /// Name in files.
-    pub name: String,
-    /// SI unit.
-    pub unit: String,
-    /// The numbers.
-    pub values: Vec<f64>,
-    /// Their 95 % intervals.
-    pub intervals: Vec<[f64; 2]>,
-    /// What cell.toml says; empty where it says nothing.
-    pub nominal: Vec<f64>,
-    /// A remark on each number, such as `at its upper bound`; empty where there is none.
-    pub warnings: Vec<Option<String>>,
-}
-
-/// An error before and after.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct Error {
-    /// Which error, on which clips.
-    pub name: String,
-    /// SI unit.
-    pub unit: String,
-    /// With what cell.toml says; none where it says too little to simulate.
-    pub before: Option<f64>,
-    /// With what was found.
-    pub after: f64,
-}
-
-/// One clip.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct Clip {
-    /// Its file.
-    pub file: String,
-    /// What it was used for: `fitted`, `held out`, `left out`.
-    pub used: String,
-    /// The main error with what cell.toml says, and with what was found; see [`Sheet::clip_error`].
-    pub error: [Option<f64>; 2],
-    /// What is odd about it; empty where nothing is.
-    pub remark: String,
-}
 
 impl Sheet {
     /// The page.
@@ -186,7 +103,7 @@ impl Sheet {
 
     fn table(&self) -> Markup {
         let [what, unit] = self.clip_error;
-        let largest = super::scale::span(self.clips.iter().flat_map(|clip| clip.error).flatten())[1];
+        let largest = crate::page::scale::span(self.clips.iter().flat_map(|clip| clip.error).flatten())[1];
         let unit = Unit::suited(unit, largest);
         let shown = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), |value| unit.with_unit(value));
         html! {
@@ -263,6 +180,9 @@ impl Parameter {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::identify::sheet::{Clip, Error};
+    use crate::page::Trace;
+    use shared_mem::recording::SessionFiles;
 
     fn sheet() -> Sheet {
         let stiffness = Parameter {

@@ -1,17 +1,17 @@
 //! What verbs print for a person: a short table, aligned, and the sentence at the end, where eyes are.
 
-use super::benchmark::{Method, RATES};
-use super::change;
-use super::channel_in_words;
+use super::benchmark::RATES;
 use super::diagnosis::{confidence, has_effects, is_known, sizes, together, verdict_words, words};
-use super::identification::{Parameter, Sheet};
-use super::quantity::{Unit, short};
-use super::scale::span;
-use super::share::{limited, percent, percent_interval};
-use crate::benchmark::score::Scores;
+use crate::benchmark::score::{Method, Scores};
+use crate::diagnose::against::change;
 use crate::diagnose::against::{Candidate as Compared, Comparison};
 use crate::diagnose::judge::confidence::MOST;
 use crate::diagnose::{Candidate, Diagnosis, Kind, Status, TorqueRms};
+use crate::identify::sheet::{Parameter, Sheet};
+use crate::page::channel_in_words;
+use crate::page::quantity::{Unit, short};
+use crate::page::scale::span;
+use crate::page::share::{limited, percent, percent_interval};
 
 /// Places of the gap that are named.
 const SHOWN_PLACES: usize = 3;
@@ -226,7 +226,7 @@ fn table(rows: Vec<Vec<String>>) -> Vec<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::report::identification::Error;
+    use crate::identify::sheet::Error;
 
     #[test]
     fn columns_stand_under_each_other_and_the_sentence_comes_last() {

@@ -10,9 +10,9 @@ use super::fits::{Fitted, PairBench};
 use super::subjects::Subject;
 use super::turned::{Acts, Side, Turned};
 use crate::diagnose::evidence::measured::Evidence;
-use crate::diagnose::fit::parameters::UNBOUNDED;
 use crate::diagnose::fit::quadratic::minimum;
 use crate::estimate::interval::student;
+use crate::page::UNBOUNDED;
 use nalgebra::{DMatrix, DVector};
 use std::collections::BTreeMap;
 

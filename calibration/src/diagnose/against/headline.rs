@@ -3,8 +3,9 @@
 use super::super::answer::{Kind, Place, Share, Status};
 use super::answer::{Candidate, Smallest, Values};
 use super::search::Trial;
+use crate::diagnose::against::change::{between, smallest_in_words};
 use crate::diagnose::conclude::headline::words;
-use crate::report::{between, channel_in_words, percent, smallest_in_words};
+use crate::page::{channel_in_words, percent};
 
 /// What the sentence is made of.
 pub(super) struct Facts {

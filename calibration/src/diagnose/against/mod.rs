@@ -19,8 +19,8 @@
 //! | [`command`] | files, and what is printed |
 
 pub mod answer;
+pub mod change;
 mod changes;
-pub mod command;
 mod conclude;
 mod fits;
 mod headline;

@@ -5,7 +5,7 @@
 
 use super::headline::words;
 use super::site::{Advice, Capture, Site};
-use crate::report::channel_in_words;
+use crate::page::channel_in_words;
 use twin::effects::{Experiment, Separation, Stage, find};
 
 use Capture::{Arm, Elsewhere, StrokeAgain, Strokes};

@@ -24,7 +24,7 @@ use crate::diagnose::judge::unproven::{self, Unproven};
 use crate::diagnose::judge::{confidence, drift, localise};
 use crate::diagnose::search::refit;
 use crate::diagnose::{DiagnoseError, Kind, Options};
-use crate::report::{Trace, channel_in_words, effect_in_words};
+use crate::page::{Trace, channel_in_words, effect_in_words};
 use shared_mem::recording::Session;
 use shared_mem::theta::Theta;
 

@@ -4,7 +4,7 @@ use super::verdict::{Decision, Finding};
 use crate::diagnose::answer::{Kind, Share};
 use crate::diagnose::judge::gap::Shrunk;
 use crate::diagnose::judge::trial::CLOSES;
-use crate::report::percent;
+use crate::page::percent;
 
 /// What the sentence is made of, beside the finding itself.
 #[derive(Debug, Clone, Default, PartialEq)]

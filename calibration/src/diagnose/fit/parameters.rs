@@ -7,19 +7,16 @@
 
 use super::bench::{Bench, Hypothesis};
 use super::quadratic::minimum;
-use crate::diagnose::answer::Size;
 use crate::diagnose::evidence::measured::Evidence;
 use crate::estimate::interval::student;
 use crate::forward::setting::Setting;
+use crate::page::{Size, UNBOUNDED};
 use nalgebra::DMatrix;
 use std::collections::BTreeMap;
 use twin::effects::{Role, Shape};
 
 /// Half the width of a 90 % interval of a normal number, in sigmas.
 const NINETY: f64 = 1.645;
-
-/// What stands for infinity at the end of an interval of what fades out towards it: JSON has no such number.
-pub const UNBOUNDED: f64 = 1e9;
 
 /// The parameters of one of a hypothesis' effects.
 #[must_use]

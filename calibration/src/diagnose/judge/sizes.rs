@@ -9,7 +9,7 @@ use crate::diagnose::answer::{Change, Gap, TorqueRms};
 use crate::diagnose::clips::admit::Admitted;
 use crate::diagnose::evidence::measured::Evidence;
 use crate::diagnose::fit::bench::Bench;
-use crate::report::in_unit;
+use crate::page::in_unit;
 use shared_mem::cell::Tolerance;
 use shared_mem::recording::Session;
 use twin::replay::Replayer;

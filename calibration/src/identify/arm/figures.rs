@@ -6,7 +6,7 @@ use crate::estimate::{Options, Random, Subset, score};
 use crate::forward::arm::Channel;
 use crate::identify::answer::{ClipGap, Figures, Gap, Identification};
 use crate::identify::run::RunError;
-use crate::report::Trace;
+use crate::page::Trace;
 use rayon::prelude::*;
 
 /// Points of a picture's line.

@@ -3,7 +3,7 @@
 use super::ObjectError;
 use super::material::Material;
 use crate::identify::answer::{ClipGap, Figures, Identification};
-use crate::report::Trace;
+use crate::page::Trace;
 use rayon::prelude::*;
 use shared_mem::recording::Clip;
 use shared_mem::theta::Theta;

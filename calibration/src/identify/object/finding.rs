@@ -5,7 +5,7 @@ use super::material::Material;
 use crate::estimate::{Fit, Intervals, Unknown, at_bounds, without_leaning};
 use crate::forward::{Setting, Settings};
 use crate::identify::answer::{Advice, Identification, Parameter, Untold};
-use crate::report::number_in_words;
+use crate::page::number_in_words;
 use std::collections::BTreeMap;
 
 /// An interval wider than this share of the search's range, to either side, tells nothing.

@@ -2,11 +2,12 @@
 
 use super::words;
 use crate::diagnose::judge::confidence::MOST;
-use crate::diagnose::{Candidate, Size, Status};
-use crate::report::canvas::Canvas;
-use crate::report::figure::forest::{Group, forest};
-use crate::report::parameters::{Numbers, numbers};
-use crate::report::share::{limited, percent_interval, probability};
+use crate::diagnose::{Candidate, Status};
+use crate::page::Size;
+use crate::page::canvas::Canvas;
+use crate::page::figure::forest::{Group, forest};
+use crate::page::parameters::{Numbers, numbers};
+use crate::page::share::{limited, percent_interval, probability};
 use maud::{Markup, html};
 
 /// Width of a probability's bar.

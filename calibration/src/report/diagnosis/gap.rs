@@ -2,8 +2,8 @@
 
 use super::has_effects;
 use crate::diagnose::{Diagnosis, TorqueRms};
-use crate::report::figure::bars::{Row, bars};
-use crate::report::frame::legend;
+use crate::page::figure::bars::{Row, bars};
+use crate::page::frame::legend;
 use maud::{Markup, html};
 
 /// Whether there were clips to measure the gap on.

@@ -6,12 +6,12 @@ mod gap;
 pub(super) use candidates::sizes;
 pub(super) use gap::is_known;
 
-use super::figure::where_map::{Cell, where_map};
-use super::frame::{facts, figure, frame, unbroken};
-use super::share::{percent_interval, probability};
-use super::trace::gallery;
 pub(super) use crate::diagnose::conclude::headline::words;
 use crate::diagnose::{Basis, Diagnosis, Kind, Verdict};
+use crate::page::figure::where_map::{Cell, where_map};
+use crate::page::frame::{facts, figure, frame, unbroken};
+use crate::page::share::{percent_interval, probability};
+use crate::page::trace::gallery;
 use maud::{Markup, html};
 
 /// Clips whose residuals are shown.
@@ -172,8 +172,9 @@ fn clip_list(clips: &[String]) -> String {
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
-    use crate::diagnose::{Candidate, Change, Clips, Gap, Nearest, Place, Remedy, Share, Size, Status, Verdict};
-    use crate::report::Trace;
+    use crate::diagnose::{Candidate, Change, Clips, Gap, Nearest, Place, Remedy, Share, Status, Verdict};
+    use crate::page::Size;
+    use crate::page::Trace;
     use shared_mem::recording::SessionFiles;
     use shared_mem::theta::Theta;
     use std::collections::BTreeMap;

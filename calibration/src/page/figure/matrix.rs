@@ -1,6 +1,6 @@
 //! Tables of numbers as colour: correlations from -1 (blue) to 1 (orange), and who was taken for whom.
 
-use crate::report::canvas::{Anchor, Canvas, WIDTH, width_of};
+use crate::page::canvas::{Anchor, Canvas, WIDTH, width_of};
 use maud::Markup;
 use std::collections::BTreeMap;
 
@@ -17,7 +17,7 @@ struct Cell {
 }
 
 /// Correlations of the named numbers, row by row.
-pub(in crate::report) fn correlations(names: &[String], values: &[Vec<f64>]) -> Markup {
+pub(crate) fn correlations(names: &[String], values: &[Vec<f64>]) -> Markup {
     grid(names, names, "correlation matrix", |row, column| {
         let value = values.get(row).and_then(|row| row.get(column)).copied().filter(|value| value.is_finite())?;
         // In hundredths, which fit a small cell.
@@ -28,7 +28,7 @@ pub(in crate::report) fn correlations(names: &[String], values: &[Vec<f64>]) -> 
 }
 
 /// How often a truth (down) was called what (across). Blue is right: `right` tells.
-pub(in crate::report) fn confusion(
+pub(crate) fn confusion(
     counts: &BTreeMap<String, BTreeMap<String, usize>>,
     right: impl Fn(&str, &str) -> bool,
 ) -> Markup {
@@ -75,7 +75,7 @@ fn grid(rows: &[String], columns: &[String], what: &str, cell: impl Fn(usize, us
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::report::canvas::tests::assert_well_formed;
+    use crate::page::canvas::tests::assert_well_formed;
 
     #[test]
     fn strong_correlations_stand_out_with_their_sign() {

@@ -1,22 +1,22 @@
 //! Before and after, as pairs of bars; a dashed line where noise alone would end.
 
-use crate::report::canvas::{Anchor, Canvas, WIDTH, width_of};
-use crate::report::quantity::Unit;
-use crate::report::scale::{Scale, span};
+use crate::page::canvas::{Anchor, Canvas, WIDTH, width_of};
+use crate::page::quantity::Unit;
+use crate::page::scale::{Scale, span};
 use maud::Markup;
 use std::collections::BTreeMap;
 
 /// A quantity before and after. Rows of the same unit share a scale.
 #[derive(Debug, Clone, PartialEq)]
-pub(in crate::report) struct Row<'a> {
+pub(crate) struct Row<'a> {
     /// What it is.
-    pub(in crate::report) name: &'a str,
+    pub(crate) name: &'a str,
     /// SI unit.
-    pub(in crate::report) unit: &'a str,
+    pub(crate) unit: &'a str,
     /// Values in the order of the classes.
-    pub(in crate::report) values: Vec<f64>,
+    pub(crate) values: Vec<f64>,
     /// What noise alone would leave.
-    pub(in crate::report) floor: Option<f64>,
+    pub(crate) floor: Option<f64>,
 }
 
 /// Room for names, at least and at most.
@@ -28,7 +28,7 @@ const GAP: f64 = 14.0;
 const WORDS: f64 = 20.0;
 
 /// Rows of bars, one bar a class: `before` is orange, `after` blue, `track` grey.
-pub(in crate::report) fn bars(classes: &[&str], rows: &[Row]) -> Markup {
+pub(crate) fn bars(classes: &[&str], rows: &[Row]) -> Markup {
     let mut canvas = Canvas::new();
     let names = rows.iter().map(|row| width_of(row.name) + 16.0);
     let left = names.fold(NAMES[0], f64::max).min(NAMES[1]);
@@ -80,7 +80,7 @@ fn scales<'a>(rows: &'a [Row], left: f64) -> BTreeMap<&'a str, (Unit, Scale)> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::report::canvas::tests::assert_well_formed;
+    use crate::page::canvas::tests::assert_well_formed;
 
     fn row<'a>(name: &'a str, unit: &'a str, values: &[f64], floor: Option<f64>) -> Row<'a> {
         Row { name, unit, values: values.to_vec(), floor }

@@ -1,9 +1,9 @@
 //! The verb `calibration diagnose`: arguments, files, and what is printed.
 
-use super::{Diagnosis, Options, diagnose_kept};
-use crate::check::gate;
-use crate::interrupt::Interrupt;
-use crate::report;
+use calibration::check::gate;
+use calibration::diagnose::{Diagnosis, Options, diagnose_kept};
+use calibration::interrupt::Interrupt;
+use calibration::report;
 use shared_mem::console;
 use shared_mem::output::Destination;
 use shared_mem::recording::Session;
@@ -42,7 +42,7 @@ Examples:
   calibration diagnose session --torques --report torques.html
   calibration diagnose session --budget 120 --out diagnosis.json
   calibration diagnose monday --against tuesday --report changes.html")]
-pub struct Arguments {
+pub(super) struct Arguments {
     /// Folder with cell.toml and at least four different clips.
     #[arg(value_name = "SESSION")]
     pub(super) session: PathBuf,
@@ -78,7 +78,7 @@ pub struct Arguments {
     #[arg(long)]
     pub(super) torques: bool,
     /// Draws which clips are for what, and the intervals.
-    #[arg(long, value_name = "N", default_value_t = 0, value_parser = crate::seed::parse, allow_negative_numbers = true)]
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = calibration::seed::parse, allow_negative_numbers = true)]
     pub(super) seed: u64,
     /// Prints one JSON object on stdout at the end.
     #[arg(long)]
@@ -89,7 +89,7 @@ pub struct Arguments {
 ///
 /// # Errors
 /// What cannot be read, diagnosed or written, in one line with the remedy.
-pub fn run(arguments: &Arguments, interrupt: &Interrupt) -> anyhow::Result<Diagnosis> {
+pub(super) fn run(arguments: &Arguments, interrupt: &Interrupt) -> anyhow::Result<Diagnosis> {
     let Arguments { out, report, force, .. } = arguments;
     let page = Destination::of(report.as_deref(), *force)?;
     let answer = Destination::of(out.as_deref(), *force)?;

@@ -1,9 +1,9 @@
 //! What a number was in one session and is in another, in words.
 
-use super::parameters::{of_joints, part};
-use super::quantity::{Unit, short};
-use super::scale::span;
-use crate::diagnose::against::{Smallest, Values};
+use super::{Smallest, Values};
+use crate::page::parameters::{of_joints, part};
+use crate::page::quantity::{Unit, short};
+use crate::page::scale::span;
 
 /// Most numbers that a line names one by one.
 const MOST: usize = 3;
@@ -38,7 +38,7 @@ pub fn between(name: &str, values: &Values) -> String {
 }
 
 /// One line for every number: which of them, its value in A and in B, the change with its interval.
-pub(super) fn rows(subject: &str, name: &str, values: &Values) -> Vec<[String; 4]> {
+pub fn rows(subject: &str, name: &str, values: &Values) -> Vec<[String; 4]> {
     let unit = unit_of(values);
     let joints = of_joints(name) || of_joints(&format!("{subject}.{name}"));
     let one = |k: usize| {

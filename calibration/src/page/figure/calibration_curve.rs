@@ -1,20 +1,20 @@
 //! Whether confidence was earned: how often verdicts were true, over how sure they were said to be.
 
-use crate::report::canvas::{Anchor, Canvas};
-use crate::report::scale::Scale;
+use crate::page::canvas::{Anchor, Canvas};
+use crate::page::scale::Scale;
 use maud::Markup;
 
 /// Verdicts of about one confidence.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(in crate::report) struct Bin {
+pub(crate) struct Bin {
     /// Their mean confidence.
-    pub(in crate::report) confidence: f64,
+    pub(crate) confidence: f64,
     /// Share of them that were true.
-    pub(in crate::report) right: f64,
+    pub(crate) right: f64,
     /// Its interval.
-    pub(in crate::report) interval: [f64; 2],
+    pub(crate) interval: [f64; 2],
     /// How many.
-    pub(in crate::report) count: usize,
+    pub(crate) count: usize,
 }
 
 const SIZE: [f64; 2] = [460.0, 400.0];
@@ -22,7 +22,7 @@ const LEFT: f64 = 60.0;
 const BOTTOM: f64 = 44.0;
 
 /// The curve, with the diagonal on which earned confidence lies.
-pub(in crate::report) fn calibration_curve(bins: &[Bin]) -> Markup {
+pub(crate) fn calibration_curve(bins: &[Bin]) -> Markup {
     let mut canvas = Canvas::new();
     let x = Scale::new([0.0, 1.0], [LEFT, SIZE[0] - 20.0]);
     let y = Scale::new([0.0, 1.0], [SIZE[1] - BOTTOM, 12.0]);
@@ -50,7 +50,7 @@ pub(in crate::report) fn calibration_curve(bins: &[Bin]) -> Markup {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::report::canvas::tests::assert_well_formed;
+    use crate::page::canvas::tests::assert_well_formed;
 
     #[test]
     fn each_bin_shows_its_share_its_interval_and_its_count() {

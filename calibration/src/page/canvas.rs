@@ -5,13 +5,13 @@ use maud::{Escaper, Markup, PreEscaped};
 use std::fmt::Write as _;
 
 /// Width of a full picture.
-pub(super) const WIDTH: f64 = 900.0;
+pub(crate) const WIDTH: f64 = 900.0;
 /// Mean width of a character of the widest font in use at size 13: DejaVu Sans.
 const CHARACTER: f64 = 7.6;
 
 /// Which end of a text stands at its place.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Anchor {
+pub(crate) enum Anchor {
     /// Its beginning.
     Start,
     /// Its middle.
@@ -22,16 +22,16 @@ pub(super) enum Anchor {
 
 /// A picture in the making.
 #[derive(Debug, Clone)]
-pub(super) struct Canvas {
+pub(crate) struct Canvas {
     body: String,
 }
 
 impl Canvas {
-    pub(super) fn new() -> Self {
+    pub(crate) fn new() -> Self {
         Self { body: String::new() }
     }
 
-    pub(super) fn rect(&mut self, class: &str, [x, y]: [f64; 2], [width, height]: [f64; 2]) {
+    pub(crate) fn rect(&mut self, class: &str, [x, y]: [f64; 2], [width, height]: [f64; 2]) {
         self.element(format_args!(
             "<rect class=\"{class}\" x=\"{}\" y=\"{}\" width=\"{}\" height=\"{}\"/>",
             n(x),
@@ -42,7 +42,7 @@ impl Canvas {
     }
 
     /// A rectangle whose colour covers by `strength`, 0 to 1.
-    pub(super) fn tint(&mut self, class: &str, strength: f64, [x, y]: [f64; 2], [width, height]: [f64; 2]) {
+    pub(crate) fn tint(&mut self, class: &str, strength: f64, [x, y]: [f64; 2], [width, height]: [f64; 2]) {
         self.element(format_args!(
             "<rect class=\"{class}\" fill-opacity=\"{:.2}\" x=\"{}\" y=\"{}\" width=\"{}\" height=\"{}\"/>",
             strength.clamp(0.0, 1.0),
@@ -53,7 +53,7 @@ impl Canvas {
         ));
     }
 
-    pub(super) fn line(&mut self, class: &str, [x1, y1]: [f64; 2], [x2, y2]: [f64; 2]) {
+    pub(crate) fn line(&mut self, class: &str, [x1, y1]: [f64; 2], [x2, y2]: [f64; 2]) {
         self.element(format_args!(
             "<line class=\"{class}\" x1=\"{}\" y1=\"{}\" x2=\"{}\" y2=\"{}\"/>",
             n(x1),
@@ -63,17 +63,17 @@ impl Canvas {
         ));
     }
 
-    pub(super) fn circle(&mut self, class: &str, [x, y]: [f64; 2], radius: f64) {
+    pub(crate) fn circle(&mut self, class: &str, [x, y]: [f64; 2], radius: f64) {
         self.element(format_args!("<circle class=\"{class}\" cx=\"{}\" cy=\"{}\" r=\"{}\"/>", n(x), n(y), n(radius)));
     }
 
     /// A line through the points, in order.
-    pub(super) fn polyline(&mut self, class: &str, points: impl Iterator<Item = [f64; 2]>) {
+    pub(crate) fn polyline(&mut self, class: &str, points: impl Iterator<Item = [f64; 2]>) {
         let points: Vec<String> = points.map(|[x, y]| format!("{},{}", n(x), n(y))).collect();
         self.element(format_args!("<polyline class=\"{class}\" points=\"{}\"/>", points.join(" ")));
     }
 
-    pub(super) fn text(&mut self, class: &str, [x, y]: [f64; 2], anchor: Anchor, text: &str) {
+    pub(crate) fn text(&mut self, class: &str, [x, y]: [f64; 2], anchor: Anchor, text: &str) {
         let anchor = match anchor {
             Anchor::Start => "start",
             Anchor::Middle => "middle",
@@ -88,14 +88,14 @@ impl Canvas {
     }
 
     /// A text that is read from below, from `at` upwards, within `room`.
-    pub(super) fn text_upwards(&mut self, class: &str, [x, y]: [f64; 2], text: &str, room: f64) {
+    pub(crate) fn text_upwards(&mut self, class: &str, [x, y]: [f64; 2], text: &str, room: f64) {
         self.element(format_args!("<g transform=\"translate({} {}) rotate(-90)\">", n(x), n(y)));
         self.text_within(class, [0.0, 0.0], Anchor::Start, text, room);
         self.element(format_args!("</g>"));
     }
 
     /// A text that takes at most `room`: shortened if need be, and then whole under the pointer.
-    pub(super) fn text_within(&mut self, class: &str, at: [f64; 2], anchor: Anchor, text: &str, room: f64) {
+    pub(crate) fn text_within(&mut self, class: &str, at: [f64; 2], anchor: Anchor, text: &str, room: f64) {
         let most = (room / CHARACTER).max(1.0) as usize;
         if text.chars().count() <= most {
             return self.text(class, at, anchor, text);
@@ -105,14 +105,14 @@ impl Canvas {
     }
 
     /// What `draw` draws, with a text that shows under the pointer.
-    pub(super) fn hint(&mut self, text: &str, draw: impl FnOnce(&mut Self)) {
+    pub(crate) fn hint(&mut self, text: &str, draw: impl FnOnce(&mut Self)) {
         self.element(format_args!("<g><title>{}</title>", escaped(text)));
         draw(self);
         self.element(format_args!("</g>"));
     }
 
     /// The picture, with what it shows in words for those who cannot see it.
-    pub(super) fn finish(self, [width, height]: [f64; 2], what: &str) -> Markup {
+    pub(crate) fn finish(self, [width, height]: [f64; 2], what: &str) -> Markup {
         PreEscaped(format!(
             "<svg role=\"img\" aria-label=\"{}\" viewBox=\"0 0 {w} {h}\" width=\"{w}\" height=\"{h}\">{}</svg>",
             escaped(what),
@@ -128,7 +128,7 @@ impl Canvas {
 }
 
 /// The width that a text takes, at most.
-pub(super) fn width_of(text: &str) -> f64 {
+pub(crate) fn width_of(text: &str) -> f64 {
     CHARACTER * text.chars().count() as f64
 }
 
@@ -145,11 +145,11 @@ fn escaped(text: &str) -> String {
 }
 
 #[cfg(test)]
-pub(super) mod tests {
+pub(crate) mod tests {
     use super::*;
 
     /// Asserts that every element is closed in order, no number is missing, and nothing is drawn outside.
-    pub(in super::super) fn assert_well_formed(svg: &str) {
+    pub(crate) fn assert_well_formed(svg: &str) {
         assert!(!svg.contains("NaN") && !svg.contains("inf\""), "a number is missing: {svg}");
         let mut open = Vec::new();
         for tag in svg.split('<').skip(1).map(|rest| rest.split('>').next().expect("a tag")) {

@@ -1,11 +1,11 @@
 //! `calibration diagnose A --against B`: files, and what is printed.
 
-use super::super::Options;
-use super::super::command::{Arguments, theta_file};
-use super::{Comparison, compare_kept};
-use crate::check::gate;
-use crate::interrupt::Interrupt;
-use crate::report;
+use super::diagnose::{Arguments, theta_file};
+use calibration::check::gate;
+use calibration::diagnose::Options;
+use calibration::diagnose::against::{Comparison, compare_kept};
+use calibration::interrupt::Interrupt;
+use calibration::report;
 use shared_mem::output::Destination;
 use shared_mem::recording::Session;
 use shared_mem::theta::Theta;
@@ -14,7 +14,7 @@ use shared_mem::theta::Theta;
 ///
 /// # Errors
 /// What cannot be read, compared or written, in one line with the remedy.
-pub fn run(arguments: &Arguments, interrupt: &Interrupt) -> anyhow::Result<Comparison> {
+pub(super) fn run(arguments: &Arguments, interrupt: &Interrupt) -> anyhow::Result<Comparison> {
     let Arguments { out, report, force, cell, .. } = arguments;
     let page = Destination::of(report.as_deref(), *force)?;
     let answer = Destination::of(out.as_deref(), *force)?;

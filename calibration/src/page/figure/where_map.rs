@@ -1,21 +1,21 @@
 //! Where the gap lies: one grid a stage, regimes down, channels across, the share of the squared residual in each cell.
 
-use crate::report::canvas::{Anchor, Canvas, WIDTH};
-use crate::report::share::percent;
+use crate::page::canvas::{Anchor, Canvas, WIDTH};
+use crate::page::share::percent;
 use maud::Markup;
 use std::cmp::Ordering;
 
 /// A cell of the map.
 #[derive(Debug, Clone, PartialEq)]
-pub(in crate::report) struct Cell<'a> {
+pub(crate) struct Cell<'a> {
     /// Part of the clip: `control`, `hit`, `slide`, `rest`, `camera`.
-    pub(in crate::report) stage: &'a str,
+    pub(crate) stage: &'a str,
     /// What moves: `joint2`, `x`, `yaw`.
-    pub(in crate::report) channel: &'a str,
+    pub(crate) channel: &'a str,
     /// Under which conditions.
-    pub(in crate::report) regime: &'a str,
+    pub(crate) regime: &'a str,
     /// Share of the squared residual, 0 to 1.
-    pub(in crate::report) share: f64,
+    pub(crate) share: f64,
 }
 
 const STAGES: [&str; 5] = ["control", "hit", "slide", "rest", "camera"];
@@ -26,7 +26,7 @@ const ROW: f64 = 30.0;
 const WIDEST: f64 = 86.0;
 
 /// The map. The colour is scaled to the largest cell; numbers are shares of everything.
-pub(in crate::report) fn where_map(cells: &[Cell]) -> Markup {
+pub(crate) fn where_map(cells: &[Cell]) -> Markup {
     let mut canvas = Canvas::new();
     let largest = cells.iter().map(|cell| cell.share).filter(|share| share.is_finite()).fold(1e-9, f64::max);
     let mut stages = distinct(cells.iter().map(|cell| cell.stage));
@@ -111,7 +111,7 @@ fn distinct<'a>(names: impl Iterator<Item = &'a str>) -> Vec<&'a str> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::report::canvas::tests::assert_well_formed;
+    use crate::page::canvas::tests::assert_well_formed;
 
     fn cell<'a>(stage: &'a str, channel: &'a str, regime: &'a str, share: f64) -> Cell<'a> {
         Cell { stage, channel, regime, share }

@@ -4,14 +4,14 @@ use super::quantity::power;
 
 /// A stretch of values laid along a stretch of the picture.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Scale {
+pub(crate) struct Scale {
     from: [f64; 2],
     to: [f64; 2],
 }
 
 impl Scale {
     /// Lays `from` along `to`. Where there is nothing to span, one unit is.
-    pub(super) fn new([lo, hi]: [f64; 2], to: [f64; 2]) -> Self {
+    pub(crate) fn new([lo, hi]: [f64; 2], to: [f64; 2]) -> Self {
         let from = if hi - lo > 1e-300 && (hi - lo).is_finite() {
             [lo, hi]
         } else if lo.is_finite() {
@@ -23,13 +23,13 @@ impl Scale {
     }
 
     /// Where a value lies, held inside the picture.
-    pub(super) fn at(&self, value: f64) -> f64 {
+    pub(crate) fn at(&self, value: f64) -> f64 {
         let share = ((value - self.from[0]) / (self.from[1] - self.from[0])).clamp(0.0, 1.0);
         self.to[0] + share * (self.to[1] - self.to[0])
     }
 
     /// Round numbers within, about `count`, with their names.
-    pub(super) fn ticks(&self, count: usize) -> Vec<(f64, String)> {
+    pub(crate) fn ticks(&self, count: usize) -> Vec<(f64, String)> {
         let [lo, hi] = self.from;
         let rough = (hi - lo) / count.max(1) as f64;
         let decade = 10_f64.powf(rough.log10().floor());
@@ -49,7 +49,7 @@ impl Scale {
 }
 
 /// Smallest and largest of the finite values; `[0, 0]` without any.
-pub(super) fn span(values: impl Iterator<Item = f64>) -> [f64; 2] {
+pub(crate) fn span(values: impl Iterator<Item = f64>) -> [f64; 2] {
     values
         .filter(|value| value.is_finite())
         .map(|value| [value, value])

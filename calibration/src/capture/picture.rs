@@ -10,7 +10,7 @@ const AROUND: f64 = 0.24;
 
 /// The picture as an SVG file: x of the base frame upwards, y to the left, as seen from behind the robot.
 #[must_use]
-pub fn picture(next: &Next, size: [f64; 3]) -> String {
+pub(super) fn picture(next: &Next, size: [f64; 3]) -> String {
     let stroke = &next.stroke;
     let [x0, y0] = stroke.object;
     let at = |x: f64, y: f64| [SCALE * (AROUND - (y - y0)), SCALE * (AROUND - (x - x0))];

@@ -2,23 +2,58 @@
 
 use super::figure::forest::{Group, Row};
 use super::quantity::Unit;
-use crate::diagnose::Size;
+use serde::ser::{Serialize, SerializeStruct, Serializer};
 use std::collections::BTreeMap;
 use twin::effects::{Shape, find};
 
+/// A parameter of one or several numbers, in SI.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Size {
+    /// The numbers.
+    pub values: Vec<f64>,
+    /// A 90 % interval each.
+    pub ci90: Vec<[f64; 2]>,
+    /// SI unit; `1` without.
+    pub unit: String,
+}
+
+impl Size {
+    /// Whether the `k`-th number was fitted; else it was held at its default, and its interval has no width.
+    #[must_use]
+    pub fn is_fitted(&self, k: usize) -> bool {
+        self.ci90.get(k).is_none_or(|[low, high]| high > low)
+    }
+}
+
+impl Serialize for Size {
+    /// `{"value", "ci90", "unit"}`: a single number stands by itself, several as lists.
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let mut out = serializer.serialize_struct("Size", 3)?;
+        if let ([value], [interval]) = (&self.values[..], &self.ci90[..]) {
+            out.serialize_field("value", value)?;
+            out.serialize_field("ci90", interval)?;
+        } else {
+            out.serialize_field("value", &self.values)?;
+            out.serialize_field("ci90", &self.ci90)?;
+        }
+        out.serialize_field("unit", &self.unit)?;
+        out.end()
+    }
+}
+
 /// A parameter of one or several numbers.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub(super) struct Numbers<'a> {
+pub(crate) struct Numbers<'a> {
     /// Name in files: `stiffness`, `centre_of_mass`, `delay`.
-    pub(super) name: &'a str,
+    pub(crate) name: &'a str,
     /// Whether there is one number a joint.
-    pub(super) joints: bool,
+    pub(crate) joints: bool,
     /// SI unit.
-    pub(super) unit: &'a str,
+    pub(crate) unit: &'a str,
     /// The numbers.
-    pub(super) values: &'a [f64],
+    pub(crate) values: &'a [f64],
     /// An interval each.
-    pub(super) intervals: &'a [[f64; 2]],
+    pub(crate) intervals: &'a [[f64; 2]],
 }
 
 /// Most numbers that a line names one by one.
@@ -26,12 +61,12 @@ const MOST: usize = 3;
 
 impl Numbers<'_> {
     /// The parameter in a line: `delay 11.9 [11.2, 12.6] ms`, `coulomb 0.28 to 1.10 N m over 7 joints`.
-    pub(super) fn line(&self) -> String {
+    pub(crate) fn line(&self) -> String {
         self.written(|unit, value, interval| unit.interval(value, interval))
     }
 
     /// The same without intervals: `delay 11.9 ms`.
-    pub(super) fn brief(&self) -> String {
+    pub(crate) fn brief(&self) -> String {
         self.written(|unit, value, _| unit.with_unit(value))
     }
 
@@ -48,7 +83,7 @@ impl Numbers<'_> {
     }
 
     /// The parameter as rows of a picture; `nominal`: what was believed of each number.
-    pub(super) fn group<'a>(
+    pub(crate) fn group<'a>(
         &'a self,
         heading: &'a str,
         nominal: &[f64],
@@ -85,7 +120,7 @@ pub fn effect_in_words(effect: &str, parameters: &BTreeMap<String, Size>) -> Str
 }
 
 /// A parameter of an effect.
-pub(super) fn numbers<'a>(effect: &str, name: &'a str, size: &'a Size) -> Numbers<'a> {
+pub(crate) fn numbers<'a>(effect: &str, name: &'a str, size: &'a Size) -> Numbers<'a> {
     let joints = of_joints(&format!("{effect}.{name}"));
     Numbers { name, joints, unit: &size.unit, values: &size.values, intervals: &size.ci90 }
 }
@@ -102,7 +137,7 @@ pub fn number_in_words(name: &str) -> String {
 }
 
 /// Whether a parameter, `stiffness` or `effect.parameter`, holds one number a joint.
-pub(super) fn of_joints(name: &str) -> bool {
+pub(crate) fn of_joints(name: &str) -> bool {
     let Some((effect, parameter)) = name.split_once('.') else { return matches!(name, "stiffness" | "damping") };
     let effect = find(effect.trim_start_matches("1/"));
     let parameter = effect.and_then(|effect| effect.parameters.iter().find(|known| known.name == parameter));
@@ -110,7 +145,7 @@ pub(super) fn of_joints(name: &str) -> bool {
 }
 
 /// What the `k`-th of `count` numbers belongs to, a joint or an axis; empty for the only one.
-pub(super) fn part(joints: bool, count: usize, k: usize) -> String {
+pub(crate) fn part(joints: bool, count: usize, k: usize) -> String {
     match ["x", "y", "z"].get(k) {
         _ if joints => format!("joint {}", k + 1),
         Some(axis) if count > 1 => (*axis).to_owned(),

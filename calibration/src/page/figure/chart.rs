@@ -1,8 +1,8 @@
 //! Lines over an axis: residuals with the noise as a band, paths, convergence.
 
-use crate::report::canvas::{Anchor, Canvas};
-use crate::report::quantity::Unit;
-use crate::report::scale::{Scale, span};
+use crate::page::canvas::{Anchor, Canvas};
+use crate::page::quantity::Unit;
+use crate::page::scale::{Scale, span};
 use maud::Markup;
 
 /// Most points of a line: more than a screen shows only makes the page heavy.
@@ -13,35 +13,35 @@ const BOTTOM: f64 = 36.0;
 
 /// A line.
 #[derive(Debug, Clone, PartialEq)]
-pub(in crate::report) struct Line<'a> {
+pub(crate) struct Line<'a> {
     /// Colour: `before`, `after`, `data`.
-    pub(in crate::report) class: &'a str,
+    pub(crate) class: &'a str,
     /// Place on the axis below, and value in SI.
-    pub(in crate::report) points: &'a [[f64; 2]],
+    pub(crate) points: &'a [[f64; 2]],
 }
 
 /// A chart.
 #[derive(Debug, Clone, PartialEq)]
-pub(in crate::report) struct Chart<'a> {
+pub(crate) struct Chart<'a> {
     /// Above it.
-    pub(in crate::report) title: &'a str,
+    pub(crate) title: &'a str,
     /// Below it.
-    pub(in crate::report) x: &'a str,
+    pub(crate) x: &'a str,
     /// SI unit of the values.
-    pub(in crate::report) unit: &'a str,
+    pub(crate) unit: &'a str,
     /// Lines, the first at the bottom.
-    pub(in crate::report) lines: &'a [Line<'a>],
+    pub(crate) lines: &'a [Line<'a>],
     /// Half the width of the grey band around zero, in SI.
-    pub(in crate::report) band: Option<f64>,
+    pub(crate) band: Option<f64>,
     /// Whether values are laid out by their logarithm, where they span more than one power of ten.
-    pub(in crate::report) logarithmic: bool,
+    pub(crate) logarithmic: bool,
     /// Width and height.
-    pub(in crate::report) size: [f64; 2],
+    pub(crate) size: [f64; 2],
 }
 
 impl Chart<'_> {
     /// The chart as a picture.
-    pub(in crate::report) fn draw(&self) -> Markup {
+    pub(crate) fn draw(&self) -> Markup {
         let [width, height] = self.size;
         let [lo, hi] = self.values();
         let unit = Unit::suited(self.unit, lo.abs().max(hi.abs()));
@@ -125,7 +125,7 @@ fn thinned(points: &[[f64; 2]]) -> Vec<[f64; 2]> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::report::canvas::tests::assert_well_formed;
+    use crate::page::canvas::tests::assert_well_formed;
 
     fn chart<'a>(lines: &'a [Line<'a>]) -> Chart<'a> {
         Chart {

@@ -1,17 +1,18 @@
 //! Numbers for people: SI prefixes where they help, as many digits as the interval allows, never an exponent that can be avoided.
 
-use crate::diagnose::fit::parameters::UNBOUNDED;
+/// What stands for infinity at the end of an interval of what fades out towards it: JSON has no such number.
+pub const UNBOUNDED: f64 = 1e9;
 
 /// How a unit is shown: factor from SI, and the name.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Unit {
+pub(crate) struct Unit {
     factor: f64,
     name: String,
 }
 
 impl Unit {
     /// The prefix that suits values up to `largest` (in SI): `rad` becomes `mrad`, `m` becomes `mm`, `s` becomes `ms`; shares are asked for by `%`.
-    pub(super) fn suited(si: &str, largest: f64) -> Self {
+    pub(crate) fn suited(si: &str, largest: f64) -> Self {
         let largest = largest.abs();
         let name = si.to_owned();
         match si {
@@ -24,22 +25,22 @@ impl Unit {
     }
 
     /// The value in this unit, as a number.
-    pub(super) fn scaled(&self, si: f64) -> f64 {
+    pub(crate) fn scaled(&self, si: f64) -> f64 {
         self.factor * si
     }
 
     /// Name with prefix; empty for pure numbers.
-    pub(super) fn name(&self) -> &str {
+    pub(crate) fn name(&self) -> &str {
         &self.name
     }
 
     /// The value with its unit.
-    pub(super) fn with_unit(&self, si: f64) -> String {
+    pub(crate) fn with_unit(&self, si: f64) -> String {
         self.attach(&short(self.scaled(si)))
     }
 
     /// The value with its interval and unit, with no more digits than the interval deserves: `11.9 [11.2, 12.6] ms`.
-    pub(super) fn interval(&self, si: f64, [lo, hi]: [f64; 2]) -> String {
+    pub(crate) fn interval(&self, si: f64, [lo, hi]: [f64; 2]) -> String {
         if hi >= UNBOUNDED && si < UNBOUNDED {
             return self.attach(&format!("{} [{}, \u{221e}]", short(self.scaled(si)), short(self.scaled(lo))));
         }
@@ -69,7 +70,7 @@ pub fn in_unit(si: &str, value: f64) -> String {
 }
 
 /// A number with three digits that count, two where it is small: `1.23`, `0.0042`, `1230`; `-` where there is none.
-pub(super) fn short(value: f64) -> String {
+pub(crate) fn short(value: f64) -> String {
     if !value.is_finite() {
         return "-".into();
     }
@@ -95,7 +96,7 @@ fn fixed(value: f64, digits: usize) -> String {
 }
 
 /// `1.2e-7` as `1.2\u{b7}10\u{207b}\u{2077}`.
-pub(super) fn power(value: f64) -> String {
+pub(crate) fn power(value: f64) -> String {
     let text = format!("{value:.1e}");
     let (mantissa, exponent) = text.split_once('e').unwrap_or((&text, "0"));
     format!("{}{}", mantissa.trim_end_matches(".0"), times_ten_to(exponent.parse().unwrap_or(0)))

@@ -1,34 +1,34 @@
 //! Parameters with their intervals, each on its own scale from bound to bound or around what was believed before.
 
-use crate::report::canvas::{Anchor, Canvas, WIDTH, width_of};
-use crate::report::quantity::{Unit, short};
-use crate::report::scale::{Scale, span};
+use crate::page::canvas::{Anchor, Canvas, WIDTH, width_of};
+use crate::page::quantity::{Unit, short};
+use crate::page::scale::{Scale, span};
 use maud::Markup;
 
 /// Parameters of one kind, which share an axis.
 #[derive(Debug, Clone, PartialEq)]
-pub(in crate::report) struct Group<'a> {
+pub(crate) struct Group<'a> {
     /// What they are.
-    pub(in crate::report) name: &'a str,
+    pub(crate) name: &'a str,
     /// SI unit.
-    pub(in crate::report) unit: &'a str,
+    pub(crate) unit: &'a str,
     /// The parameters.
-    pub(in crate::report) rows: Vec<Row>,
+    pub(crate) rows: Vec<Row>,
 }
 
 /// One number.
 #[derive(Debug, Clone, PartialEq)]
-pub(in crate::report) struct Row {
+pub(crate) struct Row {
     /// Which of them.
-    pub(in crate::report) name: String,
+    pub(crate) name: String,
     /// Value found.
-    pub(in crate::report) value: f64,
+    pub(crate) value: f64,
     /// Its interval.
-    pub(in crate::report) interval: [f64; 2],
+    pub(crate) interval: [f64; 2],
     /// What cell.toml says.
-    pub(in crate::report) nominal: Option<f64>,
+    pub(crate) nominal: Option<f64>,
     /// A remark: `at its bound`, `not identifiable`.
-    pub(in crate::report) warning: Option<String>,
+    pub(crate) warning: Option<String>,
 }
 
 /// Room for names, at least and at most.
@@ -49,7 +49,7 @@ impl Row {
 }
 
 /// The plot. A group in which every row has a nominal value other than 0 is laid out in percent of it.
-pub(in crate::report) fn forest(groups: &[Group]) -> Markup {
+pub(crate) fn forest(groups: &[Group]) -> Markup {
     let mut canvas = Canvas::new();
     let names = groups.iter().flat_map(|group| &group.rows).map(|row| width_of(&row.name) + 20.0);
     let left = names.fold(NAMES[0], f64::max).min(NAMES[1]);
@@ -162,7 +162,7 @@ fn draw_row(canvas: &mut Canvas, row: &Row, (axis, unit, scale): (&Axis, &Unit, 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::report::canvas::tests::assert_well_formed;
+    use crate::page::canvas::tests::assert_well_formed;
 
     fn row(value: f64, nominal: Option<f64>, warning: Option<&str>) -> Row {
         let interval = [value - 0.01 * value.abs(), value + 0.01 * value.abs()];

@@ -25,7 +25,7 @@ pub fn percent(share: f64) -> String {
 }
 
 /// A share with its interval: `81 [76, 85] %`.
-pub(super) fn percent_interval(share: f64, interval: [f64; 2]) -> String {
+pub(crate) fn percent_interval(share: f64, interval: [f64; 2]) -> String {
     if interval[0] > NEARLY_ALL && share < 1.0 {
         return percent(share);
     }
@@ -37,7 +37,7 @@ pub(super) fn percent_interval(share: f64, interval: [f64; 2]) -> String {
 }
 
 /// A probability. Never 0 or 1, which nothing measured is.
-pub(super) fn probability(value: f64) -> String {
+pub(crate) fn probability(value: f64) -> String {
     match value {
         v if !v.is_finite() => "-".into(),
         v if v > 0.995 => "> 99 %".into(),
@@ -47,7 +47,7 @@ pub(super) fn probability(value: f64) -> String {
 }
 
 /// A probability that is never given beyond `most`: there it is a limit and no estimate.
-pub(super) fn limited(value: f64, most: f64) -> String {
+pub(crate) fn limited(value: f64, most: f64) -> String {
     let words = probability(value);
     if value < most - 0.005 { words } else { format!("{words} (limit)") }
 }

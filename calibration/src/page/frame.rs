@@ -5,7 +5,7 @@ use maud::{DOCTYPE, Markup, PreEscaped, html};
 const STYLE: &str = include_str!("page.css");
 
 /// A page around its body. `origin`: how it came about, for the foot.
-pub(super) fn frame(title: &str, origin: &str, body: &Markup) -> String {
+pub(crate) fn frame(title: &str, origin: &str, body: &Markup) -> String {
     let page = html! {
         (DOCTYPE)
         html lang="en" {
@@ -25,7 +25,7 @@ pub(super) fn frame(title: &str, origin: &str, body: &Markup) -> String {
 }
 
 /// A sentence whose numbers stay with their units when it is broken into lines.
-pub(super) fn unbroken(sentence: &str) -> String {
+pub(crate) fn unbroken(sentence: &str) -> String {
     let mut out = String::with_capacity(sentence.len());
     for c in sentence.chars() {
         let after_number = out.ends_with(|last: char| last.is_ascii_digit());
@@ -35,7 +35,7 @@ pub(super) fn unbroken(sentence: &str) -> String {
 }
 
 /// A figure under its heading, with a line that says how to read it.
-pub(super) fn figure(heading: &str, reading: &str, picture: &Markup) -> Markup {
+pub(crate) fn figure(heading: &str, reading: &str, picture: &Markup) -> Markup {
     html! {
         section {
             h2 { (heading) }
@@ -46,7 +46,7 @@ pub(super) fn figure(heading: &str, reading: &str, picture: &Markup) -> Markup {
 }
 
 /// What the colours mean: class (`before`, `after`, `data`, `band`, `floor`) and words.
-pub(super) fn legend(entries: &[(&str, &str)]) -> Markup {
+pub(crate) fn legend(entries: &[(&str, &str)]) -> Markup {
     html! {
         div.legend {
             @for (class, words) in entries { span { i class=(class) {} (words) } }
@@ -55,7 +55,7 @@ pub(super) fn legend(entries: &[(&str, &str)]) -> Markup {
 }
 
 /// Figures to remember, each with what it is.
-pub(super) fn facts(entries: &[(String, &str)]) -> Markup {
+pub(crate) fn facts(entries: &[(String, &str)]) -> Markup {
     html! {
         div.facts {
             @for (value, what) in entries { div { b { (value) } span { (what) } } }

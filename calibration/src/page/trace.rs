@@ -83,7 +83,7 @@ pub fn worst_first(traces: &[Trace], clips: usize) -> Vec<&Trace> {
 }
 
 /// Pictures of the worst clips with a legend; `names` of before and after.
-pub(super) fn gallery(traces: &[Trace], clips: usize, [before, after]: [&str; 2]) -> Markup {
+pub(crate) fn gallery(traces: &[Trace], clips: usize, [before, after]: [&str; 2]) -> Markup {
     let worst = worst_first(traces, clips);
     let mut entries = vec![("before", before), ("after", after), ("band", "\u{b1}2\u{3c3} of the noise")];
     entries.retain(|(class, _)| *class != "after" || worst.iter().any(|trace| trace.changes()));
@@ -96,7 +96,7 @@ pub(super) fn gallery(traces: &[Trace], clips: usize, [before, after]: [&str; 2]
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::report::canvas::tests::assert_well_formed;
+    use crate::page::canvas::tests::assert_well_formed;
 
     fn trace(clip: &str, channel: &str, size: f64) -> Trace {
         let before = (0..50).map(|i| [0.1 * f64::from(i), size * f64::from(i).sin()]).collect();
