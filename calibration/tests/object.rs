@@ -1,5 +1,6 @@
 //! The object from simulated strokes of which the truth is known, and from recordings of another engine.
 
+use calibration::benchmark::coverage::Subject;
 use calibration::benchmark::session::record;
 use calibration::benchmark::world::{Fault, Kind, World};
 use calibration::estimate::ClipModel as _;
@@ -79,6 +80,17 @@ fn a_place_left_by_the_hit_moves_the_resting_place_by_as_much() {
 }
 
 /// Sessions of another engine and their truth.
+/// In this world the deviance hardly rises along friction, mass and height together, and the hits are rough: slopes, and a look
+/// at a few of their sigmas, left friction three half widths away from the truth.
+#[test]
+fn intervals_reach_as_far_as_rough_hits_leave_a_number_open() {
+    let session = Subject::Object.examine(&world(24), 8, &Interrupt::default());
+    for name in ["friction", "centre_of_mass[2]"] {
+        let told = session.told.iter().find(|told| told.name == name).expect("a number with an interval");
+        assert!(told.holds(), "{told:?}");
+    }
+}
+
 fn recorded(name: &str, parameters: Option<PathBuf>) -> Identification {
     let data = PathBuf::from(std::env::var_os("TWINALIGN_DATA").expect("TWINALIGN_DATA"));
     let optimizer = Optimizer::LeastSquares;

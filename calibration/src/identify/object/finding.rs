@@ -2,7 +2,7 @@
 
 use super::fit::ObjectFit;
 use super::material::Material;
-use crate::estimate::{Fit, Intervals, Unknown, at_bounds, without_leaning};
+use crate::estimate::{Fit, Intervals, Unknown};
 use crate::forward::{Setting, Settings};
 use crate::identify::answer::{Advice, Identification, Parameter, Untold};
 use crate::page::number_in_words;
@@ -36,21 +36,7 @@ impl<'a> Finding<'a> {
         found: &'a ObjectFit,
         disagreement: &[f64],
     ) -> Self {
-        let mut fit = Fit {
-            shared: found.at.shared.clone(),
-            clips: found.at.clips.clone(),
-            converged: found.converged,
-            evaluations: found.evaluations,
-            history: Vec::new(),
-        };
-        for (clip, weight) in fit.clips.iter_mut().zip(&found.at.weights) {
-            clip.information *= *weight;
-            clip.gradient *= *weight;
-            clip.scores.iter_mut().for_each(|score| *score *= *weight);
-        }
-        let held = at_bounds(unknowns, &fit.shared);
-        without_leaning(&mut fit, &held);
-        let mut intervals = Intervals::new(&fit, &held);
+        let (fit, held, mut intervals) = found.at.told(unknowns);
         intervals.half_width.iter_mut().zip(&found.widths).for_each(|(half, width)| *half *= width);
         intervals.half_width.iter_mut().zip(disagreement).for_each(|(half, least)| *half = half.max(*least));
         Self { settings, unknowns, found, fit, held, intervals }

@@ -4,7 +4,9 @@
 //! elsewhere than simulated finds its own way first. A clip that nothing fits counts less, so that it does not steer
 //! the others.
 
-use crate::estimate::{ClipFit, ClipModel, Impossible, Options, Random, Unknown, fit_from};
+use crate::estimate::{
+    ClipFit, ClipModel, Fit, Impossible, Intervals, Options, Random, Unknown, at_bounds, fit_from, without_leaning,
+};
 use crate::forward::object::ObjectClips;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -36,8 +38,7 @@ pub(super) struct Linearised {
     pub(super) evaluations: usize,
 }
 
-/// How far away the deviance is looked at, in sigmas, and how much wider an interval may get by that.
-const AWAY: f64 = 3.0;
+/// How much wider an interval may get by a look at the deviance.
 const WIDEST: f64 = 6.0;
 /// Steps of the own numbers at most.
 const OWN: Options = Options { iterations: 2, tolerance: 0.3 };
@@ -67,6 +68,24 @@ impl Linearised {
         let n = self.shared.len();
         let parts = self.clips.iter().zip(&self.weights);
         parts.fold(DMatrix::zeros(n, n), |sum, (clip, weight)| sum + &clip.information * *weight)
+    }
+
+    /// What they tell about the shared numbers to first order: the clips as much as each counts, wanting what they would want
+    /// had they been left out; which numbers rest on a bound; how sure the others are.
+    #[must_use]
+    pub(super) fn told(&self, unknowns: &[Unknown]) -> (Fit, Vec<bool>, Intervals) {
+        let mut clips = self.clips.clone();
+        for (clip, weight) in clips.iter_mut().zip(&self.weights) {
+            clip.information *= *weight;
+            clip.gradient *= *weight;
+            clip.scores.iter_mut().for_each(|score| *score *= *weight);
+        }
+        let shared = self.shared.clone();
+        let mut fit = Fit { shared, clips, converged: self.small, evaluations: self.evaluations, history: Vec::new() };
+        let held = at_bounds(unknowns, &fit.shared);
+        without_leaning(&mut fit, &held);
+        let intervals = Intervals::new(&fit, &held);
+        (fit, held, intervals)
     }
 
     fn gradient(&self) -> DVector<f64> {
@@ -135,33 +154,36 @@ impl Question<'_> {
         self.linearised(shared, &self.profiled(shared, own)?)
     }
 
-    /// By how much wider than information says the clips leave each number, 1 to [`WIDEST`]: the deviance is looked at
-    /// three sigmas away to both sides, the other numbers following. A hit's roughness makes slopes, and so information,
-    /// larger than what the clips can really tell.
+    /// By how much wider than slopes say the clips leave each number, 1 to [`WIDEST`]: the deviance is looked at where the
+    /// interval of half width `half` ends, to both sides, the other numbers following. A hit's roughness makes slopes, and
+    /// so information, larger than what the clips can really tell, and nearer by nothing but the roughness would be seen.
     ///
     /// # Errors
     /// As [`Self::improved`].
-    pub(super) fn widths(&self, at: &Linearised) -> Result<(Vec<f64>, usize), Impossible> {
+    pub(super) fn widths(&self, at: &Linearised, half: &[f64]) -> Result<(Vec<f64>, usize), Impossible> {
         let n = at.shared.len();
         let (own, mut evaluations) = (at.own(), 0);
-        let Some(covariance) = at.information().try_inverse() else { return Ok((vec![1.0; n], 0)) };
+        let information = at.information();
+        let Some(covariance) = information.clone().try_inverse() else { return Ok((vec![1.0; n], 0)) };
         let here = weighted(&self.profiled(&at.shared, &own)?, &at.weights);
         let mut widths = vec![1.0; n];
-        for (k, width) in widths.iter_mut().enumerate().filter(|(k, _)| covariance[(*k, *k)] > 0.0) {
-            let way = covariance.column(k) * (AWAY / covariance[(k, k)].sqrt());
-            let mut rises = Vec::new();
+        let looked_at = |k: &usize| covariance[(*k, *k)] > 0.0 && half[*k].is_finite();
+        for (k, width) in widths.iter_mut().enumerate().filter(|(k, _)| looked_at(k)) {
+            let way = covariance.column(k) * (half[k] / covariance[(k, k)]);
+            let (mut promised, mut risen) = (0.0, 0.0);
             for side in [-1.0, 1.0] {
                 let inside =
                     |j: usize| (at.shared[j] + side * way[j]).clamp(self.unknowns[j].lower, self.unknowns[j].upper);
                 let to: Vec<f64> = (0..n).map(inside).collect();
                 if let Ok(there) = self.profiled(&to, &own) {
                     evaluations += there.iter().map(|(.., calls)| calls).sum::<usize>();
-                    rises.push(weighted(&there, &at.weights) - here);
+                    let moved = DVector::from_fn(n, |j, _| to[j] - at.shared[j]);
+                    promised += moved.dot(&(&information * &moved));
+                    risen += weighted(&there, &at.weights) - here;
                 }
             }
-            // One side alone may fall by chance where the hit is rough.
-            let rise = rises.iter().sum::<f64>() / rises.len().max(1) as f64;
-            *width = (AWAY / rise.max(1e-9).sqrt()).clamp(1.0, WIDEST);
+            // Both sides together: one alone may fall by chance where the hit is rough.
+            *width = (promised / risen.max(1e-9)).sqrt().clamp(1.0, WIDEST);
         }
         Ok((widths, evaluations))
     }
