@@ -265,7 +265,7 @@ fn a_file_that_a_killed_recorder_left_empty_is_told_from_one_that_is_no_clip() {
     let path = folder.path().join("clip.mcap");
     let how = "is no MCAP file; record one with `rt_bridge record --out clip.mcap` or `ros2 bag record -s mcap";
     for (text, told) in
-        [(&b""[..], "is empty: its recorder"), (b"a poem", how), (b"SQLite format 3\0", "`ros2 bag convert")]
+        [(&b""[..], "is empty: its recorder"), (b"a poem", how), (b"SQLite format 3\0", "`calibration import FILE")]
     {
         std::fs::write(&path, text).expect("a file");
         let error = read_arm_states(&path).expect_err("nothing to read").to_string();

@@ -43,7 +43,7 @@ pub(super) struct BenchmarkArguments {
     #[arg(long, value_name = "N", default_value_t = 8, value_parser = clap::value_parser!(u64).range(8..=64))]
     clips: u64,
     /// Number of the first world.
-    #[arg(long, value_name = "N", default_value_t = 1, value_parser = calibration::seed::parse, allow_negative_numbers = true)]
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = calibration::seed::parse)]
     seed: u64,
     /// Where the page goes.
     #[arg(long, value_name = "REPORT.HTML")]

@@ -123,7 +123,7 @@ pub(super) struct ExcitationArguments {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(2..=64))]
     poses: Option<u32>,
     /// Seed of the motions; clip number N of a session is drawn from seed + N. It may be negative.
-    #[arg(long, value_name = "N", default_value_t = 0, allow_negative_numbers = true)]
+    #[arg(long, value_name = "N", default_value_t = 0)]
     seed: i64,
     /// Prints one JSON object on stdout at the end.
     #[arg(long)]
@@ -233,7 +233,7 @@ pub(super) struct StrokeArguments {
     )]
     turn_object: Vec<f64>,
     /// Turns the tool about its own axis for every stroke; a turn that breaks a joint's limit is refused.
-    #[arg(long, value_name = "DEG", default_value_t = 0.0, allow_negative_numbers = true, value_parser = turn)]
+    #[arg(long, value_name = "DEG", default_value_t = 0.0, value_parser = turn)]
     turn_tool: f64,
     /// Draws the next stroke into this file and moves nothing.
     #[arg(long, value_name = "FILE.SVG")]

@@ -22,7 +22,7 @@ pub(super) struct DemoArguments {
     #[arg(long)]
     force: bool,
     /// Draws the hidden gains, the hidden effect and the motions.
-    #[arg(long, value_name = "N", default_value_t = 1, value_parser = calibration::seed::parse, allow_negative_numbers = true)]
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = calibration::seed::parse)]
     seed: u64,
     /// Clips to record; a diagnosis needs at least four.
     #[arg(long, value_name = "N", default_value_t = 6, value_parser = clap::value_parser!(u32).range(4..=100))]

@@ -78,7 +78,7 @@ pub(super) struct Arguments {
     #[arg(long)]
     pub(super) torques: bool,
     /// Draws which clips are for what, and the intervals.
-    #[arg(long, value_name = "N", default_value_t = 0, value_parser = calibration::seed::parse, allow_negative_numbers = true)]
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = calibration::seed::parse)]
     pub(super) seed: u64,
     /// Prints one JSON object on stdout at the end.
     #[arg(long)]

@@ -40,7 +40,7 @@ struct Task {
     #[arg(long, value_name = "THETA.TOML")]
     parameters: Option<PathBuf>,
     /// Draws the clips that are held out, and the searches.
-    #[arg(long, value_name = "N", default_value_t = 0, value_parser = calibration::seed::parse, allow_negative_numbers = true)]
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = calibration::seed::parse)]
     seed: u64,
     /// Takes the data as they were recorded where `calibration check` says that they cannot mean what they say.
     #[arg(long)]

@@ -54,7 +54,7 @@ pub(super) struct InitArguments {
     #[arg(long, value_name = "MASS,LENGTH,RADIUS", value_parser = init::tool)]
     tool: Option<[f64; 3]>,
     /// Height of the table in the base frame [m].
-    #[arg(long, value_name = "HEIGHT", value_parser = init::height, allow_negative_numbers = true)]
+    #[arg(long, value_name = "HEIGHT", value_parser = init::height)]
     table: Option<f64>,
     /// The object, a box: edge lengths along its x, y, z [m].
     #[arg(long, value_name = "X,Y,Z", value_parser = init::edges)]

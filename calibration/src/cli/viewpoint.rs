@@ -71,10 +71,10 @@ pub(crate) struct ViewpointArguments {
     #[arg(long, default_value_t = 6, value_parser = clap::value_parser!(u8).range(1..=100))]
     frames: u8,
     /// A Franka Hand is mounted, its fingers this far apart [m], 0 to 0.08.
-    #[arg(long, value_name = "WIDTH", allow_negative_numbers = true, value_parser = |text: &str| number(text, 0.0..=0.08, "m"))]
+    #[arg(long, value_name = "WIDTH", value_parser = |text: &str| number(text, 0.0..=0.08, "m"))]
     hand: Option<f64>,
     /// Seed of what is drawn by lot.
-    #[arg(long, value_name = "N", default_value_t = 1, value_parser = calibration::seed::parse, allow_negative_numbers = true)]
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = calibration::seed::parse)]
     seed: u64,
     /// Writes the cell with the pose found.
     #[arg(long, value_name = "CELL.TOML")]

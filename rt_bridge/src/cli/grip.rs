@@ -45,20 +45,20 @@ enum Order {
     #[command(after_help = "Examples:\n  rt_bridge grip move 0.03 --speed 0.05")]
     Move {
         /// Between the fingers [m], 0 to 0.5: 0.03 is 30 mm
-        #[arg(value_name = "WIDTH", allow_negative_numbers = true, value_parser = width)]
+        #[arg(value_name = "WIDTH", value_parser = width)]
         width: f64,
         /// How fast [m/s], 0.001 to 1. Default: as fast as it goes
-        #[arg(long, value_name = "SPEED", allow_negative_numbers = true, value_parser = speed)]
+        #[arg(long, value_name = "SPEED", value_parser = speed)]
         speed: Option<f64>,
     },
     /// Close until something of about this width is held
     #[command(after_help = "Examples:\n  rt_bridge grip grasp 0.04 --force 40 --json")]
     Grasp {
         /// Of the object [m], 0 to 0.5: 0.03 is 30 mm
-        #[arg(value_name = "WIDTH", allow_negative_numbers = true, value_parser = width)]
+        #[arg(value_name = "WIDTH", value_parser = width)]
         width: f64,
         /// How hard [N], 0.1 to 500. Default: as gently as it can
-        #[arg(long, value_name = "FORCE", allow_negative_numbers = true, value_parser = force)]
+        #[arg(long, value_name = "FORCE", value_parser = force)]
         force: Option<f64>,
     },
     /// Stay where the fingers are

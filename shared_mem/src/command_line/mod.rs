@@ -4,10 +4,12 @@
 //! | file | owns |
 //! |---|---|
 //! | `layout` | texts below the options: paragraphs, rows, and examples that can be typed as they stand |
+//! | `numbers` | that numbers below zero are values |
 //! | `pages` | manual pages |
 //! | `placeholders` | what stands for a value, spelled alike |
 
 mod layout;
+mod numbers;
 mod pages;
 mod placeholders;
 
@@ -112,7 +114,8 @@ fn command<A: Parser>(build: &Build) -> Command {
         .after_help(format!(
             "Examples:\n  {name} manpages --out ~/.local/share/man/man1\n  man {name}    the page of a verb: man {name}-VERB"
         ));
-    layout::fitted(placeholders::spelled(command.subcommand(completions).subcommand(manpages)), WIDTH)
+    let whole = command.subcommand(completions).subcommand(manpages);
+    layout::fitted(placeholders::spelled(numbers::below_zero(whole)), WIDTH)
 }
 
 fn completions(command: &mut Command, asked: &ArgMatches) -> ExitCode {

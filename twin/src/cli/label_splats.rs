@@ -46,10 +46,10 @@ pub(crate) struct LabelSplats {
     #[arg(long, value_name = "POSE", allow_hyphen_values = true, value_delimiter = ',', value_parser = part_of_pose)]
     start: Option<Vec<f64>>,
     /// The Franka Hand is mounted, its fingers so far apart [m], 0 to 0.08
-    #[arg(long, value_name = "WIDTH", allow_negative_numbers = true, value_parser = hand)]
+    #[arg(long, value_name = "WIDTH", value_parser = hand)]
     hand: Option<f64>,
     /// A splat belongs to a link whose surface is nearer than this [m], 0.0001 to 0.2
-    #[arg(long, value_name = "DISTANCE", default_value_t = 0.015, allow_negative_numbers = true, value_parser = reach)]
+    #[arg(long, value_name = "DISTANCE", default_value_t = 0.015, value_parser = reach)]
     reach: f64,
     /// Prints one JSON object on stdout at the end
     #[arg(long)]

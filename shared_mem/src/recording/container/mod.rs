@@ -123,9 +123,9 @@ impl<R: Read + Seek> Messages<R> {
     /// Reads from any source; `path` only names it in errors.
     pub(super) fn from_source(source: R, path: &Path) -> Result<Self, ReadError> {
         let framing = Framing::open(source).map_err(ReadError::io(path))?.ok_or_else(|| {
-            let what = "is no MCAP file; record one with `rt_bridge record --out clip.mcap` or `ros2 bag record -s mcap -a`; a ROS 2 \
-                        bag of another storage becomes one with `ros2 bag convert -i BAG -o out.yaml`, out.yaml being \
-                        `output_bags: [{uri: out, storage_id: mcap, all: true}]`";
+            let what = "is no MCAP file; record one with `rt_bridge record --out clip.mcap` or `ros2 bag record -s mcap -a`; \
+                        other logs (bags of sqlite3 or ROS 1, CSV, npz, LeRobot, libfranka, SAGE) become a session with \
+                        `calibration import FILE --out session`";
             ReadError::kind(path, what)
         })?;
         Ok(Self {
