@@ -240,7 +240,8 @@ impl Running {
     fn words(&self) -> String {
         let lines = self.tail.lock().unwrap_or_else(PoisonError::into_inner);
         let is_trouble = |line: &&String| !line.trim().is_empty() && !line.contains(" INFO ");
-        let last = lines.iter().rfind(is_trouble);
+        // Behind an error of its arguments stands how to get help.
+        let last = lines.iter().rfind(|line| line.starts_with("error: ")).or_else(|| lines.iter().rfind(is_trouble));
         last.map_or(String::new(), |line| format!(": {}", line.trim().trim_start_matches("error: ")))
     }
 }
@@ -299,6 +300,13 @@ mod tests {
         let ended = shell(script).finish(GRACE, || false).unwrap_err();
         assert!(ended.to_string().ends_with(": no room"), "{ended}");
         assert!(matches!(ended, ProcessError::Ended { answer, .. } if answer == "kept\n"));
+    }
+
+    #[test]
+    fn of_a_child_with_wrong_arguments_the_error_is_quoted_and_not_the_way_to_help() {
+        let script = "printf 'error: no such arm\n\nFor more information, try --help.\n' >&2; exit 2";
+        let ended = shell(script).finish(GRACE, || false).unwrap_err().to_string();
+        assert!(ended.ends_with(": no such arm"), "{ended}");
     }
 
     #[test]

@@ -114,7 +114,8 @@ pub(super) fn run(arguments: &ExportArguments) -> anyhow::Result<()> {
         }
     })?;
     drop(bar);
-    let words = format!("{} clips in {}", clips.len(), out.display());
+    let noun = if clips.len() == 1 { "clip" } else { "clips" };
+    let words = format!("{} {noun} in {}", clips.len(), out.display());
     print(*json, &Answer { clips }, words)
 }
 

@@ -93,7 +93,8 @@ pub(super) fn run(arguments: &ImportArguments) -> anyhow::Result<()> {
         }
         Outcome::Done { clips, notes } => {
             notes.iter().for_each(|note| console::line(format_args!("{}: {}", note.line, note.why)));
-            let words = format!("{} clips in {}", clips.len(), out.display());
+            let noun = if clips.len() == 1 { "clip" } else { "clips" };
+            let words = format!("{} {noun} in {}", clips.len(), out.display());
             print(*json, &Answer { clips, notes }, words)
         }
     }
