@@ -3,10 +3,11 @@
 use std::error::Error;
 use std::path::PathBuf;
 
-const FILES: [&str; 7] = [
+const FILES: [&str; 8] = [
     "foxglove/PoseInFrame.proto",
     "foxglove/RawImage.proto",
     "foxglove/CameraCalibration.proto",
+    "foxglove/JointStates.proto",
     "foxglove/Log.proto",
     "twinalign/arm.proto",
     "twinalign/twin.proto",

@@ -98,6 +98,29 @@ pub const TWIN_GAP: Topic<TwinGap> = topic("/twin/gap", STREAM);
 pub const EVENTS: Topic<Event> =
     topic("/events", Limits { buffer: 128, history: 16, borrowed: 2, subscribers: 8, publishers: 8 });
 
+/// Recordings of tasks: positions of bodies on joints.
+pub const TASK_JOINTS: &str = "/task/joints";
+/// Recordings of tasks: what the drives of joints are told.
+pub const TASK_DRIVES: &str = "/task/drives";
+
+/// Recordings of several bodies: where the body of this name is.
+#[must_use]
+pub fn object_pose(name: &str) -> String {
+    format!("/object/{name}/pose")
+}
+
+/// Recordings of tasks: where the moved body of this name is told to be.
+#[must_use]
+pub fn object_target(name: &str) -> String {
+    format!("/object/{name}/target")
+}
+
+/// The body that a topic of [`object_pose`] (`"pose"`) or of [`object_target`] (`"target"`) is about.
+#[must_use]
+pub fn object_of<'a>(topic: &'a str, what: &str) -> Option<&'a str> {
+    topic.strip_prefix("/object/")?.strip_suffix(what)?.strip_suffix('/')
+}
+
 /// Something to do with every topic, whatever its messages.
 pub trait Visitor {
     /// A topic of messages.

@@ -1,10 +1,22 @@
 //! Task files: those that ship succeed from any start, and what is wrong with one is said in a line with its place.
 
+use shared_mem::output::Destination;
+use shared_mem::recording::{ClipInfo, ClipMessages, Episode, Payload, read_episode, write_episode};
 use std::path::{Path, PathBuf};
-use twin::task::Task;
+use twin::task::{Run, Task};
 
 fn shipped(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../tasks").join(name)
+}
+
+/// The rows without the gripper's force, which nobody knows: what is no number equals nothing.
+fn known(mut rows: Episode) -> Episode {
+    rows.moments.iter_mut().flat_map(|row| &mut row.gripper).for_each(|gripper| gripper.force = 0.0);
+    rows
+}
+
+fn run(task: &Task, seed: u64) -> Run {
+    Run { seed, duration: task.horizon(), noise: 0.0 }
 }
 
 #[test]
@@ -12,7 +24,7 @@ fn the_scripted_motion_of_each_task_succeeds_from_ten_starts() {
     for name in ["push_milk.toml", "stack_boxes.toml", "pick_carrot.toml", "close_laptop.toml"] {
         let task = Task::read(&shipped(name)).unwrap_or_else(|error| panic!("{error}"));
         for seed in 0..10 {
-            let episode = task.episode(seed, task.horizon()).expect("room for all");
+            let episode = task.episode(&run(&task, seed)).expect("room for all");
             assert!(episode.success && episode.at_rest, "{name}, seed {seed}: {episode:?}");
         }
     }
@@ -21,9 +33,56 @@ fn the_scripted_motion_of_each_task_succeeds_from_ten_starts() {
 #[test]
 fn a_start_is_that_of_its_seed_and_another_seed_has_another() {
     let task = Task::read(&shipped("stack_boxes.toml")).expect("a task");
-    let [one, again, other] = [1, 1, 2].map(|seed| task.episode(seed, 0.001).expect("room for all"));
+    let [one, again, other] =
+        [1, 1, 2].map(|seed| task.episode(&Run { duration: 0.001, ..run(&task, seed) }).expect("room for all"));
     assert_eq!(one, again);
     assert_ne!(one.bodies[1].start, other.bodies[1].start);
+}
+
+#[test]
+fn noise_changes_the_motion_and_not_the_start() {
+    let task = Task::read(&shipped("pick_carrot.toml")).expect("a task");
+    let rows = |noise| known(task.demonstration(&Run { noise, ..run(&task, 3) }).expect("room for all").1);
+    let (plain, noisy, again) = (rows(0.0), rows(0.002), rows(0.002));
+    assert!(noisy == again);
+    assert_eq!(plain.moments[0], noisy.moments[0]);
+    let hand = |rows: &Episode, row: usize| rows.moments[row].targets[0].position;
+    let off = (0..3).map(|k| (hand(&plain, 100)[k] - hand(&noisy, 100)[k]).abs()).fold(0.0, f64::max);
+    assert!(off > 1e-5 && off < 0.01, "{off}");
+    // It waits for its fingers, and has gone somewhere else after that.
+    assert_eq!(hand(&noisy, 185), hand(&noisy, 250));
+    assert_ne!(hand(&noisy, 250), hand(&noisy, 330));
+}
+
+#[test]
+fn a_recorded_episode_is_read_back_as_it_was() {
+    let task = Task::read(&shipped("pick_carrot.toml")).expect("a task");
+    let (episode, rows) = task.demonstration(&run(&task, 5)).expect("room for all");
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("episode.mcap");
+    let place = Destination::new(&path, false).expect("a place");
+    write_episode(place.begin().expect("room"), &ClipInfo::default(), &rows).expect("room");
+    let mut read = read_episode(&path).expect("an episode");
+    assert_eq!(read.info.success, episode.success);
+    assert_eq!(read.object.as_deref(), Some("plate"));
+    // The gripper's stamp is that of its row.
+    for (read, row) in read.moments.iter_mut().zip(&rows.moments) {
+        let (Some(read), Some(row)) = (&mut read.gripper, &row.gripper) else { panic!("no gripper") };
+        assert!(read.force.is_nan() && (0.0..0.091).contains(&read.width), "{read:?}");
+        read.stamp_ns = row.stamp_ns;
+    }
+    assert!(known(read) == known(rows.clone()));
+    let held = rows.moments.iter().filter(|row| row.gripper.is_some_and(|gripper| gripper.grasped == 1)).count();
+    assert!((200..600).contains(&held), "{held} rows of {}", rows.moments.len());
+    // Readers that know one object see the first.
+    let poses = ClipMessages::open(&path, &[]).expect("a clip").filter_map(Result::ok);
+    let poses: Vec<_> = poses.filter(|message| matches!(message.payload, Payload::ObjectPose(_))).collect();
+    assert_eq!(poses.len(), rows.moments.len());
+    assert!(poses.iter().all(|message| message.topic == "/object/pose"));
+    // A file that lacks its end is no whole episode.
+    let bytes = std::fs::read(&path).expect("the file");
+    std::fs::write(&path, &bytes[..bytes.len() / 2]).expect("room");
+    assert!(read_episode(&path).is_err());
 }
 
 /// A table, a box on it, and a box that has to get to x = 1.

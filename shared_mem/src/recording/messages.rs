@@ -131,7 +131,9 @@ fn own(message: &Message<'_>) -> Result<Option<Payload>, String> {
     Ok(Some(match message.channel.type_name() {
         ArmState::SCHEMA => Payload::ArmState(Box::new(decode(data)?)),
         ArmCommand::SCHEMA => Payload::ArmCommand(Box::new(decode(data)?)),
-        ObjectPose::SCHEMA => Payload::ObjectPose(Box::new(decode(data)?)),
+        ObjectPose::SCHEMA if message.channel.topic == ObjectPose::TOPIC => {
+            Payload::ObjectPose(Box::new(decode(data)?))
+        }
         CameraInfo::SCHEMA => Payload::CameraInfo(Box::new(decode(data)?)),
         Wrench::SCHEMA => Payload::Wrench(decode(data)?),
         GripperState::SCHEMA => Payload::Gripper(decode(data)?),

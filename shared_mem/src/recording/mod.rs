@@ -15,6 +15,7 @@
 //! | `joint_log` | joint rows: one publisher, one joint order |
 //! | `checks` | faults that foreign logs have, each told in a sentence |
 //! | `wire`, `writer` | own clips: messages and file |
+//! | `episode` | one run of a task as a clip, there and back |
 //! | `raw` | messages as bytes, for readers of other programs' bags |
 //! | `recover` | a damaged file, rewritten |
 //! | `export` | a session in another format |
@@ -26,6 +27,7 @@ mod checks;
 mod clip;
 mod container;
 mod device_clock;
+mod episode;
 mod error;
 mod export;
 mod joint_log;
@@ -47,6 +49,7 @@ mod wire;
 mod writer;
 
 pub use clip::{Clip, read_clip};
+pub use episode::{Episode, EpisodeInfo, EpisodeMoment, RigidPose, read_episode, write_episode};
 pub use error::ReadError;
 pub use export::{
     ExportError, Exported, FlangeAt, Format, FramesAt, LeftOut, Order, ROS_CAMERA_FRAME, RobotModel, Transform,

@@ -147,7 +147,7 @@ pub(super) fn read<R: Read + Seek>(
         match message.channel.type_name() {
             ArmState::SCHEMA => rows.push(&decode(message.data).map_err(fail)?),
             ArmCommand::SCHEMA if logged.commands_apart => rows.push_command(&decode(message.data).map_err(fail)?),
-            ObjectPose::SCHEMA => {
+            ObjectPose::SCHEMA if topic == ObjectPose::TOPIC => {
                 let pose: ObjectPose = decode(message.data).map_err(fail)?;
                 poses.push((pose.stamp_ns, pose.pose()));
             }

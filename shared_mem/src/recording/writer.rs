@@ -20,7 +20,6 @@ use crate::topics::ImageTopic;
 use mcap::records::{MessageHeader, Metadata};
 use mcap::write::NoSeek;
 use mcap::{Attachment, Compression, McapError, WriteOptions};
-use prost::Message as _;
 use std::borrow::Cow;
 use std::collections::{BTreeMap, HashMap};
 use std::fs::File;
@@ -129,7 +128,7 @@ pub struct ClipWriter<W: Write = File> {
     path: PathBuf,
     mcap: mcap::Writer<NoSeek<BufWriter<Counted<W>>>>,
     clock: UnixClock,
-    channels: HashMap<&'static str, Channel>,
+    channels: HashMap<String, Channel>,
     messages: u64,
     bytes: Arc<AtomicU64>,
     /// Name of the frame that the object's poses are in.
@@ -339,20 +338,37 @@ impl<W: Write> ClipWriter<W> {
     }
 
     fn encoded<T: Wire>(&mut self, stamp_ns: u64, message: &T::Message) -> Result<(), WriteError> {
+        self.named(T::TOPIC, T::SCHEMA, stamp_ns, message)
+    }
+
+    /// Records a message whose topic no constant names.
+    pub(super) fn named(
+        &mut self,
+        topic: &str,
+        schema: &str,
+        stamp_ns: u64,
+        message: &impl prost::Message,
+    ) -> Result<(), WriteError> {
         self.scratch.clear();
         let encoded = message.encode(&mut self.scratch);
         debug_assert!(encoded.is_ok(), "a vector grows as needed");
-        self.put(T::TOPIC, T::SCHEMA, stamp_ns).map_err(|error| self.failed(&error))
+        self.put(topic, schema, stamp_ns).map_err(|error| self.failed(&error))
+    }
+
+    /// What makes Unix time of a stamp.
+    pub(super) fn clock(&self) -> UnixClock {
+        self.clock
     }
 
     /// Writes the scratch buffer as one message.
-    fn put(&mut self, topic: &'static str, schema: &str, stamp_ns: u64) -> Result<(), McapError> {
+    fn put(&mut self, topic: &str, schema: &str, stamp_ns: u64) -> Result<(), McapError> {
         let known = self.channels.get(topic).copied();
-        let mut channel = match known {
+        let channel = match known {
             Some(channel) => channel,
             None => {
                 let schema_id = self.mcap.add_schema(schema, "protobuf", &wire::descriptor(schema))?;
                 let id = self.mcap.add_channel(schema_id, topic, "protobuf", &BTreeMap::new())?;
+                self.channels.insert(topic.to_owned(), Channel { id, sequence: 0 });
                 Channel { id, sequence: 0 }
             }
         };
@@ -360,8 +376,9 @@ impl<W: Write> ClipWriter<W> {
         let header =
             MessageHeader { channel_id: channel.id, sequence: channel.sequence, log_time: time, publish_time: time };
         self.mcap.write_to_known_channel(&header, &self.scratch)?;
-        channel.sequence = channel.sequence.wrapping_add(1);
-        self.channels.insert(topic, channel);
+        if let Some(channel) = self.channels.get_mut(topic) {
+            channel.sequence = channel.sequence.wrapping_add(1);
+        }
         self.messages += 1;
         Ok(())
     }

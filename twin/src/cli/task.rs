@@ -6,22 +6,25 @@ use shared_mem::answer;
 use shared_mem::output::Destination;
 use shared_mem::progress::Progress;
 use shared_mem::quantity::seconds;
+use shared_mem::recording::{ClipInfo, write_episode};
 use std::fmt::Write as _;
 use std::io::Write as _;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
-use twin::task::{Episode, Task as TaskFile};
+use twin::task::{Episode, Run, Task as TaskFile};
 
 /// Places the bodies of a task, simulates them, and says whether they come to rest, where, and whether it is a success.
 #[derive(clap::Args)]
 #[command(after_help = "\
 A task file holds bodies of convex pieces (free, on joints, held, moved), where they may start, what counts as success, and
-a scripted motion; docs/tasks.md has every key. An episode ends with success, or after the task's horizon.
+a scripted motion; docs/tasks.md has every key. An episode ends with success, or after the task's horizon. With --record each
+episode becomes a clip of its own in a folder, named by its seed; those that are finished stay whatever happens to the rest.
 
 Examples:
   twin task tasks/push_milk.toml
   twin task tasks/stack_boxes.toml --seed 3 --duration 5
   twin task tasks/close_laptop.toml --episodes 50 --out laptop.json
+  twin task tasks/pick_carrot.toml --episodes 50 --noise 0.003 --record carrot
   twin task tasks/pick_carrot.toml --json
 
 JSON: task, successes, and for each of episodes seed, duration_s, at_rest, at_rest_since_s, success, contacts (names of bodies
@@ -39,11 +42,17 @@ pub(crate) struct Task {
     /// Simulated time of an episode, at most [default: the task's horizon]
     #[arg(long, value_name = "SECONDS", value_parser = seconds)]
     duration: Option<Duration>,
+    /// One sigma of what is added to the script's way points along each axis; the start's seed draws it too
+    #[arg(long, value_name = "METRES", default_value_t = 0.0, value_parser = noise)]
+    noise: f64,
+    /// Writes each episode into this folder as a clip, `episode_SEED.mcap`
+    #[arg(long, value_name = "FOLDER")]
+    record: Option<PathBuf>,
     /// Writes the JSON answer to a file as well
     #[arg(long, value_name = "FILE.json")]
     out: Option<PathBuf>,
-    /// Replaces a file that is there already
-    #[arg(long, requires = "out")]
+    /// Replaces files that are there already
+    #[arg(long)]
     force: bool,
     /// Prints one JSON object on stdout at the end
     #[arg(long)]
@@ -68,7 +77,12 @@ impl Task {
         let mut episodes = Vec::new();
         for i in 0..u64::from(self.episodes) {
             let seed = self.seed.checked_add(i).context("--seed is too large for so many --episodes")?;
-            episodes.push(task.episode(seed, duration).with_context(|| format!("seed {seed}"))?);
+            let run = Run { seed, duration, noise: self.noise };
+            let outcome = match &self.record {
+                Some(folder) => self.recorded(folder, &task, &run),
+                None => task.episode(&run).map_err(anyhow::Error::from),
+            };
+            episodes.push(outcome.with_context(|| format!("seed {seed}"))?);
             bar.show(i + 1, "");
         }
         drop(bar);
@@ -86,6 +100,25 @@ impl Task {
         }
         Ok(())
     }
+
+    /// Runs an episode and writes its clip.
+    fn recorded(&self, folder: &Path, task: &TaskFile, run: &Run) -> anyhow::Result<Episode> {
+        let place = Destination::in_new_folder(&folder.join(format!("episode_{:06}.mcap", run.seed)), self.force)?;
+        let (episode, rows) = task.demonstration(run)?;
+        let info = ClipInfo {
+            configuration: task.text().to_owned(),
+            program: concat!("twin ", env!("CARGO_PKG_VERSION"), " task").to_owned(),
+            ..ClipInfo::default()
+        };
+        write_episode(place.begin()?, &info, &rows)?;
+        Ok(episode)
+    }
+}
+
+/// A length that is not negative [m].
+fn noise(text: &str) -> Result<f64, String> {
+    let wanted = "give metres from 0 to 1, as 0.003";
+    text.parse().ok().filter(|noise| (0.0..=1.0).contains(noise)).ok_or_else(|| wanted.to_owned())
 }
 
 impl Answer {

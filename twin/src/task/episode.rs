@@ -1,14 +1,38 @@
 //! One run of a task: did it come to rest, where, and was it a success.
 
 use super::Task;
+use super::motion::Motions;
 use super::start::{Placed, StartError};
 use crate::world::{STEP, World};
 use nalgebra::Isometry3;
+use rand_pcg::Pcg64;
 use serde::Serialize;
 
 /// A body whose fastest point is slower than this is at rest [m/s], once it has been for so long [s].
 const STILL: f64 = 1e-4;
 const STILL_FOR: f64 = 0.1;
+
+/// Stream of the deviates of way points: starts are drawn from another one, so that noise leaves them as they are.
+const NOISE_STREAM: u128 = 0x006e_6f69_7365;
+
+/// How an episode is to be run.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Run {
+    /// Draws where bodies start, and the noise.
+    pub seed: u64,
+    /// Simulated time at most [s].
+    pub duration: f64,
+    /// One sigma of what is added to the script's way points, along each axis [m].
+    pub noise: f64,
+}
+
+/// An episode between two steps.
+pub(super) struct Scene<'a> {
+    pub(super) world: &'a World,
+    pub(super) motions: &'a Motions,
+    /// Poses of all bodies at the beginning.
+    pub(super) starts: &'a [Isometry3<f64>],
+}
 
 /// What came of one run.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -54,17 +78,24 @@ pub struct Place {
 }
 
 impl Task {
-    /// Simulates an episode for at most `duration` seconds.
+    /// Simulates an episode.
     ///
     /// # Errors
     /// [`StartError`] when bodies overlap wherever they start, or nothing is left to do.
-    pub fn episode(&self, seed: u64, duration: f64) -> Result<Episode, StartError> {
-        let Placed { mut world, yaws } = self.placed(seed)?;
+    pub fn episode(&self, how: &Run) -> Result<Episode, StartError> {
+        self.watched(how, |_, _| {})
+    }
+
+    /// Simulates an episode; `watch` is called at the start and after every step, with how many there have been.
+    pub(super) fn watched(&self, how: &Run, mut watch: impl FnMut(usize, &Scene<'_>)) -> Result<Episode, StartError> {
+        let Placed { mut world, yaws } = self.placed(how.seed)?;
         let poses: Vec<Isometry3<f64>> = (0..self.bodies.len()).map(|body| world.pose(body)).collect();
-        let motions = self.motions.placed(&world, &yaws);
+        let mut generator = Pcg64::new(u128::from(how.seed), NOISE_STREAM);
+        let motions = self.motions.placed(&world, &yaws).off_by(how.noise, &mut generator);
         let starts: Vec<Place> = (0..self.bodies.len()).map(|body| Place::of(&world, body)).collect();
-        let steps = (duration / STEP).round().max(1.0) as usize;
-        let mut run = Run { done: 0, moved: 0, failed: 0 };
+        let steps = (how.duration / STEP).round().max(1.0) as usize;
+        let mut run = Course { done: 0, moved: 0, failed: 0 };
+        watch(0, &Scene { world: &world, motions: &motions, starts: &poses });
         while run.done < steps && !run.is_success(self.hold) {
             motions.act(&mut world, &poses, run.done);
             world.step();
@@ -75,6 +106,7 @@ impl Task {
             if !self.conditions.iter().all(|condition| condition.holds(&world)) {
                 run.failed = run.done;
             }
+            watch(run.done, &Scene { world: &world, motions: &motions, starts: &poses });
         }
         let at_rest = (run.done - run.moved) as f64 * STEP > STILL_FOR;
         let bodies = starts.into_iter().enumerate().map(|(body, start)| BodyEnd {
@@ -84,7 +116,7 @@ impl Task {
             speed_m_s: world.speed(body),
         });
         Ok(Episode {
-            seed,
+            seed: how.seed,
             duration_s: run.done as f64 * STEP,
             at_rest,
             at_rest_since_s: at_rest.then_some(run.moved as f64 * STEP),
@@ -103,13 +135,13 @@ impl Task {
 }
 
 /// Steps done, and the last ones in which something moved and in which a condition did not hold.
-struct Run {
+struct Course {
     done: usize,
     moved: usize,
     failed: usize,
 }
 
-impl Run {
+impl Course {
     fn is_success(&self, hold: f64) -> bool {
         self.done > 0 && (self.done - self.failed) as f64 * STEP >= hold
     }

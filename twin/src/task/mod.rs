@@ -10,20 +10,25 @@
 //! | `condition` | what counts as success |
 //! | `motion` | where moved bodies go and what drives do, by time |
 //! | `episode` | one run: did it come to rest, where, and was it a success |
+//! | `gripper` | two fingers on geared joints as a gripper with an opening |
+//! | `demonstration` | a run as the rows of a clip |
 
 mod condition;
+mod demonstration;
 mod episode;
 mod file;
+mod gripper;
 mod motion;
 mod read;
 mod start;
 mod surface;
 
-pub use episode::{BodyEnd, Episode, Place};
+pub use episode::{BodyEnd, Episode, Place, Run};
 pub use start::StartError;
 
 use crate::world::{BodyPlan, World};
 use condition::Condition;
+use gripper::Gripper;
 use motion::Motions;
 use shared_mem::toml_file::TomlFileError;
 use start::StartRange;
@@ -32,11 +37,16 @@ use std::path::Path;
 /// A task, ready to be started as often as wanted.
 #[derive(Debug, Clone)]
 pub struct Task {
+    /// Its file's, without the ending.
+    name: String,
+    /// The whole file.
+    text: String,
     bodies: Vec<BodyPlan>,
     world: World,
     starts: Vec<StartRange>,
     conditions: Vec<Condition>,
     motions: Motions,
+    gripper: Option<Gripper>,
     /// For how long all conditions have to hold [s].
     hold: f64,
     /// How long an episode takes at most [s].
@@ -50,6 +60,12 @@ impl Task {
     /// [`TomlFileError`] with file, line and key of what is wrong.
     pub fn read(path: &Path) -> Result<Self, TomlFileError> {
         read::read(path)
+    }
+
+    /// The text of its file.
+    #[must_use]
+    pub fn text(&self) -> &str {
+        &self.text
     }
 
     /// How long an episode takes at most [s].

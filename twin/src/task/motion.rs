@@ -2,6 +2,8 @@
 
 use crate::world::{STEP, World};
 use nalgebra::{Isometry3, Translation3, Vector3};
+use rand_distr::{Distribution as _, StandardNormal};
+use rand_pcg::Pcg64;
 
 /// A pose that a moved body reaches.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -43,22 +45,51 @@ impl Motions {
         placed
     }
 
+    /// The same with way points that lie off by normal deviates of one sigma `noise` along each axis [m]; where a body waits,
+    /// it waits in one place.
+    pub(super) fn off_by(mut self, noise: f64, generator: &mut Pcg64) -> Self {
+        let nominal: Vec<Waypoint> = self.waypoints.clone();
+        for i in 0..nominal.len() {
+            let waits_at = (0..i).rfind(|other| nominal[*other].body == nominal[i].body);
+            let waits_at = waits_at.filter(|other| nominal[*other].pose == nominal[i].pose);
+            self.waypoints[i].pose.translation = match waits_at {
+                Some(other) => self.waypoints[other].pose.translation,
+                None => {
+                    let off = Vector3::from_fn(|_, _| StandardNormal.sample(generator));
+                    Translation3::from(nominal[i].pose.translation.vector + noise * off)
+                }
+            };
+        }
+        self
+    }
+
     /// What there is to do in a step, by its number; `starts` are the poses at the beginning of the first.
     pub(super) fn act(&self, world: &mut World, starts: &[Isometry3<f64>], step: usize) {
-        let (time, end) = (step as f64 * STEP, (step + 1) as f64 * STEP);
         for order in self.orders.iter().filter(|order| (order.time / STEP).round() as usize == step) {
             world.drive(order.body, order.target, order.force);
         }
-        for (i, next) in self.waypoints.iter().enumerate().filter(|(_, next)| next.time > time) {
-            let before = self.waypoints[..i].iter().rfind(|other| other.body == next.body);
-            let (since, from) = before.map_or((0.0, starts[next.body]), |other| (other.time, other.pose));
-            if since > time {
-                continue;
+        for (body, start) in starts.iter().enumerate() {
+            if let Some((goal, true)) = self.goal(body, start, step) {
+                world.move_to(body, &goal);
             }
-            // From rest to rest with the least jerk.
-            let share = ((end - since) / (next.time - since)).min(1.0);
-            let eased = share.powi(3) * (10.0 + share * (6.0 * share - 15.0));
-            world.move_to(next.body, &from.lerp_slerp(&next.pose, eased));
         }
+    }
+
+    /// Where a moved body is told to be at the end of a step, by its number, and whether it is on its way there; `start` is
+    /// its pose at the beginning of the first. `None`: nothing moves it up to then.
+    pub(super) fn goal(&self, body: usize, start: &Isometry3<f64>, step: usize) -> Option<(Isometry3<f64>, bool)> {
+        let (time, end) = (step as f64 * STEP, (step + 1) as f64 * STEP);
+        let mut before = None;
+        for next in self.waypoints.iter().filter(|next| next.body == body) {
+            if next.time > time {
+                let (since, from) = before.map_or((0.0, *start), |other: &Waypoint| (other.time, other.pose));
+                // From rest to rest with the least jerk.
+                let share = ((end - since) / (next.time - since)).min(1.0);
+                let eased = share.powi(3) * (10.0 + share * (6.0 * share - 15.0));
+                return Some((from.lerp_slerp(&next.pose, eased), true));
+            }
+            before = Some(next);
+        }
+        before.map(|last| (last.pose, false))
     }
 }

@@ -3,6 +3,7 @@
 use super::Task;
 use super::condition::Condition;
 use super::file::{BodyEntry, HoldEntry, JointEntry, KindEntry, MotionEntry, SuccessEntry, TaskFile};
+use super::gripper::Gripper;
 use super::motion::{Motions, Order, Waypoint};
 use super::start::{StartError, StartRange};
 use super::surface::pose;
@@ -68,7 +69,10 @@ pub(super) fn parse(text: &str, path: &Path) -> Result<Task, TomlFileError> {
             .map_err(|fault| source.error(entry.span().start, fault))?;
     }
     motions.waypoints.sort_by(|a, b| a.time.total_cmp(&b.time));
-    let task = Task { bodies, world, starts, conditions, motions, hold: file.hold, horizon: file.horizon };
+    let name = path.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
+    let (gripper, hold, horizon) = (Gripper::of(&bodies), file.hold, file.horizon);
+    let text = text.to_owned();
+    let task = Task { name, text, bodies, world, starts, conditions, motions, gripper, hold, horizon };
     task.placed(0).map_err(|error| match &error {
         StartError::Crowded { second, .. } => {
             let at = names.iter().position(|name| name == second).map_or(0, |i| file.body[i].span().start);

@@ -177,11 +177,6 @@ impl World {
         self.locate();
     }
 
-    /// Sets a free body's velocity of the centre of mass [m/s] and its angular velocity [rad/s].
-    pub fn set_velocity(&mut self, body: usize, velocity: &Vector3<f64>, spin: &Vector3<f64>) {
-        self.trees.set_twist(body, velocity, spin);
-    }
-
     /// Pose of a body's origin.
     #[must_use]
     pub fn pose(&self, body: usize) -> Isometry3<f64> {
@@ -200,6 +195,13 @@ impl World {
         driven.for_each(|drive| (drive.target, drive.force) = (target, force));
     }
 
+    /// Where a body's joint is told to go [rad or m]; `None` for one without a drive.
+    #[must_use]
+    pub fn driven_to(&self, body: usize) -> Option<f64> {
+        let rail = self.rails.iter().find(|rail| rail.body == body)?;
+        rail.drive.map(|drive| drive.target)
+    }
+
     /// Whether two bodies press on each other.
     #[must_use]
     pub fn touch(&self, first: usize, second: usize) -> bool {
@@ -214,12 +216,6 @@ impl World {
     pub fn speed(&self, body: usize) -> f64 {
         let [velocity, spin] = self.trees.twist(body);
         velocity.norm() + spin.norm() * self.bodies[body].radius
-    }
-
-    /// Kinetic and potential energy of everything that moves by itself [J].
-    #[must_use]
-    pub fn energy(&self) -> f64 {
-        self.trees.energy(&GRAVITY)
     }
 
     /// Two bodies that overlap now, where no joint connects them.

@@ -361,17 +361,6 @@ impl Trees {
         twist
     }
 
-    /// Kinetic and potential energy of everything that has freedoms [J].
-    pub(super) fn energy(&self, gravity: &Vector3<f64>) -> f64 {
-        let moving = (0..self.nodes.len()).filter(|i| !matches!(self.nodes[*i].link, Link::Held));
-        let of = |i: usize| {
-            let (node, motion, [velocity, spin]) = (&self.nodes[i], &self.motions[i], self.twist(i));
-            0.5 * (node.mass * velocity.norm_squared() + spin.dot(&(motion.inertia * spin)))
-                - node.mass * gravity.dot(&motion.centre.coords)
-        };
-        moving.map(of).sum()
-    }
-
     /// Puts the freedoms of a free body into motion.
     pub(super) fn set_twist(&mut self, body: usize, velocity: &Vector3<f64>, spin: &Vector3<f64>) {
         if let Link::Free { first } = self.nodes[body].link {

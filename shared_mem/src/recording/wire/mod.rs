@@ -51,7 +51,7 @@ impl UnixClock {
         stamp_ns.saturating_add_signed(self.0)
     }
 
-    fn timestamp(self, stamp_ns: u64) -> Option<Timestamp> {
+    pub(super) fn timestamp(self, stamp_ns: u64) -> Option<Timestamp> {
         let unix_ns = self.unix_ns(stamp_ns);
         let seconds = i64::try_from(unix_ns / 1_000_000_000).ok()?;
         Some(Timestamp { seconds, nanos: i32::try_from(unix_ns % 1_000_000_000).ok()? })
