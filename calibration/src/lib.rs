@@ -7,6 +7,7 @@
 //! |---|---|
 //! | [`capture`] | planning a motion, having the bridge play it, recording it into a session folder |
 //! | [`check`] | the doctor of a recording: whether the data can mean what they say |
+//! | [`demonstrations`] | recorded episodes of tasks as data to learn from |
 //! | [`demo`] | the whole story on the simulated cell, in one command |
 //! | [`diagnose`] | where the gap lies, what causes it, how far it shrinks |
 //! | [`estimate`] | fits over clips: what all clips share, what varies from clip to clip |
@@ -48,6 +49,7 @@ pub mod benchmark;
 pub mod capture;
 pub mod check;
 pub mod demo;
+pub mod demonstrations;
 pub mod diagnose;
 pub mod estimate;
 pub mod forward;

@@ -1,4 +1,4 @@
-//! Logs of other programs as a session: what they hold, what it means, and clips of it.
+//! Logs of other programs as a session: what they hold, what it means, and clips of it. And data sets for other programs.
 //!
 //! | file | owns |
 //! |---|---|
@@ -12,10 +12,12 @@
 //! | `cell` | the cell.toml of the new session |
 //! | `session` | the whole way |
 //! | `contents` | what a log holds of a robot, for those who only look |
+//! | `data_set` | writes LeRobot data sets |
 
 mod cell;
 mod clip;
 mod contents;
+mod data_set;
 mod error;
 mod log;
 mod mapping;
@@ -28,6 +30,7 @@ mod sources;
 pub use cell::{UsualController, is_franka, usual_controller};
 pub use clip::Gravity;
 pub use contents::{Contents, look};
+pub use data_set::{DataSetError, DataSetPlan, DataSetWriter, Feature, FeatureKind, Frames};
 pub use error::ImportError;
 pub use log::LeftOut;
 pub use mapping::{

@@ -1,8 +1,10 @@
 //! Task files: those that ship succeed from any start, and what is wrong with one is said in a line with its place.
 
+use shared_mem::cell::{Cell, ClipKind};
 use shared_mem::output::Destination;
-use shared_mem::recording::{ClipInfo, ClipMessages, Episode, Payload, read_episode, write_episode};
+use shared_mem::recording::{ClipInfo, ClipMessages, Episode, Payload, read_clip, read_episode, write_episode};
 use std::path::{Path, PathBuf};
+use twin::arm::ArmModel;
 use twin::task::{Run, Task};
 
 fn shipped(name: &str) -> PathBuf {
@@ -71,6 +73,11 @@ fn a_recorded_episode_is_read_back_as_it_was() {
         assert!(read.force.is_nan() && (0.0..0.091).contains(&read.width), "{read:?}");
         read.stamp_ns = row.stamp_ns;
     }
+    for (read, row) in read.moments.iter_mut().zip(&rows.moments) {
+        let (Some(arm), Some(row)) = (&mut read.arm, &row.arm) else { panic!("no arm") };
+        assert_eq!((arm.stamp_ns, arm.device_ns), (read.time_ns, read.time_ns));
+        (arm.stamp_ns, arm.device_ns) = (row.stamp_ns, row.device_ns);
+    }
     assert!(known(read) == known(rows.clone()));
     let held = rows.moments.iter().filter(|row| row.gripper.is_some_and(|gripper| gripper.grasped == 1)).count();
     assert!((200..600).contains(&held), "{held} rows of {}", rows.moments.len());
@@ -79,10 +86,46 @@ fn a_recorded_episode_is_read_back_as_it_was() {
     let poses: Vec<_> = poses.filter(|message| matches!(message.payload, Payload::ObjectPose(_))).collect();
     assert_eq!(poses.len(), rows.moments.len());
     assert!(poses.iter().all(|message| message.topic == "/object/pose"));
+    // And the arm, by itself.
+    let clip = read_clip(&path, ClipKind::Excitation, &Cell::parse(ARM, &path).expect("a cell")).expect("a clip");
+    assert_eq!((clip.measured.len(), clip.measured.dof, clip.measured.tau.len()), (rows.moments.len(), 7, 0));
+    assert!(clip.warnings.is_empty(), "{:?}", clip.warnings);
     // A file that lacks its end is no whole episode.
     let bytes = std::fs::read(&path).expect("the file");
     std::fs::write(&path, &bytes[..bytes.len() / 2]).expect("room");
     assert!(read_episode(&path).is_err());
+}
+
+const ARM: &str = "[robot]\nmodel = \"fr3\"\n";
+
+#[test]
+fn the_arm_goes_where_its_body_goes_and_says_what_it_cannot_do() {
+    let task = Task::read(&shipped("stack_boxes.toml")).expect("a task");
+    let (_, rows) = task.demonstration(&run(&task, 2)).expect("room for all");
+    let model = ArmModel::fr3();
+    let mut before: Option<[f64; 8]> = None;
+    for (k, row) in rows.moments.iter().enumerate() {
+        let (arm, target) = (row.arm.as_ref().expect("an arm"), &row.targets[0]);
+        let flange = model.flange(&arm.q).isometry();
+        let palm = flange * nalgebra::Point3::new(0.0, 0.0, 0.1034);
+        let off = (palm.coords - nalgebra::Vector3::from(target.position)).norm();
+        assert!(off < 1e-8, "row {k}: {off}");
+        assert!((flange.rotation * nalgebra::Vector3::z()).z < -0.999_999, "row {k}");
+        let turned =
+            before.map_or(0.0, |q| (0..7).map(|i| (arm.q[i] - q[i] - 0.01 * arm.dq[i]).abs()).fold(0.0, f64::max));
+        assert!(turned < 2e-3, "row {k}: {turned}");
+        before = Some(arm.q);
+    }
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("task.toml");
+    let text = std::fs::read_to_string(shipped("stack_boxes.toml")).expect("the file");
+    for (base, said) in [("[-0.6, 0.0, 0.0]", "it does not reach"), ("[0.15, 0.0, 0.0]", "beyond")] {
+        std::fs::write(&path, text.replace("[arm]\n", &format!("[arm]\nbase = {base}\n"))).expect("room");
+        let task = Task::read(&path).expect("a task");
+        let episode = task.episode(&run(&task, 2)).expect("room for all");
+        let fault = episode.arm_fault.expect("a fault");
+        assert!(fault.contains(said) && !episode.success, "{base}: {fault}");
+    }
 }
 
 /// A table, a box on it, and a box that has to get to x = 1.

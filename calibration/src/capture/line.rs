@@ -1,23 +1,14 @@
 //! Joint motions that lead the tool's end along a straight line, the tool's direction held. Base frame; m, s, rad.
 //!
-//! Pure kinematics of the nominal arm, by damped least squares on its Jacobian; called by the stroke planner.
+//! Pure kinematics of the nominal arm; called by the stroke planner.
 
 use super::body::Body;
 use super::plan::RATE;
 use super::way::about_itself;
-use nalgebra::{DMatrix, DVector, Isometry3, Translation3, UnitQuaternion, Vector3, Vector6};
+use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3, Vector6};
+use shared_mem::msg::Joints;
 use shared_mem::msg::motion::SetPoint;
-use shared_mem::msg::{Joints, MAX_JOINTS};
 
-/// Damping of the inverse, in metres and radians alike: invisible in the working space, and no leap near a singular pose.
-const DAMPING: f64 = 1e-4;
-/// Corrections until a pose counts as out of reach.
-const CORRECTIONS: usize = 200;
-/// A pose is reached when position [m] and direction [rad] are this close: a microradian in a millisecond would already be
-/// a jerk of 1000 rad/s³.
-const REACHED: f64 = 1e-10;
-/// Largest correction of a joint at once [rad].
-const LARGEST: f64 = 0.2;
 /// Peak speed of the quintic rest-to-rest course over its mean.
 const PEAK: f64 = 1.875;
 /// How fast the tool turns on a way at most [rad/s].
@@ -30,18 +21,8 @@ const SHORTEST: f64 = 0.2;
 /// Joints that bring the tool's end to `target`, the nearest ones to `from`; `None` out of reach.
 #[must_use]
 pub fn reach(body: &Body, from: &Joints, target: &Isometry3<f64>) -> Option<Joints> {
-    let mut q = *from;
-    for _ in 0..CORRECTIONS {
-        let error = error(body, &q, target);
-        if error.amax() < REACHED {
-            return Some(q);
-        }
-        let step = joints_for(body, &q, &error);
-        let largest = step.iter().fold(0.0_f64, |largest, step| largest.max(step.abs()));
-        let share = (LARGEST / largest).min(1.0);
-        q.iter_mut().zip(&step).for_each(|(q, step)| *q += share * step);
-    }
-    None
+    let tip = Isometry3::translation(0.0, 0.0, body.model().tool_length());
+    body.model().reach(from, &tip, target)
 }
 
 /// Joints that bring the tool's end to `target` after turning it about its own axis by `turn` [rad], step by step, so that
@@ -63,29 +44,9 @@ pub fn joint_velocity(body: &Body, q: &Joints, velocity: &Vector3<f64>) -> Joint
     joints_for(body, q, &Vector6::new(velocity.x, velocity.y, velocity.z, 0.0, 0.0, 0.0))
 }
 
-/// From where the tool's end is to `target`: translation, then rotation vector.
-fn error(body: &Body, q: &Joints, target: &Isometry3<f64>) -> Vector6<f64> {
-    let tip = body.model().tip(q).isometry();
-    let shift = target.translation.vector - tip.translation.vector;
-    let turn = (target.rotation * tip.rotation.inverse()).scaled_axis();
-    Vector6::new(shift.x, shift.y, shift.z, turn.x, turn.y, turn.z)
-}
-
 /// Smallest joint motion that moves the tool's end by `motion`.
 fn joints_for(body: &Body, q: &Joints, motion: &Vector6<f64>) -> Joints {
-    let tip = body.model().tip(q).isometry().translation.vector;
-    let columns = body.model().jacobian(q, tip.into());
-    let dof = body.model().dof();
-    let jacobian = DMatrix::from_fn(6, dof, |row, joint| columns[joint][row]);
-    let mut gram = &jacobian * jacobian.transpose();
-    for i in 0..6 {
-        gram[(i, i)] += DAMPING * DAMPING;
-    }
-    let weights = gram.cholesky().map(|gram| gram.solve(&DVector::from_column_slice(motion.as_slice())));
-    let step = weights.map_or_else(|| DVector::zeros(dof), |weights| jacobian.tr_mul(&weights));
-    let mut out = [0.0; MAX_JOINTS];
-    out.iter_mut().zip(step.iter()).for_each(|(out, step)| *out = *step);
-    out
+    body.model().joints_for(q, body.model().tip(q).isometry().translation.vector.into(), motion)
 }
 
 /// A straight way of the tool's end to `end` from rest to rest at most at `speed` [m/s], the tool's direction turning on the

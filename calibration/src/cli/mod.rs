@@ -8,6 +8,7 @@ mod compare;
 mod demo;
 mod diagnose;
 mod export;
+mod export_episodes;
 mod export_model;
 mod identify;
 mod import;
@@ -37,6 +38,7 @@ Examples:
   calibration import last_week --out session
   calibration init --urdf arm.urdf --out cell.toml
   calibration export session --to rosbag2 --out bags
+  calibration export-episodes tasks/pick_carrot.toml carrot --to lerobot --out carrot_lerobot
   calibration export-model theta.toml --cell cell.toml --to mjcf --out cell.xml
 Every verb has its own --help with an example. Logs and progress go to stderr (RUST_LOG=debug for more)."
 )]
@@ -81,6 +83,8 @@ Examples:
     Init(Box<init::InitArguments>),
     /// Writes a session as ROS 2 bags, TwinAligner clip folders or own clips.
     Export(export::ExportArguments),
+    /// Writes episodes of a task as a LeRobot data set, or their pictures.
+    ExportEpisodes(export_episodes::ExportEpisodesArguments),
     /// Writes what was found as a model of MuJoCo, ROS or Gazebo, to run or to bring your own model up to date with.
     ExportModel(export_model::ExportModelArguments),
     /// The whole story on the simulated cell: shadow, record, replay, explain.
@@ -130,6 +134,7 @@ fn run_to_the_end(verb: Verb, interrupt: &Interrupt) -> anyhow::Result<()> {
         Verb::Import(arguments) => import::run(&arguments),
         Verb::Init(arguments) => init::run(*arguments),
         Verb::Export(arguments) => export::run(&arguments),
+        Verb::ExportEpisodes(arguments) => export_episodes::run(&arguments),
         Verb::ExportModel(arguments) => export_model::run(&arguments),
         Verb::Capture(_) | Verb::Demo(_) | Verb::Benchmark(_) => Ok(()),
     }

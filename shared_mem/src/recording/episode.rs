@@ -5,9 +5,11 @@
 
 use super::container::Messages;
 use super::error::ReadError;
+use super::logged::Logged;
 use super::wire::Wire;
 use super::wire::proto::{foxglove, twinalign};
 use super::writer::{ClipInfo, ClipWriter, WriteError, WriteSummary};
+use crate::msg::arm::ArmState;
 use crate::msg::gripper::GripperState;
 use crate::msg::object::ObjectPose;
 use crate::output::Output;
@@ -88,6 +90,8 @@ pub struct EpisodeMoment {
     pub drives: Vec<f64>,
     /// The gripper, where the task has one; its stamp does not count.
     pub gripper: Option<GripperState>,
+    /// The arm, where the task has one; without torques, and its stamps do not count.
+    pub arm: Option<Box<ArmState>>,
 }
 
 /// Writes a run; `info` says with which program and configuration it was made.
@@ -97,6 +101,7 @@ pub struct EpisodeMoment {
 pub fn write_episode(output: Output, info: &ClipInfo, episode: &Episode) -> Result<WriteSummary, WriteError> {
     let mut writer = ClipWriter::whole_in_unix_time(output, info)?;
     writer.note(&episode.info.record())?;
+    Logged::WITHOUT_TORQUES.record().map_or(Ok(()), |record| writer.note(&record))?;
     for moment in &episode.moments {
         let stamp_ns = moment.time_ns;
         for (name, pose) in episode.bodies.iter().zip(&moment.poses) {
@@ -127,6 +132,9 @@ pub fn write_episode(output: Output, info: &ClipInfo, episode: &Episode) -> Resu
         }
         if let Some(gripper) = &moment.gripper {
             writer.gripper(&GripperState { stamp_ns, ..*gripper })?;
+        }
+        if let Some(arm) = &moment.arm {
+            writer.arm_state(&ArmState { stamp_ns, device_ns: stamp_ns, ..**arm })?;
         }
     }
     writer.finish()
@@ -217,7 +225,7 @@ impl Columns {
     fn take(&mut self, time_ns: u64, topic: &str, schema: &str, data: &[u8]) -> Result<(), String> {
         if self.moments.last().is_none_or(|last| last.time_ns != time_ns) {
             let (poses, targets, joints, drives) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
-            self.moments.push(EpisodeMoment { time_ns, poses, targets, joints, drives, gripper: None });
+            self.moments.push(EpisodeMoment { time_ns, poses, targets, joints, drives, gripper: None, arm: None });
         }
         let is_first = self.moments.len() == 1;
         let Some(moment) = self.moments.last_mut() else { return Ok(()) };
@@ -244,6 +252,7 @@ impl Columns {
                     named(names, positions, is_first, &joint.name, position)?;
                 }
             }
+            ArmState::SCHEMA => moment.arm = Some(Box::new(super::messages::decode(data)?)),
             GripperState::SCHEMA => moment.gripper = Some(super::messages::decode(data)?),
             _ => {}
         }
@@ -256,6 +265,7 @@ impl Columns {
             let counts = [moment.poses.len(), moment.targets.len(), moment.joints.len(), moment.drives.len()];
             counts == [bodies.len(), moved.len(), joints.len(), driven.len()]
                 && moment.gripper.is_some() == moments[0].gripper.is_some()
+                && moment.arm.is_some() == moments[0].arm.is_some()
         };
         if let Some(bad) = moments.iter().find(|moment| !whole(moment)) {
             return Err(format!("lacks a body or a joint at {} s", bad.time_ns as f64 * 1e-9));

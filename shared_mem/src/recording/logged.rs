@@ -28,6 +28,9 @@ pub(super) struct Logged {
 }
 
 impl Logged {
+    /// An arm that is moved without being pushed.
+    pub(super) const WITHOUT_TORQUES: Self = Self { commands_apart: false, lacking: [false, true, false, true] };
+
     /// What a clip of any kind holds.
     pub(super) fn of(clip: &Clip) -> Self {
         let lacks = |series: &JointSeries| [series.dq_row(0).is_none(), series.tau_row(0).is_none()];

@@ -84,6 +84,27 @@ pub fn write_png_to(place: &Destination, width: u32, height: u32, rgb: &[u8]) ->
     place.write(packed.map_err(|error| OutputError::of(place.path(), error.into()))?)
 }
 
+/// A picture without gaps between its rows as the bytes of a PNG; depth as 16 bits of grey.
+///
+/// # Errors
+/// A sentence when the pixels are not that many.
+pub fn pack_picture(encoding: PixelEncoding, width: u32, height: u32, pixels: &[u8]) -> Result<Vec<u8>, String> {
+    match encoding {
+        PixelEncoding::Rgb8 => pack_png(width, height, pixels, png::Compression::default()),
+        PixelEncoding::Depth16 => {
+            let big_endian: Vec<u8> = pixels.chunks_exact(2).flat_map(|pair| [pair[1], pair[0]]).collect();
+            pack(
+                width,
+                height,
+                &big_endian,
+                (png::ColorType::Grayscale, png::BitDepth::Sixteen),
+                png::Compression::default(),
+            )
+        }
+    }
+    .map_err(|error| error.to_string())
+}
+
 /// `width * height` pixels of red, green, blue as the bytes of a PNG.
 pub(super) fn pack_png(
     width: u32,
@@ -91,13 +112,23 @@ pub(super) fn pack_png(
     rgb: &[u8],
     compression: png::Compression,
 ) -> Result<Vec<u8>, png::EncodingError> {
+    pack(width, height, rgb, (png::ColorType::Rgb, png::BitDepth::Eight), compression)
+}
+
+fn pack(
+    width: u32,
+    height: u32,
+    pixels: &[u8],
+    (color, depth): (png::ColorType, png::BitDepth),
+    compression: png::Compression,
+) -> Result<Vec<u8>, png::EncodingError> {
     let mut bytes = Vec::new();
     let mut encoder = png::Encoder::new(&mut bytes, width, height);
-    encoder.set_color(png::ColorType::Rgb);
-    encoder.set_depth(png::BitDepth::Eight);
+    encoder.set_color(color);
+    encoder.set_depth(depth);
     encoder.set_compression(compression);
     let mut writer = encoder.write_header()?;
-    writer.write_image_data(rgb)?;
+    writer.write_image_data(pixels)?;
     writer.finish()?;
     Ok(bytes)
 }
@@ -136,6 +167,10 @@ mod tests {
         let Ok(Picture::Pixels { header, pixels }) = read_picture(&path) else { panic!("no picture") };
         assert_eq!((header.width, header.height, pixels), (2, 3, rgb));
         assert!(write_png(&path, 2, 2, &[0; 3]).is_err());
+        let depth = [0x34, 0x12, 0xff, 0x00];
+        let packed = pack_picture(PixelEncoding::Depth16, 2, 1, &depth).expect("a picture");
+        let Ok(Picture::Pixels { header, pixels }) = unpack_picture(&packed, 0) else { panic!("no picture") };
+        assert_eq!((header.encoding, &pixels[..]), (PixelEncoding::Depth16, &depth[..]));
         std::fs::write(&path, b"GIF89a").expect("a file");
         assert!(read_picture(&path).unwrap_err().to_string().contains("neither a PNG nor a JPEG"));
     }

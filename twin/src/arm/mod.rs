@@ -12,6 +12,7 @@
 //! | `limits` | [`Limits`]: how far, fast and hard each joint may go |
 //! | `inertia` | mass properties of bodies |
 //! | `kinematics` | flange, Jacobian |
+//! | `reach` | joints that bring the flange to a pose |
 //! | `hull` | [`ArmHull`]: the space that links and tool take |
 //! | `dynamics` | gravity, Coriolis, mass matrix, accelerations |
 //! | `control` | [`ControlLaw`]: from command to torque |
@@ -31,6 +32,7 @@ mod kinematics;
 mod limits;
 mod model;
 mod parts;
+mod reach;
 mod spatial;
 mod step;
 mod transmission;

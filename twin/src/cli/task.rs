@@ -27,8 +27,8 @@ Examples:
   twin task tasks/pick_carrot.toml --episodes 50 --noise 0.003 --record carrot
   twin task tasks/pick_carrot.toml --json
 
-JSON: task, successes, and for each of episodes seed, duration_s, at_rest, at_rest_since_s, success, contacts (names of bodies
-that press on each other), and bodies: name, start and end (position, orientation_wxyz, joint), speed_m_s.")]
+JSON: task, successes, and for each of episodes seed, duration_s, at_rest, at_rest_since_s, success, arm_fault (what the arm
+cannot do of the motion), contacts (names of bodies that press on each other), and bodies: name, start and end (position, orientation_wxyz, joint), speed_m_s.")]
 pub(crate) struct Task {
     /// The task file
     #[arg(value_name = "TASK.toml")]
@@ -108,12 +108,16 @@ impl Task {
         let info = ClipInfo {
             configuration: task.text().to_owned(),
             program: concat!("twin ", env!("CARGO_PKG_VERSION"), " task").to_owned(),
+            cell_toml: (!task.arm_joints().is_empty()).then(|| ARM_CELL.to_owned()),
             ..ClipInfo::default()
         };
         write_episode(place.begin()?, &info, &rows)?;
         Ok(episode)
     }
 }
+
+/// What a clip's cell is where an arm carries something.
+const ARM_CELL: &str = "[robot]\nmodel = \"fr3\"\n";
 
 /// A length that is not negative [m].
 fn noise(text: &str) -> Result<f64, String> {
@@ -134,7 +138,8 @@ impl Answer {
                 }
             };
             let outcome = if episode.success { "success" } else { "no success" };
-            let _ = writeln!(text, "seed {}: {outcome} after {:.3} s, {rest}", episode.seed, episode.duration_s);
+            let fault = episode.arm_fault.as_ref().map_or(String::new(), |fault| format!("; the arm: {fault}"));
+            let _ = writeln!(text, "seed {}: {outcome} after {:.3} s, {rest}{fault}", episode.seed, episode.duration_s);
         }
         match self.episodes.as_slice() {
             [episode] => {

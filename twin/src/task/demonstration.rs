@@ -1,14 +1,14 @@
 //! A run as the rows of a clip: where everything was and what it was told, at a fixed rate.
 
-use super::episode::{Episode, Run, Scene};
+use super::episode::{Episode, Run};
 use super::start::StartError;
 use super::{BodyPlan, Task};
 use crate::world::{Hold, STEP};
 use nalgebra::Isometry3;
 use shared_mem::recording::{Episode as Recorded, EpisodeInfo, EpisodeMoment, RigidPose};
 
-/// Steps from one row to the next: 100 rows a second.
-const STEPS_A_ROW: usize = 10;
+/// Rows of a recorded episode in a second.
+pub const ROWS_A_SECOND: u32 = 100;
 
 impl Task {
     /// Simulates an episode, and what is recorded of it.
@@ -24,21 +24,16 @@ impl Task {
         let driven =
             of(|body| matches!(&body.hold, Hold::Joint(joint) if joint.drive.is_some() && joint.follows.is_none()));
         let mut moments = Vec::new();
-        let episode = self.watched(how, |done, Scene { world, motions, starts }| {
-            if done % STEPS_A_ROW != 0 {
-                return;
-            }
-            let told = |body: &usize| {
-                let goal = done.checked_sub(1).and_then(|step| motions.goal(*body, &starts[*body], step));
-                rigid_pose(&goal.map_or(starts[*body], |(goal, _)| goal))
-            };
+        let episode = self.watched(how, |done, scene| {
+            let world = scene.world;
             moments.push(EpisodeMoment {
                 time_ns: (done as f64 * STEP * 1e9).round() as u64,
                 poses: (0..self.bodies.len()).map(|body| rigid_pose(&world.pose(body))).collect(),
-                targets: moved.iter().map(told).collect(),
+                targets: moved.iter().map(|body| rigid_pose(&scene.told(*body, done))).collect(),
                 joints: joints.iter().filter_map(|body| world.joint(*body)).collect(),
                 drives: driven.iter().filter_map(|body| world.driven_to(*body)).collect(),
                 gripper: self.gripper.as_ref().and_then(|gripper| gripper.state(world, self.bodies.len())),
+                arm: self.carrier.as_ref().and_then(|carrier| carrier.state(scene.way)).map(Box::new),
             });
         })?;
         let names = |bodies: &[usize]| bodies.iter().map(|body| self.bodies[*body].name.clone()).collect();

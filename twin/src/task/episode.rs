@@ -1,6 +1,7 @@
 //! One run of a task: did it come to rest, where, and was it a success.
 
 use super::Task;
+use super::arm::Way;
 use super::motion::Motions;
 use super::start::{Placed, StartError};
 use crate::world::{STEP, World};
@@ -12,6 +13,8 @@ use serde::Serialize;
 const STILL: f64 = 1e-4;
 const STILL_FOR: f64 = 0.1;
 
+/// Steps from one row of a recording to the next.
+pub(super) const STEPS_A_ROW: usize = 10;
 /// Stream of the deviates of way points: starts are drawn from another one, so that noise leaves them as they are.
 const NOISE_STREAM: u128 = 0x006e_6f69_7365;
 
@@ -32,6 +35,20 @@ pub(super) struct Scene<'a> {
     pub(super) motions: &'a Motions,
     /// Poses of all bodies at the beginning.
     pub(super) starts: &'a [Isometry3<f64>],
+    /// The arm, where the task has one.
+    pub(super) way: &'a Way,
+}
+
+impl Scene<'_> {
+    /// Where a moved body is told to be after so many steps.
+    pub(super) fn told(&self, body: usize, done: usize) -> Isometry3<f64> {
+        told(self.motions, self.starts, body, done)
+    }
+}
+
+fn told(motions: &Motions, starts: &[Isometry3<f64>], body: usize, done: usize) -> Isometry3<f64> {
+    let goal = done.checked_sub(1).and_then(|step| motions.goal(body, &starts[body], step));
+    goal.map_or(starts[body], |(goal, _)| goal)
 }
 
 /// What came of one run.
@@ -45,8 +62,10 @@ pub struct Episode {
     pub at_rest: bool,
     /// Since when it was [s].
     pub at_rest_since_s: Option<f64>,
-    /// Whether all conditions held for as long as they have to.
+    /// Whether all conditions held for as long as they have to, and the arm, where there is one, can do it.
     pub success: bool,
+    /// What of the motion the arm cannot do, at first.
+    pub arm_fault: Option<String>,
     /// Every body.
     pub bodies: Vec<BodyEnd>,
     /// Bodies that press on each other at the end, by name.
@@ -86,7 +105,8 @@ impl Task {
         self.watched(how, |_, _| {})
     }
 
-    /// Simulates an episode; `watch` is called at the start and after every step, with how many there have been.
+    /// Simulates an episode; `watch` is called at the start and after every [`STEPS_A_ROW`] steps, with how many there
+    /// have been.
     pub(super) fn watched(&self, how: &Run, mut watch: impl FnMut(usize, &Scene<'_>)) -> Result<Episode, StartError> {
         let Placed { mut world, yaws } = self.placed(how.seed)?;
         let poses: Vec<Isometry3<f64>> = (0..self.bodies.len()).map(|body| world.pose(body)).collect();
@@ -95,7 +115,9 @@ impl Task {
         let starts: Vec<Place> = (0..self.bodies.len()).map(|body| Place::of(&world, body)).collect();
         let steps = (how.duration / STEP).round().max(1.0) as usize;
         let mut run = Course { done: 0, moved: 0, failed: 0 };
-        watch(0, &Scene { world: &world, motions: &motions, starts: &poses });
+        let mut way = Way::default();
+        self.carry(&mut way, (&motions, &poses), 0);
+        watch(0, &Scene { world: &world, motions: &motions, starts: &poses, way: &way });
         while run.done < steps && !run.is_success(self.hold) {
             motions.act(&mut world, &poses, run.done);
             world.step();
@@ -106,7 +128,10 @@ impl Task {
             if !self.conditions.iter().all(|condition| condition.holds(&world)) {
                 run.failed = run.done;
             }
-            watch(run.done, &Scene { world: &world, motions: &motions, starts: &poses });
+            if run.done % STEPS_A_ROW == 0 {
+                self.carry(&mut way, (&motions, &poses), run.done);
+                watch(run.done, &Scene { world: &world, motions: &motions, starts: &poses, way: &way });
+            }
         }
         let at_rest = (run.done - run.moved) as f64 * STEP > STILL_FOR;
         let bodies = starts.into_iter().enumerate().map(|(body, start)| BodyEnd {
@@ -120,10 +145,19 @@ impl Task {
             duration_s: run.done as f64 * STEP,
             at_rest,
             at_rest_since_s: at_rest.then_some(run.moved as f64 * STEP),
-            success: run.is_success(self.hold),
+            success: run.is_success(self.hold) && way.fault.is_none(),
+            arm_fault: way.fault,
             bodies: bodies.collect(),
             contacts: self.contacts(&world),
         })
+    }
+
+    /// Lets the arm go on to where its body is told to be after so many steps.
+    fn carry(&self, way: &mut Way, (motions, starts): (&Motions, &[Isometry3<f64>]), done: usize) {
+        if let Some(carrier) = &self.carrier {
+            let [now, next] = [done, done + 1].map(|done| told(motions, starts, carrier.body, done));
+            carrier.follow(way, [&now, &next], (done as f64 * STEP, STEP));
+        }
     }
 
     fn contacts(&self, world: &World) -> Vec<[String; 2]> {

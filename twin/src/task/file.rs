@@ -5,8 +5,9 @@ use std::path::PathBuf;
 use toml::Spanned;
 
 #[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields, expecting = "a task: horizon, [[body]], [[success]], [[motion]]")]
+#[serde(deny_unknown_fields, expecting = "a task: horizon, [[body]], [[success]], [[motion]], [[camera]], [arm]")]
 pub(super) struct TaskFile {
+    pub(super) instruction: Option<String>,
     pub(super) horizon: f64,
     #[serde(default = "half_a_second")]
     pub(super) hold: f64,
@@ -16,6 +17,9 @@ pub(super) struct TaskFile {
     pub(super) success: Vec<Spanned<SuccessEntry>>,
     #[serde(default)]
     pub(super) motion: Vec<Spanned<MotionEntry>>,
+    #[serde(default)]
+    pub(super) camera: Vec<Spanned<CameraEntry>>,
+    pub(super) arm: Option<Spanned<ArmEntry>>,
 }
 
 fn half_a_second() -> f64 {
@@ -148,4 +152,44 @@ pub(super) struct MotionEntry {
     pub(super) relative_to: Option<String>,
     pub(super) target: Option<f64>,
     pub(super) force: Option<f64>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields, expecting = "a [[camera]] block")]
+pub(super) struct CameraEntry {
+    pub(super) name: String,
+    pub(super) position: [f64; 3],
+    pub(super) look_at: [f64; 3],
+    #[serde(default = "columns")]
+    pub(super) width: u32,
+    #[serde(default = "rows")]
+    pub(super) height: u32,
+    /// From the upper edge to the lower.
+    #[serde(default = "usual_field")]
+    pub(super) field_of_view: f64,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields, expecting = "an [arm] block")]
+pub(super) struct ArmEntry {
+    pub(super) body: String,
+    #[serde(default)]
+    pub(super) base: [f64; 3],
+    /// Of the body in the flange.
+    #[serde(default)]
+    pub(super) position: [f64; 3],
+    #[serde(default)]
+    pub(super) rotation: [f64; 3],
+}
+
+fn columns() -> u32 {
+    320
+}
+
+fn rows() -> u32 {
+    240
+}
+
+fn usual_field() -> f64 {
+    0.8
 }

@@ -41,6 +41,11 @@ impl Gripper {
         })
     }
 
+    /// The finger with the drive.
+    pub(super) fn drive(&self) -> usize {
+        self.fingers[0]
+    }
+
     /// What it does now.
     pub(super) fn state(&self, world: &World, bodies: usize) -> Option<GripperState> {
         let [finger, other] = self.fingers;

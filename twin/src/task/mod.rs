@@ -7,12 +7,16 @@
 //! | `read` | bodies, conditions and motions out of it, and what is wrong with it |
 //! | `surface` | the convex pieces of a body |
 //! | `start` | where bodies start: drawn by a seed until none overlap |
+//! | `arm` | the arm that carries a moved body: joints, and what it cannot do |
+//! | `camera` | pictures of an episode, drawn afterwards |
 //! | `condition` | what counts as success |
 //! | `motion` | where moved bodies go and what drives do, by time |
 //! | `episode` | one run: did it come to rest, where, and was it a success |
 //! | `gripper` | two fingers on geared joints as a gripper with an opening |
 //! | `demonstration` | a run as the rows of a clip |
 
+mod arm;
+mod camera;
 mod condition;
 mod demonstration;
 mod episode;
@@ -23,10 +27,13 @@ mod read;
 mod start;
 mod surface;
 
+pub use camera::{TaskCamera, TaskPicture, TaskView};
+pub use demonstration::ROWS_A_SECOND;
 pub use episode::{BodyEnd, Episode, Place, Run};
 pub use start::StartError;
 
 use crate::world::{BodyPlan, World};
+use arm::Carrier;
 use condition::Condition;
 use gripper::Gripper;
 use motion::Motions;
@@ -39,6 +46,8 @@ use std::path::Path;
 pub struct Task {
     /// Its file's, without the ending.
     name: String,
+    /// What is to be done, in words.
+    instruction: String,
     /// The whole file.
     text: String,
     bodies: Vec<BodyPlan>,
@@ -47,6 +56,8 @@ pub struct Task {
     conditions: Vec<Condition>,
     motions: Motions,
     gripper: Option<Gripper>,
+    cameras: Vec<TaskCamera>,
+    carrier: Option<Carrier>,
     /// For how long all conditions have to hold [s].
     hold: f64,
     /// How long an episode takes at most [s].
@@ -62,10 +73,40 @@ impl Task {
         read::read(path)
     }
 
+    /// Its name: that of its file, without the ending.
+    #[must_use]
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// What is to be done, in words.
+    #[must_use]
+    pub fn instruction(&self) -> &str {
+        &self.instruction
+    }
+
+    /// Names of the joints of the arm that carries a moved body; empty without one.
+    #[must_use]
+    pub fn arm_joints(&self) -> &[String] {
+        self.carrier.as_ref().map_or(&[], Carrier::joint_names)
+    }
+
+    /// The body whose drive opens and closes the gripper, by its place.
+    #[must_use]
+    pub fn gripper_drive(&self) -> Option<usize> {
+        self.gripper.as_ref().map(Gripper::drive)
+    }
+
     /// The text of its file.
     #[must_use]
     pub fn text(&self) -> &str {
         &self.text
+    }
+
+    /// Its bodies, in their order.
+    #[must_use]
+    pub fn bodies(&self) -> &[BodyPlan] {
+        &self.bodies
     }
 
     /// How long an episode takes at most [s].

@@ -1,8 +1,12 @@
 //! A task out of its file, and what is wrong with it: file, line, key.
 
 use super::Task;
+use super::arm::Carrier;
+use super::camera::TaskCamera;
 use super::condition::Condition;
-use super::file::{BodyEntry, HoldEntry, JointEntry, KindEntry, MotionEntry, SuccessEntry, TaskFile};
+use super::file::{
+    ArmEntry, BodyEntry, CameraEntry, HoldEntry, JointEntry, KindEntry, MotionEntry, SuccessEntry, TaskFile,
+};
 use super::gripper::Gripper;
 use super::motion::{Motions, Order, Waypoint};
 use super::start::{StartError, StartRange};
@@ -68,11 +72,36 @@ pub(super) fn parse(text: &str, path: &Path) -> Result<Task, TomlFileError> {
         motion(entry.as_ref(), &names, &bodies, &mut motions)
             .map_err(|fault| source.error(entry.span().start, fault))?;
     }
+    let mut cameras: Vec<TaskCamera> = Vec::new();
+    for entry in &file.camera {
+        let camera = camera(entry.as_ref(), &cameras);
+        cameras.push(camera.map_err(|fault| source.error(entry.span().start, fault))?);
+    }
+    let carrier = file
+        .arm
+        .as_ref()
+        .map(|entry| carrier(entry.as_ref(), &names, &bodies).map_err(|fault| source.error(entry.span().start, fault)));
+    let carrier = carrier.transpose()?;
     motions.waypoints.sort_by(|a, b| a.time.total_cmp(&b.time));
     let name = path.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
+    let instruction = file.instruction.unwrap_or_else(|| name.replace('_', " "));
     let (gripper, hold, horizon) = (Gripper::of(&bodies), file.hold, file.horizon);
     let text = text.to_owned();
-    let task = Task { name, text, bodies, world, starts, conditions, motions, gripper, hold, horizon };
+    let task = Task {
+        name,
+        instruction,
+        text,
+        bodies,
+        world,
+        starts,
+        conditions,
+        motions,
+        gripper,
+        cameras,
+        carrier,
+        hold,
+        horizon,
+    };
     task.placed(0).map_err(|error| match &error {
         StartError::Crowded { second, .. } => {
             let at = names.iter().position(|name| name == second).map_or(0, |i| file.body[i].span().start);
@@ -282,4 +311,24 @@ fn motion(entry: &MotionEntry, names: &[&str], bodies: &[BodyPlan], motions: &mu
         }
     }
     Ok(())
+}
+
+fn camera(entry: &CameraEntry, cameras: &[TaskCamera]) -> Result<TaskCamera, Fault> {
+    finite("position", &entry.position)?;
+    finite("look_at", &entry.look_at)?;
+    if cameras.iter().any(|other| other.name == entry.name) {
+        return Err(("name", format!("two cameras are called `{}`; give each a name of its own", entry.name)));
+    }
+    TaskCamera::of(entry)
+}
+
+fn carrier(entry: &ArmEntry, names: &[&str], bodies: &[BodyPlan]) -> Result<Carrier, Fault> {
+    let body = named(&entry.body, names, "body")?;
+    if !matches!(bodies[body].hold, Hold::Moved(_)) {
+        return Err(("body", format!("`{}` is not moved; name a body with `hold = \"moved\"`", entry.body)));
+    }
+    for (key, values) in [("base", &entry.base), ("position", &entry.position), ("rotation", &entry.rotation)] {
+        finite(key, values)?;
+    }
+    Ok(Carrier::new(entry, body))
 }

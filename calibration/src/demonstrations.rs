@@ -1,0 +1,307 @@
+//! Recorded episodes of a task as data to learn from: what was seen and what was told, at a lower rate, with pictures that are
+//! drawn now. Episodes that were no success are left out.
+
+use import::{DataSetError, DataSetPlan, DataSetWriter, Feature, FeatureKind, Frames};
+use nalgebra::Quaternion;
+use serde::Serialize;
+use shared_mem::msg::image::PixelEncoding;
+use shared_mem::output::{OutputError, OutputFolder};
+use shared_mem::recording::{Episode, EpisodeMoment, ReadError, RigidPose, pack_picture, read_episode};
+use std::path::{Path, PathBuf};
+use twin::task::{ROWS_A_SECOND, Task, TaskView};
+use twin::world::Hold;
+
+/// Features by LeRobot's names.
+const STATE: &str = "observation.state";
+const SURROUNDINGS: &str = "observation.environment_state";
+const ACTION: &str = "action";
+const PICTURES: &str = "observation.images.";
+
+/// What episodes become.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Target {
+    /// A LeRobot data set.
+    LeRobot,
+    /// The pictures alone, a folder for each episode.
+    Png,
+}
+
+/// What is to be done.
+pub struct Order<'a> {
+    /// The task that the episodes are of.
+    pub task: &'a Task,
+    /// Their clips.
+    pub clips: &'a [PathBuf],
+    /// What they become.
+    pub to: Target,
+    /// Every so many rows of a clip become a frame.
+    pub every: u32,
+    /// Where they go.
+    pub folder: OutputFolder,
+}
+
+/// What was written.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Exported {
+    /// Episodes.
+    pub episodes: usize,
+    /// Frames of all of them.
+    pub frames: usize,
+    /// Frames a second.
+    pub rate: u32,
+    /// What each frame holds.
+    pub features: Vec<String>,
+    /// Clips of episodes that were no success.
+    pub left_out: Vec<PathBuf>,
+}
+
+/// Episodes cannot be exported.
+#[derive(Debug, thiserror::Error)]
+pub enum ExportError {
+    /// A clip cannot be read.
+    #[error(transparent)]
+    Read(#[from] ReadError),
+    /// The disk refuses.
+    #[error(transparent)]
+    Output(#[from] OutputError),
+    /// The data set cannot be written.
+    #[error(transparent)]
+    DataSet(#[from] DataSetError),
+    /// A clip does not go with the task.
+    #[error("{}: {what}", file.display())]
+    Clip {
+        /// The clip.
+        file: PathBuf,
+        /// What is wrong and what to do.
+        what: String,
+    },
+    /// There is nothing to be written.
+    #[error("{0}")]
+    Nothing(&'static str),
+}
+
+/// Writes episodes. `told` hears of each clip as it is done.
+///
+/// # Errors
+/// [`ExportError`]; nothing is there then.
+pub fn export(order: Order<'_>, mut told: impl FnMut()) -> Result<Exported, ExportError> {
+    let Order { task, clips, to, every, folder } = order;
+    let layout = Layout::of(task);
+    let rate = ROWS_A_SECOND / every;
+    let mut views: Vec<TaskView> = task.cameras().iter().map(|camera| task.view(camera)).collect();
+    if to == Target::Png && views.is_empty() {
+        return Err(ExportError::Nothing("the task has no camera; add a [[camera]] block (docs/tasks.md)"));
+    }
+    let features = layout.features(task);
+    let names: Vec<String> = features.iter().map(|feature| feature.name.clone()).collect();
+    let names = names.into_iter().filter(|name| to == Target::LeRobot || name.starts_with(PICTURES)).collect();
+    let mut done = Exported { episodes: 0, frames: 0, rate, features: names, left_out: Vec::new() };
+    let (robot, words) = ("twinalign".to_owned(), task.instruction().to_owned());
+    let mut sink = match to {
+        Target::LeRobot => {
+            let plan = DataSetPlan { rate, robot, task: words, features };
+            Sink::DataSet(Box::new(DataSetWriter::new(folder, plan)))
+        }
+        Target::Png => Sink::Pictures(folder),
+    };
+    for file in clips {
+        let episode = read_episode(file)?;
+        layout.fits(&episode).map_err(|what| ExportError::Clip { file: file.clone(), what })?;
+        let rows: Vec<&EpisodeMoment> = episode.moments.iter().step_by(every as usize).collect();
+        if !episode.info.success {
+            done.left_out.push(file.clone());
+        } else if let Some((_, rows_with_next)) = rows.split_last().filter(|(_, before)| !before.is_empty()) {
+            let pictures = drawn(&mut views, rows_with_next);
+            match &mut sink {
+                Sink::DataSet(writer) => {
+                    let mut frames = layout.numbers(&rows);
+                    frames.extend(pictures.into_iter().map(Frames::Pictures));
+                    writer.episode(&frames)?;
+                }
+                Sink::Pictures(folder) => write_pictures(folder, file, task, &pictures)?,
+            }
+            done.episodes += 1;
+            done.frames += rows_with_next.len();
+        }
+        told();
+    }
+    if done.episodes == 0 {
+        return Err(ExportError::Nothing(
+            "no episode was a success; record others with another --seed or less --noise",
+        ));
+    }
+    match sink {
+        Sink::DataSet(writer) => writer.finish()?,
+        Sink::Pictures(folder) => folder.finish("")?,
+    }
+    Ok(done)
+}
+
+enum Sink {
+    DataSet(Box<DataSetWriter>),
+    Pictures(OutputFolder),
+}
+
+/// Colour and depth of each camera, for each row.
+fn drawn(views: &mut [TaskView], rows: &[&EpisodeMoment]) -> Vec<Vec<Vec<u8>>> {
+    let of = |view: &mut TaskView| {
+        let pictures = rows.iter().map(|row| view.draw(&row.poses));
+        let both = pictures.map(|picture| {
+            (picture.colour, picture.depth.iter().flat_map(|depth| depth.to_le_bytes()).collect::<Vec<u8>>())
+        });
+        let (colour, depth): (Vec<_>, Vec<_>) = both.unzip();
+        [colour, depth]
+    };
+    views.iter_mut().flat_map(of).collect()
+}
+
+fn write_pictures(
+    folder: &OutputFolder,
+    clip: &Path,
+    task: &Task,
+    pictures: &[Vec<Vec<u8>>],
+) -> Result<(), ExportError> {
+    let stem = PathBuf::from(clip.file_stem().unwrap_or_default());
+    let kinds = [("color", PixelEncoding::Rgb8), ("depth", PixelEncoding::Depth16)];
+    let series = task.cameras().iter().flat_map(|camera| kinds.map(|kind| (camera, kind)));
+    for ((camera, (kind, encoding)), pictures) in series.zip(pictures) {
+        let [width, height] = camera.size;
+        for (number, pixels) in pictures.iter().enumerate() {
+            let packed = pack_picture(encoding, width, height, pixels)
+                .map_err(|what| ExportError::Clip { file: clip.to_owned(), what })?;
+            folder.write(&stem.join(format!("{}_{kind}_{number:05}.png", camera.name)), &packed)?;
+        }
+    }
+    Ok(())
+}
+
+/// Which numbers of an episode go where, by the task.
+struct Layout<'a> {
+    bodies: Vec<&'a str>,
+    /// Moved bodies, by their place in the task.
+    moved: Vec<(usize, &'a str)>,
+    /// Bodies that nothing but contacts moves.
+    free: Vec<(usize, &'a str)>,
+    /// Joints with a drive that is not the gripper's: by their place among joints and among drives.
+    driven: Vec<(usize, usize, &'a str)>,
+    /// Joints that nothing but contacts moves, by their place among joints.
+    passive: Vec<(usize, &'a str)>,
+    gripper: bool,
+    /// Joints of the arm; none without one.
+    arm: &'a [String],
+}
+
+impl<'a> Layout<'a> {
+    fn of(task: &'a Task) -> Self {
+        let gripper = task.gripper_drive();
+        let bodies = || task.bodies().iter().map(|body| (body.name.as_str(), &body.hold)).enumerate();
+        let mut layout = Self {
+            bodies: bodies().map(|(_, (name, _))| name).collect(),
+            moved: Vec::new(),
+            free: Vec::new(),
+            driven: Vec::new(),
+            passive: Vec::new(),
+            gripper: gripper.is_some(),
+            arm: task.arm_joints(),
+        };
+        let (mut joints, mut drives) = (0, 0);
+        for (place, (name, hold)) in bodies() {
+            match hold {
+                Hold::Fixed(_) => {}
+                Hold::Moved(_) => layout.moved.push((place, name)),
+                Hold::Free(_) => layout.free.push((place, name)),
+                Hold::Joint(joint) => {
+                    match (joint.follows, joint.drive) {
+                        (None, Some(_)) => {
+                            if gripper != Some(place) {
+                                layout.driven.push((joints, drives, name));
+                            }
+                            drives += 1;
+                        }
+                        (None, None) => layout.passive.push((joints, name)),
+                        // It has no freedom of its own.
+                        (Some(_), _) => {}
+                    }
+                    joints += 1;
+                }
+            }
+        }
+        layout
+    }
+
+    fn fits(&self, episode: &Episode) -> Result<(), String> {
+        let has = episode.moments.first().map(|row| [row.gripper.is_some(), row.arm.is_some()]);
+        let asked = Some([self.gripper, !self.arm.is_empty()]);
+        if episode.bodies == self.bodies && has == asked && episode.moved.len() == self.moved.len() {
+            return Ok(());
+        }
+        let (recorded, known) = (episode.bodies.join(", "), self.bodies.join(", "));
+        Err(format!(
+            "it was recorded of {recorded}, the task is of {known}, or with another arm or gripper; give the task file it was recorded with"
+        ))
+    }
+
+    fn features(&self, task: &Task) -> Vec<Feature> {
+        let pose =
+            |(_, name): &(usize, &str)| ["x", "y", "z", "qw", "qx", "qy", "qz"].map(|axis| format!("{name}.{axis}"));
+        let joint = |name: &str| format!("{name}.joint");
+        let mut told: Vec<String> = self.moved.iter().flat_map(pose).collect();
+        told.extend(self.gripper.then(|| "gripper.width".to_owned()));
+        told.extend(self.driven.iter().map(|(_, _, name)| joint(name)));
+        told.extend(self.arm.iter().map(|joint| format!("{joint}.pos")));
+        let mut around: Vec<String> = self.free.iter().flat_map(pose).collect();
+        around.extend(self.passive.iter().map(|(_, name)| joint(name)));
+        let numbers = [(STATE, told.clone()), (SURROUNDINGS, around), (ACTION, told)];
+        let numbers = numbers.into_iter().filter(|(_, names)| !names.is_empty());
+        let numbers = numbers.map(|(name, names)| Feature { name: name.into(), kind: FeatureKind::Numbers(names) });
+        let pictures = task.cameras().iter().flat_map(|camera| {
+            [("", PixelEncoding::Rgb8), ("_depth", PixelEncoding::Depth16)].map(|(ending, encoding)| Feature {
+                name: format!("{PICTURES}{}{ending}", camera.name),
+                kind: FeatureKind::Pictures(encoding, camera.size),
+            })
+        });
+        numbers.chain(pictures).collect()
+    }
+
+    /// State, surroundings, and what is told for the moment of the next frame; the last row has none.
+    fn numbers(&self, rows: &[&EpisodeMoment]) -> Vec<Frames> {
+        let mut signs = vec![None; self.moved.len() + self.free.len()];
+        let (mut state, mut around, mut action) = (Vec::new(), Vec::new(), Vec::new());
+        for pair in rows.windows(2) {
+            let [row, next] = [pair[0], pair[1]];
+            for (i, (place, _)) in self.moved.iter().enumerate() {
+                signs[i] = Some(put_pose(&mut state, &row.poses[*place], signs[i]));
+                put_pose(&mut action, &next.targets[i], signs[i]);
+            }
+            for (i, (place, _)) in self.free.iter().enumerate() {
+                let sign = &mut signs[self.moved.len() + i];
+                *sign = Some(put_pose(&mut around, &row.poses[*place], *sign));
+            }
+            if let (Some(now), Some(then)) = (&row.gripper, &next.gripper) {
+                state.push(now.width as f32);
+                action.push(then.width_d as f32);
+            }
+            for (joint, drive, _) in &self.driven {
+                state.push(row.joints[*joint] as f32);
+                action.push(next.drives[*drive] as f32);
+            }
+            if let (Some(now), Some(then)) = (&row.arm, &next.arm) {
+                state.extend(now.q[..self.arm.len()].iter().map(|q| *q as f32));
+                action.extend(then.q_d[..self.arm.len()].iter().map(|q| *q as f32));
+            }
+            around.extend(self.passive.iter().map(|(joint, _)| row.joints[*joint] as f32));
+        }
+        let all = [state, around, action].into_iter().filter(|values| !values.is_empty());
+        all.map(Frames::Numbers).collect()
+    }
+}
+
+/// Adds a pose; of the two quaternions of its rotation the one that is nearer to another, at first that with a positive w.
+fn put_pose(into: &mut Vec<f32>, pose: &RigidPose, near: Option<Quaternion<f64>>) -> Quaternion<f64> {
+    let [w, i, j, k] = pose.wxyz;
+    let given = Quaternion::new(w, i, j, k);
+    let rotation = if given.dot(&near.unwrap_or_else(Quaternion::identity)) < 0.0 { -given } else { given };
+    into.extend(pose.position.map(|v| v as f32));
+    into.extend([rotation.w, rotation.i, rotation.j, rotation.k].map(|v| v as f32));
+    rotation
+}

@@ -1,0 +1,91 @@
+//! The arm that carries a moved body: which joints its way takes, and what of it the arm cannot do. Kinematics alone: the body
+//! is where it is told to be, and so are the joints.
+
+use super::file::ArmEntry;
+use super::surface::pose;
+use crate::arm::{ArmModel, Joints, Limits};
+use nalgebra::{Isometry3, Translation3, Vector6};
+use shared_mem::msg::arm::{ArmMode, ArmState};
+
+/// A Franka FR3, and what hangs on its flange.
+#[derive(Debug, Clone)]
+pub(super) struct Carrier {
+    model: ArmModel,
+    limits: Limits,
+    /// The body that it carries.
+    pub(super) body: usize,
+    flange_from_body: Isometry3<f64>,
+    base_from_world: Isometry3<f64>,
+}
+
+/// The arm on its way.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Way {
+    q: Option<Joints>,
+    dq: Joints,
+    /// What it cannot do, at first.
+    pub(super) fault: Option<String>,
+}
+
+impl Carrier {
+    pub(super) fn new(entry: &ArmEntry, body: usize) -> Self {
+        let base = Translation3::from(entry.base).inverse();
+        let (model, limits) = (ArmModel::fr3(), Limits::fr3());
+        let flange_from_body = pose(entry.position, entry.rotation);
+        Self { model, limits, body, flange_from_body, base_from_world: Isometry3::from_parts(base, nalgebra::one()) }
+    }
+
+    pub(super) fn joint_names(&self) -> &[String] {
+        self.model.joint_names()
+    }
+
+    /// Goes on to where the body is at a time [s]; `next` is where it is `step` seconds later.
+    pub(super) fn follow(&self, way: &mut Way, [now, next]: [&Isometry3<f64>; 2], (time, step): (f64, f64)) {
+        let target = self.base_from_world * now;
+        let from = way.q.unwrap_or(*self.model.ready());
+        let Some(q) = self.model.reach(&from, &self.flange_from_body, &target) else {
+            let [x, y, z] = target.translation.vector.into();
+            let at = format!("({x:.3}, {y:.3}, {z:.3}) m");
+            way.fault.get_or_insert_with(|| format!("it does not reach {at} at {time:.2} s"));
+            return;
+        };
+        let shift = (next.translation.vector - now.translation.vector) / step;
+        let turn = (next.rotation * now.rotation.inverse()).scaled_axis() / step;
+        let twist = Vector6::from_iterator(shift.iter().chain(turn.iter()).copied());
+        let dq = self.model.joints_for(&q, target.translation.vector.into(), &twist);
+        for (i, limits) in self.limits.joints[..self.model.dof()].iter().enumerate() {
+            let name = &self.model.joint_names()[i];
+            let (at, speed, [slowest, fastest]) = (q[i], dq[i], limits.speed_bounds(q[i]));
+            if !(limits.q_min..=limits.q_max).contains(&at) {
+                let (low, high) = (limits.q_min, limits.q_max);
+                let what = || format!("{name} is at {at:.3} rad at {time:.2} s, beyond {low:.3} to {high:.3}");
+                way.fault.get_or_insert_with(what);
+            } else if !(slowest..=fastest).contains(&speed) {
+                let what = || {
+                    format!(
+                        "{name} turns at {speed:.2} rad/s at {time:.2} s, beyond {slowest:.2} to {fastest:.2} there"
+                    )
+                };
+                way.fault.get_or_insert_with(what);
+            }
+        }
+        (way.q, way.dq) = (Some(q), dq);
+    }
+
+    /// As a robot reports itself; its stamps do not count. `None` before it has reached anything.
+    pub(super) fn state(&self, way: &Way) -> Option<ArmState> {
+        let q = way.q?;
+        let dq = way.dq;
+        Some(ArmState {
+            dof: self.model.dof() as u32,
+            mode: ArmMode::Move,
+            q,
+            dq,
+            q_d: q,
+            dq_d: dq,
+            O_T_EE: self.model.O_T_EE(&q),
+            success_rate: 1.0,
+            ..ArmState::default()
+        })
+    }
+}
