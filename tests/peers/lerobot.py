@@ -37,6 +37,8 @@ def rows_of(clip):
                 row[channel.topic] = [place.x, place.y, place.z, turn.w, turn.x, turn.y, turn.z]
             elif channel.topic.startswith("/task/"):
                 row.update({f"{channel.topic}/{joint.name}": [joint.position] for joint in said.joints})
+            elif channel.topic == "/arm/state":
+                row["q"], row["q_d"] = list(said.q), list(said.q_d)
             elif channel.topic == "/gripper":
                 row["width"], row["width_d"] = [said.width], [said.width_d]
     return [rows[time] for time in sorted(rows)]
@@ -49,6 +51,8 @@ def wanted(names, row, told):
         body, what = name.rsplit(".", 1)
         if name == "gripper.width":
             numbers += row["width_d" if told else "width"]
+        elif what == "pos":
+            numbers.append(row["q_d" if told else "q"][int(body.removeprefix("fr3_joint")) - 1])
         elif what == "joint":
             numbers += row[f"/task/{'drives' if told else 'joints'}/{body}"]
         else:

@@ -13,9 +13,10 @@ use twin::task::{ROWS_A_SECOND, Task};
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Episodes are clips that `twin task --record` has written. A LeRobot data set (version 3.0) holds observation.state (poses of
-moved bodies, the gripper's opening, driven joints), action (the same as told for the moment of the next frame),
-observation.environment_state (poses of free bodies, joints without a drive) and for each [[camera]] of the task a picture in
-colour and one of depth, drawn now. Episodes that were no success are left out. The new folder is there when all of it is.
+moved bodies, the gripper's opening, driven joints, joints of the arm), action (the same as commanded for the moment of the next
+frame), observation.environment_state (poses of free bodies, joints without a drive) and for each [[camera]] of the task a
+picture in colour and one of depth, drawn now. Episodes that were no success are left out. The new folder is there when all of
+it is.
 
 Examples:
   twin task tasks/pick_carrot.toml --episodes 50 --noise 0.003 --record carrot
