@@ -45,11 +45,11 @@ pub(in crate::diagnose) fn shrunk([before, after]: [&Residuals; 2], advantage: &
     }
 }
 
-/// Whether they speak for it: more of them are predicted better than worse, and in sum they are, and enough of the gap closes: in the
-/// mean of squares, or in a clip like most.
+/// Whether they speak for it: more of them are predicted better than worse, in sum by more than its standard error, and enough of the
+/// gap closes: in the mean of squares, or in a clip like most.
 fn speaks_for(advantage: &Advantage, shrink: &Shrunk, mean: f64) -> bool {
     let [better, all] = shrink.better;
-    2 * better > all && advantage.nats > 0.0 && mean.max(shrink.usual).max(shrink.contact) > CLOSES
+    2 * better > all && advantage.nats > advantage.error && mean.max(shrink.usual).max(shrink.contact) > CLOSES
 }
 
 fn mean([before, after]: [&Residuals; 2]) -> f64 {
@@ -99,6 +99,8 @@ mod tests {
     fn clips_that_are_predicted_worse_do_not_confirm_however_much_closes() {
         let half = gains([98.0, 133.0, -31.0, -50.0]);
         assert!(!speaks_for(&half, &shrink(0.9, 0.9, &half), 0.9));
+        let uneven = gains([9.0, 1.0, 1.0, -8.0]);
+        assert!(uneven.better() == [3, 4] && !speaks_for(&uneven, &shrink(0.9, 0.9, &uneven), 0.9), "{uneven:?}");
         let in_sum = gains([2.0, 3.0, 1.0, -400.0]);
         assert!(in_sum.better() == [3, 4] && !speaks_for(&in_sum, &shrink(0.9, 0.9, &in_sum), 0.9), "{in_sum:?}");
     }
