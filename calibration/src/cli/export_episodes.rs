@@ -69,7 +69,7 @@ struct Answer<'a> {
 
 pub(super) fn run(arguments: &ExportEpisodesArguments) -> anyhow::Result<()> {
     let ExportEpisodesArguments { task, episodes, to, every, out, force, json } = arguments;
-    if ROWS_A_SECOND % every != 0 {
+    if !ROWS_A_SECOND.is_multiple_of(*every) {
         bail!("--every {every} makes no whole number of frames a second; give 1, 2, 4, 5, 10, 20, 25, 50 or 100");
     }
     let task = Task::read(task)?;

@@ -128,7 +128,7 @@ impl Task {
             if !self.conditions.iter().all(|condition| condition.holds(&world)) {
                 run.failed = run.done;
             }
-            if run.done % STEPS_A_ROW == 0 {
+            if run.done.is_multiple_of(STEPS_A_ROW) {
                 self.carry(&mut way, (&motions, &poses), run.done);
                 watch(run.done, &Scene { world: &world, motions: &motions, starts: &poses, way: &way });
             }
