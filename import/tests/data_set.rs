@@ -53,11 +53,13 @@ fn write(folder: &Path) {
 #[test]
 fn poses_of_a_data_set_come_back_as_the_clips_of_a_session() {
     let place = tempfile::tempdir().expect("a folder");
-    let [data, out, mapping] = ["data", "session", "import.toml"].map(|name| place.path().join(name));
+    let [data, out, mapping, cell] =
+        ["data", "session", "import.toml", "cell.toml"].map(|name| place.path().join(name));
     write(&data);
     std::fs::write(&mapping, MAPPING).expect("room");
+    std::fs::write(&cell, "[object]\nshape = \"box\"\nsize = [0.1, 0.1, 0.1]\n").expect("room");
     let files = [data.clone()];
-    let order = Order { mapping: Some(&mapping), ..lab::order(&files, &out, &mapping) };
+    let order = Order { mapping: Some(&mapping), cell: Some(&cell), ..lab::order(&files, &out, &mapping) };
     let Outcome::Done { clips, .. } = import(order, |_, _| ()).expect("a data set") else { panic!("open") };
     assert_eq!(clips[0].left_out[0].what, "observation.images.front");
     let session = Session::open(&out).expect("a session");

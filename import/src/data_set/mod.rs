@@ -210,7 +210,7 @@ impl DataSetWriter {
             columns.extend(COUNTERS.map(|name| Column { name: name.into(), kind: Kind::Long }));
             let name = format!("data/chunk-{:03}/file-{:03}.parquet", self.files / CHUNK, self.files % CHUNK);
             self.files += 1;
-            self.data = Some(TableFile::create(&self.folder, &name, &columns, None)?);
+            self.data = Some(TableFile::begin(&self.folder, &name, &columns, None)?);
         }
         self.data.as_mut().ok_or_else(|| DataSetError::Shape { feature: "data".into(), what: "no file is open".into() })
     }
@@ -252,7 +252,7 @@ impl DataSetWriter {
         let mut values = vec![Values::Texts(&tasks)];
         values.extend(numbers.iter().map(|(_, values)| Values::Longs(values)));
         let name = "meta/episodes/chunk-000/file-000.parquet";
-        let mut file = TableFile::create(&self.folder, name, &columns, None)?;
+        let mut file = TableFile::begin(&self.folder, name, &columns, None)?;
         file.rows(&values)?;
         file.finish()
     }
@@ -270,7 +270,7 @@ impl DataSetWriter {
         let columns =
             [Column { name: "task_index".into(), kind: Kind::Long }, Column { name: "task".into(), kind: Kind::Text }];
         let record = Some(("pandas", pandas.to_string()));
-        let mut file = TableFile::create(&self.folder, "meta/tasks.parquet", &columns, record)?;
+        let mut file = TableFile::begin(&self.folder, "meta/tasks.parquet", &columns, record)?;
         file.rows(&[Values::Longs(&[0]), Values::Texts(&[&self.plan.task])])?;
         file.finish()
     }

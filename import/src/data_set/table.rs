@@ -54,7 +54,7 @@ pub(super) struct TableFile {
 
 impl TableFile {
     /// Begins a file of the folder; `record` goes into its footer.
-    pub(super) fn create(
+    pub(super) fn begin(
         folder: &OutputFolder,
         name: &str,
         columns: &[Column],
@@ -177,7 +177,7 @@ mod tests {
             .into_iter()
             .enumerate();
         let columns: Vec<Column> = kinds.map(|(i, kind)| Column { name: format!("of.{i}"), kind }).collect();
-        let mut file = TableFile::create(&folder, "a.parquet", &columns, None).expect("a file");
+        let mut file = TableFile::begin(&folder, "a.parquet", &columns, None).expect("a file");
         for group in 0..2 {
             let texts = ["one", "two"];
             let pictures = [vec![1, 2, 3], vec![group]];
