@@ -1,4 +1,4 @@
-//! Recorded episodes of a task as data to learn from: what was seen and what was told, at a lower rate, with pictures that are
+//! Recorded episodes of a task as data to learn from: what was seen and what was commanded, at a lower rate, with pictures that are
 //! drawn now. Episodes that were no success are left out.
 
 use import::{DataSetError, DataSetPlan, DataSetWriter, Feature, FeatureKind, Frames};
@@ -80,11 +80,11 @@ pub enum ExportError {
     Nothing(&'static str),
 }
 
-/// Writes episodes. `told` hears of each clip as it is done.
+/// Writes episodes; `after_each` is called after each clip.
 ///
 /// # Errors
 /// [`ExportError`]; nothing is there then.
-pub fn export(order: Order<'_>, mut told: impl FnMut()) -> Result<Exported, ExportError> {
+pub fn export(order: Order<'_>, mut after_each: impl FnMut()) -> Result<Exported, ExportError> {
     let Order { task, clips, to, every, folder } = order;
     let layout = Layout::of(task);
     let rate = ROWS_A_SECOND / every;
@@ -123,7 +123,7 @@ pub fn export(order: Order<'_>, mut told: impl FnMut()) -> Result<Exported, Expo
             done.episodes += 1;
             done.frames += rows_with_next.len();
         }
-        told();
+        after_each();
     }
     if done.episodes == 0 {
         return Err(ExportError::Nothing(
@@ -245,13 +245,13 @@ impl<'a> Layout<'a> {
         let pose =
             |(_, name): &(usize, &str)| ["x", "y", "z", "qw", "qx", "qy", "qz"].map(|axis| format!("{name}.{axis}"));
         let joint = |name: &str| format!("{name}.joint");
-        let mut told: Vec<String> = self.moved.iter().flat_map(pose).collect();
-        told.extend(self.gripper.then(|| "gripper.width".to_owned()));
-        told.extend(self.driven.iter().map(|(_, _, name)| joint(name)));
-        told.extend(self.arm.iter().map(|joint| format!("{joint}.pos")));
+        let mut commanded: Vec<String> = self.moved.iter().flat_map(pose).collect();
+        commanded.extend(self.gripper.then(|| "gripper.width".to_owned()));
+        commanded.extend(self.driven.iter().map(|(_, _, name)| joint(name)));
+        commanded.extend(self.arm.iter().map(|joint| format!("{joint}.pos")));
         let mut around: Vec<String> = self.free.iter().flat_map(pose).collect();
         around.extend(self.passive.iter().map(|(_, name)| joint(name)));
-        let numbers = [(STATE, told.clone()), (SURROUNDINGS, around), (ACTION, told)];
+        let numbers = [(STATE, commanded.clone()), (SURROUNDINGS, around), (ACTION, commanded)];
         let numbers = numbers.into_iter().filter(|(_, names)| !names.is_empty());
         let numbers = numbers.map(|(name, names)| Feature { name: name.into(), kind: FeatureKind::Numbers(names) });
         let pictures = task.cameras().iter().flat_map(|camera| {
@@ -263,7 +263,7 @@ impl<'a> Layout<'a> {
         numbers.chain(pictures).collect()
     }
 
-    /// State, surroundings, and what is told for the moment of the next frame; the last row has none.
+    /// State, surroundings, and what is commanded for the moment of the next frame; the last row has none.
     fn numbers(&self, rows: &[&EpisodeMoment]) -> Vec<Frames> {
         let mut signs = vec![None; self.moved.len() + self.free.len()];
         let (mut state, mut around, mut action) = (Vec::new(), Vec::new(), Vec::new());

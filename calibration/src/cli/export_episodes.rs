@@ -21,7 +21,7 @@ it is.
 Examples:
   twin task tasks/pick_carrot.toml --episodes 50 --noise 0.003 --record carrot
   calibration export-episodes tasks/pick_carrot.toml carrot --to lerobot --out carrot_lerobot
-  calibration export-episodes tasks/pick_carrot.toml carrot/episode_000007.mcap --to png --every 50 --out pictures
+  calibration export-episodes tasks/pick_carrot.toml carrot --to png --every 50 --out pictures
 
 JSON: to, out, episodes, frames, rate, features, left_out (clips).")]
 pub(super) struct ExportEpisodesArguments {

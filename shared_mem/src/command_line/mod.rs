@@ -90,7 +90,8 @@ const COMPLETIONS: &str = "completions";
 const MANPAGES: &str = "manpages";
 
 /// The whole command line of a program.
-fn command<A: Parser>(build: &Build) -> Command {
+#[must_use]
+pub fn command<A: Parser>(build: &Build) -> Command {
     let command = A::command().version(build.line());
     let name = command.get_name().to_owned();
     let completions = Command::new(COMPLETIONS)

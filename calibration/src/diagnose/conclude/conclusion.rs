@@ -11,7 +11,7 @@ use crate::diagnose::clips::split::{self, Split};
 use crate::diagnose::evidence::measured::{Evidence, Group};
 use crate::diagnose::fit::bench::{Bench, Hypothesis};
 use crate::diagnose::fit::parameters;
-use crate::diagnose::judge::confirm::{Confirmation, confirm};
+use crate::diagnose::judge::confirm::confirm;
 use crate::diagnose::judge::gap::Residuals;
 use crate::diagnose::judge::gap::Shrunk;
 use crate::diagnose::judge::held_out::{self, Fits};
@@ -91,14 +91,12 @@ pub fn conclude<E: Evidence>(
     let (places, rest) = (localise::localise(bench.evidence, &before), localise::localise(bench.evidence, &after));
     let all: Vec<usize> = (0..admitted.clips.len()).collect();
     let typical = |hypothesis| Residuals::at(bench, hypothesis, &all).map(|left| left.typical());
-    let left = (typical(&first.from).zip(typical(&found.last)))
-        .map(|(before, after)| Left::of_groups(&before, &after))
-        .ok_or(DiagnoseError::NoBaseline)?;
-    let judged = confirm(bench, &first.weights, [(&baseline, &before), (&with, &after)], options.seed);
-    let Confirmation { holds: confirmed, shrink } = judged.ok_or(DiagnoseError::NoBaseline)?;
+    let typical = typical(&first.from).zip(typical(&found.last)).ok_or(DiagnoseError::NoBaseline)?;
+    let left = Left::of_groups(&typical.0, &typical.1);
+    let judged = confirm(bench, &first.weights, [(&baseline, &before), (&with, &after)], options.seed)?;
     let overdispersion = found.overdispersion(bench);
     let within_tolerance = sizes::within_tolerance(bench, ([&baseline, &with], [&before, &after]), session, admitted)?;
-    let finding = finding(bench, (split, found), &overdispersion, (left, confirmed, within_tolerance));
+    let finding = finding(bench, (split, found), &overdispersion, (left, judged.holds, within_tolerance));
     let decision = finding.decide();
     let tried = decision.kind == Kind::Unexplained;
     let partly = tried.then(|| partly::proven(bench, (split, found), &before, &overdispersion, options.seed)).flatten();
@@ -107,7 +105,7 @@ pub fn conclude<E: Evidence>(
     let believed = partly.is_some() || matches!(decision.kind, Kind::Named | Kind::Class);
     let kept = if believed { &found.last } else { &first.from };
     let shown = if believed { after } else { &before };
-    let some = tried && partly.is_none() && confirmed && !finding.effects.is_empty();
+    let some = tried && partly.is_none() && judged.holds && !finding.effects.is_empty();
     let nearest = some.then(|| Nearest {
         effects: finding.effects.iter().map(|name| (*name).to_owned()).collect(),
         shrink: after.shrink(&before, options.seed),
@@ -119,7 +117,7 @@ pub fn conclude<E: Evidence>(
     let closed = |open: &Unproven<'_>| share_of(bench, split, (open, &first.weights), (&before, options.seed));
     let unproven = unproven::unproven(bench, found).and_then(|open| closed(&open).map(|share| (open, share)));
     let open = unproven.as_ref().map(|(open, share)| (open, *share));
-    let facts = facts(bench, found, (size, open), [&places, &rest], shrink);
+    let facts = facts(bench, found, (size, open), [&places, &rest], judged.shrink);
     let verdict = match &partly {
         Some(partly) => in_part(bench, partly, &facts, (&stays, &sizes)),
         None => {

@@ -9,6 +9,7 @@ use super::held_out::Fits;
 use super::remainder::{self, Left};
 use super::score::{Advantage, predict_unseen};
 use super::trial::CLOSES;
+use crate::diagnose::DiagnoseError;
 use crate::diagnose::evidence::measured::{Evidence, Group};
 use crate::diagnose::fit::bench::Bench;
 
@@ -21,21 +22,25 @@ pub(in crate::diagnose) struct Confirmation {
 }
 
 /// Compares the baseline and what was found, each with what it leaves on the clips kept for confirming; `weights` of the channels in
-/// the step in which the search began. `None` where the twin has no answer.
+/// the step in which the search began.
+///
+/// # Errors
+/// [`DiagnoseError::NoBaseline`] where the twin has no answer.
 pub(in crate::diagnose) fn confirm<E: Evidence>(
     bench: &Bench<'_, E>,
     weights: &[f64],
     [without, with]: [(&Fits, &Residuals); 2],
     seed: u64,
-) -> Option<Confirmation> {
+) -> Result<Confirmation, DiagnoseError> {
     let [before, after] = [without, with].map(|(fits, _)| predict_unseen(bench, fits, weights));
-    let advantage = after?.over(&before?);
+    let (before, after) = before.zip(after).ok_or(DiagnoseError::NoBaseline)?;
+    let advantage = after.over(&before);
     let shrink = shrunk([without.1, with.1], &advantage, seed);
-    Some(Confirmation { holds: speaks_for(&advantage, &shrink, mean([without.1, with.1])), shrink })
+    Ok(Confirmation { holds: speaks_for(&advantage, &shrink, mean([without.1, with.1])), shrink })
 }
 
 /// How far the gap shrinks.
-pub(in crate::diagnose) fn shrunk([before, after]: [&Residuals; 2], advantage: &Advantage, seed: u64) -> Shrunk {
+fn shrunk([before, after]: [&Residuals; 2], advantage: &Advantage, seed: u64) -> Shrunk {
     Shrunk {
         mean: after.shrink(before, seed).value,
         usual: usual(before, after),
