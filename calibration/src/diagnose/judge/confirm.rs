@@ -36,7 +36,10 @@ pub(in crate::diagnose) fn confirm<E: Evidence>(
     let (before, after) = before.zip(after).ok_or(DiagnoseError::NoBaseline)?;
     let advantage = after.over(&before);
     let shrink = shrunk([without.1, with.1], &advantage, seed);
-    Ok(Confirmation { holds: speaks_for(&advantage, &shrink, mean([without.1, with.1])), shrink })
+    let mean = mean([without.1, with.1]);
+    let deviates = bench.scatter.count() > 0;
+    let holds = if deviates { speaks_for(&advantage, &shrink, mean) } else { shrinks_in_most(&shrink, mean) };
+    Ok(Confirmation { holds, shrink })
 }
 
 /// How far the gap shrinks.
@@ -55,6 +58,13 @@ fn shrunk([before, after]: [&Residuals; 2], advantage: &Advantage, seed: u64) ->
 fn speaks_for(advantage: &Advantage, shrink: &Shrunk, mean: f64) -> bool {
     let [better, all] = shrink.better;
     2 * better > all && advantage.nats > advantage.error && mean.max(shrink.usual).max(shrink.contact) > CLOSES
+}
+
+/// The same of clips that have no numbers of their own. Their likelihood is nothing but their residuals, and weighs these by what the
+/// search took for noise before anything was found: the plain residuals count, in more clips than not.
+fn shrinks_in_most(shrink: &Shrunk, mean: f64) -> bool {
+    let [shrinks, all] = shrink.clips;
+    2 * shrinks > all && mean.max(shrink.usual) > CLOSES
 }
 
 fn mean([before, after]: [&Residuals; 2]) -> f64 {
@@ -108,5 +118,12 @@ mod tests {
         assert!(uneven.better() == [3, 4] && !speaks_for(&uneven, &shrink(0.9, 0.9, &uneven), 0.9), "{uneven:?}");
         let in_sum = gains([2.0, 3.0, 1.0, -400.0]);
         assert!(in_sum.better() == [3, 4] && !speaks_for(&in_sum, &shrink(0.9, 0.9, &in_sum), 0.9), "{in_sum:?}");
+    }
+
+    #[test]
+    fn clips_without_numbers_of_their_own_confirm_by_their_residuals() {
+        let shrunk = |clips| Shrunk { clips, usual: 0.9, ..Shrunk::default() };
+        assert!(shrinks_in_most(&shrunk([2, 2]), 0.99) && !shrinks_in_most(&shrunk([1, 2]), 0.99));
+        assert!(!shrinks_in_most(&Shrunk { clips: [2, 2], ..Shrunk::default() }, 0.05), "nothing closes");
     }
 }
