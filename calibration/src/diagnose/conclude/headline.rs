@@ -31,8 +31,8 @@ impl Shrunk {
             let percent = percent(self.mean).replace("> ", "more than ").replace("< ", "less than ");
             return format!("by {percent} on held-out clips");
         }
-        let (share, whose) =
-            if self.usual > CLOSES { (self.usual, "") } else { (self.contact, "the joints in contact of ") };
+        let of_contact = self.usual <= CLOSES && self.contact > self.usual;
+        let (share, whose) = if of_contact { (self.contact, "the joints in contact of ") } else { (self.usual, "") };
         format!("by {} in {whose}a held-out clip like most, but grows in {} of {all}", percent(share), all - shrinks)
     }
 }
@@ -194,7 +194,7 @@ mod tests {
             rest: "yaw (after the slide)".into(),
             effects: effects.iter().map(|name| (*name).to_owned()).collect(),
             unproven: None,
-            shrink: Shrunk { mean: 0.963, usual: 0.97, contact: 0.0, clips: [4, 4], better: [4, 4] },
+            shrink: Shrunk { mean: 0.963, usual: 0.97, contact: 0.0, clips: [4, 4] },
         }
     }
 
@@ -224,6 +224,12 @@ mod tests {
         let found = finding(vec!["camera_scale"], 30.0, 1.5);
         let text = sentence(&found.decide(), &found, &Facts { shrink, ..facts(&["camera scale (scale 0.02)"]) });
         assert!(text.ends_with("the gap shrinks by 62 % in a held-out clip like most, but grows in 1 of 4."), "{text}");
+        let shrink = Shrunk { usual: 0.0, contact: 0.9, ..shrink };
+        let text = sentence(&found.decide(), &found, &Facts { shrink, ..facts(&["camera scale (scale 0.02)"]) });
+        assert!(
+            text.ends_with("by 90 % in the joints in contact of a held-out clip like most, but grows in 1 of 4."),
+            "{text}"
+        );
     }
 
     #[test]

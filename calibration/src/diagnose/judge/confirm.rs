@@ -32,36 +32,37 @@ pub(in crate::diagnose) fn confirm<E: Evidence>(
     [without, with]: [(&Fits, &Residuals); 2],
     seed: u64,
 ) -> Result<Confirmation, DiagnoseError> {
-    let [before, after] = [without, with].map(|(fits, _)| predict_unseen(bench, fits, weights));
-    let (before, after) = before.zip(after).ok_or(DiagnoseError::NoBaseline)?;
-    let advantage = after.over(&before);
-    let shrink = shrunk([without.1, with.1], &advantage, seed);
+    let shrink = shrunk([without.1, with.1], seed);
     let mean = mean([without.1, with.1]);
-    let deviates = bench.scatter.count() > 0;
-    let holds = if deviates { speaks_for(&advantage, &shrink, mean) } else { shrinks_in_most(&shrink, mean) };
+    let holds = if bench.scatter.count() > 0 {
+        let [before, after] = [without, with].map(|(fits, _)| predict_unseen(bench, fits, weights));
+        let (before, after) = before.zip(after).ok_or(DiagnoseError::NoBaseline)?;
+        speaks_for(&after.over(&before), &shrink, mean)
+    } else {
+        shrinks_in_most(&shrink, mean)
+    };
     Ok(Confirmation { holds, shrink })
 }
 
 /// How far the gap shrinks.
-fn shrunk([before, after]: [&Residuals; 2], advantage: &Advantage, seed: u64) -> Shrunk {
+fn shrunk([before, after]: [&Residuals; 2], seed: u64) -> Shrunk {
     Shrunk {
         mean: after.shrink(before, seed).value,
         usual: usual(before, after),
         contact: contact(before, after),
         clips: after.clips_that_shrink(before),
-        better: advantage.better(),
     }
 }
 
-/// Whether they speak for it: more of them are predicted better than worse, in sum by more than its standard error, and enough of the
-/// gap closes: in the mean of squares, or in a clip like most.
+/// Whether clips with an object speak for it: more of them are predicted better than worse, in sum by more than its standard error,
+/// and enough of the gap closes: in the mean of squares, or in a clip like most.
 fn speaks_for(advantage: &Advantage, shrink: &Shrunk, mean: f64) -> bool {
-    let [better, all] = shrink.better;
-    2 * better > all && advantage.nats > advantage.error && mean.max(shrink.usual).max(shrink.contact) > CLOSES
+    let better = advantage.share > 0.5 && advantage.nats > advantage.error;
+    better && mean.max(shrink.usual).max(shrink.contact) > CLOSES
 }
 
-/// The same of clips that have no numbers of their own. Their likelihood is nothing but their residuals, and weighs these by what the
-/// search took for noise before anything was found: the plain residuals count, in more clips than not.
+/// The same of clips of the arm alone, which have no numbers of their own. Their likelihood is nothing but their residuals, and weighs
+/// these by what the search took for noise before anything was found: the plain residuals count, in more clips than not.
 fn shrinks_in_most(shrink: &Shrunk, mean: f64) -> bool {
     let [shrinks, all] = shrink.clips;
     2 * shrinks > all && mean.max(shrink.usual) > CLOSES
@@ -98,26 +99,26 @@ mod tests {
         predicted(gains).over(&predicted([0.0; 4]))
     }
 
-    fn shrink(usual: f64, contact: f64, advantage: &Advantage) -> Shrunk {
-        Shrunk { mean: -1.0, usual, contact, clips: [2, 4], better: advantage.better() }
+    fn shrink(usual: f64, contact: f64) -> Shrunk {
+        Shrunk { mean: -1.0, usual, contact, clips: [2, 4] }
     }
 
     #[test]
     fn clips_that_are_predicted_better_confirm_although_the_object_of_one_goes_another_way() {
         let all = gains([98.0, 133.0, 31.0, 50.0]);
-        assert!(speaks_for(&all, &shrink(0.0, 0.9, &all), -1.0), "the joints in contact close");
-        assert!(speaks_for(&all, &shrink(0.6, 0.0, &all), -1.0), "a clip like most does");
-        assert!(!speaks_for(&all, &shrink(0.05, 0.02, &all), -1.0), "nothing closes");
+        assert!(speaks_for(&all, &shrink(0.0, 0.9), -1.0), "the joints in contact close");
+        assert!(speaks_for(&all, &shrink(0.6, 0.0), -1.0), "a clip like most does");
+        assert!(!speaks_for(&all, &shrink(0.05, 0.02), -1.0), "nothing closes");
     }
 
     #[test]
     fn clips_that_are_predicted_worse_do_not_confirm_however_much_closes() {
         let half = gains([98.0, 133.0, -31.0, -50.0]);
-        assert!(!speaks_for(&half, &shrink(0.9, 0.9, &half), 0.9));
+        assert!(!speaks_for(&half, &shrink(0.9, 0.9), 0.9));
         let uneven = gains([9.0, 1.0, 1.0, -8.0]);
-        assert!(uneven.better() == [3, 4] && !speaks_for(&uneven, &shrink(0.9, 0.9, &uneven), 0.9), "{uneven:?}");
+        assert!(uneven.share == 0.75 && !speaks_for(&uneven, &shrink(0.9, 0.9), 0.9), "{uneven:?}");
         let in_sum = gains([2.0, 3.0, 1.0, -400.0]);
-        assert!(in_sum.better() == [3, 4] && !speaks_for(&in_sum, &shrink(0.9, 0.9, &in_sum), 0.9), "{in_sum:?}");
+        assert!(in_sum.share == 0.75 && !speaks_for(&in_sum, &shrink(0.9, 0.9), 0.9), "{in_sum:?}");
     }
 
     #[test]

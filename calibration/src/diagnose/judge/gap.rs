@@ -32,8 +32,6 @@ pub struct Shrunk {
     pub contact: f64,
     /// In how many clips it does, and of how many.
     pub clips: [usize; 2],
-    /// How many clips are predicted better, and of how many.
-    pub better: [usize; 2],
 }
 
 /// A group of sensors in a clip like most.

@@ -132,12 +132,6 @@ impl Predicted {
 }
 
 impl Advantage {
-    /// How many clips it predicts better, and how many judged.
-    #[must_use]
-    pub fn better(&self) -> [usize; 2] {
-        [self.gains.iter().filter(|gain| **gain > 0.0).count(), self.gains.len()]
-    }
-
     /// How many clips judged.
     #[must_use]
     pub fn clips(&self) -> usize {
