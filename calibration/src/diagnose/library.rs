@@ -71,12 +71,6 @@ pub struct Probe {
 }
 
 impl Candidate {
-    /// Its effect's name as words: `command delay`.
-    #[must_use]
-    pub fn in_words(&self) -> String {
-        self.effect.name.replace('_', " ")
-    }
-
     /// Whether it acts on the arm itself; the others act on what the arm meets and on what the camera sees of it.
     #[must_use]
     pub fn is_of_arm(&self) -> bool {

@@ -2,6 +2,7 @@
 
 use super::figure::forest::{Group, Row};
 use super::quantity::Unit;
+use super::words;
 use serde::ser::{Serialize, SerializeStruct, Serializer};
 use std::collections::BTreeMap;
 use twin::effects::{Shape, find};
@@ -71,7 +72,7 @@ impl Numbers<'_> {
     }
 
     fn written(&self, number: impl Fn(&Unit, f64, [f64; 2]) -> String) -> String {
-        let name = self.name.replace('_', " ");
+        let name = words(self.name);
         let unit = self.shown();
         if self.values.len() <= MOST {
             let numbers: Vec<String> = self.pairs().map(|(value, interval)| number(&unit, value, interval)).collect();
@@ -115,7 +116,7 @@ impl Numbers<'_> {
 pub fn effect_in_words(effect: &str, parameters: &BTreeMap<String, Size>) -> String {
     let fitted = parameters.iter().filter(|(_, size)| (0..size.values.len()).any(|k| size.is_fitted(k)));
     let sizes: Vec<String> = fitted.map(|(name, size)| numbers(effect, name, size).brief()).collect();
-    let name = effect.replace('_', " ");
+    let name = words(effect);
     if sizes.is_empty() { name } else { format!("{name} ({})", sizes.join("; ")) }
 }
 
@@ -130,10 +131,10 @@ pub(crate) fn numbers<'a>(effect: &str, name: &'a str, size: &'a Size) -> Number
 pub fn number_in_words(name: &str) -> String {
     let split = name.strip_suffix(']').and_then(|rest| rest.split_once('['));
     let Some((parameter, Ok(k))) = split.map(|(parameter, k)| (parameter, k.parse::<usize>())) else {
-        return name.replace('_', " ");
+        return words(name);
     };
     let of = part(of_joints(parameter), usize::MAX, k);
-    format!("{}, {of}", parameter.replace('_', " ").replace('.', ": "))
+    format!("{}, {of}", words(parameter).replace('.', ": "))
 }
 
 /// Whether a parameter, `stiffness` or `effect.parameter`, holds one number a joint.

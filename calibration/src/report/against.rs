@@ -1,6 +1,5 @@
 //! The page of a comparison of two sessions: what changed, by how much, and what would have been seen.
 
-use super::diagnosis::words;
 use crate::diagnose::against::change::{rows, smallest_in_words};
 use crate::diagnose::against::{Candidate, Comparison};
 use crate::diagnose::judge::confidence::MOST;
@@ -8,6 +7,7 @@ use crate::diagnose::{Kind, Status};
 use crate::page::figure::bars::{Row, bars};
 use crate::page::frame::{facts, figure, frame, legend, unbroken};
 use crate::page::share::{limited, percent_interval, probability};
+use crate::page::words;
 use maud::{Markup, html};
 
 /// The page.

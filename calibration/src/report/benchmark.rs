@@ -6,6 +6,7 @@ use crate::page::figure::forest::{Group, Row, forest};
 use crate::page::figure::matrix::confusion;
 use crate::page::frame::{figure, frame, unbroken};
 use crate::page::share::{percent, percent_interval};
+use crate::page::words;
 use maud::{Markup, html};
 
 /// The page. The first method is the one in question, the others stand beside it. `origin`: the command, the time it took.
@@ -78,7 +79,7 @@ fn by_effect(scores: &Scores) -> Markup {
         .by_effect
         .iter()
         .map(|(name, rate)| Row {
-            name: format!("{} ({})", name.replace('_', " "), rate.of),
+            name: format!("{} ({})", words(name), rate.of),
             value: rate.value(),
             interval: rate.ci95,
             nominal: None,

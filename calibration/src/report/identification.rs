@@ -9,6 +9,7 @@ use crate::page::frame::{facts, figure, frame, legend, unbroken};
 use crate::page::parameters::{Numbers, of_joints, part};
 use crate::page::quantity::{Unit, short};
 use crate::page::trace::gallery;
+use crate::page::words;
 use maud::{Markup, html};
 
 /// Clips whose residuals are shown.
@@ -57,7 +58,7 @@ impl Sheet {
 
     fn forest(&self) -> Markup {
         let numbers: Vec<Numbers> = self.parameters.iter().map(Parameter::numbers).collect();
-        let headings: Vec<String> = self.parameters.iter().map(|p| p.name.replace('_', " ")).collect();
+        let headings: Vec<String> = self.parameters.iter().map(|p| words(&p.name)).collect();
         let groups: Vec<_> = numbers
             .iter()
             .zip(&headings)

@@ -1,7 +1,7 @@
 //! What verbs print for a person: a short table, aligned, and the sentence at the end, where eyes are.
 
 use super::benchmark::RATES;
-use super::diagnosis::{confidence, has_effects, is_known, sizes, together, verdict_words, words};
+use super::diagnosis::{confidence, has_effects, is_known, sizes, together, verdict_words};
 use crate::benchmark::score::{Method, Scores};
 use crate::diagnose::against::change;
 use crate::diagnose::against::{Candidate as Compared, Comparison};
@@ -12,6 +12,7 @@ use crate::page::channel_in_words;
 use crate::page::quantity::{Unit, short};
 use crate::page::scale::span;
 use crate::page::share::{limited, percent, percent_interval};
+use crate::page::words;
 
 /// Places of the gap that are named.
 const SHOWN_PLACES: usize = 3;
@@ -176,7 +177,7 @@ fn candidate(candidate: &Candidate) -> Option<(Vec<String>, Vec<String>)> {
 
 /// Rows of a parameter: name, value with interval, what was believed, remark.
 fn numbers(parameter: &Parameter) -> Vec<Vec<String>> {
-    let name = parameter.name.replace('_', " ");
+    let name = words(&parameter.name);
     let [lo, hi] = span(parameter.values.iter().copied());
     let unit = Unit::suited(&parameter.unit, lo.abs().max(hi.abs()));
     let row = |(k, value): (usize, &f64)| {

@@ -4,6 +4,7 @@ use super::{Smallest, Values};
 use crate::page::parameters::{of_joints, part};
 use crate::page::quantity::{Unit, short};
 use crate::page::scale::span;
+use crate::page::words;
 
 /// Most numbers that a line names one by one.
 const MOST: usize = 3;
@@ -12,7 +13,7 @@ const MOST: usize = 3;
 #[must_use]
 pub fn between(name: &str, values: &Values) -> String {
     let unit = unit_of(values);
-    let name = name.replace('_', " ");
+    let name = words(name);
     if values.a.len() <= MOST {
         let one = |k: usize| {
             format!(
@@ -43,7 +44,7 @@ pub fn rows(subject: &str, name: &str, values: &Values) -> Vec<[String; 4]> {
     let joints = of_joints(name) || of_joints(&format!("{subject}.{name}"));
     let one = |k: usize| {
         let part = part(joints, values.a.len(), k);
-        let name = name.replace('_', " ");
+        let name = words(name);
         let name = if part.is_empty() { name } else { format!("{name}, {part}") };
         let change = unit.interval(values.change[k], values.ci95[k]);
         [name, unit.with_unit(values.a[k]), unit.with_unit(values.b[k]), change]
@@ -56,7 +57,7 @@ pub fn rows(subject: &str, name: &str, values: &Values) -> Vec<[String; 4]> {
 pub fn smallest_in_words(name: &str, subject: &str, smallest: &Smallest) -> String {
     let [low, high] = span(smallest.values.iter().copied());
     let unit = Unit::suited(&smallest.unit, high);
-    let name = if name == subject { String::new() } else { format!("{} ", name.replace('_', " ")) };
+    let name = if name == subject { String::new() } else { format!("{} ", words(name)) };
     if smallest.values.len() < 2 {
         return format!("{name}{}", unit.with_unit(high));
     }

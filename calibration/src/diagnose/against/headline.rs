@@ -4,7 +4,7 @@ use super::super::answer::{Kind, Place, Share, Status};
 use super::answer::{Candidate, Smallest, Values};
 use super::search::Trial;
 use crate::diagnose::against::change::{between, smallest_in_words};
-use crate::diagnose::conclude::headline::words;
+use crate::page::words;
 use crate::page::{channel_in_words, percent};
 
 /// What the sentence is made of.

@@ -9,6 +9,7 @@ use crate::diagnose::fit::bench::Hypothesis;
 use crate::diagnose::fit::effort::{FIRST_PASS, HEAT};
 use crate::diagnose::fit::stages;
 use crate::diagnose::search::refit::last_pass;
+use crate::page::words;
 use shared_mem::progress::{Planned, Progress};
 
 /// At most so many changes are named, and so many effects that both sessions have are found on the way.
@@ -155,7 +156,7 @@ impl Step {
         let mut in_both: Option<(Fitted, f64)> = None;
         for (done, score) in wanted.iter().enumerate() {
             let subject = &subjects[score.subject];
-            bar.show(done as u64, &format!("{CHANGES}: {}", subject.name.replace('_', " ")));
+            bar.show(done as u64, &format!("{CHANGES}: {}", words(&subject.name)));
             if pair_bench.bench.interrupt.asked() {
                 return None;
             }

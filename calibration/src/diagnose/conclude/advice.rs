@@ -3,9 +3,9 @@
 //! Where two effects are easily taken for each other one of them says what separates them; where neither does, the stages they
 //! show in decide. What no capture can do, a weight to be hung or an object to be put somewhere, stands in the sentence first.
 
-use super::headline::words;
 use super::site::{Advice, Capture, Site};
 use crate::page::channel_in_words;
+use crate::page::words;
 use twin::effects::{Experiment, Separation, Stage, find};
 
 use Capture::{Arm, Elsewhere, StrokeAgain, Strokes};

@@ -4,7 +4,7 @@ use super::verdict::{Decision, Finding};
 use crate::diagnose::answer::{Kind, Share};
 use crate::diagnose::judge::gap::Shrunk;
 use crate::diagnose::judge::trial::CLOSES;
-use crate::page::percent;
+use crate::page::{percent, words};
 
 /// What the sentence is made of, beside the finding itself.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -49,12 +49,6 @@ pub fn sentence(decision: &Decision, finding: &Finding<'_>, facts: &Facts) -> St
         Kind::Class => class(finding, facts),
         Kind::Unexplained | Kind::NotTestable => unexplained(decision, finding, facts),
     }
-}
-
-/// An effect's name as words.
-#[must_use]
-pub fn words(effect: &str) -> String {
-    effect.replace('_', " ")
 }
 
 fn none(finding: &Finding<'_>, Facts { size, .. }: &Facts) -> String {

@@ -12,6 +12,7 @@ use crate::diagnose::fit::effort::{FIRST_PASS, HEAT, LOOK, NEAR};
 use crate::diagnose::fit::{stages, undetermined};
 use crate::diagnose::judge::trial::Step;
 use crate::estimate::{ClipModel, Impossible};
+use crate::page::words;
 use shared_mem::progress::Progress;
 
 /// What leaves more of the gain of the best on the arm's own channels than this share is not what acts there.
@@ -49,7 +50,7 @@ impl Step {
         let arm = evidence.bench(bench);
         let at = (&self.from, &weights[..]);
         let fit = |effects: &[usize], full, effort| arm.fit((effects, full), &split.train, weights, None, effort);
-        let name = |place: usize| bench.library.candidates[self.trials[place].scored.candidate].in_words();
+        let name = |place: usize| words(bench.library.candidates[self.trials[place].scored.candidate].effect.name);
         bar.stage(stages::ARM_FITS, places.len() as u64);
         let alone = |place: &usize| {
             let scored = &self.trials[*place].scored;

@@ -17,6 +17,7 @@ use crate::diagnose::judge::trial::{Found, Step, Trial};
 use crate::diagnose::propose::screening::{arm_gap_is_open, overlooked, seen_at_the_least_scatter, to_fit};
 use crate::diagnose::propose::signatures;
 use crate::diagnose::propose::starts;
+use crate::page::words;
 use shared_mem::progress::Progress;
 
 /// At most so many effects are named.
@@ -185,7 +186,7 @@ impl Step {
                 return;
             }
             let scored = &self.trials[place].scored;
-            let name = bench.library.candidates[scored.candidate].in_words();
+            let name = words(bench.library.candidates[scored.candidate].effect.name);
             bar.show((before + done) as u64, &format!("{}: {name}", stages::FITS));
             let starts = starts::kept(bench, (&self.from, &self.weights), scored, overlooked);
             let effort = bench.trying(scored.candidate, HEAT);

@@ -1,6 +1,5 @@
 //! The candidates: those in question as a table, those ruled out folded away, those that could not have been seen by name.
 
-use super::words;
 use crate::diagnose::judge::confidence::MOST;
 use crate::diagnose::{Candidate, Status};
 use crate::page::Size;
@@ -8,6 +7,7 @@ use crate::page::canvas::Canvas;
 use crate::page::figure::forest::{Group, forest};
 use crate::page::parameters::{Numbers, numbers};
 use crate::page::share::{limited, percent_interval, probability};
+use crate::page::words;
 use maud::{Markup, html};
 
 /// Width of a probability's bar.
@@ -60,7 +60,7 @@ fn table(candidates: &[&Candidate]) -> Markup {
 fn joints(candidate: &Candidate) -> Markup {
     let many = candidate.parameters.iter().filter(|(_, size)| size.values.len() > 1 && fitted(size));
     let named: Vec<(String, Numbers, &Size)> =
-        many.map(|(name, size)| (name.replace('_', " "), numbers(&candidate.effect, name, size), size)).collect();
+        many.map(|(name, size)| (words(name), numbers(&candidate.effect, name, size), size)).collect();
     let not_fitted = |size: &Size, k| (!size.is_fitted(k)).then(|| "not fitted".to_owned());
     let groups: Vec<Group> =
         named.iter().map(|(heading, numbers, size)| numbers.group(heading, &[], |k| not_fitted(size, k))).collect();

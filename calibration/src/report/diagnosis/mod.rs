@@ -6,12 +6,12 @@ mod gap;
 pub(super) use candidates::sizes;
 pub(super) use gap::is_known;
 
-pub(super) use crate::diagnose::conclude::headline::words;
 use crate::diagnose::{Basis, Diagnosis, Kind, Verdict};
 use crate::page::figure::where_map::{Cell, where_map};
 use crate::page::frame::{facts, figure, frame, unbroken};
 use crate::page::share::{percent_interval, probability};
 use crate::page::trace::gallery;
+use crate::page::words;
 use maud::{Markup, html};
 
 /// Clips whose residuals are shown.
