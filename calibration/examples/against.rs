@@ -83,9 +83,13 @@ fn main() -> anyhow::Result<()> {
         output::write(&out, serde_json::to_vec(&done)?)?;
     }
     let right = done.iter().filter(|pair| pair.is_right()).count();
-    let told: Vec<bool> = done.iter().filter_map(Outcome::holds).collect();
-    let holding = told.iter().filter(|holds| **holds).count();
+    let intervals: Vec<bool> = done.iter().filter_map(Outcome::holds).collect();
+    let holding = intervals.iter().filter(|holds| **holds).count();
     let named = done.iter().filter(|pair| pair.verdict == "named").count();
-    println!("{right} of {} right, {named} named; {holding} of {} intervals hold the change", done.len(), told.len());
+    println!(
+        "{right} of {} right, {named} named; {holding} of {} intervals hold the change",
+        done.len(),
+        intervals.len()
+    );
     Ok(())
 }

@@ -100,7 +100,7 @@ pub const EVENTS: Topic<Event> =
 
 /// Recordings of tasks: positions of bodies on joints.
 pub const TASK_JOINTS: &str = "/task/joints";
-/// Recordings of tasks: what the drives of joints are told.
+/// Recordings of tasks: where the drives of joints are commanded to go.
 pub const TASK_DRIVES: &str = "/task/drives";
 
 /// Recordings of several bodies: where the body of this name is.
@@ -109,7 +109,7 @@ pub fn object_pose(name: &str) -> String {
     format!("/object/{name}/pose")
 }
 
-/// Recordings of tasks: where the moved body of this name is told to be.
+/// Recordings of tasks: where the moved body of this name is commanded to be.
 #[must_use]
 pub fn object_target(name: &str) -> String {
     format!("/object/{name}/target")

@@ -154,10 +154,10 @@ impl Changed {
             diagnose::Kind::Unexplained => "unexplained",
             diagnose::Kind::NotTestable => "not_testable",
         };
-        let told = found.candidates.iter().find(|candidate| {
+        let changed = found.candidates.iter().find(|candidate| {
             candidate.name == self.name() && matches!(candidate.status, Status::Named | Status::Possible)
         });
-        let first = told.and_then(|candidate| candidate.parameters.values().next());
+        let first = changed.and_then(|candidate| candidate.parameters.values().next());
         Outcome {
             world: number,
             truth: self.name().to_owned(),

@@ -1,4 +1,4 @@
-//! One run of a task as an own clip, there and back: every body by its name, joints, the gripper, and what was told to them.
+//! One run of a task as an own clip, there and back: every body by its name, joints, the gripper, and what was commanded to them.
 //!
 //! Stamps are simulated time since the start; poses are in the task's world. The clip is whole or not there. What came of the
 //! run stands in a metadata record before the first message.
@@ -82,11 +82,11 @@ pub struct EpisodeMoment {
     pub time_ns: u64,
     /// Where the bodies are.
     pub poses: Vec<RigidPose>,
-    /// Where the moved bodies are told to be at this moment.
+    /// Where the moved bodies are commanded to be at this moment.
     pub targets: Vec<RigidPose>,
     /// Joint positions [rad or m].
     pub joints: Vec<f64>,
-    /// Joint positions that the drives are told to go to [rad or m].
+    /// Joint positions that the drives are commanded to go to [rad or m].
     pub drives: Vec<f64>,
     /// The gripper, where the task has one; its stamp does not count.
     pub gripper: Option<GripperState>,

@@ -46,6 +46,7 @@ pub use hull::{ArmHull, Extent, MOST_BALLS};
 pub use inertia::MassProperties;
 pub use kinematics::Jacobian;
 pub use limits::{JointLimits, Limits, TORQUE_RATE};
+pub(crate) use model::GRAVITY;
 pub use model::{ArmModel, ModelError};
 pub use parts::Part;
 pub use shared_mem::msg::{Joints, MAX_JOINTS};

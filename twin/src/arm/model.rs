@@ -12,7 +12,7 @@ use shared_mem::msg::joints_from;
 use std::path::{Path, PathBuf};
 
 /// Standard acceleration of free fall as simulators and the vendor's model use it [m/s²].
-const GRAVITY: Vec3 = [0.0, 0.0, -9.81];
+pub(crate) const GRAVITY: Vec3 = [0.0, 0.0, -9.81];
 
 /// Inertia of a joint where no model is known [kg m²]: the reflected rotor of a common hobby servo (Feetech STS3215,
 /// 0.028 after Rhoban's BAM identification). Only its ratio to the gains matters, and those are identified.

@@ -1,5 +1,5 @@
 //! The arm that carries a moved body: which joints its way takes, and what of it the arm cannot do. Kinematics alone: the body
-//! is where it is told to be, and so are the joints.
+//! is where it is commanded to be, and so are the joints.
 
 use super::file::ArmEntry;
 use super::surface::pose;

@@ -1,4 +1,4 @@
-//! A run as the rows of a clip: where everything was and what it was told, at a fixed rate.
+//! A run as the rows of a clip: where everything was and what was commanded, at a fixed rate.
 
 use super::episode::{Episode, Run};
 use super::start::StartError;
@@ -29,7 +29,7 @@ impl Task {
             moments.push(EpisodeMoment {
                 time_ns: (done as f64 * STEP * 1e9).round() as u64,
                 poses: (0..self.bodies.len()).map(|body| rigid_pose(&world.pose(body))).collect(),
-                targets: moved.iter().map(|body| rigid_pose(&scene.told(*body, done))).collect(),
+                targets: moved.iter().map(|body| rigid_pose(&scene.commanded(*body, done))).collect(),
                 joints: joints.iter().filter_map(|body| world.joint(*body)).collect(),
                 drives: driven.iter().filter_map(|body| world.driven_to(*body)).collect(),
                 gripper: self.gripper.as_ref().and_then(|gripper| gripper.state(world, self.bodies.len())),

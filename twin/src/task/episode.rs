@@ -40,13 +40,13 @@ pub(super) struct Scene<'a> {
 }
 
 impl Scene<'_> {
-    /// Where a moved body is told to be after so many steps.
-    pub(super) fn told(&self, body: usize, done: usize) -> Isometry3<f64> {
-        told(self.motions, self.starts, body, done)
+    /// Where a moved body is commanded to be after so many steps.
+    pub(super) fn commanded(&self, body: usize, done: usize) -> Isometry3<f64> {
+        commanded(self.motions, self.starts, body, done)
     }
 }
 
-fn told(motions: &Motions, starts: &[Isometry3<f64>], body: usize, done: usize) -> Isometry3<f64> {
+fn commanded(motions: &Motions, starts: &[Isometry3<f64>], body: usize, done: usize) -> Isometry3<f64> {
     let goal = done.checked_sub(1).and_then(|step| motions.goal(body, &starts[body], step));
     goal.map_or(starts[body], |(goal, _)| goal)
 }
@@ -152,10 +152,10 @@ impl Task {
         })
     }
 
-    /// Lets the arm go on to where its body is told to be after so many steps.
+    /// Lets the arm go on to where its body is commanded to be after so many steps.
     fn carry(&self, way: &mut Way, (motions, starts): (&Motions, &[Isometry3<f64>]), done: usize) {
         if let Some(carrier) = &self.carrier {
-            let [now, next] = [done, done + 1].map(|done| told(motions, starts, carrier.body, done));
+            let [now, next] = [done, done + 1].map(|done| commanded(motions, starts, carrier.body, done));
             carrier.follow(way, [&now, &next], (done as f64 * STEP, STEP));
         }
     }

@@ -75,7 +75,7 @@ impl Motions {
         }
     }
 
-    /// Where a moved body is told to be at the end of a step, by its number, and whether it is on its way there; `start` is
+    /// Where a moved body is commanded to be at the end of a step, by its number, and whether it is on its way there; `start` is
     /// its pose at the beginning of the first. `None`: nothing moves it up to then.
     pub(super) fn goal(&self, body: usize, start: &Isometry3<f64>, step: usize) -> Option<(Isometry3<f64>, bool)> {
         let (time, end) = (step as f64 * STEP, (step + 1) as f64 * STEP);

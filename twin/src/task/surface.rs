@@ -66,6 +66,7 @@ fn mesh(path: &Path) -> Result<Hull, (&'static str, String)> {
         Err(MeshFileError::Input(error)) => return fault(error.to_string()),
         Err(error) => return fault(error.to_string()),
     };
+    // Corners inside a plane face fall away in the hull; with far more the check below takes long.
     if points.len() > MOST_CORNERS * 3 {
         return fault(format!(
             "{} has {} corners; a piece has at most {MOST_CORNERS}: reduce it",

@@ -29,18 +29,18 @@ mod tree;
 
 pub use plan::{BodyPlan, Drive, Hold, JointKind, JointPlan, Piece, PlanError, box_hull, cylinder_hull};
 
+use crate::arm::GRAVITY;
 use crate::physics::Hull;
 use nalgebra::{Isometry3, Point3, Vector3};
 use patch::{Memory, Patch};
 use rail::Rail;
+use shared_mem::time::TICK;
 use std::sync::Arc;
 use touch::{Located, Search, Touching};
 use tree::Trees;
 
-/// Length of a step [s].
-pub const STEP: f64 = 1e-3;
-/// Gravity [m/s²]; the value the arm model uses too.
-const GRAVITY: Vector3<f64> = Vector3::new(0.0, 0.0, -9.81);
+/// Length of a step [s]: one of the control loop, since that is how often hands and drives are commanded anew.
+pub const STEP: f64 = TICK;
 /// Sweeps over all patches and joints, and the change of velocity [m/s] below which they end early.
 const SWEEPS: usize = 60;
 const ENOUGH: f64 = 1e-7;
@@ -135,7 +135,7 @@ impl World {
     /// Lets [`STEP`] pass.
     pub fn step(&mut self) {
         self.trees.drift(0.5 * STEP);
-        self.trees.accelerate(&GRAVITY, STEP);
+        self.trees.accelerate(&GRAVITY.into(), STEP);
         self.locate();
         self.find_patches();
         let Self { trees, rails, patches, pairs, .. } = self;
@@ -195,7 +195,7 @@ impl World {
         driven.for_each(|drive| (drive.target, drive.force) = (target, force));
     }
 
-    /// Where a body's joint is told to go [rad or m]; `None` for one without a drive.
+    /// Where a body's joint is commanded to go [rad or m]; `None` for one without a drive.
     #[must_use]
     pub fn driven_to(&self, body: usize) -> Option<f64> {
         let rail = self.rails.iter().find(|rail| rail.body == body)?;

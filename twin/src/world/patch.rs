@@ -1,4 +1,4 @@
-//! One patch: all places where two pieces touch, and the impulses there. A block of the solver ([`super::solver`]).
+//! One patch: all places where two pieces touch, and the impulses there. A block of the solver ([`super::World::step`]).
 //!
 //! Law: a place presses as much as it must to part as fast as asked, and never pulls; of places that leave the shares open the
 //! load is affine over the patch (what [`crate::sliding`] has under a base). Friction at each place stands against the slip

@@ -14,9 +14,8 @@
 //! | `scores` | what the slopes say of every change, and how small a change they would show |
 //! | `fits` | models of both sessions fitted, and what one is worth over another |
 //! | `search` | changes added while they are worth it |
-//! | `changes` | values in A and B, and the change with its interval |
+//! | `changes`, [`change`] | values in A and B, and the change with its interval; the same in words |
 //! | `conclude`, `headline`, [`answer`] | the answer |
-//! | [`command`] | files, and what is printed |
 
 pub mod answer;
 pub mod change;

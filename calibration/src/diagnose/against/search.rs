@@ -22,7 +22,7 @@ const BY_CHANCE: f64 = 0.05;
 const CLOSE: f64 = 0.05;
 /// An effect in both sessions that promises less than this is not fitted [deviance].
 const SHARED_GAIN: f64 = 6.0;
-/// What is as good as the best within so many nats cannot be told from it.
+/// Two changes whose log-likelihoods differ by less than this are not distinguishable [nats].
 const ALIKE: f64 = 4.0;
 
 /// The stages of the search, for the bar.

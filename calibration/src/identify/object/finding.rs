@@ -36,7 +36,7 @@ impl<'a> Finding<'a> {
         found: &'a ObjectFit,
         disagreement: &[f64],
     ) -> Self {
-        let (fit, held, mut intervals) = found.at.told(unknowns);
+        let (fit, held, mut intervals) = found.at.estimate(unknowns);
         intervals.half_width.iter_mut().zip(&found.widths).for_each(|(half, width)| *half *= width);
         intervals.half_width.iter_mut().zip(disagreement).for_each(|(half, least)| *half = half.max(*least));
         Self { settings, unknowns, found, fit, held, intervals }

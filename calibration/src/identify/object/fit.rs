@@ -76,7 +76,7 @@ pub(super) fn fit_object(
     }
     let Search { evaluations, convergence, stopped, .. } = search;
     let looked = Fingerprint::of(trail.1).with(&"widths");
-    let half = at.told(unknowns).2.half_width;
+    let half = at.estimate(unknowns).2.half_width;
     let look = || Question { clips, unknowns, random: &random }.widths(&at, &half);
     let (widths, looks): (Vec<f64>, usize) = trail.0.once_if_ok(&looked, look)?;
     let evaluations = evaluations + looks;
@@ -122,7 +122,7 @@ pub(super) fn linearise_object(
 /// # Errors
 /// As [`linearise_object`].
 pub(super) fn widths(clips: &ObjectClips, unknowns: &[Unknown], at: &Linearised) -> Result<Vec<f64>, Impossible> {
-    let half = at.told(unknowns).2.half_width;
+    let half = at.estimate(unknowns).2.half_width;
     Ok(Question { clips, unknowns, random: &scattered(clips) }.widths(at, &half)?.0)
 }
 

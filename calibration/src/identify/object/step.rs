@@ -70,10 +70,10 @@ impl Linearised {
         parts.fold(DMatrix::zeros(n, n), |sum, (clip, weight)| sum + &clip.information * *weight)
     }
 
-    /// What they tell about the shared numbers to first order: the clips as much as each counts, wanting what they would want
+    /// The estimate of the shared numbers to first order: the clips as much as each counts, wanting what they would want
     /// had they been left out; which numbers rest on a bound; how sure the others are.
     #[must_use]
-    pub(super) fn told(&self, unknowns: &[Unknown]) -> (Fit, Vec<bool>, Intervals) {
+    pub(super) fn estimate(&self, unknowns: &[Unknown]) -> (Fit, Vec<bool>, Intervals) {
         let mut clips = self.clips.clone();
         for (clip, weight) in clips.iter_mut().zip(&self.weights) {
             clip.information *= *weight;
