@@ -54,17 +54,9 @@ pub fn rivals(step: &Step, library: &Library, chosen: usize, overdispersion: f64
             false if library.look_alike(*candidate, chosen) => trial.is_cause(),
             false => trial.closes > ALIKE * chosen_trial.closes,
         };
-        alike && enough && comes_as_near(trial, chosen_trial, step.from.deviance())
+        alike && enough && step.comes_as_near(trial, chosen_trial)
     };
     step.trials.iter().map(|trial| trial.scored.candidate).filter(near).collect()
-}
-
-/// Whether a rival's fit goes as much of the way from what clips cost without it to what they cost with the chosen one, on a
-/// logarithmic scale: an effect after which next to nothing is left of an arm's gap has no equal in one that leaves most of it, however
-/// much single clips differ. Where clips have numbers of their own, these hide it, and it is not asked.
-fn comes_as_near(rival: &Trial, chosen: &Trial, without: f64) -> bool {
-    let way = |trial: &Trial| trial.fitted.as_ref().map_or(0.0, |(fit, _)| (without / fit.deviance()).ln());
-    rival.own_numbers || way(rival) > ALIKE * way(chosen)
 }
 
 /// Whether an advantage over a rival could be chance.
@@ -156,7 +148,12 @@ mod tests {
             other
         };
         let trials = vec![trial(tool, 1530.0, 0.5), as_good(camera, 0.15), as_good(friction, 0.15)];
-        let step = Step {
+        assert_eq!(rivals(&step(trials), &library, tool, 1.0), [camera]);
+    }
+
+    /// A step from what the first trial's fit is.
+    fn step(trials: Vec<Trial>) -> Step {
+        Step {
             from: trials[0].fitted.as_ref().expect("it is").0.clone(),
             predicted: Predicted { clips: Vec::new() },
             trials,
@@ -164,26 +161,49 @@ mod tests {
             arm_rows: 0,
             left: Vec::new(),
             whole: Vec::new(),
-        };
-        assert_eq!(rivals(&step, &library, tool, 1.0), [camera]);
+        }
     }
 
     #[test]
     fn what_leaves_most_of_an_arm_s_gap_is_no_equal_of_what_leaves_next_to_nothing() {
-        let leaves = |deviance: f64, own_numbers| {
+        let leaves = |candidate: usize, deviance: f64, own_numbers| {
             let around = Around { gram: DMatrix::zeros(1, 1), own: Vec::new() };
             let reduced = Reduced { form: DMatrix::from_element(1, 1, deviance), volume: 0.0, around };
-            let mut leaves = trial(0, 100.0, 0.9);
+            let mut leaves = trial(candidate, 100.0, 0.9);
             leaves.own_numbers = own_numbers;
             if let Some((fit, _)) = &mut leaves.fitted {
                 fit.fitted = vec![FittedClip { clip: 0, own: Vec::new(), reduced }];
             }
             leaves
         };
-        let all_but_noise = leaves(1e3, false);
-        assert!(!comes_as_near(&leaves(4e5, false), &all_but_noise, 1e6), "60 % of the gap, a seventh of the way");
-        assert!(comes_as_near(&leaves(5e3, false), &all_but_noise, 1e6));
-        assert!(comes_as_near(&leaves(4e5, true), &all_but_noise, 1e6), "own numbers of clips may hide it");
+        let before = step(vec![leaves(0, 1e6, false)]);
+        let all_but_noise = leaves(0, 1e3, false);
+        assert!(!before.comes_as_near(&leaves(1, 4e5, false), &all_but_noise), "60 % of the gap, a seventh of the way");
+        assert!(before.comes_as_near(&leaves(1, 5e3, false), &all_but_noise));
+        assert!(before.comes_as_near(&leaves(1, 4e5, true), &all_but_noise), "own numbers of clips may hide it");
+
+        // One clip has nearly all of the gap, so that gains scatter from clip to clip as much as they differ.
+        let cell = shipped();
+        let library = Library::new(&cell, &setting::complete(&cell, None).expect("a cell"), None, &[87.0; MAX_JOINTS]);
+        let [play, offset] =
+            ["joint_backlash", "joint_encoder_offset"].map(|name| library.find(name).expect("a candidate"));
+        let in_one_clip = |candidate, deviance, gain: f64| {
+            let mut trial = leaves(candidate, deviance, false);
+            let predicted = |gain: f64| Predicted {
+                clips: (0..8).map(|clip| (clip, 1e6 - if clip == 0 { 2.0 * gain } else { 2.0 })).collect(),
+            };
+            if let Some((_, advantage)) = &mut trial.fitted {
+                let nothing = Predicted { clips: (0..8).map(|clip| (clip, 1e6)).collect() };
+                *advantage = predicted(gain).over(&nothing);
+            }
+            trial
+        };
+        let leads = |other: f64| {
+            let trials = vec![in_one_clip(play, 1e3, 9000.0), in_one_clip(offset, other, 5000.0)];
+            Step { from: before.from.clone(), ..step(trials) }.leads(&library, play)
+        };
+        assert!(leads(4e5), "the other leaves most of the gap");
+        assert!(!leads(2e3), "the other leaves as little");
     }
 
     #[test]

@@ -149,7 +149,7 @@ mod tests {
                     left: Vec::new(),
                     whole: Vec::new(),
                 };
-                let trials = vec![trial(effect, last, 300.0), trial(other, &baseline, rival)];
+                let trials = vec![trial(effect, last, 300.0), trial(other, last, rival)];
                 Found { steps: vec![step(&baseline, trials), step(last, Vec::new())], last: last.clone() }
             };
             let split = Split { train: vec![0], confirm: vec![1], ..Split::default() };

@@ -29,6 +29,8 @@ const MOST_OF_IT: f64 = 0.5;
 const AHEAD: f64 = 0.2;
 /// ... and what more numbers make of that difference by this share of the gain: friction at rest is every engine's own.
 const OWN_SHARE: f64 = 1e-3;
+/// A trial comes as near as another where its fit goes this share of the other's way.
+const AS_NEAR: f64 = 0.5;
 /// Where clips have numbers of their own, which hide what a candidate closes from the likelihood, one that has more numbers
 /// than another must close this much more of the gap.
 const MORE: f64 = 0.04;
@@ -216,8 +218,18 @@ impl Step {
             beyond > CLEAR * error && beyond > AHEAD * own.nats
         };
         let others = self.trials.iter().filter(|trial| trial.scored.candidate != candidate && trial.is_cause());
-        let mut rivals = others.filter(|trial| !library.look_alike(candidate, trial.scored.candidate));
+        let mut rivals = others
+            .filter(|other| !library.look_alike(candidate, other.scored.candidate) && self.comes_as_near(other, trial));
         self.is_alone(library, candidate) || rivals.all(ahead_of)
+    }
+
+    /// Whether a trial's fit goes as much of the way from what clips cost without it to what they cost with another, on a
+    /// logarithmic scale: an effect after which next to nothing is left of an arm's gap has no equal in one that leaves most of
+    /// it, however unequal clips are. Where clips have numbers of their own, these hide it, and it is not asked.
+    pub(in crate::diagnose) fn comes_as_near(&self, trial: &Trial, other: &Trial) -> bool {
+        let without = self.from.deviance();
+        let way = |trial: &Trial| trial.fitted.as_ref().map_or(0.0, |(fit, _)| (without / fit.deviance()).ln());
+        trial.own_numbers || way(trial) > AS_NEAR * way(other)
     }
 
     /// Whether no other effect that could be the cause is worth half as much, but for those that are known to look alike:
