@@ -1,5 +1,6 @@
 //! Bounded Levenberg-Marquardt over all clips: the default way to find shared numbers, the clips' own ones with them.
 
+use super::bounded::bounded_step;
 use super::linear::ClipFit;
 use super::problem::{ClipModel, Impossible, Random, Unknown};
 use super::views::{Counted, Given, Subset};
@@ -197,12 +198,13 @@ fn improve<M: ClipModel>(
 ) -> Result<Progress, Impossible> {
     let (information, gradient) = (best.information(), best.gradient());
     let here = current(best, random);
-    let whole = bounded_step(unknowns, &best.shared, &information, &gradient, 0.0);
+    let room = room(unknowns, &best.shared);
+    let whole = bounded_step(&information, &gradient, &room, 0.0);
     if promised(best, &whole) < tolerance * best.misfit() {
         return Ok(Progress::Arrived);
     }
     for trial in 0..TRIALS {
-        let step = bounded_step(unknowns, &best.shared, &information, &gradient, *damping);
+        let step = bounded_step(&information, &gradient, &room, *damping);
         let held = if unknowns.is_empty() { 0 } else { SHARED_TRIALS };
         let share = 0.5_f64.powi(i32::try_from(trial.saturating_sub(held)).unwrap_or(i32::MAX));
         let own: Vec<Vec<f64>> = best.clips.iter().map(|clip| clip.own_part_way(&step, share)).collect();
@@ -220,56 +222,9 @@ fn improve<M: ClipModel>(
     Ok(Progress::Stuck)
 }
 
-/// A damped Newton step that keeps numbers at a bound there when they are pushed against it.
-fn bounded_step(
-    unknowns: &[Unknown],
-    shared: &[f64],
-    information: &DMatrix<f64>,
-    gradient: &DVector<f64>,
-    damping: f64,
-) -> DVector<f64> {
-    let mut free: Vec<usize> = (0..unknowns.len()).collect();
-    loop {
-        let step = solve(information, gradient, &free, damping);
-        let leaves = |k: &usize| {
-            let (value, to) = (shared[*k], shared[*k] + step[*k]);
-            (value <= unknowns[*k].lower && to < value) || (value >= unknowns[*k].upper && to > value)
-        };
-        let staying: Vec<usize> = free.iter().copied().filter(|k| !leaves(k)).collect();
-        if staying.len() == free.len() {
-            return DVector::from_fn(unknowns.len(), |k, _| {
-                step[k].clamp(unknowns[k].lower - shared[k], unknowns[k].upper - shared[k])
-            });
-        }
-        free = staying;
-    }
-}
-
-/// Ridge over the scaled information that rounding cannot undo.
-const RIDGE: f64 = 1e-12;
-
-/// `-(H + damping diag H)^-1 g` in the free numbers; a number that nothing depends on stays where it is.
-fn solve(h: &DMatrix<f64>, g: &DVector<f64>, free: &[usize], damping: f64) -> DVector<f64> {
-    let scale: Vec<f64> = free.iter().map(|k| h[(*k, *k)].max(0.0).sqrt()).collect();
-    let used: Vec<usize> = (0..free.len()).filter(|i| scale[*i] > 0.0).collect();
-    let n = used.len();
-    let scaled = DMatrix::from_fn(n, n, |i, j| {
-        let (i, j) = (used[i], used[j]);
-        h[(free[i], free[j])] / (scale[i] * scale[j])
-    });
-    let right = DVector::from_fn(n, |i, _| g[free[used[i]]] / scale[used[i]]);
-    let mut step = DVector::zeros(g.len());
-    let mut ridge = damping + RIDGE;
-    // Rounding may leave the scaled information a little indefinite: then a larger ridge is what it allows.
-    while ridge < 1e3 {
-        if let Some(factor) = (&scaled + DMatrix::identity(n, n) * ridge).cholesky() {
-            let solved = factor.solve(&right);
-            used.iter().zip(solved.iter()).for_each(|(i, x)| step[free[*i]] = -x / scale[*i]);
-            break;
-        }
-        ridge *= 10.0;
-    }
-    step
+/// Room of each number to its bounds.
+fn room(unknowns: &[Unknown], shared: &[f64]) -> Vec<[f64; 2]> {
+    unknowns.iter().zip(shared).map(|(unknown, value)| [unknown.lower - value, unknown.upper - value]).collect()
 }
 
 /// By how much a step lowers the deviance if the clips are as linear as they look.

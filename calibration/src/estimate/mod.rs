@@ -8,6 +8,7 @@
 //! |---|---|
 //! | [`problem`] | the two kinds of unknowns, and the question a model answers: residuals of one clip |
 //! | [`linear`] | one clip linearised, its own numbers eliminated |
+//! | [`bounded`] | one damped step within bounds |
 //! | [`least_squares`] | bounded Levenberg-Marquardt on all clips |
 //! | [`interval`] | how sure the shared numbers are |
 //! | [`leverage`] | what a clip says of a fit that does not lean on it |
@@ -21,6 +22,7 @@
 //! Residuals are in units of their standard deviation. Everything is deterministic: clips are worked on by many threads,
 //! but always summed in their order.
 
+pub mod bounded;
 pub mod evolution;
 pub mod interval;
 pub mod least_squares;
@@ -34,6 +36,7 @@ pub mod search;
 pub mod swarm;
 mod views;
 
+pub use bounded::bounded_step;
 pub use evolution::Evolution;
 pub use interval::{Intervals, at_bounds, moved_by};
 pub use least_squares::{Fit, Options, Underway, begin, fit, fit_from, go_on, score};

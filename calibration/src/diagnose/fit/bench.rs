@@ -8,6 +8,7 @@ use super::sweep::{Point, Precision, Reduced, Swept, sweep};
 use crate::diagnose::evidence::measured::Evidence;
 use crate::diagnose::evidence::scatter::Scatter;
 use crate::diagnose::library::Library;
+use crate::estimate::bounded_step;
 use crate::interrupt::Interrupt;
 use crate::kept::{Fingerprint, Trail};
 use nalgebra::{DMatrix, DVector};
@@ -222,8 +223,11 @@ impl<E: Evidence> Bench<'_, E> {
         let sum = forms.iter().fold(DMatrix::zeros(size, size), |sum, reduced| sum + &reduced.form);
         let kept: Clips = at.clips.iter().map(|clip| (clip.clip, clip.own.clone())).collect();
         let now = self.cost(full, &kept, weights)?;
+        let (information, gradient) = (sum.view((1, 1), (free.len(), free.len())), sum.view((1, 0), (free.len(), 1)));
+        let (information, gradient) = (information.into_owned(), gradient.column(0).into_owned());
+        let room = self.room(full, free);
         for _ in 0..TRIALS {
-            let step = self.bounded_step(full, free, &sum, *damping);
+            let step = bounded_step(&information, &gradient, &room, *damping);
             let promised = sum[(0, 0)] - quadratic::value(&sum, &(1..size).collect::<Vec<_>>(), step.as_slice());
             let mut to = full.to_vec();
             free.iter().zip(step.iter()).for_each(|(k, step)| to[*k] += step);
@@ -246,41 +250,13 @@ impl<E: Evidence> Bench<'_, E> {
         None
     }
 
-    /// A damped step that keeps numbers at a bound there when they are pushed against it.
-    fn bounded_step(&self, full: &[f64], free: &[usize], sum: &DMatrix<f64>, damping: f64) -> DVector<f64> {
-        let mut form = sum.clone();
-        for k in 1..form.ncols() {
-            form[(k, k)] *= 1.0 + damping;
-        }
-        let room = |i: usize| {
-            let unknown = &self.library.unknowns[free[i]];
-            (unknown.lower - full[free[i]], unknown.upper - full[free[i]])
+    /// Room of each free number to its bounds.
+    fn room(&self, full: &[f64], free: &[usize]) -> Vec<[f64; 2]> {
+        let room = |k: &usize| {
+            let unknown = &self.library.unknowns[*k];
+            [unknown.lower - full[*k], unknown.upper - full[*k]]
         };
-        let mut step = DVector::zeros(free.len());
-        let mut held = vec![false; free.len()];
-        loop {
-            let moving: Vec<usize> = (0..free.len()).filter(|i| !held[*i]).collect();
-            // What is held at a bound pulls on the others: its share of the slope moves into the constant column.
-            let fixed: Vec<usize> = (0..free.len()).filter(|i| held[*i]).collect();
-            let mut pulled = form.clone();
-            for j in 0..form.ncols() {
-                let pull: f64 = fixed.iter().map(|i| form[(j, i + 1)] * step[*i]).sum();
-                pulled[(j, 0)] += pull;
-            }
-            let found = quadratic::minimum(&pulled, &moving.iter().map(|i| i + 1).collect::<Vec<_>>());
-            let mut newly = false;
-            for (i, value) in moving.iter().zip(&found.at) {
-                let (low, high) = room(*i);
-                step[*i] = value.clamp(low, high);
-                if *value < low || *value > high {
-                    held[*i] = true;
-                    newly = true;
-                }
-            }
-            if !newly {
-                return step;
-            }
-        }
+        free.iter().map(room).collect()
     }
 
     /// The effort of a trial of a candidate: one beyond the arm leaves the joints' numbers alone.
