@@ -9,8 +9,10 @@
 //! | [`score`] | rates, intervals, calibration |
 //! | [`run`] | all worlds of a benchmark |
 //! | [`coverage`] | whether printed intervals hold the truth |
+//! | [`calibrate`] | the measured numbers that decide, regenerated from labelled sessions |
 //! | [`pairs`] | two sessions of one world, of which something changed or nothing did |
 
+pub mod calibrate;
 pub mod coverage;
 pub mod draw;
 pub mod pairs;

@@ -1,6 +1,7 @@
 //! `calibration benchmark`.
 
 use super::print;
+use calibration::benchmark::calibrate;
 use calibration::benchmark::run::{Extent, Outcome, Plan, run as judge};
 use calibration::benchmark::score::Scores;
 use calibration::interrupt::Interrupt;
@@ -22,10 +23,14 @@ larger size repeats that with other numbers. Each world is reported on stderr as
 
 Ctrl-C scores the worlds that are done.
 
+--calibrate prints what labelled sessions of another engine, as tests/peers/run.py records them and has them diagnosed, make
+of the measured numbers by which a diagnosis decides (calibration/src/diagnose/criteria.rs), beside the values in use.
+
 Examples:
   calibration benchmark --short
   calibration benchmark --null 300 --json > null.json
-  calibration benchmark --size 2 --report benchmark.html")]
+  calibration benchmark --size 2 --report benchmark.html
+  calibration benchmark --calibrate peers --json > criteria.json")]
 pub(super) struct BenchmarkArguments {
     /// Cell that all worlds share.
     #[arg(long, value_name = "CELL.TOML", default_value = "config/fr3_cell.toml")]
@@ -39,6 +44,9 @@ pub(super) struct BenchmarkArguments {
     /// So many worlds without anything wrong instead: how often is an effect named without cause?
     #[arg(long, value_name = "N", conflicts_with_all = ["size", "short"])]
     null: Option<u64>,
+    /// Regenerates the criteria of a diagnosis from folders of labelled sessions instead.
+    #[arg(long, value_name = "FOLDER", num_args = 1.., conflicts_with_all = ["size", "short", "null", "report", "clips", "seed", "cell"])]
+    calibrate: Vec<PathBuf>,
     /// Clips in each session, 8 to 64.
     #[arg(long, value_name = "N", default_value_t = 8, value_parser = clap::value_parser!(u64).range(8..=64))]
     clips: u64,
@@ -57,6 +65,9 @@ pub(super) struct BenchmarkArguments {
 }
 
 pub(super) fn run(arguments: BenchmarkArguments, interrupt: &Interrupt) -> anyhow::Result<()> {
+    if !arguments.calibrate.is_empty() {
+        return regenerate(&arguments.calibrate, arguments.json);
+    }
     let began = Instant::now();
     let page_file = Destination::of(arguments.report.as_deref(), arguments.force)?;
     let cell = Cell::read(&arguments.cell)?;
@@ -80,4 +91,13 @@ pub(super) fn run(arguments: BenchmarkArguments, interrupt: &Interrupt) -> anyho
     let cases = methods.first().map(|method| &method.cases);
     let answer = json!({ "scores": scores, "cases": cases, "left_out": left_out, "seconds": seconds });
     print(arguments.json, &answer, terminal::benchmark(&methods))
+}
+
+fn regenerate(folders: &[PathBuf], json: bool) -> anyhow::Result<()> {
+    let mut sessions = Vec::new();
+    for folder in folders {
+        sessions.extend(calibrate::read(folder)?);
+    }
+    let criteria = calibrate::regenerate(&sessions);
+    print(json, &json!({ "criteria": criteria, "sessions": sessions.len() }), terminal::criteria(&criteria))
 }

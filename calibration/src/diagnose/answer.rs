@@ -147,6 +147,32 @@ pub struct Gap {
     pub object_add_m: Change,
     /// Mean ADD-S [m].
     pub object_add_s_m: Change,
+    /// The gap of each kind of sensor by itself.
+    pub sensors: Vec<SensorGap>,
+}
+
+/// The gap of one kind of sensor: mean squares of residuals in units of their noise, in a clip like most (the geometric mean over
+/// all clips).
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct SensorGap {
+    /// Which.
+    pub sensors: Sensors,
+    /// With the paper's parameters identified.
+    pub before: f64,
+    /// With all effects that the search found, named or not.
+    pub after: f64,
+    /// What noise and scatter alone leave.
+    pub floor: f64,
+}
+
+/// Kinds of sensors.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Sensors {
+    /// Encoders, torque sensors: the arm.
+    Joints,
+    /// Poses of the object.
+    Object,
 }
 
 /// Root mean square over time of each joint's torque beyond the predicted one [N m].

@@ -7,6 +7,7 @@
 //! | folder | step |
 //! |---|---|
 //! | [`clips`] | which recorded clips can be diagnosed, how much of them counts, and what each is for |
+//! | [`criteria`] | the measured numbers that decide |
 //! | [`library`] | the candidates as numbers |
 //! | [`evidence`] | what is measured against the twin, where in a clip, and how far clips deviate by themselves |
 //! | [`fit`] | hypotheses linearised around clips and fitted to them |
@@ -22,6 +23,7 @@ pub mod against;
 pub mod answer;
 pub mod clips;
 pub mod conclude;
+pub mod criteria;
 pub mod evidence;
 pub mod fit;
 pub mod judge;
@@ -32,8 +34,8 @@ pub mod search;
 mod test_bench;
 
 pub use answer::{
-    Basis, Candidate, Change, Clips, Diagnosis, Gap, Kind, Nearest, Place, Remedy, Rest, Share, Status, TorqueRms,
-    Verdict,
+    Basis, Candidate, Change, Clips, Diagnosis, Gap, Kind, Nearest, Place, Remedy, Rest, SensorGap, Sensors, Share,
+    Status, TorqueRms, Verdict,
 };
 
 use crate::forward::object::ObjectClips;

@@ -2,6 +2,7 @@
 
 use super::benchmark::RATES;
 use super::diagnosis::{confidence, has_effects, is_known, sizes, together, verdict_words};
+use crate::benchmark::calibrate::Regenerated;
 use crate::benchmark::score::{Method, Scores};
 use crate::diagnose::against::change;
 use crate::diagnose::against::{Candidate as Compared, Comparison};
@@ -210,6 +211,17 @@ pub fn benchmark(methods: &[Method]) -> String {
     let mut lines = table(rows);
     lines.extend(scores.first().map(super::benchmark::sentence));
     lines.join("\n")
+}
+
+/// Criteria of a diagnosis, and what labelled sessions make of them.
+#[must_use]
+pub fn criteria(rows: &[Regenerated]) -> String {
+    let head = ["", "in use", "from sessions", "sessions", "unit"].map(str::to_owned).to_vec();
+    let line = |row: &Regenerated| {
+        let found = row.from_sessions.map_or_else(|| "too few".to_owned(), |value| format!("{value:.3}"));
+        vec![row.name.to_owned(), row.in_use.to_string(), found, row.sessions.to_string(), row.unit.to_owned()]
+    };
+    table(std::iter::once(head).chain(rows.iter().map(line)).collect()).join("\n")
 }
 
 /// Lines with their columns one under the other.

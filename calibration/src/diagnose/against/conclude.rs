@@ -73,7 +73,7 @@ pub(super) fn conclude<E: Evidence>(
     let after = if believed { &with } else { &before };
     let fits = if believed { &held_out } else { &under_a };
     let gap = Sizes::of(pair_bench.bench, ([&under_a, fits], [&before, after]), session, &case.pair.admitted)?
-        .gap([&before, after], options.seed);
+        .gap(([&before, after], Left::of_all_sensors(&before.typical(), &after.typical())), options.seed);
     let (gap_of_a, places) = (of_a(pair_bench, case), localise::localise(pair_bench.bench.evidence, &before));
     let candidates = candidates(pair_bench, case, (kind, &rivals), (&before, options.seed));
     let changes: Vec<String> = if believed { named(case, &rivals) } else { Vec::new() };

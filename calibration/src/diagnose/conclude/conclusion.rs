@@ -8,6 +8,7 @@ use super::{advice, ranked, remedies};
 use crate::diagnose::answer::{Change, Clips, Diagnosis, Gap, Nearest, Place, Rest, Share, Verdict};
 use crate::diagnose::clips::admit::Admitted;
 use crate::diagnose::clips::split::{self, Split};
+use crate::diagnose::criteria::CLASS_IS_RIGHT;
 use crate::diagnose::evidence::measured::{Evidence, Group};
 use crate::diagnose::fit::bench::{Bench, Hypothesis};
 use crate::diagnose::fit::parameters;
@@ -51,6 +52,7 @@ pub fn not_testable(session: &Session, options: &Options, why: &str) -> Diagnosi
             torque_rms: None,
             object_add_m: Change::default(),
             object_add_s_m: Change::default(),
+            sensors: Vec::new(),
         },
         nearest: None,
         places: Vec::new(),
@@ -93,6 +95,7 @@ pub fn conclude<E: Evidence>(
     let typical = |hypothesis| Residuals::at(bench, hypothesis, &all).map(|left| left.typical());
     let typical = typical(&first.from).zip(typical(&found.last)).ok_or(DiagnoseError::NoBaseline)?;
     let left = Left::of_groups(&typical.0, &typical.1);
+    let sensors = Left::of_all_sensors(&typical.0, &typical.1);
     let judged = confirm(bench, &first.weights, [(&baseline, &before), (&with, &after)], options.seed)?;
     let overdispersion = found.overdispersion(bench);
     let within_tolerance = sizes::within_tolerance(bench, ([&baseline, &with], [&before, &after]), session, admitted)?;
@@ -138,7 +141,7 @@ pub fn conclude<E: Evidence>(
     let given = options.theta.as_ref().and_then(|theta| theta.object.clone());
     let object = if admitted.with_object { theta.object.clone() } else { given };
     Ok(Diagnosis {
-        gap: sizes.gap([&before, shown], options.seed),
+        gap: sizes.gap(([&before, shown], sensors), options.seed),
         candidates: ranked::candidates(
             bench,
             (found, overdispersion[0]),
@@ -227,7 +230,7 @@ fn in_part<E: Evidence>(
     let text = headline::in_part(facts, (&partly.share, partly.unusual), (stays, looks_like), &rivals);
     let (place, looks_like) = (facts.rest.clone(), looks_like.map(str::to_owned));
     let (kind, confidence) =
-        if rivals.is_empty() { (Kind::Named, sureness(&partly.found)) } else { (Kind::Class, verdict::CLASS) };
+        if rivals.is_empty() { (Kind::Named, sureness(&partly.found)) } else { (Kind::Class, CLASS_IS_RIGHT.value) };
     Verdict {
         kind,
         confidence,

@@ -1,6 +1,7 @@
 //! The finding: one of five verdicts, with the effects and how sure it is. [`super::headline`] says it in a sentence.
 
 use crate::diagnose::answer::{Basis, Kind, Verdict};
+use crate::diagnose::criteria::{CLASS_IS_RIGHT, NONE_IS_RIGHT, PLAIN, UNKNOWN_IS_RIGHT, UNKNOWN_OF_LITTLE_IS_RIGHT};
 use crate::diagnose::judge::confidence;
 use crate::diagnose::judge::remainder::Left;
 use std::time::Duration;
@@ -58,7 +59,7 @@ impl Verdict {
     pub fn basis(&self) -> Basis {
         let most = match self.kind {
             Kind::Named => confidence::MOST,
-            Kind::None => NONE,
+            Kind::None => NONE_IS_RIGHT.value,
             Kind::Class | Kind::Unexplained => return Basis::Rate,
             Kind::NotTestable => return Basis::Nothing,
         };
@@ -74,16 +75,6 @@ const ALL_BUT_EXACT: f64 = 99.5;
 
 /// What is less likely than not is not named.
 const LIKELY: f64 = 0.5;
-
-/// How often it is right, as met in sessions of another engine, that nothing is there where the twin is as near as noise allows, ...
-const NONE: f64 = 0.96;
-/// ... that one of a class is the cause, ...
-pub(in crate::diagnose) const CLASS: f64 = 0.9;
-/// ... and that the cause of a plain gap is unknown (seven of ten); else it was an effect too far from its model.
-const UNKNOWN: f64 = 0.7;
-/// A gap of less than three least ones is seldom that (one of eight): mostly an effect that is too weak to be believed.
-const PLAIN: f64 = 3.0;
-const UNKNOWN_OF_LITTLE: f64 = 0.2;
 
 impl Finding<'_> {
     /// The verdict.
@@ -128,7 +119,7 @@ impl Finding<'_> {
         let nothing = self.left.iter().map(Left::is_nothing).fold(1.0, f64::min);
         // What is of no interest is a matter of size, which is measured.
         let nothing = if self.within_tolerance[0] { 1.0 } else { nothing };
-        Decision { kind: Kind::None, effects: Vec::new(), confidence: NONE * nothing, little: false }
+        Decision { kind: Kind::None, effects: Vec::new(), confidence: NONE_IS_RIGHT.value * nothing, little: false }
     }
 
     fn named(&self) -> Decision {
@@ -138,7 +129,7 @@ impl Finding<'_> {
 
     fn class(&self) -> Decision {
         let all = self.effects.iter().chain(&self.rivals).map(|name| (*name).to_owned()).collect();
-        Decision { kind: Kind::Class, effects: all, confidence: CLASS, little: false }
+        Decision { kind: Kind::Class, effects: all, confidence: CLASS_IS_RIGHT.value, little: false }
     }
 
     /// How much of what is not noise the effects explain, in the group of sensors in which they explain most [%].
@@ -148,7 +139,7 @@ impl Finding<'_> {
 
     fn unexplained(&self) -> Decision {
         let plain = self.drift.is_some() || self.left.iter().any(|left| left.gaps() > PLAIN);
-        let confidence = if plain { UNKNOWN } else { UNKNOWN_OF_LITTLE };
+        let confidence = if plain { UNKNOWN_IS_RIGHT.value } else { UNKNOWN_OF_LITTLE_IS_RIGHT.value };
         Decision { kind: Kind::Unexplained, effects: Vec::new(), confidence, little: !plain }
     }
 }
@@ -181,11 +172,17 @@ impl Verdict {
 #[cfg(test)]
 pub(in crate::diagnose) mod tests {
     use super::*;
-    use crate::diagnose::judge::remainder::{NUMERICS, SUBSTITUTE};
+    use crate::diagnose::criteria::{JOINTS_EXCESS, JOINTS_SHARE_LEFT};
 
     pub(in crate::diagnose) fn finding<'a>(effects: Vec<&'a str>, before: f64, after: f64) -> Finding<'a> {
-        let left =
-            vec![Left { before, after, floor: 1.0, numerics: NUMERICS, substitute: SUBSTITUTE, of_object: false }];
+        let left = vec![Left {
+            before,
+            after,
+            floor: 1.0,
+            numerics: JOINTS_EXCESS.value,
+            substitute: JOINTS_SHARE_LEFT.value,
+            of_object: false,
+        }];
         Finding {
             effects,
             rivals: Vec::new(),

@@ -53,8 +53,8 @@ fn share(left: &Left, whole: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::super::remainder::{NUMERICS, SUBSTITUTE};
     use super::*;
+    use crate::diagnose::criteria::{JOINTS_EXCESS, JOINTS_SHARE_LEFT};
 
     #[test]
     fn far_above_the_noise_the_plain_share_of_the_whole_gap_counts() {
@@ -62,8 +62,8 @@ mod tests {
             before,
             after,
             floor: 1.0,
-            numerics: NUMERICS,
-            substitute: SUBSTITUTE,
+            numerics: JOINTS_EXCESS.value,
+            substitute: JOINTS_SHARE_LEFT.value,
             of_object: false,
         };
         assert!((share(&left(1e5, 2e4), 1e5) - 0.8).abs() < 1e-3, "four fifths, and 14 % of the way");

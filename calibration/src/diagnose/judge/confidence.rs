@@ -1,6 +1,7 @@
 //! How sure a finding is: shares of the evidence among rivals, less what experience with simulated sessions takes off.
 
 use super::trial::{Step, Trial, net};
+use crate::diagnose::criteria::NAMED_IS_WRONG;
 use crate::diagnose::library::Library;
 use crate::estimate::interval::student;
 
@@ -10,11 +11,8 @@ const NEAR: f64 = 4.0;
 const CHANCE: f64 = 2.0;
 /// A rival closes at least this share of the gap that the chosen one closes, and of its way down to noise.
 const ALIKE: f64 = 0.5;
-/// What is kept for causes outside the library even where everything fits; from the simulated sessions on which this was
-/// measured: of named findings this share was wrong.
-const NONE_OF_THESE: f64 = 0.04;
 /// The largest probability of a candidate: its limit, whatever the clips say.
-pub const MOST: f64 = 1.0 - NONE_OF_THESE;
+pub const MOST: f64 = 1.0 - NAMED_IS_WRONG.value;
 /// Nats count less than they say: twins are never exact. The temperature that made shares agree with frequencies.
 const TEMPERATURE: f64 = 4.0;
 
@@ -27,7 +25,7 @@ pub fn probabilities(trials: &[Trial], none: bool) -> Vec<(usize, f64)> {
         .collect();
     let best = fitted.iter().map(|(_, worth)| *worth).fold(0.0, f64::max);
     let weight = |worth: f64| ((worth - best) / TEMPERATURE).exp();
-    let nothing = if none { 1.0 / NONE_OF_THESE } else { weight(0.0) };
+    let nothing = if none { 1.0 / NAMED_IS_WRONG.value } else { weight(0.0) };
     let total: f64 = fitted.iter().map(|(_, worth)| weight(*worth)).sum::<f64>() + nothing;
     fitted.iter().map(|(candidate, worth)| (*candidate, MOST * weight(*worth) / total)).collect()
 }
@@ -112,19 +110,16 @@ mod tests {
             all.iter().find(|(candidate, _)| *candidate == 0).map_or(0.0, |(_, p)| *p)
         };
         let cause = trial(0, 100.0, 0.4);
-        assert!((sure(&[cause.clone(), trial(1, 150.0, 0.05)]) - (1.0 - NONE_OF_THESE)).abs() < 1e-6);
+        assert!((sure(&[cause.clone(), trial(1, 150.0, 0.05)]) - MOST).abs() < 1e-6);
         assert!(sure(&[cause.clone(), trial(1, 150.0, 0.4)]) < 0.1, "one that closes as much does");
         let mut dearer = trial(1, 103.0, 0.41);
         dearer.scored.cost = 8;
-        assert!(
-            (sure(&[cause.clone(), dearer.clone()]) - (1.0 - NONE_OF_THESE)).abs() < 1e-6,
-            "one with more numbers does not"
-        );
+        assert!((sure(&[cause.clone(), dearer.clone()]) - MOST).abs() < 1e-6, "one with more numbers does not");
         // ... unless it closes markedly more, where own numbers of clips could hide that from the likelihood.
         dearer.closes = 0.5;
         assert!(sure(&[cause.clone(), dearer.clone()]) < 0.6, "one that closes markedly more does");
         dearer.own_numbers = false;
-        assert!((sure(&[cause, dearer]) - (1.0 - NONE_OF_THESE)).abs() < 1e-6);
+        assert!((sure(&[cause, dearer]) - MOST).abs() < 1e-6);
     }
 
     #[test]

@@ -4,32 +4,16 @@
 //! on some clips and harms on others. What is left is then more than another engine's way of integrating leaves.
 
 use super::gap::Typical;
+use crate::diagnose::answer::{SensorGap, Sensors};
+use crate::diagnose::criteria::{
+    DOUBTFUL, JOINTS_EXCESS, JOINTS_SHARE_LEFT, OBJECT_EXCESS, OBJECT_EXCESS_BESIDE_A_CAUSE, OBJECT_SHARE_LEFT,
+    TURNS_WITHIN,
+};
 use crate::diagnose::evidence::measured::Evidence;
 use crate::diagnose::fit::bench::{Bench, Hypothesis};
 use crate::diagnose::fit::parameters;
 use twin::effects::Role;
 
-/// Excess over the noise that any twin leaves, in squared sigmas: numerics, not physics. Sessions of another engine with
-/// nothing wrong leave up to 1.0 (excitations) and 0.1 (the arm on its way into strokes).
-pub const NUMERICS: f64 = 6.0;
-/// The same of an object's poses: what one engine's strokes leave in another's twin in a clip like most, where the
-/// paths end 2 mm and 2 degrees apart.
-pub const ROUGHNESS: f64 = 14.0;
-/// The same beside a cause that was found: twice what the roughest session with nothing wrong leaves. One with an unknown
-/// force that pulls at the object leaves 27.5.
-const ROUGHEST: f64 = 23.0;
-/// An object's excess that is a gap: of nine sessions of another engine with nothing wrong the roughest left 10.2, the next
-/// 9.4; five with a cause too weak to be told from others left 15 to 22.
-const GAP_OF_OBJECT: f64 = 13.0;
-/// Where half of the sessions in which no cause is seen have one, as a share of the least gap, and how sharply that turns:
-/// below 7 squared sigmas of the object all six had none, between 8 and 11 three of five, beyond 15 none of five.
-const DOUBTFUL: f64 = 0.75;
-const TURNS_WITHIN: f64 = 0.12;
-/// A cause leaves no more than this share of the gap it closes: of the arm's, and of the object's, whose hits are predicted
-/// less exactly.
-pub const SUBSTITUTE: f64 = 0.03;
-/// See [`SUBSTITUTE`].
-pub const SUBSTITUTE_OF_OBJECT: f64 = 0.1;
 /// A cause that stands out clearly may leave this share of the object's gap: after a bouncing hit no two engines agree. What
 /// unknown causes are mistaken for leaves two thirds.
 const MOST_OF_IT: f64 = 0.5;
@@ -59,23 +43,34 @@ impl Left {
             before: before.mean_square,
             after: after.mean_square,
             floor: before.floor,
-            numerics: if before.of_object { ROUGHEST } else { NUMERICS },
-            substitute: if before.of_object { SUBSTITUTE_OF_OBJECT } else { SUBSTITUTE },
+            numerics: if before.of_object { OBJECT_EXCESS_BESIDE_A_CAUSE.value } else { JOINTS_EXCESS.value },
+            substitute: if before.of_object { OBJECT_SHARE_LEFT.value } else { JOINTS_SHARE_LEFT.value },
             of_object: before.of_object,
         };
         before.iter().zip(after).map(one).collect()
     }
 
+    /// For diagnosis.json, of every group of sensors.
+    #[must_use]
+    pub fn of_all_sensors(before: &[Typical], after: &[Typical]) -> Vec<SensorGap> {
+        Self::of_groups(before, after).iter().map(Self::of_sensors).collect()
+    }
+
+    fn of_sensors(&self) -> SensorGap {
+        let sensors = if self.of_object { Sensors::Object } else { Sensors::Joints };
+        SensorGap { sensors, before: self.before, after: self.after, floor: self.floor }
+    }
+
     /// The gap of the twin without any effect beyond the noise, in least gaps: of 1 on it is a gap.
     #[must_use]
     pub fn gaps(&self) -> f64 {
-        (self.before - self.floor) / if self.of_object { GAP_OF_OBJECT } else { NUMERICS }
+        (self.before - self.floor) / if self.of_object { OBJECT_EXCESS.value } else { JOINTS_EXCESS.value }
     }
 
     /// How likely it is that nothing is there where no cause is seen.
     #[must_use]
     pub fn is_nothing(&self) -> f64 {
-        1.0 / (1.0 + ((self.gaps() - DOUBTFUL) / TURNS_WITHIN).exp())
+        1.0 / (1.0 + ((self.gaps() - DOUBTFUL.value) / TURNS_WITHIN.value).exp())
     }
 
     /// Whether something structured remains that is no numerics. `clear`: what was found stood out so much that it is
@@ -135,8 +130,8 @@ mod tests {
             before: 1000.0,
             after,
             floor: 1.0,
-            numerics: NUMERICS,
-            substitute: SUBSTITUTE,
+            numerics: JOINTS_EXCESS.value,
+            substitute: JOINTS_SHARE_LEFT.value,
             of_object: false,
         };
         assert!(!left(12.0).too_much(false));
@@ -150,20 +145,27 @@ mod tests {
             before: 60.0,
             after: 24.0,
             floor: 1.5,
-            numerics: ROUGHNESS,
-            substitute: SUBSTITUTE_OF_OBJECT,
+            numerics: OBJECT_EXCESS.value,
+            substitute: OBJECT_SHARE_LEFT.value,
             of_object: true,
         };
         assert!(of_object.too_much(false) && !of_object.too_much(true));
         assert!(Left { after: 40.0, ..of_object }.too_much(true), "two thirds are left");
-        assert!(Left { of_object: false, substitute: SUBSTITUTE, ..of_object }.too_much(true));
+        assert!(Left { of_object: false, substitute: JOINTS_SHARE_LEFT.value, ..of_object }.too_much(true));
     }
 
     #[test]
     fn what_numerics_leave_is_no_remainder() {
         assert!(
-            !Left { before: 2.0, after: 2.0, floor: 1.0, numerics: NUMERICS, substitute: SUBSTITUTE, of_object: false }
-                .too_much(false)
+            !Left {
+                before: 2.0,
+                after: 2.0,
+                floor: 1.0,
+                numerics: JOINTS_EXCESS.value,
+                substitute: JOINTS_SHARE_LEFT.value,
+                of_object: false
+            }
+            .too_much(false)
         );
     }
 }

@@ -5,7 +5,7 @@ use super::held_out::Fits;
 use super::remainder;
 use super::tolerance::{self, Measured};
 use crate::diagnose::DiagnoseError;
-use crate::diagnose::answer::{Change, Gap, TorqueRms};
+use crate::diagnose::answer::{Change, Gap, SensorGap, TorqueRms};
 use crate::diagnose::clips::admit::Admitted;
 use crate::diagnose::evidence::measured::Evidence;
 use crate::diagnose::fit::bench::Bench;
@@ -56,7 +56,11 @@ impl Sizes {
     }
 
     /// With the gap in sigmas: what two hypotheses leave.
-    pub(in crate::diagnose) fn gap(self, [before, shown]: [&Residuals; 2], seed: u64) -> Gap {
+    pub(in crate::diagnose) fn gap(
+        self,
+        ([before, shown], sensors): ([&Residuals; 2], Vec<SensorGap>),
+        seed: u64,
+    ) -> Gap {
         Gap {
             unit: "sigma",
             before: before.mean_square(),
@@ -68,6 +72,7 @@ impl Sizes {
             torque_rms: self.torque_rms,
             object_add_m: self.add,
             object_add_s_m: self.add_s,
+            sensors,
         }
     }
 }

@@ -2,9 +2,9 @@
 
 use super::closing::closes;
 use super::gap::{Residuals, Typical};
-use super::remainder::ROUGHNESS;
 use super::score::{Advantage, Predicted, predict};
 use crate::diagnose::clips::split::Split;
+use crate::diagnose::criteria::OBJECT_EXCESS;
 use crate::diagnose::evidence::measured::Evidence;
 use crate::diagnose::fit::bench::{Bench, Hypothesis};
 use crate::diagnose::fit::floor;
@@ -190,7 +190,7 @@ impl Step {
 
     /// Whether the object's gap is larger than in strokes of another engine with nothing wrong.
     fn object_gap(&self) -> bool {
-        self.left.iter().any(|group| group.of_object && group.mean_square - group.floor > ROUGHNESS)
+        self.left.iter().any(|group| group.of_object && group.mean_square - group.floor > OBJECT_EXCESS.value)
     }
 
     /// Whether a trial stands out: nearly all clips speak for it, far beyond chance, and for no other effect half as much.

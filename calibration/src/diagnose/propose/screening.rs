@@ -1,10 +1,11 @@
 //! Which candidates are worth a fit.
 
+use crate::diagnose::criteria::OBJECT_EXCESS;
 use crate::diagnose::evidence::measured::Evidence;
 use crate::diagnose::fit::bench::{Bench, Hypothesis};
 use crate::diagnose::fit::shortlist::{BY_CHANCE, Scored, TESTABLE};
 use crate::diagnose::judge::gap::Typical;
-use crate::diagnose::judge::remainder::{Left, ROUGHNESS};
+use crate::diagnose::judge::remainder::Left;
 use crate::diagnose::judge::trial::Step;
 use twin::effects::Stage;
 
@@ -20,7 +21,7 @@ const STANDING_OUT: usize = 2;
 const ALIKE: f64 = 0.5;
 /// An object's gap beyond this, half of what two engines differ by, has all effects on the slide fitted: which of them it is
 /// shows in how far fits get.
-const SLID: f64 = 0.5 * ROUGHNESS;
+const SLID: f64 = 0.5 * OBJECT_EXCESS.value;
 
 /// Candidates worth a fit, the arm's and the object's each among themselves: those that the score test cannot rule out, the
 /// best first; of the others only partners that the best is easily taken for. While the arm has a gap of its own, only what the arm feels
@@ -67,7 +68,7 @@ pub(in crate::diagnose) fn to_fit<E: Evidence>(
     if beyond(true) > SLID {
         all.extend(more(&|s| effect(s).stage == Stage::Slide && !all.contains(&s.candidate)));
     }
-    if beyond(true) > ROUGHNESS {
+    if beyond(true) > OBJECT_EXCESS.value {
         all.extend(more(&|s| matches!(effect(s).stage, Stage::Hit | Stage::Camera) && !all.contains(&s.candidate)));
     }
     all
@@ -130,7 +131,11 @@ mod tests {
             assert_eq!(fitted(1.5 + 1.1 * SLID).len(), slides);
             let beside = |stage| bench.library.candidates.iter().filter(|c| c.effect.stage == stage).count();
             let all_beyond = slides + beside(Stage::Hit) + beside(Stage::Camera);
-            assert_eq!(fitted(1.5 + 1.1 * ROUGHNESS).len(), all_beyond, "those of the hit and the camera as well");
+            assert_eq!(
+                fitted(1.5 + 1.1 * OBJECT_EXCESS.value).len(),
+                all_beyond,
+                "those of the hit and the camera as well"
+            );
         });
     }
 

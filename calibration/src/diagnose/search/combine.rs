@@ -3,6 +3,7 @@
 
 use super::refit::{refitted, without_superfluous};
 use crate::diagnose::clips::split::Split;
+use crate::diagnose::criteria::JOINTS_EXCESS;
 use crate::diagnose::evidence::measured::{Evidence, Group, Row};
 use crate::diagnose::fit::bench::{Bench, Hypothesis};
 use crate::diagnose::fit::effort::{FIRST_PASS, HEAT, NEAR};
@@ -11,7 +12,7 @@ use crate::diagnose::fit::shortlist::Scored;
 use crate::diagnose::fit::stages;
 use crate::diagnose::fit::undetermined;
 use crate::diagnose::judge::gap::{Residuals, Typical};
-use crate::diagnose::judge::remainder::{Left, NUMERICS};
+use crate::diagnose::judge::remainder::Left;
 use crate::diagnose::judge::score::predict;
 use crate::diagnose::judge::trial::{Found, Step, Trial};
 use crate::diagnose::propose::screening::{arm_gap_is_open, overlooked, seen_at_the_least_scatter, to_fit};
@@ -104,7 +105,7 @@ fn spent<E: Evidence>(bench: &Bench<'_, E>, split: &Split, first: &Step, now: &H
     let (Some(before), Some(after)) = (typical(&first.from), typical(now)) else { return false };
     Left::of_groups(&before, &after)
         .iter()
-        .all(|left| left.after - left.floor <= NUMERICS.max(NUMERICS_SHARE * (left.before - left.floor)))
+        .all(|left| left.after - left.floor <= JOINTS_EXCESS.value.max(NUMERICS_SHARE * (left.before - left.floor)))
 }
 
 /// Sweeps around a hypothesis, scores all candidates, fits the best.

@@ -224,6 +224,7 @@ pub(super) mod tests {
                 torque_rms: None,
                 object_add_m: Change { before: Some(0.0139), after: Some(0.0012) },
                 object_add_s_m: Change::default(),
+                sensors: Vec::new(),
             },
             nearest: None,
             places: vec![Place {
