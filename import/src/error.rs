@@ -29,6 +29,14 @@ pub enum ImportError {
     /// The mapping is no import.toml.
     #[error(transparent)]
     Mapping(#[from] TomlFileError),
+    /// An import.toml with open lines is there from an import before.
+    #[error("{} is there from an import before: fill in its open lines, then: {command}; or have them asked anew with --force", file.display())]
+    Asked {
+        /// The import.toml.
+        file: PathBuf,
+        /// What imports with it.
+        command: String,
+    },
     /// The given cell.toml cannot be used.
     #[error(transparent)]
     Cell(#[from] CellError),

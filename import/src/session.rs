@@ -178,8 +178,12 @@ fn cell_of(given: Option<&Cell>, log: &Log, joints: &[String]) -> Option<Cell> {
 /// Writes the mapping with its open lines to where the command is typed.
 fn open(order: Order<'_>, log: &Log, mapping: &Mapping, notes: Vec<Note>) -> Result<Outcome, ImportError> {
     let file = order.questions.to_owned();
+    let command = (order.command)(&file);
+    if file.is_file() && !order.force {
+        return Err(ImportError::Asked { file, command });
+    }
     let place = Destination::new(&file, order.force)?;
-    place.write(to_toml(mapping, &notes, log, &(order.command)(&file)))?;
+    place.write(to_toml(mapping, &notes, log, &command))?;
     Ok(Outcome::Open { file, notes })
 }
 

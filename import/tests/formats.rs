@@ -184,7 +184,8 @@ fn what_cannot_be_known_is_asked_once() {
     let error = import::import(given, |_, _| {}).expect_err("open lines").to_string();
     assert!(error.contains("[measured] q") && error.lines().count() == 1, "{error}");
     // Its questions kept where somebody may have begun to answer.
-    assert!(import::import(order, |_, _| {}).expect_err("it is there").to_string().contains("--force"));
+    let kept = import::import(order, |_, _| {}).expect_err("it is there").to_string();
+    assert!(kept.contains("fill in its open lines, then: ") && kept.contains("--force"), "{kept}");
     let text = std::fs::read_to_string(&questions).expect("the file");
     let (measured, desired) = text.split_once("[desired]").expect("two blocks");
     let answer = |block: &str, columns: [u32; 2]| {

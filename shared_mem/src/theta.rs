@@ -1,6 +1,7 @@
 //! `theta.toml`: what was identified about a cell. Written by identification and diagnosis, read by everything that
 //! simulates. What is absent keeps the value of cell.toml.
 
+use crate::cell::Cell;
 use crate::input;
 use crate::output::{self, OutputError};
 use crate::toml_file::{self, TomlFileError};
@@ -73,13 +74,18 @@ impl EffectTheta {
     }
 }
 
+const IS_A_CELL: &str = "describes a cell, and parameters are asked for: give a file that `calibration identify arm SESSION --out theta.toml` has written";
+
 impl Theta {
     /// Reads a theta.toml.
     ///
     /// # Errors
     /// [`TomlFileError`] when it cannot be read or a key is not known.
     pub fn read(path: &Path) -> Result<Self, TomlFileError> {
-        toml_file::read(path)
+        toml_file::read(path).map_err(|error| match Cell::read(path) {
+            Ok(_) => TomlFileError::Content { path: path.to_owned(), line: None, what: IS_A_CELL.to_owned() },
+            Err(_) => error,
+        })
     }
 
     /// The file's text.
@@ -106,6 +112,17 @@ impl Theta {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_cell_that_is_given_for_parameters_is_said_to_be_one() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("cell.toml");
+        std::fs::write(&path, include_str!("../../config/fr3_cell.toml")).expect("room");
+        let error = Theta::read(&path).expect_err("a cell").to_string();
+        assert!(error.contains("describes a cell") && !error.contains('\n'), "{error}");
+        std::fs::write(&path, "[arm]\nstifness = [1.0]\n").expect("room");
+        assert!(Theta::read(&path).expect_err("a wrong key").to_string().contains("did you mean `stiffness`?"));
+    }
 
     #[test]
     fn a_file_that_is_there_keeps_its_comments_and_what_was_not_found() {
