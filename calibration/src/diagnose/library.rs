@@ -44,6 +44,8 @@ pub struct Candidate {
     pub numbers: Range<usize>,
     /// Those of them that are fitted.
     pub turned: Vec<usize>,
+    /// Those of them that stay where they are until what was found is fitted to the end.
+    pub held: Vec<usize>,
     /// Those of them that say how strong it is.
     pub sizes: Vec<usize>,
     /// Forms to try.
@@ -131,6 +133,21 @@ impl Library {
         let reaches = numbers.iter().map(|(setting, _)| arm_reach(setting, felt)).collect();
         let (all, unknowns): (Vec<Setting>, Vec<Unknown>) = numbers.into_iter().unzip();
         Self { settings: Settings::new(base.clone(), all), unknowns, joints, reaches, baseline, candidates, robot }
+    }
+
+    /// Puts angles that have come to one end of their turn, which their bounds span, to its other end: the same angle.
+    pub fn turn_round(&self, full: &mut [f64]) {
+        for (k, setting) in self.settings.settings().iter().enumerate() {
+            if matches!(setting.search(), Some(Search::Angle { .. })) {
+                let Unknown { lower, upper, .. } = self.unknowns[k];
+                let angle = &mut full[k];
+                if *angle <= lower {
+                    *angle = upper;
+                } else if *angle >= upper {
+                    *angle = lower;
+                }
+            }
+        }
     }
 
     /// Some of its numbers, one of them perhaps several times, each with its own bounds, as the baseline of a library without
@@ -297,9 +314,10 @@ impl Candidate {
             _ => false,
         };
         let sizes: Vec<usize> = (at..numbers.len()).filter(|k| is_size(&numbers[*k].0)).collect();
-        let turned = (at..numbers.len()).filter(|k| !is_held(&numbers[*k].0)).collect();
+        let (held, turned): (Vec<usize>, Vec<usize>) = (at..numbers.len()).partition(|k| is_held(&numbers[*k].0));
+        let held = held.into_iter().filter(|k| numbers[*k].0.search() == Some(Search::Held)).collect();
         let alternatives = alternatives(effect, at, &sizes, numbers, met);
-        Self { effect, numbers: at..numbers.len(), turned, sizes, alternatives }
+        Self { effect, numbers: at..numbers.len(), turned, held, sizes, alternatives }
     }
 }
 
