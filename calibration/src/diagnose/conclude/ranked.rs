@@ -10,6 +10,7 @@ use crate::diagnose::evidence::measured::Evidence;
 use crate::diagnose::fit::bench::{Bench, Hypothesis};
 use crate::diagnose::fit::parameters;
 use crate::diagnose::fit::shortlist::{Scored, TESTABLE};
+use crate::diagnose::fit::time_step;
 use crate::diagnose::judge::gap::{DOUBLED, Residuals};
 use crate::diagnose::judge::trial::{Found, Step, Trial};
 use crate::diagnose::judge::{confidence, held_out};
@@ -30,6 +31,10 @@ pub(in crate::diagnose) fn candidates<E: Evidence>(
     seed: u64,
 ) -> Vec<Candidate> {
     let first = &found.steps[0];
+    let last_weights = &found.steps.last().unwrap_or(first).weights;
+    let time_step =
+        if found.last.effects.is_empty() { None } else { time_step::error(bench, &found.last, last_weights) };
+    let time_step = time_step.unwrap_or_default();
     let believed = matches!(kind, Kind::Named | Kind::Class);
     let likely = confidence::probabilities(&first.trials, found.last.effects.is_empty());
     let on_confirm = |fit: &Hypothesis, step: &Step| held_out::residuals(bench, split, (fit, &step.weights));
@@ -61,7 +66,9 @@ pub(in crate::diagnose) fn candidates<E: Evidence>(
         Candidate {
             effect: name.into(),
             probability: if kept { probability.max(finding.confidence) } else { probability },
-            parameters: fit.map(|fit| parameters::of_effect(bench, fit, effect)).unwrap_or_default(),
+            parameters: fit
+                .map(|fit| parameters::of_effect_moved(bench, fit, effect, if kept { &time_step } else { &[] }))
+                .unwrap_or_default(),
             shrink,
             confusable_with: confusable(first, effect, overdispersion, bench),
             status,

@@ -15,7 +15,7 @@ use shared_mem::recording::{Clip, JointSeries};
 use shared_mem::theta::Theta;
 use shared_mem::time::{TICK, TICK_NS};
 use twin::arm::{ArmModel, Joints, MAX_JOINTS, ModelError};
-use twin::control::{CommandTrack, Plant, Reading};
+use twin::control::{ArmRollout, CommandTrack, Plant, Reading};
 use twin::effects::Effects;
 
 /// At most so many moments of a clip count; more would cost time and, in smooth motion, tell little.
@@ -226,20 +226,29 @@ impl<F: Fn(&[f64]) -> Theta + Sync> ArmClips<F> {
     /// # Errors
     /// [`Impossible`] when the cell cannot be simulated with these numbers.
     pub(in crate::diagnose) fn simulated(&self, clip: usize, shared: &[f64]) -> Result<Vec<f64>, Impossible> {
-        let readings = self.readings(clip, shared)?;
+        self.simulated_in(1, clip, shared)
+    }
+
+    /// The same with every control period integrated in `parts`.
+    fn simulated_in(&self, parts: u32, clip: usize, shared: &[f64]) -> Result<Vec<f64>, Impossible> {
+        let readings = self.readings_in(parts, clip, shared)?;
         let mut residuals = Vec::new();
         self.compare(&self.clips[clip], &readings, &mut residuals)?;
         Ok(residuals)
     }
 
-    /// At every moment that counts, and a control period later.
     fn readings(&self, clip: usize, shared: &[f64]) -> Result<Vec<Reading>, Impossible> {
+        self.readings_in(1, clip, shared)
+    }
+
+    /// At every moment that counts, and a control period later.
+    fn readings_in(&self, parts: u32, clip: usize, shared: &[f64]) -> Result<Vec<Reading>, Impossible> {
         let fail = |error: &dyn std::fmt::Display| Impossible(error.to_string());
         let clip = &self.clips[clip];
         let theta = (self.theta)(shared);
         let effects = Effects::from_theta(&theta.effects, self.nominal.dof()).map_err(|e| fail(&e))?;
         let plant = Plant::new(&self.cell, self.nominal.clone(), Some(&theta), &effects.arm).map_err(|e| fail(&e))?;
-        let rollout = plant.rollout();
+        let rollout = ArmRollout { parts, ..plant.rollout() };
         let start = rollout.start_state(&clip.recorded.measured, 0, &clip.commands);
         let start = start.ok_or_else(|| Impossible("no measured joints".into()))?;
         let first = clip.recorded.measured.stamps_ns[0];
@@ -288,6 +297,10 @@ impl<F: Fn(&[f64]) -> Theta + Sync> ArmClips<F> {
 }
 
 impl<F: Fn(&[f64]) -> Theta + Sync> Evidence for ArmClips<F> {
+    fn in_halves(&self, clip: usize, shared: &[f64]) -> Option<Vec<f64>> {
+        self.simulated_in(2, clip, shared).ok()
+    }
+
     fn channels(&self) -> &[Channel] {
         &self.channels
     }

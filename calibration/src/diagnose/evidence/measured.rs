@@ -97,6 +97,11 @@ pub trait Evidence: ClipModel {
         self.residuals(clip, shared, own, out)
     }
 
+    /// The residuals of a clip with every control period integrated in two parts; `None` where that is not known.
+    fn in_halves(&self, _clip: usize, _shared: &[f64]) -> Option<Vec<f64>> {
+        None
+    }
+
     /// All measured quantities.
     fn channels(&self) -> &[Channel];
     /// The residuals of a clip, in the order of [`ClipModel::residuals`]; rows of one channel ascend in time.

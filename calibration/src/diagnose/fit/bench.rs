@@ -112,6 +112,16 @@ impl<E: Evidence> Bench<'_, E> {
         self.library.baseline.clone().chain(of_effects).collect()
     }
 
+    /// The same with what the effects on the arm hold while they are searched.
+    fn all_free(&self, effects: &[usize]) -> Vec<usize> {
+        let of_effect = |effect: &usize| {
+            let candidate = &self.library.candidates[*effect];
+            let held = candidate.held.iter().filter(|_| candidate.is_of_arm());
+            candidate.turned.iter().chain(held).copied().collect::<Vec<_>>()
+        };
+        self.library.baseline.clone().chain(effects.iter().flat_map(of_effect)).collect()
+    }
+
     /// Fits effects on clips from `full` on, each clip's own numbers from `near` on.
     ///
     /// `None` when the twin has no answer at the start.
@@ -145,7 +155,7 @@ impl<E: Evidence> Bench<'_, E> {
         weights: &[f64],
         effort: Effort,
     ) -> Option<Hypothesis> {
-        let free = self.free(effects);
+        let free = if effort.frees_held { self.all_free(effects) } else { self.free(effects) };
         let holds = |k: &usize| effort.holds_joints && self.library.joints[*k].is_some();
         let moving: Vec<usize> = free.iter().copied().filter(|k| !holds(k)).collect();
         let clips = self.own_fitted(&full, from, weights)?;
@@ -231,6 +241,7 @@ impl<E: Evidence> Bench<'_, E> {
             let promised = sum[(0, 0)] - quadratic::value(&sum, &(1..size).collect::<Vec<_>>(), step.as_slice());
             let mut to = full.to_vec();
             free.iter().zip(step.iter()).for_each(|(k, step)| to[*k] += step);
+            self.library.turn_round(&mut to);
             let own = |clip: &super::sweep::SweptClip| (clip.clip, at.own_after(clip, self.evidence, weights, &step));
             let to_own = at.clips.iter().map(own).collect();
             let fitted = self.own_fitted(&to, to_own, weights).map(|to_own| self.restarted(&to, to_own, weights));

@@ -12,13 +12,15 @@ pub struct Effort {
     /// Whether numbers that the arm alone tells stay where they are: an effect beyond the arm does not change what its joints
     /// say, and the arm need not be simulated again.
     pub holds_joints: bool,
+    /// Whether what the effects hold while they are searched moves too.
+    pub frees_held: bool,
 }
 
 impl Effort {
     /// So many linearisations, taken like this, of all numbers.
     #[must_use]
     pub const fn of(iterations: usize, precision: Precision) -> Self {
-        Self { iterations, precision, holds_joints: false }
+        Self { iterations, precision, holds_joints: false, frees_held: false }
     }
 }
 

@@ -8,6 +8,7 @@
 //! | `bench`, `cost`, `effort` | hypotheses fitted, what they cost, and how much work a fit gets |
 //! | `restart` | restarts of clips whose own numbers are stuck in a local minimum |
 //! | `parameters`, `undetermined` | its numbers with their intervals, and those that nothing depends on |
+//! | `time_step` | how far the twin's time step moves them |
 //! | `stages` | how long each part of the search takes |
 
 pub mod bench;
@@ -20,4 +21,5 @@ pub mod restart;
 pub mod shortlist;
 pub(super) mod stages;
 pub mod sweep;
+pub mod time_step;
 pub mod undetermined;

@@ -2,8 +2,10 @@
 //!
 //! An interval is the wider of two: from the curvature of the weighted deviance, and from how the number moves when clips are
 //! left out one by one (jackknife), with Student's t for as few clips as there are. Where a hit lies between a number and
-//! what is seen, the step over which its slope was taken comes on top: the answer to less than that is rough. Of a size on
-//! which nothing depends ([`super::undetermined`]) all that is met in practice is possible.
+//! what is seen, the step over which its slope was taken comes on top: the answer to less than that is rough. Of what was
+//! found on an arm alone the interval reaches to where the number would be without the twin's time step. Of a size on
+//! which nothing depends ([`super::undetermined`]), and of what was held and never fitted, all that is met in practice is
+//! possible.
 
 use super::bench::{Bench, Hypothesis};
 use super::quadratic::minimum;
@@ -21,6 +23,17 @@ const NINETY: f64 = 1.645;
 /// The parameters of one of a hypothesis' effects.
 #[must_use]
 pub fn of_effect<E: Evidence>(bench: &Bench<'_, E>, hypothesis: &Hypothesis, effect: usize) -> BTreeMap<String, Size> {
+    of_effect_moved(bench, hypothesis, effect, &[])
+}
+
+/// The same; `time_step`: how far the twin's time step moves each free number, where that is known ([`super::time_step`]).
+#[must_use]
+pub fn of_effect_moved<E: Evidence>(
+    bench: &Bench<'_, E>,
+    hypothesis: &Hypothesis,
+    effect: usize,
+    time_step: &[f64],
+) -> BTreeMap<String, Size> {
     let half_widths = half_widths(bench, hypothesis);
     let candidate = &bench.library.candidates[effect];
     let rough = !candidate.is_of_arm();
@@ -35,11 +48,14 @@ pub fn of_effect<E: Evidence>(bench: &Bench<'_, E>, hypothesis: &Hypothesis, eff
                 continue;
             }
             let value = hypothesis.full[k];
-            let half = hypothesis.free.iter().position(|free| *free == k).map_or(0.0, |place| half_widths[place]);
+            let place = hypothesis.free.iter().position(|free| *free == k);
+            let half = place.map_or(0.0, |place| half_widths[place]);
+            let moved = place.and_then(|place| time_step.get(place)).copied().unwrap_or(0.0);
             let half = if rough && half > 0.0 { half.hypot(NINETY * bench.library.unknowns[k].step) } else { half };
-            let open = candidate.sizes.contains(&k) && !hypothesis.free.contains(&k);
+            let unknown = candidate.sizes.contains(&k) || candidate.held.contains(&k);
+            let open = unknown && !hypothesis.free.contains(&k);
             let interval = match bench.library.met(k).unwrap_or(parameter.plausible) {
-                _ if !open => [value - half, value + half],
+                _ if !open => [value - half + moved.min(0.0), value + half + moved.max(0.0)],
                 [low, _] if inverse => [0.0, low.recip()],
                 plausible => plausible,
             };

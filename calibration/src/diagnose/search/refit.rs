@@ -10,8 +10,11 @@ use crate::diagnose::judge::trial::{LEAST, NEARLY_ALL, convincing};
 use crate::diagnose::library::Alternative;
 use crate::diagnose::propose::arm_alone::ArmAlone;
 
-/// The winner gets so many linearisations more.
-const LAST_PASS: Effort = Effort::of(6, Precision::Exact);
+/// The winner is fitted until it has converged, what is held of it with the others: its numbers are the answer. An arm alone
+/// converges well before so many linearisations.
+const LAST_PASS: Effort = Effort { frees_held: true, ..Effort::of(25, Precision::Exact) };
+/// With an object each linearisation takes far longer.
+const LAST_PASS_WITH_OBJECT: Effort = Effort { frees_held: true, ..Effort::of(8, Precision::Joints) };
 
 /// Where in its range a held form is tried, and how often the best of these is then looked for halfway to its neighbours.
 const SCANNED: [f64; 9] = [0.0, 0.01, 0.02, 0.05, 0.1, 0.2, 0.4, 0.7, 1.0];
@@ -81,7 +84,7 @@ fn other_way<E: Evidence>(bench: &Bench<'_, E>, fit: &Hypothesis) -> Option<Vec<
 /// The effort of a fit to the end. Clips with an object take a simulation for each number of their own; joints one by one
 /// besides would take too long.
 pub fn last_pass<E: Evidence>(bench: &Bench<'_, E>) -> Effort {
-    if bench.scatter.count() == 0 { LAST_PASS } else { Effort { precision: Precision::Joints, ..LAST_PASS } }
+    if bench.scatter.count() == 0 { LAST_PASS } else { LAST_PASS_WITH_OBJECT }
 }
 
 /// Drops effects that the others make superfluous, one after the other.

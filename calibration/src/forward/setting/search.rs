@@ -91,6 +91,10 @@ const EFFECT_STEP: f64 = 2e-3;
 /// roughness averages out.
 const ROUGH_STEP: f64 = 2e-2;
 
+/// The same of an order: far from the zero of a joint a little of it is a large angle (400 of them, 1e-5 of that range and 2.5 rad
+/// are 0.01 rad).
+const ORDER_STEP: f64 = 1e-5;
+
 /// Every number of an effect, for an arm of `dof` joints on such a robot, beginning where the effect changes nothing.
 #[must_use]
 pub fn effect_settings(info: &'static EffectInfo, robot: &Robot, dof: usize) -> Vec<(Setting, Unknown)> {
@@ -104,7 +108,11 @@ pub fn effect_settings(info: &'static EffectInfo, robot: &Robot, dof: usize) -> 
         let inverse = parameter.resting_value().is_infinite();
         let flanks = info.parameters.iter().any(|parameter| parameter.search == Search::Threshold);
         let hits = info.stage != Stage::Control || flanks;
-        let share = if hits { ROUGH_STEP } else { EFFECT_STEP };
+        let share = match parameter.search {
+            Search::InStep => ORDER_STEP,
+            _ if hits => ROUGH_STEP,
+            _ => EFFECT_STEP,
+        };
         let start = if inverse { 0.0 } else { parameter.resting_value() };
         for index in indices {
             let met = robot.range(parameter, index);
