@@ -10,6 +10,7 @@ use crate::msg::gripper::{GripperCommand, GripperState};
 use crate::msg::image::CameraInfo;
 use crate::msg::motion::MotionChunk;
 use crate::msg::object::ObjectPose;
+use crate::msg::target::{ArmTarget, GripperTarget};
 use crate::msg::twin::{TwinGap, TwinState};
 use crate::msg::wrench::Wrench;
 use std::marker::PhantomData;
@@ -62,6 +63,9 @@ const PICTURES: Limits = Limits { buffer: 8, history: 0, borrowed: 2, subscriber
 /// What a late reader wants to know at once.
 const LATCHED: Limits = Limits { buffer: 4, history: 1, borrowed: 2, subscribers: 8, publishers: 1 };
 
+/// What is steered by: the newest counts.
+const TARGETS: Limits = Limits { buffer: 16, history: 0, borrowed: 2, subscribers: 4, publishers: 4 };
+
 const fn topic<M: Message>(name: &'static str, limits: Limits) -> Topic<M> {
     Topic { name, limits, message: PhantomData }
 }
@@ -73,6 +77,9 @@ pub const ARM_COMMAND: Topic<ArmCommand> = topic("/arm/command", STREAM);
 /// Capture to bridge: motions to play. Two writers, so that a second sender is refused by the bridge and not by the transport.
 pub const ARM_MOTION: Topic<MotionChunk> =
     topic("/arm/motion", Limits { buffer: 64, history: 0, borrowed: 2, subscribers: 4, publishers: 2 });
+/// Anyone to bridge: where the arm is to go now. Several writers, so that a second sender is refused by the bridge and not by
+/// the transport.
+pub const ARM_TARGET: Topic<ArmTarget> = topic("/arm/target", TARGETS);
 /// Tracker or simulation to all: pose of the object, at frame rate.
 pub const OBJECT_POSE: Topic<ObjectPose> =
     topic("/object/pose", Limits { buffer: 256, history: 1, borrowed: 2, subscribers: 8, publishers: 2 });
@@ -90,6 +97,8 @@ pub const GRIPPER: Topic<GripperState> =
 /// Anyone to bridge: what the gripper is to do. The newest counts.
 pub const GRIPPER_COMMAND: Topic<GripperCommand> =
     topic("/gripper/command", Limits { buffer: 8, history: 0, borrowed: 2, subscribers: 4, publishers: 4 });
+/// Anyone to bridge: how far the fingers are to be apart now.
+pub const GRIPPER_TARGET: Topic<GripperTarget> = topic("/gripper/target", TARGETS);
 /// Twin to all: its own state, each cycle it mirrors.
 pub const TWIN_STATE: Topic<TwinState> = topic("/twin/state", STREAM);
 /// Twin to all: real against twin, each cycle it mirrors.
@@ -144,6 +153,7 @@ list!(
     messages ARM_STATE,
     messages ARM_COMMAND,
     messages ARM_MOTION,
+    messages ARM_TARGET,
     messages OBJECT_POSE,
     pictures CAMERA_COLOR,
     pictures CAMERA_DEPTH,
@@ -151,6 +161,7 @@ list!(
     messages WRENCH,
     messages GRIPPER,
     messages GRIPPER_COMMAND,
+    messages GRIPPER_TARGET,
     messages TWIN_STATE,
     messages TWIN_GAP,
     messages EVENTS,

@@ -74,7 +74,10 @@ fn each_big_dependency_has_one_door() {
         ("clap_mangen", &["shared_mem/src/command_line/"]),
         // Whatever asks for the commit is built again after each.
         ("git_version", &["twin/src/main.rs", "rt_bridge/src/main.rs", "calibration/src/main.rs"]),
-        ("rsruckig", &["rt_bridge/src/motion/", "calibration/src/capture/transit.rs"]),
+        (
+            "rsruckig",
+            &["twin/src/arm/follower.rs", "rt_bridge/src/motion/brake.rs", "calibration/src/capture/transit.rs"],
+        ),
         ("parquet", &["import/src/sources/parquet_file.rs", "import/src/data_set/table.rs"]),
         ("rusqlite", &["import/src/sources/sqlite.rs"]),
         ("bzip2", &["import/src/sources/ros1.rs"]),

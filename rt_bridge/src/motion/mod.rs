@@ -1,5 +1,5 @@
-//! Motions: set points out of a queue, one a cycle, the stop for everything that goes wrong, and the way to a target. Pure
-//! logic on memory set aside in advance; player and brake run in the control thread.
+//! Motions: set points out of a queue, one a cycle, the stop for everything that goes wrong, and streams of
+//! targets. Pure logic on memory set aside in advance; player and brake run in the control thread.
 //!
 //! | file | owns |
 //! |---|---|
@@ -7,14 +7,12 @@
 //! | `lost` | what the arm is told to do where set points came too late |
 //! | `ease` | from there back to the plan |
 //! | [`brake`] | from any admitted motion to rest inside the limits |
-//! | [`reach`] | from any motion to a target that may change (the only `rsruckig` code) |
+//! | `player/stream` | a stream of targets, followed as [`twin::arm::Follower`] plans |
 
 pub mod brake;
 mod ease;
 mod lost;
 pub mod player;
-pub mod reach;
 
 pub use brake::Brake;
-pub use player::Player;
-pub use reach::Reach;
+pub use player::{Player, Target};

@@ -7,6 +7,10 @@
 //! Where set points did not reach the arm in time and it went on by itself meanwhile, the motion goes on from there and eases
 //! back to its plan; where those were the last ones, the arm eases back to the end.
 
+mod stream;
+
+pub use stream::Target;
+
 use super::ease::Ease;
 use super::{Brake, lost};
 use crate::remark::{BrakeReason, Refusal, Remark};
@@ -14,6 +18,7 @@ use crate::safety::{Guard, Outside, Trace};
 use shared_mem::msg::arm::{ArmState, MotionStatus};
 use shared_mem::msg::motion::{CHUNK_LENGTH, MotionChunk, MotionKind, SetPoint};
 use shared_mem::msg::{Joints, MAX_JOINTS};
+use stream::Stream;
 
 /// Set points that can wait: 4 s at 1 kHz.
 pub const QUEUE: usize = 4096;
@@ -24,6 +29,7 @@ pub const START_TOLERANCE: f64 = 1e-6;
 enum Activity {
     Holding,
     Playing,
+    Following,
     Braking,
     Halted,
 }
@@ -42,6 +48,7 @@ pub struct Player {
     /// How far outside the workspace the arm was when it last rested.
     outside: Outside,
     queue: Queue,
+    stream: Stream,
     activity: Activity,
     status: MotionStatus,
     motion: u64,
@@ -58,6 +65,7 @@ impl Player {
     pub fn new(guard: Guard, q_d: Joints) -> Self {
         Self {
             brake: Brake::new(guard.limits, guard.period_s),
+            stream: Stream::new(&guard.limits, guard.period_s),
             outside: guard.workspace.outside(&q_d),
             guard,
             trace: Trace::at_rest(q_d),
@@ -96,6 +104,7 @@ impl Player {
                 self.ease = Ease::between(&trace, &self.planned, &self.guard.limits, self.guard.period_s);
             }
             Activity::Braking => self.brake.begin(&trace),
+            Activity::Following => self.stream.go_on_from(&trace, self.guard.period_s),
             Activity::Halted => {}
         }
     }
@@ -112,7 +121,7 @@ impl Player {
         match self.activity {
             Activity::Holding => self.ease.is_over(),
             Activity::Halted => true,
-            Activity::Playing | Activity::Braking => false,
+            Activity::Playing | Activity::Following | Activity::Braking => false,
         }
     }
 
@@ -172,7 +181,7 @@ impl Player {
 
     /// Brakes what is being played, or the way back to where the arm is held, of which nothing is told; nothing when it rests.
     pub fn stop(&mut self, why: BrakeReason) -> Option<Remark> {
-        let played = self.activity == Activity::Playing;
+        let played = matches!(self.activity, Activity::Playing | Activity::Following);
         if self.is_at_rest() || self.activity == Activity::Braking {
             return None;
         }
@@ -205,6 +214,7 @@ impl Player {
             Activity::Holding | Activity::Halted => (self.hold(), None),
             Activity::Braking => (self.braked(), None),
             Activity::Playing => self.play(),
+            Activity::Following => self.follow(),
         }
     }
 
@@ -303,7 +313,9 @@ impl Player {
         match self.activity {
             Activity::Holding => {}
             Activity::Halted => return Err(Refusal::NotCommanded),
-            Activity::Playing | Activity::Braking => return Err(Refusal::Busy { playing: self.motion }),
+            Activity::Playing | Activity::Following | Activity::Braking => {
+                return Err(Refusal::Busy { playing: self.motion });
+            }
         }
         if chunk.motion_id == 0 {
             return Err(Refusal::NoId);

@@ -34,6 +34,13 @@ pub enum Remark {
         /// The motion.
         motion: u64,
     },
+    /// A target of a stream was passed over; the arm goes on to the one before it.
+    PassedOver {
+        /// The stream.
+        motion: u64,
+        /// What resting there would break.
+        why: Violation,
+    },
     /// A motion is being braked; the arm will hold where it comes to rest.
     Braked {
         /// The motion.
@@ -85,6 +92,10 @@ pub enum Refusal {
 pub enum BrakeReason {
     /// Set points ran out.
     Underrun,
+    /// No target came for as long as a stream may be silent.
+    Silent,
+    /// No way to the target was found.
+    NoWay,
     /// A `Stop` was received.
     Asked,
     /// The run ends.
@@ -105,7 +116,7 @@ impl Remark {
     pub fn level(&self) -> EventLevel {
         match self {
             Self::Fault(_) => EventLevel::Error,
-            Self::Refused { .. } | Self::LesserClock(_) => EventLevel::Warning,
+            Self::Refused { .. } | Self::PassedOver { .. } | Self::LesserClock(_) => EventLevel::Warning,
             Self::Braked { why: BrakeReason::Asked | BrakeReason::RunEnds, .. } => EventLevel::Info,
             Self::Braked { .. } => EventLevel::Warning,
             Self::Recovered | Self::Began { .. } | Self::Done { .. } => EventLevel::Info,
@@ -122,6 +133,9 @@ impl fmt::Display for Remark {
             Self::Refused { motion, why } => write!(f, "motion {motion} refused: {why}"),
             Self::Began { motion } => write!(f, "motion {motion} began"),
             Self::Done { motion } => write!(f, "motion {motion} done"),
+            Self::PassedOver { motion, why } => {
+                write!(f, "a target of motion {motion} is passed over: {why}; the arm stays with the one before")
+            }
             Self::Braked { motion, why } => write!(f, "motion {motion} braked: {why}"),
         }
     }
@@ -153,6 +167,10 @@ impl fmt::Display for BrakeReason {
             Self::Underrun => {
                 f.write_str("its set points ran out before the chunk marked Last; keep a few hundred ms queued")
             }
+            Self::Silent => f.write_str(
+                "no target came for 0.2 s; send one at least twenty times a second, under a new id to go on",
+            ),
+            Self::NoWay => f.write_str("no way to its target was found; send another, under a new id"),
             Self::Asked => f.write_str("a stop was asked for"),
             Self::RunEnds => f.write_str("the run ends"),
             Self::Limit(violation) => write!(f, "{violation}"),

@@ -306,6 +306,9 @@ impl Cycle {
                 self.player.discard(&chunk).into_iter().for_each(|remark| self.tell(remark));
             }
         }
+        while let Some(target) = self.link.orders.target() {
+            self.player.aim(&target).into_iter().for_each(|remark| self.tell(remark));
+        }
         if self.player.has_room()
             && let Some(chunk) = self.link.orders.take()
         {

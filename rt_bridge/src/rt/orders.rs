@@ -1,7 +1,8 @@
-//! Motions and stops on their way from the pump to the control loop. Chunks go through a ring, one behind the other; a stop
+//! Motions, targets and stops on their way from the pump to the control loop. Chunks go through a ring, one behind the other; a stop
 //! goes past them all by a number of its own, and makes void what was sent before it. What does not fit into the ring is
 //! held on the pump's side, so that a stop is never behind it in shared memory. Neither side ever waits.
 
+use crate::motion::Target;
 use rtrb::{Consumer, Producer, RingBuffer};
 use shared_mem::msg::motion::{MotionChunk, MotionKind};
 use std::collections::VecDeque;
@@ -15,6 +16,9 @@ struct Numbered {
     chunk: MotionChunk,
 }
 
+/// Targets that can wait: those of a few senders between two cycles.
+const TARGETS: usize = 64;
+
 /// The pump's end.
 #[derive(Debug)]
 pub struct OrderSender {
@@ -22,6 +26,7 @@ pub struct OrderSender {
     /// Chunks for which there is no room in the ring yet; never more than its capacity.
     held: VecDeque<Numbered>,
     most_held: usize,
+    targets: Producer<(u64, Target)>,
     /// Chunks and stops sent so far.
     sent: u64,
     /// The number from which on chunks count.
@@ -32,6 +37,7 @@ pub struct OrderSender {
 #[derive(Debug)]
 pub struct Orders {
     chunks: Consumer<Numbered>,
+    targets: Consumer<(u64, Target)>,
     valid_from: Arc<AtomicU64>,
     /// What that number was when it was last looked at.
     seen: u64,
@@ -42,9 +48,17 @@ pub struct Orders {
 pub fn orders(in_ring: usize, most_held: usize) -> (OrderSender, Orders) {
     let (to_control, chunks) = RingBuffer::new(in_ring);
     let valid_from = Arc::new(AtomicU64::new(0));
+    let (to_targets, targets) = RingBuffer::new(TARGETS);
     let held = VecDeque::with_capacity(most_held);
-    let sender = OrderSender { chunks: to_control, held, most_held, sent: 0, valid_from: valid_from.clone() };
-    (sender, Orders { chunks, valid_from, seen: 0 })
+    let sender = OrderSender {
+        chunks: to_control,
+        held,
+        most_held,
+        targets: to_targets,
+        sent: 0,
+        valid_from: valid_from.clone(),
+    };
+    (sender, Orders { chunks, targets, valid_from, seen: 0 })
 }
 
 impl OrderSender {
@@ -69,6 +83,11 @@ impl OrderSender {
         };
         self.sent += u64::from(fits);
         fits
+    }
+
+    /// Sends a target. Where the loop has not taken those before it, it is dropped: newer ones follow.
+    pub fn aim(&mut self, target: &Target) {
+        let _full = self.targets.push((self.sent, *target));
     }
 
     /// Moves what is held into the ring, as far as there is room.
@@ -101,6 +120,16 @@ impl Orders {
         if is_void { self.take() } else { None }
     }
 
+    /// The target that waits longest, but for those that the newest stop overtook.
+    pub fn target(&mut self) -> Option<Target> {
+        while let Ok((number, target)) = self.targets.pop() {
+            if number >= self.seen {
+                return Some(target);
+            }
+        }
+        None
+    }
+
     /// The chunk that waits longest.
     pub fn take(&mut self) -> Option<MotionChunk> {
         self.chunks.pop().ok().map(|next| next.chunk)
@@ -131,6 +160,18 @@ mod tests {
         assert_eq!(overtaken, [1], "what was held is gone already");
         assert_eq!(orders.take().map(|chunk| chunk.motion_id), Some(3));
         assert!(orders.take().is_none());
+    }
+
+    #[test]
+    fn a_stop_overtakes_targets_and_later_ones_count() {
+        let (mut sender, mut orders) = orders(2, 1);
+        let target = |stream| Target { stream, q: [0.0; 8], speed: 0.0 };
+        sender.aim(&target(1));
+        sender.send(&chunk(0, MotionKind::Stop));
+        sender.aim(&target(2));
+        assert!(orders.is_stopped());
+        let came: Vec<u64> = std::iter::from_fn(|| orders.target()).map(|target| target.stream).collect();
+        assert_eq!(came, [2]);
     }
 
     #[test]

@@ -9,6 +9,7 @@ use shared_mem::msg::gripper::{GripperAction, GripperCommand, GripperState};
 use shared_mem::msg::image::{CameraInfo, ImageHeader, ImageHeaderWire};
 use shared_mem::msg::motion::MotionChunk;
 use shared_mem::msg::object::ObjectPose;
+use shared_mem::msg::target::{ArmTarget, GripperTarget};
 use shared_mem::msg::twin::{TwinGap, TwinState};
 use shared_mem::msg::wrench::Wrench;
 use shared_mem::topics::{self, ImageTopic, Topic, Visitor};
@@ -30,6 +31,8 @@ fn valid(topic: &str) -> Vec<u8> {
         "/arm/state" => bytes(&ArmState { dof: 7, mode: ArmMode::Move, ..ArmState::default() }),
         "/arm/command" => bytes(&ArmCommand { dof: 7, ..ArmCommand::default() }),
         "/arm/motion" => bytes(&MotionChunk { dof: 7, length: 50, ..MotionChunk::default() }),
+        "/arm/target" => bytes(&ArmTarget { dof: 7, stream: 3, ..ArmTarget::default() }),
+        "/gripper/target" => bytes(&GripperTarget { width: 0.04, ..GripperTarget::default() }),
         "/object/pose" => bytes(&ObjectPose::default()),
         "/camera/info" => bytes(&CameraInfo { width: 640, height: 480, ..CameraInfo::default() }),
         "/wrench" => bytes(&Wrench::default()),

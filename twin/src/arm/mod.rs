@@ -13,6 +13,8 @@
 //! | `inertia` | mass properties of bodies |
 //! | `kinematics` | flange, Jacobian |
 //! | `reach` | joints that bring the flange to a pose |
+//! | `nearest` | joints within their limits that bring it as near to a pose as they can |
+//! | `follower` | [`Follower`]: the way to a target that may change at any time (the only `rsruckig` code of the product but the capture's plans) |
 //! | `hull` | [`ArmHull`]: the space that links and tool take |
 //! | `dynamics` | gravity, Coriolis, mass matrix, accelerations |
 //! | `control` | [`ControlLaw`]: from command to torque |
@@ -24,6 +26,7 @@
 mod control;
 mod dry_friction;
 mod dynamics;
+mod follower;
 mod fr3;
 mod hull;
 mod inertia;
@@ -31,6 +34,7 @@ mod kernel;
 mod kinematics;
 mod limits;
 mod model;
+mod nearest;
 mod parts;
 mod reach;
 mod spatial;
@@ -42,12 +46,14 @@ mod yielding;
 pub use control::{ControlLaw, GainError};
 pub use dry_friction::Presliding;
 pub use dynamics::PointForce;
+pub use follower::Follower;
 pub use hull::{ArmHull, Extent, MOST_BALLS};
 pub use inertia::MassProperties;
 pub use kinematics::Jacobian;
 pub use limits::{JointLimits, Limits, TORQUE_RATE};
 pub(crate) use model::GRAVITY;
 pub use model::{ArmModel, ModelError};
+pub use nearest::Nearest;
 pub use parts::Part;
 pub use shared_mem::msg::{Joints, MAX_JOINTS};
 pub use transmission::{Passed, Spring, Transmission};

@@ -2,25 +2,24 @@
 //! lost where nothing comes: the arm goes on to the last target and rests there.
 
 use super::rules::JointRules;
-use crate::motion::Reach;
 use crate::safety::Trace;
 use crate::serve::faults::{Fault, Verdict};
 use crate::serve::wire::SetPoint;
 use shared_mem::msg::joints_from;
 use shared_mem::time::TICK;
-use twin::arm::Joints;
+use twin::arm::{Follower, Joints};
 
 /// Where the joints are to go.
 #[derive(Debug)]
 pub(in crate::serve) struct TargetGenerator {
-    reach: Reach,
+    reach: Follower,
     trace: Trace,
 }
 
 impl TargetGenerator {
     /// At rest at `q`, no joint faster than `fastest` [rad/s].
     pub(super) fn at_rest(q: &Joints, fastest: &[f64; 7], rules: &JointRules) -> Self {
-        let reach = Reach::at_rest(q, &joints_from(fastest), rules.limits, TICK);
+        let reach = Follower::at_rest(q, &joints_from(fastest), rules.limits, TICK);
         Self { reach, trace: Trace::at_rest(*q) }
     }
 
@@ -30,7 +29,7 @@ impl TargetGenerator {
 
     pub(super) fn follow(&mut self, set_point: Option<&SetPoint>) -> Verdict {
         let refused = Fault::PlanningJointLimits.alone();
-        if set_point.is_some_and(|set_point| !self.reach.aim(&joints_from(&set_point.q_c))) {
+        if set_point.is_some_and(|set_point| self.reach.aim(&joints_from(&set_point.q_c)).is_err()) {
             return Err(refused);
         }
         self.trace = self.trace.after(&self.reach.step().ok_or(refused)?, TICK);

@@ -10,6 +10,7 @@ use shared_mem::msg::gripper::{GripperAction, GripperCommand};
 use shared_mem::msg::image::{CameraInfo, ImageHeader, ImageHeaderWire};
 use shared_mem::msg::motion::{CHUNK_LENGTH, MotionChunk, MotionKind};
 use shared_mem::msg::object::ObjectPose;
+use shared_mem::msg::target::{ArmTarget, GripperTarget};
 use shared_mem::msg::twin::{TwinGap, TwinState};
 use shared_mem::time::now_ns;
 use shared_mem::topics::{self, ImageTopic, Topic, Visitor};
@@ -23,6 +24,8 @@ const PICTURE: [u32; 2] = [16, 12];
 const CHUNKS: u32 = 10;
 /// How far a motion goes at most [rad].
 const REACH: f64 = 0.06;
+/// A target within reach [rad].
+const TARGET: [f64; 8] = [0.1, -0.6, 0.0, -2.2, 0.0, 1.6, 0.7, 0.0];
 /// One chunk of a motion in so many is spoilt.
 const SPOILT: u32 = 100;
 
@@ -148,6 +151,8 @@ fn valid(topic: &str) -> Vec<u8> {
         "/arm/state" => bytes(&ArmState { stamp_ns, dof: 7, mode: ArmMode::Move, ..ArmState::default() }),
         "/arm/command" => bytes(&shared_mem::msg::arm::ArmCommand { stamp_ns, dof: 7, ..Default::default() }),
         "/arm/motion" => bytes(&MotionChunk { stamp_ns, dof: 7, ..MotionChunk::default() }),
+        "/arm/target" => bytes(&ArmTarget { stamp_ns, stream: 3, dof: 7, q: TARGET, ..ArmTarget::default() }),
+        "/gripper/target" => bytes(&GripperTarget { stamp_ns, stream: 3, width: 0.03, ..GripperTarget::default() }),
         "/object/pose" => bytes(&ObjectPose { stamp_ns, position: [0.55, 0.0, 0.05], ..ObjectPose::default() }),
         "/camera/color" | "/camera/depth" => {
             bytes(&ImageHeader { stamp_ns, width, height, stride: 3 * width, ..ImageHeader::default() })
