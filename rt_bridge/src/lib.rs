@@ -5,7 +5,7 @@
 //! | thread | runs | owns |
 //! |---|---|---|
 //! | control | [`rt`], [`motion`], [`safety`], an [`arm::Arm`] | the arm; neither memory nor locks nor files while it loops |
-//! | pump | [`pump`] | the ports for states, commands, motions and events |
+//! | pump | [`pump`], [`targets`] | the ports for states, commands, motions, targets and events |
 //! | world | [`sim`] | the simulated cell, with `--arm sim` |
 //! | camera | [`camera`] | the ports for pictures, with a simulated or replayed camera; a RealSense camera has one like the gripper's |
 //! | tracker | [`tracker`] | reads the pictures and joints, owns the port for the object's poses, with `--tracker rgbd` |
@@ -36,6 +36,7 @@ pub mod safety;
 pub mod serve;
 pub mod sim;
 pub mod starting;
+pub mod targets;
 pub mod times;
 pub mod tracker;
 pub mod wrench;

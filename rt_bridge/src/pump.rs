@@ -7,12 +7,14 @@ use crate::rt::cycle::Beat;
 use crate::rt::orders::OrderSender;
 use crate::rt::process;
 use crate::starting::{self, ThreadError};
+use crate::targets::Targets;
 use crate::times::Times;
 use rtrb::Consumer;
 use shared_mem::msg::arm::{ArmCommand, ArmState};
 use shared_mem::msg::event::{Event, EventLevel, EventSource};
 use shared_mem::msg::motion::MotionChunk;
 use shared_mem::msg::object::ObjectPose;
+use shared_mem::msg::target::ArmTarget;
 use shared_mem::time::now_ns;
 use shared_mem::topics;
 use shared_mem::transport::{Node, Publisher, Subscriber, TransportError};
@@ -33,6 +35,9 @@ const FINISH_PATIENCE: Duration = Duration::from_secs(5);
 /// Chunks that are taken in before states are published again: as many as wait at most.
 const LOOKS: usize = topics::ARM_MOTION.limits.buffer * topics::ARM_MOTION.limits.publishers;
 
+/// Targets that are handed on before states are published again.
+const TARGETS: usize = topics::ARM_TARGET.limits.buffer * topics::ARM_TARGET.limits.publishers;
+
 /// The pump's ends of the rings.
 #[derive(Debug)]
 pub struct Rings {
@@ -42,6 +47,8 @@ pub struct Rings {
     pub remarks: Consumer<Remark>,
     /// To the control thread.
     pub orders: OrderSender,
+    /// Turns targets into joints.
+    pub targets: Targets,
     /// From the simulated tracker, where there is one.
     pub poses: Option<Consumer<ObjectPose>>,
     /// From the main thread and the devices: texts for `/events`.
@@ -119,6 +126,7 @@ struct Ports {
     events: Publisher<Event>,
     object: Option<Publisher<ObjectPose>>,
     motion: Subscriber<MotionChunk>,
+    target: Subscriber<ArmTarget>,
 }
 
 impl Pump {
@@ -202,6 +210,7 @@ fn open(tracks: bool) -> Result<(Node, Ports), TransportError> {
         events: node.publisher(topics::EVENTS)?,
         object: tracks.then(|| node.publisher(topics::OBJECT_POSE)).transpose()?,
         motion: node.subscriber(topics::ARM_MOTION)?,
+        target: node.subscriber(topics::ARM_TARGET)?,
     };
     Ok((node, ports))
 }
@@ -214,10 +223,11 @@ fn run(
     count: &AtomicU64,
 ) -> Result<PumpReport, TransportError> {
     let mut report = PumpReport::default();
+    let mut state = ArmState::default();
     loop {
         count.fetch_add(1, Ordering::Relaxed);
         let last_round = stop.load(Ordering::Acquire);
-        publish(&mut rings, ports, &mut report)?;
+        publish(&mut rings, ports, &mut report, &mut state)?;
         if last_round {
             return Ok(report);
         }
@@ -228,6 +238,7 @@ fn run(
             let Some(chunk) = ports.motion.receive()? else { break };
             let _fitted = rings.orders.send(&chunk);
         }
+        aim(&mut rings, ports, &state)?;
         for ignored in node.newly_ignored() {
             say(ports, EventLevel::Warning, &ignored.to_string())?;
         }
@@ -238,8 +249,28 @@ fn run(
     }
 }
 
-fn publish(rings: &mut Rings, ports: &Ports, report: &mut PumpReport) -> Result<(), TransportError> {
+/// Hands targets on. Nobody knows where the arm is before its first state.
+fn aim(rings: &mut Rings, ports: &Ports, state: &ArmState) -> Result<(), TransportError> {
+    for _ in 0..TARGETS {
+        let Some(target) = ports.target.receive()? else { break };
+        match rings.targets.take(&target, state) {
+            Ok(Some(target)) if state.cycle > 0 => rings.orders.aim(&target),
+            Ok(_) => {}
+            Err(text) => say(ports, EventLevel::Warning, &text)?,
+        }
+    }
+    Ok(())
+}
+
+/// The last state published is left in `last`.
+fn publish(
+    rings: &mut Rings,
+    ports: &Ports,
+    report: &mut PumpReport,
+    last: &mut ArmState,
+) -> Result<(), TransportError> {
     while let Ok(beat) = rings.beats.pop() {
+        *last = beat.state;
         if let Some(command) = &beat.command {
             ports.command.send_quietly(command)?;
         }

@@ -7,6 +7,7 @@ mod counting;
 
 use bench::Bench;
 use counting::allocations;
+use rt_bridge::motion::Target;
 use rt_bridge::remark::{BrakeReason, Remark};
 use rt_bridge::rt::cycle::Turn;
 use rt_bridge::rt::deadline::Grid;
@@ -69,6 +70,27 @@ fn swing(from: &ArmState, millisecond: usize) -> SetPoint {
         point.dq_d[joint] = 0.1 * lift * slope;
     }
     point
+}
+
+#[test]
+fn following_targets_and_braking_when_they_end_allocates_nothing() {
+    let mut bridge = Bridge::new();
+    bridge.turn(5);
+    let mut allocated = 0;
+    for k in 0..30 {
+        let mut q = bridge.last.q_d;
+        q[k % 7] += if k % 2 == 0 { 0.4 } else { -0.3 };
+        // Each third of another sender, each fifth out of range.
+        q[3] = if k % 5 == 4 { f64::NAN } else { q[3] };
+        bridge.bench.orders.aim(&Target { stream: if k % 3 == 2 { 8 } else { 7 }, q, speed: 0.5 });
+        allocated += bridge.turn(20);
+    }
+    assert_eq!((bridge.last.motion, bridge.last.motion_id), (MotionStatus::Playing, 7));
+    assert_eq!(allocated, 0, "while following");
+    assert_eq!(bridge.turn(900), 0, "while braking, when no target came any more");
+    assert_ne!(bridge.last.motion, MotionStatus::Playing);
+    let stats = bridge.bench.cycle.finish();
+    assert!(stats.exec.count() > 1000);
 }
 
 #[test]

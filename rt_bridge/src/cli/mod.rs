@@ -9,6 +9,7 @@ mod grip;
 mod record;
 mod run;
 mod serve;
+mod target;
 
 use clap::{Parser, Subcommand};
 use shared_mem::command_line::{self, Build};
@@ -28,6 +29,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
         rt_bridge record --out clip.mcap --duration 10                 record what others do\n  \
         rt_bridge convert table.bag --out table.mcap                   a RealSense recording as a clip\n  \
         rt_bridge grip move 0.03                                       tell the gripper of a running bridge\n  \
+        rt_bridge target shift 0,0,0.05 --cell config/fr3_cell.toml    steer the arm of a running bridge\n  \
         rt_bridge serve --cell config/fr3_cell.toml                    play a Franka robot for any libfranka program\n\n\
         Processes meet when the environment variable TWINALIGN_DOMAIN agrees (default 0).")]
 struct Arguments {
@@ -42,6 +44,7 @@ enum Verb {
     Convert(convert::ConvertArguments),
     Serve(serve::ServeArguments),
     Grip(grip::GripArguments),
+    Target(target::TargetArguments),
     Doctor(doctor::DoctorArguments),
 }
 
@@ -68,6 +71,7 @@ pub fn main(build: &Build) -> ExitCode {
         Verb::Convert(convert) => convert.execute(),
         Verb::Serve(serve) => serve.execute(),
         Verb::Grip(grip) => grip.execute(),
+        Verb::Target(target) => target.execute(),
         Verb::Doctor(doctor) => doctor.execute(),
     };
     match done {

@@ -1,23 +1,28 @@
 //! Grippers: a Robotiq 2F on a serial line, the Franka Hand through its robot, or simulated fingers. All speak
-//! [`GripperState`] and [`GripperCommand`] on `/gripper` and `/gripper/command`, fifty times a second.
+//! [`GripperState`] and [`GripperCommand`] on `/gripper` and `/gripper/command`, fifty times a second; `/gripper/target` steers them.
 //!
 //! | file | owns |
 //! |---|---|
 //! | `robotiq` | Modbus RTU, the Robotiq's registers, the serial port |
 //! | `fingers` | how simulated fingers move; `rt_bridge serve` moves its hand with them, too |
 //! | `sim` | the simulated gripper |
+//! | `stream` | streams of targets |
 //! | [`crate::fr3`] | the Franka Hand |
 
 pub(crate) mod fingers;
 pub mod robotiq;
 mod sim;
+mod stream;
 
 use crate::device::{Device, DeviceFault, Lines, Service, ServiceError};
 use crate::fr3;
 use crate::pump::Notice;
 use fingers::Reach;
 use shared_mem::cell::{Cell, Gripper, GripperModel};
+use shared_mem::msg::event::EventLevel;
 use shared_mem::msg::gripper::{GripperCommand, GripperState};
+use shared_mem::msg::target::GripperTarget;
+use shared_mem::time::now_ns;
 use shared_mem::topics;
 use shared_mem::transport::{Node, Publisher, Subscriber, TransportError};
 use std::fmt;
@@ -107,12 +112,19 @@ impl GripperChoice {
         if matches!(self, Self::Replay | Self::Off) {
             return Ok(None);
         }
-        let (choice, cell) = (self.clone(), cell.clone());
+        let (choice, cell, said) = (self.clone(), cell.clone(), notices.clone());
         let open = move || {
             let opened = choice.open(&cell)?;
             Ok(opened.expect("somebody was chosen"))
         };
-        Service::start("rt_bridge_gripper", format!("the gripper {self}"), open, GripperLines::open, notices).map(Some)
+        Service::start(
+            "rt_bridge_gripper",
+            format!("the gripper {self}"),
+            open,
+            move |node| GripperLines::open(node, said),
+            notices,
+        )
+        .map(Some)
     }
 }
 
@@ -133,17 +145,40 @@ impl Device for AnyGripper {
 struct GripperLines {
     state: Publisher<GripperState>,
     command: Subscriber<GripperCommand>,
+    target: Subscriber<GripperTarget>,
+    stream: stream::Fingers,
+    notices: Sender<Notice>,
 }
 
 impl GripperLines {
-    fn open(node: &Node) -> Result<Self, TransportError> {
-        Ok(Self { state: node.publisher(topics::GRIPPER)?, command: node.subscriber(topics::GRIPPER_COMMAND)? })
+    fn open(node: &Node, notices: Sender<Notice>) -> Result<Self, TransportError> {
+        Ok(Self {
+            state: node.publisher(topics::GRIPPER)?,
+            command: node.subscriber(topics::GRIPPER_COMMAND)?,
+            target: node.subscriber(topics::GRIPPER_TARGET)?,
+            stream: stream::Fingers::default(),
+            notices,
+        })
     }
 }
 
 impl Lines<AnyGripper> for GripperLines {
     fn order(&mut self) -> Result<Option<GripperCommand>, TransportError> {
-        self.command.newest()
+        let mut order = None;
+        for _ in 0..topics::GRIPPER_TARGET.limits.buffer * topics::GRIPPER_TARGET.limits.publishers {
+            let Some(target) = self.target.receive()? else { break };
+            match self.stream.take(&target, now_ns()) {
+                Ok(wanted) => order = wanted.or(order),
+                Err(text) => {
+                    let _pump_gone = self.notices.send(Notice { level: EventLevel::Warning, text });
+                }
+            }
+        }
+        let command = self.command.newest()?;
+        if command.is_some() {
+            self.stream.forget();
+        }
+        Ok(command.or(order))
     }
 
     fn publish(&mut self, sample: &GripperState) -> Result<(), TransportError> {

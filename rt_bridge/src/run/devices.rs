@@ -112,6 +112,8 @@ impl fmt::Display for CameraChoice {
 
 pub(super) struct Devices {
     pub(super) arm: Box<dyn Arm>,
+    /// As cell.toml describes it.
+    pub(super) model: ArmModel,
     pub(super) plan: Plan,
     pub(super) workspace: Workspace,
     pub(super) world: Option<World>,
@@ -168,6 +170,7 @@ impl Devices {
                 }
                 Self {
                     arm: Box::new(arm),
+                    model,
                     plan,
                     workspace,
                     world: Some(world),
@@ -183,7 +186,7 @@ impl Devices {
             ArmChoice::Fci(host) => {
                 let arm = fr3::connect(host, settings.realtime, cell)?;
                 let pictures = Pictures::beside_the_arm(camera);
-                Self { arm, plan, workspace, world: None, pictures, poses: None, replay: None, wrenches: None }
+                Self { arm, model, plan, workspace, world: None, pictures, poses: None, replay: None, wrenches: None }
             }
             ArmChoice::Replay(clip) => {
                 let (arm, poses, clock) = ReplayArm::open(clip, cell, &model)?;
@@ -193,10 +196,11 @@ impl Devices {
                 };
                 let poses = (tracker == TrackerChoice::Replay).then_some(poses);
                 let replay = Some((clip.clone(), clock));
-                Self { arm: Box::new(arm), plan, workspace, world: None, pictures, poses, replay, wrenches: None }
+                let arm = Box::new(arm);
+                Self { arm, model, plan, workspace, world: None, pictures, poses, replay, wrenches: None }
             }
         };
-        let (has, described) = (devices.arm.dof(), model.dof());
+        let (has, described) = (devices.arm.dof(), devices.model.dof());
         if has != described {
             bail!("the arm has {has} joints, cell.toml describes {described}; correct [robot] in cell.toml");
         }

@@ -21,6 +21,7 @@ use crate::rt::orders::orders;
 use crate::rt::stats::LoopStats;
 use crate::safety::Guard;
 use crate::starting::ThreadError;
+use crate::targets::Targets;
 use crate::tracker::{self, TrackerChoice};
 use crate::wrench::{self, WrenchChoice};
 use anyhow::{Result, bail, ensure};
@@ -222,7 +223,9 @@ pub fn run(settings: &Settings, stop: &Arc<AtomicBool>) -> Result<RunReport> {
     let (to_words, remarks) = RingBuffer::new(REMARKS);
     let (to_control, orders) = orders(CHUNKS, HELD_CHUNKS);
     let (notices, told) = mpsc::channel();
-    let mut pump = Pump::start(Rings { beats, remarks, orders: to_control, poses: devices.poses, notices: told })?;
+    let targets = Targets::new(devices.model, devices.plan.limits);
+    let rings = Rings { beats, remarks, orders: to_control, targets, poses: devices.poses, notices: told };
+    let mut pump = Pump::start(rings)?;
     let recorder = match &settings.record {
         Some(file) => {
             let events = node.subscriber(topics::EVENTS)?;

@@ -1,0 +1,93 @@
+//! Streams of targets for the fingers: one sender at a time, told to the device where it changes.
+
+use shared_mem::msg::gripper::{GripperAction, GripperCommand};
+use shared_mem::msg::target::{GripperTarget, SILENCE_NS};
+
+/// A change of less is none [m].
+const STEP: f64 = 5e-4;
+
+/// Whose targets count, and what of them the gripper knows.
+#[derive(Debug, Default)]
+pub(super) struct Fingers {
+    stream: u64,
+    heard_ns: u64,
+    sent: Option<GripperTarget>,
+    refused: u64,
+}
+
+impl Fingers {
+    /// What a target has the gripper do; else what there is to say, once a stream. A sender that was silent for as long as
+    /// an arm's may be makes room for another; the fingers stay where they were sent.
+    pub(super) fn take(&mut self, target: &GripperTarget, now_ns: u64) -> Result<Option<GripperCommand>, String> {
+        if now_ns.abs_diff(target.stamp_ns) > SILENCE_NS {
+            return Ok(None);
+        }
+        let is_free = now_ns.saturating_sub(self.heard_ns) > SILENCE_NS;
+        if target.stream != self.stream && !is_free {
+            if std::mem::replace(&mut self.refused, target.stream) == target.stream {
+                return Ok(None);
+            }
+            let (other, owner) = (target.stream, self.stream);
+            return Err(format!(
+                "gripper targets of stream {other} refused: stream {owner} moves the fingers; end it first"
+            ));
+        }
+        if target.stream != self.stream {
+            (self.stream, self.sent, self.refused) = (target.stream, None, 0);
+        }
+        self.heard_ns = now_ns;
+        let known = self.sent.is_some_and(|sent| {
+            (sent.width - target.width).abs() < STEP && sent.force == target.force && sent.speed == target.speed
+        });
+        if known {
+            return Ok(None);
+        }
+        self.sent = Some(*target);
+        Ok(Some(GripperCommand {
+            stamp_ns: target.stamp_ns,
+            width: target.width,
+            speed: target.speed,
+            force: target.force,
+            action: if target.force > 0.0 { GripperAction::Grasp } else { GripperAction::Move },
+            reserved: 0,
+        }))
+    }
+
+    /// Another order came in between: what the fingers were sent to counts no more.
+    pub(super) fn forget(&mut self) {
+        self.sent = None;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const MS: u64 = 1_000_000;
+
+    fn target(stream: u64, width: f64, ms: u64) -> GripperTarget {
+        GripperTarget { stamp_ns: ms * MS, stream, width, ..GripperTarget::default() }
+    }
+
+    #[test]
+    fn a_repeated_target_is_one_order_and_a_second_sender_waits_for_silence() {
+        let mut fingers = Fingers::default();
+        let mut take = |stream, width, ms| fingers.take(&target(stream, width, ms), ms * MS);
+        let order = take(1, 0.04, 1000).expect("nothing to say").expect("an order");
+        assert_eq!((order.width, order.action), (0.04, GripperAction::Move));
+        assert_eq!(take(1, 0.0401, 1020), Ok(None), "the same");
+        assert!(take(2, 0.01, 1040).is_err_and(|line| line.contains("stream 1 moves the fingers")));
+        assert_eq!(take(2, 0.01, 1060), Ok(None), "said already");
+        assert_eq!(take(1, 0.02, 1080).expect("nothing to say").map(|order| order.width), Some(0.02));
+        assert_eq!(take(2, 0.01, 1300).expect("it is free").map(|order| order.width), Some(0.01));
+    }
+
+    #[test]
+    fn an_old_target_does_not_count_and_a_force_makes_a_grasp() {
+        let mut fingers = Fingers::default();
+        assert_eq!(fingers.take(&target(1, 0.04, 1000), 1300 * MS), Ok(None));
+        let grasp = GripperTarget { force: 20.0, ..target(1, 0.03, 1300) };
+        let order = fingers.take(&grasp, 1300 * MS).expect("nothing to say").expect("an order");
+        assert_eq!((order.action, order.force), (GripperAction::Grasp, 20.0));
+    }
+}
