@@ -51,7 +51,8 @@ impl Program {
     /// When it cannot be started.
     #[must_use]
     pub fn start(name: &str, domain: &str, arguments: &[&str]) -> Self {
-        let runs_on = arguments.first().is_some_and(|verb| ["run", "serve", "record", "shadow"].contains(verb));
+        let runs_on =
+            arguments.first().is_some_and(|verb| ["run", "serve", "record", "shadow", "teleop"].contains(verb));
         let own_id = std::process::id().to_string();
         let parent: &[&str] = if runs_on { &[parent::FLAG, &own_id] } else { &[] };
         let mut child = Command::new(program_path(name))

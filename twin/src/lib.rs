@@ -18,6 +18,8 @@ mod shipped;
 pub mod sim;
 pub mod sliding;
 pub mod task;
+#[cfg(feature = "teleop")]
+pub mod teleop;
 #[cfg(feature = "viewer")]
 pub mod viewer;
 pub mod world;

@@ -20,6 +20,7 @@ Examples:
   twin replay session --parameters theta.toml
   twin render session --out frames
   twin task tasks/push_milk.toml
+  twin teleop --task tasks/pick_carrot.toml --record carrot
   twin label-splats scan.ply --cell cell.toml --joints 0,-0.78,0,-2.36,0,1.57,0.78 --out fr3_splats
 Every verb has its own --help with examples. Logs and progress go to stderr (RUST_LOG=debug for more)."
 )]
@@ -34,13 +35,19 @@ enum Verb {
     Replay(cli::replay::Replay),
     Render(cli::render::Render),
     Task(cli::task::Task),
+    #[cfg(feature = "teleop")]
+    Teleop(cli::teleop::Teleop),
     LabelSplats(cli::label_splats::LabelSplats),
 }
 
 const BUILD: Build = Build {
     version: env!("CARGO_PKG_VERSION"),
     commit: git_version!(args = ["--always", "--abbrev=12", "--exclude=*", "--dirty=-modified"], fallback = ""),
-    features: &[("viewer", cfg!(feature = "viewer")), ("render", cfg!(feature = "render"))],
+    features: &[
+        ("viewer", cfg!(feature = "viewer")),
+        ("render", cfg!(feature = "render")),
+        ("teleop", cfg!(feature = "teleop")),
+    ],
 };
 
 fn main() -> ExitCode {
@@ -57,6 +64,8 @@ fn main() -> ExitCode {
         Verb::Replay(verb) => verb.run(),
         Verb::Render(verb) => verb.run(),
         Verb::Task(verb) => verb.run(),
+        #[cfg(feature = "teleop")]
+        Verb::Teleop(verb) => verb.run(),
         Verb::LabelSplats(verb) => verb.run(),
     };
     match outcome {

@@ -6,6 +6,8 @@ pub(crate) mod render;
 pub(crate) mod replay;
 pub(crate) mod shadow;
 pub(crate) mod task;
+#[cfg(feature = "teleop")]
+pub(crate) mod teleop;
 
 use anyhow::Context as _;
 use shared_mem::console;

@@ -117,7 +117,7 @@ impl Task {
 }
 
 /// What a clip's cell is where an arm carries something.
-const ARM_CELL: &str = "[robot]\nmodel = \"fr3\"\n";
+pub(crate) const ARM_CELL: &str = "[robot]\nmodel = \"fr3\"\n";
 
 /// A length that is not negative [m].
 fn noise(text: &str) -> Result<f64, String> {

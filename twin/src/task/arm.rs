@@ -3,7 +3,7 @@
 
 use super::file::ArmEntry;
 use super::surface::pose;
-use crate::arm::{ArmModel, Joints, Limits};
+use crate::arm::{ArmModel, Joints, Limits, Nearest};
 use nalgebra::{Isometry3, Translation3, Vector6};
 use shared_mem::msg::arm::{ArmMode, ArmState};
 
@@ -27,12 +27,53 @@ pub(super) struct Way {
     pub(super) fault: Option<String>,
 }
 
+impl Way {
+    /// At rest.
+    pub(super) fn at_rest(q: Joints) -> Self {
+        Self { q: Some(q), ..Self::default() }
+    }
+
+    /// Goes on to joints [rad] at their speeds [rad/s].
+    pub(super) fn go(&mut self, q: Joints, dq: Joints) {
+        (self.q, self.dq) = (Some(q), dq);
+    }
+
+    /// Where the joints are [rad]; `None` before it has reached anything.
+    pub(super) fn joints(&self) -> Option<&Joints> {
+        self.q.as_ref()
+    }
+}
+
 impl Carrier {
     pub(super) fn new(entry: &ArmEntry, body: usize) -> Self {
         let base = Translation3::from(entry.base).inverse();
         let (model, limits) = (ArmModel::fr3(), Limits::fr3());
         let flange_from_body = pose(entry.position, entry.rotation);
         Self { model, limits, body, flange_from_body, base_from_world: Isometry3::from_parts(base, nalgebra::one()) }
+    }
+
+    pub(super) fn limits(&self) -> &Limits {
+        &self.limits
+    }
+
+    /// The flange at these joints, in the arm's base.
+    pub(super) fn flange(&self, q: &Joints) -> Isometry3<f64> {
+        self.model.flange(q).isometry()
+    }
+
+    /// The carried body at these joints, in the world.
+    pub(super) fn body_at(&self, q: &Joints) -> Isometry3<f64> {
+        self.base_from_world.inverse() * self.flange(q) * self.flange_from_body
+    }
+
+    /// Joints that have the body at a pose in the world, near to the robot's ready pose.
+    pub(super) fn joints_at(&self, body: &Isometry3<f64>) -> Option<Joints> {
+        self.model.reach(self.model.ready(), &self.flange_from_body, &(self.base_from_world * body))
+    }
+
+    /// Joints near to others that bring the flange as near to a pose in the arm's base as they can.
+    pub(super) fn nearest(&self, from: &Joints, flange: &Isometry3<f64>) -> Nearest {
+        self.model.nearest(&self.limits, from, flange)
     }
 
     pub(super) fn joint_names(&self) -> &[String] {

@@ -1,6 +1,6 @@
 //! What counts as success.
 
-use crate::world::World;
+use crate::world::{BodyPlan, World};
 use nalgebra::Vector3;
 
 /// One of the conditions, all of which have to hold at once.
@@ -15,6 +15,18 @@ pub(super) enum Condition {
 }
 
 impl Condition {
+    /// In words.
+    pub(super) fn words(&self, bodies: &[BodyPlan]) -> String {
+        let name = |body: usize| &bodies[body].name;
+        match *self {
+            Self::Inside { body, of: Some(other), .. } => format!("{} in place at {}", name(body), name(other)),
+            Self::Inside { body, of: None, .. } => format!("{} in place", name(body)),
+            Self::Touching { bodies: [a, b], wanted: true } => format!("{} touches {}", name(a), name(b)),
+            Self::Touching { bodies: [a, b], wanted: false } => format!("{} apart from {}", name(a), name(b)),
+            Self::Joint { body, low, high } => format!("joint of {} between {low} and {high}", name(body)),
+        }
+    }
+
     pub(super) fn holds(&self, world: &World) -> bool {
         match *self {
             Self::Inside { body, of, low, high, tilt } => {

@@ -1,14 +1,72 @@
 //! A run as the rows of a clip: where everything was and what was commanded, at a fixed rate.
 
+use super::arm::Way;
 use super::episode::{Episode, Run};
 use super::start::StartError;
 use super::{BodyPlan, Task};
-use crate::world::{Hold, STEP};
+use crate::world::{Hold, STEP, World};
 use nalgebra::Isometry3;
 use shared_mem::recording::{Episode as Recorded, EpisodeInfo, EpisodeMoment, RigidPose};
 
 /// Rows of a recorded episode in a second.
 pub const ROWS_A_SECOND: u32 = 100;
+
+/// Which bodies the columns of a recording are about.
+#[derive(Debug)]
+pub(super) struct Columns {
+    moved: Vec<usize>,
+    joints: Vec<usize>,
+    driven: Vec<usize>,
+}
+
+impl Columns {
+    pub(super) fn of(task: &Task) -> Self {
+        let of = |wanted: fn(&BodyPlan) -> bool| -> Vec<usize> {
+            (0..task.bodies.len()).filter(|body| wanted(&task.bodies[*body])).collect()
+        };
+        Self {
+            moved: of(|body| matches!(body.hold, Hold::Moved(_))),
+            joints: of(|body| matches!(body.hold, Hold::Joint(_))),
+            driven: of(
+                |body| matches!(&body.hold, Hold::Joint(joint) if joint.drive.is_some() && joint.follows.is_none()),
+            ),
+        }
+    }
+
+    /// The row after so many steps; `commanded` says where a moved body is commanded to be.
+    pub(super) fn moment(
+        &self,
+        task: &Task,
+        world: &World,
+        done: usize,
+        way: &Way,
+        commanded: impl Fn(usize) -> Isometry3<f64>,
+    ) -> EpisodeMoment {
+        EpisodeMoment {
+            time_ns: (done as f64 * STEP * 1e9).round() as u64,
+            poses: (0..task.bodies.len()).map(|body| rigid_pose(&world.pose(body))).collect(),
+            targets: self.moved.iter().map(|body| rigid_pose(&commanded(*body))).collect(),
+            joints: self.joints.iter().filter_map(|body| world.joint(*body)).collect(),
+            drives: self.driven.iter().filter_map(|body| world.driven_to(*body)).collect(),
+            gripper: task.gripper.as_ref().and_then(|gripper| gripper.state(world, task.bodies.len())),
+            arm: task.carrier.as_ref().and_then(|carrier| carrier.state(way)).map(Box::new),
+        }
+    }
+
+    pub(super) fn recorded(&self, task: &Task, info: EpisodeInfo, moments: Vec<EpisodeMoment>) -> Recorded {
+        let names = |bodies: &[usize]| bodies.iter().map(|body| task.bodies[*body].name.clone()).collect();
+        let object = task.bodies.iter().find(|body| matches!(body.hold, Hold::Free(_)));
+        Recorded {
+            info,
+            bodies: task.bodies.iter().map(|body| body.name.clone()).collect(),
+            moved: names(&self.moved),
+            joints: names(&self.joints),
+            driven: names(&self.driven),
+            object: object.map(|body| body.name.clone()),
+            moments,
+        }
+    }
+}
 
 impl Task {
     /// Simulates an episode, and what is recorded of it.
@@ -16,27 +74,11 @@ impl Task {
     /// # Errors
     /// As [`Task::episode`].
     pub fn demonstration(&self, how: &Run) -> Result<(Episode, Recorded), StartError> {
-        let of = |wanted: fn(&BodyPlan) -> bool| -> Vec<usize> {
-            (0..self.bodies.len()).filter(|body| wanted(&self.bodies[*body])).collect()
-        };
-        let moved = of(|body| matches!(body.hold, Hold::Moved(_)));
-        let joints = of(|body| matches!(body.hold, Hold::Joint(_)));
-        let driven =
-            of(|body| matches!(&body.hold, Hold::Joint(joint) if joint.drive.is_some() && joint.follows.is_none()));
+        let columns = Columns::of(self);
         let mut moments = Vec::new();
         let episode = self.watched(how, |done, scene| {
-            let world = scene.world;
-            moments.push(EpisodeMoment {
-                time_ns: (done as f64 * STEP * 1e9).round() as u64,
-                poses: (0..self.bodies.len()).map(|body| rigid_pose(&world.pose(body))).collect(),
-                targets: moved.iter().map(|body| rigid_pose(&scene.commanded(*body, done))).collect(),
-                joints: joints.iter().filter_map(|body| world.joint(*body)).collect(),
-                drives: driven.iter().filter_map(|body| world.driven_to(*body)).collect(),
-                gripper: self.gripper.as_ref().and_then(|gripper| gripper.state(world, self.bodies.len())),
-                arm: self.carrier.as_ref().and_then(|carrier| carrier.state(scene.way)).map(Box::new),
-            });
+            moments.push(columns.moment(self, scene.world, done, scene.way, |body| scene.commanded(body, done)));
         })?;
-        let names = |bodies: &[usize]| bodies.iter().map(|body| self.bodies[*body].name.clone()).collect();
         let info = EpisodeInfo {
             task: self.name.clone(),
             seed: how.seed,
@@ -44,21 +86,12 @@ impl Task {
             success: episode.success,
             duration_s: episode.duration_s,
         };
-        let object = self.bodies.iter().find(|body| matches!(body.hold, Hold::Free(_)));
-        let recorded = Recorded {
-            info,
-            bodies: self.bodies.iter().map(|body| body.name.clone()).collect(),
-            moved: names(&moved),
-            joints: names(&joints),
-            driven: names(&driven),
-            object: object.map(|body| body.name.clone()),
-            moments,
-        };
+        let recorded = columns.recorded(self, info, moments);
         Ok((episode, recorded))
     }
 }
 
-fn rigid_pose(pose: &Isometry3<f64>) -> RigidPose {
+pub(super) fn rigid_pose(pose: &Isometry3<f64>) -> RigidPose {
     let q = pose.rotation.quaternion();
     RigidPose { position: pose.translation.vector.into(), wxyz: [q.w, q.i, q.j, q.k] }
 }

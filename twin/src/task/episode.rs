@@ -114,20 +114,14 @@ impl Task {
         let motions = self.motions.placed(&world, &yaws).off_by(how.noise, &mut generator);
         let starts: Vec<Place> = (0..self.bodies.len()).map(|body| Place::of(&world, body)).collect();
         let steps = (how.duration / STEP).round().max(1.0) as usize;
-        let mut run = Course { done: 0, moved: 0, failed: 0 };
+        let mut run = Course::new();
         let mut way = Way::default();
         self.carry(&mut way, (&motions, &poses), 0);
         watch(0, &Scene { world: &world, motions: &motions, starts: &poses, way: &way });
         while run.done < steps && !run.is_success(self.hold) {
             motions.act(&mut world, &poses, run.done);
             world.step();
-            run.done += 1;
-            if (0..self.bodies.len()).any(|body| world.speed(body) > STILL) {
-                run.moved = run.done;
-            }
-            if !self.conditions.iter().all(|condition| condition.holds(&world)) {
-                run.failed = run.done;
-            }
+            run.count(self, &world);
             if run.done.is_multiple_of(STEPS_A_ROW) {
                 self.carry(&mut way, (&motions, &poses), run.done);
                 watch(run.done, &Scene { world: &world, motions: &motions, starts: &poses, way: &way });
@@ -169,14 +163,30 @@ impl Task {
 }
 
 /// Steps done, and the last ones in which something moved and in which a condition did not hold.
-struct Course {
-    done: usize,
+#[derive(Debug)]
+pub(super) struct Course {
+    pub(super) done: usize,
     moved: usize,
     failed: usize,
 }
 
 impl Course {
-    fn is_success(&self, hold: f64) -> bool {
+    pub(super) fn new() -> Self {
+        Self { done: 0, moved: 0, failed: 0 }
+    }
+
+    /// A step was done.
+    pub(super) fn count(&mut self, task: &Task, world: &World) {
+        self.done += 1;
+        if (0..task.bodies.len()).any(|body| world.speed(body) > STILL) {
+            self.moved = self.done;
+        }
+        if !task.conditions.iter().all(|condition| condition.holds(world)) {
+            self.failed = self.done;
+        }
+    }
+
+    pub(super) fn is_success(&self, hold: f64) -> bool {
         self.done > 0 && (self.done - self.failed) as f64 * STEP >= hold
     }
 }

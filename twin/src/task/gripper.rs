@@ -46,6 +46,14 @@ impl Gripper {
         self.fingers[0]
     }
 
+    /// Position and force that open or close it.
+    pub(super) fn order(&self, bodies: &[BodyPlan], open: bool) -> Option<(f64, f64)> {
+        let joint = slides(&bodies[self.fingers[0]])?;
+        let [low, high] = joint.limits;
+        let wider = self.per_position > 0.0;
+        Some((if open == wider { high } else { low }, joint.drive?.force))
+    }
+
     /// What it does now.
     pub(super) fn state(&self, world: &World, bodies: usize) -> Option<GripperState> {
         let [finger, other] = self.fingers;

@@ -14,6 +14,7 @@
 //! | `episode` | one run: did it come to rest, where, and was it a success |
 //! | `gripper` | two fingers on geared joints as a gripper with an opening |
 //! | `demonstration` | a run as the rows of a clip |
+//! | `steered` | a run that a person steers |
 
 mod arm;
 mod camera;
@@ -25,14 +26,16 @@ mod gripper;
 mod motion;
 mod read;
 mod start;
+mod steered;
 mod surface;
 
 pub use camera::{TaskCamera, TaskPicture, TaskView};
 pub use demonstration::ROWS_A_SECOND;
 pub use episode::{BodyEnd, Episode, Place, Run};
 pub use start::StartError;
+pub use steered::{Jog, SteerError, Steered};
 
-use crate::world::{BodyPlan, World};
+use crate::world::{BodyPlan, Hold, World};
 use arm::Carrier;
 use condition::Condition;
 use gripper::Gripper;
@@ -95,6 +98,31 @@ impl Task {
     #[must_use]
     pub fn gripper_drive(&self) -> Option<usize> {
         self.gripper.as_ref().map(Gripper::drive)
+    }
+
+    /// What counts as success, in words.
+    #[must_use]
+    pub fn conditions(&self) -> Vec<String> {
+        self.conditions.iter().map(|condition| condition.words(&self.bodies)).collect()
+    }
+
+    /// Whether it has fingers to open and close.
+    #[must_use]
+    pub fn has_gripper(&self) -> bool {
+        self.gripper.is_some()
+    }
+
+    /// A body and all that hangs on it by joints.
+    fn carried(&self, body: usize) -> Vec<usize> {
+        let mut carried = vec![body];
+        for (i, plan) in self.bodies.iter().enumerate() {
+            if let Hold::Joint(joint) = &plan.hold
+                && joint.parent.is_some_and(|parent| carried.contains(&parent))
+            {
+                carried.push(i);
+            }
+        }
+        carried
     }
 
     /// The text of its file.

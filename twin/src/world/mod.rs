@@ -65,6 +65,7 @@ struct Shaped {
     friction: f64,
     pad_radius: f64,
     radius: f64,
+    is_fixed: bool,
     /// Of its fastest point [m/s], when contacts were last looked for.
     speed: f64,
 }
@@ -115,6 +116,7 @@ impl World {
                 friction: plan.friction,
                 pad_radius: plan.pad_radius,
                 radius: plan.pieces.iter().map(reach).fold(0.0, f64::max),
+                is_fixed: matches!(plan.hold, Hold::Fixed(_)),
                 speed: 0.0,
             });
         }
@@ -227,6 +229,25 @@ impl World {
             found.is_some_and(|touching| touching.places().iter().any(|place| place.gap < -OVERLAP))
         };
         self.pairs.iter().find(overlapping).map(|pair| pair.pieces.map(|piece| self.pieces[piece].body))
+    }
+
+    /// How deep these bodies are in any that is held fast, at most [m]; 0 where they are in none.
+    #[must_use]
+    pub fn enters_fixed(&self, bodies: &[usize]) -> f64 {
+        let of = |carried: bool| {
+            let wanted = move |piece: &usize| {
+                let body = self.pieces[*piece].body;
+                if carried { bodies.contains(&body) } else { self.bodies[body].is_fixed }
+            };
+            (0..self.pieces.len()).filter(wanted)
+        };
+        let mut deepest = 0.0_f64;
+        for (first, second) in of(true).flat_map(|first| of(false).map(move |second| (first, second))) {
+            if let Some(found) = self.touching([first, second], 0.0, &mut Search::NONE.clone()) {
+                deepest = found.places().iter().fold(deepest, |deepest, place| deepest.max(-place.gap));
+            }
+        }
+        deepest
     }
 
     fn locate(&mut self) {
