@@ -17,7 +17,7 @@ use twin::sim::SimCell;
 /// Flags that programs give each other, or that belong to programs of others.
 const OF_OTHERS: [&str; 5] = ["parent", "configuration", "shm-size", "features", "release"];
 /// A folder of the sources, and the verbs of which one must have the flags that its messages name.
-const SPOKEN_BY: [(&str, &[&str]); 9] = [
+const SPOKEN_BY: [(&str, &[&str]); 10] = [
     ("calibration/src/init/", &["calibration init"]),
     ("import/src/", &["calibration import"]),
     ("calibration/src/viewpoint/", &["calibration viewpoint"]),
@@ -26,6 +26,7 @@ const SPOKEN_BY: [(&str, &[&str]); 9] = [
     ("rt_bridge/src/run/", &["rt_bridge run"]),
     ("rt_bridge/src/serve/", &["rt_bridge serve"]),
     ("twin/src/viewer/", &["twin shadow"]),
+    ("twin/src/teleop/", &["twin teleop"]),
     ("twin/src/reconstruct/", &["twin label-splats"]),
 ];
 /// Folders whose files are named in texts by their path.

@@ -7,6 +7,7 @@ use shared_mem::recording::{ClipInfo, ClipWriter, write_png};
 use shared_mem::topics;
 use std::path::Path;
 use std::time::Duration;
+use tests::texts::root;
 use tests::{Cell, Program, lab_cell};
 
 /// What everybody is promised, and what a command may take that brakes an arm and closes its recording first.
@@ -105,6 +106,7 @@ fn commands() -> Vec<(&'static str, String, &'static str)> {
         ("twin", line("render {dir}/pictures --out {dir}/frames"), found),
         ("twin", format!("label-splats {{dir}}/scan.ply --cell {{cell}} --joints {JOINTS} --out {{dir}}/links"), found),
         ("twin", line("shadow --cell {cell}"), ""),
+        ("twin", format!("teleop --port 0 --task {}", root().join("tasks/push_milk.toml").display()), ""),
         ("rt_bridge", line("run --cell {cell} --arm sim --realtime ignore --record {dir}/live.mcap"), ""),
         ("rt_bridge", line("record --out {dir}/alone.mcap"), ""),
         ("rt_bridge", line("serve --cell {cell} --port 0 --no-hand"), ""),
