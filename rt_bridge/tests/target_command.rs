@@ -28,21 +28,10 @@ fn program(domain: &str, arguments: &[&str]) -> Command {
 }
 
 fn bridge(domain: &str) -> Child {
-    let arguments = [
-        "run",
-        "--cell",
-        CELL,
-        "--arm",
-        "sim",
-        "--camera",
-        "off",
-        "--gripper",
-        "sim",
-        "--realtime",
-        "ignore",
-        "--json",
-    ];
-    program(domain, &arguments).spawn().expect("the program starts")
+    let mut command = program(domain, &["run", "--cell", CELL, "--arm", "sim", "--camera", "off", "--gripper", "sim"]);
+    // It ends with this test, however that ends.
+    command.args(["--realtime", "ignore", "--json", "--parent", &std::process::id().to_string()]);
+    command.spawn().expect("the program starts")
 }
 
 fn target(domain: &str, arguments: &[&str]) -> Output {

@@ -231,7 +231,7 @@ impl ArmLine {
             self.targets.send(&ArmTarget { stamp_ns: now_ns(), ..*target })?;
             thread::sleep(PERIOD);
             while let Some(event) = self.events.receive()? {
-                let text = event.text().replace(&name, "it ").replace(name.trim_end(), "it");
+                let text = event.text().replace(&name, "this stream ").replace(name.trim_end(), "this stream");
                 ensure!(event.level == EventLevel::Info || event.text() == text, "the bridge says: {text}");
             }
             let Some(state) = newest(&self.states, PATIENCE)? else { bail!("the bridge fell silent; start it again") };
@@ -243,10 +243,20 @@ impl ArmLine {
             let rests = ours && state.motion_played > REST && state.dq_d.iter().all(|dq| dq.abs() < STILL);
             still = if rests { still + 1 } else { 0 };
             if still >= REST {
-                return Ok(state);
+                return self.leave(target.stream);
             }
         }
         bail!("the arm still moves after {} s; give it more --speed", LONGEST.as_secs())
+    }
+
+    /// Waits until the bridge has seen that the stream has ended, so that whoever comes next is not refused.
+    fn leave(&self, stream: u64) -> Result<ArmState> {
+        loop {
+            let Some(state) = newest(&self.states, PATIENCE)? else { bail!("the bridge fell silent; start it again") };
+            if state.motion_id != stream || state.motion != MotionStatus::Playing {
+                return Ok(state);
+            }
+        }
     }
 }
 
