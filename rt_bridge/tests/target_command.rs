@@ -119,7 +119,7 @@ fn a_sender_that_dies_has_the_arm_braked_and_a_second_one_is_refused() {
     let braked = wait_for(&states, |state| state.motion == MotionStatus::Braked);
     assert!(braked.dq_d[0] > 0.0 || braked.motion_id == 5);
     let rests = wait_for(&states, |state| state.motion == MotionStatus::Braked && state.dq_d[0] == 0.0);
-    println!("braked and at rest {:.3} s after the last target", begin.elapsed().as_secs_f64());
+    eprintln!("braked and at rest {:.3} s after the last target", begin.elapsed().as_secs_f64());
     let later = wait_for(&states, |state| state.cycle > rests.cycle + 200);
     assert_eq!(later.q_d, rests.q_d, "it holds");
     let output = end(bridge);

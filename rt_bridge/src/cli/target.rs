@@ -163,7 +163,7 @@ impl TargetArguments {
     }
 
     /// What is sent, and the flange's pose to be reached, where there is one.
-    fn target(&self, first: &ArmState) -> Result<(ArmTarget, Option<(ArmModel, Isometry3<f64>)>)> {
+    fn target(&self, first: &ArmState) -> Result<(ArmTarget, Option<Goal>)> {
         // An id that no other sender has: nanoseconds since this machine came up.
         let target = ArmTarget { stream: now_ns(), dof: first.dof, speed: self.speed, ..ArmTarget::default() };
         match &self.to {
@@ -193,6 +193,9 @@ impl TargetArguments {
     }
 }
 
+/// A pose of the flange to be reached, and the arm by which it is measured.
+type Goal = (ArmModel, Isometry3<f64>);
+
 /// The arm that a cell describes, which has to be the one that the bridge drives.
 fn model_of(cell: &Path, first: &ArmState) -> Result<ArmModel> {
     let model = ArmModel::from_cell(&Cell::read(cell)?)?;
@@ -205,7 +208,7 @@ fn model_of(cell: &Path, first: &ArmState) -> Result<ArmModel> {
 }
 
 /// A target at a pose of the flange, and what its end is measured by.
-fn at(target: &ArmTarget, pose: &Isometry3<f64>, model: ArmModel) -> (ArmTarget, Option<(ArmModel, Isometry3<f64>)>) {
+fn at(target: &ArmTarget, pose: &Isometry3<f64>, model: ArmModel) -> (ArmTarget, Option<Goal>) {
     let mut target = *target;
     let turn = pose.rotation.quaternion();
     target.kind = TargetKind::Pose;

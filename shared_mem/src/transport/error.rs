@@ -178,6 +178,7 @@ fn owner_of(topic: &str) -> &'static str {
     match topic {
         "/twin/state" | "/twin/gap" => "twin shadow",
         "/arm/motion" => "capture",
+        "/arm/target" | "/gripper/target" => "sender of targets",
         _ => "rt_bridge",
     }
 }

@@ -7,6 +7,8 @@ use rsruckig::prelude::*;
 
 /// Slower than this no joint is asked to go [rad/s]: a target that allows no more is too near to a stop.
 const SLOWEST: f64 = 0.01;
+/// Share of the limits of acceleration and jerk that a calm way takes.
+const CALM: f64 = 0.8;
 /// What a joint that is not there may do, so that the planner has numbers.
 const IDLE: f64 = 1.0;
 
@@ -39,6 +41,18 @@ impl Follower {
             limits,
             fastest: *fastest,
         }
+    }
+
+    /// The same with four fifths of the limits of acceleration and jerk: what is left lets whoever looks after the arm see a stop
+    /// from wherever it is. It goes no way before [`Follower::set_speed`].
+    #[must_use]
+    pub fn calm(q: &Joints, limits: &Limits, period_s: f64) -> Self {
+        let mut calmer = *limits;
+        for joint in &mut calmer.joints {
+            joint.acceleration = CALM * joint.acceleration.min(joint.deceleration);
+            joint.jerk *= CALM;
+        }
+        Self::at_rest(q, &[0.0; MAX_JOINTS], calmer, period_s)
     }
 
     /// Goes on from another motion: position, velocity and acceleration of every joint that counts, which are numbers.

@@ -51,7 +51,7 @@ impl ArmModel {
                 correction(limits, &q, &columns.map(|column| weighted(&Vector6::from(column))), &weighted(&error));
             let largest = step.amax();
             // What is no number is no correction.
-            if !(largest > STILL) {
+            if largest.is_nan() || largest <= STILL {
                 break;
             }
             let share = (LARGEST / largest).min(1.0);

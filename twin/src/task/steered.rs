@@ -6,7 +6,7 @@ use super::arm::{Carrier, Way};
 use super::demonstration::Columns;
 use super::episode::{Course, STEPS_A_ROW};
 use super::start::{Placed, StartError};
-use crate::arm::{Follower, Joints, MAX_JOINTS};
+use crate::arm::{Follower, Joints};
 use crate::world::{STEP, World};
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use shared_mem::recording::{Episode as Recorded, EpisodeInfo, EpisodeMoment, RigidPose};
@@ -22,8 +22,6 @@ const LEASH: f64 = 0.2;
 const MISSED: [f64; 2] = [1e-3, 5e-3];
 /// What is carried enters what is fast by no more than this [m].
 const ENTERS: f64 = 1e-3;
-/// Share of the limits of acceleration and jerk, as the bridge takes of a real arm's.
-const SHARE: f64 = 0.8;
 
 /// What a person asks for, until it is asked for something else. Shares of the fastest jog, -1 to 1.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -73,6 +71,8 @@ pub struct Steered {
     /// Why the arm does not go where it is jogged.
     held_by: Option<&'static str>,
     carried: Vec<usize>,
+    /// How deep that may be in what is fast: no deeper than where it started, and a little [m].
+    enters: f64,
     course: Course,
     columns: Columns,
     moments: Vec<EpisodeMoment>,
@@ -87,13 +87,10 @@ impl Steered {
         let carrier = task.carrier.as_ref().ok_or(SteerError::NoArm)?;
         let Placed { world, .. } = task.placed(seed)?;
         let q = carrier.joints_at(&world.pose(carrier.body)).ok_or(SteerError::OutOfReach)?;
-        let mut limits = *carrier.limits();
-        for joint in &mut limits.joints {
-            joint.acceleration = SHARE * joint.acceleration.min(joint.deceleration);
-            joint.jerk *= SHARE;
-        }
-        let mut follower = Follower::at_rest(&q, &[0.0; MAX_JOINTS], limits, STEP);
+        let mut follower = Follower::calm(&q, carrier.limits(), STEP);
         follower.set_speed(1.0);
+        let carried = task.carried(carrier.body);
+        let enters = world.enters_fixed(&carried) + ENTERS;
         let mut begun = Self {
             task: Arc::clone(task),
             seed,
@@ -105,7 +102,8 @@ impl Steered {
             flange: carrier.flange(&q),
             clear: q,
             held_by: None,
-            carried: task.carried(carrier.body),
+            carried,
+            enters,
             course: Course::new(),
             columns: Columns::of(task),
             moments: Vec::new(),
@@ -152,7 +150,7 @@ impl Steered {
     fn aim(&mut self, carrier: &Carrier) {
         self.held_by = None;
         let now = self.way.joints().copied().unwrap_or(self.target);
-        if self.world.enters_fixed(&self.carried) <= ENTERS {
+        if self.world.enters_fixed(&self.carried) <= self.enters {
             self.clear = now;
         } else {
             // Back to where it came from, whatever is asked for.
@@ -284,6 +282,7 @@ impl Steered {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::arm::MAX_JOINTS;
     use std::path::Path;
 
     fn task(name: &str) -> Arc<Task> {

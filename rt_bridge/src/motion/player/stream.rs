@@ -10,9 +10,6 @@ use shared_mem::msg::target::SILENCE_NS;
 use shared_mem::msg::{Joints, MAX_JOINTS};
 use twin::arm::Follower;
 
-/// Share of the limits of acceleration and jerk that a way to a target takes: what is left lets the guard see a stop from
-/// wherever it is.
-const SHARE: f64 = 0.8;
 /// Share of the highest speeds where a sender asks for none.
 const USUAL_SPEED: f64 = 0.25;
 
@@ -46,13 +43,8 @@ pub(super) struct Stream {
 impl Stream {
     /// Nobody's yet. Allocates.
     pub(super) fn new(limits: &Limits, period_s: f64) -> Self {
-        let mut calmer = *limits;
-        for joint in &mut calmer.joints {
-            joint.acceleration = SHARE * joint.acceleration.min(joint.deceleration);
-            joint.jerk *= SHARE;
-        }
         Self {
-            follower: Follower::at_rest(&[0.0; MAX_JOINTS], &[0.0; MAX_JOINTS], calmer, period_s),
+            follower: Follower::calm(&[0.0; MAX_JOINTS], limits, period_s),
             silent: 0,
             longest_silence: (SILENCE_NS as f64 * 1e-9 / period_s) as u32,
             refused: 0,
