@@ -10,6 +10,7 @@
 //! | [`demonstrations`] | recorded episodes of tasks as data to learn from |
 //! | [`demo`] | the whole story on the simulated cell, in one command |
 //! | [`diagnose`] | where the gap lies, what causes it, how far it shrinks |
+//! | [`engine`] | another program that simulates the arm |
 //! | [`estimate`] | fits over clips: what all clips share, what varies from clip to clip |
 //! | [`forward`] | what the twin makes of recorded clips, as residuals |
 //! | [`init`] | a cell.toml to begin with, commented |
@@ -51,6 +52,7 @@ pub mod check;
 pub mod demo;
 pub mod demonstrations;
 pub mod diagnose;
+pub mod engine;
 pub mod estimate;
 pub mod forward;
 pub mod identify;

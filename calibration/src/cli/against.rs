@@ -26,7 +26,7 @@ pub(super) fn run(arguments: &Arguments, interrupt: &Interrupt) -> anyhow::Resul
     let odd = [gate::look(&a, arguments.as_recorded)?, gate::look(&b, arguments.as_recorded)?];
     let theta = arguments.parameters.as_deref().map(Theta::read).transpose()?;
     let (seed, torques) = (arguments.seed, arguments.torques);
-    let options = Options { theta, seed, torques, budget: None, out: out.clone(), report: report.clone() };
+    let options = Options { theta, seed, torques, out: out.clone(), report: report.clone(), ..Options::default() };
     let (mut found, kept) = compare_kept([&a, &b], &options, interrupt)?;
     odd.iter().for_each(|odd| gate::add(&mut found.warnings, odd.as_ref()));
     if let Some(file) = theta_file {

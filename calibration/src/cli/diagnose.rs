@@ -1,5 +1,6 @@
 //! The verb `calibration diagnose`: arguments, files, and what is printed.
 
+use super::engine::{EngineArguments, heard};
 use calibration::check::gate;
 use calibration::diagnose::{Diagnosis, Options, diagnose_kept};
 use calibration::interrupt::Interrupt;
@@ -25,6 +26,10 @@ With --against B the question is another: what changed from this session, A, to 
 wiped table, a gain, wear). A's parameters and effects count for both, and the change is given with a 95 % interval and the
 share of B's gap under A's model that it closes; or that nothing changed, and how small a change would have been seen.
 
+With --engine another simulator is the twin: yours, with your model of the robot, over a small protocol (docs/engine.md;
+adapters/mujoco is one for MuJoCo). The verdict is about that one. Effects that it knows are asked of it; of others the twin's own
+difference is added. For clips of the arm alone.
+
 What to record next is printed as commands that can be typed, and of an effect that is named what to do about it in the
 cell and in a model.
 
@@ -40,6 +45,7 @@ Examples:
   calibration diagnose session --report report.html
   calibration diagnose session --out diagnosis.json --seed 7 --json
   calibration diagnose session --torques --report torques.html
+  calibration diagnose session --engine ./my_simulator
   calibration diagnose session --budget 120 --out diagnosis.json
   calibration diagnose monday --against tuesday --report changes.html")]
 pub(super) struct Arguments {
@@ -47,7 +53,7 @@ pub(super) struct Arguments {
     #[arg(value_name = "SESSION")]
     pub(super) session: PathBuf,
     /// Another session of the same robot: what changed from SESSION to this one, B. --theta then gets the parameters of B.
-    #[arg(long, value_name = "SESSION", conflicts_with = "budget")]
+    #[arg(long, value_name = "SESSION", conflicts_with_all = ["budget", "engine"])]
     pub against: Option<PathBuf>,
     /// What the laboratory knows about its cell [default: cell.toml beside the clips].
     #[arg(long, value_name = "CELL.TOML")]
@@ -75,8 +81,10 @@ pub(super) struct Arguments {
     budget: Option<u64>,
     /// Explains the measured torques along the measured motion instead of how commands are followed: for logs without
     /// commands, and where the control law is not known. Needs a model with masses.
-    #[arg(long)]
+    #[arg(long, conflicts_with = "engine")]
     pub(super) torques: bool,
+    #[command(flatten)]
+    pub(super) engine: EngineArguments,
     /// Draws which clips are for what, and the intervals.
     #[arg(long, value_name = "N", default_value_t = 0, value_parser = calibration::seed::parse)]
     pub(super) seed: u64,
@@ -100,8 +108,11 @@ pub(super) fn run(arguments: &Arguments, interrupt: &Interrupt) -> anyhow::Resul
     let theta = arguments.parameters.as_deref().map(Theta::read).transpose()?;
     let budget = arguments.budget.map(Duration::from_secs);
     let (seed, torques) = (arguments.seed, arguments.torques);
-    let options = Options { theta, seed, torques, budget, out: out.clone(), report: report.clone() };
-    let (mut found, kept) = diagnose_kept(&session, &options, interrupt)?;
+    let engine = arguments.engine.start(&session, interrupt)?;
+    let options =
+        Options { theta, seed, torques, engine: engine.clone(), budget, out: out.clone(), report: report.clone() };
+    let found = diagnose_kept(&session, &options, interrupt).map_err(anyhow::Error::from);
+    let (mut found, kept) = heard(engine.as_ref(), found)?;
     gate::add(&mut found.warnings, odd.as_ref());
     match theta_file {
         Some(file) if found.identifies() => {

@@ -1,5 +1,6 @@
 //! `calibration identify`.
 
+use super::engine::{EngineArguments, heard};
 use super::print;
 use calibration::check::gate;
 use calibration::identify::{Identification, Optimizer, arm, object};
@@ -58,11 +59,15 @@ struct Task {
 The recorded commands are simulated until the twin's joints move as the robot's did. A quarter of the motions is held
 out: the error on them is what the twin is worth. What is not identifiable from the clips is said, with the reason.
 
+With --engine another simulator moves the arm, over the protocol of docs/engine.md; effects of --also that it does not
+know are added from the twin.
+
 Ctrl-C keeps what was found so far, beside --out or in the session's folder; the same command goes on from there, and ends
 where it would have ended. What no clip tells is not written.
 
 Examples:
   calibration identify arm monday --out theta.toml --report page.html
+  calibration identify arm monday --engine ./my_simulator --out theta.toml
   calibration identify arm monday --also command_delay,joint_coulomb_friction --out theta.toml
   calibration identify arm monday --optimizer pso --json")]
 pub(super) struct ArmArguments {
@@ -71,6 +76,8 @@ pub(super) struct ArmArguments {
     /// Effects to search besides, by the names of docs/effects.md: command_delay,rotor_inertia,payload,...
     #[arg(long, value_name = "NAME,...", value_delimiter = ',')]
     also: Vec<String>,
+    #[command(flatten)]
+    engine: EngineArguments,
     /// Points that pso and cma may try.
     #[arg(long, value_name = "N", default_value_t = 4000, value_parser = clap::value_parser!(u32).range(1..))]
     budget: u32,
@@ -119,33 +126,32 @@ impl Way {
 
 pub(super) fn run(identify: Identify, interrupt: &Interrupt) -> anyhow::Result<()> {
     match identify {
-        Identify::Arm(ArmArguments { task, also, budget }) => task.run(|task| {
+        Identify::Arm(ArmArguments { task, also, engine, budget }) => task.run(|task, opened| {
+            let engine = engine.start(opened, interrupt)?;
             let Task { session, cell, optimizer, out, parameters, seed, .. } = task;
-            let (optimizer, budget) = (optimizer.optimizer(), budget as usize);
-            let options = arm::Options { session, cell, optimizer, out, parameters, also, budget, seed };
-            arm::identify(&options, interrupt)
+            let (optimizer, budget, asked) = (optimizer.optimizer(), budget as usize, engine.clone());
+            let options = arm::Options { session, cell, optimizer, out, parameters, also, budget, seed, engine };
+            heard(asked.as_ref(), arm::identify(&options, interrupt).map_err(anyhow::Error::from))
         }),
-        Identify::Object(ObjectArguments { task, budget }) => task.run(|task| {
+        Identify::Object(ObjectArguments { task, budget }) => task.run(|task, _| {
             let Task { session, cell, optimizer, out, parameters, seed, .. } = task;
             let (optimizer, budget) = (optimizer.optimizer(), budget as usize);
             let options = object::Options { session, cell, optimizer, out, parameters, budget, seed };
-            object::identify(&options, interrupt)
+            Ok(object::identify(&options, interrupt)?)
         }),
     }
 }
 
 impl Task {
     /// Looks at where the outputs go and at the recording, has the rest done, and says and writes what was found.
-    fn run<E>(self, identify: impl FnOnce(Self) -> Result<Identification, E>) -> anyhow::Result<()>
-    where
-        E: std::error::Error + Send + Sync + 'static,
-    {
+    fn run(self, identify: impl FnOnce(Self, &Session) -> anyhow::Result<Identification>) -> anyhow::Result<()> {
         Destination::apart(&[self.out.as_deref(), self.report.as_deref()])?;
         Destination::of(self.out.as_deref(), self.force)?;
         let page = Destination::of(self.report.as_deref(), self.force)?;
-        let odd = gate::look(&Session::open_with(&self.session, self.cell.as_deref())?, self.as_recorded)?;
+        let session = Session::open_with(&self.session, self.cell.as_deref())?;
+        let odd = gate::look(&session, self.as_recorded)?;
         let json = self.json;
-        let mut found = identify(self)?;
+        let mut found = identify(self, &session)?;
         gate::add(&mut found.warnings, odd.as_ref());
         let sheet = found.sheet();
         if let Some(page) = page {

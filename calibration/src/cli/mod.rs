@@ -7,6 +7,7 @@ mod check;
 mod compare;
 mod demo;
 mod diagnose;
+mod engine;
 mod export;
 mod export_episodes;
 mod export_model;

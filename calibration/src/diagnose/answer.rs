@@ -1,5 +1,6 @@
 //! The answer of a diagnosis, as it is written to diagnosis.json and shown on the page.
 
+use crate::engine::Used;
 use crate::page::{Size, Trace};
 use shared_mem::recording::SessionFiles;
 use shared_mem::theta::Theta;
@@ -32,6 +33,9 @@ pub struct Diagnosis {
     pub warnings: Vec<String>,
     /// Whether the time that was given was spent before everything was tried: then this is the best answer so far.
     pub budget_spent: bool,
+    /// The program that simulated the arm; none where the twin did.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub engine: Option<Used>,
     /// Wall-clock time [s].
     pub seconds: f64,
     /// The session's folder.

@@ -38,6 +38,7 @@ pub use answer::{
     Status, TorqueRms, Verdict,
 };
 
+use crate::engine::{Engine, Quantity, Used};
 use crate::forward::object::ObjectClips;
 use crate::forward::setting::{self, BaseError};
 use crate::interrupt::Interrupt;
@@ -70,6 +71,8 @@ pub struct Options {
     pub seed: u64,
     /// Whether torques along the measured motion are explained, and not how commands are followed.
     pub torques: bool,
+    /// Another program that simulates the arm in place of the twin.
+    pub engine: Option<Arc<Engine>>,
     /// After so long the best answer so far counts.
     pub budget: Option<Duration>,
     /// Where the answer will go: what was found so far is kept beside it; else in the session's folder.
@@ -98,6 +101,12 @@ pub enum DiagnoseError {
         "the twin cannot follow the clips with the parameters of cell.toml; try `twin replay` and follow its advice"
     )]
     NoBaseline,
+    /// The engine simulates arms alone.
+    #[error(
+        "--engine simulates the arm alone, and these clips have an object; record the arm alone (`calibration capture \
+         excitation`), or find the gains with `calibration identify arm`, which looks at strokes up to the touch"
+    )]
+    EngineWithObject,
     /// Ctrl-C. What was found is kept, and the words say where.
     #[error("{0}")]
     Interrupted(String),
@@ -142,8 +151,10 @@ pub fn diagnose_kept(
         }
         admitted => admitted?,
     };
+    let admitted = compared(admitted, options.engine.as_deref())?;
     let question = Fingerprint::of("diagnose")
         .with(&(session.cell.to_toml(), options.theta.as_ref().map(Theta::to_toml), options.seed, options.torques))
+        .with(&options.engine.as_ref().map(|engine| engine.ability().print()))
         .with_clips(&admitted.clips);
     let kept = kept::for_work((options.out.as_deref(), &session.folder, "diagnose"), &question, interrupt);
     let found = diagnosed(session, &admitted, options, (interrupt, (&kept, "")));
@@ -169,6 +180,24 @@ pub fn diagnose_clips(
     if interrupt.cancelled() { Err(DiagnoseError::Interrupted("interrupted; start again".into())) } else { found }
 }
 
+/// Clips with what an engine reports, too.
+fn compared(mut admitted: Admitted, engine: Option<&Engine>) -> Result<Admitted, DiagnoseError> {
+    let Some(engine) = engine else { return Ok(admitted) };
+    if admitted.with_object {
+        return Err(DiagnoseError::EngineWithObject);
+    }
+    let ability = engine.ability();
+    for clip in &mut admitted.clips {
+        let logged = [
+            (Quantity::Velocity, &mut clip.measured.dq),
+            (Quantity::Torque, &mut clip.measured.tau),
+            (Quantity::DesiredTorque, &mut clip.desired.tau),
+        ];
+        logged.into_iter().filter(|(quantity, _)| !ability.reports(*quantity)).for_each(|(_, rows)| rows.clear());
+    }
+    Ok(admitted)
+}
+
 fn diagnosed(
     session: &Session,
     admitted: &Admitted,
@@ -187,11 +216,15 @@ fn diagnosed(
         examine(&evidence, &library, session, admitted, options, work)?
     } else {
         let evidence = ArmClips::new(&session.cell, &admitted.clips, theta).map_err(Refused::from)?;
+        let nominal = setting::complete(&session.cell, None)?;
+        let evidence = evidence.moved_by(options.engine.clone(), &nominal);
         examine(&evidence, &library, session, admitted, options, work)?
     };
     if clips::torques::is_tracking(&session.cell) {
         diagnosis.theta = clips::torques::without_law(diagnosis.theta, options.theta.as_ref());
     }
+    diagnosis.engine = options.engine.as_ref().map(|engine| engine.used());
+    diagnosis.warnings.extend(diagnosis.engine.iter().flat_map(Used::sentences));
     diagnosis.seconds = began.elapsed().as_secs_f64();
     Ok(diagnosis)
 }

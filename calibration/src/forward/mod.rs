@@ -3,10 +3,12 @@
 //! | module | owns |
 //! |---|---|
 //! | [`setting`] | from a vector of numbers to the parameters of a cell |
+//! | [`motion`] | who moves the arm: the twin, or another program |
 //! | [`arm`] | what an arm's sensors log |
 //! | [`object`] | clips with an object: poses |
 
 pub mod arm;
+pub mod motion;
 pub mod object;
 pub mod setting;
 

@@ -1,5 +1,6 @@
 //! What an identification found: one structure for the JSON answer, the page and the terminal. SI units.
 
+use crate::engine::Used;
 use super::sheet::{Clip as SheetClip, Error as SheetError, Parameter as SheetParameter, Sheet};
 use crate::page::{Trace, number_in_words};
 use serde::ser::SerializeStruct as _;
@@ -32,6 +33,9 @@ pub struct Identification {
     pub optimizer: String,
     /// Clips simulated.
     pub evaluations: usize,
+    /// The program that simulated the arm; none where the twin did.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub engine: Option<Used>,
     /// Wall time [s].
     pub seconds: f64,
     /// Stretches of clips that count as independent witnesses of the intervals.

@@ -7,16 +7,18 @@ use super::measured::{Channel, Evidence, Group, Row, StageName};
 use super::recent::Recent;
 use super::scatter::Scatter;
 use crate::diagnose::clips::torques::is_tracking;
+use crate::engine::{Engine, Quantity};
 use crate::estimate::{ClipModel, Impossible};
 use crate::forward::arm::noise;
+use crate::forward::motion::{Mover, Stretch};
 use crate::forward::object;
 use shared_mem::cell::{Cell, ClipKind, TorqueSensing};
 use shared_mem::recording::{Clip, JointSeries};
 use shared_mem::theta::Theta;
 use shared_mem::time::{TICK, TICK_NS};
+use std::sync::Arc;
 use twin::arm::{ArmModel, Joints, MAX_JOINTS, ModelError};
-use twin::control::{ArmRollout, CommandTrack, Plant, Reading};
-use twin::effects::Effects;
+use twin::control::{CommandTrack, Reading};
 
 /// At most so many moments of a clip count; more would cost time and, in smooth motion, tell little.
 const MOMENTS: usize = 250;
@@ -40,6 +42,7 @@ const SETTLED_NS: u64 = 50_000_000;
 pub struct ArmClips<F> {
     cell: Cell,
     nominal: ArmModel,
+    mover: Mover,
     channels: Vec<Channel>,
     /// One sigma of each channel's sensor.
     sigma: Vec<f64>,
@@ -86,7 +89,22 @@ impl<F: Fn(&[f64]) -> Theta + Sync> ArmClips<F> {
         let sigma = (0..channels.len()).map(|channel| sensor_sigma(clips, &channels[channel], channel % dof)).collect();
         let top = top_speeds(clips, dof);
         let clips = clips.iter().filter_map(|clip| Prepared::new(clip.clone(), cell, &channels, &top)).collect();
-        Ok(Self { cell: cell.clone(), nominal, channels, sigma, clips, theta })
+        let mover = Mover::own(cell, &nominal);
+        Ok(Self { cell: cell.clone(), nominal, mover, channels, sigma, clips, theta })
+    }
+
+    /// The same moved by another program, where there is one; `known`: the cell's nominal parameters.
+    #[must_use]
+    pub fn moved_by(mut self, engine: Option<Arc<Engine>>, known: &Theta) -> Self {
+        let quantity = |channel: &Channel| match channel.quantity {
+            "dq" => Quantity::Velocity,
+            "tau_J" => Quantity::Torque,
+            "tau_J_d" => Quantity::DesiredTorque,
+            _ => Quantity::Position,
+        };
+        let wanted = self.channels.iter().map(quantity).collect();
+        self.mover = self.mover.by(engine, known.clone(), wanted);
+        self
     }
 
     /// One sigma of each channel's sensor, in its unit.
@@ -243,17 +261,11 @@ impl<F: Fn(&[f64]) -> Theta + Sync> ArmClips<F> {
 
     /// At every moment that counts, and a control period later.
     fn readings_in(&self, parts: u32, clip: usize, shared: &[f64]) -> Result<Vec<Reading>, Impossible> {
-        let fail = |error: &dyn std::fmt::Display| Impossible(error.to_string());
         let clip = &self.clips[clip];
-        let theta = (self.theta)(shared);
-        let effects = Effects::from_theta(&theta.effects, self.nominal.dof()).map_err(|e| fail(&e))?;
-        let plant = Plant::new(&self.cell, self.nominal.clone(), Some(&theta), &effects.arm).map_err(|e| fail(&e))?;
-        let rollout = ArmRollout { parts, ..plant.rollout() };
-        let start = rollout.start_state(&clip.recorded.measured, 0, &clip.commands);
-        let start = start.ok_or_else(|| Impossible("no measured joints".into()))?;
-        let first = clip.recorded.measured.stamps_ns[0];
+        let measured = &clip.recorded.measured;
+        let stretch = Stretch { measured, from: 0, commands: &clip.commands, ahead: &[], parts };
         let mut readings = vec![Reading::default(); clip.stamps_ns.len()];
-        rollout.readings(&start, first, &clip.commands, &clip.stamps_ns, &mut readings);
+        self.mover.readings(&(self.theta)(shared), &stretch, &clip.stamps_ns, &mut readings)?;
         Ok(readings)
     }
 

@@ -24,18 +24,18 @@ pub mod velocity;
 pub use clip::ArmClipError;
 pub use piece::one_piece;
 
+use super::motion::{Mover, Stretch};
+use crate::engine::{Engine, Quantity};
 use crate::estimate::{ClipModel, Impossible, Random};
 use clip::ArmClip;
 use shared_mem::cell::Cell;
-use shared_mem::ending;
 use shared_mem::msg::{Joints, MAX_JOINTS};
 use shared_mem::recording::Clip;
 use shared_mem::theta::Theta;
 use std::ops::Range;
-use std::sync::Mutex;
-use twin::arm::{ArmModel, JointState, ModelError};
-use twin::control::{ArmRollout, Plant, Reading};
-use twin::effects::Effects;
+use std::sync::{Arc, Mutex};
+use twin::arm::{ArmModel, ModelError};
+use twin::control::Reading;
 
 /// What a robot logs about a joint.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -48,6 +48,17 @@ pub enum Channel {
     Torque,
     /// Torque asked for without gravity, tau_J_d [N m].
     DesiredTorque,
+}
+
+impl Channel {
+    fn quantity(self) -> Quantity {
+        match self {
+            Self::Position => Quantity::Position,
+            Self::Velocity => Quantity::Velocity,
+            Self::Torque => Quantity::Torque,
+            Self::DesiredTorque => Quantity::DesiredTorque,
+        }
+    }
 }
 
 /// All channels.
@@ -80,6 +91,7 @@ pub struct Row {
 pub struct ArmClips<F> {
     cell: Cell,
     nominal: ArmModel,
+    mover: Mover,
     channels: Vec<Channel>,
     clips: Vec<ArmClip>,
     /// One sigma of a single logged value, by [`CHANNELS`].
@@ -127,8 +139,16 @@ impl<F: Fn(&[f64]) -> Theta + Sync> ArmClips<F> {
         channels.dedup();
         let sigma = sigmas(&usable, nominal.dof());
         let (torque_lead, spare) = (torque_time::lead(&usable), Mutex::default());
-        let cell = cell.clone();
-        Ok((Self { cell, nominal, channels, clips: usable, sigma, torque_lead, theta, spare }, left_out))
+        let (cell, mover) = (cell.clone(), Mover::own(cell, &nominal));
+        Ok((Self { cell, nominal, mover, channels, clips: usable, sigma, torque_lead, theta, spare }, left_out))
+    }
+
+    /// The same moved by another program, where there is one; `known`: the cell's nominal parameters.
+    #[must_use]
+    pub fn moved_by(mut self, engine: Option<Arc<Engine>>, known: &Theta) -> Self {
+        let wanted = self.channels.iter().map(|channel| channel.quantity()).collect();
+        self.mover = self.mover.by(engine, known.clone(), wanted);
+        self
     }
 
     /// Lets dead joints follow their commands unseen in the clips in which the others feel them move: then it is a reading
@@ -280,42 +300,20 @@ impl<F: Fn(&[f64]) -> Theta + Sync> ArmClips<F> {
         (own, parts): (&[f64], u32),
         out: &mut Vec<Reading>,
     ) -> Result<(), Impossible> {
-        let fail = |error: &dyn std::fmt::Display| Impossible(error.to_string());
-        let effects = Effects::from_theta(&theta.effects, self.nominal.dof()).map_err(|e| fail(&e))?;
-        let age = encoder_age::of(own.get(2 * self.nominal.dof()));
+        let dof = self.nominal.dof();
+        let age = encoder_age::of(own.get(2 * dof));
         let seen = encoder_age::controlled(&self.cell, &clip.recorded.desired, theta, age);
         let (theta, commands) = seen.as_ref().map_or((theta, &clip.commands), |(theta, commands)| (theta, commands));
-        let plant = Plant::new(&self.cell, self.nominal.clone(), Some(theta), &effects.arm).map_err(|e| fail(&e))?;
-        let rollout = ArmRollout { parts, ..plant.rollout() };
         let measured = &clip.recorded.measured;
         out.clear();
         out.resize(measured.len(), Reading::default());
         for (i, run) in clip.runs.iter().enumerate() {
-            let start = rollout.start_state(measured, run.start, commands);
-            let mut start = start.ok_or_else(|| Impossible("no measured joints".into()))?;
-            if i == 0 {
-                shift(&mut start, own, self.nominal.dof());
-            }
-            let stamps_ns = &measured.stamps_ns[run.clone()];
-            rollout.readings(&start, stamps_ns[0], commands, stamps_ns, &mut out[run.clone()]);
-            if ending::asked() {
-                return Err(Impossible("interrupted".into()));
-            }
-            if out[run.end - 1].state.q.iter().any(|q| !q.is_finite()) {
-                return Err(Impossible(
-                    "the simulated arm diverges; the damping may be too large for a 1 kHz controller".into(),
-                ));
-            }
+            let ahead = if i == 0 { &own[..own.len().min(2 * dof)] } else { &[] };
+            let stretch = Stretch { measured, from: run.start, commands, ahead, parts };
+            self.mover.readings(theta, &stretch, &measured.stamps_ns[run.clone()], &mut out[run.clone()])?;
         }
         encoder_age::shift(age, out);
         Ok(())
-    }
-}
-
-fn shift(start: &mut JointState, own: &[f64], dof: usize) {
-    for joint in 0..dof {
-        start.q[joint] += own.get(joint).unwrap_or(&0.0);
-        start.dq[joint] += own.get(dof + joint).unwrap_or(&0.0);
     }
 }
 

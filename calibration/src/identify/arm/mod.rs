@@ -24,6 +24,7 @@ mod verdict;
 
 use super::answer::Identification;
 use super::run::{Optimizer, Outcome, Run, RunError, concluded};
+use crate::engine::{Engine, Used};
 use crate::estimate::{ClipModel as _, Random, Subset, Unknown};
 use crate::forward::arm::ArmClips;
 use crate::forward::setting::{BaseError, complete, effect_settings, gains};
@@ -38,6 +39,7 @@ use shared_mem::recording::{Clip, ReadError, SessionFiles};
 use shared_mem::theta::Theta;
 use shared_mem::toml_file::TomlFileError;
 use std::path::PathBuf;
+use std::sync::Arc;
 use std::time::Instant;
 use twin::arm::{ArmModel, ModelError};
 use twin::effects::{EffectInfo, Robot, Stage, find, registry};
@@ -61,6 +63,8 @@ pub struct Options {
     pub budget: usize,
     /// Draws the clips that are held out, and the searches.
     pub seed: u64,
+    /// Another program that simulates the arm in place of the twin.
+    pub engine: Option<Arc<Engine>>,
 }
 
 /// The arm cannot be identified.
@@ -140,6 +144,7 @@ fn identify_material(material: Material, options: &Options, interrupt: &Interrup
     let question = Fingerprint::of("identify arm")
         .with(&(options.optimizer.name(), options.budget, options.seed, &options.also))
         .with(&(material.cell.to_toml(), given.as_ref().map(Theta::to_toml)))
+        .with(&options.engine.as_ref().map(|engine| engine.ability().print()))
         .with_clips(&material.clips);
     let kept = kept::for_work((options.out.as_deref(), &options.session, "identify_arm"), &question, interrupt);
     let found = identify_kept(material, given.as_ref(), options, (&kept, interrupt));
@@ -157,7 +162,8 @@ fn identify_kept(
     let (settings, mut unknowns): (Vec<_>, Vec<_>) = searched(&cell, &base, &options.also)?.into_iter().unzip();
     let settings = Settings::new(base, settings);
     let numbers: Numbers<'_> = Box::new(|shared| settings.theta(shared));
-    let (mut model, unusable) = ArmClips::new(&cell, clips, session::CHANNELS, numbers)?;
+    let (model, unusable) = ArmClips::new(&cell, clips, session::CHANNELS, numbers)?;
+    let mut model = model.moved_by(options.engine.clone(), &complete(&cell, None)?);
     let clips = session::used(&options.session, &model, left_out, unusable, options.seed)?;
     let free = unknowns.clone();
     session::hold_dead(&model, &clips, settings.settings(), &mut unknowns);
@@ -192,6 +198,8 @@ fn identify_kept(
     answer.warnings.extend(doubt::doubts(&answer, &finding, &model, &clips, &before));
     answer.advice = advice::next(&finding, &clips);
     clips.fill(&mut answer);
+    answer.engine = options.engine.as_ref().map(|engine| engine.used());
+    answer.warnings.extend(answer.engine.iter().flat_map(Used::sentences));
     // Of an object nothing was found.
     let object = given.and_then(|given| given.object.clone());
     let theta = Theta { object, ..settings.theta(&outcome.fit.shared) };

@@ -252,6 +252,7 @@ pub(super) mod tests {
             clips: Clips { train: vec!["clip_00.mcap".into(), "clip_01.mcap".into()], ..Clips::default() },
             warnings: Vec::new(),
             budget_spent: false,
+            engine: None,
             seconds: 83.2,
             session: "my monday".into(),
             files: SessionFiles { session: "my monday".into(), cell: Some("lab/cell.toml".into()) },

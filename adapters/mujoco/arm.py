@@ -1,0 +1,231 @@
+"""An arm in MuJoCo under the controller of cell.toml, with what MuJoCo can do of the effects of docs/effects.md.
+
+The model is the user's: masses, rotors (`armature`), friction and damping of joints count as they stand in it. Its actuators are
+left out, because the law of cell.toml takes their place: tau = k (q_d - q) + d (dq_d - dq) + gravity(q) + coriolis(q, dq), or
+tau = k (q_d - q) - d dq for `joint_pd`, once a control period and held over it.
+"""
+import mujoco
+import numpy as np
+from protocol import Impossible
+
+FLOWN = 100.0  # a joint that far from 0 has left all bounds [rad]
+
+# Effects, with the parameters that are known of each.
+EFFECTS = {
+    "base_tilt": ["tilt"],
+    "command_delay": ["delay"],
+    "command_lag": ["time_constant"],
+    "joint_coulomb_friction": ["coulomb"],
+    "joint_encoder_offset": ["offset"],
+    "joint_friction_asymmetry": ["offset"],
+    "joint_viscous_friction": ["viscous"],
+    "payload": ["mass", "centre"],
+    "rotor_inertia": ["extra"],
+    "torque_delay": ["delay"],
+    "torque_gain": ["gain"],
+    "torque_saturation": ["limit"],
+    "torque_sensor_bias": ["bias"],
+}
+
+
+def late(rows, ticks):
+    """Rows that come later by so many ticks, on straight lines between them; before the first row it held."""
+    ticks = round(ticks * 1e6) * 1e-6
+    whole = int(ticks)
+    at = np.arange(len(rows))
+    part = ticks - whole
+    return (1 - part) * rows[np.maximum(at - whole, 0)] + part * rows[np.maximum(at - whole - 1, 0)]
+
+
+def smoothed(rows, share):
+    """A first-order lag that goes `share` of the way in each tick."""
+    out, now = np.empty_like(rows), rows[0].copy()
+    for i, row in enumerate(rows):
+        now += share * (row - now)
+        out[i] = now
+    return out
+
+
+def leaning(gravity, tilt):
+    """Gravity in the axes of a base that is turned by `tilt` about x and y."""
+    angle = np.hypot(*tilt)
+    if angle == 0:
+        return gravity
+    axis = np.array([*tilt, 0.0]) / angle
+    return (gravity * np.cos(angle) - np.cross(axis, gravity) * np.sin(angle) + axis * (axis @ gravity) * (1 - np.cos(angle)))
+
+
+class Arm:
+    """The user's model, ready to be rolled out."""
+
+    def __init__(self, path, cell, joints, period, step, flange):
+        spec = mujoco.MjSpec.from_file(path)
+        for element in [*spec.actuators, *spec.sensors, *spec.keys]:
+            spec.delete(element)
+        self.flange = next((name for name in (flange, "flange", "attachment") if name and spec.body(name)), None)
+        if flange and self.flange != flange:
+            raise ValueError(f"{path} has no body `{flange}`; --flange names the body that the tool is fixed to")
+        if self.flange:
+            load = spec.body(self.flange).add_body(name="twinalign_load")
+            load.mass, load.inertia, load.explicitinertial = 1e-9, [1e-12] * 3, True
+        spec.option.timestep = step
+        spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+        spec.option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
+        self.model = spec.compile()
+        # The controller compensates gravity itself.
+        self.model.body_gravcomp[:] = 0.0
+        self.data = mujoco.MjData(self.model)
+        missing = [name for name in joints if mujoco.mj_name2id(self.model, mujoco.mjtObj.mjOBJ_JOINT, name) < 0]
+        if missing:
+            there = ", ".join(self.model.joint(i).name for i in range(self.model.njnt))
+            raise ValueError(f"{path} has no joint `{missing[0]}`, only {there}; --joints names yours in the order of {', '.join(joints)}")
+        numbers = [self.model.joint(name).id for name in joints]
+        first = [self.model.jnt_qposadr[numbers], self.model.jnt_dofadr[numbers]]
+        if any((np.diff(places) != 1).any() for places in first):
+            raise ValueError(f"the joints of {path} do not follow each other in the order of {', '.join(joints)}")
+        self.at, self.dofs = (slice(places[0], places[0] + len(joints)) for places in first)
+        self.steps = max(1, round(period / step))
+        self.period, self.step = period, step
+        controller = cell["controller"]
+        self.follows_speed = controller["kind"] == "joint_impedance"
+        if controller["kind"] not in ("joint_impedance", "joint_pd"):
+            raise ValueError(f"the control law `{controller['kind']}` is not known to this adapter")
+        self.limit = np.array(controller.get("torque_limit", [np.inf] * len(joints)), float)
+        kept = ("dof_armature", "dof_damping", "dof_frictionloss")
+        self.nominal = {name: getattr(self.model, name).copy() for name in kept}
+        self.gravity = self.model.opt.gravity.copy()
+        self.believed = Believed(spec.compile(), self.at, self.dofs)
+
+    def effects(self):
+        return {name: parameters for name, parameters in EFFECTS.items() if name != "payload" or self.flange}
+
+    def _set(self, effects):
+        model, of = self.model, lambda effect, name: np.asarray(effects.get(effect, {}).get(name, 0.0), float)
+        for name, values in self.nominal.items():
+            getattr(model, name)[:] = values
+        model.dof_armature[self.dofs] = np.maximum(model.dof_armature[self.dofs] + of("rotor_inertia", "extra"), 0.0)
+        model.dof_damping[self.dofs] += of("joint_viscous_friction", "viscous")
+        model.dof_frictionloss[self.dofs] += of("joint_coulomb_friction", "coulomb")
+        model.opt.gravity[:] = leaning(self.gravity, of("base_tilt", "tilt") + np.zeros(2))
+        if self.flange:
+            load = model.body("twinalign_load").id
+            model.body_mass[load] = max(float(of("payload", "mass")), 1e-9)
+            model.body_ipos[load] = of("payload", "centre") + np.zeros(3)
+            # Masses of subtrees are sums of these.
+            mujoco.mj_setConst(model, self.data)
+
+    def _commands(self, asked, effects):
+        commands = asked.commands
+        if "command_delay" in effects:
+            commands = late(commands, effects["command_delay"]["delay"] / self.period)
+        if "command_lag" in effects and effects["command_lag"]["time_constant"] > 0:
+            commands = smoothed(commands, 1 - np.exp(-self.period / effects["command_lag"]["time_constant"]))
+        return commands[asked.before:]
+
+    def roll_out(self, asked):
+        """States [rows, readings that are asked for, dof] at the times that are asked for."""
+        model, data, effects = self.model, self.data, asked.effects
+        mujoco.mj_resetData(model, data)
+        self._set(effects)
+        part = lambda effect, name, resting: np.asarray(effects.get(effect, {}).get(name, resting), float)
+        offset, lost = part("joint_encoder_offset", "offset", 0.0), part("joint_friction_asymmetry", "offset", 0.0)
+        # A semi-implicit step leaves positions half a step ahead of velocities.
+        ahead = 0.5 * self.step
+        position, speed, torque = data.qpos[self.at], data.qvel[self.dofs], data.qfrc_applied[self.dofs]
+        position[:], speed[:] = asked.q - offset + ahead * asked.dq, asked.dq
+        commands, motors, believed = self._commands(asked, effects), Motors(effects, self.period), self.believed
+        stiffness, damping, limit = asked.parameters["stiffness"], asked.parameters["damping"], self.limit
+        if self.follows_speed:
+            # All of the law that is known beforehand.
+            wanted = stiffness * commands[:, :asked.dof] + damping * commands[:, asked.dof:]
+        else:
+            wanted = stiffness * commands[:, :asked.dof]
+        wants_torque, rotor = "tau_J" in asked.readings, model.dof_armature[self.dofs]
+        ends = {name: np.empty((len(commands) + 1, asked.dof)) for name in ("q", "dq", *asked.readings)}
+        qs, dqs = ends["q"], ends["dq"]
+        qs[0], dqs[0] = asked.q, asked.dq
+        for tick in range(len(commands)):
+            q, dq = qs[tick], dqs[tick]
+            tau = wanted[tick] - stiffness * q - damping * dq
+            if self.follows_speed:
+                tau += believed.bias(q, dq)
+            np.clip(tau, -limit, limit, out=tau)
+            if "tau_J_d" in ends:
+                ends["tau_J_d"][tick + 1] = tau - believed.gravity(q)
+            tau = motors.torque(tau)
+            torque[:] = tau - lost
+            friction = 0.0
+            for _ in range(self.steps):
+                mujoco.mj_step(model, data)
+                if wants_torque:
+                    friction = friction + data.qfrc_passive[self.dofs] + data.qfrc_constraint[self.dofs]
+            qs[tick + 1] = position - ahead * speed + offset
+            dqs[tick + 1] = speed
+            if wants_torque:
+                ends["tau_J"][tick + 1] = tau - lost + friction / self.steps - rotor * (speed - dq) / self.period
+            if tick % 64 == 0 and not np.abs(q).max() < FLOWN:
+                raise Impossible(f"the arm left all bounds after {tick * self.period:.3f} s")
+        if wants_torque:
+            ends["tau_J"] += part("torque_sensor_bias", "bias", 0.0)
+        return between(ends, asked, self.period)
+
+
+class Believed:
+    """The arm as the controller believes it to be."""
+
+    def __init__(self, model, at, dofs):
+        model.body_gravcomp[:] = 0.0
+        self.model, self.data = model, mujoco.MjData(model)
+        self.position, self.speed, self.out = self.data.qpos[at], self.data.qvel[dofs], np.zeros(model.nv)
+        self.torque = self.out[dofs]
+
+    def bias(self, q, dq):
+        """Torques of gravity and of speed [N m]; until the next call."""
+        model, data = self.model, self.data
+        self.position[:], self.speed[:] = q, dq
+        mujoco.mj_kinematics(model, data)
+        mujoco.mj_comPos(model, data)
+        mujoco.mj_comVel(model, data)
+        mujoco.mj_rne(model, data, 0, self.out)
+        return self.torque
+
+    def gravity(self, q):
+        return self.bias(q, 0.0)
+
+
+class Motors:
+    """What becomes of a torque on its way to the joints."""
+
+    def __init__(self, effects, period):
+        self.gain = np.asarray(effects.get("torque_gain", {}).get("gain", 1.0))
+        self.limit = np.asarray(effects.get("torque_saturation", {}).get("limit", np.inf))
+        ticks = round(effects.get("torque_delay", {}).get("delay", 0.0) / period * 1e6) * 1e-6
+        self.whole, self.part, self.past = int(ticks), ticks - int(ticks), None
+
+    def torque(self, tau):
+        if self.whole or self.part:
+            if self.past is None:
+                self.past = [tau] * (self.whole + 2)
+            self.past = [tau] + self.past[:self.whole + 1]
+            tau = (1 - self.part) * self.past[self.whole] + self.part * self.past[self.whole + 1]
+        return np.clip(self.gain * tau, -self.limit, self.limit)
+
+
+def between(ends, asked, period):
+    """States at the times that are asked for, between the ends of control periods: the cubic through both positions and
+    velocities; torques hold over the period that ends there."""
+    ticks, whole = asked.times / period, np.rint(asked.times / period)
+    ticks = np.where(np.abs(ticks - whole) < 1e-6, whole, ticks)
+    after = np.clip(np.ceil(ticks).astype(int), 0, len(ends["q"]) - 1)
+    out = {name: ends[name][after] if name in ("q", "dq") else ends[name][np.maximum(after, 1)] for name in asked.readings}
+    inside = np.flatnonzero(ticks != after)
+    if inside.size:
+        before = after[inside] - 1
+        s = (ticks[inside] - before)[:, None]
+        r = 1 - s
+        (p, q), (u, v) = [[ends[name][rows] for rows in (before, after[inside])] for name in ("q", "dq")]
+        u, v = u * period, v * period
+        out["q"][inside] = r * r * (1 + 2 * s) * p + s * s * (1 + 2 * r) * q + r * s * (r * u - s * v)
+        if "dq" in out:
+            out["dq"][inside] = (6 * r * s * (q - p) + r * (r - 2 * s) * u + s * (s - 2 * r) * v) / period
+    return np.stack([out[name] for name in asked.readings], axis=1)

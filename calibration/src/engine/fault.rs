@@ -1,0 +1,65 @@
+//! What may be wrong with an engine, each in one line with a remedy.
+
+use std::process::ExitStatus;
+
+/// An engine cannot be used, or not any more.
+#[derive(Debug, Clone, thiserror::Error)]
+pub enum EngineError {
+    /// The system would not start it.
+    #[error("cannot start the engine `{command}`: {why}; start it by hand and see what is missing")]
+    Start {
+        /// As it was given.
+        command: String,
+        /// What the system said.
+        why: String,
+    },
+    /// It ended while an answer was waited for.
+    #[error("the engine `{command}` ended with {status}{words}; start it by hand and see what it says")]
+    Ended {
+        /// As it was given.
+        command: String,
+        /// How.
+        status: ExitStatus,
+        /// The last line it wrote to standard error, after a colon; empty where there is none.
+        words: String,
+    },
+    /// It does not answer.
+    #[error("the engine `{command}` has not answered for {seconds} s{words}; allow more with --engine-limit, or see where it hangs")]
+    Silent {
+        /// As it was given.
+        command: String,
+        /// The limit.
+        seconds: u64,
+        /// As of [`EngineError::Ended`].
+        words: String,
+    },
+    /// Something else than messages stands on its standard output.
+    #[error(
+        "the engine `{command}` wrote {bytes:?} where a message begins: let it print to standard error alone, as docs/engine.md says"
+    )]
+    NoMessage {
+        /// As it was given.
+        command: String,
+        /// What stands there.
+        bytes: String,
+    },
+    /// A message that is not the one that was asked for.
+    #[error("the engine `{command}` {what}; docs/engine.md says what every message holds")]
+    Wrong {
+        /// As it was given.
+        command: String,
+        /// What is wrong.
+        what: String,
+    },
+    /// It says itself that it cannot go on.
+    #[error("the engine `{command}`: {why}")]
+    Refused {
+        /// As it was given.
+        command: String,
+        /// Its words.
+        why: String,
+    },
+    /// The user asked for the end.
+    #[error("interrupted; start again")]
+    Ending,
+}

@@ -1,0 +1,288 @@
+//! Another program that simulates the arm of a cell in place of the twin: MuJoCo, Isaac, a laboratory's own. It is asked over a
+//! small protocol on its standard input and output (docs/engine.md), one process for each thread that has something to ask.
+//!
+//! | file | owns |
+//! |---|---|
+//! | `frame` | one message on a pipe |
+//! | `message` | what messages say |
+//! | `ability` | what an engine can do, and what of a set of parameters that leaves |
+//! | `process` | one process: asked, waited for, killed |
+//! | `recent` | roll-outs that were asked for a moment ago |
+//! | `used` | what an answer says about it |
+//! | `fault` | what may be wrong, each with a remedy |
+//!
+//! An engine that ends is started again once for each roll-out; then, as with silence and with what is no answer, it is given up:
+//! the work is interrupted as Ctrl-C does it, so that what was found is kept. SI units, joints in the model's order.
+
+mod ability;
+mod fault;
+mod frame;
+mod message;
+mod process;
+mod recent;
+mod used;
+
+pub use ability::{Ability, Quantity};
+pub use fault::EngineError;
+pub use used::Used;
+
+use crate::interrupt::Interrupt;
+use message::{Greeting, Reply, RollOut, VERSION};
+use process::{Process, Running};
+use recent::Recent;
+use serde_json::Value;
+use shared_mem::cell::Cell;
+use shared_mem::ending;
+use shared_mem::theta::Theta;
+use shared_mem::time::TICK;
+use std::path::Path;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
+use std::time::Duration;
+
+/// How often is looked whether the user asked for the end, so that processes nobody waits for are killed, too.
+const LOOK: Duration = Duration::from_millis(20);
+
+/// How an engine is started.
+#[derive(Debug, Clone)]
+pub struct Call {
+    /// A command line for a POSIX shell.
+    pub command: String,
+    /// Longer than this no answer is waited for.
+    pub limit: Duration,
+}
+
+/// An engine that answers.
+#[derive(Debug)]
+pub struct Engine {
+    call: Call,
+    greeting: Vec<u8>,
+    ability: Ability,
+    idle: Mutex<Vec<Process>>,
+    running: Arc<Running>,
+    interrupt: Interrupt,
+    failed: OnceLock<EngineError>,
+    started_again: AtomicUsize,
+    asked: AtomicUsize,
+    recent: Mutex<Recent>,
+}
+
+/// What is to be simulated.
+#[derive(Debug, Clone, Copy)]
+pub struct Question<'a> {
+    /// Gains and effects: those that the engine knows ([`Ability::part`]).
+    pub theta: &'a Theta,
+    /// Joints.
+    pub dof: usize,
+    /// What the encoders read at the start: positions, then velocities.
+    pub start: &'a [f64],
+    /// Rows of commands from before the start.
+    pub before: usize,
+    /// Commands, a row for each control period: desired positions, then desired velocities.
+    pub commands: &'a [f64],
+    /// What is asked for, of what the engine reports.
+    pub readings: &'a [Quantity],
+    /// When states are asked for, from the start on, ascending [s].
+    pub times: &'a [f64],
+}
+
+/// No states.
+#[derive(Debug, Clone, thiserror::Error)]
+pub enum NoStates {
+    /// The engine has none for these parameters.
+    #[error("{0}")]
+    Impossible(String),
+    /// The engine is of no use any more.
+    #[error(transparent)]
+    Failed(#[from] EngineError),
+}
+
+impl Engine {
+    /// Starts an engine and hears what it can do. `joints`: their names in the order of all arrays. When the engine is given up,
+    /// `interrupt` is asked for the end.
+    ///
+    /// # Errors
+    /// [`EngineError`] when it does not start, or does not speak the protocol.
+    pub fn start(
+        call: Call,
+        (cell, folder, joints): (&Cell, &Path, &[String]),
+        interrupt: &Interrupt,
+    ) -> Result<Arc<Self>, EngineError> {
+        let wrong = |what: String| EngineError::Wrong { command: call.command.clone(), what };
+        let folder = std::path::absolute(folder).unwrap_or_else(|_| folder.to_owned());
+        let greeting = Greeting {
+            message: "hello",
+            protocol: VERSION,
+            joints,
+            period: TICK,
+            cell: cell_as_json(cell),
+            folder: folder.display().to_string(),
+        };
+        let greeting = frame::bytes(&greeting, &[]).map_err(|error| wrong(format!("cannot be greeted: {error}")))?;
+        let running = Arc::new(Running::default());
+        kill_at_the_end(&running);
+        let (process, ability) = greeted(&call, &greeting, &running)?;
+        Ok(Arc::new(Self {
+            call,
+            greeting,
+            ability,
+            idle: Mutex::new(vec![process]),
+            running,
+            interrupt: interrupt.clone(),
+            failed: OnceLock::new(),
+            started_again: AtomicUsize::new(0),
+            asked: AtomicUsize::new(0),
+            recent: Mutex::default(),
+        }))
+    }
+
+    /// What it can do.
+    #[must_use]
+    pub fn ability(&self) -> &Ability {
+        &self.ability
+    }
+
+    /// Why it was given up.
+    #[must_use]
+    pub fn failure(&self) -> Option<&EngineError> {
+        self.failed.get()
+    }
+
+    /// What it was used for so far.
+    #[must_use]
+    pub fn used(&self) -> Used {
+        let count = |counter: &AtomicUsize| counter.load(Ordering::Relaxed);
+        Used::new(&self.ability, &self.call.command, [count(&self.asked), count(&self.started_again)])
+    }
+
+    /// States at the times that were asked for, row by row: of each quantity of the question's `readings`, a number for each joint.
+    ///
+    /// # Errors
+    /// [`NoStates`]. From the first failure on there are none at all.
+    pub fn roll_out(&self, question: &Question<'_>) -> Result<Arc<Vec<f64>>, NoStates> {
+        if let Some(failed) = self.failed.get() {
+            return Err(failed.clone().into());
+        }
+        let message = self.message(question)?;
+        let key = Recent::key(&message);
+        if let Some(known) = locked(&self.recent).get(key) {
+            return Ok(known);
+        }
+        let states = match self.states(message, question) {
+            Err(NoStates::Failed(error)) => {
+                // Of two that fail at the same time the first is told.
+                let error = self.failed.get_or_init(|| error).clone();
+                self.interrupt.ask();
+                return Err(error.into());
+            }
+            states => Arc::new(states?),
+        };
+        locked(&self.recent).keep(key, &states);
+        Ok(states)
+    }
+
+    fn message(&self, question: &Question<'_>) -> Result<Vec<u8>, EngineError> {
+        let Question { theta, dof, start, before, commands, readings, times } = *question;
+        let head = RollOut {
+            message: "rollout",
+            dof,
+            before,
+            ticks: commands.len() / (2 * dof).max(1) - before,
+            rows: times.len(),
+            readings: readings.iter().map(|quantity| quantity.name()).collect(),
+            parameters: self.ability.gains(theta),
+            effects: ability::blocks(&theta.effects),
+        };
+        frame::bytes(&head, &[start, commands, times].concat()).map_err(|error| self.wrong(error.to_string()))
+    }
+
+    fn states(&self, message: Vec<u8>, question: &Question<'_>) -> Result<Vec<f64>, NoStates> {
+        self.asked.fetch_add(1, Ordering::Relaxed);
+        let (reply, numbers) = match self.ask(message.clone()) {
+            // Once more, with a new process: it may have been the system that ended it.
+            Err(EngineError::Ended { .. }) => {
+                self.started_again.fetch_add(1, Ordering::Relaxed);
+                self.ask(message)?
+            }
+            answer => answer?,
+        };
+        let dof = question.dof;
+        match reply {
+            Reply::States => {}
+            Reply::Impossible { why } => return Err(NoStates::Impossible(why)),
+            Reply::Error { why } => {
+                return Err(EngineError::Refused { command: self.call.command.clone(), why }.into());
+            }
+            Reply::Hello(_) => return Err(self.wrong("answered a roll-out with a greeting".into()).into()),
+        }
+        let (rows, columns) = (question.times.len(), question.readings.len() * dof);
+        if numbers.len() != rows * columns {
+            let what = format!("sent {} numbers where {rows} rows of {columns} were asked for", numbers.len());
+            return Err(self.wrong(what).into());
+        }
+        Ok(numbers)
+    }
+
+    fn ask(&self, message: Vec<u8>) -> Result<(Reply, Vec<f64>), EngineError> {
+        let idle = locked(&self.idle).pop();
+        let mut process = match idle {
+            Some(process) => process,
+            None => {
+                let (process, ability) = greeted(&self.call, &self.greeting, &self.running)?;
+                if ability != self.ability {
+                    return Err(self.wrong("says of itself something else than when it was started first".into()));
+                }
+                process
+            }
+        };
+        let answer = process.ask(message, self.call.limit)?;
+        locked(&self.idle).push(process);
+        Ok(answer)
+    }
+
+    fn wrong(&self, what: String) -> EngineError {
+        EngineError::Wrong { command: self.call.command.clone(), what }
+    }
+}
+
+fn locked<T>(what: &Mutex<T>) -> MutexGuard<'_, T> {
+    what.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// A process that has said what it can do.
+fn greeted(call: &Call, greeting: &[u8], running: &Arc<Running>) -> Result<(Process, Ability), EngineError> {
+    let wrong = |what: String| EngineError::Wrong { command: call.command.clone(), what };
+    let mut process = Process::start(&call.command, running)?;
+    match process.ask(greeting.to_vec(), call.limit)?.0 {
+        Reply::Hello(hello) => {
+            let ability = Ability::read(hello).map_err(wrong)?;
+            Ok((process, ability))
+        }
+        Reply::Error { why } | Reply::Impossible { why } => {
+            Err(EngineError::Refused { command: call.command.clone(), why })
+        }
+        Reply::States => Err(wrong("answered the greeting with states".into())),
+    }
+}
+
+/// Kills every process of an engine once the user asked for the end; those that are waited for and those that nobody asks.
+fn kill_at_the_end(running: &Arc<Running>) {
+    let running = Arc::downgrade(running);
+    std::thread::spawn(move || {
+        while let Some(running) = running.upgrade() {
+            if ending::asked() {
+                running.kill();
+            }
+            drop(running);
+            std::thread::sleep(LOOK);
+        }
+    });
+}
+
+fn cell_as_json(cell: &Cell) -> Value {
+    let table: Option<toml::Table> = toml::from_str(&cell.to_toml()).ok();
+    serde_json::json!(table)
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,51 @@
+//! What an answer says about the engine that its roll-outs came from.
+
+use super::ability::Ability;
+use serde::Serialize;
+use twin::effects::{Stage, registry};
+
+/// An engine, and what it was used for.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Used {
+    /// Its name and version.
+    pub name: String,
+    /// How it was called.
+    pub command: String,
+    /// Effects that it simulates itself.
+    pub simulates: Vec<String>,
+    /// Effects of which it does not know all parameters: what the twin makes of the rest was added to its states.
+    pub added: Vec<String>,
+    /// Roll-outs that it was asked for.
+    pub rollouts: usize,
+    /// How often it ended in the middle of one and was started again.
+    pub started_again: usize,
+}
+
+impl Used {
+    pub(super) fn new(ability: &Ability, command: &str, [rollouts, started_again]: [usize; 2]) -> Self {
+        let arm = registry().iter().filter(|effect| effect.stage == Stage::Control).map(|effect| effect.name);
+        let added = arm.filter(|name| !ability.knows(name)).map(str::to_owned).collect();
+        let simulates = ability.effects().map(str::to_owned).collect();
+        Self { name: ability.name.clone(), command: command.into(), simulates, added, rollouts, started_again }
+    }
+
+    /// The same for a person, a sentence each.
+    #[must_use]
+    pub fn sentences(&self) -> Vec<String> {
+        let list = |names: &[String]| if names.is_empty() { "none".to_owned() } else { names.join(", ") };
+        let mut all = vec![format!(
+            "the arm was simulated by {}, so what is said of the twin is said of it; effects that it simulates itself: {}; of \
+             others the twin's own difference was added to its states: {}",
+            self.name,
+            list(&self.simulates),
+            list(&self.added)
+        )];
+        if self.started_again > 0 {
+            all.push(format!(
+                "{} ended in the middle of a roll-out and was started again, {} times: see what it says when it is started by hand",
+                self.name, self.started_again
+            ));
+        }
+        all
+    }
+}

@@ -1,0 +1,263 @@
+//! Who moves the arm of a clip: the twin's own dynamics, or another program's ([`crate::engine`]).
+//!
+//! With an engine the nominal model is the engine's. What it knows of gains and effects is asked of it; of what it does not
+//! know, the twin's own roll-outs with and without it differ by something, and that is added to the engine's states:
+//!
+//! ```text
+//! states(theta) = engine(known) + twin(theta) - twin(known)        known: the part of theta that the engine simulates itself
+//! ```
+//!
+//! So every effect of the library remains a candidate, and is judged by what it does beside the engine's own model. The sum is
+//! exact where an effect does the same in both models, and off by its cross terms with what the two models differ by. The state in which a clip begins is estimated with the twin's own
+//! model from its first 20 ms, in which two models of one arm do the same.
+#![allow(non_snake_case)] // the Franka Control Interface's own symbols
+
+use crate::engine::{Engine, NoStates, Quantity, Question};
+use crate::estimate::Impossible;
+use shared_mem::cell::Cell;
+use shared_mem::ending;
+use shared_mem::recording::JointSeries;
+use shared_mem::theta::Theta;
+use shared_mem::time::TICK_NS;
+use std::ops::Range;
+use std::sync::Arc;
+use twin::arm::{ArmModel, JointState};
+use twin::control::{ArmRollout, CommandTrack, Plant, Reading};
+use twin::effects::Effects;
+
+/// So long before a clip a command may have been given that still counts: the longest delay that an effect has, and a bit [ticks].
+const HISTORY: u64 = 2100;
+
+/// A part of a clip that is simulated in one go.
+#[derive(Debug, Clone, Copy)]
+pub struct Stretch<'a> {
+    /// What the arm did; it tells where the arm began.
+    pub measured: &'a JointSeries,
+    /// The row at which it begins.
+    pub from: usize,
+    /// What the arm was told.
+    pub commands: &'a CommandTrack,
+    /// Added to the state in which it begins: positions, then velocities; nothing where it is empty.
+    pub ahead: &'a [f64],
+    /// In so many parts the twin integrates a period; 1 is how it does it.
+    pub parts: u32,
+}
+
+/// Moves the arm of a cell.
+#[derive(Debug, Clone)]
+pub struct Mover {
+    cell: Cell,
+    nominal: ArmModel,
+    /// With the gains of cell.toml.
+    known: Theta,
+    engine: Option<Arc<Engine>>,
+    /// What an engine is asked for.
+    wanted: Vec<Quantity>,
+}
+
+impl Mover {
+    /// By the twin's own dynamics. `nominal`: the arm as cell.toml describes it.
+    #[must_use]
+    pub fn own(cell: &Cell, nominal: &ArmModel) -> Self {
+        Self { cell: cell.clone(), nominal: nominal.clone(), known: Theta::default(), engine: None, wanted: Vec::new() }
+    }
+
+    /// By another program, where there is one; `known`: the cell's nominal parameters; `wanted`: what is compared of what it
+    /// reports.
+    #[must_use]
+    pub fn by(self, engine: Option<Arc<Engine>>, known: Theta, mut wanted: Vec<Quantity>) -> Self {
+        wanted.sort_unstable();
+        wanted.dedup();
+        Self { engine, known, wanted, ..self }
+    }
+
+    /// What the sensors read at the ascending stamps, in `out`; quantities that an engine is not asked for are without meaning.
+    ///
+    /// # Errors
+    /// [`Impossible`] where the arm cannot be simulated, or leaves all bounds.
+    pub fn readings(
+        &self,
+        theta: &Theta,
+        stretch: &Stretch<'_>,
+        stamps_ns: &[u64],
+        out: &mut [Reading],
+    ) -> Result<(), Impossible> {
+        let Some(engine) = &self.engine else {
+            return self.twin(theta, stretch, stamps_ns, out).map(drop);
+        };
+        // What the twin's own time step does is in neither its states nor in a difference.
+        let stretch = &Stretch { parts: 1, ..*stretch };
+        let known = engine.ability().part(theta, &self.known);
+        let start = if known == *theta {
+            self.prepared(theta)?.start(stretch)?
+        } else {
+            let mut without = vec![Reading::default(); out.len()];
+            let start = self.twin(&known, stretch, stamps_ns, &mut without)?;
+            self.twin(theta, stretch, stamps_ns, out)?;
+            out.iter_mut().zip(&without).for_each(|(with, without)| add(with, without, -1.0));
+            start
+        };
+        let states = self.asked(engine, &known, (stretch, &start), stamps_ns)?;
+        let dof = self.nominal.dof();
+        let columns = self.wanted.len() * dof;
+        let is_known = known == *theta;
+        for (row, out) in states.chunks_exact(columns).zip(out) {
+            let theirs = reading(row, &self.wanted, dof);
+            if is_known { *out = theirs } else { add(out, &theirs, 1.0) }
+        }
+        Ok(())
+    }
+
+    /// What the twin makes of it, in `out`, and where it began.
+    fn twin(
+        &self,
+        theta: &Theta,
+        stretch: &Stretch<'_>,
+        stamps_ns: &[u64],
+        out: &mut [Reading],
+    ) -> Result<JointState, Impossible> {
+        let prepared = self.prepared(theta)?;
+        let start = prepared.start(stretch)?;
+        let first = stretch.measured.stamps_ns[stretch.from];
+        prepared.rollout(stretch.parts).readings(&start, first, stretch.commands, stamps_ns, out);
+        if ending::asked() {
+            return Err(Impossible("interrupted".into()));
+        }
+        if out.last().is_some_and(|last| last.state.q.iter().any(|q| !q.is_finite())) {
+            return Err(Impossible(
+                "the simulated arm diverges; the damping may be too large for a 1 kHz controller".into(),
+            ));
+        }
+        Ok(start)
+    }
+
+    fn prepared(&self, theta: &Theta) -> Result<Prepared, Impossible> {
+        let fail = |error: &dyn std::fmt::Display| Impossible(error.to_string());
+        let dof = self.nominal.dof();
+        let effects = Effects::from_theta(&theta.effects, dof).map_err(|e| fail(&e))?;
+        let plant = Plant::new(&self.cell, self.nominal.clone(), Some(theta), &effects.arm).map_err(|e| fail(&e))?;
+        Ok(Prepared { plant, dof })
+    }
+
+    fn asked(
+        &self,
+        engine: &Engine,
+        theta: &Theta,
+        (stretch, start): (&Stretch<'_>, &JointState),
+        stamps_ns: &[u64],
+    ) -> Result<Arc<Vec<f64>>, Impossible> {
+        let dof = self.nominal.dof();
+        let first_ns = stretch.measured.stamps_ns[stretch.from];
+        let last_ns = stamps_ns.last().copied().unwrap_or(first_ns);
+        let (commands, before) = commands(stretch.commands, first_ns..last_ns, dof);
+        let times: Vec<f64> = stamps_ns.iter().map(|stamp| stamp.saturating_sub(first_ns) as f64 * 1e-9).collect();
+        let start = [&start.q[..dof], &start.dq[..dof]].concat();
+        let question = Question { theta, dof, start: &start, before, commands: &commands, readings: &self.wanted, times: &times };
+        let states = engine.roll_out(&question).map_err(|error| match error {
+            NoStates::Impossible(why) => Impossible(format!("the engine has no answer: {why}")),
+            NoStates::Failed(error) => Impossible(error.to_string()),
+        })?;
+        if states.iter().any(|number| !number.is_finite()) {
+            return Err(Impossible(
+                "a state of the engine is no number; where this is so from the beginning on, its model and the gains of cell.toml \
+                 do not go together"
+                    .into(),
+            ));
+        }
+        Ok(states)
+    }
+}
+
+/// The twin's arm under parameters.
+struct Prepared {
+    plant: Plant,
+    dof: usize,
+}
+
+impl Prepared {
+    fn rollout(&self, parts: u32) -> ArmRollout<'_> {
+        ArmRollout { parts, ..self.plant.rollout() }
+    }
+
+    fn start(&self, stretch: &Stretch<'_>) -> Result<JointState, Impossible> {
+        let rollout = self.rollout(stretch.parts);
+        let start = rollout.start_state(stretch.measured, stretch.from, stretch.commands);
+        let mut start = start.ok_or_else(|| Impossible("no measured joints".into()))?;
+        for joint in 0..self.dof {
+            start.q[joint] += stretch.ahead.get(joint).unwrap_or(&0.0);
+            start.dq[joint] += stretch.ahead.get(self.dof + joint).unwrap_or(&0.0);
+        }
+        Ok(start)
+    }
+}
+
+/// The command in force in each control period, desired positions, then velocities; and how many rows are of the time before.
+fn commands(track: &CommandTrack, over: Range<u64>, dof: usize) -> (Vec<f64>, usize) {
+    let first = |ticks: u64| over.start.checked_sub(ticks * TICK_NS).map_or(0, |tick_ns| track.at(tick_ns));
+    let given = (1..HISTORY).take_while(|ticks| first(*ticks) > 0).count() as u64;
+    // The row before them all, where the first command is not in force yet.
+    let before = if first(0) == 0 { 0 } else { given + 1 };
+    let ticks = (over.end - over.start).div_ceil(TICK_NS).max(1);
+    let mut out = Vec::with_capacity(2 * dof * (before + ticks) as usize);
+    let mut push = |row: usize| {
+        out.extend_from_slice(&track.q_d(row)[..dof]);
+        out.extend_from_slice(&track.dq_d(row)[..dof]);
+    };
+    (1..=before).rev().for_each(|ticks| push(first(ticks)));
+    let mut row = first(0);
+    for tick in 0..ticks {
+        row = track.in_force(over.start + tick * TICK_NS, row);
+        push(row);
+    }
+    (out, before as usize)
+}
+
+/// A row of an engine's states.
+fn reading(row: &[f64], quantities: &[Quantity], dof: usize) -> Reading {
+    let mut reading = Reading::default();
+    for (quantity, values) in quantities.iter().zip(row.chunks_exact(dof)) {
+        let joints = match quantity {
+            Quantity::Position => &mut reading.state.q,
+            Quantity::Velocity => &mut reading.state.dq,
+            Quantity::Torque => &mut reading.tau_J,
+            Quantity::DesiredTorque => &mut reading.tau_J_d,
+        };
+        joints[..dof].copy_from_slice(values);
+    }
+    reading
+}
+
+fn add(to: &mut Reading, other: &Reading, times: f64) {
+    let pairs = [
+        (&mut to.state.q, &other.state.q),
+        (&mut to.state.dq, &other.state.dq),
+        (&mut to.tau_J, &other.tau_J),
+        (&mut to.tau_J_d, &other.tau_J_d),
+    ];
+    for (to, other) in pairs {
+        to.iter_mut().zip(other).for_each(|(to, other)| *to += times * other);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_engine_is_told_the_command_in_force_in_each_period_and_those_before_the_start() {
+        let ms = |n: u64| n * TICK_NS;
+        let series = JointSeries {
+            dof: 1,
+            stamps_ns: vec![ms(10), ms(12), ms(14), ms(16)],
+            q: vec![1.0, 2.0, 3.0, 4.0],
+            dq: vec![0.1, 0.2, 0.3, 0.4],
+            ..JointSeries::default()
+        };
+        let track = CommandTrack::new(&series).expect("commands");
+        let (rows, before) = commands(&track, ms(13)..ms(16), 1);
+        // 11 ms, in which the first command holds as before it; 12 ms; then 13, 14, 15 ms.
+        assert_eq!((rows, before), (vec![1.0, 0.1, 2.0, 0.2, 2.0, 0.2, 3.0, 0.3, 3.0, 0.3], 2));
+        let (rows, before) = commands(&track, ms(10)..ms(11), 1);
+        assert_eq!((rows, before), (vec![1.0, 0.1], 0));
+    }
+}

@@ -1,0 +1,158 @@
+"""What a recorded session says about a robot cell. Units SI, stamps in ns, quaternions w, x, y, z, poses in the base frame."""
+from os import PathLike
+from pathlib import Path
+from typing import Any, Iterable, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+_Path = str | PathLike[str]
+_Floats = NDArray[np.float64]
+_Stamps = NDArray[np.uint64]
+_Optimizer = Literal["least-squares", "pso", "cma"]
+
+class Session:
+    """A folder with cell.toml and clips, or one clip beside a cell.toml. `session[i]` reads a clip."""
+    def __init__(self, path: _Path, *, cell: _Path | None = None) -> None: ...
+    @property
+    def folder(self) -> Path: ...
+    @property
+    def cell_toml(self) -> str:
+        """cell.toml as it stands there."""
+    @property
+    def files(self) -> list[Path]:
+        """The clips' files, in the order of cell.toml."""
+    def __len__(self) -> int: ...
+    def __getitem__(self, index: int) -> Clip: ...
+
+class Clip:
+    """One recorded motion. Arrays are the reader's own memory, not copies; what was not logged is None."""
+    @property
+    def file(self) -> Path: ...
+    @property
+    def kind(self) -> Literal["excitation", "control_hit_slide", "free_motion"]: ...
+    @property
+    def joint_names(self) -> list[str]: ...
+    @property
+    def stamps_ns(self) -> _Stamps:
+        """Of what was measured [rows], ns."""
+    @property
+    def q(self) -> _Floats | None:
+        """Measured positions [rows, joints], rad."""
+    @property
+    def dq(self) -> _Floats | None:
+        """Measured velocities [rows, joints], rad/s."""
+    @property
+    def tau_J(self) -> _Floats | None:
+        """Measured torques behind the gears, gravity included [rows, joints], N m."""
+    @property
+    def command_stamps_ns(self) -> _Stamps:
+        """Of the commands [rows], ns."""
+    @property
+    def q_d(self) -> _Floats | None:
+        """Desired positions [rows, joints], rad."""
+    @property
+    def dq_d(self) -> _Floats | None:
+        """Desired velocities [rows, joints], rad/s."""
+    @property
+    def tau_J_d(self) -> _Floats | None:
+        """Desired torques without gravity [rows, joints], N m."""
+    @property
+    def object_stamps_ns(self) -> _Stamps:
+        """Of the object's poses [poses], ns."""
+    @property
+    def object_position(self) -> _Floats | None:
+        """Geometric centre in the base frame [poses, 3], m."""
+    @property
+    def object_orientation(self) -> _Floats | None:
+        """Quaternions w, x, y, z in the base frame [poses, 4]."""
+    @property
+    def warnings(self) -> list[str]: ...
+
+class Twin:
+    """The simulated cell under its joint impedance controller: 1 ms a step, deterministic."""
+    def __init__(self, cell: _Path, parameters: _Path | dict[str, Any] | None = None) -> None: ...
+    @property
+    def dof(self) -> int: ...
+    def reset(
+        self,
+        *,
+        q: _Floats | None = None,
+        dq: _Floats | None = None,
+        object_position: Iterable[float] | None = None,
+        object_orientation: Iterable[float] | None = None,
+    ) -> None:
+        """Everything back where cell.toml has it, or where it is given: q [dof] rad, dq [dof] rad/s, position [3] m, quaternion [4]."""
+    def step(self, q_d: _Floats, dq_d: _Floats | None = None, periods: int = 1) -> None:
+        """Lets `periods` of 1 ms pass under desired positions [dof] rad and velocities [dof] rad/s (0 where None)."""
+    def roll_out(self, q_d: _Floats, dq_d: _Floats) -> tuple[_Floats, _Floats, _Floats | None, _Floats | None]:
+        """Plays commands [rows, dof], one each 1 ms. States at the end of each: q, dq [rows, dof], object position [rows, 3] and
+        orientation [rows, 4], None without an object. Other threads run meanwhile."""
+    @property
+    def time(self) -> float:
+        """Simulated, s."""
+    @property
+    def q(self) -> _Floats:
+        """What the encoders read [dof], rad."""
+    @property
+    def dq(self) -> _Floats:
+        """[dof], rad/s."""
+    @property
+    def tau_J(self) -> _Floats:
+        """Behind the gears, gravity included, mean over the last 1 ms [dof], N m."""
+    @property
+    def tau_J_d(self) -> _Floats:
+        """Asked for, without gravity [dof], N m."""
+    @property
+    def object_position(self) -> _Floats | None:
+        """Geometric centre in the base frame [3], m."""
+    @property
+    def object_orientation(self) -> _Floats | None:
+        """Quaternion w, x, y, z in the base frame [4]."""
+    @property
+    def contact_force(self) -> float:
+        """Between tool and object, N."""
+
+def diagnose(
+    session: _Path,
+    *,
+    cell: _Path | None = None,
+    parameters: _Path | dict[str, Any] | None = None,
+    seed: int = 0,
+    torques: bool = False,
+    budget: float | None = None,
+    engine: str | None = None,
+    engine_limit: float = 60.0,
+    as_recorded: bool = False,
+) -> dict[str, Any]:
+    """The JSON object of `calibration diagnose --json`."""
+
+def identify_arm(
+    session: _Path,
+    *,
+    cell: _Path | None = None,
+    parameters: _Path | None = None,
+    also: Iterable[str] = (),
+    optimizer: _Optimizer = "least-squares",
+    budget: int = 4000,
+    seed: int = 0,
+    out: _Path | None = None,
+    engine: str | None = None,
+    engine_limit: float = 60.0,
+) -> dict[str, Any]:
+    """The JSON object of `calibration identify arm --json`."""
+
+def identify_object(
+    session: _Path,
+    *,
+    cell: _Path | None = None,
+    parameters: _Path | None = None,
+    optimizer: _Optimizer = "least-squares",
+    budget: int = 1200,
+    seed: int = 0,
+    out: _Path | None = None,
+) -> dict[str, Any]:
+    """The JSON object of `calibration identify object --json`."""
+
+def effects() -> list[dict[str, Any]]:
+    """Every effect: name, stage, parameters (name, unit, numbers, plausible, resting, is_size), confusable_with."""

@@ -1,0 +1,178 @@
+//! An engine for `--engine`, as docs/engine.md describes one: the twin's own arm behind the protocol, which may fail.
+//!
+//! `fake_engine [--effects none|NAME,..] [--carries KG] [--ends-after N] [--silent-after N] [--short-after N] [--nan-after N]`
+//! It shares no code with the other side of the pipe.
+
+use clap::Parser;
+use serde_json::{Value, json};
+use shared_mem::cell::Cell;
+use shared_mem::recording::JointSeries;
+use shared_mem::theta::Theta;
+use shared_mem::time::TICK_NS;
+use std::io::{Read, Write};
+use std::path::Path;
+use std::time::Duration;
+use twin::arm::{ArmModel, JointState};
+use twin::control::{CommandTrack, Plant, Reading};
+use twin::effects::{Effects, Stage, registry};
+
+/// What the engine is, and when it fails.
+#[derive(Parser)]
+struct Arguments {
+    /// The effects that it knows; all of them where nothing is said.
+    #[arg(long)]
+    effects: Option<String>,
+    /// What the arm of its own model carries besides [kg].
+    #[arg(long, default_value_t = 0.0)]
+    carries: f64,
+    /// It ends in the roll-out behind so many.
+    #[arg(long)]
+    ends_after: Option<usize>,
+    /// It answers no more behind so many.
+    #[arg(long)]
+    silent_after: Option<usize>,
+    /// It sends a number too few behind so many.
+    #[arg(long)]
+    short_after: Option<usize>,
+    /// It sends what is no number behind so many.
+    #[arg(long)]
+    nan_after: Option<usize>,
+}
+
+fn receive(from: &mut impl Read) -> Option<(Value, Vec<f64>)> {
+    let mut word = || {
+        let mut bytes = [0; 4];
+        from.read_exact(&mut bytes).ok().map(|()| u32::from_le_bytes(bytes) as usize)
+    };
+    let (text, numbers) = (word()?, word()?);
+    let mut body = vec![0; text + 8 * numbers];
+    from.read_exact(&mut body).ok()?;
+    let numbers = body[text..].chunks(8).map(|bytes| f64::from_le_bytes(bytes.try_into().expect("eight bytes")));
+    Some((serde_json::from_slice(&body[..text]).expect("JSON"), numbers.collect()))
+}
+
+fn send(to: &mut impl Write, head: &Value, numbers: &[f64]) {
+    let text = head.to_string();
+    let mut bytes = Vec::new();
+    for length in [text.len(), numbers.len()] {
+        bytes.extend(u32::try_from(length).expect("short").to_le_bytes());
+    }
+    bytes.extend(text.as_bytes());
+    numbers.iter().for_each(|number| bytes.extend(number.to_le_bytes()));
+    to.write_all(&bytes).and_then(|()| to.flush()).expect("a reader");
+}
+
+fn hello(arguments: &Arguments) -> Value {
+    let known = |name: &str| match &arguments.effects {
+        None => true,
+        Some(names) => names.split(',').any(|known| known == name),
+    };
+    let arm = registry().iter().filter(|effect| effect.stage == Stage::Control && known(effect.name));
+    let effects: serde_json::Map<String, Value> = arm
+        .map(|effect| (effect.name.to_owned(), effect.parameters.iter().map(|p| p.name).collect::<Vec<_>>().into()))
+        .collect();
+    json!({"message": "hello", "protocol": 1, "name": "fake engine", "parameters": ["stiffness", "damping"],
+           "effects": effects, "readings": ["q", "dq", "tau_J", "tau_J_d"]})
+}
+
+/// Parameters as theta.toml has them.
+fn theta(head: &Value, carries: f64) -> Theta {
+    let mut effects = head["effects"].as_array().expect("a list").clone();
+    for value in effects.iter_mut().flat_map(|effect| effect.as_object_mut().expect("an object").values_mut()) {
+        if let Value::Array(numbers) = value {
+            // What has no bound, in the words of TOML's reader: far away.
+            numbers.iter_mut().filter(|number| number.is_null()).for_each(|number| *number = json!(1e300));
+        }
+    }
+    if carries > 0.0 && !effects.iter().any(|effect| effect["name"] == "payload") {
+        effects.push(json!({"name": "payload", "mass": carries, "centre": [0.0, 0.0, 0.05]}));
+    }
+    serde_json::from_value(json!({"arm": head["parameters"], "effect": effects})).expect("parameters")
+}
+
+fn roll_out(head: &Value, numbers: &[f64], cell: &Cell, carries: f64) -> Vec<f64> {
+    let size = |key: &str| usize::try_from(head[key].as_u64().expect("a count")).expect("small");
+    let (dof, before, ticks, rows) = (size("dof"), size("before"), size("ticks"), size("rows"));
+    let mut rest = numbers;
+    let mut take = |count: usize| {
+        let (taken, behind) = rest.split_at(count);
+        rest = behind;
+        taken
+    };
+    let mut start = JointState::default();
+    start.q[..dof].copy_from_slice(take(dof));
+    start.dq[..dof].copy_from_slice(take(dof));
+    let mut desired = JointSeries { dof, ..JointSeries::default() };
+    for (tick, row) in take((before + ticks) * 2 * dof).chunks(2 * dof).enumerate() {
+        desired.stamps_ns.push(tick as u64 * TICK_NS);
+        desired.q.extend(&row[..dof]);
+        desired.dq.extend(&row[dof..]);
+    }
+    let start_ns = before as u64 * TICK_NS;
+    let at_ns: Vec<u64> = take(rows).iter().map(|time| start_ns + (time * 1e9).round() as u64).collect();
+    let theta = theta(head, carries);
+    let nominal = ArmModel::from_cell(cell).expect("an arm");
+    let effects = Effects::from_theta(&theta.effects, dof).expect("effects");
+    let plant = Plant::new(cell, nominal, Some(&theta), &effects.arm).expect("gains");
+    let commands = CommandTrack::new(&desired).expect("commands");
+    let mut readings = vec![Reading::default(); rows];
+    plant.rollout().readings(&start, start_ns, &commands, &at_ns, &mut readings);
+    let mut out = Vec::new();
+    for reading in &readings {
+        for name in head["readings"].as_array().expect("a list") {
+            out.extend_from_slice(match name.as_str() {
+                Some("q") => &reading.state.q[..dof],
+                Some("dq") => &reading.state.dq[..dof],
+                Some("tau_J") => &reading.tau_J[..dof],
+                _ => &reading.tau_J_d[..dof],
+            });
+        }
+    }
+    out
+}
+
+fn main() {
+    let arguments = Arguments::parse();
+    let (mut from, mut to) = (std::io::stdin().lock(), std::io::stdout().lock());
+    let (mut cell, mut answered) = (None, 0);
+    while let Some((head, numbers)) = receive(&mut from) {
+        if head["message"] == "hello" {
+            let text = toml_of(&head["cell"]);
+            cell = Some(Cell::parse(&text, Path::new("cell.toml")).expect("a cell.toml"));
+            send(&mut to, &hello(&arguments), &[]);
+            continue;
+        }
+        let behind = |limit: Option<usize>| limit.is_some_and(|limit| answered >= limit);
+        if behind(arguments.ends_after) {
+            std::process::exit(9);
+        }
+        if behind(arguments.silent_after) {
+            std::thread::sleep(Duration::from_secs(3600));
+        }
+        let mut states = roll_out(&head, &numbers, cell.as_ref().expect("a greeting first"), arguments.carries);
+        if behind(arguments.short_after) {
+            states.pop();
+        }
+        if behind(arguments.nan_after) {
+            states[0] = f64::NAN;
+        }
+        send(&mut to, &json!({"message": "states"}), &states);
+        answered += 1;
+    }
+}
+
+/// JSON is no TOML, but each of its values can be written as one: tables inline.
+fn toml_of(value: &Value) -> String {
+    fn inline(value: &Value) -> String {
+        match value {
+            Value::Object(table) => {
+                let pairs: Vec<String> = table.iter().map(|(key, value)| format!("{key} = {}", inline(value))).collect();
+                format!("{{ {} }}", pairs.join(", "))
+            }
+            Value::Array(values) => format!("[{}]", values.iter().map(inline).collect::<Vec<_>>().join(", ")),
+            other => other.to_string(),
+        }
+    }
+    let table = value.as_object().expect("a table");
+    table.iter().map(|(key, value)| format!("{key} = {}\n", inline(value))).collect()
+}
