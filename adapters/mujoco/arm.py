@@ -15,7 +15,7 @@ EFFECTS = {
     "base_tilt": ["tilt"],
     "command_delay": ["delay"],
     "command_lag": ["time_constant"],
-    "joint_coulomb_friction": ["coulomb"],
+    "joint_coulomb_friction": ["coulomb", "creep"],
     "joint_encoder_offset": ["offset"],
     "joint_friction_asymmetry": ["offset"],
     "joint_viscous_friction": ["viscous"],
@@ -105,7 +105,6 @@ class Arm:
             getattr(model, name)[:] = values
         model.dof_armature[self.dofs] = np.maximum(model.dof_armature[self.dofs] + of("rotor_inertia", "extra"), 0.0)
         model.dof_damping[self.dofs] += of("joint_viscous_friction", "viscous")
-        model.dof_frictionloss[self.dofs] += of("joint_coulomb_friction", "coulomb")
         model.opt.gravity[:] = leaning(self.gravity, of("base_tilt", "tilt") + np.zeros(2))
         if self.flange:
             load = model.body("twinalign_load").id
@@ -113,6 +112,15 @@ class Arm:
             model.body_ipos[load] = of("payload", "centre") + np.zeros(3)
             # Masses of subtrees are sums of these.
             mujoco.mj_setConst(model, self.data)
+
+    def _dry_friction(self, effects):
+        """Friction and the speed over which it builds up, or None: coulomb tanh(dq / creep), by its equation, because MuJoCo's
+        `frictionloss` builds up otherwise. As explicit steps have it, it cannot build up faster than a step stops the joint."""
+        effect = effects.get("joint_coulomb_friction")
+        if effect is None:
+            return None
+        coulomb, creep = np.asarray(effect["coulomb"], float), effect.get("creep", 0.002)
+        return coulomb, np.maximum(creep, coulomb * self.model.dof_invweight0[self.dofs] * self.step) + 1e-9
 
     def _commands(self, asked, effects):
         commands = asked.commands
@@ -140,6 +148,7 @@ class Arm:
             wanted = stiffness * commands[:, :asked.dof] + damping * commands[:, asked.dof:]
         else:
             wanted = stiffness * commands[:, :asked.dof]
+        dry = self._dry_friction(effects)
         wants_torque, rotor = "tau_J" in asked.readings, model.dof_armature[self.dofs]
         ends = {name: np.empty((len(commands) + 1, asked.dof)) for name in ("q", "dq", *asked.readings)}
         qs, dqs = ends["q"], ends["dq"]
@@ -156,6 +165,10 @@ class Arm:
             torque[:] = tau - lost
             friction = 0.0
             for _ in range(self.steps):
+                if dry is not None:
+                    slowed = dry[0] * np.tanh(speed / dry[1])
+                    torque[:] = tau - lost - slowed
+                    friction = friction - slowed
                 mujoco.mj_step(model, data)
                 if wants_torque:
                     friction = friction + data.qfrc_passive[self.dofs] + data.qfrc_constraint[self.dofs]

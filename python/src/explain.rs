@@ -26,8 +26,8 @@ fn interruptible<T: Send>(
     work: impl FnOnce(&Interrupt) -> anyhow::Result<T> + Send,
 ) -> PyResult<T> {
     let interrupt = Interrupt::default();
-    let (done, answer) = channel();
     py.detach(|| {
+        let (done, answer) = channel();
         std::thread::scope(|scope| {
             let flag = interrupt.clone();
             scope.spawn(move || done.send(work(&flag)));

@@ -134,7 +134,7 @@ fn an_engine_that_fails_on_the_way_costs_one_line_and_nothing_that_was_found() {
         assert!(!cell.path("diagnosis.json").exists(), "{options}");
     }
     let line = engine("");
-    calibration(&cell, &["diagnose", "SESSION", "--out", &out, "--engine", &line]).succeeded();
+    let _answer = calibration(&cell, &["diagnose", "SESSION", "--out", &out, "--engine", &line]).succeeded();
     assert!(!cell.path("diagnosis.json.state").exists() && cell.path("diagnosis.json").exists());
     let line = engine("--nan-after 0");
     let failed = calibration(&cell, &["identify", "arm", "SESSION", "--engine", &line]);

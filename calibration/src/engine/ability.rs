@@ -20,6 +20,12 @@ pub enum Quantity {
 }
 
 impl Quantity {
+    /// The one of a name of logs and messages; positions where there is none.
+    #[must_use]
+    pub fn named(name: &str) -> Self {
+        QUANTITIES.iter().find(|(known, _)| *known == name).map_or(Self::Position, |(_, quantity)| *quantity)
+    }
+
     /// Its name in messages.
     pub(super) fn name(self) -> &'static str {
         QUANTITIES[self as usize].0

@@ -45,6 +45,21 @@ pub trait ClipModel: Sync {
     /// [`Impossible`] where the model has no answer.
     fn residuals(&self, clip: usize, shared: &[f64], own: &[f64], out: &mut Vec<f64>) -> Result<(), Impossible>;
 
+    /// The same a difference step away from numbers at which the residuals are `base`: for slopes, which a model that is cheaper than
+    /// the residuals' own may give.
+    ///
+    /// # Errors
+    /// As [`ClipModel::residuals`].
+    fn stepped(
+        &self,
+        clip: usize,
+        (shared, own): (&[f64], &[f64]),
+        (_from, _base): ((&[f64], &[f64]), &[f64]),
+        out: &mut Vec<f64>,
+    ) -> Result<(), Impossible> {
+        self.residuals(clip, shared, own, out)
+    }
+
     /// Where the stretches of a clip's rows end that are witnesses of their own: so long that what residuals of
     /// neighbouring rows share has died away from one stretch to the next. Empty: the clip is a single witness.
     fn stretches(&self, _clip: usize) -> Vec<usize> {

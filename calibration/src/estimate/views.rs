@@ -29,6 +29,17 @@ impl<M: ClipModel> ClipModel for Counted<'_, M> {
         self.model.residuals(clip, shared, own, out)
     }
 
+    fn stepped(
+        &self,
+        clip: usize,
+        to: (&[f64], &[f64]),
+        from: ((&[f64], &[f64]), &[f64]),
+        out: &mut Vec<f64>,
+    ) -> Result<(), Impossible> {
+        self.calls.fetch_add(1, Ordering::Relaxed);
+        self.model.stepped(clip, to, from, out)
+    }
+
     fn stretches(&self, clip: usize) -> Vec<usize> {
         self.model.stretches(clip)
     }
@@ -47,6 +58,16 @@ impl<M: ClipModel> ClipModel for Given<'_, M> {
 
     fn residuals(&self, clip: usize, _: &[f64], own: &[f64], out: &mut Vec<f64>) -> Result<(), Impossible> {
         self.model.residuals(clip, self.shared, own, out)
+    }
+
+    fn stepped(
+        &self,
+        clip: usize,
+        (_, own): (&[f64], &[f64]),
+        ((_, from), base): ((&[f64], &[f64]), &[f64]),
+        out: &mut Vec<f64>,
+    ) -> Result<(), Impossible> {
+        self.model.stepped(clip, (self.shared, own), ((self.shared, from), base), out)
     }
 
     fn stretches(&self, clip: usize) -> Vec<usize> {
@@ -93,6 +114,16 @@ impl<M: ClipModel> ClipModel for Subset<'_, M> {
 
     fn residuals(&self, clip: usize, shared: &[f64], own: &[f64], out: &mut Vec<f64>) -> Result<(), Impossible> {
         self.model.residuals(self.clips[clip], shared, own, out)
+    }
+
+    fn stepped(
+        &self,
+        clip: usize,
+        to: (&[f64], &[f64]),
+        from: ((&[f64], &[f64]), &[f64]),
+        out: &mut Vec<f64>,
+    ) -> Result<(), Impossible> {
+        self.model.stepped(self.clips[clip], to, from, out)
     }
 
     fn stretches(&self, clip: usize) -> Vec<usize> {

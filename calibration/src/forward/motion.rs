@@ -8,7 +8,8 @@
 //! ```
 //!
 //! So every effect of the library remains a candidate, and is judged by what it does beside the engine's own model. The sum is
-//! exact where an effect does the same in both models, and off by its cross terms with what the two models differ by. The state in which a clip begins is estimated with the twin's own
+//! exact where an effect does the same in both models, and off by its cross terms with what the two models differ by. Slopes are the
+//! twin's own for the same reason, and cost no roll-out of the engine. The state in which a clip begins is estimated with the twin's
 //! model from its first 20 ms, in which two models of one arm do the same.
 #![allow(non_snake_case)] // the Franka Control Interface's own symbols
 

@@ -274,6 +274,21 @@ impl<M: ClipModel> ClipModel for Watched<'_, M> {
         answer
     }
 
+    fn stepped(
+        &self,
+        clip: usize,
+        to: (&[f64], &[f64]),
+        from: ((&[f64], &[f64]), &[f64]),
+        out: &mut Vec<f64>,
+    ) -> Result<(), Impossible> {
+        if self.watch.interrupt.asked() {
+            return Err(Impossible("interrupted".into()));
+        }
+        let answer = self.model.stepped(clip, to, from, out);
+        self.watch.one_more();
+        answer
+    }
+
     fn stretches(&self, clip: usize) -> Vec<usize> {
         self.model.stretches(clip)
     }

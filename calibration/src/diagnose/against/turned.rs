@@ -4,7 +4,7 @@
 //! library are turned and in which session each acts; what is not turned stays where it is.
 
 use super::super::library::Library;
-use crate::diagnose::evidence::measured::{Channel, Evidence, Reach, Row};
+use crate::diagnose::evidence::measured::{Channel, Evidence, Near, Row};
 use crate::diagnose::evidence::scatter::Scatter;
 use crate::estimate::{ClipModel, Impossible, Unknown};
 use crate::forward::Setting;
@@ -167,10 +167,11 @@ impl<E: Evidence> Evidence for TwoSessions<'_, E> {
         &self,
         clip: usize,
         (shared, own): (&[f64], &[f64]),
-        (reach, base): (Reach, &[f64]),
+        (reach, base, at): Near<'_>,
         out: &mut Vec<f64>,
     ) -> Result<(), Impossible> {
-        self.evidence.changed(clip, (&self.full(clip, shared), own), (reach, base), out)
+        let at = at.map(|at| self.full(clip, at));
+        self.evidence.changed(clip, (&self.full(clip, shared), own), (reach, base, at.as_deref()), out)
     }
 
     fn channels(&self) -> &[Channel] {

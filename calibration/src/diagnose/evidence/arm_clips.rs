@@ -3,7 +3,7 @@
 //! then on belongs to [`super::contact`].
 #![allow(non_snake_case)] // the Franka Control Interface's own symbols
 
-use super::measured::{Channel, Evidence, Group, Row, StageName};
+use super::measured::{Channel, Evidence, Group, Near, Row, StageName};
 use super::recent::Recent;
 use super::scatter::Scatter;
 use crate::diagnose::clips::torques::is_tracking;
@@ -43,6 +43,8 @@ pub struct ArmClips<F> {
     cell: Cell,
     nominal: ArmModel,
     mover: Mover,
+    /// The twin's own, where another program is the mover: it gives what a step changes.
+    twin: Option<Mover>,
     channels: Vec<Channel>,
     /// One sigma of each channel's sensor.
     sigma: Vec<f64>,
@@ -59,6 +61,8 @@ struct Prepared {
     stamps_ns: Vec<u64>,
     rows: Vec<Row>,
     recent: Recent<Vec<f64>>,
+    /// The twin's own, from which steps are taken.
+    stepped_from: Recent<Vec<f64>>,
     /// From here on the tool may touch the object.
     alone_until_ns: u64,
 }
@@ -90,19 +94,14 @@ impl<F: Fn(&[f64]) -> Theta + Sync> ArmClips<F> {
         let top = top_speeds(clips, dof);
         let clips = clips.iter().filter_map(|clip| Prepared::new(clip.clone(), cell, &channels, &top)).collect();
         let mover = Mover::own(cell, &nominal);
-        Ok(Self { cell: cell.clone(), nominal, mover, channels, sigma, clips, theta })
+        Ok(Self { cell: cell.clone(), nominal, mover, twin: None, channels, sigma, clips, theta })
     }
 
     /// The same moved by another program, where there is one; `known`: the cell's nominal parameters.
     #[must_use]
     pub fn moved_by(mut self, engine: Option<Arc<Engine>>, known: &Theta) -> Self {
-        let quantity = |channel: &Channel| match channel.quantity {
-            "dq" => Quantity::Velocity,
-            "tau_J" => Quantity::Torque,
-            "tau_J_d" => Quantity::DesiredTorque,
-            _ => Quantity::Position,
-        };
-        let wanted = self.channels.iter().map(quantity).collect();
+        self.twin = engine.is_some().then(|| self.mover.clone());
+        let wanted = self.channels.iter().map(|channel| Quantity::named(channel.quantity)).collect();
         self.mover = self.mover.by(engine, known.clone(), wanted);
         self
     }
@@ -168,8 +167,8 @@ impl Prepared {
                 rows.push(Row { channel, stage: StageName::Control, regime: regime(dq, top[channel % dof]), time });
             }
         }
-        let recent = Recent::default();
-        Some(Self { recorded, commands, kept, stamps_ns, rows, recent, alone_until_ns: end_ns })
+        let (recent, stepped_from) = (Recent::default(), Recent::default());
+        Some(Self { recorded, commands, kept, stamps_ns, rows, recent, stepped_from, alone_until_ns: end_ns })
     }
 }
 
@@ -217,7 +216,7 @@ impl<F: Fn(&[f64]) -> Theta + Sync> ArmClips<F> {
     pub fn peaks(&self, shared: &[f64]) -> Result<Joints, Impossible> {
         let mut peaks = [0.0; MAX_JOINTS];
         for clip in 0..self.clips.len() {
-            for reading in self.readings(clip, shared)? {
+            for reading in self.readings((&self.mover, 1), clip, shared)? {
                 let gravity = self.nominal.gravity(&reading.state.q);
                 let asked = reading.tau_J_d.iter().zip(gravity).map(|(tau, gravity)| (tau + gravity).abs());
                 peaks.iter_mut().zip(asked).for_each(|(peak, asked)| *peak = asked.max(*peak));
@@ -244,28 +243,24 @@ impl<F: Fn(&[f64]) -> Theta + Sync> ArmClips<F> {
     /// # Errors
     /// [`Impossible`] when the cell cannot be simulated with these numbers.
     pub(in crate::diagnose) fn simulated(&self, clip: usize, shared: &[f64]) -> Result<Vec<f64>, Impossible> {
-        self.simulated_in(1, clip, shared)
+        self.simulated_by((&self.mover, 1), clip, shared)
     }
 
-    /// The same with every control period integrated in `parts`.
-    fn simulated_in(&self, parts: u32, clip: usize, shared: &[f64]) -> Result<Vec<f64>, Impossible> {
-        let readings = self.readings_in(parts, clip, shared)?;
+    /// By the twin or another simulator, every control period integrated in so many parts where it can.
+    fn simulated_by(&self, by: (&Mover, u32), clip: usize, shared: &[f64]) -> Result<Vec<f64>, Impossible> {
+        let readings = self.readings(by, clip, shared)?;
         let mut residuals = Vec::new();
         self.compare(&self.clips[clip], &readings, &mut residuals)?;
         Ok(residuals)
     }
 
-    fn readings(&self, clip: usize, shared: &[f64]) -> Result<Vec<Reading>, Impossible> {
-        self.readings_in(1, clip, shared)
-    }
-
     /// At every moment that counts, and a control period later.
-    fn readings_in(&self, parts: u32, clip: usize, shared: &[f64]) -> Result<Vec<Reading>, Impossible> {
+    fn readings(&self, (mover, parts): (&Mover, u32), clip: usize, shared: &[f64]) -> Result<Vec<Reading>, Impossible> {
         let clip = &self.clips[clip];
         let measured = &clip.recorded.measured;
         let stretch = Stretch { measured, from: 0, commands: &clip.commands, ahead: &[], parts };
         let mut readings = vec![Reading::default(); clip.stamps_ns.len()];
-        self.mover.readings(&(self.theta)(shared), &stretch, &clip.stamps_ns, &mut readings)?;
+        mover.readings(&(self.theta)(shared), &stretch, &clip.stamps_ns, &mut readings)?;
         Ok(readings)
     }
 
@@ -310,7 +305,22 @@ impl<F: Fn(&[f64]) -> Theta + Sync> ArmClips<F> {
 
 impl<F: Fn(&[f64]) -> Theta + Sync> Evidence for ArmClips<F> {
     fn in_halves(&self, clip: usize, shared: &[f64]) -> Option<Vec<f64>> {
-        self.simulated_in(2, clip, shared).ok()
+        // Another simulator has steps of its own.
+        if self.twin.is_some() { None } else { self.simulated_by((&self.mover, 2), clip, shared).ok() }
+    }
+
+    fn changed(
+        &self,
+        clip: usize,
+        (shared, own): (&[f64], &[f64]),
+        (_, base, at): Near<'_>,
+        out: &mut Vec<f64>,
+    ) -> Result<(), Impossible> {
+        let (Some(twin), Some(at)) = (&self.twin, at) else { return self.residuals(clip, shared, own, out) };
+        let from = self.clips[clip].stepped_from.at(at, || self.simulated_by((twin, 1), clip, at))?;
+        *out = self.simulated_by((twin, 1), clip, shared)?;
+        out.iter_mut().zip(base).zip(&*from).for_each(|((out, base), from)| *out += base - from);
+        Ok(())
     }
 
     fn channels(&self) -> &[Channel] {
@@ -380,7 +390,7 @@ mod tests {
         let recorded = clip(&cell, &Theta::default(), true);
         let arm = ArmClips::new(&cell, &[recorded], |_: &[f64]| Theta::default()).expect("an arm");
         let told = |away: f64| {
-            let mut readings = arm.readings(0, &[]).expect("it can be simulated");
+            let mut readings = arm.readings((&arm.mover, 1), 0, &[]).expect("it can be simulated");
             readings[200].state.q[3] += away;
             arm.compare(&arm.clips[0], &readings, &mut Vec::new())
         };

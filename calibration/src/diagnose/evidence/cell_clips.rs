@@ -9,7 +9,7 @@
 use super::arm_clips::ArmClips;
 use super::contact::Contact;
 use super::deviations;
-use super::measured::{Channel, Evidence, Group, Reach, Row, StageName};
+use super::measured::{Channel, Evidence, Group, Near, Reach, Row, StageName};
 use super::recent::Recent;
 use super::scatter::Scatter;
 use crate::diagnose::library::Library;
@@ -218,7 +218,7 @@ impl<F: Fn(&[f64]) -> Theta + Sync> Evidence for CellClips<'_, F> {
         &self,
         clip: usize,
         (shared, own): (&[f64], &[f64]),
-        (reach, base): (Reach, &[f64]),
+        (reach, base, _): Near<'_>,
         out: &mut Vec<f64>,
     ) -> Result<(), Impossible> {
         let of_arm = self.of_arm(clip);

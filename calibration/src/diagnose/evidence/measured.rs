@@ -80,10 +80,13 @@ pub enum Reach {
     Object,
 }
 
+/// A point nearby: what can have changed from it, the residuals there, and the shared numbers there, where they are known.
+pub type Near<'a> = (Reach, &'a [f64], Option<&'a [f64]>);
+
 /// Clips that tell what each of their residuals is.
 pub trait Evidence: ClipModel {
-    /// [`ClipModel::residuals`] where only some can have changed from `base`: the others may be taken from there, which saves
-    /// their simulation.
+    /// [`ClipModel::residuals`] where only some can have changed from those of a point nearby: the others may be taken from there,
+    /// which saves their simulation.
     ///
     /// # Errors
     /// As [`ClipModel::residuals`].
@@ -91,7 +94,7 @@ pub trait Evidence: ClipModel {
         &self,
         clip: usize,
         (shared, own): (&[f64], &[f64]),
-        (_reach, _base): (Reach, &[f64]),
+        _near: Near<'_>,
         out: &mut Vec<f64>,
     ) -> Result<(), Impossible> {
         self.residuals(clip, shared, own, out)

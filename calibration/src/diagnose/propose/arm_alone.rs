@@ -5,7 +5,7 @@
 use super::screening::arm_gap_is_open;
 use super::starts;
 use crate::diagnose::clips::split::Split;
-use crate::diagnose::evidence::measured::{Channel, Evidence, Reach, Row};
+use crate::diagnose::evidence::measured::{Channel, Evidence, Near, Reach, Row};
 use crate::diagnose::evidence::scatter::Scatter;
 use crate::diagnose::fit::bench::{Bench, Hypothesis};
 use crate::diagnose::fit::effort::{FIRST_PASS, HEAT, LOOK, NEAR};
@@ -99,7 +99,7 @@ impl<E: Evidence> ClipModel for ArmAlone<'_, E> {
 
     fn residuals(&self, clip: usize, shared: &[f64], own: &[f64], out: &mut Vec<f64>) -> Result<(), Impossible> {
         let nothing = vec![0.0; self.rows(clip).len()];
-        self.0.changed(clip, (shared, own), (Reach::Arm, &nothing), out)
+        self.0.changed(clip, (shared, own), (Reach::Arm, &nothing, None), out)
     }
 }
 
@@ -108,7 +108,7 @@ impl<E: Evidence> Evidence for ArmAlone<'_, E> {
         &self,
         clip: usize,
         numbers: (&[f64], &[f64]),
-        (reach, base): (Reach, &[f64]),
+        (reach, base, at): Near<'_>,
         out: &mut Vec<f64>,
     ) -> Result<(), Impossible> {
         match reach {
@@ -117,7 +117,7 @@ impl<E: Evidence> Evidence for ArmAlone<'_, E> {
                 out.extend_from_slice(base);
                 Ok(())
             }
-            Reach::All | Reach::Arm => self.0.changed(clip, numbers, (Reach::Arm, base), out),
+            Reach::All | Reach::Arm => self.0.changed(clip, numbers, (Reach::Arm, base, at), out),
         }
     }
 

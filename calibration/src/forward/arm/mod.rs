@@ -92,6 +92,8 @@ pub struct ArmClips<F> {
     cell: Cell,
     nominal: ArmModel,
     mover: Mover,
+    /// The twin's own, where another program is the mover: it gives the slopes.
+    twin: Option<Mover>,
     channels: Vec<Channel>,
     clips: Vec<ArmClip>,
     /// One sigma of a single logged value, by [`CHANNELS`].
@@ -140,12 +142,13 @@ impl<F: Fn(&[f64]) -> Theta + Sync> ArmClips<F> {
         let sigma = sigmas(&usable, nominal.dof());
         let (torque_lead, spare) = (torque_time::lead(&usable), Mutex::default());
         let (cell, mover) = (cell.clone(), Mover::own(cell, &nominal));
-        Ok((Self { cell, nominal, mover, channels, clips: usable, sigma, torque_lead, theta, spare }, left_out))
+        Ok((Self { cell, nominal, mover, twin: None, channels, clips: usable, sigma, torque_lead, theta, spare }, left_out))
     }
 
     /// The same moved by another program, where there is one; `known`: the cell's nominal parameters.
     #[must_use]
     pub fn moved_by(mut self, engine: Option<Arc<Engine>>, known: &Theta) -> Self {
+        self.twin = engine.is_some().then(|| self.mover.clone());
         let wanted = self.channels.iter().map(|channel| channel.quantity()).collect();
         self.mover = self.mover.by(engine, known.clone(), wanted);
         self
@@ -264,7 +267,7 @@ impl<F: Fn(&[f64]) -> Theta + Sync> ArmClips<F> {
     /// As [`ArmClips::predict`].
     pub fn predict_in(&self, parts: u32, of: (usize, &[f64], &[f64])) -> Result<Vec<Reading>, Impossible> {
         let ((clip, shared, own), mut out) = (of, Vec::new());
-        self.simulate(&self.clips[clip], &(self.theta)(shared), (own, parts), &mut out)?;
+        self.simulate(&self.mover, &self.clips[clip], (shared, own, parts), &mut out)?;
         Ok(out)
     }
 
@@ -278,9 +281,19 @@ impl<F: Fn(&[f64]) -> Theta + Sync> ArmClips<F> {
         (clip, shared, own): (usize, &[f64], &[f64]),
         out: &mut Vec<f64>,
     ) -> Result<(), Impossible> {
+        self.residuals_by(&self.mover, (clip, shared, own), parts, out)
+    }
+
+    fn residuals_by(
+        &self,
+        mover: &Mover,
+        (clip, shared, own): (usize, &[f64], &[f64]),
+        parts: u32,
+        out: &mut Vec<f64>,
+    ) -> Result<(), Impossible> {
         let mut predicted = self.spare.lock().expect("no evaluation panics").pop().unwrap_or_default();
         let clip = &self.clips[clip];
-        let answer = self.simulate(clip, &(self.theta)(shared), (own, parts), &mut predicted);
+        let answer = self.simulate(mover, clip, (shared, own, parts), &mut predicted);
         if answer.is_ok() {
             out.clear();
             for bin in &clip.bins {
@@ -295,11 +308,12 @@ impl<F: Fn(&[f64]) -> Theta + Sync> ArmClips<F> {
 
     fn simulate(
         &self,
+        mover: &Mover,
         clip: &ArmClip,
-        theta: &Theta,
-        (own, parts): (&[f64], u32),
+        (shared, own, parts): (&[f64], &[f64], u32),
         out: &mut Vec<Reading>,
     ) -> Result<(), Impossible> {
+        let theta = &(self.theta)(shared);
         let dof = self.nominal.dof();
         let age = encoder_age::of(own.get(2 * dof));
         let seen = encoder_age::controlled(&self.cell, &clip.recorded.desired, theta, age);
@@ -310,7 +324,7 @@ impl<F: Fn(&[f64]) -> Theta + Sync> ArmClips<F> {
         for (i, run) in clip.runs.iter().enumerate() {
             let ahead = if i == 0 { &own[..own.len().min(2 * dof)] } else { &[] };
             let stretch = Stretch { measured, from: run.start, commands, ahead, parts };
-            self.mover.readings(theta, &stretch, &measured.stamps_ns[run.clone()], &mut out[run.clone()])?;
+            mover.readings(theta, &stretch, &measured.stamps_ns[run.clone()], &mut out[run.clone()])?;
         }
         encoder_age::shift(age, out);
         Ok(())
@@ -352,6 +366,21 @@ impl<F: Fn(&[f64]) -> Theta + Sync> ClipModel for ArmClips<F> {
 
     fn residuals(&self, clip: usize, shared: &[f64], own: &[f64], out: &mut Vec<f64>) -> Result<(), Impossible> {
         self.residuals_in(1, (clip, shared, own), out)
+    }
+
+    fn stepped(
+        &self,
+        clip: usize,
+        (shared, own): (&[f64], &[f64]),
+        ((from, from_own), base): ((&[f64], &[f64]), &[f64]),
+        out: &mut Vec<f64>,
+    ) -> Result<(), Impossible> {
+        let Some(twin) = &self.twin else { return self.residuals(clip, shared, own, out) };
+        let mut before = Vec::new();
+        self.residuals_by(twin, (clip, from, from_own), 1, &mut before)?;
+        self.residuals_by(twin, (clip, shared, own), 1, out)?;
+        out.iter_mut().zip(base).zip(&before).for_each(|((out, base), before)| *out += base - before);
+        Ok(())
     }
 
     fn stretches(&self, clip: usize) -> Vec<usize> {
