@@ -113,14 +113,12 @@ class Arm:
             # Masses of subtrees are sums of these.
             mujoco.mj_setConst(model, self.data)
 
-    def _dry_friction(self, effects):
-        """Friction and the speed over which it builds up, or None: coulomb tanh(dq / creep), by its equation, because MuJoCo's
-        `frictionloss` builds up otherwise. As explicit steps have it, it cannot build up faster than a step stops the joint."""
-        effect = effects.get("joint_coulomb_friction")
-        if effect is None:
-            return None
-        coulomb, creep = np.asarray(effect["coulomb"], float), effect.get("creep", 0.002)
-        return coulomb, np.maximum(creep, coulomb * self.model.dof_invweight0[self.dofs] * self.step) + 1e-9
+    def _brake(self, dry, speed):
+        """Dry friction coulomb tanh(dq / creep) as the damping that does the same at this speed: MuJoCo takes damping at the end of a
+        step, so that friction stops a joint and does not throw it back. Its own `frictionloss` builds up otherwise."""
+        coulomb, creep = dry
+        size = np.maximum(np.abs(speed), 1e-9)
+        return self.nominal["dof_damping"][self.dofs] + coulomb * np.tanh(size / np.maximum(creep, 1e-6)) / size
 
     def _commands(self, asked, effects):
         commands = asked.commands
@@ -148,7 +146,9 @@ class Arm:
             wanted = stiffness * commands[:, :asked.dof] + damping * commands[:, asked.dof:]
         else:
             wanted = stiffness * commands[:, :asked.dof]
-        dry = self._dry_friction(effects)
+        dry = effects.get("joint_coulomb_friction")
+        dry = dry and (np.asarray(dry["coulomb"], float), np.asarray(dry.get("creep", 0.002), float))
+        viscous, damped = part("joint_viscous_friction", "viscous", 0.0), model.dof_damping[self.dofs]
         wants_torque, rotor = "tau_J" in asked.readings, model.dof_armature[self.dofs]
         ends = {name: np.empty((len(commands) + 1, asked.dof)) for name in ("q", "dq", *asked.readings)}
         qs, dqs = ends["q"], ends["dq"]
@@ -166,9 +166,7 @@ class Arm:
             friction = 0.0
             for _ in range(self.steps):
                 if dry is not None:
-                    slowed = dry[0] * np.tanh(speed / dry[1])
-                    torque[:] = tau - lost - slowed
-                    friction = friction - slowed
+                    damped[:] = self._brake(dry, speed) + viscous
                 mujoco.mj_step(model, data)
                 if wants_torque:
                     friction = friction + data.qfrc_passive[self.dofs] + data.qfrc_constraint[self.dofs]

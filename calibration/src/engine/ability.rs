@@ -71,7 +71,10 @@ impl Ability {
             let on_arm = |effect: &&twin::effects::EffectInfo| effect.stage == Stage::Control;
             let Some(effect) = find(name).filter(on_arm) else {
                 let known: Vec<&str> = registry().iter().filter(on_arm).map(|effect| effect.name).collect();
-                return Err(format!("says that it knows the effect `{name}`; on the arm there are {}", known.join(", ")));
+                return Err(format!(
+                    "says that it knows the effect `{name}`; on the arm there are {}",
+                    known.join(", ")
+                ));
             };
             if let Some(other) = parameters.iter().find(|name| effect.parameters.iter().all(|p| p.name != **name)) {
                 let known: Vec<&str> = effect.parameters.iter().map(|p| p.name).collect();
@@ -178,10 +181,7 @@ mod tests {
     fn what_an_engine_does_not_know_rests_or_is_nominal() {
         let effects = r#"{"joint_coulomb_friction": ["coulomb"]}"#;
         let ability = Ability::read(hello(effects, &["damping"], &["q"])).expect("all known");
-        let nominal = Theta {
-            arm: Some(ArmTheta { stiffness: vec![6.0], damping: vec![2.0] }),
-            ..Theta::default()
-        };
+        let nominal = Theta { arm: Some(ArmTheta { stiffness: vec![6.0], damping: vec![2.0] }), ..Theta::default() };
         let part = ability.part(&theta(), &nominal);
         assert_eq!(part.arm, Some(ArmTheta { stiffness: vec![6.0], damping: vec![3.0] }));
         let [friction] = &part.effects[..] else { panic!("{part:?}") };

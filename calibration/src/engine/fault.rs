@@ -24,7 +24,9 @@ pub enum EngineError {
         words: String,
     },
     /// It does not answer.
-    #[error("the engine `{command}` has not answered for {seconds} s{words}; allow more with --engine-limit, or see where it hangs")]
+    #[error(
+        "the engine `{command}` has not answered for {seconds} s{words}; allow more with --engine-limit, or see where it hangs"
+    )]
     Silent {
         /// As it was given.
         command: String,

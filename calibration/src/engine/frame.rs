@@ -78,6 +78,8 @@ mod tests {
 
     #[test]
     fn what_somebody_printed_is_no_message() {
-        assert!(matches!(read(&mut &b"loading model ..."[..]), Err(FrameError::NoMessage(bytes)) if &bytes == b"loading "));
+        assert!(
+            matches!(read(&mut &b"loading model ..."[..]), Err(FrameError::NoMessage(bytes)) if &bytes == b"loading ")
+        );
     }
 }

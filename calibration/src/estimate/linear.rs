@@ -58,9 +58,8 @@ impl ClipFit {
             model.stepped(clip, (moved, own), ((shared, own), &base), out)
         });
         let steps = random.iter().map(|effect| (if effect.sigma > 0.0 { effect.step } else { 0.0 }, f64::INFINITY));
-        let b = slopes(&base, own, steps, |moved, out| {
-            model.stepped(clip, (shared, moved), ((shared, own), &base), out)
-        });
+        let b =
+            slopes(&base, own, steps, |moved, out| model.stepped(clip, (shared, moved), ((shared, own), &base), out));
         Ok(Self::eliminate(&DVector::from_vec(base), (&a, &b), (random, own), &model.stretches(clip)))
     }
 

@@ -94,6 +94,19 @@ impl<M: ClipModel> ClipModel for Shifted<'_, M> {
         Ok(())
     }
 
+    fn stepped(
+        &self,
+        clip: usize,
+        to: (&[f64], &[f64]),
+        (from, base): ((&[f64], &[f64]), &[f64]),
+        out: &mut Vec<f64>,
+    ) -> Result<(), Impossible> {
+        let base: Vec<f64> = base.iter().zip(&self.by[clip]).map(|(residual, by)| residual - by).collect();
+        self.model.stepped(clip, to, (from, &base), out)?;
+        out.iter_mut().zip(&self.by[clip]).for_each(|(residual, by)| *residual += by);
+        Ok(())
+    }
+
     fn stretches(&self, clip: usize) -> Vec<usize> {
         self.model.stretches(clip)
     }

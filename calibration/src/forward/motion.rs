@@ -22,7 +22,7 @@ use shared_mem::theta::Theta;
 use shared_mem::time::TICK_NS;
 use std::ops::Range;
 use std::sync::Arc;
-use twin::arm::{ArmModel, JointState};
+use twin::arm::{ArmModel, JointState, Joints};
 use twin::control::{ArmRollout, CommandTrack, Plant, Reading};
 use twin::effects::Effects;
 
@@ -64,15 +64,18 @@ impl Mover {
     }
 
     /// By another program, where there is one; `known`: the cell's nominal parameters; `wanted`: what is compared of what it
-    /// reports.
+    /// reports. Velocities are asked for besides, where it reports them: they say where joints were a moment ago.
     #[must_use]
     pub fn by(self, engine: Option<Arc<Engine>>, known: Theta, mut wanted: Vec<Quantity>) -> Self {
+        wanted.push(Quantity::Velocity);
+        wanted.retain(|quantity| engine.as_ref().is_some_and(|engine| engine.ability().reports(*quantity)));
         wanted.sort_unstable();
         wanted.dedup();
         Self { engine, known, wanted, ..self }
     }
 
-    /// What the sensors read at the ascending stamps, in `out`; quantities that an engine is not asked for are without meaning.
+    /// What the sensors read at the ascending stamps, in `out`; quantities that an engine is not asked for are without
+    /// meaning, velocities the twin's.
     ///
     /// # Errors
     /// [`Impossible`] where the arm cannot be simulated, or leaves all bounds.
@@ -89,22 +92,28 @@ impl Mover {
         // What the twin's own time step does is in neither its states nor in a difference.
         let stretch = &Stretch { parts: 1, ..*stretch };
         let known = engine.ability().part(theta, &self.known);
-        let start = if known == *theta {
-            self.prepared(theta)?.start(stretch)?
+        let whole = known == *theta && self.wanted.contains(&Quantity::Velocity);
+        let (start, mut without) = if whole {
+            (self.prepared(theta)?.start(stretch)?, Vec::new())
         } else {
             let mut without = vec![Reading::default(); out.len()];
             let start = self.twin(&known, stretch, stamps_ns, &mut without)?;
             self.twin(theta, stretch, stamps_ns, out)?;
-            out.iter_mut().zip(&without).for_each(|(with, without)| add(with, without, -1.0));
-            start
+            (start, without)
         };
         let states = self.asked(engine, &known, (stretch, &start), stamps_ns)?;
         let dof = self.nominal.dof();
         let columns = self.wanted.len() * dof;
-        let is_known = known == *theta;
-        for (row, out) in states.chunks_exact(columns).zip(out) {
-            let theirs = reading(row, &self.wanted, dof);
-            if is_known { *out = theirs } else { add(out, &theirs, 1.0) }
+        for (i, (row, out)) in states.chunks_exact(columns).zip(out).enumerate() {
+            let before = without.get_mut(i).map(|without| quantities(without).map(|joints| *joints));
+            for (quantity, theirs) in self.wanted.iter().zip(row.chunks_exact(dof)) {
+                let joints = &mut quantities(out)[*quantity as usize][..dof];
+                match &before {
+                    None => joints.copy_from_slice(theirs),
+                    Some(before) => (joints.iter_mut().zip(theirs).zip(&before[*quantity as usize]))
+                        .for_each(|((joint, theirs), before)| *joint += theirs - before),
+                }
+            }
         }
         Ok(())
     }
@@ -153,7 +162,8 @@ impl Mover {
         let (commands, before) = commands(stretch.commands, first_ns..last_ns, dof);
         let times: Vec<f64> = stamps_ns.iter().map(|stamp| stamp.saturating_sub(first_ns) as f64 * 1e-9).collect();
         let start = [&start.q[..dof], &start.dq[..dof]].concat();
-        let question = Question { theta, dof, start: &start, before, commands: &commands, readings: &self.wanted, times: &times };
+        let question =
+            Question { theta, dof, start: &start, before, commands: &commands, readings: &self.wanted, times: &times };
         let states = engine.roll_out(&question).map_err(|error| match error {
             NoStates::Impossible(why) => Impossible(format!("the engine has no answer: {why}")),
             NoStates::Failed(error) => Impossible(error.to_string()),
@@ -213,31 +223,9 @@ fn commands(track: &CommandTrack, over: Range<u64>, dof: usize) -> (Vec<f64>, us
     (out, before as usize)
 }
 
-/// A row of an engine's states.
-fn reading(row: &[f64], quantities: &[Quantity], dof: usize) -> Reading {
-    let mut reading = Reading::default();
-    for (quantity, values) in quantities.iter().zip(row.chunks_exact(dof)) {
-        let joints = match quantity {
-            Quantity::Position => &mut reading.state.q,
-            Quantity::Velocity => &mut reading.state.dq,
-            Quantity::Torque => &mut reading.tau_J,
-            Quantity::DesiredTorque => &mut reading.tau_J_d,
-        };
-        joints[..dof].copy_from_slice(values);
-    }
-    reading
-}
-
-fn add(to: &mut Reading, other: &Reading, times: f64) {
-    let pairs = [
-        (&mut to.state.q, &other.state.q),
-        (&mut to.state.dq, &other.state.dq),
-        (&mut to.tau_J, &other.tau_J),
-        (&mut to.tau_J_d, &other.tau_J_d),
-    ];
-    for (to, other) in pairs {
-        to.iter_mut().zip(other).for_each(|(to, other)| *to += times * other);
-    }
+/// What a reading holds, in the order of [`Quantity`].
+fn quantities(reading: &mut Reading) -> [&mut Joints; 4] {
+    [&mut reading.state.q, &mut reading.state.dq, &mut reading.tau_J, &mut reading.tau_J_d]
 }
 
 #[cfg(test)]

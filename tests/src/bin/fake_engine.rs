@@ -166,7 +166,8 @@ fn toml_of(value: &Value) -> String {
     fn inline(value: &Value) -> String {
         match value {
             Value::Object(table) => {
-                let pairs: Vec<String> = table.iter().map(|(key, value)| format!("{key} = {}", inline(value))).collect();
+                let pairs: Vec<String> =
+                    table.iter().map(|(key, value)| format!("{key} = {}", inline(value))).collect();
                 format!("{{ {} }}", pairs.join(", "))
             }
             Value::Array(values) => format!("[{}]", values.iter().map(inline).collect::<Vec<_>>().join(", ")),

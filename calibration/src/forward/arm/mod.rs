@@ -142,7 +142,10 @@ impl<F: Fn(&[f64]) -> Theta + Sync> ArmClips<F> {
         let sigma = sigmas(&usable, nominal.dof());
         let (torque_lead, spare) = (torque_time::lead(&usable), Mutex::default());
         let (cell, mover) = (cell.clone(), Mover::own(cell, &nominal));
-        Ok((Self { cell, nominal, mover, twin: None, channels, clips: usable, sigma, torque_lead, theta, spare }, left_out))
+        Ok((
+            Self { cell, nominal, mover, twin: None, channels, clips: usable, sigma, torque_lead, theta, spare },
+            left_out,
+        ))
     }
 
     /// The same moved by another program, where there is one; `known`: the cell's nominal parameters.
