@@ -13,8 +13,7 @@ use crate::diagnose::evidence::measured::{Evidence, Group};
 use crate::diagnose::fit::bench::{Bench, Hypothesis};
 use crate::diagnose::fit::parameters;
 use crate::diagnose::judge::confirm::confirm;
-use crate::diagnose::judge::gap::Residuals;
-use crate::diagnose::judge::gap::Shrunk;
+use crate::diagnose::judge::gap::{Residuals, Shrunk, Typical};
 use crate::diagnose::judge::held_out::{self, Fits};
 use crate::diagnose::judge::partly::{self, Partly};
 use crate::diagnose::judge::remainder::{self, Left};
@@ -92,9 +91,7 @@ pub fn conclude<E: Evidence>(
     let (baseline, before) = unseen(bench, split, (&first.from, &first.weights))?;
     let (with, after) = unseen(bench, split, (&found.last, last_weights))?;
     let (places, rest) = (localise::localise(bench.evidence, &before), localise::localise(bench.evidence, &after));
-    let all: Vec<usize> = (0..admitted.clips.len()).collect();
-    let typical = |hypothesis| Residuals::at(bench, hypothesis, &all).map(|left| left.typical());
-    let typical = typical(&first.from).zip(typical(&found.last)).ok_or(DiagnoseError::NoBaseline)?;
+    let typical = typical(bench, found, admitted).ok_or(DiagnoseError::NoBaseline)?;
     let left = Left::of_groups(&typical.0, &typical.1);
     let sensors = Left::of_all_sensors(&typical.0, &typical.1);
     let judged = confirm(bench, &first.weights, [(&baseline, &before), (&with, &after)], options.seed)?;
@@ -169,6 +166,17 @@ pub fn conclude<E: Evidence>(
         traces: traces(bench.evidence, (&before, if nearest.is_some() { after } else { shown }), &admitted.files),
         nearest,
     })
+}
+
+/// What the baseline and all that was found leave in a clip like most, of every group of sensors.
+fn typical<E: Evidence>(
+    bench: &Bench<'_, E>,
+    found: &Found,
+    admitted: &Admitted,
+) -> Option<(Vec<Typical>, Vec<Typical>)> {
+    let all: Vec<usize> = (0..admitted.clips.len()).collect();
+    let of = |hypothesis| Residuals::at(bench, hypothesis, &all).map(|left| left.typical());
+    of(&found.steps[0].from).zip(of(&found.last))
 }
 
 /// Numbers for the clips that they were not fitted to, and what they leave there.
