@@ -9,7 +9,6 @@ use crate::diagnose::evidence::measured::Evidence;
 use crate::diagnose::evidence::scatter::Scatter;
 use crate::diagnose::library::Library;
 use crate::estimate::{Unknown, bounded_step};
-use crate::forward::Setting;
 use crate::interrupt::Interrupt;
 use crate::kept::{Fingerprint, Trail};
 use nalgebra::{DMatrix, DVector};
@@ -88,8 +87,6 @@ const TOLERANCE: f64 = 0.05;
 const NEGLIGIBLE: f64 = 0.008;
 /// A control period and a half [s].
 const CONVENTION: f64 = 1.5e-3;
-/// A gain of less than this share of its upper bound may grow to that in one step.
-const LEAST_GAIN: f64 = 1e-3;
 /// Steps in which a clip finds its own numbers.
 const OWN_STEPS: usize = 2;
 /// Most trials with growing damping before a point counts as the best there is.
@@ -264,18 +261,11 @@ impl<E: Evidence> Bench<'_, E> {
         None
     }
 
-    /// Room of each free number for a step: to its bounds, and of a gain to half and to twice of what it is. Of gains that are known
-    /// by range alone the first slopes say nothing further away, and from a bound that they led to no slope may lead back.
+    /// Room of each free number to its bounds.
     fn room(&self, full: &[f64], free: &[usize]) -> Vec<[f64; 2]> {
         let room = |k: &usize| {
             let Unknown { lower, upper, .. } = self.library.unknowns[*k];
-            let bounds = [lower - full[*k], upper - full[*k]];
-            let gain = matches!(self.library.settings.settings()[*k], Setting::Stiffness(_) | Setting::Damping(_));
-            if !gain {
-                return bounds;
-            }
-            let least = LEAST_GAIN * upper;
-            [bounds[0].max(-0.5 * full[*k].max(least)), bounds[1].min(full[*k].max(least))]
+            [lower - full[*k], upper - full[*k]]
         };
         free.iter().map(room).collect()
     }
