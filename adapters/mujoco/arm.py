@@ -10,12 +10,12 @@ from protocol import Impossible
 
 FLOWN = 100.0  # a joint that far from 0 has left all bounds [rad]
 
-# Effects, with the parameters that are known of each.
+# Effects, with the parameters that are known of each. Dry friction is not among them: MuJoCo's `frictionloss` builds up otherwise than
+# coulomb tanh(dq / creep), and a verdict on it then has a wrong name. What the twin makes of it is added instead.
 EFFECTS = {
     "base_tilt": ["tilt"],
     "command_delay": ["delay"],
     "command_lag": ["time_constant"],
-    "joint_coulomb_friction": ["coulomb", "creep"],
     "joint_encoder_offset": ["offset"],
     "joint_friction_asymmetry": ["offset"],
     "joint_viscous_friction": ["viscous"],
@@ -91,7 +91,7 @@ class Arm:
         if controller["kind"] not in ("joint_impedance", "joint_pd"):
             raise ValueError(f"the control law `{controller['kind']}` is not known to this adapter")
         self.limit = np.array(controller.get("torque_limit", [np.inf] * len(joints)), float)
-        kept = ("dof_armature", "dof_damping", "dof_frictionloss")
+        kept = ("dof_armature", "dof_damping")
         self.nominal = {name: getattr(self.model, name).copy() for name in kept}
         self.gravity = self.model.opt.gravity.copy()
         self.believed = Believed(spec.compile(), self.at, self.dofs)
@@ -112,13 +112,6 @@ class Arm:
             model.body_ipos[load] = of("payload", "centre") + np.zeros(3)
             # Masses of subtrees are sums of these.
             mujoco.mj_setConst(model, self.data)
-
-    def _brake(self, dry, speed):
-        """Dry friction coulomb tanh(dq / creep) as the damping that does the same at this speed: MuJoCo takes damping at the end of a
-        step, so that friction stops a joint and does not throw it back. Its own `frictionloss` builds up otherwise."""
-        coulomb, creep = dry
-        size = np.maximum(np.abs(speed), 1e-9)
-        return self.nominal["dof_damping"][self.dofs] + coulomb * np.tanh(size / np.maximum(creep, 1e-6)) / size
 
     def _commands(self, asked, effects):
         commands = asked.commands
@@ -146,9 +139,6 @@ class Arm:
             wanted = stiffness * commands[:, :asked.dof] + damping * commands[:, asked.dof:]
         else:
             wanted = stiffness * commands[:, :asked.dof]
-        dry = effects.get("joint_coulomb_friction")
-        dry = dry and (np.asarray(dry["coulomb"], float), np.asarray(dry.get("creep", 0.002), float))
-        viscous, damped = part("joint_viscous_friction", "viscous", 0.0), model.dof_damping[self.dofs]
         wants_torque, rotor = "tau_J" in asked.readings, model.dof_armature[self.dofs]
         ends = {name: np.empty((len(commands) + 1, asked.dof)) for name in ("q", "dq", *asked.readings)}
         qs, dqs = ends["q"], ends["dq"]
@@ -165,8 +155,6 @@ class Arm:
             torque[:] = tau - lost
             friction = 0.0
             for _ in range(self.steps):
-                if dry is not None:
-                    damped[:] = self._brake(dry, speed) + viscous
                 mujoco.mj_step(model, data)
                 if wants_torque:
                     friction = friction + data.qfrc_passive[self.dofs] + data.qfrc_constraint[self.dofs]
