@@ -1,6 +1,7 @@
 //! An engine for `--engine`, as docs/engine.md describes one: the twin's own arm behind the protocol, which may fail.
 //!
-//! `fake_engine [--effects none|NAME,..] [--carries KG] [--ends-after N] [--silent-after N] [--short-after N] [--nan-after N]`
+//! `fake_engine [--effects none|NAME,..] [--carries KG] [--ends-after N] [--silent-after N] [--short-after N] [--nan-after N]
+//! [--counts FILE]`
 //! It shares no code with the other side of the pipe.
 
 use clap::Parser;
@@ -9,8 +10,9 @@ use shared_mem::cell::Cell;
 use shared_mem::recording::JointSeries;
 use shared_mem::theta::Theta;
 use shared_mem::time::TICK_NS;
+use std::fs::OpenOptions;
 use std::io::{Read, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 use twin::arm::{ArmModel, JointState};
 use twin::control::{CommandTrack, Plant, Reading};
@@ -37,6 +39,9 @@ struct Arguments {
     /// It sends what is no number behind so many.
     #[arg(long)]
     nan_after: Option<usize>,
+    /// A file that grows by a byte with each answer: the answers of all its processes count together.
+    #[arg(long)]
+    counts: Option<PathBuf>,
 }
 
 fn receive(from: &mut impl Read) -> Option<(Value, Vec<f64>)> {
@@ -142,6 +147,9 @@ fn main() {
             send(&mut to, &hello(&arguments), &[]);
             continue;
         }
+        if let Some(file) = &arguments.counts {
+            answered = std::fs::metadata(file).map_or(0, |file| usize::try_from(file.len()).expect("few"));
+        }
         let behind = |limit: Option<usize>| limit.is_some_and(|limit| answered >= limit);
         if behind(arguments.ends_after) {
             std::process::exit(9);
@@ -158,6 +166,10 @@ fn main() {
         }
         send(&mut to, &json!({"message": "states"}), &states);
         answered += 1;
+        if let Some(file) = &arguments.counts {
+            let file = OpenOptions::new().create(true).append(true).open(file);
+            file.and_then(|mut file| file.write_all(b".")).expect("room");
+        }
     }
 }
 
