@@ -75,8 +75,7 @@ pub fn read(folder: &Path) -> anyhow::Result<Vec<Labelled>> {
     let sessions: Vec<Labelled> = places.iter().filter(both).map(|place| one(place)).collect::<anyhow::Result<_>>()?;
     anyhow::ensure!(
         !sessions.is_empty(),
-        "{} holds no NAME/truth.json with its NAME/diagnosis.json; record some: python tests/peers/run.py --program calibration --out {}",
-        folder.display(),
+        "{} holds no NAME/truth.json with its NAME/diagnosis.json; record sessions there as tests/peers/README.md says",
         folder.display()
     );
     Ok(sessions)
@@ -280,8 +279,10 @@ mod tests {
         let values = |times: usize| normal.iter().cycle().take(10 * times).map(|z: &f64| (1.0 + 0.5 * z).exp());
         let (Some(of_ten), 10) = quantile(values(1)) else { panic!("ten are enough") };
         let (Some(of_thousand), 1000) = quantile(values(100)) else { panic!("a thousand are enough") };
-        let truth = (1.0 + 0.5 * NINETY_EIGHT).exp();
-        assert!((of_thousand / truth - 1.0).abs() < 0.05, "{of_thousand} {truth}");
+        // Ten quantiles spread a little less than what they are quantiles of.
+        let spread = 0.5 * (normal.iter().map(|z| z * z).sum::<f64>() / 10.0).sqrt();
+        let truth = (1.0 + spread * NINETY_EIGHT).exp();
+        assert!((of_thousand / truth - 1.0).abs() < 0.01, "{of_thousand} {truth}");
         assert!(of_ten > 1.1 * of_thousand);
         assert_eq!(quantile([1.0; 4].into_iter()), (None, 4));
     }

@@ -246,10 +246,9 @@ impl<F: Fn(&[f64]) -> Theta + Sync> ArmClips<F> {
         self.simulated_by((&self.mover, 1), clip, shared)
     }
 
-    /// By the twin or another simulator, every control period integrated in so many parts where it can.
+    /// By the twin or another simulator, each control period in so many parts where it can.
     fn simulated_by(&self, by: (&Mover, u32), clip: usize, shared: &[f64]) -> Result<Vec<f64>, Impossible> {
-        let readings = self.readings(by, clip, shared)?;
-        let mut residuals = Vec::new();
+        let (readings, mut residuals) = (self.readings(by, clip, shared)?, Vec::new());
         self.compare(&self.clips[clip], &readings, &mut residuals)?;
         Ok(residuals)
     }
@@ -306,7 +305,7 @@ impl<F: Fn(&[f64]) -> Theta + Sync> ArmClips<F> {
 impl<F: Fn(&[f64]) -> Theta + Sync> Evidence for ArmClips<F> {
     fn in_halves(&self, clip: usize, shared: &[f64]) -> Option<Vec<f64>> {
         // Another simulator has steps of its own.
-        if self.twin.is_some() { None } else { self.simulated_by((&self.mover, 2), clip, shared).ok() }
+        self.twin.is_none().then(|| self.simulated_by((&self.mover, 2), clip, shared).ok())?
     }
 
     fn changed(

@@ -14,7 +14,7 @@ use crate::diagnose::propose::arm_alone::ArmAlone;
 /// converges well before so many linearisations.
 const LAST_PASS: Effort = Effort { frees_held: true, ..Effort::of(25, Precision::Exact) };
 /// With an object each linearisation takes far longer.
-const LAST_PASS_WITH_OBJECT: Effort = Effort { frees_held: true, ..Effort::of(8, Precision::Joints) };
+const LAST_PASS_WITH_OBJECT: Effort = Effort::of(6, Precision::Joints);
 
 /// Where in its range a held form is tried, and how often the best of these is then looked for halfway to its neighbours.
 const SCANNED: [f64; 9] = [0.0, 0.01, 0.02, 0.05, 0.1, 0.2, 0.4, 0.7, 1.0];
