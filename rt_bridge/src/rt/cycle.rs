@@ -20,8 +20,12 @@ use shared_mem::msg::motion::{MotionKind, SetPoint};
 use shared_mem::msg::{Joints, MAX_JOINTS};
 use shared_mem::time::TICK_NS;
 use shared_mem::time::now_ns;
+use shared_mem::topics;
 use std::thread::Thread;
 use twin::arm::JointState;
+
+/// Targets that are taken in each cycle: one of every sender. More of them wait, so that no flood of them takes a cycle's time.
+const TARGETS_A_CYCLE: usize = topics::ARM_TARGET.limits.publishers;
 
 /// What a cycle leaves for the pump.
 #[derive(Debug, Clone, Copy)]
@@ -297,7 +301,8 @@ impl Cycle {
         }
     }
 
-    /// Takes in what was sent: a stop at once, whatever waits before it; of the rest a chunk a cycle, where there is room.
+    /// Takes in what was sent: a stop at once, whatever waits before it; of the rest a target of
+    /// every sender and a chunk a cycle, where there is room.
     fn take_orders(&mut self) {
         if self.link.orders.is_stopped() {
             self.to_recover = false;
@@ -306,7 +311,8 @@ impl Cycle {
                 self.player.discard(&chunk).into_iter().for_each(|remark| self.tell(remark));
             }
         }
-        while let Some(target) = self.link.orders.target() {
+        for _ in 0..TARGETS_A_CYCLE {
+            let Some(target) = self.link.orders.target() else { break };
             self.player.aim(&target).into_iter().for_each(|remark| self.tell(remark));
         }
         if self.player.has_room()
