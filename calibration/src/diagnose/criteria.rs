@@ -105,21 +105,5 @@ pub const NAMED_IS_WRONG: Criterion = Criterion {
     value: 0.04,
 };
 
-/// All of them.
-pub const ALL: [Criterion; 12] = [
-    JOINTS_EXCESS,
-    OBJECT_EXCESS,
-    OBJECT_EXCESS_BESIDE_A_CAUSE,
-    JOINTS_SHARE_LEFT,
-    OBJECT_SHARE_LEFT,
-    DOUBTFUL,
-    TURNS_WITHIN,
-    NONE_IS_RIGHT,
-    CLASS_IS_RIGHT,
-    UNKNOWN_IS_RIGHT,
-    UNKNOWN_OF_LITTLE_IS_RIGHT,
-    NAMED_IS_WRONG,
-];
-
 /// A gap that is plain has so many least ones.
 pub const PLAIN: f64 = 3.0;
