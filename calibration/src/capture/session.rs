@@ -7,10 +7,13 @@ use shared_mem::output::{self, OutputError};
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// A session folder that clips are added to.
-#[derive(Debug, Clone, PartialEq)]
+/// A session folder that clips are added to. One that was created here and holds no file but its cell.toml when this is dropped
+/// is removed again: a capture that failed before its first clip leaves nothing behind.
+#[derive(Debug, PartialEq)]
 pub struct Session {
     folder: PathBuf,
+    /// Whether the folder did not exist before.
+    new: bool,
 }
 
 /// A session folder cannot be used.
@@ -49,13 +52,13 @@ impl Session {
     /// # Errors
     /// [`SessionError`] when it cannot be written, or belongs to another cell.
     pub fn open(folder: &Path, cell: &Cell) -> Result<Self, SessionError> {
-        let session = Self { folder: folder.to_owned() };
+        let session = Self { folder: folder.to_owned(), new: !folder.exists() };
         let cell = cell.at_home_anywhere();
         if session.cell_file().exists() {
             let known = Cell::read(&session.cell_file())?.at_home_anywhere();
             return match differing_block(&known, &cell) {
                 None => Ok(session),
-                Some(block) => Err(SessionError::OtherCell { folder: session.folder, block }),
+                Some(block) => Err(SessionError::OtherCell { folder: folder.to_owned(), block }),
             };
         }
         std::fs::create_dir_all(folder).map_err(|source| SessionError::Write { path: folder.to_owned(), source })?;
@@ -105,6 +108,19 @@ impl Session {
     /// Replaces cell.toml in one step, so that no reader and no crash ever sees half of it.
     fn write(&self, text: &str) -> Result<(), SessionError> {
         Ok(output::write(&self.cell_file(), text)?)
+    }
+}
+
+impl Drop for Session {
+    fn drop(&mut self) {
+        let empty = |folder: &Path| {
+            std::fs::read_dir(folder)
+                .is_ok_and(|entries| entries.flatten().all(|entry| entry.file_name() == "cell.toml"))
+        };
+        if self.new && empty(&self.folder) {
+            // What cannot be removed stays, and is a session without clips that a later capture goes on with.
+            let _ = std::fs::remove_file(self.cell_file()).and_then(|()| std::fs::remove_dir(&self.folder));
+        }
     }
 }
 
@@ -162,6 +178,22 @@ mod tests {
         let session = Session::open(folder.path(), &cell()).expect("a session");
         std::fs::write(folder.path().join("clip_04.mcap"), "half a clip").expect("a file");
         assert_eq!(session.next_clip().expect("a name").1, PathBuf::from("clip_05.mcap"));
+    }
+
+    #[test]
+    fn a_capture_that_failed_before_its_first_clip_leaves_no_folder() {
+        let base = tempfile::tempdir().expect("a folder");
+        let folder = base.path().join("session");
+        drop(Session::open(&folder, &cell()).expect("a session"));
+        assert!(!folder.exists());
+        let session = Session::open(&folder, &cell()).expect("a session");
+        std::fs::write(folder.join("clip_00.mcap"), "half a clip").expect("a file");
+        drop(session);
+        assert!(folder.join("cell.toml").exists() && folder.join("clip_00.mcap").exists());
+        // It was there before this capture.
+        std::fs::remove_file(folder.join("clip_00.mcap")).expect("removed");
+        drop(Session::open(&folder, &cell()).expect("a session"));
+        assert!(folder.join("cell.toml").exists());
     }
 
     #[test]
