@@ -1,6 +1,7 @@
 //! Bounded Levenberg-Marquardt over all clips: the default way to find shared numbers, the clips' own ones with them.
 
 use super::bounded::bounded_step;
+use super::descent::Descent;
 use super::linear::ClipFit;
 use super::problem::{ClipModel, Impossible, Random, Unknown};
 use super::views::{Counted, Given, Subset};
@@ -198,44 +199,34 @@ fn improve<M: ClipModel>(
 ) -> Result<Progress, Impossible> {
     let (information, gradient) = (best.information(), best.gradient());
     let here = current(best, random);
-    let room = room(unknowns, &best.shared);
+    let room: Vec<[f64; 2]> = unknowns.iter().zip(&best.shared).map(|(unknown, at)| unknown.room(*at)).collect();
     let whole = bounded_step(&information, &gradient, &room, 0.0);
-    if promised(best, &whole) < tolerance * best.misfit() {
+    let descent = Descent { information: &information, gradient: &gradient, room: &room, enough: 0.0, trials: TRIALS };
+    if descent.promised(&whole) + own_promise(best) < tolerance * best.misfit() {
         return Ok(Progress::Arrived);
     }
-    for trial in 0..TRIALS {
-        let step = bounded_step(&information, &gradient, &room, *damping);
-        let held = if unknowns.is_empty() { 0 } else { SHARED_TRIALS };
+    let held = if unknowns.is_empty() { 0 } else { SHARED_TRIALS };
+    let to = descent.step(damping, |trial, step| {
         let share = 0.5_f64.powi(i32::try_from(trial.saturating_sub(held)).unwrap_or(i32::MAX));
-        let own: Vec<Vec<f64>> = best.clips.iter().map(|clip| clip.own_part_way(&step, share)).collect();
+        let own: Vec<Vec<f64>> = best.clips.iter().map(|clip| clip.own_part_way(step, share)).collect();
         let shared: Vec<f64> = (best.shared.iter().zip(unknowns).zip(step.iter()))
             .map(|((value, unknown), step)| (value + step).clamp(unknown.lower, unknown.upper))
             .collect();
-        if cost(model, random, &shared, &own).is_some_and(|cost| cost < here) {
-            *damping = (*damping * 0.1).max(1e-9);
-            best.clips = linearise(model, unknowns, random, &shared, &own)?;
-            best.shared = shared;
-            return Ok(Progress::Better);
-        }
-        *damping = (*damping * 10.0).max(1e-4);
-    }
-    Ok(Progress::Stuck)
+        cost(model, random, &shared, &own).is_some_and(|cost| cost < here).then_some((shared, own))
+    });
+    let Some((shared, own)) = to else { return Ok(Progress::Stuck) };
+    best.clips = linearise(model, unknowns, random, &shared, &own)?;
+    best.shared = shared;
+    Ok(Progress::Better)
 }
 
-/// Room of each number to its bounds.
-fn room(unknowns: &[Unknown], shared: &[f64]) -> Vec<[f64; 2]> {
-    unknowns.iter().zip(shared).map(|(unknown, value)| [unknown.lower - value, unknown.upper - value]).collect()
-}
-
-/// By how much a step lowers the deviance if the clips are as linear as they look.
-fn promised(best: &Fit, step: &DVector<f64>) -> f64 {
-    let shared = -(2.0 * best.gradient().dot(step) + step.dot(&(best.information() * step)));
-    // What the own numbers gain by themselves, measured by how far they go against their covariance.
+/// By how much the own numbers lower the deviance by themselves, measured by how far they go against their covariance.
+fn own_promise(best: &Fit) -> f64 {
     let gain = |clip: &ClipFit| {
         let way = clip.own_way();
         clip.own_covariance.clone().cholesky().map_or(0.0, |c| way.dot(&c.solve(way)))
     };
-    shared + best.clips.iter().map(gain).sum::<f64>()
+    best.clips.iter().map(gain).sum()
 }
 
 fn penalty(random: &[Random], own: &[f64]) -> f64 {

@@ -9,6 +9,7 @@
 //! | [`problem`] | the two kinds of unknowns, and the question a model answers: residuals of one clip |
 //! | [`linear`] | one clip linearised, its own numbers eliminated |
 //! | [`bounded`] | one damped step within bounds |
+//! | [`descent`] | such steps tried with growing damping until one costs less |
 //! | [`least_squares`] | bounded Levenberg-Marquardt on all clips |
 //! | [`interval`] | how sure the shared numbers are |
 //! | [`leverage`] | what a clip says of a fit that does not lean on it |
@@ -23,6 +24,7 @@
 //! but always summed in their order.
 
 pub mod bounded;
+pub mod descent;
 pub mod evolution;
 pub mod interval;
 pub mod least_squares;
@@ -37,6 +39,7 @@ pub mod swarm;
 mod views;
 
 pub use bounded::bounded_step;
+pub use descent::Descent;
 pub use evolution::Evolution;
 pub use interval::{Intervals, at_bounds, moved_by};
 pub use least_squares::{Fit, Options, Underway, begin, fit, fit_from, go_on, score};

@@ -15,6 +15,14 @@ pub struct Unknown {
     pub step: f64,
 }
 
+impl Unknown {
+    /// How far down (at most 0 inside the bounds) and how far up the number may go from a value.
+    #[must_use]
+    pub fn room(&self, from: f64) -> [f64; 2] {
+        [self.lower - from, self.upper - from]
+    }
+}
+
 /// A number of which every clip has its own, scattered around zero.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Random {

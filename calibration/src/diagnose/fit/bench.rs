@@ -2,13 +2,12 @@
 //! steps over the sweeps of [`super::sweep`].
 
 use super::effort::Effort;
-use super::quadratic;
 use super::shortlist::{Scored, hold_numbers};
 use super::sweep::{Point, Precision, Reduced, Swept, sweep};
 use crate::diagnose::evidence::measured::Evidence;
 use crate::diagnose::evidence::scatter::Scatter;
 use crate::diagnose::library::Library;
-use crate::estimate::{Unknown, bounded_step};
+use crate::estimate::Descent;
 use crate::interrupt::Interrupt;
 use crate::kept::{Fingerprint, Trail};
 use nalgebra::{DMatrix, DVector};
@@ -235,39 +234,18 @@ impl<E: Evidence> Bench<'_, E> {
         let now = self.cost(full, &kept, weights)?;
         let (information, gradient) = (sum.view((1, 1), (free.len(), free.len())), sum.view((1, 0), (free.len(), 1)));
         let (information, gradient) = (information.into_owned(), gradient.column(0).into_owned());
-        let room = self.room(full, free);
-        for _ in 0..TRIALS {
-            let step = bounded_step(&information, &gradient, &room, *damping);
-            let promised = sum[(0, 0)] - quadratic::value(&sum, &(1..size).collect::<Vec<_>>(), step.as_slice());
+        let room: Vec<[f64; 2]> = free.iter().map(|k| self.library.unknowns[*k].room(full[*k])).collect();
+        let descent =
+            Descent { information: &information, gradient: &gradient, room: &room, enough: TOLERANCE, trials: TRIALS };
+        descent.step(damping, |_, step| {
             let mut to = full.to_vec();
             free.iter().zip(step.iter()).for_each(|(k, step)| to[*k] += step);
             self.library.turn_round(&mut to);
-            let own = |clip: &super::sweep::SweptClip| (clip.clip, at.own_after(clip, self.evidence, weights, &step));
-            let to_own = at.clips.iter().map(own).collect();
-            let fitted = self.own_fitted(&to, to_own, weights).map(|to_own| self.restarted(&to, to_own, weights));
-            let Some(to_own) = fitted else {
-                *damping = (*damping * 20.0).max(1e-3);
-                continue;
-            };
-            if self.cost(&to, &to_own, weights).is_some_and(|cost| cost < now) {
-                *damping = (*damping * 0.1).max(1e-9);
-                return Some((to, to_own));
-            }
-            if promised < TOLERANCE {
-                return None;
-            }
-            *damping = (*damping * 20.0).max(1e-3);
-        }
-        None
-    }
-
-    /// Room of each free number to its bounds.
-    fn room(&self, full: &[f64], free: &[usize]) -> Vec<[f64; 2]> {
-        let room = |k: &usize| {
-            let Unknown { lower, upper, .. } = self.library.unknowns[*k];
-            [lower - full[*k], upper - full[*k]]
-        };
-        free.iter().map(room).collect()
+            let own = |clip: &super::sweep::SweptClip| (clip.clip, at.own_after(clip, self.evidence, weights, step));
+            let to_own = self.own_fitted(&to, at.clips.iter().map(own).collect(), weights)?;
+            let to_own = self.restarted(&to, to_own, weights);
+            self.cost(&to, &to_own, weights).is_some_and(|cost| cost < now).then_some((to, to_own))
+        })
     }
 
     /// The effort of a trial of a candidate: one beyond the arm leaves the joints' numbers alone.

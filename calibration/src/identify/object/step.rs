@@ -5,7 +5,8 @@
 //! the others.
 
 use crate::estimate::{
-    ClipFit, ClipModel, Fit, Impossible, Intervals, Options, Random, Unknown, at_bounds, fit_from, without_leaning,
+    ClipFit, ClipModel, Descent, Fit, Impossible, Intervals, Options, Random, Unknown, at_bounds, fit_from,
+    without_leaning,
 };
 use crate::forward::object::ObjectClips;
 use nalgebra::{DMatrix, DVector};
@@ -42,6 +43,8 @@ pub(super) struct Linearised {
 const WIDEST: f64 = 6.0;
 /// Steps of the own numbers at most.
 const OWN: Options = Options { iterations: 2, tolerance: 0.3 };
+/// Damping of the first trial: a hit is rough, and a whole step seldom leads down.
+const DAMPING: f64 = 1e-3;
 /// Trials with growing damping.
 const TRIALS: usize = 5;
 /// A step is small when it promises less than this [nats of -2 ln likelihood].
@@ -123,27 +126,22 @@ impl Question<'_> {
         let here = self.profiled(shared, own)?;
         let at = self.linearised(shared, &here)?;
         let (information, gradient, cost) = (at.information(), at.gradient(), weighted(&here, &at.weights));
-        let mut damping = 1e-3;
+        let room: Vec<[f64; 2]> = self.unknowns.iter().zip(shared).map(|(unknown, at)| unknown.room(*at)).collect();
+        let descent =
+            Descent { information: &information, gradient: &gradient, room: &room, enough: SMALL, trials: TRIALS };
+        let start: Vec<Vec<f64>> = here.iter().map(|(own, ..)| own.clone()).collect();
         let mut evaluations = at.evaluations;
-        for _ in 0..TRIALS {
-            let step = self.step(shared, &information, &gradient, damping);
-            let promised = -(2.0 * gradient.dot(&step) + step.dot(&(&information * &step)));
-            if promised < SMALL {
-                break;
-            }
+        let mut damping = DAMPING;
+        let found = descent.step(&mut damping, |_, step| {
             let to: Vec<f64> = shared.iter().zip(step.iter()).map(|(x, dx)| x + dx).collect();
-            let start: Vec<Vec<f64>> = here.iter().map(|(own, ..)| own.clone()).collect();
-            if let Ok(there) = self.profiled(&to, &start) {
-                evaluations += there.iter().map(|(.., calls)| calls).sum::<usize>();
-                if weighted(&there, &at.weights) < cost {
-                    let mut after = self.linearised(&to, &there)?;
-                    after.evaluations += evaluations;
-                    return Ok(after);
-                }
-            }
-            damping = (damping * 10.0).max(1e-1);
-        }
-        Ok(Linearised { small: true, evaluations, ..at })
+            let there = self.profiled(&to, &start).ok()?;
+            evaluations += there.iter().map(|(.., calls)| calls).sum::<usize>();
+            (weighted(&there, &at.weights) < cost).then_some((to, there))
+        });
+        let Some((to, there)) = found else { return Ok(Linearised { small: true, evaluations, ..at }) };
+        let mut after = self.linearised(&to, &there)?;
+        after.evaluations += evaluations;
+        Ok(after)
     }
 
     /// The clips linearised at `shared`, own numbers at their best.
@@ -207,40 +205,6 @@ impl Question<'_> {
         let evaluations = at.iter().map(|(.., calls)| calls + each).sum();
         let weights = weights(&clips);
         Ok(Linearised { shared: shared.to_vec(), clips, weights, small: false, evaluations })
-    }
-
-    fn step(&self, shared: &[f64], h: &DMatrix<f64>, g: &DVector<f64>, damping: f64) -> DVector<f64> {
-        let n = shared.len();
-        let (mut held, mut step) = (vec![false; n], DVector::zeros(n));
-        for _ in 0..=n {
-            let mut h = h.clone();
-            let mut g = g.clone();
-            for k in 0..n {
-                h[(k, k)] *= 1.0 + damping;
-                if held[k] {
-                    h.row_mut(k).fill(0.0);
-                    h.column_mut(k).fill(0.0);
-                    g[k] = 0.0;
-                }
-                if h[(k, k)] <= 0.0 {
-                    h[(k, k)] = 1.0;
-                }
-            }
-            step = h.cholesky().map_or_else(|| DVector::zeros(n), |h| -h.solve(&g));
-            let mut more = false;
-            for (k, unknown) in self.unknowns.iter().enumerate() {
-                let leaves =
-                    (shared[k] <= unknown.lower && step[k] < 0.0) || (shared[k] >= unknown.upper && step[k] > 0.0);
-                more |= leaves && !held[k];
-                held[k] |= leaves;
-            }
-            if !more {
-                break;
-            }
-        }
-        DVector::from_fn(n, |k, _| {
-            step[k].clamp(self.unknowns[k].lower - shared[k], self.unknowns[k].upper - shared[k])
-        })
     }
 }
 
