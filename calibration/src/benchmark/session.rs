@@ -349,11 +349,14 @@ mod tests {
 
     #[test]
     fn the_twin_that_knows_the_truth_leaves_of_a_world_what_is_noise_if_torques_are_of_their_period() {
-        for number in [3, 4] {
-            let world = World::draw(number, Kind::Excitation, Fault::Single(1), &shipped());
+        let candidates = crate::benchmark::draw::candidates(false);
+        let elastic = candidates.iter().position(|effect| effect.name == "joint_elasticity").expect("an effect");
+        for (number, effect) in [(3, 1), (4, 1), (13, elastic)] {
+            let world = World::draw(number, Kind::Excitation, Fault::Single(effect), &shipped());
             let clips = record(&world, 2).expect("a session");
-            let [(measured, count), (asked, _)] = left_of(&world, &clips);
+            let [(measured, count), (asked, of)] = left_of(&world, &clips);
             assert!((0.8..1.5).contains(&(measured / count)), "{} sigma²", measured / count);
+            assert!(asked < of, "{} sigma² of the torque asked for, which has no noise", asked / of);
             let later: Vec<Clip> = clips.into_iter().map(|clip| Clip { torques_end_at_rows: false, ..clip }).collect();
             let [_, (of_next, _)] = left_of(&world, &later);
             assert!(asked < 0.1 * of_next, "{asked} of the period that ends there, {of_next} of the next");
