@@ -84,7 +84,7 @@ fn main() -> anyhow::Result<()> {
             break;
         }
         done += 1;
-        let (inside, all) = (session.told.iter().filter(|told| told.holds()).count(), session.told.len());
+        let (inside, all) = (session.printed.iter().filter(|printed| printed.holds()).count(), session.printed.len());
         println!("world {number}: {inside} of {all} hold the truth {}", session.left_out.as_deref().unwrap_or(""));
         let left = (seed + sessions - 1 - number) as f64 * began.elapsed().as_secs_f64() / f64::from(done);
         console::line(format_args!("{:.0} s so far, about {left:.0} s left", began.elapsed().as_secs_f64()));

@@ -10,7 +10,7 @@
 
 #![allow(clippy::print_stdout, reason = "its output is the measurement")]
 
-use calibration::benchmark::coverage::{Session, Told, table};
+use calibration::benchmark::coverage::{Session, Printed, table};
 use calibration::viewpoint::fit::{Method, fit};
 use calibration::viewpoint::frame::{Evidence, Frame};
 use calibration::viewpoint::grid::Grid;
@@ -133,10 +133,10 @@ fn coverage() -> anyhow::Result<()> {
     let mut sessions = Vec::new();
     for view in seed..seed + views {
         let session = seen(&cell, source, pictures, view)?;
-        let inside = session.told.iter().filter(|told| told.holds()).count();
-        let off = |told: &Told| format!(" {:.2e}±{:.1e}", told.value - told.truth, told.value - told.interval[0]);
-        let off: String = session.told.iter().map(off).collect();
-        println!("view {view}: {inside} of {}{off} {}", session.told.len(), session.left_out.as_deref().unwrap_or(""));
+        let inside = session.printed.iter().filter(|printed| printed.holds()).count();
+        let off = |printed: &Printed| format!(" {:.2e}±{:.1e}", printed.value - printed.truth, printed.value - printed.interval[0]);
+        let off: String = session.printed.iter().map(off).collect();
+        println!("view {view}: {inside} of {}{off} {}", session.printed.len(), session.left_out.as_deref().unwrap_or(""));
         sessions.push(session);
     }
     print!("{}", table(&sessions, 0.95));
@@ -163,22 +163,22 @@ fn seen(cell: &Cell, source: Source, pictures: u64, view: u64) -> anyhow::Result
     // The last two steps of a fit: it is the interval that is asked about, not the search.
     let fine = refine(&frames, &shape, &start, refine::FINE);
     let found = fine.and_then(|fine| refine(&frames, &shape, &fine.camera_from_base, refine::LAST));
-    let Some((found, interval)) = found.and_then(|found| interval(&found, frames.len()).map(|told| (found, told)))
+    let Some((found, interval)) = found.and_then(|found| interval(&found, frames.len()).map(|printed| (found, printed)))
     else {
-        return Ok(Session { world: view, told: Vec::new(), left_out: Some("no pose, or no interval".into()) });
+        return Ok(Session { world: view, printed: Vec::new(), left_out: Some("no pose, or no interval".into()) });
     };
     let (truth, found) = (truth.inverse(), found.camera_from_base.inverse());
     let turned = (found.rotation * truth.rotation.inverse()).scaled_axis();
     let off = found.translation.vector - truth.translation.vector;
-    let told = (0..6).map(|i| {
+    let printed = (0..6).map(|i| {
         let (truth, value, half) = match i {
             0..3 => (truth.translation.vector[i], truth.translation.vector[i] + off[i], interval.position[i]),
             _ => (0.0, turned[i - 3], interval.rotation[i - 3]),
         };
         let name = ["x [m]", "y [m]", "z [m]", "about x [rad]", "about y [rad]", "about z [rad]"][i].to_owned();
-        Told { name, truth, value, interval: [value - half, value + half] }
+        Printed { name, truth, value, interval: [value - half, value + half] }
     });
-    Ok(Session { world: view, told: told.collect(), left_out: None })
+    Ok(Session { world: view, printed: printed.collect(), left_out: None })
 }
 
 /// A camera before the robot, 1.2 to 1.9 m away, that looks at it, about upright. The optical frame in the base.

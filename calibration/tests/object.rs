@@ -86,8 +86,8 @@ fn a_place_left_by_the_hit_moves_the_resting_place_by_as_much() {
 fn intervals_reach_as_far_as_rough_hits_leave_a_number_open() {
     let session = Subject::Object.examine(&world(24), 8, &Interrupt::default());
     for name in ["friction", "centre_of_mass[2]"] {
-        let told = session.told.iter().find(|told| told.name == name).expect("a number with an interval");
-        assert!(told.holds(), "{told:?}");
+        let printed = session.printed.iter().find(|printed| printed.name == name).expect("a number with an interval");
+        assert!(printed.holds(), "{printed:?}");
     }
 }
 

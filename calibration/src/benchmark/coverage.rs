@@ -28,7 +28,7 @@ pub enum Subject {
 
 /// A number that was printed with an interval, and what it is.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Told {
+pub struct Printed {
     /// Its name in reports.
     pub name: String,
     /// Its true value.
@@ -39,13 +39,13 @@ pub struct Told {
     pub interval: [f64; 2],
 }
 
-/// What one world's session told.
+/// What one world's session printed.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Session {
     /// Number of the world.
     pub world: u64,
     /// All numbers that were printed with an interval; none where nothing was.
-    pub told: Vec<Told>,
+    pub printed: Vec<Printed>,
     /// Why there is nothing.
     pub left_out: Option<String>,
 }
@@ -84,14 +84,14 @@ impl Subject {
     /// What the session of a world tells, of so many clips.
     #[must_use]
     pub fn examine(&self, world: &World, clips: usize, interrupt: &Interrupt) -> Session {
-        let (told, left_out) = match self.told(world, clips, interrupt) {
-            Ok(told) => (told, None),
+        let (printed, left_out) = match self.printed(world, clips, interrupt) {
+            Ok(printed) => (printed, None),
             Err(error) => (Vec::new(), Some(error.to_string())),
         };
-        Session { world: world.number, told, left_out }
+        Session { world: world.number, printed, left_out }
     }
 
-    fn told(&self, world: &World, clips: usize, interrupt: &Interrupt) -> anyhow::Result<Vec<Told>> {
+    fn printed(&self, world: &World, clips: usize, interrupt: &Interrupt) -> anyhow::Result<Vec<Printed>> {
         let (clips, seed) = (record(world, clips)?, world.number);
         match self {
             Self::Arm(effect) => {
@@ -115,23 +115,23 @@ impl Subject {
     }
 }
 
-fn of_identification(found: &Identification, truth: &Theta) -> Vec<Told> {
+fn of_identification(found: &Identification, truth: &Theta) -> Vec<Printed> {
     let of = |(name, parameter): (&String, &crate::identify::answer::Parameter)| {
         let values = parameter.value.iter().copied().zip(parameter.ci95.iter().copied());
-        told(name, values, &numbers(truth, name))
+        printed(name, values, &numbers(truth, name))
     };
     found.parameters.iter().flat_map(of).collect()
 }
 
-fn of_diagnosis(found: &Diagnosis, world: &World) -> Vec<Told> {
+fn of_diagnosis(found: &Diagnosis, world: &World) -> Vec<Printed> {
     let Truth::Effects(effects) = &world.truth else { return Vec::new() };
     let named = found.candidates.iter().filter(|candidate| candidate.status == diagnose::Status::Named);
     let right = named.filter(|candidate| effects.contains(&candidate.effect));
-    let of = |candidate: &diagnose::Candidate| -> Vec<Told> {
+    let of = |candidate: &diagnose::Candidate| -> Vec<Printed> {
         let sizes = candidate.parameters.iter().flat_map(|(parameter, size)| {
             let name = format!("{}.{parameter}", candidate.effect);
             let values = size.values.iter().copied().zip(size.ci90.iter().copied());
-            told(&name, values, &numbers(&world.hidden, &name))
+            printed(&name, values, &numbers(&world.hidden, &name))
         });
         sizes.collect()
     };
@@ -139,7 +139,7 @@ fn of_diagnosis(found: &Diagnosis, world: &World) -> Vec<Told> {
 }
 
 /// Those of a parameter's numbers whose truth is known and whose interval ends.
-fn told(name: &str, values: impl Iterator<Item = (f64, [f64; 2])>, truth: &[f64]) -> Vec<Told> {
+fn printed(name: &str, values: impl Iterator<Item = (f64, [f64; 2])>, truth: &[f64]) -> Vec<Printed> {
     let values: Vec<(f64, [f64; 2])> = values.collect();
     let single = values.len() == 1;
     let of = |(k, (value, interval)): (usize, (f64, [f64; 2]))| {
@@ -147,7 +147,7 @@ fn told(name: &str, values: impl Iterator<Item = (f64, [f64; 2])>, truth: &[f64]
         let truth = *truth.get(k).or(truth.first().filter(|_| truth.len() == 1))?;
         let name = if single { name.to_owned() } else { format!("{name}[{k}]") };
         let ends = interval.iter().all(|end| end.is_finite());
-        ends.then_some(Told { name, truth, value, interval })
+        ends.then_some(Printed { name, truth, value, interval })
     };
     values.into_iter().enumerate().filter_map(of).collect()
 }
@@ -188,14 +188,14 @@ pub struct Covered {
     pub half_width: f64,
 }
 
-/// Every number that sessions told, by name.
+/// Every number that sessions printed, by name.
 #[must_use]
 pub fn covered(sessions: &[Session], level: f64) -> BTreeMap<String, Covered> {
-    let mut by_name: BTreeMap<String, Vec<&Told>> = BTreeMap::new();
-    for told in sessions.iter().flat_map(|session| &session.told) {
-        by_name.entry(told.name.clone()).or_default().push(told);
+    let mut by_name: BTreeMap<String, Vec<&Printed>> = BTreeMap::new();
+    for printed in sessions.iter().flat_map(|session| &session.printed) {
+        by_name.entry(printed.name.clone()).or_default().push(printed);
     }
-    by_name.into_iter().map(|(name, told)| (name, Covered::of(&told, level))).collect()
+    by_name.into_iter().map(|(name, printed)| (name, Covered::of(&printed, level))).collect()
 }
 
 /// Quantile of a normal distribution at the level, in sigmas.
@@ -204,26 +204,26 @@ fn quantile(level: f64) -> f64 {
 }
 
 impl Covered {
-    fn of(told: &[&Told], level: f64) -> Self {
-        let count = |of: fn(&Told) -> bool| told.iter().filter(|told| of(told)).count();
-        let half = |told: &Told| 0.5 * (told.interval[1] - told.interval[0]);
-        let z = |told: &&&Told| {
-            let half = half(told);
-            (half > 0.0).then(|| quantile(level) * (told.value - told.truth) / half)
+    fn of(printed: &[&Printed], level: f64) -> Self {
+        let count = |of: fn(&Printed) -> bool| printed.iter().filter(|printed| of(printed)).count();
+        let half = |printed: &Printed| 0.5 * (printed.interval[1] - printed.interval[0]);
+        let z = |printed: &&&Printed| {
+            let half = half(printed);
+            (half > 0.0).then(|| quantile(level) * (printed.value - printed.truth) / half)
         };
-        let z: Vec<f64> = told.iter().filter_map(|told| z(&told)).collect();
-        let mut halves: Vec<f64> = told.iter().map(|told| half(told)).collect();
+        let z: Vec<f64> = printed.iter().filter_map(|printed| z(&printed)).collect();
+        let mut halves: Vec<f64> = printed.iter().map(|printed| half(printed)).collect();
         halves.sort_by(f64::total_cmp);
         Self {
-            inside: Rate::count(told.iter().map(|told| told.holds())),
-            beside: [count(|told| told.truth < told.interval[0]), count(|told| told.truth > told.interval[1])],
+            inside: Rate::count(printed.iter().map(|printed| printed.holds())),
+            beside: [count(|printed| printed.truth < printed.interval[0]), count(|printed| printed.truth > printed.interval[1])],
             spread: (z.iter().map(|z| z * z).sum::<f64>() / z.len().max(1) as f64).sqrt(),
             half_width: halves.get(halves.len() / 2).copied().unwrap_or(0.0),
         }
     }
 }
 
-impl Told {
+impl Printed {
     /// Whether the interval holds the truth.
     #[must_use]
     pub fn holds(&self) -> bool {
@@ -234,9 +234,9 @@ impl Told {
 /// A line for each number, and one for all together.
 #[must_use]
 pub fn table(sessions: &[Session], level: f64) -> String {
-    let told: Vec<&Told> = sessions.iter().flat_map(|session| &session.told).collect();
+    let printed: Vec<&Printed> = sessions.iter().flat_map(|session| &session.printed).collect();
     let mut all: Vec<(String, Covered)> = covered(sessions, level).into_iter().collect();
-    all.push(("all".to_owned(), Covered::of(&told, level)));
+    all.push(("all".to_owned(), Covered::of(&printed, level)));
     let mut out = String::new();
     let _ = writeln!(
         out,
@@ -289,8 +289,8 @@ mod tests {
 
     #[test]
     fn a_truth_below_inside_and_above_is_counted_where_it_lies() {
-        let told = |value: f64| Told { name: "a".into(), truth: 0.0, value, interval: [value - 1.0, value + 1.0] };
-        let session = |world, value| Session { world, told: vec![told(value)], left_out: None };
+        let printed = |value: f64| Printed { name: "a".into(), truth: 0.0, value, interval: [value - 1.0, value + 1.0] };
+        let session = |world, value| Session { world, printed: vec![printed(value)], left_out: None };
         let sessions = [session(1, 2.0), session(2, 0.5), session(3, -2.0), session(4, -0.5)];
         let covered = &covered(&sessions, 0.95)["a"];
         assert_eq!((covered.inside.hits, covered.inside.of, covered.beside), (2, 4, [1, 1]));
