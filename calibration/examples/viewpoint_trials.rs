@@ -10,7 +10,7 @@
 
 #![allow(clippy::print_stdout, reason = "its output is the measurement")]
 
-use calibration::benchmark::coverage::{Session, Printed, table};
+use calibration::benchmark::coverage::{Printed, Session, table};
 use calibration::viewpoint::fit::{Method, fit};
 use calibration::viewpoint::frame::{Evidence, Frame};
 use calibration::viewpoint::grid::Grid;
@@ -134,9 +134,15 @@ fn coverage() -> anyhow::Result<()> {
     for view in seed..seed + views {
         let session = seen(&cell, source, pictures, view)?;
         let inside = session.printed.iter().filter(|printed| printed.holds()).count();
-        let off = |printed: &Printed| format!(" {:.2e}±{:.1e}", printed.value - printed.truth, printed.value - printed.interval[0]);
+        let off = |printed: &Printed| {
+            format!(" {:.2e}±{:.1e}", printed.value - printed.truth, printed.value - printed.interval[0])
+        };
         let off: String = session.printed.iter().map(off).collect();
-        println!("view {view}: {inside} of {}{off} {}", session.printed.len(), session.left_out.as_deref().unwrap_or(""));
+        println!(
+            "view {view}: {inside} of {}{off} {}",
+            session.printed.len(),
+            session.left_out.as_deref().unwrap_or("")
+        );
         sessions.push(session);
     }
     print!("{}", table(&sessions, 0.95));
@@ -163,7 +169,8 @@ fn seen(cell: &Cell, source: Source, pictures: u64, view: u64) -> anyhow::Result
     // The last two steps of a fit: it is the interval that is asked about, not the search.
     let fine = refine(&frames, &shape, &start, refine::FINE);
     let found = fine.and_then(|fine| refine(&frames, &shape, &fine.camera_from_base, refine::LAST));
-    let Some((found, interval)) = found.and_then(|found| interval(&found, frames.len()).map(|printed| (found, printed)))
+    let Some((found, interval)) =
+        found.and_then(|found| interval(&found, frames.len()).map(|printed| (found, printed)))
     else {
         return Ok(Session { world: view, printed: Vec::new(), left_out: Some("no pose, or no interval".into()) });
     };

@@ -216,7 +216,10 @@ impl Covered {
         halves.sort_by(f64::total_cmp);
         Self {
             inside: Rate::count(printed.iter().map(|printed| printed.holds())),
-            beside: [count(|printed| printed.truth < printed.interval[0]), count(|printed| printed.truth > printed.interval[1])],
+            beside: [
+                count(|printed| printed.truth < printed.interval[0]),
+                count(|printed| printed.truth > printed.interval[1]),
+            ],
             spread: (z.iter().map(|z| z * z).sum::<f64>() / z.len().max(1) as f64).sqrt(),
             half_width: halves.get(halves.len() / 2).copied().unwrap_or(0.0),
         }
@@ -289,7 +292,8 @@ mod tests {
 
     #[test]
     fn a_truth_below_inside_and_above_is_counted_where_it_lies() {
-        let printed = |value: f64| Printed { name: "a".into(), truth: 0.0, value, interval: [value - 1.0, value + 1.0] };
+        let printed =
+            |value: f64| Printed { name: "a".into(), truth: 0.0, value, interval: [value - 1.0, value + 1.0] };
         let session = |world, value| Session { world, printed: vec![printed(value)], left_out: None };
         let sessions = [session(1, 2.0), session(2, 0.5), session(3, -2.0), session(4, -0.5)];
         let covered = &covered(&sessions, 0.95)["a"];

@@ -1,7 +1,7 @@
 //! Which effects act together: effects are added while clips are predicted better with them, and dropped or swapped when they are
 //! not needed any more.
 
-use super::refit::{refitted, without_superfluous};
+use super::refit::{last_pass, refitted, without_superfluous};
 use crate::diagnose::clips::split::Split;
 use crate::diagnose::criteria::JOINTS_EXCESS;
 use crate::diagnose::evidence::measured::{Evidence, Group, Row};
@@ -118,7 +118,7 @@ fn step<E: Evidence>(
     bar: &Progress,
 ) -> Option<Step> {
     let (weights, mut scored, narrow) = signatures::around(bench, split, from, bar)?;
-    let from = bench.fit((&from.effects, from.full.clone()), &split.train, &weights, Some(from), FIRST_PASS)?;
+    let from = weighed_anew(bench, split, from, &weights)?;
     let predicted = predict(bench, &from, &split.choose, &weights)?;
     let left = Residuals::at(bench, &from, &split.open()).map(|left| left.typical()).unwrap_or_default();
     let whole = whole.unwrap_or(&left).clone();
@@ -149,11 +149,22 @@ fn step<E: Evidence>(
 fn untried<E: Evidence>(bench: &Bench<'_, E>, split: &Split, now: &Hypothesis, first: Option<&Step>) -> Option<Step> {
     let left = Residuals::at(bench, now, &split.train)?;
     let weights = floor::weights(bench.evidence, &left.clips);
-    let from = bench.fit((&now.effects, now.full.clone()), &split.train, &weights, Some(now), FIRST_PASS)?;
+    let from = weighed_anew(bench, split, now, &weights)?;
     let predicted = predict(bench, &from, &split.choose, &weights)?;
     let left = Residuals::at(bench, &from, &split.open())?.typical();
     let whole = first.map_or_else(|| left.clone(), |first| first.whole.clone());
     Some(Step { from, predicted, trials: Vec::new(), weights, arm_rows: arm_rows(bench, split), left, whole })
+}
+
+/// A hypothesis under other weights: these are numbers that may be printed, so what acts is fitted to the end again.
+fn weighed_anew<E: Evidence>(
+    bench: &Bench<'_, E>,
+    split: &Split,
+    from: &Hypothesis,
+    weights: &[f64],
+) -> Option<Hypothesis> {
+    let effort = if from.effects.is_empty() { FIRST_PASS } else { last_pass(bench) };
+    bench.fit((&from.effects, from.full.clone()), &split.train, weights, Some(from), effort)
 }
 
 /// How many residuals of the arm the judged clips have.

@@ -7,6 +7,11 @@ use crate::arm::{ArmModel, JointState, Joints, MAX_JOINTS, Passed, Presliding, S
 
 /// Longest step of a gear that yields [s]: a wrist link on its spring rings at up to 200 Hz.
 const LONGEST_STEP: f64 = 2.5e-4;
+/// Below this speed [rad/s] friction that turns round over some mrad/s, or over some mrad, changes by as much as it can within a
+/// few periods of 1 ms; a period is then taken in [`SLOW_PARTS`]. At Stribeck velocities of 14 mrad/s one part leaves five times the
+/// encoders' noise of what four leave.
+const SLOW: f64 = 0.05;
+const SLOW_PARTS: f64 = 4.0;
 /// A joint that is slower rests when it is first seen [rad/s]: encoders' noise, and a tenth of the slowest motions.
 pub(super) const AT_REST: f64 = 1e-3;
 
@@ -50,11 +55,13 @@ impl ArmEffects {
             memory.bent = Some([0.0; MAX_JOINTS]);
         }
         let bent = memory.bent.get_or_insert_with(|| self.bent_at(arm, state, torques));
-        if !self.yields() {
+        let steps = if self.yields() {
+            (dt / LONGEST_STEP - 1e-9).ceil().max(1.0)
+        } else {
             *motor = *state;
-            return arm.step_through(self, (state, motor, bent), torques, dt);
-        }
-        let steps = (dt / LONGEST_STEP - 1e-9).ceil().max(1.0);
+            let slow = |i: usize| state.dq[i].abs() < SLOW && self.turns_round(i);
+            if (0..arm.dof()).any(slow) { SLOW_PARTS } else { 1.0 }
+        };
         let mut whole = Passed::default();
         for _ in 0..steps as usize {
             let part = arm.step_through(self, (state, motor, bent), torques, dt / steps);
@@ -62,6 +69,11 @@ impl ArmEffects {
             whole.tau_J = std::array::from_fn(|i| whole.tau_J[i] + part.tau_J[i] / steps);
         }
         whole
+    }
+
+    /// Whether the dry friction of a joint turns round over a range of speeds, or over a way, instead of at once.
+    fn turns_round(&self, joint: usize) -> bool {
+        self.joint_presliding_friction.is_some() || self.joint_stribeck_friction.is_some() || self.creep(joint) > 0.0
     }
 
     /// How far bristles are bent where nothing is known of what was before: as far as keeps a joint at rest, wholly in motion.
