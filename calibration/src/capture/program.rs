@@ -8,7 +8,7 @@
 use super::body::Body;
 use super::stroke::{self, Stroke, StrokeError, StrokePlan};
 use super::way::{WayError, Ways};
-use shared_mem::cell::Cell;
+use shared_mem::cell::{Cell, GRAVITY};
 use shared_mem::msg::Joints;
 use shared_mem::msg::motion::SetPoint;
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
@@ -35,7 +35,6 @@ const TURN: f64 = PI / 9.0;
 pub const PACES: [f64; 3] = [1.0, 0.8, 0.6];
 /// The object slides further than reckoned by this much at most.
 const SLIDES: f64 = 1.3;
-const GRAVITY: f64 = 9.81;
 /// Rest before a stroke and after it [s].
 pub const RESTS: [f64; 2] = [0.3, 0.8];
 

@@ -1,12 +1,12 @@
 //! Free fall against gravity: another acceleration is a scale of the poses or a clock.
 
 use super::columns::Columns;
-use super::limits::{CLEAR, FALL_FITS, FALL_OFF, FALL_POSES, FALL_SIGMAS, FALL_SURE, GRAVITY};
+use super::limits::{CLEAR, FALL_FITS, FALL_OFF, FALL_POSES, FALL_SIGMAS, FALL_SURE};
 use super::remark::{Fault, Remark, Size};
 use super::statistics::median;
 use crate::forward::arm::noise;
 use nalgebra::{Matrix3, Point3, Vector3};
-use shared_mem::cell::{Cell, ClipKind};
+use shared_mem::cell::{Cell, ClipKind, GRAVITY};
 
 /// One sigma of a normal variable's median over its median distance from it, times the root of the number of values.
 const MEDIAN_SIGMA: f64 = 1.4826 * 1.2533;

@@ -9,7 +9,8 @@ use super::limits::{
     LEAST_MOTION, LONGEST_DELAY, SAME_PEAK, SPEEDS_DIFFER,
 };
 use super::remark::{Fault, Remark, Size};
-use super::statistics::{deviation, mean, range, student};
+use super::statistics::{deviation, mean, range};
+use crate::estimate::interval::student_95;
 use serde::Serialize;
 
 /// Parts of a clip from whose lags the interval comes.
@@ -59,7 +60,7 @@ pub(super) fn of(clip: &Columns) -> Option<Lag> {
     let parts = parts(of, &told, &done, lag);
     let sigma = deviation(&parts) / (parts.len().max(1) as f64).sqrt();
     let seconds = (lag as f64 + offset) * step;
-    let half = if parts.len() > 1 { student(parts.len() - 1) * sigma * step } else { step };
+    let half = if parts.len() > 1 { student_95(parts.len() - 1) * sigma * step } else { step };
     let rate = rate(desired, spread(desired));
     Some(Lag { seconds, interval: [seconds - half, seconds + half], correlation: height, rate })
 }

@@ -120,9 +120,6 @@ pub(super) const ORDER_SHARE: f64 = 0.2;
 pub(super) const RESTS: f64 = 8.0;
 /// ...so many of them.
 pub(super) const REST_POSES: usize = 8;
-
-/// Acceleration of free fall [m/s²]: between pole and equator it differs by 0.3 %.
-pub(super) const GRAVITY: f64 = 9.81;
 /// A fall is off when its acceleration differs by this share [1], and by so many sigmas: drag on a cube of 0.1 m and 0.4 kg
 /// at 3 m/s is 2 %, a tracker's scale 1 % again.
 pub(super) const FALL_OFF: f64 = 0.04;

@@ -9,7 +9,8 @@ use super::limits::{
     ACCELERATION, BLOCK, CARRIES_GRAVITY, LEAST_GRAVITY, NOT_ITS_SLOPE, TORQUE_BETTER, TORQUE_LEFT, TORQUE_ROWS,
 };
 use super::remark::{Fault, Remark, Size};
-use super::statistics::{deviation, mean, student};
+use super::statistics::{deviation, mean};
+use crate::estimate::interval::student_95;
 use shared_mem::msg::{Joints, MAX_JOINTS};
 use twin::arm::{ArmModel, JointState};
 
@@ -150,7 +151,7 @@ fn shares(moments: &[Moment], models: &[Model], dof: usize) -> Option<Share> {
         .filter(|[_, gg]| *gg > 0.0)
         .map(|[gt, gg]| gt / gg)
         .collect();
-    let half = student(parts.len().saturating_sub(1)) * deviation(&parts) / (parts.len() as f64).sqrt();
+    let half = student_95(parts.len().saturating_sub(1)) * deviation(&parts) / (parts.len() as f64).sqrt();
     Some(Share { value: gt / gg, half })
 }
 

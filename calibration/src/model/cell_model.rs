@@ -3,7 +3,7 @@
 
 use super::known::{Known, LeftOut};
 use nalgebra::{Isometry3, Vector3};
-use shared_mem::cell::{Camera, Cell, ControllerKind, Tool};
+use shared_mem::cell::{Camera, Cell, ControllerKind, GRAVITY, Tool};
 use shared_mem::theta::{EffectTheta, Theta};
 use twin::arm::{ArmModel, Part};
 use twin::contact_law::ContactLaw;
@@ -14,8 +14,6 @@ use twin::scene::{ObjectModel, ObjectShape};
 
 pub(super) const CELL: &str = "cell.toml";
 pub(super) const THETA: &str = "theta.toml";
-/// As the twin has it [m/s²].
-const GRAVITY: [f64; 3] = [0.0, 0.0, -9.81];
 
 /// Everything that goes into a model file.
 #[derive(Debug, Clone)]
@@ -115,7 +113,7 @@ impl CellModel {
         let effects = Effects::from_theta(&theta.effects, dof)?;
         let mut model = Self {
             arm,
-            gravity: GRAVITY.map(Known::by_default),
+            gravity: [0.0, 0.0, -GRAVITY].map(Known::by_default),
             table: cell.table.map(|table| table.height),
             object: Object::of(cell, theta, &effects)?,
             camera: CameraModel::of(cell, &effects),

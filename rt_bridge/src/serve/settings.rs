@@ -4,7 +4,7 @@
 
 use super::wire::{Load, Thresholds};
 use nalgebra::{Isometry3, Matrix3, Matrix4, Rotation3, Translation3, UnitQuaternion, Vector3};
-use shared_mem::cell::Tool;
+use shared_mem::cell::{GRAVITY, Tool};
 use twin::arm::MassProperties;
 
 /// Largest joint stiffness the robot takes [N m/rad].
@@ -18,7 +18,6 @@ const HEAVIEST: f64 = 3.0;
 /// Largest moment of its weight about the flange's origin [N m]: what the three joints of the wrist can hold, from the data
 /// sheet.
 const WRIST: f64 = 12.0;
-const GRAVITY: f64 = 9.81;
 /// Farthest from the flange that a load or a frame may be [m], and the largest radius of gyration: more than the arm's own
 /// reach of 0.855 m.
 const FARTHEST: f64 = 1.0;

@@ -13,6 +13,7 @@ use super::wire::{ControllerMode, MotionGeneratorMode, RobotMode, WireState};
 use crate::arm::ReflexErrors;
 use crate::safety::Trace;
 use nalgebra::Vector6;
+use shared_mem::cell::GRAVITY;
 use shared_mem::msg::arm::ArmState;
 use twin::arm::{JointState, Joints, MassProperties};
 use zerocopy::little_endian::F32;
@@ -105,7 +106,7 @@ fn fill_end_effector(wire: &mut WireState, facts: &Facts) {
         }
     }
     wire.O_T_EE_c = wire.O_T_EE_d;
-    wire.O_ddP_O = floats(&[0.0, 0.0, -9.81]);
+    wire.O_ddP_O = floats(&[0.0, 0.0, -GRAVITY]);
 }
 
 fn fill_bodies(wire: &mut WireState, settings: &Settings) {

@@ -26,6 +26,10 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
+/// Acceleration of free fall [m/s²], against z of the base frame, as simulators and the vendor's model take it; between pole and
+/// equator it differs by 0.3 %.
+pub const GRAVITY: f64 = 9.81;
+
 /// What the laboratory knows about its cell. Units are SI, quaternions `w, x, y, z`.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]

@@ -51,7 +51,7 @@ pub use hull::{ArmHull, Extent, MOST_BALLS};
 pub use inertia::MassProperties;
 pub use kinematics::Jacobian;
 pub use limits::{JointLimits, Limits, TORQUE_RATE};
-pub(crate) use model::GRAVITY;
+pub(crate) use model::FREE_FALL;
 pub use model::{ArmModel, ModelError};
 pub use nearest::Nearest;
 pub use parts::Part;

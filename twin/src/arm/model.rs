@@ -6,13 +6,13 @@ use super::kernel::Link;
 use super::spatial::{Rot3, Vec3};
 use super::{JointState, Joints, MAX_JOINTS, fr3, urdf};
 use nalgebra::{Isometry3, Matrix3, Rotation3, Unit, UnitQuaternion, Vector3};
-use shared_mem::cell::{Cell, Controller, Robot};
+use shared_mem::cell::{Cell, Controller, GRAVITY, Robot};
 use shared_mem::input::InputError;
 use shared_mem::msg::joints_from;
 use std::path::{Path, PathBuf};
 
-/// Standard acceleration of free fall as simulators and the vendor's model use it [m/s²].
-pub(crate) const GRAVITY: Vec3 = [0.0, 0.0, -9.81];
+/// Free fall in the base frame [m/s²].
+pub(crate) const FREE_FALL: Vec3 = [0.0, 0.0, -GRAVITY];
 
 /// Inertia of a joint where no model is known [kg m²]: the reflected rotor of a common hobby servo (Feetech STS3215,
 /// 0.028 after Rhoban's BAM identification). Only its ratio to the gains matters, and those are identified.
@@ -171,7 +171,7 @@ impl ArmModel {
         let arm = Self {
             dof,
             links,
-            gravity: GRAVITY,
+            gravity: FREE_FALL,
             flange: last.inverse() * chain.flange,
             tool_length: 0.0,
             tool: MassProperties::default(),

@@ -5,7 +5,7 @@
 
 use super::registry::{EffectInfo, Role};
 use nalgebra::{Rotation3, Vector3};
-use shared_mem::cell::Cell;
+use shared_mem::cell::{Cell, GRAVITY};
 
 /// Where an identified number is this close to the one that changes nothing, as a share of the largest, it is not worth a word.
 const NOTHING: f64 = 0.02;
@@ -146,7 +146,7 @@ pub(super) fn leaning(tilt: [f64; 2]) -> String {
 /// Gravity in axes that lean by `tilt` about the base's x and y axes [m/s²].
 pub(super) fn gravity(tilt: [f64; 2]) -> [f64; 3] {
     let turn = Rotation3::new(Vector3::new(tilt[0], tilt[1], 0.0));
-    (turn.inverse() * Vector3::new(0.0, 0.0, -9.81)).into()
+    (turn.inverse() * Vector3::new(0.0, 0.0, -GRAVITY)).into()
 }
 
 #[cfg(test)]

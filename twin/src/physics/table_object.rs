@@ -14,7 +14,7 @@ use crate::effects::{Effects, SlideEffects, TableFriction};
 use crate::scene::{ObjectModel, ObjectParameters};
 use crate::sliding::{BASE, Closeness, Ending, Footing, FreeBody, PlanarState, Solid};
 use nalgebra::{Isometry3, Matrix3, Point3, UnitQuaternion, Vector3};
-use shared_mem::cell::Support;
+use shared_mem::cell::{GRAVITY, Support};
 use shared_mem::frames::{Base, Object, Pose};
 
 /// The object, its table and the time step between them.
@@ -47,9 +47,6 @@ pub struct ObjectMotion {
     down: Vector3<f64>,
     made_of: Material,
 }
-
-/// Gravity [m/s²]; the value the arm model uses too.
-const GRAVITY: f64 = 9.81;
 /// Longest step of a free body [s]: steps of a twelfth move the resting place of a tossed box by less than 0.2 mm.
 const FREE_STEP: f64 = 1.25e-4;
 /// Longest step under a film's drag [s].

@@ -4,12 +4,9 @@ use super::on_table::{Buried, Depth};
 use crate::rollout::ObjectState;
 use crate::scene::ObjectModel;
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3};
-use shared_mem::cell::{Cell, ClipKind};
+use shared_mem::cell::{Cell, ClipKind, GRAVITY};
 use shared_mem::frames::{Base, Object, Pose};
 use shared_mem::recording::ObjectSeries;
-
-/// Acceleration of free fall [m/s²].
-const GRAVITY: f64 = 9.81;
 /// Noise of the tracker where cell.toml does not tell it, one sigma [m].
 const POSITION_NOISE: f64 = 1e-3;
 /// An object has begun to move when it is this many sigmas away: 1 of 100 000 resting poses is.

@@ -10,12 +10,9 @@ use crate::arm::{FlangeMotion, MassProperties};
 use crate::sim::SimCell;
 use nalgebra::Vector3;
 use rand_distr::{Distribution as _, Normal};
-use shared_mem::cell::{Cell, WrenchSensor};
+use shared_mem::cell::{Cell, GRAVITY, WrenchSensor};
 use shared_mem::msg::wrench::Wrench;
 use shared_mem::time::TICK;
-
-/// Gravity in the base frame [m/s²].
-const GRAVITY: Vector3<f64> = Vector3::new(0.0, 0.0, -9.81);
 
 /// The simulated sensor.
 #[derive(Debug, Clone)]
@@ -93,7 +90,7 @@ fn felt(
     let of_centre = acceleration + alpha.cross(&arm) + omega.cross(&omega.cross(&arm));
     let turn = rotation.to_rotation_matrix();
     let inertia = turn.matrix() * tool.inertia * turn.matrix().transpose();
-    let carried = (GRAVITY - of_centre) * tool.mass;
+    let carried = (Vector3::z() * -GRAVITY - of_centre) * tool.mass;
     let force = push + carried;
     let torque =
         moment_at_base - origin.cross(&push) + arm.cross(&carried) - inertia * alpha - omega.cross(&(inertia * omega));

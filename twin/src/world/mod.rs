@@ -29,7 +29,7 @@ mod tree;
 
 pub use plan::{BodyPlan, Drive, Hold, JointKind, JointPlan, Piece, PlanError, box_hull, cylinder_hull};
 
-use crate::arm::GRAVITY;
+use crate::arm::FREE_FALL;
 use crate::physics::Hull;
 use nalgebra::{Isometry3, Point3, Vector3};
 use patch::{Memory, Patch};
@@ -137,7 +137,7 @@ impl World {
     /// Lets [`STEP`] pass.
     pub fn step(&mut self) {
         self.trees.drift(0.5 * STEP);
-        self.trees.accelerate(&GRAVITY.into(), STEP);
+        self.trees.accelerate(&FREE_FALL.into(), STEP);
         self.locate();
         self.find_patches();
         let Self { trees, rails, patches, pairs, .. } = self;

@@ -76,6 +76,11 @@ pub(in crate::effects) struct JointStribeckFriction {
 }
 
 impl JointStribeckFriction {
+    /// Speed over which a joint's friction falls; 0 where it does not [rad/s].
+    pub(super) fn falls_over(&self, joint: usize) -> f64 {
+        if self.excess[joint] > 0.0 { self.velocity[joint] } else { 0.0 }
+    }
+
     /// Dry friction at a speed [N m].
     pub(super) fn level(&self, joint: usize, speed: f64) -> f64 {
         let ratio = speed / self.velocity[joint];

@@ -7,11 +7,15 @@ use crate::arm::{ArmModel, JointState, Joints, MAX_JOINTS, Passed, Presliding, S
 
 /// Longest step of a gear that yields [s]: a wrist link on its spring rings at up to 200 Hz.
 const LONGEST_STEP: f64 = 2.5e-4;
-/// Below this speed [rad/s] friction that turns round over some mrad/s, or over some mrad, changes by as much as it can within a
-/// few periods of 1 ms; a period is then taken in [`SLOW_PARTS`]. At Stribeck velocities of 14 mrad/s one part leaves five times the
-/// encoders' noise of what four leave.
-const SLOW: f64 = 0.05;
+/// Where friction turns round over some mrad/s it changes by as much as it can within a few periods of 1 ms: while a joint is slower
+/// than so many times that, a period is taken in so many parts. One part leaves 55 sigma² of the torque asked for at a Stribeck
+/// velocity of 14 mrad/s, two leave 5. Beyond, `exp(-25)` of the change is left.
+const SLOW: f64 = 5.0;
 const SLOW_PARTS: f64 = 4.0;
+/// Where it turns round over hundreds of them, one part will do [rad/s].
+const FAST: f64 = 0.05;
+/// Bristles bend over a way; this is slow for some mrad [rad/s].
+const SLOW_TO_BEND: f64 = 0.05;
 /// A joint that is slower rests when it is first seen [rad/s]: encoders' noise, and a tenth of the slowest motions.
 pub(super) const AT_REST: f64 = 1e-3;
 
@@ -59,7 +63,7 @@ impl ArmEffects {
             (dt / LONGEST_STEP - 1e-9).ceil().max(1.0)
         } else {
             *motor = *state;
-            let slow = |i: usize| state.dq[i].abs() < SLOW && self.turns_round(i);
+            let slow = |i: usize| state.dq[i].abs() < self.slow(i);
             if (0..arm.dof()).any(slow) { SLOW_PARTS } else { 1.0 }
         };
         let mut whole = Passed::default();
@@ -71,9 +75,11 @@ impl ArmEffects {
         whole
     }
 
-    /// Whether the dry friction of a joint turns round over a range of speeds, or over a way, instead of at once.
-    fn turns_round(&self, joint: usize) -> bool {
-        self.joint_presliding_friction.is_some() || self.joint_stribeck_friction.is_some() || self.creep(joint) > 0.0
+    /// Below this speed the dry friction of a joint changes within a few periods [rad/s]; 0 where it turns round at once.
+    fn slow(&self, joint: usize) -> f64 {
+        let falls = self.joint_stribeck_friction.map_or(0.0, |effect| effect.falls_over(joint));
+        let bends = if self.joint_presliding_friction.is_some() { SLOW_TO_BEND } else { 0.0 };
+        (SLOW * self.creep(joint).max(falls)).min(FAST).max(bends)
     }
 
     /// How far bristles are bent where nothing is known of what was before: as far as keeps a joint at rest, wholly in motion.
