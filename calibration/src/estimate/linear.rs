@@ -1,12 +1,10 @@
-//! One clip around one point: residuals, their slopes, and what is left once the clip's own numbers are eliminated.
-//!
-//! With residuals `r`, slopes `A` by the shared and `B` by the own numbers `u`, and their prior precision `L`, the own
-//! numbers follow the shared ones: `du = -(B'B + L)^-1 (B'r + L u + B'A dx)`. What remains for the shared ones is the
-//! Schur complement. Its log-likelihood is that of a Gaussian whose covariance is `1 + B L^-1 B'`.
+//! One clip around one point: residuals, their slopes by differences, and what is left once the clip's own numbers are eliminated
+//! ([`super::eliminate`]).
 
+use super::eliminate::Eliminated;
 use super::problem::{ClipModel, Impossible, Random, Unknown};
 use crate::kept::numbers::{matrix, vector, vectors};
-use nalgebra::{Cholesky, DMatrix, DVector};
+use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
@@ -69,19 +67,15 @@ impl ClipFit {
         (random, own): (&[Random], &[f64]),
         stretches: &[usize],
     ) -> Self {
-        // A number that does not scatter has no slope and any precision: 1 keeps it where it is.
-        let precision = DVector::from_iterator(
-            random.len(),
-            random.iter().map(|effect| if effect.sigma > 0.0 { effect.sigma.powi(-2) } else { 1.0 }),
-        );
-        let u = DVector::from_column_slice(own);
-        let pull = precision.component_mul(&u);
-        let mut inner = b.tr_mul(b);
-        inner.set_diagonal(&(inner.diagonal() + &precision));
-        let inner = Cholesky::new(inner).expect("a Gram matrix plus positive precisions is positive definite");
-        let (ba, br) = (b.tr_mul(a), b.tr_mul(r) + &pull);
-        let own_step = -inner.solve(&br);
-        let own_answer = -inner.solve(&ba);
+        let (shared, numbers) = (a.ncols(), own.len());
+        let mut columns = DMatrix::zeros(r.len(), 1 + shared + numbers);
+        columns.set_column(0, r);
+        columns.columns_mut(1, shared).copy_from(a);
+        columns.columns_mut(1 + shared, numbers).copy_from(b);
+        let precision = |effect: &Random| if effect.sigma > 0.0 { effect.sigma.powi(-2) } else { 1.0 };
+        let precision: Vec<f64> = random.iter().map(precision).collect();
+        let left = Eliminated::of(&(columns.transpose() * &columns), &precision, own);
+        let own_answer = left.follows().columns(1, shared).into_owned();
         let starts = std::iter::once(&0).chain(stretches);
         let all = r.len();
         let ends = stretches.iter().filter(|end| **end < all).chain(std::iter::once(&all));
@@ -91,17 +85,17 @@ impl ClipFit {
             a.rows(first, rows).tr_mul(&r) + own_answer.tr_mul(&b.rows(first, rows).tr_mul(&r))
         };
         let scores = starts.zip(ends).map(score).collect();
-        let log_volume: f64 = inner.ln_determinant() - precision.iter().map(|precision| precision.ln()).sum::<f64>();
+        let at_rest: f64 = precision.iter().zip(own).map(|(precision, u)| precision * u * u).sum();
         Self {
             rows: r.len(),
             chi2: r.norm_squared(),
             own: own.to_vec(),
-            deviance: r.norm_squared() + pull.dot(&u) + log_volume,
-            gradient: a.tr_mul(r) + ba.tr_mul(&own_step),
-            information: a.transpose() * a + ba.tr_mul(&own_answer),
+            deviance: r.norm_squared() + at_rest + left.volume,
+            gradient: left.form.view((1, 0), (shared, 1)).column(0).into_owned(),
+            information: left.form.view((1, 1), (shared, shared)).into_owned(),
             scores,
-            own_covariance: inner.inverse(),
-            own_step,
+            own_covariance: left.own_covariance(),
+            own_step: left.own_change(&DVector::zeros(shared)),
             own_answer,
         }
     }

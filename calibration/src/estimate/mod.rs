@@ -7,7 +7,8 @@
 //! | module | owns |
 //! |---|---|
 //! | [`problem`] | the two kinds of unknowns, and the question a model answers: residuals of one clip |
-//! | [`linear`] | one clip linearised, its own numbers eliminated |
+//! | [`eliminate`] | the likelihood of one clip with its own numbers integrated out |
+//! | [`linear`] | one clip linearised by differences |
 //! | [`bounded`] | one damped step within bounds |
 //! | [`descent`] | such steps tried with growing damping until one costs less |
 //! | [`least_squares`] | bounded Levenberg-Marquardt on all clips |
@@ -25,6 +26,7 @@
 
 pub mod bounded;
 pub mod descent;
+pub mod eliminate;
 pub mod evolution;
 pub mod interval;
 pub mod least_squares;
@@ -40,6 +42,7 @@ mod views;
 
 pub use bounded::bounded_step;
 pub use descent::Descent;
+pub use eliminate::Eliminated;
 pub use evolution::Evolution;
 pub use interval::{Intervals, at_bounds, moved_by};
 pub use least_squares::{Fit, Options, Underway, begin, fit, fit_from, go_on, score};

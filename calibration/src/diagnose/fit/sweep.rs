@@ -13,9 +13,9 @@ use crate::diagnose::evidence::measured::{Evidence, Group, Reach};
 use crate::diagnose::evidence::scatter::Scatter;
 use crate::diagnose::evidence::scatter_scale::Around;
 use crate::diagnose::library::{Alternative, Library};
-use crate::estimate::Impossible;
+use crate::estimate::{Eliminated, Impossible};
 use crate::kept::numbers::matrix;
-use nalgebra::{Cholesky, DMatrix, DVector};
+use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
@@ -271,35 +271,18 @@ impl Swept {
 
     fn reduce(&self, clip: &SweptClip, evidence: &impl Evidence, weights: &[f64]) -> Reduced {
         let gram = gram(clip, evidence, weights);
-        let kept = 1 + self.columns.len();
-        let outer = gram.view((0, 0), (kept, kept)).into_owned();
         // The residual and the clip's own numbers, without the columns between them.
         let of_clip = |k: usize| if k == 0 { 0 } else { self.columns.len() + k };
         let alone = 1 + self.scatter.count();
         let alone = DMatrix::from_fn(alone, alone, |i, k| gram[(of_clip(i), of_clip(k))]);
         let around = Around { gram: alone, own: clip.own.clone() };
-        if self.scatter.count() == 0 {
-            return Reduced { form: outer, volume: 0.0, around };
-        }
-        let (inner, cross, precision) = self.own_part(clip, &gram);
-        let constant: f64 = precision.iter().zip(&clip.own).map(|(p, u)| p * u * u).sum();
-        let inner = Cholesky::new(inner).expect("a Gram matrix plus positive precisions is positive definite");
-        let mut form = outer - cross.tr_mul(&inner.solve(&cross));
-        form[(0, 0)] += constant;
-        let volume = inner.ln_determinant() - precision.iter().map(|p| p.ln()).sum::<f64>();
-        Reduced { form, volume: volume + self.scatter.correction(&clip.own), around }
+        let Eliminated { form, volume, .. } = self.eliminated(clip, &gram);
+        let correction = if self.scatter.count() == 0 { 0.0 } else { self.scatter.correction(&clip.own) };
+        Reduced { form, volume: volume + correction, around }
     }
 
-    fn own_part(&self, clip: &SweptClip, gram: &DMatrix<f64>) -> (DMatrix<f64>, DMatrix<f64>, Vec<f64>) {
-        let (kept, own) = (1 + self.columns.len(), self.scatter.count());
-        let mut inner = gram.view((kept, kept), (own, own)).into_owned();
-        let mut cross = gram.view((kept, 0), (own, kept)).into_owned();
-        let precision = self.scatter.precision(&clip.own);
-        for (k, precision) in precision.iter().enumerate() {
-            inner[(k, k)] += precision;
-            cross[(k, 0)] += precision * clip.own[k];
-        }
-        (inner, cross, precision)
+    fn eliminated(&self, clip: &SweptClip, gram: &DMatrix<f64>) -> Eliminated {
+        Eliminated::of(gram, &self.scatter.precision(&clip.own), &clip.own)
     }
 
     /// A clip's own numbers at their best for coefficients of all columns.
@@ -314,10 +297,8 @@ impl Swept {
         if self.scatter.count() == 0 {
             return Vec::new();
         }
-        let (inner, cross, _) = self.own_part(clip, &gram(clip, evidence, weights));
-        let inner = Cholesky::new(inner).expect("a Gram matrix plus positive precisions is positive definite");
-        let step = inner.solve(&(cross * at.clone().insert_row(0, 1.0)));
-        clip.own.iter().zip(step.iter()).map(|(own, step)| own - step).collect()
+        let step = self.eliminated(clip, &gram(clip, evidence, weights)).own_change(at);
+        clip.own.iter().zip(step.iter()).map(|(own, step)| own + step).collect()
     }
 }
 

@@ -1,0 +1,98 @@
+//! A clip's likelihood with its own numbers integrated out: what is left for the shared ones.
+//!
+//! With residuals `r`, slopes `A` by the shared numbers `x` and `B` by the clip's own ones `u`, whose prior has the precision `L`,
+//! `-2 ln` of the likelihood is `|r + A dx + B du|^2 + (u + du)' L (u + du)`, least at `du = -(B'B + L)^-1 (B'r + L u + B'A dx)`.
+//! What remains is a quadratic form in `(1, dx)` (a Schur complement) and the logarithm of the volume that was integrated over:
+//! that of a Gaussian whose covariance is `1 + B L^-1 B'`.
+
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+
+/// A clip without its own numbers. `P` shared numbers, `Q` own ones.
+pub struct Eliminated {
+    /// Over (1, shared numbers), `(1 + P) x (1 + P)`: `-2 ln` of the likelihood but for [`Self::volume`].
+    pub form: DMatrix<f64>,
+    /// `ln det (B'B + L) - ln det L`; 0 of a clip without own numbers.
+    pub volume: f64,
+    inner: Option<Cholesky<f64, Dyn>>,
+    /// `-(B'B + L)^-1 (B'r + L u, B'A)`, `Q x (1 + P)`.
+    follows: DMatrix<f64>,
+}
+
+impl Eliminated {
+    /// From the products of all columns, `gram` over (residual, `A`, `B`), the precisions and the clip's own numbers `u` there, `Q`
+    /// each. A number that does not scatter has no slope and any precision, which keeps it where it is.
+    ///
+    /// # Panics
+    /// Where a precision is not positive.
+    #[must_use]
+    pub fn of(gram: &DMatrix<f64>, precision: &[f64], u: &[f64]) -> Self {
+        let (own, kept) = (u.len(), gram.ncols() - u.len());
+        let mut form = gram.view((0, 0), (kept, kept)).into_owned();
+        if own == 0 {
+            return Self { form, volume: 0.0, inner: None, follows: DMatrix::zeros(0, kept) };
+        }
+        let mut inner = gram.view((kept, kept), (own, own)).into_owned();
+        let mut cross = gram.view((kept, 0), (own, kept)).into_owned();
+        for (k, (precision, u)) in precision.iter().zip(u).enumerate() {
+            inner[(k, k)] += precision;
+            cross[(k, 0)] += precision * u;
+            form[(0, 0)] += precision * u * u;
+        }
+        let inner = Cholesky::new(inner).expect("a Gram matrix plus positive precisions is positive definite");
+        let follows = -inner.solve(&cross);
+        form += cross.tr_mul(&follows);
+        let volume = inner.ln_determinant() - precision.iter().map(|precision| precision.ln()).sum::<f64>();
+        Self { form, volume, inner: Some(inner), follows }
+    }
+
+    /// By how much the own numbers change to be at their best after a change `dx` of the shared ones, `Q`.
+    #[must_use]
+    pub fn own_change(&self, dx: &DVector<f64>) -> DVector<f64> {
+        &self.follows * dx.clone().insert_row(0, 1.0)
+    }
+
+    /// How the own numbers follow (1, the shared ones), `Q x (1 + P)`.
+    #[must_use]
+    pub fn follows(&self) -> &DMatrix<f64> {
+        &self.follows
+    }
+
+    /// Covariance of the own numbers given the shared ones, `Q x Q`.
+    #[must_use]
+    pub fn own_covariance(&self) -> DMatrix<f64> {
+        self.inner.as_ref().map_or_else(|| DMatrix::zeros(0, 0), Cholesky::inverse)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_left_is_the_likelihood_with_the_own_number_at_its_best() {
+        // r = 1 + 2 dx + 3 du in two rows, the second of other signs; u is 0.5 with a precision of 4.
+        let columns = DMatrix::from_row_slice(2, 3, &[1.0, 2.0, 3.0, -1.0, 0.5, 1.0]);
+        let (precision, u) = (4.0, 0.5);
+        let left = Eliminated::of(&(columns.transpose() * &columns), &[precision], &[u]);
+        let cost = |dx: f64, du: f64| {
+            let rows = &columns * DVector::from_row_slice(&[1.0, dx, du]);
+            rows.norm_squared() + precision * (u + du).powi(2)
+        };
+        for dx in [-0.7, 0.0, 1.3] {
+            let du = left.own_change(&DVector::from_element(1, dx))[0];
+            assert!(cost(dx, du) < cost(dx, du + 1e-3).min(cost(dx, du - 1e-3)));
+            let at = DVector::from_row_slice(&[1.0, dx]);
+            assert!((at.dot(&(&left.form * &at)) - cost(dx, du)).abs() < 1e-12);
+        }
+        assert!(
+            (left.volume - (1.0 + 10.0 / precision).ln()).abs() < 1e-12 && left.own_covariance()[(0, 0)] == 1.0 / 14.0
+        );
+    }
+
+    #[test]
+    fn a_clip_without_own_numbers_is_its_own_form() {
+        let gram = DMatrix::from_row_slice(2, 2, &[3.0, 1.0, 1.0, 2.0]);
+        let left = Eliminated::of(&gram, &[], &[]);
+        assert!(left.form == gram && left.volume == 0.0 && left.own_change(&DVector::zeros(1)).is_empty());
+    }
+}
