@@ -84,9 +84,8 @@ mod tests {
             let at = DVector::from_row_slice(&[1.0, dx]);
             assert!((at.dot(&(&left.form * &at)) - cost(dx, du)).abs() < 1e-12);
         }
-        assert!(
-            (left.volume - (1.0 + 10.0 / precision).ln()).abs() < 1e-12 && left.own_covariance()[(0, 0)] == 1.0 / 14.0
-        );
+        assert!((left.volume - (1.0 + 10.0 / precision).ln()).abs() < 1e-12);
+        assert!((left.own_covariance()[(0, 0)] - 1.0 / 14.0).abs() < 1e-12);
     }
 
     #[test]
