@@ -3,7 +3,7 @@
 use std::error::Error;
 use std::path::PathBuf;
 
-const FILES: [&str; 8] = [
+const FILES: [&str; 9] = [
     "foxglove/PoseInFrame.proto",
     "foxglove/RawImage.proto",
     "foxglove/CameraCalibration.proto",
@@ -12,6 +12,7 @@ const FILES: [&str; 8] = [
     "twinalign/arm.proto",
     "twinalign/twin.proto",
     "twinalign/devices.proto",
+    "twinalign/target.proto",
 ];
 
 fn main() -> Result<(), Box<dyn Error>> {

@@ -42,7 +42,7 @@ fn main() -> anyhow::Result<()> {
     let count = |n: usize, default: usize| std::env::args().nth(n).map_or(Ok(default), |text| text.parse());
     let (trials, pictures, swarms) = (count(1, 100)?, count(2, 1)?, count(3, 2)?);
     let mut cell = Cell::read(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../config/fr3_cell.toml"))?;
-    cell.object.as_mut().expect("an object").pose_noise = None;
+    cell.object_mut().expect("an object").pose_noise = None;
     let camera = cell.camera.clone().unwrap_or_default();
     let truth = camera.base_from_camera().expect("a pose").isometry().inverse();
     let shape = Shape::new(RobotSurface::new(&cell, Hand::None)?);

@@ -129,6 +129,7 @@ fn where_an_object_lies_still_no_number_is_told_and_that_is_said() {
             desired: JointSeries::default(),
             measured: JointSeries::default(),
             object: ObjectSeries { poses: vec![place; stamps_ns.len()], stamps_ns },
+            others: Vec::new(),
             warnings: Vec::new(),
             damage: None,
         }

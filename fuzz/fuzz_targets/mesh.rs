@@ -29,7 +29,7 @@ fuzz_target!(
         let name = format!("mesh.{}", ENDINGS[usize::from(first) % ENDINGS.len()]);
         fuzz::file(&name, bytes);
         let object = Object { mesh: Some(name.into()), ..Object::default() };
-        let cell = Cell { object: Some(object), folder: fuzz::folder().to_owned(), ..Cell::default() };
+        let cell = Cell { objects: vec![object], folder: fuzz::folder().to_owned(), ..Cell::default() };
         if let Some(Some(model)) = fuzz::accepted(ObjectModel::new(&cell, None)) {
             let (points, triangles) = model.shape.triangles();
             assert!(triangles.iter().flatten().all(|corner| (*corner as usize) < points.len()));

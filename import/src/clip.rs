@@ -57,6 +57,7 @@ pub(crate) fn clip(log: &Log, mapping: &Mapping, gravity: Option<&Gravity>) -> R
         measured,
         torques_end_at_rows: act == TorquesAct::UntilStamp,
         object,
+        others: Vec::new(),
         warnings,
         damage: None,
     })

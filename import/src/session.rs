@@ -212,7 +212,7 @@ impl Writing<'_> {
                 None => cell::proposed(log, &self.mapping.joints),
             };
             let cell = Cell::parse(&text, Path::new(CELL_TOML))?;
-            if self.mapping.kind != ClipKind::Excitation && cell.object.is_none() {
+            if self.mapping.kind != ClipKind::Excitation && cell.object().is_none() {
                 let what = "holds poses of an object that no cell.toml describes; give one with an `[object]` block: --cell cell.toml";
                 return Err(failed(what.into()));
             }

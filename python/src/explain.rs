@@ -21,10 +21,7 @@ use twin::effects::{Role, Shape, Stage, registry};
 const LOOK: Duration = Duration::from_millis(50);
 
 /// Work beside Python's own thread, which Ctrl-C ends as in a terminal.
-fn interruptible<T: Send>(
-    py: Python<'_>,
-    work: impl FnOnce(&Interrupt) -> anyhow::Result<T> + Send,
-) -> PyResult<T> {
+fn interruptible<T: Send>(py: Python<'_>, work: impl FnOnce(&Interrupt) -> anyhow::Result<T> + Send) -> PyResult<T> {
     let interrupt = Interrupt::default();
     py.detach(|| {
         let (done, answer) = channel();
@@ -64,12 +61,13 @@ fn engine(
 
 /// What a session says about its cell; the JSON of `calibration diagnose --json`.
 #[pyfunction]
-#[pyo3(signature = (session, *, cell, theta, seed, torques, budget, engine_command, engine_limit, as_recorded))]
+#[pyo3(signature = (session, *, cell, object, theta, seed, torques, budget, engine_command, engine_limit, as_recorded))]
 #[allow(clippy::too_many_arguments)] // the command's options, of which Python's side has names and defaults
 pub(crate) fn diagnose(
     py: Python<'_>,
     session: PathBuf,
     cell: Option<PathBuf>,
+    object: Option<String>,
     theta: Option<String>,
     seed: u64,
     torques: bool,
@@ -81,7 +79,9 @@ pub(crate) fn diagnose(
     let theta = theta.map(|text| serde_json::from_str::<Theta>(&text)).transpose();
     let theta = theta.map_err(|error| PyValueError::new_err(format!("parameters: {error}")))?;
     interruptible(py, |interrupt| {
-        let session = Session::open_with(&session, cell.as_deref())?;
+        let mut session = Session::open_with(&session, cell.as_deref())?;
+        session.about(object.as_deref())?;
+        let theta = theta.map(|theta| theta.about(&session.cell));
         let odd = gate::look(&session, as_recorded)?;
         let engine = engine(engine_command, engine_limit, &session, interrupt)?;
         let budget = budget.map(Duration::try_from_secs_f64).transpose()?;
@@ -127,12 +127,13 @@ pub(crate) fn identify_arm(
 
 /// Friction, mass, centre of mass and tip friction; the JSON of `calibration identify object --json`.
 #[pyfunction]
-#[pyo3(signature = (session, *, cell, parameters, optimizer, budget, seed, out))]
+#[pyo3(signature = (session, *, cell, object, parameters, optimizer, budget, seed, out))]
 #[allow(clippy::too_many_arguments)] // as above
 pub(crate) fn identify_object(
     py: Python<'_>,
     session: PathBuf,
     cell: Option<PathBuf>,
+    object: Option<String>,
     parameters: Option<PathBuf>,
     optimizer: &str,
     budget: usize,
@@ -141,7 +142,7 @@ pub(crate) fn identify_object(
 ) -> PyResult<String> {
     let optimizer = self::optimizer(optimizer)?;
     interruptible(py, |interrupt| {
-        let options = object::Options { session, cell, optimizer, out, parameters, budget, seed };
+        let options = object::Options { session, cell, object, optimizer, out, parameters, budget, seed };
         text(&object::identify(&options, interrupt)?)
     })
 }

@@ -7,6 +7,7 @@ use pyo3::exceptions::PyIndexError;
 use pyo3::prelude::*;
 use shared_mem::cell::ClipKind;
 use shared_mem::recording;
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 /// A folder with cell.toml and clips, or one clip beside a cell.toml.
@@ -17,11 +18,15 @@ pub(crate) struct Session {
 
 #[pymethods]
 impl Session {
-    /// Opens a session folder; `cell`: another cell.toml than the one beside the clips.
+    /// Opens a session folder; `cell`: another cell.toml than the one beside the clips; `object`: of several the one whose poses a
+    /// clip's `object_position` and `object_orientation` are, else the first.
     #[new]
-    #[pyo3(signature = (path, *, cell=None))]
-    fn new(path: PathBuf, cell: Option<PathBuf>) -> PyResult<Self> {
-        let inner = recording::Session::open_with(&path, cell.as_deref()).map_err(failed)?;
+    #[pyo3(signature = (path, *, cell=None, object=None))]
+    fn new(path: PathBuf, cell: Option<PathBuf>, object: Option<String>) -> PyResult<Self> {
+        let mut inner = recording::Session::open_with(&path, cell.as_deref()).map_err(failed)?;
+        if let Some(name) = object {
+            inner.cell.about(&name).map_err(failed)?;
+        }
         Ok(Self { inner })
     }
 
@@ -95,8 +100,19 @@ pub(crate) struct Clip {
     object_position: Option<Py<PyArray2<f64>>>,
     /// The object's quaternions w, x, y, z in the base frame [poses, 4].
     object_orientation: Option<Py<PyArray2<f64>>>,
+    /// Of the other objects of cell.toml, by name: stamps [poses], ns, positions [poses, 3], m, and quaternions [poses, 4].
+    others: BTreeMap<String, Poses>,
     /// What was found odd in it, one sentence each.
     warnings: Vec<String>,
+}
+
+/// Stamps, positions and quaternions of an object; the last two None where it was not tracked.
+type Poses = (Py<PyArray1<u64>>, Option<Py<PyArray2<f64>>>, Option<Py<PyArray2<f64>>>);
+
+fn poses(py: Python<'_>, series: recording::ObjectSeries) -> PyResult<Poses> {
+    let places = series.poses.iter().flat_map(|pose| pose.position()).collect();
+    let turns = series.poses.iter().flat_map(|pose| pose.wxyz()).collect();
+    Ok((list(py, series.stamps_ns), rows(py, places, 3)?, rows(py, turns, 4)?))
 }
 
 #[pymethods]
@@ -108,15 +124,18 @@ impl Clip {
 
 impl Clip {
     fn new(py: Python<'_>, clip: recording::Clip) -> PyResult<Self> {
-        let recording::Clip { file, kind, joint_names, desired, measured, object, mut warnings, damage, .. } = clip;
+        let recording::Clip {
+            file, kind, joint_names, desired, measured, object, others, mut warnings, damage, ..
+        } = clip;
         warnings.extend(damage);
         let kind = match kind {
             ClipKind::Excitation => "excitation",
             ClipKind::ControlHitSlide => "control_hit_slide",
             ClipKind::FreeMotion => "free_motion",
         };
-        let places = object.poses.iter().flat_map(|pose| pose.position()).collect();
-        let turns = object.poses.iter().flat_map(|pose| pose.wxyz()).collect();
+        let (object_stamps_ns, object_position, object_orientation) = poses(py, object)?;
+        let others = others.into_iter().map(|other| Ok((other.name, poses(py, other.series)?)));
+        let others = others.collect::<PyResult<_>>()?;
         Ok(Self {
             file,
             kind,
@@ -129,9 +148,10 @@ impl Clip {
             q_d: rows(py, desired.q, desired.dof)?,
             dq_d: rows(py, desired.dq, desired.dof)?,
             tau_d: rows(py, desired.tau, desired.dof)?,
-            object_stamps_ns: list(py, object.stamps_ns),
-            object_position: rows(py, places, 3)?,
-            object_orientation: rows(py, turns, 4)?,
+            object_stamps_ns,
+            object_position,
+            object_orientation,
+            others,
             warnings,
         })
     }

@@ -28,19 +28,19 @@ def _text(parameters):
     return parameters if parameters is None else _os.fspath(parameters)
 
 
-def diagnose(session, *, cell=None, parameters=None, seed=0, torques=False, budget=None, engine=None, engine_limit=60.0,
+def diagnose(session, *, cell=None, object=None, parameters=None, seed=0, torques=False, budget=None, engine=None, engine_limit=60.0,
              as_recorded=False):
     """Where the twin differs from the cell, which effect causes it, and how far the gap shrinks with it.
 
     The answer is the JSON object of `calibration diagnose --json`: `verdict`, `gap`, `where`, `candidates`, `theta`, ...
 
-    session: path of a session folder. cell: another cell.toml than its own. parameters: what is known already, a path of a
-    theta.toml or a dict of its content. seed: draws the split of the clips and the intervals. torques: explains measured torques
+    session: path of a session folder. cell: another cell.toml than its own. object: of several in cell.toml the one to judge, else
+    the one that moves. parameters: what is known already, a path of a theta.toml or a dict of its content. seed: draws the split of the clips and the intervals. torques: explains measured torques
     along the measured motion. budget: after so many seconds the best answer so far counts. engine: command of another simulator
     (docs/engine.md), engine_limit: seconds it may take for one roll-out. as_recorded: takes data that cannot mean what they say.
     """
     return _json.loads(_twinalign.diagnose(
-        _os.fspath(session), cell=_text(cell), theta=_theta(parameters), seed=seed, torques=torques, budget=budget,
+        _os.fspath(session), cell=_text(cell), object=object, theta=_theta(parameters), seed=seed, torques=torques, budget=budget,
         engine_command=engine, engine_limit=engine_limit, as_recorded=as_recorded))
 
 
@@ -59,14 +59,15 @@ def identify_arm(session, *, cell=None, parameters=None, also=(), optimizer="lea
         budget=budget, seed=seed, out=_text(out), engine_command=engine, engine_limit=engine_limit))
 
 
-def identify_object(session, *, cell=None, parameters=None, optimizer="least-squares", budget=1200, seed=0, out=None):
+def identify_object(session, *, cell=None, object=None, parameters=None, optimizer="least-squares", budget=1200, seed=0, out=None):
     """Friction, mass [kg], centre of mass [m, object frame, from the geometric centre] and tip friction of the object.
 
-    The answer is the JSON object of `calibration identify object --json`; arguments as of `identify_arm`.
+    The answer is the JSON object of `calibration identify object --json`; `object`: of several in cell.toml the one to identify,
+    else the one that moves; other arguments as of `identify_arm`.
     """
     return _json.loads(_twinalign.identify_object(
-        _os.fspath(session), cell=_text(cell), parameters=_text(parameters), optimizer=optimizer, budget=budget, seed=seed,
-        out=_text(out)))
+        _os.fspath(session), cell=_text(cell), object=object, parameters=_text(parameters), optimizer=optimizer, budget=budget,
+        seed=seed, out=_text(out)))
 
 
 def effects():

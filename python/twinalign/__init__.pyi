@@ -13,7 +13,7 @@ _Optimizer = Literal["least-squares", "pso", "cma"]
 
 class Session:
     """A folder with cell.toml and clips, or one clip beside a cell.toml. `session[i]` reads a clip."""
-    def __init__(self, path: _Path, *, cell: _Path | None = None) -> None: ...
+    def __init__(self, path: _Path, *, cell: _Path | None = None, object: str | None = None) -> None: ...
     @property
     def folder(self) -> Path: ...
     @property
@@ -67,6 +67,9 @@ class Clip:
     def object_orientation(self) -> _Floats | None:
         """Quaternions w, x, y, z in the base frame [poses, 4]."""
     @property
+    def others(self) -> dict[str, tuple[_Stamps, _Floats | None, _Floats | None]]:
+        """Of the other objects of cell.toml, by name: stamps, positions, quaternions as of the object."""
+    @property
     def warnings(self) -> list[str]: ...
 
 class Twin:
@@ -117,6 +120,7 @@ def diagnose(
     session: _Path,
     *,
     cell: _Path | None = None,
+    object: str | None = None,
     parameters: _Path | dict[str, Any] | None = None,
     seed: int = 0,
     torques: bool = False,
@@ -146,6 +150,7 @@ def identify_object(
     session: _Path,
     *,
     cell: _Path | None = None,
+    object: str | None = None,
     parameters: _Path | None = None,
     optimizer: _Optimizer = "least-squares",
     budget: int = 1200,

@@ -29,6 +29,7 @@
 //! | [`time`] | the clock that every stamp comes from |
 
 pub mod answer;
+mod blocks;
 pub mod cell;
 pub mod command_line;
 pub mod console;

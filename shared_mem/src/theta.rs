@@ -1,6 +1,7 @@
 //! `theta.toml`: what was identified about a cell. Written by identification and diagnosis, read by everything that
 //! simulates. What is absent keeps the value of cell.toml.
 
+use crate::blocks::{self, Named};
 use crate::cell::Cell;
 use crate::input;
 use crate::output::{self, OutputError};
@@ -11,17 +12,49 @@ use std::path::Path;
 
 /// The identified parameters.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(from = "ThetaFile", into = "ThetaFile")]
 pub struct Theta {
     /// The arm's controller.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub arm: Option<ArmTheta>,
-    /// The object.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    /// The object that a command is about: of a file the first, [`Self::about`] says another.
     pub object: Option<ObjectTheta>,
+    /// Other objects, by their names.
+    pub others: Vec<ObjectTheta>,
     /// Effects the nominal cell lacks, by the names of the effect registry.
-    #[serde(default, rename = "effect", skip_serializing_if = "Vec::is_empty")]
     pub effects: Vec<EffectTheta>,
+}
+
+/// The same as it stands in the file: one `[object]` without a name, or `[[object]]` blocks with one each.
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct ThetaFile {
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    arm: Option<ArmTheta>,
+    #[serde(default, rename = "object", with = "blocks", skip_serializing_if = "Vec::is_empty")]
+    objects: Vec<ObjectTheta>,
+    #[serde(default, rename = "effect", skip_serializing_if = "Vec::is_empty")]
+    effects: Vec<EffectTheta>,
+}
+
+impl From<ThetaFile> for Theta {
+    fn from(ThetaFile { arm, objects, effects }: ThetaFile) -> Self {
+        let mut objects = objects.into_iter();
+        Self { arm, object: objects.next(), others: objects.collect(), effects }
+    }
+}
+
+impl From<Theta> for ThetaFile {
+    fn from(Theta { arm, object, others, effects }: Theta) -> Self {
+        Self { arm, objects: object.into_iter().chain(others).collect(), effects }
+    }
+}
+
+impl Named for ObjectTheta {
+    const KEY: &'static str = "object";
+
+    fn name(&self) -> Option<&str> {
+        self.name.as_deref()
+    }
 }
 
 /// Identified gains.
@@ -38,6 +71,9 @@ pub struct ArmTheta {
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, expecting = "an [object] block")]
 pub struct ObjectTheta {
+    /// Its name in cell.toml; needed where there are several.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub name: Option<String>,
     /// Coulomb friction between object and table.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub friction: Option<f64>,
@@ -82,10 +118,33 @@ impl Theta {
     /// # Errors
     /// [`TomlFileError`] when it cannot be read or a key is not known.
     pub fn read(path: &Path) -> Result<Self, TomlFileError> {
-        toml_file::read(path).map_err(|error| match Cell::read(path) {
-            Ok(_) => TomlFileError::Content { path: path.to_owned(), line: None, what: IS_A_CELL.to_owned() },
+        let text = input::text(path, input::Kind::Configuration)?;
+        let content = |what: String| TomlFileError::Content { path: path.to_owned(), line: None, what };
+        if let Some(what) = blocks::both_forms::<ObjectTheta>(&text) {
+            return Err(content(what));
+        }
+        let read: ThetaFile = toml_file::parse(&text, path).map_err(|error| match Cell::parse(&text, path) {
+            Ok(_) => content(IS_A_CELL.to_owned()),
             Err(_) => error,
-        })
+        })?;
+        blocks::check_names(&read.objects).map_err(content)?;
+        Ok(read.into())
+    }
+
+    /// With the object in question that `cell`'s is: the one of its name; where no name is given, on either side, the only one.
+    #[must_use]
+    pub fn about(self, cell: &Cell) -> Self {
+        let Self { arm, object, others, effects } = self;
+        let mut all: Vec<ObjectTheta> = object.into_iter().chain(others).collect();
+        let wanted = cell.object_name();
+        let fits = |object: &ObjectTheta| wanted.is_none() || object.name.is_none() || object.name() == wanted;
+        let place = all.iter().position(|object| wanted.is_some() && object.name() == wanted);
+        let place = place.or_else(|| all.iter().position(fits));
+        let mut object = place.map(|place| all.remove(place));
+        if let Some(object) = &mut object {
+            object.name = wanted.map(str::to_owned);
+        }
+        Self { arm, object, others: all, effects }
     }
 
     /// The file's text.
@@ -137,8 +196,8 @@ mod tests {
         };
         let found = Theta {
             arm: Some(ArmTheta { stiffness: vec![5.0, 6.0], damping: vec![7.0, 8.0] }),
-            object: None,
             effects: vec![effect(0.7)],
+            ..Theta::default()
         };
         found.write(&path).expect("room");
         let written = std::fs::read_to_string(&path).expect("a file");
@@ -157,10 +216,42 @@ mod tests {
     }
 
     #[test]
+    fn objects_are_told_apart_by_name_and_one_that_is_not_asked_about_stays() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("theta.toml");
+        let block = |name: &str| format!("[[object]]\nname = \"{name}\"\nshape = \"box\"\nsize = [0.1, 0.1, 0.1]\n");
+        let mut cell = Cell::parse(&(block("cup") + &block("milk")), &path).expect("a cell");
+        std::fs::write(&path, "# weighed\n[[object]]\nname = \"cup\"\nmass = 0.2\n").expect("room");
+        cell.about("milk").expect("the milk");
+        let mut theta = Theta::read(&path).expect("a theta.toml").about(&cell);
+        assert_eq!((theta.object.as_ref(), theta.others.len()), (None, 1));
+        theta.object = Some(ObjectTheta { mass: Some(0.5), ..ObjectTheta::default() });
+        theta.about(&cell).write(&path).expect("room");
+        let of =
+            |cell: &Cell| Theta::read(&path).expect("a theta.toml").about(cell).object.and_then(|object| object.mass);
+        let milk = of(&cell);
+        cell.about("cup").expect("the cup");
+        assert_eq!((of(&cell), milk), (Some(0.2), Some(0.5)));
+        assert!(std::fs::read_to_string(&path).expect("a file").contains("# weighed"));
+        // What was identified before objects had names is about the first.
+        std::fs::write(&path, "[object]\nmass = 0.3\n").expect("room");
+        assert_eq!(of(&cell), Some(0.3));
+        for (text, told) in [
+            ("[object]\nmass = 0.3\n[[object]]\nname = \"cup\"\n", "both [object] and [[object]]"),
+            ("[[object]]\nmass = 0.3\n[[object]]\nname = \"cup\"\n", "number 1 has no `name`"),
+        ] {
+            std::fs::write(&path, text).expect("room");
+            let error = Theta::read(&path).expect_err(told).to_string();
+            assert!(error.contains(told) && !error.contains('\n'), "{error}");
+        }
+    }
+
+    #[test]
     fn what_is_written_is_read_back() {
         let theta = Theta {
             arm: Some(ArmTheta { stiffness: vec![600.0; 7], damping: vec![50.0; 7] }),
             object: Some(ObjectTheta { friction: Some(0.28), ..ObjectTheta::default() }),
+            others: Vec::new(),
             effects: vec![EffectTheta {
                 name: "command_delay".into(),
                 parameters: [("delay".to_owned(), toml::Value::Float(0.012))].into(),

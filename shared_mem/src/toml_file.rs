@@ -43,8 +43,8 @@ pub fn parse<T: DeserializeOwned>(text: &str, path: &Path) -> Result<T, TomlFile
     })
 }
 
-/// The text `before` with the values of `update`; everything else of it stays, but for the arrays of blocks in `whole`, which
-/// hold what `update` has of them and nothing else. `None` where one of the two is no TOML.
+/// The text `before` with the values of `update`; everything else of it stays, blocks of other names too, but for the arrays of
+/// blocks in `whole`, which hold what `update` has of them and nothing else. `None` where one of the two is no TOML.
 #[must_use]
 pub fn updated(before: &str, update: &str, whole: &[&str]) -> Option<String> {
     let mut document: DocumentMut = before.parse().ok()?;
@@ -54,11 +54,11 @@ pub fn updated(before: &str, update: &str, whole: &[&str]) -> Option<String> {
             document.remove(name);
         }
     }
-    update_table(document.as_table_mut(), update.as_table());
+    update_table(document.as_table_mut(), update.as_table(), whole);
     Some(document.to_string())
 }
 
-fn update_table(before: &mut dyn TableLike, update: &dyn TableLike) {
+fn update_table(before: &mut dyn TableLike, update: &dyn TableLike, whole: &[&str]) {
     for (key, new) in update.iter() {
         match (before.get_mut(key), new) {
             (Some(Item::Value(old)), Item::Value(new)) if !(old.is_inline_table() && new.is_inline_table()) => {
@@ -67,9 +67,11 @@ fn update_table(before: &mut dyn TableLike, update: &dyn TableLike) {
                 *old = new.clone();
                 *old.decor_mut() = decor;
             }
-            (Some(Item::ArrayOfTables(old)), Item::ArrayOfTables(new)) => *old = update_blocks(old, new),
+            (Some(Item::ArrayOfTables(old)), Item::ArrayOfTables(new)) => {
+                *old = update_blocks(old, new, !whole.contains(&key));
+            }
             (Some(old), new) => match (old.as_table_like_mut(), new.as_table_like()) {
-                (Some(old), Some(new)) => update_table(old, new),
+                (Some(old), Some(new)) => update_table(old, new, &[]),
                 _ => *old = new.clone(),
             },
             (None, new) => drop(before.insert(key, new.clone())),
@@ -77,18 +79,20 @@ fn update_table(before: &mut dyn TableLike, update: &dyn TableLike) {
     }
 }
 
-/// The blocks of `update`, each in the place of the one of the same name.
-fn update_blocks(before: &ArrayOfTables, update: &ArrayOfTables) -> ArrayOfTables {
+/// The blocks of `update`, each in the place of the one of the same name, and with `others` those of other names.
+fn update_blocks(before: &ArrayOfTables, update: &ArrayOfTables, others: bool) -> ArrayOfTables {
     let name = |table: &toml_edit::Table| table.get("name").and_then(Item::as_str).map(str::to_owned);
     let one = |new: &toml_edit::Table| match before.iter().find(|old| name(old).is_some() && name(old) == name(new)) {
         Some(old) => {
             let mut block = old.clone();
-            update_table(&mut block, new);
+            update_table(&mut block, new, &[]);
             block
         }
         None => new.clone(),
     };
-    update.iter().map(one).collect()
+    let is_other = |old: &&toml_edit::Table| name(old).is_some() && update.iter().all(|new| name(new) != name(old));
+    let kept = before.iter().filter(|old| others && is_other(old)).cloned();
+    kept.chain(update.iter().map(one)).collect()
 }
 
 /// Turns serde's "unknown field `x`, expected one of `a`, `b`" into advice.

@@ -100,6 +100,8 @@ fn refused_file(text: &str) -> Option<String> {
 fn the_schema_takes_the_files_of_the_house_and_names_what_the_reader_refuses() {
     let shipped = include_str!("../../config/fr3_cell.toml");
     assert_eq!(refused_file(shipped), None);
+    let two = "[[object]]\nname = 'a'\nmesh = 'a.obj'\n[[object]]\nname = 'b'\nmesh = 'b.obj'\n";
+    assert!(refused_file(two).is_none() && Cell::parse(two, Path::new("cell.toml")).is_ok());
     assert_eq!(refused_file("[robot]\njoints = ['a']\n[[clip]]\nfile = 'a.mcap'\nkind = 'free_motion'\n"), None);
     for (wrong, named) in [
         ("[table]\nhieght = 0.0\n", "hieght"),
@@ -108,6 +110,7 @@ fn the_schema_takes_the_files_of_the_house_and_names_what_the_reader_refuses() {
         ("[table]\nheight = 'low'\n", "table.height"),
         ("[controller]\nkind = 'tracking'\n", "controller.kind"),
         ("[object]\nsize = [0.1, 0.1]\n", "2 items"),
+        ("[[object]]\nname = 'a'\nmesh = 'a.obj'\n[[object]]\nname = 2\nmesh = 'a.obj'\n", "object.name"),
         ("[[clip]]\nfile = 'a.mcap'\nkind = 'walk'\n", "clip.kind"),
     ] {
         assert!(Cell::parse(wrong, Path::new("cell.toml")).is_err(), "{wrong}");

@@ -7,6 +7,7 @@ use shared_mem::msg::gripper::GripperState;
 use shared_mem::msg::image::{CameraInfo, ImageHeader, PixelEncoding, StampDomain};
 use shared_mem::msg::joints_from;
 use shared_mem::msg::object::ObjectPose;
+use shared_mem::msg::target::{ArmTarget, GripperTarget, TargetKind};
 use shared_mem::msg::twin::{TwinGap, TwinState};
 use shared_mem::msg::wrench::Wrench;
 use shared_mem::recording::{
@@ -128,7 +129,20 @@ fn one_of_each() -> Vec<Payload> {
     let wrench =
         Wrench { stamp_ns: 1, device_ns: 2, sequence: 3, force: [4.0; 3], torque: [5.0; 3], saturated: 6, reserved: 0 };
     let gripper = GripperState { stamp_ns: 1, width: 0.08, width_d: 0.02, force: 30.0, grasped: 1, fault: 2 };
+    let arm_target = ArmTarget {
+        stamp_ns: 1,
+        stream: 2,
+        kind: TargetKind::Pose,
+        dof: 2,
+        speed: 0.3,
+        q: joints_from(&[0.4, 0.5]),
+        position: [0.6, 0.7, 0.8],
+        wxyz: [0.0, 0.0, 1.0, 0.0],
+    };
+    let gripper_target = GripperTarget { stamp_ns: 1, stream: 2, width: 0.03, speed: 0.04, force: 5.0 };
     vec![
+        Payload::ArmTarget(Box::new(arm_target)),
+        Payload::GripperTarget(gripper_target),
         Payload::ArmState(Box::new(state(1))),
         Payload::ArmCommand(Box::new(command)),
         Payload::ObjectPose(Box::new(pose(1))),
@@ -152,6 +166,8 @@ fn write<W: Write>(writer: &mut ClipWriter<W>, payload: &Payload) -> Result<(), 
         Payload::Picture(other) => panic!("{other:?}"),
         Payload::Wrench(m) => writer.wrench(m),
         Payload::Gripper(m) => writer.gripper(m),
+        Payload::ArmTarget(m) => writer.arm_target(m),
+        Payload::GripperTarget(m) => writer.gripper_target(m),
         Payload::TwinState(m) => writer.twin_state(m),
         Payload::TwinGap(m) => writer.twin_gap(m),
         Payload::Event(m) => writer.event(m),

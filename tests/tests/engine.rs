@@ -26,7 +26,7 @@ const DELAY: &str = "[[effect]]\nname = \"command_delay\"\ndelay = 0.008\n";
 /// A session of an arm alone that swings with three sines a joint, different ones in each clip.
 fn session(cell: &Cell, hidden: &str) {
     let lab = CellToml::parse(lab_cell(), Path::new("cell.toml")).expect("the shipped cell");
-    let alone = CellToml { object: None, ..lab };
+    let alone = CellToml { objects: Vec::new(), ..lab };
     let theta = Theta::read(&written(cell, "hidden.toml", hidden)).expect("a theta");
     let mut text = alone.to_toml();
     std::fs::create_dir(cell.path("session")).expect("a folder");

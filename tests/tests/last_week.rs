@@ -22,7 +22,8 @@ fn record(folder: &Path) {
     let mut cell = Cell::read(&root().join("config/fr3_cell.toml")).expect("the shipped cell");
     cell.clips.clear();
     // The bag knows nothing of a tool.
-    (cell.camera, cell.object, cell.tool) = (None, None, None);
+    (cell.camera, cell.tool) = (None, None);
+    cell.objects.clear();
     std::fs::create_dir_all(folder).expect("room");
     let home = *ArmModel::from_cell(&cell).expect("an arm").ready();
     for number in 0..2 {

@@ -85,7 +85,7 @@ impl ObjectModel {
     /// # Errors
     /// [`MeshFileError`] when the object is a mesh that cannot be used.
     pub fn new(cell: &Cell, theta: Option<&Theta>) -> Result<Option<Self>, MeshFileError> {
-        let Some(object) = &cell.object else { return Ok(None) };
+        let Some(object) = cell.object() else { return Ok(None) };
         let shape = match (&object.mesh, object.size) {
             (Some(file), _) => mesh_file::read(&cell.folder.join(file))?,
             (None, size) => ObjectShape::Box { half_extents: Vector3::from(size.unwrap_or([0.05; 3])) * 0.5 },
@@ -155,7 +155,9 @@ impl ObjectParameters {
     /// What `theta` knows, else the nominal values of cell.toml.
     #[must_use]
     pub fn new(object: &Object, theta: Option<&Theta>) -> Self {
-        let known = theta.and_then(|t| t.object.as_ref());
+        // A block of another name is about another object.
+        let fits = |known: &&ObjectTheta| known.name.is_none() || known.name == object.name;
+        let known = theta.and_then(|theta| theta.object.as_ref()).filter(fits);
         let of = |value: fn(&ObjectTheta) -> Option<f64>| known.and_then(value);
         Self {
             mass: of(|o| o.mass).unwrap_or_else(|| object.nominal_mass()),
@@ -251,7 +253,7 @@ mod tests {
     #[test]
     fn a_centre_of_mass_outside_of_the_object_is_refused() {
         let cell = Cell {
-            object: Some(shared_mem::cell::Object { size: Some([0.1, 0.2, 0.3]), ..Default::default() }),
+            objects: vec![shared_mem::cell::Object { size: Some([0.1, 0.2, 0.3]), ..Default::default() }],
             ..Cell::default()
         };
         let with = |centre: [f64; 3]| {
@@ -267,11 +269,11 @@ mod tests {
     #[test]
     fn what_was_identified_replaces_what_was_assumed() {
         let cell = Cell {
-            object: Some(shared_mem::cell::Object {
+            objects: vec![shared_mem::cell::Object {
                 size: Some([0.1; 3]),
                 friction_range: Some([0.2, 0.4]),
                 ..Default::default()
-            }),
+            }],
             ..Cell::default()
         };
         let theta =

@@ -97,7 +97,7 @@ impl Subject {
             Self::Arm(effect) => {
                 let also = effect.iter().cloned().collect();
                 let options = arm::Options { also, seed, ..arm::Options::default() };
-                let cell = Cell { object: None, ..world.cell.clone() };
+                let cell = Cell { objects: Vec::new(), ..world.cell.clone() };
                 let found = arm::identify_clips(&cell, clips, &options, interrupt)?;
                 Ok(of_identification(&found, &world.hidden))
             }

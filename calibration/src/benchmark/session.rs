@@ -120,7 +120,7 @@ impl Studio<'_> {
 
     /// A stroke as a capture makes them: from any side, at any speed, somewhere on the object.
     fn stroke(&self, object: &Isometry3<f64>, rng: &mut Pcg64) -> Result<Vec<SetPoint>, SessionError> {
-        let size = self.world.cell.object.as_ref().and_then(|object| object.size).unwrap_or([0.1; 3]);
+        let size = self.world.cell.object().and_then(|object| object.size).unwrap_or([0.1; 3]);
         let limits = limits::of(&self.world.cell, &self.body);
         let program = Program::of(&self.world.cell, size, &self.body, &limits);
         let (x, y) = (object.translation.x, object.translation.y);
@@ -143,7 +143,7 @@ impl Studio<'_> {
 
     /// Somewhere on the table in front of the arm, turned any way.
     fn place(&self, rng: &mut Pcg64) -> Isometry3<f64> {
-        let height = self.world.cell.object.as_ref().and_then(|object| object.size).map_or(0.0, |size| 0.5 * size[2]);
+        let height = self.world.cell.object().and_then(|object| object.size).map_or(0.0, |size| 0.5 * size[2]);
         let table = self.world.cell.table.as_ref().map_or(0.0, |table| table.height);
         let [x, y] = self.world.cell.simulation.object_position;
         let place = [x + rng.random_range(-0.05..0.05), y + rng.random_range(-0.05..0.05)];
@@ -253,6 +253,7 @@ impl Studio<'_> {
             desired,
             measured,
             object: ObjectSeries { stamps_ns: poses_ns.to_vec(), poses },
+            others: Vec::new(),
             warnings: Vec::new(),
             damage: None,
         })
@@ -261,7 +262,7 @@ impl Studio<'_> {
     /// A pose as the tracker reports it.
     fn tracked<A, B>(&self, pose: &Isometry3<f64>, rng: &mut Pcg64) -> Pose<A, B> {
         let exact = PoseNoise { position: 0.0, rotation: 0.0 };
-        let noise = self.world.cell.object.as_ref().and_then(|object| object.pose_noise).unwrap_or(exact);
+        let noise = self.world.cell.object().and_then(|object| object.pose_noise).unwrap_or(exact);
         let mut draw = |sigma: f64| {
             Vector3::from_fn(|_, _| {
                 sigma * <StandardNormal as rand_distr::Distribution<f64>>::sample(&StandardNormal, rng)

@@ -108,7 +108,7 @@ impl World {
             }
             Fault::Pair => draw::two_effects(with_object, cell, &mut rng),
         };
-        let declared = cell.object.as_ref().and_then(|object| object.friction_scatter).unwrap_or(0.0);
+        let declared = cell.object().and_then(|object| object.friction_scatter).unwrap_or(0.0);
         Self {
             number,
             kind,
@@ -137,7 +137,7 @@ fn arm(cell: &Cell, rng: &mut Pcg64) -> Option<ArmTheta> {
 }
 
 fn object(cell: &Cell, rng: &mut Pcg64) -> Option<ObjectTheta> {
-    let object = cell.object.as_ref()?;
+    let object = cell.object()?;
     let mut within = |range: Option<Range>| {
         range.map(|[low, high]| {
             let quarter = 0.25 * (high - low);

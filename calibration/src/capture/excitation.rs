@@ -123,7 +123,7 @@ fn moving(joints: &[usize], dof: usize) -> anyhow::Result<[bool; MAX_JOINTS]> {
 /// Lowest height for flange and tool: above the table, and above the object that may stand on it [m].
 fn floor(cell: &Cell) -> f64 {
     let Some(table) = &cell.table else { return f64::NEG_INFINITY };
-    let object = cell.object.as_ref().and_then(|object| object.size).map_or(0.0, |size| size[2]);
+    let object = cell.object().and_then(|object| object.size).map_or(0.0, |size| size[2]);
     table.height + object + CLEARANCE
 }
 

@@ -141,7 +141,7 @@ impl<'a> Program<'a> {
             size,
             tool: cell.tool.as_ref().map_or(0.0, |tool| tool.radius),
             table: cell.table.as_ref().map_or(0.0, |table| table.height),
-            friction: cell.object.as_ref().map_or(0.3, shared_mem::cell::Object::nominal_friction),
+            friction: cell.object().map_or(0.3, shared_mem::cell::Object::nominal_friction),
             pace: 1.0,
             turn: 0.0,
         }

@@ -40,7 +40,7 @@ pub(super) fn of(clip: &Columns, cell: &Cell, corners: &[Point3<f64>]) -> Option
     let table = cell.table.as_ref().map_or(f64::NEG_INFINITY, |table| table.height);
     let z: Vec<f64> = clip.object.poses.iter().map(|pose| pose.position()[2]).collect();
     let flies = |i: &usize| z[*i] - table > reach;
-    let known = cell.object.as_ref().and_then(|o| o.pose_noise).map_or(0.0, |noise| noise.position);
+    let known = cell.object().and_then(|o| o.pose_noise).map_or(0.0, |noise| noise.position);
     let sigma = noise::sigma(&z).max(0.3 * known).max(1e-5);
     let mut best: Option<Fall> = None;
     let mut from = 0;

@@ -135,7 +135,7 @@ impl Rules {
     }
 
     fn identify_object(&self, cell: &Cell, clip: &Clip) -> Answer {
-        if cell.object.is_none() {
+        if cell.object().is_none() {
             return Err(ObjectError::NoObject.to_string());
         }
         if clip.kind == ClipKind::Excitation {

@@ -6,6 +6,7 @@ use calibration::diagnose::Options;
 use calibration::diagnose::against::{Comparison, compare_kept};
 use calibration::interrupt::Interrupt;
 use calibration::report;
+use shared_mem::console;
 use shared_mem::output::Destination;
 use shared_mem::recording::Session;
 use shared_mem::theta::Theta;
@@ -21,10 +22,14 @@ pub(super) fn run(arguments: &Arguments, interrupt: &Interrupt) -> anyhow::Resul
     let theta_file = theta_file(arguments)?;
     Destination::apart(&[out.as_deref(), report.as_deref(), theta_file.as_deref()])?;
     let against = arguments.against.as_ref().unwrap_or(&arguments.session);
-    let (a, b) =
+    let (mut a, mut b) =
         (Session::open_with(&arguments.session, cell.as_deref())?, Session::open_with(against, cell.as_deref())?);
+    if let Some(subject) = a.about(arguments.object.as_deref())? {
+        console::line(&subject);
+        b.about(Some(&subject.name))?;
+    }
     let odd = [gate::look(&a, arguments.as_recorded)?, gate::look(&b, arguments.as_recorded)?];
-    let theta = arguments.parameters.as_deref().map(Theta::read).transpose()?;
+    let theta = arguments.parameters.as_deref().map(Theta::read).transpose()?.map(|theta| theta.about(&a.cell));
     let (seed, torques) = (arguments.seed, arguments.torques);
     let options = Options { theta, seed, torques, out: out.clone(), report: report.clone(), ..Options::default() };
     let (mut found, kept) = compare_kept([&a, &b], &options, interrupt)?;

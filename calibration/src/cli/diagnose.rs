@@ -44,6 +44,7 @@ after a --budget that was spent: of that the answer is the best so far, and says
 Examples:
   calibration diagnose session --report report.html
   calibration diagnose session --out diagnosis.json --seed 7 --json
+  calibration diagnose session --object milk_box
   calibration diagnose session --torques --report torques.html
   calibration diagnose session --engine ./my_simulator
   calibration diagnose session --budget 120 --out diagnosis.json
@@ -58,6 +59,9 @@ pub(super) struct Arguments {
     /// What the laboratory knows about its cell [default: cell.toml beside the clips].
     #[arg(long, value_name = "CELL.TOML")]
     pub(super) cell: Option<PathBuf>,
+    /// Of several objects in cell.toml the one to judge [default: the one that moves].
+    #[arg(long, value_name = "NAME")]
+    pub(super) object: Option<String>,
     /// Parameters that are known already; effects among them act and are no candidates.
     #[arg(long, value_name = "THETA.TOML")]
     pub(super) parameters: Option<PathBuf>,
@@ -103,9 +107,12 @@ pub(super) fn run(arguments: &Arguments, interrupt: &Interrupt) -> anyhow::Resul
     let answer = Destination::of(out.as_deref(), *force)?;
     let theta_file = theta_file(arguments)?;
     Destination::apart(&[out.as_deref(), report.as_deref(), theta_file.as_deref()])?;
-    let session = Session::open_with(&arguments.session, arguments.cell.as_deref())?;
+    let mut session = Session::open_with(&arguments.session, arguments.cell.as_deref())?;
+    if let Some(subject) = session.about(arguments.object.as_deref())? {
+        console::line(subject);
+    }
     let odd = gate::look(&session, arguments.as_recorded)?;
-    let theta = arguments.parameters.as_deref().map(Theta::read).transpose()?;
+    let theta = arguments.parameters.as_deref().map(Theta::read).transpose()?.map(|theta| theta.about(&session.cell));
     let budget = arguments.budget.map(Duration::from_secs);
     let (seed, torques) = (arguments.seed, arguments.torques);
     let engine = arguments.engine.start(&session, interrupt)?;

@@ -91,7 +91,8 @@ pub(super) fn run(arguments: &ExportModelArguments) -> anyhow::Result<()> {
         None if !is_session => Theta::read(from)?,
         None if beside.is_file() => Theta::read(&beside)?,
         None => Theta::default(),
-    };
+    }
+    .about(&cell);
     let format = match to {
         Target::Mjcf => Format::Mjcf,
         Target::Urdf => Format::Urdf,

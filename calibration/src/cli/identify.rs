@@ -94,10 +94,14 @@ where it would have ended. What no clip tells is not written.
 
 Examples:
   calibration identify object strokes --out theta.toml --report page.html
+  calibration identify object strokes --object milk_box --out theta.toml
   calibration identify object strokes --parameters arm.toml --optimizer pso --budget 1200 --json")]
 pub(super) struct ObjectArguments {
     #[command(flatten)]
     task: Task,
+    /// Of several objects in cell.toml the one to identify [default: the one that moves].
+    #[arg(long, value_name = "NAME")]
+    object: Option<String>,
     /// Points that pso and cma may try.
     #[arg(long, value_name = "N", default_value_t = 1200, value_parser = clap::value_parser!(u32).range(1..))]
     budget: u32,
@@ -133,10 +137,10 @@ pub(super) fn run(identify: Identify, interrupt: &Interrupt) -> anyhow::Result<(
             let options = arm::Options { session, cell, optimizer, out, parameters, also, budget, seed, engine };
             heard(asked.as_ref(), arm::identify(&options, interrupt).map_err(anyhow::Error::from))
         }),
-        Identify::Object(ObjectArguments { task, budget }) => task.run(|task, _| {
+        Identify::Object(ObjectArguments { task, object: asked, budget }) => task.run(|task, _| {
             let Task { session, cell, optimizer, out, parameters, seed, .. } = task;
             let (optimizer, budget) = (optimizer.optimizer(), budget as usize);
-            let options = object::Options { session, cell, optimizer, out, parameters, budget, seed };
+            let options = object::Options { session, cell, object: asked, optimizer, out, parameters, budget, seed };
             Ok(object::identify(&options, interrupt)?)
         }),
     }

@@ -38,6 +38,9 @@ pub struct Diagnosis {
     pub engine: Option<Used>,
     /// Wall-clock time [s].
     pub seconds: f64,
+    /// Of several objects in cell.toml the one that this is about.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub object: Option<String>,
     /// The session's folder.
     pub session: String,
     /// How it was named.

@@ -238,6 +238,7 @@ pub fn complete(cell: &Cell, given: Option<&Theta>) -> Result<Theta, BaseError> 
     }
     if let Some(object) = ObjectModel::new(cell, Some(&theta))? {
         theta.object = Some(ObjectTheta {
+            name: cell.object_name().map(str::to_owned),
             friction: Some(object.friction),
             mass: Some(object.mass),
             centre_of_mass: Some(object.centre_of_mass.into()),

@@ -14,6 +14,9 @@ use std::path::PathBuf;
 pub struct Identification {
     /// `arm` or `object`.
     pub target: String,
+    /// Of several objects in cell.toml the one that this is about.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub object: Option<String>,
     /// The session's folder.
     pub session: String,
     /// How it was named.

@@ -84,6 +84,7 @@ mod tests {
             measured: desired.clone(),
             desired,
             object: ObjectSeries::default(),
+            others: Vec::new(),
             warnings: Vec::new(),
             damage: None,
         }

@@ -87,7 +87,7 @@ pub(super) fn listed(
     let kind = if cell.robot.is_some() { ClipKind::Excitation } else { ClipKind::FreeMotion };
     let mut read = read_clip(clip, kind, cell)?;
     let mut kind = kind;
-    if cell.robot.is_some() && cell.object.is_some() {
+    if cell.robot.is_some() && cell.object().is_some() {
         let strokes = read_clip(clip, ClipKind::ControlHitSlide, cell);
         if let Some(strokes) = strokes.ok().filter(|strokes| has_moved(&strokes.object)) {
             (read, kind) = (strokes, ClipKind::ControlHitSlide);

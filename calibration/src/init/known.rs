@@ -191,7 +191,7 @@ impl Known {
             self.take("table.height", "--table");
         }
         if let Some(size) = facts.object {
-            self.cell.object = Some(Object { shape: Some("box".into()), size: Some(size), ..Object::default() });
+            self.cell.objects = vec![Object { shape: Some("box".into()), size: Some(size), ..Object::default() }];
             self.take("object.size", "--object");
         }
     }

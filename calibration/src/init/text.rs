@@ -37,6 +37,8 @@ pub(super) const BLOCKS: [(&str, &[(&str, &str)]); 12] = [
     (
         "object",
         &[
+            ("name", "\"milk_box\""),
+            ("topic", "\"/vicon/milk_box\""),
             ("shape", "\"box\""),
             ("mesh", "\"mug.obj\""),
             ("size", "[0.08, 0.06, 0.10]"),

@@ -51,7 +51,7 @@ fn every_effect_stands_in_the_file_or_is_named_among_what_it_lacks() {
             }
         }
         // A cell of which next to nothing is known drops none either.
-        let bounded = Cell { camera: None, object: None, tool: None, ..shipped() };
+        let bounded = Cell { camera: None, objects: Vec::new(), tool: None, ..shipped() };
         for (cell, format) in FORMATS.iter().flat_map(|format| [(shipped(), *format), (bounded.clone(), *format)]) {
             let file = write(&cell, &theta(&block), format).expect("a model");
             let bare = write(&cell, &Theta::default(), format).expect("a model");

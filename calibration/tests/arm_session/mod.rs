@@ -21,7 +21,7 @@ const START_NS: u64 = 1_700_000_000_000_000_000;
 /// The cell as a laboratory knows it.
 pub(crate) fn cell() -> Cell {
     let text = include_str!("../../../config/fr3_cell.toml");
-    Cell { object: None, ..Cell::parse(text, Path::new("cell.toml")).expect("the shipped cell") }
+    Cell { objects: Vec::new(), ..Cell::parse(text, Path::new("cell.toml")).expect("the shipped cell") }
 }
 
 /// The gains that a session's seed hides: nominal ones, each off by up to 20 %.
@@ -65,6 +65,7 @@ fn clip(cell: &Cell, gains: &ArmTheta, number: u64, seconds: f64, seed: u64) -> 
         desired,
         measured,
         object: ObjectSeries::default(),
+        others: Vec::new(),
         warnings: Vec::new(),
         damage: None,
     }

@@ -69,7 +69,7 @@ pub(crate) fn propose(log: &Log, cell: Option<&Cell>, gravity: &dyn Fn(&[String]
 }
 
 fn kind(mapping: &mut Mapping, cell: Option<&Cell>, notes: &mut Notes) {
-    let described = cell.is_some_and(|cell| cell.object.is_some());
+    let described = cell.is_some_and(|cell| cell.object().is_some());
     match (&mapping.object, described) {
         (Some(_), true) => {
             mapping.kind = ClipKind::ControlHitSlide;

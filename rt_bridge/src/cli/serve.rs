@@ -75,7 +75,7 @@ impl ServeArguments {
             (true, false) => Pace::LockStep,
             (true, true) => Pace::Fast,
         };
-        let hidden = hidden::read(self.parameters.as_deref(), self.effects.as_deref())?;
+        let hidden = hidden::read(&cell, self.parameters.as_deref(), self.effects.as_deref())?;
         let server = Server::open(&cell, hidden.as_ref(), ports, pace)?;
         let stop = stop_flag(self.parent)?;
         let hand = server.hand_address().map_or(String::new(), |hand| format!(", its hand at {hand}"));

@@ -153,7 +153,7 @@ impl Devices {
         if settings.arm != ArmChoice::Sim && (settings.effects.is_some() || settings.parameters.is_some()) {
             bail!("--effects and --parameters change the simulated cell only; use them with --arm sim");
         }
-        let hidden = hidden::read(settings.parameters.as_deref(), settings.effects.as_deref())?;
+        let hidden = hidden::read(cell, settings.parameters.as_deref(), settings.effects.as_deref())?;
         let plan = plan(settings, cell, &model, hidden.as_ref())?;
         let workspace = Workspace::of(cell, &model);
         let camera = settings.camera(cell)?;

@@ -147,9 +147,9 @@ impl Settings {
                 bail!("--tracker rgbd needs pictures; choose a --camera")
             }
             Some(choice) => Ok(choice),
-            None if simulated && cell.object.is_some() => Ok(TrackerChoice::Sim),
+            None if simulated && cell.object().is_some() => Ok(TrackerChoice::Sim),
             None if recorded => Ok(TrackerChoice::Replay),
-            None if cell.object.is_some() && matches!(self.camera(cell)?, CameraChoice::RealSense(_)) => {
+            None if cell.object().is_some() && matches!(self.camera(cell)?, CameraChoice::RealSense(_)) => {
                 Ok(TrackerChoice::Rgbd)
             }
             None => Ok(TrackerChoice::Off),

@@ -1,16 +1,17 @@
 //! What acts in the simulated cell that nobody outside of it is told: parameters and effects from files.
 
 use anyhow::Result;
+use shared_mem::cell::Cell;
 use shared_mem::theta::Theta;
 use std::path::Path;
 use twin::effects::{Place, find};
 
-/// Those of both files together; `None` where neither is given.
+/// Those of both files together, about the cell's object; `None` where neither is given.
 ///
 /// # Errors
 /// A file that cannot be read or is no theta.toml.
-pub(crate) fn read(parameters: Option<&Path>, effects: Option<&Path>) -> Result<Option<Theta>> {
-    let mut theta = parameters.map(Theta::read).transpose()?;
+pub(crate) fn read(cell: &Cell, parameters: Option<&Path>, effects: Option<&Path>) -> Result<Option<Theta>> {
+    let mut theta = parameters.map(Theta::read).transpose()?.map(|theta| theta.about(cell));
     if let Some(path) = effects {
         let effects = Theta::read(path)?.effects;
         theta.get_or_insert_default().effects.extend(effects);

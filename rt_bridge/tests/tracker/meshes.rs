@@ -11,8 +11,8 @@ fn with_mesh(folder: &Path, name: &str, obj: &str) -> Cell {
     std::fs::write(folder.join(name), obj).expect("a mesh file");
     let mut cell = cell([0.1; 3]);
     cell.folder = folder.to_owned();
-    let object = cell.object.take().expect("an object");
-    cell.object = Some(Object { shape: None, size: None, mesh: Some(name.into()), ..object });
+    let object = cell.objects.pop().expect("an object");
+    cell.objects = vec![Object { shape: None, size: None, mesh: Some(name.into()), ..object }];
     cell
 }
 

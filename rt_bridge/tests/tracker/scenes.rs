@@ -24,8 +24,8 @@ const SPEED: f64 = 0.5;
 pub(crate) fn cell(size: [f64; 3]) -> Cell {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../config/fr3_cell.toml");
     let mut cell = Cell::read(&path).expect("the shipped cell");
-    let object = cell.object.take().expect("a box");
-    cell.object = Some(Object { size: Some(size), ..object });
+    let object = cell.objects.pop().expect("a box");
+    cell.objects = vec![Object { size: Some(size), ..object }];
     cell
 }
 
@@ -81,7 +81,7 @@ impl Bench {
 /// A scene with the object standing at a place, the arm ready.
 pub(crate) fn standing(cell: &Cell, x: f64, y: f64, yaw: f64, frame: u64) -> SceneSnapshot {
     let model = ArmModel::from_cell(cell).expect("an arm");
-    let half = cell.object.as_ref().and_then(|o| o.size).map_or(0.0, |size| size[2] / 2.0);
+    let half = cell.object().and_then(|o| o.size).map_or(0.0, |size| size[2] / 2.0);
     SceneSnapshot {
         time_ns: frame * TICK_NS,
         dof: 7,
@@ -94,7 +94,7 @@ pub(crate) fn standing(cell: &Cell, x: f64, y: f64, yaw: f64, frame: u64) -> Sce
 pub(crate) fn clip(cell: &Cell, seed: u64) -> Vec<SceneSnapshot> {
     let mut random = Pcg64::seed_from_u64(seed);
     let model = ArmModel::from_cell(cell).expect("an arm");
-    let size = cell.object.as_ref().and_then(|o| o.size).expect("a box");
+    let size = cell.object().and_then(|o| o.size).expect("a box");
     let start = Vector3::new(random.random_range(0.42..0.62), random.random_range(-0.2..0.2), size[2] / 2.0);
     let yaw = random.random_range(0.0..TAU);
     // Towards the middle of the table, give or take a right angle.

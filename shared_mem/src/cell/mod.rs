@@ -6,6 +6,7 @@ mod camera;
 mod controller;
 mod gripper;
 mod object;
+mod objects;
 mod robot;
 mod schema;
 mod simulation;
@@ -21,6 +22,8 @@ pub use simulation::Simulation;
 pub use tolerance::Tolerance;
 pub use wrench::{WrenchNoise, WrenchSensor};
 
+use crate::blocks;
+use crate::input;
 use crate::toml_file::{self, TomlFileError};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -49,9 +52,10 @@ pub struct Cell {
     /// Topic names of foreign bags.
     #[serde(default, skip_serializing_if = "Topics::is_default")]
     pub topics: Topics,
-    /// The object on the table.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub object: Option<Object>,
+    /// The object on the table, or several with names.
+    #[serde(default, rename = "object", with = "blocks", skip_serializing_if = "Vec::is_empty")]
+    #[schemars(with = "objects::Blocks")]
+    pub objects: Vec<Object>,
     /// The camera.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub camera: Option<Camera>,
@@ -73,6 +77,9 @@ pub struct Cell {
     /// Folder of the file: relative paths in it start here.
     #[serde(skip)]
     pub folder: PathBuf,
+    /// Place among `objects` of the one that a command is about.
+    #[serde(skip)]
+    pub in_question: usize,
 }
 
 /// One clip of a session.
@@ -119,7 +126,8 @@ impl Cell {
     /// # Errors
     /// [`CellError`] with file, key and remedy.
     pub fn read(path: &Path) -> Result<Self, CellError> {
-        toml_file::read::<Self>(path)?.settle(path)
+        let text = input::text(path, input::Kind::Configuration).map_err(TomlFileError::from)?;
+        Self::parse(&text, path)
     }
 
     /// The same from text, as it rides along with a recording; `path` names it in errors, and relative paths in it
@@ -128,6 +136,9 @@ impl Cell {
     /// # Errors
     /// As [`Cell::read`].
     pub fn parse(text: &str, path: &Path) -> Result<Self, CellError> {
+        if let Some(what) = blocks::both_forms::<Object>(text) {
+            return Err(CellError::Value { path: path.to_owned(), what });
+        }
         toml_file::parse::<Self>(text, path)?.settle(path)
     }
 
@@ -153,7 +164,7 @@ impl Cell {
         let folder = std::path::absolute(&cell.folder).unwrap_or_else(|_| cell.folder.clone());
         let anchor = |path: &mut PathBuf| *path = folder.join(&*path);
         cell.robot.iter_mut().filter_map(|robot| robot.urdf.as_mut()).for_each(anchor);
-        cell.object.iter_mut().filter_map(|object| object.mesh.as_mut()).for_each(anchor);
+        cell.objects.iter_mut().filter_map(|object| object.mesh.as_mut()).for_each(anchor);
         cell
     }
 
@@ -192,9 +203,7 @@ impl Cell {
         if let Some(table) = &self.table {
             table.check()?;
         }
-        if let Some(object) = &self.object {
-            object.check()?;
-        }
+        self.check_objects()?;
         if let Some(camera) = &self.camera {
             camera.check()?;
         }

@@ -1,4 +1,4 @@
-//! `[object]`: what stands on the table, and how well it is known.
+//! `[object]`, or one of `[[object]]`: what stands on the table, and how well it is known.
 
 use super::controller::Range;
 use super::within;
@@ -10,6 +10,12 @@ use std::path::PathBuf;
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, expecting = "an [object] block")]
 pub struct Object {
+    /// Its name, of letters, digits and `_`: in topics (`/object/NAME/pose`) and theta.toml. Needed where there are several.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub name: Option<String>,
+    /// Topic of a ROS 2 bag with its poses; by default `/object/NAME/pose`, without a name `object_pose` of `[topics]`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub topic: Option<String>,
     /// `"box"`, with its `size`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub shape: Option<String>,
@@ -74,6 +80,9 @@ pub struct PoseNoise {
 
 impl Object {
     pub(super) fn check(&self) -> Result<(), String> {
+        if let Some(name) = &self.name {
+            check_name(name)?;
+        }
         match (&self.shape, &self.mesh) {
             (Some(shape), None) if shape == "box" => {
                 let size = self.size.ok_or("`[object] shape = \"box\"` needs `size = [x, y, z]` in metres")?;
@@ -131,6 +140,17 @@ impl Object {
     #[must_use]
     pub fn nominal_restitution(&self) -> f64 {
         self.restitution_range.map_or(0.0, middle)
+    }
+}
+
+fn check_name(name: &str) -> Result<(), String> {
+    let is_word = !name.is_empty() && name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_');
+    if !is_word || name.len() > 64 {
+        return Err(format!("`object.name = \"{name}\"` is no name; use up to 64 letters, digits and _"));
+    }
+    match name {
+        "pose" | "target" => Err(format!("`object.name = \"{name}\"` is part of a topic; give it another name")),
+        _ => Ok(()),
     }
 }
 

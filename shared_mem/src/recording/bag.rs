@@ -1,38 +1,45 @@
 //! A ROS 2 bag (storage mcap, messages in CDR) as a clip. Topic names come from `[topics]` of cell.toml.
 
-use super::checks;
 use super::clip::{self, Clip, NamedLog};
 use super::container::{Message, Messages};
 use super::error::ReadError;
 use super::joint_log::JointLog;
 use super::ros2::{JointState, StampedPose};
-use super::series::ObjectSeries;
 use super::torques;
+use super::tracked::{self, ObjectTopics, PoseRow};
 use crate::cell::{Cell, ClipKind, Topics};
-use crate::frames::{Base, Object, Pose};
+use crate::frames::Pose;
+use std::collections::BTreeMap;
 use std::io::{Read, Seek};
 use std::path::Path;
-
-/// A stamp [ns] and the pose, `None` where its numbers are no pose.
-type PoseRow = (u64, Option<Pose<Base, Object>>);
 
 /// A quaternion's length is 1 up to rounding by single precision and a little more.
 const UNIT: f64 = 1e-3;
 
-/// What a topic should hold, and the key of `[topics]` that names it.
-type Wanted = (&'static str, &'static str);
+/// What a topic should hold, and the block and key that name it.
+type Wanted = (&'static str, &'static str, &'static str);
+
+const OF_OBJECT: Wanted = ("object poses", "[topics]", "object_pose");
+const OF_NAMED_OBJECT: Wanted = ("object poses", "[[object]]", "topic");
 
 /// What the wanted topics held.
 #[derive(Debug, Default)]
 struct Collected {
     measured: JointLog,
     desired: JointLog,
-    poses: Vec<PoseRow>,
-    /// Frame that the poses name.
-    pose_frame: String,
-    /// Whether any pose carried a stamp of its own.
-    pose_stamped: bool,
-    pose_log_times_ns: Vec<u64>,
+    /// By topic.
+    poses: BTreeMap<String, Poses>,
+}
+
+/// What a topic held about an object.
+#[derive(Debug, Default)]
+struct Poses {
+    rows: Vec<PoseRow>,
+    /// Frame that they name.
+    frame: String,
+    /// Whether any carried a stamp of its own.
+    stamped: bool,
+    log_times_ns: Vec<u64>,
     /// Length, less 1, of the quaternion whose length is farthest from 1.
     too_long: f64,
 }
@@ -44,10 +51,10 @@ pub(super) fn read<R: Read + Seek>(
     kind: ClipKind,
     cell: &Cell,
 ) -> Result<Clip, ReadError> {
-    let mut collected = Collected::default();
+    let (mut collected, objects) = (Collected::default(), ObjectTopics::ros2(cell));
     while let Some(message) = messages.next()? {
         collected
-            .take(&message, &cell.topics)
+            .take(&message, &cell.topics, &objects)
             .map_err(|what| ReadError::content(path, &message.channel.topic, what))?;
     }
     let needs_arm = cell.robot.is_some() && kind != ClipKind::FreeMotion;
@@ -59,42 +66,44 @@ pub(super) fn read<R: Read + Seek>(
     if needs_arm || !collected.measured.is_empty() {
         collected.joints(&missing, cell, &mut clip)?;
     }
-    if kind != ClipKind::Excitation && collected.poses.is_empty() {
-        return Err(missing(&topics.object_pose, ("object poses", "object_pose")));
+    let tracked = objects.take(&mut collected.poses);
+    if kind != ClipKind::Excitation && tracked[0].2.rows.is_empty() {
+        let is_common = objects.expected() == topics.object_pose;
+        return Err(missing(objects.expected(), if is_common { OF_OBJECT } else { OF_NAMED_OBJECT }));
     }
     let base_frame = cell.robot.as_ref().and_then(|robot| robot.base_frame.as_deref());
-    let object = collected.object(path, &topics.object_pose, base_frame, &mut clip.warnings)?;
-    let (object, warning) = checks::beside_arm(object, &clip.measured, &topics.object_pose)
-        .map_err(|what| ReadError::content(path, &topics.object_pose, what))?;
-    clip.object = object;
-    clip.warnings.extend(warning);
+    for (number, (name, topic, poses)) in tracked.into_iter().enumerate() {
+        let rows = poses.rows(&topic, base_frame, &mut clip.warnings);
+        tracked::put(&mut clip, number, name, &topic, rows)?;
+    }
     Ok(clip)
 }
 
 impl Collected {
     /// Takes a message over when it is on a wanted topic; a sentence when it is not what that topic should hold.
-    fn take(&mut self, message: &Message<'_>, topics: &Topics) -> Result<(), String> {
+    fn take(&mut self, message: &Message<'_>, topics: &Topics, objects: &ObjectTopics) -> Result<(), String> {
         let topic = &message.channel.topic;
         if *topic == topics.measured || *topic == topics.desired {
             expect_type(message, &[JointState::TYPE])?;
             let state = JointState::decode(message.data).map_err(|e| not_decoded(&e))?;
             let log = if *topic == topics.measured { &mut self.measured } else { &mut self.desired };
             log.push(&state, message.log_time_ns);
-        } else if *topic == topics.object_pose {
+        } else if objects.wants(topic) {
             expect_type(message, &[StampedPose::POSE_TYPE, StampedPose::TRANSFORM_TYPE])?;
             let has_child = message.channel.type_name() == StampedPose::TRANSFORM_TYPE;
             let pose = StampedPose::decode(message.data, has_child).map_err(|e| not_decoded(&e))?;
-            self.pose_stamped |= pose.stamp_ns != 0;
-            self.pose_log_times_ns.push(message.log_time_ns);
-            if self.pose_frame.is_empty() {
-                self.pose_frame = pose.frame.to_owned();
+            let poses = self.poses.entry(topic.clone()).or_default();
+            poses.stamped |= pose.stamp_ns != 0;
+            poses.log_times_ns.push(message.log_time_ns);
+            if poses.frame.is_empty() {
+                poses.frame = pose.frame.to_owned();
             }
             let (stamp_ns, too_long) = (pose.stamp_ns, pose.wxyz.iter().map(|v| v * v).sum::<f64>().sqrt() - 1.0);
             let pose = Pose::from_parts(pose.position, pose.wxyz);
-            if pose.is_some() && too_long.abs() > self.too_long.abs() {
-                self.too_long = too_long;
+            if pose.is_some() && too_long.abs() > poses.too_long.abs() {
+                poses.too_long = too_long;
             }
-            self.poses.push((stamp_ns, pose));
+            poses.rows.push((stamp_ns, pose));
         }
         Ok(())
     }
@@ -108,10 +117,10 @@ impl Collected {
     ) -> Result<(), ReadError> {
         let (path, topics) = (clip.file.clone(), &cell.topics);
         if self.measured.is_empty() {
-            return Err(missing(&topics.measured, ("measured joints", "measured")));
+            return Err(missing(&topics.measured, ("measured joints", "[topics]", "measured")));
         }
         if self.desired.is_empty() {
-            return Err(missing(&topics.desired, ("desired joints", "desired")));
+            return Err(missing(&topics.desired, ("desired joints", "[topics]", "desired")));
         }
         let measured = NamedLog { topic: &topics.measured, log: std::mem::take(&mut self.measured) };
         let desired = NamedLog { topic: &topics.desired, log: std::mem::take(&mut self.desired) };
@@ -122,27 +131,24 @@ impl Collected {
         clip.warnings.extend(joints.warnings);
         Ok(())
     }
+}
 
-    fn object(
-        mut self,
-        path: &Path,
-        topic: &str,
-        base_frame: Option<&str>,
-        warnings: &mut Vec<String>,
-    ) -> Result<ObjectSeries, ReadError> {
-        if !self.pose_stamped {
-            for ((stamp, _), log_time) in self.poses.iter_mut().zip(&self.pose_log_times_ns) {
+impl Poses {
+    /// Its rows by one clock, and what is odd about the rest.
+    fn rows(mut self, topic: &str, base_frame: Option<&str>, warnings: &mut Vec<String>) -> Vec<PoseRow> {
+        if !self.stamped {
+            for ((stamp, _), log_time) in self.rows.iter_mut().zip(&self.log_times_ns) {
                 *stamp = *log_time;
             }
         }
         if let Some(base) = base_frame
-            && !self.pose_frame.is_empty()
-            && self.pose_frame != base
+            && !self.frame.is_empty()
+            && self.frame != base
         {
             warnings.push(format!(
                 "`{topic}`: poses name the frame `{}`, the base frame is `{base}`; they are taken as given in the \
                  base frame: set `[robot] base_frame` or publish them in it",
-                self.pose_frame
+                self.frame
             ));
         }
         if self.too_long.abs() > UNIT {
@@ -151,15 +157,12 @@ impl Collected {
                 1.0 + self.too_long
             ));
         }
-        let (series, found) =
-            checks::object(self.poses, topic).map_err(|what| ReadError::content(path, topic, what))?;
-        warnings.extend(found);
-        Ok(series)
+        self.rows
     }
 }
 
 /// Why nothing came from a topic: the file lost it, nobody published on it, or it is called otherwise.
-fn missing<R: Read + Seek>(path: &Path, topic: &str, (role, key): Wanted, messages: &Messages<R>) -> ReadError {
+fn missing<R: Read + Seek>(path: &Path, topic: &str, (role, block, key): Wanted, messages: &Messages<R>) -> ReadError {
     if let Some(damage) = messages.damage().summary() {
         return ReadError::content(path, topic, format!("no {role} are left ({damage}); record it again"));
     }
@@ -172,7 +175,7 @@ fn missing<R: Read + Seek>(path: &Path, topic: &str, (role, key): Wanted, messag
             ),
         );
     }
-    ReadError::Topic { path: path.to_owned(), topic: topic.to_owned(), role, key, present: messages.present() }
+    ReadError::Topic { path: path.to_owned(), topic: topic.to_owned(), role, block, key, present: messages.present() }
 }
 
 fn expect_type(message: &Message<'_>, wanted: &[&str]) -> Result<(), String> {

@@ -6,6 +6,7 @@ use super::error::ReadError;
 use super::joint_log::{self, JointLog, Wanted};
 use super::messages::is_own;
 use super::series::{JointSeries, ObjectSeries};
+use super::tracked::{ObjectTopics, TrackedObject};
 use super::wire::Wire;
 use super::{bag, own, twinaligner};
 use crate::cell::{Cell, ClipKind};
@@ -28,8 +29,10 @@ pub struct Clip {
     /// Whether a row's torques acted in the control period that ends at its stamp, as in the states of an arm, or in the one
     /// that begins there, as where a controller logs what it has just calculated.
     pub torques_end_at_rows: bool,
-    /// Where the object was. Empty when it was not tracked.
+    /// Where the object was that cell.toml's [`Cell::object`] is. Empty when it was not tracked.
     pub object: ObjectSeries,
+    /// Where the other objects of cell.toml were, in its order.
+    pub others: Vec<TrackedObject>,
     /// What was found odd in it, one sentence each.
     pub warnings: Vec<String>,
     /// The part of the file that could not be read; `None` when the file is whole.
@@ -67,9 +70,9 @@ pub(super) fn shows_object(path: &Path, cell: &Cell) -> Result<bool, ReadError> 
     if path.is_dir() {
         return Ok(twinaligner::is_clip_folder(path));
     }
-    let mut messages = Messages::open(path)?;
+    let (mut messages, topics) = (Messages::open(path)?, ObjectTopics::ros2(cell));
     while let Some(message) = messages.next()? {
-        if message.channel.type_name() == ObjectPose::SCHEMA || message.channel.topic == cell.topics.object_pose {
+        if message.channel.type_name() == ObjectPose::SCHEMA || topics.wants(&message.channel.topic) {
             return Ok(true);
         }
     }
@@ -87,6 +90,7 @@ impl Clip {
             measured: JointSeries::default(),
             torques_end_at_rows: false,
             object: ObjectSeries::default(),
+            others: Vec::new(),
             warnings: Vec::new(),
             damage: None,
         }

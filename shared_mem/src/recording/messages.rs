@@ -14,6 +14,7 @@ use crate::msg::event::{Event, EventLevel, EventSource};
 use crate::msg::gripper::GripperState;
 use crate::msg::image::CameraInfo;
 use crate::msg::object::ObjectPose;
+use crate::msg::target::{ArmTarget, GripperTarget};
 use crate::msg::twin::{TwinGap, TwinState};
 use crate::msg::wrench::Wrench;
 use prost::Message as _;
@@ -49,6 +50,10 @@ pub enum Payload {
     Wrench(Wrench),
     /// `/gripper`, or a bag's joint `gripper_width`.
     Gripper(GripperState),
+    /// `/arm/target`
+    ArmTarget(Box<ArmTarget>),
+    /// `/gripper/target`
+    GripperTarget(GripperTarget),
     /// `/twin/state`
     TwinState(Box<TwinState>),
     /// `/twin/gap`
@@ -137,6 +142,8 @@ fn own(message: &Message<'_>) -> Result<Option<Payload>, String> {
         CameraInfo::SCHEMA => Payload::CameraInfo(Box::new(decode(data)?)),
         Wrench::SCHEMA => Payload::Wrench(decode(data)?),
         GripperState::SCHEMA => Payload::Gripper(decode(data)?),
+        ArmTarget::SCHEMA => Payload::ArmTarget(Box::new(decode(data)?)),
+        GripperTarget::SCHEMA => Payload::GripperTarget(decode(data)?),
         TwinState::SCHEMA => Payload::TwinState(Box::new(decode(data)?)),
         TwinGap::SCHEMA => Payload::TwinGap(Box::new(decode(data)?)),
         Event::SCHEMA => Payload::Event(Box::new(decode(data)?)),

@@ -12,6 +12,7 @@
 //! | `messages`, `picture`, `picture_file`, `pictures` | all messages one by one, a picture, pictures as files, a clip's pictures |
 //! | `bag` | a ROS 2 bag as a clip |
 //! | `twinaligner`, `npy` | a TwinAligner folder as a clip |
+//! | `tracked` | objects by name, and the topics that they are on |
 //! | `joint_log` | joint rows: one publisher, one joint order |
 //! | `checks` | faults that foreign logs have, each told in a sentence |
 //! | `wire`, `writer` | own clips: messages and file |
@@ -20,6 +21,7 @@
 //! | `recover` | a damaged file, rewritten |
 //! | `export` | a session in another format |
 //! | `clip`, `series`, `session` | what callers get |
+//! | `subject` | of several objects the one that a command is about |
 
 mod bag;
 mod cdr;
@@ -43,7 +45,9 @@ mod recover;
 mod ros2;
 mod series;
 mod session;
+mod subject;
 mod torques;
+mod tracked;
 mod twinaligner;
 mod wire;
 mod writer;
@@ -65,4 +69,6 @@ pub use raw::{RawMessage, RawMessages};
 pub use recover::{RecoverError, Recovered, recover};
 pub use series::{JointSeries, ObjectSeries};
 pub use session::{Session, SessionFiles};
+pub use subject::{Subject, Why};
+pub use tracked::TrackedObject;
 pub use writer::{ClipInfo, ClipWriter, WriteError, WriteSummary};

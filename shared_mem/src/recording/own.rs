@@ -10,12 +10,14 @@ use super::logged::Logged;
 use super::messages::decode;
 use super::series::JointSeries;
 use super::torques;
+use super::tracked::{self, ObjectTopics, PoseRow};
 use super::wire::Wire;
 use super::writer::{CELL_TOML, CONFIGURATION, ClipInfo, METADATA, PROGRAM};
 use crate::cell::{Cell, ClipKind};
 use crate::msg::Joints;
 use crate::msg::arm::{ArmCommand, ArmState};
 use crate::msg::object::ObjectPose;
+use std::collections::BTreeMap;
 use std::io::{Read, Seek};
 use std::path::Path;
 
@@ -137,7 +139,8 @@ pub(super) fn read<R: Read + Seek>(
     kind: ClipKind,
     cell: &Cell,
 ) -> Result<Clip, ReadError> {
-    let (mut rows, mut poses) = (Rows::default(), Vec::new());
+    let (mut rows, mut poses) = (Rows::default(), BTreeMap::<String, Vec<PoseRow>>::new());
+    let objects = ObjectTopics::own(cell);
     // It stands before the first message.
     messages.peek()?;
     let logged = Logged::read(&messages);
@@ -147,9 +150,13 @@ pub(super) fn read<R: Read + Seek>(
         match message.channel.type_name() {
             ArmState::SCHEMA => rows.push(&decode(message.data).map_err(fail)?),
             ArmCommand::SCHEMA if logged.commands_apart => rows.push_command(&decode(message.data).map_err(fail)?),
-            ObjectPose::SCHEMA if topic == ObjectPose::TOPIC => {
+            ObjectPose::SCHEMA if objects.wants(topic) => {
                 let pose: ObjectPose = decode(message.data).map_err(fail)?;
-                poses.push((pose.stamp_ns, pose.pose()));
+                let row = (pose.stamp_ns, pose.pose());
+                match poses.get_mut(topic) {
+                    Some(rows) => rows.push(row),
+                    None => drop(poses.insert(topic.clone(), vec![row])),
+                }
             }
             _ => {}
         }
@@ -160,8 +167,9 @@ pub(super) fn read<R: Read + Seek>(
     if needs_arm && rows.device_ns.is_empty() {
         return Err(missing(path, ArmState::TOPIC, &messages.present()));
     }
-    if kind != ClipKind::Excitation && poses.is_empty() {
-        return Err(missing(path, ObjectPose::TOPIC, &messages.present()));
+    let tracked = objects.take(&mut poses);
+    if kind != ClipKind::Excitation && tracked[0].2.is_empty() {
+        return Err(missing(path, objects.expected(), &messages.present()));
     }
     rows.believe(logged);
     let fail = |what| ReadError::content(path, ArmState::TOPIC, what);
@@ -170,16 +178,13 @@ pub(super) fn read<R: Read + Seek>(
     rows.commands.stamps_ns.iter_mut().for_each(|stamp| *stamp = clock.map(*stamp));
     // A pose is stamped when it became known, one camera latency after its picture.
     let latency_ns = cell.camera.as_ref().map_or(0, |camera| (camera.latency * 1e9) as u64);
-    for (stamp_ns, _) in &mut poses {
-        *stamp_ns = clock.map(stamp_ns.saturating_sub(latency_ns));
-    }
     take_joints(path, cell, rows, &mut clip)?;
-    let fail = |what| ReadError::content(path, ObjectPose::TOPIC, what);
-    let (object, warnings) = checks::object(poses, ObjectPose::TOPIC).map_err(fail)?;
-    clip.warnings.extend(warnings);
-    let (object, warning) = checks::beside_arm(object, &clip.measured, ObjectPose::TOPIC).map_err(fail)?;
-    clip.object = object;
-    clip.warnings.extend(warning);
+    for (number, (name, topic, mut poses)) in tracked.into_iter().enumerate() {
+        for (stamp_ns, _) in &mut poses {
+            *stamp_ns = clock.map(stamp_ns.saturating_sub(latency_ns));
+        }
+        tracked::put(&mut clip, number, name, &topic, poses)?;
+    }
     Ok(clip)
 }
 

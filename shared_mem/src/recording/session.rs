@@ -104,7 +104,7 @@ fn carried_cell(path: &Path) -> Result<Cell, ReadError> {
 
 /// What a clip that cell.toml does not list is about: an arm may have moved alone in a cell that has an object too.
 fn kind_of(path: &Path, cell: &Cell) -> Result<ClipKind, ReadError> {
-    Ok(match (&cell.robot, &cell.object) {
+    Ok(match (&cell.robot, cell.object()) {
         (None, _) => ClipKind::FreeMotion,
         (Some(_), Some(_)) if super::clip::shows_object(path, cell)? => ClipKind::ControlHitSlide,
         (Some(_), _) => ClipKind::Excitation,

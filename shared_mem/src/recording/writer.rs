@@ -5,16 +5,12 @@
 //! nor the footer that [`ClipWriter::finish`] adds. Every other clip ([`ClipWriter::whole`]) is an [`Output`]: there
 //! when it is finished, or not at all.
 
+mod records;
+
 use super::torques;
 use super::wire::{self, UnixClock, Wire};
 use crate::cell::Cell;
-use crate::msg::arm::{ArmCommand, ArmState};
-use crate::msg::event::Event;
-use crate::msg::gripper::GripperState;
-use crate::msg::image::{CameraInfo, ImageHeader};
-use crate::msg::object::ObjectPose;
-use crate::msg::twin::{TwinGap, TwinState};
-use crate::msg::wrench::Wrench;
+use crate::msg::image::ImageHeader;
 use crate::output::{Output, OutputError};
 use crate::topics::ImageTopic;
 use mcap::records::{MessageHeader, Metadata};
@@ -247,80 +243,6 @@ impl<W: Write> ClipWriter<W> {
     /// A record about the clip as a whole.
     pub(super) fn note(&mut self, record: &Metadata) -> Result<(), WriteError> {
         self.mcap.write_metadata(record).map_err(|error| self.failed(&error))
-    }
-
-    /// Records a state of the arm.
-    ///
-    /// # Errors
-    /// [`WriteError`] when the disk is full or fails; what was flushed before stays readable.
-    pub fn arm_state(&mut self, message: &ArmState) -> Result<(), WriteError> {
-        self.message(message)
-    }
-
-    /// Records a command to the arm.
-    ///
-    /// # Errors
-    /// As [`ClipWriter::arm_state`].
-    pub fn arm_command(&mut self, message: &ArmCommand) -> Result<(), WriteError> {
-        self.message(message)
-    }
-
-    /// Records a pose of the object.
-    ///
-    /// # Errors
-    /// As [`ClipWriter::arm_state`].
-    pub fn object_pose(&mut self, message: &ObjectPose) -> Result<(), WriteError> {
-        let mut wire = message.to_wire(self.clock);
-        wire.frame_id.clone_from(&self.base_frame);
-        self.encoded::<ObjectPose>(message.stamp_ns, &wire)
-    }
-
-    /// Records intrinsics and pose of the camera.
-    ///
-    /// # Errors
-    /// As [`ClipWriter::arm_state`].
-    pub fn camera_info(&mut self, message: &CameraInfo) -> Result<(), WriteError> {
-        self.message(message)
-    }
-
-    /// Records a force/torque sample.
-    ///
-    /// # Errors
-    /// As [`ClipWriter::arm_state`].
-    pub fn wrench(&mut self, message: &Wrench) -> Result<(), WriteError> {
-        self.message(message)
-    }
-
-    /// Records a state of the gripper.
-    ///
-    /// # Errors
-    /// As [`ClipWriter::arm_state`].
-    pub fn gripper(&mut self, message: &GripperState) -> Result<(), WriteError> {
-        self.message(message)
-    }
-
-    /// Records a state of the twin.
-    ///
-    /// # Errors
-    /// As [`ClipWriter::arm_state`].
-    pub fn twin_state(&mut self, message: &TwinState) -> Result<(), WriteError> {
-        self.message(message)
-    }
-
-    /// Records real against twin.
-    ///
-    /// # Errors
-    /// As [`ClipWriter::arm_state`].
-    pub fn twin_gap(&mut self, message: &TwinGap) -> Result<(), WriteError> {
-        self.message(message)
-    }
-
-    /// Records a remark.
-    ///
-    /// # Errors
-    /// As [`ClipWriter::arm_state`].
-    pub fn event(&mut self, message: &Event) -> Result<(), WriteError> {
-        self.message(message)
     }
 
     /// Records a picture: its header and its pixels, rows of `header.stride` bytes.

@@ -34,6 +34,9 @@ pub(crate) struct Replay {
     /// Identified parameters; what they do not name keeps the value of cell.toml.
     #[arg(long, value_name = "THETA.TOML")]
     parameters: Option<PathBuf>,
+    /// Of several objects in cell.toml the one that is simulated [default: the one that moves].
+    #[arg(long, value_name = "NAME")]
+    object: Option<String>,
     /// Writes the recording, its simulation and the gap as a new clip; for a session, a folder of clips.
     #[arg(long, value_name = "CLIP.MCAP")]
     out: Option<PathBuf>,
@@ -50,8 +53,11 @@ pub(crate) struct Replay {
 
 impl Replay {
     pub(crate) fn run(&self) -> anyhow::Result<()> {
-        let session = Session::open_with(&self.path, self.cell.as_deref())?;
-        let theta = self.parameters.as_deref().map(Theta::read).transpose()?;
+        let mut session = Session::open_with(&self.path, self.cell.as_deref())?;
+        if let Some(subject) = session.about(self.object.as_deref())? {
+            console::line(subject);
+        }
+        let theta = self.parameters.as_deref().map(Theta::read).transpose()?.map(|theta| theta.about(&session.cell));
         if let Some(parent) = self.parent {
             parent::when_gone(parent, ending::ask)?;
         }

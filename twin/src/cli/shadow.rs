@@ -61,7 +61,7 @@ impl Shadow {
     /// Runs until its duration is over, a signal asks it to end, or no bridge comes.
     pub(crate) fn run(self) -> anyhow::Result<()> {
         let cell = Cell::read(&self.cell)?;
-        let theta = self.parameters.as_deref().map(Theta::read).transpose()?;
+        let theta = self.parameters.as_deref().map(Theta::read).transpose()?.map(|theta| theta.about(&cell));
         let mut shadow = Twin::new(&cell, theta.as_ref())?;
         let stop = Arc::new(AtomicBool::new(false));
         if let Some(parent) = self.parent {

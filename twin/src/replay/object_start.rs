@@ -52,7 +52,7 @@ pub fn remark(
 
 /// Mean of the poses before the object first moves, upright where there is a table.
 fn upright(series: &ObjectSeries, cell: &Cell) -> Option<Isometry3<f64>> {
-    let noise = cell.object.as_ref().and_then(|o| o.pose_noise).map_or(POSITION_NOISE, |n| n.position);
+    let noise = cell.object().and_then(|o| o.pose_noise).map_or(POSITION_NOISE, |n| n.position);
     let mean = mean_pose(&series.poses[..still(series, noise)])?;
     let rotation = if cell.table.is_some() { set_upright(&mean.rotation) } else { mean.rotation };
     Some(Isometry3::from_parts(mean.translation, rotation))

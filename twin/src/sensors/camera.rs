@@ -56,7 +56,7 @@ impl SimCamera {
         let light = camera_from_base * Vector3::from(looks::LIGHT).cast::<f32>();
         let pinhole = Pinhole { fx, fy, cx, cy };
         let raster = Raster::new(settings.width as usize, settings.height as usize, pinhole, light);
-        let noisy = cell.object.as_ref().is_none_or(|o| o.pose_noise.is_some());
+        let noisy = cell.object().is_none_or(|o| o.pose_noise.is_some());
         let height = cell.table.map_or(0.0, |t| t.height as f32);
         let still =
             vec![Mesh::plate([0.0, 0.0, height - FLOOR_BELOW], [FLOOR_HALF; 2], FLOOR), looks::table_top(height)];
@@ -242,7 +242,7 @@ mod tests {
     #[test]
     fn the_depth_of_the_box_s_top_is_what_geometry_says() {
         let mut cell = shipped();
-        cell.object.as_mut().expect("a box").pose_noise = None;
+        cell.object_mut().expect("a box").pose_noise = None;
         // Straight above the box, looking down, 1.1 m over the table: x of the picture along the base's x.
         let [x, y] = cell.simulation.object_position;
         cell.camera.as_mut().expect("a camera").pose =
@@ -264,7 +264,7 @@ mod tests {
     #[test]
     fn a_robot_of_splats_stands_where_the_meshes_stood() {
         let mut cell = shipped();
-        cell.object.as_mut().expect("a box").pose_noise = None;
+        cell.object_mut().expect("a box").pose_noise = None;
         let folder = tempfile::tempdir().expect("a folder");
         let bare = Cell { tool: None, ..cell.clone() };
         let robot = RobotSurface::new(&bare, Hand::None).expect("a robot");
@@ -316,7 +316,7 @@ mod tests {
     #[test]
     fn an_unknown_latency_and_a_wrong_place_are_in_the_picture_and_not_in_what_the_camera_says() {
         let mut cell = shipped();
-        cell.object.as_mut().expect("a box").pose_noise = None;
+        cell.object_mut().expect("a box").pose_noise = None;
         let blocks = "[[effect]]\nname = \"camera_latency\"\nlatency = 0.04\n\
                       [[effect]]\nname = \"camera_extrinsic_translation\"\ntranslation = [0.02, -0.01, 0.0]\n";
         let theta: shared_mem::theta::Theta =

@@ -36,7 +36,7 @@ impl SimTracker {
         Self {
             period_ns: (1e9 / camera.rate) as u64,
             latency_ns: (camera.latency * 1e9) as u64,
-            noise: cell.object.as_ref().and_then(|o| o.pose_noise).unwrap_or(exact),
+            noise: cell.object().and_then(|o| o.pose_noise).unwrap_or(exact),
             effects: CameraEffects::default(),
             reported: CameraMemory::default(),
             generator: generator(cell, 3),

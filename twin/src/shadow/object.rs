@@ -47,7 +47,7 @@ pub(super) struct ObjectMirror {
 
 impl ObjectMirror {
     pub(super) fn new(cell: &Cell, shape: &ObjectShape) -> Self {
-        let noise = cell.object.as_ref().and_then(|o| o.pose_noise).unwrap_or(UNKNOWN_NOISE);
+        let noise = cell.object().and_then(|o| o.pose_noise).unwrap_or(UNKNOWN_NOISE);
         Self {
             latency_ns: cell.camera.as_ref().map_or(0, |camera| (camera.latency * 1e9) as u64),
             noise: PoseNoise {

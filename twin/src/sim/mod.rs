@@ -121,8 +121,8 @@ impl SimCell {
                 (Some(object), ToolContact::new(cell.tool.as_ref(), &model.parameters(), &effects.hit))
             }
         };
-        let Cell { controller, tool, object: described, .. } = cell.clone();
-        let description = Description { controller, tool, object: described };
+        let (object_described, Cell { controller, tool, .. }) = (cell.object().cloned(), cell.clone());
+        let description = Description { controller, tool, object: object_described };
         Ok(Self {
             description,
             arm,

@@ -97,7 +97,7 @@ fn the_client_s_torque_and_the_robot_s_own_controller_move_the_arm_alike() {
 fn a_struck_box_moves_and_the_arm_feels_it() {
     let description = striking();
     let mut cell = SimCell::new(&description, None).expect("a cell");
-    let mut free = SimCell::new(&Cell { object: None, ..description }, None).expect("a cell");
+    let mut free = SimCell::new(&Cell { objects: Vec::new(), ..description }, None).expect("a cell");
     let mut undisturbed = Vec::new();
     strike(&mut free, 1500, |cell| undisturbed.push(cell.q()[0]));
     let before = object_position(&cell);
@@ -220,7 +220,7 @@ fn a_tossed_object_needs_no_robot() {
 
 #[test]
 fn a_solid_table_carries_what_presses_on_it_and_is_not_there_unless_asked_for() {
-    let description = Cell { object: None, ..shipped_exact() };
+    let description = Cell { objects: Vec::new(), ..shipped_exact() };
     let pressed = |solid: bool| {
         let mut cell = SimCell::new(&description, None).expect("a cell");
         if solid {

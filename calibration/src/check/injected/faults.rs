@@ -201,7 +201,7 @@ pub fn inject(fault: Injected, session: &Clean, seed: u64) -> Option<Clean> {
     }
     let mut damaged = session.clone();
     if fault == Injected::HalfWidths {
-        let size = damaged.cell.object.as_mut()?.size.as_mut()?;
+        let size = damaged.cell.object_mut()?.size.as_mut()?;
         size.iter_mut().for_each(|edge| *edge *= 0.5);
         return Some(damaged);
     }

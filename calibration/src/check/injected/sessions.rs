@@ -123,7 +123,7 @@ fn tossed(number: u64, cell: &Cell) -> Result<Clean, CleanError> {
         rollout.start(START_NS, None, Some(&start), None);
         let mut trace = CellTrace::default();
         rollout.run(&Course { commands: None, joints_ns: &[], poses_ns: &poses_ns }, &mut trace);
-        let noise = cell.object.as_ref().and_then(|object| object.pose_noise);
+        let noise = cell.object().and_then(|object| object.pose_noise);
         let sigma = noise.map_or([1e-3, 5e-3], |noise| [noise.position, noise.rotation]);
         let poses = trace.poses.iter().map(|pose| shaken(pose, sigma, &mut rng)).collect();
         let file = format!("toss_{index:02}.mcap");
@@ -135,6 +135,7 @@ fn tossed(number: u64, cell: &Cell) -> Result<Clean, CleanError> {
             measured: JointSeries::default(),
             torques_end_at_rows: false,
             object: ObjectSeries { stamps_ns: poses_ns, poses },
+            others: Vec::new(),
             warnings: Vec::new(),
             damage: None,
         };

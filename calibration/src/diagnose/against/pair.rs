@@ -157,7 +157,7 @@ mod tests {
     fn another_law_and_another_object_are_refused_and_another_tool_or_gain_is_what_may_have_changed() {
         let law = why(|cell| cell.controller.as_mut().expect("a law").kind = ControllerKind::JointPd).expect("refused");
         assert!(law.contains("joint_impedance and joint_pd"), "{law}");
-        let object = why(|cell| cell.object.as_mut().expect("an object").size = Some([0.1; 3])).expect("refused");
+        let object = why(|cell| cell.object_mut().expect("an object").size = Some([0.1; 3])).expect("refused");
         assert!(object.starts_with("object: "), "{object}");
         let heavier = |cell: &mut Cell| cell.tool = Some(Tool { mass: 0.7, length: 0.16, radius: 0.012 });
         assert_eq!(why(heavier), None);

@@ -98,6 +98,7 @@ mod tests {
             measured: series,
             torques_end_at_rows: false,
             object: ObjectSeries::default(),
+            others: Vec::new(),
             warnings: Vec::new(),
             damage: None,
         }

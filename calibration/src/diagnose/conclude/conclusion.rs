@@ -64,6 +64,7 @@ pub fn not_testable(session: &Session, options: &Options, why: &str) -> Diagnosi
         budget_spent: false,
         engine: None,
         seconds: 0.0,
+        object: session.cell.one_of_several().map(str::to_owned),
         session: session.folder.display().to_string(),
         files: session.files.clone(),
         seed: options.seed,

@@ -345,10 +345,10 @@ impl<F: Fn(&[f64]) -> Theta + Sync> Evidence for ArmClips<F> {
 mod tests {
     use super::*;
     use crate::diagnose::clips::torques;
+    use crate::diagnose::test_bench::shipped;
     use shared_mem::msg::arm::ArmState;
     use shared_mem::recording::ObjectSeries;
     use shared_mem::theta::EffectTheta;
-    use std::path::Path;
     use twin::control::Drive;
     use twin::sim::SimCell;
 
@@ -380,14 +380,13 @@ mod tests {
         let [measured, desired] = log;
         let (file, kind) = ("clip.mcap".into(), ClipKind::Excitation);
         let joint_names = (1..=7).map(|joint| format!("fr3_joint{joint}")).collect();
-        let (object, warnings) = (ObjectSeries::default(), Vec::new());
-        Clip { file, kind, joint_names, desired, measured, torques_end_at_rows, object, warnings, damage: None }
+        let (object, others, warnings) = (ObjectSeries::default(), Vec::new(), Vec::new());
+        Clip { file, kind, joint_names, desired, measured, torques_end_at_rows, object, others, warnings, damage: None }
     }
 
     #[test]
     fn an_arm_that_swings_ever_wider_has_no_residuals_however_finite_its_joints_are() {
-        let text = include_str!("../../../../config/fr3_cell.toml");
-        let cell = Cell { object: None, ..Cell::parse(text, Path::new("cell.toml")).expect("the shipped cell") };
+        let cell = Cell { objects: Vec::new(), ..shipped() };
         let recorded = clip(&cell, &Theta::default(), true);
         let arm = ArmClips::new(&cell, &[recorded], |_: &[f64]| Theta::default()).expect("an arm");
         let told = |away: f64| {
@@ -402,8 +401,7 @@ mod tests {
 
     #[test]
     fn along_a_measured_motion_the_torque_is_what_moves_links_and_overcomes_friction() {
-        let text = include_str!("../../../../config/fr3_cell.toml");
-        let mut cell = Cell { object: None, ..Cell::parse(text, Path::new("cell.toml")).expect("the shipped cell") };
+        let mut cell = Cell { objects: Vec::new(), ..shipped() };
         (cell.simulation.q_noise, cell.simulation.dq_noise) = (0.0, 0.0);
         let recorded = clip(&cell, &Theta::default(), true);
         let tracking = torques::cell(&cell).expect("a model");
@@ -434,8 +432,7 @@ mod tests {
 
     #[test]
     fn torques_agree_whether_a_log_means_the_period_before_or_behind_its_stamp() {
-        let text = include_str!("../../../../config/fr3_cell.toml");
-        let mut cell = Cell { object: None, ..Cell::parse(text, Path::new("cell.toml")).expect("the shipped cell") };
+        let mut cell = Cell { objects: Vec::new(), ..shipped() };
         (cell.simulation.q_noise, cell.simulation.dq_noise) = (0.0, 0.0);
         let effect = EffectTheta { name: "payload".into(), parameters: [("mass".to_owned(), 0.3.into())].into() };
         let theta = Theta { effects: vec![effect], ..Theta::default() };

@@ -264,7 +264,7 @@ fn warnings(clip: &Clip, commands: &CommandTrack, dead: &[bool; MAX_JOINTS]) -> 
 fn contact_ns(clip: &Clip, cell: &Cell) -> u64 {
     let poses = &clip.object.poses;
     let (ClipKind::ControlHitSlide, Some(first)) = (clip.kind, poses.first()) else { return u64::MAX };
-    let noise = cell.object.as_ref().and_then(|object| object.pose_noise);
+    let noise = cell.object().and_then(|object| object.pose_noise);
     let sigma = noise.map_or(POSE_NOISE, |PoseNoise { position, .. }| position);
     let away = |i: &usize| {
         let (a, b) = (poses[*i].position(), first.position());

@@ -79,7 +79,7 @@ impl ArmKey {
     /// Parameters that the way to the object is simulated with, whoever asks for it first: rounding of other ones of the
     /// object would be found in every hit that goes on from there.
     pub(super) fn theta(&self) -> Theta {
-        Theta { arm: self.arm.clone(), object: None, effects: self.effects.clone() }
+        Theta { arm: self.arm.clone(), effects: self.effects.clone(), ..Theta::default() }
     }
 }
 

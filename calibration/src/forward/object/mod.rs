@@ -45,7 +45,7 @@ const NOISE: PoseNoise = PoseNoise { position: 1e-3, rotation: 5e-3 };
 
 /// The tracker's noise, one sigma.
 pub(crate) fn noise_of(cell: &Cell) -> PoseNoise {
-    cell.object.as_ref().and_then(|object| object.pose_noise).unwrap_or(NOISE)
+    cell.object().and_then(|object| object.pose_noise).unwrap_or(NOISE)
 }
 
 /// How far a residual may be off for other reasons than noise, one sigma.

@@ -109,9 +109,7 @@ impl Own {
         let noise = super::noise_of(cell);
         let alone = kind == ClipKind::FreeMotion;
         match self {
-            Self::LnFriction => {
-                cell.object.as_ref().and_then(|object| object.friction_scatter).unwrap_or(FRICTION_SCATTER)
-            }
+            Self::LnFriction => cell.object().and_then(|object| object.friction_scatter).unwrap_or(FRICTION_SCATTER),
             Self::Clock => 1e-3,
             Self::Start(_) => {
                 if alone {

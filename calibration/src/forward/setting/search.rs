@@ -56,7 +56,7 @@ const CENTRE_SHARE: f64 = 0.5;
 /// that roughness averages out.
 #[must_use]
 pub fn object_parameters(cell: &Cell, base: &Theta) -> Vec<(Setting, Unknown)> {
-    let (Some(object), Some(start)) = (&cell.object, &base.object) else { return Vec::new() };
+    let (Some(object), Some(start)) = (cell.object(), &base.object) else { return Vec::new() };
     let mass = start.mass.unwrap_or_else(|| object.nominal_mass());
     let half = match ObjectModel::new(cell, Some(base)) {
         Ok(Some(model)) => model.shape.half_extents().into(),

@@ -201,8 +201,8 @@ fn identify_kept(
     answer.engine = options.engine.as_ref().map(|engine| engine.used());
     answer.warnings.extend(answer.engine.iter().flat_map(Used::sentences));
     // Of an object nothing was found.
-    let object = given.and_then(|given| given.object.clone());
-    let theta = Theta { object, ..settings.theta(&outcome.fit.shared) };
+    let given = given.cloned().unwrap_or_default();
+    let theta = Theta { object: given.object, others: given.others, ..settings.theta(&outcome.fit.shared) };
     Ok((answer, theta))
 }
 

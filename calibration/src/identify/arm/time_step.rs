@@ -72,7 +72,7 @@ mod tests {
         let text = include_str!("../../../../config/fr3_cell.toml");
         let shipped = shared_mem::toml_file::parse(text, Path::new("fr3_cell.toml")).expect("the shipped file");
         let world = World::draw(3, Kind::Excitation, Fault::Nothing, &shipped);
-        let cell = Cell { object: None, ..world.cell.clone() };
+        let cell = Cell { objects: Vec::new(), ..world.cell.clone() };
         let mut clips = record(&world, 1).expect("a session");
         let base = complete(&cell, Some(&world.hidden)).expect("gains");
         let (settings, unknowns): (Vec<_>, Vec<_>) = gains(&cell, &base).into_iter().unzip();

@@ -54,7 +54,7 @@ fn path(clip: &Clip, prediction: &Prediction) -> Path {
 }
 
 fn traces(file: &str, material: &Material, (before, after): (Path, Path)) -> impl Iterator<Item = Trace> {
-    let noise = material.cell.object.as_ref().and_then(|object| object.pose_noise.as_ref());
+    let noise = material.cell.object().and_then(|object| object.pose_noise.as_ref());
     let sigma = noise.map_or(0.0, |noise| noise.position);
     let file = file.to_owned();
     ["x", "y"].into_iter().zip(before.into_iter().zip(after)).map(move |(axis, (before, after))| Trace {

@@ -8,6 +8,7 @@ use crate::identify::remarks::grouped;
 use crate::identify::split::{Split, split};
 use rayon::prelude::*;
 use shared_mem::cell::{Cell, ClipEntry, ClipKind};
+use shared_mem::console;
 use shared_mem::recording::{Clip, Session};
 use std::path::Path;
 use twin::arm::ArmModel;
@@ -31,7 +32,10 @@ pub(super) struct Material {
 
 impl Material {
     pub(super) fn open(options: &Options) -> Result<Self, ObjectError> {
-        let session = Session::open_with(&options.session, options.cell.as_deref())?;
+        let mut session = Session::open_with(&options.session, options.cell.as_deref())?;
+        if let Some(subject) = session.about(options.object.as_deref())? {
+            console::line(subject);
+        }
         let entries: Vec<_> = session.clips.iter().filter(|clip| clip.kind != ClipKind::Excitation).collect();
         let read = |entry: &&ClipEntry| {
             let clip = session.read(entry).map_err(|error| error.to_string());
@@ -47,7 +51,7 @@ impl Material {
         read: Vec<(String, Result<Clip, String>)>,
         (path, seed): (&Path, u64),
     ) -> Result<Self, ObjectError> {
-        if cell.object.is_none() {
+        if cell.object().is_none() {
             return Err(ObjectError::NoObject);
         }
         let arm = cell.robot.as_ref().map(|_| ArmModel::from_cell(&cell)).transpose()?;

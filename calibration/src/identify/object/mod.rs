@@ -72,6 +72,8 @@ pub struct Options {
     pub session: PathBuf,
     /// The cell.toml, where it does not lie beside the clips.
     pub cell: Option<PathBuf>,
+    /// Of several objects in cell.toml the one to identify; the one that moves where none is named.
+    pub object: Option<String>,
     /// The way of searching.
     pub optimizer: Optimizer,
     /// Where the parameters go.
@@ -181,6 +183,7 @@ fn identify_kept(
     let mut answer = finding.answer(material);
     answer.session = options.session.display().to_string();
     answer.files = SessionFiles { session: options.session.clone(), cell: options.cell.clone() };
+    answer.object = material.cell.one_of_several().map(str::to_owned);
     answer.optimizer = options.optimizer.name().into();
     answer.warnings.extend(problem.warnings.iter().cloned());
     if disagreement.is_none() {
@@ -212,6 +215,7 @@ impl Problem {
         (kept, interrupt): (&Kept, &Interrupt),
     ) -> Result<Self, ObjectError> {
         let mut given = options.parameters.as_deref().map(Theta::read).transpose()?.unwrap_or_default();
+        given = given.about(&material.cell);
         let mut warnings = Vec::new();
         if given.arm.is_none() && material.cell.robot.is_some() {
             let clips = material.train();
@@ -221,7 +225,7 @@ impl Problem {
                 let find = || with_gains(&material.cell, &given, hits, interrupt);
                 // As text: what a person may read a number of effects in is no plain list of fields.
                 let text = kept.once_if_ok(&Fingerprint::of("gains"), || find().map(|theta| theta.to_toml()))?;
-                given = toml_file::parse(&text, std::path::Path::new("theta.toml"))?;
+                given = toml_file::parse::<Theta>(&text, std::path::Path::new("theta.toml"))?.about(&material.cell);
             }
         }
         let base = complete(&material.cell, Some(&given))?;
@@ -281,7 +285,7 @@ impl Problem {
 /// What is searched of an object.
 fn searched(cell: &Cell, base: Theta) -> (Settings, Vec<Unknown>) {
     // A mass that was weighed is not searched.
-    let weighed = cell.object.as_ref().is_some_and(|o| o.mass.is_some() && o.mass_range.is_none());
+    let weighed = cell.object().is_some_and(|o| o.mass.is_some() && o.mass_range.is_none());
     let known = |setting: &Setting| match setting {
         Setting::Mass => weighed,
         // Without an arm no tool touches it.

@@ -30,6 +30,7 @@ pub(super) fn clip(change: impl Fn(usize, &mut Isometry3<f64>)) -> Clip {
         desired: JointSeries::default(),
         measured: JointSeries::default(),
         object,
+        others: Vec::new(),
         warnings: Vec::new(),
         damage: None,
     }

@@ -126,6 +126,7 @@ fn init(source: &Source, cell: &Cell) -> Value {
 /// `pose.npy`: the object in the camera, one 4x4 a frame.
 fn put_poses(source: &Source, cell: &Cell, target: Place<'_>, exported: &mut Exported) -> Result<(), ExportError> {
     let object = &source.clip.object;
+    exported.poses = object.len();
     if object.is_empty() {
         return Ok(());
     }

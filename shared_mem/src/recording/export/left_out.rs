@@ -1,14 +1,13 @@
 //! What of a source was not carried over: every topic, or file of a TwinAligner folder, with how much of it.
 
 use super::super::container::Messages;
-use super::super::wire::Wire;
+use super::super::tracked::ObjectTopics;
 use super::super::{ReadError, twinaligner};
 use super::rosbag::{EXTERNAL_TORQUES, FLANGE_POSE};
 use super::source::{Kind, Source};
 use super::{Exported, Format};
 use crate::cell::Cell;
-use crate::msg::arm::ArmState;
-use crate::msg::object::ObjectPose;
+use crate::topics;
 use serde::Serialize;
 use std::collections::BTreeMap;
 
@@ -46,8 +45,23 @@ pub(super) fn left_out(
     (exported, carried): (&Exported, &Carried),
 ) -> Result<Vec<LeftOut>, ReadError> {
     let whole = whole(source, cell, to, exported);
+    let objects = match &source.kind {
+        Kind::Own(_) => Some(ObjectTopics::own(cell)),
+        Kind::Bag => Some(ObjectTopics::ros2(cell)),
+        Kind::Folder => None,
+    };
+    // A folder has room for one object.
+    let went = |topic: &str| match (&objects, to) {
+        (Some(objects), Format::TwinAligner) => objects.expected() == topic && exported.poses > 0,
+        (Some(objects), _) => objects.wants(topic),
+        (None, _) => false,
+    };
     let rest = |(topic, count): (String, usize)| {
-        let carried = if whole.contains(&topic.as_str()) { count } else { carried.0.get(&topic).map_or(0, |n| *n) };
+        let carried = if whole.contains(&topic.as_str()) || went(&topic) {
+            count
+        } else {
+            carried.0.get(&topic).map_or(0, |n| *n)
+        };
         (count > carried).then(|| LeftOut { topic, messages: count - carried })
     };
     Ok(there(source)?.into_iter().filter_map(rest).collect())
@@ -56,8 +70,8 @@ pub(super) fn left_out(
 /// Topics whose rows are those of the clip's series, and went with them.
 fn whole<'a>(source: &Source, cell: &'a Cell, to: Format, exported: &Exported) -> Vec<&'a str> {
     let (joints, poses) = (exported.measured > 0, exported.poses > 0);
-    let topics: &[(&str, bool)] = match &source.kind {
-        Kind::Own(_) => &[(ArmState::TOPIC, joints), (ObjectPose::TOPIC, poses)],
+    let whole: &[(&str, bool)] = match &source.kind {
+        Kind::Own(_) => &[(topics::ARM_STATE.name, joints)],
         Kind::Folder => &[
             (twinaligner::CONTROL, joints),
             (twinaligner::FRAME, joints),
@@ -68,12 +82,11 @@ fn whole<'a>(source: &Source, cell: &'a Cell, to: Format, exported: &Exported) -
         Kind::Bag => &[
             (&cell.topics.measured, joints),
             (&cell.topics.desired, joints),
-            (&cell.topics.object_pose, poses),
             (EXTERNAL_TORQUES, to == Format::Own),
             (FLANGE_POSE, to == Format::Own),
         ],
     };
-    topics.iter().filter(|(_, carried)| *carried).map(|(topic, _)| *topic).collect()
+    whole.iter().filter(|(_, carried)| *carried).map(|(topic, _)| *topic).collect()
 }
 
 /// Everything that the source holds: messages by topic, files by name.

@@ -64,7 +64,7 @@ pub struct Exported {
     pub measured: usize,
     /// Joint rows of what the arm was told.
     pub desired: usize,
-    /// Poses of the object.
+    /// Poses of objects.
     pub poses: usize,
     /// Pictures.
     pub pictures: usize,
@@ -231,7 +231,7 @@ impl Exported {
             file: target.file_name().map_or_else(PathBuf::new, PathBuf::from),
             measured: clip.measured.len(),
             desired: clip.desired.len(),
-            poses: clip.object.len(),
+            poses: clip.object.len() + clip.others.iter().map(|other| other.series.len()).sum::<usize>(),
             pictures: 0,
             left_out: Vec::new(),
             warnings,

@@ -5,6 +5,7 @@ use super::super::cdr::CdrError;
 use super::super::container::Messages;
 use super::super::logged::Logged;
 use super::super::ros2::{JointState, StampedPose};
+use super::super::tracked::Due;
 use super::super::writer::{ClipInfo, ClipWriter};
 use super::super::{Clip, Payload, Picture, ReadError, WriteError, WriteSummary};
 use super::left_out::Carried;
@@ -51,7 +52,7 @@ pub(super) fn write(
     }
     let known = if matches!(source.kind, Kind::Bag) { Known::read(&source.path)? } else { Known::default() };
     let latency_ns = latency_ns(cell);
-    let mut rows = Rows::new(clip, logged, known, flange_at, latency_ns);
+    let mut rows = Rows::new((clip, cell), logged, known, flange_at);
     for beside in source.beside()? {
         let beside = beside?;
         rows.put_until(beside.stamp_ns, &mut writer)?;
@@ -79,7 +80,7 @@ pub fn write_clip(clip: &Clip, cell: &Cell, program: &str, output: Output) -> Re
     if let Some(record) = logged.record() {
         writer.note(&record)?;
     }
-    let mut rows = Rows::new(clip, logged, Known::default(), &|_| None, latency_ns(cell));
+    let mut rows = Rows::new((clip, cell), logged, Known::default(), &|_| None);
     rows.put_until(u64::MAX, &mut writer)?;
     writer.finish()
 }
@@ -149,20 +150,21 @@ struct Rows<'a> {
     commands: &'a [u64],
     state: usize,
     command: usize,
-    pose: usize,
+    poses: Due<'a>,
 }
 
 impl<'a> Rows<'a> {
-    fn new(clip: &'a Clip, logged: Logged, known: Known, flange_at: FlangeAt<'a>, latency_ns: u64) -> Self {
+    fn new((clip, cell): (&'a Clip, &Cell), logged: Logged, known: Known, flange_at: FlangeAt<'a>) -> Self {
         let commands = if logged.commands_apart { &clip.desired.stamps_ns[..] } else { &[] };
-        Self { clip, known, flange_at, latency_ns, commands, state: 0, command: 0, pose: 0 }
+        let (latency_ns, poses) = (latency_ns(cell), Due::own(clip, cell));
+        Self { clip, known, flange_at, latency_ns, commands, state: 0, command: 0, poses }
     }
 
     fn put_until(&mut self, stamp_ns: u64, writer: &mut ClipWriter<Output>) -> Result<(), WriteError> {
         let clip = self.clip;
         loop {
             let state = clip.measured.stamps_ns.get(self.state).copied();
-            let pose = clip.object.stamps_ns.get(self.pose).copied();
+            let pose = self.poses.next_ns();
             let command = self.commands.get(self.command).copied();
             let Some(first) = state.into_iter().chain(command).chain(pose).min().filter(|first| *first <= stamp_ns)
             else {
@@ -176,18 +178,17 @@ impl<'a> Rows<'a> {
                 writer.arm_state(&self.arm_state(self.state, first))?;
                 self.state += 1;
             }
-            if pose == Some(first) {
-                let pose = &clip.object.poses[self.pose];
-                writer.object_pose(&ObjectPose {
+            while let Some(due) = self.poses.take(first) {
+                let pose = ObjectPose {
                     // An own pose is stamped when it became known.
                     stamp_ns: first + self.latency_ns,
                     device_ns: first,
-                    sequence: self.pose as u64,
-                    position: pose.position(),
-                    wxyz: pose.wxyz(),
+                    sequence: due.row as u64,
+                    position: due.pose.position(),
+                    wxyz: due.pose.wxyz(),
                     ..ObjectPose::default()
-                })?;
-                self.pose += 1;
+                };
+                due.topics.iter().try_for_each(|topic| writer.object_pose_on(topic, &pose))?;
             }
         }
     }

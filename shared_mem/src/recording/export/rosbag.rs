@@ -1,6 +1,7 @@
 //! A clip as a ROS 2 bag that `ros2 bag play` and Foxglove open, under the topic names of cell.toml's `[topics]`.
 
 use super::super::ros2::{self, JointState, StampedPose};
+use super::super::tracked::Due;
 use super::super::{Payload, Picture, torques};
 use super::definitions::definition;
 use super::encode;
@@ -91,8 +92,9 @@ struct Rows<'a> {
     source: &'a Source,
     cell: &'a Cell,
     frame: String,
-    /// Next row of measured joints, desired joints and poses.
-    next: [usize; 3],
+    /// Next row of measured joints and of desired ones.
+    next: [usize; 2],
+    poses: Due<'a>,
     states: std::iter::Peekable<Box<dyn Iterator<Item = (u64, &'a crate::msg::arm::ArmState)> + 'a>>,
     names: &'a [String],
     robot: Option<RobotTopics<'a>>,
@@ -105,18 +107,29 @@ impl<'a> Rows<'a> {
         let recorded = &source.clip.joint_names[..];
         let names = robot.map_or(recorded, |model| model.names(recorded));
         let robot = robot.map(|model| RobotTopics::new(model, names, &cell.topics.measured));
-        Self { source, cell, frame, next: [0; 3], states: states.peekable(), names, robot }
+        Self {
+            source,
+            cell,
+            frame,
+            next: [0; 2],
+            poses: Due::ros2(&source.clip, cell),
+            states: states.peekable(),
+            names,
+            robot,
+        }
     }
 
     /// Writes every row that is not later than `stamp_ns`.
     fn put_until(&mut self, stamp_ns: u64, bag: &mut Bag) -> Result<(), mcap::McapError> {
         let clip = &self.source.clip;
-        let (object, topics) = (&clip.object, &self.cell.topics);
+        let topics = &self.cell.topics;
         loop {
-            let due = [&clip.measured.stamps_ns, &clip.desired.stamps_ns, &object.stamps_ns];
-            let due: [Option<u64>; 3] = std::array::from_fn(|i| due[i].get(self.next[i]).copied());
+            let due = [&clip.measured.stamps_ns, &clip.desired.stamps_ns];
+            let due: [Option<u64>; 2] = std::array::from_fn(|i| due[i].get(self.next[i]).copied());
             let state = self.states.peek().map(|(stamp, _)| *stamp);
-            let Some(first) = due.into_iter().chain([state]).flatten().min().filter(|first| *first <= stamp_ns) else {
+            let Some(first) =
+                due.into_iter().chain([state, self.poses.next_ns()]).flatten().min().filter(|first| *first <= stamp_ns)
+            else {
                 return Ok(());
             };
             let unix_ns = self.source.unix_ns(first);
@@ -135,11 +148,9 @@ impl<'a> Rows<'a> {
                     self.next[kind] += 1;
                 }
             }
-            if due[2] == Some(first) {
-                let pose = &object.poses[self.next[2]];
-                let message = encode::pose(unix_ns, &self.frame, pose.position(), pose.wxyz());
-                bag.put(&topics.object_pose, StampedPose::POSE_TYPE, unix_ns, &message)?;
-                self.next[2] += 1;
+            while let Some(due) = self.poses.take(first) {
+                let message = encode::pose(unix_ns, &self.frame, due.pose.position(), due.pose.wxyz());
+                due.topics.iter().try_for_each(|topic| bag.put(topic, StampedPose::POSE_TYPE, unix_ns, &message))?;
             }
             if state == Some(first)
                 && let Some((_, state)) = self.states.next()

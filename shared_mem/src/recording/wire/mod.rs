@@ -6,6 +6,7 @@
 
 mod arm;
 mod devices;
+mod targets;
 
 pub(super) use devices::{IMAGE_SCHEMA, image_from_wire, image_to_wire};
 

@@ -40,7 +40,7 @@ pub(in crate::effects) fn slid(
     seconds: f64,
 ) -> (Vector3<f64>, f64) {
     let description = Cell {
-        object: Some(Object { size: Some(SIZE), ..Object::default() }),
+        objects: vec![Object { size: Some(SIZE), ..Object::default() }],
         table: Some(Table { height: 0.0 }),
         ..Cell::default()
     };

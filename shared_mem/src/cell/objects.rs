@@ -1,0 +1,132 @@
+//! The objects of a cell: one `[object]` without a name, or `[[object]]` blocks with one each. A command is about one of
+//! them at a time; the others are in its recordings, and in nobody's way.
+
+use super::{Cell, Object};
+use crate::blocks::{self, Named};
+use schemars::JsonSchema;
+
+/// What the file may hold, for its schema.
+#[derive(JsonSchema)]
+#[serde(untagged)]
+#[allow(dead_code)]
+pub(super) enum Blocks {
+    /// One without a name.
+    One(Box<Object>),
+    /// Several.
+    Many(Vec<Object>),
+}
+
+/// More of them are a warehouse.
+const MOST: usize = 32;
+
+impl Named for Object {
+    const KEY: &'static str = "object";
+
+    fn name(&self) -> Option<&str> {
+        self.name.as_deref()
+    }
+}
+
+impl Cell {
+    /// The object that a command is about: the first, unless [`Self::about`] said another; `None` without any.
+    #[must_use]
+    pub fn object(&self) -> Option<&Object> {
+        self.objects.get(self.in_question)
+    }
+
+    /// The same to be changed.
+    pub fn object_mut(&mut self) -> Option<&mut Object> {
+        self.objects.get_mut(self.in_question)
+    }
+
+    /// Its name; `None` without one.
+    #[must_use]
+    pub fn object_name(&self) -> Option<&str> {
+        self.object()?.name.as_deref()
+    }
+
+    /// Its name where there are several, so that an answer has to say which one it is about.
+    #[must_use]
+    pub fn one_of_several(&self) -> Option<&str> {
+        self.object_name().filter(|_| self.objects.len() > 1)
+    }
+
+    /// The objects beside it, in the order of the file.
+    pub fn other_objects(&self) -> impl Iterator<Item = &Object> {
+        self.objects.iter().enumerate().filter(|(i, _)| *i != self.in_question).map(|(_, object)| object)
+    }
+
+    /// Makes the object of this name the one in question.
+    ///
+    /// # Errors
+    /// The sentence to print where there is none of that name.
+    pub fn about(&mut self, name: &str) -> Result<(), String> {
+        let named = |object: &Object| object.name.as_deref() == Some(name);
+        self.in_question = self.objects.iter().position(named).ok_or_else(|| {
+            let names: Vec<&str> = self.objects.iter().filter_map(|object| object.name.as_deref()).collect();
+            match names.is_empty() {
+                true => format!("cell.toml names no object, so `--object {name}` fits none; leave it out"),
+                false => format!("cell.toml has no object `{name}`; it has {}", names.join(", ")),
+            }
+        })?;
+        Ok(())
+    }
+
+    pub(super) fn check_objects(&self) -> Result<(), String> {
+        if self.objects.len() > MOST {
+            return Err(format!("holds {} objects; at most {MOST} are followed", self.objects.len()));
+        }
+        blocks::check_names(&self.objects)?;
+        let told = |object: &Object, what: String| match &object.name {
+            Some(name) if self.objects.len() > 1 => format!("object `{name}`: {what}"),
+            _ => what,
+        };
+        self.objects.iter().try_for_each(|object| object.check().map_err(|what| told(object, what)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::path::Path;
+
+    fn parse(text: &str) -> Result<Cell, String> {
+        Cell::parse(text, Path::new("cell.toml")).map_err(|error| error.to_string())
+    }
+
+    const CUP: &str = "[[object]]\nname = \"cup\"\nshape = \"box\"\nsize = [0.1, 0.1, 0.1]\n";
+    const BOX: &str = "[[object]]\nname = \"milk_box\"\nshape = \"box\"\nsize = [0.1, 0.2, 0.1]\nmass = 0.4\n";
+
+    #[test]
+    fn several_objects_are_told_apart_by_name_and_one_without_a_name_stays_a_block() {
+        let mut cell = parse(&format!("{CUP}{BOX}")).expect("two objects");
+        assert_eq!(cell.object_name(), Some("cup"));
+        cell.about("milk_box").expect("the second");
+        assert_eq!(cell.object().and_then(|object| object.mass), Some(0.4));
+        assert_eq!(cell.other_objects().map(|object| object.name.as_deref()).collect::<Vec<_>>(), [Some("cup")]);
+        assert_eq!(parse(&cell.to_toml()).expect("own text").objects, cell.objects);
+        let error = cell.about("plate").expect_err("no plate");
+        assert!(error.contains("no object `plate`; it has cup, milk_box"), "{error}");
+        let one = parse("[object]\nshape = \"box\"\nsize = [0.1, 0.1, 0.1]\n").expect("one object");
+        assert!(one.to_toml().contains("\n[object]\n") || one.to_toml().starts_with("[object]\n"), "{}", one.to_toml());
+        assert_eq!(parse(&one.to_toml()).expect("own text"), one);
+    }
+
+    #[test]
+    fn what_cannot_be_told_apart_is_refused_in_one_line() {
+        let unnamed = "[[object]]\nshape = \"box\"\nsize = [0.1, 0.1, 0.1]\n";
+        for (text, told) in [
+            (format!("{CUP}{unnamed}"), "number 2 has no `name`"),
+            (format!("{CUP}{CUP}"), "two [[object]] blocks are named `cup`"),
+            (format!("[object]\nshape = \"box\"\nsize = [0.1, 0.1, 0.1]\n{CUP}"), "both [object] and [[object]]"),
+            (format!("{BOX}[object]\n"), "both [object] and [[object]]"),
+            (CUP.replace("cup", "a/b"), "letters, digits and _"),
+            (CUP.replace("cup", "pose"), "another name"),
+            (format!("{CUP}{}", BOX.replace("0.2", "0.0")), "object `milk_box`: `object.size`"),
+            ("object = 3\n".into(), "[[object]] blocks"),
+        ] {
+            let error = parse(&text).expect_err(told);
+            assert!(error.contains(told) && !error.contains('\n'), "{error}");
+        }
+    }
+}

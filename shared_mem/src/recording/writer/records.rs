@@ -1,0 +1,113 @@
+//! One method for each kind of message that an own clip holds, pictures apart.
+
+use super::{ClipWriter, WriteError};
+use crate::msg::arm::{ArmCommand, ArmState};
+use crate::msg::event::Event;
+use crate::msg::gripper::GripperState;
+use crate::msg::image::CameraInfo;
+use crate::msg::object::ObjectPose;
+use crate::msg::target::{ArmTarget, GripperTarget};
+use crate::msg::twin::{TwinGap, TwinState};
+use crate::msg::wrench::Wrench;
+use crate::recording::wire::Wire;
+use std::io::Write;
+
+impl<W: Write> ClipWriter<W> {
+    /// Records a state of the arm.
+    ///
+    /// # Errors
+    /// [`WriteError`] when the disk is full or fails; what was flushed before stays readable.
+    pub fn arm_state(&mut self, message: &ArmState) -> Result<(), WriteError> {
+        self.message(message)
+    }
+
+    /// Records a command to the arm.
+    ///
+    /// # Errors
+    /// As [`ClipWriter::arm_state`].
+    pub fn arm_command(&mut self, message: &ArmCommand) -> Result<(), WriteError> {
+        self.message(message)
+    }
+
+    /// Records a pose of the object.
+    ///
+    /// # Errors
+    /// As [`ClipWriter::arm_state`].
+    pub fn object_pose(&mut self, message: &ObjectPose) -> Result<(), WriteError> {
+        self.object_pose_on(ObjectPose::TOPIC, message)
+    }
+
+    /// Records a pose of one of several objects on its topic, [`crate::topics::object_pose`].
+    ///
+    /// # Errors
+    /// As [`ClipWriter::arm_state`].
+    pub fn object_pose_on(&mut self, topic: &str, message: &ObjectPose) -> Result<(), WriteError> {
+        let mut wire = message.to_wire(self.clock);
+        wire.frame_id.clone_from(&self.base_frame);
+        self.named(topic, ObjectPose::SCHEMA, message.stamp_ns, &wire)
+    }
+
+    /// Records intrinsics and pose of the camera.
+    ///
+    /// # Errors
+    /// As [`ClipWriter::arm_state`].
+    pub fn camera_info(&mut self, message: &CameraInfo) -> Result<(), WriteError> {
+        self.message(message)
+    }
+
+    /// Records a force/torque sample.
+    ///
+    /// # Errors
+    /// As [`ClipWriter::arm_state`].
+    pub fn wrench(&mut self, message: &Wrench) -> Result<(), WriteError> {
+        self.message(message)
+    }
+
+    /// Records a state of the gripper.
+    ///
+    /// # Errors
+    /// As [`ClipWriter::arm_state`].
+    pub fn gripper(&mut self, message: &GripperState) -> Result<(), WriteError> {
+        self.message(message)
+    }
+
+    /// Records where the arm was to go.
+    ///
+    /// # Errors
+    /// As [`ClipWriter::arm_state`].
+    pub fn arm_target(&mut self, message: &ArmTarget) -> Result<(), WriteError> {
+        self.message(message)
+    }
+
+    /// Records how far the fingers were to be apart.
+    ///
+    /// # Errors
+    /// As [`ClipWriter::arm_state`].
+    pub fn gripper_target(&mut self, message: &GripperTarget) -> Result<(), WriteError> {
+        self.message(message)
+    }
+
+    /// Records a state of the twin.
+    ///
+    /// # Errors
+    /// As [`ClipWriter::arm_state`].
+    pub fn twin_state(&mut self, message: &TwinState) -> Result<(), WriteError> {
+        self.message(message)
+    }
+
+    /// Records real against twin.
+    ///
+    /// # Errors
+    /// As [`ClipWriter::arm_state`].
+    pub fn twin_gap(&mut self, message: &TwinGap) -> Result<(), WriteError> {
+        self.message(message)
+    }
+
+    /// Records a remark.
+    ///
+    /// # Errors
+    /// As [`ClipWriter::arm_state`].
+    pub fn event(&mut self, message: &Event) -> Result<(), WriteError> {
+        self.message(message)
+    }
+}
