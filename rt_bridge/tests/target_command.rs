@@ -6,6 +6,7 @@ use rt_bridge::rt::process::ask_to_end;
 use serde_json::Value;
 use shared_mem::msg::arm::{ArmState, MotionStatus};
 use shared_mem::msg::target::ArmTarget;
+use shared_mem::recording::{ClipMessages, Payload};
 use shared_mem::time::now_ns;
 use shared_mem::topics::{ARM_STATE, ARM_TARGET};
 use shared_mem::transport::{Node, Subscriber};
@@ -27,10 +28,10 @@ fn program(domain: &str, arguments: &[&str]) -> Command {
     command
 }
 
-fn bridge(domain: &str) -> Child {
+fn bridge(domain: &str, further: &[&str]) -> Child {
     let mut command = program(domain, &["run", "--cell", CELL, "--arm", "sim", "--camera", "off", "--gripper", "sim"]);
     // It ends with this test, however that ends.
-    command.args(["--realtime", "ignore", "--json", "--parent", &std::process::id().to_string()]);
+    command.args(["--realtime", "ignore", "--json", "--parent", &std::process::id().to_string()]).args(further);
     command.spawn().expect("the program starts")
 }
 
@@ -66,7 +67,9 @@ fn end(bridge: Child) -> Output {
 
 #[test]
 fn joints_poses_and_fingers_get_where_they_are_sent() {
-    let bridge = bridge("targets");
+    let folder = tempfile::tempdir().expect("a folder");
+    let clip = folder.path().join("clip.mcap");
+    let bridge = bridge("targets", &["--record", clip.to_str().expect("a path")]);
     let here = target("targets", &["joints", "0,-0.6,0,-2.2,0,1.6,0.785", "--speed", "0.5", "--json"]);
     assert!(here.status.success(), "{}", said(&here));
     let answer: Value = serde_json::from_slice(&here.stdout).expect("JSON");
@@ -82,11 +85,21 @@ fn joints_poses_and_fingers_get_where_they_are_sent() {
     let fingers = target("targets", &["fingers", "0.03", "--json"]);
     assert!(fingers.status.success(), "{}", said(&fingers));
     assert!(end(bridge).status.success());
+    // What the arm was steered by is in the recording.
+    let (mut joints, mut widths) = (0, 0);
+    for message in ClipMessages::open(&clip, &[]).expect("a clip") {
+        match message.expect("a message").payload {
+            Payload::ArmTarget(target) => joints += usize::from((target.q[1] + 0.6).abs() < 1e-9),
+            Payload::GripperTarget(target) => widths += usize::from((target.width - 0.03).abs() < 1e-9),
+            _ => {}
+        }
+    }
+    assert!(joints > 0 && widths > 0, "{joints} and {widths} targets");
 }
 
 #[test]
 fn a_sender_that_dies_has_the_arm_braked_and_a_second_one_is_refused() {
-    let bridge = bridge("dies");
+    let bridge = bridge("dies", &[]);
     let node = Node::open_in(&format!("dies{}", std::process::id()), "a test").expect("shared memory");
     let (states, targets) =
         (node.subscriber(ARM_STATE).expect("a place"), node.publisher(ARM_TARGET).expect("a place"));

@@ -281,8 +281,13 @@ fn killed_at_once_it_keeps_every_episode_that_was_kept() {
     assert!(!there("episode_000002.mcap").exists());
     // Begun again, it goes on with the next.
     let again = Teleop::start(&["--task", &task("push_milk.toml"), "--record", &clips]);
-    assert_eq!(again.page().state()["seed"], 2);
-    again.end(Signal::INT);
+    let mut page = again.page();
+    assert_eq!(page.state()["seed"], 2);
+    page.send(json!({ "episode": "start" }));
+    page.wait("it begins", |state| state["open"] == true && state["time_s"].as_f64() > Some(0.1));
+    let (ended, answer) = again.end(Signal::INT);
+    let told = ["kept", "discarded", "cut_short"].map(|key| answer[key].as_u64());
+    assert_eq!((ended, told), (true, [Some(0), Some(1), Some(2)]), "{answer}");
 }
 
 #[test]

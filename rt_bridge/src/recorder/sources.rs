@@ -5,6 +5,7 @@ use shared_mem::msg::event::Event;
 use shared_mem::msg::gripper::GripperState;
 use shared_mem::msg::image::{CameraInfo, ImageHeader};
 use shared_mem::msg::object::ObjectPose;
+use shared_mem::msg::target::{ArmTarget, GripperTarget};
 use shared_mem::msg::twin::{TwinGap, TwinState};
 use shared_mem::msg::wrench::Wrench;
 use shared_mem::recording::{ClipWriter, WriteError};
@@ -24,6 +25,8 @@ pub(super) struct Sources {
     info: Subscriber<CameraInfo>,
     wrench: Subscriber<Wrench>,
     gripper: Subscriber<GripperState>,
+    arm_target: Subscriber<ArmTarget>,
+    gripper_target: Subscriber<GripperTarget>,
     twin_state: Subscriber<TwinState>,
     twin_gap: Subscriber<TwinGap>,
     events: Subscriber<Event>,
@@ -72,6 +75,8 @@ impl Sources {
             info: node.subscriber(topics::CAMERA_INFO)?,
             wrench: node.subscriber(topics::WRENCH)?,
             gripper: node.subscriber(topics::GRIPPER)?,
+            arm_target: node.subscriber(topics::ARM_TARGET)?,
+            gripper_target: node.subscriber(topics::GRIPPER_TARGET)?,
             twin_state: node.subscriber(topics::TWIN_STATE)?,
             twin_gap: node.subscriber(topics::TWIN_GAP)?,
             events: node.subscriber(topics::EVENTS)?,
@@ -130,6 +135,8 @@ impl Sources {
         drain!(info, camera_info);
         drain!(wrench, wrench);
         drain!(gripper, gripper);
+        drain!(arm_target, arm_target);
+        drain!(gripper_target, gripper_target);
         drain!(twin_state, twin_state);
         drain!(twin_gap, twin_gap);
         let before = counted.taken;

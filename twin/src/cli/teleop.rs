@@ -24,9 +24,9 @@ Examples:
   twin teleop --task tasks/pick_carrot.toml --record carrot
   twin teleop --task tasks/push_milk.toml --record milk --seed 100 --bind 0.0.0.0 --port 8400
 
-Ctrl-C ends it; an episode that is under way is discarded.
+Ctrl-C ends it; an episode that is under way is discarded, and that is said.
 
-JSON: task, kept, successes, discarded, clips.")]
+JSON: task, kept, successes, discarded, cut_short (the seed of an episode that was under way at the end), clips.")]
 pub(crate) struct Teleop {
     /// The task file; it needs an [arm] and a [[camera]]
     #[arg(long, value_name = "TASK.toml")]
@@ -87,6 +87,11 @@ impl Teleop {
         let summary = serve(&task, camera, recording, address, &stop, |at| {
             console::line(format_args!("open http://{at}/ in a browser; Ctrl-C ends"));
         })?;
+        if let Some(seed) = summary.cut_short {
+            console::line(format_args!(
+                "episode {seed} was under way and is discarded; --seed {seed} begins with it again"
+            ));
+        }
         if self.json {
             let mut json = serde_json::to_value(&summary)?;
             json["task"] = self.task.display().to_string().into();

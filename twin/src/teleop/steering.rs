@@ -64,8 +64,10 @@ pub struct Summary {
     pub kept: u64,
     /// Those of them that were a success.
     pub successes: u64,
-    /// Episodes that were discarded.
+    /// Episodes that were discarded, one that was under way at the end among them.
     pub discarded: u64,
+    /// The seed of the one that was under way at the end.
+    pub cut_short: Option<u64>,
     /// Their clips.
     pub clips: Vec<PathBuf>,
 }
@@ -135,13 +137,22 @@ impl Steering {
                 match orders.recv_timeout(next.saturating_duration_since(Instant::now())) {
                     Ok(order) => self.take(&order),
                     Err(RecvTimeoutError::Timeout) => break,
-                    Err(RecvTimeoutError::Disconnected) => return self.summary,
+                    Err(RecvTimeoutError::Disconnected) => return self.ended(),
                 }
             }
             // A machine that is too slow shows slow motion, not leaps.
             next = next.max(Instant::now() - PERIOD);
             self.pass();
             show(self.picture());
+        }
+        self.ended()
+    }
+
+    /// What came of it all: an episode that nobody ended is discarded.
+    fn ended(mut self) -> Summary {
+        if self.open {
+            self.summary.discarded += 1;
+            self.summary.cut_short = Some(self.episode.seed());
         }
         self.summary
     }
