@@ -1,9 +1,10 @@
-//! Links and joints of a URDF: what the dynamics of an arm need of one, for `twin` and for `franka-rs`.
+//! Links and joints of a URDF: what the dynamics of an arm need of one, and what an object on joints touches with, for `twin` and for
+//! `franka-rs`.
 //!
 //! The names and shapes are those of the published `urdf-rs` 0.9, as far as `franka-rs` uses them, so that one reader serves
-//! the whole tree; `line` and `mimicked` are our own. Meaning and defaults follow `urdfdom` (<http://wiki.ros.org/urdf/XML>),
+//! the whole tree; `line`, `mimicked`, `collisions`, `friction` and `damping` are our own. Meaning and defaults follow `urdfdom` (<http://wiki.ros.org/urdf/XML>),
 //! versions 1.0 to 1.2 of the format: lengths in m, angles in rad, masses in kg, inertias in kg m² about the inertial frame's
-//! axes. Of an element that stands where one is expected twice the first counts, as there. Shapes, materials, transmissions and
+//! axes. Of an element that stands where one is expected twice the first counts, as there. Materials, transmissions and
 //! everything else are passed over.
 //!
 //! | file | what it owns |
@@ -35,8 +36,44 @@ pub struct Link {
     pub name: String,
     /// Its mass properties; all zero where the file gives none.
     pub inertial: Inertial,
+    /// What it touches with.
+    pub collisions: Vec<Collision>,
     /// Where it stands in the file, from 1.
     pub line: usize,
+}
+
+/// A shape with which a link touches.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Collision {
+    /// The shape's frame in the link's.
+    pub origin: Pose,
+    /// The shape; `None` for one that the format does not know, or whose numbers are none.
+    pub shape: Option<Shape>,
+    /// Where it stands in the file, from 1.
+    pub line: usize,
+}
+
+/// A shape around the origin of its frame [m].
+#[derive(Debug, Clone, PartialEq)]
+pub enum Shape {
+    /// Edge lengths.
+    Box([f64; 3]),
+    /// Along z.
+    Cylinder {
+        /// Its radius.
+        radius: f64,
+        /// Its length.
+        length: f64,
+    },
+    /// Of this radius.
+    Sphere(f64),
+    /// A file.
+    Mesh {
+        /// As it is named.
+        file: String,
+        /// Along its axes.
+        scale: [f64; 3],
+    },
 }
 
 /// Mass properties of a link.
@@ -95,6 +132,10 @@ pub struct Joint {
     pub parent: LinkName,
     /// The link that it carries.
     pub child: LinkName,
+    /// Dry friction [N m or N]; 0 where the file gives none.
+    pub friction: f64,
+    /// Viscous friction [N m s/rad or N s/m]; 0 where the file gives none.
+    pub damping: f64,
     /// Its axis.
     pub axis: Axis,
     /// Its limits.

@@ -28,6 +28,11 @@ impl<'a> Tag<'a> {
         Ok(Self { name, attributes })
     }
 
+    /// Of its element.
+    pub(crate) fn name(&self) -> &str {
+        self.name
+    }
+
     pub(crate) fn find(&self, key: &str) -> Option<&str> {
         self.attributes.iter().find(|(k, _)| *k == key).map(|(_, value)| value.as_str())
     }

@@ -204,3 +204,25 @@ proptest! {
         }
     }
 }
+
+#[test]
+fn what_a_link_touches_with_and_how_a_joint_rubs_are_read() {
+    let robot = read(
+        "<robot name='a'><link name='b'>\
+         <visual><geometry><sphere radius='9'/></geometry></visual>\
+         <collision><origin xyz='0 0 1'/><geometry><box size='1 2 3'/></geometry></collision>\
+         <collision><geometry><cylinder radius='0.1' length='0.4'/></geometry></collision>\
+         <collision><geometry><mesh filename='m.stl'/></geometry></collision>\
+         <collision><geometry><capsule radius='1'/></geometry></collision></link><link name='c'/>\
+         <joint name='j' type='revolute'><parent link='b'/><child link='c'/><limit lower='0' upper='1' velocity='1'/>\
+         <dynamics damping='0.2' friction='0.7'/></joint></robot>",
+    )
+    .expect("a robot");
+    let shapes: Vec<Option<Shape>> = robot.links[0].collisions.iter().map(|c| c.shape.clone()).collect();
+    let mesh = Shape::Mesh { file: "m.stl".into(), scale: [1.0; 3] };
+    let cylinder = Shape::Cylinder { radius: 0.1, length: 0.4 };
+    assert_eq!(shapes, [Some(Shape::Box([1.0, 2.0, 3.0])), Some(cylinder), Some(mesh), None]);
+    assert_eq!(robot.links[0].collisions[0].origin.xyz.0, [0.0, 0.0, 1.0]);
+    assert_eq!((robot.joints[0].friction, robot.joints[0].damping), (0.7, 0.2));
+    assert!(robot.links[1].collisions.is_empty());
+}

@@ -2,7 +2,10 @@
 //! There is no tree of elements: a tag is read when it opens, and only the names of the open ones are kept.
 
 use crate::tag::{Tag, one_line, quoted};
-use crate::{Axis, Inertia, Inertial, Joint, JointLimit, JointType, Link, LinkName, Mass, Pose, Robot, UrdfError};
+use crate::{
+    Axis, Collision, Inertia, Inertial, Joint, JointLimit, JointType, Link, LinkName, Mass, Pose, Robot, Shape,
+    UrdfError,
+};
 use quick_xml::Reader;
 use quick_xml::events::{BytesStart, Event};
 use std::collections::HashSet;
@@ -59,7 +62,9 @@ fn newlines(text: &str, from: u64, to: u64) -> usize {
 /// An element that is open, with what was read of it.
 enum Open {
     Robot,
-    Link { name: String, line: usize, inertial: Option<Inertial> },
+    Link { name: String, line: usize, inertial: Option<Inertial>, collisions: Vec<Collision> },
+    Collision(Collision),
+    Geometry { shape: Option<Shape> },
     Inertial { origin: Option<Pose>, mass: Option<Mass>, inertia: Option<Inertia> },
     Joint(Box<Parts>),
     Other,
@@ -76,6 +81,8 @@ struct Parts {
     axis: Option<Axis>,
     limit: Option<JointLimit>,
     mimicked: Option<String>,
+    /// Dry and viscous friction.
+    dynamics: Option<[f64; 2]>,
 }
 
 #[derive(Default)]
@@ -113,11 +120,25 @@ impl Tree {
             (Some(Open::Robot), "joint") if joints == MOST => return Err(format!("more than {MOST} joints")),
             (Some(Open::Robot), "link") => {
                 let name = self.unused(0, Tag::new(start, name)?.label("name")?, "link")?;
-                Open::Link { name, line: self.line, inertial: None }
+                Open::Link { name, line: self.line, inertial: None, collisions: Vec::new() }
             }
             (Some(Open::Robot), "joint") => self.joint(&Tag::new(start, name)?)?,
             (Some(Open::Link { inertial: None, .. }), "inertial") => {
                 Open::Inertial { origin: None, mass: None, inertia: None }
+            }
+            (Some(Open::Link { .. }), "collision") => {
+                Open::Collision(Collision { line: self.line, ..Collision::default() })
+            }
+            (Some(Open::Collision(collision)), "origin") => {
+                // An arm's shapes are nobody's business here: one that cannot be read is one that is not known.
+                let origin = Tag::new(start, name).ok().and_then(|tag| tag.pose(quaternions).ok());
+                collision.origin = origin.unwrap_or_default();
+                Open::Other
+            }
+            (Some(Open::Collision(_)), "geometry") => Open::Geometry { shape: None },
+            (Some(Open::Geometry { shape }), _) => {
+                *shape = shape.take().or(Tag::new(start, name).ok().and_then(|tag| self::shape(&tag)));
+                Open::Other
             }
             (Some(Open::Inertial { origin, mass, inertia }), "origin" | "mass" | "inertia") => {
                 let tag = Tag::new(start, name)?;
@@ -128,7 +149,7 @@ impl Tree {
                 }
                 Open::Other
             }
-            (Some(Open::Joint(parts)), "origin" | "parent" | "child" | "axis" | "limit" | "mimic") => {
+            (Some(Open::Joint(parts)), "origin" | "parent" | "child" | "axis" | "limit" | "mimic" | "dynamics") => {
                 parts
                     .fill(name, &Tag::new(start, name)?, self.version)
                     .map_err(|what| format!("joint `{}`: {what}", parts.name))?;
@@ -168,8 +189,18 @@ impl Tree {
                 ));
             }
         };
-        let (origin, parent, child, axis, limit, mimicked, line) = (None, None, None, None, None, None, self.line);
-        Ok(Open::Joint(Box::new(Parts { name, line, joint_type, origin, parent, child, axis, limit, mimicked })))
+        Ok(Open::Joint(Box::new(Parts {
+            name,
+            line: self.line,
+            joint_type,
+            origin: None,
+            parent: None,
+            child: None,
+            axis: None,
+            limit: None,
+            mimicked: None,
+            dynamics: None,
+        })))
     }
 
     /// The name, unless a link (0) or a joint (1) has it already.
@@ -179,8 +210,18 @@ impl Tree {
 
     fn close(&mut self) -> Result<(), String> {
         match self.open.pop() {
-            Some(Open::Link { name, line, inertial }) => {
-                self.robot.links.push(Link { name, inertial: inertial.unwrap_or_default(), line });
+            Some(Open::Link { name, line, inertial, collisions }) => {
+                self.robot.links.push(Link { name, inertial: inertial.unwrap_or_default(), collisions, line });
+            }
+            Some(Open::Geometry { shape }) => {
+                if let Some(Open::Collision(collision)) = self.open.last_mut() {
+                    collision.shape = collision.shape.take().or(shape);
+                }
+            }
+            Some(Open::Collision(collision)) => {
+                if let Some(Open::Link { collisions, .. }) = self.open.last_mut() {
+                    collisions.push(collision);
+                }
             }
             Some(Open::Inertial { origin, mass, inertia }) => {
                 let Some(Open::Link { name, inertial, .. }) = self.open.last_mut() else { return Ok(()) };
@@ -222,6 +263,10 @@ impl Parts {
             "child" => first(&mut self.child, || Ok(LinkName { link: tag.label("link")? })),
             "axis" => first(&mut self.axis, || Ok(Axis { xyz: tag.needed_vector("xyz")? })),
             "mimic" => first(&mut self.mimicked, || tag.label("joint")),
+            "dynamics" => first(&mut self.dynamics, || {
+                let of = |key: &str| Ok::<f64, String>(tag.number(key)?.unwrap_or_default());
+                Ok([of("friction")?, of("damping")?])
+            }),
             _ => first(&mut self.limit, || limits(tag, version)),
         }
     }
@@ -230,6 +275,7 @@ impl Parts {
         let lacks = |what: &str| format!("joint `{}` has no <{what}>", self.name);
         let parent = self.parent.ok_or_else(|| lacks("parent"))?;
         let child = self.child.ok_or_else(|| lacks("child"))?;
+        let [friction, damping] = self.dynamics.unwrap_or_default();
         Ok(Joint {
             joint_type: self.joint_type,
             origin: self.origin.unwrap_or_default(),
@@ -239,6 +285,8 @@ impl Parts {
             child,
             name: self.name,
             mimicked: self.mimicked,
+            friction,
+            damping,
             line: self.line,
         })
     }
@@ -250,6 +298,22 @@ fn first<T>(slot: &mut Option<T>, read: impl FnOnce() -> Result<T, String>) -> R
         *slot = Some(read()?);
     }
     Ok(())
+}
+
+/// A shape, where the tag is one.
+fn shape(tag: &Tag<'_>) -> Option<Shape> {
+    let number = |key: &str| tag.needed_number(key).ok();
+    match tag.name() {
+        "box" => Some(Shape::Box(tag.needed_vector("size").ok()?.0)),
+        "cylinder" => Some(Shape::Cylinder { radius: number("radius")?, length: number("length")? }),
+        "sphere" => Some(Shape::Sphere(number("radius")?)),
+        "mesh" => {
+            let file = tag.label("filename").ok()?;
+            let scale = if tag.find("scale").is_some() { tag.needed_vector("scale").ok()?.0 } else { [1.0; 3] };
+            Some(Shape::Mesh { file, scale })
+        }
+        _ => None,
+    }
 }
 
 fn moments(tag: &Tag<'_>) -> Result<Inertia, String> {

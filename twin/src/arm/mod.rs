@@ -8,7 +8,7 @@
 //! |---|---|
 //! | `model` | [`ArmModel`]: what an arm is, and how cell.toml, tool and payload make one |
 //! | `fr3` | numbers of the built-in Franka FR3 |
-//! | `urdf` | the way in from a URDF file, and every frame of one (the only code that asks `urdf-rs`) |
+//! | `urdf` | the way in from a URDF file, every frame of one, and its links as bodies (the only code that asks `urdf-rs`) |
 //! | `limits` | [`Limits`]: how far, fast and hard each joint may go |
 //! | `inertia` | mass properties of bodies |
 //! | `kinematics` | flange, Jacobian |
@@ -57,7 +57,7 @@ pub use nearest::Nearest;
 pub use parts::Part;
 pub use shared_mem::msg::{Joints, MAX_JOINTS};
 pub use transmission::{Passed, Spring, Transmission};
-pub use urdf::{LinkFrame, UrdfFrames};
+pub use urdf::{LinkFrame, UrdfBody, UrdfForm, UrdfFrames, UrdfJoint, UrdfShape};
 pub use yielding::{FlangeMotion, Yielding};
 
 /// Positions and velocities of all joints.

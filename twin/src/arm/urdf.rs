@@ -5,8 +5,10 @@
 //! there and they slide, as fingers do; nor are those that follow another one (`<mimic>`). They are held at 0, or at the end of
 //! their range that is nearest to it, and what they carry is folded into the link that they hang on.
 
+mod bodies;
 mod frames;
 
+pub use bodies::{UrdfBody, UrdfForm, UrdfJoint, UrdfShape};
 pub use frames::{LinkFrame, UrdfFrames};
 
 use super::inertia::MassProperties;
