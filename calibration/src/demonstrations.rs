@@ -145,7 +145,7 @@ enum Sink {
 /// Colour and depth of each camera, for each row.
 fn drawn(views: &mut [TaskView], rows: &[&EpisodeMoment]) -> Vec<Vec<Vec<u8>>> {
     let of = |view: &mut TaskView| {
-        let pictures = rows.iter().map(|row| view.draw(&row.poses));
+        let pictures = rows.iter().map(|row| view.draw(&row.poses, row.arm.as_ref().map(|arm| &arm.q)));
         let both = pictures.map(|picture| {
             (picture.colour, picture.depth.iter().flat_map(|depth| depth.to_le_bytes()).collect::<Vec<u8>>())
         });
@@ -208,7 +208,7 @@ impl<'a> Layout<'a> {
         for (place, (name, hold)) in bodies() {
             match hold {
                 Hold::Fixed(_) => {}
-                Hold::Moved(_) => layout.moved.push((place, name)),
+                Hold::Moved(_) | Hold::Arm(_) => layout.moved.push((place, name)),
                 Hold::Free(_) => layout.free.push((place, name)),
                 Hold::Joint(joint) => {
                     match (joint.follows, joint.drive) {

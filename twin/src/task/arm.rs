@@ -1,11 +1,15 @@
-//! The arm that carries a moved body: which joints its way takes, and what of it the arm cannot do. Kinematics alone: the body
-//! is where it is commanded to be, and so are the joints.
+//! The arm that carries a moved body: which joints its way takes, and what of it the arm cannot do. Without gains it is kinematics
+//! alone: the body is where it is commanded to be, and so are the joints. With gains the joints are commanded, and what touches
+//! the body moves them.
 
 use super::file::ArmEntry;
 use super::surface::pose;
-use crate::arm::{ArmModel, Joints, Limits, Nearest};
+use crate::arm::{ArmModel, JointState, Joints, Limits, Nearest};
+use crate::world::{ArmPlan, World};
 use nalgebra::{Isometry3, Translation3, Vector6};
 use shared_mem::msg::arm::{ArmMode, ArmState};
+use shared_mem::msg::joints_from;
+use std::sync::Arc;
 
 /// A Franka FR3, and what hangs on its flange.
 #[derive(Debug, Clone)]
@@ -16,6 +20,8 @@ pub(super) struct Carrier {
     pub(super) body: usize,
     flange_from_body: Isometry3<f64>,
     base_from_world: Isometry3<f64>,
+    /// Stiffness and damping of an arm that gives way.
+    gains: Option<[Joints; 2]>,
 }
 
 /// The arm on its way.
@@ -49,7 +55,31 @@ impl Carrier {
         let base = Translation3::from(entry.base).inverse();
         let (model, limits) = (ArmModel::fr3(), Limits::fr3());
         let flange_from_body = pose(entry.position, entry.rotation);
-        Self { model, limits, body, flange_from_body, base_from_world: Isometry3::from_parts(base, nalgebra::one()) }
+        let base_from_world = Isometry3::from_parts(base, nalgebra::one());
+        let gains = entry
+            .stiffness
+            .zip(entry.damping)
+            .map(|(stiffness, damping)| [stiffness, damping].map(|all| joints_from(&all)));
+        Self { model, limits, body, flange_from_body, base_from_world, gains }
+    }
+
+    /// How an arm that gives way carries its body, whose pose this is at the start; `None` for an arm that does not give way, and
+    /// where it cannot be.
+    pub(super) fn plan(&self, body: &Isometry3<f64>) -> Option<ArmPlan> {
+        let [stiffness, damping] = self.gains?;
+        Some(ArmPlan {
+            model: Arc::new(self.model.clone()),
+            base: self.world_from_base(),
+            flange_from_body: self.flange_from_body,
+            start: self.joints_at(body)?,
+            stiffness,
+            damping,
+        })
+    }
+
+    /// Where its base is in the world.
+    pub(super) fn world_from_base(&self) -> Isometry3<f64> {
+        self.base_from_world.inverse()
     }
 
     pub(super) fn limits(&self) -> &Limits {
@@ -114,16 +144,16 @@ impl Carrier {
     }
 
     /// As a robot reports itself; its stamps do not count. `None` before it has reached anything.
-    pub(super) fn state(&self, way: &Way) -> Option<ArmState> {
-        let q = way.q?;
-        let dq = way.dq;
+    pub(super) fn state(&self, way: &Way, world: &World) -> Option<ArmState> {
+        let (q_d, dq_d) = (way.q?, way.dq);
+        let JointState { q, dq } = world.arm(self.body).unwrap_or(JointState { q: q_d, dq: dq_d });
         Some(ArmState {
             dof: self.model.dof() as u32,
             mode: ArmMode::Move,
             q,
             dq,
-            q_d: q,
-            dq_d: dq,
+            q_d,
+            dq_d,
             O_T_EE: self.model.O_T_EE(&q),
             success_rate: 1.0,
             ..ArmState::default()

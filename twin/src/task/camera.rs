@@ -2,10 +2,12 @@
 
 use super::file::CameraEntry;
 use super::{BodyPlan, Task};
+use crate::arm::Joints;
 use crate::physics::Hull;
-use crate::render::{Mesh, Pinhole, Raster, looks};
+use crate::render::{Hand, Mesh, Pinhole, Raster, RobotSurface, looks};
 use crate::world::Hold;
 use nalgebra::{Isometry3, Matrix3, Point3, Quaternion, Rotation3, UnitQuaternion, Vector3};
+use shared_mem::cell::{Cell, Robot};
 use shared_mem::recording::RigidPose;
 
 /// What is held fast, and the colours of all other bodies in turn.
@@ -81,6 +83,8 @@ pub struct TaskView {
     raster: Raster,
     /// A piece, its body, and where it is in it.
     pieces: Vec<(Mesh, usize, Isometry3<f64>)>,
+    /// The arm, and where its base is in the world.
+    arm: Option<(RobotSurface, Isometry3<f64>)>,
 }
 
 impl Task {
@@ -90,7 +94,7 @@ impl Task {
         &self.cameras
     }
 
-    /// All bodies as a camera of the task sees them.
+    /// All bodies and the arm as a camera of the task sees them.
     #[must_use]
     pub fn view(&self, camera: &TaskCamera) -> TaskView {
         let [width, height] = camera.size;
@@ -105,18 +109,29 @@ impl Task {
             pieces.extend(body.pieces.iter().map(|piece| (mesh(&piece.hull, colour), i, piece.at)));
         }
         let raster = Raster::new(width as usize, height as usize, pinhole, light);
-        TaskView { camera_from_world, raster, pieces }
+        let arm = self.carrier.as_ref().and_then(|carrier| {
+            let surface = RobotSurface::new(&Cell { robot: Some(fr3()), ..Cell::default() }, Hand::None).ok()?;
+            Some((surface, carrier.world_from_base()))
+        });
+        TaskView { camera_from_world, raster, pieces, arm }
     }
 }
 
 impl TaskView {
-    /// Draws the bodies where they are, in the task's order.
-    pub fn draw(&mut self, poses: &[RigidPose]) -> TaskPicture {
+    /// Draws the bodies where they are, in the task's order, and the arm at its joints [rad], where both are there.
+    pub fn draw(&mut self, poses: &[RigidPose], joints: Option<&Joints>) -> TaskPicture {
         self.raster.clear(looks::BACKGROUND);
         for (mesh, body, in_body) in &self.pieces {
             if let Some(pose) = poses.get(*body) {
                 self.raster.draw(mesh, &(self.camera_from_world * isometry(pose) * in_body).cast());
             }
+        }
+        if let (Some((surface, world_from_base)), Some(q)) = (&self.arm, joints) {
+            let camera_from_base = self.camera_from_world * world_from_base;
+            let raster = &mut self.raster;
+            surface.for_each(q, |part, base_from_part| {
+                raster.draw(&surface.parts()[part], &(camera_from_base * base_from_part).cast());
+            });
         }
         let colour = self.raster.color().iter().flat_map(|packed| {
             let [red, green, blue, _] = packed.to_le_bytes();
@@ -128,6 +143,11 @@ impl TaskView {
         };
         TaskPicture { colour: colour.collect(), depth: self.raster.inverse_depth().iter().map(millimetres).collect() }
     }
+}
+
+/// The robot that carries a body of a task.
+fn fr3() -> Robot {
+    Robot { model: Some("fr3".into()), ..Robot::default() }
 }
 
 fn colour(place: usize, body: &BodyPlan) -> [u8; 3] {
@@ -186,7 +206,7 @@ field_of_view = 0.9
             .map(|position| RigidPose { position, wxyz: [1.0, 0.0, 0.0, 0.0] })
             .into();
         let camera = &task.cameras()[0];
-        let picture = task.view(camera).draw(&poses);
+        let picture = task.view(camera).draw(&poses, None);
         let at = |x: f64, y: f64, z: f64| {
             let seen = camera.world_from_camera.inverse() * Point3::new(x, y, z);
             let pixel =
@@ -201,5 +221,30 @@ field_of_view = 0.9
         assert!(at(0.1, 0.0, 0.0) < at(0.0, 0.0, 0.0) && at(0.0, -0.1, 0.0) > at(0.0, 0.0, 0.0));
         // Beyond the table there is nothing.
         assert_eq!((picture.depth[50 * 401], colour(50 * 401)), (0, &looks::BACKGROUND[..]));
+    }
+    #[test]
+    fn the_arm_is_seen_where_its_joints_have_it() {
+        let (head, camera) = TASK.split_once("[[camera]]").expect("a camera");
+        let moved = "[[body]]\nname = \"tool\"\nhold = \"moved\"\nfriction = 0.5\nposition = [-0.1, 0.2, 0.3]\n\
+            piece = [{ shape = \"box\", size = [0.02, 0.02, 0.02] }]\n\
+            [arm]\nbody = \"tool\"\nbase = [-0.5, 0.0, 0.0]\nrotation = [3.141592654, 0.0, 0.0]\n[[camera]]";
+        let text = format!("{head}{moved}{}", camera.replace("1.1]", "2.2]"));
+        let task = parse(&text, Path::new("task.toml")).expect("a task");
+        let place = |position| RigidPose { position, wxyz: [1.0, 0.0, 0.0, 0.0] };
+        let poses = [place([0.0; 3]), place([0.1, 0.0, 0.05]), place([5.0, 0.0, 0.0])];
+        let carrier = task.carrier.as_ref().expect("an arm");
+        let at = Isometry3::from_parts(Vector3::new(-0.1, 0.2, 0.3).into(), nalgebra::one());
+        let q = carrier.joints_at(&at).expect("within reach");
+        let mut view = task.view(&task.cameras()[0]);
+        let [without, with] = [None, Some(&q)].map(|q| view.draw(&poses, q).depth);
+        let nearer: Vec<u16> =
+            without.iter().zip(&with).filter(|(a, b)| **b > 0 && (**a == 0 || b < a)).map(|(_, b)| *b).collect();
+        // Seen from 2.2 m above: the arm's upper side lies between its elbow and its flange.
+        assert!(nearer.len() > 200, "{} pixels", nearer.len());
+        let highest = nearer.iter().min().expect("some");
+        assert!((1100..1800).contains(highest), "{highest} mm below the camera");
+        // Where there is no arm all is as it was.
+        let changed = without.iter().zip(&with).filter(|(a, b)| a != b).count();
+        assert_eq!(changed, nearer.len());
     }
 }

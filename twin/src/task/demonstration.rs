@@ -49,7 +49,7 @@ impl Columns {
             joints: self.joints.iter().filter_map(|body| world.joint(*body)).collect(),
             drives: self.driven.iter().filter_map(|body| world.driven_to(*body)).collect(),
             gripper: task.gripper.as_ref().and_then(|gripper| gripper.state(world, task.bodies.len())),
-            arm: task.carrier.as_ref().and_then(|carrier| carrier.state(way)).map(Box::new),
+            arm: task.carrier.as_ref().and_then(|carrier| carrier.state(way, world)).map(Box::new),
         }
     }
 

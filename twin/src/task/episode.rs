@@ -66,10 +66,22 @@ pub struct Episode {
     pub success: bool,
     /// What of the motion the arm cannot do, at first.
     pub arm_fault: Option<String>,
+    /// Joints of an arm that gives way, at the start and at the end.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub arm: Option<ArmEnd>,
     /// Every body.
     pub bodies: Vec<BodyEnd>,
     /// Bodies that press on each other at the end, by name.
     pub contacts: Vec<[String; 2]>,
+}
+
+/// The joints of an arm that gives way, the first seven [rad].
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ArmEnd {
+    /// At the start.
+    pub start_q: Vec<f64>,
+    /// At the end.
+    pub end_q: Vec<f64>,
 }
 
 /// A body at the start and at the end.
@@ -113,6 +125,11 @@ impl Task {
         let mut generator = Pcg64::new(u128::from(how.seed), NOISE_STREAM);
         let motions = self.motions.placed(&world, &yaws).off_by(how.noise, &mut generator);
         let starts: Vec<Place> = (0..self.bodies.len()).map(|body| Place::of(&world, body)).collect();
+        let joints = |world: &World| -> Option<Vec<f64>> {
+            let carrier = self.carrier.as_ref()?;
+            Some(world.arm(carrier.body)?.q[..carrier.joint_names().len()].to_vec())
+        };
+        let start_q = joints(&world);
         let steps = (how.duration / STEP).round().max(1.0) as usize;
         let mut run = Course::new();
         let mut way = Way::default();
@@ -141,6 +158,7 @@ impl Task {
             at_rest_since_s: at_rest.then_some(run.moved as f64 * STEP),
             success: run.is_success(self.hold) && way.fault.is_none(),
             arm_fault: way.fault,
+            arm: start_q.zip(joints(&world)).map(|(start_q, end_q)| ArmEnd { start_q, end_q }),
             bodies: bodies.collect(),
             contacts: self.contacts(&world),
         })

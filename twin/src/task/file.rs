@@ -1,11 +1,15 @@
 //! The keys of a task file, as they stand there. SI; angles in radians; positions in the world, z up.
 
 use serde::Deserialize;
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 use toml::Spanned;
 
 #[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields, expecting = "a task: horizon, [[body]], [[success]], [[motion]], [[camera]], [arm]")]
+#[serde(
+    deny_unknown_fields,
+    expecting = "a task: horizon, [[body]], [[articulated]], [[success]], [[motion]], [[camera]], [arm]"
+)]
 pub(super) struct TaskFile {
     pub(super) instruction: Option<String>,
     pub(super) horizon: f64,
@@ -13,6 +17,8 @@ pub(super) struct TaskFile {
     pub(super) hold: f64,
     #[serde(default)]
     pub(super) body: Vec<Spanned<BodyEntry>>,
+    #[serde(default)]
+    pub(super) articulated: Vec<Spanned<ArticulatedEntry>>,
     #[serde(default)]
     pub(super) success: Vec<Spanned<SuccessEntry>>,
     #[serde(default)]
@@ -55,7 +61,27 @@ pub(super) enum HoldEntry {
     Moved,
 }
 
+/// An object out of a URDF.
 #[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields, expecting = "an [[articulated]] block")]
+pub(super) struct ArticulatedEntry {
+    pub(super) name: String,
+    pub(super) urdf: PathBuf,
+    /// Of its root.
+    #[serde(default)]
+    pub(super) hold: HoldEntry,
+    pub(super) friction: f64,
+    #[serde(default)]
+    pub(super) position: [f64; 3],
+    #[serde(default)]
+    pub(super) rotation: [f64; 3],
+    pub(super) start: Option<StartEntry>,
+    /// Where joints start, by name.
+    #[serde(default)]
+    pub(super) joints: BTreeMap<String, f64>,
+}
+
+#[derive(Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields, expecting = "a piece: { shape = \"box\", size = [x, y, z] }")]
 pub(super) struct PieceEntry {
     pub(super) shape: Option<ShapeEntry>,
@@ -180,6 +206,9 @@ pub(super) struct ArmEntry {
     pub(super) position: [f64; 3],
     #[serde(default)]
     pub(super) rotation: [f64; 3],
+    /// Of the controller of an arm that gives way.
+    pub(super) stiffness: Option<[f64; 7]>,
+    pub(super) damping: Option<[f64; 7]>,
 }
 
 fn columns() -> u32 {

@@ -5,6 +5,7 @@
 //! |---|---|
 //! | `file` | the keys of a task file |
 //! | `read` | bodies, conditions and motions out of it, and what is wrong with it |
+//! | `articulated` | bodies on joints out of URDF files |
 //! | `surface` | the convex pieces of a body |
 //! | `start` | where bodies start: drawn by a seed until none overlap |
 //! | `arm` | the arm that carries a moved body: joints, and what it cannot do |
@@ -17,6 +18,7 @@
 //! | `steered` | a run that a person steers |
 
 mod arm;
+mod articulated;
 mod camera;
 mod condition;
 mod demonstration;
@@ -31,7 +33,7 @@ mod surface;
 
 pub use camera::{TaskCamera, TaskPicture, TaskView};
 pub use demonstration::ROWS_A_SECOND;
-pub use episode::{BodyEnd, Episode, Place, Run};
+pub use episode::{ArmEnd, BodyEnd, Episode, Place, Run};
 pub use start::StartError;
 pub use steered::{Jog, SteerError, Steered};
 

@@ -5,7 +5,8 @@ use super::arm::Carrier;
 use super::camera::TaskCamera;
 use super::condition::Condition;
 use super::file::{
-    ArmEntry, BodyEntry, CameraEntry, HoldEntry, JointEntry, KindEntry, MotionEntry, SuccessEntry, TaskFile,
+    ArmEntry, ArticulatedEntry, BodyEntry, CameraEntry, HoldEntry, JointEntry, KindEntry, MotionEntry, StartEntry,
+    SuccessEntry, TaskFile,
 };
 use super::gripper::Gripper;
 use super::motion::{Motions, Order, Waypoint};
@@ -42,21 +43,15 @@ pub(super) fn parse(text: &str, path: &Path) -> Result<Task, TomlFileError> {
             return Err(source.error(0, (key, format!("it is {value}; give seconds from 0.001 to 3600"))));
         }
     }
-    if file.body.is_empty() || file.body.len() > MOST_BODIES {
-        let count = file.body.len();
-        return Err(source.error(0, ("body", format!("there are {count} [[body]] blocks; give 1 to {MOST_BODIES}"))));
-    }
-    let folder = path.parent().unwrap_or(Path::new(""));
-    let names: Vec<&str> = file.body.iter().map(|entry| entry.as_ref().name.as_str()).collect();
-    let (mut bodies, mut starts) = (Vec::new(), Vec::new());
-    for (i, entry) in file.body.iter().enumerate() {
-        let at = entry.span().start;
-        let plan = body(entry.as_ref(), &names[..i], folder).map_err(|fault| source.error(at, fault))?;
-        starts.extend(start_range(entry.as_ref(), i, &plan).map_err(|fault| source.error(at, fault))?);
-        bodies.push(plan);
-    }
-    let world = World::new(&bodies).map_err(|PlanError { body, key, what }| {
-        let at = names.iter().position(|name| *name == body).map_or(0, |i| file.body[i].span().start);
+    let Bodies { plans: bodies, places, starts } = Bodies::of(&file, &source)?;
+    let names: Vec<&str> = bodies.iter().map(|body| body.name.as_str()).collect();
+    let carrier = file.arm.as_ref().map(|entry| {
+        let found = carrier(entry.as_ref(), &names, &bodies, &starts);
+        found.map_err(|fault| source.error(entry.span().start, fault))
+    });
+    let carrier = carrier.transpose()?;
+    let world = World::new(&held(&bodies, carrier.as_ref())).map_err(|PlanError { body, key, what }| {
+        let at = names.iter().position(|name| *name == body).map_or(0, |i| places[i]);
         source.error(at, (key, what))
     })?;
     let mut conditions = Vec::new();
@@ -77,16 +72,12 @@ pub(super) fn parse(text: &str, path: &Path) -> Result<Task, TomlFileError> {
         let camera = camera(entry.as_ref(), &cameras);
         cameras.push(camera.map_err(|fault| source.error(entry.span().start, fault))?);
     }
-    let carrier = file
-        .arm
-        .as_ref()
-        .map(|entry| carrier(entry.as_ref(), &names, &bodies).map_err(|fault| source.error(entry.span().start, fault)));
-    let carrier = carrier.transpose()?;
     motions.waypoints.sort_by(|a, b| a.time.total_cmp(&b.time));
     let name = path.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
     let instruction = file.instruction.unwrap_or_else(|| name.replace('_', " "));
     let (gripper, hold, horizon) = (Gripper::of(&bodies), file.hold, file.horizon);
     let text = text.to_owned();
+    let names: Vec<String> = names.into_iter().map(str::to_owned).collect();
     let task = Task {
         name,
         instruction,
@@ -104,12 +95,68 @@ pub(super) fn parse(text: &str, path: &Path) -> Result<Task, TomlFileError> {
     };
     task.placed(0).map_err(|error| match &error {
         StartError::Crowded { second, .. } => {
-            let at = names.iter().position(|name| name == second).map_or(0, |i| file.body[i].span().start);
+            let at = names.iter().position(|name| name == second).map_or(0, |i| places[i]);
             source.error(at, ("position", error.to_string()))
         }
         StartError::AlreadyDone => source.error(file.success[0].span().start, ("success", error.to_string())),
     })?;
     Ok(task)
+}
+
+/// The bodies of a task, and where in the file each of them stands.
+struct Bodies {
+    plans: Vec<BodyPlan>,
+    places: Vec<usize>,
+    starts: Vec<StartRange>,
+}
+
+impl Bodies {
+    fn of(file: &TaskFile, source: &Source<'_>) -> Result<Self, TomlFileError> {
+        let folder = source.path.parent().unwrap_or(Path::new(""));
+        let mut all = Self { plans: Vec::new(), places: Vec::new(), starts: Vec::new() };
+        for entry in &file.body {
+            let at = entry.span().start;
+            let names: Vec<&str> = all.plans.iter().map(|body| body.name.as_str()).collect();
+            let plan = body(entry.as_ref(), &names, folder).map_err(|fault| source.error(at, fault))?;
+            all.add(vec![plan], (at, entry.as_ref().start), source)?;
+        }
+        for entry in &file.articulated {
+            let at = entry.span().start;
+            let ArticulatedEntry { position, rotation, friction, .. } = entry.as_ref();
+            let numbers = finite("position", position).and(finite("rotation", rotation));
+            let plans = numbers
+                .and(not_negative("friction", *friction))
+                .and_then(|()| entry.as_ref().bodies(all.plans.len(), folder))
+                .map_err(|fault| source.error(at, fault))?;
+            all.add(plans, (at, entry.as_ref().start), source)?;
+        }
+        match all.plans.len() {
+            1..=MOST_BODIES => Ok(all),
+            count => Err(source.error(0, ("body", format!("there are {count} bodies; give 1 to {MOST_BODIES}")))),
+        }
+    }
+
+    /// Bodies of one block, of which the first may start elsewhere.
+    fn add(
+        &mut self,
+        plans: Vec<BodyPlan>,
+        (at, start): (usize, Option<StartEntry>),
+        source: &Source<'_>,
+    ) -> Result<(), TomlFileError> {
+        if let (Some(start), Some(plan)) = (start, plans.first()) {
+            let range = start_range(start, self.plans.len(), plan).map_err(|fault| source.error(at, fault))?;
+            self.starts.push(range);
+        }
+        for plan in plans {
+            if self.plans.iter().any(|other| other.name == plan.name) {
+                let what = format!("two bodies are called `{}`; give each a name of its own", plan.name);
+                return Err(source.error(at, ("name", what)));
+            }
+            self.places.push(at);
+            self.plans.push(plan);
+        }
+        Ok(())
+    }
 }
 
 impl Source<'_> {
@@ -147,9 +194,6 @@ fn not_negative(key: &'static str, value: f64) -> Result<(), Fault> {
 }
 
 fn body(entry: &BodyEntry, names: &[&str], folder: &Path) -> Result<BodyPlan, Fault> {
-    if names.contains(&entry.name.as_str()) {
-        return Err(("name", format!("two bodies are called `{}`; give each a name of its own", entry.name)));
-    }
     finite("position", &entry.position)?;
     finite("rotation", &entry.rotation)?;
     not_negative("friction", entry.friction)?;
@@ -175,7 +219,7 @@ fn body(entry: &BodyEntry, names: &[&str], folder: &Path) -> Result<BodyPlan, Fa
         Some(mass) if mass > 0.0 && mass <= 1e4 => mass,
         Some(mass) => return Err(("mass", format!("it is {mass}; give kilograms above 0 and up to 10000"))),
         None if movable => return Err(("mass", format!("`{}` moves by itself and needs a mass [kg]", entry.name))),
-        None => 1.0,
+        None => 0.0,
     };
     let plan = BodyPlan::homogeneous(&entry.name, pieces, mass, hold).with_friction(entry.friction);
     let centre_of_mass = entry.centre_of_mass.map_or(plan.centre_of_mass, Vector3::from);
@@ -224,8 +268,7 @@ fn joint_plan(joint: &JointEntry, at: nalgebra::Isometry3<f64>, names: &[&str]) 
     })
 }
 
-fn start_range(entry: &BodyEntry, body: usize, plan: &BodyPlan) -> Result<Option<StartRange>, Fault> {
-    let Some(start) = entry.start else { return Ok(None) };
+fn start_range(start: StartEntry, body: usize, plan: &BodyPlan) -> Result<StartRange, Fault> {
     let (Hold::Free(nominal) | Hold::Fixed(nominal) | Hold::Moved(nominal)) = plan.hold else {
         return Err(("start", "a body on a joint starts where its joint does; give `start` to what carries it".into()));
     };
@@ -235,7 +278,7 @@ fn start_range(entry: &BodyEntry, body: usize, plan: &BodyPlan) -> Result<Option
             return Err(("start", format!("{range:?} is no range; give [low, high]")));
         }
     }
-    Ok(Some(StartRange { body, nominal, x: start.x, y: start.y, yaw: start.yaw }))
+    Ok(StartRange { body, nominal, x: start.x, y: start.y, yaw: start.yaw })
 }
 
 fn condition(entry: &SuccessEntry, names: &[&str], bodies: &[BodyPlan]) -> Result<Condition, Fault> {
@@ -322,13 +365,46 @@ fn camera(entry: &CameraEntry, cameras: &[TaskCamera]) -> Result<TaskCamera, Fau
     TaskCamera::of(entry)
 }
 
-fn carrier(entry: &ArmEntry, names: &[&str], bodies: &[BodyPlan]) -> Result<Carrier, Fault> {
-    let body = named(&entry.body, names, "body")?;
-    if !matches!(bodies[body].hold, Hold::Moved(_)) {
-        return Err(("body", format!("`{}` is not moved; name a body with `hold = \"moved\"`", entry.body)));
+/// The bodies as the world has them: what an arm that gives way carries is held by the arm.
+fn held(bodies: &[BodyPlan], carrier: Option<&Carrier>) -> Vec<BodyPlan> {
+    let mut bodies = bodies.to_vec();
+    if let Some(carrier) = carrier {
+        let body = &mut bodies[carrier.body];
+        if let Hold::Moved(pose) = &body.hold
+            && let Some(plan) = carrier.plan(pose)
+        {
+            body.hold = Hold::Arm(Box::new(plan));
+        }
     }
+    bodies
+}
+
+fn carrier(entry: &ArmEntry, names: &[&str], bodies: &[BodyPlan], starts: &[StartRange]) -> Result<Carrier, Fault> {
+    let body = named(&entry.body, names, "body")?;
+    let Hold::Moved(pose) = &bodies[body].hold else {
+        return Err(("body", format!("`{}` is not moved; name a body with `hold = \"moved\"`", entry.body)));
+    };
     for (key, values) in [("base", &entry.base), ("position", &entry.position), ("rotation", &entry.rotation)] {
         finite(key, values)?;
     }
-    Ok(Carrier::new(entry, body))
+    for (key, gains) in [("stiffness", &entry.stiffness), ("damping", &entry.damping)] {
+        if let Some(bad) = gains.iter().flatten().find(|gain| !(0.0..=1e5).contains(*gain)) {
+            return Err((key, format!("it holds {bad}; give seven numbers from 0 to 100000 (SI units)")));
+        }
+    }
+    match (&entry.stiffness, &entry.damping) {
+        (Some(_), None) => return Err(("stiffness", "it needs `damping` beside it, seven numbers [N m s/rad]".into())),
+        (None, Some(_)) => return Err(("damping", "it needs `stiffness` beside it, seven numbers [N m/rad]".into())),
+        _ => {}
+    }
+    let carrier = Carrier::new(entry, body);
+    if entry.stiffness.is_some() && starts.iter().any(|start| start.body == body) {
+        let what = format!("an arm with gains starts where it is; take `start` out of the block of `{}`", entry.body);
+        return Err(("stiffness", what));
+    }
+    if entry.stiffness.is_some() && carrier.plan(pose).is_none() {
+        let what = format!("the arm does not reach the start of `{}`; move the body, or `base`", entry.body);
+        return Err(("body", what));
+    }
+    Ok(carrier)
 }

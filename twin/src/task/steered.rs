@@ -137,7 +137,10 @@ impl Steered {
             None => self.held_by = Some("no way to where it is jogged"),
         }
         if let Some(q) = self.way.joints() {
-            self.world.move_to(carrier.body, &carrier.body_at(q));
+            match self.world.arm(carrier.body) {
+                Some(_) => self.world.aim(carrier.body, q, &self.follower.velocity()),
+                None => self.world.move_to(carrier.body, &carrier.body_at(q)),
+            }
         }
         self.world.step();
         self.course.count(&task, &self.world);
@@ -230,7 +233,9 @@ impl Steered {
     /// Joint positions of the arm [rad].
     #[must_use]
     pub fn joints(&self) -> Joints {
-        self.way.joints().copied().unwrap_or_default()
+        let given_way =
+            self.task.carrier.as_ref().and_then(|carrier| self.world.arm(carrier.body)).map(|state| state.q);
+        given_way.or(self.way.joints().copied()).unwrap_or_default()
     }
 
     /// Origin of the flange in the arm's base [m].

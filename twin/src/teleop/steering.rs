@@ -247,7 +247,7 @@ impl Steering {
 
     fn picture(&mut self) -> Vec<u8> {
         let poses = self.episode.poses();
-        let picture = self.view.draw(&poses);
+        let picture = self.view.draw(&poses, Some(&self.episode.joints()));
         let [width, height] = self.size;
         let png = pack_quickly(width, height, &picture.colour).unwrap_or_default();
         let (width, grasped) = self.episode.gripper().map_or((None, false), |(width, held)| (Some(width), held));

@@ -12,6 +12,12 @@ impl Trees {
             match &self.nodes[i].link {
                 // Those of its origin, where [`Trees::set_moved`] has put them.
                 Link::Held => {}
+                Link::Arm(arm) => {
+                    let motion = &mut self.motions[i];
+                    let found = self.arms[*arm].carried(&motion.centre, &self.velocities);
+                    (motion.velocity, motion.spin) = (found.velocity, found.spin);
+                    (motion.acceleration, motion.turning) = (found.acceleration, found.turning);
+                }
                 Link::Free { first } => {
                     let v = &self.velocities[*first..first + 6];
                     let motion = &mut self.motions[i];
@@ -85,9 +91,15 @@ impl Trees {
             }
             let mut masses: Dense = [[0.0; MOST_FREEDOMS]; MOST_FREEDOMS];
             let mut forces = [0.0; MOST_FREEDOMS];
+            let arm = match self.nodes[root].link {
+                Link::Arm(arm) => Some(&self.arms[arm]),
+                _ => None,
+            };
+            // The freedoms whose controller takes the weight off.
+            let weightless = arm.map_or(0..0, |arm| arm.first - first..arm.first - first + arm.dof());
             for body in (0..self.nodes.len()).filter(|i| self.nodes[*i].tree == tree) {
                 let (node, motion) = (&self.nodes[body], self.motions[body]);
-                let push = (gravity - motion.acceleration) * node.mass;
+                let (push, weight) = (-motion.acceleration * node.mass, gravity * node.mass);
                 let turn = -(motion.inertia * motion.turning + motion.spin.cross(&(motion.inertia * motion.spin)));
                 let mut chain = [(0, Screw { velocity: Vector3::zeros(), spin: Vector3::zeros() }); MOST_FREEDOMS];
                 let mut length = 0;
@@ -96,12 +108,16 @@ impl Trees {
                     length += 1;
                 });
                 for (i, screw) in &chain[..length] {
-                    forces[*i] += screw.velocity.dot(&push) + screw.spin.dot(&turn);
+                    let weight = if weightless.contains(i) { 0.0 } else { screw.velocity.dot(&weight) };
+                    forces[*i] += screw.velocity.dot(&push) + screw.spin.dot(&turn) + weight;
                     let (momentum, spin) = (screw.velocity * node.mass, motion.inertia * screw.spin);
                     for (j, other) in &chain[..length] {
                         masses[*i][*j] += other.velocity.dot(&momentum) + other.spin.dot(&spin);
                     }
                 }
+            }
+            if let Some(arm) = arm {
+                arm.act(first, [&self.positions, &self.velocities], &mut masses, &mut forces, dt);
             }
             for i in 0..count {
                 // Damping by the mean of the velocities before and after.

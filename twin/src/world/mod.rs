@@ -11,6 +11,7 @@
 //! | `plan` | what a world is made of, and what cannot be |
 //! | `tree` | bodies on their joints: where they are, how freedoms move them |
 //! | `dynamics` | what gravity and velocities do, mass matrices |
+//! | `arm` | an arm that carries a body and gives way to what touches it |
 //! | `touch` | where two convex pieces touch |
 //! | `patch` | the impulses of one patch: load, friction, torsion |
 //! | `rail` | the impulses of one joint: dry friction, limits, drive |
@@ -18,6 +19,7 @@
 //! World frame with z up, SI. There is no restitution: what hits stays. Not rapier: its friction turns a spinning box
 //! 32 % too far, and its joints report no forces. The step asks nothing of the allocator.
 
+mod arm;
 mod dynamics;
 mod patch;
 mod plan;
@@ -27,9 +29,10 @@ mod tests;
 mod touch;
 mod tree;
 
+pub use arm::ArmPlan;
 pub use plan::{BodyPlan, Drive, Hold, JointKind, JointPlan, Piece, PlanError, box_hull, cylinder_hull};
 
-use crate::arm::FREE_FALL;
+use crate::arm::{FREE_FALL, JointState, Joints};
 use crate::physics::Hull;
 use nalgebra::{Isometry3, Point3, Vector3};
 use patch::{Memory, Patch};
@@ -163,12 +166,32 @@ impl World {
         trees.halt(STEP);
     }
 
-    /// Lets a body that is [`Hold::Moved`] go to a pose within the next step.
+    /// Lets a body that is [`Hold::Moved`] go to a pose within the next step; an arm that carries it is told to bring it there,
+    /// and stays where it was told to be before where it cannot.
     pub fn move_to(&mut self, body: usize, pose: &Isometry3<f64>) {
+        if let Some(arm) = self.trees.arm_mut(body) {
+            arm.aim_at(pose, STEP);
+            return;
+        }
         let from = self.trees.pose(body);
         let velocity = (pose.translation.vector - from.translation.vector) / STEP;
         let spin = (pose.rotation * from.rotation.inverse()).scaled_axis() / STEP;
         self.trees.set_moved(body, velocity, spin, STEP);
+    }
+
+    /// Tells the arm that carries a body where its joints are to be [rad], and how fast [rad/s], for the next step; nothing happens
+    /// to a body that no arm carries.
+    pub fn aim(&mut self, body: usize, q_d: &Joints, dq_d: &Joints) {
+        if let Some(arm) = self.trees.arm_mut(body) {
+            arm.aim(*q_d, *dq_d);
+        }
+    }
+
+    /// Where the joints of the arm that carries a body are [rad], and how fast [rad/s]; `None` where no arm does.
+    #[must_use]
+    pub fn arm(&self, body: usize) -> Option<JointState> {
+        let arm = self.trees.arm(body)?;
+        Some(JointState { q: arm.joints(&self.trees.positions), dq: arm.joints(&self.trees.velocities) })
     }
 
     /// Puts a body that is on no joint somewhere, at rest.

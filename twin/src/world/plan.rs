@@ -1,5 +1,6 @@
 //! What a world is made of: bodies of convex pieces, and what holds each. Own axes of a body unless said otherwise, SI.
 
+use super::arm::ArmPlan;
 use crate::physics::Hull;
 use nalgebra::{Isometry3, Matrix3, Point3, Unit, Vector3};
 use std::sync::Arc;
@@ -23,7 +24,7 @@ pub struct BodyPlan {
     pub name: String,
     /// What it is made of; may be nothing for a link without a surface.
     pub pieces: Vec<Piece>,
-    /// Mass [kg]; of no matter where the body is held fast or moved.
+    /// Mass [kg]; of no matter where the body is held fast or moved. What an arm carries adds to the arm.
     pub mass: f64,
     /// Centre of mass [m].
     pub centre_of_mass: Vector3<f64>,
@@ -45,6 +46,9 @@ pub enum Hold {
     Fixed(Isometry3<f64>),
     /// It goes where [`super::World::move_to`] says, whatever is in its way.
     Moved(Isometry3<f64>),
+    /// An arm, which gives way to what touches it; it goes where [`super::World::move_to`] or [`super::World::aim`] tell its
+    /// controller.
+    Arm(Box<ArmPlan>),
     /// Nothing but contacts; where it starts.
     Free(Isometry3<f64>),
     /// A joint.

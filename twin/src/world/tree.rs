@@ -4,6 +4,7 @@
 //! joint it follows. All bodies that hang on one root make a tree with one dense mass matrix, so that joints hold exactly
 //! and cost the solver nothing.
 
+use super::arm::Arm;
 use super::patch::{MOST_COLUMNS, Patch, motion_in};
 use super::plan::{BodyPlan, Hold, JointKind};
 use nalgebra::{Isometry3, Matrix3, Point3, Translation3, Unit, UnitQuaternion, Vector3};
@@ -15,6 +16,8 @@ pub(super) const MOST_FREEDOMS: usize = MOST_COLUMNS / 2;
 #[derive(Debug, Clone)]
 pub(super) enum Link {
     Held,
+    /// By which of the arms.
+    Arm(usize),
     Free {
         first: usize,
     },
@@ -67,7 +70,7 @@ pub(super) struct Span {
 }
 
 /// How a freedom moves a point.
-#[derive(Clone, Copy)]
+#[derive(Debug, Clone, Copy)]
 pub(super) struct Screw {
     pub(super) velocity: Vector3<f64>,
     pub(super) spin: Vector3<f64>,
@@ -86,6 +89,7 @@ pub(super) struct Trees {
     pub(super) positions: Vec<f64>,
     pub(super) velocities: Vec<f64>,
     pub(super) damping: Vec<f64>,
+    pub(super) arms: Vec<Arm>,
 }
 
 impl Trees {
@@ -99,6 +103,7 @@ impl Trees {
             positions: Vec::new(),
             velocities: Vec::new(),
             damping: Vec::new(),
+            arms: Vec::new(),
         };
         // A tree's freedoms lie side by side: numbered root by root.
         let mut root_of = Vec::new();
@@ -125,7 +130,7 @@ impl Trees {
         for ((body, link), tree) in bodies.iter().zip(links).zip(tree_of) {
             let pose = match &body.hold {
                 Hold::Fixed(pose) | Hold::Moved(pose) | Hold::Free(pose) => *pose,
-                Hold::Joint(_) => Isometry3::identity(),
+                Hold::Arm(_) | Hold::Joint(_) => Isometry3::identity(),
             };
             let Some(link) = link else { continue };
             let centre = Point3::from(body.centre_of_mass);
@@ -146,6 +151,12 @@ impl Trees {
         };
         match hold {
             Hold::Fixed(_) | Hold::Moved(_) => Link::Held,
+            Hold::Arm(plan) => {
+                // Its controller's damping is its own.
+                (0..plan.model.dof()).for_each(|i| add(plan.start[i], 0.0));
+                self.arms.push(Arm::new((**plan).clone(), first));
+                Link::Arm(self.arms.len() - 1)
+            }
             Hold::Free(_) => {
                 (0..6).for_each(|_| add(0.0, 0.0));
                 Link::Free { first }
@@ -189,6 +200,7 @@ impl Trees {
 
     /// After a step: bodies that are moved from outside stand still unless they are moved again.
     pub(super) fn halt(&mut self, dt: f64) {
+        self.arms.iter_mut().for_each(Arm::halt);
         for (node, motion) in self.nodes.iter().zip(&mut self.motions) {
             if matches!(node.link, Link::Held) {
                 motion.before = [motion.velocity, motion.spin];
@@ -205,6 +217,22 @@ impl Trees {
 
     pub(super) fn tree(&self, body: usize) -> usize {
         self.nodes[body].tree
+    }
+
+    /// The arm that carries a body.
+    pub(super) fn arm(&self, body: usize) -> Option<&Arm> {
+        match self.nodes[body].link {
+            Link::Arm(arm) => Some(&self.arms[arm]),
+            _ => None,
+        }
+    }
+
+    /// The same to be told something.
+    pub(super) fn arm_mut(&mut self, body: usize) -> Option<&mut Arm> {
+        match self.nodes[body].link {
+            Link::Arm(arm) => Some(&mut self.arms[arm]),
+            _ => None,
+        }
     }
 
     /// Index of the freedom of a body's joint.
@@ -233,7 +261,7 @@ impl Trees {
                     let origin = centre.coords - rotation * node.centre.coords;
                     motion.pose = Isometry3::from_parts(origin.into(), rotation);
                 }
-                Link::Joint { .. } => {}
+                Link::Arm(_) | Link::Joint { .. } => {}
             }
         }
         // Those of free bodies run along, and say nothing.
@@ -244,6 +272,9 @@ impl Trees {
     /// Puts every body where its joint holds it.
     pub(super) fn place(&mut self) {
         for i in 0..self.nodes.len() {
+            if let Link::Arm(arm) = self.nodes[i].link {
+                self.motions[i].pose = self.arms[arm].place(&self.positions);
+            }
             if let Link::Joint { freedom, ratio, kind, axis, at, parent } = &self.nodes[i].link {
                 let position = ratio * self.positions[*freedom];
                 let moved = match kind {
@@ -272,6 +303,7 @@ impl Trees {
         loop {
             match &self.nodes[body].link {
                 Link::Held => return,
+                Link::Arm(arm) => return self.arms[*arm].screws(&at, each),
                 Link::Free { first } => {
                     let lever = at - self.motions[body].centre;
                     for k in 0..3 {
