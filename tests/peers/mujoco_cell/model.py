@@ -119,7 +119,8 @@ def _link(build, i, inner):
             f'<body name="link{i}">{inertial}<joint name="gear{i}" axis="0 0 1" {yields}/>{inner}</body></body>')
 
 
-def _arm(build):
+def arm(build):
+    """The arm with what is at its flange."""
     tool, start = build.tool, np.asarray(build.tool_offset)
     end = start + [0, 0, tool.length - tool.radius]
     inner = (f'<body name="flange" pos="0 0 {fr3.FLANGE}">'
@@ -164,7 +165,7 @@ def _pairs(build):
 def mjcf(build):
     """The model as text."""
     engine = build.engine
-    world, pairs = _arm(build), ""
+    world, pairs = arm(build), ""
     if build.box is not None:
         world += '<geom name="table" type="plane" size="3 3 0.1"/>' + _box(build) + "".join(build.on_table)
         pairs = f"<contact>{_pairs(build)}</contact>"

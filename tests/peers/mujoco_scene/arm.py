@@ -1,0 +1,45 @@
+"""A Franka FR3 under joint impedance control that carries a plate, and a box that falls onto it."""
+import mujoco
+import numpy as np
+
+from mujoco_cell import fr3
+from mujoco_cell.model import Build, Engine, Tool, arm
+
+from .model import numbers
+
+LIGHT = 1e-6  # [kg] of the tool that the arm's model brings along: it weighs nothing and touches nothing
+
+
+class Carrying:
+    """The arm at `q`, commanded to stay there; its plate is a box in the axes of the flange."""
+
+    def __init__(self, q, gains, plate, box, step=2.5e-4):
+        size, place = plate
+        surface = f'<geom name="plate" type="box" size="{numbers(0.5 * edge for edge in size)}" pos="{numbers(place)}" friction="0.8" mass="0"/>'
+        build = Build(Engine(), Tool(mass=LIGHT), at_flange=[surface])
+        edge, mass, at = box
+        falling = (f'<body name="box" pos="{numbers(at)}"><freejoint name="box"/>'
+                   f'<geom name="box" type="box" size="{numbers([0.5 * edge] * 3)}" friction="0.8" mass="{mass}"/></body>')
+        chain = arm(build).replace('<geom name="tool"', '<geom contype="0" conaffinity="0" name="tool"')
+        self.model = mujoco.MjModel.from_xml_string(
+            f'<mujoco><compiler angle="radian" balanceinertia="true" autolimits="true"/>'
+            f'<option timestep="{step}" cone="elliptic" impratio="20" integrator="implicitfast" gravity="0 0 -9.81"/>'
+            f'<default><geom solref="{4 * step} 1"/></default><worldbody>{chain}{falling}</worldbody></mujoco>')
+        self.data = mujoco.MjData(self.model)
+        self.joints = [self.model.joint(f"motor{i}") for i in range(fr3.DOF)]
+        self.at = np.array([joint.qposadr[0] for joint in self.joints])
+        self.speed = np.array([joint.dofadr[0] for joint in self.joints])
+        self.q_d, (self.stiffness, self.damping) = np.array(q), (np.array(gain) for gain in gains)
+        self.data.qpos[self.at] = self.q_d
+        mujoco.mj_forward(self.model, self.data)
+
+    def go_on(self, seconds):
+        for _ in range(round(seconds / self.model.opt.timestep)):
+            q, dq = self.data.qpos[self.at], self.data.qvel[self.speed]
+            # Gravity and velocity products of the arm are what the controller takes off.
+            torque = self.stiffness * (self.q_d - q) - self.damping * dq + self.data.qfrc_bias[self.speed]
+            self.data.qfrc_applied[self.speed] = torque
+            mujoco.mj_step(self.model, self.data)
+
+    def q(self):
+        return self.data.qpos[self.at].copy()
