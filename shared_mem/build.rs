@@ -3,12 +3,13 @@
 use std::error::Error;
 use std::path::PathBuf;
 
-const FILES: [&str; 9] = [
+const FILES: [&str; 10] = [
     "foxglove/PoseInFrame.proto",
     "foxglove/RawImage.proto",
     "foxglove/CameraCalibration.proto",
     "foxglove/JointStates.proto",
     "foxglove/Log.proto",
+    "foxglove/FrameTransforms.proto",
     "twinalign/arm.proto",
     "twinalign/twin.proto",
     "twinalign/devices.proto",

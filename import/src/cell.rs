@@ -48,8 +48,12 @@ pub fn usual_controller(joints: &[String]) -> UsualController {
     if is_franka(joints) { FRANKA_CONTROLLER } else { SERVO_CONTROLLER }
 }
 
-/// The file's text without clips, for these joints.
-pub(crate) fn proposed(log: &Log, joints: &[String]) -> String {
+/// File of a session that holds what the log says the robot is.
+pub(crate) const URDF: &str = "robot.urdf";
+
+/// The file's text without clips, for these joints; `base`: the link on which the arm stands, where the log's own URDF lies beside
+/// the file.
+pub(crate) fn proposed(log: &Log, joints: &[String], base: Option<&str>) -> String {
     let from = match &log.facts.robot {
         Some(robot) => format!("{}, robot `{robot}`", log.format),
         None => log.format.to_owned(),
@@ -60,6 +64,12 @@ pub(crate) fn proposed(log: &Log, joints: &[String]) -> String {
     let head = format!("{}\n", shared_mem::printable::one_line(head.trim_end()));
     if joints.is_empty() {
         return head;
+    }
+    if let Some(base) = base {
+        let base = toml_value(base);
+        let robot =
+            format!("[robot]\nurdf = \"{URDF}\"            # the log's robot_description\nbase_frame = {base}\n");
+        return format!("{head}{robot}\n{}", controller(joints));
     }
     if is_franka(joints) {
         let robot = "[robot]\nmodel = \"fr3\"                 # a Panda is built alike, of other masses: for one, give its urdf instead\n\
@@ -119,7 +129,7 @@ mod tests {
         let fr3: Vec<String> = (1..=7).map(|i| format!("panda_joint{i}")).collect();
         for joints in [fr3, names(&["shoulder \"pan\"", "a\nb"]), names(&["joint1"]), vec![]] {
             let entries = [ClipEntry { file: "a b.mcap".into(), kind: ClipKind::Excitation }];
-            let text = proposed(&Log { format: "text table", ..Log::default() }, &joints) + &clips(&entries);
+            let text = proposed(&Log { format: "text table", ..Log::default() }, &joints, None) + &clips(&entries);
             let cell = Cell::parse(&text, Path::new("cell.toml")).unwrap_or_else(|e| panic!("{e}\n{text}"));
             assert_eq!(cell.clips, entries);
             assert_eq!(cell.robot.is_some(), !joints.is_empty());

@@ -34,7 +34,7 @@ pub fn look(path: &Path) -> Result<Contents, ImportError> {
         logs.extend(source.read()?);
     }
     let log = longest(&logs, path)?;
-    let mapping = propose(log, None, &|_| None).mapping;
+    let mapping = propose(log, (None, &[]), &|_| None).mapping;
     // A second publisher on a topic is a table of its own, behind a colon.
     let topic = |table: &str| table.split(':').next().unwrap_or(table).to_owned();
     let joints = |columns: Option<crate::JointColumns>| {

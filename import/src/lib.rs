@@ -9,11 +9,12 @@
 //! | `mapping` | `import.toml`: which columns are which quantity, in which unit |
 //! | `propose` | a mapping out of a log, with the reasons |
 //! | `clip` | a log by its mapping, in SI |
-//! | `cell` | the cell.toml of the new session |
+//! | `cell`, `arm` | the cell.toml of the new session, and what is known of its arm |
 //! | `session` | the whole way |
 //! | `contents` | what a log holds of a robot, for those who only look |
 //! | `data_set` | writes LeRobot data sets |
 
+mod arm;
 mod cell;
 mod clip;
 mod contents;
@@ -27,6 +28,7 @@ mod ros;
 mod session;
 mod sources;
 
+pub use arm::{Arm, Arms};
 pub use cell::{UsualController, is_franka, usual_controller};
 pub use clip::Gravity;
 pub use contents::{Contents, look};
@@ -36,4 +38,4 @@ pub use log::LeftOut;
 pub use mapping::{
     AngleUnit, JointColumns, LengthUnit, Mapping, Note, PoseColumns, RateUnit, TimeUnit, Torque, TorquesAct,
 };
-pub use session::{Imported, Model, Order, Outcome, import};
+pub use session::{Imported, Order, Outcome, import};

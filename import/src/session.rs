@@ -1,7 +1,8 @@
 //! The whole way: logs, their mapping, clips, a session. Nothing is there before all of it is.
 
-use crate::cell;
-use crate::clip::{self, Gravity};
+use crate::arm::{Arm, Arms, described};
+use crate::cell::{self, URDF};
+use crate::clip;
 use crate::error::ImportError;
 use crate::log::{LeftOut, Log};
 use crate::mapping::{Mapping, Note, to_toml};
@@ -19,9 +20,6 @@ const CELL_TOML: &str = "cell.toml";
 const IMPORT_TOML: &str = "import.toml";
 const PROGRAM: &str = concat!("twinalign ", env!("CARGO_PKG_VERSION"), ", import");
 
-/// Makes gravity's torques out of a cell's model; `None` where it knows none.
-pub type Model<'a> = &'a dyn Fn(&Cell) -> Option<Gravity>;
-
 /// What is to be imported.
 #[derive(Clone, Copy)]
 pub struct Order<'a> {
@@ -37,8 +35,8 @@ pub struct Order<'a> {
     pub force: bool,
     /// Where an import.toml with open lines goes.
     pub questions: &'a Path,
-    /// The nominal model.
-    pub model: Model<'a>,
+    /// Tells of the arm.
+    pub arms: Arms<'a>,
     /// The command that imports with an import.toml, for its first lines: from the path of that file.
     pub command: &'a dyn Fn(&Path) -> String,
 }
@@ -99,8 +97,7 @@ pub fn import(order: Order<'_>, mut told: impl FnMut(&Imported, (u64, u64))) -> 
         None => {
             let (number, logs) = largest(&found)?;
             let log = longest(&logs, found[number].path())?;
-            let Proposal { mapping, notes } =
-                propose(log, given.as_ref(), &|joints| (order.model)(&cell_of(given.as_ref(), log, joints)?));
+            let Proposal { mapping, notes } = proposal(log, given.as_ref(), order.arms)?;
             if mapping.clone().completed().open_line().is_some() {
                 return open(order, log, &mapping, notes);
             }
@@ -114,7 +111,7 @@ pub fn import(order: Order<'_>, mut told: impl FnMut(&Imported, (u64, u64))) -> 
         folder: &folder,
         mapping: &mapping,
         given: given.as_ref(),
-        model: order.model,
+        arms: order.arms,
         taken: HashSet::new(),
         entries: vec![],
         about: None,
@@ -167,12 +164,31 @@ pub(crate) fn longest<'a>(logs: &'a [Log], path: &Path) -> Result<&'a Log, Impor
     })
 }
 
-/// The given cell, or the one that is proposed for these joints.
-fn cell_of(given: Option<&Cell>, log: &Log, joints: &[String]) -> Option<Cell> {
-    match given {
-        Some(cell) => Some(cell.clone()),
-        None => Cell::parse(&cell::proposed(log, joints), Path::new(CELL_TOML)).ok(),
+/// The mapping by what is known of the arm: the one that was given, the log's own, or the one that its joints' names tell.
+fn proposal(log: &Log, given: Option<&Cell>, arms: Arms<'_>) -> Result<Proposal, ImportError> {
+    let failed = |what: String| ImportError::log(&log.file, what);
+    if let Some(cell) = given {
+        let arm = arms(cell, None).map_err(failed)?;
+        let wanted = arm.map_or_else(Vec::new, |arm| arm.joints);
+        return Ok(propose(log, (given, &wanted), &|_| arms(cell, None).ok()??.gravity));
     }
+    let by_name = |joints: &[String]| {
+        let cell = Cell::parse(&cell::proposed(log, joints, None), Path::new(CELL_TOML)).ok()?;
+        arms(&cell, None).ok()??.gravity
+    };
+    let plain = propose(log, (None, &[]), &by_name);
+    let (mut proposal, why) = match described(log, &plain.mapping.joints, arms) {
+        Ok(None) => return Ok(plain),
+        Ok(Some((text, Arm { joints, held, .. }))) => {
+            let gravity = |_: &[String]| arms(&Cell::default(), Some(&text)).ok()??.gravity;
+            let held =
+                if held.is_empty() { String::new() } else { format!("; held where they are: {}", held.join(", ")) };
+            (propose(log, (None, &joints), &gravity), format!("the log's robot_description{held}"))
+        }
+        Err(what) => (plain, format!("the log's robot_description is not used: {what}")),
+    };
+    proposal.notes.insert(0, Note { line: "robot".into(), why, open: false });
+    Ok(proposal)
 }
 
 /// Writes the mapping with its open lines to where the command is typed.
@@ -192,40 +208,44 @@ struct Writing<'a> {
     folder: &'a OutputFolder,
     mapping: &'a Mapping,
     given: Option<&'a Cell>,
-    model: Model<'a>,
+    arms: Arms<'a>,
     taken: HashSet<String>,
     entries: Vec<ClipEntry>,
-    /// What the first log makes of cell.toml, and the first log without its numbers.
-    about: Option<(String, Cell, Log)>,
+    about: Option<About>,
+}
+
+/// What the first log tells of the cell.
+struct About {
+    /// The text of cell.toml, without clips.
+    text: String,
+    cell: Cell,
+    arm: Option<Arm>,
+    /// The URDF that goes beside it.
+    urdf: Option<String>,
+    /// The log without its numbers.
+    log: Log,
 }
 
 impl Writing<'_> {
     fn clip(&mut self, log: &Log) -> Result<Imported, ImportError> {
         let failed = |what: String| ImportError::log(&log.file, what);
         if self.about.is_none() {
-            let text = match self.given {
-                Some(cell) => {
-                    let mut cell = cell.at_home_anywhere();
-                    cell.clips.clear();
-                    cell.to_toml()
-                }
-                None => cell::proposed(log, &self.mapping.joints),
-            };
-            let cell = Cell::parse(&text, Path::new(CELL_TOML))?;
-            if self.mapping.kind != ClipKind::Excitation && cell.object().is_none() {
+            let about = self.about(log)?;
+            if self.mapping.kind != ClipKind::Excitation && about.cell.object().is_none() {
                 let what = "holds poses of an object that no cell.toml describes; give one with an `[object]` block: --cell cell.toml";
                 return Err(failed(what.into()));
             }
-            self.about = Some((text, cell, log.without_numbers()));
+            self.about = Some(about);
         }
         let name = self.name(&log.name);
-        let Some((_, cell, _)) = &self.about else { return Err(failed("holds nothing".into())) };
-        let gravity = (self.model)(cell);
-        let clip = clip::clip(log, self.mapping, gravity.as_ref()).map_err(failed)?;
+        let Some(About { cell, arm, .. }) = &self.about else { return Err(failed("holds nothing".into())) };
+        let gravity = arm.as_ref().and_then(|arm| arm.gravity.as_ref());
+        let clip = clip::clip(log, self.mapping, gravity).map_err(failed)?;
         let file = PathBuf::from(format!("{name}.mcap"));
         let output = self.folder.file(&file)?;
         let place = output.unfinished_path().to_owned();
-        write_clip(&clip, cell, PROGRAM, output)?;
+        let robot = arm.as_ref().and_then(|arm| arm.shown.as_ref());
+        write_clip(&clip, (cell, robot), PROGRAM, output)?;
         // What every command here will find in it.
         let read = read_clip(&place, self.mapping.kind, cell).map_err(|error| {
             let name = place.display().to_string();
@@ -246,6 +266,31 @@ impl Writing<'_> {
         })
     }
 
+    fn about(&self, log: &Log) -> Result<About, ImportError> {
+        let failed = |what: String| ImportError::log(&log.file, what);
+        let log_alone = log.without_numbers();
+        let Some(given) = self.given else {
+            // What keeps a description from being used was said where the mapping was proposed.
+            let described = described(log, &self.mapping.joints, self.arms).unwrap_or_default();
+            let described = described.filter(|(_, arm)| arm.joints == self.mapping.joints);
+            let shown = described.as_ref().map(|(_, arm)| arm.shown.as_ref());
+            let base = shown.map(|shown| shown.map_or("base", |shown| shown.root.as_str()));
+            let text = cell::proposed(log, &self.mapping.joints, base);
+            let cell = Cell::parse(&text, Path::new(CELL_TOML))?;
+            let (urdf, arm) = match described {
+                Some((urdf, arm)) => (Some(urdf), Some(arm)),
+                None => (None, (self.arms)(&cell, None).map_err(failed)?),
+            };
+            return Ok(About { text, cell, arm, urdf, log: log_alone });
+        };
+        let mut cell = given.at_home_anywhere();
+        cell.clips.clear();
+        let text = cell.to_toml();
+        let cell = Cell::parse(&text, Path::new(CELL_TOML))?;
+        let arm = (self.arms)(&cell, None).map_err(failed)?;
+        Ok(About { text, cell, arm, urdf: None, log: log_alone })
+    }
+
     /// A name that no other clip has, of characters that every program takes.
     fn name(&mut self, name: &str) -> String {
         let plain: String =
@@ -262,14 +307,69 @@ impl Writing<'_> {
     }
 
     fn finish(self, order: Order<'_>, notes: &[Note]) -> Result<(), ImportError> {
-        let Some((text, _, log)) = self.about else {
+        let Some(About { text, urdf, log, .. }) = self.about else {
             let path = order.files.first().map_or(Path::new("."), PathBuf::as_path);
             return Err(ImportError::log(path, "holds no log"));
         };
         let text = text + &cell::clips(&self.entries);
         self.folder.write(Path::new(CELL_TOML), text.as_bytes())?;
+        if let Some(urdf) = urdf {
+            self.folder.write(Path::new(URDF), urdf.as_bytes())?;
+        }
         let command = (order.command)(&order.out.join(IMPORT_TOML));
         let mapping = to_toml(self.mapping, notes, &log, &command);
         Ok(self.folder.write(Path::new(IMPORT_TOML), mapping.as_bytes())?)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::log::{Column, Facts, Table};
+
+    /// Joint states in the order of the alphabet, as ROS programs publish them.
+    fn bag(description: &str) -> Log {
+        let column = |name: &str, speed: f64| Column {
+            name: name.into(),
+            values: (0..50).map(|row| (f64::from(row) * speed).sin()).collect(),
+        };
+        let stamps_ns = Some((0..50).map(|row| row * 20_000_000).collect());
+        let columns =
+            vec![column("position[elbow]", 0.05), column("position[finger]", 0.0), column("position[shoulder]", 0.1)];
+        Log {
+            name: "run".into(),
+            format: "ROS 2 bag",
+            tables: vec![Table { name: "/joint_states".into(), stamps_ns, columns }],
+            facts: Facts { description: Some(description.into()), ..Facts::default() },
+            ..Log::default()
+        }
+    }
+
+    fn arms(_: &Cell, urdf: Option<&str>) -> Result<Option<Arm>, String> {
+        match urdf {
+            Some("broken") => Err("it is no URDF".into()),
+            Some(_) => Ok(Some(Arm {
+                joints: vec!["shoulder".into(), "elbow".into()],
+                held: vec!["finger".into()],
+                gravity: None,
+                shown: None,
+            })),
+            None => Ok(None),
+        }
+    }
+
+    #[test]
+    fn joints_come_in_the_order_of_the_arm_that_the_log_describes() {
+        let Proposal { mapping, notes } = proposal(&bag("<robot/>"), None, &arms).expect("a log");
+        assert_eq!(mapping.joints, ["shoulder", "elbow"]);
+        assert_eq!(mapping.measured.expect("columns").q, ["position[shoulder]", "position[elbow]"]);
+        assert!(notes[0].why.contains("robot_description") && notes[0].why.contains("finger"), "{notes:?}");
+    }
+
+    #[test]
+    fn a_description_of_no_use_is_said_and_the_joints_are_taken_as_they_are() {
+        let Proposal { mapping, notes } = proposal(&bag("broken"), None, &arms).expect("a log");
+        assert_eq!(mapping.joints, ["elbow", "shoulder"]);
+        assert!(notes[0].why.contains("not used: it is no URDF"), "{notes:?}");
     }
 }

@@ -6,6 +6,7 @@ use shared_mem::recording::{
 };
 use std::collections::BTreeMap;
 use std::path::Path;
+use std::sync::Arc;
 
 const CELL: &str =
     "[robot]\njoints = [\"a\", \"b\"]\nbase_frame = \"base\"\n[[clip]]\nfile = \"run.mcap\"\nkind = \"excitation\"\n";
@@ -33,14 +34,18 @@ fn export(session: &Session, to: Format, out: &Path, force: bool) -> Vec<Exporte
         position: [x, 0.0, 0.0],
         wxyz: [1.0, 0.0, 0.0, 0.0],
     };
-    let fixed = [frame("b", "tip", 0.1)];
-    let frames_at = |names: &[String], q: &[f64]| {
-        assert_eq!(names, ["a", "b"]);
-        Some(vec![frame("base", "a", q[0]), frame("a", "b", q[1])])
+    let robot = RobotModel {
+        description: "<robot name='r'/>".into(),
+        root: "base".into(),
+        joints: vec!["a".into(), "b".into()],
+        fixed: vec![frame("b", "tip", 0.1)],
+        frames_at: Box::new(move |names, q| {
+            assert_eq!(names, ["a", "b"]);
+            Some(vec![frame("base", "a", q[0]), frame("a", "b", q[1])])
+        }),
     };
-    let joints = ["a".to_owned(), "b".to_owned()];
-    let robot = RobotModel { description: "<robot name='r'/>", joints: &joints, fixed: &fixed, frames_at: &frames_at };
-    let order = Order { to, out, force, flange_at: &|_| None, robot: Some(robot) };
+    let robot = Arc::new(robot);
+    let order = Order { to, out, force, flange_at: &|_| None, robot: Some(&robot) };
     export_session(session, order, |_| {}).expect("an export")
 }
 

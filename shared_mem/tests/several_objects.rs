@@ -32,7 +32,7 @@ fn session(folder: &Path, [cup, milk]: [f64; 2]) -> Session {
         let others = vec![TrackedObject { name: "milk".into(), series: series(0.6, milk * moves) }];
         let clip = Clip { object: series(0.3, cup * moves), others, ..clip_of_nothing(&folder.join(name)) };
         let output = Output::create(&folder.join(name)).expect("room");
-        write_clip(&clip, &cell, "test", output).expect("room");
+        write_clip(&clip, (&cell, None), "test", output).expect("room");
     }
     Session::open(folder).expect("a session")
 }
@@ -112,7 +112,7 @@ fn objects_go_to_a_bag_and_back_by_their_names() {
     // A clip from before the object had a name is about the first.
     let file = back.folder.join("old.mcap");
     let old = Clip { object: series(0.2, 0.1), ..clip_of_nothing(&file) };
-    write_clip(&old, &alone, "test", Output::create(&file).expect("room")).expect("room");
+    write_clip(&old, (&alone, None), "test", Output::create(&file).expect("room")).expect("room");
     let read = read_clip(&file, ClipKind::FreeMotion, &back.cell).expect("a clip");
     assert_eq!((read.object.poses, read.others[0].series.len()), (old.object.poses, 0));
 }

@@ -1,7 +1,7 @@
 """Whether `lerobot-train` learns from what `calibration export-episodes --to lerobot` has written: an ACT policy for a few steps on
 the processor, from random weights (nothing is fetched), and its checkpoint. Depth pictures are left out: ACT takes three channels.
 
-    python3.12 -m venv lerobot && lerobot/bin/pip install "lerobot[dataset,training]==0.6.1"
+    python3.12 -m venv lerobot && lerobot/bin/pip install "lerobot[training]==0.6.1"
     lerobot/bin/python tests/peers/lerobot_train.py carrot_lerobot
 
 prints the command that it runs; more steps, a larger policy and a graphics card are options of that.
@@ -79,7 +79,7 @@ def main():
             print(said[-3000:], file=sys.stderr)
             sys.exit(f"lerobot-train ended with {done.returncode}")
         losses = [line.split("loss:")[1].split()[0] for line in said.splitlines() if "loss:" in line]
-        weights = list(out.glob("checkpoints/*/pretrained_model/model.safetensors"))
+        weights = {path.resolve() for path in out.glob("checkpoints/*/pretrained_model/model.safetensors")}
         print(f"{given.steps} steps in {time.monotonic() - began:.0f} s; losses {', '.join(losses)}; {len(weights)} checkpoint")
         sys.exit(0 if weights and len(losses) == given.steps else "it trained, but wrote no checkpoint or no loss for each step")
 

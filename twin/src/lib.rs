@@ -3,6 +3,7 @@
 pub mod arm;
 pub mod contact_law;
 pub mod control;
+pub mod description;
 pub mod effects;
 pub mod metrics;
 pub mod physics;
@@ -23,3 +24,4 @@ pub mod teleop;
 #[cfg(feature = "viewer")]
 pub mod viewer;
 pub mod world;
+pub mod xml;

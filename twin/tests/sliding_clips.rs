@@ -15,6 +15,7 @@ fn truth(session: &Path) -> Theta {
     Theta {
         arm: Some(ArmTheta { stiffness: list("k"), damping: list("d") }),
         object: Some(ObjectTheta {
+            name: None,
             friction: number("mu"),
             mass: number("mass"),
             centre_of_mass: Some(list("com").try_into().expect("three numbers")),

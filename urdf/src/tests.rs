@@ -1,6 +1,6 @@
 //! What is read of a URDF, what is refused and in which words, and that no text makes the reader fall over.
 
-use crate::{Axis, Inertia, JointLimit, JointType, Robot, UrdfError, Vec3, read_from_string};
+use crate::{Axis, Inertia, JointLimit, JointType, Robot, Shape, UrdfError, Vec3, read_from_string};
 use proptest::prelude::*;
 
 const ARM: &str = r#"<?xml version="1.0" encoding="utf-8"?>

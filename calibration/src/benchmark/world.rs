@@ -114,7 +114,7 @@ impl World {
             kind,
             truth: truth(fault, &effects),
             cell: cell.clone(),
-            hidden: Theta { arm: arm(cell, &mut rng), object: object(cell, &mut rng), effects },
+            hidden: Theta { arm: arm(cell, &mut rng), object: object(cell, &mut rng), effects, ..Theta::default() },
             outside: if let Fault::Outside(outside) = fault { Some(outside) } else { None },
             friction_scatter: if number.is_multiple_of(2) { declared } else { 2.0 * declared },
             parts: rng.random_range(2..=4),
@@ -146,6 +146,7 @@ fn object(cell: &Cell, rng: &mut Pcg64) -> Option<ObjectTheta> {
     };
     let centre = object.centre_of_mass_range.map(|ranges| ranges.map(|range| within(Some(range)).unwrap_or(0.0)));
     Some(ObjectTheta {
+        name: object.name.clone(),
         friction: within(object.friction_range),
         mass: object.mass.or_else(|| within(object.mass_range)),
         centre_of_mass: centre,

@@ -136,7 +136,7 @@ fn differing_block(a: &Cell, b: &Cell) -> Option<&'static str> {
         ("controller", a.controller == b.controller),
         ("tool", a.tool == b.tool),
         ("table", a.table == b.table),
-        ("object", a.object == b.object),
+        ("object", a.objects == b.objects),
         ("camera", a.camera == b.camera),
     ];
     blocks.into_iter().find_map(|(name, same)| (!same).then_some(name))

@@ -1,19 +1,16 @@
 //! `calibration export`.
 
 use super::print;
-use calibration::model;
 use clap::{Args, ValueEnum};
-use nalgebra::Isometry3;
 use serde::Serialize;
-use shared_mem::cell::{Camera, Cell};
 use shared_mem::console;
 use shared_mem::msg::joints_from;
 use shared_mem::progress::Progress;
-use shared_mem::recording::{
-    Exported, Format, FramesAt, Order, ROS_CAMERA_FRAME, RobotModel, Session, Transform, export_session,
-};
-use std::path::{Path, PathBuf};
-use twin::arm::{ArmModel, LinkFrame, UrdfFrames};
+use shared_mem::recording::{Exported, Format, Order, Session, export_session};
+use std::path::PathBuf;
+use std::sync::Arc;
+use twin::arm::ArmModel;
+use twin::description::shown_robot;
 
 #[derive(Debug, Args)]
 #[command(after_help = "\
@@ -22,7 +19,7 @@ and said, topic by topic: no format but twinalign's own holds what a twin said, 
 velocities nor torques and one joint state a picture. The new folder gets a cell.toml of its own. It is there when all of it
 is; a folder that is there already is kept, and with --force a session that nothing else lies in is replaced.
 A bag of an arm whose shape is known holds /joint_states, /tf, /tf_static and /robot_description, too, so that RViz, Foxglove
-and Rerun show the robot.
+and Rerun show the robot; an own clip holds the last three.
 
 Examples:
   calibration export session --to rosbag2 --out bags         # then: ros2 bag play bags/clip_00
@@ -91,10 +88,8 @@ pub(super) fn run(arguments: &ExportArguments) -> anyhow::Result<()> {
         Some((flange.position(), flange.wxyz()))
     };
     let ExportArguments { to, out, force, json, .. } = arguments;
-    let robot = Robot::of(&session.cell)?;
-    let frames_at = |names: &[String], q: &[f64]| robot.as_ref()?.frames_at(names, q);
-    let robot = robot.as_ref().map(|robot| robot.model(&frames_at));
-    let order = Order { to: (*to).into(), out, force: *force, flange_at: &flange_at, robot };
+    let robot = shown_robot(&session.cell)?.map(Arc::new);
+    let order = Order { to: (*to).into(), out, force: *force, flange_at: &flange_at, robot: robot.as_ref() };
     let (bar, mut done) = (Progress::new("export", session.clips.len() as u64), 0);
     let clips = export_session(&session, order, |clip| {
         done += 1;
@@ -117,51 +112,4 @@ pub(super) fn run(arguments: &ExportArguments) -> anyhow::Result<()> {
     let noun = if clips.len() == 1 { "clip" } else { "clips" };
     let words = format!("{} {noun} in {}", clips.len(), out.display());
     print(*json, &Answer { clips }, words)
-}
-
-/// The robot as a bag tells of it.
-struct Robot {
-    description: String,
-    joints: Vec<String>,
-    frames: UrdfFrames,
-    fixed: Vec<Transform>,
-}
-
-impl Robot {
-    /// `None` where no arm moves, or only its joints' names are known.
-    fn of(cell: &Cell) -> anyhow::Result<Option<Self>> {
-        let Some(description) = model::description(cell)? else { return Ok(None) };
-        let arm = ArmModel::from_cell(cell)?;
-        let file =
-            cell.robot.as_ref().and_then(|robot| robot.urdf.as_deref()).unwrap_or(Path::new("the built-in model"));
-        let frames = UrdfFrames::of(&description, file)?;
-        let base = cell.base_frame();
-        let mut fixed: Vec<Transform> = frames.fixed(arm.joint_names()).map(transform).collect();
-        if frames.root() != base {
-            // Recordings give poses in the frame that cell.toml names.
-            let parent_from_child = Isometry3::identity();
-            fixed.push(transform(LinkFrame { parent: base, child: frames.root(), parent_from_child }));
-        }
-        if let Some(pose) = cell.camera.as_ref().and_then(Camera::base_from_camera) {
-            let parent_from_child = pose.isometry();
-            fixed.push(transform(LinkFrame { parent: base, child: ROS_CAMERA_FRAME, parent_from_child }));
-        }
-        Ok(Some(Self { description, joints: arm.joint_names().to_vec(), frames, fixed }))
-    }
-
-    fn model<'a>(&'a self, frames_at: FramesAt<'a>) -> RobotModel<'a> {
-        RobotModel { description: &self.description, joints: &self.joints, fixed: &self.fixed, frames_at }
-    }
-
-    /// Nothing where the joints are named otherwise than the robot's.
-    fn frames_at(&self, names: &[String], q: &[f64]) -> Option<Vec<Transform>> {
-        let frames: Vec<Transform> = self.frames.moving(names, q).map(transform).collect();
-        (!frames.is_empty()).then_some(frames)
-    }
-}
-
-fn transform(frame: LinkFrame<'_>) -> Transform {
-    let LinkFrame { parent, child, parent_from_child } = frame;
-    let (p, q) = (parent_from_child.translation.vector, parent_from_child.rotation.quaternion());
-    Transform { parent: parent.to_owned(), child: child.to_owned(), position: p.into(), wxyz: [q.w, q.i, q.j, q.k] }
 }

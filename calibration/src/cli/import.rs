@@ -2,7 +2,7 @@
 
 use super::print;
 use clap::Args;
-use import::{Gravity, Imported, Note, Order, Outcome};
+use import::{Arm, Gravity, Imported, Note, Order, Outcome};
 use serde::Serialize;
 use shared_mem::cell::Cell;
 use shared_mem::console;
@@ -10,7 +10,9 @@ use shared_mem::msg::joints_from;
 use shared_mem::progress::Progress;
 use shared_mem::typed::Command;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use twin::arm::ArmModel;
+use twin::description::{shown_robot, shown_urdf};
 
 #[derive(Debug, Args)]
 #[command(after_help = "\
@@ -69,7 +71,7 @@ pub(super) fn run(arguments: &ImportArguments) -> anyhow::Result<()> {
         cell: cell.as_deref(),
         force: *force,
         questions: Path::new("import.toml"),
-        model: &gravity,
+        arms: &arm,
         command: &command,
     };
     let bar = Progress::new("import", 100);
@@ -114,12 +116,24 @@ fn say(clip: &Imported) {
     }
 }
 
-/// Gravity's torques by the arm's model, where cell.toml names one.
-fn gravity(cell: &Cell) -> Option<Gravity> {
-    let model = cell.robot.as_ref().and_then(|_| ArmModel::from_cell(cell).ok()).filter(ArmModel::has_geometry)?;
-    Some(Box::new(move |q: &[f64]| {
+/// The arm of a cell, or that of a URDF's text.
+fn arm(cell: &Cell, urdf: Option<&str>) -> Result<Option<Arm>, String> {
+    let told = |error: twin::arm::ModelError| error.to_string();
+    let (model, shown) = match urdf {
+        Some(text) => {
+            let model = ArmModel::from_urdf(text, Path::new("robot_description")).map_err(told)?;
+            let shown = shown_urdf(text, &model).map_err(told)?;
+            (model, Some(shown))
+        }
+        None if cell.robot.is_none() => return Ok(None),
+        None => (ArmModel::from_cell(cell).map_err(told)?, shown_robot(cell).map_err(told)?),
+    };
+    let (joints, held) = (model.joint_names().to_vec(), model.held_joints().to_vec());
+    let shown = shown.map(Arc::new);
+    let gravity: Option<Gravity> = model.has_geometry().then_some(Box::new(move |q: &[f64]| {
         (q.len() == model.dof()).then(|| model.gravity(&joints_from(q)).get(..q.len()).unwrap_or(&[]).to_vec())
-    }))
+    }));
+    Ok(Some(Arm { joints, held, gravity, shown }))
 }
 
 /// The same import, with a mapping.

@@ -6,15 +6,12 @@
 //! has no key for, or no law, is left out and named.
 
 mod cell_model;
-mod description;
 mod known;
 mod mjcf;
 mod sdf;
 mod sheet;
 mod urdf;
-mod xml;
 
-pub use description::description;
 pub use known::{LeftOut, Line};
 
 use cell_model::CellModel;

@@ -2,7 +2,7 @@
 
 use super::cell_model::{Arm, Joint};
 use super::known::{Known, LeftOut, Line, number};
-use super::xml::Document;
+use twin::xml::Document;
 
 /// Something in the joints: what, its unit, where it stands in a joint, and why it is left out.
 pub(super) type Lacking = (&'static str, &'static str, fn(&Joint) -> &Known, &'static str);

@@ -141,12 +141,13 @@ fn is_place(labels: &[String]) -> bool {
 
 fn joint_names(log: &Log, measured: &Candidate<'_>, wanted: &[String], notes: &mut Notes) -> Vec<String> {
     if let Some(names) = measured.joints() {
-        notes.why("joints", "the log's own names");
+        let known = !wanted.is_empty() && wanted.iter().all(|name| names.contains(name));
+        notes.why("joints", if known { "the log's own names, from the arm's base on" } else { "the log's own names" });
         return names.to_vec();
     }
     let count = measured.size();
     if wanted.len() == count {
-        notes.why("joints", "the log numbers its joints; they are taken in the order of cell.toml");
+        notes.why("joints", "the log numbers its joints; they are taken in the order of the arm's");
         return wanted.to_vec();
     }
     if log.facts.franka && count == 7 {
@@ -160,7 +161,7 @@ fn joint_names(log: &Log, measured: &Candidate<'_>, wanted: &[String], notes: &m
     (1..=count).map(|i| format!("joint{i}")).collect()
 }
 
-/// Columns in the order of cell.toml's joints, where these are the log's.
+/// Columns in the order of the arm's joints, where these are the log's.
 fn order(measured: &Candidate<'_>, wanted: &[String]) -> Vec<usize> {
     let plain = || (0..measured.size()).collect();
     let Some(names) = measured.joints() else { return plain() };

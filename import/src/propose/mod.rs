@@ -49,11 +49,14 @@ impl Notes {
     }
 }
 
-/// Proposes what the columns of `log` are. `cell`: what the laboratory knows, where it was given; `gravity`: the nominal model's,
-/// of the joints that were found.
-pub(crate) fn propose(log: &Log, cell: Option<&Cell>, gravity: &dyn Fn(&[String]) -> Option<Gravity>) -> Proposal {
+/// Proposes what the columns of `log` are. `cell`: what the laboratory knows, where it was given; `wanted`: the arm's joints from base
+/// to flange, where they are known; `gravity`: the nominal model's, of the joints that were found.
+pub(crate) fn propose(
+    log: &Log,
+    (cell, wanted): (Option<&Cell>, &[String]),
+    gravity: &dyn Fn(&[String]) -> Option<Gravity>,
+) -> Proposal {
     let mut notes = Notes::default();
-    let wanted = cell.and_then(|cell| cell.robot.as_ref()).map_or(&[][..], |robot| &robot.joints);
     let chosen = columns::choose(log, wanted, &mut notes);
     let object = object::choose(log, &mut notes);
     let mut mapping =

@@ -1,7 +1,7 @@
 //! What the tests share: the motion in the fixtures, and an import of one of them.
 #![allow(dead_code, reason = "each test uses its part")]
 
-use import::{Gravity, ImportError, Order, Outcome, import};
+use import::{Arm, ImportError, Order, Outcome, import};
 use shared_mem::cell::{Cell, ClipEntry};
 use shared_mem::recording::{Clip, Session};
 use std::path::{Path, PathBuf};
@@ -21,8 +21,8 @@ pub(crate) fn fixture(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures").join(name)
 }
 
-pub(crate) fn no_model(_: &Cell) -> Option<Gravity> {
-    None
+pub(crate) fn no_model(_: &Cell, _: Option<&str>) -> Result<Option<Arm>, String> {
+    Ok(None)
 }
 
 pub(crate) fn order<'a>(files: &'a [PathBuf], out: &'a Path, questions: &'a Path) -> Order<'a> {
@@ -33,7 +33,7 @@ pub(crate) fn order<'a>(files: &'a [PathBuf], out: &'a Path, questions: &'a Path
         mapping: None,
         cell: None,
         force: false,
-        model: &no_model,
+        arms: &no_model,
         command: &|mapping| format!("calibration import ... --mapping {}", mapping.display()),
     }
 }

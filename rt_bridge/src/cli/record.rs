@@ -4,12 +4,14 @@ use super::stop_flag;
 use crate::recorder::{Settings, record};
 use anyhow::{Result, bail};
 use clap::Args;
-use shared_mem::answer;
 use shared_mem::cell::Cell;
 use shared_mem::quantity::seconds;
 use shared_mem::recording::ClipInfo;
+use shared_mem::{answer, console};
 use std::path::PathBuf;
+use std::sync::Arc;
 use std::time::Duration;
+use twin::description::shown_robot;
 
 /// Record everything on shared memory to a new clip, until Ctrl-C
 ///
@@ -27,7 +29,7 @@ pub(super) struct RecordArguments {
     /// Replaces a file that is there already
     #[arg(long)]
     force: bool,
-    /// Rides along in the file, so that the clip explains itself
+    /// Rides along in the file, so that the clip explains itself and viewers show the robot
     #[arg(long, value_name = "cell.toml")]
     cell: Option<PathBuf>,
     /// How long to wait for the first message [s]
@@ -51,8 +53,9 @@ impl RecordArguments {
     pub(super) fn execute(self) -> Result<()> {
         // The recorder itself looks after the parent: it stays a moment longer.
         let stop = stop_flag(None)?;
+        let cell = self.cell.as_deref().map(Cell::read).transpose()?;
         let info = ClipInfo {
-            cell_toml: self.cell.as_deref().map(Cell::read).transpose()?.map(|cell| cell.to_toml()),
+            cell_toml: cell.as_ref().map(Cell::to_toml),
             configuration: self.configuration,
             program: concat!("rt_bridge ", env!("CARGO_PKG_VERSION")).into(),
             torques_begin_at_rows: false,
@@ -60,7 +63,14 @@ impl RecordArguments {
         // The bridge that started this recorder may take its time, and answers for itself.
         let patience = self.parent.is_none().then_some(self.wait);
         let (out, force, duration, parent) = (self.out, self.force, self.duration, self.parent);
-        let settings = Settings { out, force, duration, patience, parent, info };
+        let shown = cell.and_then(|cell| match shown_robot(&cell) {
+            Ok(robot) => Some((Arc::new(robot?), cell)),
+            Err(error) => {
+                console::line(format_args!("warning: viewers will not see the robot in {}: {error}", out.display()));
+                None
+            }
+        });
+        let settings = Settings { out, force, duration, patience, parent, info, shown };
         let recorded = record(&settings, &stop)?;
         if self.json {
             answer::json(&recorded)?;

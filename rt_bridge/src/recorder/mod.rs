@@ -7,14 +7,16 @@ mod sources;
 
 use disk::{Room, room};
 use serde::Serialize;
+use shared_mem::cell::Cell;
 use shared_mem::msg::event::{Event, EventLevel, EventSource};
 use shared_mem::output::Destination;
 use shared_mem::parent;
-use shared_mem::recording::{ClipInfo, ClipWriter, WriteError, WriteSummary};
+use shared_mem::recording::{ClipInfo, ClipWriter, RobotModel, WriteError, WriteSummary};
 use shared_mem::transport::{Node, Publisher, TransportError};
 use shared_mem::{time::now_ns, topics};
 use sources::Sources;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
@@ -39,6 +41,8 @@ pub struct Settings {
     pub parent: Option<u32>,
     /// What rides along.
     pub info: ClipInfo,
+    /// The robot that viewers of the file are shown, and the cell it stands in.
+    pub shown: Option<(Arc<RobotModel>, Cell)>,
 }
 
 /// What was recorded: the JSON answer of `rt_bridge record` and the `recorded` of `rt_bridge run`.
@@ -116,6 +120,9 @@ pub fn record(settings: &Settings, stop: &AtomicBool) -> Result<Recorded, Record
     let events = node.publisher(topics::EVENTS)?;
     place.clear().map_err(WriteError::from)?;
     let mut writer = ClipWriter::create(out, &settings.info)?;
+    if let Some((robot, cell)) = &settings.shown {
+        writer.show(robot, &robot.joints, cell);
+    }
     events.send(&Event::new(EventLevel::Info, EventSource::Recorder, &announcement(out)))?;
 
     let begin_ns = now_ns();

@@ -16,7 +16,7 @@ pub(super) enum Blocks {
     Many(Vec<Object>),
 }
 
-/// More of them are a warehouse.
+/// Most objects of a cell.
 const MOST: usize = 32;
 
 impl Named for Object {

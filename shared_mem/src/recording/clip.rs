@@ -53,9 +53,9 @@ pub fn read_clip(path: &Path, kind: ClipKind, cell: &Cell) -> Result<Clip, ReadE
         return Err(ReadError::kind(path, what));
     }
     let mut messages = Messages::open(path)?;
-    let own = messages.peek()?.map(|message| is_own(message.channel));
-    // A recording that was stopped before its first message still says whose it is.
-    if own.unwrap_or_else(|| own::clip_info(&messages).is_some()) {
+    let own = messages.peek()?.is_some_and(|message| is_own(message.channel));
+    // What stands before the first message says whose it is, too: also where no message follows, or one of ROS is the first.
+    if own || own::clip_info(&messages).is_some() {
         own::read(path, messages, kind, cell)
     } else {
         bag::read(path, messages, kind, cell)

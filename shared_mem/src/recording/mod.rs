@@ -15,7 +15,8 @@
 //! | `tracked` | objects by name, and the topics that they are on |
 //! | `joint_log` | joint rows: one publisher, one joint order |
 //! | `checks` | faults that foreign logs have, each told in a sentence |
-//! | `wire`, `writer` | own clips: messages and file |
+//! | `wire`, `writer` | own clips: messages and file, and what viewers are shown of the robot |
+//! | `robot` | a robot as viewers want it |
 //! | `episode` | one run of a task as a clip, there and back |
 //! | `raw` | messages as bytes, for readers of other programs' bags |
 //! | `recover` | a damaged file, rewritten |
@@ -42,6 +43,7 @@ mod picture_file;
 mod pictures;
 mod raw;
 mod recover;
+mod robot;
 mod ros2;
 mod series;
 mod session;
@@ -56,8 +58,8 @@ pub use clip::{Clip, read_clip};
 pub use episode::{Episode, EpisodeInfo, EpisodeMoment, RigidPose, read_episode, write_episode};
 pub use error::ReadError;
 pub use export::{
-    ExportError, Exported, FlangeAt, Format, FramesAt, LeftOut, Order, ROS_CAMERA_FRAME, RobotModel, Transform,
-    export_session, ros2_definition, session_folder, write_clip,
+    ExportError, Exported, FlangeAt, Format, LeftOut, Order, export_session, ros2_definition, session_folder,
+    write_clip,
 };
 pub use messages::{ClipMessage, ClipMessages, Payload};
 pub use npy::{Array, parse as parse_npy};
@@ -67,6 +69,7 @@ pub use picture_file::{pack_picture, pack_quickly, read_picture, unpack_picture,
 pub use pictures::{PictureKind, for_pictures};
 pub use raw::{RawMessage, RawMessages};
 pub use recover::{RecoverError, Recovered, recover};
+pub use robot::{FramesAt, JOINT_STATES, ROBOT_DESCRIPTION, RobotModel, TF, TF_STATIC, Transform};
 pub use series::{JointSeries, ObjectSeries};
 pub use session::{Session, SessionFiles};
 pub use subject::{Subject, Why};

@@ -12,6 +12,7 @@ pub(super) const CAMERA_INFO: &str = "sensor_msgs/msg/CameraInfo";
 
 /// Types of devices and remarks.
 pub(super) const WRENCH: &str = "geometry_msgs/msg/WrenchStamped";
+pub(super) const TEXT: &str = "std_msgs/msg/String";
 pub(super) const LOG: &str = "rcl_interfaces/msg/Log";
 /// Joint of a gripper's `JointState`: its position is the width between the fingers.
 pub(super) const GRIPPER_JOINT: &str = "gripper_width";

@@ -6,6 +6,7 @@
 //! when it is finished, or not at all.
 
 mod records;
+mod shown;
 
 use super::torques;
 use super::wire::{self, UnixClock, Wire};
@@ -16,6 +17,7 @@ use crate::topics::ImageTopic;
 use mcap::records::{MessageHeader, Metadata};
 use mcap::write::NoSeek;
 use mcap::{Attachment, Compression, McapError, WriteOptions};
+use shown::Shown;
 use std::borrow::Cow;
 use std::collections::{BTreeMap, HashMap};
 use std::fs::File;
@@ -129,6 +131,8 @@ pub struct ClipWriter<W: Write = File> {
     bytes: Arc<AtomicU64>,
     /// Name of the frame that the object's poses are in.
     base_frame: String,
+    /// The robot that viewers are shown.
+    shown: Option<Shown>,
     /// Encoded message, reused.
     scratch: Vec<u8>,
 }
@@ -213,7 +217,8 @@ impl<W: Write> ClipWriter<W> {
         // A cell.toml that cannot be read names no frame; whoever reads the clip is told what is wrong with it.
         let cell = info.cell_toml.as_deref().and_then(|text| Cell::parse(text, path).ok()).unwrap_or_default();
         let (path, base_frame, channels) = (path.to_owned(), cell.base_frame().to_owned(), HashMap::new());
-        let mut writer = Self { path, mcap, clock, channels, messages: 0, bytes, base_frame, scratch: Vec::new() };
+        let (shown, scratch) = (None, Vec::new());
+        let mut writer = Self { path, mcap, clock, channels, messages: 0, bytes, base_frame, shown, scratch };
         writer.ride_along(info).map_err(|error| writer.failed(&error))?;
         Ok(writer)
     }
@@ -287,12 +292,7 @@ impl<W: Write> ClipWriter<W> {
         let known = self.channels.get(topic).copied();
         let channel = match known {
             Some(channel) => channel,
-            None => {
-                let schema_id = self.mcap.add_schema(schema, "protobuf", &wire::descriptor(schema))?;
-                let id = self.mcap.add_channel(schema_id, topic, "protobuf", &BTreeMap::new())?;
-                self.channels.insert(topic.to_owned(), Channel { id, sequence: 0 });
-                Channel { id, sequence: 0 }
-            }
+            None => self.open(topic, (schema, "protobuf", &wire::descriptor(schema)), "protobuf")?,
         };
         let time = self.clock.unix_ns(stamp_ns);
         let header =
@@ -303,6 +303,15 @@ impl<W: Write> ClipWriter<W> {
         }
         self.messages += 1;
         Ok(())
+    }
+
+    /// A topic whose messages have a schema of this name, encoding and definition.
+    fn open(&mut self, topic: &str, schema: (&str, &str, &[u8]), encoding: &str) -> Result<Channel, McapError> {
+        let schema = self.mcap.add_schema(schema.0, schema.1, schema.2)?;
+        let id = self.mcap.add_channel(schema, topic, encoding, &BTreeMap::new())?;
+        let channel = Channel { id, sequence: 0 };
+        self.channels.insert(topic.to_owned(), channel);
+        Ok(channel)
     }
 
     /// Closes the open chunk and hands everything to the operating system: a kill from here on loses only what comes

@@ -2,12 +2,14 @@
 
 use super::predict::{Prediction, Replayer};
 use crate::arm::{Joints, MAX_JOINTS};
+use crate::description::shown_robot;
 use shared_mem::msg::arm::ArmState;
 use shared_mem::msg::joints_from;
 use shared_mem::msg::object::ObjectPose;
 use shared_mem::msg::twin::{TwinGap, TwinState};
 use shared_mem::output::{Destination, Output};
 use shared_mem::recording::{Clip, ClipInfo, ClipWriter, WriteError};
+use std::sync::Arc;
 
 /// Time over which [`TwinGap::joint_rms`] is taken [ns].
 const RMS_WINDOW_NS: u64 = 1_000_000_000;
@@ -32,6 +34,10 @@ pub fn write_clip(
     };
     let begin = if in_unix_time(clip) { ClipWriter::whole_in_unix_time } else { ClipWriter::whole };
     let mut writer = begin(place.begin()?, &info)?;
+    // Kinematics that cannot be read keep nobody from simulating what is known of the joints.
+    if let Ok(Some(robot)) = shown_robot(replayer.cell()) {
+        writer.show(&Arc::new(robot), &clip.joint_names, replayer.cell());
+    }
     let latency_ns = replayer.cell().camera.as_ref().map_or(0, |camera| (camera.latency * 1e9) as u64);
     Simulated { writer: &mut writer, replayer, clip, prediction, latency_ns, pose: 0 }.write()?;
     writer.finish()?;

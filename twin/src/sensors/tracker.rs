@@ -104,11 +104,11 @@ mod tests {
     fn cell(latency: f64) -> Cell {
         Cell {
             camera: Some(Camera { rate: 50.0, latency, ..Camera::default() }),
-            object: Some(shared_mem::cell::Object {
+            objects: vec![shared_mem::cell::Object {
                 size: Some([0.1; 3]),
                 pose_noise: Some(PoseNoise { position: 0.001, rotation: 0.01 }),
                 ..Default::default()
-            }),
+            }],
             ..Cell::default()
         }
     }
@@ -140,7 +140,7 @@ mod tests {
             shared_mem::toml_file::parse(blocks, std::path::Path::new("theta.toml")).expect("a theta.toml");
         let effects = crate::effects::Effects::from_theta(&theta.effects, 7).expect("a known effect").camera;
         let mut exact = cell(0.030);
-        exact.object.as_mut().expect("an object").pose_noise = None;
+        exact.objects[0].pose_noise = None;
         let mut tracker = SimTracker::new(&exact).with_effects(effects);
         let told: Vec<(u64, ObjectPose)> =
             (0..200).filter_map(|t| tracker.observe(&scene(t)).map(|pose| (t, pose))).collect();

@@ -118,7 +118,7 @@ fn difference(a: &Cell, b: &Cell) -> Option<(&'static str, String)> {
         return Some(("robot", format!("the control laws are {} and {}", named(a), named(b))));
     }
     let alike = |a: &Object, b: &Object| a.shape == b.shape && a.size == b.size && a.mass == b.mass;
-    if a.object.as_ref().zip(b.object.as_ref()).is_some_and(|(one, other)| !alike(one, other)) {
+    if a.object().zip(b.object()).is_some_and(|(one, other)| !alike(one, other)) {
         return Some(("object", "the objects' shapes, sizes or masses differ".into()));
     }
     None

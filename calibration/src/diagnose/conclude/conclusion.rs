@@ -159,6 +159,7 @@ pub fn conclude<E: Evidence>(
         budget_spent: false,
         engine: None,
         seconds: 0.0,
+        object: session.cell.one_of_several().map(str::to_owned),
         session: session.folder.display().to_string(),
         files: session.files.clone(),
         seed: options.seed,

@@ -2,8 +2,8 @@
 
 use super::super::cdr::CdrWriter;
 use super::super::picture::Picture;
+use super::super::robot::Transform;
 use super::super::ros2;
-use super::robot::Transform;
 use crate::msg::event::{Event, EventLevel, EventSource};
 use crate::msg::image::{CameraInfo, PixelEncoding};
 use crate::msg::wrench::Wrench;
@@ -11,9 +11,9 @@ use crate::msg::wrench::Wrench;
 /// Depth counts of this many metres are what `16UC1` means in ROS.
 const MILLIMETRE: f64 = 1e-3;
 /// Optical frame of the pictures in a ROS 2 bag: z forward, x right, y down.
-pub const ROS_CAMERA_FRAME: &str = "camera_color_optical_frame";
+pub(super) const ROS_CAMERA_FRAME: &str = "camera_color_optical_frame";
 /// Types of texts and of frames.
-pub(super) const TEXT: &str = "std_msgs/msg/String";
+pub(super) const TEXT: &str = ros2::TEXT;
 pub(super) const TRANSFORMS: &str = "tf2_msgs/msg/TFMessage";
 
 /// `builtin_interfaces/Time`, which ends in 2038.

@@ -1,6 +1,7 @@
 //! What of a source was not carried over: every topic, or file of a TwinAligner folder, with how much of it.
 
 use super::super::container::Messages;
+use super::super::robot::{ROBOT_DESCRIPTION, TF, TF_STATIC};
 use super::super::tracked::ObjectTopics;
 use super::super::{ReadError, twinaligner};
 use super::rosbag::{EXTERNAL_TORQUES, FLANGE_POSE};
@@ -104,6 +105,10 @@ fn there(source: &Source) -> Result<BTreeMap<String, usize>, ReadError> {
     }
     let mut messages = Messages::open(&source.path)?;
     while let Some(message) = messages.next()? {
+        // In an own clip they follow from states and cell.toml.
+        if source.is_own() && [TF, TF_STATIC, ROBOT_DESCRIPTION].contains(&message.channel.topic.as_str()) {
+            continue;
+        }
         match found.get_mut(&message.channel.topic) {
             Some(count) => *count += 1,
             None => drop(found.insert(message.channel.topic.clone(), 1)),

@@ -26,18 +26,17 @@ mod rosbag;
 mod source;
 
 pub use definitions::definition as ros2_definition;
-pub use encode::ROS_CAMERA_FRAME;
 pub use left_out::LeftOut;
 pub use native::write_clip;
-pub use robot::{FramesAt, RobotModel, Transform};
 
-use super::{ReadError, Session, WriteError};
+use super::{ReadError, RobotModel, Session, WriteError};
 use crate::cell::ClipEntry;
 use crate::output::{OutputError, OutputFolder};
 use left_out::{Carried, left_out};
 use serde::Serialize;
 use source::Source;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// What a session can be written as.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -115,8 +114,8 @@ pub struct Order<'a> {
     pub force: bool,
     /// Asked where a format wants to know where the flange is.
     pub flange_at: FlangeAt<'a>,
-    /// The robot, where its kinematics are known: a ROS 2 bag then holds its description, joint states and frames.
-    pub robot: Option<RobotModel<'a>>,
+    /// The robot, where its kinematics are known: bags and own clips then hold its description and frames, bags its joint states, too.
+    pub robot: Option<&'a Arc<RobotModel>>,
 }
 
 /// Writes all clips of `session` and its cell.toml into a new folder. `told` hears of each clip as it is done.
@@ -138,16 +137,17 @@ pub fn export_session(
         let source = Source::open(session, entry)?;
         let mut carried = Carried::default();
         let into = (&cell, &mut carried);
+        let shown = robot.map(Arc::as_ref);
         let mut exported = match to {
-            Format::Ros2 => rosbag::write(&source, into, folder.file(&file)?, robot)?.0,
+            Format::Ros2 => rosbag::write(&source, into, folder.file(&file)?, shown)?.0,
             Format::Rosbag2 => {
-                let (exported, contents) = rosbag::write(&source, into, folder.file(&file)?, robot)?;
+                let (exported, contents) = rosbag::write(&source, into, folder.file(&file)?, shown)?;
                 let text = metadata::text(&exported.file.to_string_lossy(), &contents);
                 folder.write(&file.with_file_name(METADATA_YAML), text.as_bytes())?;
                 exported
             }
             Format::TwinAligner => folder::write(&source, into, (&folder, &file), flange_at)?,
-            Format::Own => native::write(&source, into, folder.file(&file)?, flange_at)?,
+            Format::Own => native::write(&source, into, folder.file(&file)?, (flange_at, robot))?,
         };
         if !(to == Format::Own && source.is_own()) {
             exported.left_out = left_out(&source, &cell, to, (&exported, &carried))?;
@@ -186,8 +186,9 @@ pub fn session_folder(out: &Path, force: bool, sources: &[PathBuf]) -> Result<Ou
     }
     for entry in std::fs::read_dir(out).map_err(ReadError::io(out))? {
         let name = entry.map_err(ReadError::io(out))?.file_name().to_string_lossy().into_owned();
-        let of_session =
-            name == CELL_TOML || name == IMPORT_TOML || name.ends_with(".mcap") || name.starts_with("traj_");
+        let of_session = [CELL_TOML, IMPORT_TOML, ROBOT_URDF].contains(&name.as_str())
+            || name.ends_with(".mcap")
+            || name.starts_with("traj_");
         let of_session = of_session || out.join(&name).join(METADATA_YAML).is_file();
         if !of_session {
             return refused(format!("it holds {name}, which is no part of a session"));
@@ -202,6 +203,7 @@ const CELL_TOML: &str = "cell.toml";
 const METADATA_YAML: &str = "metadata.yaml";
 /// What a session that was imported keeps beside it.
 const IMPORT_TOML: &str = "import.toml";
+const ROBOT_URDF: &str = "robot.urdf";
 
 /// Name of a clip in the new session.
 fn name(file: &Path, to: Format, number: usize) -> PathBuf {

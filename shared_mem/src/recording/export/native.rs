@@ -7,7 +7,7 @@ use super::super::logged::Logged;
 use super::super::ros2::{JointState, StampedPose};
 use super::super::tracked::Due;
 use super::super::writer::{ClipInfo, ClipWriter};
-use super::super::{Clip, Payload, Picture, ReadError, WriteError, WriteSummary};
+use super::super::{Clip, Payload, Picture, ReadError, RobotModel, WriteError, WriteSummary};
 use super::left_out::Carried;
 use super::rosbag::{EXTERNAL_TORQUES, FLANGE_POSE};
 use super::source::{Beside, Kind, Source};
@@ -26,13 +26,14 @@ use crate::output::{Output, OutputError};
 use crate::topics;
 use std::collections::HashMap;
 use std::path::Path;
+use std::sync::Arc;
 
 /// Writes the clip.
 pub(super) fn write(
     source: &Source,
     (cell, carried): (&Cell, &mut Carried),
     output: Output,
-    flange_at: FlangeAt<'_>,
+    (flange_at, robot): (FlangeAt<'_>, Option<&Arc<RobotModel>>),
 ) -> Result<Exported, ExportError> {
     if source.is_own() {
         return copy(source, output);
@@ -46,6 +47,9 @@ pub(super) fn write(
         torques_begin_at_rows: !clip.torques_end_at_rows,
     };
     let mut writer = ClipWriter::whole_in_unix_time(output, &info)?;
+    if let Some(robot) = robot {
+        writer.show(robot, robot.names(&clip.joint_names), cell);
+    }
     let logged = Logged::of(clip);
     if let Some(record) = logged.record() {
         writer.note(&record)?;
@@ -64,11 +68,17 @@ pub(super) fn write(
     Ok(exported)
 }
 
-/// Writes a clip that was put together elsewhere, in Unix time or in time since its beginning; `program` names what did it.
+/// Writes a clip that was put together elsewhere, in Unix time or in time since its beginning; `program` names what did it,
+/// and viewers are shown `robot`.
 ///
 /// # Errors
 /// [`WriteError`]; nothing of it is there then.
-pub fn write_clip(clip: &Clip, cell: &Cell, program: &str, output: Output) -> Result<WriteSummary, WriteError> {
+pub fn write_clip(
+    clip: &Clip,
+    (cell, robot): (&Cell, Option<&Arc<RobotModel>>),
+    program: &str,
+    output: Output,
+) -> Result<WriteSummary, WriteError> {
     let info = ClipInfo {
         cell_toml: Some(cell.to_toml()),
         configuration: String::new(),
@@ -76,6 +86,9 @@ pub fn write_clip(clip: &Clip, cell: &Cell, program: &str, output: Output) -> Re
         torques_begin_at_rows: !clip.torques_end_at_rows,
     };
     let mut writer = ClipWriter::whole_in_unix_time(output, &info)?;
+    if let Some(robot) = robot {
+        writer.show(robot, robot.names(&clip.joint_names), cell);
+    }
     let logged = Logged::of(clip);
     if let Some(record) = logged.record() {
         writer.note(&record)?;

@@ -1,60 +1,22 @@
 //! The robot as ROS programs expect it beside any recording of one: its description, its joints, and its frames. What moves is
 //! calculated by whoever knows the robot's kinematics; here it becomes messages.
 
+use super::super::robot::{JOINT_STATES, ROBOT_DESCRIPTION, RobotModel, TF, TF_STATIC, Transform};
 use super::super::ros2::JointState;
-use super::encode;
+use super::encode::{self, ROS_CAMERA_FRAME};
 use super::rosbag::Bag;
+use crate::cell::Cell;
 use crate::recording::JointSeries;
 
-/// Topics that every ROS program knows.
-pub(super) const JOINT_STATES: &str = "/joint_states";
-pub(super) const TF: &str = "/tf";
-pub(super) const TF_STATIC: &str = "/tf_static";
-pub(super) const ROBOT_DESCRIPTION: &str = "/robot_description";
 /// Least time between two messages on `/tf` [ns]: viewers draw no faster, and a link's frame takes a hundred bytes.
 const FRAMES_NS: u64 = 10_000_000;
 
-/// A frame in another.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Transform {
-    /// The frame that it is given in.
-    pub parent: String,
-    /// Its name.
-    pub child: String,
-    /// [m]
-    pub position: [f64; 3],
-    /// `w, x, y, z`
-    pub wxyz: [f64; 4],
-}
-
-/// The frames that move at these positions [rad] of these joints; `None` where they are not the robot's.
-pub type FramesAt<'a> = &'a dyn Fn(&[String], &[f64]) -> Option<Vec<Transform>>;
-
-/// A robot of which the kinematics are known.
-#[derive(Clone, Copy)]
-pub struct RobotModel<'a> {
-    /// Its URDF.
-    pub description: &'a str,
-    /// Names of its joints from base to flange: those of recordings that only number them.
-    pub joints: &'a [String],
-    /// Frames that stay where they are.
-    pub fixed: &'a [Transform],
-    /// Frames that move.
-    pub frames_at: FramesAt<'a>,
-}
-
-impl<'a> RobotModel<'a> {
-    /// Its names for joints that are only numbered; the recorded ones otherwise.
-    pub(super) fn names(&self, recorded: &'a [String]) -> &'a [String] {
-        let numbered = recorded.iter().enumerate().all(|(i, name)| *name == format!("joint{}", i + 1));
-        if numbered && recorded.len() == self.joints.len() { self.joints } else { recorded }
-    }
-}
-
 /// What is written of a robot, row by row of what it did.
 pub(super) struct RobotTopics<'a> {
-    model: RobotModel<'a>,
+    model: &'a RobotModel,
     names: &'a [String],
+    /// Frames that stay where they are, the camera's among them.
+    fixed: Vec<Transform>,
     /// Whether the measured joints stand on `/joint_states` already.
     has_joint_states: bool,
     begun: bool,
@@ -63,9 +25,11 @@ pub(super) struct RobotTopics<'a> {
 }
 
 impl<'a> RobotTopics<'a> {
-    /// Of joints of these names, whose measured rows go on `measured`.
-    pub(super) fn new(model: RobotModel<'a>, names: &'a [String], measured: &str) -> Self {
-        Self { model, names, has_joint_states: measured == JOINT_STATES, begun: false, frames_ns: None }
+    /// Of joints of these names, in the cell that was recorded.
+    pub(super) fn new(model: &'a RobotModel, names: &'a [String], cell: &Cell) -> Self {
+        let fixed = model.fixed.iter().cloned().chain(Transform::of_camera(cell, ROS_CAMERA_FRAME)).collect();
+        let has_joint_states = cell.topics.measured == JOINT_STATES;
+        Self { model, names, fixed, has_joint_states, begun: false, frames_ns: None }
     }
 
     /// Writes what is due with a row of the measured joints.
@@ -78,10 +42,10 @@ impl<'a> RobotTopics<'a> {
     ) -> Result<(), mcap::McapError> {
         if !self.begun {
             self.begun = true;
-            let text = encode::text(self.model.description);
+            let text = encode::text(&self.model.description);
             bag.put_latched(ROBOT_DESCRIPTION, encode::TEXT, unix_ns, &text)?;
-            if !self.model.fixed.is_empty() {
-                let frames = encode::transforms(unix_ns, self.model.fixed);
+            if !self.fixed.is_empty() {
+                let frames = encode::transforms(unix_ns, &self.fixed);
                 bag.put_latched(TF_STATIC, encode::TRANSFORMS, unix_ns, &frames)?;
             }
         }

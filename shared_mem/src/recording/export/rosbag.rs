@@ -1,5 +1,6 @@
 //! A clip as a ROS 2 bag that `ros2 bag play` and Foxglove open, under the topic names of cell.toml's `[topics]`.
 
+use super::super::robot::RobotModel;
 use super::super::ros2::{self, JointState, StampedPose};
 use super::super::tracked::Due;
 use super::super::{Payload, Picture, torques};
@@ -7,7 +8,7 @@ use super::definitions::definition;
 use super::encode;
 use super::left_out::Carried;
 use super::metadata::{Contents, TopicCount, latched_profile};
-use super::robot::{RobotModel, RobotTopics};
+use super::robot::RobotTopics;
 use super::source::{Beside, Source};
 use super::{ExportError, Exported};
 use crate::cell::Cell;
@@ -37,7 +38,7 @@ pub(super) fn write(
     source: &Source,
     (cell, carried): (&Cell, &mut Carried),
     output: Output,
-    robot: Option<RobotModel<'_>>,
+    robot: Option<&RobotModel>,
 ) -> Result<(Exported, Contents), ExportError> {
     let target = output.path().to_owned();
     let mut exported = Exported::of(source, &target);
@@ -101,12 +102,12 @@ struct Rows<'a> {
 }
 
 impl<'a> Rows<'a> {
-    fn new(source: &'a Source, cell: &'a Cell, robot: Option<RobotModel<'a>>) -> Self {
+    fn new(source: &'a Source, cell: &'a Cell, robot: Option<&'a RobotModel>) -> Self {
         let frame = cell.base_frame().to_owned();
         let states: Box<dyn Iterator<Item = _>> = Box::new(source.states());
         let recorded = &source.clip.joint_names[..];
         let names = robot.map_or(recorded, |model| model.names(recorded));
-        let robot = robot.map(|model| RobotTopics::new(model, names, &cell.topics.measured));
+        let robot = robot.map(|model| RobotTopics::new(model, names, cell));
         Self {
             source,
             cell,

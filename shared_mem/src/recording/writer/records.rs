@@ -1,5 +1,6 @@
 //! One method for each kind of message that an own clip holds, pictures apart.
 
+use super::shown::Whose;
 use super::{ClipWriter, WriteError};
 use crate::msg::arm::{ArmCommand, ArmState};
 use crate::msg::event::Event;
@@ -18,7 +19,8 @@ impl<W: Write> ClipWriter<W> {
     /// # Errors
     /// [`WriteError`] when the disk is full or fails; what was flushed before stays readable.
     pub fn arm_state(&mut self, message: &ArmState) -> Result<(), WriteError> {
-        self.message(message)
+        self.message(message)?;
+        self.show_joints(Whose::Real, message.stamp_ns, message.q.get(..message.dof as usize).unwrap_or(&[]))
     }
 
     /// Records a command to the arm.
@@ -92,7 +94,8 @@ impl<W: Write> ClipWriter<W> {
     /// # Errors
     /// As [`ClipWriter::arm_state`].
     pub fn twin_state(&mut self, message: &TwinState) -> Result<(), WriteError> {
-        self.message(message)
+        self.message(message)?;
+        self.show_joints(Whose::Twin, message.stamp_ns, message.q.get(..message.dof as usize).unwrap_or(&[]))
     }
 
     /// Records real against twin.

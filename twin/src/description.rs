@@ -1,22 +1,63 @@
 //! The robot's description for programs that draw it and know its frames: the URDF that cell.toml names, else one of the built-in
 //! arm with cylinders from joint to joint. Numbers stand in full, so that frames calculated from it are the twin's.
 
-use super::xml::Document;
+use crate::arm::{ArmModel, LinkFrame, ModelError, Part, UrdfFrames};
+use crate::xml::Document;
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use shared_mem::cell::Cell;
 use shared_mem::input;
-use twin::arm::{ArmModel, Part};
+use shared_mem::recording::{RobotModel, Transform};
+use std::path::Path;
 
 /// Radius of a link at the base and at the flange [m]: an FR3's.
 const LINK_RADIUS: [f64; 2] = [0.065, 0.042];
 /// Joints closer than this have no link to be drawn between them [m].
 const SHORTEST: f64 = 1e-3;
 
-/// The URDF's text; `None` where only the names of the joints are known.
+/// The robot as recordings show it: description, frames that stay and frames that move. `None` where no arm moves, or only its
+/// joints' names are known.
 ///
 /// # Errors
-/// A URDF that cannot be read.
-pub fn description(cell: &Cell) -> anyhow::Result<Option<String>> {
+/// [`ModelError`] when cell.toml describes no arm, or its URDF cannot be read.
+pub fn shown_robot(cell: &Cell) -> Result<Option<RobotModel>, ModelError> {
+    let Some(description) = description(cell)? else { return Ok(None) };
+    let arm = ArmModel::from_cell(cell)?;
+    let file = cell.robot.as_ref().and_then(|robot| robot.urdf.as_deref()).unwrap_or(Path::new("the built-in model"));
+    shown(description, &arm, (Some(cell.base_frame()), file)).map(Some)
+}
+
+/// The same of a URDF's text, whose arm was read already.
+///
+/// # Errors
+/// [`ModelError`] when a joint of it moves in more than one way.
+pub fn shown_urdf(text: &str, arm: &ArmModel) -> Result<RobotModel, ModelError> {
+    shown(text.to_owned(), arm, (None, Path::new("robot_description")))
+}
+
+fn shown(text: String, arm: &ArmModel, (base, file): (Option<&str>, &Path)) -> Result<RobotModel, ModelError> {
+    let frames = UrdfFrames::of(&text, file)?;
+    let (root, joints) = (frames.root().to_owned(), arm.joint_names().to_vec());
+    let mut fixed: Vec<Transform> = frames.fixed(&joints).map(transform).collect();
+    if let Some(base) = base.filter(|base| *base != root) {
+        // Recordings give poses in the frame that cell.toml names.
+        let parent_from_child = Isometry3::identity();
+        fixed.push(transform(LinkFrame { parent: base, child: &root, parent_from_child }));
+    }
+    let frames_at = move |names: &[String], q: &[f64]| {
+        let moving: Vec<Transform> = frames.moving(names, q).map(transform).collect();
+        (!moving.is_empty()).then_some(moving)
+    };
+    Ok(RobotModel { description: text, root, joints, fixed, frames_at: Box::new(frames_at) })
+}
+
+fn transform(frame: LinkFrame<'_>) -> Transform {
+    let LinkFrame { parent, child, parent_from_child } = frame;
+    let (p, q) = (parent_from_child.translation.vector, parent_from_child.rotation.quaternion());
+    Transform { parent: parent.to_owned(), child: child.to_owned(), position: p.into(), wxyz: [q.w, q.i, q.j, q.k] }
+}
+
+/// The URDF's text; `None` where only the names of the joints are known.
+fn description(cell: &Cell) -> Result<Option<String>, ModelError> {
     let Some(robot) = &cell.robot else { return Ok(None) };
     if let Some(file) = &robot.urdf {
         return Ok(Some(input::text(&cell.folder.join(file), input::Kind::Robot)?));
@@ -109,12 +150,10 @@ fn numbers(values: &[f64]) -> String {
 mod tests {
     use super::*;
     use shared_mem::msg::joints_from;
-    use std::path::Path;
-    use twin::arm::UrdfFrames;
 
     #[test]
     fn frames_calculated_from_it_are_the_twin_s() {
-        let cell = Cell::parse(include_str!("../../../config/fr3_cell.toml"), Path::new("cell.toml")).expect("a cell");
+        let cell = Cell::parse(include_str!("../../config/fr3_cell.toml"), Path::new("cell.toml")).expect("a cell");
         let arm = ArmModel::from_cell(&cell).expect("an arm");
         let text = description(&cell).expect("an arm").expect("a shape");
         let frames = UrdfFrames::of(&text, Path::new("fr3.urdf")).expect("own text");

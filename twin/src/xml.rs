@@ -1,19 +1,28 @@
-//! The only code that writes XML: elements, attributes, comments, all of them escaped.
+//! The only code that writes XML: elements, attributes, comments, all of them escaped. For descriptions of robots and for models of
+//! other simulators.
 
 use quick_xml::Writer;
 use quick_xml::events::{BytesEnd, BytesStart, BytesText, Event};
 
 /// An XML document that is being written into memory.
-pub(super) struct Document {
+pub struct Document {
     writer: Writer<Vec<u8>>,
     open: Vec<String>,
 }
 
 /// Attributes in their order.
-pub(super) type Attributes<'a> = &'a [(&'a str, String)];
+pub type Attributes<'a> = &'a [(&'a str, String)];
+
+impl Default for Document {
+    fn default() -> Self {
+        Self::new()
+    }
+}
 
 impl Document {
-    pub(super) fn new() -> Self {
+    /// One with nothing but its declaration.
+    #[must_use]
+    pub fn new() -> Self {
         let mut document = Self { writer: Writer::new_with_indent(Vec::new(), b' ', 2), open: Vec::new() };
         document.write(Event::Decl(quick_xml::events::BytesDecl::new("1.0", Some("UTF-8"), None)));
         document
@@ -33,35 +42,40 @@ impl Document {
         start
     }
 
-    pub(super) fn open(&mut self, name: &str, attributes: Attributes<'_>) {
+    /// Begins an element.
+    pub fn open(&mut self, name: &str, attributes: Attributes<'_>) {
         self.write(Event::Start(Self::start(name, attributes)));
         self.open.push(name.to_owned());
     }
 
-    pub(super) fn close(&mut self) {
+    /// Ends the element that was begun last.
+    pub fn close(&mut self) {
         if let Some(name) = self.open.pop() {
             self.write(Event::End(BytesEnd::new(name)));
         }
     }
 
-    pub(super) fn leaf(&mut self, name: &str, attributes: Attributes<'_>) {
+    /// An element with nothing in it.
+    pub fn leaf(&mut self, name: &str, attributes: Attributes<'_>) {
         self.write(Event::Empty(Self::start(name, attributes)));
     }
 
     /// An element that holds a text.
-    pub(super) fn text(&mut self, name: &str, attributes: Attributes<'_>, text: &str) {
+    pub fn text(&mut self, name: &str, attributes: Attributes<'_>, text: &str) {
         self.write(Event::Start(Self::start(name, attributes)));
         self.write(Event::Text(BytesText::new(text)));
         self.write(Event::End(BytesEnd::new(name)));
     }
 
     /// A comment, in which XML allows no `--`.
-    pub(super) fn comment(&mut self, text: &str) {
+    pub fn comment(&mut self, text: &str) {
         let plain = text.replace("--", "- -").replace(['<', '>'], "'").replace(char::is_control, "_");
         self.write(Event::Comment(BytesText::from_escaped(format!(" {plain} "))));
     }
 
-    pub(super) fn finish(mut self) -> String {
+    /// Ends what is open; the text.
+    #[must_use]
+    pub fn finish(mut self) -> String {
         while !self.open.is_empty() {
             self.close();
         }
