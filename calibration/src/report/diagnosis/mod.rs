@@ -255,6 +255,7 @@ pub(super) mod tests {
             budget_spent: false,
             engine: None,
             seconds: 83.2,
+            object: None,
             session: "my monday".into(),
             files: SessionFiles { session: "my monday".into(), cell: Some("lab/cell.toml".into()) },
             seed: 7,
