@@ -1,0 +1,84 @@
+//! How often intervals hold the truth, over simulated studies of which it is known.
+
+use evaluation::statistics::{Cell, LEVEL, Pairs, Share, agreement, difference, pearson, powered};
+use rand::RngExt as _;
+use rand_pcg::Pcg64;
+
+const STUDIES: u64 = 2000;
+
+/// The share of studies in which an interval holds the truth; a study gives both.
+fn coverage(name: &str, mut study: impl FnMut(&mut Pcg64) -> (f64, [f64; 2])) -> f64 {
+    let holds = |seed: u64| {
+        let (truth, [low, high]) = study(&mut Pcg64::new(u128::from(seed), 11));
+        (low..=high).contains(&truth)
+    };
+    let share = Share::of((0..STUDIES).map(holds)).value();
+    println!("{name}: {share:.4}");
+    share
+}
+
+fn trials(generator: &mut Pcg64, p: f64, count: u64) -> Share {
+    Share::of((0..count).map(|_| generator.random_bool(p)))
+}
+
+#[test]
+fn intervals_hold_the_truth_as_often_as_they_say() {
+    let share = coverage("share", |generator| {
+        let (p, count) = (generator.random_range(0.05..0.95), generator.random_range(20..100));
+        (p, trials(generator, p, count).interval(LEVEL))
+    });
+    let two = coverage("difference", |generator| {
+        let [p, q] = [(); 2].map(|()| generator.random_range(0.05..0.95));
+        let [n, m] = [(); 2].map(|()| generator.random_range(20..100));
+        let [_, low, high] = difference(trials(generator, p, n), trials(generator, q, m), LEVEL);
+        (p - q, [low, high])
+    });
+    let paired = coverage("difference of pairs", |generator| {
+        // How hard a start is acts on both.
+        let [p, q] = [(); 2].map(|()| generator.random_range(0.1..0.9));
+        let shared = generator.random_range(0.0..0.9);
+        let pairs = Pairs::of((0..60).map(|_| correlated(generator, [p, q], shared)));
+        let [_, low, high] = pairs.difference(LEVEL);
+        (p - q, [low, high])
+    });
+    let few_and_many = coverage("few real and many simulated", |generator| {
+        let [p, q] = [(); 2].map(|()| generator.random_range(0.1..0.9));
+        let shared = generator.random_range(0.0..0.9);
+        let pairs: Vec<[bool; 2]> = (0..60).map(|_| correlated(generator, [p, q], shared)).collect();
+        let more: Vec<bool> = (0..300).map(|_| generator.random_bool(q)).collect();
+        (p, powered(&pairs, &more, LEVEL).expect("pairs").interval)
+    });
+    for (name, share) in [("share", share), ("two", two), ("paired", paired), ("few and many", few_and_many)] {
+        assert!((0.93..=0.97).contains(&share), "{name}: {share}");
+    }
+}
+
+/// Two outcomes of one start: with the chance `shared` one draw decides both.
+fn correlated(generator: &mut Pcg64, [p, q]: [f64; 2], shared: f64) -> [bool; 2] {
+    if generator.random_bool(shared) {
+        let draw: f64 = generator.random();
+        [draw < p, draw < q]
+    } else {
+        [generator.random_bool(p), generator.random_bool(q)]
+    }
+}
+
+#[test]
+fn a_correlation_s_interval_holds_that_of_the_true_shares() {
+    let found = coverage("correlation", |generator| {
+        let truth: Vec<[f64; 2]> = (0..12)
+            .map(|_| {
+                let p: f64 = generator.random_range(0.1..0.9);
+                [p, (p + generator.random_range(-0.2..0.2)).clamp(0.02, 0.98)]
+            })
+            .collect();
+        let cells: Vec<Cell> = truth
+            .iter()
+            .map(|[p, q]| Cell { simulated: trials(generator, *p, 200), real: trials(generator, *q, 60) })
+            .collect();
+        let [first, second] = [0, 1].map(|k| truth.iter().map(|pair| pair[k]).collect::<Vec<f64>>());
+        let seed = generator.random();
+        (pearson(&first, &second), agreement(&cells, &[0; 12], LEVEL, seed).expect("cells").pearson_interval)
+    });
+    assert!((0.93..=0.97).contains(&found), "{found}");
+}
