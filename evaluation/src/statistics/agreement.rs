@@ -1,12 +1,14 @@
 //! How far shares of success in one world predict those in another, policy by policy: linearly, and by their order.
 
 use super::share::Share;
-use rand::RngExt as _;
+use rand_distr::{Binomial, Distribution as _};
 use rand_pcg::Pcg64;
 use serde::Serialize;
 
 /// Drawings of other sets of trials.
-const DRAWINGS: usize = 2000;
+const DRAWINGS: usize = 500;
+/// Scatter never counts for more than the rest of a variance.
+const LEAST: f64 = 0.2;
 /// Stream of what is drawn here.
 const STREAM: u128 = 0x6167_7265_65;
 
@@ -46,7 +48,7 @@ pub struct Agreement {
     pub cells: usize,
     /// Pearson's correlation of the shares.
     pub pearson: f64,
-    /// Its interval.
+    /// Interval of the correlation that the shares would have after trials without end.
     pub pearson_interval: [f64; 2],
     /// Mean maximum rank violation.
     pub rank_violation: f64,
@@ -56,34 +58,39 @@ pub struct Agreement {
 
 /// How two worlds agree about cells; `None` for less than three of them. Rank violations are counted within `groups`, which name
 /// the task of each cell: shares on different tasks are in no order. `seed` draws the bootstrap.
+///
+/// Trials scatter shares more widely than the policies differ, which lowers a correlation. So trials are drawn again from shares that
+/// are drawn in towards their mean by what scatter explains, and each correlation is divided by what scatter leaves of it
+/// (Spearman 1904); the interval is the middle part of what comes of that.
 #[must_use]
 pub fn agreement(cells: &[Cell], groups: &[usize], level: f64, seed: u64) -> Option<Agreement> {
     if cells.len() < 3 {
         return None;
     }
     let mut generator = Pcg64::new(u128::from(seed), STREAM);
-    let values = |cells: &[Cell]| -> [Vec<f64>; 2] {
-        [cells.iter().map(|cell| cell.simulated.value()).collect(), cells.iter().map(|cell| cell.real.value()).collect()]
-    };
-    let [simulated, real] = values(cells);
-    let (r, violation) = (pearson(&simulated, &real), violation(&simulated, &real, groups));
+    let side = |of: fn(&Cell) -> Share| -> Vec<Share> { cells.iter().map(of).collect() };
+    let [simulated, real] = [side(|cell| cell.simulated), side(|cell| cell.real)];
+    let [probable, true_ones] = [drawn_in(&simulated), drawn_in(&real)];
     let (mut correlations, mut violations) = (Vec::new(), Vec::new());
     for _ in 0..DRAWINGS {
-        let again: Vec<Cell> = cells
-            .iter()
-            .map(|cell| Cell { simulated: redrawn(cell.simulated, &mut generator), real: redrawn(cell.real, &mut generator) })
-            .collect();
-        let [simulated, real] = values(&again);
-        correlations.push(pearson(&simulated, &real));
-        violations.push(self::violation(&simulated, &real, groups));
+        let again = [redrawn(&simulated, &probable, &mut generator), redrawn(&real, &true_ones, &mut generator)];
+        let [first, second] = [values(&again[0]), values(&again[1])];
+        let left = (reliability(&again[0]) * reliability(&again[1])).sqrt();
+        correlations.push((pearson(&first, &second) / left).clamp(-1.0, 1.0));
+        violations.push(violation(&first, &second, groups));
     }
+    let [first, second] = [values(&simulated), values(&real)];
     Some(Agreement {
         cells: cells.len(),
-        pearson: r,
-        pearson_interval: turned_over(r, correlations, level),
-        rank_violation: violation,
+        pearson: pearson(&first, &second),
+        pearson_interval: percentiles(correlations, level),
+        rank_violation: violation(&first, &second, groups),
         rank_violation_interval: percentiles(violations, level),
     })
+}
+
+fn values(shares: &[Share]) -> Vec<f64> {
+    shares.iter().map(|share| share.value()).collect()
 }
 
 /// Mean over all cells of the largest violation within their groups.
@@ -101,10 +108,35 @@ fn violation(simulated: &[f64], real: &[f64], groups: &[usize]) -> f64 {
     named.into_iter().map(of).sum::<f64>() / real.len() as f64
 }
 
-/// As many trials again, with the share that Jeffreys's prior expects behind it, so that none is certain.
-fn redrawn(share: Share, generator: &mut Pcg64) -> Share {
-    let p = (share.successes as f64 + 0.5) / (share.trials as f64 + 1.0);
-    Share::of((0..share.trials).map(|_| generator.random_bool(p)))
+/// How much of the variance of shares is no scatter of trials; no less than [`LEAST`], below which it is not known.
+fn reliability(shares: &[Share]) -> f64 {
+    let values = values(shares);
+    let count = values.len() as f64;
+    let mean = values.iter().sum::<f64>() / count;
+    let variance = values.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / (count - 1.0);
+    let of = |share: &Share| share.value() * (1.0 - share.value()) / (share.trials.max(2) - 1) as f64;
+    let scatter = shares.iter().map(of).sum::<f64>() / count;
+    if variance > 0.0 { (1.0 - scatter / variance).max(LEAST) } else { LEAST }
+}
+
+/// Shares as far from their mean as they would be without scatter, none of them certain.
+fn drawn_in(shares: &[Share]) -> Vec<f64> {
+    let (values, narrower) = (values(shares), reliability(shares).sqrt());
+    let mean = values.iter().sum::<f64>() / values.len() as f64;
+    let of = |(value, share): (&f64, &Share)| {
+        let end = 0.5 / (share.trials as f64 + 1.0);
+        (mean + narrower * (value - mean)).clamp(end, 1.0 - end)
+    };
+    values.iter().zip(shares).map(of).collect()
+}
+
+/// As many trials again.
+fn redrawn(shares: &[Share], chances: &[f64], generator: &mut Pcg64) -> Vec<Share> {
+    let of = |(share, chance): (&Share, &f64)| {
+        let successes = Binomial::new(share.trials, *chance).map_or(0, |trials| trials.sample(generator));
+        Share { successes, ..*share }
+    };
+    shares.iter().zip(chances).map(of).collect()
 }
 
 /// The ends of the middle part of what was drawn.
@@ -116,13 +148,6 @@ fn percentiles(mut drawn: Vec<f64>, level: f64) -> [f64; 2] {
         drawn.get(place).copied().unwrap_or(f64::NAN)
     };
     [at(0.5 - 0.5 * level), at(0.5 + 0.5 * level)]
-}
-
-/// The interval of a correlation: what was drawn scatters about `r` as `r` does about the truth, on Fisher's scale.
-fn turned_over(r: f64, drawn: Vec<f64>, level: f64) -> [f64; 2] {
-    let fisher = |r: f64| r.clamp(-0.999_999, 0.999_999).atanh();
-    let [low, high] = percentiles(drawn.into_iter().map(fisher).collect(), level);
-    [(2.0 * fisher(r) - high).tanh(), (2.0 * fisher(r) - low).tanh()]
 }
 
 #[cfg(test)]

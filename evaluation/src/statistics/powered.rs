@@ -41,7 +41,8 @@ pub fn powered(pairs: &[[bool; 2]], more: &[bool], level: f64) -> Option<Powered
     } else {
         (covariance / (spread * (1.0 + n / others))).clamp(0.0, 1.0)
     };
-    let shift = if lambda > 0.0 { mean(&mut more.iter().map(|success| number(*success)), others) - simulated } else { 0.0 };
+    let shift =
+        if lambda > 0.0 { mean(&mut more.iter().map(|success| number(*success)), others) - simulated } else { 0.0 };
     let value = (real + lambda * shift).clamp(0.0, 1.0);
     // In units of one real trial's variance; without any the real trials alone count.
     let left = own - 2.0 * lambda * covariance + lambda * lambda * spread * (1.0 + n / others);

@@ -49,7 +49,8 @@ mod tests {
     #[test]
     fn statistics_are_those_of_scipy() {
         // scipy.stats.kruskal of the same lists.
-        let trials = |successes: usize, count: usize| -> Vec<f64> { (0..count).map(|i| f64::from(i < successes)).collect() };
+        let trials =
+            |successes: usize, count: usize| -> Vec<f64> { (0..count).map(|i| f64::from(i < successes)).collect() };
         let found = kruskal_wallis(&[&trials(17, 20), &trials(11, 20)]).expect("two groups");
         assert!((found.h - 4.178_571_428_571_428).abs() < 1e-9 && (found.p - 0.040_937_9).abs() < 1e-6, "{found:?}");
         let found = kruskal_wallis(&[&[1.0, 3.0, 5.0, 7.0, 9.0], &[2.0, 4.0, 6.0, 8.0, 10.0]]).expect("two groups");

@@ -27,8 +27,8 @@ Examples:
   twin task tasks/pick_carrot.toml --episodes 50 --noise 0.003 --record carrot
   twin task tasks/pick_carrot.toml --json
 
-JSON: task, successes, and for each of episodes seed, duration_s, at_rest, at_rest_since_s, success, arm_fault (what the arm
-cannot do of the motion), contacts (names of bodies that press on each other), and bodies: name, start and end (position, orientation_wxyz, joint), speed_m_s.")]
+JSON: task, successes, and for each of episodes seed, duration_s, at_rest, at_rest_since_s, success, progress (0 to 1: how far it
+came), missed (conditions that did not hold at the end), arm_fault (what the arm cannot do of the motion), contacts (names of bodies that press on each other), and bodies: name, start and end (position, orientation_wxyz, joint), speed_m_s.")]
 pub(crate) struct Task {
     /// The task file
     #[arg(value_name = "TASK.toml")]

@@ -29,6 +29,8 @@ pub(super) struct Carrier {
 pub(super) struct Way {
     q: Option<Joints>,
     dq: Joints,
+    /// What the encoders read, where the arm is not where it is commanded to be.
+    reading: Option<JointState>,
     /// What it cannot do, at first.
     pub(super) fault: Option<String>,
 }
@@ -44,7 +46,17 @@ impl Way {
         (self.q, self.dq) = (Some(q), dq);
     }
 
-    /// Where the joints are [rad]; `None` before it has reached anything.
+    /// The encoders of an arm that is not where it is commanded to be read this.
+    pub(super) fn read(&mut self, reading: JointState) {
+        self.reading = Some(reading);
+    }
+
+    /// Commanded speeds of the joints [rad/s].
+    pub(super) fn speeds(&self) -> &Joints {
+        &self.dq
+    }
+
+    /// Where the joints are commanded to be [rad]; `None` before it has reached anything.
     pub(super) fn joints(&self) -> Option<&Joints> {
         self.q.as_ref()
     }
@@ -101,6 +113,11 @@ impl Carrier {
         self.model.reach(self.model.ready(), &self.flange_from_body, &(self.base_from_world * body))
     }
 
+    /// The flange in the arm's base with which the carried body is at a pose in the world.
+    pub(super) fn flange_for(&self, body: &Isometry3<f64>) -> Isometry3<f64> {
+        self.base_from_world * body * self.flange_from_body.inverse()
+    }
+
     /// Joints near to others that bring the flange as near to a pose in the arm's base as they can.
     pub(super) fn nearest(&self, from: &Joints, flange: &Isometry3<f64>) -> Nearest {
         self.model.nearest(&self.limits, from, flange)
@@ -146,7 +163,8 @@ impl Carrier {
     /// As a robot reports itself; its stamps do not count. `None` before it has reached anything.
     pub(super) fn state(&self, way: &Way, world: &World) -> Option<ArmState> {
         let (q_d, dq_d) = (way.q?, way.dq);
-        let JointState { q, dq } = world.arm(self.body).unwrap_or(JointState { q: q_d, dq: dq_d });
+        let reading = way.reading.or_else(|| world.arm(self.body));
+        let JointState { q, dq } = reading.unwrap_or(JointState { q: q_d, dq: dq_d });
         Some(ArmState {
             dof: self.model.dof() as u32,
             mode: ArmMode::Move,

@@ -2,7 +2,9 @@
 
 use super::Task;
 use super::arm::Way;
+use super::cell::Servo;
 use super::motion::Motions;
+use super::progress::Progress;
 use super::start::{Placed, StartError};
 use crate::world::{STEP, World};
 use nalgebra::Isometry3;
@@ -64,6 +66,10 @@ pub struct Episode {
     pub at_rest_since_s: Option<f64>,
     /// Whether all conditions held for as long as they have to, and the arm, where there is one, can do it.
     pub success: bool,
+    /// How far it came towards success: 0 as at the start, 1 success.
+    pub progress: f64,
+    /// Conditions of success that did not hold at the end, in words.
+    pub missed: Vec<String>,
     /// What of the motion the arm cannot do, at first.
     pub arm_fault: Option<String>,
     /// Joints of an arm that gives way, at the start and at the end.
@@ -134,13 +140,22 @@ impl Task {
         let mut run = Course::new();
         let mut way = Way::default();
         self.carry(&mut way, (&motions, &poses), 0);
+        let mut progress = Progress::begin(self, &world);
+        let mut servo = way.joints().and_then(|q| Servo::begin(self, q));
         watch(0, &Scene { world: &world, motions: &motions, starts: &poses, way: &way });
         while run.done < steps && !run.is_success(self.hold) {
             motions.act(&mut world, &poses, run.done);
+            if let Some(servo) = &mut servo {
+                self.obey(servo, &way, &mut world, run.done);
+            }
             world.step();
             run.count(self, &world);
             if run.done.is_multiple_of(STEPS_A_ROW) {
+                progress.look(self, &world);
                 self.carry(&mut way, (&motions, &poses), run.done);
+                if let Some(servo) = &servo {
+                    way.read(servo.reading());
+                }
                 watch(run.done, &Scene { world: &world, motions: &motions, starts: &poses, way: &way });
             }
         }
@@ -151,12 +166,15 @@ impl Task {
             end: Place::of(&world, body),
             speed_m_s: world.speed(body),
         });
+        let success = run.is_success(self.hold) && way.fault.is_none();
         Ok(Episode {
             seed: how.seed,
             duration_s: run.done as f64 * STEP,
             at_rest,
             at_rest_since_s: at_rest.then_some(run.moved as f64 * STEP),
-            success: run.is_success(self.hold) && way.fault.is_none(),
+            success,
+            progress: progress.best(success),
+            missed: if success { Vec::new() } else { self.missed(&world) },
             arm_fault: way.fault,
             arm: start_q.zip(joints(&world)).map(|(start_q, end_q)| ArmEnd { start_q, end_q }),
             bodies: bodies.collect(),
@@ -170,6 +188,14 @@ impl Task {
             let [now, next] = [done, done + 1].map(|done| commanded(motions, starts, carrier.body, done));
             carrier.follow(way, [&now, &next], (done as f64 * STEP, STEP));
         }
+    }
+
+    /// Has the arm follow its way for a step, from the last row of it on, and what it carries with it.
+    fn obey(&self, servo: &mut Servo, way: &Way, world: &mut World, done: usize) {
+        let (Some(carrier), Some(q)) = (&self.carrier, way.joints()) else { return };
+        let since = ((done % STEPS_A_ROW) + 1) as f64 * STEP;
+        let q_d = std::array::from_fn(|i| q[i] + since * way.speeds()[i]);
+        world.move_to(carrier.body, &carrier.body_at(&servo.step(&q_d, way.speeds())));
     }
 
     fn contacts(&self, world: &World) -> Vec<[String; 2]> {

@@ -54,6 +54,19 @@ impl Gripper {
         Some((if open == wider { high } else { low }, joint.drive?.force))
     }
 
+    /// Position and force for an opening [m], as near to it as the fingers go.
+    pub(super) fn order_width(&self, bodies: &[BodyPlan], width: f64) -> Option<(f64, f64)> {
+        let joint = slides(&bodies[self.fingers[0]])?;
+        let [low, high] = joint.limits;
+        Some((((width - self.opening) / self.per_position).max(low).min(high), joint.drive?.force))
+    }
+
+    /// Opening when it is closed and when it is open, as far as it goes [m].
+    pub(super) fn range(&self, bodies: &[BodyPlan]) -> Option<[f64; 2]> {
+        let ends = slides(&bodies[self.fingers[0]])?.limits.map(|at| (self.opening + self.per_position * at).max(0.0));
+        Some([ends[0].min(ends[1]), ends[0].max(ends[1])])
+    }
+
     /// What it does now.
     pub(super) fn state(&self, world: &World, bodies: usize) -> Option<GripperState> {
         let [finger, other] = self.fingers;

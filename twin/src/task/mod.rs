@@ -9,36 +9,50 @@
 //! | `surface` | the convex pieces of a body |
 //! | `start` | where bodies start: drawn by a seed until none overlap |
 //! | `arm` | the arm that carries a moved body: joints, and what it cannot do |
+//! | `cell` | the cell in which it is carried out: the arm under its controller, what was identified |
 //! | `camera` | pictures of an episode, drawn afterwards |
 //! | `condition` | what counts as success |
 //! | `motion` | where moved bodies go and what drives do, by time |
+//! | `progress` | how far a run came towards success |
 //! | `episode` | one run: did it come to rest, where, and was it a success |
 //! | `gripper` | two fingers on geared joints as a gripper with an opening |
 //! | `demonstration` | a run as the rows of a clip |
+//! | `numbers` | which numbers of a run are state, surroundings and action, for whoever learns |
+//! | `reported` | what a robot reports as a row of a task, and what an action asks of its joints |
 //! | `steered` | a run that a person steers |
+//! | `acting` | a run that a policy steers |
 
+mod acting;
 mod arm;
 mod articulated;
 mod camera;
+mod cell;
 mod condition;
 mod demonstration;
 mod episode;
 mod file;
 mod gripper;
 mod motion;
+mod numbers;
+mod progress;
 mod read;
+mod reported;
 mod start;
 mod steered;
 mod surface;
 
+pub use acting::{Acting, ActingEnd, Action};
 pub use camera::{TaskCamera, TaskPicture, TaskView};
+pub use cell::InCellError;
 pub use demonstration::ROWS_A_SECOND;
 pub use episode::{ArmEnd, BodyEnd, Episode, Place, Run};
+pub use numbers::{Numbers, Signs};
 pub use start::StartError;
 pub use steered::{Jog, SteerError, Steered};
 
 use crate::world::{BodyPlan, Hold, World};
 use arm::Carrier;
+use cell::TaskCell;
 use condition::Condition;
 use gripper::Gripper;
 use motion::Motions;
@@ -63,6 +77,8 @@ pub struct Task {
     gripper: Option<Gripper>,
     cameras: Vec<TaskCamera>,
     carrier: Option<Carrier>,
+    /// Where it is carried out; `None`: everything moved is where it is commanded to be.
+    cell: Option<TaskCell>,
     /// For how long all conditions have to hold [s].
     hold: f64,
     /// How long an episode takes at most [s].
@@ -106,6 +122,12 @@ impl Task {
     #[must_use]
     pub fn conditions(&self) -> Vec<String> {
         self.conditions.iter().map(|condition| condition.words(&self.bodies)).collect()
+    }
+
+    /// Opening of the gripper when it is closed and when it is open [m]; `None` without one.
+    #[must_use]
+    pub fn gripper_range(&self) -> Option<[f64; 2]> {
+        self.gripper.as_ref()?.range(&self.bodies)
     }
 
     /// Whether it has fingers to open and close.

@@ -90,6 +90,7 @@ pub(super) fn parse(text: &str, path: &Path) -> Result<Task, TomlFileError> {
         gripper,
         cameras,
         carrier,
+        cell: None,
         hold,
         horizon,
     };
@@ -366,7 +367,7 @@ fn camera(entry: &CameraEntry, cameras: &[TaskCamera]) -> Result<TaskCamera, Fau
 }
 
 /// The bodies as the world has them: what an arm that gives way carries is held by the arm.
-fn held(bodies: &[BodyPlan], carrier: Option<&Carrier>) -> Vec<BodyPlan> {
+pub(super) fn held(bodies: &[BodyPlan], carrier: Option<&Carrier>) -> Vec<BodyPlan> {
     let mut bodies = bodies.to_vec();
     if let Some(carrier) = carrier {
         let body = &mut bodies[carrier.body];

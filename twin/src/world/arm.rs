@@ -27,6 +27,14 @@ pub struct ArmPlan {
     pub damping: Joints,
 }
 
+impl ArmPlan {
+    /// Where the carried body starts, in the world.
+    #[must_use]
+    pub fn body_at_start(&self) -> Isometry3<f64> {
+        self.base * self.model.flange(&self.start).isometry() * self.flange_from_body
+    }
+}
+
 /// The arm within a world.
 #[derive(Debug, Clone)]
 pub(super) struct Arm {

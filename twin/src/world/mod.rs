@@ -65,7 +65,6 @@ pub struct World {
 
 #[derive(Debug, Clone)]
 struct Shaped {
-    friction: f64,
     pad_radius: f64,
     radius: f64,
     is_fixed: bool,
@@ -86,6 +85,7 @@ struct PieceNow {
 #[derive(Debug, Clone)]
 struct PiecePair {
     pieces: [usize; 2],
+    friction: f64,
     found_by: Search,
     memory: Memory,
 }
@@ -116,7 +116,6 @@ impl World {
             pieces.extend(plan.pieces.iter().map(now));
             let reach = |piece: &Piece| piece.at.translation.vector.norm() + piece.hull.radius;
             bodies.push(Shaped {
-                friction: plan.friction,
                 pad_radius: plan.pad_radius,
                 radius: plan.pieces.iter().map(reach).fold(0.0, f64::max),
                 is_fixed: matches!(plan.hold, Hold::Fixed(_)),
@@ -200,6 +199,17 @@ impl World {
         self.trees.set_twist(body, &Vector3::zeros(), &Vector3::zeros());
         self.trees.place();
         self.locate();
+    }
+
+    /// Gives two bodies a Coulomb friction of their own, in place of the larger one of theirs.
+    pub fn set_friction(&mut self, bodies: [usize; 2], friction: f64) {
+        let Self { pairs, pieces, .. } = self;
+        for pair in pairs {
+            let between = pair.pieces.map(|piece| pieces[piece].body);
+            if between == bodies || between == [bodies[1], bodies[0]] {
+                pair.friction = friction;
+            }
+        }
     }
 
     /// Pose of a body's origin.
@@ -312,9 +322,8 @@ impl World {
                 pair.memory = Memory::NONE;
                 continue;
             };
-            let of = |of: fn(&Shaped) -> f64| of(&self.bodies[first]).max(of(&self.bodies[second]));
-            let (friction, pad) = (of(|body| body.friction), of(|body| body.pad_radius));
-            let mut patch = Patch::new(&touching, friction, pad, &pair.memory, STEP);
+            let pad = self.bodies[first].pad_radius.max(self.bodies[second].pad_radius);
+            let mut patch = Patch::new(&touching, pair.friction, pad, &pair.memory, STEP);
             self.trees.connect(&mut patch, first, second);
             patch.begin(&mut self.trees.velocities);
             self.patches.push((i, patch));
@@ -334,7 +343,8 @@ fn pairs(plans: &[BodyPlan], pieces: &[PieceNow], trees: &Trees) -> Vec<PiecePai
             let (a, b) = (pieces[i].body, pieces[j].body);
             let moves = !trees.is_held(a) || !trees.is_held(b);
             if a != b && moves && parent(a) != Some(b) && parent(b) != Some(a) {
-                found.push(PiecePair { pieces: [i, j], found_by: Search::NONE, memory: Memory::NONE });
+                let friction = plans[a].friction.max(plans[b].friction);
+                found.push(PiecePair { pieces: [i, j], friction, found_by: Search::NONE, memory: Memory::NONE });
             }
         }
     }

@@ -130,6 +130,15 @@ impl BodyPlan {
         Self { name: name.into(), pieces, mass, centre_of_mass, inertia, friction: 0.0, pad_radius: 0.0, hold }
     }
 
+    /// The force of its joint's drive, where it has one [N or N m].
+    #[must_use]
+    pub fn drive_force(&self) -> Option<f64> {
+        match &self.hold {
+            Hold::Joint(joint) => joint.drive.map(|drive| drive.force),
+            _ => None,
+        }
+    }
+
     /// The same with a friction.
     #[must_use]
     pub fn with_friction(self, friction: f64) -> Self {

@@ -205,7 +205,6 @@ pub(super) mod tests {
             after: vec![[0.0, 0.1], [2.9, -0.1]],
         };
         Diagnosis {
-            object: None,
             verdict: Verdict {
                 kind: Kind::Named,
                 effects: vec!["command_delay".into()],

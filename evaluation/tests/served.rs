@@ -1,0 +1,116 @@
+//! A policy behind openpi's protocol: a small server in this process plays what a script would do, or answers with nonsense.
+
+use evaluation::policy::{ActionKind, Array, Keys, Served, pack, unpack};
+use evaluation::rollout::{Asking, RunError, run};
+use rmpv::Value;
+use std::net::TcpListener;
+use std::path::Path;
+use std::sync::Arc;
+use std::thread;
+use tungstenite::Message;
+use twin::task::{Numbers, Run, Signs, Task};
+
+/// Serves one client at an address of its own: metadata, then an answer to each observation; `None` closes the connection.
+fn serve(mut answer: impl FnMut(&Value) -> Option<Message> + Send + 'static) -> String {
+    let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
+    let address = format!("ws://{}", listener.local_addr().expect("an address"));
+    thread::spawn(move || {
+        let (stream, _) = listener.accept().expect("a client");
+        let mut socket = tungstenite::accept(stream).expect("a handshake");
+        let metadata = Value::Map(vec![("name".into(), "test".into())]);
+        socket.send(Message::Binary(pack(&metadata).into())).expect("a client");
+        while let Ok(Message::Binary(bytes)) = socket.read() {
+            let Some(message) = answer(&unpack(&bytes).expect("an observation")) else { break };
+            if socket.send(message).is_err() {
+                break;
+            }
+        }
+    });
+    address
+}
+
+fn actions(rows: &[Vec<f32>]) -> Message {
+    let rows = rows.iter().map(|row| Value::Array(row.iter().map(|value| Value::from(*value)).collect())).collect();
+    Message::Binary(pack(&Value::Map(vec![("actions".into(), Value::Array(rows))])).into())
+}
+
+fn task() -> Arc<Task> {
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tasks/pick_carrot.toml");
+    Arc::new(Task::read(&file).expect("a task that ships"))
+}
+
+fn asking(keys: &[&str], task: &Task) -> Asking {
+    let keys: Vec<String> = keys.iter().map(|key| (*key).to_owned()).collect();
+    let keys = Keys::read(&keys, task).expect("keys");
+    Asking { keys, actions: ActionKind::Recorded, rate: 20, chunk: Some(4) }
+}
+
+fn entry<'a>(observation: &'a Value, key: &str) -> &'a Value {
+    let pairs = observation.as_map().expect("a map");
+    &pairs.iter().find(|(found, _)| found.as_str() == Some(key)).unwrap_or_else(|| panic!("no {key}")).1
+}
+
+#[test]
+fn a_served_policy_sees_pictures_and_numbers_and_what_it_asks_for_is_done() {
+    let task = task();
+    let (numbers, mut signs) = (Numbers::of(&task), Signs::default());
+    let (_, shown) = task.demonstration(&Run { seed: 4, duration: task.horizon(), noise: 0.0 }).expect("a script");
+    let by_heart: Vec<Vec<f32>> = shown
+        .moments
+        .windows(6)
+        .step_by(5)
+        .map(|rows| {
+            let _now = numbers.state(&rows[0], &mut signs);
+            numbers.action(&rows[5], &signs)
+        })
+        .collect();
+    let mut asked = 0;
+    let address = serve(move |observation| {
+        let state = Array::read(entry(observation, "observation/state")).expect("an array");
+        assert_eq!(state.shape, [15]);
+        assert_eq!(Array::read(entry(observation, "seen")).expect("a picture").shape, [240, 320, 3]);
+        assert_eq!(Array::read(entry(observation, "observation/depth/front")).expect("a picture").shape, [240, 320]);
+        let gripper = Array::read(entry(observation, "observation/gripper_position")).expect("an array");
+        assert!((0.0..=1.0).contains(&gripper.values[0]));
+        assert!(entry(observation, "prompt").as_str().is_some_and(|prompt| prompt.contains("carrot")));
+        // Two more than are taken of a chunk.
+        let chunk: Vec<Vec<f32>> =
+            (asked..asked + 6).map(|i: usize| by_heart[i.min(by_heart.len() - 1)].clone()).collect();
+        asked += 4;
+        Some(actions(&chunk))
+    });
+    let mut policy = Served::connect(&address).expect("a policy");
+    assert_eq!(entry(policy.metadata(), "name").as_str(), Some("test"));
+    let (outcome, recorded) =
+        run(&task, 4, &mut policy, &asking(&["image/front=seen"], &task), || false).expect("an episode");
+    assert!(outcome.success && outcome.progress == 1.0 && outcome.stills.is_empty(), "{outcome:?}");
+    assert!(recorded.info.success && recorded.moments.len() > 500);
+}
+
+#[test]
+fn whatever_a_server_answers_is_an_error_in_a_line_or_an_action() {
+    let task = task();
+    let ask = |answer: fn() -> Option<Message>| {
+        let mut policy = Served::connect(&serve(move |_| answer())).expect("a policy");
+        run(&task, 0, &mut policy, &asking(&[], &task), || false)
+    };
+    let cases: [(fn() -> Option<Message>, &str); 6] = [
+        (|| Some(Message::Text("Traceback\n  File x\nValueError: no such key\n".into())), "ValueError: no such key"),
+        (|| None, "fell silent"),
+        (|| Some(Message::Binary(vec![0xc1, 0, 1].into())), "no msgpack"),
+        (|| Some(Message::Binary(pack(&Value::Map(Vec::new())).into())), "no `actions`"),
+        (|| Some(actions(&[vec![1.0, 2.0]])), "an action has 15 numbers"),
+        (|| Some(actions(&[vec![f32::NAN; 15]])), "of an action is NaN"),
+    ];
+    for (answer, words) in cases {
+        let error = ask(answer).expect_err(words).to_string();
+        assert!(error.contains(words) && !error.contains('\n'), "{error}");
+    }
+    // What would harm a robot is no error of the evaluation but a failure of the policy.
+    let (outcome, _) = ask(|| Some(actions(&[vec![9.0; 15]]))).expect("an outcome");
+    assert!(!outcome.success && outcome.fault.is_some() && !outcome.stills.is_empty(), "{outcome:?}");
+    let absent = Served::connect("ws://127.0.0.1:9").expect_err("nobody").to_string();
+    assert!(absent.contains("start its server"), "{absent}");
+    let mut policy = Served::connect(&serve(|_| Some(actions(&[vec![0.0; 15]])))).expect("a policy");
+    assert!(matches!(run(&task, 0, &mut policy, &asking(&[], &task), || true), Err(RunError::Interrupted)));
+}
