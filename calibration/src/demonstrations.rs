@@ -2,14 +2,12 @@
 //! drawn now. Episodes that were no success are left out.
 
 use import::{DataSetError, DataSetPlan, DataSetWriter, Feature, FeatureKind, Frames};
-use nalgebra::Quaternion;
 use serde::Serialize;
 use shared_mem::msg::image::PixelEncoding;
 use shared_mem::output::{OutputError, OutputFolder};
-use shared_mem::recording::{Episode, EpisodeMoment, ReadError, RigidPose, pack_picture, read_episode};
+use shared_mem::recording::{EpisodeMoment, ReadError, pack_picture, read_episode};
 use std::path::{Path, PathBuf};
-use twin::task::{ROWS_A_SECOND, Task, TaskView};
-use twin::world::Hold;
+use twin::task::{Numbers, ROWS_A_SECOND, Signs, Task, TaskView};
 
 /// Features by LeRobot's names.
 const STATE: &str = "observation.state";
@@ -86,13 +84,13 @@ pub enum ExportError {
 /// [`ExportError`]; nothing is there then.
 pub fn export(order: Order<'_>, mut after_each: impl FnMut()) -> Result<Exported, ExportError> {
     let Order { task, clips, to, every, folder } = order;
-    let layout = Layout::of(task);
+    let numbers = Numbers::of(task);
     let rate = ROWS_A_SECOND / every;
     let mut views: Vec<TaskView> = task.cameras().iter().map(|camera| task.view(camera)).collect();
     if to == Target::Png && views.is_empty() {
         return Err(ExportError::Nothing("the task has no camera; add a [[camera]] block (docs/tasks.md)"));
     }
-    let features = layout.features(task);
+    let features = features(task, &numbers);
     let names: Vec<String> = features.iter().map(|feature| feature.name.clone()).collect();
     let names = names.into_iter().filter(|name| to == Target::LeRobot || name.starts_with(PICTURES)).collect();
     let mut done = Exported { episodes: 0, frames: 0, rate, features: names, left_out: Vec::new() };
@@ -106,7 +104,7 @@ pub fn export(order: Order<'_>, mut after_each: impl FnMut()) -> Result<Exported
     };
     for file in clips {
         let episode = read_episode(file)?;
-        layout.fits(&episode).map_err(|what| ExportError::Clip { file: file.clone(), what })?;
+        numbers.fits(&episode).map_err(|what| ExportError::Clip { file: file.clone(), what })?;
         let rows: Vec<&EpisodeMoment> = episode.moments.iter().step_by(every as usize).collect();
         if !episode.info.success {
             done.left_out.push(file.clone());
@@ -114,7 +112,7 @@ pub fn export(order: Order<'_>, mut after_each: impl FnMut()) -> Result<Exported
             let pictures = drawn(&mut views, rows_with_next);
             match &mut sink {
                 Sink::DataSet(writer) => {
-                    let mut frames = layout.numbers(&rows);
+                    let mut frames = frames(&numbers, &rows);
                     frames.extend(pictures.into_iter().map(Frames::Pictures));
                     writer.episode(&frames)?;
                 }
@@ -175,133 +173,30 @@ fn write_pictures(
     Ok(())
 }
 
-/// Which numbers of an episode go where, by the task.
-struct Layout<'a> {
-    bodies: Vec<&'a str>,
-    /// Moved bodies, by their place in the task.
-    moved: Vec<(usize, &'a str)>,
-    /// Bodies that nothing but contacts moves.
-    free: Vec<(usize, &'a str)>,
-    /// Joints with a drive that is not the gripper's: by their place among joints and among drives.
-    driven: Vec<(usize, usize, &'a str)>,
-    /// Joints that nothing but contacts moves, by their place among joints.
-    passive: Vec<(usize, &'a str)>,
-    gripper: bool,
-    /// Joints of the arm; none without one.
-    arm: &'a [String],
+/// What a frame holds, by LeRobot's names.
+fn features(task: &Task, numbers: &Numbers) -> Vec<Feature> {
+    let commanded = numbers.state_names();
+    let all = [(STATE, commanded.clone()), (SURROUNDINGS, numbers.surroundings_names()), (ACTION, commanded)];
+    let all = all.into_iter().filter(|(_, names)| !names.is_empty());
+    let all = all.map(|(name, names)| Feature { name: name.into(), kind: FeatureKind::Numbers(names) });
+    let pictures = task.cameras().iter().flat_map(|camera| {
+        [("", PixelEncoding::Rgb8), ("_depth", PixelEncoding::Depth16)].map(|(ending, encoding)| Feature {
+            name: format!("{PICTURES}{}{ending}", camera.name),
+            kind: FeatureKind::Pictures(encoding, camera.size),
+        })
+    });
+    all.chain(pictures).collect()
 }
 
-impl<'a> Layout<'a> {
-    fn of(task: &'a Task) -> Self {
-        let gripper = task.gripper_drive();
-        let bodies = || task.bodies().iter().map(|body| (body.name.as_str(), &body.hold)).enumerate();
-        let mut layout = Self {
-            bodies: bodies().map(|(_, (name, _))| name).collect(),
-            moved: Vec::new(),
-            free: Vec::new(),
-            driven: Vec::new(),
-            passive: Vec::new(),
-            gripper: gripper.is_some(),
-            arm: task.arm_joints(),
-        };
-        let (mut joints, mut drives) = (0, 0);
-        for (place, (name, hold)) in bodies() {
-            match hold {
-                Hold::Fixed(_) => {}
-                Hold::Moved(_) | Hold::Arm(_) => layout.moved.push((place, name)),
-                Hold::Free(_) => layout.free.push((place, name)),
-                Hold::Joint(joint) => {
-                    match (joint.follows, joint.drive) {
-                        (None, Some(_)) => {
-                            if gripper != Some(place) {
-                                layout.driven.push((joints, drives, name));
-                            }
-                            drives += 1;
-                        }
-                        (None, None) => layout.passive.push((joints, name)),
-                        // It has no freedom of its own.
-                        (Some(_), _) => {}
-                    }
-                    joints += 1;
-                }
-            }
-        }
-        layout
+/// State, surroundings, and what is commanded for the moment of the next frame; the last row has none.
+fn frames(numbers: &Numbers, rows: &[&EpisodeMoment]) -> Vec<Frames> {
+    let mut signs = Signs::default();
+    let (mut state, mut around, mut action) = (Vec::new(), Vec::new(), Vec::new());
+    for pair in rows.windows(2) {
+        state.extend(numbers.state(pair[0], &mut signs));
+        around.extend(numbers.surroundings(pair[0], &mut signs));
+        action.extend(numbers.action(pair[1], &signs));
     }
-
-    fn fits(&self, episode: &Episode) -> Result<(), String> {
-        let has = episode.moments.first().map(|row| [row.gripper.is_some(), row.arm.is_some()]);
-        let asked = Some([self.gripper, !self.arm.is_empty()]);
-        if episode.bodies == self.bodies && has == asked && episode.moved.len() == self.moved.len() {
-            return Ok(());
-        }
-        let (recorded, known) = (episode.bodies.join(", "), self.bodies.join(", "));
-        Err(format!(
-            "it was recorded of {recorded}, the task is of {known}, or with another arm or gripper; give the task file it was recorded with"
-        ))
-    }
-
-    fn features(&self, task: &Task) -> Vec<Feature> {
-        let pose =
-            |(_, name): &(usize, &str)| ["x", "y", "z", "qw", "qx", "qy", "qz"].map(|axis| format!("{name}.{axis}"));
-        let joint = |name: &str| format!("{name}.joint");
-        let mut commanded: Vec<String> = self.moved.iter().flat_map(pose).collect();
-        commanded.extend(self.gripper.then(|| "gripper.width".to_owned()));
-        commanded.extend(self.driven.iter().map(|(_, _, name)| joint(name)));
-        commanded.extend(self.arm.iter().map(|joint| format!("{joint}.pos")));
-        let mut around: Vec<String> = self.free.iter().flat_map(pose).collect();
-        around.extend(self.passive.iter().map(|(_, name)| joint(name)));
-        let numbers = [(STATE, commanded.clone()), (SURROUNDINGS, around), (ACTION, commanded)];
-        let numbers = numbers.into_iter().filter(|(_, names)| !names.is_empty());
-        let numbers = numbers.map(|(name, names)| Feature { name: name.into(), kind: FeatureKind::Numbers(names) });
-        let pictures = task.cameras().iter().flat_map(|camera| {
-            [("", PixelEncoding::Rgb8), ("_depth", PixelEncoding::Depth16)].map(|(ending, encoding)| Feature {
-                name: format!("{PICTURES}{}{ending}", camera.name),
-                kind: FeatureKind::Pictures(encoding, camera.size),
-            })
-        });
-        numbers.chain(pictures).collect()
-    }
-
-    /// State, surroundings, and what is commanded for the moment of the next frame; the last row has none.
-    fn numbers(&self, rows: &[&EpisodeMoment]) -> Vec<Frames> {
-        let mut signs = vec![None; self.moved.len() + self.free.len()];
-        let (mut state, mut around, mut action) = (Vec::new(), Vec::new(), Vec::new());
-        for pair in rows.windows(2) {
-            let [row, next] = [pair[0], pair[1]];
-            for (i, (place, _)) in self.moved.iter().enumerate() {
-                signs[i] = Some(put_pose(&mut state, &row.poses[*place], signs[i]));
-                put_pose(&mut action, &next.targets[i], signs[i]);
-            }
-            for (i, (place, _)) in self.free.iter().enumerate() {
-                let sign = &mut signs[self.moved.len() + i];
-                *sign = Some(put_pose(&mut around, &row.poses[*place], *sign));
-            }
-            if let (Some(now), Some(then)) = (&row.gripper, &next.gripper) {
-                state.push(now.width as f32);
-                action.push(then.width_d as f32);
-            }
-            for (joint, drive, _) in &self.driven {
-                state.push(row.joints[*joint] as f32);
-                action.push(next.drives[*drive] as f32);
-            }
-            if let (Some(now), Some(then)) = (&row.arm, &next.arm) {
-                state.extend(now.q[..self.arm.len()].iter().map(|q| *q as f32));
-                action.extend(then.q_d[..self.arm.len()].iter().map(|q| *q as f32));
-            }
-            around.extend(self.passive.iter().map(|(joint, _)| row.joints[*joint] as f32));
-        }
-        let all = [state, around, action].into_iter().filter(|values| !values.is_empty());
-        all.map(Frames::Numbers).collect()
-    }
-}
-
-/// Adds a pose; of the two quaternions of its rotation the one that is nearer to another, at first that with a positive w.
-fn put_pose(into: &mut Vec<f32>, pose: &RigidPose, near: Option<Quaternion<f64>>) -> Quaternion<f64> {
-    let [w, i, j, k] = pose.wxyz;
-    let given = Quaternion::new(w, i, j, k);
-    let rotation = if given.dot(&near.unwrap_or_else(Quaternion::identity)) < 0.0 { -given } else { given };
-    into.extend(pose.position.map(|v| v as f32));
-    into.extend([rotation.w, rotation.i, rotation.j, rotation.k].map(|v| v as f32));
-    rotation
+    let all = [state, around, action].into_iter().filter(|values| !values.is_empty());
+    all.map(Frames::Numbers).collect()
 }

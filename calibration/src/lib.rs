@@ -5,6 +5,7 @@
 //!
 //! | module | owns |
 //! |---|---|
+//! | [`acting`] | a policy on a robot, through a running bridge |
 //! | [`capture`] | planning a motion, having the bridge play it, recording it into a session folder |
 //! | [`check`] | the doctor of a recording: whether the data can mean what they say |
 //! | [`demonstrations`] | recorded episodes of tasks as data to learn from |
@@ -18,6 +19,8 @@
 //! | [`model`] | what was found as a model file of MuJoCo, ROS or Gazebo |
 //! | [`page`] | what all pages are made of: words for numbers, pictures of plain numbers |
 //! | [`report`] | pages with plots |
+//! | [`study`] | policies on tasks from the same starts, in several worlds |
+//! | [`sweep`] | work in units, on many cores and machines |
 //! | [`viewpoint`] | the camera's pose from pictures of the robot |
 //! | [`processes`] | the other programs as children |
 //! | [`interrupt`] | Ctrl-C, and a budget of time |
@@ -46,6 +49,7 @@
 //! | class | candidates that these clips cannot tell apart |
 //! | shrink | `1 - after / before` of the mean squared residual on held-out clips |
 
+pub mod acting;
 pub mod benchmark;
 pub mod capture;
 pub mod check;
@@ -65,4 +69,6 @@ pub mod page;
 pub mod processes;
 pub mod report;
 pub mod seed;
+pub mod study;
+pub mod sweep;
 pub mod viewpoint;

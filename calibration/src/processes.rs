@@ -2,7 +2,7 @@
 //!
 //! Each child runs in a process group of its own, so that Ctrl-C on the terminal reaches only this program, which then
 //! ends its children in an order that loses nothing. A child that is dropped is ended, and one whose starter is killed ends
-//! by itself ([`shared_mem::parent`]). Called by capture and demo.
+//! by itself ([`shared_mem::parent`]). Called by capture, demo and sweep.
 
 use rustix::process::{Pid, Signal, kill_process_group};
 use shared_mem::parent;
@@ -137,6 +137,19 @@ impl Running {
         let verb = arguments.first().map_or(String::new(), |v| format!(" {}", v.to_string_lossy()));
         Self::spawn(format!("{}{verb}", program.name()), &mut command)
             .map_err(|source| ProcessError::Start { path, source })
+    }
+
+    /// Starts this program itself once more, on so many threads.
+    ///
+    /// # Errors
+    /// [`ProcessError::Start`].
+    pub fn start_itself(arguments: &[OsString], threads: usize) -> Result<Self, ProcessError> {
+        let path = std::env::current_exe().unwrap_or_else(|_| PathBuf::from("calibration"));
+        let mut command = Command::new(&path);
+        command.args(arguments).env("RAYON_NUM_THREADS", threads.max(1).to_string());
+        command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
+        let verb = arguments.first().map_or(String::new(), |v| format!(" {}", v.to_string_lossy()));
+        Self::spawn(format!("calibration{verb}"), &mut command).map_err(|source| ProcessError::Start { path, source })
     }
 
     fn spawn(name: String, command: &mut Command) -> std::io::Result<Self> {

@@ -116,7 +116,7 @@ pub fn documents() -> Vec<(String, String)> {
 pub fn literals() -> Vec<(String, String)> {
     let mut found = Vec::new();
     let mut folders: Vec<PathBuf> =
-        ["shared_mem/src", "twin/src", "rt_bridge/src", "calibration/src", "import/src", "urdf/src"]
+        ["shared_mem/src", "twin/src", "rt_bridge/src", "calibration/src", "evaluation/src", "import/src", "urdf/src"]
             .map(|f| root().join(f))
             .into();
     while let Some(folder) = folders.pop() {

@@ -26,7 +26,7 @@ fn sources(folder: &str) -> Vec<(String, String)> {
 }
 
 fn product_sources() -> Vec<(String, String)> {
-    ["shared_mem/src", "twin/src", "rt_bridge/src", "calibration/src", "import/src", "urdf/src"]
+    ["shared_mem/src", "twin/src", "rt_bridge/src", "calibration/src", "evaluation/src", "import/src", "urdf/src"]
         .iter()
         .flat_map(|f| sources(f))
         .collect()
@@ -56,7 +56,7 @@ fn is_named(line: &str, name: &str) -> bool {
 
 #[test]
 fn each_big_dependency_has_one_door() {
-    let doors: [(&str, &[&str]); 26] = [
+    let doors: [(&str, &[&str]); 30] = [
         ("iceoryx2", &["shared_mem/src/transport/", "shared_mem/src/msg/"]),
         ("mcap", &["shared_mem/src/recording/"]),
         ("parry3d_f64", &["twin/src/physics/"]),
@@ -84,7 +84,11 @@ fn each_big_dependency_has_one_door() {
         ("rusqlite", &["import/src/sources/sqlite.rs"]),
         ("bzip2", &["import/src/sources/ros1.rs"]),
         ("lz4_flex", &["import/src/sources/ros1.rs"]),
-        ("csv", &["import/src/sources/table.rs"]),
+        ("csv", &["import/src/sources/table.rs", "evaluation/src/trial.rs"]),
+        ("statrs", &["evaluation/src/statistics/"]),
+        ("rmpv", &["evaluation/src/policy/"]),
+        ("tungstenite", &["evaluation/src/policy/served.rs"]),
+        ("base64", &["calibration/src/page/picture.rs"]),
         ("zip", &["import/src/sources/npz.rs"]),
         ("schemars", &["shared_mem/src/cell/"]),
     ];
@@ -248,7 +252,7 @@ fn needed(text: &str) -> Vec<String> {
 #[test]
 fn folders_need_each_other_in_no_circle() {
     let lines = product_lines();
-    for package in ["shared_mem", "twin", "rt_bridge", "calibration", "import", "urdf"] {
+    for package in ["shared_mem", "twin", "rt_bridge", "calibration", "evaluation", "import", "urdf"] {
         let folder = |file: &str| {
             let within = file.strip_prefix(package)?.strip_prefix("/src/")?.split('/').next()?;
             Some(within.strip_suffix(".rs").unwrap_or(within).to_owned()).filter(|name| name != "lib" && name != "main")
@@ -293,11 +297,12 @@ fn the_diagnosis_goes_one_way() {
 
 #[test]
 fn dependencies_point_one_way() {
-    let rules: [(&str, &[&str]); 5] = [
-        ("shared_mem", &["twin", "rt_bridge", "calibration", "import"]),
-        ("import", &["twin", "rt_bridge", "calibration", "urdf"]),
-        ("twin", &["rt_bridge", "calibration", "import"]),
-        ("rt_bridge", &["calibration", "import"]),
+    let rules: [(&str, &[&str]); 6] = [
+        ("shared_mem", &["twin", "rt_bridge", "calibration", "evaluation", "import"]),
+        ("import", &["twin", "rt_bridge", "calibration", "evaluation", "urdf"]),
+        ("evaluation", &["rt_bridge", "calibration", "import"]),
+        ("twin", &["rt_bridge", "calibration", "evaluation", "import"]),
+        ("rt_bridge", &["calibration", "evaluation", "import"]),
         ("calibration", &["rt_bridge"]),
     ];
     for (package, forbidden) in rules {
@@ -314,9 +319,18 @@ fn dependencies_point_one_way() {
 #[test]
 fn the_readme_names_every_folder_and_only_existing_files() {
     let readme = std::fs::read_to_string(root().join("README.md")).expect("README.md");
-    for folder in
-        ["shared_mem/", "twin/", "rt_bridge/", "calibration/", "import/", "urdf/", "tests/", "fuzz/", "config/"]
-    {
+    for folder in [
+        "shared_mem/",
+        "twin/",
+        "rt_bridge/",
+        "calibration/",
+        "evaluation/",
+        "import/",
+        "urdf/",
+        "tests/",
+        "fuzz/",
+        "config/",
+    ] {
         assert!(readme.contains(folder), "README.md does not mention {folder}");
     }
     let mentioned = readme.split('`').skip(1).step_by(2).filter(|code| {
@@ -325,6 +339,7 @@ fn the_readme_names_every_folder_and_only_existing_files() {
             "twin/src",
             "rt_bridge/src",
             "calibration/src",
+            "evaluation/src",
             "import/",
             "urdf/src",
             "tests/",

@@ -15,7 +15,19 @@ use twin::control::Drive;
 use twin::sim::SimCell;
 
 /// Flags that programs give each other, or that belong to programs of others.
-const OF_OTHERS: [&str; 5] = ["parent", "configuration", "shm-size", "features", "release"];
+const OF_OTHERS: [&str; 10] = [
+    "parent",
+    "configuration",
+    "shm-size",
+    "features",
+    "release",
+    // Of Slurm.
+    "job-name",
+    "array",
+    "cpus-per-task",
+    "requeue",
+    "open-mode",
+];
 /// A folder of the sources, and the verbs of which one must have the flags that its messages name.
 const SPOKEN_BY: [(&str, &[&str]); 10] = [
     ("calibration/src/init/", &["calibration init"]),

@@ -100,6 +100,22 @@ fn commands() -> Vec<(&'static str, String, &'static str)> {
             ),
             found,
         ),
+        (
+            "calibration",
+            format!(
+                "evaluate --policies expert --tasks {} --episodes 100000 --out {{dir}}/evaluation",
+                root().join("tasks/pick_carrot.toml").display()
+            ),
+            found,
+        ),
+        (
+            "calibration",
+            format!(
+                "policy run --policy expert --task {} --episodes 100000",
+                root().join("tasks/pick_carrot.toml").display()
+            ),
+            found,
+        ),
         ("calibration", line("benchmark --cell {cell} --short"), ""),
         ("calibration", line("demo --out {dir}/demo"), ""),
         ("twin", line("replay {dir}/session --out {dir}/twin"), found),

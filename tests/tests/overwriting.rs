@@ -57,6 +57,7 @@ fn an_output_that_is_there_is_kept_and_the_way_to_replace_it_is_told_at_once() {
         ),
         ("calibration export {dir}/clip.mcap --to ros2 --out {dir}/full", "full"),
         ("calibration demo --out {dir}/full", "full"),
+        ("calibration evaluate --policies expert --tasks {dir}/none --out {dir}/full", "full"),
         ("twin replay {dir}/clip.mcap --out {dir}/there.mcap", "there.mcap"),
         ("twin render {dir}/clip.mcap --out {dir}/frames", "frame_00000.png"),
         (&format!("twin label-splats {{dir}}/none --cell {{cell}} --joints {JOINTS} --out {{dir}}/links"), "link0.ply"),

@@ -8,12 +8,15 @@ mod compare;
 mod demo;
 mod diagnose;
 mod engine;
+mod evaluate;
 mod export;
 mod export_episodes;
 mod export_model;
 mod identify;
 mod import;
 mod init;
+mod policy;
+mod sweep;
 mod viewpoint;
 
 use calibration::interrupt::Interrupt;
@@ -41,6 +44,7 @@ Examples:
   calibration export session --to rosbag2 --out bags
   calibration export-episodes tasks/pick_carrot.toml carrot --to lerobot --out carrot_lerobot
   calibration export-model theta.toml --cell cell.toml --to mjcf --out cell.xml
+  calibration evaluate --policies expert --tasks tasks/pick_carrot.toml --out carrot
 Every verb has its own --help with an example. Logs and progress go to stderr (RUST_LOG=debug for more)."
 )]
 pub(crate) struct Arguments {
@@ -88,6 +92,26 @@ Examples:
     ExportEpisodes(export_episodes::ExportEpisodesArguments),
     /// Writes what was found as a model of MuJoCo, ROS or Gazebo, to run or to bring your own model up to date with.
     ExportModel(export_model::ExportModelArguments),
+    /// How often policies succeed at tasks, with intervals, and how far success in one world predicts that in another.
+    Evaluate(Box<evaluate::EvaluateArguments>),
+    /// Runs a policy: on a task in the twin, or on the robot.
+    #[command(
+        subcommand,
+        after_help = "\
+Examples:
+  calibration policy run --task tasks/pick_carrot.toml --policy ws://localhost:8000 --episodes 10"
+    )]
+    Policy(policy::Policy),
+    /// Many runs of other verbs as units: on many cores and machines, going on after a kill, merged without gaps.
+    #[command(
+        subcommand,
+        after_help = "\
+Examples:
+  calibration sweep plan commands.txt --each seed=0..200 --out sweep
+  calibration sweep local sweep --jobs 2
+  calibration sweep merge sweep --out merged"
+    )]
+    Sweep(sweep::Sweep),
     /// The whole story on the simulated cell: shadow, record, replay, explain.
     Demo(demo::DemoArguments),
 }
@@ -102,6 +126,8 @@ pub(crate) fn run(arguments: Arguments) -> anyhow::Result<()> {
         Verb::Capture(capture) => capture::run(capture, &Interrupt::listen()?),
         Verb::Demo(arguments) => demo::run(arguments, &Interrupt::listen()?),
         Verb::Benchmark(arguments) => benchmark::run(arguments, &Interrupt::listen_and_cut_short()?),
+        // Its children are waited for, which end within a moment.
+        Verb::Sweep(sweep) => sweep::run(sweep, &Interrupt::listen_and_cut_short()?),
         verb => {
             let interrupt = Interrupt::listen_to_end_at_once()?;
             let done = run_to_the_end(verb, &interrupt);
@@ -137,7 +163,9 @@ fn run_to_the_end(verb: Verb, interrupt: &Interrupt) -> anyhow::Result<()> {
         Verb::Export(arguments) => export::run(&arguments),
         Verb::ExportEpisodes(arguments) => export_episodes::run(&arguments),
         Verb::ExportModel(arguments) => export_model::run(&arguments),
-        Verb::Capture(_) | Verb::Demo(_) | Verb::Benchmark(_) => Ok(()),
+        Verb::Policy(policy) => policy::run(policy, interrupt),
+        Verb::Evaluate(arguments) => evaluate::run(&arguments, interrupt),
+        Verb::Capture(_) | Verb::Demo(_) | Verb::Benchmark(_) | Verb::Sweep(_) => Ok(()),
     }
 }
 

@@ -5,6 +5,7 @@
 //! | `frame` | what all pages share: style, headings, legends |
 //! | `figure` | pictures of plain numbers: bars, map, lines, intervals, matrix |
 //! | `canvas`, `scale` | SVG, axes |
+//! | `picture` | pictures by pixels |
 //! | `trace` | what is left between robot and twin through a clip |
 //! | `quantity`, `share`, `parameters` | numbers, units, shares and intervals as people read them |
 
@@ -12,6 +13,7 @@ pub(crate) mod canvas;
 pub(crate) mod figure;
 pub(crate) mod frame;
 pub(crate) mod parameters;
+pub(crate) mod picture;
 pub(crate) mod quantity;
 pub(crate) mod scale;
 pub(crate) mod share;

@@ -311,7 +311,9 @@ mod tests {
             let hand = rows.bodies.iter().position(|name| name == "hand").expect("a hand");
             let last = rows.moments.last().expect("rows");
             let from = rows.moments[0].poses[hand].position;
-            let way = |pose: &RigidPose| (0..3).map(|k| (pose.position[k] - from[k]).powi(2)).sum::<f64>().sqrt();
+            let way = |pose: &shared_mem::recording::RigidPose| {
+                (0..3).map(|k| (pose.position[k] - from[k]).powi(2)).sum::<f64>().sqrt()
+            };
             [way(&last.poses[hand]), way(&last.targets[0])]
         };
         let ([told, wanted], [moved, same], [delayed, _]) = (at(&exact), at(&nominal), at(&late));

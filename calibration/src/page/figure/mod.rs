@@ -5,4 +5,5 @@ pub(crate) mod calibration_curve;
 pub(crate) mod chart;
 pub(crate) mod forest;
 pub(crate) mod matrix;
+pub(crate) mod scatter;
 pub(crate) mod where_map;
