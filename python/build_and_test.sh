@@ -11,6 +11,6 @@ python3 -m venv --clear "$folder/venv"
 python=$folder/venv/bin/python
 "$python" -m pip install --quiet --upgrade pip
 "$python" -m pip wheel --quiet --no-deps --wheel-dir "$folder" "$here"
-"$python" -m pip install --quiet --force-reinstall "$folder"/twinalign-*.whl
+"$python" -m pip install --quiet --force-reinstall "$folder"/twinalign-*.whl "gymnasium>=1.0"
 cd "$folder" # not the sources: what was installed is tested
 TWINALIGN_SESSION=$session "$python" -m unittest discover -s "$here/tests"

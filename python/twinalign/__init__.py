@@ -9,9 +9,9 @@ import os as _os
 import tomllib as _tomllib
 
 from . import _twinalign
-from ._twinalign import Clip, Session
+from ._twinalign import Clip, Session, TaskEpisode
 
-__all__ = ["Clip", "Session", "Twin", "diagnose", "effects", "identify_arm", "identify_object"]
+__all__ = ["Clip", "Session", "TaskEpisode", "Twin", "diagnose", "effects", "identify_arm", "identify_object"]
 
 
 def _theta(parameters):

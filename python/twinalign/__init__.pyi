@@ -72,6 +72,34 @@ class Clip:
     @property
     def warnings(self) -> list[str]: ...
 
+class TaskEpisode:
+    """A task in which a policy acts, as `twinalign.env.TaskEnv` without Gymnasium: rows of 10 ms."""
+    def __init__(self, task: _Path, cell: _Path | None = None, theta: str | None = None) -> None:
+        """`theta`: content of a theta.toml as JSON."""
+    @property
+    def name(self) -> str: ...
+    @property
+    def instruction(self) -> str: ...
+    @property
+    def horizon(self) -> float:
+        """s."""
+    @property
+    def rows_a_second(self) -> int: ...
+    @property
+    def state_names(self) -> list[str]: ...
+    @property
+    def surroundings_names(self) -> list[str]: ...
+    @property
+    def cameras(self) -> list[tuple[str, int, int, float]]:
+        """Name, rows, columns, focal length in pixels."""
+    def reset(self, seed: int) -> None: ...
+    def step(self, action: NDArray[np.float32], rows: int) -> tuple[bool, float, bool, float, str | None]:
+        """Success, progress 0 to 1, whether it is over, time s, what would have stopped a robot."""
+    def state(self) -> NDArray[np.float32]: ...
+    def surroundings(self) -> NDArray[np.float32]: ...
+    def pictures(self) -> list[tuple[NDArray[np.uint8], NDArray[np.uint16]]]:
+        """Of each camera colour [rows, columns, 3] and depth [rows, columns], mm."""
+
 class Twin:
     """The simulated cell under its joint impedance controller: 1 ms a step, deterministic."""
     def __init__(self, cell: _Path, parameters: _Path | dict[str, Any] | None = None) -> None: ...

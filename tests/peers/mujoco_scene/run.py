@@ -8,9 +8,10 @@ from . import model
 
 
 class Scene:
-    """A task in MuJoCo, begun where the twin began: `bodies` of its answer."""
+    """A task in MuJoCo, begun where the twin began: `bodies` of its answer. `noise`: one sigma of what `generator` adds to each way point
+    along each axis, m; where a body waits, it waits in one place."""
 
-    def __init__(self, task, bodies, step=1e-3):
+    def __init__(self, task, bodies, step=1e-3, noise=0.0, generator=None):
         self.task, self.step = task, step
         self.model = mujoco.MjModel.from_xml_string(model.mjcf(task, step))
         self.data = mujoco.MjData(self.model)
@@ -29,6 +30,12 @@ class Scene:
         for entry in sorted(task.get("motion", []), key=lambda entry: entry["time"]):
             if "position" in entry:
                 self.ways.setdefault(entry["body"], []).append((entry["time"], *self.waypoint(entry)))
+        if noise > 0:
+            for way in self.ways.values():
+                nominal = [place for _, place, _ in way]
+                for i, (time_, place, turn) in enumerate(way):
+                    waits = i > 0 and np.array_equal(place, nominal[i - 1]) and np.array_equal(turn, way[i - 1][2])
+                    way[i] = time_, way[i - 1][1] if waits else place + noise * generator.standard_normal(3), turn
         self.orders = {body["name"]: dict(body["joint"]["drive"]) for body in task["body"] if "drive" in body.get("joint", {})}
         self.seconds = 0.0
 
