@@ -2,7 +2,7 @@
 
 use super::remark::{Remark, Severity};
 use super::session::ClipFacts;
-use crate::diagnose::clips::admit::{self, Refused};
+use crate::diagnose::clips::admit;
 use crate::forward::arm::{ArmClips, Channel};
 use crate::identify::arm::ArmError;
 use crate::identify::object::{ObjectError, shows_object};
@@ -146,18 +146,24 @@ impl Rules {
 
     /// `of`: whether the arm is to be explained, or with it the object.
     fn diagnose(&self, session: &Session, clip: &Clip, of: ClipKind) -> Answer {
+        if clip.kind == ClipKind::FreeMotion {
+            // An object alone is explained where no clip of the session has an arm.
+            let alone = session.clips.iter().all(|entry| entry.kind == ClipKind::FreeMotion);
+            return match of {
+                ClipKind::ControlHitSlide if alone => self.identify_object(&session.cell, clip),
+                ClipKind::ControlHitSlide => Err("an arm moves in other clips of the session".into()),
+                _ => Err("no arm moves in it".into()),
+            };
+        }
         if session.cell.robot.is_none() {
-            return Err(Refused::NoRobot { session: session.files.clone() }.to_string());
+            return Err(ArmError::NoArm("[robot]").to_string());
         }
         if of == ClipKind::ControlHitSlide && clip.kind != of {
             return Err("no object is hit in it".into());
         }
-        if clip.kind == ClipKind::FreeMotion {
-            return Err("no arm moves in it".into());
-        }
         commanded(clip)?;
         let arm = self.arm.as_ref().map_err(Clone::clone)?;
-        admit::looked_at(clip.clone(), &session.cell, arm).map(|_| ())
+        admit::looked_at(clip.clone(), &session.cell, Some(arm)).map(|_| ())
     }
 }
 

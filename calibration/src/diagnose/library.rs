@@ -13,7 +13,7 @@ use shared_mem::theta::Theta;
 use std::ops::Range;
 use twin::arm::ArmModel;
 use twin::arm::Joints;
-use twin::effects::{EffectInfo, OnTable, Robot, Role, Search, Shape, Stage, find, registry};
+use twin::effects::{EffectInfo, OnTable, Place, Robot, Role, Search, Shape, Stage, find, registry};
 
 /// All numbers of all hypotheses.
 #[derive(Debug, Clone)]
@@ -104,7 +104,9 @@ impl Library {
         let dof = base.arm.as_ref().map_or(0, |arm| arm.stiffness.len());
         let mut numbers = setting::gains(cell, base);
         if with_object {
-            numbers.extend(setting::object_parameters(cell, base));
+            // How heavy an object is that moves by itself no pose tells.
+            let shows = |(setting, _): &(Setting, Unknown)| cell.robot.is_some() || *setting != Setting::Mass;
+            numbers.extend(setting::object_parameters(cell, base).into_iter().filter(shows));
         }
         for (_, unknown) in &mut numbers {
             keep_known_gains(cell, unknown);
@@ -114,7 +116,8 @@ impl Library {
         let mut candidates = Vec::new();
         let fits = |effect: &&EffectInfo| {
             let known = base.effects.iter().any(|given| given.name == effect.name);
-            let visible = if effect.stage == Stage::Control { dof > 0 } else { with_object };
+            let touched = cell.robot.is_some() || effect.acts_on != Place::ToolContact;
+            let visible = if effect.stage == Stage::Control { dof > 0 } else { with_object && touched };
             visible && !known
         };
         for effect in registry().iter().filter(fits) {

@@ -152,6 +152,8 @@ pub fn diagnose_kept(
         admitted => admitted?,
     };
     let admitted = compared(admitted, options.engine.as_deref())?;
+    let alone = admitted.objects_alone().then(|| without_robot(session));
+    let session = alone.as_ref().unwrap_or(session);
     let question = Fingerprint::of("diagnose")
         .with(&(session.cell.to_toml(), options.theta.as_ref().map(Theta::to_toml), options.seed, options.torques))
         .with(&options.engine.as_ref().map(|engine| engine.ability().print()))
@@ -178,6 +180,12 @@ pub fn diagnose_clips(
 ) -> Result<Diagnosis, DiagnoseError> {
     let found = diagnosed(session, admitted, options, (interrupt, (Kept::nothing(), "")));
     if interrupt.cancelled() { Err(DiagnoseError::Interrupted("interrupted; start again".into())) } else { found }
+}
+
+/// The session with a cell in which an object moves by itself.
+fn without_robot(session: &Session) -> Session {
+    let cell = Cell { robot: None, controller: None, tool: None, ..session.cell.clone() };
+    Session { cell, ..session.clone() }
 }
 
 /// Clips with what an engine reports, too.
@@ -210,9 +218,10 @@ fn diagnosed(
     let library = Library::new(&session.cell, &base, admitted.ground().as_ref(), &peaks);
     let theta = |numbers: &[f64]| library.theta(numbers);
     let mut diagnosis = if admitted.with_object {
-        let arm = ArmClips::new(&session.cell, &admitted.clips, theta).map_err(Refused::from)?;
+        let robot = session.cell.robot.as_ref();
+        let arm = robot.map(|_| ArmClips::new(&session.cell, &admitted.clips, theta)).transpose();
         let object = ObjectClips::new(&session.cell, admitted.clips.clone(), library.settings.clone())?;
-        let evidence = CellClips::new(Some(arm), object, &library);
+        let evidence = CellClips::new(arm.map_err(Refused::from)?, object, &library);
         examine(&evidence, &library, session, admitted, options, work)?
     } else {
         let evidence = ArmClips::new(&session.cell, &admitted.clips, theta).map_err(Refused::from)?;
@@ -235,8 +244,11 @@ type Work<'a> = (&'a Interrupt, Trail<'a>);
 /// The largest torque that each joint is asked for in the clips where nothing is wrong [N m].
 ///
 /// # Errors
-/// [`DiagnoseError`] when the cell has no arm, or it cannot follow the clips.
+/// [`DiagnoseError`] when the arm cannot follow the clips; where there is none, nothing is asked for.
 pub fn peaks(cell: &Cell, admitted: &Admitted, base: &Theta) -> Result<Joints, DiagnoseError> {
+    if cell.robot.is_none() {
+        return Ok(Joints::default());
+    }
     let arm = ArmClips::new(cell, &admitted.clips, |_: &[f64]| base.clone()).map_err(Refused::from)?;
     arm.peaks(&[]).map_err(|_| DiagnoseError::NoBaseline)
 }

@@ -6,12 +6,14 @@
 //! | file | owns |
 //! |---|---|
 //! | `predict` | [`Replayer`]: one clip in the twin |
+//! | `first_motion` | how an object moved that was let go or slid already |
 //! | `object_start` | where the object was and how it moved when the clip began |
 //! | `on_table` | whether the table could carry it there |
 //! | `report` | the gaps of a session, as JSON and as a table |
 //! | `session` | all clips of a session, on all cores |
 //! | `write` | a simulated clip on disk |
 
+mod first_motion;
 pub mod object_start;
 mod on_table;
 mod predict;

@@ -7,7 +7,7 @@ use crate::forward::arm::one_piece;
 use crate::identify::object::screen::{Screened, screened};
 use crate::identify::remarks::grouped;
 use shared_mem::cell::{Cell, ClipKind};
-use shared_mem::recording::{Clip, JointSeries, ReadError, Session, SessionFiles};
+use shared_mem::recording::{Clip, JointSeries, ReadError, Session};
 use twin::arm::{ArmModel, ModelError};
 
 /// Clips that can be used.
@@ -19,13 +19,19 @@ pub struct Admitted {
     pub files: Vec<String>,
     /// Clips of one command, as indices.
     pub groups: Vec<Vec<usize>>,
-    /// Whether every clip has an object.
+    /// Whether every clip has an object: one that the arm hits, or one alone.
     pub with_object: bool,
     /// What a reader has to know about the clips, one sentence each.
     pub warnings: Vec<String>,
 }
 
 impl Admitted {
+    /// Whether objects move by themselves in all clips: tosses and slides.
+    #[must_use]
+    pub fn objects_alone(&self) -> bool {
+        self.clips.iter().all(|clip| clip.kind == ClipKind::FreeMotion)
+    }
+
     /// Where the objects slid; `None` where it is the arm that the clips are for.
     #[must_use]
     pub fn ground(&self) -> Option<Ground> {
@@ -42,15 +48,6 @@ pub enum Refused {
     /// The arm.
     #[error(transparent)]
     Arm(#[from] ModelError),
-    /// An object alone.
-    #[error(
-        "cell.toml has no [robot], and a diagnosis explains how an arm and what it hits move; what an object alone tells is found by `{}`",
-        session.command("calibration identify object")
-    )]
-    NoRobot {
-        /// The session.
-        session: SessionFiles,
-    },
     /// Torques cannot be predicted.
     #[error(
         "torques can be predicted from a model with masses alone: give cell.toml a [controller], and a `urdf` or `model` under [robot] in place of `joints`"
@@ -69,15 +66,16 @@ const FEWEST: usize = 4;
 /// # Errors
 /// [`Refused`] with what is missing.
 pub fn admit(session: &Session) -> Result<Admitted, Refused> {
-    if session.cell.robot.is_none() {
-        return Err(Refused::NoRobot { session: session.files.clone() });
+    if session.cell.robot.is_none() && session.cell.object().is_none() {
+        let why = "cell.toml has neither [robot] nor [object]; add the block of what moves in the clips";
+        return Err(Refused::NotTestable(why.into()));
     }
-    let arm = ArmModel::from_cell(&session.cell)?;
+    let arm = session.cell.robot.as_ref().map(|_| ArmModel::from_cell(&session.cell)).transpose()?;
     let (mut clips, mut files, mut out, mut remarks) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
     for entry in &session.clips {
         let file = entry.file.to_string_lossy().into_owned();
         let read = session.read(entry).map_err(|error| error.to_string());
-        match read.and_then(|clip| looked_at(clip, &session.cell, &arm)) {
+        match read.and_then(|clip| looked_at(clip, &session.cell, arm.as_ref())) {
             Ok((clip, odd)) => {
                 clips.push(clip);
                 remarks.extend(odd.into_iter().map(|remark| (file.clone(), remark)));
@@ -115,13 +113,14 @@ pub fn admit(session: &Session) -> Result<Admitted, Refused> {
         let short = || Refused::NotTestable("clips are too short for their motion to be smoothed".into());
         clips = all.ok_or_else(short)?;
     }
-    let with_object = !tracking && clips.iter().all(|clip| clip.kind == ClipKind::ControlHitSlide);
+    let all = |kind: ClipKind| clips.iter().all(|clip| clip.kind == kind);
+    let with_object = !tracking && (all(ClipKind::ControlHitSlide) || all(ClipKind::FreeMotion));
     Ok(Admitted { clips, files, groups, with_object, warnings })
 }
 
 /// The clip with what could be mended mended and its joints in the model's order, and what is odd about it; the reason why
-/// it cannot be used otherwise.
-pub(crate) fn looked_at(mut clip: Clip, cell: &Cell, arm: &ArmModel) -> Result<(Clip, Vec<String>), String> {
+/// it cannot be used otherwise. `arm`: the cell's, where there is one.
+pub(crate) fn looked_at(mut clip: Clip, cell: &Cell, arm: Option<&ArmModel>) -> Result<(Clip, Vec<String>), String> {
     let tracking = is_tracking(cell);
     if tracking && clip.desired.is_empty() {
         // Where no command was logged, the motion itself says what moves.
@@ -130,7 +129,7 @@ pub(crate) fn looked_at(mut clip: Clip, cell: &Cell, arm: &ArmModel) -> Result<(
     let mut remarks: Vec<String> = clip.warnings.iter().chain(&clip.damage).cloned().collect();
     // What a session lacks as a whole is said of the session.
     let complete = !clip.measured.is_empty() && !clip.desired.is_empty();
-    if complete {
+    if let Some(arm) = arm.filter(|_| complete) {
         (clip, remarks) = one_piece(clip, cell, arm).map_err(|why| why.to_string())?;
     }
     if tracking || clip.kind == ClipKind::Excitation || clip.object.is_empty() {
@@ -200,22 +199,10 @@ mod tests {
     }
 
     #[test]
-    fn a_session_without_a_robot_is_sent_to_where_an_object_alone_is_understood() {
-        let files = SessionFiles { session: "my tosses".into(), cell: Some("the cell.toml".into()) };
-        let session = Session { folder: "my tosses".into(), cell: Cell::default(), clips: Vec::new(), files };
-        let why = admit(&session).expect_err("no arm").to_string();
-        assert!(
-            why.contains("no [robot]")
-                && why.contains("`calibration identify object 'my tosses' --cell 'the cell.toml'`"),
-            "{why}"
-        );
-    }
-
-    #[test]
     fn a_clip_without_faults_is_taken_as_it_is() {
         for kind in [Kind::Excitation, Kind::Strokes] {
             let (cell, arm, clip) = recorded(kind);
-            let (taken, remarks) = looked_at(clip.clone(), &cell, &arm).expect("a usable clip");
+            let (taken, remarks) = looked_at(clip.clone(), &cell, Some(&arm)).expect("a usable clip");
             assert_eq!((&taken.measured, &taken.object), (&clip.measured, &clip.object));
             assert!(remarks.is_empty(), "{remarks:?}");
         }
@@ -226,12 +213,12 @@ mod tests {
         let (cell, arm, mut clip) = recorded(Kind::Excitation);
         let rows = clip.desired.len();
         without_commands(&mut clip, rows / 4..rows / 4 + 200);
-        let (taken, remarks) = looked_at(clip, &cell, &arm).expect("a usable clip");
+        let (taken, remarks) = looked_at(clip, &cell, Some(&arm)).expect("a usable clip");
         assert!((rows / 2..rows * 3 / 4).contains(&taken.measured.len()), "{} of {rows}", taken.measured.len());
         assert!(remarks.iter().any(|remark| remark.contains("no commands for 0.20")), "{remarks:?}");
         let (cell, arm, mut clip) = recorded(Kind::Strokes);
         without_commands(&mut clip, rows / 4..rows / 4 + 200);
-        let why = looked_at(clip, &cell, &arm).expect_err("a reason");
+        let why = looked_at(clip, &cell, Some(&arm)).expect_err("a reason");
         assert!(why.contains("no commands for 0.20") && why.contains("record it again"), "{why}");
     }
 
@@ -240,13 +227,13 @@ mod tests {
         let (cell, arm, mut clip) = recorded(Kind::Excitation);
         let stays = clip.measured.q[3];
         clip.measured.q.iter_mut().skip(3).step_by(7).for_each(|q| *q = stays);
-        let why = looked_at(clip, &cell, &arm).expect_err("a reason");
+        let why = looked_at(clip, &cell, Some(&arm)).expect_err("a reason");
         assert!(why.contains("joint 4") && why.contains("enabled"), "{why}");
         let (cell, arm, mut clip) = recorded(Kind::Strokes);
         for pose in &mut clip.object.poses {
             *pose = Pose::from_isometry(Translation3::new(0.0, 0.4, 0.0) * pose.isometry());
         }
-        let (_, remarks) = looked_at(clip, &cell, &arm).expect("a clip");
+        let (_, remarks) = looked_at(clip, &cell, Some(&arm)).expect("a clip");
         assert!(remarks.iter().any(|remark| remark.contains("never comes nearer")), "{remarks:?}");
     }
 }

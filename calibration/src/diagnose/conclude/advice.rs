@@ -66,10 +66,23 @@ fn general(stage: Stage) -> (&'static str, &'static [Capture]) {
     }
 }
 
+/// What separates an effect on an object alone from others, where a hand lets the object go.
+fn by_hand(effect: &str) -> &'static str {
+    match find(effect).map(|effect| effect.stage) {
+        Some(Stage::Camera) => "let the object slide in places far apart",
+        _ => "let the object slide on its base in eight directions through the same place, and at half the speed",
+    }
+}
+
 /// What to record next to separate these effects.
 #[must_use]
 pub fn separating(effects: &[&str], site: &Site) -> Advice {
     let pairs = effects.iter().enumerate().flat_map(|(k, a)| effects[k + 1..].iter().map(move |b| (*a, *b)));
+    if let (true, [first, ..]) = (site.objects_alone(), effects) {
+        let effects: Vec<String> = effects.iter().map(|effect| words(effect)).collect();
+        let sentence = format!("To separate {}: {}.", effects.join(", "), by_hand(first));
+        return site.advice(sentence, &[]);
+    }
     if let Some(([a, b], apart)) = pairs.filter_map(|(a, b)| separation(a, b)).next() {
         let captures: Vec<Capture> = apart.record.iter().map(|experiment| capture(*experiment)).collect();
         return site.advice(format!("To separate {} from {}: {}.", words(a), words(b), apart.by), &captures);

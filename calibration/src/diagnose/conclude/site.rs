@@ -54,6 +54,8 @@ pub struct Site {
     clips: Vec<usize>,
     /// The largest factor at which the first of them can be played.
     fastest: f64,
+    /// Whether objects move by themselves: no command records such clips.
+    alone: bool,
     /// Whether torques along the measured motion are asked about.
     torques: bool,
     /// The page of the command that advises; it keeps its name.
@@ -70,12 +72,19 @@ impl Site {
     }
 
     fn found(session: &Session) -> Self {
-        let strokes =
-            !session.clips.is_empty() && session.clips.iter().all(|clip| clip.kind == ClipKind::ControlHitSlide);
+        let all = |kind| !session.clips.is_empty() && session.clips.iter().all(|clip| clip.kind == kind);
+        let alone = all(ClipKind::FreeMotion);
+        let strokes = all(ClipKind::ControlHitSlide);
         let torques = is_tracking(&session.cell);
         if let Some(cell) = &session.files.cell {
             let folder = named_after(&session.folder, "next");
-            return Self { cell: cell.clone(), is_new: true, torques, ..Self::new(&folder, strokes, Vec::new(), 1.0) };
+            return Self {
+                cell: cell.clone(),
+                is_new: true,
+                alone,
+                torques,
+                ..Self::new(&folder, strokes, Vec::new(), 1.0)
+            };
         }
         let kind = if strokes { ClipKind::ControlHitSlide } else { ClipKind::Excitation };
         let (mut clips, mut fastest) = (Vec::new(), 1.0);
@@ -93,7 +102,7 @@ impl Site {
                 }
             }
         }
-        Self { torques, ..Self::new(&session.folder, strokes, clips, fastest) }
+        Self { alone, torques, ..Self::new(&session.folder, strokes, clips, fastest) }
     }
 
     /// Of a session in `folder` with clips that can be repeated, the first of them `fastest` times as fast at most.
@@ -109,6 +118,7 @@ impl Site {
             strokes,
             clips,
             fastest,
+            alone: false,
             torques: false,
             page: None,
         }
@@ -119,8 +129,16 @@ impl Site {
         self.strokes
     }
 
+    /// Whether objects move by themselves in its clips.
+    pub(in crate::diagnose) fn objects_alone(&self) -> bool {
+        self.alone
+    }
+
     /// The sentence with the commands of `captures`, and what diagnoses them.
     pub(in crate::diagnose) fn advice(&self, sentence: String, captures: &[Capture]) -> Advice {
+        if self.alone {
+            return Advice { sentence, commands: Vec::new() };
+        }
         let mut commands = Vec::new();
         // A session begins with clips enough to be diagnosed.
         let beside = captures.iter().find_map(|capture| match capture {
@@ -155,6 +173,12 @@ impl Site {
             _ => "one at half the speed".to_owned(),
         };
         let what = if times > TWO { "repeat one clip eight times" } else { "repeat two clips" };
+        if self.alone {
+            return (
+                format!("let the object go {times} times more, in other directions and at other speeds"),
+                Vec::new(),
+            );
+        }
         let Some(first) = self.clips.first() else {
             let words =
                 format!("record {times} clips more, and {}", speeds.replace("one at half and", "some at half and"));
@@ -175,11 +199,15 @@ impl Site {
 
     /// The sentence with the command of so many clips more of the same kind.
     pub(in crate::diagnose) fn more(&self, sentence: String, clips: usize) -> Advice {
-        self.finished(sentence, vec![self.same(&format!("--clips {clips}"))])
+        let commands = if self.alone { Vec::new() } else { vec![self.same(&format!("--clips {clips}"))] };
+        self.finished(sentence, commands)
     }
 
     /// Another session of the same kind.
     pub(in crate::diagnose) fn usual(&self) -> Vec<String> {
+        if self.alone {
+            return Vec::new();
+        }
         let next = if self.is_new { self.folder.clone() } else { named_after(&self.folder, "next") };
         vec![if self.strokes {
             capture_into("control-hit-slide", &self.cell, &next, "--clips 12")

@@ -40,16 +40,18 @@ const IN_THE_PLANE: [usize; 3] = [0, 1, 5];
 /// under a blow is not modelled well enough to learn from.
 const TIPPING: PoseNoise = PoseNoise { position: 3e-3, rotation: 0.05 };
 
-/// Places of friction and clock among the own numbers; those of [`deviations`] follow.
+/// What a clip has of its own before the deviations of its path: friction first. An object alone keeps its own time.
+const OF_STROKES: &[Own] = &[Own::LnFriction, Own::Clock];
+const OF_OBJECTS_ALONE: &[Own] = &[Own::LnFriction];
 const FRICTION: usize = 0;
-const CLOCK: usize = 1;
-const FIRST_DEVIATION: usize = 2;
 
 /// The arm where there is one, and the object.
 pub struct CellClips<'a, F> {
     library: &'a Library,
     arm: Option<ArmClips<F>>,
     object: ObjectClips,
+    /// What a clip has of its own; the numbers of [`deviations`] follow.
+    own: &'static [Own],
     channels: Vec<Channel>,
     rows: Vec<Vec<Row>>,
     /// For each clip and number of [`deviations`], what one unit of it takes off every residual.
@@ -69,7 +71,7 @@ pub struct CellClips<'a, F> {
 }
 
 impl<'a, F: Fn(&[f64]) -> Theta + Sync> CellClips<'a, F> {
-    /// Both on the same clips in the same order.
+    /// Both on the same clips in the same order; without an arm, objects that move by themselves.
     pub fn new(arm: Option<ArmClips<F>>, mut object: ObjectClips, library: &'a Library) -> Self {
         object.set_model_error(ModelError { joints: arm.as_ref().map(|_| 1.0), ..object.model_error() });
         let mut channels = arm.as_ref().map_or_else(Vec::new, |arm| arm.channels().to_vec());
@@ -87,12 +89,13 @@ impl<'a, F: Fn(&[f64]) -> Theta + Sync> CellClips<'a, F> {
         let encoders: Vec<Channel> =
             channels[..first].iter().filter(|channel| channel.quantity == "q").cloned().collect();
         channels.extend(encoders.into_iter().map(|encoder| Channel { group: Group::Contact, ..encoder }));
+        let alone = arm.is_none();
         let (mut rows, mut deviations, mut contact) = (Vec::new(), Vec::new(), Vec::new());
         for clip in 0..object.clips() {
             let of_arm = arm.as_ref().map_or(&[][..], |arm| arm.rows(clip));
             let joints = Contact::of(arm.as_ref(), &object, clip);
             let poses = pose_rows(&object, clip, first);
-            deviations.push(deviations::slopes(&object, clip, of_arm.len(), joints.rows.len()));
+            deviations.push(deviations::slopes((&object, alone), clip, of_arm.len(), joints.rows.len()));
             rows.push([of_arm, &poses, &joints.evidence(&object.rows(clip), in_contact)].concat());
             contact.push(joints);
         }
@@ -100,12 +103,14 @@ impl<'a, F: Fn(&[f64]) -> Theta + Sync> CellClips<'a, F> {
         let friction = numbers().find(|(_, setting)| **setting == Setting::Friction).map(|(k, _)| k);
         let stiffness =
             numbers().filter(|(_, setting)| matches!(setting, Setting::Stiffness(_))).map(|(k, _)| k).collect();
-        let scatter = scatter(&object);
+        let own = if alone { OF_OBJECTS_ALONE } else { OF_STROKES };
+        let scatter = scatter(&object, own, alone);
         let arm_alone = rows.iter().map(|_| Recent::default()).collect();
         Self {
             library,
             arm,
             object,
+            own,
             channels,
             rows,
             deviations,
@@ -130,8 +135,8 @@ impl<'a, F: Fn(&[f64]) -> Theta + Sync> CellClips<'a, F> {
         if let (Some(friction), Some(own)) = (self.friction, own.get(FRICTION)) {
             shared[friction] *= own.exp();
         }
-        let clock = own.get(CLOCK).copied().unwrap_or(0.0);
-        let of_object = ALL.map(|number| if number == Own::Clock { clock } else { 0.0 });
+        let clock = self.own.iter().position(|number| *number == Own::Clock).and_then(|k| own.get(k)).copied();
+        let of_object = ALL.map(|number| if number == Own::Clock { clock.unwrap_or(0.0) } else { 0.0 });
         let mut residuals = self.object.errors(clip, &shared, &of_object)?;
         let (noise, contact) = (self.object.noise(), &self.contact[clip]);
         let joints: Vec<f64> = residuals[contact.rows.clone()].to_vec();
@@ -145,7 +150,7 @@ impl<'a, F: Fn(&[f64]) -> Theta + Sync> CellClips<'a, F> {
             *residual /= if tips { noise.hypot(tipping) } else { noise };
         }
         for (slopes, value) in
-            self.deviations[clip].iter().zip(own.iter().skip(FIRST_DEVIATION)).filter(|(_, u)| **u != 0.0)
+            self.deviations[clip].iter().zip(own.iter().skip(self.own.len())).filter(|(_, u)| **u != 0.0)
         {
             residuals.iter_mut().zip(&slopes[of_arm..]).for_each(|(residual, slope)| *residual += slope * value);
         }
@@ -165,19 +170,19 @@ impl<'a, F: Fn(&[f64]) -> Theta + Sync> CellClips<'a, F> {
     }
 }
 
-/// Friction and clock as identification has them, and the deviations of paths.
-fn scatter(object: &ObjectClips) -> Scatter {
-    let light = [Own::LnFriction, Own::Clock];
-    let kind = ClipKind::ControlHitSlide;
+/// What clips have of their own as identification has it, and the deviations of paths; `alone`: of objects alone.
+fn scatter(object: &ObjectClips, own: &[Own], alone: bool) -> Scatter {
+    let kind = if alone { ClipKind::FreeMotion } else { ClipKind::ControlHitSlide };
     let mut random: Vec<Random> =
-        light.iter().map(|own| Random { sigma: own.sigma(object.cell(), kind), ..own.random() }).collect();
-    random.extend(deviations::random());
-    Scatter { heavy: FIRST_DEVIATION..random.len(), forgiving: 1.0, random }
+        own.iter().map(|own| Random { sigma: own.sigma(object.cell(), kind), ..own.random() }).collect();
+    random.extend(deviations::random(alone));
+    Scatter { heavy: own.len()..random.len(), forgiving: 1.0, random }
 }
 
 fn pose_rows(object: &ObjectClips, clip: usize, first: usize) -> Vec<Row> {
     let rows = object.rows(clip);
     let start_ns = rows.first().map_or(0, |row| row.stamp_ns);
+    let alone = object.clip(clip).kind == ClipKind::FreeMotion;
     let onset_ns = rows.iter().filter(|row| row.part == Part::Before).map(|row| row.stamp_ns).max().unwrap_or(start_ns);
     let one = |row: &object::Row| {
         let coordinate = match row.channel {
@@ -187,8 +192,10 @@ fn pose_rows(object: &ObjectClips, clip: usize, first: usize) -> Vec<Row> {
         };
         let since = row.stamp_ns.saturating_sub(onset_ns) as f64 * 1e-9;
         let (part, stage, regime) = match row.part {
+            Part::Before if alone => (0, StageName::Rest, "at the start"),
             Part::Before => (0, StageName::Rest, "before the hit"),
             Part::After => (0, StageName::Rest, "after the slide"),
+            Part::Hit | Part::Slide if alone => (2, StageName::Slide, "by itself"),
             _ if since < HIT => (1, StageName::Hit, "blow"),
             Part::Hit => (2, StageName::Slide, "beside the tool"),
             Part::Slide => (2, StageName::Slide, "free"),
@@ -228,6 +235,10 @@ impl<F: Fn(&[f64]) -> Theta + Sync> Evidence for CellClips<'_, F> {
                 out.extend_from_slice(&self.arm(clip, shared)?);
                 out.extend(&base[of_arm..]);
             }
+            (Reach::Arm, None) => {
+                out.clear();
+                out.extend(base);
+            }
             (Reach::Object, _) => {
                 let others = self.since_touch(clip, shared, own)?;
                 out.clear();
@@ -252,6 +263,6 @@ impl<F: Fn(&[f64]) -> Theta + Sync> Evidence for CellClips<'_, F> {
     }
 
     fn own_slope(&self, clip: usize, own: usize) -> Option<&[f64]> {
-        Some(self.deviations[clip].get(own.checked_sub(FIRST_DEVIATION)?)?)
+        Some(self.deviations[clip].get(own.checked_sub(self.own.len())?)?)
     }
 }

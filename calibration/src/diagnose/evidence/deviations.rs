@@ -7,6 +7,9 @@
 //! one that leaves in another direction is beside its path in proportion to the way it has come. So a slide that bends or
 //! slows down otherwise than simulated is not taken for a hit that was off: each stage starts, in effect, from its measured
 //! state.
+//!
+//! An object alone begins from its measured motion. Where it tumbles, each impact of a corner multiplies what that start and the
+//! simulated impact are off by, so that it may come to rest elsewhere and turned otherwise by a lot.
 
 use crate::estimate::Random;
 use crate::forward::object::{Channel, ObjectClips, Part, Row};
@@ -34,11 +37,25 @@ const DEVIATIONS: [(&str, Coordinate, Shape, f64); 9] = [
     ("yaw of the slide", Coordinate::Yaw, Shape::InWay, 0.012),
 ];
 
+/// The same of an object alone, by the end of its motion. Tossed cubes that are given the parameters identified from them end
+/// some centimetres and tenths of a radian away; what only slides is near an eighth of this, the least scale.
+const ALONE: [(&str, Coordinate, Shape, f64); 5] = [
+    ("along the motion", Coordinate::Along, Shape::InTime, 0.01),
+    ("across the motion", Coordinate::Across, Shape::InTime, 0.01),
+    ("yaw of the motion", Coordinate::Yaw, Shape::InTime, 0.1),
+    ("roll of the motion", Coordinate::Roll, Shape::InTime, 0.1),
+    ("pitch of the motion", Coordinate::Pitch, Shape::InTime, 0.1),
+];
+
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Coordinate {
     X,
     Y,
     Yaw,
+    /// About the base's x axis.
+    Roll,
+    /// About its y axis.
+    Pitch,
     /// The direction in which the object slid freely.
     Along,
     /// A quarter turn to the left of it.
@@ -79,15 +96,24 @@ impl Shape {
     }
 }
 
-/// The own numbers with their scatter.
-pub(in crate::diagnose) fn random() -> Vec<Random> {
-    DEVIATIONS.map(|(name, _, _, sigma)| Random { name: name.into(), sigma, step: sigma }).to_vec()
+fn all(alone: bool) -> &'static [(&'static str, Coordinate, Shape, f64)] {
+    if alone { &ALONE } else { &DEVIATIONS }
+}
+
+/// The own numbers with their scatter; `alone`: of objects alone.
+pub(in crate::diagnose) fn random(alone: bool) -> Vec<Random> {
+    let one = |(name, _, _, sigma): &(&str, Coordinate, Shape, f64)| Random {
+        name: (*name).into(),
+        sigma: *sigma,
+        step: *sigma,
+    };
+    all(alone).iter().map(one).collect()
 }
 
 /// What one unit of every number takes off the residuals of a clip, between `of_arm` rows of the arm alone and `in_contact`
-/// of the arm in contact.
+/// of the arm in contact. With the clips: whether objects move alone in them.
 pub(in crate::diagnose) fn slopes(
-    object: &ObjectClips,
+    (object, alone): (&ObjectClips, bool),
     clip: usize,
     of_arm: usize,
     in_contact: usize,
@@ -97,13 +123,15 @@ pub(in crate::diagnose) fn slopes(
     let series = &object.clip(clip).object;
     let along = direction(series, &rows);
     let fractions = fractions(series, &rows);
-    let one = |(_, coordinate, shape, _): (&str, Coordinate, Shape, f64)| {
+    let one = |&(_, coordinate, shape, _): &(&str, Coordinate, Shape, f64)| {
         let share = |channel: Channel| match (channel, coordinate) {
             (Channel::Position(0), Coordinate::X) | (Channel::Position(1), Coordinate::Y) => 1.0 / noise.position,
             (Channel::Position(axis @ (0 | 1)), Coordinate::Along) => along[axis] / noise.position,
             (Channel::Position(0), Coordinate::Across) => -along[1] / noise.position,
             (Channel::Position(1), Coordinate::Across) => along[0] / noise.position,
-            (Channel::Rotation(2), Coordinate::Yaw) => 1.0 / noise.rotation,
+            (Channel::Rotation(0), Coordinate::Roll)
+            | (Channel::Rotation(1), Coordinate::Pitch)
+            | (Channel::Rotation(2), Coordinate::Yaw) => 1.0 / noise.rotation,
             _ => 0.0,
         };
         let mut slopes = vec![0.0; of_arm];
@@ -111,7 +139,7 @@ pub(in crate::diagnose) fn slopes(
         slopes.extend(std::iter::repeat_n(0.0, in_contact));
         slopes
     };
-    DEVIATIONS.map(one).to_vec()
+    all(alone).iter().map(one).collect()
 }
 
 /// Place of the object at a stamp, or of its last pose.

@@ -44,14 +44,19 @@ pub fn identify<E: Evidence>(
     let without_object = ArmAlone(bench.evidence);
     let alone = without_object.bench(bench);
     bar.show(0, stages::BASELINE);
-    let arm = alone.fit((&[], start(bench, split, cell, admitted)), &split.train, &even, None, WAY)?;
-    bar.show(1, stages::BASELINE);
-    let arm = alone.fit((&[], arm.full.clone()), &split.train, &even, Some(&arm), LAST)?;
-    if !admitted.with_object {
-        return Some(arm);
-    }
+    let begun = if cell.robot.is_some() {
+        let arm = alone.fit((&[], start(bench, split, cell, admitted)), &split.train, &even, None, WAY)?;
+        bar.show(1, stages::BASELINE);
+        let arm = alone.fit((&[], arm.full.clone()), &split.train, &even, Some(&arm), LAST)?;
+        if !admitted.with_object {
+            return Some(arm);
+        }
+        arm.full
+    } else {
+        bench.library.start()
+    };
     bar.show(2, stages::BASELINE);
-    let full = refined(bench, split, cell, admitted, &arm.full).unwrap_or_else(|| arm.full.clone());
+    let full = refined(bench, split, cell, admitted, &begun).unwrap_or(begun);
     bar.show(3, stages::BASELINE);
     bench.fit((&[], full), &split.train, &even, None, TOGETHER)
 }

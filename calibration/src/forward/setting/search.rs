@@ -51,7 +51,7 @@ const TIP_FRICTION: Range = [0.0, 1.0];
 /// The centre of mass lies within this share of the half extents.
 const CENTRE_SHARE: f64 = 0.5;
 
-/// Friction, mass, centre of mass and tip friction of the object, beginning at the base's. Difference steps are wide: where
+/// Friction, mass, centre of mass and, where an arm may touch it, tip friction of the object, beginning at the base's. Difference steps are wide: where
 /// tool and object part by a hair's breadth, a little more of any number moves the resting place, and over such a step
 /// that roughness averages out.
 #[must_use]
@@ -79,7 +79,9 @@ pub fn object_parameters(cell: &Cell, base: &Theta) -> Vec<(Setting, Unknown)> {
         let value = start.centre_of_mass.unwrap_or_default()[axis];
         all.push(wide(Setting::CentreOfMass(axis), value, range, 1.5e-3));
     }
-    all.push(wide(Setting::TipFriction, tip, object.tip_friction_range.unwrap_or(TIP_FRICTION), 0.06));
+    if cell.robot.is_some() {
+        all.push(wide(Setting::TipFriction, tip, object.tip_friction_range.unwrap_or(TIP_FRICTION), 0.06));
+    }
     all
 }
 

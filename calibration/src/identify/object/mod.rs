@@ -286,14 +286,9 @@ impl Problem {
 fn searched(cell: &Cell, base: Theta) -> (Settings, Vec<Unknown>) {
     // A mass that was weighed is not searched.
     let weighed = cell.object().is_some_and(|o| o.mass.is_some() && o.mass_range.is_none());
-    let known = |setting: &Setting| match setting {
-        Setting::Mass => weighed,
-        // Without an arm no tool touches it.
-        Setting::TipFriction => cell.robot.is_none(),
-        _ => false,
-    };
     let searched = object_parameters(cell, &base).into_iter();
-    let (settings, unknowns): (Vec<Setting>, Vec<Unknown>) = searched.filter(|(setting, _)| !known(setting)).unzip();
+    let unknown = |(setting, _): &(Setting, Unknown)| !(weighed && *setting == Setting::Mass);
+    let (settings, unknowns): (Vec<Setting>, Vec<Unknown>) = searched.filter(unknown).unzip();
     (Settings::new(base, settings), unknowns)
 }
 
