@@ -19,6 +19,10 @@ use std::time::Duration;
 The twin is identified first, then every known effect is tried, alone and with others, on clips that were not used to fit
 it. The verdict is none, named, class (several that these clips cannot separate), unexplained or not_testable.
 
+Of strokes it says whose the object's gap is: the arm's, or what stays under the recorded motion of the arm. Without a robot in cell.toml
+an object that moves by itself is explained, tossed or sliding. Where cell.toml does not say which control law leads the arm, the
+one that fits is found first.
+
 A recording that cannot mean what it says (units, order, sign, misaligned logs) is not explained, unless --as-recorded says
 so: `calibration check` shows what is wrong.
 

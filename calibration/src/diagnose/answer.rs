@@ -16,6 +16,9 @@ pub struct Diagnosis {
     pub gap: Gap,
     /// What comes nearest to explaining a gap that nothing explains; none where nothing comes near, or something explains it.
     pub nearest: Option<Nearest>,
+    /// Whose the object's gap is, where an arm hits it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub stage_test: Option<StageTest>,
     /// Where it lies; shares sum to 1 over everything that was measured.
     #[serde(rename = "where")]
     pub places: Vec<Place>,
@@ -227,6 +230,23 @@ pub struct Change {
     pub before: Option<f64>,
     /// With them.
     pub after: Option<f64>,
+}
+
+/// The object under the simulated and under the recorded arm, on held-out clips without effects.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct StageTest {
+    /// Mean ADD where the twin moves the arm [m].
+    pub simulated_arm_add_m: f64,
+    /// Mean ADD where the arm moves as it was measured to [m].
+    pub recorded_arm_add_m: f64,
+    /// Share of the first that is gone in the second.
+    pub of_the_arm: f64,
+    /// Clips.
+    pub clips: usize,
+    /// In how many of them the recorded arm does not touch the object.
+    pub untouched: usize,
+    /// What that means, in words.
+    pub text: String,
 }
 
 /// A cell of the map of where the gap lies.

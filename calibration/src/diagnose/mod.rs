@@ -35,7 +35,7 @@ mod test_bench;
 
 pub use answer::{
     Basis, Candidate, Change, Clips, Diagnosis, Gap, Kind, Nearest, Place, Remedy, Rest, SensorGap, Sensors, Share,
-    Status, TorqueRms, Verdict,
+    StageTest, Status, TorqueRms, Verdict,
 };
 
 use crate::engine::{Engine, Quantity, Used};
@@ -275,6 +275,8 @@ fn examine<E: Evidence>(
     let cut_short = interrupt.spent();
     bar.stage(fit::stages::CONCLUSION, 1);
     let mut concluded = conclude::conclusion::conclude(&bench, &split, &found, session, admitted, options)?;
+    let baseline = library.theta(&found.steps[0].from.full);
+    concluded.stage_test = judge::recorded_arm::stage_test(&session.cell, &baseline, admitted, &split.confirm)?;
     if interrupt.spent() {
         concluded.budget_spent = true;
         concluded.verdict = concluded.verdict.so_far(options.budget.unwrap_or_default(), cut_short);

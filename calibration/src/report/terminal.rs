@@ -70,6 +70,7 @@ pub fn diagnosis(diagnosis: &Diagnosis) -> String {
     if !diagnosis.candidates.is_empty() {
         lines.push(others(&diagnosis.candidates));
     }
+    lines.extend(diagnosis.stage_test.iter().map(|test| format!("arm or object: {}", test.text)));
     lines.extend(diagnosis.warnings.iter().map(|warning| format!("note: {warning}")));
     if !diagnosis.next_experiment.is_empty() {
         lines.push(format!("next clip: {}", diagnosis.next_experiment));

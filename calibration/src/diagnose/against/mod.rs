@@ -126,12 +126,13 @@ fn compared(
     let peaks = peaks(cell, admitted, &base)?;
     let library = Library::new(cell, &base, admitted.ground().as_ref(), &peaks);
     let theta = |numbers: &[f64]| library.theta(numbers);
-    let arm = ArmClips::new(cell, &admitted.clips, theta).map_err(Refused::from)?;
-    let mut comparison = if admitted.with_object {
-        let object = ObjectClips::new(cell, admitted.clips.clone(), library.settings.clone())?;
-        examine(&CellClips::new(Some(arm), object, &library), &library, (sessions, pair), options, work)?
-    } else {
-        examine(&arm, &library, (sessions, pair), options, work)?
+    let arm = cell.robot.as_ref().map(|_| ArmClips::new(cell, &admitted.clips, theta)).transpose();
+    let mut comparison = match arm.map_err(Refused::from)? {
+        Some(arm) if !admitted.with_object => examine(&arm, &library, (sessions, pair), options, work)?,
+        arm => {
+            let object = ObjectClips::new(cell, admitted.clips.clone(), library.settings.clone())?;
+            examine(&CellClips::new(arm, object, &library), &library, (sessions, pair), options, work)?
+        }
     };
     if torques::is_tracking(cell) {
         comparison.theta = torques::without_law(comparison.theta, options.theta.as_ref());

@@ -8,6 +8,7 @@
 //! | `closing` | how much of the gap it closes |
 //! | `remainder`, `drift` | what it leaves |
 //! | `gap`, `localise`, `sizes` | how large the gap is, and where |
+//! | `recorded_arm` | whose an object's gap is: the arm's, or the object's |
 //! | `unproven` | what more clips would prove |
 //! | `tolerance` | whether a gap is of interest |
 //! | `partly` | what is proven although a part of the gap stays |
@@ -22,6 +23,7 @@ pub mod gap;
 pub(super) mod held_out;
 pub mod localise;
 pub(super) mod partly;
+pub(super) mod recorded_arm;
 pub mod remainder;
 pub mod score;
 pub(super) mod sizes;

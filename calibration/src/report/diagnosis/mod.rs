@@ -28,6 +28,9 @@ pub fn page(diagnosis: &Diagnosis) -> String {
         @if !diagnosis.places.is_empty() {
             (figure("Where it lies", "Share of the squared gap in each stage, channel and regime.", &map(diagnosis)))
         }
+        @if let Some(test) = &diagnosis.stage_test {
+            section { h2 { "The arm's, or the object's" } p { (test.text) } }
+        }
         @if !diagnosis.traces.is_empty() { (residuals(diagnosis)) }
         @if !diagnosis.candidates.is_empty() { (candidates::sections(&diagnosis.candidates)) }
         @if !diagnosis.remedies.is_empty() { (remedies(diagnosis)) }
@@ -227,6 +230,7 @@ pub(super) mod tests {
                 sensors: Vec::new(),
             },
             nearest: None,
+            stage_test: None,
             places: vec![Place {
                 stage: "control".into(),
                 channel: "joint2".into(),
