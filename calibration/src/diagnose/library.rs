@@ -114,8 +114,10 @@ impl Library {
         let baseline = 0..numbers.len();
         let robot = ArmModel::from_cell(cell).map_or_else(|_| Robot::unknown(), |arm| Robot::of(&arm));
         let mut candidates = Vec::new();
+        let stated = twin::effects::stated(cell.controller.as_ref());
         let fits = |effect: &&EffectInfo| {
-            let known = base.effects.iter().any(|given| given.name == effect.name);
+            let mut given = base.effects.iter().chain(&stated);
+            let known = given.any(|given| given.name == effect.name);
             let touched = cell.robot.is_some() || effect.acts_on != Place::ToolContact;
             let visible = if effect.stage == Stage::Control { dof > 0 } else { with_object && touched };
             visible && !known
@@ -297,8 +299,10 @@ const GAIN_TOLERANCE: f64 = 0.25;
 /// Gains that cell.toml states by value are right to 20 %: without that, viscous friction is a damping that is off.
 fn keep_known_gains(cell: &Cell, unknown: &mut Unknown) {
     let Some(controller) = &cell.controller else { return };
-    let stated = (unknown.name.starts_with("stiffness") && controller.stiffness_range.is_none())
-        || (unknown.name.starts_with("damping") && controller.damping_range.is_none());
+    let known =
+        |name: &str, values: &[f64], ranged: bool| unknown.name.starts_with(name) && !ranged && !values.is_empty();
+    let stated = known("stiffness", &controller.stiffness, controller.stiffness_range.is_some())
+        || known("damping", &controller.damping, controller.damping_range.is_some());
     if stated {
         // The bounds are symmetric in the logarithm around the stated value.
         let nominal = (unknown.lower * unknown.upper).sqrt();

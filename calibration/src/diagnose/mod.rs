@@ -41,6 +41,7 @@ pub use answer::{
 use crate::engine::{Engine, Quantity, Used};
 use crate::forward::object::ObjectClips;
 use crate::forward::setting::{self, BaseError};
+use crate::identify::arm::{ArmError, law};
 use crate::interrupt::Interrupt;
 use crate::kept::{self, Fingerprint, Kept, Trail};
 use clips::admit::{Admitted, Refused, admit};
@@ -101,6 +102,9 @@ pub enum DiagnoseError {
         "the twin cannot follow the clips with the parameters of cell.toml; try `twin replay` and follow its advice"
     )]
     NoBaseline,
+    /// The law that leads the arm cannot be found.
+    #[error(transparent)]
+    Law(#[from] ArmError),
     /// The engine simulates arms alone.
     #[error(
         "--engine simulates the arm alone, and these clips have an object; record the arm alone (`calibration capture \
@@ -154,6 +158,11 @@ pub fn diagnose_kept(
     let admitted = compared(admitted, options.engine.as_deref())?;
     let alone = admitted.objects_alone().then(|| without_robot(session));
     let session = alone.as_ref().unwrap_or(session);
+    let law = law::found(&session.cell, &admitted.clips, options.theta.as_ref(), interrupt)?;
+    let (led, told) = law.map(|(cell, told)| (Session { cell, ..session.clone() }, told)).unzip();
+    let session = led.as_ref().unwrap_or(session);
+    let mut admitted = admitted;
+    admitted.warnings.extend(told);
     let question = Fingerprint::of("diagnose")
         .with(&(session.cell.to_toml(), options.theta.as_ref().map(Theta::to_toml), options.seed, options.torques))
         .with(&options.engine.as_ref().map(|engine| engine.ability().print()))

@@ -144,7 +144,7 @@ impl Mover {
     fn prepared(&self, theta: &Theta) -> Result<Prepared, Impossible> {
         let fail = |error: &dyn std::fmt::Display| Impossible(error.to_string());
         let dof = self.nominal.dof();
-        let effects = Effects::from_theta(&theta.effects, dof).map_err(|e| fail(&e))?;
+        let effects = Effects::of(self.cell.controller.as_ref(), &theta.effects, dof).map_err(|e| fail(&e))?;
         let plant = Plant::new(&self.cell, self.nominal.clone(), Some(theta), &effects.arm).map_err(|e| fail(&e))?;
         Ok(Prepared { plant, dof })
     }

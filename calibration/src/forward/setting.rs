@@ -349,8 +349,8 @@ mod tests {
         let ranged = Cell {
             robot: Some(Robot { joints: vec!["a".into()], ..Robot::default() }),
             controller: Some(Controller {
-                stiffness_range: Some([1.0, 100.0]),
-                damping_range: Some([0.0, 5.0]),
+                stiffness_range: Some([1.0, 100.0].into()),
+                damping_range: Some([0.0, 5.0].into()),
                 ..Controller::default()
             }),
             ..Cell::default()

@@ -102,7 +102,10 @@ pub fn controller(text: &str) -> Result<ControllerKind, String> {
     match text.trim() {
         "joint_impedance" => Ok(ControllerKind::JointImpedance),
         "joint_pd" => Ok(ControllerKind::JointPd),
-        _ => Err("give joint_impedance (gravity and velocities of the commands are compensated) or joint_pd (a servo)"
+        "inverse_dynamics" => Ok(ControllerKind::InverseDynamics),
+        "joint_velocity" => Ok(ControllerKind::JointVelocity),
+        _ => Err("give joint_impedance (gravity and velocities of the commands are compensated), inverse_dynamics (inertia as \
+                  well), joint_velocity (commands are velocities) or joint_pd (a servo)"
             .into()),
     }
 }

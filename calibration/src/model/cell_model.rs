@@ -123,7 +123,9 @@ impl CellModel {
             },
             beyond: Vec::new(),
         };
-        for block in &theta.effects {
+        let stated = twin::effects::stated(cell.controller.as_ref());
+        let replaced = |block: &&EffectTheta| theta.effects.iter().any(|given| given.name == block.name);
+        for block in stated.iter().filter(|block| !replaced(block)).chain(&theta.effects) {
             model.take(block, cell);
         }
         Ok(model)

@@ -1,5 +1,6 @@
 //! `[controller]`: the law between command and torque.
 
+use super::ranges::Ranges;
 use super::within;
 use crate::msg::MAX_JOINTS;
 use schemars::JsonSchema;
@@ -9,7 +10,8 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, expecting = "a [controller] block")]
 pub struct Controller {
-    /// The law.
+    /// The law; left out where it is not known: `identify arm` and `diagnose` find which one fits.
+    #[serde(default = "ControllerKind::unstated", skip_serializing_if = "ControllerKind::is_unstated")]
     pub kind: ControllerKind,
     /// Nominal stiffness [N m/rad].
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -17,18 +19,27 @@ pub struct Controller {
     /// Nominal damping [N m s/rad].
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub damping: Vec<f64>,
-    /// Where every stiffness may lie [N m/rad]; default: within 20 % of nominal.
+    /// Where every stiffness may lie, or each by itself [N m/rad]; default: within 20 % of nominal, else what such a robot has.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub stiffness_range: Option<Range>,
-    /// Where every damping may lie [N m s/rad]; default: within 20 % of nominal.
+    pub stiffness_range: Option<Ranges>,
+    /// Where every damping may lie, or each by itself [N m s/rad]; default: within 20 % of nominal, else what such a robot has.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub damping_range: Option<Range>,
+    pub damping_range: Option<Ranges>,
     /// Rotor inertia seen at the joint [kg m²].
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub rotor_inertia: Vec<f64>,
     /// Largest torque [N m].
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub torque_limit: Vec<f64>,
+    /// How fast an integral part of the law answers [1/s]: its gain over the stiffness.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub integral_rate: Vec<f64>,
+    /// Largest torque at standstill of drives whose voltage is limited, as of servos with pulse-width modulation [N m].
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub voltage_limit: Vec<f64>,
+    /// Torque at the joint over the current of the motor, where currents were logged in place of torques [N m/A].
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub torque_constant: Vec<f64>,
     /// Where logged torques are measured.
     #[serde(default, skip_serializing_if = "TorqueSensing::is_joint")]
     pub torque_sensing: TorqueSensing,
@@ -63,9 +74,39 @@ pub enum ControllerKind {
     JointImpedance,
     /// `tau = k (q_d - q) - d dq`: a servo, nothing compensated.
     JointPd,
+    /// `joint_impedance` with `M(q) ddq_d` added: the inertia is fed forward.
+    InverseDynamics,
+    /// `tau = d (dq_d - dq) + k s + gravity(q) + coriolis(q, dq)`, `ds/dt = dq_d - dq`: commands are velocities, `k` sums up what
+    /// the joint is off.
+    JointVelocity,
+    /// Not known which; simulated as `joint_impedance`. Not for cell.toml: it is what a missing `kind` means.
+    #[serde(skip_deserializing)]
+    Unstated,
     /// No law that a robot has: the joints go along the desired motion, by whatever torque that takes. Not for cell.toml.
     #[serde(skip_deserializing)]
     Tracking,
+}
+
+impl ControllerKind {
+    fn unstated() -> Self {
+        Self::Unstated
+    }
+
+    fn is_unstated(&self) -> bool {
+        *self == Self::Unstated
+    }
+
+    /// Its name in cell.toml; `None` for what is no law of a robot.
+    #[must_use]
+    pub fn name(self) -> Option<&'static str> {
+        match self {
+            Self::JointImpedance => Some("joint_impedance"),
+            Self::JointPd => Some("joint_pd"),
+            Self::InverseDynamics => Some("inverse_dynamics"),
+            Self::JointVelocity => Some("joint_velocity"),
+            Self::Unstated | Self::Tracking => None,
+        }
+    }
 }
 
 impl Controller {
@@ -75,6 +116,9 @@ impl Controller {
             ("controller.damping", &self.damping),
             ("controller.rotor_inertia", &self.rotor_inertia),
             ("controller.torque_limit", &self.torque_limit),
+            ("controller.integral_rate", &self.integral_rate),
+            ("controller.voltage_limit", &self.voltage_limit),
+            ("controller.torque_constant", &self.torque_constant),
         ];
         for (key, values) in blocks {
             within(key, values, 0.0, 1e6)?;
@@ -93,15 +137,11 @@ impl Controller {
                 ));
             }
         }
-        for (key, range) in
-            [("controller.stiffness_range", self.stiffness_range), ("controller.damping_range", self.damping_range)]
-        {
-            if let Some([lo, hi]) = range
-                && !(lo >= 0.0 && hi > lo)
-            {
-                return Err(format!("`{key}` must be [low, high] with 0 <= low < high"));
-            }
-        }
-        Ok(())
+        let ranges =
+            [("controller.stiffness_range", &self.stiffness_range), ("controller.damping_range", &self.damping_range)];
+        ranges
+            .into_iter()
+            .filter_map(|(key, range)| Some((key, range.as_ref()?)))
+            .try_for_each(|(k, r)| r.check(k, dof))
     }
 }

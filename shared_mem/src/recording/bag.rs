@@ -7,7 +7,7 @@ use super::joint_log::JointLog;
 use super::ros2::{JointState, StampedPose};
 use super::torques;
 use super::tracked::{self, ObjectTopics, PoseRow};
-use crate::cell::{Cell, ClipKind, Topics};
+use crate::cell::{Cell, ClipKind, ControllerKind};
 use crate::frames::Pose;
 use std::collections::BTreeMap;
 use std::io::{Read, Seek};
@@ -54,7 +54,7 @@ pub(super) fn read<R: Read + Seek>(
     let (mut collected, objects) = (Collected::default(), ObjectTopics::ros2(cell));
     while let Some(message) = messages.next()? {
         collected
-            .take(&message, &cell.topics, &objects)
+            .take(&message, cell, &objects)
             .map_err(|what| ReadError::content(path, &message.channel.topic, what))?;
     }
     let needs_arm = cell.robot.is_some() && kind != ClipKind::FreeMotion;
@@ -81,11 +81,16 @@ pub(super) fn read<R: Read + Seek>(
 
 impl Collected {
     /// Takes a message over when it is on a wanted topic; a sentence when it is not what that topic should hold.
-    fn take(&mut self, message: &Message<'_>, topics: &Topics, objects: &ObjectTopics) -> Result<(), String> {
-        let topic = &message.channel.topic;
+    fn take(&mut self, message: &Message<'_>, cell: &Cell, objects: &ObjectTopics) -> Result<(), String> {
+        let (topic, topics) = (&message.channel.topic, &cell.topics);
         if *topic == topics.measured || *topic == topics.desired {
             expect_type(message, &[JointState::TYPE])?;
-            let state = JointState::decode(message.data).map_err(|e| not_decoded(&e))?;
+            let mut state = JointState::decode(message.data).map_err(|e| not_decoded(&e))?;
+            // What a velocity interface is sent need not hold positions: they follow from the velocities.
+            let velocities = cell.controller.as_ref().is_some_and(|law| law.kind == ControllerKind::JointVelocity);
+            if velocities && *topic == topics.desired && state.position.is_empty() {
+                state.position = vec![0.0; state.velocity.len()];
+            }
             let log = if *topic == topics.measured { &mut self.measured } else { &mut self.desired };
             log.push(&state, message.log_time_ns);
         } else if objects.wants(topic) {

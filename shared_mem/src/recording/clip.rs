@@ -8,7 +8,7 @@ use super::messages::is_own;
 use super::series::{JointSeries, ObjectSeries};
 use super::tracked::{ObjectTopics, TrackedObject};
 use super::wire::Wire;
-use super::{bag, own, twinaligner};
+use super::{bag, controller_log, own, twinaligner};
 use crate::cell::{Cell, ClipKind};
 use crate::msg::object::ObjectPose;
 use std::path::{Path, PathBuf};
@@ -45,6 +45,11 @@ pub struct Clip {
 /// [`ReadError`] when the file is missing, is of no known kind, lacks a topic that `cell` and `kind` ask for, lacks a
 /// joint, or more than 1 % of its rows cannot be used. A cut or partly changed file is no error: see [`Clip::damage`].
 pub fn read_clip(path: &Path, kind: ClipKind, cell: &Cell) -> Result<Clip, ReadError> {
+    Ok(controller_log::in_positions_and_torques(as_logged(path, kind, cell)?, cell))
+}
+
+/// A clip in the quantities that were logged.
+fn as_logged(path: &Path, kind: ClipKind, cell: &Cell) -> Result<Clip, ReadError> {
     if path.is_dir() {
         if twinaligner::is_clip_folder(path) {
             return twinaligner::read(path, kind, cell);

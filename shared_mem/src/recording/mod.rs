@@ -13,6 +13,7 @@
 //! | `bag` | a ROS 2 bag as a clip |
 //! | `twinaligner`, `npy` | a TwinAligner folder as a clip |
 //! | `tracked` | objects by name, and the topics that they are on |
+//! | `controller_log` | commanded velocities and motor currents, made into positions and torques |
 //! | `joint_log` | joint rows: one publisher, one joint order |
 //! | `checks` | faults that foreign logs have, each told in a sentence |
 //! | `wire`, `writer` | own clips: messages and file, and what viewers are shown of the robot |
@@ -29,6 +30,7 @@ mod cdr;
 mod checks;
 mod clip;
 mod container;
+mod controller_log;
 mod device_clock;
 mod episode;
 mod error;

@@ -1,6 +1,9 @@
 //! From command to torque: the joint controllers that cell.toml names. Evaluated once per millisecond and held in
 //! between, by the bridge on the real or simulated arm and by every rollout.
 
+mod inverse_dynamics;
+
+use super::gains;
 use super::{ArmModel, JointState, Joints, MAX_JOINTS};
 use shared_mem::cell::{Controller, ControllerKind, Range};
 use shared_mem::msg::joints_from;
@@ -97,9 +100,29 @@ impl ControlLaw {
     #[must_use]
     #[inline]
     pub fn torque(&self, nominal: &ArmModel, state: &JointState, q_d: &Joints, dq_d: &Joints) -> Joints {
+        self.torque_after(nominal, state, (q_d, dq_d), dq_d)
+    }
+
+    /// The same where the velocity that was desired a control period before is known, whose change a law may feed forward.
+    #[must_use]
+    #[inline]
+    pub fn torque_after(
+        &self,
+        nominal: &ArmModel,
+        state: &JointState,
+        (q_d, dq_d): (&Joints, &Joints),
+        dq_d_before: &Joints,
+    ) -> Joints {
         let compensation = match self.kind {
-            ControllerKind::JointImpedance => nominal.bias(state),
+            ControllerKind::JointImpedance | ControllerKind::JointVelocity | ControllerKind::Unstated => {
+                nominal.bias(state)
+            }
             ControllerKind::JointPd => [0.0; MAX_JOINTS],
+            ControllerKind::InverseDynamics => {
+                let ddq_d = inverse_dynamics::acceleration(dq_d_before, dq_d);
+                let (bias, fed) = (nominal.bias(state), inverse_dynamics::torque(nominal, state, &ddq_d));
+                std::array::from_fn(|i| bias[i] + fed[i])
+            }
             ControllerKind::Tracking => return self.tracking_torque(nominal, state, q_d, dq_d),
         };
         self.torque_with(state, q_d, dq_d, &compensation)
@@ -116,6 +139,11 @@ impl ControlLaw {
 
     /// Whether a torque follows from the command and `gravity + coriolis` alone.
     pub(crate) fn needs_no_mass(&self) -> bool {
+        !matches!(self.kind, ControllerKind::Tracking | ControllerKind::InverseDynamics)
+    }
+
+    /// Whether the damping is one that drives have.
+    pub(crate) fn damps(&self) -> bool {
         self.kind != ControllerKind::Tracking
     }
 
@@ -124,7 +152,10 @@ impl ControlLaw {
     pub(super) fn torque_with(&self, state: &JointState, q_d: &Joints, dq_d: &Joints, bias: &Joints) -> Joints {
         // A servo damps the joint's own velocity and compensates nothing.
         let (follow, compensate) = match self.kind {
-            ControllerKind::JointImpedance => (1.0, 1.0),
+            ControllerKind::JointImpedance
+            | ControllerKind::JointVelocity
+            | ControllerKind::InverseDynamics
+            | ControllerKind::Unstated => (1.0, 1.0),
             ControllerKind::JointPd => (0.0, 0.0),
             ControllerKind::Tracking => unreachable!("asked for by `needs_no_mass`"),
         };
@@ -148,21 +179,23 @@ fn exactly(key: &'static str, values: &[f64], dof: usize) -> Result<Joints, Gain
 
 fn nominal(controller: &Controller, arm: &ArmModel) -> Result<(Joints, Joints), GainError> {
     let mut stiffness = [0.0; MAX_JOINTS];
-    match (&controller.stiffness[..], controller.stiffness_range) {
-        ([], None) => return Err(GainError::Unknown("stiffness")),
-        ([], Some(range)) => stiffness[..arm.dof()].fill(geometric_middle(range)),
-        (values, _) => stiffness = exactly("`controller.stiffness` in cell.toml", values, arm.dof())?,
+    if controller.stiffness.is_empty() {
+        for (joint, stiffness) in stiffness[..arm.dof()].iter_mut().enumerate() {
+            let range = gains::stiffness_range(controller, arm, joint).ok_or(GainError::Unknown("stiffness"))?;
+            *stiffness = geometric_middle(range);
+        }
+    } else {
+        stiffness = exactly("`controller.stiffness` in cell.toml", &controller.stiffness, arm.dof())?;
     }
     let mut damping = [0.0; MAX_JOINTS];
-    match (&controller.damping[..], controller.damping_range) {
-        ([], None) => return Err(GainError::Unknown("damping")),
-        ([], Some([lo, hi])) => {
-            let mass = arm.mass_matrix(arm.ready());
-            for i in 0..arm.dof() {
-                damping[i] = (2.0 * (stiffness[i] * mass[i][i]).sqrt()).clamp(lo, hi);
-            }
+    if controller.damping.is_empty() {
+        let mass = arm.mass_matrix(arm.ready());
+        for i in 0..arm.dof() {
+            let [lo, hi] = gains::damping_range(controller, arm, i).ok_or(GainError::Unknown("damping"))?;
+            damping[i] = (2.0 * (stiffness[i] * mass[i][i]).sqrt()).clamp(lo, hi);
         }
-        (values, _) => damping = exactly("`controller.damping` in cell.toml", values, arm.dof())?,
+    } else {
+        damping = exactly("`controller.damping` in cell.toml", &controller.damping, arm.dof())?;
     }
     Ok((stiffness, damping))
 }

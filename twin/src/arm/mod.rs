@@ -18,6 +18,7 @@
 //! | `hull` | [`ArmHull`]: the space that links and tool take |
 //! | `dynamics` | gravity, Coriolis, mass matrix, accelerations |
 //! | `control` | [`ControlLaw`]: from command to torque |
+//! | `gains` | where its gains may lie |
 //! | `step` | integration over time |
 //! | `yielding` | how the flange moves and gives way to a push |
 //! | `transmission` | the same with friction, yielding and play between motor and link |
@@ -28,6 +29,7 @@ mod dry_friction;
 mod dynamics;
 mod follower;
 mod fr3;
+mod gains;
 mod hull;
 mod inertia;
 mod kernel;
@@ -47,6 +49,7 @@ pub use control::{ControlLaw, GainError};
 pub use dry_friction::Presliding;
 pub use dynamics::PointForce;
 pub use follower::Follower;
+pub use gains::{damping_range, stiffness_range};
 pub use hull::{ArmHull, Extent, MOST_BALLS};
 pub use inertia::MassProperties;
 pub use kinematics::Jacobian;

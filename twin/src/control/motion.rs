@@ -50,6 +50,8 @@ pub(crate) struct ArmMotion {
     pub(crate) tau_J: Joints,
     /// Asked for in the last period, without gravity [N m].
     pub(crate) tau_J_d: Joints,
+    /// Velocity that was desired in the last period, as it reached the controller [rad/s]; `None` before the first.
+    pub(crate) dq_d: Option<Joints>,
 }
 
 impl Clone for ArmMotion {
@@ -74,7 +76,7 @@ impl ArmMotion {
     /// An arm that is about to be started.
     pub(crate) fn unstarted() -> Self {
         let (state, zero) = (JointState::default(), [0.0; MAX_JOINTS]);
-        Self { state, memory: None, motor: zero, external: zero, tau_J: zero, tau_J_d: zero }
+        Self { state, memory: None, motor: zero, external: zero, tau_J: zero, tau_J_d: zero, dq_d: None }
     }
 
     /// Notes the torque of a controller that knows the arm exactly.
@@ -100,6 +102,7 @@ impl ArmRollout<'_> {
         let gravity = self.nominal.gravity(&reading.q);
         (motion.motor, motion.tau_J) = (gravity, gravity);
         (motion.external, motion.tau_J_d) = ([0.0; MAX_JOINTS], [0.0; MAX_JOINTS]);
+        motion.dq_d = None;
     }
 
     /// The same at the stamp `at_ns` of a command series: commands of the time before that are still on their way count.
@@ -164,7 +167,8 @@ impl ArmRollout<'_> {
                     (Some(effects), Some(memory)) => effects.command(memory, q_d, dq_d),
                     _ => (*q_d, *dq_d),
                 };
-                let tau = self.law.torque(self.nominal, &reading, &q_d, &dq_d);
+                let before = motion.dq_d.replace(dq_d).unwrap_or(dq_d);
+                let tau = self.law.torque_after(self.nominal, &reading, (&q_d, &dq_d), &before);
                 match (self.effects, &mut motion.memory) {
                     (Some(effects), Some(memory)) => {
                         effects.asked(memory, (self.arm, self.law), (&reading, &q_d), &tau)
@@ -188,7 +192,7 @@ impl ArmRollout<'_> {
     /// What the controller's damping takes at the joints' own velocities [N m]; nothing where no gains are known.
     fn damped(&self, drive: &Drive, reading: &JointState) -> Joints {
         match drive {
-            Drive::JointImpedance { .. } if self.law.needs_no_mass() => {
+            Drive::JointImpedance { .. } if self.law.damps() => {
                 std::array::from_fn(|i| self.law.damping[i] * reading.dq[i])
             }
             Drive::JointImpedance { .. } | Drive::Torque { .. } => [0.0; MAX_JOINTS],

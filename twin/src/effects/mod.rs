@@ -23,6 +23,7 @@ mod remedy;
 mod robot;
 mod separation;
 mod slide;
+mod stated;
 mod values;
 
 pub(crate) use arm::JointMemory;
@@ -35,6 +36,7 @@ pub use remedy::{Found, Remedy};
 pub use robot::Robot;
 pub use separation::{Experiment, Separation};
 pub use slide::{SlideEffects, TableFriction};
+pub use stated::stated;
 pub use values::EffectError;
 
 use shared_mem::theta::EffectTheta;

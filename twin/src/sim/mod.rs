@@ -106,7 +106,7 @@ impl SimCell {
     pub fn new(cell: &Cell, theta: Option<&Theta>) -> Result<Self, SimError> {
         let model = cell.robot.as_ref().map(|_| ArmModel::from_cell(cell)).transpose()?;
         let blocks = theta.map_or(&[][..], |t| &t.effects);
-        let effects = Effects::from_theta(blocks, model.as_ref().map_or(0, ArmModel::dof))?;
+        let effects = Effects::of(cell.controller.as_ref(), blocks, model.as_ref().map_or(0, ArmModel::dof))?;
         let arm = model.map(|model| SimArm::new(cell, model, theta, &effects.arm)).transpose()?;
         let (object, contact) = match ObjectModel::new(cell, theta)? {
             None => (None, ToolContact::without_object()),
@@ -143,7 +143,7 @@ impl SimCell {
     /// [`SimError`] naming the key and the remedy.
     pub fn set_parameters(&mut self, theta: &Theta) -> Result<(), SimError> {
         let dof = self.arm.as_ref().map_or(0, |arm| arm.model().dof());
-        let effects = Effects::from_theta(&theta.effects, dof)?;
+        let effects = Effects::of(self.description.controller.as_ref(), &theta.effects, dof)?;
         let Description { controller, tool, object: described } = &self.description;
         let parameters = described.as_ref().map(|object| ObjectParameters::new(object, Some(theta)));
         parameters.map_or(Ok(()), |parameters| parameters.check())?;

@@ -108,13 +108,7 @@ fn difference(a: &Cell, b: &Cell) -> Option<(&'static str, String)> {
     }
     let law = |cell: &Cell| cell.controller.as_ref().map(|controller| controller.kind);
     if law(a) != law(b) {
-        let named = |cell| {
-            law(cell).map_or("none", |kind| match kind {
-                ControllerKind::JointImpedance => "joint_impedance",
-                ControllerKind::JointPd => "joint_pd",
-                ControllerKind::Tracking => "none",
-            })
-        };
+        let named = |cell| law(cell).and_then(ControllerKind::name).unwrap_or("none");
         return Some(("robot", format!("the control laws are {} and {}", named(a), named(b))));
     }
     let alike = |a: &Object, b: &Object| a.shape == b.shape && a.size == b.size && a.mass == b.mass;

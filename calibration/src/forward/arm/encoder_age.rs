@@ -26,7 +26,8 @@ pub(super) fn of(own: Option<&f64>) -> f64 {
 /// Gains and commands under which fresh readings give the torque that old ones give under `theta` and `desired`:
 /// `k (q_d - q + age dq) + d (dq_d - dq)` is `k (q_d - q) + e (dq_d d / e - dq)` with `e = d - k age`. `None` where nothing changes.
 pub(super) fn controlled(cell: &Cell, desired: &JointSeries, theta: &Theta, age: f64) -> Option<(Theta, CommandTrack)> {
-    let follows = cell.controller.as_ref().is_some_and(|c| c.kind == ControllerKind::JointImpedance);
+    let kind = cell.controller.as_ref().map(|controller| controller.kind);
+    let follows = matches!(kind, Some(ControllerKind::JointImpedance | ControllerKind::JointVelocity));
     if age == 0.0 || !follows || desired.dq.is_empty() {
         return None;
     }

@@ -2,8 +2,9 @@
 
 use super::Setting;
 use crate::estimate::Unknown;
-use shared_mem::cell::{Cell, ControllerKind, Range};
+use shared_mem::cell::{Cell, Controller, ControllerKind, Range};
 use shared_mem::theta::Theta;
+use twin::arm::{ArmModel, damping_range, stiffness_range};
 use twin::effects::{EffectInfo, Parameter, Robot, Role, Search, Shape, Stage};
 use twin::scene::ObjectModel;
 
@@ -19,8 +20,14 @@ pub fn gains(cell: &Cell, base: &Theta) -> Vec<(Setting, Unknown)> {
     if controller.kind == ControllerKind::Tracking {
         return Vec::new();
     }
-    let stiffness = Gain { starts: &arm.stiffness, nominal: &controller.stiffness, range: controller.stiffness_range };
-    let damping = Gain { starts: &arm.damping, nominal: &controller.damping, range: controller.damping_range };
+    let model = ArmModel::from_cell(cell).ok();
+    let ranges = |of: fn(&Controller, &ArmModel, usize) -> Option<Range>, count: usize| -> Vec<Option<Range>> {
+        (0..count).map(|joint| of(controller, model.as_ref()?, joint)).collect()
+    };
+    let ranged = ranges(stiffness_range, arm.stiffness.len());
+    let stiffness = Gain { starts: &arm.stiffness, nominal: &controller.stiffness, ranges: ranged };
+    let ranged = ranges(damping_range, arm.damping.len());
+    let damping = Gain { starts: &arm.damping, nominal: &controller.damping, ranges: ranged };
     let mut all = stiffness.unknowns(Setting::Stiffness);
     all.extend(damping.unknowns(Setting::Damping));
     all
@@ -30,14 +37,14 @@ pub fn gains(cell: &Cell, base: &Theta) -> Vec<(Setting, Unknown)> {
 struct Gain<'a> {
     starts: &'a [f64],
     nominal: &'a [f64],
-    range: Option<Range>,
+    ranges: Vec<Option<Range>>,
 }
 
 impl Gain<'_> {
     fn unknowns(&self, setting: fn(usize) -> Setting) -> Vec<(Setting, Unknown)> {
         let of = |(joint, start): (usize, &f64)| {
             let around = self.nominal.get(joint).copied().unwrap_or(*start).max(f64::MIN_POSITIVE);
-            let [lower, upper] = self.range.unwrap_or([around / GAIN_FACTOR, around * GAIN_FACTOR]);
+            let [lower, upper] = self.ranges[joint].unwrap_or([around / GAIN_FACTOR, around * GAIN_FACTOR]);
             unknown(setting(joint), *start, [lower, upper], GAIN_STEP * start.max(0.05 * around).max(1e-3))
         };
         self.starts.iter().enumerate().map(of).collect()

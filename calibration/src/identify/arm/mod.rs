@@ -4,6 +4,7 @@
 //! |---|---|
 //! | `session` | which clips of a session can be used, and for what |
 //! | `start` | where the search begins when little is known |
+//! | [`law`] | which control law leads the arm, where nobody says |
 //! | `saturation` | the same for a limit of the torques |
 //! | `time_step` | what the twin's time step does to the numbers, and that it is taken out |
 //! | `finding` | what a fit tells, number by number |
@@ -16,6 +17,7 @@ mod advice;
 mod doubt;
 mod figures;
 mod finding;
+pub mod law;
 mod saturation;
 mod session;
 mod start;
@@ -158,6 +160,8 @@ fn identify_kept(
     options: &Options,
     (kept, interrupt): (&Kept, &Interrupt),
 ) -> Result<(Identification, Theta), ArmError> {
+    let law = law::found(&cell, &clips, given, interrupt)?;
+    let (cell, told) = law.map_or((cell, None), |(cell, told)| (cell, Some(told)));
     let base = complete(&cell, given)?;
     let (settings, mut unknowns): (Vec<_>, Vec<_>) = searched(&cell, &base, &options.also)?.into_iter().unzip();
     let settings = Settings::new(base, settings);
@@ -196,6 +200,7 @@ fn identify_kept(
     figures::fill(&mut answer, &model, &clips, &random, [&before, &outcome.fit.shared])?;
     answer.not_identifiable = verdict::untold(&finding, &model, &clips, options.optimizer);
     answer.warnings.extend(doubt::doubts(&answer, &finding, &model, &clips, &before));
+    answer.warnings.extend(told);
     answer.advice = advice::next(&finding, &clips);
     clips.fill(&mut answer);
     answer.engine = options.engine.as_ref().map(|engine| engine.used());

@@ -58,7 +58,10 @@ pub(super) fn improve(
 /// Whether cell.toml knows gains by range alone.
 pub(super) fn is_ranged(cell: &Cell) -> bool {
     let controller = cell.controller.as_ref();
-    controller.is_some_and(|law| law.stiffness_range.is_some() || law.damping_range.is_some())
+    let ranged = |values: &[f64], range: bool| range || values.is_empty();
+    controller.is_some_and(|law| {
+        ranged(&law.stiffness, law.stiffness_range.is_some()) || ranged(&law.damping, law.damping_range.is_some())
+    })
 }
 
 fn is_delay(setting: &Setting) -> bool {
