@@ -6,6 +6,7 @@
 //! alternative for each of a few forms.
 
 use crate::diagnose::clips::ground::{Ground, Patch};
+use crate::diagnose::known_gains;
 use crate::estimate::Unknown;
 use crate::forward::setting::{self, Setting, Settings};
 use shared_mem::cell::Cell;
@@ -109,7 +110,7 @@ impl Library {
             numbers.extend(setting::object_parameters(cell, base).into_iter().filter(shows));
         }
         for (_, unknown) in &mut numbers {
-            keep_known_gains(cell, unknown);
+            known_gains::keep(cell, unknown);
         }
         let baseline = 0..numbers.len();
         let robot = ArmModel::from_cell(cell).map_or_else(|_| Robot::unknown(), |arm| Robot::of(&arm));
@@ -291,25 +292,6 @@ fn arm_reach(setting: &Setting, felt: Option<(&str, usize)>) -> ArmReach {
 fn felt_with(setting: &Setting) -> Option<&'static str> {
     let Setting::Effect { name, .. } = *setting else { return None };
     setting.of_effect().filter(|parameter| parameter.felt_by_arm).map(|_| name)
-}
-
-/// How far gains stated by value may be off: cell.toml's own statement, and a quarter more.
-const GAIN_TOLERANCE: f64 = 0.25;
-
-/// Gains that cell.toml states by value are right to 20 %: without that, viscous friction is a damping that is off.
-fn keep_known_gains(cell: &Cell, unknown: &mut Unknown) {
-    let Some(controller) = &cell.controller else { return };
-    let known =
-        |name: &str, values: &[f64], ranged: bool| unknown.name.starts_with(name) && !ranged && !values.is_empty();
-    let stated = known("stiffness", &controller.stiffness, controller.stiffness_range.is_some())
-        || known("damping", &controller.damping, controller.damping_range.is_some());
-    if stated {
-        // The bounds are symmetric in the logarithm around the stated value.
-        let nominal = (unknown.lower * unknown.upper).sqrt();
-        unknown.lower = nominal * (1.0 - GAIN_TOLERANCE);
-        unknown.upper = nominal * (1.0 + GAIN_TOLERANCE);
-        unknown.start = unknown.start.clamp(unknown.lower, unknown.upper);
-    }
 }
 
 impl Candidate {

@@ -8,7 +8,7 @@
 //! |---|---|
 //! | [`clips`] | which recorded clips can be diagnosed, how much of them counts, and what each is for |
 //! | [`criteria`] | the measured numbers that decide |
-//! | [`library`] | the candidates as numbers |
+//! | [`library`], `known_gains` | the candidates as numbers; how far gains stated by value may be off |
 //! | [`evidence`] | what is measured against the twin, where in a clip, and how far clips deviate by themselves |
 //! | [`fit`] | hypotheses linearised around clips and fitted to them |
 //! | [`judge`] | how well a hypothesis predicts clips, how much of the gap it closes, how sure that is, and what is left |
@@ -27,6 +27,7 @@ pub mod criteria;
 pub mod evidence;
 pub mod fit;
 pub mod judge;
+mod known_gains;
 pub mod library;
 pub mod propose;
 pub mod search;
