@@ -115,10 +115,18 @@ pub fn documents() -> Vec<(String, String)> {
 #[must_use]
 pub fn literals() -> Vec<(String, String)> {
     let mut found = Vec::new();
-    let mut folders: Vec<PathBuf> =
-        ["shared_mem/src", "twin/src", "rt_bridge/src", "calibration/src", "evaluation/src", "import/src", "urdf/src"]
-            .map(|f| root().join(f))
-            .into();
+    let mut folders: Vec<PathBuf> = [
+        "shared_mem/src",
+        "twin/src",
+        "rt_bridge/src",
+        "calibration/src",
+        "evaluation/src",
+        "import/src",
+        "urdf/src",
+        "reconstruct/src",
+    ]
+    .map(|f| root().join(f))
+    .into();
     while let Some(folder) = folders.pop() {
         for entry in std::fs::read_dir(&folder).expect("a folder").map(|entry| entry.expect("an entry").path()) {
             let name = entry.strip_prefix(root()).expect("below the root").display().to_string();

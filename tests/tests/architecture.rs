@@ -26,10 +26,19 @@ fn sources(folder: &str) -> Vec<(String, String)> {
 }
 
 fn product_sources() -> Vec<(String, String)> {
-    ["shared_mem/src", "twin/src", "rt_bridge/src", "calibration/src", "evaluation/src", "import/src", "urdf/src"]
-        .iter()
-        .flat_map(|f| sources(f))
-        .collect()
+    [
+        "shared_mem/src",
+        "twin/src",
+        "rt_bridge/src",
+        "calibration/src",
+        "evaluation/src",
+        "import/src",
+        "urdf/src",
+        "reconstruct/src",
+    ]
+    .iter()
+    .flat_map(|f| sources(f))
+    .collect()
 }
 
 /// The lines of every product file that are neither tests nor comments.
@@ -56,7 +65,7 @@ fn is_named(line: &str, name: &str) -> bool {
 
 #[test]
 fn each_big_dependency_has_one_door() {
-    let doors: [(&str, &[&str]); 30] = [
+    let doors: [(&str, &[&str]); 31] = [
         ("iceoryx2", &["shared_mem/src/transport/", "shared_mem/src/msg/"]),
         ("mcap", &["shared_mem/src/recording/"]),
         ("parry3d_f64", &["twin/src/physics/"]),
@@ -91,6 +100,7 @@ fn each_big_dependency_has_one_door() {
         ("base64", &["calibration/src/page/picture.rs"]),
         ("zip", &["import/src/sources/npz.rs"]),
         ("schemars", &["shared_mem/src/cell/"]),
+        ("base64", &["reconstruct/src/assets/page.rs"]),
     ];
     for (file, text) in product_sources() {
         for (dependency, allowed) in doors {
@@ -252,7 +262,7 @@ fn needed(text: &str) -> Vec<String> {
 #[test]
 fn folders_need_each_other_in_no_circle() {
     let lines = product_lines();
-    for package in ["shared_mem", "twin", "rt_bridge", "calibration", "evaluation", "import", "urdf"] {
+    for package in ["shared_mem", "twin", "rt_bridge", "calibration", "evaluation", "import", "urdf", "reconstruct"] {
         let folder = |file: &str| {
             let within = file.strip_prefix(package)?.strip_prefix("/src/")?.split('/').next()?;
             Some(within.strip_suffix(".rs").unwrap_or(within).to_owned()).filter(|name| name != "lib" && name != "main")
@@ -297,12 +307,13 @@ fn the_diagnosis_goes_one_way() {
 
 #[test]
 fn dependencies_point_one_way() {
-    let rules: [(&str, &[&str]); 6] = [
-        ("shared_mem", &["twin", "rt_bridge", "calibration", "evaluation", "import"]),
-        ("import", &["twin", "rt_bridge", "calibration", "evaluation", "urdf"]),
+    let rules: [(&str, &[&str]); 7] = [
+        ("shared_mem", &["twin", "rt_bridge", "calibration", "evaluation", "import", "reconstruct"]),
+        ("import", &["twin", "rt_bridge", "calibration", "evaluation", "urdf", "reconstruct"]),
+        ("reconstruct", &["twin", "rt_bridge", "calibration", "evaluation", "import", "urdf"]),
         ("evaluation", &["rt_bridge", "calibration", "import"]),
         ("twin", &["rt_bridge", "calibration", "evaluation", "import"]),
-        ("rt_bridge", &["calibration", "evaluation", "import"]),
+        ("rt_bridge", &["calibration", "evaluation", "import", "reconstruct"]),
         ("calibration", &["rt_bridge"]),
     ];
     for (package, forbidden) in rules {
@@ -327,6 +338,7 @@ fn the_readme_names_every_folder_and_only_existing_files() {
         "evaluation/",
         "import/",
         "urdf/",
+        "reconstruct/",
         "tests/",
         "fuzz/",
         "config/",
@@ -342,6 +354,7 @@ fn the_readme_names_every_folder_and_only_existing_files() {
             "evaluation/src",
             "import/",
             "urdf/src",
+            "reconstruct/src",
             "tests/",
             "config/",
             "docs/",

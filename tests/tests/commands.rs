@@ -29,7 +29,7 @@ const OF_OTHERS: [&str; 10] = [
     "open-mode",
 ];
 /// A folder of the sources, and the verbs of which one must have the flags that its messages name.
-const SPOKEN_BY: [(&str, &[&str]); 10] = [
+const SPOKEN_BY: [(&str, &[&str]); 11] = [
     ("calibration/src/init/", &["calibration init"]),
     ("import/src/", &["calibration import"]),
     ("calibration/src/viewpoint/", &["calibration viewpoint"]),
@@ -40,10 +40,22 @@ const SPOKEN_BY: [(&str, &[&str]); 10] = [
     ("twin/src/viewer/", &["twin shadow"]),
     ("twin/src/teleop/", &["twin teleop"]),
     ("twin/src/reconstruct/", &["twin label-splats"]),
+    ("reconstruct/src/", &["twin reconstruct object"]),
 ];
 /// Folders whose files are named in texts by their path.
-const FOLDERS: [&str; 10] =
-    ["shared_mem/", "twin/", "rt_bridge/", "calibration/", "import/", "urdf/", "tests/", "config/", "tasks/", "docs/"];
+const FOLDERS: [&str; 11] = [
+    "shared_mem/",
+    "twin/",
+    "rt_bridge/",
+    "calibration/",
+    "import/",
+    "urdf/",
+    "reconstruct/",
+    "tests/",
+    "config/",
+    "tasks/",
+    "docs/",
+];
 
 fn named(verb: &Verb) -> String {
     verb.path.join(" ")

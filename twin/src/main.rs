@@ -21,6 +21,7 @@ Examples:
   twin render session --out frames
   twin task tasks/push_milk.toml
   twin teleop --task tasks/pick_carrot.toml --record carrot
+  twin reconstruct object scan --out mug --mass 0.118
   twin label-splats scan.ply --cell cell.toml --joints 0,-0.78,0,-2.36,0,1.57,0.78 --out fr3_splats
 Every verb has its own --help with examples. Logs and progress go to stderr (RUST_LOG=debug for more)."
 )]
@@ -38,6 +39,8 @@ enum Verb {
     #[cfg(feature = "teleop")]
     Teleop(cli::teleop::Teleop),
     LabelSplats(cli::label_splats::LabelSplats),
+    #[cfg(feature = "reconstruct")]
+    Reconstruct(cli::reconstruct::Reconstruct),
 }
 
 const BUILD: Build = Build {
@@ -47,6 +50,7 @@ const BUILD: Build = Build {
         ("viewer", cfg!(feature = "viewer")),
         ("render", cfg!(feature = "render")),
         ("teleop", cfg!(feature = "teleop")),
+        ("reconstruct", cfg!(feature = "reconstruct")),
     ],
 };
 
@@ -67,6 +71,8 @@ fn main() -> ExitCode {
         #[cfg(feature = "teleop")]
         Verb::Teleop(verb) => verb.run(),
         Verb::LabelSplats(verb) => verb.run(),
+        #[cfg(feature = "reconstruct")]
+        Verb::Reconstruct(verb) => verb.run(),
     };
     match outcome {
         Ok(()) => ExitCode::SUCCESS,

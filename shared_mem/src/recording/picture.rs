@@ -157,23 +157,9 @@ pub(super) fn check_size(width: u32, height: u32) -> Result<(), String> {
 
 /// The pixels of a PNG file; a sentence when it is damaged or too large.
 pub(super) fn unpack_png(bytes: &[u8], stamp_ns: u64) -> Result<Picture, String> {
-    // What a PNG carries beside its pixels takes memory of its own.
-    let limits = png::Limits { bytes: 64 << 20 };
-    let mut decoder = png::Decoder::new_with_limits(std::io::Cursor::new(bytes), limits);
-    decoder.set_transformations(png::Transformations::EXPAND);
-    let fail = |error: png::DecodingError| format!("the PNG is damaged ({error})");
-    let mut reader = decoder.read_info().map_err(fail)?;
-    check_size(reader.info().width, reader.info().height)?;
-    let size = reader.output_buffer_size().ok_or("the PNG is damaged (its size makes no sense)")?;
-    let mut raw = vec![0; size];
-    let frame = reader.next_frame(&mut raw).map_err(fail)?;
-    raw.truncate(frame.buffer_size());
-    let (channels, colours) = match frame.color_type {
-        png::ColorType::Grayscale | png::ColorType::Indexed => (1, [0, 0, 0]),
-        png::ColorType::GrayscaleAlpha => (2, [0, 0, 0]),
-        png::ColorType::Rgb => (3, [0, 1, 2]),
-        png::ColorType::Rgba => (4, [0, 1, 2]),
-    };
+    let (frame, raw) = raw_png(bytes)?;
+    let channels = frame.color_type.samples();
+    let colours = if channels < 3 { [0, 0, 0] } else { [0, 1, 2] };
     let mut pixels = Vec::with_capacity(raw.len());
     let (pixel, size) = match (frame.bit_depth, channels) {
         (png::BitDepth::Sixteen, 1) => (Pixel::Count, 2),
@@ -186,6 +172,32 @@ pub(super) fn unpack_png(bytes: &[u8], stamp_ns: u64) -> Result<Picture, String>
     }
     let encoding = if matches!(pixel, Pixel::Count) { PixelEncoding::Depth16 } else { PixelEncoding::Rgb8 };
     Ok(Picture::Pixels { header: header(stamp_ns, (frame.width, frame.height), encoding), pixels })
+}
+
+/// Opacity of each pixel of a PNG file, 0 to 255; `None` where it has none.
+pub(super) fn unpack_alpha(bytes: &[u8]) -> Result<Option<Vec<u8>>, String> {
+    let (frame, raw) = raw_png(bytes)?;
+    let channels = frame.color_type.samples();
+    let size = channels * if frame.bit_depth == png::BitDepth::Sixteen { 2 } else { 1 };
+    // Of 16 bits the upper byte, which stands first.
+    let alpha = |pixel: &[u8]| pixel[size / channels * (channels - 1)];
+    Ok(matches!(channels, 2 | 4).then(|| raw.chunks_exact(size).map(alpha).collect()))
+}
+
+/// The samples of a PNG file as they stand in it, palettes and few bits expanded.
+fn raw_png(bytes: &[u8]) -> Result<(png::OutputInfo, Vec<u8>), String> {
+    // What a PNG carries beside its pixels takes memory of its own.
+    let limits = png::Limits { bytes: 64 << 20 };
+    let mut decoder = png::Decoder::new_with_limits(std::io::Cursor::new(bytes), limits);
+    decoder.set_transformations(png::Transformations::EXPAND);
+    let fail = |error: png::DecodingError| format!("the PNG is damaged ({error})");
+    let mut reader = decoder.read_info().map_err(fail)?;
+    check_size(reader.info().width, reader.info().height)?;
+    let size = reader.output_buffer_size().ok_or("the PNG is damaged (its size makes no sense)")?;
+    let mut raw = vec![0; size];
+    let frame = reader.next_frame(&mut raw).map_err(fail)?;
+    raw.truncate(frame.buffer_size());
+    Ok((frame, raw))
 }
 
 #[cfg(test)]

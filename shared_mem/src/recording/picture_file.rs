@@ -2,7 +2,7 @@
 //! millimetre (a PNG with 16 bits of grey).
 
 use super::error::ReadError;
-use super::picture::{Picture, check_size, unpack_png};
+use super::picture::{Picture, check_size, unpack_alpha, unpack_png};
 use crate::input;
 use crate::msg::image::{ImageHeader, PixelEncoding, StampDomain};
 use crate::output::{self, Destination, OutputError};
@@ -24,7 +24,17 @@ pub fn read_picture(path: &Path) -> Result<Picture, ReadError> {
     unpack_picture(&bytes, 0).map_err(|what| ReadError::kind(path, what))
 }
 
-/// The same from a file's bytes, as a clip's compressed picture holds them.
+/// Opacity of each pixel of a PNG file, row by row, 0 to 255; `None` where the picture has no alpha channel.
+///
+/// # Errors
+/// As [`read_picture`].
+pub fn read_alpha(path: &Path) -> Result<Option<Vec<u8>>, ReadError> {
+    let bytes = input::bytes(path, input::Kind::Picture)?;
+    let alpha = if bytes.starts_with(b"\x89PNG") { unpack_alpha(&bytes) } else { Ok(None) };
+    alpha.map_err(|what| ReadError::kind(path, what))
+}
+
+/// A picture from a file's bytes, as a clip's compressed picture holds them.
 ///
 /// # Errors
 /// A sentence when the bytes are cut short or neither PNG nor JPEG.
@@ -182,6 +192,18 @@ mod tests {
         assert_eq!((header.encoding, &pixels[..]), (PixelEncoding::Depth16, &depth[..]));
         std::fs::write(&path, b"GIF89a").expect("a file");
         assert!(read_picture(&path).unwrap_err().to_string().contains("neither a PNG nor a JPEG"));
+    }
+
+    #[test]
+    fn an_alpha_channel_is_read_where_there_is_one() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("a.png");
+        let pixels = [1, 2, 3, 0, 4, 5, 6, 255];
+        let packed = pack(2, 1, &pixels, (png::ColorType::Rgba, png::BitDepth::Eight), png::Compression::default());
+        std::fs::write(&path, packed.expect("a picture")).expect("a file");
+        assert_eq!(read_alpha(&path).expect("a picture"), Some(vec![0, 255]));
+        write_png(&path, 2, 1, &pixels[..6]).expect("a file");
+        assert_eq!(read_alpha(&path).expect("a picture"), None);
     }
 
     proptest! {

@@ -2,6 +2,8 @@
 
 pub(crate) mod label_splats;
 pub(crate) mod look;
+#[cfg(feature = "reconstruct")]
+pub(crate) mod reconstruct;
 pub(crate) mod render;
 pub(crate) mod replay;
 pub(crate) mod shadow;

@@ -10,6 +10,7 @@ pub mod hit;
 mod hull;
 mod impulses;
 mod outline;
+mod pieces;
 mod push;
 mod shape;
 mod surface;
@@ -19,6 +20,7 @@ mod tumble;
 
 pub use hull::{Face, Hull};
 pub use outline::Outline;
+pub use pieces::{Piece, convex_pieces};
 pub use shape::FlatMesh;
 pub use surface::Surface;
 pub use table_object::{ObjectMotion, TableObject};

@@ -1,0 +1,77 @@
+//! What a simulation takes: meshes, convex pieces, URDF, a block for cell.toml, numbers, and a page that shows how good it is. All in
+//! the object's own frame: the scan's axes, with the origin in the middle of the mesh's bounding box.
+//!
+//! | file | owns |
+//! |---|---|
+//! | `description` | URDF and the block for cell.toml |
+//! | `page` | the report |
+//! | `summary` | the numbers as JSON |
+
+mod description;
+mod page;
+mod summary;
+
+pub use summary::Summary;
+
+use crate::mesh::{Mesh, obj, ply};
+use crate::object::{Object, is_certain};
+use nalgebra::Point3;
+use shared_mem::msg::image::PixelEncoding;
+use shared_mem::recording::pack_picture;
+use std::path::PathBuf;
+
+/// Colour of what no view has shown.
+const UNKNOWN: [u8; 3] = [128, 128, 128];
+/// Density where nobody weighed the object [kg/m³]: that of a filled package.
+pub const DENSITY: f64 = 500.0;
+
+/// What the files are called, and what the scan cannot say.
+#[derive(Debug, Clone)]
+pub struct Labels {
+    /// The object's name.
+    pub name: String,
+    /// Its mass, where it was weighed [kg].
+    pub mass: Option<f64>,
+    /// The command that made it, for the report's foot.
+    pub command: String,
+}
+
+/// A mesh in the object's frame.
+#[must_use]
+pub fn centred(mesh: &Mesh, middle: &Point3<f64>) -> Mesh {
+    Mesh { points: mesh.points.iter().map(|p| p - middle.coords).collect(), triangles: mesh.triangles.clone() }
+}
+
+/// All files with their paths in the output folder; `pieces` are convex and in the object's frame.
+#[must_use]
+pub fn files(object: &Object, pieces: &[Mesh], labels: &Labels) -> Vec<(PathBuf, Vec<u8>)> {
+    let middle = object.middle();
+    let (fine, coarse) = (centred(&object.fine, &middle), centred(&object.coarse, &middle));
+    let colours: Vec<[u8; 3]> =
+        object.fine.points.iter().zip(&object.shown).map(|(p, n)| colour(object, p, *n)).collect();
+    let summary = Summary::of(object, pieces, labels);
+    let mut files = vec![
+        ("object.obj".into(), obj(&coarse).into_bytes()),
+        ("object_fine.obj".into(), obj(&fine).into_bytes()),
+        ("object.ply".into(), ply(&fine, &colours, &object.shown)),
+        ("object.urdf".into(), description::urdf(&summary, pieces.len()).into_bytes()),
+        ("cell_object.toml".into(), description::block(&summary).into_bytes()),
+        ("object.json".into(), summary.json()),
+        ("report.html".into(), page::page(object, &summary, labels).into_bytes()),
+    ];
+    for (number, piece) in pieces.iter().enumerate() {
+        files.push((description::piece_file(number).into(), obj(piece).into_bytes()));
+    }
+    for view in &object.held_out {
+        let stem = view.name.replace(['/', '\\'], "_");
+        let stem = stem.rsplit_once('.').map_or(stem.as_str(), |(stem, _)| stem);
+        let packed = pack_picture(PixelEncoding::Rgb8, view.width, view.height, view.drawn.rgb.as_flattened());
+        files.extend(packed.ok().map(|bytes| (format!("held_out/{stem}.png").into(), bytes)));
+    }
+    files
+}
+
+fn colour(object: &Object, point: &Point3<f64>, shown: u8) -> [u8; 3] {
+    let known = object.field.colour_at(point).filter(|_| is_certain(shown));
+    known.map_or(UNKNOWN, |colour| colour.map(|c| (c * 255.0).round() as u8))
+}

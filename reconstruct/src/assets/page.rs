@@ -1,0 +1,146 @@
+//! The report: one HTML file that opens anywhere, without network and without scripts. Held-out pictures beside what the object looks
+//! like from there, and where the two differ.
+
+use super::{Labels, Summary};
+use crate::object::{HeldOut, Object};
+use crate::scan::ScaleSource;
+use base64::Engine as _;
+use base64::engine::general_purpose::STANDARD;
+use maud::{DOCTYPE, Markup, PreEscaped, html};
+use shared_mem::msg::image::PixelEncoding;
+use shared_mem::recording::pack_picture;
+
+const STYLE: &str = include_str!("page.css");
+/// Differences are drawn so many times as bright.
+const BRIGHTER: u8 = 4;
+/// Room around the object in a picture [pixel].
+const ROOM: u32 = 12;
+
+pub(super) fn page(object: &Object, summary: &Summary, labels: &Labels) -> String {
+    let page = html! {
+        (DOCTYPE)
+        html lang="en" {
+            head {
+                meta charset="utf-8";
+                meta name="viewport" content="width=device-width, initial-scale=1";
+                title { "twinalign: " (summary.name) }
+                style { (PreEscaped(STYLE)) }
+            }
+            body {
+                h1 { (summary.name) }
+                (facts(summary))
+                @for remark in &summary.remarks { p.remark { (remark.0) } }
+                (shape(summary))
+                h2 { "Held-out views" }
+                p.note {
+                    "Every eighth view took no part. Left the picture inside its mask, in the middle the object from there, right "
+                    "their difference, " (BRIGHTER) " times as bright. PSNR is that inside the mask, its outermost three pixels left "
+                    "out, with the camera's pose fitted to the object; in brackets with the pose as the scan has it."
+                }
+                @for view in &object.held_out { (held_out(view)) }
+                footer { "twinalign " (env!("CARGO_PKG_VERSION")) ". " (labels.command) }
+            }
+        }
+    };
+    page.into_string()
+}
+
+fn facts(summary: &Summary) -> Markup {
+    let entries = [
+        (format!("{:.1} dB", summary.psnr_db), "PSNR of held-out views inside the mask"),
+        (format!("{:.1} cm³", summary.volume_m3 * 1e6), "volume"),
+        (summary.surface.genus.to_string(), "handles (genus)"),
+        (format!("{:.2} mm", summary.voxel_m * 1e3), "distance of the grid's nodes"),
+    ];
+    html! { div.facts { @for (value, what) in &entries { div { b { (value) } span { (what) } } } } }
+}
+
+fn shape(summary: &Summary) -> Markup {
+    let scale = &summary.scale;
+    let source = match scale.source {
+        ScaleSource::Given => "given on the command line".to_owned(),
+        ScaleSource::Robot => "the robot that held the camera".to_owned(),
+        ScaleSource::Depth => {
+            format!("depth at points of the COLMAP model, single points spread by {:.1} %", scale.spread * 100.0)
+        }
+        ScaleSource::Poses => "the poses are in metres, and the depth pictures agree".to_owned(),
+    };
+    let [x, y, z] = summary.size_m.map(|edge| edge * 1e3);
+    let mass = if summary.weighed { "weighed" } else { "from the volume at 500 kg/m³; weigh it and give --mass" };
+    let rows = [
+        (
+            "surface",
+            format!(
+                "closed and oriented; {} triangles, and {} in object.obj",
+                summary.surface.triangles, summary.coarse_triangles
+            ),
+        ),
+        ("size", format!("{x:.1} x {y:.1} x {z:.1} mm along the scan's axes")),
+        (
+            "convex pieces",
+            format!("{}, {:.1} % of the volume", summary.pieces, 100.0 * summary.pieces_volume_m3 / summary.volume_m3),
+        ),
+        ("mass", format!("{:.3} kg, {mass}", summary.mass_kg)),
+        ("scale", format!("one unit of the poses is {:.5} m: {source}", scale.metres)),
+        (
+            "views",
+            format!(
+                "{} to learn from{}, {} held out",
+                summary.views,
+                if summary.with_depth { " with depth" } else { "" },
+                summary.held_out.len()
+            ),
+        ),
+        (
+            "cameras",
+            format!("moved by {:.2} mm (root mean square) to agree with each other", summary.cameras_moved_m * 1e3),
+        ),
+    ];
+    html! { table { @for (what, value) in &rows { tr { th { (what) } td { (value) } } } } }
+}
+
+fn held_out(view: &HeldOut) -> Markup {
+    let difference: Vec<[u8; 3]> = view
+        .picture
+        .iter()
+        .zip(&view.drawn.rgb)
+        .map(|(a, b)| std::array::from_fn(|c| a[c].abs_diff(b[c]).saturating_mul(BRIGHTER)))
+        .collect();
+    let window = window(view);
+    html! {
+        figure {
+            @for (rgb, what) in [(&view.picture, "photograph"), (&view.drawn.rgb, "object"), (&difference, "difference")] {
+                @if let Some(source) = picture(rgb, view.width, window) { img src=(source) alt=(format!("{what} of {}", view.name)); }
+            }
+            figcaption {
+                (view.name) ": " (format!("{:.1} dB ({:.1}); silhouettes agree to {:.1} %", view.psnr, view.psnr_as_given, view.overlap * 100.0))
+            }
+        }
+    }
+}
+
+/// First column and row, columns and rows of the part that shows the object.
+fn window(view: &HeldOut) -> [u32; 4] {
+    let shown = |at: &usize| view.picture[*at] != [0; 3] || view.drawn.opacity[*at] > 0.5;
+    let places = (0..view.picture.len()).filter(shown).map(|at| [at as u32 % view.width, at as u32 / view.width]);
+    let (low, high) = places.fold(([u32::MAX; 2], [0; 2]), |(low, high), at| {
+        ([0, 1].map(|a| low[a].min(at[a])), [0, 1].map(|a| high[a].max(at[a])))
+    });
+    if low[0] > high[0] {
+        return [0, 0, view.width, view.height];
+    }
+    let first = low.map(|a| a.saturating_sub(ROOM));
+    let last = [(high[0] + ROOM).min(view.width - 1), (high[1] + ROOM).min(view.height - 1)];
+    [first[0], first[1], last[0] + 1 - first[0], last[1] + 1 - first[1]]
+}
+
+/// A part of a picture as the address of an image.
+fn picture(rgb: &[[u8; 3]], width: u32, [x, y, columns, rows]: [u32; 4]) -> Option<String> {
+    let row = |row: u32| {
+        let first = (row * width + x) as usize;
+        rgb[first..first + columns as usize].as_flattened().iter().copied()
+    };
+    let pixels: Vec<u8> = (y..y + rows).flat_map(row).collect();
+    let packed = pack_picture(PixelEncoding::Rgb8, columns, rows, &pixels).ok()?;
+    Some(format!("data:image/png;base64,{}", STANDARD.encode(packed)))
+}

@@ -1,0 +1,111 @@
+//! The numbers of an object, as JSON and for the other files.
+
+use super::{DENSITY, Labels};
+use crate::mesh::{Mesh, Solid, Topology};
+use crate::object::{Object, Remark};
+use crate::scan::Scale;
+use serde::Serialize;
+
+/// The numbers of an object.
+#[derive(Debug, Clone, Serialize)]
+pub struct Summary {
+    /// The object's name.
+    pub name: String,
+    /// Edges of its box along the scan's axes [m].
+    pub size_m: [f64; 3],
+    /// Where its frame's origin lies in the scan's frame [m].
+    pub origin_in_scan_m: [f64; 3],
+    /// Volume [m³].
+    pub volume_m3: f64,
+    /// Volume of the convex pieces together [m³].
+    pub pieces_volume_m3: f64,
+    /// Convex pieces.
+    pub pieces: usize,
+    /// Mass [kg].
+    pub mass_kg: f64,
+    /// Whether it was weighed; else it is the volume's at [`DENSITY`].
+    pub weighed: bool,
+    /// Centre of mass from the origin, as if of one material [m].
+    pub centre_of_mass_m: [f64; 3],
+    /// Inertia about it: xx, xy, xz, yy, yz, zz [kg m²].
+    pub inertia_kg_m2: [f64; 6],
+    /// The fine mesh.
+    pub surface: Topology,
+    /// Triangles of the coarse mesh.
+    pub coarse_triangles: usize,
+    /// Metres for one unit of the scan's poses, and who says so.
+    pub scale: Scale,
+    /// Views that it was made from.
+    pub views: usize,
+    /// Whether they had depth.
+    pub with_depth: bool,
+    /// How far the cameras' poses were moved, root mean square [m].
+    pub cameras_moved_m: f64,
+    /// Held-out views.
+    pub held_out: Vec<HeldOutNumbers>,
+    /// Their mean PSNR inside the mask [dB].
+    pub psnr_db: f64,
+    /// Distance of the grid's nodes [m].
+    pub voxel_m: f64,
+    /// What a person should know.
+    pub remarks: Vec<Remark>,
+}
+
+/// The numbers of one held-out view.
+#[derive(Debug, Clone, Serialize)]
+pub struct HeldOutNumbers {
+    /// The picture.
+    pub view: String,
+    /// PSNR inside the mask with the camera fitted to the object [dB].
+    pub psnr_db: f64,
+    /// PSNR inside the mask with the camera where the scan has it [dB].
+    pub psnr_as_given_db: f64,
+    /// Silhouette and mask: what they have in common, of what either has.
+    pub overlap: f64,
+}
+
+impl Summary {
+    /// The numbers of an object with its convex pieces.
+    #[must_use]
+    pub fn of(object: &Object, pieces: &[Mesh], labels: &Labels) -> Self {
+        let (low, high) = object.fine.bounds();
+        let middle = object.middle();
+        let solid = &object.solid;
+        let mass = labels.mass.unwrap_or(DENSITY * solid.volume);
+        let inertia = solid.unit_inertia * mass;
+        let held_out = object.held_out.iter().map(|view| HeldOutNumbers {
+            view: view.name.clone(),
+            psnr_db: view.psnr,
+            psnr_as_given_db: view.psnr_as_given,
+            overlap: view.overlap,
+        });
+        Self {
+            name: labels.name.clone(),
+            size_m: (high - low).into(),
+            origin_in_scan_m: middle.coords.into(),
+            volume_m3: solid.volume,
+            pieces_volume_m3: pieces.iter().map(|piece| Solid::of(piece).volume).sum(),
+            pieces: pieces.len(),
+            mass_kg: mass,
+            weighed: labels.mass.is_some(),
+            centre_of_mass_m: (solid.centroid - middle).into(),
+            inertia_kg_m2: [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)].map(|at| inertia[at]),
+            surface: object.topology,
+            coarse_triangles: object.coarse.triangles.len(),
+            scale: object.scale,
+            views: object.views,
+            with_depth: object.with_depth,
+            cameras_moved_m: object.moved,
+            held_out: held_out.collect(),
+            psnr_db: object.psnr(),
+            voxel_m: object.field.grid.voxel,
+            remarks: object.remarks.clone(),
+        }
+    }
+
+    pub(super) fn json(&self) -> Vec<u8> {
+        let mut bytes = serde_json::to_vec_pretty(self).unwrap_or_default();
+        bytes.push(b'\n');
+        bytes
+    }
+}

@@ -1,0 +1,18 @@
+//! From a scan to assets of a simulation: pictures with known poses in, closed coloured meshes out. No network is trained and no
+//! graphics device needed: signed distance and colour stand on a grid, whose derivatives are written by hand.
+//!
+//! | module | owns |
+//! |---|---|
+//! | [`scan`] | pictures, masks, depth, poses; COLMAP, nerfstudio, robot-held cameras |
+//! | [`field`] | signed distance and colour at the nodes of a box |
+//! | [`object`] | one object: where it starts, the optimisation, what was left uncertain |
+//! | [`mesh`] | its surface as triangles: closed, checked, reduced; volume and inertia |
+//! | [`assets`] | files: meshes, URDF, cell.toml block, report page |
+//!
+//! Lengths are metres. Camera axes: x right, y down, z forwards.
+
+pub mod assets;
+pub mod field;
+pub mod mesh;
+pub mod object;
+pub mod scan;

@@ -1,0 +1,180 @@
+//! How good it is, by pictures that took no part; and which parts no picture has shown.
+
+use super::bounds::Bounds;
+use super::learn;
+use super::pictures::Remark;
+use super::pool;
+use super::view::{Drawn, draw};
+use crate::field::{Field, Grid};
+use crate::mesh::{Islands, Mesh};
+use crate::scan::{Camera, Frame};
+use nalgebra::{Isometry3, Point3, Vector3};
+use rayon::prelude::*;
+
+/// So near to the mask's border pixels do not count: what is behind shines in [pixel].
+const EDGE: i16 = 3;
+/// For what views show, pictures of fewer pixels do.
+const COARSER: u32 = 3;
+/// A corner is shown by a view that it faces (cosine).
+const FACING: f64 = 0.25;
+/// A corner is certain that so many views show.
+const CERTAIN: u8 = 2;
+
+/// A view that took no part.
+#[derive(Debug, Clone)]
+pub struct HeldOut {
+    /// The picture's path as the scan lists it.
+    pub name: String,
+    /// The picture, black outside the mask.
+    pub picture: Vec<[u8; 3]>,
+    /// The same view of the field.
+    pub drawn: Drawn,
+    /// Columns.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    /// Peak signal-to-noise ratio inside the mask, its border left out [dB].
+    pub psnr: f64,
+    /// The same with the camera where the scan has it, before its pose was fitted to the field [dB].
+    pub psnr_as_given: f64,
+    /// What mask and drawn silhouette have in common, of what either has.
+    pub overlap: f64,
+}
+
+pub(super) fn held_out(field: &Field<f32>, frame: &Frame, bounds: &Bounds) -> HeldOut {
+    let pixels = pool::pixels(std::slice::from_ref(frame));
+    let pose = learn::placed(field, &pixels, &frame.scan_from_camera, bounds.centre(), bounds.radius());
+    let as_given = draw(field, &frame.camera, &frame.scan_from_camera);
+    let drawn = draw(field, &frame.camera, &pose);
+    let (mut both, mut either) = (0usize, 0usize);
+    for (mask, opacity) in frame.mask.iter().zip(&drawn.opacity) {
+        both += usize::from(*mask && *opacity > 0.5);
+        either += usize::from(*mask || *opacity > 0.5);
+    }
+    let picture = frame.rgb.iter().zip(&frame.mask).map(|(rgb, mask)| if *mask { *rgb } else { [0; 3] }).collect();
+    HeldOut {
+        name: frame.name.clone(),
+        picture,
+        psnr: psnr(frame, &drawn),
+        psnr_as_given: psnr(frame, &as_given),
+        drawn,
+        width: frame.camera.width,
+        height: frame.camera.height,
+        overlap: both as f64 / either.max(1) as f64,
+    }
+}
+
+fn psnr(frame: &Frame, drawn: &Drawn) -> f64 {
+    let (mut sum, mut count) = (0.0, 0usize);
+    for (at, steps) in frame.border_distance(EDGE + 1).into_iter().enumerate() {
+        if steps > EDGE {
+            let off = |c: usize| f64::from(frame.rgb[at][c].abs_diff(drawn.rgb[at][c]));
+            sum += (0..3).map(|c| off(c) * off(c)).sum::<f64>();
+            count += 3;
+        }
+    }
+    let mean = (sum / count.max(1) as f64).max(1e-3);
+    10.0 * (255.0 * 255.0 / mean).log10()
+}
+
+/// How many views show each corner of a mesh: it faces them, and nothing stands before it.
+pub(super) fn shown(field: &Field<f32>, mesh: &Mesh, frames: &[Frame], poses: &[Isometry3<f64>]) -> Vec<u8> {
+    let normals = normals(mesh);
+    let near = 2.5 * field.grid.voxel;
+    let one = |frame: &Frame, pose: &Isometry3<f64>| -> Vec<bool> {
+        let camera: Camera = frame.camera.reduced(COARSER);
+        let drawn = draw(field, &camera, pose);
+        let at = |(point, normal): (&Point3<f64>, &Vector3<f64>)| {
+            let local = pose.inverse_transform_point(point);
+            let Some([u, v]) = camera.project(&local) else { return false };
+            if !(u >= 0.0 && v >= 0.0 && u < f64::from(camera.width) && v < f64::from(camera.height)) {
+                return false;
+            }
+            let towards = (Point3::from(pose.translation.vector) - point).normalize();
+            let depth = f64::from(drawn.depth[v as usize * camera.width as usize + u as usize]);
+            let slack = near + 2.0 * local.z / camera.focal[0];
+            normal.dot(&towards) > FACING && depth > 0.0 && local.z < depth + slack
+        };
+        mesh.points.iter().zip(&normals).map(at).collect()
+    };
+    let mut count = vec![0u8; mesh.points.len()];
+    for (frame, pose) in frames.iter().zip(poses) {
+        let shown = one(frame, pose);
+        count.iter_mut().zip(shown).for_each(|(count, shown)| *count = count.saturating_add(u8::from(shown)));
+    }
+    count
+}
+
+fn normals(mesh: &Mesh) -> Vec<Vector3<f64>> {
+    let mut normals = vec![Vector3::zeros(); mesh.points.len()];
+    for (number, triangle) in mesh.triangles.iter().enumerate() {
+        let [a, b, c] = mesh.corners(number);
+        let normal = (b - a).cross(&(c - a));
+        triangle.iter().for_each(|corner| normals[*corner as usize] += normal);
+    }
+    normals.iter().map(|n| n.try_normalize(0.0).unwrap_or_else(Vector3::z)).collect()
+}
+
+/// How many metres one unit of the poses would have to be for depth to lie on the start's surface; `None` without depth. In a view, the
+/// middle ratio of measured to expected depth.
+pub(super) fn depth_scale(grid: &Grid, distance: &[f32], frames: &[Frame]) -> Option<f64> {
+    let field = Field { grid: *grid, distance: distance.to_vec(), colour: vec![[0.0; 3]; grid.len()] };
+    let of = |frame: &Frame| -> Vec<f64> {
+        if frame.depth.is_empty() {
+            return Vec::new();
+        }
+        let camera = frame.camera.reduced(2 * COARSER);
+        let drawn = draw(&field, &camera, &frame.scan_from_camera);
+        let (columns, step) = (camera.width as usize, 2 * COARSER as usize);
+        let ratio = |at: usize| {
+            let whole = (at / columns * step + step / 2) * frame.camera.width as usize + at % columns * step + step / 2;
+            let (measured, expected) = (f64::from(frame.depth[whole]), f64::from(drawn.depth[at]));
+            (measured > 0.0 && expected > 0.0 && frame.mask[whole]).then(|| measured / expected)
+        };
+        (0..drawn.depth.len()).filter_map(ratio).collect()
+    };
+    let mut ratios: Vec<f64> = frames.par_iter().flat_map_iter(of).collect();
+    ratios.sort_by(f64::total_cmp);
+    (ratios.len() > 100).then(|| ratios[ratios.len() / 2])
+}
+
+/// What a person should know about the surface.
+pub(super) fn remarks(shown: &[u8], mesh: &Mesh, islands: &Islands, views: &[HeldOut]) -> Vec<Remark> {
+    let mut remarks = Vec::new();
+    let (mut hidden, mut all) = (0.0, 0.0);
+    for (number, triangle) in mesh.triangles.iter().enumerate() {
+        let [a, b, c] = mesh.corners(number);
+        let area = (b - a).cross(&(c - a)).norm();
+        all += area;
+        if triangle.iter().any(|corner| shown[*corner as usize] < CERTAIN) {
+            hidden += area;
+        }
+    }
+    let share = hidden / all;
+    if share > 0.02 {
+        remarks.push(Remark(format!(
+            "{:.0} % of the surface is shown by fewer than {CERTAIN} views, and is a guess (grey in object.ply): take pictures from there",
+            share * 100.0
+        )));
+    }
+    if islands.share > 0.02 {
+        remarks.push(Remark(format!(
+            "{} parts beside the object were left out, {:.0} % of its volume: does the mask show more than one object?",
+            islands.bodies,
+            islands.share * 100.0
+        )));
+    }
+    let overlap = views.iter().map(|view| view.overlap).sum::<f64>() / views.len().max(1) as f64;
+    if overlap < 0.9 {
+        remarks.push(Remark(format!(
+            "silhouettes of held-out views agree with their masks to {:.0} % only: masks or poses are wrong in parts",
+            overlap * 100.0
+        )));
+    }
+    remarks
+}
+
+/// Whether a corner that so many views show is certain.
+pub(crate) fn is_certain(shown: u8) -> bool {
+    shown >= CERTAIN
+}

@@ -1,0 +1,289 @@
+//! The optimisation, coarse to fine: in each step some thousand rays and the smoothness of the field around its surface, one step of
+//! Adam along the sum; the poses of the cameras move along. The same state and step give the same next state on any machine.
+
+use super::adam::{Adam, Gathered, Rates};
+use super::band::Band;
+use super::pool::{Pixel, Stand, corrected};
+use super::ray::{Medium, Receiver, Tracer, Weights};
+use super::smooth::{Smoothness, at_node};
+use super::start::{self, Seen};
+use super::sweep::signed_distance;
+use crate::field::{Field, Grid};
+use crate::scan::Frame;
+use nalgebra::{Isometry3, Point3};
+use rand::{RngExt as _, SeedableRng as _};
+use rand_pcg::Pcg64;
+use rayon::prelude::*;
+
+/// Parts of a step that are gathered by themselves.
+const PARTS: usize = 4;
+/// Rays of a step.
+const RAYS: usize = 8192;
+/// Of the nodes around the surface one in so many is smoothed in a step.
+const SMOOTHED: usize = 4;
+/// The band around the surface is found anew after so many steps.
+const BAND_STEPS: u32 = 10;
+/// Distance of samples [voxel].
+const PACE: f32 = 0.7;
+/// Steepness of the logistic function in the end [1/voxel].
+const STEEPEST: f32 = 6.0;
+
+/// One level of the optimisation.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Level {
+    /// About so many nodes.
+    pub(crate) nodes: f64,
+    pub(crate) steps: u32,
+    /// Steepness of the logistic function at its beginning and end [1/voxel].
+    pub(crate) steepness: [f32; 2],
+    /// Whether the cameras' poses move.
+    pub(crate) poses: bool,
+}
+
+/// The levels of a run, the last of about `edge` cubed nodes.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Plan {
+    pub(crate) levels: Vec<Level>,
+}
+
+impl Plan {
+    /// Without depth the hollows have to be found from coarse to fine. With it they are known, and thin walls would be lost in a coarse
+    /// grid: it only serves to find the cameras' places, with which depth is then fused again.
+    pub(crate) fn new(edge: u32, with_depth: bool) -> Self {
+        let level = |part: f64, steps: u32, steepness: [f32; 2], poses: bool| Level {
+            nodes: (f64::from(edge) / part).powi(3),
+            steps,
+            steepness,
+            poses,
+        };
+        let first = if with_depth { None } else { Some(level(4.0, 150, [1.5, 3.0], false)) };
+        let others = [level(2.0, 300, [2.0, 4.0], true), level(1.0, 800, [2.5, STEEPEST], true)];
+        Self { levels: first.into_iter().chain(others).collect() }
+    }
+
+    /// Steps of all levels.
+    pub(crate) fn steps(&self) -> u64 {
+        self.steps_left(0, 0)
+    }
+
+    /// Steps from a place on.
+    pub(crate) fn steps_left(&self, level: usize, step: u32) -> u64 {
+        self.levels.iter().skip(level).map(|level| u64::from(level.steps)).sum::<u64>() - u64::from(step)
+    }
+}
+
+/// Moments of the cameras' corrections.
+pub(crate) type PoseMoments = ([f64; 6], [f64; 6]);
+
+/// All that goes on from step to step.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct State {
+    pub(crate) level: usize,
+    pub(crate) step: u32,
+    pub(crate) field: Field<f32>,
+    pub(crate) adam: Adam,
+    /// Shift [m] and turn [rad] of each frame's camera about the pivot.
+    pub(crate) corrections: Vec<[f64; 6]>,
+    pub(crate) moments: Vec<PoseMoments>,
+}
+
+impl State {
+    /// A field with the distances of the start, in grey.
+    pub(crate) fn new(grid: Grid, distance: Vec<f32>, frames: usize) -> Self {
+        let nodes = grid.len();
+        let field = Field { grid, distance, colour: vec![[0.5; 3]; nodes] };
+        let none = ([0.0; 6], [0.0; 6]);
+        let (corrections, moments) = (vec![[0.0; 6]; frames], vec![none; frames]);
+        Self { level: 0, step: 0, field, adam: Adam::new(nodes), corrections, moments }
+    }
+}
+
+/// What the steps of one run share.
+pub(crate) struct Learner<'a> {
+    plan: Plan,
+    frames: &'a [Frame],
+    /// Standard deviation of depth at one metre [m], where there is depth.
+    depth_spread: Option<f64>,
+    pixels: &'a [Pixel],
+    pivot: Point3<f64>,
+    /// Half the object's diagonal [m].
+    radius: f64,
+    parts: Vec<Gathered>,
+    band: Option<(Band, Vec<u32>)>,
+}
+
+impl<'a> Learner<'a> {
+    pub(crate) fn new(
+        plan: Plan,
+        (frames, depth_spread): (&'a [Frame], Option<f64>),
+        pixels: &'a [Pixel],
+        (pivot, radius): (Point3<f64>, f64),
+    ) -> Self {
+        Self { plan, frames, depth_spread, pixels, pivot, radius, parts: Vec::new(), band: None }
+    }
+
+    /// One step; at the end of a level the field goes on with nodes twice as dense. `true` while there are steps left.
+    pub(crate) fn step(&mut self, state: &mut State) -> bool {
+        let level = self.plan.levels[state.level];
+        let nodes = state.field.grid.len();
+        if self.parts.first().is_none_or(|part| !part.is_for(nodes)) {
+            self.parts = vec![Gathered::new(nodes); PARTS];
+            self.band = None;
+        }
+        let progress = state.step as f32 / level.steps as f32;
+        let steepness = level.steepness[0] * (level.steepness[1] / level.steepness[0]).powf(progress);
+        if self.band.is_none() || state.step.is_multiple_of(BAND_STEPS) {
+            let band = Band::new(&state.field.grid, &state.field.distance, 6.0 / steepness + 1.0);
+            let nodes = band.nodes(&state.field.grid);
+            self.band = Some((band, nodes));
+        }
+        let by_pose = self.gather(state, steepness);
+        let decay = 0.1f32.powf(progress);
+        let rates = Rates { distance: 0.03 * decay, colour: 0.03 * 0.2f32.powf(progress) };
+        let State { field, adam, .. } = state;
+        adam.step(&mut field.distance, &mut field.colour, &mut self.parts, rates);
+        if level.poses {
+            self.move_cameras(state, &by_pose, 1e-4 * f64::from(decay));
+        }
+        state.step += 1;
+        if state.step == level.steps {
+            state.step = 0;
+            state.level += 1;
+            if state.level < self.plan.levels.len() {
+                self.refine(state);
+            }
+        }
+        state.level < self.plan.levels.len()
+    }
+
+    /// Nodes twice as dense; before the last level depth is fused anew, with the cameras where they are by now.
+    fn refine(&self, state: &mut State) {
+        let fine = state.field.refined();
+        let is_last = state.level + 1 == self.plan.levels.len();
+        let distance = match self.depth_spread {
+            Some(spread) if is_last => {
+                let poses: Vec<_> = (0..self.frames.len()).map(|frame| self.pose(state, frame)).collect();
+                start::distance(&fine.grid, &Seen::all(self.frames, Some(&poses)), Some(spread))
+            }
+            _ => signed_distance(&fine.grid, &fine.distance),
+        };
+        state.adam = Adam::new(fine.grid.len());
+        state.field = Field { distance, ..fine };
+    }
+
+    /// Derivatives of a step: of the field into the parts, of the poses in steps of the grid and radians.
+    fn gather(&mut self, state: &State, steepness: f32) -> Vec<[f64; 6]> {
+        let field = &state.field;
+        let Some((band, near)) = &self.band else { return Vec::new() };
+        let medium =
+            Medium { grid: &field.grid, band, distance: &field.distance, colour: &field.colour, steepness, pace: PACE };
+        let stands: Vec<Stand> =
+            (0..self.frames.len()).map(|f| Stand::new(&field.grid, &self.pose(state, f))).collect();
+        let pivot: [f32; 3] = field.grid.steps(&self.pivot).coords.map(|v| v as f32).into();
+        let weights = weights(&field.grid);
+        let smoothness = Smoothness { eikonal: 0.02, curvature: 0.01 };
+        let seed = (state.level as u64) << 32 | u64::from(state.step);
+        let pixels = self.pixels;
+        let part = |number: usize, into: &mut Gathered| {
+            let mut random = Pcg64::seed_from_u64(seed * PARTS as u64 + number as u64);
+            let mut tracer = Tracer::new();
+            let mut by_pose = vec![[0.0f64; 6]; stands.len()];
+            for _ in 0..RAYS / PARTS {
+                let pixel = &pixels[random.random_range(0..pixels.len())];
+                let (ray, target) = stands[usize::from(pixel.frame)].look(pixel);
+                let sight = tracer.see(&medium, &ray, random.random_range(0.0..1.0));
+                let (_, pose) = tracer.learn(&medium, &ray, &sight, (&target, &weights), pivot, into);
+                let sum = &mut by_pose[usize::from(pixel.frame)];
+                (0..6).for_each(|i| sum[i] += f64::from(pose[i]));
+            }
+            let first = random.random_range(0..SMOOTHED);
+            for node in near.iter().skip(first * PARTS + number).step_by(SMOOTHED * PARTS) {
+                at_node(&field.grid, &field.distance, *node as usize, &smoothness, into);
+            }
+            by_pose
+        };
+        let parts: Vec<Vec<[f64; 6]>> =
+            self.parts.par_iter_mut().enumerate().map(|(number, into)| part(number, into)).collect();
+        let mut sum = vec![[0.0; 6]; stands.len()];
+        for part in parts {
+            sum.iter_mut().zip(part).for_each(|(sum, part)| (0..6).for_each(|i| sum[i] += part[i]));
+        }
+        sum
+    }
+
+    /// A frame's pose with its correction.
+    pub(crate) fn pose(&self, state: &State, frame: usize) -> Isometry3<f64> {
+        corrected(&self.frames[frame].scan_from_camera, &state.corrections[frame], &self.pivot)
+    }
+
+    fn move_cameras(&self, state: &mut State, by_pose: &[[f64; 6]], rate: f64) {
+        let State { corrections, moments, .. } = state;
+        let cameras = corrections.len() as f64;
+        for ((correction, moments), slope) in corrections.iter_mut().zip(moments).zip(by_pose) {
+            move_camera(correction, moments, slope, rate, self.radius);
+        }
+        // All cameras together may move freely with the object: their mean stays.
+        for i in 0..6 {
+            let mean = corrections.iter().map(|c| c[i]).sum::<f64>() / cameras;
+            corrections.iter_mut().for_each(|c| c[i] -= mean);
+        }
+    }
+}
+
+/// A step of Adam for one camera.
+fn move_camera(correction: &mut [f64; 6], (first, second): &mut PoseMoments, slope: &[f64; 6], rate: f64, radius: f64) {
+    for i in 0..6 {
+        first[i] = 0.9 * first[i] + 0.1 * slope[i];
+        second[i] = 0.99 * second[i] + 0.01 * slope[i] * slope[i];
+        let rate = if i < 3 { rate } else { rate / radius };
+        correction[i] -= rate * (first[i] / (second[i].sqrt() + 1e-9)).clamp(-3.0, 3.0);
+    }
+}
+
+fn weights(grid: &Grid) -> Weights<f32> {
+    // Beyond a hundredth of a metre a depth is of something else, or of a mirror.
+    Weights { colour: 1.0, mask: 0.1, depth: 0.1, depth_limit: (0.01 / grid.voxel).max(4.0) as f32 }
+}
+
+/// Receives derivatives that nobody needs.
+struct Nowhere;
+
+impl Receiver<f32> for Nowhere {
+    fn distance(&mut self, _: usize, _: f32) {}
+
+    fn colour(&mut self, _: usize, _: [f32; 3]) {}
+}
+
+/// Steps in which a camera that took no part finds its place.
+const PLACED: u32 = 120;
+
+/// Where a camera stands whose pixels took no part in the optimisation: its pose moves, the field stays.
+pub(crate) fn placed(
+    field: &Field<f32>,
+    pixels: &[Pixel],
+    start: &Isometry3<f64>,
+    pivot: Point3<f64>,
+    radius: f64,
+) -> Isometry3<f64> {
+    let steepness = STEEPEST;
+    let band = Band::new(&field.grid, &field.distance, 6.0 / steepness + 1.0);
+    let grid = &field.grid;
+    let medium = Medium { grid, band: &band, distance: &field.distance, colour: &field.colour, steepness, pace: PACE };
+    let pivot_steps: [f32; 3] = grid.steps(&pivot).coords.map(|v| v as f32).into();
+    let (mut correction, mut moments, weights) = ([0.0; 6], ([0.0; 6], [0.0; 6]), weights(grid));
+    for step in 0..PLACED {
+        let stand = Stand::new(grid, &corrected(start, &correction, &pivot));
+        let mut random = Pcg64::seed_from_u64(u64::from(step));
+        let mut tracer = Tracer::new();
+        let mut slope = [0.0; 6];
+        for _ in 0..RAYS / 8 {
+            let (ray, target) = stand.look(&pixels[random.random_range(0..pixels.len())]);
+            let sight = tracer.see(&medium, &ray, random.random_range(0.0..1.0));
+            let (_, pose) = tracer.learn(&medium, &ray, &sight, (&target, &weights), pivot_steps, &mut Nowhere);
+            (0..6).for_each(|i| slope[i] += f64::from(pose[i]));
+        }
+        let rate = 1e-4 * 0.1f64.powf(f64::from(step) / f64::from(PLACED));
+        move_camera(&mut correction, &mut moments, &slope, rate, radius);
+    }
+    corrected(start, &correction, &pivot)
+}

@@ -1,0 +1,257 @@
+//! One object out of a scan.
+//!
+//! | file | owns |
+//! |---|---|
+//! | `pictures` | the views' pixels, and which of them say nothing |
+//! | `bounds` | where the object is |
+//! | `start` | visual hull, fused depth |
+//! | `sweep` | signed distance from signs |
+//! | `band` | the parts of the box that a surface may be in |
+//! | `pool` | pixels as rays |
+//! | `ray` | what a ray sees, and how it depends on the field |
+//! | `smooth` | the field's own terms |
+//! | `adam` | steps along derivatives |
+//! | `learn` | the optimisation, coarse to fine |
+//! | `view` | whole pictures of the field |
+//! | `judge` | held-out views, and what no view has shown |
+//! | `state` | what there is when the work is interrupted |
+
+mod adam;
+mod band;
+mod bounds;
+mod judge;
+mod learn;
+mod pictures;
+mod pool;
+mod ray;
+mod smooth;
+mod start;
+mod state;
+mod sweep;
+mod view;
+
+pub use judge::HeldOut;
+pub(crate) use judge::is_certain;
+pub use pictures::Remark;
+pub use state::StateError;
+pub use view::{Drawn, draw};
+
+use crate::field::{Field, Grid};
+use crate::mesh::{self, Flaw, Islands, Mesh, Solid, Topology};
+use crate::scan::{Scale, ScaleSource, Scan, ScanError};
+use bounds::Bounds;
+use learn::{Learner, Plan, State};
+use nalgebra::{Isometry3, Point3};
+use shared_mem::ending;
+use shared_mem::progress::{Planned, Progress};
+use start::Seen;
+use state::Keeper;
+use std::path::Path;
+
+/// Every so many views one is held out.
+pub const HOLD_OUT: usize = 8;
+/// Triangles of the fine mesh and of the coarse one.
+pub const FINE: usize = 20_000;
+/// Triangles of the coarse mesh.
+pub const COARSE: usize = 700;
+
+/// Stages of the work with how long each takes of 60 views on two cores [s].
+const STAGES: [Planned; 5] = [(READ, 6.0), (START, 12.0), (LEARN, 110.0), (MESH, 8.0), (JUDGE, 15.0)];
+const READ: &str = "read";
+const START: &str = "start";
+const LEARN: &str = "optimise";
+const MESH: &str = "mesh";
+const JUDGE: &str = "judge";
+
+/// No object came of a scan.
+#[derive(Debug, thiserror::Error)]
+pub enum ObjectError {
+    /// The scan cannot be used.
+    #[error(transparent)]
+    Scan(#[from] ScanError),
+    /// What was kept of an interrupted run cannot be read or written.
+    #[error(transparent)]
+    State(#[from] StateError),
+    /// Nothing is left inside.
+    #[error(
+        "nothing is left of the object: masks, depth and poses contradict each other; look at the scan's poses and scale"
+    )]
+    Nothing,
+    /// The mesh is no surface of a body.
+    #[error("{0}; please report this with the scan: by construction it cannot be")]
+    Flaw(#[from] Flaw),
+    /// Depth pictures and poses have different units.
+    #[error("depth pictures say that one unit of the poses is {metres:.4} m, not 1 m: give --scale {metres:.4}")]
+    Scale {
+        /// Metres for one unit, as depth has it.
+        metres: f64,
+    },
+    /// Ctrl-C.
+    #[error("interrupted; the same command goes on from {0:.0} % of the optimisation")]
+    Interrupted(f64),
+}
+
+/// An object as its scan shows it.
+#[derive(Debug, Clone)]
+pub struct Object {
+    /// Signed distance and colour in the scan's frame.
+    pub field: Field<f32>,
+    /// The surface of at most [`FINE`] triangles, in the scan's frame [m].
+    pub fine: Mesh,
+    /// That of at most [`COARSE`] triangles.
+    pub coarse: Mesh,
+    /// What kind of surface it is.
+    pub topology: Topology,
+    /// Its volume and inertia.
+    pub solid: Solid,
+    /// How many views show each corner of the fine mesh.
+    pub shown: Vec<u8>,
+    /// What was left out beside it.
+    pub islands: Islands,
+    /// Where its scale comes from.
+    pub scale: Scale,
+    /// How the held-out views look.
+    pub held_out: Vec<HeldOut>,
+    /// Views that it was made from.
+    pub views: usize,
+    /// Whether they had depth.
+    pub with_depth: bool,
+    /// Middle shift of the cameras, root mean square [m].
+    pub moved: f64,
+    /// What a person should know.
+    pub remarks: Vec<Remark>,
+}
+
+/// What a person may choose.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Options {
+    /// Metres for one unit of the poses; `None`: as depth or the robot says.
+    pub scale: Option<f64>,
+    /// The grid has about as many nodes as a cube with so many along each edge.
+    pub edge: u32,
+}
+
+/// Makes an object of a scan; what is done is kept in the file `kept` now and then, and a run that finds it goes on from there.
+///
+/// # Errors
+/// [`ObjectError`] in one line.
+pub fn reconstruct(scan: Scan, options: &Options, kept: &Path) -> Result<Object, ObjectError> {
+    let bar = Progress::planned("reconstruct", &STAGES, scan.views.len() as u64);
+    let scale = scan.scale(options.scale)?;
+    let scan = scan.scaled(scale.metres);
+    let pictures = pictures::read(&scan, |done| bar.show(done, READ))?;
+    bar.stage(START, 2);
+    let plan = Plan::new(options.edge, pictures.depth_spread.is_some());
+    let bounds = bounds::find(&pictures.train)?;
+    let seen = Seen::all(&pictures.train, None);
+    let grid = Grid::filling(&bounds.low, &bounds.high, plan.levels[0].nodes, 3);
+    let distance = start::distance(&grid, &seen, pictures.depth_spread);
+    let metres = judge::depth_scale(&grid, &start::distance(&grid, &seen, None), &pictures.train);
+    if let (ScaleSource::Poses, Some(metres)) = (scale.source, metres.filter(|m| (m - 1.0).abs() > 0.03)) {
+        return Err(ObjectError::Scale { metres });
+    }
+    let pixels = pool::pixels(&pictures.train);
+    let mut keeper = Keeper::new(kept, options, &pictures, &pixels);
+    let fresh = || State::new(grid, distance, pictures.train.len());
+    let mut state = keeper.take()?.unwrap_or_else(fresh);
+    interrupted(&plan, &state)?;
+    let train = (pictures.train.as_slice(), pictures.depth_spread);
+    let learner = Learner::new(plan.clone(), train, &pixels, (bounds.centre(), bounds.radius()));
+    let poses = learn(&bar, &plan, learner, &mut state, &mut keeper)?;
+    bar.stage(MESH, 3);
+    let (surface, islands) = mesh::surface(&state.field).ok_or(ObjectError::Nothing)?;
+    Topology::of(&surface)?;
+    let fine = mesh::reduced(&surface, FINE);
+    let topology = Topology::of(&fine)?;
+    bar.show(2, MESH);
+    let coarse = mesh::reduced(&fine, COARSE);
+    Topology::of(&coarse)?;
+    let solid = Solid::of(&fine);
+    interrupted(&plan, &state)?;
+    bar.stage(JUDGE, 1 + pictures.held_out.len() as u64);
+    let shown = judge::shown(&state.field, &fine, &pictures.train, &poses);
+    let mut held_out = Vec::new();
+    for frame in &pictures.held_out {
+        bar.show(1 + held_out.len() as u64, JUDGE);
+        interrupted(&plan, &state)?;
+        held_out.push(judge::held_out(&state.field, frame, &bounds));
+    }
+    let mut remarks = pictures.remarks;
+    remarks.extend(judge::remarks(&shown, &fine, &islands, &held_out));
+    let shifts = state.corrections.iter().map(|c| c[0] * c[0] + c[1] * c[1] + c[2] * c[2]);
+    let moved = (shifts.sum::<f64>() / state.corrections.len() as f64).sqrt();
+    let (views, with_depth) = (pictures.train.len(), scan.has_depth());
+    let State { field, .. } = state;
+    Ok(Object {
+        field,
+        fine,
+        coarse,
+        topology,
+        solid,
+        shown,
+        islands,
+        scale,
+        held_out,
+        views,
+        with_depth,
+        moved,
+        remarks,
+    })
+}
+
+/// All steps; the cameras' poses at the end.
+fn learn(
+    bar: &Progress,
+    plan: &Plan,
+    mut learner: Learner<'_>,
+    state: &mut State,
+    keeper: &mut Keeper<'_>,
+) -> Result<Vec<Isometry3<f64>>, ObjectError> {
+    bar.stage(LEARN, plan.steps());
+    while state.level < plan.levels.len() {
+        learner.step(state);
+        bar.show(plan.steps() - plan.steps_left(state.level, state.step), LEARN);
+        if ending::asked() {
+            keeper.keep(state)?;
+            interrupted(plan, state)?;
+        }
+        keeper.keep_now_and_then(state)?;
+    }
+    Ok((0..state.corrections.len()).map(|frame| learner.pose(state, frame)).collect())
+}
+
+/// An error once the end was asked for.
+fn interrupted(plan: &Plan, state: &State) -> Result<(), ObjectError> {
+    let done = 1.0 - plan.steps_left(state.level, state.step) as f64 / plan.steps() as f64;
+    if ending::asked() { Err(ObjectError::Interrupted(done * 100.0)) } else { Ok(()) }
+}
+
+/// Removes what was kept, once the outputs are there.
+///
+/// # Errors
+/// [`StateError`] when the file cannot be removed.
+pub fn forget(kept: &Path) -> Result<(), StateError> {
+    state::forget(kept)
+}
+
+impl Bounds {
+    /// Half the diagonal [m].
+    fn radius(&self) -> f64 {
+        0.5 * (self.high - self.low).norm()
+    }
+}
+
+impl Object {
+    /// Middle of the fine mesh's box: where the object's own frame has its origin, in the scan's frame [m].
+    #[must_use]
+    pub fn middle(&self) -> Point3<f64> {
+        let (low, high) = self.fine.bounds();
+        nalgebra::center(&low, &high)
+    }
+
+    /// Mean PSNR of the held-out views inside the mask [dB].
+    #[must_use]
+    pub fn psnr(&self) -> f64 {
+        self.held_out.iter().map(|view| view.psnr).sum::<f64>() / self.held_out.len().max(1) as f64
+    }
+}

@@ -1,0 +1,295 @@
+//! One ray through the field: what it sees, and how that changes with every number of the field. The opacity of a section is
+//! NeuS's (Wang et al. 2021, equation 13), from the logistic function of the signed distance at its ends; the derivatives are written
+//! out by hand. Lengths in steps of the grid, so that every level is alike.
+
+use super::band::Band;
+use crate::field::{Cell, Grid};
+use nalgebra::{RealField, convert};
+
+/// Samples of a ray at most.
+pub(crate) const MOST_SAMPLES: usize = 64;
+/// What is left of the light behind which nothing counts.
+const DARK: f64 = 1e-3;
+/// A section of less weight shows no colour.
+const FAINT: f64 = 1e-4;
+/// Exponents of the logistic function are cut here.
+const STEEPEST: f64 = 18.0;
+/// Opacities in logarithms keep this distance from 0 and 1.
+const CLEAR: f64 = 1e-3;
+
+/// A ray [steps].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Ray<T> {
+    /// Where it begins: the camera.
+    pub(crate) origin: [T; 3],
+    /// Of length one.
+    pub(crate) direction: [T; 3],
+    /// Depth along the camera's axis of one step along the ray.
+    pub(crate) axial: T,
+}
+
+/// What a picture says about a ray.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Target<T> {
+    /// Colour, where the object's is seen.
+    pub(crate) colour: Option<[T; 3]>,
+    /// 1 where the object is seen, else 0.
+    pub(crate) mask: T,
+    /// Depth along the camera's axis [step], where it was measured.
+    pub(crate) depth: Option<T>,
+}
+
+/// Weights of the terms.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Weights<T> {
+    pub(crate) colour: T,
+    pub(crate) mask: T,
+    pub(crate) depth: T,
+    /// Depths off by more than this are of something else [step].
+    pub(crate) depth_limit: T,
+}
+
+/// What a ray sees.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Sight<T> {
+    pub(crate) colour: [T; 3],
+    /// 0 to 1.
+    pub(crate) opacity: T,
+    /// Mean depth along the camera's axis [step], 0 where nothing is seen.
+    pub(crate) depth: T,
+}
+
+/// A field as rays read it.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Medium<'a, T> {
+    pub(crate) grid: &'a Grid,
+    pub(crate) band: &'a Band,
+    pub(crate) distance: &'a [T],
+    pub(crate) colour: &'a [[T; 3]],
+    /// Steepness of the logistic function [1/step].
+    pub(crate) steepness: T,
+    /// Distance of samples [step].
+    pub(crate) pace: T,
+}
+
+/// Receives derivatives.
+pub(crate) trait Receiver<T> {
+    /// Of the distances and colours at a node.
+    fn distance(&mut self, node: usize, value: T);
+    /// Of the colour at a node.
+    fn colour(&mut self, node: usize, value: [T; 3]);
+}
+
+/// One sample.
+#[derive(Debug, Clone, Copy)]
+struct Sample<T> {
+    t: T,
+    cell: Cell<T>,
+    nodes: [T; 8],
+    phi: T,
+}
+
+/// One section.
+#[derive(Debug, Clone, Copy)]
+struct Section<T> {
+    /// Its first sample.
+    first: usize,
+    /// Light that reaches it.
+    light: T,
+    opacity: T,
+    middle: T,
+    /// Cell of its middle and the colour there, where it counts.
+    colour: Option<(Cell<T>, [T; 3])>,
+}
+
+/// Memory of one ray after the other.
+#[derive(Debug)]
+pub(crate) struct Tracer<T> {
+    samples: Vec<Sample<T>>,
+    sections: Vec<Section<T>>,
+}
+
+fn at<T: RealField + Copy>(ray: &Ray<T>, t: T) -> [T; 3] {
+    [0, 1, 2].map(|axis| ray.origin[axis] + ray.direction[axis] * t)
+}
+
+impl<T: RealField + Copy> Tracer<T> {
+    pub(crate) fn new() -> Self {
+        Self { samples: Vec::with_capacity(MOST_SAMPLES), sections: Vec::with_capacity(MOST_SAMPLES) }
+    }
+
+    /// Follows a ray; samples lie at `(n + jitter) * pace` from its origin.
+    pub(crate) fn see(&mut self, medium: &Medium<'_, T>, ray: &Ray<T>, jitter: T) -> Sight<T> {
+        self.samples.clear();
+        self.sections.clear();
+        let one = T::one();
+        let mut sight = Sight { colour: [T::zero(); 3], opacity: T::zero(), depth: T::zero() };
+        let Some((enter, leave)) = through(medium.grid, ray) else { return sight };
+        let (mut number, last) = ((enter / medium.pace - jitter).ceil(), leave / medium.pace - jitter);
+        let mut light = one;
+        let mut linked = false;
+        while number < last && self.samples.len() < MOST_SAMPLES {
+            let t = (number + jitter) * medium.pace;
+            number += one;
+            let Some(sample) = sample(medium, ray, t) else {
+                linked = false;
+                continue;
+            };
+            let before = self.samples.len();
+            self.samples.push(sample);
+            if linked {
+                let phi = [self.samples[before - 1].phi, sample.phi];
+                let opacity = (one - phi[1] / phi[0]).max(T::zero());
+                let middle = t - medium.pace * convert(0.5);
+                let weight = light * opacity;
+                let colour = (weight > convert(FAINT)).then(|| colour(medium, ray, middle)).flatten();
+                if let Some((_, colour)) = colour {
+                    (0..3).for_each(|c| sight.colour[c] += weight * colour[c]);
+                }
+                sight.depth += weight * middle;
+                self.sections.push(Section { first: before - 1, light, opacity, middle, colour });
+                light *= one - opacity;
+                if light < convert(DARK) {
+                    break;
+                }
+            }
+            linked = true;
+        }
+        sight.opacity = one - light;
+        sight.depth = if sight.opacity > T::zero() { sight.depth / sight.opacity * ray.axial } else { T::zero() };
+        sight
+    }
+
+    /// Loss of the ray that was seen last, and its derivatives: by the field into `into`, by a shift of the ray and by a turn about
+    /// `pivot` [step] in what is returned beside it.
+    pub(crate) fn learn(
+        &self,
+        medium: &Medium<'_, T>,
+        ray: &Ray<T>,
+        sight: &Sight<T>,
+        (target, weights): (&Target<T>, &Weights<T>),
+        pivot: [T; 3],
+        into: &mut impl Receiver<T>,
+    ) -> (T, [T; 6]) {
+        let (loss, by_colour, by_opacity, by_depth) = blame(sight, target, weights);
+        let mut pose = [T::zero(); 6];
+        let mut moved = |place: [T; 3], by: [T; 3]| {
+            let arm = [0, 1, 2].map(|axis| place[axis] - pivot[axis]);
+            for axis in 0..3 {
+                let (next, after) = ((axis + 1) % 3, (axis + 2) % 3);
+                pose[axis] += by[axis];
+                pose[3 + axis] += arm[next] * by[after] - arm[after] * by[next];
+            }
+        };
+        // Depth is the mean over the sections; how opaque they are together is left as it is.
+        let mean = if sight.opacity > T::zero() { by_depth * ray.axial / sight.opacity } else { T::zero() };
+        let mut behind = T::zero();
+        for section in self.sections.iter().rev() {
+            let mut by_weight = by_opacity + mean * section.middle;
+            let weight = section.light * section.opacity;
+            if let Some((cell, colour)) = section.colour {
+                let mut slope = [T::zero(); 3];
+                let nodes = medium.grid.nodes(cell.base);
+                for c in 0..3 {
+                    by_weight += by_colour[c] * colour[c];
+                    if by_colour[c] != T::zero() {
+                        let along = cell.slope(nodes.map(|node| medium.colour[node][c]));
+                        (0..3).for_each(|axis| slope[axis] += weight * by_colour[c] * along[axis]);
+                    }
+                }
+                if by_colour.iter().any(|c| *c != T::zero()) {
+                    for (node, share) in nodes.into_iter().zip(cell.weights()) {
+                        into.colour(node, by_colour.map(|c| c * weight * share));
+                    }
+                    moved(at(ray, section.middle), slope);
+                }
+            }
+            let by_section = section.light * by_weight - behind / (T::one() - section.opacity).max(convert(1e-12));
+            behind += weight * by_weight;
+            if section.opacity <= T::zero() {
+                continue;
+            }
+            let [near, far] = [self.samples[section.first], self.samples[section.first + 1]];
+            let share = medium.steepness * far.phi / near.phi;
+            for (sample, factor) in [(near, share * (T::one() - near.phi)), (far, -share * (T::one() - far.phi))] {
+                let by_distance = by_section * factor;
+                for (node, weight) in medium.grid.nodes(sample.cell.base).into_iter().zip(sample.cell.weights()) {
+                    into.distance(node, by_distance * weight);
+                }
+                moved(at(ray, sample.t), sample.cell.slope(sample.nodes).map(|slope| slope * by_distance));
+            }
+        }
+        (loss, pose)
+    }
+}
+
+/// Where a ray enters and leaves the box [step]; `None` where it misses it.
+fn through<T: RealField + Copy>(grid: &Grid, ray: &Ray<T>) -> Option<(T, T)> {
+    let (mut enter, mut leave): (T, T) = (T::zero(), convert(1e9));
+    for axis in 0..3 {
+        let edge: T = convert((grid.dims[axis] - 1) as f64);
+        let inverse = T::one() / ray.direction[axis];
+        let (a, b) = (-ray.origin[axis] * inverse, (edge - ray.origin[axis]) * inverse);
+        if a.is_finite() && b.is_finite() {
+            enter = enter.max(a.min(b));
+            leave = leave.min(a.max(b));
+        } else if ray.origin[axis] < T::zero() || ray.origin[axis] > edge {
+            return None;
+        }
+    }
+    (enter < leave).then_some((enter, leave))
+}
+
+#[inline]
+fn sample<T: RealField + Copy>(medium: &Medium<'_, T>, ray: &Ray<T>, t: T) -> Option<Sample<T>> {
+    let place = at(ray, t);
+    let cell = medium.grid.cell(place)?;
+    if !medium.band.holds(cell.node) {
+        return None;
+    }
+    let nodes = medium.grid.nodes(cell.base).map(|node| medium.distance[node]);
+    let distance = nodes.iter().zip(cell.weights()).fold(T::zero(), |sum, (value, weight)| sum + *value * weight);
+    let exponent = (medium.steepness * distance).clamp(convert(-STEEPEST), convert(STEEPEST));
+    let phi = T::one() / (T::one() + (-exponent).exp());
+    Some(Sample { t, cell, nodes, phi })
+}
+
+#[inline]
+fn colour<T: RealField + Copy>(medium: &Medium<'_, T>, ray: &Ray<T>, t: T) -> Option<(Cell<T>, [T; 3])> {
+    let cell = medium.grid.cell(at(ray, t))?;
+    let mut sum = [T::zero(); 3];
+    for (node, weight) in medium.grid.nodes(cell.base).into_iter().zip(cell.weights()) {
+        (0..3).for_each(|c| sum[c] += medium.colour[node][c] * weight);
+    }
+    Some((cell, sum))
+}
+
+/// The loss and its derivatives by colour, opacity and depth.
+fn blame<T: RealField + Copy>(sight: &Sight<T>, target: &Target<T>, weights: &Weights<T>) -> (T, [T; 3], T, T) {
+    let (mut loss, mut by_colour, mut by_depth) = (T::zero(), [T::zero(); 3], T::zero());
+    let third: T = convert(1.0 / 3.0);
+    if let Some(colour) = target.colour {
+        for c in 0..3 {
+            let off = sight.colour[c] - colour[c];
+            loss += weights.colour * third * off.abs();
+            by_colour[c] = weights.colour * third * off.signum();
+        }
+    }
+    let (low, high) = (convert(CLEAR), convert(1.0 - CLEAR));
+    let opacity = sight.opacity.clamp(low, high);
+    let (inside, outside) = (target.mask, T::one() - target.mask);
+    loss -= weights.mask * (inside * opacity.ln() + outside * (T::one() - opacity).ln());
+    let cut = sight.opacity < low || sight.opacity > high;
+    let by_opacity = if cut { T::zero() } else { weights.mask * (outside / (T::one() - opacity) - inside / opacity) };
+    if let (Some(depth), true) = (target.depth, sight.opacity > convert(0.1)) {
+        let off = sight.depth - depth;
+        if off.abs() < weights.depth_limit {
+            loss += weights.depth * off.abs();
+            by_depth = weights.depth * off.signum();
+        }
+    }
+    (loss, by_colour, by_opacity, by_depth)
+}
+
+#[cfg(test)]
+mod tests;

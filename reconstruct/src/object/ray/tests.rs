@@ -1,0 +1,179 @@
+//! The derivatives of everything that a ray sees against finite differences.
+
+use super::*;
+use nalgebra::{Point3, Rotation3, Vector3};
+use rand::{RngExt as _, SeedableRng as _};
+use rand_pcg::Pcg64;
+
+const NODES: usize = 14;
+const RAYS: usize = 400;
+const PIVOT: [f64; 3] = [6.5; 3];
+
+/// A dented ball in colours that change from node to node, and rays that meet it from all sides.
+struct Problem {
+    grid: Grid,
+    band: Band,
+    distance: Vec<f64>,
+    colour: Vec<[f64; 3]>,
+    rays: Vec<(Ray<f64>, Target<f64>, f64)>,
+    /// Shift [step] and turn [rad] of all rays.
+    pose: [f64; 6],
+}
+
+#[derive(Default)]
+struct Sums {
+    distance: Vec<f64>,
+    colour: Vec<[f64; 3]>,
+}
+
+impl Receiver<f64> for Sums {
+    fn distance(&mut self, node: usize, value: f64) {
+        self.distance[node] += value;
+    }
+
+    fn colour(&mut self, node: usize, value: [f64; 3]) {
+        (0..3).for_each(|c| self.colour[node][c] += value[c]);
+    }
+}
+
+impl Problem {
+    fn new() -> Self {
+        let mut random = Pcg64::seed_from_u64(5);
+        let grid = Grid { dims: [NODES; 3], origin: Point3::origin(), voxel: 1.0 };
+        let distance: Vec<f64> = (0..grid.len())
+            .map(|i| {
+                (grid.position(grid.node(i)) - Point3::from(PIVOT)).norm() - 3.8 + random.random_range(-0.25..0.25)
+            })
+            .collect();
+        let colour = (0..grid.len()).map(|_| [(); 3].map(|()| random.random_range(0.0..1.0))).collect();
+        let near: Vec<f32> = distance.iter().map(|d| *d as f32).collect();
+        let band = Band::new(&grid, &near, 4.0);
+        let mut vector = || Vector3::from_fn(|_, _| random.random_range(-1.0..1.0f64));
+        let rays = (0..RAYS).map(|number| {
+            let (from, towards) = (vector().normalize() * 25.0, vector() * 4.2);
+            let direction = (towards - from).normalize();
+            let origin = (from + Vector3::from(PIVOT)).into();
+            let target = Target {
+                colour: (number % 3 != 0).then_some([0.3, 0.6, 0.5]),
+                mask: if number % 5 == 0 { 0.0 } else { 1.0 },
+                depth: (number % 2 == 0).then_some(20.0 + towards.x),
+            };
+            (Ray { origin, direction: direction.into(), axial: 0.9 }, target, 0.37)
+        });
+        Self { grid, band, distance, colour, rays: rays.collect(), pose: [0.0; 6] }
+    }
+
+    fn moved(&self, ray: &Ray<f64>) -> Ray<f64> {
+        let turn = Rotation3::new(Vector3::new(self.pose[3], self.pose[4], self.pose[5]));
+        let (pivot, shift) = (Vector3::from(PIVOT), Vector3::new(self.pose[0], self.pose[1], self.pose[2]));
+        let origin = turn * (Vector3::from(ray.origin) - pivot) + pivot + shift;
+        Ray { origin: origin.into(), direction: (turn * Vector3::from(ray.direction)).into(), axial: ray.axial }
+    }
+
+    fn loss(&self, mut into: Option<&mut Sums>) -> (f64, [f64; 6]) {
+        let medium = Medium {
+            grid: &self.grid,
+            band: &self.band,
+            distance: &self.distance,
+            colour: &self.colour,
+            steepness: 2.5,
+            pace: 0.7,
+        };
+        let weights = Weights { colour: 1.0, mask: 0.3, depth: 0.2, depth_limit: 50.0 };
+        let (mut tracer, mut sum, mut pose) = (Tracer::new(), 0.0, [0.0; 6]);
+        let mut nowhere = Sums { distance: vec![0.0; self.grid.len()], colour: vec![[0.0; 3]; self.grid.len()] };
+        for (ray, target, jitter) in &self.rays {
+            let ray = self.moved(ray);
+            let sight = tracer.see(&medium, &ray, *jitter);
+            let into = into.as_deref_mut().unwrap_or(&mut nowhere);
+            let (loss, by_pose) = tracer.learn(&medium, &ray, &sight, (target, &weights), PIVOT, into);
+            sum += loss;
+            (0..6).for_each(|i| pose[i] += by_pose[i]);
+        }
+        (sum, pose)
+    }
+
+    fn entry(&mut self, number: usize) -> &mut f64 {
+        let count = self.grid.len();
+        match number {
+            n if n < count => &mut self.distance[n],
+            n if n < 4 * count => &mut self.colour[(n - count) / 3][(n - count) % 3],
+            n => &mut self.pose[n - 4 * count],
+        }
+    }
+
+    /// Loss without what the mean depth owes to the common opacity, which the derivative leaves out on purpose.
+    fn difference(&mut self, number: usize) -> f64 {
+        let step = 1e-6;
+        let before = *self.entry(number);
+        let mut at = |value: f64| {
+            *self.entry(number) = value;
+            self.loss(None).0
+        };
+        let slope = (at(before + step) - at(before - step)) / (2.0 * step);
+        *self.entry(number) = before;
+        slope
+    }
+}
+
+#[test]
+fn a_thousand_derivatives_agree_with_finite_differences() {
+    let mut problem = Problem::new();
+    // Depth is looked at by itself below.
+    problem.rays.iter_mut().for_each(|(_, target, _)| target.depth = None);
+    check(&mut problem, 1000);
+}
+
+/// With rays that see nothing but the object, opacity is one and has no part in the mean depth.
+#[test]
+fn derivatives_of_depth_agree_where_the_object_hides_what_is_behind_it() {
+    let mut problem = Problem::new();
+    problem.rays.retain(|(_, target, _)| target.depth.is_some());
+    let medium = |problem: &Problem, ray: &Ray<f64>| {
+        let medium = Medium {
+            grid: &problem.grid,
+            band: &problem.band,
+            distance: &problem.distance,
+            colour: &problem.colour,
+            steepness: 2.5,
+            pace: 0.7,
+        };
+        Tracer::new().see(&medium, ray, 0.37).opacity
+    };
+    let opaque: Vec<bool> = problem.rays.iter().map(|(ray, _, _)| medium(&problem, ray) > 1.0 - 2e-3).collect();
+    let mut keep = opaque.iter();
+    problem.rays.retain(|_| *keep.next().expect("one for each"));
+    assert!(problem.rays.len() > 40, "{}", problem.rays.len());
+    let mut sums = Sums { distance: vec![0.0; problem.grid.len()], colour: vec![[0.0; 3]; problem.grid.len()] };
+    problem.loss(Some(&mut sums));
+    let largest = sums.distance.iter().fold(0.0f64, |m, v| m.max(v.abs()));
+    let (mut off, mut all) = (0.0, 0.0);
+    for number in (0..problem.grid.len()).filter(|n| sums.distance[*n].abs() > 0.02 * largest) {
+        let difference = problem.difference(number);
+        off += (difference - sums.distance[number]).powi(2);
+        all += difference.powi(2);
+    }
+    assert!((off / all).sqrt() < 0.01, "{}", (off / all).sqrt());
+}
+
+fn check(problem: &mut Problem, count: usize) {
+    let nodes = problem.grid.len();
+    let mut sums = Sums { distance: vec![0.0; nodes], colour: vec![[0.0; 3]; nodes] };
+    let (_, pose) = problem.loss(Some(&mut sums));
+    let all: Vec<f64> =
+        sums.distance.iter().copied().chain(sums.colour.iter().flatten().copied()).chain(pose).collect();
+    let largest = all[..4 * nodes].iter().fold(0.0f64, |m, v| m.max(v.abs()));
+    let seen: Vec<usize> = (0..4 * nodes).filter(|n| all[*n].abs() > 1e-4 * largest).collect();
+    let mut random = Pcg64::seed_from_u64(9);
+    let mut chosen: Vec<usize> = (0..count).map(|_| seen[random.random_range(0..seen.len())]).collect();
+    chosen.extend(4 * nodes..4 * nodes + 6);
+    let mut wrong = Vec::new();
+    for number in chosen {
+        let (by_hand, difference) = (all[number], problem.difference(number));
+        let off = (by_hand - difference).abs() / difference.abs().max(1e-3 * largest);
+        if off > 1e-4 {
+            wrong.push((number, by_hand, difference));
+        }
+    }
+    assert!(wrong.is_empty(), "{} of {count}: {:?}", wrong.len(), &wrong[..wrong.len().min(5)]);
+}

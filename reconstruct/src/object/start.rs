@@ -1,0 +1,135 @@
+//! Where the optimisation starts: the masks' visual hull and, where there is depth, the depths fused into it.
+//!
+//! Hull: a node is as far outside as the view says that has it furthest outside its mask (Laurentini 1994), but for the few that
+//! noise of the masks may have put there. Fusion: mean of truncated distances along the rays (Curless and Levoy 1996), weighted by the
+//! variance of depth, which grows with its fourth power.
+
+use super::sweep;
+use crate::field::Grid;
+use crate::scan::Frame;
+use nalgebra::{Isometry3, Point3};
+use rayon::prelude::*;
+
+/// Pixels beyond this from a mask's border are simply inside or outside.
+const REACH: i16 = 40;
+/// Background must be this far from a mask's border to say that a place is free [pixel].
+const CLEAR: i16 = 4;
+
+/// A frame as the start needs it.
+pub(crate) struct Seen<'a> {
+    frame: &'a Frame,
+    camera_from_scan: Isometry3<f64>,
+    border: Vec<i16>,
+}
+
+impl<'a> Seen<'a> {
+    /// All frames, from the scan's poses or from others.
+    pub(crate) fn all(frames: &'a [Frame], poses: Option<&[Isometry3<f64>]>) -> Vec<Self> {
+        let seen = |(number, frame): (usize, &'a Frame)| {
+            let pose = poses.map_or(frame.scan_from_camera, |poses| poses[number]);
+            Self { frame, camera_from_scan: pose.inverse(), border: frame.border_distance(REACH) }
+        };
+        frames.par_iter().enumerate().map(seen).collect()
+    }
+
+    /// Pixel and distance along the axis [m] of a place; `None` outside the picture.
+    fn pixel(&self, point: &Point3<f64>) -> Option<(usize, f64)> {
+        let local = self.camera_from_scan * point;
+        let [u, v] = self.frame.camera.project(&local)?;
+        let (width, height) = (self.frame.camera.width, self.frame.camera.height);
+        let inside = u >= 0.0 && v >= 0.0 && u < f64::from(width) && v < f64::from(height);
+        inside.then(|| (v as usize * width as usize + u as usize, local.z))
+    }
+
+    /// How far outside the mask a place appears [m], negative inside; `None` outside the picture.
+    fn outside(&self, point: &Point3<f64>) -> Option<f64> {
+        let (pixel, z) = self.pixel(point)?;
+        let pixels = match self.border[pixel] {
+            // The border lies between the pixels beside it.
+            steps if steps > 0 => 0.5 - f64::from(steps),
+            steps => -0.5 - f64::from(steps),
+        };
+        Some(pixels * z / self.frame.camera.focal[0])
+    }
+}
+
+/// Of so many views how many may see a place outside their mask though it is inside.
+fn allowed(views: usize) -> usize {
+    match views {
+        ..16 => 0,
+        16..32 => 1,
+        _ => 2,
+    }
+}
+
+/// How far outside the masks' hull each node is [m], negative inside.
+pub(crate) fn hull(grid: &Grid, seen: &[Seen<'_>]) -> Vec<f32> {
+    let kept = allowed(seen.len()) + 1;
+    let node = |index: usize| {
+        let point = grid.position(grid.node(index));
+        let mut largest = [f64::NEG_INFINITY; 3];
+        for outside in seen.iter().filter_map(|view| view.outside(&point)) {
+            let mut value = outside;
+            for slot in &mut largest[..kept] {
+                if value > *slot {
+                    std::mem::swap(&mut value, slot);
+                }
+            }
+        }
+        // A place that too few views see is taken for outside.
+        let level = largest[kept - 1];
+        if level == f64::NEG_INFINITY { grid.voxel as f32 } else { level as f32 }
+    };
+    (0..grid.len()).into_par_iter().map(node).collect()
+}
+
+/// Depth fused into the hull: the level [m] of each node. `spread`: standard deviation of depth at one metre [m].
+fn fused(grid: &Grid, seen: &[Seen<'_>], hull: &[f32], spread: f64) -> Vec<f32> {
+    let node = |index: usize| {
+        let point = grid.position(grid.node(index));
+        let (mut sum, mut total) = (0.0, 0.0);
+        for view in seen.iter().filter(|view| !view.frame.depth.is_empty()) {
+            let Some((pixel, z)) = view.pixel(&point) else { continue };
+            let cut = (2.5 * grid.voxel).max(3.0 * spread * z * z);
+            let weight = z.powi(-4);
+            let measured = f64::from(view.frame.depth[pixel]);
+            let (apart, weight) = if !view.frame.mask[pixel] {
+                // Nothing stands before the background.
+                if view.border[pixel] > -CLEAR {
+                    continue;
+                }
+                (cut, weight)
+            } else if measured <= 0.0 {
+                continue;
+            } else {
+                let apart = measured - z;
+                // What lies behind a surface says the less, the deeper: the next surface may begin there.
+                let behind = (1.0 + apart / cut).clamp(0.0, 1.0);
+                (apart.min(cut), weight * behind)
+            };
+            sum += weight * apart;
+            total += weight;
+        }
+        if total > 0.0 { (sum / total) as f32 } else { hull[index] }
+    };
+    (0..grid.len()).into_par_iter().map(node).collect()
+}
+
+/// The signed distance [voxel] that the optimisation begins with: of the hull, or of depth fused into it.
+pub(crate) fn distance(grid: &Grid, seen: &[Seen<'_>], depth_spread: Option<f64>) -> Vec<f32> {
+    let hull = hull(grid, seen);
+    let level = match depth_spread {
+        Some(spread) => fused(grid, seen, &hull, spread),
+        None => hull,
+    };
+    sweep::signed_distance(grid, &level)
+}
+
+/// The smallest box that holds all nodes inside; `None` where none is.
+pub(crate) fn bounds(grid: &Grid, level: &[f32]) -> Option<(Point3<f64>, Point3<f64>)> {
+    let inside = (0..grid.len()).filter(|index| level[*index] < 0.0).map(|index| grid.node(index));
+    let (low, high) = inside.fold(([usize::MAX; 3], [0; 3]), |(low, high), node| {
+        ([0, 1, 2].map(|a| low[a].min(node[a])), [0, 1, 2].map(|a| high[a].max(node[a])))
+    });
+    (low[0] != usize::MAX).then(|| (grid.position(low), grid.position(high)))
+}

@@ -1,0 +1,207 @@
+//! Scans: pictures of something from known places, with masks and, where the camera measures it, depth.
+//!
+//! | file | owns |
+//! |---|---|
+//! | `camera` | pixels to rays and back |
+//! | `colmap` | poses and cameras out of a COLMAP model |
+//! | `transforms` | the same out of `transforms.json` and `poses.json` |
+//! | `frame` | the pixels of one view |
+//! | `scale` | metres for one unit of the poses |
+//! | `error` | why a scan cannot be used |
+
+mod camera;
+mod colmap;
+mod error;
+mod frame;
+mod scale;
+mod transforms;
+
+pub use camera::{Camera, Lens};
+pub use error::ScanError;
+pub use frame::Frame;
+pub use scale::{Scale, ScaleSource};
+
+use nalgebra::Isometry3;
+use std::path::{Path, PathBuf};
+
+/// Fewer pictures make no surface.
+pub const FEWEST_VIEWS: usize = 8;
+
+/// Where the mask of a picture is.
+#[derive(Debug, Clone, PartialEq)]
+enum Mask {
+    /// In the picture's own alpha channel.
+    Alpha,
+    /// In a picture of its own: white is the object.
+    File(PathBuf),
+}
+
+/// One picture of a scan.
+#[derive(Debug, Clone, PartialEq)]
+pub struct View {
+    /// The picture's path as the scan lists it.
+    pub name: String,
+    /// The camera that took it.
+    pub camera: Camera,
+    /// The camera's pose in the scan's frame [m, once the scan is in metres].
+    pub scan_from_camera: Isometry3<f64>,
+    picture: PathBuf,
+    mask: Mask,
+    depth: Option<PathBuf>,
+}
+
+/// Pictures with poses.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Scan {
+    /// The folder.
+    pub folder: PathBuf,
+    /// Its views, in the order of their names.
+    pub views: Vec<View>,
+    /// Metres for one count of a depth picture.
+    depth_unit: f64,
+    /// Places in pictures where the poses' file knows how far a point is: view, pixel, distance along the axis [unit of the poses].
+    known_depths: Vec<(usize, [f64; 2], f64)>,
+    /// How many metres one unit of the poses is, as far as the files say it.
+    pub(crate) says_metres: bool,
+}
+
+/// Where the poses of a scan stand.
+#[derive(Debug, Clone, PartialEq, Eq)]
+enum Poses {
+    File(PathBuf),
+    Colmap(PathBuf),
+}
+
+fn poses_of(scan: &Path) -> Result<Poses, ScanError> {
+    if scan.is_file() {
+        return Ok(Poses::File(scan.to_owned()));
+    }
+    let files = ["transforms.json", "poses.json"].map(|name| scan.join(name));
+    if let Some(file) = files.into_iter().find(|file| file.is_file()) {
+        return Ok(Poses::File(file));
+    }
+    if let Some(folder) = colmap::folder_of(scan) {
+        return Ok(Poses::Colmap(folder));
+    }
+    Err(ScanError::Missing(format!(
+        "{}: no poses; a scan holds transforms.json (nerfstudio), poses.json (a robot's) or a COLMAP model in sparse/0",
+        scan.display()
+    )))
+}
+
+impl Scan {
+    /// Reads a scan's poses and finds its pictures; the pictures themselves are read by [`Scan::frame`].
+    ///
+    /// # Errors
+    /// [`ScanError`] in one line: no poses, no masks, files that are missing.
+    pub fn open(scan: &Path) -> Result<Self, ScanError> {
+        let poses = poses_of(scan)?;
+        let folder = if scan.is_file() { scan.parent().unwrap_or(Path::new("")).to_owned() } else { scan.to_owned() };
+        let mut known_depths = Vec::new();
+        let (listed, depth_unit, says_metres) = match &poses {
+            Poses::File(file) => {
+                let (listed, unit) = transforms::read(file)?;
+                (listed, unit, file.file_name().is_some_and(|name| name == "poses.json"))
+            }
+            Poses::Colmap(model) => {
+                let model = colmap::read(model)?;
+                let mut images = model.images;
+                images.sort_by(|a, b| a.name.cmp(&b.name));
+                for (view, image) in images.iter().enumerate() {
+                    let of = |(pixel, number): &([f64; 2], u64)| {
+                        let point = image.model_from_camera.inverse_transform_point(model.points.get(number)?);
+                        (point.z > 0.0).then_some((view, *pixel, point.z))
+                    };
+                    known_depths.extend(image.seen.iter().filter_map(of));
+                }
+                (images.into_iter().map(|image| from_colmap(&folder, image)).collect(), None, false)
+            }
+        };
+        let mut views = Vec::with_capacity(listed.len());
+        for listed in listed {
+            views.push(view(&folder, listed)?);
+        }
+        if views.len() < FEWEST_VIEWS {
+            return Err(ScanError::Missing(format!(
+                "{}: {} pictures with poses; a scan needs {FEWEST_VIEWS} at least, from all sides",
+                folder.display(),
+                views.len()
+            )));
+        }
+        if known_depths.is_empty() && matches!(poses, Poses::File(_)) {
+            views.sort_by(|a, b| a.name.cmp(&b.name));
+        }
+        Ok(Self { folder, views, depth_unit: depth_unit.unwrap_or(1e-3), known_depths, says_metres })
+    }
+
+    /// Whether any view has depth.
+    #[must_use]
+    pub fn has_depth(&self) -> bool {
+        self.views.iter().any(|view| view.depth.is_some())
+    }
+
+    /// Reads the pixels of one view; `by` pixels in each direction become one.
+    ///
+    /// # Errors
+    /// [`ScanError`] when a picture is missing, damaged, or of another size than its camera.
+    pub fn frame(&self, view: usize, by: u32) -> Result<Frame, ScanError> {
+        Frame::read(&self.views[view], self.depth_unit, by)
+    }
+
+    /// The same scan with poses in metres.
+    #[must_use]
+    pub fn scaled(mut self, metres: f64) -> Self {
+        for view in &mut self.views {
+            view.scan_from_camera.translation.vector *= metres;
+        }
+        self.known_depths.iter_mut().for_each(|(_, _, z)| *z *= metres);
+        self.says_metres = true;
+        self
+    }
+}
+
+/// COLMAP names pictures relative to a folder that it does not name: `images`, as a rule.
+fn from_colmap(folder: &Path, image: colmap::Image) -> transforms::Listed {
+    let places = ["images", "", "input"].map(|place| Path::new(place).join(&image.name));
+    let [first, ..] = &places;
+    let picture = places.iter().find(|place| folder.join(place).is_file()).unwrap_or(first).clone();
+    let (camera, scan_from_camera) = (image.camera, image.model_from_camera);
+    transforms::Listed { picture, mask: None, depth: None, camera, scan_from_camera }
+}
+
+/// A file of the same name as a picture in a folder beside the picture's: `masks/a.png` or `masks/a.jpg.png` for `images/a.jpg`.
+fn beside(folder: &Path, picture: &Path, names: &[&str]) -> Option<PathBuf> {
+    let file = Path::new(picture.file_name()?);
+    let parent = picture.parent().unwrap_or(Path::new(""));
+    let own = [file.to_owned(), file.with_extension("png"), PathBuf::from(format!("{}.png", file.display()))];
+    let parents = [parent.parent().unwrap_or(Path::new("")), Path::new("")];
+    let places = parents.iter().flat_map(|place| names.iter().map(move |name| folder.join(place).join(name)));
+    places
+        .flat_map(|place| own.iter().map(move |file| place.join(file)).collect::<Vec<_>>())
+        .find(|file| file.is_file())
+}
+
+fn view(folder: &Path, listed: transforms::Listed) -> Result<View, ScanError> {
+    let name = listed.picture.display().to_string();
+    let mut picture = folder.join(&listed.picture);
+    // nerfstudio's own files leave the ending out now and then.
+    if !picture.is_file() && picture.extension().is_none() {
+        picture = ["png", "jpg", "jpeg"]
+            .map(|e| picture.with_extension(e))
+            .into_iter()
+            .find(|p| p.is_file())
+            .unwrap_or(picture);
+    }
+    let mask =
+        listed.mask.map(|mask| folder.join(mask)).or_else(|| beside(folder, &listed.picture, &["masks", "mask"]));
+    let depth =
+        listed.depth.map(|depth| folder.join(depth)).or_else(|| beside(folder, &listed.picture, &["depth", "depths"]));
+    Ok(View {
+        name,
+        camera: listed.camera,
+        scan_from_camera: listed.scan_from_camera,
+        picture,
+        mask: mask.map_or(Mask::Alpha, Mask::File),
+        depth,
+    })
+}

@@ -1,0 +1,184 @@
+//! nerfstudio's `transforms.json`, and `poses.json` of a camera that a robot held. In the first, a camera looks along its -z and
+//! y is up (OpenGL); in the second x is right, y down, z forwards, lengths are metres and poses are `x, y, z, qw, qx, qy, qz`.
+
+use super::camera::{Camera, Lens};
+use super::error::ScanError;
+use nalgebra::{Isometry3, Matrix3, Matrix4, Quaternion, Rotation3, Translation3, UnitQuaternion, Vector3};
+use serde::Deserialize;
+use shared_mem::input::{self, Kind};
+use std::path::{Path, PathBuf};
+
+/// Numbers of a camera as they stand beside the frames or in each of them.
+#[derive(Debug, Clone, Default, Deserialize)]
+struct Numbers {
+    camera_model: Option<String>,
+    fl_x: Option<f64>,
+    fl_y: Option<f64>,
+    cx: Option<f64>,
+    cy: Option<f64>,
+    w: Option<f64>,
+    h: Option<f64>,
+    k1: Option<f64>,
+    k2: Option<f64>,
+    k3: Option<f64>,
+    p1: Option<f64>,
+    p2: Option<f64>,
+}
+
+#[derive(Debug, Deserialize)]
+struct File {
+    #[serde(flatten)]
+    camera: Numbers,
+    depth_unit_scale_factor: Option<f64>,
+    frames: Vec<Frame>,
+}
+
+#[derive(Debug, Deserialize)]
+struct Frame {
+    file_path: PathBuf,
+    mask_path: Option<PathBuf>,
+    depth_file_path: Option<PathBuf>,
+    transform_matrix: Option<[[f64; 4]; 4]>,
+    /// Of `poses.json` in place of the matrix.
+    base_from_camera: Option<[f64; 7]>,
+    #[serde(flatten)]
+    camera: Numbers,
+}
+
+/// A picture as the file lists it; paths are relative to the file.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Listed {
+    pub(crate) picture: PathBuf,
+    pub(crate) mask: Option<PathBuf>,
+    pub(crate) depth: Option<PathBuf>,
+    pub(crate) camera: Camera,
+    pub(crate) scan_from_camera: Isometry3<f64>,
+}
+
+/// The pictures and, where the file says it, metres for one count of a depth picture.
+pub(crate) fn read(path: &Path) -> Result<(Vec<Listed>, Option<f64>), ScanError> {
+    let bad = |what: String| ScanError::content(path, what);
+    let text = input::text(path, Kind::List)?;
+    let file: File = serde_json::from_str(&text).map_err(|error| bad(format!("{error}; see docs/reconstruct.md")))?;
+    let listed = file.frames.iter().map(|frame| {
+        let name = frame.file_path.display();
+        let camera = camera(&file.camera, &frame.camera).map_err(|what| bad(format!("{name}: {what}")))?;
+        let pose = pose(frame).map_err(|what| bad(format!("{name}: {what}")))?;
+        Ok(Listed {
+            picture: frame.file_path.clone(),
+            mask: frame.mask_path.clone(),
+            depth: frame.depth_file_path.clone(),
+            camera,
+            scan_from_camera: pose,
+        })
+    });
+    Ok((listed.collect::<Result<_, ScanError>>()?, file.depth_unit_scale_factor))
+}
+
+fn pose(frame: &Frame) -> Result<Isometry3<f64>, String> {
+    match (&frame.transform_matrix, &frame.base_from_camera) {
+        (Some(rows), _) => {
+            let matrix = Matrix4::from_fn(|row, column| rows[row][column]);
+            let turn: Matrix3<f64> = matrix.fixed_view::<3, 3>(0, 0).into_owned();
+            let opencv = turn * Matrix3::from_diagonal(&Vector3::new(1.0, -1.0, -1.0));
+            isometry(&opencv, matrix.fixed_view::<3, 1>(0, 3).into_owned())
+        }
+        (None, Some([x, y, z, w, i, j, k])) => {
+            let turn = Quaternion::new(*w, *i, *j, *k);
+            if !(0.5..2.0).contains(&turn.norm()) || [x, y, z].iter().any(|v| !v.is_finite()) {
+                return Err("`base_from_camera` is no pose; it is x, y, z [m], qw, qx, qy, qz".into());
+            }
+            Ok(Isometry3::from_parts(Translation3::new(*x, *y, *z), UnitQuaternion::from_quaternion(turn)))
+        }
+        (None, None) => Err("has neither `transform_matrix` nor `base_from_camera`".into()),
+    }
+}
+
+/// A pose from a matrix that must be a rotation, but for rounding.
+fn isometry(turn: &Matrix3<f64>, place: Vector3<f64>) -> Result<Isometry3<f64>, String> {
+    let off = (turn.transpose() * turn - Matrix3::identity()).amax();
+    if !(off < 1e-3 && place.iter().all(|v| v.is_finite())) {
+        return Err(
+            "`transform_matrix` holds no rotation; its columns must be of length one and square to each other".into()
+        );
+    }
+    if turn.determinant() < 0.0 {
+        return Err(
+            "`transform_matrix` is mirrored (its determinant is -1): change the sign of one axis of the camera".into(),
+        );
+    }
+    let turn = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix(turn));
+    Ok(Isometry3::from_parts(Translation3::from(place), turn))
+}
+
+fn camera(common: &Numbers, own: &Numbers) -> Result<Camera, String> {
+    let number = |of: fn(&Numbers) -> Option<f64>| of(own).or_else(|| of(common));
+    let needed = |of: fn(&Numbers) -> Option<f64>, key: &str| number(of).ok_or_else(|| format!("`{key}` is missing"));
+    let model = own.camera_model.as_ref().or(common.camera_model.as_ref());
+    if let Some(model) = model
+        .filter(|model| !["PINHOLE", "SIMPLE_PINHOLE", "SIMPLE_RADIAL", "RADIAL", "OPENCV"].contains(&model.as_str()))
+    {
+        return Err(format!("the camera model {model} is not known here; undistort the pictures"));
+    }
+    let (width, height) = (needed(|n| n.w, "w")?, needed(|n| n.h, "h")?);
+    let fx = needed(|n| n.fl_x, "fl_x")?;
+    let or_zero = |of: fn(&Numbers) -> Option<f64>| number(of).unwrap_or(0.0);
+    if or_zero(|n| n.k3) != 0.0 {
+        return Err("`k3` is not known here; undistort the pictures".into());
+    }
+    let bends = [or_zero(|n| n.k1), or_zero(|n| n.k2), or_zero(|n| n.p1), or_zero(|n| n.p2)];
+    let camera = Camera {
+        width: width as u32,
+        height: height as u32,
+        focal: [fx, number(|n| n.fl_y).unwrap_or(fx)],
+        centre: [number(|n| n.cx).unwrap_or(width / 2.0), number(|n| n.cy).unwrap_or(height / 2.0)],
+        lens: if bends == [0.0; 4] { Lens::Straight } else { Lens::OpenCv(bends) },
+    };
+    camera.checked()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read_text(text: &str) -> Result<Vec<Listed>, String> {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("transforms.json");
+        std::fs::write(&path, text).expect("a file");
+        read(&path).map(|(listed, _)| listed).map_err(|error| error.to_string())
+    }
+
+    const HEAD: &str = r#""fl_x": 600, "w": 640, "h": 480, "k1": -0.1"#;
+
+    #[test]
+    fn a_camera_of_opengl_looks_the_other_way_and_robot_poses_are_taken_as_they_are() {
+        let matrix = "[[1,0,0,0.1],[0,1,0,0],[0,0,1,0.5],[0,0,0,1]]";
+        let text = format!(r#"{{{HEAD}, "frames": [{{"file_path": "a.png", "transform_matrix": {matrix}}}]}}"#);
+        let listed = read_text(&text).expect("a scan");
+        let forwards = listed[0].scan_from_camera.rotation * Vector3::z();
+        assert!((forwards + Vector3::z()).norm() < 1e-12);
+        assert_eq!(
+            (listed[0].camera.centre, listed[0].camera.lens),
+            ([320.0, 240.0], Lens::OpenCv([-0.1, 0.0, 0.0, 0.0]))
+        );
+        let text = format!(r#"{{{HEAD}, "frames": [{{"file_path": "a.png", "base_from_camera": [0,0,1,1,0,0,0]}}]}}"#);
+        let listed = read_text(&text).expect("a scan");
+        assert!((listed[0].scan_from_camera.rotation * Vector3::z() - Vector3::z()).norm() < 1e-12);
+    }
+
+    #[test]
+    fn what_is_no_pose_or_no_camera_is_named_with_its_picture() {
+        let frame =
+            |matrix: &str| format!(r#"{{{HEAD}, "frames": [{{"file_path": "a.png", "transform_matrix": {matrix}}}]}}"#);
+        let cases = [
+            (frame("[[1,0,0,0],[0,1,0,0],[0,0,-1,0],[0,0,0,1]]"), "mirrored"),
+            (frame("[[2,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,1]]"), "no rotation"),
+            (r#"{"w": 640, "h": 480, "frames": [{"file_path": "a.png"}]}"#.into(), "`fl_x` is missing"),
+            ("{}".into(), "frames"),
+        ];
+        for (text, what) in cases {
+            let line = read_text(&text).expect_err("it is refused");
+            assert!(line.contains(what) && !line.contains('\n'), "{line}");
+        }
+    }
+}

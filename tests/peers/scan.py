@@ -1,0 +1,173 @@
+"""Scans of known objects, drawn by MuJoCo, through `twin reconstruct object`: how far its meshes and pictures are from the truth, beside
+Open3D's fusion with screened Poisson reconstruction of the same pictures.
+
+    python3 -m venv scan_venv
+    scan_venv/bin/pip install mujoco==4.0.0 numpy==2.4.6 scipy trimesh==5.2.0 manifold3d==3.5.4 pillow open3d==0.20.0
+    scan_venv/bin/python tests/peers/scan.py --program target/release/twin --out scans --objects box mug
+
+Licences: mujoco and scipy Apache-2.0 and BSD, trimesh and open3d MIT, manifold3d Apache-2.0, pillow MIT-CMU.
+"""
+
+import argparse
+import glob
+import json
+import os
+import subprocess
+import time
+
+import numpy as np
+import trimesh
+from PIL import Image
+from scipy.ndimage import binary_erosion
+
+from scan_objects import shapes
+
+SAMPLES = 60_000
+# Pixels of the object's rim that show what is behind it.
+RIM = 3
+KINDS = {
+    "depth": {"noise": True, "depth": True},
+    "masks": {"noise": True, "depth": False},
+    "exact": {"noise": False, "depth": True},
+}
+
+
+def distances(points, mesh):
+    import open3d as o3d
+
+    scene = o3d.t.geometry.RaycastingScene()
+    scene.add_triangles(mesh.vertices.astype(np.float32), mesh.faces.astype(np.uint32))
+    return scene.compute_distance(points.astype(np.float32)).numpy()
+
+
+def chamfer(mesh, truth):
+    """Mean of the two mean distances [mm]."""
+    ours, theirs = (trimesh.sample.sample_surface(m, SAMPLES, seed=1)[0] for m in (mesh, truth))
+    return 500.0 * (distances(ours, truth).mean() + distances(theirs, mesh).mean())
+
+
+def measured(mesh, truth):
+    closed = bool(mesh.is_watertight and mesh.is_winding_consistent)
+    return {
+        "chamfer_mm": chamfer(mesh, truth),
+        "volume": mesh.volume / truth.volume - 1 if closed else None,
+        "closed": closed,
+        "genus": int(1 - mesh.euler_number // 2) if closed and mesh.body_count == 1 else None,
+    }
+
+
+def psnr(folder, out):
+    """Of the drawn held-out views inside the true mask [dB]: mean over views."""
+    values = []
+    for drawn in sorted(glob.glob(f"{out}/held_out/*.png")):
+        name = os.path.basename(drawn).removeprefix("images_")
+        mask = np.asarray(Image.open(f"{folder}/truth/mask_{name}")) > 0
+        mask = binary_erosion(mask, iterations=RIM)
+        truth, ours = (np.asarray(Image.open(p).convert("RGB")).astype(float) for p in (f"{folder}/images/{name}", drawn))
+        values.append(-10 * np.log10(((truth - ours)[mask] ** 2).mean() / 255**2))
+    return float(np.mean(values))
+
+
+def open3d_mesh(folder, voxel=0.001):
+    """The same views fused and closed by Open3D: TSDF, then screened Poisson, its largest part."""
+    import open3d as o3d
+
+    with open(f"{folder}/transforms.json") as text:
+        scan = json.load(text)
+    camera = o3d.camera.PinholeCameraIntrinsic(scan["w"], scan["h"], scan["fl_x"], scan["fl_y"], scan["cx"] - 0.5, scan["cy"] - 0.5)
+    volume = o3d.pipelines.integration.ScalableTSDFVolume(
+        voxel_length=voxel, sdf_trunc=4 * voxel, color_type=o3d.pipelines.integration.TSDFVolumeColorType.RGB8
+    )
+    unit = scan.get("depth_unit_scale_factor", 1e-3)
+    for number, frame in enumerate(scan["frames"]):
+        if number % 8 == 4:
+            continue
+        colour = np.asarray(Image.open(f"{folder}/{frame['file_path']}").convert("RGB"))
+        mask = np.asarray(Image.open(f"{folder}/{frame['mask_path']}")) > 127
+        depth = np.asarray(Image.open(f"{folder}/{frame['depth_file_path']}")).astype(np.float32) * unit * mask
+        pair = o3d.geometry.RGBDImage.create_from_color_and_depth(
+            o3d.geometry.Image(np.ascontiguousarray(colour)), o3d.geometry.Image(depth.astype(np.float32)), 1.0, 3.0, False
+        )
+        pose = np.array(frame["transform_matrix"]) @ np.diag([1.0, -1, -1, 1])
+        volume.integrate(pair, camera, np.linalg.inv(pose))
+    cloud = volume.extract_point_cloud()
+    mesh, _ = o3d.geometry.TriangleMesh.create_from_point_cloud_poisson(cloud, depth=8)
+    mesh = trimesh.Trimesh(np.asarray(mesh.vertices), np.asarray(mesh.triangles))
+    parts = mesh.split(only_watertight=False)
+    return max(parts, key=lambda part: len(part.faces)) if len(parts) else mesh
+
+
+def reconstruct(program, folder, out, kind):
+    command = [program, "reconstruct", "object", folder, "--out", out, "--json", "--force"]
+    command += ["--scale", "1"] if not KINDS[kind]["depth"] else []
+    begun = os.times()
+    ended = subprocess.run(command, capture_output=True, text=True)
+    if ended.returncode:
+        return {"error": ended.stderr.strip().splitlines()[-1:]}
+    after = os.times()
+    answer = json.loads(ended.stdout)
+    used = after.children_user + after.children_system - begun.children_user - begun.children_system
+    return {**answer, "seconds": after.elapsed - begun.elapsed, "cpu_seconds": used}
+
+
+def judged(args, name, truth, kind):
+    folder, out = f"{args.out}/{name}_{kind}", f"{args.out}/{name}_{kind}_object"
+    answer = reconstruct(args.program, folder, out, kind)
+    if "error" in answer:
+        return answer
+    row = {key: answer[key] for key in ("psnr_db", "seconds", "cpu_seconds", "cameras_moved_m", "remarks")}
+    for which in ("object_fine", "object"):
+        mesh = trimesh.load(f"{out}/{which}.obj", process=False)
+        mesh.apply_translation(answer["origin_in_scan_m"])
+        row[which] = measured(mesh, truth)
+    row["true_mask_psnr_db"] = psnr(folder, out)
+    row["pieces_volume"] = answer["pieces_volume_m3"] / answer["volume_m3"] - 1
+    if KINDS[kind]["depth"]:
+        row["open3d"] = measured(open3d_mesh(folder), truth)
+    return row
+
+
+def line(name, kind, row):
+    if "error" in row:
+        return f"| {name} | {kind} | {row['error']} |"
+    fine, peer = row["object_fine"], row.get("open3d", {})
+    volume = f"{100 * fine['volume']:+.1f} %" if fine["volume"] is not None else "open"
+    other = f"{peer['chamfer_mm']:.2f}" if peer else "-"
+    return (
+        f"| {name} | {kind} | {fine['chamfer_mm']:.2f} | {other} | {volume} | {fine['genus']} of {shapes.GENUS[name]} "
+        f"| {row['true_mask_psnr_db']:.1f} | {row['seconds']:.0f} ({row['cpu_seconds']:.0f} CPU) |"
+    )
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--program", default="target/release/twin", help="the program twin")
+    parser.add_argument("--out", required=True, help="folder for scans and results; scans that are there are kept")
+    parser.add_argument("--objects", nargs="+", choices=list(shapes.GENUS), default=list(shapes.GENUS))
+    parser.add_argument("--kinds", nargs="+", choices=list(KINDS), default=list(KINDS))
+    parser.add_argument("--views", type=int, default=60)
+    args = parser.parse_args()
+    rows = {}
+    print("| object | input | Chamfer-L1 [mm] | Open3D | volume | genus | held-out PSNR [dB] | time [s] |")
+    print("|---|---|---|---|---|---|---|---|")
+    for name, truth in shapes.objects():
+        if name not in args.objects:
+            continue
+        missing = [kind for kind in args.kinds if not os.path.exists(f"{args.out}/{name}_{kind}/transforms.json")]
+        if missing:
+            from scan_objects.record import record, shots
+
+            drawn = shots(truth, f"{args.out}/{name}_world", views=args.views)
+            for kind in missing:
+                record(drawn, f"{args.out}/{name}_{kind}", **KINDS[kind])
+        for kind in args.kinds:
+            begun = time.time()
+            rows[f"{name} {kind}"] = row = judged(args, name, truth, kind)
+            row["all_seconds"] = time.time() - begun
+            print(line(name, kind, row), flush=True)
+            with open(f"{args.out}/results.json", "w") as out:
+                json.dump(rows, out, indent=1)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,155 @@
+//! `twin reconstruct`: assets of a simulation out of scans.
+
+use anyhow::{Context as _, ensure};
+use nalgebra::Point3;
+use reconstruct::assets::{self, Labels};
+use reconstruct::mesh::Mesh;
+use reconstruct::object::{self, Object, Options};
+use reconstruct::scan::Scan;
+use shared_mem::output::OutputFolder;
+use shared_mem::quantity::number;
+use shared_mem::{answer, console, ending};
+use std::path::{Path, PathBuf};
+use twin::physics::convex_pieces;
+
+/// Makes assets of a simulation out of scans: closed meshes with their mass, for contact and for pictures.
+#[derive(clap::Args)]
+#[command(after_help = "\
+Examples:
+  twin reconstruct object scan --out mug
+  twin reconstruct object scan --out mug --mass 0.118 --scale 0.0231")]
+pub(crate) struct Reconstruct {
+    #[command(subcommand)]
+    what: What,
+}
+
+#[derive(clap::Subcommand)]
+enum What {
+    Object(ObjectVerb),
+}
+
+/// An object out of pictures from all sides: a closed mesh, convex pieces, URDF, a block for cell.toml, a report.
+#[derive(clap::Args)]
+#[command(after_help = "\
+A scan is a folder with pictures, masks of the object (masks/NAME.png, white is the object, or an alpha channel), and the poses:
+transforms.json of nerfstudio, a COLMAP model in sparse/0, or poses.json of a robot that held the camera. Depth pictures
+(depth/NAME.png, 16 bits, millimetres) make hollows and thin walls right, and give the scale. Forty to eighty pictures from all
+around, above and below are good; every eighth is held out and shows in the report how good the result is.
+
+Writes object.obj (at most 700 triangles), object_fine.obj, object.ply (with colours; grey where no picture shows it), pieces/,
+object.urdf, cell_object.toml (an [object] block for cell.toml), object.json and report.html. After Ctrl-C the same command goes on.
+
+Examples:
+  twin reconstruct object scan --out mug
+  twin reconstruct object scan --out mug --mass 0.118
+  twin reconstruct object phone_scan --scale 0.0231 --out box --json")]
+pub(crate) struct ObjectVerb {
+    /// Folder with the scan, or its transforms.json or poses.json
+    #[arg(value_name = "SCAN")]
+    scan: PathBuf,
+    /// New folder for the files
+    #[arg(long, value_name = "FOLDER")]
+    out: PathBuf,
+    /// Replaces a folder that an earlier run has made
+    #[arg(long)]
+    force: bool,
+    /// Metres for one unit of the poses, 1e-6 to 1000 [default: as depth or the robot says]
+    #[arg(long, value_name = "METRES", value_parser = metres)]
+    scale: Option<f64>,
+    /// Nodes along each edge of the grid, were it a cube, 24 to 256: 256 takes eight times as long and 1.5 GB
+    #[arg(long, value_name = "NODES", default_value_t = 128, value_parser = clap::value_parser!(u32).range(24..=256))]
+    grid: u32,
+    /// Mass, where it was weighed [kg], 1e-4 to 1000 [default: 500 kg/m^3]
+    #[arg(long, value_name = "MASS", value_parser = mass)]
+    mass: Option<f64>,
+    /// The object's name [default: the folder's]
+    #[arg(long, value_name = "NAME")]
+    name: Option<String>,
+    /// Prints one JSON object on stdout at the end
+    #[arg(long)]
+    json: bool,
+}
+
+fn metres(text: &str) -> Result<f64, String> {
+    number(text, 1e-6..=1e3, "m")
+}
+
+fn mass(text: &str) -> Result<f64, String> {
+    number(text, 1e-4..=1e3, "kg")
+}
+
+/// What every folder of this command holds, and appears last.
+const LAST: &str = "object.json";
+
+impl Reconstruct {
+    pub(crate) fn run(&self) -> anyhow::Result<()> {
+        match &self.what {
+            What::Object(verb) => verb.run(),
+        }
+    }
+}
+
+impl ObjectVerb {
+    fn run(&self) -> anyhow::Result<()> {
+        ctrlc::set_handler(ending::ask).context("cannot listen for Ctrl-C")?;
+        let folder = self.folder()?;
+        let scan = Scan::open(&self.scan)?;
+        let kept = kept(&self.out);
+        let object = object::reconstruct(scan, &Options { scale: self.scale, edge: self.grid }, &kept)?;
+        let middle = object.middle();
+        let fine = assets::centred(&object.fine, &middle);
+        let pieces: Vec<Mesh> = convex_pieces(&fine.points, &fine.triangles).into_iter().map(piece).collect();
+        let named = |path: &Path| path.file_name().map(|name| name.to_string_lossy().into_owned());
+        let name = self.name.clone().or_else(|| named(&self.out)).unwrap_or_else(|| "object".into());
+        let command = format!("twin reconstruct object {} --out {}", self.scan.display(), self.out.display());
+        let labels = Labels { name, mass: self.mass, command };
+        for (path, bytes) in assets::files(&object, &pieces, &labels) {
+            folder.write(&path, &bytes)?;
+        }
+        ensure!(!ending::asked(), "interrupted; the same command goes on from there");
+        folder.finish(LAST)?;
+        object::forget(&kept)?;
+        for remark in &object.remarks {
+            console::line(format_args!("note: {}", remark.0));
+        }
+        let summary = assets::Summary::of(&object, &pieces, &labels);
+        if self.json { Ok(answer::json(&summary)?) } else { Ok(answer::words(self.words(&object, pieces.len()))?) }
+    }
+
+    /// The folder to fill. One of another command is never replaced.
+    fn folder(&self) -> anyhow::Result<OutputFolder> {
+        if self.force && self.out.join(LAST).is_file() {
+            return Ok(OutputFolder::replacing(&self.out)?);
+        }
+        Ok(OutputFolder::create(&self.out)?)
+    }
+
+    fn words(&self, object: &Object, pieces: usize) -> String {
+        let (low, high) = object.fine.bounds();
+        let size = (high - low) * 1e3;
+        format!(
+            "{}: {:.0} x {:.0} x {:.0} mm, {:.1} cm^3, closed, genus {}, {} convex pieces; held-out views {:.1} dB inside the mask; \
+             see {}",
+            self.out.display(),
+            size.x,
+            size.y,
+            size.z,
+            object.solid.volume * 1e6,
+            object.topology.genus,
+            pieces,
+            object.psnr(),
+            self.out.join("report.html").display()
+        )
+    }
+}
+
+fn piece((points, triangles): (Vec<Point3<f64>>, Vec<[u32; 3]>)) -> Mesh {
+    Mesh { points, triangles }
+}
+
+/// Where an interrupted run leaves what it has: beside the folder.
+fn kept(out: &Path) -> PathBuf {
+    let mut name = out.as_os_str().to_owned();
+    name.push(".state");
+    PathBuf::from(name)
+}
