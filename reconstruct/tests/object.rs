@@ -1,0 +1,144 @@
+//! A whole scan of a known object, from files to the mesh, on a coarse grid; and scans that cannot be used.
+
+use nalgebra::{Isometry3, Point3, Vector3};
+use reconstruct::field::{Field, Grid};
+use reconstruct::mesh::{Solid, surface};
+use reconstruct::object::{Options, draw, reconstruct};
+use reconstruct::scan::{Camera, Lens, Scan};
+use serde_json::json;
+use shared_mem::msg::image::PixelEncoding;
+use shared_mem::recording::pack_picture;
+use std::path::Path;
+
+const WIDTH: u32 = 120;
+const HEIGHT: u32 = 90;
+const FOCAL: f64 = 130.0;
+const VIEWS: usize = 24;
+
+/// A ring of 60 and 18 mm with a knob, whose genus is one and which is no mirror image of itself in any of its views, in colours that
+/// change slowly.
+fn ring() -> Field<f32> {
+    let grid = Grid { dims: [56, 56, 24], origin: Point3::new(-0.088, -0.088, -0.0368), voxel: 0.0032 };
+    let knob = Point3::new(0.052, 0.035, 0.018);
+    let distance = |p: Point3<f64>| {
+        let ring = ((p.x.hypot(p.y) - 0.06).powi(2) + p.z * p.z).sqrt() - 0.018;
+        ring.min((p - knob).norm() - 0.016)
+    };
+    let colour = |p: Point3<f64>| [0.5 + 4.0 * p.x, 0.5 + 4.0 * p.y, 0.5 + 10.0 * p.z].map(|c| c as f32);
+    let points: Vec<Point3<f64>> = (0..grid.len()).map(|i| grid.position(grid.node(i))).collect();
+    let distance = points.iter().map(|p| (distance(*p) / grid.voxel) as f32).collect();
+    Field { grid, distance, colour: points.iter().map(|p| colour(*p)).collect() }
+}
+
+fn camera() -> Camera {
+    let centre = [f64::from(WIDTH) / 2.0, f64::from(HEIGHT) / 2.0];
+    Camera { width: WIDTH, height: HEIGHT, focal: [FOCAL; 2], centre, lens: Lens::Straight }
+}
+
+/// From all sides along a spiral, looking at the origin.
+fn poses() -> impl Iterator<Item = Isometry3<f64>> {
+    (0..VIEWS).map(|i| {
+        let height = 0.9 - 1.8 * (i as f64 + 0.5) / VIEWS as f64;
+        let (sin, cos) = (i as f64 * 2.4).sin_cos();
+        let across = (1.0f64 - height * height).sqrt();
+        let eye = Point3::new(across * cos, across * sin, height) * 0.3;
+        Isometry3::face_towards(&eye, &Point3::origin(), &-Vector3::z())
+    })
+}
+
+/// How the poses are written.
+#[derive(Clone, Copy, PartialEq)]
+enum Poses {
+    Right,
+    /// In a left-handed frame.
+    Mirrored,
+    /// Of cameras that look along -z, with y up.
+    OpenGl,
+}
+
+/// Writes the scan.
+fn write(folder: &Path, poses_are: Poses) {
+    let field = ring();
+    let mut frames = Vec::new();
+    for part in ["images", "masks", "depth"] {
+        std::fs::create_dir_all(folder.join(part)).expect("a folder");
+    }
+    for (number, pose) in poses().enumerate() {
+        let drawn = draw(&field, &camera(), &pose);
+        let mask: Vec<u8> = drawn.opacity.iter().flat_map(|o| [if *o > 0.5 { 255 } else { 0 }; 3]).collect();
+        let depth: Vec<u8> = drawn
+            .depth
+            .iter()
+            .zip(&drawn.opacity)
+            .flat_map(|(z, o)| (if *o > 0.5 { (z * 1e4).round() as u16 } else { 0 }).to_le_bytes())
+            .collect();
+        let name = format!("{number:02}.png");
+        for (part, encoding, pixels) in [
+            ("images", PixelEncoding::Rgb8, drawn.rgb.as_flattened()),
+            ("masks", PixelEncoding::Rgb8, &mask),
+            ("depth", PixelEncoding::Depth16, &depth),
+        ] {
+            let packed = pack_picture(encoding, WIDTH, HEIGHT, pixels).expect("a picture");
+            std::fs::write(folder.join(part).join(&name), packed).expect("a file");
+        }
+        let (mut place, turn) = (pose.translation.vector, pose.rotation);
+        let [w, i, j, k] = [turn.w, turn.i, turn.j, turn.k];
+        let [w, i, j, k] = match poses_are {
+            Poses::Right => [w, i, j, k],
+            Poses::Mirrored => [w, i, -j, -k],
+            // Half a turn about the camera's own x.
+            Poses::OpenGl => [-i, w, k, -j],
+        };
+        if poses_are == Poses::Mirrored {
+            place.x = -place.x;
+        }
+        let pose = [place.x, place.y, place.z, w, i, j, k];
+        frames.push(json!({ "file_path": format!("images/{name}"), "base_from_camera": pose }));
+    }
+    let scan = json!({
+        "fl_x": FOCAL, "w": WIDTH, "h": HEIGHT, "depth_unit_scale_factor": 1e-4, "frames": frames
+    });
+    std::fs::write(folder.join("poses.json"), scan.to_string()).expect("a file");
+}
+
+#[test]
+fn a_ring_comes_out_of_its_pictures_closed_with_its_hole_its_volume_and_its_colours() {
+    let folder = tempfile::tempdir().expect("a folder");
+    write(folder.path(), Poses::Right);
+    let scan = Scan::open(folder.path()).expect("a scan");
+    let kept = folder.path().join("ring.state");
+    let object = reconstruct(scan, &Options { scale: None, edge: 32 }, &kept).expect("an object");
+    assert_eq!((object.topology.genus, object.topology.parts, object.held_out.len()), (1, 1, 3));
+    let (truth, _) = surface(&ring()).expect("a ring");
+    let volume = Solid::of(&object.fine).volume / Solid::of(&truth).volume;
+    assert!((volume - 1.0).abs() < 0.04, "{volume}");
+    assert!(object.psnr() > 28.0, "{}", object.psnr());
+    assert!(object.remarks.is_empty(), "{:?}", object.remarks);
+}
+
+#[test]
+fn scans_that_cannot_be_used_are_refused_in_a_line_that_says_what_is_missing() {
+    let folder = tempfile::tempdir().expect("a folder");
+    write(folder.path(), Poses::Right);
+    let refused = |path: &Path, scale: Option<f64>| {
+        let found = Scan::open(path).map_err(|error| error.to_string());
+        let options = Options { scale, edge: 24 };
+        let line = found
+            .and_then(|scan| reconstruct(scan, &options, &path.join("x.state")).map_err(|error| error.to_string()))
+            .expect_err("it cannot be used");
+        assert!(!line.contains('\n'), "{line}");
+        line
+    };
+    let empty = tempfile::tempdir().expect("a folder");
+    assert!(refused(empty.path(), None).contains("transforms.json"));
+    std::fs::rename(folder.path().join("masks"), folder.path().join("elsewhere")).expect("a folder");
+    assert!(refused(folder.path(), None).contains("has no mask"));
+    std::fs::rename(folder.path().join("elsewhere"), folder.path().join("masks")).expect("a folder");
+    let text = std::fs::read_to_string(folder.path().join("poses.json")).expect("a file");
+    std::fs::write(folder.path().join("poses.json"), text.replace("images/00", "images/no")).expect("a file");
+    assert!(refused(folder.path(), None).contains("no.png"));
+    for (poses, what) in [(Poses::Mirrored, "mirrored"), (Poses::OpenGl, "look the other way")] {
+        write(folder.path(), poses);
+        assert!(refused(folder.path(), None).contains(what), "{what}");
+    }
+}
