@@ -46,6 +46,7 @@ fn slide(cell: &Cell, hidden: &Theta, number: u64) -> Clip {
     };
     let poses = trace.poses.iter().enumerate().map(noisy).collect();
     Clip {
+        others: Vec::new(),
         file: format!("slide_{number:02}.mcap").into(),
         kind: ClipKind::FreeMotion,
         joint_names: Vec::new(),

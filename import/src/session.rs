@@ -168,8 +168,8 @@ pub(crate) fn longest<'a>(logs: &'a [Log], path: &Path) -> Result<&'a Log, Impor
 fn proposal(log: &Log, given: Option<&Cell>, arms: Arms<'_>) -> Result<Proposal, ImportError> {
     let failed = |what: String| ImportError::log(&log.file, what);
     if let Some(cell) = given {
-        let arm = arms(cell, None).map_err(failed)?;
-        let wanted = arm.map_or_else(Vec::new, |arm| arm.joints);
+        let named = || cell.robot.as_ref().map_or_else(Vec::new, |robot| robot.joints.clone());
+        let wanted = arms(cell, None).map_err(failed)?.map_or_else(named, |arm| arm.joints);
         return Ok(propose(log, (given, &wanted), &|_| arms(cell, None).ok()??.gravity));
     }
     let by_name = |joints: &[String]| {

@@ -114,6 +114,12 @@ fn an_arm_of_its_own_is_told_by_the_description_in_its_bag() {
     let told = answer(lab.path(), "init --bag bags/run --out mine.toml");
     assert_eq!(told["urdf"], "mine.urdf", "{told}");
     assert_eq!(std::fs::read_to_string(lab.path().join("mine.urdf")).expect("the file"), urdf);
-    let cell = Cell::read(&lab.path().join("mine.toml")).expect("a cell");
-    assert_eq!(ArmModel::from_cell(&cell).expect("an arm").joint_names(), ["shoulder"]);
+    // An import takes it by itself.
+    let imported = answer(lab.path(), "import bags --out session");
+    assert!(imported["notes"].to_string().contains("the log's robot_description"), "{imported}");
+    assert_eq!(std::fs::read_to_string(lab.path().join("session/robot.urdf")).expect("the file"), urdf);
+    for cell in ["mine.toml", "session/cell.toml"] {
+        let cell = Cell::read(&lab.path().join(cell)).expect("a cell");
+        assert_eq!(ArmModel::from_cell(&cell).expect("an arm").joint_names(), ["shoulder"]);
+    }
 }

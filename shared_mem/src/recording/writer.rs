@@ -5,14 +5,17 @@
 //! nor the footer that [`ClipWriter::finish`] adds. Every other clip ([`ClipWriter::whole`]) is an [`Output`]: there
 //! when it is finished, or not at all.
 
+mod error;
 mod records;
 mod shown;
+
+pub use error::WriteError;
 
 use super::torques;
 use super::wire::{self, UnixClock, Wire};
 use crate::cell::Cell;
 use crate::msg::image::ImageHeader;
-use crate::output::{Output, OutputError};
+use crate::output::Output;
 use crate::topics::ImageTopic;
 use mcap::records::{MessageHeader, Metadata};
 use mcap::write::NoSeek;
@@ -57,42 +60,6 @@ pub struct WriteSummary {
     pub messages: u64,
     /// Size of the file.
     pub bytes: u64,
-}
-
-/// A clip cannot be written any further.
-#[derive(Debug, thiserror::Error)]
-pub enum WriteError {
-    /// The file cannot be created.
-    #[error("cannot create {}: {source}; give a new file in a folder that exists and is writable", path.display())]
-    Create {
-        /// The file.
-        path: PathBuf,
-        /// What the system said.
-        source: io::Error,
-    },
-    /// No room is left.
-    #[error(
-        "the disk is full: {} ends after {bytes} bytes and is readable up to its last flush; free some space and \
-         record again",
-        path.display()
-    )]
-    DiskFull {
-        /// The file.
-        path: PathBuf,
-        /// Bytes that were written.
-        bytes: u64,
-    },
-    /// A clip that is no live recording; nothing of it is there.
-    #[error(transparent)]
-    Output(#[from] OutputError),
-    /// Writing failed for another reason.
-    #[error("cannot write {} any further ({what}); it is readable up to its last flush; record to another disk", path.display())]
-    Failed {
-        /// The file.
-        path: PathBuf,
-        /// What the system said.
-        what: String,
-    },
 }
 
 /// Counts what reaches the file.
@@ -347,25 +314,5 @@ impl<W: Write> ClipWriter<W> {
 
     fn failed(&self, error: &McapError) -> WriteError {
         WriteError::from_mcap(&self.path, self.bytes_written(), error)
-    }
-}
-
-impl WriteError {
-    /// `bytes`: how far the file came.
-    pub(super) fn from_mcap(path: &Path, bytes: u64, error: &McapError) -> Self {
-        if let McapError::Io(io) = error
-            && let Some(refused) = OutputError::inside(io)
-        {
-            return Self::Output(refused);
-        }
-        let path = path.to_owned();
-        match error {
-            McapError::Io(e) if matches!(e.kind(), io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded) => {
-                Self::DiskFull { path, bytes }
-            }
-            McapError::Io(e) => Self::Failed { path, what: e.to_string() },
-            McapError::AttemptedWriteAfterFailure => Self::Failed { path, what: "an earlier write failed".into() },
-            other => Self::Failed { path, what: other.to_string() },
-        }
     }
 }
