@@ -3,7 +3,7 @@
 
 use libfuzzer_sys::fuzz_target;
 use nalgebra::Similarity3;
-use twin::render::splat::SplatCloud;
+use splat::SplatCloud;
 
 /// One splat with the usual columns.
 fn plain() -> Vec<u8> {

@@ -118,6 +118,7 @@ pub fn literals() -> Vec<(String, String)> {
     let mut folders: Vec<PathBuf> = [
         "shared_mem/src",
         "twin/src",
+        "splat/src",
         "rt_bridge/src",
         "calibration/src",
         "evaluation/src",

@@ -11,8 +11,8 @@ use eye::camera_from_base;
 use nalgebra::Vector3;
 use robot_splats::robot_splats;
 use shared_mem::cell::Cell;
+use splat::{Body, Canvas, Lens, Shape, Surroundings};
 use std::path::Path;
-use twin::render::splat::{Body, Canvas, Lens, Shape, Surroundings};
 use twin::render::{Hand, RobotSurface};
 
 const SIZE: [usize; 2] = [640, 480];

@@ -9,9 +9,9 @@ mod robot_splats;
 use eye::camera_from_base;
 use nalgebra::{Isometry3, Matrix2, Matrix3, Point3, Translation3, UnitQuaternion, Vector2, Vector3};
 use robot_splats::robot_splats;
+use splat::{Body, Lens, Picture, Shape, Splat, SplatCloud, Surroundings, render};
 use std::path::Path;
 use twin::render::device::{Device, DeviceCanvas, DeviceError};
-use twin::render::splat::{Body, Lens, Picture, Shape, Splat, SplatCloud, Surroundings, render};
 use twin::render::{Drawer, Hand, Mesh, Model, Painter, RobotSurface};
 
 const SIZE: [usize; 2] = [323, 241];

@@ -8,11 +8,11 @@ use rand::{RngExt as _, SeedableRng as _};
 use rand_pcg::Pcg64Mcg;
 use robot_splats::robot_splats;
 use shared_mem::cell::Cell;
+use splat::{Splat, SplatCloud};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use twin::arm::Joints;
 use twin::reconstruct::{SurfacePoints, align, label};
-use twin::render::splat::{Splat, SplatCloud};
 use twin::render::{Hand, RobotSurface};
 
 const JOINTS: &str = "0.2,-0.6,0.1,-2.2,0.1,1.7,0.6";

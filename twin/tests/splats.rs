@@ -2,8 +2,8 @@
 
 use nalgebra::{Isometry3, Matrix2, Matrix3, Point3, Translation3, UnitQuaternion, Vector2, Vector3};
 use proptest::prelude::*;
+use splat::{Body, Lens, Picture, Shape, Splat, SplatCloud, Surroundings, render};
 use std::path::Path;
-use twin::render::splat::{Body, Lens, Picture, Shape, Splat, SplatCloud, Surroundings, render};
 use twin::render::{Hand, RobotSurface};
 
 const SIZE: [usize; 2] = [160, 120];

@@ -4,7 +4,7 @@
 use nalgebra::{Point3, UnitQuaternion, Vector3};
 use rand::{RngExt as _, SeedableRng as _};
 use rand_pcg::Pcg64Mcg;
-use twin::render::splat::{Splat, SplatCloud};
+use splat::{Splat, SplatCloud};
 use twin::render::{Mesh, RobotSurface};
 
 /// One cloud for each part of the robot, about `count` splats together, spherical harmonics to degree 3.

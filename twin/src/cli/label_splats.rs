@@ -8,10 +8,10 @@ use shared_mem::cell::Cell;
 use shared_mem::output::{Destination, Output};
 use shared_mem::progress::{Planned, Progress};
 use shared_mem::quantity::number;
+use splat::{SplatCloud, link_file};
 use std::path::PathBuf;
 use twin::arm::MAX_JOINTS;
 use twin::reconstruct::{STARTS, SurfacePoints, align, label};
-use twin::render::splat::{SplatCloud, link_file};
 use twin::render::{Hand, RobotSurface};
 
 /// Finds the robot in a scanned cell and parts the scan: one splat file for each link, in its frame, and the rest.

@@ -3,9 +3,9 @@
 
 use super::nearest::Nearest;
 use super::surface::SurfacePoints;
-use crate::render::splat::SplatCloud;
 use nalgebra::Similarity3;
 use rayon::prelude::*;
+use splat::SplatCloud;
 
 /// How many neighbours vote.
 const VOTES: usize = 9;

@@ -1,5 +1,5 @@
-//! Pictures of the cell: a CPU rasteriser of flat-shaded triangles, colour and depth in one pass, fast enough for the
-//! simulated camera on one core; and beside it [`splat`], Gaussian splats and meshes in one picture, which with the
+//! Pictures of the cell, drawn by the crate [`splat`]: a CPU rasteriser of flat-shaded triangles, colour and depth in one
+//! pass, fast enough for the simulated camera on one core; and Gaussian splats and meshes in one picture, which with the
 //! feature `render` a Vulkan device draws as well. A [`Painter`] is the one or the other.
 //!
 //! Camera frame: z forward, x right, y down, metres; pixel centres lie at whole numbers. `f32` throughout: at 2 m a
@@ -10,19 +10,15 @@ pub mod device;
 mod glb;
 mod live;
 pub(crate) mod looks;
-mod mesh;
 mod painter;
-mod raster;
 mod robot;
 pub mod session;
 mod shown;
-pub mod splat;
 mod stray;
 
 pub use live::{Beside, LiveView};
-pub use mesh::Mesh;
 pub use painter::{Drawer, Model, PaintError, Painter};
-pub use raster::{Pinhole, Raster};
 pub use robot::{Hand, RobotSurface};
 pub(crate) use shown::{ScannedLink, Shown};
+pub use splat::{Mesh, Pinhole, Raster};
 pub(crate) use stray::strays;

@@ -3,8 +3,8 @@
 use super::Mesh;
 #[cfg(feature = "render")]
 use super::device::{Device, DeviceCanvas};
-use super::splat::{Body, Canvas, Lens, Picture, Shape, SplatCloud, Surroundings};
 use nalgebra::Isometry3;
+use splat::{Body, Canvas, Lens, Picture, Shape, SplatCloud, Surroundings};
 
 /// What a body looks like, kept by a [`Painter`].
 #[derive(Debug, Clone, PartialEq)]

@@ -1,6 +1,5 @@
 //! A recorded session beside its twin: the camera's picture, what the twin shows at the same joints, and where they differ.
 
-use super::splat::{Lens, SplatError, read_links};
 use super::{Drawer, Hand, PaintError, Painter, RobotSurface, ScannedLink, Shown, looks, strays};
 use crate::arm::{Joints, MAX_JOINTS, ModelError};
 use crate::scene::MeshFileError;
@@ -9,6 +8,7 @@ use shared_mem::cell::Cell;
 use shared_mem::frames::{Base, Object, Pose};
 use shared_mem::msg::image::ImageHeader;
 use shared_mem::recording::Picture;
+use splat::{Lens, SplatError, read_links};
 use std::path::Path;
 
 /// The cell's twin as a camera sees it.

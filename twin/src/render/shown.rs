@@ -1,9 +1,9 @@
 //! The robot and what stands around it, ready to be drawn again and again: which model moves with what.
 
-use super::splat::{Lens, Picture, SplatCloud, Surroundings};
 use super::{Drawer, Mesh, Model, PaintError, Painter, RobotSurface, looks};
 use crate::arm::Joints;
 use nalgebra::{Isometry3, Vector3};
+use splat::{Lens, Picture, SplatCloud, Surroundings};
 
 /// Numbers in the picture: what never moves, the object, and the robot's links from here on.
 const STILL: u32 = 1;

@@ -73,9 +73,9 @@ mod tests {
     use super::*;
     use crate::arm::MAX_JOINTS;
     use crate::render::Hand;
-    use crate::render::splat::{Splat, SplatCloud};
     use crate::shipped::shipped;
     use nalgebra::UnitQuaternion;
+    use splat::{Splat, SplatCloud};
 
     #[test]
     fn a_scan_in_the_base_frame_that_is_taken_for_one_in_the_links_is_told() {

@@ -8,7 +8,6 @@ use super::camera_clock_ns;
 use super::depth::{self, DepthSensor};
 use crate::effects::CameraEffects;
 use crate::render::session::ViewError;
-use crate::render::splat::{Lens, Picture, read_links};
 use crate::render::{Drawer, Hand, Mesh, Pinhole, Raster, RobotSurface, ScannedLink, Shown, looks, strays};
 use crate::scene::SceneSnapshot;
 use crate::sim::SimError;
@@ -16,6 +15,7 @@ use crate::sim::generator;
 use nalgebra::{Isometry3, Vector3};
 use shared_mem::cell::{Camera, Cell};
 use shared_mem::msg::image::{CameraInfo, ImageHeader, PixelEncoding, StampDomain};
+use splat::{Lens, Picture, read_links};
 use std::path::Path;
 
 /// The camera.
@@ -225,10 +225,10 @@ impl SimCamera {
 mod tests {
     use super::*;
     use crate::reconstruct::SurfacePoints;
-    use crate::render::splat::{Splat, SplatCloud, link_file};
     use crate::shipped::shipped;
     use crate::sim::SimCell;
     use shared_mem::cell::CameraPose;
+    use splat::{Splat, SplatCloud, link_file};
     use std::path::Path;
 
     fn picture(cell: &Cell, scene: &SceneSnapshot) -> (SimCamera, Vec<u8>, Vec<u16>, [ImageHeader; 2]) {

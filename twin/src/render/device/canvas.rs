@@ -4,8 +4,8 @@ use super::passes::{DEPTH, Passes, SURFACE};
 use super::upload::Upload;
 use super::view::{BODY, Facts, VIEW, body_bytes, view_bytes};
 use super::{Device, DeviceError};
-use crate::render::splat::{Lens, Picture, Shape, Straight, Surroundings};
 use nalgebra::Isometry3;
+use splat::{Lens, Picture, Shape, Straight, Surroundings};
 use wgpu::BufferUsages as Usages;
 
 /// Edge of a tile [pixel], and threads of a group that goes through splats, as in `splats.wgsl`.

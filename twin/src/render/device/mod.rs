@@ -1,5 +1,5 @@
 //! Pictures on a Vulkan device, a graphics card or Mesa's software one: the only code that knows wgpu. The same maths as
-//! the reference in [`super::splat`], in single precision; splats and meshes are uploaded once and moved by poses.
+//! the reference in [`splat`], in single precision; splats and meshes are uploaded once and moved by poses.
 //!
 //! | file | owns |
 //! |---|---|
@@ -154,8 +154,8 @@ fn wait<T>(future: impl Future<Output = T>) -> T {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::render::splat::{Lens, Shape, Splat, SplatCloud};
     use nalgebra::{Point3, UnitQuaternion, Vector3};
+    use splat::{Lens, Shape, Splat, SplatCloud};
 
     #[test]
     fn more_splats_than_a_small_device_holds_are_refused_in_one_line() {

@@ -3,8 +3,8 @@
 
 use super::{Device, DeviceError};
 use crate::render::Mesh;
-use crate::render::splat::{Shape, SplatCloud};
 use nalgebra::Point3;
+use splat::{Shape, SplatCloud};
 use std::ops::Range;
 
 /// Bytes of a splat, without its harmonics.

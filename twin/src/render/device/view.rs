@@ -1,8 +1,8 @@
 //! What changes with every picture, in the bytes that `shared.wgsl` describes.
 
 use super::upload::Part;
-use crate::render::splat::{Lens, Straight, Surroundings, held};
 use nalgebra::{Isometry3, Point3};
+use splat::{Lens, Straight, Surroundings, slope_ends};
 
 /// Bytes of `View` and of `Body`.
 pub(super) const VIEW: u64 = 160;
@@ -26,7 +26,7 @@ pub(super) fn view_bytes(facts: &Facts<'_>) -> Vec<u8> {
     let [fx, fy] = lens.focal;
     let [cx, cy] = lens.centre;
     let [k1, k2, p1, p2, k3] = lens.distortion;
-    let [[left, right], [top, bottom]] = held(lens, facts.size);
+    let [[left, right], [top, bottom]] = slope_ends(lens, facts.size);
     let [r, g, b] = around.background;
     let light = around.light.normalize();
     let pinhole = &straight.pinhole;

@@ -5,9 +5,10 @@
 
 use super::cloud::SplatCloud;
 use super::lens::Lens;
+use super::mesh::Mesh;
 use super::project::{FAINTEST, Projected, project};
+use super::raster::Raster;
 use super::straight::Straight;
-use crate::render::{Mesh, Raster};
 use nalgebra::{Isometry3, Vector3};
 use rayon::prelude::*;
 

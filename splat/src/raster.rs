@@ -2,7 +2,7 @@
 //! picture and a row of pixels is a straight run that the compiler turns into vector code. Allocates when made, and for
 //! the first mesh that is larger than all before.
 
-use super::Mesh;
+use super::mesh::Mesh;
 use nalgebra::{Isometry3, Point3, Vector3};
 use std::ops::Range;
 

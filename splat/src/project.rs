@@ -50,7 +50,7 @@ pub fn project(
     }
     let (pixel, _) = lens.project(&centre);
     let mut held_at = centre;
-    for (i, [least, most]) in held(lens, size).into_iter().enumerate() {
+    for (i, [least, most]) in slope_ends(lens, size).into_iter().enumerate() {
         held_at[i] = (centre[i] / centre.z).clamp(least, most) * centre.z;
     }
     let (_, slope) = lens.project(&held_at);
@@ -85,7 +85,8 @@ pub fn project(
 }
 
 /// Between which ends the slope of the projection is taken, along a row and along a column, in the plane z = 1.
-pub(in crate::render) fn held(lens: &Lens, size: [usize; 2]) -> [[f64; 2]; 2] {
+#[must_use]
+pub fn slope_ends(lens: &Lens, size: [usize; 2]) -> [[f64; 2]; 2] {
     [0, 1].map(|i| {
         let ends = [-lens.centre[i], size[i] as f64 - 1.0 - lens.centre[i]].map(|end| end / lens.focal[i]);
         let spare = (OUTSIDE - 1.0) * 0.5 * (ends[1] - ends[0]);

@@ -1,24 +1,27 @@
 //! The straight picture that meshes are drawn in, and where each pixel of a bent lens finds itself in it.
 
 use super::lens::Lens;
-use crate::render::Pinhole;
+use super::raster::Pinhole;
 use rayon::prelude::*;
 
 /// A pixel that sees nothing of the straight picture.
-pub(in crate::render) const NOWHERE: u32 = u32::MAX;
+pub const NOWHERE: u32 = u32::MAX;
 
 /// The pinhole beside a lens.
 #[derive(Debug, Clone)]
-pub(in crate::render) struct Straight {
-    pub(in crate::render) pinhole: Pinhole,
+pub struct Straight {
+    /// Its camera.
+    pub pinhole: Pinhole,
     /// Columns and rows.
-    pub(in crate::render) size: [usize; 2],
+    pub size: [usize; 2],
     /// For every pixel behind the lens the pixel of the straight picture, or [`NOWHERE`]; empty where the two are one.
-    pub(in crate::render) lookup: Vec<u32>,
+    pub lookup: Vec<u32>,
 }
 
 impl Straight {
-    pub(in crate::render) fn new(lens: &Lens, seen: [usize; 2]) -> Self {
+    /// For pictures behind the lens of so many columns and rows.
+    #[must_use]
+    pub fn new(lens: &Lens, seen: [usize; 2]) -> Self {
         // A lens that bends sees a little more or less than its pinhole: that one's picture is made large enough.
         let margin = if lens.is_bent() { seen.map(|pixels| pixels / 4) } else { [0, 0] };
         let size = [0, 1].map(|i| seen[i] + 2 * margin[i]);
@@ -37,7 +40,8 @@ impl Straight {
     }
 
     /// The straight picture's pixel for one behind the lens.
-    pub(in crate::render) fn at(&self, pixel: usize) -> Option<usize> {
+    #[must_use]
+    pub fn at(&self, pixel: usize) -> Option<usize> {
         match self.lookup.get(pixel) {
             None => Some(pixel),
             Some(&NOWHERE) => None,
