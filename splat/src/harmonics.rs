@@ -1,34 +1,81 @@
 //! Colour by direction: real spherical harmonics to degree 3, with the signs that 3DGS files are written for.
 
+use super::real::Real;
 use nalgebra::{DMatrix, UnitQuaternion, Vector3};
 
 /// The constant function.
 pub(super) const FIRST: f64 = 0.282_094_791_773_878_14;
 
+/// Constants of the degrees 1 to 3.
+const ONE: f64 = 0.488_602_511_902_919_9;
+const TWO: [f64; 3] = [1.092_548_430_592_079_2, 0.315_391_565_252_520_05, 0.546_274_215_296_039_6];
+const THREE: [f64; 5] = [
+    0.590_043_589_926_643_5,
+    2.890_611_442_640_554,
+    0.457_045_799_464_465_8,
+    0.373_176_332_590_115_4,
+    1.445_305_721_320_277,
+];
+
 /// Values of the `(degree + 1)^2` functions in a direction of length 1; beyond them 0.
-pub(super) fn values(degree: usize, [x, y, z]: [f64; 3]) -> [f64; 16] {
-    let mut out = [0.0; 16];
-    out[0] = FIRST;
+pub(super) fn values<T: Real>(degree: usize, [x, y, z]: [T; 3]) -> [T; 16] {
+    let mut out = [T::zero(); 16];
+    out[0] = T::of(FIRST);
     if degree >= 1 {
-        let c = 0.488_602_511_902_919_9;
+        let c = T::of(ONE);
         out[1..4].copy_from_slice(&[-c * y, c * z, -c * x]);
     }
     let (xx, yy, zz) = (x * x, y * y, z * z);
+    let [two, three, four] = [2.0, 3.0, 4.0].map(T::of);
     if degree >= 2 {
-        let (a, b, c) = (1.092_548_430_592_079_2, 0.315_391_565_252_520_05, 0.546_274_215_296_039_6);
-        out[4..9].copy_from_slice(&[a * x * y, -a * y * z, b * (2.0 * zz - xx - yy), -a * x * z, c * (xx - yy)]);
+        let [a, b, c] = TWO.map(T::of);
+        out[4..9].copy_from_slice(&[a * x * y, -a * y * z, b * (two * zz - xx - yy), -a * x * z, c * (xx - yy)]);
     }
     if degree >= 3 {
-        let (a, b, c) = (0.590_043_589_926_643_5, 2.890_611_442_640_554, 0.457_045_799_464_465_8);
-        let (d, e) = (0.373_176_332_590_115_4, 1.445_305_721_320_277);
+        let [a, b, c, d, e] = THREE.map(T::of);
         out[9..16].copy_from_slice(&[
-            -a * y * (3.0 * xx - yy),
+            -a * y * (three * xx - yy),
             b * x * y * z,
-            -c * y * (4.0 * zz - xx - yy),
-            d * z * (2.0 * zz - 3.0 * xx - 3.0 * yy),
-            -c * x * (4.0 * zz - xx - yy),
+            -c * y * (four * zz - xx - yy),
+            d * z * (two * zz - three * xx - three * yy),
+            -c * x * (four * zz - xx - yy),
             e * z * (xx - yy),
-            -a * x * (xx - 3.0 * yy),
+            -a * x * (xx - three * yy),
+        ]);
+    }
+    out
+}
+
+/// How the functions change with x, y and z, each taken by itself.
+pub(super) fn slopes<T: Real>(degree: usize, [x, y, z]: [T; 3]) -> [[T; 3]; 16] {
+    let mut out = [[T::zero(); 3]; 16];
+    let none = T::zero();
+    if degree >= 1 {
+        let c = T::of(ONE);
+        out[1..4].copy_from_slice(&[[none, -c, none], [none, none, c], [-c, none, none]]);
+    }
+    let (xx, yy, zz) = (x * x, y * y, z * z);
+    let [two, three, four, six, eight] = [2.0, 3.0, 4.0, 6.0, 8.0].map(T::of);
+    if degree >= 2 {
+        let [a, b, c] = TWO.map(T::of);
+        out[4..9].copy_from_slice(&[
+            [a * y, a * x, none],
+            [none, -a * z, -a * y],
+            [-two * b * x, -two * b * y, four * b * z],
+            [-a * z, none, -a * x],
+            [two * c * x, -two * c * y, none],
+        ]);
+    }
+    if degree >= 3 {
+        let [a, b, c, d, e] = THREE.map(T::of);
+        out[9..16].copy_from_slice(&[
+            [-six * a * x * y, -three * a * (xx - yy), none],
+            [b * y * z, b * x * z, b * x * y],
+            [two * c * x * y, -c * (four * zz - xx - three * yy), -eight * c * y * z],
+            [-six * d * x * z, -six * d * y * z, d * (six * zz - three * xx - three * yy)],
+            [-c * (four * zz - three * xx - yy), two * c * x * y, -eight * c * x * z],
+            [two * e * x * z, -two * e * y * z, e * (xx - yy)],
+            [-three * a * (xx - yy), six * a * x * y, none],
         ]);
     }
     out
@@ -89,6 +136,24 @@ mod tests {
         for (i, row) in products.iter().enumerate() {
             for (j, product) in row.iter().enumerate() {
                 assert!((product - f64::from(u8::from(i == j))).abs() < 1e-3, "{i} {j}: {product}");
+            }
+        }
+    }
+
+    #[test]
+    fn slopes_are_difference_quotients() {
+        let at = [0.48, -0.6, 0.64];
+        let slopes = slopes(3, at);
+        for axis in 0..3 {
+            let moved = |by: f64| {
+                let mut there = at;
+                there[axis] += by;
+                values(3, there)
+            };
+            let (after, before) = (moved(1e-6), moved(-1e-6));
+            for k in 0..16 {
+                let quotient = (after[k] - before[k]) / 2e-6;
+                assert!((quotient - slopes[k][axis]).abs() < 1e-8, "{k} {axis}: {quotient} {}", slopes[k][axis]);
             }
         }
     }

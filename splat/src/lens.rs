@@ -1,5 +1,6 @@
 //! Pinhole and Brown-Conrady distortion [pixel]: forward with its slope, and backward. Pixel centres lie at whole numbers.
 
+use super::real::Real;
 use nalgebra::{Matrix2, Matrix2x3, Point3, Vector2, Vector3};
 
 /// How a camera projects.
@@ -21,31 +22,11 @@ impl Lens {
     #[must_use]
     pub fn project(&self, p: &Point3<f64>) -> ([f64; 2], Matrix2x3<f64>) {
         let (x, y) = (p.x / p.z, p.y / p.z);
-        let (bent, slope) = self.bend(x, y);
+        let (bent, slope) = bend(&self.distortion, x, y);
         let flat = Matrix2x3::new(1.0 / p.z, 0.0, -x / p.z, 0.0, 1.0 / p.z, -y / p.z);
         let focal = Matrix2::from_diagonal(&Vector2::from(self.focal));
         let pixel = [0, 1].map(|i| self.focal[i] * bent[i] + self.centre[i]);
         (pixel, focal * slope * flat)
-    }
-
-    /// The distortion of a point of the plane z = 1, and its slope.
-    fn bend(&self, x: f64, y: f64) -> (Vector2<f64>, Matrix2<f64>) {
-        let [k1, k2, p1, p2, k3] = self.distortion;
-        let r2 = x * x + y * y;
-        let radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3));
-        let rise = k1 + r2 * (2.0 * k2 + 3.0 * r2 * k3);
-        let bent = Vector2::new(
-            x * radial + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x),
-            y * radial + p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y,
-        );
-        let mixed = 2.0 * x * y * rise + 2.0 * p1 * x + 2.0 * p2 * y;
-        let slope = Matrix2::new(
-            radial + 2.0 * x * x * rise + 2.0 * p1 * y + 6.0 * p2 * x,
-            mixed,
-            mixed,
-            radial + 2.0 * y * y * rise + 6.0 * p1 * y + 2.0 * p2 * x,
-        );
-        (bent, slope)
     }
 
     /// The direction that a pixel sees, with z = 1.
@@ -55,7 +36,7 @@ impl Lens {
         let mut at = wanted;
         if self.is_bent() {
             for _ in 0..STEPS {
-                let (bent, slope) = self.bend(at.x, at.y);
+                let (bent, slope) = bend(&self.distortion, at.x, at.y);
                 let Some(back) = slope.try_inverse() else { break };
                 let step = back * (wanted - bent);
                 at += step;
@@ -72,6 +53,41 @@ impl Lens {
     pub fn is_bent(&self) -> bool {
         self.distortion.iter().any(|k| *k != 0.0)
     }
+}
+
+/// The distortion of a point of the plane z = 1, and its slope.
+pub(super) fn bend<T: Real>(distortion: &[T; 5], x: T, y: T) -> (Vector2<T>, Matrix2<T>) {
+    let [k1, k2, p1, p2, k3] = *distortion;
+    let [one, two, three, six] = [1.0, 2.0, 3.0, 6.0].map(T::of);
+    let r2 = x * x + y * y;
+    let radial = one + r2 * (k1 + r2 * (k2 + r2 * k3));
+    let rise = k1 + r2 * (two * k2 + three * r2 * k3);
+    let bent = Vector2::new(
+        x * radial + two * p1 * x * y + p2 * (r2 + two * x * x),
+        y * radial + p1 * (r2 + two * y * y) + two * p2 * x * y,
+    );
+    let mixed = two * x * y * rise + two * p1 * x + two * p2 * y;
+    let slope = Matrix2::new(
+        radial + two * x * x * rise + two * p1 * y + six * p2 * x,
+        mixed,
+        mixed,
+        radial + two * y * y * rise + six * p1 * y + two * p2 * x,
+    );
+    (bent, slope)
+}
+
+/// How the slope of the distortion changes with x and with y. It is symmetric, as are the two answers.
+pub(super) fn bend_curvature<T: Real>(distortion: &[T; 5], x: T, y: T) -> [Matrix2<T>; 2] {
+    let [k1, k2, p1, p2, k3] = *distortion;
+    let [two, three, four, six] = [2.0, 3.0, 4.0, 6.0].map(T::of);
+    let r2 = x * x + y * y;
+    let rise = k1 + r2 * (two * k2 + three * r2 * k3);
+    let bow = two * k2 + six * k3 * r2;
+    let xxx = six * x * rise + four * x * x * x * bow + six * p2;
+    let xxy = two * y * rise + four * x * x * y * bow + two * p1;
+    let xyy = two * x * rise + four * x * y * y * bow + two * p2;
+    let yyy = six * y * rise + four * y * y * y * bow + six * p1;
+    [Matrix2::new(xxx, xxy, xxy, xyy), Matrix2::new(xxy, xyy, xyy, yyy)]
 }
 
 #[cfg(test)]

@@ -6,31 +6,40 @@
 //! |---|---|
 //! | `cloud` | the splats of one body |
 //! | `ply`, `compressed` | 3DGS PLY and SuperSplat's compressed PLY |
+//! | `real` | single and double precision |
 //! | `harmonics` | colour by direction |
 //! | `links` | a folder with one file for each link |
 //! | `lens` | pinhole and Brown-Conrady distortion, both ways |
 //! | `project` | one splat in a picture |
+//! | `gradient` | the picture once more, and from pixels back to splats |
+//! | `loss` | how far a picture is from a photograph |
 //! | `straight` | the pinhole's picture beside the lens's |
 //! | `mesh`, `raster` | triangles of one colour, and a CPU rasteriser of them |
 //! | `reference` | the picture |
 
 mod cloud;
 mod compressed;
+mod gradient;
 mod harmonics;
 mod lens;
 mod links;
+mod loss;
 mod mesh;
 mod ply;
 mod project;
 mod raster;
+mod real;
 mod reference;
 mod straight;
 
 pub use cloud::{Splat, SplatCloud, SplatError};
+pub use gradient::{COLOR_DEPTH, COLOR_DEPTH_NORMAL, Frame, Parameters, Planes};
 pub use lens::Lens;
 pub use links::{link_file, read_links};
+pub use loss::{Loss, Target, Weights};
 pub use mesh::Mesh;
 pub use project::{Projected, project, slope_ends};
 pub use raster::{Pinhole, Raster};
+pub use real::Real;
 pub use reference::{Body, Canvas, Picture, Shape, Surroundings, render};
 pub use straight::{NOWHERE, Straight};

@@ -6,7 +6,7 @@
 use super::cloud::SplatCloud;
 use super::lens::Lens;
 use super::mesh::Mesh;
-use super::project::{FAINTEST, Projected, project};
+use super::project::{FAINTEST, Projected, View, project_from};
 use super::raster::Raster;
 use super::straight::Straight;
 use nalgebra::{Isometry3, Vector3};
@@ -64,11 +64,11 @@ impl Picture {
 }
 
 /// Edge of a tile [pixel].
-const TILE: usize = 16;
+pub(super) const TILE: usize = 16;
 /// No splat keeps back all light.
-const MOST: f64 = 0.99;
+pub(super) const MOST: f64 = 0.99;
 /// Light of which less is left does not change a picture any more.
-const SPENT: f64 = 1e-4;
+pub(super) const SPENT: f64 = 1e-4;
 
 struct Drawn {
     splat: Projected,
@@ -139,8 +139,9 @@ impl Canvas {
         let mut drawn: Vec<Drawn> = Vec::new();
         for body in bodies {
             if let Shape::Splats(cloud) = body.shape {
+                let view = View::new(&body.camera_from_body, &self.lens, self.size);
                 let one = |number| {
-                    let splat = project(cloud, number, &body.camera_from_body, &self.lens, self.size)?;
+                    let splat = project_from(cloud, number, &view)?;
                     Some(Drawn { splat, instance: body.instance })
                 };
                 drawn.par_extend((0..cloud.splats.len()).into_par_iter().filter_map(one));
