@@ -37,14 +37,14 @@ const DEVIATIONS: [(&str, Coordinate, Shape, f64); 9] = [
     ("yaw of the slide", Coordinate::Yaw, Shape::InWay, 0.012),
 ];
 
-/// The same of an object alone, by the end of its motion. Tossed cubes that are given the parameters identified from them end
-/// some centimetres and tenths of a radian away; what only slides is near an eighth of this, the least scale.
+/// The same of an object alone, by the end of its motion: as wide as those of a free slide after a hit, so that a slide still shows
+/// what bends it. One that tumbles is beyond that by many times, which the heavy tails bear.
 const ALONE: [(&str, Coordinate, Shape, f64); 5] = [
-    ("along the motion", Coordinate::Along, Shape::InTime, 0.01),
-    ("across the motion", Coordinate::Across, Shape::InTime, 0.01),
-    ("yaw of the motion", Coordinate::Yaw, Shape::InTime, 0.1),
-    ("roll of the motion", Coordinate::Roll, Shape::InTime, 0.1),
-    ("pitch of the motion", Coordinate::Pitch, Shape::InTime, 0.1),
+    ("along the motion", Coordinate::Along, Shape::InTime, 1e-3),
+    ("across the motion", Coordinate::Across, Shape::InTime, 1e-3),
+    ("yaw of the motion", Coordinate::Yaw, Shape::InTime, 0.012),
+    ("roll of the motion", Coordinate::Roll, Shape::InTime, 0.012),
+    ("pitch of the motion", Coordinate::Pitch, Shape::InTime, 0.012),
 ];
 
 #[derive(Debug, Clone, Copy, PartialEq)]
