@@ -67,6 +67,22 @@ fn pose(i: u64) -> ObjectPose {
     }
 }
 
+/// What arm and gripper are steered by.
+fn targets() -> [Payload; 2] {
+    let arm_target = ArmTarget {
+        stamp_ns: 1,
+        stream: 2,
+        kind: TargetKind::Pose,
+        dof: 2,
+        speed: 0.3,
+        q: joints_from(&[0.4, 0.5]),
+        position: [0.6, 0.7, 0.8],
+        wxyz: [0.0, 0.0, 1.0, 0.0],
+    };
+    let gripper_target = GripperTarget { stamp_ns: 1, stream: 2, width: 0.03, speed: 0.04, force: 5.0 };
+    [Payload::ArmTarget(Box::new(arm_target)), Payload::GripperTarget(gripper_target)]
+}
+
 /// One payload of every kind.
 fn one_of_each() -> Vec<Payload> {
     let header = ImageHeader {
@@ -129,20 +145,10 @@ fn one_of_each() -> Vec<Payload> {
     let wrench =
         Wrench { stamp_ns: 1, device_ns: 2, sequence: 3, force: [4.0; 3], torque: [5.0; 3], saturated: 6, reserved: 0 };
     let gripper = GripperState { stamp_ns: 1, width: 0.08, width_d: 0.02, force: 30.0, grasped: 1, fault: 2 };
-    let arm_target = ArmTarget {
-        stamp_ns: 1,
-        stream: 2,
-        kind: TargetKind::Pose,
-        dof: 2,
-        speed: 0.3,
-        q: joints_from(&[0.4, 0.5]),
-        position: [0.6, 0.7, 0.8],
-        wxyz: [0.0, 0.0, 1.0, 0.0],
-    };
-    let gripper_target = GripperTarget { stamp_ns: 1, stream: 2, width: 0.03, speed: 0.04, force: 5.0 };
+    let [arm_target, gripper_target] = targets();
     vec![
-        Payload::ArmTarget(Box::new(arm_target)),
-        Payload::GripperTarget(gripper_target),
+        arm_target,
+        gripper_target,
         Payload::ArmState(Box::new(state(1))),
         Payload::ArmCommand(Box::new(command)),
         Payload::ObjectPose(Box::new(pose(1))),

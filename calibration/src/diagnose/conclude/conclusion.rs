@@ -138,8 +138,7 @@ pub fn conclude<E: Evidence>(
     };
     let theta = bench.library.theta(&kept.full);
     // Of an object that no clip shows nothing was found but what was given.
-    let given = options.theta.as_ref().and_then(|theta| theta.object.clone());
-    let object = if admitted.with_object { theta.object.clone() } else { given };
+    let known = if admitted.with_object { Some(&theta) } else { options.theta.as_ref() };
     Ok(Diagnosis {
         gap: sizes.gap(([&before, shown], sensors), options.seed),
         candidates: ranked::candidates(
@@ -165,7 +164,7 @@ pub fn conclude<E: Evidence>(
         session: session.folder.display().to_string(),
         files: session.files.clone(),
         seed: options.seed,
-        theta: Theta { object, ..theta },
+        theta: Theta { object: known.and_then(|known| known.object.clone()), ..theta },
         theta_file: None,
         traces: traces(bench.evidence, (&before, if nearest.is_some() { after } else { shown }), &admitted.files),
         nearest,
