@@ -21,6 +21,12 @@ const PARTS: usize = 4;
 const RAYS: usize = 8192;
 /// Of the nodes around the surface one in so many is smoothed in a step.
 const SMOOTHED: usize = 4;
+/// Cameras stay for this share of a level: a field without colours would lead them anywhere.
+const BEFORE_POSES: f32 = 0.25;
+/// How far a step moves a camera at the beginning of a level [m].
+const POSE_RATE: f64 = 5e-5;
+/// A camera this far from where the scan has it is drawn back as strongly as its pixels push it on the average [m].
+const POSE_SIGMA: f64 = 2e-3;
 /// The band around the surface is found anew after so many steps.
 const BAND_STEPS: u32 = 10;
 /// Distance of samples [voxel].
@@ -144,8 +150,8 @@ impl<'a> Learner<'a> {
         let rates = Rates { distance: 0.03 * decay, colour: 0.03 * 0.2f32.powf(progress) };
         let State { field, adam, .. } = state;
         adam.step(&mut field.distance, &mut field.colour, &mut self.parts, rates);
-        if level.poses {
-            self.move_cameras(state, &by_pose, 1e-4 * f64::from(decay));
+        if level.poses && progress > BEFORE_POSES {
+            self.move_cameras(state, &by_pose, POSE_RATE * f64::from(decay));
         }
         state.step += 1;
         if state.step == level.steps {
@@ -232,19 +238,22 @@ impl<'a> Learner<'a> {
     }
 }
 
-/// A step of Adam for one camera.
+/// A step of Adam for one camera. It is drawn back to where the scan has it, measured by how strongly its pixels push on the average:
+/// what they do not agree on leaves it there.
 fn move_camera(correction: &mut [f64; 6], (first, second): &mut PoseMoments, slope: &[f64; 6], rate: f64, radius: f64) {
     for i in 0..6 {
-        first[i] = 0.9 * first[i] + 0.1 * slope[i];
-        second[i] = 0.99 * second[i] + 0.01 * slope[i] * slope[i];
-        let rate = if i < 3 { rate } else { rate / radius };
-        correction[i] -= rate * (first[i] / (second[i].sqrt() + 1e-9)).clamp(-3.0, 3.0);
+        let unit = if i < 3 { 1.0 } else { 1.0 / radius };
+        let back = second[i].sqrt() * correction[i] / (POSE_SIGMA * unit);
+        let slope = slope[i] + back;
+        first[i] = 0.9 * first[i] + 0.1 * slope;
+        second[i] = 0.99 * second[i] + 0.01 * slope * slope;
+        correction[i] -= rate * unit * (first[i] / (second[i].sqrt() + 1e-9)).clamp(-3.0, 3.0);
     }
 }
 
 fn weights(grid: &Grid) -> Weights<f32> {
     // Beyond a hundredth of a metre a depth is of something else, or of a mirror.
-    Weights { colour: 1.0, mask: 0.1, depth: 0.1, depth_limit: (0.01 / grid.voxel).max(4.0) as f32 }
+    Weights { colour: 1.0, mask: 0.05, depth: 0.1, depth_limit: (0.01 / grid.voxel).max(4.0) as f32 }
 }
 
 /// Receives derivatives that nobody needs.
@@ -257,9 +266,12 @@ impl Receiver<f32> for Nowhere {
 }
 
 /// Steps in which a camera that took no part finds its place.
-const PLACED: u32 = 120;
+const PLACED: u32 = 100;
+/// Rays of each of them.
+const PLACED_RAYS: usize = 2048;
 
-/// Where a camera stands whose pixels took no part in the optimisation: its pose moves, the field stays.
+/// Where a camera stands whose pixels took no part in the optimisation: its pose moves, the field stays. Of the places on its way the
+/// one of least loss counts, the first included.
 pub(crate) fn placed(
     field: &Field<f32>,
     pixels: &[Pixel],
@@ -267,25 +279,38 @@ pub(crate) fn placed(
     pivot: Point3<f64>,
     radius: f64,
 ) -> Isometry3<f64> {
-    let steepness = STEEPEST;
-    let band = Band::new(&field.grid, &field.distance, 6.0 / steepness + 1.0);
     let grid = &field.grid;
-    let medium = Medium { grid, band: &band, distance: &field.distance, colour: &field.colour, steepness, pace: PACE };
+    let band = Band::new(grid, &field.distance, 6.0 / STEEPEST + 1.0);
+    let (distance, colour) = (&field.distance[..], &field.colour[..]);
+    let medium = Medium { grid, band: &band, distance, colour, steepness: STEEPEST, pace: PACE };
     let pivot_steps: [f32; 3] = grid.steps(&pivot).coords.map(|v| v as f32).into();
-    let (mut correction, mut moments, weights) = ([0.0; 6], ([0.0; 6], [0.0; 6]), weights(grid));
-    for step in 0..PLACED {
-        let stand = Stand::new(grid, &corrected(start, &correction, &pivot));
-        let mut random = Pcg64::seed_from_u64(u64::from(step));
-        let mut tracer = Tracer::new();
-        let mut slope = [0.0; 6];
-        for _ in 0..RAYS / 8 {
-            let (ray, target) = stand.look(&pixels[random.random_range(0..pixels.len())]);
-            let sight = tracer.see(&medium, &ray, random.random_range(0.0..1.0));
-            let (_, pose) = tracer.learn(&medium, &ray, &sight, (&target, &weights), pivot_steps, &mut Nowhere);
+    let weights = weights(grid);
+    // The same rays in every step, so that losses can be compared.
+    let mut random = Pcg64::seed_from_u64(1);
+    let rays: Vec<(&Pixel, f32)> = (0..PLACED_RAYS)
+        .map(|_| (&pixels[random.random_range(0..pixels.len())], random.random_range(0.0..1.0)))
+        .collect();
+    let look = |correction: &[f64; 6]| {
+        let stand = Stand::new(grid, &corrected(start, correction, &pivot));
+        let (mut tracer, mut sum, mut slope) = (Tracer::new(), 0.0, [0.0; 6]);
+        for (pixel, jitter) in &rays {
+            let (ray, target) = stand.look(pixel);
+            let sight = tracer.see(&medium, &ray, *jitter);
+            let (loss, pose) = tracer.learn(&medium, &ray, &sight, (&target, &weights), pivot_steps, &mut Nowhere);
+            sum += f64::from(loss);
             (0..6).for_each(|i| slope[i] += f64::from(pose[i]));
         }
-        let rate = 1e-4 * 0.1f64.powf(f64::from(step) / f64::from(PLACED));
+        (sum, slope)
+    };
+    let (mut correction, mut moments) = ([0.0; 6], ([0.0; 6], [0.0; 6]));
+    let (mut best, mut least) = (correction, f64::INFINITY);
+    for step in 0..PLACED {
+        let (loss, slope) = look(&correction);
+        if loss < least {
+            (best, least) = (correction, loss);
+        }
+        let rate = POSE_RATE * 0.1f64.powf(f64::from(step) / f64::from(PLACED));
         move_camera(&mut correction, &mut moments, &slope, rate, radius);
     }
-    corrected(start, &correction, &pivot)
+    corrected(start, &best, &pivot)
 }

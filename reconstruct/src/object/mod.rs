@@ -144,7 +144,7 @@ pub fn reconstruct(scan: Scan, options: &Options, kept: &Path) -> Result<Object,
     let plan = Plan::new(options.edge, pictures.depth_spread.is_some());
     let bounds = bounds::find(&pictures.train)?;
     let seen = Seen::all(&pictures.train, None);
-    let grid = Grid::filling(&bounds.low, &bounds.high, plan.levels[0].nodes, 3);
+    let grid = Grid::filling(&bounds.low, &bounds.high, plan.levels[0].nodes, 2);
     let distance = start::distance(&grid, &seen, pictures.depth_spread);
     let metres = judge::depth_scale(&grid, &start::distance(&grid, &seen, None), &pictures.train);
     if let (ScaleSource::Poses, Some(metres)) = (scale.source, metres.filter(|m| (m - 1.0).abs() > 0.03)) {

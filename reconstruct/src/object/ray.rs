@@ -14,8 +14,8 @@ const DARK: f64 = 1e-3;
 const FAINT: f64 = 1e-4;
 /// Exponents of the logistic function are cut here.
 const STEEPEST: f64 = 18.0;
-/// Opacities in logarithms keep this distance from 0 and 1.
-const CLEAR: f64 = 1e-3;
+/// Opacities in logarithms keep this distance from 0 and 1: a mask that is wrong by some pixels pushes no harder.
+const CLEAR: f64 = 0.1;
 
 /// A ray [steps].
 #[derive(Debug, Clone, Copy, PartialEq)]
