@@ -97,7 +97,7 @@ fn whatever_a_server_answers_is_an_error_in_a_line_or_an_action() {
     let cases: [(fn() -> Option<Message>, &str); 6] = [
         (|| Some(Message::Text("Traceback\n  File x\nValueError: no such key\n".into())), "ValueError: no such key"),
         (|| None, "fell silent"),
-        (|| Some(Message::Binary(vec![0xc1, 0, 1].into())), "no msgpack"),
+        (|| Some(Message::Binary(vec![0x92, 0x01].into())), "no msgpack"),
         (|| Some(Message::Binary(pack(&Value::Map(Vec::new())).into())), "no `actions`"),
         (|| Some(actions(&[vec![1.0, 2.0]])), "an action has 15 numbers"),
         (|| Some(actions(&[vec![f32::NAN; 15]])), "of an action is NaN"),
