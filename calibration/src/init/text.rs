@@ -212,15 +212,15 @@ impl Block<'_> {
     }
 }
 
-/// The definition that a property refers to, by itself, or as one of several, or as the items of a list; the property where it
-/// refers to none.
+/// The definition that a property refers to, by itself, or as one of several, or as the items of a list, and on to what that one
+/// refers to in the same way; the property where it refers to none.
 pub(super) fn definition<'a>(schema: &'a Value, property: &'a Value) -> &'a Value {
     fn reference(value: &Value) -> Option<&str> {
         let of_any = || value["anyOf"].as_array()?.iter().find_map(reference);
         value["$ref"].as_str().or_else(of_any).or_else(|| value["items"]["$ref"].as_str())
     }
     let name = reference(property).and_then(|path| path.strip_prefix("#/$defs/"));
-    name.map_or(property, |name| &schema["$defs"][name])
+    name.map_or(property, |name| definition(schema, &schema["$defs"][name]))
 }
 
 /// Text as comments, in lines that a terminal holds.
