@@ -5,9 +5,9 @@ use crate::arm::{JointState, MAX_JOINTS};
 use shared_mem::msg::joints_from;
 use shared_mem::recording::JointSeries;
 
-/// Rows within this time of the first one count [ns]: a velocity is then known to 3e-5 rad/s from encoders good to 4e-6 rad, and
-/// what a controller's damping makes of that is as little as torques are computed to.
-const WINDOW_NS: u64 = 60_000_000;
+/// Rows within this time of the first one count [ns]: a velocity is then known to 8e-5 rad/s from encoders good to 4e-6 rad, and what
+/// the simulation lacks (a load of half a kilogram sags by 2 mm/s) has little time to pass for velocity.
+const WINDOW_NS: u64 = 30_000_000;
 /// With fewer rows in the first 20 ms a resolver's steps would pass for velocity, and the logged velocity is better.
 const ENOUGH_ROWS: usize = 10;
 const NEAR_NS: u64 = 20_000_000;
@@ -23,7 +23,7 @@ const HOLD: f64 = 0.01;
 impl ArmRollout<'_> {
     /// Where the arm was and how fast at row `from` of `measured`; `None` when there is no such row.
     ///
-    /// A first guess, the row itself, is simulated for 60 ms under the commands; position and velocity at its beginning are then those
+    /// A first guess, the row itself, is simulated for 30 ms under the commands; position and velocity at its beginning are then those
     /// that bring the simulation nearest to the measured positions (least squares, joint by joint). So a motion that sets off in
     /// this time does not pass for initial velocity, nor does what the controller does about a guess that is off.
     #[must_use]
