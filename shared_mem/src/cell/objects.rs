@@ -7,6 +7,7 @@ use schemars::JsonSchema;
 
 /// What the file may hold, for its schema.
 #[derive(JsonSchema)]
+#[schemars(inline)]
 #[serde(untagged)]
 #[allow(dead_code)]
 pub(super) enum Blocks {
