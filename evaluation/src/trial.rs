@@ -114,7 +114,7 @@ pub fn table<'a>(trials: impl IntoIterator<Item = &'a Trial>) -> String {
     let mut put = |row: [&str; 6]| drop(writer.write_record(row));
     put(["world", "policy", "task", "start", "success", "progress"]);
     for trial in trials {
-        let progress = trial.progress.map_or(String::new(), |share| format!("{share:.4}"));
+        let progress = trial.progress.map_or(String::new(), |share| share.to_string());
         let start = trial.start.as_deref().unwrap_or("");
         put([&trial.world, &trial.policy, &trial.task, start, if trial.success { "1" } else { "0" }, &progress]);
     }
