@@ -43,14 +43,14 @@ def distances(points, mesh):
 def chamfer(mesh, truth):
     """Mean of the two mean distances [mm]."""
     ours, theirs = (trimesh.sample.sample_surface(m, SAMPLES, seed=1)[0] for m in (mesh, truth))
-    return 500.0 * (distances(ours, truth).mean() + distances(theirs, mesh).mean())
+    return float(500.0 * (distances(ours, truth).mean() + distances(theirs, mesh).mean()))
 
 
 def measured(mesh, truth):
     closed = bool(mesh.is_watertight and mesh.is_winding_consistent)
     return {
         "chamfer_mm": chamfer(mesh, truth),
-        "volume": mesh.volume / truth.volume - 1 if closed else None,
+        "volume": float(mesh.volume / truth.volume - 1) if closed else None,
         "closed": closed,
         "genus": int(1 - mesh.euler_number // 2) if closed and mesh.body_count == 1 else None,
     }
@@ -90,7 +90,10 @@ def open3d_mesh(folder, voxel=0.001):
         )
         pose = np.array(frame["transform_matrix"]) @ np.diag([1.0, -1, -1, 1])
         volume.integrate(pair, camera, np.linalg.inv(pose))
-    cloud = volume.extract_point_cloud()
+    surface = volume.extract_triangle_mesh()
+    surface.compute_vertex_normals()
+    cloud = o3d.geometry.PointCloud(surface.vertices)
+    cloud.normals = surface.vertex_normals
     mesh, _ = o3d.geometry.TriangleMesh.create_from_point_cloud_poisson(cloud, depth=8)
     mesh = trimesh.Trimesh(np.asarray(mesh.vertices), np.asarray(mesh.triangles))
     parts = mesh.split(only_watertight=False)

@@ -183,11 +183,16 @@ impl<T: RealField + Copy> Tracer<T> {
                 pose[3 + axis] += arm[next] * by[after] - arm[after] * by[next];
             }
         };
-        // Depth is the mean over the sections; how opaque they are together is left as it is.
-        let mean = if sight.opacity > T::zero() { by_depth * ray.axial / sight.opacity } else { T::zero() };
+        // Depth is the mean over the sections, so that a section counts by its distance from that mean: how opaque all of them are
+        // together does not change it, and an error of depth does not make anything more or less opaque.
+        let (mean, centre) = if sight.opacity > T::zero() {
+            (by_depth * ray.axial / sight.opacity, sight.depth / ray.axial)
+        } else {
+            (T::zero(), T::zero())
+        };
         let mut behind = T::zero();
         for section in self.sections.iter().rev() {
-            let mut by_weight = by_opacity + mean * section.middle;
+            let mut by_weight = by_opacity + mean * (section.middle - centre);
             let weight = section.light * section.opacity;
             if let Some((cell, colour)) = section.colour {
                 let mut slope = [T::zero(); 3];

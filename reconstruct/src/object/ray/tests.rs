@@ -18,8 +18,6 @@ struct Problem {
     rays: Vec<(Ray<f64>, Target<f64>, f64)>,
     /// Shift [step] and turn [rad] of all rays.
     pose: [f64; 6],
-    /// Opacity of each ray before anything is changed: the mean depth is that of the sections, whatever their sum.
-    opacities: Vec<f64>,
 }
 
 #[derive(Default)]
@@ -63,9 +61,7 @@ impl Problem {
             (Ray { origin, direction: direction.into(), axial: 0.9 }, target, 0.37)
         });
         let rays = rays.collect();
-        let mut problem = Self { grid, band, distance, colour, rays, pose: [0.0; 6], opacities: Vec::new() };
-        problem.opacities = problem.loss(None).2;
-        problem
+        Self { grid, band, distance, colour, rays, pose: [0.0; 6] }
     }
 
     fn moved(&self, ray: &Ray<f64>) -> Ray<f64> {
@@ -75,8 +71,8 @@ impl Problem {
         Ray { origin: origin.into(), direction: (turn * Vector3::from(ray.direction)).into(), axial: ray.axial }
     }
 
-    /// Loss, derivatives by the pose, and opacities.
-    fn loss(&self, mut into: Option<&mut Sums>) -> (f64, [f64; 6], Vec<f64>) {
+    /// Loss and derivatives by the pose.
+    fn loss(&self, mut into: Option<&mut Sums>) -> (f64, [f64; 6]) {
         let medium = Medium {
             grid: &self.grid,
             band: &self.band,
@@ -88,18 +84,15 @@ impl Problem {
         let weights = Weights { colour: 1.0, mask: 0.3, depth: 0.2, depth_limit: 50.0 };
         let (mut tracer, mut sum, mut pose) = (Tracer::new(), 0.0, [0.0; 6]);
         let mut nowhere = Sums { distance: vec![0.0; self.grid.len()], colour: vec![[0.0; 3]; self.grid.len()] };
-        let mut opacities = Vec::new();
-        for (number, (ray, target, jitter)) in self.rays.iter().enumerate() {
+        for (ray, target, jitter) in &self.rays {
             let ray = self.moved(ray);
-            let mut sight = tracer.see(&medium, &ray, *jitter);
-            opacities.push(sight.opacity);
-            sight.depth *= self.opacities.get(number).map_or(1.0, |before| sight.opacity / before.max(1e-9));
+            let sight = tracer.see(&medium, &ray, *jitter);
             let into = into.as_deref_mut().unwrap_or(&mut nowhere);
             let (loss, by_pose) = tracer.learn(&medium, &ray, &sight, (target, &weights), PIVOT, into);
             sum += loss;
             (0..6).for_each(|i| pose[i] += by_pose[i]);
         }
-        (sum, pose, opacities)
+        (sum, pose)
     }
 
     fn entry(&mut self, number: usize) -> &mut f64 {
@@ -130,7 +123,7 @@ fn a_thousand_derivatives_agree_with_finite_differences() {
     let (mut problem, count) = (Problem::new(), 1000);
     let nodes = problem.grid.len();
     let mut sums = Sums { distance: vec![0.0; nodes], colour: vec![[0.0; 3]; nodes] };
-    let (_, pose, _) = problem.loss(Some(&mut sums));
+    let (_, pose) = problem.loss(Some(&mut sums));
     let all: Vec<f64> =
         sums.distance.iter().copied().chain(sums.colour.iter().flatten().copied()).chain(pose).collect();
     let largest = all[..4 * nodes].iter().fold(0.0f64, |m, v| m.max(v.abs()));
