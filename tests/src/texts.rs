@@ -119,6 +119,7 @@ pub fn literals() -> Vec<(String, String)> {
         "shared_mem/src",
         "twin/src",
         "splat/src",
+        "fusion/src",
         "rt_bridge/src",
         "calibration/src",
         "evaluation/src",

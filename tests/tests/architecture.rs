@@ -30,6 +30,7 @@ fn product_sources() -> Vec<(String, String)> {
         "shared_mem/src",
         "twin/src",
         "splat/src",
+        "fusion/src",
         "rt_bridge/src",
         "calibration/src",
         "evaluation/src",
@@ -262,9 +263,18 @@ fn needed(text: &str) -> Vec<String> {
 #[test]
 fn folders_need_each_other_in_no_circle() {
     let lines = product_lines();
-    for package in
-        ["shared_mem", "splat", "twin", "rt_bridge", "calibration", "evaluation", "import", "urdf", "reconstruct"]
-    {
+    for package in [
+        "shared_mem",
+        "splat",
+        "fusion",
+        "twin",
+        "rt_bridge",
+        "calibration",
+        "evaluation",
+        "import",
+        "urdf",
+        "reconstruct",
+    ] {
         let folder = |file: &str| {
             let within = file.strip_prefix(package)?.strip_prefix("/src/")?.split('/').next()?;
             Some(within.strip_suffix(".rs").unwrap_or(within).to_owned()).filter(|name| name != "lib" && name != "main")
@@ -309,11 +319,12 @@ fn the_diagnosis_goes_one_way() {
 
 #[test]
 fn dependencies_point_one_way() {
-    let rules: [(&str, &[&str]); 8] = [
-        ("shared_mem", &["splat", "twin", "rt_bridge", "calibration", "evaluation", "import", "reconstruct"]),
-        ("splat", &["twin", "rt_bridge", "calibration", "evaluation", "import", "urdf", "reconstruct"]),
-        ("import", &["splat", "twin", "rt_bridge", "calibration", "evaluation", "urdf", "reconstruct"]),
-        ("reconstruct", &["splat", "twin", "rt_bridge", "calibration", "evaluation", "import", "urdf"]),
+    let rules: [(&str, &[&str]); 9] = [
+        ("shared_mem", &["splat", "fusion", "twin", "rt_bridge", "calibration", "evaluation", "import", "reconstruct"]),
+        ("splat", &["fusion", "twin", "rt_bridge", "calibration", "evaluation", "import", "urdf", "reconstruct"]),
+        ("fusion", &["twin", "rt_bridge", "calibration", "evaluation", "import", "urdf", "reconstruct"]),
+        ("import", &["splat", "fusion", "twin", "rt_bridge", "calibration", "evaluation", "urdf", "reconstruct"]),
+        ("reconstruct", &["splat", "fusion", "twin", "rt_bridge", "calibration", "evaluation", "import", "urdf"]),
         ("evaluation", &["rt_bridge", "calibration", "import"]),
         ("twin", &["rt_bridge", "calibration", "evaluation", "import"]),
         ("rt_bridge", &["calibration", "evaluation", "import", "reconstruct"]),
@@ -353,6 +364,7 @@ fn the_readme_names_every_folder_and_only_existing_files() {
         let known = [
             "shared_mem/",
             "splat/src",
+            "fusion/src",
             "twin/src",
             "rt_bridge/src",
             "calibration/src",

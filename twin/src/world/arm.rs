@@ -181,8 +181,8 @@ mod tests {
 
     /// What a force at the plate's middle asks of the joints, and the arm's inertia.
     fn jacobian(plan: &ArmPlan, q: &Joints) -> (DMatrix<f64>, DMatrix<f64>) {
-        let middle = plan.model.flange(q).isometry() * plan.flange_from_body.translation.vector;
-        let columns = plan.model.jacobian(q, Point3::from(middle).coords.into());
+        let middle = plan.model.flange(q).isometry() * Point3::from(plan.flange_from_body.translation.vector);
+        let columns = plan.model.jacobian(q, middle.coords.into());
         let masses = plan.model.mass_matrix(q);
         (DMatrix::from_fn(6, 7, |i, j| columns[j][i]), DMatrix::from_fn(7, 7, |i, j| masses[i][j]))
     }

@@ -1,0 +1,157 @@
+//! The largest plane among points: three of them propose it (RANSAC, Fischler & Bolles 1981), all that lie on it fit it by least
+//! squares, with a tolerance that shrinks to their own scatter.
+
+use crate::Surface;
+use nalgebra::{Matrix3, Point3, Vector3};
+use rand::{RngExt as _, SeedableRng as _};
+use rand_pcg::Pcg64Mcg;
+use rayon::prelude::*;
+
+/// A plane: points with `normal · p = offset`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Plane {
+    /// Of length 1.
+    pub normal: Vector3<f64>,
+    /// Along the normal from the origin [m].
+    pub offset: f64,
+    /// Points that lie on it.
+    pub points: usize,
+}
+
+/// Which plane is looked for.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Wanted {
+    /// How far points may lie off the plane while it is looked for [m].
+    pub tolerance: f64,
+    /// The direction that its normal has, and by how much it may differ [rad]; `None`: any.
+    pub normal: Option<(Vector3<f64>, f64)>,
+}
+
+/// Proposals: enough to meet a plane that holds a sixth of the points with 99 %.
+const TRIALS: u64 = 1000;
+/// Points that are asked about each.
+const ASKED: usize = 1000;
+/// Refinements; and the tolerance in standard deviations of what lies on the plane.
+const STEPS: usize = 12;
+const DEVIATIONS: f64 = 2.5;
+/// A normal of a point on the plane differs by less from the plane's: cosine.
+const ALIKE: f64 = 0.8;
+
+impl Plane {
+    /// Distance of a point on the side of the normal [m].
+    #[must_use]
+    pub fn distance(&self, point: &Point3<f64>) -> f64 {
+        self.normal.dot(&point.coords) - self.offset
+    }
+
+    /// The plane with most points; `normals` of the points, of length 1, or none at all. Its own normal points as most of
+    /// them do, or as was wanted.
+    #[must_use]
+    pub fn largest(points: &[Point3<f64>], normals: &[Vector3<f64>], wanted: &Wanted) -> Option<Self> {
+        if points.len() < 3 {
+            return None;
+        }
+        let every = points.len().div_ceil(ASKED).max(1);
+        let proposed = (0..TRIALS)
+            .into_par_iter()
+            .filter_map(|trial| {
+                let mut rng = Pcg64Mcg::seed_from_u64(trial);
+                let [a, b, c] = [0; 3].map(|_| points[rng.random_range(0..points.len())]);
+                let normal = (b - a).cross(&(c - a)).try_normalize(1e-9)?;
+                let plane = wanted.turned(Self { normal, offset: normal.dot(&a.coords), points: 0 })?;
+                let on = (0..points.len()).step_by(every);
+                let count = on.filter(|i| plane.holds(points, normals, *i, wanted.tolerance)).count();
+                Some((count, trial, plane))
+            })
+            .max_by_key(|(count, trial, _)| (*count, *trial));
+        let mut plane = proposed?.2;
+        let mut tolerance = wanted.tolerance;
+        for _ in 0..STEPS {
+            let on: Vec<usize> = (0..points.len()).filter(|i| plane.holds(points, normals, *i, tolerance)).collect();
+            if on.len() < 3 {
+                break;
+            }
+            plane = plane.fitted(points, &on);
+            let square: f64 = on.iter().map(|i| plane.distance(&points[*i]).powi(2)).sum();
+            tolerance = (DEVIATIONS * (square / on.len() as f64).sqrt()).clamp(1e-6, wanted.tolerance);
+        }
+        plane.points = (0..points.len()).filter(|i| plane.holds(points, normals, *i, wanted.tolerance)).count();
+        if wanted.normal.is_none() && !normals.is_empty() {
+            let alike = |i: &usize| plane.distance(&points[*i]).abs() < wanted.tolerance;
+            let along: f64 = (0..points.len()).filter(alike).map(|i| normals[i].dot(&plane.normal)).sum();
+            if along < 0.0 {
+                (plane.normal, plane.offset) = (-plane.normal, -plane.offset);
+            }
+        }
+        Some(plane)
+    }
+
+    fn holds(&self, points: &[Point3<f64>], normals: &[Vector3<f64>], number: usize, tolerance: f64) -> bool {
+        let near = self.distance(&points[number]).abs() < tolerance;
+        near && normals.get(number).is_none_or(|normal| normal.dot(&self.normal).abs() > ALIKE)
+    }
+
+    /// The least squares through some points, on the same side.
+    fn fitted(&self, points: &[Point3<f64>], on: &[usize]) -> Self {
+        let middle = on.iter().map(|i| points[*i].coords).sum::<Vector3<f64>>() / on.len() as f64;
+        let spread: Matrix3<f64> =
+            (on.iter()).map(|i| points[*i].coords - middle).map(|off| off * off.transpose()).sum();
+        let axes = spread.symmetric_eigen();
+        let normal = axes.eigenvectors.column(axes.eigenvalues.imin()).into_owned();
+        let normal = if normal.dot(&self.normal) < 0.0 { -normal } else { normal };
+        Self { normal, offset: normal.dot(&middle), points: on.len() }
+    }
+}
+
+impl Wanted {
+    /// The plane with its normal on the wanted side, where it may have such a one.
+    fn turned(&self, plane: Plane) -> Option<Plane> {
+        let Some((way, most)) = self.normal else { return Some(plane) };
+        let along = plane.normal.dot(&way.normalize());
+        if along.abs() < most.cos() {
+            return None;
+        }
+        let sign = along.signum();
+        Some(Plane { normal: plane.normal * sign, offset: plane.offset * sign, ..plane })
+    }
+}
+
+/// The table of a scene: its largest plane that faces up, within 15 degrees of `up`.
+#[must_use]
+pub fn table(surface: &Surface, up: &Vector3<f64>) -> Option<Plane> {
+    let points: Vec<Point3<f64>> = surface.points.iter().map(|p| p.cast()).collect();
+    let normals: Vec<Vector3<f64>> = surface.normals().iter().map(|n| n.cast()).collect();
+    Plane::largest(&points, &normals, &Wanted { tolerance: 0.01, normal: Some((*up, 0.26)) })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand_distr::{Distribution as _, Normal};
+
+    #[test]
+    fn a_table_is_found_below_what_stands_on_it_within_a_tenth_of_a_degree() {
+        let mut rng = Pcg64Mcg::seed_from_u64(3);
+        let noise = Normal::new(0.0, 0.003).expect("a deviation");
+        let normal = Vector3::new(0.05, -0.08, 1.0).normalize();
+        let mut points = Vec::new();
+        let mut surface = |count: usize, low: [f64; 3], high: [f64; 3], on_table: bool| {
+            for _ in 0..count {
+                let p = Vector3::from_fn(|i, _| rng.random_range(low[i]..=high[i]));
+                let height = if on_table { 0.31 - normal.dot(&p) } else { 0.0 };
+                points.push(Point3::from(p + normal * (height + noise.sample(&mut rng))));
+            }
+        };
+        surface(6000, [-0.6, -0.4, 0.2], [0.6, 0.4, 0.4], true);
+        // A wall with more points, and things on the table.
+        surface(9000, [0.7, -1.0, 0.0], [0.7, 1.0, 1.5], false);
+        surface(3000, [0.1, 0.1, 0.3], [0.2, 0.25, 0.45], false);
+        let wanted = Wanted { tolerance: 0.01, normal: Some((Vector3::z(), 0.26)) };
+        let table = Plane::largest(&points, &[], &wanted).expect("a table");
+        let off = table.normal.angle(&normal).to_degrees();
+        assert!(off < 0.1 && (table.offset - 0.31).abs() < 1e-3 && table.points > 5500, "{off} {table:?}");
+        let wall = Plane::largest(&points, &[], &Wanted { normal: None, ..wanted }).expect("a wall");
+        assert!(wall.normal.x.abs() > 0.9999 && (wall.offset.abs() - 0.7).abs() < 1e-3, "{wall:?}");
+        assert!(Plane::largest(&points[..2], &[], &wanted).is_none());
+    }
+}
