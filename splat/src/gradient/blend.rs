@@ -4,6 +4,11 @@
 //!
 //! Pixels are taken eight of a row at a time, without branches, so that the compiler makes vector instructions of them.
 
+#![allow(
+    clippy::needless_range_loop,
+    reason = "one number for several arrays side by side becomes vector instructions"
+)]
+
 use super::Planes;
 use super::tiles::Drawn;
 use crate::project::FAINTEST;
