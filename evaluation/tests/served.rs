@@ -34,6 +34,9 @@ fn actions(rows: &[Vec<f32>]) -> Message {
     Message::Binary(pack(&Value::Map(vec![("actions".into(), Value::Array(rows))])).into())
 }
 
+/// What a server answers; `None` closes the connection.
+type Answer = fn() -> Option<Message>;
+
 fn task() -> Arc<Task> {
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tasks/pick_carrot.toml");
     Arc::new(Task::read(&file).expect("a task that ships"))
@@ -90,11 +93,11 @@ fn a_served_policy_sees_pictures_and_numbers_and_what_it_asks_for_is_done() {
 #[test]
 fn whatever_a_server_answers_is_an_error_in_a_line_or_an_action() {
     let task = task();
-    let ask = |answer: fn() -> Option<Message>| {
+    let ask = |answer: Answer| {
         let mut policy = Served::connect(&serve(move |_| answer())).expect("a policy");
         run(&task, 0, &mut policy, &asking(&[], &task), || false)
     };
-    let cases: [(fn() -> Option<Message>, &str); 6] = [
+    let cases: [(Answer, &str); 6] = [
         (|| Some(Message::Text("Traceback\n  File x\nValueError: no such key\n".into())), "ValueError: no such key"),
         (|| None, "fell silent"),
         (|| Some(Message::Binary(vec![0x92, 0x01].into())), "no msgpack"),
