@@ -17,10 +17,10 @@ use std::path::Path;
 const UNIT: f64 = 1e-3;
 
 /// What a topic should hold, and the block and key that name it.
-type Wanted = (&'static str, &'static str, &'static str);
+type Wanted = (&'static str, &'static str);
 
-const OF_OBJECT: Wanted = ("object poses", "[topics]", "object_pose");
-const OF_NAMED_OBJECT: Wanted = ("object poses", "[[object]]", "topic");
+const OF_OBJECT: Wanted = ("object poses", "[topics] object_pose");
+const OF_NAMED_OBJECT: Wanted = ("object poses", "[[object]] topic");
 
 /// What the wanted topics held.
 #[derive(Debug, Default)]
@@ -122,10 +122,10 @@ impl Collected {
     ) -> Result<(), ReadError> {
         let (path, topics) = (clip.file.clone(), &cell.topics);
         if self.measured.is_empty() {
-            return Err(missing(&topics.measured, ("measured joints", "[topics]", "measured")));
+            return Err(missing(&topics.measured, ("measured joints", "[topics] measured")));
         }
         if self.desired.is_empty() {
-            return Err(missing(&topics.desired, ("desired joints", "[topics]", "desired")));
+            return Err(missing(&topics.desired, ("desired joints", "[topics] desired")));
         }
         let measured = NamedLog { topic: &topics.measured, log: std::mem::take(&mut self.measured) };
         let desired = NamedLog { topic: &topics.desired, log: std::mem::take(&mut self.desired) };
@@ -167,7 +167,7 @@ impl Poses {
 }
 
 /// Why nothing came from a topic: the file lost it, nobody published on it, or it is called otherwise.
-fn missing<R: Read + Seek>(path: &Path, topic: &str, (role, block, key): Wanted, messages: &Messages<R>) -> ReadError {
+fn missing<R: Read + Seek>(path: &Path, topic: &str, (role, key): Wanted, messages: &Messages<R>) -> ReadError {
     if let Some(damage) = messages.damage().summary() {
         return ReadError::content(path, topic, format!("no {role} are left ({damage}); record it again"));
     }
@@ -180,7 +180,7 @@ fn missing<R: Read + Seek>(path: &Path, topic: &str, (role, block, key): Wanted,
             ),
         );
     }
-    ReadError::Topic { path: path.to_owned(), topic: topic.to_owned(), role, block, key, present: messages.present() }
+    ReadError::Topic { path: path.to_owned(), topic: topic.to_owned(), role, key, present: messages.present() }
 }
 
 fn expect_type(message: &Message<'_>, wanted: &[&str]) -> Result<(), String> {

@@ -34,7 +34,7 @@ pub enum ReadError {
     },
     /// A topic that is needed is not there.
     #[error(
-        "{}: no messages on `{topic}` ({role}); the file has {present}; set `{block} {key} = \"...\"` in cell.toml",
+        "{}: no messages on `{topic}` ({role}); the file has {present}; set `{key} = \"...\"` in cell.toml",
         path.display()
     )]
     Topic {
@@ -44,9 +44,7 @@ pub enum ReadError {
         topic: String,
         /// What it should hold.
         role: &'static str,
-        /// Block of cell.toml that names it.
-        block: &'static str,
-        /// Key there.
+        /// Block and key of cell.toml that name it.
         key: &'static str,
         /// Topics and types that the file has.
         present: String,
