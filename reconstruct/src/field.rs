@@ -163,8 +163,8 @@ impl Field<f32> {
         let sample = |index: usize| {
             let mut at = place(index);
             // The last node of an axis belongs to the cell before it.
-            for axis in 0..3 {
-                at[axis] = at[axis].min((self.grid.dims[axis] - 1) as f32 - 1e-3);
+            for (at, nodes) in at.iter_mut().zip(self.grid.dims) {
+                *at = at.min((nodes - 1) as f32 - 1e-3);
             }
             let cell = self.grid.cell(at).unwrap_or(Cell { node: [0; 3], base: 0, share: [0.0; 3] });
             (self.grid.nodes(cell.base), cell.weights())

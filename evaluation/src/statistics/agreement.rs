@@ -10,7 +10,7 @@ const DRAWINGS: usize = 500;
 /// Scatter never counts for more than the rest of a variance.
 const LEAST: f64 = 0.2;
 /// Stream of what is drawn here.
-const STREAM: u128 = 0x6167_7265_65;
+const STREAM: u128 = 0x0061_6772_6565;
 
 /// Pearson's correlation; 1 where both differ from their means alike, NaN where one of them does not vary.
 #[must_use]

@@ -117,7 +117,7 @@ impl<T: Real, const C: usize> Pixels<T, C> {
             }
         }
         for number in list {
-            if pixels.blended % EVERY == 0 && pixels.is_spent() {
+            if pixels.blended.is_multiple_of(EVERY) && pixels.is_spent() {
                 break;
             }
             pixels.blended += 1;

@@ -37,11 +37,11 @@ fn the_picture_is_the_references_in_both_precisions() {
     let narrow = Frame::<f32, COLOR_DEPTH_NORMAL>::new(&Parameters::of(&cloud), &pose, &LENS, SIZE).planes();
     let mut off = [0.0f64; 2];
     for (i, color) in reference.color.iter().enumerate() {
-        for c in 0..3 {
+        for (c, color) in color.iter().enumerate() {
             let wide = wide.channels[c][i] + wide.left[i] * around.background[c];
             let narrow = f64::from(narrow.channels[c][i]) + f64::from(narrow.left[i]) * around.background[c];
-            off[0] = off[0].max((wide - f64::from(color[c])).abs());
-            off[1] = off[1].max((narrow - f64::from(color[c])).abs());
+            off[0] = off[0].max((wide - f64::from(*color)).abs());
+            off[1] = off[1].max((narrow - f64::from(*color)).abs());
         }
         let cover = 1.0 - wide.left[i];
         assert!(cover == 0.0 || (wide.channels[3][i] / cover - f64::from(reference.depth[i])).abs() < 1e-6);
@@ -139,6 +139,6 @@ fn single_precision_takes_nearly_the_same_slopes() {
     let found: Vec<f64> = found.columns().concat().into_iter().map(f64::from).collect();
     let (off, all) =
         exact.iter().zip(&found).fold((0.0, 0.0), |(off, all), (a, b)| (off + (a - b).powi(2), all + a * a));
-    let off = (off / all as f64).sqrt();
+    let off = (off / all).sqrt();
     assert!(off < 1e-4, "{off:e}");
 }

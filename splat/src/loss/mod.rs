@@ -74,14 +74,14 @@ impl<T: Real, const C: usize> Loss<T, C> {
         });
         let window = target.window(&shown);
         let mut alike = T::zero();
-        for c in 0..3 {
+        for (c, shown) in shown.iter().enumerate() {
             let cut = |plane: &[T]| window.cut(plane);
-            let (sum, slope) = ssim::ssim(&cut(&shown[c]), &cut(&target.color[c]), window.size());
+            let (sum, slope) = ssim::ssim(&cut(shown), &cut(&target.color[c]), window.size());
             // Beyond the window both are the background.
             alike += sum + T::of((seen.left.len() - slope.len()) as f64);
             let out = &mut self.slope.channels[c];
             window.put(&slope, out);
-            for ((out, seen), wanted) in out.iter_mut().zip(&shown[c]).zip(&target.color[c]) {
+            for ((out, seen), wanted) in out.iter_mut().zip(shown).zip(&target.color[c]) {
                 let off = *seen - *wanted;
                 self.value += (T::one() - share) * scale * off.abs();
                 *out = scale * ((T::one() - share) * sign(off) - share * *out);
