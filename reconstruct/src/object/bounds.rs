@@ -9,6 +9,9 @@ use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, UnitQuaternion, Vector3};
 const COARSE: f64 = 64.0 * 64.0 * 64.0;
 /// The hull must fill this share of the masks, seen from the views.
 const FILLED: f64 = 0.8;
+/// Below this share poses that are meant otherwise are looked at too: an object that is nearly its own mirror image fills most of its
+/// masks even in mirrored poses.
+const PLAIN: f64 = 0.97;
 
 /// A box that holds the object [m].
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -29,7 +32,9 @@ impl Bounds {
 /// [`ScanError::Missing`] when there is no place inside the masks, with what the poses look like instead.
 pub(crate) fn find(frames: &[Frame]) -> Result<Bounds, ScanError> {
     let Some((bounds, filled)) = fit(frames) else { return Err(none_found(frames)) };
-    if filled < FILLED { Err(inconsistent(frames, filled)) } else { Ok(bounds) }
+    // Poses that leave half as much of the masks empty are the right ones.
+    let is_meant_otherwise = || filled < PLAIN && otherwise_better(frames, 0.5 * (1.0 + filled)).is_some();
+    if filled < FILLED || is_meant_otherwise() { Err(inconsistent(frames, filled)) } else { Ok(bounds) }
 }
 
 /// The box and how much of the masks its content fills; `None` where nothing is inside them.
@@ -135,27 +140,36 @@ fn otherwise(frames: &[Frame], turn: &Matrix3<f64>, of_world: bool) -> Vec<Frame
     frames.iter().map(turned).collect()
 }
 
-/// Whether the masks agree if the cameras' axes were meant as OpenGL has them, or the poses are mirrored.
-fn guess(frames: &[Frame]) -> &'static str {
-    let good = |frames: &[Frame]| fit(frames).is_some_and(|(_, filled)| filled >= FILLED);
+/// What the poses look like, had the cameras' axes been meant as OpenGL has them, or the poses been mirrored, where the masks then
+/// agree to `least`.
+fn otherwise_better(frames: &[Frame], least: f64) -> Option<&'static str> {
+    let good = |frames: &[Frame]| fit(frames).is_some_and(|(_, filled)| filled >= least);
     if good(&otherwise(frames, &Matrix3::from_diagonal(&Vector3::new(1.0, -1.0, -1.0)), false)) {
-        return "the cameras look the other way: give poses whose cameras look along -z with y up (transforms.json), \
-                or along z with y down (COLMAP, poses.json)";
+        return Some(
+            "the cameras look the other way: give poses whose cameras look along -z with y up (transforms.json), \
+             or along z with y down (COLMAP, poses.json)",
+        );
     }
     if good(&otherwise(frames, &Matrix3::from_diagonal(&Vector3::new(-1.0, 1.0, 1.0)), true)) {
-        return "the poses are mirrored: their frame is left-handed; change the sign of one axis of positions and rotations";
+        return Some(
+            "the poses are mirrored: their frame is left-handed; change the sign of one axis of positions and rotations",
+        );
     }
-    "look whether poses, pictures and masks belong together"
+    None
+}
+
+fn guess(frames: &[Frame], least: f64) -> &'static str {
+    otherwise_better(frames, least).unwrap_or("look whether poses, pictures and masks belong together")
 }
 
 fn none_found(frames: &[Frame]) -> ScanError {
-    ScanError::Missing(format!("no place lies inside the masks of all views: {}", guess(frames)))
+    ScanError::Missing(format!("no place lies inside the masks of all views: {}", guess(frames, FILLED)))
 }
 
 fn inconsistent(frames: &[Frame], filled: f64) -> ScanError {
     let share = filled * 100.0;
     ScanError::Missing(format!(
         "the masks do not agree: what is inside all of them fills {share:.0} % of them; {}",
-        guess(frames)
+        guess(frames, FILLED.max(filled))
     ))
 }

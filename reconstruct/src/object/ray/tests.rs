@@ -106,7 +106,8 @@ impl Problem {
 
     /// The slope of the loss along one number.
     fn difference(&mut self, number: usize) -> f64 {
-        let step = 1e-6;
+        // Along a pose a step moves all rays, some of them into another cell, where the slope is another.
+        let step = if number < 4 * self.grid.len() { 1e-6 } else { 1e-8 };
         let before = *self.entry(number);
         let mut at = |value: f64| {
             *self.entry(number) = value;
