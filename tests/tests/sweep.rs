@@ -7,6 +7,7 @@ use tests::{Cell, Finished};
 
 /// A box that falls for a twentieth of a second.
 const TASK: &str = r#"horizon = 0.05
+hold = 0.01
 [[body]]
 name = "table"
 hold = "fixed"
