@@ -95,7 +95,7 @@ fn set_upright(rotation: &UnitQuaternion<f64>) -> UnitQuaternion<f64> {
     }
 }
 
-/// Pose and velocities at the first pose, from the first poses of its motion ([`super::first_motion`]); one that begins inside
+/// Pose and velocities at the first pose, from the first poses of its motion (`first_motion`); one that begins inside
 /// the table begins on it. `None` with fewer than three poses.
 pub fn moving(series: &ObjectSeries, object: &ObjectModel, cell: &Cell) -> Option<ObjectState> {
     let depth = |pose: &Isometry3<f64>| cell.table.map(|table| Depth::of(&object.shape, pose, &table));
