@@ -124,10 +124,9 @@ fn scans_that_cannot_be_used_are_refused_in_a_line_that_says_what_is_missing() {
     let refused = |path: &Path, scale: Option<f64>| {
         let found = Scan::open(path).map_err(|error| error.to_string());
         let options = Options { scale, edge: 24 };
-        let line = found
-            .and_then(|scan| reconstruct(scan, &options, &path.join("x.state")).map_err(|error| error.to_string()))
-            .err()
-            .expect("it cannot be used");
+        let made = found
+            .and_then(|scan| reconstruct(scan, &options, &path.join("x.state")).map_err(|error| error.to_string()));
+        let Err(line) = made else { panic!("it cannot be used") };
         assert!(!line.contains('\n'), "{line}");
         line
     };

@@ -1,7 +1,6 @@
 //! Gaussian splats: files, projection, and the reference renderer of splats and meshes together.
 //!
-//! The reference draws in double precision, training runs in single: of 15,000 splats at 320x240 the way forward and back
-//! takes 27 ms of one core in single and 39 ms in double precision (`cargo bench -p splat --bench step` for whole steps).
+//! The reference draws in double precision, training runs in single, which takes less time (`cargo bench -p splat --bench step`).
 //!
 //! Camera frame: z forward, x right, y down, metres; pixel centres lie at whole numbers.
 //!
