@@ -1,7 +1,7 @@
 //! Whether confidence was earned: how often verdicts were true, over how sure they were said to be.
 
-use crate::page::canvas::{Anchor, Canvas};
-use crate::page::scale::Scale;
+use super::shares::Shares;
+use crate::page::canvas::Anchor;
 use maud::Markup;
 
 /// Verdicts of about one confidence.
@@ -18,22 +18,10 @@ pub(crate) struct Bin {
 }
 
 const SIZE: [f64; 2] = [460.0, 400.0];
-const LEFT: f64 = 60.0;
-const BOTTOM: f64 = 44.0;
 
 /// The curve, with the diagonal on which earned confidence lies.
 pub(crate) fn calibration_curve(bins: &[Bin]) -> Markup {
-    let mut canvas = Canvas::new();
-    let x = Scale::new([0.0, 1.0], [LEFT, SIZE[0] - 20.0]);
-    let y = Scale::new([0.0, 1.0], [SIZE[1] - BOTTOM, 12.0]);
-    for (value, _) in x.ticks(5) {
-        let name = format!("{:.0} %", 100.0 * value);
-        canvas.line("grid", [x.at(value), y.at(0.0)], [x.at(value), y.at(1.0)]);
-        canvas.line("grid", [x.at(0.0), y.at(value)], [x.at(1.0), y.at(value)]);
-        canvas.text("small", [x.at(value), y.at(0.0) + 16.0], Anchor::Middle, &name);
-        canvas.text("small", [LEFT - 8.0, y.at(value) + 4.0], Anchor::End, &name);
-    }
-    canvas.line("floor", [x.at(0.0), y.at(0.0)], [x.at(1.0), y.at(1.0)]);
+    let Shares { mut canvas, x, y } = Shares::new(SIZE, "confidence stated");
     for bin in bins {
         let at = x.at(bin.confidence);
         canvas.line("whisker", [at, y.at(bin.interval[0])], [at, y.at(bin.interval[1])]);
@@ -41,8 +29,6 @@ pub(crate) fn calibration_curve(bins: &[Bin]) -> Markup {
         let beside = if at > SIZE[0] - 70.0 { (at - 8.0, Anchor::End) } else { (at + 8.0, Anchor::Start) };
         canvas.text("small", [beside.0, y.at(bin.right) + 4.0], beside.1, &bin.count.to_string());
     }
-    let middle = 0.5 * (x.at(0.0) + x.at(1.0));
-    canvas.text("small", [middle, SIZE[1] - 6.0], Anchor::Middle, "confidence stated");
     canvas.text_upwards("small", [16.0, y.at(0.35)], "verdicts that were true", 200.0);
     canvas.finish(SIZE, "share of true verdicts by stated confidence")
 }

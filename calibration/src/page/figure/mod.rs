@@ -6,4 +6,5 @@ pub(crate) mod chart;
 pub(crate) mod forest;
 pub(crate) mod matrix;
 pub(crate) mod scatter;
+mod shares;
 pub(crate) mod where_map;

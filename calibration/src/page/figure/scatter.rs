@@ -1,7 +1,6 @@
 //! Shares in one world over shares in another, each with its interval; on the diagonal both are alike.
 
-use crate::page::canvas::{Anchor, Canvas};
-use crate::page::scale::Scale;
+use super::shares::Shares;
 use maud::Markup;
 
 /// One policy on one task.
@@ -16,22 +15,10 @@ pub(crate) struct Point {
 }
 
 const SIZE: [f64; 2] = [440.0, 420.0];
-const LEFT: f64 = 60.0;
-const BOTTOM: f64 = 44.0;
 
 /// The points; `below` and `beside` name the two worlds.
 pub(crate) fn scatter([below, beside]: [&str; 2], points: &[Point]) -> Markup {
-    let mut canvas = Canvas::new();
-    let x = Scale::new([0.0, 1.0], [LEFT, SIZE[0] - 20.0]);
-    let y = Scale::new([0.0, 1.0], [SIZE[1] - BOTTOM, 12.0]);
-    for (value, _) in x.ticks(5) {
-        let name = format!("{:.0} %", 100.0 * value);
-        canvas.line("grid", [x.at(value), y.at(0.0)], [x.at(value), y.at(1.0)]);
-        canvas.line("grid", [x.at(0.0), y.at(value)], [x.at(1.0), y.at(value)]);
-        canvas.text("small", [x.at(value), y.at(0.0) + 16.0], Anchor::Middle, &name);
-        canvas.text("small", [LEFT - 8.0, y.at(value) + 4.0], Anchor::End, &name);
-    }
-    canvas.line("floor", [x.at(0.0), y.at(0.0)], [x.at(1.0), y.at(1.0)]);
+    let Shares { mut canvas, x, y } = Shares::new(SIZE, &format!("success in {below}"));
     for Point { name, x: [across, left, right], y: [up, low, high] } in points {
         canvas.hint(name, |canvas| {
             canvas.line("axis", [x.at(*left), y.at(*up)], [x.at(*right), y.at(*up)]);
@@ -39,8 +26,6 @@ pub(crate) fn scatter([below, beside]: [&str; 2], points: &[Point]) -> Markup {
             canvas.circle("dot", [x.at(*across), y.at(*up)], 4.5);
         });
     }
-    let middle = 0.5 * (x.at(0.0) + x.at(1.0));
-    canvas.text_within("small", [middle, SIZE[1] - 6.0], Anchor::Middle, &format!("success in {below}"), 360.0);
     canvas.text_upwards("small", [16.0, y.at(0.2)], &format!("success in {beside}"), 260.0);
     canvas.finish(SIZE, &format!("success in {beside} over success in {below}"))
 }
