@@ -108,6 +108,20 @@ pub fn documents() -> Vec<(String, String)> {
     all.map(read).collect()
 }
 
+/// The folders with the sources of the product.
+pub const PRODUCT: [&str; 10] = [
+    "shared_mem/src",
+    "splat/src",
+    "fusion/src",
+    "reconstruct/src",
+    "urdf/src",
+    "twin/src",
+    "rt_bridge/src",
+    "import/src",
+    "evaluation/src",
+    "calibration/src",
+];
+
 /// Every string in the sources of the product, tests left out: its file, and the string with escaped line ends as spaces.
 ///
 /// # Panics
@@ -115,20 +129,7 @@ pub fn documents() -> Vec<(String, String)> {
 #[must_use]
 pub fn literals() -> Vec<(String, String)> {
     let mut found = Vec::new();
-    let mut folders: Vec<PathBuf> = [
-        "shared_mem/src",
-        "twin/src",
-        "splat/src",
-        "fusion/src",
-        "rt_bridge/src",
-        "calibration/src",
-        "evaluation/src",
-        "import/src",
-        "urdf/src",
-        "reconstruct/src",
-    ]
-    .map(|f| root().join(f))
-    .into();
+    let mut folders: Vec<PathBuf> = PRODUCT.map(|folder| root().join(folder)).into();
     while let Some(folder) = folders.pop() {
         for entry in std::fs::read_dir(&folder).expect("a folder").map(|entry| entry.expect("an entry").path()) {
             let name = entry.strip_prefix(root()).expect("below the root").display().to_string();

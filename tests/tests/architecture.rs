@@ -2,6 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
+use tests::texts::PRODUCT;
 
 fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("the workspace").to_owned()
@@ -26,21 +27,7 @@ fn sources(folder: &str) -> Vec<(String, String)> {
 }
 
 fn product_sources() -> Vec<(String, String)> {
-    [
-        "shared_mem/src",
-        "twin/src",
-        "splat/src",
-        "fusion/src",
-        "rt_bridge/src",
-        "calibration/src",
-        "evaluation/src",
-        "import/src",
-        "urdf/src",
-        "reconstruct/src",
-    ]
-    .iter()
-    .flat_map(|f| sources(f))
-    .collect()
+    PRODUCT.iter().flat_map(|folder| sources(folder)).collect()
 }
 
 /// The lines of every product file that are neither tests nor comments.

@@ -8,7 +8,7 @@ use crate::cell::{Cell, ClipKind};
 use std::fmt;
 use std::path::Path;
 
-/// An object that strays farther than this from where it was first [m], or turns by more [rad], was moved.
+/// An object that is farther than this from where it was first [m], or turns by more [rad], was moved.
 const MOVED: f64 = 0.01;
 const TURNED: f64 = 0.1;
 

@@ -66,7 +66,7 @@ pub struct Settings {
     pub rates: Rates,
     /// Of the order of the photographs.
     pub seed: u64,
-    /// Where a training that is stopped is kept, and taken up again.
+    /// Where a training that was interrupted is kept, to go on from.
     pub state: Option<PathBuf>,
 }
 

@@ -6,7 +6,7 @@ use shared_mem::msg::joints_from;
 use shared_mem::recording::JointSeries;
 
 /// Rows within this time of the first one count [ns]: a velocity is then known to 8e-5 rad/s from encoders good to 4e-6 rad, and what
-/// the simulation lacks (a load of half a kilogram sags by 2 mm/s) has little time to pass for velocity.
+/// the simulation lacks, as a load, has little time to pass for velocity.
 const WINDOW_NS: u64 = 30_000_000;
 /// With fewer rows in the first 20 ms a resolver's steps would pass for velocity, and the logged velocity is better.
 const ENOUGH_ROWS: usize = 10;
