@@ -160,10 +160,10 @@ pub fn diagnose_kept(
     let alone = admitted.objects_alone().then(|| without_robot(session));
     let session = alone.as_ref().unwrap_or(session);
     let law = law::found(&session.cell, &admitted.clips, options.theta.as_ref(), interrupt)?;
-    let (led, told) = law.map(|(cell, told)| (Session { cell, ..session.clone() }, told)).unzip();
+    let (led, remark) = law.map(|(cell, remark)| (Session { cell, ..session.clone() }, remark)).unzip();
     let session = led.as_ref().unwrap_or(session);
     let mut admitted = admitted;
-    admitted.warnings.extend(told);
+    admitted.warnings.extend(remark);
     let question = Fingerprint::of("diagnose")
         .with(&(session.cell.to_toml(), options.theta.as_ref().map(Theta::to_toml), options.seed, options.torques))
         .with(&options.engine.as_ref().map(|engine| engine.ability().print()))

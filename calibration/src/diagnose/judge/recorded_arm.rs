@@ -121,7 +121,7 @@ mod tests {
     }
 
     #[test]
-    fn clips_that_the_recorded_arm_does_not_touch_are_told() {
+    fn clips_that_the_recorded_arm_does_not_touch_are_reported() {
         let gap = |add: f64, touched: bool| Gap {
             object_add_m: Some(add),
             contact_time_s: touched.then_some(0.5),

@@ -14,7 +14,7 @@ use shared_mem::theta::Theta;
 /// Laws that are compared, the most frequent first: of two that fit alike the first is taken.
 const LAWS: [ControllerKind; 3] =
     [ControllerKind::JointImpedance, ControllerKind::InverseDynamics, ControllerKind::JointPd];
-/// So many clips tell the law.
+/// So many clips decide which law it is.
 const CLIPS: usize = 4;
 /// A law that leaves less than this times as much as another fits as well.
 const ALIKE: f64 = 1.1;
@@ -96,7 +96,7 @@ mod tests {
     const CELL: &str =
         "[robot]\njoints = [\"a\"]\n[controller]\nstiffness = [30.0]\ndamping = [3.0]\nrotor_inertia = [0.4]\n";
 
-    /// What a joint does under a law that is told a sum of swings, with gains that are not those of cell.toml.
+    /// What a joint does under a law that is commanded a sum of swings, with gains that are not those of cell.toml.
     fn clip(cell: &Cell, faster: f64) -> Clip {
         let arm = ArmModel::from_cell(cell).expect("a joint");
         let theta = shared_mem::theta::ArmTheta { stiffness: vec![33.0], damping: vec![2.8] };
@@ -139,11 +139,12 @@ mod tests {
 
     #[test]
     fn the_law_that_led_an_arm_is_found_and_said() {
-        let told = Cell::parse(CELL, Path::new("cell.toml")).expect("a cell");
+        let unstated = Cell::parse(CELL, Path::new("cell.toml")).expect("a cell");
         for kind in LAWS {
-            let led = under(&told, kind);
+            let led = under(&unstated, kind);
             let clips = [clip(&led, 1.0), clip(&led, 1.7)];
-            let (cell, said) = found(&told, &clips, None, &Interrupt::default()).expect("an answer").expect("a law");
+            let (cell, said) =
+                found(&unstated, &clips, None, &Interrupt::default()).expect("an answer").expect("a law");
             let name = kind.name().expect("a law of a robot");
             assert!(cell == led && said.contains(&format!("kind = \"{name}\"")), "{name}: {said}");
             assert_eq!(found(&led, &clips, None, &Interrupt::default()).expect("an answer"), None, "it is stated");

@@ -161,7 +161,7 @@ fn identify_kept(
     (kept, interrupt): (&Kept, &Interrupt),
 ) -> Result<(Identification, Theta), ArmError> {
     let law = law::found(&cell, &clips, given, interrupt)?;
-    let (cell, told) = law.map_or((cell, None), |(cell, told)| (cell, Some(told)));
+    let (cell, remark) = law.map_or((cell, None), |(cell, remark)| (cell, Some(remark)));
     let base = complete(&cell, given)?;
     let (settings, mut unknowns): (Vec<_>, Vec<_>) = searched(&cell, &base, &options.also)?.into_iter().unzip();
     let settings = Settings::new(base, settings);
@@ -200,7 +200,7 @@ fn identify_kept(
     figures::fill(&mut answer, &model, &clips, &random, [&before, &outcome.fit.shared])?;
     answer.not_identifiable = verdict::untold(&finding, &model, &clips, options.optimizer);
     answer.warnings.extend(doubt::doubts(&answer, &finding, &model, &clips, &before));
-    answer.warnings.extend(told);
+    answer.warnings.extend(remark);
     answer.advice = advice::next(&finding, &clips);
     clips.fill(&mut answer);
     answer.engine = options.engine.as_ref().map(|engine| engine.used());
