@@ -72,25 +72,25 @@ def open3d_mesh(folder, voxel=0.001):
     """The same views fused and closed by Open3D: TSDF, then screened Poisson, its largest part."""
     import open3d as o3d
 
+    core = o3d.core
     with open(f"{folder}/transforms.json") as text:
         scan = json.load(text)
-    camera = o3d.camera.PinholeCameraIntrinsic(scan["w"], scan["h"], scan["fl_x"], scan["fl_y"], scan["cx"] - 0.5, scan["cy"] - 0.5)
-    volume = o3d.pipelines.integration.ScalableTSDFVolume(
-        voxel_length=voxel, sdf_trunc=4 * voxel, color_type=o3d.pipelines.integration.TSDFVolumeColorType.RGB8
+    camera = core.Tensor(np.array([[scan["fl_x"], 0, scan["cx"] - 0.5], [0, scan["fl_y"], scan["cy"] - 0.5], [0, 0, 1.0]]))
+    volume = o3d.t.geometry.VoxelBlockGrid(
+        attr_names=("tsdf", "weight"), attr_dtypes=(core.float32, core.float32), attr_channels=((1), (1)),
+        voxel_size=voxel, block_resolution=16, block_count=10_000,
     )
     unit = scan.get("depth_unit_scale_factor", 1e-3)
     for number, frame in enumerate(scan["frames"]):
         if number % 8 == 4:
             continue
-        colour = np.asarray(Image.open(f"{folder}/{frame['file_path']}").convert("RGB"))
         mask = np.asarray(Image.open(f"{folder}/{frame['mask_path']}")) > 127
         depth = np.asarray(Image.open(f"{folder}/{frame['depth_file_path']}")).astype(np.float32) * unit * mask
-        pair = o3d.geometry.RGBDImage.create_from_color_and_depth(
-            o3d.geometry.Image(np.ascontiguousarray(colour)), o3d.geometry.Image(depth.astype(np.float32)), 1.0, 3.0, False
-        )
+        depth = o3d.t.geometry.Image(np.ascontiguousarray(depth.astype(np.float32)))
         pose = np.array(frame["transform_matrix"]) @ np.diag([1.0, -1, -1, 1])
-        volume.integrate(pair, camera, np.linalg.inv(pose))
-    surface = volume.extract_triangle_mesh()
+        seen = (depth, camera, core.Tensor(np.linalg.inv(pose)), 1.0, 3.0, 4.0)
+        volume.integrate(volume.compute_unique_block_coordinates(*seen), *seen)
+    surface = volume.extract_triangle_mesh(weight_threshold=3.0).to_legacy()
     surface.compute_vertex_normals()
     cloud = o3d.geometry.PointCloud(surface.vertices)
     cloud.normals = surface.vertex_normals
