@@ -35,7 +35,8 @@ pub(super) fn urdf(summary: &Summary, pieces: usize) -> String {
 
 /// The `[object]` block of cell.toml.
 pub(super) fn block(summary: &Summary) -> String {
-    let [x, y, z] = summary.centre_of_mass_m;
+    // To a tenth of a millimetre, and zero without a sign.
+    let [x, y, z] = summary.centre_of_mass_m.map(|v| (1e4 * v).round() * 1e-4 + 0.0);
     let mass = if summary.weighed {
         format!("mass = {:.4}\n", summary.mass_kg)
     } else {
