@@ -11,7 +11,7 @@ use std::collections::VecDeque;
 use std::ffi::OsString;
 use std::io::{BufRead, BufReader, Read};
 use std::os::unix::process::CommandExt;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::{Child, Command, ExitStatus, Stdio};
 use std::sync::mpsc::{Receiver, channel};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -88,13 +88,15 @@ impl Program {
         }
     }
 
-    /// The binary: beside this one, one folder up (tests run in `deps`), else on the PATH.
+    /// The binary: beside this one, else on the PATH. Of a test, which cargo builds into `deps`, beside that folder too.
     ///
     /// # Errors
     /// [`ProcessError::Missing`], which says how to build it.
     pub fn find(self) -> Result<PathBuf, ProcessError> {
         let here = std::env::current_exe().ok();
-        let beside = here.iter().flat_map(|exe| exe.ancestors().skip(1).take(2)).map(PathBuf::from);
+        let folder = here.as_deref().and_then(Path::parent);
+        let of_test = folder.filter(|folder| folder.ends_with("deps")).and_then(Path::parent);
+        let beside = folder.into_iter().chain(of_test).map(PathBuf::from);
         let path = std::env::var_os("PATH").unwrap_or_default();
         let on_path: Vec<PathBuf> = std::env::split_paths(&path).collect();
         beside

@@ -79,8 +79,12 @@ fn two_outputs_that_are_one_file_are_refused_before_anything_is_read() {
 
 #[test]
 fn a_demo_that_lacks_a_program_leaves_its_folder_for_the_next_call() {
-    let alone = tempfile::tempdir().expect("a folder");
-    let [program, out] = ["calibration", "demo"].map(|name| alone.path().join(name));
+    let folder = tempfile::tempdir().expect("a folder");
+    // A program of that name in the folder above is somebody else's.
+    std::fs::write(folder.path().join("rt_bridge"), "").expect("a file");
+    let alone = folder.path().join("alone");
+    std::fs::create_dir(&alone).expect("a folder");
+    let [program, out] = ["calibration", "demo"].map(|name| alone.join(name));
     std::fs::copy(env!("CARGO_BIN_EXE_calibration"), &program).expect("a copy");
     let output = Command::new(&program).args(["demo", "--out"]).arg(&out).env("PATH", "").output().expect("it runs");
     assert_eq!(output.status.code(), Some(1));
