@@ -78,6 +78,25 @@ fn two_outputs_that_are_one_file_are_refused_before_anything_is_read() {
 }
 
 #[test]
+fn a_policy_in_a_file_says_what_it_lacks_to_be_computed() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("policy.onnx");
+    let run = || {
+        let policy = file.display().to_string();
+        let arguments = ["policy", "run", "--task", "../tasks/push_milk.toml", "--policy", &policy];
+        let mut command = Command::new(env!("CARGO_BIN_EXE_calibration"));
+        let output = command.args(arguments).env("ORT_DYLIB_PATH", "/nowhere.so").output().expect("it runs");
+        assert_eq!(output.status.code(), Some(1));
+        text(&output.stderr).to_owned()
+    };
+    let said = run();
+    assert!(said.contains("there is no such file") && said.lines().count() == 1, "{said}");
+    std::fs::write(&file, "no model").expect("a file");
+    let said = run();
+    assert!(said.contains("pip install onnxruntime") && said.lines().count() == 1, "{said}");
+}
+
+#[test]
 fn a_demo_that_lacks_a_program_leaves_its_folder_for_the_next_call() {
     let folder = tempfile::tempdir().expect("a folder");
     // A program of that name in the folder above is somebody else's.

@@ -4,7 +4,7 @@
 //!
 //! | module | owns |
 //! |---|---|
-//! | [`policy`] | who acts: the task's script, or a policy behind openpi's protocol |
+//! | [`policy`] | who acts: the task's script, a policy behind openpi's protocol, or one in an ONNX file |
 //! | [`rollout`] | one episode of a policy on a task |
 //! | [`trial`] | trials, and files of them from other worlds |
 //! | [`statistics`] | intervals, tests and ranks of trials that succeed or fail |

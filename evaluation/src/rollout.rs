@@ -1,6 +1,6 @@
 //! One episode of one policy on one task.
 
-use crate::policy::{ActionKind, Keys, Seen, Served, ServedError};
+use crate::policy::{ActionKind, Keys, Policy, PolicyError, Seen};
 use serde::{Deserialize, Serialize};
 use shared_mem::msg::Joints;
 use shared_mem::recording::{Episode, RigidPose};
@@ -56,7 +56,7 @@ pub struct Asking {
 pub enum RunError {
     /// The policy.
     #[error(transparent)]
-    Policy(#[from] ServedError),
+    Policy(#[from] PolicyError),
     /// The start.
     #[error(transparent)]
     Start(#[from] StartError),
@@ -98,7 +98,7 @@ pub fn script(task: &Task, seed: u64, noise: f64, stills: bool) -> Result<Outcom
 pub fn run(
     task: &Arc<Task>,
     seed: u64,
-    policy: &mut Served,
+    policy: &mut Policy,
     asking: &Asking,
     give_up: impl Fn() -> bool,
 ) -> Result<(Outcome, Episode), RunError> {
@@ -106,6 +106,7 @@ pub fn run(
     let mut views: Vec<TaskView> = task.cameras().iter().map(|camera| task.view(camera)).collect();
     let (mut acting, mut signs) = (Acting::begin(task, seed)?, Signs::default());
     let rows = (ROWS_A_SECOND / asking.rate) as usize;
+    policy.begin();
     while !acting.is_over() {
         let (Some(now), Some(shown)) = (acting.now(), acting.seen()) else { break };
         let joints = shown.arm.as_ref().map(|arm| &arm.q);

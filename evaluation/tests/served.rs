@@ -1,6 +1,6 @@
 //! A policy behind openpi's protocol: a small server in this process plays what a script would do, or answers with nonsense.
 
-use evaluation::policy::{ActionKind, Array, Keys, Served, pack, unpack};
+use evaluation::policy::{ActionKind, Array, Keys, Policy, Served, pack, unpack};
 use evaluation::rollout::{Asking, RunError, run};
 use rmpv::Value;
 use std::net::TcpListener;
@@ -82,8 +82,9 @@ fn a_served_policy_sees_pictures_and_numbers_and_what_it_asks_for_is_done() {
         asked += 4;
         Some(actions(&chunk))
     });
-    let mut policy = Served::connect(&address).expect("a policy");
+    let policy = Served::connect(&address).expect("a policy");
     assert_eq!(entry(policy.metadata(), "name").as_str(), Some("test"));
+    let mut policy = Policy::Served(policy);
     let (outcome, recorded) =
         run(&task, 4, &mut policy, &asking(&["image/front=seen"], &task), || false).expect("an episode");
     assert!(outcome.success && outcome.progress == 1.0 && outcome.stills.is_empty(), "{outcome:?}");
@@ -94,7 +95,7 @@ fn a_served_policy_sees_pictures_and_numbers_and_what_it_asks_for_is_done() {
 fn whatever_a_server_answers_is_an_error_in_a_line_or_an_action() {
     let task = task();
     let ask = |answer: Answer| {
-        let mut policy = Served::connect(&serve(move |_| answer())).expect("a policy");
+        let mut policy = Policy::Served(Served::connect(&serve(move |_| answer())).expect("a policy"));
         run(&task, 0, &mut policy, &asking(&[], &task), || false)
     };
     let cases: [(Answer, &str); 6] = [
@@ -114,6 +115,7 @@ fn whatever_a_server_answers_is_an_error_in_a_line_or_an_action() {
     assert!(!outcome.success && outcome.fault.is_some() && !outcome.stills.is_empty(), "{outcome:?}");
     let absent = Served::connect("ws://127.0.0.1:9").expect_err("nobody").to_string();
     assert!(absent.contains("start its server"), "{absent}");
-    let mut policy = Served::connect(&serve(|_| Some(actions(&[vec![0.0; 15]])))).expect("a policy");
+    let policy = Served::connect(&serve(|_| Some(actions(&[vec![0.0; 15]])))).expect("a policy");
+    let mut policy = Policy::Served(policy);
     assert!(matches!(run(&task, 0, &mut policy, &asking(&[], &task), || true), Err(RunError::Interrupted)));
 }

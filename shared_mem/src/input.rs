@@ -25,6 +25,8 @@ pub enum Kind {
     Picture,
     /// Numbers as NumPy stores them.
     Array,
+    /// A network of a policy.
+    Network,
     /// Lists of commands, frames or states (JSON).
     List,
 }
@@ -47,6 +49,8 @@ impl Kind {
             Self::Picture => 256 * MIB,
             // Eight million poses of 16 doubles: three days at 30 Hz.
             Self::Array => 1024 * MIB,
+            // Twice what a protocol buffer holds: larger networks have their weights elsewhere.
+            Self::Network => 4096 * MIB,
             // An hour of seven joints at 1 kHz takes 600 MB.
             Self::List => 1024 * MIB,
         }
@@ -61,6 +65,7 @@ impl Kind {
             Self::Splats => "splats",
             Self::Picture => "a picture",
             Self::Array => "an array",
+            Self::Network => "a network",
             Self::List => "a list",
         }
     }
@@ -72,6 +77,7 @@ impl Kind {
             Self::Mesh => "reduce its triangles",
             Self::Splats => "crop the scan, or export it compressed",
             Self::Picture => "scale it down",
+            Self::Network => "export it with its weights in a file of their own",
             Self::Array | Self::List => "cut the clip into shorter ones",
         }
     }

@@ -2,7 +2,7 @@
 
 use super::stream::{Leg, Stream};
 use crate::interrupt::Interrupt;
-use evaluation::policy::{Seen, Served, ServedError};
+use evaluation::policy::{Policy, PolicyError, Seen};
 use evaluation::rollout::Asking;
 use serde::Serialize;
 use shared_mem::msg::arm::{ArmMode, ArmState, MotionStatus};
@@ -30,7 +30,7 @@ pub enum ActedError {
     Transport(#[from] TransportError),
     /// The policy.
     #[error(transparent)]
-    Policy(#[from] ServedError),
+    Policy(#[from] PolicyError),
     /// No thread.
     #[error("the stream of targets does not start: {0}; end other programs")]
     Thread(#[from] std::io::Error),
@@ -105,7 +105,7 @@ impl Robot {
     pub fn act(
         &mut self,
         task: &Task,
-        policy: &mut Served,
+        policy: &mut Policy,
         (asking, speed): (&Asking, f64),
         interrupt: &Interrupt,
     ) -> Result<Acted, ActedError> {
@@ -125,6 +125,7 @@ impl Robot {
             ArmTarget { stream: now_ns(), dof: self.state.dof, speed, q: self.state.q_d, ..ArmTarget::default() };
         let stream = Stream::begin(target)?;
         let (began, period) = (Instant::now(), Duration::from_secs_f64(1.0 / f64::from(asking.rate)));
+        policy.begin();
         let mut acted = Acted { duration_s: 0.0, actions: 0, fault: None };
         while acted.fault.is_none() && began.elapsed().as_secs_f64() < task.horizon() {
             acted.fault = self.look(target.stream, interrupt)?;

@@ -25,8 +25,8 @@ use twin::task::{ROWS_A_SECOND, Task};
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Every policy meets the same starts of every task, so that what differs is seen start by start. A policy is `expert` (the task's script),
-`expert:noise=METRES` (the same, way points off by so much), or `ws://HOST:PORT` (served by openpi's protocol,
-docs/policies.md); `NAME=` before it gives it a name of its own.
+`expert:noise=METRES` (the same, way points off by so much), `ws://HOST:PORT` (served by openpi's protocol), or `FILE.onnx`
+(computed here; docs/policies.md); `NAME=` before it gives it a name of its own.
 
 Worlds: `twin` is the task file's; with --cell its arm moves under that cell's controller, with --theta as it was identified, and the
 task's object is what was identified. `nominal` is the same without --theta: does alignment matter, and by how much? FILE.csv
@@ -45,7 +45,7 @@ Examples:
 JSON: that of findings.json: level, cells (world, policy, task, successes, trials, success, interval, progress, smallest_difference),
 policies and worlds (pairs with difference and interval; agreement, powered), out.")]
 pub(super) struct EvaluateArguments {
-    /// Who acts: expert, expert:noise=METRES, ws://HOST:PORT, each also as NAME=...
+    /// Who acts: expert, expert:noise=METRES, ws://HOST:PORT, FILE.onnx, each also as NAME=...
     #[arg(long, value_name = "POLICY", num_args = 1.., required = true)]
     policies: Vec<Named>,
     /// Task files.

@@ -7,7 +7,7 @@ use calibration::acting::Robot;
 use calibration::capture::recorder::Recorder;
 use calibration::interrupt::Interrupt;
 use clap::{Args, Subcommand};
-use evaluation::policy::{Named, Served, Source};
+use evaluation::policy::{Named, Policy as Asked, Source};
 use evaluation::rollout::{self, Asking, Outcome, RunError};
 use evaluation::statistics::Share;
 use serde::Serialize;
@@ -31,7 +31,8 @@ pub(super) enum Policy {
 
 #[derive(Debug, Args)]
 #[command(after_help = "\
-The policy is asked over openpi's websocket protocol: what it sees and what its actions mean is in docs/policies.md. An episode ends
+A policy at ws://HOST:PORT is asked over openpi's websocket protocol, one in FILE.onnx is computed here by ONNX Runtime: what it sees
+and what its actions mean is in docs/policies.md. An episode ends
 with success, the task's horizon, or whatever would stop a robot: a joint sent beyond its end, a pose out of reach, a tool
 pushed into what is fast.
 
@@ -42,6 +43,7 @@ puts things back.
 Examples:
   calibration policy run --task tasks/pick_carrot.toml --policy ws://localhost:8000 --episodes 10 --record tried
   calibration policy run --task tasks/push_milk.toml --policy ws://localhost:8000 --cell config/fr3_cell.toml --json
+  calibration policy run --task tasks/pick_carrot.toml --policy act.onnx --rate 20 --chunk 10
   calibration policy run --task tasks/push_milk.toml --policy ws://localhost:8000 --robot --cell config/fr3_cell.toml --record tried
 
 JSON: task, policy, successes, trials, and for each of episodes start, success (null on a robot), progress, duration_s, fault, missed, clip.")]
@@ -49,7 +51,7 @@ pub(super) struct RunArguments {
     /// Task file.
     #[arg(long, value_name = "TASK.toml")]
     task: PathBuf,
-    /// Who acts: ws://HOST:PORT, expert, or expert:noise=METRES.
+    /// Who acts: ws://HOST:PORT, FILE.onnx, expert, or expert:noise=METRES.
     #[arg(long, value_name = "POLICY")]
     policy: Named,
     /// Starts; each is an episode.
@@ -126,10 +128,7 @@ fn in_twin(arguments: &RunArguments, task: Task, asking: &Asking, interrupt: &In
         None => task,
     };
     let task = Arc::new(task);
-    let mut policy = match &arguments.policy.source {
-        Source::Served(address) => Some(Served::connect(address)?),
-        Source::Expert { .. } => None,
-    };
+    let mut policy = Asked::open(&arguments.policy.source)?;
     let bar = Progress::new("policy", arguments.episodes);
     let mut episodes = Vec::new();
     for i in 0..arguments.episodes {
@@ -139,7 +138,7 @@ fn in_twin(arguments: &RunArguments, task: Task, asking: &Asking, interrupt: &In
         let ran = match (&mut policy, &arguments.policy.source) {
             (Some(policy), _) => rollout::run(&task, seed, policy, asking, || interrupt.asked()),
             (None, Source::Expert { noise }) => scripted(&task, seed, *noise),
-            (None, Source::Served(_)) => bail!("no policy"),
+            (None, Source::Served(_) | Source::Onnx(_)) => bail!("no policy"),
         };
         let (outcome, recorded) = ran.with_context(|| format!("start {seed}"))?;
         if let Some(place) = place {
@@ -181,10 +180,9 @@ fn cell_toml(arguments: &RunArguments, task: &Task) -> anyhow::Result<Option<Str
 }
 
 fn on_robot(arguments: &RunArguments, task: &Task, asking: &Asking, interrupt: &Interrupt) -> anyhow::Result<One> {
-    let Source::Served(address) = &arguments.policy.source else {
+    let Some(mut policy) = Asked::open(&arguments.policy.source)? else {
         bail!("a script knows where everything stands, which nobody does on a robot; give --policy ws://HOST:PORT");
     };
-    let mut policy = Served::connect(address)?;
     let mut robot = Robot::find()?;
     // The folder stays as long as its place is held, and then for what is in it.
     let (clip, recorder, _place) = match (&arguments.record, &arguments.cell) {

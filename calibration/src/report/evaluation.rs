@@ -175,10 +175,10 @@ impl Sheet<'_> {
         let world = self.plan.worlds.iter().find(|world| world.name == done.trial.world)?;
         let task = world.tasks.iter().find(|task| task.name() == done.trial.task)?;
         let policy = self.plan.policies.iter().find(|policy| policy.name == done.trial.policy)?;
-        // A script does the same again; a served policy's moments were kept.
+        // A script does the same again; any other policy's moments were kept.
         let stills: Vec<Still> = match policy.source {
             Source::Expert { noise } => script(task, done.seed, noise, true).ok()?.stills,
-            Source::Served(_) => done.outcome.stills.clone(),
+            Source::Served(_) | Source::Onnx(_) => done.outcome.stills.clone(),
         };
         let mut words =
             format!("{} on {} in {}, start {}", done.trial.policy, done.trial.task, done.trial.world, done.seed);

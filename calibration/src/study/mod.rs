@@ -2,11 +2,15 @@
 
 use crate::interrupt::Interrupt;
 use crate::kept::{Fingerprint, Kept};
-use evaluation::policy::{Named, Served, Source};
+use evaluation::policy::{Named, Policy, Source};
 use evaluation::rollout::{self, Asking, Outcome, RunError};
 use evaluation::trial::Trial;
 use rayon::prelude::*;
+use sha2::{Digest as _, Sha256};
+use shared_mem::input;
 use shared_mem::progress::Progress;
+use std::collections::BTreeMap;
+use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use twin::task::Task;
@@ -33,7 +37,7 @@ pub struct Plan {
     pub episodes: u64,
     /// The first of them; the others follow it.
     pub seed: u64,
-    /// How served policies are asked.
+    /// How policies that are no scripts are asked.
     pub asking: Asking,
 }
 
@@ -61,7 +65,7 @@ struct Unit<'a> {
 /// # Errors
 /// [`RunError`] of the first trial that cannot be run.
 pub fn run(plan: &Plan, kept: &Kept, interrupt: &Interrupt) -> Result<Vec<Done>, RunError> {
-    let units = plan.units();
+    let (units, files) = (plan.units(), Files::of(&plan.policies));
     let (bar, count) = (Progress::new("evaluate", units.len() as u64), AtomicU64::new(0));
     let step = |unit: &Unit<'_>| {
         bar.show(count.fetch_add(1, Ordering::Relaxed) + 1, &format!("{} on {}", unit.policy.name, unit.task.name()));
@@ -71,7 +75,7 @@ pub fn run(plan: &Plan, kept: &Kept, interrupt: &Interrupt) -> Result<Vec<Done>,
             return Ok(None);
         }
         let work = || rollout::script(unit.task, unit.seed, noise, false);
-        let outcome = kept.once_if_ok(&unit.fingerprint(&plan.asking), work)?;
+        let outcome = kept.once_if_ok(&unit.fingerprint(&plan.asking, &files), work)?;
         step(unit);
         Ok(Some(outcome))
     };
@@ -79,14 +83,17 @@ pub fn run(plan: &Plan, kept: &Kept, interrupt: &Interrupt) -> Result<Vec<Done>,
         .par_iter()
         .map(|unit| match unit.policy.source {
             Source::Expert { noise } => scripted(unit, noise),
-            Source::Served(_) => Ok(None),
+            Source::Served(_) | Source::Onnx(_) => Ok(None),
         })
         .collect::<Result<_, _>>()?;
-    // A server thinks about one observation at a time.
-    let mut connection: Option<(&str, Served)> = None;
+    // A server thinks about one observation at a time, and ONNX Runtime about one with all cores.
+    let mut open: Option<(&Source, Policy)> = None;
     for (unit, outcome) in units.iter().zip(&mut outcomes) {
-        let Source::Served(address) = &unit.policy.source else { continue };
-        let fingerprint = unit.fingerprint(&plan.asking);
+        let source = &unit.policy.source;
+        if matches!(source, Source::Expert { .. }) {
+            continue;
+        }
+        let fingerprint = unit.fingerprint(&plan.asking, &files);
         if interrupt.asked() {
             break;
         }
@@ -94,11 +101,11 @@ pub fn run(plan: &Plan, kept: &Kept, interrupt: &Interrupt) -> Result<Vec<Done>,
         let found = match known {
             Some(known) => known,
             None => {
-                if connection.as_ref().is_none_or(|(open, _)| *open != address.as_str()) {
-                    connection = Some((address.as_str(), Served::connect(address)?));
+                if open.as_ref().is_none_or(|(opened, _)| *opened != source) {
+                    open = Policy::open(source)?.map(|policy| (source, policy));
                 }
-                let Some((_, served)) = &mut connection else { break };
-                match rollout::run(unit.task, unit.seed, served, &plan.asking, || interrupt.asked()) {
+                let Some((_, policy)) = &mut open else { break };
+                match rollout::run(unit.task, unit.seed, policy, &plan.asking, || interrupt.asked()) {
                     Ok((found, _)) => found,
                     Err(RunError::Interrupted) => break,
                     Err(error) => return Err(error),
@@ -114,6 +121,31 @@ pub fn run(plan: &Plan, kept: &Kept, interrupt: &Interrupt) -> Result<Vec<Done>,
     }
     let done = |(unit, outcome): (&Unit<'_>, Option<Outcome>)| outcome.map(|outcome| unit.done(outcome));
     Ok(units.iter().zip(outcomes).filter_map(done).collect())
+}
+
+/// What is in the files of policies, each as a hash: a policy that was trained on is another one under the same name.
+struct Files<'a>(BTreeMap<&'a Path, String>);
+
+impl<'a> Files<'a> {
+    fn of(policies: &'a [Named]) -> Self {
+        let files = policies.iter().filter_map(|policy| match &policy.source {
+            Source::Onnx(path) => Some(path.as_path()),
+            Source::Expert { .. } | Source::Served(_) => None,
+        });
+        Self(files.map(|path| (path, content(path))).collect())
+    }
+}
+
+/// The hash of a network and of its weights, which torch writes into a file of their own.
+fn content(path: &Path) -> String {
+    let mut hasher = Sha256::new();
+    let mut weights = path.as_os_str().to_owned();
+    weights.push(".data");
+    for file in [path, Path::new(&weights)] {
+        // One that cannot be read is said when the policy is opened.
+        hasher.update(input::bytes(file, input::Kind::Network).unwrap_or_default());
+    }
+    hasher.finalize().iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
 impl Plan {
@@ -137,10 +169,11 @@ impl Plan {
 
 impl Unit<'_> {
     /// What its outcome depends on.
-    fn fingerprint(&self, asking: &Asking) -> Fingerprint {
+    fn fingerprint(&self, asking: &Asking, files: &Files<'_>) -> Fingerprint {
         let how = match &self.policy.source {
             Source::Expert { noise } => format!("script {noise:e}"),
             Source::Served(address) => format!("{address} {asking:?}"),
+            Source::Onnx(path) => format!("{} {asking:?}", files.0.get(path.as_path()).map_or("", String::as_str)),
         };
         Fingerprint::of("trial").with(&(self.task.name(), self.task.text(), &self.world.description, how, self.seed))
     }

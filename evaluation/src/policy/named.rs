@@ -1,5 +1,6 @@
-//! A policy by its name on a command line: `expert`, `expert:noise=0.01`, `ws://HOST:PORT`, each also as `NAME=...`.
+//! A policy by its name on a command line: `expert`, `expert:noise=0.01`, `ws://HOST:PORT`, `FILE.onnx`, each also as `NAME=...`.
 
+use std::path::PathBuf;
 use std::str::FromStr;
 
 /// Who acts.
@@ -12,6 +13,8 @@ pub enum Source {
     },
     /// A policy that is served at this address, `ws://HOST:PORT`.
     Served(String),
+    /// A policy in an ONNX file.
+    Onnx(PathBuf),
 }
 
 /// A policy and what reports call it.
@@ -26,7 +29,7 @@ pub struct Named {
 /// No policy is called so.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "`{0}` is no policy; give expert, expert:noise=METRES or ws://HOST:PORT, with a name of its own as NAME=ws://HOST:PORT"
+    "`{0}` is no policy; give expert, expert:noise=METRES, ws://HOST:PORT or FILE.onnx, with a name of its own as NAME=ws://HOST:PORT"
 )]
 pub struct NamedError(String);
 
@@ -50,6 +53,8 @@ impl FromStr for Named {
             Source::Expert { noise }
         } else if source.strip_prefix("ws://").is_some_and(|host| !host.is_empty()) {
             Source::Served(source.to_owned())
+        } else if source.strip_suffix(".onnx").is_some_and(|stem| !stem.is_empty() && !stem.ends_with('/')) {
+            Source::Onnx(source.into())
         } else {
             return Err(wrong());
         };
@@ -70,10 +75,12 @@ mod tests {
             ("worse=expert:noise=0.01", "worse", Source::Expert { noise: 0.01 }),
             ("ws://host:8000", "ws://host:8000", served.clone()),
             ("mine=ws://host:8000", "mine", served.clone()),
+            ("policies/act.onnx", "policies/act.onnx", Source::Onnx("policies/act.onnx".into())),
+            ("act=act.onnx", "act", Source::Onnx("act.onnx".into())),
         ] {
             assert_eq!(text.parse(), Ok(Named { name: name.into(), source }), "{text}");
         }
-        for wrong in ["", "expert:noise=-1", "expert:noise=x", "ws://", "=expert", "a,b=expert", "file.onnx"] {
+        for wrong in ["", "expert:noise=-1", "expert:noise=x", "ws://", "=expert", "a,b=expert", ".onnx", "file.pt"] {
             assert!(wrong.parse::<Named>().is_err_and(|error| error.to_string().contains("ws://HOST:PORT")), "{wrong}");
         }
     }
