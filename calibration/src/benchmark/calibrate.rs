@@ -98,21 +98,26 @@ fn one(place: &Path) -> anyhow::Result<Labelled> {
 #[must_use]
 pub fn regenerate(sessions: &[Labelled]) -> Vec<Regenerated> {
     let all = || sessions.iter();
-    let nothing = |sensors| quantile(all().filter(|s| s.nothing_is_hidden()).filter_map(|s| s.excess(sensors)));
+    let nothing = |sensors| {
+        beyond_noise(
+            all().filter(|s| s.nothing_is_hidden()).filter_map(|s| s.of(sensors)).map(|of| (of.before, of.floor)),
+        )
+    };
     let named = || all().filter(|session| session.is_named_rightly());
+    let beside = |sensors| {
+        beyond_noise(named().filter_map(|s| s.of(sensors)).filter(|of| has_a_gap(of)).map(|of| (of.after, of.floor)))
+    };
     let share_left = |sensors| quantile(named().filter_map(|session| session.share_left(sensors)));
     let said = |kind| all().filter(move |session| session.is(kind));
     let far_below_doubt = |session: &&Labelled| session.gaps() < 0.5 * criteria::DOUBTFUL.value;
-    let plain = |session: &&Labelled| session.gaps() > criteria::PLAIN;
+    let plain = |session: &&Labelled| session.has_a_plain_gap();
     let outside = |session: &Labelled| !session.truth.known;
     let [doubtful, turns] = unseen(sessions);
     let found = [
         (criteria::JOINTS_EXCESS, nothing(Sensors::Joints)),
         (criteria::OBJECT_EXCESS, nothing(Sensors::Object)),
-        (
-            criteria::OBJECT_EXCESS_BESIDE_A_CAUSE,
-            quantile(named().filter_map(|session| session.excess_left(Sensors::Object))),
-        ),
+        (criteria::JOINTS_EXCESS_BESIDE_A_CAUSE, beside(Sensors::Joints)),
+        (criteria::OBJECT_EXCESS_BESIDE_A_CAUSE, beside(Sensors::Object)),
         (criteria::JOINTS_SHARE_LEFT, share_left(Sensors::Joints)),
         (criteria::OBJECT_SHARE_LEFT, share_left(Sensors::Object)),
         (criteria::DOUBTFUL, doubtful),
@@ -156,18 +161,14 @@ impl Labelled {
         self.said.gap.sensors.iter().find(|gap| gap.sensors == sensors)
     }
 
-    fn excess(&self, sensors: Sensors) -> Option<f64> {
-        self.of(sensors).map(|gap| gap.before - gap.floor)
-    }
-
-    fn excess_left(&self, sensors: Sensors) -> Option<f64> {
-        self.of(sensors).map(|gap| gap.after - gap.floor)
-    }
-
     /// Of sensors that have a gap.
     fn share_left(&self, sensors: Sensors) -> Option<f64> {
-        let (before, after) = (self.excess(sensors)?, self.excess_left(sensors)?);
-        (before > least_gap(sensors)).then(|| after.max(0.0) / before)
+        let of = self.of(sensors).filter(|of| has_a_gap(of))?;
+        Some((of.after - of.floor).max(0.0) / (of.before - of.floor))
+    }
+
+    fn has_a_plain_gap(&self) -> bool {
+        self.said.gap.sensors.iter().any(is_plain)
     }
 
     /// The largest gap of its sensors, in least gaps.
@@ -175,6 +176,18 @@ impl Labelled {
         let of = |gap: &SensorGap| (gap.before - gap.floor) / least_gap(gap.sensors);
         self.said.gap.sensors.iter().map(of).fold(0.0, f64::max)
     }
+}
+
+fn is_plain(of: &SensorGap) -> bool {
+    let from = match of.sensors {
+        Sensors::Joints => criteria::PLAIN_IN_JOINTS,
+        Sensors::Object => criteria::PLAIN_IN_OBJECT,
+    };
+    of.before - of.floor > from
+}
+
+fn has_a_gap(of: &SensorGap) -> bool {
+    of.before - of.floor > least_gap(of.sensors)
 }
 
 fn least_gap(sensors: Sensors) -> f64 {
@@ -190,6 +203,15 @@ const FEWEST: usize = 5;
 const NOTHING: f64 = 1e-3;
 /// Quantile of the normal distribution at 98 %.
 const NINETY_EIGHT: f64 = 2.054;
+
+/// The 98 % quantile of an excess beyond the floor, of pairs of a mean square and its floor. Their ratio is lognormal, so that an
+/// excess that noise makes negative counts as what it is.
+fn beyond_noise(pairs: impl Iterator<Item = (f64, f64)>) -> (Option<f64>, usize) {
+    let pairs: Vec<(f64, f64)> = pairs.collect();
+    let (ratio, n) = quantile(pairs.iter().map(|(mean_square, floor)| mean_square / floor));
+    let floor = pairs.iter().map(|(_, floor)| floor).sum::<f64>() / n.max(1) as f64;
+    (ratio.map(|ratio| floor * (ratio - 1.0)), n)
+}
 
 /// The 98 % quantile of one value more of the kind: of a lognormal distribution that is known from these values alone.
 fn quantile(values: impl Iterator<Item = f64>) -> (Option<f64>, usize) {
@@ -242,7 +264,7 @@ mod tests {
         let names = |names: &[&str]| names.iter().map(|name| (*name).to_owned()).collect::<Vec<_>>();
         let [before, after] = object;
         let sensors = vec![
-            SensorGap { sensors: Sensors::Joints, before: 1.5, after: 1.5, floor: 1.0 },
+            SensorGap { sensors: Sensors::Joints, before: 1.05, after: 1.05, floor: 1.0 },
             SensorGap { sensors: Sensors::Object, before, after, floor: 1.0 },
         ];
         Labelled {
@@ -317,9 +339,9 @@ mod tests {
             .collect();
         let rows = regenerate(&sessions);
         let names: std::collections::BTreeSet<&str> = rows.iter().map(|row| row.name).collect();
-        assert_eq!((names.len(), rows.len()), (12, 12));
-        // The joints of these sessions have no gap of which a share could be left.
+        assert_eq!((names.len(), rows.len()), (13, 13));
+        // The joints of these sessions have no gap of which a cause could leave anything.
         let open: Vec<&str> = rows.iter().filter(|row| row.from_sessions.is_none()).map(|row| row.name).collect();
-        assert_eq!(open, [criteria::JOINTS_SHARE_LEFT.name], "{rows:?}");
+        assert_eq!(open, [criteria::JOINTS_EXCESS_BESIDE_A_CAUSE.name, criteria::JOINTS_SHARE_LEFT.name], "{rows:?}");
     }
 }

@@ -24,11 +24,18 @@ pub struct Criterion {
 const SQUARED_SIGMAS: &str = "squared sigmas";
 const SHARE: &str = "share";
 
-/// The joints' excess that any twin leaves: numerics, not physics.
+/// The joints' excess that is a gap.
 pub const JOINTS_EXCESS: Criterion = Criterion {
     name: "joints_excess",
     unit: SQUARED_SIGMAS,
     meaning: "98 of 100 sessions with nothing wrong leave less in the joints",
+    value: 0.6,
+};
+/// The joints' excess beside a cause that was found.
+pub const JOINTS_EXCESS_BESIDE_A_CAUSE: Criterion = Criterion {
+    name: "joints_excess_beside_a_cause",
+    unit: SQUARED_SIGMAS,
+    meaning: "98 of 100 sessions leave less in the joints once their cause acts in the twin",
     value: 6.0,
 };
 /// The object's excess that is a gap.
@@ -87,7 +94,7 @@ pub const CLASS_IS_RIGHT: Criterion =
 pub const UNKNOWN_IS_RIGHT: Criterion = Criterion {
     name: "unknown_is_right",
     unit: SHARE,
-    meaning: "of verdicts `unexplained` of a gap of three least ones and more so many are of a cause outside of the library",
+    meaning: "of verdicts `unexplained` of a gap that is plain so many are of a cause outside of the library",
     value: 0.7,
 };
 /// The same of a gap of less.
@@ -105,5 +112,7 @@ pub const NAMED_IS_WRONG: Criterion = Criterion {
     value: 0.04,
 };
 
-/// A gap that is plain has so many least ones.
-pub const PLAIN: f64 = 3.0;
+/// A gap of the joints is plain from here on [squared sigmas]: three times what a cause may leave of it.
+pub const PLAIN_IN_JOINTS: f64 = 3.0 * JOINTS_EXCESS_BESIDE_A_CAUSE.value;
+/// A gap of the object is plain from here on [squared sigmas]: three least ones.
+pub const PLAIN_IN_OBJECT: f64 = 3.0 * OBJECT_EXCESS.value;

@@ -1,7 +1,7 @@
 //! The finding: one of five verdicts, with the effects and how sure it is. [`super::headline`] says it in a sentence.
 
 use crate::diagnose::answer::{Basis, Kind, Verdict};
-use crate::diagnose::criteria::{CLASS_IS_RIGHT, NONE_IS_RIGHT, PLAIN, UNKNOWN_IS_RIGHT, UNKNOWN_OF_LITTLE_IS_RIGHT};
+use crate::diagnose::criteria::{CLASS_IS_RIGHT, NONE_IS_RIGHT, UNKNOWN_IS_RIGHT, UNKNOWN_OF_LITTLE_IS_RIGHT};
 use crate::diagnose::judge::confidence;
 use crate::diagnose::judge::remainder::Left;
 use std::time::Duration;
@@ -107,7 +107,7 @@ impl Finding<'_> {
     /// leaves nothing of it.
     fn moves_the_arm(&self) -> bool {
         let arm = self.left.iter().find(|left| !left.of_object);
-        self.of_arm && arm.is_some_and(|arm| arm.gaps() > PLAIN && arm.explained() > 1.0 - arm.substitute)
+        self.of_arm && arm.is_some_and(|arm| arm.is_plain() && arm.explained() > 1.0 - arm.substitute)
     }
 
     /// How many times what noise alone leaves the residuals are without any effect.
@@ -138,7 +138,7 @@ impl Finding<'_> {
     }
 
     fn unexplained(&self) -> Decision {
-        let plain = self.drift.is_some() || self.left.iter().any(|left| left.gaps() > PLAIN);
+        let plain = self.drift.is_some() || self.left.iter().any(Left::is_plain);
         let confidence = if plain { UNKNOWN_IS_RIGHT.value } else { UNKNOWN_OF_LITTLE_IS_RIGHT.value };
         Decision { kind: Kind::Unexplained, effects: Vec::new(), confidence, little: !plain }
     }
@@ -172,14 +172,14 @@ impl Verdict {
 #[cfg(test)]
 pub(in crate::diagnose) mod tests {
     use super::*;
-    use crate::diagnose::criteria::{JOINTS_EXCESS, JOINTS_SHARE_LEFT};
+    use crate::diagnose::criteria::{JOINTS_EXCESS_BESIDE_A_CAUSE, JOINTS_SHARE_LEFT};
 
     pub(in crate::diagnose) fn finding<'a>(effects: Vec<&'a str>, before: f64, after: f64) -> Finding<'a> {
         let left = vec![Left {
             before,
             after,
             floor: 1.0,
-            numerics: JOINTS_EXCESS.value,
+            numerics: JOINTS_EXCESS_BESIDE_A_CAUSE.value,
             substitute: JOINTS_SHARE_LEFT.value,
             of_object: false,
         }];
@@ -236,7 +236,7 @@ pub(in crate::diagnose) mod tests {
         let named = |confidence| Finding { confidence, ..finding(vec!["payload"], 500.0, 1.5) };
         assert_eq!(basis(&named(confidence::MOST)), Basis::Limit);
         assert_eq!(basis(&named(0.8)), Basis::Estimate);
-        assert_eq!(basis(&finding(vec![], 1.5, 1.5)), Basis::Limit);
+        assert_eq!(basis(&finding(vec![], 1.0, 1.0)), Basis::Limit);
         assert_eq!(basis(&finding(vec![], 500.0, 500.0)), Basis::Rate);
         assert_eq!(not_testable("one clip").basis(), Basis::Nothing);
     }
@@ -245,12 +245,12 @@ pub(in crate::diagnose) mod tests {
     fn what_widens_the_gap_on_clips_kept_for_confirming_is_not_named() {
         let refuted = Finding { confirmed: false, ..finding(vec!["payload"], 500.0, 1.5) };
         assert_eq!(refuted.decide().kind, Kind::Unexplained);
-        assert_eq!(Finding { confirmed: false, ..finding(vec!["payload"], 2.0, 1.5) }.decide().kind, Kind::None);
+        assert_eq!(Finding { confirmed: false, ..finding(vec!["payload"], 1.5, 1.2) }.decide().kind, Kind::None);
     }
 
     #[test]
     fn what_is_less_likely_than_not_is_not_named_alone() {
-        let unlikely = Finding { confidence: 0.1, ..finding(vec!["restitution"], 5.0, 1.5) };
+        let unlikely = Finding { confidence: 0.1, ..finding(vec!["restitution"], 1.5, 1.2) };
         assert_eq!(unlikely.decide().kind, Kind::None);
         assert_eq!(Finding { rivals: vec!["tip_friction"], ..unlikely }.decide().kind, Kind::Class);
         let in_a_gap = Finding { confidence: 0.1, ..finding(vec!["restitution"], 500.0, 1.5) };

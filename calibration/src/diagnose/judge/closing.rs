@@ -54,7 +54,7 @@ fn share(left: &Left, whole: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::diagnose::criteria::{JOINTS_EXCESS, JOINTS_SHARE_LEFT};
+    use crate::diagnose::criteria::{JOINTS_EXCESS_BESIDE_A_CAUSE, JOINTS_SHARE_LEFT};
 
     #[test]
     fn far_above_the_noise_the_plain_share_of_the_whole_gap_counts() {
@@ -62,7 +62,7 @@ mod tests {
             before,
             after,
             floor: 1.0,
-            numerics: JOINTS_EXCESS.value,
+            numerics: JOINTS_EXCESS_BESIDE_A_CAUSE.value,
             substitute: JOINTS_SHARE_LEFT.value,
             of_object: false,
         };

@@ -6,8 +6,8 @@
 use super::gap::Typical;
 use crate::diagnose::answer::{SensorGap, Sensors};
 use crate::diagnose::criteria::{
-    DOUBTFUL, JOINTS_EXCESS, JOINTS_SHARE_LEFT, OBJECT_EXCESS, OBJECT_EXCESS_BESIDE_A_CAUSE, OBJECT_SHARE_LEFT,
-    TURNS_WITHIN,
+    DOUBTFUL, JOINTS_EXCESS, JOINTS_EXCESS_BESIDE_A_CAUSE, JOINTS_SHARE_LEFT, OBJECT_EXCESS,
+    OBJECT_EXCESS_BESIDE_A_CAUSE, OBJECT_SHARE_LEFT, PLAIN_IN_JOINTS, PLAIN_IN_OBJECT, TURNS_WITHIN,
 };
 use crate::diagnose::evidence::measured::Evidence;
 use crate::diagnose::fit::bench::{Bench, Hypothesis};
@@ -43,7 +43,11 @@ impl Left {
             before: before.mean_square,
             after: after.mean_square,
             floor: before.floor,
-            numerics: if before.of_object { OBJECT_EXCESS_BESIDE_A_CAUSE.value } else { JOINTS_EXCESS.value },
+            numerics: if before.of_object {
+                OBJECT_EXCESS_BESIDE_A_CAUSE.value
+            } else {
+                JOINTS_EXCESS_BESIDE_A_CAUSE.value
+            },
             substitute: if before.of_object { OBJECT_SHARE_LEFT.value } else { JOINTS_SHARE_LEFT.value },
             of_object: before.of_object,
         };
@@ -65,6 +69,12 @@ impl Left {
     #[must_use]
     pub fn gaps(&self) -> f64 {
         (self.before - self.floor) / if self.of_object { OBJECT_EXCESS.value } else { JOINTS_EXCESS.value }
+    }
+
+    /// Whether the gap of the twin without any effect is so large that a substitute for its cause does not close it.
+    #[must_use]
+    pub fn is_plain(&self) -> bool {
+        self.before - self.floor > if self.of_object { PLAIN_IN_OBJECT } else { PLAIN_IN_JOINTS }
     }
 
     /// How likely it is that nothing is there where no cause is seen.
@@ -130,7 +140,7 @@ mod tests {
             before: 1000.0,
             after,
             floor: 1.0,
-            numerics: JOINTS_EXCESS.value,
+            numerics: JOINTS_EXCESS_BESIDE_A_CAUSE.value,
             substitute: JOINTS_SHARE_LEFT.value,
             of_object: false,
         };
@@ -161,7 +171,7 @@ mod tests {
                 before: 2.0,
                 after: 2.0,
                 floor: 1.0,
-                numerics: JOINTS_EXCESS.value,
+                numerics: JOINTS_EXCESS_BESIDE_A_CAUSE.value,
                 substitute: JOINTS_SHARE_LEFT.value,
                 of_object: false
             }

@@ -3,7 +3,7 @@
 
 use super::refit::{last_pass, refitted, without_superfluous};
 use crate::diagnose::clips::split::Split;
-use crate::diagnose::criteria::JOINTS_EXCESS;
+use crate::diagnose::criteria::JOINTS_EXCESS_BESIDE_A_CAUSE;
 use crate::diagnose::evidence::measured::{Evidence, Group, Row};
 use crate::diagnose::fit::bench::{Bench, Hypothesis};
 use crate::diagnose::fit::effort::{FIRST_PASS, HEAT, NEAR};
@@ -103,9 +103,9 @@ pub fn search<E: Evidence>(
 fn spent<E: Evidence>(bench: &Bench<'_, E>, split: &Split, first: &Step, now: &Hypothesis) -> bool {
     let typical = |hypothesis| Residuals::at(bench, hypothesis, split.elsewhere()).map(|left| left.typical());
     let (Some(before), Some(after)) = (typical(&first.from), typical(now)) else { return false };
-    Left::of_groups(&before, &after)
-        .iter()
-        .all(|left| left.after - left.floor <= JOINTS_EXCESS.value.max(NUMERICS_SHARE * (left.before - left.floor)))
+    Left::of_groups(&before, &after).iter().all(|left| {
+        left.after - left.floor <= JOINTS_EXCESS_BESIDE_A_CAUSE.value.max(NUMERICS_SHARE * (left.before - left.floor))
+    })
 }
 
 /// Sweeps around a hypothesis, scores all candidates, fits the best.
