@@ -127,7 +127,7 @@ pub(crate) fn identify_arm(
 
 /// Friction, mass, centre of mass and tip friction; the JSON of `calibration identify object --json`.
 #[pyfunction]
-#[pyo3(signature = (session, *, cell, object, parameters, optimizer, budget, seed, out))]
+#[pyo3(signature = (session, *, cell, object, parameters, optimizer, budget, seed, out, engine_command, engine_limit))]
 #[allow(clippy::too_many_arguments)] // as above
 pub(crate) fn identify_object(
     py: Python<'_>,
@@ -139,10 +139,14 @@ pub(crate) fn identify_object(
     budget: usize,
     seed: u64,
     out: Option<PathBuf>,
+    engine_command: Option<String>,
+    engine_limit: f64,
 ) -> PyResult<String> {
     let optimizer = self::optimizer(optimizer)?;
     interruptible(py, |interrupt| {
-        let options = object::Options { session, cell, object, optimizer, out, parameters, budget, seed };
+        let opened = Session::open_with(&session, cell.as_deref())?;
+        let engine = engine(engine_command, engine_limit, &opened, interrupt)?;
+        let options = object::Options { session, cell, object, optimizer, out, parameters, budget, seed, engine };
         text(&object::identify(&options, interrupt)?)
     })
 }

@@ -59,7 +59,8 @@ def identify_arm(session, *, cell=None, parameters=None, also=(), optimizer="lea
         budget=budget, seed=seed, out=_text(out), engine_command=engine, engine_limit=engine_limit))
 
 
-def identify_object(session, *, cell=None, object=None, parameters=None, optimizer="least-squares", budget=1200, seed=0, out=None):
+def identify_object(session, *, cell=None, object=None, parameters=None, optimizer="least-squares", budget=1200, seed=0, out=None,
+                    engine=None, engine_limit=60.0):
     """Friction, mass [kg], centre of mass [m, object frame, from the geometric centre] and tip friction of the object.
 
     The answer is the JSON object of `calibration identify object --json`; `object`: of several in cell.toml the one to identify,
@@ -67,7 +68,7 @@ def identify_object(session, *, cell=None, object=None, parameters=None, optimiz
     """
     return _json.loads(_twinalign.identify_object(
         _os.fspath(session), cell=_text(cell), object=object, parameters=_text(parameters), optimizer=optimizer, budget=budget,
-        seed=seed, out=_text(out)))
+        seed=seed, out=_text(out), engine_command=engine, engine_limit=engine_limit))
 
 
 def effects():

@@ -184,6 +184,8 @@ def identify_object(
     budget: int = 1200,
     seed: int = 0,
     out: _Path | None = None,
+    engine: str | None = None,
+    engine_limit: float = 60.0,
 ) -> dict[str, Any]:
     """The JSON object of `calibration identify object --json`."""
 

@@ -32,7 +32,7 @@ share of B's gap under A's model that it closes; or that nothing changed, and ho
 
 With --engine another simulator is the twin: yours, with your model of the robot, over a small protocol (docs/engine.md;
 adapters/mujoco is one for MuJoCo). The verdict is about that one. Effects that it knows are asked of it; of others the twin's own
-difference is added. For clips of the arm alone.
+difference is added. For clips of the arm alone, and of strokes where the engine says that it simulates an object.
 
 What to record next is printed as commands that can be typed, and of an effect that is named what to do about it in the
 cell and in a model.

@@ -10,7 +10,7 @@ use twin::arm::ArmModel;
 /// What another program is asked for.
 #[derive(Debug, Clone, clap::Args)]
 pub(super) struct EngineArguments {
-    /// A program that simulates the arm in place of the twin, over the protocol of docs/engine.md: one process for each core.
+    /// A program that simulates the cell in place of the twin, over the protocol of docs/engine.md: one process for each core.
     #[arg(long, value_name = "COMMAND")]
     engine: Option<String>,
     /// An engine that takes longer than this for one roll-out is given up.

@@ -89,12 +89,15 @@ The recorded commands are simulated, hit and slide included, until object and ar
 found first, from the way to the object in the same clips, unless --parameters brings them. A quarter of the strokes is
 held out. Clips in which the object topples, is lost or not hit are left out, and that is said; so is what is not identifiable.
 
+With --engine another simulator moves arm and object, over the protocol of docs/engine.md: what is found is for that simulator.
+
 Ctrl-C keeps what was found so far, beside --out or in the session's folder; the same command goes on from there, and ends
 where it would have ended. What no clip tells is not written.
 
 Examples:
   calibration identify object strokes --out theta.toml --report page.html
   calibration identify object strokes --object milk_box --out theta.toml
+  calibration identify object strokes --engine ./my_simulator --out theta.toml
   calibration identify object strokes --parameters arm.toml --optimizer pso --budget 1200 --json")]
 pub(super) struct ObjectArguments {
     #[command(flatten)]
@@ -102,6 +105,8 @@ pub(super) struct ObjectArguments {
     /// Of several objects in cell.toml the one to identify [default: the one that moves].
     #[arg(long, value_name = "NAME")]
     object: Option<String>,
+    #[command(flatten)]
+    engine: EngineArguments,
     /// Points that pso and cma may try.
     #[arg(long, value_name = "N", default_value_t = 1200, value_parser = clap::value_parser!(u32).range(1..))]
     budget: u32,
@@ -137,11 +142,12 @@ pub(super) fn run(identify: Identify, interrupt: &Interrupt) -> anyhow::Result<(
             let options = arm::Options { session, cell, optimizer, out, parameters, also, budget, seed, engine };
             heard(asked.as_ref(), arm::identify(&options, interrupt).map_err(anyhow::Error::from))
         }),
-        Identify::Object(ObjectArguments { task, object: asked, budget }) => task.run(|task, _| {
+        Identify::Object(ObjectArguments { task, object, engine, budget }) => task.run(|task, opened| {
+            let engine = engine.start(opened, interrupt)?;
             let Task { session, cell, optimizer, out, parameters, seed, .. } = task;
-            let (optimizer, budget) = (optimizer.optimizer(), budget as usize);
-            let options = object::Options { session, cell, object: asked, optimizer, out, parameters, budget, seed };
-            Ok(object::identify(&options, interrupt)?)
+            let (optimizer, budget, asked) = (optimizer.optimizer(), budget as usize, engine.clone());
+            let options = object::Options { session, cell, object, optimizer, out, parameters, budget, seed, engine };
+            heard(asked.as_ref(), object::identify(&options, interrupt).map_err(anyhow::Error::from))
         }),
     }
 }

@@ -39,7 +39,7 @@ pub use answer::{
     StageTest, Status, TorqueRms, Verdict,
 };
 
-use crate::engine::{Engine, Quantity, Used};
+use crate::engine::{Engine, EngineError, Quantity, Used};
 use crate::forward::object::ObjectClips;
 use crate::forward::setting::{self, BaseError};
 use crate::identify::arm::{ArmError, law};
@@ -73,7 +73,7 @@ pub struct Options {
     pub seed: u64,
     /// Whether torques along the measured motion are explained, and not how commands are followed.
     pub torques: bool,
-    /// Another program that simulates the arm in place of the twin.
+    /// Another program that simulates arm and object in place of the twin.
     pub engine: Option<Arc<Engine>>,
     /// After so long the best answer so far counts.
     pub budget: Option<Duration>,
@@ -106,12 +106,9 @@ pub enum DiagnoseError {
     /// The law that leads the arm cannot be found.
     #[error(transparent)]
     Law(#[from] ArmError),
-    /// The engine simulates arms alone.
-    #[error(
-        "--engine simulates the arm alone, and these clips have an object; record the arm alone (`calibration capture \
-         excitation`), or find the gains with `calibration identify arm`, which looks at strokes up to the touch"
-    )]
-    EngineWithObject,
+    /// The engine cannot be asked for these clips.
+    #[error(transparent)]
+    Engine(#[from] EngineError),
     /// Ctrl-C. What was found is kept, and the words say where.
     #[error("{0}")]
     Interrupted(String),
@@ -202,7 +199,7 @@ fn without_robot(session: &Session) -> Session {
 fn compared(mut admitted: Admitted, engine: Option<&Engine>) -> Result<Admitted, DiagnoseError> {
     let Some(engine) = engine else { return Ok(admitted) };
     if admitted.with_object {
-        return Err(DiagnoseError::EngineWithObject);
+        engine.admits(admitted.clips.iter())?;
     }
     let ability = engine.ability();
     for clip in &mut admitted.clips {
@@ -227,22 +224,24 @@ fn diagnosed(
     let peaks = peaks(&session.cell, admitted, &base)?;
     let library = Library::new(&session.cell, &base, admitted.ground().as_ref(), &peaks);
     let theta = |numbers: &[f64]| library.theta(numbers);
+    let nominal = setting::complete(&session.cell, None)?;
+    let engine = options.engine.as_ref();
     let mut diagnosis = if admitted.with_object {
         let robot = session.cell.robot.as_ref();
         let arm = robot.map(|_| ArmClips::new(&session.cell, &admitted.clips, theta)).transpose();
+        let arm = arm.map_err(Refused::from)?.map(|arm| arm.moved_by(options.engine.clone(), &nominal));
         let object = ObjectClips::new(&session.cell, admitted.clips.clone(), library.settings.clone())?;
-        let evidence = CellClips::new(arm.map_err(Refused::from)?, object, &library);
+        let evidence = CellClips::new(arm, object.simulated_by(engine, &nominal), &library);
         examine(&evidence, &library, session, admitted, options, work)?
     } else {
         let evidence = ArmClips::new(&session.cell, &admitted.clips, theta).map_err(Refused::from)?;
-        let nominal = setting::complete(&session.cell, None)?;
         let evidence = evidence.moved_by(options.engine.clone(), &nominal);
         examine(&evidence, &library, session, admitted, options, work)?
     };
     if clips::torques::is_tracking(&session.cell) {
         diagnosis.theta = clips::torques::without_law(diagnosis.theta, options.theta.as_ref());
     }
-    diagnosis.engine = options.engine.as_ref().map(|engine| engine.used());
+    diagnosis.engine = engine.map(|engine| engine.used());
     diagnosis.warnings.extend(diagnosis.engine.iter().flat_map(Used::sentences));
     diagnosis.seconds = began.elapsed().as_secs_f64();
     Ok(diagnosis)
@@ -286,7 +285,10 @@ fn examine<E: Evidence>(
     bar.stage(fit::stages::CONCLUSION, 1);
     let mut concluded = conclude::conclusion::conclude(&bench, &split, &found, session, admitted, options)?;
     let baseline = library.theta(&found.steps[0].from.full);
-    concluded.stage_test = judge::recorded_arm::stage_test(&session.cell, &baseline, admitted, &split.confirm)?;
+    // What the twin makes of the recorded motion says nothing about another program.
+    if options.engine.is_none() {
+        concluded.stage_test = judge::recorded_arm::stage_test(&session.cell, &baseline, admitted, &split.confirm)?;
+    }
     if interrupt.spent() {
         concluded.budget_spent = true;
         concluded.verdict = concluded.verdict.so_far(options.budget.unwrap_or_default(), cut_short);

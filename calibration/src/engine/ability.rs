@@ -1,10 +1,10 @@
 //! What an engine says that it can do, held against the registry of effects, and what of a set of parameters that leaves.
 
-use super::message::{Hello, VERSION};
+use super::message::{Hello, OLDEST, VERSION};
 use serde_json::Value;
 use shared_mem::theta::{EffectTheta, Theta};
 use std::collections::BTreeMap;
-use twin::effects::{Stage, find, registry};
+use twin::effects::{EffectInfo, Stage, find, registry};
 
 /// A quantity of a robot's log.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -39,7 +39,9 @@ const QUANTITIES: [(&str, Quantity); 4] = [
     ("tau_J", Quantity::Torque),
     ("tau_J_d", Quantity::DesiredTorque),
 ];
-const GAINS: [&str; 2] = ["stiffness", "damping"];
+/// Numbers of the controller, then those of the object.
+const PARAMETERS: [&str; 6] = ["stiffness", "damping", "friction", "mass", "centre_of_mass", "tip_friction"];
+const GAINS: usize = 2;
 
 /// What an engine can do.
 #[derive(Debug, Clone, PartialEq)]
@@ -48,8 +50,10 @@ pub struct Ability {
     pub name: String,
     /// What it may be asked for.
     readings: Vec<Quantity>,
-    stiffness: bool,
-    damping: bool,
+    /// Whether it simulates an object that the arm hits.
+    pub object: bool,
+    /// Which of [`PARAMETERS`] can be set.
+    sets: [bool; PARAMETERS.len()],
     /// Effects, with the parameters that it knows.
     effects: BTreeMap<String, Vec<String>>,
 }
@@ -60,21 +64,20 @@ impl Ability {
     /// # Errors
     /// What is wrong with them.
     pub(super) fn read(hello: Hello) -> Result<Self, String> {
-        let Hello { protocol, name, parameters, effects, readings } = hello;
-        if protocol != VERSION {
+        let Hello { protocol, name, parameters, effects, readings, object } = hello;
+        if !(OLDEST..=VERSION).contains(&protocol) {
             return Err(format!("speaks version {protocol} of the protocol, and this program version {VERSION}"));
         }
-        if let Some(other) = parameters.iter().find(|name| !GAINS.contains(&name.as_str())) {
-            return Err(format!("says that it knows the parameter `{other}`; there are {}", GAINS.join(", ")));
+        let known = if object { &PARAMETERS[..] } else { &PARAMETERS[..GAINS] };
+        if let Some(other) = parameters.iter().find(|name| !known.contains(&name.as_str())) {
+            return Err(format!("says that it knows the parameter `{other}`; there are {}", known.join(", ")));
         }
         for (name, parameters) in &effects {
-            let on_arm = |effect: &&twin::effects::EffectInfo| effect.stage == Stage::Control;
-            let Some(effect) = find(name).filter(on_arm) else {
-                let known: Vec<&str> = registry().iter().filter(on_arm).map(|effect| effect.name).collect();
-                return Err(format!(
-                    "says that it knows the effect `{name}`; on the arm there are {}",
-                    known.join(", ")
-                ));
+            let simulated = |effect: &&EffectInfo| is_simulated(effect, object);
+            let Some(effect) = find(name).filter(simulated) else {
+                let known: Vec<&str> = registry().iter().filter(simulated).map(|effect| effect.name).collect();
+                let on = if object { "arm and object" } else { "the arm" };
+                return Err(format!("says that it knows the effect `{name}`; on {on} there are {}", known.join(", ")));
             };
             if let Some(other) = parameters.iter().find(|name| effect.parameters.iter().all(|p| p.name != **name)) {
                 let known: Vec<&str> = effect.parameters.iter().map(|p| p.name).collect();
@@ -89,8 +92,8 @@ impl Ability {
         if !readings.contains(&Quantity::Position) {
             return Err("does not report `q`, without which nothing can be compared".into());
         }
-        let [stiffness, damping] = GAINS.map(|gain| parameters.iter().any(|name| name == gain));
-        Ok(Self { name, readings, stiffness, damping, effects })
+        let sets = PARAMETERS.map(|parameter| parameters.iter().any(|name| name == parameter));
+        Ok(Self { name, readings, object, sets, effects })
     }
 
     /// All of it as a text: results of one engine are not those of another.
@@ -117,23 +120,30 @@ impl Ability {
         self.effects.get(effect).is_some_and(|known| all.iter().all(|p| known.iter().any(|name| name == p.name)))
     }
 
-    /// The part of parameters that it simulates itself; gains that it does not know are those of `nominal`.
+    /// The part of parameters that it simulates itself, with what is a camera's: that acts on its answer. Other numbers of controller
+    /// and object are those of `nominal`.
     #[must_use]
     pub fn part(&self, theta: &Theta, nominal: &Theta) -> Theta {
         let mut part = theta.clone();
+        let [stiffness, damping, friction, mass, centre_of_mass, tip_friction] = self.sets;
         if let (Some(arm), Some(nominal)) = (&mut part.arm, &nominal.arm) {
-            if !self.stiffness {
-                arm.stiffness.clone_from(&nominal.stiffness);
-            }
-            if !self.damping {
-                arm.damping.clone_from(&nominal.damping);
-            }
+            restore(stiffness, &mut arm.stiffness, &nominal.stiffness);
+            restore(damping, &mut arm.damping, &nominal.damping);
+        }
+        if let (Some(object), Some(nominal)) = (&mut part.object, &nominal.object) {
+            restore(friction, &mut object.friction, &nominal.friction);
+            restore(mass, &mut object.mass, &nominal.mass);
+            restore(centre_of_mass, &mut object.centre_of_mass, &nominal.centre_of_mass);
+            restore(tip_friction, &mut object.tip_friction, &nominal.tip_friction);
         }
         part.effects = theta.effects.iter().filter_map(|effect| self.part_of(effect)).collect();
         part
     }
 
     fn part_of(&self, effect: &EffectTheta) -> Option<EffectTheta> {
+        if find(&effect.name).is_some_and(|effect| effect.stage == Stage::Camera) {
+            return Some(effect.clone());
+        }
         let known = self.effects.get(&effect.name)?;
         let mut part = effect.clone();
         part.parameters.retain(|name, _| known.contains(name));
@@ -143,18 +153,29 @@ impl Ability {
     /// What of gains is told to it.
     pub(super) fn gains<'a>(&self, theta: &'a Theta) -> BTreeMap<&'static str, &'a [f64]> {
         let Some(arm) = &theta.arm else { return BTreeMap::new() };
-        let told = [(self.stiffness, &arm.stiffness[..]), (self.damping, &arm.damping[..])];
-        GAINS.into_iter().zip(told).filter(|(_, (knows, _))| *knows).map(|(name, (_, gains))| (name, gains)).collect()
+        let told = PARAMETERS.into_iter().zip(self.sets).zip([&arm.stiffness[..], &arm.damping[..]]);
+        told.filter(|((_, sets), _)| *sets).map(|((name, _), gains)| (name, gains)).collect()
+    }
+
+    /// Effects as an engine reads them; what has no bound is null.
+    pub(super) fn blocks(&self, effects: &[EffectTheta]) -> Vec<BTreeMap<String, Value>> {
+        let block = |effect: &EffectTheta| {
+            let parameters = effect.parameters.iter().map(|(name, value)| (name.clone(), serde_json::json!(value)));
+            parameters.chain([("name".to_owned(), Value::from(effect.name.as_str()))]).collect()
+        };
+        effects.iter().filter(|effect| self.effects.contains_key(&effect.name)).map(block).collect()
     }
 }
 
-/// Effects as an engine reads them; what has no bound is null.
-pub(super) fn blocks(effects: &[EffectTheta]) -> Vec<BTreeMap<String, Value>> {
-    let block = |effect: &EffectTheta| {
-        let parameters = effect.parameters.iter().map(|(name, value)| (name.clone(), serde_json::json!(value)));
-        parameters.chain([("name".to_owned(), Value::from(effect.name.as_str()))]).collect()
-    };
-    effects.iter().map(block).collect()
+/// Whether an effect is one of what an engine simulates: what a camera makes of poses is applied to its answer.
+pub(super) fn is_simulated(effect: &EffectInfo, with_object: bool) -> bool {
+    effect.stage == Stage::Control || (with_object && matches!(effect.stage, Stage::Hit | Stage::Slide))
+}
+
+fn restore<T: Clone>(is_set: bool, part: &mut T, nominal: &T) {
+    if !is_set {
+        part.clone_from(nominal);
+    }
 }
 
 #[cfg(test)]
@@ -166,7 +187,7 @@ mod tests {
         let list = |names: &[&str]| names.iter().map(|name| (*name).to_owned()).collect();
         let effects = serde_json::from_str(effects).expect("JSON");
         let (parameters, readings) = (list(parameters), list(readings));
-        Hello { protocol: VERSION, name: "engine".into(), parameters, effects, readings }
+        Hello { protocol: VERSION, name: "engine".into(), parameters, effects, readings, object: false }
     }
 
     fn theta() -> Theta {

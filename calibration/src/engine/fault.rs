@@ -53,6 +53,24 @@ pub enum EngineError {
         /// What is wrong.
         what: String,
     },
+    /// It cannot simulate what is in the clips.
+    #[error(
+        "the engine `{command}` simulates an arm alone: its greeting has no `object`, and these clips have one; add it as version 2 of \
+         docs/engine.md says, or record the arm alone (`calibration capture excitation`)"
+    )]
+    NoObject {
+        /// As it was given.
+        command: String,
+    },
+    /// No engine is asked for objects without an arm.
+    #[error(
+        "--engine simulates an arm and what it hits, and in {count} of these clips an object moves by itself (`kind = \"free_motion\"`); take \
+         them out of cell.toml, or leave --engine out"
+    )]
+    NoArm {
+        /// Such clips.
+        count: usize,
+    },
     /// It says itself that it cannot go on.
     #[error("the engine `{command}`: {why}")]
     Refused {

@@ -5,7 +5,9 @@ use serde_json::Value;
 use std::collections::BTreeMap;
 
 /// The version of the protocol that is spoken here.
-pub(super) const VERSION: u32 = 1;
+pub(super) const VERSION: u32 = 2;
+/// The oldest that is understood: engines of it know no object, and are asked for what they know.
+pub(super) const OLDEST: u32 = 1;
 
 /// The first message to an engine: which cell it is to simulate.
 #[derive(Debug, Serialize)]
@@ -40,6 +42,44 @@ pub(super) struct RollOut<'a> {
     pub(super) parameters: BTreeMap<&'static str, &'a [f64]>,
     /// Effects that act, with parameters that the engine knows; null is infinite.
     pub(super) effects: Vec<BTreeMap<String, Value>>,
+    /// The object that takes part.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) object: Option<ObjectBlock<'a>>,
+}
+
+/// An object that stands on the table when a roll-out begins. Its frame is its geometric centre.
+#[derive(Debug, Serialize)]
+pub(super) struct ObjectBlock<'a> {
+    /// Its numbers.
+    #[serde(flatten)]
+    pub(super) body: &'a ObjectBody,
+    /// Where it stands, in the base frame [m].
+    pub(super) position: [f64; 3],
+    /// Unit quaternion w, x, y, z, from its frame to the base's.
+    pub(super) orientation: [f64; 4],
+    /// Times at which its pose is asked for.
+    pub(super) poses: usize,
+}
+
+/// The numbers of an object.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ObjectBody {
+    /// Mass [kg].
+    pub mass: f64,
+    /// Centre of mass from the geometric centre, object frame [m].
+    pub centre_of_mass: [f64; 3],
+    /// Inertia about the centre of mass along the object's axes [kg m²], row by row.
+    pub inertia: [[f64; 3]; 3],
+    /// Coulomb friction on the table.
+    pub friction: f64,
+    /// Coulomb friction against the tool.
+    pub tip_friction: f64,
+    /// Restitution against the table, 0 to 1.
+    pub restitution: f64,
+    /// Edges of the box, or of the mesh's bounding box [m].
+    pub size: [f64; 3],
+    /// The mesh, whose bounding box has its middle in the geometric centre; none of a box.
+    pub mesh: Option<String>,
 }
 
 /// What comes back.
@@ -68,7 +108,7 @@ pub(super) struct Hello {
     pub(super) protocol: u32,
     /// Name and version, for reports.
     pub(super) name: String,
-    /// Of `stiffness`, `damping`.
+    /// Numbers of controller and object that can be set.
     #[serde(default)]
     pub(super) parameters: Vec<String>,
     /// Effects, each with the parameters that it knows.
@@ -76,4 +116,7 @@ pub(super) struct Hello {
     pub(super) effects: BTreeMap<String, Vec<String>>,
     /// What it may be asked for: of `q`, `dq`, `tau_J`, `tau_J_d`.
     pub(super) readings: Vec<String>,
+    /// Whether it simulates an object that the arm hits.
+    #[serde(default)]
+    pub(super) object: bool,
 }

@@ -1,4 +1,4 @@
-//! Another program that simulates the arm of a cell in place of the twin: MuJoCo, Isaac, a laboratory's own. It is asked over a
+//! Another program that simulates a cell in place of the twin: MuJoCo, Isaac, a laboratory's own. It is asked over a
 //! small protocol on its standard input and output (docs/engine.md), one process for each thread that has something to ask.
 //!
 //! | file | owns |
@@ -24,24 +24,31 @@ mod used;
 
 pub use ability::{Ability, Quantity};
 pub use fault::EngineError;
+pub use message::ObjectBody;
 pub use used::Used;
 
 use crate::interrupt::Interrupt;
-use message::{Greeting, Reply, RollOut, VERSION};
+use message::{Greeting, ObjectBlock, Reply, RollOut, VERSION};
 use process::{Process, Running};
 use recent::Recent;
 use serde_json::Value;
-use shared_mem::cell::Cell;
+use shared_mem::cell::{Cell, ClipKind};
 use shared_mem::ending;
+use shared_mem::frames::{Base, Object, Pose};
+use shared_mem::recording::Clip;
 use shared_mem::theta::Theta;
 use shared_mem::time::TICK;
 use std::path::Path;
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::time::Duration;
 
 /// How often is looked whether the user asked for the end, so that processes nobody waits for are killed, too.
 const LOOK: Duration = Duration::from_millis(20);
+/// Numbers of a pose: x, y, z, then a unit quaternion w, x, y, z.
+pub const POSE: usize = 7;
+/// By so much the length of a quaternion may be off: single precision, and a bit.
+const UNIT: f64 = 1e-4;
 
 /// How an engine is started.
 #[derive(Debug, Clone)]
@@ -64,6 +71,8 @@ pub struct Engine {
     failed: OnceLock<EngineError>,
     started_again: AtomicUsize,
     asked: AtomicUsize,
+    /// Whether it was asked for an object.
+    with_object: AtomicBool,
     recent: Mutex<Recent>,
 }
 
@@ -83,6 +92,19 @@ pub struct Question<'a> {
     /// What is asked for, of what the engine reports.
     pub readings: &'a [Quantity],
     /// When states are asked for, from the start on, ascending [s].
+    pub times: &'a [f64],
+    /// The object that takes part; without one it is the arm alone.
+    pub object: Option<ObjectQuestion<'a>>,
+}
+
+/// What is to be simulated of an object.
+#[derive(Debug, Clone, Copy)]
+pub struct ObjectQuestion<'a> {
+    /// Its numbers.
+    pub body: &'a ObjectBody,
+    /// Where its geometric centre rests at the start, in the base frame.
+    pub start: &'a Pose<Base, Object>,
+    /// When its pose is asked for, from the start on, ascending [s].
     pub times: &'a [f64],
 }
 
@@ -132,6 +154,7 @@ impl Engine {
             failed: OnceLock::new(),
             started_again: AtomicUsize::new(0),
             asked: AtomicUsize::new(0),
+            with_object: AtomicBool::new(false),
             recent: Mutex::default(),
         }))
     }
@@ -140,6 +163,19 @@ impl Engine {
     #[must_use]
     pub fn ability(&self) -> &Ability {
         &self.ability
+    }
+
+    /// Whether it can be asked for clips with an object.
+    ///
+    /// # Errors
+    /// [`EngineError`] where it knows no object, or nothing moves the object in a clip.
+    pub fn admits<'a>(&self, clips: impl Iterator<Item = &'a Clip>) -> Result<(), EngineError> {
+        let count = clips.filter(|clip| clip.kind == ClipKind::FreeMotion).count();
+        match count {
+            _ if !self.ability.object => Err(EngineError::NoObject { command: self.call.command.clone() }),
+            0 => Ok(()),
+            count => Err(EngineError::NoArm { count }),
+        }
     }
 
     /// Why it was given up.
@@ -152,10 +188,12 @@ impl Engine {
     #[must_use]
     pub fn used(&self) -> Used {
         let count = |counter: &AtomicUsize| counter.load(Ordering::Relaxed);
-        Used::new(&self.ability, &self.call.command, [count(&self.asked), count(&self.started_again)])
+        let asked_for = (&self.call.command[..], self.with_object.load(Ordering::Relaxed));
+        Used::new(&self.ability, asked_for, [count(&self.asked), count(&self.started_again)])
     }
 
-    /// States at the times that were asked for, row by row: of each quantity of the question's `readings`, a number for each joint.
+    /// States at the times that were asked for, row by row: of each quantity of the question's `readings`, a number for each joint. Behind
+    /// them the object's poses, [`POSE`] numbers each, where the question has an object.
     ///
     /// # Errors
     /// [`NoStates`]. From the first failure on there are none at all.
@@ -182,7 +220,7 @@ impl Engine {
     }
 
     fn message(&self, question: &Question<'_>) -> Result<Vec<u8>, EngineError> {
-        let Question { theta, dof, start, before, commands, readings, times } = *question;
+        let Question { theta, dof, start, before, commands, readings, times, object } = *question;
         let head = RollOut {
             message: "rollout",
             dof,
@@ -191,13 +229,19 @@ impl Engine {
             rows: times.len(),
             readings: readings.iter().map(|quantity| quantity.name()).collect(),
             parameters: self.ability.gains(theta),
-            effects: ability::blocks(&theta.effects),
+            effects: self.ability.blocks(&theta.effects),
+            object: object.map(|object| {
+                let (position, orientation) = (object.start.position(), object.start.wxyz());
+                ObjectBlock { body: object.body, position, orientation, poses: object.times.len() }
+            }),
         };
-        frame::bytes(&head, &[start, commands, times].concat()).map_err(|error| self.wrong(error.to_string()))
+        let poses = object.map_or(&[][..], |object| object.times);
+        frame::bytes(&head, &[start, commands, times, poses].concat()).map_err(|error| self.wrong(error.to_string()))
     }
 
     fn states(&self, message: Vec<u8>, question: &Question<'_>) -> Result<Vec<f64>, NoStates> {
         self.asked.fetch_add(1, Ordering::Relaxed);
+        self.with_object.fetch_or(question.object.is_some(), Ordering::Relaxed);
         let (reply, numbers) = match self.ask(message.clone()) {
             // Once more, with a new process: it may have been the system that ended it.
             Err(EngineError::Ended { .. }) => {
@@ -216,9 +260,20 @@ impl Engine {
             Reply::Hello(_) => return Err(self.wrong("answered a roll-out with a greeting".into()).into()),
         }
         let (rows, columns) = (question.times.len(), question.readings.len() * dof);
-        if numbers.len() != rows * columns {
-            let what = format!("sent {} numbers where {rows} rows of {columns} were asked for", numbers.len());
+        let poses = question.object.map_or(0, |object| object.times.len());
+        if numbers.len() != rows * columns + poses * POSE {
+            let of_object = if poses > 0 { format!(" and {poses} poses of {POSE}") } else { String::new() };
+            let what =
+                format!("sent {} numbers where {rows} rows of {columns}{of_object} were asked for", numbers.len());
             return Err(self.wrong(what).into());
+        }
+        let length = |pose: &[f64]| pose[3..].iter().map(|part| part * part).sum::<f64>().sqrt();
+        // What is no number is no fault of the engine's: a simulation may fly apart.
+        let off = |length: &f64| length.is_finite() && (length - 1.0).abs() > UNIT;
+        if let Some(length) = numbers[rows * columns..].chunks_exact(POSE).map(length).find(off) {
+            return Err(self
+                .wrong(format!("sent an orientation that is no unit quaternion, but {length:.4} long"))
+                .into());
         }
         Ok(numbers)
     }

@@ -35,6 +35,7 @@ fn asked(engine: &Engine) -> Result<Arc<Vec<f64>>, NoStates> {
         commands: &[0.1, 0.0],
         readings: &[Quantity::Position],
         times: &[0.0, 1e-3],
+        object: None,
     })
 }
 
@@ -46,7 +47,7 @@ fn an_engine_that_cannot_be_greeted_is_told_in_one_line_with_a_remedy() {
         ("echo loading a model of a robot".to_owned(), "\"loading \" where a message begins"),
         (says(r#"{"message":"states"}"#), "answered the greeting with states"),
         (says(r#"{"message":"error","why":"no licence"}"#), "no licence"),
-        (says(r#"{"message":"hello","protocol":2,"name":"x","readings":["q"]}"#), "version 2 of the protocol"),
+        (says(r#"{"message":"hello","protocol":3,"name":"x","readings":["q"]}"#), "version 3 of the protocol"),
         (says(r#"{"message":"bye"}"#), "cannot be read"),
         ("echo 'ImportError: no module' >&2; exit 1".to_owned(), ": ImportError: no module; start it by hand"),
     ] {

@@ -1,8 +1,8 @@
 //! What an answer says about the engine that its roll-outs came from.
 
-use super::ability::Ability;
+use super::ability::{Ability, is_simulated};
 use serde::Serialize;
-use twin::effects::{Stage, registry};
+use twin::effects::registry;
 
 /// An engine, and what it was used for.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
@@ -11,6 +11,8 @@ pub struct Used {
     pub name: String,
     /// How it was called.
     pub command: String,
+    /// Whether it simulated an object, too.
+    pub object: bool,
     /// Effects that it simulates itself.
     pub simulates: Vec<String>,
     /// Effects of which it does not know all parameters: what the twin makes of the rest was added to its states.
@@ -22,11 +24,15 @@ pub struct Used {
 }
 
 impl Used {
-    pub(super) fn new(ability: &Ability, command: &str, [rollouts, started_again]: [usize; 2]) -> Self {
-        let arm = registry().iter().filter(|effect| effect.stage == Stage::Control).map(|effect| effect.name);
-        let added = arm.filter(|name| !ability.knows(name)).map(str::to_owned).collect();
-        let simulates = ability.effects().map(str::to_owned).collect();
-        Self { name: ability.name.clone(), command: command.into(), simulates, added, rollouts, started_again }
+    pub(super) fn new(
+        ability: &Ability,
+        (command, object): (&str, bool),
+        [rollouts, started_again]: [usize; 2],
+    ) -> Self {
+        let all = || registry().iter().filter(|effect| is_simulated(effect, object)).map(|effect| effect.name);
+        let added = all().filter(|name| !ability.knows(name)).map(str::to_owned).collect();
+        let simulates = ability.effects().filter(|name| all().any(|other| other == *name)).map(str::to_owned).collect();
+        Self { name: ability.name.clone(), command: command.into(), object, simulates, added, rollouts, started_again }
     }
 
     /// The same for a person, a sentence each.
@@ -34,8 +40,9 @@ impl Used {
     pub fn sentences(&self) -> Vec<String> {
         let list = |names: &[String]| if names.is_empty() { "none".to_owned() } else { names.join(", ") };
         let mut all = vec![format!(
-            "the arm was simulated by {}, so what is said of the twin is said of it; effects that it simulates itself: {}; of \
+            "{} simulated by {}, so what is said of the twin is said of it; effects that it simulates itself: {}; of \
              others the twin's own difference was added to its states: {}",
+            if self.object { "arm and object were" } else { "the arm was" },
             self.name,
             list(&self.simulates),
             list(&self.added)

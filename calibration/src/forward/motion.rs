@@ -1,4 +1,4 @@
-//! Who moves the arm of a clip: the twin's own dynamics, or another program's ([`crate::engine`]).
+//! Who moves an arm that touches nothing: the twin's own dynamics, or another program's ([`crate::engine`]).
 //!
 //! With an engine the nominal model is the engine's. What it knows of gains and effects is asked of it; of what it does not
 //! know, the twin's own roll-outs with and without it differ by something, and that is added to the engine's states:
@@ -18,13 +18,13 @@ use crate::estimate::Impossible;
 use shared_mem::cell::Cell;
 use shared_mem::ending;
 use shared_mem::recording::JointSeries;
-use shared_mem::theta::Theta;
+use shared_mem::theta::{EffectTheta, Theta};
 use shared_mem::time::TICK_NS;
 use std::ops::Range;
 use std::sync::Arc;
 use twin::arm::{ArmModel, JointState, Joints};
 use twin::control::{ArmRollout, CommandTrack, Plant, Reading};
-use twin::effects::Effects;
+use twin::effects::{Effects, Place, find};
 
 /// So long before a clip a command may have been given that still counts: the longest delay that an effect has, and a bit [ticks].
 const HISTORY: u64 = 2100;
@@ -91,6 +91,7 @@ impl Mover {
         };
         // What the twin's own time step does is in neither its states nor in a difference.
         let stretch = &Stretch { parts: 1, ..*stretch };
+        let theta = &felt_by_arm(theta);
         let known = engine.ability().part(theta, &self.known);
         let whole = known == *theta && self.wanted.contains(&Quantity::Velocity);
         let (start, mut without) = if whole {
@@ -162,21 +163,47 @@ impl Mover {
         let (commands, before) = commands(stretch.commands, first_ns..last_ns, dof);
         let times: Vec<f64> = stamps_ns.iter().map(|stamp| stamp.saturating_sub(first_ns) as f64 * 1e-9).collect();
         let start = [&start.q[..dof], &start.dq[..dof]].concat();
-        let question =
-            Question { theta, dof, start: &start, before, commands: &commands, readings: &self.wanted, times: &times };
-        let states = engine.roll_out(&question).map_err(|error| match error {
-            NoStates::Impossible(why) => Impossible(format!("the engine has no answer: {why}")),
-            NoStates::Failed(error) => Impossible(error.to_string()),
-        })?;
-        if states.iter().any(|number| !number.is_finite()) {
-            return Err(Impossible(
-                "a state of the engine is no number; where this is so from the beginning on, its model and the gains of cell.toml \
-                 do not go together"
-                    .into(),
-            ));
-        }
-        Ok(states)
+        let question = Question {
+            theta,
+            dof,
+            start: &start,
+            before,
+            commands: &commands,
+            readings: &self.wanted,
+            times: &times,
+            object: None,
+        };
+        states(engine, &question)
     }
+}
+
+/// What an engine answers.
+///
+/// # Errors
+/// [`Impossible`] where it has no answer, or none that is a number.
+pub(super) fn states(engine: &Engine, question: &Question<'_>) -> Result<Arc<Vec<f64>>, Impossible> {
+    let states = engine.roll_out(question).map_err(|error| match error {
+        NoStates::Impossible(why) => Impossible(format!("the engine has no answer: {why}")),
+        NoStates::Failed(error) => Impossible(error.to_string()),
+    })?;
+    if states.iter().any(|number| !number.is_finite()) {
+        return Err(Impossible(
+            "a state of the engine is no number; where this is so from the beginning on, its model and the gains of cell.toml \
+             do not go together"
+                .into(),
+        ));
+    }
+    Ok(states)
+}
+
+/// Of parameters those that an arm feels as long as it touches nothing.
+pub(super) fn felt_by_arm(theta: &Theta) -> Theta {
+    let counts = |effect: &&EffectTheta| {
+        let acts_on = find(&effect.name).map(|effect| effect.acts_on);
+        !matches!(acts_on, Some(Place::Object | Place::Table | Place::ObjectObservation))
+    };
+    let effects = theta.effects.iter().filter(counts).cloned().collect();
+    Theta { arm: theta.arm.clone(), effects, ..Theta::default() }
 }
 
 /// The twin's arm under parameters.
@@ -203,7 +230,7 @@ impl Prepared {
 }
 
 /// The command in force in each control period, desired positions, then velocities; and how many rows are of the time before.
-fn commands(track: &CommandTrack, over: Range<u64>, dof: usize) -> (Vec<f64>, usize) {
+pub(super) fn commands(track: &CommandTrack, over: Range<u64>, dof: usize) -> (Vec<f64>, usize) {
     let first = |ticks: u64| over.start.checked_sub(ticks * TICK_NS).map_or(0, |tick_ns| track.at(tick_ns));
     let given = (1..HISTORY).take_while(|ticks| first(*ticks) > 0).count() as u64;
     // The row before them all, where the first command is not in force yet.

@@ -112,11 +112,23 @@ impl Replayer {
     /// # Errors
     /// [`ReplayError`] naming the clip and the remedy.
     pub fn replay(&self, clip: Clip) -> Result<(Clip, Prediction, ClipGap), ReplayError> {
+        self.judge(clip, |clip| self.predict(clip))
+    }
+
+    /// The same for what anybody else predicts of the clip, joints in the model's order.
+    ///
+    /// # Errors
+    /// As [`Replayer::replay`], and those of the prediction.
+    pub fn judge(
+        &self,
+        clip: Clip,
+        predict: impl FnOnce(&Clip) -> Result<Prediction, ReplayError>,
+    ) -> Result<(Clip, Prediction, ClipGap), ReplayError> {
         let clip = match self.rollout.cell().arm_model() {
             Some(arm) => in_model_order(clip, arm)?,
             None => clip,
         };
-        let mut prediction = self.predict(&clip)?;
+        let mut prediction = predict(&clip)?;
         prediction.warnings.extend(self.placement(&clip)?);
         let gap = self.gap(&clip, &prediction);
         let finite = gap.joint_rms_rad.iter().flatten().chain(&gap.object_add_m).all(|v| v.is_finite());

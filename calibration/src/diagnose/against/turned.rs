@@ -170,8 +170,9 @@ impl<E: Evidence> Evidence for TwoSessions<'_, E> {
         (reach, base, at): Near<'_>,
         out: &mut Vec<f64>,
     ) -> Result<(), Impossible> {
-        let at = at.map(|at| self.full(clip, at));
-        self.evidence.changed(clip, (&self.full(clip, shared), own), (reach, base, at.as_deref()), out)
+        let at = at.map(|(at, own)| (self.full(clip, at), own));
+        let at = at.as_ref().map(|(at, own)| (&at[..], *own));
+        self.evidence.changed(clip, (&self.full(clip, shared), own), (reach, base, at), out)
     }
 
     fn channels(&self) -> &[Channel] {

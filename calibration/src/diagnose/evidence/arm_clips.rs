@@ -317,7 +317,7 @@ impl<F: Fn(&[f64]) -> Theta + Sync> Evidence for ArmClips<F> {
         (_, base, at): Near<'_>,
         out: &mut Vec<f64>,
     ) -> Result<(), Impossible> {
-        let (Some(twin), Some(at)) = (&self.twin, at) else { return self.residuals(clip, shared, own, out) };
+        let (Some(twin), Some((at, _))) = (&self.twin, at) else { return self.residuals(clip, shared, own, out) };
         let from = self.clips[clip].stepped_from.at(at, || self.simulated_by((twin, 1), clip, at))?;
         *out = self.simulated_by((twin, 1), clip, shared)?;
         out.iter_mut().zip(base).zip(&*from).for_each(|((out, base), from)| *out += base - from);

@@ -13,6 +13,7 @@ use super::measured::{Channel, Evidence, Group, Near, Reach, Row, StageName};
 use super::recent::Recent;
 use super::scatter::Scatter;
 use crate::diagnose::library::Library;
+use crate::engine::Engine;
 use crate::estimate::{ClipModel, Impossible, Random};
 use crate::forward::Setting;
 use crate::forward::object::{self, ALL, ModelError, ObjectClips, Own, Part};
@@ -69,6 +70,9 @@ pub struct CellClips<'a, F> {
     /// object's.
     arm_alone: Vec<Recent<Vec<f64>>>,
 }
+
+/// Measured less predicted of a clip, at shared numbers and its own.
+type Errors = fn(&ObjectClips, usize, &[f64], &[f64]) -> Result<Vec<f64>, Impossible>;
 
 impl<'a, F: Fn(&[f64]) -> Theta + Sync> CellClips<'a, F> {
     /// Both on the same clips in the same order; without an arm, objects that move by themselves.
@@ -131,13 +135,22 @@ impl<'a, F: Fn(&[f64]) -> Theta + Sync> CellClips<'a, F> {
 
     /// The residuals of the poses and of the joints in contact at numbers, a clip's own among them.
     fn since_touch(&self, clip: usize, shared: &[f64], own: &[f64]) -> Result<Vec<f64>, Impossible> {
+        self.since_touch_by(ObjectClips::errors, (clip, shared, own))
+    }
+
+    /// The same out of errors that are given.
+    fn since_touch_by(
+        &self,
+        errors: Errors,
+        (clip, shared, own): (usize, &[f64], &[f64]),
+    ) -> Result<Vec<f64>, Impossible> {
         let mut shared = shared.to_vec();
         if let (Some(friction), Some(own)) = (self.friction, own.get(FRICTION)) {
             shared[friction] *= own.exp();
         }
         let clock = self.own.iter().position(|number| *number == Own::Clock).and_then(|k| own.get(k)).copied();
         let of_object = ALL.map(|number| if number == Own::Clock { clock.unwrap_or(0.0) } else { 0.0 });
-        let mut residuals = self.object.errors(clip, &shared, &of_object)?;
+        let mut residuals = errors(&self.object, clip, &shared, &of_object)?;
         let (noise, contact) = (self.object.noise(), &self.contact[clip]);
         let joints: Vec<f64> = residuals[contact.rows.clone()].to_vec();
         residuals.truncate(self.poses(clip));
@@ -157,6 +170,32 @@ impl<'a, F: Fn(&[f64]) -> Theta + Sync> CellClips<'a, F> {
         let stiffness: Vec<f64> = self.stiffness.iter().map(|k| shared[*k]).collect();
         residuals.extend(contact.in_sigmas(&joints, &stiffness));
         Ok(residuals)
+    }
+
+    /// [`Evidence::changed`] where another program simulates: what a step changes is the twin's.
+    fn stepped(
+        &self,
+        clip: usize,
+        (shared, own): (&[f64], &[f64]),
+        (reach, base, at): (Reach, &[f64], (&[f64], &[f64])),
+        out: &mut Vec<f64>,
+    ) -> Result<(), Impossible> {
+        let of_arm = self.of_arm(clip);
+        out.clear();
+        match &self.arm {
+            Some(arm) if reach != Reach::Object => {
+                arm.changed(clip, (shared, own), (reach, &base[..of_arm], Some(at)), out)?;
+            }
+            _ => out.extend_from_slice(&base[..of_arm]),
+        }
+        if reach == Reach::Arm {
+            out.extend_from_slice(&base[of_arm..]);
+            return Ok(());
+        }
+        let twins = |(shared, own)| self.since_touch_by(ObjectClips::twins_errors, (clip, shared, own));
+        let (before, after) = (twins(at)?, twins((shared, own))?);
+        out.extend(base[of_arm..].iter().zip(before).zip(after).map(|((base, before), after)| base + after - before));
+        Ok(())
     }
 
     /// How many rows the arm has that moves alone.
@@ -225,9 +264,12 @@ impl<F: Fn(&[f64]) -> Theta + Sync> Evidence for CellClips<'_, F> {
         &self,
         clip: usize,
         (shared, own): (&[f64], &[f64]),
-        (reach, base, _): Near<'_>,
+        (reach, base, at): Near<'_>,
         out: &mut Vec<f64>,
     ) -> Result<(), Impossible> {
+        if let (Some(_), Some(at)) = (self.engine(), at) {
+            return self.stepped(clip, (shared, own), (reach, base, at), out);
+        }
         let of_arm = self.of_arm(clip);
         match (reach, &self.arm) {
             (Reach::Arm, Some(_)) => {
@@ -248,6 +290,10 @@ impl<F: Fn(&[f64]) -> Theta + Sync> Evidence for CellClips<'_, F> {
             _ => self.residuals(clip, shared, own, out)?,
         }
         Ok(())
+    }
+
+    fn engine(&self) -> Option<&Arc<Engine>> {
+        self.object.engine()
     }
 
     fn channels(&self) -> &[Channel] {

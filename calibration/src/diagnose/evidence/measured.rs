@@ -4,7 +4,9 @@
 //! nothing. A hypothesis is a choice of which numbers are free; [`Selected`] makes it a [`ClipModel`] of its own.
 
 use super::scatter::Scatter;
+use crate::engine::Engine;
 use crate::estimate::{ClipModel, Impossible, Unknown};
+use std::sync::Arc;
 
 /// Part of a clip to which a channel's gap is counted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -80,8 +82,9 @@ pub enum Reach {
     Object,
 }
 
-/// A point nearby: what can have changed from it, the residuals there, and the shared numbers there, where they are known.
-pub type Near<'a> = (Reach, &'a [f64], Option<&'a [f64]>);
+/// A point nearby: what can have changed from it, the residuals there, and the numbers there, shared and the clip's own, where they
+/// are known.
+pub type Near<'a> = (Reach, &'a [f64], Option<(&'a [f64], &'a [f64])>);
 
 /// Clips that tell what each of their residuals is.
 pub trait Evidence: ClipModel {
@@ -98,6 +101,11 @@ pub trait Evidence: ClipModel {
         out: &mut Vec<f64>,
     ) -> Result<(), Impossible> {
         self.residuals(clip, shared, own, out)
+    }
+
+    /// The other program that simulates strokes, where it is not the twin.
+    fn engine(&self) -> Option<&Arc<Engine>> {
+        None
     }
 
     /// The residuals of a clip with every control period integrated in two parts; `None` where that is not known.

@@ -189,7 +189,7 @@ impl<E: Evidence, G: Fn(f64) -> bool + Sync> Work<'_, E, G> {
         let units: Vec<f64> = batch.iter().map(|k| self.turn(&mut numbers, self.columns[*k])).collect();
         let mut out = Vec::with_capacity(base.len());
         let reach = self.reach(batch, &numbers);
-        let answer = self.evidence.changed(clip, (&numbers, own), (reach, base, Some(self.full)), &mut out);
+        let answer = self.evidence.changed(clip, (&numbers, own), (reach, base, Some((self.full, own))), &mut out);
         let answered = answer.is_ok() && out.len() == base.len();
         if !answered {
             return Vec::new();
@@ -252,7 +252,7 @@ impl<E: Evidence, G: Fn(f64) -> bool + Sync> Work<'_, E, G> {
         let effect = &self.scatter.random[k];
         let (mut moved, mut out) = (own.to_vec(), Vec::new());
         moved[k] += effect.step;
-        let near = (Reach::Object, base, Some(self.full));
+        let near = (Reach::Object, base, Some((self.full, own)));
         let changed = |out: &mut Vec<f64>| self.evidence.changed(clip, (self.full, &moved), near, out);
         let turned = effect.sigma > 0.0 && changed(&mut out).is_ok();
         if !turned || out.len() != base.len() {

@@ -9,10 +9,11 @@ use crate::diagnose::answer::{Change, Gap, SensorGap, TorqueRms};
 use crate::diagnose::clips::admit::Admitted;
 use crate::diagnose::evidence::measured::Evidence;
 use crate::diagnose::fit::bench::Bench;
+use crate::forward::object::Replays;
+use crate::forward::setting;
 use crate::page::in_unit;
 use shared_mem::cell::Tolerance;
 use shared_mem::recording::Session;
-use twin::replay::Replayer;
 
 /// Figures on held-out clips.
 pub(in crate::diagnose) struct Sizes {
@@ -110,7 +111,8 @@ fn size_in_words((torques, joints): (Option<f64>, Option<f64>), add: Option<f64>
     }
 }
 
-/// Mean joint error, ADD and ADD-S of the confirm clips at two hypotheses, each with numbers that were not fitted to them, by the code of `twin replay`.
+/// Mean joint error, ADD and ADD-S of the confirm clips at two hypotheses, each with numbers that were not fitted to them, by the code of `twin replay`; of strokes
+/// by whoever simulates them.
 fn replayed<E: Evidence>(
     bench: &Bench<'_, E>,
     both: [&Fits; 2],
@@ -118,12 +120,14 @@ fn replayed<E: Evidence>(
     admitted: &Admitted,
 ) -> Result<[Change; 3], DiagnoseError> {
     let mut changes = [Change::default(); 3];
+    let (engine, nominal) = (bench.evidence.engine(), setting::complete(&session.cell, None)?);
     for (place, fits) in both.into_iter().enumerate() {
         let mut gaps = Vec::new();
         for (hypothesis, clips) in fits {
-            let replayer = Replayer::new(&session.cell, Some(&bench.library.theta(&hypothesis.full)))?;
+            let theta = bench.library.theta(&hypothesis.full);
+            let replays = Replays::new(&session.cell, &theta, (engine, &nominal))?;
             for clip in clips {
-                let (_, _, report) = replayer.replay(admitted.clips[*clip].clone())?;
+                let (_, _, report) = replays.replay(admitted.clips[*clip].clone())?;
                 gaps.push(report.gap);
             }
         }

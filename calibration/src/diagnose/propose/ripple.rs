@@ -59,7 +59,7 @@ pub(in crate::diagnose) fn start<E: Evidence>(
         bench.evidence.residuals(clip, &from.full, &own, &mut base).ok()?;
         let column = |full: &[f64]| {
             let mut out = Vec::new();
-            bench.evidence.changed(clip, (full, &own), (Reach::Arm, &base, Some(&from.full)), &mut out).ok()?;
+            bench.evidence.changed(clip, (full, &own), (Reach::Arm, &base, Some((&from.full, &own))), &mut out).ok()?;
             Some(out)
         };
         let waves = |order: &f64| {

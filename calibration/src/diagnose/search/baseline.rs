@@ -94,7 +94,7 @@ pub fn refined<E: Evidence>(
     if let (Some(object), Some(nominal)) = (&mut base.object, nominal) {
         *object = ObjectTheta { friction: object.friction, ..nominal };
     }
-    let theta = object::refine(cell, clips, &base, bench.interrupt).ok()?;
+    let theta = object::refine((cell, bench.evidence.engine()), clips, &base, bench.interrupt).ok()?;
     let numbers = bench.library.settings.numbers(&theta);
     let mut full = given.to_vec();
     for k in bench.library.baseline.clone() {

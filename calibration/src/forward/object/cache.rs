@@ -2,11 +2,11 @@
 
 use super::own::Values;
 use super::rollout::{Outcome, Path};
+use crate::forward::motion::felt_by_arm;
 use nalgebra::Isometry3;
 use shared_mem::theta::{ArmTheta, EffectTheta, Theta};
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, PoisonError};
-use twin::effects::{self, Place};
 use twin::rollout::{CellTrace, Checkpoint};
 
 /// Hits kept for a clip: a linearisation by as many numbers comes back to its point.
@@ -69,11 +69,8 @@ struct Run {
 
 impl ArmKey {
     pub(super) fn new(theta: &Theta, start: Isometry3<f64>) -> Self {
-        let counts = |effect: &&EffectTheta| {
-            effects::find(&effect.name)
-                .is_none_or(|effect| !matches!(effect.acts_on, Place::Object | Place::Table | Place::ObjectObservation))
-        };
-        Self { arm: theta.arm.clone(), effects: theta.effects.iter().filter(counts).cloned().collect(), start }
+        let Theta { arm, effects, .. } = felt_by_arm(theta);
+        Self { arm, effects, start }
     }
 
     /// Parameters that the way to the object is simulated with, whoever asks for it first: rounding of other ones of the

@@ -12,6 +12,8 @@
 //! | `clip` | a recorded clip, prepared |
 //! | `clearance` | how far tool and object are apart |
 //! | `rollout` | a clip in the twin |
+//! | `simulator` | a clip by another program, completed by the twin |
+//! | `replayed` | the figures of `twin replay`, whoever simulates |
 //! | `cache` | what of it can be used again |
 //! | `rows` | what every residual is about |
 
@@ -19,14 +21,18 @@ mod cache;
 mod clearance;
 mod clip;
 mod own;
+mod replayed;
 mod rollout;
 mod rows;
+mod simulator;
 
 pub use clearance::{Clearance, first_near};
 pub use own::{ALL, Axis, Own, Values};
+pub use replayed::Replays;
 pub use rows::{Channel, Part, Row};
 
 use super::Settings;
+use crate::engine::Engine;
 use crate::estimate::{ClipModel, Impossible, Random};
 use cache::ClipCache;
 use clip::ObjectClip;
@@ -35,6 +41,8 @@ use rollout::{Job, Outcome};
 use shared_mem::cell::{Cell, ClipKind, PoseNoise};
 use shared_mem::frames::{Base, Object, Pose};
 use shared_mem::recording::Clip;
+use shared_mem::theta::Theta;
+use simulator::{Simulator, composed, is_whole};
 use std::sync::{Arc, Mutex};
 use twin::effects::CameraMemory;
 use twin::rollout::CellRollout;
@@ -78,6 +86,9 @@ pub struct ObjectClips {
     error: ModelError,
     clips: Vec<ObjectClip>,
     caches: Vec<ClipCache>,
+    /// The other program where there is one, and what came of it, clip by clip.
+    simulator: Option<Simulator>,
+    simulated: Vec<ClipCache>,
     /// Idle workers; as many as threads were ever at work.
     workers: Mutex<Vec<CellRollout>>,
     worker: CellRollout,
@@ -102,10 +113,24 @@ impl ObjectClips {
         let noise = noise_of(cell);
         let prepared = |clip| ObjectClip::new(clip, cell, noise.position);
         let clips: Vec<_> = clips.into_iter().filter_map(prepared).collect();
-        let caches = clips.iter().map(|_| ClipCache::default()).collect();
+        let [caches, simulated] = [(), ()].map(|()| clips.iter().map(|_| ClipCache::default()).collect());
         let worker = CellRollout::new(cell, None)?;
         let (error, workers) = (ModelError::default(), Mutex::default());
-        Ok(Self { cell: cell.clone(), noise, error, clips, caches, workers, worker, settings })
+        let (cell, simulator) = (cell.clone(), None);
+        Ok(Self { cell, noise, error, clips, caches, simulator, simulated, workers, worker, settings })
+    }
+
+    /// The same simulated by another program, where there is one; `nominal`: the cell's nominal parameters.
+    #[must_use]
+    pub fn simulated_by(mut self, engine: Option<&Arc<Engine>>, nominal: &Theta) -> Self {
+        self.simulator = engine.map(|engine| Simulator { engine: Arc::clone(engine), nominal: nominal.clone() });
+        self
+    }
+
+    /// The other program.
+    #[must_use]
+    pub fn engine(&self) -> Option<&Arc<Engine>> {
+        self.simulator.as_ref().map(|simulator| &simulator.engine)
     }
 
     /// The same clips, other numbers to turn.
@@ -126,7 +151,7 @@ impl ObjectClips {
     /// Changes [`Self::model_error`].
     pub fn set_model_error(&mut self, error: ModelError) {
         if error.joints.is_some() != self.error.joints.is_some() {
-            self.caches.iter_mut().for_each(|cache| *cache = ClipCache::default());
+            self.caches.iter_mut().chain(&mut self.simulated).for_each(|cache| *cache = ClipCache::default());
         }
         self.error = error;
     }
@@ -169,16 +194,43 @@ impl ObjectClips {
 
     fn outcome(&self, clip: usize, shared: &[f64], own: &Values) -> Result<Arc<Outcome>, Impossible> {
         let theta = self.settings.theta(shared);
-        let (clip, cache) = (&self.clips[clip], &self.caches[clip]);
+        let Some(simulator) = &self.simulator else { return self.by_twin(clip, &theta, own) };
+        let cache = &self.simulated[clip];
         if let Some(outcome) = cache.outcome(&theta, own) {
             return Ok(outcome);
         }
+        let (known, standing) = (simulator.part(&theta), own.standing());
+        let mut outcome = self.job(clip, (&known, &standing), |mut job| simulator.outcome(&mut job))?;
+        if !is_whole((&theta, &known), own) {
+            let [with, without] = [self.by_twin(clip, &theta, own)?, self.by_twin(clip, &known, &standing)?];
+            outcome = composed(&outcome, &with, &without);
+        }
+        Ok(cache.keep_outcome(theta, own, outcome))
+    }
+
+    fn by_twin(&self, clip: usize, theta: &Theta, own: &Values) -> Result<Arc<Outcome>, Impossible> {
+        let cache = &self.caches[clip];
+        if let Some(outcome) = cache.outcome(theta, own) {
+            return Ok(outcome);
+        }
+        let outcome = self.job(clip, (theta, own), |job| job.run())?;
+        Ok(cache.keep_outcome(theta.clone(), own, outcome))
+    }
+
+    /// Has something done by an idle worker.
+    fn job(
+        &self,
+        clip: usize,
+        (theta, own): (&Theta, &Values),
+        work: impl FnOnce(Job<'_>) -> Result<Outcome, Impossible>,
+    ) -> Result<Outcome, Impossible> {
+        let (clip, cache) = (&self.clips[clip], &self.caches[clip]);
         let idle = self.workers.lock().expect("no rollout has panicked").pop();
         let mut worker = idle.unwrap_or_else(|| self.worker.clone());
         let joints_ns = if self.error.joints.is_some() { &clip.arm_ns[..] } else { &[] };
-        let outcome = Job { cell: &self.cell, clip, theta: &theta, own, joints_ns, worker: &mut worker, cache }.run();
+        let outcome = work(Job { cell: &self.cell, clip, theta, own, joints_ns, worker: &mut worker, cache });
         self.workers.lock().expect("no rollout has panicked").push(worker);
-        Ok(cache.keep_outcome(theta, own, outcome?))
+        outcome
     }
 
     /// Measured less predicted, row by row as [`Self::rows`] says [m, rad].
@@ -187,9 +239,21 @@ impl ObjectClips {
     /// [`Impossible`] when the cell cannot be simulated with these numbers.
     pub fn errors(&self, clip: usize, shared: &[f64], own: &[f64]) -> Result<Vec<f64>, Impossible> {
         let own = Values::new(own, self.clips[clip].recorded.kind);
-        let outcome = self.outcome(clip, shared, &own)?;
+        self.errors_of(clip, &*self.outcome(clip, shared, &own)?, &own)
+    }
+
+    /// The same by the twin, whoever simulates: for what a step changes.
+    ///
+    /// # Errors
+    /// As [`Self::errors`].
+    pub fn twins_errors(&self, clip: usize, shared: &[f64], own: &[f64]) -> Result<Vec<f64>, Impossible> {
+        let own = Values::new(own, self.clips[clip].recorded.kind);
+        self.errors_of(clip, &*self.by_twin(clip, &self.settings.theta(shared), &own)?, &own)
+    }
+
+    fn errors_of(&self, clip: usize, outcome: &Outcome, own: &Values) -> Result<Vec<f64>, Impossible> {
         let clip = &self.clips[clip];
-        let poses = clip.recorded.object.poses.iter().zip(reported(&outcome, clip, &own));
+        let poses = clip.recorded.object.poses.iter().zip(reported(outcome, clip, own));
         let mut errors: Vec<f64> = poses.flat_map(|(a, b)| difference(&a.isometry(), &b.isometry())).collect();
         if self.error.joints.is_some() {
             let measured = &clip.recorded.measured;
@@ -246,6 +310,23 @@ impl ClipModel for ObjectClips {
     fn residuals(&self, clip: usize, shared: &[f64], own: &[f64], out: &mut Vec<f64>) -> Result<(), Impossible> {
         *out = self.errors(clip, shared, own)?;
         out.iter_mut().zip(self.sigmas(clip)).for_each(|(error, sigma)| *error /= sigma);
+        Ok(())
+    }
+
+    fn stepped(
+        &self,
+        clip: usize,
+        (shared, own): (&[f64], &[f64]),
+        ((from, from_own), base): ((&[f64], &[f64]), &[f64]),
+        out: &mut Vec<f64>,
+    ) -> Result<(), Impossible> {
+        if self.simulator.is_none() {
+            return self.residuals(clip, shared, own, out);
+        }
+        let before = self.twins_errors(clip, from, from_own)?;
+        *out = self.twins_errors(clip, shared, own)?;
+        let rows = out.iter_mut().zip(&before).zip(base).zip(self.sigmas(clip));
+        rows.for_each(|(((out, before), base), sigma)| *out = base + (*out - before) / sigma);
         Ok(())
     }
 }

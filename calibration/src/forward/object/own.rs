@@ -177,6 +177,14 @@ impl Values {
         felt
     }
 
+    /// Those that say where the object stands before anything moves it.
+    pub(super) fn standing(&self) -> Self {
+        let mut standing = *self;
+        let stands = |own: &Own| matches!(own, Own::Start(_) | Own::StartYaw);
+        ALL.iter().zip(&mut standing.0).filter(|(own, _)| !stands(own)).for_each(|(_, value)| *value = 0.0);
+        standing
+    }
+
     /// Those along an axis, as a vector.
     pub(super) fn vector(&self, own: impl Fn(Axis) -> Own) -> nalgebra::Vector3<f64> {
         nalgebra::Vector3::from([Axis::X, Axis::Y, Axis::Z].map(|axis| self.of(own(axis))))

@@ -15,7 +15,8 @@ use shared_mem::frames::Pose;
 use shared_mem::theta::{ObjectTheta, Theta};
 use shared_mem::time::TICK_NS;
 use std::sync::Arc;
-use twin::arm::Joints;
+use twin::arm::{JointState, Joints};
+use twin::control::CommandTrack;
 use twin::effects::CameraEffects;
 use twin::replay::object_start;
 use twin::rollout::{CellRollout, CellTrace, Course, ObjectState};
@@ -71,7 +72,7 @@ pub(super) struct Job<'a> {
     pub(super) cache: &'a ClipCache,
 }
 
-fn impossible(error: impl std::fmt::Display) -> Impossible {
+pub(super) fn impossible(error: impl std::fmt::Display) -> Impossible {
     Impossible(error.to_string())
 }
 
@@ -92,11 +93,24 @@ impl Job<'_> {
         }
     }
 
+    /// Where the object stands before it is hit.
+    pub(super) fn standing(&self, object: &ObjectModel) -> Result<Isometry3<f64>, Impossible> {
+        let series = self.clip.undistorted(&self.worker.cell().camera_effects());
+        let rest = object_start::resting(&series, object, self.cell).ok_or_else(|| impossible("no object poses"))?;
+        Ok(self.moved(&rest.isometry()))
+    }
+
+    /// What was commanded, and the state in which the arm begins under the worker's parameters.
+    pub(super) fn begun(&self) -> Result<(&CommandTrack, JointState), Impossible> {
+        let commands = self.clip.commands.as_ref().ok_or_else(|| impossible("no commands"))?;
+        let arm = self.worker.arm().ok_or_else(|| impossible("the cell has no arm"))?;
+        let first = arm.start_state(&self.clip.recorded.measured, 0, commands);
+        Ok((commands, first.ok_or_else(|| impossible("no measured joints"))?))
+    }
+
     fn hit(&mut self, object: &ObjectModel) -> Result<Outcome, Impossible> {
         let camera = self.worker.cell().camera_effects();
-        let series = self.clip.undistorted(&camera);
-        let rest = object_start::resting(&series, object, self.cell).ok_or_else(|| impossible("no object poses"))?;
-        let start = self.moved(&rest.isometry());
+        let start = self.standing(object)?;
         let hit = self.until_release(start)?;
         let (mut path, mut joints) = (hit.path.clone(), hit.joints.clone());
         if let Some(checkpoint) = &hit.checkpoint {
@@ -144,16 +158,14 @@ impl Job<'_> {
     }
 
     fn approach(&mut self, key: ArmKey, start: &Isometry3<f64>) -> Result<Approach, Impossible> {
-        let commands = self.clip.commands.as_ref().ok_or_else(|| impossible("no commands"))?;
-        let measured = &self.clip.recorded.measured;
         self.worker.set_parameters(&key.theta()).map_err(impossible)?;
-        let arm = self.worker.arm().ok_or_else(|| impossible("the cell has no arm"))?;
-        let first = arm.start_state(measured, 0, commands).ok_or_else(|| impossible("no measured joints"))?;
+        let (_, first) = self.begun()?;
         let object = ObjectState::at_rest(Pose::from_isometry(*start));
-        self.worker.start(measured.stamps_ns[0], Some(&first), Some(&object), Some(commands));
+        let commands = self.clip.commands.as_ref();
+        self.worker.start(self.clip.recorded.measured.stamps_ns[0], Some(&first), Some(&object), commands);
         let mut joints = CellTrace::default();
         let end_ns = [self.clip.end_ns];
-        let course = Course { commands: Some(commands), joints_ns: self.joints_ns, poses_ns: &end_ns };
+        let course = Course { commands, joints_ns: self.joints_ns, poses_ns: &end_ns };
         let contact_ns = self.worker.run_until_contact(&course, &mut joints);
         not_interrupted()?;
         let checkpoint = contact_ns.map(|_| self.worker.checkpoint());

@@ -204,7 +204,8 @@ fn finished(
     numbers: &[f64],
     (evaluations, seconds, loss_m, way): Course,
 ) -> Result<Method, ObjectError> {
-    let (gaps, _) = gaps(material, &problem.settings.theta(numbers))?;
+    let theta = problem.settings.theta(numbers);
+    let (gaps, _) = gaps(material, &theta, (None, &theta))?;
     let mean = |of: &[usize]| Figures::mean(&of.iter().map(|clip| figures(&gaps[*clip])).collect::<Vec<_>>());
     let named = |(unknown, value): (&Unknown, &f64)| (unknown.name.clone(), *value);
     let clip = |clip: &usize| {

@@ -2,24 +2,31 @@
 
 use super::ObjectError;
 use super::material::Material;
+use crate::engine::Engine;
+use crate::forward::object::Replays;
 use crate::identify::answer::{ClipGap, Figures, Identification};
 use crate::page::Trace;
 use rayon::prelude::*;
 use shared_mem::recording::Clip;
 use shared_mem::theta::Theta;
 use shared_mem::time::seconds_between;
-use twin::replay::{Gap, Prediction, Replayer};
+use std::sync::Arc;
+use twin::replay::{Gap, Prediction};
 
 /// Measured less predicted position of the object, along x and y of the base frame.
 pub(super) type Path = [Vec<[f64; 2]>; 2];
+
+/// Another program where it simulates in place of the twin, and the cell's nominal parameters.
+pub(super) type By<'a> = (Option<&'a Arc<Engine>>, &'a Theta);
 
 /// Figures of every clip before and after, and their means over clips fitted and held out.
 pub(super) fn fill(
     answer: &mut Identification,
     material: &Material,
     [before, after]: [&Theta; 2],
+    by: By<'_>,
 ) -> Result<(), ObjectError> {
-    let ((before, paths_before), (after, paths_after)) = (gaps(material, before)?, gaps(material, after)?);
+    let ((before, paths_before), (after, paths_after)) = (gaps(material, before, by)?, gaps(material, after, by)?);
     let files = material.usable.iter().map(|usable| usable.file.as_str());
     let paths = paths_before.into_iter().zip(paths_after);
     answer.traces = files.zip(paths).flat_map(|(file, paths)| traces(file, material, paths)).collect();
@@ -68,10 +75,10 @@ fn traces(file: &str, material: &Material, (before, after): (Path, Path)) -> imp
 }
 
 /// Gap of every clip, and what is left of its object's path.
-pub(super) fn gaps(material: &Material, theta: &Theta) -> Result<(Vec<Gap>, Vec<Path>), ObjectError> {
-    let replayer = Replayer::new(&material.cell, Some(theta))?;
+pub(super) fn gaps(material: &Material, theta: &Theta, by: By<'_>) -> Result<(Vec<Gap>, Vec<Path>), ObjectError> {
+    let replays = Replays::new(&material.cell, theta, by)?;
     let gap = |usable: &super::material::Usable| -> Result<(Gap, Path), ObjectError> {
-        let (clip, prediction, report) = replayer.replay(usable.clip.clone())?;
+        let (clip, prediction, report) = replays.replay(usable.clip.clone())?;
         Ok((report.gap, path(&clip, &prediction)))
     };
     let done: Vec<(Gap, Path)> = material.usable.par_iter().map(gap).collect::<Result<_, _>>()?;

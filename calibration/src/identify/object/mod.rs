@@ -38,6 +38,7 @@ mod vicinity;
 
 use super::answer::Identification;
 use super::run::{Optimizer, Outcome, Run, RunError, concluded};
+use crate::engine::{Engine, EngineError, Used};
 use crate::estimate::{Impossible, Options as FitOptions, Unknown, fit as fit_clips};
 use crate::forward::arm::{ArmClips, Channel};
 use crate::forward::object::ObjectClips;
@@ -59,6 +60,7 @@ use shared_mem::recording::{Clip, ReadError, SessionFiles};
 use shared_mem::theta::Theta;
 use shared_mem::toml_file::{self, TomlFileError};
 use std::path::PathBuf;
+use std::sync::Arc;
 use std::time::Instant;
 use twin::arm::ModelError;
 use twin::replay::ReplayError;
@@ -84,6 +86,8 @@ pub struct Options {
     pub budget: usize,
     /// Draws the clips that are held out, and the searches.
     pub seed: u64,
+    /// Another program that simulates arm and object in place of the twin.
+    pub engine: Option<Arc<Engine>>,
 }
 
 /// The object cannot be identified.
@@ -110,6 +114,9 @@ pub enum ObjectError {
     /// A clip cannot be replayed.
     #[error(transparent)]
     Replay(#[from] ReplayError),
+    /// The engine cannot be asked for these clips.
+    #[error(transparent)]
+    Engine(#[from] EngineError),
     /// There is nothing to identify.
     #[error("cell.toml has no [object] block; add it, or identify the arm")]
     NoObject,
@@ -140,9 +147,14 @@ pub fn identify(options: &Options, interrupt: &Interrupt) -> Result<Identificati
     let began = Instant::now();
     let material = Material::open(options)?;
     let parameters = options.parameters.as_deref().map(Theta::read).transpose()?;
+    let engine = options.engine.as_ref();
+    if let Some(engine) = engine {
+        engine.admits(material.usable.iter().map(|usable| &usable.clip))?;
+    }
     let question = Fingerprint::of("identify object")
         .with(&(options.optimizer.name(), options.budget, options.seed))
         .with(&(material.cell.to_toml(), parameters.map(|theta| theta.to_toml())))
+        .with(&engine.map(|engine| engine.ability().print()))
         .with_clips(material.usable.iter().map(|usable| &usable.clip));
     let kept = kept::for_work((options.out.as_deref(), &options.session, "identify_object"), &question, interrupt);
     let found = identify_kept(&material, options, (&kept, interrupt));
@@ -174,7 +186,9 @@ fn identify_kept(
     (kept, interrupt): (&Kept, &Interrupt),
 ) -> Result<(Identification, Theta), ObjectError> {
     let problem = Problem::new(material, options, (kept, interrupt))?;
-    let mut clips = ObjectClips::new(&material.cell, material.train(), problem.settings.clone())?;
+    let (engine, nominal) = (options.engine.as_ref(), complete(&material.cell, None)?);
+    let clips = ObjectClips::new(&material.cell, material.train(), problem.settings.clone())?;
+    let mut clips = clips.simulated_by(engine, &nominal);
     let found = problem.search(&mut clips, options, (kept, interrupt))?;
     let searched = (&problem.settings, &problem.unknowns[..]);
     let disagreement = disagreement(&found.at.shared, &clips, searched, (kept, interrupt))?;
@@ -191,9 +205,11 @@ fn identify_kept(
             .warnings
             .push("ended before parts of the tosses were asked: the intervals are too narrow; run it again".into());
     }
-    figures::fill(&mut answer, material, [problem.settings.base(), &theta])?;
+    figures::fill(&mut answer, material, [problem.settings.base(), &theta], (engine, &nominal))?;
     let doubts = doubt::doubts(&answer, &material.cell);
     answer.warnings.extend(doubts);
+    answer.engine = engine.map(|engine| engine.used());
+    answer.warnings.extend(answer.engine.iter().flat_map(Used::sentences));
     // Gains of cell.toml were not found.
     let theta = Theta { arm: problem.known.arm.clone(), ..theta };
     Ok((answer, theta))
@@ -222,7 +238,8 @@ impl Problem {
             let hits: Vec<Clip> = clips.into_iter().filter(|clip| clip.kind == ClipKind::ControlHitSlide).collect();
             if !hits.is_empty() {
                 warnings.push("the arm's gains were found first, from the way to the object in the same clips".into());
-                let find = || with_gains(&material.cell, &given, hits, interrupt);
+                let by = (&material.cell, options.engine.clone());
+                let find = || with_gains(by, &given, hits, interrupt);
                 // As text: what a person may read a number of effects in is no plain list of fields.
                 let text = kept.once_if_ok(&Fingerprint::of("gains"), || find().map(|theta| theta.to_toml()))?;
                 given = toml_file::parse::<Theta>(&text, std::path::Path::new("theta.toml"))?.about(&material.cell);
@@ -296,9 +313,15 @@ fn searched(cell: &Cell, base: Theta) -> (Settings, Vec<Unknown>) {
 ///
 /// # Errors
 /// [`ObjectError`] when the cell cannot be simulated with `base`.
-pub fn refine(cell: &Cell, clips: Vec<Clip>, base: &Theta, interrupt: &Interrupt) -> Result<Theta, ObjectError> {
+pub fn refine(
+    (cell, engine): (&Cell, Option<&Arc<Engine>>),
+    clips: Vec<Clip>,
+    base: &Theta,
+    interrupt: &Interrupt,
+) -> Result<Theta, ObjectError> {
     let (settings, unknowns) = searched(cell, base.clone());
-    let mut clips = ObjectClips::new(cell, clips, settings.clone())?;
+    let clips = ObjectClips::new(cell, clips, settings.clone())?;
+    let mut clips = clips.simulated_by(engine, &complete(cell, None)?);
     let start: Vec<f64> = unknowns.iter().map(|unknown| unknown.start).collect();
     let trail = (Kept::nothing(), "");
     let found = fit_object(&mut clips, &unknowns, &start, trail, |_, _| !interrupt.asked())?;
@@ -306,11 +329,17 @@ pub fn refine(cell: &Cell, clips: Vec<Clip>, base: &Theta, interrupt: &Interrupt
 }
 
 /// The gains that fit the arm's way to the object.
-fn with_gains(cell: &Cell, given: &Theta, clips: Vec<Clip>, interrupt: &Interrupt) -> Result<Theta, ObjectError> {
+fn with_gains(
+    (cell, engine): (&Cell, Option<Arc<Engine>>),
+    given: &Theta,
+    clips: Vec<Clip>,
+    interrupt: &Interrupt,
+) -> Result<Theta, ObjectError> {
     let base = complete(cell, Some(given))?;
     let (settings, unknowns): (Vec<Setting>, Vec<Unknown>) = gains(cell, &base).into_iter().unzip();
     let settings = Settings::new(base, settings);
     let (clips, _) = ArmClips::new(cell, clips, &[Channel::Position], |numbers: &[f64]| settings.theta(numbers))?;
+    let clips = clips.moved_by(engine, &complete(cell, None)?);
     let fit = fit_clips(&clips, &unknowns, &clips.random(), &FitOptions::default(), |_, _| !interrupt.asked())?;
     Ok(Theta { arm: settings.theta(&fit.shared).arm, ..given.clone() })
 }

@@ -112,6 +112,16 @@ impl ClipModel for OneClip<'_> {
     fn residuals(&self, _: usize, _: &[f64], own: &[f64], out: &mut Vec<f64>) -> Result<(), Impossible> {
         self.clips.residuals(self.clip, self.shared, own, out)
     }
+
+    fn stepped(
+        &self,
+        _: usize,
+        (_, own): (&[f64], &[f64]),
+        ((_, from), base): ((&[f64], &[f64]), &[f64]),
+        out: &mut Vec<f64>,
+    ) -> Result<(), Impossible> {
+        self.clips.stepped(self.clip, (self.shared, own), ((self.shared, from), base), out)
+    }
 }
 
 /// Own numbers at their best, their cost, calls of the model.
