@@ -1,14 +1,16 @@
 """An arm in MuJoCo under the controller of cell.toml, with what MuJoCo can do of the effects of docs/effects.md.
 
 The model is the user's: masses, rotors (`armature`), friction and damping of joints count as they stand in it. Its actuators are
-left out, because the law of cell.toml takes their place: tau = k (q_d - q) + d (dq_d - dq) + gravity(q) + coriolis(q, dq), or
-tau = k (q_d - q) - d dq for `joint_pd`, once a control period and held over it.
+left out, and so are bodies that float freely: the object comes from the session. The law of cell.toml takes the actuators' place:
+tau = k (q_d - q) + d (dq_d - dq) + gravity(q) + coriolis(q, dq), or tau = k (q_d - q) - d dq for `joint_pd`, once a control period
+and held over it.
 """
 import mujoco
 import numpy as np
 from protocol import Impossible
 
 FLOWN = 100.0  # a joint that far from 0 has left all bounds [rad]
+LOAD = "twinalign_load"
 
 # Effects, with the parameters that are known of each. Dry friction is not among them: MuJoCo's `frictionloss` builds up otherwise than
 # coulomb tanh(dq / creep), and a verdict on it then has a wrong name. What the twin makes of it is added instead.
@@ -55,19 +57,12 @@ def leaning(gravity, tilt):
     return (gravity * np.cos(angle) - np.cross(axis, gravity) * np.sin(angle) + axis * (axis @ gravity) * (1 - np.cos(angle)))
 
 
-class Arm:
-    """The user's model, ready to be rolled out."""
+class World:
+    """A compiled model with the arm in it."""
 
-    def __init__(self, path, cell, joints, period, step, flange):
-        spec = mujoco.MjSpec.from_file(path)
-        for element in [*spec.actuators, *spec.sensors, *spec.keys]:
-            spec.delete(element)
-        self.flange = next((name for name in (flange, "flange", "attachment") if name and spec.body(name)), None)
-        if flange and self.flange != flange:
-            raise ValueError(f"{path} has no body `{flange}`; --flange names the body that the tool is fixed to")
-        if self.flange:
-            load = spec.body(self.flange).add_body(name="twinalign_load")
-            load.mass, load.inertia, load.explicitinertial = 1e-9, [1e-12] * 3, True
+    touches = False  # whether something may push the arm
+
+    def __init__(self, spec, path, joints, period, step):
         spec.option.timestep = step
         spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
         spec.option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
@@ -85,36 +80,78 @@ class Arm:
             raise ValueError(f"the joints of {path} do not follow each other in the order of {', '.join(joints)}")
         self.at, self.dofs = (slice(places[0], places[0] + len(joints)) for places in first)
         self.steps = max(1, round(period / step))
-        self.period, self.step = period, step
-        controller = cell["controller"]
-        self.follows_speed = controller["kind"] == "joint_impedance"
-        if controller["kind"] not in ("joint_impedance", "joint_pd"):
-            raise ValueError(f"the control law `{controller['kind']}` is not known to this adapter")
-        self.limit = np.array(controller.get("torque_limit", [np.inf] * len(joints)), float)
-        kept = ("dof_armature", "dof_damping")
-        self.nominal = {name: getattr(self.model, name).copy() for name in kept}
+        # A semi-implicit step leaves positions half a step ahead of velocities.
+        self.ahead = 0.5 * step
+        self.nominal = {name: getattr(self.model, name).copy() for name in ("dof_armature", "dof_damping")}
         self.gravity = self.model.opt.gravity.copy()
-        self.believed = Believed(spec.compile(), self.at, self.dofs)
+        data = self.data
+        self.position, self.speed, self.torque = data.qpos[self.at], data.qvel[self.dofs], data.qfrc_applied[self.dofs]
+        self.load = self.model.body(LOAD).id if mujoco.mj_name2id(self.model, mujoco.mjtObj.mjOBJ_BODY, LOAD) >= 0 else None
 
-    def effects(self):
-        return {name: parameters for name, parameters in EFFECTS.items() if name != "payload" or self.flange}
-
-    def _set(self, effects):
+    def set(self, effects):
+        """The arm with these effects; its state is lost."""
         model, of = self.model, lambda effect, name: np.asarray(effects.get(effect, {}).get(name, 0.0), float)
+        mujoco.mj_resetData(model, self.data)
         for name, values in self.nominal.items():
             getattr(model, name)[:] = values
         model.dof_armature[self.dofs] = np.maximum(model.dof_armature[self.dofs] + of("rotor_inertia", "extra"), 0.0)
         model.dof_damping[self.dofs] += of("joint_viscous_friction", "viscous")
         model.opt.gravity[:] = leaning(self.gravity, of("base_tilt", "tilt") + np.zeros(2))
-        if self.flange:
-            load = model.body("twinalign_load").id
-            model.body_mass[load] = max(float(of("payload", "mass")), 1e-9)
-            model.body_ipos[load] = of("payload", "centre") + np.zeros(3)
-            # Masses of subtrees are sums of these.
-            mujoco.mj_setConst(model, self.data)
+        if self.load is not None:
+            model.body_mass[self.load] = max(float(of("payload", "mass")), 1e-9)
+            model.body_ipos[self.load] = of("payload", "centre") + np.zeros(3)
 
-    def _commands(self, asked, effects):
-        commands = asked.commands
+    def friction(self):
+        """Torque of the model's own joint friction and limits in the step just taken [N m]."""
+        data, dofs = self.data, self.dofs
+        if not self.touches:
+            return data.qfrc_passive[dofs] + data.qfrc_constraint[dofs]
+        dry, rows = np.zeros(self.model.nv), data.efc_type[:data.nefc] == mujoco.mjtConstraint.mjCNSTR_FRICTION_DOF
+        dry[data.efc_id[:data.nefc][rows]] = data.efc_force[:data.nefc][rows]
+        return data.qfrc_passive[dofs] + dry[dofs]
+
+    def put(self, q, dq):
+        """Puts the arm where its joints are at `q` when they move at `dq`."""
+        self.position[:], self.speed[:] = q + self.ahead * dq, dq
+
+
+class Arm:
+    """The user's model, ready to be rolled out."""
+
+    def __init__(self, path, cell, joints, period, step, flange):
+        self.path, self.joints, self.period = path, joints, period
+        self.flange = None
+        spec = self.spec()
+        self.flange = next((name for name in (flange, "flange", "attachment") if name and spec.body(name)), None)
+        if flange and self.flange != flange:
+            raise ValueError(f"{path} has no body `{flange}`; --flange names the body that the tool is fixed to")
+        self.world = self.built(self.spec(), step)
+        controller = cell["controller"]
+        self.follows_speed = controller["kind"] == "joint_impedance"
+        if controller["kind"] not in ("joint_impedance", "joint_pd"):
+            raise ValueError(f"the control law `{controller['kind']}` is not known to this adapter")
+        self.limit = np.array(controller.get("torque_limit", [np.inf] * len(joints)), float)
+        self.believed = Believed(self.spec().compile(), self.world.at, self.world.dofs)
+
+    def spec(self):
+        """The user's model, to be added to."""
+        spec = mujoco.MjSpec.from_file(self.path)
+        floating = [joint.parent for joint in spec.joints if joint.type == mujoco.mjtJoint.mjJNT_FREE]
+        for element in [*spec.actuators, *spec.sensors, *spec.keys, *floating]:
+            spec.delete(element)
+        if self.flange:
+            load = spec.body(self.flange).add_body(name=LOAD)
+            load.mass, load.inertia, load.explicitinertial = 1e-9, [1e-12] * 3, True
+        return spec
+
+    def built(self, spec, step):
+        return World(spec, self.path, self.joints, self.period, step)
+
+    def effects(self):
+        return {name: parameters for name, parameters in EFFECTS.items() if name != "payload" or self.flange}
+
+    def commands(self, asked):
+        commands, effects = asked.commands, asked.effects
         if "command_delay" in effects:
             commands = late(commands, effects["command_delay"]["delay"] / self.period)
         if "command_lag" in effects and effects["command_lag"]["time_constant"] > 0:
@@ -123,50 +160,80 @@ class Arm:
 
     def roll_out(self, asked):
         """States [rows, readings that are asked for, dof] at the times that are asked for."""
-        model, data, effects = self.model, self.data, asked.effects
-        mujoco.mj_resetData(model, data)
-        self._set(effects)
-        part = lambda effect, name, resting: np.asarray(effects.get(effect, {}).get(name, resting), float)
-        offset, lost = part("joint_encoder_offset", "offset", 0.0), part("joint_friction_asymmetry", "offset", 0.0)
-        # A semi-implicit step leaves positions half a step ahead of velocities.
-        ahead = 0.5 * self.step
-        position, speed, torque = data.qpos[self.at], data.qvel[self.dofs], data.qfrc_applied[self.dofs]
-        position[:], speed[:] = asked.q - offset + ahead * asked.dq, asked.dq
-        commands, motors, believed = self._commands(asked, effects), Motors(effects, self.period), self.believed
-        stiffness, damping, limit = asked.parameters["stiffness"], asked.parameters["damping"], self.limit
-        if self.follows_speed:
-            # All of the law that is known beforehand.
-            wanted = stiffness * commands[:, :asked.dof] + damping * commands[:, asked.dof:]
-        else:
-            wanted = stiffness * commands[:, :asked.dof]
-        wants_torque, rotor = "tau_J" in asked.readings, model.dof_armature[self.dofs]
-        ends = {name: np.empty((len(commands) + 1, asked.dof)) for name in ("q", "dq", *asked.readings)}
-        qs, dqs = ends["q"], ends["dq"]
-        qs[0], dqs[0] = asked.q, asked.dq
-        for tick in range(len(commands)):
-            q, dq = qs[tick], dqs[tick]
-            tau = wanted[tick] - stiffness * q - damping * dq
-            if self.follows_speed:
-                tau += believed.bias(q, dq)
-            np.clip(tau, -limit, limit, out=tau)
-            if "tau_J_d" in ends:
-                ends["tau_J_d"][tick + 1] = tau - believed.gravity(q)
-            tau = motors.torque(tau)
-            torque[:] = tau - lost
-            friction = 0.0
-            for _ in range(self.steps):
-                mujoco.mj_step(model, data)
-                if wants_torque:
-                    friction = friction + data.qfrc_passive[self.dofs] + data.qfrc_constraint[self.dofs]
-            qs[tick + 1] = position - ahead * speed + offset
-            dqs[tick + 1] = speed
-            if wants_torque:
-                ends["tau_J"][tick + 1] = tau - lost + friction / self.steps - rotor * (speed - dq) / self.period
-            if tick % 64 == 0 and not np.abs(q).max() < FLOWN:
-                raise Impossible(f"the arm left all bounds after {tick * self.period:.3f} s")
+        world, motion = self.world, Motion(self, asked)
+        world.set(asked.effects)
+        if world.load is not None:
+            # Masses of subtrees are sums of these.
+            mujoco.mj_setConst(world.model, world.data)
+        motion.begin(world)
+        while motion.tick < motion.ticks:
+            motion.advance(world)
+        return motion.states(asked)
+
+
+class Motion:
+    """An arm under its law, a control period at a time, in whichever world it is."""
+
+    def __init__(self, arm, asked):
+        self.arm, part = arm, lambda effect, name: np.asarray(asked.effects.get(effect, {}).get(name, 0.0), float)
+        self.offset, self.lost = part("joint_encoder_offset", "offset"), part("joint_friction_asymmetry", "offset")
+        self.bias = part("torque_sensor_bias", "bias")
+        commands, self.motors = arm.commands(asked), Motors(asked.effects, arm.period)
+        self.stiffness, self.damping = asked.parameters["stiffness"], asked.parameters["damping"]
+        # All of the law that is known beforehand.
+        self.wanted = self.stiffness * commands[:, :asked.dof]
+        if arm.follows_speed:
+            self.wanted = self.wanted + self.damping * commands[:, asked.dof:]
+        self.tick, self.ticks = 0, len(commands)
+        self.ends = {name: np.empty((self.ticks + 1, asked.dof)) for name in ("q", "dq", *asked.readings)}
+        self.qs, self.dqs = self.ends["q"], self.ends["dq"]
+        self.qs[0], self.dqs[0] = asked.q, asked.dq
+
+    def begin(self, world):
+        """Puts the arm where it is now."""
+        world.put(self.qs[self.tick] - self.offset, self.dqs[self.tick])
+
+    def advance(self, world):
+        """A control period."""
+        model, data, tick, dofs = world.model, world.data, self.tick, world.dofs
+        q, dq = self.qs[tick], self.dqs[tick]
+        tau = self.wanted[tick] - self.stiffness * q - self.damping * dq
+        if self.arm.follows_speed:
+            tau += self.arm.believed.bias(q, dq)
+        np.clip(tau, -self.arm.limit, self.arm.limit, out=tau)
+        if "tau_J_d" in self.ends:
+            self.ends["tau_J_d"][tick + 1] = tau - self.arm.believed.gravity(q)
+        tau = self.motors.torque(tau)
+        world.torque[:] = tau - self.lost
+        wants_torque, friction = "tau_J" in self.ends, 0.0
         if wants_torque:
-            ends["tau_J"] += part("torque_sensor_bias", "bias", 0.0)
-        return between(ends, asked, self.period)
+            for _ in range(world.steps):
+                mujoco.mj_step(model, data)
+                friction = friction + world.friction()
+        else:
+            mujoco.mj_step(model, data, nstep=world.steps)
+        self.tick = tick = tick + 1
+        speed = world.speed
+        self.qs[tick] = world.position - world.ahead * speed + self.offset
+        self.dqs[tick] = speed
+        if wants_torque:
+            taken = model.dof_armature[dofs] * (speed - dq) / self.arm.period
+            self.ends["tau_J"][tick] = tau - self.lost + friction / world.steps - taken
+        if tick % 64 == 0 and not np.abs(q).max() < FLOWN:
+            raise Impossible(f"the arm left all bounds after {tick * self.arm.period:.3f} s")
+
+    def kept(self):
+        """All that is needed to go on from here."""
+        return self.tick, self.motors.past, self.qs[:self.tick + 1].copy(), self.dqs[:self.tick + 1].copy()
+
+    def resume(self, kept):
+        self.tick, self.motors.past, qs, dqs = kept
+        self.qs[:self.tick + 1], self.dqs[:self.tick + 1] = qs, dqs
+
+    def states(self, asked):
+        if "tau_J" in self.ends:
+            self.ends["tau_J"] += self.bias
+        return between(self.ends, asked, self.arm.period)
 
 
 class Believed:
