@@ -136,7 +136,7 @@ fn the_twin_as_an_engine_gives_the_twins_answer_whatever_of_it_the_engine_knows(
     let cell = Cell::shipped();
     session(&cell, HIDDEN);
     let own = identify(&cell, None).succeeded().json();
-    for options in ["", "--parameters none --effects none", "--parameters friction,mass"] {
+    for options in ["", "--parameters none --effects none"] {
         let theirs = identify(&cell, Some(options)).succeeded().json();
         for figure in ["joint_rms_rad", "object_add_m", "object_add_s_m"] {
             for of in ["train_before", "holdout_before"] {
@@ -146,14 +146,12 @@ fn the_twin_as_an_engine_gives_the_twins_answer_whatever_of_it_the_engine_knows(
             }
         }
         for parameter in ["friction", "mass"] {
-            let [found, half] = [&own, &theirs].map(|answer| {
-                let of = |key: &str| number(answer, &format!("/parameters/{parameter}/{key}"));
-                of("value")
-            });
-            assert!((found / half - 1.0).abs() < 0.02, "{options}: {parameter} {found} {half}");
+            let [own, theirs] = [&own, &theirs].map(|answer| number(answer, &format!("/parameters/{parameter}/value")));
+            assert!((own / theirs - 1.0).abs() < 0.02, "{options}: {parameter} {own} {theirs}");
         }
         assert_eq!(theirs["engine"]["object"], true);
-        assert!(theirs["engine"]["rollouts"].as_u64() > Some(10), "{}", theirs["engine"]);
+        // An engine that knows nothing has one answer for each clip.
+        assert!(theirs["engine"]["rollouts"].as_u64() >= Some(STROKES.len() as u64), "{}", theirs["engine"]);
     }
 }
 
