@@ -191,6 +191,15 @@ impl Field<f32> {
         Some(f64::from(sum) * self.grid.voxel)
     }
 
+    /// Signed distance [m] at a place of the scan and its derivative by the place; `None` outside the box.
+    #[must_use]
+    pub fn slope_at(&self, point: &Point3<f64>) -> Option<(f64, Vector3<f64>)> {
+        let cell = self.grid.cell(self.grid.steps(point).coords.into())?;
+        let values = self.grid.nodes(cell.base).map(|node| f64::from(self.distance[node]));
+        let distance: f64 = values.iter().zip(cell.weights()).map(|(value, weight)| weight * value).sum();
+        Some((distance * self.grid.voxel, cell.slope(values).into()))
+    }
+
     /// Colour at a place of the scan, 0 to 1; `None` outside the box.
     #[must_use]
     pub fn colour_at(&self, point: &Point3<f64>) -> Option<[f32; 3]> {

@@ -7,10 +7,12 @@
 //! | [`field`] | signed distance and colour at the nodes of a box |
 //! | [`object`] | one object: where it starts, the optimisation, what was left uncertain |
 //! | [`mesh`] | its surface as triangles: closed, checked, reduced; volume and inertia |
+//! | [`articulated`] | two states of an object with a part that moves: the joint and both parts |
 //! | [`assets`] | files: meshes, URDF, cell.toml block, report page |
 //!
 //! Lengths are metres. Camera axes: x right, y down, z forwards.
 
+pub mod articulated;
 pub mod assets;
 pub mod field;
 pub mod mesh;

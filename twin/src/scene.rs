@@ -5,7 +5,7 @@ mod arm_outline;
 mod mesh_file;
 
 pub use arm_outline::{ArmOutline, Part};
-pub use mesh_file::MeshFileError;
+pub use mesh_file::{MeshFileError, read_surface as mesh_in_its_middle};
 pub(crate) use mesh_file::{open_edges, read as read_mesh};
 
 use nalgebra::{Point3, Vector3};

@@ -8,7 +8,7 @@ pub(super) fn piece_file(number: usize) -> String {
 }
 
 /// A name as XML may hold it.
-fn escaped(name: &str) -> String {
+pub(super) fn escaped(name: &str) -> String {
     name.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
 

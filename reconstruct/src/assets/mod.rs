@@ -6,12 +6,19 @@
 //! | `description` | URDF and the block for cell.toml |
 //! | `page` | the report |
 //! | `summary` | the numbers as JSON |
+//! | `articulated` | the same for an object with a part that moves |
 
+mod articulated;
 mod description;
 mod page;
 mod summary;
 
+pub use articulated::{
+    ArticulatedSummary, JointNumbers, LINKS, PartNumbers, articulated_files, in_frame, links_from_mesh,
+};
 pub use summary::Summary;
+
+use description::escaped;
 
 use crate::mesh::{Mesh, obj, ply};
 use crate::object::{Object, is_certain};

@@ -10,7 +10,7 @@ use maud::{DOCTYPE, Markup, PreEscaped, html};
 use shared_mem::msg::image::PixelEncoding;
 use shared_mem::recording::pack_picture;
 
-const STYLE: &str = include_str!("page.css");
+pub(super) const STYLE: &str = include_str!("page.css");
 /// Differences are drawn so many times as bright.
 const BRIGHTER: u8 = 4;
 /// Room around the object in a picture [pixel].
@@ -135,7 +135,7 @@ fn window(view: &HeldOut) -> [u32; 4] {
 }
 
 /// A part of a picture as the address of an image.
-fn picture(rgb: &[[u8; 3]], width: u32, [x, y, columns, rows]: [u32; 4]) -> Option<String> {
+pub(super) fn picture(rgb: &[[u8; 3]], width: u32, [x, y, columns, rows]: [u32; 4]) -> Option<String> {
     let row = |row: u32| {
         let first = (row * width + x) as usize;
         rgb[first..first + columns as usize].as_flattened().iter().copied()

@@ -3,18 +3,21 @@
 //! | file | owns |
 //! |---|---|
 //! | `tetrahedra` | the surface of a field: closed by construction |
+//! | `distance` | signed distance of a closed mesh |
 //! | `check` | closed, oriented, genus, volume: what a body needs, or why it has it not |
 //! | `reduce` | fewer triangles that stay closed |
 //! | `solid` | volume, centroid, inertia |
 //! | `files` | OBJ and PLY |
 
 mod check;
+mod distance;
 mod files;
 mod reduce;
 mod solid;
 mod tetrahedra;
 
 pub use check::{Flaw, Topology};
+pub use distance::distances;
 pub use files::{obj, ply};
 pub use reduce::reduced;
 pub use solid::Solid;
@@ -36,6 +39,13 @@ impl Mesh {
     #[must_use]
     pub fn corners(&self, triangle: usize) -> [Point3<f64>; 3] {
         self.triangles[triangle].map(|corner| self.points[corner as usize])
+    }
+
+    /// A triangle's area [m²].
+    #[must_use]
+    pub fn area(&self, triangle: usize) -> f64 {
+        let [a, b, c] = self.corners(triangle);
+        0.5 * (b - a).cross(&(c - a)).norm()
     }
 
     /// The smallest box along the axes that holds the mesh: low and high corner [m].

@@ -34,6 +34,7 @@ pub use judge::HeldOut;
 pub(crate) use judge::is_certain;
 pub use pictures::Remark;
 pub use state::StateError;
+pub(crate) use sweep::{distance_from, signed_distance};
 pub use view::{Drawn, draw};
 
 use crate::field::{Field, Grid};

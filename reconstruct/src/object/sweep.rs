@@ -44,6 +44,16 @@ pub(crate) fn signed_distance(grid: &Grid, level: &[f32]) -> Vec<f32> {
     distance.iter().zip(level).map(|(distance, level)| if *level < 0.0 { -distance } else { *distance }).collect()
 }
 
+/// Distances [voxel] from the nodes of a set.
+pub(crate) fn distance_from(grid: &Grid, is_in: impl Fn(usize) -> bool) -> Vec<f32> {
+    let known: Vec<bool> = (0..grid.len()).map(is_in).collect();
+    let mut distance: Vec<f32> = known.iter().map(|known| if *known { 0.0 } else { FAR }).collect();
+    for round in 0..8 * ROUNDS {
+        sweep(grid, &known, &mut distance, round % 8);
+    }
+    distance
+}
+
 fn sweep(grid: &Grid, known: &[bool], distance: &mut [f32], direction: usize) {
     let strides = grid.strides();
     let along = |axis: usize, step: usize| {

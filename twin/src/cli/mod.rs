@@ -1,5 +1,7 @@
 //! The verbs of the program `twin`, one file each: arguments and what is printed, nothing that simulates.
 
+#[cfg(feature = "reconstruct")]
+mod articulated;
 pub(crate) mod label_splats;
 pub(crate) mod look;
 #[cfg(feature = "reconstruct")]

@@ -1,5 +1,6 @@
 //! `twin reconstruct`: assets of a simulation out of scans.
 
+use super::articulated::ArticulatedVerb;
 use anyhow::{Context as _, ensure};
 use nalgebra::Point3;
 use reconstruct::assets::{self, Labels};
@@ -17,7 +18,8 @@ use twin::physics::convex_pieces;
 #[command(after_help = "\
 Examples:
   twin reconstruct object scan --out mug
-  twin reconstruct object scan --out mug --mass 0.118 --scale 0.0231")]
+  twin reconstruct object scan --out mug --mass 0.118 --scale 0.0231
+  twin reconstruct articulated laptop_closed laptop_open --out laptop")]
 pub(crate) struct Reconstruct {
     #[command(subcommand)]
     what: What,
@@ -26,6 +28,7 @@ pub(crate) struct Reconstruct {
 #[derive(clap::Subcommand)]
 enum What {
     Object(ObjectVerb),
+    Articulated(ArticulatedVerb),
 }
 
 /// An object out of pictures from all sides: a closed mesh, convex pieces, URDF, a block for cell.toml, a report.
@@ -70,11 +73,11 @@ pub(crate) struct ObjectVerb {
     json: bool,
 }
 
-fn metres(text: &str) -> Result<f64, String> {
+pub(super) fn metres(text: &str) -> Result<f64, String> {
     number(text, 1e-6..=1e3, "m")
 }
 
-fn mass(text: &str) -> Result<f64, String> {
+pub(super) fn mass(text: &str) -> Result<f64, String> {
     number(text, 1e-4..=1e3, "kg")
 }
 
@@ -85,6 +88,7 @@ impl Reconstruct {
     pub(crate) fn run(&self) -> anyhow::Result<()> {
         match &self.what {
             What::Object(verb) => verb.run(),
+            What::Articulated(verb) => verb.run(),
         }
     }
 }
@@ -143,12 +147,12 @@ impl ObjectVerb {
     }
 }
 
-fn piece((points, triangles): (Vec<Point3<f64>>, Vec<[u32; 3]>)) -> Mesh {
+pub(super) fn piece((points, triangles): (Vec<Point3<f64>>, Vec<[u32; 3]>)) -> Mesh {
     Mesh { points, triangles }
 }
 
 /// Where an interrupted run leaves what it has: beside the folder.
-fn kept(out: &Path) -> PathBuf {
+pub(super) fn kept(out: &Path) -> PathBuf {
     let mut name = out.as_os_str().to_owned();
     name.push(".state");
     PathBuf::from(name)

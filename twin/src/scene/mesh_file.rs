@@ -43,6 +43,17 @@ pub(crate) fn read(path: &Path) -> Result<ObjectShape, MeshFileError> {
     surface.and_then(centred).map_err(|what| MeshFileError::Content { path: path.to_owned(), what })
 }
 
+/// Corners [m], around the middle of their box, and triangles of a mesh.
+///
+/// # Errors
+/// [`MeshFileError`] as for the object of a cell.
+pub fn read_surface(path: &Path) -> Result<Surface, MeshFileError> {
+    match read(path)? {
+        ObjectShape::Mesh { points, triangles } => Ok((points, triangles)),
+        ObjectShape::Box { .. } => Ok(Surface::default()),
+    }
+}
+
 fn centred((mut points, triangles): Surface) -> Result<ObjectShape, String> {
     let count = points.len();
     if count < 4 || triangles.is_empty() {

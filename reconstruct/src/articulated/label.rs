@@ -1,0 +1,205 @@
+//! Which part of a surface moves: what each place of it would mean in the other state if it stayed or moved along, smoothed; places that
+//! say nothing belong to the nearest one that does, by a way along the surface on which folds inwards are long.
+
+use super::body::{Body, Place, normal};
+use crate::field::{Field, Grid};
+use crate::object::distance_from;
+use nalgebra::{Isometry3, Point3, Vector3};
+use std::cmp::Reverse;
+use std::collections::{BinaryHeap, HashMap};
+
+/// Costs of a place that is hidden in the other state, nearly in the open, in the open; on a surface there is none.
+const HIDDEN: f64 = 3.0;
+const NEARLY: f64 = 4.5;
+const FREE: f64 = 7.0;
+/// Largest weight of what a place says.
+const LOUDEST: f64 = 4.0;
+/// Hints at least so loud, and so clear once smoothed, are what other places follow.
+const HEARD: f64 = 1.0;
+const CLEAR: f64 = 0.3;
+/// How long a fold inwards makes a way: a step is so many times longer, as an exponent, for each unit by which normals change.
+const FOLD: f64 = 16.0;
+/// Rounds in which normals become means of their neighbours' that agree so far with them (cosine).
+const CALMED: usize = 6;
+const AGREE: f64 = 0.5;
+/// Neighbours whose normals agree less (cosine) are on different sides of a wall.
+const SIDES: f64 = -0.3;
+/// Rounds of the conjugate gradients, and the residual at which they end.
+const ROUNDS: usize = 60;
+const ENOUGH: f64 = 1e-3;
+/// Times the border between the parts is smoothed.
+const SMOOTHED: usize = 4;
+
+/// What a place of the surface says: 1 for the part, 0 for the base, and how loudly.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Hint {
+    pub(super) part: f64,
+    pub(super) weight: f64,
+}
+
+/// Places beside the surface, at nodes of the body's grid just outside of it: within a thin wall both sides would be near to each other.
+struct Rim {
+    nodes: Vec<usize>,
+    places: Vec<(Point3<f64>, Vector3<f64>)>,
+    /// Neighbours and the length of the way to them.
+    beside: Vec<Vec<(u32, f64)>>,
+}
+
+/// The border between the parts: negative nearer to the part that moves [voxel], at the nodes of the body's grid. `hint` is asked for
+/// places of the surface and the directions out of it.
+pub(super) fn border(body: &Body, hint: impl Fn(&Point3<f64>, &Vector3<f64>) -> Hint) -> Field<f32> {
+    let rim = Rim::of(body);
+    let hints: Vec<Hint> = rim.places.iter().map(|(place, normal)| hint(place, normal)).collect();
+    let part = rim.carried_on(&hints, rim.smoothed(&hints));
+    let grid = body.field.grid;
+    let mut seeds = vec![0u8; grid.len()];
+    for (node, part) in rim.nodes.iter().zip(&part) {
+        seeds[*node] = if *part { 2 } else { 1 };
+    }
+    let [base, part] = [1, 2].map(|kind| distance_from(&grid, |index| seeds[index] == kind));
+    let mut distance: Vec<f32> = part.iter().zip(&base).map(|(part, base)| 0.5 * (part - base)).collect();
+    for _ in 0..SMOOTHED {
+        distance = smoothed(&grid, &distance);
+    }
+    Field { grid, distance, colour: Vec::new() }
+}
+
+/// What a place says when the other state is reached by one of two poses. On the surface either way it says nothing: a plane that slides
+/// within itself, or a place on the axis.
+pub(super) fn seen_in(
+    other: &Body,
+    poses: &[Isometry3<f64>; 2],
+    tolerance: f64,
+    place: &Point3<f64>,
+    normal: &Vector3<f64>,
+) -> Hint {
+    let cost = |pose: &Isometry3<f64>| {
+        let (place, normal) = (pose * place, pose.rotation * normal);
+        match other.place(&place, &normal, tolerance) {
+            Place::On(..) => 0.0,
+            Place::Hidden => HIDDEN,
+            Place::Free if matches!(other.place(&place, &normal, 2.0 * tolerance), Place::Free) => FREE,
+            Place::Free => NEARLY,
+        }
+    };
+    let [base, part] = [0, 1].map(|which| cost(&poses[which]));
+    Hint { part: if part < base { 1.0 } else { 0.0 }, weight: (part - base).abs().min(LOUDEST) }
+}
+
+fn smoothed(grid: &Grid, values: &[f32]) -> Vec<f32> {
+    let strides = grid.strides();
+    let mean = |index: usize| {
+        if grid.is_rim(grid.node(index)) {
+            return values[index];
+        }
+        let around: f32 = strides.iter().map(|stride| values[index - stride] + values[index + stride]).sum();
+        0.5 * values[index] + around / 12.0
+    };
+    (0..values.len()).map(mean).collect()
+}
+
+impl Rim {
+    fn of(body: &Body) -> Self {
+        let (grid, distance) = (&body.field.grid, &body.field.distance);
+        let nodes: Vec<usize> = (0..grid.len()).filter(|i| (0.0..1.0).contains(&distance[*i])).collect();
+        let places: Vec<(Point3<f64>, Vector3<f64>)> = nodes
+            .iter()
+            .map(|index| {
+                let place = grid.position(grid.node(*index));
+                let normal = normal(&body.field, &place);
+                (place - normal * (f64::from(distance[*index]) * grid.voxel), normal)
+            })
+            .collect();
+        let numbers: HashMap<usize, u32> = nodes.iter().enumerate().map(|(i, node)| (*node, i as u32)).collect();
+        let [x, y, z] = grid.strides().map(|stride| stride as isize);
+        let steps: Vec<isize> =
+            [x, y, z, x + y, x - y, x + z, x - z, y + z, y - z].into_iter().flat_map(|s| [s, -s]).collect();
+        let around: Vec<Vec<u32>> = (0..nodes.len())
+            .map(|i| {
+                steps.iter().filter_map(|step| numbers.get(&nodes[i].checked_add_signed(*step)?).copied()).collect()
+            })
+            .collect();
+        let mut normals: Vec<Vector3<f64>> = places.iter().map(|place| place.1).collect();
+        for _ in 0..CALMED {
+            let mean = |i: usize| {
+                let agree = around[i].iter().map(|j| normals[*j as usize]).filter(|n| n.dot(&normals[i]) > AGREE);
+                (normals[i] + agree.sum::<Vector3<f64>>()).normalize()
+            };
+            normals = (0..normals.len()).map(mean).collect();
+        }
+        let ways = |i: usize| {
+            let at = |i: usize| (places[i].0, normals[i]);
+            around[i].iter().filter_map(|j| Some((*j, way(&at(i), &at(*j as usize))?))).collect()
+        };
+        let beside = (0..nodes.len()).map(ways).collect();
+        Self { nodes, places, beside }
+    }
+
+    /// The least of sum w_i (x_i - h_i)² + sum (x_i - x_j)², nearly, by conjugate gradients.
+    fn smoothed(&self, hints: &[Hint]) -> Vec<f64> {
+        let apply = |x: &[f64]| -> Vec<f64> {
+            (0..x.len())
+                .map(|i| {
+                    let steps: f64 = self.beside[i].iter().map(|(j, _)| x[i] - x[*j as usize]).sum();
+                    hints[i].weight * x[i] + steps
+                })
+                .collect()
+        };
+        let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+        let mut x = vec![0.5; hints.len()];
+        let right: Vec<f64> = hints.iter().map(|hint| hint.weight * hint.part).collect();
+        let mut left: Vec<f64> = right.iter().zip(apply(&x)).map(|(b, a)| b - a).collect();
+        let (mut way, mut square) = (left.clone(), dot(&left, &left));
+        let end = ENOUGH * ENOUGH * dot(&right, &right).max(1e-12);
+        for _ in 0..ROUNDS {
+            if square < end {
+                break;
+            }
+            let product = apply(&way);
+            let step = square / dot(&way, &product);
+            x.iter_mut().zip(&way).for_each(|(x, way)| *x += step * way);
+            left.iter_mut().zip(&product).for_each(|(left, product)| *left -= step * product);
+            let before = std::mem::replace(&mut square, dot(&left, &left));
+            way.iter_mut().zip(&left).for_each(|(way, left)| *way = left + *way * (square / before));
+        }
+        x
+    }
+
+    /// Whether each place moves: what is clear there, or at the nearest place where it is (Dijkstra 1959).
+    fn carried_on(&self, hints: &[Hint], smoothed: Vec<f64>) -> Vec<bool> {
+        let mut moves: Vec<bool> = smoothed.iter().map(|part| *part > 0.5).collect();
+        let mut length = vec![f64::INFINITY; moves.len()];
+        let mut open = BinaryHeap::new();
+        for (i, (hint, part)) in hints.iter().zip(&smoothed).enumerate() {
+            if hint.weight >= HEARD && (part - 0.5).abs() > CLEAR {
+                length[i] = 0.0;
+                open.push((Reverse(0u64), i as u32));
+            }
+        }
+        while let Some((Reverse(at), i)) = open.pop() {
+            let i = i as usize;
+            // Lengths are ordered as whole thousandths.
+            if at > (length[i] * 1e3) as u64 {
+                continue;
+            }
+            for (j, way) in &self.beside[i] {
+                let j = *j as usize;
+                if length[i] + way < length[j] {
+                    (length[j], moves[j]) = (length[i] + way, moves[i]);
+                    open.push((Reverse((length[j] * 1e3) as u64), j as u32));
+                }
+            }
+        }
+        moves
+    }
+}
+
+/// How many steps the way between two neighbours is worth; `None` through a wall.
+fn way(one: &(Point3<f64>, Vector3<f64>), other: &(Point3<f64>, Vector3<f64>)) -> Option<f64> {
+    let away = other.0 - one.0;
+    if one.1.dot(&other.1) < SIDES {
+        return None;
+    }
+    let fold = -(other.1 - one.1).dot(&away) / away.norm().max(1e-9);
+    Some((FOLD * fold.max(0.0)).exp())
+}
