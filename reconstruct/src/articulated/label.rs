@@ -1,5 +1,5 @@
 //! Which part of a surface moves: what each place of it would mean in the other state if it stayed or moved along, smoothed; places that
-//! say nothing belong to the nearest one that does, by a way along the surface on which folds inwards are long.
+//! say nothing follow those that do, by random walks along the surface that seldom pass folds inwards.
 
 use super::body::{Body, Place, normal};
 use crate::field::{Field, Grid};
@@ -24,9 +24,10 @@ const CALMED: usize = 6;
 const AGREE: f64 = 0.5;
 /// Neighbours whose normals agree less (cosine) are on different sides of a wall.
 const SIDES: f64 = -0.3;
-/// Rounds of the conjugate gradients, and the residual at which they end.
+/// Rounds of the conjugate gradients, in smoothing and on, and the share of the squared residual at which they end.
 const ROUNDS: usize = 60;
-const ENOUGH: f64 = 1e-3;
+const WALKED: usize = 1500;
+const ENOUGH: f64 = 1e-7;
 /// Times the border between the parts is smoothed.
 const SMOOTHED: usize = 4;
 
@@ -135,46 +136,53 @@ impl Rim {
         Self { nodes, places, beside }
     }
 
-    /// The least of sum w_i (x_i - h_i)² + sum (x_i - x_j)², nearly, by conjugate gradients.
+    /// The least of sum w_i (x_i - h_i)² + sum (x_i - x_j)², nearly.
     fn smoothed(&self, hints: &[Hint]) -> Vec<f64> {
         let apply = |x: &[f64]| -> Vec<f64> {
-            (0..x.len())
-                .map(|i| {
-                    let steps: f64 = self.beside[i].iter().map(|(j, _)| x[i] - x[*j as usize]).sum();
-                    hints[i].weight * x[i] + steps
-                })
-                .collect()
+            let steps = |i: usize| self.beside[i].iter().map(|(j, _)| x[i] - x[*j as usize]).sum::<f64>();
+            (0..x.len()).map(|i| hints[i].weight * x[i] + steps(i)).collect()
         };
-        let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
-        let mut x = vec![0.5; hints.len()];
+        let diagonal: Vec<f64> =
+            hints.iter().zip(&self.beside).map(|(hint, beside)| hint.weight + beside.len() as f64).collect();
         let right: Vec<f64> = hints.iter().map(|hint| hint.weight * hint.part).collect();
-        let mut left: Vec<f64> = right.iter().zip(apply(&x)).map(|(b, a)| b - a).collect();
-        let (mut way, mut square) = (left.clone(), dot(&left, &left));
-        let end = ENOUGH * ENOUGH * dot(&right, &right).max(1e-12);
-        for _ in 0..ROUNDS {
-            if square < end {
-                break;
-            }
-            let product = apply(&way);
-            let step = square / dot(&way, &product);
-            x.iter_mut().zip(&way).for_each(|(x, way)| *x += step * way);
-            left.iter_mut().zip(&product).for_each(|(left, product)| *left -= step * product);
-            let before = std::mem::replace(&mut square, dot(&left, &left));
-            way.iter_mut().zip(&left).for_each(|(way, left)| *way = left + *way * (square / before));
-        }
-        x
+        solved(apply, &diagonal, &right, vec![0.5; hints.len()], ROUNDS)
     }
 
-    /// Whether each place moves: what is clear there, or at the nearest place where it is (Dijkstra 1959).
+    /// Whether each place moves: what is clear there, or where more of the random walks from it end (Grady 2006).
     fn carried_on(&self, hints: &[Hint], smoothed: Vec<f64>) -> Vec<bool> {
-        let mut moves: Vec<bool> = smoothed.iter().map(|part| *part > 0.5).collect();
-        let mut length = vec![f64::INFINITY; moves.len()];
+        let is_clear = |i: usize| hints[i].weight >= HEARD && (smoothed[i] - 0.5).abs() > CLEAR;
+        let clear: Vec<bool> = (0..hints.len()).map(is_clear).collect();
+        let start = self.nearest(&clear, &smoothed);
+        let apply = |x: &[f64]| -> Vec<f64> {
+            let steps = |i: usize| self.beside[i].iter().map(|(j, way)| (x[i] - x[*j as usize]) / way).sum::<f64>();
+            (0..x.len()).map(|i| if clear[i] { x[i] } else { steps(i) }).collect()
+        };
+        // What is clear stays as it is: moved to the right side, the matrix is that of the others alone.
+        let known: Vec<f64> = (0..start.len()).map(|i| if clear[i] { start[i] } else { 0.0 }).collect();
+        let shares = apply(&known);
+        let right: Vec<f64> = (0..start.len()).map(|i| if clear[i] { 0.0 } else { -shares[i] }).collect();
+        let open = |x: &[f64]| -> Vec<f64> {
+            let x: Vec<f64> = x.iter().zip(&clear).map(|(x, clear)| if *clear { 0.0 } else { *x }).collect();
+            apply(&x)
+        };
+        let diagonal: Vec<f64> = (0..start.len())
+            .map(
+                |i| if clear[i] { 1.0 } else { self.beside[i].iter().map(|(_, way)| 1.0 / way).sum::<f64>().max(1e-9) },
+            )
+            .collect();
+        let first = start.iter().zip(&clear).map(|(x, clear)| if *clear { 0.0 } else { *x }).collect();
+        let found = solved(open, &diagonal, &right, first, WALKED);
+        (0..start.len()).map(|i| if clear[i] { start[i] > 0.5 } else { found[i] > 0.5 }).collect()
+    }
+
+    /// What is clear at the nearest place where it is (Dijkstra 1959): 1 for the part, 0 for the base.
+    fn nearest(&self, clear: &[bool], smoothed: &[f64]) -> Vec<f64> {
+        let mut part: Vec<f64> = smoothed.iter().map(|part| part.round()).collect();
+        let mut length = vec![f64::INFINITY; part.len()];
         let mut open = BinaryHeap::new();
-        for (i, (hint, part)) in hints.iter().zip(&smoothed).enumerate() {
-            if hint.weight >= HEARD && (part - 0.5).abs() > CLEAR {
-                length[i] = 0.0;
-                open.push((Reverse(0u64), i as u32));
-            }
+        for i in (0..part.len()).filter(|i| clear[*i]) {
+            length[i] = 0.0;
+            open.push((Reverse(0u64), i as u32));
         }
         while let Some((Reverse(at), i)) = open.pop() {
             let i = i as usize;
@@ -185,13 +193,43 @@ impl Rim {
             for (j, way) in &self.beside[i] {
                 let j = *j as usize;
                 if length[i] + way < length[j] {
-                    (length[j], moves[j]) = (length[i] + way, moves[i]);
+                    (length[j], part[j]) = (length[i] + way, part[i]);
                     open.push((Reverse((length[j] * 1e3) as u64), j as u32));
                 }
             }
         }
-        moves
+        part
     }
+}
+
+/// Linear equations with a positive matrix by conjugate gradients, scaled by the matrix' diagonal.
+fn solved(
+    apply: impl Fn(&[f64]) -> Vec<f64>,
+    diagonal: &[f64],
+    right: &[f64],
+    start: Vec<f64>,
+    rounds: usize,
+) -> Vec<f64> {
+    let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+    let scaled = |left: &[f64]| -> Vec<f64> { left.iter().zip(diagonal).map(|(left, d)| left / d).collect() };
+    let mut x = start;
+    let mut left: Vec<f64> = right.iter().zip(apply(&x)).map(|(b, a)| b - a).collect();
+    let mut way = scaled(&left);
+    let mut square = dot(&left, &way);
+    let end = ENOUGH * square;
+    for _ in 0..rounds {
+        if square <= end {
+            break;
+        }
+        let product = apply(&way);
+        let step = square / dot(&way, &product);
+        x.iter_mut().zip(&way).for_each(|(x, way)| *x += step * way);
+        left.iter_mut().zip(&product).for_each(|(left, product)| *left -= step * product);
+        let next = scaled(&left);
+        let before = std::mem::replace(&mut square, dot(&left, &next));
+        way.iter_mut().zip(&next).for_each(|(way, next)| *way = next + *way * (square / before));
+    }
+    x
 }
 
 /// How many steps the way between two neighbours is worth; `None` through a wall.
