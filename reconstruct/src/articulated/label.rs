@@ -2,6 +2,7 @@
 //! say nothing follow those that do, by random walks along the surface that seldom pass folds inwards.
 
 use super::body::{Body, Place, normal};
+use super::is_beyond;
 use crate::field::{Field, Grid};
 use crate::object::distance_from;
 use nalgebra::{Isometry3, Point3, Vector3};
@@ -66,24 +67,26 @@ pub(super) fn border(body: &Body, hint: impl Fn(&Point3<f64>, &Vector3<f64>) -> 
 }
 
 /// What a place says when the other state is reached by one of two poses. On the surface either way it says nothing: a plane that slides
-/// within itself, or a place on the axis.
+/// within itself, or a place on the axis. Where the border of the other state is known already, a place that stays is on what stays there
+/// alone, and one that moves on what moves.
 pub(super) fn seen_in(
-    other: &Body,
+    (other, border): (&Body, Option<&Field<f32>>),
     poses: &[Isometry3<f64>; 2],
     tolerance: f64,
     place: &Point3<f64>,
     normal: &Vector3<f64>,
 ) -> Hint {
-    let cost = |pose: &Isometry3<f64>| {
-        let (place, normal) = (pose * place, pose.rotation * normal);
+    let cost = |which: usize| {
+        let (place, normal) = (poses[which] * place, poses[which].rotation * normal);
+        let is_of_other = || border.is_some_and(|border| is_beyond(border, &place) != (which == 1));
         match other.place(&place, &normal, tolerance) {
-            Place::On(..) => 0.0,
-            Place::Hidden => HIDDEN,
+            Place::On(..) if !is_of_other() => 0.0,
+            Place::On(..) | Place::Hidden => HIDDEN,
             Place::Free if matches!(other.place(&place, &normal, 2.0 * tolerance), Place::Free) => FREE,
             Place::Free => NEARLY,
         }
     };
-    let [base, part] = [0, 1].map(|which| cost(&poses[which]));
+    let [base, part] = [0, 1].map(cost);
     Hint { part: if part < base { 1.0 } else { 0.0 }, weight: (part - base).abs().min(LOUDEST) }
 }
 

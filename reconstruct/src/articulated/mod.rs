@@ -168,11 +168,17 @@ pub fn between(first: Mesh, second: Mesh) -> Result<Articulated, ArticulatedErro
     bar.stage(SPLIT, 4);
     let [whole, part] = found.motion.poses();
     let within = found.tolerance;
-    let back = [whole.inverse(), part.inverse()];
-    let (border, before) = rayon::join(
-        || label::border(&second, |place, normal| label::seen_in(&first, &back, within, place, normal)),
-        || label::border(&first, |place, normal| label::seen_in(&second, &[whole, part], within, place, normal)),
-    );
+    let borders = |known: [Option<&Field<f32>>; 2]| {
+        let of = |body: &Body, other: (&Body, Option<&Field<f32>>), poses: [Isometry3<f64>; 2]| {
+            label::border(body, |place, normal| label::seen_in(other, &poses, within, place, normal))
+        };
+        rayon::join(
+            || of(&first, (&second, known[1]), [whole, part]),
+            || of(&second, (&first, known[0]), [whole.inverse(), part.inverse()]),
+        )
+    };
+    let (before, after) = borders([None; 2]);
+    let (before, border) = borders([Some(&before), Some(&after)]);
     bar.show(1, SPLIT);
     for (body, border) in [(&mut first, &before), (&mut second, &border)] {
         body.samples.iter_mut().for_each(|sample| sample.moves = Some(is_beyond(border, &sample.point)));
