@@ -5,6 +5,7 @@
 //! |---|---|
 //! | [`scan`] | pictures, masks, depth, poses; COLMAP, nerfstudio, robot-held cameras |
 //! | [`field`] | signed distance and colour at the nodes of a box |
+//! | `sweep` | signed distance from signs |
 //! | [`object`] | one object: where it starts, the optimisation, what was left uncertain |
 //! | [`mesh`] | its surface as triangles: closed, checked, reduced; volume and inertia |
 //! | [`articulated`] | two states of an object with a part that moves: the joint and both parts |
@@ -18,3 +19,4 @@ pub mod field;
 pub mod mesh;
 pub mod object;
 pub mod scan;
+mod sweep;

@@ -4,7 +4,7 @@
 use super::body::{Body, Place, normal};
 use super::is_beyond;
 use crate::field::{Field, Grid};
-use crate::object::distance_from;
+use crate::sweep::distance_from;
 use nalgebra::{Isometry3, Point3, Vector3};
 use std::cmp::Reverse;
 use std::collections::{BinaryHeap, HashMap};

@@ -2,7 +2,7 @@
 
 use super::Mesh;
 use crate::field::{Field, Grid};
-use crate::object::signed_distance;
+use crate::sweep::signed_distance;
 use nalgebra::{Point3, Vector3};
 
 /// Nodes within so many voxels of a triangle have their exact distance.

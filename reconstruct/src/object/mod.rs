@@ -5,7 +5,6 @@
 //! | `pictures` | the views' pixels, and which of them say nothing |
 //! | `bounds` | where the object is |
 //! | `start` | visual hull, fused depth |
-//! | `sweep` | signed distance from signs |
 //! | `band` | the parts of the box that a surface may be in |
 //! | `pool` | pixels as rays |
 //! | `ray` | what a ray sees, and how it depends on the field |
@@ -27,14 +26,12 @@ mod ray;
 mod smooth;
 mod start;
 mod state;
-mod sweep;
 mod view;
 
 pub use judge::HeldOut;
 pub(crate) use judge::is_certain;
 pub use pictures::Remark;
 pub use state::StateError;
-pub(crate) use sweep::{distance_from, signed_distance};
 pub use view::{Drawn, draw};
 
 use crate::field::{Field, Grid};

@@ -4,9 +4,9 @@
 //! noise of the masks may have put there. Fusion: mean of truncated distances along the rays (Curless and Levoy 1996), weighted by the
 //! variance of depth, which grows with its fourth power.
 
-use super::sweep;
 use crate::field::Grid;
 use crate::scan::Frame;
+use crate::sweep;
 use nalgebra::{Isometry3, Point3};
 use rayon::prelude::*;
 
