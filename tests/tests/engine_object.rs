@@ -15,7 +15,7 @@ use twin::control::Drive;
 use twin::effects::{Role, Shape, registry};
 use twin::sim::SimCell;
 
-const PATIENCE: Duration = Duration::from_secs(400);
+const PATIENCE: Duration = Duration::from_secs(900);
 /// Joints with the tip upright 5 cm above the table, 46 and 58 cm in front of the base [rad].
 const FROM: [f64; 7] = [0.0, 0.22786, 0.0, -2.53004, 0.0, 2.7579, 0.78];
 const TO: [f64; 7] = [0.0, 0.47061, 0.0, -2.10632, 0.0, 2.57692, 0.78];
@@ -166,6 +166,7 @@ fn friction_is_found_for_the_engine_whose_own_table_is_more_slippery() {
 }
 
 #[test]
+#[ignore = "two diagnoses of strokes, minutes on two cores"]
 fn a_diagnosis_names_what_acts_on_the_object_whether_the_engine_or_the_twin_simulates_it() {
     let cell = Cell::shipped();
     session(&cell, &format!("{HIDDEN}{TILT}"));
