@@ -6,7 +6,7 @@
 //! |---|---|
 //! | `surface` | a coloured mesh |
 //! | `fuse` | depth pictures into a surface |
-//! | `plane` | the largest plane, and the table |
+//! | `plane` | the largest plane, the levels of a scene, and its table |
 
 pub mod fuse;
 pub mod plane;

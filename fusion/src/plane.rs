@@ -116,12 +116,57 @@ impl Wanted {
     }
 }
 
-/// The table of a scene: its largest plane that faces up, within 15 degrees of `up`.
+/// A level part of a scene: a table, a floor, a shelf.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Level {
+    /// Its plane.
+    pub plane: Plane,
+    /// The middle of its points [m].
+    pub middle: Point3<f64>,
+}
+
+/// Points lie on a level that are nearer to it than this [m].
+const LEVEL: f64 = 0.01;
+/// A scene has so many levels at most, none with less than this share of the largest one's points.
+const LEVELS: usize = 6;
+const LEAST: f64 = 0.1;
+/// The table has at least this share of them.
+const OF_TABLE: f64 = 1.0 / 3.0;
+
+/// The levels of a scene, the largest first: planes that face up, `within` so much of `up` [rad]; those after the first within 2
+/// degrees of it.
 #[must_use]
-pub fn table(surface: &Surface, up: &Vector3<f64>) -> Option<Plane> {
-    let points: Vec<Point3<f64>> = surface.points.iter().map(|p| p.cast()).collect();
-    let normals: Vec<Vector3<f64>> = surface.normals().iter().map(|n| n.cast()).collect();
-    Plane::largest(&points, &normals, &Wanted { tolerance: 0.01, normal: Some((*up, 0.26)) })
+pub fn levels(surface: &Surface, up: &Vector3<f64>, within: f64) -> Vec<Level> {
+    let mut points: Vec<Point3<f64>> = surface.points.iter().map(|p| p.cast()).collect();
+    let mut normals: Vec<Vector3<f64>> = surface.normals().iter().map(|n| n.cast()).collect();
+    let mut levels: Vec<Level> = Vec::new();
+    let mut wanted = Wanted { tolerance: LEVEL, normal: Some((*up, within)) };
+    while levels.len() < LEVELS {
+        let Some(plane) = Plane::largest(&points, &normals, &wanted) else { break };
+        // Undersides are no levels.
+        let is_on = |i: usize| plane.distance(&points[i]).abs() < LEVEL && normals[i].dot(&plane.normal) > ALIKE;
+        let on: Vec<usize> = (0..points.len()).filter(|i| is_on(*i)).collect();
+        let most = levels.first().map_or(0, |level| level.plane.points);
+        if on.is_empty() || (on.len() as f64) < LEAST * most as f64 {
+            break;
+        }
+        let middle = on.iter().map(|i| points[*i].coords).sum::<Vector3<f64>>() / on.len() as f64;
+        levels.push(Level { plane: Plane { points: on.len(), ..plane }, middle: middle.into() });
+        wanted.normal = Some((levels[0].plane.normal, 0.035));
+        let left = |i: &usize| plane.distance(&points[*i]).abs() > 2.0 * LEVEL;
+        let left: Vec<usize> = (0..points.len()).filter(left).collect();
+        (points, normals) = left.iter().map(|i| (points[*i], normals[*i])).unzip();
+    }
+    levels
+}
+
+/// Which of the levels is the table: the highest that has a third of the largest one's points at least.
+#[must_use]
+pub fn table(levels: &[Level]) -> Option<usize> {
+    let up = levels.first()?.plane.normal;
+    let least = OF_TABLE * levels[0].plane.points as f64;
+    let large = (0..levels.len()).filter(|i| levels[*i].plane.points as f64 >= least);
+    large.max_by(|a, b| up.dot(&levels[*a].middle.coords).total_cmp(&up.dot(&levels[*b].middle.coords)))
 }
 
 #[cfg(test)]
@@ -153,5 +198,32 @@ mod tests {
         let wall = Plane::largest(&points, &[], &Wanted { normal: None, ..wanted }).expect("a wall");
         assert!(wall.normal.x.abs() > 0.9999 && (wall.offset.abs() - 0.7).abs() < 1e-3, "{wall:?}");
         assert!(Plane::largest(&points[..2], &[], &wanted).is_none());
+    }
+
+    /// Squares of 5 mm that face up.
+    fn plate(surface: &mut Surface, [x, y, z]: [f32; 3], [columns, rows]: [u32; 2]) {
+        let first = surface.points.len() as u32;
+        for i in 0..columns * rows {
+            let (column, row) = (i % columns, i / columns);
+            surface.points.push(Point3::new(x + 0.005 * column as f32, y + 0.005 * row as f32, z));
+            surface.colors.push([0.5; 3]);
+            if column + 1 < columns && row + 1 < rows {
+                let a = first + i;
+                surface.triangles.extend([[a, a + 1, a + columns], [a + 1, a + columns + 1, a + columns]]);
+            }
+        }
+    }
+
+    #[test]
+    fn the_table_is_the_highest_of_the_large_levels() {
+        let mut surface = Surface::default();
+        plate(&mut surface, [0.0, 0.0, 0.0], [200, 100]);
+        plate(&mut surface, [0.2, 0.0, 0.7], [100, 80]);
+        plate(&mut surface, [0.3, 0.1, 0.9], [20, 20]);
+        let found = levels(&surface, &Vector3::new(0.1, 0.0, 1.0), 0.3);
+        let heights: Vec<f64> = found.iter().map(|level| level.middle.z).collect();
+        assert!(found.len() == 2 && heights[0].abs() < 1e-6 && (heights[1] - 0.7).abs() < 1e-6, "{heights:?}");
+        assert_eq!((table(&found), table(&[])), (Some(1), None));
+        assert!((found[1].middle.x - 0.4475).abs() < 1e-5 && found[1].plane.points == 8000, "{found:?}");
     }
 }

@@ -1,7 +1,7 @@
 //! Views of boxes on a table become their surface.
 
 use super::*;
-use crate::plane::table;
+use crate::plane::{levels, table};
 use crate::test_boxes::{SIZE, cameras, seen, table as solids};
 use nalgebra::{Point3, Vector3};
 use rand::SeedableRng as _;
@@ -59,7 +59,8 @@ fn noisy_views_become_a_coloured_surface_that_faces_outward_and_has_its_table() 
             surface.colors[i]
         );
     }
-    let table = table(&surface, &Vector3::z()).expect("a table");
+    let levels = levels(&surface, &Vector3::z(), 0.26);
+    let table = levels[table(&levels).expect("a table")].plane;
     let tilt = table.normal.angle(&Vector3::z()).to_degrees();
     assert!(tilt < 0.2 && table.offset.abs() < 2e-3, "{tilt} degrees, {} m", table.offset);
     let text = surface.obj();
