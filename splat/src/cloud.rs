@@ -136,12 +136,18 @@ impl SplatCloud {
         Self { splats: splats.collect(), degree: self.degree, harmonics }
     }
 
+    /// A 3DGS PLY.
+    #[must_use]
+    pub fn ply(&self) -> Vec<u8> {
+        ply::write(self)
+    }
+
     /// Writes the file `path` as a 3DGS PLY.
     ///
     /// # Errors
     /// [`OutputError`] where it cannot be written.
     pub fn write(&self, path: &Path) -> Result<(), OutputError> {
-        output::write(path, ply::write(self))
+        output::write(path, self.ply())
     }
 
     /// Writes a 3DGS PLY into an output, which the caller finishes.
@@ -149,7 +155,7 @@ impl SplatCloud {
     /// # Errors
     /// As [`Self::write`].
     pub fn write_to(&self, output: &mut Output) -> Result<(), OutputError> {
-        output.write_all(&ply::write(self)).map_err(|error| OutputError::of(output.path(), error))
+        output.write_all(&self.ply()).map_err(|error| OutputError::of(output.path(), error))
     }
 
     fn check(&self) -> Result<(), String> {

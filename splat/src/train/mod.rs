@@ -66,7 +66,7 @@ pub struct Settings {
     pub rates: Rates,
     /// Of the order of the photographs.
     pub seed: u64,
-    /// Where a training that was interrupted is kept, to go on from.
+    /// Where a training is kept, to go on from where it was stopped, or to have its end again; the caller removes the file.
     pub state: Option<PathBuf>,
 }
 
@@ -103,7 +103,8 @@ impl Settings {
     #[must_use]
     pub fn scene(steps: usize) -> Self {
         let weights = Weights { similarity: 0.2, mask: 0.0, depth: 0.2, normals: 0.05 };
-        Self { weights, flatten: 0.05, ..Self::object(steps) }
+        let rates = Rates { centre: ON_SURFACE, ..Rates::default() };
+        Self { weights, flatten: 0.05, rates, ..Self::object(steps) }
     }
 }
 
@@ -147,6 +148,8 @@ pub enum TrainError {
     State(#[from] StateError),
 }
 
+/// Rate of centres that begin on fused depth, and are to stay there: an eighth of that of points from pictures.
+const ON_SURFACE: f64 = 2e-5;
 /// Steps between which the state is kept.
 const KEEP: usize = 500;
 /// What is left at the end of the centres' rate, and of all others.
@@ -177,6 +180,7 @@ pub fn train(
     }
     .unwrap_or_else(|| Moments::new(Parameters::of(cloud)));
     let extent = extent(photographs);
+    let begun = moments.step;
     while moments.step < settings.steps {
         let photograph = &photographs[chosen(settings.seed, moments.step, photographs.len())];
         let (loss, slope) = slope(&moments.at, photograph, settings);
@@ -191,8 +195,8 @@ pub fn train(
             return Err(TrainError::Stopped(step));
         }
     }
-    if let Some(path) = &settings.state {
-        state::remove(path);
+    if let Some(path) = settings.state.as_ref().filter(|_| begun < settings.steps) {
+        state::write(path, mark, &moments)?;
     }
     Ok(moments.at.cloud())
 }

@@ -1,4 +1,4 @@
-//! A training that was stopped, in a file: whole or not there, and only for the same cloud, photographs and settings.
+//! A training on its way or at its end, in a file: whole or not there, and only for the same cloud, photographs and settings.
 
 use super::adam::Moments;
 use super::{Photograph, Settings};
@@ -75,9 +75,4 @@ pub(super) fn write(path: &Path, mark: u64, moments: &Moments) -> Result<(), Sta
         part.columns().into_iter().flatten().for_each(|value| bytes.extend(value.to_le_bytes()));
     }
     Ok(output::write(path, bytes)?)
-}
-
-/// Removes the state of a training that came to its end. One that stays does no harm: it is that of other steps.
-pub(super) fn remove(path: &Path) {
-    let _ = std::fs::remove_file(path);
 }
