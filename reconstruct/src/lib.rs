@@ -6,7 +6,10 @@
 //! | [`scan`] | pictures, masks, depth, poses; COLMAP, nerfstudio, robot-held cameras |
 //! | [`field`] | signed distance and colour at the nodes of a box |
 //! | `sweep` | signed distance from signs |
+//! | [`views`] | views read, the blurred ones left out, every eighth held out |
+//! | `splats` | views as splats are trained on them, and the picture of splats |
 //! | [`object`] | one object: where it starts, the optimisation, what was left uncertain |
+//! | [`scene`] | what stands around: fused depth, levels, planar splats |
 //! | [`mesh`] | its surface as triangles: closed, checked, reduced; volume and inertia |
 //! | [`articulated`] | two states of an object with a part that moves: the joint and both parts |
 //! | [`assets`] | files: meshes, URDF, cell.toml block, report page |
@@ -19,4 +22,7 @@ pub mod field;
 pub mod mesh;
 pub mod object;
 pub mod scan;
+pub mod scene;
+mod splats;
 mod sweep;
+pub mod views;

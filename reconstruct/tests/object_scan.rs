@@ -1,14 +1,19 @@
 //! A whole scan of a known object, from files to the mesh, on a coarse grid; and scans that cannot be used.
 
 use nalgebra::{Isometry3, Point3, Vector3};
+use reconstruct::assets::{Labels, files};
 use reconstruct::field::{Field, Grid};
 use reconstruct::mesh::{Solid, surface};
-use reconstruct::object::{Options, draw, reconstruct};
+use reconstruct::object::{Object, ObjectError, Options, draw, forget, reconstruct};
 use reconstruct::scan::{Camera, Lens, Scan};
 use serde_json::json;
+use shared_mem::ending;
 use shared_mem::msg::image::PixelEncoding;
 use shared_mem::recording::pack_picture;
-use std::path::Path;
+use splat::SplatCloud;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::time::Duration;
 
 const WIDTH: u32 = 120;
 const HEIGHT: u32 = 90;
@@ -115,6 +120,87 @@ fn a_ring_comes_out_of_its_pictures_closed_with_its_hole_its_volume_and_its_colo
     assert!((volume - 1.0).abs() < 0.06, "{volume}");
     assert!(object.psnr() > 28.0, "{}", object.psnr());
     assert!(object.remarks.is_empty(), "{:?}", object.remarks);
+    assert!(object.psnr_splats() > 30.0, "{}", object.psnr_splats());
+    // In the frame of the meshes, whose origin is not the scan's.
+    let read = SplatCloud::parse(&written(&object, "splats.ply")).expect("splats");
+    assert_eq!(read.splats.len(), object.fine.points.len());
+    let count = read.splats.len() as f64;
+    let ours = read.splats.iter().map(|splat| splat.centre.coords.cast::<f64>()).sum::<Vector3<f64>>() / count;
+    let mesh = object.fine.points.iter().map(|p| p - object.middle()).sum::<Vector3<f64>>() / count;
+    assert!((ours - mesh).norm() < 5e-3 && object.middle().z > 0.015, "{ours} {mesh}");
+}
+
+/// One of the files that become of an object.
+fn written(object: &Object, name: &str) -> Vec<u8> {
+    let labels = Labels { name: "ring".into(), mass: None, command: String::new() };
+    let mut files = files(object, &[], &labels).into_iter();
+    files.find(|(path, _)| path == &PathBuf::from(name)).expect("a file of this name").1
+}
+
+/// Where the run that is ended early finds its scan, and after how many milliseconds.
+const SCAN: &str = "TWINALIGN_TEST_SCAN";
+const ENDS: &str = "TWINALIGN_TEST_ENDS";
+/// What it said in the end.
+const SAID: &str = "said";
+const COARSE: Options = Options { scale: None, edge: 24 };
+
+#[test]
+fn a_run_that_is_ended_again_and_again_goes_on_to_the_same_bytes() {
+    let folder = tempfile::tempdir().expect("a folder");
+    write(folder.path(), Poses::Right);
+    let kept = folder.path().join("ring.state");
+    let whole = reconstruct(Scan::open(folder.path()).expect("a scan"), &COARSE, &kept).expect("an object");
+    forget(&kept).expect("nothing is left of it");
+    // Ending is asked of a process, once and for all: each part of the work is a process of its own.
+    let program = std::env::current_exe().expect("this test");
+    let mut ended = 0;
+    for round in 1..60 {
+        let child = Command::new(&program)
+            .args(["--exact", "a_part_of_the_work"])
+            .env(SCAN, folder.path())
+            .env(ENDS, (1000 + 500 * round).to_string())
+            .output();
+        assert!(child.expect("it runs").status.success());
+        let said = std::fs::read_to_string(folder.path().join(SAID)).expect("what it said");
+        if said.contains("it is done") {
+            break;
+        }
+        assert!(said.contains("the same command goes on from"), "{said}");
+        ended += 1;
+    }
+    assert!(ended > 0, "it was never ended");
+    for name in ["splats.ply", "object_fine.obj"] {
+        let resumed = std::fs::read(folder.path().join(name)).expect("the resumed run's file");
+        assert!(resumed == written(&whole, name), "{name} differs after {ended} parts");
+    }
+    let left = std::fs::read_dir(folder.path())
+        .expect("the folder")
+        .filter_map(|entry| entry.ok()?.file_name().into_string().ok());
+    assert_eq!(left.filter(|name| name.contains("state")).count(), 0);
+}
+
+/// Does nothing by itself.
+#[test]
+fn a_part_of_the_work() {
+    let (Some(scan), Some(ends)) = (std::env::var_os(SCAN), std::env::var(ENDS).ok()) else { return };
+    let (scan, ends) = (PathBuf::from(scan), ends.parse().expect("milliseconds"));
+    std::thread::spawn(move || {
+        std::thread::sleep(Duration::from_millis(ends));
+        ending::ask();
+    });
+    let kept = scan.join("ring.state");
+    let said = match reconstruct(Scan::open(&scan).expect("a scan"), &COARSE, &kept) {
+        Ok(object) => {
+            for name in ["splats.ply", "object_fine.obj"] {
+                std::fs::write(scan.join(name), written(&object, name)).expect("a file");
+            }
+            forget(&kept).expect("nothing is left of it");
+            "it is done".into()
+        }
+        Err(ObjectError::Scan(_)) => "the same command goes on from the beginning".into(),
+        Err(error) => error.to_string(),
+    };
+    std::fs::write(scan.join(SAID), said).expect("a file");
 }
 
 #[test]

@@ -312,7 +312,7 @@ fn dependencies_point_one_way() {
         ("splat", &["fusion", "twin", "rt_bridge", "calibration", "evaluation", "import", "urdf", "reconstruct"]),
         ("fusion", &["twin", "rt_bridge", "calibration", "evaluation", "import", "urdf", "reconstruct"]),
         ("import", &["splat", "fusion", "twin", "rt_bridge", "calibration", "evaluation", "urdf", "reconstruct"]),
-        ("reconstruct", &["splat", "fusion", "twin", "rt_bridge", "calibration", "evaluation", "import", "urdf"]),
+        ("reconstruct", &["twin", "rt_bridge", "calibration", "evaluation", "import", "urdf"]),
         ("evaluation", &["rt_bridge", "calibration", "import"]),
         ("twin", &["rt_bridge", "calibration", "evaluation", "import"]),
         ("rt_bridge", &["calibration", "evaluation", "import", "reconstruct"]),

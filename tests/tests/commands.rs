@@ -40,7 +40,7 @@ const SPOKEN_BY: [(&str, &[&str]); 11] = [
     ("twin/src/viewer/", &["twin shadow"]),
     ("twin/src/teleop/", &["twin teleop"]),
     ("twin/src/reconstruct/", &["twin label-splats"]),
-    ("reconstruct/src/", &["twin reconstruct object", "twin reconstruct articulated"]),
+    ("reconstruct/src/", &["twin reconstruct object", "twin reconstruct articulated", "twin reconstruct scene"]),
 ];
 /// Folders whose files are named in texts by their path.
 const FOLDERS: [&str; 11] = [

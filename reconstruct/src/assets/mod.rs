@@ -7,22 +7,25 @@
 //! | `page` | the report |
 //! | `summary` | the numbers as JSON |
 //! | `articulated` | the same for an object with a part that moves |
+//! | `scene` | the files of a scene, in the scan's frame |
 
 mod articulated;
 mod description;
 mod page;
+mod scene;
 mod summary;
 
 pub use articulated::{
     ArticulatedSummary, JointNumbers, LINKS, PartNumbers, articulated_files, in_frame, links_from_mesh,
 };
+pub use scene::{LevelNumbers, SceneSummary, ViewNumbers, scene_files};
 pub use summary::Summary;
 
 use description::escaped;
 
 use crate::mesh::{Mesh, obj, ply};
 use crate::object::{Object, is_certain};
-use nalgebra::Point3;
+use nalgebra::{Point3, Similarity3, Vector3};
 use shared_mem::msg::image::PixelEncoding;
 use shared_mem::recording::pack_picture;
 use std::path::PathBuf;
@@ -56,11 +59,13 @@ pub fn files(object: &Object, pieces: &[Mesh], labels: &Labels) -> Vec<(PathBuf,
     let (fine, coarse) = (centred(&object.fine, &middle), centred(&object.coarse, &middle));
     let colours: Vec<[u8; 3]> =
         object.fine.points.iter().zip(&object.shown).map(|(p, n)| colour(object, p, *n)).collect();
+    let splats = object.splats.moved(&Similarity3::new(-middle.coords, Vector3::zeros(), 1.0));
     let summary = Summary::of(object, pieces, labels);
     let mut files = vec![
         ("object.obj".into(), obj(&coarse).into_bytes()),
         ("object_fine.obj".into(), obj(&fine).into_bytes()),
-        ("object.ply".into(), ply(&fine, &colours, &object.shown)),
+        ("object.ply".into(), ply(&fine, &colours, Some(&object.shown))),
+        ("splats.ply".into(), splats.ply()),
         ("object.urdf".into(), description::urdf(&summary, pieces.len()).into_bytes()),
         ("cell_object.toml".into(), description::block(&summary).into_bytes()),
         ("object.json".into(), summary.json()),
@@ -70,12 +75,19 @@ pub fn files(object: &Object, pieces: &[Mesh], labels: &Labels) -> Vec<(PathBuf,
         files.push((description::piece_file(number).into(), obj(piece).into_bytes()));
     }
     for view in &object.held_out {
-        let stem = view.name.replace(['/', '\\'], "_");
-        let stem = stem.rsplit_once('.').map_or(stem.as_str(), |(stem, _)| stem);
-        let packed = pack_picture(PixelEncoding::Rgb8, view.width, view.height, view.drawn.rgb.as_flattened());
-        files.extend(packed.ok().map(|bytes| (format!("held_out/{stem}.png").into(), bytes)));
+        let stem = stem(&view.name);
+        for (rgb, of) in [(&view.drawn.rgb, ""), (&view.splats, "_splats")] {
+            let packed = pack_picture(PixelEncoding::Rgb8, view.width, view.height, rgb.as_flattened());
+            files.extend(packed.ok().map(|bytes| (format!("held_out/{stem}{of}.png").into(), bytes)));
+        }
     }
     files
+}
+
+/// A picture's path as one name, without its ending.
+fn stem(name: &str) -> String {
+    let joined = name.replace(['/', '\\'], "_");
+    joined.rsplit_once('.').map_or(joined.as_str(), |(stem, _)| stem).to_owned()
 }
 
 fn colour(object: &Object, point: &Point3<f64>, shown: u8) -> [u8; 3] {

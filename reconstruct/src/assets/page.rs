@@ -12,7 +12,7 @@ use shared_mem::recording::pack_picture;
 
 pub(super) const STYLE: &str = include_str!("page.css");
 /// Differences are drawn so many times as bright.
-const BRIGHTER: u8 = 4;
+pub(super) const BRIGHTER: u8 = 4;
 /// Room around the object in a picture [pixel].
 const ROOM: u32 = 12;
 
@@ -33,9 +33,10 @@ pub(super) fn page(object: &Object, summary: &Summary, labels: &Labels) -> Strin
                 (shape(summary))
                 h2 { "Held-out views" }
                 p.note {
-                    "Every eighth view took no part. Left the picture inside its mask, in the middle the object from there, right "
-                    "their difference, " (BRIGHTER) " times as bright. PSNR is that inside the mask, its outermost three pixels left "
-                    "out, with the camera's pose fitted to the object; in brackets with the pose as the scan has it."
+                    "Every eighth view took no part. From the left: the picture inside its mask, the object from there, its splats, "
+                    "and what these differ by from the picture, " (BRIGHTER) " times as bright. PSNR is that inside the mask, its "
+                    "outermost three pixels left out, with the camera's pose fitted to the object; in brackets with the pose as the "
+                    "scan has it."
                 }
                 @for view in &object.held_out { (held_out(view)) }
                 footer { "twinalign " (env!("CARGO_PKG_VERSION")) ". " (labels.command) }
@@ -48,6 +49,7 @@ pub(super) fn page(object: &Object, summary: &Summary, labels: &Labels) -> Strin
 fn facts(summary: &Summary) -> Markup {
     let entries = [
         (format!("{:.1} dB", summary.psnr_db), "PSNR of held-out views inside the mask"),
+        (format!("{:.1} dB", summary.psnr_splats_db), "PSNR of the splats there"),
         (format!("{:.1} cm³", summary.volume_m3 * 1e6), "volume"),
         (summary.surface.genus.to_string(), "handles (genus)"),
         (format!("{:.2} mm", summary.voxel_m * 1e3), "distance of the grid's nodes"),
@@ -80,6 +82,7 @@ fn shape(summary: &Summary) -> Markup {
             "convex pieces",
             format!("{}, {:.1} % of the volume", summary.pieces, 100.0 * summary.pieces_volume_m3 / summary.volume_m3),
         ),
+        ("splats", format!("{} in splats.ply", summary.splats)),
         ("mass", format!("{:.3} kg, {mass}", summary.mass_kg)),
         ("scale", format!("one unit of the poses is {:.5} m: {source}", scale.metres)),
         (
@@ -100,23 +103,35 @@ fn shape(summary: &Summary) -> Markup {
 }
 
 fn held_out(view: &HeldOut) -> Markup {
-    let difference: Vec<[u8; 3]> = view
-        .picture
-        .iter()
-        .zip(&view.drawn.rgb)
-        .map(|(a, b)| std::array::from_fn(|c| a[c].abs_diff(b[c]).saturating_mul(BRIGHTER)))
-        .collect();
+    let difference = differences(&view.picture, &view.splats);
     let window = window(view);
     html! {
         figure {
-            @for (rgb, what) in [(&view.picture, "photograph"), (&view.drawn.rgb, "object"), (&difference, "difference")] {
+            @for (rgb, what) in [
+                (&view.picture, "photograph"),
+                (&view.drawn.rgb, "object"),
+                (&view.splats, "splats"),
+                (&difference, "difference"),
+            ] {
                 @if let Some(source) = picture(rgb, view.width, window) { img src=(source) alt=(format!("{what} of {}", view.name)); }
             }
             figcaption {
-                (view.name) ": " (format!("{:.1} dB ({:.1}); silhouettes agree to {:.1} %", view.psnr, view.psnr_as_given, view.overlap * 100.0))
+                (view.name) ": " (format!(
+                    "{:.1} dB ({:.1}), splats {:.1} dB; silhouettes agree to {:.1} %",
+                    view.psnr,
+                    view.psnr_as_given,
+                    view.psnr_splats,
+                    view.overlap * 100.0
+                ))
             }
         }
     }
+}
+
+/// What two pictures differ by, [`BRIGHTER`] times as bright.
+pub(super) fn differences(one: &[[u8; 3]], other: &[[u8; 3]]) -> Vec<[u8; 3]> {
+    let off = |(a, b): (&[u8; 3], &[u8; 3])| std::array::from_fn(|c| a[c].abs_diff(b[c]).saturating_mul(BRIGHTER));
+    one.iter().zip(other).map(off).collect()
 }
 
 /// First column and row, columns and rows of the part that shows the object.

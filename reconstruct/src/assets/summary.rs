@@ -2,8 +2,9 @@
 
 use super::{DENSITY, Labels};
 use crate::mesh::{Mesh, Solid, Topology};
-use crate::object::{Object, Remark};
+use crate::object::Object;
 use crate::scan::Scale;
+use crate::views::Remark;
 use serde::Serialize;
 
 /// The numbers of an object.
@@ -33,6 +34,8 @@ pub struct Summary {
     pub surface: Topology,
     /// Triangles of the coarse mesh.
     pub coarse_triangles: usize,
+    /// Splats.
+    pub splats: usize,
     /// Metres for one unit of the scan's poses, and who says so.
     pub scale: Scale,
     /// Views that it was made from.
@@ -45,6 +48,8 @@ pub struct Summary {
     pub held_out: Vec<HeldOutNumbers>,
     /// Their mean PSNR inside the mask [dB].
     pub psnr_db: f64,
+    /// That of the splats [dB].
+    pub psnr_splats_db: f64,
     /// Distance of the grid's nodes [m].
     pub voxel_m: f64,
     /// What a person should know.
@@ -60,6 +65,8 @@ pub struct HeldOutNumbers {
     pub psnr_db: f64,
     /// PSNR inside the mask with the camera where the scan has it [dB].
     pub psnr_as_given_db: f64,
+    /// PSNR of the splats inside the mask, from where the object has put the camera [dB].
+    pub psnr_splats_db: f64,
     /// Silhouette and mask: what they have in common, of what either has.
     pub overlap: f64,
 }
@@ -77,6 +84,7 @@ impl Summary {
             view: view.name.clone(),
             psnr_db: view.psnr,
             psnr_as_given_db: view.psnr_as_given,
+            psnr_splats_db: view.psnr_splats,
             overlap: view.overlap,
         });
         Self {
@@ -92,12 +100,14 @@ impl Summary {
             inertia_kg_m2: [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)].map(|at| inertia[at]),
             surface: object.topology,
             coarse_triangles: object.coarse.triangles.len(),
+            splats: object.splats.splats.len(),
             scale: object.scale,
             views: object.views,
             with_depth: object.with_depth,
             cameras_moved_m: object.moved,
             held_out: held_out.collect(),
             psnr_db: object.psnr(),
+            psnr_splats_db: object.psnr_splats(),
             voxel_m: object.field.grid.voxel,
             remarks: object.remarks.clone(),
         }

@@ -1,11 +1,12 @@
 //! Fewer triangles: edges are drawn together where that moves the surface least, by the quadrics of Garland and Heckbert (1997). An edge
 //! is left alone where the surface would not stay a closed manifold (its ends must have two neighbours in common) or a triangle would
-//! turn over, so that genus and closedness stay as they were.
+//! turn over, so that genus and closedness stay as they were. Where a surface has a rim, planes across it hold the rim in place.
 
 use super::Mesh;
 use nalgebra::{Matrix3, Point3, Vector3};
+use shared_mem::ending;
 use std::cmp::Ordering;
-use std::collections::BinaryHeap;
+use std::collections::{BinaryHeap, HashMap};
 
 /// A triangle may turn by so much (cosine).
 const TURN: f64 = 0.2;
@@ -24,9 +25,13 @@ impl Quadric {
     fn of(corners: [Point3<f64>; 3]) -> Self {
         let normal = (corners[1] - corners[0]).cross(&(corners[2] - corners[0]));
         let area = normal.norm();
+        Self::of_plane(normal, &corners[0], area)
+    }
+
+    fn of_plane(normal: Vector3<f64>, point: &Point3<f64>, weight: f64) -> Self {
         let Some(unit) = normal.try_normalize(1e-30) else { return Self::default() };
-        let offset = -unit.dot(&corners[0].coords);
-        Self { a: unit * unit.transpose() * area, b: unit * (offset * area), c: offset * offset * area }
+        let offset = -unit.dot(&point.coords);
+        Self { a: unit * unit.transpose() * weight, b: unit * (offset * weight), c: offset * offset * weight }
     }
 
     fn plus(&self, other: &Self) -> Self {
@@ -83,9 +88,12 @@ struct Work {
     around: Vec<Vec<u32>>,
     quadrics: Vec<Quadric>,
     stamps: Vec<u32>,
+    /// Corners at which the surface ends.
+    is_rim: Vec<bool>,
 }
 
-/// A closed mesh with at most so many triangles, or as near to that as it stays closed.
+/// A mesh with at most so many triangles, or as near to that as it stays a surface: closed where it was closed. Ends early, with more
+/// triangles, once the end was asked for.
 #[must_use]
 pub fn reduced(mesh: &Mesh, triangles: usize) -> Mesh {
     let mut work = Work::new(mesh);
@@ -94,19 +102,19 @@ pub fn reduced(mesh: &Mesh, triangles: usize) -> Mesh {
     for triangle in &mesh.triangles {
         for i in 0..3 {
             let (a, b) = (triangle[i], triangle[(i + 1) % 3]);
-            if a < b {
-                heap.push(work.edge([a, b]));
+            if a < b || work.shared([a, b]) == 1 {
+                heap.push(work.edge([a.min(b), a.max(b)]));
             }
         }
     }
-    while left > triangles.max(4) {
+    while left > triangles.max(4) && !ending::asked() {
         let Some(edge) = heap.pop() else { break };
         let [a, b] = edge.ends.map(|end| end as usize);
         if [work.stamps[a], work.stamps[b]] != edge.stamps || !work.may_join(&edge) {
             continue;
         }
+        left -= work.shared(edge.ends);
         work.join(&edge);
-        left -= 2;
         for neighbour in work.neighbours(edge.ends[0]) {
             heap.push(work.edge([edge.ends[0].min(neighbour), edge.ends[0].max(neighbour)]));
         }
@@ -126,8 +134,19 @@ impl Work {
                 quadrics[*corner as usize] = quadrics[*corner as usize].plus(&quadric);
             }
         }
+        let mut is_rim = vec![false; count];
+        for ([a, b], number) in rim(mesh) {
+            let [p, q, r] = mesh.corners(number);
+            let (from, to) = (mesh.points[a as usize], mesh.points[b as usize]);
+            let across = (q - p).cross(&(r - p)).cross(&(to - from));
+            let quadric = Quadric::of_plane(across, &from, (to - from).norm_squared());
+            for corner in [a as usize, b as usize] {
+                is_rim[corner] = true;
+                quadrics[corner] = quadrics[corner].plus(&quadric);
+            }
+        }
         let triangles = mesh.triangles.iter().copied().map(Some).collect();
-        Self { points: mesh.points.clone(), triangles, around, quadrics, stamps: vec![0; count] }
+        Self { points: mesh.points.clone(), triangles, around, quadrics, stamps: vec![0; count], is_rim }
     }
 
     fn edge(&self, ends: [u32; 2]) -> Edge {
@@ -135,6 +154,11 @@ impl Work {
         let quadric = self.quadrics[a].plus(&self.quadrics[b]);
         let place = quadric.best(&nalgebra::center(&self.points[a], &self.points[b]));
         Edge { error: quadric.at(&place), ends, stamps: [self.stamps[a], self.stamps[b]], place }
+    }
+
+    /// Triangles that have both ends of an edge.
+    fn shared(&self, [a, b]: [u32; 2]) -> usize {
+        self.triangles_at(a).filter(|triangle| triangle.contains(&b)).count()
     }
 
     fn triangles_at(&self, corner: u32) -> impl Iterator<Item = [u32; 3]> + '_ {
@@ -154,7 +178,13 @@ impl Work {
         let common: Vec<u32> = of_a.iter().copied().filter(|n| of_b.binary_search(n).is_ok()).collect();
         // Where one of the two has three neighbours, joining would lay two triangles onto each other.
         let thin = common.iter().any(|n| self.neighbours(*n).len() <= 3);
-        if common.len() != 2 || thin || of_a.len() + of_b.len() < 7 {
+        // A rim stays one: two of its corners join along it alone.
+        let shared = self.shared(edge.ends);
+        let is_between_rims = self.is_rim[a as usize] && self.is_rim[b as usize];
+        if shared != if is_between_rims { 1 } else { 2 } {
+            return false;
+        }
+        if common.len() != shared || thin || of_a.len() + of_b.len() < 7 {
             return false;
         }
         [(a, b), (b, a)].iter().all(|(corner, other)| {
@@ -182,6 +212,7 @@ impl Work {
         let (first, second) = (a as usize, b as usize);
         self.quadrics[first] = self.quadrics[first].plus(&self.quadrics[second]);
         self.points[first] = edge.place;
+        self.is_rim[first] |= self.is_rim[second];
         for number in std::mem::take(&mut self.around[second]) {
             let Some(triangle) = &mut self.triangles[number as usize] else { continue };
             if triangle.contains(&a) {
@@ -196,6 +227,20 @@ impl Work {
         self.stamps[first] += 1;
         self.stamps[second] += 1;
     }
+}
+
+/// Edges of one triangle alone, with its number, in a fixed order.
+fn rim(mesh: &Mesh) -> Vec<([u32; 2], usize)> {
+    let mut found: HashMap<[u32; 2], (usize, usize)> = HashMap::new();
+    for (number, triangle) in mesh.triangles.iter().enumerate() {
+        for i in 0..3 {
+            let (a, b) = (triangle[i], triangle[(i + 1) % 3]);
+            found.entry([a.min(b), a.max(b)]).or_insert((0, number)).0 += 1;
+        }
+    }
+    let mut rim: Vec<_> = found.into_iter().filter(|(_, (count, _))| *count == 1).map(|(e, (_, n))| (e, n)).collect();
+    rim.sort_unstable();
+    rim
 }
 
 #[cfg(test)]
@@ -218,5 +263,30 @@ mod tests {
         assert!((after / before - 1.0).abs() < 0.03, "{before} {after}");
         // With nothing left to draw together it ends, closed.
         assert_eq!(Topology::of(&reduced(&mesh, 4)).expect("closed").genus, 1);
+    }
+
+    #[test]
+    fn a_plate_with_a_step_of_few_triangles_keeps_its_rim_and_its_step() {
+        let (columns, rows) = (60u32, 40u32);
+        let height = |column: u32| if column < 30 { 0.0 } else { 0.05 };
+        let points = (0..columns * rows)
+            .map(|i| Point3::new(0.01 * f64::from(i % columns), 0.01 * f64::from(i / columns), height(i % columns)));
+        let mut triangles = Vec::new();
+        for row in 0..rows - 1 {
+            for column in 0..columns - 1 {
+                let a = row * columns + column;
+                triangles.extend([[a, a + 1, a + columns], [a + 1, a + columns + 1, a + columns]]);
+            }
+        }
+        let few = reduced(&Mesh { points: points.collect(), triangles }, 60);
+        assert!(few.triangles.len() <= 60, "{}", few.triangles.len());
+        let (low, high) = few.bounds();
+        assert!((low - Point3::origin()).norm() < 1e-3 && (high - Point3::new(0.59, 0.39, 0.05)).norm() < 1e-3);
+        let area = (0..few.triangles.len()).map(|number| {
+            let [a, b, c] = few.corners(number);
+            0.5 * (b - a).cross(&(c - a)).norm()
+        });
+        let wanted = 0.39 * (0.29 + 0.29 + 0.05f64.hypot(0.01));
+        assert!((area.sum::<f64>() / wanted - 1.0).abs() < 0.01);
     }
 }

@@ -29,6 +29,17 @@ impl Band {
         Self { blocks, active }
     }
 
+    /// Which blocks these are, x fastest.
+    pub(crate) fn active(&self) -> &[bool] {
+        &self.active
+    }
+
+    /// From [`Band::active`] of the same grid; `None` where the count is another one.
+    pub(crate) fn of(grid: &Grid, active: Vec<bool>) -> Option<Self> {
+        let blocks = grid.dims.map(|n| n.div_ceil(EDGE));
+        (active.len() == blocks.iter().product::<usize>()).then_some(Self { blocks, active })
+    }
+
     /// Whether a place [steps] lies in such a block.
     #[inline]
     pub(crate) fn holds(&self, node: [usize; 3]) -> bool {

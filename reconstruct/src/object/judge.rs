@@ -2,14 +2,16 @@
 
 use super::bounds::Bounds;
 use super::learn;
-use super::pictures::Remark;
 use super::pool;
 use super::view::{Drawn, draw};
 use crate::field::{Field, Grid};
 use crate::mesh::{Islands, Mesh};
 use crate::scan::{Camera, Frame};
+use crate::splats;
+use crate::views::Remark;
 use nalgebra::{Isometry3, Point3, Vector3};
 use rayon::prelude::*;
+use splat::SplatCloud;
 
 /// So near to the mask's border pixels do not count: what is behind shines in [pixel].
 const EDGE: i16 = 3;
@@ -29,6 +31,8 @@ pub struct HeldOut {
     pub picture: Vec<[u8; 3]>,
     /// The same view of the field.
     pub drawn: Drawn,
+    /// And of the splats, over black.
+    pub splats: Vec<[u8; 3]>,
     /// Columns.
     pub width: u32,
     /// Rows.
@@ -37,15 +41,18 @@ pub struct HeldOut {
     pub psnr: f64,
     /// The same with the camera where the scan has it, before its pose was fitted to the field [dB].
     pub psnr_as_given: f64,
+    /// That of the splats, from where the field has put the camera [dB].
+    pub psnr_splats: f64,
     /// What mask and drawn silhouette have in common, of what either has.
     pub overlap: f64,
 }
 
-pub(super) fn held_out(field: &Field<f32>, frame: &Frame, bounds: &Bounds) -> HeldOut {
+pub(super) fn held_out(field: &Field<f32>, cloud: &SplatCloud, frame: &Frame, bounds: &Bounds) -> HeldOut {
     let pixels = pool::pixels(std::slice::from_ref(frame));
     let pose = learn::placed(field, &pixels, &frame.scan_from_camera, bounds.centre(), bounds.radius());
     let as_given = draw(field, &frame.camera, &frame.scan_from_camera);
     let drawn = draw(field, &frame.camera, &pose);
+    let splats: Vec<[u8; 3]> = splats::draw(cloud, &frame.camera, &pose, [0.0; 3]).rgb8().collect();
     let (mut both, mut either) = (0usize, 0usize);
     for (mask, opacity) in frame.mask.iter().zip(&drawn.opacity) {
         both += usize::from(*mask && *opacity > 0.5);
@@ -55,26 +62,20 @@ pub(super) fn held_out(field: &Field<f32>, frame: &Frame, bounds: &Bounds) -> He
     HeldOut {
         name: frame.name.clone(),
         picture,
-        psnr: psnr(frame, &drawn),
-        psnr_as_given: psnr(frame, &as_given),
+        psnr: psnr(frame, &drawn.rgb),
+        psnr_as_given: psnr(frame, &as_given.rgb),
+        psnr_splats: psnr(frame, &splats),
         drawn,
+        splats,
         width: frame.camera.width,
         height: frame.camera.height,
         overlap: both as f64 / either.max(1) as f64,
     }
 }
 
-fn psnr(frame: &Frame, drawn: &Drawn) -> f64 {
-    let (mut sum, mut count) = (0.0, 0usize);
-    for (at, steps) in frame.border_distance(EDGE + 1).into_iter().enumerate() {
-        if steps > EDGE {
-            let off = |c: usize| f64::from(frame.rgb[at][c].abs_diff(drawn.rgb[at][c]));
-            sum += (0..3).map(|c| off(c) * off(c)).sum::<f64>();
-            count += 3;
-        }
-    }
-    let mean = (sum / count.max(1) as f64).max(1e-3);
-    10.0 * (255.0 * 255.0 / mean).log10()
+fn psnr(frame: &Frame, drawn: &[[u8; 3]]) -> f64 {
+    let border = frame.border_distance(EDGE + 1);
+    splats::psnr(&frame.rgb, drawn, |at| border[at] > EDGE)
 }
 
 /// How many views show each corner of a mesh: it faces them, and nothing stands before it.

@@ -89,6 +89,8 @@ pub(crate) struct State {
     pub(crate) level: usize,
     pub(crate) step: u32,
     pub(crate) field: Field<f32>,
+    /// Where rays look until it is found anew.
+    pub(crate) band: Option<Band>,
     pub(crate) adam: Adam,
     /// Shift [m] and turn [rad] of each frame's camera about the pivot.
     pub(crate) corrections: Vec<[f64; 6]>,
@@ -102,7 +104,7 @@ impl State {
         let field = Field { grid, distance, colour: vec![[0.5; 3]; nodes] };
         let none = ([0.0; 6], [0.0; 6]);
         let (corrections, moments) = (vec![[0.0; 6]; frames], vec![none; frames]);
-        Self { level: 0, step: 0, field, adam: Adam::new(nodes), corrections, moments }
+        Self { level: 0, step: 0, field, band: None, adam: Adam::new(nodes), corrections, moments }
     }
 }
 
@@ -117,7 +119,8 @@ pub(crate) struct Learner<'a> {
     /// Half the object's diagonal [m].
     radius: f64,
     parts: Vec<Gathered>,
-    band: Option<(Band, Vec<u32>)>,
+    /// The nodes of the band.
+    near: Option<Vec<u32>>,
 }
 
 impl<'a> Learner<'a> {
@@ -127,7 +130,7 @@ impl<'a> Learner<'a> {
         pixels: &'a [Pixel],
         (pivot, radius): (Point3<f64>, f64),
     ) -> Self {
-        Self { plan, frames, depth_spread, pixels, pivot, radius, parts: Vec::new(), band: None }
+        Self { plan, frames, depth_spread, pixels, pivot, radius, parts: Vec::new(), near: None }
     }
 
     /// One step; at the end of a level the field goes on with nodes twice as dense. `true` while there are steps left.
@@ -136,14 +139,16 @@ impl<'a> Learner<'a> {
         let nodes = state.field.grid.len();
         if self.parts.first().is_none_or(|part| !part.is_for(nodes)) {
             self.parts = vec![Gathered::new(nodes); PARTS];
-            self.band = None;
+            self.near = None;
         }
         let progress = state.step as f32 / level.steps as f32;
         let steepness = level.steepness[0] * (level.steepness[1] / level.steepness[0]).powf(progress);
-        if self.band.is_none() || state.step.is_multiple_of(BAND_STEPS) {
-            let band = Band::new(&state.field.grid, &state.field.distance, 6.0 / steepness + 1.0);
-            let nodes = band.nodes(&state.field.grid);
-            self.band = Some((band, nodes));
+        if state.band.is_none() || state.step.is_multiple_of(BAND_STEPS) {
+            state.band = Some(Band::new(&state.field.grid, &state.field.distance, 6.0 / steepness + 1.0));
+            self.near = None;
+        }
+        if self.near.is_none() {
+            self.near = state.band.as_ref().map(|band| band.nodes(&state.field.grid));
         }
         let by_pose = self.gather(state, steepness);
         let decay = 0.1f32.powf(progress);
@@ -182,7 +187,7 @@ impl<'a> Learner<'a> {
     /// Derivatives of a step: of the field into the parts, of the poses in steps of the grid and radians.
     fn gather(&mut self, state: &State, steepness: f32) -> Vec<[f64; 6]> {
         let field = &state.field;
-        let Some((band, near)) = &self.band else { return Vec::new() };
+        let (Some(band), Some(near)) = (&state.band, &self.near) else { return Vec::new() };
         let medium =
             Medium { grid: &field.grid, band, distance: &field.distance, colour: &field.colour, steepness, pace: PACE };
         let stands: Vec<Stand> =

@@ -12,10 +12,12 @@
 //! | `adam` | steps along derivatives |
 //! | `learn` | the optimisation, coarse to fine |
 //! | `view` | whole pictures of the field |
+//! | `appearance` | splats on the surface, trained on the views |
 //! | `judge` | held-out views, and what no view has shown |
 //! | `state` | what there is when the work is interrupted |
 
 mod adam;
+mod appearance;
 mod band;
 mod bounds;
 mod judge;
@@ -30,35 +32,35 @@ mod view;
 
 pub use judge::HeldOut;
 pub(crate) use judge::is_certain;
-pub use pictures::Remark;
 pub use state::StateError;
 pub use view::{Drawn, draw};
 
 use crate::field::{Field, Grid};
 use crate::mesh::{self, Flaw, Islands, Mesh, Solid, Topology};
 use crate::scan::{Scale, ScaleSource, Scan, ScanError};
+use crate::views::Remark;
 use bounds::Bounds;
 use learn::{Learner, Plan, State};
 use nalgebra::{Isometry3, Point3};
 use shared_mem::ending;
 use shared_mem::progress::{Planned, Progress};
+use splat::{SplatCloud, TrainError};
 use start::Seen;
 use state::Keeper;
 use std::path::Path;
 
-/// Every so many views one is held out.
-pub const HOLD_OUT: usize = 8;
 /// Triangles of the fine mesh and of the coarse one.
 pub const FINE: usize = 20_000;
 /// Triangles of the coarse mesh.
 pub const COARSE: usize = 700;
 
 /// Stages of the work with how long each takes of 60 views on two cores [s].
-const STAGES: [Planned; 5] = [(READ, 6.0), (START, 12.0), (LEARN, 110.0), (MESH, 8.0), (JUDGE, 15.0)];
+const STAGES: [Planned; 6] = [(READ, 6.0), (START, 12.0), (LEARN, 110.0), (MESH, 8.0), (SPLATS, 120.0), (JUDGE, 15.0)];
 const READ: &str = "read";
 const START: &str = "start";
 const LEARN: &str = "optimise";
 const MESH: &str = "mesh";
+const SPLATS: &str = "splats";
 const JUDGE: &str = "judge";
 
 /// No object came of a scan.
@@ -84,9 +86,12 @@ pub enum ObjectError {
         /// Metres for one unit, as depth has it.
         metres: f64,
     },
-    /// Ctrl-C.
-    #[error("interrupted; the same command goes on from {0:.0} % of the optimisation")]
-    Interrupted(f64),
+    /// The splats cannot be trained.
+    #[error(transparent)]
+    Splats(#[from] TrainError),
+    /// Ctrl-C: how much is done [%], of what.
+    #[error("interrupted; the same command goes on from {0:.0} % of the {1}")]
+    Interrupted(f64, &'static str),
 }
 
 /// An object as its scan shows it.
@@ -98,6 +103,8 @@ pub struct Object {
     pub fine: Mesh,
     /// That of at most [`COARSE`] triangles.
     pub coarse: Mesh,
+    /// Splats that show it, in the scan's frame [m].
+    pub splats: SplatCloud,
     /// What kind of surface it is.
     pub topology: Topology,
     /// Its volume and inertia.
@@ -152,49 +159,71 @@ pub fn reconstruct(scan: Scan, options: &Options, kept: &Path) -> Result<Object,
     let mut keeper = Keeper::new(kept, options, &pictures, &pixels);
     let fresh = || State::new(grid, distance, pictures.train.len());
     let mut state = keeper.take()?.unwrap_or_else(fresh);
+    if state.level < plan.levels.len() {
+        keeper.forget_splats()?;
+    }
     interrupted(&plan, &state)?;
     let train = (pictures.train.as_slice(), pictures.depth_spread);
     let learner = Learner::new(plan.clone(), train, &pixels, (bounds.centre(), bounds.radius()));
     let poses = learn(&bar, &plan, learner, &mut state, &mut keeper)?;
     bar.stage(MESH, 3);
-    let (surface, islands) = mesh::surface(&state.field).ok_or(ObjectError::Nothing)?;
-    Topology::of(&surface)?;
-    let fine = mesh::reduced(&surface, FINE);
-    let topology = Topology::of(&fine)?;
-    bar.show(2, MESH);
-    let coarse = mesh::reduced(&fine, COARSE);
-    Topology::of(&coarse)?;
-    let solid = Solid::of(&fine);
+    let shape = Shape::of(&state.field, &bar)?;
     interrupted(&plan, &state)?;
+    let trained = (pictures.train.as_slice(), poses.as_slice());
+    let steps = appearance::steps(options.edge);
+    let splats = appearance::trained(&bar, (&state.field, &shape.fine), trained, steps, keeper.splats())?;
     bar.stage(JUDGE, 1 + pictures.held_out.len() as u64);
-    let shown = judge::shown(&state.field, &fine, &pictures.train, &poses);
+    let shown = judge::shown(&state.field, &shape.fine, &pictures.train, &poses);
     let mut held_out = Vec::new();
     for frame in &pictures.held_out {
         bar.show(1 + held_out.len() as u64, JUDGE);
         interrupted(&plan, &state)?;
-        held_out.push(judge::held_out(&state.field, frame, &bounds));
+        held_out.push(judge::held_out(&state.field, &splats, frame, &bounds));
     }
     let mut remarks = pictures.remarks;
-    remarks.extend(judge::remarks(&shown, &fine, &islands, &held_out));
+    remarks.extend(judge::remarks(&shown, &shape.fine, &shape.islands, &held_out));
     let shifts = state.corrections.iter().map(|c| c[0] * c[0] + c[1] * c[1] + c[2] * c[2]);
     let moved = (shifts.sum::<f64>() / state.corrections.len() as f64).sqrt();
-    let (views, with_depth) = (pictures.train.len(), scan.has_depth());
-    let State { field, .. } = state;
+    let Shape { fine, coarse, topology, solid, islands } = shape;
     Ok(Object {
-        field,
+        field: state.field,
         fine,
         coarse,
+        splats,
         topology,
         solid,
         shown,
         islands,
         scale,
         held_out,
-        views,
-        with_depth,
+        views: pictures.train.len(),
+        with_depth: scan.has_depth(),
         moved,
         remarks,
     })
+}
+
+/// The surface of a field, and what follows from it.
+struct Shape {
+    fine: Mesh,
+    coarse: Mesh,
+    topology: Topology,
+    solid: Solid,
+    islands: Islands,
+}
+
+impl Shape {
+    fn of(field: &Field<f32>, bar: &Progress) -> Result<Self, ObjectError> {
+        let (surface, islands) = mesh::surface(field).ok_or(ObjectError::Nothing)?;
+        Topology::of(&surface)?;
+        let fine = mesh::reduced(&surface, FINE);
+        let topology = Topology::of(&fine)?;
+        bar.show(2, MESH);
+        let coarse = mesh::reduced(&fine, COARSE);
+        Topology::of(&coarse)?;
+        let solid = Solid::of(&fine);
+        Ok(Self { fine, coarse, topology, solid, islands })
+    }
 }
 
 /// All steps; the cameras' poses at the end.
@@ -206,6 +235,7 @@ fn learn(
     keeper: &mut Keeper<'_>,
 ) -> Result<Vec<Isometry3<f64>>, ObjectError> {
     bar.stage(LEARN, plan.steps());
+    let was_done = state.level == plan.levels.len();
     while state.level < plan.levels.len() {
         learner.step(state);
         bar.show(plan.steps() - plan.steps_left(state.level, state.step), LEARN);
@@ -215,13 +245,16 @@ fn learn(
         }
         keeper.keep_now_and_then(state)?;
     }
+    if !was_done {
+        keeper.keep(state)?;
+    }
     Ok((0..state.corrections.len()).map(|frame| learner.pose(state, frame)).collect())
 }
 
 /// An error once the end was asked for.
 fn interrupted(plan: &Plan, state: &State) -> Result<(), ObjectError> {
     let done = 1.0 - plan.steps_left(state.level, state.step) as f64 / plan.steps() as f64;
-    if ending::asked() { Err(ObjectError::Interrupted(done * 100.0)) } else { Ok(()) }
+    if ending::asked() { Err(ObjectError::Interrupted(done * 100.0, "optimisation")) } else { Ok(()) }
 }
 
 /// Removes what was kept, once the outputs are there.
@@ -251,5 +284,11 @@ impl Object {
     #[must_use]
     pub fn psnr(&self) -> f64 {
         self.held_out.iter().map(|view| view.psnr).sum::<f64>() / self.held_out.len().max(1) as f64
+    }
+
+    /// The same of the splats [dB].
+    #[must_use]
+    pub fn psnr_splats(&self) -> f64 {
+        self.held_out.iter().map(|view| view.psnr_splats).sum::<f64>() / self.held_out.len().max(1) as f64
     }
 }

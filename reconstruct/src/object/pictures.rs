@@ -1,16 +1,10 @@
 //! The views' pixels: those to learn from, those held out, and those that say nothing, each with the reason.
 
-use super::HOLD_OUT;
 use crate::scan::{FEWEST_VIEWS, Frame, Scan, ScanError};
-use rayon::prelude::*;
-use serde::Serialize;
-use shared_mem::ending;
-use std::sync::atomic::{AtomicU64, Ordering};
+use crate::views::{Remark, grey, is_held_out, named, read_all, without_blurred};
 
 /// Longest edge of a picture [pixel]; larger ones are reduced.
 const LONGEST: u32 = 1300;
-/// A view is blurred whose detail is so much weaker than the middle of all views'.
-const BLURRED: f64 = 0.25;
 /// Fewer pixels show no object.
 const FEWEST_PIXELS: usize = 200;
 /// A mask that fills so much of its picture is none.
@@ -19,10 +13,6 @@ const WHOLE: f64 = 0.95;
 const DARK: f64 = 12.0;
 /// Of the object's pixels so many must have depth.
 const DEPTH_SEEN: f64 = 0.6;
-
-/// Something that a person should know about the result.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
-pub struct Remark(pub String);
 
 /// What the views show.
 #[derive(Debug)]
@@ -34,19 +24,9 @@ pub(super) struct Pictures {
     pub(super) remarks: Vec<Remark>,
 }
 
-/// Reads all views. `done`: told how many are read.
+/// Reads all views. `done` is called with the number of views that are read.
 pub(super) fn read(scan: &Scan, done: impl Fn(u64) + Sync) -> Result<Pictures, ScanError> {
-    let count = AtomicU64::new(0);
-    let one = |view: usize| -> Result<Frame, ScanError> {
-        if ending::asked() {
-            return Err(ScanError::Interrupted);
-        }
-        let camera = &scan.views[view].camera;
-        let frame = scan.frame(view, camera.width.max(camera.height).div_ceil(LONGEST))?;
-        done(count.fetch_add(1, Ordering::Relaxed) + 1);
-        Ok(frame)
-    };
-    let frames: Vec<Frame> = (0..scan.views.len()).into_par_iter().map(one).collect::<Result<_, _>>()?;
+    let frames = read_all(scan, LONGEST, |view, by| scan.frame(view, by), done)?;
     let mut remarks = Vec::new();
     let frames = useful(frames, &mut remarks);
     if frames.len() < FEWEST_VIEWS {
@@ -61,15 +41,9 @@ pub(super) fn read(scan: &Scan, done: impl Fn(u64) + Sync) -> Result<Pictures, S
     let depth_spread = spread(&frames);
     let (mut train, mut held_out) = (Vec::new(), Vec::new());
     for (number, frame) in frames.into_iter().enumerate() {
-        if number % HOLD_OUT == HOLD_OUT / 2 { held_out.push(frame) } else { train.push(frame) }
+        if is_held_out(number) { held_out.push(frame) } else { train.push(frame) }
     }
     Ok(Pictures { train, held_out, depth_spread, remarks })
-}
-
-fn named(frames: &[&Frame]) -> String {
-    let names: Vec<&str> = frames.iter().take(3).map(|frame| frame.name.as_str()).collect();
-    let rest = if frames.len() > 3 { ", ..." } else { "" };
-    format!("{}{rest}", names.join(", "))
 }
 
 /// The frames that show the object sharply.
@@ -77,49 +51,17 @@ fn useful(frames: Vec<Frame>, remarks: &mut Vec<Remark>) -> Vec<Frame> {
     let (frames, empty): (Vec<Frame>, Vec<Frame>) =
         frames.into_iter().partition(|frame| frame.masked() >= FEWEST_PIXELS);
     if !empty.is_empty() {
-        let names = named(&empty.iter().collect::<Vec<_>>());
+        let names = named(&empty);
         remarks.push(Remark(format!("{} views have no object in their mask and were left out: {names}", empty.len())));
     }
     let whole = |frame: &Frame| frame.masked() as f64 > WHOLE * frame.mask.len() as f64;
     let (full, frames): (Vec<Frame>, Vec<Frame>) = frames.into_iter().partition(whole);
     if !full.is_empty() {
-        let names = named(&full.iter().collect::<Vec<_>>());
+        let names = named(&full);
         remarks
             .push(Remark(format!("{} masks fill their picture (white must be the object alone): {names}", full.len())));
     }
-    let detail: Vec<f64> = frames.par_iter().map(detail).collect();
-    let mut sorted = detail.clone();
-    sorted.sort_by(f64::total_cmp);
-    let middle = sorted.get(sorted.len() / 2).copied().unwrap_or(0.0);
-    let mut blurred = Vec::new();
-    let mut kept = Vec::new();
-    for (frame, detail) in frames.into_iter().zip(detail) {
-        if detail < BLURRED * middle { blurred.push(frame) } else { kept.push(frame) }
-    }
-    if !blurred.is_empty() {
-        let names = named(&blurred.iter().collect::<Vec<_>>());
-        remarks.push(Remark(format!("{} views are blurred and were left out: {names}", blurred.len())));
-    }
-    kept
-}
-
-fn grey(rgb: [u8; 3]) -> f64 {
-    f64::from(u32::from(rgb[0]) + u32::from(rgb[1]) + u32::from(rgb[2])) / 3.0
-}
-
-/// Mean absolute Laplacian of the brightness within the mask: what a blurred picture has little of.
-fn detail(frame: &Frame) -> f64 {
-    let width = frame.camera.width as usize;
-    let (mut sum, mut count) = (0.0, 0usize);
-    for at in width..frame.rgb.len() - width {
-        let around = [at - width, at - 1, at + 1, at + width];
-        if frame.mask[at] && around.iter().all(|n| frame.mask[*n]) {
-            let mean: f64 = around.iter().map(|n| grey(frame.rgb[*n])).sum::<f64>() / 4.0;
-            sum += (grey(frame.rgb[at]) - mean).abs();
-            count += 1;
-        }
-    }
-    sum / count.max(1) as f64
+    without_blurred(frames, remarks)
 }
 
 /// Objects that are dark, or that depth does not see.

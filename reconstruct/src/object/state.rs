@@ -3,6 +3,7 @@
 
 use super::Options;
 use super::adam::Adam;
+use super::band::Band;
 use super::learn::State;
 use super::pictures::Pictures;
 use super::pool::Pixel;
@@ -17,7 +18,7 @@ use std::time::{Duration, Instant};
 /// How often it is written.
 const PAUSE: Duration = Duration::from_secs(45);
 /// First bytes of the file.
-const MAGIC: &[u8; 8] = b"TWINOBJ1";
+const MAGIC: &[u8; 8] = b"TWINOBJ2";
 
 /// What was kept cannot be read or written.
 #[derive(Debug, thiserror::Error)]
@@ -36,6 +37,13 @@ pub enum StateError {
         /// What the system said.
         source: std::io::Error,
     },
+}
+
+/// Where the training of the splats is kept: beside the file of the rest.
+fn of_splats(path: &Path) -> PathBuf {
+    let mut name = path.as_os_str().to_owned();
+    name.push(".splats");
+    name.into()
 }
 
 /// Keeps the state of one scan's work.
@@ -75,12 +83,27 @@ impl<'a> Keeper<'a> {
         Ok(output::write(self.path, bytes(state, self.question))?)
     }
 
+    /// Where the training of the splats is kept.
+    pub(super) fn splats(&self) -> PathBuf {
+        of_splats(self.path)
+    }
+
+    /// Splats of another question are forgotten: they begin once the field is done.
+    pub(super) fn forget_splats(&self) -> Result<(), StateError> {
+        removed(&of_splats(self.path))
+    }
+
     pub(super) fn keep_now_and_then(&mut self, state: &State) -> Result<(), StateError> {
         if self.last.elapsed() < PAUSE { Ok(()) } else { self.keep(state) }
     }
 }
 
 pub(super) fn forget(path: &Path) -> Result<(), StateError> {
+    removed(&of_splats(path))?;
+    removed(path)
+}
+
+fn removed(path: &Path) -> Result<(), StateError> {
     match std::fs::remove_file(path) {
         Err(source) if source.kind() != std::io::ErrorKind::NotFound => {
             Err(StateError::Remove { path: path.to_owned(), source })
@@ -101,6 +124,7 @@ fn bytes(state: &State, question: u64) -> Vec<u8> {
     let field = state.field.distance.iter().chain(state.field.colour.iter().flatten());
     let moments = state.adam.first.iter().flatten().chain(state.adam.second.iter().flatten());
     field.chain(moments).for_each(|v| out.extend(v.to_le_bytes()));
+    out.extend(state.band.iter().flat_map(|band| band.active()).map(|active| u8::from(*active)));
     out
 }
 
@@ -131,9 +155,9 @@ fn parse(bytes: &[u8], question: u64) -> Option<State> {
     let corrections = (0..cameras).map(|_| six()).collect::<Option<Vec<_>>>()?;
     let moments = (0..cameras).map(|_| Some((six()?, six()?))).collect::<Option<Vec<_>>>()?;
     let nodes = grid.len();
-    if rest.len() != nodes.checked_mul(48)? {
-        return None;
-    }
+    let (rest, band) = rest.split_at_checked(nodes.checked_mul(48)?)?;
+    let active = band.iter().map(|active| *active != 0).collect();
+    let band = if band.is_empty() { None } else { Some(Band::of(&grid, active)?) };
     let floats: Vec<f32> = rest.as_chunks::<4>().0.iter().map(|b| f32::from_le_bytes(*b)).collect();
     let (distance, floats) = floats.split_at(nodes);
     let (colour, floats) = floats.split_at(3 * nodes);
@@ -141,7 +165,7 @@ fn parse(bytes: &[u8], question: u64) -> Option<State> {
     let colour = colour.as_chunks::<3>().0.to_vec();
     let adam = Adam { first: first.as_chunks::<4>().0.to_vec(), second: second.as_chunks::<4>().0.to_vec() };
     let field = Field { grid, distance: distance.to_vec(), colour };
-    Some(State { level, step, field, adam, corrections, moments })
+    Some(State { level, step, field, band, adam, corrections, moments })
 }
 
 #[cfg(test)]
@@ -154,9 +178,10 @@ mod tests {
         let mut state = State::new(grid, (0..60).map(|i| i as f32).collect(), 2);
         (state.level, state.step, state.corrections[1][4]) = (1, 77, 0.5);
         state.adam.second[59] = [1.0, 2.0, 3.0, 4.0];
+        state.band = Some(Band::new(&grid, &state.field.distance, 20.0));
         let whole = bytes(&state, 9);
         assert_eq!(parse(&whole, 9).as_ref(), Some(&state));
         assert!(parse(&whole, 8).is_none());
-        assert!((0..whole.len()).step_by(97).all(|length| parse(&whole[..length], 9).is_none()));
+        assert!((0..whole.len() - 4).step_by(97).all(|length| parse(&whole[..length], 9).is_none()));
     }
 }

@@ -49,10 +49,12 @@ fn pixels(path: &Path, camera: &Camera, encoding: PixelEncoding) -> Result<Vec<u
 }
 
 impl Frame {
-    pub(super) fn read(view: &View, depth_unit: f64, by: u32) -> Result<Self, ScanError> {
+    /// `all`: everything in the picture counts, whatever its mask.
+    pub(super) fn read(view: &View, depth_unit: f64, by: u32, all: bool) -> Result<Self, ScanError> {
         let camera = view.camera;
         let rgb: Vec<[u8; 3]> = pixels(&view.picture, &camera, PixelEncoding::Rgb8)?.as_chunks::<3>().0.to_vec();
         let mask: Vec<bool> = match &view.mask {
+            _ if all => vec![true; rgb.len()],
             Mask::File(file) => {
                 pixels(file, &camera, PixelEncoding::Rgb8)?.chunks_exact(3).map(|p| p[0] >= 128).collect()
             }

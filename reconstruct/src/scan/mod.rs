@@ -61,8 +61,9 @@ pub struct Scan {
     depth_unit: f64,
     /// Places in pictures where the poses' file knows how far a point is: view, pixel, distance along the axis [unit of the poses].
     known_depths: Vec<(usize, [f64; 2], f64)>,
-    /// How many metres one unit of the poses is, as far as the files say it.
+    /// Whether the poses are in metres.
     pub(crate) says_metres: bool,
+    of_robot: bool,
 }
 
 /// Where the poses of a scan stand.
@@ -131,7 +132,14 @@ impl Scan {
         if known_depths.is_empty() && matches!(poses, Poses::File(_)) {
             views.sort_by(|a, b| a.name.cmp(&b.name));
         }
-        Ok(Self { folder, views, depth_unit: depth_unit.unwrap_or(1e-3), known_depths, says_metres })
+        Ok(Self {
+            folder,
+            views,
+            depth_unit: depth_unit.unwrap_or(1e-3),
+            known_depths,
+            says_metres,
+            of_robot: says_metres,
+        })
     }
 
     /// Whether any view has depth.
@@ -145,7 +153,21 @@ impl Scan {
     /// # Errors
     /// [`ScanError`] when a picture is missing, damaged, or of another size than its camera.
     pub fn frame(&self, view: usize, by: u32) -> Result<Frame, ScanError> {
-        Frame::read(&self.views[view], self.depth_unit, by)
+        Frame::read(&self.views[view], self.depth_unit, by, false)
+    }
+
+    /// The same with all of the picture in the mask, for scans of a scene.
+    ///
+    /// # Errors
+    /// As [`Scan::frame`].
+    pub fn whole_frame(&self, view: usize, by: u32) -> Result<Frame, ScanError> {
+        Frame::read(&self.views[view], self.depth_unit, by, true)
+    }
+
+    /// Whether a robot held the camera: its poses are then metres in its base frame, whose z points up.
+    #[must_use]
+    pub fn is_of_robot(&self) -> bool {
+        self.of_robot
     }
 
     /// The same scan with poses in metres.

@@ -7,19 +7,21 @@ use reconstruct::assets::{self, Labels};
 use reconstruct::mesh::Mesh;
 use reconstruct::object::{self, Object, Options};
 use reconstruct::scan::Scan;
+use reconstruct::scene;
 use shared_mem::output::OutputFolder;
 use shared_mem::quantity::number;
 use shared_mem::{answer, console, ending};
 use std::path::{Path, PathBuf};
 use twin::physics::convex_pieces;
 
-/// Makes assets of a simulation out of scans: closed meshes with their mass, for contact and for pictures.
+/// Makes assets of a simulation out of scans: objects as closed meshes with their mass, scenes as surfaces and splats.
 #[derive(clap::Args)]
 #[command(after_help = "\
 Examples:
   twin reconstruct object scan --out mug
   twin reconstruct object scan --out mug --mass 0.118 --scale 0.0231
-  twin reconstruct articulated laptop_closed laptop_open --out laptop")]
+  twin reconstruct articulated laptop_closed laptop_open --out laptop
+  twin reconstruct scene cell_scan --out cell_scene")]
 pub(crate) struct Reconstruct {
     #[command(subcommand)]
     what: What,
@@ -29,6 +31,7 @@ pub(crate) struct Reconstruct {
 enum What {
     Object(ObjectVerb),
     Articulated(ArticulatedVerb),
+    Scene(SceneVerb),
 }
 
 /// An object out of pictures from all sides: a closed mesh, convex pieces, URDF, a block for cell.toml, a report.
@@ -39,8 +42,9 @@ transforms.json of nerfstudio, a COLMAP model in sparse/0, or poses.json of a ro
 (depth/NAME.png, 16 bits, millimetres) make hollows and thin walls right, and give the scale. Forty to eighty pictures from all
 around, above and below are good; every eighth is held out and shows in the report how good the result is.
 
-Writes object.obj (at most 700 triangles), object_fine.obj, object.ply (with colours; grey where no picture shows it), pieces/,
-object.urdf, cell_object.toml (an [object] block for cell.toml), object.json and report.html. After Ctrl-C the same command goes on.
+Writes object.obj (at most 700 triangles), object_fine.obj, object.ply (with colours; grey where no picture shows it), splats.ply
+(Gaussian splats on its surface), pieces/, object.urdf, cell_object.toml (an [object] block for cell.toml), object.json and
+report.html. After Ctrl-C the same command goes on.
 
 Examples:
   twin reconstruct object scan --out mug
@@ -81,14 +85,106 @@ pub(super) fn mass(text: &str) -> Result<f64, String> {
     number(text, 1e-4..=1e3, "kg")
 }
 
-/// What every folder of this command holds, and appears last.
-const LAST: &str = "object.json";
+/// What every folder of these commands holds, and appears last.
+const LAST_OF_OBJECT: &str = "object.json";
+const LAST_OF_SCENE: &str = "scene.json";
+
+/// A scene out of pictures with depth: one surface, its table, planar splats, a mesh to collide with, a report.
+#[derive(clap::Args)]
+#[command(after_help = "\
+A scan is a folder with pictures, depth pictures (depth/NAME.png, 16 bits, millimetres) and the poses: transforms.json of nerfstudio, a
+COLMAP model in sparse/0, or poses.json of a robot that held the camera. Masks are not needed. Views from around the scene that overlap
+are good, fifty and more; every eighth is held out and shows in the report how good the result is.
+
+Writes scene.ply (the surface in colours), scene.obj (at most about 10,000 triangles, to collide with), splats.ply, scene.json (the table's
+height and normal, all levels), report.html, and cell_scene.toml (the [table] block of cell.toml) where a robot held the camera. All lies in
+the scan's frame, in metres. After Ctrl-C the same command goes on.
+
+Examples:
+  twin reconstruct scene cell_scan --out cell_scene
+  twin reconstruct scene phone_scan --scale 0.31 --voxel 0.006 --out room --json
+  twin label-splats cell_scene/splats.ply --cell cell.toml --joints 0,-0.78,0,-2.36,0,1.57,0.78 --out fr3_splats")]
+pub(crate) struct SceneVerb {
+    /// Folder with the scan, or its transforms.json or poses.json
+    #[arg(value_name = "SCAN")]
+    scan: PathBuf,
+    /// New folder for the files
+    #[arg(long, value_name = "FOLDER")]
+    out: PathBuf,
+    /// Replaces a folder that an earlier run has made
+    #[arg(long)]
+    force: bool,
+    /// Metres for one unit of the poses, 1e-6 to 1000 [default: as depth or the robot says]
+    #[arg(long, value_name = "METRES", value_parser = metres)]
+    scale: Option<f64>,
+    /// Edge of a voxel of the fused depth [m], 0.001 to 0.05: half of it takes four times as long and as much memory
+    #[arg(long, value_name = "METRES", default_value_t = 0.004, value_parser = voxel)]
+    voxel: f64,
+    /// Steps of the splats' training, of one picture each, 1 to 100000
+    #[arg(long, value_name = "STEPS", default_value_t = 1500, value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    steps: u32,
+    /// Leaves splats as thick as pictures make them: for scenes of plants or cloth, without walls and tables
+    #[arg(long)]
+    no_planes: bool,
+    /// Prints one JSON object on stdout at the end
+    #[arg(long)]
+    json: bool,
+}
+
+fn voxel(text: &str) -> Result<f64, String> {
+    number(text, 1e-3..=0.05, "m")
+}
+
+impl SceneVerb {
+    fn run(&self) -> anyhow::Result<()> {
+        ctrlc::set_handler(ending::ask).context("cannot listen for Ctrl-C")?;
+        let folder = folder(&self.out, self.force, LAST_OF_SCENE)?;
+        let scan = Scan::open(&self.scan)?;
+        let kept = kept(&self.out);
+        let (scale, voxel) = (self.scale, self.voxel);
+        let options = scene::Options { scale, voxel, planar: !self.no_planes, steps: self.steps as usize };
+        let scene = scene::reconstruct(scan, &options, &kept)?;
+        let command = format!("twin reconstruct scene {} --out {}", self.scan.display(), self.out.display());
+        for (path, bytes) in assets::scene_files(&scene, &command) {
+            folder.write(&path, &bytes)?;
+        }
+        ensure!(!ending::asked(), "interrupted; the same command goes on from there");
+        folder.finish(LAST_OF_SCENE)?;
+        object::forget(&kept)?;
+        for remark in &scene.remarks {
+            console::line(format_args!("note: {}", remark.0));
+        }
+        let summary = assets::SceneSummary::of(&scene);
+        if self.json { Ok(answer::json(&summary)?) } else { Ok(answer::words(self.words(&summary))?) }
+    }
+
+    fn words(&self, summary: &assets::SceneSummary) -> String {
+        let table = summary.table.map_or("no table".to_owned(), |table| {
+            let [x, y, z] = table.normal;
+            format!(
+                "table {:.1} mm along ({x:.4}, {y:.4}, {z:.4}) from the origin, {} points",
+                1e3 * table.offset_m,
+                table.points
+            )
+        });
+        format!(
+            "{}: {} triangles, {} to collide with, {} splats; {table}; held-out views {:.1} dB; see {}",
+            self.out.display(),
+            summary.surface[1],
+            summary.collision_triangles,
+            summary.splats,
+            summary.psnr_db,
+            self.out.join("report.html").display()
+        )
+    }
+}
 
 impl Reconstruct {
     pub(crate) fn run(&self) -> anyhow::Result<()> {
         match &self.what {
             What::Object(verb) => verb.run(),
             What::Articulated(verb) => verb.run(),
+            What::Scene(verb) => verb.run(),
         }
     }
 }
@@ -96,7 +192,7 @@ impl Reconstruct {
 impl ObjectVerb {
     fn run(&self) -> anyhow::Result<()> {
         ctrlc::set_handler(ending::ask).context("cannot listen for Ctrl-C")?;
-        let folder = self.folder()?;
+        let folder = folder(&self.out, self.force, LAST_OF_OBJECT)?;
         let scan = Scan::open(&self.scan)?;
         let kept = kept(&self.out);
         let object = object::reconstruct(scan, &Options { scale: self.scale, edge: self.grid }, &kept)?;
@@ -111,7 +207,7 @@ impl ObjectVerb {
             folder.write(&path, &bytes)?;
         }
         ensure!(!ending::asked(), "interrupted; the same command goes on from there");
-        folder.finish(LAST)?;
+        folder.finish(LAST_OF_OBJECT)?;
         object::forget(&kept)?;
         for remark in &object.remarks {
             console::line(format_args!("note: {}", remark.0));
@@ -120,20 +216,12 @@ impl ObjectVerb {
         if self.json { Ok(answer::json(&summary)?) } else { Ok(answer::words(self.words(&object, pieces.len()))?) }
     }
 
-    /// The folder to fill. One of another command is never replaced.
-    fn folder(&self) -> anyhow::Result<OutputFolder> {
-        if self.force && self.out.join(LAST).is_file() {
-            return Ok(OutputFolder::replacing(&self.out)?);
-        }
-        Ok(OutputFolder::create(&self.out)?)
-    }
-
     fn words(&self, object: &Object, pieces: usize) -> String {
         let (low, high) = object.fine.bounds();
         let size = (high - low) * 1e3;
         format!(
-            "{}: {:.0} x {:.0} x {:.0} mm, {:.1} cm^3, closed, genus {}, {} convex pieces; held-out views {:.1} dB inside the mask; \
-             see {}",
+            "{}: {:.0} x {:.0} x {:.0} mm, {:.1} cm^3, closed, genus {}, {} convex pieces; held-out views {:.1} dB inside the mask, \
+             {:.1} dB by {} splats; see {}",
             self.out.display(),
             size.x,
             size.y,
@@ -142,9 +230,19 @@ impl ObjectVerb {
             object.topology.genus,
             pieces,
             object.psnr(),
+            object.psnr_splats(),
+            object.splats.splats.len(),
             self.out.join("report.html").display()
         )
     }
+}
+
+/// The folder to fill. One of another command, without the file that comes last, is never replaced.
+fn folder(out: &Path, replace: bool, last: &str) -> anyhow::Result<OutputFolder> {
+    if replace && out.join(last).is_file() {
+        return Ok(OutputFolder::replacing(out)?);
+    }
+    Ok(OutputFolder::create(out)?)
 }
 
 pub(super) fn piece((points, triangles): (Vec<Point3<f64>>, Vec<[u32; 3]>)) -> Mesh {

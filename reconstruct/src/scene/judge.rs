@@ -1,0 +1,71 @@
+//! How good it is, by pictures that took no part.
+
+use crate::scan::Frame;
+use crate::splats;
+use crate::views::Remark;
+use fusion::Surface;
+use fusion::plane::Level;
+use splat::{Mesh, SplatCloud};
+
+/// Colour of the surface in pictures.
+const GREY: [u8; 3] = [200, 200, 200];
+
+/// A view that took no part.
+#[derive(Debug, Clone)]
+pub struct HeldOut {
+    /// The picture's path as the scan lists it.
+    pub name: String,
+    /// Columns.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    /// The picture.
+    pub picture: Vec<[u8; 3]>,
+    /// The same view of the splats.
+    pub splats: Vec<[u8; 3]>,
+    /// Their depth along the camera's axis [m], 0 where nothing is.
+    pub splat_depth: Vec<f32>,
+    /// The same view of the surface, shaded.
+    pub surface: Vec<[u8; 3]>,
+    /// Peak signal-to-noise ratio of the splats over the whole picture [dB].
+    pub psnr: f64,
+    /// Middle absolute difference of the surface's depth and the measured one, whose noise is in it [m].
+    pub depth_off: f64,
+    /// Share of the measured pixels at which there is a surface.
+    pub covered: f64,
+}
+
+/// The surface as it is drawn.
+pub(super) fn looks(surface: &Surface) -> Mesh {
+    Mesh { points: surface.points.clone(), triangles: surface.triangles.clone(), color: GREY }
+}
+
+pub(super) fn held_out(cloud: &SplatCloud, looks: &Mesh, frame: &Frame, background: [f32; 3]) -> HeldOut {
+    let pose = &frame.scan_from_camera;
+    let drawn = splats::draw(cloud, &frame.camera, pose, background);
+    let surface = splats::draw_mesh(looks, &frame.camera, pose);
+    let measured = || frame.depth.iter().zip(&surface.depth).filter(|(measured, _)| **measured > 0.0);
+    let mut offs: Vec<f32> = measured().filter(|(_, z)| **z > 0.0).map(|(a, b)| (a - b).abs()).collect();
+    offs.sort_by(f32::total_cmp);
+    let picture: Vec<[u8; 3]> = drawn.rgb8().collect();
+    HeldOut {
+        name: frame.name.clone(),
+        width: frame.camera.width,
+        height: frame.camera.height,
+        psnr: splats::psnr(&frame.rgb, &picture, |_| true),
+        picture: frame.rgb.clone(),
+        splats: picture,
+        splat_depth: drawn.depth,
+        surface: surface.rgb8().collect(),
+        depth_off: offs.get(offs.len() / 2).map_or(0.0, |off| f64::from(*off)),
+        covered: offs.len() as f64 / measured().count().max(1) as f64,
+    }
+}
+
+/// What a person should know.
+pub(super) fn remarks(levels: &[Level]) -> Vec<Remark> {
+    if levels.is_empty() {
+        return vec![Remark("there is no level surface: is the table in the pictures, and which way is up?".into())];
+    }
+    Vec::new()
+}
