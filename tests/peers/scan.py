@@ -1,9 +1,10 @@
-"""Scans of known objects, drawn by MuJoCo, through `twin reconstruct object`: how far its meshes and pictures are from the truth, beside
-Open3D's fusion with screened Poisson reconstruction of the same pictures.
+"""Scans of known objects and of a room, drawn by MuJoCo, through `twin reconstruct object` and `scene`: how far meshes and pictures are
+from the truth, beside Open3D's fusion (of objects with screened Poisson reconstruction) of the same pictures.
 
     python3 -m venv scan_venv
     scan_venv/bin/pip install mujoco==4.0.0 numpy==2.4.6 scipy trimesh==5.2.0 manifold3d==3.5.4 pillow open3d==0.20.0
     scan_venv/bin/python tests/peers/scan.py --program target/release/twin --out scans --objects box mug
+    scan_venv/bin/python tests/peers/scan.py --program target/release/twin --out scans --rooms 1 --views 60
 
 Licences: mujoco and scipy Apache-2.0 and BSD, trimesh and open3d MIT, manifold3d Apache-2.0, pillow MIT-CMU.
 """
@@ -56,11 +57,12 @@ def measured(mesh, truth):
     }
 
 
-def psnr(folder, out):
-    """Of the drawn held-out views inside the true mask [dB]: mean over views."""
+def psnr(folder, out, of=""):
+    """Of the held-out views, drawn from the field or of splats, inside the true mask [dB]: mean over views."""
     values = []
-    for drawn in sorted(glob.glob(f"{out}/held_out/*.png")):
-        name = os.path.basename(drawn).removeprefix("images_")
+    for mask in sorted(glob.glob(f"{folder}/truth/mask_*.png")):
+        name = os.path.basename(mask).removeprefix("mask_")
+        drawn = f"{out}/held_out/images_{name.removesuffix('.png')}{of}.png"
         mask = np.asarray(Image.open(f"{folder}/truth/mask_{name}")) > 0
         mask = binary_erosion(mask, iterations=RIM)
         truth, ours = (np.asarray(Image.open(p).convert("RGB")).astype(float) for p in (f"{folder}/images/{name}", drawn))
@@ -68,8 +70,8 @@ def psnr(folder, out):
     return float(np.mean(values))
 
 
-def open3d_mesh(folder, voxel=0.001):
-    """The same views fused and closed by Open3D: TSDF, then screened Poisson, its largest part."""
+def open3d_fused(folder, voxel, farthest, masked):
+    """The same views fused by Open3D."""
     import open3d as o3d
 
     core = o3d.core
@@ -78,19 +80,26 @@ def open3d_mesh(folder, voxel=0.001):
     camera = core.Tensor(np.array([[scan["fl_x"], 0, scan["cx"] - 0.5], [0, scan["fl_y"], scan["cy"] - 0.5], [0, 0, 1.0]]))
     volume = o3d.t.geometry.VoxelBlockGrid(
         attr_names=("tsdf", "weight"), attr_dtypes=(core.float32, core.float32), attr_channels=((1), (1)),
-        voxel_size=voxel, block_resolution=16, block_count=10_000,
+        voxel_size=voxel, block_resolution=16, block_count=40_000,
     )
     unit = scan.get("depth_unit_scale_factor", 1e-3)
     for number, frame in enumerate(scan["frames"]):
         if number % 8 == 4:
             continue
-        mask = np.asarray(Image.open(f"{folder}/{frame['mask_path']}")) > 127
+        mask = np.asarray(Image.open(f"{folder}/{frame['mask_path']}")) > 127 if masked else 1
         depth = np.asarray(Image.open(f"{folder}/{frame['depth_file_path']}")).astype(np.float32) * unit * mask
         depth = o3d.t.geometry.Image(np.ascontiguousarray(depth.astype(np.float32)))
         pose = np.array(frame["transform_matrix"]) @ np.diag([1.0, -1, -1, 1])
-        seen = (depth, camera, core.Tensor(np.linalg.inv(pose)), 1.0, 3.0, 4.0)
+        seen = (depth, camera, core.Tensor(np.linalg.inv(pose)), 1.0, farthest, 4.0)
         volume.integrate(volume.compute_unique_block_coordinates(*seen), *seen)
-    surface = volume.extract_triangle_mesh(weight_threshold=3.0).to_legacy()
+    return volume.extract_triangle_mesh(weight_threshold=3.0).to_legacy()
+
+
+def open3d_mesh(folder, voxel=0.001):
+    """The same views fused and closed by Open3D: TSDF, then screened Poisson, its largest part."""
+    import open3d as o3d
+
+    surface = open3d_fused(folder, voxel, 3.0, masked=True)
     surface.compute_vertex_normals()
     cloud = o3d.geometry.PointCloud(surface.vertices)
     cloud.normals = surface.vertex_normals
@@ -124,6 +133,7 @@ def judged(args, name, truth, kind):
         mesh.apply_translation(answer["origin_in_scan_m"])
         row[which] = measured(mesh, truth)
     row["true_mask_psnr_db"] = psnr(folder, out)
+    row["true_mask_splats_db"] = psnr(folder, out, "_splats")
     row["pieces_volume"] = answer["pieces_volume_m3"] / answer["volume_m3"] - 1
     if KINDS[kind]["depth"]:
         row["open3d"] = measured(open3d_mesh(folder), truth)
@@ -138,8 +148,62 @@ def line(name, kind, row):
     other = f"{peer['chamfer_mm']:.2f}" if peer else "-"
     return (
         f"| {name} | {kind} | {fine['chamfer_mm']:.2f} | {other} | {volume} | {fine['genus']} of {shapes.GENUS[name]} "
-        f"| {row['true_mask_psnr_db']:.1f} | {row['seconds']:.0f} ({row['cpu_seconds']:.0f} CPU) |"
+        f"| {row['true_mask_psnr_db']:.1f} | {row['true_mask_splats_db']:.1f} | {row['seconds']:.0f} ({row['cpu_seconds']:.0f} CPU) |"
     )
+
+
+def room(args, seed):
+    """A room through `twin reconstruct scene`, with and without the terms for planes."""
+    from scan_objects import rooms
+
+    folder = f"{args.out}/room_{seed}"
+    if not os.path.exists(f"{folder}/transforms.json"):
+        rooms.scan(folder, args.views, seed)
+    answers = {}
+    for kind in ("planes", "plain"):
+        out = f"{folder}_{kind}"
+        command = [args.program, "reconstruct", "scene", folder, "--out", out, "--json", "--force"]
+        command += ["--steps", str(args.steps)] + (["--no-planes"] if kind == "plain" else [])
+        begun = os.times()
+        ended = subprocess.run(command, capture_output=True, text=True)
+        if ended.returncode:
+            return {"error": ended.stderr.strip().splitlines()[-1:]}
+        after = os.times()
+        answers[kind] = answer = json.loads(ended.stdout)
+        answer["seconds"] = after.elapsed - begun.elapsed
+        answer["cpu_seconds"] = after.children_user + after.children_system - begun.children_user - begun.children_system
+        answer["rough_mm"] = rooms.roughness(folder, out)
+    ours = trimesh.load(f"{folder}_planes/scene.ply", process=False)
+    peer = open3d_fused(folder, answer["voxel_m"], rooms.FARTHEST, masked=False)
+    meshes = [(np.asarray(ours.vertices), np.asarray(ours.faces)), (np.asarray(peer.vertices), np.asarray(peer.triangles))]
+    errors, shares = rooms.depth_errors(meshes, folder)
+    table = answers["planes"]["table"]
+    tilt = np.degrees(np.arccos(min(1.0, table["normal"][2])))
+    height = 1e3 * (table["middle_m"][2] - rooms.TABLE)
+    return {"depth_mm": errors, "covered": shares, "table_mm": height, "table_degrees": float(tilt), **answers}
+
+
+def room_line(seed, row):
+    if "error" in row:
+        return f"| {seed} | {row['error']} |"
+    (ours, peer), (own_share, peer_share) = row["depth_mm"], row["covered"]
+    planes, plain = row["planes"], row["plain"]
+    return (
+        f"| {seed} | {ours:.2f} ({100 * own_share:.1f} %) | {peer:.2f} ({100 * peer_share:.1f} %) | {row['table_mm']:+.2f} mm, "
+        f"{row['table_degrees']:.3f} degrees | {planes['rough_mm']:.2f} | {plain['rough_mm']:.2f} | {planes['psnr_db']:.2f} "
+        f"| {plain['psnr_db']:.2f} | {planes['seconds']:.0f} ({planes['cpu_seconds']:.0f} CPU) |"
+    )
+
+
+def all_rooms(args):
+    print("| room | depth off [mm] (covered) | Open3D | table off | walls rough [mm] | without planes | PSNR [dB] | without | time [s] |")
+    print("|---|---|---|---|---|---|---|---|---|")
+    rows = {}
+    for seed in range(1, args.rooms + 1):
+        rows[seed] = row = room(args, seed)
+        print(room_line(seed, row), flush=True)
+        with open(f"{args.out}/rooms.json", "w") as out:
+            json.dump(rows, out, indent=1)
 
 
 def main():
@@ -149,10 +213,16 @@ def main():
     parser.add_argument("--objects", nargs="+", choices=list(shapes.GENUS), default=list(shapes.GENUS))
     parser.add_argument("--kinds", nargs="+", choices=list(KINDS), default=list(KINDS))
     parser.add_argument("--views", type=int, default=60)
+    parser.add_argument("--rooms", type=int, default=0, help="so many rooms in place of objects")
+    parser.add_argument("--steps", type=int, default=1500, help="of the training of a room's splats")
     args = parser.parse_args()
+    os.makedirs(args.out, exist_ok=True)
+    if args.rooms:
+        all_rooms(args)
+        return
     rows = {}
-    print("| object | input | Chamfer-L1 [mm] | Open3D | volume | genus | held-out PSNR [dB] | time [s] |")
-    print("|---|---|---|---|---|---|---|---|")
+    print("| object | input | Chamfer-L1 [mm] | Open3D | volume | genus | held-out PSNR [dB] | splats [dB] | time [s] |")
+    print("|---|---|---|---|---|---|---|---|---|")
     for name, truth in shapes.objects():
         if name not in args.objects:
             continue
