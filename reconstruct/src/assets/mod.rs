@@ -28,6 +28,7 @@ use crate::object::{Object, is_certain};
 use nalgebra::{Point3, Similarity3, Vector3};
 use shared_mem::msg::image::PixelEncoding;
 use shared_mem::recording::pack_picture;
+use splat::SplatCloud;
 use std::path::PathBuf;
 
 /// Colour of what no view has shown.
@@ -46,6 +47,12 @@ pub struct Labels {
     pub command: String,
 }
 
+/// Splats in the object's frame.
+#[must_use]
+pub fn centred_splats(splats: &SplatCloud, middle: &Point3<f64>) -> SplatCloud {
+    splats.moved(&Similarity3::new(-middle.coords, Vector3::zeros(), 1.0))
+}
+
 /// A mesh in the object's frame.
 #[must_use]
 pub fn centred(mesh: &Mesh, middle: &Point3<f64>) -> Mesh {
@@ -59,7 +66,7 @@ pub fn files(object: &Object, pieces: &[Mesh], labels: &Labels) -> Vec<(PathBuf,
     let (fine, coarse) = (centred(&object.fine, &middle), centred(&object.coarse, &middle));
     let colours: Vec<[u8; 3]> =
         object.fine.points.iter().zip(&object.shown).map(|(p, n)| colour(object, p, *n)).collect();
-    let splats = object.splats.moved(&Similarity3::new(-middle.coords, Vector3::zeros(), 1.0));
+    let splats = centred_splats(&object.splats, &middle);
     let summary = Summary::of(object, pieces, labels);
     let mut files = vec![
         ("object.obj".into(), obj(&coarse).into_bytes()),

@@ -1,6 +1,6 @@
 //! `twin reconstruct articulated`: an object with a part that moves, out of scans.
 
-use super::reconstruct::{kept, mass, metres, piece};
+use super::reconstruct::{folder, kept, mass, metres, piece};
 use anyhow::{Context as _, ensure};
 use nalgebra::{Isometry3, Similarity3, Translation3};
 use reconstruct::articulated::{self, Articulated, Joint, Marks};
@@ -96,7 +96,7 @@ struct ObjectScale {
 impl ArticulatedVerb {
     pub(super) fn run(&self) -> anyhow::Result<()> {
         ctrlc::set_handler(ending::ask).context("cannot listen for Ctrl-C")?;
-        let folder = self.folder()?;
+        let folder = folder(&self.out, self.force, LAST)?;
         let first = self.given(&self.first, "first")?;
         let (object, splats, kept) = match (&self.second, &self.marks) {
             (Some(second), _) => {
@@ -130,14 +130,6 @@ impl ArticulatedVerb {
             console::line(format_args!("note: {remark}"));
         }
         if self.json { Ok(answer::json(&summary)?) } else { Ok(answer::words(self.words(&object, &summary))?) }
-    }
-
-    /// The folder to fill. One of another command is never replaced.
-    fn folder(&self) -> anyhow::Result<OutputFolder> {
-        if self.force && self.out.join(LAST).is_file() {
-            return Ok(OutputFolder::replacing(&self.out)?);
-        }
-        Ok(OutputFolder::create(&self.out)?)
     }
 
     fn name(&self) -> String {
@@ -178,7 +170,7 @@ impl ArticulatedVerb {
             mesh: assets::centred(&object.fine, &middle),
             mesh_from_scan: Translation3::from(-middle.coords).into(),
             metres: object.scale.metres,
-            splats: None,
+            splats: Some(assets::centred_splats(&object.splats, &middle)),
             kept: Some(state),
         })
     }

@@ -238,7 +238,7 @@ impl ObjectVerb {
 }
 
 /// The folder to fill. One of another command, without the file that comes last, is never replaced.
-fn folder(out: &Path, replace: bool, last: &str) -> anyhow::Result<OutputFolder> {
+pub(super) fn folder(out: &Path, replace: bool, last: &str) -> anyhow::Result<OutputFolder> {
     if replace && out.join(last).is_file() {
         return Ok(OutputFolder::replacing(out)?);
     }
