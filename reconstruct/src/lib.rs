@@ -9,7 +9,7 @@
 //! | [`views`] | views read, the blurred ones left out, every eighth held out |
 //! | `splats` | views as splats are trained on them, and the picture of splats |
 //! | [`object`] | one object: where it starts, the optimisation, what was left uncertain |
-//! | [`scene`] | what stands around: fused depth, levels, planar splats |
+//! | [`scene`] | what stands around: fused depth, levels, splats |
 //! | [`mesh`] | its surface as triangles: closed, checked, reduced; volume and inertia |
 //! | [`articulated`] | two states of an object with a part that moves: the joint and both parts |
 //! | [`assets`] | files: meshes, URDF, cell.toml block, report page |

@@ -163,7 +163,7 @@ def room(args, seed):
     for kind in ("planes", "plain"):
         out = f"{folder}_{kind}"
         command = [args.program, "reconstruct", "scene", folder, "--out", out, "--json", "--force"]
-        command += ["--steps", str(args.steps)] + (["--no-planes"] if kind == "plain" else [])
+        command += ["--steps", str(args.steps)] + (["--planes"] if kind == "planes" else [])
         begun = os.times()
         ended = subprocess.run(command, capture_output=True, text=True)
         if ended.returncode:

@@ -1,4 +1,4 @@
-//! A scene out of a scan with depth: what stands around, as one surface, its levels, planar splats, and a mesh
+//! A scene out of a scan with depth: what stands around, as one surface, its levels, splats, and a mesh
 //! of fewer triangles to collide with.
 //!
 //! | file | owns |

@@ -102,7 +102,7 @@ impl Settings {
     /// For a scene with walls and tables: its splats are drawn into planes.
     #[must_use]
     pub fn scene(steps: usize) -> Self {
-        let weights = Weights { similarity: 0.2, mask: 0.0, depth: 0.2, normals: 0.05 };
+        let weights = Weights { similarity: 0.2, mask: 0.0, depth: 0.2, normals: 0.015 };
         let rates = Rates { centre: ON_SURFACE, ..Rates::default() };
         Self { weights, flatten: 0.05, rates, ..Self::object(steps) }
     }

@@ -89,14 +89,14 @@ pub(super) fn mass(text: &str) -> Result<f64, String> {
 const LAST_OF_OBJECT: &str = "object.json";
 const LAST_OF_SCENE: &str = "scene.json";
 
-/// A scene out of pictures with depth: one surface, its table, planar splats, a mesh to collide with, a report.
+/// A scene out of pictures with depth: one surface, its table, splats, a mesh to collide with, a report.
 #[derive(clap::Args)]
 #[command(after_help = "\
 A scan is a folder with pictures, depth pictures (depth/NAME.png, 16 bits, millimetres) and the poses: transforms.json of nerfstudio, a
 COLMAP model in sparse/0, or poses.json of a robot that held the camera. Masks are not needed. Views from around the scene that overlap
 are good, fifty and more; every eighth is held out and shows in the report how good the result is.
 
-Writes scene.ply (the surface in colours), scene.obj (at most about 10,000 triangles, to collide with), splats.ply, scene.json (the table's
+Writes scene.ply (the surface in colours), scene.obj (the same in fewer triangles, to collide with), splats.ply, scene.json (the table's
 height and normal, all levels), report.html, and cell_scene.toml (the [table] block of cell.toml) where a robot held the camera. All lies in
 the scan's frame, in metres. After Ctrl-C the same command goes on.
 
@@ -123,9 +123,9 @@ pub(crate) struct SceneVerb {
     /// Steps of the splats' training, of one picture each, 1 to 100000
     #[arg(long, value_name = "STEPS", default_value_t = 1500, value_parser = clap::value_parser!(u32).range(1..=100_000))]
     steps: u32,
-    /// Leaves splats as thick as pictures make them: for scenes of plants or cloth, without walls and tables
+    /// Draws splats into planes: thinner ones, with normals as their depth has them
     #[arg(long)]
-    no_planes: bool,
+    planes: bool,
     /// Prints one JSON object on stdout at the end
     #[arg(long)]
     json: bool,
@@ -142,7 +142,7 @@ impl SceneVerb {
         let scan = Scan::open(&self.scan)?;
         let kept = kept(&self.out);
         let (scale, voxel) = (self.scale, self.voxel);
-        let options = scene::Options { scale, voxel, planar: !self.no_planes, steps: self.steps as usize };
+        let options = scene::Options { scale, voxel, planar: self.planes, steps: self.steps as usize };
         let scene = scene::reconstruct(scan, &options, &kept)?;
         let command = format!("twin reconstruct scene {} --out {}", self.scan.display(), self.out.display());
         for (path, bytes) in assets::scene_files(&scene, &command) {
