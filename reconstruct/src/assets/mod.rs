@@ -4,6 +4,7 @@
 //! | file | owns |
 //! |---|---|
 //! | `description` | URDF and the block for cell.toml |
+//! | `frame` | what all reports have in common |
 //! | `page` | the report |
 //! | `summary` | the numbers as JSON |
 //! | `articulated` | the same for an object with a part that moves |
@@ -11,6 +12,7 @@
 
 mod articulated;
 mod description;
+mod frame;
 mod page;
 mod scene;
 mod summary;

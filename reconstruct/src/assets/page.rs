@@ -1,49 +1,35 @@
-//! The report: one HTML file that opens anywhere, without network and without scripts. Held-out pictures beside what the object looks
-//! like from there, and where the two differ.
+//! The report of an object: held-out pictures beside what it looks like from there, and where the two differ.
 
+use super::frame::framed;
 use super::{Labels, Summary};
 use crate::object::{HeldOut, Object};
 use crate::scan::ScaleSource;
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
-use maud::{DOCTYPE, Markup, PreEscaped, html};
+use maud::{Markup, html};
 use shared_mem::msg::image::PixelEncoding;
 use shared_mem::recording::pack_picture;
 
-pub(super) const STYLE: &str = include_str!("page.css");
 /// Differences are drawn so many times as bright.
 pub(super) const BRIGHTER: u8 = 4;
 /// Room around the object in a picture [pixel].
 const ROOM: u32 = 12;
 
 pub(super) fn page(object: &Object, summary: &Summary, labels: &Labels) -> String {
-    let page = html! {
-        (DOCTYPE)
-        html lang="en" {
-            head {
-                meta charset="utf-8";
-                meta name="viewport" content="width=device-width, initial-scale=1";
-                title { "twinalign: " (summary.name) }
-                style { (PreEscaped(STYLE)) }
-            }
-            body {
-                h1 { (summary.name) }
-                (facts(summary))
-                @for remark in &summary.remarks { p.remark { (remark.0) } }
-                (shape(summary))
-                h2 { "Held-out views" }
-                p.note {
-                    "Every eighth view took no part. From the left: the picture inside its mask, the object from there, its splats, "
-                    "and what these differ by from the picture, " (BRIGHTER) " times as bright. PSNR is that inside the mask, its "
-                    "outermost three pixels left out, with the camera's pose fitted to the object; in brackets with the pose as the "
-                    "scan has it."
-                }
-                @for view in &object.held_out { (held_out(view)) }
-                footer { "twinalign " (env!("CARGO_PKG_VERSION")) ". " (labels.command) }
-            }
+    let content = html! {
+        (facts(summary))
+        @for remark in &summary.remarks { p.remark { (remark.0) } }
+        (shape(summary))
+        h2 { "Held-out views" }
+        p.note {
+            "Every eighth view took no part. From the left: the picture inside its mask, the object from there, its splats, "
+            "and what these differ by from the picture, " (BRIGHTER) " times as bright. PSNR is that inside the mask, its "
+            "outermost three pixels left out, with the camera's pose fitted to the object; in brackets with the pose as the "
+            "scan has it."
         }
+        @for view in &object.held_out { (held_out(view)) }
     };
-    page.into_string()
+    framed(&summary.name, &content, &labels.command)
 }
 
 fn facts(summary: &Summary) -> Markup {

@@ -4,30 +4,18 @@ use super::drawing::{EDGE, SIDES, Window, drawn};
 use super::{ArticulatedSummary, LINKS};
 use crate::articulated::Articulated;
 use crate::assets::Labels;
-use crate::assets::page::{STYLE, picture};
-use maud::{DOCTYPE, Markup, PreEscaped, html};
+use crate::assets::frame::framed;
+use crate::assets::page::picture;
+use maud::{Markup, html};
 
 pub(super) fn page(object: &Articulated, summary: &ArticulatedSummary, labels: &Labels) -> String {
-    let page = html! {
-        (DOCTYPE)
-        html lang="en" {
-            head {
-                meta charset="utf-8";
-                meta name="viewport" content="width=device-width, initial-scale=1";
-                title { "twinalign: " (summary.name) }
-                style { (PreEscaped(STYLE)) }
-            }
-            body {
-                h1 { (summary.name) }
-                (facts(summary))
-                @for remark in &summary.remarks { p.remark { (remark) } }
-                (states(object))
-                (numbers(object, summary))
-                footer { "twinalign " (env!("CARGO_PKG_VERSION")) ". " (labels.command) }
-            }
-        }
+    let content = html! {
+        (facts(summary))
+        @for remark in &summary.remarks { p.remark { (remark) } }
+        (states(object))
+        (numbers(object, summary))
     };
-    page.into_string()
+    framed(&summary.name, &content, &labels.command)
 }
 
 /// A position with its unit.

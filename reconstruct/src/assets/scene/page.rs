@@ -1,37 +1,25 @@
 //! The report of a scene: held-out photographs beside what splats and surface look like from there.
 
-use super::super::page::{BRIGHTER, STYLE, differences, picture};
+use super::super::frame::framed;
+use super::super::page::{BRIGHTER, differences, picture};
 use super::{SceneSummary, ViewNumbers};
 use crate::scene::{HeldOut, Scene};
-use maud::{DOCTYPE, Markup, PreEscaped, html};
+use maud::{Markup, html};
 
 pub(super) fn page(scene: &Scene, summary: &SceneSummary, command: &str) -> String {
-    let page = html! {
-        (DOCTYPE)
-        html lang="en" {
-            head {
-                meta charset="utf-8";
-                meta name="viewport" content="width=device-width, initial-scale=1";
-                title { "twinalign: scene" }
-                style { (PreEscaped(STYLE)) }
-            }
-            body {
-                h1 { "Scene" }
-                (facts(summary))
-                @for remark in &summary.remarks { p.remark { (remark.0) } }
-                (shape(summary))
-                h2 { "Held-out views" }
-                p.note {
-                    "Every eighth view took no part. From the left: the photograph, the splats from there, what the two differ by, "
-                    (BRIGHTER) " times as bright, and the surface. PSNR is that of the whole picture; depth is how far the surface is "
-                    "off what was measured, whose noise is in it: the middle of all pixels."
-                }
-                @for (view, numbers) in scene.held_out.iter().zip(&summary.held_out) { (held_out(view, numbers)) }
-                footer { "twinalign " (env!("CARGO_PKG_VERSION")) ". " (command) }
-            }
+    let content = html! {
+        (facts(summary))
+        @for remark in &summary.remarks { p.remark { (remark.0) } }
+        (shape(summary))
+        h2 { "Held-out views" }
+        p.note {
+            "Every eighth view took no part. From the left: the photograph, the splats from there, what the two differ by, "
+            (BRIGHTER) " times as bright, and the surface. PSNR is that of the whole picture; depth is how far the surface is "
+            "off what was measured, whose noise is in it: the middle of all pixels."
         }
+        @for (view, numbers) in scene.held_out.iter().zip(&summary.held_out) { (held_out(view, numbers)) }
     };
-    page.into_string()
+    framed("Scene", &content, command)
 }
 
 fn facts(summary: &SceneSummary) -> Markup {
