@@ -196,7 +196,7 @@ fn refined(pair: &Pair<'_>, motion: Motion, joint: Joint) -> Result<Estimate, Ar
     let count = (points.first.len() + points.second.len()) as f64 / TOGETHER;
     let criterion =
         |motion: &Motion| 2.0 * cost(pair, &motion.poses(), &points, sigma) + motion.freedoms() as f64 * count.ln();
-    // A hinge further away than the object is large many times is a slide.
+    // A hinge whose axis is many sizes of the object away is a slide.
     let turns = matches!(turn, Motion::Jointed(_, joint) if plausible(&joint, pair.first));
     let evidence = if turns { criterion(&slide) - criterion(&turn) } else { f64::NEG_INFINITY };
     let motion = in_place(pair, if evidence > 0.0 { turn } else { slide });

@@ -1,5 +1,5 @@
-//! Which part of a surface moves: what each place of it would mean in the other state if it stayed or moved along, smoothed; places that
-//! say nothing follow those that do, by random walks along the surface that seldom pass folds inwards.
+//! Which part of a surface moves: where each place of it would be in the other state if it stayed or moved along, smoothed; places for
+//! which both are as likely follow the others, by random walks along the surface that seldom pass folds inwards.
 
 use super::body::{Body, Place, normal};
 use super::is_beyond;
@@ -13,15 +13,15 @@ use std::collections::{BinaryHeap, HashMap};
 const HIDDEN: f64 = 3.0;
 const NEARLY: f64 = 4.5;
 const FREE: f64 = 7.0;
-/// Largest weight of what a place says.
-const LOUDEST: f64 = 4.0;
-/// Hints at least so loud, and so clear once smoothed, are what other places follow.
-const HEARD: f64 = 1.0;
+/// Largest weight of one place's evidence.
+const MOST: f64 = 4.0;
+/// Places whose evidence has this weight at least, and is so far from a half once smoothed, are what others follow.
+const WEIGHTY: f64 = 1.0;
 const CLEAR: f64 = 0.3;
 /// How long a fold inwards makes a way: a step is so many times longer, as an exponent, for each unit by which normals change.
 const FOLD: f64 = 16.0;
 /// Rounds in which normals become means of their neighbours' that agree so far with them (cosine).
-const CALMED: usize = 6;
+const AVERAGED: usize = 6;
 const AGREE: f64 = 0.5;
 /// Neighbours whose normals agree less (cosine) are on different sides of a wall.
 const SIDES: f64 = -0.3;
@@ -32,9 +32,9 @@ const ENOUGH: f64 = 1e-7;
 /// Times the border between the parts is smoothed.
 const SMOOTHED: usize = 4;
 
-/// What a place of the surface says: 1 for the part, 0 for the base, and how loudly.
+/// Evidence of one place of the surface: 1 for the part, 0 for the base, and its weight [squared standard deviations].
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Hint {
+pub(super) struct Evidence {
     pub(super) part: f64,
     pub(super) weight: f64,
 }
@@ -47,12 +47,12 @@ struct Rim {
     beside: Vec<Vec<(u32, f64)>>,
 }
 
-/// The border between the parts: negative nearer to the part that moves [voxel], at the nodes of the body's grid. `hint` is asked for
+/// The border between the parts: negative nearer to the part that moves [voxel], at the nodes of the body's grid. `evidence_of` is asked for
 /// places of the surface and the directions out of it.
-pub(super) fn border(body: &Body, hint: impl Fn(&Point3<f64>, &Vector3<f64>) -> Hint) -> Field<f32> {
+pub(super) fn border(body: &Body, evidence_of: impl Fn(&Point3<f64>, &Vector3<f64>) -> Evidence) -> Field<f32> {
     let rim = Rim::of(body);
-    let hints: Vec<Hint> = rim.places.iter().map(|(place, normal)| hint(place, normal)).collect();
-    let part = rim.carried_on(&hints, rim.smoothed(&hints));
+    let evidence: Vec<Evidence> = rim.places.iter().map(|(place, normal)| evidence_of(place, normal)).collect();
+    let part = rim.carried_on(&evidence, rim.smoothed(&evidence));
     let grid = body.field.grid;
     let mut seeds = vec![0u8; grid.len()];
     for (node, part) in rim.nodes.iter().zip(&part) {
@@ -66,7 +66,7 @@ pub(super) fn border(body: &Body, hint: impl Fn(&Point3<f64>, &Vector3<f64>) -> 
     Field { grid, distance, colour: Vec::new() }
 }
 
-/// What a place says when the other state is reached by one of two poses. On the surface either way it says nothing: a plane that slides
+/// Evidence of a place when the other state is reached by one of two poses. On the surface either way there is none: a plane that slides
 /// within itself, or a place on the axis. Where the border of the other state is known already, a place that stays is on what stays there
 /// alone, and one that moves on what moves.
 pub(super) fn seen_in(
@@ -75,7 +75,7 @@ pub(super) fn seen_in(
     tolerance: f64,
     place: &Point3<f64>,
     normal: &Vector3<f64>,
-) -> Hint {
+) -> Evidence {
     let cost = |which: usize| {
         let (place, normal) = (poses[which] * place, poses[which].rotation * normal);
         let is_of_other = || border.is_some_and(|border| is_beyond(border, &place) != (which == 1));
@@ -87,7 +87,7 @@ pub(super) fn seen_in(
         }
     };
     let [base, part] = [0, 1].map(cost);
-    Hint { part: if part < base { 1.0 } else { 0.0 }, weight: (part - base).abs().min(LOUDEST) }
+    Evidence { part: if part < base { 1.0 } else { 0.0 }, weight: (part - base).abs().min(MOST) }
 }
 
 fn smoothed(grid: &Grid, values: &[f32]) -> Vec<f32> {
@@ -124,7 +124,7 @@ impl Rim {
             })
             .collect();
         let mut normals: Vec<Vector3<f64>> = places.iter().map(|place| place.1).collect();
-        for _ in 0..CALMED {
+        for _ in 0..AVERAGED {
             let mean = |i: usize| {
                 let agree = around[i].iter().map(|j| normals[*j as usize]).filter(|n| n.dot(&normals[i]) > AGREE);
                 (normals[i] + agree.sum::<Vector3<f64>>()).normalize()
@@ -140,21 +140,21 @@ impl Rim {
     }
 
     /// The least of sum w_i (x_i - h_i)² + sum (x_i - x_j)², nearly.
-    fn smoothed(&self, hints: &[Hint]) -> Vec<f64> {
+    fn smoothed(&self, evidence: &[Evidence]) -> Vec<f64> {
         let apply = |x: &[f64]| -> Vec<f64> {
             let steps = |i: usize| self.beside[i].iter().map(|(j, _)| x[i] - x[*j as usize]).sum::<f64>();
-            (0..x.len()).map(|i| hints[i].weight * x[i] + steps(i)).collect()
+            (0..x.len()).map(|i| evidence[i].weight * x[i] + steps(i)).collect()
         };
         let diagonal: Vec<f64> =
-            hints.iter().zip(&self.beside).map(|(hint, beside)| hint.weight + beside.len() as f64).collect();
-        let right: Vec<f64> = hints.iter().map(|hint| hint.weight * hint.part).collect();
-        solved(apply, &diagonal, &right, vec![0.5; hints.len()], ROUNDS)
+            evidence.iter().zip(&self.beside).map(|(one, beside)| one.weight + beside.len() as f64).collect();
+        let right: Vec<f64> = evidence.iter().map(|one| one.weight * one.part).collect();
+        solved(apply, &diagonal, &right, vec![0.5; evidence.len()], ROUNDS)
     }
 
     /// Whether each place moves: what is clear there, or where more of the random walks from it end (Grady 2006).
-    fn carried_on(&self, hints: &[Hint], smoothed: Vec<f64>) -> Vec<bool> {
-        let is_clear = |i: usize| hints[i].weight >= HEARD && (smoothed[i] - 0.5).abs() > CLEAR;
-        let clear: Vec<bool> = (0..hints.len()).map(is_clear).collect();
+    fn carried_on(&self, evidence: &[Evidence], smoothed: Vec<f64>) -> Vec<bool> {
+        let is_clear = |i: usize| evidence[i].weight >= WEIGHTY && (smoothed[i] - 0.5).abs() > CLEAR;
+        let clear: Vec<bool> = (0..evidence.len()).map(is_clear).collect();
         let start = self.nearest(&clear, &smoothed);
         let apply = |x: &[f64]| -> Vec<f64> {
             let steps = |i: usize| self.beside[i].iter().map(|(j, way)| (x[i] - x[*j as usize]) / way).sum::<f64>();
@@ -235,7 +235,7 @@ fn solved(
     x
 }
 
-/// How many steps the way between two neighbours is worth; `None` through a wall.
+/// How many steps long the way between two neighbours counts; `None` through a wall.
 fn way(one: &(Point3<f64>, Vector3<f64>), other: &(Point3<f64>, Vector3<f64>)) -> Option<f64> {
     let away = other.0 - one.0;
     if one.1.dot(&other.1) < SIDES {

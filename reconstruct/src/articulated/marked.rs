@@ -2,15 +2,15 @@
 //! its axis.
 
 use super::body::Body;
-use super::label::{self, Hint};
+use super::label::{self, Evidence};
 use super::{Articulated, ArticulatedError, Joint, Moves, READ, SPLIT, STAGES, State};
 use crate::mesh::{Mesh, Topology};
 use crate::scan::Camera;
 use nalgebra::{Isometry3, Point3, Unit, Vector3};
 use shared_mem::progress::Progress;
 
-/// How loudly a picture speaks of a place.
-const LOUD: f64 = 2.0;
+/// Weight of what one picture shows of a place.
+const OF_ONE: f64 = 2.0;
 /// A surface is looked at from the side below this cosine, where masks are not exact.
 const SIDEWAYS: f64 = 0.2;
 /// A place is seen if nothing is before it by so many voxels.
@@ -75,8 +75,8 @@ pub fn marked(
     };
     bar.stage(SPLIT, 4);
     let border = label::border(&body, |place, normal| {
-        let said: f64 = views.iter().filter_map(|view| view.says(&body, place, normal)).sum();
-        Hint { part: if said > 0.0 { 1.0 } else { 0.0 }, weight: said.abs().min(2.0 * LOUD) }
+        let shown: f64 = views.iter().filter_map(|view| view.shows(&body, place, normal)).sum();
+        Evidence { part: if shown > 0.0 { 1.0 } else { 0.0 }, weight: shown.abs().min(2.0 * OF_ONE) }
     });
     let states = vec![State::of(&body.mesh, &border, &Isometry3::identity())];
     Articulated::of(&body, border, Moves { joint, limits, position: 0.0, certainty: None }, states, &bar)
@@ -84,7 +84,7 @@ pub fn marked(
 
 impl MarkedView {
     /// Whether the picture shows a place as the part (positive) or as the base (negative); `None` where it does not show it.
-    fn says(&self, body: &Body, place: &Point3<f64>, normal: &Vector3<f64>) -> Option<f64> {
+    fn shows(&self, body: &Body, place: &Point3<f64>, normal: &Vector3<f64>) -> Option<f64> {
         let eye = Point3::from(self.mesh_from_camera.translation.vector);
         let away = place - eye;
         if normal.dot(&away) > -SIDEWAYS * away.norm() {
@@ -99,7 +99,7 @@ impl MarkedView {
             return None;
         }
         let is_part = self.part[v as usize * self.camera.width as usize + u as usize];
-        Some(if is_part { LOUD } else { -LOUD })
+        Some(if is_part { OF_ONE } else { -OF_ONE })
     }
 
     /// The place of the surface that a pixel shows.
@@ -131,7 +131,7 @@ fn entry(body: &Body, eye: &Point3<f64>, way: &Unit<Vector3<f64>>) -> Option<f64
     let last = grid.position(grid.dims.map(|n| n - 1));
     let (mut from, mut to) = (0.0f64, f64::INFINITY);
     for axis in 0..3 {
-        // The box without its outermost hair, so that rounding leaves the place inside.
+        // The box, a thousandth of a voxel smaller, so that rounding leaves the place inside.
         let rim = 1e-3 * grid.voxel;
         let (low, high) = (grid.origin[axis] + rim, last[axis] - rim);
         if way[axis].abs() < 1e-12 {

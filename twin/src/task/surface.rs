@@ -12,7 +12,7 @@ const MOST_CORNERS: usize = 200;
 /// Corners of a convex mesh lie behind each of its faces but for this share of its size.
 const CONVEX: f64 = 1e-3;
 /// Height of a triangle below which it has no direction, over the distance of the farthest corner.
-const HAIR: f64 = 1e-5;
+const SLIVER: f64 = 1e-5;
 /// Sizes that a piece can have [m].
 const SIZES: std::ops::RangeInclusive<f64> = 1e-4..=100.0;
 
@@ -100,15 +100,15 @@ fn mesh(path: &Path) -> Result<Hull, (&'static str, String)> {
     }
 }
 
-/// How far a corner lies in front of a face at most, over the distance of the farthest corner. Faces as narrow as a hair are left out: which
-/// way they look is a matter of the file's last digit.
+/// How far a corner lies in front of a face at most, over the distance of the farthest corner. Slivers are left out: their normals
+/// depend on the file's last digit.
 fn most_beyond(points: &[Point3<f64>], triangles: &[[u32; 3]]) -> f64 {
     let size = points.iter().map(|p| p.coords.norm()).fold(f64::MIN_POSITIVE, f64::max);
     let of = |triangle: &[u32; 3]| {
         let [a, b, c] = triangle.map(|i| points[i as usize]);
         let across = (b - a).cross(&(c - a));
         let longest = (b - a).norm().max((c - a).norm()).max((c - b).norm());
-        let normal = across.try_normalize(HAIR * size * longest)?;
+        let normal = across.try_normalize(SLIVER * size * longest)?;
         Some(points.iter().map(|p| (p - a).dot(&normal)).fold(0.0, f64::max))
     };
     triangles.iter().filter_map(of).fold(0.0, f64::max) / size
@@ -119,13 +119,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_face_as_narrow_as_a_hair_that_looks_inwards_makes_nothing_hollow() {
+    fn a_sliver_that_looks_inwards_makes_nothing_hollow() {
         let places = [[0.0, 0.0, 0.0], [0.1, 0.0, 0.0], [0.0, 0.1, 0.0], [0.0, 0.0, 0.1], [0.05, 1e-7, 1e-7]];
         let points = places.map(Point3::from);
         let closed = [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]];
         assert!(most_beyond(&points, &closed) < CONVEX);
-        let hair = [closed.as_slice(), &[[0, 1, 4]], &[[0, 4, 1]]].concat();
-        assert!(most_beyond(&points, &hair) < CONVEX);
+        let with_sliver = [closed.as_slice(), &[[0, 1, 4]], &[[0, 4, 1]]].concat();
+        assert!(most_beyond(&points, &with_sliver) < CONVEX);
         let hollow = [places[0], places[1], places[2], places[3], [0.02, 0.02, 0.02]].map(Point3::from);
         assert!(most_beyond(&hollow, &[[0, 2, 1], [0, 1, 4], [1, 3, 4], [0, 4, 3], [0, 3, 2], [1, 2, 3]]) > CONVEX);
     }
