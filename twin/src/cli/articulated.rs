@@ -1,6 +1,6 @@
 //! `twin reconstruct articulated`: an object with a part that moves, out of scans.
 
-use super::reconstruct::{folder, kept, mass, metres, piece};
+use super::reconstruct::{Outputs, kept, mass, metres, piece};
 use anyhow::{Context as _, ensure};
 use nalgebra::{Isometry3, Similarity3, Translation3};
 use reconstruct::articulated::{self, Articulated, Joint, Marks};
@@ -26,7 +26,7 @@ moved by 20 degrees or a fifth of its size is found well. With --marks one state
 pixels of its axis (docs/reconstruct.md).
 
 Writes articulated.urdf (position 0 is the first state), base.obj and part.obj (at most 700 triangles), base_fine.obj, part_fine.obj,
-pieces/, base_splats.ply and part_splats.ply where the state has splats.ply, task_articulated.toml (an [[articulated]] block for a task),
+pieces/, base_splats.ply and part_splats.ply (of a folder: where it has splats.ply), task_articulated.toml (an [[articulated]] block for a task),
 articulated.json and report.html.
 
 Examples:
@@ -40,12 +40,8 @@ pub(crate) struct ArticulatedVerb {
     /// Scan of the second state, or the folder of an object made of it
     #[arg(value_name = "SECOND", required_unless_present = "marks", conflicts_with = "marks")]
     second: Option<PathBuf>,
-    /// New folder for the files
-    #[arg(long, value_name = "FOLDER")]
-    out: PathBuf,
-    /// Replaces a folder that an earlier run has made
-    #[arg(long)]
-    force: bool,
+    #[command(flatten)]
+    outputs: Outputs,
     /// JSON file that marks the part and its axis in pictures of the first state
     #[arg(long, value_name = "FILE")]
     marks: Option<PathBuf>,
@@ -58,9 +54,6 @@ pub(crate) struct ArticulatedVerb {
     /// The object's name [default: the folder's]
     #[arg(long, value_name = "NAME")]
     name: Option<String>,
-    /// Prints one JSON object on stdout at the end
-    #[arg(long)]
-    json: bool,
 }
 
 /// What every folder of this command holds, and appears last.
@@ -96,7 +89,7 @@ struct ObjectScale {
 impl ArticulatedVerb {
     pub(super) fn run(&self) -> anyhow::Result<()> {
         ctrlc::set_handler(ending::ask).context("cannot listen for Ctrl-C")?;
-        let folder = folder(&self.out, self.force, LAST)?;
+        let folder = self.outputs.folder(LAST)?;
         let first = self.given(&self.first, "first")?;
         let (object, splats, kept) = match (&self.second, &self.marks) {
             (Some(second), _) => {
@@ -129,18 +122,22 @@ impl ArticulatedVerb {
         for remark in &summary.remarks {
             console::line(format_args!("note: {remark}"));
         }
-        if self.json { Ok(answer::json(&summary)?) } else { Ok(answer::words(self.words(&object, &summary))?) }
+        if self.outputs.json { Ok(answer::json(&summary)?) } else { Ok(answer::words(self.words(&object, &summary))?) }
     }
 
     fn name(&self) -> String {
-        let named = || self.out.file_name().map(|name| name.to_string_lossy().into_owned());
+        let named = || self.outputs.out.file_name().map(|name| name.to_string_lossy().into_owned());
         self.name.clone().or_else(named).unwrap_or_else(|| "articulated".into())
     }
 
     fn command(&self) -> String {
         let second = self.second.as_ref().map(|path| format!(" {}", path.display())).unwrap_or_default();
         let marks = self.marks.as_ref().map(|path| format!(" --marks {}", path.display())).unwrap_or_default();
-        format!("twin reconstruct articulated {}{second}{marks} --out {}", self.first.display(), self.out.display())
+        format!(
+            "twin reconstruct articulated {}{second}{marks} --out {}",
+            self.first.display(),
+            self.outputs.out.display()
+        )
     }
 
     /// A state out of the folder of an object, or out of a scan.
@@ -161,7 +158,7 @@ impl ArticulatedVerb {
                 kept: None,
             });
         }
-        let mut state = self.out.as_os_str().to_owned();
+        let mut state = self.outputs.out.as_os_str().to_owned();
         state.push(format!(".{which}"));
         let state = kept(Path::new(&state));
         let object = object::reconstruct(Scan::open(path)?, &Options { scale: self.scale, edge: GRID }, &state)?;
@@ -198,8 +195,8 @@ impl ArticulatedVerb {
         let [base, part] = [0, 1].map(|number| summary.parts[number].volume_m3 * 1e6);
         format!(
             "{}: {joint}; base {base:.1} cm^3, part {part:.1} cm^3, both closed; see {}",
-            self.out.display(),
-            self.out.join("report.html").display()
+            self.outputs.out.display(),
+            self.outputs.out.join("report.html").display()
         )
     }
 }

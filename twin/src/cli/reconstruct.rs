@@ -34,6 +34,30 @@ enum What {
     Scene(SceneVerb),
 }
 
+/// Where a command of these writes.
+#[derive(clap::Args)]
+pub(super) struct Outputs {
+    /// New folder for the files
+    #[arg(long, value_name = "FOLDER")]
+    pub(super) out: PathBuf,
+    /// Replaces a folder that an earlier run has made
+    #[arg(long)]
+    force: bool,
+    /// Prints one JSON object on stdout at the end
+    #[arg(long)]
+    pub(super) json: bool,
+}
+
+impl Outputs {
+    /// The folder to fill. One of another command, without the file that comes last, is never replaced.
+    pub(super) fn folder(&self, last: &str) -> anyhow::Result<OutputFolder> {
+        if self.force && self.out.join(last).is_file() {
+            return Ok(OutputFolder::replacing(&self.out)?);
+        }
+        Ok(OutputFolder::create(&self.out)?)
+    }
+}
+
 /// An object out of pictures from all sides: a closed mesh, convex pieces, URDF, a block for cell.toml, a report.
 #[derive(clap::Args)]
 #[command(after_help = "\
@@ -54,12 +78,8 @@ pub(crate) struct ObjectVerb {
     /// Folder with the scan, or its transforms.json or poses.json
     #[arg(value_name = "SCAN")]
     scan: PathBuf,
-    /// New folder for the files
-    #[arg(long, value_name = "FOLDER")]
-    out: PathBuf,
-    /// Replaces a folder that an earlier run has made
-    #[arg(long)]
-    force: bool,
+    #[command(flatten)]
+    outputs: Outputs,
     /// Metres for one unit of the poses, 1e-6 to 1000 [default: as depth or the robot says]
     #[arg(long, value_name = "METRES", value_parser = metres)]
     scale: Option<f64>,
@@ -72,9 +92,6 @@ pub(crate) struct ObjectVerb {
     /// The object's name [default: the folder's]
     #[arg(long, value_name = "NAME")]
     name: Option<String>,
-    /// Prints one JSON object on stdout at the end
-    #[arg(long)]
-    json: bool,
 }
 
 pub(super) fn metres(text: &str) -> Result<f64, String> {
@@ -108,12 +125,8 @@ pub(crate) struct SceneVerb {
     /// Folder with the scan, or its transforms.json or poses.json
     #[arg(value_name = "SCAN")]
     scan: PathBuf,
-    /// New folder for the files
-    #[arg(long, value_name = "FOLDER")]
-    out: PathBuf,
-    /// Replaces a folder that an earlier run has made
-    #[arg(long)]
-    force: bool,
+    #[command(flatten)]
+    outputs: Outputs,
     /// Metres for one unit of the poses, 1e-6 to 1000 [default: as depth or the robot says]
     #[arg(long, value_name = "METRES", value_parser = metres)]
     scale: Option<f64>,
@@ -126,9 +139,6 @@ pub(crate) struct SceneVerb {
     /// Draws splats into planes: thinner ones, with normals as their depth has them
     #[arg(long)]
     planes: bool,
-    /// Prints one JSON object on stdout at the end
-    #[arg(long)]
-    json: bool,
 }
 
 fn voxel(text: &str) -> Result<f64, String> {
@@ -138,13 +148,13 @@ fn voxel(text: &str) -> Result<f64, String> {
 impl SceneVerb {
     fn run(&self) -> anyhow::Result<()> {
         ctrlc::set_handler(ending::ask).context("cannot listen for Ctrl-C")?;
-        let folder = folder(&self.out, self.force, LAST_OF_SCENE)?;
+        let folder = self.outputs.folder(LAST_OF_SCENE)?;
         let scan = Scan::open(&self.scan)?;
-        let kept = kept(&self.out);
+        let kept = kept(&self.outputs.out);
         let (scale, voxel) = (self.scale, self.voxel);
         let options = scene::Options { scale, voxel, planar: self.planes, steps: self.steps as usize };
         let scene = scene::reconstruct(scan, &options, &kept)?;
-        let command = format!("twin reconstruct scene {} --out {}", self.scan.display(), self.out.display());
+        let command = format!("twin reconstruct scene {} --out {}", self.scan.display(), self.outputs.out.display());
         for (path, bytes) in assets::scene_files(&scene, &command) {
             folder.write(&path, &bytes)?;
         }
@@ -155,7 +165,7 @@ impl SceneVerb {
             console::line(format_args!("note: {}", remark.0));
         }
         let summary = assets::SceneSummary::of(&scene);
-        if self.json { Ok(answer::json(&summary)?) } else { Ok(answer::words(self.words(&summary))?) }
+        if self.outputs.json { Ok(answer::json(&summary)?) } else { Ok(answer::words(self.words(&summary))?) }
     }
 
     fn words(&self, summary: &assets::SceneSummary) -> String {
@@ -169,12 +179,12 @@ impl SceneVerb {
         });
         format!(
             "{}: {} triangles, {} to collide with, {} splats; {table}; held-out views {:.1} dB; see {}",
-            self.out.display(),
+            self.outputs.out.display(),
             summary.surface[1],
             summary.collision_triangles,
             summary.splats,
             summary.psnr_db,
-            self.out.join("report.html").display()
+            self.outputs.out.join("report.html").display()
         )
     }
 }
@@ -192,16 +202,16 @@ impl Reconstruct {
 impl ObjectVerb {
     fn run(&self) -> anyhow::Result<()> {
         ctrlc::set_handler(ending::ask).context("cannot listen for Ctrl-C")?;
-        let folder = folder(&self.out, self.force, LAST_OF_OBJECT)?;
+        let folder = self.outputs.folder(LAST_OF_OBJECT)?;
         let scan = Scan::open(&self.scan)?;
-        let kept = kept(&self.out);
+        let kept = kept(&self.outputs.out);
         let object = object::reconstruct(scan, &Options { scale: self.scale, edge: self.grid }, &kept)?;
         let middle = object.middle();
         let fine = assets::centred(&object.fine, &middle);
         let pieces: Vec<Mesh> = convex_pieces(&fine.points, &fine.triangles).into_iter().map(piece).collect();
         let named = |path: &Path| path.file_name().map(|name| name.to_string_lossy().into_owned());
-        let name = self.name.clone().or_else(|| named(&self.out)).unwrap_or_else(|| "object".into());
-        let command = format!("twin reconstruct object {} --out {}", self.scan.display(), self.out.display());
+        let name = self.name.clone().or_else(|| named(&self.outputs.out)).unwrap_or_else(|| "object".into());
+        let command = format!("twin reconstruct object {} --out {}", self.scan.display(), self.outputs.out.display());
         let labels = Labels { name, mass: self.mass, command };
         for (path, bytes) in assets::files(&object, &pieces, &labels) {
             folder.write(&path, &bytes)?;
@@ -213,7 +223,11 @@ impl ObjectVerb {
             console::line(format_args!("note: {}", remark.0));
         }
         let summary = assets::Summary::of(&object, &pieces, &labels);
-        if self.json { Ok(answer::json(&summary)?) } else { Ok(answer::words(self.words(&object, pieces.len()))?) }
+        if self.outputs.json {
+            Ok(answer::json(&summary)?)
+        } else {
+            Ok(answer::words(self.words(&object, pieces.len()))?)
+        }
     }
 
     fn words(&self, object: &Object, pieces: usize) -> String {
@@ -222,7 +236,7 @@ impl ObjectVerb {
         format!(
             "{}: {:.0} x {:.0} x {:.0} mm, {:.1} cm^3, closed, genus {}, {} convex pieces; held-out views {:.1} dB inside the mask, \
              {:.1} dB by {} splats; see {}",
-            self.out.display(),
+            self.outputs.out.display(),
             size.x,
             size.y,
             size.z,
@@ -232,17 +246,9 @@ impl ObjectVerb {
             object.psnr(),
             object.psnr_splats(),
             object.splats.splats.len(),
-            self.out.join("report.html").display()
+            self.outputs.out.join("report.html").display()
         )
     }
-}
-
-/// The folder to fill. One of another command, without the file that comes last, is never replaced.
-pub(super) fn folder(out: &Path, replace: bool, last: &str) -> anyhow::Result<OutputFolder> {
-    if replace && out.join(last).is_file() {
-        return Ok(OutputFolder::replacing(out)?);
-    }
-    Ok(OutputFolder::create(out)?)
 }
 
 pub(super) fn piece((points, triangles): (Vec<Point3<f64>>, Vec<[u32; 3]>)) -> Mesh {
