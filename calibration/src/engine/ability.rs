@@ -150,11 +150,11 @@ impl Ability {
         Some(part).filter(|part| !part.parameters.is_empty())
     }
 
-    /// What of gains is told to it.
+    /// The gains that the engine sets.
     pub(super) fn gains<'a>(&self, theta: &'a Theta) -> BTreeMap<&'static str, &'a [f64]> {
         let Some(arm) = &theta.arm else { return BTreeMap::new() };
-        let told = PARAMETERS.into_iter().zip(self.sets).zip([&arm.stiffness[..], &arm.damping[..]]);
-        told.filter(|((_, sets), _)| *sets).map(|((name, _), gains)| (name, gains)).collect()
+        let sets = PARAMETERS.into_iter().zip(self.sets).zip([&arm.stiffness[..], &arm.damping[..]]);
+        sets.filter(|((_, sets), _)| *sets).map(|((name, _), gains)| (name, gains)).collect()
     }
 
     /// Effects as an engine reads them; what has no bound is null.

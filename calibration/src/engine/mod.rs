@@ -208,7 +208,7 @@ impl Engine {
         }
         let states = match self.states(message, question) {
             Err(NoStates::Failed(error)) => {
-                // Of two that fail at the same time the first is told.
+                // Of two that fail at the same time the first is reported.
                 let error = self.failed.get_or_init(|| error).clone();
                 self.interrupt.ask();
                 return Err(error.into());

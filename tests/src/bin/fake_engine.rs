@@ -32,7 +32,7 @@ struct Arguments {
     /// The version that it speaks: 1 knows no object.
     #[arg(long, default_value_t = 2)]
     protocol: u32,
-    /// So much less than it is told the object of its own model rubs on the table.
+    /// By so much the friction of its own table is below the one that is asked for.
     #[arg(long, default_value_t = 0.0)]
     slippery: f64,
     /// What the arm of its own model carries besides [kg].

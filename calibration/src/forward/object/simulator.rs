@@ -6,9 +6,9 @@
 //! ```
 //!
 //! Encoders add up as numbers. Of poses the places add up, and turns are put one behind the other: the engine's, then the one from
-//! `twin(known)` to `twin(theta, own)`, each about the base's axes. All three begin with the object at one place, which the recorded poses
-//! say, and the arm in one state. What a camera makes of poses is applied to the outcome, so that it is exact. Of what a clip has
-//! of its own only where the object stands is told to the engine.
+//! `twin(known)` to `twin(theta, own)`, each about the base's axes. All three begin with the object where the recorded poses have it
+//! and the arm in one state. Camera effects are applied to the outcome, so that they are exact. Of a clip's own numbers the engine
+//! gets the object's start pose alone.
 //!
 //! The difference is taken at equal times. The twin may touch the object some milliseconds before or after the engine does, and let it go
 //! with another speed: what an effect changes then is right to first order, the less the nearer both hits are to each other.
@@ -41,7 +41,7 @@ pub(super) struct Simulator {
 }
 
 impl Simulator {
-    /// What of parameters it is told.
+    /// The part of the parameters that the engine knows.
     pub(super) fn part(&self, theta: &Theta) -> Theta {
         self.engine.ability().part(theta, &self.nominal)
     }
@@ -89,7 +89,7 @@ impl Simulator {
     }
 }
 
-/// The engine's outcome with what the twin says that makes of it what the engine does not know.
+/// The engine's outcome plus the twin's difference.
 pub(super) fn composed(theirs: &Outcome, with: &Outcome, without: &Outcome) -> Outcome {
     let start_ns = theirs.object.start_ns;
     let pose = |(period, theirs): (usize, &Isometry3<f64>)| {
