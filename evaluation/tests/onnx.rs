@@ -86,7 +86,7 @@ fn numbers(observation: &Value, key: &str) -> Vec<f32> {
 }
 
 #[test]
-#[ignore = "needs ONNX Runtime: ORT_DYLIB_PATH=.../libonnxruntime.so.VERSION"]
+#[ignore = "needs ONNX Runtime: ORT_DYLIB_PATH=LIBRARY cargo test --release --workspace --test onnx -- --ignored"]
 fn a_network_gets_what_is_seen_and_its_output_is_the_action() {
     let (folder, task) = (tempfile::tempdir().expect("a folder"), task());
     let mut policy = open(written(folder.path(), "a.onnx", &model("observation.state", 240, 15))).expect("a model");
@@ -106,7 +106,7 @@ fn a_network_gets_what_is_seen_and_its_output_is_the_action() {
 }
 
 #[test]
-#[ignore = "needs ONNX Runtime: ORT_DYLIB_PATH=.../libonnxruntime.so.VERSION"]
+#[ignore = "needs ONNX Runtime: ORT_DYLIB_PATH=LIBRARY cargo test --release --workspace --test onnx -- --ignored"]
 fn a_file_of_no_use_is_an_error_in_a_line_that_says_why() {
     let (folder, task) = (tempfile::tempdir().expect("a folder"), task());
     let of = |name: &str, bytes: &[u8]| {

@@ -93,19 +93,19 @@ fn joint_and_parts_of_three_objects_are_found_out_of_two_states_each() {
 }
 
 #[test]
-#[ignore = "takes minutes"]
+#[ignore = "takes minutes: cargo test --release --workspace --test articulated -- --ignored --nocapture"]
 fn ten_states_of_a_laptop() {
     ten_states(0);
 }
 
 #[test]
-#[ignore = "takes minutes"]
+#[ignore = "takes minutes: cargo test --release --workspace --test articulated -- --ignored --nocapture"]
 fn ten_states_of_a_drawer() {
     ten_states(1);
 }
 
 #[test]
-#[ignore = "takes minutes"]
+#[ignore = "takes minutes: cargo test --release --workspace --test articulated -- --ignored --nocapture"]
 fn ten_states_of_a_box_with_a_lid() {
     ten_states(2);
 }
