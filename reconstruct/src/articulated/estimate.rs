@@ -1,14 +1,13 @@
 //! The joint out of two states: poses of the whole, for each of them poses of a part, each as a hinge and as a slide; what explains
 //! both surfaces best.
 
-use super::ArticulatedError;
 use super::body::{Body, Place, Sample};
 use super::fit::{Pair, Points, carried};
 use super::motion::{Joint, Motion};
 use super::search::{Open, apart, poses};
+use super::{ArticulatedError, go_on};
 use nalgebra::{DMatrix, Isometry3, Point3, Translation3, Vector3};
 use rayon::prelude::*;
-use shared_mem::ending;
 use shared_mem::progress::Progress;
 
 /// Poses of the whole that are looked at, and poses of a part for each.
@@ -71,15 +70,11 @@ pub(super) fn estimate(pair: &Pair<'_>, bar: &Progress) -> Result<Estimate, Arti
     let wholes = poses(pair, &Open::all(&points), &[Isometry3::identity(), aligned], WHOLES);
     let mut candidates: Vec<Candidate> = Vec::new();
     for (number, (_, whole)) in wholes.iter().enumerate() {
-        if ending::asked() {
-            return Err(ArticulatedError::Interrupted);
-        }
+        go_on()?;
         bar.show(1 + number as u64, "search");
         candidates.extend(parts(pair, &points, whole));
     }
-    if ending::asked() {
-        return Err(ArticulatedError::Interrupted);
-    }
+    go_on()?;
     candidates.sort_by(|a, b| a.cost.total_cmp(&b.cost));
     let best = candidates.first().ok_or(ArticulatedError::Still { noise: MIDDLE * size })?;
     let in_place = |candidate: &&Candidate| {

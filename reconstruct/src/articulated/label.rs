@@ -6,6 +6,7 @@ use super::is_beyond;
 use crate::field::{Field, Grid};
 use crate::sweep::distance_from;
 use nalgebra::{Isometry3, Point3, Vector3};
+use shared_mem::ending;
 use std::cmp::Reverse;
 use std::collections::{BinaryHeap, HashMap};
 
@@ -221,7 +222,8 @@ fn solved(
     let mut square = dot(&left, &way);
     let end = ENOUGH * square;
     for _ in 0..rounds {
-        if square <= end {
+        // Who asked for the end throws the result away.
+        if square <= end || ending::asked() {
             break;
         }
         let product = apply(&way);

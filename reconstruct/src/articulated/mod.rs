@@ -161,6 +161,7 @@ pub fn between(first: Mesh, second: Mesh) -> Result<Articulated, ArticulatedErro
     Topology::of(&first)?;
     Topology::of(&second)?;
     let (mut first, mut second) = rayon::join(|| Body::of(first), || Body::of(second));
+    go_on()?;
     let pair = Pair { first: &first, second: &second };
     bar.stage(SEARCH, 7);
     let found = estimate(&pair, &bar)?;
@@ -178,7 +179,9 @@ pub fn between(first: Mesh, second: Mesh) -> Result<Articulated, ArticulatedErro
         )
     };
     let (before, after) = borders([None; 2]);
+    go_on()?;
     let (before, border) = borders([Some(&before), Some(&after)]);
+    go_on()?;
     bar.show(1, SPLIT);
     for (body, border) in [(&mut first, &before), (&mut second, &border)] {
         body.samples.iter_mut().for_each(|sample| sample.moves = Some(is_beyond(border, &sample.point)));
@@ -199,6 +202,11 @@ pub fn between(first: Mesh, second: Mesh) -> Result<Articulated, ArticulatedErro
     let travel = joint.travel();
     let moves = Moves { joint, limits: [0.0, travel], position: travel, certainty: Some(certainty) };
     Articulated::of(&second, border, moves, states, &bar)
+}
+
+/// Ends the work where that was asked for.
+fn go_on() -> Result<(), ArticulatedError> {
+    if ending::asked() { Err(ArticulatedError::Interrupted) } else { Ok(()) }
 }
 
 /// Refuses what is no single part that moves.
@@ -253,9 +261,7 @@ impl Articulated {
     ) -> Result<Self, ArticulatedError> {
         let [base, part] = split::split(body, &border).ok_or(ArticulatedError::Nothing)?;
         bar.show(2, SPLIT);
-        if ending::asked() {
-            return Err(ArticulatedError::Interrupted);
-        }
+        go_on()?;
         let (base, part) = rayon::join(|| Part::of(&base), || Part::of(&part));
         let (base, part) = (base?, part?);
         let (low, high) = part.fine.bounds();

@@ -103,10 +103,12 @@ impl ArticulatedVerb {
             (None, None) => unreachable!("one of the two is required"),
         };
         let frames = assets::links_from_mesh(&object);
-        let pieces = [(&object.base, &frames[0]), (&object.part, &frames[1])].map(|(part, frame)| {
+        let mut pieces: [Vec<Mesh>; 2] = Default::default();
+        for ((part, frame), pieces) in [&object.base, &object.part].into_iter().zip(&frames).zip(&mut pieces) {
+            ensure!(!ending::asked(), "interrupted");
             let mesh = assets::in_frame(&part.fine, frame);
-            convex_pieces(&mesh.points, &mesh.triangles).into_iter().map(piece).collect()
-        });
+            *pieces = convex_pieces(&mesh.points, &mesh.triangles).into_iter().map(piece).collect();
+        }
         ensure!(!ending::asked(), "interrupted");
         let labels = Labels { name: self.name(), mass: self.mass, command: self.command() };
         for (path, bytes) in assets::articulated_files(&object, &pieces, &labels) {
