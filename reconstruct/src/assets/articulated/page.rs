@@ -3,9 +3,9 @@
 use super::drawing::{EDGE, SIDES, Window, drawn};
 use super::{ArticulatedSummary, LINKS};
 use crate::articulated::Articulated;
-use crate::assets::Labels;
 use crate::assets::frame::framed;
 use crate::assets::page::picture;
+use crate::assets::{DENSITY, Labels};
 use maud::{Markup, html};
 
 pub(super) fn page(object: &Articulated, summary: &ArticulatedSummary, labels: &Labels) -> String {
@@ -70,10 +70,11 @@ fn numbers(object: &Articulated, summary: &ArticulatedSummary) -> Markup {
     )];
     if let Some(sure) = object.certainty {
         let mut known = format!("direction to {:.2}°", sure.direction.to_degrees());
-        if joint.kind == "revolute" {
-            known += &format!(", place to {:.2} mm", sure.place * 1e3);
-        }
-        known += &format!(", travel to {}", position(summary, sure.travel));
+        known += &if joint.kind == "revolute" {
+            format!(", place to {:.2} mm, travel to {:.2}°", sure.place * 1e3, sure.travel.to_degrees())
+        } else {
+            format!(", travel to {:.2} mm", sure.travel * 1e3)
+        };
         rows.push(("standard deviations".into(), known));
         let other = if joint.kind == "revolute" { "a slide" } else { "a hinge" };
         let evidence = if sure.evidence.is_finite() {
@@ -86,9 +87,9 @@ fn numbers(object: &Articulated, summary: &ArticulatedSummary) -> Markup {
         rows.push(("unexplained".into(), format!("{:.1} % of both surfaces", sure.unexplained * 100.0)));
     }
     let weighed = if summary.weighed {
-        "weighed, shared out by volume"
+        "weighed, shared out by volume".to_owned()
     } else {
-        "from the volume at 500 kg/m³; weigh it and give --mass"
+        format!("from the volume at {DENSITY} kg/m³; weigh it and give --mass")
     };
     for (link, part) in LINKS.iter().zip(&summary.parts) {
         let surface = format!("closed, {} triangles, {} handles", part.surface.triangles, part.surface.genus);
