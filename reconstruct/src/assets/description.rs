@@ -50,7 +50,7 @@ pub(super) fn block(summary: &Summary) -> String {
     let range = |v: f64| format!("[{:.4}, {:.4}]", v - 0.01, v + 0.01);
     format!(
         "# Of a scan: {} views, volume {:.1} cm^3, of one material its centre of mass is at [{x:.4}, {y:.4}, {z:.4}].\n\
-         [object]\nmesh = \"object.obj\"\n{mass}centre_of_mass_range = [{}, {}, {}]\n",
+         [object]\nmesh = \"object.obj\"\nsplats = \"splats.ply\"\n{mass}centre_of_mass_range = [{}, {}, {}]\n",
         summary.views,
         summary.volume_m3 * 1e6,
         range(x),

@@ -70,7 +70,7 @@ impl Camera {
     ) -> Result<Self, CameraError> {
         let mut camera = SimCamera::new(cell)?.with_effects(effects);
         if let Some(folder) = splats {
-            camera = camera.with_splats(folder, Drawer::Auto)?;
+            camera = camera.with_splats(cell, folder, Drawer::Auto)?;
             camera.remarks().iter().for_each(|remark| tracing::warn!("{remark}"));
         }
         let known_ns = cell.camera.as_ref().map_or(0, |camera| (camera.latency * 1e9) as u64);

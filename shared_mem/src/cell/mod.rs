@@ -2,6 +2,7 @@
 //!
 //! An absent block means "not known" or "not there"; unknown keys are refused with the nearest known name.
 
+mod background;
 mod camera;
 mod controller;
 mod gripper;
@@ -14,6 +15,7 @@ mod simulation;
 mod tolerance;
 mod wrench;
 
+pub use background::Background;
 pub use camera::{Camera, CameraPose, Intrinsics};
 pub use controller::{Controller, ControllerKind, Range, TorqueSensing};
 pub use gripper::{Gripper, GripperModel};
@@ -58,6 +60,9 @@ pub struct Cell {
     #[serde(default, rename = "object", with = "blocks", skip_serializing_if = "Vec::is_empty")]
     #[schemars(with = "objects::Blocks")]
     pub objects: Vec<Object>,
+    /// What stands around the robot, for pictures.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub background: Option<Background>,
     /// The camera.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub camera: Option<Camera>,
@@ -166,7 +171,8 @@ impl Cell {
         let folder = std::path::absolute(&cell.folder).unwrap_or_else(|_| cell.folder.clone());
         let anchor = |path: &mut PathBuf| *path = folder.join(&*path);
         cell.robot.iter_mut().filter_map(|robot| robot.urdf.as_mut()).for_each(anchor);
-        cell.objects.iter_mut().filter_map(|object| object.mesh.as_mut()).for_each(anchor);
+        cell.objects.iter_mut().flat_map(|object| [&mut object.mesh, &mut object.splats]).flatten().for_each(anchor);
+        cell.background.iter_mut().map(|background| &mut background.splats).for_each(anchor);
         cell
     }
 

@@ -23,6 +23,10 @@ pub struct Object {
     /// the object's is the geometric centre, the middle of the mesh's bounding box.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub mesh: Option<PathBuf>,
+    /// Gaussian splats in the object's frame (3DGS PLY, or SuperSplat's compressed PLY), relative to cell.toml: pictures show them
+    /// in place of `shape` or `mesh`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub splats: Option<PathBuf>,
     /// Edge lengths along the object's x, y, z [m].
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub size: Option<[f64; 3]>,

@@ -1,8 +1,18 @@
 //! How the cell looks wherever it is drawn: its colours, the table top, the light.
 
-use super::Mesh;
+use super::{Mesh, Model};
 use crate::scene::{MeshFileError, ObjectModel};
 use shared_mem::cell::Cell;
+use splat::{SplatCloud, SplatError};
+use std::path::Path;
+
+/// Splats that cell.toml names cannot be used.
+#[derive(Debug, thiserror::Error)]
+#[error("{fault} (`{key}` in cell.toml)")]
+pub struct CellSplatsError {
+    key: &'static str,
+    fault: SplatError,
+}
 
 /// What lies behind everything.
 pub(crate) const BACKGROUND: [u8; 3] = [168, 186, 204];
@@ -26,4 +36,18 @@ pub(crate) fn table_top(height: f32) -> Mesh {
 /// [`MeshFileError`] when its mesh cannot be used.
 pub(crate) fn object(cell: &Cell) -> Result<Option<Mesh>, MeshFileError> {
     Ok(ObjectModel::new(cell, None)?.map(|model| Mesh::new(model.shape.triangles(), OBJECT)))
+}
+
+/// The splats around the robot, base frame, and those of the object in its own; `None` where the cell names none.
+///
+/// # Errors
+/// [`CellSplatsError`] when a file cannot be used.
+pub(crate) fn splats(cell: &Cell) -> Result<[Option<Model>; 2], CellSplatsError> {
+    let read = |key, file: Option<&Path>| {
+        let cloud = file.map(|file| SplatCloud::read(&cell.folder.join(file))).transpose();
+        cloud.map(|cloud| cloud.map(Model::Splats)).map_err(|fault| CellSplatsError { key, fault })
+    };
+    let around = cell.background.as_ref().map(|background| background.splats.as_path());
+    let object = cell.object().and_then(|object| object.splats.as_deref());
+    Ok([read("background.splats", around)?, read("object.splats", object)?])
 }

@@ -1,6 +1,7 @@
 //! A recorded session beside its twin: the camera's picture, what the twin shows at the same joints, and where they differ.
 
-use super::{Drawer, Hand, PaintError, Painter, RobotSurface, ScannedLink, Shown, looks, strays};
+use super::looks::CellSplatsError;
+use super::{Drawer, Hand, Model, PaintError, Painter, RobotSurface, ScannedLink, Shown, looks, strays};
 use crate::arm::{Joints, MAX_JOINTS, ModelError};
 use crate::scene::MeshFileError;
 use nalgebra::Isometry3;
@@ -33,6 +34,9 @@ pub enum ViewError {
     /// A splat file cannot be used.
     #[error(transparent)]
     Splats(#[from] SplatError),
+    /// A splat file of cell.toml cannot be used.
+    #[error(transparent)]
+    OfCell(#[from] CellSplatsError),
     /// Who shall draw cannot.
     #[error(transparent)]
     Paint(#[from] PaintError),
@@ -55,8 +59,8 @@ pub enum ViewError {
 }
 
 impl TwinView {
-    /// From a cell; `splats`: a folder with a PLY file for each link, its name with `link0` to `link7` or `hand`. They
-    /// replace the meshes. Each is in its link's frame, or all are in the base frame of an arm `scanned_at` these joint
+    /// From a cell, with the splats that it names for its background and its object; `splats`: a folder with a PLY file for each
+    /// link, its name with `link0` to `link7` or `hand`. They replace the meshes. Each is in its link's frame, or all are in the base frame of an arm `scanned_at` these joint
     /// positions [rad].
     ///
     /// # Errors
@@ -73,8 +77,9 @@ impl TwinView {
         let lens =
             Lens { focal: [pinhole.fx, pinhole.fy], centre: [pinhole.cx, pinhole.cy], distortion: camera.distortion };
         let robot = RobotSurface::new(cell, Hand::None)?;
-        let table = cell.table.map(|table| looks::table_top(table.height as f32));
-        let object = looks::object(cell)?;
+        let table = cell.table.map(|table| Model::Mesh(looks::table_top(table.height as f32)));
+        let mesh = looks::object(cell)?.map(Model::Mesh);
+        let [background, object] = looks::splats(cell)?;
         let scans = splats.map(read_links).transpose()?.unwrap_or_default().into_iter();
         let scans: Vec<_> = scans
             .map(|(link, splats)| {
@@ -85,7 +90,14 @@ impl TwinView {
             .collect();
         let remarks = strays(&robot, &scans, scanned_at.is_some());
         let size = [camera.width as usize, camera.height as usize];
-        let shown = Shown::new(&robot, table.as_slice(), object.as_ref(), scans, drawer, (lens, size))?;
+        let shown = Shown::new(
+            &robot,
+            background.or(table).into_iter().collect(),
+            object.or(mesh),
+            scans,
+            drawer,
+            (lens, size),
+        )?;
         Ok(Self { size, camera_from_base: base_from_camera.inverse().isometry(), robot, shown, remarks })
     }
 
@@ -187,6 +199,45 @@ mod tests {
         assert!(both > 2000 && both * 1000 > either * 995, "{both} of {either} pixels of the white arm");
         let (width, height, sheet) = beside(view.size(), &color, &twin);
         assert_eq!((width, height, sheet.len()), (1920, 480, 3 * color.len()));
+    }
+
+    #[test]
+    fn background_and_object_are_drawn_of_the_splats_that_the_cell_names() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let ball = |centre: [f32; 3], sigma, colour: [f32; 3]| {
+            let (rotation, sigma) = (nalgebra::UnitQuaternion::identity(), nalgebra::Vector3::repeat(sigma));
+            let splats = vec![splat::Splat { centre: centre.into(), rotation, sigma, opacity: 0.99 }];
+            splat::SplatCloud { splats, degree: 0, harmonics: vec![colour] }
+        };
+        let [far, near] = ["far.ply", "near.ply"].map(|name| folder.path().join(name));
+        ball([0.5, -0.3, 0.1], 0.05, [-2.0, 2.0, -2.0]).write(&far).expect("room");
+        ball([0.0, 0.0, 0.05], 0.03, [-2.0, -2.0, 2.0]).write(&near).expect("room");
+        let mut cell = shipped();
+        cell.folder = folder.path().to_owned();
+        cell.background = Some(shared_mem::cell::Background { splats: "far.ply".into() });
+        cell.object_mut().expect("a box").splats = Some("near.ply".into());
+        let mut view = TwinView::new(&cell, None, None, Drawer::Processor).expect("a view");
+        let q = *view.robot.model().ready();
+        let box_at = Pose::from_parts([0.5, 0.2, 0.05], [1.0, 0.0, 0.0, 0.0]).expect("a pose");
+        let camera = cell.camera.as_ref().expect("a camera");
+        let pinhole = camera.pinhole();
+        let mut at = |object: Option<_>, place: [f64; 3]| {
+            let picture = view.draw(&q, object).expect("a picture");
+            let seen = view.camera_from_base * nalgebra::Point3::from(place);
+            let [u, v] = [pinhole.fx * seen.x / seen.z + pinhole.cx, pinhole.fy * seen.y / seen.z + pinhole.cy];
+            let start = 3 * (v.round() as usize * camera.width as usize + u.round() as usize);
+            [picture[start], picture[start + 1], picture[start + 2]]
+        };
+        let [red, green, blue] = at(None, [0.5, -0.3, 0.1]);
+        assert!(green > 150 && red < 60 && blue < 60, "{red} {green} {blue}");
+        // Above the box, so that its mesh would not be seen there.
+        let [red, green, blue] = at(Some(box_at), [0.5, 0.2, 0.12]);
+        assert!(blue > 100 && red < 80 && green < 100, "{red} {green} {blue}");
+        // The table top is not drawn.
+        assert_eq!(at(None, [0.5, 0.2, 0.0]), looks::BACKGROUND);
+        std::fs::remove_file(&far).expect("a file");
+        let error = TwinView::new(&cell, None, None, Drawer::Processor).expect_err("no file").to_string();
+        assert!(error.contains("far.ply") && error.ends_with("(`background.splats` in cell.toml)"), "{error}");
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! The robot and what stands around it, ready to be drawn again and again: which model moves with what.
 
-use super::{Drawer, Mesh, Model, PaintError, Painter, RobotSurface, looks};
+use super::{Drawer, Model, PaintError, Painter, RobotSurface, looks};
 use crate::arm::Joints;
 use nalgebra::{Isometry3, Vector3};
 use splat::{Lens, Picture, SplatCloud, Surroundings};
@@ -48,8 +48,8 @@ impl Shown {
     /// [`PaintError`] when who shall draw cannot.
     pub(crate) fn new(
         robot: &RobotSurface,
-        still: &[Mesh],
-        object: Option<&Mesh>,
+        still: Vec<Model>,
+        object: Option<Model>,
         scans: Vec<ScannedLink>,
         drawer: Drawer,
         (lens, size): (Lens, [usize; 2]),
@@ -58,11 +58,10 @@ impl Shown {
         let meshes = scans.is_empty();
         let parts =
             robot.parts().iter().zip(robot.links()).enumerate().filter(|(_, (_, link))| meshes || *link == tool);
-        let mesh = |place, mesh: &Mesh, number| (place, (Model::Mesh(mesh.clone()), number));
         let number = |link: usize| ROBOT + link as u32;
-        let (places, models) = (still.iter().map(|shape| mesh(Place::Still, shape, STILL)))
-            .chain(object.map(|shape| mesh(Place::Object, shape, OBJECT)))
-            .chain(parts.map(|(part, (shape, link))| mesh(Place::Part(part), shape, number(link))))
+        let (places, models) = (still.into_iter().map(|model| (Place::Still, (model, STILL))))
+            .chain(object.map(|model| (Place::Object, (model, OBJECT))))
+            .chain(parts.map(|(part, (mesh, link))| (Place::Part(part), (Model::Mesh(mesh.clone()), number(link)))))
             .chain(scans.into_iter().map(|ScannedLink { link, link_from_scan, splats }| {
                 (Place::Link(link, link_from_scan), (Model::Splats(splats), number(link)))
             }))

@@ -8,7 +8,7 @@ use super::camera_clock_ns;
 use super::depth::{self, DepthSensor};
 use crate::effects::CameraEffects;
 use crate::render::session::ViewError;
-use crate::render::{Drawer, Hand, Mesh, Pinhole, Raster, RobotSurface, ScannedLink, Shown, looks, strays};
+use crate::render::{Drawer, Hand, Mesh, Model, Pinhole, Raster, RobotSurface, ScannedLink, Shown, looks, strays};
 use crate::scene::SceneSnapshot;
 use crate::sim::SimError;
 use crate::sim::generator;
@@ -84,12 +84,12 @@ impl SimCamera {
         Self { camera_from_base, older_ns: effects.latency_ns(), ..self }
     }
 
-    /// The same camera before a robot of splats: a folder with a file for each link, in the links' frames. A picture then
-    /// takes as long as whoever draws it needs.
+    /// The same camera before a robot of splats: a folder with a file for each link, in the links' frames; background and object
+    /// are of splats, too, where `cell` names some. A picture then takes as long as whoever draws it needs.
     ///
     /// # Errors
     /// [`ViewError`] when the splats cannot be used, or who shall draw cannot.
-    pub fn with_splats(mut self, folder: &Path, drawer: Drawer) -> Result<Self, ViewError> {
+    pub fn with_splats(mut self, cell: &Cell, folder: &Path, drawer: Drawer) -> Result<Self, ViewError> {
         let pinhole = self.settings.pinhole();
         let lens = Lens { focal: [pinhole.fx, pinhole.fy], centre: [pinhole.cx, pinhole.cy], distortion: [0.0; 5] };
         let view = (lens, [self.settings.width as usize, self.settings.height as usize]);
@@ -98,7 +98,11 @@ impl SimCamera {
             let scans = scans.map(|(link, splats)| ScannedLink { link, link_from_scan: Isometry3::identity(), splats });
             let scans: Vec<_> = scans.collect();
             self.remarks = strays(robot, &scans, false);
-            self.scanned = Some(Shown::new(robot, &self.still, self.object.as_ref(), scans, drawer, view)?);
+            let [background, object] = looks::splats(cell)?;
+            let meshes = || self.still.iter().cloned().map(Model::Mesh).collect();
+            let still = background.map_or_else(meshes, |splats| vec![splats]);
+            let object = object.or(self.object.clone().map(Model::Mesh));
+            self.scanned = Some(Shown::new(robot, still, object, scans, drawer, view)?);
         }
         Ok(self)
     }
@@ -288,7 +292,7 @@ mod tests {
         let scene = SimCell::new(&cell, None).expect("a cell").snapshot();
         let (_, meshes, deep, _) = picture(&cell, &scene);
         let camera = SimCamera::new(&cell).expect("a camera");
-        let mut camera = camera.with_splats(folder.path(), Drawer::Processor).expect("splats");
+        let mut camera = camera.with_splats(&cell, folder.path(), Drawer::Processor).expect("splats");
         let (mut color, mut depth) = (vec![0; camera.color_bytes()], vec![0; camera.depth_bytes()]);
         camera.render(&scene, &mut color, &mut depth);
         let depth: Vec<u16> = depth.chunks_exact(2).map(|b| u16::from_le_bytes([b[0], b[1]])).collect();
@@ -299,7 +303,9 @@ mod tests {
         assert!(same * 100 > 95 * arm.len() && near * 100 > 90 * arm.len(), "{same} and {near} of {}", arm.len());
         let beside = (0..depth.len()).filter(|i| depth[*i].abs_diff(deep[*i]) > 30).count();
         assert!(beside * 20 < depth.len(), "{beside} pixels elsewhere");
-        assert!(SimCamera::new(&cell).expect("a camera").with_splats(Path::new("nowhere"), Drawer::Auto).is_err());
+        assert!(
+            SimCamera::new(&cell).expect("a camera").with_splats(&cell, Path::new("nowhere"), Drawer::Auto).is_err()
+        );
     }
 
     #[test]
