@@ -10,7 +10,7 @@ use super::start::{self, Seen};
 use crate::field::{Field, Grid};
 use crate::scan::Frame;
 use crate::sweep::signed_distance;
-use nalgebra::{Isometry3, Point3};
+use nalgebra::{Isometry3, Point3, Vector3};
 use rand::{RngExt as _, SeedableRng as _};
 use rand_pcg::Pcg64;
 use rayon::prelude::*;
@@ -231,15 +231,32 @@ impl<'a> Learner<'a> {
 
     fn move_cameras(&self, state: &mut State, by_pose: &[[f64; 6]], rate: f64) {
         let State { corrections, moments, .. } = state;
-        let cameras = corrections.len() as f64;
         for ((correction, moments), slope) in corrections.iter_mut().zip(moments).zip(by_pose) {
             move_camera(correction, moments, slope, rate, self.radius);
         }
-        // All cameras together may move freely with the object: their mean stays.
-        for i in 0..6 {
-            let mean = corrections.iter().map(|c| c[i]).sum::<f64>() / cameras;
-            corrections.iter_mut().for_each(|c| c[i] -= mean);
-        }
+        let away: Vec<Vector3<f64>> =
+            self.frames.iter().map(|frame| frame.scan_from_camera * Point3::origin() - self.pivot).collect();
+        without_common(corrections, &away);
+    }
+}
+
+/// Takes out of the cameras' corrections what the pictures cannot show, because the object may move and grow with all cameras together:
+/// the mean shift and turn, and a common retreat from the pivot; `away`: from the pivot to each camera [m]. Left free, the cameras
+/// retreat where a coarse grid makes thin walls too thick, and the object stays too thick in the fine grid.
+fn without_common(corrections: &mut [[f64; 6]], away: &[Vector3<f64>]) {
+    let cameras = corrections.len() as f64;
+    for i in 0..6 {
+        let mean = corrections.iter().map(|c| c[i]).sum::<f64>() / cameras;
+        corrections.iter_mut().for_each(|c| c[i] -= mean);
+    }
+    // About the cameras' middle, so that taking out the growth shifts nothing.
+    let middle = away.iter().sum::<Vector3<f64>>() / cameras;
+    let away = || away.iter().map(|away| away - middle);
+    let along = |(c, away): (&[f64; 6], Vector3<f64>)| away.dot(&Vector3::new(c[0], c[1], c[2]));
+    let growth =
+        corrections.iter().zip(away()).map(along).sum::<f64>() / away().map(|away| away.norm_squared()).sum::<f64>();
+    for (correction, away) in corrections.iter_mut().zip(away()) {
+        (0..3).for_each(|i| correction[i] -= growth * away[i]);
     }
 }
 
@@ -318,4 +335,30 @@ pub(crate) fn placed(
         move_camera(&mut correction, &mut moments, &slope, rate, radius);
     }
     corrected(start, &best, &pivot)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_all_cameras_do_together_is_taken_out_and_what_each_does_alone_stays() {
+        let mut random = Pcg64::seed_from_u64(4);
+        let away: Vec<Vector3<f64>> =
+            (0..40).map(|_| Vector3::from_fn(|axis, _| random.random_range(-0.4..0.4) + 0.1 * axis as f64)).collect();
+        let mut own: Vec<[f64; 6]> =
+            (0..40).map(|_| std::array::from_fn(|_| random.random_range(-1e-3..1e-3))).collect();
+        without_common(&mut own, &away);
+        let mut moved = own.clone();
+        for (correction, away) in moved.iter_mut().zip(&away) {
+            for i in 0..3 {
+                correction[i] += 0.002 * away[i] + 0.003;
+                correction[3 + i] -= 0.001;
+            }
+        }
+        without_common(&mut moved, &away);
+        let apart = own.iter().flatten().zip(moved.iter().flatten()).map(|(a, b)| (a - b).abs());
+        assert!(apart.fold(0.0, f64::max) < 1e-12);
+        assert!(own.iter().flatten().any(|value| value.abs() > 5e-4));
+    }
 }
