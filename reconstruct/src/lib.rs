@@ -6,6 +6,7 @@
 //! | [`scan`] | pictures, masks, depth, poses; COLMAP, nerfstudio, robot-held cameras |
 //! | [`field`] | signed distance and colour at the nodes of a box |
 //! | `sweep` | signed distance from signs |
+//! | `closing` | gaps filled that are narrower than the grid shows |
 //! | [`views`] | views read, the blurred ones left out, every eighth held out |
 //! | `splats` | views as splats are trained on them, and the picture of splats |
 //! | [`object`] | one object: where it starts, the optimisation, what was left uncertain |
@@ -18,6 +19,7 @@
 
 pub mod articulated;
 pub mod assets;
+mod closing;
 pub mod field;
 pub mod mesh;
 pub mod object;

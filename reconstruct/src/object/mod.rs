@@ -35,6 +35,7 @@ pub(crate) use judge::is_certain;
 pub use state::StateError;
 pub use view::{Drawn, draw};
 
+use crate::closing;
 use crate::field::{Field, Grid};
 use crate::mesh::{self, Flaw, Islands, Mesh, Solid, Topology};
 use crate::scan::{Scale, ScaleSource, Scan, ScanError};
@@ -214,7 +215,7 @@ struct Shape {
 
 impl Shape {
     fn of(field: &Field<f32>, bar: &Progress) -> Result<Self, ObjectError> {
-        let (surface, islands) = mesh::surface(field).ok_or(ObjectError::Nothing)?;
+        let (surface, islands) = mesh::surface(&closing::closed(field)).ok_or(ObjectError::Nothing)?;
         Topology::of(&surface)?;
         let fine = mesh::reduced(&surface, FINE);
         let topology = Topology::of(&fine)?;
