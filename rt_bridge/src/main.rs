@@ -7,7 +7,11 @@ use std::process::ExitCode;
 const BUILD: Build = Build {
     version: env!("CARGO_PKG_VERSION"),
     commit: git_version!(args = ["--always", "--abbrev=12", "--exclude=*", "--dirty=-modified"], fallback = ""),
-    features: &[("render", cfg!(feature = "render")), ("realsense", cfg!(feature = "realsense"))],
+    features: &[
+        ("render", cfg!(feature = "render")),
+        ("realsense", cfg!(feature = "realsense")),
+        ("link", cfg!(feature = "link")),
+    ],
 };
 
 fn main() -> ExitCode {

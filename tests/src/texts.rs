@@ -109,13 +109,14 @@ pub fn documents() -> Vec<(String, String)> {
 }
 
 /// The folders with the sources of the product.
-pub const PRODUCT: [&str; 10] = [
+pub const PRODUCT: [&str; 11] = [
     "shared_mem/src",
     "splat/src",
     "fusion/src",
     "reconstruct/src",
     "urdf/src",
     "twin/src",
+    "link/src",
     "rt_bridge/src",
     "import/src",
     "evaluation/src",

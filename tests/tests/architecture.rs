@@ -54,7 +54,7 @@ fn is_named(line: &str, name: &str) -> bool {
 
 #[test]
 fn each_big_dependency_has_one_door() {
-    let doors: [(&str, &[&str]); 31] = [
+    let doors: [(&str, &[&str]); 32] = [
         ("iceoryx2", &["shared_mem/src/transport/", "shared_mem/src/msg/"]),
         ("mcap", &["shared_mem/src/recording/"]),
         ("parry3d_f64", &["twin/src/physics/"]),
@@ -88,6 +88,7 @@ fn each_big_dependency_has_one_door() {
         ("tungstenite", &["evaluation/src/policy/served.rs"]),
         ("ort", &["evaluation/src/policy/onnx.rs"]),
         ("zip", &["import/src/sources/npz.rs"]),
+        ("zenoh", &["link/src/network/"]),
         ("schemars", &["shared_mem/src/cell/"]),
         ("base64", &["reconstruct/src/assets/page.rs", "calibration/src/page/picture.rs"]),
     ];
@@ -262,6 +263,7 @@ fn folders_need_each_other_in_no_circle() {
         "import",
         "urdf",
         "reconstruct",
+        "link",
     ] {
         let folder = |file: &str| {
             let within = file.strip_prefix(package)?.strip_prefix("/src/")?.split('/').next()?;
@@ -307,8 +309,15 @@ fn the_diagnosis_goes_one_way() {
 
 #[test]
 fn dependencies_point_one_way() {
-    let rules: [(&str, &[&str]); 9] = [
-        ("shared_mem", &["splat", "fusion", "twin", "rt_bridge", "calibration", "evaluation", "import", "reconstruct"]),
+    let rules: [(&str, &[&str]); 10] = [
+        (
+            "shared_mem",
+            &["splat", "fusion", "twin", "link", "rt_bridge", "calibration", "evaluation", "import", "reconstruct"],
+        ),
+        (
+            "link",
+            &["splat", "fusion", "twin", "rt_bridge", "calibration", "evaluation", "import", "urdf", "reconstruct"],
+        ),
         ("splat", &["fusion", "twin", "rt_bridge", "calibration", "evaluation", "import", "urdf", "reconstruct"]),
         ("fusion", &["twin", "rt_bridge", "calibration", "evaluation", "import", "urdf", "reconstruct"]),
         ("import", &["splat", "fusion", "twin", "rt_bridge", "calibration", "evaluation", "urdf", "reconstruct"]),
@@ -336,6 +345,7 @@ fn the_readme_names_every_folder_and_only_existing_files() {
         "shared_mem/",
         "twin/",
         "splat/",
+        "link/",
         "rt_bridge/",
         "calibration/",
         "evaluation/",
@@ -354,6 +364,7 @@ fn the_readme_names_every_folder_and_only_existing_files() {
             "splat/src",
             "fusion/src",
             "twin/src",
+            "link/src",
             "rt_bridge/src",
             "calibration/src",
             "evaluation/src",

@@ -29,7 +29,7 @@ const OF_OTHERS: [&str; 10] = [
     "open-mode",
 ];
 /// A folder of the sources, and the verbs of which one must have the flags that its messages name.
-const SPOKEN_BY: [(&str, &[&str]); 11] = [
+const SPOKEN_BY: [(&str, &[&str]); 12] = [
     ("calibration/src/init/", &["calibration init"]),
     ("import/src/", &["calibration import"]),
     ("calibration/src/viewpoint/", &["calibration viewpoint"]),
@@ -37,6 +37,7 @@ const SPOKEN_BY: [(&str, &[&str]); 11] = [
     ("calibration/src/demo/", &["calibration demo"]),
     ("rt_bridge/src/run/", &["rt_bridge run"]),
     ("rt_bridge/src/serve/", &["rt_bridge serve"]),
+    ("link/src/", &["rt_bridge link"]),
     ("twin/src/viewer/", &["twin shadow"]),
     ("twin/src/teleop/", &["twin teleop"]),
     ("twin/src/reconstruct/", &["twin label-splats"]),

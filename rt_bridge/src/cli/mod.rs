@@ -6,6 +6,7 @@
 mod convert;
 mod doctor;
 mod grip;
+mod link;
 mod record;
 mod run;
 mod serve;
@@ -30,7 +31,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
         rt_bridge convert table.bag --out table.mcap                   a RealSense recording as a clip\n  \
         rt_bridge grip move 0.03                                       tell the gripper of a running bridge\n  \
         rt_bridge target shift 0,0,0.05 --cell config/fr3_cell.toml    steer the arm of a running bridge\n  \
-        rt_bridge serve --cell config/fr3_cell.toml                    play a Franka robot for any libfranka program\n\n\
+        rt_bridge serve --cell config/fr3_cell.toml                    play a Franka robot for any libfranka program\n  \
+        rt_bridge link --listen tcp/0.0.0.0:7447                       let another host read along\n\n\
         Processes meet when the environment variable TWINALIGN_DOMAIN agrees (default 0).")]
 struct Arguments {
     #[command(subcommand)]
@@ -45,8 +47,13 @@ enum Verb {
     Serve(serve::ServeArguments),
     Grip(grip::GripArguments),
     Target(target::TargetArguments),
+    Link(link::LinkArguments),
     Doctor(doctor::DoctorArguments),
 }
+
+/// What is said on standard error unless `RUST_LOG` says otherwise. The network's library says each failure by itself, and
+/// what matters of it is said by `link`.
+const LOGGED: &str = "info,zenoh=off";
 
 /// Reads the command line and does what it says.
 #[must_use]
@@ -60,7 +67,7 @@ pub fn main(build: &Build) -> ExitCode {
         .with_writer(|| console::Log)
         .with_env_filter(
             tracing_subscriber::EnvFilter::try_from_default_env()
-                .unwrap_or_else(|_| tracing_subscriber::EnvFilter::new("info")),
+                .unwrap_or_else(|_| tracing_subscriber::EnvFilter::new(LOGGED)),
         )
         .with_target(false)
         .with_ansi(false)
@@ -72,6 +79,7 @@ pub fn main(build: &Build) -> ExitCode {
         Verb::Serve(serve) => serve.execute(),
         Verb::Grip(grip) => grip.execute(),
         Verb::Target(target) => target.execute(),
+        Verb::Link(link) => link.execute(),
         Verb::Doctor(doctor) => doctor.execute(),
     };
     match done {

@@ -122,7 +122,7 @@ pub(super) fn is_own(channel: &Channel) -> bool {
 /// Decodes one of the protobuf payloads.
 pub(super) fn decode<T: Wire>(data: &[u8]) -> Result<T, String> {
     let message = T::Message::decode(data)
-        .map_err(|e| format!("a message is no {} ({e}); the clip was written by another program", T::SCHEMA))?;
+        .map_err(|e| format!("a message is no {} ({e}); it was written by another program", T::SCHEMA))?;
     Ok(T::from_wire(message))
 }
 

@@ -17,6 +17,7 @@
 //! | `joint_log` | joint rows: one publisher, one joint order |
 //! | `checks` | faults that foreign logs have, each told in a sentence |
 //! | `wire`, `writer` | own clips: messages and file, and what viewers are shown of the robot |
+//! | `encoded` | the bytes of messages without a file, as they go to another host |
 //! | `robot` | a robot as viewers want it |
 //! | `episode` | one run of a task as a clip, there and back |
 //! | `raw` | messages as bytes, for readers of other programs' bags |
@@ -32,6 +33,7 @@ mod clip;
 mod container;
 mod controller_log;
 mod device_clock;
+mod encoded;
 mod episode;
 mod error;
 mod export;
@@ -57,6 +59,9 @@ mod wire;
 mod writer;
 
 pub use clip::{Clip, read_clip};
+pub use encoded::{
+    Encoded, EncodedVisitor, append_picture, picture_from_bytes, picture_schema, schema_checksum, visit_encoded,
+};
 pub use episode::{Episode, EpisodeInfo, EpisodeMoment, RigidPose, read_episode, write_episode};
 pub use error::ReadError;
 pub use export::{
