@@ -3,7 +3,7 @@
 use hdrhistogram::Histogram;
 use serde::Serialize;
 
-/// Longest age told apart: ten minutes; longer ones count as this [ns].
+/// Longest age that is distinguished: ten minutes; longer ones count as this [ns].
 const LONGEST_NS: u64 = 600_000_000_000;
 
 /// A distribution of ages [ns], exact to 0.1 %.

@@ -12,16 +12,16 @@ pub struct Endpoint {
 }
 
 impl Endpoint {
-    /// The port.
+    /// Host and port.
     #[must_use]
-    pub fn port(&self) -> u16 {
-        self.port
+    pub fn address(&self) -> String {
+        format!("{}:{}", self.host, self.port)
     }
 }
 
 impl fmt::Display for Endpoint {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "tcp/{}:{}", self.host, self.port)
+        write!(f, "tcp/{}", self.address())
     }
 }
 

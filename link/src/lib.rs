@@ -9,7 +9,7 @@
 //! | [`envelope`] | what stands beside a message's bytes on the way: sender, number, time, schema |
 //! | [`history`] | numbered messages that the sender keeps, to send again what the other host missed |
 //! | [`order`] | the receiver's count: next in order, missing, repeated, or from a stranger |
-//! | [`queue`] | what waits for a thread, the oldest dropped first |
+//! | [`queue`], [`pace`] | what waits for a thread, the oldest dropped first; how fast a backlog is published |
 //! | [`clock`] | how far the clocks of two hosts are apart, from round trips |
 //! | [`ages`], [`report`] | how long messages took, and the answer of the program |
 //! | `network` | zenoh, behind the feature `zenoh` |
@@ -25,6 +25,7 @@ pub mod history;
 #[cfg(feature = "zenoh")]
 mod network;
 pub mod order;
+pub mod pace;
 pub mod queue;
 pub mod report;
 

@@ -51,6 +51,12 @@ impl Order {
         Self { is_complete, sender: None }
     }
 
+    /// Number of the message that is due; `None` before the first, and where what is missing is not asked for.
+    #[must_use]
+    pub fn next(&self) -> Option<u64> {
+        self.sender.as_ref().filter(|_| self.is_complete).map(|sender| sender.next)
+    }
+
     /// Judges a message that came at `now_ns` of this host's clock. The first of a sender is the beginning: nothing before
     /// it is asked for.
     pub fn judge(&mut self, envelope: &Envelope, now_ns: u64) -> Verdict {
@@ -96,6 +102,7 @@ mod tests {
     #[test]
     fn a_gap_is_asked_for_once_and_nothing_is_handed_on_before_it_is_filled() {
         let mut order = Order::new(true);
+        assert_eq!(order.next(), None);
         let mut at = |number, now_ns| order.judge(&envelope(1, number, 0), now_ns);
         assert_eq!(at(5, 0), Verdict::Deliver { lost: 0 });
         assert_eq!(at(6, 1), Verdict::Deliver { lost: 0 });
@@ -105,6 +112,7 @@ mod tests {
         assert_eq!(at(7, 300_000_000), Verdict::Deliver { lost: 0 });
         assert_eq!(at(6, 300_000_001), Verdict::Repeated);
         assert_eq!(at(8, 300_000_002), Verdict::Deliver { lost: 0 });
+        assert_eq!(order.next(), Some(9));
     }
 
     #[test]

@@ -41,13 +41,12 @@ impl<T> Queue<T> {
         self.filled.notify_one();
     }
 
-    /// The oldest, and how many more wait; `None` when none came within `patience`.
-    pub fn pop(&self, patience: Duration) -> Option<(T, usize)> {
+    /// The oldest; `None` when none came within `patience`.
+    pub fn pop(&self, patience: Duration) -> Option<T> {
         let inner = self.inner();
         let waited = self.filled.wait_timeout_while(inner, patience, |inner| inner.waiting.is_empty());
         let (mut inner, _) = waited.unwrap_or_else(PoisonError::into_inner);
-        let item = inner.waiting.pop_front()?;
-        Some((item, inner.waiting.len()))
+        inner.waiting.pop_front()
     }
 
     /// How many were dropped so far.
@@ -71,7 +70,7 @@ mod tests {
         let queue = Queue::new(2);
         (0..5).for_each(|i| queue.push(i));
         assert_eq!(queue.dropped(), 3);
-        assert_eq!([queue.pop(Duration::ZERO), queue.pop(Duration::ZERO)], [Some((3, 1)), Some((4, 0))]);
+        assert_eq!([queue.pop(Duration::ZERO), queue.pop(Duration::ZERO)], [Some(3), Some(4)]);
         assert_eq!(queue.pop(Duration::from_millis(1)), None);
     }
 
@@ -81,6 +80,6 @@ mod tests {
         let waiting = Arc::clone(&queue);
         let thread = std::thread::spawn(move || waiting.pop(Duration::from_secs(20)));
         queue.push("here");
-        assert_eq!(thread.join().ok().flatten(), Some(("here", 0)));
+        assert_eq!(thread.join().ok().flatten(), Some("here"));
     }
 }

@@ -70,15 +70,20 @@ impl Report {
     #[must_use]
     pub fn in_words(&self) -> String {
         let mut lines = Vec::new();
-        for Sent { topic, messages, bytes, repeated, dropped } in &self.sent {
+        let sent = self.sent.iter().filter(|sent| sent.messages > 0);
+        let taken = self.taken.iter().filter(|taken| taken.messages + taken.lost + taken.refused > 0);
+        for Sent { topic, messages, bytes, repeated, dropped } in sent {
             let megabytes = *bytes as f64 * 1e-6;
             lines.push(format!(
                 "sent {topic}: {messages} messages, {megabytes:.1} MB, {repeated} again, {dropped} dropped"
             ));
         }
-        for Taken { topic, messages, lost, refused, age_us, .. } in &self.taken {
+        for Taken { topic, messages, lost, refused, age_us, .. } in taken {
             let age = age_us.map_or_else(String::new, |age| format!(", age {}", in_words(&age)));
             lines.push(format!("taken {topic}: {messages} messages, {lost} lost, {refused} refused{age}"));
+        }
+        if lines.is_empty() {
+            lines.push("nothing crossed".into());
         }
         lines.extend(self.clock.map(|clock| clock.in_words()));
         lines.push(format!("{} outages, the longest {:.1} s", self.outages, self.longest_outage));
@@ -114,7 +119,7 @@ mod tests {
         let report = Report {
             seconds: 2.0,
             sent: vec![Sent { topic: "/camera/depth", messages: 60, bytes: 36_864_000, repeated: 0, dropped: 2 }],
-            taken: vec![Taken { topic: "/arm/state", messages: 2000, age_us, ..Taken::default() }],
+            taken: vec![Taken { topic: "/arm/state", messages: 2000, age_us, ..Taken::default() }, Taken::default()],
             clock: Some(Clock { offset: -12.5, uncertainty: 45e-6, round_trips: 10, round_trip_us: age_us }),
             outages: 1,
             longest_outage: 5.25,

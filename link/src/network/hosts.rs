@@ -19,6 +19,9 @@ use zenoh::query::{ConsolidationMode, Query, QueryTarget, Queryable, Reply};
 
 /// Between two questions.
 const PERIOD: Duration = Duration::from_millis(200);
+/// The first ones follow each other faster: one of them is short, and bounds the clock well.
+const FIRST: u64 = 16;
+const FIRST_PERIOD: Duration = Duration::from_millis(10);
 /// How long an answer is waited for.
 const PATIENCE: Duration = Duration::from_millis(700);
 /// Without an answer for so long nobody is there [ns].
@@ -35,6 +38,8 @@ pub(super) struct Hosts {
     round_trips: Ages,
     answered_ns: Option<u64>,
     pub(super) outages: u64,
+    /// How often it came back.
+    pub(super) returns: u64,
     pub(super) longest_ns: u64,
     is_gone: bool,
 }
@@ -75,6 +80,7 @@ impl Hosts {
             None => Some(0),
             Some(before) if self.is_gone => {
                 self.is_gone = false;
+                self.returns += 1;
                 let away = trip.back_ns.saturating_sub(before);
                 self.longest_ns = self.longest_ns.max(away);
                 Some(away)
@@ -167,7 +173,8 @@ pub(super) fn ask(shared: &Shared, plan: &Plan) -> Result<(), LinkError> {
         if lock(&shared.hosts).has_gone(now_ns()) {
             shared.remark(EventLevel::Warning, "the other host is gone; it is looked for until Ctrl-C");
         }
-        std::thread::sleep(PERIOD);
+        let is_first = lock(&shared.hosts).clock().is_some_and(|clock| clock.round_trips < FIRST);
+        std::thread::sleep(if is_first { FIRST_PERIOD } else { PERIOD });
     }
     Ok(())
 }

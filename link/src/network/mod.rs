@@ -87,13 +87,14 @@ fn reach(settings: &Settings, stop: &AtomicBool, is_over: &impl Fn() -> bool) ->
             }
             Err(what) => what,
         };
-        let Side::Connect(endpoint) = &settings.side else { return Err(session::refused(&settings.side, what)) };
+        let endpoint = match &settings.side {
+            Side::Listen(endpoint) => return Err(session::listening_failed(endpoint, &what)),
+            Side::Connect(endpoint) => endpoint,
+        };
         if said.is_none_or(|at| at.elapsed() >= STATUS) {
             said = Some(Instant::now());
-            tracing::warn!(
-                "{endpoint} is not reached: {}; it is looked for until Ctrl-C",
-                session::cause(&what, endpoint)
-            );
+            let what = session::why_not_reached(endpoint);
+            tracing::warn!("{endpoint} is not reached: {what}; it is looked for until Ctrl-C");
         }
         let until = Instant::now() + RETRY;
         while Instant::now() < until && !is_over() {
@@ -103,7 +104,8 @@ fn reach(settings: &Settings, stop: &AtomicBool, is_over: &impl Fn() -> bool) ->
             return Ok(None);
         }
         if is_over() {
-            return Err(session::refused(&settings.side, what));
+            let what = session::why_not_reached(endpoint);
+            return Err(LinkError::NotReached { endpoint: endpoint.clone(), what });
         }
     }
 }
@@ -228,14 +230,19 @@ impl Work {
                 line = Instant::now();
                 tracing::info!("{}", self.status(shared));
             }
-            let is_silent = !self.sent.is_empty() && self.sent.iter().all(|count| lock(count).messages == 0);
-            if begin.elapsed() >= SILENCE && is_silent {
+            if begin.elapsed() >= SILENCE && self.is_silent() {
                 shared.warn_once(
                     "no program on this host publishes what is sent; start `rt_bridge run --cell cell.toml --arm sim` (a robot: --arm fci://HOST) in the same TWINALIGN_DOMAIN",
                 );
             }
         }
         Ok(())
+    }
+
+    /// Whether something is to be sent and no program here publishes any of it; what the link itself says does not count.
+    fn is_silent(&self) -> bool {
+        let mut silent = self.sent.iter().filter(|count| lock(count).topic != topics::EVENTS.name).peekable();
+        silent.peek().is_some() && silent.all(|count| lock(count).messages == 0)
     }
 
     /// One line about the last ten seconds.

@@ -3,6 +3,8 @@
 use crate::crossing::Plan;
 use crate::endpoint::Endpoint;
 use crate::{LinkError, Side};
+use std::io;
+use std::net::{TcpStream, ToSocketAddrs as _};
 use std::time::Duration;
 use zenoh::{Config, Session, Wait};
 
@@ -20,6 +22,10 @@ const BLOCK_US: u64 = 500_000;
 const LONGEST: usize = 128 << 20;
 /// How long the end of a session may take.
 const CLOSE: Duration = Duration::from_millis(300);
+
+/// How long a bare connection may take.
+const TRIAL: Duration = Duration::from_millis(400);
+const NO_ANSWER: &str = "no answer";
 
 /// Key of a topic's messages.
 pub(super) fn messages(topic: &str) -> String {
@@ -50,24 +56,35 @@ pub(super) fn close(session: Session) {
     }
 }
 
-/// Why an address cannot be listened at.
-pub(super) fn refused(side: &Side, what: String) -> LinkError {
-    match side {
-        Side::Listen(endpoint) => LinkError::Listen { endpoint: endpoint.clone(), what: cause(&what, endpoint) },
-        Side::Connect(endpoint) => LinkError::NotReached { endpoint: endpoint.clone(), what: cause(&what, endpoint) },
-    }
-}
-
-/// What the system said, out of a chain of errors that repeats the address.
-pub(super) fn cause(what: &str, endpoint: &Endpoint) -> String {
+/// Why an address cannot be listened at: what the system said, out of a chain of errors that repeats the address.
+pub(super) fn listening_failed(endpoint: &Endpoint, what: &str) -> LinkError {
     let system = what.rfind("(os error").map(|end| &what[..end]);
     let words = system.and_then(|words| words.rsplit([':', '"', '(', '[', ']']).next()).map(str::trim);
-    match words {
-        Some(words) if !words.is_empty() => words.to_owned(),
-        _ if what.contains("deadline") || what.to_lowercase().contains("timeout") => "no answer".into(),
-        _ if what.contains("Unable to connect") => "no answer".into(),
-        _ => what.replace(&endpoint.to_string(), "it").lines().next().unwrap_or("").to_owned(),
-    }
+    let what = words.filter(|words| !words.is_empty()).unwrap_or(what.lines().next().unwrap_or("")).to_owned();
+    LinkError::Listen { endpoint: endpoint.clone(), what }
+}
+
+/// Why an address is not reached: the network's library does not say, a bare connection does.
+pub(super) fn why_not_reached(endpoint: &Endpoint) -> String {
+    let (answer, answered) = std::sync::mpsc::channel();
+    let address = endpoint.address();
+    let trying = move || {
+        let reach = || {
+            let addresses: Vec<_> = address.to_socket_addrs()?.collect();
+            let first = addresses.first().ok_or_else(|| io::Error::other("the name stands for no address"))?;
+            TcpStream::connect_timeout(first, TRIAL)
+        };
+        let what = match reach() {
+            Ok(_) => "the port is open, but no link answers".to_owned(),
+            Err(error) if error.kind() == io::ErrorKind::TimedOut => NO_ANSWER.to_owned(),
+            Err(error) => error.to_string(),
+        };
+        let _nobody_waits = answer.send(what);
+    };
+    // A name server that says nothing holds up this thread alone.
+    let begun = std::thread::Builder::new().name("link trial".into()).spawn(trying);
+    let what = begun.ok().and_then(|_| answered.recv_timeout(TRIAL).ok());
+    what.unwrap_or_else(|| NO_ANSWER.into())
 }
 
 fn settings(side: &Side, plan: &Plan) -> String {

@@ -6,6 +6,7 @@ use crate::LinkError;
 use crate::crossing::Kind;
 use crate::envelope::{Envelope, NoEnvelope, VERSION};
 use crate::order::{Order, Verdict};
+use crate::pace::Pace;
 use crate::queue::Queue;
 use shared_mem::recording::{Encoded, picture_from_bytes, picture_schema, schema_checksum};
 use shared_mem::time::now_ns;
@@ -25,10 +26,6 @@ const LOOK: Duration = Duration::from_millis(200);
 const WAITING: usize = 16_384;
 /// Pictures and commands that wait for the thread.
 const WAITING_NEWEST: usize = 2;
-/// Of a backlog, so many are published at a stretch and then a tick apart: readers here keep two seconds of a stream, and
-/// are not to lose what the line brings all at once.
-const STRETCH: u32 = 16;
-const TICK: Duration = Duration::from_millis(1);
 
 /// A message as it came.
 struct Arrived {
@@ -44,8 +41,9 @@ struct Line {
     queue: Arc<Queue<Arrived>>,
     order: Order,
     asks: Publisher<'static>,
-    /// Of a backlog, published since the last tick.
-    at_a_stretch: u32,
+    pace: Pace,
+    /// How often the other host had come back when this topic was last asked for.
+    returns: u64,
     _subscriber: Subscriber<()>,
 }
 
@@ -68,18 +66,18 @@ impl Line {
             queue,
             order: Order::new(kind == Kind::State),
             asks,
-            at_a_stretch: 0,
+            pace: Pace::new(now_ns()),
+            returns: 0,
             _subscriber: subscriber,
         })
     }
 
     /// The next message that is to be published; `None` when there is none yet.
     fn next(&mut self, shared: &Shared, count: &TakenCount) -> Result<Option<(Envelope, ZBytes)>, LinkError> {
-        let Some((arrived, waiting)) = self.queue.pop(LOOK) else { return Ok(None) };
-        self.at_a_stretch = if waiting > 0 { self.at_a_stretch + 1 } else { 0 };
-        if self.at_a_stretch >= STRETCH {
-            self.at_a_stretch = 0;
-            std::thread::sleep(TICK);
+        self.ask_after_a_return(shared)?;
+        let Some(arrived) = self.queue.pop(LOOK) else { return Ok(None) };
+        if let Some(sleep) = self.pace.take(now_ns()) {
+            std::thread::sleep(sleep);
         }
         let envelope = match arrived.envelope {
             Ok(envelope) if envelope.schema == self.schema => envelope,
@@ -94,7 +92,7 @@ impl Line {
                 lock(count).taken.lost += lost;
                 return Ok(Some((envelope, arrived.message)));
             }
-            Verdict::Ask { from } => self.asks.put(from.to_le_bytes().to_vec()).wait().map_err(network)?,
+            Verdict::Ask { from } => self.ask(from)?,
             Verdict::Stranger => {
                 lock(count).taken.refused += 1;
                 shared.warn_once(&format!("two hosts send {}; the first counts: stop one of them", self.topic));
@@ -102,6 +100,19 @@ impl Line {
             Verdict::Wait | Verdict::Repeated => {}
         }
         Ok(None)
+    }
+
+    fn ask(&self, from: u64) -> Result<(), LinkError> {
+        self.asks.put(from.to_le_bytes().to_vec()).wait().map_err(network)
+    }
+
+    /// A topic that seldom says anything would not show what a cut cable swallowed until it speaks again.
+    fn ask_after_a_return(&mut self, shared: &Shared) -> Result<(), LinkError> {
+        let returns = lock(&shared.hosts).returns;
+        if std::mem::replace(&mut self.returns, returns) == returns {
+            return Ok(());
+        }
+        self.order.next().map_or(Ok(()), |from| self.ask(from))
     }
 
     fn refuse(&self, shared: &Shared, why: Option<NoEnvelope>) {

@@ -19,6 +19,8 @@ use std::time::Duration;
 ///
 /// Commands do not cross. --take-commands on the robot's host lets those in that it names, from whoever reaches the port; it is
 /// not encrypted, so open it in a network of your own or inside a tunnel. docs/link.md has more.
+///
+/// The network is an optional part of the program: one that was built without it says how to build it.
 #[derive(Debug, Args)]
 #[command(
     group(ArgGroup::new("side").required(true).args(["listen", "connect"])),
@@ -34,11 +36,11 @@ use std::time::Duration;
     round_trip_us), outages, longest_outage [s]."
 )]
 pub(super) struct LinkArguments {
-    /// Where the other host connects to; 0.0.0.0 for all addresses of this one
-    #[arg(long, value_name = "tcp/HOST:PORT")]
+    /// Address of this host that the other connects to, tcp/HOST:PORT; 0.0.0.0 for all of them
+    #[arg(long, value_name = "ADDRESS")]
     listen: Option<Endpoint>,
-    /// Where the other host listens
-    #[arg(long, value_name = "tcp/HOST:PORT")]
+    /// Address at which the other host listens, tcp/HOST:PORT
+    #[arg(long, value_name = "ADDRESS")]
     connect: Option<Endpoint>,
     /// Topics of the other host to publish here, with commas between them, or none. Default: with --connect all states and
     /// pictures of a cell, with --listen none

@@ -19,7 +19,7 @@ use zenoh::sample::Sample;
 use zenoh::{Config, Session, Wait};
 
 /// Environment variable that makes this program a peer.
-pub const ROLE: &str = "TWINALIGN_TEST_PEER";
+pub(crate) const ROLE: &str = "TWINALIGN_TEST_PEER";
 
 const STATES: &str = "bare/states";
 const DEPTH: &str = "bare/depth";
@@ -139,7 +139,7 @@ fn intrude(seconds: f64, endpoint: &str) {
 }
 
 /// Plays the part that [`ROLE`] names: `send`, `receive` or `intrude`, with seconds and address behind it.
-pub fn play(role: &str) {
+pub(crate) fn play(role: &str) {
     let words: Vec<&str> = role.split(' ').collect();
     let [verb, seconds, endpoint] = words[..] else { panic!("{role}") };
     let seconds = seconds.parse().expect("seconds");

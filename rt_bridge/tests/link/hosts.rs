@@ -9,21 +9,21 @@ use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
 /// Where links listen.
-pub const PORT: u16 = 7447;
+pub(crate) const PORT: u16 = 7447;
 
 /// Before the answer of a peer, among what a test program says.
-pub const ANSWER: &str = "answer: ";
+pub(crate) const ANSWER: &str = "answer: ";
 /// The test that plays the peers.
 const PEER: [&str; 4] = ["--exact", "peer", "--ignored", "--nocapture"];
 
 /// Two hosts; they are gone when this is dropped.
-pub struct Hosts {
+pub(crate) struct Hosts {
     robot: String,
     far: String,
     /// Domain of the robot's host.
-    pub robot_domain: String,
+    pub(crate) robot_domain: String,
     /// Domain of the other one.
-    pub far_domain: String,
+    pub(crate) far_domain: String,
 }
 
 fn ip(arguments: &[&str]) {
@@ -33,7 +33,7 @@ fn ip(arguments: &[&str]) {
 
 impl Hosts {
     /// Makes them; `name` keeps tests of one process apart.
-    pub fn new(name: &str) -> Self {
+    pub(crate) fn new(name: &str) -> Self {
         let of = |host: &str| format!("ta{host}{name}{}", std::process::id());
         let [robot, far] = [of("r"), of("f")];
         for namespace in [&robot, &far] {
@@ -50,36 +50,36 @@ impl Hosts {
     }
 
     /// An address of the robot's host.
-    pub fn robot_endpoint(&self, port: u16) -> String {
+    pub(crate) fn robot_endpoint(&self, port: u16) -> String {
         format!("tcp/10.213.7.1:{port}")
     }
 
     /// Pulls the cable out at one end, or puts it in again.
-    pub fn cable(&self, is_robots_end: bool, is_in: bool) {
+    pub(crate) fn cable(&self, is_robots_end: bool, is_in: bool) {
         let namespace = if is_robots_end { &self.robot } else { &self.far };
         ip(&["-n", namespace, "link", "set", "cable", if is_in { "up" } else { "down" }]);
     }
 
     /// Runs `rt_bridge link` on the robot's host.
-    pub fn link_on_robot(&self, arguments: &[&str]) -> Running {
+    pub(crate) fn link_on_robot(&self, arguments: &[&str]) -> Running {
         let arguments = [&["link", "--json"], arguments].concat();
         Running::start(&self.robot, &self.robot_domain, env!("CARGO_BIN_EXE_rt_bridge").as_ref(), &arguments, "")
     }
 
     /// Runs `rt_bridge link` on the other host.
-    pub fn link_on_far(&self, arguments: &[&str]) -> Running {
+    pub(crate) fn link_on_far(&self, arguments: &[&str]) -> Running {
         let arguments = [&["link", "--json"], arguments].concat();
         Running::start(&self.far, &self.far_domain, env!("CARGO_BIN_EXE_rt_bridge").as_ref(), &arguments, "")
     }
 
     /// Runs a peer on the robot's host.
-    pub fn peer_on_robot(&self, role: &str) -> Running {
+    pub(crate) fn peer_on_robot(&self, role: &str) -> Running {
         let program = std::env::current_exe().expect("this program");
         Running::start(&self.robot, &self.robot_domain, &program, &PEER, role)
     }
 
     /// Runs a peer on the other host.
-    pub fn peer_on_far(&self, role: &str) -> Running {
+    pub(crate) fn peer_on_far(&self, role: &str) -> Running {
         let program = std::env::current_exe().expect("this program");
         Running::start(&self.far, &self.far_domain, &program, &PEER, role)
     }
@@ -94,7 +94,7 @@ impl Drop for Hosts {
 }
 
 /// A program in a namespace. Dropping it kills it.
-pub struct Running {
+pub(crate) struct Running {
     child: Child,
     what: String,
 }
@@ -117,7 +117,7 @@ impl Running {
     }
 
     /// Waits for the end.
-    pub fn ended(mut self, limit: Duration) {
+    pub(crate) fn ended(mut self, limit: Duration) {
         let begin = Instant::now();
         loop {
             if let Some(status) = self.child.try_wait().expect("a child") {
@@ -130,7 +130,7 @@ impl Running {
     }
 
     /// Waits for the end and returns the JSON object.
-    pub fn answer(mut self, limit: Duration) -> Value {
+    pub(crate) fn answer(mut self, limit: Duration) -> Value {
         let mut stdout = self.child.stdout.take().expect("a pipe");
         let what = self.what.clone();
         self.ended(limit);
@@ -142,7 +142,7 @@ impl Running {
     }
 
     /// Asks a link to end, which it does within a second; returns the JSON object.
-    pub fn interrupted(self) -> Value {
+    pub(crate) fn interrupted(self) -> Value {
         ask_to_end(self.child.id()).unwrap_or_else(|e| panic!("{}: {e}", self.what));
         let begin = Instant::now();
         let answer = self.answer(Duration::from_secs(10));

@@ -13,13 +13,13 @@ use std::time::{Duration, Instant};
 const SESSION: u64 = 7;
 
 /// States at 1 kHz and depth pictures of 640 x 480 at 30 Hz, until it is stopped.
-pub struct Traffic {
+pub(crate) struct Traffic {
     stop: Arc<AtomicBool>,
     threads: Vec<JoinHandle<u64>>,
 }
 
 impl Traffic {
-    pub fn start(domain: &str, has_pictures: bool) -> Self {
+    pub(crate) fn start(domain: &str, has_pictures: bool) -> Self {
         let stop = Arc::new(AtomicBool::new(false));
         let mut threads = vec![publish(domain, &stop, states)];
         if has_pictures {
@@ -29,7 +29,7 @@ impl Traffic {
     }
 
     /// How many of each were sent.
-    pub fn stop(self) -> Vec<u64> {
+    pub(crate) fn stop(self) -> Vec<u64> {
         self.stop.store(true, Ordering::Relaxed);
         self.threads.into_iter().map(|thread| thread.join().expect("a sender")).collect()
     }
@@ -52,11 +52,15 @@ fn each(period: Duration, stop: &AtomicBool, mut send: impl FnMut(u64)) -> u64 {
     number
 }
 
+fn state(cycle: u64) -> ArmState {
+    let stamp_ns = now_ns();
+    ArmState { stamp_ns, cycle, session: SESSION, dof: 7, q: [0.5; 8], tau_J: [1.5; 8], ..ArmState::default() }
+}
+
 fn states(node: &Node, stop: &AtomicBool) -> u64 {
     let publisher = node.publisher(topics::ARM_STATE).expect("a publisher");
-    let state = ArmState { session: SESSION, dof: 7, q: [0.5; 8], tau_J: [1.5; 8], ..ArmState::default() };
     each(Duration::from_millis(1), stop, |cycle| {
-        publisher.send(&ArmState { stamp_ns: now_ns(), cycle, ..state }).expect("a state sent");
+        publisher.send(&state(cycle)).expect("a state sent");
     })
 }
 
@@ -81,35 +85,35 @@ fn pictures(node: &Node, stop: &AtomicBool) -> u64 {
 
 /// What a reader saw.
 #[derive(Debug, Default)]
-pub struct Seen {
-    pub states: u64,
+pub(crate) struct Seen {
+    pub(crate) states: u64,
     /// States that are missing between the first and the last.
-    pub gaps: u64,
+    pub(crate) gaps: u64,
     /// States that came twice or out of order.
-    pub repeats: u64,
+    pub(crate) repeats: u64,
     /// States that nobody here sent.
-    pub strangers: u64,
-    pub pictures: u64,
+    pub(crate) strangers: u64,
+    pub(crate) pictures: u64,
     /// From stamp to reading [us].
-    pub ages_us: Vec<f64>,
+    pub(crate) ages_us: Vec<f64>,
 }
 
 /// The share of values that lie below.
-pub fn percentile(values: &[f64], share: f64) -> f64 {
+pub(crate) fn percentile(values: &[f64], share: f64) -> f64 {
     let mut sorted = values.to_vec();
     sorted.sort_by(f64::total_cmp);
     sorted.get(((sorted.len() as f64 - 1.0) * share) as usize).copied().unwrap_or(f64::NAN)
 }
 
 /// A reader of a domain, on a thread of its own from the beginning.
-pub struct Reader {
+pub(crate) struct Reader {
     newest_ns: Arc<AtomicU64>,
     limit_ns: Arc<AtomicU64>,
     thread: JoinHandle<Seen>,
 }
 
 impl Reader {
-    pub fn open(domain: &str) -> Self {
+    pub(crate) fn open(domain: &str) -> Self {
         let (newest_ns, limit_ns) = (Arc::new(AtomicU64::new(0)), Arc::new(AtomicU64::new(u64::MAX)));
         let (newest, limit, domain) = (Arc::clone(&newest_ns), Arc::clone(&limit_ns), domain.to_owned());
         let thread = thread::spawn(move || {
@@ -123,7 +127,7 @@ impl Reader {
     }
 
     /// Waits until something comes.
-    pub fn wait_for_first(&mut self, patience: Duration) {
+    pub(crate) fn wait_for_first(&mut self, patience: Duration) {
         let begin = Instant::now();
         while self.newest_ns() == 0 {
             assert!(begin.elapsed() < patience, "nothing came");
@@ -132,18 +136,18 @@ impl Reader {
     }
 
     /// Reads on for so long.
-    pub fn read_for(self, time: Duration) -> Self {
+    pub(crate) fn read_for(self, time: Duration) -> Self {
         let limit = now_ns() + u64::try_from(time.as_nanos()).expect("an hour at most");
         self.limit_ns.store(limit, Ordering::Relaxed);
         self
     }
 
     /// Stamp of the newest state [ns].
-    pub fn newest_ns(&self) -> u64 {
+    pub(crate) fn newest_ns(&self) -> u64 {
         self.newest_ns.load(Ordering::Relaxed)
     }
 
-    pub fn join(self) -> thread::Result<Seen> {
+    pub(crate) fn join(self) -> thread::Result<Seen> {
         self.thread.join()
     }
 }
