@@ -86,7 +86,7 @@ fn a_minute_of_states_and_depth_crosses_whole_and_nearly_as_fast_as_zenoh_alone(
     let clock = &here["clock"];
     let (offset, bound) = (clock["offset"].as_f64().expect("s"), clock["uncertainty"].as_f64().expect("s"));
     assert!(offset.abs() <= bound && bound < 5e-3, "{clock}");
-    let bare = |of: &str| f64::max(p99(&before[of]), p99(&after[of]));
+    let bare = |of: &str| f64::min(p99(&before[of]), p99(&after[of]));
     println!(
         "states p99: link {:.0} us, bare {:.0} us; depth p99: link {:.0} us, bare {:.0} us",
         p99(states),
@@ -160,10 +160,11 @@ fn a_strangers_command_is_refused_unless_commands_are_let_in_by_name() {
         let _sent = traffic.stop();
         let (there, here) = (listen.interrupted(), connect.interrupted());
         println!("{came} targets of the stranger came\nthe robot's link: {there}\nthe other: {here}");
-        match commands {
-            None => assert_eq!(came, 0, "a stranger moved the arm"),
-            // What comes in where it is let in shows that the stranger spoke the right language.
-            Some(_) => assert!(came > 0, "{there}"),
+        assert_eq!(came, 0, "a stranger moved the arm");
+        if let Some(command) = commands {
+            // Where commands are let in they reach the link, and so the stranger spoke its language. One that answers no questions
+            // about its clock is refused all the same.
+            assert!(topic(&there, "taken", command)["refused"].as_u64() > Some(100), "{there}");
         }
         assert!(far.strangers == 0 && far.states > 3000, "{} states of a stranger of {}", far.strangers, far.states);
     }
