@@ -232,7 +232,7 @@ impl Work {
             }
             if begin.elapsed() >= SILENCE && self.is_silent() {
                 shared.warn_once(
-                    "no program on this host publishes what is sent; start `rt_bridge run --cell cell.toml --arm sim` (a robot: --arm fci://HOST) in the same TWINALIGN_DOMAIN",
+                    "no program on this host publishes what is sent; start `rt_bridge run --cell cell.toml --arm sim` (for a robot `rt_bridge run --cell cell.toml --arm fci://HOST`) in the same TWINALIGN_DOMAIN",
                 );
             }
         }
