@@ -14,6 +14,7 @@
 //! | [`engine`] | another program that simulates the arm |
 //! | [`estimate`] | fits over clips: what all clips share, what varies from clip to clip |
 //! | [`forward`] | what the twin makes of recorded clips, as residuals |
+//! | [`hand_eye`] | where a camera is mounted on an arm or beside it, from pictures of a board |
 //! | [`init`] | a cell.toml to begin with, commented |
 //! | [`identify`] | the parameters that a session tells, and what it cannot tell |
 //! | [`model`] | what was found as a model file of MuJoCo, ROS or Gazebo |
@@ -59,6 +60,7 @@ pub mod diagnose;
 pub mod engine;
 pub mod estimate;
 pub mod forward;
+pub mod hand_eye;
 pub mod identify;
 pub mod init;
 pub mod interrupt;

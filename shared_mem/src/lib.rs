@@ -13,6 +13,7 @@
 //! | [`cell`] | `cell.toml`: what the laboratory knows about its cell |
 //! | [`theta`] | `theta.toml`: what was identified, and the effects that were named |
 //! | [`frames`] | typed poses: `Pose<To, From>` |
+//! | [`hand_eye`] | `hand_eye.toml`: where a camera is mounted, and `O_T_EE` in lists of pictures |
 //! | [`input`] | the one way in for files: regular ones only, each kind up to a size |
 //! | [`output`] | files that are whole or not there: every writer but the live recorder goes through it |
 //! | [`ending`] | whether the process was asked to end |
@@ -36,6 +37,7 @@ pub mod console;
 pub mod ending;
 mod error_line;
 pub mod frames;
+pub mod hand_eye;
 pub mod input;
 pub mod msg;
 pub mod output;

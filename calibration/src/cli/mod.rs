@@ -12,6 +12,7 @@ mod evaluate;
 mod export;
 mod export_episodes;
 mod export_model;
+mod hand_eye;
 mod identify;
 mod import;
 mod init;
@@ -39,6 +40,7 @@ Examples:
   calibration identify arm session --out theta.toml --report page.html
   calibration diagnose session --report report.html
   calibration viewpoint session --out cell.toml --report outline.png
+  calibration hand-eye board --board 5x7,0.034,0.028,DICT_5X5_100 --out hand_eye.toml
   calibration import last_week --out session
   calibration init --urdf arm.urdf --out cell.toml
   calibration export session --to rosbag2 --out bags
@@ -82,6 +84,8 @@ Examples:
     Check(check::CheckArguments),
     /// Finds where the camera stands, from pictures of the robot and its joints.
     Viewpoint(Box<viewpoint::ViewpointArguments>),
+    /// Finds where a camera is mounted on the arm, or beside it, from pictures of a board.
+    HandEye(hand_eye::HandEyeArguments),
     /// Makes a session of logs of other programs: bags, data sets, tables.
     Import(import::ImportArguments),
     /// Writes a cell.toml to begin with, commented: from a URDF, a bag, recorded clips, or by questions.
@@ -158,6 +162,7 @@ fn run_to_the_end(verb: Verb, interrupt: &Interrupt) -> anyhow::Result<()> {
         }
         Verb::Check(arguments) => check::run(&arguments),
         Verb::Viewpoint(arguments) => viewpoint::run(*arguments),
+        Verb::HandEye(arguments) => hand_eye::run(arguments),
         Verb::Import(arguments) => import::run(&arguments),
         Verb::Init(arguments) => init::run(*arguments),
         Verb::Export(arguments) => export::run(&arguments),

@@ -26,6 +26,17 @@ pub struct Board {
     pub dictionary: String,
 }
 
+/// A picture read as one of the board.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Reading {
+    /// How well the board explains what is light and dark there, 1 at best.
+    pub explained: f64,
+    /// The board's frame in the camera's.
+    pub camera_from_board: Isometry3<f64>,
+    /// Corners between squares.
+    pub seen: Vec<Seen>,
+}
+
 /// Middle of a field of a marker in the board's frame [m], and whether it is light.
 type Field = ([f64; 2], bool);
 
@@ -70,31 +81,50 @@ impl Board {
     /// # Errors
     /// When no picture shows the board.
     pub fn camera_from_board(&self, pictures: &[Pixels], lens: &Lens) -> anyhow::Result<Isometry3<f64>> {
-        let mut best: Option<(f64, Isometry3<f64>)> = None;
-        let [columns, rows] = self.squares;
-        let patterns: Vec<_> =
-            [0, 1][..if rows % 2 == 0 { 2 } else { 1 }].iter().map(|black| self.fields(*black)).collect();
-        let enlarged = |picture: &Pixels| ENLARGED.map(|factor| (picture.grey(), factor));
-        for (grey, factor) in pictures.iter().flat_map(enlarged) {
-            for crossings in lattices(&grey, factor)? {
-                for seen in self.readings(&crossings) {
-                    let Some(pose) = planar::pose(&seen, lens) else { continue };
-                    for fields in &patterns {
-                        let explained = explained(fields, &grey, lens, &pose);
-                        if explained > best.map_or(EXPLAINED, |(most, _)| most) {
-                            best = Some((explained, pose));
-                        }
-                    }
-                }
+        let mut best: Option<Reading> = None;
+        for picture in pictures {
+            let found = self.seen(picture, lens)?;
+            if found.as_ref().map(|found| found.explained) > best.as_ref().map(|best| best.explained) {
+                best = found;
             }
         }
-        let (_, pose) = best.with_context(|| {
+        let [columns, rows] = self.squares;
+        let best = best.with_context(|| {
             format!(
                 "no picture shows the board of {columns} x {rows} squares with {}: check --board and the light",
                 self.dictionary
             )
         })?;
-        Ok(pose)
+        Ok(best.camera_from_board)
+    }
+
+    /// The board in a picture without distortion, as it is read best; `None` where it is not there.
+    ///
+    /// # Errors
+    /// When the picture cannot be searched.
+    pub fn seen(&self, picture: &Pixels, lens: &Lens) -> anyhow::Result<Option<Reading>> {
+        let mut best: Option<Reading> = None;
+        let patterns: Vec<_> = [0, 1][..if self.squares[1].is_multiple_of(2) { 2 } else { 1 }]
+            .iter()
+            .map(|black| self.fields(*black))
+            .collect();
+        let grey = picture.grey();
+        for factor in ENLARGED {
+            for crossings in lattices(&grey, factor)? {
+                for seen in self.readings(&crossings) {
+                    let Some(camera_from_board) = planar::pose(&seen, lens) else { continue };
+                    let explained = patterns.iter().map(|fields| explained(fields, &grey, lens, &camera_from_board));
+                    let explained = explained.fold(0.0, f64::max);
+                    // Of two lattices that fit alike, the one with more of the board's corners.
+                    let worth = |explained: f64, corners: usize| explained * (corners as f64).powf(0.1);
+                    let least = best.as_ref().map_or(0.0, |best| worth(best.explained, best.seen.len()));
+                    if explained > EXPLAINED && worth(explained, seen.len()) > least {
+                        best = Some(Reading { explained, camera_from_board, seen });
+                    }
+                }
+            }
+        }
+        Ok(best)
     }
 
     /// Every field of every marker, for a board whose first square is black (0) or white (1).
