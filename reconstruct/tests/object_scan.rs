@@ -5,7 +5,7 @@ use reconstruct::assets::{Labels, files};
 use reconstruct::field::{Field, Grid};
 use reconstruct::mesh::{Solid, surface};
 use reconstruct::object::{Object, ObjectError, Options, draw, forget, reconstruct};
-use reconstruct::scan::{Camera, Lens, Scan};
+use reconstruct::scan::{Camera, Lens, ScaleSource, Scan};
 use serde_json::json;
 use shared_mem::ending;
 use shared_mem::msg::image::PixelEncoding;
@@ -228,4 +228,35 @@ fn scans_that_cannot_be_used_are_refused_in_a_line_that_says_what_is_missing() {
         write(folder.path(), poses);
         assert!(refused(folder.path(), None).contains(what), "{what}");
     }
+}
+
+#[test]
+fn the_arms_poses_and_a_hand_eye_calibration_are_worth_those_of_the_camera() {
+    let folder = tempfile::tempdir().expect("a folder");
+    write(folder.path(), Poses::Right);
+    let given = Scan::open(folder.path()).expect("a scan");
+    let (shift, turn) = ([0.06, -0.01, 0.04], Vector3::new(0.02, -0.01, 1.57));
+    let mount = Isometry3::new(Vector3::from(shift), turn);
+    let q = mount.rotation.quaternion();
+    let file = format!(
+        "mount = \"eye_in_hand\"\n[EE_T_camera]\nposition = {shift:?}\norientation = {:?}\n",
+        [q.w, q.i, q.j, q.k]
+    );
+    std::fs::write(folder.path().join("hand_eye.toml"), file).expect("a file");
+    let path = folder.path().join("poses.json");
+    let mut list: serde_json::Value =
+        serde_json::from_str(&std::fs::read_to_string(&path).expect("a file")).expect("JSON");
+    for (frame, view) in list["frames"].as_array_mut().expect("frames").iter_mut().zip(&given.views) {
+        let end_effector = (view.scan_from_camera * mount.inverse()).to_homogeneous();
+        frame.as_object_mut().expect("a frame").remove("base_from_camera");
+        frame["O_T_EE"] = json!(end_effector.as_slice());
+    }
+    std::fs::write(&path, list.to_string()).expect("a file");
+    let held = Scan::open(folder.path()).expect("a scan");
+    for (a, b) in given.views.iter().zip(&held.views) {
+        let off = a.scan_from_camera.inverse() * b.scan_from_camera;
+        assert!(off.translation.vector.norm() < 1e-9 && off.rotation.angle() < 1e-7, "{}", a.name);
+    }
+    let scale = held.scale(None).expect("metres");
+    assert!(held.is_of_robot() && scale.metres == 1.0 && scale.source == ScaleSource::Robot);
 }

@@ -5,6 +5,7 @@
 //! | `camera` | pixels to rays and back |
 //! | `colmap` | poses and cameras out of a COLMAP model |
 //! | `transforms` | the same out of `transforms.json` and `poses.json` |
+//! | `held` | poses of a camera that a robot holds, from those of its end effector |
 //! | `frame` | the pixels of one view |
 //! | `scale` | metres for one unit of the poses |
 //! | `error` | why a scan cannot be used |
@@ -13,6 +14,7 @@ mod camera;
 mod colmap;
 mod error;
 mod frame;
+mod held;
 mod scale;
 mod transforms;
 
@@ -101,8 +103,8 @@ impl Scan {
         let mut known_depths = Vec::new();
         let (listed, depth_unit, says_metres) = match &poses {
             Poses::File(file) => {
-                let (listed, unit) = transforms::read(file)?;
-                (listed, unit, file.file_name().is_some_and(|name| name == "poses.json"))
+                let list = transforms::read(file)?;
+                (list.listed, list.depth_unit, list.of_robot)
             }
             Poses::Colmap(model) => {
                 let model = colmap::read(model)?;

@@ -1,10 +1,13 @@
 //! nerfstudio's `transforms.json`, and `poses.json` of a camera that a robot held. In the first, a camera looks along its -z and
-//! y is up (OpenGL); in the second x is right, y down, z forwards, lengths are metres and poses are `x, y, z, qw, qx, qy, qz`.
+//! y is up (OpenGL); in the second x is right, y down, z forwards, lengths are metres and poses are `x, y, z, qw, qx, qy, qz`, or
+//! those of the end effector, `O_T_EE`.
 
 use super::camera::{Camera, Lens};
 use super::error::ScanError;
+use super::held::Held;
 use nalgebra::{Isometry3, Matrix3, Matrix4, Quaternion, Rotation3, Translation3, UnitQuaternion, Vector3};
 use serde::Deserialize;
+use shared_mem::hand_eye::Matrix;
 use shared_mem::input::{self, Kind};
 use std::path::{Path, PathBuf};
 
@@ -30,6 +33,8 @@ struct File {
     #[serde(flatten)]
     camera: Numbers,
     depth_unit_scale_factor: Option<f64>,
+    /// How the camera is mounted, where frames give the end effector's pose.
+    hand_eye: Option<PathBuf>,
     frames: Vec<Frame>,
 }
 
@@ -41,6 +46,9 @@ struct Frame {
     transform_matrix: Option<[[f64; 4]; 4]>,
     /// Of `poses.json` in place of the matrix.
     base_from_camera: Option<[f64; 7]>,
+    /// And in place of both.
+    #[serde(rename = "O_T_EE")]
+    end_effector: Option<Matrix>,
     #[serde(flatten)]
     camera: Numbers,
 }
@@ -55,24 +63,44 @@ pub(crate) struct Listed {
     pub(crate) scan_from_camera: Isometry3<f64>,
 }
 
-/// The pictures and, where the file says it, metres for one count of a depth picture.
-pub(crate) fn read(path: &Path) -> Result<(Vec<Listed>, Option<f64>), ScanError> {
+/// The pictures of a file.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct List {
+    pub(crate) listed: Vec<Listed>,
+    /// Metres for one count of a depth picture, where the file says it.
+    pub(crate) depth_unit: Option<f64>,
+    /// Whether poses are a robot's: metres in its base frame.
+    pub(crate) of_robot: bool,
+}
+
+/// Reads a file and, where it gives the end effector's poses, how the camera is mounted.
+pub(crate) fn read(path: &Path) -> Result<List, ScanError> {
     let bad = |what: String| ScanError::content(path, what);
     let text = input::text(path, Kind::List)?;
     let file: File = serde_json::from_str(&text).map_err(|error| bad(format!("{error}; see docs/reconstruct.md")))?;
+    let is_held = file.frames.iter().any(|frame| frame.end_effector.is_some());
+    let held = is_held.then(|| Held::read(path, file.hand_eye.as_deref())).transpose()?;
     let listed = file.frames.iter().map(|frame| {
         let name = frame.file_path.display();
         let camera = camera(&file.camera, &frame.camera).map_err(|what| bad(format!("{name}: {what}")))?;
-        let pose = pose(frame).map_err(|what| bad(format!("{name}: {what}")))?;
+        let pose = match (&held, &frame.end_effector) {
+            (Some(held), Some(end_effector)) => held.base_from_camera(end_effector),
+            (Some(_), None) => Err("has no `O_T_EE`, as other frames do".into()),
+            (None, _) => pose(frame),
+        };
         Ok(Listed {
             picture: frame.file_path.clone(),
             mask: frame.mask_path.clone(),
             depth: frame.depth_file_path.clone(),
             camera,
-            scan_from_camera: pose,
+            scan_from_camera: pose.map_err(|what| bad(format!("{name}: {what}")))?,
         })
     });
-    Ok((listed.collect::<Result<_, ScanError>>()?, file.depth_unit_scale_factor))
+    Ok(List {
+        listed: listed.collect::<Result<_, ScanError>>()?,
+        depth_unit: file.depth_unit_scale_factor,
+        of_robot: is_held || path.file_name().is_some_and(|name| name == "poses.json"),
+    })
 }
 
 fn pose(frame: &Frame) -> Result<Isometry3<f64>, String> {
@@ -90,7 +118,7 @@ fn pose(frame: &Frame) -> Result<Isometry3<f64>, String> {
             }
             Ok(Isometry3::from_parts(Translation3::new(*x, *y, *z), UnitQuaternion::from_quaternion(turn)))
         }
-        (None, None) => Err("has neither `transform_matrix` nor `base_from_camera`".into()),
+        (None, None) => Err("has none of `transform_matrix`, `base_from_camera` and `O_T_EE`".into()),
     }
 }
 
@@ -145,7 +173,7 @@ mod tests {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("transforms.json");
         std::fs::write(&path, text).expect("a file");
-        read(&path).map(|(listed, _)| listed).map_err(|error| error.to_string())
+        read(&path).map(|list| list.listed).map_err(|error| error.to_string())
     }
 
     const HEAD: &str = r#""fl_x": 600, "w": 640, "h": 480, "k1": -0.1"#;
