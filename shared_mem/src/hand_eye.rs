@@ -166,7 +166,7 @@ impl Matrix {
         let matrix = match self {
             Self::Rows(rows) => Matrix4::from_fn(|row, column| rows[row][column]),
             // The row 0, 0, 0, 1 tells which way round; where both have it, the position is zero.
-            Self::Flat(list) if list[12..15].iter().all(|v| *v == 0.0) && list[3] + list[7] + list[11] != 0.0 => {
+            Self::Flat(list) if list[12..15] == [0.0; 3] && [list[3], list[7], list[11]] != [0.0; 3] => {
                 Matrix4::from_row_slice(list)
             }
             Self::Flat(list) => Matrix4::from_column_slice(list),

@@ -45,7 +45,6 @@ impl Held {
 #[cfg(test)]
 mod tests {
     use super::super::transforms;
-    use super::*;
 
     const MOUNT: &str =
         "mount = \"eye_in_hand\"\n[EE_T_camera]\nposition = [0.1, 0.0, 0.0]\norientation = [1.0, 0.0, 0.0, 0.0]\n";

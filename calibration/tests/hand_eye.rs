@@ -1,0 +1,105 @@
+//! `calibration hand-eye` as a program: lists of corners in, hand_eye.toml out; what cannot be used is refused in one line.
+
+use calibration::hand_eye::chain::Chain;
+use calibration::hand_eye::simulated::{World, off};
+use calibration::hand_eye::view::View;
+use rand::SeedableRng as _;
+use rand_pcg::Pcg64;
+use serde_json::{Value, json};
+use shared_mem::hand_eye::{HandEye, Mount};
+use std::path::Path;
+use std::process::{Command, Output};
+
+const WORLD: World =
+    World { mount: Mount::EyeInHand, views: 12, pixel: 0.1, arm: [1e-3, 0.5e-3], turns: [0.5, 0.5, 1.0] };
+
+/// The list of a world's pictures, corners in place of pixels.
+fn list(views: &[View]) -> Value {
+    let frame = |view: &View| {
+        let points: Vec<[f64; 4]> =
+            view.seen.iter().map(|s| [s.place[0], s.place[1], s.pixel[0] + 0.5, s.pixel[1] + 0.5]).collect();
+        let matrix = view.base_from_end_effector.to_homogeneous();
+        json!({ "file_path": view.name, "O_T_EE": matrix.as_slice(), "points": points })
+    };
+    let lens = views[0].lens;
+    json!({
+        "fl_x": lens.focal[0], "fl_y": lens.focal[1], "cx": lens.centre[0] + 0.5, "cy": lens.centre[1] + 0.5,
+        "frames": views.iter().map(frame).collect::<Vec<_>>(),
+    })
+}
+
+fn drawn(world: &World) -> (Chain, Vec<View>) {
+    world.draw(&mut Pcg64::seed_from_u64(5))
+}
+
+fn hand_eye(folder: &Path, list: &Value, more: &[&str]) -> Output {
+    std::fs::write(folder.join("poses.json"), list.to_string()).expect("a file");
+    let out = folder.join("hand_eye.toml");
+    Command::new(env!("CARGO_BIN_EXE_calibration"))
+        .arg("hand-eye")
+        .arg(folder)
+        .args(["--json", "--out"])
+        .arg(out)
+        .args(more)
+        .output()
+        .expect("the program runs")
+}
+
+/// The line of a refusal.
+fn refused(output: &Output) -> String {
+    assert_eq!(output.status.code(), Some(1), "{output:?}");
+    let said = String::from_utf8_lossy(&output.stderr).trim_end().to_owned();
+    assert!(!said.contains('\n'), "{said}");
+    said
+}
+
+#[test]
+fn corners_of_another_detector_give_the_mount_and_its_file() {
+    let folder = tempfile::tempdir().expect("a folder");
+    for (mount, more) in [(Mount::EyeInHand, &[][..]), (Mount::FixedCamera, &["--fixed-camera", "--force"][..])] {
+        let (truth, mut views) = drawn(&World { mount, ..WORLD });
+        let wrong = views[6].base_from_end_effector;
+        views[3].base_from_end_effector = wrong;
+        let output = hand_eye(folder.path(), &list(&views), more);
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        let answer: Value = serde_json::from_slice(&output.stdout).expect("JSON");
+        assert_eq!(answer["residual"]["left_out"], json!(["003.png"]), "{answer}");
+        let file = HandEye::read(&folder.path().join("hand_eye.toml")).expect("the file");
+        let pose = [file.EE_T_camera, file.O_T_camera][usize::from(mount == Mount::FixedCamera)].expect("a mount");
+        let off = off(&pose.isometry().expect("a pose"), &truth.camera);
+        assert!(off[..3].iter().all(|turn| turn.abs() < 5e-3) && off[3..].iter().all(|m| m.abs() < 5e-3), "{off:?}");
+        let left = file.residual.expect("what is left");
+        assert!(left.held_out_px > left.corner_sigma_px && left.held_out_px < 8.0 && left.pictures == 11, "{left:?}");
+        assert!(pose.covariance.is_some() && answer["not_identifiable"] == json!([]));
+    }
+}
+
+#[test]
+fn what_gives_no_mount_is_said_in_one_line_and_nothing_is_written() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let (_, views) = drawn(&World { turns: [0.0, 0.0, 1.0], ..WORLD });
+    let said = hand_eye(folder.path(), &list(&views), &[]);
+    let answer: Value = serde_json::from_slice(&said.stdout).expect("JSON");
+    assert!(answer["not_identifiable"][0]["parameter"].as_str().is_some_and(|what| what.contains("shift along")));
+    assert!(refused(&said).contains("one axis") && !folder.path().join("hand_eye.toml").exists());
+    let (_, views) = drawn(&WORLD);
+    let few = refused(&hand_eye(folder.path(), &list(&views[..2]), &[]));
+    assert!(few.contains("2 pictures"), "{few}");
+    let whole = list(&views);
+    type Damage = fn(&mut Value);
+    let cases: [(Damage, &str); 5] = [
+        (|list| drop(list["frames"][2].as_object_mut().expect("a frame").remove("O_T_EE")), "O_T_EE"),
+        (|list| list["frames"][2]["O_T_EE"][0] = json!(3.0), "no pose"),
+        (|list| drop(list.as_object_mut().expect("a list").remove("fl_x")), "no intrinsics"),
+        (|list| drop(list["frames"][2].as_object_mut().expect("a frame").remove("points")), "012.png"),
+        (|list| list["frames"] = json!(7), "docs/hand_eye.md"),
+    ];
+    for (damage, what) in cases {
+        let mut list = whole.clone();
+        list["frames"][2]["file_path"] = json!("012.png");
+        damage(&mut list);
+        let said = refused(&hand_eye(folder.path(), &list, &[]));
+        assert!(said.contains(what), "{what}: {said}");
+    }
+    assert!(!folder.path().join("hand_eye.toml").exists());
+}
