@@ -33,7 +33,11 @@ const SPOKEN_BY: [(&str, &[&str]); 12] = [
     ("calibration/src/init/", &["calibration init"]),
     ("import/src/", &["calibration import"]),
     ("calibration/src/viewpoint/", &["calibration viewpoint"]),
-    ("calibration/src/capture/", &["calibration capture excitation", "calibration capture control-hit-slide"]),
+    ("calibration/src/hand_eye/", &["calibration hand-eye"]),
+    (
+        "calibration/src/capture/",
+        &["calibration capture excitation", "calibration capture control-hit-slide", "calibration capture scan"],
+    ),
     ("calibration/src/demo/", &["calibration demo"]),
     ("rt_bridge/src/run/", &["rt_bridge run"]),
     ("rt_bridge/src/serve/", &["rt_bridge serve"]),

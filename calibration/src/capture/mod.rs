@@ -3,12 +3,13 @@
 //! Planning is pure: [`plan`] for excitation on a [`shape`] ([`multisine`], [`chirp`], [`ramp`], [`hold`], built of [`jet`]s), or on a clip that was [`recorded`], at a [`pace`], [`program`], [`staged`], [`stroke`] and [`way`] for Control-Hit-Slide on
 //! [`line`] and [`transit`], both within [`limits`] of the [`body`]. Playing goes through shared memory only ([`stream`],
 //! [`link`], [`object_watch`]), with [`placing`] where the object has to stand somewhere and [`recovery`] where the robot stops itself; recording is a process beside us ([`recorder`]). [`excitation`] and [`control_hit_slide`] are the
-//! verbs that bind them, and [`task`] is what both are asked for.
+//! verbs that bind them, and [`task`] is what both are asked for. [`scan`] carries a camera around a point: [`dome`] plans its views, [`shots`] takes the pictures.
 
 pub mod body;
 pub mod bridge;
 pub mod chirp;
 pub mod control_hit_slide;
+pub mod dome;
 pub mod excess;
 pub mod excitation;
 pub mod hold;
@@ -28,8 +29,10 @@ pub mod ramp;
 pub mod recorded;
 pub mod recorder;
 pub mod recovery;
+pub mod scan;
 pub mod session;
 pub mod shape;
+pub mod shots;
 pub mod staged;
 pub mod stream;
 pub mod stroke;

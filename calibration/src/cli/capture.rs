@@ -4,12 +4,12 @@ use super::print;
 use calibration::capture::control_hit_slide::Series;
 use calibration::capture::shape::Kind;
 use calibration::capture::task::Task;
-use calibration::capture::{control_hit_slide, excitation, ramp};
+use calibration::capture::{control_hit_slide, excitation, ramp, scan};
 use calibration::interrupt::Interrupt;
 use calibration::keys::Keys;
 use clap::{Subcommand, ValueEnum as _};
 use shared_mem::output::Destination;
-use shared_mem::quantity::number;
+use shared_mem::quantity::{number, numbers};
 use std::path::PathBuf;
 
 #[derive(Debug, Subcommand)]
@@ -18,6 +18,8 @@ pub(super) enum Capture {
     Excitation(ExcitationArguments),
     /// The tool runs up to the object, hits it and lets it slide: what identifying the object and diagnosing contact need.
     ControlHitSlide(StrokeArguments),
+    /// A camera on the arm goes around a point and takes pictures of it: a scan for `twin reconstruct`.
+    Scan(ScanArguments),
 }
 
 /// What every capture is asked for.
@@ -256,6 +258,7 @@ pub(super) fn run(capture: Capture, interrupt: &Interrupt) -> anyhow::Result<()>
     match capture {
         Capture::Excitation(arguments) => excite(arguments, interrupt),
         Capture::ControlHitSlide(arguments) => strike(arguments, interrupt),
+        Capture::Scan(arguments) => look(arguments, interrupt),
     }
 }
 
@@ -294,5 +297,62 @@ fn strike(arguments: StrokeArguments, interrupt: &Interrupt) -> anyhow::Result<(
         Some(file) => format!("the next stroke is drawn in {}", file.display()),
         None => format!("{}: {kept} of {} clips kept", summary.session.display(), summary.clips.len()),
     };
+    print(json, &summary, words)
+}
+
+#[derive(Debug, clap::Args)]
+#[command(after_help = "\
+The bridge has to publish pictures of a camera on the arm: start it with --camera. The
+arm stops at each view, waits until it is at rest, and keeps colour and, where there is
+any, depth of one moment with O_T_EE. Views lie on a dome around --at, those that are
+reached inside the joints' limits, above the table, and with flange, tool and camera at
+least half the distance away from --at; of the rest of the arm and of other things in
+the cell it knows nothing. At any moment p pauses, and q or Ctrl-C ends; what was taken
+is kept.
+
+Examples:
+  calibration capture scan --cell lab/cell.toml --hand-eye hand_eye.toml --at 0.5,0,0.05 --out scan
+  calibration capture scan --cell lab/cell.toml --hand-eye hand_eye.toml --at 0.5,0,0.05 --distance 0.3 --views 60 --out scan")]
+pub(super) struct ScanArguments {
+    /// What the laboratory knows about its cell.
+    #[arg(long, value_name = "CELL.TOML")]
+    cell: PathBuf,
+    /// How the camera is mounted, as `calibration hand-eye` writes it.
+    #[arg(long, value_name = "HAND_EYE.TOML")]
+    hand_eye: PathBuf,
+    /// What is looked at, in the base frame [m].
+    #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true, value_parser = |text: &str| numbers::<3>(text, -3.0..=3.0, "m"))]
+    at: [f64; 3],
+    /// From the camera to it [m].
+    #[arg(long, value_name = "M", default_value_t = 0.35, value_parser = |text: &str| number(text, 0.1..=1.5, "m"))]
+    distance: f64,
+    /// Views, 8 to 200; fewer where not as many are within reach.
+    #[arg(long, value_name = "N", default_value_t = 40, value_parser = clap::value_parser!(u8).range(8..=200))]
+    views: u8,
+    /// The scan's folder; new.
+    #[arg(long, value_name = "SCAN")]
+    out: PathBuf,
+    /// Arm for the bridge that is started when none runs: sim or fci://HOST [default: sim].
+    #[arg(long)]
+    arm: Option<String>,
+    /// Whether that bridge refuses to run without real-time guarantees: enforce or ignore [default: the bridge's own].
+    #[arg(long, value_parser = ["enforce", "ignore"])]
+    realtime: Option<String>,
+    /// Prints one JSON object on stdout at the end.
+    #[arg(long)]
+    json: bool,
+}
+
+fn look(arguments: ScanArguments, interrupt: &Interrupt) -> anyhow::Result<()> {
+    let ScanArguments { cell, hand_eye, at, distance, views, out, arm, realtime, json } = arguments;
+    let views = usize::from(views);
+    let options = scan::Options { cell, hand_eye, at, distance, views, out, arm, realtime, domain: None };
+    let summary = scan::capture(&options, interrupt)?;
+    let left = match summary.without_way {
+        0 => String::new(),
+        count => format!("; {count} views were left out, to which no way leads"),
+    };
+    let words =
+        format!("{}: {} pictures, {} with depth{left}", summary.scan.display(), summary.pictures, summary.with_depth);
     print(json, &summary, words)
 }

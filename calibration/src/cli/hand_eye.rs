@@ -26,9 +26,9 @@ pub(super) struct HandEyeArguments {
     /// Folder of pictures of the board, a session, or a clip.
     #[arg(value_name = "FOLDER|SESSION|CLIP")]
     target: PathBuf,
-    /// The ChArUco board as OpenCV draws it, lengths in metres, for example 5x7,0.034,0.028,DICT_5X5_100; not needed where
+    /// The ChArUco board as OpenCV draws it: COLUMNSxROWS,SQUARE,MARKER,DICTIONARY, lengths in metres, for example 5x7,0.034,0.028,DICT_5X5_100; not needed where
     /// poses.json holds its corners.
-    #[arg(long, value_name = "COLUMNSxROWS,SQUARE,MARKER,DICTIONARY", value_parser = Board::parse)]
+    #[arg(long, value_name = "BOARD", value_parser = Board::parse)]
     board: Option<Board>,
     /// The camera stands beside the robot, and the board is in the arm's hand.
     #[arg(long)]

@@ -62,7 +62,8 @@ enum Verb {
         after_help = "\
 Examples:
   calibration capture excitation --cell config/fr3_cell.toml --clips 8 --out session
-  calibration capture control-hit-slide --cell config/fr3_cell.toml --clips 12 --out strokes"
+  calibration capture control-hit-slide --cell config/fr3_cell.toml --clips 12 --out strokes
+  calibration capture scan --cell lab/cell.toml --hand-eye hand_eye.toml --at 0.5,0,0.05 --out scan"
     )]
     Capture(capture::Capture),
     /// Finds the parameters of controller or object from a session, with intervals, and says which are not identifiable.

@@ -1,0 +1,163 @@
+//! Views of a point from a dome above it, by a camera on the arm: where the camera stands, which joints bring it there, and calm
+//! ways between. Pure. Base frame; m, rad.
+
+use super::body::Body;
+use super::limits::first_excess;
+use super::transit;
+use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, UnitQuaternion, Vector3};
+use shared_mem::msg::Joints;
+use shared_mem::msg::motion::SetPoint;
+use std::f64::consts::TAU;
+use twin::arm::JointLimits;
+
+/// What is looked at, and from how far.
+#[derive(Debug, Clone, Copy)]
+pub struct Dome {
+    /// The point [m].
+    pub at: Point3<f64>,
+    /// From the camera to it [m].
+    pub distance: f64,
+    /// How the camera is mounted on the flange.
+    pub flange_from_camera: Isometry3<f64>,
+    /// Height that flange, tool and camera stay above [m].
+    pub floor: f64,
+}
+
+/// Lowest and highest elevation of the camera above the point's level [rad].
+const ELEVATIONS: [f64; 2] = [0.2, 1.45];
+/// Places that are tried for each that is wanted: most lie behind the object or too low.
+const TRIED: usize = 6;
+/// Turns of the camera about its own axis that are tried.
+const ROLLS: usize = 12;
+/// Joints stay this far inside their stops [rad].
+const MARGIN: f64 = 0.05;
+/// Flange, tool and camera stay this share of the distance away from the point.
+const AWAY: f64 = 0.5;
+/// Set points between two looks at how near the arm is.
+const LOOK: usize = 20;
+
+/// A camera at `from` that looks at `at`, its rows level but for a `roll` about its own axis.
+#[must_use]
+pub fn looking(from: &Point3<f64>, at: &Point3<f64>, roll: f64) -> Isometry3<f64> {
+    let forwards = (at - from).normalize();
+    let right = forwards.cross(&Vector3::z());
+    let right = if right.norm() > 1e-6 { right.normalize() } else { Vector3::y() };
+    let turn = Rotation3::from_matrix_unchecked(Matrix3::from_columns(&[right, forwards.cross(&right), forwards]));
+    let roll = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), roll);
+    Isometry3::from_parts((*from).into(), UnitQuaternion::from_rotation_matrix(&turn) * roll)
+}
+
+impl Dome {
+    /// Joints of at most `wanted` views spread over the dome, of those that are reached inside every limit.
+    #[must_use]
+    pub fn views(&self, body: &Body, limits: &[JointLimits], start: &Joints, wanted: usize) -> Vec<Joints> {
+        let reached = self.places(TRIED * wanted).filter_map(|place| {
+            let joints =
+                (0..ROLLS).filter_map(|k| self.reach(body, limits, start, &place, TAU * k as f64 / ROLLS as f64));
+            let joints = joints.min_by(|a, b| apart(a, start).total_cmp(&apart(b, start)))?;
+            Some((place, joints))
+        });
+        let mut reached: Vec<(Point3<f64>, Joints)> = reached.collect();
+        let mut chosen: Vec<(Point3<f64>, Joints)> = Vec::new();
+        // One after the other the place that is furthest from all before.
+        while chosen.len() < wanted && !reached.is_empty() {
+            let lonely =
+                |place: &Point3<f64>| chosen.iter().map(|(c, _)| (c - place).norm()).fold(f64::INFINITY, f64::min);
+            let furthest = (0..reached.len()).max_by(|a, b| lonely(&reached[*a].0).total_cmp(&lonely(&reached[*b].0)));
+            let Some(furthest) = furthest else { break };
+            chosen.push(reached.swap_remove(furthest));
+        }
+        chosen.into_iter().map(|(_, joints)| joints).collect()
+    }
+
+    /// Places spread evenly over the dome, along a spiral.
+    fn places(&self, count: usize) -> impl Iterator<Item = Point3<f64>> + '_ {
+        let [low, high] = ELEVATIONS.map(f64::sin);
+        (0..count).map(move |k| {
+            let z = low + (high - low) * (k as f64 + 0.5) / count as f64;
+            let (sin, cos) = (k as f64 * TAU * 0.381_966_011_250_105).sin_cos();
+            let level = (1.0 - z * z).sqrt();
+            self.at + self.distance * Vector3::new(level * cos, level * sin, z)
+        })
+    }
+
+    fn reach(
+        &self,
+        body: &Body,
+        limits: &[JointLimits],
+        start: &Joints,
+        place: &Point3<f64>,
+        roll: f64,
+    ) -> Option<Joints> {
+        let target = looking(place, &self.at, roll);
+        let joints = body.model().reach(start, &self.flange_from_camera, &target)?;
+        let inside = limits.iter().zip(&joints).all(|(l, q)| (l.q_min + MARGIN..=l.q_max - MARGIN).contains(q));
+        (inside && self.is_free(body, &joints)).then_some(joints)
+    }
+
+    /// Whether flange, tool and camera are above the floor and away from the object.
+    fn is_free(&self, body: &Body, q: &Joints) -> bool {
+        let flange = body.model().flange(q).isometry();
+        let camera = flange * Point3::from(self.flange_from_camera.translation.vector);
+        let tool = body.model().tool_length();
+        let away = [0.0, 0.5, 1.0].map(|share| (flange * Point3::new(0.0, 0.0, share * tool) - self.at).norm());
+        let away = away.into_iter().fold((camera - self.at).norm(), f64::min);
+        body.lowest_point(q) >= self.floor && camera.z >= self.floor && away >= AWAY * self.distance
+    }
+
+    /// From rest to rest inside every limit, above the floor and away from the object; `None` where the straight way is not.
+    #[must_use]
+    pub fn way(&self, body: &Body, limits: &[JointLimits], from: &Joints, to: &Joints) -> Option<Vec<SetPoint>> {
+        let way = transit::plan(from, to, limits, 1.0)?;
+        let free = way.iter().step_by(LOOK).chain(way.last()).all(|point| self.is_free(body, &point.q_d));
+        (free && first_excess(&way, limits, Some(body)).is_none()).then_some(way)
+    }
+}
+
+/// How far joints are from one another [rad].
+#[must_use]
+pub fn apart(a: &Joints, b: &Joints) -> f64 {
+    a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::capture::limits;
+    use shared_mem::cell::Cell;
+
+    fn arm() -> (Body, Vec<JointLimits>) {
+        let text = include_str!("../../../config/fr3_cell.toml");
+        let cell: Cell = shared_mem::toml_file::parse(text, "fr3_cell.toml".as_ref()).expect("the shipped file");
+        let body = Body::of(&cell).expect("the shipped cell has an arm");
+        let limits = limits::of(&cell, &body);
+        (body, limits)
+    }
+
+    #[test]
+    fn views_look_at_the_point_from_all_sides_that_the_arm_reaches() {
+        let (body, limits) = arm();
+        let mount = Isometry3::new(Vector3::new(0.06, 0.0, 0.03), Vector3::new(0.0, 0.0, 1.57));
+        let at = Point3::new(0.5, 0.0, 0.05);
+        let dome = Dome { at, distance: 0.35, flange_from_camera: mount, floor: 0.05 };
+        let start = *body.model().ready();
+        let views = dome.views(&body, &limits, &start, 20);
+        assert!(views.len() >= 12, "{} views", views.len());
+        let mut headings = Vec::new();
+        for q in &views {
+            let camera = body.model().flange(q).isometry() * mount;
+            let seen = camera.inverse() * at;
+            assert!(seen.x.abs() < 1e-6 && seen.y.abs() < 1e-6 && (seen.z - 0.35).abs() < 1e-6, "{seen}");
+            assert!(limits.iter().zip(q).all(|(limit, q)| limit.q_min < *q && *q < limit.q_max));
+            assert!(body.lowest_point(q) >= 0.05);
+            headings.push((camera.translation.y - at.y).atan2(camera.translation.x - at.x));
+        }
+        headings.sort_by(f64::total_cmp);
+        assert!(headings[headings.len() - 1] - headings[0] > 2.0, "{headings:?}");
+        let ways = views.windows(2).filter(|pair| dome.way(&body, &limits, &pair[0], &pair[1]).is_some()).count();
+        assert!(ways > 0, "no two of them are joined");
+        // A point behind the base's back, and out of reach.
+        let far = Dome { at: Point3::new(3.0, 0.0, 0.0), ..dome };
+        assert!(far.views(&body, &limits, &start, 5).is_empty());
+    }
+}

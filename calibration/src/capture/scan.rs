@@ -1,0 +1,232 @@
+//! The verb `capture scan`: the arm carries the camera around a point, stops at each view, and what is seen there goes with the
+//! arm's pose into a folder that `twin reconstruct` takes.
+
+use super::body::Body;
+use super::bridge::{Bridge, Wanted};
+use super::dome::{Dome, apart};
+use super::limits;
+use super::link::Link;
+use super::shots::{Pixels, Shot, ShotError, Shots};
+use super::stream::{Motion, Outcome, play};
+use super::task::cause;
+use crate::interrupt::Interrupt;
+use anyhow::{Context as _, ensure};
+use nalgebra::{Isometry3, Point3};
+use serde::Serialize;
+use serde_json::{Value, json};
+use shared_mem::cell::{Cell, Intrinsics};
+use shared_mem::hand_eye::{HandEye, Matrix};
+use shared_mem::msg::Joints;
+use shared_mem::msg::motion::SetPoint;
+use shared_mem::output;
+use shared_mem::progress::Progress;
+use shared_mem::recording::pack_picture;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+use twin::arm::JointLimits;
+
+/// What is asked for.
+#[derive(Debug, Clone)]
+pub struct Options {
+    /// The laboratory's cell.toml.
+    pub cell: PathBuf,
+    /// How the camera is mounted.
+    pub hand_eye: PathBuf,
+    /// What is looked at: base frame [m].
+    pub at: [f64; 3],
+    /// From the camera to it [m].
+    pub distance: f64,
+    /// Views.
+    pub views: usize,
+    /// The scan's folder; new.
+    pub out: PathBuf,
+    /// Arm of a bridge that has to be started, as `rt_bridge run --arm` takes it.
+    pub arm: Option<String>,
+    /// Whether that bridge insists on real time, as `rt_bridge run --realtime` takes it; default: the bridge's own.
+    pub realtime: Option<String>,
+    /// Shared-memory domain; default: the one this process was started in.
+    pub domain: Option<String>,
+}
+
+/// What was done.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Summary {
+    /// The scan's folder.
+    pub scan: PathBuf,
+    /// Pictures in it.
+    pub pictures: usize,
+    /// Of these with depth.
+    pub with_depth: usize,
+    /// Views within reach of which no way inside every limit was found.
+    pub without_way: usize,
+    /// Whether the user ended it early.
+    pub interrupted: bool,
+    /// Whether the bridge was started, and ended, by this run.
+    pub own_bridge: bool,
+}
+
+/// Fewer views make no scan.
+const FEWEST: usize = 8;
+/// Flange, tool and camera stay this far above the table [m].
+const CLEARANCE: f64 = 0.05;
+/// From the middle of a pixel to the corner that lists of pictures count from.
+const HALF: f64 = 0.5;
+
+/// Everything that stays the same from view to view.
+struct Desk<'a> {
+    options: &'a Options,
+    body: Body,
+    limits: Vec<JointLimits>,
+    list: Value,
+    shots: Shots,
+    interrupt: &'a Interrupt,
+}
+
+/// Captures the scan until all views are there or the user ends it.
+///
+/// # Errors
+/// One line with what happened and what to do; pictures that were complete before are in the folder.
+pub fn capture(options: &Options, interrupt: &Interrupt) -> anyhow::Result<Summary> {
+    let cell = Cell::read(&options.cell)?;
+    let body = Body::of(&cell)?;
+    ensure!(
+        body.model().has_geometry(),
+        "cell.toml gives no robot.model or robot.urdf: without it no view can be planned"
+    );
+    let hand_eye = HandEye::read(&options.hand_eye)?;
+    let mount = hand_eye.end_effector_from_camera();
+    let mount = mount.map_err(|what| anyhow::anyhow!("{} {what}", options.hand_eye.display()))?;
+    let list = list(&cell, &hand_eye)?;
+    let list_file = options.out.join("poses.json");
+    ensure!(!list_file.exists(), "{} holds a scan already; give a new folder with --out", options.out.display());
+    let latency = Duration::from_secs_f64(cell.camera.as_ref().map_or(0.0, |camera| camera.latency.max(0.0)));
+    let mut link = Link::open(options.domain.as_deref())?;
+    let (arm, realtime) = (options.arm.as_deref(), options.realtime.as_deref());
+    let wanted = Wanted { cell: &options.cell, arm, realtime, domain: options.domain.as_deref() };
+    let mut bridge = Bridge::find_or_start(&mut link, &wanted, interrupt)?;
+    let shots = Shots::open(options.domain.as_deref(), latency)?;
+    let limits = limits::of(&cell, &body);
+    let mut desk = Desk { options, body, limits, list, shots, interrupt };
+    let floor = cell.table.as_ref().map_or(f64::NEG_INFINITY, |table| table.height + CLEARANCE);
+    let done = desk.all_views(&mut link, &mount, floor, &hand_eye);
+    let summary = done.map_err(|error| cause(error, &mut bridge))?;
+    let own_bridge = bridge.is_own();
+    bridge.stop()?;
+    Ok(Summary { own_bridge, ..summary })
+}
+
+/// The list of pictures without pictures: the camera's numbers.
+fn list(cell: &Cell, hand_eye: &HandEye) -> anyhow::Result<Value> {
+    let of_cell = cell.camera.as_ref().map(|camera| (camera.pinhole(), camera.distortion));
+    let calibrated = hand_eye.camera.map(|camera| (camera.intrinsics, camera.distortion));
+    let (Intrinsics { fx, fy, cx, cy }, [k1, k2, p1, p2, k3]) =
+        calibrated.or(of_cell).context("no intrinsics: neither hand_eye.toml nor cell.toml has a `[camera]`")?;
+    ensure!(
+        k3 == 0.0,
+        "the lens has a k3 of {k3}, which `twin reconstruct` does not know: calibrate the camera without k3, and the mount again"
+    );
+    Ok(json!({
+        "fl_x": fx, "fl_y": fy, "cx": cx + HALF, "cy": cy + HALF,
+        "k1": k1, "k2": k2, "p1": p1, "p2": p2, "frames": [],
+    }))
+}
+
+impl Desk<'_> {
+    fn all_views(
+        &mut self,
+        link: &mut Link,
+        mount: &Isometry3<f64>,
+        floor: f64,
+        hand_eye: &HandEye,
+    ) -> anyhow::Result<Summary> {
+        let Options { at, distance, views, out, .. } = self.options;
+        let state = link.ready_arm(self.limits.len())?;
+        // A robot may report another end effector than the flange.
+        let reported = Matrix::Flat(state.O_T_EE).isometry().map_err(anyhow::Error::msg)?;
+        let flange = self.body.model().flange(&state.q).isometry();
+        let flange_from_camera = flange.inverse() * reported * mount;
+        let dome = Dome { at: Point3::from(*at), distance: *distance, flange_from_camera, floor };
+        let mut open = dome.views(&self.body, &self.limits, &state.q_d, *views);
+        let [x, y, z] = at;
+        ensure!(
+            open.len() >= FEWEST,
+            "of the views around {x}, {y}, {z} m only {} are within the arm's reach: move the object nearer, or give another --distance",
+            open.len()
+        );
+        for part in ["images", "depth"] {
+            std::fs::create_dir_all(out.join(part))
+                .with_context(|| format!("cannot make {}; give another folder with --out", out.join(part).display()))?;
+        }
+        output::write(&out.join("hand_eye.toml"), hand_eye.to_toml())?;
+        let progress = Progress::new("views", open.len() as u64);
+        let mut summary = Summary {
+            scan: out.clone(),
+            pictures: 0,
+            with_depth: 0,
+            without_way: 0,
+            interrupted: false,
+            own_bridge: false,
+        };
+        while !open.is_empty() && !self.interrupt.asked() {
+            self.interrupt.wait_out_pause();
+            progress.show(summary.pictures as u64, "");
+            let from = link.ready_arm(self.limits.len())?.q_d;
+            let Some((next, way)) = self.nearest(&dome, &from, &open) else {
+                summary.without_way = open.len();
+                break;
+            };
+            match play(link, Motion { set_points: &way, dof: self.limits.len() }, self.interrupt, |_| {})? {
+                Outcome::Done => {}
+                Outcome::Paused => continue,
+                Outcome::Stopped => break,
+                Outcome::Reflex => {
+                    anyhow::bail!("{}; recover the robot, then start again with a new folder", link.reason()?)
+                }
+            }
+            open.swap_remove(next);
+            match self.shots.take(link, self.interrupt) {
+                Ok(shot) => {
+                    self.keep(summary.pictures, &shot)?;
+                    summary.pictures += 1;
+                    summary.with_depth += usize::from(shot.depth.is_some());
+                }
+                Err(ShotError::Interrupted) => break,
+                Err(error) => return Err(error.into()),
+            }
+        }
+        summary.interrupted = self.interrupt.asked();
+        Ok(summary)
+    }
+
+    /// The nearest of the open views that a way leads to.
+    fn nearest(&self, dome: &Dome, from: &Joints, open: &[Joints]) -> Option<(usize, Vec<SetPoint>)> {
+        let mut order: Vec<usize> = (0..open.len()).collect();
+        order.sort_by(|a, b| apart(from, &open[*a]).total_cmp(&apart(from, &open[*b])));
+        order.into_iter().find_map(|k| Some((k, dome.way(&self.body, &self.limits, from, &open[k])?)))
+    }
+
+    /// Writes the pictures, then the list with them in it: what it names is there.
+    fn keep(&mut self, number: usize, shot: &Shot) -> anyhow::Result<()> {
+        let name = format!("{number:03}.png");
+        write(&self.options.out.join("images").join(&name), &shot.colour)?;
+        let mut frame = json!({ "file_path": format!("images/{name}"), "O_T_EE": shot.state.O_T_EE });
+        if let Some(depth) = &shot.depth {
+            write(&self.options.out.join("depth").join(&name), depth)?;
+            frame["depth_file_path"] = json!(format!("depth/{name}"));
+            self.list["depth_unit_scale_factor"] = json!(depth.header.depth_scale);
+        }
+        (self.list["w"], self.list["h"]) = (json!(shot.colour.header.width), json!(shot.colour.header.height));
+        if let Some(frames) = self.list["frames"].as_array_mut() {
+            frames.push(frame);
+        }
+        let text = serde_json::to_string_pretty(&self.list)?;
+        Ok(output::write(&self.options.out.join("poses.json"), text)?)
+    }
+}
+
+fn write(path: &Path, pixels: &Pixels) -> anyhow::Result<()> {
+    let header = &pixels.header;
+    let packed = pack_picture(header.encoding, header.width, header.height, &pixels.bytes);
+    let packed = packed.map_err(|what| anyhow::anyhow!("{}: {what}", path.display()))?;
+    Ok(output::write(path, packed)?)
+}
