@@ -29,7 +29,7 @@ const OF_OTHERS: [&str; 10] = [
     "open-mode",
 ];
 /// A folder of the sources, and the verbs of which one must have the flags that its messages name.
-const SPOKEN_BY: [(&str, &[&str]); 12] = [
+const SPOKEN_BY: [(&str, &[&str]); 13] = [
     ("calibration/src/init/", &["calibration init"]),
     ("import/src/", &["calibration import"]),
     ("calibration/src/viewpoint/", &["calibration viewpoint"]),
