@@ -63,6 +63,8 @@ pub const FEWEST: usize = 3;
 const IMPROBABLE: f64 = 0.01;
 /// A mount less certain than this is not identified: a ruler and a protractor do as well [m, rad].
 const LIMIT: [f64; 2] = [0.01, 0.035];
+/// Turns that are spread by less than this about a second axis are about one axis, of a hand that is not quite steady [rad].
+const LEAST_TURN: f64 = 0.05;
 /// A turn by this counts as much as a shift by one [rad/m].
 const LEVER: f64 = 0.5;
 /// Level of the intervals.
@@ -79,6 +81,11 @@ pub enum NoFit {
         "no two pictures differ in how the end effector is turned; turn it by 20 degrees and more about two axes between them"
     )]
     Alike,
+    /// No mount explains most of the pictures, and they are all turned about one axis.
+    #[error(
+        "the end effector turns about one axis only; turn it by 20 degrees and more about a second one between the pictures"
+    )]
+    OneAxis,
     /// No mount explains most of the pictures.
     #[error(
         "no mount explains most of the pictures: check that each O_T_EE belongs to its picture, the board's size, and who holds the camera"
@@ -107,10 +114,12 @@ pub fn fit(mount: Mount, views: &[View]) -> Result<Fit, NoFit> {
     let pixel = pixel_sigma(&prepared).max(1e-6);
     let pictures: Vec<closed_form::Pair> = prepared.iter().map(|p| (p.link, p.board)).collect();
     let (start, fits) = closed_form::start(mount, &pictures).ok_or(NoFit::Alike)?;
+    let links: Vec<Isometry3<f64>> = prepared.iter().map(|picture| picture.link).collect();
+    let none = if spread(&links)[1] < LEAST_TURN { NoFit::OneAxis } else { NoFit::Inconsistent };
     if 2 * fits.iter().filter(|fits| **fits).count() <= fits.len() {
-        return Err(NoFit::Inconsistent);
+        return Err(none);
     }
-    let (found, used) = chosen(&prepared, start, fits, pixel).ok_or(NoFit::Inconsistent)?;
+    let (found, used) = chosen(&prepared, start, fits, pixel).ok_or(none)?;
     Ok(answer(&prepared, &alone, &found, &used, pixel))
 }
 

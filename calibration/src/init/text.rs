@@ -8,7 +8,7 @@ use shared_mem::cell::Cell;
 use std::fmt::Write as _;
 
 /// Blocks and their keys in the order of the file, each key with an example.
-pub(super) const BLOCKS: [(&str, &[(&str, &str)]); 12] = [
+pub(super) const BLOCKS: [(&str, &[(&str, &str)]); 13] = [
     (
         "robot",
         &[
@@ -44,6 +44,7 @@ pub(super) const BLOCKS: [(&str, &[(&str, &str)]); 12] = [
             ("topic", "\"/vicon/milk_box\""),
             ("shape", "\"box\""),
             ("mesh", "\"mug.obj\""),
+            ("splats", "\"mug/splats.ply\""),
             ("size", "[0.08, 0.06, 0.10]"),
             ("support", "\"uniform\""),
             ("mass", "0.31"),
@@ -56,6 +57,7 @@ pub(super) const BLOCKS: [(&str, &[(&str, &str)]); 12] = [
             ("pose_noise", "{ position = 0.0007, rotation = 0.005 }"),
         ],
     ),
+    ("background", &[("splats", "\"scene.ply\"")]),
     (
         "camera",
         &[
