@@ -10,15 +10,15 @@ pub mod device;
 mod glb;
 mod live;
 pub(crate) mod looks;
+mod misplaced;
 mod painter;
 mod robot;
 pub mod session;
 mod shown;
-mod stray;
 
 pub use live::{Beside, LiveView};
+pub(crate) use misplaced::misplaced;
 pub use painter::{Drawer, Model, PaintError, Painter};
 pub use robot::{Hand, RobotSurface};
 pub(crate) use shown::{ScannedLink, Shown};
 pub use splat::{Mesh, Pinhole, Raster};
-pub(crate) use stray::strays;

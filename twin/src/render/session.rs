@@ -1,7 +1,7 @@
 //! A recorded session beside its twin: the camera's picture, what the twin shows at the same joints, and where they differ.
 
 use super::looks::CellSplatsError;
-use super::{Drawer, Hand, Model, PaintError, Painter, RobotSurface, ScannedLink, Shown, looks, strays};
+use super::{Drawer, Hand, Model, PaintError, Painter, RobotSurface, ScannedLink, Shown, looks, misplaced};
 use crate::arm::{Joints, MAX_JOINTS, ModelError};
 use crate::scene::MeshFileError;
 use nalgebra::Isometry3;
@@ -88,7 +88,7 @@ impl TwinView {
                 ScannedLink { link, link_from_scan, splats }
             })
             .collect();
-        let remarks = strays(&robot, &scans, scanned_at.is_some());
+        let remarks = misplaced(&robot, &scans, scanned_at.is_some());
         let size = [camera.width as usize, camera.height as usize];
         let shown = Shown::new(
             &robot,

@@ -8,7 +8,7 @@ use super::camera_clock_ns;
 use super::depth::{self, DepthSensor};
 use crate::effects::CameraEffects;
 use crate::render::session::ViewError;
-use crate::render::{Drawer, Hand, Mesh, Model, Pinhole, Raster, RobotSurface, ScannedLink, Shown, looks, strays};
+use crate::render::{Drawer, Hand, Mesh, Model, Pinhole, Raster, RobotSurface, ScannedLink, Shown, looks, misplaced};
 use crate::scene::SceneSnapshot;
 use crate::sim::SimError;
 use crate::sim::generator;
@@ -97,7 +97,7 @@ impl SimCamera {
             let scans = read_links(folder)?.into_iter();
             let scans = scans.map(|(link, splats)| ScannedLink { link, link_from_scan: Isometry3::identity(), splats });
             let scans: Vec<_> = scans.collect();
-            self.remarks = strays(robot, &scans, false);
+            self.remarks = misplaced(robot, &scans, false);
             let [background, object] = looks::splats(cell)?;
             let meshes = || self.still.iter().cloned().map(Model::Mesh).collect();
             let still = background.map_or_else(meshes, |splats| vec![splats]);

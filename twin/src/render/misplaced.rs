@@ -13,11 +13,11 @@ const AROUND_OUTLINE: f64 = 0.15;
 const MANY: f64 = 0.25;
 
 /// One sentence for every scan most of whose splats are not where its link is.
-pub(crate) fn strays(robot: &RobotSurface, scans: &[ScannedLink], in_base: bool) -> Vec<String> {
-    scans.iter().filter_map(|scan| stray(robot, scan, in_base)).collect()
+pub(crate) fn misplaced(robot: &RobotSurface, scans: &[ScannedLink], in_base: bool) -> Vec<String> {
+    scans.iter().filter_map(|scan| remark(robot, scan, in_base)).collect()
 }
 
-fn stray(robot: &RobotSurface, scan: &ScannedLink, in_base: bool) -> Option<String> {
+fn remark(robot: &RobotSurface, scan: &ScannedLink, in_base: bool) -> Option<String> {
     let (low, high) = bounds(robot, scan.link)?;
     let around = if robot.is_measured() { AROUND } else { AROUND_OUTLINE };
     let clear = scan.splats.splats.iter().filter(|splat| splat.opacity >= FAINT);
@@ -101,13 +101,13 @@ mod tests {
         };
         let link_from_base = |link: usize| robot.base_from_link(&q, link).inverse();
         let good: Vec<_> = (0..8).map(|link| scan(link, link_from_base(link), Isometry3::identity())).collect();
-        assert_eq!(strays(&robot, &good, false), [""; 0]);
+        assert_eq!(misplaced(&robot, &good, false), [""; 0]);
         let scanned_at: Vec<_> = (0..8).map(|link| scan(link, Isometry3::identity(), link_from_base(link))).collect();
-        assert_eq!(strays(&robot, &scanned_at, true), [""; 0]);
+        assert_eq!(misplaced(&robot, &scanned_at, true), [""; 0]);
         // All in the base frame, and nobody said so: every link but the base lies elsewhere.
         let taken: Vec<_> = (0..8).map(|link| scan(link, Isometry3::identity(), Isometry3::identity())).collect();
-        let told = strays(&robot, &taken, false);
-        assert!(told.len() >= 6 && told.iter().all(|line| line.contains("--scanned-at Q")), "{told:?}");
-        assert!(!told.iter().any(|line| line.starts_with("link0")), "{told:?}");
+        let remarks = misplaced(&robot, &taken, false);
+        assert!(remarks.len() >= 6 && remarks.iter().all(|line| line.contains("--scanned-at Q")), "{remarks:?}");
+        assert!(!remarks.iter().any(|line| line.starts_with("link0")), "{remarks:?}");
     }
 }
