@@ -86,7 +86,7 @@ impl Report {
             lines.push("nothing crossed".into());
         }
         lines.extend(self.clock.map(|clock| clock.in_words()));
-        lines.push(format!("{} outages, the longest {:.1} s", self.outages, self.longest_outage));
+        lines.push(format!("outages: {}, the longest {:.1} s", self.outages, self.longest_outage));
         lines.join("\n")
     }
 }
@@ -129,7 +129,7 @@ mod tests {
             "sent /camera/depth: 60 messages, 36.9 MB, 0 again, 2 dropped\n\
              taken /arm/state: 2000 messages, 0 lost, 0 refused, age p50 0.21 ms, p99 0.80 ms\n\
              the other host's clock is -12.500000 s from this one's, to within 45 us\n\
-             1 outages, the longest 5.2 s"
+             outages: 1, the longest 5.2 s"
         );
     }
 }
