@@ -253,8 +253,8 @@ fn without_common(corrections: &mut [[f64; 6]], away: &[Vector3<f64>]) {
     let middle = away.iter().sum::<Vector3<f64>>() / cameras;
     let away = || away.iter().map(|away| away - middle);
     let along = |(c, away): (&[f64; 6], Vector3<f64>)| away.dot(&Vector3::new(c[0], c[1], c[2]));
-    let growth =
-        corrections.iter().zip(away()).map(along).sum::<f64>() / away().map(|away| away.norm_squared()).sum::<f64>();
+    let growth = corrections.iter().zip(away()).map(along).sum::<f64>()
+        / away().map(|away| away.norm_squared()).sum::<f64>().max(f64::MIN_POSITIVE);
     for (correction, away) in corrections.iter_mut().zip(away()) {
         (0..3).for_each(|i| correction[i] -= growth * away[i]);
     }
