@@ -1,6 +1,6 @@
 //! What is said about the camera's mount.
 
-use super::fit::{Fit, Open};
+use super::fit::{Fit, Open, TURNED};
 use nalgebra::{Isometry3, Vector3};
 use serde::Serialize;
 use shared_mem::hand_eye::{HandEye, Mount, MountedPose};
@@ -54,9 +54,6 @@ pub struct NotIdentifiable {
     /// Why, and what to do.
     pub why: String,
 }
-
-/// Turns between pictures spread less than this are about no axis [rad].
-const TURNED: f64 = 0.09;
 
 /// A direction with one decimal, its largest part positive.
 fn axis(of: &Vector3<f64>) -> String {

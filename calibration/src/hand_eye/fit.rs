@@ -63,8 +63,8 @@ pub const FEWEST: usize = 3;
 const IMPROBABLE: f64 = 0.01;
 /// A mount less certain than this is not identified: a ruler and a protractor do as well [m, rad].
 const LIMIT: [f64; 2] = [0.01, 0.035];
-/// Turns that are spread by less than this about a second axis are about one axis, of a hand that is not quite steady [rad].
-const LEAST_TURN: f64 = 0.05;
+/// Turns between pictures spread less than this are about no axis [rad].
+pub(super) const TURNED: f64 = 0.09;
 /// A turn by this counts as much as a shift by one [rad/m].
 const LEVER: f64 = 0.5;
 /// Level of the intervals.
@@ -115,7 +115,7 @@ pub fn fit(mount: Mount, views: &[View]) -> Result<Fit, NoFit> {
     let pictures: Vec<closed_form::Pair> = prepared.iter().map(|p| (p.link, p.board)).collect();
     let (start, fits) = closed_form::start(mount, &pictures).ok_or(NoFit::Alike)?;
     let links: Vec<Isometry3<f64>> = prepared.iter().map(|picture| picture.link).collect();
-    let none = if spread(&links)[1] < LEAST_TURN { NoFit::OneAxis } else { NoFit::Inconsistent };
+    let none = if spread(&links)[1] < TURNED { NoFit::OneAxis } else { NoFit::Inconsistent };
     if 2 * fits.iter().filter(|fits| **fits).count() <= fits.len() {
         return Err(none);
     }
