@@ -61,9 +61,10 @@ impl Dome {
         let mut chosen: Vec<(Point3<f64>, Joints)> = Vec::new();
         // One after the other the place that is furthest from all before.
         while chosen.len() < wanted && !reached.is_empty() {
-            let lonely =
+            let clearance =
                 |place: &Point3<f64>| chosen.iter().map(|(c, _)| (c - place).norm()).fold(f64::INFINITY, f64::min);
-            let furthest = (0..reached.len()).max_by(|a, b| lonely(&reached[*a].0).total_cmp(&lonely(&reached[*b].0)));
+            let furthest =
+                (0..reached.len()).max_by(|a, b| clearance(&reached[*a].0).total_cmp(&clearance(&reached[*b].0)));
             let Some(furthest) = furthest else { break };
             chosen.push(reached.swap_remove(furthest));
         }
@@ -123,20 +124,11 @@ pub fn apart(a: &Joints, b: &Joints) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::capture::limits;
-    use shared_mem::cell::Cell;
-
-    fn arm() -> (Body, Vec<JointLimits>) {
-        let text = include_str!("../../../config/fr3_cell.toml");
-        let cell: Cell = shared_mem::toml_file::parse(text, "fr3_cell.toml".as_ref()).expect("the shipped file");
-        let body = Body::of(&cell).expect("the shipped cell has an arm");
-        let limits = limits::of(&cell, &body);
-        (body, limits)
-    }
+    use crate::capture::limits::shipped;
 
     #[test]
     fn views_look_at_the_point_from_all_sides_that_the_arm_reaches() {
-        let (body, limits) = arm();
+        let (body, limits) = shipped();
         let mount = Isometry3::new(Vector3::new(0.06, 0.0, 0.03), Vector3::new(0.0, 0.0, 1.57));
         let at = Point3::new(0.5, 0.0, 0.05);
         let dome = Dome { at, distance: 0.35, flange_from_camera: mount, floor: 0.05 };

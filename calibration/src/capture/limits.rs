@@ -17,6 +17,16 @@ pub fn of(cell: &Cell, body: &Body) -> Vec<JointLimits> {
     Limits::of(cell, body.model()).counted().copied().collect()
 }
 
+/// The shipped cell's arm and its limits, for tests.
+#[cfg(test)]
+pub(super) fn shipped() -> (Body, Vec<JointLimits>) {
+    let text = include_str!("../../../config/fr3_cell.toml");
+    let cell: Cell = shared_mem::toml_file::parse(text, "fr3_cell.toml".as_ref()).expect("the shipped file");
+    let body = Body::of(&cell).expect("the shipped cell has an arm");
+    let limits = of(&cell, &body);
+    (body, limits)
+}
+
 /// The first limit that set points, one a control cycle, break; torque is asked of a body where there is one.
 #[must_use]
 pub fn first_excess(points: &[SetPoint], limits: &[JointLimits], body: Option<&Body>) -> Option<Excess> {

@@ -236,19 +236,9 @@ impl Samples {
 
 #[cfg(test)]
 mod tests {
-    use super::super::limits;
+    use super::super::limits::shipped;
     use super::*;
     use proptest::prelude::*;
-    use shared_mem::cell::Cell;
-
-    fn arm() -> (Body, Vec<JointLimits>) {
-        let text = include_str!("../../../config/fr3_cell.toml");
-        let cell: Cell =
-            shared_mem::toml_file::parse(text, std::path::Path::new("cell.toml")).expect("the shipped file");
-        let body = Body::of(&cell).expect("an arm");
-        let limits = limits::of(&cell, &body);
-        (body, limits)
-    }
 
     const ALL: [bool; MAX_JOINTS] = [true; MAX_JOINTS];
 
@@ -284,7 +274,7 @@ mod tests {
 
     /// Plans around a place between the stops and checks every limit, the ends and the joints that are to hold.
     fn check_plan(kind: Kind, place: [f64; 7], asked: (f64, f64, u64), still: usize) -> Result<(), TestCaseError> {
-        let (body, limits) = arm();
+        let (body, limits) = shipped();
         let (amplitude, duration, seed) = asked;
         let mut start = [0.0; MAX_JOINTS];
         for (joint, limits) in limits.iter().enumerate() {
@@ -354,7 +344,7 @@ mod tests {
 
     #[test]
     fn in_the_ready_pose_a_moderate_motion_is_played_as_asked() {
-        let (body, limits) = arm();
+        let (body, limits) = shipped();
         let plan = plan(&Request { amplitude: 0.1, duration: 8.0, ..request(*body.model().ready()) }, &limits, &body);
         let plan = plan.expect("room");
         assert_eq!(plan.set_points.len(), 8001);
@@ -368,7 +358,7 @@ mod tests {
 
     #[test]
     fn what_is_too_much_is_made_smaller_and_the_limit_named() {
-        let (body, limits) = arm();
+        let (body, limits) = shipped();
         let plan = plan(&Request { amplitude: 2.0, ..request(*body.model().ready()) }, &limits, &body).expect("room");
         assert!(plan.amplitude.iter().all(|a| *a < 2.0));
         assert!(plan.bound_by.iter().all(Option::is_some), "{:?}", plan.bound_by);
@@ -376,7 +366,7 @@ mod tests {
 
     #[test]
     fn a_start_beyond_a_stop_is_refused_with_joint_value_and_limit() {
-        let (body, limits) = arm();
+        let (body, limits) = shipped();
         let mut start = *body.model().ready();
         start[3] = -0.12;
         let error = plan(&request(start), &limits, &body).unwrap_err().to_string();
@@ -385,7 +375,7 @@ mod tests {
 
     #[test]
     fn a_start_below_the_floor_is_refused() {
-        let (body, limits) = arm();
+        let (body, limits) = shipped();
         let start = *body.model().ready();
         let error = plan(&Request { floor: 1.0, ..request(start) }, &limits, &body).unwrap_err();
         assert!(matches!(error, PlanError::Start(Excess { quantity: Quantity::Height, .. })), "{error}");

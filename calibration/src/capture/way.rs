@@ -159,17 +159,8 @@ fn last(points: &[SetPoint], otherwise: &Joints) -> Joints {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::capture::limits;
+    use crate::capture::limits::shipped;
     use proptest::prelude::*;
-    use shared_mem::cell::Cell;
-
-    fn arm() -> (Body, Vec<JointLimits>) {
-        let text = include_str!("../../../config/fr3_cell.toml");
-        let cell: Cell = shared_mem::toml_file::parse(text, "fr3_cell.toml".as_ref()).expect("the shipped file");
-        let body = Body::of(&cell).expect("the shipped cell has an arm");
-        let limits = limits::of(&cell, &body);
-        (body, limits)
-    }
 
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(24))]
@@ -179,7 +170,7 @@ mod tests {
             (x, y) in (0.35..0.6_f64, -0.25..0.25_f64),
             (x_from, y_from) in (0.35..0.6_f64, -0.25..0.25_f64),
         ) {
-            let (body, limits) = arm();
+            let (body, limits) = shipped();
             let ways = Ways { body: &body, limits: &limits, height: 0.2, floor: 0.12 };
             let at = |x, y, z| line::reach(&body, body.model().ready(), &upright(Vector3::new(x, y, z), 0.0)).expect("in reach");
             let (from, to) = (at(x_from, y_from, 0.03), at(x, y, 0.03));
@@ -198,7 +189,7 @@ mod tests {
 
     #[test]
     fn after_a_stroke_the_tool_backs_off_and_rises() {
-        let (body, limits) = arm();
+        let (body, limits) = shipped();
         let ways = Ways { body: &body, limits: &limits, height: 0.2, floor: 0.12 };
         let from =
             line::reach(&body, body.model().ready(), &upright(Vector3::new(0.5, 0.0, 0.03), 0.0)).expect("in reach");
@@ -209,7 +200,7 @@ mod tests {
 
     #[test]
     fn near_a_stop_the_way_down_is_taken_more_slowly() {
-        let (body, mut limits) = arm();
+        let (body, mut limits) = shipped();
         let to =
             line::reach(&body, body.model().ready(), &upright(Vector3::new(0.5, 0.0, 0.03), 0.0)).expect("in reach");
         let over = |limits: &[JointLimits]| {
