@@ -137,9 +137,12 @@ impl HandEye {
     }
 
     /// The file's text.
+    ///
+    /// # Panics
+    /// Never: every field has a TOML form.
     #[must_use]
     pub fn to_toml(&self) -> String {
-        toml::to_string(self).unwrap_or_default()
+        toml::to_string(self).expect("numbers, strings, arrays and tables have a TOML form")
     }
 }
 
