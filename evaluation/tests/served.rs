@@ -1,38 +1,15 @@
 //! A policy behind openpi's protocol: a small server in this process plays what a script would do, or answers with nonsense.
 
-use evaluation::policy::{ActionKind, Array, Keys, Policy, Served, pack, unpack};
+mod server;
+
+use evaluation::policy::{ActionKind, Array, Keys, Policy, Served, pack};
 use evaluation::rollout::{Asking, RunError, run};
 use rmpv::Value;
-use std::net::TcpListener;
+use server::{actions, entry, serve};
 use std::path::Path;
 use std::sync::Arc;
-use std::thread;
 use tungstenite::Message;
 use twin::task::{Numbers, Run, Signs, Task};
-
-/// Serves one client at an address of its own: metadata, then an answer to each observation; `None` closes the connection.
-fn serve(mut answer: impl FnMut(&Value) -> Option<Message> + Send + 'static) -> String {
-    let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
-    let address = format!("ws://{}", listener.local_addr().expect("an address"));
-    thread::spawn(move || {
-        let (stream, _) = listener.accept().expect("a client");
-        let mut socket = tungstenite::accept(stream).expect("a handshake");
-        let metadata = Value::Map(vec![("name".into(), "test".into())]);
-        socket.send(Message::Binary(pack(&metadata).into())).expect("a client");
-        while let Ok(Message::Binary(bytes)) = socket.read() {
-            let Some(message) = answer(&unpack(&bytes).expect("an observation")) else { break };
-            if socket.send(message).is_err() {
-                break;
-            }
-        }
-    });
-    address
-}
-
-fn actions(rows: &[Vec<f32>]) -> Message {
-    let rows = rows.iter().map(|row| Value::Array(row.iter().map(|value| Value::from(*value)).collect())).collect();
-    Message::Binary(pack(&Value::Map(vec![("actions".into(), Value::Array(rows))])).into())
-}
 
 /// What a server answers; `None` closes the connection.
 type Answer = fn() -> Option<Message>;
@@ -46,11 +23,6 @@ fn asking(keys: &[&str], task: &Task) -> Asking {
     let keys: Vec<String> = keys.iter().map(|key| (*key).to_owned()).collect();
     let keys = Keys::read(&keys, task).expect("keys");
     Asking { keys, actions: ActionKind::Recorded, rate: 20, chunk: Some(4) }
-}
-
-fn entry<'a>(observation: &'a Value, key: &str) -> &'a Value {
-    let pairs = observation.as_map().expect("a map");
-    &pairs.iter().find(|(found, _)| found.as_str() == Some(key)).unwrap_or_else(|| panic!("no {key}")).1
 }
 
 #[test]
