@@ -58,6 +58,11 @@ impl Raster {
         }
     }
 
+    /// Lights what is drawn from now on from elsewhere: a direction towards the light, camera frame.
+    pub fn light_from(&mut self, light: Vector3<f32>) {
+        self.light = light.normalize();
+    }
+
     /// Empties the picture; `background` is the colour where nothing is drawn.
     pub fn clear(&mut self, background: [u8; 3]) {
         self.inverse_depth.fill(0.0);

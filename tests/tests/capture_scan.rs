@@ -12,16 +12,21 @@ position = [0.06, 0.0, 0.03]
 orientation = [0.7071067811865476, 0.0, 0.0, 0.7071067811865476]
 ";
 
-/// A capture of this many views of a place before the arm.
+/// The middle of the box that stands before the arm, and how far the camera stays from it: a D455 measures nothing nearer than 0.4 m.
+const AT: [f64; 3] = [0.55, 0.0, 0.05];
+const DISTANCE: f64 = 0.5;
+
+/// A capture of this many views of the box.
 fn scan(cell: &Cell, views: &str, out: &str) -> Program {
     std::fs::write(cell.path("hand_eye.toml"), MOUNT).expect("a file");
     let files = [cell.text("hand_eye.toml"), cell.text(out)];
     let [hand_eye, out] = files.each_ref().map(String::as_str);
-    let asked = ["capture", "scan", "--cell", "{cell}", "--hand-eye", hand_eye, "--at", "0.5,0,0.1", "--out", out];
-    cell.start("calibration", &[&asked[..], &["--views", views, "--realtime", "ignore", "--json"]].concat())
+    let asked = ["capture", "scan", "--cell", "{cell}", "--hand-eye", hand_eye, "--at", "0.55,0,0.05", "--out", out];
+    let more = ["--distance", "0.5", "--radius", "0.12", "--views", views, "--realtime", "ignore", "--json"];
+    cell.start("calibration", &[&asked[..], &more].concat())
 }
 
-/// The scan's list, each picture of which is there, of one size, and taken with the camera's axis through the place.
+/// The scan's list, each picture of which is there, of one size, and shows the box in its middle and in its mask.
 fn frames(cell: &Cell, out: &str) -> usize {
     let text = std::fs::read_to_string(cell.path(out).join("poses.json")).expect("a list");
     let list: serde_json::Value = serde_json::from_str(&text).expect("JSON");
@@ -29,17 +34,29 @@ fn frames(cell: &Cell, out: &str) -> usize {
     let mount = mount.end_effector_from_camera().expect("a pose");
     let frames = list["frames"].as_array().expect("frames");
     for frame in frames {
-        for (key, is_depth) in [("file_path", false), ("depth_file_path", true)] {
-            let path = cell.path(out).join(frame[key].as_str().expect("a path"));
-            let Picture::Pixels { header, .. } = read_picture(&path).expect("a picture") else { panic!("packed") };
-            assert_eq!((header.width, header.height), (640, 480));
-            assert_eq!(header.depth_scale != 0.0 || header.encoding.bytes_per_pixel() == 2, is_depth, "{key}");
-        }
+        let read = |path: &str| {
+            let picture = read_picture(&cell.path(out).join(path)).expect("a picture");
+            let Picture::Pixels { header, pixels } = picture else { panic!("packed") };
+            assert_eq!((header.width, header.height), (640, 480), "{path}");
+            (header.encoding.bytes_per_pixel() as usize, pixels)
+        };
+        let path = frame["file_path"].as_str().expect("a path");
+        assert_eq!(read(path).0, 3);
+        let (bytes, depth) = read(frame["depth_file_path"].as_str().expect("a path"));
+        assert_eq!(bytes, 2);
+        // The box's corners are 71 mm from its middle, its nearest faces 30.
+        let middle = 2 * (640 * 240 + 320);
+        let millimetres = u16::from_le_bytes([depth[middle], depth[middle + 1]]);
+        assert!((425..=475).contains(&millimetres), "{millimetres} mm in {path}");
+        let (_, mask) = read(&path.replace("images", "masks"));
+        let white = mask.chunks_exact(3).filter(|rgb| rgb[0] > 127).count();
+        // At 0.5 m a face of the box covers 60 x 80 mm or more of 0.82 mm a pixel, its outline at most 1.7 times as much.
+        assert!(mask[3 * (640 * 240 + 320)] > 127 && (5000..26_000).contains(&white), "{white} pixels in {path}");
         let matrix: Matrix = serde_json::from_value(frame["O_T_EE"].clone()).expect("a matrix");
         let camera = matrix.isometry().expect("a pose") * mount;
-        let seen = camera.inverse_transform_point(&[0.5, 0.0, 0.1].into());
+        let seen = camera.inverse_transform_point(&AT.into());
         // The tenth part of a millimetre is seen; the arm's noise and its friction have room.
-        assert!(seen.x.hypot(seen.y) < 0.01 && (seen.z - 0.35).abs() < 0.01, "{seen}");
+        assert!(seen.x.hypot(seen.y) < 0.01 && (seen.z - DISTANCE).abs() < 0.01, "{seen}");
     }
     frames.len()
 }
@@ -51,6 +68,7 @@ fn the_arm_goes_round_and_what_it_sees_is_a_scan() {
     let (pictures, left) = (answer["pictures"].as_u64().expect("a number"), answer["without_way"].as_u64());
     assert!(pictures >= 8 && answer["own_bridge"] == true, "{answer}");
     assert_eq!((frames(&cell, "scan") as u64, answer["with_depth"].as_u64()), (pictures, Some(pictures)));
+    assert_eq!(answer["with_mask"].as_u64(), Some(pictures));
     assert!(pictures + left.expect("a number") <= 10, "{answer}");
     let again = scan(&cell, "10", "scan").wait(Duration::from_secs(20));
     assert!(again.complaint().contains("holds a scan already"), "{}", again.complaint());

@@ -38,6 +38,8 @@ pub struct Wanted<'a> {
     pub cell: &'a Path,
     /// The arm; default: the simulated one.
     pub arm: Option<&'a str>,
+    /// How a simulated arm holds the simulated camera; default: it stands where cell.toml says.
+    pub hand_eye: Option<&'a Path>,
     /// Whether it insists on real time; default: its own.
     pub realtime: Option<&'a str>,
     /// Shared-memory domain; default: the one this process was started in.
@@ -73,6 +75,8 @@ impl Bridge {
     fn start(wanted: &Wanted) -> Result<Running, ProcessError> {
         let arm = wanted.arm.unwrap_or(DEFAULT_ARM);
         let mut list = arguments([&"run", &"--cell", &wanted.cell, &"--arm", &arm]);
+        let held = wanted.hand_eye.filter(|_| arm == DEFAULT_ARM);
+        list.extend(held.into_iter().flat_map(|file| arguments([&"--hand-eye", &file])));
         list.extend(wanted.realtime.into_iter().flat_map(|way| arguments([&"--realtime", &way])));
         Running::start(Program::Bridge, &list, wanted.domain)
     }

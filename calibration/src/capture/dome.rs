@@ -48,13 +48,16 @@ pub fn looking(from: &Point3<f64>, at: &Point3<f64>, roll: f64) -> Isometry3<f64
 }
 
 impl Dome {
-    /// Joints of at most `wanted` views spread over the dome, of those that are reached inside every limit.
+    /// Joints of at most `wanted` views spread over the dome, of those to which a straight way leads from `start` inside every limit: from
+    /// any of them each other one is reached over there.
     #[must_use]
     pub fn views(&self, body: &Body, limits: &[JointLimits], start: &Joints, wanted: usize) -> Vec<Joints> {
         let reached = self.places(TRIED * wanted).filter_map(|place| {
-            let joints =
-                (0..ROLLS).filter_map(|k| self.reach(body, limits, start, &place, TAU * k as f64 / ROLLS as f64));
-            let joints = joints.min_by(|a, b| apart(a, start).total_cmp(&apart(b, start)))?;
+            let roll = |k: usize| TAU * k as f64 / ROLLS as f64;
+            let mut joints: Vec<Joints> =
+                (0..ROLLS).filter_map(|k| self.reach(body, limits, start, &place, roll(k))).collect();
+            joints.sort_by(|a, b| apart(a, start).total_cmp(&apart(b, start)));
+            let joints = joints.into_iter().find(|joints| self.way(body, limits, start, joints).is_some())?;
             Some((place, joints))
         });
         let mut reached: Vec<(Point3<f64>, Joints)> = reached.collect();
@@ -113,6 +116,24 @@ impl Dome {
         let free = way.iter().step_by(LOOK).chain(way.last()).all(|point| self.is_free(body, &point.q_d));
         (free && first_excess(&way, limits, Some(body)).is_none()).then_some(way)
     }
+
+    /// The same, over the one of `by` that makes the way shortest where the straight way is not free: one way after the other.
+    #[must_use]
+    pub fn legs(
+        &self,
+        body: &Body,
+        limits: &[JointLimits],
+        [from, to]: [&Joints; 2],
+        by: &[Joints],
+    ) -> Option<Vec<Vec<SetPoint>>> {
+        let way = |from: &Joints, to: &Joints| self.way(body, limits, from, to);
+        if let Some(straight) = way(from, to) {
+            return Some(vec![straight]);
+        }
+        let mut by: Vec<&Joints> = by.iter().collect();
+        by.sort_by(|a, b| (apart(from, a) + apart(a, to)).total_cmp(&(apart(from, b) + apart(b, to))));
+        by.into_iter().find_map(|by| Some(vec![way(from, by)?, way(by, to)?]))
+    }
 }
 
 /// How far joints are from one another [rad].
@@ -151,5 +172,31 @@ mod tests {
         // A point behind the base's back, and out of reach.
         let far = Dome { at: Point3::new(3.0, 0.0, 0.0), ..dome };
         assert!(far.views(&body, &limits, &start, 5).is_empty());
+    }
+
+    #[test]
+    fn where_no_straight_way_leads_one_does_over_a_place_where_the_arm_has_been() {
+        let (body, limits) = shipped();
+        let mount = Isometry3::new(Vector3::new(0.06, 0.0, 0.03), Vector3::new(0.0, 0.0, 1.57));
+        let at = Point3::new(0.55, 0.0, 0.05);
+        let dome = Dome { at, distance: 0.5, flange_from_camera: mount, floor: 0.05 };
+        let start = *body.model().ready();
+        let views = dome.views(&body, &limits, &start, 10);
+        let left = |by_places: bool| {
+            let (mut been, mut open) = (vec![start], views.clone());
+            loop {
+                let by = if by_places { &been[..] } else { &[] };
+                let from = been[been.len() - 1];
+                let legs = |to: &Joints| dome.legs(&body, &limits, [&from, to], by);
+                let Some((next, legs)) = open.iter().enumerate().find_map(|(k, to)| Some((k, legs(to)?))) else {
+                    break;
+                };
+                let ends = legs.iter().map(|leg| leg.last().expect("points").q_d);
+                assert!(apart(&ends.last().expect("a leg"), &open[next]) < 1e-9);
+                been.push(open.swap_remove(next));
+            }
+            open.len()
+        };
+        assert_eq!((views.len(), left(true)), (10, 0));
     }
 }

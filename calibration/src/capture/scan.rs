@@ -3,6 +3,7 @@
 
 use super::body::Body;
 use super::bridge::{Bridge, Wanted};
+use super::cut::Cut;
 use super::dome::{Dome, apart};
 use super::limits;
 use super::link::Link;
@@ -14,7 +15,7 @@ use anyhow::{Context as _, ensure};
 use nalgebra::{Isometry3, Point3};
 use serde::Serialize;
 use serde_json::{Value, json};
-use shared_mem::cell::{Cell, Intrinsics};
+use shared_mem::cell::{Cell, Intrinsics, Table};
 use shared_mem::hand_eye::{HandEye, Matrix};
 use shared_mem::msg::Joints;
 use shared_mem::msg::motion::SetPoint;
@@ -36,6 +37,8 @@ pub struct Options {
     pub at: [f64; 3],
     /// From the camera to it [m].
     pub distance: f64,
+    /// What is further from there is no part of it [m].
+    pub radius: f64,
     /// Views.
     pub views: usize,
     /// The scan's folder; new.
@@ -57,6 +60,8 @@ pub struct Summary {
     pub pictures: usize,
     /// Of these with depth.
     pub with_depth: usize,
+    /// Of these with a mask.
+    pub with_mask: usize,
     /// Views within reach of which no way inside every limit was found.
     pub without_way: usize,
     /// Whether the user ended it early.
@@ -78,6 +83,8 @@ struct Desk<'a> {
     body: Body,
     limits: Vec<JointLimits>,
     list: Value,
+    cut: Option<Cut>,
+    mount: Isometry3<f64>,
     shots: Shots,
     interrupt: &'a Interrupt,
 }
@@ -96,19 +103,23 @@ pub fn capture(options: &Options, interrupt: &Interrupt) -> anyhow::Result<Summa
     let hand_eye = HandEye::read(&options.hand_eye)?;
     let mount = hand_eye.end_effector_from_camera();
     let mount = mount.map_err(|what| anyhow::anyhow!("{} {what}", options.hand_eye.display()))?;
-    let list = list(&cell, &hand_eye)?;
+    let (list, pinhole) = list(&cell, &hand_eye)?;
+    // Without a table everything in reach would be the object.
+    let of_table = |table: &Table| Cut { at: options.at.into(), radius: options.radius, table: table.height, pinhole };
+    let cut = cell.table.as_ref().map(of_table);
     let list_file = options.out.join("poses.json");
     ensure!(!list_file.exists(), "{} holds a scan already; give a new folder with --out", options.out.display());
     let latency = Duration::from_secs_f64(cell.camera.as_ref().map_or(0.0, |camera| camera.latency.max(0.0)));
     let mut link = Link::open(options.domain.as_deref())?;
     let (arm, realtime) = (options.arm.as_deref(), options.realtime.as_deref());
-    let wanted = Wanted { cell: &options.cell, arm, realtime, domain: options.domain.as_deref() };
+    let (hand_eye_file, domain) = (Some(options.hand_eye.as_path()), options.domain.as_deref());
+    let wanted = Wanted { cell: &options.cell, arm, hand_eye: hand_eye_file, realtime, domain };
     let mut bridge = Bridge::find_or_start(&mut link, &wanted, interrupt)?;
     let shots = Shots::open(options.domain.as_deref(), latency)?;
     let limits = limits::of(&cell, &body);
-    let mut desk = Desk { options, body, limits, list, shots, interrupt };
+    let mut desk = Desk { options, body, limits, list, cut, mount, shots, interrupt };
     let floor = cell.table.as_ref().map_or(f64::NEG_INFINITY, |table| table.height + CLEARANCE);
-    let done = desk.all_views(&mut link, &mount, floor, &hand_eye);
+    let done = desk.all_views(&mut link, floor, &hand_eye);
     let summary = done.map_err(|error| cause(error, &mut bridge))?;
     let own_bridge = bridge.is_own();
     bridge.stop()?;
@@ -116,35 +127,31 @@ pub fn capture(options: &Options, interrupt: &Interrupt) -> anyhow::Result<Summa
 }
 
 /// The list of pictures without pictures: the camera's numbers.
-fn list(cell: &Cell, hand_eye: &HandEye) -> anyhow::Result<Value> {
+fn list(cell: &Cell, hand_eye: &HandEye) -> anyhow::Result<(Value, Intrinsics)> {
     let of_cell = cell.camera.as_ref().map(|camera| (camera.pinhole(), camera.distortion));
     let calibrated = hand_eye.camera.map(|camera| (camera.intrinsics, camera.distortion));
-    let (Intrinsics { fx, fy, cx, cy }, [k1, k2, p1, p2, k3]) =
+    let (pinhole, [k1, k2, p1, p2, k3]) =
         calibrated.or(of_cell).context("no intrinsics: neither hand_eye.toml nor cell.toml has a `[camera]`")?;
     ensure!(
         k3 == 0.0,
         "the lens has a k3 of {k3}, which `twin reconstruct` does not know: calibrate the camera without k3, and the mount again"
     );
-    Ok(json!({
+    let Intrinsics { fx, fy, cx, cy } = pinhole;
+    let list = json!({
         "fl_x": fx, "fl_y": fy, "cx": cx + HALF, "cy": cy + HALF,
         "k1": k1, "k2": k2, "p1": p1, "p2": p2, "frames": [],
-    }))
+    });
+    Ok((list, pinhole))
 }
 
 impl Desk<'_> {
-    fn all_views(
-        &mut self,
-        link: &mut Link,
-        mount: &Isometry3<f64>,
-        floor: f64,
-        hand_eye: &HandEye,
-    ) -> anyhow::Result<Summary> {
+    fn all_views(&mut self, link: &mut Link, floor: f64, hand_eye: &HandEye) -> anyhow::Result<Summary> {
         let Options { at, distance, views, out, .. } = self.options;
         let state = link.ready_arm(self.limits.len())?;
         // A robot may report another end effector than the flange.
         let reported = Matrix::Flat(state.O_T_EE).isometry().map_err(anyhow::Error::msg)?;
         let flange = self.body.model().flange(&state.q).isometry();
-        let flange_from_camera = flange.inverse() * reported * mount;
+        let flange_from_camera = flange.inverse() * reported * self.mount;
         let dome = Dome { at: Point3::from(*at), distance: *distance, flange_from_camera, floor };
         let mut open = dome.views(&self.body, &self.limits, &state.q_d, *views);
         let [x, y, z] = at;
@@ -153,16 +160,18 @@ impl Desk<'_> {
             "of the views around {x}, {y}, {z} m only {} are within the arm's reach: move the object nearer, or give another --distance",
             open.len()
         );
-        for part in ["images", "depth"] {
+        for part in ["images", "depth", "masks"] {
             std::fs::create_dir_all(out.join(part))
                 .with_context(|| format!("cannot make {}; give another folder with --out", out.join(part).display()))?;
         }
         output::write(&out.join("hand_eye.toml"), hand_eye.to_toml())?;
+        let mut been = vec![state.q_d];
         let progress = Progress::new("views", open.len() as u64);
         let mut summary = Summary {
             scan: out.clone(),
             pictures: 0,
             with_depth: 0,
+            with_mask: 0,
             without_way: 0,
             interrupted: false,
             own_bridge: false,
@@ -171,11 +180,11 @@ impl Desk<'_> {
             self.interrupt.wait_out_pause();
             progress.show(summary.pictures as u64, "");
             let from = link.ready_arm(self.limits.len())?.q_d;
-            let Some((next, way)) = self.nearest(&dome, &from, &open) else {
+            let Some((next, legs)) = self.nearest(&dome, (&from, &been), &open) else {
                 summary.without_way = open.len();
                 break;
             };
-            match play(link, Motion { set_points: &way, dof: self.limits.len() }, self.interrupt, |_| {})? {
+            match self.go(link, &legs)? {
                 Outcome::Done => {}
                 Outcome::Paused => continue,
                 Outcome::Stopped => break,
@@ -183,12 +192,13 @@ impl Desk<'_> {
                     anyhow::bail!("{}; recover the robot, then start again with a new folder", link.reason()?)
                 }
             }
-            open.swap_remove(next);
+            been.push(open.swap_remove(next));
             match self.shots.take(link, self.interrupt) {
                 Ok(shot) => {
                     self.keep(summary.pictures, &shot)?;
                     summary.pictures += 1;
                     summary.with_depth += usize::from(shot.depth.is_some());
+                    summary.with_mask += usize::from(shot.depth.is_some() && self.cut.is_some());
                 }
                 Err(ShotError::Interrupted) => break,
                 Err(error) => return Err(error.into()),
@@ -198,11 +208,30 @@ impl Desk<'_> {
         Ok(summary)
     }
 
-    /// The nearest of the open views that a way leads to.
-    fn nearest(&self, dome: &Dome, from: &Joints, open: &[Joints]) -> Option<(usize, Vec<SetPoint>)> {
+    /// The nearest of the open views that a way leads to, straight or over a place where the arm has been.
+    fn nearest(
+        &self,
+        dome: &Dome,
+        (from, been): (&Joints, &[Joints]),
+        open: &[Joints],
+    ) -> Option<(usize, Vec<Vec<SetPoint>>)> {
         let mut order: Vec<usize> = (0..open.len()).collect();
         order.sort_by(|a, b| apart(from, &open[*a]).total_cmp(&apart(from, &open[*b])));
-        order.into_iter().find_map(|k| Some((k, dome.way(&self.body, &self.limits, from, &open[k])?)))
+        let legs = |k: usize, by| dome.legs(&self.body, &self.limits, [from, &open[k]], by);
+        let straight = order.iter().find_map(|k| Some((*k, legs(*k, &[])?)));
+        straight.or_else(|| order.iter().find_map(|k| Some((*k, legs(*k, been)?))))
+    }
+
+    /// Plays one way after the other; how the first that was not played to its end ended.
+    fn go(&self, link: &mut Link, legs: &[Vec<SetPoint>]) -> anyhow::Result<Outcome> {
+        for set_points in legs {
+            let motion = Motion { set_points, dof: self.limits.len() };
+            let outcome = play(link, motion, self.interrupt, |_| {})?;
+            if !matches!(outcome, Outcome::Done) {
+                return Ok(outcome);
+            }
+        }
+        Ok(Outcome::Done)
     }
 
     /// Writes the pictures, then the list with them in it: what it names is there.
@@ -214,6 +243,11 @@ impl Desk<'_> {
             write(&self.options.out.join("depth").join(&name), depth)?;
             frame["depth_file_path"] = json!(format!("depth/{name}"));
             self.list["depth_unit_scale_factor"] = json!(depth.header.depth_scale);
+            if let Some(cut) = &self.cut {
+                let flange = Matrix::Flat(shot.state.O_T_EE).isometry().map_err(anyhow::Error::msg)?;
+                let mask = cut.mask(depth, &(flange * self.mount));
+                write(&self.options.out.join("masks").join(&name), &mask)?;
+            }
         }
         (self.list["w"], self.list["h"]) = (json!(shot.colour.header.width), json!(shot.colour.header.height));
         if let Some(frames) = self.list["frames"].as_array_mut() {

@@ -71,6 +71,6 @@ impl Task {
     /// [`BridgeError`] with the remedy.
     pub fn bridge(&self, link: &mut Link, interrupt: &Interrupt) -> Result<Bridge, BridgeError> {
         let (arm, realtime, domain) = (self.arm.as_deref(), self.realtime.as_deref(), self.domain.as_deref());
-        Bridge::find_or_start(link, &Wanted { cell: &self.cell, arm, realtime, domain }, interrupt)
+        Bridge::find_or_start(link, &Wanted { cell: &self.cell, arm, hand_eye: None, realtime, domain }, interrupt)
     }
 }

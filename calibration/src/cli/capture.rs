@@ -326,6 +326,10 @@ pub(super) struct ScanArguments {
     /// From the camera to it [m].
     #[arg(long, value_name = "M", default_value_t = 0.35, value_parser = |text: &str| number(text, 0.1..=1.5, "m"))]
     distance: f64,
+    /// What is further from --at is no part of the object: masks are cut by depth, of what stands above the table nearer
+    /// than this [m] [default: a third of --distance].
+    #[arg(long, value_name = "M", value_parser = |text: &str| number(text, 0.01..=1.0, "m"))]
+    radius: Option<f64>,
     /// Views, 8 to 200; fewer where not as many are within reach.
     #[arg(long, value_name = "N", default_value_t = 40, value_parser = clap::value_parser!(u8).range(8..=200))]
     views: u8,
@@ -344,15 +348,16 @@ pub(super) struct ScanArguments {
 }
 
 fn look(arguments: ScanArguments, interrupt: &Interrupt) -> anyhow::Result<()> {
-    let ScanArguments { cell, hand_eye, at, distance, views, out, arm, realtime, json } = arguments;
-    let views = usize::from(views);
-    let options = scan::Options { cell, hand_eye, at, distance, views, out, arm, realtime, domain: None };
+    let ScanArguments { cell, hand_eye, at, distance, radius, views, out, arm, realtime, json } = arguments;
+    let (views, radius) = (usize::from(views), radius.unwrap_or(distance / 3.0));
+    let options = scan::Options { cell, hand_eye, at, distance, radius, views, out, arm, realtime, domain: None };
     let summary = scan::capture(&options, interrupt)?;
     let left = match summary.without_way {
         0 => String::new(),
         count => format!("; {count} views were left out, to which no way leads"),
     };
+    let scan::Summary { scan, pictures, with_depth, with_mask, .. } = &summary;
     let words =
-        format!("{}: {} pictures, {} with depth{left}", summary.scan.display(), summary.pictures, summary.with_depth);
+        format!("{}: {pictures} pictures, {with_depth} with depth, {with_mask} with a mask{left}", scan.display());
     print(json, &summary, words)
 }

@@ -14,6 +14,7 @@ pub use source::{CameraSource, ConvertError, Converted};
 
 use crate::replay::ReplayClock;
 use crate::starting::{self, ThreadError};
+use nalgebra::Isometry3;
 use rtrb::Consumer;
 use shared_mem::cell::Cell;
 use shared_mem::recording::{ClipMessages, ReadError};
@@ -58,7 +59,7 @@ pub enum CameraError {
 
 impl Camera {
     /// Starts the simulated camera on the scenes of a simulated cell, under effects that nobody is told; `splats`: a folder
-    /// with the robot's links as it shall show them.
+    /// with the robot's links as it shall show them; `held`: where the arm holds it, its optical frame in the flange's.
     ///
     /// # Errors
     /// [`CameraError`] when the cell cannot be drawn or another camera runs.
@@ -67,8 +68,13 @@ impl Camera {
         scenes: Consumer<SceneSnapshot>,
         effects: &CameraEffects,
         splats: Option<&Path>,
+        held: Option<Isometry3<f64>>,
     ) -> Result<Self, CameraError> {
-        let mut camera = SimCamera::new(cell)?.with_effects(effects);
+        let mut camera = SimCamera::new(cell)?;
+        if let Some(flange_from_camera) = held {
+            camera = camera.held(flange_from_camera);
+        }
+        camera = camera.with_effects(effects);
         if let Some(folder) = splats {
             camera = camera.with_splats(cell, folder, Drawer::Auto)?;
             camera.remarks().iter().for_each(|remark| tracing::warn!("{remark}"));

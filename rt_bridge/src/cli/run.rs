@@ -53,6 +53,9 @@ pub(super) struct RunArguments {
     /// them), on a graphics card where the program was built with `--features render` and finds one
     #[arg(long, value_name = "FOLDER")]
     splats: Option<PathBuf>,
+    /// The arm holds the simulated camera as this file says (`calibration hand-eye` writes one): pictures move with the arm
+    #[arg(long, value_name = "hand_eye.toml")]
+    hand_eye: Option<PathBuf>,
     /// Who publishes the object's pose: the simulated cell, the bridge from the camera's colour and depth, the recording,
     /// or (off) another process. Default: sim with the simulated arm, replay with a recording, rgbd with a RealSense
     /// camera, else off
@@ -106,6 +109,7 @@ impl RunArguments {
             controller: self.controller,
             camera: self.camera,
             splats: self.splats,
+            hand_eye: self.hand_eye,
             tracker: self.tracker,
             gripper: self.gripper,
             wrench: self.wrench,

@@ -26,8 +26,10 @@ use crate::tracker::{self, TrackerChoice};
 use crate::wrench::{self, WrenchChoice};
 use anyhow::{Result, bail, ensure};
 use devices::{Devices, Pictures};
+use nalgebra::Isometry3;
 use rtrb::{Consumer, RingBuffer};
 use shared_mem::cell::Cell;
+use shared_mem::hand_eye::HandEye;
 use shared_mem::msg::event::EventLevel;
 use shared_mem::msg::joints_from;
 use shared_mem::msg::wrench::Wrench;
@@ -67,6 +69,8 @@ pub struct Settings {
     pub camera: Option<CameraChoice>,
     /// Splats of the robot's links, which the simulated camera draws.
     pub splats: Option<PathBuf>,
+    /// How the arm holds the simulated camera; none: it stands where cell.toml says.
+    pub hand_eye: Option<PathBuf>,
     /// Who tracks the object; none: the simulated cell with the simulated arm, the recording's poses with a recording,
     /// the bridge with a RealSense camera, else nobody.
     pub tracker: Option<TrackerChoice>,
@@ -94,7 +98,8 @@ impl Settings {
     /// What is in force, defaults resolved, as the TOML text that rides along in a recording.
     fn in_force(&self, plan: &Plan) -> String {
         let mut text = format!("arm = {:?}\ninterface = {:?}\n", self.arm.to_string(), format!("{:?}", plan.interface));
-        for (key, path) in [("effects", &self.effects), ("parameters", &self.parameters)] {
+        let files = [("effects", &self.effects), ("parameters", &self.parameters), ("hand_eye", &self.hand_eye)];
+        for (key, path) in files {
             if let Some(path) = path {
                 text += &format!("{key} = {:?}\n", path.display().to_string());
             }
@@ -131,6 +136,18 @@ impl Settings {
             }
             _ => Ok(choice),
         }
+    }
+
+    /// Where the arm holds the simulated camera: its optical frame in the flange's.
+    fn held(&self, cell: &Cell, is_drawn: bool) -> Result<Option<Isometry3<f64>>> {
+        let Some(file) = &self.hand_eye else { return Ok(None) };
+        ensure!(is_drawn, "--hand-eye is for the simulated camera: leave it out, or add --camera sim");
+        ensure!(
+            self.tracker(cell)? != TrackerChoice::Rgbd,
+            "--tracker rgbd needs a camera that stands still: leave --hand-eye out, or choose another --tracker"
+        );
+        let mount = HandEye::read(file)?.end_effector_from_camera();
+        Ok(Some(mount.map_err(|what| anyhow::anyhow!("{} {what}", file.display()))?))
     }
 
     /// The tracker in force.
@@ -217,6 +234,7 @@ pub fn run(settings: &Settings, stop: &Arc<AtomicBool>) -> Result<RunReport> {
         is_drawn || settings.splats.is_none(),
         "--splats is for the simulated camera: leave it out, or add --camera sim"
     );
+    let held = settings.held(&cell, is_drawn)?;
     let node = Node::open("rt_bridge")?;
 
     let (to_pump, beats) = RingBuffer::new(BEATS);
@@ -250,7 +268,7 @@ pub fn run(settings: &Settings, stop: &Arc<AtomicBool>) -> Result<RunReport> {
     };
     let camera = match devices.pictures {
         Pictures::Scenes(scenes, effects) => {
-            Some(Camera::simulated(&cell, scenes, &effects, settings.splats.as_deref())?)
+            Some(Camera::simulated(&cell, scenes, &effects, settings.splats.as_deref(), held)?)
         }
         Pictures::Clip(clip, clock) => Some(Camera::replayed(&clip, clock)?),
         Pictures::RealSense(source) => {

@@ -13,15 +13,19 @@ use crate::scene::SceneSnapshot;
 use crate::sim::SimError;
 use crate::sim::generator;
 use nalgebra::{Isometry3, Vector3};
-use shared_mem::cell::{Camera, Cell};
+use shared_mem::cell::{Camera, CameraPose, Cell};
 use shared_mem::msg::image::{CameraInfo, ImageHeader, PixelEncoding, StampDomain};
 use splat::{Lens, Picture, read_links};
 use std::path::Path;
 
 /// The camera.
 pub struct SimCamera {
+    /// With the pose that it is said to have, of a camera that the arm holds in its last picture.
     settings: Camera,
     camera_from_base: Isometry3<f32>,
+    misplaced: Isometry3<f32>,
+    /// Where the arm holds it.
+    flange_from_camera: Option<Isometry3<f64>>,
     raster: Raster,
     depth: DepthSensor,
     still: Vec<Mesh>,
@@ -62,6 +66,8 @@ impl SimCamera {
             vec![Mesh::plate([0.0, 0.0, height - FLOOR_BELOW], [FLOOR_HALF; 2], FLOOR), looks::table_top(height)];
         Ok(Self {
             camera_from_base,
+            misplaced: Isometry3::identity(),
+            flange_from_camera: None,
             raster,
             depth: DepthSensor::new(settings.width, settings.height, noisy, generator(cell, 2)),
             still,
@@ -76,12 +82,20 @@ impl SimCamera {
         })
     }
 
+    /// The same camera held by the arm; `flange_from_camera`: its optical frame in the flange's. A camera whose cell has no robot
+    /// stays where it is.
+    #[must_use]
+    pub fn held(self, flange_from_camera: Isometry3<f64>) -> Self {
+        Self { flange_from_camera: Some(flange_from_camera), ..self }
+    }
+
     /// The same camera under effects that nobody is told: it stands elsewhere than [`Self::info`] says, and its pictures
     /// are older than their stamps. What is a tracker's own ([`CameraEffects::of_the_tracker`]) is in no picture.
     #[must_use]
     pub fn with_effects(self, effects: &CameraEffects) -> Self {
-        let camera_from_base = self.camera_from_base * effects.misplaced().cast::<f32>();
-        Self { camera_from_base, older_ns: effects.latency_ns(), ..self }
+        let misplaced = effects.misplaced().cast::<f32>();
+        let camera_from_base = self.camera_from_base * misplaced;
+        Self { camera_from_base, misplaced, older_ns: effects.latency_ns(), ..self }
     }
 
     /// The same camera before a robot of splats: a folder with a file for each link, in the links' frames; background and object
@@ -140,6 +154,7 @@ impl SimCamera {
     /// `stamp_ns` the host sets.
     pub fn render(&mut self, scene: &SceneSnapshot, color: &mut [u8], depth: &mut [u8]) -> [ImageHeader; 2] {
         let width = self.settings.width as usize;
+        self.stand(scene);
         if let Some(picture) = self.paint(scene) {
             for (rgb, seen) in color.chunks_exact_mut(3).zip(picture.rgb8()) {
                 rgb.copy_from_slice(&seen);
@@ -179,7 +194,7 @@ impl SimCamera {
         )
     }
 
-    /// How this camera projects and where it stands. `stamp_ns` is the host's to set.
+    /// How this camera projects and where it stands, or stood in its last picture where the arm holds it. `stamp_ns` is the host's to set.
     #[must_use]
     pub fn info(&self) -> CameraInfo {
         let pinhole = self.settings.pinhole();
@@ -192,6 +207,17 @@ impl SimCamera {
             position: self.settings.pose.position,
             wxyz: self.settings.pose.orientation,
         }
+    }
+
+    /// Goes where the arm holds it.
+    fn stand(&mut self, scene: &SceneSnapshot) {
+        let (Some(flange_from_camera), Some(robot)) = (self.flange_from_camera, &self.robot) else { return };
+        let base_from_camera = robot.model().flange(&scene.q).isometry() * flange_from_camera;
+        let rotation = base_from_camera.rotation;
+        let orientation = [rotation.w, rotation.i, rotation.j, rotation.k];
+        self.settings.pose = CameraPose { position: base_from_camera.translation.vector.into(), orientation };
+        self.camera_from_base = base_from_camera.inverse().cast::<f32>() * self.misplaced;
+        self.raster.light_from(self.camera_from_base * Vector3::from(looks::LIGHT).cast::<f32>());
     }
 
     /// The picture with the scanned robot; `None` where there is none, and from then on where its device has failed.
@@ -231,7 +257,6 @@ mod tests {
     use crate::reconstruct::SurfacePoints;
     use crate::shipped::shipped;
     use crate::sim::SimCell;
-    use shared_mem::cell::CameraPose;
     use splat::{Splat, SplatCloud, link_file};
     use std::path::Path;
 
@@ -263,6 +288,27 @@ mod tests {
         let beside = at(pinhole.cx + pinhole.fx * 0.05, pinhole.cy);
         assert!(beside.abs_diff(1100) <= 1, "the table beside it: {beside} mm");
         assert_eq!((header.width, header.stride, header.depth_scale), (640, 1280, 0.001));
+    }
+
+    #[test]
+    fn a_camera_that_the_arm_holds_sees_what_one_that_stands_there_would() {
+        let mut cell = shipped();
+        cell.object_mut().expect("a box").pose_noise = None;
+        let scene = SimCell::new(&cell, None).expect("a cell").snapshot();
+        let mount =
+            Isometry3::translation(0.06, 0.0, 0.03) * nalgebra::UnitQuaternion::from_euler_angles(0.0, 0.1, 1.5);
+        let mut held = SimCamera::new(&cell).expect("a camera").held(mount);
+        let (mut color, mut depth) = (vec![0; held.color_bytes()], vec![0; held.depth_bytes()]);
+        held.render(&scene, &mut color, &mut depth);
+        let info = held.info();
+        let flange = held.robot.as_ref().expect("a robot").model().flange(&scene.q).isometry();
+        assert!((nalgebra::Vector3::from(info.position) - (flange * mount).translation.vector).norm() < 1e-12);
+        cell.camera.as_mut().expect("a camera").pose = CameraPose { position: info.position, orientation: info.wxyz };
+        let (standing, expected, ..) = picture(&cell, &scene);
+        assert_eq!(standing.info(), info);
+        let other = color.iter().zip(&expected).filter(|(a, b)| a.abs_diff(**b) > 2).count();
+        assert!(other * 1000 < color.len(), "{other} of {} values", color.len());
+        assert!(color.chunks_exact(3).any(|rgb| rgb != &color[..3]), "something is seen");
     }
 
     #[test]
