@@ -103,7 +103,10 @@ pub fn capture(options: &Options, interrupt: &Interrupt) -> anyhow::Result<Summa
     let hand_eye = HandEye::read(&options.hand_eye)?;
     let mount = hand_eye.end_effector_from_camera();
     let mount = mount.map_err(|what| anyhow::anyhow!("{} {what}", options.hand_eye.display()))?;
-    let (list, pinhole) = list(&cell, &hand_eye)?;
+    let (mut list, pinhole) = list(&cell, &hand_eye)?;
+    if let Some(table) = &cell.table {
+        list["table"] = json!(table.height);
+    }
     // Without a table everything in reach would be the object.
     let of_table = |table: &Table| Cut { at: options.at.into(), radius: options.radius, table: table.height, pinhole };
     let cut = cell.table.as_ref().map(of_table);

@@ -11,6 +11,7 @@
 //! | `smooth` | the field's own terms |
 //! | `adam` | steps along derivatives |
 //! | `learn` | the optimisation, coarse to fine |
+//! | `table` | nothing lies below the table |
 //! | `view` | whole pictures of the field |
 //! | `appearance` | splats on the surface, trained on the views |
 //! | `judge` | held-out views, and what no view has shown |
@@ -28,6 +29,7 @@ mod ray;
 mod smooth;
 mod start;
 mod state;
+mod table;
 mod view;
 
 pub use judge::HeldOut;
@@ -167,6 +169,9 @@ pub fn reconstruct(scan: Scan, options: &Options, kept: &Path) -> Result<Object,
     let train = (pictures.train.as_slice(), pictures.depth_spread);
     let learner = Learner::new(plan.clone(), train, &pixels, (bounds.centre(), bounds.radius()));
     let poses = learn(&bar, &plan, learner, &mut state, &mut keeper)?;
+    if let Some(height) = scan.table {
+        table::cut(&mut state.field, height);
+    }
     bar.stage(MESH, 3);
     let shape = Shape::of(&state.field, &bar)?;
     interrupted(&plan, &state)?;

@@ -66,6 +66,8 @@ pub struct Scan {
     /// Whether the poses are in metres.
     pub(crate) says_metres: bool,
     of_robot: bool,
+    /// How high the table is on which the object stands: z of the scan's frame [m].
+    pub(crate) table: Option<f64>,
 }
 
 /// Where the poses of a scan stand.
@@ -101,9 +103,11 @@ impl Scan {
         let poses = poses_of(scan)?;
         let folder = if scan.is_file() { scan.parent().unwrap_or(Path::new("")).to_owned() } else { scan.to_owned() };
         let mut known_depths = Vec::new();
+        let mut table = None;
         let (listed, depth_unit, says_metres) = match &poses {
             Poses::File(file) => {
                 let list = transforms::read(file)?;
+                table = list.table;
                 (list.listed, list.depth_unit, list.of_robot)
             }
             Poses::Colmap(model) => {
@@ -141,6 +145,7 @@ impl Scan {
             known_depths,
             says_metres,
             of_robot: says_metres,
+            table,
         })
     }
 
@@ -179,6 +184,7 @@ impl Scan {
             view.scan_from_camera.translation.vector *= metres;
         }
         self.known_depths.iter_mut().for_each(|(_, _, z)| *z *= metres);
+        self.table = self.table.map(|height| height * metres);
         self.says_metres = true;
         self
     }

@@ -35,6 +35,8 @@ struct File {
     depth_unit_scale_factor: Option<f64>,
     /// How the camera is mounted, where frames give the end effector's pose.
     hand_eye: Option<PathBuf>,
+    /// How high the table is on which the object stands [m].
+    table: Option<f64>,
     frames: Vec<Frame>,
 }
 
@@ -71,6 +73,8 @@ pub(crate) struct List {
     pub(crate) depth_unit: Option<f64>,
     /// Whether poses are a robot's: metres in its base frame.
     pub(crate) of_robot: bool,
+    /// How high the table is, where a robot's file says it [m].
+    pub(crate) table: Option<f64>,
 }
 
 /// Reads a file and, where it gives the end effector's poses, how the camera is mounted.
@@ -96,10 +100,17 @@ pub(crate) fn read(path: &Path) -> Result<List, ScanError> {
             scan_from_camera: pose.map_err(|what| bad(format!("{name}: {what}")))?,
         })
     });
+    let of_robot = is_held || path.file_name().is_some_and(|name| name == "poses.json");
+    if file.table.is_some_and(|height| !height.is_finite() || !of_robot) {
+        return Err(bad(
+            "`table` is the height of the table in a robot's base frame [m], and goes with poses in it".into()
+        ));
+    }
     Ok(List {
+        table: file.table,
+        of_robot,
         listed: listed.collect::<Result<_, ScanError>>()?,
         depth_unit: file.depth_unit_scale_factor,
-        of_robot: is_held || path.file_name().is_some_and(|name| name == "poses.json"),
     })
 }
 
@@ -202,6 +213,7 @@ mod tests {
             (frame("[[1,0,0,0],[0,1,0,0],[0,0,-1,0],[0,0,0,1]]"), "mirrored"),
             (frame("[[2,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,1]]"), "no rotation"),
             (r#"{"w": 640, "h": 480, "frames": [{"file_path": "a.png"}]}"#.into(), "`fl_x` is missing"),
+            (format!(r#"{{{HEAD}, "table": 0.1, "frames": []}}"#), "a robot's base frame"),
             ("{}".into(), "frames"),
         ];
         for (text, what) in cases {
