@@ -26,6 +26,8 @@ pub struct Library {
     /// The joint in whose channels each number shows, from 0; `None` for numbers of the whole arm and of the object, and for
     /// those of a joint that an object alone may show.
     pub joints: Vec<Option<usize>>,
+    /// Whether joints move without one another: nothing but a second-order model of each is known.
+    pub joints_apart: bool,
     /// What each number does to the arm.
     reaches: Vec<ArmReach>,
     /// The baseline's numbers: gains, and the object's parameters.
@@ -138,7 +140,9 @@ impl Library {
         let felt = (numbers.iter().enumerate()).find_map(|(number, (setting, _))| Some((felt_with(setting)?, number)));
         let reaches = numbers.iter().map(|(setting, _)| arm_reach(setting, felt)).collect();
         let (all, unknowns): (Vec<Setting>, Vec<Unknown>) = numbers.into_iter().unzip();
-        Self { settings: Settings::new(base.clone(), all), unknowns, joints, reaches, baseline, candidates, robot }
+        let joints_apart = cell.robot.as_ref().is_some_and(|robot| robot.urdf.is_none() && !robot.joints.is_empty());
+        let settings = Settings::new(base.clone(), all);
+        Self { settings, unknowns, joints, joints_apart, reaches, baseline, candidates, robot }
     }
 
     /// Puts angles that have come to one end of their turn, which their bounds span, to its other end: the same angle.
@@ -169,6 +173,7 @@ impl Library {
         Self {
             settings: Settings::new(self.settings.base().clone(), chosen.iter().map(|(k, _)| all[*k]).collect()),
             joints: chosen.iter().map(|(k, _)| self.joints[*k]).collect(),
+            joints_apart: self.joints_apart,
             reaches: chosen.iter().map(|(k, _)| reach(*k)).collect(),
             baseline: 0..chosen.len(),
             candidates: Vec::new(),

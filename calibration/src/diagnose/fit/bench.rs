@@ -1,5 +1,5 @@
-//! Hypotheses fitted to clips: the baseline's numbers and those of the effects that act, together, by bounded Gauss-Newton
-//! steps over the sweeps of [`super::sweep`].
+//! Hypotheses fitted to clips: the baseline's numbers and those of the effects that act, together, by the steps of
+//! [`super::descend`].
 
 use super::effort::Effort;
 use super::shortlist::{Scored, hold_numbers};
@@ -7,7 +7,6 @@ use super::sweep::{Point, Precision, Reduced, Swept, sweep};
 use crate::diagnose::evidence::measured::Evidence;
 use crate::diagnose::evidence::scatter::Scatter;
 use crate::diagnose::library::Library;
-use crate::estimate::Descent;
 use crate::interrupt::Interrupt;
 use crate::kept::{Fingerprint, Trail};
 use nalgebra::{DMatrix, DVector};
@@ -78,8 +77,6 @@ impl Hypothesis {
     }
 }
 
-/// A fit has converged when a step promises less than this of the deviance: a fiftieth of a nat decides nothing.
-const TOLERANCE: f64 = 0.05;
 /// An effect weaker than this share of the strongest that is met in practice is none: two engines with other steps and other
 /// rules of integration differ by as much (0.35 % of a rotor's inertia and 0.02 % of viscous friction, measured on sessions
 /// of another engine with nothing wrong).
@@ -88,8 +85,6 @@ const NEGLIGIBLE: f64 = 0.008;
 const CONVENTION: f64 = 1.5e-3;
 /// Steps in which a clip finds its own numbers.
 const OWN_STEPS: usize = 2;
-/// Most trials with growing damping before a point counts as the best there is.
-const TRIALS: usize = 6;
 
 /// Share of the strongest from which on an effect counts. What fades out towards infinity, as a gear's stiffness, is met
 /// in practice from the far end of its plausible range on; beyond, it is the ordinary stiffness of anything.
@@ -171,29 +166,6 @@ impl<E: Evidence> Bench<'_, E> {
         Some(Hypothesis { effects: effects.to_vec(), full, free, fitted: fitted.collect() })
     }
 
-    /// Damped steps of some numbers and of the clips' own; the last linearisation too, where no step from it was worth it.
-    fn descended(
-        &self,
-        (mut full, mut clips): (Vec<f64>, Clips),
-        moving: &[usize],
-        weights: &[f64],
-        effort: Effort,
-    ) -> Option<(Vec<f64>, Clips, Option<Swept>)> {
-        let mut damping = 1e-4;
-        for _ in 0..effort.iterations {
-            if self.interrupt.asked() {
-                break;
-            }
-            let at = self.linearise(&full, moving, &clips, effort.precision)?;
-            let forms = at.reduced(self.evidence, weights);
-            let Some((to, to_own)) = self.improved(&full, moving, (&at, &forms), weights, &mut damping) else {
-                return Some((full, clips, Some(at)));
-            };
-            (full, clips) = (to, to_own);
-        }
-        Some((full, clips, None))
-    }
-
     /// What the clips of a hypothesis cost at `full` after one step of some numbers alone, and the numbers then. `None` when the
     /// twin has no answer there.
     pub(in crate::diagnose) fn after_a_step(
@@ -217,35 +189,6 @@ impl<E: Evidence> Bench<'_, E> {
         let point = Point { full, free, probed: &[], clips, precision };
         // Not to be cut short: what was found is known only once the clips are linearised there.
         sweep(self.evidence, self.library, &point, &self.scatter, &|_| true).ok()
-    }
-
-    /// A point with a lower cost, along damped steps; `None` when there is none that is worth it.
-    fn improved(
-        &self,
-        full: &[f64],
-        free: &[usize],
-        (at, forms): (&Swept, &[Reduced]),
-        weights: &[f64],
-        damping: &mut f64,
-    ) -> Option<(Vec<f64>, Clips)> {
-        let size = 1 + free.len();
-        let sum = forms.iter().fold(DMatrix::zeros(size, size), |sum, reduced| sum + &reduced.form);
-        let kept: Clips = at.clips.iter().map(|clip| (clip.clip, clip.own.clone())).collect();
-        let now = self.cost(full, &kept, weights)?;
-        let (information, gradient) = (sum.view((1, 1), (free.len(), free.len())), sum.view((1, 0), (free.len(), 1)));
-        let (information, gradient) = (information.into_owned(), gradient.column(0).into_owned());
-        let room: Vec<[f64; 2]> = free.iter().map(|k| self.library.unknowns[*k].room(full[*k])).collect();
-        let descent =
-            Descent { information: &information, gradient: &gradient, room: &room, enough: TOLERANCE, trials: TRIALS };
-        descent.step(damping, |_, step| {
-            let mut to = full.to_vec();
-            free.iter().zip(step.iter()).for_each(|(k, step)| to[*k] += step);
-            self.library.turn_round(&mut to);
-            let own = |clip: &super::sweep::SweptClip| (clip.clip, at.own_after(clip, self.evidence, weights, step));
-            let to_own = self.own_fitted(&to, at.clips.iter().map(own).collect(), weights)?;
-            let to_own = self.restarted(&to, to_own, weights);
-            self.cost(&to, &to_own, weights).is_some_and(|cost| cost < now).then_some((to, to_own))
-        })
     }
 
     /// The effort of a trial of a candidate: one beyond the arm leaves the joints' numbers alone.
@@ -319,7 +262,7 @@ impl<E: Evidence> Bench<'_, E> {
     }
 
     /// Clips with their own numbers at their best for shared ones that are given.
-    fn own_fitted(&self, full: &[f64], mut clips: Clips, weights: &[f64]) -> Option<Clips> {
+    pub(super) fn own_fitted(&self, full: &[f64], mut clips: Clips, weights: &[f64]) -> Option<Clips> {
         let steps = if self.scatter.count() == 0 { 0 } else { OWN_STEPS };
         for _ in 0..steps {
             let swept = self.linearise(full, &[], &clips, Precision::Exact)?;

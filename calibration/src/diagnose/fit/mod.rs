@@ -6,6 +6,7 @@
 //! | `floor` | weights of the channels: how far residuals can be trusted |
 //! | `shortlist` | how much of the gap each candidate's signature explains |
 //! | `bench`, `cost`, `effort` | hypotheses fitted, what they cost, and how much work a fit gets |
+//! | `descend` | the steps of a fit |
 //! | `restart` | restarts of clips whose own numbers are stuck in a local minimum |
 //! | `parameters`, `undetermined` | its numbers with their intervals, and those that nothing depends on |
 //! | `time_step` | how far the twin's time step moves them |
@@ -13,6 +14,7 @@
 
 pub mod bench;
 pub mod cost;
+mod descend;
 pub mod effort;
 pub mod floor;
 pub mod parameters;

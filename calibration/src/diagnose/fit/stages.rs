@@ -17,32 +17,35 @@ pub(in crate::diagnose) const REFINEMENT: &str = "refinement";
 /// The confirm clips are opened.
 pub(in crate::diagnose) const CONCLUSION: &str = "conclusion";
 
-/// A search that finds one effect. Whether it then looks for another is not known before: half of such a step is expected,
-/// which is about what its fits take.
-pub(in crate::diagnose) const ARM: [Planned; 7] = [
+/// A search that finds one effect, and then looks for another beside it.
+pub(in crate::diagnose) const ARM: [Planned; 9] = [
     (BASELINE, 1.0),
     (SIGNATURES, 1.0),
     (FITS, 2.0),
     (LAST_FITS, 1.0),
     (REFINEMENT, 2.0),
+    (SIGNATURES, 1.0),
     (FITS, 2.0),
+    (LAST_FITS, 1.0),
     (CONCLUSION, 0.2),
 ];
 
 /// The same with an object.
-pub(in crate::diagnose) const OBJECT: [Planned; 8] = [
+pub(in crate::diagnose) const OBJECT: [Planned; 10] = [
     (BASELINE, 1.0),
     (SIGNATURES, 0.5),
     (ARM_FITS, 0.5),
     (FITS, 4.0),
     (LAST_FITS, 1.0),
     (REFINEMENT, 3.0),
+    (SIGNATURES, 0.5),
     (FITS, 4.0),
+    (LAST_FITS, 1.0),
     (CONCLUSION, 0.2),
 ];
 
 /// Fits that the score test did not point to.
 pub(in crate::diagnose) const MORE_FITS: [Planned; 2] = [(FITS, 2.0), (LAST_FITS, 1.0)];
 
-/// Half of a further step.
-pub(in crate::diagnose) const FURTHER: [Planned; 1] = [(FITS, 2.0)];
+/// A further step.
+pub(in crate::diagnose) const FURTHER: [Planned; 3] = [(SIGNATURES, 1.0), (FITS, 2.0), (LAST_FITS, 1.0)];

@@ -33,7 +33,7 @@ pub enum Column {
 pub enum Precision {
     /// Joints together, each told by its own channels.
     Joints,
-    /// One simulation for each column.
+    /// One simulation for each column; for those of all joints where these move without one another.
     Exact,
 }
 
@@ -124,7 +124,7 @@ fn batches(library: &Library, columns: &[Column], precision: Precision) -> Vec<B
     };
     for (k, column) in columns.iter().enumerate() {
         let joint = joint_of(library, *column);
-        let joins = precision == Precision::Joints
+        let joins = (precision == Precision::Joints || library.joints_apart)
             && joint.is_some()
             && batches.last().is_some_and(|batch| {
                 batch.iter().all(|other| {
