@@ -1,0 +1,53 @@
+//! Clips of a minute, of which the arm moves for a few seconds: what counts is where it moves, and the verdict is the same.
+
+use calibration::benchmark::session::record;
+use calibration::benchmark::world::{Fault, Kind, World};
+use calibration::diagnose::clips::admit::Admitted;
+use calibration::diagnose::clips::length::liveliest;
+use calibration::diagnose::clips::split::by_command;
+use calibration::diagnose::{self, Options, diagnose_clips};
+use calibration::interrupt::Interrupt;
+use shared_mem::cell::Cell;
+use shared_mem::recording::{Clip, JointSeries, Session, SessionFiles};
+use shared_mem::theta::{EffectTheta, Theta};
+use std::path::Path;
+
+/// The arm stands on until a minute is over, seen every ten milliseconds.
+fn stands(mut series: JointSeries) -> JointSeries {
+    let (first, rows) = (series.stamps_ns[0], series.len());
+    let end =
+        |values: &[f64]| if values.is_empty() { Vec::new() } else { values[values.len() - series.dof..].to_vec() };
+    let (q, dq, tau) = (end(&series.q), vec![0.0; end(&series.dq).len()], end(&series.tau));
+    for stamp in (series.stamps_ns[rows - 1]..first + 60_000_000_000).step_by(10_000_000).skip(1) {
+        series.stamps_ns.push(stamp);
+        series.q.extend(&q);
+        series.dq.extend(&dq);
+        series.tau.extend(&tau);
+    }
+    series
+}
+
+#[test]
+fn a_late_command_is_named_out_of_clips_of_a_minute() {
+    let cell =
+        Cell::parse(include_str!("../../config/fr3_cell.toml"), Path::new("fr3_cell.toml")).expect("the shipped cell");
+    let well = World::draw(3, Kind::Excitation, Fault::Nothing, &cell);
+    let parameters = [("delay".to_owned(), 8e-3.into())].into();
+    let late = EffectTheta { name: "command_delay".into(), parameters };
+    let world = World { hidden: Theta { effects: vec![late], ..well.hidden.clone() }, ..well };
+    let mut clips: Vec<Clip> = record(&world, 8).expect("a session");
+    for clip in &mut clips {
+        (clip.desired, clip.measured) = (stands(clip.desired.clone()), stands(clip.measured.clone()));
+        assert!((59.9..60.1).contains(&clip.measured.duration()));
+    }
+    let groups = by_command(&clips);
+    let said = liveliest(&mut clips).expect("they are long");
+    assert!(said.contains("of 8 long clips the 6.0 s") && said.contains("48 s of 480 s"), "{said}");
+    let files = clips.iter().map(|clip| clip.file.display().to_string()).collect();
+    let cell = world.cell.clone();
+    let session = Session { folder: "minutes".into(), cell, clips: Vec::new(), files: SessionFiles::default() };
+    let admitted = Admitted { groups, clips, files, with_object: false, warnings: Vec::new() };
+    let found = diagnose_clips(&session, &admitted, &Options::default(), &Interrupt::default()).expect("a diagnosis");
+    assert_eq!(found.verdict.kind, diagnose::Kind::Named, "{:?}", found.verdict);
+    assert_eq!(found.verdict.effects, ["command_delay"]);
+}
