@@ -7,13 +7,14 @@
 
 use super::bench::{Bench, Clips};
 use super::effort::Effort;
+use super::floor;
 use super::sweep::{Reduced, Swept};
 use crate::diagnose::evidence::measured::Evidence;
 use crate::estimate::Descent;
 use nalgebra::{DMatrix, DVector};
 
-/// A fit has converged when a step promises less than this of the deviance: a fiftieth of a nat decides nothing. Where the
-/// residuals are larger than their sigmas, what chance moves is larger, and so is this.
+/// A fit has converged when a step promises less than this of the deviance: a fiftieth of a nat decides nothing. Where more is
+/// left than the weights take for noise, chance moves more, and so much more decides nothing.
 const TOLERANCE: f64 = 0.05;
 /// Most trials with growing damping before a point counts as the best there is.
 const TRIALS: usize = 6;
@@ -79,7 +80,7 @@ impl<E: Evidence> Bench<'_, E> {
         let (information, gradient) = (sum.view((1, 1), (free.len(), free.len())), sum.view((1, 0), (free.len(), 1)));
         let (information, gradient) = (information.into_owned(), gradient.column(0).into_owned());
         let room: Vec<[f64; 2]> = free.iter().map(|k| self.library.unknowns[*k].room(full[*k])).collect();
-        let enough = TOLERANCE * self.excess(now, &here, weights);
+        let enough = TOLERANCE * self.excess(at, weights);
         let descent = Descent { information: &information, gradient: &gradient, room: &room, enough, trials };
         descent.step(damping, |_, step| {
             let mut to = full.to_vec();
@@ -95,14 +96,18 @@ impl<E: Evidence> Bench<'_, E> {
         })
     }
 
-    /// By how much the squared residuals of clips without numbers of their own exceed their sigmas, at least 1.
-    fn excess(&self, cost: f64, clips: &Clips, weights: &[f64]) -> f64 {
+    /// How many times what the clips of an arm leave exceeds what the weights take for noise, at least 1: so many times more does
+    /// chance move of the deviance. Clips with numbers of their own take that up.
+    fn excess(&self, at: &Swept, weights: &[f64]) -> f64 {
         if self.scatter.count() > 0 {
             return 1.0;
         }
-        let weigh = |clip: usize| self.evidence.rows(clip).iter().filter(|row| weights[row.channel] > 0.0).count();
-        let rows: usize = clips.iter().map(|(clip, _)| weigh(*clip)).sum();
-        (cost / rows.max(1) as f64).max(1.0)
+        let left: Vec<(usize, Vec<f64>)> =
+            at.clips.iter().map(|clip| (clip.clip, clip.matrix.column(0).iter().copied().collect())).collect();
+        let found = floor::weights(self.evidence, &left);
+        let counts = weights.iter().zip(&found).filter(|(taken, found)| **taken > 0.0 && **found > 0.0);
+        let ratios: Vec<f64> = counts.map(|(taken, found)| (taken / found).powi(2)).collect();
+        (ratios.iter().sum::<f64>() / ratios.len().max(1) as f64).max(1.0)
     }
 
     /// A linearisation moved to where a step led, its slopes corrected by what the step did: by the least that makes them right

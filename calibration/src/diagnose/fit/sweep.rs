@@ -312,3 +312,27 @@ fn gram(clip: &SweptClip, evidence: &impl Evidence, weights: &[f64]) -> DMatrix<
     // As a product of matrices: nalgebra's `tr_mul` takes one dot product after another, several times slower.
     weighted.transpose() * weighted
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::forward::setting;
+    use shared_mem::cell::Cell;
+    use shared_mem::msg::MAX_JOINTS;
+    use std::path::Path;
+
+    #[test]
+    fn joints_that_move_without_one_another_are_turned_together_however_exact() {
+        let text = "[robot]\njoints = [\"a\", \"b\", \"c\"]\n[controller]\nkind = \"joint_pd\"\nstiffness_range = [0.5, 200.0]\n\
+                    damping_range = [0.0, 20.0]\n";
+        let cell = Cell::parse(text, Path::new("cell.toml")).expect("a cell");
+        let base = setting::complete(&cell, None).expect("a cell");
+        let apart = Library::new(&cell, &base, None, &[10.0; MAX_JOINTS]);
+        let columns: Vec<Column> = apart.baseline.clone().map(Column::Number).collect();
+        let count = |library: &Library, precision| batches(library, &columns, precision).len();
+        assert_eq!(count(&apart, Precision::Exact), count(&apart, Precision::Joints));
+        let coupled = Library { joints_apart: false, ..apart };
+        assert_eq!(count(&coupled, Precision::Exact), columns.len());
+        assert!(count(&coupled, Precision::Joints) < columns.len());
+    }
+}
