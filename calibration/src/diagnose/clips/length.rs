@@ -31,8 +31,8 @@ pub fn liveliest(clips: &mut [Clip]) -> Option<String> {
         let all = seconds.iter().sum::<f64>();
         let counts = seconds.iter().map(|seconds| seconds.min(most)).sum::<f64>();
         format!(
-            "of {cut} long clips the {most:.1} s count in which their commands move the joints most, {counts:.0} s of {all:.0} s in all: \
-             the others would take far longer and say little more; `twin replay` takes them whole"
+            "of {cut} long clips the {most:.1} s count in which their commands move the joints most, {counts:.0} s of {all:.0} s in \
+             all: the others would take far longer and say little more; `twin replay` takes them whole"
         )
     })
 }
