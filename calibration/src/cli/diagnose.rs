@@ -34,7 +34,7 @@ With --engine another simulator is the twin: yours, with your model of the robot
 adapters/mujoco is one for MuJoCo). The verdict is about that one. Effects that it knows are asked of it; of others the twin's own
 difference is added. For clips of the arm alone, and of strokes where the engine says that it simulates an object.
 
-Of clips of the arm alone that last longer together than 48 s the parts count in which its commands move the joints most, and the
+Of clips of the arm alone that last longer together than 96 s the parts count in which its commands move the joints most, and the
 answer says how long these are.
 
 What to record next is printed as commands that can be typed, and of an effect that is named what to do about it in the

@@ -5,9 +5,9 @@ use shared_mem::cell::ClipKind;
 use shared_mem::recording::{Clip, JointSeries};
 
 /// So much motion counts in all [s]. Residuals of a model that is not exact are alike over tenths of a second, so this holds some
-/// hundred that say something of their own in every channel, more than the numbers of any hypothesis; the simulated sessions in
-/// which effects are told apart have 34 s.
-const ENOUGH: f64 = 48.0;
+/// hundred that say something of their own in every channel, more than the numbers of any hypothesis; it is three times what the
+/// simulated sessions have in which effects are told apart (34 s).
+const ENOUGH: f64 = 96.0;
 /// Commands from before the part that counts are kept for so long: some are still on their way [ns].
 const BEFORE_NS: u64 = 500_000_000;
 /// Parts of a clip that are compared begin this share of their length apart.
@@ -109,10 +109,10 @@ mod tests {
 
     #[test]
     fn what_is_short_stays_and_the_long_share_the_rest() {
-        assert_eq!(equal_share(&[3.0; 16]), None);
-        assert_eq!(equal_share(&[60.0; 16]), Some(3.0));
-        // 6 s and 12 s of the 48 are taken; two share the thirty that are left.
-        assert_eq!(equal_share(&[500.0, 6.0, 12.0, 300.0]), Some(15.0));
+        assert_eq!(equal_share(&[6.0; 16]), None);
+        assert_eq!(equal_share(&[60.0; 16]), Some(6.0));
+        // 6 s and 12 s of the 96 are taken; two share the 78 that are left.
+        assert_eq!(equal_share(&[500.0, 6.0, 12.0, 300.0]), Some(39.0));
     }
 
     #[test]
@@ -120,12 +120,12 @@ mod tests {
         let mut clips = vec![clip(300, 100.0), clip(6, 0.0), clip(300, 250.0), clip(300, 0.0)];
         let short = clips[1].clone();
         let said = liveliest(&mut clips).expect("they are long");
-        assert!(said.contains("3 long clips the 14.0 s") && said.contains("48 s of 906 s"), "{said}");
+        assert!(said.contains("3 long clips the 30.0 s") && said.contains("96 s of 906 s"), "{said}");
         assert_eq!(clips[1], short);
         for (clip, lively) in [(&clips[0], 100.0), (&clips[2], 250.0), (&clips[3], 0.0)] {
             let (from, to) = (clip.measured.stamps_ns[0] as f64 * 1e-9, clip.measured.duration());
             assert!(from <= lively + 1e-9 && from + to >= lively + 7.9, "{from} s, {to} s long");
-            assert!((13.9..14.1).contains(&to), "{to}");
+            assert!((29.9..30.1).contains(&to), "{to}");
             let before = seconds_between(clip.desired.stamps_ns[0], clip.measured.stamps_ns[0]);
             assert!((before - 0.5_f64.min(from)).abs() < 1e-9, "{before}");
         }

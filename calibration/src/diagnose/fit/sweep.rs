@@ -331,7 +331,8 @@ mod tests {
         let columns: Vec<Column> = apart.baseline.clone().map(Column::Number).collect();
         let count = |library: &Library, precision| batches(library, &columns, precision).len();
         assert_eq!(count(&apart, Precision::Exact), count(&apart, Precision::Joints));
-        let coupled = Library { joints_apart: false, ..apart };
+        let mut coupled = apart;
+        coupled.joints_apart = false;
         assert_eq!(count(&coupled, Precision::Exact), columns.len());
         assert!(count(&coupled, Precision::Joints) < columns.len());
     }

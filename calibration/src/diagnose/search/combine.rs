@@ -25,6 +25,8 @@ use shared_mem::progress::Progress;
 pub const MOST: usize = 4;
 /// So many places of a patch are fitted to the end.
 const LAST_PLACES: usize = 3;
+/// So often at most a search begins anew from a better fit of what its step extends.
+const ANEW: usize = 2;
 /// Near the best deviance is within [`NEAR`] of it, or within this share of what the best gains.
 const NEAR_SHARE: f64 = 0.4;
 /// Engines integrate one and the same effect differently by a hundredth of it, so by this share of the squared gap.
@@ -41,6 +43,7 @@ pub fn search<E: Evidence>(
 ) -> Option<Found> {
     let mut steps: Vec<Step> = Vec::new();
     let mut now = baseline;
+    let mut begun_anew = 0;
     loop {
         if let Some(first) = steps.first().filter(|first| spent(bench, split, first, &now)) {
             let last = untried(bench, split, &now, Some(first))?;
@@ -58,6 +61,14 @@ pub fn search<E: Evidence>(
             break;
         };
         step.reconsider(bench, split, refined);
+        if begun_anew < ANEW
+            && let Some(nearer) = step.nearer_without(bench, split)
+        {
+            bar.insert(&stages::FURTHER);
+            begun_anew += 1;
+            now = nearer;
+            continue;
+        }
         let best = step.best(bench).map(|(_, fit, _)| fit.clone());
         now = step.from.clone();
         let weights = step.weights.clone();
