@@ -30,7 +30,7 @@ pub struct Crossing {
 /// Topics that move the robot or its gripper, as far as they can cross.
 const COMMANDS: [&str; 2] = [topics::ARM_TARGET.name, topics::GRIPPER_TARGET.name];
 /// What the twin says: it runs where it runs, on either side.
-const OF_THE_TWIN: [&str; 2] = [topics::TWIN_STATE.name, topics::TWIN_GAP.name];
+const OF_THE_TWIN: [&str; 3] = [topics::TWIN_STATE.name, topics::TWIN_GAP.name, topics::TWIN_OBJECTS.name];
 /// Commands that never cross, and what stands in for them.
 const NEVER: [(&str, &str); 2] =
     [(topics::ARM_MOTION.name, topics::ARM_TARGET.name), (topics::GRIPPER_COMMAND.name, topics::GRIPPER_TARGET.name)];

@@ -9,9 +9,9 @@ use crate::msg::event::Event;
 use crate::msg::gripper::{GripperCommand, GripperState};
 use crate::msg::image::CameraInfo;
 use crate::msg::motion::MotionChunk;
-use crate::msg::object::ObjectPose;
+use crate::msg::object::{NamedPose, ObjectPose};
 use crate::msg::target::{ArmTarget, GripperTarget};
-use crate::msg::twin::{TwinGap, TwinState};
+use crate::msg::twin::{TwinGap, TwinObject, TwinState};
 use crate::msg::wrench::Wrench;
 use std::marker::PhantomData;
 
@@ -83,6 +83,10 @@ pub const ARM_TARGET: Topic<ArmTarget> = topic("/arm/target", TARGETS);
 /// Tracker or simulation to all: pose of the object, at frame rate.
 pub const OBJECT_POSE: Topic<ObjectPose> =
     topic("/object/pose", Limits { buffer: 256, history: 1, borrowed: 2, subscribers: 8, publishers: 2 });
+/// Tracker or simulation to all: pose of each object that has a name, at frame rate. The first object of a cell is on
+/// [`OBJECT_POSE`], too.
+pub const OBJECT_POSES: Topic<NamedPose> =
+    topic("/object/poses", Limits { buffer: 1024, history: 32, borrowed: 2, subscribers: 8, publishers: 2 });
 /// Bridge to all: colour pictures.
 pub const CAMERA_COLOR: ImageTopic = ImageTopic { name: "/camera/color", limits: PICTURES };
 /// Bridge to all: depth pictures.
@@ -103,6 +107,9 @@ pub const GRIPPER_TARGET: Topic<GripperTarget> = topic("/gripper/target", TARGET
 pub const TWIN_STATE: Topic<TwinState> = topic("/twin/state", STREAM);
 /// Twin to all: real against twin, each cycle it mirrors.
 pub const TWIN_GAP: Topic<TwinGap> = topic("/twin/gap", STREAM);
+/// Twin to all: each object that has a name, real against twin, whenever its pose comes.
+pub const TWIN_OBJECTS: Topic<TwinObject> =
+    topic("/twin/objects", Limits { buffer: 1024, history: 0, borrowed: 2, subscribers: 8, publishers: 1 });
 /// Anyone to all: remarks for people.
 pub const EVENTS: Topic<Event> =
     topic("/events", Limits { buffer: 128, history: 16, borrowed: 2, subscribers: 8, publishers: 8 });
@@ -116,6 +123,12 @@ pub const TASK_DRIVES: &str = "/task/drives";
 #[must_use]
 pub fn object_pose(name: &str) -> String {
     format!("/object/{name}/pose")
+}
+
+/// Recordings: the object of this name in the twin, and how far it is from the real one.
+#[must_use]
+pub fn twin_object(name: &str) -> String {
+    format!("/twin/object/{name}")
 }
 
 /// Recordings of tasks: where the moved body of this name is commanded to be.
@@ -155,6 +168,7 @@ list!(
     messages ARM_MOTION,
     messages ARM_TARGET,
     messages OBJECT_POSE,
+    messages OBJECT_POSES,
     pictures CAMERA_COLOR,
     pictures CAMERA_DEPTH,
     messages CAMERA_INFO,
@@ -164,6 +178,7 @@ list!(
     messages GRIPPER_TARGET,
     messages TWIN_STATE,
     messages TWIN_GAP,
+    messages TWIN_OBJECTS,
     messages EVENTS,
 );
 

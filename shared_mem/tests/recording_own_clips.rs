@@ -6,9 +6,9 @@ use shared_mem::msg::event::{Event, EventLevel, EventSource};
 use shared_mem::msg::gripper::GripperState;
 use shared_mem::msg::image::{CameraInfo, ImageHeader, PixelEncoding, StampDomain};
 use shared_mem::msg::joints_from;
-use shared_mem::msg::object::ObjectPose;
+use shared_mem::msg::object::{ObjectName, ObjectPose};
 use shared_mem::msg::target::{ArmTarget, GripperTarget, TargetKind};
-use shared_mem::msg::twin::{TwinGap, TwinState};
+use shared_mem::msg::twin::{TwinGap, TwinObject, TwinState};
 use shared_mem::msg::wrench::Wrench;
 use shared_mem::recording::{
     ClipInfo, ClipMessages, ClipWriter, Payload, Picture, Session, WriteError, read_arm_states, read_clip,
@@ -158,8 +158,21 @@ fn one_of_each() -> Vec<Payload> {
         Payload::Gripper(gripper),
         Payload::TwinState(Box::new(twin)),
         Payload::TwinGap(Box::new(gap)),
+        Payload::TwinObject(Box::new(twin_object())),
         Payload::Event(Box::new(event)),
     ]
+}
+
+fn twin_object() -> TwinObject {
+    TwinObject {
+        stamp_ns: 7,
+        mirrors_ns: 5,
+        position: [0.1, 0.2, 0.3],
+        wxyz: [0.0, 1.0, 0.0, 0.0],
+        add_m: 0.004,
+        add_s_m: 0.003,
+        name: ObjectName::new("milk_box").expect("a name"),
+    }
 }
 
 fn write<W: Write>(writer: &mut ClipWriter<W>, payload: &Payload) -> Result<(), WriteError> {
@@ -176,6 +189,7 @@ fn write<W: Write>(writer: &mut ClipWriter<W>, payload: &Payload) -> Result<(), 
         Payload::GripperTarget(m) => writer.gripper_target(m),
         Payload::TwinState(m) => writer.twin_state(m),
         Payload::TwinGap(m) => writer.twin_gap(m),
+        Payload::TwinObject(m) => writer.twin_object(m),
         Payload::Event(m) => writer.event(m),
     }
 }

@@ -4,9 +4,9 @@ use shared_mem::msg::arm::{ArmCommand, ArmState};
 use shared_mem::msg::event::Event;
 use shared_mem::msg::gripper::GripperState;
 use shared_mem::msg::image::{CameraInfo, ImageHeader};
-use shared_mem::msg::object::ObjectPose;
+use shared_mem::msg::object::{NamedPose, ObjectPose};
 use shared_mem::msg::target::{ArmTarget, GripperTarget};
-use shared_mem::msg::twin::{TwinGap, TwinState};
+use shared_mem::msg::twin::{TwinGap, TwinObject, TwinState};
 use shared_mem::msg::wrench::Wrench;
 use shared_mem::recording::{ClipWriter, WriteError};
 use shared_mem::topics;
@@ -20,6 +20,7 @@ pub(super) struct Sources {
     state: Subscriber<ArmState>,
     command: Subscriber<ArmCommand>,
     object: Subscriber<ObjectPose>,
+    objects: Subscriber<NamedPose>,
     color: ImageSubscriber,
     depth: ImageSubscriber,
     info: Subscriber<CameraInfo>,
@@ -29,6 +30,7 @@ pub(super) struct Sources {
     gripper_target: Subscriber<GripperTarget>,
     twin_state: Subscriber<TwinState>,
     twin_gap: Subscriber<TwinGap>,
+    twin_objects: Subscriber<TwinObject>,
     events: Subscriber<Event>,
     wake: Wake,
     counted: Counted,
@@ -70,6 +72,7 @@ impl Sources {
             state: node.subscriber(topics::ARM_STATE)?,
             command: node.subscriber(topics::ARM_COMMAND)?,
             object: node.subscriber(topics::OBJECT_POSE)?,
+            objects: node.subscriber(topics::OBJECT_POSES)?,
             color: node.image_subscriber(topics::CAMERA_COLOR)?,
             depth: node.image_subscriber(topics::CAMERA_DEPTH)?,
             info: node.subscriber(topics::CAMERA_INFO)?,
@@ -79,6 +82,7 @@ impl Sources {
             gripper_target: node.subscriber(topics::GRIPPER_TARGET)?,
             twin_state: node.subscriber(topics::TWIN_STATE)?,
             twin_gap: node.subscriber(topics::TWIN_GAP)?,
+            twin_objects: node.subscriber(topics::TWIN_OBJECTS)?,
             events: node.subscriber(topics::EVENTS)?,
             wake: node.wake_on(topics::ARM_STATE.name)?,
             counted: Counted::default(),
@@ -132,6 +136,7 @@ impl Sources {
         }
         drain!(command, arm_command);
         drain!(object, object_pose);
+        drain!(objects, named_pose);
         drain!(info, camera_info);
         drain!(wrench, wrench);
         drain!(gripper, gripper);
@@ -139,6 +144,7 @@ impl Sources {
         drain!(gripper_target, gripper_target);
         drain!(twin_state, twin_state);
         drain!(twin_gap, twin_gap);
+        drain!(twin_objects, twin_object);
         let before = counted.taken;
         drain!(events, event);
         counted.remarks += counted.taken - before;

@@ -66,6 +66,12 @@ pub enum Wrong {
         /// Field of the message.
         field: &'static str,
     },
+    /// A text is no name of an object.
+    #[error("{field} is no name of letters, digits and _")]
+    Name {
+        /// Field of the message.
+        field: &'static str,
+    },
     /// A picture's bytes do not fit its header.
     #[error("the picture has {bytes} bytes, its header describes {described}")]
     PictureSize {

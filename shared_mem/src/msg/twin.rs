@@ -2,7 +2,8 @@
 #![allow(non_snake_case)] // the field's own symbols
 
 use super::check::{self, Wrong};
-use super::wire::plain;
+use super::object::ObjectName;
+use super::wire::{plain, wire};
 use super::{Joints, MAX_JOINTS};
 use iceoryx2::prelude::ZeroCopySend;
 use zerocopy::{FromBytes, Immutable, IntoBytes};
@@ -124,3 +125,58 @@ impl TwinGap {
 }
 
 plain!(TwinGap);
+
+/// One of several objects in the twin, when the tracker reports it, and how far the two are apart. Topic `/twin/objects`; clips
+/// hold each on `/twin/object/NAME`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TwinObject {
+    /// When it was sent: monotonic clock [ns].
+    pub stamp_ns: u64,
+    /// Moment of the picture behind the tracker's pose: monotonic clock [ns].
+    pub mirrors_ns: u64,
+    /// Predicted position at that moment, geometric centre in the base frame [m].
+    pub position: [f64; 3],
+    /// Predicted orientation in the base frame, `w, x, y, z`.
+    pub wxyz: [f64; 4],
+    /// Average distance of its surface points, twin against tracker [m]; NaN when the twin was just set onto it.
+    pub add_m: f64,
+    /// The same to the closest point (for symmetric objects) [m]; NaN as before.
+    pub add_s_m: f64,
+    /// Whose it is.
+    pub name: ObjectName,
+}
+
+impl Default for TwinObject {
+    fn default() -> Self {
+        Self {
+            stamp_ns: 0,
+            mirrors_ns: 0,
+            position: [0.0; 3],
+            wxyz: [1.0, 0.0, 0.0, 0.0],
+            add_m: f64::NAN,
+            add_s_m: f64::NAN,
+            name: ObjectName::default(),
+        }
+    }
+}
+
+impl TwinObject {
+    fn check(&self) -> Result<(), Wrong> {
+        check::running("stamp_ns", self.stamp_ns)?;
+        check::running("mirrors_ns", self.mirrors_ns)?;
+        check::numbers("position", &self.position)?;
+        check::quaternion("wxyz", &self.wxyz)?;
+        check::number_or_none("add_m", self.add_m)?;
+        check::number_or_none("add_s_m", self.add_s_m)
+    }
+}
+
+wire!("twinalign/TwinObject/1" TwinObjectWire: TwinObject {
+    stamp_ns: u64,
+    mirrors_ns: u64,
+    position: [f64; 3],
+    wxyz: [f64; 4],
+    add_m: f64,
+    add_s_m: f64,
+    name: ObjectName,
+});

@@ -8,9 +8,9 @@ use crate::msg::arm::{ArmCommand, ArmState};
 use crate::msg::event::Event;
 use crate::msg::gripper::GripperState;
 use crate::msg::image::{CameraInfo, ImageHeader};
-use crate::msg::object::ObjectPose;
+use crate::msg::object::{NamedPose, ObjectPose};
 use crate::msg::target::{ArmTarget, GripperTarget};
-use crate::msg::twin::{TwinGap, TwinState};
+use crate::msg::twin::{TwinGap, TwinObject, TwinState};
 use crate::msg::wrench::Wrench;
 use crate::time::unix_offset_ns;
 use crate::topics::{self, ImageTopic, Topic};
@@ -68,6 +68,7 @@ encoded!(
     ArmState,
     ArmCommand,
     ObjectPose,
+    NamedPose,
     CameraInfo,
     Wrench,
     GripperState,
@@ -75,6 +76,7 @@ encoded!(
     GripperTarget,
     TwinState,
     TwinGap,
+    TwinObject,
     Event,
 );
 
@@ -91,6 +93,7 @@ pub fn visit_encoded(visitor: &mut impl EncodedVisitor) {
     visitor.messages(topics::ARM_STATE);
     visitor.messages(topics::ARM_COMMAND);
     visitor.messages(topics::OBJECT_POSE);
+    visitor.messages(topics::OBJECT_POSES);
     visitor.pictures(topics::CAMERA_COLOR);
     visitor.pictures(topics::CAMERA_DEPTH);
     visitor.messages(topics::CAMERA_INFO);
@@ -100,6 +103,7 @@ pub fn visit_encoded(visitor: &mut impl EncodedVisitor) {
     visitor.messages(topics::GRIPPER_TARGET);
     visitor.messages(topics::TWIN_STATE);
     visitor.messages(topics::TWIN_GAP);
+    visitor.messages(topics::TWIN_OBJECTS);
     visitor.messages(topics::EVENTS);
 }
 

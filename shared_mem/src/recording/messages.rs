@@ -15,7 +15,7 @@ use crate::msg::gripper::GripperState;
 use crate::msg::image::CameraInfo;
 use crate::msg::object::ObjectPose;
 use crate::msg::target::{ArmTarget, GripperTarget};
-use crate::msg::twin::{TwinGap, TwinState};
+use crate::msg::twin::{TwinGap, TwinObject, TwinState};
 use crate::msg::wrench::Wrench;
 use prost::Message as _;
 use std::fs::File;
@@ -58,6 +58,8 @@ pub enum Payload {
     TwinState(Box<TwinState>),
     /// `/twin/gap`
     TwinGap(Box<TwinGap>),
+    /// `/twin/object/NAME`
+    TwinObject(Box<TwinObject>),
     /// `/events`, or a bag's `rcl_interfaces/Log`.
     Event(Box<Event>),
 }
@@ -146,6 +148,7 @@ fn own(message: &Message<'_>) -> Result<Option<Payload>, String> {
         GripperTarget::SCHEMA => Payload::GripperTarget(decode(data)?),
         TwinState::SCHEMA => Payload::TwinState(Box::new(decode(data)?)),
         TwinGap::SCHEMA => Payload::TwinGap(Box::new(decode(data)?)),
+        TwinObject::SCHEMA => Payload::TwinObject(Box::new(decode(data)?)),
         Event::SCHEMA => Payload::Event(Box::new(decode(data)?)),
         wire::IMAGE_SCHEMA => {
             let image = proto::foxglove::RawImage::decode(data)

@@ -176,7 +176,7 @@ pub(super) fn listener_error(topic: &'static str, error: ListenerCreateError) ->
 /// The program that usually sits on a side of a topic, for error messages.
 fn owner_of(topic: &str) -> &'static str {
     match topic {
-        "/twin/state" | "/twin/gap" => "twin shadow",
+        "/twin/state" | "/twin/gap" | "/twin/objects" => "twin shadow",
         "/arm/motion" => "capture",
         "/arm/target" | "/gripper/target" => "sender of targets",
         _ => "rt_bridge",

@@ -8,9 +8,9 @@ use shared_mem::msg::event::{Event, EventLevel, EventSource};
 use shared_mem::msg::gripper::{GripperAction, GripperCommand, GripperState};
 use shared_mem::msg::image::{CameraInfo, ImageHeader, ImageHeaderWire};
 use shared_mem::msg::motion::MotionChunk;
-use shared_mem::msg::object::ObjectPose;
+use shared_mem::msg::object::{NamedPose, ObjectName, ObjectPose};
 use shared_mem::msg::target::{ArmTarget, GripperTarget};
-use shared_mem::msg::twin::{TwinGap, TwinState};
+use shared_mem::msg::twin::{TwinGap, TwinObject, TwinState};
 use shared_mem::msg::wrench::Wrench;
 use shared_mem::topics::{self, ImageTopic, Topic, Visitor};
 use shared_mem::transport::Node;
@@ -34,12 +34,16 @@ fn valid(topic: &str) -> Vec<u8> {
         "/arm/target" => bytes(&ArmTarget { dof: 7, stream: 3, ..ArmTarget::default() }),
         "/gripper/target" => bytes(&GripperTarget { width: 0.04, ..GripperTarget::default() }),
         "/object/pose" => bytes(&ObjectPose::default()),
+        "/object/poses" => bytes(&NamedPose::new(ObjectName::new("cup").expect("a name"), &ObjectPose::default())),
         "/camera/info" => bytes(&CameraInfo { width: 640, height: 480, ..CameraInfo::default() }),
         "/wrench" => bytes(&Wrench::default()),
         "/gripper" => bytes(&GripperState { width: 0.04, ..GripperState::default() }),
         "/gripper/command" => bytes(&GripperCommand { action: GripperAction::Grasp, ..GripperCommand::default() }),
         "/twin/state" => bytes(&TwinState { dof: 7, has_object: 1, ..TwinState::default() }),
         "/twin/gap" => bytes(&TwinGap { dof: 7, ..TwinGap::default() }),
+        "/twin/objects" => {
+            bytes(&TwinObject { name: ObjectName::new("cup").expect("a name"), ..TwinObject::default() })
+        }
         "/events" => bytes(&Event::new(EventLevel::Warning, EventSource::Twin, "größer als erlaubt")),
         "/camera/color" | "/camera/depth" => {
             bytes(&ImageHeader { width: 8, height: 2, stride: 24, ..ImageHeader::default() })

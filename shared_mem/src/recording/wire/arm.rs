@@ -1,10 +1,11 @@
-//! Arm and twin: `/arm/state`, `/arm/command`, `/twin/state`, `/twin/gap`.
+//! Arm and twin: `/arm/state`, `/arm/command`, `/twin/state`, `/twin/gap`, `/twin/objects`.
 #![allow(non_snake_case)] // the field's own symbols
 
 use super::proto::twinalign as wire;
 use super::{UnixClock, Wire, array};
 use crate::msg::arm::{ArmCommand, ArmMode, ArmState, CommandInterface, MotionStatus};
-use crate::msg::twin::{TwinGap, TwinState};
+use crate::msg::object::ObjectName;
+use crate::msg::twin::{TwinGap, TwinObject, TwinState};
 use crate::msg::{Joints, joints_from};
 use crate::topics;
 
@@ -203,6 +204,40 @@ impl Wire for TwinGap {
             object_add_m: m.object_add,
             object_add_s_m: m.object_add_s,
             age_ns: m.age_ns,
+        }
+    }
+}
+
+impl Wire for TwinObject {
+    const TOPIC: &'static str = topics::TWIN_OBJECTS.name;
+    const SCHEMA: &'static str = "twinalign.TwinObject";
+    type Message = wire::TwinObject;
+
+    fn stamp_ns(&self) -> u64 {
+        self.stamp_ns
+    }
+
+    fn to_wire(&self, _clock: UnixClock) -> wire::TwinObject {
+        wire::TwinObject {
+            stamp_ns: self.stamp_ns,
+            mirrors_ns: self.mirrors_ns,
+            name: self.name.text().to_owned(),
+            position: self.position.to_vec(),
+            orientation: self.wxyz.to_vec(),
+            add: self.add_m,
+            add_s: self.add_s_m,
+        }
+    }
+
+    fn from_wire(m: wire::TwinObject) -> Self {
+        Self {
+            stamp_ns: m.stamp_ns,
+            mirrors_ns: m.mirrors_ns,
+            position: array(&m.position),
+            wxyz: array(&m.orientation),
+            add_m: m.add,
+            add_s_m: m.add_s,
+            name: ObjectName::new(&m.name).unwrap_or_default(),
         }
     }
 }

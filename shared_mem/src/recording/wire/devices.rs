@@ -5,7 +5,7 @@ use super::{UnixClock, Wire, array};
 use crate::msg::event::{Event, EventLevel, EventSource};
 use crate::msg::gripper::GripperState;
 use crate::msg::image::{CameraInfo, ImageHeader, PixelEncoding, StampDomain};
-use crate::msg::object::ObjectPose;
+use crate::msg::object::{NamedPose, ObjectName, ObjectPose};
 use crate::msg::wrench::Wrench;
 use crate::topics;
 use prost::Message as _;
@@ -41,6 +41,7 @@ impl Wire for ObjectPose {
                 device_ns: self.device_ns,
                 sequence: self.sequence,
                 covariance: if known { self.covariance.to_vec() } else { Vec::new() },
+                name: String::new(),
             }),
         }
     }
@@ -58,6 +59,29 @@ impl Wire for ObjectPose {
             wxyz: [q.w, q.x, q.y, q.z],
             covariance: array(&detail.covariance),
         }
+    }
+}
+
+impl Wire for NamedPose {
+    const TOPIC: &'static str = topics::OBJECT_POSES.name;
+    const SCHEMA: &'static str = ObjectPose::SCHEMA;
+    type Message = foxglove::PoseInFrame;
+
+    fn stamp_ns(&self) -> u64 {
+        self.stamp_ns
+    }
+
+    fn to_wire(&self, clock: UnixClock) -> foxglove::PoseInFrame {
+        let mut message = Wire::to_wire(&self.unnamed(), clock);
+        if let Some(detail) = &mut message.twinalign {
+            self.name.text().clone_into(&mut detail.name);
+        }
+        message
+    }
+
+    fn from_wire(m: foxglove::PoseInFrame) -> Self {
+        let name = m.twinalign.as_ref().and_then(|detail| ObjectName::new(&detail.name)).unwrap_or_default();
+        Self::new(name, &<ObjectPose as Wire>::from_wire(m))
     }
 }
 

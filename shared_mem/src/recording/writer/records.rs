@@ -6,11 +6,12 @@ use crate::msg::arm::{ArmCommand, ArmState};
 use crate::msg::event::Event;
 use crate::msg::gripper::GripperState;
 use crate::msg::image::CameraInfo;
-use crate::msg::object::ObjectPose;
+use crate::msg::object::{NamedPose, ObjectPose};
 use crate::msg::target::{ArmTarget, GripperTarget};
-use crate::msg::twin::{TwinGap, TwinState};
+use crate::msg::twin::{TwinGap, TwinObject, TwinState};
 use crate::msg::wrench::Wrench;
 use crate::recording::wire::Wire;
+use crate::topics;
 use std::io::Write;
 
 impl<W: Write> ClipWriter<W> {
@@ -47,6 +48,14 @@ impl<W: Write> ClipWriter<W> {
         let mut wire = message.to_wire(self.clock);
         wire.frame_id.clone_from(&self.base_frame);
         self.named(topic, ObjectPose::SCHEMA, message.stamp_ns, &wire)
+    }
+
+    /// Records a pose of one of several objects by its name.
+    ///
+    /// # Errors
+    /// As [`ClipWriter::arm_state`].
+    pub fn named_pose(&mut self, message: &NamedPose) -> Result<(), WriteError> {
+        self.object_pose_on(&topics::object_pose(message.name.text()), &message.unnamed())
     }
 
     /// Records intrinsics and pose of the camera.
@@ -104,6 +113,15 @@ impl<W: Write> ClipWriter<W> {
     /// As [`ClipWriter::arm_state`].
     pub fn twin_gap(&mut self, message: &TwinGap) -> Result<(), WriteError> {
         self.message(message)
+    }
+
+    /// Records one of several objects in the twin by its name.
+    ///
+    /// # Errors
+    /// As [`ClipWriter::arm_state`].
+    pub fn twin_object(&mut self, message: &TwinObject) -> Result<(), WriteError> {
+        let (topic, wire) = (topics::twin_object(message.name.text()), message.to_wire(self.clock));
+        self.named(&topic, TwinObject::SCHEMA, message.stamp_ns, &wire)
     }
 
     /// Records a remark.

@@ -9,9 +9,9 @@ use shared_mem::msg::event::{Event, EventLevel, EventSource};
 use shared_mem::msg::gripper::{GripperAction, GripperCommand};
 use shared_mem::msg::image::{CameraInfo, ImageHeader, ImageHeaderWire};
 use shared_mem::msg::motion::{CHUNK_LENGTH, MotionChunk, MotionKind};
-use shared_mem::msg::object::ObjectPose;
+use shared_mem::msg::object::{NamedPose, ObjectName, ObjectPose};
 use shared_mem::msg::target::{ArmTarget, GripperTarget};
-use shared_mem::msg::twin::{TwinGap, TwinState};
+use shared_mem::msg::twin::{TwinGap, TwinObject, TwinState};
 use shared_mem::time::now_ns;
 use shared_mem::topics::{self, ImageTopic, Topic, Visitor};
 use shared_mem::transport::{ImagePublisher, Node, Publisher, TransportError};
@@ -154,6 +154,10 @@ fn valid(topic: &str) -> Vec<u8> {
         "/arm/target" => bytes(&ArmTarget { stamp_ns, stream: 3, dof: 7, q: TARGET, ..ArmTarget::default() }),
         "/gripper/target" => bytes(&GripperTarget { stamp_ns, stream: 3, width: 0.03, ..GripperTarget::default() }),
         "/object/pose" => bytes(&ObjectPose { stamp_ns, position: [0.55, 0.0, 0.05], ..ObjectPose::default() }),
+        "/object/poses" => bytes(&NamedPose::new(
+            ObjectName::new("cup").expect("a name"),
+            &ObjectPose { stamp_ns, position: [0.55, 0.0, 0.05], ..ObjectPose::default() },
+        )),
         "/camera/color" | "/camera/depth" => {
             bytes(&ImageHeader { stamp_ns, width, height, stride: 3 * width, ..ImageHeader::default() })
         }
@@ -165,6 +169,9 @@ fn valid(topic: &str) -> Vec<u8> {
         }
         "/twin/state" => bytes(&TwinState { stamp_ns, dof: 7, has_object: 1, ..TwinState::default() }),
         "/twin/gap" => bytes(&TwinGap { stamp_ns, dof: 7, ..TwinGap::default() }),
+        "/twin/objects" => {
+            bytes(&TwinObject { stamp_ns, name: ObjectName::new("cup").expect("a name"), ..TwinObject::default() })
+        }
         "/events" => bytes(&Event::new(EventLevel::Warning, EventSource::Capture, "größer als erlaubt")),
         other => panic!("{other} is a new topic: name a message of it that is valid"),
     }
