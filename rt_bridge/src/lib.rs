@@ -34,6 +34,7 @@ pub mod rt;
 pub mod run;
 pub mod safety;
 pub mod serve;
+pub mod sighting;
 pub mod sim;
 pub mod starting;
 pub mod targets;

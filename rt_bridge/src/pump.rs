@@ -6,6 +6,7 @@ use crate::remark::Remark;
 use crate::rt::cycle::Beat;
 use crate::rt::orders::OrderSender;
 use crate::rt::process;
+use crate::sighting::{PosePorts, Sighting};
 use crate::starting::{self, ThreadError};
 use crate::targets::Targets;
 use crate::times::Times;
@@ -50,7 +51,7 @@ pub struct Rings {
     /// Turns targets into joints.
     pub targets: Targets,
     /// From the simulated tracker, where there is one.
-    pub poses: Option<Consumer<ObjectPose>>,
+    pub poses: Option<Consumer<Sighting>>,
     /// From the main thread and the devices: texts for `/events`.
     pub notices: mpsc::Receiver<Notice>,
 }
@@ -124,7 +125,7 @@ struct Ports {
     state: Publisher<ArmState>,
     command: Publisher<ArmCommand>,
     events: Publisher<Event>,
-    object: Option<Publisher<ObjectPose>>,
+    objects: Option<PosePorts>,
     motion: Subscriber<MotionChunk>,
     target: Subscriber<ArmTarget>,
 }
@@ -208,7 +209,7 @@ fn open(tracks: bool) -> Result<(Node, Ports), TransportError> {
         state: node.publisher(topics::ARM_STATE)?,
         command: node.publisher(topics::ARM_COMMAND)?,
         events: node.publisher(topics::EVENTS)?,
-        object: tracks.then(|| node.publisher(topics::OBJECT_POSE)).transpose()?,
+        objects: tracks.then(|| PosePorts::open(&node)).transpose()?,
         motion: node.subscriber(topics::ARM_MOTION)?,
         target: node.subscriber(topics::ARM_TARGET)?,
     };
@@ -277,9 +278,9 @@ fn publish(
         ports.state.send(&beat.state)?;
         report.age.record(now_ns().saturating_sub(beat.state.stamp_ns));
     }
-    if let (Some(poses), Some(object)) = (&mut rings.poses, &ports.object) {
-        while let Ok(pose) = poses.pop() {
-            object.send(&ObjectPose { stamp_ns: now_ns(), ..pose })?;
+    if let (Some(poses), Some(objects)) = (&mut rings.poses, &ports.objects) {
+        while let Ok(Sighting { is_first, name, pose }) = poses.pop() {
+            objects.send(&Sighting { is_first, name, pose: ObjectPose { stamp_ns: now_ns(), ..pose } })?;
         }
     }
     while let Ok(remark) = rings.remarks.pop() {

@@ -8,12 +8,13 @@ pub use instruments::{InstrumentError, Instruments};
 
 use crate::arm::{Arm, ArmFault, Clock, Desired, Read};
 use crate::rt::process::sleep_until;
+use crate::sighting::Sighting;
 use rtrb::{Consumer, Producer, RingBuffer};
 use shared_mem::cell::{Cell, ClipKind};
 use shared_mem::msg::arm::{ArmCommand, ArmMode, ArmState, CommandInterface};
 use shared_mem::msg::joints_from;
-use shared_mem::msg::object::ObjectPose;
-use shared_mem::recording::{Clip, ReadError, read_clip};
+use shared_mem::msg::object::{ObjectName, ObjectPose};
+use shared_mem::recording::{Clip, ObjectSeries, ReadError, read_clip};
 use shared_mem::time::now_ns;
 use std::path::Path;
 use std::sync::Arc;
@@ -70,16 +71,16 @@ const POSES: usize = 256;
 pub struct ReplayArm {
     clip: Clip,
     next: usize,
-    /// Next pose of the object to give out.
-    next_pose: usize,
-    poses: Producer<ObjectPose>,
+    /// Name of each object, the first one first, and its next pose to give out.
+    objects: Vec<(ObjectName, usize)>,
+    poses: Producer<Sighting>,
     /// Row of the desired series in force.
     desired: usize,
     clock: ReplayClock,
 }
 
 impl ReplayArm {
-    /// Reads a clip of the arm that `model` describes. Also returns the poses of its object, as their moment comes, and
+    /// Reads a clip of the arm that `model` describes. Also returns the poses of its objects, as their moment comes, and
     /// the clock of the replay.
     ///
     /// # Errors
@@ -88,33 +89,29 @@ impl ReplayArm {
         path: &Path,
         cell: &Cell,
         model: &ArmModel,
-    ) -> Result<(Self, Consumer<ObjectPose>, ReplayClock), ReadError> {
+    ) -> Result<(Self, Consumer<Sighting>, ReplayClock), ReadError> {
         let clip = read_clip(path, ClipKind::Excitation, cell)?.reorder(model.joint_names())?;
         for warning in clip.warnings.iter().chain(&clip.damage) {
             tracing::warn!("{}: {warning}", path.display());
         }
         let (to_pump, poses) = RingBuffer::new(POSES);
         let clock = ReplayClock::default();
-        let arm = Self { clip, next: 0, next_pose: 0, poses: to_pump, desired: 0, clock: clock.clone() };
+        let others = clip.others.iter().map(|other| other.name.as_str());
+        let named = |name: &str| (ObjectName::new(name).unwrap_or_default(), 0);
+        let objects = [cell.object_name().unwrap_or("")].into_iter().chain(others).map(named).collect();
+        let arm = Self { clip, next: 0, objects, poses: to_pump, desired: 0, clock: clock.clone() };
         Ok((arm, poses, clock))
     }
 
     /// Gives out the poses that were recorded up to `stamp_ns`.
     fn give_poses(&mut self, stamp_ns: u64) {
-        let object = &self.clip.object;
-        while let (Some(stamp), Some(pose)) = (object.stamps_ns.get(self.next_pose), object.poses.get(self.next_pose))
-            && *stamp <= stamp_ns
-        {
-            let message = ObjectPose {
-                device_ns: *stamp,
-                sequence: self.next_pose as u64,
-                position: pose.position(),
-                wxyz: pose.wxyz(),
-                ..ObjectPose::default()
-            };
-            // A pump that is late loses poses, not states.
-            let _full = self.poses.push(message);
-            self.next_pose += 1;
+        let all = [&self.clip.object].into_iter().chain(self.clip.others.iter().map(|other| &other.series));
+        for (number, (series, (name, next))) in all.zip(&mut self.objects).enumerate() {
+            while let Some(pose) = due(series, *next, stamp_ns) {
+                // A pump that is late loses poses, not states.
+                let _full = self.poses.push(Sighting { is_first: number == 0, name: *name, pose });
+                *next += 1;
+            }
         }
     }
 
@@ -177,4 +174,16 @@ impl Arm for ReplayArm {
     fn recover(&mut self) -> Result<(), ArmFault> {
         Ok(())
     }
+}
+
+/// Pose number `row` of an object where it was recorded up to `stamp_ns`.
+fn due(series: &ObjectSeries, row: usize, stamp_ns: u64) -> Option<ObjectPose> {
+    let (stamp, pose) = (series.stamps_ns.get(row)?, series.poses.get(row)?);
+    (*stamp <= stamp_ns).then(|| ObjectPose {
+        device_ns: *stamp,
+        sequence: row as u64,
+        position: pose.position(),
+        wxyz: pose.wxyz(),
+        ..ObjectPose::default()
+    })
 }

@@ -2,30 +2,19 @@
 //! theta.toml; read by the physics and by the camera. Object frame, SI.
 
 mod arm_outline;
+mod bodies;
 mod mesh_file;
+mod snapshot;
 
 pub use arm_outline::{ArmOutline, Part};
+pub use bodies::{CellBody, bodies_of, cell_bodies, start_of};
 pub use mesh_file::{MeshFileError, read_surface as mesh_in_its_middle};
 pub(crate) use mesh_file::{open_edges, read as read_mesh};
+pub use snapshot::{MOST_BODIES, NamedPoses, SceneSnapshot};
 
 use nalgebra::{Point3, Vector3};
 use shared_mem::cell::{Cell, Object, Support};
-use shared_mem::frames::{Base, Pose};
-use shared_mem::msg::Joints;
 use shared_mem::theta::{ObjectTheta, Theta};
-
-/// The cell at one moment, as far as a camera sees it.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct SceneSnapshot {
-    /// Simulated clock [ns].
-    pub time_ns: u64,
-    /// Joints that count.
-    pub dof: usize,
-    /// Joint positions [rad].
-    pub q: Joints,
-    /// The object's geometric centre, where there is an object.
-    pub object: Option<Pose<Base, shared_mem::frames::Object>>,
-}
 
 /// The object with every number a simulation needs.
 #[derive(Debug, Clone, PartialEq)]
@@ -80,12 +69,12 @@ pub enum ObjectShape {
 }
 
 impl ObjectModel {
-    /// The object of a cell, `None` when the cell has none.
+    /// The object of a cell, `None` when the cell has none, or one that moves in itself ([`CellBody`]).
     ///
     /// # Errors
     /// [`MeshFileError`] when the object is a mesh that cannot be used.
     pub fn new(cell: &Cell, theta: Option<&Theta>) -> Result<Option<Self>, MeshFileError> {
-        let Some(object) = cell.object() else { return Ok(None) };
+        let Some(object) = cell.object().filter(|object| object.urdf.is_none()) else { return Ok(None) };
         let shape = match (&object.mesh, object.size) {
             (Some(file), _) => mesh_file::read(&cell.folder.join(file))?,
             (None, size) => ObjectShape::Box { half_extents: Vector3::from(size.unwrap_or([0.05; 3])) * 0.5 },

@@ -69,6 +69,8 @@ fn every_commented_key_is_one_that_the_reader_knows() {
                 ("controller", "kind") | ("clip" | "tool" | "robot" | "gripper", _) => &[],
                 ("controller", _) => &[("kind", "\"joint_pd\"")],
                 ("object", "mesh") => &[],
+                ("object", "urdf") => &[("name", "\"laptop\"")],
+                ("object", "hold" | "joints") => &[("name", "\"laptop\""), ("urdf", "\"laptop.urdf\"")],
                 ("object", "shape") => &[("size", "[0.1, 0.1, 0.1]")],
                 ("object", "size") => &[("shape", "\"box\"")],
                 ("object", _) => &[("shape", "\"box\""), ("size", "[0.1, 0.1, 0.1]")],

@@ -8,6 +8,7 @@ use crate::replay::{ReplayArm, ReplayClock};
 use crate::rt::cycle::Plan;
 use crate::rt::law::TorquePd;
 use crate::safety::{Limits, Workspace};
+use crate::sighting::Sighting;
 use crate::sim::{World, hidden};
 use crate::tracker::TrackerChoice;
 use crate::wrench::WrenchChoice;
@@ -15,7 +16,6 @@ use anyhow::{Result, bail};
 use rtrb::Consumer;
 use shared_mem::cell::{Cell, ControllerKind};
 use shared_mem::msg::arm::CommandInterface;
-use shared_mem::msg::object::ObjectPose;
 use shared_mem::msg::wrench::Wrench;
 use shared_mem::theta::Theta;
 use std::fmt;
@@ -119,7 +119,7 @@ pub(super) struct Devices {
     pub(super) world: Option<World>,
     pub(super) pictures: Pictures,
     /// From the simulated tracker, or of the recording, unless another one tracks. They come with the camera off, too.
-    pub(super) poses: Option<Consumer<ObjectPose>>,
+    pub(super) poses: Option<Consumer<Sighting>>,
     /// The recording that is replayed, and its clock.
     pub(super) replay: Option<(PathBuf, ReplayClock)>,
     /// Of the simulated cell's force sensor, where it is to be there.

@@ -40,6 +40,21 @@ const EXPLAINED: f64 = 0.6;
 /// The robot at a moment.
 pub(super) type Arm<'a> = Option<(&'a ArmBody, &'a Joints)>;
 
+/// Where another object is followed.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Occupied {
+    /// Its geometric centre, base frame [m].
+    pub(super) centre: Vector3<f64>,
+    /// Of a ball around it in which there is nothing else [m].
+    pub(super) radius: f64,
+}
+
+impl Occupied {
+    pub(super) fn holds(&self, place: &Vector3<f64>) -> bool {
+        (place - self.centre).norm() < self.radius
+    }
+}
+
 /// One heap on the table.
 #[derive(Debug, Clone)]
 struct Heap {
@@ -73,9 +88,10 @@ impl Hunt {
 }
 
 impl Scene<'_> {
-    /// Begins to look for the object in the whole picture.
-    pub(super) fn begin_hunt(&self, view: &View, frame: &Frame, arm: Arm) -> Hunt {
+    /// Begins to look for the object in the whole picture, but for where others are followed.
+    pub(super) fn begin_hunt(&self, view: &View, frame: &Frame, arm: Arm, others: &[Occupied]) -> Hunt {
         let mut left = self.heaps(view, frame, arm);
+        left.retain(|heap| !others.iter().any(|other| other.holds(&heap.middle)));
         left.reverse();
         let mut hunt = Hunt { left, ranked: None, best: Vec::new() };
         self.go_on(&mut hunt, view, frame, arm);

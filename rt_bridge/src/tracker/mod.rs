@@ -43,7 +43,7 @@ pub use view::{Frame, View};
 use align::{FINE, Fit, Scene};
 use arm::ArmBody;
 use colors::Colors;
-use find::Hunt;
+use find::{Hunt, Occupied};
 use judge::Verdict;
 use nalgebra::{Isometry3, Matrix6, UnitQuaternion, Vector3};
 use patch::Patch;
@@ -59,7 +59,7 @@ const LONG_AGO: f64 = 0.2;
 /// Other turns to try where a fit is poor [rad].
 const OTHER_TURNS: [f64; 4] = [0.35, -0.35, 0.8, -0.8];
 
-/// Follows one object.
+/// Follows one object. Of several each has a tracker of its own, which learns its colours.
 #[derive(Debug, Clone)]
 pub struct Tracker {
     model: Model,
@@ -128,6 +128,12 @@ pub enum TrackerError {
     /// Nothing to track.
     #[error("a tracker needs an object and a table; add [object] and [table] to cell.toml")]
     NoObject,
+    /// An object that moves in itself.
+    #[error(
+        "object `{0}` moves in itself (`urdf` in cell.toml), and --tracker rgbd follows rigid objects; use --tracker sim, or --tracker off with \
+         a tracker of your own on /object/poses"
+    )]
+    Articulated(String),
     /// Shared memory.
     #[error(transparent)]
     Transport(#[from] shared_mem::transport::TransportError),
@@ -191,13 +197,20 @@ impl Tracker {
 
     /// Looks at a frame taken at `at` [s] of the camera's clock, with the joints at `q` [rad] where that is known.
     pub fn look(&mut self, frame: &Frame, at: f64, q: Option<&Joints>) -> Sight {
+        self.look_beside(frame, at, q, &[])
+    }
+
+    /// The same beside others of its kind: where they follow their objects, this one looks for none.
+    pub fn look_beside(&mut self, frame: &Frame, at: f64, q: Option<&Joints>, others: &[&Self]) -> Sight {
+        let others: Vec<Occupied> = others.iter().filter_map(|other| other.occupied()).collect();
         let (Some(view), Some(mut table)) = (self.view.take(), self.table.take()) else {
             return Sight::Lost(Reason::NoView);
         };
         table.look(&view, frame);
         let arm = self.arm.take();
         let robot = arm.as_ref().zip(q);
-        let found = self.follow(&view, &table, frame, at, robot).or_else(|| self.search(&view, &table, frame, robot));
+        let followed = self.follow(&view, &table, frame, at, robot);
+        let found = followed.or_else(|| self.search(&view, &table, frame, robot, &others));
         let sight = match found {
             Some(fit) => Sight::Tracked(self.accept(&view, &table, frame, at, robot, &fit)),
             None => {
@@ -240,11 +253,18 @@ impl Tracker {
 
     /// In the whole picture, one step a frame, without regard to what was learnt: another light, other neighbours may have
     /// made it wrong. What is found decides what holds from then on.
-    fn search(&mut self, view: &View, table: &Table, frame: &Frame, robot: find::Arm) -> Option<Fit> {
+    fn search(
+        &mut self,
+        view: &View,
+        table: &Table,
+        frame: &Frame,
+        robot: find::Arm,
+        others: &[Occupied],
+    ) -> Option<Fit> {
         let unknown = Colors::new();
         let scene = Scene { model: &self.model, table, colors: &unknown };
         let Some(mut hunt) = self.hunt.take() else {
-            self.hunt = Some(scene.begin_hunt(view, frame, robot));
+            self.hunt = Some(scene.begin_hunt(view, frame, robot, others));
             return None;
         };
         if !hunt.is_over() {
@@ -260,10 +280,20 @@ impl Tracker {
         let before = std::mem::replace(&mut self.colors, Colors::new());
         self.learn(&mut patch, table, &first);
         let found = Scene { model: &self.model, table, colors: &self.colors }.decide(&mut patch, &poses);
+        let found = found.filter(|fit| {
+            let centre = (view.base_from_camera * fit.camera_from_object).translation.vector;
+            !others.iter().any(|other| other.holds(&centre))
+        });
         if found.is_none() {
             self.colors = before;
         }
         found
+    }
+
+    /// Where it follows its object; `None` while it does not.
+    fn occupied(&self) -> Option<Occupied> {
+        let last = self.last.filter(|_| self.lost_for == 0)?;
+        Some(Occupied { centre: last.base_from_object.translation.vector, radius: self.model.own_radius })
     }
 
     /// Takes a fit as the object's pose.

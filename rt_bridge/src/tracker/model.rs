@@ -20,6 +20,8 @@ pub struct Model {
     pub(super) corners: Vec<Vector3<f64>>,
     /// Radius around the geometric centre that holds everything.
     pub(super) radius: f64,
+    /// Mean of half the edges of its bounding box: within so much of its centre there is nothing else [m].
+    pub(super) own_radius: f64,
     /// Turns of the object, in its own frame, that change nothing an eye could see. The first is none at all.
     symmetries: Vec<UnitQuaternion<f64>>,
     /// The axis of a body of revolution: the turn about it cannot be seen.
@@ -47,6 +49,7 @@ impl Model {
         let corners = outermost(&points);
         let mut model = Self {
             radius: shape.bounding_radius(),
+            own_radius: shape.half_extents().mean(),
             mesh: Mesh::new((points, triangles), [255; 3]),
             corners,
             symmetries,

@@ -1,18 +1,20 @@
-//! The tracker's thread: pictures and joint positions from shared memory, poses onto `/object/pose`, and a remark when the
-//! object is found or lost. It reads the topics of whatever camera runs, so it cannot tell a real one from a simulated one.
+//! The tracker's thread: pictures and joint positions from shared memory, poses onto `/object/pose` and `/object/poses`, and a
+//! remark when an object is found or lost. Of several objects each has a tracker of its own; they look at the same picture one
+//! after the other. It reads the topics of whatever camera runs, so it cannot tell a real one from a simulated one.
 
 use super::{Estimate, Frame, Reason, Sight, Tracker, TrackerError, View};
 use crate::pump::Notice;
+use crate::sighting::{PosePorts, Sighting};
 use crate::starting;
 use shared_mem::cell::Cell;
 use shared_mem::msg::Joints;
 use shared_mem::msg::arm::ArmState;
 use shared_mem::msg::event::EventLevel;
 use shared_mem::msg::image::CameraInfo;
-use shared_mem::msg::object::ObjectPose;
+use shared_mem::msg::object::{ObjectName, ObjectPose};
 use shared_mem::time::now_ns;
 use shared_mem::topics;
-use shared_mem::transport::{ImageSample, ImageSubscriber, Node, Publisher, Subscriber, TransportError, Wake};
+use shared_mem::transport::{ImageSample, ImageSubscriber, Node, Subscriber, TransportError, Wake};
 use std::collections::VecDeque;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -61,12 +63,12 @@ impl Drop for Service {
     }
 }
 
-/// Starts to track the cell's object in the pictures on shared memory.
+/// Starts to track the cell's objects in the pictures on shared memory.
 ///
 /// # Errors
 /// [`TrackerError`] when there is nothing to track, shared memory fails or there is no thread for it.
 pub fn serve(cell: &Cell, notices: Sender<Notice>) -> Result<Service, TrackerError> {
-    let tracker = Tracker::new(cell)?;
+    let followed = Followed::all(cell)?;
     let latency_ns = cell.camera.as_ref().map_or(0, |camera| (camera.latency * 1e9) as u64);
     let stop = Arc::new(AtomicBool::new(false));
     let told = stop.clone();
@@ -80,7 +82,7 @@ pub fn serve(cell: &Cell, notices: Sender<Notice>) -> Result<Service, TrackerErr
             }
         };
         let _gone = opened.send(Ok(()));
-        let mut desk = Desk { tracker, latency_ns, notices, poses: 0, standing: Standing::default() };
+        let mut desk = Desk { followed, latency_ns, notices };
         if let Err(e) = desk.run(&ports, &told) {
             tracing::error!("the tracker stopped: {e}");
         }
@@ -96,7 +98,7 @@ struct Ports {
     info: Subscriber<CameraInfo>,
     states: Subscriber<ArmState>,
     wake: Wake,
-    poses: Publisher<ObjectPose>,
+    poses: PosePorts,
     // Declared last: ports go before the node they belong to.
     node: Node,
 }
@@ -110,20 +112,40 @@ impl Ports {
             info: node.subscriber(topics::CAMERA_INFO)?,
             states: node.subscriber(topics::ARM_STATE)?,
             wake: node.wake_on(topics::CAMERA_COLOR.name)?,
-            poses: node.publisher(topics::OBJECT_POSE)?,
+            poses: PosePorts::open(&node)?,
             node,
         })
     }
 }
 
-/// The tracker at work.
+/// The trackers at work.
 struct Desk {
-    tracker: Tracker,
+    followed: Vec<Followed>,
     /// From a picture to its arrival.
     latency_ns: u64,
     notices: Sender<Notice>,
+}
+
+/// One object, and who follows it.
+struct Followed {
+    name: ObjectName,
+    tracker: Tracker,
     poses: u64,
     standing: Standing,
+}
+
+impl Followed {
+    fn all(cell: &Cell) -> Result<Vec<Self>, TrackerError> {
+        if let Some(object) = cell.objects.iter().find(|object| object.urdf.is_some()) {
+            return Err(TrackerError::Articulated(object.name.clone().unwrap_or_default()));
+        }
+        let one = |number: usize| {
+            let cell = Cell { in_question: number, ..cell.clone() };
+            let name = cell.object_name().and_then(ObjectName::new).unwrap_or_default();
+            Ok(Self { name, tracker: Tracker::new(&cell)?, poses: 0, standing: Standing::new(cell.one_of_several()) })
+        };
+        (0..cell.objects.len().max(1)).map(one).collect()
+    }
 }
 
 impl Desk {
@@ -166,7 +188,7 @@ impl Desk {
         let info = CameraInfo { stamp_ns: 0, ..*info };
         if shown.replace(info) != Some(info) {
             match View::new(&info) {
-                Some(view) => self.tracker.set_view(view),
+                Some(view) => self.followed.iter_mut().for_each(|one| one.tracker.set_view(view.clone())),
                 None => tracing::warn!("the tracker cannot use a camera with these intrinsics and this pose: {info:?}"),
             }
         }
@@ -179,42 +201,49 @@ impl Desk {
         color: Option<&ImageSample>,
         q: Option<&Joints>,
     ) -> Result<(), TransportError> {
-        let Some(view) = self.tracker.view() else { return Ok(()) };
+        let Some(view) = self.followed.first().and_then(|one| one.tracker.view()) else { return Ok(()) };
         let color = color.map(|sample| (sample.header(), sample.bytes()));
         let Some(frame) = Frame::new(view, (depth.header(), depth.bytes()), color) else { return Ok(()) };
         let (stamp_ns, device_ns) = (depth.header().stamp_ns, depth.header().device_ns);
         // Whole seconds of a device's epoch would cost the fraction its digits.
         let at = (device_ns % 1_000_000_000_000_000) as f64 * 1e-9;
-        let sight = self.tracker.look(&frame, at, q);
-        if let Sight::Tracked(Estimate { pose, covariance }) = sight {
-            ports.poses.send(&ObjectPose {
+        for number in 0..self.followed.len() {
+            let (before, rest) = self.followed.split_at_mut(number);
+            let Some((one, behind)) = rest.split_first_mut() else { continue };
+            let others: Vec<&Tracker> = before.iter().chain(behind.iter()).map(|other| &other.tracker).collect();
+            let sight = one.tracker.look_beside(&frame, at, q, &others);
+            if let Sight::Tracked(Estimate { pose, covariance }) = sight {
                 // Of the picture, not of the answer: what the search takes says nothing about when the object was there.
-                stamp_ns,
-                device_ns,
-                sequence: self.poses,
-                position: pose.position(),
-                wxyz: pose.wxyz(),
-                covariance,
-            })?;
-            self.poses += 1;
-        }
-        if let Some(notice) = self.standing.after(&sight, &self.tracker) {
-            // The pump may have ended before; then nobody listens any more.
-            let _gone = self.notices.send(notice);
+                let (position, wxyz) = (pose.position(), pose.wxyz());
+                let pose = ObjectPose { stamp_ns, device_ns, sequence: one.poses, position, wxyz, covariance };
+                ports.poses.send(&Sighting { is_first: number == 0, name: one.name, pose })?;
+                one.poses += 1;
+            }
+            if let Some(notice) = one.standing.after(&sight, &one.tracker) {
+                // The pump may have ended before; then nobody listens any more.
+                let _gone = self.notices.send(notice);
+            }
         }
         Ok(())
     }
 }
 
 /// Whether the object is being followed, as far as people were told.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 struct Standing {
+    /// What it is called: `the object`, or of several by its name.
+    object: String,
     followed: bool,
     missing: u32,
     said_lost: bool,
 }
 
 impl Standing {
+    fn new(one_of_several: Option<&str>) -> Self {
+        let object = one_of_several.map_or_else(|| "the object".to_owned(), |name| format!("`{name}`"));
+        Self { object, followed: false, missing: 0, said_lost: false }
+    }
+
     /// What is worth telling after a frame.
     fn after(&mut self, sight: &Sight, tracker: &Tracker) -> Option<Notice> {
         match sight {
@@ -224,7 +253,7 @@ impl Standing {
                 if std::mem::replace(&mut self.followed, true) {
                     return None;
                 }
-                Some(Notice { level: EventLevel::Info, text: found(estimate, tracker) })
+                Some(Notice { level: EventLevel::Info, text: found(&self.object, estimate, tracker) })
             }
             Sight::Lost(reason) => {
                 self.missing += 1;
@@ -232,16 +261,16 @@ impl Standing {
                     return None;
                 }
                 (self.followed, self.said_lost) = (false, true);
-                Some(Notice { level: EventLevel::Warning, text: lost(*reason) })
+                Some(Notice { level: EventLevel::Warning, text: lost(&self.object, *reason) })
             }
         }
     }
 }
 
-fn found(estimate: &Estimate, tracker: &Tracker) -> String {
+fn found(object: &str, estimate: &Estimate, tracker: &Tracker) -> String {
     let [x, y, _] = estimate.pose.position();
     let others = tracker.equivalent_yaws(&estimate.pose);
-    let mut text = format!("the tracker follows the object, at x {x:.3} m, y {y:.3} m");
+    let mut text = format!("the tracker follows {object}, at x {x:.3} m, y {y:.3} m");
     if others.len() > 1 {
         let others: Vec<String> = others[1..].iter().map(|yaw| format!("{:.0}", yaw.to_degrees())).collect();
         text += &format!("; turned by {} degrees it would look the same", others.join(" or "));
@@ -257,8 +286,8 @@ fn found(estimate: &Estimate, tracker: &Tracker) -> String {
     text
 }
 
-fn lost(reason: Reason) -> String {
-    format!("the tracker has lost the object: {reason}; poses come again by themselves once it is seen")
+fn lost(object: &str, reason: Reason) -> String {
+    format!("the tracker has lost {object}: {reason}; poses come again by themselves once it is seen")
 }
 
 /// The joint positions nearest to a moment.

@@ -4,6 +4,7 @@
 mod meshes;
 mod rough;
 mod scenes;
+mod several;
 
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use rough::roughen;

@@ -87,6 +87,7 @@ pub(crate) fn standing(cell: &Cell, x: f64, y: f64, yaw: f64, frame: u64) -> Sce
         dof: 7,
         q: *model.ready(),
         object: Some(Pose::from_isometry(Isometry3::new(Vector3::new(x, y, half), Vector3::z() * yaw))),
+        ..SceneSnapshot::default()
     }
 }
 
@@ -116,7 +117,8 @@ pub(crate) fn clip(cell: &Cell, seed: u64) -> Vec<SceneSnapshot> {
             q = reaching(&model, &q, &Vector3::new(tip.x, tip.y, 0.04));
             let place = start + along * way;
             let object = Isometry3::new(place, Vector3::z() * (yaw + turned));
-            SceneSnapshot { time_ns: frame * TICK_NS, dof: 7, q, object: Some(Pose::from_isometry(object)) }
+            let object = Some(Pose::from_isometry(object));
+            SceneSnapshot { time_ns: frame * TICK_NS, dof: 7, q, object, ..SceneSnapshot::default() }
         })
         .collect()
 }

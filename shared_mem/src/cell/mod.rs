@@ -19,7 +19,7 @@ pub use background::Background;
 pub use camera::{Camera, CameraPose, Intrinsics};
 pub use controller::{Controller, ControllerKind, Range, TorqueSensing};
 pub use gripper::{Gripper, GripperModel};
-pub use object::{Object, PoseNoise, Support};
+pub use object::{Object, PoseNoise, RootHold, Support};
 pub use ranges::Ranges;
 pub use robot::{Robot, Table, Tool, Topics};
 pub use simulation::Simulation;
@@ -171,7 +171,11 @@ impl Cell {
         let folder = std::path::absolute(&cell.folder).unwrap_or_else(|_| cell.folder.clone());
         let anchor = |path: &mut PathBuf| *path = folder.join(&*path);
         cell.robot.iter_mut().filter_map(|robot| robot.urdf.as_mut()).for_each(anchor);
-        cell.objects.iter_mut().flat_map(|object| [&mut object.mesh, &mut object.splats]).flatten().for_each(anchor);
+        cell.objects
+            .iter_mut()
+            .flat_map(|object| [&mut object.mesh, &mut object.splats, &mut object.urdf])
+            .flatten()
+            .for_each(anchor);
         cell.background.iter_mut().map(|background| &mut background.splats).for_each(anchor);
         cell
     }

@@ -60,16 +60,22 @@ impl Cell {
     /// Makes the object of this name the one in question.
     ///
     /// # Errors
-    /// The sentence to print where there is none of that name.
+    /// The sentence to print where there is none of that name, or it moves in itself.
     pub fn about(&mut self, name: &str) -> Result<(), String> {
         let named = |object: &Object| object.name.as_deref() == Some(name);
-        self.in_question = self.objects.iter().position(named).ok_or_else(|| {
+        let place = self.objects.iter().position(named).ok_or_else(|| {
             let names: Vec<&str> = self.objects.iter().filter_map(|object| object.name.as_deref()).collect();
             match names.is_empty() {
                 true => format!("cell.toml names no object, so `--object {name}` fits none; leave it out"),
                 false => format!("cell.toml has no object `{name}`; it has {}", names.join(", ")),
             }
         })?;
+        if self.objects[place].urdf.is_some() {
+            return Err(format!(
+                "object `{name}` moves in itself (`urdf`), and only rigid ones are identified: name another"
+            ));
+        }
+        self.in_question = place;
         Ok(())
     }
 
@@ -96,6 +102,7 @@ mod tests {
     }
 
     const CUP: &str = "[[object]]\nname = \"cup\"\nshape = \"box\"\nsize = [0.1, 0.1, 0.1]\n";
+    const LAPTOP: &str = "[[object]]\nname = \"laptop\"\nurdf = \"laptop.urdf\"\n";
     const BOX: &str = "[[object]]\nname = \"milk_box\"\nshape = \"box\"\nsize = [0.1, 0.2, 0.1]\nmass = 0.4\n";
 
     #[test]
@@ -114,6 +121,18 @@ mod tests {
     }
 
     #[test]
+    fn an_object_that_moves_in_itself_is_read_and_no_command_is_about_it() {
+        let block = "hold = \"fixed\"\njoints = { hinge = -0.3 }\nstart = [0.4, 0.2]\nstart_yaw = 0.5\n";
+        let mut cell = parse(&format!("{CUP}{LAPTOP}{block}")).expect("two objects");
+        assert_eq!(parse(&cell.to_toml()).expect("own text").objects, cell.objects);
+        assert_eq!(cell.objects[1].joints["hinge"], -0.3);
+        assert!(cell.about("laptop").expect_err("it is not rigid").contains("moves in itself"));
+        assert!(cell.about("cup").is_ok());
+        cell.folder = "/lab".into();
+        assert_eq!(cell.at_home_anywhere().objects[1].urdf.as_deref(), Some(Path::new("/lab/laptop.urdf")));
+    }
+
+    #[test]
     fn what_cannot_be_told_apart_is_refused_in_one_line() {
         let unnamed = "[[object]]\nshape = \"box\"\nsize = [0.1, 0.1, 0.1]\n";
         for (text, told) in [
@@ -125,6 +144,17 @@ mod tests {
             (CUP.replace("cup", "pose"), "another name"),
             (format!("{CUP}{}", BOX.replace("0.2", "0.0")), "object `milk_box`: `object.size`"),
             ("object = 3\n".into(), "[[object]] blocks"),
+            (CUP.replace("cup", "a b"), "letters, digits and _"),
+            (CUP.replace("shape = \"box\"\n", ""), "exactly one of"),
+            ("[object]\nurdf = \"laptop.urdf\"\n".into(), "needs a `name`"),
+            (format!("{CUP}urdf = \"laptop.urdf\"\n"), "is of a rigid object"),
+            (format!("{CUP}hold = \"fixed\"\n"), "of an object with `urdf`"),
+            (format!("{LAPTOP}mesh = \"cup.obj\"\n"), "in place of `shape` and `mesh`"),
+            (format!("{LAPTOP}mass = 1.0\n"), "is of a rigid object"),
+            (format!("{LAPTOP}hold = \"moved\"\n"), "hold"),
+            (format!("{LAPTOP}joints = {{ hinge = nan }}\n"), "`object.joints` puts `hinge`"),
+            (format!("{CUP}start = [500.0, 0.0]\n"), "object.start"),
+            (format!("{CUP}start_yaw = 90.0\n"), "object.start_yaw"),
         ] {
             let error = parse(&text).expect_err(told);
             assert!(error.contains(told) && !error.contains('\n'), "{error}");

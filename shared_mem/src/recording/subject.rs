@@ -64,14 +64,16 @@ impl Session {
         if let Some(name) = asked {
             self.cell.about(name).map_err(fail)?;
         }
-        if self.cell.objects.len() < 2 {
+        let mut rigid = self.cell.objects.iter().filter(|object| object.urdf.is_none());
+        let first_rigid = rigid.next().and_then(|object| object.name.clone());
+        if self.cell.objects.len() < 2 || first_rigid.is_none() {
             return Ok(None);
         }
         let moving = self.moving()?;
         let name = match (asked, &moving.objects[..]) {
             (Some(name), _) => name.to_owned(),
             (None, [(name, _)]) => name.clone(),
-            (None, []) => self.cell.object_name().unwrap_or_default().to_owned(),
+            (None, []) => first_rigid.unwrap_or_default(),
             (None, several) => {
                 let names: Vec<&str> = several.iter().map(|(name, _)| name.as_str()).collect();
                 let what =
@@ -103,13 +105,14 @@ impl Session {
                 *count += usize::from(moves);
             }
         }
-        let objects = names.into_iter().zip(counts).filter(|(_, count)| *count > 0).collect();
+        let is_rigid = |name: &str| cell.objects.iter().any(|o| o.urdf.is_none() && o.name.as_deref() == Some(name));
+        let objects = names.into_iter().zip(counts).filter(|(name, count)| *count > 0 && is_rigid(name)).collect();
         Ok(Moving { objects, clips })
     }
 }
 
 struct Moving {
-    /// Name and number of clips, in the order of cell.toml.
+    /// Name and number of clips of rigid objects, in the order of cell.toml.
     objects: Vec<(String, usize)>,
     clips: usize,
 }

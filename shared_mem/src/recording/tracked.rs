@@ -2,7 +2,8 @@
 //!
 //! An object with a name is on `/object/NAME/pose`, in a ROS 2 bag on the `topic` of its block where that is given; without a
 //! name on `/object/pose`, in a bag on `object_pose` of `[topics]`. The first object of a cell.toml is on that one, too, where
-//! the file has nothing on its own: so are clips that were recorded before objects had names.
+//! the file has nothing on its own: so are clips that were recorded before objects had names. Parts of an object that moves in
+//! itself are on `/object/NAME_LINK/pose` and come behind all objects.
 
 use super::checks;
 use super::clip::Clip;
@@ -29,6 +30,8 @@ pub(super) type PoseRow = (u64, Option<Pose<Base, ObjectFrame>>);
 pub(super) struct ObjectTopics {
     /// Name, and where to look, the best place first.
     objects: Vec<(String, Vec<String>)>,
+    /// What topics of parts begin with.
+    parts: Vec<String>,
 }
 
 impl ObjectTopics {
@@ -52,12 +55,15 @@ impl ObjectTopics {
             (object.name.clone().unwrap_or_default(), choice)
         };
         let first = cell.object().map_or_else(|| (String::new(), vec![common.to_owned()]), named);
-        Self { objects: [first].into_iter().chain(cell.other_objects().map(named)).collect() }
+        let articulated = cell.objects.iter().filter(|object| object.urdf.is_some());
+        let parts = articulated.filter_map(|object| Some(format!("/object/{}_", object.name.as_deref()?))).collect();
+        Self { objects: [first].into_iter().chain(cell.other_objects().map(named)).collect(), parts }
     }
 
     /// Whether poses on this topic are of use.
     pub(super) fn wants(&self, topic: &str) -> bool {
-        self.objects.iter().any(|(_, choice)| choice.iter().any(|wanted| wanted == topic))
+        let of_part = || topics::object_of(topic, "pose").is_some() && self.parts.iter().any(|p| topic.starts_with(p));
+        self.objects.iter().any(|(_, choice)| choice.iter().any(|wanted| wanted == topic)) || of_part()
     }
 
     /// Where the object in question should be.
@@ -71,7 +77,14 @@ impl ObjectTopics {
             let topic = choice.iter().find(|topic| there.contains_key(*topic)).unwrap_or(&choice[0]);
             (name.clone(), topic.clone(), there.remove(topic).unwrap_or_default())
         };
-        self.objects.iter().map(one).collect()
+        let mut taken: Vec<_> = self.objects.iter().map(one).collect();
+        let of_parts: Vec<String> =
+            there.keys().filter(|topic| self.parts.iter().any(|part| topic.starts_with(part))).cloned().collect();
+        for topic in of_parts {
+            let name = topics::object_of(&topic, "pose").unwrap_or_default().to_owned();
+            taken.push((name, topic.clone(), there.remove(&topic).unwrap_or_default()));
+        }
+        taken
     }
 }
 
@@ -140,8 +153,10 @@ impl<'a> Due<'a> {
 
     fn of(clip: &'a Clip, topics: ObjectTopics) -> Self {
         let series = [&clip.object].into_iter().chain(clip.others.iter().map(|other| &other.series));
-        let objects = topics.objects.into_iter().zip(series);
-        Self { objects: objects.map(|((_, topics), series)| DueObject { series, topics, next: 0 }).collect() }
+        let parts = clip.others.iter().skip(topics.objects.len().saturating_sub(1));
+        let of_parts = parts.map(|part| vec![topics::object_pose(&part.name)]);
+        let all = topics.objects.into_iter().map(|(_, topics)| topics).chain(of_parts).zip(series);
+        Self { objects: all.map(|(topics, series)| DueObject { series, topics, next: 0 }).collect() }
     }
 
     /// When the next pose is due [ns].

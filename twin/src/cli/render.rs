@@ -2,9 +2,11 @@
 
 use super::look::Look;
 use anyhow::{Context as _, bail, ensure};
+use shared_mem::frames::{Base, Object, Pose};
+use shared_mem::msg::object::ObjectName;
 use shared_mem::output::Destination;
 use shared_mem::progress::Progress;
-use shared_mem::recording::{PictureKind, Session, for_pictures, write_png};
+use shared_mem::recording::{ObjectSeries, PictureKind, Session, for_pictures, write_png};
 use shared_mem::{answer, console};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -13,8 +15,8 @@ use twin::render::session::{ViewError, beside, pixels_of};
 /// Draws the twin beside every recorded picture: what the camera saw, what the twin shows, where they differ.
 #[derive(clap::Args)]
 #[command(after_help = "\
-The robot is drawn at the joints measured when the picture was taken, from its meshes or from splats of its links; the object
-where it was seen. A graphics card draws where the program was built with `--features render` and finds one by Vulkan, else the
+The robot is drawn at the joints measured when the picture was taken, from its meshes or from splats of its links; objects
+where they were seen. A graphics card draws where the program was built with `--features render` and finds one by Vulkan, else the
 processor; both draw the same picture.
 
 Examples:
@@ -47,6 +49,12 @@ pub(crate) struct Render {
     json: bool,
 }
 
+/// Where an object was seen when a picture was taken.
+fn seen_at(series: &ObjectSeries, stamp_ns: u64) -> Option<Pose<Base, Object>> {
+    let at = series.stamps_ns.partition_point(|stamp| *stamp < stamp_ns);
+    series.poses.get(at.min(series.len().saturating_sub(1))).copied()
+}
+
 impl Render {
     pub(crate) fn run(&self) -> anyhow::Result<()> {
         super::discard_on_signal()?;
@@ -73,9 +81,14 @@ impl Render {
                 };
                 let (of_pictures, real) = pixels_of(picture).map_err(anyhow::Error::msg)?;
                 ensure!(of_pictures == view.size(), ViewError::Size { of_pictures, of_camera: view.size() });
-                let at = clip.object.stamps_ns.partition_point(|stamp| *stamp < stamp_ns);
-                let object = clip.object.poses.get(at.min(clip.object.len().saturating_sub(1))).copied();
-                let twin = view.draw(&q, object)?;
+                let first = session.cell.object_name().unwrap_or("");
+                let series = |name: &str| match name == first {
+                    true => Some(&clip.object),
+                    false => clip.others.iter().find(|other| other.name == name).map(|other| &other.series),
+                };
+                let seen = |name: &ObjectName| seen_at(series(name.text())?, stamp_ns);
+                let objects: Vec<_> = view.names().iter().map(seen).collect();
+                let twin = view.draw_all(&q, &objects)?;
                 let sum: u64 = real.iter().zip(&twin).map(|(a, b)| u64::from(a.abs_diff(*b))).sum();
                 apart += sum as f64 / (255.0 * real.len() as f64);
                 let (width, height, rgb) = beside(of_pictures, &real, &twin);

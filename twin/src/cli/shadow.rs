@@ -21,16 +21,16 @@ use twin::shadow::{Mirrored, Shadow as Twin, Summary};
 /// Mirror a running cell in simulation and publish how far the two are apart.
 ///
 /// Attaches to `rt_bridge run` through shared memory, whichever of the two is started first, and survives its restarts.
-/// Where no state comes within --wait it ends with exit code 1. Sends the twin's state on /twin/state and the gap on
-/// /twin/gap.
+/// Where no state comes within --wait it ends with exit code 1. Sends the twin's state on /twin/state, the gap on
+/// /twin/gap and that of each object with a name on /twin/objects.
 #[derive(Args)]
 #[command(after_help = "Examples:\n  \
     twin shadow --cell config/fr3_cell.toml                       until Ctrl-C, gap on the terminal\n  \
     twin shadow --cell config/fr3_cell.toml --viewer              in Foxglove or Lichtblick: ws://127.0.0.1:8765\n  \
     twin shadow --cell cell.toml --viewer --splats fr3_splats     the twin's pictures from a scanned robot\n  \
     twin shadow --cell cell.toml --parameters theta.toml --duration 60 --json\n\n\
-    JSON: cycles, real_time_factor, dropped, alignments, age_us, gap (joint_rms_rad, object_add_m, object_add_s_m); null for\n\
-    what was not measured.")]
+    JSON: cycles, real_time_factor, dropped, alignments, age_us, gap (joint_rms_rad, object_add_m, object_add_s_m, and\n\
+    objects: add_m and add_s_m of each by its name); null for what was not measured.")]
 pub(crate) struct Shadow {
     /// What is known about the cell; the same file the bridge runs with
     #[arg(long, value_name = "CELL.toml")]

@@ -15,6 +15,9 @@ pub struct FlatMesh;
 /// Corners of a mesh that are all asked for, and directions in which the outermost are looked for where it has more.
 const MOST_POINTS: usize = 500;
 const DIRECTIONS: usize = 300;
+/// Directions of edges of a hull among many bodies, and directions in which the outermost corners of one with more are kept.
+const MOST_EDGES: usize = 64;
+const FEW_DIRECTIONS: usize = 24;
 
 /// Shape and what follows from it alone: made once, shared by clones.
 #[derive(Clone)]
@@ -59,12 +62,18 @@ fn outermost(points: &[Point3<f64>]) -> Vec<Point3<f64>> {
     if points.len() <= MOST_POINTS {
         return points.to_vec();
     }
+    let kept = farthest_in(points, DIRECTIONS);
+    tracing::warn!("the object's mesh has {} corners; the physics takes the {} outermost", points.len(), kept.len());
+    kept
+}
+
+/// The corners that lie farthest in so many directions, spread evenly over the sphere along a golden spiral.
+fn farthest_in(points: &[Point3<f64>], directions: usize) -> Vec<Point3<f64>> {
     let farthest = |direction: Vector3<f64>| {
         points.iter().max_by(|a, b| direction.dot(&a.coords).total_cmp(&direction.dot(&b.coords))).copied()
     };
-    // Directions spread evenly over the sphere along a golden spiral.
-    let spiral = (0..DIRECTIONS).map(|i| {
-        let height = 1.0 - (2 * i + 1) as f64 / DIRECTIONS as f64;
+    let spiral = (0..directions).map(|i| {
+        let height = 1.0 - (2 * i + 1) as f64 / directions as f64;
         let (sin, cos) = (i as f64 * 2.399_963_229_728_653).sin_cos();
         let across = (1.0 - height * height).sqrt();
         Vector3::new(across * cos, across * sin, height)
@@ -72,11 +81,19 @@ fn outermost(points: &[Point3<f64>]) -> Vec<Point3<f64>> {
     let mut kept: Vec<Point3<f64>> = spiral.filter_map(farthest).collect();
     kept.sort_by(|a, b| (a.x, a.y, a.z).partial_cmp(&(b.x, b.y, b.z)).unwrap_or(std::cmp::Ordering::Equal));
     kept.dedup();
-    tracing::warn!("the object's mesh has {} corners; the physics takes the {} outermost", points.len(), kept.len());
     kept
 }
 
 impl CollisionShape {
+    /// Its hull for a world of many bodies, of no more directions of edges than that can ask.
+    pub(super) fn hull(&self) -> Option<Hull> {
+        let whole = Hull::of(&self.corners)?;
+        if whole.edges.len() <= MOST_EDGES {
+            return Some(whole);
+        }
+        Hull::of(&farthest_in(&self.corners, FEW_DIRECTIONS))
+    }
+
     /// Distance of a point from the surface (negative inside), the surface's nearest point, and the outward direction.
     #[inline]
     pub(super) fn signed_distance(&self, point: &Point3<f64>) -> (f64, Point3<f64>, Vector3<f64>) {

@@ -8,6 +8,7 @@
 mod tests;
 
 use super::hit::Press;
+use super::hull::Hull;
 use super::shape::{CollisionShape, FlatMesh};
 use super::tumble::Tumbling;
 use crate::effects::{Effects, SlideEffects, TableFriction};
@@ -291,6 +292,13 @@ impl TableObject {
     #[must_use]
     pub fn bounding_radius(&self) -> f64 {
         self.shape.bounding_radius
+    }
+
+    /// Its convex hull, for a world of many bodies; `None` where it has none. One with more than 64 directions of edges, of which a
+    /// step there would have to ask each pair, is replaced by that of its outermost corners.
+    #[must_use]
+    pub fn hull(&self) -> Option<Hull> {
+        self.shape.hull()
     }
 
     pub(super) fn isometry(&self) -> Isometry3<f64> {

@@ -4,7 +4,7 @@ use super::session::{TwinView, ViewError, difference, tight_pixels};
 use crate::arm::{Joints, MAX_JOINTS};
 use shared_mem::frames::{Base, Object, Pose};
 use shared_mem::msg::image::{ImageHeader, PixelEncoding};
-use shared_mem::msg::twin::TwinState;
+use shared_mem::msg::twin::{TwinObject, TwinState};
 use std::collections::VecDeque;
 
 /// The twin is remembered for so many of its states: at 30 a second, longer than a picture is under way.
@@ -16,6 +16,8 @@ pub struct LiveView {
     view: TwinView,
     latency_ns: u64,
     moments: VecDeque<Moment>,
+    /// Where the objects beside the first are.
+    others: Vec<Option<Pose<Base, Object>>>,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -42,7 +44,8 @@ impl LiveView {
     /// A view, and how long after its exposure a picture arrives [s].
     #[must_use]
     pub fn new(view: TwinView, latency: f64) -> Self {
-        Self { view, latency_ns: (latency * 1e9) as u64, moments: VecDeque::with_capacity(REMEMBERED) }
+        let others = vec![None; view.names().len().saturating_sub(1)];
+        Self { view, latency_ns: (latency * 1e9) as u64, moments: VecDeque::with_capacity(REMEMBERED), others }
     }
 
     /// Takes note of where the twin is.
@@ -58,6 +61,14 @@ impl LiveView {
         self.moments.push_back(Moment { stamp_ns: state.mirrors_ns, q: state.q, object });
     }
 
+    /// Takes note of where one of several objects is in the twin.
+    pub fn remember_object(&mut self, object: &TwinObject) {
+        let place = self.view.names().iter().position(|name| *name == object.name);
+        if let Some(other) = place.and_then(|place| self.others.get_mut(place.checked_sub(1)?)) {
+            *other = Pose::from_parts(object.position, object.wxyz);
+        }
+    }
+
     /// The twin beside a colour picture; `None` before the twin is known.
     ///
     /// # Errors
@@ -69,7 +80,8 @@ impl LiveView {
         }
         let Some((q, object)) = self.at(header.stamp_ns.saturating_sub(self.latency_ns)) else { return Ok(None) };
         let (size, camera) = tight_pixels(header, bytes);
-        let twin = self.view.draw(&q, object)?;
+        let objects: Vec<_> = [object].into_iter().chain(self.others.iter().copied()).collect();
+        let twin = self.view.draw_all(&q, &objects)?;
         let blend = camera.iter().zip(&twin).map(|(a, b)| a.midpoint(*b)).collect();
         let difference = difference(&camera, &twin);
         Ok(Some(Beside { size, twin, blend, difference }))

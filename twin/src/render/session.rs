@@ -8,6 +8,7 @@ use nalgebra::Isometry3;
 use shared_mem::cell::Cell;
 use shared_mem::frames::{Base, Object, Pose};
 use shared_mem::msg::image::ImageHeader;
+use shared_mem::msg::object::ObjectName;
 use shared_mem::recording::Picture;
 use splat::{Lens, SplatError, read_links};
 use std::path::Path;
@@ -19,6 +20,8 @@ pub struct TwinView {
     camera_from_base: Isometry3<f64>,
     robot: RobotSurface,
     shown: Shown,
+    /// Of the objects, the one in question first.
+    names: Vec<ObjectName>,
     remarks: Vec<String>,
 }
 
@@ -78,8 +81,9 @@ impl TwinView {
             Lens { focal: [pinhole.fx, pinhole.fy], centre: [pinhole.cx, pinhole.cy], distortion: camera.distortion };
         let robot = RobotSurface::new(cell, Hand::None)?;
         let table = cell.table.map(|table| Model::Mesh(looks::table_top(table.height as f32)));
-        let mesh = looks::object(cell)?.map(Model::Mesh);
-        let [background, object] = looks::splats(cell)?;
+        let bodies = looks::objects(cell)?;
+        let (background, objects) = (looks::background(cell)?, looks::models(cell, &bodies)?);
+        let names = bodies.iter().map(|body| body.name).collect();
         let scans = splats.map(read_links).transpose()?.unwrap_or_default().into_iter();
         let scans: Vec<_> = scans
             .map(|(link, splats)| {
@@ -90,15 +94,9 @@ impl TwinView {
             .collect();
         let remarks = misplaced(&robot, &scans, scanned_at.is_some());
         let size = [camera.width as usize, camera.height as usize];
-        let shown = Shown::new(
-            &robot,
-            background.or(table).into_iter().collect(),
-            object.or(mesh),
-            scans,
-            drawer,
-            (lens, size),
-        )?;
-        Ok(Self { size, camera_from_base: base_from_camera.inverse().isometry(), robot, shown, remarks })
+        let shown =
+            Shown::new(&robot, background.or(table).into_iter().collect(), objects, scans, drawer, (lens, size))?;
+        Ok(Self { size, camera_from_base: base_from_camera.inverse().isometry(), robot, shown, names, remarks })
     }
 
     /// Columns and rows.
@@ -124,9 +122,23 @@ impl TwinView {
     /// # Errors
     /// [`ViewError::Paint`] when the device that draws fails.
     pub fn draw(&mut self, q: &[f64], object: Option<Pose<Base, Object>>) -> Result<Vec<u8>, ViewError> {
-        let object = object.map(|pose| pose.isometry());
-        let seen = self.shown.paint(&self.robot, &joints(q), object, &self.camera_from_base)?;
+        self.draw_all(q, &[object])
+    }
+
+    /// The same with each object of [`Self::names`] where it was seen; those that are missing were not.
+    ///
+    /// # Errors
+    /// As [`Self::draw`].
+    pub fn draw_all(&mut self, q: &[f64], objects: &[Option<Pose<Base, Object>>]) -> Result<Vec<u8>, ViewError> {
+        let objects: Vec<_> = objects.iter().map(|pose| pose.map(|pose| pose.isometry())).collect();
+        let seen = self.shown.paint(&self.robot, &joints(q), &objects, &self.camera_from_base)?;
         Ok(seen.rgb8().flatten().collect())
+    }
+
+    /// Names of the objects in the order in which they are drawn: the one in question first; empty for one without a name.
+    #[must_use]
+    pub fn names(&self) -> &[ObjectName] {
+        &self.names
     }
 }
 

@@ -5,7 +5,7 @@ use crate::arm::Joints;
 use nalgebra::{Isometry3, Vector3};
 use splat::{Lens, Picture, SplatCloud, Surroundings};
 
-/// Numbers in the picture: what never moves, the object, and the robot's links from here on.
+/// Numbers in the picture: what never moves, the objects, and the robot's links from here on.
 const STILL: u32 = 1;
 const OBJECT: u32 = 2;
 const ROBOT: u32 = 3;
@@ -33,7 +33,8 @@ pub(crate) struct Shown {
 enum Place {
     /// Nothing: it stands in the base frame.
     Still,
-    Object,
+    /// An object by its number.
+    Object(usize),
     /// A part of the robot's surface.
     Part(usize),
     /// A link, and the scan's frame in the link's.
@@ -41,7 +42,7 @@ enum Place {
 }
 
 impl Shown {
-    /// What stands `still` (base frame), the object, and the robot: from its meshes, or from scans of its links and the
+    /// What stands `still` (base frame), the objects, and the robot: from its meshes, or from scans of its links and the
     /// mesh of its tool, which no scan of links shows. `view`: lens, columns and rows of the pictures.
     ///
     /// # Errors
@@ -49,7 +50,7 @@ impl Shown {
     pub(crate) fn new(
         robot: &RobotSurface,
         still: Vec<Model>,
-        object: Option<Model>,
+        objects: Vec<Model>,
         scans: Vec<ScannedLink>,
         drawer: Drawer,
         (lens, size): (Lens, [usize; 2]),
@@ -60,7 +61,7 @@ impl Shown {
             robot.parts().iter().zip(robot.links()).enumerate().filter(|(_, (_, link))| meshes || *link == tool);
         let number = |link: usize| ROBOT + link as u32;
         let (places, models) = (still.into_iter().map(|model| (Place::Still, (model, STILL))))
-            .chain(object.map(|model| (Place::Object, (model, OBJECT))))
+            .chain(objects.into_iter().enumerate().map(|(i, model)| (Place::Object(i), (model, OBJECT))))
             .chain(parts.map(|(part, (mesh, link))| (Place::Part(part), (Model::Mesh(mesh.clone()), number(link)))))
             .chain(scans.into_iter().map(|ScannedLink { link, link_from_scan, splats }| {
                 (Place::Link(link, link_from_scan), (Model::Splats(splats), number(link)))
@@ -74,7 +75,7 @@ impl Shown {
         &self.painter
     }
 
-    /// The robot that [`Self::new`] was given, at joint positions `q` [rad], and the object where it is, if it is there.
+    /// The robot that [`Self::new`] was given, at joint positions `q` [rad], and each object where it is, if it is there.
     ///
     /// # Errors
     /// [`PaintError`] when the device that draws fails.
@@ -82,14 +83,14 @@ impl Shown {
         &mut self,
         robot: &RobotSurface,
         q: &Joints,
-        object: Option<Isometry3<f64>>,
+        objects: &[Option<Isometry3<f64>>],
         camera_from_base: &Isometry3<f64>,
     ) -> Result<Picture, PaintError> {
         let mut parts = vec![Isometry3::identity(); robot.parts().len()];
         robot.for_each(q, |part, pose| parts[part] = pose);
         let base_from = |place: &Place| match place {
             Place::Still => Some(Isometry3::identity()),
-            Place::Object => object,
+            Place::Object(number) => objects.get(*number).copied().flatten(),
             Place::Part(part) => Some(parts[*part]),
             Place::Link(link, link_from_scan) => Some(robot.base_from_link(q, *link) * link_from_scan),
         };

@@ -20,6 +20,9 @@ pub enum MeshFileError {
     /// Missing, no file, or too large.
     #[error("{0} (`object.mesh` in cell.toml)")]
     Input(#[from] InputError),
+    /// The links of an object that moves in itself, or their names.
+    #[error("{0}")]
+    Links(String),
     /// Not what its name says, or empty.
     #[error("{}: {what}; use a triangulated obj, stl or ply in metres", path.display())]
     Content {

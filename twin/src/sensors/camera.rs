@@ -1,5 +1,5 @@
-//! A simulated D455: colour and depth of one moment, depth aligned to colour, from the scene's geometry. Table, box or
-//! mesh, the robot's surface, tool as the capsule it is. The picture has no lens distortion.
+//! A simulated D455: colour and depth of one moment, depth aligned to colour, from the scene's geometry. Table, boxes or
+//! meshes, the robot's surface, tool as the capsule it is. The picture has no lens distortion.
 //!
 //! Called by the camera thread of the bridge: allocates nothing after its first picture, unless the robot is drawn from
 //! splats.
@@ -7,6 +7,7 @@
 use super::camera_clock_ns;
 use super::depth::{self, DepthSensor};
 use crate::effects::CameraEffects;
+use crate::render::looks::DrawnBody;
 use crate::render::session::ViewError;
 use crate::render::{Drawer, Hand, Mesh, Model, Pinhole, Raster, RobotSurface, ScannedLink, Shown, looks, misplaced};
 use crate::scene::SceneSnapshot;
@@ -30,7 +31,7 @@ pub struct SimCamera {
     depth: DepthSensor,
     still: Vec<Mesh>,
     robot: Option<RobotSurface>,
-    object: Option<Mesh>,
+    objects: Vec<DrawnBody>,
     /// The same with the robot of splats, and what is odd about them.
     scanned: Option<Shown>,
     remarks: Vec<String>,
@@ -72,7 +73,7 @@ impl SimCamera {
             depth: DepthSensor::new(settings.width, settings.height, noisy, generator(cell, 2)),
             still,
             robot: cell.robot.as_ref().map(|_| RobotSurface::new(cell, Hand::None)).transpose()?,
-            object: looks::object(cell)?,
+            objects: looks::objects(cell)?,
             scanned: None,
             remarks: Vec::new(),
             older_ns: 0,
@@ -112,11 +113,10 @@ impl SimCamera {
             let scans = scans.map(|(link, splats)| ScannedLink { link, link_from_scan: Isometry3::identity(), splats });
             let scans: Vec<_> = scans.collect();
             self.remarks = misplaced(robot, &scans, false);
-            let [background, object] = looks::splats(cell)?;
+            let (background, objects) = (looks::background(cell)?, looks::models(cell, &self.objects)?);
             let meshes = || self.still.iter().cloned().map(Model::Mesh).collect();
             let still = background.map_or_else(meshes, |splats| vec![splats]);
-            let object = object.or(self.object.clone().map(Model::Mesh));
-            self.scanned = Some(Shown::new(robot, still, object, scans, drawer, view)?);
+            self.scanned = Some(Shown::new(robot, still, objects, scans, drawer, view)?);
         }
         Ok(self)
     }
@@ -224,8 +224,8 @@ impl SimCamera {
     fn paint(&mut self, scene: &SceneSnapshot) -> Option<Picture> {
         let (scanned, robot) = (self.scanned.as_mut()?, self.robot.as_ref()?);
         let camera_from_base: Isometry3<f64> = self.camera_from_base.cast();
-        let object = scene.object.map(|pose| pose.isometry());
-        match scanned.paint(robot, &scene.q, object, &camera_from_base) {
+        let objects: Vec<_> = places(&self.objects, scene).map(|(_, pose)| pose).collect();
+        match scanned.paint(robot, &scene.q, &objects, &camera_from_base) {
             Ok(picture) => Some(picture),
             Err(error) => {
                 tracing::warn!("the simulated camera draws the robot's meshes from here on: {error}");
@@ -245,10 +245,23 @@ impl SimCamera {
                 self.raster.draw(&robot.parts()[part], &(self.camera_from_base * base_from_part.cast::<f32>()));
             });
         }
-        if let (Some(mesh), Some(pose)) = (&self.object, scene.object) {
-            self.raster.draw(mesh, &(self.camera_from_base * pose.isometry().cast::<f32>()));
+        for (body, pose) in places(&self.objects, scene) {
+            if let Some(pose) = pose {
+                self.raster.draw(&body.mesh, &(self.camera_from_base * pose.cast::<f32>()));
+            }
         }
     }
+}
+
+/// Where the bodies are: the first is the scene's object, whatever its name.
+fn places<'a>(
+    bodies: &'a [DrawnBody],
+    scene: &'a SceneSnapshot,
+) -> impl Iterator<Item = (&'a DrawnBody, Option<Isometry3<f64>>)> {
+    bodies.iter().enumerate().map(|(number, body)| {
+        let pose = if number == 0 { scene.object } else { scene.named.of(&body.name) };
+        (body, pose.map(|pose| pose.isometry()))
+    })
 }
 
 #[cfg(test)]

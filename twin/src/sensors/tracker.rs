@@ -12,6 +12,10 @@ use shared_mem::frames::{Base, Object, Pose};
 use shared_mem::msg::object::ObjectPose;
 use std::collections::VecDeque;
 
+/// Streams of random numbers: of the first body's tracker, and of the others' behind this.
+const OF_THE_FIRST: u64 = 3;
+const OF_OTHERS: u64 = 100;
+
 /// The tracker.
 #[derive(Debug, Clone)]
 pub struct SimTracker {
@@ -31,6 +35,16 @@ impl SimTracker {
     /// The tracker of a cell: rate and latency of its camera, noise of its object. Without `[camera]` those of a D455 at 30 Hz.
     #[must_use]
     pub fn new(cell: &Cell) -> Self {
+        Self::drawing(cell, OF_THE_FIRST)
+    }
+
+    /// The tracker of the cell's body of this number, which belongs to the object in question: its noise is its own.
+    #[must_use]
+    pub fn of_body(cell: &Cell, number: usize) -> Self {
+        Self::drawing(cell, if number == 0 { OF_THE_FIRST } else { OF_OTHERS + number as u64 })
+    }
+
+    fn drawing(cell: &Cell, stream: u64) -> Self {
         let camera = cell.camera.clone().unwrap_or_default();
         let exact = PoseNoise { position: 0.0, rotation: 0.0 };
         Self {
@@ -39,7 +53,7 @@ impl SimTracker {
             noise: cell.object().and_then(|o| o.pose_noise).unwrap_or(exact),
             effects: CameraEffects::default(),
             reported: CameraMemory::default(),
-            generator: generator(cell, 3),
+            generator: generator(cell, stream),
             sequence: 0,
             next_picture_ns: 0,
             pending: VecDeque::with_capacity(64),
@@ -55,15 +69,20 @@ impl SimTracker {
     /// Shows the tracker the scene; called every control period. Answers with a pose when one becomes known at that
     /// moment. Its `stamp_ns` is left for the host to set; `device_ns` is the camera's clock when the picture was taken.
     pub fn observe(&mut self, scene: &SceneSnapshot) -> Option<ObjectPose> {
-        if scene.time_ns >= self.next_picture_ns {
-            self.next_picture_ns = (scene.time_ns / self.period_ns + 1) * self.period_ns;
-            if let Some(object) = scene.object {
-                let pose = self.measure(&object, scene.time_ns);
-                self.pending.push_back((scene.time_ns + self.latency_ns + self.effects.latency_ns(), pose));
+        self.look(scene.time_ns, scene.object)
+    }
+
+    /// The same of an object that is there at this moment of the simulated clock [ns].
+    pub fn look(&mut self, time_ns: u64, object: Option<Pose<Base, Object>>) -> Option<ObjectPose> {
+        if time_ns >= self.next_picture_ns {
+            self.next_picture_ns = (time_ns / self.period_ns + 1) * self.period_ns;
+            if let Some(object) = object {
+                let pose = self.measure(&object, time_ns);
+                self.pending.push_back((time_ns + self.latency_ns + self.effects.latency_ns(), pose));
             }
         }
         let (known_at, _) = self.pending.front()?;
-        (*known_at <= scene.time_ns).then(|| self.pending.pop_front())?.map(|(_, pose)| pose)
+        (*known_at <= time_ns).then(|| self.pending.pop_front())?.map(|(_, pose)| pose)
     }
 
     fn measure(&mut self, object: &Pose<Base, Object>, time_ns: u64) -> ObjectPose {

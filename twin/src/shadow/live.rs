@@ -3,10 +3,10 @@
 
 use super::{MirrorError, Mirrored, ObjectEvent, Shadow};
 use shared_mem::msg::arm::ArmState;
-use shared_mem::msg::object::ObjectPose;
-use shared_mem::msg::twin::{TwinGap, TwinState};
+use shared_mem::msg::object::{NamedPose, ObjectPose};
+use shared_mem::msg::twin::{TwinGap, TwinObject, TwinState};
 use shared_mem::time::now_ns;
-use shared_mem::topics::{ARM_STATE, OBJECT_POSE, TWIN_GAP, TWIN_STATE};
+use shared_mem::topics::{ARM_STATE, OBJECT_POSE, OBJECT_POSES, TWIN_GAP, TWIN_OBJECTS, TWIN_STATE};
 use shared_mem::transport::{Node, Publisher, Subscriber, TransportError, Wake};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -51,9 +51,11 @@ pub struct Live {
     node: Node,
     states: Subscriber<ArmState>,
     poses: Subscriber<ObjectPose>,
+    named: Subscriber<NamedPose>,
     wake: Wake,
     predictions: Publisher<TwinState>,
     gaps: Publisher<TwinGap>,
+    objects: Publisher<TwinObject>,
     /// Time spent computing and sending [s].
     busy_s: f64,
 }
@@ -68,9 +70,11 @@ impl Live {
         Ok(Self {
             states: node.subscriber(ARM_STATE)?,
             poses: node.subscriber(OBJECT_POSE)?,
+            named: node.subscriber(OBJECT_POSES)?,
             wake: node.wake_on(ARM_STATE.name)?,
             predictions: node.publisher(TWIN_STATE)?,
             gaps: node.publisher(TWIN_GAP)?,
+            objects: node.publisher(TWIN_OBJECTS)?,
             node,
             busy_s: 0.0,
         })
@@ -107,6 +111,7 @@ impl Live {
                 self.node.clear_dead_nodes();
                 self.predictions.greet_new_readers()?;
                 self.gaps.greet_new_readers()?;
+                self.objects.greet_new_readers()?;
                 for ignored in self.node.newly_ignored() {
                     watcher.remark(&ignored.to_string());
                 }
@@ -133,16 +138,45 @@ impl Live {
                 }
                 watcher.mirrored(&mirrored);
             }
-            while let Some(pose) = self.poses.receive()? {
-                match shadow.on_object(&pose) {
-                    Some(ObjectEvent::Found) => watcher.remark("the object is tracked; the twin's stands where it is"),
-                    Some(ObjectEvent::Rests) => watcher.remark("the object rests; the twin's was set onto it"),
-                    None => {}
-                }
-            }
+            self.mirror_objects(shadow, watcher)?;
             self.busy_s += now_ns().saturating_sub(arrived_ns) as f64 * 1e-9;
         }
         Ok(any)
+    }
+
+    /// What the tracker says about objects.
+    fn mirror_objects(&self, shadow: &mut Shadow, watcher: &mut dyn Watcher) -> Result<(), TransportError> {
+        while let Some(pose) = self.poses.receive()? {
+            let event = shadow.on_object(&pose);
+            self.tell(shadow, 0, event, watcher)?;
+        }
+        while let Some(pose) = self.named.receive()? {
+            if let Some((number, event)) = shadow.on_named(&pose) {
+                self.tell(shadow, number, event, watcher)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Sends an object's gap, and tells what happened to it.
+    fn tell(
+        &self,
+        shadow: &Shadow,
+        number: usize,
+        event: Option<ObjectEvent>,
+        watcher: &mut dyn Watcher,
+    ) -> Result<(), TransportError> {
+        if let Some(object) = shadow.twin_object(number) {
+            self.objects.send(&TwinObject { stamp_ns: now_ns(), ..object })?;
+        }
+        let name = shadow.name(number);
+        let object = if name.is_empty() { "the object".to_owned() } else { format!("`{}`", name.text()) };
+        match event {
+            Some(ObjectEvent::Found) => watcher.remark(&format!("{object} is tracked; the twin's stands where it is")),
+            Some(ObjectEvent::Rests) => watcher.remark(&format!("{object} rests; the twin's was set onto it")),
+            None => {}
+        }
+        Ok(())
     }
 
     fn send(&self, mirrored: &mut Mirrored) -> Result<(), TransportError> {

@@ -1,6 +1,6 @@
 //! The live twin: a simulated cell that is told what the real arm is told and compared with what the real cell does.
 //!
-//! [`Shadow`] is the whole logic without processes: feed it arm states and object poses, take predictions and gaps out.
+//! [`Shadow`] is the whole logic without processes: feed it arm states and poses of objects, take predictions and gaps out.
 //! [`live`] wires it to shared memory. One thread; stamps are the host's monotonic clock unless a name says otherwise.
 //!
 //! The twin is set back onto the robot ("aligned") when it first sees it, when the bridge was restarted, after a hole
@@ -16,15 +16,16 @@ mod tests;
 pub use object::ObjectEvent;
 pub use report::{Ages, Summary};
 
+use crate::arm::JointState;
 use crate::control::Drive;
-use crate::scene::{MeshFileError, ObjectModel};
-use crate::sim::{SimCell, SimError};
+use crate::scene::{MeshFileError, cell_bodies};
+use crate::sim::{SimError, SimScene};
 use gap::JointGap;
 use object::ObjectMirror;
 use shared_mem::cell::Cell;
 use shared_mem::msg::arm::ArmState;
-use shared_mem::msg::object::ObjectPose;
-use shared_mem::msg::twin::{TwinGap, TwinState};
+use shared_mem::msg::object::{NamedPose, ObjectName, ObjectPose};
+use shared_mem::msg::twin::{TwinGap, TwinObject, TwinState};
 use shared_mem::msg::{Joints, MAX_JOINTS};
 use shared_mem::theta::Theta;
 use shared_mem::time::TICK_NS;
@@ -47,11 +48,12 @@ impl fmt::Display for Event {
 
 /// The twin and what it last saw of the robot.
 pub struct Shadow {
-    cell: SimCell,
+    scene: SimScene,
     dof: usize,
     last: Option<ArmState>,
     joints: JointGap,
-    object: Option<ObjectMirror>,
+    /// One for each body, in the order of the twin's.
+    objects: Vec<ObjectMirror>,
     alignments: u32,
     cycles: u64,
     dropped: u64,
@@ -119,15 +121,19 @@ impl Shadow {
     /// # Errors
     /// [`ShadowError`] naming what cell.toml lacks.
     pub fn new(cell: &Cell, theta: Option<&Theta>) -> Result<Self, ShadowError> {
-        let sim = SimCell::new(cell, theta)?;
-        let dof = sim.arm_model().ok_or(ShadowError::NoArm)?.dof();
-        let object = ObjectModel::new(cell, theta)?.map(|model| ObjectMirror::new(cell, &model.shape));
+        let scene = SimScene::new(cell, theta)?;
+        let dof = scene.cell().arm_model().ok_or(ShadowError::NoArm)?.dof();
+        let mut objects = Vec::new();
+        for (number, body) in cell_bodies(cell)?.iter().enumerate() {
+            let one = Cell { in_question: body.object, ..cell.clone() };
+            objects.push(ObjectMirror::new(&one, number, &body.surface()));
+        }
         Ok(Self {
-            cell: sim,
+            scene,
             dof,
             last: None,
             joints: JointGap::new(dof),
-            object,
+            objects,
             alignments: 0,
             cycles: 0,
             dropped: 0,
@@ -160,19 +166,47 @@ impl Shadow {
         self.last = Some(*state);
         self.cycles += 1;
         self.ages.record(age_ns);
-        if let Some(object) = &mut self.object {
-            object.remember(state.stamp_ns, &self.cell);
+        for object in &mut self.objects {
+            object.remember(state.stamp_ns, &self.scene);
         }
         Ok(Some(Mirrored { state: self.prediction(state), gap: self.compare(state, age_ns), event }))
     }
 
-    /// Takes in what the tracker says about the object; tells when the twin's object was set onto it.
+    /// Takes in what the tracker says about the first object; tells when the twin's was set onto it.
     pub fn on_object(&mut self, pose: &ObjectPose) -> Option<ObjectEvent> {
-        let event = self.object.as_mut()?.on_pose(pose, &mut self.cell);
+        self.on_body(0, pose)
+    }
+
+    /// The same about one of the others by its name, with its number; `None` for the first, which is on a topic of its own, and
+    /// for a name that the cell does not have.
+    pub fn on_named(&mut self, pose: &NamedPose) -> Option<(usize, Option<ObjectEvent>)> {
+        let number = self.scene.names().iter().position(|name| *name == pose.name).filter(|number| *number > 0)?;
+        Some((number, self.on_body(number, &pose.unnamed())))
+    }
+
+    fn on_body(&mut self, number: usize, pose: &ObjectPose) -> Option<ObjectEvent> {
+        let event = self.objects.get_mut(number)?.on_pose(pose, &mut self.scene);
         if event.is_some() {
             self.alignments += 1;
         }
         event
+    }
+
+    /// Name of an object by its number; empty for one without.
+    #[must_use]
+    pub fn name(&self, number: usize) -> ObjectName {
+        self.scene.names().get(number).copied().unwrap_or_default()
+    }
+
+    /// An object in the twin when the tracker saw it last, and how far the two were apart; `None` for one without a name or that was
+    /// not seen. `stamp_ns` is left for the sender.
+    #[must_use]
+    pub fn twin_object(&self, number: usize) -> Option<TwinObject> {
+        let (mirror, name) = (self.objects.get(number)?, self.name(number));
+        let (mirrors_ns, pose) = mirror.pictured().filter(|_| !name.is_empty())?;
+        let (add_m, add_s_m) = mirror.latest_gap().unwrap_or((f64::NAN, f64::NAN));
+        let (position, wxyz) = (pose.position(), pose.wxyz());
+        Some(TwinObject { stamp_ns: 0, mirrors_ns, position, wxyz, add_m, add_s_m, name })
     }
 
     /// The reader threw away `states` unread because it was too slow: the next state aligns the twin.
@@ -190,8 +224,15 @@ impl Shadow {
             alignments: self.alignments,
             ages: self.ages.clone(),
             joint_rms: self.joints.overall().map(|rms| rms[..self.dof].to_vec()),
-            object: self.object.as_ref().and_then(ObjectMirror::mean_gap),
+            object: self.objects.first().and_then(ObjectMirror::mean_gap),
+            objects: self.by_name(),
         }
+    }
+
+    /// Mean gap of each object that has a name.
+    fn by_name(&self) -> Vec<(String, Option<(f64, f64)>)> {
+        let named = self.scene.names().iter().zip(&self.objects).filter(|(name, _)| !name.is_empty());
+        named.map(|(name, mirror)| (name.text().to_owned(), mirror.mean_gap())).collect()
     }
 
     /// Simulates up to the moment of `state` where that is possible.
@@ -214,47 +255,47 @@ impl Shadow {
             let share = k as f64 / periods as f64;
             let q_d = between(&last.q_d, &state.q_d, share);
             let dq_d = between(&last.dq_d, &state.dq_d, share);
-            self.cell.step(&Drive::JointImpedance { q_d, dq_d });
+            self.scene.step(&Drive::JointImpedance { q_d, dq_d });
         }
         if periods == 0 { Step::Nothing } else { Step::Mirrored }
     }
 
     fn align(&mut self, state: &ArmState) {
-        self.cell.set_arm(&state.q[..self.dof], &state.dq[..self.dof]);
+        self.scene.set_arm(&JointState { q: state.q, dq: state.dq }, self.dof);
         self.alignments += 1;
         self.joints.start_anew();
-        if let Some(object) = &mut self.object {
+        for object in &mut self.objects {
             // It may have been moved meanwhile, and the arm was just put where the twin's object may stand.
             object.lose();
         }
     }
 
     fn prediction(&self, state: &ArmState) -> TwinState {
-        let object = self.cell.object();
+        let (object, cell) = (self.scene.object(0), self.scene.cell());
         TwinState {
             stamp_ns: 0,
             mirrors_ns: state.stamp_ns,
             cycle: state.cycle,
             dof: state.dof,
             has_object: u32::from(object.is_some()),
-            q: self.cell.q(),
-            dq: self.cell.dq(),
-            tau_J: self.cell.tau_J(),
+            q: cell.q(),
+            dq: cell.dq(),
+            tau_J: cell.tau_J(),
             object_position: object.map_or([0.0; 3], |pose| pose.position()),
             object_wxyz: object.map_or([1.0, 0.0, 0.0, 0.0], |pose| pose.wxyz()),
-            contact_force: self.cell.contact_force(),
+            contact_force: self.scene.contact_force(),
         }
     }
 
     fn compare(&mut self, state: &ArmState, age_ns: u64) -> TwinGap {
-        let predicted = self.cell.joint_reading().q;
+        let predicted = self.scene.cell().joint_reading().q;
         let mut joint_error = [0.0; MAX_JOINTS];
         for i in 0..self.dof {
             joint_error[i] = predicted[i] - state.q[i];
         }
         self.joints.add(&joint_error);
         let (object_add_m, object_add_s_m) =
-            self.object.as_ref().and_then(ObjectMirror::latest_gap).unwrap_or((f64::NAN, f64::NAN));
+            self.objects.first().and_then(ObjectMirror::latest_gap).unwrap_or((f64::NAN, f64::NAN));
         TwinGap {
             stamp_ns: 0,
             cycle: state.cycle,

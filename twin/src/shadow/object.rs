@@ -6,7 +6,7 @@
 
 use crate::metrics::SurfacePoints;
 use crate::scene::ObjectShape;
-use crate::sim::SimCell;
+use crate::sim::SimScene;
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use shared_mem::cell::{Cell, PoseNoise};
 use shared_mem::frames::{Base, Object, Pose};
@@ -31,8 +31,10 @@ const UNKNOWN_NOISE: PoseNoise = PoseNoise { position: 1e-3, rotation: 5e-3 };
 /// Poses agree, and the twin agrees with them, within so many sigmas.
 const SIGMAS: f64 = 4.0;
 
-/// The object as tracker and twin see it.
+/// One of the objects as tracker and twin see it.
 pub(super) struct ObjectMirror {
+    /// Its place among the bodies of the twin.
+    number: usize,
     latency_ns: u64,
     noise: PoseNoise,
     points: SurfacePoints,
@@ -41,14 +43,18 @@ pub(super) struct ObjectMirror {
     recent: VecDeque<Pose<Base, Object>>,
     found: bool,
     latest: Option<(f64, f64)>,
+    /// Moment of the newest picture [ns], and the twin's pose then.
+    pictured: Option<(u64, Pose<Base, Object>)>,
     sums: (f64, f64),
     count: u64,
 }
 
 impl ObjectMirror {
-    pub(super) fn new(cell: &Cell, shape: &ObjectShape) -> Self {
+    /// Of the object in question of `cell`, which is body `number` of the twin.
+    pub(super) fn new(cell: &Cell, number: usize, shape: &ObjectShape) -> Self {
         let noise = cell.object().and_then(|o| o.pose_noise).unwrap_or(UNKNOWN_NOISE);
         Self {
+            number,
             latency_ns: cell.camera.as_ref().map_or(0, |camera| (camera.latency * 1e9) as u64),
             noise: PoseNoise {
                 position: noise.position.max(1e-4), // an exact tracker must still tolerate the twin settling on its table
@@ -59,18 +65,19 @@ impl ObjectMirror {
             recent: VecDeque::with_capacity(REST_POSES),
             found: false,
             latest: None,
+            pictured: None,
             sums: (0.0, 0.0),
             count: 0,
         }
     }
 
     /// Keeps the twin's pose of the moment of an arm state.
-    pub(super) fn remember(&mut self, stamp_ns: u64, twin: &SimCell) {
-        let Some(pose) = twin.object() else { return };
+    pub(super) fn remember(&mut self, stamp_ns: u64, twin: &SimScene) {
+        let Some(pose) = twin.object(self.number) else { return };
         if self.history.len() == HISTORY {
             self.history.pop_front();
         }
-        self.history.push_back((stamp_ns, pose, twin.contact_force() > 0.0));
+        self.history.push_back((stamp_ns, pose, twin.is_moved(self.number)));
     }
 
     /// Forgets the real object: the next pose is a first one.
@@ -79,20 +86,23 @@ impl ObjectMirror {
         self.recent.clear();
         self.found = false;
         self.latest = None;
+        self.pictured = None;
     }
 
-    pub(super) fn on_pose(&mut self, message: &ObjectPose, twin: &mut SimCell) -> Option<ObjectEvent> {
+    pub(super) fn on_pose(&mut self, message: &ObjectPose, twin: &mut SimScene) -> Option<ObjectEvent> {
         let real = message.pose()?;
+        let picture_ns = message.stamp_ns.saturating_sub(self.latency_ns);
         if !self.found {
             self.found = true;
             self.set(&real, twin);
+            self.pictured = Some((picture_ns, real));
             return Some(ObjectEvent::Found);
         }
-        let picture_ns = message.stamp_ns.saturating_sub(self.latency_ns);
         let then = self.history.iter().rev().find(|(stamp, ..)| *stamp <= picture_ns).map(|(_, pose, _)| *pose);
         if let Some(then) = then {
             let (add, add_s) = (self.points.add(&real, &then), self.points.add_s(&real, &then));
             self.latest = Some((add, add_s));
+            self.pictured = Some((picture_ns, then));
             (self.sums.0, self.sums.1) = (self.sums.0 + add, self.sums.1 + add_s);
             self.count += 1;
         }
@@ -104,6 +114,11 @@ impl ObjectMirror {
         self.latest
     }
 
+    /// Moment of the newest picture that could be compared [ns], and the twin's pose then.
+    pub(super) fn pictured(&self) -> Option<(u64, Pose<Base, Object>)> {
+        self.pictured
+    }
+
     /// Mean ADD and ADD-S over all poses [m].
     pub(super) fn mean_gap(&self) -> Option<(f64, f64)> {
         let count = self.count as f64;
@@ -111,7 +126,7 @@ impl ObjectMirror {
     }
 
     /// Sets the twin's object onto a real one that rests somewhere else.
-    fn rests(&mut self, real: &Pose<Base, Object>, twin: &mut SimCell) -> Option<ObjectEvent> {
+    fn rests(&mut self, real: &Pose<Base, Object>, twin: &mut SimScene) -> Option<ObjectEvent> {
         if self.recent.len() == REST_POSES {
             self.recent.pop_front();
         }
@@ -121,7 +136,7 @@ impl ObjectMirror {
         if self.recent.len() < REST_POSES || touched || !self.recent.iter().all(|pose| self.agrees(pose, &mean)) {
             return None;
         }
-        if self.agrees(&twin.object()?, &mean) {
+        if self.agrees(&twin.object(self.number)?, &mean) {
             return None;
         }
         self.set(&mean, twin);
@@ -135,8 +150,8 @@ impl ObjectMirror {
         apart < sigmas * self.noise.position && a.angle_to(b) < sigmas * self.noise.rotation
     }
 
-    fn set(&mut self, pose: &Pose<Base, Object>, twin: &mut SimCell) {
-        twin.set_object(pose, Vector3::zeros(), Vector3::zeros());
+    fn set(&mut self, pose: &Pose<Base, Object>, twin: &mut SimScene) {
+        twin.set_object(self.number, pose, Vector3::zeros(), Vector3::zeros());
         self.history.clear();
         self.recent.clear();
     }

@@ -50,6 +50,8 @@ pub struct Summary {
     pub joint_rms: Option<Vec<f64>>,
     /// Mean ADD and ADD-S over the object's poses [m]; `None` without poses.
     pub object: Option<(f64, f64)>,
+    /// The same of each object that has a name, in the order of cell.toml.
+    pub objects: Vec<(String, Option<(f64, f64)>)>,
 }
 
 impl Summary {
@@ -57,6 +59,11 @@ impl Summary {
     /// how much faster than the robot the twin could have gone.
     #[must_use]
     pub fn json(&self, busy_s: f64) -> Value {
+        let gap = |(name, gap): &(String, Option<(f64, f64)>)| {
+            let gap = json!({ "add_m": gap.map(|(add, _)| add), "add_s_m": gap.map(|(_, add_s)| add_s) });
+            (name.clone(), gap)
+        };
+        let objects: serde_json::Map<String, Value> = self.objects.iter().map(gap).collect();
         json!({
             "cycles": self.cycles,
             "real_time_factor": self.real_time_factor(busy_s),
@@ -67,6 +74,7 @@ impl Summary {
                 "joint_rms_rad": self.joint_rms,
                 "object_add_m": self.object.map(|(add, _)| add),
                 "object_add_s_m": self.object.map(|(_, add_s)| add_s),
+                "objects": objects,
             },
         })
     }
@@ -75,10 +83,14 @@ impl Summary {
     #[must_use]
     pub fn text(&self, busy_s: f64) -> Option<String> {
         let worst = self.joint_rms.as_ref()?.iter().copied().fold(0.0, f64::max);
-        let object = self.object.map_or_else(
-            || "no object was seen".to_owned(),
-            |(add, add_s)| format!("object ADD {:.2} mm, ADD-S {:.2} mm", add * 1e3, add_s * 1e3),
-        );
+        let seen = |name: &str, gap: &Option<(f64, f64)>| match gap {
+            Some((add, add_s)) => format!("{name} ADD {:.2} mm, ADD-S {:.2} mm", add * 1e3, add_s * 1e3),
+            None => format!("no {name} was seen"),
+        };
+        let object = match &self.objects[..] {
+            several @ [_, _, ..] => several.iter().map(|(name, gap)| seen(name, gap)).collect::<Vec<_>>().join("; "),
+            _ => seen("object", &self.object),
+        };
         Some(format!(
             "mirrored {} cycles, dropped {}, aligned {} times; {:.0} times faster than real time\n\
              age of a state: median {:.0} µs, 99 % {:.0} µs\n\

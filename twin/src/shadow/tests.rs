@@ -3,6 +3,7 @@
 use super::*;
 use crate::sensors::tracker::SimTracker;
 use crate::shipped::shipped_exact;
+use crate::sim::SimCell;
 use nalgebra::{Isometry3, Vector3};
 use shared_mem::frames::Pose;
 use shared_mem::theta::ArmTheta;

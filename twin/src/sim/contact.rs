@@ -36,6 +36,16 @@ enum Outlook {
     Near(FlangeMotion),
 }
 
+/// The tool as it is held, for a world of many bodies.
+pub(super) struct Held {
+    /// From the origin along z to the far end of the segment [m].
+    pub(super) segment: f64,
+    /// Around the segment [m].
+    pub(super) radius: f64,
+    /// Where its origin is in the flange.
+    pub(super) flange_from_tool: Isometry3<f64>,
+}
+
 /// The contact between tool and object.
 #[derive(Clone)]
 pub(super) struct ToolContact {
@@ -82,6 +92,22 @@ impl ToolContact {
     /// See [`super::SimCell::refine`].
     pub(super) fn refine(&mut self, parts: u32) {
         self.parts = parts;
+    }
+
+    /// The tool as it is held.
+    pub(super) fn held_tool(&self, tool: &Tool) -> Held {
+        let flange_from_tool = self.held(&Isometry3::identity());
+        Held { segment: tool.length - tool.radius, radius: tool.radius, flange_from_tool }
+    }
+
+    /// Whether the tool may touch the object within the coming period; asked once in each in which [`Self::advance`] is not.
+    pub(super) fn is_near(&mut self, arm: &SimArm, object: &TableObject) -> bool {
+        self.approaching(arm, object).is_some()
+    }
+
+    /// Nothing touches the object in the coming period.
+    pub(super) fn let_go(&mut self) {
+        (self.record.mean_force, self.record.on_tool) = (0.0, Default::default());
     }
 
     /// One period of an object that nothing touches.

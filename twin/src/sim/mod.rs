@@ -2,29 +2,33 @@
 //! robot, `twin shadow` and `twin replay` are all this one; called from their threads, never from a control thread
 //! (a contact takes too long for one).
 //!
-//! The arm meets the object, with its tool alone, and the table where that is asked for ([`SimCell::make_table_solid`]).
-//! It passes through itself.
+//! [`SimCell`] has one object, [`SimScene`] all of them. The arm meets objects, with its tool alone, and the table where that
+//! is asked for ([`SimCell::make_table_solid`]). It passes through itself.
 //! Units SI, everything in the base frame. Deterministic: the same cell, parameters and drives give the same numbers.
 #![allow(non_snake_case)] // tau_J is the Franka Control Interface's own symbol
 
 mod arm;
 mod contact;
+mod error;
 mod generator;
 mod joint_noise;
+mod several;
 mod state;
 mod table;
 #[cfg(test)]
 mod tests;
 mod tool_path;
 
+pub use error::SimError;
 pub(crate) use generator::generator;
+pub use several::SimScene;
 pub use state::SimState;
 
-use crate::arm::{ArmModel, GainError, JointState, Joints, MassProperties, ModelError};
+use crate::arm::{ArmModel, GainError, JointState, Joints, MassProperties};
 use crate::control::{CommandTrack, Drive, Plant, Reading};
-use crate::effects::{CameraEffects, EffectError, Effects};
-use crate::physics::{FlatMesh, TableObject};
-use crate::scene::{MeshFileError, ObjectModel, ObjectParameters, ParameterError, SceneSnapshot};
+use crate::effects::{CameraEffects, Effects};
+use crate::physics::TableObject;
+use crate::scene::{NamedPoses, ObjectModel, ObjectParameters, SceneSnapshot};
 use arm::SimArm;
 use contact::{ContactRecord, ToolContact};
 use nalgebra::{Isometry3, Vector3};
@@ -63,40 +67,6 @@ struct Description {
     object: Option<shared_mem::cell::Object>,
 }
 
-/// No cell can be simulated from what was given.
-#[derive(Debug, thiserror::Error)]
-pub enum SimError {
-    /// The arm.
-    #[error(transparent)]
-    Arm(#[from] ModelError),
-    /// Its controller.
-    #[error(transparent)]
-    Gains(#[from] GainError),
-    /// The object's mesh file.
-    #[error(transparent)]
-    Mesh(#[from] MeshFileError),
-    /// The object's mesh encloses nothing.
-    #[error(transparent)]
-    FlatMesh(#[from] FlatMesh),
-    /// A number of the object that no body can have.
-    #[error(transparent)]
-    Object(#[from] ParameterError),
-    /// An object, and nothing to put it on.
-    #[error("cell.toml has an [object] but no [table]; add `[table]` with `height = ` in metres over the base frame")]
-    NoTable,
-    /// The start pose does not fit the arm.
-    #[error("`simulation.q` holds {given} numbers; this arm has {dof} joints: give one for each, or leave it out")]
-    StartPose {
-        /// Numbers given.
-        given: usize,
-        /// Joints of the arm.
-        dof: usize,
-    },
-    /// An effect is not known or its parameters do not fit.
-    #[error("{0} (an `[[effect]]` of theta.toml, or of the file given with --effects)")]
-    Effect(#[from] EffectError),
-}
-
 impl SimCell {
     /// The cell as cell.toml describes it, arm and object at rest where `[simulation]` puts them; what `theta` knows
     /// replaces cell.toml's nominal values.
@@ -114,9 +84,11 @@ impl SimCell {
                 model.check()?;
                 let table = cell.table.ok_or(SimError::NoTable)?.height;
                 let mut object = TableObject::new(&model, Some(table), &effects)?;
-                let [x, y] = cell.simulation.object_position;
+                let described = cell.object();
+                let [x, y] = described.and_then(|o| o.start).unwrap_or(cell.simulation.object_position);
+                let yaw = described.and_then(|o| o.start_yaw).unwrap_or(cell.simulation.object_yaw);
                 let place = Vector3::new(x, y, table + model.shape.half_extents().z);
-                let start = Isometry3::new(place, Vector3::z() * cell.simulation.object_yaw);
+                let start = Isometry3::new(place, Vector3::z() * yaw);
                 object.set(&Pose::from_isometry(start), Vector3::zeros(), Vector3::zeros());
                 (Some(object), ToolContact::new(cell.tool.as_ref(), &model.parameters(), &effects.hit))
             }
@@ -401,6 +373,7 @@ impl SimCell {
             dof: self.arm_model().map_or(0, ArmModel::dof),
             q: self.q(),
             object: self.object(),
+            named: NamedPoses::default(),
         }
     }
 }

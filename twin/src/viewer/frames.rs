@@ -4,13 +4,14 @@
 //! |---|---|
 //! | `robot.base_frame` of cell.toml | nothing: the one base, of robot and twin |
 //! | the links by their names in the model or the URDF, `flange` | the link before, the first on the base |
-//! | `object`, `camera` (optical: z forward, x right, y down) | the base |
+//! | `object`, `object/NAME` of each beside the first, `camera` (optical: z forward, x right, y down) | the base |
 //! | the same behind `twin/` | the same behind `twin/`, the first on the base |
 
 use crate::arm::{ArmModel, Joints};
 use foxglove::messages::{FrameTransform, FrameTransforms, Quaternion, Timestamp, Vector3};
 use nalgebra::Isometry3;
 use shared_mem::cell::Cell;
+use shared_mem::msg::object::ObjectName;
 
 /// Whose picture it is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -70,9 +71,9 @@ impl Frames {
         FrameTransforms { transforms }
     }
 
-    /// The object.
-    pub(super) fn object(&self, time: Timestamp, look: Look, base_from_object: &Isometry3<f64>) -> FrameTransforms {
-        self.on_base(time, own(look, OBJECT), base_from_object)
+    /// An object, by the name of its frame ([`object_frame`]).
+    pub(super) fn object(&self, time: Timestamp, look: Look, frame: &str, place: &Isometry3<f64>) -> FrameTransforms {
+        self.on_base(time, own(look, frame), place)
     }
 
     /// The camera.
@@ -82,6 +83,14 @@ impl Frames {
 
     fn on_base(&self, time: Timestamp, child: String, base_from_child: &Isometry3<f64>) -> FrameTransforms {
         FrameTransforms { transforms: vec![transform(time, self.base.clone(), child, base_from_child)] }
+    }
+}
+
+/// Name of an object's frame, by its number and name.
+pub(super) fn object_frame(number: usize, name: &ObjectName) -> String {
+    match number {
+        0 => OBJECT.to_owned(),
+        _ => format!("{OBJECT}/{}", name.text()),
     }
 }
 

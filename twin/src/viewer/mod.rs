@@ -9,6 +9,7 @@
 mod frames;
 mod front;
 mod newcomers;
+mod objects;
 mod request;
 mod scene;
 #[cfg(test)]
@@ -20,22 +21,23 @@ mod tests;
 
 use crate::arm::{Joints, ModelError};
 use crate::render::LiveView;
-use foxglove::messages::{
-    CameraCalibration, FrameTransforms, JointStates, PoseInFrame, RawImage, SceneUpdate, Timestamp,
-};
+use foxglove::messages::{CameraCalibration, FrameTransforms, JointStates, RawImage, SceneUpdate, Timestamp};
 use foxglove::{
     Channel, ChannelBuilder, Context, Encode, FoxgloveError, RawChannel, Schema, WebSocketServer, WebSocketServerHandle,
 };
 use frames::{CAMERA, Look};
 use front::{Front, PATIENCE, hidden_address};
 use newcomers::Newcomers;
+use objects::ObjectChannels;
 use scene::Scene;
 use shared_mem::cell::Cell;
-use shared_mem::frames::{Base, Object, Pose};
+use shared_mem::frames::{Base, Pose};
 use shared_mem::msg::image::{CameraInfo, ImageHeader};
 use shared_mem::msg::twin::TwinGap;
 use shared_mem::time::unix_offset_ns;
-use shared_mem::topics::{ARM_STATE, CAMERA_COLOR, CAMERA_DEPTH, CAMERA_INFO, OBJECT_POSE, TWIN_GAP, TWIN_STATE};
+use shared_mem::topics::{
+    ARM_STATE, CAMERA_COLOR, CAMERA_DEPTH, CAMERA_INFO, OBJECT_POSE, OBJECT_POSES, TWIN_GAP, TWIN_OBJECTS, TWIN_STATE,
+};
 use shared_mem::transport::{ImageSample, ImageSubscriber, Node, TransportError};
 use std::io;
 use std::net::{Ipv4Addr, SocketAddr};
@@ -64,8 +66,7 @@ pub struct Viewer {
     newcomers: Arc<Newcomers>,
     real_joints: Channel<JointStates>,
     twin_joints: Channel<JointStates>,
-    real_object: Channel<PoseInFrame>,
-    twin_object: Channel<PoseInFrame>,
+    objects: Vec<ObjectChannels>,
     transforms: Channel<FrameTransforms>,
     calibration: Channel<CameraCalibration>,
     color: Channel<RawImage>,
@@ -111,6 +112,7 @@ impl Viewer {
         let scene = Scene::new(cell)?;
         let newcomers = Arc::new(Newcomers::to(SCENE));
         let context = Context::new();
+        let objects = objects::channels(&scene, |topic| channel(&context, topic));
         let server = WebSocketServer::new().name("twinalign shadow").context(&context).listener(newcomers.clone());
         let (front, server) = open(server, listen, PATIENCE)?;
         let schema = r#"{"type":"object","properties":{"joint_error":{"type":"array","items":{"type":"number"}},
@@ -130,8 +132,7 @@ impl Viewer {
             newcomers,
             real_joints: channel(&context, "/arm/joints"),
             twin_joints: channel(&context, "/twin/joints"),
-            real_object: channel(&context, OBJECT_POSE.name),
-            twin_object: channel(&context, "/twin/object"),
+            objects,
             transforms: channel(&context, "/tf"),
             calibration: channel(&context, CAMERA_INFO.name),
             color: channel(&context, CAMERA_COLOR.name),
@@ -160,6 +161,7 @@ impl Viewer {
     fn run_on(mut self, node: &Node, stop: &AtomicBool) -> Result<(), ViewerError> {
         let (arm, twin) = (node.subscriber(ARM_STATE)?, node.subscriber(TWIN_STATE)?);
         let (gaps, poses) = (node.subscriber(TWIN_GAP)?, node.subscriber(OBJECT_POSE)?);
+        let (named, twins) = (node.subscriber(OBJECT_POSES)?, node.subscriber(TWIN_OBJECTS)?);
         let info = node.subscriber(CAMERA_INFO)?;
         let (color, depth) = (node.image_subscriber(CAMERA_COLOR)?, node.image_subscriber(CAMERA_DEPTH)?);
         while !stop.load(Ordering::Relaxed) {
@@ -175,14 +177,15 @@ impl Viewer {
                 self.twin_joints.log(&self.scene.joints(time, &state.q, &state.dq, &state.tau_J));
                 self.show_arm(time, Look::Twin, &state.q);
                 let pose = Pose::from_parts(state.object_position, state.object_wxyz);
-                self.show_object(time, Look::Twin, pose.filter(|_| state.has_object == 1));
+                self.show_object(time, Look::Twin, 0, pose.filter(|_| state.has_object == 1));
                 if let Some(live) = &mut self.live {
                     live.remember(&state);
                 }
             }
             if let Some(pose) = poses.newest()? {
-                self.show_object(time, Look::Real, pose.pose());
+                self.show_object(time, Look::Real, 0, pose.pose());
             }
+            self.show_others(time, &named, &twins)?;
             if let Some(gap) = gaps.newest()? {
                 self.gap.log(gap_json(&gap).to_string().as_bytes());
             }
@@ -211,16 +214,6 @@ impl Viewer {
     fn show_arm(&self, time: Timestamp, look: Look, q: &Joints) {
         self.transforms.log(&self.scene.transforms(time, look, q));
         self.scene.capsules(time, look, q).iter().for_each(|capsules| self.scenes.log(capsules));
-    }
-
-    fn show_object(&self, time: Timestamp, look: Look, pose: Option<Pose<Base, Object>>) {
-        let Some(pose) = pose else { return };
-        let channel = if look == Look::Real { &self.real_object } else { &self.twin_object };
-        channel.log(&self.scene.pose_in_base(time, &pose.isometry()));
-        self.transforms.log(&self.scene.frames().object(time, look, &pose.isometry()));
-        if let Some(update) = self.scene.object(time, look, &pose.isometry()) {
-            self.scenes.log(&update);
-        }
     }
 
     /// The twin at the moment of a colour picture, while somebody looks. What cannot be drawn once is not tried again.

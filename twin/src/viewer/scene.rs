@@ -1,15 +1,16 @@
 //! Robot, twin and object as Foxglove primitives, metres: what hangs on a link in the link's frame, all else in the base frame.
 
-use super::frames::{Frames, Look, parts};
+use super::frames::{Frames, Look, object_frame, parts};
 use crate::arm::{Joints, ModelError};
 use crate::render::{Hand, Mesh, RobotSurface};
-use crate::scene::{ArmOutline, ObjectModel};
+use crate::scene::{ArmOutline, CellBody, ObjectShape, cell_bodies};
 use foxglove::messages::{
     Color, CubePrimitive, CylinderPrimitive, FrameTransforms, JointState, JointStates, Point3, Pose, PoseInFrame,
     SceneEntity, SceneUpdate, SpherePrimitive, Timestamp, TriangleListPrimitive, Vector3,
 };
 use nalgebra::{Isometry3, Translation3};
 use shared_mem::cell::Cell;
+use shared_mem::msg::object::ObjectName;
 
 /// What does not change while it is shown.
 pub(super) struct Scene {
@@ -17,8 +18,29 @@ pub(super) struct Scene {
     /// The robot's own shapes, where they are known.
     surface: Option<RobotSurface>,
     frames: Frames,
-    object_size: Option<nalgebra::Vector3<f64>>,
+    /// Names of the bodies on the table, the first object first, and how they are shown.
+    objects: Vec<(ObjectName, Form)>,
 }
+
+/// How a body on the table is shown.
+enum Form {
+    /// A rigid object as its bounding box [m].
+    Box(nalgebra::Vector3<f64>),
+    /// A link as it is.
+    Link(Mesh),
+}
+
+impl Form {
+    fn of(body: &CellBody) -> Self {
+        match (&body.link, body.surface()) {
+            (None, shape) => Self::Box(shape.half_extents() * 2.0),
+            (Some(_), ObjectShape::Box { half_extents }) => Self::Box(half_extents * 2.0),
+            (Some(_), shape) => Self::Link(Mesh::new(shape.triangles(), OBJECT)),
+        }
+    }
+}
+
+const OBJECT: [u8; 3] = [222, 112, 40];
 
 /// Share by which the twin is drawn larger.
 const GHOST: f64 = 1.01;
@@ -27,12 +49,12 @@ impl Scene {
     pub(super) fn new(cell: &Cell) -> Result<Self, ModelError> {
         let outline = ArmOutline::new(cell)?;
         // A mesh that cannot be read was refused when the twin was made.
-        let object = ObjectModel::new(cell, None).ok().flatten();
+        let objects = cell_bodies(cell).unwrap_or_default().iter().map(|body| (body.name, Form::of(body))).collect();
         let surface = RobotSurface::new(cell, Hand::None)?;
         Ok(Self {
             frames: Frames::of(cell, outline.model()),
             surface: surface.is_measured().then_some(surface),
-            object_size: object.map(|model| model.shape.half_extents() * 2.0),
+            objects,
             outline,
         })
     }
@@ -100,15 +122,34 @@ impl Scene {
         Some(SceneUpdate { deletions: Vec::new(), entities: vec![entity] })
     }
 
-    /// The object's bounding box; `None` where the cell has no object.
-    pub(super) fn object(&self, time: Timestamp, look: Look, place: &Isometry3<f64>) -> Option<SceneUpdate> {
-        let size = self.object_size? * if look == Look::Twin { GHOST } else { 1.0 };
-        let mut entity = self.entity(time, look, "object");
-        entity.cubes.push(CubePrimitive {
-            pose: Some(pose(place)),
-            size: Some(Vector3 { x: size.x, y: size.y, z: size.z }),
-            color: color(look, [0.87, 0.44, 0.16]),
-        });
+    /// Names of the bodies, the first object first.
+    pub(super) fn names(&self) -> impl Iterator<Item = ObjectName> {
+        self.objects.iter().map(|(name, _)| *name)
+    }
+
+    /// A body by its number, of a rigid one the bounding box; `None` where the cell has no such body.
+    pub(super) fn object(
+        &self,
+        time: Timestamp,
+        look: Look,
+        number: usize,
+        place: &Isometry3<f64>,
+    ) -> Option<SceneUpdate> {
+        let (name, form) = self.objects.get(number)?;
+        let mut entity = self.entity(time, look, &object_frame(number, name));
+        match form {
+            Form::Box(size) => {
+                let size = size * if look == Look::Twin { GHOST } else { 1.0 };
+                entity.cubes.push(CubePrimitive {
+                    pose: Some(pose(place)),
+                    size: Some(Vector3 { x: size.x, y: size.y, z: size.z }),
+                    color: color(look, OBJECT.map(|value| f64::from(value) / 255.0)),
+                });
+            }
+            Form::Link(mesh) => {
+                entity.triangles.push(TriangleListPrimitive { pose: Some(pose(place)), ..triangles(mesh, look) });
+            }
+        }
         Some(SceneUpdate { deletions: Vec::new(), entities: vec![entity] })
     }
 

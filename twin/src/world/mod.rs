@@ -15,12 +15,14 @@
 //! | `touch` | where two convex pieces touch |
 //! | `patch` | the impulses of one patch: load, friction, torsion |
 //! | `rail` | the impulses of one joint: dry friction, limits, drive |
+//! | `outside` | what is put in from outside and read back in every step |
 //!
 //! World frame with z up, SI. There is no restitution: what hits stays. Not rapier: its friction turns a spinning box
 //! 32 % too far, and its joints report no forces. The step asks nothing of the allocator.
 
 mod arm;
 mod dynamics;
+mod outside;
 mod patch;
 mod plan;
 mod rail;
@@ -30,6 +32,7 @@ mod touch;
 mod tree;
 
 pub use arm::ArmPlan;
+pub use outside::{BodyMotion, Load};
 pub use plan::{BodyPlan, Drive, Hold, JointKind, JointPlan, Piece, PlanError, box_hull, cylinder_hull};
 
 use crate::arm::{FREE_FALL, JointState, Joints};

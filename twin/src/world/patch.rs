@@ -220,7 +220,7 @@ impl Patch {
         Some(Fast { inverse, goal: Vector6::new(0.0, 0.0, 0.0, tilt.x, tilt.y, tilt.z), shares, give: self.give() })
     }
 
-    fn impulse(&self) -> Vector6<f64> {
+    pub(super) fn impulse(&self) -> Vector6<f64> {
         let mut sum = Vector6::zeros();
         sum[2] = self.spin;
         for Spot { x, y, load, rub, .. } in &self.spots[..self.count] {

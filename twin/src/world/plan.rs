@@ -145,6 +145,15 @@ impl BodyPlan {
         Self { friction, ..self }
     }
 
+    /// The same in a world in which so many more bodies come before it and the one that carries it.
+    #[must_use]
+    pub fn hanging(mut self, behind: usize) -> Self {
+        if let Hold::Joint(JointPlan { parent: Some(parent), .. }) = &mut self.hold {
+            *parent += behind;
+        }
+        self
+    }
+
     pub(super) fn check(&self, index: usize, bodies: &[Self]) -> Result<(), PlanError> {
         let fault = |key, what: String| Err(PlanError { body: self.name.clone(), key, what });
         let movable = matches!(self.hold, Hold::Free(_) | Hold::Joint(_));

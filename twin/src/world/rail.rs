@@ -13,7 +13,7 @@ pub(super) struct Rail {
     pub(super) freedom: usize,
     tree: usize,
     friction: f64,
-    limits: [f64; 2],
+    pub(super) limits: [f64; 2],
     pub(super) drive: Option<Drive>,
     /// Of friction, drive, lower and upper limit, from the step before [N m s or N s].
     impulses: [f64; 4],
