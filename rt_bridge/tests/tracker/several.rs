@@ -46,12 +46,12 @@ fn follow(sizes: &[[f64; 3]], frames: u64, places: impl Fn(u64) -> Vec<[f64; 2]>
         let scene = SceneSnapshot { object: Some(poses[0]), named, ..standing(&described, 0.5, 0.0, 0.0, number) };
         let headers: [ImageHeader; 2] = camera.render(&scene, &mut color, &mut depth);
         let frame = Frame::new(&view, (&headers[1], &depth), Some((&headers[0], &color))).expect("a frame");
-        for i in 0..trackers.len() {
+        for (i, seen) in seen.iter_mut().enumerate() {
             let (before, rest) = trackers.split_at_mut(i);
             let (tracker, behind) = rest.split_first_mut().expect("a tracker");
             let others: Vec<&Tracker> = before.iter().chain(behind.iter()).collect();
             let sight = tracker.look_beside(&frame, scene.time_ns as f64 * 1e-9, Some(&scene.q), &others);
-            seen[i] = match sight {
+            *seen = match sight {
                 Sight::Tracked(estimate) => Some(estimate.pose.isometry().translation.vector),
                 Sight::Lost(_) => None,
             };

@@ -12,8 +12,6 @@
 
 mod crowd;
 mod standing;
-#[cfg(test)]
-mod tests;
 
 use super::contact::ToolContact;
 use super::{SimCell, SimError};
