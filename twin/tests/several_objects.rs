@@ -6,6 +6,7 @@ use shared_mem::cell::Cell;
 use shared_mem::msg::object::ObjectName;
 use shared_mem::theta::Theta;
 use shared_mem::time::TICK;
+use std::f64::consts::FRAC_PI_2;
 use std::path::Path;
 use twin::arm::ArmModel;
 use twin::control::Drive;
@@ -201,7 +202,10 @@ fn a_lid_falls_shut_or_is_held_by_its_friction_while_something_else_is_pushed() 
         assert!((place(&scene, 0) - before[0]).norm() > 0.05, "the cup stays at {}", place(&scene, 0));
         assert!((place(&scene, 1) - before[1]).norm() < 2e-3, "the laptop slides to {}", place(&scene, 1));
         let angle = opened(&scene);
-        assert!(if falls { (angle - 1.5708).abs() < 0.02 } else { (angle - 0.4).abs() < 1e-3 }, "{friction}: {angle}");
+        assert!(
+            if falls { (angle - FRAC_PI_2).abs() < 0.02 } else { (angle - 0.4).abs() < 1e-3 },
+            "{friction}: {angle}"
+        );
     }
 }
 

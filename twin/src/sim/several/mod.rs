@@ -175,7 +175,7 @@ impl SimScene {
             return self.cell.step(drive);
         }
         self.periods = self.periods.wrapping_add(1);
-        if self.is_together && !self.stays_together && self.periods % LOOK_EVERY == 0 {
+        if self.is_together && !self.stays_together && self.periods.is_multiple_of(LOOK_EVERY) {
             self.part();
         }
         if !self.is_together {

@@ -101,7 +101,9 @@ fn plan(object: &Object, body: &CellBody, root: Isometry3<f64>, before: usize) -
             });
         }
     }
-    if !matches!(hold, Hold::Fixed(_)) && !(mass > 0.0 && inertia.cholesky().is_some()) {
+    let moves = !matches!(hold, Hold::Fixed(_));
+    let has_inertia = mass > 0.0 && inertia.cholesky().is_some();
+    if moves && !has_inertia {
         return Err(fault("it moves and has no mass or inertia; give its link in the URDF an <inertial>"));
     }
     let friction = object.nominal_friction();
