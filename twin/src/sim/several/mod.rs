@@ -4,13 +4,13 @@
 //! | state | law |
 //! |---|---|
 //! | objects are apart, the tool is at one of them at most | that of one object, for each of them: [`crate::physics`] |
-//! | two objects are near each other, or the tool is at two | that of many bodies for all: [`crate::world`] (`crowd`) |
+//! | two objects are near each other, or the tool is at two | that of many bodies for all: [`crate::world`] (`many`) |
 //! | one of them moves in itself | that of many bodies, always |
 //!
 //! Poses and velocities go over from one to the other; what is behind is the nearest two of all pairs. The laws differ in a hit,
 //! which has no restitution among many bodies, and in effects on hit and slide, which act on objects that are apart.
 
-mod crowd;
+mod many;
 mod standing;
 
 use super::contact::ToolContact;
@@ -20,7 +20,7 @@ use crate::control::Drive;
 use crate::effects::{Stage, find};
 use crate::physics::TableObject;
 use crate::scene::{CellBody, NamedPoses, ObjectModel, SceneSnapshot, cell_bodies};
-use crowd::{Crowd, Member};
+use many::{ManyBodies, Member};
 use nalgebra::Vector3;
 use shared_mem::cell::Cell;
 use shared_mem::frames::{Base, Object, Pose};
@@ -44,7 +44,7 @@ pub struct SimScene {
     names: Vec<ObjectName>,
     objects: Vec<usize>,
     /// All of them in one world, where there are several.
-    crowd: Option<Crowd>,
+    many: Option<ManyBodies>,
     is_together: bool,
     /// One of them moves in itself, which the law of one object does not know.
     stays_together: bool,
@@ -118,8 +118,8 @@ impl SimScene {
             }
         };
         let tool = cell.tool.as_ref().zip(scene.cell.arm.as_ref());
-        let crowd = Crowd::new(table, tool.map(|(tool, arm)| (scene.cell.contact.held_tool(tool), arm)), plans)?;
-        if let Some([a, b]) = crowd.overlap() {
+        let many = ManyBodies::new(table, tool.map(|(tool, arm)| (scene.cell.contact.held_tool(tool), arm)), plans)?;
+        if let Some([a, b]) = many.overlap() {
             let [first, second] = [a, b].map(|i| scene.names[i].text().to_owned());
             return Err(SimError::Overlap { first, second });
         }
@@ -128,7 +128,7 @@ impl SimScene {
                 scene.set_object(number, &Pose::from_isometry(*start), Vector3::zeros(), Vector3::zeros());
             }
         }
-        scene.crowd = Some(crowd);
+        scene.many = Some(many);
         Ok(scene)
     }
 
@@ -138,7 +138,7 @@ impl SimScene {
             others: Vec::new(),
             names: bodies.iter().map(|body| body.name).collect(),
             objects: bodies.iter().map(|body| body.object).collect(),
-            crowd: None,
+            many: None,
             is_together: false,
             stays_together: false,
             known_apart: false,
@@ -171,7 +171,7 @@ impl SimScene {
 
     /// Lets one control period of 1 ms pass.
     pub fn step(&mut self, drive: &Drive) {
-        if self.crowd.is_none() {
+        if self.many.is_none() {
             return self.cell.step(drive);
         }
         self.periods = self.periods.wrapping_add(1);
@@ -186,8 +186,8 @@ impl SimScene {
                 return self.step_apart(drive, near.first().copied());
             }
         }
-        if let Some(crowd) = &mut self.crowd {
-            crowd.step(&mut self.cell, drive);
+        if let Some(many) = &mut self.many {
+            many.step(&mut self.cell, drive);
         }
     }
 
@@ -233,31 +233,31 @@ impl SimScene {
             return false;
         }
         let fastest = self.objects().map(speed).fold(0.0, f64::max);
-        let Some(mut crowd) = self.crowd.take() else { return false };
-        crowd.take_up(self.objects());
-        let near = crowd.any_near(NEAR + 2.0 * fastest * shared_mem::time::TICK);
-        self.crowd = Some(crowd);
+        let Some(mut many) = self.many.take() else { return false };
+        many.take_up(self.objects());
+        let near = many.any_near(NEAR + 2.0 * fastest * shared_mem::time::TICK);
+        self.many = Some(many);
         self.known_apart = still && !near;
         near
     }
 
     /// From here on all are in one world.
     fn join(&mut self) {
-        if let Some(mut crowd) = self.crowd.take() {
-            crowd.take_up(self.objects());
-            self.crowd = Some(crowd);
+        if let Some(mut many) = self.many.take() {
+            many.take_up(self.objects());
+            self.many = Some(many);
         }
         (self.is_together, self.known_apart) = (true, false);
     }
 
     /// Each by itself again, where all are apart.
     fn part(&mut self) {
-        let Some(crowd) = self.crowd.take() else { return };
-        if !crowd.any_near(APART) {
+        let Some(many) = self.many.take() else { return };
+        if !many.any_near(APART) {
             let first = self.cell.object.iter_mut();
             let all = first.chain(self.others.iter_mut().map(|other| &mut other.object));
             for (i, object) in all.enumerate() {
-                let motion = crowd.motion(i);
+                let motion = many.motion(i);
                 object.set(&Pose::from_isometry(motion.pose), motion.velocity, motion.spin);
             }
             self.cell.contact.look_again();
@@ -265,7 +265,7 @@ impl SimScene {
             // The tool between two of them keeps them together.
             self.is_together = self.at_the_tool().len() > 1;
         }
-        self.crowd = Some(crowd);
+        self.many = Some(many);
     }
 
     fn objects(&self) -> impl Iterator<Item = &TableObject> {
@@ -275,8 +275,8 @@ impl SimScene {
     /// Geometric centre of a body by its number.
     #[must_use]
     pub fn object(&self, number: usize) -> Option<Pose<Base, Object>> {
-        match &self.crowd {
-            Some(crowd) if self.is_together => crowd.pose(number),
+        match &self.many {
+            Some(many) if self.is_together => many.pose(number),
             _ => self.objects().nth(number).map(TableObject::pose),
         }
     }
@@ -284,8 +284,8 @@ impl SimScene {
     /// Whether the tool presses on a body, or something else moves it.
     #[must_use]
     pub fn is_moved(&self, number: usize) -> bool {
-        match &self.crowd {
-            Some(crowd) if self.is_together => crowd.is_moved(number),
+        match &self.many {
+            Some(many) if self.is_together => many.is_moved(number),
             _ if number == 0 => self.cell.contact_force() > 0.0,
             _ => self.others.get(number - 1).is_some_and(|other| other.contact.record.mean_force > 0.0),
         }
@@ -301,8 +301,8 @@ impl SimScene {
     /// Puts a body somewhere: pose and velocity [m/s] of its geometric centre, angular velocity [rad/s].
     pub fn set_object(&mut self, number: usize, pose: &Pose<Base, Object>, velocity: Vector3<f64>, spin: Vector3<f64>) {
         self.known_apart = false;
-        if let Some(crowd) = self.crowd.as_mut().filter(|_| self.is_together) {
-            crowd.put(number, pose);
+        if let Some(many) = self.many.as_mut().filter(|_| self.is_together) {
+            many.put(number, pose);
         } else if number == 0 {
             self.cell.set_object(pose, velocity, spin);
         } else if let Some(other) = self.others.get_mut(number - 1) {

@@ -34,14 +34,14 @@ pub(super) struct Member {
 }
 
 /// The world.
-pub(super) struct Crowd {
+pub(super) struct ManyBodies {
     world: World,
     tool: Option<usize>,
     /// Places of the objects among the bodies.
     objects: Range<usize>,
 }
 
-impl Crowd {
+impl ManyBodies {
     /// Objects where they are now on a table at `height` [m], with the tool that an arm holds.
     ///
     /// # Errors
