@@ -42,7 +42,7 @@ fn a_late_command_is_named_out_of_clips_of_a_minute() {
     }
     let groups = by_command(&clips);
     let said = liveliest(&mut clips).expect("they are long");
-    assert!(said.contains("of 8 long clips the 6.0 s") && said.contains("48 s of 480 s"), "{said}");
+    assert!(said.contains("of 8 long clips the 12.0 s") && said.contains("96 s of 480 s"), "{said}");
     let files = clips.iter().map(|clip| clip.file.display().to_string()).collect();
     let cell = world.cell.clone();
     let session = Session { folder: "minutes".into(), cell, clips: Vec::new(), files: SessionFiles::default() };

@@ -151,7 +151,7 @@ mod tests {
             (format!("{CUP}hold = \"fixed\"\n"), "of an object with `urdf`"),
             (format!("{LAPTOP}mesh = \"cup.obj\"\n"), "in place of `shape` and `mesh`"),
             (format!("{LAPTOP}mass = 1.0\n"), "is of a rigid object"),
-            (format!("{LAPTOP}hold = \"moved\"\n"), "hold"),
+            (format!("{LAPTOP}hold = \"moved\"\n"), "expected `free` or `fixed`"),
             (format!("{LAPTOP}joints = {{ hinge = nan }}\n"), "`object.joints` puts `hinge`"),
             (format!("{CUP}start = [500.0, 0.0]\n"), "object.start"),
             (format!("{CUP}start_yaw = 90.0\n"), "object.start_yaw"),

@@ -276,14 +276,20 @@ mod tests {
             &Effects::default(),
         );
         let hull = hull.expect("a hull");
+        let mut outside = 0;
         for step in 0..500 {
             let wave = |k: f64| (f64::from(step) * k).sin();
             let turn = Isometry3::rotation(Vector3::new(1.3 * wave(0.7), 1.3 * wave(1.1), wave(0.3)));
             let tip = Point3::new(0.06 * wave(1.9), 0.06 * wave(2.3), 0.08 * wave(3.1));
             let held = Isometry3::translation(tip.x, tip.y, tip.z) * turn * upright(Point3::origin());
             let [gap, same] = [&boxed, &hull].map(|object| object.touch(&TOOL, &held).depth);
-            assert!((gap - same).abs() < 1e-6, "{step}: {gap} {same}");
+            // With its axis inside a tool has gone through the surface, and a box looks no further than that.
+            if same < TOOL.radius {
+                assert!((gap - same).abs() < 1e-6, "{step}: {gap} {same}");
+                outside += 1;
+            }
         }
+        assert!(outside > 200, "{outside}");
     }
 
     #[test]
