@@ -119,6 +119,11 @@ pub trait Evidence: ClipModel {
     fn rows(&self, clip: usize) -> &[Row];
     /// What varies from clip to clip.
     fn scatter(&self) -> Scatter;
+    /// Whether an object is in the clips, even where only the arm is looked at: a hit goes elsewhere with the least change of the
+    /// gains, so these are fitted as exactly as they can be.
+    fn has_object(&self) -> bool {
+        self.scatter().count() > 0
+    }
     /// One sigma of each channel [N m], where torques along the measured motion are all that is looked at.
     fn torque_sigma(&self) -> Option<&[f64]> {
         None

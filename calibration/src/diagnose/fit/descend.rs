@@ -2,8 +2,9 @@
 //!
 //! Slopes cost a simulation of all clips for every number, a step costs one. So slopes are kept from step to step, each time
 //! corrected by what the step did (the secant update of Broyden 1965), for as long as steps bring most of what they promise;
-//! then they are taken anew. Converged is only what slopes taken anew say is. Clips with numbers of their own have slopes by
-//! these too, which a step of the shared numbers says nothing about: there every step takes all of them.
+//! then they are taken anew. Converged is only what slopes taken anew say is. Where clips show an object every step takes all of
+//! them: clips then have slopes by numbers of their own, which a step of the shared ones says nothing about, and a hit goes elsewhere
+//! with the least change of the gains.
 
 use super::bench::{Bench, Clips};
 use super::effort::Effort;
@@ -99,7 +100,7 @@ impl<E: Evidence> Bench<'_, E> {
     /// How many times what the clips of an arm leave exceeds what the weights take for noise, at least 1: so many times more does
     /// chance move of the deviance. Clips with numbers of their own take that up.
     fn excess(&self, at: &Swept, weights: &[f64]) -> f64 {
-        if self.scatter.count() > 0 {
+        if self.evidence.has_object() {
             return 1.0;
         }
         let left: Vec<(usize, Vec<f64>)> =
@@ -113,7 +114,7 @@ impl<E: Evidence> Bench<'_, E> {
     /// A linearisation moved to where a step led, its slopes corrected by what the step did: by the least that makes them right
     /// along it, numbers in their steps. `None` where they are to be taken anew.
     fn corrected(&self, mut at: Swept, (from, free): (&[f64], &[usize]), step: &Step) -> Option<Swept> {
-        if self.scatter.count() > 0 || step.turned_round || step.gained < BROUGHT * step.promised {
+        if self.evidence.has_object() || step.turned_round || step.gained < BROUGHT * step.promised {
             return None;
         }
         let way = DVector::from_iterator(free.len(), free.iter().map(|k| step.full[*k] - from[*k]));

@@ -132,6 +132,10 @@ impl<E: Evidence> Evidence for ArmAlone<'_, E> {
     fn scatter(&self) -> Scatter {
         Scatter::default()
     }
+
+    fn has_object(&self) -> bool {
+        self.0.has_object()
+    }
 }
 
 #[cfg(test)]
