@@ -13,7 +13,7 @@ const BEFORE_NS: u64 = 500_000_000;
 /// Parts of a clip that are compared begin this share of their length apart.
 const APART: f64 = 0.05;
 
-/// Cuts the longest clips of arms alone to one length, so that [`ENOUGH`] is left: of each the part in which its commands move
+/// Cuts the longest clips of arms alone to one length, so that 96 s are left: of each the part in which its commands move
 /// the joints most. What was done, for the reader.
 #[must_use]
 pub fn liveliest(clips: &mut [Clip]) -> Option<String> {

@@ -1,5 +1,5 @@
 //! Hypotheses fitted to clips: the baseline's numbers and those of the effects that act, together, by the steps of
-//! [`super::descend`].
+//! `descend`.
 
 use super::effort::Effort;
 use super::shortlist::{Scored, hold_numbers};
