@@ -7,14 +7,12 @@ use crate::diagnose::clips::split::Split;
 use crate::diagnose::evidence::measured::Evidence;
 use crate::diagnose::fit::bench::{Bench, Hypothesis};
 use crate::diagnose::fit::effort::{FIRST_PASS, NEAR};
-use crate::diagnose::judge::trial::Step;
-
-/// A better fit counts from this share of what the best trial gains on: less decides nothing between effects.
-const SHARE: f64 = 0.1;
+use crate::diagnose::judge::trial::{CLOSES, Step};
 
 impl Step {
     /// What this step extends, from the numbers of its best trial without that trial's effect, where it fits better by more
-    /// than is near and by a share of what the trial gains. Only clips with numbers of their own are as rough as that.
+    /// than is near and by such a share of what the trial gains as a cause must close. Only clips with numbers of their own are as
+    /// rough as that.
     pub(super) fn nearer_without<E: Evidence>(&self, bench: &Bench<'_, E>, split: &Split) -> Option<Hypothesis> {
         if bench.scatter.count() == 0 || bench.interrupt.asked() {
             return None;
@@ -28,6 +26,6 @@ impl Step {
         let gain = self.from.deviance() - best.deviance();
         let without =
             bench.fit((&self.from.effects, full), &split.train, &self.weights, Some(&self.from), FIRST_PASS)?;
-        (self.from.deviance() - without.deviance() > NEAR.max(SHARE * gain)).then_some(without)
+        (self.from.deviance() - without.deviance() > NEAR.max(CLOSES * gain)).then_some(without)
     }
 }
