@@ -145,7 +145,7 @@ impl Studio<'_> {
     fn place(&self, rng: &mut Pcg64) -> Isometry3<f64> {
         let height = self.world.cell.object().and_then(|object| object.size).map_or(0.0, |size| 0.5 * size[2]);
         let table = self.world.cell.table.as_ref().map_or(0.0, |table| table.height);
-        let [x, y] = self.world.cell.simulation.object_position;
+        let ([x, y], _) = self.world.cell.object_start();
         let place = [x + rng.random_range(-0.05..0.05), y + rng.random_range(-0.05..0.05)];
         let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), rng.random_range(-PI..PI));
         Isometry3::from_parts(Translation3::new(place[0], place[1], table + height), turn)
@@ -271,7 +271,7 @@ impl Studio<'_> {
         let (shift, turn) = (draw(noise.position), draw(noise.rotation));
         let mut place = pose.translation.vector;
         if self.world.outside == Some(Outside::Lens) {
-            let [x, y] = self.world.cell.simulation.object_position;
+            let ([x, y], _) = self.world.cell.object_start();
             let off = Vector3::new(place.x - x, place.y - y, 0.0);
             place += off * (3.0 * off.norm_squared());
         }

@@ -59,8 +59,7 @@ impl Placing<'_> {
     /// Starts the simulated cell anew with the object in its place.
     fn simulate(&mut self, wanted: &Standing, link: &mut Link, object: &mut ObjectWatch) -> anyhow::Result<()> {
         let mut cell = self.cell.at_home_anywhere();
-        cell.simulation.object_position = wanted.place;
-        cell.simulation.object_yaw = wanted.yaw.sin().atan2(wanted.yaw.cos());
+        cell.start_object_at(wanted.place, wanted.yaw.sin().atan2(wanted.yaw.cos()));
         cell.clips = Vec::new();
         let file = self.cell_file();
         output::write(&file, cell.to_toml())?;

@@ -57,6 +57,22 @@ impl Cell {
         self.objects.iter().enumerate().filter(|(i, _)| *i != self.in_question).map(|(_, object)| object)
     }
 
+    /// Where it starts in the simulated cell: x, y of its geometric centre in the base frame [m], and its rotation about z [rad]. What its
+    /// own block leaves out stands under `[simulation]`.
+    #[must_use]
+    pub fn object_start(&self) -> ([f64; 2], f64) {
+        let (own, simulation) = (self.object(), &self.simulation);
+        let place = own.and_then(|object| object.start).unwrap_or(simulation.object_position);
+        (place, own.and_then(|object| object.start_yaw).unwrap_or(simulation.object_yaw))
+    }
+
+    /// Has it start elsewhere; nothing happens without an object.
+    pub fn start_object_at(&mut self, place: [f64; 2], yaw: f64) {
+        if let Some(object) = self.object_mut() {
+            (object.start, object.start_yaw) = (Some(place), Some(yaw));
+        }
+    }
+
     /// Makes the object of this name the one in question.
     ///
     /// # Errors
@@ -118,6 +134,17 @@ mod tests {
         let one = parse("[object]\nshape = \"box\"\nsize = [0.1, 0.1, 0.1]\n").expect("one object");
         assert!(one.to_toml().contains("\n[object]\n") || one.to_toml().starts_with("[object]\n"), "{}", one.to_toml());
         assert_eq!(parse(&one.to_toml()).expect("own text"), one);
+    }
+
+    #[test]
+    fn an_object_starts_where_its_block_says_and_where_it_is_put_after_that() {
+        let simulation = "[simulation]\nobject_position = [0.5, 0.1]\nobject_yaw = 0.2\n";
+        let mut cell = parse(&format!("{CUP}{simulation}")).expect("an object");
+        assert_eq!(cell.object_start(), ([0.5, 0.1], 0.2));
+        cell = parse(&format!("{CUP}start = [0.4, -0.1]\n{simulation}")).expect("an object");
+        assert_eq!(cell.object_start(), ([0.4, -0.1], 0.2));
+        cell.start_object_at([0.6, 0.0], -1.0);
+        assert_eq!(parse(&cell.to_toml()).expect("own text").object_start(), ([0.6, 0.0], -1.0));
     }
 
     #[test]

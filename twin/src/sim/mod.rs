@@ -84,9 +84,7 @@ impl SimCell {
                 model.check()?;
                 let table = cell.table.ok_or(SimError::NoTable)?.height;
                 let mut object = TableObject::new(&model, Some(table), &effects)?;
-                let described = cell.object();
-                let [x, y] = described.and_then(|o| o.start).unwrap_or(cell.simulation.object_position);
-                let yaw = described.and_then(|o| o.start_yaw).unwrap_or(cell.simulation.object_yaw);
+                let ([x, y], yaw) = cell.object_start();
                 let place = Vector3::new(x, y, table + model.shape.half_extents().z);
                 let start = Isometry3::new(place, Vector3::z() * yaw);
                 object.set(&Pose::from_isometry(start), Vector3::zeros(), Vector3::zeros());
