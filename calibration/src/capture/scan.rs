@@ -168,7 +168,7 @@ impl Desk<'_> {
                 .with_context(|| format!("cannot make {}; give another folder with --out", out.join(part).display()))?;
         }
         output::write(&out.join("hand_eye.toml"), hand_eye.to_toml())?;
-        let mut been = vec![state.q_d];
+        let start = state.q_d;
         let progress = Progress::new("views", open.len() as u64);
         let mut summary = Summary {
             scan: out.clone(),
@@ -183,7 +183,7 @@ impl Desk<'_> {
             self.interrupt.wait_out_pause();
             progress.show(summary.pictures as u64, "");
             let from = link.ready_arm(self.limits.len())?.q_d;
-            let Some((next, legs)) = self.nearest(&dome, (&from, &been), &open) else {
+            let Some((next, legs)) = self.nearest(&dome, [&from, &start], &open) else {
                 summary.without_way = open.len();
                 break;
             };
@@ -195,7 +195,7 @@ impl Desk<'_> {
                     anyhow::bail!("{}; recover the robot, then start again with a new folder", link.reason()?)
                 }
             }
-            been.push(open.swap_remove(next));
+            open.swap_remove(next);
             match self.shots.take(link, self.interrupt) {
                 Ok(shot) => {
                     self.keep(summary.pictures, &shot)?;
@@ -211,18 +211,21 @@ impl Desk<'_> {
         Ok(summary)
     }
 
-    /// The nearest of the open views that a way leads to, straight or over a place where the arm has been.
+    /// The nearest of the open views that a way leads to: straight, or over where the arm was at the start, from where each is reached.
     fn nearest(
         &self,
         dome: &Dome,
-        (from, been): (&Joints, &[Joints]),
+        [from, start]: [&Joints; 2],
         open: &[Joints],
     ) -> Option<(usize, Vec<Vec<SetPoint>>)> {
         let mut order: Vec<usize> = (0..open.len()).collect();
         order.sort_by(|a, b| apart(from, &open[*a]).total_cmp(&apart(from, &open[*b])));
-        let legs = |k: usize, by| dome.legs(&self.body, &self.limits, [from, &open[k]], by);
-        let straight = order.iter().find_map(|k| Some((*k, legs(*k, &[])?)));
-        straight.or_else(|| order.iter().find_map(|k| Some((*k, legs(*k, been)?))))
+        let way = |from: &Joints, to: &Joints| dome.way(&self.body, &self.limits, from, to);
+        let straight = order.iter().find_map(|k| Some((*k, vec![way(from, &open[*k])?])));
+        straight.or_else(|| {
+            let back = way(from, start)?;
+            order.iter().find_map(|k| Some((*k, vec![back.clone(), way(start, &open[*k])?])))
+        })
     }
 
     /// Plays one way after the other; how the first that was not played to its end ended.
