@@ -7,7 +7,6 @@ import mujoco
 import numpy as np
 
 HEAVY = 1e5  # [kg] of a body that is moved: nothing pushes it aside
-SERVO = 2000.0  # gain of a drive [N s/m or N m s/rad]
 
 
 def quaternion(rotation):
@@ -89,8 +88,7 @@ def element(body, task):
 def mjcf(task, step):
     joints = {body["name"]: body["joint"] for body in task["body"] if "joint" in body}
     roots = [element(body, task) for body in task["body"] if not body.get("joint", {}).get("parent")]
-    drives = [f'<velocity name="{name}" joint="{name}" kv="{SERVO}" forcelimited="true" forcerange="-1e4 1e4"/>'
-              for name, joint in joints.items() if "drive" in joint]
+    drives = [f'<motor name="{name}" joint="{name}"/>' for name, joint in joints.items() if "drive" in joint]
     gears = [f'<joint joint1="{name}" joint2="{joint["follows"]["body"]}" polycoef="0 {joint["follows"]["ratio"]} 0 0 0" solref="{4 * step} 1"/>'
              for name, joint in joints.items() if "follows" in joint]
     apart = [f'<exclude body1="{body["name"]}" body2="{body["joint"]["parent"]}"/>'

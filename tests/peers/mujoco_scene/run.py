@@ -5,6 +5,7 @@ import mujoco
 import numpy as np
 
 from . import model
+from .drive import Drive
 
 
 class Scene:
@@ -36,7 +37,7 @@ class Scene:
                 for i, (time_, place, turn) in enumerate(way):
                     waits = i > 0 and np.array_equal(place, nominal[i - 1]) and np.array_equal(turn, way[i - 1][2])
                     way[i] = time_, way[i - 1][1] if waits else place + noise * generator.standard_normal(3), turn
-        self.orders = {body["name"]: dict(body["joint"]["drive"]) for body in task["body"] if "drive" in body.get("joint", {})}
+        self.drives = {body["name"]: Drive(self.model, body["name"], body["joint"]["drive"]) for body in task["body"] if "drive" in body.get("joint", {})}
         self.seconds = 0.0
 
     def waypoint(self, entry):
@@ -91,11 +92,9 @@ class Scene:
                 self.put(body["name"], place, turn, (then - place) / step, world / step)
         for entry in self.task.get("motion", []):
             if "target" in entry and round(entry["time"] / step) == index:
-                self.orders[entry["body"]].update({key: entry[key] for key in ("target", "force") if key in entry})
-        for name, order in self.orders.items():
-            at = self.data.qpos[self.model.joint(name).qposadr[0]]
-            self.data.ctrl[self.model.actuator(name).id] = np.clip((order["target"] - at) / (20 * step), -order["speed"], order["speed"])
-            self.model.actuator_forcerange[self.model.actuator(name).id] = -order["force"], order["force"]
+                self.drives[entry["body"]].order.update({key: entry[key] for key in ("target", "force") if key in entry})
+        for drive in self.drives.values():
+            self.data.ctrl[drive.actuator] = drive.force(self.data)
         begun = time.perf_counter()
         mujoco.mj_step(self.model, self.data)
         self.seconds += time.perf_counter() - begun
