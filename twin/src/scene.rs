@@ -23,8 +23,7 @@ pub struct ObjectModel {
     pub shape: ObjectShape,
     /// Mass [kg].
     pub mass: f64,
-    /// Centre of mass from the geometric centre, object frame [m]; there itself where nothing is known, also of a mesh
-    /// whose volume has its centroid elsewhere.
+    /// Centre of mass from the geometric centre, object frame [m]; where nothing is known, [`nominal_centre_of_mass`].
     pub centre_of_mass: Vector3<f64>,
     /// Coulomb friction on the table.
     pub friction: f64,
@@ -80,7 +79,7 @@ impl ObjectModel {
             (None, size) => ObjectShape::Box { half_extents: Vector3::from(size.unwrap_or([0.05; 3])) * 0.5 },
         };
         let ObjectParameters { mass, centre_of_mass, friction, tip_friction, restitution } =
-            ObjectParameters::new(object, theta);
+            ObjectParameters::new(object, nominal_centre_of_mass(object, &shape), theta);
         Ok(Some(Self { shape, mass, centre_of_mass, friction, tip_friction, restitution, support: object.support }))
     }
 
@@ -141,16 +140,16 @@ impl ObjectParameters {
         Ok(())
     }
 
-    /// What `theta` knows, else the nominal values of cell.toml.
+    /// What `theta` knows, else the nominal values: `centre_of_mass` ([`nominal_centre_of_mass`]) and those of cell.toml.
     #[must_use]
-    pub fn new(object: &Object, theta: Option<&Theta>) -> Self {
+    pub fn new(object: &Object, centre_of_mass: Vector3<f64>, theta: Option<&Theta>) -> Self {
         // A block of another name is about another object.
         let fits = |known: &&ObjectTheta| known.name.is_none() || known.name == object.name;
         let known = theta.and_then(|theta| theta.object.as_ref()).filter(fits);
         let of = |value: fn(&ObjectTheta) -> Option<f64>| known.and_then(value);
         Self {
             mass: of(|o| o.mass).unwrap_or_else(|| object.nominal_mass()),
-            centre_of_mass: Vector3::from(known.and_then(|o| o.centre_of_mass).unwrap_or_default()),
+            centre_of_mass: known.and_then(|o| o.centre_of_mass).map_or(centre_of_mass, Vector3::from),
             friction: of(|o| o.friction).unwrap_or_else(|| object.nominal_friction()),
             tip_friction: of(|o| o.tip_friction).unwrap_or_else(|| object.nominal_tip_friction()),
             restitution: object.nominal_restitution(),
@@ -158,7 +157,29 @@ impl ObjectParameters {
     }
 }
 
+/// Where the centre of mass of an object is taken to be while nobody knows, from the geometric centre [m]: where evenly spread mass
+/// has it; along an axis along which `centre_of_mass_range` excludes that, in the middle of the range.
+#[must_use]
+pub fn nominal_centre_of_mass(object: &Object, shape: &ObjectShape) -> Vector3<f64> {
+    let mut centre = shape.centroid();
+    for (value, [low, high]) in centre.iter_mut().zip(object.centre_of_mass_range.into_iter().flatten()) {
+        if !(low..=high).contains(value) {
+            *value = 0.5 * (low + high);
+        }
+    }
+    centre
+}
+
 impl ObjectShape {
+    /// Centroid of the volume, from the geometric centre [m]; of a surface that encloses none, the geometric centre.
+    #[must_use]
+    pub fn centroid(&self) -> Vector3<f64> {
+        match self {
+            Self::Box { .. } => Vector3::zeros(),
+            Self::Mesh { points, triangles } => mesh_file::centroid(points, triangles).unwrap_or_default(),
+        }
+    }
+
     /// Half the size of the bounding box [m].
     #[must_use]
     pub fn half_extents(&self) -> Vector3<f64> {
@@ -237,6 +258,19 @@ mod tests {
             let error = parameters.check().expect_err(told).to_string();
             assert!(error.contains(told) && error.contains("give") && !error.contains('\n'), "{error}");
         }
+    }
+
+    #[test]
+    fn a_centre_of_mass_that_nobody_knows_is_that_of_evenly_spread_mass_where_cell_toml_allows_it() {
+        let corners = [[0.0, 0.0, 0.0], [0.4, 0.0, 0.0], [0.0, 0.4, 0.0], [0.0, 0.0, 0.4]].map(Point3::from);
+        let points = corners.map(|corner| corner - Vector3::repeat(0.2)).to_vec();
+        let shape = ObjectShape::Mesh { points, triangles: vec![[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]] };
+        let nominal = |centre_of_mass_range| {
+            nominal_centre_of_mass(&Object { centre_of_mass_range, ..Object::default() }, &shape)
+        };
+        assert!((nominal(None) - Vector3::repeat(-0.1)).norm() < 1e-12);
+        let range = [[-0.12, -0.02], [0.0, 0.04], [-0.08, -0.06]];
+        assert!((nominal(Some(range)) - Vector3::new(-0.1, 0.02, -0.07)).norm() < 1e-12);
     }
 
     #[test]

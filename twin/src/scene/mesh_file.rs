@@ -98,6 +98,18 @@ fn volume(points: &[Point3<f64>], triangles: &[[u32; 3]]) -> f64 {
     triangles.iter().map(corners).map(|[a, b, c]| a.dot(&b.cross(&c)) / 6.0).sum()
 }
 
+/// Centroid of the volume inside a surface [m]; `None` where it is open or as good as flat, and so has none.
+pub(super) fn centroid(points: &[Point3<f64>], triangles: &[[u32; 3]]) -> Option<Vector3<f64>> {
+    let whole = volume(points, triangles);
+    if whole < SMALLEST.powi(3) || open_edges(points, triangles) > 0 {
+        return None;
+    }
+    // Of the tetrahedra between the origin and each face.
+    let corners = |t: &[u32; 3]| t.map(|i| points[i as usize].coords);
+    let moment = |[a, b, c]: [Vector3<f64>; 3]| (a + b + c) * (a.dot(&b.cross(&c)) / 24.0);
+    Some(triangles.iter().map(corners).map(moment).sum::<Vector3<f64>>() / whole)
+}
+
 /// Edges that belong to an odd number of faces. Corners at one place are one corner: an stl repeats them.
 pub(crate) fn open_edges(points: &[Point3<f64>], triangles: &[[u32; 3]]) -> usize {
     let place = |i: u32| points[i as usize].coords.map(|v| (v * 1e7).round() as i64);

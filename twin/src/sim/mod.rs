@@ -28,7 +28,7 @@ use crate::arm::{ArmModel, GainError, JointState, Joints, MassProperties};
 use crate::control::{CommandTrack, Drive, Plant, Reading};
 use crate::effects::{CameraEffects, Effects};
 use crate::physics::TableObject;
-use crate::scene::{NamedPoses, ObjectModel, ObjectParameters, SceneSnapshot};
+use crate::scene::{NamedPoses, ObjectModel, ObjectParameters, SceneSnapshot, nominal_centre_of_mass};
 use arm::SimArm;
 use contact::{ContactRecord, ToolContact};
 use nalgebra::{Isometry3, Vector3};
@@ -65,6 +65,8 @@ struct Description {
     controller: Option<Controller>,
     tool: Option<Tool>,
     object: Option<shared_mem::cell::Object>,
+    /// Nominal one of the object [m].
+    centre_of_mass: Vector3<f64>,
 }
 
 impl SimCell {
@@ -78,10 +80,13 @@ impl SimCell {
         let blocks = theta.map_or(&[][..], |t| &t.effects);
         let effects = Effects::of(cell.controller.as_ref(), blocks, model.as_ref().map_or(0, ArmModel::dof))?;
         let arm = model.map(|model| SimArm::new(cell, model, theta, &effects.arm)).transpose()?;
+        let mut centre_of_mass = Vector3::zeros();
         let (object, contact) = match ObjectModel::new(cell, theta)? {
             None => (None, ToolContact::without_object()),
             Some(model) => {
                 model.check()?;
+                centre_of_mass =
+                    cell.object().map_or(centre_of_mass, |object| nominal_centre_of_mass(object, &model.shape));
                 let table = cell.table.ok_or(SimError::NoTable)?.height;
                 let mut object = TableObject::new(&model, Some(table), &effects)?;
                 let ([x, y], yaw) = cell.object_start();
@@ -92,7 +97,7 @@ impl SimCell {
             }
         };
         let (object_described, Cell { controller, tool, .. }) = (cell.object().cloned(), cell.clone());
-        let description = Description { controller, tool, object: object_described };
+        let description = Description { controller, tool, object: object_described, centre_of_mass };
         Ok(Self {
             description,
             arm,
@@ -114,8 +119,9 @@ impl SimCell {
     pub fn set_parameters(&mut self, theta: &Theta) -> Result<(), SimError> {
         let dof = self.arm.as_ref().map_or(0, |arm| arm.model().dof());
         let effects = Effects::of(self.description.controller.as_ref(), &theta.effects, dof)?;
-        let Description { controller, tool, object: described } = &self.description;
-        let parameters = described.as_ref().map(|object| ObjectParameters::new(object, Some(theta)));
+        let Description { controller, tool, object: described, .. } = &self.description;
+        let nominal = self.description.centre_of_mass;
+        let parameters = described.as_ref().map(|object| ObjectParameters::new(object, nominal, Some(theta)));
         parameters.map_or(Ok(()), |parameters| parameters.check())?;
         if let Some(arm) = &mut self.arm {
             arm.set_parameters(controller.as_ref(), theta, &effects.arm)?;

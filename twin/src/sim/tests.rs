@@ -4,6 +4,7 @@
 use super::*;
 use crate::arm::{ControlLaw, JointState, PointForce};
 use crate::shipped::shipped_exact;
+use nalgebra::UnitQuaternion;
 use shared_mem::time::TICK;
 
 /// The shipped cell with the table lifted to 30 mm under the tip and the box 20 mm beside it, so that turning joint 1
@@ -250,4 +251,31 @@ fn a_solid_table_carries_what_presses_on_it_and_is_not_there_unless_asked_for() 
     assert!((force + 3e4 * height).abs() < 0.1 * force, "{force} N at {height} m");
     let (height, force, wanted) = pressed(false);
     assert!((height - wanted).abs() < 1e-3 && force == 0.0, "{height} m");
+}
+
+#[test]
+fn a_right_angled_wedge_stands_though_the_middle_of_its_bounding_box_is_above_its_edge() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let triangle = |z: f64| [[0.0, 0.0, z], [0.15, 0.0, z], [0.0, 0.15, z]];
+    let corners: String =
+        triangle(0.0).iter().chain(&triangle(0.04)).map(|[x, y, z]| format!("v {x} {y} {z}\n")).collect();
+    let faces = "f 1 3 2\nf 4 5 6\nf 1 2 5 4\nf 2 3 6 5\nf 3 1 4 6\n";
+    std::fs::write(folder.path().join("wedge.obj"), corners + faces).expect("a mesh");
+    let mut cell = shipped_exact();
+    (cell.robot, cell.controller, cell.tool) = (None, None, None);
+    cell.folder = folder.path().into();
+    let wedge = shared_mem::cell::Object { mesh: Some("wedge.obj".into()), mass: Some(1.5), ..Default::default() };
+    cell.objects = vec![wedge];
+    let mut cell = SimCell::new(&cell, None).expect("a wedge");
+    let start = cell.object().expect("a wedge");
+    // Who leans by a thousandth falls back onto the base, and not over the edge.
+    let lean = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), 1e-3);
+    let leaning = Isometry3::from_parts(start.isometry().translation, lean * start.isometry().rotation);
+    cell.set_object(&Pose::from_isometry(leaning), Vector3::zeros(), Vector3::zeros());
+    for _ in 0..2000 {
+        cell.step(&Drive::Torque { tau_J_d: [0.0; 8] });
+    }
+    let end = cell.object().expect("a wedge").isometry();
+    let up = end.rotation * Vector3::z();
+    assert!(up.z > 1.0 - 1e-6 && (end.translation.z - start.isometry().translation.z).abs() < 1e-4, "{end}");
 }

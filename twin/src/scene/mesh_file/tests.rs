@@ -80,6 +80,15 @@ fn the_geometric_centre_is_the_middle_of_the_bounding_box_wherever_origin_and_ce
 }
 
 #[test]
+fn the_centroid_is_that_of_the_volume_and_an_open_surface_has_none() {
+    let corners: String = TETRAHEDRON.iter().map(|[x, y, z]| format!("v {x} {y} {z}\n")).collect();
+    let faces = FACES.map(|f| format!("f {} {} {}\n", f[0] + 1, f[1] + 1, f[2] + 1));
+    let read = |faces: &[String]| read_as("a.obj", (corners.clone() + &faces.concat()).as_bytes()).expect("a body");
+    assert!((read(&faces).centroid() - Vector3::new(-0.25, -0.25, -0.5)).norm() < 1e-12);
+    assert_eq!(read(&faces[1..]).centroid(), Vector3::zeros());
+}
+
+#[test]
 fn a_ply_whose_header_promises_what_is_not_there_is_refused() {
     let file = |columns: &str, count: &str, values: &str| {
         format!("ply\nformat ascii 1.0\nelement vertex {count}\n{columns}end_header\n{values}")
