@@ -40,9 +40,11 @@ fn a_late_command_is_named_out_of_clips_of_a_minute() {
         (clip.desired, clip.measured) = (stands(clip.desired.clone()), stands(clip.measured.clone()));
         assert!((59.9..60.1).contains(&clip.measured.duration()));
     }
-    let groups = by_command(&clips);
     let said = liveliest(&mut clips).expect("they are long");
     assert!(said.contains("of 8 long clips the 12.0 s") && said.contains("96 s of 480 s"), "{said}");
+    // As few as are diagnosed: eight take twice as long and say the same.
+    clips.truncate(4);
+    let groups = by_command(&clips);
     let files = clips.iter().map(|clip| clip.file.display().to_string()).collect();
     let cell = world.cell.clone();
     let session = Session { folder: "minutes".into(), cell, clips: Vec::new(), files: SessionFiles::default() };
