@@ -341,6 +341,19 @@ mod tests {
     }
 
     #[test]
+    fn a_mass_that_was_weighed_is_not_searched() {
+        let searched = |mass, mass_range| {
+            let mut cell = cell();
+            (cell.objects[0].mass, cell.objects[0].mass_range) = (mass, mass_range);
+            let base = complete(&cell, None).expect("a complete cell");
+            object_parameters(&cell, &base).iter().any(|(setting, _)| *setting == Setting::Mass)
+        };
+        let range = Some([0.1, 1.0]);
+        assert!(searched(None, None) && searched(None, range) && searched(Some(0.3), range));
+        assert!(!searched(Some(0.3), None));
+    }
+
+    #[test]
     fn gains_known_by_their_range_are_searched_in_it_and_gains_known_by_value_around_it() {
         let nominal = cell();
         let base = complete(&nominal, None).expect("a complete cell");

@@ -2,6 +2,7 @@
 
 use super::Setting;
 use crate::estimate::Unknown;
+use nalgebra::Vector3;
 use shared_mem::cell::{Cell, Controller, ControllerKind, Range};
 use shared_mem::theta::Theta;
 use twin::arm::{ArmModel, damping_range, stiffness_range};
@@ -55,21 +56,26 @@ impl Gain<'_> {
 const FRICTION: Range = [0.02, 1.5];
 const MASS_FACTOR: f64 = 5.0;
 const TIP_FRICTION: Range = [0.0, 1.0];
-/// The centre of mass lies within this share of the half extents.
+/// The centre of mass lies within this share of the half extents from the centroid.
 const CENTRE_SHARE: f64 = 0.5;
 
-/// Friction, mass, centre of mass and, where an arm may touch it, tip friction of the object, beginning at the base's. Difference steps are wide: where
-/// tool and object part by a hair's breadth, a little more of any number moves the resting place, and over such a step
-/// that roughness averages out.
+/// Friction, mass where it was not weighed, centre of mass and, where an arm may touch it, tip friction of the object, beginning at the
+/// base's. Difference steps are wide: where tool and object just part, a little more of any number moves the resting place, and
+/// over such a step that roughness averages out.
 #[must_use]
 pub fn object_parameters(cell: &Cell, base: &Theta) -> Vec<(Setting, Unknown)> {
     let (Some(object), Some(start)) = (cell.object(), &base.object) else { return Vec::new() };
     let mass = start.mass.unwrap_or_else(|| object.nominal_mass());
-    let half = match ObjectModel::new(cell, Some(base)) {
-        Ok(Some(model)) => model.shape.half_extents().into(),
-        _ => [0.05; 3],
+    let (half, centroid) = match ObjectModel::new(cell, Some(base)) {
+        Ok(Some(model)) => (model.shape.half_extents(), model.shape.centroid()),
+        _ => (Vector3::repeat(0.05), Vector3::zeros()),
     };
-    let centres = object.centre_of_mass_range.unwrap_or_else(|| half.map(|h| [-CENTRE_SHARE * h, CENTRE_SHARE * h]));
+    let centres = object.centre_of_mass_range.unwrap_or_else(|| {
+        let around = |(half, centre): (f64, f64)| {
+            [-1.0, 1.0].map(|side| (centre + side * CENTRE_SHARE * half).clamp(-half, half))
+        };
+        [0, 1, 2].map(|axis| around((half[axis], centroid[axis])))
+    });
     let masses = object.mass_range.unwrap_or([mass / MASS_FACTOR, mass * MASS_FACTOR]);
     let friction = start.friction.unwrap_or_else(|| object.nominal_friction());
     let tip = start.tip_friction.unwrap_or_else(|| object.nominal_tip_friction());
@@ -78,10 +84,10 @@ pub fn object_parameters(cell: &Cell, base: &Theta) -> Vec<(Setting, Unknown)> {
         unknown(setting, start, range, step.min(0.2 * room).max(1e-3 * room))
     };
     let frictions = object.friction_range.unwrap_or(FRICTION);
-    let mut all = vec![
-        wide(Setting::Friction, friction, frictions, 0.05 * friction.max(0.05)),
-        wide(Setting::Mass, mass, masses, 0.08 * mass),
-    ];
+    let mut all = vec![wide(Setting::Friction, friction, frictions, 0.05 * friction.max(0.05))];
+    if object.mass.is_none() || object.mass_range.is_some() {
+        all.push(wide(Setting::Mass, mass, masses, 0.08 * mass));
+    }
     for (axis, range) in centres.into_iter().enumerate() {
         let value = start.centre_of_mass.unwrap_or_default()[axis];
         all.push(wide(Setting::CentreOfMass(axis), value, range, 1.5e-3));

@@ -301,11 +301,7 @@ impl Problem {
 
 /// What is searched of an object.
 fn searched(cell: &Cell, base: Theta) -> (Settings, Vec<Unknown>) {
-    // A mass that was weighed is not searched.
-    let weighed = cell.object().is_some_and(|o| o.mass.is_some() && o.mass_range.is_none());
-    let searched = object_parameters(cell, &base).into_iter();
-    let unknown = |(setting, _): &(Setting, Unknown)| !(weighed && *setting == Setting::Mass);
-    let (settings, unknowns): (Vec<Setting>, Vec<Unknown>) = searched.filter(unknown).unzip();
+    let (settings, unknowns): (Vec<Setting>, Vec<Unknown>) = object_parameters(cell, &base).into_iter().unzip();
     (Settings::new(base, settings), unknowns)
 }
 
