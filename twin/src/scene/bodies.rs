@@ -235,4 +235,31 @@ mod tests {
         let round = std::f64::consts::PI * 0.25 * 2.0;
         assert!(whole < round && whole > 0.98 * round, "{whole} of {round}");
     }
+
+    #[test]
+    fn the_highest_object_is_the_one_whose_lid_may_stand_open() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let part = |name: &str, x: f64, z: f64, height: f64| {
+            format!(
+                "<link name='{name}'><inertial><mass value='1'/><inertia ixx='1' iyy='1' izz='1' ixy='0' ixz='0' iyz='0'/></inertial>\
+                 <collision><origin xyz='{x} 0 {z}'/><geometry><box size='0.2 0.2 {height}'/></geometry></collision></link>"
+            )
+        };
+        let hinge = "<joint name='hinge' type='revolute'><parent link='base'/><child link='lid'/><origin xyz='0.1 0 0.04'/>\
+                     <axis xyz='0 1 0'/><limit lower='0' upper='1.5707963267948966' effort='1' velocity='1'/></joint>";
+        let robot = format!(
+            "<robot name='lap'>{}{}{hinge}</robot>",
+            part("base", 0.0, 0.02, 0.04),
+            part("lid", -0.1, 0.01, 0.02)
+        );
+        std::fs::write(folder.path().join("lap.urdf"), robot).expect("room");
+        let blocks = "[[object]]\nname = \"cup\"\nshape = \"box\"\nsize = [0.1, 0.1, 0.12]\n";
+        let read = |text: &str| Cell::parse(text, &folder.path().join("cell.toml")).expect("a cell");
+        assert!((tallest(&read(blocks)).expect("a box") - 0.12).abs() < 1e-12);
+        let both = format!("{blocks}[[object]]\nname = \"lap\"\nurdf = \"lap.urdf\"\n");
+        let highest = tallest(&read(&both)).expect("a box and a laptop");
+        // Its far edge is highest just before the lid stands upright.
+        assert!((highest - 0.04 - 0.2_f64.hypot(0.02)).abs() < 1e-5, "{highest}");
+        assert_eq!(tallest(&Cell::default()).expect("nothing"), 0.0);
+    }
 }
