@@ -96,6 +96,36 @@ fn named(name: &str, rest: &str) -> String {
 }
 
 #[test]
+fn one_of_two_objects_is_struck_by_name_the_other_is_kept_clear_of_and_the_session_is_about_the_one() {
+    let at = |name: &str, [x, y]: [f64; 2]| named(name, &format!("{BOX}mass = 0.3\nstart = [{x}, {y}]\n"));
+    let cell = Cell::with(&with_objects(&(at("box1", [0.48, 0.24]) + &at("box2", [0.48, 0.0]))));
+    let session = cell.text("session");
+    let capture =
+        ["capture", "control-hit-slide", "--cell", "{cell}", "--clips", "2", "--out", &session, "--realtime", "ignore"];
+    let unnamed = cell.start("calibration", &capture).wait(Duration::from_secs(20));
+    let complaint = unnamed.complaint();
+    assert!(complaint.contains("box1, box2") && complaint.contains("--object box1"), "{}", unnamed.stderr);
+    let capture = [&capture[..], &["--object", "box2", "--json"]].concat();
+    let captured = cell.start("calibration", &capture).wait(Duration::from_secs(120)).succeeded();
+    let answer = captured.json();
+    let kept = answer["clips"].as_array().expect("clips").iter().filter(|clip| clip["kept"] == true).count();
+    assert_eq!(kept, 2, "{answer}\n{}", captured.stderr);
+    let described = Described::read(&cell.path("session/cell.toml")).expect("the session's cell");
+    for entry in &described.clips {
+        let clip =
+            read_clip(&cell.path("session").join(&entry.file), ClipKind::ControlHitSlide, &described).expect("a clip");
+        let [struck] = &clip.others[..] else { panic!("{} other objects", clip.others.len()) };
+        assert_eq!(struck.name, "box2");
+        assert!(way(&struck.series) > 0.02 && way(&clip.object) < 1e-6 && clip.object.len() > 60);
+    }
+    for verb in [&["identify", "object"][..], &["diagnose"]] {
+        let words = [verb, &[&session, "--object", "box2", "--json"]].concat();
+        let done = cell.start("calibration", &words).wait(Duration::from_secs(120)).succeeded();
+        assert_eq!(done.json()["object"], "box2", "{}", done.stderr);
+    }
+}
+
+#[test]
 fn objects_that_cannot_be_are_refused_in_one_line() {
     let hinge = "<robot name='lap'><link name='base'/><link name='lid'/><joint name='hinge' type='continuous'>\
                  <parent link='base'/><child link='lid'/><axis xyz='0 1 0'/></joint></robot>";

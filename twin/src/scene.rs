@@ -7,7 +7,7 @@ mod mesh_file;
 mod snapshot;
 
 pub use arm_outline::{ArmOutline, Part};
-pub use bodies::{CellBody, bodies_of, cell_bodies, start_of};
+pub use bodies::{CellBody, bodies_of, cell_bodies, poses_in_root, start_of, tallest};
 pub use mesh_file::{MeshFileError, read_surface as mesh_in_its_middle};
 pub(crate) use mesh_file::{open_edges, read as read_mesh};
 pub use snapshot::{MOST_BODIES, NamedPoses, SceneSnapshot};

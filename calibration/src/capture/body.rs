@@ -2,15 +2,20 @@
 //!
 //! Rests on the nominal model of cell.toml; called once for every set point of a plan.
 
+use nalgebra::Point3;
 use shared_mem::cell::{Cell, Tool};
 use shared_mem::msg::{Joints, MAX_JOINTS};
-use twin::arm::{ArmModel, JointState, ModelError};
+use twin::arm::{ArmHull, ArmModel, JointState, ModelError};
+
+/// Balls of a link are joined by balls no farther apart than their radius, or this where nobody knows how thick it is [m].
+const THIN: f64 = 0.01;
 
 /// The nominal arm with its tool.
 #[derive(Debug, Clone)]
 pub struct Body {
     model: ArmModel,
     tool: Option<Tool>,
+    hull: Option<ArmHull>,
 }
 
 impl Body {
@@ -19,7 +24,8 @@ impl Body {
     /// # Errors
     /// [`ModelError`] when it describes no arm.
     pub fn of(cell: &Cell) -> Result<Self, ModelError> {
-        Ok(Self { model: ArmModel::from_cell(cell)?, tool: cell.tool.clone() })
+        let model = ArmModel::from_cell(cell)?;
+        Ok(Self { hull: ArmHull::of(cell, &model), model, tool: cell.tool.clone() })
     }
 
     /// The arm.
@@ -40,6 +46,31 @@ impl Body {
             Some(tool) => at(0.0).min(at(tool.length - tool.radius)) - tool.radius,
             None => at(0.0),
         }
+    }
+
+    /// Balls that fill flange, tool and the links behind the shoulder, centre and radius [m]; none where the arm's geometry is not
+    /// known. Of an arm unlike an FR3 the links are lines between its joints.
+    #[must_use]
+    pub fn balls(&self, q: &Joints) -> Vec<(Point3<f64>, f64)> {
+        let Some(hull) = &self.hull else { return Vec::new() };
+        let balls: Vec<(usize, Point3<f64>, f64)> =
+            hull.balls(q).into_iter().map(|(link, centre, radius)| (link, centre.into(), radius)).collect();
+        let tool = balls.len().saturating_sub(2);
+        let mut all = Vec::with_capacity(4 * balls.len());
+        for (i, (link, centre, radius)) in balls.iter().enumerate() {
+            all.push((*centre, *radius));
+            for (k, (of, other, wide)) in balls.iter().enumerate().skip(i + 1) {
+                let is_line = *radius == 0.0 && k == i + 1;
+                if (of == link && (i >= tool) == (k >= tool)) || is_line {
+                    let steps = ((other - centre).norm() / radius.min(*wide).max(THIN)).ceil() as u32;
+                    all.extend((1..steps).map(|step| {
+                        let share = f64::from(step) / f64::from(steps);
+                        (centre + (other - centre) * share, radius + (wide - radius) * share)
+                    }));
+                }
+            }
+        }
+        all
     }
 
     /// Torque that moves the arm like this, `M(q) ddq + bias(q, dq)` with gravity and rotors [N m].

@@ -4,7 +4,8 @@
 use super::body::Body;
 use super::limits;
 use super::link::Link;
-use super::object_watch::{ObjectWatch, PoseQuality};
+use super::object_watch::ObjectWatch;
+use super::obstacle::Obstacle;
 use super::placing::{BY_HAND, COMES_TO_REST, Placing};
 use super::plan::{RATE, peak_speed};
 use super::program::{MIDDLE, Next, NoStroke, Program, Wish};
@@ -16,15 +17,16 @@ use super::session::Session;
 use super::staged::{self, Staged};
 use super::stream::{Motion, Outcome, play};
 use super::stroke::StrokeError;
+use super::stroke_clip::{ClipSummary, unfit};
 use super::task::{Summary, Task, cause};
 use super::way::Ways;
 use crate::interrupt::Interrupt;
-use serde::Serialize;
 use shared_mem::cell::{Cell, ClipKind};
 use shared_mem::console;
 use shared_mem::msg::motion::SetPoint;
 use shared_mem::output;
 use shared_mem::progress::Progress;
+use shared_mem::typed;
 use std::path::PathBuf;
 use twin::arm::JointLimits;
 use twin::scene::ObjectModel;
@@ -33,16 +35,14 @@ use twin::scene::ObjectModel;
 const ABOVE: f64 = 0.08;
 /// Further tries for every clip that is asked for.
 const AGAIN: f64 = 0.5;
-/// An object that moved less was not hit [m].
-const MOVED: f64 = 5e-3;
-/// Share of lost poses from which a stroke is better repeated.
-const POSES_LOST: f64 = 0.1;
 
 /// What is asked for.
 #[derive(Debug, Clone)]
 pub struct Options {
     /// What every capture is asked for.
     pub task: Task,
+    /// Name of the object that is hit; needed where cell.toml has several.
+    pub object: Option<String>,
     /// What the strokes are for.
     pub series: Series,
     /// How far the tool is turned about its own axis [rad].
@@ -62,55 +62,24 @@ pub enum Series {
     Turned(Vec<f64>),
 }
 
-/// One clip.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct ClipSummary {
-    /// File, relative to the session.
-    pub file: PathBuf,
-    /// What was played, in words.
-    pub motion: String,
-    /// `true`: entered into cell.toml. A clip that is not stays on disk.
-    pub kept: bool,
-    /// Why not.
-    pub why: Option<String>,
-    /// `true`: the user paused it, so another takes its place.
-    pub paused: bool,
-    /// `true`: the robot stopped itself, so another takes its place.
-    pub reflex: bool,
-    /// Direction of the stroke [rad].
-    pub heading: f64,
-    /// Speed of the hit that was commanded [m/s].
-    pub speed: f64,
-    /// How far the line passed to the left of the centre [m].
-    pub offset: f64,
-    /// What was seen of the arm.
-    #[serde(flatten)]
-    pub quality: Quality,
-    /// What was seen of the object.
-    #[serde(flatten)]
-    pub object: PoseQuality,
-    /// Messages in the file.
-    pub messages: u64,
-    /// Size of the file [bytes].
-    pub bytes: u64,
-}
-
 /// Captures strokes until all are there or the user ends it.
 ///
 /// # Errors
 /// One line with what happened and what to do; clips that were complete before are in the session.
 pub fn capture(options: &Options, interrupt: &Interrupt) -> anyhow::Result<Summary<ClipSummary>> {
     let task = &options.task;
-    let cell = Cell::read(&task.cell)?;
+    let mut cell = Cell::read(&task.cell)?;
+    choose(&mut cell, options)?;
     let body = Body::of(&cell)?;
     let size = size_of(&cell)?;
     let domain = task.domain.as_deref();
     // Before a bridge is started: a clip that cannot be repeated is said at once.
-    let repeats = task.repeat.iter().map(|number| recorded::read(&task.out, *number, ClipKind::ControlHitSlide, &body));
+    let kind = (ClipKind::ControlHitSlide, cell.object_name());
+    let repeats = task.repeat.iter().map(|number| recorded::read(&task.out, *number, kind, &body));
     let repeats = repeats.collect::<Result<Vec<_>, _>>()?;
     let session = Session::open(&task.out, &cell)?;
     let mut link = Link::open(domain)?;
-    let mut object = ObjectWatch::open(domain)?;
+    let mut object = ObjectWatch::open(domain, &cell)?;
     let mut bridge = task.bridge(&mut link, interrupt)?;
     let limits = limits::of(&cell, &body);
     let recovery = Recovery::new(options.task.recover);
@@ -125,6 +94,23 @@ pub fn capture(options: &Options, interrupt: &Interrupt) -> anyhow::Result<Summa
     let own_bridge = bridge.is_own();
     bridge.stop()?;
     Ok(Summary { session, clips, interrupted: interrupt.asked(), own_bridge })
+}
+
+/// Makes the object that is hit the one in question: the one that is asked for, else the only rigid one.
+fn choose(cell: &mut Cell, options: &Options) -> anyhow::Result<()> {
+    let rigid = cell.objects.iter().filter(|object| object.urdf.is_none());
+    let names: Vec<String> = rigid.filter_map(|object| object.name.clone()).collect();
+    let name = match (&options.object, &names[..]) {
+        (Some(name), _) => name,
+        (None, [only]) => only,
+        (None, [first, ..]) => anyhow::bail!(
+            "cell.toml has several objects ({}); say which one is hit: `{}`",
+            names.join(", "),
+            typed::with(&format!("--object {first}"), false)
+        ),
+        (None, []) => return Ok(()),
+    };
+    cell.about(name).map_err(anyhow::Error::msg)
 }
 
 fn size_of(cell: &Cell) -> anyhow::Result<[f64; 3]> {
@@ -157,7 +143,7 @@ impl<'a> Desk<'a> {
         let mut clips: Vec<ClipSummary> = Vec::new();
         let wanted = self.options.task.clips as usize;
         let tries = wanted + (AGAIN * wanted as f64).ceil() as usize;
-        let staged = self.staged(object)?;
+        let mut staged = self.staged(object)?;
         while clips.iter().filter(|clip| !clip.paused).count() < tries {
             self.interrupt.wait_out_pause();
             if self.interrupt.asked() {
@@ -167,13 +153,14 @@ impl<'a> Desk<'a> {
             if kept == wanted {
                 break;
             }
-            let next = match &staged[..] {
-                [] => self.next(link, object)?,
-                staged => self.prepared(&staged[kept % staged.len()], link, object)?,
+            let next = if staged.is_empty() {
+                self.next(link, object)
+            } else {
+                self.first_clear(&mut staged, kept, link, object)
             };
-            let Some((next, motion)) = next else { break };
+            let Some((next, motion)) = next? else { break };
             if let Some(file) = &self.options.preview {
-                output::write(file, super::picture::picture(&next, self.size))?;
+                output::write(file, super::picture::picture(&next, self.size, &object.obstacles()))?;
                 console::line(format_args!("{}: the next stroke; the arm was not moved", file.display()));
                 break;
             }
@@ -205,17 +192,46 @@ impl<'a> Desk<'a> {
             return Ok(Vec::new());
         }
         let Some(standing) = object.standing(COMES_TO_REST, self.interrupt)? else { return Ok(Vec::new()) };
+        let obstacles = object.obstacles();
+        let ways = self.ways(&obstacles);
         if let Series::Turned(turns) = &self.options.series {
-            return Ok(staged::turned_objects(&program, turns, &standing, &self.ways())?);
+            return Ok(staged::turned_objects(&program, turns, &standing, &ways)?);
         }
         let Series::Headings(count) = self.options.series else { return Ok(Vec::new()) };
-        let (slides, refused) = staged::headings(&program, count, MIDDLE, standing.yaw, &self.ways());
-        refused.iter().for_each(console::line);
+        let (slides, refused) = staged::headings(&program, count, MIDDLE, standing.yaw, &ways);
+        refused.iter().for_each(|(towards, error)| console::line(format_args!("no slide {towards}: {error}")));
+        if let (true, Some(blocked)) = (slides.is_empty(), NoStroke::least(refused.into_iter().map(|(_, error)| error)))
+        {
+            return Err(NoStroke::Blocked(blocked).into());
+        }
         anyhow::ensure!(
             !slides.is_empty(),
             "no slide can be done through the middle of the area; try a smaller --speed"
         );
         Ok(slides)
+    }
+
+    /// Of strokes for which the object has to stand somewhere the next one that keeps clear of other objects; those that do not
+    /// are left out. `None`: the user gave up.
+    fn first_clear(
+        &mut self,
+        staged: &mut Vec<Staged>,
+        kept: usize,
+        link: &mut Link,
+        object: &mut ObjectWatch,
+    ) -> anyhow::Result<Option<(Next, String)>> {
+        loop {
+            let number = kept % staged.len();
+            let prepared = self.prepared(&staged[number], link, object);
+            let blocked = |error: &anyhow::Error| matches!(error.downcast_ref(), Some(NoStroke::Blocked(_)));
+            match prepared {
+                Err(error) if staged.len() > 1 && blocked(&error) => {
+                    let out = staged.remove(number);
+                    console::line(format_args!("left out: {}: {error}", out.words));
+                }
+                done => return done,
+            }
+        }
     }
 
     /// A stroke for which the object has to stand somewhere, once it does. `None`: the user gave up.
@@ -227,18 +243,22 @@ impl<'a> Desk<'a> {
     ) -> anyhow::Result<Option<(Next, String)>> {
         link.ready_arm(self.limits.len())?;
         let Some(stands) = self.placing.place(&staged.standing, link, object)? else { return Ok(None) };
-        let (stroke, plan) = (staged.stroke, staged.plan.clone());
-        let approach = self.ways().over(&link.ready_state()?.q_d, &plan.set_points[0].q_d)?;
-        let rest = self.program().rest(&stroke);
+        let (stroke, plan, program) = (staged.stroke, staged.plan.clone(), self.program());
+        let obstacles = object.obstacles();
+        let ways = self.ways(&obstacles);
+        program.check_clear(&stroke, &plan, &ways)?;
+        let approach = ways.over(&link.ready_state()?.q_d, &plan.set_points[0].q_d).map_err(NoStroke::from)?;
+        let rest = program.rest(&stroke);
         let words = format!("{}{}", staged.words, self.changes());
-        Ok(Some((Next { stroke, plan, approach, object: stands, rest }, words)))
+        Ok(Some((Next { stroke, plan, approach, object: stands, rest, left_out: None }, words)))
     }
 
     /// What is unlike in all strokes of this run, in words.
     fn changes(&self) -> String {
         let turn = self.options.turn_tool.to_degrees();
         let turned = if turn == 0.0 { String::new() } else { format!(", the tool turned by {turn:.0} degrees") };
-        format!("{}{turned}", self.options.task.pace())
+        let on = self.cell.one_of_several().map_or_else(String::new, |name| format!(" on `{name}`"));
+        format!("{on}{}{turned}", self.options.task.pace())
     }
 
     /// The stroke for the next clip, once the object stands still in reach. `None`: the user gave up.
@@ -250,9 +270,20 @@ impl<'a> Desk<'a> {
         let mut told = false;
         loop {
             let Some(standing) = object.standing(COMES_TO_REST, self.interrupt)? else { return Ok(None) };
-            let (wish, ways, from) = (Wish::of_clip(number), self.ways(), link.ready_state()?.q_d);
+            let obstacles = object.obstacles();
+            let (wish, ways, from) = (Wish::of_clip(number), self.ways(&obstacles), link.ready_state()?.q_d);
             match program.next(&wish, &standing, &ways, &from) {
-                Ok(next) => return Ok(Some((next, format!("a stroke{}", self.changes())))),
+                Ok(next) => {
+                    if let Some((count, heading, blocked)) = &next.left_out {
+                        let towards = heading.to_degrees();
+                        console::line(format_args!(
+                            "{count} left out, the first towards {towards:.0} degrees: {blocked}"
+                        ));
+                    }
+                    return Ok(Some((next, format!("a stroke{}", self.changes()))));
+                }
+                // In a simulated cell nobody can move it.
+                Err(error @ NoStroke::Blocked(_)) if self.placing.simulates() => return Err(error.into()),
                 Err(NoStroke::Refused(error)) if program.turn != 0.0 => {
                     let turn = program.turn.to_degrees();
                     anyhow::bail!(
@@ -287,10 +318,15 @@ impl<'a> Desk<'a> {
         title: &str,
     ) -> anyhow::Result<Option<ClipSummary>> {
         let points = &next.plan.set_points;
+        object.begin();
         if self.play(link, object, &next.approach, &format!("{title}: approach"))?.0 != Outcome::Done {
             return Ok(None);
         }
-        let Some(_) = object.standing(COMES_TO_REST, self.interrupt)? else { return Ok(None) };
+        let Some(_) = object.resting(COMES_TO_REST, self.interrupt)? else { return Ok(None) };
+        if let Some((name, ..)) = object.also_moved().first() {
+            console::line(format_args!("`{name}` moved meanwhile: a stroke is planned anew"));
+            return Ok(None);
+        }
         let (_, file) = self.session.next_clip()?;
         let path = self.session.folder().join(&file);
         let task = &self.options.task;
@@ -303,7 +339,7 @@ impl<'a> Desk<'a> {
                 path.display()
             ));
         })?;
-        let rested = object.standing(COMES_TO_REST, self.interrupt);
+        let rested = object.resting(COMES_TO_REST, self.interrupt);
         let seen = object.quality();
         let recorded = recorder.finish()?;
         let why = match (outcome, &recorded.stopped, quality.verdict(peak_speed(points)), rested) {
@@ -313,7 +349,7 @@ impl<'a> Desk<'a> {
             (_, Some(why), ..) => Some(why.clone()),
             (_, _, Verdict::Repeat(why), _) => Some(why),
             (_, _, _, Err(error)) => Some(error.to_string()),
-            (..) => unfit(&seen),
+            (..) => unfit(&seen, &object.also_moved()),
         };
         if why.is_none() {
             self.session.enter(&file, ClipKind::ControlHitSlide)?;
@@ -345,13 +381,14 @@ impl<'a> Desk<'a> {
         heading: f64,
         title: &str,
     ) -> anyhow::Result<()> {
-        let away = self.ways().away(&link.ready_state()?.q_d, heading)?;
+        let obstacles = object.obstacles();
+        let away = self.ways(&obstacles).away(&link.ready_state()?.q_d, heading)?;
         self.play(link, object, &away, &format!("{title}: retreat")).map(drop)
     }
 
-    fn ways(&self) -> Ways<'_> {
+    fn ways<'b>(&'b self, obstacles: &'b [Obstacle]) -> Ways<'b> {
         let top = self.cell.table.as_ref().map_or(0.0, |table| table.height) + self.size[2];
-        Ways { body: self.body, limits: self.limits, height: top + ABOVE, floor: top + 0.5 * ABOVE }
+        Ways { body: self.body, limits: self.limits, height: top + ABOVE, floor: top + 0.5 * ABOVE, obstacles }
     }
 
     fn play(
@@ -375,51 +412,5 @@ impl<'a> Desk<'a> {
         looked?;
         self.recovery.note(outcome, link)?;
         Ok((outcome, watch.quality()))
-    }
-}
-
-/// Why the object's poses make a clip useless, if they do.
-fn unfit(seen: &PoseQuality) -> Option<String> {
-    let lost = seen.lost_poses as f64 / (seen.poses + seen.lost_poses).max(1) as f64;
-    if seen.moved < MOVED {
-        return Some(format!("the object moved by {:.1} mm only: it was not hit", 1e3 * seen.moved));
-    }
-    (lost > POSES_LOST).then(|| format!("{:.0} % of the object's poses are lost", 100.0 * lost))
-}
-
-impl ClipSummary {
-    /// The clip's quality in a line.
-    #[must_use]
-    pub fn line(&self) -> String {
-        let verdict = match &self.why {
-            None => "keep".to_owned(),
-            Some(why) => format!("repeat, because {why}; the file stays, but is not entered into cell.toml"),
-        };
-        format!(
-            "{}: {}, towards {:.0}° at {:.2} m/s, the object moved {:.0} mm and turned {:.0}°, {} packets and {} poses lost, \
-             {:.1} MB: {verdict}",
-            self.file.display(),
-            self.motion,
-            self.heading.to_degrees(),
-            self.speed,
-            1e3 * self.object.moved,
-            self.object.turned.to_degrees(),
-            self.quality.lost_packets,
-            self.object.lost_poses,
-            self.bytes as f64 * 1e-6,
-        )
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_stroke_that_hit_nothing_or_lost_the_object_is_to_be_repeated() {
-        let seen = PoseQuality { poses: 100, lost_poses: 2, moved: 0.12, turned: 0.1 };
-        assert_eq!(unfit(&seen), None);
-        assert!(unfit(&PoseQuality { moved: 1e-3, ..seen }).is_some_and(|why| why.contains("not hit")));
-        assert!(unfit(&PoseQuality { lost_poses: 20, ..seen }).is_some_and(|why| why.contains("17 %")));
     }
 }

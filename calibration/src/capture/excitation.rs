@@ -23,6 +23,7 @@ use shared_mem::msg::{Joints, MAX_JOINTS};
 use shared_mem::progress::Progress;
 use std::path::{Path, PathBuf};
 use twin::arm::JointLimits;
+use twin::scene::tallest;
 
 /// Flange and tool stay this far above table and object [m]: about twice what a loosely tuned arm strays.
 const CLEARANCE: f64 = 0.05;
@@ -86,12 +87,13 @@ pub fn capture(
     let body = Body::of(&cell)?;
     let moving = moving(&options.joints, body.model().dof())?;
     // Before a bridge is started: a clip that cannot be repeated is said at once.
-    let repeats = task.repeat.iter().map(|number| recorded::read(&task.out, *number, ClipKind::Excitation, &body));
+    let repeats =
+        task.repeat.iter().map(|number| recorded::read(&task.out, *number, (ClipKind::Excitation, None), &body));
     let repeats = repeats.collect::<Result<Vec<_>, _>>()?;
     let session = Session::open(&task.out, &cell)?;
     let mut link = Link::open(task.domain.as_deref())?;
     let mut bridge = task.bridge(&mut link, interrupt)?;
-    let (limits, floor, recovery) = (limits::of(&cell, &body), floor(&cell), Recovery::new(options.task.recover));
+    let (limits, floor, recovery) = (limits::of(&cell, &body), floor(&cell)?, Recovery::new(options.task.recover));
     let mut desk = Desk { options, moving, repeats, limits, body, floor, session, interrupt, recovery };
     let mut clips = Vec::new();
     loop {
@@ -120,11 +122,10 @@ fn moving(joints: &[usize], dof: usize) -> anyhow::Result<[bool; MAX_JOINTS]> {
     Ok(std::array::from_fn(|joint| joint < dof && (joints.is_empty() || joints.contains(&joint))))
 }
 
-/// Lowest height for flange and tool: above the table, and above the object that may stand on it [m].
-fn floor(cell: &Cell) -> f64 {
-    let Some(table) = &cell.table else { return f64::NEG_INFINITY };
-    let object = cell.object().and_then(|object| object.size).map_or(0.0, |size| size[2]);
-    table.height + object + CLEARANCE
+/// Lowest height for flange and tool: above the table, and above the highest of the objects that may stand on it, wherever [m].
+fn floor(cell: &Cell) -> anyhow::Result<f64> {
+    let Some(table) = &cell.table else { return Ok(f64::NEG_INFINITY) };
+    Ok(table.height + tallest(cell)? + CLEARANCE)
 }
 
 /// Everything that stays the same from clip to clip.
@@ -257,7 +258,7 @@ impl Desk<'_> {
         let (lowest, floor) = (self.lowest(&set_points), self.floor);
         anyhow::ensure!(
             lowest >= floor,
-            "the clip leads the tool down to {lowest:.3} m, below the {floor:.3} m kept free above table and object; repeat another clip"
+            "the clip leads the tool down to {lowest:.3} m, below the {floor:.3} m kept free above table and objects; repeat another clip"
         );
         let dof = self.limits.len();
         let begin = set_points[0].q_d;
@@ -349,5 +350,38 @@ impl ClipSummary {
             self.motion,
             self.bytes as f64 * 1e-6,
         )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use shared_mem::cell::Object;
+
+    #[test]
+    fn an_excitation_stays_above_the_highest_of_all_objects() {
+        let text = include_str!("../../../config/fr3_cell.toml");
+        let mut cell: Cell = shared_mem::toml_file::parse(text, "fr3_cell.toml".as_ref()).expect("the shipped file");
+        let one = cell.objects[0].clone();
+        assert_eq!(floor(&cell).expect("a floor"), one.size.map_or(0.0, |size| size[2]) + CLEARANCE);
+        let bottle = Object { name: Some("bottle".into()), size: Some([0.07, 0.07, 0.3]), ..one.clone() };
+        cell.objects = vec![Object { name: Some("cup".into()), ..one }, bottle];
+        let floor = floor(&cell).expect("a floor");
+        assert!((floor - 0.35).abs() < 1e-9, "{floor}");
+        let (body, limits) = limits::shipped();
+        let request = Request {
+            start: *body.model().ready(),
+            kind: Kind::Multisine,
+            moving: [true; MAX_JOINTS],
+            amplitude: 0.5,
+            duration: 4.0,
+            seed: 1,
+            floor,
+        };
+        let plan = plan(&request, &limits, &body).expect("room above");
+        let lowest = plan.set_points.iter().map(|point| body.lowest_point(&point.q_d)).fold(f64::INFINITY, f64::min);
+        assert!(lowest >= floor, "{lowest}");
+        let error = plan::plan(&Request { floor: 0.6, ..request }, &limits, &body).expect_err("below a taller one");
+        assert!(error.to_string().contains("height"), "{error}");
     }
 }

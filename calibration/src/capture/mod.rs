@@ -1,7 +1,7 @@
 //! Capture: plan a motion, have the bridge play it, record it into a session folder.
 //!
 //! Planning is pure: [`plan`] for excitation on a [`shape`] ([`multisine`], [`chirp`], [`ramp`], [`hold`], built of [`jet`]s), or on a clip that was [`recorded`], at a [`pace`], [`program`], [`staged`], [`stroke`] and [`way`] for Control-Hit-Slide on
-//! [`line`] and [`transit`], both within [`limits`] of the [`body`]. Playing goes through shared memory only ([`stream`],
+//! [`line`] and [`transit`], both within [`limits`] of the [`body`] and clear of every [`obstacle`]. Playing goes through shared memory only ([`stream`],
 //! [`link`], [`object_watch`]), with [`placing`] where the object has to stand somewhere and [`recovery`] where the robot stops itself; recording is a process beside us ([`recorder`]). [`excitation`] and [`control_hit_slide`] are the
 //! verbs that bind them, and [`task`] is what both are asked for. [`scan`] carries a camera around a point: [`dome`] plans its views, [`shots`] takes the pictures, `cut` says what in them is the object.
 
@@ -20,6 +20,7 @@ pub mod line;
 pub mod link;
 pub mod multisine;
 pub mod object_watch;
+pub mod obstacle;
 pub mod pace;
 mod picture;
 pub mod placing;
@@ -37,6 +38,7 @@ pub mod shots;
 pub mod staged;
 pub mod stream;
 pub mod stroke;
+pub mod stroke_clip;
 pub mod task;
 pub mod transit;
 pub mod way;

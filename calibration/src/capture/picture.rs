@@ -1,5 +1,6 @@
 //! A stroke from above, before it is done: where the object stands, which way the tool goes, where the object comes to rest.
 
+use crate::capture::obstacle::Obstacle;
 use crate::capture::program::Next;
 use std::fmt::Write as _;
 
@@ -10,7 +11,7 @@ const AROUND: f64 = 0.24;
 
 /// The picture as an SVG file: x of the base frame upwards, y to the left, as seen from behind the robot.
 #[must_use]
-pub(super) fn picture(next: &Next, size: [f64; 3]) -> String {
+pub(super) fn picture(next: &Next, size: [f64; 3], obstacles: &[Obstacle]) -> String {
     let stroke = &next.stroke;
     let [x0, y0] = stroke.object;
     let at = |x: f64, y: f64| [SCALE * (AROUND - (y - y0)), SCALE * (AROUND - (x - x0))];
@@ -25,6 +26,14 @@ pub(super) fn picture(next: &Next, size: [f64; 3]) -> String {
         width + 40.0
     );
     let mut draw = |text: std::fmt::Arguments| svg.write_fmt(text).expect("a string takes all text");
+    for obstacle in obstacles {
+        let corners: Vec<[f64; 2]> = obstacle.outline().iter().map(|corner| at(corner.x, corner.y)).collect();
+        let points: Vec<String> = corners.iter().map(|[x, y]| format!("{x:.1},{y:.1}")).collect();
+        draw(format_args!("<polygon points=\"{}\" fill=\"#e4e0d8\" stroke=\"#8a8270\"/>", points.join(" ")));
+        if let Some([x, y]) = corners.first() {
+            draw(format_args!("<text x=\"{x:.1}\" y=\"{y:.1}\" fill=\"#8a8270\">{}</text>", obstacle.name()));
+        }
+    }
     let rest = at(next.rest[0], next.rest[1]);
     let (before, after) =
         (on_line(-stroke.clearance - 0.5 * stroke.speed * stroke.rise), on_line(stroke.follow_through));

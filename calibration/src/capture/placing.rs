@@ -3,7 +3,7 @@
 
 use super::bridge::{Bridge, Wanted};
 use super::link::Link;
-use super::object_watch::ObjectWatch;
+use super::object_watch::{ObjectWatch, WatchError};
 use super::program::Standing;
 use super::task::Task;
 use crate::interrupt::Interrupt;
@@ -49,11 +49,17 @@ impl Placing<'_> {
         if near(&stands, wanted) {
             return Ok(Some(stands));
         }
-        if self.bridge.is_own() && self.task.arm.as_deref().is_none_or(|arm| arm == "sim") {
+        if self.simulates() {
             self.simulate(wanted, link, object)?;
             return Ok(object.standing(COMES_TO_REST, self.interrupt)?);
         }
         self.by_hand(wanted, stands, object)
+    }
+
+    /// Whether this capture has started the simulated cell itself.
+    #[must_use]
+    pub fn simulates(&self) -> bool {
+        self.bridge.is_own() && self.task.arm.as_deref().is_none_or(|arm| arm == "sim")
     }
 
     /// Starts the simulated cell anew with the object in its place.
@@ -101,11 +107,13 @@ impl Placing<'_> {
         let mut said = Instant::now();
         loop {
             // An object in somebody's hand does not come to rest: that is what is waited for.
-            match object.standing(SAY, self.interrupt) {
+            match object.resting(SAY, self.interrupt) {
                 Ok(None) => return Ok(None),
-                Ok(Some(standing)) if near(&standing, wanted) => return Ok(Some(standing)),
+                Ok(Some(standing)) if near(&standing, wanted) => {
+                    return Ok(object.standing(COMES_TO_REST, self.interrupt)?);
+                }
                 Ok(Some(standing)) => stands = standing,
-                Err(super::object_watch::WatchError::Restless(_)) => {}
+                Err(WatchError::Restless(_) | WatchError::RestlessOf(..)) => {}
                 Err(error) => return Err(error.into()),
             }
             if begin.elapsed() > BY_HAND {

@@ -6,6 +6,7 @@
 //! [`ANCHOR`]-th stroke repeats the first: the same stroke again tells scatter from gap and drift from both.
 
 use super::body::Body;
+use super::obstacle::{self, Blocked};
 use super::stroke::{self, Stroke, StrokeError, StrokePlan};
 use super::way::{WayError, Ways};
 use shared_mem::cell::{Cell, GRAVITY};
@@ -94,6 +95,8 @@ pub struct Program<'a> {
     pub pace: f64,
     /// How far the tool is turned about its own axis [rad].
     pub turn: f64,
+    /// The object's name, where there are several.
+    pub name: Option<&'a str>,
 }
 
 /// A stroke that can be done.
@@ -109,6 +112,9 @@ pub struct Next {
     pub object: Standing,
     /// Where it will come to rest, about [m].
     pub rest: [f64; 2],
+    /// How many strokes nearer to the wish are left out because of other objects, and what is in the way of the first of them,
+    /// with its direction [rad].
+    pub left_out: Option<(usize, f64, Blocked)>,
 }
 
 /// No stroke can be done where the object stands.
@@ -128,13 +134,31 @@ pub enum NoStroke {
     Refused(#[from] StrokeError),
     /// Strokes could be done, but there is no way to their begin or from their end; the first refusal.
     #[error(transparent)]
-    Cut(#[from] WayError),
+    Cut(WayError),
+    /// Other objects are in the way of all that could be done otherwise; the stroke that lacks least.
+    #[error("no stroke is free of other objects: {0}")]
+    Blocked(Blocked),
+}
+
+impl NoStroke {
+    /// Of what other objects are in the way of, the one that lacks least; `None` where they are in the way of nothing.
+    #[must_use]
+    pub fn least(refused: impl Iterator<Item = Self>) -> Option<Blocked> {
+        let blocked = refused.filter_map(|error| if let Self::Blocked(blocked) = error { Some(blocked) } else { None });
+        blocked.reduce(|a, b| if b.lacks() < a.lacks() { b } else { a })
+    }
+}
+
+impl From<WayError> for NoStroke {
+    fn from(error: WayError) -> Self {
+        if let WayError::Blocked(blocked) = error { Self::Blocked(blocked) } else { Self::Cut(error) }
+    }
 }
 
 impl<'a> Program<'a> {
     /// For the arm, tool and object of a cell; `size`: the object's edge lengths [m].
     #[must_use]
-    pub fn of(cell: &Cell, size: [f64; 3], body: &'a Body, limits: &'a [JointLimits]) -> Self {
+    pub fn of(cell: &'a Cell, size: [f64; 3], body: &'a Body, limits: &'a [JointLimits]) -> Self {
         Self {
             body,
             limits,
@@ -144,6 +168,7 @@ impl<'a> Program<'a> {
             friction: cell.object().map_or(0.3, shared_mem::cell::Object::nominal_friction),
             pace: 1.0,
             turn: 0.0,
+            name: cell.one_of_several(),
         }
     }
 
@@ -153,7 +178,7 @@ impl<'a> Program<'a> {
     /// # Errors
     /// [`NoStroke`] with the remedy.
     pub fn next(&self, wish: &Wish, object: &Standing, ways: &Ways<'_>, from: &Joints) -> Result<Next, NoStroke> {
-        let mut refused = None;
+        let (mut refused, mut blocked) = (None, Vec::new());
         let turns = (0..=9).flat_map(|k| [f64::from(k), -f64::from(k)]).skip(1);
         // A speed that was asked for is the one that is played.
         let paces = if self.pace == 1.0 { &PACES[..] } else { &PACES[..1] };
@@ -167,11 +192,18 @@ impl<'a> Program<'a> {
                 continue;
             }
             match self.whole(&stroke, ways, from) {
-                Ok((plan, approach)) => return Ok(Next { stroke, plan, approach, object: *object, rest }),
+                Ok((plan, approach)) => {
+                    let count = blocked.len();
+                    let left_out = blocked.into_iter().next().map(|(heading, blocked)| (count, heading, blocked));
+                    return Ok(Next { stroke, plan, approach, object: *object, rest, left_out });
+                }
+                Err(NoStroke::Blocked(in_way)) => blocked.push((stroke.heading, in_way)),
                 Err(error) => refused = refused.or(Some(error)),
             }
         }
-        Err(refused.unwrap_or(NoStroke::Away { place: object.place }))
+        // Moving another object away is what helps, whatever else is refused.
+        let least = NoStroke::least(blocked.into_iter().map(|(_, blocked)| NoStroke::Blocked(blocked)));
+        Err(least.map(NoStroke::Blocked).or(refused).unwrap_or(NoStroke::Away { place: object.place }))
     }
 
     /// The stroke's motion and the way to it, once there is one back as well.
@@ -184,11 +216,34 @@ impl<'a> Program<'a> {
         ways: &Ways<'_>,
         from: &Joints,
     ) -> Result<(StrokePlan, Vec<SetPoint>), NoStroke> {
+        self.check_slide(stroke, ways)?;
         let plan = stroke::plan(stroke, self.body.model().ready(), self.limits, self.body)?;
+        self.check_motion(&plan, ways)?;
         let [begin, .., end] = &plan.set_points[..] else { return Err(NoStroke::Away { place: stroke.object }) };
         let approach = ways.over(from, &begin.q_d)?;
         ways.away(&end.q_d, stroke.heading)?;
         Ok((plan, approach))
+    }
+
+    /// Whether a stroke keeps clear of other objects: what slides, and the arm.
+    ///
+    /// # Errors
+    /// [`NoStroke::Blocked`] with the object in the way.
+    pub fn check_clear(&self, stroke: &Stroke, plan: &StrokePlan, ways: &Ways<'_>) -> Result<(), NoStroke> {
+        self.check_slide(stroke, ways)?;
+        self.check_motion(plan, ways)
+    }
+
+    fn check_slide(&self, stroke: &Stroke, ways: &Ways<'_>) -> Result<(), NoStroke> {
+        let (ends, radius) = ([stroke.object, self.farthest(stroke)], 0.5 * self.size[0].hypot(self.size[1]));
+        let called = self.name.map_or_else(|| "the object".to_owned(), |name| format!("`{name}`"));
+        let blocked = obstacle::on_slide(ways.obstacles, &called, ends, radius);
+        blocked.map_or(Ok(()), |blocked| Err(NoStroke::Blocked(blocked)))
+    }
+
+    fn check_motion(&self, plan: &StrokePlan, ways: &Ways<'_>) -> Result<(), NoStroke> {
+        let blocked = obstacle::on_motion(ways.obstacles, self.body, &plan.set_points, false);
+        blocked.map_or(Ok(()), |blocked| Err(NoStroke::Blocked(blocked)))
     }
 
     /// The wish as a stroke on the object, its direction turned towards the nearest face.
@@ -219,7 +274,21 @@ impl<'a> Program<'a> {
     #[must_use]
     pub fn rest(&self, stroke: &Stroke) -> [f64; 2] {
         let pushed = 0.25 * stroke.speed * stroke.rise + stroke.clearance + stroke.follow_through;
-        let way = pushed.max(SLIDES * stroke.speed * stroke.speed / (2.0 * self.friction * GRAVITY));
+        Self::after(stroke, pushed.max(self.slide(stroke)))
+    }
+
+    /// Where it comes at most: pushed until the tool has stopped, or sliding freely from where that begins to slow down.
+    fn farthest(&self, stroke: &Stroke) -> [f64; 2] {
+        let slowing = 0.5 * stroke.speed * stroke.rise;
+        Self::after(stroke, stroke.clearance + stroke.follow_through + slowing.max(self.slide(stroke)))
+    }
+
+    /// A free slide at the speed of the hit [m].
+    fn slide(&self, stroke: &Stroke) -> f64 {
+        SLIDES * stroke.speed * stroke.speed / (2.0 * self.friction * GRAVITY)
+    }
+
+    fn after(stroke: &Stroke, way: f64) -> [f64; 2] {
         let [x, y] = stroke.object;
         [x + way * stroke.heading.cos(), y + way * stroke.heading.sin()]
     }
@@ -229,6 +298,7 @@ impl<'a> Program<'a> {
 mod tests {
     use super::*;
     use crate::capture::limits;
+    use crate::capture::obstacle::Obstacle;
 
     fn shipped() -> (Cell, Body, Vec<JointLimits>) {
         let text = include_str!("../../../config/fr3_cell.toml");
@@ -255,7 +325,7 @@ mod tests {
     fn forty_strokes_one_after_the_other_keep_the_object_in_reach() {
         let (cell, body, limits) = shipped();
         let program = Program::of(&cell, [0.08, 0.06, 0.10], &body, &limits);
-        let ways = Ways { body: &body, limits: &limits, height: 0.18, floor: 0.14 };
+        let ways = Ways { body: &body, limits: &limits, height: 0.18, floor: 0.14, obstacles: &[] };
         let mut object = Standing { place: [0.55, 0.0], yaw: 0.2 };
         let mut at = *body.model().ready();
         for number in 0..40 {
@@ -274,9 +344,58 @@ mod tests {
         let (cell, body, limits) = shipped();
         let program = Program::of(&cell, [0.08, 0.06, 0.10], &body, &limits);
         let far = Standing { place: [1.1, 0.4], yaw: 0.0 };
-        let ways = Ways { body: &body, limits: &limits, height: 0.18, floor: 0.14 };
+        let ways = Ways { body: &body, limits: &limits, height: 0.18, floor: 0.14, obstacles: &[] };
         let error =
             program.next(&Wish::of_clip(1), &far, &ways, body.model().ready()).expect_err("too far").to_string();
         assert!(error.contains("put it back") || error.contains("move the object"), "{error}");
+    }
+
+    /// A box of 8 by 6 by 10 cm.
+    fn block(name: &str, [x, y]: [f64; 2]) -> Obstacle {
+        let corner = |i: usize| {
+            let sign = |bit: usize| if i >> bit & 1 == 1 { 1.0 } else { -1.0 };
+            nalgebra::Point3::new(0.04 * sign(0), 0.03 * sign(1), 0.05 * sign(2))
+        };
+        let corners: Vec<_> = (0..8).map(corner).collect();
+        Obstacle::at(name, &corners, &nalgebra::Isometry3::translation(x, y, 0.05))
+    }
+
+    #[test]
+    fn a_stroke_towards_another_object_is_left_out_and_one_past_it_is_done() {
+        let (cell, body, limits) = shipped();
+        let program = Program { name: Some("box"), ..Program::of(&cell, [0.08, 0.06, 0.10], &body, &limits) };
+        let object = Standing { place: MIDDLE, yaw: 0.0 };
+        let wish = Wish { heading: FRAC_PI_2, speed: 0.3, aside: 0.0, height: 0.2 };
+        let next = |obstacles: &[Obstacle]| {
+            let ways = Ways { body: &body, limits: &limits, height: 0.18, floor: 0.14, obstacles };
+            program.next(&wish, &object, &ways, body.model().ready())
+        };
+        let alone = next(&[]).expect("a stroke");
+        assert_eq!(alone.stroke.heading, FRAC_PI_2);
+        assert_eq!(next(&[block("far", [0.48, 0.5])]).expect("a stroke"), alone);
+        let in_way = [block("cup", [0.48, 0.2])];
+        let turned = next(&in_way).expect("a stroke past it");
+        let ways = Ways { body: &body, limits: &limits, height: 0.18, floor: 0.14, obstacles: &in_way };
+        program.check_clear(&turned.stroke, &turned.plan, &ways).expect("clear");
+        assert!(program.check_clear(&alone.stroke, &alone.plan, &ways).is_err());
+        let (count, heading, blocked) = turned.left_out.expect("left out");
+        assert!(count > 0 && heading == FRAC_PI_2 && blocked.name == "cup" && turned.stroke.heading != FRAC_PI_2);
+        // Behind it there is no room for the tool, either.
+        let behind = next(&[block("cup", [0.48, -0.13])]).expect("a stroke from elsewhere");
+        assert!(behind.left_out.is_some_and(|(_, _, blocked)| blocked.what == "the arm"));
+    }
+
+    #[test]
+    fn an_object_between_others_has_one_of_them_moved_away_by_what_is_missing() {
+        let (cell, body, limits) = shipped();
+        let program = Program { name: Some("box"), ..Program::of(&cell, [0.08, 0.06, 0.10], &body, &limits) };
+        let around = [[0.0, 0.11], [0.0, -0.11], [0.13, 0.0], [-0.13, 0.0]];
+        let around = around.map(|[x, y]| block("cup", [MIDDLE[0] + x, MIDDLE[1] + y]));
+        let ways = Ways { body: &body, limits: &limits, height: 0.18, floor: 0.14, obstacles: &around };
+        let object = Standing { place: MIDDLE, yaw: 0.0 };
+        let error = program.next(&Wish::of_clip(1), &object, &ways, body.model().ready()).expect_err("no room");
+        let line = error.to_string();
+        assert!(line.starts_with("no stroke is free of other objects: ") && !line.contains('\n'), "{line}");
+        assert!(line.contains("move `cup` away by about") && line.contains("mm along x"), "{line}");
     }
 }

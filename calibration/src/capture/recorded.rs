@@ -38,6 +38,14 @@ pub enum RepeatError {
         /// The clips there are.
         known: String,
     },
+    /// The session knows no such object.
+    #[error("{}: {what}", folder.display())]
+    Object {
+        /// The session.
+        folder: PathBuf,
+        /// What stands in the way.
+        what: String,
+    },
     /// It is of the other kind.
     #[error("clip {number} {was}; repeat it with `{command}`")]
     Other {
@@ -69,15 +77,23 @@ pub struct Repeated {
     pub object: Option<Standing>,
 }
 
-/// Reads clip `number` of the session in `folder`, of the kind that is wanted.
+/// Reads clip `number` of the session in `folder`, of the kind that is wanted, and of the object of this name where there are several.
 ///
 /// # Errors
 /// [`RepeatError`] with the clips there are, or why this one cannot be repeated.
-pub fn read(folder: &Path, number: usize, kind: ClipKind, body: &Body) -> Result<Repeated, RepeatError> {
+pub fn read(
+    folder: &Path,
+    number: usize,
+    (kind, object): (ClipKind, Option<&str>),
+    body: &Body,
+) -> Result<Repeated, RepeatError> {
     if !folder.join("cell.toml").exists() {
         return Err(RepeatError::Unknown { folder: folder.to_owned(), number, known: "none".into() });
     }
-    let session = Session::open(folder)?;
+    let mut session = Session::open(folder)?;
+    if let Some(name) = object {
+        session.cell.about(name).map_err(|what| RepeatError::Object { folder: folder.to_owned(), what })?;
+    }
     let Some(entry) = session.clips.iter().find(|clip| number_of(&clip.file) == Some(number)) else {
         let known = session.clips.iter().map(|clip| clip.file.display().to_string()).collect::<Vec<_>>().join(", ");
         return Err(RepeatError::Unknown { folder: folder.to_owned(), number, known });

@@ -55,7 +55,7 @@ pub fn again(program: &Program<'_>, clip: &Repeated) -> anyhow::Result<Staged> {
 }
 
 /// Straight strokes in `count` headings, evenly all round, through `place`; the object is turned so that a face meets each.
-/// Headings that cannot be done are left out, with the reason in words.
+/// Headings that cannot be done are left out: in words which, and why.
 #[must_use]
 pub fn headings(
     program: &Program<'_>,
@@ -63,7 +63,7 @@ pub fn headings(
     place: [f64; 2],
     yaw: f64,
     ways: &Ways<'_>,
-) -> (Vec<Staged>, Vec<String>) {
+) -> (Vec<Staged>, Vec<(String, NoStroke)>) {
     let (mut possible, mut refused) = (Vec::new(), Vec::new());
     for k in 0..count {
         let heading = TAU * k as f64 / count as f64;
@@ -72,7 +72,7 @@ pub fn headings(
         let towards = format!("towards {:.0} degrees", heading.to_degrees());
         match straight(program, heading, &standing, ways) {
             Ok((stroke, plan)) => possible.push(Staged { standing, stroke, plan, words: "a straight slide".into() }),
-            Err(error) => refused.push(format!("no slide {towards}: {error}")),
+            Err(error) => refused.push((towards, error)),
         }
     }
     (possible, refused)
@@ -227,7 +227,7 @@ mod tests {
     fn slides_all_round_go_through_one_place_each_against_a_face() {
         let (cell, body, limits) = shipped();
         let program = Program::of(&cell, SIZE, &body, &limits);
-        let ways = Ways { body: &body, limits: &limits, height: 0.18, floor: 0.14 };
+        let ways = Ways { body: &body, limits: &limits, height: 0.18, floor: 0.14, obstacles: &[] };
         let (slides, refused) = headings(&program, 8, MIDDLE, 0.2, &ways);
         assert!(slides.len() >= 6, "{refused:?}");
         for slide in &slides {

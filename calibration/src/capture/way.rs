@@ -2,10 +2,12 @@
 //! rad.
 //!
 //! Everything travels above the object; only beside it, where the stroke begins and ends, the tool goes straight down or up.
+//! Past other objects it travels as low; where one is in the way, above all of them.
 
 use super::body::Body;
 use super::excess::{Excess, Quantity};
 use super::limits::first_excess;
+use super::obstacle::{self, Blocked, Obstacle};
 use super::{line, transit};
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use shared_mem::msg::Joints;
@@ -37,6 +39,9 @@ pub enum WayError {
     /// A limit is broken on the way.
     #[error("the way to or from the stroke breaks a limit ({0}); move the arm to its ready pose, then start again")]
     Limit(Excess),
+    /// Another object stands there.
+    #[error(transparent)]
+    Blocked(#[from] Blocked),
 }
 
 /// How ways are judged.
@@ -50,14 +55,28 @@ pub struct Ways<'a> {
     pub height: f64,
     /// Height that flange and tool stay above while they travel [m].
     pub floor: f64,
+    /// What it keeps clear of.
+    pub obstacles: &'a [Obstacle],
 }
 
 impl Ways<'_> {
     /// From rest at `from` to rest at `to`, a pose beside the object: up, over, down.
     ///
     /// # Errors
-    /// [`WayError`] with the place, or the joint and the limit.
+    /// [`WayError`] with the place, or the joint and the limit, or the object in the way.
     pub fn over(&self, from: &Joints, to: &Joints) -> Result<Vec<SetPoint>, WayError> {
+        let low = self.over_at_height(from, to);
+        let (Err(WayError::Blocked(_)), Some(higher)) = (&low, self.above_all()) else { return low };
+        higher.over_at_height(from, to).or(low)
+    }
+
+    /// The same ways above every obstacle; `None` where they are that already.
+    fn above_all(&self) -> Option<Self> {
+        let (above, top) = (self.height - self.floor, obstacle::highest(self.obstacles)?);
+        (top + above > self.floor).then_some(Self { height: top + 2.0 * above, floor: top + above, ..*self })
+    }
+
+    fn over_at_height(&self, from: &Joints, to: &Joints) -> Result<Vec<SetPoint>, WayError> {
         self.paced(|pace| {
             let mut points = self.up(from, pace)?;
             let above = last(&points, from);
@@ -126,9 +145,12 @@ impl Ways<'_> {
     }
 
     fn checked(&self, points: Vec<SetPoint>) -> Result<Vec<SetPoint>, WayError> {
-        match first_excess(&points, self.limits, Some(self.body)) {
+        if let Some(excess) = first_excess(&points, self.limits, Some(self.body)) {
+            return Err(WayError::Limit(excess));
+        }
+        match obstacle::on_motion(self.obstacles, self.body, &points, true) {
             None => Ok(points),
-            Some(excess) => Err(WayError::Limit(excess)),
+            Some(blocked) => Err(WayError::Blocked(blocked)),
         }
     }
 }
@@ -171,7 +193,7 @@ mod tests {
             (x_from, y_from) in (0.35..0.6_f64, -0.25..0.25_f64),
         ) {
             let (body, limits) = shipped();
-            let ways = Ways { body: &body, limits: &limits, height: 0.2, floor: 0.12 };
+            let ways = Ways { body: &body, limits: &limits, height: 0.2, floor: 0.12, obstacles: &[] };
             let at = |x, y, z| line::reach(&body, body.model().ready(), &upright(Vector3::new(x, y, z), 0.0)).expect("in reach");
             let (from, to) = (at(x_from, y_from, 0.03), at(x, y, 0.03));
             let points = ways.over(&from, &to).expect("a way");
@@ -187,10 +209,42 @@ mod tests {
         }
     }
 
+    /// A box of 8 by 8 cm.
+    fn block(name: &str, [x, y]: [f64; 2], height: f64) -> Obstacle {
+        let corner = |i: usize| {
+            let sign = |bit: usize| if i >> bit & 1 == 1 { 1.0 } else { -1.0 };
+            nalgebra::Point3::new(0.04 * sign(0), 0.04 * sign(1), 0.5 * height * sign(2))
+        };
+        let corners: Vec<_> = (0..8).map(corner).collect();
+        Obstacle::at(name, &corners, &Isometry3::translation(x, y, 0.5 * height))
+    }
+
+    #[test]
+    fn past_low_objects_the_tool_travels_low_above_a_tall_one_higher_and_not_down_beside_one() {
+        let (body, limits) = shipped();
+        let at =
+            |x, y| line::reach(&body, body.model().ready(), &upright(Vector3::new(x, y, 0.03), 0.0)).expect("in reach");
+        let (from, to) = (at(0.5, -0.25), at(0.5, 0.25));
+        let over = |obstacles: &[Obstacle]| {
+            Ways { body: &body, limits: &limits, height: 0.2, floor: 0.12, obstacles }.over(&from, &to)
+        };
+        let highest = |points: &[SetPoint]| {
+            points.iter().map(|p| body.model().tip(&p.q_d).isometry().translation.z).fold(0.0, f64::max)
+        };
+        let low = over(&[]).expect("a way");
+        assert_eq!(over(&[block("cup", [0.5, 0.0], 0.1), block("tall", [0.2, -0.6], 0.5)]).expect("a way"), low);
+        let tall = [block("tall", [0.5, 0.0], 0.2)];
+        let high = over(&tall).expect("a way above it");
+        assert!(highest(&high) > 0.35 && highest(&low) < 0.3, "{} and {}", highest(&high), highest(&low));
+        assert_eq!(obstacle::on_motion(&tall, &body, &high, false), None);
+        let error = over(&[block("cup", [0.5, 0.32], 0.1)]).expect_err("no room to come down").to_string();
+        assert!(error.contains("the arm would come within") && error.contains("move `cup` away by about"), "{error}");
+    }
+
     #[test]
     fn after_a_stroke_the_tool_backs_off_and_rises() {
         let (body, limits) = shipped();
-        let ways = Ways { body: &body, limits: &limits, height: 0.2, floor: 0.12 };
+        let ways = Ways { body: &body, limits: &limits, height: 0.2, floor: 0.12, obstacles: &[] };
         let from =
             line::reach(&body, body.model().ready(), &upright(Vector3::new(0.5, 0.0, 0.03), 0.0)).expect("in reach");
         let points = ways.away(&from, 0.0).expect("a way");
@@ -204,7 +258,7 @@ mod tests {
         let to =
             line::reach(&body, body.model().ready(), &upright(Vector3::new(0.5, 0.0, 0.03), 0.0)).expect("in reach");
         let over = |limits: &[JointLimits]| {
-            Ways { body: &body, limits, height: 0.2, floor: 0.12 }.over(body.model().ready(), &to)
+            Ways { body: &body, limits, height: 0.2, floor: 0.12, obstacles: &[] }.over(body.model().ready(), &to)
         };
         let usual = over(&limits).expect("a way").len();
         // The shoulder's stop so near that it may still creep there.

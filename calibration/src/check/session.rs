@@ -21,6 +21,9 @@ use twin::replay::in_model_order;
 pub struct Checked {
     /// The session's folder.
     pub session: String,
+    /// Of several objects in cell.toml the one that this is about.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub object: Option<String>,
     /// How it was named.
     #[serde(skip)]
     pub files: SessionFiles,
@@ -211,7 +214,8 @@ pub fn check(session: &Session) -> Checked {
     let clips: Vec<ClipFacts> = facts.collect();
     let missing = good_for::missing(session, &clips);
     let (folder, files) = (session.folder.display().to_string(), session.files.clone());
-    Checked { session: folder, files, remarks: merged(remarks), clips, missing, pictures }
+    let object = session.cell.one_of_several().map(str::to_owned);
+    Checked { session: folder, object, files, remarks: merged(remarks), clips, missing, pictures }
 }
 
 /// The clips of a session.

@@ -71,7 +71,7 @@ enum MotionKind {
 
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
-The arm starts and ends at rest in the pose it holds, and stays above table and object. An amplitude that breaks a limit
+The arm starts and ends at rest in the pose it holds, and stays above the table and the highest object. An amplitude that breaks a limit
 of position, speed, acceleration, jerk, torque or height is made smaller; which limit it was is said for each joint. A
 --speed that breaks one is refused, with the joint and the largest factor that fits.
 
@@ -187,6 +187,11 @@ strikes, waits until the object rests, and steps back. Strokes come from all sid
 the first, so that scatter and drift can be separated from a gap. Directions are chosen so that the object stays in reach; one
 that got away is asked for by hand.
 
+Of several objects --object says which one is hit, and the tracker has to see all. Arm and tool stay 30 mm away from the others;
+so does what slides, and 0.3 m more for each metre of its way. The arm travels past low ones and above tall ones. Strokes
+that do not keep clear are left out with the reason; where none does, it is said which object to move and how far. A clip
+in which another object moved is not kept.
+
 With --repeat, --headings and --turn-object every stroke goes out from the same place. The object has to stand there, to
 5 mm and 3 degrees: you are asked to put it back at x, y and a turn, and have two minutes. Where this capture has started the
 simulated cell itself it starts it anew with the object there instead. A stroke that is repeated has the same set points.
@@ -198,6 +203,7 @@ recovered up to three times 2 s later, the arm goes back and the clip is repeate
 
 Examples:
   calibration capture control-hit-slide --cell config/fr3_cell.toml --clips 12 --out strokes
+  calibration capture control-hit-slide --cell lab/cell.toml --clips 12 --out strokes --object milk_box
   calibration capture control-hit-slide --cell lab/cell.toml --clips 1 --out monday --preview next.svg
   calibration capture control-hit-slide --cell config/fr3_cell.toml --out strokes --repeat 0,4
   calibration capture control-hit-slide --cell config/fr3_cell.toml --out strokes --repeat 4 --clips 8
@@ -208,6 +214,9 @@ Examples:
 pub(super) struct StrokeArguments {
     #[command(flatten)]
     task: TaskArguments,
+    /// Name of the object that is hit, of several in cell.toml; all others are kept clear of.
+    #[arg(long, value_name = "NAME")]
+    object: Option<String>,
     /// Clips to add; with --repeat, --headings or --turn-object as many as they name, where nothing else is said.
     #[arg(
         long,
@@ -281,7 +290,7 @@ fn excite(arguments: ExcitationArguments, interrupt: &Interrupt) -> anyhow::Resu
 }
 
 fn strike(arguments: StrokeArguments, interrupt: &Interrupt) -> anyhow::Result<()> {
-    let StrokeArguments { task, clips, headings, turn_object, turn_tool, preview, force, json } = arguments;
+    let StrokeArguments { task, object, clips, headings, turn_object, turn_tool, preview, force, json } = arguments;
     Destination::of(preview.as_deref(), force)?;
     let series = match (headings, &turn_object[..]) {
         (Some(count), _) => Series::Headings(count as usize),
@@ -290,7 +299,7 @@ fn strike(arguments: StrokeArguments, interrupt: &Interrupt) -> anyhow::Result<(
     };
     let named = headings.map_or(turn_object.len(), |count| count as usize);
     let task = task.task(clips, named);
-    let options = control_hit_slide::Options { task, series, turn_tool: turn_tool.to_radians(), preview };
+    let options = control_hit_slide::Options { task, object, series, turn_tool: turn_tool.to_radians(), preview };
     let summary = control_hit_slide::capture(&options, interrupt)?;
     let kept = summary.clips.iter().filter(|clip| clip.kept).count();
     let words = match &options.preview {

@@ -4,6 +4,7 @@ use super::print;
 use anyhow::ensure;
 use calibration::check;
 use calibration::report::check::{page, words};
+use shared_mem::console;
 use shared_mem::output::Destination;
 use shared_mem::recording::Session;
 use std::path::PathBuf;
@@ -32,6 +33,9 @@ pub(super) struct CheckArguments {
     /// What the laboratory knows about its cell [default: cell.toml beside the clips].
     #[arg(long, value_name = "CELL.TOML")]
     cell: Option<PathBuf>,
+    /// Of several objects in cell.toml the one to look at [default: the one that moves].
+    #[arg(long, value_name = "NAME")]
+    object: Option<String>,
     /// Writes a page with pictures.
     #[arg(long, value_name = "CHECK.HTML")]
     report: Option<PathBuf>,
@@ -44,9 +48,12 @@ pub(super) struct CheckArguments {
 }
 
 pub(super) fn run(arguments: &CheckArguments) -> anyhow::Result<()> {
-    let CheckArguments { session, cell, report, force, json } = arguments;
+    let CheckArguments { session, cell, object, report, force, json } = arguments;
     let place = Destination::of(report.as_deref(), *force)?;
-    let opened = Session::open_with(session, cell.as_deref())?;
+    let mut opened = Session::open_with(session, cell.as_deref())?;
+    if let Some(subject) = opened.about(object.as_deref())? {
+        console::line(subject);
+    }
     let found = check::check(&opened);
     ensure!(
         found.clips.iter().any(|clip| clip.seconds.is_some()),

@@ -89,7 +89,8 @@ pub(super) fn listed(
     let mut kind = kind;
     if cell.robot.is_some() && cell.object().is_some() {
         let strokes = read_clip(clip, ClipKind::ControlHitSlide, cell);
-        if let Some(strokes) = strokes.ok().filter(|strokes| has_moved(&strokes.object)) {
+        let hit = |clip: &Clip| has_moved(&clip.object) || clip.others.iter().any(|other| has_moved(&other.series));
+        if let Some(strokes) = strokes.ok().filter(hit) {
             (read, kind) = (strokes, ClipKind::ControlHitSlide);
         }
     }
@@ -100,7 +101,7 @@ pub(super) fn listed(
     Ok((ClipEntry { file: relative(clip, out), kind }, remark))
 }
 
-/// Whether the object lies elsewhere in the end than in the beginning: an arm may have moved beside one that nothing hit.
+/// Whether an object lies elsewhere in the end than in the beginning: an arm may have moved beside one that nothing hit.
 fn has_moved(object: &ObjectSeries) -> bool {
     let ends = object.poses.first().zip(object.poses.last());
     ends.is_some_and(|(first, last)| {

@@ -224,6 +224,7 @@ mod tests {
         };
         let files = SessionFiles { session: "my monday".into(), cell: Some("the cell.toml".into()) };
         Checked {
+            object: None,
             session: "monday".into(),
             files,
             remarks,

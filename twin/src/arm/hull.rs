@@ -1,6 +1,6 @@
 //! How much space an arm and its tool take: balls that move with the links. The hull of a link's balls encloses the link, so
-//! the arm is above a plane where all its balls are. Base frame, m. Nothing here allocates: the bridge's guard asks it for
-//! many poses in each control cycle.
+//! the arm is above a plane where all its balls are. Base frame, m. [`ArmHull::at`] allocates nothing: the bridge's guard asks it
+//! for many poses in each control cycle.
 
 use super::kernel::{Chain, first, with_dof};
 use super::spatial::{add, rotate};
@@ -100,6 +100,21 @@ impl ArmHull {
                 }
             }
             extent
+        })
+    }
+
+    /// Its balls at joint positions `q` [rad], each with the joint that it lies behind, from 0, with its centre and its radius [m]; the
+    /// last two are the ends of the tool.
+    #[must_use]
+    pub fn balls(&self, q: &Joints) -> Vec<(usize, [f64; 3], f64)> {
+        with_dof!(self.model, N => {
+            let frames = Chain::<N>::at(first(&self.model.links), first(q)).frames;
+            let of_arm = self.balls.iter().take(self.count);
+            let placed = of_arm.filter_map(|ball| {
+                let frame = frames.get(ball.link)?;
+                Some((ball.link, add(frame.origin, rotate(&frame.rotation, ball.centre)), ball.radius))
+            });
+            placed.collect()
         })
     }
 

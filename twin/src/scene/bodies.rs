@@ -2,7 +2,7 @@
 
 use super::{MOST_BODIES, MeshFileError, ObjectModel, ObjectShape, mesh_file};
 use crate::arm::{UrdfBody, UrdfForm};
-use nalgebra::{Isometry3, Point3, Vector3};
+use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use shared_mem::cell::{Cell, Object};
 use shared_mem::input;
 use shared_mem::msg::object::{NAME_LENGTH, ObjectName};
@@ -10,6 +10,8 @@ use std::path::Path;
 
 /// Sides of a drawn and simulated cylinder.
 const SIDES: u32 = 24;
+/// Steps over a joint's range in which its highest place is looked for.
+const STEPS: u32 = 16;
 
 /// One body.
 #[derive(Debug, Clone)]
@@ -126,6 +128,60 @@ pub fn start_of(object: &Object, link: &UrdfBody) -> f64 {
     link.joint.as_ref().map_or(0.0, of)
 }
 
+/// Poses of an object's bodies in its root, each joint where `position` has it [rad or m].
+#[must_use]
+pub fn poses_in_root(own: &[&CellBody], position: impl Fn(&UrdfBody) -> f64) -> Vec<Isometry3<f64>> {
+    let mut poses: Vec<Isometry3<f64>> = Vec::new();
+    for body in own {
+        let joint = body.link.as_ref().and_then(|link| Some((link.joint.as_ref()?, position(link))));
+        poses.push(joint.map_or_else(Isometry3::identity, |(joint, position)| {
+            let moved = match joint.slides {
+                true => Isometry3::from_parts((joint.axis.into_inner() * position).into(), nalgebra::one()),
+                false => Isometry3::from_parts(
+                    Translation3::identity(),
+                    UnitQuaternion::from_axis_angle(&joint.axis, position),
+                ),
+            };
+            poses[joint.parent] * joint.at * moved
+        }));
+    }
+    poses
+}
+
+/// How far the highest object of a cell reaches above the table on which it stands upright [m]; of one that moves in itself wherever
+/// one of its joints may be, the others where they start. 0 without objects.
+///
+/// # Errors
+/// As [`cell_bodies`].
+pub fn tallest(cell: &Cell) -> Result<f64, MeshFileError> {
+    let bodies = cell_bodies(cell)?;
+    let height = |(number, object): (usize, &Object)| {
+        let own: Vec<&CellBody> = bodies.iter().filter(|body| body.object == number).collect();
+        let at_start = heights(&own, &poses_in_root(&own, |link| start_of(object, link)));
+        let moved = own
+            .iter()
+            .filter_map(|body| Some((body.link.as_ref()?.link.as_str(), body.link.as_ref()?.joint.as_ref()?)));
+        let moved = moved.flat_map(|(name, joint)| (0..=STEPS).map(move |k| (name, joint, k)));
+        let highest = moved.map(|(name, joint, k)| {
+            let [low, high] = joint.limits;
+            let there = low + (high - low) * f64::from(k) / f64::from(STEPS);
+            heights(&own, &poses_in_root(&own, |link| if link.link == name { there } else { start_of(object, link) }))
+                [1]
+        });
+        highest.fold(at_start[1], f64::max) - at_start[0]
+    };
+    Ok(cell.objects.iter().enumerate().map(height).fold(0.0, f64::max))
+}
+
+/// Lowest and highest point of bodies at `poses` [m].
+fn heights(own: &[&CellBody], poses: &[Isometry3<f64>]) -> [f64; 2] {
+    let points = own.iter().zip(poses).flat_map(|(body, pose)| {
+        let (points, _) = body.surface().triangles();
+        points.into_iter().map(move |point| (pose * point).z)
+    });
+    points.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], z| [low.min(z), high.max(z)])
+}
+
 impl CellBody {
     /// Its whole surface in the body's axes.
     #[must_use]
@@ -178,5 +234,32 @@ mod tests {
         let whole: f64 = triangles.iter().map(volume).sum();
         let round = std::f64::consts::PI * 0.25 * 2.0;
         assert!(whole < round && whole > 0.98 * round, "{whole} of {round}");
+    }
+
+    #[test]
+    fn the_highest_object_is_the_one_whose_lid_may_stand_open() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let part = |name: &str, x: f64, z: f64, height: f64| {
+            format!(
+                "<link name='{name}'><inertial><mass value='1'/><inertia ixx='1' iyy='1' izz='1' ixy='0' ixz='0' iyz='0'/></inertial>\
+                 <collision><origin xyz='{x} 0 {z}'/><geometry><box size='0.2 0.2 {height}'/></geometry></collision></link>"
+            )
+        };
+        let hinge = "<joint name='hinge' type='revolute'><parent link='base'/><child link='lid'/><origin xyz='0.1 0 0.04'/>\
+                     <axis xyz='0 1 0'/><limit lower='0' upper='1.5707963267948966' effort='1' velocity='1'/></joint>";
+        let robot = format!(
+            "<robot name='lap'>{}{}{hinge}</robot>",
+            part("base", 0.0, 0.02, 0.04),
+            part("lid", -0.1, 0.01, 0.02)
+        );
+        std::fs::write(folder.path().join("lap.urdf"), robot).expect("room");
+        let blocks = "[[object]]\nname = \"cup\"\nshape = \"box\"\nsize = [0.1, 0.1, 0.12]\n";
+        let read = |text: &str| Cell::parse(text, &folder.path().join("cell.toml")).expect("a cell");
+        assert!((tallest(&read(blocks)).expect("a box") - 0.12).abs() < 1e-12);
+        let both = format!("{blocks}[[object]]\nname = \"lap\"\nurdf = \"lap.urdf\"\n");
+        let highest = tallest(&read(&both)).expect("a box and a laptop");
+        // Its far edge is highest just before the lid stands upright.
+        assert!((highest - 0.04 - 0.2_f64.hypot(0.02)).abs() < 1e-5, "{highest}");
+        assert_eq!(tallest(&Cell::default()).expect("nothing"), 0.0);
     }
 }

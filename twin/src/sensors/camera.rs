@@ -48,7 +48,7 @@ const FLOOR_HALF: f32 = 5.0;
 const FLOOR: [u8; 3] = [128, 130, 134];
 
 impl SimCamera {
-    /// The camera of a cell, a D455 where `[camera]` is absent. Without `[object] pose_noise` depth is exact.
+    /// The camera of a cell, a D455 where `[camera]` is absent. Where no object has `pose_noise` depth is exact.
     ///
     /// # Errors
     /// [`SimError`] when the arm or the object's mesh cannot be read.
@@ -61,7 +61,7 @@ impl SimCamera {
         let light = camera_from_base * Vector3::from(looks::LIGHT).cast::<f32>();
         let pinhole = Pinhole { fx, fy, cx, cy };
         let raster = Raster::new(settings.width as usize, settings.height as usize, pinhole, light);
-        let noisy = cell.object().is_none_or(|o| o.pose_noise.is_some());
+        let noisy = cell.objects.is_empty() || cell.objects.iter().any(|object| object.pose_noise.is_some());
         let height = cell.table.map_or(0.0, |t| t.height as f32);
         let still =
             vec![Mesh::plate([0.0, 0.0, height - FLOOR_BELOW], [FLOOR_HALF; 2], FLOOR), looks::table_top(height)];

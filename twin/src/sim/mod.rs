@@ -136,11 +136,8 @@ impl SimCell {
 
     /// Lets one control period of 1 ms pass. Where the cell has no arm, `drive` moves nothing.
     pub fn step(&mut self, drive: &Drive) {
-        let Self { arm, object, contact, table, takes_part, .. } = self;
-        if let (Some(arm), Some(table)) = (arm.as_mut(), table) {
-            let push = table.push(arm.model(), arm.state());
-            arm.push(push);
-        }
+        self.lean_on_table();
+        let Self { arm, object, contact, takes_part, .. } = self;
         let (arm, object) = (arm.as_mut().filter(|_| takes_part.arm), object.as_mut().filter(|_| takes_part.object));
         match (arm, object) {
             (Some(arm), Some(object)) => contact.advance(arm, object, drive, self.time_ns),
@@ -149,6 +146,14 @@ impl SimCell {
             (None, None) => {}
         }
         self.time_ns += TICK_NS;
+    }
+
+    /// Has the table push the arm in the coming period, where it is solid; with these torques [N m].
+    fn lean_on_table(&mut self) -> Joints {
+        let (Some(arm), Some(table)) = (self.arm.as_mut(), &self.table) else { return Joints::default() };
+        let push = table.push(arm.model(), arm.state());
+        arm.push(push);
+        push
     }
 
     /// Lets the arm collide with the table, where the cell has an arm of known shape and a table. Off by default: a

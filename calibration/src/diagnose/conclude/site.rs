@@ -58,6 +58,8 @@ pub struct Site {
     alone: bool,
     /// Whether torques along the measured motion are asked about.
     torques: bool,
+    /// Of several objects the one that is asked about.
+    object: Option<String>,
     /// The page of the command that advises; it keeps its name.
     page: Option<PathBuf>,
 }
@@ -68,7 +70,8 @@ impl Site {
     /// one, or there is none, and the one given lists no new clips. `page`: where the command that advises writes its own.
     #[must_use]
     pub fn of(session: &Session, page: Option<&Path>) -> Self {
-        Self { page: page.map(Path::to_owned), ..Self::found(session) }
+        let object = session.cell.one_of_several().map(str::to_owned);
+        Self { page: page.map(Path::to_owned), object, ..Self::found(session) }
     }
 
     fn found(session: &Session) -> Self {
@@ -89,10 +92,11 @@ impl Site {
         let kind = if strokes { ClipKind::ControlHitSlide } else { ClipKind::Excitation };
         let (mut clips, mut fastest) = (Vec::new(), 1.0);
         if let Ok(body) = Body::of(&session.cell) {
+            let of = (kind, session.cell.object_name());
             let numbers =
                 session.clips.iter().filter(|clip| clip.kind == kind).filter_map(|clip| number_of(&clip.file));
             for number in numbers.take(2 * TWO) {
-                let Ok(clip) = recorded::read(&session.folder, number, kind, &body) else { continue };
+                let Ok(clip) = recorded::read(&session.folder, number, of, &body) else { continue };
                 if clips.is_empty() {
                     fastest = pace::largest(&clip.set_points, &limits::of(&session.cell, &body), &body);
                 }
@@ -120,6 +124,7 @@ impl Site {
             fastest,
             alone: false,
             torques: false,
+            object: None,
             page: None,
         }
     }
@@ -156,7 +161,7 @@ impl Site {
             },
             Capture::Elsewhere(name, rest) => {
                 let cell = named_after(&self.folder, &format!("{name}.toml"));
-                capture_into("control-hit-slide", &cell, &named_after(&self.folder, name), rest)
+                self.strokes_into(&cell, &named_after(&self.folder, name), rest)
             }
         }));
         self.finished(sentence, commands)
@@ -210,7 +215,7 @@ impl Site {
         }
         let next = if self.is_new { self.folder.clone() } else { named_after(&self.folder, "next") };
         vec![if self.strokes {
-            capture_into("control-hit-slide", &self.cell, &next, "--clips 12")
+            self.strokes_into(&self.cell, &next, "--clips 12")
         } else {
             capture_into("excitation", &self.cell, &next, "--clips 8")
         }]
@@ -232,7 +237,8 @@ impl Site {
         for (folder, page) in beside.into_iter().chain([(self.folder.clone(), "report".to_owned())]) {
             if fill(&commands, &folder) {
                 let torques = if self.torques { "--torques" } else { "" };
-                let command = Command::new("calibration diagnose").path(&folder).words(torques);
+                let object = self.object.as_ref().map_or_else(String::new, |name| format!("--object {name}"));
+                let command = Command::new("calibration diagnose").path(&folder).words(&object).words(torques);
                 commands.push(command.option("--report", &self.free_page(&page)).into());
             }
         }
@@ -259,7 +265,12 @@ impl Site {
 
     fn strokes(&self, rest: &str) -> String {
         let folder = if self.strokes { self.folder.clone() } else { named_after(&self.folder, "strokes") };
-        capture_into("control-hit-slide", &self.cell, &folder, rest)
+        self.strokes_into(&self.cell, &folder, rest)
+    }
+
+    fn strokes_into(&self, cell: &Path, folder: &Path, rest: &str) -> String {
+        let rest = self.object.as_ref().map_or_else(|| rest.to_owned(), |name| format!("--object {name} {rest}"));
+        capture_into("control-hit-slide", cell, folder, &rest)
     }
 }
 
@@ -287,6 +298,15 @@ mod tests {
         let site = Site { torques: true, ..Site::new(Path::new("bags"), false, Vec::new(), 1.0) };
         let advice = site.more("Record more.".into(), 4);
         assert_eq!(advice.commands[1], "calibration diagnose bags --torques --report report.html");
+    }
+
+    #[test]
+    fn of_several_objects_strokes_and_their_diagnosis_are_about_the_same_one() {
+        let site = Site { object: Some("cup".into()), ..Site::new(Path::new("bags"), true, vec![4], 1.0) };
+        let commands = site.advice(String::new(), &[Capture::StrokeAgain("--speed 0.5")]).commands;
+        let of_strokes = "--cell bags/cell.toml --out bags --object cup --repeat 4 --speed 0.5";
+        assert_eq!(commands[0], format!("calibration capture control-hit-slide {of_strokes}"));
+        assert_eq!(commands[1], "calibration diagnose bags --object cup --report report.html");
     }
 
     #[test]

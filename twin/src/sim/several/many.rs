@@ -119,13 +119,21 @@ impl ManyBodies {
     pub(super) fn step(&mut self, cell: &mut SimCell, drive: &Drive) {
         let now_ns = cell.time_ns;
         cell.time_ns += TICK_NS;
+        let (table, takes_part) = (cell.lean_on_table(), cell.takes_part.arm);
         let record = &mut cell.contact.record;
         (record.mean_force, record.on_tool) = (0.0, Default::default());
         let Some(arm) = &mut cell.arm else { return self.world.step() };
         let Some(tool) = self.tool else {
-            arm.period(drive);
+            if takes_part {
+                arm.period(drive);
+            }
             return self.world.step();
         };
+        if !takes_part {
+            self.world.set_arm(tool, arm.state());
+            self.world.refresh();
+            return self.world.step();
+        }
         let before = arm.motion.clone();
         arm.period(drive);
         let (q, free) = (before.state.q, arm.state().dq);
@@ -141,7 +149,7 @@ impl ManyBodies {
         let torque: Joints =
             std::array::from_fn(|i| (0..MAX_JOINTS).map(|j| masses[i][j] * (after[j] - free[j])).sum::<f64>() / STEP);
         arm.motion.clone_from(&before);
-        arm.push(torque);
+        arm.push(std::array::from_fn(|i| torque[i] + table[i]));
         arm.period(drive);
         arm.push([0.0; MAX_JOINTS]);
         (record.mean_force, record.on_tool) = (load.pressing, [load.force, load.moment]);

@@ -15,7 +15,7 @@ mod standing;
 
 use super::contact::ToolContact;
 use super::{SimCell, SimError};
-use crate::arm::JointState;
+use crate::arm::{GainError, JointState, Joints, MassProperties};
 use crate::control::Drive;
 use crate::effects::{Stage, find};
 use crate::physics::TableObject;
@@ -152,6 +152,30 @@ impl SimScene {
         &self.cell
     }
 
+    /// Lets the arm collide with the table: [`SimCell::make_table_solid`].
+    pub fn make_table_solid(&mut self, cell: &Cell) {
+        self.cell.make_table_solid(cell);
+    }
+
+    /// Tells the arm's controller what the flange carries: [`SimCell::declare_load`].
+    pub fn declare_load(&mut self, load: &MassProperties) {
+        self.cell.declare_load(load);
+    }
+
+    /// Asks the arm's own controller for another stiffness [N m/rad]: [`SimCell::ask_stiffness`].
+    ///
+    /// # Errors
+    /// [`GainError`] when cell.toml describes no controller.
+    pub fn ask_stiffness(&mut self, stiffness: &Joints) -> Result<(), GainError> {
+        self.cell.ask_stiffness(stiffness)
+    }
+
+    /// Takes the arm's motion out until it is set again. Apart from each other objects do not notice it meanwhile, among many bodies
+    /// they give way to its tool.
+    pub fn remove_arm(&mut self) {
+        self.cell.remove_arm();
+    }
+
     /// Names of all bodies in the order of cell.toml; empty for one object without a name.
     #[must_use]
     pub fn names(&self) -> &[ObjectName] {
@@ -193,8 +217,8 @@ impl SimScene {
 
     /// Objects that the tool may touch within the coming period.
     fn at_the_tool(&mut self) -> Vec<usize> {
-        let SimCell { arm, object, contact, .. } = &mut self.cell;
-        let Some(arm) = arm else { return Vec::new() };
+        let SimCell { arm, object, contact, takes_part, .. } = &mut self.cell;
+        let Some(arm) = arm.as_ref().filter(|_| takes_part.arm) else { return Vec::new() };
         let first = object.as_ref().zip(Some(contact)).into_iter();
         let all = first.chain(self.others.iter_mut().map(|other| (&other.object, &mut other.contact)));
         all.enumerate().filter_map(|(i, (object, contact))| contact.is_near(arm, object).then_some(i)).collect()
@@ -202,12 +226,14 @@ impl SimScene {
 
     /// A period in which the tool is at one of the objects, or at none.
     fn step_apart(&mut self, drive: &Drive, touched: Option<usize>) {
-        let SimCell { arm, object, contact, time_ns, .. } = &mut self.cell;
+        self.cell.lean_on_table();
+        let SimCell { arm, object, contact, time_ns, takes_part, .. } = &mut self.cell;
+        let mut arm = arm.as_mut().filter(|_| takes_part.arm);
         let first = object.as_mut().zip(Some(contact)).into_iter();
         let all = first.chain(self.others.iter_mut().map(|other| (&mut other.object, &mut other.contact)));
         let mut on_tool = None;
         for (i, (object, contact)) in all.enumerate() {
-            match arm.as_mut().filter(|_| touched == Some(i)) {
+            match arm.as_deref_mut().filter(|_| touched == Some(i)) {
                 Some(arm) => {
                     contact.advance(arm, object, drive, *time_ns);
                     on_tool = Some(contact.record.on_tool);

@@ -1,10 +1,10 @@
 //! Where objects stand when the simulated cell starts: where their blocks say, else each 5 cm beside the one before it. Base frame.
 
 use crate::physics::Hull;
-use crate::scene::{CellBody, ObjectShape, start_of};
+use crate::scene::{CellBody, ObjectShape, poses_in_root, start_of};
 use crate::sim::SimError;
 use crate::world::{BodyPlan, Hold, JointKind, JointPlan, Piece};
-use nalgebra::{Isometry3, Matrix3, Point3, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
 use shared_mem::cell::{Cell, Object, RootHold};
 
 /// Between objects that have no `start` of their own [m].
@@ -31,7 +31,7 @@ pub(super) fn starts(cell: &Cell, bodies: &[CellBody], table: f64) -> Vec<Isomet
 fn extent(object: &Object, number: usize, bodies: &[CellBody]) -> (f64, f64) {
     let own: Vec<&CellBody> = bodies.iter().filter(|body| body.object == number).collect();
     let (mut low, mut around) = (0.0_f64, 0.0_f64);
-    for (body, pose) in own.iter().zip(poses(object, &own)) {
+    for (body, pose) in own.iter().zip(poses_in_root(&own, |link| start_of(object, link))) {
         for point in body.surface().triangles().0 {
             let place = pose * point;
             low = low.min(place.z);
@@ -39,25 +39,6 @@ fn extent(object: &Object, number: usize, bodies: &[CellBody]) -> (f64, f64) {
         }
     }
     (low, around)
-}
-
-/// Poses of an object's bodies in its root when all joints are where they start.
-fn poses(object: &Object, own: &[&CellBody]) -> Vec<Isometry3<f64>> {
-    let mut poses: Vec<Isometry3<f64>> = Vec::new();
-    for body in own {
-        let joint = body.link.as_ref().and_then(|link| Some((link.joint.as_ref()?, start_of(object, link))));
-        poses.push(joint.map_or_else(Isometry3::identity, |(joint, position)| {
-            let moved = match joint.slides {
-                true => Isometry3::from_parts((joint.axis.into_inner() * position).into(), nalgebra::one()),
-                false => Isometry3::from_parts(
-                    Translation3::identity(),
-                    UnitQuaternion::from_axis_angle(&joint.axis, position),
-                ),
-            };
-            poses[joint.parent] * joint.at * moved
-        }));
-    }
-    poses
 }
 
 /// The bodies of an object that moves in itself, for a world in which `before` bodies come before them.
