@@ -4,7 +4,7 @@ use super::headline::{self, Facts};
 use super::site::Advice;
 use super::site::Site;
 use super::verdict::{self, Finding};
-use super::{advice, ranked, remedies};
+use super::{advice, ends, ranked, remedies};
 use crate::diagnose::answer::{Change, Clips, Diagnosis, Gap, Nearest, Place, Rest, Share, Verdict};
 use crate::diagnose::clips::admit::Admitted;
 use crate::diagnose::clips::split::{self, Split};
@@ -22,6 +22,7 @@ use crate::diagnose::judge::sizes::{self, Sizes};
 use crate::diagnose::judge::trial::{Found, Step};
 use crate::diagnose::judge::unproven::{self, Unproven};
 use crate::diagnose::judge::{confidence, drift, localise};
+use crate::diagnose::library::Library;
 use crate::diagnose::search::refit;
 use crate::diagnose::{DiagnoseError, Kind, Options};
 use crate::page::{Trace, channel_in_words, effect_in_words};
@@ -156,7 +157,7 @@ pub fn conclude<E: Evidence>(
         stage_test: None,
         places,
         clips: Clips { train: names(&split.train), choose: names(&split.choose), confirm: names(&split.confirm) },
-        warnings: admitted.warnings.iter().cloned().chain(few(split)).collect(),
+        warnings: warnings(bench.library, kept, (admitted, split)),
         budget_spent: false,
         engine: None,
         seconds: 0.0,
@@ -202,6 +203,12 @@ fn share_of<E: Evidence>(
 ) -> Option<f64> {
     let share = held_out::residuals(bench, split, (open.fit, weights))?.shrink(before, seed).value;
     (share > 0.0).then_some(share)
+}
+
+/// What has to be known beside the answer: of the recording, of few commands, of sizes at an end of their search.
+fn warnings(library: &Library, kept: &Hypothesis, (admitted, split): (&Admitted, &Split)) -> Vec<String> {
+    let ended = ends::remarks(library, &kept.effects, &kept.full);
+    admitted.warnings.iter().cloned().chain(few(split)).chain(ended).collect()
 }
 
 /// What has to be known about clips of few commands.
