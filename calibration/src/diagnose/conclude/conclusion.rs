@@ -4,7 +4,7 @@ use super::headline::{self, Facts};
 use super::site::Advice;
 use super::site::Site;
 use super::verdict::{self, Finding};
-use super::{advice, ends, ranked, remedies};
+use super::{advice, ranked, remedies};
 use crate::diagnose::answer::{Change, Clips, Diagnosis, Gap, Nearest, Place, Rest, Share, Verdict};
 use crate::diagnose::clips::admit::Admitted;
 use crate::diagnose::clips::split::{self, Split};
@@ -21,11 +21,11 @@ use crate::diagnose::judge::score::predict;
 use crate::diagnose::judge::sizes::{self, Sizes};
 use crate::diagnose::judge::trial::{Found, Step};
 use crate::diagnose::judge::unproven::{self, Unproven};
-use crate::diagnose::judge::{confidence, drift, localise};
+use crate::diagnose::judge::{confidence, drift, ends, localise};
 use crate::diagnose::library::Library;
 use crate::diagnose::search::refit;
 use crate::diagnose::{DiagnoseError, Kind, Options};
-use crate::page::{Trace, channel_in_words, effect_in_words};
+use crate::page::{Trace, channel_in_words, effect_in_words, words};
 use shared_mem::recording::Session;
 use shared_mem::theta::Theta;
 
@@ -205,10 +205,16 @@ fn share_of<E: Evidence>(
     (share > 0.0).then_some(share)
 }
 
-/// What has to be known beside the answer: of the recording, of few commands, of sizes at an end of their search.
+/// What has to be known beside the answer: of the recording, of few commands, of effects as strong as they are looked for.
 fn warnings(library: &Library, kept: &Hypothesis, (admitted, split): (&Admitted, &Split)) -> Vec<String> {
-    let ended = ends::remarks(library, &kept.effects, &kept.full);
-    admitted.warnings.iter().cloned().chain(few(split)).chain(ended).collect()
+    let ended = kept.effects.iter().filter(|effect| !ends::stopped(library, **effect, &kept.full).is_empty());
+    let sentence = |effect: &usize| {
+        let name = words(library.candidates[*effect].effect.name);
+        format!(
+            "{name} was found as strong as it is looked for: it may be stronger, or something else that looks like it"
+        )
+    };
+    admitted.warnings.iter().cloned().chain(few(split)).chain(ended.map(sentence)).collect()
 }
 
 /// What has to be known about clips of few commands.

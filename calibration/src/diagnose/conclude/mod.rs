@@ -5,13 +5,11 @@
 //! | `verdict`, `headline` | which of the five verdicts it is, and its sentence |
 //! | `advice`, `site` | what to record next, and the commands for it |
 //! | `remedies` | what to do about what was named |
-//! | `ends` | what stopped at an end of its search |
 //! | `ranked`, `reason` | what is said of every candidate, and why |
 //! | `conclusion` | the answer |
 
 pub mod advice;
 pub mod conclusion;
-mod ends;
 pub mod headline;
 pub mod ranked;
 pub(super) mod reason;

@@ -6,6 +6,7 @@
 //! | `held_out` | numbers for clips that it was not fitted to |
 //! | `confirm` | whether the clips kept for confirming speak for what was found |
 //! | `closing` | how much of the gap it closes |
+//! | `ends` | which of its sizes stopped at an end of their search |
 //! | `remainder`, `drift` | what it leaves |
 //! | `gap`, `localise`, `sizes` | how large the gap is, and where |
 //! | `recorded_arm` | whose an object's gap is: the arm's, or the object's |
@@ -19,6 +20,7 @@ pub mod closing;
 pub mod confidence;
 pub(super) mod confirm;
 pub mod drift;
+pub(super) mod ends;
 pub mod gap;
 pub(super) mod held_out;
 pub mod localise;

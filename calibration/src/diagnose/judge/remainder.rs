@@ -3,6 +3,7 @@
 //! A substitute for a cause that the library does not know fits a part of it, grows beyond what is met in practice, or helps
 //! on some clips and harms on others. What is left is then more than another engine's way of integrating leaves.
 
+use super::ends;
 use super::gap::Typical;
 use crate::diagnose::answer::{SensorGap, Sensors};
 use crate::diagnose::criteria::{
@@ -110,21 +111,24 @@ pub fn explained(before: f64, after: f64, floor: f64) -> f64 {
 /// one.
 const BEYOND: f64 = 0.05;
 
-/// Effects of a hypothesis that are stronger than what is met in practice, whatever of their intervals is true.
+/// Effects of a hypothesis that are stronger than what is met in practice, whatever of their intervals is true: what stopped at an
+/// end of its search is at least as strong as that.
 #[must_use]
 pub fn implausible<E: Evidence>(bench: &Bench<'_, E>, hypothesis: &Hypothesis) -> Vec<usize> {
     let beyond = |effect: &usize| {
         let sizes = parameters::of_effect(bench, hypothesis, *effect);
+        let stopped = ends::stopped(bench.library, *effect, &hypothesis.full);
         let info = bench.library.candidates[*effect].effect.parameters.iter();
         info.filter(|parameter| matches!(parameter.role, Role::Size { .. })).any(|parameter| {
-            let outside = |(index, [low, high]): (usize, &[f64; 2])| {
+            let outside = |(index, (value, ci90)): (usize, (&f64, &[f64; 2]))| {
+                let [low, high] = if stopped.contains(&(parameter.name, index)) { [*value; 2] } else { *ci90 };
                 let [lo, hi] = bench.library.robot().range(parameter, Some(index));
                 let room = BEYOND * (hi - lo);
                 // What fades out towards infinity is met from its strongest on.
                 let hi = if parameter.resting_value().is_infinite() { f64::INFINITY } else { hi };
-                *low > hi + room || *high < lo - room
+                low > hi + room || high < lo - room
             };
-            sizes.get(parameter.name).is_some_and(|size| size.ci90.iter().enumerate().any(outside))
+            sizes.get(parameter.name).is_some_and(|size| size.values.iter().zip(&size.ci90).enumerate().any(outside))
         })
     };
     hypothesis.effects.iter().copied().filter(beyond).collect()
