@@ -350,6 +350,7 @@ mod tests {
         let holed = quality(&track(|t| (0.5 + 0.1 * t, 0.0), (0..61).filter(|k| !(20..27).contains(k))));
         assert_eq!(holed.lost_poses, 7);
     }
+
     #[test]
     fn an_object_beside_was_moved_where_the_ends_of_a_clip_are_apart_and_not_where_single_poses_err() {
         let noisy =
