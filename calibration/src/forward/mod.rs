@@ -6,10 +6,12 @@
 //! | [`motion`] | who moves the arm: the twin, or another program |
 //! | [`arm`] | what an arm's sensors log |
 //! | [`object`] | clips with an object: poses |
+//! | [`smoothing`] | logged series smoothed, with slopes |
 
 pub mod arm;
 pub mod motion;
 pub mod object;
 pub mod setting;
+pub mod smoothing;
 
 pub use setting::{Setting, Settings};
