@@ -199,7 +199,7 @@ fn improve<M: ClipModel>(
 ) -> Result<Progress, Impossible> {
     let (information, gradient) = (best.information(), best.gradient());
     let here = current(best, random);
-    let room: Vec<[f64; 2]> = unknowns.iter().zip(&best.shared).map(|(unknown, at)| unknown.room(*at)).collect();
+    let room: Vec<[f64; 2]> = unknowns.iter().zip(&best.shared).map(|(unknown, at)| unknown.reach(*at)).collect();
     let whole = bounded_step(&information, &gradient, &room, 0.0);
     let descent = Descent { information: &information, gradient: &gradient, room: &room, enough: 0.0, trials: TRIALS };
     if descent.promised(&whole) + own_promise(best) < tolerance * best.misfit() {

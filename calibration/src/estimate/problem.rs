@@ -1,5 +1,8 @@
 //! What is asked of a set of clips, in numbers.
 
+/// A positive number whose bounds are so many times apart is known by its order of magnitude alone.
+const WIDE: f64 = 100.0;
+
 /// A number that all clips share and that is to be found.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Unknown {
@@ -20,6 +23,17 @@ impl Unknown {
     #[must_use]
     pub fn room(&self, from: f64) -> [f64; 2] {
         [self.lower - from, self.upper - from]
+    }
+
+    /// The same for one step of a search: a positive number that is known by its order of magnitude alone, as gains that nobody has
+    /// published, is at most halved or doubled, since slopes say nothing about another order of magnitude.
+    #[must_use]
+    pub fn reach(&self, from: f64) -> [f64; 2] {
+        let [down, up] = self.room(from);
+        if self.lower <= 0.0 || self.upper < WIDE * self.lower || down > 0.0 || up < 0.0 {
+            return [down, up];
+        }
+        [down.max(-0.5 * from), up.min(from)]
     }
 }
 
@@ -72,5 +86,21 @@ pub trait ClipModel: Sync {
     /// neighbouring rows share has died away from one stretch to the next. Empty: the clip is a single witness.
     fn stretches(&self, _clip: usize) -> Vec<usize> {
         Vec::new()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_number_known_by_its_order_of_magnitude_is_at_most_halved_or_doubled() {
+        let unknown = |lower, upper| Unknown { name: "k".into(), start: 1.0, lower, upper, step: 1e-6 };
+        assert_eq!(unknown(1.0, 1000.0).reach(100.0), [-50.0, 100.0]);
+        assert_eq!(unknown(60.0, 6500.0).reach(100.0), [-40.0, 100.0]);
+        assert_eq!(unknown(1.0, 1000.0).reach(800.0), [-400.0, 200.0]);
+        assert_eq!(unknown(50.0, 200.0).reach(100.0), [-50.0, 100.0], "known within a factor of four");
+        assert_eq!(unknown(-1.0, 1000.0).reach(100.0), [-101.0, 900.0], "it may be 0");
+        assert_eq!(unknown(1.0, 1000.0).reach(0.5), [0.5, 999.5], "outside");
     }
 }

@@ -80,7 +80,7 @@ impl<E: Evidence> Bench<'_, E> {
         let now = self.cost(full, &here, weights)?;
         let (information, gradient) = (sum.view((1, 1), (free.len(), free.len())), sum.view((1, 0), (free.len(), 1)));
         let (information, gradient) = (information.into_owned(), gradient.column(0).into_owned());
-        let room: Vec<[f64; 2]> = free.iter().map(|k| self.library.unknowns[*k].room(full[*k])).collect();
+        let room: Vec<[f64; 2]> = free.iter().map(|k| self.library.unknowns[*k].reach(full[*k])).collect();
         let enough = TOLERANCE * self.excess(at, weights);
         let descent = Descent { information: &information, gradient: &gradient, room: &room, enough, trials };
         descent.step(damping, |_, step| {
