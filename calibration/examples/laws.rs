@@ -70,10 +70,11 @@ fn main() -> anyhow::Result<()> {
 /// What makes a law of the joint impedance that the cell has.
 type Law = (&'static str, fn(&mut Controller));
 
-fn laws() -> [Law; 6] {
+fn laws() -> [Law; 7] {
     [
         ("joint_impedance", |_| {}),
         ("inverse_dynamics", |law| law.kind = ControllerKind::InverseDynamics),
+        ("compensated_pd", |law| law.kind = ControllerKind::CompensatedPd),
         ("joint_velocity", |law| law.kind = ControllerKind::JointVelocity),
         ("joint_pd", |law| {
             // A servo that compensates nothing has to be stiff, or it hangs.

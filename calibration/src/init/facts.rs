@@ -101,11 +101,13 @@ pub fn height(text: &str) -> Result<f64, String> {
 pub fn controller(text: &str) -> Result<ControllerKind, String> {
     match text.trim() {
         "joint_impedance" => Ok(ControllerKind::JointImpedance),
+        "compensated_pd" => Ok(ControllerKind::CompensatedPd),
         "joint_pd" => Ok(ControllerKind::JointPd),
         "inverse_dynamics" => Ok(ControllerKind::InverseDynamics),
         "joint_velocity" => Ok(ControllerKind::JointVelocity),
         _ => Err("give joint_impedance (gravity and velocities of the commands are compensated), inverse_dynamics (inertia as \
-                  well), joint_velocity (commands are velocities) or joint_pd (a servo)"
+                  well), compensated_pd (gravity alone; the damper acts on measured velocities), joint_velocity (commands are \
+                  velocities) or joint_pd (a servo)"
             .into()),
     }
 }

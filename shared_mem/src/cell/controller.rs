@@ -72,6 +72,8 @@ pub enum ControllerKind {
     /// `tau = k (q_d - q) + d (dq_d - dq) + gravity(q) + coriolis(q, dq)` of the nominal model.
     #[default]
     JointImpedance,
+    /// `tau = k (q_d - q) - d dq + gravity(q) + coriolis(q, dq)`: PD control with compensation, whose damper knows no desired velocity.
+    CompensatedPd,
     /// `tau = k (q_d - q) - d dq`: a servo, nothing compensated.
     JointPd,
     /// `joint_impedance` with `M(q) ddq_d` added: the inertia is fed forward.
@@ -101,6 +103,7 @@ impl ControllerKind {
     pub fn name(self) -> Option<&'static str> {
         match self {
             Self::JointImpedance => Some("joint_impedance"),
+            Self::CompensatedPd => Some("compensated_pd"),
             Self::JointPd => Some("joint_pd"),
             Self::InverseDynamics => Some("inverse_dynamics"),
             Self::JointVelocity => Some("joint_velocity"),

@@ -114,9 +114,10 @@ impl ControlLaw {
         dq_d_before: &Joints,
     ) -> Joints {
         let compensation = match self.kind {
-            ControllerKind::JointImpedance | ControllerKind::JointVelocity | ControllerKind::Unstated => {
-                nominal.bias(state)
-            }
+            ControllerKind::JointImpedance
+            | ControllerKind::CompensatedPd
+            | ControllerKind::JointVelocity
+            | ControllerKind::Unstated => nominal.bias(state),
             ControllerKind::JointPd => [0.0; MAX_JOINTS],
             ControllerKind::InverseDynamics => {
                 let ddq_d = inverse_dynamics::acceleration(dq_d_before, dq_d);
@@ -150,12 +151,13 @@ impl ControlLaw {
     /// The same where the model's `gravity + coriolis` at this state is known already [N m].
     #[inline(always)]
     pub(super) fn torque_with(&self, state: &JointState, q_d: &Joints, dq_d: &Joints, bias: &Joints) -> Joints {
-        // A servo damps the joint's own velocity and compensates nothing.
+        // A PD law damps the joint's own velocity, and a servo compensates nothing besides.
         let (follow, compensate) = match self.kind {
             ControllerKind::JointImpedance
             | ControllerKind::JointVelocity
             | ControllerKind::InverseDynamics
             | ControllerKind::Unstated => (1.0, 1.0),
+            ControllerKind::CompensatedPd => (0.0, 1.0),
             ControllerKind::JointPd => (0.0, 0.0),
             ControllerKind::Tracking => unreachable!("asked for by `needs_no_mass`"),
         };
@@ -208,6 +210,22 @@ fn geometric_middle([lo, hi]: Range) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn pd_control_with_compensation_is_joint_impedance_that_knows_no_desired_velocity() {
+        let arm = ArmModel::fr3();
+        let state = JointState { q: *arm.ready(), dq: [0.3; MAX_JOINTS] };
+        let (q_d, dq_d) = (arm.ready().map(|q| q + 0.01), [0.5; MAX_JOINTS]);
+        let torque = |kind, dq_d: &Joints| {
+            let (stiffness, damping) = ([100.0; MAX_JOINTS], [10.0; MAX_JOINTS]);
+            let law = ControlLaw { kind, stiffness, damping, torque_limit: [f64::INFINITY; MAX_JOINTS] };
+            law.torque(&arm, &state, &q_d, dq_d)
+        };
+        let still = torque(ControllerKind::JointImpedance, &[0.0; MAX_JOINTS]);
+        assert_eq!(torque(ControllerKind::CompensatedPd, &dq_d), still);
+        assert_ne!(torque(ControllerKind::JointImpedance, &dq_d), still);
+        assert_ne!(torque(ControllerKind::JointPd, &dq_d), still, "a servo does not carry the arm's weight");
+    }
 
     #[test]
     fn a_gain_that_no_controller_has_is_refused_in_one_line() {

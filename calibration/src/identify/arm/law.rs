@@ -12,8 +12,12 @@ use shared_mem::recording::Clip;
 use shared_mem::theta::Theta;
 
 /// Laws that are compared, the most frequent first: of two that fit alike the first is taken.
-const LAWS: [ControllerKind; 3] =
-    [ControllerKind::JointImpedance, ControllerKind::InverseDynamics, ControllerKind::JointPd];
+const LAWS: [ControllerKind; 4] = [
+    ControllerKind::JointImpedance,
+    ControllerKind::InverseDynamics,
+    ControllerKind::CompensatedPd,
+    ControllerKind::JointPd,
+];
 /// So many clips decide which law it is.
 const CLIPS: usize = 4;
 /// A law that leaves less than this times as much as another fits as well.
@@ -24,7 +28,7 @@ const ALIKE: f64 = 1.1;
 ///
 /// # Errors
 /// [`ArmError`] when the arm cannot be simulated under any law.
-pub fn found(
+pub(super) fn found(
     cell: &Cell,
     clips: &[Clip],
     given: Option<&Theta>,
