@@ -42,7 +42,7 @@ pub use answer::{
 use crate::engine::{Engine, EngineError, Quantity, Used};
 use crate::forward::object::ObjectClips;
 use crate::forward::setting::{self, BaseError};
-use crate::identify::arm::{ArmError, law};
+use crate::identify::arm::{self, ArmError};
 use crate::interrupt::Interrupt;
 use crate::kept::{self, Fingerprint, Kept, Trail};
 use clips::admit::{Admitted, Refused, admit};
@@ -156,11 +156,10 @@ pub fn diagnose_kept(
     let admitted = compared(admitted, options.engine.as_deref())?;
     let alone = admitted.objects_alone().then(|| without_robot(session));
     let session = alone.as_ref().unwrap_or(session);
-    let law = law::found(&session.cell, &admitted.clips, options.theta.as_ref(), interrupt)?;
-    let (led, remark) = law.map(|(cell, remark)| (Session { cell, ..session.clone() }, remark)).unzip();
-    let session = led.as_ref().unwrap_or(session);
     let mut admitted = admitted;
-    admitted.warnings.extend(remark);
+    let (known, remarks) = (options.theta.as_ref(), &mut admitted.warnings);
+    let cell = arm::controlled(session.cell.clone(), &admitted.clips, known, remarks, interrupt)?;
+    let session = &Session { cell, ..session.clone() };
     let question = Fingerprint::of("diagnose")
         .with(&(session.cell.to_toml(), options.theta.as_ref().map(Theta::to_toml), options.seed, options.torques))
         .with(&options.engine.as_ref().map(|engine| engine.ability().print()))

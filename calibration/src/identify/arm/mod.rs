@@ -17,7 +17,8 @@ mod advice;
 mod doubt;
 mod figures;
 mod finding;
-pub mod law;
+mod law;
+mod measured_stiffness;
 mod saturation;
 mod session;
 mod start;
@@ -160,8 +161,8 @@ fn identify_kept(
     options: &Options,
     (kept, interrupt): (&Kept, &Interrupt),
 ) -> Result<(Identification, Theta), ArmError> {
-    let law = law::found(&cell, &clips, given, interrupt)?;
-    let (cell, remark) = law.map_or((cell, None), |(cell, remark)| (cell, Some(remark)));
+    let mut remarks = Vec::new();
+    let cell = controlled(cell, &clips, given, &mut remarks, interrupt)?;
     let base = complete(&cell, given)?;
     let (settings, mut unknowns): (Vec<_>, Vec<_>) = searched(&cell, &base, &options.also)?.into_iter().unzip();
     let settings = Settings::new(base, settings);
@@ -200,7 +201,7 @@ fn identify_kept(
     figures::fill(&mut answer, &model, &clips, &random, [&before, &outcome.fit.shared])?;
     answer.not_identifiable = verdict::untold(&finding, &model, &clips, options.optimizer);
     answer.warnings.extend(doubt::doubts(&answer, &finding, &model, &clips, &before));
-    answer.warnings.extend(remark);
+    answer.warnings.extend(remarks);
     answer.advice = advice::next(&finding, &clips);
     clips.fill(&mut answer);
     answer.engine = options.engine.as_ref().map(|engine| engine.used());
@@ -209,6 +210,31 @@ fn identify_kept(
     let given = given.cloned().unwrap_or_default();
     let theta = Theta { object: given.object, others: given.others, ..settings.theta(&outcome.fit.shared) };
     Ok((answer, theta))
+}
+
+/// The cell with what its clips say of the controller before anything is fitted to them: the law where it is not stated, and the
+/// stiffness where torques tell it. `given`: parameters that are known already; then gains are not looked for.
+///
+/// # Errors
+/// [`ArmError`] when the arm cannot be simulated under any law.
+pub fn controlled(
+    cell: Cell,
+    clips: &[Clip],
+    given: Option<&Theta>,
+    remarks: &mut Vec<String>,
+    interrupt: &Interrupt,
+) -> Result<Cell, ArmError> {
+    let mut cell = cell;
+    if let Some((led, remark)) = law::found(&cell, clips, given, interrupt)? {
+        cell = led;
+        remarks.push(remark);
+    }
+    let gains_are_given = given.is_some_and(|given| given.arm.is_some());
+    if let Some((known, remark)) = measured_stiffness::found(&cell, clips).filter(|_| !gains_are_given) {
+        cell = known;
+        remarks.push(remark);
+    }
+    Ok(cell)
 }
 
 /// Parameters from which a fit of gains by their slopes arrives: where cell.toml knows gains by range alone, the best of a coarse
