@@ -5,12 +5,14 @@ mod arm_outline;
 mod bodies;
 mod mesh_file;
 mod snapshot;
+mod starts;
 
 pub use arm_outline::{ArmOutline, Part};
 pub use bodies::{CellBody, bodies_of, cell_bodies, poses_in_root, start_of, tallest};
 pub use mesh_file::{MeshFileError, read_surface as mesh_in_its_middle};
 pub(crate) use mesh_file::{open_edges, read as read_mesh};
 pub use snapshot::{MOST_BODIES, NamedPoses, SceneSnapshot};
+pub use starts::{body_starts, joint_position, starts};
 
 use nalgebra::{Point3, Vector3};
 use shared_mem::cell::{Cell, Object, Support};

@@ -83,7 +83,7 @@ pub fn capture(options: &Options, interrupt: &Interrupt) -> anyhow::Result<Summa
     let mut bridge = task.bridge(&mut link, interrupt)?;
     let limits = limits::of(&cell, &body);
     let recovery = Recovery::new(options.task.recover);
-    let placing = Placing { task, cell: &cell, bridge: &mut bridge, interrupt };
+    let placing = Placing { task, simulated: Placing::simulated(&cell), bridge: &mut bridge, interrupt };
     let (body, limits, cell) = (&body, &limits[..], &cell);
     let mut desk = Desk { options, repeats, placing, cell, size, body, limits, session, interrupt, recovery };
     let clips = match desk.clips(&mut link, &mut object) {
@@ -242,8 +242,11 @@ impl<'a> Desk<'a> {
         object: &mut ObjectWatch,
     ) -> anyhow::Result<Option<(Next, String)>> {
         link.ready_arm(self.limits.len())?;
-        let Some(stands) = self.placing.place(&staged.standing, link, object)? else { return Ok(None) };
         let (stroke, plan, program) = (staged.stroke, staged.plan.clone(), self.program());
+        let Some(_) = object.standing(COMES_TO_REST, self.interrupt)? else { return Ok(None) };
+        // What is left out anyway is not worth putting the object there.
+        program.check_clear(&stroke, &plan, &self.ways(&object.obstacles()))?;
+        let Some(stands) = self.placing.place(&staged.standing, link, object)? else { return Ok(None) };
         let obstacles = object.obstacles();
         let ways = self.ways(&obstacles);
         program.check_clear(&stroke, &plan, &ways)?;

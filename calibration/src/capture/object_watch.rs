@@ -4,7 +4,7 @@
 use super::obstacle::{Obstacle, corners};
 use super::program::Standing;
 use crate::interrupt::Interrupt;
-use nalgebra::{Isometry3, Point3};
+use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
 use serde::Serialize;
 use shared_mem::cell::Cell;
 use shared_mem::console;
@@ -248,6 +248,21 @@ impl ObjectWatch {
         self.others.iter().filter_map(at).collect()
     }
 
+    /// The bodies of the other objects by name, where each was seen last: the mean of place and heading over its
+    /// last poses.
+    #[must_use]
+    pub fn others(&self) -> Vec<(ObjectName, Isometry3<f64>)> {
+        let of = |other: &Other| {
+            let last = other.pose?;
+            let seen = &other.seen[other.seen.len().saturating_sub(ENDS)..];
+            let Some(mean) = (!seen.is_empty()).then(|| mean(seen)) else { return Some((other.name, last)) };
+            let turn = between(mean.yaw, last.rotation.euler_angles().2);
+            let rotation = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), turn) * last.rotation;
+            Some((other.name, Isometry3::from_parts(Vector3::from(mean.place).into(), rotation)))
+        };
+        self.others.iter().filter_map(of).collect()
+    }
+
     /// Those of the other objects that moved since [`Self::begin`]: name, how far [m], and how far they turned [rad].
     #[must_use]
     pub fn also_moved(&self) -> Vec<(String, f64, f64)> {
@@ -265,7 +280,8 @@ fn seen(pose: &ObjectPose) -> Option<Seen> {
     pose.pose().map(|_| Seen { time: pose.device_ns as f64 * 1e-9, place: pose.position, yaw })
 }
 
-fn between(a: f64, b: f64) -> f64 {
+/// From `b` to `a`, the shorter way round [rad].
+pub(super) fn between(a: f64, b: f64) -> f64 {
     (a - b).sin().atan2((a - b).cos())
 }
 

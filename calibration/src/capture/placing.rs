@@ -1,16 +1,18 @@
 //! The object where a stroke needs it: put there by a person who is asked for it, or, where this capture has started the
-//! simulated cell itself, by starting that cell anew with the object there. Base frame; m, rad.
+//! simulated cell itself, by starting that cell anew with the object there and the others where they are. Base frame; m, rad.
 
 use super::bridge::{Bridge, Wanted};
 use super::link::Link;
 use super::object_watch::{ObjectWatch, WatchError};
 use super::program::Standing;
+use super::stay::stay;
 use super::task::Task;
 use crate::interrupt::Interrupt;
 use shared_mem::cell::Cell;
 use shared_mem::{console, output};
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
+use twin::scene::cell_bodies;
 
 /// How near is near enough [m, rad]: what a hand can do.
 const NEAR: [f64; 2] = [5e-3, 0.05];
@@ -26,8 +28,8 @@ pub const COMES_TO_REST: Duration = Duration::from_secs(10);
 pub struct Placing<'a> {
     /// What the capture is asked for.
     pub task: &'a Task,
-    /// The laboratory's cell.
-    pub cell: &'a Cell,
+    /// The laboratory's cell as it was simulated last, at first [`Self::simulated`].
+    pub simulated: Cell,
     /// The bridge that is in use.
     pub bridge: &'a mut Bridge,
     /// Where the user ends it.
@@ -62,13 +64,23 @@ impl Placing<'_> {
         self.bridge.is_own() && self.task.arm.as_deref().is_none_or(|arm| arm == "sim")
     }
 
-    /// Starts the simulated cell anew with the object in its place.
+    /// The cell as the simulated bridge reads it first.
+    #[must_use]
+    pub fn simulated(cell: &Cell) -> Cell {
+        Cell { clips: Vec::new(), ..cell.at_home_anywhere() }
+    }
+
+    /// Starts the simulated cell anew with the object in its place and the others where they are.
     fn simulate(&mut self, wanted: &Standing, link: &mut Link, object: &mut ObjectWatch) -> anyhow::Result<()> {
-        let mut cell = self.cell.at_home_anywhere();
-        cell.start_object_at(wanted.place, wanted.yaw.sin().atan2(wanted.yaw.cos()));
-        cell.clips = Vec::new();
+        let bodies = cell_bodies(&self.simulated)?;
+        for name in stay(&mut self.simulated, &bodies, &object.others()) {
+            console::line(format_args!(
+                "`{name}` lies on a side; in the cell that is started anew it stands upright there"
+            ));
+        }
+        self.simulated.start_object_at(wanted.place, wanted.yaw.sin().atan2(wanted.yaw.cos()));
         let file = self.cell_file();
-        output::write(&file, cell.to_toml())?;
+        output::write(&file, self.simulated.to_toml())?;
         console::line(format_args!("the simulated cell is started anew with the object at {}", words(wanted)));
         let Task { realtime, domain, .. } = self.task;
         let wanted = Wanted {

@@ -10,8 +10,8 @@
 //! Poses and velocities go over from one to the other; what is behind is the nearest two of all pairs. The laws differ in a hit,
 //! which has no restitution among many bodies, and in effects on hit and slide, which act on objects that are apart.
 
+mod linked;
 mod many;
-mod standing;
 
 use super::contact::ToolContact;
 use super::{SimCell, SimError};
@@ -19,7 +19,8 @@ use crate::arm::{GainError, JointState, Joints, MassProperties};
 use crate::control::Drive;
 use crate::effects::{Stage, find};
 use crate::physics::TableObject;
-use crate::scene::{CellBody, NamedPoses, ObjectModel, SceneSnapshot, cell_bodies};
+use crate::scene::{CellBody, NamedPoses, ObjectModel, SceneSnapshot, cell_bodies, starts};
+use linked::linked;
 use many::{ManyBodies, Member};
 use nalgebra::Vector3;
 use shared_mem::cell::Cell;
@@ -27,7 +28,6 @@ use shared_mem::frames::{Base, Object, Pose};
 use shared_mem::msg::object::ObjectName;
 use shared_mem::theta::Theta;
 use shared_mem::time::TICK_NS;
-use standing::{linked, starts};
 
 /// Objects nearer than this, and as much more as they may come nearer in a period, are many bodies [m].
 const NEAR: f64 = 1e-3;

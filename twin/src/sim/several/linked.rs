@@ -1,45 +1,11 @@
-//! Where objects stand when the simulated cell starts: where their blocks say, else each 5 cm beside the one before it. Base frame.
+//! Objects that move in themselves as bodies of one world. Base frame.
 
 use crate::physics::Hull;
-use crate::scene::{CellBody, ObjectShape, poses_in_root, start_of};
+use crate::scene::{CellBody, ObjectShape, start_of};
 use crate::sim::SimError;
 use crate::world::{BodyPlan, Hold, JointKind, JointPlan, Piece};
 use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
-use shared_mem::cell::{Cell, Object, RootHold};
-
-/// Between objects that have no `start` of their own [m].
-const BESIDE: f64 = 0.05;
-
-/// Pose of each object at the start; of one that moves in itself that of its root.
-pub(super) fn starts(cell: &Cell, bodies: &[CellBody], table: f64) -> Vec<Isometry3<f64>> {
-    let mut before: Option<([f64; 2], f64)> = None;
-    let start = |(number, object): (usize, &Object)| {
-        let (low, around) = extent(object, number, bodies);
-        let beside = match before {
-            None => cell.simulation.object_position,
-            Some(([x, y], reach)) => [x, y + reach + BESIDE + around],
-        };
-        let [x, y] = object.start.unwrap_or(beside);
-        before = Some(([x, y], around));
-        let own_yaw = if number == 0 { cell.simulation.object_yaw } else { 0.0 };
-        Isometry3::new(Vector3::new(x, y, table - low), Vector3::z() * object.start_yaw.unwrap_or(own_yaw))
-    };
-    cell.objects.iter().enumerate().map(start).collect()
-}
-
-/// Lowest point of an object under its origin, negative, and how far it reaches from there to the sides [m].
-fn extent(object: &Object, number: usize, bodies: &[CellBody]) -> (f64, f64) {
-    let own: Vec<&CellBody> = bodies.iter().filter(|body| body.object == number).collect();
-    let (mut low, mut around) = (0.0_f64, 0.0_f64);
-    for (body, pose) in own.iter().zip(poses_in_root(&own, |link| start_of(object, link))) {
-        for point in body.surface().triangles().0 {
-            let place = pose * point;
-            low = low.min(place.z);
-            around = around.max(place.x.hypot(place.y));
-        }
-    }
-    (low, around)
-}
+use shared_mem::cell::{Object, RootHold};
 
 /// The bodies of an object that moves in itself, for a world in which `before` bodies come before them.
 ///
