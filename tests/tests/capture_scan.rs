@@ -3,7 +3,7 @@
 use shared_mem::hand_eye::{HandEye, Matrix};
 use shared_mem::recording::{Picture, read_picture};
 use std::time::Duration;
-use tests::{Cell, Program};
+use tests::{Cell, Program, lab_cell};
 
 const MOUNT: &str = "\
 mount = \"eye_in_hand\"
@@ -78,4 +78,35 @@ fn the_arm_goes_round_and_what_it_sees_is_a_scan() {
     let answer = running.interrupt().succeeded().json();
     assert_eq!(answer["interrupted"], true);
     assert_eq!(Some(frames(&cell, "ended") as u64), answer["pictures"].as_u64());
+}
+
+/// The shipped cell with its box by the name of `box` and another one of this height beside it.
+fn beside(place: [f64; 2], height: f64) -> String {
+    let (before, after) = lab_cell().split_once("[object]").expect("an object");
+    let (_, after) = after.split_once("[camera]").expect("a camera");
+    let object = |name: &str, [x, y]: [f64; 2], size: [f64; 3]| {
+        format!("[[object]]\nname = \"{name}\"\nshape = \"box\"\nsize = {size:?}\nmass = 0.3\nstart = [{x:?}, {y:?}]\n")
+    };
+    let objects = object("box", [0.55, 0.0], [0.08, 0.06, 0.10]) + &object("tall", place, [0.1, 0.1, height]);
+    format!("{before}{objects}[camera]{after}")
+}
+
+#[test]
+fn views_that_another_object_is_in_the_way_of_are_left_out_with_what_helps() {
+    let cell = Cell::with(&beside([0.55, 0.4], 0.4));
+    let running = scan(&cell, "16", "scan");
+    Cell::until("a picture", Duration::from_secs(90), || cell.path("scan/poses.json").exists());
+    let done = running.interrupt().succeeded();
+    let blocked = done.json()["blocked"].as_u64().expect("a number");
+    assert!((1..=8).contains(&blocked), "{blocked} of 16\n{}", done.stderr);
+    let said = format!("{blocked} of ");
+    let said = done.stderr.lines().find(|line| line.starts_with(&said)).unwrap_or_else(|| panic!("{}", done.stderr));
+    assert!(said.contains("views are left out") && said.contains("move `tall` away by about"), "{said}");
+    assert!(!done.stderr.contains("no poses of"), "{}", done.stderr);
+    // Where it leaves too few, nothing is done.
+    let cell = Cell::with(&beside([0.55, 0.2], 0.5));
+    let refused = scan(&cell, "10", "scan").wait(Duration::from_secs(60));
+    let complaint = refused.complaint();
+    assert!(complaint.contains("clear of other objects") && complaint.contains("move `tall` away by"), "{complaint}");
+    assert!(!cell.path("scan").exists());
 }

@@ -2,13 +2,15 @@
 //!
 //! Rests on the nominal model of cell.toml; called once for every set point of a plan.
 
-use nalgebra::Point3;
+use nalgebra::{Isometry3, Point3};
 use shared_mem::cell::{Cell, Tool};
 use shared_mem::msg::{Joints, MAX_JOINTS};
 use twin::arm::{ArmHull, ArmModel, JointState, ModelError};
 
 /// Balls of a link are joined by balls no farther apart than their radius, or this where nobody knows how thick it is [m].
 const THIN: f64 = 0.01;
+/// A ball that holds a depth camera with its mount: half the length of the longest, a D455's 124 mm [m].
+const CAMERA: f64 = 0.065;
 
 /// The nominal arm with its tool.
 #[derive(Debug, Clone)]
@@ -16,6 +18,7 @@ pub struct Body {
     model: ArmModel,
     tool: Option<Tool>,
     hull: Option<ArmHull>,
+    camera: Option<Isometry3<f64>>,
 }
 
 impl Body {
@@ -25,7 +28,13 @@ impl Body {
     /// [`ModelError`] when it describes no arm.
     pub fn of(cell: &Cell) -> Result<Self, ModelError> {
         let model = ArmModel::from_cell(cell)?;
-        Ok(Self { hull: ArmHull::of(cell, &model), model, tool: cell.tool.clone() })
+        Ok(Self { hull: ArmHull::of(cell, &model), model, tool: cell.tool.clone(), camera: None })
+    }
+
+    /// The same with a camera on its flange.
+    #[must_use]
+    pub fn with_camera(self, flange_from_camera: Isometry3<f64>) -> Self {
+        Self { camera: Some(flange_from_camera), ..self }
     }
 
     /// The arm.
@@ -48,7 +57,7 @@ impl Body {
         }
     }
 
-    /// Balls that fill flange, tool and the links behind the shoulder, centre and radius [m]; none where the arm's geometry is not
+    /// Balls that fill flange, tool, camera and the links behind the shoulder, centre and radius [m]; none where the arm's geometry is not
     /// known. Of an arm unlike an FR3 the links are lines between its joints.
     #[must_use]
     pub fn balls(&self, q: &Joints) -> Vec<(Point3<f64>, f64)> {
@@ -57,6 +66,8 @@ impl Body {
             hull.balls(q).into_iter().map(|(link, centre, radius)| (link, centre.into(), radius)).collect();
         let tool = balls.len().saturating_sub(2);
         let mut all = Vec::with_capacity(4 * balls.len());
+        let camera = self.camera.map(|mount| (self.model.flange(q).isometry() * mount).translation.vector);
+        all.extend(camera.map(|centre| (centre.into(), CAMERA)));
         for (i, (link, centre, radius)) in balls.iter().enumerate() {
             all.push((*centre, *radius));
             for (k, (of, other, wide)) in balls.iter().enumerate().skip(i + 1) {

@@ -3,8 +3,9 @@
 //! Planning is pure: [`plan`] for excitation on a [`shape`] ([`multisine`], [`chirp`], [`ramp`], [`hold`], built of [`jet`]s), or on a clip that was [`recorded`], at a [`pace`], [`program`], [`staged`], [`stroke`] and [`way`] for Control-Hit-Slide on
 //! [`line`] and [`transit`], both within [`limits`] of the [`body`] and clear of every [`obstacle`]. Playing goes through shared memory only ([`stream`],
 //! [`link`], [`object_watch`]), with [`placing`] where the object has to stand somewhere (others `stay`) and [`recovery`] where the robot stops itself; recording is a process beside us ([`recorder`]). [`excitation`] and [`control_hit_slide`] are the
-//! verbs that bind them, and [`task`] is what both are asked for. [`scan`] carries a camera around a point: [`dome`] plans its views, [`shots`] takes the pictures, `cut` says what in them is the object.
+//! verbs that bind them, and [`task`] is what both are asked for. [`scan`] carries a camera around a point: [`dome`] plans its views clear of what stands `around` it, [`shots`] takes the pictures, `cut` says what in them is the object.
 
+mod around;
 pub mod body;
 pub mod bridge;
 pub mod chirp;

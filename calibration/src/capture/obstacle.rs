@@ -101,8 +101,9 @@ impl Obstacle {
         if inside { deepest } else { nearest }
     }
 
-    /// Gap between the obstacle and a ball, negative where they overlap; and the direction that leads away from it.
-    fn gap(&self, centre: &Point3<f64>, radius: f64) -> (f64, Vector2<f64>) {
+    /// Gap between the obstacle and a ball, negative where they overlap [m]; and the direction that leads away from it.
+    #[must_use]
+    pub fn gap(&self, centre: &Point3<f64>, radius: f64) -> (f64, Vector2<f64>) {
         let ((beside, away), above) = (self.beside(&centre.xy()), centre.z - self.top);
         let gap = if above <= 0.0 {
             beside
@@ -169,7 +170,30 @@ pub fn on_slide(obstacles: &[Obstacle], what: &str, [from, to]: [[f64; 2]; 2], r
     found.reduce(worse)
 }
 
-fn worse(a: Blocked, b: Blocked) -> Blocked {
+/// What stands between a camera and the ball of `radius` [m] around the point that it looks at; the worst. What reaches into that
+/// ball is a part of what is looked at.
+#[must_use]
+pub fn on_sight(obstacles: &[Obstacle], camera: &Point3<f64>, at: &Point3<f64>, radius: f64) -> Option<Blocked> {
+    let way = at - camera;
+    let steps = (way.norm() / STEP).ceil().max(1.0) as usize;
+    let found = obstacles.iter().filter(|obstacle| obstacle.gap(at, radius).0 >= 0.0).filter_map(|obstacle| {
+        let shares = (0..=steps).map(|k| k as f64 / steps as f64);
+        let gaps = shares.map(|share| obstacle.gap(&(camera + way * share), radius * share));
+        let (gap, away) = gaps.reduce(|nearest, gap| if gap.0 < nearest.0 { gap } else { nearest })?;
+        (gap < 0.0).then(|| Blocked {
+            what: "the camera's sight".to_owned(),
+            name: obstacle.name.clone(),
+            gap,
+            kept: 0.0,
+            away,
+        })
+    });
+    found.reduce(worse)
+}
+
+/// The one that lacks more.
+#[must_use]
+pub fn worse(a: Blocked, b: Blocked) -> Blocked {
     if b.lacks() > a.lacks() { b } else { a }
 }
 

@@ -1,12 +1,14 @@
 //! The verb `capture scan`: the arm carries the camera around a point, stops at each view, and what is seen there goes with the
 //! arm's pose into a folder that `twin reconstruct` takes.
 
+use super::around::Around;
 use super::body::Body;
 use super::bridge::{Bridge, Wanted};
 use super::cut::Cut;
-use super::dome::{Dome, apart};
+use super::dome::{Dome, Views, apart};
 use super::limits;
 use super::link::Link;
+use super::obstacle::{self, Blocked, Obstacle};
 use super::shots::{Pixels, Shot, ShotError, Shots};
 use super::stream::{Motion, Outcome, play};
 use super::task::cause;
@@ -16,6 +18,7 @@ use nalgebra::{Isometry3, Point3};
 use serde::Serialize;
 use serde_json::{Value, json};
 use shared_mem::cell::{Cell, Intrinsics, Table};
+use shared_mem::console;
 use shared_mem::hand_eye::{HandEye, Matrix};
 use shared_mem::msg::Joints;
 use shared_mem::msg::motion::SetPoint;
@@ -33,6 +36,8 @@ pub struct Options {
     pub cell: PathBuf,
     /// How the camera is mounted.
     pub hand_eye: PathBuf,
+    /// Name of the object that is scanned; default: the one that stands there. The arm keeps clear of the others.
+    pub object: Option<String>,
     /// What is looked at: base frame [m].
     pub at: [f64; 3],
     /// From the camera to it [m].
@@ -64,6 +69,8 @@ pub struct Summary {
     pub with_mask: usize,
     /// Views within reach of which no way inside every limit was found.
     pub without_way: usize,
+    /// Views left out because another object is in the way, or in the camera's sight.
+    pub blocked: usize,
     /// Whether the user ended it early.
     pub interrupted: bool,
     /// Whether the bridge was started, and ended, by this run.
@@ -85,6 +92,7 @@ struct Desk<'a> {
     list: Value,
     cut: Option<Cut>,
     mount: Isometry3<f64>,
+    around: Option<Around>,
     shots: Shots,
     interrupt: &'a Interrupt,
 }
@@ -112,6 +120,7 @@ pub fn capture(options: &Options, interrupt: &Interrupt) -> anyhow::Result<Summa
     let cut = cell.table.as_ref().map(of_table);
     let list_file = options.out.join("poses.json");
     ensure!(!list_file.exists(), "{} holds a scan already; give a new folder with --out", options.out.display());
+    let around = Around::open(options.domain.as_deref(), &cell, options.object.as_deref())?;
     let latency = Duration::from_secs_f64(cell.camera.as_ref().map_or(0.0, |camera| camera.latency.max(0.0)));
     let mut link = Link::open(options.domain.as_deref())?;
     let (arm, realtime) = (options.arm.as_deref(), options.realtime.as_deref());
@@ -120,7 +129,7 @@ pub fn capture(options: &Options, interrupt: &Interrupt) -> anyhow::Result<Summa
     let mut bridge = Bridge::find_or_start(&mut link, &wanted, interrupt)?;
     let shots = Shots::open(options.domain.as_deref(), latency)?;
     let limits = limits::of(&cell, &body);
-    let mut desk = Desk { options, body, limits, list, cut, mount, shots, interrupt };
+    let mut desk = Desk { options, body, limits, list, cut, mount, around, shots, interrupt };
     let floor = cell.table.as_ref().map_or(f64::NEG_INFINITY, |table| table.height + CLEARANCE);
     let done = desk.all_views(&mut link, floor, &hand_eye);
     let summary = done.map_err(|error| cause(error, &mut bridge))?;
@@ -155,14 +164,16 @@ impl Desk<'_> {
         let reported = Matrix::Flat(state.O_T_EE).isometry().map_err(anyhow::Error::msg)?;
         let flange = self.body.model().flange(&state.q).isometry();
         let flange_from_camera = flange.inverse() * reported * self.mount;
-        let dome = Dome { at: Point3::from(*at), distance: *distance, flange_from_camera, floor };
-        let mut open = dome.views(&self.body, &self.limits, &state.q_d, *views);
-        let [x, y, z] = at;
-        ensure!(
-            open.len() >= FEWEST,
-            "of the views around {x}, {y}, {z} m only {} are within the arm's reach: move the object nearer, or give another --distance",
-            open.len()
-        );
+        self.body = self.body.clone().with_camera(flange_from_camera);
+        let (at, radius) = (Point3::from(*at), self.options.radius);
+        if let Some(around) = &mut self.around {
+            around.settle(&at, self.options.object.is_some())?;
+        }
+        let obstacles = self.obstacles()?;
+        say_parts(&obstacles, &at, radius);
+        let dome = Dome { at, distance: *distance, flange_from_camera, floor, radius, obstacles: &obstacles };
+        let Views { free: mut open, blocked } = dome.views(&self.body, &self.limits, &state.q_d, *views);
+        check(&at, &open, &blocked)?;
         for part in ["images", "depth", "masks"] {
             std::fs::create_dir_all(out.join(part))
                 .with_context(|| format!("cannot make {}; give another folder with --out", out.join(part).display()))?;
@@ -176,6 +187,7 @@ impl Desk<'_> {
             with_depth: 0,
             with_mask: 0,
             without_way: 0,
+            blocked: blocked.len(),
             interrupted: false,
             own_bridge: false,
         };
@@ -183,6 +195,8 @@ impl Desk<'_> {
             self.interrupt.wait_out_pause();
             progress.show(summary.pictures as u64, "");
             let from = link.ready_arm(self.limits.len())?.q_d;
+            let now = self.obstacles()?;
+            let dome = Dome { obstacles: &now, ..dome };
             let Some((next, legs)) = self.nearest(&dome, [&from, &start], &open) else {
                 summary.without_way = open.len();
                 break;
@@ -211,16 +225,23 @@ impl Desk<'_> {
         Ok(summary)
     }
 
+    /// The other objects, where they stand now.
+    fn obstacles(&mut self) -> anyhow::Result<Vec<Obstacle>> {
+        let Some(around) = &mut self.around else { return Ok(Vec::new()) };
+        around.look()?;
+        Ok(around.obstacles())
+    }
+
     /// The nearest of the open views that a way leads to: straight, or over where the arm was at the start, from where each is reached.
     fn nearest(
         &self,
-        dome: &Dome,
+        dome: &Dome<'_>,
         [from, start]: [&Joints; 2],
         open: &[Joints],
     ) -> Option<(usize, Vec<Vec<SetPoint>>)> {
         let mut order: Vec<usize> = (0..open.len()).collect();
         order.sort_by(|a, b| apart(from, &open[*a]).total_cmp(&apart(from, &open[*b])));
-        let way = |from: &Joints, to: &Joints| dome.way(&self.body, &self.limits, from, to);
+        let way = |from: &Joints, to: &Joints| dome.way(&self.body, &self.limits, from, to).ok();
         let straight = order.iter().find_map(|k| Some((*k, vec![way(from, &open[*k])?])));
         straight.or_else(|| {
             let back = way(from, start)?;
@@ -262,6 +283,48 @@ impl Desk<'_> {
         let text = serde_json::to_string_pretty(&self.list)?;
         Ok(output::write(&self.options.out.join("poses.json"), text)?)
     }
+}
+
+/// Says which objects reach into what is scanned.
+fn say_parts(obstacles: &[Obstacle], at: &Point3<f64>, radius: f64) {
+    for obstacle in obstacles.iter().filter(|obstacle| obstacle.gap(at, radius).0 < 0.0) {
+        let (gap, _) = obstacle.gap(at, 0.0);
+        console::line(format_args!(
+            "`{}` stands {:.0} mm from --at, within --radius ({:.0} mm), and becomes a part of what is scanned; give a smaller --radius \
+             or move it away, unless it is to be one",
+            obstacle.name(),
+            1e3 * gap.max(0.0),
+            1e3 * radius
+        ));
+    }
+}
+
+/// Says which views are left out and why; an error where too few are free.
+fn check(at: &Point3<f64>, free: &[Joints], blocked: &[Blocked]) -> anyhow::Result<()> {
+    let all = free.len() + blocked.len();
+    let place = format!("{}, {}, {} m", at.x, at.y, at.z);
+    ensure!(
+        all >= FEWEST,
+        "of the views around {place} only {all} are within the arm's reach: move the object nearer, or give another --distance"
+    );
+    let mut said: Vec<&str> = Vec::new();
+    for Blocked { name, .. } in blocked {
+        if said.contains(&name.as_str()) {
+            continue;
+        }
+        said.push(name);
+        let of_this = || blocked.iter().filter(|blocked| blocked.name == *name).cloned();
+        if let Some(worst) = of_this().reduce(obstacle::worse) {
+            console::line(format_args!("{} of {all} views are left out: {worst}", of_this().count()));
+        }
+    }
+    let worst = blocked.iter().cloned().reduce(obstacle::worse).filter(|_| free.len() < FEWEST);
+    let left = free.len();
+    worst.map_or(Ok(()), |worst| {
+        Err(anyhow::anyhow!(
+            "of the views around {place} only {left} are clear of other objects, and {FEWEST} are needed: {worst}"
+        ))
+    })
 }
 
 fn write(path: &Path, pixels: &Pixels) -> anyhow::Result<()> {

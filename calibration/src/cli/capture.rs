@@ -315,9 +315,11 @@ The bridge has to publish pictures of a camera on the arm: start it with --camer
 arm stops at each view, waits until it is at rest, and keeps colour and, where there is
 any, depth of one moment with O_T_EE. Views lie on a dome around --at, those that are
 reached inside the joints' limits, above the table, and with flange, tool and camera at
-least half the distance away from --at; of the rest of the arm and of other things in
-the cell it knows nothing. At any moment p pauses, and q or Ctrl-C ends; what was taken
-is kept.
+least half the distance away from --at. Where cell.toml has several [[object]], arm,
+tool and camera keep 30 mm clear of those that are not scanned, where the tracker sees
+them, else where cell.toml has them start; views that one of them is in the way of, or
+hides, are left out. Of other things in the cell it knows nothing. At any moment p
+pauses, and q or Ctrl-C ends; what was taken is kept.
 
 Examples:
   calibration capture scan --cell lab/cell.toml --hand-eye hand_eye.toml --at 0.5,0,0.05 --out scan
@@ -329,6 +331,9 @@ pub(super) struct ScanArguments {
     /// How the camera is mounted, as `calibration hand-eye` writes it.
     #[arg(long, value_name = "HAND_EYE.TOML")]
     hand_eye: PathBuf,
+    /// Name of the object that is scanned, where cell.toml has several [default: the one that stands at --at].
+    #[arg(long, value_name = "NAME")]
+    object: Option<String>,
     /// What is looked at, in the base frame [m].
     #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true, value_parser = |text: &str| numbers::<3>(text, -3.0..=3.0, "m"))]
     at: [f64; 3],
@@ -357,14 +362,18 @@ pub(super) struct ScanArguments {
 }
 
 fn look(arguments: ScanArguments, interrupt: &Interrupt) -> anyhow::Result<()> {
-    let ScanArguments { cell, hand_eye, at, distance, radius, views, out, arm, realtime, json } = arguments;
+    let ScanArguments { cell, hand_eye, object, at, distance, radius, views, out, arm, realtime, json } = arguments;
     let (views, radius) = (usize::from(views), radius.unwrap_or(distance / 3.0));
-    let options = scan::Options { cell, hand_eye, at, distance, radius, views, out, arm, realtime, domain: None };
+    let options =
+        scan::Options { cell, hand_eye, object, at, distance, radius, views, out, arm, realtime, domain: None };
     let summary = scan::capture(&options, interrupt)?;
-    let left = match summary.without_way {
+    let mut left = match summary.without_way {
         0 => String::new(),
         count => format!("; {count} views were left out, to which no way leads"),
     };
+    if summary.blocked > 0 {
+        left += &format!("; {} views were left out because of other objects", summary.blocked);
+    }
     let scan::Summary { scan, pictures, with_depth, with_mask, .. } = &summary;
     let words =
         format!("{}: {pictures} pictures, {with_depth} with depth, {with_mask} with a mask{left}", scan.display());

@@ -78,14 +78,7 @@ impl Cell {
     /// # Errors
     /// The sentence to print where there is none of that name, or it moves in itself.
     pub fn about(&mut self, name: &str) -> Result<(), String> {
-        let named = |object: &Object| object.name.as_deref() == Some(name);
-        let place = self.objects.iter().position(named).ok_or_else(|| {
-            let names: Vec<&str> = self.objects.iter().filter_map(|object| object.name.as_deref()).collect();
-            match names.is_empty() {
-                true => format!("cell.toml names no object, so `--object {name}` fits none; leave it out"),
-                false => format!("cell.toml has no object `{name}`; it has {}", names.join(", ")),
-            }
-        })?;
+        let place = self.place_of(name)?;
         if self.objects[place].urdf.is_some() {
             return Err(format!(
                 "object `{name}` moves in itself (`urdf`), and only rigid ones are identified: name another"
@@ -93,6 +86,21 @@ impl Cell {
         }
         self.in_question = place;
         Ok(())
+    }
+
+    /// Place of the object of this name among [`Cell::objects`].
+    ///
+    /// # Errors
+    /// The sentence to print where there is none of that name.
+    pub fn place_of(&self, name: &str) -> Result<usize, String> {
+        let named = |object: &Object| object.name.as_deref() == Some(name);
+        self.objects.iter().position(named).ok_or_else(|| {
+            let names: Vec<&str> = self.objects.iter().filter_map(|object| object.name.as_deref()).collect();
+            match names.is_empty() {
+                true => format!("cell.toml names no object, so `--object {name}` fits none; leave it out"),
+                false => format!("cell.toml has no object `{name}`; it has {}", names.join(", ")),
+            }
+        })
     }
 
     pub(super) fn check_objects(&self) -> Result<(), String> {
