@@ -1,11 +1,12 @@
 """The twin's worlds of many bodies against MuJoCo and closed forms: stacks, a held box, a falling lid, an arm that gives way, the tasks
-that ship, noisy demonstrations of them replayed open loop, speed.
+that ship, noisy demonstrations of them replayed open loop, speed. Times are those of the processor, not of the clock on the wall.
 
     python tests/peers/world.py --program target/release/twin
 """
 import argparse
 import math
 import os
+import resource
 import statistics
 import sys
 import tempfile
@@ -19,7 +20,7 @@ try:
     import numpy as np
     from mujoco import rollout
 
-    from mujoco_scene.arm import Carrying
+    from mujoco_scene.arm import Carrying, resting
     from mujoco_scene.replay import Replay
     from mujoco_scene.run import Scene
 except ModuleNotFoundError as missing:
@@ -184,9 +185,9 @@ def tasks(program, count, only):
         path = os.path.join(TASKS, name)
         with open(path, "rb") as stream:
             task = tomllib.load(stream)
-        begun = time.perf_counter()
+        begun = of_children()
         found = answer([program, "task", path, "--json", "--episodes", str(count)])
-        wall, simulated = time.perf_counter() - begun, sum(e["duration_s"] for e in found["episodes"])
+        used, simulated = of_children() - begun, sum(e["duration_s"] for e in found["episodes"])
         free = [body["name"] for body in task["body"] if "joint" not in body and body.get("hold", "free") == "free"]
         hinged = [body["name"] for body in task["body"] if body.get("joint", {}).get("kind") == "revolute"]
         apart, turned, swung, wins, seconds, steps = [], [], [], 0, 0.0, 0
@@ -209,28 +210,62 @@ def tasks(program, count, only):
         hinge = f", hinge {statistics.median(swung):.2f} deg" if swung else ""
         print(f"{name:20s} success of {count}: twin {found['successes']}, MuJoCo {wins}; apart at the end, median (90 %): "
               f"{statistics.median(apart):.2f} ({np.quantile(apart, 0.9):.2f}) mm, {statistics.median(turned):.2f} ({np.quantile(turned, 0.9):.2f}) deg{hinge}; "
-              f"a step: twin {1e6 * wall / (simulated / 1e-3):.1f} us, MuJoCo {1e6 * seconds / steps:.1f} us")
+              f"a step: twin {1e6 * used / (simulated / 1e-3):.1f} us, MuJoCo {1e6 * seconds / steps:.1f} us")
         sys.stdout.flush()
 
 
 def speed(program, only):
     """Everything where it starts and nothing moved: both engines without a word of Python in a step."""
     for name in only or sorted(os.listdir(TASKS)):
-        with open(os.path.join(TASKS, name)) as stream:
-            text = stream.read().split("\n[[motion]]")[0] + "\n"
-        times = []
-        for duration in ("5", "65"):
-            begun = time.perf_counter()
-            found = twin(program, text, "--duration", duration)
-            times.append(time.perf_counter() - begun)
-        ours = (times[1] - times[0]) / 60000
-        scene = Scene(tomllib.loads(text), found["episodes"][0]["bodies"])
-        state = np.zeros((1, mujoco.mj_stateSize(scene.model, mujoco.mjtState.mjSTATE_FULLPHYSICS)))
-        mujoco.mj_getState(scene.model, scene.data, state[0], mujoco.mjtState.mjSTATE_FULLPHYSICS)
-        begun = time.perf_counter()
-        rollout.rollout(scene.model, scene.data, state, nstep=20000)
-        theirs = (time.perf_counter() - begun) / 20000
+        text = still(name)
+        ours, found = rested(program, text)
+        scene = Scene(tomllib.loads(text), found["bodies"])
+        theirs = rolled(scene.model, scene.data)
         print(f"{name:20s} at rest, a step: twin {1e6 * ours:.2f} us ({1e-3 / ours:.0f} times real time), MuJoCo {1e6 * theirs:.2f} us, ratio {theirs / ours:.2f}")
+    if only:
+        return
+    stiffness, damping = GAINS
+    text = still("stack_boxes.toml").replace("[arm]\n", f"[arm]\nstiffness = {stiffness}\ndamping = {damping}\n", 1)
+    text = text.replace("# A gripper that is moved", box("third", (0.6, 0.0, 0.025), size=(0.05, 0.05, 0.05)) + "\n# A gripper that is moved", 1)
+    ours, found = rested(program, text)
+    task = tomllib.loads(text)
+    for body, at in zip(task["body"], found["bodies"]):
+        if body.get("hold", "free") == "free" and "joint" not in body:
+            body["position"], body["rotation"] = at["start"]["position"], [0.0, 0.0, 0.0]
+    theirs = rolled(*resting(task, found["arm"]["start_q"]))
+    print(f"arm under control, hand, three boxes at rest, a step: twin {1e6 * ours:.2f} us ({1e-3 / ours:.0f} times real time), "
+          f"MuJoCo {1e6 * theirs:.2f} us, ratio {theirs / ours:.2f}")
+
+
+def still(name):
+    """A task without its motion."""
+    with open(os.path.join(TASKS, name)) as stream:
+        return stream.read().split("\n[[motion]]")[0] + "\n"
+
+
+def rested(program, text):
+    """The twin's time for a step [s of a processor], and the episode."""
+    times = []
+    for duration in ("5", "65"):
+        begun = of_children()
+        found = twin(program, text, "--duration", duration)
+        times.append(of_children() - begun)
+    return (times[1] - times[0]) / 60000, found["episodes"][0]
+
+
+def rolled(model, data):
+    """MuJoCo's time for a step [s of a processor]."""
+    state = np.zeros((1, mujoco.mj_stateSize(model, mujoco.mjtState.mjSTATE_FULLPHYSICS)))
+    mujoco.mj_getState(model, data, state[0], mujoco.mjtState.mjSTATE_FULLPHYSICS)
+    begun = time.process_time()
+    rollout.rollout(model, data, state, nstep=20000)
+    return (time.process_time() - begun) / 20000
+
+
+def of_children():
+    """Processor time of the programs that were started and have ended [s]."""
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime
 
 
 def main():

@@ -1,11 +1,11 @@
-"""A Franka FR3 under joint impedance control that carries a plate, and a box that falls onto it."""
+"""A Franka FR3 under joint impedance control: with a plate onto which a box falls, and with the hand of a task."""
 import mujoco
 import numpy as np
 
 from mujoco_cell import fr3
 from mujoco_cell.model import Build, Engine, Tool, arm
 
-from .model import numbers
+from .model import element, mjcf, numbers
 
 LIGHT = 1e-6  # [kg] of the tool that the arm's model brings along: it weighs nothing and touches nothing
 
@@ -43,3 +43,26 @@ class Carrying:
 
     def q(self):
         return self.data.qpos[self.at].copy()
+
+
+def resting(task, q, step=1e-3):
+    """A task at its start, whose arm at `q` is held there by its controller: springs and dampers in its joints, without gravity. Model and
+    data."""
+    carrying = task["arm"]
+
+    def root(body, task):
+        if body["name"] != carrying["body"]:
+            return element(body, task)
+        fixed = {**body, "hold": "fixed", "position": carrying.get("position", [0, 0, 0]), "rotation": carrying.get("rotation", [0, 0, 0])}
+        build = Build(Engine(), Tool(mass=LIGHT), at_flange=[element(fixed, task)], viscous=np.array(carrying["damping"], float))
+        chain = arm(build).replace('<geom name="tool"', '<geom contype="0" conaffinity="0" name="tool"')
+        for i, (stiffness, place) in enumerate(zip(carrying["stiffness"], q)):
+            chain = chain.replace(f'name="motor{i}"', f'name="motor{i}" stiffness="{stiffness}" springref="{place:.12g}"')
+        return chain.replace('<body name="link', '<body gravcomp="1" name="link')
+
+    model = mujoco.MjModel.from_xml_string(mjcf(task, step, root))
+    data = mujoco.MjData(model)
+    for i, place in enumerate(q):
+        data.qpos[model.joint(f"motor{i}").qposadr[0]] = place
+    mujoco.mj_forward(model, data)
+    return model, data

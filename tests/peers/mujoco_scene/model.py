@@ -85,15 +85,16 @@ def element(body, task):
     return f'<body name="{name}" {place}{more}>{"".join(inside)}</body>'
 
 
-def mjcf(task, step):
+def mjcf(task, step, root=element):
+    """The model as text; `root`: what becomes of a body that hangs on no other one."""
     joints = {body["name"]: body["joint"] for body in task["body"] if "joint" in body}
-    roots = [element(body, task) for body in task["body"] if not body.get("joint", {}).get("parent")]
+    roots = [root(body, task) for body in task["body"] if not body.get("joint", {}).get("parent")]
     drives = [f'<motor name="{name}" joint="{name}"/>' for name, joint in joints.items() if "drive" in joint]
     gears = [f'<joint joint1="{name}" joint2="{joint["follows"]["body"]}" polycoef="0 {joint["follows"]["ratio"]} 0 0 0" solref="{4 * step} 1"/>'
              for name, joint in joints.items() if "follows" in joint]
     apart = [f'<exclude body1="{body["name"]}" body2="{body["joint"]["parent"]}"/>'
              for body in task["body"] if body.get("joint", {}).get("parent")]
-    return f"""<mujoco><compiler angle="radian" autolimits="false"/>
+    return f"""<mujoco><compiler angle="radian" autolimits="false" balanceinertia="true"/>
 <option timestep="{step}" cone="elliptic" impratio="20" integrator="implicitfast"><flag multiccd="disable"/></option>
 <default><geom solref="{4 * step} 1"/></default>
 <worldbody>{"".join(roots)}</worldbody>

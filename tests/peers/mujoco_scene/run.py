@@ -95,9 +95,9 @@ class Scene:
                 self.drives[entry["body"]].order.update({key: entry[key] for key in ("target", "force") if key in entry})
         for drive in self.drives.values():
             self.data.ctrl[drive.actuator] = drive.force(self.data)
-        begun = time.perf_counter()
+        begun = time.process_time()
         mujoco.mj_step(self.model, self.data)
-        self.seconds += time.perf_counter() - begun
+        self.seconds += time.process_time() - begun
 
     def place(self, name):
         body = self.data.body(name)
