@@ -35,7 +35,9 @@ impl TaskEpisode {
         let theta = theta.map_err(|error| PyValueError::new_err(format!("parameters: {error}")))?;
         let task = match cell {
             Some(cell) => task.in_cell(&Cell::read(&cell).map_err(failed)?, theta.as_ref()).map_err(failed)?.0,
-            None if theta.is_some() => return Err(PyValueError::new_err("parameters are those of a cell; give cell as well")),
+            None if theta.is_some() => {
+                return Err(PyValueError::new_err("parameters are those of a cell; give cell as well"));
+            }
             None => task,
         };
         let views = task.cameras().iter().map(|camera| task.view(camera)).collect();
@@ -99,8 +101,8 @@ impl TaskEpisode {
         rows: usize,
     ) -> PyResult<(bool, f64, bool, f64, Option<String>)> {
         let values: Vec<f32> = action.as_array().iter().copied().collect();
-        let action = self.numbers.read(&values).map_err(PyValueError::new_err)?;
         let acting = self.acting.as_mut().ok_or_else(begin_first)?;
+        let action = self.numbers.read(&values).map_err(PyValueError::new_err)?;
         acting.act(&action, rows);
         let ActingEnd { success, progress, duration_s, fault, .. } = acting.end();
         Ok((success, progress, acting.is_over(), duration_s, fault))
@@ -120,11 +122,12 @@ impl TaskEpisode {
 
     /// What the cameras show, as late as those of the cell: colour [rows, columns, 3] and depth [rows, columns] mm of each.
     fn pictures(&mut self, py: Python<'_>) -> PyResult<Vec<Picture>> {
-        let poses = self.acting.as_ref().and_then(Acting::seen).ok_or_else(begin_first)?;
+        let shown = self.acting.as_ref().and_then(Acting::seen).ok_or_else(begin_first)?;
+        let joints = shown.arm.as_ref().map(|arm| &arm.q);
         let mut pictures = Vec::new();
         for (view, camera) in self.views.iter_mut().zip(self.task.cameras()) {
             let [columns, rows] = camera.size.map(|pixels| pixels as usize);
-            let picture = view.draw(poses);
+            let picture = view.draw(&shown.poses, joints);
             let colour = PyArray1::from_vec(py, picture.colour).reshape([rows, columns, 3])?.unbind();
             pictures.push((colour, PyArray1::from_vec(py, picture.depth).reshape([rows, columns])?.unbind()));
         }

@@ -84,8 +84,14 @@ class Twin(_twinalign.Twin):
     cell: path of a cell.toml. parameters: what was identified and diagnosed, a path of a theta.toml or a dict of its content.
 
     State, each a new array: `q` [dof] rad and `dq` [dof] rad/s as the encoders read them, `tau_J` [dof] N m behind the gears,
-    `tau_J_d` [dof] N m asked for without gravity, `object_position` [3] m and `object_orientation` [4] w, x, y, z in the base
-    frame (None without an object), `contact_force` N, `time` s.
+    `tau_J_d` [dof] N m asked for without gravity, `object_position` [3] m and `object_orientation` [4] w, x, y, z of the first
+    object in the base frame (None without one), `contact_force` N, `time` s. `objects` has the same of every `[[object]]`: a dict
+    from its name to (position [3] m, orientation [4]), with the links of an object that moves in itself as `NAME_LINK`; one that
+    cell.toml gives no name is called `object`. `object_names` lists them in the order of cell.toml.
+
+    `reset(objects={"cup": (position, orientation)})` puts objects where they are given, at rest; a link goes as near to its pose as
+    its joint lets it. `render()` returns what the `[camera]` of cell.toml shows now: colour [rows, columns, 3] uint8 and depth
+    [rows, columns] uint16 in mm, 0 where nothing is measured. `roll_out_named` is `roll_out` with the ways of all objects by name.
     """
 
     def __new__(cls, cell, parameters=None):

@@ -1,7 +1,7 @@
 """What a recorded session says about a robot cell. Units SI, stamps in ns, quaternions w, x, y, z, poses in the base frame."""
 from os import PathLike
 from pathlib import Path
-from typing import Any, Iterable, Literal
+from typing import Any, Iterable, Literal, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -112,13 +112,23 @@ class Twin:
         dq: _Floats | None = None,
         object_position: Iterable[float] | None = None,
         object_orientation: Iterable[float] | None = None,
+        objects: Mapping[str, tuple[_Floats | Sequence[float], _Floats | Sequence[float]]] | None = None,
     ) -> None:
-        """Everything back where cell.toml has it, or where it is given: q [dof] rad, dq [dof] rad/s, position [3] m, quaternion [4]."""
+        """Everything back where cell.toml has it, or where it is given: q [dof] rad, dq [dof] rad/s, position [3] m and quaternion
+        w, x, y, z [4] of the first object, and the same of any by its name in `objects`; at rest. ValueError, and everything where
+        cell.toml has it, where two of them would overlap. A link goes as near to its pose as its joint lets it."""
     def step(self, q_d: _Floats, dq_d: _Floats | None = None, periods: int = 1) -> None:
         """Lets `periods` of 1 ms pass under desired positions [dof] rad and velocities [dof] rad/s (0 where None)."""
     def roll_out(self, q_d: _Floats, dq_d: _Floats) -> tuple[_Floats, _Floats, _Floats | None, _Floats | None]:
         """Plays commands [rows, dof], one each 1 ms. States at the end of each: q, dq [rows, dof], object position [rows, 3] and
-        orientation [rows, 4], None without an object. Other threads run meanwhile."""
+        orientation [rows, 4] of the first object, None without one. Other threads run meanwhile."""
+    def roll_out_named(
+        self, q_d: _Floats, dq_d: _Floats
+    ) -> tuple[_Floats, _Floats, dict[str, tuple[_Floats, _Floats]]]:
+        """The same with position [rows, 3], m, and orientation [rows, 4] of every object by its name."""
+    def render(self) -> tuple[NDArray[np.uint8], NDArray[np.uint16]]:
+        """What the `[camera]` of cell.toml shows now, with all objects: colour [rows, columns, 3] and depth [rows, columns], mm, 0
+        where nothing is measured. Its noise begins anew at a reset."""
     @property
     def time(self) -> float:
         """Simulated, s."""
@@ -136,13 +146,20 @@ class Twin:
         """Asked for, without gravity [dof], N m."""
     @property
     def object_position(self) -> _Floats | None:
-        """Geometric centre in the base frame [3], m."""
+        """Geometric centre of the first object in the base frame [3], m."""
     @property
     def object_orientation(self) -> _Floats | None:
-        """Quaternion w, x, y, z in the base frame [4]."""
+        """Quaternion w, x, y, z of the first object in the base frame [4]."""
+    @property
+    def object_names(self) -> list[str]:
+        """Of every `[[object]]` in the order of cell.toml, with the links (`NAME_LINK`) of one that moves in itself; `object` for one
+        without a name."""
+    @property
+    def objects(self) -> dict[str, tuple[_Floats, _Floats]]:
+        """By name: geometric centre in the base frame [3], m, and quaternion w, x, y, z [4]; of a link its own frame."""
     @property
     def contact_force(self) -> float:
-        """Between tool and object, N."""
+        """Between tool and objects, N."""
 
 def diagnose(
     session: _Path,

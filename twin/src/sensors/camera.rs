@@ -61,7 +61,6 @@ impl SimCamera {
         let light = camera_from_base * Vector3::from(looks::LIGHT).cast::<f32>();
         let pinhole = Pinhole { fx, fy, cx, cy };
         let raster = Raster::new(settings.width as usize, settings.height as usize, pinhole, light);
-        let noisy = cell.objects.is_empty() || cell.objects.iter().any(|object| object.pose_noise.is_some());
         let height = cell.table.map_or(0.0, |t| t.height as f32);
         let still =
             vec![Mesh::plate([0.0, 0.0, height - FLOOR_BELOW], [FLOOR_HALF; 2], FLOOR), looks::table_top(height)];
@@ -70,7 +69,7 @@ impl SimCamera {
             misplaced: Isometry3::identity(),
             flange_from_camera: None,
             raster,
-            depth: DepthSensor::new(settings.width, settings.height, noisy, generator(cell, 2)),
+            depth: DepthSensor::new(settings.width, settings.height, is_noisy(cell), generator(cell, 2)),
             still,
             robot: cell.robot.as_ref().map(|_| RobotSurface::new(cell, Hand::None)).transpose()?,
             objects: looks::objects(cell)?,
@@ -119,6 +118,19 @@ impl SimCamera {
             self.scanned = Some(Shown::new(robot, still, objects, scans, drawer, view)?);
         }
         Ok(self)
+    }
+
+    /// Starts the noise and the count of pictures anew: the same scenes give the same pictures again. `cell`: that of [`Self::new`].
+    pub fn restart(&mut self, cell: &Cell) {
+        let Camera { width, height, .. } = self.settings;
+        self.depth = DepthSensor::new(width, height, is_noisy(cell), generator(cell, 2));
+        (self.sequence, self.next_picture_ns) = (0, 0);
+    }
+
+    /// Columns and rows of its pictures.
+    #[must_use]
+    pub fn size(&self) -> [usize; 2] {
+        [self.settings.width, self.settings.height].map(|pixels| pixels as usize)
     }
 
     /// What is odd about the splats, one sentence each.
@@ -251,6 +263,11 @@ impl SimCamera {
             }
         }
     }
+}
+
+/// Whether depth is measured with noise.
+fn is_noisy(cell: &Cell) -> bool {
+    cell.objects.is_empty() || cell.objects.iter().any(|object| object.pose_noise.is_some())
 }
 
 /// Where the bodies are: the first is the scene's object, whatever its name.

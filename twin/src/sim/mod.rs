@@ -21,7 +21,7 @@ mod tool_path;
 
 pub use error::SimError;
 pub(crate) use generator::generator;
-pub use several::SimScene;
+pub use several::{SceneState, SimScene};
 pub use state::SimState;
 
 use crate::arm::{ArmModel, GainError, JointState, Joints, MassProperties};

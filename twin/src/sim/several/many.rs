@@ -34,6 +34,7 @@ pub(super) struct Member {
 }
 
 /// The world.
+#[derive(Clone)]
 pub(super) struct ManyBodies {
     world: World,
     tool: Option<usize>,
@@ -106,6 +107,11 @@ impl ManyBodies {
         if self.objects.contains(&body) {
             self.world.put_link(body, &pose.isometry());
         }
+    }
+
+    /// Whether an object's body hangs on another one by a joint.
+    pub(super) fn is_on_joint(&self, number: usize) -> bool {
+        self.world.joint(self.objects.start + number).is_some()
     }
 
     /// Whether the tool presses on an object, or something else moves it.

@@ -12,6 +12,7 @@
 
 mod linked;
 mod many;
+mod state;
 
 use super::contact::ToolContact;
 use super::{SimCell, SimError};
@@ -28,6 +29,7 @@ use shared_mem::frames::{Base, Object, Pose};
 use shared_mem::msg::object::ObjectName;
 use shared_mem::theta::Theta;
 use shared_mem::time::TICK_NS;
+pub use state::SceneState;
 
 /// Objects nearer than this, and as much more as they may come nearer in a period, are many bodies [m].
 const NEAR: f64 = 1e-3;
@@ -186,6 +188,12 @@ impl SimScene {
     #[must_use]
     pub fn object_of(&self, number: usize) -> usize {
         self.objects.get(number).copied().unwrap_or(0)
+    }
+
+    /// Whether a body hangs on another one by a joint.
+    #[must_use]
+    pub fn is_on_joint(&self, number: usize) -> bool {
+        self.many.as_ref().is_some_and(|many| many.is_on_joint(number))
     }
 
     /// Fills what a robot reports about itself: [`SimCell::read`].
