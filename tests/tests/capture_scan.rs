@@ -103,7 +103,10 @@ fn views_that_another_object_is_in_the_way_of_are_left_out_with_what_helps() {
     let said = done.stderr.lines().find(|line| line.starts_with(&said)).unwrap_or_else(|| panic!("{}", done.stderr));
     assert!(said.contains("views are left out") && said.contains("move `tall` away by about"), "{said}");
     assert!(!done.stderr.contains("no poses of"), "{}", done.stderr);
-    // Where it leaves too few, nothing is done.
+}
+
+#[test]
+fn a_scan_of_which_another_object_leaves_too_few_views_is_refused_before_the_arm_moves() {
     let cell = Cell::with(&beside([0.55, 0.2], 0.5));
     let refused = scan(&cell, "10", "scan").wait(Duration::from_secs(60));
     let complaint = refused.complaint();
