@@ -118,14 +118,21 @@ impl Dome<'_> {
             let in_way = match self.way(body, limits, start, &joints) {
                 Err(NoWay::Outside) => continue,
                 Err(NoWay::Blocked(blocked)) => Some(blocked),
-                Ok(_) if hidden.is_some() => return hidden.map(Err),
+                Ok(_) if hidden.is_some() => return hidden.map(|blocked| Err(self.outwards(blocked))),
                 Ok(_) => obstacle::on_motion(self.obstacles, body, &stands, false),
             };
             let Some(in_way) = in_way else { return Some(Ok(joints)) };
             least =
                 Some(least.map_or(in_way.clone(), |least| if in_way.lacks() < least.lacks() { in_way } else { least }));
         }
-        least.map(Err)
+        least.map(|blocked| Err(self.outwards(blocked)))
+    }
+
+    /// The same with the remedy that moves the obstacle away from the point: away from the arm may be towards what is scanned.
+    fn outwards(&self, blocked: Blocked) -> Blocked {
+        let obstacle = self.obstacles.iter().find(|obstacle| obstacle.name() == blocked.name);
+        let away = obstacle.map_or(blocked.away, |obstacle| obstacle.gap(&self.at, 0.0).1);
+        Blocked { away, ..blocked }
     }
 
     /// Places spread evenly over the dome, along a spiral.
@@ -266,6 +273,7 @@ mod tests {
         assert!(free.len() == views.free.len() && !free.iter().any(touches));
         let said = views.blocked[0].to_string();
         assert!(said.contains("`tall`") && said.contains("move `tall` away by about"), "{said}");
+        assert!(views.blocked.iter().all(|blocked| blocked.away.y > 0.9), "towards what is scanned: {views:?}");
         // Beside the dome it is in nobody's way.
         let far = Dome { obstacles: &[block("far", [0.5, 0.9], 0.45)], ..bare };
         assert_eq!(far.views(&body, &limits, &start, 20), before);
