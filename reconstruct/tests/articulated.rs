@@ -87,7 +87,8 @@ fn ten_states(of: usize) {
 #[test]
 fn joint_and_parts_of_three_objects_are_found_out_of_two_states_each() {
     for kind in kinds() {
-        let (fine, line) = judged(&kind, 0);
+        // Of the drawer, states in which the case's ceiling and the drawer's sides slide within their own planes.
+        let (fine, line) = judged(&kind, 1);
         assert!(fine, "{line}");
     }
 }

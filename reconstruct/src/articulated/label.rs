@@ -1,5 +1,6 @@
 //! Which part of a surface moves: where each place of it would be in the other state if it stayed or moved along, smoothed; places for
-//! which both are as likely follow the others, by random walks along the surface that seldom pass folds inwards.
+//! which both are as likely follow the others: what a slide moves within itself those before and behind it along the slide, the rest
+//! by random walks along the surface that seldom pass folds inwards.
 
 use super::body::{Body, Place, normal};
 use super::is_beyond;
@@ -26,6 +27,8 @@ const AVERAGED: usize = 6;
 const AGREE: f64 = 0.5;
 /// Neighbours whose normals agree less (cosine) are on different sides of a wall.
 const SIDES: f64 = -0.3;
+/// Normals on a surface that goes on straight agree so far (cosine).
+const SAME: f64 = 0.9;
 /// Rounds of the conjugate gradients, in smoothing and on, and the share of the squared residual at which they end.
 const ROUNDS: usize = 60;
 const WALKED: usize = 1500;
@@ -42,18 +45,25 @@ pub(super) struct Evidence {
 
 /// Places beside the surface, at nodes of the body's grid just outside of it: within a thin wall both sides would be near to each other.
 struct Rim {
+    grid: Grid,
     nodes: Vec<usize>,
+    /// Of each such node which one it is.
+    numbers: HashMap<usize, u32>,
     places: Vec<(Point3<f64>, Vector3<f64>)>,
     /// Neighbours and the length of the way to them.
     beside: Vec<Vec<(u32, f64)>>,
 }
 
 /// The border between the parts: negative nearer to the part that moves [voxel], at the nodes of the body's grid. `evidence_of` is asked for
-/// places of the surface and the directions out of it.
-pub(super) fn border(body: &Body, evidence_of: impl Fn(&Point3<f64>, &Vector3<f64>) -> Evidence) -> Field<f32> {
+/// places of the surface and the directions out of it; `slide`: the direction of the joint, where it is a slide.
+pub(super) fn border(
+    body: &Body,
+    slide: Option<Vector3<f64>>,
+    evidence_of: impl Fn(&Point3<f64>, &Vector3<f64>) -> Evidence,
+) -> Field<f32> {
     let rim = Rim::of(body);
     let evidence: Vec<Evidence> = rim.places.iter().map(|(place, normal)| evidence_of(place, normal)).collect();
-    let part = rim.carried_on(&evidence, rim.smoothed(&evidence));
+    let part = rim.carried_on(&evidence, rim.smoothed(&evidence), slide);
     let grid = body.field.grid;
     let mut seeds = vec![0u8; grid.len()];
     for (node, part) in rim.nodes.iter().zip(&part) {
@@ -68,20 +78,22 @@ pub(super) fn border(body: &Body, evidence_of: impl Fn(&Point3<f64>, &Vector3<f6
 }
 
 /// Evidence of a place when the other state is reached by one of two poses. On the surface either way there is none: a plane that slides
-/// within itself, or a place on the axis. Where the border of the other state is known already, a place that stays is on what stays there
-/// alone, and one that moves on what moves.
+/// within itself, or a place on the axis. A surface along `slide` may be hidden as well: the other part covers and uncovers it, whichever
+/// of the two moves. Where the border of the other state is known already, a place that stays is on what stays there alone, and one that
+/// moves on what moves.
 pub(super) fn seen_in(
     (other, border): (&Body, Option<&Field<f32>>),
     poses: &[Isometry3<f64>; 2],
-    tolerance: f64,
-    place: &Point3<f64>,
-    normal: &Vector3<f64>,
+    (tolerance, slide): (f64, Option<&Vector3<f64>>),
+    (place, normal): (&Point3<f64>, &Vector3<f64>),
 ) -> Evidence {
+    let slides = slide.is_some_and(|slide| normal.dot(slide).powi(2) < 1.0 - SAME * SAME);
     let cost = |which: usize| {
         let (place, normal) = (poses[which] * place, poses[which].rotation * normal);
         let is_of_other = || border.is_some_and(|border| is_beyond(border, &place) != (which == 1));
         match other.place(&place, &normal, tolerance) {
             Place::On(..) if !is_of_other() => 0.0,
+            Place::Hidden if slides => 0.0,
             Place::On(..) | Place::Hidden => HIDDEN,
             Place::Free if matches!(other.place(&place, &normal, 2.0 * tolerance), Place::Free) => FREE,
             Place::Free => NEARLY,
@@ -137,7 +149,7 @@ impl Rim {
             around[i].iter().filter_map(|j| Some((*j, way(&at(i), &at(*j as usize))?))).collect()
         };
         let beside = (0..nodes.len()).map(ways).collect();
-        Self { nodes, places, beside }
+        Self { grid: *grid, nodes, numbers, places, beside }
     }
 
     /// The least of sum w_i (x_i - h_i)² + sum (x_i - x_j)², nearly.
@@ -153,9 +165,16 @@ impl Rim {
     }
 
     /// Whether each place moves: what is clear there, or where more of the random walks from it end (Grady 2006).
-    fn carried_on(&self, evidence: &[Evidence], smoothed: Vec<f64>) -> Vec<bool> {
+    fn carried_on(&self, evidence: &[Evidence], mut smoothed: Vec<f64>, slide: Option<Vector3<f64>>) -> Vec<bool> {
         let is_clear = |i: usize| evidence[i].weight >= WEIGHTY && (smoothed[i] - 0.5).abs() > CLEAR;
-        let clear: Vec<bool> = (0..evidence.len()).map(is_clear).collect();
+        let mut clear: Vec<bool> = (0..evidence.len()).map(is_clear).collect();
+        if let Some(slide) = slide {
+            let open = (0..clear.len()).filter(|i| !clear[*i]);
+            let found: Vec<_> = open.filter_map(|i| Some((i, smoothed[self.in_line(i, &slide, &clear)?]))).collect();
+            for (i, part) in found {
+                (clear[i], smoothed[i]) = (true, part);
+            }
+        }
         let start = self.nearest(&clear, &smoothed);
         let apply = |x: &[f64]| -> Vec<f64> {
             let steps = |i: usize| self.beside[i].iter().map(|(j, way)| (x[i] - x[*j as usize]) / way).sum::<f64>();
@@ -177,6 +196,35 @@ impl Rim {
         let first = start.iter().zip(&clear).map(|(x, clear)| if *clear { 0.0 } else { *x }).collect();
         let found = solved(open, &diagonal, &right, first, WALKED);
         (0..start.len()).map(|i| if clear[i] { start[i] > 0.5 } else { found[i] > 0.5 }).collect()
+    }
+
+    /// The nearest clear place before or behind another one along a slide, on the same surface: as the slide moves that surface within
+    /// itself, all of the line belongs to one part, unless it ends on both.
+    fn in_line(&self, from: usize, slide: &Vector3<f64>, clear: &[bool]) -> Option<usize> {
+        let (place, normal) = self.places[from];
+        let step = slide * self.grid.voxel;
+        let walk = |sign: f64| {
+            let on = (1..).map_while(|count| self.on_surface(&(place + step * (sign * f64::from(count))), &normal));
+            on.enumerate().find(|(_, i)| clear[*i])
+        };
+        let ends = [walk(1.0), walk(-1.0)];
+        ends.into_iter().flatten().min_by_key(|(count, _)| *count).map(|(_, i)| i)
+    }
+
+    /// The place beside the surface that is next to a place on it and whose normal agrees.
+    fn on_surface(&self, place: &Point3<f64>, normal: &Vector3<f64>) -> Option<usize> {
+        // Half a step outside, where these places are.
+        let middle = self.grid.steps(&(place + normal * (0.5 * self.grid.voxel)));
+        let around = (0..27).filter_map(|i: usize| {
+            let node = [i % 3, i / 3 % 3, i / 9];
+            let at = [0, 1, 2].map(|axis| middle[axis].round() as isize + node[axis] as isize - 1);
+            let inside = (0..3).all(|axis| at[axis] >= 0 && at[axis] < self.grid.dims[axis] as isize);
+            let number = inside.then(|| self.numbers.get(&self.grid.index(at.map(|v| v as usize))))?;
+            number.map(|i| *i as usize)
+        });
+        let away = |i: usize| (self.places[i].0 - place).norm_squared();
+        let near = around.filter(|i| self.places[*i].1.dot(normal) > SAME && away(*i) < self.grid.voxel.powi(2));
+        near.min_by(|a, b| away(*a).total_cmp(&away(*b)))
     }
 
     /// What is clear at the nearest place where it is (Dijkstra 1959): 1 for the part, 0 for the base.

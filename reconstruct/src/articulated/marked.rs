@@ -74,7 +74,7 @@ pub fn marked(
         Joint::Prismatic { travel: direction.into_inner() * limits[1] }
     };
     bar.stage(SPLIT, 4);
-    let border = label::border(&body, |place, normal| {
+    let border = label::border(&body, None, |place, normal| {
         let shown: f64 = views.iter().filter_map(|view| view.shows(&body, place, normal)).sum();
         Evidence { part: if shown > 0.0 { 1.0 } else { 0.0 }, weight: shown.abs().min(2.0 * OF_ONE) }
     });

@@ -34,7 +34,7 @@ use body::Body;
 use estimate::{Estimate, estimate};
 use fit::Pair;
 use motion::Motion;
-use nalgebra::{Isometry3, Point3};
+use nalgebra::{Isometry3, Point3, Vector3};
 use shared_mem::ending;
 use shared_mem::progress::{Planned, Progress};
 
@@ -169,13 +169,15 @@ pub fn between(first: Mesh, second: Mesh) -> Result<Articulated, ArticulatedErro
     bar.stage(SPLIT, 4);
     let [whole, part] = found.motion.poses();
     let within = found.tolerance;
+    let slide = found.motion.slide();
     let borders = |known: [Option<&Field<f32>>; 2]| {
-        let of = |body: &Body, other: (&Body, Option<&Field<f32>>), poses: [Isometry3<f64>; 2]| {
-            label::border(body, |place, normal| label::seen_in(other, &poses, within, place, normal))
+        let of = |(body, slide): (&Body, Option<Vector3<f64>>), other: (&Body, Option<&Field<f32>>), poses: [_; 2]| {
+            let seen = |place: &_, normal: &_| label::seen_in(other, &poses, (within, slide.as_ref()), (place, normal));
+            label::border(body, slide, seen)
         };
         rayon::join(
-            || of(&first, (&second, known[1]), [whole, part]),
-            || of(&second, (&first, known[0]), [whole.inverse(), part.inverse()]),
+            || of((&first, slide), (&second, known[1]), [whole, part]),
+            || of((&second, slide.map(|way| whole * way)), (&first, known[0]), [whole.inverse(), part.inverse()]),
         )
     };
     let (before, after) = borders([None; 2]);

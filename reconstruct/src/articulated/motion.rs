@@ -166,6 +166,14 @@ impl Motion {
         }
     }
 
+    /// The direction in which the part slides, in the first state's frame; `None` for a hinge.
+    pub(super) fn slide(&self) -> Option<Vector3<f64>> {
+        match self {
+            Self::Jointed(_, Joint::Prismatic { travel }) => travel.try_normalize(0.0),
+            _ => None,
+        }
+    }
+
     pub(super) fn freedoms(&self) -> usize {
         match self {
             Self::Pose(_) => 6,
