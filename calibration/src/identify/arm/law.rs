@@ -11,12 +11,12 @@ use shared_mem::cell::{Cell, ControllerKind};
 use shared_mem::recording::Clip;
 use shared_mem::theta::Theta;
 
-/// Laws that are compared, the most frequent first: of two that fit alike the first is taken.
+/// Laws that are compared, the most frequent first: of two that fit alike the first is taken. Without gravity the last two are one.
 const LAWS: [ControllerKind; 4] = [
     ControllerKind::JointImpedance,
     ControllerKind::InverseDynamics,
-    ControllerKind::CompensatedPd,
     ControllerKind::JointPd,
+    ControllerKind::CompensatedPd,
 ];
 /// So many clips decide which law it is.
 const CLIPS: usize = 4;
@@ -144,7 +144,8 @@ mod tests {
     #[test]
     fn the_law_that_led_an_arm_is_found_and_said() {
         let unstated = Cell::parse(CELL, Path::new("cell.toml")).expect("a cell");
-        for kind in LAWS {
+        // A joint that carries nothing tells no servo from one whose weight is compensated.
+        for kind in LAWS.into_iter().filter(|kind| *kind != ControllerKind::CompensatedPd) {
             let led = under(&unstated, kind);
             let clips = [clip(&led, 1.0), clip(&led, 1.7)];
             let (cell, said) =
