@@ -85,8 +85,9 @@ def element(body, task):
     return f'<body name="{name}" {place}{more}>{"".join(inside)}</body>'
 
 
-def mjcf(task, step, root=element):
-    """The model as text; `root`: what becomes of a body that hangs on no other one."""
+def mjcf(task, step, root=element, head="", more=""):
+    """The model as text; `root`: what becomes of a body that hangs on no other one; `head`: what stands before the world; `more`: what is
+    in it beside the bodies."""
     joints = {body["name"]: body["joint"] for body in task["body"] if "joint" in body}
     roots = [root(body, task) for body in task["body"] if not body.get("joint", {}).get("parent")]
     drives = [f'<motor name="{name}" joint="{name}"/>' for name, joint in joints.items() if "drive" in joint]
@@ -97,5 +98,5 @@ def mjcf(task, step, root=element):
     return f"""<mujoco><compiler angle="radian" autolimits="false" balanceinertia="true"/>
 <option timestep="{step}" cone="elliptic" impratio="20" integrator="implicitfast"><flag multiccd="disable"/></option>
 <default><geom solref="{4 * step} 1"/></default>
-<worldbody>{"".join(roots)}</worldbody>
+{head}<worldbody>{"".join(roots)}{more}</worldbody>
 <actuator>{"".join(drives)}</actuator><equality>{"".join(gears)}</equality><contact>{"".join(apart)}</contact></mujoco>"""

@@ -10,11 +10,11 @@ from .drive import Drive
 
 class Scene:
     """A task in MuJoCo, begun where the twin began: `bodies` of its answer. `noise`: one sigma of what `generator` adds to each way point
-    along each axis, m; where a body waits, it waits in one place."""
+    along each axis, m; where a body waits, it waits in one place. `compiled`: its model, where that is there already."""
 
-    def __init__(self, task, bodies, step=1e-3, noise=0.0, generator=None):
+    def __init__(self, task, bodies, step=1e-3, noise=0.0, generator=None, compiled=None):
         self.task, self.step = task, step
-        self.model = mujoco.MjModel.from_xml_string(model.mjcf(task, step))
+        self.model = compiled or mujoco.MjModel.from_xml_string(model.mjcf(task, step))
         self.data = mujoco.MjData(self.model)
         self.starts = {body["name"]: body["start"] for body in bodies}
         for body in task["body"]:

@@ -1,0 +1,187 @@
+"""Policies in a cell in MuJoCo that has masses, friction, a lagging arm, a camera and noise of its own, as if it were reality:
+
+    python tests/peers/mujoco_policies.py identified tasks/close_laptop.toml --out laptop_identified.toml
+    python tests/peers/mujoco_policies.py demonstrate tasks/close_laptop.toml --commands laptop_lerobot --out laptop_mujoco
+    python tests/peers/mujoco_policies.py trials tasks/close_laptop.toml --program target/release/twin \\
+      --policy twin=ws://localhost:8000 --seed 1000 --episodes 60 --out twin.csv
+    python tests/peers/mujoco_policies.py compare twin.csv mujoco.csv
+
+`identified` writes the task file as identification would leave it: what is hidden, with errors as in mujoco_scene/hidden.py. `demonstrate`
+sends the commands of a data set of the twin to the arm in MuJoCo from the same starts, and keeps what was a success, as a data set
+that adapters/cloud_policy/train.py reads. `trials` writes a world for `calibration evaluate --worlds twin,FILE.csv`. `compare` says
+how often each policy succeeds and the ratio of the first to the second, start by start.
+
+    pip install -r tests/peers/requirements.txt pyarrow pillow websockets msgpack; where there is no screen, MUJOCO_GL=egl
+"""
+import argparse
+import csv
+import io
+import os
+import shutil
+import sys
+import tomllib
+
+from program import Failed, answer, built, ending_by_signals, note
+
+try:
+    import numpy as np
+
+    from mujoco_cell.fr3 import DOF
+    from mujoco_scene.acting import Stage
+    from mujoco_scene.hidden import Hidden, toml
+except ModuleNotFoundError as missing:
+    sys.exit(f"{missing.name} is not installed; the head of this file says how")
+
+REALITY = 20  # the number by which all that is hidden is drawn
+GOES_ON = 1.0  # [s] for which the last command is held, so that an arm that lags arrives
+
+
+def read(path):
+    with open(path, "rb") as stream:
+        return tomllib.load(stream)
+
+
+def whole(path, text):
+    """Writes a file whole or not at all."""
+    if os.path.exists(path):
+        raise ValueError(f"{path} is there, and is kept; give another --out")
+    beside = path + ".unfinished"
+    with open(beside, "w") as stream:
+        stream.write(text)
+        stream.flush()
+        os.fsync(stream.fileno())
+    os.replace(beside, path)
+
+
+def identified(given):
+    whole(given.out, toml(Hidden(read(given.task), given.reality).identified(given.reality)))
+
+
+def commands(folder):
+    """State, surroundings and actions of each episode of a data set, and the rate."""
+    import json
+
+    import pyarrow.parquet as parquet
+    with open(os.path.join(folder, "meta", "info.json")) as stream:
+        rate = json.load(stream)["fps"]
+    table = parquet.read_table(os.path.join(folder, "data"), columns=["observation.state", "observation.environment_state", "action", "episode_index"])
+    columns = [np.array(table[name].to_pylist()) for name in table.column_names]
+    ends = np.flatnonzero(np.diff(columns[3])) + 1
+    return [[part[0], around[0], actions] for part, around, actions in zip(*(np.split(column, ends) for column in columns[:3]))], rate
+
+
+def demonstrate(given):
+    if os.path.exists(given.out):
+        raise ValueError(f"{given.out} is there, and is kept; give another --out")
+    from mujoco_scene.written import Written
+    stage = Stage(Hidden(read(given.task), given.reality), given.pictures)
+    beside = given.out + ".unfinished"
+    shutil.rmtree(beside, ignore_errors=True)
+    found = [commands(folder) for folder in given.commands]
+    episodes, rate = sum((episodes for episodes, _ in found), []), found[0][1]
+    written = Written(beside, rate, stage)
+    for number, (state, around, actions) in enumerate(episodes):
+        acting, frames = stage.begin(stage.starts(state, around), number, state[-DOF:]), []
+        for action in [*actions, *[actions[-1]] * round(GOES_ON * rate)]:
+            frames.append((*acting.numbers(), *acting.seen(), action.astype(np.float32)))
+            acting.act(action, 1 / rate)
+            if acting.over:
+                break
+        if acting.success:
+            written.episode(frames)
+        note(f"episode {number + 1} of {len(episodes)}: {'kept' if acting.success else acting.fault or 'no success'}; {written.episodes} kept")
+    written.close()
+    os.replace(beside, given.out)
+
+
+def trials(given):
+    from mujoco_scene.asked import Policy
+    name, address = given.policy.split("=", 1) if "=" in given.policy else ("policy", given.policy)
+    policy, task = Policy(address), read(given.task)
+    stage = Stage(Hidden(task, given.reality), policy.metadata.get("see") != "cloud")
+    starts = answer([given.program, "task", given.task, "--json", "--episodes", str(given.episodes), "--seed", str(given.seed),
+                     "--duration", "0.001"])["episodes"]
+    text = io.StringIO()
+    table = csv.writer(text, lineterminator="\n")
+    table.writerow(["policy", "task", "start", "success"])
+    wins = 0
+    for count, start in enumerate(starts, 1):
+        acting = stage.begin(start["bodies"], start["seed"])
+        while not acting.over:
+            for action in policy.actions(acting.observation())[:given.chunk]:
+                acting.act(action, 1 / given.rate)
+                if acting.over:
+                    break
+        wins += acting.success
+        table.writerow([name, os.path.basename(given.task).removesuffix(".toml"), start["seed"], int(acting.success)])
+        note(f"start {start['seed']}: {'success' if acting.success else acting.fault or 'not within the horizon'}; {wins} of {count}")
+    whole(given.out, text.getvalue())
+    print(f"{name}: {wins} of {len(starts)}")
+
+
+def wilson(wins, trials, z=1.959964):
+    share, more = wins / trials, z * z / trials
+    middle, half = (share + more / 2) / (1 + more), z * np.sqrt(share * (1 - share) / trials + more / (4 * trials)) / (1 + more)
+    return middle - half, middle + half
+
+
+def compare(given):
+    sides = []
+    for path in (given.first, given.second):
+        with open(path, newline="") as stream:
+            sides.append({(row["task"], row["start"]): int(row["success"]) for row in csv.DictReader(stream)})
+    both = sorted(set(sides[0]) & set(sides[1]))
+    if not both:
+        raise ValueError("the files have no start in common; give trials of the same task and --seed")
+    table = np.array([[side[key] for key in both] for side in sides])
+    for path, wins in zip((given.first, given.second), table.sum(axis=1)):
+        low, high = wilson(wins, len(both))
+        print(f"{path}: {wins} of {len(both)}, {wins / len(both):.2f} [{low:.2f}, {high:.2f}]")
+    drawn = np.random.default_rng(0).integers(len(both), size=(20000, len(both)))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ratios = table[0][drawn].sum(axis=1) / table[1][drawn].sum(axis=1)
+        low, high = np.nanquantile(ratios, [0.025, 0.975])
+        print(f"ratio {table[0].sum() / table[1].sum():.2f} [{low:.2f}, {high:.2f}] (95 %, starts drawn again); "
+              f"the first alone in {int((table[0] > table[1]).sum())}, the second alone in {int((table[0] < table[1]).sum())}")
+
+
+def arguments():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    modes = parser.add_subparsers(required=True, metavar="MODE")
+    for mode, what in ((identified, "the task file after identification"), (demonstrate, "a data set recorded in MuJoCo"), (trials, "a policy's trials")):
+        inner = modes.add_parser(mode.__name__, help=what)
+        inner.set_defaults(mode=mode)
+        inner.add_argument("task", metavar="TASK.toml")
+        inner.add_argument("--out", required=True, metavar="PATH", help="new")
+        inner.add_argument("--reality", type=int, default=REALITY, metavar="N", help=f"what is hidden is drawn by it [default: {REALITY}]")
+        if mode is demonstrate:
+            inner.add_argument("--commands", required=True, nargs="+", metavar="DATASET", help="of the twin")
+            inner.add_argument("--pictures", action="store_true", help="in colour, too")
+        if mode is trials:
+            inner.add_argument("--program", required=True, type=built, metavar="TWIN", help="the built `twin`, which draws the starts")
+            inner.add_argument("--policy", required=True, metavar="[NAME=]ws://HOST:PORT")
+            inner.add_argument("--episodes", type=int, default=60, metavar="N", help="[default: 60]")
+            inner.add_argument("--seed", type=int, default=1000, metavar="S", help="the first start [default: 1000]")
+            inner.add_argument("--rate", type=int, default=20, metavar="HZ", help="actions a second [default: 20]")
+            inner.add_argument("--chunk", type=int, default=8, metavar="N", help="actions carried out of each answer [default: 8]")
+    inner = modes.add_parser("compare", help="two files of trials")
+    inner.set_defaults(mode=compare)
+    inner.add_argument("first", metavar="FIRST.csv")
+    inner.add_argument("second", metavar="SECOND.csv")
+    return parser.parse_args()
+
+
+def main():
+    given = arguments()
+    ending_by_signals()
+    try:
+        given.mode(given)
+    except (ValueError, OSError, Failed) as error:
+        sys.exit(str(error))
+
+
+if __name__ == "__main__":
+    try:
+        main()
+    except KeyboardInterrupt:
+        sys.exit(130)
