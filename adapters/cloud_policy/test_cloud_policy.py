@@ -49,6 +49,13 @@ def depth(camera, x, y):
     return np.where(inside, 900, 1000).astype(np.uint16).reshape(camera.rows, camera.columns)
 
 
+def colour(camera, x, y):
+    """The same in black and white, as a PNG."""
+    stream = io.BytesIO()
+    Image.fromarray(((depth(camera, x, y) == 900)[..., None] * [255, 255, 255]).astype(np.uint8)).save(stream, "PNG")
+    return stream.getvalue()
+
+
 def write(folder, camera, episodes=20, frames=5):
     generator, rows = np.random.default_rng(0), []
     for episode in range(episodes):
@@ -57,15 +64,17 @@ def write(folder, camera, episodes=20, frames=5):
         Image.fromarray(depth(camera, x, y)).save(stream, "PNG")
         for _ in range(frames):
             rows.append({"observation.state": generator.uniform(-1, 1, 2).tolist(), "action": [x, y], "episode_index": episode,
-                         "observation.images.above_depth": {"bytes": stream.getvalue(), "path": None}})
+                         "observation.images.above_depth": {"bytes": stream.getvalue(), "path": None},
+                         "observation.images.above": {"bytes": colour(camera, x, y), "path": None}})
     os.makedirs(f"{folder}/meta")
     os.makedirs(f"{folder}/data/chunk-000")
-    features = {"action": {"names": ["tool.x", "tool.y"]}, "observation.images.above_depth": {}}
+    features = {"action": {"names": ["tool.x", "tool.y"]}, "observation.images.above_depth": {}, "observation.images.above": {}}
     with open(f"{folder}/meta/info.json", "w") as stream:
         json.dump({"fps": 20, "features": features}, stream)
     numbers = pa.list_(pa.float32())
+    image = pa.struct([("bytes", pa.binary()), ("path", pa.string())])
     schema = pa.schema([("observation.state", numbers), ("action", numbers), ("episode_index", pa.int64()),
-                        ("observation.images.above_depth", pa.struct([("bytes", pa.binary()), ("path", pa.string())]))])
+                        ("observation.images.above_depth", image), ("observation.images.above", image)])
     parquet.write_table(pa.Table.from_pylist(rows, schema), f"{folder}/data/chunk-000/file-000.parquet")
 
 
@@ -121,6 +130,13 @@ class CloudPolicy(unittest.TestCase):
         # Whoever knows nothing is 0.05 m off.
         self.assertLess(np.mean(errors), 0.015)
         self.assertIn("has no `observation/state`", said)
+
+    def test_pictures_are_seen_in_place_of_points(self):
+        subprocess.run(self.command("pictures", 5, "--see", "pictures"), check=True, capture_output=True)
+        acting = serve.Acting(Trained(f"{self.folder}/pictures"), 0)
+        picture = np.array(Image.open(io.BytesIO(colour(self.camera, 0.5, 0.0))))
+        answer = acting.answer({"observation/state": np.zeros(2, np.float32), "observation/image/above": picture})
+        self.assertEqual(answer["actions"].shape, (4, 2))
 
     def test_after_ctrl_c_it_goes_on_as_if_there_had_been_none(self):
         subprocess.run(self.command("whole", 60), check=True, capture_output=True)

@@ -37,7 +37,7 @@ def arguments():
     parser.add_argument("--camera", metavar="NAME", help="of the task [default: its first]")
     parser.add_argument("--see", choices=["cloud", "pictures"], default="cloud", help="what is learned from [default: cloud]")
     parser.add_argument("--episodes", type=int, metavar="N", help="no more than the first so many [default: all]")
-    parser.add_argument("--steps", type=int, default=3000, metavar="N", help="[default: 3000]")
+    parser.add_argument("--steps", type=int, default=3000, metavar="N", help="a trained policy goes on with more of them [default: 3000]")
     parser.add_argument("--batch", type=int, default=32, metavar="N", help="frames a step [default: 32]")
     parser.add_argument("--draws", type=int, default=8, metavar="N", help="of noise for each frame of a step [default: 8]")
     parser.add_argument("--points", type=int, default=512, metavar="N", help="of a cloud [default: 512]")
@@ -118,6 +118,7 @@ class Training:
 
     def go_on(self):
         before = checkpoint.read(self.path)
+        before["settings"]["steps"] = self.given.steps  # more of them go on from here
         differs = [key for key in self.kept if before.get(key) != self.kept[key]]
         if differs:
             raise ValueError(f"{self.path} is of another training ({', '.join(differs)}); give another --out, or remove it")
