@@ -63,7 +63,7 @@ class Stage:
         sky = f'<texture type="skybox" builtin="flat" rgb1="{model.numbers(BACKGROUND)}" width="16" height="16"/>'
         seen = (f'<statistic extent="1"/><visual><global offwidth="{self.columns}" offheight="{self.rows}"/><map znear="0.01" zfar="10"/>'
                 f'<headlight ambient="0.45 0.45 0.45" diffuse="0.25 0.25 0.25"/></visual><asset>{sky}{assets}</asset>')
-        self.model = mujoco.MjModel.from_xml_string(model.mjcf(self.task, step, seen, view + links))
+        self.model = mujoco.MjModel.from_xml_string(model.mjcf(self.task, step, head=seen, more=view + links))
         for number, body in enumerate(self.task["body"]):
             fixed = body.get("hold") == "fixed"
             here = self.model.geom_bodyid == self.model.body(body["name"]).id
