@@ -65,6 +65,8 @@ fn a_sleeper_sleeps_until_something_is_sent() {
         for cycle in 1..=LAST {
             publisher.send(&ArmState { cycle, ..ArmState::default() }).expect("send");
         }
+        // The reader ends when it sees the last one: a next round at once would bury that.
+        std::thread::sleep(Duration::from_millis(20));
     }
     reader.join().expect("reader");
 }
