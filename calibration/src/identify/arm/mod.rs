@@ -3,8 +3,9 @@
 //! | file | owns |
 //! |---|---|
 //! | `session` | which clips of a session can be used, and for what |
+//! | `law` | which control law leads the arm, where nobody says |
+//! | `measured_stiffness` | what logged torques say of the stiffness, where nobody does |
 //! | `start` | where the search begins when little is known |
-//! | [`law`] | which control law leads the arm, where nobody says |
 //! | `saturation` | the same for a limit of the torques |
 //! | `time_step` | what the twin's time step does to the numbers, and that it is taken out |
 //! | `finding` | what a fit tells, number by number |
