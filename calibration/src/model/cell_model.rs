@@ -44,6 +44,8 @@ pub(super) struct Arm {
     pub(super) loads: Vec<Load>,
     /// Whether the controller compensates gravity and Coriolis torques.
     pub(super) compensates: bool,
+    /// Whether its damper is given the desired velocity.
+    pub(super) follows_velocity: bool,
     pub(super) command_delay: Known,
     pub(super) command_lag: Known,
 }
@@ -224,6 +226,7 @@ impl Arm {
             carried: 1.0,
             loads: Vec::new(),
             compensates: controller.kind != ControllerKind::JointPd,
+            follows_velocity: !matches!(controller.kind, ControllerKind::JointPd | ControllerKind::CompensatedPd),
             command_delay: Known::default(),
             command_lag: Known::default(),
         })

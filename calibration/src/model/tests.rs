@@ -1,7 +1,7 @@
 //! What is written is read back, and what was found stands in the file or among what it lacks.
 
 use super::{Format, write};
-use shared_mem::cell::Cell;
+use shared_mem::cell::{Cell, ControllerKind};
 use shared_mem::theta::Theta;
 use std::path::Path;
 use twin::arm::ArmModel;
@@ -84,6 +84,19 @@ fn numbers_of_joints_are_sums_of_what_is_stated_and_what_was_found() {
     assert!(text.contains(
         "fr3_joint1 armature [kg m^2]: rotor inertia seen at the joint, from cell.toml and theta.toml (rotor_inertia)"
     ));
+}
+
+#[test]
+fn a_law_that_is_given_no_desired_velocity_has_no_actuator_for_it() {
+    let actuators = |kind: ControllerKind| {
+        let mut cell = shipped();
+        cell.controller.as_mut().expect("a controller").kind = kind;
+        let text = write(&cell, &Theta::default(), Format::Mjcf).expect("a model").text;
+        [text.contains("fr3_joint1_velocity"), text.contains("gravcomp=\"1\""), text.contains("kp=\"600\" kv=\"50\"")]
+    };
+    assert_eq!(actuators(ControllerKind::JointImpedance), [true, true, false]);
+    assert_eq!(actuators(ControllerKind::CompensatedPd), [false, true, true]);
+    assert_eq!(actuators(ControllerKind::JointPd), [false, false, true]);
 }
 
 #[test]

@@ -201,15 +201,15 @@ impl File {
         }
         way_comments.iter().for_each(|comment| self.sheet.xml.comment(comment));
         if gains {
-            let law = if arm.compensates {
+            let law = if arm.follows_velocity {
                 "k (q_d - q) + d (dq_d - dq): first all positions, then all velocities"
             } else {
                 "k (q_d - q) - d dq"
             };
             self.sheet.xml.comment(&format!("control law of each joint: {law}"));
-            arm.joints.iter().for_each(|joint| self.position(joint, arm.compensates, &way, lag));
+            arm.joints.iter().for_each(|joint| self.position(joint, arm.follows_velocity, &way, lag));
         }
-        if gains && arm.compensates {
+        if gains && arm.follows_velocity {
             arm.joints.iter().for_each(|joint| self.velocity(joint, &way, lag));
         }
         for joint in arm.joints.iter().filter(|joint| joint.constant.is_known()) {
