@@ -2,8 +2,8 @@
 
 The model is the user's: masses, rotors (`armature`), friction and damping of joints count as they stand in it. Its actuators are
 left out, and so are bodies that float freely: the object comes from the session. The law of cell.toml takes the actuators' place:
-tau = k (q_d - q) + d (dq_d - dq) + gravity(q) + coriolis(q, dq), or tau = k (q_d - q) - d dq for `joint_pd`, once a control period
-and held over it.
+tau = k (q_d - q) + d (dq_d - dq) + gravity(q) + coriolis(q, dq), without dq_d for `compensated_pd`, or tau = k (q_d - q) - d dq for
+`joint_pd`, once a control period and held over it.
 """
 import mujoco
 import numpy as np
@@ -127,9 +127,10 @@ class Arm:
             raise ValueError(f"{path} has no body `{flange}`; --flange names the body that the tool is fixed to")
         self.world = self.built(self.spec(), step)
         controller = cell["controller"]
-        self.follows_speed = controller["kind"] == "joint_impedance"
-        if controller["kind"] not in ("joint_impedance", "joint_pd"):
+        laws = {"joint_impedance": (True, True), "compensated_pd": (False, True), "joint_pd": (False, False)}
+        if controller["kind"] not in laws:
             raise ValueError(f"the control law `{controller['kind']}` is not known to this adapter")
+        self.follows_speed, self.compensates = laws[controller["kind"]]
         self.limit = np.array(controller.get("torque_limit", [np.inf] * len(joints)), float)
         self.believed = Believed(self.spec().compile(), self.world.at, self.world.dofs)
 
@@ -198,7 +199,7 @@ class Motion:
         model, data, tick, dofs = world.model, world.data, self.tick, world.dofs
         q, dq = self.qs[tick], self.dqs[tick]
         tau = self.wanted[tick] - self.stiffness * q - self.damping * dq
-        if self.arm.follows_speed:
+        if self.arm.compensates:
             tau += self.arm.believed.bias(q, dq)
         np.clip(tau, -self.arm.limit, self.arm.limit, out=tau)
         if "tau_J_d" in self.ends:
