@@ -230,8 +230,9 @@ pub fn controlled(
         cell = led;
         remarks.push(remark);
     }
-    let gains_are_given = given.is_some_and(|given| given.arm.is_some());
-    if let Some((known, remark)) = measured_stiffness::found(&cell, clips).filter(|_| !gains_are_given) {
+    if given.is_none_or(|given| given.arm.is_none())
+        && let Some((known, remark)) = measured_stiffness::found(&cell, clips)
+    {
         cell = known;
         remarks.push(remark);
     }
