@@ -11,7 +11,7 @@ sends the commands of a data set of the twin to the arm in MuJoCo from the same 
 that adapters/cloud_policy/train.py reads. `trials` writes a world for `calibration evaluate --worlds twin,FILE.csv`. `compare` says
 how often each policy succeeds and the ratio of the first to the second, start by start.
 
-    pip install -r tests/peers/requirements.txt pyarrow pillow websockets msgpack; where there is no screen, MUJOCO_GL=egl
+    pip install -r tests/peers/requirements.txt pyarrow pillow tomli-w websockets msgpack; where there is no screen, MUJOCO_GL=egl
 """
 import argparse
 import csv
@@ -22,13 +22,15 @@ import sys
 import tomllib
 
 from program import Failed, answer, built, ending_by_signals, note
+from verdicts import wilson
 
 try:
     import numpy as np
+    import tomli_w
 
     from mujoco_cell.fr3 import DOF
     from mujoco_scene.acting import Stage
-    from mujoco_scene.hidden import Hidden, toml
+    from mujoco_scene.hidden import Hidden
 except ModuleNotFoundError as missing:
     sys.exit(f"{missing.name} is not installed; the head of this file says how")
 
@@ -54,7 +56,7 @@ def whole(path, text):
 
 
 def identified(given):
-    whole(given.out, toml(Hidden(read(given.task), given.reality).identified(given.reality)))
+    whole(given.out, tomli_w.dumps(Hidden(read(given.task), given.reality).identified(given.reality)))
 
 
 def commands(folder):
@@ -117,12 +119,6 @@ def trials(given):
         note(f"start {start['seed']}: {'success' if acting.success else acting.fault or 'not within the horizon'}; {wins} of {count}")
     whole(given.out, text.getvalue())
     print(f"{name}: {wins} of {len(starts)}")
-
-
-def wilson(wins, trials, z=1.959964):
-    share, more = wins / trials, z * z / trials
-    middle, half = (share + more / 2) / (1 + more), z * np.sqrt(share * (1 - share) / trials + more / (4 * trials)) / (1 + more)
-    return middle - half, middle + half
 
 
 def compare(given):

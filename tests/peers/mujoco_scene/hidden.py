@@ -42,25 +42,3 @@ class Hidden:
                 if key in body.get("joint", {}):
                     body["joint"][key] *= float(1 + FRICTION * generator.standard_normal())
         return task
-
-
-def toml(task):
-    """A task as the text of its file."""
-    def value(given):
-        if isinstance(given, bool):
-            return "true" if given else "false"
-        if isinstance(given, str):
-            return '"' + given.replace("\\", "\\\\").replace('"', '\\"') + '"'
-        if isinstance(given, dict):
-            return "{ " + ", ".join(f"{key} = {value(inner)}" for key, inner in given.items()) + " }"
-        if isinstance(given, list):
-            return "[" + ", ".join(map(value, given)) + "]"
-        return repr(given)
-
-    is_tables = lambda given: isinstance(given, list) and given and isinstance(given[0], dict)
-    lines = [f"{key} = {value(given)}" for key, given in task.items() if not isinstance(given, dict) and not is_tables(given)]
-    for key, given in task.items():
-        head = f"[[{key}]]" if is_tables(given) else f"[{key}]"
-        for table in given if is_tables(given) else [given] if isinstance(given, dict) else []:
-            lines += ["", head] + [f"{name} = {value(inner)}" for name, inner in table.items()]
-    return "\n".join(lines) + "\n"
