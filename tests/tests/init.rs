@@ -102,6 +102,40 @@ fn a_bag_tells_its_robot_and_its_topics() {
 }
 
 #[test]
+fn joints_that_recordings_call_otherwise_than_the_urdf_are_taken_by_place() {
+    use std::fmt::Write as _;
+    let lab = tempfile::tempdir().expect("a folder");
+    let mut urdf = String::from("<robot name='arm'><link name='l0'/>");
+    for i in 1..=7 {
+        let one = ARM.lines().skip(2).take(4).collect::<String>();
+        let own = [("base", i - 1), ("upper", i)];
+        let one = own.into_iter().fold(one, |text, (name, n)| text.replace(&format!("'{name}'"), &format!("'l{n}'")));
+        write!(urdf, "{}", one.replace("shoulder", &format!("axis{i}"))).expect("room");
+    }
+    std::fs::write(lab.path().join("arm.urdf"), urdf + "</robot>").expect("room");
+    let bag = root().join("import/tests/fixtures/rosbag2_mcap");
+    let bag = bag.to_str().expect("UTF-8");
+    let (answer, cell) = written(lab.path(), &["init", "--urdf", "arm.urdf", "--bag", bag]);
+    let recorded: Vec<String> = (1..=7).map(|i| format!("fr3_joint{i}")).collect();
+    assert_eq!(cell.robot.expect("a robot").joints, recorded);
+    assert!(answer["taken"].to_string().contains("robot.joints"), "{answer}");
+    let toml = lab.path().join("cell.toml");
+    let text = std::fs::read_to_string(&toml).expect("the file");
+    assert!(text.contains("axis1, axis2"), "{text}");
+    let replayed = |text: &str| {
+        std::fs::write(&toml, text).expect("room");
+        let check = run(lab.path(), &["check", ".", "--json"]);
+        let page: Value = serde_json::from_slice(&check.stdout).expect("one JSON object");
+        let replay = &page["clips"][0]["good_for"][0];
+        (replay["good"].clone(), replay["why"].to_string())
+    };
+    assert_eq!(replayed(&text), (true.into(), "\"\"".to_owned()));
+    let unnamed: String = text.lines().filter(|line| !line.starts_with("joints")).flat_map(|line| [line, "\n"]).collect();
+    let (good, why) = replayed(&unnamed);
+    assert!(good == false && why.contains("`joints` beside `urdf`"), "{why}");
+}
+
+#[test]
 fn the_schema_is_one_json_object_that_names_the_blocks() {
     let lab = tempfile::tempdir().expect("a folder");
     let output = run(lab.path(), &["init", "--schema"]);

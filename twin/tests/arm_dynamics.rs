@@ -4,6 +4,7 @@ use proptest::prelude::*;
 use shared_mem::cell::{Cell, Controller, ControllerKind, Robot, Tool};
 use shared_mem::msg::joints_from;
 use twin::arm::{ArmModel, JointState, Joints, MAX_JOINTS, MassProperties, PointForce};
+use twin::description::shown_robot;
 
 fn state() -> impl Strategy<Value = JointState> {
     (prop::array::uniform7(-2.5..2.5f64), prop::array::uniform7(-2.0..2.0f64))
@@ -269,6 +270,27 @@ fn fingers_are_no_joints_of_the_arm_and_their_mass_hangs_on_its_last_link() {
     let (_folder, cell) =
         urdf_cell(&DOUBLE_PENDULUM.replace("</robot>", &format!("{beside}</robot>")), Controller::default());
     assert_eq!(ArmModel::from_cell(&cell).expect("an arm and a wheel").joint_names(), ["shoulder", "elbow"]);
+}
+
+#[test]
+fn joints_of_a_urdf_have_the_names_that_recordings_give_them() {
+    let (_folder, mut cell) = urdf_cell(DOUBLE_PENDULUM, Controller::default());
+    let own = ArmModel::from_cell(&cell).expect("a serial chain");
+    let at = |cell: &Cell, names: [&str; 2]| {
+        let shown = shown_robot(cell).expect("an arm").expect("a shape");
+        (shown.frames_at)(&names.map(str::to_owned), &[0.3, -0.2]).map(|moving| (shown.fixed.len(), moving))
+    };
+    let as_described = at(&cell, ["shoulder", "elbow"]);
+    let robot = cell.robot.as_mut().expect("an arm");
+    robot.joints = vec!["m1".into(), "m2".into()];
+    let arm = ArmModel::from_cell(&cell).expect("the same chain");
+    assert_eq!((arm.joint_names(), arm.described_joint_names()), (&["m1".into(), "m2".into()][..], own.joint_names()));
+    let state = JointState { q: joints_from(&[0.4, 0.9]), dq: joints_from(&[1.1, -0.6]) };
+    assert_eq!(arm.bias(&state), own.bias(&state));
+    assert!(as_described.is_some() && at(&cell, ["m1", "m2"]) == as_described);
+    cell.robot.as_mut().expect("an arm").joints.pop();
+    let error = ArmModel::from_cell(&cell).unwrap_err().to_string();
+    assert!(error.contains("`robot.joints` in cell.toml holds 1 values; this arm has 2 joints"), "{error}");
 }
 
 #[test]

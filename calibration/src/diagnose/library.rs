@@ -140,7 +140,7 @@ impl Library {
         let felt = (numbers.iter().enumerate()).find_map(|(number, (setting, _))| Some((felt_with(setting)?, number)));
         let reaches = numbers.iter().map(|(setting, _)| arm_reach(setting, felt)).collect();
         let (all, unknowns): (Vec<Setting>, Vec<Unknown>) = numbers.into_iter().unzip();
-        let joints_apart = cell.robot.as_ref().is_some_and(|robot| robot.urdf.is_none() && !robot.joints.is_empty());
+        let joints_apart = cell.robot.as_ref().is_some_and(|robot| robot.joints_only());
         let settings = Settings::new(base.clone(), all);
         Self { settings, unknowns, joints, joints_apart, reaches, baseline, candidates, robot }
     }

@@ -1,10 +1,14 @@
-//! Remarks on clips, for people: what many clips share is told once.
+//! Remarks on clips, for people: what many clips share is said once.
+
+use std::path::Path;
 
 /// One line for each kind of remark on a file, in the order in which they first appear. Remarks that differ by numbers
-/// alone are of one kind: `clip_00.mcap and 6 more: no commands for 0.201 s from 1.999 s on`.
+/// alone are of one kind: `clip_00.mcap and 6 more: no commands for 0.201 s from 1.999 s on`. The path that an error of reading
+/// begins with is left out: the line begins with the file.
 pub(crate) fn grouped<'a>(remarks: impl IntoIterator<Item = (&'a str, &'a str)>) -> Vec<String> {
     let mut kinds: Vec<(String, &str, &str, usize)> = Vec::new();
     for (file, remark) in remarks {
+        let remark = remark.split_once(": ").filter(|(path, _)| Path::new(path).ends_with(file)).map_or(remark, |(_, r)| r);
         let kind: String = remark.chars().filter(|c| !c.is_ascii_digit()).collect();
         match kinds.iter_mut().find(|(known, ..)| *known == kind) {
             Some((.., more)) => *more += 1,
@@ -23,8 +27,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_many_clips_share_is_told_once() {
+    fn what_many_clips_share_is_said_once() {
         let remarks = [("a.mcap", "logged at 15 Hz"), ("b.mcap", "not hit"), ("c.mcap", "logged at 16 Hz")];
         assert_eq!(grouped(remarks), ["a.mcap and 1 more: logged at 15 Hz", "b.mcap: not hit"]);
+        let errors = [("a.mcap", "log/a.mcap: `q`: no joint"), ("b.mcap", "log/b.mcap: `q`: no joint")];
+        assert_eq!(grouped(errors), ["a.mcap and 1 more: `q`: no joint"]);
     }
 }

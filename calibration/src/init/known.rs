@@ -65,7 +65,10 @@ impl Known {
             (Some(Named::Joints(joints)), _) => {
                 self.set_robot(Robot { joints: joints.clone(), ..Robot::default() }, "--joints");
             }
-            (Some(Named::Urdf(file)), _) => self.set_description(Description::of_file(file, out)?, "--urdf", out),
+            (Some(Named::Urdf(file)), recorded) => {
+                self.set_description(Description::of_file(file, out)?, "--urdf", out);
+                self.recorded_names(recorded)?;
+            }
             (None, Some(_)) if self.cell.robot.is_some() => {}
             (None, Some(recorded)) => self.recorded_robot(recorded, out),
             (None, None) => {
@@ -109,6 +112,24 @@ impl Known {
         } else if !joints.is_empty() {
             self.set_robot(Robot { joints: joints.clone(), ..Robot::default() }, &format!("{flag}: its joint names"));
         }
+    }
+
+    /// What the recordings call the URDF's joints, where they have as many and other names.
+    fn recorded_names(&mut self, recorded: Option<&Recorded>) -> anyhow::Result<()> {
+        let (Some(Recorded { flag, about, .. }), Some(arm), Some(robot)) =
+            (recorded, self.arm.as_mut(), self.cell.robot.as_mut())
+        else {
+            return Ok(());
+        };
+        let joints = &about.contents.joints;
+        if joints.len() == arm.dof() && arm.joint_names().iter().all(|name| !joints.contains(name)) {
+            let described = arm.joint_names().join(", ");
+            self.remarks.push(("robot", format!("`joints` in the recordings are {described} in the URDF, by place; check it.")));
+            arm.call_joints(joints)?;
+            robot.joints.clone_from(joints);
+            self.take("robot.joints", &format!("{flag}: its joint names"));
+        }
+        Ok(())
     }
 
     fn set_robot(&mut self, robot: Robot, from: &str) {

@@ -15,7 +15,8 @@ pub struct Robot {
     /// URDF file, relative to cell.toml.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub urdf: Option<PathBuf>,
-    /// Joint names in the order of the recordings, where no model is known: one second-order model a joint then.
+    /// Names of the joints in recordings. Beside `urdf` those of its joints from base to flange, where recordings call them
+    /// otherwise. Alone, in the order of the recordings, where no model is known: one second-order model a joint then.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub joints: Vec<String>,
     /// Name of the base frame, in recordings, bags and viewers alike; absent: the first link of the model, else `base`.
@@ -79,13 +80,18 @@ impl Topics {
 }
 
 impl Robot {
+    /// Whether nothing is known of the arm but the names of its joints.
+    #[must_use]
+    pub fn joints_only(&self) -> bool {
+        self.urdf.is_none() && !self.joints.is_empty()
+    }
+
     pub(super) fn check(&self) -> Result<(), String> {
-        let ways =
-            usize::from(self.model.is_some()) + usize::from(self.urdf.is_some()) + usize::from(!self.joints.is_empty());
-        if ways != 1 {
-            return Err(
-                "`[robot]` needs exactly one of `model = \"fr3\"`, `urdf = \"file.urdf\"` or `joints = [names]`".into(),
-            );
+        let ways = usize::from(self.model.is_some()) + usize::from(self.urdf.is_some()) + usize::from(self.joints_only());
+        if ways != 1 || self.model.is_some() && !self.joints.is_empty() {
+            return Err("`[robot]` needs exactly one of `model = \"fr3\"`, `urdf = \"file.urdf\"` (with `joints = [names]` where \
+                        recordings name its joints otherwise) or `joints = [names]` alone"
+                .into());
         }
         match self.model.as_deref() {
             None | Some("fr3") => Ok(()),

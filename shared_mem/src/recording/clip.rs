@@ -111,7 +111,8 @@ impl Clip {
         }
         let columns = joint_log::columns(names, &self.joint_names).ok_or_else(|| {
             let what = format!(
-                "the model's joints are [{}], the recording has [{}]; rename the joints in the model or the recording",
+                "the model's joints are [{}], the recording has [{}]; list the recording's, from base to flange, as \
+                 `joints` beside `urdf` in `[robot]` of cell.toml",
                 names.join(", "),
                 self.joint_names.join(", ")
             );

@@ -96,8 +96,8 @@ impl JointLog {
         let Some((columns, publisher)) = chosen else {
             let names = wanted.names().join(", ");
             return Err(format!(
-                "the model's joints are [{names}], the recording has {listed}; rename the joints in the model or the \
-                 recording, or list the recording's names as `[robot] joints`"
+                "cell.toml's joints are [{names}], the recording has {listed}; list the recording's as `joints` in \
+                 `[robot]` of cell.toml, beside `urdf` from base to flange, or alone"
             ));
         };
         let others = self.rows - self.malformed - publisher.series.len();

@@ -31,6 +31,8 @@ pub struct ArmModel {
     pub(super) tool: MassProperties,
     has_geometry: bool,
     joint_names: Vec<String>,
+    /// Those in the arm's own file, where recordings call them otherwise.
+    described_names: Option<Vec<String>>,
     /// Names of the links behind the joints, and each one's frame here in that of its source.
     link_names: Vec<String>,
     turns: Vec<UnitQuaternion<f64>>,
@@ -71,7 +73,7 @@ pub enum ModelError {
     #[error("the arm has {0} movable joints; 1 to {MAX_JOINTS} are supported: fix the others in the URDF")]
     Joints(usize),
     /// A vector of cell.toml does not fit the arm.
-    #[error("`{key}` in cell.toml holds {given} numbers; this arm has {dof} joints: give one for each")]
+    #[error("`{key}` in cell.toml holds {given} values; this arm has {dof} joints: give one for each")]
     Length {
         /// The key.
         key: &'static str,
@@ -136,17 +138,19 @@ impl ArmModel {
     /// [`ModelError`] naming file, joint or key, and the remedy.
     pub fn from_cell(cell: &Cell) -> Result<Self, ModelError> {
         let robot = cell.robot.as_ref().ok_or(ModelError::NoRobot)?;
-        let known = !robot.joints.is_empty();
         let mut chain = match &robot.urdf {
             Some(file) => urdf::chain(&cell.folder.join(file))?,
-            None if known => joints_only(robot),
+            None if robot.joints_only() => joints_only(robot),
             None => fr3::chain(),
         };
         if let Some(controller) = &cell.controller {
             apply_controller(&mut chain, controller)?;
         }
         let mut arm = Self::from_chain(chain)?;
-        arm.has_geometry = !known;
+        arm.has_geometry = !robot.joints_only();
+        if robot.urdf.is_some() && !robot.joints.is_empty() {
+            arm.call_joints(&robot.joints)?;
+        }
         if let Some(tool) = &cell.tool {
             arm.tool = MassProperties::of_tool(tool);
             arm.tool_length = tool.length;
@@ -184,10 +188,23 @@ impl ArmModel {
             turns: chain.joints.iter().map(|j| z_onto(&j.axis).into()).collect(),
             link_names: chain.joints.iter().map(|j| j.link.clone()).collect(),
             joint_names: chain.joints.into_iter().map(|j| j.name).collect(),
+            described_names: None,
             held_joints: chain.held,
         };
         arm.check_inertia()?;
         Ok(arm)
+    }
+
+    /// Gives the joints, from base to flange, the names that recordings have for them.
+    ///
+    /// # Errors
+    /// [`ModelError::Length`] where there are more or fewer names than joints.
+    pub fn call_joints(&mut self, names: &[String]) -> Result<(), ModelError> {
+        if names.len() != self.dof {
+            return Err(ModelError::Length { key: "robot.joints", given: names.len(), dof: self.dof });
+        }
+        self.described_names = Some(std::mem::replace(&mut self.joint_names, names.to_vec()));
+        Ok(())
     }
 
     fn check_inertia(&self) -> Result<(), ModelError> {
@@ -236,10 +253,16 @@ impl ArmModel {
         self.dof
     }
 
-    /// Names of the joints from base to flange.
+    /// Names of the joints from base to flange, as recordings have them.
     #[must_use]
     pub fn joint_names(&self) -> &[String] {
         &self.joint_names
+    }
+
+    /// The same as the arm's URDF has them.
+    #[must_use]
+    pub fn described_joint_names(&self) -> &[String] {
+        self.described_names.as_deref().unwrap_or(&self.joint_names)
     }
 
     /// Name of each link behind a joint and its frame in the base at joint positions `q` [rad], as the arm's source names and

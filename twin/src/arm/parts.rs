@@ -8,7 +8,7 @@ use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, Unit, UnitQuaternion
 /// One joint and the body behind it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Part {
-    /// Name of the joint.
+    /// Name of the joint in its source.
     pub joint: String,
     /// Name of the link that it carries.
     pub link: String,
@@ -43,7 +43,7 @@ impl ArmModel {
                 before = turn;
                 let aligned = Isometry3::from_parts(Translation3::identity(), turn);
                 Part {
-                    joint: self.joint_names()[i].clone(),
+                    joint: self.described_joint_names()[i].clone(),
                     link: self.link_names()[i].clone(),
                     slides: link.slides,
                     origin,

@@ -6,7 +6,7 @@
 //! friction, payloads, base tilts and the like do, gains and delays or not.
 
 use crate::forward::smoothing;
-use shared_mem::cell::{Cell, Controller, ControllerKind};
+use shared_mem::cell::{Cell, Controller, ControllerKind, Robot};
 use shared_mem::recording::{Clip, JointSeries};
 use shared_mem::theta::Theta;
 use shared_mem::time::TICK_NS;
@@ -25,7 +25,7 @@ pub(in crate::diagnose) fn without_law(theta: Theta, given: Option<&Theta>) -> T
 /// which no torque can be predicted.
 pub(in crate::diagnose) fn cell(cell: &Cell) -> Option<Cell> {
     let controller = cell.controller.as_ref()?;
-    if cell.robot.as_ref().is_none_or(|robot| !robot.joints.is_empty()) {
+    if cell.robot.as_ref().is_none_or(Robot::joints_only) {
         return None;
     }
     let controller = Controller {

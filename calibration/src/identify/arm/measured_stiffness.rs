@@ -15,7 +15,7 @@
 use crate::forward::setting::complete;
 use crate::forward::smoothing::{derivatives, half_width};
 use nalgebra::{DMatrix, DVector};
-use shared_mem::cell::{Cell, ControllerKind, Ranges, TorqueSensing};
+use shared_mem::cell::{Cell, ControllerKind, Ranges, Robot, TorqueSensing};
 use shared_mem::recording::Clip;
 use twin::arm::{ArmModel, JointState, Joints, stiffness_range};
 
@@ -42,7 +42,7 @@ pub(super) fn found(cell: &Cell, clips: &[Clip]) -> Option<(Cell, String)> {
     let controller = cell.controller.as_ref()?;
     let ranged = controller.stiffness_range.is_some() || controller.stiffness.is_empty();
     let led = !matches!(controller.kind, ControllerKind::Tracking | ControllerKind::Unstated);
-    if !ranged || !led || cell.robot.as_ref().is_none_or(|robot| !robot.joints.is_empty()) {
+    if !ranged || !led || cell.robot.as_ref().is_none_or(Robot::joints_only) {
         return None;
     }
     let arm = ArmModel::from_cell(cell).ok()?;
