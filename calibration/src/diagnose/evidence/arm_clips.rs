@@ -5,11 +5,12 @@
 
 use super::measured::{Channel, Evidence, Group, Near, Row, StageName};
 use super::recent::Recent;
+use super::regime::Regimes;
 use super::scatter::Scatter;
 use crate::diagnose::clips::torques::is_tracking;
 use crate::engine::{Engine, Quantity};
 use crate::estimate::{ClipModel, Impossible};
-use crate::forward::arm::noise;
+use crate::forward::arm::{desired_rows, noise};
 use crate::forward::motion::{Mover, Stretch};
 use crate::forward::object;
 use shared_mem::cell::{Cell, ClipKind, TorqueSensing};
@@ -26,11 +27,6 @@ const MOMENTS: usize = 250;
 const TOUCH_MARGIN_NS: u64 = 60_000_000;
 /// A simulated joint that is two turns from its reading has left all bounds [rad]; a reading that wraps around is off by one.
 const FLOWN: f64 = 4.0 * std::f64::consts::PI;
-/// A joint slower than this stands [rad/s].
-const STILL: f64 = 0.02;
-/// Share of a joint's top speed from which on it is fast.
-const FAST: f64 = 0.5;
-
 /// The four quantities, in the order of their rows.
 const QUANTITIES: [&str; 4] = ["q", "dq", "tau_J", "tau_J_d"];
 /// Where the arm goes along what was measured: the torque that this takes.
@@ -61,6 +57,8 @@ struct Prepared {
     commands: CommandTrack,
     /// Measured rows that count, and their stamps.
     kept: Vec<usize>,
+    /// The desired row of the same moment as each, where there is one.
+    desired_rows: Vec<Option<usize>>,
     /// Each followed by the one a control period later: some logs have the torque that acts from a tick on.
     stamps_ns: Vec<u64>,
     rows: Vec<Row>,
@@ -95,8 +93,8 @@ impl<F: Fn(&[f64]) -> Theta + Sync> ArmClips<F> {
         };
         let channels: Vec<Channel> = quantities.flat_map(joints).collect();
         let sigma = (0..channels.len()).map(|channel| sensor_sigma(clips, &channels[channel], channel % dof)).collect();
-        let top = top_speeds(clips, dof);
-        let clips = clips.iter().filter_map(|clip| Prepared::new(clip.clone(), cell, &channels, &top)).collect();
+        let regimes = Regimes::of(clips, dof);
+        let clips = clips.iter().filter_map(|clip| Prepared::new(clip.clone(), cell, &channels, &regimes)).collect();
         let mover = Mover::own(cell, &nominal);
         Ok(Self { cell: cell.clone(), nominal, mover, twin: None, channels, sigma, clips, theta })
     }
@@ -136,52 +134,48 @@ fn sensor_sigma(clips: &[Clip], channel: &Channel, joint: usize) -> f64 {
     noise::of_clips(clips.iter().map(of)).max(least)
 }
 
-fn top_speeds(clips: &[Clip], dof: usize) -> Vec<f64> {
-    let speed = |joint: usize| {
-        let rows = clips.iter().flat_map(|clip| {
-            (0..clip.desired.len()).filter_map(move |row| clip.desired.dq_row(row).map(|dq| dq[joint].abs()))
-        });
-        rows.fold(0.0, f64::max)
-    };
-    (0..dof).map(speed).collect()
-}
-
 impl Prepared {
-    fn new(recorded: Clip, cell: &Cell, channels: &[Channel], top: &[f64]) -> Option<Self> {
+    fn new(recorded: Clip, cell: &Cell, channels: &[Channel], regimes: &Regimes) -> Option<Self> {
         let commands = CommandTrack::new(&recorded.desired)?;
         let end_ns = end_of_arm_alone(&recorded, cell);
         let stamps = &recorded.measured.stamps_ns;
-        let used = stamps.partition_point(|stamp| *stamp < end_ns).min(recorded.desired.len());
+        let desired = &recorded.desired;
+        // The last command holds for as long as that before it did.
+        let [.., before, last] = desired.stamps_ns[..] else { return None };
+        let used = stamps.partition_point(|stamp| *stamp < end_ns.min(last + (last - before).max(1)));
         let stride = used.div_ceil(MOMENTS).max(1);
         let first = *stamps.first()?;
         // What acted in the period before the first state is not known: neither are its torques.
         let unknown = if is_tracking(cell) { SETTLED_NS } else { BEGUN_NS };
         let begun = stamps.partition_point(|stamp| *stamp < first + unknown);
         let known = begun.max(usize::from(recorded.torques_end_at_rows));
-        let kept: Vec<usize> = (known..used).step_by(stride).collect();
+        let at_once = desired_rows(&recorded);
+        let of_commands = channels.iter().any(|channel| channel.quantity == "tau_J_d");
+        let complete = |row: &usize| !of_commands || at_once[*row].is_some();
+        let kept: Vec<usize> = (known..used).step_by(stride).filter(complete).collect();
+        let desired_rows = kept.iter().map(|row| at_once[*row]).collect();
         let stamps_ns: Vec<u64> = kept.iter().flat_map(|row| [stamps[*row], stamps[*row] + TICK_NS]).collect();
         let dof = recorded.measured.dof;
         let mut rows = Vec::with_capacity(channels.len() * kept.len());
         for channel in 0..channels.len() {
             for row in &kept {
-                let dq = recorded.desired.dq_row(*row).map_or(0.0, |dq| dq[channel % dof]);
+                let regime = regimes.at(desired, stamps[*row], channel % dof);
                 let time = (stamps[*row] - first) as f64 * 1e-9;
-                rows.push(Row { channel, stage: StageName::Control, regime: regime(dq, top[channel % dof]), time });
+                rows.push(Row { channel, stage: StageName::Control, regime, time });
             }
         }
         let (recent, stepped_from) = (Recent::default(), Recent::default());
-        Some(Self { recorded, commands, kept, stamps_ns, rows, recent, stepped_from, alone_until_ns: end_ns })
-    }
-}
-
-/// What a joint does that is told to move at `dq`.
-fn regime(dq: f64, top: f64) -> &'static str {
-    match dq {
-        _ if dq.abs() < STILL => "standing or turning round",
-        _ if dq > FAST * top => "fast forward",
-        _ if dq < -FAST * top => "fast backward",
-        _ if dq > 0.0 => "slow forward",
-        _ => "slow backward",
+        Some(Self {
+            recorded,
+            commands,
+            kept,
+            desired_rows,
+            stamps_ns,
+            rows,
+            recent,
+            stepped_from,
+            alone_until_ns: end_ns,
+        })
     }
 }
 
@@ -284,7 +278,8 @@ impl<F: Fn(&[f64]) -> Theta + Sync> ArmClips<F> {
             let joint = channel % dof;
             let (log, values) = series(&clip.recorded, info);
             let later = usize::from(!clip.recorded.torques_end_at_rows);
-            for (moment, row) in clip.kept.iter().enumerate() {
+            for (moment, (row, desired)) in clip.kept.iter().zip(&clip.desired_rows).enumerate() {
+                let row = if info.quantity == "tau_J_d" { desired.unwrap_or(*row) } else { *row };
                 let predicted = match info.quantity {
                     "q" => readings[2 * moment].state.q[joint],
                     "dq" => readings[2 * moment].state.dq[joint],
@@ -436,14 +431,18 @@ mod tests {
         (cell.simulation.q_noise, cell.simulation.dq_noise) = (0.0, 0.0);
         let effect = EffectTheta { name: "payload".into(), parameters: [("mass".to_owned(), 0.3.into())].into() };
         let theta = Theta { effects: vec![effect], ..Theta::default() };
-        for end_at_rows in [true, false] {
-            let arm = ArmClips::new(&cell, &[clip(&cell, &theta, end_at_rows)], |_: &[f64]| theta.clone());
+        // Of a part of a clip commands are kept from before it.
+        for (end_at_rows, begins_ns) in [(true, 0), (false, 0), (true, 150_000_000), (false, 150_000_000)] {
+            let mut recorded = clip(&cell, &theta, end_at_rows);
+            recorded.measured = recorded.measured.between(begins_ns..=u64::MAX);
+            let arm = ArmClips::new(&cell, &[recorded], |_: &[f64]| theta.clone());
             let (arm, mut out) = (arm.expect("an arm"), Vec::new());
             arm.residuals(0, &[], &[], &mut out).expect("it can be simulated");
             let torques: Vec<f64> =
                 arm.rows(0).iter().zip(&out).filter(|(row, _)| row.channel >= 14).map(|(_, r)| *r).collect();
             let worst = torques.iter().fold(0.0, |worst: f64, sigmas| worst.max(sigmas.abs()));
             assert!(torques.len() > 2000 && worst < 3.0, "{end_at_rows}: {worst} sigmas in {} rows", torques.len());
+            assert!(arm.rows(0).iter().any(|row| row.channel == 3 && row.regime == "fast forward"));
         }
     }
 }

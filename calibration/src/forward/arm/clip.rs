@@ -142,7 +142,7 @@ impl ArmClip {
         let bins = bins(&recorded.measured.stamps_ns, &runs, step_ns);
         let left = bins.iter().map(Range::len).sum::<usize>() as f64 / rate;
         let stretches = (left / STRETCH).round().max(1.0) as usize;
-        let desired_rows = desired_rows(&recorded, step_ns);
+        let desired_rows = desired_rows(&recorded);
         let stretch = bins.len().div_ceil(stretches);
         Ok(Self { recorded, commands, runs, bins, dead, given, desired_rows, warnings, stretch, pieces, seconds: left })
     }
@@ -310,7 +310,9 @@ fn bins(stamps_ns: &[u64], runs: &[Range<usize>], step_ns: u64) -> Vec<Range<usi
     bins
 }
 
-fn desired_rows(clip: &Clip, step_ns: u64) -> Vec<Option<usize>> {
+/// For every measured row the desired one of the same moment; `None` where that was not logged.
+pub(crate) fn desired_rows(clip: &Clip) -> Vec<Option<usize>> {
+    let step_ns = usual_step(&clip.measured.stamps_ns);
     let desired = &clip.desired.stamps_ns;
     let row_at = |stamp: &u64| {
         let after = desired.partition_point(|other| other < stamp);

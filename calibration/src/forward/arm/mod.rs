@@ -22,6 +22,7 @@ mod torque_time;
 pub mod velocity;
 
 pub use clip::ArmClipError;
+pub(crate) use clip::desired_rows;
 pub use piece::one_piece;
 
 use super::motion::{Mover, Stretch};

@@ -1,0 +1,56 @@
+//! What a joint is commanded to do at a moment: it stands, or moves slowly or fast one way or the other.
+
+use shared_mem::recording::{Clip, JointSeries};
+
+/// A joint slower than this stands [rad/s].
+const STILL: f64 = 0.02;
+/// Share of a joint's top speed from which on it is fast.
+const FAST: f64 = 0.5;
+
+/// The fastest that each joint is commanded to move in any clip [rad/s].
+pub(super) struct Regimes(Vec<f64>);
+
+impl Regimes {
+    pub(super) fn of(clips: &[Clip], dof: usize) -> Self {
+        let speed = |joint: usize| {
+            let rows = clips.iter().flat_map(|clip| {
+                (0..clip.desired.len()).filter_map(move |row| clip.desired.dq_row(row).map(|dq| dq[joint].abs()))
+            });
+            rows.fold(0.0, f64::max)
+        };
+        Self((0..dof).map(speed).collect())
+    }
+
+    /// By the command that holds at a stamp; without desired velocities every joint stands.
+    pub(super) fn at(&self, desired: &JointSeries, stamp_ns: u64, joint: usize) -> &'static str {
+        let row = desired.stamps_ns.partition_point(|stamp| *stamp <= stamp_ns).saturating_sub(1);
+        let dq = desired.dq_row(row).map_or(0.0, |dq| dq[joint]);
+        match dq {
+            _ if dq.abs() < STILL => "standing or turning round",
+            _ if dq > FAST * self.0[joint] => "fast forward",
+            _ if dq < -FAST * self.0[joint] => "fast backward",
+            _ if dq > 0.0 => "slow forward",
+            _ => "slow backward",
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_command_that_holds_says_what_a_joint_does_whichever_rows_were_logged() {
+        let rows = [0.0, 0.1, 1.0, -0.6, -0.1];
+        let stamps_ns = (0..rows.len() as u64).map(|row| 500 + 10 * row).collect();
+        let desired = JointSeries { dof: 1, stamps_ns, q: vec![0.0; rows.len()], dq: rows.to_vec(), tau: Vec::new() };
+        let regimes = Regimes(vec![1.0]);
+        let at = |stamp_ns| regimes.at(&desired, stamp_ns, 0);
+        assert_eq!(
+            [at(504), at(510), at(529), at(530), at(600)],
+            ["standing or turning round", "slow forward", "fast forward", "fast backward", "slow backward"]
+        );
+        let bare = JointSeries { dq: Vec::new(), ..desired.clone() };
+        assert_eq!(regimes.at(&bare, 529, 0), "standing or turning round");
+    }
+}
