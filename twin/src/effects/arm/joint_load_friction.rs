@@ -6,7 +6,7 @@
 //! - Source: Dohring et al. 1993; load-dependent term of Rhoban's BAM actuator models.
 //! - Unit: 1. Plausible: 0.01 to 0.25 (hobby servos the upper end).
 //! - Signature (C6): odd in velocity; its size follows the gravity torque over the pose.
-//! - Confused with: Coulomb friction (alike in one pose), torque gain, payload.
+//! - Confused with: Coulomb, Stribeck and presliding friction (alike in one pose), torque gain, payload.
 
 use super::joint_coulomb_friction::CREEP;
 use crate::arm::Joints;
@@ -25,7 +25,13 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
             .elsewhere(Elsewhere::Range([0.0, 0.8])),
         CREEP,
     ],
-    confusable_with: &["joint_coulomb_friction", "torque_gain", "payload"],
+    confusable_with: &[
+        "joint_coulomb_friction",
+        "joint_presliding_friction",
+        "joint_stribeck_friction",
+        "torque_gain",
+        "payload",
+    ],
     separated: &[],
     install: |values, effects| {
         effects.arm.joint_load_friction =
