@@ -3,10 +3,11 @@
 //!
 //! Effects are taken in the order in which they were found. They are believed as long as each stood out on clips that were
 //! not fitted (nearly all of them, far beyond chance, no other effect half as good), and all together close a real share of the
-//! squared gap on the clips kept for confirming: the whole 90 % interval of the share lies above it. Where an effect that is
-//! known to look alike does as well, it is proven that one of the two acts, and both are said. One that is stronger than
-//! what is met in practice is said to be unusual: a range is what is known beforehand, and no bar for what the clips show.
-//! What comes after them in the search belongs to the rest.
+//! squared gap on the clips kept for confirming: the whole 90 % interval of the share lies above it. Where it does not, the
+//! interval of all that the search found may: then those that are believed have to close more than half of what all of it
+//! does. Where an effect that is known to look alike does as well, it is proven that one of the two acts, and both are said. One
+//! that is stronger than what is met in practice is said to be unusual: a range is what is known beforehand, and no bar for
+//! what the clips show. What comes after them in the search belongs to the rest.
 
 use super::gap::Residuals;
 use super::held_out::{self, Fits};
@@ -48,6 +49,11 @@ pub(in crate::diagnose) fn proven<E: Evidence>(
     seed: u64,
 ) -> Option<Partly> {
     let all = found.last.effects.len();
+    let of_all = || {
+        let all = (&found.last, &found.steps.last()?.weights[..]);
+        Some(held_out::residuals(bench, split, all)?.shrink(before, seed))
+    };
+    let most_of = |share: &Share, all: Share| all.ci90[0] > REAL_SHARE && share.value > REAL_SHARE * all.value;
     let one = |count: usize| {
         let weights = &with_effects(&found.steps, count).or(found.steps.last())?.weights;
         let last = if count == all { &found.last } else { &with_effects(&found.steps, count)?.from };
@@ -57,7 +63,8 @@ pub(in crate::diagnose) fn proven<E: Evidence>(
         let after = Residuals::of(bench, &fits)?;
         let share = after.shrink(before, seed);
         let unusual = !remainder::implausible(bench, last).is_empty();
-        (share.ci90[0] > REAL_SHARE).then_some(Partly { found: until, fits, after, share, unusual, rivals })
+        let real = share.ci90[0] > REAL_SHARE || of_all().is_some_and(|all| most_of(&share, all));
+        real.then_some(Partly { found: until, fits, after, share, unusual, rivals })
     };
     (1..=all).rev().find_map(one)
 }
@@ -168,6 +175,21 @@ mod tests {
             let both = Found { steps: vec![beside, found(20.0, &last).steps[1].clone()], last: last.clone() };
             let [named, rivals] = proven(&both).expect("one of two that look alike acts").effects(bench);
             assert_eq!([named, rivals], [vec!["command_delay".to_owned()], vec!["command_lag".to_owned()]]);
+            // A part of the delay, that closes less than half of the gap, and a larger part beside another effect.
+            let to = |share: f64, effects: &[usize]| {
+                let mut full = baseline.full.clone();
+                let mut go = |k: usize| full[k] += share * (last.full[k] - baseline.full[k]);
+                library.candidates[effect].numbers.clone().for_each(&mut go);
+                Hypothesis { effects: effects.to_vec(), full, ..baseline.clone() }
+            };
+            let alone = to(0.28, &[effect]);
+            assert!(proven(&found(20.0, &alone)).is_none(), "less than half of the gap");
+            let first = Step { from: alone.clone(), ..found(20.0, &alone).steps[1].clone() };
+            let two = to(0.55, &[effect, other]);
+            let end = Step { from: two.clone(), ..first.clone() };
+            let steps = vec![found(20.0, &alone).steps[0].clone(), first, end];
+            let partly = proven(&Found { steps, last: two }).expect("most of what was found");
+            assert!(partly.effects(bench)[0] == ["command_delay"] && partly.share.value < 0.5, "{:?}", partly.share);
             let useless = Hypothesis { effects: vec![effect], ..baseline.clone() };
             assert!(proven(&found(20.0, &useless)).is_none(), "nothing of the gap closes");
         });
