@@ -130,7 +130,8 @@ fn joints_that_recordings_call_otherwise_than_the_urdf_are_taken_by_place() {
         (replay["good"].clone(), replay["why"].to_string())
     };
     assert_eq!(replayed(&text), (true.into(), "\"\"".to_owned()));
-    let unnamed: String = text.lines().filter(|line| !line.starts_with("joints")).flat_map(|line| [line, "\n"]).collect();
+    let unnamed: String =
+        text.lines().filter(|line| !line.starts_with("joints")).flat_map(|line| [line, "\n"]).collect();
     let (good, why) = replayed(&unnamed);
     assert!(good == false && why.contains("`joints` beside `urdf`"), "{why}");
 }

@@ -41,7 +41,7 @@ pub fn examine(world: &World, clips: Vec<Clip>, interrupt: &Interrupt) -> Result
     let library = Library::new(&world.cell, &base, admitted.ground().as_ref(), &peaks);
     let theta = |numbers: &[f64]| library.theta(numbers);
     let arm = ArmClips::new(&world.cell, &admitted.clips, theta).map_err(Refused::from)?;
-    let split = Split::new(&admitted.groups, options.seed);
+    let split = admitted.split(options.seed);
     let court = Court { world, library: &library, split, admitted: &admitted, interrupt };
     if admitted.with_object {
         let object = ObjectClips::new(&world.cell, admitted.clips.clone(), library.settings.clone())?;
@@ -62,8 +62,9 @@ pub(super) fn sealed(world: &World, clips: Vec<Clip>) -> (Session, Admitted) {
         files: SessionFiles::default(),
     };
     let with_object = clips.iter().all(|clip| clip.kind == ClipKind::ControlHitSlide);
-    let admitted = Admitted { groups: split::by_command(&clips), clips, files, with_object, warnings: Vec::new() };
-    (session, admitted)
+    let groups = split::by_command(&clips);
+    let admitted = Admitted { commands: groups.len(), groups, clips, files, with_object, warnings: Vec::new() };
+    (session, admitted.in_parts())
 }
 
 struct Court<'a> {

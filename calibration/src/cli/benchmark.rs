@@ -47,8 +47,8 @@ pub(super) struct BenchmarkArguments {
     /// Regenerates the criteria of a diagnosis from folders of labelled sessions instead.
     #[arg(long, value_name = "FOLDER", num_args = 1.., conflicts_with_all = ["size", "short", "null", "report", "clips", "seed", "cell"])]
     calibrate: Vec<PathBuf>,
-    /// Clips in each session, 8 to 64.
-    #[arg(long, value_name = "N", default_value_t = 8, value_parser = clap::value_parser!(u64).range(8..=64))]
+    /// Clips in each session, 4 to 64; fewer than 8 of an arm alone count in parts.
+    #[arg(long, value_name = "N", default_value_t = 8, value_parser = clap::value_parser!(u64).range(4..=64))]
     clips: u64,
     /// Number of the first world.
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = calibration::seed::parse)]

@@ -46,7 +46,6 @@ use crate::identify::arm::{self, ArmError};
 use crate::interrupt::Interrupt;
 use crate::kept::{self, Fingerprint, Kept, Trail};
 use clips::admit::{Admitted, Refused, admit};
-use clips::split::Split;
 use evidence::arm_clips::ArmClips;
 use evidence::cell_clips::CellClips;
 use evidence::measured::Evidence;
@@ -159,6 +158,7 @@ pub fn diagnose_kept(
     let mut admitted = admitted;
     let (known, remarks) = (options.theta.as_ref(), &mut admitted.warnings);
     let cell = arm::controlled(session.cell.clone(), &admitted.clips, known, remarks, interrupt)?;
+    let admitted = admitted.in_parts();
     let session = &Session { cell, ..session.clone() };
     let question = Fingerprint::of("diagnose")
         .with(&(session.cell.to_toml(), options.theta.as_ref().map(Theta::to_toml), options.seed, options.torques))
@@ -270,7 +270,7 @@ fn examine<E: Evidence>(
     (interrupt, trail): Work<'_>,
 ) -> Result<Diagnosis, DiagnoseError> {
     let bench = Bench { evidence, library, scatter: evidence.scatter(), interrupt, trail };
-    let split = Split::new(&admitted.groups, options.seed);
+    let split = admitted.split(options.seed);
     let plan: &[_] = if admitted.with_object { &fit::stages::OBJECT } else { &fit::stages::ARM };
     let bar = Progress::planned("diagnose", plan, search::baseline::steps(admitted));
     let baseline =

@@ -8,7 +8,8 @@ use std::path::Path;
 pub(crate) fn grouped<'a>(remarks: impl IntoIterator<Item = (&'a str, &'a str)>) -> Vec<String> {
     let mut kinds: Vec<(String, &str, &str, usize)> = Vec::new();
     for (file, remark) in remarks {
-        let remark = remark.split_once(": ").filter(|(path, _)| Path::new(path).ends_with(file)).map_or(remark, |(_, r)| r);
+        let remark =
+            remark.split_once(": ").filter(|(path, _)| Path::new(path).ends_with(file)).map_or(remark, |(_, r)| r);
         let kind: String = remark.chars().filter(|c| !c.is_ascii_digit()).collect();
         match kinds.iter_mut().find(|(known, ..)| *known == kind) {
             Some((.., more)) => *more += 1,

@@ -124,7 +124,10 @@ impl Known {
         let joints = &about.contents.joints;
         if joints.len() == arm.dof() && arm.joint_names().iter().all(|name| !joints.contains(name)) {
             let described = arm.joint_names().join(", ");
-            self.remarks.push(("robot", format!("`joints` in the recordings are {described} in the URDF, by place; check it.")));
+            self.remarks.push((
+                "robot",
+                format!("`joints` in the recordings are {described} in the URDF, by place; check it."),
+            ));
             arm.call_joints(joints)?;
             robot.joints.clone_from(joints);
             self.take("robot.joints", &format!("{flag}: its joint names"));

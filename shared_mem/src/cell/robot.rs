@@ -87,7 +87,8 @@ impl Robot {
     }
 
     pub(super) fn check(&self) -> Result<(), String> {
-        let ways = usize::from(self.model.is_some()) + usize::from(self.urdf.is_some()) + usize::from(self.joints_only());
+        let ways =
+            usize::from(self.model.is_some()) + usize::from(self.urdf.is_some()) + usize::from(self.joints_only());
         if ways != 1 || self.model.is_some() && !self.joints.is_empty() {
             return Err("`[robot]` needs exactly one of `model = \"fr3\"`, `urdf = \"file.urdf\"` (with `joints = [names]` where \
                         recordings name its joints otherwise) or `joints = [names]` alone"

@@ -88,7 +88,8 @@ impl Pair {
         }
         let files = [tagged("A/", a.files), tagged("B/", b.files)].concat();
         let with_object = a.with_object && b.with_object;
-        Self { admitted: Admitted { clips, files, groups, with_object, warnings }, first_of_b }
+        let commands = groups.len();
+        Self { admitted: Admitted { clips, files, groups, commands, with_object, warnings }, first_of_b }
     }
 }
 

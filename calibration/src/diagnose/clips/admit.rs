@@ -19,6 +19,8 @@ pub struct Admitted {
     pub files: Vec<String>,
     /// Clips of one command, as indices.
     pub groups: Vec<Vec<usize>>,
+    /// How many different commands they have.
+    pub commands: usize,
     /// Whether every clip has an object: one that the arm hits, or one alone.
     pub with_object: bool,
     /// What a reader has to know about the clips, one sentence each.
@@ -115,7 +117,8 @@ pub fn admit(session: &Session) -> Result<Admitted, Refused> {
     }
     let all = |kind: ClipKind| clips.iter().all(|clip| clip.kind == kind);
     let with_object = !tracking && (all(ClipKind::ControlHitSlide) || all(ClipKind::FreeMotion));
-    Ok(Admitted { clips, files, groups, with_object, warnings })
+    let commands = groups.len();
+    Ok(Admitted { clips, files, groups, commands, with_object, warnings })
 }
 
 /// The clip with what could be mended mended and its joints in the model's order, and what is odd about it; the reason why

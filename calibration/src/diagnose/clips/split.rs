@@ -29,14 +29,10 @@ impl Split {
     /// see the whole session. `seed` turns the order. Fewer than eight are left out in turn.
     #[must_use]
     pub fn new(groups: &[Vec<usize>], seed: u64) -> Self {
-        let mut split = Self::default();
         if groups.len() < FEW {
-            split.in_turn = groups.to_vec();
-            split.train = groups.concat();
-            split.train.sort_unstable();
-            split.confirm.clone_from(&split.train);
-            return split;
+            return Self::in_turn(groups);
         }
+        let mut split = Self::default();
         let offset = usize::try_from(seed % 4).unwrap_or(0);
         for (place, group) in groups.iter().enumerate() {
             let set = match (place + offset) % 4 {
@@ -50,6 +46,14 @@ impl Split {
             set.sort_unstable();
         }
         split
+    }
+
+    /// All clips for training and for confirming, each group left out in turn.
+    #[must_use]
+    pub fn in_turn(groups: &[Vec<usize>]) -> Self {
+        let mut all = groups.concat();
+        all.sort_unstable();
+        Self { train: all.clone(), choose: Vec::new(), confirm: all, in_turn: groups.to_vec() }
     }
 
     /// Clips that tell whether a fit does harm elsewhere: those for choosing, or all where none can be spared.

@@ -129,7 +129,11 @@ pub fn conclude<E: Evidence>(
             decision.said(text)
         }
     };
-    let names = |set: &[usize]| set.iter().map(|clip| admitted.files[*clip].clone()).collect();
+    let names = |set: &[usize]| {
+        let mut files: Vec<String> = set.iter().map(|clip| admitted.files[*clip].clone()).collect();
+        files.dedup();
+        files
+    };
     let largest = rest.first().map(|place| (place.channel.as_str(), place.regime.as_str()));
     let rest_is_open = partly.is_some() || finding.open().is_some();
     let site = Site::of(session, options.report.as_deref());
@@ -167,7 +171,7 @@ pub fn conclude<E: Evidence>(
         seed: options.seed,
         theta: Theta { object: known.and_then(|known| known.object.clone()), ..theta },
         theta_file: None,
-        traces: traces(bench.evidence, (&before, if nearest.is_some() { after } else { shown }), &admitted.files),
+        traces: traces(bench.evidence, (&before, if nearest.is_some() { after } else { shown }), admitted),
         nearest,
     })
 }
@@ -214,17 +218,21 @@ fn warnings(library: &Library, kept: &Hypothesis, (admitted, split): (&Admitted,
             "{name} was found as strong as it is looked for: it may be stronger, or something else that looks like it"
         )
     };
-    admitted.warnings.iter().cloned().chain(few(split)).chain(ended.map(sentence)).collect()
+    admitted.warnings.iter().cloned().chain(few(admitted.commands, split)).chain(ended.map(sentence)).collect()
 }
 
 /// What has to be known about clips of few commands.
-fn few(split: &Split) -> Option<String> {
+fn few(commands: usize, split: &Split) -> Option<String> {
     let count = split.in_turn.len();
+    let [in_parts, all] = match count > commands {
+        true => [format!("their clips count in {count} parts, "), "parts".to_owned()],
+        false => [String::new(), "of them".to_owned()],
+    };
     (count > 0).then(|| {
         format!(
-            "only {count} different commands: effects are chosen by all of them, and each in turn is left out of the fit that its gap is \
-             measured with; record {} more to have clips that nothing was chosen by",
-            split::FEW - count
+            "only {commands} different commands: {in_parts}effects are chosen by all {all}, and each in turn is left out of the fit \
+             that its gap is measured with; record {} more to have clips that nothing was chosen by",
+            split::FEW - commands
         )
     })
 }
@@ -356,7 +364,7 @@ fn stands_in<E: Evidence>(
 }
 
 /// Residuals of the channels with the largest gap, before and after, on the confirm clips.
-fn traces(evidence: &impl Evidence, (before, after): (&Residuals, &Residuals), files: &[String]) -> Vec<Trace> {
+fn traces(evidence: &impl Evidence, (before, after): (&Residuals, &Residuals), admitted: &Admitted) -> Vec<Trace> {
     let mut sized: Vec<(f64, usize, usize)> = Vec::new();
     for (place, (clip, residuals)) in before.clips.iter().enumerate() {
         for channel in 0..evidence.channels().len() {
@@ -373,7 +381,7 @@ fn traces(evidence: &impl Evidence, (before, after): (&Residuals, &Residuals), f
         };
         let when = if info.group == Group::Contact { " in contact" } else { "" };
         Trace {
-            clip: files[clip].clone(),
+            clip: admitted.label(clip),
             channel: format!("{} of {}{when}", info.quantity, channel_in_words(&info.place)),
             unit: "σ".into(),
             sigma: 1.0,

@@ -104,7 +104,8 @@ mod tests {
     fn of(world: &World) -> StageTest {
         let clips = record(world, 2).expect("a session");
         let (files, groups) = (vec![String::new(); 2], split::by_command(&clips));
-        let admitted = Admitted { clips, files, groups, with_object: true, warnings: Vec::new() };
+        let admitted =
+            Admitted { clips, files, commands: groups.len(), groups, with_object: true, warnings: Vec::new() };
         let mut theta = setting::complete(&world.cell, None).expect("a cell");
         (theta.arm, theta.object) = (world.hidden.arm.clone(), world.hidden.object.clone());
         stage_test(&world.cell, &theta, &admitted, &[0, 1]).expect("an answer").expect("an object")
