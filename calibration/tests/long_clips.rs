@@ -4,7 +4,6 @@ use calibration::benchmark::session::record;
 use calibration::benchmark::world::{Fault, Kind, World};
 use calibration::diagnose::clips::admit::Admitted;
 use calibration::diagnose::clips::length::liveliest;
-use calibration::diagnose::clips::split::by_command;
 use calibration::diagnose::{self, Options, diagnose_clips};
 use calibration::interrupt::Interrupt;
 use shared_mem::cell::Cell;
@@ -44,11 +43,11 @@ fn a_late_command_is_named_out_of_clips_of_a_minute() {
     assert!(said.contains("of 8 long clips the 12.0 s") && said.contains("96 s of 480 s"), "{said}");
     // As few as are diagnosed: eight take twice as long and say the same.
     clips.truncate(4);
-    let groups = by_command(&clips);
     let files = clips.iter().map(|clip| clip.file.display().to_string()).collect();
     let cell = world.cell.clone();
     let session = Session { folder: "minutes".into(), cell, clips: Vec::new(), files: SessionFiles::default() };
-    let admitted = Admitted { groups, clips, files, with_object: false, warnings: Vec::new() };
+    let admitted = Admitted::of(clips, files, false).in_parts();
+    assert_eq!((admitted.commands, admitted.clips.len()), (4, 12));
     let found = diagnose_clips(&session, &admitted, &Options::default(), &Interrupt::default()).expect("a diagnosis");
     assert_eq!(found.verdict.kind, diagnose::Kind::Named, "{:?}", found.verdict);
     assert_eq!(found.verdict.effects, ["command_delay"]);

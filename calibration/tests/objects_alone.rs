@@ -1,7 +1,6 @@
 //! An object that slides by itself, no robot: what the table does to it is named, and nothing where nothing is wrong.
 
 use calibration::diagnose::clips::admit::Admitted;
-use calibration::diagnose::clips::split::by_command;
 use calibration::diagnose::{Diagnosis, Kind, Options, diagnose_clips};
 use calibration::interrupt::Interrupt;
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
@@ -65,7 +64,7 @@ fn diagnosed(hidden: &str) -> Diagnosis {
     let clips: Vec<Clip> = (0..12).map(|number| slide(&cell, &hidden, number)).collect();
     let files = clips.iter().map(|clip| clip.file.display().to_string()).collect();
     let session = Session { folder: "slides".into(), cell, clips: Vec::new(), files: SessionFiles::default() };
-    let admitted = Admitted { groups: by_command(&clips), clips, files, with_object: true, warnings: Vec::new() };
+    let admitted = Admitted::of(clips, files, true);
     diagnose_clips(&session, &admitted, &Options::default(), &Interrupt::default()).expect("a diagnosis")
 }
 

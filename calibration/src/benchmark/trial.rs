@@ -5,7 +5,7 @@ use super::rules;
 use super::score::{Case, Said, Truth};
 use super::world::World;
 use crate::diagnose::clips::admit::{Admitted, Refused};
-use crate::diagnose::clips::split::{self, Split};
+use crate::diagnose::clips::split::Split;
 use crate::diagnose::evidence::arm_clips::ArmClips;
 use crate::diagnose::evidence::cell_clips::CellClips;
 use crate::diagnose::evidence::measured::Evidence;
@@ -62,9 +62,7 @@ pub(super) fn sealed(world: &World, clips: Vec<Clip>) -> (Session, Admitted) {
         files: SessionFiles::default(),
     };
     let with_object = clips.iter().all(|clip| clip.kind == ClipKind::ControlHitSlide);
-    let groups = split::by_command(&clips);
-    let admitted = Admitted { commands: groups.len(), groups, clips, files, with_object, warnings: Vec::new() };
-    (session, admitted.in_parts())
+    (session, Admitted::of(clips, files, with_object).in_parts())
 }
 
 struct Court<'a> {

@@ -28,6 +28,13 @@ pub struct Admitted {
 }
 
 impl Admitted {
+    /// Clips that need no look: `files` are theirs, `with_object` as in the field.
+    #[must_use]
+    pub fn of(clips: Vec<Clip>, files: Vec<String>, with_object: bool) -> Self {
+        let groups = split::by_command(&clips);
+        Self { commands: groups.len(), groups, clips, files, with_object, warnings: Vec::new() }
+    }
+
     /// Whether objects move by themselves in all clips: tosses and slides.
     #[must_use]
     pub fn objects_alone(&self) -> bool {

@@ -81,7 +81,6 @@ fn in_equal_parts(clip: &Clip, count: usize) -> impl Iterator<Item = Clip> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::split::by_command;
     use super::*;
     use shared_mem::recording::{JointSeries, ObjectSeries};
 
@@ -106,8 +105,7 @@ mod tests {
 
     fn admitted(clips: Vec<Clip>) -> Admitted {
         let files = (0..clips.len()).map(|i| format!("{i}.mcap")).collect();
-        let groups = by_command(&clips);
-        Admitted { commands: groups.len(), groups, clips, files, with_object: false, warnings: Vec::new() }
+        Admitted::of(clips, files, false)
     }
 
     #[test]

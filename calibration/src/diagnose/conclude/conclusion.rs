@@ -129,11 +129,6 @@ pub fn conclude<E: Evidence>(
             decision.said(text)
         }
     };
-    let names = |set: &[usize]| {
-        let mut files: Vec<String> = set.iter().map(|clip| admitted.files[*clip].clone()).collect();
-        files.dedup();
-        files
-    };
     let largest = rest.first().map(|place| (place.channel.as_str(), place.regime.as_str()));
     let rest_is_open = partly.is_some() || finding.open().is_some();
     let site = Site::of(session, options.report.as_deref());
@@ -160,7 +155,7 @@ pub fn conclude<E: Evidence>(
         verdict,
         stage_test: None,
         places,
-        clips: Clips { train: names(&split.train), choose: names(&split.choose), confirm: names(&split.confirm) },
+        clips: clips(admitted, split),
         warnings: warnings(bench.library, kept, (admitted, split)),
         budget_spent: false,
         engine: None,
@@ -196,6 +191,16 @@ fn unseen<E: Evidence>(
     let fits = held_out::fits(bench, split, hypothesis).ok_or(DiagnoseError::NoBaseline)?;
     let left = Residuals::of(bench, &fits).ok_or(DiagnoseError::NoBaseline)?;
     Ok((fits, left))
+}
+
+/// The files that are for what, each once.
+fn clips(admitted: &Admitted, split: &Split) -> Clips {
+    let files = |set: &[usize]| {
+        let mut files: Vec<String> = set.iter().map(|clip| admitted.files[*clip].clone()).collect();
+        files.dedup();
+        files
+    };
+    Clips { train: files(&split.train), choose: files(&split.choose), confirm: files(&split.confirm) }
 }
 
 /// How far the gap shrinks with an effect that is not proven; `None` where it widens: that is no lead.

@@ -127,71 +127,107 @@ mod tests {
     use crate::forward::setting;
     use shared_mem::msg::MAX_JOINTS;
 
-    #[test]
-    fn an_effect_is_proven_where_it_stands_out_alone_and_closes_most_of_the_gap() {
+    fn likelier(nats: f64) -> Predicted {
+        Predicted { clips: (0..12).map(|clip| (clip, 1000.0 - nats / 6.0)).collect() }
+    }
+
+    fn trial(library: &Library, candidate: usize, (fitted, nats): (&Hypothesis, f64)) -> Trial {
+        Trial {
+            scored: Scored { signal: 30.0, ..nothing_said_of(library, candidate) },
+            fitted: Some((fitted.clone(), likelier(nats).over(&likelier(0.0)))),
+            closes: 0.9,
+            own_numbers: false,
+        }
+    }
+
+    fn step(from: &Hypothesis, trials: Vec<Trial>) -> Step {
+        Step {
+            from: from.clone(),
+            trials,
+            predicted: likelier(0.0),
+            weights: vec![1.0; 4 * MAX_JOINTS],
+            arm_rows: 100,
+            left: Vec::new(),
+            whole: Vec::new(),
+        }
+    }
+
+    /// Clips of a world with a command delay; what a search found in it is made of a fit without an effect and one with the truth.
+    fn in_a_world_with_a_delay(
+        tested: impl FnOnce(&Library, &Hypothesis, &Hypothesis, &dyn Fn(&Found) -> Option<Named>),
+    ) {
         let (cell, base) = (shipped(), setting::complete(&shipped(), None).expect("a cell"));
         let world = with_effect("command_delay", 3, Kind::Excitation, &cell);
         let library = Library::new(&cell, &base, None, &[87.0; MAX_JOINTS]);
         on_bench((&cell, &world), &library, |bench, even| {
-            let [effect, other] = ["command_delay", "payload"].map(|name| library.find(name).expect("a candidate"));
+            let effect = library.find("command_delay").expect("a candidate");
             let with = truth(&library, &world);
             let mut without = with.clone();
             library.candidates[effect].numbers.clone().for_each(|k| without[k] = library.start()[k]);
             let fit = |effects: &[usize], full| bench.fit((effects, full), &[0], even, None, ONCE).expect("a fit");
             let (baseline, last) = (fit(&[], without), fit(&[effect], with));
-            let likelier = |nats: f64| Predicted { clips: (0..12).map(|clip| (clip, 1000.0 - nats / 6.0)).collect() };
-            let trial = |candidate, fitted: &Hypothesis, nats| Trial {
-                scored: Scored { signal: 30.0, ..nothing_said_of(&library, candidate) },
-                fitted: Some((fitted.clone(), likelier(nats).over(&likelier(0.0)))),
-                closes: 0.9,
-                own_numbers: false,
-            };
-            let found = |rival: f64, last: &Hypothesis| {
-                let step = |from: &Hypothesis, trials| Step {
-                    from: from.clone(),
-                    trials,
-                    predicted: likelier(0.0),
-                    weights: vec![1.0; even.len()],
-                    arm_rows: 100,
-                    left: Vec::new(),
-                    whole: Vec::new(),
-                };
-                let trials = vec![trial(effect, last, 300.0), trial(other, last, rival)];
-                Found { steps: vec![step(&baseline, trials), step(last, Vec::new())], last: last.clone() }
-            };
             let split = Split { train: vec![0], confirm: vec![1], ..Split::default() };
             let before = Residuals::at(bench, &baseline, &split.confirm).expect("it can be simulated");
-            let proven = |found: &Found| proven(bench, (&split, found), &before, &[1.0; 2], 0);
-            let partly = proven(&found(20.0, &last)).expect("it is");
+            let named = |found: &Found| {
+                let partly = proven(bench, (&split, found), &before, &vec![1.0; found.steps.len()], 0)?;
+                Some(Named { share: partly.share, effects: partly.effects(bench) })
+            };
+            tested(&library, &baseline, &last, &named);
+        });
+    }
+
+    struct Named {
+        share: Share,
+        effects: [Vec<String>; 2],
+    }
+
+    #[test]
+    fn an_effect_is_proven_where_it_stands_out_alone_and_closes_most_of_the_gap() {
+        in_a_world_with_a_delay(|library, baseline, last, proven| {
+            let [effect, other, alike] =
+                ["command_delay", "payload", "command_lag"].map(|name| library.find(name).expect("a candidate"));
+            let found = |(rival, nats): (usize, f64), last: &Hypothesis| {
+                let trials = vec![trial(library, effect, (last, 300.0)), trial(library, rival, (last, nats))];
+                let steps = vec![step(baseline, trials), step(last, Vec::new())];
+                Found { steps, last: last.clone() }
+            };
+            let partly = proven(&found((other, 20.0), last)).expect("it is");
+            let [named, rivals] = partly.effects;
             assert!(
-                partly.share.ci90[0] > 0.9 && partly.effects(bench)[0] == ["command_delay"] && partly.rivals.is_empty(),
+                partly.share.ci90[0] > 0.9 && named == ["command_delay"] && rivals.is_empty(),
                 "{:?}",
                 partly.share
             );
-            assert!(proven(&found(290.0, &last)).is_none(), "another effect does as well");
-            let alike = library.find("command_lag").expect("a candidate");
-            let step = &found(20.0, &last).steps[0];
-            let beside = Step { trials: vec![trial(effect, &last, 300.0), trial(alike, &last, 298.0)], ..step.clone() };
-            let both = Found { steps: vec![beside, found(20.0, &last).steps[1].clone()], last: last.clone() };
-            let [named, rivals] = proven(&both).expect("one of two that look alike acts").effects(bench);
-            assert_eq!([named, rivals], [vec!["command_delay".to_owned()], vec!["command_lag".to_owned()]]);
-            // A part of the delay, that closes less than half of the gap, and a larger part beside another effect.
+            assert!(proven(&found((other, 290.0), last)).is_none(), "another effect does as well");
+            let both = proven(&found((alike, 298.0), last)).expect("one of two that look alike acts");
+            assert_eq!(both.effects, [vec!["command_delay".to_owned()], vec!["command_lag".to_owned()]]);
+            let useless = Hypothesis { effects: vec![effect], ..baseline.clone() };
+            assert!(proven(&found((other, 20.0), &useless)).is_none(), "nothing of the gap closes");
+        });
+    }
+
+    #[test]
+    fn an_effect_that_closes_less_than_half_is_proven_where_it_is_most_of_what_was_found() {
+        in_a_world_with_a_delay(|library, baseline, last, proven| {
+            let [effect, other] = ["command_delay", "payload"].map(|name| library.find(name).expect("a candidate"));
             let to = |share: f64, effects: &[usize]| {
                 let mut full = baseline.full.clone();
-                let mut go = |k: usize| full[k] += share * (last.full[k] - baseline.full[k]);
-                library.candidates[effect].numbers.clone().for_each(&mut go);
+                let numbers = library.candidates[effect].numbers.clone();
+                numbers.for_each(|k| full[k] += share * (last.full[k] - baseline.full[k]));
                 Hypothesis { effects: effects.to_vec(), full, ..baseline.clone() }
             };
-            let alone = to(0.28, &[effect]);
-            assert!(proven(&found(20.0, &alone)).is_none(), "less than half of the gap");
-            let first = Step { from: alone.clone(), ..found(20.0, &alone).steps[1].clone() };
-            let two = to(0.55, &[effect, other]);
-            let end = Step { from: two.clone(), ..first.clone() };
-            let steps = vec![found(20.0, &alone).steps[0].clone(), first, end];
+            // What an error of the delay leaves grows with its square.
+            let (alone, two) = (to(0.28, &[effect]), to(0.55, &[effect, other]));
+            let first = || {
+                let trials = [(effect, 300.0), (other, 20.0)];
+                step(baseline, trials.map(|(k, nats)| trial(library, k, (&alone, nats))).to_vec())
+            };
+            let last = step(&alone, Vec::new());
+            let found = Found { steps: vec![first(), last.clone()], last: alone.clone() };
+            assert!(proven(&found).is_none(), "less than half of the gap");
+            let steps = vec![first(), last, step(&two, Vec::new())];
             let partly = proven(&Found { steps, last: two }).expect("most of what was found");
-            assert!(partly.effects(bench)[0] == ["command_delay"] && partly.share.value < 0.5, "{:?}", partly.share);
-            let useless = Hypothesis { effects: vec![effect], ..baseline.clone() };
-            assert!(proven(&found(20.0, &useless)).is_none(), "nothing of the gap closes");
+            assert!(partly.effects[0] == ["command_delay"] && partly.share.value < 0.5, "{:?}", partly.share);
         });
     }
 }

@@ -96,16 +96,13 @@ mod tests {
     use super::*;
     use crate::benchmark::session::record;
     use crate::benchmark::world::{Kind, World};
-    use crate::diagnose::clips::split;
     use crate::diagnose::test_bench::{shipped, with_effect};
     use crate::forward::setting;
 
     /// The test of strokes in a world under what the laboratory knows, with the true gains and object.
     fn of(world: &World) -> StageTest {
         let clips = record(world, 2).expect("a session");
-        let (files, groups) = (vec![String::new(); 2], split::by_command(&clips));
-        let admitted =
-            Admitted { clips, files, commands: groups.len(), groups, with_object: true, warnings: Vec::new() };
+        let admitted = Admitted::of(clips, vec![String::new(); 2], true);
         let mut theta = setting::complete(&world.cell, None).expect("a cell");
         (theta.arm, theta.object) = (world.hidden.arm.clone(), world.hidden.object.clone());
         stage_test(&world.cell, &theta, &admitted, &[0, 1]).expect("an answer").expect("an object")
