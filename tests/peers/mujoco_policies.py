@@ -4,12 +4,12 @@
     python tests/peers/mujoco_policies.py demonstrate tasks/close_laptop.toml --commands laptop_lerobot --out laptop_mujoco
     python tests/peers/mujoco_policies.py trials tasks/close_laptop.toml --program target/release/twin \\
       --policy twin=ws://localhost:8000 --seed 1000 --episodes 60 --out twin.csv
-    python tests/peers/mujoco_policies.py compare twin.csv mujoco.csv
+    python tests/peers/mujoco_policies.py compare twin_0.csv twin_1.csv --to mujoco_0.csv mujoco_1.csv
 
 `identified` writes the task file as identification would leave it: what is hidden, with errors as in mujoco_scene/hidden.py. `demonstrate`
 sends the commands of a data set of the twin to the arm in MuJoCo from the same starts, and keeps what was a success, as a data set
 that adapters/cloud_policy/train.py reads. `trials` writes a world for `calibration evaluate --worlds twin,FILE.csv`. `compare` says
-how often each policy succeeds and the ratio of the first to the second, start by start.
+how often each policy succeeds and the ratio of the first ones to the others, over starts and trainings.
 
     pip install -r tests/peers/requirements.txt pyarrow pillow tomli-w websockets msgpack; where there is no screen, MUJOCO_GL=egl
 """
@@ -121,24 +121,44 @@ def trials(given):
     print(f"{name}: {wins} of {len(starts)}")
 
 
-def compare(given):
-    sides = []
-    for path in (given.first, given.second):
+def table(paths):
+    """Successes (task, start): [trainings] of files that have the same starts, or those that all of them have."""
+    found = []
+    for path in paths:
         with open(path, newline="") as stream:
-            sides.append({(row["task"], row["start"]): int(row["success"]) for row in csv.DictReader(stream)})
-    both = sorted(set(sides[0]) & set(sides[1]))
+            found.append({(row["task"], row["start"]): int(row["success"]) for row in csv.DictReader(stream)})
+    return {key: [one[key] for one in found] for key in found[0] if all(key in one for one in found)}
+
+
+def ratios(first, second, draws=20000, seed=0):
+    """Ratios [draws] of the mean success of the first [trainings, starts] to that of the second [trainings, starts], the starts being the same
+    ones. Starts are drawn again for both sides together, trainings on each side by itself, one fewer than there are (Rao and Wu 1988:
+    then the spread of a mean of few has no bias)."""
+    generator = np.random.default_rng(seed)
+    starts = generator.integers(first.shape[1], size=(draws, first.shape[1]))
+    shares = []
+    for side in (first, second):
+        trainings = generator.integers(len(side), size=(draws, max(1, len(side) - 1)))
+        shares.append(side[trainings[:, :, None], starts[:, None, :]].mean(axis=(1, 2)))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return shares[0] / shares[1]
+
+
+def compare(given):
+    first, second = table(given.first), table(given.to)
+    both = sorted(set(first) & set(second))
     if not both:
         raise ValueError("the files have no start in common; give trials of the same task and --seed")
-    table = np.array([[side[key] for key in both] for side in sides])
-    for path, wins in zip((given.first, given.second), table.sum(axis=1)):
-        low, high = wilson(wins, len(both))
-        print(f"{path}: {wins} of {len(both)}, {wins / len(both):.2f} [{low:.2f}, {high:.2f}]")
-    drawn = np.random.default_rng(0).integers(len(both), size=(20000, len(both)))
-    with np.errstate(divide="ignore", invalid="ignore"):
-        ratios = table[0][drawn].sum(axis=1) / table[1][drawn].sum(axis=1)
-        low, high = np.nanquantile(ratios, [0.025, 0.975])
-        print(f"ratio {table[0].sum() / table[1].sum():.2f} [{low:.2f}, {high:.2f}] (95 %, starts drawn again); "
-              f"the first alone in {int((table[0] > table[1]).sum())}, the second alone in {int((table[0] < table[1]).sum())}")
+    sides = [np.array([side[key] for key in both]).T for side in (first, second)]
+    for paths, side in zip((given.first, given.to), sides):
+        for path, wins in zip(paths, side.sum(axis=1)):
+            low, high = wilson(wins, len(both))
+            print(f"{path}: {wins} of {len(both)}, {wins / len(both):.2f} [{low:.2f}, {high:.2f}]")
+    low, high = np.nanquantile(ratios(*sides), [0.025, 0.975])
+    drawn = "starts and trainings drawn again" if min(map(len, sides)) > 1 else "starts drawn again; what trainings scatter by needs several of each"
+    one, other = (side.mean(axis=0) for side in sides)
+    print(f"ratio {one.mean() / other.mean():.2f} [{low:.2f}, {high:.2f}] (95 %, {drawn}); {sides[0].sum()} of {sides[0].size} to {sides[1].sum()} of "
+          f"{sides[1].size}; the first does better at {int((one > other).sum())} starts, the second at {int((one < other).sum())}")
 
 
 def arguments():
@@ -160,10 +180,10 @@ def arguments():
             inner.add_argument("--seed", type=int, default=1000, metavar="S", help="the first start [default: 1000]")
             inner.add_argument("--rate", type=int, default=20, metavar="HZ", help="actions a second [default: 20]")
             inner.add_argument("--chunk", type=int, default=8, metavar="N", help="actions carried out of each answer [default: 8]")
-    inner = modes.add_parser("compare", help="two files of trials")
+    inner = modes.add_parser("compare", help="trials of two sorts of policies, a file for each training")
     inner.set_defaults(mode=compare)
-    inner.add_argument("first", metavar="FIRST.csv")
-    inner.add_argument("second", metavar="SECOND.csv")
+    inner.add_argument("first", nargs="+", metavar="FIRST.csv")
+    inner.add_argument("--to", nargs="+", required=True, metavar="SECOND.csv")
     return parser.parse_args()
 
 

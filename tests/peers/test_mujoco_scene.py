@@ -6,6 +6,7 @@ import unittest
 import numpy as np
 import tomli_w
 
+from mujoco_policies import ratios
 from mujoco_scene.acting import Gripper
 from mujoco_scene.franka import READY, Arm, rotation, wxyz
 from mujoco_scene.hidden import Hidden
@@ -51,6 +52,20 @@ class MujocoScene(unittest.TestCase):
     def test_intervals_of_shares_are_wilsons(self):
         # Newcombe 1998, table I: 81 of 263.
         self.assertTrue(np.allclose(wilson(81, 263), [0.2553, 0.3662], atol=5e-5))
+
+    def test_the_interval_of_a_ratio_holds_what_trainings_scatter_by(self):
+        chance = lambda odds: 1 / (1 + np.exp(-odds))
+        # Log odds of two sorts of policies; those of a training and of a start, the same for both sorts, scatter about them.
+        generator, odds, training = np.random.default_rng(0), [0.24, 1.39], 0.6
+        far = generator.normal(0, 1, (200000, 2)) @ [training, 1.0]
+        truth, inside, studies = chance(odds[0] + far).mean() / chance(odds[1] + far).mean(), 0, 200
+        for _ in range(studies):
+            start = generator.normal(0, 1, 60)
+            sides = [generator.random((3, 60)) < chance(middle + training * generator.normal(0, 1, (3, 1)) + start) for middle in odds]
+            low, high = np.quantile(ratios(*sides, draws=500), [0.025, 0.975])
+            inside += low <= truth <= high
+        # With starts alone drawn again it is two thirds of them.
+        self.assertGreater(inside / studies, 0.9)
 
 
 if __name__ == "__main__":
