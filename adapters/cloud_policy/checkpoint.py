@@ -36,9 +36,11 @@ class Trained:
     def __init__(self, path):
         kept = read(path)
         self.settings, self.step = kept["settings"], kept["step"]
+        if "parts" not in self.settings:
+            raise ValueError(f"{path} is of an earlier train.py; train it again, with another --out")
         self.names, self.rate, self.camera_name = kept["names"], kept["rate"], kept["camera_name"]
         self.camera = Camera(**kept["camera"])
         self.scale = Scale(**kept["scale"])
-        self.policy = Policy(self.settings["see"], len(self.names), self.settings["horizon"])
+        self.policy = Policy(self.settings["see"], len(self.names), self.settings["horizon"], self.settings["parts"])
         self.policy.load_state_dict(kept["mean"])
         self.policy.eval()

@@ -48,12 +48,28 @@ class Frames:
         self.episode = np.array(self.episode)
         if given.episodes:
             kept = int(np.searchsorted(self.episode, given.episodes))
-            self.state, self.action, self.episode, self.seen = self.state[:kept], self.action[:kept], self.episode[:kept], self.seen[:kept]
+            self.keep(np.arange(kept))
+        self.read = len(self.state)
+        self.keep(moving(self.action, self.episode, given.still))
+
+    def keep(self, rows):
+        self.state, self.action, self.episode, self.seen = self.state[rows], self.action[rows], self.episode[rows], [self.seen[row] for row in rows]
 
     def chunks(self, horizon):
         """Which frames' actions follow each frame [n, horizon]; the last of an episode goes on at its end."""
         last = np.searchsorted(self.episode, self.episode, side="right") - 1
         return np.minimum(np.arange(len(self.episode))[:, None] + np.arange(horizon), last[:, None])
+
+
+def moving(action, episode, still):
+    """Rows of frames whose command [m, rad] is in some number at least `still` away from that of the last row before it in their episode, with
+    the first and the last of each: where a script rests, one moment does not say whether the arm arrives or leaves."""
+    rows = []
+    for row in range(len(action)):
+        ends = row in (0, len(action) - 1) or episode[row - 1] != episode[row] or episode[row] != episode[row + 1]
+        if ends or np.abs(action[row] - action[rows[-1]]).max() >= still:
+            rows.append(row)
+    return np.array(rows)
 
 
 class Scale:

@@ -24,7 +24,8 @@ from websockets.asyncio.client import connect
 import seeing
 import serve
 from checkpoint import Trained, read
-from data_set import Frames
+from data_set import Frames, moving
+from network import Policy
 
 HERE = os.path.dirname(os.path.abspath(__file__))
 TASK = """horizon = 1.0
@@ -56,7 +57,7 @@ def colour(camera, x, y):
     return stream.getvalue()
 
 
-def write(folder, camera, episodes=20, frames=5):
+def write(folder, camera, episodes=40, frames=3):
     generator, rows = np.random.default_rng(0), []
     for episode in range(episodes):
         x, y = generator.uniform([0.4, -0.15], [0.6, 0.15])
@@ -95,7 +96,7 @@ class CloudPolicy(unittest.TestCase):
 
     def command(self, out, steps, *more):
         return [sys.executable, f"{HERE}/train.py", f"{self.folder}/data_set", "--task", self.task, "--out", f"{self.folder}/{out}",
-                "--steps", str(steps), "--points", "128", "--horizon", "4", *more]
+                "--steps", str(steps), "--points", "128", "--horizon", "4", "--still", "0", *more]
 
     def test_a_cloud_lies_where_the_box_is(self):
         cloud = self.camera.cloud(depth(self.camera, 0.5, -0.1), np.random.default_rng(0))
@@ -107,6 +108,25 @@ class CloudPolicy(unittest.TestCase):
         frames = Frames.__new__(Frames)
         frames.episode = np.array([0, 0, 0, 1, 1])
         self.assertEqual(frames.chunks(3).tolist(), [[0, 1, 2], [1, 2, 2], [2, 2, 2], [3, 4, 4], [4, 4, 4]])
+
+    def test_frames_in_which_nothing_is_commanded_are_left_out(self):
+        action = np.array([[0.0, 0], [0.004, 0], [0.004, 0.006], [0.008, 0.006], [0.012, 0.006], [0.012, 0.006], [1.0, 0.0], [1.0, 0.0]])
+        episode = np.array([0, 0, 0, 0, 0, 0, 1, 1])
+        # Slow motion goes on; the first and the last frame of an episode stay.
+        self.assertEqual(moving(action, episode, 0.005).tolist(), [0, 2, 4, 5, 6, 7])
+        self.assertEqual(moving(action, episode, 0.0).tolist(), list(range(8)))
+
+    def test_chunks_are_made_of_what_demonstrations_are(self):
+        generator = np.random.default_rng(0)
+        state, way = (torch.from_numpy(generator.uniform(-0.3, 0.3, (100, 2)).astype(np.float32)) for _ in range(2))
+        lines = state[:, None] + way[:, None] * torch.linspace(0.1, 1.0, 10)[:, None]
+        policy = Policy("cloud", 2, 10, 2)
+        policy.look(state, lines)
+        again = policy.chunk(state, policy.along(state, lines))
+        self.assertLess((again - lines).abs().max(), 1e-5)
+        # Whatever it says is a line from the state on.
+        parts = torch.from_numpy(generator.standard_normal((5, 2)).astype(np.float32))
+        self.assertLess(policy.chunk(state[:5], parts).diff(n=2, dim=1).abs().max(), 1e-5)
 
     def test_it_learns_where_the_box_is_and_says_so_when_asked(self):
         subprocess.run(self.command("learned", 600), check=True, capture_output=True)

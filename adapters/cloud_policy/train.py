@@ -40,12 +40,15 @@ def arguments():
     parser.add_argument("--steps", type=int, default=3000, metavar="N", help="a trained policy goes on with more of them [default: 3000]")
     parser.add_argument("--batch", type=int, default=32, metavar="N", help="frames a step [default: 32]")
     parser.add_argument("--draws", type=int, default=8, metavar="N", help="of noise for each frame of a step [default: 8]")
-    parser.add_argument("--points", type=int, default=512, metavar="N", help="of a cloud [default: 512]")
-    parser.add_argument("--horizon", type=int, default=16, metavar="N", help="actions of a chunk [default: 16]")
+    parser.add_argument("--points", type=int, default=256, metavar="N", help="of a cloud [default: 256]")
+    parser.add_argument("--horizon", type=int, default=32, metavar="N", help="actions of a chunk [default: 32]")
+    parser.add_argument("--parts", type=int, default=32, metavar="N", help="principal directions that a chunk is made of, at most [default: 32]")
     parser.add_argument("--rate", type=float, default=1e-3, metavar="X", help="of learning, at most [default: 0.001]")
     parser.add_argument("--scatter", type=float, default=0.002, metavar="M", help="one sigma added to points in training [default: 0.002]")
-    parser.add_argument("--state-scatter", type=float, default=0.01, metavar="SHARE",
-                        help="one sigma added to the state in training, of half its range [default: 0.01]")
+    parser.add_argument("--state-scatter", type=float, default=0.003, metavar="SHARE",
+                        help="one sigma added to the state in training, of half its range [default: 0.003]")
+    parser.add_argument("--still", type=float, default=0.005, metavar="X", help="frames are left out whose command is in every number "
+                        "nearer than this [m, rad] to that of the last frame before that is kept; 0 leaves none out [default: 0.005]")
     parser.add_argument("--seed", type=int, default=0, metavar="S")
     parser.add_argument("--threads", type=int, default=1, metavar="N", help="of torch [default: 1]")
     return parser.parse_args()
@@ -104,15 +107,18 @@ def left(seconds):
 class Training:
     def __init__(self, given, camera_name, camera, frames):
         self.given, self.path = given, os.path.join(given.out, checkpoint.NAME)
+        given.parts = min(given.parts, given.horizon * len(frames.names))
         scale = Scale.of(np.concatenate([frames.state, frames.action]))
         self.settings = {key: value for key, value in vars(given).items() if key not in ("out", "threads", "data", "task", "camera")}
         self.kept = {"names": frames.names, "rate": frames.rate, "camera_name": camera_name, "camera": camera.kept(), "scale": scale.kept(),
                      "frames": len(frames.state), "settings": self.settings}
         torch.manual_seed(given.seed)
-        self.policy = Policy(given.see, len(frames.names), given.horizon)
+        self.batches = Batches(frames, given, scale)
+        self.policy = Policy(given.see, len(frames.names), given.horizon, given.parts)
+        self.policy.look(*(torch.from_numpy(part) for part in (self.batches.states, self.batches.actions[self.batches.chunks])))
         self.mean = {key: value.clone() for key, value in self.policy.state_dict().items()}
         self.optimiser = torch.optim.AdamW(self.policy.parameters(), lr=given.rate, weight_decay=1e-4)
-        self.done, self.batches = 0, Batches(frames, given, scale)
+        self.done = 0
         if os.path.exists(self.path):
             self.go_on()
 
@@ -166,13 +172,13 @@ class Training:
 
 def main():
     given, ending = arguments(), Ending()
-    if min(given.steps, given.batch, given.draws, given.points, given.horizon, given.threads, given.episodes or 1) < 1:
-        sys.exit("--episodes, --steps, --batch, --draws, --points, --horizon and --threads begin at 1")
+    if min(given.steps, given.batch, given.draws, given.points, given.horizon, given.parts, given.threads, given.episodes or 1) < 1:
+        sys.exit("--episodes, --steps, --batch, --draws, --points, --horizon, --parts and --threads begin at 1")
     torch.set_num_threads(given.threads)
     try:
         camera_name, camera = seeing.Camera.of_task(given.task, given.camera)
         frames = Frames(given.data, camera_name, camera, given, lambda count: note(f"\r{count} frames read", end=""))
-        note("")
+        note(f"\r{len(frames.state)} of {frames.read} frames move")
         training = Training(given, camera_name, camera, frames)
     except (ValueError, OSError) as error:
         sys.exit(str(error))
