@@ -58,14 +58,17 @@ class MujocoScene(unittest.TestCase):
         # Log odds of two sorts of policies; those of a training and of a start, the same for both sorts, scatter about them.
         generator, odds, training = np.random.default_rng(0), [0.24, 1.39], 0.6
         far = generator.normal(0, 1, (200000, 2)) @ [training, 1.0]
-        truth, inside, studies = chance(odds[0] + far).mean() / chance(odds[1] + far).mean(), 0, 200
+        truth, studies = chance(odds[0] + far).mean() / chance(odds[1] + far).mean(), 200
+        inside = np.zeros(2)
         for _ in range(studies):
             start = generator.normal(0, 1, 60)
             sides = [generator.random((3, 60)) < chance(middle + training * generator.normal(0, 1, (3, 1)) + start) for middle in odds]
-            low, high = np.quantile(ratios(*sides, draws=500), [0.025, 0.975])
-            inside += low <= truth <= high
-        # With starts alone drawn again it is two thirds of them.
-        self.assertGreater(inside / studies, 0.9)
+            for kind, tables in enumerate((sides, [side.mean(axis=0, keepdims=True) for side in sides])):
+                low, high = np.quantile(ratios(*tables, draws=500), [0.025, 0.975])
+                inside[kind] += low <= truth <= high
+        self.assertGreater(inside[0] / studies, 0.9)
+        # With starts alone drawn again it is far from what it says.
+        self.assertLess(inside[1] / studies, 0.75)
 
 
 if __name__ == "__main__":
