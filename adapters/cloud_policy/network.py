@@ -88,7 +88,7 @@ class Policy(nn.Module):
         self.register_buffer("share", wave.clamp(1e-4, 0.9999), persistent=False)
 
     @torch.no_grad()
-    def look(self, state, actions):
+    def find_directions(self, state, actions):
         """Finds the directions of chunks [n, horizon, numbers] from states [n, numbers], by the eigenvectors of their second moments."""
         away = (actions - state[:, None]).flatten(1).double()
         values, vectors = torch.linalg.eigh(away.T @ away / len(away))

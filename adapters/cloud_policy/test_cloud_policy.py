@@ -121,7 +121,7 @@ class CloudPolicy(unittest.TestCase):
         state, way = (torch.from_numpy(generator.uniform(-0.3, 0.3, (100, 2)).astype(np.float32)) for _ in range(2))
         lines = state[:, None] + way[:, None] * torch.linspace(0.1, 1.0, 10)[:, None]
         policy = Policy("cloud", 2, 10, 2)
-        policy.look(state, lines)
+        policy.find_directions(state, lines)
         again = policy.chunk(state, policy.along(state, lines))
         self.assertLess((again - lines).abs().max(), 1e-5)
         # Whatever it says is a line from the state on.

@@ -115,7 +115,7 @@ class Training:
         torch.manual_seed(given.seed)
         self.batches = Batches(frames, given, scale)
         self.policy = Policy(given.see, len(frames.names), given.horizon, given.parts)
-        self.policy.look(*(torch.from_numpy(part) for part in (self.batches.states, self.batches.actions[self.batches.chunks])))
+        self.policy.find_directions(*(torch.from_numpy(part) for part in (self.batches.states, self.batches.actions[self.batches.chunks])))
         self.mean = {key: value.clone() for key, value in self.policy.state_dict().items()}
         self.optimiser = torch.optim.AdamW(self.policy.parameters(), lr=given.rate, weight_decay=1e-4)
         self.done = 0
