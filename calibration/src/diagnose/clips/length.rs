@@ -22,9 +22,7 @@ pub fn liveliest(clips: &mut [Clip]) -> Option<String> {
     let long = |clip: &Clip| clip.kind != ClipKind::ControlHitSlide && clip.measured.duration() > most;
     let mut cut = 0;
     for clip in clips.iter_mut().filter(|clip| long(clip)) {
-        let [from_ns, to_ns] = liveliest_part(&clip.desired, &clip.measured, most);
-        clip.measured = clip.measured.between(from_ns..=to_ns);
-        clip.desired = clip.desired.between(from_ns.saturating_sub(BEFORE_NS)..=to_ns);
+        *clip = part(clip, liveliest_part(&clip.desired, &clip.measured, most));
         cut += 1;
     }
     (cut > 0).then(|| {
@@ -35,6 +33,15 @@ pub fn liveliest(clips: &mut [Clip]) -> Option<String> {
              all: the others would take far longer and say little more; `twin replay` takes them whole"
         )
     })
+}
+
+/// A clip between two stamps [ns], with the commands that are still on their way when it begins, and the one that holds then.
+pub(super) fn part(clip: &Clip, [from_ns, to_ns]: [u64; 2]) -> Clip {
+    let commands = &clip.desired.stamps_ns;
+    let holds = commands.partition_point(|stamp| *stamp <= from_ns.saturating_sub(BEFORE_NS)).saturating_sub(1);
+    let commanded_from_ns = commands.get(holds).copied().unwrap_or_default();
+    let (measured, desired) = (clip.measured.between(from_ns..=to_ns), clip.desired.between(commanded_from_ns..=to_ns));
+    Clip { measured, desired, ..clip.clone() }
 }
 
 /// The length beyond which clips are cut so that all of them together last [`ENOUGH`]; `None` where they are no longer.

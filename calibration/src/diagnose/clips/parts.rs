@@ -5,18 +5,18 @@
 //! the most part met in others. Parts at the same place of clips with the same command stay together: each such group is left
 //! out of fits in turn.
 
+use super::admit::Admitted;
+use super::length;
 use super::split::{FEW, Split};
-use crate::diagnose::clips::admit::Admitted;
 use shared_mem::cell::ClipKind;
-use shared_mem::recording::Clip;
+use shared_mem::recording::{Clip, JointSeries};
+use shared_mem::time::seconds_between;
 
 /// So many parts are made of a session: where eleven of twelve speak for an effect, that is no chance (p = 0.003).
 const WANTED: f64 = 12.0;
 /// No part is shorter [s]. Residuals of a model that is not exact are alike over tenths of a second, and what a command moves is
 /// over within about one.
 const SHORTEST: f64 = 1.5;
-/// Commands from before a part are kept for so long: some are still on their way [ns].
-const BEFORE_NS: u64 = 500_000_000;
 
 impl Admitted {
     /// Clips of arms alone in parts, where there are fewer different commands than a session can be split by. Clips with an
@@ -25,7 +25,8 @@ impl Admitted {
     pub fn in_parts(self) -> Self {
         let few = self.commands < FEW && self.clips.iter().all(|clip| clip.kind == ClipKind::Excitation);
         let seconds = |group: &Vec<usize>| {
-            group.iter().map(|clip| self.clips[*clip].measured.duration()).fold(f64::INFINITY, f64::min)
+            let of = |clip: &usize| span(&self.clips[*clip]);
+            group.iter().map(of).map(|[from, to]| seconds_between(from, to)).fold(f64::INFINITY, f64::min)
         };
         let all: f64 = self.groups.iter().map(seconds).sum();
         let length = (all / WANTED).max(SHORTEST);
@@ -66,23 +67,24 @@ impl Admitted {
     }
 }
 
+/// From when to when a clip has both commands and measured joints [ns].
+fn span(clip: &Clip) -> [u64; 2] {
+    let ends = |series: &JointSeries| [series.stamps_ns.first(), series.stamps_ns.last()].map(Option::<&u64>::copied);
+    let ([from, to], [commanded_from, commanded_to]) = (ends(&clip.measured), ends(&clip.desired));
+    let from_ns = from.max(commanded_from).unwrap_or_default();
+    [from_ns, to.min(commanded_to).unwrap_or_default().max(from_ns)]
+}
+
 fn in_equal_parts(clip: &Clip, count: usize) -> impl Iterator<Item = Clip> {
-    let stamps_ns = &clip.measured.stamps_ns;
-    let [first, last] = [stamps_ns.first(), stamps_ns.last()].map(|stamp| stamp.copied().unwrap_or_default());
-    let edge = move |part: usize| first + (u128::from(last - first) * part as u128 / count as u128) as u64;
-    (0..count).map(move |part| {
-        let (from_ns, to_ns) = (edge(part), edge(part + 1));
-        let mut cut = clip.clone();
-        cut.measured = clip.measured.between(from_ns..=to_ns);
-        cut.desired = clip.desired.between(from_ns.saturating_sub(BEFORE_NS)..=to_ns);
-        cut
-    })
+    let [from_ns, to_ns] = span(clip);
+    let edge = move |part: usize| from_ns + (to_ns - from_ns) / count as u64 * part as u64;
+    (0..count).map(move |part| length::part(clip, [edge(part), edge(part + 1)]))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use shared_mem::recording::{JointSeries, ObjectSeries};
+    use shared_mem::recording::ObjectSeries;
 
     /// A joint that follows a sine of its own frequency for so many seconds.
     fn clip(seconds: u64, frequency: f64) -> Clip {
@@ -124,8 +126,27 @@ mod tests {
         let rows: usize = cut.clips[..4].iter().map(|clip| clip.measured.len()).sum();
         assert!(rows >= whole.clips[0].measured.len(), "{rows}");
         assert_eq!(cut.clips[0].desired.stamps_ns[0], 1_000_000_000);
-        let [begins, led_from] = [&cut.clips[1].measured, &cut.clips[1].desired].map(|series| series.stamps_ns[0]);
-        assert_eq!(begins - led_from, BEFORE_NS);
+        let [begins, commanded_from] =
+            [&cut.clips[1].measured, &cut.clips[1].desired].map(|series| series.stamps_ns[0]);
+        assert_eq!(begins - commanded_from, 500_000_000);
+    }
+
+    #[test]
+    fn rare_commands_lead_a_part_from_before_it_and_what_nothing_leads_any_more_is_no_part() {
+        let whole = admitted((1..=4).map(|i| clip(6, f64::from(i))).collect());
+        // A command every two seconds, and none in the last two.
+        let seldom = |mut clip: Clip| {
+            let rows: Vec<usize> = vec![0, 200, 400];
+            clip.desired.stamps_ns = rows.iter().map(|row| clip.desired.stamps_ns[*row]).collect();
+            clip.desired.q = rows.iter().map(|row| clip.desired.q[*row]).collect();
+            clip
+        };
+        let cut = admitted(whole.clips.into_iter().map(seldom).collect()).in_parts();
+        assert_eq!(cut.clips.len(), 12);
+        for clip in &cut.clips {
+            let [desired, measured] = [&clip.desired.stamps_ns, &clip.measured.stamps_ns];
+            assert!(desired[0] <= measured[0] && measured.last() <= Some(&5_000_000_000), "{measured:?}");
+        }
     }
 
     #[test]
