@@ -44,6 +44,8 @@ pub(crate) struct Level {
     pub(crate) steepness: [f32; 2],
     /// Whether the cameras' poses move.
     pub(crate) poses: bool,
+    /// Whether the field shall bend little.
+    pub(crate) smooth: bool,
 }
 
 /// The levels of a run, the last of about `edge` cubed nodes.
@@ -54,7 +56,8 @@ pub(crate) struct Plan {
 
 impl Plan {
     /// Without depth the hollows have to be found from coarse to fine. With it they are known, and thin walls would be lost in a coarse
-    /// grid: it only serves to find the cameras' places, with which depth is then fused again.
+    /// grid: it only serves to find the cameras' places, with which depth is then fused again. Such a wall has the ridge of its distance
+    /// beside its surface there, and would become thicker by a field that is smooth; cameras would then go back from it.
     pub(crate) fn new(edge: u32, with_depth: bool) -> Self {
         // Fewer nodes need fewer steps.
         let share = (f64::from(edge) / 128.0).sqrt().min(1.0);
@@ -63,6 +66,7 @@ impl Plan {
             steps: (steps * share).ceil() as u32,
             steepness,
             poses,
+            smooth: !with_depth || part < 2.0,
         };
         let first = if with_depth { None } else { Some(level(4.0, 150.0, [1.5, 3.0], false)) };
         let others = [level(2.0, 300.0, [2.0, 4.0], true), level(1.0, 800.0, [2.5, STEEPEST], true)];
@@ -194,7 +198,8 @@ impl<'a> Learner<'a> {
             (0..self.frames.len()).map(|f| Stand::new(&field.grid, &self.pose(state, f))).collect();
         let pivot: [f32; 3] = field.grid.steps(&self.pivot).coords.map(|v| v as f32).into();
         let weights = weights(&field.grid);
-        let smoothness = Smoothness { eikonal: 0.02, curvature: 0.01 };
+        let curvature = if self.plan.levels[state.level].smooth { 0.01 } else { 0.0 };
+        let smoothness = Smoothness { eikonal: 0.02, curvature };
         let seed = (state.level as u64) << 32 | u64::from(state.step);
         let pixels = self.pixels;
         let part = |number: usize, into: &mut Gathered| {

@@ -83,6 +83,13 @@ pub(crate) fn hull(grid: &Grid, seen: &[Seen<'_>]) -> Vec<f32> {
     (0..grid.len()).into_par_iter().map(node).collect()
 }
 
+/// How far before a surface a place is for a view that measures it `apart` behind the place [m], and the weight of that. What lies deep
+/// behind a surface says the less, the deeper: the next surface may begin there. Just behind it counts as much as just before it, else
+/// noise of depth would draw the surface inwards.
+fn vote(apart: f64, cut: f64) -> (f64, f64) {
+    (apart.min(cut), (2.0 + 2.0 * apart / cut).clamp(0.0, 1.0))
+}
+
 /// Depth fused into the hull: the level [m] of each node. `spread`: standard deviation of depth at one metre [m].
 fn fused(grid: &Grid, seen: &[Seen<'_>], hull: &[f32], spread: f64) -> Vec<f32> {
     let node = |index: usize| {
@@ -102,10 +109,8 @@ fn fused(grid: &Grid, seen: &[Seen<'_>], hull: &[f32], spread: f64) -> Vec<f32> 
             } else if measured <= 0.0 {
                 continue;
             } else {
-                let apart = measured - z;
-                // What lies behind a surface says the less, the deeper: the next surface may begin there.
-                let behind = (1.0 + apart / cut).clamp(0.0, 1.0);
-                (apart.min(cut), weight * behind)
+                let (apart, share) = vote(measured - z, cut);
+                (apart, weight * share)
             };
             sum += weight * apart;
             total += weight;
@@ -132,4 +137,24 @@ pub(crate) fn bounds(grid: &Grid, level: &[f32]) -> Option<(Point3<f64>, Point3<
         ([0, 1, 2].map(|a| low[a].min(node[a])), [0, 1, 2].map(|a| high[a].max(node[a])))
     });
     (low[0] != usize::MAX).then(|| (grid.position(low), grid.position(high)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn noise_of_depth_hardly_shifts_the_surface() {
+        let (spread, cut) = (1.0, 3.0);
+        // Normal noise of depth at a place on the surface.
+        let votes = (-500..=500).map(|i| {
+            let noise = f64::from(i) * 0.01;
+            let (apart, weight) = vote(noise, cut);
+            (apart, weight * (-0.5 * noise * noise).exp())
+        });
+        let (sum, total) =
+            votes.fold((0.0, 0.0), |(sum, total), (apart, weight)| (sum + weight * apart, total + weight));
+        assert!((sum / total).abs() < 0.05 * spread, "{}", sum / total);
+        assert_eq!([vote(-3.5, cut).1, vote(10.0, cut).0], [0.0, cut]);
+    }
 }

@@ -107,7 +107,7 @@ impl Problem {
     /// The slope of the loss along one number.
     fn difference(&mut self, number: usize) -> f64 {
         // Along a pose a step moves all rays, some of them into another cell, where the slope is another.
-        let step = if number < 4 * self.grid.len() { 1e-6 } else { 1e-8 };
+        let step = if number < 4 * self.grid.len() { 1e-6 } else { 3e-8 };
         let before = *self.entry(number);
         let mut at = |value: f64| {
             *self.entry(number) = value;
@@ -141,4 +141,27 @@ fn a_thousand_derivatives_agree_with_finite_differences() {
         }
     }
     assert!(wrong.is_empty(), "{} of {count}: {:?}", wrong.len(), &wrong[..wrong.len().min(5)]);
+}
+
+#[test]
+fn depth_of_a_thin_wall_is_where_the_ray_enters_it_and_not_towards_what_stands_behind() {
+    let grid = Grid { dims: [40, 8, 8], origin: Point3::origin(), voxel: 1.0 };
+    // Walls of two steps from 10.3 and of six from 30.
+    let distance = |x: f64| ((x - 11.3).abs() - 1.0).min((x - 33.0).abs() - 3.0);
+    let distance: Vec<f64> = (0..grid.len()).map(|i| distance(grid.position(grid.node(i)).x)).collect();
+    let near: Vec<f32> = distance.iter().map(|d| *d as f32).collect();
+    let band = Band::new(&grid, &near, 40.0);
+    let colour = vec![[0.5; 3]; grid.len()];
+    let medium = Medium { grid: &grid, band: &band, distance: &distance, colour: &colour, steepness: 2.0, pace: 0.7 };
+    let along = |direction: Vector3<f64>| {
+        let direction = direction.normalize();
+        let origin = Point3::new(10.3, 3.5, 3.5) - direction * 6.0;
+        Tracer::new().see(&medium, &Ray { origin: origin.coords.into(), direction: direction.into(), axial: 0.5 }, 0.2)
+    };
+    for (direction, expected) in
+        [(Vector3::x(), 3.0), (Vector3::new(1.0, 0.2, 0.1), 3.0), (Vector3::new(0.05, 1.0, 0.0), 0.0)]
+    {
+        let sight = along(direction);
+        assert!((sight.depth - expected).abs() < 1e-9, "{direction:?}: {sight:?}");
+    }
 }
