@@ -3,6 +3,7 @@
 
 use super::adam::{Adam, Gathered, Rates};
 use super::band::Band;
+use super::colours;
 use super::pool::{Pixel, Stand, corrected};
 use super::ray::{Medium, Receiver, Tracer, Weights};
 use super::smooth::{Smoothness, at_node};
@@ -55,9 +56,10 @@ pub(crate) struct Plan {
 }
 
 impl Plan {
-    /// Without depth the hollows have to be found from coarse to fine. With it they are known, and thin walls would be lost in a coarse
-    /// grid: it only serves to find the cameras' places, with which depth is then fused again. Such a wall has the ridge of its distance
-    /// beside its surface there, and would become thicker by a field that is smooth; cameras would then go back from it.
+    /// Without depth colours have to draw the surface in from the hull, which stands over flat sides by millimetres, and find the hollows:
+    /// from coarse to fine, since a step goes farther in a coarse grid and costs less. With depth they are known, and thin walls would be
+    /// lost in a coarse grid: it only serves to find the cameras' places, with which depth is then fused again. Such a wall has the ridge
+    /// of its distance beside its surface there, and would become thicker by a field that is smooth; cameras would then go back from it.
     pub(crate) fn new(edge: u32, with_depth: bool) -> Self {
         // Fewer nodes need fewer steps.
         let share = (f64::from(edge) / 128.0).sqrt().min(1.0);
@@ -68,7 +70,7 @@ impl Plan {
             poses,
             smooth: !with_depth || part < 2.0,
         };
-        let first = if with_depth { None } else { Some(level(4.0, 150.0, [1.5, 3.0], false)) };
+        let first = if with_depth { None } else { Some(level(4.0, 1200.0, [1.5, 3.0], false)) };
         let others = [level(2.0, 300.0, [2.0, 4.0], true), level(1.0, 800.0, [2.5, STEEPEST], true)];
         Self { levels: first.into_iter().chain(others).collect() }
     }
@@ -147,12 +149,17 @@ impl<'a> Learner<'a> {
         }
         let progress = state.step as f32 / level.steps as f32;
         let steepness = level.steepness[0] * (level.steepness[1] / level.steepness[0]).powf(progress);
-        if state.band.is_none() || state.step.is_multiple_of(BAND_STEPS) {
+        let anew = state.band.is_none() || state.step.is_multiple_of(BAND_STEPS);
+        if anew {
             state.band = Some(Band::new(&state.field.grid, &state.field.distance, 6.0 / steepness + 1.0));
             self.near = None;
         }
         if self.near.is_none() {
             self.near = state.band.as_ref().map(|band| band.nodes(&state.field.grid));
+        }
+        // With depth the surface is where depth says.
+        if let (true, None, Some(near)) = (anew, self.depth_spread, &self.near) {
+            colours::extend(&mut state.field, near);
         }
         let by_pose = self.gather(state, steepness);
         let decay = 0.1f32.powf(progress);

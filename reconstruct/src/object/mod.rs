@@ -9,6 +9,7 @@
 //! | `pool` | pixels as rays |
 //! | `ray` | what a ray sees, and how it depends on the field |
 //! | `smooth` | the field's own terms |
+//! | `colours` | colours beside the surface |
 //! | `adam` | steps along derivatives |
 //! | `learn` | the optimisation, coarse to fine |
 //! | `table` | nothing lies below the table |
@@ -21,6 +22,7 @@ mod adam;
 mod appearance;
 mod band;
 mod bounds;
+mod colours;
 mod judge;
 mod learn;
 mod pictures;
