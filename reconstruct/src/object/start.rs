@@ -123,11 +123,51 @@ fn fused(grid: &Grid, seen: &[Seen<'_>], hull: &[f32], spread: f64) -> Vec<f32> 
 /// The signed distance [voxel] that the optimisation begins with: of the hull, or of depth fused into it.
 pub(crate) fn distance(grid: &Grid, seen: &[Seen<'_>], depth_spread: Option<f64>) -> Vec<f32> {
     let hull = hull(grid, seen);
-    let level = match depth_spread {
+    let mut level = match depth_spread {
         Some(spread) => fused(grid, seen, &hull, spread),
         None => hull,
     };
+    without_rim(grid, &mut level);
     sweep::signed_distance(grid, &level)
+}
+
+/// Takes away parts at the rim of the box, where hardly a view looks, but never the largest part: no ray would find that nothing is there.
+fn without_rim(grid: &Grid, level: &mut [f32]) {
+    let (mut part_of, mut sizes, mut at_rim) = (vec![0usize; level.len()], vec![0usize], vec![false]);
+    let mut open = Vec::new();
+    for start in 0..level.len() {
+        if level[start] >= 0.0 || part_of[start] > 0 {
+            continue;
+        }
+        let part = sizes.len();
+        sizes.push(0);
+        at_rim.push(false);
+        part_of[start] = part;
+        open.push(start);
+        while let Some(index) = open.pop() {
+            sizes[part] += 1;
+            if grid.is_rim(grid.node(index)) {
+                at_rim[part] = true;
+            }
+            for (axis, stride) in grid.strides().into_iter().enumerate() {
+                let place = grid.node(index)[axis];
+                let before = (place > 0).then(|| index - stride);
+                let after = (place + 1 < grid.dims[axis]).then(|| index + stride);
+                for next in before.into_iter().chain(after) {
+                    if level[next] < 0.0 && part_of[next] == 0 {
+                        part_of[next] = part;
+                        open.push(next);
+                    }
+                }
+            }
+        }
+    }
+    let largest = sizes.iter().copied().max().unwrap_or(0);
+    for (level, part) in level.iter_mut().zip(part_of) {
+        if at_rim[part] && sizes[part] < largest {
+            *level = grid.voxel as f32;
+        }
+    }
 }
 
 /// The smallest box that holds all nodes inside; `None` where none is.
@@ -142,6 +182,20 @@ pub(crate) fn bounds(grid: &Grid, level: &[f32]) -> Option<(Point3<f64>, Point3<
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn parts_at_the_rim_go_and_the_largest_stays() {
+        let grid = Grid { dims: [12; 3], origin: Point3::origin(), voxel: 0.01 };
+        let boxes = [([3, 3, 3], [8, 8, 8]), ([0, 0, 0], [2, 2, 2]), ([10, 5, 5], [11, 6, 6])];
+        let inside = |node: [usize; 3], (low, high): &([usize; 3], [usize; 3])| {
+            (0..3).all(|axis| (low[axis]..high[axis]).contains(&node[axis]))
+        };
+        let mut level: Vec<f32> =
+            (0..grid.len()).map(|i| if boxes.iter().any(|b| inside(grid.node(i), b)) { -0.01 } else { 0.01 }).collect();
+        without_rim(&grid, &mut level);
+        let left = |b| (0..grid.len()).filter(|i| level[*i] < 0.0 && inside(grid.node(*i), b)).count();
+        assert_eq!([left(&boxes[0]), left(&boxes[1]), left(&boxes[2])], [125, 0, 1]);
+    }
 
     #[test]
     fn noise_of_depth_hardly_shifts_the_surface() {
