@@ -56,7 +56,7 @@ pub(crate) struct Plan {
 }
 
 impl Plan {
-    /// Without depth colours have to draw the surface in from the hull, which stands over flat sides by millimetres, and find the hollows:
+    /// Without depth colours have to draw the surface in from the hull, which stands over plane sides by millimetres, and find the hollows:
     /// from coarse to fine, since a step goes farther in a coarse grid and costs less. With depth they are known, and thin walls would be
     /// lost in a coarse grid: it only serves to find the cameras' places, with which depth is then fused again. Such a wall has the ridge
     /// of its distance beside its surface there, and would become thicker by a field that is smooth; cameras would then go back from it.
