@@ -2,8 +2,8 @@
 //!
 //! Of four clips, one that alone has fast motion is predicted by none of the others, and three that gain against one that loses
 //! prove nothing. Parts are simulated from the state that was measured where each begins, and what moves in one of them is for
-//! the most part met in others. Parts at the same place of clips with the same command stay together: each such group is left
-//! out of fits in turn.
+//! the most part met in others. Parts at the same place of clips with the same command stay together. A fifth of them in turn is
+//! left out of the fits that a gap is measured with.
 
 use super::admit::Admitted;
 use super::length;
@@ -17,6 +17,9 @@ const WANTED: f64 = 12.0;
 /// No part is shorter [s]. Residuals of a model that is not exact are alike over tenths of a second, and what a command moves is
 /// over within about one.
 const SHORTEST: f64 = 1.5;
+
+/// Fits that a gap is measured with leave out one of so many sets of parts in turn: as many fits as with four or five whole clips.
+const SETS: usize = 5;
 
 impl Admitted {
     /// Clips of arms alone in parts, where there are fewer different commands than a session can be split by. Clips with an
@@ -52,7 +55,18 @@ impl Admitted {
     /// Which clips are for what.
     #[must_use]
     pub fn split(&self, seed: u64) -> Split {
-        if self.commands < FEW { Split::in_turn(&self.groups) } else { Split::new(&self.groups, seed) }
+        if self.commands >= FEW {
+            return Split::new(&self.groups, seed);
+        }
+        if self.groups.len() == self.commands {
+            return Split::in_turn(&self.groups);
+        }
+        let mut sets = vec![Vec::new(); SETS];
+        for (place, group) in self.groups.iter().enumerate() {
+            sets[place % SETS].extend(group);
+        }
+        sets.retain(|set| !set.is_empty());
+        Split::in_turn(&sets)
     }
 
     /// What a clip is called among all: its file, and which part of it where it counts in parts.
@@ -122,6 +136,10 @@ mod tests {
             let of = |clip: &usize| &cut.clips[*clip];
             assert!(group.iter().all(|clip| of(clip).measured == of(&group[0]).measured));
         }
+        let split = cut.split(0);
+        assert_eq!((split.in_turn.len(), split.train.len(), split.confirm.len(), split.choose.len()), (5, 17, 17, 0));
+        assert!(split.in_turn.iter().all(|set| (2..=5).contains(&set.len())), "{split:?}");
+        assert_eq!(whole.split(0).in_turn, whole.groups);
         // Every row is in a part, and a part has the commands that are still on their way when it begins.
         let rows: usize = cut.clips[..4].iter().map(|clip| clip.measured.len()).sum();
         assert!(rows >= whole.clips[0].measured.len(), "{rows}");

@@ -223,19 +223,19 @@ fn warnings(library: &Library, kept: &Hypothesis, (admitted, split): (&Admitted,
             "{name} was found as strong as it is looked for: it may be stronger, or something else that looks like it"
         )
     };
-    admitted.warnings.iter().cloned().chain(few(admitted.commands, split)).chain(ended.map(sentence)).collect()
+    admitted.warnings.iter().cloned().chain(few(admitted, split)).chain(ended.map(sentence)).collect()
 }
 
 /// What has to be known about clips of few commands.
-fn few(commands: usize, split: &Split) -> Option<String> {
-    let count = split.in_turn.len();
-    let [in_parts, all] = match count > commands {
-        true => [format!("their clips count in {count} parts, "), "parts".to_owned()],
-        false => [String::new(), "of them".to_owned()],
+fn few(admitted: &Admitted, split: &Split) -> Option<String> {
+    let (commands, parts) = (admitted.commands, admitted.groups.len());
+    let [in_parts, in_turn] = match parts > commands {
+        true => [format!("their clips count in {parts} parts, "), format!("one in {} of them", split.in_turn.len())],
+        false => [String::new(), "each".to_owned()],
     };
-    (count > 0).then(|| {
+    (!split.in_turn.is_empty()).then(|| {
         format!(
-            "only {commands} different commands: {in_parts}effects are chosen by all {all}, and each in turn is left out of the fit \
+            "only {commands} different commands: {in_parts}effects are chosen by all of them, and {in_turn} in turn is left out of the fit \
              that its gap is measured with; record {} more to have clips that nothing was chosen by",
             split::FEW - commands
         )
