@@ -46,8 +46,7 @@ fn a_late_command_is_named_out_of_clips_of_a_minute() {
     let files = clips.iter().map(|clip| clip.file.display().to_string()).collect();
     let cell = world.cell.clone();
     let session = Session { folder: "minutes".into(), cell, clips: Vec::new(), files: SessionFiles::default() };
-    let admitted = Admitted::of(clips, files, false).in_parts();
-    assert_eq!((admitted.commands, admitted.clips.len()), (4, 12));
+    let admitted = Admitted::of(clips, files, false);
     let found = diagnose_clips(&session, &admitted, &Options::default(), &Interrupt::default()).expect("a diagnosis");
     assert_eq!(found.verdict.kind, diagnose::Kind::Named, "{:?}", found.verdict);
     assert_eq!(found.verdict.effects, ["command_delay"]);
