@@ -87,31 +87,17 @@ fn ways(commands: &JointSeries) -> Vec<f64> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::test_clip::of_one_joint;
     use super::*;
-    use shared_mem::recording::ObjectSeries;
     use shared_mem::time::seconds_between;
 
     /// A joint that rests but for eight seconds of swinging from `lively` s on.
     fn clip(seconds: usize, lively: f64) -> Clip {
-        let stamps_ns: Vec<u64> = (0..seconds as u64 * 100).map(|i| i * 10_000_000).collect();
-        let swing = |ns: &u64| {
-            let t = seconds_between(0, *ns) - lively;
-            if (0.0..8.0).contains(&t) { 0.3 * (3.0 * t).sin() } else { 0.0 }
-        };
-        let q = stamps_ns.iter().map(swing).collect();
-        let series = JointSeries { stamps_ns, dof: 1, q, dq: Vec::new(), tau: Vec::new() };
-        Clip {
-            file: "clip.mcap".into(),
-            kind: ClipKind::Excitation,
-            joint_names: vec!["joint1".into()],
-            desired: series.clone(),
-            measured: series,
-            torques_end_at_rows: false,
-            object: ObjectSeries::default(),
-            others: Vec::new(),
-            warnings: Vec::new(),
-            damage: None,
-        }
+        let stamps_ns = (0..seconds as u64 * 100).map(|i| i * 10_000_000).collect();
+        of_one_joint(
+            stamps_ns,
+            |t| if (0.0..8.0).contains(&(t - lively)) { 0.3 * (3.0 * (t - lively)).sin() } else { 0.0 },
+        )
     }
 
     #[test]

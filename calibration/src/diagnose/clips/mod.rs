@@ -14,4 +14,6 @@ pub mod ground;
 pub mod length;
 mod parts;
 pub mod split;
+#[cfg(test)]
+mod test_clip;
 pub(super) mod torques;

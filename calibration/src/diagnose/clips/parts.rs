@@ -97,26 +97,13 @@ fn in_equal_parts(clip: &Clip, count: usize) -> impl Iterator<Item = Clip> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::test_clip::of_one_joint;
     use super::*;
-    use shared_mem::recording::ObjectSeries;
 
     /// A joint that follows a sine of its own frequency for so many seconds.
     fn clip(seconds: u64, frequency: f64) -> Clip {
-        let stamps_ns: Vec<u64> = (0..=seconds * 100).map(|i| 1_000_000_000 + i * 10_000_000).collect();
-        let q = stamps_ns.iter().map(|ns| (frequency * *ns as f64 * 1e-9).sin()).collect();
-        let series = JointSeries { stamps_ns, dof: 1, q, dq: Vec::new(), tau: Vec::new() };
-        Clip {
-            file: "clip.mcap".into(),
-            kind: ClipKind::Excitation,
-            joint_names: vec!["joint1".into()],
-            desired: series.clone(),
-            measured: series,
-            torques_end_at_rows: false,
-            object: ObjectSeries::default(),
-            others: Vec::new(),
-            warnings: Vec::new(),
-            damage: None,
-        }
+        let stamps_ns = (0..=seconds * 100).map(|i| 1_000_000_000 + i * 10_000_000).collect();
+        of_one_joint(stamps_ns, |t| (frequency * t).sin())
     }
 
     fn admitted(clips: Vec<Clip>) -> Admitted {
