@@ -35,22 +35,16 @@ pub fn shown_urdf(text: &str, arm: &ArmModel) -> Result<RobotModel, ModelError> 
 }
 
 fn shown(text: String, arm: &ArmModel, (base, file): (Option<&str>, &Path)) -> Result<RobotModel, ModelError> {
-    let frames = UrdfFrames::of(&text, file)?;
+    let frames = UrdfFrames::of(&text, file)?.renamed(arm.described_joint_names(), arm.joint_names());
     let (root, joints) = (frames.root().to_owned(), arm.joint_names().to_vec());
-    let described = arm.described_joint_names().to_vec();
-    let mut fixed: Vec<Transform> = frames.fixed(&described).map(transform).collect();
+    let mut fixed: Vec<Transform> = frames.fixed(&joints).map(transform).collect();
     if let Some(base) = base.filter(|base| *base != root) {
         // Recordings give poses in the frame that cell.toml names.
         let parent_from_child = Isometry3::identity();
         fixed.push(transform(LinkFrame { parent: base, child: &root, parent_from_child }));
     }
-    let recorded = joints.clone();
     let frames_at = move |names: &[String], q: &[f64]| {
-        let as_described = |name: &String| {
-            recorded.iter().position(|recorded| recorded == name).map_or_else(|| name.clone(), |i| described[i].clone())
-        };
-        let names: Vec<String> = names.iter().map(as_described).collect();
-        let moving: Vec<Transform> = frames.moving(&names, q).map(transform).collect();
+        let moving: Vec<Transform> = frames.moving(names, q).map(transform).collect();
         (!moving.is_empty()).then_some(moving)
     };
     Ok(RobotModel { description: text, root, joints, fixed, frames_at: Box::new(frames_at) })

@@ -78,6 +78,18 @@ impl UrdfFrames {
         Ok(Self { root: tree.root.to_owned(), joints })
     }
 
+    /// With other names for these joints, one for each.
+    #[must_use]
+    pub fn renamed(mut self, described: &[String], names: &[String]) -> Self {
+        for joint in &mut self.joints {
+            let place = described.iter().position(|described| *described == joint.name);
+            if let Some(name) = place.and_then(|place| names.get(place)) {
+                joint.name.clone_from(name);
+            }
+        }
+        self
+    }
+
     /// Name of the link that hangs on nothing.
     #[must_use]
     pub fn root(&self) -> &str {
