@@ -69,6 +69,14 @@ impl Admitted {
         Split::in_turn(&sets)
     }
 
+    /// How many clips there are where they count in parts; `None` where they count whole.
+    #[must_use]
+    pub fn cut(&self) -> Option<usize> {
+        let mut files = self.files.clone();
+        files.dedup();
+        (self.groups.len() > self.commands).then_some(files.len())
+    }
+
     /// What a clip is called among all: its file, and which part of it where it counts in parts.
     #[must_use]
     pub fn label(&self, clip: usize) -> String {
@@ -126,7 +134,7 @@ mod tests {
         let split = cut.split(0);
         assert_eq!((split.in_turn.len(), split.train.len(), split.confirm.len(), split.choose.len()), (5, 17, 17, 0));
         assert!(split.in_turn.iter().all(|set| (2..=5).contains(&set.len())), "{split:?}");
-        assert_eq!(whole.split(0).in_turn, whole.groups);
+        assert_eq!((whole.split(0).in_turn, whole.cut(), cut.cut()), (whole.groups.clone(), None, Some(5)));
         // Every row is in a part, and a part has the commands that are still on their way when it begins.
         let rows: usize = cut.clips[..4].iter().map(|clip| clip.measured.len()).sum();
         assert!(rows >= whole.clips[0].measured.len(), "{rows}");

@@ -119,7 +119,8 @@ pub fn conclude<E: Evidence>(
     let sizes = Sizes::of(bench, ([&baseline, shown_fits], [&before, shown]), session, admitted)?;
     let [size, stays] = sizes.in_words(of_object);
     let closed = |open: &Unproven<'_>| share_of(bench, split, (open, &first.weights), (&before, options.seed));
-    let unproven = unproven::unproven(bench, found).and_then(|open| closed(&open).map(|share| (open, share)));
+    let unproven =
+        unproven::unproven(bench, found, admitted.cut()).and_then(|open| closed(&open).map(|share| (open, share)));
     let open = unproven.as_ref().map(|(open, share)| (open, *share));
     let facts = facts(bench, found, (size, open), [&places, &rest], judged.shrink);
     let verdict = match &partly {

@@ -24,8 +24,13 @@ impl Unproven<'_> {
     }
 }
 
-/// The likeliest such effect; `None` where something was found, or where none closes a real part of the gap.
-pub(in crate::diagnose) fn unproven<'a, E: Evidence>(bench: &Bench<'_, E>, found: &'a Found) -> Option<Unproven<'a>> {
+/// The likeliest such effect; `None` where something was found, or where none closes a real part of the gap. `cut`: how many
+/// clips there are, where parts of them judge.
+pub(in crate::diagnose) fn unproven<'a, E: Evidence>(
+    bench: &Bench<'_, E>,
+    found: &'a Found,
+    cut: Option<usize>,
+) -> Option<Unproven<'a>> {
     let step = found.steps.first().filter(|_| found.last.effects.is_empty())?;
     let one = |trial: &'a Trial| {
         let (fit, advantage) = trial.fitted.as_ref()?;
@@ -33,7 +38,8 @@ pub(in crate::diagnose) fn unproven<'a, E: Evidence>(bench: &Bench<'_, E>, found
             advantage.clips_more().filter(|_| trial.closes > PLAIN && !convincing(advantage, trial.scored.cost))?;
         let real =
             !bench.negligible(trial.scored.candidate, &fit.full) && !bench.is_convention(trial.scored.candidate, fit);
-        real.then(|| Unproven { trial, fit, clips: advantage.clips(), more })
+        let clips = cut.unwrap_or(advantage.clips());
+        real.then(|| Unproven { trial, fit, clips, more: (more * clips).div_ceil(advantage.clips()) })
     };
     step.trials.iter().filter_map(one).max_by(|a, b| a.trial.nats().total_cmp(&b.trial.nats()))
 }
