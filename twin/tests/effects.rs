@@ -6,7 +6,7 @@ use twin::control::{ArmRollout, CommandTrack};
 use twin::effects::{Effects, Elsewhere, Role, Shape, registry};
 
 /// Every name that reports and files may rely on.
-const NAMES: [&str; 38] = [
+const NAMES: [&str; 39] = [
     "joint_coulomb_friction",
     "joint_viscous_friction",
     "joint_stribeck_friction",
@@ -28,6 +28,7 @@ const NAMES: [&str; 38] = [
     "torque_ripple",
     "torque_sensor_bias",
     "base_tilt",
+    "joint_weight",
     "restitution",
     "contact_compliance",
     "tip_friction",

@@ -9,15 +9,16 @@ use rand_pcg::Pcg64;
 use shared_mem::cell::Cell;
 use shared_mem::theta::EffectTheta;
 use std::collections::BTreeMap;
-use twin::effects::{EffectInfo, Parameter, Role, Shape, Stage, registry};
+use twin::effects::{EffectInfo, Parameter, Role, Shape, Stage, registry, unknown_weight};
 
 /// Smallest share of the plausible range that is drawn.
 const SMALLEST: f64 = 0.33;
 
-/// Effects that can show in clips of the arm alone, or in strokes.
+/// Causes that can show in clips of the arm alone, or in strokes.
 #[must_use]
 pub fn candidates(with_object: bool) -> Vec<&'static EffectInfo> {
-    registry().iter().filter(|effect| with_object || effect.stage == Stage::Control).collect()
+    let shows = |effect: &&EffectInfo| with_object || effect.stage == Stage::Control;
+    registry().iter().filter(shows).filter(|effect| effect.name != unknown_weight().name).collect()
 }
 
 /// An effect with sizes and forms drawn from its plausible ranges.

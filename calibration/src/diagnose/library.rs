@@ -14,7 +14,7 @@ use shared_mem::theta::Theta;
 use std::ops::Range;
 use twin::arm::ArmModel;
 use twin::arm::Joints;
-use twin::effects::{EffectInfo, OnTable, Place, Robot, Role, Search, Shape, Stage, find, registry};
+use twin::effects::{EffectInfo, OnTable, Place, Robot, Role, Search, Shape, Stage, find, registry, unknown_weight};
 
 /// All numbers of all hypotheses.
 #[derive(Debug, Clone)]
@@ -105,7 +105,7 @@ impl Library {
     pub fn new(cell: &Cell, base: &Theta, ground: Option<&Ground>, peaks: &Joints) -> Self {
         let with_object = ground.is_some();
         let dof = base.arm.as_ref().map_or(0, |arm| arm.stiffness.len());
-        let mut numbers = setting::gains(cell, base);
+        let mut numbers = setting::arm_numbers(cell, base);
         if with_object {
             // How heavy an object is that moves by itself no pose tells.
             let shows = |(setting, _): &(Setting, Unknown)| cell.robot.is_some() || *setting != Setting::Mass;
@@ -123,7 +123,7 @@ impl Library {
             let known = given.any(|given| given.name == effect.name);
             let touched = cell.robot.is_some() || effect.acts_on != Place::ToolContact;
             let visible = if effect.stage == Stage::Control { dof > 0 } else { with_object && touched };
-            visible && !known
+            visible && !known && effect.name != unknown_weight().name
         };
         for effect in registry().iter().filter(fits) {
             let at = numbers.len();

@@ -5,7 +5,7 @@
 
 mod search;
 
-pub use search::{effect_settings, gains, object_parameters};
+pub use search::{arm_numbers, effect_settings, object_parameters};
 
 use shared_mem::cell::Cell;
 use shared_mem::theta::{ArmTheta, EffectTheta, ObjectTheta, Theta};
@@ -357,7 +357,7 @@ mod tests {
     fn gains_known_by_their_range_are_searched_in_it_and_gains_known_by_value_around_it() {
         let nominal = cell();
         let base = complete(&nominal, None).expect("a complete cell");
-        let (_, first) = &gains(&nominal, &base)[0];
+        let (_, first) = &arm_numbers(&nominal, &base)[0];
         assert_eq!((first.lower, first.start, first.upper), (300.0, 600.0, 1200.0));
         let ranged = Cell {
             robot: Some(Robot { joints: vec!["a".into()], ..Robot::default() }),
@@ -369,7 +369,36 @@ mod tests {
             ..Cell::default()
         };
         let base = complete(&ranged, None).expect("a complete cell");
-        let both = gains(&ranged, &base);
-        assert_eq!(both.iter().map(|(_, u)| [u.lower, u.upper]).collect::<Vec<_>>(), [[1.0, 100.0], [0.0, 5.0]]);
+        let all = arm_numbers(&ranged, &base);
+        assert_eq!(all[..2].iter().map(|(_, u)| [u.lower, u.upper]).collect::<Vec<_>>(), [[1.0, 100.0], [0.0, 5.0]]);
+    }
+
+    #[test]
+    fn the_weight_of_unknown_masses_is_searched_from_what_is_known_of_it() {
+        let servo = Cell {
+            robot: Some(Robot { joints: vec!["a".into(), "b".into()], ..Robot::default() }),
+            controller: Some(Controller {
+                stiffness: vec![20.0; 2],
+                damping: vec![1.0; 2],
+                torque_limit: vec![3.0, 1.0],
+                ..Controller::default()
+            }),
+            ..Cell::default()
+        };
+        let given = "[[effect]]\nname = \"joint_weight\"\nconstant = [0.2, 0.1]\nsine = [1.5, -0.3]\ncosine = 0.0";
+        let given: Theta = shared_mem::toml_file::parse(given, Path::new("theta.toml")).expect("a theta.toml");
+        let base = complete(&servo, Some(&given)).expect("a complete cell");
+        let all = arm_numbers(&servo, &base);
+        let of_weight: Vec<(f64, f64)> = all[4..].iter().map(|(_, u)| (u.start, u.upper)).collect();
+        let (large, small) = (3.0 * 0.8 * 2.0, 0.8 * 2.0);
+        assert_eq!(of_weight.iter().map(|(start, _)| *start).collect::<Vec<_>>(), [0.2, 0.1, 1.5, -0.3, 0.0, 0.0]);
+        assert!(
+            of_weight.iter().zip([large, small].iter().cycle()).all(|((_, upper), most)| (upper - most).abs() < 1e-9)
+        );
+        assert_eq!(
+            arm_numbers(&cell(), &complete(&cell(), None).expect("a complete cell")).len(),
+            14,
+            "its masses are known"
+        );
     }
 }

@@ -31,7 +31,9 @@ pub use arm::{ArmEffects, ArmMemory};
 pub use camera::{CameraEffects, CameraMemory};
 pub use change::Change;
 pub use hit::HitEffects;
-pub use registry::{EffectInfo, Elsewhere, OnTable, Parameter, Place, Role, Search, Shape, Stage, find, registry};
+pub use registry::{
+    EffectInfo, Elsewhere, OnTable, Parameter, Place, Role, Search, Shape, Stage, find, registry, unknown_weight,
+};
 pub use remedy::{Found, Remedy};
 pub use robot::Robot;
 pub use separation::{Experiment, Separation};

@@ -272,6 +272,13 @@ pub fn find(name: &str) -> Option<&'static EffectInfo> {
     EFFECTS.iter().find(|effect| effect.name == name)
 }
 
+/// The weight of links whose masses are not known: no cause, since every arm has weight, but numbers to identify where a cell
+/// gives no masses.
+#[must_use]
+pub fn unknown_weight() -> &'static EffectInfo {
+    &arm::joint_weight::EFFECT
+}
+
 static EFFECTS: &[EffectInfo] = &[
     arm::joint_coulomb_friction::EFFECT,
     arm::joint_viscous_friction::EFFECT,
@@ -294,6 +301,7 @@ static EFFECTS: &[EffectInfo] = &[
     arm::torque_ripple::EFFECT,
     arm::torque_sensor_bias::EFFECT,
     arm::base_tilt::EFFECT,
+    arm::joint_weight::EFFECT,
     hit::restitution::EFFECT,
     hit::contact_compliance::EFFECT,
     hit::tip_friction::EFFECT,

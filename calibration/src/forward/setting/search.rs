@@ -3,10 +3,10 @@
 use super::Setting;
 use crate::estimate::Unknown;
 use nalgebra::Vector3;
-use shared_mem::cell::{Cell, Controller, ControllerKind, Range};
+use shared_mem::cell::{Cell, Controller, ControllerKind, Range, Robot as CellRobot};
 use shared_mem::theta::Theta;
 use twin::arm::{ArmModel, damping_range, stiffness_range};
-use twin::effects::{EffectInfo, Parameter, Robot, Role, Search, Shape, Stage};
+use twin::effects::{EffectInfo, Parameter, Robot, Role, Search, Shape, Stage, unknown_weight};
 use twin::scene::ObjectModel;
 
 /// Gains stated by value are searched this far: the values are right to 20 %, and a bound must not be mistaken for them.
@@ -14,9 +14,10 @@ const GAIN_FACTOR: f64 = 2.0;
 /// Difference step of a gain over the gain.
 const GAIN_STEP: f64 = 1e-4;
 
-/// Stiffness and damping of every joint, beginning at the base's; none where no law leads the arm.
+/// Stiffness and damping of every joint, beginning at the base's, and where the masses of the links are not known what their weight
+/// asks of each joint; none where no law leads the arm.
 #[must_use]
-pub fn gains(cell: &Cell, base: &Theta) -> Vec<(Setting, Unknown)> {
+pub fn arm_numbers(cell: &Cell, base: &Theta) -> Vec<(Setting, Unknown)> {
     let (Some(controller), Some(arm)) = (&cell.controller, &base.arm) else { return Vec::new() };
     if controller.kind == ControllerKind::Tracking {
         return Vec::new();
@@ -31,6 +32,18 @@ pub fn gains(cell: &Cell, base: &Theta) -> Vec<(Setting, Unknown)> {
     let damping = Gain { starts: &arm.damping, nominal: &controller.damping, ranges: ranged };
     let mut all = stiffness.unknowns(Setting::Stiffness);
     all.extend(damping.unknowns(Setting::Damping));
+    if cell.robot.as_ref().is_some_and(CellRobot::joints_only) {
+        all.extend(model.iter().flat_map(|model| weight(model, base)));
+    }
+    all
+}
+
+/// What the weight of links of unknown masses asks of each joint, beginning at the base's.
+fn weight(model: &ArmModel, base: &Theta) -> Vec<(Setting, Unknown)> {
+    let mut all = effect_settings(unknown_weight(), &Robot::of(model), model.dof());
+    for (setting, unknown) in &mut all {
+        unknown.start = setting.read(base).unwrap_or(unknown.start).clamp(unknown.lower, unknown.upper);
+    }
     all
 }
 

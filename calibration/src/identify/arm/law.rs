@@ -5,7 +5,7 @@ use super::{ArmError, Numbers, begun, session};
 use crate::estimate::{ClipModel as _, Options as FitOptions, fit};
 use crate::forward::Settings;
 use crate::forward::arm::ArmClips;
-use crate::forward::setting::{complete, gains};
+use crate::forward::setting::{arm_numbers, complete};
 use crate::interrupt::Interrupt;
 use shared_mem::cell::{Cell, ControllerKind};
 use shared_mem::recording::Clip;
@@ -66,7 +66,7 @@ fn left_under(
     interrupt: &Interrupt,
 ) -> Result<Option<f64>, ArmError> {
     let base = begun(cell, &clips.iter().collect::<Vec<_>>(), &complete(cell, given)?, interrupt)?;
-    let (settings, unknowns): (Vec<_>, Vec<_>) = gains(cell, &base).into_iter().unzip();
+    let (settings, unknowns): (Vec<_>, Vec<_>) = arm_numbers(cell, &base).into_iter().unzip();
     let settings = Settings::new(base, settings);
     let numbers: Numbers<'_> = Box::new(|shared| settings.theta(shared));
     let (model, _) = ArmClips::new(cell, clips.to_vec(), session::CHANNELS, numbers)?;

@@ -31,7 +31,7 @@ use super::run::{Optimizer, Outcome, Run, RunError, concluded};
 use crate::engine::{Engine, Used};
 use crate::estimate::{ClipModel as _, Random, Subset, Unknown};
 use crate::forward::arm::ArmClips;
-use crate::forward::setting::{BaseError, complete, effect_settings, gains};
+use crate::forward::setting::{BaseError, arm_numbers, complete, effect_settings};
 use crate::forward::{Setting, Settings};
 use crate::interrupt::Interrupt;
 use crate::kept::{self, Fingerprint, Kept};
@@ -249,7 +249,7 @@ pub fn begun(cell: &Cell, clips: &[&Clip], base: &Theta, interrupt: &Interrupt) 
         return Ok(base.clone());
     }
     let clips = clips.iter().map(|clip| (*clip).clone()).collect();
-    let (settings, mut unknowns): (Vec<_>, Vec<_>) = gains(cell, base).into_iter().unzip();
+    let (settings, mut unknowns): (Vec<_>, Vec<_>) = arm_numbers(cell, base).into_iter().unzip();
     let settings = Settings::new(base.clone(), settings);
     let numbers: Numbers<'_> = Box::new(|shared| settings.theta(shared));
     let (model, _) = ArmClips::new(cell, clips, session::CHANNELS, numbers)?;
@@ -260,7 +260,7 @@ pub fn begun(cell: &Cell, clips: &[&Clip], base: &Theta, interrupt: &Interrupt) 
 
 /// Gains, and the parameters of the effects that were asked for.
 fn searched(cell: &Cell, base: &Theta, also: &[String]) -> Result<Vec<(Setting, Unknown)>, ArmError> {
-    let mut all = gains(cell, base);
+    let mut all = arm_numbers(cell, base);
     let dof = base.arm.as_ref().map_or(0, |arm| arm.stiffness.len());
     let robot = Robot::of(&ArmModel::from_cell(cell)?);
     for name in also {
@@ -269,7 +269,9 @@ fn searched(cell: &Cell, base: &Theta, also: &[String]) -> Result<Vec<(Setting, 
             let known: Vec<&str> = registry().iter().filter(on_arm).map(|effect| effect.name).collect();
             ArmError::Effect { given: name.clone(), known: known.join(", ") }
         })?;
-        all.extend(effect_settings(effect, &robot, dof));
+        let asked = effect_settings(effect, &robot, dof).into_iter();
+        let new: Vec<_> = asked.filter(|(asked, _)| all.iter().all(|(setting, _)| setting != asked)).collect();
+        all.extend(new);
     }
     Ok(all)
 }

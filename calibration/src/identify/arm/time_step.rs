@@ -62,7 +62,7 @@ mod tests {
     use crate::estimate::{Options, fit};
     use crate::forward::Settings;
     use crate::forward::arm::{ArmClips, CHANNELS};
-    use crate::forward::setting::{complete, gains};
+    use crate::forward::setting::{arm_numbers, complete};
     use crate::identify::arm::Numbers;
     use shared_mem::cell::Cell;
     use std::path::Path;
@@ -75,7 +75,7 @@ mod tests {
         let cell = Cell { objects: Vec::new(), ..world.cell.clone() };
         let mut clips = record(&world, 1).expect("a session");
         let base = complete(&cell, Some(&world.hidden)).expect("gains");
-        let (settings, unknowns): (Vec<_>, Vec<_>) = gains(&cell, &base).into_iter().unzip();
+        let (settings, unknowns): (Vec<_>, Vec<_>) = arm_numbers(&cell, &base).into_iter().unzip();
         let settings = Settings::new(base, settings);
         let model = |clips| -> Model<'_> {
             let numbers: Numbers<'_> = Box::new(|shared| settings.theta(shared));

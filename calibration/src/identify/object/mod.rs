@@ -42,7 +42,7 @@ use crate::engine::{Engine, EngineError, Used};
 use crate::estimate::{Impossible, Options as FitOptions, Unknown, fit as fit_clips};
 use crate::forward::arm::{ArmClips, Channel};
 use crate::forward::object::ObjectClips;
-use crate::forward::setting::{BaseError, complete, gains, object_parameters};
+use crate::forward::setting::{BaseError, arm_numbers, complete, object_parameters};
 use crate::forward::{Setting, Settings};
 use crate::interrupt::Interrupt;
 use crate::kept::{self, Fingerprint, Kept};
@@ -332,7 +332,7 @@ fn with_gains(
     interrupt: &Interrupt,
 ) -> Result<Theta, ObjectError> {
     let base = complete(cell, Some(given))?;
-    let (settings, unknowns): (Vec<Setting>, Vec<Unknown>) = gains(cell, &base).into_iter().unzip();
+    let (settings, unknowns): (Vec<Setting>, Vec<Unknown>) = arm_numbers(cell, &base).into_iter().unzip();
     let settings = Settings::new(base, settings);
     let (clips, _) = ArmClips::new(cell, clips, &[Channel::Position], |numbers: &[f64]| settings.theta(numbers))?;
     let clips = clips.moved_by(engine, &complete(cell, None)?);

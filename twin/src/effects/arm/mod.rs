@@ -19,6 +19,7 @@ pub(super) mod joint_load_friction;
 pub(super) mod joint_presliding_friction;
 pub(super) mod joint_stribeck_friction;
 pub(super) mod joint_viscous_friction;
+pub(super) mod joint_weight;
 mod memory;
 pub(super) mod payload;
 pub(super) mod rotor_inertia;
@@ -65,6 +66,7 @@ pub struct ArmEffects {
     pub(super) torque_ripple: Option<torque_ripple::TorqueRipple>,
     pub(super) torque_sensor_bias: Option<torque_sensor_bias::TorqueSensorBias>,
     pub(super) base_tilt: Option<base_tilt::BaseTilt>,
+    pub(super) joint_weight: Option<joint_weight::JointWeight>,
 }
 
 impl ArmEffects {
@@ -120,6 +122,10 @@ impl ArmEffects {
         }
         memory.motor = state;
         memory.tau_J = arm.gravity(&state.q);
+        if let Some(effect) = &self.joint_weight {
+            let held = effect.held_at(&state.q);
+            memory.tau_J.iter_mut().zip(held).for_each(|(tau, held)| *tau += held);
+        }
         for i in 0..arm.dof() {
             state.q[i] -= self.twist_under(i, memory.tau_J[i]);
         }
@@ -203,6 +209,7 @@ impl ArmEffects {
         (motor_torque, external): (&Joints, &Joints),
         dt: f64,
     ) {
+        let external = &self.joint_weight.map_or(*external, |effect| effect.beside(external, state, dt));
         if self.acts_in_joints() {
             let passed = self.advance_through(memory, arm, state, (motor_torque, external), dt);
             (memory.tau_J, memory.grip) = (passed.tau_J, passed.grip);
