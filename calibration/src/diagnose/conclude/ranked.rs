@@ -51,7 +51,7 @@ pub(in crate::diagnose) fn candidates<E: Evidence>(
         let trial = step.trials.iter().find(|trial| trial.scored.candidate == effect).unwrap_or(trial);
         let with = match &trial.fitted {
             _ if kept => after_keeping(found, &left, after, place),
-            Some((fit, _)) => on_confirm(fit, step),
+            Some((fit, _)) => held_out::estimated(bench, split, (fit, &step.weights)),
             None => None,
         };
         let closed = with.as_ref().zip(left[place].as_ref()).map(|(with, from)| with.shrink_added(from, before, seed));

@@ -7,6 +7,7 @@
 //! | `shortlist` | how much of the gap each candidate's signature explains |
 //! | `bench`, `cost`, `effort` | hypotheses fitted, what they cost, and how much work a fit gets |
 //! | `descend` | the steps of a fit |
+//! | `left_out` | the numbers without some of the clips |
 //! | `restart` | restarts of clips whose own numbers are stuck in a local minimum |
 //! | `parameters`, `undetermined` | its numbers with their intervals, and those that nothing depends on |
 //! | `time_step` | how far the twin's time step moves them |
@@ -17,6 +18,7 @@ pub mod cost;
 mod descend;
 pub mod effort;
 pub mod floor;
+pub(super) mod left_out;
 pub mod parameters;
 pub mod quadratic;
 pub mod restart;

@@ -9,7 +9,8 @@ use crate::diagnose::evidence::measured::Evidence;
 use crate::diagnose::evidence::noise::median;
 use crate::diagnose::evidence::scatter_scale::{Around, at_the_best_scale};
 use crate::diagnose::fit::bench::{Bench, FittedClip, Hypothesis};
-use crate::diagnose::fit::quadratic::{minimum, value};
+use crate::diagnose::fit::left_out::shift_to;
+use crate::diagnose::fit::quadratic::value;
 
 /// Deviance of every judged clip out of sample, and what it says about numbers.
 #[derive(Debug, Clone, PartialEq)]
@@ -83,7 +84,7 @@ fn left_out<E: Evidence>(bench: &Bench<'_, E>, hypothesis: &Hypothesis, weights:
     let total = bench.held(hypothesis);
     let one = |clip: &FittedClip| {
         let form = &clip.reduced.form;
-        let shift = bounded(bench, hypothesis, &minimum(&(&total - form), &all).at);
+        let shift = shift_to(bench, hypothesis, &(&total - form));
         let linear = value(form, &all, &shift) + clip.reduced.volume;
         let doubted = linear > clip.deviance() + DOUBTED;
         let answer = if doubted { simulated(bench, hypothesis, (clip, &shift), weights) } else { None };
@@ -102,14 +103,6 @@ fn simulated<E: Evidence>(
     let mut shifted = hypothesis.clone();
     hypothesis.free.iter().zip(shift).for_each(|(k, shift)| shifted.full[*k] += shift);
     Some(bench.judge(&shifted, &[clip.clip], weights)?.first()?.deviance())
-}
-
-fn bounded<E: Evidence>(bench: &Bench<'_, E>, hypothesis: &Hypothesis, shift: &[f64]) -> Vec<f64> {
-    let within = |(index, shift): (&usize, &f64)| {
-        let (value, unknown) = (hypothesis.full[*index], &bench.library.unknowns[*index]);
-        (value + shift).clamp(unknown.lower, unknown.upper) - value
-    };
-    hypothesis.free.iter().zip(shift).map(within).collect()
 }
 
 impl Predicted {
