@@ -33,7 +33,7 @@ use shared_mem::recording::pack_picture;
 use splat::SplatCloud;
 use std::path::PathBuf;
 
-/// Colour of what no view has shown.
+/// Colour of what no view has shown, or of which views contradict each other.
 const UNKNOWN: [u8; 3] = [128, 128, 128];
 /// Density where nobody weighed the object [kg/m³]: that of a filled package.
 pub const DENSITY: f64 = 500.0;
@@ -66,8 +66,7 @@ pub fn centred(mesh: &Mesh, middle: &Point3<f64>) -> Mesh {
 pub fn files(object: &Object, pieces: &[Mesh], labels: &Labels) -> Vec<(PathBuf, Vec<u8>)> {
     let middle = object.middle();
     let (fine, coarse) = (centred(&object.fine, &middle), centred(&object.coarse, &middle));
-    let colours: Vec<[u8; 3]> =
-        object.fine.points.iter().zip(&object.shown).map(|(p, n)| colour(object, p, *n)).collect();
+    let colours: Vec<[u8; 3]> = (0..object.fine.points.len()).map(|corner| colour(object, corner)).collect();
     let splats = centred_splats(&object.splats, &middle);
     let summary = Summary::of(object, pieces, labels);
     let mut files = vec![
@@ -99,7 +98,9 @@ fn stem(name: &str) -> String {
     joined.rsplit_once('.').map_or(joined.as_str(), |(stem, _)| stem).to_owned()
 }
 
-fn colour(object: &Object, point: &Point3<f64>, shown: u8) -> [u8; 3] {
-    let known = object.field.colour_at(point).filter(|_| is_certain(shown));
+/// Of a corner of the fine mesh; grey where it is a guess.
+fn colour(object: &Object, corner: usize) -> [u8; 3] {
+    let is_known = is_certain(object.shown[corner]) && (object.with_depth || !object.contradicted[corner]);
+    let known = object.field.colour_at(&object.fine.points[corner]).filter(|_| is_known);
     known.map_or(UNKNOWN, |colour| colour.map(|c| (c * 255.0).round() as u8))
 }

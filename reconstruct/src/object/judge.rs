@@ -1,26 +1,26 @@
-//! How good it is, by pictures that took no part; and which parts no picture has shown.
+//! How good it is, by pictures that took no part; and what a person should know about the surface.
 
 use super::bounds::Bounds;
+use super::evidence::Evidence;
 use super::learn;
 use super::pool;
 use super::view::{Drawn, draw};
 use crate::field::{Field, Grid};
 use crate::mesh::{Islands, Mesh};
-use crate::scan::{Camera, Frame};
+use crate::scan::Frame;
 use crate::splats;
 use crate::views::Remark;
-use nalgebra::{Isometry3, Point3, Vector3};
 use rayon::prelude::*;
 use splat::SplatCloud;
 
 /// So near to the mask's border pixels do not count: what is behind shines in [pixel].
 const EDGE: i16 = 3;
-/// For what views show, pictures of fewer pixels do.
-const COARSER: u32 = 3;
-/// A corner is shown by a view that it faces (cosine).
-const FACING: f64 = 0.25;
+/// For depth that is expected, pictures of fewer pixels do.
+const COARSER: u32 = 6;
 /// A corner is certain that so many views show.
 const CERTAIN: u8 = 2;
+/// Views of a textured object contradict each other on less of its surface, at the edges of its print.
+const CONTRADICTED: f64 = 0.05;
 
 /// A view that took no part.
 #[derive(Debug, Clone)]
@@ -78,44 +78,6 @@ fn psnr(frame: &Frame, drawn: &[[u8; 3]]) -> f64 {
     splats::psnr(&frame.rgb, drawn, |at| border[at] > EDGE)
 }
 
-/// How many views show each corner of a mesh: it faces them, and nothing stands before it.
-pub(super) fn shown(field: &Field<f32>, mesh: &Mesh, frames: &[Frame], poses: &[Isometry3<f64>]) -> Vec<u8> {
-    let normals = normals(mesh);
-    let near = 2.5 * field.grid.voxel;
-    let one = |frame: &Frame, pose: &Isometry3<f64>| -> Vec<bool> {
-        let camera: Camera = frame.camera.reduced(COARSER);
-        let drawn = draw(field, &camera, pose);
-        let at = |(point, normal): (&Point3<f64>, &Vector3<f64>)| {
-            let local = pose.inverse_transform_point(point);
-            let Some([u, v]) = camera.project(&local) else { return false };
-            if !(u >= 0.0 && v >= 0.0 && u < f64::from(camera.width) && v < f64::from(camera.height)) {
-                return false;
-            }
-            let towards = (Point3::from(pose.translation.vector) - point).normalize();
-            let depth = f64::from(drawn.depth[v as usize * camera.width as usize + u as usize]);
-            let slack = near + 2.0 * local.z / camera.focal[0];
-            normal.dot(&towards) > FACING && depth > 0.0 && local.z < depth + slack
-        };
-        mesh.points.iter().zip(&normals).map(at).collect()
-    };
-    let mut count = vec![0u8; mesh.points.len()];
-    for (frame, pose) in frames.iter().zip(poses) {
-        let shown = one(frame, pose);
-        count.iter_mut().zip(shown).for_each(|(count, shown)| *count = count.saturating_add(u8::from(shown)));
-    }
-    count
-}
-
-fn normals(mesh: &Mesh) -> Vec<Vector3<f64>> {
-    let mut normals = vec![Vector3::zeros(); mesh.points.len()];
-    for (number, triangle) in mesh.triangles.iter().enumerate() {
-        let [a, b, c] = mesh.corners(number);
-        let normal = (b - a).cross(&(c - a));
-        triangle.iter().for_each(|corner| normals[*corner as usize] += normal);
-    }
-    normals.iter().map(|n| n.try_normalize(0.0).unwrap_or_else(Vector3::z)).collect()
-}
-
 /// How many metres one unit of the poses would have to be for depth to lie on the start's surface; `None` without depth. In a view, the
 /// middle ratio of measured to expected depth.
 pub(super) fn depth_scale(grid: &Grid, distance: &[f32], frames: &[Frame]) -> Option<f64> {
@@ -124,9 +86,9 @@ pub(super) fn depth_scale(grid: &Grid, distance: &[f32], frames: &[Frame]) -> Op
         if frame.depth.is_empty() {
             return Vec::new();
         }
-        let camera = frame.camera.reduced(2 * COARSER);
+        let camera = frame.camera.reduced(COARSER);
         let drawn = draw(&field, &camera, &frame.scan_from_camera);
-        let (columns, step) = (camera.width as usize, 2 * COARSER as usize);
+        let (columns, step) = (camera.width as usize, COARSER as usize);
         let ratio = |at: usize| {
             let whole = (at / columns * step + step / 2) * frame.camera.width as usize + at % columns * step + step / 2;
             let (measured, expected) = (f64::from(frame.depth[whole]), f64::from(drawn.depth[at]));
@@ -140,23 +102,22 @@ pub(super) fn depth_scale(grid: &Grid, distance: &[f32], frames: &[Frame]) -> Op
 }
 
 /// What a person should know about the surface.
-pub(super) fn remarks(shown: &[u8], mesh: &Mesh, islands: &Islands, views: &[HeldOut]) -> Vec<Remark> {
+pub(super) fn remarks(
+    evidence: &Evidence,
+    mesh: &Mesh,
+    islands: &Islands,
+    (views, with_depth): (&[HeldOut], bool),
+) -> Vec<Remark> {
     let mut remarks = Vec::new();
-    let (mut hidden, mut all) = (0.0, 0.0);
-    for (number, triangle) in mesh.triangles.iter().enumerate() {
-        let [a, b, c] = mesh.corners(number);
-        let area = (b - a).cross(&(c - a)).norm();
-        all += area;
-        if triangle.iter().any(|corner| shown[*corner as usize] < CERTAIN) {
-            hidden += area;
-        }
-    }
-    let share = hidden / all;
+    let share = share(mesh, |corner| evidence.views[corner] < CERTAIN);
     if share > 0.02 {
         remarks.push(Remark(format!(
             "{:.0} % of the surface is shown by fewer than {CERTAIN} views, and is a guess (grey in object.ply): take pictures from there",
             share * 100.0
         )));
+    }
+    if !with_depth {
+        remarks.push(hollows(evidence, mesh));
     }
     if islands.share > 0.02 {
         remarks.push(Remark(format!(
@@ -173,6 +134,33 @@ pub(super) fn remarks(shown: &[u8], mesh: &Mesh, islands: &Islands, views: &[Hel
         )));
     }
     remarks
+}
+
+/// Of the surface the share that has a corner of a kind.
+fn share(mesh: &Mesh, is: impl Fn(usize) -> bool) -> f64 {
+    let (mut part, mut all) = (0.0, 0.0);
+    for (number, triangle) in mesh.triangles.iter().enumerate() {
+        let area = mesh.area(number);
+        all += area;
+        if triangle.iter().any(|corner| is(*corner as usize)) {
+            part += area;
+        }
+    }
+    part / all
+}
+
+/// Silhouettes show no hollow that opens to one side, and colours only some.
+fn hollows(evidence: &Evidence, mesh: &Mesh) -> Remark {
+    let share = share(mesh, |corner| evidence.contradicted[corner]);
+    Remark(if share > CONTRADICTED {
+        format!(
+            "on {:.0} % of the surface the views contradict each other in colour (grey in object.ply): it is not where they see it; without \
+             depth a hollow is filled there, and the volume too large: take pictures with depth",
+            share * 100.0
+        )
+    } else {
+        "made without depth: a hollow that no silhouette shows, as the inside of a cup, is filled where its colours are even".into()
+    })
 }
 
 /// Whether a corner that so many views show is certain.

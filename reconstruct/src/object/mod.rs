@@ -15,7 +15,8 @@
 //! | `table` | nothing lies below the table |
 //! | `view` | whole pictures of the field |
 //! | `appearance` | splats on the surface, trained on the views |
-//! | `judge` | held-out views, and what no view has shown |
+//! | `evidence` | what views show of the surface, and where they contradict each other |
+//! | `judge` | held-out views, and what a person should know |
 //! | `state` | what there is when the work is interrupted |
 
 mod adam;
@@ -23,6 +24,7 @@ mod appearance;
 mod band;
 mod bounds;
 mod colours;
+mod evidence;
 mod judge;
 mod learn;
 mod pictures;
@@ -45,6 +47,7 @@ use crate::mesh::{self, Flaw, Islands, Mesh, Solid, Topology};
 use crate::scan::{Scale, ScaleSource, Scan, ScanError};
 use crate::views::Remark;
 use bounds::Bounds;
+use evidence::Evidence;
 use learn::{Learner, Plan, State};
 use nalgebra::{Isometry3, Point3};
 use shared_mem::ending;
@@ -116,6 +119,8 @@ pub struct Object {
     pub solid: Solid,
     /// How many views show each corner of the fine mesh.
     pub shown: Vec<u8>,
+    /// Whether these views contradict each other about its colour.
+    pub contradicted: Vec<bool>,
     /// What was left out beside it.
     pub islands: Islands,
     /// Where its scale comes from.
@@ -181,7 +186,7 @@ pub fn reconstruct(scan: Scan, options: &Options, kept: &Path) -> Result<Object,
     let steps = appearance::steps(options.edge);
     let splats = appearance::trained(&bar, (&state.field, &shape.fine), trained, steps, keeper.splats())?;
     bar.stage(JUDGE, 1 + pictures.held_out.len() as u64);
-    let shown = judge::shown(&state.field, &shape.fine, &pictures.train, &poses);
+    let evidence = Evidence::of(&state.field, &shape.fine, &pictures.train, &poses);
     let mut held_out = Vec::new();
     for frame in &pictures.held_out {
         bar.show(1 + held_out.len() as u64, JUDGE);
@@ -189,7 +194,7 @@ pub fn reconstruct(scan: Scan, options: &Options, kept: &Path) -> Result<Object,
         held_out.push(judge::held_out(&state.field, &splats, frame, &bounds));
     }
     let mut remarks = pictures.remarks;
-    remarks.extend(judge::remarks(&shown, &shape.fine, &shape.islands, &held_out));
+    remarks.extend(judge::remarks(&evidence, &shape.fine, &shape.islands, (&held_out, scan.has_depth())));
     let shifts = state.corrections.iter().map(|c| c[0] * c[0] + c[1] * c[1] + c[2] * c[2]);
     let moved = (shifts.sum::<f64>() / state.corrections.len() as f64).sqrt();
     let Shape { fine, coarse, topology, solid, islands } = shape;
@@ -200,7 +205,8 @@ pub fn reconstruct(scan: Scan, options: &Options, kept: &Path) -> Result<Object,
         splats,
         topology,
         solid,
-        shown,
+        shown: evidence.views,
+        contradicted: evidence.contradicted,
         islands,
         scale,
         held_out,

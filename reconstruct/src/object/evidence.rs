@@ -1,0 +1,188 @@
+//! What the views show of the surface: how many of them each corner of its mesh, and how far apart the colours are that they have there.
+//! Where the surface is not where it seems to be, as over a hollow that was filled because no silhouette shows it, each view sees another
+//! place.
+
+use super::view::draw;
+use crate::field::Field;
+use crate::mesh::Mesh;
+use crate::scan::{Camera, Frame};
+use nalgebra::{Isometry3, Point3, Vector3};
+
+/// Pictures of fewer pixels do.
+const COARSER: u32 = 3;
+/// A corner is shown by a view that it faces (cosine).
+const FACING: f64 = 0.25;
+/// Colours of fewer views say nothing about whether they agree.
+const FEWEST: usize = 3;
+/// Rounds in which a corner takes the mean with its neighbours: pixels at the edge of a print differ anywhere.
+const ROUNDS: usize = 8;
+/// Colours further apart contradict each other [of 255].
+const APART: f64 = 16.0;
+
+/// What views show of each corner.
+#[derive(Debug)]
+pub(super) struct Evidence {
+    /// How many views show it.
+    pub(super) views: Vec<u8>,
+    /// Whether they contradict each other about its colour.
+    pub(super) contradicted: Vec<bool>,
+}
+
+impl Evidence {
+    /// Of a mesh on the surface of `field`, from the poses that the frames have by now.
+    pub(super) fn of(field: &Field<f32>, mesh: &Mesh, frames: &[Frame], poses: &[Isometry3<f64>]) -> Self {
+        let normals = normals(mesh);
+        let mut views = vec![0u8; mesh.points.len()];
+        let mut colours: Vec<Vec<[f64; 3]>> = vec![Vec::new(); mesh.points.len()];
+        for (frame, pose) in frames.iter().zip(poses) {
+            for (corner, pixel) in seen(field, (mesh, &normals), frame, pose).into_iter().enumerate() {
+                views[corner] = views[corner].saturating_add(u8::from(pixel.is_some()));
+                colours[corner].extend(pixel.and_then(|pixel| mean(frame, pixel)));
+            }
+        }
+        let apart: Vec<Option<f64>> = colours.iter_mut().map(|colours| apart(colours)).collect();
+        let contradicted = smoothed(mesh, apart).into_iter().map(|apart| apart.is_some_and(|a| a > APART)).collect();
+        Self { views, contradicted }
+    }
+}
+
+/// Pixels of a picture reduced by [`COARSER`] at which a view shows the corners; `None` where a corner faces away from it, or something
+/// stands before it.
+fn seen(
+    field: &Field<f32>,
+    (mesh, normals): (&Mesh, &[Vector3<f64>]),
+    frame: &Frame,
+    pose: &Isometry3<f64>,
+) -> Vec<Option<[usize; 2]>> {
+    let camera: Camera = frame.camera.reduced(COARSER);
+    let drawn = draw(field, &camera, pose);
+    let near = 2.5 * field.grid.voxel;
+    let at = |(point, normal): (&Point3<f64>, &Vector3<f64>)| {
+        let local = pose.inverse_transform_point(point);
+        let [u, v] = camera.project(&local)?;
+        if !(u >= 0.0 && v >= 0.0 && u < f64::from(camera.width) && v < f64::from(camera.height)) {
+            return None;
+        }
+        let pixel = [u as usize, v as usize];
+        let towards = (Point3::from(pose.translation.vector) - point).normalize();
+        let depth = f64::from(drawn.depth[pixel[1] * camera.width as usize + pixel[0]]);
+        let slack = near + 2.0 * local.z / camera.focal[0];
+        (normal.dot(&towards) > FACING && depth > 0.0 && local.z < depth + slack).then_some(pixel)
+    };
+    mesh.points.iter().zip(normals).map(at).collect()
+}
+
+/// Mean colour [of 255] of the pixels that are one in the reduced picture; `None` where not all of them are in the mask.
+fn mean(frame: &Frame, [column, row]: [usize; 2]) -> Option<[f64; 3]> {
+    let by = COARSER as usize;
+    let first = row * by * frame.camera.width as usize + column * by;
+    let pixels = (0..by * by).map(|i| first + i / by * frame.camera.width as usize + i % by);
+    let mut sum = [0.0; 3];
+    for at in pixels.clone() {
+        (0..3).for_each(|c| sum[c] += f64::from(frame.rgb[at][c]));
+    }
+    pixels.clone().all(|at| frame.mask[at]).then(|| sum.map(|sum| sum / (by * by) as f64))
+}
+
+/// Mean distance of colours from their middle one, channel by channel.
+fn apart(colours: &mut [[f64; 3]]) -> Option<f64> {
+    if colours.len() < FEWEST {
+        return None;
+    }
+    let mut sum = 0.0;
+    for c in 0..3 {
+        colours.sort_by(|a, b| a[c].total_cmp(&b[c]));
+        let middle = colours[colours.len() / 2][c];
+        sum += colours.iter().map(|colour| (colour[c] - middle).abs()).sum::<f64>();
+    }
+    Some(sum / (3 * colours.len()) as f64)
+}
+
+/// Values of corners, of which each takes the mean with its neighbours again and again.
+fn smoothed(mesh: &Mesh, mut values: Vec<Option<f64>>) -> Vec<Option<f64>> {
+    for _ in 0..ROUNDS {
+        // Its own value counts as one of its neighbours'.
+        let mut sums: Vec<(f64, f64)> =
+            values.iter().map(|value| value.map_or((0.0, 0.0), |v| (2.0 * v, 2.0))).collect();
+        for triangle in &mesh.triangles {
+            for (to, from) in [(0, 1), (1, 2), (2, 0), (1, 0), (2, 1), (0, 2)] {
+                if let Some(value) = values[triangle[from] as usize] {
+                    let (sum, count) = &mut sums[triangle[to] as usize];
+                    (*sum, *count) = (*sum + value, *count + 1.0);
+                }
+            }
+        }
+        values = sums.into_iter().map(|(sum, count)| (count > 0.0).then(|| sum / count)).collect();
+    }
+    values
+}
+
+fn normals(mesh: &Mesh) -> Vec<Vector3<f64>> {
+    let mut normals = vec![Vector3::zeros(); mesh.points.len()];
+    for (number, triangle) in mesh.triangles.iter().enumerate() {
+        let [a, b, c] = mesh.corners(number);
+        let normal = (b - a).cross(&(c - a));
+        triangle.iter().for_each(|corner| normals[*corner as usize] += normal);
+    }
+    normals.iter().map(|n| n.try_normalize(0.0).unwrap_or_else(Vector3::z)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::field::Grid;
+    use crate::mesh::surface;
+    use crate::scan::Lens;
+
+    const WIDTH: u32 = 120;
+    const HEIGHT: u32 = 90;
+
+    /// A box of 80 x 80 x 60 mm, with a hollow of 60 x 60 x 40 mm that opens upwards or without.
+    fn body(hollow: bool) -> Field<f32> {
+        let grid = Grid { dims: [41, 41, 41], origin: Point3::new(-0.06, -0.06, -0.06), voxel: 0.003 };
+        let inside = |p: Point3<f64>, half: [f64; 3]| (0..3).map(|i| p[i].abs() - half[i]).fold(f64::MIN, f64::max);
+        let points: Vec<Point3<f64>> = (0..grid.len()).map(|i| grid.position(grid.node(i))).collect();
+        let distance = |p: &Point3<f64>| {
+            let outside = inside(*p, [0.04, 0.04, 0.03]);
+            // Its floor is 40 mm below the rim.
+            let free = -inside(*p - Vector3::new(0.0, 0.0, 0.03), [0.03, 0.03, 0.04]);
+            (if hollow { outside.max(free) } else { outside } / grid.voxel) as f32
+        };
+        let colour = |p: &Point3<f64>| [0, 1, 2].map(|i| (0.5 + 0.4 * (150.0 * p[i]).sin()) as f32);
+        Field { grid, distance: points.iter().map(distance).collect(), colour: points.iter().map(colour).collect() }
+    }
+
+    #[test]
+    fn views_into_a_hollow_contradict_each_other_where_it_is_filled() {
+        let centre = [f64::from(WIDTH) / 2.0, f64::from(HEIGHT) / 2.0];
+        let camera = Camera { width: WIDTH, height: HEIGHT, focal: [180.0; 2], centre, lens: Lens::Straight };
+        let pose = |i: u32| {
+            let (sin, cos) = (f64::from(i) * 2.4).sin_cos();
+            let high = 0.9 - 0.06 * f64::from(i);
+            let eye = Point3::new((1.0 - high * high).sqrt() * cos, (1.0 - high * high).sqrt() * sin, high) * 0.3;
+            Isometry3::face_towards(&eye, &Point3::origin(), &-Vector3::z())
+        };
+        let poses: Vec<_> = (0..16).map(pose).collect();
+        let frame = |pose: &Isometry3<f64>| {
+            let drawn = draw(&body(true), &camera, pose);
+            let mask = drawn.opacity.iter().map(|o| *o > 0.5).collect();
+            Frame { name: String::new(), camera, scan_from_camera: *pose, rgb: drawn.rgb, mask, depth: Vec::new() }
+        };
+        let frames: Vec<Frame> = poses.iter().map(frame).collect();
+        let shares = |hollow: bool| {
+            let field = body(hollow);
+            let (mesh, _) = surface(&field).expect("a body");
+            let Evidence { views, contradicted } = Evidence::of(&field, &mesh, &frames, &poses);
+            let share = |counts: &dyn Fn(&Point3<f64>) -> bool| {
+                let all: Vec<usize> = (0..views.len()).filter(|i| counts(&mesh.points[*i]) && views[*i] > 3).collect();
+                all.iter().filter(|i| contradicted[**i]).count() as f64 / all.len() as f64
+            };
+            let over = |p: &Point3<f64>| p.z > 0.029 && p.x.abs() < 0.025 && p.y.abs() < 0.025;
+            [share(&over), share(&|p| p.z < 0.02 && p.z > -0.025 && p.x.abs().max(p.y.abs()) > 0.038)]
+        };
+        let filled = shares(false);
+        assert!(filled[0] > 0.9 && filled[1] < 0.1, "{filled:?}");
+        let right = shares(true);
+        assert!(right[1] < 0.1, "{right:?}");
+    }
+}
