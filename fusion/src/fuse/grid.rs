@@ -13,6 +13,8 @@ const VOXELS: usize = (EDGE * EDGE * EDGE) as usize;
 const EVERY: usize = 2;
 /// Nearer depths are no surface but the camera's own housing [m].
 const NEAREST: f32 = 0.05;
+/// Depths are off by less than so many standard deviations.
+const NOISE: f32 = 3.0;
 
 /// A block's voxels: x runs quickest, then y, then z.
 #[derive(Debug, Clone)]
@@ -134,6 +136,13 @@ pub(super) fn voxel([x, y, z]: [i32; 3]) -> usize {
     ((z * EDGE + y) * EDGE + x) as usize
 }
 
+/// How much a depth counts for a voxel that is so far before it. Behind the band a voxel may be in the next surface; but where noise is
+/// wider than the band, depths that are short by it must count as much as those that are long by it, else the surface moves away from
+/// the cameras.
+fn counts(before: f32, reach: f32, noise: f32) -> f32 {
+    if before >= -reach { 1.0 } else { (2.0 + 2.0 * before / noise.max(reach)).clamp(0.0, 1.0) }
+}
+
 fn take_in(block: &mut Block, place: [i32; 3], view: &View<'_>, settings: &Settings) {
     let camera: Isometry3<f32> = view.camera.camera_from_world.cast();
     let lens = &view.camera.lens;
@@ -158,13 +167,17 @@ fn take_in(block: &mut Block, place: [i32; 3], view: &View<'_>, settings: &Setti
         let pixel = v as usize * view.size[0] + u as usize;
         let depth = view.depth[pixel];
         let before = depth - at.z;
-        if !(depth > NEAREST && depth < settings.farthest) || before < -reach {
+        if !(depth > NEAREST && depth < settings.farthest) {
             continue;
         }
-        let weight = depth.powi(-4);
+        let share = counts(before, reach, NOISE * settings.spread * depth * depth);
+        if share <= 0.0 {
+            continue;
+        }
+        let weight = share * depth.powi(-4);
         let all = block.weight[number] + weight;
         let share = weight / all;
-        block.distance[number] += share * ((before / reach).min(1.0) - block.distance[number]);
+        block.distance[number] += share * ((before / reach).clamp(-1.0, 1.0) - block.distance[number]);
         block.weight[number] = all;
         block.seen[number] = block.seen[number].saturating_add(1);
         // Colours are those of the surface: a voxel far before it sees what lies behind.
@@ -174,5 +187,25 @@ fn take_in(block: &mut Block, place: [i32; 3], view: &View<'_>, settings: &Setti
             let color = rgb[pixel].map(|value| f32::from(value) / 255.0);
             (0..3).for_each(|c| block.color[number][c] += share * (color[c] - block.color[number][c]));
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::counts;
+
+    #[test]
+    fn noise_as_wide_as_the_band_leaves_a_voxel_on_the_surface_there() {
+        // Mean over normal noise of what a voxel on the surface gathers, in bands.
+        let mean = |noise: f32| {
+            let votes = (-400i16..=400).map(|i| {
+                let off = f32::from(i) * 0.01;
+                let weight = counts(off, 1.0, noise) * (-0.5 * off * off).exp();
+                (weight * off.clamp(-1.0, 1.0), weight)
+            });
+            let (sum, total) = votes.fold((0.0, 0.0), |a, b| (a.0 + b.0, a.1 + b.1));
+            sum / total
+        };
+        assert!(mean(3.0).abs() < 0.03 && mean(0.0) > 0.15, "{} {}", mean(3.0), mean(0.0));
     }
 }

@@ -42,11 +42,13 @@ pub struct Settings {
     pub least: u16,
     /// Depths beyond are left out [m].
     pub farthest: f32,
+    /// Standard deviation of a depth of one metre, growing with the square of depth [m].
+    pub spread: f32,
 }
 
 impl Default for Settings {
     fn default() -> Self {
-        Self { voxel: 4e-3, band: 5.0, least: 2, farthest: 3.0 }
+        Self { voxel: 4e-3, band: 5.0, least: 2, farthest: 3.0, spread: 0.0 }
     }
 }
 

@@ -1,7 +1,7 @@
 //! The views' pixels: those to learn from, those held out, and those that say nothing, each with the reason.
 
 use crate::scan::{FEWEST_VIEWS, Frame, Scan, ScanError};
-use crate::views::{Remark, grey, is_held_out, named, read_all, without_blurred};
+use crate::views::{Remark, grey, is_held_out, named, read_all, spread, without_blurred};
 
 /// Longest edge of a picture [pixel]; larger ones are reduced.
 const LONGEST: u32 = 1300;
@@ -87,26 +87,4 @@ fn appearance(frames: &[Frame], with_depth: bool, remarks: &mut Vec<Remark>) {
             seen * 100.0
         )));
     }
-}
-
-/// Standard deviation of depth at one metre, growing with the square of the distance: from how single pixels differ from those on
-/// both sides.
-fn spread(frames: &[Frame]) -> Option<f64> {
-    let mut off = Vec::new();
-    for frame in frames.iter().filter(|frame| !frame.depth.is_empty()) {
-        for (number, three) in frame.depth.windows(3).enumerate().step_by(7) {
-            let bend = 0.5 * (three[0] + three[2]) - three[1];
-            let smooth = three.iter().all(|z| *z > 0.0) && (three[0] - three[2]).abs() < 0.02 * three[1];
-            if smooth && frame.mask[number + 1] {
-                // Of three equal variances.
-                off.push(f64::from(bend.abs() / (three[1] * three[1])) / 1.5f64.sqrt());
-            }
-        }
-    }
-    if off.len() < 100 {
-        return None;
-    }
-    off.sort_by(f64::total_cmp);
-    // The middle of absolute normal values.
-    Some((off[off.len() / 2] / 0.6745).clamp(2e-4, 0.05))
 }

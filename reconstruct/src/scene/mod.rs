@@ -16,7 +16,7 @@ pub use judge::HeldOut;
 use crate::mesh::{self, Mesh};
 use crate::scan::{Scale, ScaleSource, Scan, ScanError};
 use crate::splats;
-use crate::views::Remark;
+use crate::views::{Remark, spread};
 use fusion::Surface;
 use fusion::fuse::{Grid, Settings as Fineness, View};
 use fusion::plane::{Level, levels, table};
@@ -175,7 +175,13 @@ fn not_interrupted() -> Result<(), SceneError> {
 /// The surface that the views see together, without the islands that noise leaves.
 fn fused(bar: &Progress, views: &Views, options: &Options) -> Result<Surface, SceneError> {
     bar.stage(FUSE, 2 + views.train.len() as u64);
-    let settings = Fineness { voxel: options.voxel as f32, least: SEEN, farthest: FARTHEST, ..Fineness::default() };
+    let settings = Fineness {
+        voxel: options.voxel as f32,
+        least: SEEN,
+        farthest: FARTHEST,
+        spread: spread(&views.train).unwrap_or_default() as f32,
+        ..Fineness::default()
+    };
     let mut grid = Grid::new(settings);
     for (number, frame) in views.train.iter().enumerate() {
         not_interrupted()?;
