@@ -4,7 +4,10 @@ use crate::scan::{self, Camera, Frame};
 use nalgebra::{Isometry3, Vector3};
 use shared_mem::ending;
 use shared_mem::progress::Progress;
-use splat::{Body, Lens, Mesh, Photograph, Picture, Settings, Shape, SplatCloud, Surroundings, TrainError, train};
+use splat::{
+    Body, COLOR_PLANE, Lens, Mesh, Parameters, Photograph, Picture, Settings, Shape, SplatCloud, Surroundings, Target,
+    TrainError, train,
+};
 use std::ops::ControlFlow;
 
 /// Room that is left around a mask [pixel]: more than the window of the similarity reaches.
@@ -96,6 +99,16 @@ pub(crate) fn draw(
     background: [f32; 3],
 ) -> Picture {
     draw_shape(Shape::Splats(cloud), camera, scan_from_camera, background.map(f64::from))
+}
+
+/// Depth [m] of a cloud whose splats are flat: where rays meet their planes; 0 where it keeps back less than half of the light.
+pub(crate) fn plane_depth(cloud: &SplatCloud, camera: &Camera, scan_from_camera: &Isometry3<f64>) -> Vec<f32> {
+    let (lens, size) = (lens(camera), [camera.width as usize, camera.height as usize]);
+    let splats = Parameters::<f32>::of(cloud);
+    let frame = splat::Frame::<f32, COLOR_PLANE>::new(&splats, &scan_from_camera.inverse(), &lens, size);
+    let planes = frame.planes();
+    let cover: Vec<f32> = planes.left.iter().map(|left| 1.0 - left).collect();
+    planes.depth(&cover, &Target::rays(&lens, size))
 }
 
 /// A mesh as a camera of the scan sees it, lit from there, over black.

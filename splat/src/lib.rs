@@ -37,7 +37,7 @@ mod straight;
 mod train;
 
 pub use cloud::{Splat, SplatCloud, SplatError};
-pub use gradient::{COLOR_DEPTH, COLOR_DEPTH_NORMAL, Frame, Parameters, Planes};
+pub use gradient::{COLOR_DEPTH, COLOR_PLANE, Frame, Parameters, Planes};
 pub use lens::Lens;
 pub use links::{link_file, read_links};
 pub use loss::{Loss, Target, Weights};

@@ -40,7 +40,12 @@ pub(super) fn looks(surface: &Surface) -> Mesh {
     Mesh { points: surface.points.clone(), triangles: surface.triangles.clone(), color: GREY }
 }
 
-pub(super) fn held_out(cloud: &SplatCloud, looks: &Mesh, frame: &Frame, background: [f32; 3]) -> HeldOut {
+pub(super) fn held_out(
+    (cloud, planar): (&SplatCloud, bool),
+    looks: &Mesh,
+    frame: &Frame,
+    background: [f32; 3],
+) -> HeldOut {
     let pose = &frame.scan_from_camera;
     let drawn = splats::draw(cloud, &frame.camera, pose, background);
     let surface = splats::draw_mesh(looks, &frame.camera, pose);
@@ -55,7 +60,7 @@ pub(super) fn held_out(cloud: &SplatCloud, looks: &Mesh, frame: &Frame, backgrou
         psnr: splats::psnr(&frame.rgb, &picture, |_| true),
         picture: frame.rgb.clone(),
         splats: picture,
-        splat_depth: drawn.depth,
+        splat_depth: if planar { splats::plane_depth(cloud, &frame.camera, pose) } else { drawn.depth },
         surface: surface.rgb8().collect(),
         depth_off: offs.get(offs.len() / 2).map_or(0.0, |off| f64::from(*off)),
         covered: offs.len() as f64 / measured().count().max(1) as f64,

@@ -147,7 +147,7 @@ pub fn reconstruct(scan: Scan, options: &Options, kept: &Path) -> Result<Scene, 
     for frame in &views.held_out {
         bar.show(1 + held_out.len() as u64, JUDGE);
         not_interrupted()?;
-        held_out.push(judge::held_out(&splats, &looks, frame, background));
+        held_out.push(judge::held_out((&splats, options.planar), &looks, frame, background));
     }
     let mut remarks = views.remarks;
     remarks.extend(judge::remarks(&levels));

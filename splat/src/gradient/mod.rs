@@ -10,8 +10,10 @@
 //! | `projected` | from a splat in the picture back to the splat |
 //! | `planes` | channels of a picture, row by row |
 //!
-//! A picture has four channels, red, green, blue and depth, or seven, with the normal in the camera's frame. Each is the sum
-//! of the splats' values, each times the light that it keeps back.
+//! A picture has four channels, red, green, blue and the depth of the centre, or seven, red, green, blue and the plane in which a
+//! splat lies flattest: its distance from the camera and its normal, in the camera's frame. Each is the sum of the splats' values, each
+//! times the light that it keeps back. Of planes a pixel's depth is where its ray meets the mean plane (Chen et al. 2024, PGSR): that
+//! of centres goes in steps from splat to splat, and lies before a surface that is seen at a slant, since nearer centres are drawn first.
 
 mod blend;
 mod parameters;
@@ -35,8 +37,8 @@ use tiles::{Drawn, Lists};
 
 /// Red, green, blue, depth [m].
 pub const COLOR_DEPTH: usize = 4;
-/// The same, and the normal's x, y, z, camera frame.
-pub const COLOR_DEPTH_NORMAL: usize = 7;
+/// Red, green, blue; normal n of the splat's plane towards the camera times its centre [m]; n's x, y, z, camera frame.
+pub const COLOR_PLANE: usize = 7;
 
 /// Splats seen by a camera, with all that the way back needs.
 #[derive(Debug)]
@@ -48,7 +50,7 @@ pub struct Frame<T: Real, const C: usize> {
 }
 
 impl<T: Real, const C: usize> Frame<T, C> {
-    /// Draws splats, for `C` of [`COLOR_DEPTH`] or [`COLOR_DEPTH_NORMAL`] channels, as `size` columns and rows.
+    /// Draws splats, for `C` of [`COLOR_DEPTH`] or [`COLOR_PLANE`] channels, as `size` columns and rows.
     #[must_use]
     pub fn new(splats: &Parameters<T>, camera_from_body: &Isometry3<f64>, lens: &Lens, size: [usize; 2]) -> Self {
         let view = View::new(camera_from_body, lens, size);

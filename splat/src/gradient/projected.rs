@@ -2,7 +2,7 @@
 
 use super::blend::Sums;
 use super::tiles::{Drawn, normal};
-use super::{COLOR_DEPTH_NORMAL, Parameters};
+use super::{COLOR_PLANE, Parameters};
 use crate::harmonics::{slopes, values};
 use crate::lens::{bend, bend_curvature};
 use crate::project::{Bell, View, Way, unit};
@@ -44,15 +44,17 @@ impl<T: Real> Back<T> {
         let seen_axes = spread * Matrix3::from_diagonal(&bell.sigma);
         let focal = Matrix2::from_diagonal(&Vector2::from(view.focal));
         let mut axes = (focal * way.bent * way.divided).transpose() * seen_axes;
-        if C == COLOR_DEPTH_NORMAL {
+        // Over the centre, camera frame, from the fourth channel.
+        let mut over_at = Vector3::z() * sums.values[3];
+        if C == COLOR_PLANE {
             let (axis, sign) = normal(&bell.sigma, &way.axes, &way.at);
-            (0..3).for_each(|i| axes[(i, axis)] += sign * sums.values[4 + i]);
+            over_at = way.axes.column(axis) * (sign * sums.values[3]);
+            (0..3).for_each(|i| axes[(i, axis)] += sign * (sums.values[4 + i] + sums.values[3] * way.at[i]));
         }
         let turn = turned(&bell.turn, &(view.rotation.transpose() * axes));
 
         let slope = seen_axes * way.axes.transpose();
-        let mut at = slope_back(view, &way, &(focal * slope)) + pixel_back(view, &way, &(focal * pixel));
-        at.z += sums.values[3];
+        let at = slope_back(view, &way, &(focal * slope)) + pixel_back(view, &way, &(focal * pixel)) + over_at;
         let color = [sums.values[0], sums.values[1], sums.values[2]];
         let centre = view.rotation.transpose() * at + color_back(splats, number, view, &bell, drawn, color, harmonics);
         // Over the logarithm of opacity; that one's slope over the logit is the light that passes.

@@ -34,7 +34,7 @@ fn the_picture_is_the_references_in_both_precisions() {
     let body = Body { shape: Shape::Splats(&cloud), camera_from_body: pose, instance: 1 };
     let reference = render(&[body], &LENS, SIZE, &around);
     let wide = Frame::<f64, COLOR_DEPTH>::new(&Parameters::of(&cloud), &pose, &LENS, SIZE).planes();
-    let narrow = Frame::<f32, COLOR_DEPTH_NORMAL>::new(&Parameters::of(&cloud), &pose, &LENS, SIZE).planes();
+    let narrow = Frame::<f32, COLOR_PLANE>::new(&Parameters::of(&cloud), &pose, &LENS, SIZE).planes();
     let mut off = [0.0f64; 2];
     for (i, color) in reference.color.iter().enumerate() {
         for (c, color) in color.iter().enumerate() {
@@ -115,7 +115,7 @@ fn slopes_of_colour_mask_and_depth_are_difference_quotients() {
 #[test]
 fn slopes_of_the_normals_are_difference_quotients() {
     let weights = Weights { similarity: 0.2, mask: 0.1, depth: 0.5, normals: 0.3 };
-    compare::<COLOR_DEPTH_NORMAL>(&weights, 300, 8);
+    compare::<COLOR_PLANE>(&weights, 300, 8);
 }
 
 #[test]

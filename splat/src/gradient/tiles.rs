@@ -1,6 +1,6 @@
 //! The splats that a camera sees, nearest first, and which of them reach a tile of the picture.
 
-use super::{COLOR_DEPTH_NORMAL, Parameters};
+use super::{COLOR_PLANE, Parameters};
 use crate::project::View;
 use crate::real::Real;
 use crate::reference::TILE;
@@ -28,10 +28,12 @@ pub(super) fn drawn<T: Real, const C: usize>(splats: &Parameters<T>, view: &View
         let mut values = [T::zero(); C];
         values[..3].copy_from_slice(&seen.color);
         values[3] = seen.depth;
-        if C == COLOR_DEPTH_NORMAL {
+        if C == COLOR_PLANE {
             let way = view.way(&bell)?;
             let (axis, sign) = normal(&bell.sigma, &way.axes, &way.at);
-            (0..3).for_each(|i| values[4 + i] = way.axes[(i, axis)] * sign);
+            let normal = way.axes.column(axis) * sign;
+            values[3] = normal.dot(&way.at);
+            (0..3).for_each(|i| values[4 + i] = normal[i]);
         }
         let (centre, conic, opacity, reach, depth) = (seen.centre, seen.conic, seen.opacity, seen.reach, seen.depth);
         Some(Drawn { number: number as u32, centre, conic, opacity, reach, depth, values })

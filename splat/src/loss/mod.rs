@@ -6,7 +6,7 @@
 //! |---|---|
 //! | colour | (1 - s) L1 + s (1 - SSIM), s the share of similarity (Kerbl et al. 2023) |
 //! | mask | L1 between the light that is kept back and the mask |
-//! | depth | L1 between expected and measured depth, relative to the latter, where more than half of the light is kept back; the light kept back by which the expected depth is divided counts as a constant |
+//! | depth | L1 between expected and measured depth, relative to the latter, where more than half of the light is kept back; the light kept back by which the mean depth of centres is divided counts as a constant |
 //! | normals | what splats' normals and the normal of their expected depth differ by (Chen et al. 2024, PGSR; Huang et al. 2024, 2DGS) |
 
 mod normals;
@@ -15,11 +15,8 @@ mod target;
 
 pub use target::Target;
 
-use crate::gradient::{COLOR_DEPTH_NORMAL, Planes};
+use crate::gradient::{COLOR_PLANE, Planes};
 use crate::real::Real;
-
-/// Light kept back from which on a pixel has a depth.
-const HALF: f64 = 0.5;
 
 /// Weights of the terms.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -50,17 +47,21 @@ impl<T: Real, const C: usize> Loss<T, C> {
         let mut loss = Self { value: T::zero(), slope: Planes::zeros(seen.size) };
         loss.color(seen, target, weights);
         loss.mask(seen, target, weights);
-        let depth = depth(seen, cover);
+        let depth = seen.depth(cover, &target.rays);
         let mut over_depth = vec![T::zero(); depth.len()];
         loss.depth(&depth, target, weights, &mut over_depth);
-        if C == COLOR_DEPTH_NORMAL && weights.normals > 0.0 {
+        if C == COLOR_PLANE && weights.normals > 0.0 {
             let weight = T::of(weights.normals / depth.len() as f64);
             let slopes = normals::normals(seen, &depth, target, weight, &mut over_depth);
             loss.value += slopes.0;
             loss.slope.channels[4..].iter_mut().zip(slopes.1).for_each(|(plane, slope)| *plane = slope);
         }
-        for ((slope, over), cover) in loss.slope.channels[3].iter_mut().zip(&over_depth).zip(cover) {
-            *slope = if *over == T::zero() { T::zero() } else { *over / *cover };
+        for (at, over) in over_depth.into_iter().enumerate().filter(|(_, over)| *over != T::zero()) {
+            if C == COLOR_PLANE {
+                seen.depth_back(at, depth[at], over, &target.rays[at], &mut loss.slope);
+            } else {
+                loss.slope.channels[3][at] = over / cover[at];
+            }
         }
         loss
     }
@@ -112,13 +113,6 @@ impl<T: Real, const C: usize> Loss<T, C> {
             }
         }
     }
-}
-
-/// Expected depth [m]; 0 where less than half of the light is kept back.
-fn depth<T: Real, const C: usize>(seen: &Planes<T, C>, cover: &[T]) -> Vec<T> {
-    let half = T::of(HALF);
-    let one = |(sum, cover): (&T, &T)| if *cover > half { *sum / *cover } else { T::zero() };
-    seen.channels[3].iter().zip(cover).map(one).collect()
 }
 
 fn sign<T: Real>(value: T) -> T {

@@ -1,10 +1,9 @@
-//! Normals of splats against the normal of their expected depth: of the plane through the points that a pixel's neighbours
+//! Normals of splats against the normal of their depth: of the plane through the points that a pixel's neighbours
 //! see. Splats whose normals agree with their places lie in planes.
 
 use super::Target;
 use crate::gradient::Planes;
 use crate::real::Real;
-use nalgebra::Vector3;
 
 /// Neighbours whose depths differ by more than this share lie on different surfaces.
 const STEP: f64 = 0.03;
@@ -39,7 +38,7 @@ pub(super) fn normals<T: Real, const C: usize>(
                 continue;
             }
             let normal = normal / length;
-            let blended = Vector3::new(seen.channels[4][at], seen.channels[5][at], seen.channels[6][at]);
+            let blended = seen.normal(at);
             let weight = weight * smooth(target, at, around);
             value += weight * (T::one() - blended.dot(&normal));
             (0..3).for_each(|i| slopes[i][at] = -weight * normal[i]);

@@ -19,7 +19,7 @@ pub use photograph::{Camera, Photograph, Quality};
 pub use state::StateError;
 
 use crate::cloud::SplatCloud;
-use crate::gradient::{COLOR_DEPTH, COLOR_DEPTH_NORMAL, Frame, Parameters};
+use crate::gradient::{COLOR_DEPTH, COLOR_PLANE, Frame, Parameters};
 use crate::loss::{Loss, Target, Weights};
 use adam::Moments;
 use nalgebra::Vector3;
@@ -206,7 +206,7 @@ fn slope(splats: &Parameters<f32>, photograph: &Photograph, settings: &Settings)
     let has_normals = settings.weights.normals > 0.0;
     let target = photograph.target(settings.background, has_normals);
     let (loss, mut slope) = if has_normals {
-        through::<COLOR_DEPTH_NORMAL>(splats, photograph, &target, &settings.weights)
+        through::<COLOR_PLANE>(splats, photograph, &target, &settings.weights)
     } else {
         through::<COLOR_DEPTH>(splats, photograph, &target, &settings.weights)
     };
