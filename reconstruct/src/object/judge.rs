@@ -19,8 +19,8 @@ const EDGE: i16 = 3;
 const COARSER: u32 = 6;
 /// A corner is certain that so many views show.
 const CERTAIN: u8 = 2;
-/// Views of a textured object contradict each other on less of its surface, at the edges of its print.
-const CONTRADICTED: f64 = 0.05;
+/// Views of a textured object contradict each other on less of its surface, at the edges of its print and of thin parts.
+const CONTRADICTED: f64 = 0.1;
 
 /// A view that took no part.
 #[derive(Debug, Clone)]
