@@ -86,7 +86,8 @@ mod tests {
             let near = estimated(bench, &split, (&all, even)).expect("residuals");
             let at_all = Residuals::at(bench, &all, &[0, 1]).expect("residuals");
             let [fitted, near, at_all] = [&left, &near, &at_all].map(Residuals::mean_square);
-            assert!((near - fitted).abs() < 0.3 * (fitted - at_all).abs(), "{fitted} {near} {at_all}");
+            // One step goes most of the way that fits go.
+            assert!((near - fitted).abs() < 0.5 * (fitted - at_all).abs(), "{fitted} {near} {at_all}");
         });
     }
 }
