@@ -231,7 +231,10 @@ fn warnings(library: &Library, kept: &Hypothesis, (admitted, split): (&Admitted,
 fn few(admitted: &Admitted, split: &Split) -> Option<String> {
     let (commands, parts) = (admitted.commands, admitted.groups.len());
     let [in_parts, in_turn] = match parts > commands {
-        true => [format!("their clips count in {parts} parts, each of which is called a clip here, "), format!("one in {} of them", split.in_turn.len())],
+        true => [
+            format!("their clips count in {parts} parts, each of which is called a clip here, "),
+            format!("one in {} of them", split.in_turn.len()),
+        ],
         false => [String::new(), "each".to_owned()],
     };
     (!split.in_turn.is_empty()).then(|| {
