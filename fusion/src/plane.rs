@@ -27,7 +27,7 @@ pub struct Wanted {
     pub normal: Option<(Vector3<f64>, f64)>,
 }
 
-/// Proposals: enough to meet a plane that holds a sixth of the points with 99 %.
+/// Proposals: enough to meet a plane that holds a sixth of the points that may lie on it with 99 %.
 const TRIALS: u64 = 1000;
 /// Points that are asked about each.
 const ASKED: usize = 1000;
@@ -52,11 +52,15 @@ impl Plane {
             return None;
         }
         let every = points.len().div_ceil(ASKED).max(1);
+        let drawn: Vec<usize> = (0..points.len()).filter(|i| wanted.may_hold(normals.get(*i))).collect();
+        if drawn.is_empty() {
+            return None;
+        }
         let proposed = (0..TRIALS)
             .into_par_iter()
             .filter_map(|trial| {
                 let mut rng = Pcg64Mcg::seed_from_u64(trial);
-                let [a, b, c] = [0; 3].map(|_| points[rng.random_range(0..points.len())]);
+                let [a, b, c] = [0; 3].map(|_| points[drawn[rng.random_range(0..drawn.len())]]);
                 let normal = (b - a).cross(&(c - a)).try_normalize(1e-9)?;
                 let plane = wanted.turned(Self { normal, offset: normal.dot(&a.coords), points: 0 })?;
                 let on = (0..points.len()).step_by(every);
@@ -104,6 +108,12 @@ impl Plane {
 }
 
 impl Wanted {
+    /// Whether a point with this normal may lie on such a plane: three of those propose it, and not of all, of which walls are most.
+    fn may_hold(&self, normal: Option<&Vector3<f64>>) -> bool {
+        let (Some((way, most)), Some(normal)) = (self.normal, normal) else { return true };
+        normal.dot(&way.normalize()).abs() > (ALIKE.acos() + most).cos()
+    }
+
     /// The plane with its normal on the wanted side, where it may have such a one.
     fn turned(&self, plane: Plane) -> Option<Plane> {
         let Some((way, most)) = self.normal else { return Some(plane) };
@@ -212,6 +222,27 @@ mod tests {
                 surface.triangles.extend([[a, a + 1, a + columns], [a + 1, a + columns + 1, a + columns]]);
             }
         }
+    }
+
+    #[test]
+    fn a_table_is_found_in_a_room_of_which_walls_are_nine_tenths() {
+        let mut room = Surface::default();
+        plate(&mut room, [0.0, 0.0, 0.0], [120, 80]);
+        plate(&mut room, [0.2, 0.1, 0.7], [60, 60]);
+        // A wall with nine times as many points as both.
+        let first = room.points.len() as u32;
+        let (columns, rows) = (400, 300);
+        for i in 0..columns * rows {
+            room.points.push(Point3::new(0.005 * (i % columns) as f32, -0.3, 0.005 * (i / columns) as f32));
+            room.colors.push([0.5; 3]);
+            if i % columns + 1 < columns && i / columns + 1 < rows {
+                let a = first + i;
+                room.triangles.extend([[a, a + 1, a + columns], [a + 1, a + columns + 1, a + columns]]);
+            }
+        }
+        let levels = levels(&room, &Vector3::z(), 0.26);
+        let at = table(&levels).expect("a table");
+        assert!(levels.len() == 2 && (levels[at].middle.z - 0.7).abs() < 1e-6, "{levels:?}");
     }
 
     #[test]
