@@ -53,7 +53,8 @@ fn clip(cell: &Cell, hidden: &str, seed: u64) -> Clip {
     let arm = effects.arm.real_arm(&model);
     let rollout = ArmRollout { arm: &arm, nominal: &model, law: &law, effects: Some(&effects.arm), parts: 2 };
     let mut start = JointState::default();
-    (start.q[..DOF].copy_from_slice(&desired.q[..DOF]), start.dq[..DOF].copy_from_slice(&desired.dq[..DOF]));
+    start.q[..DOF].copy_from_slice(&desired.q[..DOF]);
+    start.dq[..DOF].copy_from_slice(&desired.dq[..DOF]);
     let mut states = vec![JointState::default(); stamps_ns.len()];
     rollout.run(&start, stamps_ns[0], &commands, &stamps_ns, &mut states);
     let noise = |row: usize, joint: usize| 1e-6 * (1e4 * (2 * row + joint) as f64 + seed as f64).sin();
