@@ -112,8 +112,8 @@ mod tests {
         ] {
             let both = effects(&format!("{BLOCK}\n{beside}"));
             let start = JointState { q: first(0.7), dq: first(0.0) };
-            let held = both.joint_weight.expect("weight").held_at(&first(0.7))[0];
-            let states = run(&joint(0.07), &both, start, 500, |_, _| held);
+            let weight = both.joint_weight.expect("weight");
+            let states = run(&joint(0.07), &both, start, 500, |_, state| weight.held_at(&state.q)[0]);
             assert!(
                 (states[500].q[0] - states[0].q[0]).abs() < 1e-5,
                 "{beside}: {}",
