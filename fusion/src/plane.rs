@@ -52,7 +52,7 @@ impl Plane {
             return None;
         }
         let every = points.len().div_ceil(ASKED).max(1);
-        let drawn: Vec<usize> = (0..points.len()).filter(|i| wanted.may_hold(normals.get(*i))).collect();
+        let drawn = wanted.candidates(points, normals);
         if drawn.is_empty() {
             return None;
         }
@@ -108,10 +108,11 @@ impl Plane {
 }
 
 impl Wanted {
-    /// Whether a point with this normal may lie on such a plane: three of those propose it, and not of all, of which walls are most.
-    fn may_hold(&self, normal: Option<&Vector3<f64>>) -> bool {
-        let (Some((way, most)), Some(normal)) = (self.normal, normal) else { return true };
-        normal.dot(&way.normalize()).abs() > (ALIKE.acos() + most).cos()
+    /// The points that may lie on such a plane, by their normals: three of those propose it, and not of all, of which walls are most.
+    fn candidates(&self, points: &[Point3<f64>], normals: &[Vector3<f64>]) -> Vec<usize> {
+        let Some((way, most)) = self.normal else { return (0..points.len()).collect() };
+        let (way, least) = (way.normalize(), (ALIKE.acos() + most).cos());
+        (0..points.len()).filter(|i| normals.get(*i).is_none_or(|normal| normal.dot(&way).abs() > least)).collect()
     }
 
     /// The plane with its normal on the wanted side, where it may have such a one.

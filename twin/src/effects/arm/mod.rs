@@ -209,7 +209,7 @@ impl ArmEffects {
         (motor_torque, external): (&Joints, &Joints),
         dt: f64,
     ) {
-        let external = &self.joint_weight.map_or(*external, |effect| effect.beside(external, state, dt));
+        let external = &self.joint_weight.as_ref().map_or(*external, |effect| effect.beside(external, state, dt));
         if self.acts_in_joints() {
             let passed = self.advance_through(memory, arm, state, (motor_torque, external), dt);
             (memory.tau_J, memory.grip) = (passed.tau_J, passed.grip);
