@@ -9,7 +9,7 @@ use rand_pcg::Pcg64;
 use shared_mem::cell::Cell;
 use shared_mem::theta::EffectTheta;
 use std::collections::BTreeMap;
-use twin::effects::{EffectInfo, Parameter, Role, Shape, Stage, registry, unknown_weight};
+use twin::effects::{EffectInfo, Parameter, Role, Shape, Stage, registry};
 
 /// Smallest share of the plausible range that is drawn.
 const SMALLEST: f64 = 0.33;
@@ -18,7 +18,7 @@ const SMALLEST: f64 = 0.33;
 #[must_use]
 pub fn candidates(with_object: bool) -> Vec<&'static EffectInfo> {
     let shows = |effect: &&EffectInfo| with_object || effect.stage == Stage::Control;
-    registry().iter().filter(shows).filter(|effect| effect.name != unknown_weight().name).collect()
+    registry().iter().filter(shows).filter(|effect| effect.is_cause()).collect()
 }
 
 /// An effect with sizes and forms drawn from its plausible ranges.

@@ -14,7 +14,7 @@ use shared_mem::theta::Theta;
 use std::ops::Range;
 use twin::arm::ArmModel;
 use twin::arm::Joints;
-use twin::effects::{EffectInfo, OnTable, Place, Robot, Role, Search, Shape, Stage, find, registry, unknown_weight};
+use twin::effects::{EffectInfo, OnTable, Place, Robot, Role, Search, Shape, Stage, find, registry};
 
 /// All numbers of all hypotheses.
 #[derive(Debug, Clone)]
@@ -123,7 +123,7 @@ impl Library {
             let known = given.any(|given| given.name == effect.name);
             let touched = cell.robot.is_some() || effect.acts_on != Place::ToolContact;
             let visible = if effect.stage == Stage::Control { dof > 0 } else { with_object && touched };
-            visible && !known && effect.name != unknown_weight().name
+            visible && !known && effect.is_cause()
         };
         for effect in registry().iter().filter(fits) {
             let at = numbers.len();

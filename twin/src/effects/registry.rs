@@ -272,6 +272,14 @@ pub fn find(name: &str) -> Option<&'static EffectInfo> {
     EFFECTS.iter().find(|effect| effect.name == name)
 }
 
+impl EffectInfo {
+    /// Whether it may be what a cell has and its model lacks; else its numbers are identified with the model's own.
+    #[must_use]
+    pub fn is_cause(&self) -> bool {
+        self.name != unknown_weight().name
+    }
+}
+
 /// The weight of links whose masses are not known: no cause, since every arm has weight, but numbers to identify where a cell
 /// gives no masses.
 #[must_use]
