@@ -21,3 +21,9 @@ pub(super) fn keep(cell: &Cell, unknown: &mut Unknown) {
         unknown.start = unknown.start.clamp(unknown.lower, unknown.upper);
     }
 }
+
+/// Whether a gain with these bounds is known by its range alone.
+pub(super) fn by_range(unknown: &Unknown) -> bool {
+    let widest_stated = (1.0 + GAIN_TOLERANCE) / (1.0 - GAIN_TOLERANCE);
+    unknown.upper > 1.01 * widest_stated * unknown.lower
+}

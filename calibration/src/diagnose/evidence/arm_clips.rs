@@ -10,10 +10,11 @@ use super::scatter::Scatter;
 use crate::diagnose::clips::torques::is_tracking;
 use crate::engine::{Engine, Quantity};
 use crate::estimate::{ClipModel, Impossible};
+use crate::forward::arm::following::{self, Moment};
 use crate::forward::arm::{desired_rows, noise};
 use crate::forward::motion::{Mover, Stretch};
 use crate::forward::object;
-use shared_mem::cell::{Cell, ClipKind, TorqueSensing};
+use shared_mem::cell::{Cell, TorqueSensing};
 use shared_mem::recording::{Clip, JointSeries};
 use shared_mem::theta::Theta;
 use shared_mem::time::{TICK, TICK_NS};
@@ -23,8 +24,6 @@ use twin::control::{CommandTrack, Reading};
 
 /// At most so many moments of a clip count; more would cost time and, in smooth motion, tell little.
 const MOMENTS: usize = 250;
-/// Before the object is seen to move, the tool has touched it already for at most this long [ns].
-const TOUCH_MARGIN_NS: u64 = 60_000_000;
 /// A simulated joint that is two turns from its reading has left all bounds [rad]; a reading that wraps around is off by one.
 const FLOWN: f64 = 4.0 * std::f64::consts::PI;
 /// The four quantities, in the order of their rows.
@@ -137,7 +136,7 @@ fn sensor_sigma(clips: &[Clip], channel: &Channel, joint: usize) -> f64 {
 impl Prepared {
     fn new(recorded: Clip, cell: &Cell, channels: &[Channel], regimes: &Regimes) -> Option<Self> {
         let commands = CommandTrack::new(&recorded.desired)?;
-        let end_ns = end_of_arm_alone(&recorded, cell);
+        let end_ns = object::alone_until(cell, &recorded);
         let stamps = &recorded.measured.stamps_ns;
         let desired = &recorded.desired;
         // The last command holds for as long as that before it did.
@@ -177,19 +176,6 @@ impl Prepared {
             alone_until_ns: end_ns,
         })
     }
-}
-
-/// When the tool may have touched the object; beyond the end where there is none. Encoders and the object's first place
-/// tell it to the millisecond, unless the camera sees the object elsewhere; then it is seen to move.
-fn end_of_arm_alone(clip: &Clip, cell: &Cell) -> u64 {
-    if clip.kind == ClipKind::Excitation || clip.object.is_empty() {
-        return u64::MAX;
-    }
-    let place = |row: usize| nalgebra::Vector3::from(clip.object.poses[row].position());
-    let start = place(0);
-    let moved = (0..clip.object.len()).find(|row| (place(*row) - start).norm() > 0.006);
-    let seen = moved.map_or(u64::MAX, |row| clip.object.stamps_ns[row].saturating_sub(TOUCH_MARGIN_NS));
-    object::first_near(cell, clip).map_or(seen, |near| near.min(seen))
 }
 
 impl<F: Fn(&[f64]) -> Theta + Sync> ClipModel for ArmClips<F> {
@@ -300,6 +286,14 @@ impl<F: Fn(&[f64]) -> Theta + Sync> ArmClips<F> {
 }
 
 impl<F: Fn(&[f64]) -> Theta + Sync> Evidence for ArmClips<F> {
+    fn following(&self, clip: usize) -> Vec<Moment> {
+        let Some(controller) = &self.cell.controller else { return Vec::new() };
+        let clip = &self.clips[clip];
+        let stamps: Vec<u64> = clip.stamps_ns.iter().step_by(2).copied().collect();
+        let logged = (&clip.recorded.measured, &clip.commands);
+        following::moments((&self.nominal, controller.kind), logged, &stamps).unwrap_or_default()
+    }
+
     fn in_halves(&self, clip: usize, shared: &[f64]) -> Option<Vec<f64>> {
         // Another simulator has steps of its own.
         self.twin.is_none().then(|| self.simulated_by((&self.mover, 2), clip, shared).ok())?

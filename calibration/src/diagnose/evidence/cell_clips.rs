@@ -16,6 +16,7 @@ use crate::diagnose::library::Library;
 use crate::engine::Engine;
 use crate::estimate::{ClipModel, Impossible, Random};
 use crate::forward::Setting;
+use crate::forward::arm::following::Moment;
 use crate::forward::object::{self, ALL, ModelError, ObjectClips, Own, Part};
 use shared_mem::cell::{ClipKind, PoseNoise};
 use shared_mem::theta::Theta;
@@ -290,6 +291,10 @@ impl<F: Fn(&[f64]) -> Theta + Sync> Evidence for CellClips<'_, F> {
             _ => self.residuals(clip, shared, own, out)?,
         }
         Ok(())
+    }
+
+    fn following(&self, clip: usize) -> Vec<Moment> {
+        self.arm.as_ref().map_or_else(Vec::new, |arm| arm.following(clip))
     }
 
     fn engine(&self) -> Option<&Arc<Engine>> {

@@ -6,6 +6,7 @@
 use super::scatter::Scatter;
 use crate::engine::Engine;
 use crate::estimate::{ClipModel, Impossible, Unknown};
+use crate::forward::arm::following::Moment;
 use std::sync::Arc;
 
 /// Part of a clip to which a channel's gap is counted.
@@ -106,6 +107,12 @@ pub trait Evidence: ClipModel {
     /// The other program that simulates strokes, where it is not the twin.
     fn engine(&self) -> Option<&Arc<Engine>> {
         None
+    }
+
+    /// Moments of a clip along its measured motion, where the arm's law is a spring to the command and a damper to the ground; none
+    /// elsewhere.
+    fn following(&self, _clip: usize) -> Vec<Moment> {
+        Vec::new()
     }
 
     /// The residuals of a clip with every control period integrated in two parts; `None` where that is not known.

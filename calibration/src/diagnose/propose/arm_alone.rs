@@ -12,6 +12,7 @@ use crate::diagnose::fit::effort::{FIRST_PASS, HEAT, LOOK, NEAR};
 use crate::diagnose::fit::{stages, undetermined};
 use crate::diagnose::judge::trial::Step;
 use crate::estimate::{ClipModel, Impossible};
+use crate::forward::arm::following::Moment;
 use crate::page::words;
 use shared_mem::progress::Progress;
 
@@ -119,6 +120,10 @@ impl<E: Evidence> Evidence for ArmAlone<'_, E> {
             }
             Reach::All | Reach::Arm => self.0.changed(clip, numbers, (Reach::Arm, base, at), out),
         }
+    }
+
+    fn following(&self, clip: usize) -> Vec<Moment> {
+        self.0.following(clip)
     }
 
     fn channels(&self) -> &[Channel] {

@@ -5,8 +5,9 @@
 //! | `signatures` | every candidate's signature, linearised once |
 //! | `screening` | which of them are fitted |
 //! | `arm_alone` | effects in the joints, fitted to the arm first |
-//! | `starts`, `ripple` | where a fit begins |
+//! | `starts`, `ripple`, `along_motion` | where a fit begins |
 
+pub mod along_motion;
 pub mod arm_alone;
 pub mod ripple;
 pub mod screening;

@@ -2,7 +2,7 @@
 //! has no slope there, and what changes how an object is hit or slides, is tried at strengths that are met in practice; what
 //! does nothing below a threshold, joint by joint.
 
-use super::ripple;
+use super::{along_motion, ripple};
 use crate::diagnose::evidence::measured::Evidence;
 use crate::diagnose::fit::bench::{Bench, Hypothesis};
 use crate::diagnose::fit::shortlist::Scored;
@@ -147,7 +147,8 @@ fn without_a_slope<E: Evidence>(
         let nominal = with_nominal_arm(bench, fitted.clone());
         return vec![limits(bench, at, candidate, fitted), limits(bench, at, candidate, nominal)];
     }
-    if candidate.is_searched(Search::Threshold) { vec![joint_by_joint(bench, at, candidate)] } else { Vec::new() }
+    let threshold = candidate.is_searched(Search::Threshold).then(|| joint_by_joint(bench, at, candidate));
+    threshold.into_iter().chain(along_motion::start(bench, at, candidate)).collect()
 }
 
 /// Limits of joints, each time that of the joint where the clips then cost least, for as long as that spares something: until the

@@ -9,6 +9,7 @@
 //! |---|---|
 //! | `clip` | a recorded clip, prepared, or the reason why it cannot be used |
 //! | `piece` | the part of a clip that can be simulated in one go |
+//! | `following` | what the law had to work with, and what that took of the model, along the measured motion |
 //! | `encoder_age` | how old encoder readings are when controller and log get them |
 //! | `noise` | how noisy a signal is |
 //! | `torque_time` | which control period a logged torque belongs to |
@@ -16,6 +17,7 @@
 
 mod clip;
 mod encoder_age;
+pub mod following;
 pub mod noise;
 mod piece;
 mod torque_time;

@@ -1,7 +1,7 @@
 //! How far tool and object are apart, told from encoders and tracked poses alone: no simulation, no parameters.
 
 use nalgebra::Vector3;
-use shared_mem::cell::Cell;
+use shared_mem::cell::{Cell, ClipKind};
 use shared_mem::msg::joints_from;
 use shared_mem::recording::Clip;
 use twin::arm::ArmModel;
@@ -18,6 +18,11 @@ const APART: f64 = 4e-3;
 const MAY_TOUCH: f64 = 0.02;
 /// Rows of the arm between two looks: at a metre a second the tool moves by the width above [1].
 const STRIDE: usize = 4;
+
+/// An object moves that is seen so far from where it stood [m]: beyond the noise of trackers.
+const SEEN: f64 = 6e-3;
+/// Before the object is seen to move, the tool has touched it already for at most this long [ns].
+const TOUCH_MARGIN_NS: u64 = 60_000_000;
 
 /// Tool, arm and object of a cell, and a clip of it.
 pub struct Clearance {
@@ -60,10 +65,23 @@ impl Clearance {
     }
 }
 
+/// Until which stamp [ns] the arm of a clip surely moves alone; beyond the end where there is no object. Encoders and the object's
+/// first place tell it to the millisecond, unless the camera sees the object elsewhere; then it is seen to move.
+#[must_use]
+pub fn alone_until(cell: &Cell, clip: &Clip) -> u64 {
+    if clip.kind == ClipKind::Excitation || clip.object.is_empty() {
+        return u64::MAX;
+    }
+    let place = |row: usize| Vector3::from(clip.object.poses[row].position());
+    let start = place(0);
+    let moved = (0..clip.object.len()).find(|row| (place(*row) - start).norm() > SEEN);
+    let seen = moved.map_or(u64::MAX, |row| clip.object.stamps_ns[row].saturating_sub(TOUCH_MARGIN_NS));
+    first_near(cell, clip).map_or(seen, |near| near.min(seen))
+}
+
 /// Stamp of the first measured row at which the tool may touch the object where it stood at first; `None` where it never
 /// comes near, or the cell cannot tell.
-#[must_use]
-pub fn first_near(cell: &Cell, clip: &Clip) -> Option<u64> {
+fn first_near(cell: &Cell, clip: &Clip) -> Option<u64> {
     let mut clearance = Clearance::new(cell, clip)?;
     if clip.object.is_empty() {
         return None;

@@ -26,7 +26,7 @@ mod rollout;
 mod rows;
 mod simulator;
 
-pub use clearance::{Clearance, first_near};
+pub use clearance::{Clearance, alone_until};
 pub use own::{ALL, Axis, Own, Values};
 pub use replayed::Replays;
 pub use rows::{Channel, Part, Row};

@@ -37,7 +37,7 @@ pub use memory::ArmMemory;
 pub(crate) use memory::JointMemory;
 
 use super::hit::tool_offset::ToolOffset;
-use crate::arm::{ArmModel, ControlLaw, JointState, Joints};
+use crate::arm::{ArmModel, ControlLaw, JointState, Joints, Transmission};
 use shared_mem::cell::ControllerKind;
 use shared_mem::time::TICK;
 
@@ -221,6 +221,15 @@ impl ArmEffects {
         let rotor = arm.rotor_inertia();
         memory.motor = *state;
         memory.tau_J = std::array::from_fn(|i| motor_torque[i] - rotor[i] * (state.dq[i] - before[i]) / dt);
+    }
+
+    /// What friction, ripple and weight that the model lacks take of the motor's torque of a joint that moves so [N m].
+    #[must_use]
+    pub fn taken(&self, joint: usize, state: &JointState, motor_torque: f64) -> f64 {
+        let dq = state.dq[joint];
+        let dry = if dq == 0.0 { 0.0 } else { dq.signum() * self.dry_friction(joint, dq.abs(), motor_torque) };
+        let weight = self.joint_weight.map_or(0.0, |effect| effect.held_at(&state.q)[joint]);
+        dry + self.drag(joint, state.q[joint], dq) + weight
     }
 
     /// What the torque sensors behind the gears tell: mean over the last step [N m].
