@@ -335,6 +335,7 @@ mod tests {
     use super::*;
     use crate::diagnose::clips::torques;
     use crate::diagnose::test_bench::shipped;
+    use shared_mem::cell::ClipKind;
     use shared_mem::msg::arm::ArmState;
     use shared_mem::recording::ObjectSeries;
     use shared_mem::theta::EffectTheta;
