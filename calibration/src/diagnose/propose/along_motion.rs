@@ -141,7 +141,8 @@ impl Joint {
         let (mut damping, mut found) = (0.0, DVector::zeros(0));
         // What friction that follows the load takes depends on the damping's torque, which is found with it.
         for _ in 0..2 {
-            let motor = |moment: &Moment| stiffness * moment.behind[joint] - damping * moment.state.dq[joint];
+            let asked = |moment: &&Moment| stiffness * moment.behind[joint] - damping * moment.state.dq[joint];
+            let motor: Vec<f64> = moving.iter().map(asked).collect();
             let (columns, others) = self.columns(library, full, (&moving, &motor))?;
             let wanted = moving.iter().map(|moment| stiffness * moment.behind[joint] - moment.load[joint]);
             found = robust(&columns, &(DVector::from_iterator(moving.len(), wanted) - others))?;
@@ -155,20 +156,20 @@ impl Joint {
         Some(numbers.zip(&found).map(within).chain([(self.stiffness, stiffness)]).collect())
     }
 
-    /// What the damping and each number of friction and weight take of the motor's torque at every moment, by unit of the number;
+    /// What the damping and each number of friction and weight take of the motor's torque [N m] at every moment, by unit of the number;
     /// and what effects take that act already.
     fn columns(
         &self,
         library: &Library,
         full: &[f64],
-        (moving, motor): (&[&Moment], &dyn Fn(&Moment) -> f64),
+        (moving, motor): (&[&Moment], &[f64]),
     ) -> Option<(DMatrix<f64>, DVector<f64>)> {
         let mut resting = full.to_vec();
         self.taken.iter().for_each(|k| resting[*k] = library.unknowns[*k].start);
         let taken = |full: &[f64]| -> Option<DVector<f64>> {
             let effects = effects(library, full)?;
-            let of = |moment: &&Moment| effects.arm.taken(self.place, &moment.state, motor(moment));
-            Some(DVector::from_iterator(moving.len(), moving.iter().map(of)))
+            let of = |(moment, motor): (&&Moment, &f64)| effects.arm.taken(self.place, &moment.state, *motor);
+            Some(DVector::from_iterator(moving.len(), moving.iter().zip(motor).map(of)))
         };
         let others = taken(&resting)?;
         let speeds = moving.iter().map(|moment| moment.state.dq[self.place]);
