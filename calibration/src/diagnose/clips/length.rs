@@ -1,7 +1,6 @@
 //! How much of long clips counts: a session of hours says no more about its gap than its liveliest minutes, and every
 //! candidate simulates all that counts a hundred times.
 
-use crate::forward::smoothing;
 use shared_mem::cell::ClipKind;
 use shared_mem::recording::{Clip, JointSeries};
 
@@ -36,20 +35,12 @@ pub fn liveliest(clips: &mut [Clip]) -> Option<String> {
     })
 }
 
-/// A clip between two stamps [ns], with the commands that are still on their way when it begins, and the one that holds then. It begins
-/// as fast as the rows on both sides of its first one say: what a servo reports as its velocity comes in steps of a few
-/// hundredths of a rad/s, and late.
+/// A clip between two stamps [ns], with the commands that are still on their way when it begins, and the one that holds then.
 pub(super) fn part(clip: &Clip, [from_ns, to_ns]: [u64; 2]) -> Clip {
     let commands = &clip.desired.stamps_ns;
     let holds = commands.partition_point(|stamp| *stamp <= from_ns.saturating_sub(BEFORE_NS)).saturating_sub(1);
     let commanded_from_ns = commands.get(holds).copied().unwrap_or_default();
-    let (mut measured, desired) =
-        (clip.measured.between(from_ns..=to_ns), clip.desired.between(commanded_from_ns..=to_ns));
-    if let (Some(first), Some(half)) = (measured.stamps_ns.first(), smoothing::half_width(&clip.measured.stamps_ns)) {
-        let inside = clip.measured.stamps_ns[0] + half <= *first;
-        let speeds = smoothing::motion(&clip.measured, &[*first], half).dq;
-        measured.dq.iter_mut().zip(speeds).filter(|_| inside).for_each(|(dq, smoothed)| *dq = smoothed);
-    }
+    let (measured, desired) = (clip.measured.between(from_ns..=to_ns), clip.desired.between(commanded_from_ns..=to_ns));
     Clip { measured, desired, ..clip.clone() }
 }
 
