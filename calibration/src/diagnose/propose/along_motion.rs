@@ -33,7 +33,7 @@ const TURNS: usize = 15;
 /// 1977).
 const FAR: f64 = 2.385;
 
-/// Numbers at which the fit of a candidate begins; `None` where it is no dry friction, or the gains are known.
+/// Numbers at which the fit of a candidate begins; `None` where it is no dry friction, the gains are known, or the law is another.
 pub(in crate::diagnose) fn start<E: Evidence>(
     bench: &Bench<'_, E>,
     (from, weights): (&Hypothesis, &[f64]),
@@ -46,6 +46,9 @@ pub(in crate::diagnose) fn start<E: Evidence>(
     }
     let clips: Vec<usize> = from.fitted.iter().map(|fitted| fitted.clip).collect();
     let moments: Vec<Moment> = clips.par_iter().flat_map(|clip| bench.evidence.following(*clip)).collect();
+    if moments.is_empty() {
+        return None;
+    }
     let with = |power: i32| {
         let solved = joints.iter().filter_map(|joint| joint.solved(library, (&from.full, &moments), power));
         let mut full = from.full.clone();
