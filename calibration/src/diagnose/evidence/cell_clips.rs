@@ -70,6 +70,8 @@ pub struct CellClips<'a, F> {
     /// For each clip the last numbers that the arm feels with its residuals there: most of what a search turns is the
     /// object's.
     arm_alone: Vec<Recent<Vec<f64>>>,
+    /// By the twin since the touch, where a step or a point around which another program is looked at begins.
+    stepped_from: Vec<Recent<Vec<f64>>>,
 }
 
 /// Measured less predicted of a clip, at shared numbers and its own.
@@ -111,6 +113,7 @@ impl<'a, F: Fn(&[f64]) -> Theta + Sync> CellClips<'a, F> {
         let own = if alone { OF_OBJECTS_ALONE } else { OF_STROKES };
         let scatter = scatter(&object, own, alone);
         let arm_alone = rows.iter().map(|_| Recent::default()).collect();
+        let stepped_from = rows.iter().map(|_| Recent::default()).collect();
         Self {
             library,
             arm,
@@ -125,6 +128,7 @@ impl<'a, F: Fn(&[f64]) -> Theta + Sync> CellClips<'a, F> {
             first,
             contact,
             arm_alone,
+            stepped_from,
         }
     }
 
@@ -194,8 +198,9 @@ impl<'a, F: Fn(&[f64]) -> Theta + Sync> CellClips<'a, F> {
             return Ok(());
         }
         let twins = |(shared, own)| self.since_touch_by(ObjectClips::twins_errors, (clip, shared, own));
-        let (before, after) = (twins(at)?, twins((shared, own))?);
-        out.extend(base[of_arm..].iter().zip(before).zip(after).map(|((base, before), after)| base + after - before));
+        let before = self.stepped_from[clip].at(&[at.0, at.1].concat(), || twins(at))?;
+        let after = twins((shared, own))?;
+        out.extend(base[of_arm..].iter().zip(&*before).zip(after).map(|((base, before), after)| base + after - before));
         Ok(())
     }
 

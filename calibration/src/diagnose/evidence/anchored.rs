@@ -1,0 +1,200 @@
+//! Strokes that another program simulates, looked at around one point: its residuals there, and what the twin changes of them from
+//! there on.
+//!
+//! ```text
+//! residuals(numbers) = engine(point) + twin(numbers) - twin(point)
+//! ```
+//!
+//! So a search over forty effects asks for one roll-out of each stroke. It is output space mapping with the twin as the coarse model
+//! (Bandler et al. 2004, "Space mapping: the state of the art"): right at the point, to first order around it, and off by what the two
+//! models differ by in what a number changes. What is chosen is fitted to the engine's own roll-outs afterwards.
+
+use super::measured::{Channel, Evidence, Group, Near, Reach, Row};
+use super::recent::Recent;
+use super::scatter::Scatter;
+use crate::diagnose::fit::bench::Bench;
+use crate::engine::Engine;
+use crate::estimate::{ClipModel, Impossible};
+use crate::forward::arm::following::Moment;
+use std::sync::Arc;
+
+/// Clips around a point.
+pub(in crate::diagnose) struct Anchored<'a, E> {
+    whole: &'a E,
+    /// Shared numbers; clips' own are at rest there.
+    point: Vec<f64>,
+    nothing: Vec<f64>,
+    /// Residuals there, clip by clip.
+    there: Vec<Recent<Vec<f64>>>,
+}
+
+impl<'a, E: Evidence> Anchored<'a, E> {
+    pub(in crate::diagnose) fn new(whole: &'a E, point: &[f64]) -> Self {
+        let there = (0..whole.clips()).map(|_| Recent::default()).collect();
+        Self { whole, point: point.to_vec(), nothing: vec![0.0; whole.scatter().count()], there }
+    }
+
+    /// A bench for these.
+    pub(in crate::diagnose) fn bench<'b>(&'b self, whole: &Bench<'b, E>) -> Bench<'b, Self> {
+        let trail = (whole.trail.0, "around a point");
+        Bench {
+            evidence: self,
+            library: whole.library,
+            scatter: whole.scatter.clone(),
+            interrupt: whole.interrupt,
+            trail,
+        }
+    }
+
+    fn there(&self, clip: usize) -> Result<Arc<Vec<f64>>, Impossible> {
+        self.there[clip].at(&self.point, || {
+            let mut residuals = Vec::new();
+            self.whole.residuals(clip, &self.point, &self.nothing, &mut residuals)?;
+            Ok(residuals)
+        })
+    }
+}
+
+impl<E: Evidence> ClipModel for Anchored<'_, E> {
+    fn clips(&self) -> usize {
+        self.whole.clips()
+    }
+
+    fn residuals(&self, clip: usize, shared: &[f64], own: &[f64], out: &mut Vec<f64>) -> Result<(), Impossible> {
+        let (there, at) = (self.there(clip)?, Some((&self.point[..], &self.nothing[..])));
+        self.whole.changed(clip, (shared, own), (Reach::All, &there, at), out)
+    }
+}
+
+impl<E: Evidence> Evidence for Anchored<'_, E> {
+    fn changed(
+        &self,
+        clip: usize,
+        numbers: (&[f64], &[f64]),
+        (reach, base, at): Near<'_>,
+        out: &mut Vec<f64>,
+    ) -> Result<(), Impossible> {
+        if at.is_some() {
+            return self.whole.changed(clip, numbers, (reach, base, at), out);
+        }
+        let (there, at) = (self.there(clip)?, Some((&self.point[..], &self.nothing[..])));
+        self.whole.changed(clip, numbers, (reach, &there, at), out)?;
+        for ((out, base), row) in out.iter_mut().zip(base).zip(self.rows(clip)) {
+            let of_arm = self.channels()[row.channel].group == Group::Arm;
+            if (reach == Reach::Arm && !of_arm) || (reach == Reach::Object && of_arm) {
+                *out = *base;
+            }
+        }
+        Ok(())
+    }
+
+    fn engine(&self) -> Option<&Arc<Engine>> {
+        self.whole.engine()
+    }
+
+    fn following(&self, clip: usize) -> Vec<Moment> {
+        self.whole.following(clip)
+    }
+
+    fn channels(&self) -> &[Channel] {
+        self.whole.channels()
+    }
+
+    fn rows(&self, clip: usize) -> &[Row] {
+        self.whole.rows(clip)
+    }
+
+    fn scatter(&self) -> Scatter {
+        self.whole.scatter()
+    }
+
+    fn has_object(&self) -> bool {
+        self.whole.has_object()
+    }
+
+    fn own_slope(&self, clip: usize, own: usize) -> Option<&[f64]> {
+        self.whole.own_slope(clip, own)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::measured::StageName;
+    use super::*;
+    use std::sync::atomic::{AtomicUsize, Ordering};
+
+    /// A row of the arm and one of the object; the engine's residuals bend, the twin's are straight.
+    struct Bent {
+        asked: AtomicUsize,
+        channels: [Channel; 2],
+        rows: [Row; 2],
+    }
+
+    impl Bent {
+        fn new() -> Self {
+            let channel = |group| Channel { quantity: "q", place: "joint1".into(), joint: None, group };
+            let row = |channel| Row { channel, stage: StageName::Slide, regime: "free", time: 0.0 };
+            let channels = [channel(Group::Arm), channel(Group::Object)];
+            Self { asked: AtomicUsize::new(0), channels, rows: [row(0), row(1)] }
+        }
+    }
+
+    const TWINS: [f64; 2] = [2.0, -3.0];
+
+    impl ClipModel for Bent {
+        fn clips(&self) -> usize {
+            1
+        }
+
+        fn residuals(&self, _: usize, shared: &[f64], _: &[f64], out: &mut Vec<f64>) -> Result<(), Impossible> {
+            self.asked.fetch_add(1, Ordering::Relaxed);
+            *out = TWINS.map(|slope| slope * shared[0] + shared[0].powi(2)).to_vec();
+            Ok(())
+        }
+    }
+
+    impl Evidence for Bent {
+        fn changed(
+            &self,
+            _: usize,
+            (shared, _): (&[f64], &[f64]),
+            (reach, base, at): Near<'_>,
+            out: &mut Vec<f64>,
+        ) -> Result<(), Impossible> {
+            let (at, _) = at.expect("a point");
+            *out = base.to_vec();
+            let felt = |row: usize| reach == Reach::All || (row == 0) == (reach == Reach::Arm);
+            (0..2).filter(|row| felt(*row)).for_each(|row| out[row] += TWINS[row] * (shared[0] - at[0]));
+            Ok(())
+        }
+
+        fn channels(&self) -> &[Channel] {
+            &self.channels
+        }
+
+        fn rows(&self, _: usize) -> &[Row] {
+            &self.rows
+        }
+
+        fn scatter(&self) -> Scatter {
+            Scatter::default()
+        }
+    }
+
+    #[test]
+    fn an_engine_is_asked_once_and_the_twin_says_what_changes_from_there_on() {
+        let whole = Bent::new();
+        let around = Anchored::new(&whole, &[1.0]);
+        let mut out = Vec::new();
+        around.residuals(0, &[1.0], &[], &mut out).expect("residuals");
+        assert_eq!(out, [3.0, -2.0]);
+        around.residuals(0, &[1.5], &[], &mut out).expect("residuals");
+        assert_eq!(out, [4.0, -3.5]);
+        // Of the arm alone the other rows are those that are given.
+        around.changed(0, (&[1.5], &[]), (Reach::Arm, &[0.0, 7.0], None), &mut out).expect("residuals");
+        assert_eq!(out, [4.0, 7.0]);
+        around.changed(0, (&[1.5], &[]), (Reach::Object, &[7.0, 0.0], None), &mut out).expect("residuals");
+        assert_eq!(out, [7.0, -3.5]);
+        assert_eq!(whole.asked.load(Ordering::Relaxed), 1);
+    }
+}
