@@ -8,13 +8,11 @@ pub(super) const LEAST_MISMATCH: f64 = 5e-3;
 /// differ by more than a fifth of what separates either from a third.
 pub(super) const BETTER_FIT: f64 = 0.2;
 
-pub(super) use crate::forward::arm::velocity::{LEAST_MOTION, MOVES};
+pub(super) use crate::forward::arm::velocity::{LEAST_MOTION, MOVES, NOT_ITS_SLOPE};
 
 /// A ratio of two quantities is a known conversion when it comes this near to it [1]: half-way between 57.3 and the next
 /// conversion (60) is 2.3 %; the controller adds errors of some percent, and no other conversion is near any of these.
 pub(super) const NEAR_CONVERSION: f64 = 0.12;
-/// A slope this far from 1 is none of the same quantity [1]: filters and noise stay within a tenth, conversions begin at 2 pi.
-pub(super) const NOT_ITS_SLOPE: f64 = 0.5;
 /// A velocity that is off its slope by a turn within a step, to this share [1], was computed across a wrap.
 pub(super) const NEAR_TURN: f64 = 0.25;
 

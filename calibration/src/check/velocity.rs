@@ -33,8 +33,7 @@ pub(super) fn remarks(clip: &Columns) -> Vec<Remark> {
 }
 
 fn unit(clip: &Columns, topic: &str, joints: &[Compared]) -> Vec<Remark> {
-    let odd = |c: &&Compared| (c.factor.value - 1.0).abs() > NOT_ITS_SLOPE.max(5.0 * c.factor.sigma);
-    let odd: Vec<&Compared> = joints.iter().filter(odd).collect();
+    let odd: Vec<&Compared> = joints.iter().filter(|joint| joint.is_not_its_slope()).collect();
     let factors: Vec<f64> = odd.iter().map(|c| c.factor.value).collect();
     let Some(interval) = range(&factors) else { return Vec::new() };
     let value = median(factors);

@@ -129,6 +129,11 @@ impl ArmClip {
             recorded.measured.dq.clear();
             warnings
                 .push("the measured velocities were filtered and come late: the positions count in their place".into());
+        } else if velocity::contradict_positions(&recorded.measured) {
+            recorded.measured.dq.clear();
+            let said =
+                "the measured velocities are not the slopes of the positions: the positions count in their place";
+            warnings.push(said.into());
         }
         let jump = clock_jump(&recorded.measured, step_ns);
         let until_ns = jump.map_or(u64::MAX, |row| recorded.measured.stamps_ns[row]);

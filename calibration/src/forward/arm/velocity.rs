@@ -23,6 +23,9 @@ const WINDOW: f64 = 0.04;
 const FILTER_STEPS: f64 = 1.6;
 const FILTER_DELAY: f64 = 2.5e-3;
 
+/// A slope this far from 1 is none of the same quantity [1]: filters and noise stay within a tenth, conversions begin at 2 pi.
+pub const NOT_ITS_SLOPE: f64 = 0.5;
+
 /// One joint of a log.
 #[derive(Debug, Clone, Copy)]
 pub struct Motion<'a> {
@@ -95,17 +98,39 @@ pub fn late(joints: &[Compared], step: f64) -> Option<Late> {
 
 /// The same of a log.
 pub(super) fn late_in(log: &JointSeries) -> Option<Late> {
-    if log.dq.is_empty() {
-        return None;
+    late(&compared_in(log), step(&seconds(log)))
+}
+
+/// Whether the velocities of a log, joint by joint, are no slopes of its positions: of another unit, scale or joint.
+pub(super) fn contradict_positions(log: &JointSeries) -> bool {
+    compared_in(log).iter().any(Compared::is_not_its_slope)
+}
+
+impl Compared {
+    /// Whether a velocity is none of this joint's [1].
+    #[must_use]
+    pub fn is_not_its_slope(&self) -> bool {
+        (self.factor.value - 1.0).abs() > NOT_ITS_SLOPE.max(5.0 * self.factor.sigma)
     }
-    let first = *log.stamps_ns.first()?;
-    let t: Vec<f64> = log.stamps_ns.iter().map(|stamp| seconds_between(first, *stamp)).collect();
+}
+
+/// Every joint of a log that moves enough to tell.
+fn compared_in(log: &JointSeries) -> Vec<Compared> {
+    if log.dq.is_empty() {
+        return Vec::new();
+    }
+    let t = seconds(log);
     let column = |values: &[f64], joint: usize| values.iter().skip(joint).step_by(log.dof).copied().collect::<Vec<_>>();
     let of = |joint: usize| {
         let (q, dq) = (column(&log.q, joint), column(&log.dq, joint));
         Motion { t: &t, q: &q, dq: &dq, noise: noise::sigma(&q) }.compared(joint)
     };
-    late(&(0..log.dof).filter_map(of).collect::<Vec<_>>(), step(&t))
+    (0..log.dof).filter_map(of).collect()
+}
+
+fn seconds(log: &JointSeries) -> Vec<f64> {
+    let first = log.stamps_ns.first().copied().unwrap_or_default();
+    log.stamps_ns.iter().map(|stamp| seconds_between(first, *stamp)).collect()
 }
 
 fn step(t: &[f64]) -> f64 {
@@ -149,5 +174,16 @@ mod tests {
             assert!((found.delay - 0.02).abs() < 1e-3, "{found:?}");
         }
         assert_eq!(late_in(&JointSeries { dq: Vec::new(), ..log(200.0, 0.02) }), None);
+    }
+
+    #[test]
+    fn velocities_of_another_scale_are_told_from_late_ones() {
+        let scaled = |factor: f64| {
+            let log = log(200.0, 0.0);
+            JointSeries { dq: log.dq.iter().map(|dq| factor * dq).collect(), ..log }
+        };
+        assert!(contradict_positions(&scaled(2.3)) && contradict_positions(&scaled(-1.0)));
+        assert!(!contradict_positions(&scaled(1.0)) && !contradict_positions(&log(200.0, 0.02)));
+        assert!(!contradict_positions(&JointSeries { dq: Vec::new(), ..scaled(2.3) }));
     }
 }
