@@ -1,6 +1,7 @@
 //! How much of long clips counts: a session of hours says no more about its gap than its liveliest minutes, and every
 //! candidate simulates all that counts a hundred times.
 
+use crate::forward::smoothing;
 use shared_mem::cell::ClipKind;
 use shared_mem::recording::{Clip, JointSeries};
 
@@ -35,12 +36,20 @@ pub fn liveliest(clips: &mut [Clip]) -> Option<String> {
     })
 }
 
-/// A clip between two stamps [ns], with the commands that are still on their way when it begins, and the one that holds then.
+/// A clip between two stamps [ns], with the commands that are still on their way when it begins, and the one that holds then. It begins
+/// as fast as the rows on both sides of its first one say: what a servo reports as its velocity comes in steps of a few
+/// hundredths of a rad/s, and late.
 pub(super) fn part(clip: &Clip, [from_ns, to_ns]: [u64; 2]) -> Clip {
     let commands = &clip.desired.stamps_ns;
     let holds = commands.partition_point(|stamp| *stamp <= from_ns.saturating_sub(BEFORE_NS)).saturating_sub(1);
     let commanded_from_ns = commands.get(holds).copied().unwrap_or_default();
-    let (measured, desired) = (clip.measured.between(from_ns..=to_ns), clip.desired.between(commanded_from_ns..=to_ns));
+    let (mut measured, desired) =
+        (clip.measured.between(from_ns..=to_ns), clip.desired.between(commanded_from_ns..=to_ns));
+    if let (Some(first), Some(half)) = (measured.stamps_ns.first(), smoothing::half_width(&clip.measured.stamps_ns)) {
+        let inside = clip.measured.stamps_ns[0] + half <= *first;
+        let speeds = smoothing::motion(&clip.measured, &[*first], half).dq;
+        measured.dq.iter_mut().zip(speeds).filter(|_| inside).for_each(|(dq, smoothed)| *dq = smoothed);
+    }
     Clip { measured, desired, ..clip.clone() }
 }
 
@@ -125,5 +134,18 @@ mod tests {
             assert!((least - 1e-9..least + 0.0201).contains(&before), "{before}");
         }
         assert_eq!(liveliest(&mut clips), None, "once is enough");
+    }
+
+    #[test]
+    fn a_part_begins_as_fast_as_the_joint_moved_there_and_a_clip_as_it_was_logged() {
+        let stamps_ns = (0..200).map(|i| i * 20_000_000).collect();
+        let mut whole = of_one_joint(stamps_ns, |t| 0.3 * (3.0 * t).sin());
+        // As a servo reports it: a step behind the motion, in steps of 0.1 rad/s.
+        let speed = |row: usize| 0.9 * (3.0 * 0.02 * row as f64).cos();
+        whole.measured.dq = (0..200).map(|row: usize| (10.0 * speed(row.saturating_sub(1))).round() / 10.0).collect();
+        let cut = part(&whole, [800_000_000, 3_000_000_000]).measured;
+        assert!((cut.dq[0] - speed(40)).abs() < 2e-3 && (whole.measured.dq[40] - speed(40)).abs() > 0.02);
+        assert_eq!(cut.dq[1..], whole.measured.dq[41..151]);
+        assert_eq!(part(&whole, [0, 3_000_000_000]).measured.dq[0], whole.measured.dq[0]);
     }
 }

@@ -248,22 +248,24 @@ mod tests {
         [[effect]]\nname = \"joint_weight\"\nconstant = [0.2, 0.0]\nsine = [2.8, 1.9]\ncosine = [-0.6, 1.3]\n\
         [[effect]]\nname = \"joint_coulomb_friction\"\ncoulomb = [2.7, 2.4]\ncreep = 0.0\n";
 
-    #[test]
-    fn a_joint_that_sticks_far_off_its_command_begins_near_its_friction() {
-        let cell = Cell::parse(CELL, Path::new("cell.toml")).expect("a cell");
+    /// Where the fit of a candidate begins, in a cell of this text in which [`HIDDEN`] holds.
+    fn found(cell: &str, candidate: &str) -> Option<Theta> {
+        let cell = Cell::parse(cell, Path::new("cell.toml")).expect("a cell");
         let mut world = World::draw(1, Kind::Excitation, Fault::Nothing, &cell);
         let hidden: Theta = shared_mem::toml_file::parse(HIDDEN, Path::new("theta.toml")).expect("a theta.toml");
         world.hidden = Theta { effects: hidden.effects, arm: hidden.arm, ..world.hidden };
         let base = setting::complete(&cell, None).expect("a cell");
         let library = Library::new(&cell, &base, None, &[10.0; MAX_JOINTS]);
-        let found = |name: &str| {
-            let candidate = &library.candidates[library.find(name).expect("a candidate")];
-            on_bench((&cell, &world), &library, |bench, even| {
-                let baseline = bench.fit((&[], library.start()), &[0, 1], even, None, ONCE).expect("a fit");
-                start(bench, (&baseline, even), candidate).map(|full| library.theta(&full))
-            })
-        };
-        let begun = found("joint_coulomb_friction").expect("numbers");
+        let candidate = &library.candidates[library.find(candidate).expect("a candidate")];
+        on_bench((&cell, &world), &library, |bench, even| {
+            let baseline = bench.fit((&[], library.start()), &[0, 1], even, None, ONCE).expect("a fit");
+            start(bench, (&baseline, even), candidate).map(|full| library.theta(&full))
+        })
+    }
+
+    #[test]
+    fn a_joint_that_sticks_far_off_its_command_begins_near_its_friction() {
+        let begun = found(CELL, "joint_coulomb_friction").expect("numbers");
         let ArmTheta { stiffness, damping } = begun.arm.expect("gains");
         let level = begun.effects.iter().find_map(|effect| effect.parameters.get("coulomb"));
         let level: Vec<f64> = level
@@ -278,6 +280,11 @@ mod tests {
             assert!((lag / late - 1.0).abs() < 0.2, "joint {joint} lags by {lag} s");
             assert!((0.5..2.0).contains(&(stiffness[joint] / [90.0, 60.0][joint])), "joint {joint}: {stiffness:?}");
         }
-        assert_eq!(found("joint_viscous_friction"), None, "no dry friction");
+    }
+
+    #[test]
+    fn what_is_no_dry_friction_and_laws_that_are_given_the_desired_velocity_begin_where_the_search_stands() {
+        assert_eq!(found(CELL, "joint_viscous_friction"), None);
+        assert_eq!(found(&CELL.replace("joint_pd", "joint_impedance"), "joint_coulomb_friction"), None);
     }
 }
