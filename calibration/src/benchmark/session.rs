@@ -5,9 +5,9 @@
 use super::world::{Kind, Outside, World};
 use crate::capture::body::Body;
 use crate::capture::limits;
-use crate::capture::plan::{self, Request};
+use crate::capture::plan;
 use crate::capture::program::{Program, SPEEDS, Standing, Wish};
-use crate::capture::shape;
+use crate::capture::request::{self, Request};
 use crate::capture::stroke;
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use rand::{RngExt, SeedableRng};
@@ -105,7 +105,7 @@ impl Studio<'_> {
     fn excitation(&self, index: usize) -> Result<Vec<SetPoint>, SessionError> {
         let request = Request {
             start: *self.body.model().ready(),
-            kind: shape::Kind::Multisine,
+            kind: request::Kind::Multisine,
             moving: [true; MAX_JOINTS],
             amplitude: 0.35,
             duration: EXCITATION,

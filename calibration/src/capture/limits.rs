@@ -2,7 +2,7 @@
 
 use super::body::Body;
 use super::excess::{Excess, Quantity};
-use super::plan::RATE;
+use super::rate::RATE;
 use shared_mem::cell::Cell;
 use shared_mem::msg::motion::SetPoint;
 use shared_mem::msg::{Joints, MAX_JOINTS};

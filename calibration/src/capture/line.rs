@@ -3,8 +3,7 @@
 //! Pure kinematics of the nominal arm; called by the stroke planner.
 
 use super::body::Body;
-use super::plan::RATE;
-use super::way::about_itself;
+use super::rate::RATE;
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3, Vector6};
 use shared_mem::msg::Joints;
 use shared_mem::msg::motion::SetPoint;
@@ -36,6 +35,12 @@ pub fn reach_turned(body: &Body, from: &Joints, target: &Isometry3<f64>, turn: f
         target
     };
     (1..=steps).try_fold(reach(body, from, target)?, |q, k| reach(body, &q, &turned(k)))
+}
+
+/// A turn about the tool's own axis [rad].
+#[must_use]
+pub fn about_itself(turn: f64) -> UnitQuaternion<f64> {
+    UnitQuaternion::from_axis_angle(&Vector3::z_axis(), turn)
 }
 
 /// Joint velocities that move the tool's end with `velocity` [m/s] and turn it nowhere.

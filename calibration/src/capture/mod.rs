@@ -1,7 +1,7 @@
 //! Capture: plan a motion, have the bridge play it, record it into a session folder.
 //!
-//! Planning is pure: [`plan`] for excitation on a [`shape`] ([`multisine`], [`chirp`], [`ramp`], [`hold`], built of [`jet`]s), or on a clip that was [`recorded`], at a [`pace`], [`program`], [`staged`], [`stroke`] and [`way`] for Control-Hit-Slide on
-//! [`line`] and [`transit`], both within [`limits`] of the [`body`] and clear of every [`obstacle`]. Playing goes through shared memory only ([`stream`],
+//! Planning is pure: [`plan`] for excitation as a [`request`] asks for it, on a [`shape`] ([`multisine`], [`chirp`], [`ramp`], [`hold`], built of [`jet`]s), or on a clip that was [`recorded`], at a [`pace`], [`program`], [`staged`], [`stroke`] and [`way`] for Control-Hit-Slide on
+//! [`line`] and [`transit`], both at the arm's control [`rate`], within [`limits`] of the [`body`] and clear of every [`obstacle`]. Playing goes through shared memory only ([`stream`],
 //! [`link`], [`object_watch`]), with [`placing`] where the object has to stand somewhere (others `stay`) and [`recovery`] where the robot stops itself; recording is a process beside us ([`recorder`]). [`excitation`] and [`control_hit_slide`] are the
 //! verbs that bind them, and [`task`] is what both are asked for. [`scan`] carries a camera around a point: [`dome`] plans its views clear of what stands `around` it, [`shots`] takes the pictures, `cut` says what in them is the object.
 
@@ -29,9 +29,11 @@ pub mod plan;
 pub mod program;
 pub mod quality;
 pub mod ramp;
+pub mod rate;
 pub mod recorded;
 pub mod recorder;
 pub mod recovery;
+pub mod request;
 pub mod scan;
 pub mod session;
 pub mod shape;

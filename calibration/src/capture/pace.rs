@@ -6,7 +6,7 @@
 use super::body::Body;
 use super::excess::Excess;
 use super::limits::{SHARE, first_excess};
-use super::plan::RATE;
+use super::rate::RATE;
 use shared_mem::msg::motion::SetPoint;
 use shared_mem::msg::{Joints, MAX_JOINTS};
 use twin::arm::{JointLimits, JointState};
@@ -123,8 +123,8 @@ pub fn resampled(times: &[f64], rows: &[SetPoint], factor: f64) -> Vec<SetPoint>
 
 #[cfg(test)]
 mod tests {
-    use super::super::plan::{Request, plan};
-    use super::super::shape::Kind;
+    use super::super::plan::plan;
+    use super::super::request::{Kind, Request};
     use super::*;
     use crate::capture::limits;
     use proptest::prelude::*;

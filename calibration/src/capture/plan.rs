@@ -6,39 +6,20 @@
 use super::body::Body;
 use super::excess::{Excess, Quantity};
 use super::limits::SHARE;
-use super::shape::{Kind, Shape};
+use super::rate::RATE;
+use super::request::Request;
+use super::shape::Shape;
 use super::stream::Motion;
 use shared_mem::msg::motion::SetPoint;
 use shared_mem::msg::{Joints, MAX_JOINTS};
 use twin::arm::{JointLimits, JointState};
 
-/// Set points a second: the control rate of the arm.
-pub const RATE: f64 = 1000.0;
 /// Distance kept from the stops [rad].
 const STOP_MARGIN: f64 = 0.05;
 /// Smallest amplitude worth recording [rad].
 const SMALLEST: f64 = 0.01;
 /// How much smaller each try is, where limits couple the joints.
 const SHRINK: f64 = 0.95;
-
-/// What is asked for.
-#[derive(Debug, Clone, Copy)]
-pub struct Request {
-    /// Pose to start, move around and end in [rad].
-    pub start: Joints,
-    /// What kind of motion.
-    pub kind: Kind,
-    /// Joints that move; the others hold.
-    pub moving: [bool; MAX_JOINTS],
-    /// Largest excursion of each joint [rad].
-    pub amplitude: f64,
-    /// Length [s].
-    pub duration: f64,
-    /// Draws what the kind leaves open: amplitudes, phases, directions, poses.
-    pub seed: u64,
-    /// Height in the base frame that flange and tool stay above [m].
-    pub floor: f64,
-}
 
 /// A clip's motion.
 #[derive(Debug, Clone, PartialEq)]
@@ -237,6 +218,7 @@ impl Samples {
 #[cfg(test)]
 mod tests {
     use super::super::limits::shipped;
+    use super::super::request::Kind;
     use super::*;
     use proptest::prelude::*;
 

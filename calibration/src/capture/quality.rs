@@ -1,6 +1,6 @@
 //! Judges a clip from the states that passed by while it was played. Units: rad, s.
 
-use super::plan::RATE;
+use super::rate::RATE;
 use serde::Serialize;
 use shared_mem::msg::arm::ArmState;
 

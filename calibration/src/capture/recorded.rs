@@ -3,8 +3,8 @@
 
 use super::body::Body;
 use super::pace::resampled;
-use super::plan::RATE;
 use super::program::Standing;
+use super::rate::RATE;
 use super::session::number_of;
 use shared_mem::cell::{ClipEntry, ClipKind};
 use shared_mem::msg::joints_from;

@@ -6,43 +6,9 @@ use super::excess::Excess;
 use super::hold::{self, Hold};
 use super::jet::Jet;
 use super::multisine::Multisine;
-use super::plan::Request;
 use super::ramp::Ramp;
-use std::fmt;
+use super::request::{Kind, Request};
 use twin::arm::JointLimits;
-
-/// A kind of motion with what is its own.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Kind {
-    /// Sums of sines, 0.2 to 1.6 Hz.
-    Multisine,
-    /// Swings of growing frequency.
-    Chirp {
-        /// First and last frequency [Hz].
-        frequency: [f64; 2],
-    },
-    /// Triangles of growing speed.
-    Ramp {
-        /// First and last speed [rad/s].
-        speeds: [f64; 2],
-    },
-    /// Rests in several poses.
-    Hold {
-        /// How many.
-        poses: usize,
-    },
-}
-
-impl fmt::Display for Kind {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Multisine => f.write_str("multisine"),
-            Self::Chirp { frequency: [lo, hi] } => write!(f, "chirp from {lo} to {hi} Hz"),
-            Self::Ramp { speeds: [lo, hi] } => write!(f, "ramps from {lo} to {hi} rad/s"),
-            Self::Hold { poses } => write!(f, "holds in {poses} poses"),
-        }
-    }
-}
 
 /// Excursions of the joints as asked for.
 #[derive(Debug, Clone, PartialEq)]

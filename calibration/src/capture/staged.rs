@@ -5,13 +5,13 @@
 //! or of the hand that put the object back.
 
 use super::body::Body;
-use super::line;
+use super::line::{self, about_itself};
 use super::pace;
-use super::plan::RATE;
 use super::program::{NoStroke, PACES, Program, RESTS, SPEEDS, Standing, Wish};
+use super::rate::RATE;
 use super::recorded::Repeated;
 use super::stroke::{Stroke, StrokePlan};
-use super::way::{Ways, about_itself};
+use super::way::Ways;
 use nalgebra::Vector3;
 use shared_mem::msg::motion::SetPoint;
 use shared_mem::msg::{Joints, MAX_JOINTS};

@@ -8,7 +8,7 @@ use super::body::Body;
 use super::excess::Excess;
 use super::limits::first_excess;
 use super::line;
-use super::plan::RATE;
+use super::rate::RATE;
 use super::way::upright;
 use nalgebra::Vector3;
 use shared_mem::msg::Joints;

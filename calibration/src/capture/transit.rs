@@ -3,7 +3,7 @@
 //!
 //! The only `rsruckig` code of this crate.
 
-use super::plan::RATE;
+use super::rate::RATE;
 use rsruckig::prelude::*;
 use shared_mem::msg::motion::SetPoint;
 use shared_mem::msg::{Joints, MAX_JOINTS};

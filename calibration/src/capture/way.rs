@@ -7,8 +7,9 @@
 use super::body::Body;
 use super::excess::{Excess, Quantity};
 use super::limits::first_excess;
+use super::line::{self, about_itself};
 use super::obstacle::{self, Blocked, Obstacle};
-use super::{line, transit};
+use super::transit;
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use shared_mem::msg::Joints;
 use shared_mem::msg::motion::SetPoint;
@@ -160,12 +161,6 @@ impl Ways<'_> {
 pub fn upright(place: Vector3<f64>, turn: f64) -> Isometry3<f64> {
     let down = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI);
     Isometry3::from_parts(Translation3::from(place), down * about_itself(turn))
-}
-
-/// A turn about the tool's own axis [rad].
-#[must_use]
-pub fn about_itself(turn: f64) -> UnitQuaternion<f64> {
-    UnitQuaternion::from_axis_angle(&Vector3::z_axis(), turn)
 }
 
 fn raised(place: &Isometry3<f64>, height: f64) -> Isometry3<f64> {

@@ -2,7 +2,7 @@
 
 use super::print;
 use calibration::capture::control_hit_slide::Series;
-use calibration::capture::shape::Kind;
+use calibration::capture::request::Kind;
 use calibration::capture::task::Task;
 use calibration::capture::{control_hit_slide, excitation, ramp, scan};
 use calibration::interrupt::Interrupt;

@@ -7,7 +7,7 @@ mod replay;
 mod stage;
 
 use crate::capture::excitation::{self, ClipSummary};
-use crate::capture::shape::Kind;
+use crate::capture::request::Kind;
 use crate::capture::task::{Summary, Task};
 use crate::diagnose::{self, Diagnosis, Verdict, diagnose};
 use crate::interrupt::Interrupt;
