@@ -1,7 +1,6 @@
 //! Which verbs each clip is good for, by the rules by which these admit clips, and what is missing for a verb.
 
 use super::remark::{Remark, Severity};
-use super::session::ClipFacts;
 use crate::diagnose::clips::admit;
 use crate::forward::arm::{ArmClips, Channel};
 use crate::identify::arm::ArmError;
@@ -202,15 +201,15 @@ fn viewpoint(session: &Session, entry: &ClipEntry, clip: &Clip) -> Answer {
     Err("it holds no pictures".into())
 }
 
-/// What is missing for verbs that no clip is good for, and for a diagnosis that needs more clips than there are.
-pub(super) fn missing(session: &Session, clips: &[ClipFacts]) -> Vec<Missing> {
+/// What is missing for verbs that no clip is good for, each given with its file, and for a diagnosis that needs more clips than there are.
+pub(super) fn missing(session: &Session, clips: &[(&str, &[Fitness])]) -> Vec<Missing> {
     let lacking = |(number, verb): (usize, &'static str)| {
-        let good = clips.iter().any(|clip| clip.good_for[number].good);
-        let whys = clips.iter().map(|clip| (clip.file.as_str(), clip.good_for[number].why.as_str()));
+        let good = clips.iter().any(|(_, good_for)| good_for[number].good);
+        let whys = clips.iter().map(|(file, good_for)| (*file, good_for[number].why.as_str()));
         (!good).then(|| Missing { verb, why: grouped(whys).join("; ") })
     };
     let mut out: Vec<Missing> = VERBS.into_iter().enumerate().filter_map(lacking).collect();
-    let diagnosed = clips.iter().any(|clip| clip.good_for.iter().any(|f| f.good && f.verb.starts_with("diagnose")));
+    let diagnosed = clips.iter().any(|(_, good_for)| good_for.iter().any(|f| f.good && f.verb.starts_with("diagnose")));
     if let (true, Err(why)) = (diagnosed, admit::admit(session)) {
         out.push(Missing { verb: "diagnose", why: why.to_string() });
     }

@@ -22,6 +22,7 @@
 //! | `standing` | size and orientation of an object that stands on its table |
 //! | `fall` | free fall |
 //! | `elsewhere` | forward kinematics against poses |
+//! | `look` | one clip looked at, by all of these in their turn |
 //! | [`session`] | a whole session looked at: the answer |
 //! | [`good_for`] | which verbs each clip is good for |
 //! | [`gate`] | what `diagnose` and `identify` take from it |
@@ -38,6 +39,7 @@ pub mod good_for;
 pub mod injected;
 pub mod lag;
 mod limits;
+mod look;
 mod order;
 pub mod picture;
 mod publishers;

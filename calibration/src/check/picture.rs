@@ -1,8 +1,8 @@
 //! What the page of a recording draws: numbers over an axis, with what to see in them. Data alone; the page is drawn elsewhere.
 
 use super::columns::{Columns, Signals};
+use super::look::{Known, Looked};
 use super::remark::{Fault, Remark};
-use super::session::{Known, Looked};
 use super::statistics::{deviation, root_mean_square};
 use super::{fall, torque};
 

@@ -3,7 +3,7 @@
 use super::faults::Injected;
 use super::sessions::Clean;
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
-use rand::RngExt;
+use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 use shared_mem::cell::{Cell, ClipKind};
 use shared_mem::frames::{Base, Object, Pose};
@@ -17,7 +17,7 @@ use twin::arm::ArmModel;
 use twin::replay::in_model_order;
 
 /// What is the same in all clips.
-pub(super) struct Draw {
+struct Draw {
     /// Joints that are exchanged; the first is the one that is turned or silent.
     joints: [usize; 2],
     /// A size, 0 to 1.
@@ -30,7 +30,7 @@ pub(super) struct Draw {
 }
 
 impl Draw {
-    pub(super) fn new(rng: &mut Pcg64, session: &Clean) -> Option<Self> {
+    fn new(rng: &mut Pcg64, session: &Clean) -> Option<Self> {
         let dof = session.clips.first()?.1.measured.dof.max(2);
         let a = rng.random_range(0..dof);
         let b = (a + rng.random_range(1..dof)) % dof;
@@ -45,8 +45,30 @@ impl Draw {
     }
 }
 
+/// A session with the fault, as it is after reading; `None` where it has nothing that could have it.
+#[must_use]
+pub fn inject(fault: Injected, session: &Clean, seed: u64) -> Option<Clean> {
+    if !fault.fits(session) {
+        return None;
+    }
+    let mut damaged = session.clone();
+    if fault == Injected::HalfWidths {
+        let size = damaged.cell.object_mut()?.size.as_mut()?;
+        size.iter_mut().for_each(|edge| *edge *= 0.5);
+        return Some(damaged);
+    }
+    let mut rng = Pcg64::seed_from_u64(seed.wrapping_mul(31) + fault as u64);
+    // What a driver does wrong it does in every clip.
+    let draw = Draw::new(&mut rng, session)?;
+    for (_, clip) in &mut damaged.clips {
+        damage(fault, clip, &draw, &mut rng, &session.cell)?;
+        *clip = clip.clone().checked().ok()?;
+    }
+    Some(damaged)
+}
+
 /// Puts the fault into a clip; `None` where the clip lacks what it needs.
-pub(super) fn damage(fault: Injected, clip: &mut Clip, draw: &Draw, rng: &mut Pcg64, cell: &Cell) -> Option<()> {
+fn damage(fault: Injected, clip: &mut Clip, draw: &Draw, rng: &mut Pcg64, cell: &Cell) -> Option<()> {
     let dof = clip.measured.dof;
     let [a, b] = draw.joints;
     match fault {

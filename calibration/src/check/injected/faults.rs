@@ -1,10 +1,7 @@
 //! Every fault that foreign logs are known to have: its name, the remarks that find it, the sessions that can have it.
 
-use super::damage::{Draw, damage};
 use super::sessions::Clean;
 use crate::check::remark::Fault;
-use rand::SeedableRng;
-use rand_pcg::Pcg64;
 use shared_mem::cell::ClipKind;
 
 /// What is put into a session.
@@ -192,25 +189,3 @@ impl Injected {
 
 /// A lag that goes with speed needs clips of which one takes so many times as long as another.
 const PACES: f64 = 1.5;
-
-/// A session with the fault, as it is after reading; `None` where it has nothing that could have it.
-#[must_use]
-pub fn inject(fault: Injected, session: &Clean, seed: u64) -> Option<Clean> {
-    if !fault.fits(session) {
-        return None;
-    }
-    let mut damaged = session.clone();
-    if fault == Injected::HalfWidths {
-        let size = damaged.cell.object_mut()?.size.as_mut()?;
-        size.iter_mut().for_each(|edge| *edge *= 0.5);
-        return Some(damaged);
-    }
-    let mut rng = Pcg64::seed_from_u64(seed.wrapping_mul(31) + fault as u64);
-    // What a driver does wrong it does in every clip.
-    let draw = Draw::new(&mut rng, session)?;
-    for (_, clip) in &mut damaged.clips {
-        damage(fault, clip, &draw, &mut rng, &session.cell)?;
-        *clip = clip.clone().checked().ok()?;
-    }
-    Some(damaged)
-}

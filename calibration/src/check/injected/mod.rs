@@ -11,6 +11,7 @@ pub mod faults;
 pub mod score;
 pub mod sessions;
 
-pub use faults::{Injected, inject};
+pub use damage::inject;
+pub use faults::Injected;
 pub use score::{Score, Trial, table};
 pub use sessions::{Clean, Sort};

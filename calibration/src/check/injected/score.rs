@@ -1,6 +1,7 @@
 //! How often a fault is found where it is, and where it is not.
 
-use super::faults::{Injected, inject};
+use super::damage::inject;
+use super::faults::Injected;
 use super::sessions::Clean;
 use crate::check::check_clips;
 use crate::check::remark::Fault;
