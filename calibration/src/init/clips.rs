@@ -1,6 +1,6 @@
 //! Recorded clips: which lie in a folder, what the first of them says about its robot, and at which rates they were recorded.
 
-use super::known::relative;
+use super::path::relative;
 use anyhow::{Context as _, ensure};
 use import::Contents;
 use shared_mem::cell::{Cell, ClipEntry, ClipKind};

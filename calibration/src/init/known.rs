@@ -3,6 +3,7 @@
 use super::clips::{self, About};
 use super::description::Description;
 use super::facts::{Facts, Named};
+use super::path::relative;
 use super::{Order, Taken};
 use anyhow::bail;
 use import::{UsualController, is_franka, usual_controller};
@@ -271,13 +272,4 @@ fn recorded(order: Order<'_>) -> anyhow::Result<Option<Recorded>> {
         (None, None) => return Ok(None),
     };
     Ok(Some(found))
-}
-
-/// A path as cell.toml `out` may name it: from its folder where the file lies there or below, else from anywhere.
-pub(super) fn relative(path: &Path, out: &Path) -> PathBuf {
-    let folder = out.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let whole =
-        |path: &Path| path.canonicalize().or_else(|_| std::path::absolute(path)).unwrap_or_else(|_| path.to_owned());
-    let path = whole(path);
-    path.strip_prefix(whole(folder)).map_or_else(|_| path.clone(), Path::to_owned)
 }

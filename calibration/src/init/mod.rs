@@ -8,6 +8,7 @@
 //! | `description` | a URDF from a file or a bag, xacro expanded |
 //! | `clips` | recorded clips: their robot, topics and rates |
 //! | `known` | all of it put together, with where each came from |
+//! | `path` | files beside the new one, as it may name them |
 //! | `text` | the file's text |
 
 mod ask;
@@ -15,6 +16,7 @@ mod clips;
 mod description;
 mod facts;
 mod known;
+mod path;
 #[cfg(test)]
 mod tests;
 mod text;
