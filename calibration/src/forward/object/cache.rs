@@ -1,7 +1,7 @@
 //! What was simulated of a clip and can be used again: the arm's way to the object, the hit, and the whole.
 
+use super::outcome::{Outcome, Path};
 use super::own::Values;
-use super::rollout::{Outcome, Path};
 use crate::forward::motion::felt_by_arm;
 use nalgebra::Isometry3;
 use shared_mem::theta::{ArmTheta, EffectTheta, Theta};

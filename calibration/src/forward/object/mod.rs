@@ -14,12 +14,14 @@
 //! | `rollout` | a clip in the twin |
 //! | `simulator` | a clip by another program, completed by the twin |
 //! | `replayed` | the figures of `twin replay`, whoever simulates |
+//! | `outcome` | what came of it |
 //! | `cache` | what of it can be used again |
 //! | `rows` | what every residual is about |
 
 mod cache;
 mod clearance;
 mod clip;
+mod outcome;
 mod own;
 mod replayed;
 mod rollout;
@@ -37,7 +39,8 @@ use crate::estimate::{ClipModel, Impossible, Random};
 use cache::ClipCache;
 use clip::ObjectClip;
 use nalgebra::Isometry3;
-use rollout::{Job, Outcome};
+use outcome::Outcome;
+use rollout::Job;
 use shared_mem::cell::{Cell, ClipKind, PoseNoise};
 use shared_mem::frames::{Base, Object, Pose};
 use shared_mem::recording::Clip;

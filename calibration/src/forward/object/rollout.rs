@@ -6,6 +6,7 @@
 
 use super::cache::{Approach, ArmKey, ClipCache, Hit};
 use super::clip::ObjectClip;
+use super::outcome::{Outcome, Path};
 use super::own::{Own, Values};
 use crate::estimate::Impossible;
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
@@ -15,50 +16,14 @@ use shared_mem::frames::Pose;
 use shared_mem::theta::{ObjectTheta, Theta};
 use shared_mem::time::TICK_NS;
 use std::sync::Arc;
-use twin::arm::{JointState, Joints};
+use twin::arm::JointState;
 use twin::control::CommandTrack;
-use twin::effects::CameraEffects;
 use twin::replay::object_start;
 use twin::rollout::{CellRollout, CellTrace, Course, ObjectState};
 use twin::scene::ObjectModel;
 
 /// The simulation ends when the object has rested for so many periods and no recorded pose moves any more.
 const REST_PERIODS: usize = 50;
-
-/// What the twin did in a clip.
-#[derive(Debug, Clone)]
-pub(super) struct Outcome {
-    /// The object from the first touch on, one pose a period.
-    pub(super) object: Path,
-    /// What the encoders read at the clip's arm stamps [rad].
-    pub(super) joints: Vec<Joints>,
-    /// Stamp of the first touch.
-    pub(super) contact_ns: Option<u64>,
-    pub(super) camera: CameraEffects,
-}
-
-/// Poses a period apart; before the first and after the last the object rests.
-#[derive(Debug, Clone, Default)]
-pub(super) struct Path {
-    pub(super) start_ns: u64,
-    pub(super) poses: Vec<Isometry3<f64>>,
-}
-
-impl Path {
-    /// The pose at a time, between periods on the straight way.
-    pub(super) fn at(&self, stamp_ns: f64) -> Isometry3<f64> {
-        let along = (stamp_ns - self.start_ns as f64) / TICK_NS as f64;
-        let last = self.poses.len() - 1;
-        if along <= 0.0 {
-            return self.poses[0];
-        }
-        if along >= last as f64 {
-            return self.poses[last];
-        }
-        let (row, share) = (along.floor() as usize, along.fract());
-        self.poses[row].lerp_slerp(&self.poses[row + 1], share)
-    }
-}
 
 /// What a simulation of one clip needs.
 pub(super) struct Job<'a> {

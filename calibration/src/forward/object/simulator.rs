@@ -13,8 +13,9 @@
 //! The difference is taken at equal times. The twin may touch the object some milliseconds before or after the engine does, and let it go
 //! with another speed: what an effect changes then is right to first order, the less the nearer both hits are to each other.
 
+use super::outcome::{Outcome, Path};
 use super::own::Values;
-use super::rollout::{Job, Outcome, Path, impossible};
+use super::rollout::{Job, impossible};
 use crate::engine::{Engine, ObjectBody, ObjectQuestion, POSE, Quantity, Question};
 use crate::estimate::Impossible;
 use crate::forward::motion::{commands, states};
