@@ -1,7 +1,6 @@
 //! Blocks of voxels by their place, and views going into them.
 
-use super::{Settings, View, nets};
-use crate::Surface;
+use super::{Settings, View};
 use nalgebra::{Isometry3, Point3, Vector3};
 use rayon::prelude::*;
 use std::collections::{HashMap, HashSet};
@@ -122,12 +121,6 @@ impl Grid {
     /// Where there are blocks.
     pub(super) fn places(&self) -> &[[i32; 3]] {
         &self.places
-    }
-
-    /// The surface that the views taken in show together.
-    #[must_use]
-    pub fn surface(&self) -> Surface {
-        nets::surface(self)
     }
 }
 

@@ -43,7 +43,15 @@ struct Cell {
     crossed: [Option<bool>; 3],
 }
 
-pub(super) fn surface(grid: &Grid) -> Surface {
+impl Grid {
+    /// The surface that the views taken in show together.
+    #[must_use]
+    pub fn surface(&self) -> Surface {
+        surface(self)
+    }
+}
+
+fn surface(grid: &Grid) -> Surface {
     let mut places = grid.places().to_vec();
     places.sort_unstable();
     let cells: Vec<Cell> = places.par_iter().flat_map_iter(|place| cells(grid, *place)).collect();
