@@ -4,11 +4,12 @@
 //! |---|---|
 //! | one a topic that is sent (`send`) | shared memory to network; keeps states, and sends again what is asked for |
 //! | one a topic that is taken (`take`) | network to shared memory, in order |
-//! | `link clock` (`hosts`) | round trips: offset of the clocks, and whether anybody is there |
+//! | `link clock` (`asking`, `hosts`) | round trips: offset of the clocks, and whether anybody is there |
 //! | main | remarks, status lines, the end |
 //!
 //! Ports of shared memory belong to the thread that opened them; zenoh's own threads only fill queues.
 
+mod asking;
 mod hosts;
 mod send;
 mod session;
@@ -60,7 +61,7 @@ pub fn run(settings: &Settings, stop: &Arc<AtomicBool>) -> Result<Report, LinkEr
     let shared = Shared::new(session.clone(), RandomState::new().build_hasher().finish(), Arc::clone(&ends), remarks);
     let mut work = Work::default();
     let begun = work.begin(&shared, &settings.plan);
-    let answering = hosts::answer(&shared, &settings.plan);
+    let answering = asking::answer(&shared, &settings.plan);
     let done = begun.and(answering).and_then(|_answering| work.watch(&shared, &node, &said, &is_over));
     ends.store(true, Ordering::Relaxed);
     let ended = work.end();
@@ -207,7 +208,7 @@ impl Work {
         let mut starter = Starter { work: self, shared, plan, failed: None };
         visit_encoded(&mut starter);
         let asked = plan.clone();
-        starter.start("link clock".into(), move |shared| hosts::ask(shared, &asked));
+        starter.start("link clock".into(), move |shared| asking::ask(shared, &asked));
         starter.failed.map_or(Ok(()), Err)
     }
 
