@@ -2,8 +2,8 @@
 //! that somebody who connects and stays silent, or sends half a header, keeps nobody from the robot; such a connection is
 //! closed after two seconds. Used for the arm's port and the hand's.
 
+use super::connection::{Gone, read_into};
 use super::framing::{Inbox, Message};
-use super::session::{Gone, read_into};
 use socket2::{SockRef, TcpKeepalive};
 use std::collections::VecDeque;
 use std::io;

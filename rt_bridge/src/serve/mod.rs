@@ -11,6 +11,7 @@
 //! | file | owns |
 //! |---|---|
 //! | [`server`] | the ports, who is served, the robot's millisecond: free-running or in lock-step with its client |
+//! | `connection` | bytes of a connection as they arrive, and why it ends |
 //! | `arrivals` | connections before their first request |
 //! | `session` | one client: its sockets, the handshake, what it is sent and when |
 //! | `notices` | lines on standard error, and how many there may be |
@@ -33,12 +34,13 @@
 //! | `hand` | the Franka Hand |
 //! | `fuzzing` | what a client can send, for the fuzz targets and tests alone |
 //!
-//! Everything but `server`, `arrivals`, `session`, `notices` and the hand's service is without sockets and clocks, and deterministic.
+//! Everything but `server`, `connection`, `arrivals`, `session`, `notices` and the hand's service is without sockets and clocks, and deterministic.
 //!
 //! Sources: libfranka's documentation and its protocol headers (Apache-2.0), by way of `franka-rs`'s wire structs.
 
 mod arrivals;
 mod body;
+mod connection;
 mod faults;
 mod framing;
 #[cfg(any(test, fuzzing))]

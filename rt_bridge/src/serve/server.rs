@@ -8,11 +8,12 @@
 
 use super::ServeError;
 use super::arrivals::{Arrivals, Outcome};
+use super::connection::Gone;
 use super::framing::Inbox;
 use super::hand::HandService;
 use super::notices::{About, Notices};
 use super::robot::{Robot, Tally};
-use super::session::{Gone, Session};
+use super::session::Session;
 use super::wire::{ROBOT_COMMAND_PORT, SetPoint};
 use crate::rt::process;
 use crate::times::{Percentiles, Times};

@@ -4,13 +4,14 @@
 //! set points.
 
 use super::arrivals::Arrival;
+use super::connection::{Gone, READS, read_into};
 use super::framing::{Inbox, Message};
 use super::notices::{About, Notices};
 use super::robot::{Outbox, Reply, Robot};
 use super::wire::{
     ConnectStatus, NotARequest, ROBOT_VERSION, Request, SetPoint, busy_reply, connect_reply, reply, request, set_point,
 };
-use std::io::{self, Read as _, Write as _};
+use std::io::{self, Write as _};
 use std::net::{SocketAddr, TcpStream, UdpSocket};
 use std::ops::RangeInclusive;
 use std::time::Duration;
@@ -20,43 +21,6 @@ use zerocopy::IntoBytes as _;
 const CONNECT: u32 = 0;
 /// Longest datagram that is looked at: longer than a set point, so that a longer one is told from one.
 const DATAGRAM: usize = 512;
-/// Pieces of a stream, and datagrams, that are taken in a millisecond.
-const READS: usize = 64;
-
-/// Why a connection is over.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-pub(super) enum Gone {
-    /// In the ordinary way.
-    #[error("it closed the connection")]
-    Left,
-    /// It did not say what it wants.
-    #[error("it sent no handshake within two seconds; the connection is closed")]
-    Silent,
-    /// Too many others do not say either.
-    #[error("too many connections wait for their handshake; the oldest is closed")]
-    Crowded,
-    /// Somebody else is served.
-    #[error("it is refused: this robot serves one client at a time, end the other one first")]
-    Second,
-    /// Its interface is another.
-    #[error(
-        "its FCI version {0} is refused: this robot speaks version {ROBOT_VERSION}, which is libfranka 0.18 to 0.21"
-    )]
-    Version(u16),
-    /// It sent what no client sends.
-    #[error("{0}; the connection is closed")]
-    Nonsense(String),
-    /// The network failed.
-    #[error("the connection broke ({0})")]
-    Broken(io::ErrorKind),
-}
-
-impl From<io::Error> for Gone {
-    fn from(error: io::Error) -> Self {
-        Self::Broken(error.kind())
-    }
-}
-
 /// A connected client.
 #[derive(Debug)]
 pub(super) struct Session {
@@ -164,21 +128,6 @@ impl Session {
 fn send(tcp: &mut TcpStream, number: u32, id: u32, payload: &[u8]) -> Result<(), Gone> {
     // Replies are a few bytes, the longest some kilobytes: a client that leaves no room for one reads none.
     Ok(tcp.write_all(&reply(number, id, payload))?)
-}
-/// Takes all bytes that have arrived.
-pub(super) fn read_into(tcp: &mut TcpStream, inbox: &mut Inbox) -> Result<(), Gone> {
-    let mut bytes = [0; 2048];
-    // Not without end: somebody who never stops sending must not stop the robot's clock.
-    for _ in 0..READS {
-        match tcp.read(&mut bytes) {
-            Ok(0) => return Err(Gone::Left),
-            Ok(length) => inbox.put(&bytes[..length]),
-            Err(error) if error.kind() == io::ErrorKind::WouldBlock => return Ok(()),
-            Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
-            Err(error) => return Err(Gone::Broken(error.kind())),
-        }
-    }
-    Ok(())
 }
 
 /// Status of the reply to what is no request: a Move's invalid argument, a setter's, or else "not possible".
