@@ -7,6 +7,7 @@
 //! | module | owns |
 //! |---|---|
 //! | `cloud` | the splats of one body |
+//! | `file` | a file of them, read and written |
 //! | `ply`, `compressed` | 3DGS PLY and SuperSplat's compressed PLY |
 //! | `real` | single and double precision |
 //! | `harmonics` | colour by direction |
@@ -22,6 +23,7 @@
 
 mod cloud;
 mod compressed;
+mod file;
 mod gradient;
 mod harmonics;
 mod lens;
@@ -36,7 +38,8 @@ mod reference;
 mod straight;
 mod train;
 
-pub use cloud::{Splat, SplatCloud, SplatError};
+pub use cloud::{Splat, SplatCloud};
+pub use file::SplatError;
 pub use gradient::{COLOR_DEPTH, COLOR_PLANE, Frame, Parameters, Planes};
 pub use lens::Lens;
 pub use links::{link_file, read_links};
