@@ -5,7 +5,7 @@
 //! queue run dry: then the arm is braked within its limits and held.
 
 use super::check::{self, Wrong};
-use super::wire::{codes, wire};
+use super::wire::{codes, plain_fields, wire};
 use super::{Joints, MAX_JOINTS};
 use iceoryx2::prelude::ZeroCopySend;
 use zerocopy::{FromBytes, Immutable, IntoBytes};
@@ -79,6 +79,8 @@ impl MotionChunk {
         })
     }
 }
+
+plain_fields!([] [SetPoint; CHUNK_LENGTH]);
 
 wire!("twinalign/MotionChunk/3" MotionChunkWire: MotionChunk {
     stamp_ns: u64,

@@ -5,7 +5,6 @@
 //! (`zerocopy::FromBytes`: the compiler proves it), and only [`Message::from_wire`] makes a message of it.
 
 use super::check::Wrong;
-use super::motion::{CHUNK_LENGTH, SetPoint};
 use iceoryx2::prelude::ZeroCopySend;
 use std::fmt::Debug;
 use zerocopy::{FromBytes, Immutable, IntoBytes};
@@ -43,18 +42,19 @@ pub trait Field: Sized {
 /// Fields that are plain already.
 macro_rules! plain_fields {
     ($([$($parameter:tt)*] $field:ty),+ $(,)?) => {$(
-        impl<$($parameter)*> Field for $field {
+        impl<$($parameter)*> $crate::msg::wire::Field for $field {
             type Wire = Self;
             fn to_wire(self) -> Self {
                 self
             }
-            fn from_wire(_: &'static str, wire: Self) -> Result<Self, Wrong> {
+            fn from_wire(_: &'static str, wire: Self) -> Result<Self, $crate::msg::check::Wrong> {
                 Ok(wire)
             }
         }
     )+};
 }
-plain_fields!([] u32, [] u64, [] f64, [const N: usize] [f64; N], [const N: usize] [u8; N], [] [SetPoint; CHUNK_LENGTH]);
+plain_fields!([] u32, [] u64, [] f64, [const N: usize] [f64; N], [const N: usize] [u8; N]);
+pub(super) use plain_fields;
 
 /// Makes an enum a field that travels as a `u32`. Does not compile while a variant is missing.
 macro_rules! codes {
