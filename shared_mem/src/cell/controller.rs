@@ -62,9 +62,6 @@ impl TorqueSensing {
     }
 }
 
-/// Lower and upper bound.
-pub type Range = [f64; 2];
-
 /// The law between command and torque, evaluated at 1 kHz and held in between.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]

@@ -17,10 +17,10 @@ mod wrench;
 
 pub use background::Background;
 pub use camera::{Camera, CameraPose, Intrinsics};
-pub use controller::{Controller, ControllerKind, Range, TorqueSensing};
+pub use controller::{Controller, ControllerKind, TorqueSensing};
 pub use gripper::{Gripper, GripperModel};
 pub use object::{Object, PoseNoise, RootHold, Support};
-pub use ranges::Ranges;
+pub use ranges::{Range, Ranges};
 pub use robot::{Robot, Table, Tool, Topics};
 pub use simulation::Simulation;
 pub use tolerance::Tolerance;

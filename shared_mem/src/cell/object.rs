@@ -1,6 +1,6 @@
 //! `[object]`, or one of `[[object]]`: what stands on the table, and how well it is known.
 
-use super::controller::Range;
+use super::ranges::Range;
 use super::within;
 use crate::msg::object::{NAME_LENGTH, is_object_name};
 use schemars::JsonSchema;

@@ -1,9 +1,11 @@
 //! Where gains may lie: one range for all joints, or one a joint.
 
-use super::controller::Range;
 use crate::msg::MAX_JOINTS;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+
+/// Lower and upper bound.
+pub type Range = [f64; 2];
 
 /// Lower and upper bounds of a quantity of every joint.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
