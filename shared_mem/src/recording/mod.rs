@@ -8,6 +8,7 @@
 //! |---|---|
 //! | `container` | MCAP records and messages of a file that may be cut or changed |
 //! | `cdr`, `ros2` | ROS 2 messages |
+//! | `read` | which kind of clip a file is, and reading it |
 //! | `own`, `logged` | an own recording as a clip, and what of its states to believe |
 //! | `messages`, `picture`, `picture_file`, `pictures` | all messages one by one, a picture, pictures as files, a clip's pictures |
 //! | `bag` | a ROS 2 bag as a clip |
@@ -46,6 +47,7 @@ mod picture;
 mod picture_file;
 mod pictures;
 mod raw;
+mod read;
 mod recover;
 mod robot;
 mod ros2;
@@ -58,7 +60,7 @@ mod twinaligner;
 mod wire;
 mod writer;
 
-pub use clip::{Clip, read_clip};
+pub use clip::{Clip, TrackedObject};
 pub use encoded::{
     Encoded, EncodedVisitor, append_picture, picture_from_bytes, picture_schema, schema_checksum, visit_encoded,
 };
@@ -75,10 +77,10 @@ pub use picture::Picture;
 pub use picture_file::{pack_picture, pack_quickly, read_alpha, read_picture, unpack_picture, write_png, write_png_to};
 pub use pictures::{PictureKind, for_pictures};
 pub use raw::{RawMessage, RawMessages};
+pub use read::read_clip;
 pub use recover::{RecoverError, Recovered, recover};
 pub use robot::{FramesAt, JOINT_STATES, ROBOT_DESCRIPTION, RobotModel, TF, TF_STATIC, Transform};
 pub use series::{JointSeries, ObjectSeries};
 pub use session::{Session, SessionFiles};
 pub use subject::{Subject, Why};
-pub use tracked::TrackedObject;
 pub use writer::{ClipInfo, ClipWriter, WriteError, WriteSummary};

@@ -106,7 +106,7 @@ fn carried_cell(path: &Path) -> Result<Cell, ReadError> {
 fn kind_of(path: &Path, cell: &Cell) -> Result<ClipKind, ReadError> {
     Ok(match (&cell.robot, cell.object()) {
         (None, _) => ClipKind::FreeMotion,
-        (Some(_), Some(_)) if super::clip::shows_object(path, cell)? => ClipKind::ControlHitSlide,
+        (Some(_), Some(_)) if super::read::shows_object(path, cell)? => ClipKind::ControlHitSlide,
         (Some(_), _) => ClipKind::Excitation,
     })
 }

@@ -6,22 +6,13 @@
 //! itself are on `/object/NAME_LINK/pose` and come behind all objects.
 
 use super::checks;
-use super::clip::Clip;
+use super::clip::{Clip, TrackedObject};
 use super::error::ReadError;
 use super::series::ObjectSeries;
 use crate::cell::{Cell, Object};
 use crate::frames::{Base, Object as ObjectFrame, Pose};
 use crate::topics;
 use std::collections::BTreeMap;
-
-/// An object beside the one that a command is about.
-#[derive(Debug, Clone, PartialEq)]
-pub struct TrackedObject {
-    /// Its name in cell.toml.
-    pub name: String,
-    /// Where it was; empty when it was not tracked.
-    pub series: ObjectSeries,
-}
 
 /// A stamp [ns] and the pose, `None` where its numbers are no pose.
 pub(super) type PoseRow = (u64, Option<Pose<Base, ObjectFrame>>);

@@ -4,7 +4,7 @@ use super::super::container::Messages;
 use super::super::robot::{ROBOT_DESCRIPTION, TF, TF_STATIC};
 use super::super::tracked::ObjectTopics;
 use super::super::{ReadError, twinaligner};
-use super::rosbag::{EXTERNAL_TORQUES, FLANGE_POSE};
+use super::bag::{EXTERNAL_TORQUES, FLANGE_POSE};
 use super::source::{Kind, Source};
 use super::{Exported, Format};
 use crate::cell::Cell;

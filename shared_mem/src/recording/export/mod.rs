@@ -7,13 +7,14 @@
 //! | file | owns |
 //! |---|---|
 //! | `source` | a clip of any kind with everything beside its joints and poses |
-//! | `rosbag`, `encode`, `definitions` | a ROS 2 bag |
+//! | `rosbag`, `bag`, `encode`, `definitions` | a ROS 2 bag |
 //! | `robot` | the robot's description, joints and frames in it |
 //! | `metadata` | the `metadata.yaml` of a bag that is a folder |
 //! | `folder`, `npz` | a TwinAligner clip folder |
 //! | `native` | an own clip |
 //! | `left_out` | what of the source is not in it |
 
+mod bag;
 mod definitions;
 mod encode;
 mod folder;

@@ -3,8 +3,8 @@
 
 use super::super::robot::{JOINT_STATES, ROBOT_DESCRIPTION, RobotModel, TF, TF_STATIC, Transform};
 use super::super::ros2::JointState;
+use super::bag::Bag;
 use super::encode::{self, ROS_CAMERA_FRAME};
-use super::rosbag::Bag;
 use crate::cell::Cell;
 use crate::recording::JointSeries;
 
