@@ -4,10 +4,6 @@
 //! that format knows; a law for which none has one is [`Change::Beyond`]. Units SI; a vector of joints holds one number for each,
 //! or a single one for all.
 
-use super::registry::EffectInfo;
-use super::remedy::Found;
-use shared_mem::cell::Cell;
-
 /// One change of a model, on top of what cell.toml states.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Change {
@@ -84,19 +80,11 @@ pub enum Change {
     Beyond(&'static str),
 }
 
-impl EffectInfo {
-    /// What this effect changes in a model of `cell`, where `numbers` are its parameters by name; one that is not known takes
-    /// its resting value.
-    #[must_use]
-    pub fn changes(&'static self, cell: &Cell, numbers: &dyn Fn(&str) -> Option<Vec<f64>>) -> Vec<Change> {
-        (self.model)(&Found::new(self, numbers, cell))
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::super::registry::{find, registry};
     use super::*;
+    use shared_mem::cell::Cell;
 
     #[test]
     fn every_effect_says_what_it_changes_in_a_model_with_the_numbers_that_were_found() {

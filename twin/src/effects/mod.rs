@@ -1,7 +1,7 @@
 //! Everything the nominal cell lacks: effects that a real cell has and that a simulated cell can be given.
 //!
 //! One effect is one file: its equation, source, plausible range, signature, what it is confused with, how a search comes
-//! by it, what separates it from others, what to do about it, what it changes in a model for another simulator, its code and its test. [`registry()`] lists them all. A new effect is a new file, its line in the registry, and a field in the struct
+//! by it, what separates it from others, what to do about it, what it changes in a model for another simulator, its code and its test: what it says about itself in the words of `info` and `parameter`. [`registry()`] lists them all. A new effect is a new file, its line in the registry, and a field in the struct
 //! of its stage. Effects combine freely; one whose sizes are all neutral is not installed, so it changes no bit.
 //!
 //! | folder | acts on | read by |
@@ -18,6 +18,8 @@ mod arm;
 mod camera;
 mod change;
 mod hit;
+mod info;
+mod parameter;
 mod registry;
 mod remedy;
 mod robot;
@@ -31,9 +33,9 @@ pub use arm::{ArmEffects, ArmMemory};
 pub use camera::{CameraEffects, CameraMemory};
 pub use change::Change;
 pub use hit::HitEffects;
-pub use registry::{
-    EffectInfo, Elsewhere, OnTable, Parameter, Place, Role, Search, Shape, Stage, find, registry, unknown_weight,
-};
+pub use info::{EffectInfo, Place, Stage};
+pub use parameter::{Elsewhere, OnTable, Parameter, Role, Search, Shape};
+pub use registry::{find, registry, unknown_weight};
 pub use remedy::{Found, Remedy};
 pub use robot::Robot;
 pub use separation::{Experiment, Separation};
@@ -41,6 +43,7 @@ pub use slide::{SlideEffects, TableFriction};
 pub use stated::stated;
 pub use values::EffectError;
 
+use registry::named;
 use shared_mem::theta::EffectTheta;
 use values::Values;
 
@@ -68,9 +71,10 @@ impl Effects {
             if blocks[..i].iter().any(|earlier| earlier.name == block.name) {
                 return Err(EffectError::Twice(block.name.clone()));
             }
-            let values = Values::read(block, dof)?;
+            let effect = named(&block.name)?;
+            let values = Values::read(effect.name, effect.parameters, block, dof)?;
             if !values.are_neutral() {
-                (values.effect().install)(&values, &mut effects);
+                (effect.install)(&values, &mut effects);
             }
         }
         Ok(effects)

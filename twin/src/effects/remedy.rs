@@ -3,7 +3,7 @@
 //! Each effect says it in its own file, from the numbers that were identified. Numbers are SI with three digits that count;
 //! angles are in degrees too where a person turns something.
 
-use super::registry::{EffectInfo, Role};
+use super::parameter::{Parameter, Role};
 use nalgebra::{Rotation3, Vector3};
 use shared_mem::cell::{Cell, GRAVITY};
 
@@ -19,20 +19,11 @@ pub struct Remedy {
     pub in_model: String,
 }
 
-/// An effect with the numbers that were found for it, in the cell it was found in.
+/// Parameters of an effect with the numbers that were found for them, in the cell it was found in.
 pub struct Found<'a> {
-    effect: &'static EffectInfo,
+    parameters: &'static [Parameter],
     numbers: &'a dyn Fn(&str) -> Option<Vec<f64>>,
     cell: &'a Cell,
-}
-
-impl EffectInfo {
-    /// What to do about this effect in `cell`, where `numbers` are its parameters by name; one that is not known takes its
-    /// resting value.
-    #[must_use]
-    pub fn remedy(&'static self, cell: &Cell, numbers: &dyn Fn(&str) -> Option<Vec<f64>>) -> Remedy {
-        (self.remedy)(&Found::new(self, numbers, cell))
-    }
 }
 
 impl Remedy {
@@ -43,11 +34,11 @@ impl Remedy {
 
 impl<'a> Found<'a> {
     pub(super) fn new(
-        effect: &'static EffectInfo,
+        parameters: &'static [Parameter],
         numbers: &'a dyn Fn(&str) -> Option<Vec<f64>>,
         cell: &'a Cell,
     ) -> Self {
-        Self { effect, numbers, cell }
+        Self { parameters, numbers, cell }
     }
 
     /// The cell it was found in.
@@ -56,7 +47,7 @@ impl<'a> Found<'a> {
     }
 
     fn resting(&self, name: &str) -> f64 {
-        let parameter = self.effect.parameters.iter().find(|p| p.name == name);
+        let parameter = self.parameters.iter().find(|p| p.name == name);
         parameter.expect("an effect asks for its own parameters").resting_value()
     }
 
@@ -84,7 +75,7 @@ impl<'a> Found<'a> {
     /// The same, each number in words of its own.
     pub(super) fn joints_by(&self, name: &str, words: &dyn Fn(f64) -> String) -> String {
         let (all, resting) = (self.all(name), self.resting(name));
-        let parameter = self.effect.parameters.iter().find(|p| p.name == name);
+        let parameter = self.parameters.iter().find(|p| p.name == name);
         let is_size = parameter.is_some_and(|p| matches!(p.role, Role::Size { .. }));
         if let [one] = all[..] {
             return format!("{} in every joint", words(one));

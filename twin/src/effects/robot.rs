@@ -1,7 +1,7 @@
 //! How strong effects on an arm may be on this robot. The ranges of the registry are those of the FR3 and its kin; another
 //! robot's follow from what it is known to be: torque limits, inertia seen at its joints, mass of its links.
 
-use super::registry::{Elsewhere, Parameter};
+use super::parameter::{Elsewhere, Parameter};
 use crate::arm::{ArmModel, Joints};
 
 /// What of a robot says how strong effects on it may be.

@@ -1,6 +1,6 @@
 //! From an `[[effect]]` block of theta.toml to numbers that an effect can use: every mistake is refused in one line.
 
-use super::registry::{EffectInfo, Parameter, Role, Shape, registry};
+use super::parameter::{Parameter, Role, Shape};
 use crate::arm::{Joints, MAX_JOINTS};
 use shared_mem::msg::joints_from;
 use shared_mem::theta::EffectTheta;
@@ -77,37 +77,35 @@ fn behind(unit: &str) -> String {
 /// Checked parameters of one effect.
 #[derive(Debug, Clone)]
 pub(super) struct Values {
-    effect: &'static EffectInfo,
+    parameters: &'static [Parameter],
     numbers: Vec<Vec<f64>>,
 }
 
 impl Values {
-    /// Checks a block against the registry, for an arm of `dof` joints.
-    pub(super) fn read(block: &EffectTheta, dof: usize) -> Result<Self, EffectError> {
-        let effect = super::registry::find(&block.name)
-            .ok_or_else(|| EffectError::Name { name: block.name.clone(), nearest: nearest(&block.name) })?;
-        if let Some(given) = block.parameters.keys().find(|key| effect.parameters.iter().all(|p| p.name != *key)) {
-            let known = effect.parameters.iter().map(|p| format!("`{}`", p.name)).collect::<Vec<_>>().join(", ");
-            return Err(EffectError::Parameter { effect: effect.name, given: given.clone(), known });
+    /// Checks a block against the parameters of the `effect` that it names, for an arm of `dof` joints.
+    pub(super) fn read(
+        effect: &'static str,
+        parameters: &'static [Parameter],
+        block: &EffectTheta,
+        dof: usize,
+    ) -> Result<Self, EffectError> {
+        if let Some(given) = block.parameters.keys().find(|key| parameters.iter().all(|p| p.name != *key)) {
+            let known = parameters.iter().map(|p| format!("`{}`", p.name)).collect::<Vec<_>>().join(", ");
+            return Err(EffectError::Parameter { effect, given: given.clone(), known });
         }
-        let numbers = effect
-            .parameters
+        let numbers = parameters
             .iter()
             .map(|p| match block.parameters.get(p.name) {
-                Some(value) => numbers(effect.name, p, value, dof),
-                None => p.absent(effect.name, dof),
+                Some(value) => numbers(effect, p, value, dof),
+                None => p.absent(effect, dof),
             })
             .collect::<Result<_, _>>()?;
-        Ok(Self { effect, numbers })
-    }
-
-    pub(super) fn effect(&self) -> &'static EffectInfo {
-        self.effect
+        Ok(Self { parameters, numbers })
     }
 
     /// Whether the effect changes nothing.
     pub(super) fn are_neutral(&self) -> bool {
-        self.effect.parameters.iter().zip(&self.numbers).all(|(p, numbers)| match p.role {
+        self.parameters.iter().zip(&self.numbers).all(|(p, numbers)| match p.role {
             Role::Size { neutral } => numbers.iter().all(|n| *n == neutral),
             Role::Form { .. } => true,
         })
@@ -132,7 +130,7 @@ impl Values {
     }
 
     fn of(&self, name: &str) -> &[f64] {
-        let at = self.effect.parameters.iter().position(|p| p.name == name);
+        let at = self.parameters.iter().position(|p| p.name == name);
         &self.numbers[at.expect("an effect asks for its own parameters")]
     }
 }
@@ -197,12 +195,4 @@ fn numbers(effect: &'static str, p: &Parameter, value: &toml::Value, dof: usize)
 
 fn number(value: &toml::Value) -> Option<f64> {
     value.as_float().or_else(|| value.as_integer().map(|i| i as f64))
-}
-
-fn nearest(name: &str) -> &'static str {
-    let similarity = |effect: &EffectInfo| strsim::jaro_winkler(name, effect.name);
-    registry()
-        .iter()
-        .max_by(|a, b| similarity(a).total_cmp(&similarity(b)))
-        .map_or("command_delay", |effect| effect.name)
 }

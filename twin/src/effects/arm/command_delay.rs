@@ -7,7 +7,8 @@
 //! - Confused with: command lag (in slow motion exactly), viscous friction, camera latency (where only the camera sees the arm).
 
 use crate::effects::change::Change;
-use crate::effects::registry::{EffectInfo, Parameter, Place, Search, Stage};
+use crate::effects::info::{EffectInfo, Place, Stage};
+use crate::effects::parameter::{Parameter, Search};
 use crate::effects::remedy::{Remedy, milliseconds, short};
 use crate::effects::separation::{Experiment, Separation};
 

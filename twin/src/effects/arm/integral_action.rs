@@ -10,7 +10,8 @@
 use super::transmission::AT_REST;
 use crate::arm::{ArmModel, ControlLaw, JointState, Joints};
 use crate::effects::change::Change;
-use crate::effects::registry::{EffectInfo, Parameter, Place, Stage};
+use crate::effects::info::{EffectInfo, Place, Stage};
+use crate::effects::parameter::Parameter;
 use crate::effects::remedy::Remedy;
 use crate::effects::separation::{Experiment, Separation};
 use shared_mem::time::TICK;

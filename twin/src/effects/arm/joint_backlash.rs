@@ -10,7 +10,8 @@
 
 use crate::arm::{Joints, Spring};
 use crate::effects::change::Change;
-use crate::effects::registry::{EffectInfo, Parameter, Place, Search, Stage};
+use crate::effects::info::{EffectInfo, Place, Stage};
+use crate::effects::parameter::{Parameter, Search};
 use crate::effects::remedy::{Remedy, degrees, short};
 
 pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {

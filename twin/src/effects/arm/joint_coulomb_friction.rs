@@ -10,7 +10,8 @@
 
 use crate::arm::Joints;
 use crate::effects::change::Change;
-use crate::effects::registry::{EffectInfo, Elsewhere, Parameter, Place, Search, Stage};
+use crate::effects::info::{EffectInfo, Place, Stage};
+use crate::effects::parameter::{Elsewhere, Parameter, Search};
 use crate::effects::remedy::Remedy;
 use crate::effects::separation::{Experiment, Separation};
 

@@ -11,7 +11,8 @@
 
 use crate::arm::Joints;
 use crate::effects::change::Change;
-use crate::effects::registry::{EffectInfo, Elsewhere, Parameter, Place, Stage};
+use crate::effects::info::{EffectInfo, Place, Stage};
+use crate::effects::parameter::{Elsewhere, Parameter};
 use crate::effects::remedy::{Remedy, with_unit};
 
 pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {

@@ -13,7 +13,8 @@
 
 use crate::arm::{JointState, Joints};
 use crate::effects::change::Change;
-use crate::effects::registry::{EffectInfo, Elsewhere, Parameter, Place, Stage};
+use crate::effects::info::{EffectInfo, Place, Stage};
+use crate::effects::parameter::{Elsewhere, Parameter};
 use crate::effects::remedy::Remedy;
 
 /// Searched this far [N m], where no torque limit is known.

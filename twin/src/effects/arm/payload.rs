@@ -8,7 +8,8 @@
 
 use crate::arm::{ArmModel, MassProperties};
 use crate::effects::change::Change;
-use crate::effects::registry::{EffectInfo, Elsewhere, Parameter, Place, Stage};
+use crate::effects::info::{EffectInfo, Place, Stage};
+use crate::effects::parameter::{Elsewhere, Parameter};
 use crate::effects::remedy::{Remedy, list, short};
 use crate::effects::separation::{Experiment, Separation};
 

@@ -9,7 +9,8 @@
 
 use crate::arm::{ArmModel, Joints};
 use crate::effects::change::Change;
-use crate::effects::registry::{EffectInfo, Elsewhere, Parameter, Place, Stage};
+use crate::effects::info::{EffectInfo, Place, Stage};
+use crate::effects::parameter::{Elsewhere, Parameter};
 use crate::effects::remedy::{Remedy, list};
 use crate::effects::separation::{Experiment, Separation};
 

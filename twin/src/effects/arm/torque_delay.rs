@@ -7,7 +7,8 @@
 //! - Confused with: a lower damping, viscous friction (adds what this takes), joint elasticity (rings too).
 
 use crate::effects::change::Change;
-use crate::effects::registry::{EffectInfo, Parameter, Place, Stage};
+use crate::effects::info::{EffectInfo, Place, Stage};
+use crate::effects::parameter::Parameter;
 use crate::effects::remedy::{Remedy, milliseconds, short};
 
 pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {

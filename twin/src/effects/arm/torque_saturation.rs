@@ -8,7 +8,8 @@
 
 use crate::arm::Joints;
 use crate::effects::change::Change;
-use crate::effects::registry::{EffectInfo, Elsewhere, Parameter, Place, Search, Stage};
+use crate::effects::info::{EffectInfo, Place, Stage};
+use crate::effects::parameter::{Elsewhere, Parameter, Search};
 use crate::effects::remedy::Remedy;
 
 pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {

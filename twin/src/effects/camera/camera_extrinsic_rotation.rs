@@ -10,7 +10,8 @@
 //! - Confused with: table tilt (a yaw bends nothing), encoder offset, tool offset.
 
 use crate::effects::change::Change;
-use crate::effects::registry::{EffectInfo, Parameter, Place, Search, Stage};
+use crate::effects::info::{EffectInfo, Place, Stage};
+use crate::effects::parameter::{Parameter, Search};
 use crate::effects::remedy::{Remedy, list, short};
 use crate::effects::separation::{Experiment, Separation};
 use nalgebra::{Isometry3, Rotation3, UnitQuaternion, Vector3};

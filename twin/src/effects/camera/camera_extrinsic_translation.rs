@@ -7,7 +7,8 @@
 //! - Confused with: encoder offset, tool offset, a rotation seen over a small table.
 
 use crate::effects::change::Change;
-use crate::effects::registry::{EffectInfo, Parameter, Place, Stage};
+use crate::effects::info::{EffectInfo, Place, Stage};
+use crate::effects::parameter::Parameter;
 use crate::effects::remedy::{Remedy, list};
 use nalgebra::{Isometry3, Vector3};
 

@@ -7,7 +7,8 @@
 //! - Confused with: command delay (moves the contact too), tracker smoothing.
 
 use crate::effects::change::Change;
-use crate::effects::registry::{EffectInfo, Parameter, Place, Stage};
+use crate::effects::info::{EffectInfo, Place, Stage};
+use crate::effects::parameter::Parameter;
 use crate::effects::remedy::{Remedy, milliseconds, short};
 use crate::effects::separation::{Experiment, Separation};
 

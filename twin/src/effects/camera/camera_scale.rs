@@ -9,7 +9,8 @@
 //! - Confused with: restitution and friction together, an extrinsic translation where the object hardly moves.
 
 use crate::effects::change::Change;
-use crate::effects::registry::{EffectInfo, Parameter, Place, Search, Stage};
+use crate::effects::info::{EffectInfo, Place, Stage};
+use crate::effects::parameter::{Parameter, Search};
 use crate::effects::remedy::{Remedy, short};
 use crate::effects::separation::{Experiment, Separation};
 use nalgebra::{Isometry3, Vector3};

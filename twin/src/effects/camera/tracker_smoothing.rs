@@ -7,7 +7,8 @@
 //! - Confused with: camera latency (no rounding), command lag, contact compliance.
 
 use crate::effects::change::Change;
-use crate::effects::registry::{EffectInfo, Parameter, Place, Stage};
+use crate::effects::info::{EffectInfo, Place, Stage};
+use crate::effects::parameter::Parameter;
 use crate::effects::remedy::{Remedy, milliseconds};
 use nalgebra::Isometry3;
 

@@ -7,7 +7,8 @@
 //! - Confused with: tool offset and tip friction (spin after the hit), pressure distribution (decay of spin).
 
 use crate::effects::change::Change;
-use crate::effects::registry::{EffectInfo, Parameter, Place, Stage};
+use crate::effects::info::{EffectInfo, Place, Stage};
+use crate::effects::parameter::Parameter;
 use crate::effects::remedy::{Remedy, short};
 use crate::effects::separation::{Experiment, Separation};
 

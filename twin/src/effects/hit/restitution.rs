@@ -9,7 +9,8 @@
 
 use crate::contact_law::{ContactLaw, RESTITUTION};
 use crate::effects::change::Change;
-use crate::effects::registry::{EffectInfo, Parameter, Place, Stage};
+use crate::effects::info::{EffectInfo, Place, Stage};
+use crate::effects::parameter::Parameter;
 use crate::effects::remedy::{Remedy, short};
 use crate::effects::separation::{Experiment, Separation};
 

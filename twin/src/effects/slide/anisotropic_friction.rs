@@ -11,7 +11,8 @@
 //! - Confused with: table tilt (repeats once), friction patch (follows the place).
 
 use crate::effects::change::Change;
-use crate::effects::registry::{EffectInfo, Parameter, Place, Search, Stage};
+use crate::effects::info::{EffectInfo, Place, Stage};
+use crate::effects::parameter::{Parameter, Search};
 use crate::effects::remedy::{Remedy, degrees, short};
 use crate::effects::separation::{Experiment, Separation};
 use nalgebra::Vector2;

@@ -8,7 +8,8 @@
 //! - Confused with: anisotropic friction and table tilt, where all slides go the same way.
 
 use crate::effects::change::Change;
-use crate::effects::registry::{EffectInfo, OnTable, Parameter, Place, Search, Stage};
+use crate::effects::info::{EffectInfo, Place, Stage};
+use crate::effects::parameter::{OnTable, Parameter, Search};
 use crate::effects::remedy::{Remedy, degrees, short};
 use nalgebra::Vector2;
 use std::f64::consts::PI;

@@ -9,7 +9,8 @@
 //! - Confused with: object inertia (spin too, but at the hit already), the object's friction.
 
 use crate::effects::change::Change;
-use crate::effects::registry::{EffectInfo, Parameter, Place, Search, Stage};
+use crate::effects::info::{EffectInfo, Place, Stage};
+use crate::effects::parameter::{Parameter, Search};
 use crate::effects::remedy::{Remedy, short};
 
 pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {

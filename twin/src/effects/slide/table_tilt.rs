@@ -7,7 +7,8 @@
 //! - Confused with: a yaw of the camera, anisotropic friction (repeats after half a turn), friction patch.
 
 use crate::effects::change::Change;
-use crate::effects::registry::{EffectInfo, Parameter, Place, Stage};
+use crate::effects::info::{EffectInfo, Place, Stage};
+use crate::effects::parameter::Parameter;
 use crate::effects::remedy::{Remedy, gravity, leaning, list};
 use crate::effects::separation::{Experiment, Separation};
 use nalgebra::{Rotation3, Vector3};

@@ -7,7 +7,8 @@
 //! - Confused with: viscous sliding drag (the same for one mass), Stribeck friction, camera distortion.
 
 use crate::effects::change::Change;
-use crate::effects::registry::{EffectInfo, Parameter, Place, Stage};
+use crate::effects::info::{EffectInfo, Place, Stage};
+use crate::effects::parameter::Parameter;
 use crate::effects::remedy::{Remedy, short};
 use crate::effects::separation::{Experiment, Separation};
 

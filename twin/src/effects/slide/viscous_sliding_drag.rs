@@ -8,7 +8,8 @@
 //! - Confused with: velocity-dependent friction (the same for one mass).
 
 use crate::effects::change::Change;
-use crate::effects::registry::{EffectInfo, Parameter, Place, Stage};
+use crate::effects::info::{EffectInfo, Place, Stage};
+use crate::effects::parameter::Parameter;
 use crate::effects::remedy::{Remedy, with_unit};
 
 pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {

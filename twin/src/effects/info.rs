@@ -1,0 +1,97 @@
+//! What an effect says about itself.
+
+use super::Effects;
+use super::change::Change;
+use super::parameter::Parameter;
+use super::remedy::{Found, Remedy};
+use super::separation::Separation;
+use super::values::Values;
+use shared_mem::cell::Cell;
+
+/// Part of a clip in which an effect shows first.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Stage {
+    /// The arm follows its command.
+    Control,
+    /// The tool hits the object.
+    Hit,
+    /// The object slides.
+    Slide,
+    /// The camera reports.
+    Camera,
+}
+
+/// Where in the simulation an effect acts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Place {
+    /// Between the log of the command and the controller.
+    CommandPath,
+    /// Between the controller and the motors.
+    TorquePath,
+    /// Between the motors and the links.
+    Joint,
+    /// Bodies of the arm, and gravity.
+    ArmModel,
+    /// What the arm reports about itself.
+    JointSensing,
+    /// Contact of tool and object.
+    ToolContact,
+    /// The object's body.
+    Object,
+    /// Friction between object and table, and what else acts on the object there.
+    Table,
+    /// What is reported about the object's pose.
+    ObjectObservation,
+}
+
+impl Stage {
+    /// Name in reports.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Control => "control",
+            Self::Hit => "hit",
+            Self::Slide => "slide",
+            Self::Camera => "camera",
+        }
+    }
+}
+
+/// One effect: what the nominal cell lacks.
+#[derive(Debug, Clone, Copy)]
+pub struct EffectInfo {
+    /// Name in files and reports.
+    pub name: &'static str,
+    /// Where it shows first.
+    pub stage: Stage,
+    /// Where it acts.
+    pub acts_on: Place,
+    /// Its parameters.
+    pub parameters: &'static [Parameter],
+    /// Names of effects that look alike in some recordings.
+    pub confusable_with: &'static [&'static str],
+    /// What separates it from some of them.
+    pub separated: &'static [Separation],
+    /// Adds the effect with these parameters.
+    pub(super) install: fn(&Values, &mut Effects),
+    /// What to do about it; asked for by [`EffectInfo::remedy`].
+    pub(super) remedy: fn(&Found<'_>) -> Remedy,
+    /// What it changes in a model; asked for by [`EffectInfo::changes`].
+    pub(super) model: fn(&Found<'_>) -> Vec<Change>,
+}
+
+impl EffectInfo {
+    /// What to do about this effect in `cell`, where `numbers` are its parameters by name; one that is not known takes its
+    /// resting value.
+    #[must_use]
+    pub fn remedy(&'static self, cell: &Cell, numbers: &dyn Fn(&str) -> Option<Vec<f64>>) -> Remedy {
+        (self.remedy)(&Found::new(self.parameters, numbers, cell))
+    }
+
+    /// What this effect changes in a model of `cell`, where `numbers` are its parameters by name; one that is not known takes
+    /// its resting value.
+    #[must_use]
+    pub fn changes(&'static self, cell: &Cell, numbers: &dyn Fn(&str) -> Option<Vec<f64>>) -> Vec<Change> {
+        (self.model)(&Found::new(self.parameters, numbers, cell))
+    }
+}
