@@ -5,7 +5,7 @@
 //! `M q̈ = k (q_d - q) + d (dq_d - dq) + Jᵀ f`: the controller takes off gravity and Coriolis torques of the arm and the weight of
 //! what hangs on its flange, as a robot does that knows its tool. Limits of joints and torques are not in it.
 
-use super::tree::{Dense, MOST_FREEDOMS, Screw};
+use super::freedom::{Dense, MOST_FREEDOMS, Screw};
 use crate::arm::{ArmModel, Joints, MAX_JOINTS};
 use nalgebra::{Isometry3, Point3, Vector3};
 use std::sync::Arc;

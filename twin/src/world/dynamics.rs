@@ -1,8 +1,9 @@
 //! What gravity and velocities do to the trees, and how freedoms answer to impulses: velocity products by the Newton-Euler
 //! recursion, masses summed over the bodies (Featherstone 2008, chapters 5 and 6). World frame, SI.
 
+use super::freedom::{Dense, MOST_FREEDOMS, Screw};
 use super::plan::JointKind;
-use super::tree::{Dense, Link, MOST_FREEDOMS, Motion, Screw, Span, Trees};
+use super::tree::{Link, Motion, Span, Trees};
 use nalgebra::{Isometry3, Point3, Vector3};
 
 impl Trees {

@@ -9,6 +9,7 @@
 //! | file | owns |
 //! |---|---|
 //! | `plan` | what a world is made of, and what cannot be |
+//! | `freedom` | how one freedom moves a point, and room for all of a tree |
 //! | `tree` | bodies on their joints: where they are, how freedoms move them |
 //! | `dynamics` | what gravity and velocities do, mass matrices |
 //! | `arm` | an arm that carries a body and gives way to what touches it |
@@ -22,6 +23,7 @@
 
 mod arm;
 mod dynamics;
+mod freedom;
 mod outside;
 mod patch;
 mod plan;
@@ -37,6 +39,7 @@ pub use plan::{BodyPlan, Drive, Hold, JointKind, JointPlan, Piece, PlanError, bo
 
 use crate::arm::{FREE_FALL, JointState, Joints};
 use crate::physics::Hull;
+use freedom::MOST_FREEDOMS;
 use nalgebra::{Isometry3, Point3, Vector3};
 use patch::{Memory, Patch};
 use rail::Rail;
@@ -105,7 +108,7 @@ impl World {
         let trees = Trees::new(plans).map_err(|i| PlanError {
             body: plans[i].name.clone(),
             key: "parent",
-            what: format!("more than {} freedoms hang on one root; hang it on another one", tree::MOST_FREEDOMS),
+            what: format!("more than {} freedoms hang on one root; hang it on another one", MOST_FREEDOMS),
         })?;
         let (mut bodies, mut pieces) = (Vec::new(), Vec::new());
         for (i, plan) in plans.iter().enumerate() {

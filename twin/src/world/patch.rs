@@ -8,7 +8,7 @@
 //! Six numbers describe how the second body moves against the first at the patch's origin, in axes `t1`, `t2`, `n`:
 //! slip (2), turn about the normal, parting, tilts about `t1` and `t2`. World frame, impulses in N s.
 
-use super::touch::{MOST_PLACES, Touching};
+use super::touch::{MOST_PLACES, Touching, tangents};
 use nalgebra::{Matrix2, Matrix3, Matrix6, Point3, SMatrix, SVector, Vector2, Vector3, Vector6};
 
 /// Freedoms of the two trees of a patch together.
@@ -89,13 +89,6 @@ struct Fast {
     goal: Vector6<f64>,
     shares: Matrix3<f64>,
     give: f64,
-}
-
-/// Two directions across a normal, with which it makes right-handed axes.
-pub(super) fn tangents(normal: &Vector3<f64>) -> [Vector3<f64>; 2] {
-    let least = if normal.x.abs() < 0.6 { Vector3::x() } else { Vector3::y() };
-    let first = least.cross(normal).normalize();
-    [first, normal.cross(&first)]
 }
 
 impl Memory {

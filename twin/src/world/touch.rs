@@ -248,6 +248,13 @@ impl Pair<'_> {
     }
 }
 
+/// Two directions across a normal, with which it makes right-handed axes.
+pub(super) fn tangents(normal: &Vector3<f64>) -> [Vector3<f64>; 2] {
+    let least = if normal.x.abs() < 0.6 { Vector3::x() } else { Vector3::y() };
+    let first = least.cross(normal).normalize();
+    [first, normal.cross(&first)]
+}
+
 /// How far a hull reaches against a direction.
 fn least(hull: &Hull, along: &Vector3<f64>) -> f64 {
     hull.corners.iter().map(|p| p.coords.dot(along)).fold(f64::INFINITY, f64::min)
@@ -321,7 +328,7 @@ impl Polygon {
             return;
         }
         let whole = *self;
-        let [across, aside] = crate::world::patch::tangents(normal);
+        let [across, aside] = tangents(normal);
         self.count = 0;
         let mut taken = [false; MOST_CORNERS];
         for i in 0..MOST_PLACES {

@@ -5,12 +5,10 @@
 //! and cost the solver nothing.
 
 use super::arm::Arm;
-use super::patch::{MOST_COLUMNS, Patch, motion_in};
+use super::freedom::{Dense, MOST_FREEDOMS, Screw};
+use super::patch::{Patch, motion_in};
 use super::plan::{BodyPlan, Hold, JointKind};
 use nalgebra::{Isometry3, Matrix3, Point3, Translation3, Unit, UnitQuaternion, Vector3};
-
-/// Freedoms of a tree.
-pub(super) const MOST_FREEDOMS: usize = MOST_COLUMNS / 2;
 
 /// What connects a body to the one that carries it, or to the world.
 #[derive(Debug, Clone)]
@@ -68,15 +66,6 @@ pub(super) struct Span {
     /// Bodies of the tree.
     pub(super) bodies: usize,
 }
-
-/// How a freedom moves a point.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Screw {
-    pub(super) velocity: Vector3<f64>,
-    pub(super) spin: Vector3<f64>,
-}
-
-pub(super) type Dense = [[f64; MOST_FREEDOMS]; MOST_FREEDOMS];
 
 /// All bodies.
 #[derive(Debug, Clone)]
