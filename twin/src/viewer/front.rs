@@ -11,7 +11,7 @@
 //! The server behind it listens at an address of the loopback that is drawn at each start, so that no web page finds it
 //! past this check. Programs on this machine can; they could read shared memory as well.
 
-use super::request::{Refusal, check};
+use super::request::{MOST, Refusal, check};
 use std::collections::BTreeMap;
 use std::hash::{BuildHasher as _, RandomState};
 use std::io::{self, ErrorKind, Read as _, Write as _};
@@ -21,8 +21,6 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
-/// Viewers at a time.
-pub(super) const MOST: usize = 4;
 /// How long a viewer may leave what it was sent unread.
 pub(super) const PATIENCE: Duration = Duration::from_secs(10);
 /// How long a request may take to arrive, and how long it may be [bytes]: a browser's has some hundred.

@@ -1,4 +1,4 @@
-//! Which requests for a WebSocket are those of a viewer on this machine. Pure.
+//! Which requests for a WebSocket are those of a viewer on this machine, and how many are served. Pure.
 
 use std::fmt;
 use std::io;
@@ -11,6 +11,8 @@ const HOSTED: [&str; 3] = ["app.foxglove.dev", "studio.foxglove.dev", "lichtblic
 /// Viewers that are installed load themselves so, which no web page does.
 const INSTALLED: [&str; 4] = ["file", "app", "foxglove", "lichtblick"];
 
+/// Viewers at a time.
+pub(super) const MOST: usize = 4;
 /// Longest part of a name that is repeated to a person.
 const SHOWN: usize = 80;
 
@@ -32,7 +34,7 @@ pub(super) enum Refusal {
 impl fmt::Display for Refusal {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Full => write!(f, "{} are connected already; close one of them", super::front::MOST),
+            Self::Full => write!(f, "{} are connected already; close one of them", MOST),
             Self::Page(origin) => write!(
                 f,
                 "it is a page of {origin}; open the viewer at app.foxglove.dev, as an installed program, or from a server on this machine"

@@ -1,7 +1,8 @@
 //! Viewers that are too many, that come from elsewhere or that do not read, over real sockets.
 
-use super::front::{Front, MOST};
+use super::front::Front;
 use super::open;
+use super::request::MOST;
 use super::test_client::{LONG, connect, say};
 use foxglove::{ChannelBuilder, Context, RawChannel, WebSocketServer, WebSocketServerHandle};
 use std::io::{ErrorKind, Read as _, Write as _};
