@@ -1,6 +1,6 @@
 //! `twin reconstruct articulated`: an object with a part that moves, out of scans.
 
-use super::reconstruct::{Outputs, kept, mass, metres, piece};
+use super::asset_folder::{Outputs, kept, mass, metres, piece};
 use anyhow::{Context as _, ensure};
 use nalgebra::{Isometry3, Similarity3, Translation3};
 use reconstruct::articulated::{self, Articulated, Joint, Marks};

@@ -2,6 +2,8 @@
 
 #[cfg(feature = "reconstruct")]
 mod articulated;
+#[cfg(feature = "reconstruct")]
+mod asset_folder;
 pub(crate) mod label_splats;
 pub(crate) mod look;
 #[cfg(feature = "reconstruct")]

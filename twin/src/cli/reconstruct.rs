@@ -1,14 +1,13 @@
 //! `twin reconstruct`: assets of a simulation out of scans.
 
 use super::articulated::ArticulatedVerb;
+use super::asset_folder::{Outputs, kept, mass, metres, piece};
 use anyhow::{Context as _, ensure};
-use nalgebra::Point3;
 use reconstruct::assets::{self, Labels};
 use reconstruct::mesh::Mesh;
 use reconstruct::object::{self, Object, Options};
 use reconstruct::scan::Scan;
 use reconstruct::scene;
-use shared_mem::output::OutputFolder;
 use shared_mem::quantity::number;
 use shared_mem::{answer, console, ending};
 use std::path::{Path, PathBuf};
@@ -32,30 +31,6 @@ enum What {
     Object(ObjectVerb),
     Articulated(ArticulatedVerb),
     Scene(SceneVerb),
-}
-
-/// Where a command of these writes.
-#[derive(clap::Args)]
-pub(super) struct Outputs {
-    /// New folder for the files
-    #[arg(long, value_name = "FOLDER")]
-    pub(super) out: PathBuf,
-    /// Replaces a folder that an earlier run has made
-    #[arg(long)]
-    force: bool,
-    /// Prints one JSON object on stdout at the end
-    #[arg(long)]
-    pub(super) json: bool,
-}
-
-impl Outputs {
-    /// The folder to fill. One of another command, without the file that comes last, is never replaced.
-    pub(super) fn folder(&self, last: &str) -> anyhow::Result<OutputFolder> {
-        if self.force && self.out.join(last).is_file() {
-            return Ok(OutputFolder::replacing(&self.out)?);
-        }
-        Ok(OutputFolder::create(&self.out)?)
-    }
 }
 
 /// An object out of pictures from all sides: a closed mesh, convex pieces, URDF, a block for cell.toml, a report.
@@ -92,14 +67,6 @@ pub(crate) struct ObjectVerb {
     /// The object's name [default: the folder's]
     #[arg(long, value_name = "NAME")]
     name: Option<String>,
-}
-
-pub(super) fn metres(text: &str) -> Result<f64, String> {
-    number(text, 1e-6..=1e3, "m")
-}
-
-pub(super) fn mass(text: &str) -> Result<f64, String> {
-    number(text, 1e-4..=1e3, "kg")
 }
 
 /// What every folder of these commands holds, and appears last.
@@ -249,15 +216,4 @@ impl ObjectVerb {
             self.outputs.out.join("report.html").display()
         )
     }
-}
-
-pub(super) fn piece((points, triangles): (Vec<Point3<f64>>, Vec<[u32; 3]>)) -> Mesh {
-    Mesh { points, triangles }
-}
-
-/// Where an interrupted run leaves what it has: beside the folder.
-pub(super) fn kept(out: &Path) -> PathBuf {
-    let mut name = out.as_os_str().to_owned();
-    name.push(".state");
-    PathBuf::from(name)
 }
