@@ -5,7 +5,7 @@
 //! value is about three times that, and cell.toml may say so.
 
 use super::MassProperties;
-use super::model::{Chain, Joint};
+use super::chain::{Chain, Joint};
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4};
 

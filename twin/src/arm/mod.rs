@@ -7,6 +7,7 @@
 //! | file | owns |
 //! |---|---|
 //! | `model` | [`ArmModel`]: what an arm is, and how cell.toml, tool and payload make one |
+//! | `chain`, `error` | what a source tells of one, and why none can be made of it |
 //! | `fr3` | numbers of the built-in Franka FR3 |
 //! | `urdf` | the way in from a URDF file, every frame of one, and its links as bodies (the only code that asks `urdf-rs`) |
 //! | `limits` | [`Limits`]: how far, fast and hard each joint may go |
@@ -24,9 +25,11 @@
 //! | `transmission` | the same with friction, yielding and play between motor and link |
 //! | `kernel`, `spatial` | the arithmetic below |
 
+mod chain;
 mod control;
 mod dry_friction;
 mod dynamics;
+mod error;
 mod follower;
 mod fr3;
 mod gains;
@@ -48,14 +51,15 @@ mod yielding;
 pub use control::{ControlLaw, GainError};
 pub use dry_friction::Presliding;
 pub use dynamics::PointForce;
+pub use error::ModelError;
 pub use follower::Follower;
 pub use gains::{damping_range, stiffness_range};
 pub use hull::{ArmHull, Extent, MOST_BALLS};
 pub use inertia::MassProperties;
 pub use kinematics::Jacobian;
 pub use limits::{JointLimits, Limits, TORQUE_RATE};
+pub use model::ArmModel;
 pub(crate) use model::FREE_FALL;
-pub use model::{ArmModel, ModelError};
 pub use nearest::Nearest;
 pub use parts::Part;
 pub use shared_mem::msg::{Joints, MAX_JOINTS};

@@ -1,15 +1,16 @@
 //! What an arm is: a chain of joints with bodies, limits and a flange, and how cell.toml, a tool and a payload make one.
 //! Built once by the bridge, the simulation and every rollout; then only read.
 
+use super::chain::{Chain, Joint};
+use super::error::ModelError;
 use super::inertia::{MassProperties, TenParameters};
 use super::kernel::Link;
 use super::spatial::{Rot3, Vec3};
 use super::{JointState, Joints, MAX_JOINTS, fr3, urdf};
 use nalgebra::{Isometry3, Matrix3, Rotation3, Unit, UnitQuaternion, Vector3};
 use shared_mem::cell::{Cell, Controller, GRAVITY, Robot};
-use shared_mem::input::InputError;
 use shared_mem::msg::joints_from;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// Free fall in the base frame [m/s²].
 pub(crate) const FREE_FALL: Vec3 = [0.0, 0.0, -GRAVITY];
@@ -42,79 +43,6 @@ pub struct ArmModel {
     velocity_limit: Joints,
     torque_limit: Joints,
     ready: Joints,
-}
-
-/// No arm can be made of what was given.
-#[derive(Debug, thiserror::Error)]
-pub enum ModelError {
-    /// cell.toml describes no arm.
-    #[error("cell.toml has no [robot] block; add one, for example `model = \"fr3\"`")]
-    NoRobot,
-    /// The URDF is missing, no file, or too large.
-    #[error("{0} (`robot.urdf` in cell.toml)")]
-    Input(#[from] InputError),
-    /// The URDF makes no sense.
-    #[error("{}: {what}; give a URDF that a robot_state_publisher accepts (xacro must be expanded first)", path.display())]
-    Read {
-        /// The file.
-        path: PathBuf,
-        /// What the reader said.
-        what: String,
-    },
-    /// The URDF describes something else than one serial chain.
-    #[error("{}: {what}", path.display())]
-    Chain {
-        /// The file.
-        path: PathBuf,
-        /// Joint or link, and how to mend it.
-        what: String,
-    },
-    /// More joints than a message carries.
-    #[error("the arm has {0} movable joints; 1 to {MAX_JOINTS} are supported: fix the others in the URDF")]
-    Joints(usize),
-    /// A vector of cell.toml does not fit the arm.
-    #[error("`{key}` in cell.toml holds {given} values; this arm has {dof} joints: give one for each")]
-    Length {
-        /// The key.
-        key: &'static str,
-        /// Numbers given.
-        given: usize,
-        /// Joints of the arm.
-        dof: usize,
-    },
-    /// A joint moves nothing.
-    #[error(
-        "joint `{0}` moves no inertia; give its link an <inertial> in the URDF, or `rotor_inertia` in [controller] of cell.toml"
-    )]
-    Massless(String),
-}
-
-/// An arm as its source tells it, before it is laid out for computing.
-pub(super) struct Chain {
-    pub(super) joints: Vec<Joint>,
-    /// The flange in the last link's frame.
-    pub(super) flange: Isometry3<f64>,
-    /// Movable joints of its source that are no joints of the arm, such as fingers.
-    pub(super) held: Vec<String>,
-}
-
-/// One movable joint and the body behind it.
-pub(super) struct Joint {
-    pub(super) name: String,
-    /// The link that it carries.
-    pub(super) link: String,
-    pub(super) slides: bool,
-    /// The joint's frame at 0 in the link before.
-    pub(super) origin: Isometry3<f64>,
-    /// In the joint's frame.
-    pub(super) axis: Unit<Vector3<f64>>,
-    /// In the joint's frame, which moves with the link.
-    pub(super) body: MassProperties,
-    pub(super) position: [f64; 2],
-    pub(super) velocity: f64,
-    pub(super) torque: f64,
-    pub(super) rotor_inertia: f64,
-    pub(super) ready: f64,
 }
 
 impl ArmModel {

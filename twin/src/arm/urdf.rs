@@ -11,8 +11,9 @@ mod frames;
 pub use bodies::{UrdfBody, UrdfForm, UrdfJoint, UrdfShape};
 pub use frames::{LinkFrame, UrdfFrames};
 
+use super::chain::{Chain, Joint};
+use super::error::ModelError;
 use super::inertia::MassProperties;
-use super::model::{Chain, Joint, ModelError};
 use nalgebra::{Isometry3, Translation3, Unit, UnitQuaternion, Vector3};
 use shared_mem::input;
 use std::collections::HashMap;
