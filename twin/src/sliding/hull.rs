@@ -1,7 +1,9 @@
 //! Convex hull of points in the plane, without allocation.
 
-use super::patch::MAX_POINTS;
 use nalgebra::Vector2;
+
+/// Most places of a patch, and most corners of a base.
+pub const MAX_POINTS: usize = 64;
 
 /// A convex polygon, counter-clockwise, of at most [`MAX_POINTS`] corners.
 #[derive(Debug, Clone, Copy, PartialEq)]

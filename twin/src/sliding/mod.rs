@@ -23,7 +23,8 @@ mod slider;
 
 pub use footing::{BASE, Closeness, Footing, FreeBody, Solid};
 pub use friction::{Coulomb, SlidingFriction};
+pub use hull::MAX_POINTS;
 pub use load::Wrench;
-pub use patch::{MAX_POINTS, Patch, PatchError};
+pub use patch::{Patch, PatchError};
 pub use planar::PlanarState;
 pub use slider::{Ending, Slider};

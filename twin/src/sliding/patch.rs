@@ -5,12 +5,10 @@
 //! hull cut into sectors from its centroid and each sector into shells; a place stands at its cell's radius of gyration,
 //! so that the yaw of a spinning slide is within 0.5 % of a patch of 2000 places.
 
-use super::hull::Hull;
+use super::hull::{Hull, MAX_POINTS};
 use nalgebra::Vector2;
 use shared_mem::cell::Support;
 
-/// Most places of a patch, and most corners of a base.
-pub const MAX_POINTS: usize = 64;
 /// Places along a ring: more moves the yaw of a spinning slide by less than 0.2 %.
 const RING_POINTS: usize = 48;
 /// Sectors of a uniform patch, or as many as it has edges; shells fill up to [`MAX_POINTS`].
@@ -51,7 +49,7 @@ macro_rules! with_places {
                 $body
             }
             _ => {
-                let $places = $patch.first::<{ $crate::sliding::patch::MAX_POINTS }>();
+                let $places = $patch.first::<{ $crate::sliding::hull::MAX_POINTS }>();
                 $body
             }
         }
