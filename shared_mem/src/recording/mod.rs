@@ -7,7 +7,7 @@
 //! | file | owns |
 //! |---|---|
 //! | `container` | MCAP records and messages of a file that may be cut or changed |
-//! | `cdr`, `ros2` | ROS 2 messages |
+//! | `cdr`, `ros2`, `definitions` | ROS 2 messages, and how they are defined |
 //! | `read` | which kind of clip a file is, and reading it |
 //! | `own`, `logged` | an own recording as a clip, and what of its states to believe |
 //! | `messages`, `picture`, `picture_file`, `pictures` | all messages one by one, a picture, pictures as files, a clip's pictures |
@@ -33,6 +33,7 @@ mod checks;
 mod clip;
 mod container;
 mod controller_log;
+mod definitions;
 mod device_clock;
 mod encoded;
 mod episode;
@@ -61,15 +62,13 @@ mod wire;
 mod writer;
 
 pub use clip::{Clip, TrackedObject};
+pub use definitions::definition as ros2_definition;
 pub use encoded::{
     Encoded, EncodedVisitor, append_picture, picture_from_bytes, picture_schema, schema_checksum, visit_encoded,
 };
 pub use episode::{Episode, EpisodeInfo, EpisodeMoment, RigidPose, read_episode, write_episode};
 pub use error::ReadError;
-pub use export::{
-    ExportError, Exported, FlangeAt, Format, LeftOut, Order, export_session, ros2_definition, session_folder,
-    write_clip,
-};
+pub use export::{ExportError, Exported, FlangeAt, Format, LeftOut, Order, export_session, session_folder, write_clip};
 pub use messages::{ClipMessage, ClipMessages, Payload};
 pub use npy::{Array, parse as parse_npy};
 pub use own::{read_arm_states, read_clip_info};

@@ -1,6 +1,6 @@
 //! A ROS 2 bag as it is written: its messages, and its topics that cell.toml does not name.
 
-use super::definitions::definition;
+use super::super::definitions::definition;
 use super::metadata::{Contents, TopicCount, latched_profile};
 use crate::output::Output;
 use mcap::records::{MessageHeader, Metadata};

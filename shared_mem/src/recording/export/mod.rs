@@ -7,7 +7,7 @@
 //! | file | owns |
 //! |---|---|
 //! | `source` | a clip of any kind with everything beside its joints and poses |
-//! | `rosbag`, `bag`, `encode`, `definitions` | a ROS 2 bag |
+//! | `rosbag`, `bag`, `encode` | a ROS 2 bag |
 //! | `robot` | the robot's description, joints and frames in it |
 //! | `metadata` | the `metadata.yaml` of a bag that is a folder |
 //! | `folder`, `npz` | a TwinAligner clip folder |
@@ -15,7 +15,6 @@
 //! | `left_out` | what of the source is not in it |
 
 mod bag;
-mod definitions;
 mod encode;
 mod folder;
 mod left_out;
@@ -26,7 +25,6 @@ mod robot;
 mod rosbag;
 mod source;
 
-pub use definitions::definition as ros2_definition;
 pub use left_out::LeftOut;
 pub use native::write_clip;
 

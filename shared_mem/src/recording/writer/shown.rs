@@ -2,7 +2,7 @@
 //! and the twin's frames behind `twin/`. Readers here do without: everything in it follows from states and cell.toml.
 
 use super::super::cdr::CdrWriter;
-use super::super::export::ros2_definition;
+use super::super::definitions::definition;
 use super::super::robot::{ROBOT_DESCRIPTION, RobotModel, TF, TF_STATIC, Transform};
 use super::super::ros2;
 use super::super::wire::{UnixClock, proto::foxglove};
@@ -80,7 +80,7 @@ impl<W: Write> ClipWriter<W> {
             shown.fixed.extend(twins);
         }
         if shown.written_ns == [None; 2] {
-            let definition = ros2_definition(ros2::TEXT);
+            let definition = definition(ros2::TEXT);
             let schema = (ros2::TEXT, "ros2msg", definition.as_bytes());
             self.open(ROBOT_DESCRIPTION, schema, "cdr").map_err(|error| self.failed(&error))?;
             self.scratch = CdrWriter::default().text(&shown.robot.description).message();
