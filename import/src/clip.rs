@@ -1,13 +1,11 @@
 //! A log by its mapping: a clip in SI, joints in one order, stamps in nanoseconds.
 
-use crate::log::{Column, Log, Table};
+use crate::log::{Column, HEADER, Log, Table};
 use crate::mapping::{Clock, JointColumns, Mapping, PoseColumns, Torque, TorquesAct};
 use shared_mem::frames::Pose;
 use shared_mem::msg::MAX_JOINTS;
 use shared_mem::recording::{Clip, JointSeries, ObjectSeries};
 
-/// Name of the stamps that the format itself gives.
-pub(crate) const HEADER: &str = "header";
 /// Largest share of rows that may be without stamp, or without pose.
 const LARGEST_BAD_SHARE: f64 = 0.01;
 

@@ -2,6 +2,9 @@
 
 use std::path::PathBuf;
 
+/// Name of the stamps that the format itself gives.
+pub(crate) const HEADER: &str = "header";
+
 /// What was recorded at once: a bag, a file, one episode of a data set.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(crate) struct Log {

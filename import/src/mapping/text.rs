@@ -1,7 +1,7 @@
 //! import.toml as it is written: every line with its reason above it, and what is still to be filled in marked.
 
 use super::{Clock, JointColumns, Mapping, PoseColumns};
-use crate::log::Log;
+use crate::log::{HEADER, Log};
 use serde::Serialize;
 
 /// Marks a line that a person has to fill in.
@@ -72,7 +72,7 @@ impl Text<'_> {
         match stamps {
             Some(stamps) => {
                 self.entry(block, "stamps", stamps);
-                if stamps != super::super::clip::HEADER {
+                if stamps != HEADER {
                     self.entry(block, "stamp_unit", unit);
                 }
             }

@@ -1,8 +1,7 @@
 //! Where a table's stamps are, and in which unit.
 
 use super::Notes;
-use crate::clip::HEADER;
-use crate::log::{Column, Log, Table};
+use crate::log::{Column, HEADER, Log, Table};
 use crate::mapping::TimeUnit;
 use crate::naming;
 

@@ -21,8 +21,8 @@ mod torque;
 mod track;
 mod units;
 
-use crate::clip::{Gravity, HEADER};
-use crate::log::{Log, Table};
+use crate::clip::Gravity;
+use crate::log::{HEADER, Log, Table};
 use crate::mapping::{JointColumns, Mapping, Note, RateUnit, TorquesAct};
 use columns::Chosen;
 use shared_mem::cell::{Cell, ClipKind};

@@ -1,8 +1,7 @@
 //! Which columns are the pose of an object on the table.
 
 use super::{Notes, clock};
-use crate::clip::HEADER;
-use crate::log::{Log, Table};
+use crate::log::{HEADER, Log, Table};
 use crate::mapping::{LengthUnit, PoseColumns};
 use crate::naming;
 

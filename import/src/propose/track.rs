@@ -1,7 +1,6 @@
 //! Numbers of joints over time, as far as a mapping gives them so far.
 
-use crate::clip::HEADER;
-use crate::log::Table;
+use crate::log::{HEADER, Table};
 use crate::mapping::JointColumns;
 use shared_mem::time::seconds_between;
 
