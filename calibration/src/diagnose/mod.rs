@@ -279,8 +279,7 @@ fn examine<E: Evidence>(
         let step = bench.step("refined").with_numbers(full);
         trail.0.once(&step, || search::baseline::refined(&bench, &split, &session.cell, admitted, full))
     };
-    let found = search::around_engine::search(&bench, &split, baseline, &refined, &bar);
-    let found = found.ok_or(DiagnoseError::NoBaseline)?;
+    let found = search::combine::search(&bench, &split, baseline, &refined, &bar).ok_or(DiagnoseError::NoBaseline)?;
     let cut_short = interrupt.spent();
     bar.stage(fit::stages::CONCLUSION, 1);
     let mut concluded = conclude::conclusion::conclude(&bench, &split, &found, session, admitted, options)?;

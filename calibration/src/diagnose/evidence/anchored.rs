@@ -18,25 +18,31 @@ use crate::estimate::{ClipModel, Impossible};
 use crate::forward::arm::following::Moment;
 use std::sync::Arc;
 
-/// Clips around a point.
+/// Clips around a point where another program simulates strokes; elsewhere the clips as they are.
 pub(in crate::diagnose) struct Anchored<'a, E> {
     whole: &'a E,
+    around: Option<Around>,
+}
+
+struct Around {
     /// Shared numbers; clips' own are at rest there.
     point: Vec<f64>,
     nothing: Vec<f64>,
     /// Residuals there, clip by clip.
     there: Vec<Recent<Vec<f64>>>,
+    /// By which kept work is told from that around other points.
+    label: String,
 }
 
 impl<'a, E: Evidence> Anchored<'a, E> {
     pub(in crate::diagnose) fn new(whole: &'a E, point: &[f64]) -> Self {
-        let there = (0..whole.clips()).map(|_| Recent::default()).collect();
-        Self { whole, point: point.to_vec(), nothing: vec![0.0; whole.scatter().count()], there }
+        Self { whole, around: whole.engine().map(|_| Around::new(whole, point)) }
     }
 
     /// A bench for these.
     pub(in crate::diagnose) fn bench<'b>(&'b self, whole: &Bench<'b, E>) -> Bench<'b, Self> {
-        let trail = (whole.trail.0, "around a point");
+        let (kept, label) = whole.trail;
+        let trail = (kept, self.around.as_ref().map_or(label, |around| &around.label));
         Bench {
             evidence: self,
             library: whole.library,
@@ -45,13 +51,28 @@ impl<'a, E: Evidence> Anchored<'a, E> {
             trail,
         }
     }
+}
 
-    fn there(&self, clip: usize) -> Result<Arc<Vec<f64>>, Impossible> {
+impl Around {
+    fn new(whole: &impl Evidence, point: &[f64]) -> Self {
+        Self {
+            point: point.to_vec(),
+            nothing: vec![0.0; whole.scatter().count()],
+            there: (0..whole.clips()).map(|_| Recent::default()).collect(),
+            label: format!("around {point:?}"),
+        }
+    }
+
+    fn there(&self, whole: &impl Evidence, clip: usize) -> Result<Arc<Vec<f64>>, Impossible> {
         self.there[clip].at(&self.point, || {
             let mut residuals = Vec::new();
-            self.whole.residuals(clip, &self.point, &self.nothing, &mut residuals)?;
+            whole.residuals(clip, &self.point, &self.nothing, &mut residuals)?;
             Ok(residuals)
         })
+    }
+
+    fn at(&self) -> Option<(&[f64], &[f64])> {
+        Some((&self.point, &self.nothing))
     }
 }
 
@@ -61,8 +82,9 @@ impl<E: Evidence> ClipModel for Anchored<'_, E> {
     }
 
     fn residuals(&self, clip: usize, shared: &[f64], own: &[f64], out: &mut Vec<f64>) -> Result<(), Impossible> {
-        let (there, at) = (self.there(clip)?, Some((&self.point[..], &self.nothing[..])));
-        self.whole.changed(clip, (shared, own), (Reach::All, &there, at), out)
+        let Some(around) = &self.around else { return self.whole.residuals(clip, shared, own, out) };
+        let there = around.there(self.whole, clip)?;
+        self.whole.changed(clip, (shared, own), (Reach::All, &there, around.at()), out)
     }
 }
 
@@ -74,11 +96,11 @@ impl<E: Evidence> Evidence for Anchored<'_, E> {
         (reach, base, at): Near<'_>,
         out: &mut Vec<f64>,
     ) -> Result<(), Impossible> {
-        if at.is_some() {
+        let Some(around) = self.around.as_ref().filter(|_| at.is_none()) else {
             return self.whole.changed(clip, numbers, (reach, base, at), out);
-        }
-        let (there, at) = (self.there(clip)?, Some((&self.point[..], &self.nothing[..])));
-        self.whole.changed(clip, numbers, (reach, &there, at), out)?;
+        };
+        let there = around.there(self.whole, clip)?;
+        self.whole.changed(clip, numbers, (reach, &there, around.at()), out)?;
         for ((out, base), row) in out.iter_mut().zip(base).zip(self.rows(clip)) {
             let of_arm = self.channels()[row.channel].group == Group::Arm;
             if (reach == Reach::Arm && !of_arm) || (reach == Reach::Object && of_arm) {
@@ -94,6 +116,14 @@ impl<E: Evidence> Evidence for Anchored<'_, E> {
 
     fn following(&self, clip: usize) -> Vec<Moment> {
         self.whole.following(clip)
+    }
+
+    fn in_halves(&self, clip: usize, shared: &[f64]) -> Option<Vec<f64>> {
+        self.whole.in_halves(clip, shared)
+    }
+
+    fn torque_sigma(&self) -> Option<&[f64]> {
+        self.whole.torque_sigma()
     }
 
     fn channels(&self) -> &[Channel] {
@@ -184,7 +214,7 @@ mod tests {
     #[test]
     fn an_engine_is_asked_once_and_the_twin_says_what_changes_from_there_on() {
         let whole = Bent::new();
-        let around = Anchored::new(&whole, &[1.0]);
+        let around = Anchored { whole: &whole, around: Some(Around::new(&whole, &[1.0])) };
         let mut out = Vec::new();
         around.residuals(0, &[1.0], &[], &mut out).expect("residuals");
         assert_eq!(out, [3.0, -2.0]);

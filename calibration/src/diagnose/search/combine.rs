@@ -1,9 +1,11 @@
 //! Which effects act together: effects are added while clips are predicted better with them, and dropped or swapped when they are
 //! not needed any more.
 
+use super::by_engine::by_engine;
 use super::refit::{last_pass, refitted, without_superfluous};
 use crate::diagnose::clips::split::Split;
 use crate::diagnose::criteria::JOINTS_EXCESS_BESIDE_A_CAUSE;
+use crate::diagnose::evidence::anchored::Anchored;
 use crate::diagnose::evidence::measured::{Evidence, Group, Row};
 use crate::diagnose::fit::bench::{Bench, Hypothesis};
 use crate::diagnose::fit::effort::{FIRST_PASS, HEAT, NEAR};
@@ -33,7 +35,8 @@ const NEAR_SHARE: f64 = 0.4;
 const NUMERICS_SHARE: f64 = 1e-4;
 
 /// Searches from a baseline; `refined` gives numbers whose object is found anew under the effects in them, where there is
-/// one.
+/// one. Strokes that another program simulates are looked at around what each step extends ([`Anchored`]); what is extended, and what
+/// is found, is fitted to that program itself.
 pub fn search<E: Evidence>(
     bench: &Bench<'_, E>,
     split: &Split,
@@ -45,31 +48,33 @@ pub fn search<E: Evidence>(
     let mut now = baseline;
     let mut begun_anew = 0;
     loop {
-        if let Some(first) = steps.first().filter(|first| spent(bench, split, first, &now)) {
-            let last = untried(bench, split, &now, Some(first))?;
+        let around = Anchored::new(bench.evidence, &now.full);
+        let near = &around.bench(bench);
+        if let Some(first) = steps.first().filter(|first| spent(near, split, first, &now)) {
+            let last = untried(near, split, &now, Some(first))?;
             now = last.from.clone();
             steps.push(last);
             break;
         }
-        let step = step(bench, split, (&now, steps.first().map(|first| &first.left)), refined, bar);
+        let step = step(near, split, (&now, steps.first().map(|first| &first.left)), refined, bar);
         let Some(mut step) = step else {
             // Cut short by its budget: what was found before stands.
-            let stands = if bench.interrupt.spent() { untried(bench, split, &now, steps.first()) } else { None };
+            let stands = if bench.interrupt.spent() { untried(near, split, &now, steps.first()) } else { None };
             let last = stands?;
             now = last.from.clone();
             steps.push(last);
             break;
         };
-        step.reconsider(bench, split, refined);
+        step.reconsider(near, split, refined);
         if begun_anew < ANEW
-            && let Some(nearer) = step.nearer_without(bench, split)
+            && let Some(nearer) = step.nearer_without(near, split)
         {
             bar.insert(&stages::FURTHER);
             begun_anew += 1;
-            now = nearer;
+            now = by_engine(bench, split, nearer, &step.weights);
             continue;
         }
-        let best = step.best(bench).map(|(_, fit, _)| fit.clone());
+        let best = step.best(near).map(|(_, fit, _)| fit.clone());
         now = step.from.clone();
         let weights = step.weights.clone();
         steps.push(step);
@@ -79,13 +84,13 @@ pub fn search<E: Evidence>(
                 if steps.len() > 1 {
                     bar.insert(&stages::FURTHER);
                 }
-                now = refitted(bench, split, (&best, &weights), refined)?;
+                now = refitted(near, split, (&best, &weights), refined)?;
                 bar.show(1, stages::REFINEMENT);
                 let step = steps.last_mut()?;
-                step.reidentify_rivals(bench, split, &now, refined);
-                match step.best(bench).map(|(_, fit, _)| fit.clone()) {
+                step.reidentify_rivals(near, split, &now, refined);
+                match step.best(near).map(|(_, fit, _)| fit.clone()) {
                     Some(other) if other.effects != now.effects => {
-                        now = refitted(bench, split, (&other, &weights), refined)?;
+                        now = refitted(near, split, (&other, &weights), refined)?;
                     }
                     Some(_) => {}
                     // Fitted to the end it predicts clips no better than chance: what it did before was the fit's.
@@ -94,10 +99,11 @@ pub fn search<E: Evidence>(
                         break;
                     }
                 }
+                now = by_engine(bench, split, now, &weights);
             }
             // The best so far, as far as it was fitted.
             Some(best) if bench.interrupt.spent() && now.effects.len() < MOST => {
-                let last = untried(bench, split, &best, steps.first())?;
+                let last = untried(near, split, &best, steps.first())?;
                 now = last.from.clone();
                 steps.push(last);
                 break;
@@ -105,8 +111,10 @@ pub fn search<E: Evidence>(
             _ => break,
         }
     }
-    let last = undetermined::without(bench, &without_superfluous(bench, split, now, &steps.last()?.weights));
-    Some(Found { steps, last })
+    let around = Anchored::new(bench.evidence, &now.full);
+    let near = &around.bench(bench);
+    let last = undetermined::without(near, &without_superfluous(near, split, now, &steps.last()?.weights));
+    Some(Found { steps, last }.by_engine(bench, split))
 }
 
 /// Whether the effects found so far leave no more than numerics do: a further one would only name how engines differ. The

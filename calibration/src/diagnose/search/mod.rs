@@ -4,12 +4,12 @@
 //! |---|---|
 //! | `baseline` | the paper's parameters identified |
 //! | `combine` | which effects act together |
-//! | `around_engine` | the same where another program simulates strokes |
+//! | `by_engine` | what was found, fitted to the roll-outs of another program |
 //! | `nearer` | what a step extends, fitted anew from where its best trial ended |
 //! | `refit`, `reidentify` | what was chosen fitted to the end, and its nearest rivals with it |
 
-pub mod around_engine;
 pub mod baseline;
+mod by_engine;
 pub mod combine;
 mod nearer;
 pub mod refit;
