@@ -4,6 +4,7 @@
 //! the machine that runs tests is slow and shared.
 
 mod bench;
+pub mod modules;
 mod program;
 pub mod texts;
 

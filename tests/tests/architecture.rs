@@ -1,7 +1,7 @@
 //! What the house must look like: one door per big dependency, files that own one idea, a README that tells the truth.
 
-use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
+use tests::modules::{circles, module, needs};
 use tests::texts::PRODUCT;
 
 fn root() -> PathBuf {
@@ -221,74 +221,21 @@ fn what_identifies_and_diagnoses_names_no_effect() {
     }
 }
 
-/// Names behind every `crate::` in a text: one, or those of a group.
-fn needed(text: &str) -> Vec<String> {
-    let name = |text: &str| text.chars().take_while(|c| c.is_alphanumeric() || *c == '_').collect::<String>();
-    let mut found = Vec::new();
-    for after in text.split("crate::").skip(1) {
-        let Some(group) = after.strip_prefix('{') else {
-            found.push(name(after));
-            continue;
-        };
-        let mut depth = 0;
-        let mut begins = true;
-        for (at, c) in group.char_indices() {
-            match c {
-                '{' => depth += 1,
-                '}' if depth == 0 => break,
-                '}' => depth -= 1,
-                ',' if depth == 0 => begins = true,
-                c if begins && !c.is_whitespace() => {
-                    found.push(name(&group[at..]));
-                    begins = false;
-                }
-                _ => {}
-            }
-        }
-    }
-    found
-}
-
 #[test]
-fn folders_need_each_other_in_no_circle() {
+fn modules_beside_each_other_need_each_other_in_no_circle() {
     let lines = product_lines();
-    for package in [
-        "shared_mem",
-        "splat",
-        "fusion",
-        "twin",
-        "rt_bridge",
-        "calibration",
-        "evaluation",
-        "import",
-        "urdf",
-        "reconstruct",
-        "link",
-    ] {
-        let folder = |file: &str| {
-            let within = file.strip_prefix(package)?.strip_prefix("/src/")?.split('/').next()?;
-            Some(within.strip_suffix(".rs").unwrap_or(within).to_owned()).filter(|name| name != "lib" && name != "main")
+    let mut found = Vec::new();
+    for package in PRODUCT {
+        let of_package = |(file, lines): &(String, Vec<String>)| {
+            let own = module(file.strip_prefix(package)?.strip_prefix('/')?)?;
+            Some((own, lines.join("\n")))
         };
-        let mut needs: BTreeMap<String, BTreeSet<String>> = BTreeMap::new();
-        for (file, lines) in &lines {
-            if let Some(own) = folder(file) {
-                needs
-                    .entry(own.clone())
-                    .or_default()
-                    .extend(needed(&lines.join("\n")).into_iter().filter(|n| *n != own));
-            }
-        }
-        let all: BTreeSet<String> = needs.keys().cloned().collect();
-        needs.values_mut().for_each(|needed| needed.retain(|name| all.contains(name)));
-        // Whatever needs nothing that is left goes; a circle stays.
-        while let Some(ground) = needs.iter().find(|(_, needed)| needed.is_empty()).map(|(name, _)| name.clone()) {
-            needs.remove(&ground);
-            needs.values_mut().for_each(|needed| {
-                needed.remove(&ground);
-            });
-        }
-        assert!(needs.is_empty(), "{package}/src: folders that need each other, by way of these: {needs:?}");
+        let files: Vec<(Vec<String>, String)> = lines.iter().filter_map(of_package).collect();
+        let left = needs(&files).into_iter().map(|(folder, needs)| (folder, circles(needs)));
+        let left = left.filter(|(_, circles)| !circles.is_empty());
+        found.extend(left.map(|(folder, circles)| format!("{package}/{}: {circles:?}", folder.join("/"))));
     }
+    assert!(found.is_empty(), "modules that need each other, by way of these:\n{}", found.join("\n"));
 }
 
 #[test]
