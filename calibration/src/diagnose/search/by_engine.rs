@@ -8,14 +8,14 @@ use crate::diagnose::fit::bench::{Bench, Hypothesis};
 use crate::diagnose::fit::effort::FIRST_PASS;
 use crate::diagnose::judge::trial::Found;
 
-/// A hypothesis at its best by the engine; as it is where the twin simulates, or the engine has no answer.
+/// A hypothesis at its best by the engine; as it is where the twin simulates, the engine has no answer, or no time is left.
 pub(super) fn by_engine<E: Evidence>(
     bench: &Bench<'_, E>,
     split: &Split,
     fit: Hypothesis,
     weights: &[f64],
 ) -> Hypothesis {
-    if bench.evidence.engine().is_none() {
+    if bench.evidence.engine().is_none() || bench.interrupt.asked() {
         return fit;
     }
     let numbers = (&fit.effects[..], fit.full.clone());
@@ -26,7 +26,7 @@ impl Found {
     /// The same with baseline and result at their best by the engine. The baseline is fitted once more from where the result ended: a
     /// likelihood ratio compares two maxima, and fits over rough hits end in many.
     pub(super) fn by_engine<E: Evidence>(mut self, bench: &Bench<'_, E>, split: &Split) -> Self {
-        if bench.evidence.engine().is_none() {
+        if bench.evidence.engine().is_none() || bench.interrupt.asked() {
             return self;
         }
         let Some(last_weights) = self.steps.last().map(|step| step.weights.clone()) else { return self };
