@@ -4,7 +4,6 @@
 //! |---|---|
 //! | `measured` | residuals of clips under the numbers of every hypothesis, and where in a clip each stands |
 //! | `arm_clips`, `cell_clips`, `contact` | of the arm alone, of the arm and an object, of the arm in contact |
-//! | `anchored` | strokes of another program around one point, with the twin's differences |
 //! | `deviations` | how the object of a clip deviates from any simulated path |
 //! | `regime` | what a joint is commanded to do at a moment |
 //! | `recent` | where a search has just been |
@@ -12,7 +11,6 @@
 //! | `noise` | what holds for most residuals, and how many of them say the same |
 //! | `scatter_scale` | how widely clips scatter under one of them |
 
-pub(super) mod anchored;
 pub mod arm_clips;
 pub mod cell_clips;
 pub mod contact;

@@ -5,6 +5,7 @@
 //! | `sweep`, `quadratic` | clips linearised by numbers and probes of candidates, and the quadratic forms that come of it |
 //! | `floor` | weights of the channels: how far residuals can be trusted |
 //! | `shortlist` | how much of the gap each candidate's signature explains |
+//! | `anchored` | strokes of another program around one point, with the twin's differences |
 //! | `bench`, `cost`, `effort` | hypotheses fitted, what they cost, and how much work a fit gets |
 //! | `descend` | the steps of a fit |
 //! | `left_out` | the numbers without some of the clips |
@@ -13,6 +14,7 @@
 //! | `time_step` | how far the twin's time step moves them |
 //! | `stages` | how long each part of the search takes |
 
+pub(super) mod anchored;
 pub mod bench;
 pub mod cost;
 mod descend;

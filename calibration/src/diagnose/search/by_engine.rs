@@ -1,6 +1,4 @@
-//! What a search around points of another program found ([`Anchored`]), fitted to that program's own roll-outs.
-//!
-//! [`Anchored`]: crate::diagnose::evidence::anchored::Anchored
+//! What a search around points of another program found, fitted to that program's own roll-outs.
 
 use crate::diagnose::clips::split::Split;
 use crate::diagnose::evidence::measured::Evidence;

@@ -5,8 +5,8 @@ use super::by_engine::by_engine;
 use super::refit::{last_pass, refitted, without_superfluous};
 use crate::diagnose::clips::split::Split;
 use crate::diagnose::criteria::JOINTS_EXCESS_BESIDE_A_CAUSE;
-use crate::diagnose::evidence::anchored::Anchored;
 use crate::diagnose::evidence::measured::{Evidence, Group, Row};
+use crate::diagnose::fit::anchored::Anchored;
 use crate::diagnose::fit::bench::{Bench, Hypothesis};
 use crate::diagnose::fit::effort::{FIRST_PASS, HEAT, NEAR};
 use crate::diagnose::fit::floor;
@@ -35,7 +35,7 @@ const NEAR_SHARE: f64 = 0.4;
 const NUMERICS_SHARE: f64 = 1e-4;
 
 /// Searches from a baseline; `refined` gives numbers whose object is found anew under the effects in them, where there is
-/// one. Strokes that another program simulates are looked at around what each step extends ([`Anchored`]); what is extended, and what
+/// one. Strokes that another program simulates are looked at around what each step extends; what is extended, and what
 /// is found, is fitted to that program itself.
 pub fn search<E: Evidence>(
     bench: &Bench<'_, E>,

@@ -9,10 +9,10 @@
 //! (Bandler et al. 2004, "Space mapping: the state of the art"): right at the point, to first order around it, and off by what the two
 //! models differ by in what a number changes. What is chosen is fitted to the engine's own roll-outs afterwards.
 
-use super::measured::{Channel, Evidence, Group, Near, Reach, Row};
-use super::recent::Recent;
-use super::scatter::Scatter;
-use crate::diagnose::fit::bench::Bench;
+use super::bench::Bench;
+use crate::diagnose::evidence::measured::{Channel, Evidence, Group, Near, Reach, Row};
+use crate::diagnose::evidence::recent::Recent;
+use crate::diagnose::evidence::scatter::Scatter;
 use crate::engine::Engine;
 use crate::estimate::{ClipModel, Impossible};
 use crate::forward::arm::following::Moment;
@@ -149,8 +149,8 @@ impl<E: Evidence> Evidence for Anchored<'_, E> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::measured::StageName;
     use super::*;
+    use crate::diagnose::evidence::measured::StageName;
     use std::sync::atomic::{AtomicUsize, Ordering};
 
     /// A row of the arm and one of the object; the engine's residuals bend, the twin's are straight.
