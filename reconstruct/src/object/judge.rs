@@ -20,7 +20,7 @@ const COARSER: u32 = 6;
 /// A corner is certain that so many views show.
 const CERTAIN: u8 = 2;
 /// Views of a textured object contradict each other on less of its surface, at the edges of its print and of thin parts.
-const CONTRADICTED: f64 = 0.1;
+pub(super) const CONTRADICTED: f64 = 0.1;
 
 /// A view that took no part.
 #[derive(Debug, Clone)]
@@ -109,7 +109,7 @@ pub(super) fn remarks(
     (views, with_depth): (&[HeldOut], bool),
 ) -> Vec<Remark> {
     let mut remarks = Vec::new();
-    let share = share(mesh, |corner| evidence.views[corner] < CERTAIN);
+    let share = evidence.share_shown_by_fewer(mesh, CERTAIN);
     if share > 0.02 {
         remarks.push(Remark(format!(
             "{:.0} % of the surface is shown by fewer than {CERTAIN} views, and is a guess (grey in object.ply): take pictures from there",
@@ -136,22 +136,9 @@ pub(super) fn remarks(
     remarks
 }
 
-/// Of the surface the share that has a corner of a kind.
-fn share(mesh: &Mesh, is: impl Fn(usize) -> bool) -> f64 {
-    let (mut part, mut all) = (0.0, 0.0);
-    for (number, triangle) in mesh.triangles.iter().enumerate() {
-        let area = mesh.area(number);
-        all += area;
-        if triangle.iter().any(|corner| is(*corner as usize)) {
-            part += area;
-        }
-    }
-    part / all
-}
-
 /// Silhouettes show no hollow that opens to one side, and colours only some.
 fn hollows(evidence: &Evidence, mesh: &Mesh) -> Remark {
-    let share = share(mesh, |corner| evidence.contradicted[corner]);
+    let share = evidence.share_contradicted(mesh);
     Remark(if share > CONTRADICTED {
         format!(
             "on {:.0} % of the surface the views contradict each other in colour (grey in object.ply): it is not where they see it; without \

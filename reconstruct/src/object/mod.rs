@@ -5,6 +5,7 @@
 //! | `pictures` | the views' pixels, and which of them say nothing |
 //! | `bounds` | where the object is |
 //! | `start` | visual hull, fused depth |
+//! | `hollow` | hollows that no silhouette shows, by colour |
 //! | `band` | the parts of the box that a surface may be in |
 //! | `pool` | pixels as rays |
 //! | `ray` | what a ray sees, and how it depends on the field |
@@ -25,6 +26,7 @@ mod band;
 mod bounds;
 mod colours;
 mod evidence;
+mod hollow;
 mod judge;
 mod learn;
 mod pictures;
@@ -50,6 +52,7 @@ use bounds::Bounds;
 use evidence::Evidence;
 use learn::{Learner, Plan, State};
 use nalgebra::{Isometry3, Point3};
+use pictures::Pictures;
 use shared_mem::ending;
 use shared_mem::progress::{Planned, Progress};
 use splat::{SplatCloud, TrainError};
@@ -167,7 +170,7 @@ pub fn reconstruct(scan: Scan, options: &Options, kept: &Path) -> Result<Object,
     }
     let pixels = pool::pixels(&pictures.train);
     let mut keeper = Keeper::new(kept, options, &pictures, &pixels);
-    let fresh = || State::new(grid, distance, pictures.train.len());
+    let fresh = || State::new(grid, begun(&grid, distance, &pictures), pictures.train.len());
     let mut state = keeper.take()?.unwrap_or_else(fresh);
     if state.level < plan.levels.len() {
         keeper.forget_splats()?;
@@ -215,6 +218,15 @@ pub fn reconstruct(scan: Scan, options: &Options, kept: &Path) -> Result<Object,
         moved,
         remarks,
     })
+}
+
+/// The distance that the optimisation begins with: without depth, that of the hull without its hollows.
+fn begun(grid: &Grid, distance: Vec<f32>, pictures: &Pictures) -> Vec<f32> {
+    if pictures.depth_spread.is_some() {
+        return distance;
+    }
+    let poses: Vec<Isometry3<f64>> = pictures.train.iter().map(|frame| frame.scan_from_camera).collect();
+    hollow::carved(grid, distance, (&pictures.train, &poses), judge::CONTRADICTED)
 }
 
 /// The surface of a field, and what follows from it.
