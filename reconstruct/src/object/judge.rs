@@ -146,7 +146,9 @@ fn hollows(evidence: &Evidence, mesh: &Mesh) -> Remark {
             share * 100.0
         )
     } else {
-        "made without depth: a hollow that no silhouette shows, as the inside of a cup, is filled where its colours are even".into()
+        "made without depth: a hollow that no silhouette shows, as the inside of a cup, is filled where its colours are even, and has too \
+         thick a wall elsewhere: take pictures with depth"
+            .into()
     })
 }
 
