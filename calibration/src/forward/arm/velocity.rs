@@ -107,7 +107,7 @@ pub(super) fn contradict_positions(log: &JointSeries) -> bool {
 }
 
 impl Compared {
-    /// Whether a velocity is none of this joint's [1].
+    /// Whether the velocity is no slope of this joint's position.
     #[must_use]
     pub fn is_not_its_slope(&self) -> bool {
         (self.factor.value - 1.0).abs() > NOT_ITS_SLOPE.max(5.0 * self.factor.sigma)
