@@ -14,6 +14,7 @@ use splat::SplatCloud;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::Duration;
+use tempfile::TempDir;
 
 const WIDTH: u32 = 120;
 const HEIGHT: u32 = 90;
@@ -148,6 +149,19 @@ const COARSE: Options = Options { scale: None, edge: 24 };
 fn a_run_that_is_ended_again_and_again_goes_on_to_the_same_bytes() {
     let folder = tempfile::tempdir().expect("a folder");
     write(folder.path(), Poses::Right);
+    ended_again_and_again(&folder);
+}
+
+#[test]
+#[ignore = "takes a minute: cargo test --release --workspace --test object_scan -- --ignored"]
+fn a_run_without_depth_that_is_ended_again_and_again_goes_on_to_the_same_bytes() {
+    let folder = tempfile::tempdir().expect("a folder");
+    write(folder.path(), Poses::Right);
+    std::fs::remove_dir_all(folder.path().join("depth")).expect("a folder");
+    ended_again_and_again(&folder);
+}
+
+fn ended_again_and_again(folder: &TempDir) {
     let kept = folder.path().join("ring.state");
     let whole = reconstruct(Scan::open(folder.path()).expect("a scan"), &COARSE, &kept).expect("an object");
     forget(&kept).expect("nothing is left of it");

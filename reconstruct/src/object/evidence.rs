@@ -20,16 +20,6 @@ const ROUNDS: usize = 8;
 /// Colours further apart contradict each other [of 255].
 const APART: f64 = 16.0;
 
-/// The same where each view takes the pixel that agrees best, of a corner's own and those beside it [of 255]. By 8 the box of the tests is
-/// contradicted with its hollow, too; a filled bowl is by 12 on 36 % of its surface, a filled mug on 13 %.
-const APART_TO_A_PIXEL: f64 = 12.0;
-/// Colours of so many views are tried for a corner's own.
-const REFERENCES: usize = 12;
-
-/// Colours of a pixel of the reduced picture and of the eight around it; `None` outside of picture or mask.
-type Window = [Option<[f32; 3]>; 9];
-const MIDDLE: usize = 4;
-
 /// What views show of each corner.
 #[derive(Debug)]
 pub(super) struct Evidence {
@@ -42,17 +32,16 @@ pub(super) struct Evidence {
 impl Evidence {
     /// Of a mesh on the surface of `field`, from the poses that the frames have by now.
     pub(super) fn of(field: &Field<f32>, mesh: &Mesh, frames: &[Frame], poses: &[Isometry3<f64>]) -> Self {
-        let (views, mut colours) = gathered((field, mesh), (frames, poses), mean);
-        let apart: Vec<Option<f64>> = colours.iter_mut().map(|colours| apart(colours)).collect();
-        Self { views, contradicted: contradicted(mesh, apart, APART) }
-    }
-
-    /// The same where a view agrees that has a corner's colour at its pixel or beside it (r-consistency; Kutulakos, "Approximate N-view
-    /// stereo", ECCV 2000): print would contradict itself on a surface that is known to a voxel alone.
-    pub(super) fn to_a_pixel(field: &Field<f32>, mesh: &Mesh, frames: &[Frame], poses: &[Isometry3<f64>]) -> Self {
-        let (views, windows) = gathered((field, mesh), (frames, poses), window);
-        let apart: Vec<Option<f64>> = windows.par_iter().map(|windows| nearest_apart(windows)).collect();
-        Self { views, contradicted: contradicted(mesh, apart, APART_TO_A_PIXEL) }
+        let normals = normals(mesh);
+        let (mut views, mut colours) = (vec![0u8; mesh.points.len()], vec![Vec::new(); mesh.points.len()]);
+        for (frame, pose) in frames.iter().zip(poses) {
+            for (corner, pixel) in seen((field, mesh, &normals), (frame, pose)).into_iter().enumerate() {
+                views[corner] = views[corner].saturating_add(u8::from(pixel.is_some()));
+                colours[corner].extend(pixel.and_then(|pixel| mean(frame, pixel, COARSER)));
+            }
+        }
+        let apart = smoothed(mesh, colours.iter_mut().map(|colours| apart(colours)).collect());
+        Self { views, contradicted: apart.into_iter().map(|apart| apart.is_some_and(|apart| apart > APART)).collect() }
     }
 
     /// On which share of the mesh that it is of the views contradict each other [1].
@@ -66,27 +55,14 @@ impl Evidence {
     }
 }
 
-/// How many views show each corner, and what is taken of each at its pixel.
-fn gathered<T>(
-    (field, mesh): (&Field<f32>, &Mesh),
+/// Numbers of the views that show each corner of a mesh on the surface of a field, of which these are the normals.
+pub(super) fn seen_by(
+    surface: (&Field<f32>, &Mesh, &[Vector3<f64>]),
     (frames, poses): (&[Frame], &[Isometry3<f64>]),
-    taken: impl Fn(&Frame, [usize; 2]) -> Option<T>,
-) -> (Vec<u8>, Vec<Vec<T>>) {
-    let normals = normals(mesh);
-    let mut views = vec![0u8; mesh.points.len()];
-    let mut all: Vec<Vec<T>> = mesh.points.iter().map(|_| Vec::new()).collect();
-    for (frame, pose) in frames.iter().zip(poses) {
-        for (corner, pixel) in seen(field, (mesh, &normals), frame, pose).into_iter().enumerate() {
-            views[corner] = views[corner].saturating_add(u8::from(pixel.is_some()));
-            all[corner].extend(pixel.and_then(|pixel| taken(frame, pixel)));
-        }
-    }
-    (views, all)
-}
-
-/// Corners whose colours are further apart, with those of their neighbours.
-fn contradicted(mesh: &Mesh, apart: Vec<Option<f64>>, most: f64) -> Vec<bool> {
-    smoothed(mesh, apart).into_iter().map(|apart| apart.is_some_and(|apart| apart > most)).collect()
+) -> Vec<Vec<u16>> {
+    let pixels: Vec<_> = frames.par_iter().zip(poses).map(|view| seen(surface, view)).collect();
+    let of = |corner: usize| (0..frames.len()).filter(|f| pixels[*f][corner].is_some()).map(|f| f as u16).collect();
+    (0..surface.1.points.len()).map(of).collect()
 }
 
 /// Share of the area of triangles with such a corner.
@@ -105,10 +81,8 @@ fn share(mesh: &Mesh, is: impl Fn(usize) -> bool) -> f64 {
 /// Pixels of a picture reduced by [`COARSER`] at which a view shows the corners; `None` where a corner faces away from it, or something
 /// stands before it.
 fn seen(
-    field: &Field<f32>,
-    (mesh, normals): (&Mesh, &[Vector3<f64>]),
-    frame: &Frame,
-    pose: &Isometry3<f64>,
+    (field, mesh, normals): (&Field<f32>, &Mesh, &[Vector3<f64>]),
+    (frame, pose): (&Frame, &Isometry3<f64>),
 ) -> Vec<Option<[usize; 2]>> {
     let camera: Camera = frame.camera.reduced(COARSER);
     let drawn = draw(field, &camera, pose);
@@ -128,9 +102,9 @@ fn seen(
     mesh.points.iter().zip(normals).map(at).collect()
 }
 
-/// Mean colour [of 255] of the pixels that are one in the reduced picture; `None` where not all of them are in the mask.
-fn mean(frame: &Frame, [column, row]: [usize; 2]) -> Option<[f64; 3]> {
-    let by = COARSER as usize;
+/// Mean colour [of 255] of the pixels that are one in a picture reduced by `by`; `None` where not all of them are in the mask.
+pub(super) fn mean(frame: &Frame, [column, row]: [usize; 2], by: u32) -> Option<[f64; 3]> {
+    let by = by as usize;
     let first = row * by * frame.camera.width as usize + column * by;
     let pixels = (0..by * by).map(|i| first + i / by * frame.camera.width as usize + i % by);
     let mut sum = [0.0; 3];
@@ -138,31 +112,6 @@ fn mean(frame: &Frame, [column, row]: [usize; 2]) -> Option<[f64; 3]> {
         (0..3).for_each(|c| sum[c] += f64::from(frame.rgb[at][c]));
     }
     pixels.clone().all(|at| frame.mask[at]).then(|| sum.map(|sum| sum / (by * by) as f64))
-}
-
-/// `None` where the corner's own pixel is not in the mask.
-fn window(frame: &Frame, [column, row]: [usize; 2]) -> Option<Window> {
-    let camera = frame.camera.reduced(COARSER);
-    let window: Window = std::array::from_fn(|i| {
-        let (column, row) = ((column + i % 3).checked_sub(1)?, (row + i / 3).checked_sub(1)?);
-        let inside = column < camera.width as usize && row < camera.height as usize;
-        inside.then(|| mean(frame, [column, row])).flatten().map(|colour| colour.map(|c| c as f32))
-    });
-    window[MIDDLE].is_some().then_some(window)
-}
-
-/// Mean distance of the views' nearest colours from that of the view with which they agree best.
-fn nearest_apart(windows: &[Window]) -> Option<f64> {
-    if windows.len() < FEWEST {
-        return None;
-    }
-    let from = |reference: [f32; 3]| {
-        let away = |colour: &[f32; 3]| (0..3).map(|c| (colour[c] - reference[c]).abs()).sum::<f32>() / 3.0;
-        let nearest = |window: &Window| window.iter().flatten().map(away).fold(f32::INFINITY, f32::min);
-        f64::from(windows.iter().map(nearest).sum::<f32>()) / windows.len() as f64
-    };
-    let references = windows.iter().step_by(windows.len().div_ceil(REFERENCES)).filter_map(|window| window[MIDDLE]);
-    Some(references.map(from).fold(f64::INFINITY, f64::min))
 }
 
 /// Mean distance of colours from their middle one, channel by channel.
@@ -180,7 +129,7 @@ fn apart(colours: &mut [[f64; 3]]) -> Option<f64> {
 }
 
 /// Values of corners, of which each takes the mean with its neighbours again and again.
-fn smoothed(mesh: &Mesh, mut values: Vec<Option<f64>>) -> Vec<Option<f64>> {
+pub(super) fn smoothed(mesh: &Mesh, mut values: Vec<Option<f64>>) -> Vec<Option<f64>> {
     for _ in 0..ROUNDS {
         // Its own value counts as one of its neighbours'.
         let mut sums: Vec<(f64, f64)> =
@@ -198,7 +147,7 @@ fn smoothed(mesh: &Mesh, mut values: Vec<Option<f64>>) -> Vec<Option<f64>> {
     values
 }
 
-fn normals(mesh: &Mesh) -> Vec<Vector3<f64>> {
+pub(super) fn normals(mesh: &Mesh) -> Vec<Vector3<f64>> {
     let mut normals = vec![Vector3::zeros(); mesh.points.len()];
     for (number, triangle) in mesh.triangles.iter().enumerate() {
         let [a, b, c] = mesh.corners(number);

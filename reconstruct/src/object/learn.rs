@@ -4,6 +4,7 @@
 use super::adam::{Adam, Gathered, Rates};
 use super::band::Band;
 use super::colours;
+use super::hollow::{self, Search};
 use super::pool::{Pixel, Stand, corrected};
 use super::ray::{Medium, Receiver, Tracer, Weights};
 use super::smooth::{Smoothness, at_node};
@@ -180,16 +181,17 @@ impl<'a> Learner<'a> {
         state.level < self.plan.levels.len()
     }
 
-    /// Nodes twice as dense; before the last level depth is fused anew, with the cameras where they are by now.
+    /// Nodes twice as dense. Before the last level depth is fused anew, with the cameras where they are by now; without depth what the
+    /// coarser grid could not show of walls and hollows is opened.
     fn refine(&self, state: &mut State) {
         let fine = state.field.refined();
         let is_last = state.level + 1 == self.plan.levels.len();
+        let poses: Vec<_> = (0..self.frames.len()).map(|frame| self.pose(state, frame)).collect();
+        let begun = || signed_distance(&fine.grid, &fine.distance);
         let distance = match self.depth_spread {
-            Some(spread) if is_last => {
-                let poses: Vec<_> = (0..self.frames.len()).map(|frame| self.pose(state, frame)).collect();
-                start::distance(&fine.grid, &Seen::all(self.frames, Some(&poses)), Some(spread))
-            }
-            _ => signed_distance(&fine.grid, &fine.distance),
+            Some(spread) if is_last => start::distance(&fine.grid, &Seen::all(self.frames, Some(&poses)), Some(spread)),
+            Some(_) => begun(),
+            None => hollow::opened(&fine.grid, begun(), (self.frames, &poses), Search::REFINED),
         };
         state.adam = Adam::new(fine.grid.len());
         state.field = Field { distance, ..fine };

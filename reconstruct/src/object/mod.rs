@@ -6,6 +6,7 @@
 //! | `bounds` | where the object is |
 //! | `start` | visual hull, fused depth |
 //! | `hollow` | hollows that no silhouette shows, by colour |
+//! | `stereo` | how far behind a surface the views agree best |
 //! | `band` | the parts of the box that a surface may be in |
 //! | `pool` | pixels as rays |
 //! | `ray` | what a ray sees, and how it depends on the field |
@@ -35,6 +36,7 @@ mod ray;
 mod smooth;
 mod start;
 mod state;
+mod stereo;
 mod table;
 mod view;
 
@@ -226,7 +228,7 @@ fn begun(grid: &Grid, distance: Vec<f32>, pictures: &Pictures) -> Vec<f32> {
         return distance;
     }
     let poses: Vec<Isometry3<f64>> = pictures.train.iter().map(|frame| frame.scan_from_camera).collect();
-    hollow::carved(grid, distance, (&pictures.train, &poses), judge::CONTRADICTED)
+    hollow::opened(grid, distance, (&pictures.train, &poses), hollow::Search::FROM_HULL)
 }
 
 /// The surface of a field, and what follows from it.
@@ -266,7 +268,10 @@ fn learn(
         learner.step(state);
         bar.show(plan.steps() - plan.steps_left(state.level, state.step), LEARN);
         if ending::asked() {
-            keeper.keep(state)?;
+            // At the beginning of a level its hollows may be opened in part: it is begun anew from what was kept before.
+            if state.step > 0 || state.level == plan.levels.len() {
+                keeper.keep(state)?;
+            }
             interrupted(plan, state)?;
         }
         keeper.keep_now_and_then(state)?;
