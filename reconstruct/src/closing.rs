@@ -1,20 +1,21 @@
 //! Gaps that a grid cannot show: what is narrower than two nodes' distance is filled, by a closing (Serra, Image Analysis and
-//! Mathematical Morphology, 1982) with a ball of one voxel. Noise pierces thin walls by such gaps, and a wall with a pinhole has
+//! Mathematical Morphology, 1982) with a ball of one voxel or of two. Noise pierces thin walls by such gaps, and a wall with a pinhole has
 //! another topology.
 
 use crate::field::Field;
 use crate::sweep::signed_distance;
 
-/// Radius of the ball [voxel].
-const RADIUS: f32 = 1.0;
+/// Radius of the ball [voxel]: with depth, and where noise of colours leaves tunnels in what was opened without.
+pub(crate) const PINHOLE: f32 = 1.0;
+pub(crate) const TUNNEL: f32 = 2.0;
 /// Where the closing lies no deeper than this, the field stays as it is: so much are distances wrong beside sharp edges [voxel].
 const SHALLOW: f32 = 0.5;
 
-/// The field with its narrow gaps filled; everywhere else it stays as it is.
+/// The field with the gaps filled into which no ball of this radius goes [voxel]; everywhere else it stays as it is.
 #[must_use]
-pub(crate) fn closed(field: &Field<f32>) -> Field<f32> {
-    let grown: Vec<f32> = signed_distance(&field.grid, &field.distance).iter().map(|d| d - RADIUS).collect();
-    let closing = signed_distance(&field.grid, &grown).into_iter().map(|d| d + RADIUS);
+pub(crate) fn closed(field: &Field<f32>, radius: f32) -> Field<f32> {
+    let grown: Vec<f32> = signed_distance(&field.grid, &field.distance).iter().map(|d| d - radius).collect();
+    let closing = signed_distance(&field.grid, &grown).into_iter().map(|d| d + radius);
     let fill = |(own, closing): (&f32, f32)| if *own >= 0.0 && closing < -SHALLOW { closing } else { *own };
     Field { distance: field.distance.iter().zip(closing).map(fill).collect(), ..field.clone() }
 }
@@ -47,13 +48,13 @@ mod tests {
     #[test]
     fn a_pinhole_is_filled_and_a_hole_that_the_grid_shows_stays() {
         assert_eq!([0.9, 3.0].map(|hole| genus(&plate(hole))), [1, 1]);
-        assert_eq!([0.9, 3.0].map(|hole| genus(&closed(&plate(hole)))), [0, 1]);
+        assert_eq!([0.9, 3.0].map(|hole| genus(&closed(&plate(hole), PINHOLE))), [0, 1]);
     }
 
     #[test]
     fn nothing_else_changes() {
         for whole in [plate(0.0), plate(4.0)] {
-            assert_eq!(closed(&whole), whole);
+            assert_eq!(closed(&whole, PINHOLE), whole);
         }
     }
 }

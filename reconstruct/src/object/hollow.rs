@@ -4,6 +4,7 @@
 
 use super::evidence;
 use super::stereo::{STEP, Stereo};
+use crate::closing;
 use crate::field::{Field, Grid};
 use crate::mesh::{self, Mesh, Solid};
 use crate::scan::Frame;
@@ -15,6 +16,8 @@ use shared_mem::ending;
 const BESIDE: f64 = 1.75;
 /// What lies nearer than this to a surface that stays does so, too [voxel]: a wall has two surfaces, and nodes between them.
 const WALL: f32 = 1.8;
+/// Of what is opened, gaps narrower than twice this are filled again [voxel]: corners that go back by themselves leave tunnels.
+const NARROW: f32 = 1.5;
 /// A round that opens less than this share of the body is the last.
 const LITTLE: f64 = 0.01;
 
@@ -43,7 +46,7 @@ pub(super) fn opened(
 ) -> Vec<f32> {
     let middle = grid.position(grid.dims.map(|n| n / 2));
     let stereo = Stereo::new(views, (grid.voxel, &middle));
-    let mut field = Field { grid: *grid, colour: vec![[0.5; 3]; distance.len()], distance };
+    let mut field = Field { grid: *grid, colour: vec![[0.5; 3]; distance.len()], distance: distance.clone() };
     let mut before = f64::INFINITY;
     for _ in 0..search.rounds {
         let Some((surface, _)) = mesh::surface(&field) else { break };
@@ -57,7 +60,9 @@ pub(super) fn opened(
         take_away(&mut field, &surface, &depths, |node| behind[node] < WALL);
         field.distance = sweep::signed_distance(grid, &field.distance);
     }
-    field.distance
+    let filled = closing::closed(&field, NARROW).distance.into_iter().zip(distance).zip(&field.distance);
+    let level: Vec<f32> = filled.map(|((filled, begun), own)| if begun < 0.0 { filled } else { *own }).collect();
+    sweep::signed_distance(grid, &level)
 }
 
 /// Whether a node is the nearest one to some of the corners.

@@ -185,7 +185,8 @@ pub fn reconstruct(scan: Scan, options: &Options, kept: &Path) -> Result<Object,
         table::cut(&mut state.field, height);
     }
     bar.stage(MESH, 3);
-    let shape = Shape::of(&state.field, &bar)?;
+    let gap = if pictures.depth_spread.is_some() { closing::PINHOLE } else { closing::TUNNEL };
+    let shape = Shape::of(&closing::closed(&state.field, gap), &bar)?;
     interrupted(&plan, &state)?;
     let trained = (pictures.train.as_slice(), poses.as_slice());
     let steps = appearance::steps(options.edge);
@@ -231,7 +232,7 @@ fn begun(grid: &Grid, distance: Vec<f32>, pictures: &Pictures) -> Vec<f32> {
     hollow::opened(grid, distance, (&pictures.train, &poses), hollow::Search::FROM_HULL)
 }
 
-/// The surface of a field, and what follows from it.
+/// The surface of a field without narrow gaps, and what follows from it.
 struct Shape {
     fine: Mesh,
     coarse: Mesh,
@@ -242,7 +243,7 @@ struct Shape {
 
 impl Shape {
     fn of(field: &Field<f32>, bar: &Progress) -> Result<Self, ObjectError> {
-        let (surface, islands) = mesh::surface(&closing::closed(field)).ok_or(ObjectError::Nothing)?;
+        let (surface, islands) = mesh::surface(field).ok_or(ObjectError::Nothing)?;
         Topology::of(&surface)?;
         let fine = mesh::reduced(&surface, FINE);
         let topology = Topology::of(&fine)?;
