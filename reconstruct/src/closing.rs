@@ -5,7 +5,7 @@
 use crate::field::Field;
 use crate::sweep::signed_distance;
 
-/// Radius of the ball [voxel]: with depth, and where noise of colours leaves tunnels in what was opened without.
+/// Radius of the ball [voxel] of an object with depth, and of one without, in whose opened hollows noise of colours leaves tunnels.
 pub(crate) const PINHOLE: f32 = 1.0;
 pub(crate) const TUNNEL: f32 = 2.0;
 /// Where the closing lies no deeper than this, the field stays as it is: so much are distances wrong beside sharp edges [voxel].

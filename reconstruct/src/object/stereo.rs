@@ -14,7 +14,8 @@ use shared_mem::ending;
 
 /// Distance of the depths that are tried [voxel].
 pub(super) const STEP: f64 = 0.5;
-/// A pixel of the pictures that are compared is about so wide [voxel]: depths a step apart differ by what is seen, and poses a pixel off do not.
+/// A pixel of the pictures that are compared is about so wide [voxel]: depths a step apart differ by what is seen, and poses a pixel off
+/// do not.
 const PIXEL: f64 = 0.4;
 /// Colours of fewer views say nothing.
 const FEWEST: usize = 3;
@@ -24,7 +25,8 @@ const REFERENCES: usize = 6;
 const NOISE: f64 = 1.0;
 /// Where at each depth more than this share of the variance is left [1], and more than this of it [of 255, squared], the views agree
 /// nowhere near, and the surface goes back by so many steps. Over a filled hollow of the objects of `tests/peers/scan.py` seven tenths
-/// and more are left, some 1,200, on a surface that is right within a voxel three tenths; light that changes leaves less than 144.
+/// and more are left, some 1,200, on a surface that is right within a voxel three tenths. Colours that are
+/// less than 12 of 255 apart may be so by the light.
 const NOWHERE: f64 = 0.5;
 const NOWHERE_LEAST: f64 = 144.0;
 const FURTHER: f64 = 2.0;
@@ -94,6 +96,7 @@ impl<'a> Stereo<'a> {
 
     /// Of the views that show a place, or what lies before it.
     fn variance(&self, point: &Point3<f64>, views: &[u16]) -> Option<Variance> {
+        // All that follows is thrown away then: an end that was asked for comes within a second.
         if ending::asked() {
             return None;
         }
