@@ -242,11 +242,17 @@ impl Engine {
     fn states(&self, message: Vec<u8>, question: &Question<'_>) -> Result<Vec<f64>, NoStates> {
         self.asked.fetch_add(1, Ordering::Relaxed);
         self.with_object.fetch_or(question.object.is_some(), Ordering::Relaxed);
-        let (reply, numbers) = match self.ask(message.clone()) {
-            // Once more, with a new process: it may have been the system that ended it.
+        let idle = locked(&self.idle).pop();
+        let first = match idle {
+            Some(process) => self.ask(process, message.clone()),
+            None => self.ask(self.another()?, message.clone()),
+        };
+        let (reply, numbers) = match first {
+            // Once more, with a new process, since it may have been the system that ended it; not with an idle one, which may be about
+            // to end itself.
             Err(EngineError::Ended { .. }) => {
                 self.started_again.fetch_add(1, Ordering::Relaxed);
-                self.ask(message)?
+                self.ask(self.another()?, message)?
             }
             answer => answer?,
         };
@@ -278,18 +284,17 @@ impl Engine {
         Ok(numbers)
     }
 
-    fn ask(&self, message: Vec<u8>) -> Result<(Reply, Vec<f64>), EngineError> {
-        let idle = locked(&self.idle).pop();
-        let mut process = match idle {
-            Some(process) => process,
-            None => {
-                let (process, ability) = greeted(&self.call, &self.greeting, &self.running)?;
-                if ability != self.ability {
-                    return Err(self.wrong("says of itself something else than when it was started first".into()));
-                }
-                process
-            }
-        };
+    /// A process beside those that run, which can do what the first one said.
+    fn another(&self) -> Result<Process, EngineError> {
+        let (process, ability) = greeted(&self.call, &self.greeting, &self.running)?;
+        if ability != self.ability {
+            return Err(self.wrong("says of itself something else than when it was started first".into()));
+        }
+        Ok(process)
+    }
+
+    /// Asks a process, which is idle from then on.
+    fn ask(&self, mut process: Process, message: Vec<u8>) -> Result<(Reply, Vec<f64>), EngineError> {
         let answer = process.ask(message, self.call.limit)?;
         locked(&self.idle).push(process);
         Ok(answer)

@@ -67,6 +67,27 @@ fn an_engine_that_dies_in_a_roll_out_is_started_again_once_and_then_given_up() {
 }
 
 #[test]
+fn a_roll_out_is_asked_again_of_a_new_process_where_all_that_run_are_about_to_end() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mended = folder.path().join("mended");
+    let impossible = says(r#"{"message":"impossible","why":"singular"}"#);
+    let script = format!(
+        "[ -e '{}' ] && answers=yes; {}; [ $answers ] && {impossible} && exec cat >&2; exit 7",
+        mended.display(),
+        says(HELLO)
+    );
+    let (engine, interrupt) = started(&script, PATIENCE).expect("a greeting");
+    for _ in 0..2 {
+        let process = engine.another().expect("a greeting");
+        locked(&engine.idle).push(process);
+    }
+    std::fs::write(&mended, "").expect("a mark");
+    assert!(matches!(asked(&engine), Err(NoStates::Impossible(_))));
+    assert!(engine.failure().is_none() && !interrupt.cancelled());
+    assert_eq!(engine.used().started_again, 1);
+}
+
+#[test]
 fn silence_ends_at_the_limit_and_takes_what_the_engine_started_along() {
     let script = format!("{}; sleep 600 & echo $! >&2; wait", says(HELLO));
     let (engine, _) = started(&script, Duration::from_secs(1)).expect("a greeting");
