@@ -6,7 +6,7 @@ use super::band::Band;
 use super::colours;
 use super::hollow::{self, Search};
 use super::pool::{Pixel, Stand, corrected};
-use super::ray::{Medium, Receiver, Tracer, Weights};
+use super::ray::{Medium, Receiver, Tracer, Weights, reach};
 use super::smooth::{Smoothness, at_node};
 use super::start::{self, Seen};
 use crate::field::{Field, Grid};
@@ -152,7 +152,7 @@ impl<'a> Learner<'a> {
         let steepness = level.steepness[0] * (level.steepness[1] / level.steepness[0]).powf(progress);
         let anew = state.band.is_none() || state.step.is_multiple_of(BAND_STEPS);
         if anew {
-            state.band = Some(Band::new(&state.field.grid, &state.field.distance, 6.0 / steepness + 1.0));
+            state.band = Some(Band::new(&state.field.grid, &state.field.distance, reach(steepness)));
             self.near = None;
         }
         if self.near.is_none() {
@@ -316,7 +316,7 @@ pub(crate) fn placed(
     radius: f64,
 ) -> Isometry3<f64> {
     let grid = &field.grid;
-    let band = Band::new(grid, &field.distance, 6.0 / STEEPEST + 1.0);
+    let band = Band::new(grid, &field.distance, reach(STEEPEST));
     let (distance, colour) = (&field.distance[..], &field.colour[..]);
     let medium = Medium { grid, band: &band, distance, colour, steepness: STEEPEST, pace: PACE };
     let pivot_steps: [f32; 3] = grid.steps(&pivot).coords.map(|v| v as f32).into();

@@ -6,8 +6,10 @@ use super::band::Band;
 use crate::field::{Cell, Grid};
 use nalgebra::{RealField, convert};
 
-/// Samples of a ray at most.
-pub(crate) const MOST_SAMPLES: usize = 64;
+/// Samples for which there is room from the start.
+const SAMPLES: usize = 64;
+/// Exponent of the logistic function at which all light passes.
+const CLEAR_EXPONENT: f64 = 6.0;
 /// What is left of the light behind which nothing counts.
 const DARK: f64 = 1e-3;
 /// A section of less weight shows no colour.
@@ -118,13 +120,18 @@ pub(crate) struct Tracer<T> {
     entry: Option<usize>,
 }
 
+/// Farther from the surface than this nothing takes light from a ray [step].
+pub(crate) fn reach<T: RealField + Copy>(steepness: T) -> T {
+    convert::<_, T>(CLEAR_EXPONENT) / steepness + T::one()
+}
+
 fn at<T: RealField + Copy>(ray: &Ray<T>, t: T) -> [T; 3] {
     [0, 1, 2].map(|axis| ray.origin[axis] + ray.direction[axis] * t)
 }
 
 impl<T: RealField + Copy> Tracer<T> {
     pub(crate) fn new() -> Self {
-        Self { samples: Vec::with_capacity(MOST_SAMPLES), sections: Vec::with_capacity(MOST_SAMPLES), entry: None }
+        Self { samples: Vec::with_capacity(SAMPLES), sections: Vec::with_capacity(SAMPLES), entry: None }
     }
 
     /// Follows a ray; samples lie at `(n + jitter) * pace` from its origin.
@@ -138,10 +145,11 @@ impl<T: RealField + Copy> Tracer<T> {
         let (mut number, last) = ((enter / medium.pace - jitter).ceil(), leave / medium.pace - jitter);
         let mut light = one;
         let mut linked = false;
-        while number < last && self.samples.len() < MOST_SAMPLES {
+        let reach = reach(medium.steepness);
+        while number < last {
             let t = (number + jitter) * medium.pace;
             number += one;
-            let Some(sample) = sample(medium, ray, t) else {
+            let Some(sample) = sample(medium, ray, t).filter(|sample| sample.distance < reach) else {
                 linked = false;
                 continue;
             };

@@ -2,7 +2,7 @@
 
 use super::band::Band;
 use super::pool::Stand;
-use super::ray::{Medium, Sight, Tracer};
+use super::ray::{Medium, Sight, Tracer, reach};
 use crate::field::Field;
 use crate::scan::Camera;
 use nalgebra::Isometry3;
@@ -28,7 +28,7 @@ pub struct Drawn {
 #[must_use]
 pub fn draw(field: &Field<f32>, camera: &Camera, scan_from_camera: &Isometry3<f64>) -> Drawn {
     let grid = &field.grid;
-    let band = Band::new(grid, &field.distance, 6.0 / STEEPNESS + 1.0);
+    let band = Band::new(grid, &field.distance, reach(STEEPNESS));
     let medium = Medium {
         grid,
         band: &band,

@@ -165,3 +165,20 @@ fn depth_of_a_thin_wall_is_where_the_ray_enters_it_and_not_towards_what_stands_b
         assert!((sight.depth - expected).abs() < 1e-9, "{direction:?}: {sight:?}");
     }
 }
+
+#[test]
+fn a_ray_that_runs_along_a_wall_sees_what_stands_at_its_end() {
+    let grid = Grid { dims: [150, 16, 8], origin: Point3::origin(), voxel: 1.0 };
+    let distance = |p: Point3<f64>| (p.y - 3.0).min(140.0 - p.x);
+    let distance: Vec<f64> = (0..grid.len()).map(|i| distance(grid.position(grid.node(i)))).collect();
+    let near: Vec<f32> = distance.iter().map(|d| *d as f32).collect();
+    let (colour, steepness) = (vec![[0.5; 3]; grid.len()], 8.0);
+    let band = Band::new(&grid, &near, reach(8.0));
+    let medium = Medium { grid: &grid, band: &band, distance: &distance, colour: &colour, steepness, pace: 0.35 };
+    for above in [1.2, 3.0, 6.0] {
+        let ray = Ray { origin: [-5.0, 3.0 + above, 3.5], direction: [1.0, 0.0, 0.0], axial: 1.0 };
+        let sight = Tracer::new().see(&medium, &ray, 0.5);
+        assert!((sight.depth - 145.0).abs() < 1e-9 && sight.opacity > 0.99, "{above}: {sight:?}");
+        assert!((sight.colour[0] - 0.5).abs() < 0.01, "{above}: {sight:?}");
+    }
+}
