@@ -2,6 +2,7 @@
 //! Where the surface is not where it seems to be, as over a hollow that was filled because no silhouette shows it, each view sees another
 //! place.
 
+use super::neighbours::Neighbours;
 use super::view::draw;
 use crate::field::Field;
 use crate::mesh::Mesh;
@@ -15,8 +16,6 @@ const COARSER: u32 = 3;
 const FACING: f64 = 0.25;
 /// Colours of fewer views say nothing about whether they agree.
 const FEWEST: usize = 3;
-/// Rounds in which a corner takes the mean with its neighbours: pixels at the edge of a print differ anywhere.
-const ROUNDS: usize = 8;
 /// Colours further apart contradict each other [of 255].
 const APART: f64 = 16.0;
 
@@ -40,7 +39,7 @@ impl Evidence {
                 colours[corner].extend(pixel.and_then(|pixel| mean(frame, pixel, COARSER)));
             }
         }
-        let apart = smoothed(mesh, colours.iter_mut().map(|colours| apart(colours)).collect());
+        let apart = Neighbours::of(mesh).smoothed(colours.iter_mut().map(|colours| apart(colours)).collect());
         Self { views, contradicted: apart.into_iter().map(|apart| apart.is_some_and(|apart| apart > APART)).collect() }
     }
 
@@ -126,25 +125,6 @@ fn apart(colours: &mut [[f64; 3]]) -> Option<f64> {
         sum += colours.iter().map(|colour| (colour[c] - middle).abs()).sum::<f64>();
     }
     Some(sum / (3 * colours.len()) as f64)
-}
-
-/// Values of corners, of which each takes the mean with its neighbours again and again.
-pub(super) fn smoothed(mesh: &Mesh, mut values: Vec<Option<f64>>) -> Vec<Option<f64>> {
-    for _ in 0..ROUNDS {
-        // Its own value counts as one of its neighbours'.
-        let mut sums: Vec<(f64, f64)> =
-            values.iter().map(|value| value.map_or((0.0, 0.0), |v| (2.0 * v, 2.0))).collect();
-        for triangle in &mesh.triangles {
-            for (to, from) in [(0, 1), (1, 2), (2, 0), (1, 0), (2, 1), (0, 2)] {
-                if let Some(value) = values[triangle[from] as usize] {
-                    let (sum, count) = &mut sums[triangle[to] as usize];
-                    (*sum, *count) = (*sum + value, *count + 1.0);
-                }
-            }
-        }
-        values = sums.into_iter().map(|(sum, count)| (count > 0.0).then(|| sum / count)).collect();
-    }
-    values
 }
 
 pub(super) fn normals(mesh: &Mesh) -> Vec<Vector3<f64>> {

@@ -3,6 +3,7 @@
 //! behind it: silhouettes show it.
 
 use super::evidence;
+use super::simple;
 use super::stereo::{STEP, Stereo};
 use crate::closing;
 use crate::field::{Field, Grid};
@@ -11,6 +12,7 @@ use crate::scan::Frame;
 use crate::sweep;
 use nalgebra::{Isometry3, Point3};
 use shared_mem::ending;
+use std::collections::BTreeMap;
 
 /// The surface lies between nodes no farther from it than this [voxel].
 const BESIDE: f64 = 1.75;
@@ -19,7 +21,7 @@ const WALL: f32 = 1.8;
 /// Of what is opened, gaps narrower than twice this are filled again [voxel]: corners that go back by themselves leave tunnels.
 const NARROW: f32 = 1.5;
 /// A round that opens less than this share of the body is the last.
-const LITTLE: f64 = 0.01;
+const LITTLE: f64 = 0.003;
 
 /// How far it is looked.
 #[derive(Debug, Clone, Copy)]
@@ -56,13 +58,14 @@ pub(super) fn opened(
         }
         before = now;
         let depths = stereo.depths(&field, &surface, search.depths);
-        let behind = sweep::distance_from(grid, near(grid, &surface, |corner| depths[corner] == 0.0));
+        let behind = sweep::distance_from(grid, near(grid, &surface, |corner| depths[corner].round() == 0.0));
         take_away(&mut field, &surface, &depths, |node| behind[node] < WALL);
         field.distance = sweep::signed_distance(grid, &field.distance);
     }
-    let filled = closing::closed(&field, NARROW).distance.into_iter().zip(distance).zip(&field.distance);
-    let level: Vec<f32> = filled.map(|((filled, begun), own)| if begun < 0.0 { filled } else { *own }).collect();
-    sweep::signed_distance(grid, &level)
+    let filled = closing::closed(&field, NARROW).distance.into_iter().enumerate();
+    let filled = filled.filter(|(node, _)| distance[*node] < 0.0);
+    simple::moved(grid, &mut field.distance, filled);
+    sweep::signed_distance(grid, &field.distance)
 }
 
 /// Whether a node is the nearest one to some of the corners.
@@ -77,19 +80,22 @@ fn near(grid: &Grid, surface: &Mesh, is: impl Fn(usize) -> bool) -> impl Fn(usiz
     move |node| marked[node]
 }
 
-/// Takes balls out of the body on each corner's way inwards, but for what stays; `depths` in [`STEP`].
+/// Takes balls out of the body on each corner's way inwards, but for what stays, and without piercing it; `depths` in [`STEP`].
 fn take_away(field: &mut Field<f32>, surface: &Mesh, depths: &[f64], stays: impl Fn(usize) -> bool) {
     let grid = field.grid;
     let normals = evidence::normals(surface);
+    let mut wanted = BTreeMap::new();
     for ((point, normal), depth) in surface.points.iter().zip(&normals).zip(depths) {
         for number in 0..depth.round() as usize {
             let steps = grid.steps(&(point - normal * (number as f64 * STEP * grid.voxel)));
             for index in beside(&grid, &steps).into_iter().filter(|index| !stays(*index)) {
                 let away = (Point3::from(grid.node(index).map(|n| n as f64)) - steps).norm();
-                field.distance[index] = field.distance[index].max((STEP - away) as f32);
+                let value = wanted.entry(index).or_insert(field.distance[index]);
+                *value = value.max((STEP - away) as f32);
             }
         }
     }
+    simple::moved(&grid, &mut field.distance, wanted);
 }
 
 /// Nodes of the cube around a place.

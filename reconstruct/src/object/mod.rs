@@ -6,6 +6,7 @@
 //! | `bounds` | where the object is |
 //! | `start` | visual hull, fused depth |
 //! | `hollow` | hollows that no silhouette shows, by colour |
+//! | `simple` | nodes that may change sides: no wall is pierced |
 //! | `stereo` | how far behind a surface the views agree best |
 //! | `band` | the parts of the box that a surface may be in |
 //! | `pool` | pixels as rays |
@@ -17,6 +18,7 @@
 //! | `table` | nothing lies below the table |
 //! | `view` | whole pictures of the field |
 //! | `appearance` | splats on the surface, trained on the views |
+//! | `neighbours` | which corners of a surface are beside each other |
 //! | `evidence` | what views show of the surface, and where they contradict each other |
 //! | `judge` | held-out views, and what a person should know |
 //! | `state` | what there is when the work is interrupted |
@@ -30,9 +32,11 @@ mod evidence;
 mod hollow;
 mod judge;
 mod learn;
+mod neighbours;
 mod pictures;
 mod pool;
 mod ray;
+mod simple;
 mod smooth;
 mod start;
 mod state;
