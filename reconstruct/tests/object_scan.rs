@@ -1,7 +1,7 @@
 //! A whole scan of a known object, from files to the mesh, on a coarse grid; and scans that cannot be used.
 
 use nalgebra::{Isometry3, Point3, Vector3};
-use reconstruct::assets::{Labels, files};
+use reconstruct::assets::{Labels, dataset_files, files};
 use reconstruct::field::{Field, Grid};
 use reconstruct::mesh::{Solid, surface};
 use reconstruct::object::{Object, ObjectError, Options, draw, forget, reconstruct};
@@ -129,6 +129,31 @@ fn a_ring_comes_out_of_its_pictures_closed_with_its_hole_its_volume_and_its_colo
     let ours = read.splats.iter().map(|splat| splat.centre.coords.cast::<f64>()).sum::<Vector3<f64>>() / count;
     let mesh = object.fine.points.iter().map(|p| p - object.middle()).sum::<Vector3<f64>>() / count;
     assert!((ours - mesh).norm() < 5e-3 && object.middle().z > 0.015, "{ours} {mesh}");
+    its_dataset_is_a_scan_of_the_same_views(&object);
+}
+
+/// In the object's own frame.
+fn its_dataset_is_a_scan_of_the_same_views(object: &Object) {
+    let folder = tempfile::tempdir().expect("a folder");
+    for (path, bytes) in dataset_files(&object.train, &object.splats, &object.middle()) {
+        let path = folder.path().join(path);
+        std::fs::create_dir_all(path.parent().expect("a folder")).expect("a folder");
+        std::fs::write(path, bytes).expect("a file");
+    }
+    let dataset = folder.path().join("dataset");
+    let scan = Scan::open(&dataset).expect("a scan");
+    assert_eq!((scan.views.len(), object.train.len()), (VIEWS - 3, VIEWS - 3));
+    for (number, (view, given)) in scan.views.iter().zip(&object.train).enumerate() {
+        let place = view.scan_from_camera.translation.vector + object.middle().coords;
+        assert!((place - given.scan_from_camera.translation.vector).norm() < 1e-9);
+        assert!(view.scan_from_camera.rotation.angle_to(&given.scan_from_camera.rotation) < 1e-7);
+        assert_eq!(view.camera, given.camera);
+        let frame = scan.frame(number, 1).expect("pixels");
+        assert_eq!((&frame.rgb, &frame.mask), (&given.rgb, &given.mask));
+    }
+    assert_eq!(std::fs::read(dataset.join("init.ply")).expect("splats"), written(object, "splats.ply"));
+    let points = std::fs::read_to_string(dataset.join("sparse/0/points3D.txt")).expect("points");
+    assert_eq!(points.lines().count(), 1 + object.splats.splats.len());
 }
 
 /// One of the files that become of an object.

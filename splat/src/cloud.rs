@@ -1,7 +1,7 @@
 //! The splats of one body: anisotropic Gaussians with opacity and a colour that depends on the direction (Kerbl et al.
 //! 2023). Body frame, metres.
 
-use super::harmonics::turns;
+use super::harmonics::{FIRST, turns};
 use nalgebra::{Point3, Similarity3, UnitQuaternion, Vector3};
 
 /// One splat, without its colour.
@@ -33,6 +33,12 @@ impl SplatCloud {
     #[must_use]
     pub fn coefficients(&self) -> usize {
         (self.degree + 1) * (self.degree + 1)
+    }
+
+    /// Mean colour of a splat over all directions: red, green, blue, 0 to 1 and, where it was trained, a little beyond.
+    #[must_use]
+    pub fn colour(&self, number: usize) -> [f32; 3] {
+        self.harmonics[number * self.coefficients()].map(|first| 0.5 + FIRST as f32 * first)
     }
 
     /// The splats whose number `keep` wants.

@@ -3,6 +3,7 @@
 //!
 //! | file | owns |
 //! |---|---|
+//! | `dataset` | pictures, poses and splats for other trainers |
 //! | `description` | URDF and the block for cell.toml |
 //! | `frame` | what all reports have in common |
 //! | `page` | the report |
@@ -11,6 +12,7 @@
 //! | `scene` | the files of a scene, in the scan's frame |
 
 mod articulated;
+mod dataset;
 mod description;
 mod frame;
 mod page;
@@ -20,6 +22,7 @@ mod summary;
 pub use articulated::{
     ArticulatedSummary, JointNumbers, LINKS, PartNumbers, articulated_files, in_frame, links_from_mesh,
 };
+pub use dataset::dataset_files;
 pub use scene::{LevelNumbers, SceneSummary, ViewNumbers, scene_files};
 pub use summary::Summary;
 

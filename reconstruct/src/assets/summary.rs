@@ -102,7 +102,7 @@ impl Summary {
             coarse_triangles: object.coarse.triangles.len(),
             splats: object.splats.splats.len(),
             scale: object.scale,
-            views: object.views,
+            views: object.train.len(),
             with_depth: object.with_depth,
             cameras_moved_m: object.moved,
             held_out: held_out.collect(),

@@ -52,7 +52,7 @@ pub use view::{Drawn, draw};
 use crate::closing;
 use crate::field::{Field, Grid};
 use crate::mesh::{self, Flaw, Islands, Mesh, Solid, Topology};
-use crate::scan::{Scale, ScaleSource, Scan, ScanError};
+use crate::scan::{Frame, Scale, ScaleSource, Scan, ScanError};
 use crate::views::Remark;
 use bounds::Bounds;
 use evidence::Evidence;
@@ -136,8 +136,8 @@ pub struct Object {
     pub scale: Scale,
     /// How the held-out views look.
     pub held_out: Vec<HeldOut>,
-    /// Views that it was made from.
-    pub views: usize,
+    /// Views that it was made from, from where their cameras stand by now.
+    pub train: Vec<Frame>,
     /// Whether they had depth.
     pub with_depth: bool,
     /// Middle shift of the cameras, root mean square [m].
@@ -220,7 +220,12 @@ pub fn reconstruct(scan: Scan, options: &Options, kept: &Path) -> Result<Object,
         islands,
         scale,
         held_out,
-        views: pictures.train.len(),
+        train: pictures
+            .train
+            .into_iter()
+            .zip(poses)
+            .map(|(frame, pose)| Frame { scan_from_camera: pose, ..frame })
+            .collect(),
         with_depth: scan.has_depth(),
         moved,
         remarks,

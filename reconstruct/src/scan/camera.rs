@@ -96,6 +96,18 @@ impl Camera {
         Self { width, height, focal, centre, lens }.checked()
     }
 
+    /// COLMAP's name of its model, and the parameters.
+    #[must_use]
+    pub fn to_colmap(&self) -> (&'static str, Vec<f64>) {
+        let ([fx, fy], [x, y]) = (self.focal, self.centre);
+        match self.lens {
+            Lens::Straight => ("PINHOLE", vec![fx, fy, x, y]),
+            // Their own models have one focal length.
+            Lens::Radial([k1, k2]) => ("OPENCV", vec![fx, fy, x, y, k1, k2, 0.0, 0.0]),
+            Lens::OpenCv([k1, k2, p1, p2]) => ("OPENCV", vec![fx, fy, x, y, k1, k2, p1, p2]),
+        }
+    }
+
     /// Refuses a camera that cannot be one.
     ///
     /// # Errors
@@ -146,9 +158,11 @@ mod tests {
         ];
         for (model, parameters) in cameras {
             let camera = Camera::from_colmap(model, [640, 480], &parameters).expect("a camera");
+            let (name, written) = camera.to_colmap();
+            let again = Camera::from_colmap(name, [640, 480], &written).expect("a camera");
             for pixel in [[3.5, 7.5], [320.0, 240.0], [630.0, 470.0]] {
                 let [x, y] = camera.direction(pixel);
-                let back = camera.project(&Point3::new(x * 0.4, y * 0.4, 0.4)).expect("in front");
+                let back = again.project(&Point3::new(x * 0.4, y * 0.4, 0.4)).expect("in front");
                 assert!((back[0] - pixel[0]).abs() < 1e-6 && (back[1] - pixel[1]).abs() < 1e-6, "{model} {back:?}");
             }
         }

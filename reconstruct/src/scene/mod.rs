@@ -14,7 +14,7 @@ mod views;
 pub use judge::HeldOut;
 
 use crate::mesh::{self, Mesh};
-use crate::scan::{Scale, ScaleSource, Scan, ScanError};
+use crate::scan::{Frame, Scale, ScaleSource, Scan, ScanError};
 use crate::splats;
 use crate::views::{Remark, spread};
 use fusion::Surface;
@@ -115,7 +115,7 @@ pub struct Scene {
     /// How the held-out views look.
     pub held_out: Vec<HeldOut>,
     /// Views that it was made from.
-    pub views: usize,
+    pub train: Vec<Frame>,
     /// What a person should know.
     pub remarks: Vec<Remark>,
 }
@@ -162,7 +162,7 @@ pub fn reconstruct(scan: Scan, options: &Options, kept: &Path) -> Result<Scene, 
         voxel: options.voxel,
         planar: options.planar,
         held_out,
-        views: views.train.len(),
+        train: views.train,
         remarks,
     })
 }

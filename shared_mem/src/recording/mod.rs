@@ -73,7 +73,9 @@ pub use messages::{ClipMessage, ClipMessages, Payload};
 pub use npy::{Array, parse as parse_npy};
 pub use own::{read_arm_states, read_clip_info};
 pub use picture::Picture;
-pub use picture_file::{pack_picture, pack_quickly, read_alpha, read_picture, unpack_picture, write_png, write_png_to};
+pub use picture_file::{
+    pack_picture, pack_quickly, pack_with_alpha, read_alpha, read_picture, unpack_picture, write_png, write_png_to,
+};
 pub use pictures::{PictureKind, for_pictures};
 pub use raw::{RawMessage, RawMessages};
 pub use read::read_clip;

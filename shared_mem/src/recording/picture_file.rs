@@ -115,6 +115,15 @@ pub fn pack_picture(encoding: PixelEncoding, width: u32, height: u32, pixels: &[
     .map_err(|error| error.to_string())
 }
 
+/// `width * height` pixels of red, green, blue, alpha as the bytes of a PNG.
+///
+/// # Errors
+/// A sentence when the pixels are not that many.
+pub fn pack_with_alpha(width: u32, height: u32, rgba: &[u8]) -> Result<Vec<u8>, String> {
+    let kind = (png::ColorType::Rgba, png::BitDepth::Eight);
+    pack(width, height, rgba, kind, png::Compression::default()).map_err(|error| error.to_string())
+}
+
 /// `width * height` pixels of red, green, blue as the bytes of a PNG, in as little time as it takes: for pictures that are seen
 /// once.
 ///

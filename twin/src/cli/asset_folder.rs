@@ -1,9 +1,12 @@
 //! Folders of assets that the verbs of `twin reconstruct` fill, and the numbers that these take.
 
 use nalgebra::Point3;
+use reconstruct::assets;
 use reconstruct::mesh::Mesh;
+use reconstruct::scan::Frame;
 use shared_mem::output::OutputFolder;
 use shared_mem::quantity::number;
+use splat::SplatCloud;
 use std::path::{Path, PathBuf};
 
 /// Where a command of these writes.
@@ -18,6 +21,21 @@ pub(super) struct Outputs {
     /// Prints one JSON object on stdout at the end
     #[arg(long)]
     pub(super) json: bool,
+}
+
+/// What goes to other trainers of splats.
+#[derive(clap::Args)]
+pub(super) struct Dataset {
+    /// Adds dataset/ for other trainers of splats, as brush: pictures with alpha, a COLMAP model, init.ply
+    #[arg(long)]
+    dataset: bool,
+}
+
+impl Dataset {
+    /// Files of the dataset, where it is wanted, with `origin` as that of its frame.
+    pub(super) fn files(&self, train: &[Frame], splats: &SplatCloud, origin: &Point3<f64>) -> Vec<(PathBuf, Vec<u8>)> {
+        if self.dataset { assets::dataset_files(train, splats, origin) } else { Vec::new() }
+    }
 }
 
 impl Outputs {

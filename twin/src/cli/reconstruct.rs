@@ -1,8 +1,9 @@
 //! `twin reconstruct`: assets of a simulation out of scans.
 
 use super::articulated::ArticulatedVerb;
-use super::asset_folder::{Outputs, kept, mass, metres, piece};
+use super::asset_folder::{Dataset, Outputs, kept, mass, metres, piece};
 use anyhow::{Context as _, ensure};
+use nalgebra::Point3;
 use reconstruct::assets::{self, Labels};
 use reconstruct::mesh::Mesh;
 use reconstruct::object::{self, Object, Options};
@@ -48,6 +49,7 @@ report.html. After Ctrl-C the same command goes on.
 Examples:
   twin reconstruct object scan --out mug
   twin reconstruct object scan --out mug --mass 0.118
+  twin reconstruct object scan --out mug --dataset
   twin reconstruct object phone_scan --scale 0.0231 --out box --json")]
 pub(crate) struct ObjectVerb {
     /// Folder with the scan, or its transforms.json or poses.json
@@ -55,6 +57,8 @@ pub(crate) struct ObjectVerb {
     scan: PathBuf,
     #[command(flatten)]
     outputs: Outputs,
+    #[command(flatten)]
+    dataset: Dataset,
     /// Metres for one unit of the poses, 1e-6 to 1000 [default: as depth or the robot says]
     #[arg(long, value_name = "METRES", value_parser = metres)]
     scale: Option<f64>,
@@ -94,6 +98,8 @@ pub(crate) struct SceneVerb {
     scan: PathBuf,
     #[command(flatten)]
     outputs: Outputs,
+    #[command(flatten)]
+    dataset: Dataset,
     /// Metres for one unit of the poses, 1e-6 to 1000 [default: as depth or the robot says]
     #[arg(long, value_name = "METRES", value_parser = metres)]
     scale: Option<f64>,
@@ -122,7 +128,8 @@ impl SceneVerb {
         let options = scene::Options { scale, voxel, planar: self.planes, steps: self.steps as usize };
         let scene = scene::reconstruct(scan, &options, &kept)?;
         let command = format!("twin reconstruct scene {} --out {}", self.scan.display(), self.outputs.out.display());
-        for (path, bytes) in assets::scene_files(&scene, &command) {
+        let dataset = self.dataset.files(&scene.train, &scene.splats, &Point3::origin());
+        for (path, bytes) in assets::scene_files(&scene, &command).into_iter().chain(dataset) {
             folder.write(&path, &bytes)?;
         }
         ensure!(!ending::asked(), "interrupted; the same command goes on from there");
@@ -180,7 +187,8 @@ impl ObjectVerb {
         let name = self.name.clone().or_else(|| named(&self.outputs.out)).unwrap_or_else(|| "object".into());
         let command = format!("twin reconstruct object {} --out {}", self.scan.display(), self.outputs.out.display());
         let labels = Labels { name, mass: self.mass, command };
-        for (path, bytes) in assets::files(&object, &pieces, &labels) {
+        let dataset = self.dataset.files(&object.train, &object.splats, &middle);
+        for (path, bytes) in assets::files(&object, &pieces, &labels).into_iter().chain(dataset) {
             folder.write(&path, &bytes)?;
         }
         ensure!(!ending::asked(), "interrupted; the same command goes on from there");

@@ -105,7 +105,7 @@ impl SceneSummary {
             planar: scene.planar,
             voxel_m: scene.voxel,
             scale: scene.scale,
-            views: scene.views,
+            views: scene.train.len(),
             held_out: scene.held_out.iter().map(view).collect(),
             psnr_db: scene.psnr(),
             depth_off_m: scene.depth_off(),
