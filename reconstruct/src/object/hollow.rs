@@ -18,7 +18,7 @@ use std::collections::BTreeMap;
 const BESIDE: f64 = 1.75;
 /// What lies nearer than this to a surface that stays does so, too [voxel]: a wall has two surfaces, and nodes between them.
 const WALL: f32 = 1.8;
-/// Of what is opened, gaps narrower than twice this are filled again [voxel]: corners that go back by themselves leave tunnels.
+/// Of what is opened, gaps narrower than twice this are filled again [voxel]: corners that go back by themselves leave narrow pits.
 const NARROW: f32 = 1.5;
 /// A round that opens less than this share of the body is the last.
 const LITTLE: f64 = 0.003;
