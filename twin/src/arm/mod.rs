@@ -64,7 +64,7 @@ pub use nearest::Nearest;
 pub use parts::Part;
 pub use shared_mem::msg::{Joints, MAX_JOINTS};
 pub use transmission::{Passed, Spring, Transmission};
-pub use urdf::{LinkFrame, UrdfBody, UrdfForm, UrdfFrames, UrdfJoint, UrdfShape};
+pub use urdf::{LinkFrame, UrdfBody, UrdfForm, UrdfFrames, UrdfJoint, UrdfShape, with_joint_friction};
 pub use yielding::{FlangeMotion, Yielding};
 
 /// Positions and velocities of all joints.

@@ -20,6 +20,21 @@ use std::collections::HashMap;
 use std::path::Path;
 use urdf_rs::{JointType, Pose, Robot};
 
+/// The text of a URDF with the dry friction [N m or N] and the damping [N m s/rad or N s/m] of a joint, all else as it is; `file` names it
+/// in errors.
+///
+/// # Errors
+/// [`ModelError`] with the line, where it is no XML or has no such joint.
+pub fn with_joint_friction(
+    text: &str,
+    file: &Path,
+    joint: &str,
+    [friction, damping]: [f64; 2],
+) -> Result<String, ModelError> {
+    let fault = |error: urdf_rs::UrdfError| ModelError::Read { path: file.to_owned(), what: error.to_string() };
+    urdf_rs::with_dynamics(text, joint, friction, damping).map_err(fault)
+}
+
 /// Reads the serial chain of a URDF. The flange is the end of the fixed joints behind the last movable one, following
 /// the first of them in file order at each fork.
 pub(super) fn chain(file: &Path) -> Result<Chain, ModelError> {

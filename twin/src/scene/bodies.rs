@@ -2,7 +2,7 @@
 
 use super::{MOST_BODIES, MeshFileError, ObjectModel, ObjectShape, mesh_file};
 use crate::arm::{UrdfBody, UrdfForm};
-use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Point3, Vector3};
 use shared_mem::cell::{Cell, Object};
 use shared_mem::input;
 use shared_mem::msg::object::{NAME_LENGTH, ObjectName};
@@ -134,16 +134,9 @@ pub fn poses_in_root(own: &[&CellBody], position: impl Fn(&UrdfBody) -> f64) -> 
     let mut poses: Vec<Isometry3<f64>> = Vec::new();
     for body in own {
         let joint = body.link.as_ref().and_then(|link| Some((link.joint.as_ref()?, position(link))));
-        poses.push(joint.map_or_else(Isometry3::identity, |(joint, position)| {
-            let moved = match joint.slides {
-                true => Isometry3::from_parts((joint.axis.into_inner() * position).into(), nalgebra::one()),
-                false => Isometry3::from_parts(
-                    Translation3::identity(),
-                    UnitQuaternion::from_axis_angle(&joint.axis, position),
-                ),
-            };
-            poses[joint.parent] * joint.at * moved
-        }));
+        poses.push(
+            joint.map_or_else(Isometry3::identity, |(joint, position)| poses[joint.parent] * joint.pose_at(position)),
+        );
     }
     poses
 }

@@ -17,6 +17,7 @@
 //! | `patch` | the impulses of one patch: load, friction, torsion |
 //! | `rail` | the impulses of one joint: dry friction, limits, drive |
 //! | `outside` | what is put in from outside and read back in every step |
+//! | `lone_joint` | one part on its joint while nothing touches it, fast enough to be fitted |
 //!
 //! World frame with z up, SI. There is no restitution: what hits stays. Not rapier: its friction turns a spinning box
 //! 32 % too far, and its joints report no forces. The step asks nothing of the allocator.
@@ -24,6 +25,7 @@
 mod arm;
 mod dynamics;
 mod freedom;
+mod lone_joint;
 mod outside;
 mod patch;
 mod plan;
@@ -34,6 +36,7 @@ mod touch;
 mod tree;
 
 pub use arm::ArmPlan;
+pub use lone_joint::LoneJoint;
 pub use outside::{BodyMotion, Load};
 pub use plan::{BodyPlan, Drive, Hold, JointKind, JointPlan, Piece, PlanError, box_hull, cylinder_hull};
 

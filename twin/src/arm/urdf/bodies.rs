@@ -2,7 +2,7 @@
 
 use super::{Tree, at_line, isometry, read};
 use crate::arm::{MassProperties, ModelError};
-use nalgebra::{Isometry3, Unit, Vector3};
+use nalgebra::{Isometry3, Unit, UnitQuaternion, Vector3};
 use std::path::Path;
 use urdf_rs::{JointType, Shape};
 
@@ -38,6 +38,18 @@ pub struct UrdfJoint {
     pub friction: f64,
     /// Viscous friction [N m s/rad or N s/m].
     pub damping: f64,
+}
+
+impl UrdfJoint {
+    /// The body's frame in that of the body that it hangs on, at a position [rad or m].
+    #[must_use]
+    pub fn pose_at(&self, position: f64) -> Isometry3<f64> {
+        let moved = match self.slides {
+            true => Isometry3::from_parts((self.axis.into_inner() * position).into(), nalgebra::one()),
+            false => Isometry3::from_parts(nalgebra::one(), UnitQuaternion::from_axis_angle(&self.axis, position)),
+        };
+        self.at * moved
+    }
 }
 
 /// A shape around the origin of its frame.
