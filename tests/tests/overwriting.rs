@@ -44,6 +44,8 @@ fn an_output_that_is_there_is_kept_and_the_way_to_replace_it_is_told_at_once() {
         ("calibration identify arm {dir}/none --report {dir}/there.html", "there.html"),
         ("calibration identify object {dir}/none --out {dir}/there.toml", "there.toml"),
         ("calibration identify object {dir}/none --report {dir}/there.html", "there.html"),
+        ("calibration identify joint {dir}/none --out {dir}/there.toml", "there.toml"),
+        ("calibration identify joint {dir}/none --report {dir}/there.html", "there.html"),
         ("calibration diagnose {dir}/none --out {dir}/there.json", "there.json"),
         ("calibration diagnose {dir}/none --report {dir}/there.html", "there.html"),
         ("calibration diagnose {dir}/none --theta {dir}/there.toml", "there.toml"),
@@ -81,6 +83,7 @@ fn an_output_without_a_folder_is_told_before_the_work() {
     for line in [
         "calibration identify arm {dir}/none --report {dir}/nowhere/page.html",
         "calibration identify object {dir}/none --out {dir}/nowhere/theta.toml",
+        "calibration identify joint {dir}/none --out {dir}/nowhere/found.urdf",
         "calibration diagnose {dir}/none --report {dir}/nowhere/page.html",
         "calibration diagnose {dir}/none --out {dir}/nowhere/d.json",
         "calibration benchmark --short --cell {cell} --report {dir}/nowhere/page.html",

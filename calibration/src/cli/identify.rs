@@ -3,7 +3,7 @@
 use super::engine::{EngineArguments, heard};
 use super::print;
 use calibration::check::gate;
-use calibration::identify::{Identification, Optimizer, arm, object};
+use calibration::identify::{Identification, Optimizer, arm, joint, object};
 use calibration::interrupt::Interrupt;
 use calibration::report::terminal;
 use clap::{Subcommand, ValueEnum};
@@ -17,6 +17,8 @@ pub(super) enum Identify {
     Arm(ArmArguments),
     /// Friction, mass, centre of mass and tip friction of the object, from clips in which the arm hits it.
     Object(ObjectArguments),
+    /// Friction and damping of a laptop's hinge or a drawer's slide, from clips in which its part moves by itself after a push.
+    Joint(JointArguments),
 }
 
 /// What both are asked for.
@@ -112,6 +114,61 @@ pub(super) struct ObjectArguments {
     budget: u32,
 }
 
+#[derive(Debug, clap::Args)]
+#[command(after_help = "\
+The object stands in cell.toml as an [[object]] with a `urdf`, as `twin reconstruct articulated` writes one. A clip has the poses of both
+of its links, on /object/NAME/pose and /object/NAME_LINK/pose, while somebody or the robot pushes the part and lets go: what counts
+of each motion is its end, from where weight and friction alone explain it until the part rests or runs into something. Push three
+times and more, with different strength. Of several motions each is held out in turn.
+
+Weight and inertia are those of the URDF: what is found is in proportion to them. --out is the URDF with what was found in the
+joint's <dynamics>; write it beside the URDF, whose meshes it names.
+
+Examples:
+  calibration identify joint pushes --out laptop/identified.urdf --report hinge.html
+  calibration identify joint pushes --object desk --joint rail --json")]
+pub(super) struct JointArguments {
+    /// Session folder, or one clip beside a cell.toml.
+    #[arg(value_name = "SESSION")]
+    session: PathBuf,
+    /// What the laboratory knows about its cell [default: cell.toml beside the clips].
+    #[arg(long, value_name = "CELL.TOML")]
+    cell: Option<PathBuf>,
+    /// Of several objects with a `urdf` in cell.toml the one in question.
+    #[arg(long, value_name = "NAME")]
+    object: Option<String>,
+    /// Of several joints of its URDF the one in question.
+    #[arg(long, value_name = "NAME")]
+    joint: Option<String>,
+    /// Where the URDF with what was found goes.
+    #[arg(long, value_name = "FILE.URDF")]
+    out: Option<PathBuf>,
+    /// Replaces the files of --out and --report.
+    #[arg(long)]
+    force: bool,
+    /// Prints one JSON object on stdout at the end.
+    #[arg(long)]
+    json: bool,
+    /// Writes a page with pictures.
+    #[arg(long, value_name = "PAGE.HTML")]
+    report: Option<PathBuf>,
+}
+
+impl JointArguments {
+    fn run(self, interrupt: &Interrupt) -> anyhow::Result<()> {
+        let Self { session, cell, object, joint, out, force, json, report } = self;
+        Destination::apart(&[out.as_deref(), report.as_deref()])?;
+        Destination::of(out.as_deref(), force)?;
+        let page = Destination::of(report.as_deref(), force)?;
+        let found = joint::identify(&joint::Options { session, cell, object, joint, out }, interrupt)?;
+        let sheet = found.sheet();
+        if let Some(page) = page {
+            page.write(sheet.page())?;
+        }
+        print(json, &found, terminal::identification(&sheet))
+    }
+}
+
 /// Ways of searching, by their names on the command line.
 #[derive(Debug, Clone, Copy, ValueEnum)]
 enum Way {
@@ -149,6 +206,7 @@ pub(super) fn run(identify: Identify, interrupt: &Interrupt) -> anyhow::Result<(
             let options = object::Options { session, cell, object, optimizer, out, parameters, budget, seed, engine };
             heard(asked.as_ref(), object::identify(&options, interrupt).map_err(anyhow::Error::from))
         }),
+        Identify::Joint(arguments) => arguments.run(interrupt),
     }
 }
 

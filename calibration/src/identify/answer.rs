@@ -12,11 +12,14 @@ use std::path::PathBuf;
 /// An identification; what is not marked as an index is in SI units.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct Identification {
-    /// `arm` or `object`.
+    /// `arm`, `object` or `joint`.
     pub target: String,
     /// Of several objects in cell.toml the one that this is about.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub object: Option<String>,
+    /// The joint of that object that this is about, where it moves in itself.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub joint: Option<String>,
     /// The session's folder.
     pub session: String,
     /// How it was named.
@@ -115,6 +118,9 @@ pub struct Figures {
     pub joint_rms_rad: Option<f64>,
     /// Mean over the rows of the 2-norm of the joints' errors [rad].
     pub joint_norm_rad: Option<f64>,
+    /// Root mean square of a slide's position [m].
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub joint_rms_m: Option<f64>,
     /// ADD of the object [m].
     pub object_add_m: Option<f64>,
     /// ADD-S of the object [m].
@@ -196,6 +202,7 @@ impl Figures {
         Self {
             joint_rms_rad: of(|f| f.joint_rms_rad, 2),
             joint_norm_rad: of(|f| f.joint_norm_rad, 1),
+            joint_rms_m: of(|f| f.joint_rms_m, 2),
             object_add_m: of(|f| f.object_add_m, 1),
             object_add_s_m: of(|f| f.object_add_s_m, 1),
         }
@@ -221,11 +228,12 @@ impl Identification {
             push("ADD", "m", before.object_add_m, after.object_add_m);
             push("ADD-S", "m", before.object_add_s_m, after.object_add_s_m);
             push("joint error (RMS)", "rad", before.joint_rms_rad, after.joint_rms_rad);
+            push("joint error (RMS)", "m", before.joint_rms_m, after.joint_rms_m);
         }
         let clip = |clip: &ClipGap| SheetClip {
             file: clip.file.clone(),
             used: clip.used.clone(),
-            error: [clip.before, clip.after].map(|f| f.object_add_m.or(f.joint_rms_rad)),
+            error: [clip.before, clip.after].map(|f| f.object_add_m.or(f.joint_rms_rad).or(f.joint_rms_m)),
             remark: clip.warnings.join("; "),
         };
         let left_out = |clip: &LeftOut| SheetClip {
@@ -247,7 +255,11 @@ impl Identification {
                 .collect(),
             errors,
             clips: self.by_clip.iter().map(clip).chain(self.clips.left_out.iter().map(left_out)).collect(),
-            clip_error: if self.gap.train.object_add_m.is_some() { ["ADD", "m"] } else { ["joint error (RMS)", "rad"] },
+            clip_error: match self.gap.train {
+                Figures { object_add_m: Some(_), .. } => ["ADD", "m"],
+                Figures { joint_rms_m: Some(_), .. } => ["joint error (RMS)", "m"],
+                _ => ["joint error (RMS)", "rad"],
+            },
             traces: self.traces.clone(),
             convergence: self.convergence.clone(),
             names: self.names.iter().map(|name| number_in_words(name)).collect(),
@@ -271,6 +283,7 @@ impl Identification {
             f.object_add_m
                 .map(|m| format!("{:.2} mm ADD", m * 1e3))
                 .or_else(|| f.joint_rms_rad.map(|rad| format!("{:.3} mrad", rad * 1e3)))
+                .or_else(|| f.joint_rms_m.map(|m| format!("{:.3} mm", m * 1e3)))
         };
         let (set, before, after) = if self.clips.holdout.is_empty() {
             ("the clips it was fitted to", &self.gap.train_before, &self.gap.train)

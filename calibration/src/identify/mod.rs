@@ -5,6 +5,7 @@
 //! |---|---|
 //! | [`arm`] | gains of the controller, and arm effects on request |
 //! | [`object`] | friction, mass, centre of mass and tip friction of the object |
+//! | [`joint`] | friction and damping of a hinge or a slide of an object that moves in itself |
 //! | [`split`] | which clips are fitted and which are held out |
 //! | [`answer`] | what is found, as JSON, as a page, as lines for a terminal |
 //! | `remarks` | what is odd about clips, told once for all that share it |
@@ -12,6 +13,7 @@
 
 pub mod answer;
 pub mod arm;
+pub mod joint;
 pub mod object;
 pub(crate) mod remarks;
 mod run;

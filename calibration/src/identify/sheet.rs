@@ -7,7 +7,7 @@ use std::path::PathBuf;
 /// Everything on the page. SI units.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Sheet {
-    /// `arm` or `object`.
+    /// `arm`, `object` or `joint`.
     pub target: String,
     /// The session's folder.
     pub session: String,

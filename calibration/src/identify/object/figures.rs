@@ -93,5 +93,6 @@ pub(super) fn figures(gap: &Gap) -> Figures {
         joint_norm_rad: None,
         object_add_m: gap.object_add_m,
         object_add_s_m: gap.object_add_s_m,
+        ..Figures::default()
     }
 }

@@ -1,0 +1,179 @@
+//! The answer: friction and damping with their intervals, how far the twin is off, what the clips cannot tell.
+
+use super::fit::Found;
+use super::model::Motion;
+use super::{Looked, Material};
+use crate::estimate::ClipFit;
+use crate::identify::answer::{ClipGap, Clips, Figures, Gap, Identification, Parameter, Untold};
+use crate::identify::remarks::grouped;
+use crate::page::Trace;
+use std::collections::BTreeMap;
+
+/// Below so many motions the interval rests on how noisy the poses are: whether friction is the same each time remains open.
+const FEW: usize = 3;
+/// Residuals so many times the noise are no noise.
+const COARSE: f64 = 1.5;
+
+/// `before` are the motions with what the URDF says, `held_out` each with what the others say.
+pub(super) fn answer(
+    material: &Material,
+    (motions, found): (&[Motion], &Found),
+    before: &[ClipFit],
+    held_out: Option<&[ClipFit]>,
+) -> Identification {
+    let slides = material.subject.joint.slides;
+    let rms = |fits: &[ClipFit], motions: &[Motion]| {
+        let (sum, rows) = fits
+            .iter()
+            .zip(motions)
+            .fold((0.0, 0), |(sum, rows), (fit, motion)| (sum + fit.chi2 * motion.sigma.powi(2), rows + fit.rows));
+        figures(slides, (sum / rows.max(1) as f64).sqrt())
+    };
+    let [old, new] = [before, &found.fit.clips].map(|fits| rms(fits, motions));
+    let gap = Gap {
+        train: new,
+        train_before: old,
+        holdout: held_out.map_or_else(Figures::default, |fits| rms(fits, motions)),
+        holdout_before: held_out.map_or_else(Figures::default, |_| old),
+    };
+    let used = || material.looked.iter().filter(|looked| !looked.motions.is_empty());
+    let files: Vec<String> = used().map(|looked| looked.clip.file.clone()).collect();
+    let mut first = 0;
+    let mut by_clip = Vec::new();
+    for looked in used() {
+        let rows = first..first + looked.motions.len();
+        first = rows.end;
+        let after =
+            rms(held_out.unwrap_or(&found.fit.clips).get(rows.clone()).unwrap_or_default(), &motions[rows.clone()]);
+        by_clip.push(ClipGap {
+            file: looked.clip.file.clone(),
+            used: if held_out.is_some() { "held out in turn".into() } else { "fitted".into() },
+            joint_rms_rad: after.joint_rms_rad.into_iter().collect(),
+            after,
+            before: rms(&before[rows.clone()], &motions[rows]),
+            warnings: vec![in_words(looked, material.subject.units()[0])],
+        });
+    }
+    let names = found.unknowns.iter().map(|unknown| unknown.name.clone());
+    Identification {
+        target: "joint".into(),
+        object: Some(material.subject.object.clone()),
+        joint: Some(material.subject.joint.name.clone()),
+        parameters: parameters(material, found),
+        not_identifiable: not_identifiable(found),
+        gap,
+        clips: Clips {
+            holdout: if held_out.is_some() { files.clone() } else { Vec::new() },
+            train: files,
+            left_out: material.left_out.clone(),
+        },
+        by_clip,
+        optimizer: "least-squares".into(),
+        evaluations: found.fit.evaluations,
+        witnesses: found.intervals.witnesses,
+        misfit: found.fit.misfit().sqrt(),
+        converged: found.fit.converged,
+        names: names.collect(),
+        correlation: found.intervals.correlation.row_iter().map(|row| row.iter().copied().collect()).collect(),
+        warnings: warnings(material, motions, found),
+        traces: traces(material, motions, [before, &found.fit.clips], found),
+        ..Identification::default()
+    }
+}
+
+fn figures(slides: bool, rms: f64) -> Figures {
+    if slides {
+        Figures { joint_rms_m: Some(rms), ..Figures::default() }
+    } else {
+        Figures { joint_rms_rad: Some(rms), ..Figures::default() }
+    }
+}
+
+fn parameters(material: &Material, found: &Found) -> BTreeMap<String, Parameter> {
+    let [_, friction, damping] = material.subject.units();
+    let joint = &material.subject.joint;
+    let parameter = |(k, (unit, start)): (usize, (&str, f64))| {
+        let parameter = Parameter {
+            value: vec![found.fit.shared[k]],
+            ci95: vec![found.interval(k)],
+            unit: unit.into(),
+            start: vec![start],
+            single: true,
+        };
+        (found.unknowns[k].name.clone(), parameter)
+    };
+    [(friction, joint.friction), (damping, joint.damping)].into_iter().enumerate().map(parameter).collect()
+}
+
+fn not_identifiable(found: &Found) -> Vec<Untold> {
+    let untold = |k: usize| Some(Untold { parameter: found.unknowns[k].name.clone(), why: found.open(k)?.into() });
+    (0..found.unknowns.len()).filter_map(untold).collect()
+}
+
+fn in_words(looked: &Looked, unit: &str) -> String {
+    let stretch = |alone: &super::Alone| {
+        let [first, last] = [alone.rows.start, alone.rows.end - 1].map(|row| looked.clip.times[row]);
+        let travel = alone.motion.travel();
+        format!("moves by itself from {first:.2} to {last:.2} s, over {travel:.3} {unit}")
+    };
+    looked.motions.iter().map(stretch).collect::<Vec<_>>().join("; ")
+}
+
+fn warnings(material: &Material, motions: &[Motion], found: &Found) -> Vec<String> {
+    let subject = &material.subject;
+    let mut all = vec![format!(
+        "in proportion to the inertia that the URDF gives `{}` about its axis or along it, {:.4} {}",
+        subject.bodies[1],
+        motions[0].joint.inertia,
+        if subject.joint.slides { "kg" } else { "kg m^2" }
+    )];
+    if motions.len() < FEW {
+        all.push(format!(
+            "only {} of the part: whether friction is the same each time remains open; record at least {FEW} pushes",
+            if motions.len() == 1 { "one motion".to_owned() } else { format!("{} motions", motions.len()) }
+        ));
+    }
+    if found.fit.misfit().sqrt() > COARSE {
+        all.push(format!(
+            "what is left is {:.1} times the noise of the poses: this joint is not slowed by dry friction and damping alone, or not each \
+             time alike; the intervals are as much wider",
+            found.fit.misfit().sqrt()
+        ));
+    }
+    let contradicted = material.holds().filter(|[least, _]| *least > found.interval(0)[1]);
+    match contradicted {
+        Some([least, at]) => all.push(format!(
+            "where the part rests at {at:.2} {}, dry friction would hold {least:.3} {} of its weight, more than was found: something else \
+             holds it there, or its mass or centre of mass in the URDF is wrong",
+            subject.units()[0],
+            subject.units()[1]
+        )),
+        None => all.extend(material.holds_in_words()),
+    }
+    all.extend(grouped(material.left_out.iter().map(|clip| (clip.file.as_str(), clip.why.as_str()))));
+    all
+}
+
+fn traces(material: &Material, motions: &[Motion], fits: [&[ClipFit]; 2], found: &Found) -> Vec<Trace> {
+    let joint = &material.subject.joint;
+    let files = material.looked.iter().flat_map(|looked| looked.motions.iter().map(move |alone| (looked, alone)));
+    let numbers = [[joint.friction, joint.damping], found.numbers()];
+    let trace = |(k, (looked, alone)): (usize, (&Looked, &super::Alone))| {
+        let motion = &motions[k];
+        let from = looked.clip.times[alone.rows.start];
+        let off = |which: usize| {
+            let predicted = motion.predicted(numbers[which], &fits[which][k].own);
+            let row = |(time, (measured, predicted)): (&f64, (&f64, &f64))| [from + time, measured - predicted];
+            motion.times.iter().zip(motion.positions.iter().zip(&predicted)).map(row).collect()
+        };
+        Trace {
+            clip: looked.clip.file.clone(),
+            channel: joint.name.clone(),
+            unit: material.subject.units()[0].into(),
+            sigma: motion.sigma,
+            before: off(0),
+            after: off(1),
+        }
+    };
+    files.enumerate().map(trace).collect()
+}
