@@ -86,7 +86,7 @@ fn a_hinge_is_found_from_three_pushes_and_written_into_its_urdf() {
     let folder = session(&[3.0, 4.0, 5.0]);
     let out = folder.path().join("found.urdf");
     let found = identify(folder.path(), Some(&out)).expect("an answer");
-    for (name, truth) in [("friction", FRICTION), ("damping", DAMPING)] {
+    for (name, truth) in [("dry_friction", FRICTION), ("viscous_friction", DAMPING)] {
         let parameter = &found.parameters[name];
         let [low, high] = parameter.ci95[0];
         assert!((low..=high).contains(&truth), "{name}: {parameter:?}");
@@ -100,7 +100,7 @@ fn a_hinge_is_found_from_three_pushes_and_written_into_its_urdf() {
     let written = UrdfBody::of(&text, &out).expect("a URDF")[1].joint.clone().expect("a hinge");
     assert_eq!(
         [written.friction, written.damping],
-        ["friction", "damping"].map(|name| found.parameters[name].value[0])
+        ["dry_friction", "viscous_friction"].map(|name| found.parameters[name].value[0])
     );
     let page = found.sheet().page();
     assert!(page.contains("push_1") && page.contains("held out in turn"), "a page");

@@ -1,6 +1,6 @@
 """Friction and damping of hinges and slides: `calibration identify joint` on pushes simulated by MuJoCo.
 
-    joints.py --program target/release/calibration --out joints --sessions 20 [--pushes 3] [--kinds laptop box drawer gate]
+    joints.py --program target/release/calibration --out joints --sessions 20 [--pushes 3] [--noise 0.2] [--kinds laptop box drawer gate]
 
 Each session draws an object (masses and sizes; a laptop's lid that stands or falls shut, a box's lid, a drawer, a gate with an upright axis),
 its dry friction and damping, and how it is seen: 30 or 60 poses a second of each link, noise of 1 mm and 5 mrad, half of it lasting for
@@ -131,9 +131,9 @@ def times(a, b):
 class Seen:
     """A tracker's noise: half of its variance lasts for some frames."""
 
-    def __init__(self, rng):
+    def __init__(self, rng, noise):
         self.rng, self.lasting = rng, np.zeros(6)
-        self.sigma = np.array([1e-3] * 3 + [5e-3] * 3)
+        self.sigma = noise * np.array([1e-3] * 3 + [5e-3] * 3)
 
     def pose(self, place, turn):
         self.lasting = 0.7 * self.lasting + np.sqrt(1 - 0.49) * self.rng.normal(size=6)
@@ -142,7 +142,7 @@ class Seen:
         return place + noise[:3], times(turn, turned(noise[3:], angle))
 
 
-def record(folder, o, rng, pushes):
+def record(folder, o, rng, pushes, noise):
     """Clips as ROS 2 bags, cell.toml and the URDF."""
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "object.urdf").write_text(urdf(o))
@@ -157,7 +157,7 @@ def record(folder, o, rng, pushes):
         name = f"clip_{clip:02}.mcap"
         with open(folder / name, "wb") as stream:
             written = bag.Bag(stream)
-            seen = [Seen(rng), Seen(rng)]
+            seen = [Seen(rng, noise), Seen(rng, noise)]
             for row in range(0, len(positions), every):
                 q = positions[row]
                 turn = base[1] if o["slides"] else times(base[1], turned(o["axis"], q))
@@ -179,11 +179,11 @@ def judged(program, folder, o):
         return dict(error=done.stderr.strip().splitlines()[-1])
     answer = json.loads(done.stdout)
     out = {}
-    for name in ("friction", "damping"):
-        found = answer["parameters"][name]
+    for name, key in (("friction", "dry_friction"), ("damping", "viscous_friction")):
+        found = answer["parameters"][key]
         # No interval of a number that is held.
         low, high = (end if end is not None else float("inf") for end in found["ci95"])
-        open_ = any(u["parameter"] == name for u in answer["not_identifiable"])
+        open_ = any(u["parameter"] == key for u in answer["not_identifiable"])
         out[name] = dict(value=found["value"], low=low, high=high, truth=o[name], open=open_)
     # At half the speed of the pushes.
     slows = lambda key: out["friction"][key] + 0.5 * o["rate"] * out["damping"][key]
@@ -210,6 +210,7 @@ def main():
     parser.add_argument("--sessions", type=int, default=20, help="of each kind")
     parser.add_argument("--pushes", type=int, default=3)
     parser.add_argument("--kinds", nargs="+", choices=KINDS, default=KINDS)
+    parser.add_argument("--noise", type=float, default=1.0, help="times 1 mm and 5 mrad")
     parser.add_argument("--seed", type=int, default=0)
     options = parser.parse_args()
     for kind in options.kinds:
@@ -219,7 +220,7 @@ def main():
             o = draw(kind, rng)
             folder = options.out / f"{kind}_{options.seed}_{number}"
             if not (folder / "cell.toml").exists():
-                record(folder, o, rng, options.pushes)
+                record(folder, o, rng, options.pushes, options.noise)
             found = judged(options.program, folder, o)
             print(line(number, kind, found), flush=True)
             all_found.append(found)

@@ -104,7 +104,7 @@ mod tests {
     #[test]
     fn a_part_moves_and_stops_as_in_a_world_of_bodies() {
         for slides in [false, true] {
-            for (friction, damping, start) in [(0.0, 0.0, 1.3), (0.1, 0.0, 1.3), (0.0, 0.05, -0.8), (0.2, 0.03, 0.4)] {
+            for (friction, damping, start) in [(0.0, 0.0, 1.3), (0.1, 0.0, 1.3), (0.0, 0.05, -0.8), (0.1, 0.03, 1.2)] {
                 let joint = joint(slides, friction, damping);
                 let (mut world, part) = world(&joint, start);
                 let alone = LoneJoint::new(&joint, &part, &UnitQuaternion::identity());

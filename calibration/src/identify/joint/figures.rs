@@ -140,15 +140,16 @@ fn warnings(material: &Material, motions: &[Motion], found: &Found) -> Vec<Strin
             found.fit.misfit().sqrt()
         ));
     }
-    let contradicted = material.holds().filter(|[least, _]| *least > found.interval(0)[1]);
-    match contradicted {
-        Some([least, at]) => all.push(format!(
+    let [low, high] = found.interval(0);
+    match material.holds() {
+        Some([least, at]) if least > high => all.push(format!(
             "where the part rests at {at:.2} {}, dry friction would hold {least:.3} {} of its weight, more than was found: something else \
              holds it there, or its mass or centre of mass in the URDF is wrong",
             subject.units()[0],
             subject.units()[1]
         )),
-        None => all.extend(material.holds_in_words()),
+        Some([least, _]) if least > low => all.extend(material.holds_in_words()),
+        _ => {}
     }
     all.extend(grouped(material.left_out.iter().map(|clip| (clip.file.as_str(), clip.why.as_str()))));
     all

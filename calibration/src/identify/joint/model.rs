@@ -107,7 +107,7 @@ impl Motions<'_> {
             upper: upper[k] + more,
             step: SHARED_STEP * whole[k],
         };
-        [unknown("friction", 0, 2.0 * held), unknown("damping", 1, 0.0)]
+        [unknown("dry_friction", 0, 2.0 * held), unknown("viscous_friction", 1, 0.0)]
     }
 
     /// The own numbers of each motion: its start.

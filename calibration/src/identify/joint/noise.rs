@@ -2,7 +2,7 @@
 //! part rests.
 
 /// Rows of a window in which a part may rest.
-const WINDOW: usize = 20;
+const WINDOW: usize = 30;
 /// A window is one of rest if its rows scatter by at most so many times what changes from row to row.
 const RESTS: f64 = 3.0;
 /// Degree of a smooth curve through a window in which it moves.
@@ -41,7 +41,9 @@ impl Noise {
         if all.is_empty() {
             return Self { sigma: white, lasts: 1.0 };
         }
-        let [variance, first, second] = [0, 1, 2].map(|lag| middle(all.iter().map(|window| window[lag]).collect()));
+        // Windows of rest are all of one kind; of curves some are steeper than a polynomial.
+        let typical: fn(Vec<f64>) -> f64 = if taken > 1.0 { middle } else { mean };
+        let [variance, first, second] = [0, 1, 2].map(|lag| typical(all.iter().map(|window| window[lag]).collect()));
         let mut noise = Self { sigma: white.max(variance.sqrt()), lasts: 1.0 };
         if variance <= 0.0 {
             return noise;
@@ -96,12 +98,15 @@ fn take_off(rows: &mut [f64], unit: &[f64]) {
     rows.iter_mut().zip(unit).for_each(|(row, unit)| *row -= along * unit);
 }
 
+fn mean(values: Vec<f64>) -> f64 {
+    values.iter().sum::<f64>() / values.len() as f64
+}
+
 /// Mean of the middle half.
 fn middle(mut values: Vec<f64>) -> f64 {
     values.sort_unstable_by(f64::total_cmp);
     let cut = values.len() / 4;
-    let middle = &values[cut..values.len() - cut];
-    middle.iter().sum::<f64>() / middle.len() as f64
+    mean(values[cut..values.len() - cut].to_vec())
 }
 
 fn median(mut values: Vec<f64>) -> f64 {
