@@ -11,7 +11,8 @@
 //! | `noise` | how noisy that is |
 //! | `model` | what friction and damping make of a motion |
 //! | `alone` | where in a clip the part moves by itself |
-//! | `agreement` | whether what is left is noise, in one motion and in all |
+//! | `agreement` | whether what is left of a motion is noise |
+//! | `together` | beginnings cut off and motions left out on which not all agree |
 //! | `fit` | both numbers, their intervals, what cannot be told |
 //! | `figures` | the answer |
 
@@ -25,6 +26,7 @@ mod positions;
 mod subject;
 #[cfg(test)]
 mod tests;
+mod together;
 
 use super::answer::{Identification, LeftOut};
 use super::remarks::grouped;
@@ -206,9 +208,9 @@ impl Material {
         let (mut clips, mut all): (Vec<usize>, Vec<Alone>) =
             own.flat_map(|(clip, looked)| looked.motions.iter().map(move |alone| (clip, alone.clone()))).unzip();
         loop {
-            agreement::cut_to_agree(&mut all, &self.noise);
+            together::cut_to_agree(&mut all, &self.noise);
             let motions: Vec<Motion> = all.iter().map(|alone| alone.motion.clone()).collect();
-            let Some(odd) = agreement::odd(&motions) else { break };
+            let Some(odd) = together::odd(&motions) else { break };
             let (clip, from) = (clips.remove(odd), all.remove(odd).rows.start);
             let Positions { file, times, .. } = &self.looked[clip].clip;
             let why = format!(

@@ -1,11 +1,11 @@
 //! Pushes with known friction, through noise: what is found, how sure, and what is said to be open.
 
-use super::agreement::cut_to_agree;
 use super::alone::{self, Alone};
 use super::fit::{Found, held_out};
 use super::model::Motion;
 use super::noise::Noise;
 use super::positions::Positions;
+use super::together::cut_to_agree;
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use rand::{RngExt as _, SeedableRng as _};
 use rand_distr::StandardNormal;
