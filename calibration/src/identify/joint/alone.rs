@@ -31,8 +31,9 @@ const STOPPED: f64 = 0.25;
 /// Ends and beginnings that are tried.
 const ENDS: usize = 12;
 const BEGINNINGS: usize = 24;
-/// Agreement is refused where a part's frame and the joint's law, which are not exact, explain it: this share of the travel.
+/// A part's frame and the joint's law are not exact: residuals of this share of the travel count as noise.
 const INEXACT: f64 = 1e-3;
+
 /// A motion and the rows of the clip that it is.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Alone {
@@ -48,7 +49,7 @@ pub(super) fn motions(clip: &Positions, joint: &LoneJoint, noise: &Noise) -> Vec
     moving.iter().zip(starts).filter_map(of).collect()
 }
 
-/// Rows in which the part rests for a while, with its median position there.
+/// Mean position of each stretch in which the part rests for a while [rad or m].
 pub(super) fn rests(clip: &Positions, noise: &Noise) -> Vec<f64> {
     let moving = moving(clip, noise);
     let ends = std::iter::once(0).chain(moving.iter().map(|rows| rows.end));

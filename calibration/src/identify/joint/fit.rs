@@ -1,4 +1,4 @@
-//! Friction and damping of all motions together, how sure they are, and what the motions do not tell.
+//! Friction and damping of all motions together, how sure they are, and what is not identifiable from the motions.
 
 use super::model::{Motion, Motions, best_fit};
 use super::noise::Noise;

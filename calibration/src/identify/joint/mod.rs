@@ -13,7 +13,7 @@
 //! | `alone` | where in a clip the part moves by itself |
 //! | `agreement` | whether what is left of a motion is noise |
 //! | `together` | beginnings cut off and motions left out on which not all agree |
-//! | `fit` | both numbers, their intervals, what cannot be told |
+//! | `fit` | both numbers, their intervals, what is not identifiable |
 //! | `figures` | the answer |
 
 mod agreement;

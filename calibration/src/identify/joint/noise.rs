@@ -50,7 +50,7 @@ impl Noise {
         }
         for _ in 0..ROUNDS {
             // The mean of a window is taken off, and with it this share of every covariance. Of curves the share is that of white noise:
-            // how much they take of noise that lasts cannot be told from a few rows.
+            // how much they take of noise that lasts is not identifiable from a few rows.
             let lost = if taken > 1.0 { taken } else { noise.lasts } / WINDOW as f64;
             let whole = variance / (1.0 - lost).max(0.5);
             let [first, second] = [first, second].map(|covariance| covariance / whole + lost);
@@ -109,7 +109,8 @@ fn middle(mut values: Vec<f64>) -> f64 {
     mean(values[cut..values.len() - cut].to_vec())
 }
 
-fn median(mut values: Vec<f64>) -> f64 {
+/// The middle of the values; 0 of none.
+pub(super) fn median(mut values: Vec<f64>) -> f64 {
     if values.is_empty() {
         return 0.0;
     }

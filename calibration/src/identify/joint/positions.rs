@@ -1,5 +1,6 @@
 //! Where a joint is over a clip: the pose of its part as seen from the body that carries it.
 
+use super::noise::median;
 use super::subject::Subject;
 use nalgebra::{Isometry3, Quaternion, UnitQuaternion};
 use shared_mem::recording::{Clip, ObjectSeries};
@@ -102,9 +103,4 @@ fn mean(rotations: &[UnitQuaternion<f64>]) -> UnitQuaternion<f64> {
         sum + if turn.dot(&first) < 0.0 { -turn } else { turn }
     });
     UnitQuaternion::try_new(sum, 1e-9).unwrap_or(first)
-}
-
-fn median(mut values: Vec<f64>) -> f64 {
-    let middle = values.len() / 2;
-    *values.select_nth_unstable_by(middle, f64::total_cmp).1
 }
