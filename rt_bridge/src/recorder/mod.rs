@@ -154,6 +154,13 @@ fn announcement(file: &Path) -> String {
     format!("recording to {}", file.display())
 }
 
+/// The remark that a clip holds of what is missing in it.
+fn loss(messages: u64) -> String {
+    format!(
+        "{messages} messages of the last half second are missing in the clip: this machine was too busy to hand them on; take other load off its disk and processors"
+    )
+}
+
 enum Reason {
     Told,
     Failed(String),
@@ -178,10 +185,20 @@ fn keep_writing(
         if let Err(e) = sources.drain_into(writer)? {
             return Ok(Reason::Failed(e.to_string()));
         }
-        if told {
-            return Ok(Reason::Told);
+        let flushes = now_ns() - flushed_ns >= FLUSH_EVERY_NS;
+        if (told || flushes)
+            && let Some(lost) = sources.newly_lost()
+        {
+            events.send(&Event::new(EventLevel::Warning, EventSource::Recorder, &loss(lost)))?;
         }
-        if now_ns() - flushed_ns >= FLUSH_EVERY_NS {
+        if told {
+            // The remark on what was lost belongs into the file as well.
+            return Ok(match sources.drain_into(writer)? {
+                Ok(()) => Reason::Told,
+                Err(e) => Reason::Failed(e.to_string()),
+            });
+        }
+        if flushes {
             flushed_ns = now_ns();
             for ignored in node.newly_ignored() {
                 events.send(&Event::new(EventLevel::Warning, EventSource::Recorder, &ignored.to_string()))?;

@@ -43,6 +43,8 @@ struct Counted {
     /// Of those taken, remarks for people: this recorder sends some itself.
     remarks: u64,
     lost: u64,
+    /// Of those lost, the ones that a remark has named.
+    named: u64,
     state: Option<(u64, u64)>,
     color: Option<u64>,
     depth: Option<u64>,
@@ -102,6 +104,12 @@ impl Sources {
     /// Messages lost so far.
     pub(super) fn lost(&self) -> u64 {
         self.counted.lost
+    }
+
+    /// Messages lost since this was last asked; `None` where there are none.
+    pub(super) fn newly_lost(&mut self) -> Option<u64> {
+        let lost = self.counted.lost - std::mem::replace(&mut self.counted.named, self.counted.lost);
+        (lost > 0).then_some(lost)
     }
 
     /// Sleeps a while, so that messages are written in batches: each wake-up costs more than writing a message.
