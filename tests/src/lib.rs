@@ -4,9 +4,11 @@
 //! the machine that runs tests is slow and shared.
 
 mod bench;
+mod judge;
 pub mod modules;
 mod program;
 pub mod texts;
 
 pub use bench::{Cell, lab_cell};
+pub use judge::Judge;
 pub use program::{Finished, Program, program_path};

@@ -6,21 +6,15 @@
 //! exceeded.
 #![allow(clippy::print_stdout)] // its answer
 
-mod judge;
 mod thrower;
 
-use judge::Judge;
 use shared_mem::topics;
 use shared_mem::transport::Node;
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
-use tests::{Cell, Finished, Program, lab_cell};
+use tests::{Cell, Finished, Judge, Program, lab_cell};
 use thrower::Thrower;
 
-/// What rounding may add to the ratio of a command.
-const ROUNDING: f64 = 1e-6;
-/// How far the arm may be beyond a command that is at a limit, as a share of the limit: it follows within its gains.
-const FOLLOWING: f64 = 1e-3;
 /// Pause between two messages of a topic.
 const PAUSE: Duration = Duration::from_millis(1);
 /// The same where only a recorder runs: it keeps what is valid.
@@ -95,12 +89,7 @@ fn report(
     let failed: Vec<String> =
         ended.iter().filter(|(_, e)| !e.status.success()).map(|(n, e)| format!("{n}: {}", e.status)).collect();
     let replaced = ended.iter().any(|(_, e)| e.stderr.contains("the recorder was killed"));
-    let exceeded: Vec<&str> = judge
-        .worst()
-        .iter()
-        .filter(|(w, r)| **r > 1.0 + if w.starts_with("state") { FOLLOWING } else { ROUNDING })
-        .map(|(w, _)| *w)
-        .collect();
+    let exceeded = judge.exceeded();
     let ignored: Vec<&str> =
         ended.iter().flat_map(|(_, e)| e.stderr.lines()).filter(|l| l.contains("ignored ")).collect();
     let survived = dead.is_empty() && failed.is_empty() && !replaced;

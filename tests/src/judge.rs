@@ -8,12 +8,17 @@ use shared_mem::msg::arm::{ArmCommand, ArmState};
 use std::collections::BTreeMap;
 use twin::arm::ArmModel;
 
+/// What rounding may add to the ratio of a command.
+const ROUNDING: f64 = 1e-6;
+/// How far the arm may be beyond a command that is at a limit, as a share of the limit: it follows within its gains.
+const FOLLOWING: f64 = 1e-3;
 /// Control period [s].
 const T: f64 = 1e-3;
 /// Below this a joint stands [rad/s]: the rounding of differences of positions.
 const STANDING: f64 = 1e-9;
 
 /// What was commanded last.
+#[derive(Debug)]
 struct Last {
     cycle: u64,
     trace: Trace,
@@ -23,21 +28,27 @@ struct Last {
 }
 
 /// The judge of one arm.
-pub(crate) struct Judge {
+#[derive(Debug)]
+pub struct Judge {
     limits: Limits,
     workspace: Workspace,
     last: Option<Last>,
     worst: BTreeMap<&'static str, f64>,
     /// Commands and states that were judged.
-    pub(crate) judged: [u64; 2],
+    pub judged: [u64; 2],
     /// Commands and states that failed their check, and so could not be judged.
-    pub(crate) overlooked: u64,
+    pub overlooked: u64,
     /// Commands that differ from the one before.
-    pub(crate) moved: u64,
+    pub moved: u64,
 }
 
 impl Judge {
-    pub(crate) fn new(cell: &Cell) -> Self {
+    /// For the arm of a cell.
+    ///
+    /// # Panics
+    /// When the cell has no arm.
+    #[must_use]
+    pub fn new(cell: &Cell) -> Self {
         let model = ArmModel::from_cell(cell).expect("a cell with an arm");
         Self {
             limits: Limits::of(cell, &model),
@@ -51,11 +62,20 @@ impl Judge {
     }
 
     /// The worst ratio to each limit.
-    pub(crate) fn worst(&self) -> &BTreeMap<&'static str, f64> {
+    #[must_use]
+    pub fn worst(&self) -> &BTreeMap<&'static str, f64> {
         &self.worst
     }
 
-    pub(crate) fn command(&mut self, command: &ArmCommand) {
+    /// The limits that were exceeded.
+    #[must_use]
+    pub fn exceeded(&self) -> Vec<&'static str> {
+        let allowed = |what: &str| 1.0 + if what.starts_with("state") { FOLLOWING } else { ROUNDING };
+        self.worst.iter().filter(|(what, ratio)| **ratio > allowed(what)).map(|(what, _)| *what).collect()
+    }
+
+    /// Judges a command against the one before it.
+    pub fn command(&mut self, command: &ArmCommand) {
         self.judged[0] += 1;
         let follows = self.last.take().filter(|last| last.cycle + 1 == command.cycle);
         let row = follows.as_ref().map_or(0, |last| last.row.saturating_add(1));
@@ -86,7 +106,8 @@ impl Judge {
         self.last = Some(Last { cycle: command.cycle, trace, tau: command.tau_J_d, row });
     }
 
-    pub(crate) fn state(&mut self, state: &ArmState) {
+    /// Judges what the arm does.
+    pub fn state(&mut self, state: &ArmState) {
         self.judged[1] += 1;
         let limits = self.limits;
         for (i, joint) in limits.counted().enumerate() {
