@@ -34,6 +34,7 @@ pub use folder::OutputFolder;
 pub use unfinished::discard_unfinished;
 
 use error::folder_of;
+pub(crate) use error::size;
 use std::fs::{File, OpenOptions};
 use std::io::{self, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};

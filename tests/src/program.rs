@@ -3,6 +3,7 @@
 use rustix::process::{Pid, Signal, kill_process};
 use serde_json::Value;
 use shared_mem::parent;
+use std::ffi::OsStr;
 use std::io::Read;
 use std::path::PathBuf;
 use std::process::{Child, Command, ExitStatus, Stdio};
@@ -51,11 +52,23 @@ impl Program {
     /// When it cannot be started.
     #[must_use]
     pub fn start(name: &str, domain: &str, arguments: &[&str]) -> Self {
+        Self::start_through(&[], name, domain, arguments)
+    }
+
+    /// The same by way of another program and its arguments, as `setpriv`, which has to become the one that it starts.
+    ///
+    /// # Panics
+    /// When it cannot be started.
+    #[must_use]
+    pub fn start_through(through: &[&str], name: &str, domain: &str, arguments: &[&str]) -> Self {
         let runs_on =
             arguments.first().is_some_and(|verb| ["run", "serve", "record", "shadow", "teleop"].contains(verb));
         let own_id = std::process::id().to_string();
         let parent: &[&str] = if runs_on { &[parent::FLAG, &own_id] } else { &[] };
-        let mut child = Command::new(program_path(name))
+        let path = program_path(name);
+        let words: Vec<&OsStr> = through.iter().map(OsStr::new).chain([path.as_os_str()]).collect();
+        let mut child = Command::new(words[0])
+            .args(&words[1..])
             .args(arguments)
             .args(parent)
             .env("TWINALIGN_DOMAIN", domain)

@@ -54,8 +54,9 @@ fn is_named(line: &str, name: &str) -> bool {
 
 #[test]
 fn each_big_dependency_has_one_door() {
-    let doors: [(&str, &[&str]); 32] = [
+    let doors: [(&str, &[&str]); 33] = [
         ("iceoryx2", &["shared_mem/src/transport/", "shared_mem/src/msg/"]),
+        ("iceoryx2_cal", &["shared_mem/src/transport/"]),
         ("mcap", &["shared_mem/src/recording/"]),
         ("parry3d_f64", &["twin/src/physics/"]),
         ("urdf_rs", &["twin/src/arm/urdf.rs", "twin/src/arm/urdf/"]),
@@ -131,15 +132,17 @@ fn every_file_says_what_it_owns_and_stays_readable() {
 }
 
 #[test]
-fn unsafe_code_lives_in_one_file() {
+fn unsafe_code_lives_in_two_files() {
+    let homes = ["rt_bridge/src/rt/process.rs", "shared_mem/src/transport/storage.rs"];
     for (file, text) in product_sources() {
         let uses = text.lines().any(|l| {
             !l.trim_start().starts_with("//")
                 && (l.contains("unsafe {") || l.contains("unsafe fn") || l.contains("unsafe impl"))
         });
         assert!(
-            !uses || file == "rt_bridge/src/rt/process.rs",
-            "{file} holds unsafe code; it belongs into rt_bridge/src/rt/process.rs"
+            !uses || homes.contains(&file.as_str()),
+            "{file} holds unsafe code; it belongs into {}",
+            homes.join(" or ")
         );
     }
 }

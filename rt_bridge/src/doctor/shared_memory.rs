@@ -9,7 +9,7 @@ const SHM: &str = "/dev/shm";
 /// What a cell with a 1280x720 camera and all topics takes, rounded up [MB].
 const COMFORTABLE_MB: u64 = 512;
 /// What the arm's topics alone take, rounded up [MB].
-const NEEDED_MB: u64 = 64;
+const NEEDED_MB: u64 = 80;
 
 pub(super) fn examine() -> Vec<Finding> {
     vec![room(), rights(), foreign(), seats()]

@@ -100,7 +100,7 @@ fn full(path: &Path, needed: u64, written: u64) -> String {
 }
 
 /// Bytes as a person reads them.
-fn size(bytes: u64) -> String {
+pub(crate) fn size(bytes: u64) -> String {
     match bytes {
         0..1_000 => format!("{bytes} bytes"),
         1_000..1_000_000 => format!("{:.1} kB", bytes as f64 * 1e-3),

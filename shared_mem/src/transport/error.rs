@@ -2,6 +2,7 @@
 
 use super::DOMAIN_VARIABLE;
 use super::place::PlaceError;
+use super::room::NoRoom;
 use crate::topics::Limits;
 use iceoryx2::port::listener::ListenerCreateError;
 use iceoryx2::port::notifier::NotifierCreateError;
@@ -28,6 +29,9 @@ pub enum TransportError {
     /// The place on disk is not this user's alone.
     #[error(transparent)]
     Place(#[from] PlaceError),
+    /// There is no room for what would be opened.
+    #[error(transparent)]
+    NoRoom(#[from] NoRoom),
     /// All places of one side of a topic are taken.
     #[error(
         "topic {topic} already has its {limit} {side}: another {owner} is running; stop it, or set {DOMAIN_VARIABLE} to another number to run a second cell"

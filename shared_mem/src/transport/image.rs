@@ -3,6 +3,7 @@
 use super::error::{MOST_NODES, publisher_error, service_error, subscriber_error};
 use super::ignored::Tally;
 use super::publish::ring;
+use super::room::with_room;
 use super::{Node, Service, TransportError, service_name};
 use crate::msg::image::{ImageHeader, ImageHeaderWire};
 use crate::msg::{Message as _, Wrong};
@@ -46,31 +47,34 @@ impl Node {
     /// Opens the sending side for pictures of at most `max_bytes`.
     ///
     /// # Errors
-    /// [`TransportError::Full`] when another process already sends, other variants when shared memory fails.
+    /// [`TransportError::Full`] when another process already sends, [`TransportError::NoRoom`] when shared memory is full,
+    /// other variants when it fails.
     pub fn image_publisher(&self, topic: ImageTopic, max_bytes: usize) -> Result<ImagePublisher, TransportError> {
-        let port = self
-            .image_service(topic)?
-            .publisher_builder()
-            .initial_max_slice_len(max_bytes)
-            .allocation_strategy(AllocationStrategy::Static)
-            .max_loaned_samples(1)
-            .backpressure_strategy(BackpressureStrategy::DiscardData)
-            .create()
-            .map_err(|e| publisher_error(topic.name, topic.limits, e))?;
-        Ok(ImagePublisher { topic: topic.name, port, bell: self.bell(topic.name)? })
+        with_room(|| {
+            let port = self
+                .image_service(topic)?
+                .publisher_builder()
+                .initial_max_slice_len(max_bytes)
+                .allocation_strategy(AllocationStrategy::Static)
+                .max_loaned_samples(1)
+                .backpressure_strategy(BackpressureStrategy::DiscardData)
+                .create()
+                .map_err(|e| publisher_error(topic.name, topic.limits, e))?;
+            Ok(ImagePublisher { topic: topic.name, port, bell: self.bell(topic.name)? })
+        })
     }
 
     /// Opens the receiving side. The sender need not exist yet.
     ///
     /// # Errors
-    /// [`TransportError::Full`] when all places are taken, other variants when shared memory fails.
+    /// [`TransportError::Full`] when all places are taken, [`TransportError::NoRoom`] when shared memory is full, other
+    /// variants when it fails.
     pub fn image_subscriber(&self, topic: ImageTopic) -> Result<ImageSubscriber, TransportError> {
-        let port = self
-            .image_service(topic)?
-            .subscriber_builder()
-            .buffer_size(topic.limits.buffer)
-            .create()
-            .map_err(|e| subscriber_error(topic.name, topic.limits, e))?;
+        let port = with_room(|| {
+            let service = self.image_service(topic)?;
+            let builder = service.subscriber_builder().buffer_size(topic.limits.buffer);
+            builder.create().map_err(|e| subscriber_error(topic.name, topic.limits, e))
+        })?;
         let (buffer, ignored) = (topic.limits.buffer, self.tallies.open(topic.name));
         Ok(ImageSubscriber { topic: topic.name, port, buffer, ignored })
     }

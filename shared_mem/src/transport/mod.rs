@@ -3,6 +3,9 @@
 //! A process opens one [`Node`] a thread and takes publishers and subscribers from it. Ports belong to the thread that
 //! made them. Nothing here may be called from the control thread: a `send` maps memory when a reader has just joined.
 //!
+//! A full `/dev/shm` is an error of whoever opens something; who has opened it keeps the room. Where a reader joins and there
+//! is no room for what it shares with a sender, the reader is refused, and the sender goes on.
+//!
 //! A process that dies without a word leaves its ports behind; they are cleared away whenever any process opens a node.
 //!
 //! What is received was written by whatever process opened the topic: it is checked before it is handed on. Processes of
@@ -14,6 +17,9 @@ mod ignored;
 mod image;
 mod place;
 mod publish;
+mod room;
+mod service;
+mod storage;
 mod subscribe;
 
 pub use doctor::{NodeReport, SharedMemoryReport, book_keeping, foreign_files, survey};
@@ -22,14 +28,14 @@ pub use ignored::Ignored;
 pub use image::{ImagePublisher, ImageSample, ImageSubscriber};
 pub use place::{ForeignFile, PlaceError};
 pub use publish::Publisher;
+pub use room::NoRoom;
 pub use subscribe::{Subscriber, Wake};
 
 use iceoryx2::prelude::*;
 use ignored::Tallies;
 use place::Place;
-
-/// The flavour of iceoryx2 in use: single-threaded ports, no locks.
-type Service = ipc::Service;
+use room::with_room;
+use service::Service;
 
 /// Environment variable that separates cells on one machine: processes see each other when it agrees. Default `0`.
 pub const DOMAIN_VARIABLE: &str = "TWINALIGN_DOMAIN";
@@ -46,7 +52,8 @@ impl Node {
     /// Takes a seat under `name`, in the domain of [`DOMAIN_VARIABLE`], and clears away what dead processes left.
     ///
     /// # Errors
-    /// [`TransportError::Place`] when another user is in the way, [`TransportError::Node`] when shared memory is not usable.
+    /// [`TransportError::Place`] when another user is in the way, [`TransportError::NoRoom`] when shared memory is full,
+    /// [`TransportError::Node`] when it is not usable.
     pub fn open(name: &str) -> Result<Self, TransportError> {
         Self::open_in(&domain(), name)
     }
@@ -54,19 +61,16 @@ impl Node {
     /// The same in a domain given here: for tests and for programs that talk to several cells.
     ///
     /// # Errors
-    /// [`TransportError::Place`] when another user is in the way, [`TransportError::Node`] when shared memory is not usable
-    /// or `domain` is no short name.
+    /// [`TransportError::Place`] when another user is in the way, [`TransportError::NoRoom`] when shared memory is full,
+    /// [`TransportError::Node`] when it is not usable or `domain` is no short name.
     pub fn open_in(domain: &str, name: &str) -> Result<Self, TransportError> {
         set_log_level(LogLevel::Fatal); // every failure comes back as an error; iceoryx2's own log would say it twice
         let place = Place::open(domain)?;
         let name = NodeName::new(name).map_err(TransportError::node)?;
-        let inner = NodeBuilder::new()
-            .name(&name)
-            .config(&place.configuration()?)
-            .signal_handling_mode(SignalHandlingMode::Disabled)
-            .create::<Service>()
-            .map_err(TransportError::node)?;
-        place.close_to_others()?;
+        let config = place.configuration()?;
+        let builder = NodeBuilder::new().name(&name).config(&config);
+        let builder = builder.signal_handling_mode(SignalHandlingMode::Disabled);
+        let inner = with_room(|| builder.create::<Service>().map_err(TransportError::node))?;
         Ok(Self { inner, place, tallies: Tallies::default() })
     }
 

@@ -9,12 +9,12 @@ use crate::typed::Command;
 use iceoryx2::config::Config;
 use iceoryx2::prelude::{FileName, Path as IceoryxPath, SemanticString as _};
 use std::io::ErrorKind;
-use std::os::unix::fs::{DirBuilderExt as _, MetadataExt as _, PermissionsExt as _};
+use std::os::unix::fs::{DirBuilderExt as _, MetadataExt as _};
 use std::path::{Path, PathBuf};
 use std::{fs, io};
 
 /// Where Linux keeps shared memory.
-const MEMORY: &str = "/dev/shm";
+pub(super) const MEMORY: &str = "/dev/shm";
 /// The variable that names a folder of this user alone (XDG Base Directory Specification).
 const FOLDER_VARIABLE: &str = "XDG_RUNTIME_DIR";
 /// Longest path of a socket that the kernel takes: `sun_path`, 108 bytes with the end mark.
@@ -88,21 +88,6 @@ impl Place {
                 ),
             }),
         }
-    }
-
-    /// Takes rights of others away from what this user made. iceoryx2 lets everybody write the counter of its nodes, and
-    /// whoever may write a file may cut it short.
-    pub(super) fn close_to_others(&self) -> Result<(), PlaceError> {
-        for (path, found) in files(Path::new(MEMORY), &self.prefix) {
-            if found.uid() == self.user && found.mode() & 0o077 != 0 {
-                let closed = fs::Permissions::from_mode(found.mode() & 0o700);
-                match fs::set_permissions(&path, closed) {
-                    Err(e) if e.kind() != ErrorKind::NotFound => return Err(unusable(&path, &e)),
-                    _ => {}
-                }
-            }
-        }
-        Ok(())
     }
 
     fn check_length(&self) -> Result<(), PlaceError> {
@@ -202,7 +187,7 @@ fn files(memory: &Path, prefix: &str) -> impl Iterator<Item = (PathBuf, fs::Meta
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::os::unix::fs::{chown, symlink};
+    use std::os::unix::fs::{PermissionsExt as _, chown, symlink};
 
     fn mode(path: &Path) -> u32 {
         fs::metadata(path).expect("it exists").mode() & 0o777

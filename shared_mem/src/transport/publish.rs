@@ -1,6 +1,7 @@
 //! Sending messages of fixed size, and waking those who wait for them.
 
 use super::error::{MOST_EVENT_PORTS, MOST_NODES, event_error, notifier_error, publisher_error, service_error};
+use super::room::with_room;
 use super::{Node, Service, TransportError, service_name};
 use crate::msg::Message;
 use crate::topics::{Limits, Topic};
@@ -22,17 +23,20 @@ impl Node {
     /// Opens the sending side of a topic.
     ///
     /// # Errors
-    /// [`TransportError::Full`] when another process already sends on it, other variants when shared memory fails.
+    /// [`TransportError::Full`] when another process already sends on it, [`TransportError::NoRoom`] when shared memory is
+    /// full, other variants when it fails.
     pub fn publisher<M: Message>(&self, topic: Topic<M>) -> Result<Publisher<M>, TransportError> {
         let limits = topic.limits;
-        let port = self
-            .service(topic)?
-            .publisher_builder()
-            .max_loaned_samples(1)
-            .backpressure_strategy(BackpressureStrategy::DiscardData)
-            .create()
-            .map_err(|e| publisher_error(topic.name, limits, e))?;
-        Ok(Publisher { topic: topic.name, port, bell: self.bell(topic.name)? })
+        with_room(|| {
+            let port = self
+                .service(topic)?
+                .publisher_builder()
+                .max_loaned_samples(1)
+                .backpressure_strategy(BackpressureStrategy::DiscardData)
+                .create()
+                .map_err(|e| publisher_error(topic.name, limits, e))?;
+            Ok(Publisher { topic: topic.name, port, bell: self.bell(topic.name)? })
+        })
     }
 
     /// The service behind a topic; both sides open it with the same limits.

@@ -2,6 +2,7 @@
 
 use super::error::{listener_error, subscriber_error};
 use super::ignored::Tally;
+use super::room::with_room;
 use super::{Node, Service, TransportError};
 use crate::msg::Message;
 use crate::topics::Topic;
@@ -38,14 +39,14 @@ impl Node {
     /// Opens the receiving side of a topic. The sender need not exist yet.
     ///
     /// # Errors
-    /// [`TransportError::Full`] when all places are taken, other variants when shared memory fails.
+    /// [`TransportError::Full`] when all places are taken, [`TransportError::NoRoom`] when shared memory is full, other
+    /// variants when it fails.
     pub fn subscriber<M: Message>(&self, topic: Topic<M>) -> Result<Subscriber<M>, TransportError> {
-        let port = self
-            .service(topic)?
-            .subscriber_builder()
-            .buffer_size(topic.limits.buffer)
-            .create()
-            .map_err(|e| subscriber_error(topic.name, topic.limits, e))?;
+        let port = with_room(|| {
+            let service = self.service(topic)?;
+            let builder = service.subscriber_builder().buffer_size(topic.limits.buffer);
+            builder.create().map_err(|e| subscriber_error(topic.name, topic.limits, e))
+        })?;
         let (buffer, ignored) = (topic.limits.buffer, self.tallies.open(topic.name));
         Ok(Subscriber { topic: topic.name, port, buffer, ignored })
     }
@@ -55,7 +56,8 @@ impl Node {
     /// # Errors
     /// [`TransportError`] when shared memory fails.
     pub fn wake_on(&self, topic: &'static str) -> Result<Wake, TransportError> {
-        let listener = self.bell_service(topic)?.listener_builder().create().map_err(|e| listener_error(topic, e))?;
+        let listener =
+            with_room(|| self.bell_service(topic)?.listener_builder().create().map_err(|e| listener_error(topic, e)))?;
         Ok(Wake { topic, listener })
     }
 }
