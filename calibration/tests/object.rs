@@ -125,6 +125,7 @@ fn where_an_object_lies_still_no_number_is_told_and_that_is_said() {
             file: format!("clip_{number:02}.mcap").into(),
             kind: ClipKind::FreeMotion,
             torques_end_at_rows: false,
+            origins: shared_mem::origin::Origins::default(),
             joint_names: Vec::new(),
             desired: JointSeries::default(),
             measured: JointSeries::default(),

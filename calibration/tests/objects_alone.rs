@@ -52,6 +52,7 @@ fn slide(cell: &Cell, hidden: &Theta, number: u64) -> Clip {
         desired: JointSeries::default(),
         measured: JointSeries::default(),
         torques_end_at_rows: false,
+        origins: shared_mem::origin::Origins::default(),
         object: ObjectSeries { stamps_ns, poses },
         warnings: Vec::new(),
         damage: None,

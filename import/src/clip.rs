@@ -4,6 +4,7 @@ use crate::log::{Column, HEADER, Log, Table};
 use crate::mapping::{Clock, JointColumns, Mapping, PoseColumns, Torque, TorquesAct};
 use shared_mem::frames::Pose;
 use shared_mem::msg::MAX_JOINTS;
+use shared_mem::origin::{Origin, Origins};
 use shared_mem::recording::{Clip, JointSeries, ObjectSeries};
 
 /// Largest share of rows that may be without stamp, or without pose.
@@ -56,9 +57,19 @@ pub(crate) fn clip(log: &Log, mapping: &Mapping, gravity: Option<&Gravity>) -> R
         torques_end_at_rows: act == TorquesAct::UntilStamp,
         object,
         others: Vec::new(),
+        origins: origins(log),
         warnings,
         damage: None,
     })
+}
+
+/// What the log says itself; else it is the log of another program.
+fn origins(log: &Log) -> Origins {
+    if log.origins.is_unknown() {
+        Origin::import(&log.file.to_string_lossy(), log.format).into()
+    } else {
+        log.origins.clone()
+    }
 }
 
 /// Positions, velocities and torques in SI, and the stamps of their rows [ns].

@@ -1,5 +1,6 @@
 //! What every format is read into: tables of numbers with named columns and stamps. No meaning yet.
 
+use shared_mem::origin::Origins;
 use std::path::PathBuf;
 
 /// Name of the stamps that the format itself gives.
@@ -18,6 +19,8 @@ pub(crate) struct Log {
     pub(crate) tables: Vec<Table>,
     /// What the format itself says about its numbers.
     pub(crate) facts: Facts,
+    /// Where it says that it comes from; nothing in logs of other programs.
+    pub(crate) origins: Origins,
     /// What is there and is not imported.
     pub(crate) left_out: Vec<LeftOut>,
     /// What was odd in it, one sentence each.

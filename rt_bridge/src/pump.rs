@@ -15,6 +15,7 @@ use shared_mem::msg::arm::{ArmCommand, ArmState};
 use shared_mem::msg::event::{Event, EventLevel, EventSource};
 use shared_mem::msg::motion::MotionChunk;
 use shared_mem::msg::object::ObjectPose;
+use shared_mem::msg::origin::ArmOrigin;
 use shared_mem::msg::target::ArmTarget;
 use shared_mem::time::now_ns;
 use shared_mem::topics;
@@ -52,6 +53,8 @@ pub struct Rings {
     pub targets: Targets,
     /// From the simulated tracker, where there is one.
     pub poses: Option<Consumer<Sighting>>,
+    /// Which arm the states are of.
+    pub origin: ArmOrigin,
     /// From the main thread and the devices: texts for `/events`.
     pub notices: mpsc::Receiver<Notice>,
 }
@@ -271,12 +274,13 @@ fn publish(
     last: &mut ArmState,
 ) -> Result<(), TransportError> {
     while let Ok(beat) = rings.beats.pop() {
-        *last = beat.state;
+        // Of a recording that is played back, each state may say something else.
+        *last = ArmState { origin: rings.origin, ..beat.state };
         if let Some(command) = &beat.command {
             ports.command.send_quietly(command)?;
         }
-        ports.state.send(&beat.state)?;
-        report.age.record(now_ns().saturating_sub(beat.state.stamp_ns));
+        ports.state.send(last)?;
+        report.age.record(now_ns().saturating_sub(last.stamp_ns));
     }
     if let (Some(poses), Some(objects)) = (&mut rings.poses, &ports.objects) {
         while let Ok(Sighting { is_first, name, pose }) = poses.pop() {

@@ -14,6 +14,7 @@
 //! | [`theta`] | `theta.toml`: what was identified, and the effects that were named |
 //! | [`frames`] | typed poses: `Pose<To, From>` |
 //! | [`hand_eye`] | `hand_eye.toml`: where a camera is mounted, and `O_T_EE` in lists of pictures |
+//! | [`origin`] | where a recording comes from: a simulation, a robot, another recording |
 //! | [`input`] | the one way in for files: regular ones only, each kind up to a size |
 //! | [`output`] | files that are whole or not there: every writer but the live recorder goes through it |
 //! | [`ending`] | whether the process was asked to end |
@@ -40,6 +41,7 @@ pub mod frames;
 pub mod hand_eye;
 pub mod input;
 pub mod msg;
+pub mod origin;
 pub mod output;
 pub mod parent;
 pub mod printable;

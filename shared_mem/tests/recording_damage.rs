@@ -21,7 +21,7 @@ fn info() -> ClipInfo {
         cell_toml: Some("[table]\nheight = 0.0\n".into()),
         configuration: "a = 1\n".into(),
         program: "t 1".into(),
-        torques_begin_at_rows: false,
+        ..ClipInfo::default()
     }
 }
 

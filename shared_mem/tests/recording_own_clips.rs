@@ -25,7 +25,7 @@ fn info() -> ClipInfo {
         cell_toml: Some(CELL.into()),
         configuration: "rate = 1000\n".into(),
         program: "test 1.2.3".into(),
-        torques_begin_at_rows: false,
+        ..ClipInfo::default()
     }
 }
 
@@ -52,7 +52,7 @@ fn state(i: u64) -> ArmState {
         motion_played: 11,
         motion_queued: 12,
         motion: MotionStatus::Braked,
-        reserved: 0,
+        ..ArmState::default()
     }
 }
 

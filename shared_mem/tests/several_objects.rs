@@ -45,6 +45,7 @@ fn clip_of_nothing(path: &Path) -> Clip {
         desired: Default::default(),
         measured: Default::default(),
         torques_end_at_rows: false,
+        origins: shared_mem::origin::Origins::default(),
         object: ObjectSeries::default(),
         others: Vec::new(),
         warnings: Vec::new(),

@@ -17,6 +17,7 @@ use shared_mem::cell::{ClipKind, PoseNoise};
 use shared_mem::frames::Pose;
 use shared_mem::msg::MAX_JOINTS;
 use shared_mem::msg::motion::SetPoint;
+use shared_mem::origin::Origin;
 use shared_mem::recording::{Clip, JointSeries, ObjectSeries};
 use shared_mem::theta::{EffectTheta, Theta};
 use std::f64::consts::PI;
@@ -249,6 +250,7 @@ impl Studio<'_> {
             kind: if poses_ns.is_empty() { ClipKind::Excitation } else { ClipKind::ControlHitSlide },
             // A reading tells the mean over the period that ends there.
             torques_end_at_rows: true,
+            origins: Origin::Simulation.into(),
             joint_names: self.body.model().joint_names().to_vec(),
             desired,
             measured,

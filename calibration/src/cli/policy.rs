@@ -13,6 +13,7 @@ use evaluation::statistics::Share;
 use serde::Serialize;
 use shared_mem::cell::Cell;
 use shared_mem::input;
+use shared_mem::origin::Origin;
 use shared_mem::output::Destination;
 use shared_mem::progress::Progress;
 use shared_mem::quantity::number;
@@ -146,6 +147,7 @@ fn in_twin(arguments: &RunArguments, task: Task, asking: &Asking, interrupt: &In
                 configuration: task.text().to_owned(),
                 program: concat!("calibration ", env!("CARGO_PKG_VERSION"), " policy run").to_owned(),
                 cell_toml: cell_toml(arguments, &task)?,
+                origins: Origin::Simulation.into(),
                 ..ClipInfo::default()
             };
             write_episode(place.begin()?, &info, &recorded)?;

@@ -80,6 +80,7 @@ mod tests {
             file: "clip.mcap".into(),
             kind: ClipKind::Excitation,
             torques_end_at_rows: false,
+            origins: shared_mem::origin::Origins::default(),
             joint_names: vec!["a".into()],
             measured: desired.clone(),
             desired,

@@ -61,6 +61,7 @@ fn clip(cell: &Cell, gains: &ArmTheta, number: u64, seconds: f64, seed: u64) -> 
         file: format!("clip_{number:02}.mcap").into(),
         kind: ClipKind::Excitation,
         torques_end_at_rows: false,
+        origins: shared_mem::origin::Origins::default(),
         joint_names: arm.joint_names().to_vec(),
         desired,
         measured,

@@ -168,7 +168,7 @@ fn empty(folder: &Path, info: &Info, episode: u64) -> Log {
         tables: vec![Table { name: FRAMES.into(), ..Table::default() }],
         facts: Facts { rate: Some(info.fps), robot: info.robot_type.clone(), ..Facts::default() },
         left_out: left_out.collect(),
-        warnings: Vec::new(),
+        ..Log::default()
     }
 }
 

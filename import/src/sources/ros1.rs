@@ -85,7 +85,7 @@ pub(super) fn read(path: &Path) -> Result<Log, ImportError> {
         tables,
         facts: Facts { franka, torque, ..Facts::default() },
         left_out,
-        warnings: Vec::new(),
+        ..Log::default()
     })
 }
 

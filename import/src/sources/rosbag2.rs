@@ -4,6 +4,7 @@ use super::{go_on, sqlite, stem};
 use crate::error::ImportError;
 use crate::log::{Facts, LeftOut, Log};
 use crate::ros::{Collector, Encoding, Incoming};
+use shared_mem::origin::Origins;
 use shared_mem::recording::RawMessages;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -14,11 +15,14 @@ const NOT_CDR: &str = "its messages are not in CDR";
 pub(super) fn read(path: &Path, files: &[PathBuf]) -> Result<Log, ImportError> {
     let mut collector = Collector::new(Encoding::Cdr);
     let mut left_out: BTreeMap<String, u64> = BTreeMap::new();
+    let mut origins = Origins::default();
     let mut is_mcap = true;
     for file in files {
         is_mcap = file.extension().is_none_or(|e| e != "db3");
         if is_mcap {
-            mcap(file, &mut collector, &mut left_out)?;
+            for origin in mcap(file, &mut collector, &mut left_out)?.iter() {
+                origins.add(origin.clone());
+            }
         } else {
             sqlite::read(file, &mut collector)?;
         }
@@ -35,12 +39,14 @@ pub(super) fn read(path: &Path, files: &[PathBuf]) -> Result<Log, ImportError> {
         format: if is_mcap { "ROS 2 bag (mcap)" } else { "ROS 2 bag (sqlite3)" },
         tables,
         facts: Facts { franka, torque, description, ..Facts::default() },
+        origins,
         left_out: out,
         warnings: Vec::new(),
     })
 }
 
-fn mcap(path: &Path, collector: &mut Collector, left_out: &mut BTreeMap<String, u64>) -> Result<(), ImportError> {
+/// Takes the messages of a file, and returns where it says that it comes from.
+fn mcap(path: &Path, collector: &mut Collector, left_out: &mut BTreeMap<String, u64>) -> Result<Origins, ImportError> {
     let mut messages = RawMessages::open(path)?;
     let mut count = 0_u64;
     while let Some(message) = messages.read_next()? {
@@ -66,6 +72,6 @@ fn mcap(path: &Path, collector: &mut Collector, left_out: &mut BTreeMap<String, 
             let what = format!("{damage}; `ros2 bag convert` writes what is left of it as a new bag, or leave it out");
             Err(ImportError::log(path, what))
         }
-        None => Ok(()),
+        None => Ok(messages.origins()),
     }
 }

@@ -4,6 +4,7 @@ use crate::camera::{Converted, convert};
 use anyhow::Result;
 use clap::Args;
 use shared_mem::cell::Cell;
+use shared_mem::origin::Origin;
 use shared_mem::output::discard_unfinished;
 use shared_mem::recording::ClipInfo;
 use shared_mem::{answer, console, input};
@@ -52,6 +53,7 @@ impl ConvertArguments {
             configuration: format!("bag = {:?}\n", self.bag.display().to_string()),
             program: concat!("rt_bridge ", env!("CARGO_PKG_VERSION")).into(),
             torques_begin_at_rows: false,
+            origins: Origin::import(&self.bag.to_string_lossy(), "RealSense bag").into(),
         };
         let camera = cell.and_then(|cell| cell.camera).unwrap_or_default();
         let converted = convert(&self.bag, &camera, (&self.out, self.force), &info)?;

@@ -58,7 +58,8 @@ impl RecordArguments {
             cell_toml: cell.as_ref().map(Cell::to_toml),
             configuration: self.configuration,
             program: concat!("rt_bridge ", env!("CARGO_PKG_VERSION")).into(),
-            torques_begin_at_rows: false,
+            // The arm says where it comes from.
+            ..ClipInfo::default()
         };
         // The bridge that started this recorder may take its time, and answers for itself.
         let patience = self.parent.is_none().then_some(self.wait);

@@ -32,6 +32,7 @@ use shared_mem::cell::Cell;
 use shared_mem::hand_eye::HandEye;
 use shared_mem::msg::event::EventLevel;
 use shared_mem::msg::joints_from;
+use shared_mem::msg::origin::ArmOrigin;
 use shared_mem::msg::wrench::Wrench;
 use shared_mem::topics;
 use shared_mem::transport::Node;
@@ -242,7 +243,8 @@ pub fn run(settings: &Settings, stop: &Arc<AtomicBool>) -> Result<RunReport> {
     let (to_control, orders) = orders(CHUNKS, HELD_CHUNKS);
     let (notices, told) = mpsc::channel();
     let targets = Targets::new(devices.model, devices.plan.limits);
-    let rings = Rings { beats, remarks, orders: to_control, targets, poses: devices.poses, notices: told };
+    let origin = ArmOrigin::new(&settings.arm.to_string());
+    let rings = Rings { beats, remarks, orders: to_control, targets, poses: devices.poses, origin, notices: told };
     let mut pump = Pump::start(rings)?;
     let recorder = match &settings.record {
         Some(file) => {

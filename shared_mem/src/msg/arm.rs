@@ -5,6 +5,7 @@
 #![allow(non_snake_case)] // the field's own symbols
 
 use super::check::{self, Wrong};
+use super::origin::ArmOrigin;
 use super::wire::{codes, wire};
 use super::{Joints, MAX_JOINTS};
 use iceoryx2::prelude::ZeroCopySend;
@@ -52,6 +53,8 @@ pub struct ArmState {
     pub motion: MotionStatus,
     /// Keeps the size a multiple of 8; always 0.
     pub reserved: u32,
+    /// Which arm this is. Own clips say it once, for the whole clip, and not in each state.
+    pub origin: ArmOrigin,
 }
 
 impl Default for ArmState {
@@ -77,6 +80,7 @@ impl Default for ArmState {
             motion_queued: 0,
             motion: MotionStatus::None,
             reserved: 0,
+            origin: ArmOrigin::default(),
         }
     }
 }
@@ -94,7 +98,7 @@ impl ArmState {
     }
 }
 
-wire!("twinalign/ArmState/2" ArmStateWire: ArmState {
+wire!("twinalign/ArmState/3" ArmStateWire: ArmState {
     stamp_ns: u64,
     device_ns: u64,
     cycle: u64,
@@ -115,6 +119,7 @@ wire!("twinalign/ArmState/2" ArmStateWire: ArmState {
     motion_queued: u32,
     motion: MotionStatus,
     reserved: u32,
+    origin: ArmOrigin,
 });
 
 /// What the robot is doing. Values are those of the Franka Control Interface.

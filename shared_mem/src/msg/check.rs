@@ -66,6 +66,12 @@ pub enum Wrong {
         /// Field of the message.
         field: &'static str,
     },
+    /// A text is no line of UTF-8 with nothing behind its end.
+    #[error("{field} is no line of UTF-8")]
+    Line {
+        /// Field of the message.
+        field: &'static str,
+    },
     /// A text is no name of an object.
     #[error("{field} is no name of letters, digits and _")]
     Name {

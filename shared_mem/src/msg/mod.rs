@@ -10,6 +10,7 @@ pub mod gripper;
 pub mod image;
 pub mod motion;
 pub mod object;
+pub mod origin;
 pub mod target;
 pub mod twin;
 pub mod wire;

@@ -4,6 +4,7 @@ use super::clip::{self, Clip, NamedLog};
 use super::container::{Message, Messages};
 use super::error::ReadError;
 use super::joint_log::JointLog;
+use super::origins;
 use super::ros2::{JointState, StampedPose};
 use super::torques;
 use super::tracked::{self, ObjectTopics, PoseRow};
@@ -61,6 +62,7 @@ pub(super) fn read<R: Read + Seek>(
     let topics = &cell.topics;
     let mut clip = Clip::empty(path, kind);
     clip.damage = messages.damage().summary();
+    clip.origins = origins::read(&messages, false);
     clip.torques_end_at_rows = torques::end_at_rows(&messages, false);
     let missing = |topic: &str, wanted: Wanted| missing(path, topic, wanted, &messages);
     if needs_arm || !collected.measured.is_empty() {

@@ -5,6 +5,7 @@ use super::error::ReadError;
 use super::joint_log::{self, JointLog, Wanted};
 use super::series::{JointSeries, ObjectSeries};
 use crate::cell::{Cell, ClipKind};
+use crate::origin::Origins;
 use std::path::{Path, PathBuf};
 
 /// One recorded clip.
@@ -27,6 +28,8 @@ pub struct Clip {
     pub object: ObjectSeries,
     /// Where the other objects of cell.toml were, in its order.
     pub others: Vec<TrackedObject>,
+    /// Where it comes from, as far as it says.
+    pub origins: Origins,
     /// What was found odd in it, one sentence each.
     pub warnings: Vec<String>,
     /// The part of the file that could not be read; `None` when the file is whole.
@@ -54,6 +57,7 @@ impl Clip {
             torques_end_at_rows: false,
             object: ObjectSeries::default(),
             others: Vec::new(),
+            origins: Origins::default(),
             warnings: Vec::new(),
             damage: None,
         }

@@ -57,6 +57,7 @@ mod tests {
         };
         Clip {
             others: Vec::new(),
+            origins: crate::origin::Origins::default(),
             file: "clip.mcap".into(),
             kind: ClipKind::Excitation,
             joint_names: vec!["a".into(), "b".into()],

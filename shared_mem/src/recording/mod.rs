@@ -25,6 +25,7 @@
 //! | `recover` | a damaged file, rewritten |
 //! | `export` | a session in another format |
 //! | `clip`, `series`, `session` | what callers get |
+//! | `origins`, `provenance` | where a clip says that it comes from, and what that makes of a session |
 //! | `subject` | of several objects the one that a command is about |
 
 mod bag;
@@ -43,10 +44,12 @@ mod joint_log;
 mod logged;
 mod messages;
 mod npy;
+mod origins;
 mod own;
 mod picture;
 mod picture_file;
 mod pictures;
+mod provenance;
 mod raw;
 mod read;
 mod recover;
@@ -77,6 +80,7 @@ pub use picture_file::{
     pack_picture, pack_quickly, pack_with_alpha, read_alpha, read_picture, unpack_picture, write_png, write_png_to,
 };
 pub use pictures::{PictureKind, for_pictures};
+pub use provenance::{ClipOrigins, Provenance, read_origins};
 pub use raw::{RawMessage, RawMessages};
 pub use read::read_clip;
 pub use recover::{RecoverError, Recovered, recover};

@@ -9,10 +9,10 @@ use super::error::ReadError;
 use super::logged::Logged;
 use super::messages::decode;
 use super::series::JointSeries;
-use super::torques;
 use super::tracked::{self, ObjectTopics, PoseRow};
 use super::wire::Wire;
 use super::writer::{CELL_TOML, CONFIGURATION, ClipInfo, METADATA, PROGRAM};
+use super::{origins, torques};
 use crate::cell::{Cell, ClipKind};
 use crate::msg::Joints;
 use crate::msg::arm::{ArmCommand, ArmState};
@@ -26,12 +26,19 @@ pub(super) fn clip_info<R: Read + Seek>(messages: &Messages<R>) -> Option<ClipIn
     let record = messages.metadata.iter().find(|m| m.name == METADATA)?;
     let text = |key: &str| record.pairs.get(key).cloned().unwrap_or_default();
     let cell = messages.attachments.iter().find(|a| a.name == CELL_TOML);
+    let origins = origins::said(messages);
     Some(ClipInfo {
         cell_toml: cell.map(|a| String::from_utf8_lossy(&a.data).into_owned()),
         configuration: text(CONFIGURATION),
         program: text(PROGRAM),
         torques_begin_at_rows: !torques::end_at_rows(messages, true),
+        origins,
     })
+}
+
+/// Whether the file says that it is an own clip; what stands before its first message must have been read.
+pub(super) fn is_own<R: Read + Seek>(messages: &Messages<R>) -> bool {
+    messages.metadata.iter().any(|m| m.name == METADATA)
 }
 
 /// Joint rows as they are collected.
@@ -163,6 +170,7 @@ pub(super) fn read<R: Read + Seek>(
     }
     let mut clip = Clip { torques_end_at_rows: torques::end_at_rows(&messages, true), ..Clip::empty(path, kind) };
     clip.damage = messages.damage().summary();
+    clip.origins = origins::read(&messages, true);
     let needs_arm = cell.robot.is_some() && kind != ClipKind::FreeMotion;
     if needs_arm && rows.device_ns.is_empty() {
         return Err(missing(path, ArmState::TOPIC, &messages.present()));

@@ -2,6 +2,8 @@
 
 use super::container::Messages;
 use super::error::ReadError;
+use super::origins;
+use crate::origin::Origins;
 use std::fs::File;
 use std::io::BufReader;
 use std::path::Path;
@@ -50,6 +52,12 @@ impl RawMessages {
             log_time_ns: message.log_time_ns,
             data: message.data,
         }))
+    }
+
+    /// Where the file says that it comes from, as far as it was read.
+    #[must_use]
+    pub fn origins(&self) -> Origins {
+        origins::said(&self.0)
     }
 
     /// The part of the file that could not be read so far; `None` while all is whole.

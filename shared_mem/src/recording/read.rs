@@ -32,7 +32,7 @@ fn as_logged(path: &Path, kind: ClipKind, cell: &Cell) -> Result<Clip, ReadError
     let mut messages = Messages::open(path)?;
     let own = messages.peek()?.is_some_and(|message| is_own(message.channel));
     // What stands before the first message says whose it is, too: also where no message follows, or one of ROS is the first.
-    if own || own::clip_info(&messages).is_some() {
+    if own || own::is_own(&messages) {
         own::read(path, messages, kind, cell)
     } else {
         bag::read(path, messages, kind, cell)

@@ -6,6 +6,7 @@ use super::clip::{self, Clip, NamedLog};
 use super::error::ReadError;
 use super::joint_log::JointLog;
 use super::npy;
+use super::origins;
 use super::ros2::JointState;
 use crate::cell::{CameraPose, Cell, ClipKind};
 use crate::frames::{Base, Camera, Object, Pose};
@@ -61,7 +62,7 @@ pub(super) fn read(path: &Path, kind: ClipKind, cell: &Cell) -> Result<Clip, Rea
         NamedLog { topic: CONTROL, log: desired },
         &clip::wanted_joints(cell),
     )?;
-    let mut clip = Clip::empty(path, kind);
+    let mut clip = Clip { origins: origins::of_folder(), ..Clip::empty(path, kind) };
     clip.joint_names = joints.names;
     clip.desired = joints.desired;
     clip.measured = joints.measured;

@@ -11,10 +11,12 @@ mod shown;
 
 pub use error::WriteError;
 
-use super::torques;
 use super::wire::{self, UnixClock, Wire};
+use super::{origins, torques};
 use crate::cell::Cell;
 use crate::msg::image::ImageHeader;
+use crate::msg::origin::ArmOrigin;
+use crate::origin::Origins;
 use crate::output::Output;
 use crate::topics::ImageTopic;
 use mcap::records::{MessageHeader, Metadata};
@@ -51,6 +53,8 @@ pub struct ClipInfo {
     /// Whether the torques of a state act from its stamp on, and not until it as those that a robot reports: see
     /// [`Clip::torques_end_at_rows`](super::Clip::torques_end_at_rows).
     pub torques_begin_at_rows: bool,
+    /// Where the clip comes from, as far as it is known from the beginning; the states of an arm say it themselves.
+    pub origins: Origins,
 }
 
 /// What a finished clip holds.
@@ -100,6 +104,10 @@ pub struct ClipWriter<W: Write = File> {
     base_frame: String,
     /// The robot that viewers are shown.
     shown: Option<Shown>,
+    /// Where the clip comes from, as far as it says so already.
+    origins: Origins,
+    /// What the last state said about that.
+    origin: ArmOrigin,
     /// Encoded message, reused.
     scratch: Vec<u8>,
 }
@@ -184,8 +192,19 @@ impl<W: Write> ClipWriter<W> {
         // A cell.toml that cannot be read names no frame; whoever reads the clip is told what is wrong with it.
         let cell = info.cell_toml.as_deref().and_then(|text| Cell::parse(text, path).ok()).unwrap_or_default();
         let (path, base_frame, channels) = (path.to_owned(), cell.base_frame().to_owned(), HashMap::new());
-        let (shown, scratch) = (None, Vec::new());
-        let mut writer = Self { path, mcap, clock, channels, messages: 0, bytes, base_frame, shown, scratch };
+        let mut writer = Self {
+            path,
+            mcap,
+            clock,
+            channels,
+            messages: 0,
+            bytes,
+            base_frame,
+            shown: None,
+            origins: info.origins.clone(),
+            origin: ArmOrigin::default(),
+            scratch: Vec::new(),
+        };
         writer.ride_along(info).map_err(|error| writer.failed(&error))?;
         Ok(writer)
     }
@@ -199,6 +218,9 @@ impl<W: Write> ClipWriter<W> {
         let metadata = pairs.into_iter().map(|(key, value)| (key.to_owned(), value)).collect();
         self.mcap.write_metadata(&Metadata { name: METADATA.into(), metadata })?;
         self.mcap.write_metadata(&torques::record(!info.torques_begin_at_rows))?;
+        for origin in info.origins.iter() {
+            self.mcap.write_metadata(&origins::record(origin))?;
+        }
         if let Some(text) = &info.cell_toml {
             let now = self.clock.unix_ns(crate::time::now_ns());
             self.mcap.attach(&Attachment {
@@ -210,6 +232,18 @@ impl<W: Write> ClipWriter<W> {
             })?;
         }
         self.mcap.flush()
+    }
+
+    /// Says which arm the states from here on are of, where that is new.
+    fn say_origin(&mut self, origin: &ArmOrigin) -> Result<(), WriteError> {
+        if *origin == self.origin {
+            return Ok(());
+        }
+        self.origin = *origin;
+        match origin.origin() {
+            Some(origin) if self.origins.add(origin.clone()) => self.note(&origins::record(&origin)),
+            _ => Ok(()),
+        }
     }
 
     /// A record about the clip as a whole.

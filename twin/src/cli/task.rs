@@ -3,6 +3,7 @@
 use anyhow::Context as _;
 use serde::Serialize;
 use shared_mem::answer;
+use shared_mem::origin::Origin;
 use shared_mem::output::Destination;
 use shared_mem::progress::Progress;
 use shared_mem::quantity::seconds;
@@ -109,6 +110,7 @@ impl Task {
             configuration: task.text().to_owned(),
             program: concat!("twin ", env!("CARGO_PKG_VERSION"), " task").to_owned(),
             cell_toml: (!task.arm_joints().is_empty()).then(|| ARM_CELL.to_owned()),
+            origins: Origin::Simulation.into(),
             ..ClipInfo::default()
         };
         write_episode(place.begin()?, &info, &rows)?;

@@ -2,7 +2,7 @@
 
 use anyhow::Context as _;
 use shared_mem::quantity::seconds;
-use shared_mem::{answer, recording::ClipInfo};
+use shared_mem::{answer, origin::Origin, recording::ClipInfo};
 use shared_mem::{console, parent};
 use std::net::{IpAddr, Ipv4Addr};
 use std::path::PathBuf;
@@ -79,6 +79,7 @@ impl Teleop {
                 configuration: task.text().to_owned(),
                 program: concat!("twin ", env!("CARGO_PKG_VERSION"), " teleop").to_owned(),
                 cell_toml: Some(super::task::ARM_CELL.to_owned()),
+                origins: Origin::Simulation.into(),
                 ..ClipInfo::default()
             },
         };

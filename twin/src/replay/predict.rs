@@ -137,7 +137,7 @@ impl Replayer {
         }
         let mut warnings = clip.warnings.clone();
         warnings.extend(clip.damage.iter().chain(&prediction.warnings).cloned());
-        let report = ClipGap { file: name(&clip), gap, warnings };
+        let report = ClipGap { file: name(&clip), gap, origins: clip.origins.clone(), warnings };
         Ok((clip, prediction, report))
     }
 

@@ -2,6 +2,8 @@
 //! shows milliradians and millimetres.
 
 use serde::Serialize;
+use shared_mem::origin::Origins;
+use shared_mem::recording::Provenance;
 use std::fmt;
 
 /// Real against simulated; `None` (`null`) where it does not apply.
@@ -25,6 +27,8 @@ pub struct ClipGap {
     /// The figures.
     #[serde(flatten)]
     pub gap: Gap,
+    /// Where the recording comes from, as far as it says.
+    pub origins: Origins,
     /// What was odd in the recording, one sentence each.
     pub warnings: Vec<String>,
 }
@@ -116,7 +120,8 @@ impl fmt::Display for SessionGap {
             }
             writeln!(f)?;
         }
-        Ok(())
+        let origins = self.clips.iter().map(|clip| (clip.file.as_str(), &clip.origins));
+        write!(f, "origin: {}", Provenance::of_clips(origins))
     }
 }
 
@@ -133,7 +138,7 @@ mod tests {
 
     fn clip(file: &str, rms: f64, add: Option<f64>) -> ClipGap {
         let gap = Gap { joint_rms_rad: Some(vec![rms, 0.0]), object_add_m: add, ..Gap::default() };
-        ClipGap { file: file.into(), gap, warnings: Vec::new() }
+        ClipGap { file: file.into(), gap, origins: Origins::default(), warnings: Vec::new() }
     }
 
     #[test]

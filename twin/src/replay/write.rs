@@ -31,6 +31,7 @@ pub fn write_clip(
         configuration: replayer.theta().map_or_else(String::new, |theta| theta.to_toml()),
         program: concat!("twin ", env!("CARGO_PKG_VERSION"), " replay").to_owned(),
         torques_begin_at_rows: !clip.torques_end_at_rows,
+        origins: clip.origins.clone(),
     };
     let begin = if in_unix_time(clip) { ClipWriter::whole_in_unix_time } else { ClipWriter::whole };
     let mut writer = begin(place.begin()?, &info)?;

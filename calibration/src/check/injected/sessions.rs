@@ -8,6 +8,7 @@ use rand_distr::StandardNormal;
 use rand_pcg::Pcg64;
 use shared_mem::cell::{Cell, ClipKind};
 use shared_mem::frames::Pose;
+use shared_mem::origin::Origin;
 use shared_mem::recording::{Clip, JointSeries, ObjectSeries, Session};
 use shared_mem::theta::Theta;
 use std::f64::consts::PI;
@@ -134,6 +135,7 @@ fn tossed(number: u64, cell: &Cell) -> Result<Clean, CleanError> {
             desired: JointSeries::default(),
             measured: JointSeries::default(),
             torques_end_at_rows: false,
+            origins: Origin::Simulation.into(),
             object: ObjectSeries { stamps_ns: poses_ns, poses },
             others: Vec::new(),
             warnings: Vec::new(),

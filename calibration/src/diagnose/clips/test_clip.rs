@@ -15,6 +15,7 @@ pub(super) fn of_one_joint(stamps_ns: Vec<u64>, q: impl Fn(f64) -> f64) -> Clip 
         desired: series.clone(),
         measured: series,
         torques_end_at_rows: false,
+        origins: shared_mem::origin::Origins::default(),
         object: ObjectSeries::default(),
         others: Vec::new(),
         warnings: Vec::new(),

@@ -371,7 +371,20 @@ mod tests {
         let (file, kind) = ("clip.mcap".into(), ClipKind::Excitation);
         let joint_names = (1..=7).map(|joint| format!("fr3_joint{joint}")).collect();
         let (object, others, warnings) = (ObjectSeries::default(), Vec::new(), Vec::new());
-        Clip { file, kind, joint_names, desired, measured, torques_end_at_rows, object, others, warnings, damage: None }
+        let origins = shared_mem::origin::Origins::default();
+        Clip {
+            file,
+            kind,
+            joint_names,
+            desired,
+            measured,
+            torques_end_at_rows,
+            object,
+            others,
+            origins,
+            warnings,
+            damage: None,
+        }
     }
 
     #[test]

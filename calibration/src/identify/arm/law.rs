@@ -135,6 +135,7 @@ mod tests {
             desired,
             measured,
             torques_end_at_rows: true,
+            origins: shared_mem::origin::Origins::default(),
             object: ObjectSeries::default(),
             warnings: Vec::new(),
             damage: None,

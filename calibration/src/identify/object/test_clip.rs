@@ -26,6 +26,7 @@ pub(super) fn clip(change: impl Fn(usize, &mut Isometry3<f64>)) -> Clip {
         file: "clip.mcap".into(),
         kind: ClipKind::ControlHitSlide,
         torques_end_at_rows: false,
+        origins: shared_mem::origin::Origins::default(),
         joint_names: Vec::new(),
         desired: JointSeries::default(),
         measured: JointSeries::default(),

@@ -182,6 +182,22 @@ impl<R: Read + Seek> Messages<R> {
         })
     }
 
+    /// Goes to the end for what rides along alone: chunks are passed over unopened, and the messages are gone.
+    pub(super) fn skim(&mut self) -> Result<(), ReadError> {
+        while let Some(opcode) = self.framing.advance().map_err(ReadError::io(&self.path))? {
+            if ending::asked() {
+                return Err(ReadError::Interrupted { path: self.path.clone() });
+            }
+            if opcode == op::METADATA {
+                let record = std::mem::take(&mut self.framing.record);
+                // The framing has looked at its lengths.
+                let _whole = self.record(opcode, record.get(PREFIX..).unwrap_or(&[]));
+                self.framing.record = record;
+            }
+        }
+        Ok(())
+    }
+
     /// What could not be read so far.
     pub(super) fn damage(&self) -> &Damage {
         &self.framing.damage

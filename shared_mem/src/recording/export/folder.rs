@@ -12,6 +12,7 @@ use super::source::Source;
 use super::{ExportError, Exported, FlangeAt, npz};
 use crate::cell::{Camera, CameraPose, Cell};
 use crate::msg::image::{CameraInfo, ImageHeader, PixelEncoding};
+use crate::origin;
 use crate::output::{OutputError, OutputFolder};
 use serde_json::{Map, Value, json};
 use std::path::Path;
@@ -71,6 +72,11 @@ pub(super) fn write(
     }
     if clip.measured.dq_row(0).is_some() || clip.measured.tau_row(0).is_some() {
         exported.warnings.push("velocities and torques have no room in the format".into());
+    }
+    let is_lost = |from: &origin::Origin| from.source() != origin::Source::Elsewhere;
+    if clip.origins.iter().any(is_lost) {
+        let what = format!("where the clip comes from has no room in the format: {}", clip.origins);
+        exported.warnings.push(what);
     }
     Ok(exported)
 }

@@ -45,6 +45,7 @@ pub(super) fn write(
         configuration: String::new(),
         program: concat!("twinalign ", env!("CARGO_PKG_VERSION"), ", export").into(),
         torques_begin_at_rows: !clip.torques_end_at_rows,
+        origins: clip.origins.clone(),
     };
     let mut writer = ClipWriter::whole_in_unix_time(output, &info)?;
     if let Some(robot) = robot {
@@ -84,6 +85,7 @@ pub fn write_clip(
         configuration: String::new(),
         program: program.into(),
         torques_begin_at_rows: !clip.torques_end_at_rows,
+        origins: clip.origins.clone(),
     };
     let mut writer = ClipWriter::whole_in_unix_time(output, &info)?;
     if let Some(robot) = robot {

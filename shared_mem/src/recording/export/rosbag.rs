@@ -3,7 +3,7 @@
 use super::super::robot::RobotModel;
 use super::super::ros2::{self, JointState, StampedPose};
 use super::super::tracked::Due;
-use super::super::{Payload, Picture, torques};
+use super::super::{Payload, Picture, origins, torques};
 use super::bag::{Bag, COLOR, COLOR_COMPRESSED, DEPTH, EVENTS, EXTERNAL_TORQUES, FLANGE_POSE, GRIPPER, INFO, WRENCH};
 use super::encode;
 use super::left_out::Carried;
@@ -38,6 +38,9 @@ pub(super) fn write(
     };
     let mut bag = Bag::create(output).map_err(failed)?;
     bag.put_metadata(&torques::record(source.clip.torques_end_at_rows)).map_err(failed)?;
+    for record in origins::records(&source.clip.origins) {
+        bag.put_metadata(&record).map_err(failed)?;
+    }
     let mut rows = Rows::new(source, cell, robot);
     for beside in source.beside()? {
         let beside = beside?;

@@ -3,7 +3,7 @@
 
 use super::super::container::Messages;
 use super::super::device_clock::DeviceClock;
-use super::super::own::{clip_info, well_stamped};
+use super::super::own::{is_own, well_stamped};
 use super::super::ros2::CompressedImage;
 use super::super::writer::{METADATA, UNIX_OFFSET_NS};
 use super::super::{Clip, ClipMessages, Payload, Picture, ReadError, Session, read_arm_states, twinaligner};
@@ -123,7 +123,7 @@ impl Source {
 fn kind_of_file(path: &Path, cell: &Cell) -> Result<Kind, ReadError> {
     let mut messages = Messages::open(path)?;
     messages.next()?;
-    if clip_info(&messages).is_none() {
+    if !is_own(&messages) {
         return Ok(Kind::Bag);
     }
     let record = messages.metadata.iter().find(|m| m.name == METADATA);

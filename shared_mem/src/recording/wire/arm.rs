@@ -5,6 +5,7 @@ use super::proto::twinalign as wire;
 use super::{UnixClock, Wire, array};
 use crate::msg::arm::{ArmCommand, ArmMode, ArmState, CommandInterface, MotionStatus};
 use crate::msg::object::ObjectName;
+use crate::msg::origin::ArmOrigin;
 use crate::msg::twin::{TwinGap, TwinObject, TwinState};
 use crate::msg::{Joints, joints_from};
 use crate::topics;
@@ -48,6 +49,7 @@ impl Wire for ArmState {
             motion_played: self.motion_played,
             motion_queued: self.motion_queued,
             motion: self.motion as i32,
+            origin: self.origin.text().to_owned(),
         }
     }
 
@@ -88,6 +90,7 @@ impl Wire for ArmState {
                 wire::MotionStatus::Braked => MotionStatus::Braked,
             },
             reserved: 0,
+            origin: ArmOrigin::new(&m.origin),
         }
     }
 }

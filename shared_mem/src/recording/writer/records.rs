@@ -7,6 +7,7 @@ use crate::msg::event::Event;
 use crate::msg::gripper::GripperState;
 use crate::msg::image::CameraInfo;
 use crate::msg::object::{NamedPose, ObjectPose};
+use crate::msg::origin::ArmOrigin;
 use crate::msg::target::{ArmTarget, GripperTarget};
 use crate::msg::twin::{TwinGap, TwinObject, TwinState};
 use crate::msg::wrench::Wrench;
@@ -20,7 +21,8 @@ impl<W: Write> ClipWriter<W> {
     /// # Errors
     /// [`WriteError`] when the disk is full or fails; what was flushed before stays readable.
     pub fn arm_state(&mut self, message: &ArmState) -> Result<(), WriteError> {
-        self.message(message)?;
+        self.say_origin(&message.origin)?;
+        self.message(&ArmState { origin: ArmOrigin::default(), ..*message })?;
         self.show_joints(Whose::Real, message.stamp_ns, message.q.get(..message.dof as usize).unwrap_or(&[]))
     }
 
