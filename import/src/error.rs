@@ -1,5 +1,6 @@
 //! Why logs cannot be imported, one line each: what happened and what to do.
 
+use shared_mem::budget::BudgetError;
 use shared_mem::cell::CellError;
 use shared_mem::input::InputError;
 use shared_mem::output::OutputError;
@@ -48,6 +49,14 @@ pub enum ImportError {
         /// What is wrong and how to mend it.
         what: String,
     },
+    /// A log asks for more than is spent on one of its size.
+    #[error("{}: {source}", path.display())]
+    Budget {
+        /// The file or folder.
+        path: PathBuf,
+        /// What was spent.
+        source: BudgetError,
+    },
     /// Ctrl-C.
     #[error("{}: interrupted while it was read; start again", path.display())]
     Interrupted {
@@ -61,5 +70,13 @@ impl ImportError {
     pub(crate) fn log(path: &Path, what: impl Into<String>) -> Self {
         // What a log holds may be quoted, and be anything.
         Self::Log { path: path.to_owned(), what: printable::one_line(&what.into()) }
+    }
+
+    /// A budget is spent, or the process was asked to end.
+    pub(crate) fn budget(path: &Path) -> impl Fn(BudgetError) -> Self + '_ {
+        move |source| match source {
+            BudgetError::Ended => Self::Interrupted { path: path.to_owned() },
+            BudgetError::Memory(_) | BudgetError::Steps(_) => Self::Budget { path: path.to_owned(), source },
+        }
     }
 }

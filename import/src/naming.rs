@@ -1,6 +1,7 @@
 //! What the names of columns say: which of them belong together, and which quantity they may be.
 
 use crate::log::Table;
+use std::collections::HashMap;
 
 /// Columns of one quantity: `q[0]` to `q[6]`, `joint1_pos` to `joint6_pos`.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -175,14 +176,20 @@ pub(crate) fn may_serve(name: &str) -> bool {
 /// Columns of a table by quantity, in the order they stand.
 pub(crate) fn groups(table: &Table) -> Vec<Group> {
     let mut groups: Vec<Group> = Vec::new();
+    let mut first: HashMap<String, usize> = HashMap::new();
     for column in &table.columns {
         let (base, label) = split(&column.name);
-        match groups.iter_mut().find(|group| group.base == base && !label.is_empty()) {
+        // Without a label a column stands by itself.
+        let known = first.get(&base).filter(|_| !label.is_empty());
+        match known.and_then(|at| groups.get_mut(*at)) {
             Some(group) => {
                 group.labels.push(label);
                 group.names.push(column.name.clone());
             }
-            None => groups.push(Group { base, labels: vec![label], names: vec![column.name.clone()] }),
+            None => {
+                first.entry(base.clone()).or_insert(groups.len());
+                groups.push(Group { base, labels: vec![label], names: vec![column.name.clone()] });
+            }
         }
     }
     groups

@@ -148,8 +148,8 @@ fn given_mapping(path: &Path) -> Result<Mapping, ImportError> {
 
 /// The source with most bytes, and its logs: its numbers tell most.
 fn largest(found: &[Source]) -> Result<(usize, Vec<Log>), ImportError> {
-    let number =
-        (0..found.len()).max_by_key(|number| (found[*number].bytes(), std::cmp::Reverse(*number))).unwrap_or(0);
+    let bytes = found.iter().map(Source::bytes).collect::<Result<Vec<_>, _>>()?;
+    let number = (0..found.len()).max_by_key(|number| (bytes[*number], std::cmp::Reverse(*number))).unwrap_or(0);
     Ok((number, found[number].read()?))
 }
 

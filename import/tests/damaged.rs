@@ -5,10 +5,10 @@
 
 mod lab;
 
-use lab::fixture;
+use lab::{copy, fixture};
 use rand::{RngExt, SeedableRng};
 use shared_mem::recording::Session;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// Which file of a log is damaged.
 const LOGS: [(&str, &str); 13] = [
@@ -26,18 +26,6 @@ const LOGS: [(&str, &str); 13] = [
     ("sage_motion", "state_motor.csv"),
     ("sage_motion", "control.csv"),
 ];
-
-fn copy(from: &Path, to: &Path) {
-    if from.is_dir() {
-        std::fs::create_dir_all(to).expect("room");
-        for entry in std::fs::read_dir(from).expect("a folder") {
-            let path = entry.expect("an entry").path();
-            copy(&path, &to.join(path.file_name().expect("a name")));
-        }
-    } else {
-        std::fs::copy(from, to).expect("room");
-    }
-}
 
 /// How many of the damaged copies were refused, of those that were cut and of those that were changed.
 fn damaged(log: &str, file: &str, copies: usize) -> [usize; 2] {

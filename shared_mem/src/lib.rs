@@ -15,6 +15,7 @@
 //! | [`frames`] | typed poses: `Pose<To, From>` |
 //! | [`hand_eye`] | `hand_eye.toml`: where a camera is mounted, and `O_T_EE` in lists of pictures |
 //! | [`origin`] | where a recording comes from: a simulation, a robot, another recording |
+//! | [`budget`] | what reading one input may cost: memory and steps |
 //! | [`input`] | the one way in for files: regular ones only, each kind up to a size |
 //! | [`output`] | files that are whole or not there: every writer but the live recorder goes through it |
 //! | [`ending`] | whether the process was asked to end |
@@ -32,6 +33,7 @@
 
 pub mod answer;
 mod blocks;
+pub mod budget;
 pub mod cell;
 pub mod command_line;
 pub mod console;

@@ -4,6 +4,7 @@ use super::Notes;
 use crate::log::Log;
 use crate::naming::{self, Group, Quantity, Role};
 use shared_mem::msg::MAX_JOINTS;
+use std::collections::HashSet;
 
 /// Columns of one table.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -104,7 +105,7 @@ pub(super) fn choose(log: &Log, wanted: &[String], notes: &mut Notes) -> Chosen 
 
 /// Every group that may be a quantity of joints, without fingers.
 fn candidates<'a>(log: &'a Log, wanted: &[String], fingers: &mut Vec<String>) -> Vec<Candidate<'a>> {
-    let mut found = Vec::new();
+    let (mut found, mut told) = (Vec::new(), HashSet::new());
     for table in &log.tables {
         for mut group in naming::groups(table) {
             let Some(role) = naming::role(&table.name, &group) else { continue };
@@ -116,12 +117,11 @@ fn candidates<'a>(log: &'a Log, wanted: &[String], fingers: &mut Vec<String>) ->
                 (label.contains("finger") || label.contains("gripper"))
                     && !wanted.iter().any(|w| w.to_ascii_lowercase() == label)
             };
-            let out: Vec<usize> =
-                (0..group.labels.len()).filter(|i| group.labels.get(*i).is_some_and(is_finger)).collect();
-            for i in out.into_iter().rev() {
-                let label = group.labels.remove(i);
-                group.names.remove(i);
-                if !fingers.contains(&label) {
+            let all = std::mem::take(&mut group.labels).into_iter().zip(std::mem::take(&mut group.names));
+            let (out, arm): (Vec<_>, Vec<_>) = all.partition(|(label, _)| is_finger(label));
+            (group.labels, group.names) = arm.into_iter().unzip();
+            for (label, _) in out.into_iter().rev() {
+                if told.insert(label.clone()) {
                     fingers.push(label);
                 }
             }

@@ -4,6 +4,7 @@ use super::{Notes, clock};
 use crate::log::{HEADER, Log, Table};
 use crate::mapping::{LengthUnit, PoseColumns};
 use crate::naming;
+use std::collections::HashSet;
 
 /// Words of things that lie on a table, and of what does not.
 const THINGS: [&str; 11] =
@@ -28,12 +29,13 @@ const SPELLINGS: [([&str; 3], [&str; 4]); 5] = [
 pub(super) fn choose(log: &Log, notes: &mut Notes) -> Option<PoseColumns> {
     let mut found: Vec<(u32, &Table, [String; 3], [String; 4])> = Vec::new();
     for table in &log.tables {
+        let there: HashSet<&str> = table.columns.iter().map(|column| column.name.as_str()).collect();
         for column in &table.columns {
             for (position, orientation) in SPELLINGS {
                 let Some(prefix) = column.name.strip_suffix(position[0]) else { continue };
                 let whole = |name: &str| format!("{prefix}{name}");
                 let (position, orientation) = (position.map(whole), orientation.map(whole));
-                let all = position.iter().chain(&orientation).all(|name| table.column(name).is_some());
+                let all = position.iter().chain(&orientation).all(|name| there.contains(name.as_str()));
                 let ends = prefix.is_empty() || !prefix.ends_with(|c: char| c.is_alphanumeric());
                 let words = naming::words(&format!("{} {prefix}", table.name));
                 let says = |list: &[&str]| words.iter().any(|word| list.contains(&word.as_str()));

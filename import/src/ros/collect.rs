@@ -1,12 +1,15 @@
 //! The messages of a bag as tables: one a topic and publisher, with the numbers that may be of use.
 
-use super::definition::{self, Arity, Field, Kind};
-use super::flat::Flat;
+use super::definition::{self, Arity, Field, Kind, Undefined};
+use super::flat::{Flat, Unread};
 use super::known;
-use super::wire::{Encoding, Reader};
+use super::wire::{Broken, Encoding, Reader};
+use crate::error::ImportError;
 use crate::log::{Column, LeftOut, Table};
 use crate::naming;
+use shared_mem::budget::{Budget, BudgetError};
 use std::collections::{BTreeMap, HashMap};
+use std::path::Path;
 use std::rc::Rc;
 
 /// Publishers, or transforms, of one topic that are read separately.
@@ -17,6 +20,10 @@ const PICTURES: &str = "pictures and other arrays of bytes are not imported";
 const UNDEFINED: &str = "the bag holds no definition of its type";
 const NUMBERLESS: &str = "it holds no number that a clip has a place for";
 const CROWDED: &str = "its messages have too many forms";
+const LONG: &str = "its messages hold more numbers than a row of any use";
+
+/// What a topic, a column or a text takes beside its own bytes.
+const OVERHEAD: usize = 128;
 
 /// Types of a text, in ROS 2 and ROS 1.
 const TEXT: [&str; 2] = ["std_msgs/msg/String", "std_msgs/String"];
@@ -24,8 +31,9 @@ const TEXT: [&str; 2] = ["std_msgs/msg/String", "std_msgs/String"];
 const DESCRIPTION: &str = "robot_description";
 
 /// Takes messages and gives tables.
-pub(crate) struct Collector {
+pub(crate) struct Collector<'a> {
     encoding: Encoding,
+    budget: &'a Budget,
     types: HashMap<String, Option<Rc<Vec<Field>>>>,
     topics: BTreeMap<String, Topic>,
     description: Option<String>,
@@ -60,27 +68,68 @@ pub(crate) struct Incoming<'a> {
     pub(crate) data: &'a [u8],
 }
 
-impl Collector {
-    pub(crate) fn new(encoding: Encoding) -> Self {
-        Self { encoding, types: HashMap::new(), topics: BTreeMap::new(), description: None }
+/// A message is not taken over.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) enum Refused {
+    /// It is not what its type says: a sentence to be put behind the bag's name.
+    Message(String),
+    /// The bag's budget is spent.
+    Budget(BudgetError),
+}
+
+impl Refused {
+    /// Of the bag at `path`.
+    pub(crate) fn of(self, path: &Path) -> ImportError {
+        match self {
+            Self::Message(what) => ImportError::log(path, what),
+            Self::Budget(over) => ImportError::budget(path)(over),
+        }
+    }
+}
+
+impl From<BudgetError> for Refused {
+    fn from(over: BudgetError) -> Self {
+        Self::Budget(over)
+    }
+}
+
+impl<'a> Collector<'a> {
+    /// `budget`: that of the bag.
+    pub(crate) fn new(encoding: Encoding, budget: &'a Budget) -> Self {
+        Self { encoding, budget, types: HashMap::new(), topics: BTreeMap::new(), description: None }
     }
 
-    /// Takes a message over; a sentence where it is not what its type says.
-    pub(crate) fn take(&mut self, message: &Incoming<'_>) -> Result<(), String> {
-        let fields = self.fields(message);
+    /// What is left for the bag.
+    pub(crate) fn budget(&self) -> &'a Budget {
+        self.budget
+    }
+
+    /// Takes a message over.
+    ///
+    /// # Errors
+    /// [`Refused`] where it is not what its type says, or the budget is spent.
+    pub(crate) fn take(&mut self, message: &Incoming<'_>) -> Result<(), Refused> {
+        let (budget, fields) = (self.budget, self.fields(message)?);
         let topic = match self.topics.get_mut(message.topic) {
             Some(topic) => topic,
-            None => self.topics.entry(message.topic.to_owned()).or_default(),
+            None => {
+                budget.take(message.topic.len() + OVERHEAD)?;
+                self.topics.entry(message.topic.to_owned()).or_default()
+            }
         };
         let Some(fields) = fields else {
             topic.leave_out(UNDEFINED);
             return Ok(());
         };
         let broken = |_| {
-            format!(
+            Refused::Message(format!(
                 "a message on `{}` is no {}: the bag is damaged; take it from its source again",
                 message.topic, message.type_name
-            )
+            ))
+        };
+        let unread = |unread: Unread| match unread {
+            Unread::Broken => broken(Broken),
+            Unread::Budget(over) => Refused::Budget(over),
         };
         let mut reader = Reader::new(message.data, self.encoding).map_err(broken)?;
         if TEXT.contains(&message.type_name) && message.topic.ends_with(DESCRIPTION) {
@@ -89,26 +138,34 @@ impl Collector {
         // A list of messages is as many of them: transforms.
         if let [Field { kind: Kind::Message(inner), arity: Arity::Sequence, .. }] = &fields[..] {
             for _ in 0..reader.length().map_err(broken)? {
-                topic.row(inner, &mut reader, message.log_time_ns).map_err(broken)?;
+                topic.row(inner, (&mut reader, budget), message.log_time_ns).map_err(unread)?;
             }
         } else {
-            topic.row(&fields, &mut reader, message.log_time_ns).map_err(broken)?;
+            topic.row(&fields, (&mut reader, budget), message.log_time_ns).map_err(unread)?;
         }
-        if reader.is_at_end() { Ok(()) } else { Err(broken(super::wire::Broken)) }
+        if reader.is_at_end() { Ok(()) } else { Err(broken(Broken)) }
     }
 
-    fn fields(&mut self, message: &Incoming<'_>) -> Option<Rc<Vec<Field>>> {
+    /// The fields of a message's type, where they are known.
+    fn fields(&mut self, message: &Incoming<'_>) -> Result<Option<Rc<Vec<Field>>>, BudgetError> {
         if let Some(known) = self.types.get(message.type_name) {
-            return known.clone();
+            return Ok(known.clone());
         }
-        let own = std::str::from_utf8(message.definition).ok().filter(|text| !text.trim().is_empty());
-        let fields = own.and_then(|text| definition::parse(message.type_name, text)).or_else(|| {
-            let text = known::definition(message.type_name);
-            if text.is_empty() { None } else { definition::parse(message.type_name, &text) }
-        });
-        let fields = fields.map(Rc::new);
+        self.budget.take(message.type_name.len() + OVERHEAD)?;
+        let own = std::str::from_utf8(message.definition).unwrap_or("");
+        let mut fields = None;
+        for text in [own, &known::definition(message.type_name)] {
+            if fields.is_some() || text.trim().is_empty() {
+                continue;
+            }
+            fields = match definition::parse(message.type_name, text, self.budget) {
+                Ok(fields) => Some(Rc::new(fields)),
+                Err(Undefined::Text) => None,
+                Err(Undefined::Budget(over)) => return Err(over),
+            };
+        }
         self.types.insert(message.type_name.to_owned(), fields.clone());
-        fields
+        Ok(fields)
     }
 
     /// The robot's URDF, where it was published.
@@ -136,13 +193,19 @@ impl Topic {
         *self.left_out.entry(why).or_default() += 1;
     }
 
-    fn row(&mut self, fields: &[Field], reader: &mut Reader<'_>, log_time_ns: u64) -> Result<(), super::wire::Broken> {
+    fn row(
+        &mut self,
+        fields: &[Field],
+        (reader, budget): (&mut Reader<'_>, &Budget),
+        log_time_ns: u64,
+    ) -> Result<(), Unread> {
         let again = reader.clone();
-        let flat = Flat::read(fields, reader, false)?;
-        if flat.has_bytes {
-            self.leave_out(PICTURES);
+        let flat = Flat::read(fields, reader, false, budget)?;
+        if flat.has_bytes || flat.is_long {
+            self.leave_out(if flat.has_bytes { PICTURES } else { LONG });
             return Ok(());
         }
+        budget.step(self.layouts.len())?;
         let known = self.layouts.iter().position(|l| l.shape == flat.shape && l.texts == flat.texts);
         let at = match known {
             Some(at) => at,
@@ -151,14 +214,15 @@ impl Topic {
                 return Ok(());
             }
             None => {
-                let named = Flat::read(fields, &mut again.clone(), true)?;
-                self.layouts.push(Layout::new(&named));
+                let named = Flat::read(fields, &mut again.clone(), true, budget)?;
+                self.layouts.push(Layout::new(&named, budget)?);
                 self.layouts.len() - 1
             }
         };
         if self.layouts.get(at).is_none_or(|layout| layout.kept.is_empty()) {
             self.leave_out(NUMBERLESS);
         } else if let Some(layout) = self.layouts.get_mut(at) {
+            budget.elements(layout.kept.len() + 2, size_of::<f64>())?;
             layout.push(&flat, log_time_ns);
         }
         Ok(())
@@ -179,11 +243,14 @@ impl Topic {
 }
 
 impl Layout {
-    fn new(flat: &Flat<'_>) -> Self {
+    fn new(flat: &Flat<'_>, budget: &Budget) -> Result<Self, BudgetError> {
         let names = flat.names();
+        let bytes = |texts: usize, sum: usize| sum + texts * OVERHEAD;
+        budget.take(bytes(names.len(), names.iter().map(String::len).sum()))?;
+        budget.take(bytes(flat.texts.len(), flat.texts.iter().map(|text| text.len()).sum()))?;
         let kept: Vec<usize> =
             (0..names.len()).filter(|i| names.get(*i).is_some_and(|n| naming::may_serve(n))).collect();
-        Self {
+        Ok(Self {
             shape: flat.shape.clone(),
             texts: flat.texts.iter().map(|&text| text.to_owned()).collect(),
             columns: vec![Vec::new(); kept.len()],
@@ -191,7 +258,7 @@ impl Layout {
             kept,
             stamps_ns: Vec::new(),
             log_times_ns: Vec::new(),
-        }
+        })
     }
 
     fn push(&mut self, flat: &Flat<'_>, log_time_ns: u64) {

@@ -1,5 +1,7 @@
-//! Types of messages as their `.msg` texts define them: the message itself, and behind lines of `=` every type it uses.
+//! Types of messages as their `.msg` texts define them: the message itself, and behind lines of `=` every type it uses. Arrays
+//! of a type that takes no byte are no such types: any number of elements would be there.
 
+use shared_mem::budget::{Budget, BudgetError};
 use std::collections::HashMap;
 
 /// The most fields that a type may have, nested ones counted, and how deep types may lie in each other: more than any real
@@ -47,12 +49,37 @@ pub(super) struct Field {
     pub(super) name: String,
     pub(super) kind: Kind,
     pub(super) arity: Arity,
+    /// What one element takes in a message, at least [bytes].
+    pub(super) least: usize,
     /// Whether it is a `Time`: the stamp of a header.
     pub(super) is_time: bool,
 }
 
-/// The fields of the type that `text` defines; `None` where it cannot be understood. `type_name` is its full name.
-pub(super) fn parse(type_name: &str, text: &str) -> Option<Vec<Field>> {
+/// Why a text defines no type.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Undefined {
+    /// It cannot be understood.
+    Text,
+    /// It takes too much.
+    Budget(BudgetError),
+}
+
+impl From<BudgetError> for Undefined {
+    fn from(over: BudgetError) -> Self {
+        Self::Budget(over)
+    }
+}
+
+/// The fields of the type that `text` defines; `type_name` is its full name.
+pub(super) fn parse(type_name: &str, text: &str, budget: &Budget) -> Result<Vec<Field>, Undefined> {
+    budget.step(text.len())?;
+    let texts = texts(type_name, text).ok_or(Undefined::Text)?;
+    let mut types = Types { texts, left: MOST_FIELDS, budget };
+    types.fields(&short(type_name), DEEPEST)
+}
+
+/// The text of each type by its short name.
+fn texts<'a>(type_name: &str, text: &'a str) -> Option<HashMap<String, &'a str>> {
     let mut texts: HashMap<String, &str> = HashMap::new();
     let mut rest = text;
     let mut name = short(type_name);
@@ -69,8 +96,7 @@ pub(super) fn parse(type_name: &str, text: &str) -> Option<Vec<Field>> {
         name = short(title.trim().strip_prefix("MSG: ")?.trim());
         rest = body;
     }
-    let mut left = MOST_FIELDS;
-    fields(&short(type_name), &texts, &mut left, DEEPEST)
+    Some(texts)
 }
 
 /// `sensor_msgs/msg/JointState` as `sensor_msgs/JointState`.
@@ -78,36 +104,81 @@ fn short(name: &str) -> String {
     name.replace("/msg/", "/")
 }
 
-fn fields(name: &str, texts: &HashMap<String, &str>, left: &mut usize, depth: usize) -> Option<Vec<Field>> {
-    let package = name.split_once('/').map_or("", |(package, _)| package);
-    let depth = depth.checked_sub(1)?;
-    let mut found = Vec::new();
-    for line in texts.get(name)?.lines() {
+/// Types that are being put together.
+struct Types<'a> {
+    texts: HashMap<String, &'a str>,
+    /// Fields that there may still be.
+    left: usize,
+    budget: &'a Budget,
+}
+
+impl Types<'_> {
+    fn fields(&mut self, name: &str, depth: usize) -> Result<Vec<Field>, Undefined> {
+        let depth = depth.checked_sub(1).ok_or(Undefined::Text)?;
+        let text = *self.texts.get(name).ok_or(Undefined::Text)?;
+        // Comments take time, too, and each use of the type goes through them again.
+        self.budget.step(text.len())?;
+        let package = name.split_once('/').map_or("", |(package, _)| package);
+        text.lines().filter_map(|line| self.field(line, package, depth).transpose()).collect()
+    }
+
+    /// The field of a line; `None` where it has none.
+    fn field(&mut self, line: &str, package: &str, depth: usize) -> Result<Option<Field>, Undefined> {
         let line = line.split('#').next().unwrap_or("").trim();
         let mut words = line.split_whitespace();
-        let (Some(kind), Some(field)) = (words.next(), words.next()) else { continue };
+        let (Some(kind), Some(name)) = (words.next(), words.next()) else { return Ok(None) };
         // A constant.
-        if field.contains('=') || words.next().is_some_and(|word| word.starts_with('=')) {
-            continue;
+        if name.contains('=') || words.next().is_some_and(|word| word.starts_with('=')) {
+            return Ok(None);
         }
-        *left = left.checked_sub(1)?;
-        let (kind, arity) = arity(kind)?;
-        let kind = kind.split("<=").next()?;
+        self.left = self.left.checked_sub(1).ok_or(Undefined::Text)?;
+        self.budget.take(size_of::<Field>() + name.len())?;
+        let (kind, arity) = arity(kind).ok_or(Undefined::Text)?;
+        let kind = kind.split("<=").next().unwrap_or(kind);
         let is_time = matches!(kind, "time" | "builtin_interfaces/Time" | "builtin_interfaces/msg/Time");
-        let kind = match primitive(kind) {
-            Some(primitive) => Kind::Primitive(primitive),
+        let (kind, least) = match primitive(kind) {
+            Some(primitive) => (Kind::Primitive(primitive), primitive.least()),
             None => {
                 let full = match short(kind) {
                     header if header == "Header" => "std_msgs/Header".to_owned(),
                     full if full.contains('/') => full,
                     local => format!("{package}/{local}"),
                 };
-                Kind::Message(fields(&full, texts, left, depth)?)
+                let inner = self.fields(&full, depth)?;
+                let least = inner.iter().fold(0, |sum: usize, field| sum.saturating_add(field.least_of_all()));
+                (Kind::Message(inner), least)
             }
         };
-        found.push(Field { name: field.to_owned(), kind, arity, is_time });
+        if least == 0 && arity != Arity::One {
+            return Err(Undefined::Text);
+        }
+        Ok(Some(Field { name: name.to_owned(), kind, arity, least, is_time }))
     }
-    Some(found)
+}
+
+impl Field {
+    /// What all its elements take, at least [bytes].
+    fn least_of_all(&self) -> usize {
+        match self.arity {
+            Arity::One => self.least,
+            Arity::Fixed(count) => self.least.saturating_mul(count),
+            // Their number.
+            Arity::Sequence => size_of::<u32>(),
+        }
+    }
+}
+
+impl Primitive {
+    /// What it takes in a message, at least [bytes].
+    fn least(self) -> usize {
+        match self {
+            Self::Bool | Self::U8 | Self::I8 => 1,
+            Self::U16 | Self::I16 => 2,
+            // Of a text its length.
+            Self::U32 | Self::I32 | Self::F32 | Self::Text => 4,
+            Self::U64 | Self::I64 | Self::F64 | Self::Moment => 8,
+        }
+    }
 }
 
 fn arity(kind: &str) -> Option<(&str, Arity)> {
@@ -143,6 +214,10 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
+    fn parse(type_name: &str, text: &str) -> Option<Vec<Field>> {
+        super::parse(type_name, text, &Budget::of(text.len() as u64)).ok()
+    }
+
     #[test]
     fn constants_comments_arrays_and_nested_types_are_understood() {
         let rule = "=".repeat(80);
@@ -162,6 +237,28 @@ mod tests {
     fn a_type_that_holds_itself_or_an_unknown_one_is_refused() {
         assert_eq!(parse("a/Loop", "Loop loop\n"), None);
         assert_eq!(parse("a/B", "Missing m\n"), None);
+    }
+
+    #[test]
+    fn arrays_of_what_takes_no_byte_are_refused_and_one_of_it_is_not() {
+        let rule = "=".repeat(80);
+        let with = |own: &str| parse("a/Msg", &format!("{own}\n{rule}\nMSG: a/E\n{rule}\nMSG: a/Holds\nE e\n"));
+        assert_eq!(with("E[1000000000000] e"), None);
+        assert_eq!(with("E[] e"), None);
+        assert_eq!(with("Holds[] e"), None);
+        assert_eq!(with("E e\nuint8 x").map(|fields| (fields[0].least, fields[1].least)), Some((0, 1)));
+    }
+
+    #[test]
+    fn a_text_that_uses_long_comments_again_and_again_is_refused() {
+        // 12 levels of 8 uses each of what lies below, and the last has a page of comments.
+        let rule = "=".repeat(80);
+        let level = |n: usize| format!("MSG: a/T{n}\n{}{rule}\n", format!("T{} x\n", n + 1).repeat(8));
+        let levels: String = (1..4).map(level).collect();
+        let text = format!("T1 x\n{rule}\n{levels}MSG: a/T4\n{}", "# nothing\n".repeat(1000));
+        assert_eq!(parse("a/Top", &text).map(|fields| fields.len()), Some(1));
+        let spent = super::parse("a/Top", &text, &Budget::with(1 << 30, 1_000_000));
+        assert_eq!(spent, Err(Undefined::Budget(BudgetError::Steps(1_000_000))));
     }
 
     proptest! {

@@ -73,7 +73,14 @@ impl<'a> Reader<'a> {
     /// How many follow; never more than bytes are left.
     pub(super) fn length(&mut self) -> Result<usize, Broken> {
         let length = self.u32()? as usize;
-        if length > self.data.len().saturating_sub(self.at) { Err(Broken) } else { Ok(length) }
+        self.holds(length, 1)?;
+        Ok(length)
+    }
+
+    /// Whether so many elements may follow that take `least` bytes each, at least.
+    pub(super) fn holds(&self, count: usize, least: usize) -> Result<(), Broken> {
+        let left = self.data.len().saturating_sub(self.at);
+        if count.saturating_mul(least) > left { Err(Broken) } else { Ok(()) }
     }
 
     /// Passes over `length` bytes.
@@ -138,5 +145,9 @@ mod tests {
         let mut reader = Reader::new(&[0xff, 0xff, 0xff, 0x7f, 1], Encoding::Ros1).expect("no header");
         assert_eq!(reader.clone().length(), Err(Broken));
         assert_eq!(reader.text(), Err(Broken));
+        assert_eq!(
+            (reader.holds(1, 1), reader.holds(1, 2), reader.holds(usize::MAX, 8)),
+            (Ok(()), Err(Broken), Err(Broken))
+        );
     }
 }

@@ -1,8 +1,10 @@
 //! Which logs lie at a path: a file, a folder that is one log, or a folder of logs.
 
-use super::{lerobot, npz, ros1, rosbag2, sage, table};
+use super::walk::{self, Seen};
+use super::{lerobot, npz, ros1, rosbag2, sage, sqlite, table};
 use crate::error::ImportError;
 use crate::log::Log;
+use shared_mem::budget::Budget;
 use std::fs::File;
 use std::io::Read as _;
 use std::path::{Path, PathBuf};
@@ -23,27 +25,29 @@ pub(crate) enum Source {
 }
 
 impl Source {
-    /// Reads it: one log, or one an episode.
+    /// Reads it, within a budget that goes by its bytes: one log, or one an episode.
     pub(crate) fn read(&self) -> Result<Vec<Log>, ImportError> {
+        let budget = &Budget::of(self.bytes()?);
         match self {
-            Self::Rosbag2(path, files) => Ok(vec![rosbag2::read(path, files)?]),
-            Self::Ros1(path) => Ok(vec![ros1::read(path)?]),
-            Self::LeRobot(path) => lerobot::read(path),
-            Self::Sage(path) => Ok(vec![sage::read(path)?]),
-            Self::Table(path) => Ok(vec![table::read(path)?]),
-            Self::Npz(path) => Ok(vec![npz::read(path)?]),
+            Self::Rosbag2(path, files) => Ok(vec![rosbag2::read(path, files, budget)?]),
+            Self::Ros1(path) => Ok(vec![ros1::read(path, budget)?]),
+            Self::LeRobot(path) => lerobot::read(path, budget),
+            Self::Sage(path) => Ok(vec![sage::read(path, budget)?]),
+            Self::Table(path) => Ok(vec![table::read(path, budget)?]),
+            Self::Npz(path) => Ok(vec![npz::read(path, budget)?]),
         }
     }
 
-    /// How many bytes it has.
-    pub(crate) fn bytes(&self) -> u64 {
-        fn below(path: &Path) -> u64 {
-            match std::fs::read_dir(path) {
-                Ok(entries) => entries.flatten().map(|entry| below(&entry.path())).sum(),
-                Err(_) => std::fs::metadata(path).map_or(0, |about| about.len()),
-            }
-        }
-        below(self.path())
+    /// How many bytes of it are read: pictures beside a data set are not.
+    pub(crate) fn bytes(&self) -> Result<u64, ImportError> {
+        let files = match self {
+            Self::Rosbag2(_, files) => files.clone(),
+            Self::LeRobot(path) => lerobot::files(path)?,
+            Self::Sage(path) => walk::files(path)?,
+            Self::Ros1(path) | Self::Table(path) | Self::Npz(path) => vec![path.clone()],
+        };
+        let size = |path: &Path| std::fs::metadata(path).map_or(0, |about| about.len());
+        Ok(files.iter().map(|file| size(file) + size(&sqlite::journal(file))).sum())
     }
 
     /// File or folder.
@@ -69,7 +73,7 @@ pub(crate) fn find(path: &Path) -> Result<Vec<Source>, ImportError> {
     })?;
     if metadata.is_dir() {
         let mut found = Vec::new();
-        in_folder(path, DEPTH, &mut found)?;
+        in_folder(path, DEPTH, (&mut Seen::default(), &mut found))?;
         if found.is_empty() {
             let what = "holds no log that is known: .mcap, .db3, .bag, .csv, .tsv, .npz, a LeRobot data set or SAGE folders; \
                         what is there as HDF5 or .mat becomes .npz with numpy.savez";
@@ -99,7 +103,7 @@ fn unknown(path: &Path) -> String {
     }
 }
 
-fn in_folder(folder: &Path, depth: usize, found: &mut Vec<Source>) -> Result<(), ImportError> {
+fn in_folder(folder: &Path, depth: usize, (seen, found): (&mut Seen, &mut Vec<Source>)) -> Result<(), ImportError> {
     if lerobot::is_data_set(folder) {
         found.push(Source::LeRobot(folder.to_owned()));
         return Ok(());
@@ -108,11 +112,7 @@ fn in_folder(folder: &Path, depth: usize, found: &mut Vec<Source>) -> Result<(),
         found.push(Source::Sage(folder.to_owned()));
         return Ok(());
     }
-    let mut entries = Vec::new();
-    let failed = |e: std::io::Error| ImportError::log(folder, format!("cannot be read ({e}); look at its permissions"));
-    for entry in std::fs::read_dir(folder).map_err(failed)? {
-        entries.push(entry.map_err(failed)?.path());
-    }
+    let mut entries = seen.entries(folder)?;
     entries.retain(|path| !path.file_name().is_some_and(|name| name.to_string_lossy().starts_with('.')));
     entries.sort_by_key(|path| natural(&path.file_name().unwrap_or_default().to_string_lossy()));
     if folder.join("metadata.yaml").is_file() {
@@ -126,7 +126,7 @@ fn in_folder(folder: &Path, depth: usize, found: &mut Vec<Source>) -> Result<(),
     for path in entries {
         if path.is_dir() {
             if depth > 1 {
-                in_folder(&path, depth - 1, found)?;
+                in_folder(&path, depth - 1, (seen, found))?;
             }
         } else if KNOWN.contains(&extension(&path).as_str())
             && let Some(source) = of_file(&path)?

@@ -1,12 +1,14 @@
 //! LeRobot data sets: `meta/info.json` and parquet files, one an episode (version 2) or many episodes in one (version 3). Each
 //! episode is a log.
 
-use super::{parquet_file, stem};
+use super::parquet_file::{self, Numbers};
+use super::{stem, walk};
 use crate::error::ImportError;
 use crate::log::{Column, Facts, LeftOut, Log, Table};
 use serde::Deserialize;
+use shared_mem::budget::Budget;
 use shared_mem::input::{self, Kind};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashMap};
 use std::path::{Path, PathBuf};
 
 /// The only table of an episode.
@@ -15,6 +17,8 @@ const FRAMES: &str = "frames";
 const EPISODE: &str = "episode_index";
 const FRAME: &str = "frame_index";
 const COUNTERS: [&str; 5] = [EPISODE, FRAME, "index", "task_index", "next.done"];
+/// What a column or a feature takes in each episode, beside its numbers [bytes].
+const IN_EPISODE: usize = 128;
 
 /// What `meta/info.json` says, as far as it is used.
 #[derive(Debug, Deserialize)]
@@ -39,9 +43,17 @@ pub(super) fn is_data_set(folder: &Path) -> bool {
     folder.join("meta/info.json").is_file() && folder.join("data").is_dir()
 }
 
-pub(super) fn read(folder: &Path) -> Result<Vec<Log>, ImportError> {
+/// The files that hold its numbers, in order.
+pub(super) fn files(folder: &Path) -> Result<Vec<PathBuf>, ImportError> {
+    let mut files = walk::files(&folder.join("data"))?;
+    files.retain(|path| path.extension().is_some_and(|e| e == "parquet"));
+    files.sort();
+    Ok(files)
+}
+
+pub(super) fn read(folder: &Path, budget: &Budget) -> Result<Vec<Log>, ImportError> {
     let path = folder.join("meta/info.json");
-    let info: Info = serde_json::from_str(&input::text(&path, Kind::List)?)
+    let info: Info = serde_json::from_str(&input::text(&path, Kind::Configuration)?)
         .map_err(|e| ImportError::log(&path, format!("is no info.json of a LeRobot data set ({e}); copy it again")))?;
     if !info.codebase_version.starts_with("v2") && !info.codebase_version.starts_with("v3") {
         let what =
@@ -51,13 +63,14 @@ pub(super) fn read(folder: &Path) -> Result<Vec<Log>, ImportError> {
     if !(info.fps.is_finite() && info.fps > 0.0) {
         return Err(ImportError::log(&path, format!("says {} frames a second; write the data set's rate", info.fps)));
     }
-    let mut files = Vec::new();
-    parquet_files(&folder.join("data"), &mut files)?;
-    files.sort();
     let mut episodes: BTreeMap<u64, Log> = BTreeMap::new();
-    let mut frames = 0;
-    for file in &files {
-        frames += take(file, folder, &info, &mut episodes)?;
+    let mut frames = 0_usize;
+    for file in &files(folder)? {
+        // What is said of the rows costs nothing to read; the rows may cost more than there is.
+        let left = info.total_frames.saturating_sub(frames);
+        let (rows, columns) = parquet_file::read(file, left, budget)?;
+        frames += rows;
+        take(file, (rows, &columns), (folder, &info, budget), &mut episodes)?;
     }
     if frames != info.total_frames || episodes.len() != info.total_episodes {
         let what = format!(
@@ -71,22 +84,14 @@ pub(super) fn read(folder: &Path) -> Result<Vec<Log>, ImportError> {
     Ok(episodes.into_values().collect())
 }
 
-fn parquet_files(folder: &Path, found: &mut Vec<PathBuf>) -> Result<(), ImportError> {
-    let failed = |e: std::io::Error| ImportError::log(folder, format!("cannot be read ({e}); look at its permissions"));
-    for entry in std::fs::read_dir(folder).map_err(failed)? {
-        let path = entry.map_err(failed)?.path();
-        if path.is_dir() {
-            parquet_files(&path, found)?;
-        } else if path.extension().is_some_and(|e| e == "parquet") {
-            found.push(path);
-        }
-    }
-    Ok(())
-}
-
-/// Takes the episodes of a file over; how many frames it has.
-fn take(file: &Path, folder: &Path, info: &Info, episodes: &mut BTreeMap<u64, Log>) -> Result<usize, ImportError> {
-    let (rows, columns) = parquet_file::read(file)?;
+/// Takes the episodes of a file over.
+fn take(
+    file: &Path,
+    (rows, columns): (usize, &[Numbers]),
+    (folder, info, budget): (&Path, &Info, &Budget),
+    episodes: &mut BTreeMap<u64, Log>,
+) -> Result<(), ImportError> {
+    let spent = ImportError::budget(file);
     let counter = |name: &str| {
         let column = columns.iter().find(|column| column.name == name && column.width == 1);
         column.ok_or_else(|| {
@@ -95,6 +100,16 @@ fn take(file: &Path, folder: &Path, info: &Info, episodes: &mut BTreeMap<u64, Lo
     };
     let (of_row, frame) = (counter(EPISODE)?, counter(FRAME)?);
     let count = |value: f64| ((0.0..1e15).contains(&value) && value.fract() == 0.0).then_some(value as u64);
+    let quantities =
+        columns.iter().filter(|column| !COUNTERS.contains(&column.name.as_str()) && column.name != "timestamp");
+    let mut named = Vec::new();
+    for column in quantities {
+        budget.elements(column.width, size_of::<String>() + column.name.len()).map_err(&spent)?;
+        named.push((column, labels(info, column)));
+    }
+    let width: usize = named.iter().map(|(numbers, _)| numbers.width).sum();
+    // Rows of an episode follow each other, so that its columns are looked for once.
+    let (mut at_work, mut places) = (None, Vec::new());
     for row in 0..rows {
         let (Some(episode), Some(frame)) =
             (of_row.values.get(row).and_then(|v| count(*v)), frame.values.get(row).and_then(|v| count(*v)))
@@ -104,49 +119,53 @@ fn take(file: &Path, folder: &Path, info: &Info, episodes: &mut BTreeMap<u64, Lo
                 format!("row {row} belongs to no episode: the file is damaged; download it again"),
             ));
         };
+        budget.elements(width + 1, size_of::<f64>()).map_err(&spent)?;
+        if at_work != Some(episode) {
+            budget.elements(width + info.features.len() + 1, IN_EPISODE).map_err(&spent)?;
+        }
         let log = episodes.entry(episode).or_insert_with(|| empty(folder, info, episode));
         let Some(table) = log.tables.first_mut() else { continue };
+        if at_work != Some(episode) {
+            places = columns_of(table, &named);
+            at_work = Some(episode);
+        }
         // Stamps in the file are single precision; frames are counted.
         table.stamps_ns.get_or_insert_default().push((frame as f64 / info.fps * 1e9).round() as u64);
-        let numbers =
-            columns.iter().filter(|column| !COUNTERS.contains(&column.name.as_str()) && column.name != "timestamp");
-        for column in numbers {
-            push(table, column, row, info);
+        for ((numbers, _), first) in named.iter().zip(&places) {
+            let values = numbers.values.get(row * numbers.width..(row + 1) * numbers.width).unwrap_or(&[]);
+            let columns = table.columns.iter_mut().skip(*first);
+            columns.zip(values).for_each(|(column, value)| column.values.push(*value));
         }
     }
-    Ok(rows)
+    Ok(())
 }
 
-fn push(table: &mut Table, numbers: &parquet_file::Numbers, row: usize, info: &Info) {
+/// Where the columns of each quantity begin in the table of an episode, which gets those that it lacks.
+fn columns_of(table: &mut Table, named: &[(&Numbers, Vec<String>)]) -> Vec<usize> {
     let filled = table.stamps_ns.as_ref().map_or(0, Vec::len);
-    let first = format!("{}{}", numbers.name, label(info, numbers, 0));
-    let at = match table.columns.iter().position(|column| column.name == first) {
-        Some(at) => at,
-        None => {
-            table.columns.extend((0..numbers.width).map(|i| Column {
-                name: format!("{}{}", numbers.name, label(info, numbers, i)),
-                values: vec![f64::NAN; filled.saturating_sub(1)],
-            }));
-            table.columns.len() - numbers.width
-        }
-    };
-    for i in 0..numbers.width {
-        if let (Some(column), Some(value)) =
-            (table.columns.get_mut(at + i), numbers.values.get(row * numbers.width + i))
-        {
-            column.values.push(*value);
+    let known: HashMap<String, usize> =
+        table.columns.iter().enumerate().map(|(at, column)| (column.name.clone(), at)).collect();
+    let mut places = Vec::new();
+    for (_, labels) in named {
+        let place = labels.first().and_then(|first| known.get(first)).copied();
+        places.push(place.unwrap_or(table.columns.len()));
+        if place.is_none() {
+            let column = |name: &String| Column { name: name.clone(), values: vec![f64::NAN; filled] };
+            table.columns.extend(labels.iter().map(column));
         }
     }
+    places
 }
 
-/// `[shoulder_pan.pos]` where the data set names the numbers of a feature.
-fn label(info: &Info, numbers: &parquet_file::Numbers, i: usize) -> String {
+/// Names of the columns of a quantity: `observation.state[shoulder_pan]` where the data set names its numbers.
+fn labels(info: &Info, numbers: &Numbers) -> Vec<String> {
     let names = info.features.get(&numbers.name).and_then(|feature| names(&feature.names, numbers.width));
-    match names.as_ref().and_then(|names| names.get(i)) {
+    let label = |i: usize| match names.as_ref().and_then(|names| names.get(i)) {
         Some(name) => format!("[{}]", name.strip_suffix(".pos").unwrap_or(name)),
         None if numbers.width == 1 => String::new(),
         None => format!("[{i}]"),
-    }
+    };
+    (0..numbers.width).map(|i| format!("{}{}", numbers.name, label(i))).collect()
 }
 
 /// A list of names, wherever the versions keep it.

@@ -12,6 +12,7 @@
 //! | `libfranka` | what libfranka's log says about a table's columns |
 //! | `sage` | SAGE's folders of a motion |
 //! | `npz` | NumPy's archives (the only zip code) |
+//! | `walk` | the files below a folder, each once |
 
 mod find;
 mod lerobot;
@@ -23,6 +24,7 @@ mod rosbag2;
 mod sage;
 mod sqlite;
 mod table;
+mod walk;
 
 pub(crate) use find::{Source, find};
 
@@ -33,6 +35,11 @@ use std::path::Path;
 /// Stops where the process was asked to end.
 fn go_on(path: &Path) -> Result<(), ImportError> {
     if ending::asked() { Err(ImportError::Interrupted { path: path.to_owned() }) } else { Ok(()) }
+}
+
+/// Why a folder is not read.
+fn failed(folder: &Path) -> impl Fn(std::io::Error) -> ImportError + '_ {
+    move |e| ImportError::log(folder, format!("cannot be read ({e}); look at its permissions"))
 }
 
 /// File or folder name without extension.

@@ -3,8 +3,9 @@
 use super::{go_on, stem};
 use crate::error::ImportError;
 use crate::log::{Column, LeftOut, Log, Table};
+use shared_mem::budget::Budget;
 use shared_mem::input::{self, Kind};
-use shared_mem::recording::{Array, parse_npy};
+use shared_mem::recording::{Array, ArrayError, parse_npy};
 use std::collections::BTreeMap;
 use std::io::{Cursor, Read as _};
 use std::path::Path;
@@ -12,7 +13,7 @@ use std::path::Path;
 /// A wider array is no quantity of joints.
 const WIDEST: usize = 64;
 
-pub(super) fn read(path: &Path) -> Result<Log, ImportError> {
+pub(super) fn read(path: &Path, budget: &Budget) -> Result<Log, ImportError> {
     let bytes = input::bytes(path, Kind::Array)?;
     let broken = |what: &dyn std::fmt::Display| {
         ImportError::log(
@@ -20,7 +21,11 @@ pub(super) fn read(path: &Path) -> Result<Log, ImportError> {
             format!("is no whole .npz ({what}); copy it from its source again, or save it with numpy.savez"),
         )
     };
+    let spent = ImportError::budget(path);
     let mut archive = zip::ZipArchive::new(Cursor::new(bytes)).map_err(|e| broken(&e))?;
+    if archive.has_overlapping_files().map_err(|e| broken(&e))? {
+        return Err(broken(&"two arrays share their bytes"));
+    }
     let mut by_rows: BTreeMap<usize, Vec<(String, Array)>> = BTreeMap::new();
     let mut log = Log { file: path.to_owned(), name: stem(path), format: "npz", ..Log::default() };
     for number in 0..archive.len() {
@@ -28,20 +33,29 @@ pub(super) fn read(path: &Path) -> Result<Log, ImportError> {
         let file = archive.by_index(number).map_err(|e| broken(&e))?;
         let entry = file.name().map_err(|e| broken(&e))?.into_owned();
         let Some(name) = entry.strip_suffix(".npy").map(str::to_owned) else { continue };
+        // What it says of its size is checked once it is there: one byte more than there is room for is enough to know.
+        let room = budget.left().min(Kind::Array.limit());
         let mut npy = Vec::new();
-        file.take(Kind::Array.limit()).read_to_end(&mut npy).map_err(|e| broken(&e))?;
-        match parse_npy(&npy) {
+        file.take(room + 1).read_to_end(&mut npy).map_err(|e| broken(&e))?;
+        budget.take(npy.len()).map_err(&spent)?;
+        let read = parse_npy(&npy, budget);
+        budget.give_back(npy.len());
+        match read {
             Ok(array) => match (array.shape.first(), array.shape.len(), array.shape.get(1)) {
                 (Some(rows), 1, _) => by_rows.entry(*rows).or_default().push((name, array)),
                 (Some(rows), 2, Some(width)) if *width <= WIDEST => {
                     by_rows.entry(*rows).or_default().push((name, array))
                 }
-                _ => log.left_out.push(LeftOut { what: name, why: "it has no row of numbers a stamp", count: 1 }),
+                _ => {
+                    budget.give_back(size_of_val(array.values.as_slice()));
+                    log.left_out.push(LeftOut { what: name, why: "it has no row of numbers a stamp", count: 1 });
+                }
             },
-            Err(what) if what.contains("is cut") || what.contains("no complete") => {
-                return Err(broken(&format!("`{name}` {what}")));
+            Err(ArrayError::Budget(over)) => return Err(spent(over)),
+            Err(what @ ArrayError::Cut(_)) => return Err(broken(&format!("`{name}` {what}"))),
+            Err(ArrayError::Kind(_)) => {
+                log.left_out.push(LeftOut { what: name, why: "it is no array of numbers", count: 1 });
             }
-            Err(_) => log.left_out.push(LeftOut { what: name, why: "it is no array of numbers", count: 1 }),
         }
     }
     // The rows that most arrays have are those of the clip.
@@ -50,18 +64,25 @@ pub(super) fn read(path: &Path) -> Result<Log, ImportError> {
     for (number, (_, arrays)) in tables.into_iter().enumerate() {
         let first = arrays.first().map_or("", |(name, _)| name);
         let name = if number == 0 { super::table::ROWS.to_owned() } else { format!("rows of {first}") };
-        let columns = arrays.into_iter().flat_map(|(name, array)| columns(&name, &array)).collect();
-        log.tables.push(Table { name, stamps_ns: None, columns });
+        let mut table = Table { name, ..Table::default() };
+        for (name, array) in arrays {
+            // There twice until the array is gone.
+            let doubled = size_of_val(array.values.as_slice());
+            budget.elements(array.values.len(), size_of::<f64>()).map_err(&spent)?;
+            table.columns.extend(columns(&name, array));
+            budget.give_back(doubled);
+        }
+        log.tables.push(table);
     }
     Ok(log)
 }
 
-fn columns(name: &str, array: &Array) -> Vec<Column> {
+fn columns(name: &str, array: Array) -> Vec<Column> {
     match array.shape.as_slice() {
         [_, width] => {
             let column = |i: usize| array.values.iter().skip(i).step_by((*width).max(1)).copied().collect();
             (0..*width).map(|i| Column { name: format!("{name}[{i}]"), values: column(i) }).collect()
         }
-        _ => vec![Column { name: name.to_owned(), values: array.values.clone() }],
+        _ => vec![Column { name: name.to_owned(), values: array.values }],
     }
 }

@@ -1,11 +1,13 @@
-//! ROS 1 bags (version 2.0): records front to back, chunks as they are, in bzip2 or in LZ4. The index is not needed.
+//! ROS 1 bags (version 2.0): records front to back, chunks as they are, in bzip2 or in LZ4. The index is not needed. Memory
+//! holds one chunk at a time.
 //!
 //! The format is that of <http://wiki.ros.org/Bags/Format/2.0>.
 
 use super::{go_on, stem};
 use crate::error::ImportError;
 use crate::log::{Facts, Log};
-use crate::ros::{Collector, Encoding, Incoming};
+use crate::ros::{Collector, Encoding, Incoming, Refused};
+use shared_mem::budget::{self, Budget};
 use std::collections::HashMap;
 use std::io::{BufReader, Read};
 use std::path::Path;
@@ -13,6 +15,9 @@ use std::path::Path;
 const MAGIC: &[u8] = b"#ROSBAG V2.0\n";
 /// The largest chunk or record that is believed [bytes]: recorders make chunks below a megabyte, or of one large picture.
 const LARGEST: usize = 1 << 29;
+
+/// A record is taken apart before anything is made of it.
+const STEPS_OF_A_RECORD: usize = 16;
 
 mod op {
     pub(super) const MESSAGE: u8 = 2;
@@ -32,7 +37,7 @@ struct Connection {
 
 type Connections = HashMap<u32, Connection>;
 
-pub(super) fn read(path: &Path) -> Result<Log, ImportError> {
+pub(super) fn read(path: &Path, budget: &Budget) -> Result<Log, ImportError> {
     let file = shared_mem::input::open(path)?;
     let mut source = BufReader::with_capacity(1 << 16, file);
     let cut = || {
@@ -45,7 +50,8 @@ pub(super) fn read(path: &Path) -> Result<Log, ImportError> {
         let what = "is a bag of another version than 2.0; `rosbag fix` or `rosbag reindex` writes one of 2.0";
         return Err(ImportError::log(path, what));
     }
-    let mut collector = Collector::new(Encoding::Ros1);
+    let refused = |what: Option<Refused>| what.map_or_else(cut, |what| what.of(path));
+    let mut collector = Collector::new(Encoding::Ros1, budget);
     let mut connections = Connections::new();
     let (mut chunks, mut expected) = (0_u32, None);
     while let Some((header, data)) = record(&mut source).map_err(|Cut| cut())? {
@@ -61,12 +67,12 @@ pub(super) fn read(path: &Path) -> Result<Log, ImportError> {
                 let mut inside = &bytes[..];
                 while let Some((header, data)) = record(&mut inside).map_err(|Cut| cut())? {
                     let fields = Fields::parse(&header).ok_or_else(cut)?;
-                    message(&fields, &data, &mut connections, &mut collector)
-                        .map_err(|what| what.map_or_else(cut, |what| ImportError::log(path, what)))?;
+                    message(&fields, &data, &mut connections, &mut collector).map_err(refused)?;
                 }
             }
-            op::CONNECTION | op::MESSAGE => message(&fields, &data, &mut connections, &mut collector)
-                .map_err(|what| what.map_or_else(cut, |what| ImportError::log(path, what)))?,
+            op::CONNECTION | op::MESSAGE => {
+                message(&fields, &data, &mut connections, &mut collector).map_err(refused)?
+            }
             op::INDEX | op::CHUNK_INFO => {}
             _ => return Err(cut()),
         }
@@ -94,11 +100,15 @@ fn message(
     fields: &Fields<'_>,
     data: &[u8],
     connections: &mut Connections,
-    collector: &mut Collector,
-) -> Result<(), Option<String>> {
+    collector: &mut Collector<'_>,
+) -> Result<(), Option<Refused>> {
+    // Records without a message in them are steps, too.
+    let spent = |over| Some(Refused::Budget(over));
+    collector.budget().step(STEPS_OF_A_RECORD).map_err(spent)?;
     let id = fields.number("conn");
     match fields.op() {
         Some(op::CONNECTION) => {
+            collector.budget().take(data.len() + size_of::<Connection>()).map_err(spent)?;
             let about = Fields::parse(data).ok_or(None)?;
             let text = |bytes: Option<&[u8]>| bytes.map(|b| String::from_utf8_lossy(b).into_owned()).ok_or(None);
             let connection = Connection {
@@ -161,7 +171,7 @@ fn part(source: &mut impl Read, length: [u8; 4]) -> Result<Vec<u8>, Cut> {
 }
 
 fn unpack(data: &[u8], compression: &[u8], size: usize) -> Option<Vec<u8>> {
-    if size > LARGEST {
+    if size as u64 > budget::unpacked(data.len()) {
         return None;
     }
     let mut bytes = Vec::new();

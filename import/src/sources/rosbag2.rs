@@ -4,6 +4,7 @@ use super::{go_on, sqlite, stem};
 use crate::error::ImportError;
 use crate::log::{Facts, LeftOut, Log};
 use crate::ros::{Collector, Encoding, Incoming};
+use shared_mem::budget::Budget;
 use shared_mem::origin::Origins;
 use shared_mem::recording::RawMessages;
 use std::collections::BTreeMap;
@@ -12,8 +13,8 @@ use std::path::{Path, PathBuf};
 /// Messages that are no ROS 2 messages.
 const NOT_CDR: &str = "its messages are not in CDR";
 
-pub(super) fn read(path: &Path, files: &[PathBuf]) -> Result<Log, ImportError> {
-    let mut collector = Collector::new(Encoding::Cdr);
+pub(super) fn read(path: &Path, files: &[PathBuf], budget: &Budget) -> Result<Log, ImportError> {
+    let mut collector = Collector::new(Encoding::Cdr, budget);
     let mut left_out: BTreeMap<String, u64> = BTreeMap::new();
     let mut origins = Origins::default();
     let mut is_mcap = true;
@@ -46,7 +47,11 @@ pub(super) fn read(path: &Path, files: &[PathBuf]) -> Result<Log, ImportError> {
 }
 
 /// Takes the messages of a file, and returns where it says that it comes from.
-fn mcap(path: &Path, collector: &mut Collector, left_out: &mut BTreeMap<String, u64>) -> Result<Origins, ImportError> {
+fn mcap(
+    path: &Path,
+    collector: &mut Collector<'_>,
+    left_out: &mut BTreeMap<String, u64>,
+) -> Result<Origins, ImportError> {
     let mut messages = RawMessages::open(path)?;
     let mut count = 0_u64;
     while let Some(message) = messages.read_next()? {
@@ -55,6 +60,7 @@ fn mcap(path: &Path, collector: &mut Collector, left_out: &mut BTreeMap<String, 
             go_on(path)?;
         }
         if message.encoding != "cdr" {
+            collector.budget().step(1).map_err(ImportError::budget(path))?;
             *left_out.entry(message.topic.to_owned()).or_default() += 1;
             continue;
         }
@@ -65,7 +71,7 @@ fn mcap(path: &Path, collector: &mut Collector, left_out: &mut BTreeMap<String, 
             log_time_ns: message.log_time_ns,
             data: message.data,
         };
-        collector.take(&incoming).map_err(|what| ImportError::log(path, what))?;
+        collector.take(&incoming).map_err(|what| what.of(path))?;
     }
     match messages.damage() {
         Some(damage) => {

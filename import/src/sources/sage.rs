@@ -4,6 +4,7 @@
 use super::{stem, table};
 use crate::error::ImportError;
 use crate::log::{Facts, Log, Table};
+use shared_mem::budget::Budget;
 use shared_mem::input::{self, Kind};
 use std::path::Path;
 
@@ -14,7 +15,7 @@ pub(super) fn is_motion(folder: &Path) -> bool {
     folder.join(CONTROL).is_file() && folder.join(STATE).is_file()
 }
 
-pub(super) fn read(folder: &Path) -> Result<Log, ImportError> {
+pub(super) fn read(folder: &Path, budget: &Budget) -> Result<Log, ImportError> {
     let list = folder.join("joint_list.txt");
     let joints: Vec<String> = if list.is_file() {
         let text = input::text(&list, Kind::Configuration)?;
@@ -26,7 +27,7 @@ pub(super) fn read(folder: &Path) -> Result<Log, ImportError> {
     let mut tables = Vec::new();
     for (file, kind) in [(CONTROL, "CONTROL"), (STATE, "STATE_MOTOR")] {
         let path = folder.join(file);
-        let mut text = table::text(&path)?;
+        let mut text = table::text(&path, budget)?;
         let stamps = text.columns.iter().find(|column| column.name == "timestamp").map(|column| column.values.clone());
         let Some(stamps) = stamps else {
             return Err(ImportError::log(&path, "has no column `timestamp`: it is no log of SAGE, or damaged"));

@@ -21,6 +21,25 @@ pub(crate) fn fixture(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures").join(name)
 }
 
+/// Copies a log, be it a file or a folder.
+pub(crate) fn copy(from: &Path, to: &Path) {
+    if from.is_dir() {
+        std::fs::create_dir_all(to).expect("room");
+        for entry in std::fs::read_dir(from).expect("a folder") {
+            let path = entry.expect("an entry").path();
+            copy(&path, &to.join(path.file_name().expect("a name")));
+        }
+    } else {
+        std::fs::copy(from, to).expect("room");
+    }
+}
+
+/// An array of one dimension as a `.npy` file.
+pub(crate) fn npy(descr: &str, count: usize, data: &[u8]) -> Vec<u8> {
+    let header = format!("{{'descr': '{descr}', 'fortran_order': False, 'shape': ({count},), }}\n");
+    [b"\x93NUMPY\x01\x00", &(header.len() as u16).to_le_bytes()[..], header.as_bytes(), data].concat()
+}
+
 pub(crate) fn no_model(_: &Cell, _: Option<&str>) -> Result<Option<Arm>, String> {
     Ok(None)
 }

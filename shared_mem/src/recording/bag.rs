@@ -8,6 +8,7 @@ use super::origins;
 use super::ros2::{JointState, StampedPose};
 use super::torques;
 use super::tracked::{self, ObjectTopics, PoseRow};
+use crate::budget::Budget;
 use crate::cell::{Cell, ClipKind, ControllerKind};
 use crate::frames::Pose;
 use std::collections::BTreeMap;
@@ -53,10 +54,9 @@ pub(super) fn read<R: Read + Seek>(
     cell: &Cell,
 ) -> Result<Clip, ReadError> {
     let (mut collected, objects) = (Collected::default(), ObjectTopics::ros2(cell));
+    let budget = messages.budget().clone();
     while let Some(message) = messages.next()? {
-        collected
-            .take(&message, cell, &objects)
-            .map_err(|what| ReadError::content(path, &message.channel.topic, what))?;
+        collected.take(&message, (cell, &objects), (path, &budget))?;
     }
     let needs_arm = cell.robot.is_some() && kind != ClipKind::FreeMotion;
     let topics = &cell.topics;
@@ -82,23 +82,32 @@ pub(super) fn read<R: Read + Seek>(
 }
 
 impl Collected {
-    /// Takes a message over when it is on a wanted topic; a sentence when it is not what that topic should hold.
-    fn take(&mut self, message: &Message<'_>, cell: &Cell, objects: &ObjectTopics) -> Result<(), String> {
+    /// Takes a message over when it is on a wanted topic and what that topic should hold.
+    fn take(
+        &mut self,
+        message: &Message<'_>,
+        (cell, objects): (&Cell, &ObjectTopics),
+        (path, budget): (&Path, &Budget),
+    ) -> Result<(), ReadError> {
         let (topic, topics) = (&message.channel.topic, &cell.topics);
+        let fail = |what: String| ReadError::content(path, topic, what);
         if *topic == topics.measured || *topic == topics.desired {
-            expect_type(message, &[JointState::TYPE])?;
-            let mut state = JointState::decode(message.data).map_err(|e| not_decoded(&e))?;
+            expect_type(message, &[JointState::TYPE]).map_err(fail)?;
+            let mut state = JointState::decode(message.data).map_err(|e| fail(not_decoded(&e)))?;
             // What a velocity interface is sent need not hold positions: they follow from the velocities.
             let velocities = cell.controller.as_ref().is_some_and(|law| law.kind == ControllerKind::JointVelocity);
             if velocities && *topic == topics.desired && state.position.is_empty() {
                 state.position = vec![0.0; state.velocity.len()];
             }
             let log = if *topic == topics.measured { &mut self.measured } else { &mut self.desired };
+            let (bytes, compared) = log.cost(&state);
+            budget.step(compared).and_then(|()| budget.take(bytes)).map_err(ReadError::budget(path))?;
             log.push(&state, message.log_time_ns);
         } else if objects.wants(topic) {
-            expect_type(message, &[StampedPose::POSE_TYPE, StampedPose::TRANSFORM_TYPE])?;
+            expect_type(message, &[StampedPose::POSE_TYPE, StampedPose::TRANSFORM_TYPE]).map_err(fail)?;
             let has_child = message.channel.type_name() == StampedPose::TRANSFORM_TYPE;
-            let pose = StampedPose::decode(message.data, has_child).map_err(|e| not_decoded(&e))?;
+            let pose = StampedPose::decode(message.data, has_child).map_err(|e| fail(not_decoded(&e)))?;
+            budget.take(size_of::<PoseRow>() + size_of::<u64>()).map_err(ReadError::budget(path))?;
             let poses = self.poses.entry(topic.clone()).or_default();
             poses.stamped |= pose.stamp_ns != 0;
             poses.log_times_ns.push(message.log_time_ns);

@@ -169,8 +169,10 @@ pub fn read_episode(path: &Path) -> Result<Episode, ReadError> {
     let info = EpisodeInfo::of(&record.pairs).map_err(|key| {
         ReadError::kind(path, format!("says nothing readable about `{key}`; record the episode again"))
     })?;
-    let mut read = Columns::default();
+    let (mut read, budget) = (Columns::default(), messages.budget().clone());
     while let Some(message) = messages.next()? {
+        let kept = read.cost(message.log_time_ns, message.channel.type_name(), message.data);
+        budget.take(kept).map_err(ReadError::budget(path))?;
         let topic = &message.channel.topic;
         read.take(message.log_time_ns, topic, message.channel.type_name(), message.data)
             .map_err(|what| ReadError::content(path, topic, what))?;
@@ -222,6 +224,15 @@ struct Columns {
 }
 
 impl Columns {
+    /// Bytes that a message takes at most.
+    fn cost(&self, time_ns: u64, schema: &str, data: &[u8]) -> usize {
+        let begins = self.moments.last().is_none_or(|last| last.time_ns != time_ns);
+        let moment = if begins { size_of::<EpisodeMoment>() } else { 0 };
+        // Of joints a number and, in the first moment, a name are kept.
+        moment
+            + if schema == ArmState::SCHEMA { size_of::<ArmState>() } else { size_of::<RigidPose>() + 2 * data.len() }
+    }
+
     fn take(&mut self, time_ns: u64, topic: &str, schema: &str, data: &[u8]) -> Result<(), String> {
         if self.moments.last().is_none_or(|last| last.time_ns != time_ns) {
             let (poses, targets, joints, drives) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());

@@ -1,5 +1,6 @@
 //! Why a recording cannot be used, one line each: what happened and what to do.
 
+use crate::budget::BudgetError;
 use crate::cell::CellError;
 use crate::input::InputError;
 use std::path::{Path, PathBuf};
@@ -23,6 +24,14 @@ pub enum ReadError {
     Interrupted {
         /// The file.
         path: PathBuf,
+    },
+    /// It asks for more than is spent on a file of its size.
+    #[error("{}: {source}", path.display())]
+    Budget {
+        /// The file.
+        path: PathBuf,
+        /// What was spent.
+        source: BudgetError,
     },
     /// The file is no recording of a known kind.
     #[error("{}: {what}", path.display())]
@@ -67,6 +76,14 @@ pub enum ReadError {
 impl ReadError {
     pub(super) fn io(path: &Path) -> impl Fn(std::io::Error) -> Self + '_ {
         move |source| Self::Io { path: path.to_owned(), source }
+    }
+
+    /// A budget is spent, or the process was asked to end.
+    pub(super) fn budget(path: &Path) -> impl Fn(BudgetError) -> Self + '_ {
+        move |source| match source {
+            BudgetError::Ended => Self::Interrupted { path: path.to_owned() },
+            BudgetError::Memory(_) | BudgetError::Steps(_) => Self::Budget { path: path.to_owned(), source },
+        }
     }
 
     pub(super) fn kind(path: &Path, what: impl Into<String>) -> Self {

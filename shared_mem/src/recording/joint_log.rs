@@ -49,6 +49,12 @@ pub(super) struct Ordered {
 }
 
 impl JointLog {
+    /// Bytes that a row of `state` takes, and publishers that it is compared with.
+    pub(super) fn cost(&self, state: &JointState<'_>) -> (usize, usize) {
+        let numbers = 3 * state.position.len() + 2;
+        (size_of::<f64>() * numbers, self.publishers.len())
+    }
+
     pub(super) fn push(&mut self, state: &JointState<'_>, log_time_ns: u64) {
         let dof = state.position.len();
         if dof == 0 || !(state.names.is_empty() || state.names.len() == dof) {

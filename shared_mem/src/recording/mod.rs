@@ -73,7 +73,7 @@ pub use episode::{Episode, EpisodeInfo, EpisodeMoment, RigidPose, read_episode, 
 pub use error::ReadError;
 pub use export::{ExportError, Exported, FlangeAt, Format, LeftOut, Order, export_session, session_folder, write_clip};
 pub use messages::{ClipMessage, ClipMessages, Payload};
-pub use npy::{Array, parse as parse_npy};
+pub use npy::{Array, ArrayError, parse as parse_npy};
 pub use own::{read_arm_states, read_clip_info};
 pub use picture::Picture;
 pub use picture_file::{

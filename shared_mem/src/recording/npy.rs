@@ -1,5 +1,7 @@
 //! NumPy's `.npy` files: little-endian floats and integers. Bytes in, numbers out.
 
+use crate::budget::{Budget, BudgetError};
+
 /// Shape and numbers of an array, row-major.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Array {
@@ -9,16 +11,39 @@ pub struct Array {
     pub values: Vec<f64>,
 }
 
-/// Reads an array of little-endian numbers.
+/// Bytes are no array: a sentence to be put behind the file's name.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum ArrayError {
+    /// Some of them are missing.
+    #[error("{0}")]
+    Cut(&'static str),
+    /// It holds something else.
+    #[error("{0}")]
+    Kind(String),
+    /// It is too large.
+    #[error(transparent)]
+    Budget(#[from] BudgetError),
+}
+
+impl From<&str> for ArrayError {
+    fn from(what: &str) -> Self {
+        Self::Kind(what.to_owned())
+    }
+}
+
+/// Reads an array of little-endian numbers; `budget` is that of the file it stands in.
 ///
 /// # Errors
-/// A sentence when it is none or of another kind, to be put behind the file's name.
-pub fn parse(bytes: &[u8]) -> Result<Array, String> {
-    let (header, data) = split(bytes).ok_or("is no complete .npy file; save it with numpy.save")?;
+/// [`ArrayError`] when it is cut, of another kind, or too large.
+pub fn parse(bytes: &[u8], budget: &Budget) -> Result<Array, ArrayError> {
+    let cut = ArrayError::Cut("is no complete .npy file; save it with numpy.save");
+    let (header, data) = split(bytes).ok_or(cut)?;
     let descr = text_behind(header, "'descr':").and_then(|v| v.trim_start().strip_prefix('\'')?.split('\'').next());
     let (size, number) = descr.and_then(kind).ok_or_else(|| {
         let found = descr.unwrap_or("a record");
-        format!("holds numbers of type `{found}`; save arrays of float64, float32 or integers, little-endian")
+        let what =
+            format!("holds numbers of type `{found}`; save arrays of float64, float32 or integers, little-endian");
+        ArrayError::Kind(what)
     })?;
     let order = text_behind(header, "'fortran_order':").map(str::trim_start).unwrap_or("");
     let by_columns = order.starts_with("True");
@@ -32,15 +57,19 @@ pub fn parse(bytes: &[u8]) -> Result<Array, String> {
     let shape = shape.ok_or("names no shape; save it with numpy.save")?;
     let count = shape.iter().try_fold(1usize, |product, n| product.checked_mul(*n));
     let needed = count.and_then(|count| count.checked_mul(size));
-    let data = needed.and_then(|needed| data.get(..needed)).ok_or("is cut: it holds fewer numbers than its shape")?;
+    let cut = ArrayError::Cut("is cut: it holds fewer numbers than its shape");
+    let data = needed.and_then(|needed| data.get(..needed)).ok_or(cut)?;
+    budget.elements(data.len() / size, size_of::<f64>())?;
     let mut values: Vec<f64> = data.chunks_exact(size).map(number).collect();
     match *shape.as_slice() {
         _ if !by_columns => {}
         [_] | [] => {}
         [rows, columns] => {
+            budget.elements(values.len(), size_of::<f64>())?;
             let stored = values;
             let at = |i: usize| stored.get((i % columns) * rows + i / columns).copied().unwrap_or(f64::NAN);
             values = (0..stored.len()).map(at).collect();
+            budget.give_back(size_of_val(stored.as_slice()));
         }
         _ => return Err("is stored column by column; save numpy.ascontiguousarray of it".into()),
     }
@@ -94,6 +123,10 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
+    fn parse(bytes: &[u8]) -> Result<Array, ArrayError> {
+        super::parse(bytes, &Budget::of(bytes.len() as u64))
+    }
+
     fn file(header: &str, data: &[u8]) -> Vec<u8> {
         let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
         bytes.extend(u16::try_from(header.len()).expect("a short header").to_le_bytes());
@@ -119,7 +152,7 @@ mod tests {
         let array = parse(&file("{'descr': '|u1', 'fortran_order': True, 'shape': (2, 3), }\n", &[1, 4, 2, 5, 3, 6]));
         assert_eq!(array, Ok(Array { shape: vec![2, 3], values: vec![1.0, 2.0, 3.0, 4.0, 5.0, 6.0] }));
         let error = parse(&file("{'descr': [('q', '<f8')], 'fortran_order': False, 'shape': (2,), }\n", &[0; 16]));
-        assert!(error.is_err_and(|what| what.contains("a record")));
+        assert!(error.is_err_and(|what| what.to_string().contains("a record")));
     }
 
     #[test]
@@ -127,6 +160,14 @@ mod tests {
         let header = "{'descr': '<f8', 'fortran_order': False, 'shape': (18446744073709551615, 4, 4), }\n";
         assert!(parse(&file(header, &[0; 64])).is_err());
         assert!(parse(&file("{'descr': '<f8', 'fortran_order': True, 'shape': (2, 2, 2), }", &[0; 64])).is_err());
+    }
+
+    #[test]
+    fn bytes_that_become_more_doubles_than_there_is_room_for_are_refused() {
+        let bytes = file("{'descr': '|u1', 'fortran_order': False, 'shape': (100,), }\n", &[7; 100]);
+        let spent = super::parse(&bytes, &Budget::with(799, 1000));
+        assert_eq!(spent, Err(ArrayError::Budget(BudgetError::Memory(799))));
+        super::parse(&bytes, &Budget::with(800, 1000)).expect("room for a hundred doubles");
     }
 
     proptest! {

@@ -41,6 +41,9 @@ pub(super) fn is_own<R: Read + Seek>(messages: &Messages<R>) -> bool {
     messages.metadata.iter().any(|m| m.name == METADATA)
 }
 
+/// Largest row of a [`JointSeries`]: a stamp, q, dq and tau.
+const ROW: usize = size_of::<u64>() + 3 * size_of::<Joints>();
+
 /// Joint rows as they are collected.
 #[derive(Default)]
 struct Rows {
@@ -151,15 +154,24 @@ pub(super) fn read<R: Read + Seek>(
     // It stands before the first message.
     messages.peek()?;
     let logged = Logged::read(&messages);
+    let budget = messages.budget().clone();
     while let Some(message) = messages.next()? {
         let topic = &message.channel.topic;
         let fail = |what: String| ReadError::content(path, topic, what);
+        let keep = |bytes: usize| budget.take(bytes).map_err(ReadError::budget(path));
         match message.channel.type_name() {
-            ArmState::SCHEMA => rows.push(&decode(message.data).map_err(fail)?),
-            ArmCommand::SCHEMA if logged.commands_apart => rows.push_command(&decode(message.data).map_err(fail)?),
+            ArmState::SCHEMA => {
+                keep(2 * ROW)?;
+                rows.push(&decode(message.data).map_err(fail)?);
+            }
+            ArmCommand::SCHEMA if logged.commands_apart => {
+                keep(ROW)?;
+                rows.push_command(&decode(message.data).map_err(fail)?);
+            }
             ObjectPose::SCHEMA if objects.wants(topic) => {
                 let pose: ObjectPose = decode(message.data).map_err(fail)?;
                 let row = (pose.stamp_ns, pose.pose());
+                keep(size_of::<PoseRow>())?;
                 match poses.get_mut(topic) {
                     Some(rows) => rows.push(row),
                     None => drop(poses.insert(topic.clone(), vec![row])),
@@ -232,9 +244,10 @@ fn missing(path: &Path, topic: &str, present: &str) -> ReadError {
 /// [`ReadError`] when the file is missing, is no clip, or holds no arm state.
 pub fn read_arm_states(path: &Path) -> Result<Vec<ArmState>, ReadError> {
     let mut messages = Messages::open(path)?;
-    let mut states = Vec::new();
+    let (mut states, budget) = (Vec::new(), messages.budget().clone());
     while let Some(message) = messages.next()? {
         if message.channel.type_name() == ArmState::SCHEMA {
+            budget.take(size_of::<ArmState>()).map_err(ReadError::budget(path))?;
             states.push(decode(message.data).map_err(|what| ReadError::content(path, ArmState::TOPIC, what))?);
         }
     }

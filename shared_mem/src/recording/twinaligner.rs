@@ -8,6 +8,7 @@ use super::joint_log::JointLog;
 use super::npy;
 use super::origins;
 use super::ros2::JointState;
+use crate::budget::Budget;
 use crate::cell::{CameraPose, Cell, ClipKind};
 use crate::frames::{Base, Camera, Object, Pose};
 use crate::input;
@@ -87,7 +88,8 @@ fn read_poses(path: &Path, cell: &Cell, frames: &[Frame], clip: &mut Clip) -> Re
         return Ok(());
     };
     let bytes = input::bytes(&file, input::Kind::Array)?;
-    let array = npy::parse(&bytes).map_err(|what| ReadError::content(path, POSE, what))?;
+    let budget = Budget::of(bytes.len() as u64);
+    let array = npy::parse(&bytes, &budget).map_err(|what| ReadError::content(path, POSE, what.to_string()))?;
     let &[count, 4, 4] = array.shape.as_slice() else {
         let what = format!("has the shape {:?}; one 4x4 pose a frame is needed: (frames, 4, 4)", array.shape);
         return Err(ReadError::content(path, POSE, what));

@@ -55,7 +55,7 @@ impl Damage {
 #[derive(Debug)]
 pub(super) struct Framing<R> {
     source: R,
-    length: u64,
+    pub(super) length: u64,
     /// Where the next record starts.
     at: u64,
     /// Checksum over everything so far; `None` once something was skipped.

@@ -1,7 +1,7 @@
 //! Messages of an MCAP file in the order they were written, from files that may be cut or have changed bits.
 //!
 //! Chunk checksums are compared before a message of the chunk is believed; a bad chunk is skipped and told in
-//! [`Messages::damage`]. Memory holds one chunk at a time.
+//! [`Messages::damage`]. Memory holds one chunk at a time, and what rides along within the budget of the file.
 
 mod fields;
 mod framing;
@@ -9,9 +9,10 @@ mod framing;
 pub(super) use framing::Damage;
 
 use super::error::ReadError;
+use crate::budget::{self, Budget, BudgetError};
 use crate::{ending, input};
 use fields::{Chunk, Fields};
-use framing::{Framing, LARGEST, PREFIX, op};
+use framing::{Framing, PREFIX, op};
 use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use std::collections::{BTreeMap, HashMap};
 use std::fs::File;
@@ -78,6 +79,11 @@ pub(super) struct Metadata {
     pub(super) pairs: BTreeMap<String, String>,
 }
 
+/// Steps for a message: it is unpacked, looked up and decoded.
+const STEPS_OF_A_MESSAGE: usize = 16;
+/// What is kept of a record that rides along, beside its own bytes.
+const OVERHEAD: usize = 256;
+
 /// Where a message of the current chunk lies in `Messages::bytes`.
 #[derive(Debug, Clone)]
 struct Entry {
@@ -101,6 +107,10 @@ pub(super) struct Messages<R> {
     bytes: Vec<u8>,
     entries: Vec<Entry>,
     next: usize,
+    /// What is left for this file.
+    budget: Budget,
+    /// Why nothing more is read.
+    spent: Option<BudgetError>,
     /// Attachments met so far.
     pub(super) attachments: Vec<Attachment>,
     /// Metadata met so far.
@@ -130,6 +140,8 @@ impl<R: Read + Seek> Messages<R> {
         })?;
         Ok(Self {
             path: path.to_owned(),
+            budget: Budget::of(framing.length),
+            spent: None,
             framing,
             schemas: HashMap::new(),
             channels: HashMap::new(),
@@ -165,7 +177,11 @@ impl<R: Read + Seek> Messages<R> {
             if ending::asked() {
                 return Err(ReadError::Interrupted { path: self.path.clone() });
             }
-            if !self.load().map_err(ReadError::io(&self.path))? {
+            let loaded = self.load().map_err(ReadError::io(&self.path))?;
+            if let Some(spent) = self.spent {
+                return Err(ReadError::budget(&self.path)(spent));
+            }
+            if !loaded {
                 return Ok(None);
             }
         }
@@ -198,6 +214,11 @@ impl<R: Read + Seek> Messages<R> {
         Ok(())
     }
 
+    /// What is left for what is made of this file.
+    pub(super) fn budget(&self) -> &Budget {
+        &self.budget
+    }
+
     /// What could not be read so far.
     pub(super) fn damage(&self) -> &Damage {
         &self.framing.damage
@@ -227,7 +248,7 @@ impl<R: Read + Seek> Messages<R> {
         let record = std::mem::take(&mut self.framing.record);
         let body = record.get(PREFIX..).unwrap_or(&[]);
         let mut read = self.take_over(opcode, &record, body);
-        if read.is_err() && self.channels_from_summary()? {
+        if read.is_err() && self.spent.is_none() && self.channels_from_summary()? {
             // The chunk that introduced the topics was lost; now they are known.
             self.bytes.clear();
             self.entries.clear();
@@ -266,16 +287,15 @@ impl<R: Read + Seek> Messages<R> {
             }
             return self.records(chunk.records).ok_or_else(|| "a chunk ends inside a record".into());
         }
-        // The largest believable size: what a good compressor reaches, and never more than one record may have.
-        let limit = (64 << 20).max(chunk.records.len().saturating_mul(300)).min(LARGEST as usize);
-        if chunk.uncompressed_size > limit as u64 {
+        let limit = budget::unpacked(chunk.records.len());
+        if chunk.uncompressed_size > limit {
             return Err("a chunk's size has changed".into());
         }
         let options = LinearReaderOptions::default()
             .with_skip_start_magic(true)
             .with_skip_end_magic(true)
             .with_prevalidate_chunk_crcs(true)
-            .with_record_length_limit(limit);
+            .with_record_length_limit(limit as usize);
         let mut reader = LinearReader::new_with_options(options);
         let mut rest = record;
         while let Some(event) = reader.next_event() {
@@ -305,9 +325,19 @@ impl<R: Read + Seek> Messages<R> {
         Some(())
     }
 
-    /// Takes one record over; `None` when it makes no sense.
+    /// Draws from the budget; `None` when it is spent.
+    fn draw(&mut self, drawn: impl FnOnce(&Budget) -> Result<(), BudgetError>) -> Option<()> {
+        drawn(&self.budget).map_err(|spent| self.spent = Some(spent)).ok()
+    }
+
+    /// Takes one record over; `None` when it makes no sense, or the budget is spent.
     fn record(&mut self, opcode: u8, body: &[u8]) -> Option<()> {
         let mut f = Fields(body);
+        match opcode {
+            op::MESSAGE => self.draw(|budget| budget.step(STEPS_OF_A_MESSAGE))?,
+            op::SCHEMA | op::CHANNEL | op::METADATA => self.draw(|budget| budget.take(body.len() + OVERHEAD))?,
+            _ => self.draw(|budget| budget.step(1))?,
+        }
         match opcode {
             op::SCHEMA => {
                 let id = f.u16()?;
@@ -340,6 +370,7 @@ impl<R: Read + Seek> Messages<R> {
     }
 
     fn attachment(&mut self, body: &[u8]) -> Option<()> {
+        self.draw(|budget| budget.take(body.len() + OVERHEAD))?;
         let mut f = Fields(body);
         let (log_time_ns, create_time_ns) = (f.u64()?, f.u64()?);
         let (name, media_type) = (f.text()?.to_owned(), f.text()?.to_owned());

@@ -2,6 +2,7 @@
 //! out, and back.
 
 use super::super::npy::{self, Array};
+use crate::budget::Budget;
 
 /// Signatures of a ZIP's records.
 const LOCAL: [u8; 4] = *b"PK\x03\x04";
@@ -82,7 +83,7 @@ pub(super) fn parse(bytes: &[u8], name: &str) -> Result<Array, String> {
         }
         let start = local + 30 + half(local + 26)? + half(local + 28)?;
         let data = start.checked_add(size).and_then(|stop| bytes.get(start..stop)).ok_or_else(broken)?;
-        return npy::parse(data);
+        return npy::parse(data, &Budget::of(data.len() as u64)).map_err(|what| what.to_string());
     }
     Err(format!("holds no array `{name}`"))
 }
