@@ -27,6 +27,8 @@ pub enum Kind {
     Array,
     /// A network of a policy.
     Network,
+    /// Poses of pictures (JSON).
+    Poses,
     /// Lists of commands, frames or states (JSON).
     List,
 }
@@ -51,6 +53,8 @@ impl Kind {
             Self::Array => 1024 * MIB,
             // Twice what a protocol buffer holds: larger networks have their weights elsewhere.
             Self::Network => 4096 * MIB,
+            // A hundred thousand pictures with cameras of their own.
+            Self::Poses => 64 * MIB,
             // An hour of seven joints at 1 kHz takes 600 MB.
             Self::List => 1024 * MIB,
         }
@@ -66,6 +70,7 @@ impl Kind {
             Self::Picture => "a picture",
             Self::Array => "an array",
             Self::Network => "a network",
+            Self::Poses => "a list of poses",
             Self::List => "a list",
         }
     }
@@ -78,6 +83,7 @@ impl Kind {
             Self::Splats => "crop the scan, or export it compressed",
             Self::Picture => "scale it down",
             Self::Network => "export it with its weights in a file of their own",
+            Self::Poses => "leave pictures out that show nothing new",
             Self::Array | Self::List => "cut the clip into shorter ones",
         }
     }

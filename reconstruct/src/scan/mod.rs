@@ -2,6 +2,7 @@
 //!
 //! | file | owns |
 //! |---|---|
+//! | `beside` | files that lie beside the pictures: masks, depth |
 //! | `camera` | pixels to rays and back |
 //! | `colmap` | poses and cameras out of a COLMAP model |
 //! | `transforms` | the same out of `transforms.json` and `poses.json` |
@@ -10,6 +11,7 @@
 //! | `scale` | metres for one unit of the poses |
 //! | `error` | why a scan cannot be used |
 
+mod beside;
 mod camera;
 mod colmap;
 mod error;
@@ -23,7 +25,9 @@ pub use error::ScanError;
 pub use frame::Frame;
 pub use scale::{Scale, ScaleSource};
 
+use beside::Beside;
 use nalgebra::Isometry3;
+use shared_mem::ending;
 use std::path::{Path, PathBuf};
 
 /// Fewer pictures make no surface.
@@ -124,9 +128,9 @@ impl Scan {
                 (images.into_iter().map(|image| from_colmap(&folder, image)).collect(), None, false)
             }
         };
-        let mut views = Vec::with_capacity(listed.len());
+        let (mut views, mut beside) = (Vec::with_capacity(listed.len()), Beside::of(&folder));
         for listed in listed {
-            views.push(view(&folder, listed)?);
+            views.push(view(&folder, listed, &mut beside)?);
         }
         if views.len() < FEWEST_VIEWS {
             return Err(ScanError::Missing(format!(
@@ -199,19 +203,10 @@ fn from_colmap(folder: &Path, image: colmap::Image) -> transforms::Listed {
     transforms::Listed { picture, mask: None, depth: None, camera, scan_from_camera }
 }
 
-/// A file of the same name as a picture in a folder beside the picture's: `masks/a.png` or `masks/a.jpg.png` for `images/a.jpg`.
-fn beside(folder: &Path, picture: &Path, names: &[&str]) -> Option<PathBuf> {
-    let file = Path::new(picture.file_name()?);
-    let parent = picture.parent().unwrap_or(Path::new(""));
-    let own = [file.to_owned(), file.with_extension("png"), PathBuf::from(format!("{}.png", file.display()))];
-    let parents = [parent.parent().unwrap_or(Path::new("")), Path::new("")];
-    let places = parents.iter().flat_map(|place| names.iter().map(move |name| folder.join(place).join(name)));
-    places
-        .flat_map(|place| own.iter().map(move |file| place.join(file)).collect::<Vec<_>>())
-        .find(|file| file.is_file())
-}
-
-fn view(folder: &Path, listed: transforms::Listed) -> Result<View, ScanError> {
+fn view(folder: &Path, listed: transforms::Listed, beside: &mut Beside<'_>) -> Result<View, ScanError> {
+    if ending::asked() {
+        return Err(ScanError::Interrupted);
+    }
     let name = listed.picture.display().to_string();
     let mut picture = folder.join(&listed.picture);
     // nerfstudio's own files leave the ending out now and then.
@@ -222,10 +217,11 @@ fn view(folder: &Path, listed: transforms::Listed) -> Result<View, ScanError> {
             .find(|p| p.is_file())
             .unwrap_or(picture);
     }
-    let mask =
-        listed.mask.map(|mask| folder.join(mask)).or_else(|| beside(folder, &listed.picture, &["masks", "mask"]));
-    let depth =
-        listed.depth.map(|depth| folder.join(depth)).or_else(|| beside(folder, &listed.picture, &["depth", "depths"]));
+    let mut found = |said: Option<PathBuf>, names: &[&str]| {
+        said.map(|file| folder.join(file)).or_else(|| beside.find(&listed.picture, names))
+    };
+    let mask = found(listed.mask, &["masks", "mask"]);
+    let depth = found(listed.depth, &["depth", "depths"]);
     Ok(View {
         name,
         camera: listed.camera,

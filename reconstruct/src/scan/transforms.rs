@@ -80,7 +80,7 @@ pub(crate) struct List {
 /// Reads a file and, where it gives the end effector's poses, how the camera is mounted.
 pub(crate) fn read(path: &Path) -> Result<List, ScanError> {
     let bad = |what: String| ScanError::content(path, what);
-    let text = input::text(path, Kind::List)?;
+    let text = input::text(path, Kind::Poses)?;
     let file: File = serde_json::from_str(&text).map_err(|error| bad(format!("{error}; see docs/reconstruct.md")))?;
     let is_held = file.frames.iter().any(|frame| frame.end_effector.is_some());
     let held = is_held.then(|| Held::read(path, file.hand_eye.as_deref())).transpose()?;
