@@ -56,7 +56,7 @@ pub struct Asking {
 pub enum RunError {
     /// The policy.
     #[error(transparent)]
-    Policy(#[from] PolicyError),
+    Policy(PolicyError),
     /// The start.
     #[error(transparent)]
     Start(#[from] StartError),
@@ -66,6 +66,12 @@ pub enum RunError {
     /// The end was asked for.
     #[error("interrupted")]
     Interrupted,
+}
+
+impl From<PolicyError> for RunError {
+    fn from(error: PolicyError) -> Self {
+        if error.is_interruption() { Self::Interrupted } else { Self::Policy(error) }
+    }
 }
 
 /// The task's scripted motion with noise [m]; `stills`: keeps moments of a failure.

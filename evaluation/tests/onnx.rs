@@ -1,44 +1,15 @@
 //! A policy in an ONNX file. The model is written here, byte by byte: one that repeats the state it sees and adds the mean of two
 //! pictures to each number. `ORT_DYLIB_PATH` has to name ONNX Runtime's library.
 
+mod model;
+
 use evaluation::policy::{ActionKind, Array, Keys, Policy, Seen, Source};
 use evaluation::rollout::{Asking, run};
+use model::{bytes, node, number, tensor, written};
 use rmpv::Value;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use twin::task::{Acting, Numbers, Signs, Task};
-
-/// A field of a protocol buffer that holds bytes.
-fn bytes(field: u64, content: &[u8]) -> Vec<u8> {
-    [number_of(field << 3 | 2), number_of(content.len() as u64), content.to_vec()].concat()
-}
-
-/// A field that holds a number.
-fn number(field: u64, value: u64) -> Vec<u8> {
-    [number_of(field << 3), number_of(value)].concat()
-}
-
-fn number_of(mut value: u64) -> Vec<u8> {
-    let mut encoded = Vec::new();
-    while value > 127 {
-        encoded.push((value & 127) as u8 | 128);
-        value >>= 7;
-    }
-    encoded.push(value as u8);
-    encoded
-}
-
-fn node(kind: &str, inputs: &[&str], output: &str, attributes: &[u8]) -> Vec<u8> {
-    let inputs: Vec<u8> = inputs.iter().flat_map(|name| bytes(1, name.as_bytes())).collect();
-    bytes(1, &[inputs, bytes(2, output.as_bytes()), bytes(4, kind.as_bytes()), attributes.to_vec()].concat())
-}
-
-/// An input or output of float32.
-fn tensor(field: u64, name: &str, lengths: &[u64]) -> Vec<u8> {
-    let axes: Vec<u8> = lengths.iter().flat_map(|length| bytes(1, &number(1, *length))).collect();
-    let kind = bytes(1, &[number(1, 1), bytes(2, &axes)].concat());
-    bytes(field, &[bytes(1, name.as_bytes()), bytes(2, &kind)].concat())
-}
 
 /// ONNX version 8, operators of version 13.
 fn model(state: &str, rows: u64, actions: u64) -> Vec<u8> {
@@ -52,12 +23,6 @@ fn model(state: &str, rows: u64, actions: u64) -> Vec<u8> {
         tensor(12, "action", &[1, actions]),
     ];
     [number(1, 8), bytes(7, &graph.concat()), bytes(8, &number(2, 13))].concat()
-}
-
-fn written(folder: &Path, name: &str, bytes: &[u8]) -> PathBuf {
-    let file = folder.join(name);
-    std::fs::write(&file, bytes).expect("a file");
-    file
 }
 
 fn open(file: PathBuf) -> Result<Policy, String> {
@@ -95,8 +60,8 @@ fn a_network_gets_what_is_seen_and_its_output_is_the_action() {
     let picture = numbers(&seen, "observation/image/front");
     let mean = picture.iter().map(|value| f64::from(*value)).sum::<f64>() / picture.len() as f64 / 255.0;
     let actions = policy.actions(&seen).expect("actions");
-    assert_eq!(actions.len(), 1);
-    for (action, state) in actions[0].iter().zip(&state) {
+    let [action]: [&[f32]; 1] = actions.iter().collect::<Vec<_>>().try_into().expect("one action");
+    for (action, state) in action.iter().zip(&state) {
         assert!((f64::from(action - state) - mean).abs() < 1e-4, "{action} of {state} and {mean}");
     }
     // Moving to where everything is, plus 0.3 to 0.6 rad, is an episode that ends without success.

@@ -63,6 +63,21 @@ fn a_served_policy_sees_pictures_and_numbers_and_what_it_asks_for_is_done() {
     assert!(recorded.info.success && recorded.moments.len() > 500);
 }
 
+fn answer(actions: Value) -> Message {
+    Message::Binary(pack(&Value::Map(vec![("actions".into(), actions)])).into())
+}
+
+/// An array of bytes, as numpy's come.
+fn bytes(shape: [u64; 2]) -> Value {
+    let key = |key: &str| Value::Binary(key.as_bytes().to_vec());
+    Value::Map(vec![
+        (key("__ndarray__"), true.into()),
+        (key("data"), Value::Binary(vec![0; (shape[0] * shape[1]) as usize])),
+        (key("dtype"), "|u1".into()),
+        (key("shape"), Value::Array(shape.map(Value::from).to_vec())),
+    ])
+}
+
 #[test]
 fn whatever_a_server_answers_is_an_error_in_a_line_or_an_action() {
     let task = task();
@@ -70,13 +85,17 @@ fn whatever_a_server_answers_is_an_error_in_a_line_or_an_action() {
         let mut policy = Policy::Served(Served::connect(&serve(move |_| answer())).expect("a policy"));
         run(&task, 0, &mut policy, &asking(&[], &task), || false)
     };
-    let cases: [(Answer, &str); 6] = [
+    let cases: [(Answer, &str); 9] = [
         (|| Some(Message::Text("Traceback\n  File x\nValueError: no such key\n".into())), "ValueError: no such key"),
         (|| None, "fell silent"),
         (|| Some(Message::Binary(vec![0x92, 0x01].into())), "no msgpack"),
         (|| Some(Message::Binary(pack(&Value::Map(Vec::new())).into())), "no `actions`"),
         (|| Some(actions(&[vec![1.0, 2.0]])), "an action has 15 numbers"),
         (|| Some(actions(&[vec![f32::NAN; 15]])), "of an action is NaN"),
+        // A row of its own for each number, in bytes and in lists, and a value for each byte.
+        (|| Some(answer(bytes([2_000_000, 1]))), "[2000000, 1]; 1048576 numbers at most"),
+        (|| Some(answer(Value::Array(vec![bytes([1_000_000, 1]); 2]))), "numbers at most"),
+        (|| Some(answer(Value::Array(vec![Value::Array(vec![1.into()]); 1_000_000]))), "1048576 single values"),
     ];
     for (answer, words) in cases {
         let error = ask(answer).expect_err(words).to_string();

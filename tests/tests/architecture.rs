@@ -87,7 +87,7 @@ fn each_big_dependency_has_one_door() {
         ("statrs", &["evaluation/src/statistics/", "calibration/src/hand_eye/quantile.rs"]),
         ("rmpv", &["evaluation/src/policy/"]),
         ("tungstenite", &["evaluation/src/policy/served.rs"]),
-        ("ort", &["evaluation/src/policy/onnx.rs"]),
+        ("ort", &["evaluation/src/policy/onnx.rs", "evaluation/src/policy/onnx/"]),
         ("zip", &["import/src/sources/npz.rs"]),
         ("zenoh", &["link/src/network/"]),
         ("schemars", &["shared_mem/src/cell/"]),

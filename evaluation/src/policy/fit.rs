@@ -6,6 +6,9 @@
 use super::packed::Array;
 use std::collections::VecDeque;
 
+/// Numbers that an input may have: a hundred pictures of a million pixels, in float32 a gigabyte.
+const MOST_NUMBERS: usize = 1 << 28;
+
 /// Axes of an input, as its network states them; `None`: any length.
 pub(super) type Axes = [Option<usize>];
 
@@ -38,6 +41,10 @@ impl Moments {
             2 => axes[1].unwrap_or(1).max(1),
             _ => 1,
         };
+        let count = moments.checked_mul(seen.values.len()).filter(|count| *count <= MOST_NUMBERS);
+        count.ok_or_else(|| {
+            format!("asks for {moments} moments of {} numbers each, more than {MOST_NUMBERS}", seen.values.len())
+        })?;
         let mut values: Vec<f32> = if moved {
             let channels = item[0];
             (0..channels).flat_map(|c| seen.values.iter().skip(c).step_by(channels).copied()).collect()
@@ -131,5 +138,7 @@ mod tests {
         moments.clear();
         let seen = Array { shape: vec![1], values: vec![5.0] };
         assert_eq!(moments.fill(&seen, &[None, None, None], 1.0).expect("one moment").shape, [1, 1, 1]);
+        let told = moments.fill(&seen, &[Some(1), Some(1_000_000_000_000), Some(1)], 1.0).expect_err("too many");
+        assert!(told.contains("1000000000000 moments"), "{told}");
     }
 }

@@ -7,6 +7,7 @@
 //! | `observation` | what a policy sees: numbers and pictures by keys |
 //! | `onnx` | a policy in an ONNX file |
 //! | `opened` | a policy ready to be asked, wherever it is computed |
+//! | `patient` | a connection on which one waits so long, whatever comes meanwhile |
 //! | `packed` | arrays in msgpack, as numpy's come over openpi's protocol |
 //! | `served` | a policy behind openpi's websocket protocol |
 
@@ -16,11 +17,12 @@ mod observation;
 mod onnx;
 mod opened;
 mod packed;
+mod patient;
 mod served;
 
 pub use named::{Named, NamedError, Source};
 pub use observation::{ActionKind, Keys, Seen};
 pub use onnx::{Onnx, OnnxError};
 pub use opened::{Policy, PolicyError};
-pub use packed::{Array, PackedError, pack, unpack};
+pub use packed::{Array, PackedError, Rows, pack, unpack};
 pub use served::{Served, ServedError};

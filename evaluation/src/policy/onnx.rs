@@ -1,13 +1,14 @@
-//! A policy in an ONNX file, computed by ONNX Runtime.
+//! A policy in an ONNX file, computed by ONNX Runtime. `computed` owns the thread that does so, and its limits.
 //!
 //! The library is loaded when a policy is opened: the file that `ORT_DYLIB_PATH` names, else `libonnxruntime.so` where the system
 //! looks for libraries.
 
+mod computed;
+
 use super::fit::Moments;
-use super::packed::{Array, entry};
-use ort::logging::LogLevel;
-use ort::session::Session;
-use ort::value::{DynValue, Tensor, TensorElementType, ValueType};
+use super::packed::{Array, MOST_NUMBERS, Rows, entry};
+use computed::{Computed, Given, Numbers, Port, Uncomputed};
+use ort::value::TensorElementType;
 use rmpv::Value;
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
@@ -32,6 +33,9 @@ pub enum OnnxError {
         /// What is wrong with it, and what to do.
         what: String,
     },
+    /// The end was asked for.
+    #[error("interrupted")]
+    Interrupted,
     /// One of its answers.
     #[error("the policy of {} answered with {what}", path.display())]
     Answer {
@@ -40,6 +44,25 @@ pub enum OnnxError {
         /// What is wrong with it.
         what: String,
     },
+}
+
+/// What helps where a network has no end.
+const REMEDY: &str = "export the policy without its training, and with axes of the lengths that it uses";
+
+/// The output that holds the actions.
+fn output(ports: &[Port]) -> Result<String, String> {
+    let is_action = |port: &&Port| matches!(port.name.as_str(), "action" | "actions");
+    let chosen = if let [only] = ports { Some(only) } else { ports.iter().find(is_action) };
+    let chosen = chosen.ok_or_else(|| {
+        let names: Vec<&str> = ports.iter().map(|port| port.name.as_str()).collect();
+        format!("its outputs are {}; export it with one called action", names.join(", "))
+    })?;
+    let known = chosen.kind.tensor_shape().into_iter().flat_map(|shape| shape.iter());
+    let count = known.filter_map(|length| u64::try_from(*length).ok()).fold(1_u64, u64::saturating_mul);
+    if count > MOST_NUMBERS as u64 {
+        return Err(format!("its output {} has {count} numbers, and {MOST_NUMBERS} at most are taken", chosen.name));
+    }
+    Ok(chosen.name.clone())
 }
 
 /// An input of the network.
@@ -55,9 +78,8 @@ struct Input {
 #[derive(Debug)]
 pub struct Onnx {
     path: PathBuf,
-    session: Session,
+    network: Computed,
     inputs: Vec<Input>,
-    output: String,
 }
 
 impl Onnx {
@@ -74,21 +96,13 @@ impl Onnx {
         let environment = ort::init_from(&library).map_err(|error| OnnxError::Library(line(&error)))?;
         // The first of a process counts, and none of them asks for anything.
         let _first = environment.commit();
-        let session = Session::builder()
-            .and_then(|builder| Ok(builder.with_log_level(LogLevel::Error)?))
-            .and_then(|mut builder| builder.commit_from_file(path))
-            .map_err(|error| bad(format!("{}; export it again, with an opset that ONNX Runtime has", line(&error))))?;
-        let inputs = session.inputs().iter().map(|input| Input::of(input.name(), input.dtype()));
-        let inputs = inputs.collect::<Result<Vec<_>, _>>().map_err(bad)?;
-        let outputs: Vec<&str> = session.outputs().iter().map(ort::value::Outlet::name).collect();
-        let output = match outputs[..] {
-            [only] => Some(only),
-            _ => outputs.iter().find(|name| matches!(**name, "action" | "actions")).copied(),
-        };
-        let output = output
-            .map(str::to_owned)
-            .ok_or_else(|| bad(format!("its outputs are {}; export it with one called action", outputs.join(", "))))?;
-        Ok(Self { path: path.to_owned(), session, inputs, output })
+        let network = Computed::open(path, output).map_err(|error| match error {
+            Uncomputed::Failed(what) => bad(what),
+            Uncomputed::Ended(what) => bad(format!("it {what}; {REMEDY}")),
+            Uncomputed::Interrupted => OnnxError::Interrupted,
+        })?;
+        let inputs = network.inputs.iter().map(Input::of).collect::<Result<Vec<_>, _>>().map_err(bad)?;
+        Ok(Self { path: path.to_owned(), network, inputs })
     }
 
     /// An episode begins: what was seen before is forgotten.
@@ -100,26 +114,24 @@ impl Onnx {
     ///
     /// # Errors
     /// [`OnnxError::File`] when an input is not among what is seen, or has another shape; [`OnnxError::Answer`].
-    pub fn actions(&mut self, observation: &Value) -> Result<Vec<Vec<f32>>, OnnxError> {
-        let mut values: Vec<(String, DynValue)> = Vec::new();
+    pub fn actions(&mut self, observation: &Value) -> Result<Rows, OnnxError> {
+        let mut given = Vec::new();
         for input in &mut self.inputs {
-            let value = input.value(observation).map_err(|what| OnnxError::File {
+            given.push(input.given(observation).map_err(|what| OnnxError::File {
                 path: self.path.clone(),
                 what: format!("its input {} {what}", input.name),
-            })?;
-            values.push((input.name.clone(), value));
+            })?);
         }
         let answer = |what: String| OnnxError::Answer { path: self.path.clone(), what };
-        let found = self.session.run(values).map_err(|error| answer(format!("an error: {}", line(&error))))?;
-        let output = found.get(&self.output).ok_or_else(|| answer("no actions".into()))?;
-        let (shape, values) = output
-            .try_extract_tensor::<f32>()
-            .map_err(|_| answer(format!("{}, which are no float32; export it with such an output", self.output)))?;
-        let mut shape: Vec<usize> = shape.iter().map(|length| usize::try_from(*length).unwrap_or(0)).collect();
-        if let [1, _, _] = shape[..] {
-            shape.remove(0);
+        let mut found = self.network.run(given).map_err(|error| match error {
+            Uncomputed::Failed(what) => answer(what),
+            Uncomputed::Ended(what) => answer(format!("nothing: it {what}; {REMEDY}")),
+            Uncomputed::Interrupted => OnnxError::Interrupted,
+        })?;
+        if let [1, _, _] = found.shape[..] {
+            found.shape.remove(0);
         }
-        Array { shape, values: values.to_vec() }.rows().map_err(|error| answer(error.to_string()))
+        found.into_rows().map_err(|error| answer(error.to_string()))
     }
 
     /// An answer that does not fit the task.
@@ -130,7 +142,7 @@ impl Onnx {
 }
 
 impl Input {
-    fn of(name: &str, kind: &ValueType) -> Result<Self, String> {
+    fn of(Port { name, kind }: &Port) -> Result<Self, String> {
         let (Some(element), Some(shape)) = (kind.tensor_type(), kind.tensor_shape()) else {
             return Err(format!("its input {name} is no tensor; export a policy whose inputs are tensors"));
         };
@@ -138,10 +150,10 @@ impl Input {
             return Err(format!("its input {name} takes {element}; export it with float32, or uint8 for pictures"));
         }
         let axes = shape.iter().map(|length| usize::try_from(*length).ok()).collect();
-        Ok(Self { name: name.to_owned(), element, axes, moments: Moments::default() })
+        Ok(Self { name: name.clone(), element, axes, moments: Moments::default() })
     }
 
-    fn value(&mut self, observation: &Value) -> Result<DynValue, String> {
+    fn given(&mut self, observation: &Value) -> Result<Given, String> {
         let seen = entry(observation, &self.name).or_else(|| entry(observation, &key(&self.name)));
         let seen = seen.ok_or_else(|| {
             let names: Vec<&str> =
@@ -152,13 +164,12 @@ impl Input {
         let real = self.element == TensorElementType::Float32;
         let scale = if real && seen.shape.len() == 3 { OF_A_BYTE } else { 1.0 };
         let filled = self.moments.fill(&seen, &self.axes, scale)?;
-        let value = if real {
-            Tensor::from_array((filled.shape, filled.values)).map(Tensor::into_dyn)
+        let numbers = if real {
+            Numbers::Real(filled.values)
         } else {
-            let bytes: Vec<u8> = filled.values.iter().map(|value| *value as u8).collect();
-            Tensor::from_array((filled.shape, bytes)).map(Tensor::into_dyn)
+            Numbers::Bytes(filled.values.iter().map(|value| *value as u8).collect())
         };
-        value.map_err(|error| format!("cannot be filled: {}", line(&error)))
+        Ok(Given { name: self.name.clone(), shape: filled.shape, numbers })
     }
 }
 

@@ -2,6 +2,7 @@
 
 use super::named::Source;
 use super::onnx::{Onnx, OnnxError};
+use super::packed::Rows;
 use super::served::{Served, ServedError};
 use rmpv::Value;
 
@@ -23,6 +24,14 @@ pub enum PolicyError {
     /// Its file.
     #[error(transparent)]
     Onnx(#[from] OnnxError),
+}
+
+impl PolicyError {
+    /// Whether nothing went wrong but that the end was asked for.
+    #[must_use]
+    pub fn is_interruption(&self) -> bool {
+        matches!(self, Self::Served(ServedError::Interrupted) | Self::Onnx(OnnxError::Interrupted))
+    }
 }
 
 impl Policy {
@@ -51,7 +60,7 @@ impl Policy {
     ///
     /// # Errors
     /// [`PolicyError`].
-    pub fn actions(&mut self, observation: &Value) -> Result<Vec<Vec<f32>>, PolicyError> {
+    pub fn actions(&mut self, observation: &Value) -> Result<Rows, PolicyError> {
         Ok(match self {
             Self::Served(policy) => policy.actions(observation)?,
             Self::Onnx(policy) => policy.actions(observation)?,

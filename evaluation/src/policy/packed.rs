@@ -1,7 +1,13 @@
 //! Arrays in msgpack, as openpi's client and server exchange numpy's: a map with the binary keys `__ndarray__`, `data`, `dtype` and
-//! `shape`, little-endian. What comes in is believed only as far as its sizes agree.
+//! `shape`, little-endian. What comes in is believed only as far as its sizes agree, and only so much of it is taken.
 
 use rmpv::Value;
+use std::io::{self, Read};
+
+/// Values that a message may have: each takes a hundred times the byte that it is sent as.
+const MOST_VALUES: usize = 1 << 20;
+/// Numbers that an answer may have: a thousand actions of a thousand numbers.
+pub(super) const MOST_NUMBERS: usize = 1 << 20;
 
 /// An array of numbers as it came in, row by row.
 #[derive(Debug, Clone, PartialEq)]
@@ -48,11 +54,31 @@ pub fn pack(message: &Value) -> Vec<u8> {
 /// A message out of its bytes.
 ///
 /// # Errors
-/// [`PackedError`] when they are no msgpack, or more than one message.
-pub fn unpack(mut bytes: &[u8]) -> Result<Value, PackedError> {
-    let message = rmpv::decode::read_value_with_max_depth(&mut bytes, 64);
+/// [`PackedError`] when they are no msgpack, more than one message, or too many values: arrays count as one each.
+pub fn unpack(bytes: &[u8]) -> Result<Value, PackedError> {
+    let mut counted = Counted { bytes, left: MOST_VALUES };
+    let message = rmpv::decode::read_value_with_max_depth(&mut counted, 64);
+    if counted.left == 0 {
+        return Err(PackedError(format!("more than {MOST_VALUES} single values; send arrays of numbers")));
+    }
     let message = message.map_err(|error| PackedError(format!("it is no msgpack ({error})")))?;
-    if bytes.is_empty() { Ok(message) } else { Err(PackedError("more bytes follow the message".into())) }
+    if counted.bytes.is_empty() { Ok(message) } else { Err(PackedError("more bytes follow the message".into())) }
+}
+
+/// Bytes out of which so many pieces may be read; a value has one at least.
+struct Counted<'a> {
+    bytes: &'a [u8],
+    left: usize,
+}
+
+impl Read for Counted<'_> {
+    fn read(&mut self, into: &mut [u8]) -> io::Result<usize> {
+        self.left = self.left.saturating_sub(1);
+        if self.left == 0 {
+            return Err(io::ErrorKind::QuotaExceeded.into());
+        }
+        self.bytes.read(into)
+    }
 }
 
 /// What stands in a map under a key, be it text or bytes.
@@ -71,10 +97,16 @@ impl Array {
     /// # Errors
     /// [`PackedError`] saying what it is instead.
     pub fn read(value: &Value) -> Result<Self, PackedError> {
-        if entry(value, MARK).and_then(Value::as_bool) == Some(true) { Self::numpy(value) } else { Self::list(value) }
+        Self::within(value, usize::MAX)
     }
 
-    fn numpy(value: &Value) -> Result<Self, PackedError> {
+    /// The same of `most` numbers at most.
+    pub(super) fn within(value: &Value, most: usize) -> Result<Self, PackedError> {
+        let is_numpy = entry(value, MARK).and_then(Value::as_bool) == Some(true);
+        if is_numpy { Self::numpy(value, most) } else { Self::list(value, most) }
+    }
+
+    fn numpy(value: &Value, most: usize) -> Result<Self, PackedError> {
         let lacks = |key: &str| PackedError(format!("an array without a usable `{key}`"));
         let data = entry(value, "data").and_then(Value::as_slice).ok_or_else(|| lacks("data"))?;
         let dtype = entry(value, "dtype").and_then(|dtype| match dtype {
@@ -87,10 +119,13 @@ impl Array {
         let length = |length: &Value| length.as_u64().and_then(|length| usize::try_from(length).ok());
         let shape: Option<Vec<usize>> = shape.iter().map(length).collect();
         let shape = shape.ok_or_else(|| lacks("shape"))?;
+        let count = shape.iter().try_fold(1_usize, |count, length| count.checked_mul(*length));
+        if count.is_none_or(|count| count > most) {
+            return Err(PackedError(format!("an array of the shape {shape:?}; {most} numbers at most are taken")));
+        }
         let values = numbers(dtype, data).ok_or_else(|| {
             PackedError(format!("an array of the type {dtype}; send float32, float64 or whole numbers, little-endian"))
         })?;
-        let count = shape.iter().try_fold(1_usize, |count, length| count.checked_mul(*length));
         if count == Some(values.len()) {
             Ok(Self { shape, values })
         } else {
@@ -98,13 +133,22 @@ impl Array {
         }
     }
 
-    fn list(value: &Value) -> Result<Self, PackedError> {
+    fn list(value: &Value, most: usize) -> Result<Self, PackedError> {
         let Some(items) = value.as_array() else {
             let number =
                 value.as_f64().ok_or_else(|| PackedError(format!("no array of numbers but {}", kind(value))))?;
+            if most == 0 {
+                return Err(PackedError(format!("lists of more than {MOST_NUMBERS} numbers")));
+            }
             return Ok(Self { shape: Vec::new(), values: vec![number as f32] });
         };
-        let items = items.iter().map(Self::read).collect::<Result<Vec<_>, _>>()?;
+        let mut left = most;
+        let mut item = |item: &Value| {
+            let item = Self::within(item, left)?;
+            left = left.saturating_sub(item.values.len());
+            Ok(item)
+        };
+        let items = items.iter().map(&mut item).collect::<Result<Vec<_>, PackedError>>()?;
         let within = items.first().map_or(Vec::new(), |first| first.shape.clone());
         if items.iter().any(|item| item.shape != within) {
             return Err(PackedError("a list of arrays of different shapes".into()));
@@ -117,7 +161,7 @@ impl Array {
     ///
     /// # Errors
     /// [`PackedError`] for more or fewer axes, and where there is none.
-    pub fn rows(&self) -> Result<Vec<Vec<f32>>, PackedError> {
+    pub fn into_rows(self) -> Result<Rows, PackedError> {
         let columns = match self.shape[..] {
             [columns] => columns,
             [_, columns] => columns,
@@ -126,7 +170,31 @@ impl Array {
         if columns == 0 || self.values.is_empty() {
             return Err(PackedError("an array with nothing in it".into()));
         }
-        Ok(self.values.chunks(columns).map(<[f32]>::to_vec).collect())
+        Ok(Rows { columns, values: self.values })
+    }
+}
+
+/// A table of numbers: of a policy's answer, an action a row.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Rows {
+    /// At least one.
+    columns: usize,
+    values: Vec<f32>,
+}
+
+impl Rows {
+    /// Row by row; there is one at least.
+    pub fn iter(&self) -> std::slice::ChunksExact<'_, f32> {
+        self.values.chunks_exact(self.columns)
+    }
+}
+
+impl<'a> IntoIterator for &'a Rows {
+    type Item = &'a [f32];
+    type IntoIter = std::slice::ChunksExact<'a, f32>;
+
+    fn into_iter(self) -> Self::IntoIter {
+        self.iter()
     }
 }
 
@@ -180,8 +248,9 @@ mod tests {
         let message = unpack(&recorded()).expect("a message");
         let array = Array::read(entry(&message, "actions").expect("actions")).expect("an array");
         assert_eq!(array, Array { shape: vec![2, 3], values: vec![0.0, 1.0, 2.0, 3.0, 4.0, 5.0] });
-        assert_eq!(array.rows(), Ok(vec![vec![0.0, 1.0, 2.0], vec![3.0, 4.0, 5.0]]));
         let again = Value::Map(vec![("actions".into(), floats(&[2, 3], &array.values))]);
+        let rows = array.into_rows().expect("a table");
+        assert_eq!(rows.iter().collect::<Vec<_>>(), [[0.0, 1.0, 2.0], [3.0, 4.0, 5.0]]);
         assert_eq!(pack(&again), recorded());
     }
 
@@ -205,13 +274,37 @@ mod tests {
         assert!(Array::read(&Value::from("no")).is_err_and(|error| error.to_string().contains("text")));
         assert!(
             floats(&[0, 3], &[]).as_map().is_some()
-                && Array::read(&floats(&[0, 3], &[])).expect("an array").rows().is_err()
+                && Array::read(&floats(&[0, 3], &[])).expect("an array").into_rows().is_err()
         );
     }
 
     #[test]
     fn lists_of_numbers_are_arrays_too() {
         let list = Value::Array(vec![Value::Array(vec![1.into(), 2.5.into()]), Value::Array(vec![3.into(), 4.into()])]);
-        assert_eq!(Array::read(&list).expect("an array").rows(), Ok(vec![vec![1.0, 2.5], vec![3.0, 4.0]]));
+        let rows = Array::read(&list).and_then(Array::into_rows).expect("a table");
+        assert_eq!(rows.iter().collect::<Vec<_>>(), [[1.0, 2.5], [3.0, 4.0]]);
+    }
+
+    #[test]
+    fn a_message_of_more_values_than_an_answer_has_is_refused_while_it_is_read() {
+        let many = pack(&Value::Array(vec![1.into(); MOST_VALUES]));
+        let told = unpack(&many).expect_err("too many").to_string();
+        assert!(told.contains("more than 1048576 single values"), "{told}");
+        unpack(&pack(&Value::Array(vec![1.into(); MOST_VALUES / 2]))).expect("half as many");
+        // Bytes are one value, however many there are.
+        unpack(&pack(&array("|u1", &[1 << 24], vec![0; 1 << 24]))).expect("a large picture");
+    }
+
+    #[test]
+    fn an_answer_of_more_numbers_than_are_taken_is_refused_before_they_are_decoded() {
+        let answer = |count: usize| array("|u1", &[count, 1], vec![0; count]);
+        let told = Array::within(&answer(11), 10).expect_err("too many").to_string();
+        assert!(told.contains("[11, 1]") && told.contains("10 numbers at most"), "{told}");
+        Array::within(&Value::Array(vec![answer(5), answer(5)]), 10).expect("ten");
+        Array::within(&Value::Array(vec![answer(6), answer(6)]), 10).expect_err("twelve");
+        let wide = array("|u1", &[usize::MAX, 2], vec![0; 2]);
+        assert!(Array::read(&wide).is_err_and(|error| error.to_string().contains("shape")));
+        let numbers: Vec<Value> = vec![1.into(); 11];
+        Array::within(&Value::Array(numbers), 10).expect_err("eleven single ones");
     }
 }

@@ -1,15 +1,19 @@
 //! A policy behind openpi's websocket protocol: the server sends its metadata when a client connects, and an answer with `actions`
 //! for each observation, all as msgpack; a text instead is its error.
 
-use super::packed::{Array, PackedError, entry, pack, unpack};
+use super::packed::{Array, MOST_NUMBERS, PackedError, Rows, entry, pack, unpack};
+use super::patient::Patient;
 use rmpv::Value;
+use shared_mem::ending;
 use std::net::{TcpStream, ToSocketAddrs as _};
 use std::time::Duration;
 use tungstenite::protocol::WebSocketConfig;
 use tungstenite::{HandshakeError, Message, WebSocket};
 
-/// How long a server may take to take a connection up, and to answer.
+/// How long a server may take to take a connection up, to say who it is, and to answer in full.
 const CONNECTS: Duration = Duration::from_secs(5);
+const SAYS_WHO: Duration = Duration::from_secs(30);
+/// The first answer of a network that is compiled for it takes more than a minute.
 const ANSWERS: Duration = Duration::from_secs(120);
 /// Largest message that is taken [bytes].
 const LARGEST: usize = 64 << 20;
@@ -43,6 +47,9 @@ pub enum ServedError {
         /// The last line of what it said.
         words: String,
     },
+    /// The end was asked for.
+    #[error("interrupted")]
+    Interrupted,
     /// An answer is of no use.
     #[error("the policy at {address} answered with {what}")]
     Answer {
@@ -57,7 +64,7 @@ pub enum ServedError {
 #[derive(Debug)]
 pub struct Served {
     address: String,
-    socket: WebSocket<TcpStream>,
+    socket: WebSocket<Patient>,
     metadata: Value,
 }
 
@@ -84,12 +91,11 @@ impl Served {
             .into_iter()
             .find_map(|place| TcpStream::connect_timeout(&place, CONNECTS).map_err(|error| last = Some(error)).ok());
         let stream = stream.ok_or_else(|| last.map_or_else(|| absent(&"no such host"), |error| absent(&error)))?;
-        let settings =
-            [stream.set_nodelay(true), stream.set_read_timeout(Some(ANSWERS)), stream.set_write_timeout(Some(ANSWERS))];
-        settings.into_iter().collect::<Result<Vec<()>, _>>().map_err(|error| absent(&error))?;
+        let stream = Patient::of(stream, SAYS_WHO).map_err(|error| absent(&error))?;
         let config = WebSocketConfig::default().max_message_size(Some(LARGEST)).max_frame_size(Some(LARGEST));
         let (socket, _) =
             tungstenite::client::client_with_config(address, stream, Some(config)).map_err(|error| match error {
+                HandshakeError::Failure(_) if ending::asked() => ServedError::Interrupted,
                 HandshakeError::Failure(error) => absent(&error),
                 HandshakeError::Interrupted(_) => absent(&"it does not answer as a websocket"),
             })?;
@@ -108,12 +114,13 @@ impl Served {
     ///
     /// # Errors
     /// [`ServedError`].
-    pub fn actions(&mut self, observation: &Value) -> Result<Vec<Vec<f32>>, ServedError> {
+    pub fn actions(&mut self, observation: &Value) -> Result<Rows, ServedError> {
+        self.socket.get_mut().wait(ANSWERS);
         let sent = self.socket.send(Message::Binary(pack(observation).into()));
         sent.map_err(|error| self.silent(&error))?;
         let answer = self.receive()?;
         let actions = entry(&answer, "actions").ok_or_else(|| PackedError("no `actions`".into()));
-        let rows = actions.and_then(Array::read).and_then(|array| array.rows());
+        let rows = actions.and_then(|actions| Array::within(actions, MOST_NUMBERS)).and_then(Array::into_rows);
         rows.map_err(|error| self.answer(&error))
     }
 
@@ -124,6 +131,9 @@ impl Served {
     }
 
     fn silent(&self, cause: &dyn std::fmt::Display) -> ServedError {
+        if ending::asked() {
+            return ServedError::Interrupted;
+        }
         ServedError::Silent { address: self.address.clone(), cause: cause.to_string() }
     }
 
