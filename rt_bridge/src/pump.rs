@@ -13,7 +13,7 @@ use crate::times::Times;
 use rtrb::Consumer;
 use shared_mem::msg::arm::{ArmCommand, ArmState};
 use shared_mem::msg::event::{Event, EventLevel, EventSource};
-use shared_mem::msg::motion::MotionChunk;
+use shared_mem::msg::motion::{MotionChunk, MotionKind};
 use shared_mem::msg::object::ObjectPose;
 use shared_mem::msg::origin::ArmOrigin;
 use shared_mem::msg::target::ArmTarget;
@@ -37,7 +37,7 @@ const FINISH_PATIENCE: Duration = Duration::from_secs(5);
 /// Chunks that are taken in before states are published again: as many as wait at most.
 const LOOKS: usize = topics::ARM_MOTION.limits.buffer * topics::ARM_MOTION.limits.publishers;
 
-/// Targets that are handed on before states are published again.
+/// Targets that are taken in before states are published again: as many as wait at most.
 const TARGETS: usize = topics::ARM_TARGET.limits.buffer * topics::ARM_TARGET.limits.publishers;
 
 /// The pump's ends of the rings.
@@ -240,6 +240,9 @@ fn run(
             // Everything that came is taken in at once, so that a stop does not wait behind a motion. A chunk too many is
             // dropped; the control thread finds it missing and says so.
             let Some(chunk) = ports.motion.receive()? else { break };
+            if chunk.kind == MotionKind::Stop {
+                rings.targets.forget();
+            }
             let _fitted = rings.orders.send(&chunk);
         }
         aim(&mut rings, ports, &state)?;
@@ -257,11 +260,13 @@ fn run(
 fn aim(rings: &mut Rings, ports: &Ports, state: &ArmState) -> Result<(), TransportError> {
     for _ in 0..TARGETS {
         let Some(target) = ports.target.receive()? else { break };
-        match rings.targets.take(&target, state) {
-            Ok(Some(target)) if state.cycle > 0 => rings.orders.aim(&target),
-            Ok(_) => {}
-            Err(text) => say(ports, EventLevel::Warning, &text)?,
-        }
+        rings.targets.keep(&target, state);
+    }
+    if state.cycle == 0 {
+        rings.targets.forget();
+    }
+    for text in rings.targets.hand_on(state, |target| rings.orders.aim(target)) {
+        say(ports, EventLevel::Warning, &text)?;
     }
     Ok(())
 }

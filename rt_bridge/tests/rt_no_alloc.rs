@@ -82,7 +82,7 @@ fn following_targets_and_braking_when_they_end_allocates_nothing() {
         q[k % 7] += if k % 2 == 0 { 0.4 } else { -0.3 };
         // Each third of another sender, each fifth out of range.
         q[3] = if k % 5 == 4 { f64::NAN } else { q[3] };
-        bridge.bench.orders.aim(&Target { stream: if k % 3 == 2 { 8 } else { 7 }, q, speed: 0.5 });
+        bridge.bench.orders.aim(&Target { stream: if k % 3 == 2 { 8 } else { 7 }, q: Some(q), speed: 0.5 });
         allocated += bridge.turn(20);
     }
     assert_eq!((bridge.last.motion, bridge.last.motion_id), (MotionStatus::Playing, 7));

@@ -39,7 +39,7 @@ impl Bench {
     }
 
     fn aim(&mut self, stream: u64, q: [f64; MAX_JOINTS], speed: f64) {
-        self.said.extend(self.player.aim(&Target { stream, q, speed }));
+        self.said.extend(self.player.aim(&Target { stream, q: Some(q), speed }));
     }
 
     /// So many periods; position, speed, acceleration and jerk of all joints are inside their limits in each.
@@ -164,6 +164,20 @@ fn targets_out_of_range_or_below_the_table_are_passed_over_and_said_once() {
         bench.aim(5, moved(3, 0.1), 0.5);
     }
     assert!(matches!(bench.said[..], [Remark::PassedOver { why: Violation::Workspace, .. }]));
+}
+
+#[test]
+fn each_stream_whose_target_is_passed_over_hears_of_it() {
+    let mut bench = Bench::new(None);
+    for stream in [5, 6, 5, 6] {
+        bench.aim(stream, moved(3, 9.0), 0.5);
+        bench.go_on(20);
+    }
+    assert!(
+        matches!(bench.said[..], [Remark::PassedOver { motion: 5, .. }, Remark::PassedOver { motion: 6, .. }]),
+        "{:?}",
+        bench.said
+    );
 }
 
 /// A number for a joint: mostly near its range, now and then one of the kinds that no arm has.

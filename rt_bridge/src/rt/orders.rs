@@ -165,7 +165,7 @@ mod tests {
     #[test]
     fn a_stop_overtakes_targets_and_later_ones_count() {
         let (mut sender, mut orders) = orders(2, 1);
-        let target = |stream| Target { stream, q: [0.0; 8], speed: 0.0 };
+        let target = |stream| Target { stream, q: Some([0.0; 8]), speed: 0.0 };
         sender.aim(&target(1));
         sender.send(&chunk(0, MotionKind::Stop));
         sender.aim(&target(2));

@@ -2,12 +2,13 @@
 //! ends where it falls silent, is stopped or meets a limit: the arm is braked then and holds.
 
 use super::{Activity, Player};
-use crate::remark::{BrakeReason, Refusal, Remark};
+use crate::remark::{BrakeReason, Refusal, Remark, Said};
 use crate::safety::{Limits, Trace, Violation};
 use shared_mem::msg::arm::MotionStatus;
 use shared_mem::msg::motion::SetPoint;
 use shared_mem::msg::target::SILENCE_NS;
 use shared_mem::msg::{Joints, MAX_JOINTS};
+use std::mem::{Discriminant, discriminant};
 use twin::arm::Follower;
 
 /// Share of the highest speeds where a sender asks for none.
@@ -21,8 +22,8 @@ const SLOWEST: f64 = 0.02;
 pub struct Target {
     /// The stream that it belongs to.
     pub stream: u64,
-    /// Positions [rad].
-    pub q: Joints,
+    /// Positions [rad]. `None`: it does not count, or is a pose of a stream that cannot steer now; it shows that somebody sends.
+    pub q: Option<Joints>,
     /// Share of the highest speeds, up to 1; 0: a quarter.
     pub speed: f64,
 }
@@ -34,10 +35,10 @@ pub(super) struct Stream {
     /// Periods since its last target.
     silent: u32,
     longest_silence: u32,
-    /// Whose refusal was said already.
-    refused: u64,
-    /// Whether its last target was passed over.
-    passes_over: bool,
+    /// Whose refusal was said already, of each kind.
+    refused: Said<(u64, Discriminant<Refusal>)>,
+    /// Streams of which a target was passed over since one counted, which was said.
+    passed_over: Said<u64>,
 }
 
 impl Stream {
@@ -47,8 +48,8 @@ impl Stream {
             follower: Follower::calm(&[0.0; MAX_JOINTS], limits, period_s),
             silent: 0,
             longest_silence: (SILENCE_NS as f64 * 1e-9 / period_s) as u32,
-            refused: 0,
-            passes_over: false,
+            refused: Said::default(),
+            passed_over: Said::default(),
         }
     }
 
@@ -61,27 +62,28 @@ impl Stream {
 impl Player {
     /// Takes in a target. Returns what there is to say about it: of many that are refused alike, only of the first.
     pub fn aim(&mut self, target: &Target) -> Option<Remark> {
+        let goes_on = self.activity == Activity::Following && target.stream == self.motion;
         if self.is_dropped(target.stream) {
             return None;
         }
-        let goes_on = self.activity == Activity::Following && target.stream == self.motion;
         if !goes_on && let Err(why) = self.may_begin(target.stream) {
-            let said = std::mem::replace(&mut self.stream.refused, target.stream) == target.stream;
-            return (!said).then_some(Remark::Refused { motion: target.stream, why });
+            let is_new = self.stream.refused.note((target.stream, discriminant(&why)));
+            return is_new.then_some(Remark::Refused { motion: target.stream, why });
         }
+        let q = &target.q?;
+        self.stream.silent = 0;
         if !goes_on {
             self.stream.go_on_from(&self.trace, self.guard.period_s);
         }
-        self.stream.silent = 0;
-        if let Err(why) = self.reaches(target) {
-            let said = std::mem::replace(&mut self.stream.passes_over, true);
-            return (!said).then_some(Remark::PassedOver { motion: target.stream, why });
+        if let Err(why) = self.reaches(q, target.speed) {
+            let is_new = self.stream.passed_over.note(target.stream);
+            return is_new.then_some(Remark::PassedOver { motion: target.stream, why });
         }
-        self.stream.passes_over = false;
+        self.stream.passed_over = Said::default();
         if goes_on {
             return None;
         }
-        (self.motion, self.played, self.stream.refused) = (target.stream, 0, 0);
+        (self.motion, self.played, self.stream.refused) = (target.stream, 0, Said::default());
         (self.activity, self.status) = (Activity::Following, MotionStatus::Playing);
         Some(Remark::Began { motion: target.stream })
     }
@@ -96,7 +98,7 @@ impl Player {
     }
 
     /// Goes for a target, where the arm may rest there.
-    fn reaches(&mut self, Target { q, speed, .. }: &Target) -> Result<(), Violation> {
+    fn reaches(&mut self, q: &Joints, speed: f64) -> Result<(), Violation> {
         for (i, joint) in self.guard.limits.counted().enumerate() {
             let number = u8::try_from(i + 1).unwrap_or(u8::MAX);
             if !q[i].is_finite() {
@@ -112,7 +114,7 @@ impl Player {
             return Err(Violation::Workspace);
         }
         // What is no number is no share either.
-        self.stream.follower.set_speed(if *speed > 0.0 { speed.clamp(SLOWEST, 1.0) } else { USUAL_SPEED });
+        self.stream.follower.set_speed(if speed > 0.0 { speed.clamp(SLOWEST, 1.0) } else { USUAL_SPEED });
         let aimed = self.stream.follower.aim(q);
         aimed.map_err(|joint| Violation::Velocity { joint: u8::try_from(joint + 1).unwrap_or(u8::MAX) })
     }
