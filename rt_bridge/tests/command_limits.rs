@@ -174,7 +174,8 @@ impl Bridge {
             self.turn(rng.random_range(0..=points.len()));
             let stop = MotionChunk { motion_id, kind: MotionKind::Stop, ..MotionChunk::default() };
             assert!(self.bench.orders.send(&stop), "a stop needs no room");
-            self.turn(1);
+            // After it nothing begins before half a second of silence.
+            self.turn(600);
         }
         let mut patience = points.len() + 3000;
         while !(self.bench.orders.is_empty() && self.bench.cycle.is_at_rest()) && patience > 0 {

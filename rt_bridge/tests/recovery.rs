@@ -6,7 +6,8 @@ mod bench;
 
 use bench::Bench;
 use rt_bridge::arm::{Arm, ArmFault, Clock, Desired, Read, ReflexErrors};
-use rt_bridge::remark::{BrakeReason, Remark};
+use rt_bridge::motion::Target;
+use rt_bridge::remark::{BrakeReason, Refusal, Remark};
 use rt_bridge::rt::cycle::Turn;
 use shared_mem::cell::{Cell, Robot};
 use shared_mem::msg::arm::{ArmCommand, ArmMode, ArmState, CommandInterface, MotionStatus};
@@ -15,6 +16,8 @@ use std::sync::atomic::{AtomicU8, AtomicU32, Ordering};
 use std::sync::{Arc, Mutex};
 
 const READY: [f64; 8] = [0.0, -0.785, 0.0, -2.356, 0.0, 1.571, 0.785, 0.0];
+/// Periods without a sender after which motions may begin again after a stop, and one more.
+const SILENCE: u32 = 501;
 
 /// What the test and the robot share.
 #[derive(Default)]
@@ -153,9 +156,35 @@ fn after_a_reflex_the_arm_is_held_where_it_stands_and_the_next_motion_is_played(
     assert_eq!(bridge.script.recoveries.load(Ordering::Relaxed), 1);
     assert!((bridge.last.q_d[1] - (READY[1] + 0.01)).abs() < 1e-12, "{:?}", bridge.last.q_d);
     assert!(bridge.told().contains(&Remark::Recovered));
+    bridge.turn(SILENCE);
     bridge.send(2, MotionKind::Last);
     bridge.turn(60);
     assert_eq!((bridge.last.motion_id, bridge.last.motion), (2, MotionStatus::Done));
+}
+
+#[test]
+fn who_sends_on_through_a_reflex_does_not_move_the_arm_when_it_is_commanded_again() {
+    let mut bridge = Bridge::new();
+    bridge.turn(5);
+    let send_on = |bridge: &mut Bridge, periods: u32| {
+        for _ in 0..periods / 10 {
+            let mut q = READY;
+            q[0] += 0.5;
+            bridge.bench.orders.aim(&Target { stream: 5, q: Some(q), speed: 0.5 });
+            bridge.turn(10);
+        }
+    };
+    bridge.send(1, MotionKind::Play);
+    bridge.turn(20);
+    bridge.stop_by(1);
+    send_on(&mut bridge, 100);
+    bridge.send(0, MotionKind::Recover);
+    send_on(&mut bridge, 2 * SILENCE);
+    assert!(bridge.told().contains(&Remark::Recovered));
+    assert_eq!(bridge.last.q_d[0], READY[0], "it holds where it stands");
+    bridge.turn(SILENCE);
+    send_on(&mut bridge, 100);
+    assert!(bridge.last.q_d[0] > READY[0], "somebody who asks anew");
 }
 
 #[test]
@@ -203,6 +232,7 @@ fn a_stop_brakes_in_the_next_cycle_whatever_is_queued_and_whoever_sends_it() {
     bridge.turn(5);
     let why = BrakeReason::Asked;
     assert_eq!(bridge.told(), [Remark::Began { motion: 1 }, Remark::Braked { motion: 1, why }]);
+    bridge.turn(SILENCE);
     bridge.send(2, MotionKind::Last);
     bridge.turn(60);
     assert_eq!((bridge.last.motion_id, bridge.last.motion), (2, MotionStatus::Done));
@@ -221,10 +251,13 @@ fn a_motion_that_was_sent_before_a_stop_does_not_begin_after_it() {
     bridge.send_stop(0);
     bridge.turn(5);
     bridge.send(2, MotionKind::Last);
+    bridge.turn(SILENCE);
+    assert_eq!(bridge.told(), [Remark::Refused { motion: 2, why: Refusal::Stopped }]);
+    bridge.send(3, MotionKind::Last);
     bridge.turn(60);
     assert_eq!(
         (bridge.last.motion_id, bridge.last.motion),
-        (2, MotionStatus::Done),
-        "a stop stops what was, not what comes"
+        (3, MotionStatus::Done),
+        "a stop stops what was, not what comes after a silence"
     );
 }

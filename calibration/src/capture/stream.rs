@@ -5,7 +5,7 @@
 use super::link::{Link, LinkError};
 use crate::interrupt::Interrupt;
 use shared_mem::msg::arm::{ArmMode, ArmState, MotionStatus};
-use shared_mem::msg::motion::{CHUNK_LENGTH, MotionChunk, MotionKind, SetPoint};
+use shared_mem::msg::motion::{CHUNK_LENGTH, MotionChunk, MotionKind, STOP_SILENCE_NS, SetPoint};
 use shared_mem::time::now_ns;
 use std::time::{Duration, Instant};
 
@@ -17,6 +17,8 @@ const LOOK: Duration = Duration::from_millis(5);
 const TAKE_UP: Duration = Duration::from_secs(2);
 /// How long an arm may take to come to rest after a stop.
 const BRAKING: Duration = Duration::from_secs(3);
+/// After a stop the bridge begins nothing before a silence, which it counts in its own cycles: half as long again.
+const SILENCE: Duration = Duration::from_nanos(STOP_SILENCE_NS + STOP_SILENCE_NS / 2);
 
 /// How a motion ended that was not refused.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -180,8 +182,13 @@ pub fn play(
             stopped = Some((halted(), Instant::now()));
         }
         if let Some((outcome, since)) = stopped {
-            if at_rest(&state, &feeder) || since.elapsed() > BRAKING {
-                return Ok(if interrupt.asked() { Outcome::Stopped } else { outcome });
+            let rests = at_rest(&state, &feeder) || since.elapsed() > BRAKING;
+            if rests && interrupt.asked() {
+                return Ok(Outcome::Stopped);
+            }
+            // What comes after a pause has to be begun by the bridge.
+            if rests && since.elapsed() > SILENCE {
+                return Ok(outcome);
             }
         } else {
             match feeder.next(&state) {

@@ -175,8 +175,8 @@ impl Lines<AnyGripper> for GripperLines {
             }
         }
         let command = self.command.newest()?;
-        if command.is_some() {
-            self.stream.forget();
+        if let Some(command) = &command {
+            self.stream.give_way(command, now_ns());
         }
         Ok(command.or(order))
     }

@@ -1,8 +1,14 @@
-//! Streams of targets for the fingers: one sender at a time, told to the device where it changes.
+//! Streams of targets for the fingers: one sender at a time, told to the device where it changes. After a stop none of them
+//! moves the fingers before all were silent, as with the arm.
 
+use crate::remark::Said;
 use shared_mem::msg::gripper::{GripperAction, GripperCommand};
+use shared_mem::msg::motion::STOP_SILENCE_NS;
 use shared_mem::msg::target::{GripperTarget, SILENCE_NS};
 
+/// Why a target does not count after a stop.
+const STOPPED: &str = "the fingers were stopped, and no stream moves them before nobody has sent gripper targets for 0.5 s; end \
+                       what sends, then ask again";
 /// A change of less is none [m].
 const STEP: f64 = 5e-4;
 
@@ -12,28 +18,31 @@ pub(super) struct Fingers {
     stream: u64,
     heard_ns: u64,
     sent: Option<GripperTarget>,
-    refused: u64,
+    refused: Said<u64>,
+    /// When a stop was asked for, or a target came last after it.
+    stopped_ns: Option<u64>,
 }
 
 impl Fingers {
     /// What a target has the gripper do; else what there is to say, once a stream. A sender that was silent for as long as
     /// an arm's may be makes room for another; the fingers stay where they were sent.
     pub(super) fn take(&mut self, target: &GripperTarget, now_ns: u64) -> Result<Option<GripperCommand>, String> {
+        if let Some(stopped_ns) = self.stopped_ns {
+            if now_ns.saturating_sub(stopped_ns) < STOP_SILENCE_NS {
+                self.stopped_ns = Some(now_ns);
+                return self.refuse(target.stream, STOPPED);
+            }
+            self.stopped_ns = None;
+        }
         if now_ns.abs_diff(target.stamp_ns) > SILENCE_NS {
             return Ok(None);
         }
         let is_free = now_ns.saturating_sub(self.heard_ns) > SILENCE_NS;
         if target.stream != self.stream && !is_free {
-            if std::mem::replace(&mut self.refused, target.stream) == target.stream {
-                return Ok(None);
-            }
-            let (other, owner) = (target.stream, self.stream);
-            return Err(format!(
-                "gripper targets of stream {other} refused: stream {owner} moves the fingers; end it first"
-            ));
+            return self.refuse(target.stream, &format!("stream {} moves the fingers; end it first", self.stream));
         }
         if target.stream != self.stream {
-            (self.stream, self.sent, self.refused) = (target.stream, None, 0);
+            (self.stream, self.sent, self.refused) = (target.stream, None, Said::default());
         }
         self.heard_ns = now_ns;
         let known = self.sent.is_some_and(|sent| {
@@ -53,9 +62,20 @@ impl Fingers {
         }))
     }
 
+    fn refuse(&mut self, stream: u64, why: &str) -> Result<Option<GripperCommand>, String> {
+        if self.refused.note(stream) {
+            Err(format!("gripper targets of stream {stream} refused: {why}"))
+        } else {
+            Ok(None)
+        }
+    }
+
     /// Another order came in between: what the fingers were sent to counts no more.
-    pub(super) fn forget(&mut self) {
+    pub(super) fn give_way(&mut self, command: &GripperCommand, now_ns: u64) {
         self.sent = None;
+        if command.action == GripperAction::Stop {
+            (self.stopped_ns, self.refused) = (Some(now_ns), Said::default());
+        }
     }
 }
 
@@ -80,6 +100,23 @@ mod tests {
         assert_eq!(take(2, 0.01, 1060), Ok(None), "said already");
         assert_eq!(take(1, 0.02, 1080).expect("nothing to say").map(|order| order.width), Some(0.02));
         assert_eq!(take(2, 0.01, 1300).expect("it is free").map(|order| order.width), Some(0.01));
+    }
+
+    #[test]
+    fn after_a_stop_no_stream_moves_the_fingers_before_all_were_silent() {
+        let mut fingers = Fingers::default();
+        assert!(fingers.take(&target(1, 0.04, 1000), 1000 * MS).is_ok_and(|order| order.is_some()));
+        fingers.give_way(&GripperCommand { action: GripperAction::Stop, ..GripperCommand::default() }, 1010 * MS);
+        for ms in (1020..3000).step_by(20) {
+            // The one that moved them, another, and one that takes a new id each time.
+            for stream in [1, 2, ms] {
+                assert!(!matches!(fingers.take(&target(stream, 0.01, ms), ms * MS), Ok(Some(_))), "{ms} ms: {stream}");
+            }
+        }
+        let line = fingers.take(&target(7, 0.01, 3000), 3000 * MS).expect_err("its own words");
+        assert!(line.contains("stream 7 refused: the fingers were stopped"), "{line}");
+        assert_eq!(fingers.take(&target(7, 0.01, 3020), 3020 * MS), Ok(None), "said already");
+        assert!(fingers.take(&target(7, 0.01, 3530), 3530 * MS).is_ok_and(|order| order.is_some()));
     }
 
     #[test]

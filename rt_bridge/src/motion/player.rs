@@ -4,24 +4,30 @@
 //! A motion begins at once when its first chunk arrives and the arm holds. It must start where the arm is *commanded* to
 //! be, to [`START_TOLERANCE`]: a larger step would itself break the acceleration limit (10 rad/s² is 10 urad in 1 ms).
 //!
+//! After a stop that was asked for, or a fault of the arm, nothing begins before all senders were silent: whoever was sending
+//! then has not asked since.
+//!
 //! Where set points did not reach the arm in time and it went on by itself meanwhile, the motion goes on from there and eases
 //! back to its plan; where those were the last ones, the arm eases back to the end.
 
+mod queue;
+mod silence;
 mod stream;
 
+pub use queue::QUEUE;
 pub use stream::Target;
 
 use super::ease::Ease;
 use super::{Brake, lost};
-use crate::remark::{BrakeReason, Refusal, Remark};
+use crate::remark::{BrakeReason, Refusal, Remark, Said};
 use crate::safety::{Guard, Outside, Trace};
+use queue::Queue;
 use shared_mem::msg::arm::{ArmState, MotionStatus};
 use shared_mem::msg::motion::{CHUNK_LENGTH, MotionChunk, MotionKind, SetPoint};
 use shared_mem::msg::{Joints, MAX_JOINTS};
+use silence::Silence;
 use stream::Stream;
 
-/// Set points that can wait: 4 s at 1 kHz.
-pub const QUEUE: usize = 4096;
 /// How far a motion's first set point may lie from the commanded position [rad].
 pub const START_TOLERANCE: f64 = 1e-6;
 
@@ -49,14 +55,15 @@ pub struct Player {
     outside: Outside,
     queue: Queue,
     stream: Stream,
+    silence: Silence,
     activity: Activity,
     status: MotionStatus,
     motion: u64,
     due_index: u32,
     has_last: bool,
     played: u32,
-    /// A motion whose further chunks are dropped without a word: it was refused or braked.
-    dropped_motion: u64,
+    /// Motions whose further chunks and targets are dropped without a word: they were refused or braked.
+    dropped: Said<u64>,
 }
 
 impl Player {
@@ -66,6 +73,7 @@ impl Player {
         Self {
             brake: Brake::new(guard.limits, guard.period_s),
             stream: Stream::new(&guard.limits, guard.period_s),
+            silence: Silence::over(guard.period_s),
             outside: guard.workspace.outside(&q_d),
             guard,
             trace: Trace::at_rest(q_d),
@@ -79,7 +87,7 @@ impl Player {
             due_index: 0,
             has_last: false,
             played: 0,
-            dropped_motion: 0,
+            dropped: Said::default(),
         }
     }
 
@@ -139,6 +147,7 @@ impl Player {
                 Err(why) => self.stop(BrakeReason::Chunk(why)),
             };
         }
+        self.silence.hear();
         if self.is_dropped(chunk.motion_id) {
             return None;
         }
@@ -151,7 +160,7 @@ impl Player {
                 Some(Remark::Began { motion: self.motion })
             }
             Err(why) => {
-                self.dropped_motion = chunk.motion_id;
+                self.dropped.note(chunk.motion_id);
                 if self.activity == Activity::Holding {
                     (self.motion, self.played, self.status) = (chunk.motion_id, 0, MotionStatus::Refused);
                 }
@@ -167,7 +176,7 @@ impl Player {
         if motion == 0 || motion == self.motion || self.is_dropped(motion) {
             return None;
         }
-        self.dropped_motion = motion;
+        self.dropped.note(motion);
         if self.activity == Activity::Holding {
             (self.motion, self.played, self.status) = (motion, 0, MotionStatus::Braked);
         }
@@ -176,11 +185,15 @@ impl Player {
 
     fn is_dropped(&self, motion: u64) -> bool {
         let braked = self.status == MotionStatus::Braked && motion == self.motion;
-        motion != 0 && (motion == self.dropped_motion || braked)
+        motion != 0 && (braked || self.dropped.has(&motion))
     }
 
     /// Brakes what is being played, or the way back to where the arm is held, of which nothing is told; nothing when it rests.
+    /// One that was asked for counts at rest, too: what is being sent does not begin after it.
     pub fn stop(&mut self, why: BrakeReason) -> Option<Remark> {
+        if why == BrakeReason::Asked {
+            self.silence.begin();
+        }
         let played = matches!(self.activity, Activity::Playing | Activity::Following);
         if self.is_at_rest() || self.activity == Activity::Braking {
             return None;
@@ -191,23 +204,28 @@ impl Player {
             return None;
         }
         self.queue.clear();
-        (self.status, self.dropped_motion) = (MotionStatus::Braked, self.motion);
+        self.status = MotionStatus::Braked;
+        self.dropped.note(self.motion);
         Some(Remark::Braked { motion: self.motion, why })
     }
 
-    /// The arm is no longer commanded: forgets what was queued and refuses what comes.
+    /// The arm is no longer commanded: forgets what was queued and refuses what comes. Who sends on meanwhile does not move the
+    /// arm when it is commanded again.
     pub fn halt(&mut self) -> Option<Remark> {
         let was_moving = !self.is_at_rest();
         self.queue.clear();
+        self.silence.begin();
         self.activity = Activity::Halted;
         was_moving.then(|| {
             self.status = MotionStatus::Braked;
+            self.dropped.note(self.motion);
             Remark::Braked { motion: self.motion, why: BrakeReason::ArmStopped }
         })
     }
 
     /// The set point of this cycle.
     pub fn advance(&mut self) -> (SetPoint, Option<Remark>) {
+        self.silence.step();
         self.before = self.trace;
         match self.activity {
             Activity::Holding if !self.ease.is_over() => (self.settle(), None),
@@ -311,8 +329,9 @@ impl Player {
 
     fn startable(&self, chunk: &MotionChunk) -> Result<(), Refusal> {
         match self.activity {
-            Activity::Holding => {}
             Activity::Halted => return Err(Refusal::NotCommanded),
+            _ if !self.silence.is_over() => return Err(Refusal::Stopped),
+            Activity::Holding => {}
             Activity::Playing | Activity::Following | Activity::Braking => {
                 return Err(Refusal::Busy { playing: self.motion });
             }
@@ -349,42 +368,5 @@ impl Player {
         }
         self.due_index += 1;
         self.has_last |= chunk.kind == MotionKind::Last;
-    }
-}
-
-/// First in, first out, in memory set aside once.
-#[derive(Debug)]
-struct Queue {
-    points: Box<[SetPoint]>,
-    head: usize,
-    len: usize,
-}
-
-impl Queue {
-    fn new() -> Self {
-        Self { points: vec![SetPoint::default(); QUEUE].into_boxed_slice(), head: 0, len: 0 }
-    }
-
-    fn push(&mut self, point: &SetPoint) {
-        if self.len < QUEUE
-            && let Some(slot) = self.points.get_mut((self.head + self.len) % QUEUE)
-        {
-            *slot = *point;
-            self.len += 1;
-        }
-    }
-
-    fn pop(&mut self) -> Option<SetPoint> {
-        if self.len == 0 {
-            return None;
-        }
-        let point = self.points.get(self.head).copied();
-        self.head = (self.head + 1) % QUEUE;
-        self.len -= 1;
-        point
-    }
-
-    fn clear(&mut self) {
-        (self.head, self.len) = (0, 0);
     }
 }

@@ -87,6 +87,8 @@ pub enum Refusal {
     NoId,
     /// The arm is not commanded: it stopped itself or is being let go.
     NotCommanded,
+    /// A stop was asked for, or the arm stopped itself, and since then senders have not been silent for long enough.
+    Stopped,
 }
 
 /// Why a motion is braked.
@@ -159,6 +161,10 @@ impl fmt::Display for Refusal {
             Self::NotFinite => f.write_str("a set point holds a number that is not finite"),
             Self::NoId => f.write_str("its id is 0; choose another"),
             Self::NotCommanded => f.write_str("the arm is not under command; see the fault before this"),
+            Self::Stopped => f.write_str(
+                "the arm was stopped, and nothing begins before nobody has sent targets or motions for 0.5 s; end what \
+                 sends, then ask again under a new id",
+            ),
         }
     }
 }

@@ -13,6 +13,9 @@ use zerocopy::{FromBytes, Immutable, IntoBytes};
 /// Set points in one [`MotionChunk`]: 50 ms at 1 kHz.
 pub const CHUNK_LENGTH: usize = 50;
 
+/// How long nobody may have sent a chunk or a target after a [`MotionKind::Stop`] before anything begins again [ns].
+pub const STOP_SILENCE_NS: u64 = 500_000_000;
+
 /// Desired state of one control cycle.
 #[derive(Debug, Clone, Copy, PartialEq, ZeroCopySend, FromBytes, IntoBytes, Immutable)]
 #[type_name("twinalign/SetPoint/1")]
@@ -101,7 +104,9 @@ pub enum MotionKind {
     /// The last chunk of its motion.
     Last = 1,
     /// Brake now, whatever is queued and whoever sent it: chunks that the bridge received before are dropped, and so is what
-    /// still comes of the motion that was braked. The set points do not count.
+    /// still comes of the motion that was braked. Nothing begins before nobody has sent chunks or targets for
+    /// [`STOP_SILENCE_NS`], also where nothing moved: who was sending at the stop has not asked since. The set points do
+    /// not count.
     Stop = 2,
     /// Clear the reflex that ended commanding and hold the arm where it stands; the set points do not count. Nothing
     /// happens unless the arm is in a reflex: a stop that a person pressed is a person's to release.

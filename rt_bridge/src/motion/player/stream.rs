@@ -63,6 +63,9 @@ impl Player {
     /// Takes in a target. Returns what there is to say about it: of many that are refused alike, only of the first.
     pub fn aim(&mut self, target: &Target) -> Option<Remark> {
         let goes_on = self.activity == Activity::Following && target.stream == self.motion;
+        if !goes_on {
+            self.silence.hear();
+        }
         if self.is_dropped(target.stream) {
             return None;
         }
@@ -92,6 +95,7 @@ impl Player {
         match self.activity {
             _ if stream == 0 => Err(Refusal::NoId),
             Activity::Halted => Err(Refusal::NotCommanded),
+            _ if !self.silence.is_over() => Err(Refusal::Stopped),
             Activity::Holding if self.ease.is_over() => Ok(()),
             _ => Err(Refusal::Busy { playing: self.motion }),
         }
