@@ -2,67 +2,21 @@
 //! second one is refused in one line. Each test has its own domain of shared memory.
 #![allow(missing_docs)]
 
-use rt_bridge::rt::process::ask_to_end;
+mod running;
+
+use running::{CELL, LONG, bridge, end, program, said, target, wait_for};
 use serde_json::Value;
 use shared_mem::msg::arm::{ArmState, MotionStatus};
 use shared_mem::msg::target::ArmTarget;
 use shared_mem::recording::{ClipMessages, Payload};
 use shared_mem::time::now_ns;
-use shared_mem::topics::{ARM_STATE, ARM_TARGET};
-use shared_mem::transport::{Node, Subscriber};
-use std::process::{Child, Command, Output, Stdio};
+use shared_mem::topics::{ARM_STATE, ARM_TARGET, GRIPPER};
+use shared_mem::transport::Node;
 use std::time::{Duration, Instant};
-
-const CELL: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../config/fr3_cell.toml");
-/// Longest wait for something that takes a second; only a fault uses it up.
-const LONG: Duration = Duration::from_secs(30);
-
-fn program(domain: &str, arguments: &[&str]) -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_rt_bridge"));
-    command
-        .env("TWINALIGN_DOMAIN", format!("{domain}{}", std::process::id()))
-        .args(arguments)
-        .stdin(Stdio::null())
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped());
-    command
-}
-
-fn bridge(domain: &str, further: &[&str]) -> Child {
-    let mut command = program(domain, &["run", "--cell", CELL, "--arm", "sim", "--camera", "off", "--gripper", "sim"]);
-    // It ends with this test, however that ends.
-    command.args(["--realtime", "ignore", "--json", "--parent", &std::process::id().to_string()]).args(further);
-    command.spawn().expect("the program starts")
-}
-
-fn target(domain: &str, arguments: &[&str]) -> Output {
-    let all: Vec<&str> = ["target"].iter().chain(arguments).copied().collect();
-    program(domain, &all).output().expect("the program runs")
-}
-
-fn said(output: &Output) -> String {
-    String::from_utf8_lossy(&output.stderr).into_owned()
-}
-
-fn wait_for(states: &Subscriber<ArmState>, wanted: impl Fn(&ArmState) -> bool) -> ArmState {
-    let begin = Instant::now();
-    while begin.elapsed() < LONG {
-        match states.newest().expect("shared memory") {
-            Some(state) if wanted(&state) => return state,
-            _ => std::thread::sleep(Duration::from_millis(2)),
-        }
-    }
-    panic!("not within half a minute");
-}
 
 /// The same, sent now.
 fn fresh(target: &ArmTarget) -> ArmTarget {
     ArmTarget { stamp_ns: now_ns(), ..*target }
-}
-
-fn end(bridge: Child) -> Output {
-    ask_to_end(bridge.id()).expect("it still runs");
-    bridge.wait_with_output().expect("it ends")
 }
 
 #[test]
@@ -78,10 +32,6 @@ fn joints_poses_and_fingers_get_where_they_are_sent() {
     assert!(up.status.success(), "{}", said(&up));
     let answer: Value = serde_json::from_slice(&up.stdout).expect("JSON");
     assert!(answer["off_m"].as_f64().expect("a number") < 1e-4, "{answer}");
-    let away = target("targets", &["pose", "1.4,0,0.4,0,1,0,0", "--cell", CELL]);
-    assert!(!away.status.success() && said(&away).contains("out of reach"), "{}", said(&away));
-    let wrong = target("targets", &["joints", "0,-0.6,0,1.2,0,1.6,0.785"]);
-    assert!(!wrong.status.success() && said(&wrong).contains("joint 4"), "{}", said(&wrong));
     let fingers = target("targets", &["fingers", "0.03", "--json"]);
     assert!(fingers.status.success(), "{}", said(&fingers));
     assert!(end(bridge).status.success());
@@ -138,4 +88,55 @@ fn a_sender_that_dies_has_the_arm_braked_and_a_second_one_is_refused() {
     let output = end(bridge);
     assert_eq!(said(&output).matches("refused").count(), 1, "{}", said(&output));
     assert!(said(&output).contains("no target came for 0.2 s"), "{}", said(&output));
+}
+
+/// 2 for 0.2, a minus too many, a zero too few.
+#[test]
+fn what_a_person_mistypes_is_said_before_anything_moves() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let with_gripper = folder.path().join("cell.toml");
+    let cell = std::fs::read_to_string(CELL).expect("a cell") + "\n[gripper]\nmodel = \"franka_hand\"\n";
+    std::fs::write(&with_gripper, cell).expect("a file");
+    let with_gripper = with_gripper.to_str().expect("a path");
+    let bridge = bridge("mistyped", &[]);
+    let node = Node::open_in(&format!("mistyped{}", std::process::id()), "a test").expect("shared memory");
+    let (states, fingers) = (node.subscriber(ARM_STATE).expect("a place"), node.subscriber(GRIPPER).expect("a place"));
+    wait_for(&states, |state| state.cycle > 10);
+    let apart = || {
+        let newest = (0..500).find_map(|_| {
+            std::thread::sleep(Duration::from_millis(10));
+            fingers.newest().expect("shared memory")
+        });
+        newest.expect("a gripper").width
+    };
+    let width = apart();
+    let stays = |arguments: &[&str], why: &str| {
+        let here = wait_for(&states, |_| true);
+        let output = target("mistyped", arguments);
+        assert!(output.status.code() == Some(1) && said(&output).contains(why), "{arguments:?}: {}", said(&output));
+        let later = wait_for(&states, |_| true);
+        assert_eq!((later.q_d, later.motion_id), (here.q_d, here.motion_id), "{arguments:?}");
+    };
+    for (arguments, why) in [
+        (&["pose", "2,0.1,0.4,0,1,0,0", "--cell", CELL][..], "out of reach"),
+        (&["pose", "1.4,0,0.4,0,1,0,0", "--cell", CELL], "out of reach"),
+        (&["pose", "0.307,0,-0.15,0,1,0,0", "--cell", CELL], "workspace"),
+        (&["shift", "0.9,0,0", "--cell", CELL], "out of reach"),
+        (&["shift", "0,0,-0.5", "--cell", CELL], "workspace"),
+        (&["joints", "0,-0.6,0,1.2,0,1.6,0.785"], "joint 4"),
+        (&["joints", "0,-0.6,0,1.2,0,1.6,0.785", "--cell", CELL], "nothing moved: at that goal joint 4"),
+        (&["joints", "0,1.6,0,-0.6,0,1.5,0.785"], "workspace"),
+        (&["joints", "0,1.6,0,-0.6,0,1.5,0.785", "--cell", CELL], "nothing moved: at that goal arm or tool"),
+        (&["joints", "0,-0.6,0,-2.2,0,1.6", "--cell", CELL], "7 joints and 6 positions"),
+        (&["fingers", "0.3", "--cell", with_gripper], "opens to 0.08 m"),
+    ] {
+        stays(arguments, why);
+    }
+    assert!((apart() - width).abs() < 1e-9);
+    // Here and there the arm is clear of the table, and on the way between it is not.
+    let here = target("mistyped", &["joints", "0,0.3,0,-2.4,0,1.2,0.785", "--speed", "1", "--cell", CELL]);
+    assert!(here.status.success(), "{}", said(&here));
+    stays(&["joints", "0,0.6,0,-2.4,0,4.3,0.785", "--cell", CELL], "nothing moved: on the way there arm or tool");
+    let output = end(bridge);
+    assert_eq!(said(&output).matches("began").count(), 1, "{}", said(&output));
 }
