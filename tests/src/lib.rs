@@ -7,6 +7,7 @@ mod bench;
 mod judge;
 pub mod modules;
 mod program;
+pub mod teleop;
 pub mod texts;
 
 pub use bench::{Cell, lab_cell};

@@ -23,6 +23,9 @@ Examples:
   twin teleop --task tasks/pick_carrot.toml
   twin teleop --task tasks/pick_carrot.toml --record carrot
   twin teleop --task tasks/push_milk.toml --record milk --seed 100 --bind 0.0.0.0 --port 8400
+  twin teleop --task tasks/push_milk.toml --bind 0.0.0.0 --name bench.lab.example
+
+Escape stops: the arm holds until an episode is started. Every page can stop, also one that watches.
 
 Ctrl-C ends it; an episode that is under way is discarded, and that is said.
 
@@ -46,6 +49,10 @@ pub(crate) struct Teleop {
     /// Address of this machine on which the page is; others than the loopback's let every machine that reaches it steer
     #[arg(long, value_name = "ADDRESS", default_value_t = IpAddr::V4(Ipv4Addr::LOCALHOST))]
     bind: IpAddr,
+    /// A name by which other machines open the page, beside this machine's own and its addresses; again for others. By other names
+    /// it is refused: a page of their owner would count as this one
+    #[arg(long = "name", value_name = "NAME", value_parser = host_name)]
+    names: Vec<String>,
     /// Port of the page; 0: any that is free
     #[arg(long, value_name = "PORT", default_value_t = 8380)]
     port: u16,
@@ -58,6 +65,15 @@ pub(crate) struct Teleop {
     /// Prints one JSON object on stdout at the end
     #[arg(long)]
     json: bool,
+}
+
+fn host_name(text: &str) -> Result<String, String> {
+    let is_name = |c: char| c.is_ascii_alphanumeric() || "-._".contains(c);
+    if !text.is_empty() && text.chars().all(is_name) {
+        Ok(text.to_owned())
+    } else {
+        Err("give a host's name without http:// and port, as bench.lab.example".to_owned())
+    }
 }
 
 impl Teleop {
@@ -83,9 +99,9 @@ impl Teleop {
                 ..ClipInfo::default()
             },
         };
-        let address = Address { ip: self.bind, port: self.port };
+        let address = Address { ip: self.bind, port: self.port, names: self.names };
         let camera = self.camera.as_deref();
-        let summary = serve(&task, camera, recording, address, &stop, |at| {
+        let summary = serve(&task, camera, recording, &address, &stop, |at| {
             console::line(format_args!("open http://{at}/ in a browser; Ctrl-C ends"));
         })?;
         if let Some(seed) = summary.cut_short {

@@ -11,6 +11,9 @@ pub(super) struct Input {
     /// A number that comes back with the first picture that this has had an effect on.
     #[serde(default)]
     pub(super) id: u64,
+    /// Has the arm hold until an episode is started; whatever else the message asks for is left out then.
+    #[serde(default)]
+    pub(super) stop: bool,
     /// Counts for 0.2 s.
     pub(super) jog: Option<JogEntry>,
     /// Opens or closes the gripper.
@@ -112,6 +115,8 @@ pub(super) struct State {
     /// Between the fingers [m].
     pub(super) width: Option<f64>,
     pub(super) grasped: bool,
+    /// Whether a stop was asked for, and nothing started since.
+    pub(super) stopped: bool,
     /// Why the arm does not go where it is jogged.
     pub(super) held_by: Option<&'static str>,
     pub(super) kept: u64,
@@ -141,6 +146,7 @@ mod tests {
         joints[1] = 1.0;
         assert_eq!(input.jog.map(|jog| jog.jog()), Some(Jog::Joints(joints)));
         assert_eq!((input.fingers, input.episode), (Some(FingersEntry::Close), Some(EpisodeEntry::Start)));
+        assert!(!input.stop && Input::read(r#"{"stop": true}"#).expect("one").stop);
         for wrong in
             ["", "jog", "{\"fly\": 1}", "{\"episode\": \"end\"}", "{\"jog\": {\"joints\": [0,0,0,0,0,0,0,0,0]}}", "[]"]
         {

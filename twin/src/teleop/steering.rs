@@ -1,6 +1,7 @@
 //! The thread that simulates, draws and records: one episode after the other, fifty pictures a second.
 
 use super::message::{EpisodeEntry, FingersEntry, Hello, Input, State, frame};
+use super::orders::{Awaited, MOST, Order, Orders};
 use crate::task::{Jog, SteerError, Steered, Task, TaskCamera, TaskView};
 use crate::world::STEP;
 use serde::Serialize;
@@ -10,13 +11,14 @@ use shared_mem::recording::{ClipInfo, Episode, RigidPose, WriteError, pack_quick
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::{Receiver, RecvTimeoutError};
 use std::time::{Duration, Instant};
 
 /// From one picture to the next.
 const PERIOD: Duration = Duration::from_millis(20);
 /// A jog that is not repeated counts for so long.
 const SILENCE: Duration = Duration::from_nanos(SILENCE_NS);
+/// A start that comes sooner after a stop was on its way before its sender saw that.
+const STANDS: Duration = Duration::from_millis(500);
 /// Seeds in a row whose bodies cannot be placed, before it is given up.
 const SEEDS: u64 = 100;
 
@@ -72,13 +74,6 @@ pub struct Summary {
     pub clips: Vec<PathBuf>,
 }
 
-/// What a page sent, or that the page that steers is gone.
-#[derive(Debug)]
-pub(super) enum Order {
-    Input(Input),
-    Gone,
-}
-
 /// The thread's memory.
 pub(super) struct Steering {
     task: Arc<Task>,
@@ -87,6 +82,8 @@ pub(super) struct Steering {
     recording: Recording,
     episode: Steered,
     open: bool,
+    /// When a stop was asked for last; none once something was started since.
+    stopped: Option<Instant>,
     jogged: Instant,
     newest: u64,
     summary: Summary,
@@ -110,7 +107,8 @@ impl Steering {
         let summary = Summary::default();
         let (task, size, said) = (Arc::clone(task), camera.size, "start an episode".to_owned());
         let jogged = Instant::now();
-        Ok(Self { task, view, size, recording, episode, open: false, jogged, newest: 0, summary, said })
+        let (open, stopped, newest) = (false, None, 0);
+        Ok(Self { task, view, size, recording, episode, open, stopped, jogged, newest, summary, said })
     }
 
     /// What a page is sent when it opens.
@@ -129,23 +127,30 @@ impl Steering {
     }
 
     /// Goes on until `stop`: takes in what pages sent, lets as much time pass as has passed, and shows a picture.
-    pub(super) fn run(mut self, orders: &Receiver<Order>, stop: &AtomicBool, mut show: impl FnMut(Vec<u8>)) -> Summary {
+    pub(super) fn run(mut self, orders: &Orders, stop: &AtomicBool, mut show: impl FnMut(Vec<u8>)) -> Summary {
         let mut next = Instant::now();
         while !stop.load(Ordering::Relaxed) {
             next += PERIOD;
-            loop {
-                match orders.recv_timeout(next.saturating_duration_since(Instant::now())) {
-                    Ok(order) => self.take(&order),
-                    Err(RecvTimeoutError::Timeout) => break,
-                    Err(RecvTimeoutError::Disconnected) => return self.ended(),
-                }
-            }
+            self.take_in(orders, next, stop);
             // A machine that is too slow shows slow motion, not leaps.
             next = next.max(Instant::now() - PERIOD);
             self.pass();
             show(self.picture());
         }
         self.ended()
+    }
+
+    /// Takes in what pages ask for until then, and no more than so many inputs and one end of an episode: pages that send as fast
+    /// as they can hold up neither the others nor the end. A stop is taken in at any time.
+    fn take_in(&mut self, orders: &Orders, until: Instant, stop: &AtomicBool) {
+        let (mut taken, mut awaited) = (0, Awaited::Any);
+        while !stop.load(Ordering::Relaxed) && (taken < MOST || Instant::now() < until) {
+            let Some(order) = orders.next(until, awaited) else { return };
+            taken += 1;
+            if self.take(&order) || taken >= MOST {
+                awaited = Awaited::Halts;
+            }
+        }
     }
 
     /// What came of it all: an episode that nobody ended is discarded.
@@ -157,12 +162,34 @@ impl Steering {
         self.summary
     }
 
-    fn take(&mut self, order: &Order) {
-        let Order::Input(input) = order else {
-            self.episode.jog(Jog::Still);
+    /// Does what is asked for; whether an episode came to its end by that.
+    fn take(&mut self, order: &Order) -> bool {
+        match order {
+            Order::Stop { id } => {
+                self.newest = self.newest.max(*id);
+                self.episode.jog(Jog::Still);
+                (self.stopped, self.said) = (Some(Instant::now()), "stopped: the arm holds; start goes on".to_owned());
+                false
+            }
+            Order::Gone => {
+                self.episode.jog(Jog::Still);
+                // The numbers of the next page are its own.
+                self.newest = 0;
+                false
+            }
+            Order::Input(input) => {
+                self.newest = self.newest.max(input.id);
+                self.steer(input);
+                input.episode.is_some_and(|wanted| self.turn(wanted))
+            }
+        }
+    }
+
+    /// Moves arm and fingers, unless a stop has them hold.
+    fn steer(&mut self, input: &Input) {
+        if self.stopped.is_some() {
             return;
-        };
-        self.newest = self.newest.max(input.id);
+        }
         if let Some(jog) = &input.jog {
             self.episode.jog(jog.jog());
             self.jogged = Instant::now();
@@ -172,18 +199,33 @@ impl Steering {
         {
             self.episode.fingers(fingers == FingersEntry::Open);
         }
-        match input.episode {
-            Some(EpisodeEntry::Start) if !self.open => {
-                (self.open, self.said) = (true, format!("episode {}", self.episode.seed()));
+    }
+
+    /// Begins an episode, goes on with it after a stop, or ends it; whether it came to its end.
+    fn turn(&mut self, wanted: EpisodeEntry) -> bool {
+        let seed = self.episode.seed();
+        match wanted {
+            EpisodeEntry::Start if self.stopped.is_some_and(|at| at.elapsed() < STANDS) => false,
+            EpisodeEntry::Start => {
+                if !self.open {
+                    self.said = format!("episode {seed}");
+                } else if self.stopped.is_some() {
+                    self.said = format!("episode {seed} goes on");
+                }
+                (self.open, self.stopped) = (true, None);
+                false
             }
-            Some(EpisodeEntry::Keep) if self.open => self.keep(),
-            Some(EpisodeEntry::Discard) if self.open => {
+            EpisodeEntry::Keep if self.open => {
+                self.keep();
+                true
+            }
+            EpisodeEntry::Discard if self.open => {
                 self.summary.discarded += 1;
-                let seed = self.episode.seed();
                 self.place(seed);
                 self.said = format!("episode {seed} discarded; start it again");
+                true
             }
-            _ => {}
+            EpisodeEntry::Keep | EpisodeEntry::Discard => false,
         }
     }
 
@@ -264,7 +306,10 @@ impl Steering {
             bodies: poses.iter().map(flat).collect(),
             width,
             grasped,
-            held_by: self.episode.held_by(),
+            stopped: self.stopped.is_some(),
+            held_by: self
+                .stopped
+                .map_or_else(|| self.episode.held_by(), |_| Some("a stop was asked for; start goes on")),
             kept: self.summary.kept,
             successes: self.summary.successes,
             discarded: self.summary.discarded,
