@@ -1,5 +1,6 @@
 //! A sweep of many small units, killed halfway: what is merged is what one process would have found, and no unit ran twice.
 
+use rustix::process::Signal;
 use serde_json::Value;
 use std::path::Path;
 use std::time::Duration;
@@ -116,4 +117,63 @@ fn units_that_fail_are_said_and_what_makes_no_sense_is_refused() {
     assert!(none.complaint().contains("units.jsonl"), "{}", none.stderr);
     let slurm = run(&cell, "sweep slurm {dir}/sweep --slices 4 --time 00:10:00").succeeded();
     assert!(slurm.stdout.starts_with("#!/bin/bash\n") && slurm.stdout.contains("--array=1-4"));
+    for (flag, value) in [("--time", "1;id"), ("--partition", "a\n#SBATCH --uid=0")] {
+        let arguments = ["sweep", "slurm", "{dir}/sweep", "--slices", "4", flag, value];
+        let refused = cell.start("calibration", &arguments).wait(Duration::from_secs(60));
+        assert!(refused.status.code() == Some(2) && refused.stderr.contains("give "), "{}", refused.stderr);
+    }
+}
+
+#[test]
+fn links_in_circles_are_planned_and_an_interruption_ends_hashing_at_once() {
+    let cell = Cell::shipped();
+    let session = cell.path("session");
+    std::fs::create_dir(&session).expect("room");
+    for name in ["a", "b"] {
+        std::os::unix::fs::symlink(".", session.join(name)).expect("a link");
+    }
+    std::fs::write(cell.path("commands.txt"), format!("check {} --seed {{seed}}", cell.text("session"))).expect("room");
+    let plan = |out: &str| {
+        let line = format!("sweep plan {{dir}}/commands.txt --each seed=0..2 --out {{dir}}/{out}");
+        cell.start("calibration", &line.split(' ').collect::<Vec<&str>>())
+    };
+    let _planned = plan("sweep").wait(Duration::from_secs(60)).succeeded();
+    // Hours of hashing, without any bytes on the disk.
+    let large = std::fs::File::create(session.join("clip_00.mcap")).and_then(|file| file.set_len(1 << 42));
+    large.expect("a sparse file");
+    for signal in [Signal::INT, Signal::TERM] {
+        let planning = plan("other");
+        let begun = || {
+            let mut names = std::fs::read_dir(cell.path("")).expect("the cell's folder").flatten();
+            names.any(|entry| entry.file_name().to_string_lossy().starts_with(".unfinished-other"))
+        };
+        Cell::until("it is at work", Duration::from_secs(60), begun);
+        let end = planning.end_by(signal);
+        assert!(end.complaint().contains("interrupted"), "{}", end.stderr);
+        assert!(!cell.path("other").exists() && !begun(), "nothing is left");
+    }
+}
+
+#[test]
+fn a_result_that_was_changed_is_not_merged() {
+    let cell = Cell::shipped();
+    std::fs::write(cell.path("task.toml"), TASK).expect("room");
+    let command = format!(
+        "evaluate --policies expert --tasks {} --seed {{seed}} --episodes 1 --out {{out}}",
+        cell.text("task.toml")
+    );
+    std::fs::write(cell.path("commands.txt"), command).expect("room");
+    let _planned = run(&cell, "sweep plan {dir}/commands.txt --each seed=0..2 --out {dir}/sweep").succeeded();
+    let _ran = run(&cell, "sweep local {dir}/sweep").succeeded();
+    let file = cell.path("sweep").join("results").join(&results(&cell.path("sweep"))[0].0);
+    let text = std::fs::read_to_string(&file).expect("a result");
+    let changed = text.replacen("\"success\":", "\"success\": ", 1);
+    assert_ne!(changed, text, "{text}");
+    std::fs::write(&file, changed).expect("room");
+    let refused = run(&cell, "sweep merge {dir}/sweep --out {dir}/merged");
+    let name = file.to_str().expect("UTF-8");
+    assert!(refused.complaint().contains(name) && refused.stderr.contains("was changed"), "{}", refused.stderr);
+    std::fs::remove_file(&file).expect("a result");
+    let _again = run(&cell, "sweep local {dir}/sweep").succeeded();
+    let _merged = run(&cell, "sweep merge {dir}/sweep --out {dir}/merged").succeeded();
 }

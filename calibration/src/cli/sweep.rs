@@ -3,7 +3,7 @@
 use super::print;
 use anyhow::Context as _;
 use calibration::interrupt::Interrupt;
-use calibration::sweep::{self, Each, Ran, Slice, Wanted};
+use calibration::sweep::{self, Each, Partition, Ran, Slice, TimeLimit, Wanted};
 use clap::{Args, Subcommand};
 use serde_json::json;
 use shared_mem::answer;
@@ -19,7 +19,7 @@ pub(super) enum Sweep {
     Run(RunArguments),
     /// Runs all units that have no result yet on the cores of this machine.
     Local(LocalArguments),
-    /// All results as one; refuses gaps and results of other questions.
+    /// All results as one; refuses gaps, results of other questions, and results that were changed.
     Merge(MergeArguments),
     /// Prints a script for Slurm, whose tasks run a slice each.
     Slurm(SlurmArguments),
@@ -31,7 +31,8 @@ COMMANDS holds commands of this program without its name, one a line. {NAME} in 
 folder of the unit's own. --json is added. A unit's result is the JSON object that it prints, and the tables and lists in {out}.
 
 Its hash is that of the command, of the program's build, and of all files and folders that the command names: when one of them changes, the
-sweep has to be planned again. With the line `benchmark --null 1 --seed {seed}`, or
+sweep has to be planned again. Files may have any size; a link counts as what it leads to, each folder once. With the line
+`benchmark --null 1 --seed {seed}`, or
 `evaluate --policies expert:noise={noise} --tasks tasks/push_milk.toml --seed {seed} --out {out}`:
 
 Examples:
@@ -134,28 +135,16 @@ pub(super) struct SlurmArguments {
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=4096))]
     cpus: u32,
     /// Time limit of each task, as Slurm takes it: HH:MM:SS.
-    #[arg(long, value_name = "TIME", default_value = "01:00:00", value_parser = slurm_time)]
-    time: String,
+    #[arg(long, value_name = "TIME", default_value = "01:00:00")]
+    time: TimeLimit,
     /// Partition [default: the cluster's].
-    #[arg(long, value_name = "NAME", value_parser = plain)]
-    partition: Option<String>,
-}
-
-/// Minutes, or what has colons and a day in it.
-fn slurm_time(text: &str) -> Result<String, String> {
-    let is_time = |c: char| c.is_ascii_digit() || c == ':' || c == '-';
-    let fits = text.chars().all(is_time) && text.starts_with(|c: char| c.is_ascii_digit());
-    if fits { Ok(text.to_owned()) } else { Err("give minutes, HH:MM:SS or DAYS-HH:MM:SS".to_owned()) }
-}
-
-fn plain(text: &str) -> Result<String, String> {
-    let fits = !text.is_empty() && text.chars().all(|c| c.is_ascii_alphanumeric() || "_-,".contains(c));
-    if fits { Ok(text.to_owned()) } else { Err("give letters, digits, _ and -".to_owned()) }
+    #[arg(long, value_name = "NAME")]
+    partition: Option<Partition>,
 }
 
 pub(super) fn run(verb: Sweep, interrupt: &Interrupt) -> anyhow::Result<()> {
     match verb {
-        Sweep::Plan(arguments) => plan(&arguments),
+        Sweep::Plan(arguments) => plan(&arguments, interrupt),
         Sweep::Run(RunArguments { sweep, slice, jobs, json }) => {
             work(&sweep, slice.unwrap_or(Slice::WHOLE), jobs as usize, json, interrupt)
         }
@@ -169,7 +158,7 @@ pub(super) fn run(verb: Sweep, interrupt: &Interrupt) -> anyhow::Result<()> {
             let absolute = sweep.canonicalize().with_context(|| sweep.display().to_string())?;
             let program = std::env::current_exe().context("this program's own path")?;
             let wanted = Wanted { slices, cpus, time, partition };
-            Ok(answer::bytes(sweep::script(&absolute, &program, &wanted).as_bytes())?)
+            Ok(answer::bytes(sweep::script(&absolute, &program, &wanted)?.as_bytes())?)
         }
     }
 }
@@ -178,11 +167,11 @@ fn cores() -> usize {
     std::thread::available_parallelism().map_or(1, usize::from)
 }
 
-fn plan(arguments: &PlanArguments) -> anyhow::Result<()> {
+fn plan(arguments: &PlanArguments, interrupt: &Interrupt) -> anyhow::Result<()> {
     let PlanArguments { commands, each, out, json } = arguments;
     let folder = OutputFolder::create(out)?;
     let text = input::text(commands, input::Kind::Configuration)?;
-    let units = sweep::plan(&sweep::commands(&text)?, each)?;
+    let units = sweep::plan(&sweep::commands(&text)?, each, interrupt)?;
     sweep::write(&units, folder)?;
     let words = format!("{} units in {}; `calibration sweep local` runs them here", units.len(), out.display());
     print(*json, &json!({ "out": out, "units": units.len() }), words)

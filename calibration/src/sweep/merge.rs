@@ -1,12 +1,11 @@
-//! All results as one: in the order of the units, without gaps, none of another question.
+//! All results as one: in the order of the units, without gaps, none of another question, none that was changed.
 
 use super::SweepError;
+use super::result::{Stored, result_of};
 use super::unit::Unit;
-use super::work::{Stored, result_of};
 use evaluation::findings::{Findings, findings};
 use evaluation::trial::{self, Trial};
 use serde_json::{Value, json};
-use shared_mem::input;
 use std::path::Path;
 
 /// What is merged.
@@ -25,7 +24,7 @@ pub struct Merged {
 /// Merges the results of a sweep.
 ///
 /// # Errors
-/// [`SweepError`] for gaps, with how many and how to fill them, and for a result of another question.
+/// [`SweepError`] for gaps, with how many and how to fill them, for a result of another question, and for one that was changed.
 pub fn merge(sweep: &Path, units: &[Unit]) -> Result<Merged, SweepError> {
     let missing: Vec<usize> =
         units.iter().filter(|unit| !result_of(sweep, unit).exists()).map(|unit| unit.unit).collect();
@@ -40,20 +39,13 @@ pub fn merge(sweep: &Path, units: &[Unit]) -> Result<Merged, SweepError> {
     let (mut answers, mut trials, mut seconds) = (String::new(), Vec::new(), 0.0);
     let mut are_evaluations = true;
     for unit in units {
-        let file = result_of(sweep, unit);
-        let text = input::text(&file, input::Kind::List)?;
-        let content = |what: &str| SweepError::Content { file: file.clone(), what: what.to_owned() };
-        let stored: Stored =
-            serde_json::from_str(&text).map_err(|_| content("it is no result; remove it and run its unit again"))?;
-        if stored.hash != unit.hash || stored.command != unit.command {
-            return Err(content("it is the result of another question; remove it and run its unit again"));
-        }
+        let stored = Stored::read(sweep, unit)?;
         let line = json!({ "unit": unit.unit, "seed": unit.seed, "command": unit.command, "answer": stored.answer });
         answers += &line.to_string();
         answers.push('\n');
         seconds += stored.seconds;
         match (stored.files.get("trials.csv"), are_evaluations) {
-            (Some(table), true) => trials.extend(trial::parse(table, &file)?),
+            (Some(table), true) => trials.extend(trial::parse(table, &result_of(sweep, unit))?),
             _ => are_evaluations = false,
         }
     }

@@ -8,21 +8,25 @@
 //!
 //! | file | owns |
 //! |---|---|
-//! | `unit` | a unit: command, values, hash |
+//! | `unit` | a unit: command, values, hash; slices of units |
+//! | `inputs` | what commands name, as a hash |
 //! | `plan` | units out of commands with placeholders |
 //! | `work` | running units, a result each |
+//! | `result` | the file of a result, with a checksum |
 //! | `merge` | all results as one |
 //! | `slurm` | a script for Slurm |
 
+mod inputs;
 mod merge;
 mod plan;
+mod result;
 mod slurm;
 mod unit;
 mod work;
 
 pub use merge::{Merged, merge};
 pub use plan::{Each, commands, plan, write};
-pub use slurm::{Wanted, script};
+pub use slurm::{Partition, TimeLimit, Wanted, script};
 pub use unit::{Slice, Unit, read};
 pub use work::{Ran, Runner, process, run};
 
@@ -53,6 +57,9 @@ pub enum SweepError {
     /// What is asked for is none.
     #[error("{0}")]
     Asked(String),
+    /// The end was asked for.
+    #[error("interrupted; nothing was written, and the same command starts again")]
+    Interrupted,
     /// Units failed.
     #[error("{failed} of {units} units failed, the first, {number}: {why}; mend it and start the same command again")]
     Failed {

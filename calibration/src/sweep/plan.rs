@@ -1,7 +1,9 @@
 //! Units out of commands with placeholders: one for each combination of their values.
 
 use super::SweepError;
-use super::unit::{Inputs, OUT, UNITS, Unit};
+use super::inputs::Inputs;
+use super::unit::{OUT, UNITS, Unit};
+use crate::interrupt::Interrupt;
 use shared_mem::output::OutputFolder;
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -93,8 +95,9 @@ pub fn commands(text: &str) -> Result<Vec<Vec<String>>, SweepError> {
 /// A unit for each command and each combination of the values of its placeholders, the last one's fastest.
 ///
 /// # Errors
-/// [`SweepError::Asked`] for a placeholder that has no values, or values without a placeholder.
-pub fn plan(commands: &[Vec<String>], each: &[Each]) -> Result<Vec<Unit>, SweepError> {
+/// [`SweepError::Asked`] for a placeholder that has no values, or values without a placeholder; for what a command names and cannot be
+/// read; [`SweepError::Interrupted`].
+pub fn plan(commands: &[Vec<String>], each: &[Each], interrupt: &Interrupt) -> Result<Vec<Unit>, SweepError> {
     let asked = |what: String| Err(SweepError::Asked(what));
     let uses = |command: &[String], each: &Each| command.iter().any(|word| word.contains(&each.mark()));
     if let Some(unused) = each.iter().find(|each| !commands.iter().any(|command| uses(command, each))) {
@@ -117,7 +120,7 @@ pub fn plan(commands: &[Vec<String>], each: &[Each]) -> Result<Vec<Unit>, SweepE
             if let Some(word) = words.iter().find(|word| word.replace(OUT, "").contains('{')) {
                 return asked(format!("`{word}` has a placeholder without values; give --each NAME=VALUES"));
             }
-            let hash = inputs.hash(&words)?;
+            let hash = inputs.hash(&words, interrupt)?;
             if !hashes.insert(hash.clone()) {
                 return asked(format!("two units are the same: {}; give each value once", words.join(" ")));
             }
@@ -170,7 +173,7 @@ mod tests {
     }
 
     fn planned(text: &str, values: &[&str]) -> Result<Vec<Unit>, SweepError> {
-        plan(&commands(text)?, &values.iter().map(|text| each(text)).collect::<Vec<_>>())
+        plan(&commands(text)?, &values.iter().map(|text| each(text)).collect::<Vec<_>>(), &Interrupt::default())
     }
 
     #[test]

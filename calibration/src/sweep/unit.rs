@@ -1,12 +1,9 @@
-//! A unit: a command line of this program, and what its result depends on as one number.
+//! A unit: a command line of this program, its place in the sweep, and the slices that units are parted into.
 
 use super::SweepError;
 use serde::{Deserialize, Serialize};
-use sha2::{Digest as _, Sha256};
-use shared_mem::command_line;
 use shared_mem::input;
-use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::str::FromStr;
 
 /// A word of a command that stands for a folder of the unit's own.
@@ -78,65 +75,6 @@ pub fn read(sweep: &Path) -> Result<Vec<Unit>, SweepError> {
     if units.is_empty() { Err(content("it holds no units; plan the sweep again".to_owned())) } else { Ok(units) }
 }
 
-/// Hashes of the files and folders that commands name; each is read once.
-#[derive(Debug, Default)]
-pub(super) struct Inputs(BTreeMap<String, Option<String>>);
-
-impl Inputs {
-    /// The hash of a command.
-    pub(super) fn hash(&mut self, command: &[String]) -> Result<String, SweepError> {
-        let mut hasher = Sha256::new();
-        hasher.update(command_line::fingerprint());
-        for word in command {
-            hasher.update((word.len() as u64).to_le_bytes());
-            hasher.update(word);
-            // Worlds of an evaluation stand in one word.
-            for part in word.split([',', '=']) {
-                if let Some(content) = self.content(part)? {
-                    hasher.update(content);
-                }
-            }
-        }
-        Ok(hex(&hasher.finalize()))
-    }
-
-    /// The hash of a file or folder; `None` where a word names none.
-    fn content(&mut self, word: &str) -> Result<Option<String>, SweepError> {
-        if let Some(known) = self.0.get(word) {
-            return Ok(known.clone());
-        }
-        let path = Path::new(word);
-        let found = if word.is_empty() || !path.exists() { None } else { Some(tree(path)?) };
-        self.0.insert(word.to_owned(), found.clone());
-        Ok(found)
-    }
-}
-
-/// The hash of a file, or of all files of a folder with their names.
-fn tree(path: &Path) -> Result<String, SweepError> {
-    let mut hasher = Sha256::new();
-    if path.is_dir() {
-        let unreadable = |error: std::io::Error| SweepError::Content {
-            file: path.to_owned(),
-            what: format!("the folder cannot be read ({error}); see that it may be"),
-        };
-        let entries = std::fs::read_dir(path).map_err(unreadable)?;
-        let mut inside: Vec<PathBuf> = entries.flatten().map(|entry| entry.path()).collect();
-        inside.sort();
-        for entry in inside {
-            hasher.update(entry.file_name().unwrap_or_default().as_encoded_bytes());
-            hasher.update(tree(&entry)?);
-        }
-    } else if path.is_file() {
-        hasher.update(input::bytes(path, input::Kind::Splats)?);
-    }
-    Ok(hex(&hasher.finalize()))
-}
-
-fn hex(bytes: &[u8]) -> String {
-    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -153,22 +91,5 @@ mod tests {
         for wrong in ["0/3", "4/3", "1", "a/b", "1/0", ""] {
             assert!(wrong.parse::<Slice>().is_err(), "{wrong}");
         }
-    }
-
-    #[test]
-    fn a_hash_is_that_of_the_command_and_of_what_it_names() {
-        let folder = tempfile::tempdir().expect("a folder");
-        let file = folder.path().join("task.toml");
-        std::fs::write(&file, "one").expect("room");
-        let command = |word: &str| vec!["evaluate".to_owned(), word.to_owned()];
-        let of = |word: &str| Inputs::default().hash(&command(word)).expect("a hash");
-        let (named, listed) = (file.display().to_string(), format!("twin,{}", file.display()));
-        let (before, in_list, of_folder) = (of(&named), of(&listed), of(&folder.path().display().to_string()));
-        assert_eq!(before, of(&named));
-        std::fs::write(&file, "two").expect("room");
-        assert!(
-            before != of(&named) && in_list != of(&listed) && of_folder != of(&folder.path().display().to_string())
-        );
-        assert_ne!(of("ab"), Inputs::default().hash(&["evaluatea".to_owned(), "b".to_owned()]).expect("a hash"));
     }
 }

@@ -1,37 +1,26 @@
 //! Runs units: those without a result, each into one result file that is there whole or not at all.
 
 use super::SweepError;
-use super::unit::{Inputs, OUT, Slice, Unit};
+use super::inputs::Inputs;
+use super::result::{Stored, result_of};
+use super::unit::{OUT, Slice, Unit};
 use crate::interrupt::Interrupt;
 use crate::processes::Running;
 use rayon::prelude::*;
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 use serde_json::Value;
 use shared_mem::input;
 use shared_mem::output::Destination;
 use shared_mem::progress::Progress;
 use std::collections::BTreeMap;
 use std::ffi::OsString;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
 /// A unit may take a month.
 const PATIENCE: Duration = Duration::from_secs(30 * 24 * 3600);
-
-/// The result of a unit.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub(super) struct Stored {
-    pub(super) hash: String,
-    pub(super) command: Vec<String>,
-    /// How long it took [s]; no part of what is merged.
-    pub(super) seconds: f64,
-    /// The JSON object that it printed.
-    pub(super) answer: Value,
-    /// Tables and lists that it wrote to its own folder, by name.
-    pub(super) files: BTreeMap<String, String>,
-}
 
 /// What was run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -58,10 +47,6 @@ pub fn process(command: &[OsString], threads: usize, interrupt: &Interrupt) -> R
         Ok(answer) => Ok(Some(answer)),
         Err(error) => Err(error.to_string()),
     }
-}
-
-pub(super) fn result_of(sweep: &Path, unit: &Unit) -> PathBuf {
-    sweep.join("results").join(format!("{}.json", unit.hash))
 }
 
 /// Runs the units of a slice that have no result yet, `jobs` at once; units that fail are said at the end.
@@ -113,7 +98,11 @@ fn one(
     runner: &Runner<'_>,
     interrupt: &Interrupt,
 ) -> Result<Result<bool, String>, SweepError> {
-    let hash = inputs.lock().unwrap_or_else(std::sync::PoisonError::into_inner).hash(&unit.command)?;
+    let hash = inputs.lock().unwrap_or_else(std::sync::PoisonError::into_inner).hash(&unit.command, interrupt);
+    let hash = match hash {
+        Err(SweepError::Interrupted) => return Ok(Ok(false)),
+        hash => hash?,
+    };
     if hash != unit.hash {
         return Ok(Err(
             "a file that it names, or this program, is another one than when it was planned; plan the sweep again"
@@ -145,7 +134,7 @@ fn one(
     let seconds = began.elapsed().as_secs_f64();
     let files = files(&folder)?;
     let stored = Stored { hash, command: unit.command.clone(), seconds, answer, files };
-    place.write(serde_json::to_vec(&stored).unwrap_or_default())?;
+    place.write(stored.text())?;
     Ok(Ok(true))
 }
 
