@@ -2,85 +2,30 @@
 //! for; the same command finds it again and ends, bit by bit, where it would have ended without the interruption.
 //!
 //! The file is written whole, now and then and when the work is interrupted. It belongs to one question: other clips,
-//! settings or another build of the program have a [`Fingerprint`] of their own and begin anew.
+//! settings or another build of the program have a [`Fingerprint`] of their own and begin anew. How a session is spelt, and where it
+//! lies, is no part of the question. At the file's end stands a checksum of all that is before it: what a damaged disk or a hand has
+//! changed is not gone on from.
 
+mod fingerprint;
 pub mod numbers;
+
+pub use fingerprint::Fingerprint;
 
 use crate::interrupt::Interrupt;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
-use shared_mem::command_line;
+use sha2::{Digest as _, Sha256};
+use shared_mem::console;
 use shared_mem::input;
 use shared_mem::output::{self, OutputError};
-use shared_mem::recording::Clip;
 use shared_mem::typed;
 use std::collections::BTreeMap;
-use std::hash::{DefaultHasher, Hash, Hasher as _};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, LazyLock, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 /// A kill that nobody can listen to loses no more work than this.
 const SAVED_EVERY: Duration = Duration::from_secs(30);
-
-/// What a question is made of, as one number.
-#[derive(Debug, Clone)]
-pub struct Fingerprint(DefaultHasher);
-
-impl Fingerprint {
-    /// Of a command, in this build of the program.
-    #[must_use]
-    pub fn of(command: &str) -> Self {
-        Self::in_build(command, command_line::fingerprint())
-    }
-
-    fn in_build(command: &str, build: &str) -> Self {
-        let mut hasher = DefaultHasher::new();
-        (command, env!("CARGO_PKG_VERSION"), build).hash(&mut hasher);
-        Self(hasher)
-    }
-
-    /// With a setting.
-    #[must_use]
-    pub fn with(mut self, setting: &impl Hash) -> Self {
-        setting.hash(&mut self.0);
-        self
-    }
-
-    /// With numbers, to the last bit.
-    #[must_use]
-    pub fn with_numbers<'a>(mut self, numbers: impl IntoIterator<Item = &'a f64>) -> Self {
-        let mut count = 0_usize;
-        for number in numbers {
-            self.0.write_u64(number.to_bits());
-            count += 1;
-        }
-        self.0.write_usize(count);
-        self
-    }
-
-    /// With the rows of clips, to the last bit.
-    #[must_use]
-    pub fn with_clips<'a>(self, clips: impl IntoIterator<Item = &'a Clip>) -> Self {
-        clips.into_iter().fold(self, |print, clip| {
-            let print = print.with(&(&clip.file, clip.torques_end_at_rows, format!("{:?}", clip.kind)));
-            let print = [&clip.measured, &clip.desired].into_iter().fold(print, |print, series| {
-                print.with(&series.stamps_ns).with_numbers(series.q.iter().chain(&series.dq).chain(&series.tau))
-            });
-            let poses = clip.object.poses.iter().flat_map(|pose| {
-                let ([x, y, z], [w, i, j, k]) = (pose.position(), pose.wxyz());
-                [x, y, z, w, i, j, k]
-            });
-            print.with(&clip.object.stamps_ns).with_numbers(&poses.collect::<Vec<f64>>())
-        })
-    }
-
-    /// The number.
-    #[must_use]
-    pub fn number(&self) -> u64 {
-        self.0.finish()
-    }
-}
 
 /// Results of steps, and the file in which they outlive the program.
 #[derive(Debug, Default)]
@@ -109,6 +54,37 @@ struct Stored {
     by_step: BTreeMap<u64, Vec<u8>>,
 }
 
+/// Bytes of the checksum at a file's end.
+const CHECKSUM: usize = 32;
+
+impl Stored {
+    fn bytes(&self) -> Vec<u8> {
+        let mut bytes = postcard::to_allocvec(self).unwrap_or_default();
+        let checksum = Sha256::digest(&bytes);
+        bytes.extend_from_slice(&checksum);
+        bytes
+    }
+
+    /// `None` where this is not what was written.
+    fn read(bytes: &[u8]) -> Option<Self> {
+        let (content, checksum) = bytes.split_at_checked(bytes.len().checked_sub(CHECKSUM)?)?;
+        let is_whole = Sha256::digest(content).as_slice() == checksum;
+        postcard::from_bytes(content).ok().filter(|_| is_whole)
+    }
+
+    /// What a file holds of a question. One that is damaged is said to be.
+    fn of(question: u64, file: &Path) -> Option<Self> {
+        // None is there before anything is kept.
+        let bytes = input::bytes(file, input::Kind::Array).ok()?;
+        let stored = Self::read(&bytes);
+        if stored.is_none() {
+            let file = file.display();
+            console::line(format_args!("{file} is damaged: its checksum is another one; the work starts anew"));
+        }
+        stored.filter(|stored| stored.question == question)
+    }
+}
+
 impl Kept {
     /// Nothing is kept.
     #[must_use]
@@ -122,10 +98,7 @@ impl Kept {
     #[must_use]
     pub fn in_file(file: Option<PathBuf>, question: &Fingerprint, interrupt: &Interrupt) -> Self {
         let question = question.number();
-        let stored = file.as_deref().and_then(|file| {
-            let bytes = input::bytes(file, input::Kind::Array).ok()?;
-            postcard::from_bytes::<Stored>(&bytes).ok().filter(|stored| stored.question == question)
-        });
+        let stored = file.as_deref().and_then(|file| Stored::of(question, file));
         let by_step = stored.map(|stored| stored.by_step).unwrap_or_default();
         let results = Mutex::new(Results { by_step, ..Results::default() });
         Self { file, question, interrupt: interrupt.clone(), results }
@@ -208,7 +181,7 @@ impl Kept {
     fn save_these(&self, results: &mut Results) {
         let Some(file) = &self.file else { return };
         let stored = Stored { question: self.question, by_step: std::mem::take(&mut results.by_step) };
-        let bytes = postcard::to_allocvec(&stored).unwrap_or_default();
+        let bytes = stored.bytes();
         results.by_step = stored.by_step;
         results.unsaved_since = None;
         results.failed = output::write(file, bytes).err();
@@ -320,11 +293,18 @@ mod tests {
         let again = Kept::in_file(Some(file.clone()), &Fingerprint::of("one"), &Interrupt::default());
         assert_eq!((cut, again.known::<i32>(&step(1)), again.known::<i32>(&step(2))), (0, Some(7), None));
         let bytes = std::fs::read(&file).expect("the state");
-        for cut in 0..bytes.len() {
-            std::fs::write(&file, &bytes[..cut]).expect("room");
-            let damaged = Kept::in_file(Some(file.clone()), &Fingerprint::of("one"), &Interrupt::default());
-            assert!(!damaged.holds_something());
+        let holds_something = |damaged: &[u8]| {
+            std::fs::write(&file, damaged).expect("room");
+            Kept::in_file(Some(file.clone()), &Fingerprint::of("one"), &Interrupt::default()).holds_something()
+        };
+        assert!((0..bytes.len()).all(|cut| !holds_something(&bytes[..cut])));
+        for (place, bit) in (0..bytes.len()).flat_map(|place| (0..8).map(move |bit| (place, bit))) {
+            let mut damaged = bytes.clone();
+            damaged[place] ^= 1 << bit;
+            assert!(!holds_something(&damaged), "bit {bit} of byte {place}");
         }
+        let longer = [&bytes[..], &[0]].concat();
+        assert!(!holds_something(&longer) && holds_something(&bytes));
     }
 
     #[test]

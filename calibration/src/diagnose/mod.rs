@@ -161,7 +161,8 @@ pub fn diagnose_kept(
     let admitted = admitted.in_parts();
     let session = &Session { cell, ..session.clone() };
     let question = Fingerprint::of("diagnose")
-        .with(&(session.cell.to_toml(), options.theta.as_ref().map(Theta::to_toml), options.seed, options.torques))
+        .with(&(options.theta.as_ref().map(Theta::to_toml), options.seed, options.torques))
+        .with_cell(&session.cell)
         .with(&options.engine.as_ref().map(|engine| engine.ability().print()))
         .with_clips(&admitted.clips);
     let kept = kept::for_work((options.out.as_deref(), &session.folder, "diagnose"), &question, interrupt);

@@ -87,9 +87,10 @@ pub fn compare_kept(
         None => sessions,
     };
     let pair = pair::pair(sessions)?;
-    let cells = sessions.map(|session| session.cell.to_toml());
     let question = Fingerprint::of("diagnose against")
-        .with(&(cells, options.theta.as_ref().map(Theta::to_toml), options.seed, options.torques, pair.first_of_b))
+        .with(&(options.theta.as_ref().map(Theta::to_toml), options.seed, options.torques, pair.first_of_b))
+        .with_cell(&sessions[0].cell)
+        .with_cell(&sessions[1].cell)
         .with_clips(&pair.admitted.clips);
     let kept = kept::for_work((options.out.as_deref(), &sessions[1].folder, "against"), &question, interrupt);
     let found = compared(sessions, &pair, options, (interrupt, (&kept, "")));

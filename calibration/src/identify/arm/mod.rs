@@ -147,7 +147,8 @@ fn identify_material(material: Material, options: &Options, interrupt: &Interrup
     let given = options.parameters.as_deref().map(Theta::read).transpose()?;
     let question = Fingerprint::of("identify arm")
         .with(&(options.optimizer.name(), options.budget, options.seed, &options.also))
-        .with(&(material.cell.to_toml(), given.as_ref().map(Theta::to_toml)))
+        .with(&given.as_ref().map(Theta::to_toml))
+        .with_cell(&material.cell)
         .with(&options.engine.as_ref().map(|engine| engine.ability().print()))
         .with_clips(&material.clips);
     let kept = kept::for_work((options.out.as_deref(), &options.session, "identify_arm"), &question, interrupt);

@@ -153,7 +153,8 @@ pub fn identify(options: &Options, interrupt: &Interrupt) -> Result<Identificati
     }
     let question = Fingerprint::of("identify object")
         .with(&(options.optimizer.name(), options.budget, options.seed))
-        .with(&(material.cell.to_toml(), parameters.map(|theta| theta.to_toml())))
+        .with(&parameters.map(|theta| theta.to_toml()))
+        .with_cell(&material.cell)
         .with(&engine.map(|engine| engine.ability().print()))
         .with_clips(material.usable.iter().map(|usable| &usable.clip));
     let kept = kept::for_work((options.out.as_deref(), &options.session, "identify_object"), &question, interrupt);
