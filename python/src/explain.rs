@@ -1,14 +1,14 @@
 //! Identification, diagnosis, and the list of effects. Answers are those of `--json`, as text; the Python side reads them.
 
 use crate::failed;
-use calibration::check::gate;
+use calibration::check::gate::{self, Allowed};
 use calibration::diagnose::{Options, diagnose as diagnosed};
 use calibration::engine::{Call, Engine};
 use calibration::identify::{Identification, Optimizer, arm, object};
 use calibration::interrupt::Interrupt;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-use shared_mem::recording::Session;
+use shared_mem::recording::{Provenance, Session};
 use shared_mem::theta::Theta;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -61,7 +61,7 @@ fn engine(
 
 /// What a session says about its cell; the JSON of `calibration diagnose --json`.
 #[pyfunction]
-#[pyo3(signature = (session, *, cell, object, theta, seed, torques, budget, engine_command, engine_limit, as_recorded))]
+#[pyo3(signature = (session, *, cell, object, theta, seed, torques, budget, engine_command, engine_limit, as_recorded, mix))]
 #[allow(clippy::too_many_arguments)] // the command's options, of which Python's side has names and defaults
 pub(crate) fn diagnose(
     py: Python<'_>,
@@ -75,6 +75,7 @@ pub(crate) fn diagnose(
     engine_command: Option<String>,
     engine_limit: f64,
     as_recorded: bool,
+    mix: bool,
 ) -> PyResult<String> {
     let theta = theta.map(|text| serde_json::from_str::<Theta>(&text)).transpose();
     let theta = theta.map_err(|error| PyValueError::new_err(format!("parameters: {error}")))?;
@@ -82,12 +83,12 @@ pub(crate) fn diagnose(
         let mut session = Session::open_with(&session, cell.as_deref())?;
         session.about(object.as_deref())?;
         let theta = theta.map(|theta| theta.about(&session.cell));
-        let odd = gate::look(&session, as_recorded)?;
+        let looked = gate::look(&session, Allowed { as_recorded, mix })?;
         let engine = engine(engine_command, engine_limit, &session, interrupt)?;
         let budget = budget.map(Duration::try_from_secs_f64).transpose()?;
         let options = Options { theta, seed, torques, budget, engine, ..Options::default() };
         let mut found = diagnosed(&session, &options, interrupt)?;
-        gate::add(&mut found.warnings, odd.as_ref());
+        gate::add(&mut found.warnings, &looked);
         Ok(serde_json::to_string(&found)?)
     })
 }
@@ -101,7 +102,7 @@ fn optimizer(name: &str) -> PyResult<Optimizer> {
 
 /// Stiffness and damping of every joint; the JSON of `calibration identify arm --json`.
 #[pyfunction]
-#[pyo3(signature = (session, *, cell, parameters, also, optimizer, budget, seed, out, engine_command, engine_limit))]
+#[pyo3(signature = (session, *, cell, parameters, also, optimizer, budget, seed, out, engine_command, engine_limit, mix))]
 #[allow(clippy::too_many_arguments)] // as above
 pub(crate) fn identify_arm(
     py: Python<'_>,
@@ -115,19 +116,22 @@ pub(crate) fn identify_arm(
     out: Option<PathBuf>,
     engine_command: Option<String>,
     engine_limit: f64,
+    mix: bool,
 ) -> PyResult<String> {
     let optimizer = self::optimizer(optimizer)?;
     interruptible(py, |interrupt| {
         let opened = Session::open_with(&session, cell.as_deref())?;
+        let provenance = Provenance::of(&opened);
+        gate::unmixed(&provenance, mix)?;
         let engine = engine(engine_command, engine_limit, &opened, interrupt)?;
         let options = arm::Options { session, cell, optimizer, out, parameters, also, budget, seed, engine };
-        text(&arm::identify(&options, interrupt)?)
+        text(arm::identify(&options, interrupt)?, &provenance)
     })
 }
 
 /// Friction, mass, centre of mass and tip friction; the JSON of `calibration identify object --json`.
 #[pyfunction]
-#[pyo3(signature = (session, *, cell, object, parameters, optimizer, budget, seed, out, engine_command, engine_limit))]
+#[pyo3(signature = (session, *, cell, object, parameters, optimizer, budget, seed, out, engine_command, engine_limit, mix))]
 #[allow(clippy::too_many_arguments)] // as above
 pub(crate) fn identify_object(
     py: Python<'_>,
@@ -141,18 +145,22 @@ pub(crate) fn identify_object(
     out: Option<PathBuf>,
     engine_command: Option<String>,
     engine_limit: f64,
+    mix: bool,
 ) -> PyResult<String> {
     let optimizer = self::optimizer(optimizer)?;
     interruptible(py, |interrupt| {
         let opened = Session::open_with(&session, cell.as_deref())?;
+        let provenance = Provenance::of(&opened);
+        gate::unmixed(&provenance, mix)?;
         let engine = engine(engine_command, engine_limit, &opened, interrupt)?;
         let options = object::Options { session, cell, object, optimizer, out, parameters, budget, seed, engine };
-        text(&object::identify(&options, interrupt)?)
+        text(object::identify(&options, interrupt)?, &provenance)
     })
 }
 
-fn text(found: &Identification) -> anyhow::Result<String> {
-    Ok(serde_json::to_string(found)?)
+fn text(mut found: Identification, provenance: &Provenance) -> anyhow::Result<String> {
+    found.origin = provenance.to_string();
+    Ok(serde_json::to_string(&found)?)
 }
 
 /// Every effect that a cell may have, as JSON.

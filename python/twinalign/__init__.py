@@ -29,7 +29,7 @@ def _text(parameters):
 
 
 def diagnose(session, *, cell=None, object=None, parameters=None, seed=0, torques=False, budget=None, engine=None, engine_limit=60.0,
-             as_recorded=False):
+             as_recorded=False, mix=False):
     """Where the twin differs from the cell, which effect causes it, and how far the gap shrinks with it.
 
     The answer is the JSON object of `calibration diagnose --json`: `verdict`, `gap`, `where`, `candidates`, `theta`, ...
@@ -38,29 +38,30 @@ def diagnose(session, *, cell=None, object=None, parameters=None, seed=0, torque
     the one that moves. parameters: what is known already, a path of a theta.toml or a dict of its content. seed: draws the split of the clips and the intervals. torques: explains measured torques
     along the measured motion. budget: after so many seconds the best answer so far counts. engine: command of another simulator
     (docs/engine.md), engine_limit: seconds it may take for one roll-out. as_recorded: takes data that cannot mean what they say.
+    mix: takes clips of several cells together (two robots, or a robot and the simulation).
     """
     return _json.loads(_twinalign.diagnose(
         _os.fspath(session), cell=_text(cell), object=object, theta=_theta(parameters), seed=seed, torques=torques, budget=budget,
-        engine_command=engine, engine_limit=engine_limit, as_recorded=as_recorded))
+        engine_command=engine, engine_limit=engine_limit, as_recorded=as_recorded, mix=mix))
 
 
 def identify_arm(session, *, cell=None, parameters=None, also=(), optimizer="least-squares", budget=4000, seed=0, out=None,
-                 engine=None, engine_limit=60.0):
+                 engine=None, engine_limit=60.0, mix=False):
     """Stiffness [N m/rad] and damping [N m s/rad] of every joint, and the parameters of the effects in `also`, with 95 % intervals.
 
     The answer is the JSON object of `calibration identify arm --json`: `parameters`, `not_identifiable`, `gap`, ...
 
     session: path of a session folder or of a clip beside a cell.toml. parameters: path of a theta.toml that is known already.
     optimizer: least-squares, pso or cma; the last two try `budget` points. out: path of the theta.toml that is written.
-    engine, engine_limit: as of `diagnose`.
+    engine, engine_limit, mix: as of `diagnose`.
     """
     return _json.loads(_twinalign.identify_arm(
         _os.fspath(session), cell=_text(cell), parameters=_text(parameters), also=list(also), optimizer=optimizer,
-        budget=budget, seed=seed, out=_text(out), engine_command=engine, engine_limit=engine_limit))
+        budget=budget, seed=seed, out=_text(out), engine_command=engine, engine_limit=engine_limit, mix=mix))
 
 
 def identify_object(session, *, cell=None, object=None, parameters=None, optimizer="least-squares", budget=1200, seed=0, out=None,
-                    engine=None, engine_limit=60.0):
+                    engine=None, engine_limit=60.0, mix=False):
     """Friction, mass [kg], centre of mass [m, object frame, from the geometric centre] and tip friction of the object.
 
     The answer is the JSON object of `calibration identify object --json`; `object`: of several in cell.toml the one to identify,
@@ -68,7 +69,7 @@ def identify_object(session, *, cell=None, object=None, parameters=None, optimiz
     """
     return _json.loads(_twinalign.identify_object(
         _os.fspath(session), cell=_text(cell), object=object, parameters=_text(parameters), optimizer=optimizer, budget=budget,
-        seed=seed, out=_text(out), engine_command=engine, engine_limit=engine_limit))
+        seed=seed, out=_text(out), engine_command=engine, engine_limit=engine_limit, mix=mix))
 
 
 def effects():

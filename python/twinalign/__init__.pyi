@@ -173,6 +173,7 @@ def diagnose(
     engine: str | None = None,
     engine_limit: float = 60.0,
     as_recorded: bool = False,
+    mix: bool = False,
 ) -> dict[str, Any]:
     """The JSON object of `calibration diagnose --json`."""
 
@@ -188,6 +189,7 @@ def identify_arm(
     out: _Path | None = None,
     engine: str | None = None,
     engine_limit: float = 60.0,
+    mix: bool = False,
 ) -> dict[str, Any]:
     """The JSON object of `calibration identify arm --json`."""
 
@@ -203,6 +205,7 @@ def identify_object(
     out: _Path | None = None,
     engine: str | None = None,
     engine_limit: float = 60.0,
+    mix: bool = False,
 ) -> dict[str, Any]:
     """The JSON object of `calibration identify object --json`."""
 

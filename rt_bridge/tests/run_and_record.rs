@@ -8,7 +8,8 @@ use serde_json::Value;
 use shared_mem::msg::arm::{ArmState, MotionStatus};
 use shared_mem::msg::motion::{CHUNK_LENGTH, MotionChunk, MotionKind, SetPoint};
 use shared_mem::msg::twin::TwinState;
-use shared_mem::recording::{ClipMessages, Payload, read_arm_states};
+use shared_mem::origin::Origin;
+use shared_mem::recording::{ClipMessages, Payload, read_arm_states, read_origins};
 use shared_mem::time::now_ns;
 use shared_mem::topics::{self, ARM_MOTION, ARM_STATE};
 use shared_mem::transport::{Node, Subscriber};
@@ -54,6 +55,9 @@ fn replay(clip: &Path, again: &Path, wanted: fn(&Payload) -> bool) -> usize {
     assert!(answer["cycles"].as_u64() > Some(1000), "{answer}");
     let twin = "the recording's /twin/state and /twin/gap are not shown again; `twin shadow`";
     assert_eq!(said(&output).matches(twin).count(), 1, "{}", said(&output));
+    // Whatever the recording was of, this one is of it.
+    let name = clip.file_name().expect("a name").to_string_lossy();
+    assert_eq!(Some(read_origins(again).expect("a clip")), Origin::replay(&name).map(Into::into));
     let messages = ClipMessages::open(again, &[]).expect("a clip");
     messages.filter(|m| m.as_ref().is_ok_and(|m| wanted(&m.payload))).count()
 }
@@ -78,6 +82,7 @@ fn what_was_recorded_holds_every_cycle_pictures_and_poses_and_can_be_replayed() 
     let (output, answer) = end(bridge);
     assert!(output.status.success(), "{}", said(&output));
     assert_eq!(answer["recorded"]["lost"], 0, "{answer}");
+    assert_eq!(read_origins(&clip).expect("a clip"), Origin::Simulation.into());
     let states = read_arm_states(&clip).expect("a clip");
     assert!(states.len() as u64 == answer["cycles"], "{} states of {answer}", states.len());
     assert!(states.windows(2).all(|pair| pair[1].cycle == pair[0].cycle + 1));

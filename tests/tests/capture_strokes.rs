@@ -39,7 +39,7 @@ fn strokes_are_captured_kept_and_replayed_by_the_twin() {
     assert!(add.iter().all(|add| *add < 0.01), "the twin of the same cell strays: {replayed}");
     // The same stroke again, in the same place: the simulated cell is started anew with the object there.
     let mut again = strokes[..4].to_vec();
-    again.extend(strokes[6..10].iter().chain(&["--repeat", "0", "--speed", "0.8", "--json"]));
+    again.extend(strokes[6..10].iter().chain(&["--arm", "sim", "--repeat", "0", "--speed", "0.8", "--json"]));
     let answer = cell.start("calibration", &again).wait(Duration::from_secs(120)).succeeded().json();
     let clip = &answer["clips"][0];
     assert_eq!(

@@ -1,9 +1,11 @@
 //! The bridge a capture works through: the one that runs already, or one that is started for it and ended after it.
 
+use super::admission::{Admission, AdmissionError};
 use super::link::{Link, LinkError};
 use crate::interrupt::Interrupt;
 use crate::processes::{ProcessError, Program, Running, arguments};
 use shared_mem::console;
+use shared_mem::origin::Origin;
 use std::path::Path;
 use std::time::Duration;
 
@@ -11,8 +13,8 @@ use std::time::Duration;
 const LOOK: Duration = Duration::from_millis(500);
 /// How long a bridge may take to its first arm state: a robot has to be reached and its brakes opened.
 const START: Duration = Duration::from_secs(30);
-/// Arm of a bridge that is started without being told which.
-const DEFAULT_ARM: &str = "sim";
+/// The simulated arm, which alone holds a simulated camera.
+const SIMULATED: &str = "sim";
 
 /// No bridge could be had.
 #[derive(Debug, thiserror::Error)]
@@ -23,6 +25,19 @@ pub enum BridgeError {
     /// It could not be started, or ended at once.
     #[error(transparent)]
     Process(#[from] ProcessError),
+    /// Its arm does not go with the session.
+    #[error(transparent)]
+    Refused(#[from] AdmissionError),
+    /// It drives another arm than the one asked for.
+    #[error("the bridge that is running drives {running}, not {asked}: end it, or ask for --arm {arm}")]
+    OtherArm {
+        /// What it drives.
+        running: Origin,
+        /// What was asked for.
+        asked: Origin,
+        /// What to ask for instead.
+        arm: String,
+    },
     /// It runs but reports no arm.
     #[error("the bridge reported no arm state within {} s; check the robot's address and whether it is unlocked, then start again", START.as_secs())]
     NoState,
@@ -36,7 +51,7 @@ pub enum BridgeError {
 pub struct Wanted<'a> {
     /// cell.toml.
     pub cell: &'a Path,
-    /// The arm; default: the simulated one.
+    /// The arm; default: what the session admits.
     pub arm: Option<&'a str>,
     /// How a simulated arm holds the simulated camera; default: it stands where cell.toml says.
     pub hand_eye: Option<&'a Path>,
@@ -50,6 +65,7 @@ pub struct Wanted<'a> {
 #[derive(Debug)]
 pub struct Bridge {
     started: Option<Running>,
+    origin: Option<Origin>,
 }
 
 impl Bridge {
@@ -57,40 +73,74 @@ impl Bridge {
     ///
     /// # Errors
     /// [`BridgeError`] with the remedy.
-    pub fn find_or_start(link: &mut Link, wanted: &Wanted, interrupt: &Interrupt) -> Result<Self, BridgeError> {
-        if link.wait_for_bridge(LOOK, || interrupt.asked())?.is_some() {
-            match wanted.arm {
-                Some(arm) => console::line(format_args!("using the bridge that is running; --arm {arm} has no effect")),
-                None => console::line("using the bridge that is running"),
-            }
-            return Ok(Self { started: None });
+    pub fn find_or_start(
+        link: &mut Link,
+        wanted: &Wanted,
+        admission: &Admission,
+        interrupt: &Interrupt,
+    ) -> Result<Self, BridgeError> {
+        if let Some(state) = link.wait_for_bridge(LOOK, || interrupt.asked())? {
+            return Self::running(state.origin.origin(), wanted.arm, admission);
         }
-        let arm = wanted.arm.unwrap_or(DEFAULT_ARM);
-        console::line(format_args!("no bridge is running: starting `rt_bridge run --arm {arm}` for this capture"));
-        let mut bridge = Self { started: Some(Self::start(wanted)?) };
+        let arm = admission.arm(wanted.arm)?;
+        let origin = arm.parse().ok();
+        admission.admits(origin.as_ref())?;
+        let why = match wanted.arm {
+            Some(_) => "",
+            None => ": the simulation, because the session is new and --arm names no robot",
+        };
+        console::line(format_args!("no bridge is running: starting `rt_bridge run --arm {arm}` for this capture{why}"));
+        let mut bridge = Self { started: Some(Self::start(arm, wanted)?), origin };
         bridge.wait_until_alive(link, interrupt)?;
         Ok(bridge)
     }
 
-    fn start(wanted: &Wanted) -> Result<Running, ProcessError> {
-        let arm = wanted.arm.unwrap_or(DEFAULT_ARM);
+    /// The bridge that runs, where its arm is the one asked for and goes with the session.
+    fn running(origin: Option<Origin>, asked: Option<&str>, admission: &Admission) -> Result<Self, BridgeError> {
+        if let (Some(running), Some(arm)) = (&origin, asked)
+            && let Ok(asked) = arm.parse::<Origin>()
+            && asked.source() != running.source()
+        {
+            let arm = running.arm().unwrap_or_else(|| "as it is".to_owned());
+            return Err(BridgeError::OtherArm { running: running.clone(), asked, arm });
+        }
+        admission.admits(origin.as_ref())?;
+        match &origin {
+            Some(origin) => console::line(format_args!("using the bridge that is running: {origin}")),
+            None => console::line("using the bridge that is running, which does not say which arm it drives"),
+        }
+        Ok(Self { started: None, origin })
+    }
+
+    /// Where what it records comes from; `None` where it does not say.
+    #[must_use]
+    pub fn origin(&self) -> Option<&Origin> {
+        self.origin.as_ref()
+    }
+
+    fn start(arm: &str, wanted: &Wanted) -> Result<Running, ProcessError> {
         let mut list = arguments([&"run", &"--cell", &wanted.cell, &"--arm", &arm]);
-        let held = wanted.hand_eye.filter(|_| arm == DEFAULT_ARM);
+        let held = wanted.hand_eye.filter(|_| arm == SIMULATED);
         list.extend(held.into_iter().flat_map(|file| arguments([&"--hand-eye", &file])));
         list.extend(wanted.realtime.into_iter().flat_map(|way| arguments([&"--realtime", &way])));
         Running::start(Program::Bridge, &list, wanted.domain)
     }
 
-    /// Ends the bridge that was started here and starts another one as `wanted`.
+    /// Ends the bridge that was started here and starts another one of the simulated arm, as `wanted`.
     ///
     /// # Errors
     /// [`BridgeError`] with the remedy.
-    pub fn start_anew(&mut self, link: &mut Link, wanted: &Wanted, interrupt: &Interrupt) -> Result<(), BridgeError> {
+    pub fn simulate_anew(
+        &mut self,
+        link: &mut Link,
+        wanted: &Wanted,
+        interrupt: &Interrupt,
+    ) -> Result<(), BridgeError> {
         if let Some(bridge) = self.started.take() {
             bridge.stop()?;
         }
         link.forget()?;
-        self.started = Some(Self::start(wanted)?);
+        self.started = Some(Self::start(SIMULATED, wanted)?);
         self.wait_until_alive(link, interrupt)
     }
 

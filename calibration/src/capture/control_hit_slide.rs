@@ -92,9 +92,9 @@ pub fn capture(options: &Options, interrupt: &Interrupt) -> anyhow::Result<Summa
         Err(error) => return Err(cause(error, &mut bridge)),
     };
     let session = desk.session.folder().to_owned();
-    let own_bridge = bridge.is_own();
+    let (own_bridge, origin) = (bridge.is_own(), bridge.origin().cloned());
     bridge.stop()?;
-    Ok(Summary { session, clips, interrupted: interrupt.asked(), own_bridge })
+    Ok(Summary { session, clips, interrupted: interrupt.asked(), own_bridge, origin })
 }
 
 /// Makes the object that is hit the one in question: the one that is asked for, else the only rigid one.

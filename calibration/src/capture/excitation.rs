@@ -109,10 +109,10 @@ pub fn capture(
         };
         clips.extend(clip);
     }
-    let own_bridge = bridge.is_own();
+    let (own_bridge, origin) = (bridge.is_own(), bridge.origin().cloned());
     bridge.stop()?;
     let session = desk.session.folder().to_owned();
-    Ok(Summary { session, clips, interrupted: interrupt.asked(), own_bridge })
+    Ok(Summary { session, clips, interrupted: interrupt.asked(), own_bridge, origin })
 }
 
 /// Which joints move.
@@ -124,7 +124,7 @@ fn moving(joints: &[usize], dof: usize) -> anyhow::Result<[bool; MAX_JOINTS]> {
 }
 
 /// Lowest height for flange and tool: above the table, and above the highest of the objects that may stand on it, wherever [m].
-fn floor(cell: &Cell) -> anyhow::Result<f64> {
+pub(crate) fn floor(cell: &Cell) -> anyhow::Result<f64> {
     let Some(table) = &cell.table else { return Ok(f64::NEG_INFINITY) };
     Ok(table.height + tallest(cell)? + CLEARANCE)
 }

@@ -19,7 +19,7 @@ pub fn of(cell: &Cell, body: &Body) -> Vec<JointLimits> {
 
 /// The shipped cell's arm and its limits, for tests.
 #[cfg(test)]
-pub(super) fn shipped() -> (Body, Vec<JointLimits>) {
+pub(crate) fn shipped() -> (Body, Vec<JointLimits>) {
     let text = include_str!("../../../config/fr3_cell.toml");
     let cell: Cell = shared_mem::toml_file::parse(text, "fr3_cell.toml".as_ref()).expect("the shipped file");
     let body = Body::of(&cell).expect("the shipped cell has an arm");

@@ -83,14 +83,9 @@ impl Placing<'_> {
         output::write(&file, self.simulated.to_toml())?;
         console::line(format_args!("the simulated cell is started anew with the object at {}", words(wanted)));
         let Task { realtime, domain, .. } = self.task;
-        let wanted = Wanted {
-            cell: &file,
-            arm: Some("sim"),
-            hand_eye: None,
-            realtime: realtime.as_deref(),
-            domain: domain.as_deref(),
-        };
-        let started = self.bridge.start_anew(link, &wanted, self.interrupt);
+        let wanted =
+            Wanted { cell: &file, arm: None, hand_eye: None, realtime: realtime.as_deref(), domain: domain.as_deref() };
+        let started = self.bridge.simulate_anew(link, &wanted, self.interrupt);
         object.begin_anew()?;
         let removed = std::fs::remove_file(&file);
         started?;

@@ -9,7 +9,8 @@ use super::session::number_of;
 use shared_mem::cell::{ClipEntry, ClipKind};
 use shared_mem::msg::joints_from;
 use shared_mem::msg::motion::SetPoint;
-use shared_mem::recording::{Clip, JointSeries, ReadError, Session};
+use shared_mem::origin::Origin;
+use shared_mem::recording::{Clip, JointSeries, Provenance, ReadError, Session};
 use shared_mem::typed::Command;
 use std::path::{Path, PathBuf};
 
@@ -100,7 +101,9 @@ pub fn read(
     };
     let repeats = |verb: &str| {
         let command = Command::new("calibration capture").words(verb).option("--cell", &folder.join("cell.toml"));
-        command.option("--out", folder).words(&format!("--repeat {number}"))
+        let arm = Provenance::of(&session).source().and_then(Origin::arm);
+        let command = command.option("--out", folder).option_of("--arm", arm.as_deref().map(Path::new));
+        command.words(&format!("--repeat {number}"))
     };
     match entry.kind {
         same if same == kind => {}

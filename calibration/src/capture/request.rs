@@ -25,6 +25,19 @@ pub enum Kind {
     },
 }
 
+impl Kind {
+    /// Length [s] and amplitude [rad] where nothing else is asked for.
+    #[must_use]
+    pub fn usual(self) -> (f64, f64) {
+        match self {
+            Self::Multisine => (8.0, 0.25),
+            Self::Chirp { .. } => (20.0, 0.25),
+            Self::Ramp { .. } => (40.0, 0.25),
+            Self::Hold { .. } => (40.0, 0.4),
+        }
+    }
+}
+
 impl fmt::Display for Kind {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {

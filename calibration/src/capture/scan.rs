@@ -1,6 +1,7 @@
 //! The verb `capture scan`: the arm carries the camera around a point, stops at each view, and what is seen there goes with the
 //! arm's pose into a folder that `twin reconstruct` takes.
 
+use super::admission::Admission;
 use super::around::Around;
 use super::body::Body;
 use super::bridge::{Bridge, Wanted};
@@ -126,7 +127,7 @@ pub fn capture(options: &Options, interrupt: &Interrupt) -> anyhow::Result<Summa
     let (arm, realtime) = (options.arm.as_deref(), options.realtime.as_deref());
     let (hand_eye_file, domain) = (Some(options.hand_eye.as_path()), options.domain.as_deref());
     let wanted = Wanted { cell: &options.cell, arm, hand_eye: hand_eye_file, realtime, domain };
-    let mut bridge = Bridge::find_or_start(&mut link, &wanted, interrupt)?;
+    let mut bridge = Bridge::find_or_start(&mut link, &wanted, &Admission::default(), interrupt)?;
     let shots = Shots::open(options.domain.as_deref(), latency)?;
     let limits = limits::of(&cell, &body);
     let mut desk = Desk { options, body, limits, list, cut, mount, around, shots, interrupt };

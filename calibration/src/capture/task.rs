@@ -1,9 +1,11 @@
 //! What every capture is asked for, and what it answers, whichever motions it plays.
 
+use super::admission::Admission;
 use super::bridge::{Bridge, BridgeError, Wanted};
 use super::link::Link;
 use crate::interrupt::Interrupt;
 use serde::Serialize;
+use shared_mem::origin::Origin;
 use std::path::PathBuf;
 
 /// What is asked for.
@@ -19,6 +21,8 @@ pub struct Task {
     pub speed: f64,
     /// Session folder.
     pub out: PathBuf,
+    /// Whether clips may go beside those of another source.
+    pub mix: bool,
     /// Arm of a bridge that has to be started, as `rt_bridge run --arm` takes it.
     pub arm: Option<String>,
     /// Whether that bridge insists on real time, as `rt_bridge run --realtime` takes it; default: the bridge's own.
@@ -40,6 +44,8 @@ pub struct Summary<Clip> {
     pub interrupted: bool,
     /// Whether the bridge was started, and ended, by this run.
     pub own_bridge: bool,
+    /// Where its clips come from; null where the bridge does not say.
+    pub origin: Option<Origin>,
 }
 
 /// Why a capture failed: a bridge that died says more than the silence it leaves.
@@ -71,6 +77,7 @@ impl Task {
     /// [`BridgeError`] with the remedy.
     pub fn bridge(&self, link: &mut Link, interrupt: &Interrupt) -> Result<Bridge, BridgeError> {
         let (arm, realtime, domain) = (self.arm.as_deref(), self.realtime.as_deref(), self.domain.as_deref());
-        Bridge::find_or_start(link, &Wanted { cell: &self.cell, arm, hand_eye: None, realtime, domain }, interrupt)
+        let wanted = Wanted { cell: &self.cell, arm, hand_eye: None, realtime, domain };
+        Bridge::find_or_start(link, &wanted, &Admission::to(&self.out, self.mix), interrupt)
     }
 }

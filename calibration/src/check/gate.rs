@@ -1,41 +1,101 @@
-//! What `diagnose` and `identify` take from the doctor of a recording: the worst remark, and the end of what makes no sense.
+//! What `diagnose` and `identify` take from the doctor of a recording: where it comes from, the worst remark, and the end of what
+//! makes no sense.
 
-use super::remark::{Remark, Severity};
+use super::origins;
+use super::remark::{Fault, Remark, Severity};
 use super::session::{Found, Read, check_clips};
 use shared_mem::console;
-use shared_mem::recording::Session;
+use shared_mem::recording::{Provenance, Session};
 use shared_mem::typed::{self, Command};
 
-/// The data cannot mean what they say.
-#[derive(Debug, thiserror::Error)]
-#[error("{remark}: the data cannot mean what they say; `{check}` shows it, `{command}` goes on all the same")]
-pub struct Stopped {
-    check: Command,
-    remark: String,
-    command: String,
+/// What is taken all the same, because a person said so.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Allowed {
+    /// Data that cannot mean what they say.
+    pub as_recorded: bool,
+    /// Clips of several sources.
+    pub mix: bool,
 }
 
-/// Looks at a session before it is explained: its worst remark, which is said on the console as well; none where there is
-/// nothing to remark.
+/// What was seen in a session before it is explained.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Looked {
+    /// The worst remark; none where there is nothing to remark.
+    pub worst: Option<Remark>,
+    /// Where its clips come from.
+    pub provenance: Provenance,
+}
+
+/// The data are not to be explained as they are.
+#[derive(Debug, thiserror::Error)]
+pub enum Stopped {
+    /// They cannot mean what they say.
+    #[error("{remark}: the data cannot mean what they say; `{check}` shows it, `{command}` goes on all the same")]
+    Wrong {
+        /// What shows it.
+        check: Command,
+        /// What is wrong.
+        remark: String,
+        /// What goes on all the same.
+        command: String,
+    },
+    /// They are of several cells.
+    #[error("{what}: they are not explained together unasked; `{command}` takes them together")]
+    Mixed {
+        /// Which come from where.
+        what: String,
+        /// What takes them together.
+        command: String,
+    },
+}
+
+/// Looks at a session before it is explained. Its worst remark is said on the console as well, and that clips do not say where they
+/// come from.
 ///
 /// # Errors
-/// [`Stopped`] when the data cannot mean what they say, unless they are to be taken `as_recorded`.
-pub fn look(session: &Session, as_recorded: bool) -> Result<Option<Remark>, Stopped> {
+/// [`Stopped`] when the data cannot mean what they say, or come from several sources, unless that is `allowed`.
+pub fn look(session: &Session, allowed: Allowed) -> Result<Looked, Stopped> {
     // Clips that cannot be read are left out by the verbs, and said to be.
-    let Found { remarks, .. } = check_clips(&session.cell, &Read::of(session).clips);
-    let Some(worst) = remarks.into_iter().next() else { return Ok(None) };
-    let check = session.files.command("calibration check");
-    if worst.severity == Severity::Wrong && !as_recorded {
-        let remark = format!("{}: {}", worst.clips_in_words(), worst.what);
-        return Err(Stopped { check, remark, command: typed::with("--as-recorded", false) });
+    let clips = Read::of(session).clips;
+    let provenance = origins::provenance(&clips);
+    unmixed(&provenance, allowed.mix)?;
+    if provenance.unknown() > 0 {
+        let (count, session) = (provenance.unknown(), session.folder.display());
+        console::line(format_args!("{session}: {count} of {} clips do not say where they come from", clips.len()));
     }
-    console::line(format_args!("warning: {worst} (`{check}` shows all that is odd)"));
-    Ok(Some(worst))
+    let Found { remarks, .. } = check_clips(&session.cell, &clips);
+    // That is what was asked for, and said at once.
+    let worst = remarks.into_iter().find(|remark| remark.fault != Fault::MixedOrigins);
+    if let Some(worst) = &worst {
+        let check = session.files.command("calibration check");
+        if worst.severity == Severity::Wrong && !allowed.as_recorded {
+            let remark = format!("{}: {}", worst.clips_in_words(), worst.what);
+            return Err(Stopped::Wrong { check, remark, command: typed::with("--as-recorded", false) });
+        }
+        console::line(format_args!("warning: {worst} (`{check}` shows all that is odd)"));
+    }
+    Ok(Looked { worst, provenance })
+}
+
+/// Whether clips are to be explained together.
+///
+/// # Errors
+/// [`Stopped::Mixed`] where they come from several sources, unless that is to be so (`mix`).
+pub fn unmixed(provenance: &Provenance, mix: bool) -> Result<(), Stopped> {
+    let Some(mixture) = provenance.mixture() else { return Ok(()) };
+    let what = format!("the clips come from several cells ({mixture})");
+    if !mix {
+        return Err(Stopped::Mixed { what, command: typed::with("--mix", false) });
+    }
+    console::line(format_args!("warning: {what}, and are taken together"));
+    Ok(())
 }
 
 /// Adds the worst remark to the warnings of an answer, unless they say it already.
-pub fn add(warnings: &mut Vec<String>, worst: Option<&Remark>) {
-    if let Some(remark) = worst
+pub fn add(warnings: &mut Vec<String>, looked: &Looked) {
+    let mixture = looked.provenance.mixture();
+    warnings.splice(0..0, mixture.map(|mixture| format!("the clips come from several cells ({mixture})")));
+    if let Some(remark) = &looked.worst
         && !warnings.iter().any(|warning| warning.contains(&remark.what))
     {
         warnings.insert(0, remark.to_string());

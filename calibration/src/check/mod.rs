@@ -22,6 +22,7 @@
 //! | `standing` | size and orientation of an object that stands on its table |
 //! | `fall` | free fall |
 //! | `elsewhere` | forward kinematics against poses |
+//! | `origins` | where the clips come from |
 //! | `look` | one clip looked at, by all of these in their turn |
 //! | [`session`] | a whole session looked at: the answer |
 //! | [`good_for`] | which verbs each clip is good for |
@@ -41,6 +42,7 @@ pub mod lag;
 mod limits;
 mod look;
 mod order;
+mod origins;
 pub mod picture;
 mod publishers;
 mod range;

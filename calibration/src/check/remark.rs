@@ -19,6 +19,8 @@ pub enum Severity {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Fault {
+    /// Clips of several sources: two robots, or a robot and the simulation.
+    MixedOrigins,
     /// Commands and measurements are shifted against each other by no delay.
     MisalignedLogs,
     /// Two topics were stamped by clocks of their own.
@@ -79,7 +81,8 @@ pub enum Fault {
 
 impl Fault {
     /// All of them, in the order in which a session is looked at.
-    pub const ALL: [Self; 28] = [
+    pub const ALL: [Self; 29] = [
+        Self::MixedOrigins,
         Self::MisalignedLogs,
         Self::DifferentClocks,
         Self::StampUnit,
@@ -114,6 +117,7 @@ impl Fault {
     #[must_use]
     pub fn key(self) -> &'static str {
         match self {
+            Self::MixedOrigins => "mixed_origins",
             Self::MisalignedLogs => "misaligned_logs",
             Self::DifferentClocks => "different_clocks",
             Self::StampUnit => "stamp_unit",
@@ -149,7 +153,8 @@ impl Fault {
     #[must_use]
     pub fn severity(self) -> Severity {
         match self {
-            Self::MisalignedLogs
+            Self::MixedOrigins
+            | Self::MisalignedLogs
             | Self::DifferentClocks
             | Self::StampUnit
             | Self::CommandUnit

@@ -5,11 +5,13 @@ use super::fall;
 use super::good_for::{self, Fitness};
 use super::lag::{self, Lag};
 use super::look::{Known, Looked, look};
+use super::origins;
 use super::picture::{self, Picture};
 use super::remark::{Fault, Remark, merged};
 use rayon::prelude::*;
 use serde::Serialize;
 use shared_mem::cell::{Cell, ClipEntry, ClipKind};
+use shared_mem::origin::Origins;
 use shared_mem::recording::{Clip, Session, SessionFiles};
 
 /// What was found about a session.
@@ -23,6 +25,8 @@ pub struct Checked {
     /// How it was named.
     #[serde(skip)]
     pub files: SessionFiles,
+    /// Where its clips come from, in words.
+    pub origin: String,
     /// What is odd about it, worst first.
     pub remarks: Vec<Remark>,
     /// Its clips.
@@ -41,6 +45,8 @@ pub struct ClipFacts {
     pub file: String,
     /// What was done in it.
     pub kind: ClipKind,
+    /// Where it comes from, as far as it says; empty where it says nothing.
+    pub origins: Origins,
     /// How long it lasts; null where it cannot be read [s].
     pub seconds: Option<f64>,
     /// Rows a second of the measured joints, the commands and the object's poses; null where there are none [Hz].
@@ -69,6 +75,7 @@ pub fn check_clips(cell: &Cell, clips: &[(String, Clip)]) -> Found {
     let falls: Vec<(&Columns, fall::Fall)> =
         looked.iter().filter_map(|l| Some((&l.columns, l.fall.clone()?))).collect();
     remarks.extend(fall::remarks(&falls));
+    remarks.extend(origins::remark(clips));
     Found { remarks: merged(remarks), clips: looked }
 }
 
@@ -76,6 +83,7 @@ pub fn check_clips(cell: &Cell, clips: &[(String, Clip)]) -> Found {
 #[must_use]
 pub fn check(session: &Session) -> Checked {
     let Read { clips, unread } = Read::of(session);
+    let origin = origins::provenance(&clips).to_string();
     let Found { mut remarks, clips: looked } = check_clips(&session.cell, &clips);
     remarks.extend(unread.iter().map(|(file, why)| unreadable(file, why)));
     let fitness = good_for::of(session, &clips, &unread, &remarks);
@@ -86,6 +94,7 @@ pub fn check(session: &Session) -> Checked {
         let seen = looked.iter().find(|looked| looked.columns.file == file);
         ClipFacts {
             kind: entry.kind,
+            origins: clip.map_or_else(Origins::default, |clip| clip.origins.clone()),
             seconds: clip.map(|clip| clip.measured.duration().max(clip.object.duration())),
             rates_hz: seen.map_or([None; 3], rates_of),
             lag: seen.and_then(|looked| looked.lag),
@@ -98,7 +107,7 @@ pub fn check(session: &Session) -> Checked {
     let missing = good_for::missing(session, &fitness);
     let (folder, files) = (session.folder.display().to_string(), session.files.clone());
     let object = session.cell.one_of_several().map(str::to_owned);
-    Checked { session: folder, object, files, remarks: merged(remarks), clips, missing, pictures }
+    Checked { session: folder, object, origin, files, remarks: merged(remarks), clips, missing, pictures }
 }
 
 /// The clips of a session.

@@ -28,12 +28,17 @@ pub(super) fn run(arguments: &Arguments, interrupt: &Interrupt) -> anyhow::Resul
         console::line(&subject);
         b.about(Some(&subject.name))?;
     }
-    let odd = [gate::look(&a, arguments.as_recorded)?, gate::look(&b, arguments.as_recorded)?];
+    let looked = [gate::look(&a, arguments.allowed())?, gate::look(&b, arguments.allowed())?];
+    // What changed is asked of one robot.
+    let [of_a, of_b] = &looked;
+    if of_a.provenance.mixture().is_none() && of_b.provenance.mixture().is_none() {
+        gate::unmixed(&of_a.provenance.clone().with(of_b.provenance.clone()), arguments.mix)?;
+    }
     let theta = arguments.parameters.as_deref().map(Theta::read).transpose()?.map(|theta| theta.about(&a.cell));
     let (seed, torques) = (arguments.seed, arguments.torques);
     let options = Options { theta, seed, torques, out: out.clone(), report: report.clone(), ..Options::default() };
     let (mut found, kept) = compare_kept([&a, &b], &options, interrupt)?;
-    odd.iter().for_each(|odd| gate::add(&mut found.warnings, odd.as_ref()));
+    looked.iter().for_each(|looked| gate::add(&mut found.warnings, looked));
     if let Some(file) = theta_file {
         found.theta.write(&file)?;
         found.theta_file = Some(file);

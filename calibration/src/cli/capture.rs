@@ -8,6 +8,7 @@ use calibration::capture::{control_hit_slide, excitation, ramp, scan};
 use calibration::interrupt::Interrupt;
 use calibration::keys::Keys;
 use clap::{Subcommand, ValueEnum as _};
+use shared_mem::origin::Origin;
 use shared_mem::output::Destination;
 use shared_mem::quantity::{number, numbers};
 use std::path::PathBuf;
@@ -37,9 +38,12 @@ struct TaskArguments {
     /// Session folder; created, or continued.
     #[arg(long, value_name = "SESSION")]
     out: PathBuf,
-    /// Arm for the bridge that is started when none runs: sim or fci://HOST [default: sim].
+    /// Arm for the bridge that is started when none runs: sim or fci://HOST [default: sim in a new session; none where it has clips].
     #[arg(long)]
     arm: Option<String>,
+    /// Adds clips also where those of the session come from elsewhere: another robot, or the simulation.
+    #[arg(long)]
+    mix: bool,
     /// Whether that bridge refuses to run without real-time guarantees: enforce or ignore [default: the bridge's own].
     #[arg(long, value_parser = ["enforce", "ignore"])]
     realtime: Option<String>,
@@ -51,9 +55,9 @@ struct TaskArguments {
 impl TaskArguments {
     /// `clips`: how many are asked for; else as many as are named.
     fn task(self, clips: Option<u32>, named: usize) -> Task {
-        let Self { cell, repeat, speed, out, arm, realtime, recover } = self;
+        let Self { cell, repeat, speed, out, arm, mix, realtime, recover } = self;
         let clips = clips.unwrap_or_else(|| u32::try_from(repeat.len().max(named)).unwrap_or(u32::MAX));
-        Task { cell, clips, repeat, speed, out, arm, realtime, recover, domain: None }
+        Task { cell, clips, repeat, speed, out, mix, arm, realtime, recover, domain: None }
     }
 }
 
@@ -84,7 +88,8 @@ of position, speed, acceleration, jerk, torque or height is made smaller; which 
 A clip that is repeated begins where it began: the arm first goes there calmly. Its number is that of its file,
 3 for clip_03.mcap.
 
-A session that exists is continued with the next number; nothing is overwritten. At any moment p (or SIGUSR1)
+A session that exists is continued with the next number; nothing is overwritten. Clips of another arm than those that are
+there are refused unless --mix. At any moment p (or SIGUSR1)
 pauses: the arm brakes inside its limits and holds, and p (or SIGUSR2) goes on with a fresh try of the same clip. q or
 Ctrl-C ends: the arm brakes, and what was recorded is kept. A robot that stops itself ends it too; with --recover 3 it is
 recovered up to three times 2 s later, the arm goes back and the clip is repeated. One that a person stopped is left alone.
@@ -92,11 +97,11 @@ recovered up to three times 2 s later, the arm goes back and the clip is repeate
 Examples:
   calibration capture excitation --cell config/fr3_cell.toml --clips 4 --out session
   calibration capture excitation --cell lab/cell.toml --clips 8 --out monday --arm fci://172.16.0.2 --amplitude 0.2
-  calibration capture excitation --cell config/fr3_cell.toml --clips 1 --out session --motion chirp --frequency 0.2 10
-  calibration capture excitation --cell config/fr3_cell.toml --clips 1 --out session --motion ramp --joints 1,4
-  calibration capture excitation --cell config/fr3_cell.toml --clips 1 --out session --motion hold --poses 12
-  calibration capture excitation --cell config/fr3_cell.toml --out session --repeat 0,3
-  calibration capture excitation --cell config/fr3_cell.toml --out session --repeat 3 --speed 0.5")]
+  calibration capture excitation --cell config/fr3_cell.toml --clips 1 --out session --arm sim --motion chirp --frequency 0.2 10
+  calibration capture excitation --cell config/fr3_cell.toml --clips 1 --out session --arm sim --motion ramp --joints 1,4
+  calibration capture excitation --cell config/fr3_cell.toml --clips 1 --out session --arm sim --motion hold --poses 12
+  calibration capture excitation --cell config/fr3_cell.toml --out session --arm sim --repeat 0,3
+  calibration capture excitation --cell config/fr3_cell.toml --out session --arm sim --repeat 3 --speed 0.5")]
 pub(super) struct ExcitationArguments {
     #[command(flatten)]
     task: TaskArguments,
@@ -162,16 +167,6 @@ impl ExcitationArguments {
             MotionKind::Hold => Kind::Hold { poses: poses.unwrap_or(8) as usize },
         })
     }
-
-    /// Length [s] and amplitude [rad] where nothing else is asked for.
-    fn usual(&self) -> (f64, f64) {
-        match self.motion {
-            MotionKind::Multisine => (8.0, 0.25),
-            MotionKind::Chirp => (20.0, 0.25),
-            MotionKind::Ramp => (40.0, 0.25),
-            MotionKind::Hold => (40.0, 0.4),
-        }
-    }
 }
 
 /// Ends the program as for any other wrong argument.
@@ -196,7 +191,8 @@ With --repeat, --headings and --turn-object every stroke goes out from the same 
 5 mm and 3 degrees: you are asked to put it back at x, y and a turn, and have two minutes. Where this capture has started the
 simulated cell itself it starts it anew with the object there instead. A stroke that is repeated has the same set points.
 
-A session that exists is continued with the next number; nothing is overwritten. At any moment p (or SIGUSR1)
+A session that exists is continued with the next number; nothing is overwritten. Clips of another arm than those that are
+there are refused unless --mix. At any moment p (or SIGUSR1)
 pauses: the arm brakes inside its limits and holds, and p (or SIGUSR2) goes on with a fresh try of the same clip. q or
 Ctrl-C ends: the arm brakes, and what was recorded is kept. A robot that stops itself ends it too; with --recover 3 it is
 recovered up to three times 2 s later, the arm goes back and the clip is repeated. One that a person stopped is left alone.
@@ -205,12 +201,12 @@ Examples:
   calibration capture control-hit-slide --cell config/fr3_cell.toml --clips 12 --out strokes
   calibration capture control-hit-slide --cell lab/cell.toml --clips 12 --out strokes --object milk_box
   calibration capture control-hit-slide --cell lab/cell.toml --clips 1 --out monday --preview next.svg
-  calibration capture control-hit-slide --cell config/fr3_cell.toml --out strokes --repeat 0,4
-  calibration capture control-hit-slide --cell config/fr3_cell.toml --out strokes --repeat 4 --clips 8
-  calibration capture control-hit-slide --cell config/fr3_cell.toml --clips 6 --out strokes --speed 0.5
-  calibration capture control-hit-slide --cell config/fr3_cell.toml --out strokes --headings 8
-  calibration capture control-hit-slide --cell config/fr3_cell.toml --out strokes --turn-object 0,90,180
-  calibration capture control-hit-slide --cell config/fr3_cell.toml --out strokes --repeat 4 --turn-tool=-90")]
+  calibration capture control-hit-slide --cell config/fr3_cell.toml --out strokes --arm sim --repeat 0,4
+  calibration capture control-hit-slide --cell config/fr3_cell.toml --out strokes --arm sim --repeat 4 --clips 8
+  calibration capture control-hit-slide --cell config/fr3_cell.toml --clips 6 --out strokes --arm sim --speed 0.5
+  calibration capture control-hit-slide --cell config/fr3_cell.toml --out strokes --arm sim --headings 8
+  calibration capture control-hit-slide --cell config/fr3_cell.toml --out strokes --arm sim --turn-object 0,90,180
+  calibration capture control-hit-slide --cell config/fr3_cell.toml --out strokes --arm sim --repeat 4 --turn-tool=-90")]
 pub(super) struct StrokeArguments {
     #[command(flatten)]
     task: TaskArguments,
@@ -273,7 +269,7 @@ pub(super) fn run(capture: Capture, interrupt: &Interrupt) -> anyhow::Result<()>
 
 fn excite(arguments: ExcitationArguments, interrupt: &Interrupt) -> anyhow::Result<()> {
     let kind = arguments.kind().unwrap_or_else(|why| refuse(&why));
-    let (duration, amplitude) = arguments.usual();
+    let (duration, amplitude) = kind.usual();
     let ExcitationArguments { task, clips, joints, duration: asked, amplitude: wide, seed, json, .. } = arguments;
     let options = excitation::Options {
         task: task.task(clips, 0),
@@ -285,8 +281,14 @@ fn excite(arguments: ExcitationArguments, interrupt: &Interrupt) -> anyhow::Resu
     };
     let summary = excitation::capture(&options, interrupt, &mut String::new)?;
     let kept = summary.clips.iter().filter(|clip| clip.kept).count();
-    let words = format!("{}: {kept} of {} clips kept", summary.session.display(), options.task.clips);
+    let (session, from) = (summary.session.display(), from(summary.origin.as_ref()));
+    let words = format!("{session}: {kept} of {} clips kept{from}", options.task.clips);
     print(json, &summary, words)
+}
+
+/// ` (the simulation)`, behind what was recorded.
+fn from(origin: Option<&Origin>) -> String {
+    origin.map_or_else(String::new, |origin| format!(" ({origin})"))
 }
 
 fn strike(arguments: StrokeArguments, interrupt: &Interrupt) -> anyhow::Result<()> {
@@ -304,7 +306,10 @@ fn strike(arguments: StrokeArguments, interrupt: &Interrupt) -> anyhow::Result<(
     let kept = summary.clips.iter().filter(|clip| clip.kept).count();
     let words = match &options.preview {
         Some(file) => format!("the next stroke is drawn in {}", file.display()),
-        None => format!("{}: {kept} of {} clips kept", summary.session.display(), summary.clips.len()),
+        None => {
+            let (session, from) = (summary.session.display(), from(summary.origin.as_ref()));
+            format!("{session}: {kept} of {} clips kept{from}", summary.clips.len())
+        }
     };
     print(json, &summary, words)
 }

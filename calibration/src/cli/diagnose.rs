@@ -1,7 +1,8 @@
 //! The verb `calibration diagnose`: arguments, files, and what is printed.
 
 use super::engine::{EngineArguments, heard};
-use calibration::check::gate;
+use calibration::check::gate::{self, Allowed};
+use calibration::diagnose::conclude::written;
 use calibration::diagnose::{Diagnosis, Options, diagnose_kept};
 use calibration::interrupt::Interrupt;
 use calibration::report;
@@ -23,6 +24,8 @@ Of strokes it says whose the object's gap is: the arm's, or what stays under the
 an object that moves by itself is explained, tossed or sliding. Where cell.toml does not say which control law leads the arm, the
 one that fits is found first.
 
+Clips of a robot are not explained together with those of another one, or of the simulation, unless --mix says so.
+
 A recording that cannot mean what it says (units, order, sign, misaligned logs) is not explained, unless --as-recorded says
 so: `calibration check` shows what is wrong.
 
@@ -37,7 +40,9 @@ difference is added. For clips of the arm alone, and of strokes where the engine
 Of clips of the arm alone that last longer together than 96 s the parts count in which its commands move the joints most, and the
 answer says how long these are.
 
-What to record next is printed as commands that can be typed, and of an effect that is named what to do about it in the
+What to record next is printed as commands that can be typed, with the arm that the clips are of. Where no bridge drives that arm, it
+is said in words, and the motion is written beside --report or --out as CSV: time and position of each joint, 1000 rows a second, within
+the limits of the cell. Of an effect that is named what to do about it in the
 cell and in a model.
 
 How far the gap shrinks is one figure, 1 - after / before of the mean squared residual on held-out clips, in units of the
@@ -87,6 +92,9 @@ pub(super) struct Arguments {
     /// Takes the data as they were recorded where `calibration check` says that they cannot mean what they say.
     #[arg(long)]
     pub(super) as_recorded: bool,
+    /// Takes clips of several sources together: of two robots, or of a robot and the simulation.
+    #[arg(long)]
+    pub(super) mix: bool,
     /// After so many seconds the best answer so far counts, 1 to 1000000 [default: as long as it takes].
     #[arg(long, value_name = "SECONDS", value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
     budget: Option<u64>,
@@ -104,6 +112,13 @@ pub(super) struct Arguments {
     pub json: bool,
 }
 
+impl Arguments {
+    /// What is taken all the same.
+    pub(super) fn allowed(&self) -> Allowed {
+        Allowed { as_recorded: self.as_recorded, mix: self.mix }
+    }
+}
+
 /// Runs the verb; the caller prints what was found.
 ///
 /// # Errors
@@ -118,7 +133,7 @@ pub(super) fn run(arguments: &Arguments, interrupt: &Interrupt) -> anyhow::Resul
     if let Some(subject) = session.about(arguments.object.as_deref())? {
         console::line(subject);
     }
-    let odd = gate::look(&session, arguments.as_recorded)?;
+    let looked = gate::look(&session, arguments.allowed())?;
     let theta = arguments.parameters.as_deref().map(Theta::read).transpose()?.map(|theta| theta.about(&session.cell));
     let budget = arguments.budget.map(Duration::from_secs);
     let (seed, torques) = (arguments.seed, arguments.torques);
@@ -127,7 +142,7 @@ pub(super) fn run(arguments: &Arguments, interrupt: &Interrupt) -> anyhow::Resul
         Options { theta, seed, torques, engine: engine.clone(), budget, out: out.clone(), report: report.clone() };
     let found = diagnose_kept(&session, &options, interrupt).map_err(anyhow::Error::from);
     let (mut found, kept) = heard(engine.as_ref(), found)?;
-    gate::add(&mut found.warnings, odd.as_ref());
+    gate::add(&mut found.warnings, &looked);
     match theta_file {
         Some(file) if found.identifies() => {
             found.theta.write(&file)?;
@@ -135,6 +150,9 @@ pub(super) fn run(arguments: &Arguments, interrupt: &Interrupt) -> anyhow::Resul
         }
         Some(file) => console::line(format_args!("{}: not written, because no parameter was found", file.display())),
         None => {}
+    }
+    if let Some(beside) = report.as_deref().or(out.as_deref()) {
+        written::write(&mut found.next_motions, &session, beside, *force)?;
     }
     if let Some(answer) = answer {
         answer.write(serde_json::to_string_pretty(&found)?)?;

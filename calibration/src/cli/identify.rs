@@ -2,13 +2,13 @@
 
 use super::engine::{EngineArguments, heard};
 use super::print;
-use calibration::check::gate;
+use calibration::check::gate::{self, Allowed};
 use calibration::identify::{Identification, Optimizer, arm, joint, object};
 use calibration::interrupt::Interrupt;
 use calibration::report::terminal;
 use clap::{Subcommand, ValueEnum};
 use shared_mem::output::Destination;
-use shared_mem::recording::Session;
+use shared_mem::recording::{Provenance, Session};
 use std::path::PathBuf;
 
 #[derive(Debug, Subcommand)]
@@ -48,6 +48,9 @@ struct Task {
     /// Takes the data as they were recorded where `calibration check` says that they cannot mean what they say.
     #[arg(long)]
     as_recorded: bool,
+    /// Takes clips of several sources together: of two robots, or of a robot and the simulation.
+    #[arg(long)]
+    mix: bool,
     /// Prints one JSON object on stdout at the end.
     #[arg(long)]
     json: bool,
@@ -146,6 +149,9 @@ pub(super) struct JointArguments {
     /// Replaces the files of --out and --report.
     #[arg(long)]
     force: bool,
+    /// Takes clips of several sources together: of two robots, or of a robot and the simulation.
+    #[arg(long)]
+    mix: bool,
     /// Prints one JSON object on stdout at the end.
     #[arg(long)]
     json: bool,
@@ -156,11 +162,14 @@ pub(super) struct JointArguments {
 
 impl JointArguments {
     fn run(self, interrupt: &Interrupt) -> anyhow::Result<()> {
-        let Self { session, cell, object, joint, out, force, json, report } = self;
+        let Self { session, cell, object, joint, out, force, mix, json, report } = self;
         Destination::apart(&[out.as_deref(), report.as_deref()])?;
         Destination::of(out.as_deref(), force)?;
         let page = Destination::of(report.as_deref(), force)?;
-        let found = joint::identify(&joint::Options { session, cell, object, joint, out }, interrupt)?;
+        let provenance = Provenance::of(&Session::open_with(&session, cell.as_deref())?);
+        gate::unmixed(&provenance, mix)?;
+        let mut found = joint::identify(&joint::Options { session, cell, object, joint, out }, interrupt)?;
+        found.origin = provenance.to_string();
         let sheet = found.sheet();
         if let Some(page) = page {
             page.write(sheet.page())?;
@@ -217,10 +226,11 @@ impl Task {
         Destination::of(self.out.as_deref(), self.force)?;
         let page = Destination::of(self.report.as_deref(), self.force)?;
         let session = Session::open_with(&self.session, self.cell.as_deref())?;
-        let odd = gate::look(&session, self.as_recorded)?;
+        let looked = gate::look(&session, Allowed { as_recorded: self.as_recorded, mix: self.mix })?;
         let json = self.json;
         let mut found = identify(self, &session)?;
-        gate::add(&mut found.warnings, odd.as_ref());
+        gate::add(&mut found.warnings, &looked);
+        found.origin = looked.provenance.to_string();
         let sheet = found.sheet();
         if let Some(page) = page {
             page.write(sheet.page())?;

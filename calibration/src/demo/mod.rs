@@ -257,6 +257,7 @@ fn record(
             clips: options.clips,
             out: files.session.clone(),
             arm: None,
+            mix: false,
             realtime: None,
             recover: 0,
             repeat: Vec::new(),

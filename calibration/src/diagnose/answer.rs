@@ -1,5 +1,7 @@
 //! The answer of a diagnosis, as it is written to diagnosis.json and shown on the page.
 
+use crate::capture::arm_motion::ArmMotion;
+use crate::capture::rate::RATE;
 use crate::engine::Used;
 use crate::page::{Size, Trace};
 use shared_mem::recording::SessionFiles;
@@ -28,6 +30,9 @@ pub struct Diagnosis {
     pub next_experiment: String,
     /// The commands that record it, in this order, as they can be typed.
     pub next_commands: Vec<String>,
+    /// The motions of it, where no bridge drives the arm.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub next_motions: Vec<NextMotion>,
     /// What to do about the effects that are named, in the cell and in a model.
     pub remedies: Vec<Remedy>,
     /// Which clips were used for what.
@@ -46,6 +51,8 @@ pub struct Diagnosis {
     pub object: Option<String>,
     /// The session's folder.
     pub session: String,
+    /// Where its clips come from, in words.
+    pub origin: String,
     /// How it was named.
     #[serde(skip)]
     pub files: SessionFiles,
@@ -58,6 +65,47 @@ pub struct Diagnosis {
     /// Residuals of the confirm clips without and with the effects, for the page.
     #[serde(skip)]
     pub traces: Vec<Trace>,
+}
+
+/// A motion to be played by whatever drives the arm.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct NextMotion {
+    /// In words.
+    pub text: String,
+    /// Where it was written: a CSV of a row a control cycle, time [s] and the position of each joint [rad].
+    pub file: Option<PathBuf>,
+    /// Rows a second of that file [Hz].
+    pub rate_hz: f64,
+    /// How long it lasts [s]; none where it was not planned.
+    pub seconds: Option<f64>,
+    /// Why there is no file.
+    pub why: Option<String>,
+    /// What is to be planned.
+    #[serde(skip)]
+    pub motion: ArmMotion,
+}
+
+impl NextMotion {
+    /// A motion that nobody has planned yet.
+    #[must_use]
+    pub fn new(motion: ArmMotion) -> Self {
+        let (text, why) =
+            (motion.in_words(), "with --report or --out it is written beside that file as CSV".to_owned());
+        Self { text, file: None, rate_hz: RATE, seconds: None, why: Some(why), motion }
+    }
+
+    /// In a line, with where it is or why it is nowhere.
+    #[must_use]
+    pub fn in_words(&self) -> String {
+        let Self { text, file, rate_hz, seconds, why, .. } = self;
+        match (file, seconds, why) {
+            (Some(file), Some(seconds), _) => {
+                format!("{text}: {} ({seconds:.1} s, {rate_hz} rows a second)", file.display())
+            }
+            (.., Some(why)) => format!("{text} ({why})"),
+            _ => text.clone(),
+        }
+    }
 }
 
 impl Diagnosis {

@@ -35,8 +35,8 @@ pub mod search;
 mod test_bench;
 
 pub use answer::{
-    Basis, Candidate, Change, Clips, Diagnosis, Gap, Kind, Nearest, Place, Remedy, Rest, SensorGap, Sensors, Share,
-    StageTest, Status, TorqueRms, Verdict,
+    Basis, Candidate, Change, Clips, Diagnosis, Gap, Kind, Nearest, NextMotion, Place, Remedy, Rest, SensorGap,
+    Sensors, Share, StageTest, Status, TorqueRms, Verdict,
 };
 
 use crate::engine::{Engine, EngineError, Quantity, Used};

@@ -22,6 +22,8 @@ pub struct Identification {
     pub joint: Option<String>,
     /// The session's folder.
     pub session: String,
+    /// Where its clips come from, in words.
+    pub origin: String,
     /// How it was named.
     #[serde(skip)]
     pub files: SessionFiles,
@@ -245,6 +247,7 @@ impl Identification {
         Sheet {
             target: self.target.clone(),
             session: self.session.clone(),
+            origin: self.origin.clone(),
             files: self.files.clone(),
             sentence: self.sentence(),
             parameters: parameters.collect(),

@@ -11,6 +11,8 @@ pub struct Sheet {
     pub target: String,
     /// The session's folder.
     pub session: String,
+    /// Where its clips come from.
+    pub origin: String,
     /// How it was named.
     pub files: SessionFiles,
     /// The finding in one sentence.

@@ -51,7 +51,7 @@ fn size(size: &Size) -> String {
 /// Lines for a terminal, the sentence last.
 #[must_use]
 pub fn words(found: &Checked) -> String {
-    let mut lines = Vec::new();
+    let mut lines = vec![format!("origin: {}", found.origin)];
     for remark in &found.remarks {
         lines.push(format!(
             "{}, {}: {}: {}",
@@ -84,6 +84,7 @@ pub fn page(found: &Checked) -> String {
     let body = html! {
         p.kicker { "The recording " b { (found.session) } }
         h1 { (unbroken(&sentence(found))) }
+        p { "Recorded: " (found.origin) "." }
         (overview(found))
         @if !found.remarks.is_empty() { (remarks(&found.remarks)) }
         @for picture in &found.pictures { (drawn(picture)) }
@@ -167,10 +168,11 @@ fn clips(all: &[ClipFacts]) -> Markup {
             h2 { "What each clip is good for" }
             p.note { "By the rules by which each verb admits clips; numbers stand for the reasons below. Hz: measured joints / commands / object poses." }
             table {
-                tr { th { "clip" } th.n { "s" } th { "Hz" } th.n { "lag" } @for verb in VERBS { th { (verb) } } }
+                tr { th { "clip" } th { "origin" } th.n { "s" } th { "Hz" } th.n { "lag" } @for verb in VERBS { th { (verb) } } }
                 @for clip in all {
                     tr {
                         td { (clip.file) }
+                        td { (clip.origins) }
                         td.n { @if let Some(seconds) = clip.seconds { (format!("{seconds:.1}")) } @else { "-" } }
                         td.nowrap { (clip.rates_hz.map(rate).join(" / ")) }
                         td.n { @if let Some(lag) = clip.lag { (format!("{:.0} ms", lag.seconds * 1e3)) } @else { "-" } }
@@ -201,6 +203,7 @@ mod tests {
     use crate::check::remark::Fault;
     use crate::page::canvas::tests::assert_well_formed;
     use shared_mem::cell::ClipKind;
+    use shared_mem::origin::Origin;
     use shared_mem::recording::SessionFiles;
 
     fn found(remarks: Vec<Remark>) -> Checked {
@@ -209,6 +212,7 @@ mod tests {
         let clip = ClipFacts {
             file: "clip_00.mcap".into(),
             kind: ClipKind::Excitation,
+            origins: Origin::import("<b>\x1b.csv", "CSV").into(),
             seconds: Some(6.0),
             rates_hz: [Some(1000.0), None, None],
             lag: None,
@@ -226,6 +230,7 @@ mod tests {
         Checked {
             object: None,
             session: "monday".into(),
+            origin: "the simulation & more".into(),
             files,
             remarks,
             clips: vec![clip],
@@ -250,6 +255,8 @@ mod tests {
             "turn it back",
             "at 1.250 s",
             "no &lt;arm&gt;",
+            "the simulation &amp; more",
+            "&lt;b&gt;\\u{1b}.csv",
             "cannot be",
         ] {
             assert!(page.contains(text), "no {text}");

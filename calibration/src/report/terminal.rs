@@ -22,6 +22,7 @@ const SHOWN_PLACES: usize = 3;
 #[must_use]
 pub fn identification(sheet: &Sheet) -> String {
     let mut lines = table(sheet.parameters.iter().flat_map(numbers).collect());
+    lines.extend((!sheet.origin.is_empty()).then(|| format!("origin: {}", sheet.origin)));
     lines.extend(sheet.errors.iter().map(|error| {
         let unit = Unit::suited(&error.unit, error.before.unwrap_or(error.after));
         let before = error.before.map_or_else(String::new, |before| format!("{} -> ", short(unit.scaled(before))));
@@ -59,6 +60,7 @@ pub fn diagnosis(diagnosis: &Diagnosis) -> String {
             format!("{} {} ({}) {}", place.stage, channel_in_words(&place.channel), place.regime, percent(place.share))
         })
         .collect();
+    lines.extend((!diagnosis.origin.is_empty()).then(|| format!("origin: {}", diagnosis.origin)));
     if !places.is_empty() {
         lines.push(format!("where: {}", places.join(", ")));
     }
@@ -76,6 +78,7 @@ pub fn diagnosis(diagnosis: &Diagnosis) -> String {
         lines.push(format!("next clip: {}", diagnosis.next_experiment));
     }
     lines.extend(diagnosis.next_commands.iter().map(|command| format!("    {command}")));
+    lines.extend(diagnosis.next_motions.iter().map(|motion| format!("    {}", motion.in_words())));
     for remedy in &diagnosis.remedies {
         let effect = words(&remedy.effect);
         lines.push(format!("about {effect}, in the cell: {}", remedy.in_cell));

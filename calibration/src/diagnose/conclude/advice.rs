@@ -4,15 +4,18 @@
 //! show in decide. What no capture can do, a weight to be hung or an object to be put somewhere, stands in the sentence first.
 
 use super::site::{Advice, Capture, Site};
+use crate::capture::arm_motion::ArmMotion;
+use crate::capture::request::Kind;
 use crate::page::channel_in_words;
 use crate::page::words;
 use twin::effects::{Experiment, Separation, Stage, find};
 
 use Capture::{Arm, Elsewhere, StrokeAgain, Strokes};
 
-const CHIRP: Capture = Arm("--clips 1 --motion chirp --frequency 0.2 10");
-const RAMP: Capture = Arm("--clips 1 --motion ramp --ramp-speeds 0.005 0.5");
-const HOLD: Capture = Arm("--clips 1 --motion hold --poses 8");
+const CHIRP: Capture = Arm(ArmMotion::of(Kind::Chirp { frequency: [0.2, 10.0] }, 1));
+const RAMP: Capture = Arm(ArmMotion::of(Kind::Ramp { speeds: [0.005, 0.5] }, 1));
+const HOLD: Capture = Arm(ArmMotion::of(Kind::Hold { poses: 8 }, 1));
+const MANY_HOLDS: ArmMotion = ArmMotion::of(Kind::Hold { poses: 12 }, 1);
 const HEADINGS: Capture = Strokes("--headings 8");
 const TURNED: Capture = Strokes("--turn-object 0,90,180");
 const ONE_STROKE: Capture = Strokes("--clips 1");
@@ -23,11 +26,11 @@ const SLOWER: Capture = Strokes("--clips 4 --speed 0.5");
 fn capture(experiment: Experiment) -> Capture {
     match experiment {
         Experiment::Chirp => CHIRP,
-        Experiment::FastChirp => Arm("--clips 1 --motion chirp --frequency 0.5 40"),
+        Experiment::FastChirp => Arm(ArmMotion::of(Kind::Chirp { frequency: [0.5, 40.0] }, 1)),
         Experiment::Ramps => RAMP,
         Experiment::Holds => HOLD,
-        Experiment::ManyHolds => Arm("--clips 1 --motion hold --poses 12 --amplitude 0.8"),
-        Experiment::NewMotion => Arm("--clips 1"),
+        Experiment::ManyHolds => Arm(ArmMotion { amplitude: Some(0.8), ..MANY_HOLDS }),
+        Experiment::NewMotion => Arm(ArmMotion::of(Kind::Multisine, 1)),
         Experiment::StrokeAgainSlower => AGAIN_SLOWER,
         Experiment::StrokeAgainToolTurned => StrokeAgain("--turn-tool=-90"),
         Experiment::OneStroke => ONE_STROKE,
@@ -104,21 +107,21 @@ pub fn separating(effects: &[&str], site: &Site) -> Advice {
 /// What to record next to confirm what was found.
 #[must_use]
 pub fn confirming(effects: &[String], site: &Site) -> Advice {
-    let (clips, commands) = site.again(2);
+    let (clips, steps) = site.again(2);
     let effects: Vec<String> = effects.iter().map(|effect| words(effect)).collect();
-    site.finished(format!("To confirm {}: {clips}.", effects.join(" and ")), commands)
+    site.finished(format!("To confirm {}: {clips}.", effects.join(" and ")), steps)
 }
 
 /// What to record where something unknown is left.
 #[must_use]
 pub fn unexplained(place: Option<(&str, &str)>, site: &Site) -> Advice {
     let Some((channel, regime)) = place else { return Advice::default() };
-    let (clips, commands) = site.again(8);
+    let (clips, steps) = site.again(8);
     let channel = channel_in_words(channel);
     let sentence = format!(
         "What is left is largest in {channel} ({regime}): {clips}, to see whether it repeats and how it grows."
     );
-    site.finished(sentence, commands)
+    site.finished(sentence, steps)
 }
 
 /// What to record where an effect is likely, and so many clips more would prove it.
@@ -131,7 +134,7 @@ pub fn proving(effect: &str, more: usize, site: &Site) -> Advice {
 /// What to record where the clips do not say enough.
 #[must_use]
 pub fn lacking(why: &str, site: &Site) -> Advice {
-    let command = if site.strikes() { Strokes("--clips 12") } else { Arm("--clips 8") };
+    let command = if site.strikes() { Strokes("--clips 12") } else { Arm(ArmMotion::of(Kind::Multisine, 8)) };
     site.advice(format!("Record a session that has what this one lacks: {why}."), &[command])
 }
 
@@ -139,7 +142,8 @@ pub fn lacking(why: &str, site: &Site) -> Advice {
 #[must_use]
 pub fn nothing_open(site: &Site) -> Advice {
     let commands = site.usual();
-    Advice { sentence: "Nothing is open; record the next session as usual.".into(), commands }
+    let sentence = "Nothing is open; record the next session as usual.".into();
+    Advice { sentence, commands, ..Advice::default() }
 }
 
 /// Every advice there is, for those who check that each can be carried out.
@@ -178,7 +182,7 @@ mod tests {
         assert_eq!(
             advice.commands,
             [
-                "calibration capture excitation --cell monday/cell.toml --out monday --clips 1 --motion chirp --frequency 0.2 10",
+                "calibration capture excitation --cell monday/cell.toml --out monday --arm sim --clips 1 --motion chirp --frequency 0.2 10",
                 "calibration diagnose monday --report report.html"
             ]
         );
@@ -208,9 +212,9 @@ mod tests {
         assert_eq!(
             advice.commands,
             [
-                "calibration capture excitation --cell 'monday strokes/cell.toml' --out 'monday strokes_arm' --clips 4",
-                "calibration capture excitation --cell 'monday strokes/cell.toml' --out 'monday strokes_arm' --clips 1 --motion hold --poses 8",
-                "calibration capture control-hit-slide --cell 'monday strokes/cell.toml' --out 'monday strokes' --headings 8",
+                "calibration capture excitation --cell 'monday strokes/cell.toml' --out 'monday strokes_arm' --arm sim --clips 4",
+                "calibration capture excitation --cell 'monday strokes/cell.toml' --out 'monday strokes_arm' --arm sim --clips 1 --motion hold --poses 8",
+                "calibration capture control-hit-slide --cell 'monday strokes/cell.toml' --out 'monday strokes' --arm sim --headings 8",
                 "calibration diagnose 'monday strokes_arm' --report report_arm.html",
                 "calibration diagnose 'monday strokes' --report report.html",
             ]

@@ -5,7 +5,7 @@ use super::site::Advice;
 use super::site::Site;
 use super::verdict::{self, Finding};
 use super::{advice, ranked, remedies};
-use crate::diagnose::answer::{Change, Clips, Diagnosis, Gap, Nearest, Place, Rest, Share, Verdict};
+use crate::diagnose::answer::{Change, Clips, Diagnosis, Gap, Nearest, NextMotion, Place, Rest, Share, Verdict};
 use crate::diagnose::clips::admit::Admitted;
 use crate::diagnose::clips::split::{self, Split};
 use crate::diagnose::criteria::CLASS_IS_RIGHT;
@@ -38,7 +38,8 @@ const TRACES: usize = 12;
 #[must_use]
 pub fn not_testable(session: &Session, options: &Options, why: &str) -> Diagnosis {
     let nothing = Share { value: 0.0, ci90: [0.0; 2] };
-    let lacking = advice::lacking(why, &Site::of(session, options.report.as_deref()));
+    let site = Site::of(session, options.report.as_deref());
+    let lacking = advice::lacking(why, &site);
     Diagnosis {
         verdict: verdict::not_testable(why),
         gap: Gap {
@@ -60,6 +61,7 @@ pub fn not_testable(session: &Session, options: &Options, why: &str) -> Diagnosi
         candidates: Vec::new(),
         next_experiment: lacking.sentence,
         next_commands: lacking.commands,
+        next_motions: lacking.motions.into_iter().map(NextMotion::new).collect(),
         remedies: Vec::new(),
         clips: Clips::default(),
         warnings: Vec::new(),
@@ -68,6 +70,7 @@ pub fn not_testable(session: &Session, options: &Options, why: &str) -> Diagnosi
         seconds: 0.0,
         object: session.cell.one_of_several().map(str::to_owned),
         session: session.folder.display().to_string(),
+        origin: site.origin().to_owned(),
         files: session.files.clone(),
         seed: options.seed,
         // What was known before; nothing was found.
@@ -152,6 +155,7 @@ pub fn conclude<E: Evidence>(
         ),
         next_experiment: next.sentence,
         next_commands: next.commands,
+        next_motions: next.motions.into_iter().map(NextMotion::new).collect(),
         remedies: remedies::of(&verdict, &theta, &session.cell),
         verdict,
         stage_test: None,
@@ -163,6 +167,7 @@ pub fn conclude<E: Evidence>(
         seconds: 0.0,
         object: session.cell.one_of_several().map(str::to_owned),
         session: session.folder.display().to_string(),
+        origin: site.origin().to_owned(),
         files: session.files.clone(),
         seed: options.seed,
         theta: Theta { object: known.and_then(|known| known.object.clone()), ..theta },

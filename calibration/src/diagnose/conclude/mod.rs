@@ -4,6 +4,7 @@
 //! |---|---|
 //! | `verdict`, `headline` | which of the five verdicts it is, and its sentence |
 //! | `advice`, `site` | what to record next, and the commands for it |
+//! | `written` | the motion of an arm that no bridge drives, as CSV |
 //! | `remedies` | what to do about what was named |
 //! | `ranked`, `reason` | what is said of every candidate, and why |
 //! | `conclusion` | the answer |
@@ -16,3 +17,4 @@ pub(super) mod reason;
 pub mod remedies;
 pub mod site;
 pub mod verdict;
+pub mod written;

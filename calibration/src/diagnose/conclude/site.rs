@@ -1,12 +1,15 @@
 //! Where an advice is carried out: the session, its clips that can be repeated, and how much faster they may be played. It
 //! makes commands that can be typed of what an advice asks for.
 
+use crate::capture::arm_motion::ArmMotion;
 use crate::capture::body::Body;
+use crate::capture::request::Kind;
 use crate::capture::session::number_of;
 use crate::capture::{limits, pace, recorded};
 use crate::diagnose::clips::torques::is_tracking;
 use shared_mem::cell::ClipKind;
-use shared_mem::recording::Session;
+use shared_mem::origin::Origin;
+use shared_mem::recording::{Provenance, Session};
 use shared_mem::typed::{Command, quoted};
 use std::path::{Path, PathBuf};
 
@@ -18,19 +21,28 @@ const WORTH: f64 = 1.2;
 const TWICE: f64 = 2.0;
 
 /// What to record next.
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct Advice {
     /// The reason and the experiment, in words; steps for hands before those for the keyboard.
     pub sentence: String,
     /// Commands that can be typed as they are, in this order.
     pub commands: Vec<String>,
+    /// Motions of an arm that no bridge drives.
+    pub motions: Vec<ArmMotion>,
+}
+
+/// What records something: commands, or motions where no bridge drives the arm.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub(in crate::diagnose) struct Steps {
+    commands: Vec<String>,
+    motions: Vec<ArmMotion>,
 }
 
 /// A capture of an advice, without cell and session.
 #[derive(Debug, Clone, Copy)]
 pub(in crate::diagnose) enum Capture {
     /// The arm alone, new clips.
-    Arm(&'static str),
+    Arm(ArmMotion),
     /// A stroke of the session again, with these arguments; a new one where there is none to repeat.
     StrokeAgain(&'static str),
     /// New strokes.
@@ -46,6 +58,10 @@ pub struct Site {
     folder: PathBuf,
     /// What captures are told about the cell.
     cell: PathBuf,
+    /// The arm that records them, as `--arm` takes it; none where no bridge drives it.
+    arm: Option<String>,
+    /// Where the clips of the session in question come from, in words.
+    origin: String,
     /// Whether that session is still to be made.
     is_new: bool,
     /// Whether its clips are strokes; otherwise the arm moves alone.
@@ -79,10 +95,16 @@ impl Site {
         let alone = all(ClipKind::FreeMotion);
         let strokes = all(ClipKind::ControlHitSlide);
         let torques = is_tracking(&session.cell);
-        if let Some(cell) = &session.files.cell {
+        let provenance = Provenance::of(session);
+        let (origin, (arm, goes_on)) = (provenance.to_string(), arm_of(session, &provenance));
+        if session.files.cell.is_some() || !goes_on || arm.is_none() {
             let folder = named_after(&session.folder, "next");
+            let beside = Self::new(&session.folder, strokes, Vec::new(), 1.0).cell;
+            let cell = session.files.cell.clone().unwrap_or(beside);
             return Self {
-                cell: cell.clone(),
+                arm,
+                origin,
+                cell,
                 is_new: true,
                 alone,
                 torques,
@@ -106,10 +128,10 @@ impl Site {
                 }
             }
         }
-        Self { alone, torques, ..Self::new(&session.folder, strokes, clips, fastest) }
+        Self { arm, origin, alone, torques, ..Self::new(&session.folder, strokes, clips, fastest) }
     }
 
-    /// Of a session in `folder` with clips that can be repeated, the first of them `fastest` times as fast at most.
+    /// Of a session of the simulation in `folder` with clips that can be repeated, the first of them `fastest` times as fast at most.
     #[must_use]
     pub fn new(folder: &Path, strokes: bool, clips: Vec<usize>, fastest: f64) -> Self {
         // Without a slash at its end, and never nothing: a clip may lie where the program runs.
@@ -118,6 +140,8 @@ impl Site {
         Self {
             cell: folder.join("cell.toml"),
             folder,
+            arm: Some("sim".into()),
+            origin: String::new(),
             is_new: false,
             strokes,
             clips,
@@ -127,6 +151,11 @@ impl Site {
             object: None,
             page: None,
         }
+    }
+
+    /// Where the clips of the session in question come from, in words.
+    pub(in crate::diagnose) fn origin(&self) -> &str {
+        &self.origin
     }
 
     /// Whether its clips are strokes.
@@ -142,7 +171,14 @@ impl Site {
     /// The sentence with the commands of `captures`, and what diagnoses them.
     pub(in crate::diagnose) fn advice(&self, sentence: String, captures: &[Capture]) -> Advice {
         if self.alone {
-            return Advice { sentence, commands: Vec::new() };
+            return Advice { sentence, ..Advice::default() };
+        }
+        if self.arm.is_none() {
+            let motions = captures.iter().filter_map(|capture| match capture {
+                Capture::Arm(motion) => Some(*motion),
+                _ => None,
+            });
+            return self.finished(sentence, Steps { motions: motions.collect(), ..Steps::default() });
         }
         let mut commands = Vec::new();
         // A session begins with clips enough to be diagnosed.
@@ -153,7 +189,7 @@ impl Site {
         });
         commands.extend(beside);
         commands.extend(captures.iter().map(|capture| match capture {
-            Capture::Arm(rest) => self.arm(rest),
+            Capture::Arm(motion) => self.arm(&motion.arguments()),
             Capture::Strokes(rest) => self.strokes(rest),
             Capture::StrokeAgain(rest) => match self.clips.first() {
                 Some(number) if self.strokes => self.strokes(&format!("--repeat {number} {rest}")),
@@ -164,11 +200,11 @@ impl Site {
                 self.strokes_into(&cell, &named_after(&self.folder, name), rest)
             }
         }));
-        self.finished(sentence, commands)
+        self.finished(sentence, Steps { commands, ..Steps::default() })
     }
 
     /// Repeats: the words for it and the commands. Of eight only one clip is repeated, of two both.
-    pub(in crate::diagnose) fn again(&self, times: usize) -> (String, Vec<String>) {
+    pub(in crate::diagnose) fn again(&self, times: usize) -> (String, Steps) {
         let fast = (100.0 * self.fastest.min(TWICE)).floor() / 100.0;
         let speeds = match fast {
             fast if fast >= TWICE => "one at half and one at twice the speed".to_owned(),
@@ -181,13 +217,14 @@ impl Site {
         if self.alone {
             return (
                 format!("let the object go {times} times more, in other directions and at other speeds"),
-                Vec::new(),
+                Steps::default(),
             );
         }
         let Some(first) = self.clips.first() else {
             let words =
                 format!("record {times} clips more, and {}", speeds.replace("one at half and", "some at half and"));
-            return (words, vec![self.same(&format!("--clips {times}")), self.same("--clips 2 --speed 0.5")]);
+            let usual = ArmMotion::of(Kind::Multisine, times);
+            return (words, self.steps(&[usual, ArmMotion { speed: 0.5, ..ArmMotion::of(Kind::Multisine, 2) }]));
         };
         let all: Vec<String> = self.clips.iter().take(TWO).map(ToString::to_string).collect();
         let repeated = if times > TWO {
@@ -199,30 +236,50 @@ impl Site {
         if fast >= WORTH {
             commands.push(self.same(&format!("--repeat {first} --speed {fast}")));
         }
-        (format!("{what} and add {speeds}"), commands)
+        (format!("{what} and add {speeds}"), Steps { commands, ..Steps::default() })
+    }
+
+    /// New clips of the session's kind: sums of sines of the arm alone, or as many strokes.
+    fn steps(&self, motions: &[ArmMotion]) -> Steps {
+        match &self.arm {
+            Some(_) => {
+                let commands = motions.iter().map(|motion| self.same(&motion.arguments())).collect();
+                Steps { commands, ..Steps::default() }
+            }
+            None if self.strokes => Steps::default(),
+            None => Steps { motions: motions.to_vec(), ..Steps::default() },
+        }
     }
 
     /// The sentence with the command of so many clips more of the same kind.
     pub(in crate::diagnose) fn more(&self, sentence: String, clips: usize) -> Advice {
-        let commands = if self.alone { Vec::new() } else { vec![self.same(&format!("--clips {clips}"))] };
-        self.finished(sentence, commands)
+        let steps = if self.alone { Steps::default() } else { self.steps(&[ArmMotion::of(Kind::Multisine, clips)]) };
+        self.finished(sentence, steps)
     }
 
     /// Another session of the same kind.
     pub(in crate::diagnose) fn usual(&self) -> Vec<String> {
-        if self.alone {
+        if self.alone || self.arm.is_none() {
             return Vec::new();
         }
         let next = if self.is_new { self.folder.clone() } else { named_after(&self.folder, "next") };
         vec![if self.strokes {
             self.strokes_into(&self.cell, &next, "--clips 12")
         } else {
-            capture_into("excitation", &self.cell, &next, "--clips 8")
+            self.capture_into("excitation", &self.cell, &next, "--clips 8")
         }]
     }
 
     /// The sentence with commands, and after them what diagnoses the sessions they record into.
-    pub(in crate::diagnose) fn finished(&self, sentence: String, mut commands: Vec<String>) -> Advice {
+    pub(in crate::diagnose) fn finished(&self, sentence: String, steps: Steps) -> Advice {
+        let Steps { mut commands, motions } = steps;
+        if self.arm.is_none() && !self.alone {
+            let sentence = format!(
+                "{sentence} No bridge drives this arm: play the motions with its own controller, log commands and \
+                 measurements, and make a session of the logs with `calibration import`."
+            );
+            return Advice { sentence, commands: Vec::new(), motions };
+        }
         let fill = |commands: &[String], folder: &Path| {
             commands.iter().any(|command| command.contains(&format!("--out {} ", quoted(folder))))
         };
@@ -242,7 +299,7 @@ impl Site {
                 commands.push(command.option("--report", &self.free_page(&page)).into());
             }
         }
-        Advice { sentence, commands }
+        Advice { sentence, commands, motions }
     }
 
     /// A page whose name is not taken where the program runs: one that is there is kept, and the command refused.
@@ -260,7 +317,7 @@ impl Site {
 
     fn arm(&self, rest: &str) -> String {
         let folder = if self.strokes { named_after(&self.folder, "arm") } else { self.folder.clone() };
-        capture_into("excitation", &self.cell, &folder, rest)
+        self.capture_into("excitation", &self.cell, &folder, rest)
     }
 
     fn strokes(&self, rest: &str) -> String {
@@ -270,13 +327,27 @@ impl Site {
 
     fn strokes_into(&self, cell: &Path, folder: &Path, rest: &str) -> String {
         let rest = self.object.as_ref().map_or_else(|| rest.to_owned(), |name| format!("--object {name} {rest}"));
-        capture_into("control-hit-slide", cell, folder, &rest)
+        self.capture_into("control-hit-slide", cell, folder, &rest)
+    }
+
+    fn capture_into(&self, verb: &str, cell: &Path, folder: &Path, rest: &str) -> String {
+        let command = Command::new("calibration capture").words(verb).option("--cell", cell).option("--out", folder);
+        command.option_of("--arm", self.arm.as_deref().map(Path::new)).words(rest).into()
     }
 }
 
-fn capture_into(verb: &str, cell: &Path, folder: &Path, rest: &str) -> String {
-    let command = Command::new("calibration capture").words(verb).option("--cell", cell).option("--out", folder);
-    command.words(rest).into()
+/// The arm that records more clips like those of a session, as `--arm` takes it, and whether they go into that session. A real FR3
+/// whose address nobody knows is `fci://ROBOT`; clips of other sources than a bridge's stay by themselves. None where no bridge
+/// drives the arm.
+fn arm_of(session: &Session, provenance: &Provenance) -> (Option<String>, bool) {
+    if let Some(arm) = provenance.source().and_then(Origin::arm) {
+        return (Some(arm), true);
+    }
+    let is_fr3 = session.cell.robot.as_ref().is_some_and(|robot| robot.model.as_deref() == Some("fr3"));
+    let robots = provenance.clips().iter().flat_map(|clip| clip.origins.iter());
+    let known = robots.filter(|origin| **origin != Origin::Simulation).find_map(Origin::arm);
+    let arm = is_fr3.then(|| known.unwrap_or_else(|| "fci://ROBOT".to_owned()));
+    (arm, provenance.is_unknown())
 }
 
 /// A session beside another one: `monday_arm`.
@@ -288,62 +359,4 @@ fn named_after(folder: &Path, end: &str) -> PathBuf {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use shared_mem::cell::Cell;
-    use shared_mem::recording::SessionFiles;
-
-    #[test]
-    fn the_question_about_torques_is_asked_again() {
-        let site = Site { torques: true, ..Site::new(Path::new("bags"), false, Vec::new(), 1.0) };
-        let advice = site.more("Record more.".into(), 4);
-        assert_eq!(advice.commands[1], "calibration diagnose bags --torques --report report.html");
-    }
-
-    #[test]
-    fn of_several_objects_strokes_and_their_diagnosis_are_about_the_same_one() {
-        let site = Site { object: Some("cup".into()), ..Site::new(Path::new("bags"), true, vec![4], 1.0) };
-        let commands = site.advice(String::new(), &[Capture::StrokeAgain("--speed 0.5")]).commands;
-        let of_strokes = "--cell bags/cell.toml --out bags --object cup --repeat 4 --speed 0.5";
-        assert_eq!(commands[0], format!("calibration capture control-hit-slide {of_strokes}"));
-        assert_eq!(commands[1], "calibration diagnose bags --object cup --report report.html");
-    }
-
-    #[test]
-    fn with_a_cell_of_elsewhere_clips_go_into_a_session_that_is_captured_with_it() {
-        let files = SessionFiles { session: "my clips/".into(), cell: Some("the lab/cell.toml".into()) };
-        let session = Session { folder: "my clips/".into(), cell: Cell::default(), clips: Vec::new(), files };
-        let advice = Site::of(&session, None).more("Record more.".into(), 3);
-        let capture = "calibration capture excitation --cell 'the lab/cell.toml' --out 'my clips_next' --clips";
-        let expected = [format!("{capture} 4"), format!("{capture} 3")];
-        assert_eq!(advice.commands[..2], expected);
-        assert_eq!(advice.commands[2], "calibration diagnose 'my clips_next' --report report.html");
-        assert_eq!(Site::of(&session, None).usual(), [format!("{capture} 8")]);
-        // Eight clips are enough to be diagnosed.
-        assert_eq!(Site::of(&session, None).more(String::new(), 8).commands.len(), 2);
-    }
-
-    #[test]
-    fn a_page_gets_a_name_that_neither_this_command_nor_one_before_has_taken() {
-        let asked = |page: &str| {
-            let site = Site { page: Some(page.into()), ..Site::new(Path::new("bags"), false, Vec::new(), 1.0) };
-            site.more("Record more.".into(), 4).commands[1].clone()
-        };
-        assert!(asked("./report.html").ends_with("--report report_2.html"), "{}", asked("./report.html"));
-        assert!(asked("other.html").ends_with("--report report.html"), "{}", asked("other.html"));
-    }
-
-    #[test]
-    fn a_clip_that_lies_where_the_program_runs_has_a_folder_too() {
-        let advice = Site::new(Path::new(""), true, vec![2], 1.0).advice(String::new(), &[Capture::Arm("--clips 2")]);
-        assert_eq!(advice.commands[0], "calibration capture excitation --cell ./cell.toml --out ./arm --clips 4");
-        assert_eq!(advice.commands[2], "calibration diagnose ./arm --report report_arm.html");
-    }
-
-    #[test]
-    fn where_nothing_can_be_repeated_new_clips_take_its_place() {
-        let (words, commands) = Site::new(Path::new("bags"), false, Vec::new(), 1.0).again(2);
-        assert!(words.starts_with("record 2 clips more"), "{words}");
-        assert!(commands[0].ends_with("--clips 2") && commands[1].ends_with("--speed 0.5"), "{commands:?}");
-    }
-}
+mod tests;

@@ -39,6 +39,9 @@ pub fn page(diagnosis: &Diagnosis) -> String {
                 h2 { "The next clip" }
                 p.next { (diagnosis.next_experiment) }
                 @if !diagnosis.next_commands.is_empty() { pre { code { (diagnosis.next_commands.join("\n")) } } }
+                @if !diagnosis.next_motions.is_empty() {
+                    ul { @for motion in &diagnosis.next_motions { li { (motion.in_words()) } } }
+                }
             }
         }
         @if !diagnosis.warnings.is_empty() {
@@ -149,6 +152,7 @@ fn origin(diagnosis: &Diagnosis) -> Markup {
             h2 { "Where this comes from" }
             dl {
                 dt { "session" } dd { code { (diagnosis.session) } }
+                dt { "origin" } dd { (diagnosis.origin) }
                 @for (what, clips) in used { dt { (what) } dd { (clip_list(clips)) } }
                 dt { "seed" } dd { (diagnosis.seed) }
                 dt { "took" } dd { (format!("{:.0} s", diagnosis.seconds)) }
@@ -244,6 +248,8 @@ pub(super) mod tests {
                 candidate("camera_latency", 0.0, Status::NotTestable),
             ],
             next_experiment: "Play a chirp up to 10 Hz.".into(),
+            next_motions: Vec::new(),
+            origin: "the simulation".into(),
             next_commands: vec![
                 "calibration capture excitation --motion chirp".into(),
                 "calibration diagnose monday".into(),
