@@ -310,7 +310,7 @@ mod tests {
     use super::super::world::Fault;
     use super::*;
     use crate::diagnose::evidence::arm_clips::ArmClips;
-    use crate::diagnose::evidence::measured::Evidence;
+    use crate::diagnose::evidence::measured::Measured;
     use crate::estimate::ClipModel;
     use shared_mem::cell::Cell;
     use std::path::Path;

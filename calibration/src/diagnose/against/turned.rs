@@ -4,8 +4,8 @@
 //! library are turned and in which session each acts; what is not turned stays where it is.
 
 use super::super::library::Library;
-use crate::diagnose::evidence::measured::{Channel, Evidence, Near, Row};
-use crate::diagnose::evidence::scatter::Scatter;
+use crate::diagnose::evidence::measured::{Channel, Evidence, Measured, Near, Row};
+use crate::diagnose::evidence::scatter::{Scatter, WithOwn};
 use crate::estimate::{ClipModel, Impossible, Unknown};
 use crate::forward::Setting;
 
@@ -162,7 +162,9 @@ impl<E: Evidence> ClipModel for TwoSessions<'_, E> {
     }
 }
 
-impl<E: Evidence> Evidence for TwoSessions<'_, E> {
+impl<E: Evidence> Measured for TwoSessions<'_, E> {
+    type Own = WithOwn;
+
     fn changed(
         &self,
         clip: usize,

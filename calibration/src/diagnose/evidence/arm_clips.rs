@@ -3,10 +3,10 @@
 //! then on belongs to [`super::contact`].
 #![allow(non_snake_case)] // the Franka Control Interface's own symbols
 
-use super::measured::{Channel, Evidence, Group, Near, Row, StageName};
+use super::measured::{Channel, Group, Measured, Near, Row, StageName};
 use super::recent::Recent;
 use super::regime::Regimes;
-use super::scatter::Scatter;
+use super::scatter::{Scatter, WithOwn};
 use crate::diagnose::clips::torques::is_tracking;
 use crate::engine::{Engine, Quantity};
 use crate::estimate::{ClipModel, Impossible};
@@ -285,7 +285,9 @@ impl<F: Fn(&[f64]) -> Theta + Sync> ArmClips<F> {
     }
 }
 
-impl<F: Fn(&[f64]) -> Theta + Sync> Evidence for ArmClips<F> {
+impl<F: Fn(&[f64]) -> Theta + Sync> Measured for ArmClips<F> {
+    type Own = WithOwn;
+
     fn following(&self, clip: usize) -> Vec<Moment> {
         let Some(controller) = &self.cell.controller else { return Vec::new() };
         let clip = &self.clips[clip];

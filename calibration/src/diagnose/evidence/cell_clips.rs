@@ -9,9 +9,9 @@
 use super::arm_clips::ArmClips;
 use super::contact::Contact;
 use super::deviations;
-use super::measured::{Channel, Evidence, Group, Near, Reach, Row, StageName};
+use super::measured::{Channel, Group, Measured, Near, Reach, Row, StageName};
 use super::recent::Recent;
-use super::scatter::Scatter;
+use super::scatter::{Scatter, WithOwn};
 use crate::diagnose::library::Library;
 use crate::engine::Engine;
 use crate::estimate::{ClipModel, Impossible, Random};
@@ -177,7 +177,7 @@ impl<'a, F: Fn(&[f64]) -> Theta + Sync> CellClips<'a, F> {
         Ok(residuals)
     }
 
-    /// [`Evidence::changed`] where another program simulates: what a step changes is the twin's.
+    /// [`Measured::changed`] where another program simulates: what a step changes is the twin's.
     fn stepped(
         &self,
         clip: usize,
@@ -265,7 +265,9 @@ impl<F: Fn(&[f64]) -> Theta + Sync> ClipModel for CellClips<'_, F> {
     }
 }
 
-impl<F: Fn(&[f64]) -> Theta + Sync> Evidence for CellClips<'_, F> {
+impl<F: Fn(&[f64]) -> Theta + Sync> Measured for CellClips<'_, F> {
+    type Own = WithOwn;
+
     fn changed(
         &self,
         clip: usize,

@@ -3,7 +3,7 @@
 //! One vector holds the baseline's numbers and those of every effect of the library, each effect resting where it changes
 //! nothing. A hypothesis is a choice of which numbers are free; [`Selected`] makes it a [`ClipModel`] of its own.
 
-use super::scatter::Scatter;
+use super::scatter::{OwnNumbers, Scatter, WithOwn};
 use crate::engine::Engine;
 use crate::estimate::{ClipModel, Impossible, Unknown};
 use crate::forward::arm::following::Moment;
@@ -62,7 +62,7 @@ pub struct Channel {
 /// Where a residual stands.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Row {
-    /// Index into [`Evidence::channels`].
+    /// Index into [`Measured::channels`].
     pub channel: usize,
     /// Part of the clip.
     pub stage: StageName,
@@ -88,7 +88,11 @@ pub enum Reach {
 pub type Near<'a> = (Reach, &'a [f64], Option<(&'a [f64], &'a [f64])>);
 
 /// Clips that tell what each of their residuals is.
-pub trait Evidence: ClipModel {
+pub trait Measured: ClipModel {
+    /// Whether clips have numbers of their own. What is fitted to these clips is of this kind: a clip's own numbers mean nothing to a
+    /// bench that knows none.
+    type Own: OwnNumbers;
+
     /// [`ClipModel::residuals`] where only some can have changed from those of a point nearby: the others may be taken from there,
     /// which saves their simulation.
     ///
@@ -141,6 +145,12 @@ pub trait Evidence: ClipModel {
     }
 }
 
+/// All that was measured, each clip with its own numbers: what a diagnosis is about. Of clips that are looked at in part only
+/// [`Measured`] is known.
+pub trait Evidence: Measured<Own = WithOwn> {}
+
+impl<E: Measured<Own = WithOwn>> Evidence for E {}
+
 /// A hypothesis on some of the clips: `free` numbers of `full`, every residual times the weight of its channel.
 pub struct Selected<'a, E> {
     /// All clips, all numbers.
@@ -155,7 +165,7 @@ pub struct Selected<'a, E> {
     pub weights: &'a [f64],
 }
 
-impl<E: Evidence> Selected<'_, E> {
+impl<E: Measured> Selected<'_, E> {
     /// The full vector for values of the free numbers.
     pub fn numbers(&self, shared: &[f64]) -> Vec<f64> {
         let mut full = self.full.clone();
@@ -175,7 +185,7 @@ impl<E: Evidence> Selected<'_, E> {
     }
 }
 
-impl<E: Evidence> ClipModel for Selected<'_, E> {
+impl<E: Measured> ClipModel for Selected<'_, E> {
     fn clips(&self) -> usize {
         self.clips.len()
     }

@@ -5,10 +5,25 @@
 //! t distribution together (Lange, Little & Taylor 1989), so that one clip that went its own way does not decide.
 
 use crate::estimate::Random;
+use std::fmt::Debug;
 use std::ops::Range;
 
 /// Degrees of freedom of the heavy tails: low enough that ten sigmas are met now and then.
 const FREEDOM: f64 = 3.0;
+
+/// Whether the clips of a bench have numbers of their own.
+pub trait OwnNumbers: Debug + Clone + Copy + Send + Sync + 'static {}
+
+/// Each clip has those that its evidence names, of some evidence none.
+#[derive(Debug, Clone, Copy)]
+pub struct WithOwn;
+
+/// No clip has any.
+#[derive(Debug, Clone, Copy)]
+pub struct WithoutOwn;
+
+impl OwnNumbers for WithOwn {}
+impl OwnNumbers for WithoutOwn {}
 
 /// The own numbers of a clip.
 #[derive(Debug, Clone)]

@@ -10,9 +10,9 @@
 //! models differ by in what a number changes. What is chosen is fitted to the engine's own roll-outs afterwards.
 
 use super::bench::Bench;
-use crate::diagnose::evidence::measured::{Channel, Evidence, Group, Near, Reach, Row};
+use crate::diagnose::evidence::measured::{Channel, Evidence, Group, Measured, Near, Reach, Row};
 use crate::diagnose::evidence::recent::Recent;
-use crate::diagnose::evidence::scatter::Scatter;
+use crate::diagnose::evidence::scatter::{Scatter, WithOwn};
 use crate::engine::Engine;
 use crate::estimate::{ClipModel, Impossible};
 use crate::forward::arm::following::Moment;
@@ -88,7 +88,9 @@ impl<E: Evidence> ClipModel for Anchored<'_, E> {
     }
 }
 
-impl<E: Evidence> Evidence for Anchored<'_, E> {
+impl<E: Evidence> Measured for Anchored<'_, E> {
+    type Own = WithOwn;
+
     fn changed(
         &self,
         clip: usize,
@@ -183,7 +185,9 @@ mod tests {
         }
     }
 
-    impl Evidence for Bent {
+    impl Measured for Bent {
+        type Own = WithOwn;
+
         fn changed(
             &self,
             _: usize,

@@ -4,13 +4,14 @@
 use super::effort::Effort;
 use super::shortlist::{Scored, hold_numbers};
 use super::sweep::{Point, Precision, Reduced, Swept, sweep};
-use crate::diagnose::evidence::measured::Evidence;
-use crate::diagnose::evidence::scatter::Scatter;
+use crate::diagnose::evidence::measured::Measured;
+use crate::diagnose::evidence::scatter::{Scatter, WithOwn};
 use crate::diagnose::library::Library;
 use crate::interrupt::Interrupt;
 use crate::kept::{Fingerprint, Trail};
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
+use std::marker::PhantomData;
 use twin::effects::{EffectInfo, Place, Role};
 
 /// What every step of the diagnosis is given.
@@ -32,16 +33,20 @@ pub(in crate::diagnose) type Clips = Vec<(usize, Vec<f64>)>;
 
 /// A clip at a hypothesis.
 #[derive(Debug, Clone, Serialize, Deserialize)]
-pub struct FittedClip {
+#[serde(bound = "")]
+pub struct FittedClip<V = WithOwn> {
     /// Index of the clip.
     pub clip: usize,
     /// Its own numbers.
     pub own: Vec<f64>,
     /// Over (residual, free numbers), weighted, own numbers eliminated.
     pub reduced: Reduced,
+    /// Whether clips have own numbers at all.
+    #[serde(skip)]
+    pub kind: PhantomData<V>,
 }
 
-impl FittedClip {
+impl<V> FittedClip<V> {
     /// `-2 ln` of its likelihood.
     #[must_use]
     pub fn deviance(&self) -> f64 {
@@ -49,9 +54,11 @@ impl FittedClip {
     }
 }
 
-/// A hypothesis with its numbers.
+/// A hypothesis with its numbers, of a bench whose clips have own numbers or have none: the other kind of bench takes its numbers
+/// alone ([`Bench::fit`] from there), never the hypothesis.
 #[derive(Debug, Clone, Serialize, Deserialize)]
-pub struct Hypothesis {
+#[serde(bound = "")]
+pub struct Hypothesis<V = WithOwn> {
     /// Candidates that act, in the order in which they were found.
     pub effects: Vec<usize>,
     /// All numbers.
@@ -59,10 +66,16 @@ pub struct Hypothesis {
     /// Indices of the free ones.
     pub free: Vec<usize>,
     /// Clips it was fitted to.
-    pub fitted: Vec<FittedClip>,
+    pub fitted: Vec<FittedClip<V>>,
 }
 
-impl Hypothesis {
+impl<V> Hypothesis<V> {
+    /// Clips it was fitted to.
+    #[must_use]
+    pub fn clips(&self) -> Vec<usize> {
+        self.fitted.iter().map(|fitted| fitted.clip).collect()
+    }
+
     /// `-2 ln` of the likelihood of the clips it was fitted to.
     #[must_use]
     pub fn deviance(&self) -> f64 {
@@ -98,7 +111,7 @@ fn least(effect: &EffectInfo) -> f64 {
     }
 }
 
-impl<E: Evidence> Bench<'_, E> {
+impl<E: Measured> Bench<'_, E> {
     /// Numbers that are free when these effects act.
     #[must_use]
     pub fn free(&self, effects: &[usize]) -> Vec<usize> {
@@ -125,9 +138,9 @@ impl<E: Evidence> Bench<'_, E> {
         (effects, full): (&[usize], Vec<f64>),
         clips: &[usize],
         weights: &[f64],
-        near: Option<&Hypothesis>,
+        near: Option<&Hypothesis<E::Own>>,
         effort: Effort,
-    ) -> Option<Hypothesis> {
+    ) -> Option<Hypothesis<E::Own>> {
         let count = self.scatter.count();
         let own = |clip: &usize| (*clip, near.map_or_else(|| vec![0.0; count], |near| near.own(*clip, count)));
         let from: Clips = clips.iter().map(own).collect();
@@ -148,7 +161,7 @@ impl<E: Evidence> Bench<'_, E> {
         from: Clips,
         weights: &[f64],
         effort: Effort,
-    ) -> Option<Hypothesis> {
+    ) -> Option<Hypothesis<E::Own>> {
         let free = if effort.frees_held { self.all_free(effects) } else { self.free(effects) };
         let holds = |k: &usize| effort.holds_joints && self.library.joints[*k].is_some();
         let moving: Vec<usize> = free.iter().copied().filter(|k| !holds(k)).collect();
@@ -162,7 +175,12 @@ impl<E: Evidence> Bench<'_, E> {
             None => self.linearise(&full, &free, &restarted, effort.precision)?,
         };
         let forms = at.reduced(self.evidence, weights);
-        let fitted = restarted.into_iter().zip(forms).map(|((clip, own), reduced)| FittedClip { clip, own, reduced });
+        let fitted = restarted.into_iter().zip(forms).map(|((clip, own), reduced)| FittedClip {
+            clip,
+            own,
+            reduced,
+            kind: PhantomData,
+        });
         Some(Hypothesis { effects: effects.to_vec(), full, free, fitted: fitted.collect() })
     }
 
@@ -170,7 +188,7 @@ impl<E: Evidence> Bench<'_, E> {
     /// twin has no answer there.
     pub(in crate::diagnose) fn after_a_step(
         &self,
-        (from, full): (&Hypothesis, Vec<f64>),
+        (from, full): (&Hypothesis<E::Own>, Vec<f64>),
         moving: &[usize],
         weights: &[f64],
     ) -> Option<(f64, Vec<f64>)> {
@@ -201,12 +219,12 @@ impl<E: Evidence> Bench<'_, E> {
     #[must_use]
     pub fn extend(
         &self,
-        from: &Hypothesis,
+        from: &Hypothesis<E::Own>,
         (candidate, full): (usize, Vec<f64>),
         clips: &[usize],
         weights: &[f64],
         effort: Effort,
-    ) -> Option<Hypothesis> {
+    ) -> Option<Hypothesis<E::Own>> {
         let mut effects = from.effects.clone();
         effects.push(candidate);
         self.fit((&effects, full), clips, weights, Some(from), effort)
@@ -245,19 +263,34 @@ impl<E: Evidence> Bench<'_, E> {
 
     /// Clips that were not fitted, at a hypothesis' numbers with their own ones at their best.
     #[must_use]
-    pub fn judge(&self, hypothesis: &Hypothesis, clips: &[usize], weights: &[f64]) -> Option<Vec<FittedClip>> {
+    pub fn judge(
+        &self,
+        hypothesis: &Hypothesis<E::Own>,
+        clips: &[usize],
+        weights: &[f64],
+    ) -> Option<Vec<FittedClip<E::Own>>> {
         let step = self.step("judge").with(&clips).with_numbers(&hypothesis.full).with_numbers(weights);
         self.trail.0.once(&step, || self.judged(hypothesis, clips, weights))
     }
 
-    fn judged(&self, hypothesis: &Hypothesis, clips: &[usize], weights: &[f64]) -> Option<Vec<FittedClip>> {
+    fn judged(
+        &self,
+        hypothesis: &Hypothesis<E::Own>,
+        clips: &[usize],
+        weights: &[f64],
+    ) -> Option<Vec<FittedClip<E::Own>>> {
         let nothing = vec![0.0; self.scatter.count()];
         let clips = clips.iter().map(|clip| (*clip, nothing.clone())).collect();
         let at = self.own_fitted(&hypothesis.full, clips, weights)?;
         let at = self.restarted(&hypothesis.full, at, weights);
         let swept = self.linearise(&hypothesis.full, &[], &at, Precision::Exact)?;
         let forms = swept.reduced(self.evidence, weights);
-        let judged = at.into_iter().zip(forms).map(|((clip, own), reduced)| FittedClip { clip, own, reduced });
+        let judged = at.into_iter().zip(forms).map(|((clip, own), reduced)| FittedClip {
+            clip,
+            own,
+            reduced,
+            kind: PhantomData,
+        });
         Some(judged.collect())
     }
 
@@ -288,7 +321,7 @@ impl<E: Evidence> Bench<'_, E> {
     /// Whether an effect of a hypothesis does no more to commands that another changes already than shift them by a control
     /// period: from which period on a filtered command acts is every engine's own.
     #[must_use]
-    pub fn is_convention(&self, effect: usize, hypothesis: &Hypothesis) -> bool {
+    pub fn is_convention(&self, effect: usize, hypothesis: &Hypothesis<E::Own>) -> bool {
         let of_commands = |k: &usize| self.library.candidates[*k].effect.acts_on == Place::CommandPath;
         let weak = |size: &usize| hypothesis.full[*size] - self.library.unknowns[*size].start < CONVENTION;
         of_commands(&effect)
@@ -298,7 +331,7 @@ impl<E: Evidence> Bench<'_, E> {
 
     /// The sum of fitted clips' forms, numbers held to their known ranges.
     #[must_use]
-    pub fn held(&self, hypothesis: &Hypothesis) -> DMatrix<f64> {
+    pub fn held(&self, hypothesis: &Hypothesis<E::Own>) -> DMatrix<f64> {
         let size = 1 + hypothesis.free.len();
         let mut sum = hypothesis.fitted.iter().fold(DMatrix::zeros(size, size), |sum, clip| sum + &clip.reduced.form);
         let columns: Vec<_> = hypothesis.free.iter().map(|k| super::sweep::Column::Number(*k)).collect();

@@ -1,11 +1,11 @@
 //! What clips cost at numbers: squared weighted residuals, and the clips' own numbers in their sigmas.
 
-use super::bench::{Bench, Hypothesis};
-use crate::diagnose::evidence::measured::{Evidence, Selected};
+use super::bench::Bench;
+use crate::diagnose::evidence::measured::{Measured, Selected};
 use crate::estimate::ClipModel as _;
 use rayon::prelude::*;
 
-impl<E: Evidence> Bench<'_, E> {
+impl<E: Measured> Bench<'_, E> {
     /// Sum of squared weighted residuals and of the own numbers in their sigmas.
     pub(in crate::diagnose) fn cost(&self, full: &[f64], clips: &[(usize, Vec<f64>)], weights: &[f64]) -> Option<f64> {
         Some(self.costs(full, clips, weights)?.iter().sum::<f64>()).filter(|cost| cost.is_finite())
@@ -28,20 +28,19 @@ impl<E: Evidence> Bench<'_, E> {
         clips.par_iter().map(one).collect()
     }
 
-    /// The cost of the clips of a hypothesis at other shared numbers, their own numbers at rest: where they were fitted
-    /// they hide a part of the gap.
+    /// The cost of clips with their own numbers at rest: where these were fitted they hide a part of the gap.
     #[must_use]
-    pub fn plain_cost(&self, from: &Hypothesis, full: &[f64], weights: &[f64]) -> Option<f64> {
+    pub fn plain_cost(&self, clips: &[usize], full: &[f64], weights: &[f64]) -> Option<f64> {
         let nothing = vec![0.0; self.scatter.count()];
-        let clips: Vec<_> = from.fitted.iter().map(|fitted| (fitted.clip, nothing.clone())).collect();
+        let clips: Vec<_> = clips.iter().map(|clip| (*clip, nothing.clone())).collect();
         self.cost(full, &clips, weights)
     }
 
     /// [`Self::plain_cost`] where it is less than `bound`; clips are not asked any more once it is not.
     #[must_use]
-    pub fn plain_cost_below(&self, from: &Hypothesis, full: &[f64], weights: &[f64], bound: f64) -> Option<f64> {
+    pub fn plain_cost_below(&self, clips: &[usize], full: &[f64], weights: &[f64], bound: f64) -> Option<f64> {
         let nothing = vec![0.0; self.scatter.count()];
-        let clips: Vec<_> = from.fitted.iter().map(|fitted| (fitted.clip, nothing.clone())).collect();
+        let clips: Vec<_> = clips.iter().map(|clip| (*clip, nothing.clone())).collect();
         let mut sum = 0.0;
         for some in clips.chunks(rayon::current_num_threads()) {
             for cost in self.costs(full, some, weights)? {

@@ -10,7 +10,7 @@ use super::bench::{Bench, Clips};
 use super::effort::Effort;
 use super::floor;
 use super::sweep::{Reduced, Swept};
-use crate::diagnose::evidence::measured::Evidence;
+use crate::diagnose::evidence::measured::Measured;
 use crate::estimate::Descent;
 use nalgebra::{DMatrix, DVector};
 
@@ -33,7 +33,7 @@ struct Step {
     turned_round: bool,
 }
 
-impl<E: Evidence> Bench<'_, E> {
+impl<E: Measured> Bench<'_, E> {
     /// At most so many damped steps of some numbers and of the clips' own; the last linearisation too, where no step from it was
     /// worth it. `None` when the twin has no answer at the start.
     pub(super) fn descended(
@@ -138,7 +138,7 @@ impl<E: Evidence> Bench<'_, E> {
 mod tests {
     use super::*;
     use crate::diagnose::evidence::measured::{Channel, Group, Row, StageName};
-    use crate::diagnose::evidence::scatter::Scatter;
+    use crate::diagnose::evidence::scatter::{Scatter, WithOwn};
     use crate::diagnose::fit::sweep::Precision;
     use crate::diagnose::library::Library;
     use crate::diagnose::test_bench::{bench, shipped};
@@ -186,7 +186,9 @@ mod tests {
         }
     }
 
-    impl Evidence for Bent<'_> {
+    impl Measured for Bent<'_> {
+        type Own = WithOwn;
+
         fn channels(&self) -> &[Channel] {
             &self.channel
         }

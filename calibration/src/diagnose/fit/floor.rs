@@ -7,7 +7,7 @@
 use super::quadratic::minimum;
 use super::shortlist;
 use super::sweep::{Column, Swept};
-use crate::diagnose::evidence::measured::{Channel, Evidence, Group};
+use crate::diagnose::evidence::measured::{Channel, Group, Measured};
 use crate::diagnose::evidence::noise::{correlation_length, median};
 use crate::diagnose::library::Library;
 use nalgebra::{DMatrix, DVector};
@@ -15,19 +15,19 @@ use nalgebra::{DMatrix, DVector};
 /// Factors while nothing is known of how far the twin is off: the sensors' noise alone. The joints in contact are left out: any
 /// engine is off there by many times their noise.
 #[must_use]
-pub fn sensors_alone(evidence: &impl Evidence) -> Vec<f64> {
+pub fn sensors_alone(evidence: &impl Measured) -> Vec<f64> {
     let known = |channel: &Channel| if channel.group == Group::Contact { 0.0 } else { 1.0 };
     evidence.channels().iter().map(known).collect()
 }
 
 /// Factor on each channel of residuals given clip by clip, one list of values a row.
 #[must_use]
-pub fn weights(evidence: &impl Evidence, clips: &[(usize, Vec<f64>)]) -> Vec<f64> {
+pub fn weights(evidence: &impl Measured, clips: &[(usize, Vec<f64>)]) -> Vec<f64> {
     let channels = evidence.channels().len();
     (0..channels).map(|channel| weight(evidence, clips, channel)).collect()
 }
 
-fn weight(evidence: &impl Evidence, clips: &[(usize, Vec<f64>)], channel: usize) -> f64 {
+fn weight(evidence: &impl Measured, clips: &[(usize, Vec<f64>)], channel: usize) -> f64 {
     let of_clip = |(clip, residuals): &(usize, Vec<f64>)| {
         let of_channel: Vec<f64> = (evidence.rows(*clip).iter().zip(residuals))
             .filter(|(row, _)| row.channel == channel)
@@ -56,7 +56,7 @@ fn weight(evidence: &impl Evidence, clips: &[(usize, Vec<f64>)], channel: usize)
 #[must_use]
 pub fn richest_residuals(
     swept: &Swept,
-    evidence: &impl Evidence,
+    evidence: &impl Measured,
     library: &Library,
     weights: &[f64],
 ) -> Vec<(usize, Vec<f64>)> {
@@ -86,7 +86,7 @@ pub fn richest_residuals(
 #[must_use]
 pub fn residuals_at(
     swept: &Swept,
-    evidence: &impl Evidence,
+    evidence: &impl Measured,
     weights: &[f64],
     free: &[usize],
     at: &[f64],

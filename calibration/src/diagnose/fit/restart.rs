@@ -6,7 +6,7 @@
 
 use super::bench::{Bench, Clips};
 use super::sweep::Precision;
-use crate::diagnose::evidence::measured::Evidence;
+use crate::diagnose::evidence::measured::Measured;
 use crate::diagnose::evidence::noise::median;
 use nalgebra::DVector;
 
@@ -19,7 +19,7 @@ const LEAST: f64 = 100.0;
 const TRIED: [f64; 4] = [-5.0, -2.5, 2.5, 5.0];
 const KEPT: [f64; 2] = [0.5, 1.0];
 
-impl<E: Evidence> Bench<'_, E> {
+impl<E: Measured> Bench<'_, E> {
     /// Clips with their own numbers, those that stand out where they cost least; those without an answer as they were.
     pub(in crate::diagnose) fn restarted(&self, full: &[f64], mut clips: Clips, weights: &[f64]) -> Clips {
         if self.scatter.count() == self.scatter.heavy.len() {
@@ -76,7 +76,7 @@ fn outstanding(costs: &[f64]) -> Vec<usize> {
 mod tests {
     use super::*;
     use crate::diagnose::evidence::measured::{Channel, Group, Row, StageName};
-    use crate::diagnose::evidence::scatter::Scatter;
+    use crate::diagnose::evidence::scatter::{Scatter, WithOwn};
     use crate::diagnose::library::Library;
     use crate::diagnose::test_bench::{bench, shipped};
     use crate::estimate::{ClipModel, Impossible, Random};
@@ -103,7 +103,9 @@ mod tests {
         }
     }
 
-    impl Evidence for TouchedTwice {
+    impl Measured for TouchedTwice {
+        type Own = WithOwn;
+
         fn channels(&self) -> &[Channel] {
             &self.0
         }

@@ -9,7 +9,7 @@
 //! ([`Precision::Joints`]): a stiff controller leaves little of one joint in another. That costs a seventh of turning
 //! them one by one ([`Precision::Exact`]).
 
-use crate::diagnose::evidence::measured::{Evidence, Group, Reach};
+use crate::diagnose::evidence::measured::{Group, Measured, Reach};
 use crate::diagnose::evidence::scatter::Scatter;
 use crate::diagnose::evidence::scatter_scale::Around;
 use crate::diagnose::library::{Alternative, Library};
@@ -94,7 +94,7 @@ type Batch = Vec<usize>;
 /// [`Impossible`] when the point itself has no answer, or `go_on` says no; it is told, before each simulation, which share of a
 /// clip's that is. A column without an answer counts as one that changes nothing.
 pub fn sweep(
-    evidence: &impl Evidence,
+    evidence: &impl Measured,
     library: &Library,
     point: &Point<'_>,
     scatter: &Scatter,
@@ -159,7 +159,7 @@ struct Work<'a, E, G> {
     go_on: &'a G,
 }
 
-impl<E: Evidence, G: Fn(f64) -> bool + Sync> Work<'_, E, G> {
+impl<E: Measured, G: Fn(f64) -> bool + Sync> Work<'_, E, G> {
     fn clip(&self, clip: usize, own: &[f64]) -> Result<SweptClip, Impossible> {
         let mut base = Vec::new();
         self.evidence.residuals(clip, self.full, own, &mut base)?;
@@ -265,11 +265,11 @@ impl<E: Evidence, G: Fn(f64) -> bool + Sync> Work<'_, E, G> {
 impl Swept {
     /// Each clip with channel weights and its own numbers eliminated.
     #[must_use]
-    pub fn reduced(&self, evidence: &impl Evidence, weights: &[f64]) -> Vec<Reduced> {
+    pub fn reduced(&self, evidence: &impl Measured, weights: &[f64]) -> Vec<Reduced> {
         self.clips.par_iter().map(|clip| self.reduce(clip, evidence, weights)).collect()
     }
 
-    fn reduce(&self, clip: &SweptClip, evidence: &impl Evidence, weights: &[f64]) -> Reduced {
+    fn reduce(&self, clip: &SweptClip, evidence: &impl Measured, weights: &[f64]) -> Reduced {
         let gram = gram(clip, evidence, weights);
         // The residual and the clip's own numbers, without the columns between them.
         let of_clip = |k: usize| if k == 0 { 0 } else { self.columns.len() + k };
@@ -290,7 +290,7 @@ impl Swept {
     pub fn own_after(
         &self,
         clip: &SweptClip,
-        evidence: &impl Evidence,
+        evidence: &impl Measured,
         weights: &[f64],
         at: &DVector<f64>,
     ) -> Vec<f64> {
@@ -303,7 +303,7 @@ impl Swept {
 }
 
 /// Products of all columns of a clip, weighted.
-fn gram(clip: &SweptClip, evidence: &impl Evidence, weights: &[f64]) -> DMatrix<f64> {
+fn gram(clip: &SweptClip, evidence: &impl Measured, weights: &[f64]) -> DMatrix<f64> {
     let mut weighted = clip.matrix.clone();
     let factors: Vec<f64> = evidence.rows(clip.clip).iter().map(|row| weights[row.channel]).collect();
     for mut column in weighted.column_iter_mut() {

@@ -3,7 +3,7 @@
 
 use super::bench::{Bench, FittedClip, Hypothesis};
 use super::floor;
-use crate::diagnose::evidence::measured::Evidence;
+use crate::diagnose::evidence::measured::{Evidence, Measured};
 use twin::effects::Search;
 
 /// What a number may change of the clips' squared residuals, as a share and at least, and still be one that nothing depends
@@ -25,14 +25,15 @@ pub fn without<E: Evidence>(bench: &Bench<'_, E>, hypothesis: &Hypothesis) -> Hy
 
 /// The sizes of an effect on the arm that nothing depends on.
 #[must_use]
-pub fn sizes<E: Evidence>(bench: &Bench<'_, E>, hypothesis: &Hypothesis, effect: usize) -> Vec<usize> {
+pub fn sizes<E: Measured>(bench: &Bench<'_, E>, hypothesis: &Hypothesis<E::Own>, effect: usize) -> Vec<usize> {
     let candidate = &bench.library.candidates[effect];
     // Of one number it is known that something depends on it: it was found.
     if !candidate.is_of_arm() || candidate.sizes.len() < 2 {
         return Vec::new();
     }
     let even = floor::sensors_alone(bench.evidence);
-    let cost = |full: &[f64]| bench.plain_cost(hypothesis, full, &even).unwrap_or(f64::INFINITY);
+    let clips = hypothesis.clips();
+    let cost = |full: &[f64]| bench.plain_cost(&clips, full, &even).unwrap_or(f64::INFINITY);
     let now = cost(&hypothesis.full);
     let mut full = hypothesis.full.clone();
     let mut unseen = Vec::new();

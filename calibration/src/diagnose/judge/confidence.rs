@@ -82,6 +82,7 @@ mod tests {
     use crate::forward::setting;
     use nalgebra::DMatrix;
     use shared_mem::msg::MAX_JOINTS;
+    use std::marker::PhantomData;
 
     fn trial(candidate: usize, nats: f64, closes: f64) -> Trial {
         let predicted =
@@ -167,7 +168,7 @@ mod tests {
             let mut leaves = trial(candidate, 100.0, 0.9);
             leaves.own_numbers = own_numbers;
             if let Some((fit, _)) = &mut leaves.fitted {
-                fit.fitted = vec![FittedClip { clip: 0, own: Vec::new(), reduced }];
+                fit.fitted = vec![FittedClip { clip: 0, own: Vec::new(), reduced, kind: PhantomData }];
             }
             leaves
         };

@@ -7,7 +7,7 @@
 //! but the stiffness follows by linear least squares. The stiffness hardly shows there, since slow motion tells ratios alone; it is
 //! taken where the simulated clips cost least, each joint by itself.
 
-use crate::diagnose::evidence::measured::Evidence;
+use crate::diagnose::evidence::measured::Measured;
 use crate::diagnose::fit::bench::{Bench, Hypothesis};
 use crate::diagnose::known_gains;
 use crate::diagnose::library::{Candidate, Library};
@@ -34,9 +34,9 @@ const TURNS: usize = 15;
 const FAR: f64 = 2.385;
 
 /// Numbers at which the fit of a candidate begins; `None` where it is no dry friction, the gains are known, or the law is another.
-pub(in crate::diagnose) fn start<E: Evidence>(
+pub(in crate::diagnose) fn start<E: Measured>(
     bench: &Bench<'_, E>,
-    (from, weights): (&Hypothesis, &[f64]),
+    (from, weights): (&Hypothesis<E::Own>, &[f64]),
     candidate: &Candidate,
 ) -> Option<Vec<f64>> {
     let library = bench.library;
@@ -44,7 +44,7 @@ pub(in crate::diagnose) fn start<E: Evidence>(
     if joints.is_empty() {
         return None;
     }
-    let clips: Vec<usize> = from.fitted.iter().map(|fitted| fitted.clip).collect();
+    let clips = from.clips();
     let moments: Vec<Moment> = clips.par_iter().flat_map(|clip| bench.evidence.following(*clip)).collect();
     if moments.is_empty() {
         return None;
@@ -69,20 +69,25 @@ pub(in crate::diagnose) fn start<E: Evidence>(
 
 /// The numbers, with what the candidate holds while it is searched at its lower end where that costs less: a joint that creeps
 /// leaves within seconds what one that sticks keeps.
-fn sticking<E: Evidence>(
+fn sticking<E: Measured>(
     bench: &Bench<'_, E>,
-    (from, weights): (&Hypothesis, &[f64]),
+    (from, weights): (&Hypothesis<E::Own>, &[f64]),
     candidate: &Candidate,
     full: Vec<f64>,
 ) -> Vec<f64> {
     let mut held = full.clone();
     candidate.held.iter().for_each(|number| held[*number] = bench.library.unknowns[*number].lower);
-    let cost = |full: &[f64]| bench.plain_cost(from, full, weights).unwrap_or(f64::INFINITY);
+    let clips = from.clips();
+    let cost = |full: &[f64]| bench.plain_cost(&clips, full, weights).unwrap_or(f64::INFINITY);
     if cost(&held) < cost(&full) { held } else { full }
 }
 
 /// What the clips of a hypothesis cost in the channels of each joint at other numbers.
-fn of_joints<E: Evidence>(bench: &Bench<'_, E>, from: &Hypothesis, (full, weights): (&[f64], &[f64])) -> Vec<f64> {
+fn of_joints<E: Measured>(
+    bench: &Bench<'_, E>,
+    from: &Hypothesis<E::Own>,
+    (full, weights): (&[f64], &[f64]),
+) -> Vec<f64> {
     let channels = bench.evidence.channels();
     let dof = channels.iter().filter_map(|channel| channel.joint).max().map_or(0, |last| last + 1);
     let of_clip = |clip: usize| {

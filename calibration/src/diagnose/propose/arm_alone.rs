@@ -5,8 +5,8 @@
 use super::screening::arm_gap_is_open;
 use super::starts;
 use crate::diagnose::clips::split::Split;
-use crate::diagnose::evidence::measured::{Channel, Evidence, Near, Reach, Row};
-use crate::diagnose::evidence::scatter::Scatter;
+use crate::diagnose::evidence::measured::{Channel, Evidence, Measured, Near, Reach, Row};
+use crate::diagnose::evidence::scatter::{Scatter, WithoutOwn};
 use crate::diagnose::fit::bench::{Bench, Hypothesis};
 use crate::diagnose::fit::effort::{FIRST_PASS, HEAT, LOOK, NEAR};
 use crate::diagnose::fit::{stages, undetermined};
@@ -49,14 +49,15 @@ impl Step {
         }
         let (evidence, weights) = (ArmAlone(bench.evidence), &self.weights);
         let arm = evidence.bench(bench);
-        let at = (&self.from, &weights[..]);
         let fit = |effects: &[usize], full, effort| arm.fit((effects, full), &split.train, weights, None, effort);
+        // What the step extends, as the arm alone sees it.
+        let Some(from) = fit(&self.from.effects, self.from.full.clone(), LOOK) else { return Vec::new() };
         let name = |place: usize| words(bench.library.candidates[self.trials[place].scored.candidate].effect.name);
         bar.stage(stages::ARM_FITS, places.len() as u64);
         let alone = |place: &usize| {
             let scored = &self.trials[*place].scored;
             let effects = [&self.from.effects[..], &[scored.candidate]].concat();
-            let starts = starts::kept(&arm, at, scored, overlooked).into_iter();
+            let starts = starts::kept(&arm, (&from, weights), scored, overlooked).into_iter();
             let begun = starts.filter_map(|start| fit(&effects, start, HEAT));
             let best = begun.min_by(|a, b| a.deviance().total_cmp(&b.deviance()))?;
             Some((*place, fit(&effects, best.full, FIRST_PASS)?))
@@ -65,27 +66,27 @@ impl Step {
             bar.show(done as u64, &format!("{}: {}", stages::ARM_FITS, name(*place)));
             if bench.interrupt.asked() { None } else { alone(place) }
         };
-        let all: Vec<(usize, Hypothesis)> = places.iter().enumerate().filter_map(unless_asked).collect();
-        let Some(from) = fit(&self.from.effects, self.from.full.clone(), LOOK) else { return Vec::new() };
+        let all: Vec<(usize, Hypothesis<WithoutOwn>)> = places.iter().enumerate().filter_map(unless_asked).collect();
         let best = all.iter().fold(&from, |best, (_, fit)| if fit.deviance() < best.deviance() { fit } else { best });
         let near = best.deviance() + NEAR.max(NEAR_ON_ARM * (from.deviance() - best.deviance()));
         let anew = if arm_gap_is_open(&self.whole, &self.left) { refined(&best.full) } else { None };
-        let with_object = |(place, alone): (usize, Hypothesis)| {
+        let with_object = |(place, alone): (usize, Hypothesis<WithoutOwn>)| {
             let candidate = self.trials[place].scored.candidate;
             let mut open = undetermined::sizes(&arm, &alone, candidate);
             open.retain(|k| bench.library.joints[*k].is_none());
             let object = |other: &Vec<f64>| bench.library.with_object_of(alone.full.clone(), other);
             let starts = [Some(alone.full.clone()), anew.as_ref().map(object)].into_iter().flatten();
             let look = |start: Vec<f64>| {
-                let full = starts::seen_by_the_object(bench, at, start, &open);
+                let full = starts::seen_by_the_object(bench, (&self.from, weights), start, &open);
                 bench.extend(&self.from, (candidate, full), &split.train, weights, LOOK)
             };
             let looks = starts.filter_map(look);
             Some((place, looks.min_by(|a, b| a.deviance().total_cmp(&b.deviance()))?))
         };
-        let near: Vec<(usize, Hypothesis)> = all.into_iter().filter(|(_, alone)| alone.deviance() < near).collect();
+        let near: Vec<(usize, Hypothesis<WithoutOwn>)> =
+            all.into_iter().filter(|(_, alone)| alone.deviance() < near).collect();
         bar.stage(stages::FITS, (near.len() + others) as u64);
-        let shown = |(done, one): (usize, (usize, Hypothesis))| {
+        let shown = |(done, one): (usize, (usize, Hypothesis<WithoutOwn>))| {
             bar.show(done as u64, &format!("{}: {}", stages::FITS, name(one.0)));
             with_object(one)
         };
@@ -104,7 +105,9 @@ impl<E: Evidence> ClipModel for ArmAlone<'_, E> {
     }
 }
 
-impl<E: Evidence> Evidence for ArmAlone<'_, E> {
+impl<E: Evidence> Measured for ArmAlone<'_, E> {
+    type Own = WithoutOwn;
+
     fn changed(
         &self,
         clip: usize,
@@ -236,6 +239,24 @@ mod tests {
             let [turned, lifted] = [0, 1].map(|joint| (fit.full[sizes[joint]], hidden[sizes[joint]].expect("hidden")));
             assert!((lifted.0 - lifted.1).abs() < 1e-4, "gravity tells it: {lifted:?}");
             assert!((turned.0 - turned.1).abs() < 5e-3, "only the hit tells it: {turned:?}");
+        });
+    }
+
+    #[test]
+    fn play_is_tried_joint_by_joint_on_strokes_whose_clips_have_numbers_of_their_own() {
+        let cell = shipped();
+        let world = with_effect("joint_backlash", 40, Kind::Strokes, &cell);
+        on_strokes((&cell, &world), |bench, even| {
+            assert!(bench.scatter.count() > 0, "strokes have numbers of their own");
+            let library = bench.library;
+            let candidate = library.find("joint_backlash").expect("a candidate");
+            let (step, split) = step(bench, hidden_baseline(library, &world), even, &[candidate]);
+            let bar = Progress::new("nothing", 1);
+            let found = step.fitted_to_the_arm_first(bench, &split, (&[0], true), &|_: &[f64]| None, (&bar, 0));
+            let [(0, fit)] = &found[..] else { panic!("{} fits", found.len()) };
+            assert_eq!(fit.effects, [candidate]);
+            assert!(fit.deviance() < step.from.deviance(), "{} {}", fit.deviance(), step.from.deviance());
+            assert!(fit.fitted.iter().all(|clip| clip.own.len() == bench.scatter.count()));
         });
     }
 

@@ -4,7 +4,7 @@
 //! slope leads from one to the other. So all orders are tried in steps that a fit can bridge, every joint by itself (a
 //! periodogram over the position instead of over time, by least squares: Lomb 1976).
 
-use crate::diagnose::evidence::measured::{Evidence, Reach};
+use crate::diagnose::evidence::measured::{Measured, Reach};
 use crate::diagnose::fit::bench::{Bench, Hypothesis};
 use nalgebra::{Matrix2, Vector2};
 use rayon::prelude::*;
@@ -35,9 +35,9 @@ impl Waves {
 
 /// Numbers with the candidate's ripple at the order, strength and phase that suit each joint best; `None` where the twin has
 /// no answer. `from`: what acts already, and the clips.
-pub(in crate::diagnose) fn start<E: Evidence>(
+pub(in crate::diagnose) fn start<E: Measured>(
     bench: &Bench<'_, E>,
-    (from, weights): (&Hypothesis, &[f64]),
+    (from, weights): (&Hypothesis<E::Own>, &[f64]),
     candidate: usize,
 ) -> Option<Vec<f64>> {
     let ripple = &bench.library.candidates[candidate];

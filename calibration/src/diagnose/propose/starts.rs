@@ -3,7 +3,7 @@
 //! does nothing below a threshold, joint by joint.
 
 use super::{along_motion, ripple};
-use crate::diagnose::evidence::measured::Evidence;
+use crate::diagnose::evidence::measured::Measured;
 use crate::diagnose::fit::bench::{Bench, Hypothesis};
 use crate::diagnose::fit::shortlist::Scored;
 use crate::diagnose::library::Candidate;
@@ -38,9 +38,9 @@ const BY_JOINT: [f64; 4] = [0.1, 0.3, 1.0, 3.0];
 const ALL_ALONG: [f64; 10] = [-9.0, -7.0, -5.0, -3.0, -1.0, 1.0, 3.0, 5.0, 7.0, 9.0];
 
 /// [`of`], worked out unless it is known.
-pub(in crate::diagnose) fn kept<E: Evidence>(
+pub(in crate::diagnose) fn kept<E: Measured>(
     bench: &Bench<'_, E>,
-    (from, weights): (&Hypothesis, &[f64]),
+    (from, weights): (&Hypothesis<E::Own>, &[f64]),
     scored: &Scored,
     overlooked: bool,
 ) -> Vec<Vec<f64>> {
@@ -49,9 +49,9 @@ pub(in crate::diagnose) fn kept<E: Evidence>(
 }
 
 /// Numbers at which fits of a candidate begin; `overlooked`: the score test did not point to it.
-fn of<E: Evidence>(
+fn of<E: Measured>(
     bench: &Bench<'_, E>,
-    at: (&Hypothesis, &[f64]),
+    at: (&Hypothesis<E::Own>, &[f64]),
     scored: &Scored,
     overlooked: bool,
 ) -> Vec<Vec<f64>> {
@@ -62,7 +62,7 @@ fn of<E: Evidence>(
 /// table) also the forms next to the best; of one beyond the arm also some way to either side, since the object's numbers,
 /// fitted without it, stand in for a part of it; of one whose slope at one point tells little, as where the object is hit
 /// elsewhere, also where the clips cost least.
-fn pointed_at<E: Evidence>(bench: &Bench<'_, E>, at: (&Hypothesis, &[f64]), scored: &Scored) -> Vec<Vec<f64>> {
+fn pointed_at<E: Measured>(bench: &Bench<'_, E>, at: (&Hypothesis<E::Own>, &[f64]), scored: &Scored) -> Vec<Vec<f64>> {
     let candidate = &bench.library.candidates[scored.candidate];
     let mut starts = vec![scored.clone()];
     if candidate.effect.stage == Stage::Slide {
@@ -101,7 +101,7 @@ pub(in crate::diagnose) fn has_places<E>(bench: &Bench<'_, E>, candidate: usize)
 
 /// Where the clips cost least with a candidate in each of its many forms, friction being another beside it: an edge that lies
 /// elsewhere than it is shows no slope towards its place.
-fn placed<E: Evidence>(bench: &Bench<'_, E>, at: (&Hypothesis, &[f64]), scored: &Scored) -> Vec<Vec<f64>> {
+fn placed<E: Measured>(bench: &Bench<'_, E>, at: (&Hypothesis<E::Own>, &[f64]), scored: &Scored) -> Vec<Vec<f64>> {
     let friction = bench.library.settings.settings().iter().position(|setting| *setting == Setting::Friction);
     let forms = 0..bench.library.candidates[scored.candidate].alternatives.len();
     let mut places: Vec<(f64, Vec<f64>)> = Vec::new();
@@ -124,22 +124,22 @@ fn placed<E: Evidence>(bench: &Bench<'_, E>, at: (&Hypothesis, &[f64]), scored: 
 
 /// Of a candidate that the score test did not point to, the strength at which the fitted clips cost least, in any form, unless
 /// they cost far more than without it.
-fn scanned<E: Evidence>(bench: &Bench<'_, E>, at: (&Hypothesis, &[f64]), scored: &Scored) -> Vec<Vec<f64>> {
+fn scanned<E: Measured>(bench: &Bench<'_, E>, at: (&Hypothesis<E::Own>, &[f64]), scored: &Scored) -> Vec<Vec<f64>> {
     let forms = 0..bench.library.candidates[scored.candidate].alternatives.len();
     let starts = forms.flat_map(|alternative| aside(bench, &Scored { alternative, ..scored.clone() }, &SCANNED));
     let numbers = starts.map(|start| bench.begun(at.0.full.clone(), &start));
     let ripples = bench.library.candidates[scored.candidate].is_searched(Search::InStep);
     let in_step = if ripples { ripple::start(bench, at, scored.candidate) } else { None };
-    let most = FAR_OFF * bench.plain_cost(at.0, &at.0.full, at.1).unwrap_or(f64::INFINITY);
+    let most = FAR_OFF * bench.plain_cost(&at.0.clips(), &at.0.full, at.1).unwrap_or(f64::INFINITY);
     let start = cheapest_below(bench, at, numbers.chain(in_step), most);
     let candidate = &bench.library.candidates[scored.candidate];
     start.map(|(_, full)| full).into_iter().chain(without_a_slope(bench, at, candidate)).collect()
 }
 
 /// Numbers of an effect to which no slope leads, joint by joint.
-fn without_a_slope<E: Evidence>(
+fn without_a_slope<E: Measured>(
     bench: &Bench<'_, E>,
-    at: (&Hypothesis, &[f64]),
+    at: (&Hypothesis<E::Own>, &[f64]),
     candidate: &Candidate,
 ) -> Vec<Vec<f64>> {
     let fitted = at.0.full.clone();
@@ -153,13 +153,13 @@ fn without_a_slope<E: Evidence>(
 
 /// Limits of joints, each time that of the joint where the clips then cost least, for as long as that spares something: until the
 /// worst is limited, those of the others mean nothing.
-fn limits<E: Evidence>(
+fn limits<E: Measured>(
     bench: &Bench<'_, E>,
-    at: (&Hypothesis, &[f64]),
+    at: (&Hypothesis<E::Own>, &[f64]),
     candidate: &Candidate,
     mut full: Vec<f64>,
 ) -> Vec<f64> {
-    let mut cost = bench.plain_cost(at.0, &full, at.1).unwrap_or(f64::INFINITY);
+    let mut cost = bench.plain_cost(&at.0.clips(), &full, at.1).unwrap_or(f64::INFINITY);
     for _ in &candidate.sizes {
         let probes = candidate.alternatives[0].probes.iter().filter_map(|probe| probe.moves.first());
         let tried = probes.flat_map(|(size, probed)| {
@@ -185,9 +185,9 @@ fn limits<E: Evidence>(
 
 /// Sizes of an effect in the joints, one joint after the other, where the clips cost least once the gains of that joint are fitted
 /// beside it: gains that were fitted without the effect stand in for it.
-fn joint_by_joint<E: Evidence>(
+fn joint_by_joint<E: Measured>(
     bench: &Bench<'_, E>,
-    (from, weights): (&Hypothesis, &[f64]),
+    (from, weights): (&Hypothesis<E::Own>, &[f64]),
     candidate: &Candidate,
 ) -> Vec<f64> {
     let (library, mut full) = (bench.library, from.full.clone());
@@ -204,7 +204,7 @@ fn joint_by_joint<E: Evidence>(
         };
         let tried = BY_JOINT.iter().filter_map(|share| bench.after_a_step((from, with(*share)), &chosen, weights));
         let best = tried.min_by(|a, b| a.0.total_cmp(&b.0));
-        let now = bench.plain_cost(from, &full, weights).unwrap_or(f64::INFINITY);
+        let now = bench.plain_cost(&from.clips(), &full, weights).unwrap_or(f64::INFINITY);
         full = best.filter(|(cost, _)| *cost < now).map_or(full, |(_, better)| better);
         if bench.interrupt.asked() {
             break;
@@ -215,12 +215,12 @@ fn joint_by_joint<E: Evidence>(
 
 /// The numbers with gains as cell.toml has them: where an arm is driven into its limits, gains that were fitted without these mean
 /// nothing.
-fn with_nominal_arm<E: Evidence>(bench: &Bench<'_, E>, full: Vec<f64>) -> Vec<f64> {
+fn with_nominal_arm<E: Measured>(bench: &Bench<'_, E>, full: Vec<f64>) -> Vec<f64> {
     with_nominal(bench, full, |k| bench.library.joints[k].is_some())
 }
 
 /// The numbers with some of the baseline's as cell.toml has them.
-fn with_nominal<E: Evidence>(bench: &Bench<'_, E>, mut full: Vec<f64>, which: impl Fn(usize) -> bool) -> Vec<f64> {
+fn with_nominal<E: Measured>(bench: &Bench<'_, E>, mut full: Vec<f64>, which: impl Fn(usize) -> bool) -> Vec<f64> {
     bench.library.baseline.clone().filter(|k| which(*k)).for_each(|k| full[k] = bench.library.unknowns[k].start);
     full
 }
@@ -228,9 +228,9 @@ fn with_nominal<E: Evidence>(bench: &Bench<'_, E>, mut full: Vec<f64>, which: im
 /// Some way to either side along each of a candidate's directions, in any of its forms: what the clips cost where they cost
 /// least, and the numbers there. Also with the object as it is said to be: fitted without the effect, its numbers stand in
 /// for it, and would have to be unlearnt.
-pub(in crate::diagnose) fn least_cost_aside<E: Evidence>(
+pub(in crate::diagnose) fn least_cost_aside<E: Measured>(
     bench: &Bench<'_, E>,
-    at: (&Hypothesis, &[f64]),
+    at: (&Hypothesis<E::Own>, &[f64]),
     scored: &Scored,
 ) -> Option<(f64, Vec<f64>)> {
     let alternatives = &bench.library.candidates[scored.candidate].alternatives;
@@ -253,9 +253,9 @@ pub(in crate::diagnose) fn least_cost_aside<E: Evidence>(
 
 /// Numbers of an effect in the joints that the arm's own channels leave open, where the object tells them: nothing but what
 /// the tip hits says how far off a vertical joint's encoder is. `full`: the others, as the arm tells them.
-pub(in crate::diagnose) fn seen_by_the_object<E: Evidence>(
+pub(in crate::diagnose) fn seen_by_the_object<E: Measured>(
     bench: &Bench<'_, E>,
-    at: (&Hypothesis, &[f64]),
+    at: (&Hypothesis<E::Own>, &[f64]),
     full: Vec<f64>,
     open: &[usize],
 ) -> Vec<f64> {
@@ -264,9 +264,9 @@ pub(in crate::diagnose) fn seen_by_the_object<E: Evidence>(
 
 /// Numbers of a candidate, one after the other, where the clips cost least beside those before it: from rest no slope leads
 /// there. `units` of each number's probe are tried, and rest.
-fn one_by_one<E: Evidence>(
+fn one_by_one<E: Measured>(
     bench: &Bench<'_, E>,
-    at: (&Hypothesis, &[f64]),
+    at: (&Hypothesis<E::Own>, &[f64]),
     mut full: Vec<f64>,
     numbers: &[usize],
     units: &[f64],
@@ -287,26 +287,26 @@ fn one_by_one<E: Evidence>(
 
 /// The numbers with the baseline's object as cell.toml has it, but for its friction: how far it slides tells that whatever
 /// the hit was like.
-fn with_nominal_object<E: Evidence>(bench: &Bench<'_, E>, full: Vec<f64>) -> Vec<f64> {
+fn with_nominal_object<E: Measured>(bench: &Bench<'_, E>, full: Vec<f64>) -> Vec<f64> {
     let (library, at) = (bench.library, full.clone());
     with_nominal(bench, full, |k| !library.arm_feels(k, &at) && library.settings.settings()[k] != Setting::Friction)
 }
 
 /// Which numbers make the fitted clips cost least, and how much, where that is less than `bound`. Of numbers that cost more
 /// before all clips were asked the others are not.
-fn cheapest_below<E: Evidence>(
+fn cheapest_below<E: Measured>(
     bench: &Bench<'_, E>,
-    (from, weights): (&Hypothesis, &[f64]),
+    (from, weights): (&Hypothesis<E::Own>, &[f64]),
     numbers: impl Iterator<Item = Vec<f64>>,
     bound: f64,
 ) -> Option<(f64, Vec<f64>)> {
-    let mut best: Option<(f64, Vec<f64>)> = None;
+    let (clips, mut best) = (from.clips(), None::<(f64, Vec<f64>)>);
     for full in numbers {
         if bench.interrupt.asked() {
             break;
         }
         let bound = best.as_ref().map_or(bound, |(cost, _)| *cost);
-        if let Some(cost) = bench.plain_cost_below(from, &full, weights, bound) {
+        if let Some(cost) = bench.plain_cost_below(&clips, &full, weights, bound) {
             best = Some((cost, full));
         }
     }
@@ -314,16 +314,16 @@ fn cheapest_below<E: Evidence>(
 }
 
 /// The same whatever they cost.
-fn cheapest<E: Evidence>(
+fn cheapest<E: Measured>(
     bench: &Bench<'_, E>,
-    at: (&Hypothesis, &[f64]),
+    at: (&Hypothesis<E::Own>, &[f64]),
     numbers: impl Iterator<Item = Vec<f64>>,
 ) -> Option<(f64, Vec<f64>)> {
     cheapest_below(bench, at, numbers, f64::INFINITY)
 }
 
 /// A candidate at shares of the strongest that is met in practice, either way where it acts both ways.
-fn aside<E: Evidence>(bench: &Bench<'_, E>, scored: &Scored, shares: &[f64]) -> Vec<Scored> {
+fn aside<E: Measured>(bench: &Bench<'_, E>, scored: &Scored, shares: &[f64]) -> Vec<Scored> {
     let probes = &bench.library.candidates[scored.candidate].alternatives[scored.alternative].probes;
     let one_sided = probes.iter().any(|probe| probe.one_sided);
     let sides = shares.iter().flat_map(|share| [*share, -share]).filter(|side| *side > 0.0 || !one_sided);
@@ -401,7 +401,7 @@ mod tests {
             let patch = bench.library.find("friction_patch").expect("a candidate");
             let starts = placed(bench, (&from, even), &nothing_said_of(bench.library, patch));
             assert_eq!(starts.len(), PLACES);
-            let cost = |full: &[f64]| bench.plain_cost(&from, full, even).expect("strokes");
+            let cost = |full: &[f64]| bench.plain_cost(&from.clips(), full, even).expect("strokes");
             let costs: Vec<f64> = starts.iter().map(|full| cost(full)).collect();
             assert!(costs.is_sorted() && costs[0] < cost(&from.full), "{costs:?}");
             let places = bench.library.candidates[patch].numbers.clone();

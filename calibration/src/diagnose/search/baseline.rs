@@ -6,7 +6,7 @@
 
 use crate::diagnose::clips::admit::Admitted;
 use crate::diagnose::clips::split::Split;
-use crate::diagnose::evidence::measured::Evidence;
+use crate::diagnose::evidence::measured::{Evidence, Measured};
 use crate::diagnose::fit::bench::{Bench, Hypothesis};
 use crate::diagnose::fit::effort::Effort;
 use crate::diagnose::fit::sweep::Precision;
@@ -41,24 +41,32 @@ pub fn identify<E: Evidence>(
     bar: &Progress,
 ) -> Option<Hypothesis> {
     let even = floor::sensors_alone(bench.evidence);
-    let without_object = ArmAlone(bench.evidence);
-    let alone = without_object.bench(bench);
     bar.show(0, stages::BASELINE);
-    let begun = if cell.robot.is_some() {
-        let arm = alone.fit((&[], start(bench, split, cell, admitted)), &split.train, &even, None, WAY)?;
-        bar.show(1, stages::BASELINE);
-        let arm = alone.fit((&[], arm.full.clone()), &split.train, &even, Some(&arm), LAST)?;
-        if !admitted.with_object {
-            return Some(arm);
+    let begun = match (&cell.robot, admitted.with_object) {
+        (None, _) => bench.library.start(),
+        (Some(_), false) => return of_the_arm(bench, split, start(bench, split, cell, admitted), bar),
+        (Some(_), true) => {
+            let without_object = ArmAlone(bench.evidence);
+            of_the_arm(&without_object.bench(bench), split, start(bench, split, cell, admitted), bar)?.full
         }
-        arm.full
-    } else {
-        bench.library.start()
     };
     bar.show(2, stages::BASELINE);
     let full = refined(bench, split, cell, admitted, &begun).unwrap_or(begun);
     bar.show(3, stages::BASELINE);
     bench.fit((&[], full), &split.train, &even, None, TOGETHER)
+}
+
+/// The arm by itself, from where its numbers begin.
+fn of_the_arm<E: Measured>(
+    bench: &Bench<'_, E>,
+    split: &Split,
+    start: Vec<f64>,
+    bar: &Progress,
+) -> Option<Hypothesis<E::Own>> {
+    let even = floor::sensors_alone(bench.evidence);
+    let on_the_way = bench.fit((&[], start), &split.train, &even, None, WAY)?;
+    bar.show(1, stages::BASELINE);
+    bench.fit((&[], on_the_way.full.clone()), &split.train, &even, Some(&on_the_way), LAST)
 }
 
 /// Where the fit begins.

@@ -54,7 +54,8 @@ fn scanned<E: Evidence>(bench: &Bench<'_, E>, fit: &Hypothesis, weights: &[f64])
         }
         full
     };
-    let cost = |full: &[f64]| arm.plain_cost(fit, full, weights).unwrap_or(f64::INFINITY);
+    let clips = fit.clips();
+    let cost = |full: &[f64]| arm.plain_cost(&clips, full, weights).unwrap_or(f64::INFINITY);
     let mut tried: Vec<(f64, f64)> = SCANNED.iter().map(|share| (*share, cost(&at(*share)))).collect();
     let least = |tried: &[(f64, f64)]| (0..tried.len()).min_by(|a, b| tried[*a].1.total_cmp(&tried[*b].1)).unwrap_or(0);
     for _ in 0..HALVINGS {
