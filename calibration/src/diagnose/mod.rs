@@ -33,6 +33,8 @@ pub mod propose;
 pub mod search;
 #[cfg(test)]
 mod test_bench;
+#[cfg(test)]
+mod test_cell;
 
 pub use answer::{
     Basis, Candidate, Change, Clips, Diagnosis, Gap, Kind, Nearest, NextMotion, Place, Remedy, Rest, SensorGap,
@@ -294,4 +296,20 @@ fn examine<E: Evidence>(
         concluded.verdict = concluded.verdict.so_far(options.budget.unwrap_or_default(), cut_short);
     }
     Ok(concluded)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::test_cell::{changed, filled};
+    use super::*;
+    use shared_mem::recording::SessionFiles;
+
+    #[test]
+    fn a_cell_without_its_robot_is_the_same_but_for_that() {
+        let cell = filled();
+        let session = Session { folder: PathBuf::new(), cell, clips: Vec::new(), files: SessionFiles::default() };
+        let changed = changed(&session.cell, &without_robot(&session).cell);
+        let of_robot = |key: &String| ["robot.", "controller.", "tool."].iter().any(|block| key.starts_with(block));
+        assert!(!changed.is_empty() && changed.iter().all(of_robot), "{changed:?}");
+    }
 }

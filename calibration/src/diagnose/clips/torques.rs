@@ -28,11 +28,17 @@ pub(in crate::diagnose) fn cell(cell: &Cell) -> Option<Cell> {
     if cell.robot.as_ref().is_none_or(Robot::joints_only) {
         return None;
     }
+    // Of the law nothing is left; what is known of motors and sensors stays.
     let controller = Controller {
         kind: ControllerKind::Tracking,
-        rotor_inertia: controller.rotor_inertia.clone(),
-        torque_sensing: controller.torque_sensing,
-        ..Controller::default()
+        stiffness: Vec::new(),
+        damping: Vec::new(),
+        stiffness_range: None,
+        damping_range: None,
+        torque_limit: Vec::new(),
+        integral_rate: Vec::new(),
+        voltage_limit: Vec::new(),
+        ..controller.clone()
     };
     Some(Cell { controller: Some(controller), ..cell.clone() })
 }
@@ -61,7 +67,26 @@ pub(in crate::diagnose) fn followed(mut clip: Clip) -> Option<Clip> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::diagnose::test_cell::{changed, filled};
     use shared_mem::theta::ArmTheta;
+
+    #[test]
+    fn a_cell_whose_arm_goes_where_it_was_measured_is_the_same_but_for_the_law() {
+        let given = filled();
+        let tracking = cell(&given).expect("a model");
+        let law = [
+            "kind",
+            "stiffness",
+            "damping",
+            "stiffness_range",
+            "damping_range",
+            "torque_limit",
+            "integral_rate",
+            "voltage_limit",
+        ];
+        assert_eq!(changed(&given, &tracking), law.map(|key| format!("controller.{key}")).into());
+        assert!(is_tracking(&tracking));
+    }
 
     #[test]
     fn gains_of_the_law_that_keeps_the_arm_on_its_way_are_no_finding() {
