@@ -29,12 +29,11 @@ pub fn all<E: Evidence>(bench: &Bench<'_, E>, split: &Split, baseline: &Hypothes
     let (full, free) = (&baseline.full[..], &baseline.free[..]);
     let point = Point { full, free, probed: &probed, clips: &clips, precision: Precision::Joints };
     let nothing = || said(&[]);
-    let Ok(swept) = sweep(bench.evidence, bench.library, &point, &Scatter::default(), &|_| true) else {
-        return NAMES.map(|_| nothing()).to_vec();
-    };
     let even = floor::sensors_alone(bench.evidence);
+    let swept = sweep(bench.evidence, bench.library, &point, &Scatter::default(), &|_| true);
+    let reduced = swept.and_then(|swept| Ok((swept.reduced(bench.evidence, &even)?, swept)));
+    let Ok((reduced, swept)) = reduced else { return NAMES.map(|_| nothing()).to_vec() };
     let size = 1 + swept.columns.len();
-    let reduced = swept.reduced(bench.evidence, &even);
     let sum = reduced.iter().fold(DMatrix::zeros(size, size), |sum, clip| sum + &clip.form);
     let rows: usize = split.train.iter().map(|clip| bench.evidence.rows(*clip).len()).sum();
     vec![largest_error(bench, &swept), everything(bench, &swept, &sum), sample_bic(bench, &swept, &sum, rows)]

@@ -5,6 +5,7 @@
 //! What remains is a quadratic form in `(1, dx)` (a Schur complement) and the logarithm of the volume that was integrated over:
 //! that of a Gaussian whose covariance is `1 + B L^-1 B'`.
 
+use super::problem::Impossible;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 /// A clip without its own numbers. `P` shared numbers, `Q` own ones.
@@ -22,14 +23,17 @@ impl Eliminated {
     /// From the products of all columns, `gram` over (residual, `A`, `B`), the precisions and the clip's own numbers `u` there, `Q`
     /// each. A number that does not scatter has no slope and any precision, which keeps it where it is.
     ///
-    /// # Panics
-    /// Where a precision is not positive.
-    #[must_use]
-    pub fn of(gram: &DMatrix<f64>, precision: &[f64], u: &[f64]) -> Self {
+    /// # Errors
+    /// [`Impossible`] where a product is not finite, or products are so large that their rounding swallows the precisions, which are
+    /// positive.
+    pub fn of(gram: &DMatrix<f64>, precision: &[f64], u: &[f64]) -> Result<Self, Impossible> {
+        if !gram.iter().chain(u).all(|number| number.is_finite()) {
+            return Err(Impossible("what the clips leave, or its slopes, is too large to be squared".into()));
+        }
         let (own, kept) = (u.len(), gram.ncols() - u.len());
         let mut form = gram.view((0, 0), (kept, kept)).into_owned();
         if own == 0 {
-            return Self { form, volume: 0.0, inner: None, follows: DMatrix::zeros(0, kept) };
+            return Ok(Self { form, volume: 0.0, inner: None, follows: DMatrix::zeros(0, kept) });
         }
         let mut inner = gram.view((kept, kept), (own, own)).into_owned();
         let mut cross = gram.view((kept, 0), (own, kept)).into_owned();
@@ -38,11 +42,13 @@ impl Eliminated {
             cross[(k, 0)] += precision * u;
             form[(0, 0)] += precision * u * u;
         }
-        let inner = Cholesky::new(inner).expect("a Gram matrix plus positive precisions is positive definite");
+        let Some(inner) = Cholesky::new(inner) else {
+            return Err(Impossible("slopes by a clip's own numbers are too large to be told apart".into()));
+        };
         let follows = -inner.solve(&cross);
         form += cross.tr_mul(&follows);
         let volume = inner.ln_determinant() - precision.iter().map(|precision| precision.ln()).sum::<f64>();
-        Self { form, volume, inner: Some(inner), follows }
+        Ok(Self { form, volume, inner: Some(inner), follows })
     }
 
     /// By how much the own numbers change to be at their best after a change `dx` of the shared ones, `Q`.
@@ -73,7 +79,7 @@ mod tests {
         // r = 1 + 2 dx + 3 du in two rows, the second of other signs; u is 0.5 with a precision of 4.
         let columns = DMatrix::from_row_slice(2, 3, &[1.0, 2.0, 3.0, -1.0, 0.5, 1.0]);
         let (precision, u) = (4.0, 0.5);
-        let left = Eliminated::of(&(columns.transpose() * &columns), &[precision], &[u]);
+        let left = Eliminated::of(&(columns.transpose() * &columns), &[precision], &[u]).expect("finite");
         let cost = |dx: f64, du: f64| {
             let rows = &columns * DVector::from_row_slice(&[1.0, dx, du]);
             rows.norm_squared() + precision * (u + du).powi(2)
@@ -91,7 +97,22 @@ mod tests {
     #[test]
     fn a_clip_without_own_numbers_is_its_own_form() {
         let gram = DMatrix::from_row_slice(2, 2, &[3.0, 1.0, 1.0, 2.0]);
-        let left = Eliminated::of(&gram, &[], &[]);
+        let left = Eliminated::of(&gram, &[], &[]).expect("finite");
         assert!(left.form == gram && left.volume == 0.0 && left.own_change(&DVector::zeros(1)).is_empty());
+    }
+    #[test]
+    fn products_that_no_double_holds_or_that_swallow_the_precisions_are_an_error_and_no_panic() {
+        for large in [f64::INFINITY, f64::NAN, f64::MAX] {
+            let columns = DMatrix::from_row_slice(1, 2, &[large, 1.0]);
+            assert!(Eliminated::of(&(columns.transpose() * &columns), &[], &[]).is_err(), "{large}");
+            assert!(Eliminated::of(&(columns.transpose() * &columns), &[1.0], &[0.0]).is_err(), "{large}");
+        }
+        // Two own numbers that do the same: their difference is held by the precision of 1 alone.
+        for (slope, holds) in [(1e3, true), (1e20, false)] {
+            let columns = DMatrix::from_row_slice(2, 3, &[1.0, slope, slope, 1.0, 3.0 * slope, 3.0 * slope]);
+            let left = Eliminated::of(&(columns.transpose() * &columns), &[1.0, 1.0], &[0.0, 0.0]);
+            assert_eq!(left.is_ok(), holds, "{slope}");
+        }
+        assert!(Eliminated::of(&DMatrix::identity(2, 2), &[1.0], &[f64::NAN]).is_err());
     }
 }

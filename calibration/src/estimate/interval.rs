@@ -101,6 +101,10 @@ fn inverse(information: &DMatrix<f64>, free: &[usize]) -> DMatrix<f64> {
     }
     let scale: Vec<f64> = free.iter().map(|k| information[(*k, *k)].sqrt()).collect();
     let scaled = DMatrix::from_fn(n, n, |i, j| information[(free[i], free[j])] / (scale[i] * scale[j]));
+    // The search for eigenvalues of what is not finite has no end.
+    if !scaled.iter().all(|value| value.is_finite()) {
+        return DMatrix::zeros(n, n);
+    }
     let eigen = scaled.symmetric_eigen();
     let lost: Vec<bool> = (0..n)
         .map(|i| (0..n).any(|e| eigen.eigenvalues[e] < COLLINEAR && eigen.eigenvectors[(i, e)].abs() > 0.1))

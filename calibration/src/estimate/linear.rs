@@ -42,7 +42,7 @@ impl ClipFit {
     /// Linearises a clip at (`shared`, `own`). Costs `1 + P + Q` evaluations, `Q` counting only random effects that scatter.
     ///
     /// # Errors
-    /// [`Impossible`] when the model has no answer at the point itself. A step without an answer is tried the other way,
+    /// [`Impossible`] when the model has no answer at the point itself, or one that is too large to be squared. A step without an answer is tried the other way,
     /// and then counts as one that changes nothing.
     pub fn at(
         model: &impl ClipModel,
@@ -58,7 +58,7 @@ impl ClipFit {
         let steps = random.iter().map(|effect| (if effect.sigma > 0.0 { effect.step } else { 0.0 }, f64::INFINITY));
         let b =
             slopes(&base, own, steps, |moved, out| model.stepped(clip, (shared, moved), ((shared, own), &base), out));
-        Ok(Self::eliminate(&DVector::from_vec(base), (&a, &b), (random, own), &model.stretches(clip)))
+        Self::eliminate(&DVector::from_vec(base), (&a, &b), (random, own), &model.stretches(clip))
     }
 
     fn eliminate(
@@ -66,7 +66,7 @@ impl ClipFit {
         (a, b): (&DMatrix<f64>, &DMatrix<f64>),
         (random, own): (&[Random], &[f64]),
         stretches: &[usize],
-    ) -> Self {
+    ) -> Result<Self, Impossible> {
         let (shared, numbers) = (a.ncols(), own.len());
         let mut columns = DMatrix::zeros(r.len(), 1 + shared + numbers);
         columns.set_column(0, r);
@@ -74,7 +74,7 @@ impl ClipFit {
         columns.columns_mut(1 + shared, numbers).copy_from(b);
         let precision = |effect: &Random| if effect.sigma > 0.0 { effect.sigma.powi(-2) } else { 1.0 };
         let precision: Vec<f64> = random.iter().map(precision).collect();
-        let left = Eliminated::of(&(columns.transpose() * &columns), &precision, own);
+        let left = Eliminated::of(&(columns.transpose() * &columns), &precision, own)?;
         let own_answer = left.follows().columns(1, shared).into_owned();
         let starts = std::iter::once(&0).chain(stretches);
         let all = r.len();
@@ -86,7 +86,7 @@ impl ClipFit {
         };
         let scores = starts.zip(ends).map(score).collect();
         let at_rest: f64 = precision.iter().zip(own).map(|(precision, u)| precision * u * u).sum();
-        Self {
+        Ok(Self {
             rows: r.len(),
             chi2: r.norm_squared(),
             own: own.to_vec(),
@@ -97,7 +97,7 @@ impl ClipFit {
             own_covariance: left.own_covariance(),
             own_step: left.own_change(&DVector::zeros(shared)),
             own_answer,
-        }
+        })
     }
 
     /// Where the own numbers want to go with the shared ones held.
@@ -149,7 +149,8 @@ fn slope(
         moved[k] = at[k] + step;
         // What rounding left of the step.
         let step = moved[k] - at[k];
-        if evaluate(&moved, &mut out).is_ok() && out.len() == base.len() {
+        let finite = |out: &[f64]| out.iter().all(|residual| residual.is_finite());
+        if evaluate(&moved, &mut out).is_ok() && out.len() == base.len() && finite(&out) {
             column.iter_mut().zip(&out).zip(base).for_each(|((slope, out), base)| *slope = (out - base) / step);
             return;
         }

@@ -17,7 +17,7 @@ pub struct Witness {
 /// Of directions that one witness tells alone, others hold at least this share: nothing contradicts it there.
 const ALONE: f64 = 0.02;
 
-/// Covariance of the answer; `None` where the information leaves a direction open.
+/// Covariance of the answer; `None` where the information leaves a direction open or is not finite.
 #[must_use]
 pub fn covariance<'a>(
     information: &DMatrix<f64>,
@@ -30,6 +30,10 @@ pub fn covariance<'a>(
         let half = root.solve_lower_triangular(information)?;
         let share = root.solve_lower_triangular(&half.transpose())?;
         let share = (&share + share.transpose()) * 0.5;
+        // The search for eigenvalues of what is not finite has no end.
+        if !share.iter().all(|value| value.is_finite()) {
+            return None;
+        }
         let eigen = share.symmetric_eigen();
         let by = eigen.eigenvalues.map(|share| (1.0 - share).max(ALONE).sqrt().recip());
         let wanted = root.solve_lower_triangular(score)?;

@@ -71,11 +71,12 @@ impl Slopes {
             sweep(bench.evidence, bench.library, &point, &bench.scatter, &|_| !bench.interrupt.asked()).ok()
         };
         let swept = [one(Side::A)?, one(Side::B)?];
-        let weights = known_weights.map_or_else(|| weights(bench, &swept), <[f64]>::to_vec);
-        let clips = [0, 1].map(|side: usize| -> Vec<DMatrix<f64>> {
-            let reduced = swept[side].reduced(bench.evidence, &weights);
-            reduced.into_iter().map(|clip| clip.form).collect()
-        });
+        let weights = known_weights.map_or_else(|| weights(bench, &swept), |known| Some(known.to_vec()))?;
+        let clips = |swept: &Swept| -> Option<Vec<DMatrix<f64>>> {
+            let reduced = swept.reduced(bench.evidence, &weights).ok()?;
+            Some(reduced.into_iter().map(|clip| clip.form).collect())
+        };
+        let clips = [clips(&swept[0])?, clips(&swept[1])?];
         let forms = [0, 1].map(|side: usize| {
             let size = 1 + swept[side].columns.len();
             clips[side].iter().fold(DMatrix::zeros(size, size), |sum, form| sum + form)
@@ -290,15 +291,15 @@ fn pointed(candidate: usize, alternative: usize, units: &[f64]) -> Scored {
 }
 
 /// Factors on the channels under which what the richest model leaves in both sessions looks like noise.
-fn weights<E: Evidence>(bench: &Bench<'_, E>, swept: &[Swept; 2]) -> Vec<f64> {
+fn weights<E: Evidence>(bench: &Bench<'_, E>, swept: &[Swept; 2]) -> Option<Vec<f64>> {
     let mut weights = vec![1.0; bench.evidence.channels().len()];
     // Weights depend on what the richest hypothesis leaves, and that on the weights: twice is enough.
     for _ in 0..2 {
-        let left =
-            swept.iter().flat_map(|swept| floor::richest_residuals(swept, bench.evidence, bench.library, &weights));
-        weights = floor::weights(bench.evidence, &left.collect::<Vec<_>>());
+        let left = |swept: &Swept| floor::richest_residuals(swept, bench.evidence, bench.library, &weights).ok();
+        let left = [left(&swept[0])?, left(&swept[1])?].concat();
+        weights = floor::weights(bench.evidence, &left);
     }
-    weights
+    Some(weights)
 }
 
 #[cfg(test)]

@@ -174,7 +174,7 @@ impl<E: Measured> Bench<'_, E> {
             Some(at) => at,
             None => self.linearise(&full, &free, &restarted, effort.precision)?,
         };
-        let forms = at.reduced(self.evidence, weights);
+        let forms = at.reduced(self.evidence, weights).ok()?;
         let fitted = restarted.into_iter().zip(forms).map(|((clip, own), reduced)| FittedClip {
             clip,
             own,
@@ -284,7 +284,7 @@ impl<E: Measured> Bench<'_, E> {
         let at = self.own_fitted(&hypothesis.full, clips, weights)?;
         let at = self.restarted(&hypothesis.full, at, weights);
         let swept = self.linearise(&hypothesis.full, &[], &at, Precision::Exact)?;
-        let forms = swept.reduced(self.evidence, weights);
+        let forms = swept.reduced(self.evidence, weights).ok()?;
         let judged = at.into_iter().zip(forms).map(|((clip, own), reduced)| FittedClip {
             clip,
             own,
@@ -300,8 +300,8 @@ impl<E: Measured> Bench<'_, E> {
         for _ in 0..steps {
             let swept = self.linearise(full, &[], &clips, Precision::Exact)?;
             let nothing = DVector::zeros(0);
-            let own = |clip: &super::sweep::SweptClip| swept.own_after(clip, self.evidence, weights, &nothing);
-            clips = swept.clips.iter().map(|clip| (clip.clip, own(clip))).collect();
+            let own = |clip: &super::sweep::SweptClip| swept.own_after(clip, self.evidence, weights, &nothing).ok();
+            clips = swept.clips.iter().map(|clip| Some((clip.clip, own(clip)?))).collect::<Option<_>>()?;
         }
         Some(clips)
     }

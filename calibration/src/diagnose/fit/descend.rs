@@ -50,7 +50,7 @@ impl<E: Measured> Bench<'_, E> {
                 Some(at) => at,
                 None => self.linearise(&full, moving, &clips, effort.precision)?,
             };
-            let forms = at.reduced(self.evidence, weights);
+            let forms = at.reduced(self.evidence, weights).ok()?;
             let mut damped = damping;
             let trials = if anew { TRIALS } else { 1 };
             match self.improved((&full, moving), (&at, &forms), weights, (&mut damped, trials)) {
@@ -88,8 +88,10 @@ impl<E: Measured> Bench<'_, E> {
             free.iter().zip(step.iter()).for_each(|(k, step)| to[*k] += step);
             let straight = to.clone();
             self.library.turn_round(&mut to);
-            let own = |clip: &super::sweep::SweptClip| (clip.clip, at.own_after(clip, self.evidence, weights, step));
-            let to_own = self.own_fitted(&to, at.clips.iter().map(own).collect(), weights)?;
+            let own = |clip: &super::sweep::SweptClip| {
+                Some((clip.clip, at.own_after(clip, self.evidence, weights, step).ok()?))
+            };
+            let to_own = self.own_fitted(&to, at.clips.iter().map(own).collect::<Option<_>>()?, weights)?;
             let clips = self.restarted(&to, to_own, weights);
             let cost = self.cost(&to, &clips, weights).filter(|cost| *cost < now)?;
             let (promised, gained, turned_round) = (descent.promised(step), now - cost, to != straight);

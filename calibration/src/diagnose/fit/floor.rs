@@ -10,6 +10,7 @@ use super::sweep::{Column, Swept};
 use crate::diagnose::evidence::measured::{Channel, Group, Measured};
 use crate::diagnose::evidence::noise::{correlation_length, median};
 use crate::diagnose::library::Library;
+use crate::estimate::Impossible;
 use nalgebra::{DMatrix, DVector};
 
 /// Factors while nothing is known of how far the twin is off: the sensors' noise alone. The joints in contact are left out: any
@@ -53,14 +54,16 @@ fn weight(evidence: &impl Measured, clips: &[(usize, Vec<f64>)], channel: usize)
 
 /// What the richest hypothesis leaves: all numbers and every candidate's best form at once, each clip's own numbers at
 /// their best.
-#[must_use]
+///
+/// # Errors
+/// As of [`Swept::reduced`].
 pub fn richest_residuals(
     swept: &Swept,
     evidence: &impl Measured,
     library: &Library,
     weights: &[f64],
-) -> Vec<(usize, Vec<f64>)> {
-    let reduced = swept.reduced(evidence, weights);
+) -> Result<Vec<(usize, Vec<f64>)>, Impossible> {
+    let reduced = swept.reduced(evidence, weights)?;
     let size = 1 + swept.columns.len();
     let mut sum = reduced.iter().fold(DMatrix::zeros(size, size), |sum, clip| sum + &clip.form);
     shortlist::hold_numbers(&mut sum, &swept.columns, library);
@@ -83,23 +86,25 @@ pub fn richest_residuals(
 }
 
 /// Residuals of a sweep's clips at coefficients of some columns, each clip's own numbers at their best; not weighted.
-#[must_use]
+///
+/// # Errors
+/// As of [`Swept::own_after`].
 pub fn residuals_at(
     swept: &Swept,
     evidence: &impl Measured,
     weights: &[f64],
     free: &[usize],
     at: &[f64],
-) -> Vec<(usize, Vec<f64>)> {
+) -> Result<Vec<(usize, Vec<f64>)>, Impossible> {
     let mut all = DVector::zeros(swept.columns.len());
     free.iter().zip(at).for_each(|(k, value)| all[k - 1] = *value);
     let one = |clip: &super::sweep::SweptClip| {
         let mut left = clip.matrix.column(0) + clip.matrix.columns(1, all.len()) * &all;
-        let own = swept.own_after(clip, evidence, weights, &all);
+        let own = swept.own_after(clip, evidence, weights, &all)?;
         for (k, (to, from)) in own.iter().zip(&clip.own).enumerate() {
             left.axpy(to - from, &clip.matrix.column(1 + all.len() + k), 1.0);
         }
-        (clip.clip, left.as_slice().to_vec())
+        Ok((clip.clip, left.as_slice().to_vec()))
     };
     swept.clips.iter().map(one).collect()
 }

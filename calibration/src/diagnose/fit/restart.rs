@@ -52,7 +52,7 @@ impl<E: Measured> Bench<'_, E> {
         let swept = self.linearise(full, &[], &begun, Precision::Exact)?;
         let mut tried = Clips::new();
         for (at, (_, begun)) in swept.clips.iter().zip(&begun) {
-            let after = swept.own_after(at, self.evidence, weights, &DVector::zeros(0));
+            let after = swept.own_after(at, self.evidence, weights, &DVector::zeros(0)).ok()?;
             tried.push((clip, after.clone()));
             tried.extend(KEPT.map(|share| {
                 let kept = |k: usize| if even.contains(&k) { after[k] } else { share * begun[k] };

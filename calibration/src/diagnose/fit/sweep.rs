@@ -190,7 +190,7 @@ impl<E: Measured, G: Fn(f64) -> bool + Sync> Work<'_, E, G> {
         let mut out = Vec::with_capacity(base.len());
         let reach = self.reach(batch, &numbers);
         let answer = self.evidence.changed(clip, (&numbers, own), (reach, base, Some((self.full, own))), &mut out);
-        let answered = answer.is_ok() && out.len() == base.len();
+        let answered = answer.is_ok() && out.len() == base.len() && out.iter().all(|residual| residual.is_finite());
         if !answered {
             return Vec::new();
         }
@@ -255,7 +255,7 @@ impl<E: Measured, G: Fn(f64) -> bool + Sync> Work<'_, E, G> {
         let near = (Reach::Object, base, Some((self.full, own)));
         let changed = |out: &mut Vec<f64>| self.evidence.changed(clip, (self.full, &moved), near, out);
         let turned = effect.sigma > 0.0 && changed(&mut out).is_ok();
-        if !turned || out.len() != base.len() {
+        if !turned || out.len() != base.len() || !out.iter().all(|residual| residual.is_finite()) {
             return vec![0.0; base.len()];
         }
         out.iter().zip(base).map(|(out, base)| (out - base) / effect.step).collect()
@@ -264,41 +264,45 @@ impl<E: Measured, G: Fn(f64) -> bool + Sync> Work<'_, E, G> {
 
 impl Swept {
     /// Each clip with channel weights and its own numbers eliminated.
-    #[must_use]
-    pub fn reduced(&self, evidence: &impl Measured, weights: &[f64]) -> Vec<Reduced> {
+    ///
+    /// # Errors
+    /// As of [`Eliminated::of`].
+    pub fn reduced(&self, evidence: &impl Measured, weights: &[f64]) -> Result<Vec<Reduced>, Impossible> {
         self.clips.par_iter().map(|clip| self.reduce(clip, evidence, weights)).collect()
     }
 
-    fn reduce(&self, clip: &SweptClip, evidence: &impl Measured, weights: &[f64]) -> Reduced {
+    fn reduce(&self, clip: &SweptClip, evidence: &impl Measured, weights: &[f64]) -> Result<Reduced, Impossible> {
         let gram = gram(clip, evidence, weights);
         // The residual and the clip's own numbers, without the columns between them.
         let of_clip = |k: usize| if k == 0 { 0 } else { self.columns.len() + k };
         let alone = 1 + self.scatter.count();
         let alone = DMatrix::from_fn(alone, alone, |i, k| gram[(of_clip(i), of_clip(k))]);
         let around = Around { gram: alone, own: clip.own.clone() };
-        let Eliminated { form, volume, .. } = self.eliminated(clip, &gram);
+        let Eliminated { form, volume, .. } = self.eliminated(clip, &gram)?;
         let correction = if self.scatter.count() == 0 { 0.0 } else { self.scatter.correction(&clip.own) };
-        Reduced { form, volume: volume + correction, around }
+        Ok(Reduced { form, volume: volume + correction, around })
     }
 
-    fn eliminated(&self, clip: &SweptClip, gram: &DMatrix<f64>) -> Eliminated {
+    fn eliminated(&self, clip: &SweptClip, gram: &DMatrix<f64>) -> Result<Eliminated, Impossible> {
         Eliminated::of(gram, &self.scatter.precision(&clip.own), &clip.own)
     }
 
     /// A clip's own numbers at their best for coefficients of all columns.
-    #[must_use]
+    ///
+    /// # Errors
+    /// As of [`Eliminated::of`].
     pub fn own_after(
         &self,
         clip: &SweptClip,
         evidence: &impl Measured,
         weights: &[f64],
         at: &DVector<f64>,
-    ) -> Vec<f64> {
+    ) -> Result<Vec<f64>, Impossible> {
         if self.scatter.count() == 0 {
-            return Vec::new();
+            return Ok(Vec::new());
         }
-        let step = self.eliminated(clip, &gram(clip, evidence, weights)).own_change(at);
-        clip.own.iter().zip(step.iter()).map(|(own, step)| own + step).collect()
+        let step = self.eliminated(clip, &gram(clip, evidence, weights))?.own_change(at);
+        Ok(clip.own.iter().zip(step.iter()).map(|(own, step)| own + step).collect())
     }
 }
 

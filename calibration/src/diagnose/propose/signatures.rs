@@ -32,19 +32,19 @@ fn taken<E: Evidence>(bench: &Bench<'_, E>, split: &Split, from: &Hypothesis, ba
     let mut weights = vec![1.0; bench.evidence.channels().len()];
     // Weights depend on what the richest hypothesis leaves, and that on the weights: twice is enough.
     for _ in 0..2 {
-        let left = floor::richest_residuals(&swept, bench.evidence, bench.library, &weights);
+        let left = floor::richest_residuals(&swept, bench.evidence, bench.library, &weights).ok()?;
         weights = floor::weights(bench.evidence, &left);
     }
     let scores = |swept: &Swept| {
         let size = 1 + swept.columns.len();
-        let forms = swept.reduced(bench.evidence, &weights);
+        let forms = swept.reduced(bench.evidence, &weights).ok()?;
         let sum = forms.iter().fold(DMatrix::zeros(size, size), |sum, clip| sum + &clip.form);
-        shortlist::score(swept, &sum, bench.library)
+        Some(shortlist::score(swept, &sum, bench.library))
     };
-    let scored = scores(&swept);
+    let scored = scores(&swept)?;
     // Where clips of the right hypothesis scatter little, the usual scatter hides a small effect altogether.
     swept.scatter = bench.scatter.narrowed(scatter_scale::LEAST);
-    let narrow = scores(&swept);
+    let narrow = scores(&swept)?;
     Some((weights, scored, narrow))
 }
 

@@ -163,6 +163,10 @@ fn compliance(mut normal: DMatrix<f64>, mut right: DVector<f64>) -> Option<f64> 
             }
         }
     }
+    // The search for eigenvalues of what is not finite has no end.
+    if !normal.iter().all(|value| value.is_finite()) {
+        return None;
+    }
     let solved = normal.symmetric_eigen();
     let least = 1e-9 * solved.eigenvalues.max();
     let along = solved.eigenvectors.transpose() * right;
