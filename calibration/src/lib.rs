@@ -26,6 +26,7 @@
 //! | [`processes`] | the other programs as children |
 //! | [`interrupt`] | Ctrl-C, and a budget of time |
 //! | [`kept`] | what long work has found so far, for when it is interrupted |
+//! | `child_output` | what other programs say on their pipes |
 //! | [`seed`] | what is drawn is drawn from it |
 //!
 //! # Words
@@ -54,6 +55,7 @@ pub mod acting;
 pub mod benchmark;
 pub mod capture;
 pub mod check;
+mod child_output;
 pub mod demo;
 pub mod demonstrations;
 pub mod diagnose;

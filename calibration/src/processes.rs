@@ -4,12 +4,13 @@
 //! ends its children in an order that loses nothing. A child that is dropped is ended, and one whose starter is killed ends
 //! by itself ([`shared_mem::parent`]). Called by capture, demo and sweep.
 
+use crate::child_output;
 use rustix::process::{Pid, Signal, kill_process_group};
 use shared_mem::parent;
 use shared_mem::transport::DOMAIN_VARIABLE;
 use std::collections::VecDeque;
 use std::ffi::OsString;
-use std::io::{BufRead, BufReader, Read};
+use std::io::Read;
 use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, ExitStatus, Stdio};
@@ -19,6 +20,8 @@ use std::time::{Duration, Instant};
 
 /// Lines of a child's stderr kept for an error message.
 const TAIL: usize = 8;
+/// An answer longer than this is none: the longest diagnosis is a hundred times shorter [bytes].
+const LONGEST_ANSWER: u64 = 256 << 20;
 /// How long a child may take to end after SIGTERM before it is killed.
 const GRACE: Duration = Duration::from_secs(5);
 /// How often a child is looked at while it ends.
@@ -159,15 +162,14 @@ impl Running {
         let tail = Arc::new(Mutex::new(VecDeque::new()));
         if let Some(stderr) = child.stderr.take() {
             let tail = Arc::clone(&tail);
-            std::thread::spawn(move || keep_tail(BufReader::new(stderr), &tail));
+            std::thread::spawn(move || keep_tail(stderr, &tail));
         }
-        let answer = child.stdout.take().map(|mut stdout| {
+        let answer = child.stdout.take().map(|stdout| {
             let (told, answer) = channel();
             std::thread::spawn(move || {
-                let mut text = String::new();
                 // What cannot be read is missed by whoever parses the answer; who gave up on it hears nothing.
-                let _ = stdout.read_to_string(&mut text);
-                let _ = told.send(text);
+                let text = child_output::whole(stdout, LONGEST_ANSWER).ok().flatten();
+                let _ = told.send(text.and_then(|text| String::from_utf8(text).ok()).unwrap_or_default());
             });
             answer
         });
@@ -275,15 +277,14 @@ impl Drop for Running {
     }
 }
 
-fn keep_tail(lines: impl BufRead, tail: &Mutex<VecDeque<String>>) {
-    for line in lines.split(b'\n').map_while(Result::ok) {
-        let line = String::from_utf8_lossy(&line).into_owned();
+fn keep_tail(stderr: impl Read, tail: &Mutex<VecDeque<String>>) {
+    child_output::lines(stderr, |line| {
         let mut kept = tail.lock().unwrap_or_else(PoisonError::into_inner);
         if kept.len() == TAIL {
             kept.pop_front();
         }
-        kept.push_back(line);
-    }
+        kept.push_back(line.to_owned());
+    });
 }
 
 #[cfg(test)]

@@ -1,5 +1,6 @@
 //! The robot's URDF: a file, a xacro file that the program `xacro` expands, or the text that a bag holds.
 
+use crate::child_output;
 use anyhow::{Context as _, bail, ensure};
 use shared_mem::input;
 use shared_mem::printable;
@@ -36,20 +37,25 @@ impl Description {
     }
 }
 
+/// A description that is longer than a file of one may be is none [bytes].
+const LONGEST: u64 = 16 << 20;
+
 /// What `xacro` makes of a file.
 fn expanded(file: &Path) -> anyhow::Result<String> {
     ensure!(file.is_file(), "there is no {}; give an existing .xacro or .urdf file", file.display());
     let shown = file.display();
-    let output = match Command::new("xacro").arg(file).output() {
+    let output = match child_output::of(Command::new("xacro").arg(file), LONGEST) {
         Err(error) if error.kind() == io::ErrorKind::NotFound => bail!(
             "{shown} is a xacro file, and no program `xacro` is installed; where ROS is: `xacro {shown} > arm.urdf`, and give that"
         ),
         output => output.with_context(|| format!("`xacro {shown}` cannot be started"))?,
     };
     if !output.status.success() {
-        let said = String::from_utf8_lossy(&output.stderr);
-        let last = said.lines().rev().find(|line| !line.trim().is_empty()).unwrap_or("it says nothing");
+        let last = if output.last_words.is_empty() { "it says nothing" } else { &output.last_words };
         bail!("`xacro {shown}` failed: {}; expand it by hand and give the .urdf", printable::one_line(last));
     }
-    String::from_utf8(output.stdout).with_context(|| format!("`xacro {shown}` gave no text"))
+    let text = output.answer.with_context(|| {
+        format!("`xacro {shown}` gave more than {} MiB, which is no robot; look what it includes", LONGEST >> 20)
+    })?;
+    String::from_utf8(text).with_context(|| format!("`xacro {shown}` gave no text"))
 }
