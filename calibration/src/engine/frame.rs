@@ -25,6 +25,8 @@ pub(super) enum FrameError {
     Ended,
     /// It begins with these bytes, which are no lengths.
     NoMessage([u8; 8]),
+    /// It has so many numbers, and no answer may have them; they are not read.
+    TooMany(u32),
 }
 
 /// The bytes of a message.
@@ -39,13 +41,16 @@ pub(super) fn bytes(head: &impl Serialize, numbers: &[f64]) -> io::Result<Vec<u8
     Ok(bytes)
 }
 
-/// The next message.
-pub(super) fn read(from: &mut impl Read) -> Result<Frame, FrameError> {
+/// The next message, of at most so many numbers.
+pub(super) fn read(from: &mut impl Read, most: usize) -> Result<Frame, FrameError> {
     let mut lengths = [0; 8];
     from.read_exact(&mut lengths).map_err(|_| FrameError::Ended)?;
     let [text, numbers] = [0, 4].map(|at| u32::from_le_bytes(std::array::from_fn(|k| lengths[at + k])));
     if text > LONGEST_TEXT || numbers > MOST_NUMBERS {
         return Err(FrameError::NoMessage(lengths));
+    }
+    if numbers as usize > most {
+        return Err(FrameError::TooMany(numbers));
     }
     // Grows with what arrives: a length alone takes no memory.
     let mut body = Vec::new();
@@ -67,19 +72,25 @@ mod tests {
     fn a_message_comes_back_as_it_was_and_half_a_one_is_none() {
         let numbers = [1.5, -0.0, f64::NAN, f64::INFINITY];
         let sent = bytes(&serde_json::json!({"message": "hello"}), &numbers).expect("short enough");
-        let frame = read(&mut &sent[..]).expect("a message");
+        let frame = read(&mut &sent[..], numbers.len()).expect("a message");
         assert_eq!(frame.text, br#"{"message":"hello"}"#);
         let bits = |numbers: &[f64]| numbers.iter().map(|n| n.to_bits()).collect::<Vec<_>>();
         assert_eq!(bits(&frame.numbers), bits(&numbers));
         for cut in [0, 3, 8, sent.len() - 1] {
-            assert!(matches!(read(&mut &sent[..cut]), Err(FrameError::Ended)), "{cut}");
+            assert!(matches!(read(&mut &sent[..cut], numbers.len()), Err(FrameError::Ended)), "{cut}");
         }
     }
 
     #[test]
     fn what_somebody_printed_is_no_message() {
         assert!(
-            matches!(read(&mut &b"loading model ..."[..]), Err(FrameError::NoMessage(bytes)) if &bytes == b"loading ")
+            matches!(read(&mut &b"loading model ..."[..], 9), Err(FrameError::NoMessage(bytes)) if &bytes == b"loading ")
         );
+    }
+    #[test]
+    fn more_numbers_than_an_answer_may_have_are_not_read() {
+        let mut lengths: &[u8] = &[2, 0, 0, 0, 3, 0, 0, 0, b'{', b'}'];
+        assert!(matches!(read(&mut lengths, 2), Err(FrameError::TooMany(3))));
+        assert_eq!(lengths, b"{}", "nothing behind the lengths");
     }
 }

@@ -7,6 +7,8 @@
 //! | `message` | what messages say |
 //! | `ability` | what an engine can do, and what of a set of parameters that leaves |
 //! | `process` | one process: asked, waited for, killed |
+//! | `started` | what a process started, killed with it |
+//! | `physical` | states that no arm and no object can have |
 //! | `recent` | roll-outs that were asked for a moment ago |
 //! | `used` | what an answer says about it |
 //! | `fault` | what may be wrong, each with a remedy |
@@ -18,8 +20,10 @@ mod ability;
 mod fault;
 mod frame;
 mod message;
+mod physical;
 mod process;
 mod recent;
+mod started;
 mod used;
 
 pub use ability::{Ability, Quantity};
@@ -29,7 +33,7 @@ pub use used::Used;
 
 use crate::interrupt::Interrupt;
 use message::{Greeting, ObjectBlock, Reply, RollOut, VERSION};
-use process::{Process, Running};
+use process::{Asked, Process, Running};
 use recent::Recent;
 use serde_json::Value;
 use shared_mem::cell::{Cell, ClipKind};
@@ -243,20 +247,22 @@ impl Engine {
         self.asked.fetch_add(1, Ordering::Relaxed);
         self.with_object.fetch_or(question.object.is_some(), Ordering::Relaxed);
         let idle = locked(&self.idle).pop();
+        let (rows, columns) = (question.times.len(), question.readings.len() * question.dof);
+        let poses = question.object.map_or(0, |object| object.times.len());
+        let asked = Asked { message, most: rows * columns + poses * POSE };
         let first = match idle {
-            Some(process) => self.ask(process, message.clone()),
-            None => self.ask(self.another()?, message.clone()),
+            Some(process) => self.ask(process, asked.clone()),
+            None => self.ask(self.another()?, asked.clone()),
         };
         let (reply, numbers) = match first {
             // Once more, with a new process, since it may have been the system that ended it; not with an idle one, which may be about
             // to end itself.
             Err(EngineError::Ended { .. }) => {
                 self.started_again.fetch_add(1, Ordering::Relaxed);
-                self.ask(self.another()?, message)?
+                self.ask(self.another()?, asked.clone())?
             }
             answer => answer?,
         };
-        let dof = question.dof;
         match reply {
             Reply::States => {}
             Reply::Impossible { why } => return Err(NoStates::Impossible(why)),
@@ -265,23 +271,24 @@ impl Engine {
             }
             Reply::Hello(_) => return Err(self.wrong("answered a roll-out with a greeting".into()).into()),
         }
-        let (rows, columns) = (question.times.len(), question.readings.len() * dof);
-        let poses = question.object.map_or(0, |object| object.times.len());
-        if numbers.len() != rows * columns + poses * POSE {
+        if numbers.len() != asked.most {
             let of_object = if poses > 0 { format!(" and {poses} poses of {POSE}") } else { String::new() };
             let what =
                 format!("sent {} numbers where {rows} rows of {columns}{of_object} were asked for", numbers.len());
             return Err(self.wrong(what).into());
         }
         let length = |pose: &[f64]| pose[3..].iter().map(|part| part * part).sum::<f64>().sqrt();
-        // What is no number is no fault of the engine's: a simulation may fly apart.
+        // What is no number is no fault of the engine's (`physical`).
         let off = |length: &f64| length.is_finite() && (length - 1.0).abs() > UNIT;
         if let Some(length) = numbers[rows * columns..].chunks_exact(POSE).map(length).find(off) {
             return Err(self
                 .wrong(format!("sent an orientation that is no unit quaternion, but {length:.4} long"))
                 .into());
         }
-        Ok(numbers)
+        match physical::impossible(question, &numbers) {
+            Some(why) => Err(NoStates::Impossible(why)),
+            None => Ok(numbers),
+        }
     }
 
     /// A process beside those that run, which can do what the first one said.
@@ -294,8 +301,8 @@ impl Engine {
     }
 
     /// Asks a process, which is idle from then on.
-    fn ask(&self, mut process: Process, message: Vec<u8>) -> Result<(Reply, Vec<f64>), EngineError> {
-        let answer = process.ask(message, self.call.limit)?;
+    fn ask(&self, mut process: Process, asked: Asked) -> Result<(Reply, Vec<f64>), EngineError> {
+        let answer = process.ask(asked, self.call.limit)?;
         locked(&self.idle).push(process);
         Ok(answer)
     }
@@ -313,7 +320,7 @@ fn locked<T>(what: &Mutex<T>) -> MutexGuard<'_, T> {
 fn greeted(call: &Call, greeting: &[u8], running: &Arc<Running>) -> Result<(Process, Ability), EngineError> {
     let wrong = |what: String| EngineError::Wrong { command: call.command.clone(), what };
     let mut process = Process::start(&call.command, running)?;
-    match process.ask(greeting.to_vec(), call.limit)?.0 {
+    match process.ask(Asked { message: greeting.to_vec(), most: 0 }, call.limit)?.0 {
         Reply::Hello(hello) => {
             let ability = Ability::read(hello).map_err(wrong)?;
             Ok((process, ability))

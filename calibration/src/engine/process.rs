@@ -1,11 +1,13 @@
-//! One process of an engine: asked and waited for, no longer than the limit, and killed with everything that it started.
+//! One process of an engine: asked and waited for, no longer than the limit, and killed with what it started (`started`).
 
 use super::fault::EngineError;
 use super::frame::{self, Frame, FrameError};
 use super::message::Reply;
-use rustix::process::{Pid, Signal, kill_process_group};
+use super::started::{self, Traces};
+use crate::child_output;
+use rustix::process::Pid;
 use shared_mem::ending;
-use std::io::{BufRead, BufReader, Write as _};
+use std::io::{BufReader, Write as _};
 use std::os::unix::process::CommandExt as _;
 use std::process::{Child, ChildStderr, ChildStdin, ChildStdout, Command, ExitStatus, Stdio};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
@@ -19,20 +21,25 @@ const GRACE: Duration = Duration::from_millis(400);
 
 /// The processes that run, for whoever has to end them all.
 #[derive(Debug, Default)]
-pub(super) struct Running(Mutex<Vec<Pid>>);
+pub(super) struct Running(Mutex<Vec<Traces>>);
 
 impl Running {
-    fn list(&self) -> std::sync::MutexGuard<'_, Vec<Pid>> {
+    fn list(&self) -> std::sync::MutexGuard<'_, Vec<Traces>> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Kills all of them with all that they started.
     pub(super) fn kill(&self) {
-        for pid in self.list().iter() {
-            // One that is gone already needs no killing.
-            let _gone = kill_process_group(*pid, Signal::KILL);
-        }
+        started::kill(&self.list());
     }
+}
+
+/// A message to a process.
+#[derive(Debug, Clone)]
+pub(super) struct Asked {
+    pub(super) message: Vec<u8>,
+    /// Its answer has at most so many numbers.
+    pub(super) most: usize,
 }
 
 /// A running process.
@@ -40,9 +47,9 @@ impl Running {
 pub(super) struct Process {
     command: String,
     child: Child,
-    pid: Option<Pid>,
+    traces: Option<Traces>,
     running: Arc<Running>,
-    requests: Option<Sender<Vec<u8>>>,
+    requests: Option<Sender<Asked>>,
     answers: Receiver<Result<Frame, FrameError>>,
     last_words: Arc<Mutex<String>>,
 }
@@ -53,10 +60,13 @@ impl Process {
         let fail = |why: String| EngineError::Start { command: command.into(), why };
         let mut shell = Command::new("sh");
         shell.args(["-c", command]).stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
+        let mark = started::mark();
+        shell.env(started::VARIABLE, &mark);
         // Ctrl-C on the terminal reaches this program alone, which then ends its children.
         let mut child = shell.process_group(0).spawn().map_err(|error| fail(error.to_string()))?;
-        let pid = i32::try_from(child.id()).ok().and_then(Pid::from_raw);
-        running.list().extend(pid);
+        let group = i32::try_from(child.id()).ok().and_then(Pid::from_raw);
+        let traces = group.map(|group| Traces { group, mark });
+        running.list().extend(traces.clone());
         let pipes = (child.stdin.take(), child.stdout.take(), child.stderr.take());
         let (Some(stdin), Some(stdout), Some(stderr)) = pipes else { return Err(fail("it has no pipes".into())) };
         let (requests, asked) = channel();
@@ -66,14 +76,14 @@ impl Process {
         let words = Arc::clone(&last_words);
         std::thread::spawn(move || listen(stderr, &words));
         let (command, running, requests) = (command.to_owned(), Arc::clone(running), Some(requests));
-        Ok(Self { command, child, pid, running, requests, answers, last_words })
+        Ok(Self { command, child, traces, running, requests, answers, last_words })
     }
 
     /// Sends a message and waits for the answer. After an error the process is of no use any more.
-    pub(super) fn ask(&mut self, message: Vec<u8>, limit: Duration) -> Result<(Reply, Vec<f64>), EngineError> {
+    pub(super) fn ask(&mut self, asked: Asked, limit: Duration) -> Result<(Reply, Vec<f64>), EngineError> {
         let began = Instant::now();
         // Where nobody takes it, the answer says why.
-        let _ended = self.requests.as_ref().map(|requests| requests.send(message));
+        let _ended = self.requests.as_ref().map(|requests| requests.send(asked));
         let answer = loop {
             match self.answers.recv_timeout(LOOK) {
                 Err(RecvTimeoutError::Timeout) if ending::asked() => return Err(EngineError::Ending),
@@ -99,6 +109,10 @@ impl Process {
         match error {
             FrameError::NoMessage(bytes) => {
                 EngineError::NoMessage { command, bytes: String::from_utf8_lossy(bytes).into_owned() }
+            }
+            FrameError::TooMany(numbers) => {
+                let what = format!("begins an answer of {numbers} numbers where fewer are asked for");
+                EngineError::Wrong { command, what }
             }
             // The process killed by Ctrl-C is no fault of the engine.
             FrameError::Ended if ending::asked() => EngineError::Ending,
@@ -126,10 +140,9 @@ impl Process {
     }
 
     fn kill(&mut self) {
-        if let Some(pid) = self.pid.take() {
-            // Fails only when it is gone already, which is what is wanted.
-            let _gone = kill_process_group(pid, Signal::KILL);
-            self.running.list().retain(|other| *other != pid);
+        if let Some(traces) = self.traces.take() {
+            started::kill(std::slice::from_ref(&traces));
+            self.running.list().retain(|other| *other != traces);
         }
     }
 
@@ -151,14 +164,14 @@ impl Drop for Process {
 /// Takes each message to the process and its answer back, until one side has ended.
 fn serve(
     (mut stdin, stdout): (ChildStdin, ChildStdout),
-    asked: &Receiver<Vec<u8>>,
+    asked: &Receiver<Asked>,
     told: &Sender<Result<Frame, FrameError>>,
 ) {
     let mut stdout = BufReader::with_capacity(1 << 16, stdout);
-    while let Ok(message) = asked.recv() {
+    while let Ok(Asked { message, most }) = asked.recv() {
         // A process that does not read it may have written why.
         let sent = stdin.write_all(&message).and_then(|()| stdin.flush());
-        let answer = frame::read(&mut stdout);
+        let answer = frame::read(&mut stdout, most);
         let ended = sent.is_err() || answer.is_err();
         if told.send(answer).is_err() || ended {
             return;
@@ -167,11 +180,11 @@ fn serve(
 }
 
 fn listen(stderr: ChildStderr, last_words: &Mutex<String>) {
-    for line in BufReader::new(stderr).split(b'\n').map_while(Result::ok) {
-        let line = String::from_utf8_lossy(&line).trim().to_owned();
+    child_output::lines(stderr, |line| {
+        let line = line.trim();
         if !line.is_empty() {
             tracing::debug!("engine: {line}");
             *last_words.lock().unwrap_or_else(PoisonError::into_inner) = line.chars().take(300).collect();
         }
-    }
+    });
 }

@@ -17,7 +17,12 @@ fn started(command: &str, limit: Duration) -> Result<(Arc<Engine>, Interrupt), E
 
 /// Writes a message without numbers.
 fn says(text: &str) -> String {
-    let bytes = frame::bytes(&serde_json::from_str::<Value>(text).expect("JSON"), &[]).expect("short");
+    says_with(text, &[])
+}
+
+/// Writes a message with numbers.
+fn says_with(text: &str, numbers: &[f64]) -> String {
+    let bytes = frame::bytes(&serde_json::from_str::<Value>(text).expect("JSON"), numbers).expect("short");
     let octal: String = bytes.iter().map(|byte| format!("\\{byte:03o}")).collect();
     format!("printf '{octal}'")
 }
@@ -96,9 +101,103 @@ fn silence_ends_at_the_limit_and_takes_what_the_engine_started_along() {
     assert!(error.contains("for 1 s") && error.contains("--engine-limit"), "{error}");
     assert!(began.elapsed() < Duration::from_secs(5), "{:?}", began.elapsed());
     let sleeper = error.split(": ").nth(1).and_then(|words| words.split(';').next()).expect("its number");
-    let state = std::process::Command::new("ps").args(["-o", "stat=", "-p", sleeper.trim()]).output().expect("ps");
-    let state = String::from_utf8_lossy(&state.stdout).trim().to_owned();
-    assert!(state.is_empty() || state.starts_with('Z'), "{sleeper} is {state}");
+    end(&[sleeper.trim().to_owned()]);
+}
+
+/// Whether a process has ended; its parent may not have been told yet.
+fn is_gone(pid: &str) -> bool {
+    let state = std::fs::read_to_string(format!("/proc/{pid}/stat")).unwrap_or_default();
+    state.is_empty() || state.contains(") Z ")
+}
+
+/// Waits for the end of processes: what was killed takes a moment.
+fn end(pids: &[String]) {
+    let began = Instant::now();
+    while let Some(pid) = pids.iter().find(|pid| !is_gone(pid)) {
+        assert!(began.elapsed() < PATIENCE, "{pid} runs");
+        std::thread::yield_now();
+    }
+}
+
+/// Starts a process that leaves group, session and parent, and writes its number into `file`.
+fn leaves(file: &Path) -> String {
+    format!("(setsid sh -c 'echo $$ >> {}; exec sleep 600' </dev/null >/dev/null 2>&1 &)", file.display())
+}
+
+/// The numbers of so many processes, once they are there.
+fn numbers(file: &Path, count: usize) -> Vec<String> {
+    let began = Instant::now();
+    loop {
+        let pids: Vec<String> = std::fs::read_to_string(file).unwrap_or_default().lines().map(str::to_owned).collect();
+        if pids.len() >= count {
+            return pids;
+        }
+        assert!(began.elapsed() < PATIENCE, "{pids:?}");
+        std::thread::yield_now();
+    }
+}
+
+#[test]
+fn what_left_the_engines_group_and_session_ends_with_it_and_what_another_process_started_does_not() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let [file, other] = ["pids", "other"].map(|name| folder.path().join(name));
+    // One process that is silent and given up, and one that ends with its input.
+    let silent = format!("{0}; {0}; {1}; sleep 600", leaves(&file), says(HELLO));
+    let (engine, _) = started(&silent, Duration::from_secs(5)).expect("a greeting");
+    let (beside, _) =
+        started(&format!("{}; {}; exec cat >&2", leaves(&other), says(HELLO)), PATIENCE).expect("a greeting");
+    let (pids, others) = (numbers(&file, 2), numbers(&other, 1));
+    assert!(pids.iter().chain(&others).all(|pid| !is_gone(pid)), "they run");
+    assert!(asked(&engine).is_err());
+    end(&pids);
+    assert!(others.iter().all(|pid| !is_gone(pid)), "{others:?} are another engine's");
+    drop(beside);
+    end(&others);
+}
+
+#[test]
+fn states_that_no_arm_has_are_no_answer_and_said_by_name() {
+    for (states, says_of_it) in [
+        ([0.1, 1e308], "q of joint 1 at 0.001 s is 1e308 rad, beyond 1e6"),
+        ([-1e30, 0.1], "q of joint 1 at 0.000 s is -1e30 rad, beyond 1e6"),
+        ([0.1, f64::NAN], "a state of the engine is no number: q of joint 1 at 0.001 s"),
+        ([f64::NEG_INFINITY, 0.1], "a state of the engine is no number: q of joint 1 at 0.000 s"),
+    ] {
+        let answer = says_with(r#"{"message":"states"}"#, &states);
+        let (engine, interrupt) =
+            started(&format!("{}; {answer}; cat >&2", says(HELLO)), PATIENCE).expect("a greeting");
+        let error = asked(&engine).expect_err("no states");
+        assert!(matches!(&error, NoStates::Impossible(why) if why.contains(says_of_it)), "{error}");
+        assert!(engine.failure().is_none() && !interrupt.cancelled(), "others may do");
+    }
+    let answer = says_with(r#"{"message":"states"}"#, &[-0.0, 5e-324]);
+    let (engine, _) = started(&format!("{}; {answer}; cat >&2", says(HELLO)), PATIENCE).expect("a greeting");
+    assert_eq!(*asked(&engine).expect("states"), [0.0, 5e-324]);
+}
+
+#[test]
+fn an_answer_of_more_numbers_than_were_asked_for_is_refused_before_they_are_read() {
+    let text = r#"{"message":"states"}"#;
+    let lengths = [text.len() as u32, 1 << 27].map(u32::to_le_bytes).concat();
+    let octal: String = lengths.iter().map(|byte| format!("\\{byte:03o}")).collect();
+    for before in [String::new(), format!("{}; ", says(HELLO))] {
+        // Nothing of the numbers ever comes.
+        let begun = started(&format!("{before}printf '{octal}'; printf '{text}'; sleep 600"), PATIENCE);
+        let error = match begun {
+            Ok((engine, _)) => asked(&engine).expect_err("too many").to_string(),
+            Err(error) => error.to_string(),
+        };
+        assert!(error.contains("begins an answer of 134217728 numbers where fewer"), "{error}");
+    }
+}
+
+#[test]
+fn an_engine_that_ends_in_the_middle_of_a_long_line_is_quoted_in_a_short_one() {
+    let script = format!("{}; head -c 20000000 /dev/zero | tr '\\0' x >&2; exit 7", says(HELLO));
+    let (engine, _) = started(&script, PATIENCE).expect("a greeting");
+    let error = asked(&engine).expect_err("it dies").to_string();
+    assert!(error.contains(": xxx") && error.contains("exit status: 7"), "{error}");
+    assert!(error.len() < script.len() + 500, "{} letters", error.len());
 }
 
 #[test]

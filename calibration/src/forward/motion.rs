@@ -180,20 +180,12 @@ impl Mover {
 /// What an engine answers.
 ///
 /// # Errors
-/// [`Impossible`] where it has no answer, or none that is a number.
+/// [`Impossible`] where it has no answer, or none that an arm or an object can have.
 pub(super) fn states(engine: &Engine, question: &Question<'_>) -> Result<Arc<Vec<f64>>, Impossible> {
-    let states = engine.roll_out(question).map_err(|error| match error {
+    engine.roll_out(question).map_err(|error| match error {
         NoStates::Impossible(why) => Impossible(format!("the engine has no answer: {why}")),
         NoStates::Failed(error) => Impossible(error.to_string()),
-    })?;
-    if states.iter().any(|number| !number.is_finite()) {
-        return Err(Impossible(
-            "a state of the engine is no number; where this is so from the beginning on, its model and the gains of cell.toml \
-             do not go together"
-                .into(),
-        ));
-    }
-    Ok(states)
+    })
 }
 
 /// Of parameters those that an arm feels as long as it touches nothing.
