@@ -59,10 +59,6 @@ pub fn look(session: &Session, allowed: Allowed) -> Result<Looked, Stopped> {
     let clips = Read::of(session).clips;
     let provenance = origins::provenance(&clips);
     unmixed(&provenance, allowed.mix)?;
-    if provenance.unknown() > 0 {
-        let (count, session) = (provenance.unknown(), session.folder.display());
-        console::line(format_args!("{session}: {count} of {} clips do not say where they come from", clips.len()));
-    }
     let Found { remarks, .. } = check_clips(&session.cell, &clips);
     // That is what was asked for, and said at once.
     let worst = remarks.into_iter().find(|remark| remark.fault != Fault::MixedOrigins);
@@ -73,6 +69,10 @@ pub fn look(session: &Session, allowed: Allowed) -> Result<Looked, Stopped> {
             return Err(Stopped::Wrong { check, remark, command: typed::with("--as-recorded", false) });
         }
         console::line(format_args!("warning: {worst} (`{check}` shows all that is odd)"));
+    }
+    if provenance.unknown() > 0 {
+        let (count, session) = (provenance.unknown(), session.folder.display());
+        console::line(format_args!("{session}: {count} of {} clips do not say where they come from", clips.len()));
     }
     Ok(Looked { worst, provenance })
 }

@@ -270,6 +270,7 @@ impl Identification {
             advice: self.advice.iter().map(Advice::sentence).collect(),
             notes: self.warnings.clone(),
             provenance: vec![
+                ["origin".into(), self.origin.clone()],
                 ["way of searching".into(), self.optimizer.clone()],
                 ["clips simulated".into(), self.evaluations.to_string()],
                 ["wall time".into(), format!("{:.1} s", self.seconds)],

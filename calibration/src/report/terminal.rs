@@ -285,6 +285,7 @@ The object is known.";
 gap: 38.4 -> 1.40 sigma^2 (noise alone 1.00), shrink 96.3 [95.1, 97.2] %
 joints: 2.13 -> 0.180 mrad
 ADD: 13.9 -> 1.20 mm
+origin: the simulation
 where: control joint 2 (reversal) 41 %
 command lag     possible   2 %            shrink 81 [76, 85] %
     creep 2.00 ms (default, not fitted)

@@ -15,5 +15,5 @@ pub mod length;
 mod parts;
 pub mod split;
 #[cfg(test)]
-mod test_clip;
+pub(in crate::diagnose) mod test_clip;
 pub(super) mod torques;

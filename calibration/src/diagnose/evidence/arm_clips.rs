@@ -335,11 +335,10 @@ impl<F: Fn(&[f64]) -> Theta + Sync> Measured for ArmClips<F> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::diagnose::clips::test_clip::of_one_joint;
     use crate::diagnose::clips::torques;
     use crate::diagnose::test_bench::shipped;
-    use shared_mem::cell::ClipKind;
     use shared_mem::msg::arm::ArmState;
-    use shared_mem::recording::ObjectSeries;
     use shared_mem::theta::EffectTheta;
     use twin::control::Drive;
     use twin::sim::SimCell;
@@ -370,23 +369,9 @@ mod tests {
             }
         }
         let [measured, desired] = log;
-        let (file, kind) = ("clip.mcap".into(), ClipKind::Excitation);
         let joint_names = (1..=7).map(|joint| format!("fr3_joint{joint}")).collect();
-        let (object, others, warnings) = (ObjectSeries::default(), Vec::new(), Vec::new());
-        let origins = shared_mem::origin::Origins::default();
-        Clip {
-            file,
-            kind,
-            joint_names,
-            desired,
-            measured,
-            torques_end_at_rows,
-            object,
-            others,
-            origins,
-            warnings,
-            damage: None,
-        }
+        let nothing = of_one_joint(Vec::new(), |_| 0.0);
+        Clip { joint_names, desired, measured, torques_end_at_rows, ..nothing }
     }
 
     #[test]
