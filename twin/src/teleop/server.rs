@@ -28,6 +28,9 @@ const PAGE: &str = include_str!("page.html");
 const MOST: usize = 8;
 /// Longest message of a page [bytes].
 const LONGEST: usize = 16 * 1024;
+/// Most messages of a page that are heard from one picture to the next; what is more waits at the page. A page that sends as fast as
+/// it can would keep the others from being attended to.
+const HEARD: usize = 128;
 /// How often a page is asked whether it is there.
 const ASK: Duration = Duration::from_secs(2);
 /// A page that answers none of so many in a row is gone, though its connection never ended: the next one steers.
@@ -162,7 +165,7 @@ async fn upgrade(State(shared): State<Shared>, socket: WebSocketUpgrade) -> Resp
     };
     // The seat goes along: where the connection fails before it is a page's, it is dropped with what was to come.
     socket.max_message_size(LONGEST).on_upgrade(move |socket| async move {
-        let page = Page { socket, seat, shared, unanswered: 0, is_warned: false };
+        let page = Page { socket, seat, shared, unanswered: 0, heard: 0, is_warned: false };
         // A page that goes away in the middle is no fault of anybody's.
         let _gone = page.attend().await;
     })
@@ -195,6 +198,8 @@ struct Page {
     shared: Shared,
     /// How often in a row it was asked whether it is there, and nothing came.
     unanswered: u32,
+    /// Messages heard since the last picture.
+    heard: usize,
     /// Whether it heard, since the last picture, that it sends too much.
     is_warned: bool,
 }
@@ -218,14 +223,14 @@ impl Page {
                 self.say(Message::Text(format!("{{\"role\": \"{role}\"}}").into())).await?;
             }
             tokio::select! {
-                message = self.socket.recv() => match message {
+                message = self.socket.recv(), if self.heard < HEARD => match message {
                     Some(Ok(message)) => self.hear(message).await?,
                     Some(Err(_)) | None => return Err(Left),
                 },
                 changed = frames.changed() => {
                     changed.map_err(|_| Left)?;
                     let frame = frames.borrow_and_update().clone();
-                    self.is_warned = false;
+                    (self.heard, self.is_warned) = (0, false);
                     self.say(Message::Binary(frame)).await?;
                 }
                 _ = ask.tick() => {
@@ -247,7 +252,7 @@ impl Page {
     }
 
     async fn hear(&mut self, message: Message) -> Result<(), Left> {
-        self.unanswered = 0;
+        (self.unanswered, self.heard) = (0, self.heard + 1);
         let line = match message {
             Message::Text(text) => match self.take(&text) {
                 Ok(()) => return Ok(()),
