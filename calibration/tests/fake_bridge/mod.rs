@@ -2,7 +2,7 @@
 
 use shared_mem::msg::arm::{ArmMode, ArmState, MotionStatus};
 use shared_mem::msg::event::{Event, EventLevel, EventSource};
-use shared_mem::msg::motion::{MotionChunk, MotionKind, SetPoint};
+use shared_mem::msg::motion::{MotionChunk, MotionKind, STOP_SILENCE_NS, SetPoint};
 use shared_mem::time::now_ns;
 use shared_mem::topics::{ARM_MOTION, ARM_STATE, EVENTS};
 use shared_mem::transport::{Node, Publisher, Subscriber};
@@ -10,7 +10,10 @@ use std::collections::VecDeque;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, mpsc};
 use std::thread::JoinHandle;
-use std::time::Duration;
+use std::time::{Duration, Instant};
+
+/// After a stop it begins nothing before nobody has sent for so long.
+const SILENCE: Duration = Duration::from_nanos(STOP_SILENCE_NS);
 
 /// How the bridge misbehaves.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -78,6 +81,8 @@ struct Fake {
     queue: VecDeque<SetPoint>,
     complete: bool,
     played: Vec<SetPoint>,
+    /// When a stop came, or anything after it.
+    stopped: Option<Instant>,
     _node: Node,
 }
 
@@ -93,6 +98,7 @@ impl Fake {
             queue: VecDeque::new(),
             complete: false,
             played: Vec::new(),
+            stopped: None,
             _node: node,
         }
     }
@@ -137,6 +143,13 @@ impl Fake {
                 self.state.motion = MotionStatus::Refused;
                 self.say("set point 0: joint 2 is too fast");
             }
+            if self.stopped.is_some_and(|stopped| stopped.elapsed() < SILENCE) {
+                self.state.motion = MotionStatus::Refused;
+                self.say("the arm was stopped, and nothing begins before a silence");
+            }
+        }
+        if chunk.kind == MotionKind::Stop || self.stopped.is_some_and(|stopped| stopped.elapsed() < SILENCE) {
+            self.stopped = Some(Instant::now());
         }
         match chunk.kind {
             MotionKind::Stop => self.brake("stopped on request"),

@@ -1,8 +1,7 @@
 //! What a person typed as joints that the arm can get to, or what is wrong with it. A goal that is out of reach is no goal:
 //! going to the nearest place instead is for streams, whose senders see the arm.
 
-use super::{LONGEST, way};
-use crate::motion::Target;
+use super::way;
 use crate::safety::{Guard, Limits, Workspace};
 use anyhow::{Result, ensure};
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
@@ -118,8 +117,7 @@ impl Place {
     }
 
     fn reached(self, goal: Goal, speed: f64) -> Result<Goal> {
-        let target = Target { stream: 1, q: Some(goal.q), speed };
-        way::check(self.guard, &self.first.q_d, &target, LONGEST)?;
+        way::check(self.guard, &self.first.q_d, &goal.q, speed)?;
         Ok(goal)
     }
 }
