@@ -77,5 +77,10 @@ fn a_policy_acts_on_the_arm_of_a_running_bridge_and_what_is_beyond_its_limits_en
     let (address, _) = serve(|joints| joints.iter().map(|_| 9.0).chain([0.0]).collect());
     let answer = run(&address, &[]);
     assert!(answer["episodes"][0]["fault"].is_string(), "{answer}");
+    // What is no target at all is never sent, and nothing is waited for.
+    let (address, _) = serve(|joints| joints.iter().map(|_| 3e38).chain([0.0]).collect());
+    let answer = run(&address, &[]);
+    let fault = answer["episodes"][0]["fault"].as_str().unwrap_or("none");
+    assert!(fault.contains("no target may be"), "{answer}");
     assert!(bridge.interrupt().status.success());
 }

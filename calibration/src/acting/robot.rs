@@ -6,6 +6,7 @@ use evaluation::policy::{Policy, PolicyError, Seen};
 use evaluation::rollout::Asking;
 use serde::Serialize;
 use shared_mem::msg::arm::{ArmMode, ArmState, MotionStatus};
+use shared_mem::msg::check::LARGEST;
 use shared_mem::msg::event::{Event, EventLevel, EventSource};
 use shared_mem::msg::gripper::GripperState;
 use shared_mem::msg::target::ArmTarget;
@@ -21,6 +22,9 @@ const PATIENCE: Duration = Duration::from_secs(2);
 const LOOK: Duration = Duration::from_millis(5);
 /// The last target is held for so long, so that the arm comes to rest there.
 const REST: Duration = Duration::from_millis(600);
+
+/// What ended an episode that a person ended.
+const INTERRUPTED: &str = "interrupted";
 
 /// A policy cannot act on the robot.
 #[derive(Debug, thiserror::Error)]
@@ -135,7 +139,13 @@ impl Robot {
             let now = task.reported(&self.state, self.gripper.as_ref());
             let pictures = task.cameras().iter().enumerate().map(|(i, camera)| self.seen_by(i, camera)).collect();
             let seen = Seen { task, numbers: &numbers, now: &now, surroundings: false, pictures };
-            let answer = policy.actions(&seen.message(&asking.keys, &mut signs))?;
+            let answer = match policy.actions(&seen.message(&asking.keys, &mut signs)) {
+                Err(error) if error.is_interruption() => {
+                    acted.fault = Some(INTERRUPTED.to_owned());
+                    break;
+                }
+                answer => answer?,
+            };
             for values in answer.iter().take(asking.chunk.unwrap_or(usize::MAX)) {
                 let action = asking.actions.read(task, &numbers, values).map_err(|what| policy.answer(&what))?;
                 acted.fault = self.go(task, &action, (&mut target, &stream, period), interrupt)?;
@@ -165,6 +175,11 @@ impl Robot {
             Ok(Some(q)) => target.q = q,
             Ok(None) => {}
             Err(fault) => return Ok(Some(fault)),
+        }
+        // A bridge ignores a message that holds more, and nobody would hear of it.
+        let wanted = target.q.iter().copied().chain(action.width);
+        if let Some(beyond) = wanted.into_iter().find(|value| !(value.abs() <= LARGEST)) {
+            return Ok(Some(format!("the policy wants {beyond:e} rad or m, which no target may be")));
         }
         if !stream.go(Leg { q: target.q, width: action.width, over: period }) {
             return Ok(Some("the stream of targets broke off".to_owned()));
@@ -203,7 +218,7 @@ impl Robot {
         }
         let braked = self.state.motion_id == stream && self.state.motion == MotionStatus::Braked;
         Ok(if interrupt.asked() {
-            Some("interrupted".to_owned())
+            Some(INTERRUPTED.to_owned())
         } else if self.heard.elapsed() > PATIENCE {
             Some("the bridge fell silent".to_owned())
         } else if !matches!(self.state.mode, ArmMode::Idle | ArmMode::Move) {
