@@ -1,4 +1,5 @@
-//! The well-formed files: one folder for each scenario, made from nothing. SI units.
+//! The well-formed files: one folder for each scenario, made from nothing, and those of logs from the fixtures of the importer. SI
+//! units.
 
 use shared_mem::msg::arm::ArmState;
 use shared_mem::msg::image::{CameraInfo, ImageHeader, PixelEncoding};
@@ -8,7 +9,7 @@ use shared_mem::topics;
 use std::fmt::Write as _;
 use std::fs;
 use std::io::BufWriter;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// A pose in which the arm can start.
 const READY: [f64; 7] = [0.0, -0.785, 0.0, -2.356, 0.0, 1.571, 0.785];
@@ -91,6 +92,64 @@ pub(crate) fn write(whole: &Path) {
     put(&splats.join("scan.ply"), cloud(3000));
     put(&splats.join("links/link0.ply"), cloud(100));
     pictures(&folder("pictures"));
+    for log in LOGS {
+        copy(&fixtures().join(log), &whole.join(log).join(log));
+    }
+    scan(&folder("scan"));
+}
+
+/// Logs of other programs, each in a scenario of its name.
+pub(crate) const LOGS: [&str; 10] = [
+    "rosbag2_mcap",
+    "rosbag2_sqlite3",
+    "franka_state.bag",
+    "joint_states_bz2.bag",
+    "joint_states_lz4.bag",
+    "lerobot_v21",
+    "lerobot_v3",
+    "plain.csv",
+    "log.npz",
+    "sage_motion",
+];
+
+fn fixtures() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../import/tests/fixtures")
+}
+
+/// Copies a file, or a folder with all that is in it.
+pub(crate) fn copy(from: &Path, to: &Path) {
+    if from.is_dir() {
+        fs::create_dir_all(to).expect("room");
+        for entry in fs::read_dir(from).expect("a folder").map(|entry| entry.expect("an entry").path()) {
+            copy(&entry, &to.join(entry.file_name().expect("a name")));
+        }
+    } else {
+        fs::create_dir_all(to.parent().expect("a folder")).expect("room");
+        fs::copy(from, to).expect("room");
+    }
+}
+
+/// A dozen pictures of one colour around a place, with masks, which show no object.
+fn scan(folder: &Path) {
+    let mut frames = Vec::new();
+    for i in 0..12 {
+        let name = format!("{i:02}.png");
+        for (kind, value) in [("images", 90_u8), ("masks", 255)] {
+            fs::create_dir_all(folder.join(kind)).expect("room");
+            let pixels = vec![value; 3 * (WIDTH * HEIGHT) as usize];
+            write_png(&folder.join(kind).join(&name), WIDTH, HEIGHT, &pixels).expect("room");
+        }
+        let (s, c) = (f64::from(i) * std::f64::consts::TAU / 12.0).sin_cos();
+        // From two units away along x, turned about z; x of the camera is right, its -z forwards.
+        frames.push(format!(
+            r#"{{"file_path": "images/{name}", "transform_matrix": [[{}, 0, {c}, {}], [{c}, 0, {s}, {}], [0, 1, 0, 0], [0, 0, 0, 1]]}}"#,
+            -s,
+            2.0 * c,
+            2.0 * s
+        ));
+    }
+    let camera = format!(r#""fl_x": 60, "fl_y": 60, "cx": 32, "cy": 24, "w": {WIDTH}, "h": {HEIGHT}"#);
+    put(&folder.join("transforms.json"), format!("{{{camera}, \"frames\": [{}]}}", frames.join(", ")));
 }
 
 fn put(path: &Path, bytes: impl AsRef<[u8]>) {

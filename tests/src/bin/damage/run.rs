@@ -1,6 +1,7 @@
 //! One case: a copy of a scenario with one damaged file, a program that is run on it, and what it did.
 
 use crate::changes;
+use crate::files::copy;
 use crate::verbs::Verb;
 use rand::{RngExt as _, SeedableRng as _};
 use rand_pcg::Pcg64;
@@ -96,6 +97,8 @@ fn watched(verb: &Verb, folder: &Path, number: u64, limits: &Limits) -> Ended {
     let stderr = folder.join("stderr.txt");
     let mut child = Command::new(tests::program_path(verb.program))
         .args(arguments)
+        // What a program asks is written where it was started.
+        .current_dir(folder)
         .env("TWINALIGN_DOMAIN", format!("damage-{}-{number}", std::process::id()))
         .env("RAYON_NUM_THREADS", "2")
         .stdin(Stdio::null())
@@ -191,12 +194,4 @@ fn names_a_file(line: &str, folder: &Path) -> bool {
             || line.contains(" --")
             || line.contains("cell.toml")
             || entries.any(|entry| named(&entry.file_name())))
-}
-
-fn copy(from: &Path, to: &Path) {
-    fs::create_dir_all(to).expect("room");
-    for entry in fs::read_dir(from).expect("a folder").map(|entry| entry.expect("an entry").path()) {
-        let target = to.join(entry.file_name().expect("a name"));
-        if entry.is_dir() { copy(&entry, &target) } else { fs::copy(&entry, &target).map(drop).expect("room") }
-    }
 }

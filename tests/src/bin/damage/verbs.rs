@@ -66,6 +66,33 @@ pub(crate) fn all(programs: &[String]) -> Vec<Verb> {
     add("splats", &["links/link0.ply"], "twin", "render {dir} --splats {dir}/links --out {dir}/frames --json");
     add("pictures", &["picture.png", "mask.png", "joints.json", "cell.toml"], "calibration", VIEWPOINT);
     add("pictures", &["photo.jpg", "photo.json"], "calibration", PHOTO);
+    for (log, damaged, line) in [
+        ("rosbag2_mcap", &["rosbag2_mcap/rosbag2_mcap.mcap"][..], "import {dir}/rosbag2_mcap --out {dir}/out --json"),
+        ("rosbag2_sqlite3", &["rosbag2_sqlite3/rosbag2_sqlite3.db3"], "import {dir}/rosbag2_sqlite3 --out {dir}/out --json"),
+        ("franka_state.bag", &["franka_state.bag"], "import {dir}/franka_state.bag --out {dir}/out --json"),
+        ("joint_states_bz2.bag", &["joint_states_bz2.bag"], "import {dir}/joint_states_bz2.bag --out {dir}/out --json"),
+        ("joint_states_lz4.bag", &["joint_states_lz4.bag"], "import {dir}/joint_states_lz4.bag --out {dir}/out --json"),
+        (
+            "lerobot_v21",
+            &["lerobot_v21/data/chunk-000/episode_000000.parquet", "lerobot_v21/meta/info.json"],
+            "import {dir}/lerobot_v21 --out {dir}/out --json",
+        ),
+        (
+            "lerobot_v3",
+            &["lerobot_v3/data/chunk-000/file-000.parquet", "lerobot_v3/meta/info.json"],
+            "import {dir}/lerobot_v3 --out {dir}/out --json",
+        ),
+        ("plain.csv", &["plain.csv", "plain.csv"], "import {dir}/plain.csv --out {dir}/out --json"),
+        ("log.npz", &["log.npz", "log.npz"], "import {dir}/log.npz --out {dir}/out --json"),
+        (
+            "sage_motion",
+            &["sage_motion/control.csv", "sage_motion/state_motor.csv", "sage_motion/event.csv"],
+            "import {dir}/sage_motion --out {dir}/out --json",
+        ),
+    ] {
+        add(log, damaged, "calibration", line);
+    }
+    add("scan", &["transforms.json", "transforms.json", "masks/03.png"], "twin", "reconstruct object {dir} --out {dir}/out");
     add("own", &["effects.toml", "effects.toml", "cell.toml"], "rt_bridge", BRIDGE);
     all
 }
