@@ -53,7 +53,7 @@ fn arrays_without_end_of_what_takes_no_byte_are_no_type() {
     ] {
         std::fs::write(&log, bag(&format!("{own}{empty}"), &message)).expect("room");
         let line = refused(&log);
-        assert!(line.contains("`/states` (the bag holds no definition of its type)"), "{own}: {line}");
+        assert!(line.contains("`/states` (the bag holds no definition of its type that can be read)"), "{own}: {line}");
     }
 }
 

@@ -17,7 +17,7 @@ const MOST_LAYOUTS: usize = 64;
 
 /// Why a topic is left out.
 const PICTURES: &str = "pictures and other arrays of bytes are not imported";
-const UNDEFINED: &str = "the bag holds no definition of its type";
+const UNDEFINED: &str = "the bag holds no definition of its type that can be read";
 const NUMBERLESS: &str = "it holds no number that a clip has a place for";
 const CROWDED: &str = "its messages have too many forms";
 const LONG: &str = "its messages hold more numbers than a row of any use";
