@@ -7,15 +7,17 @@
 //! | [`control`] | the thread: real time, the loop, its end |
 //! | [`cycle`] | one turn: read, check, command, hand to the pump |
 //! | [`deadline`] | the timer's grid |
+//! | [`idle`] | how deeply idle processors sleep |
 //! | [`law`] | the joint-impedance law |
 //! | [`orders`] | motions and stops on their way to the loop |
 //! | [`stats`] | how well time was kept |
-//! | [`process`] | what is asked of Linux (the only `unsafe`) |
+//! | [`process`] | what is asked of Linux by `unsafe` calls |
 
 mod claim;
 pub mod control;
 pub mod cycle;
 pub mod deadline;
+pub mod idle;
 pub mod law;
 pub mod orders;
 pub mod process;

@@ -17,6 +17,7 @@ use crate::replay::Instruments;
 use crate::rt::Realtime;
 use crate::rt::control;
 use crate::rt::cycle::{Cycle, Link, Plan};
+use crate::rt::idle::{DeepIdle, ShallowIdle};
 use crate::rt::orders::orders;
 use crate::rt::stats::LoopStats;
 use crate::safety::Guard;
@@ -320,6 +321,7 @@ impl Watch {
     /// Starts the control thread and stays until it has ended. A pump that fails ends the run: nobody would see the arm.
     fn over(&mut self, settings: &Settings, cycle: Cycle, stop: &AtomicBool, pump: &mut Pump) -> Result<LoopStats> {
         let end_control = Arc::new(AtomicBool::new(false));
+        let _shallow_idle = self.shallow_idle();
         let control = control::spawn(cycle, settings.realtime, end_control.clone())?;
         tracing::info!("driving {}; it holds its pose until a motion is sent", settings.arm);
         let begin = Instant::now();
@@ -339,6 +341,15 @@ impl Watch {
                 Ok(LoopStats::default())
             }
         }
+    }
+
+    /// Keeps processors out of deep sleep while the loop runs.
+    fn shallow_idle(&self) -> Option<ShallowIdle> {
+        let refused = |error: DeepIdle| {
+            let notice = Notice { level: EventLevel::Warning, text: error.to_string() };
+            let _pump_gone = self.notices.send(notice);
+        };
+        ShallowIdle::hold().map_err(refused).ok()
     }
 
     fn look(&mut self, cleared: &mut Instant) {
