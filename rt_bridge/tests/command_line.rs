@@ -119,6 +119,18 @@ fn the_doctor_answers_with_one_object_of_findings() {
         assert!(checks.iter().any(|c| *c == check), "{check} is not looked at: {checks:?}");
     }
     assert!(report["wake_us"]["p999"].as_f64() > Some(0.0));
+    assert!(report["communication_constraints_violation"].is_array(), "{report}");
+    let ready = report["ready"].as_bool().expect("ready");
+    assert_eq!((ready, end.status.code()), (report["conclusion"] == "ready", Some(i32::from(!ready))), "{report}");
+}
+
+#[test]
+fn the_doctor_ends_in_one_line_and_a_robot_that_does_not_answer_is_named_there() {
+    let end = rt_bridge(&["doctor", "--arm", "fci://127.0.0.1:1"]);
+    let said = text(&end.stdout);
+    let last = said.lines().last().unwrap_or_default();
+    assert!(last.starts_with("not ready: ") && last.contains("robot ("), "{said}");
+    assert_eq!((end.status.code(), text(&end.stderr)), (Some(1), String::new()));
 }
 
 /// Whoever may write in the folder, or owns a file under a name of ours, could stop a bridge at any moment.

@@ -73,23 +73,28 @@ pub fn main(build: &Build) -> ExitCode {
         .with_ansi(false)
         .init();
     let done = match arguments.verb {
-        Verb::Run(run) => run.execute(),
-        Verb::Record(record) => record.execute(),
-        Verb::Convert(convert) => convert.execute(),
-        Verb::Serve(serve) => serve.execute(),
-        Verb::Grip(grip) => grip.execute(),
-        Verb::Target(target) => target.execute(),
-        Verb::Link(link) => link.execute(),
+        // What it found out is its answer, and no error.
         Verb::Doctor(doctor) => doctor.execute(),
+        Verb::Run(run) => run.execute().map(success),
+        Verb::Record(record) => record.execute().map(success),
+        Verb::Convert(convert) => convert.execute().map(success),
+        Verb::Serve(serve) => serve.execute().map(success),
+        Verb::Grip(grip) => grip.execute().map(success),
+        Verb::Target(target) => target.execute().map(success),
+        Verb::Link(link) => link.execute().map(success),
     };
     match done {
-        Ok(()) => ExitCode::SUCCESS,
+        Ok(code) => code,
         Err(error) => {
             // Every error is one sentence that holds its cause; the chain below would say it twice.
             console::line(format_args!("error: {error}"));
             ExitCode::FAILURE
         }
     }
+}
+
+fn success((): ()) -> ExitCode {
+    ExitCode::SUCCESS
 }
 
 /// A flag that Ctrl-C and `SIGTERM` set, and the end of `parent`, where one started this program.

@@ -1,30 +1,13 @@
-//! Kernel, scheduling, memory, processors.
+//! Scheduling, memory, processors.
 
 use super::Finding;
 use crate::rt::process::{self, Limit};
-use std::fs;
-use std::path::Path;
 
 /// Lines for the limits of one user, for `/etc/security/limits.d/`.
 const LIMITS: &str = "put `@realtime - rtprio 99` and `@realtime - memlock unlimited` into /etc/security/limits.d/realtime.conf, add yourself to the group `realtime`, log in again";
 
 pub(super) fn examine() -> Vec<Finding> {
-    vec![kernel(), scheduling(), memory_lock(), processors(), governor()]
-}
-
-fn kernel() -> Finding {
-    let version = fs::read_to_string("/proc/sys/kernel/osrelease").unwrap_or_default();
-    let version = version.trim();
-    let realtime = fs::read_to_string("/sys/kernel/realtime").is_ok_and(|flag| flag.trim() == "1");
-    if realtime {
-        Finding::ok("kernel", format!("{version}, PREEMPT_RT"))
-    } else {
-        Finding::warning(
-            "kernel",
-            format!("{version}, not PREEMPT_RT"),
-            "install a real-time kernel before a robot moves; with `--realtime ignore` the bridge runs without",
-        )
-    }
+    vec![scheduling(), memory_lock(), processors()]
 }
 
 /// Tried in a thread of its own, which ends with the priority.
@@ -37,7 +20,7 @@ fn scheduling() -> Finding {
                 Ok((soft, _)) => soft.map_or("unlimited".into(), |n| n.to_string()),
                 Err(_) => "not known".into(),
             };
-            Finding::warning("scheduling", format!("SCHED_FIFO is refused (limit rtprio: {limit})"), LIMITS)
+            Finding::warning("scheduling", format!("SCHED_FIFO is refused (limit rtprio: {limit})"), LIMITS).delaying()
         }
     }
 }
@@ -50,7 +33,7 @@ fn memory_lock() -> Finding {
         Ok((Some(bytes), _)) => format!("{} kB", bytes / 1024),
         _ => "not known".into(),
     };
-    Finding::warning("memory lock", format!("only a part may be locked (limit memlock: {limit})"), LIMITS)
+    Finding::warning("memory lock", format!("only a part may be locked (limit memlock: {limit})"), LIMITS).delaying()
 }
 
 fn processors() -> Finding {
@@ -65,19 +48,5 @@ fn processors() -> Finding {
             Finding::warning("processors", found, "four cores keep camera, recorder and twin out of each other's way")
         }
         _ => Finding::ok("processors", found),
-    }
-}
-
-fn governor() -> Finding {
-    let folder = Path::new("/sys/devices/system/cpu");
-    let core = process::last_core().unwrap_or(0);
-    match fs::read_to_string(folder.join(format!("cpu{core}/cpufreq/scaling_governor"))) {
-        Ok(name) if name.trim() == "performance" => Finding::ok("governor", "performance"),
-        Ok(name) => Finding::warning(
-            "governor",
-            format!("{} on core {core}", name.trim()),
-            "set it with `cpupower frequency-set -g performance`: clocks that ramp up cost hundreds of microseconds",
-        ),
-        Err(_) => Finding::ok("governor", "the clock is not this system's to set (a virtual machine?)"),
     }
 }

@@ -65,12 +65,12 @@ impl Line {
         );
         if !matches!(self.mode, ArmMode::Idle | ArmMode::Move) {
             let remedy = "release the user stop, unlock the joints and activate FCI in the robot's web page";
-            return Finding::warning("robot", found, remedy);
+            return Finding::problem("robot", found, remedy);
         }
         if self.lost > 0 || late.p99.is_none_or(|us| us > GOOD_US) {
             let remedy =
                 "connect it directly, without switch or Wi-Fi: state, computing and command share one millisecond";
-            return Finding::warning("robot", found, remedy);
+            return Finding::warning("robot", found, remedy).delaying();
         }
         Finding::ok("robot", found)
     }

@@ -3,6 +3,8 @@
 
 use std::io;
 use std::mem::MaybeUninit;
+use std::net::UdpSocket;
+use std::os::fd::AsRawFd as _;
 
 /// Priority of the control thread under `SCHED_FIFO`: above ordinary interrupts' threads (50), below the kernel's own watchdogs (99).
 pub const CONTROL_PRIORITY: i32 = 80;
@@ -159,6 +161,61 @@ pub enum Limit {
     LockedMemory,
 }
 
+/// How long a network interface keeps packets back, to interrupt the processor once for several of them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct PacketHold {
+    /// Those that come in [us].
+    pub receive_us: u32,
+    /// Those that were sent, before it says so [us].
+    pub send_us: u32,
+    /// It changes the time for those that come in by itself.
+    pub is_adaptive: bool,
+}
+
+/// Linux's question for [`PacketHold`], and its answer: `struct ethtool_coalesce`.
+#[repr(C)]
+struct Coalesce {
+    question: u32,
+    receive_us: u32,
+    receive_frames_and_interrupt: [u32; 3],
+    send_us: u32,
+    send_frames_interrupt_and_statistics: [u32; 4],
+    adaptive_receive: u32,
+    rest: [u32; 12],
+}
+
+/// Asks a network interface, as `ethtool -c` does.
+///
+/// # Errors
+/// The kernel's: "operation not supported" where it keeps nothing back, "no such device".
+pub fn packet_hold(interface: &str) -> io::Result<PacketHold> {
+    const GET_COALESCE: u32 = 0xe;
+    let socket = UdpSocket::bind(("0.0.0.0", 0))?;
+    let mut answer = Coalesce {
+        question: GET_COALESCE,
+        receive_us: 0,
+        receive_frames_and_interrupt: [0; 3],
+        send_us: 0,
+        send_frames_interrupt_and_statistics: [0; 4],
+        adaptive_receive: 0,
+        rest: [0; 12],
+    };
+    // SAFETY: an all-zero ifreq is one without a name.
+    let mut request = unsafe { MaybeUninit::<libc::ifreq>::zeroed().assume_init() };
+    let name = request.ifr_name.iter_mut().zip(interface.bytes());
+    name.for_each(|(place, byte)| *place = byte as libc::c_char);
+    // Shortened, it would be the name of another one.
+    if interface.len() >= request.ifr_name.len() {
+        return Err(io::Error::from(io::ErrorKind::InvalidInput));
+    }
+    request.ifr_ifru.ifru_data = (&raw mut answer).cast();
+    // SAFETY: the request names an answer that lives longer than the call and is as long as the question asks for.
+    let rc = unsafe { libc::ioctl(socket.as_raw_fd(), libc::SIOCETHTOOL, &raw mut request) };
+    outcome(rc)?;
+    let Coalesce { receive_us, send_us, adaptive_receive, .. } = answer;
+    Ok(PacketHold { receive_us, send_us, is_adaptive: adaptive_receive != 0 })
+}
+
 /// Asks a process to end in its own orderly way (`SIGTERM`).
 ///
 /// # Errors
@@ -185,6 +242,15 @@ mod tests {
         sleep_until(deadline);
         assert!(now_ns() >= deadline);
         sleep_until(deadline - 1_000_000);
+    }
+
+    #[test]
+    fn an_interface_that_is_not_there_or_keeps_nothing_back_is_an_error() {
+        // 23 numbers of 32 bits, as the kernel writes them.
+        assert_eq!(size_of::<Coalesce>(), 92);
+        for interface in ["lo", "no-such-one", "longer-than-a-name-may-be"] {
+            assert!(packet_hold(interface).is_err(), "{interface}");
+        }
     }
 
     #[test]
