@@ -137,8 +137,9 @@ fn answers(session: &str, cell: &str, strokes: &str) -> Vec<Verb> {
 
 /// Verbs that move the simulated arm. What they record grows, and is judged as far as it was entered into the session.
 fn live(cell: &str) -> Vec<Verb> {
-    let capture =
-        format!("capture excitation --cell {cell} --arm sim --clips 1 --duration 2 --out {{out}}/session --realtime ignore");
+    let capture = format!(
+        "capture excitation --cell {cell} --arm sim --clips 1 --duration 2 --out {{out}}/session --realtime ignore"
+    );
     let run = format!("run --cell {cell} --arm sim --realtime ignore --duration 3 --record {{out}}/clip.mcap");
     let demo: &[&str] = &[
         "demo/cell.toml",
