@@ -4,7 +4,7 @@
 use rmpv::Value;
 use std::io::{self, Read};
 
-/// Values that a message may have: each takes a hundred times the byte that it is sent as.
+/// Pieces that a message may be read in, of which a value has one or two: it takes a hundred times the byte that it is sent as.
 const MOST_VALUES: usize = 1 << 20;
 /// Numbers that an answer may have: a thousand actions of a thousand numbers.
 pub(super) const MOST_NUMBERS: usize = 1 << 20;

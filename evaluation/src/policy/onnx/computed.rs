@@ -23,8 +23,6 @@ const ENDS: Duration = Duration::from_millis(200);
 /// this machine, and once more [bytes].
 const ROOM: u64 = 2 << 30;
 const OF_THE_FILES: u64 = 4;
-/// Bytes of a page, by which the system counts memory.
-const PAGE: u64 = 4096;
 
 /// What a network takes or gives.
 #[derive(Debug, Clone)]
@@ -55,6 +53,8 @@ pub(super) struct Computed {
     answers: Receiver<Result<Array, String>>,
     stop: Arc<RunOptions>,
     room: u64,
+    /// Whether it was given up: an answer that comes late is none to what is asked next.
+    given_up: bool,
     pub(super) inputs: Vec<Port>,
 }
 
@@ -99,13 +99,17 @@ impl Computed {
         };
         thread::Builder::new().name("policy".into()).spawn(work).map_err(|error| failed(&error))?;
         let inputs = wait(&opening, room, &Stop::Opening)?.map_err(Uncomputed::Failed)?;
-        Ok(Self { asked, answers, stop, room, inputs })
+        Ok(Self { asked, answers, stop, room, given_up: false, inputs })
     }
 
     /// What comes of these inputs.
-    pub(super) fn run(&self, given: Vec<Given>) -> Result<Array, Uncomputed> {
-        self.asked.send(given).map_err(|_| Uncomputed::Ended("was ended before".into()))?;
-        wait(&self.answers, self.room, &Stop::Run(&self.stop))?.map_err(Uncomputed::Failed)
+    pub(super) fn run(&mut self, given: Vec<Given>) -> Result<Array, Uncomputed> {
+        if self.given_up || self.asked.send(given).is_err() {
+            return Err(Uncomputed::Ended("was given up before".into()));
+        }
+        let waited = wait(&self.answers, self.room, &Stop::Run(&self.stop));
+        self.given_up = waited.is_err();
+        waited?.map_err(Uncomputed::Failed)
     }
 }
 
@@ -191,7 +195,7 @@ fn wait<T>(given: &Receiver<T>, room: u64, stop: &Stop<'_>) -> Result<T, Uncompu
     let why = loop {
         match given.recv_timeout(LOOK) {
             Ok(given) => return Ok(given),
-            Err(RecvTimeoutError::Disconnected) => return Err(Uncomputed::Ended("its thread has ended".into())),
+            Err(RecvTimeoutError::Disconnected) => return Err(Uncomputed::Ended("has ended by itself".into())),
             Err(RecvTimeoutError::Timeout) => {}
         }
         if ending::asked() {
@@ -212,8 +216,10 @@ fn wait<T>(given: &Receiver<T>, room: u64, stop: &Stop<'_>) -> Result<T, Uncompu
 
 /// What the process has in memory [bytes]; 0 where the system does not say it.
 fn resident() -> u64 {
-    let text = input::text(Path::new("/proc/self/statm"), input::Kind::Configuration).unwrap_or_default();
-    text.split(' ').nth(1).and_then(|pages| pages.parse::<u64>().ok()).unwrap_or(0) * PAGE
+    let text = input::text(Path::new("/proc/self/status"), input::Kind::Configuration).unwrap_or_default();
+    let line = text.lines().find_map(|line| line.strip_prefix("VmRSS:"));
+    let kibibytes = line.and_then(|line| line.split_whitespace().next()).and_then(|number| number.parse::<u64>().ok());
+    kibibytes.unwrap_or(0) << 10
 }
 
 /// What the files of a network take: its own, and those beside it, where its weights may be [bytes].
