@@ -27,7 +27,7 @@ fn above(table: Option<f64>) -> Guard {
     let table = table.map(|height| Table { height });
     let cell = Cell { robot: Some(robot), tool: Some(tool), table, ..Cell::default() };
     let workspace = Workspace::of(&cell, &ArmModel::from_cell(&cell).expect("an FR3"));
-    Guard { limits: Limits::fr3(), workspace, period_s: T }
+    Guard { limits: Limits::fr3(), workspace, trailing: None, period_s: T }
 }
 
 fn chunks(motion_id: u64, points: &[SetPoint]) -> Vec<MotionChunk> {
@@ -184,9 +184,12 @@ fn a_velocity_above_the_limit_is_refused_though_the_positions_keep_it() {
     for i in 0..7 {
         point.q_d[i] += last.v[i] * T;
     }
-    assert!(guard().check(&last, &point, &guard().workspace.outside(&READY)).is_ok());
+    assert!(guard().check(&last, &point, &guard().workspace.outside(&READY), None).is_ok());
     point.dq_d[0] = limits.joints[0].velocity + 1e-3;
-    assert_eq!(guard().check(&last, &point, &guard().workspace.outside(&READY)), Err(Violation::Velocity { joint: 1 }));
+    assert_eq!(
+        guard().check(&last, &point, &guard().workspace.outside(&READY), None),
+        Err(Violation::Velocity { joint: 1 })
+    );
 }
 
 #[test]

@@ -23,7 +23,7 @@ fn above(table: Option<f64>) -> Guard {
     let table = table.map(|height| Table { height });
     let cell = Cell { robot: Some(robot), tool: Some(tool), table, ..Cell::default() };
     let workspace = Workspace::of(&cell, &ArmModel::from_cell(&cell).expect("an FR3"));
-    Guard { limits: Limits::fr3(), workspace, period_s: T }
+    Guard { limits: Limits::fr3(), workspace, trailing: None, period_s: T }
 }
 
 /// A player, what it commanded last, and all that it said.

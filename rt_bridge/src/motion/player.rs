@@ -20,13 +20,14 @@ pub use stream::Target;
 use super::ease::Ease;
 use super::{Brake, lost};
 use crate::remark::{BrakeReason, Refusal, Remark, Said};
-use crate::safety::{Guard, Outside, Trace};
+use crate::safety::{Guard, Measured, Outside, Trace};
 use queue::Queue;
 use shared_mem::msg::arm::{ArmState, MotionStatus};
 use shared_mem::msg::motion::{CHUNK_LENGTH, MotionChunk, MotionKind, SetPoint};
 use shared_mem::msg::{Joints, MAX_JOINTS};
 use silence::Silence;
 use stream::Stream;
+use twin::arm::JointState;
 
 /// How far a motion's first set point may lie from the commanded position [rad].
 pub const START_TOLERANCE: f64 = 1e-6;
@@ -53,6 +54,8 @@ pub struct Player {
     ease: Ease,
     /// How far outside the workspace the arm was when it last rested.
     outside: Outside,
+    /// What was measured of the arm; `None` before anything was.
+    arm: Option<Measured>,
     queue: Queue,
     stream: Stream,
     silence: Silence,
@@ -75,6 +78,7 @@ impl Player {
             stream: Stream::new(&guard.limits, guard.period_s),
             silence: Silence::over(guard.period_s),
             outside: guard.workspace.outside(&q_d),
+            arm: None,
             guard,
             trace: Trace::at_rest(q_d),
             before: Trace::at_rest(q_d),
@@ -98,6 +102,16 @@ impl Player {
         (self.before, self.activity) = (self.trace, Activity::Holding);
         (self.planned, self.ease) = (self.trace, Ease::over());
         self.outside = self.guard.workspace.outside(&q_d);
+        self.arm = None;
+    }
+
+    /// The arm is in this state, which the next set point answers. Its numbers must be finite.
+    pub fn see(&mut self, state: &JointState) {
+        let Guard { workspace, limits, period_s, .. } = &self.guard;
+        match &mut self.arm {
+            Some(arm) => arm.see(state, &self.trace, workspace, limits, *period_s),
+            None => self.arm = Some(Measured::at_rest(state, &self.trace.q, workspace)),
+        }
     }
 
     /// The arm says that it is told to be at `in_force`, `periods` after the state that the last set point answered. Where
@@ -255,7 +269,7 @@ impl Player {
         };
         self.planned = self.planned.after(&point.q_d, self.guard.period_s);
         self.ease_back(&mut point);
-        match self.guard.check(&self.trace, &point, &self.outside) {
+        match self.guard.check(&self.trace, &point, &self.outside, self.arm.as_ref()) {
             Ok(_) if at_end => {
                 (self.activity, self.status) = (Activity::Holding, MotionStatus::Done);
                 self.planned = Trace::at_rest(self.planned.q);
@@ -279,7 +293,7 @@ impl Player {
     fn settle(&mut self) -> SetPoint {
         let mut point = SetPoint { q_d: self.planned.q, dq_d: [0.0; MAX_JOINTS] };
         self.ease_back(&mut point);
-        match self.guard.check(&self.trace, &point, &self.outside) {
+        match self.guard.check(&self.trace, &point, &self.outside, self.arm.as_ref()) {
             Ok(next) => {
                 self.trace = next;
                 if self.ease.is_over() {

@@ -246,6 +246,9 @@ impl Cycle {
         }
         self.take_orders();
         self.reconcile();
+        if self.commanding {
+            self.player.see(&JointState { q: self.state.q, dq: self.state.dq });
+        }
         let (point, remark) = self.player.advance();
         if let Some(remark) = remark {
             self.tell(remark);

@@ -4,7 +4,7 @@
 
 use shared_mem::msg::motion::SetPoint;
 use shared_mem::msg::{Joints, MAX_JOINTS};
-use twin::arm::{ArmModel, ControlLaw, JointState};
+use twin::arm::{ArmModel, ControlLaw, JointState, Trailing};
 
 /// Gains and the model behind the Coriolis term.
 #[derive(Debug, Clone)]
@@ -19,6 +19,12 @@ impl TorquePd {
     #[must_use]
     pub fn new(law: &ControlLaw, arm: ArmModel) -> Self {
         Self { stiffness: law.stiffness, damping: law.damping, arm }
+    }
+
+    /// How the arm comes after its commands under this law.
+    #[must_use]
+    pub fn trailing(&self) -> Option<Trailing> {
+        Trailing::impedance(&self.arm, &self.stiffness, &self.damping)
     }
 
     /// The torque that answers a state, without gravity [N m].

@@ -7,7 +7,7 @@ use crate::fr3;
 use crate::replay::{ReplayArm, ReplayClock};
 use crate::rt::cycle::Plan;
 use crate::rt::law::TorquePd;
-use crate::safety::{Limits, Workspace};
+use crate::safety::{Guard, Limits, Trailing, Workspace};
 use crate::sighting::Sighting;
 use crate::sim::{World, hidden};
 use crate::tracker::TrackerChoice;
@@ -18,6 +18,7 @@ use shared_mem::cell::{Cell, ControllerKind};
 use shared_mem::msg::arm::CommandInterface;
 use shared_mem::msg::wrench::Wrench;
 use shared_mem::theta::Theta;
+use shared_mem::time::TICK;
 use std::fmt;
 use std::path::PathBuf;
 use std::str::FromStr;
@@ -115,7 +116,7 @@ pub(super) struct Devices {
     /// As cell.toml describes it.
     pub(super) model: ArmModel,
     pub(super) plan: Plan,
-    pub(super) workspace: Workspace,
+    pub(super) guard: Guard,
     pub(super) world: Option<World>,
     pub(super) pictures: Pictures,
     /// From the simulated tracker, or of the recording, unless another one tracks. They come with the camera off, too.
@@ -155,7 +156,7 @@ impl Devices {
         }
         let hidden = hidden::read(cell, settings.parameters.as_deref(), settings.effects.as_deref())?;
         let plan = plan(settings, cell, &model, hidden.as_ref())?;
-        let workspace = Workspace::of(cell, &model);
+        let guard = guard(&settings.arm, &plan, cell, &model);
         let camera = settings.camera(cell)?;
         let tracker = settings.tracker(cell)?;
         let devices = match &settings.arm {
@@ -172,7 +173,7 @@ impl Devices {
                     arm: Box::new(arm),
                     model,
                     plan,
-                    workspace,
+                    guard,
                     world: Some(world),
                     replay: None,
                     pictures: match camera {
@@ -186,7 +187,7 @@ impl Devices {
             ArmChoice::Fci(host) => {
                 let arm = fr3::connect(host, settings.realtime, cell)?;
                 let pictures = Pictures::beside_the_arm(camera);
-                Self { arm, model, plan, workspace, world: None, pictures, poses: None, replay: None, wrenches: None }
+                Self { arm, model, plan, guard, world: None, pictures, poses: None, replay: None, wrenches: None }
             }
             ArmChoice::Replay(clip) => {
                 let (arm, poses, clock) = ReplayArm::open(clip, cell, &model)?;
@@ -197,7 +198,7 @@ impl Devices {
                 let poses = (tracker == TrackerChoice::Replay).then_some(poses);
                 let replay = Some((clip.clone(), clock));
                 let arm = Box::new(arm);
-                Self { arm, model, plan, workspace, world: None, pictures, poses, replay, wrenches: None }
+                Self { arm, model, plan, guard, world: None, pictures, poses, replay, wrenches: None }
             }
         };
         let (has, described) = (devices.arm.dof(), devices.model.dof());
@@ -212,6 +213,17 @@ impl Devices {
 fn inside_the_controller(hidden: &Theta) -> Option<&str> {
     let gains = hidden.arm.as_ref().map(|_| "the controller's gains in --parameters");
     gains.or_else(|| hidden::on_the_way(hidden).next())
+}
+
+/// What lets commands pass. How the arm comes after them is told by the law that computes its torques: the bridge's own, else
+/// that of cell.toml. A robot that cell.toml gives no stiffness to keeps its own, which nobody knows.
+fn guard(arm: &ArmChoice, plan: &Plan, cell: &Cell, model: &ArmModel) -> Guard {
+    let controller = cell.controller.as_ref().filter(|c| *arm == ArmChoice::Sim || !c.stiffness.is_empty());
+    let trailing = match &plan.law {
+        Some(law) => law.trailing(),
+        None => ControlLaw::new(controller, None, model).ok().and_then(|law| Trailing::new(model, &law)),
+    };
+    Guard { limits: plan.limits, workspace: Workspace::of(cell, model), trailing, period_s: TICK }
 }
 
 fn plan(settings: &Settings, cell: &Cell, model: &ArmModel, hidden: Option<&Theta>) -> Result<Plan> {

@@ -20,7 +20,6 @@ use crate::rt::cycle::{Cycle, Link, Plan};
 use crate::rt::idle::{DeepIdle, ShallowIdle};
 use crate::rt::orders::orders;
 use crate::rt::stats::LoopStats;
-use crate::safety::Guard;
 use crate::starting::ThreadError;
 use crate::targets::Targets;
 use crate::tracker::{self, TrackerChoice};
@@ -285,8 +284,7 @@ pub fn run(settings: &Settings, stop: &Arc<AtomicBool>) -> Result<RunReport> {
         TrackerChoice::Rgbd => Some(tracker::serve(&cell, notices.clone())?),
         _ => None,
     };
-    let guard = Guard { limits: devices.plan.limits, workspace: devices.workspace, period_s: 1e-3 };
-    let player = Player::new(guard, joints_from(&[]));
+    let player = Player::new(devices.guard, joints_from(&[]));
     let link = Link { beats: to_pump, remarks: to_words, orders, pump: pump.thread() };
     let cycle = Cycle::new(devices.arm, devices.plan, player, link);
 

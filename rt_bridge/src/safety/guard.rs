@@ -1,15 +1,14 @@
 //! The verdict on the next set point. A set point is admitted when it lies inside every limit *and* braking from it, as
 //! [`crate::motion::Brake`] does it, stays inside them too, and arm and tool inside the workspace all the way: so whatever
-//! comes next, there is always a way to stop. A set point that is not admitted leaves the way from the one before it.
+//! comes next, there is always a way to stop. The arm that is there has to stay in the workspace as well on that way, which it
+//! trails and overshoots: see [`Measured`]. A set point that is not admitted leaves the way from the one before it.
 
-use super::{JointLimits, Limits, Outside, Trace, Workspace};
+use super::{JointLimits, Limits, Measured, Outside, Trace, Trailing, Workspace};
 use shared_mem::msg::motion::SetPoint;
 use std::fmt;
 
 /// Kept between a commanded position and the joint's end [rad]: covers the last, jerk-limited moment of a stop.
 const END_MARGIN: f64 = 1e-4;
-/// Share of the acceleration limit that stopping counts on; the rest covers the periods being finite.
-const STOPPING_SHARE: f64 = 0.9;
 /// What is forgiven to rounding, as a share of a limit.
 const ROUNDING: f64 = 1e-6;
 
@@ -71,26 +70,43 @@ pub struct Guard {
     pub limits: Limits,
     /// Where arm and tool may be.
     pub workspace: Workspace,
+    /// How the arm comes after its commands; `None` where no law is known that says so.
+    pub trailing: Option<Trailing>,
     /// Control period [s].
     pub period_s: f64,
 }
 
 impl Guard {
     /// Admits `point` after `last`, or says what is wrong with it. `outside` is how far the arm was outside the workspace
-    /// when it last came to rest.
+    /// when it last came to rest; `arm` is what was measured of it, where that is known.
     ///
     /// # Errors
     /// The first [`Violation`] found, joint by joint, then the workspace.
-    pub fn check(&self, last: &Trace, point: &SetPoint, outside: &Outside) -> Result<Trace, Violation> {
+    pub fn check(
+        &self,
+        last: &Trace,
+        point: &SetPoint,
+        outside: &Outside,
+        arm: Option<&Measured>,
+    ) -> Result<Trace, Violation> {
         let next = last.after(&point.q_d, self.period_s);
         for (i, limits) in self.limits.counted().enumerate() {
             self.check_joint(i, limits, last, &next, point)?;
         }
         let holds = next == Trace::at_rest(last.q);
-        if !holds && !self.workspace.keeps(&next, &self.limits, self.period_s, outside) {
+        if !holds && !(self.workspace.keeps(&next, &self.limits, self.period_s, outside) && self.keeps_arm(&next, arm))
+        {
             return Err(Violation::Workspace);
         }
         Ok(next)
+    }
+
+    /// Whether the arm itself stays in the workspace while it is told to stop from `next` on.
+    fn keeps_arm(&self, next: &Trace, arm: Option<&Measured>) -> bool {
+        arm.is_none_or(|arm| match &self.trailing {
+            Some(trailing) => arm.keeps(next, trailing, &self.workspace, &self.limits, self.period_s),
+            None => arm.keeps_its_gap(next, &self.workspace, &self.limits, self.period_s),
+        })
     }
 
     fn check_joint(
@@ -141,7 +157,6 @@ impl Guard {
         if q < limits.q_min || q > limits.q_max {
             return Err(true);
         }
-        let stopping = limits.deceleration.min(STOPPING_SHARE * limits.acceleration);
         for direction in [1.0, -1.0] {
             let speeding = (direction * a).max(0.0);
             let peak = direction * v + speeding * speeding / (2.0 * limits.jerk);
@@ -150,7 +165,7 @@ impl Guard {
             }
             let reaction = (speeding + limits.acceleration) / limits.jerk;
             let ahead = q + direction * (peak * (reaction + self.period_s) + END_MARGIN);
-            if peak > limits.speed_towards(direction, ahead, stopping) {
+            if peak > limits.speed_towards(direction, ahead, limits.stopping()) {
                 return Err(peak <= limits.speed_towards(direction, q, limits.deceleration));
             }
         }

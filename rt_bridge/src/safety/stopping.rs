@@ -67,8 +67,8 @@ impl JointStop {
         stop
     }
 
-    /// Position, speed, the highest speed from then on, and at most the way that is left.
-    fn at(&self, t: f64) -> [f64; 4] {
+    /// Position, speed, the highest speed from then on, at most the way that is left, and how much the speed changes.
+    fn at(&self, t: f64) -> [f64; 5] {
         let mut since = t;
         for phase in &self.phases {
             if since < phase.length {
@@ -78,11 +78,12 @@ impl JointStop {
                 let fastest = v.abs().max(peak);
                 // A joint that moves the other way first comes back past here.
                 let left = if self.direction * v < 0.0 { fastest * (self.duration - t) } else { (self.end - q).abs() };
-                return [q, v, fastest, left];
+                // Up to the peak, and from there to 0.
+                return [q, v, fastest, left, 2.0 * peak - self.direction * v];
             }
             since -= phase.length;
         }
-        [self.end, 0.0, 0.0, 0.0]
+        [self.end, 0.0, 0.0, 0.0, 0.0]
     }
 }
 
@@ -105,6 +106,8 @@ pub struct Moment {
     pub fastest: Joints,
     /// How far each joint still moves from then on, at most [rad].
     pub left: Joints,
+    /// By how much each joint's velocity changes from then on, up and down added [rad/s].
+    pub change: Joints,
 }
 
 impl Stopping {
@@ -124,9 +127,9 @@ impl Stopping {
     #[must_use]
     pub fn at(&self, t: f64) -> Moment {
         let nothing = [0.0; MAX_JOINTS];
-        let mut moment = Moment { q: nothing, dq: nothing, fastest: nothing, left: nothing };
+        let mut moment = Moment { q: nothing, dq: nothing, fastest: nothing, left: nothing, change: nothing };
         for (i, joint) in self.joints.iter().enumerate().take(self.dof) {
-            [moment.q[i], moment.dq[i], moment.fastest[i], moment.left[i]] = joint.at(t);
+            [moment.q[i], moment.dq[i], moment.fastest[i], moment.left[i], moment.change[i]] = joint.at(t);
         }
         moment
     }
@@ -159,9 +162,10 @@ mod tests {
                 prop_assert!((now[1] - before[1]).abs() <= joint.acceleration * step + 1e-9);
                 prop_assert!(now[1].abs() <= before[2] + 1e-12 && now[2] <= before[2] + 1e-12);
                 prop_assert!(before[3] - now[3] >= (now[0] - before[0]).abs() - 1e-9, "{before:?} {now:?}");
+                prop_assert!(before[4] - now[4] >= (now[1] - before[1]).abs() - 1e-9, "{before:?} {now:?}");
                 before = now;
             }
-            prop_assert_eq!(before, [stop.end, 0.0, 0.0, 0.0]);
+            prop_assert_eq!(before, [stop.end, 0.0, 0.0, 0.0, 0.0]);
         }
     }
 

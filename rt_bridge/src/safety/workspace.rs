@@ -1,9 +1,10 @@
 //! Where the arm may be: all of it above the table, the tool tip in a box besides. Asked of a whole way to rest, it looks at
 //! the commanded positions of that way, and passes over those which the arm is too slow to leave the space by.
 //!
-//! What is kept inside is what is *commanded*, as long as the arm gets it. Where set points are lost, a robot goes on by itself
-//! with its last acceleration; the first set point that reaches it again is one from which it can stop inside, or braking
-//! begins with it, and then the arm may be beyond by what it moved meanwhile.
+//! What is kept inside here is what is *commanded*, as long as the arm gets it; for the arm that is there, which does not
+//! follow exactly, see [`super::Measured`]. Where set points are lost, a robot goes on by itself with its last acceleration;
+//! the first set point that reaches it again is one from which it can stop inside, or braking begins with it, and then the
+//! arm may be beyond by what it moved meanwhile.
 //!
 //! An arm that is outside when command of it is taken may hold, and may move where it gets no deeper than it was: see
 //! [`Outside`].
@@ -22,6 +23,9 @@ const REACH: f64 = 1.2;
 const DIP: f64 = 1e-3;
 /// What is forgiven to rounding [m].
 const ROUNDING: f64 = 1e-7;
+/// How much nearer than a command a measured arm may come [m]: a quarter of the gap, so that one which rests where it may just
+/// be commanded to rest is not outside for its noise.
+const FORGIVEN: f64 = 0.5e-3;
 
 /// Bounds that are kept: every ball of the arm above the table, then the tip in its box.
 const BOUNDS: usize = MOST_BALLS + 1;
@@ -41,10 +45,23 @@ pub struct Workspace {
     levers: [Joints; 2],
 }
 
-/// How far the arm is outside each bound, negative [m]; 0 inside. A bound that is not kept may be passed no deeper than the
-/// arm was when it last came to rest, and a millimetre.
+/// How far the arm is outside each bound. A bound that is not kept may be passed no deeper than the arm was when it last came
+/// to rest, and a millimetre.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Outside([f64; BOUNDS]);
+pub struct Outside {
+    /// Negative [m]; 0 inside.
+    by: [f64; BOUNDS],
+    /// How far a bound that is kept may be passed [m].
+    forgiven: f64,
+}
+
+impl Outside {
+    /// How deep each bound may be passed, negative [m].
+    fn let_to(&self) -> [f64; BOUNDS] {
+        // Half, so that noise does not take an arm that rests at the edge of what is forgiven beyond it.
+        self.by.map(|by| if by < -0.5 * self.forgiven { by - DIP } else { -self.forgiven })
+    }
+}
 
 impl Workspace {
     /// The space of a cell, whose arm is `model`: tool and links 2 mm above its table, the tip within 1.2 m of the base along
@@ -65,14 +82,20 @@ impl Workspace {
     /// Distance to the nearest bound at joint positions `q` [m]; negative outside.
     #[must_use]
     pub fn room(&self, q: &Joints) -> f64 {
-        let [above, within] = self.least(&self.distances(q), &Outside([0.0; BOUNDS]));
+        let [above, within] = self.left(q, &Outside { by: [0.0; BOUNDS], forgiven: 0.0 });
         smaller(above, within)
     }
 
-    /// How far outside the arm is at `q`.
+    /// How far outside an arm is that is commanded to be at `q`.
     #[must_use]
     pub fn outside(&self, q: &Joints) -> Outside {
-        Outside(self.distances(q).map(|distance| distance.min(0.0)))
+        Outside { by: self.distances(q).map(|distance| distance.min(0.0)), forgiven: 0.0 }
+    }
+
+    /// How far outside an arm is that was measured at `q`.
+    #[must_use]
+    pub fn outside_measured(&self, q: &Joints) -> Outside {
+        Outside { forgiven: FORGIVEN, ..self.outside(q) }
     }
 
     /// The same of an arm that came to rest at `q` and was `before` where it rested last: what it came nearer is kept, and
@@ -80,9 +103,9 @@ impl Workspace {
     #[must_use]
     pub fn outside_after(&self, q: &Joints, before: &Outside) -> Outside {
         let mut outside = *before;
-        for (outside, distance) in outside.0.iter_mut().zip(self.distances(q)) {
-            *outside =
-                if distance < let_to(*outside) - 2.0 * ROUNDING { distance } else { outside.max(distance.min(0.0)) };
+        let bounds = outside.by.iter_mut().zip(before.let_to()).zip(self.distances(q));
+        for ((by, let_to), distance) in bounds {
+            *by = if distance < let_to - 2.0 * ROUNDING { distance } else { by.max(distance.min(0.0)) };
         }
         outside
     }
@@ -98,17 +121,14 @@ impl Workspace {
         let mut period = 0;
         loop {
             let moment = way.at(period as f64 * period_s);
-            let [above, within] = self.least(&self.distances(&moment.q), outside);
-            // What is no number is outside.
-            if !(above >= -ROUNDING && within >= -ROUNDING) {
+            let left @ [above, within] = self.left(&moment.q, outside);
+            if !is_inside(left) {
                 return false;
             }
-            let by =
-                |joints: &Joints| self.levers.map(|levers| levers.iter().zip(joints).map(|(l, q)| l * q).sum::<f64>());
-            let (sinks, closing) = (by(&moment.left), by(&moment.fastest));
-            if sinks[0] <= within && sinks[1] <= above {
+            if self.is_too_little(&moment.left, left) {
                 return true;
             }
+            let closing = self.at_most(&moment.fastest);
             // So many periods pass before any bound can be reached, however the joints move.
             let free = |room: f64, closing: f64| (room / (closing * period_s)) as usize;
             period += 1 + free(within, closing[0]).min(free(above, closing[1])).min(last);
@@ -134,20 +154,36 @@ impl Workspace {
         distances
     }
 
-    /// What is left before the table, and before the box, is passed deeper than `outside` lets.
-    fn least(&self, distances: &[f64; BOUNDS], outside: &Outside) -> [f64; 2] {
-        let mut left = [f64::INFINITY; BOUNDS];
-        for (left, (distance, outside)) in left.iter_mut().zip(distances.iter().zip(outside.0)) {
-            *left = distance - let_to(outside);
+    /// What is left at `q` before the table, and before the box, is passed deeper than `outside` lets [m].
+    pub(super) fn left(&self, q: &Joints, outside: &Outside) -> [f64; 2] {
+        let mut left = self.distances(q);
+        for (left, let_to) in left.iter_mut().zip(outside.let_to()) {
+            *left -= let_to;
         }
         let [above @ .., within] = left;
         [above.into_iter().fold(f64::INFINITY, smaller), within]
     }
+
+    /// Whether joints that move by no more than this [rad] use up nothing of what is `left`.
+    pub(super) fn is_too_little(&self, way: &Joints, left: [f64; 2]) -> bool {
+        let [within, above] = self.at_most(way);
+        above <= left[0] && within <= left[1]
+    }
+
+    /// How far the tip, and how far any ball's height, moves at most when each joint moves as given [m].
+    fn at_most(&self, joints: &Joints) -> [f64; 2] {
+        self.levers.map(|levers| levers.iter().zip(joints).map(|(lever, q)| lever * q).sum())
+    }
+
+    /// Whether places in space mean something for this arm.
+    pub(super) fn is_somewhere(&self) -> bool {
+        self.arm.is_some()
+    }
 }
 
-/// How deep a bound may be passed by an arm that was `outside` it.
-fn let_to(outside: f64) -> f64 {
-    if outside < 0.0 { outside - DIP } else { 0.0 }
+/// Whether nothing is passed deeper than it is let; what is no number is.
+pub(super) fn is_inside([above, within]: [f64; 2]) -> bool {
+    above >= -ROUNDING && within >= -ROUNDING
 }
 
 /// The smaller of two numbers, or the one that is none.
@@ -252,7 +288,7 @@ mod tests {
             };
             cell.table = Some(Table { height: least(&level) - gap });
             let space = Workspace::of(&cell, &model);
-            prop_assert_eq!(space.keeps(&trace, &limits, T, &Outside([0.0; BOUNDS])), least(&space) >= -ROUNDING);
+            prop_assert_eq!(space.keeps(&trace, &limits, T, &Outside { by: [0.0; BOUNDS], forgiven: 0.0 }), least(&space) >= -ROUNDING);
         }
     }
 }

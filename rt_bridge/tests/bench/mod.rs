@@ -10,7 +10,7 @@ use rt_bridge::safety::{Guard, Limits, Workspace};
 use rtrb::{Consumer, RingBuffer};
 use shared_mem::cell::Cell;
 use shared_mem::msg::arm::CommandInterface;
-use twin::arm::{ArmModel, ControlLaw};
+use twin::arm::{ArmModel, ControlLaw, Trailing};
 
 /// Chunks of a motion that wait at most.
 const WAITING: usize = 128;
@@ -36,7 +36,14 @@ impl Bench {
             limits: Limits::fr3(),
             session: 1,
         };
-        let guard = Guard { limits: Limits::fr3(), workspace: Workspace::of(cell, &model), period_s: 1e-3 };
+        let trailing = match &plan.law {
+            Some(law) => law.trailing(),
+            None => {
+                let law = ControlLaw::new(cell.controller.as_ref(), None, &model).expect("gains");
+                Trailing::new(&model, &law)
+            }
+        };
+        let guard = Guard { limits: Limits::fr3(), workspace: Workspace::of(cell, &model), trailing, period_s: 1e-3 };
         let (to_pump, beats) = RingBuffer::new(64);
         let (to_words, remarks) = RingBuffer::new(64);
         let (sender, from_pump) = orders(WAITING, 0);

@@ -35,6 +35,8 @@ pub struct JointLimits {
 pub const TORQUE_RATE: f64 = 1000.0;
 /// Acceleration of every FR3 joint [rad/s²]; it also serves for arms that name none.
 const ACCELERATION: f64 = 10.0;
+/// Share of the highest acceleration that stopping counts on.
+const STOPPING_SHARE: f64 = 0.9;
 /// Jerk of every FR3 joint [rad/s³]; it also serves for arms that name none.
 const JERK: f64 = 5000.0;
 
@@ -59,6 +61,13 @@ impl JointLimits {
         let distance = if direction > 0.0 { self.q_max - q } else { q - self.q_min };
         let stoppable = (2.0 * deceleration * distance.max(0.0)).sqrt() - self.velocity_offset;
         stoppable.clamp(0.0, self.velocity)
+    }
+
+    /// Deceleration that whoever looks ahead counts on for stopping [rad/s²]: the position-dependent speed limit's, and a tenth
+    /// less than the highest acceleration, which covers control periods being finite.
+    #[must_use]
+    pub fn stopping(&self) -> f64 {
+        self.deceleration.min(STOPPING_SHARE * self.acceleration)
     }
 
     /// Slowest (most negative) and fastest speed at position `q` [rad/s].

@@ -21,6 +21,7 @@
 //! | `control` | [`ControlLaw`]: from command to torque |
 //! | `gains` | where its gains may lie |
 //! | `step` | integration over time |
+//! | `trailing` | [`Trailing`]: how an arm comes after its commands under a law that feeds no acceleration forward |
 //! | `yielding` | how the flange moves and gives way to a push |
 //! | `transmission` | the same with friction, yielding and play between motor and link |
 //! | `kernel`, `spatial` | the arithmetic below |
@@ -44,6 +45,7 @@ mod parts;
 mod reach;
 mod spatial;
 mod step;
+mod trailing;
 mod transmission;
 mod urdf;
 mod yielding;
@@ -63,6 +65,7 @@ pub(crate) use model::FREE_FALL;
 pub use nearest::Nearest;
 pub use parts::Part;
 pub use shared_mem::msg::{Joints, MAX_JOINTS};
+pub use trailing::{Trail, Trailing};
 pub use transmission::{Passed, Spring, Transmission};
 pub use urdf::{LinkFrame, UrdfBody, UrdfForm, UrdfFrames, UrdfJoint, UrdfShape, with_joint_friction};
 pub use yielding::{FlangeMotion, Yielding};

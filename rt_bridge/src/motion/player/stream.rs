@@ -139,7 +139,7 @@ impl Player {
         for (i, (q, dq)) in q.iter().zip(velocity).enumerate().take(dof) {
             (point.q_d[i], point.dq_d[i]) = (*q, dq);
         }
-        match self.guard.check(&self.trace, &point, &self.outside) {
+        match self.guard.check(&self.trace, &point, &self.outside, self.arm.as_ref()) {
             Ok(next) => {
                 (self.trace, self.planned) = (next, next);
                 self.played = self.played.saturating_add(1);
