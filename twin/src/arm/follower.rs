@@ -1,6 +1,8 @@
 //! From any motion to rest at a target that may change at any time, inside the limits of speed, acceleration and jerk, all
-//! joints arriving together. Planned by `rsruckig` for each new target, then sampled each period. Pure: what comes next
-//! depends on the motion, the target and the limits alone. Units: rad, s.
+//! joints arriving together. Planned by `rsruckig` for each new target, then sampled each period. Speed limits that fall
+//! towards the end of a joint's range are no matter of its: the highest speed is one from which the joint can be braked to rest
+//! at the target below such a limit, or the limit where the joint is, set anew on the way. Pure: what comes next depends on
+//! the motion, the target and the limits alone. Units: rad, s.
 
 use super::{JointLimits, Joints, Limits, MAX_JOINTS};
 use rsruckig::prelude::*;
@@ -9,6 +11,18 @@ use rsruckig::prelude::*;
 const SLOWEST: f64 = 0.01;
 /// Share of the limits of acceleration and jerk that a calm way takes.
 const CALM: f64 = 0.8;
+/// Share of the highest speeds: who knows a way by its positions alone sees the last moment of a speeding-up a little faster
+/// than it is (at 1 kHz by 8 mrad/s at most), and that must not be above the limit either.
+const CALM_SPEED: f64 = 0.995;
+/// The same near a stop, where the speed limit falls: as a distance [rad].
+const UNSEEN: f64 = 1.2e-3;
+/// Periods after which the highest speed near a stop is set anew.
+const ANEW: u32 = 10;
+/// Share of the deceleration that stopping counts on with which the speed falls on the way towards a stop: less than a calm
+/// way brakes with, so that it can be kept.
+const FALLING: f64 = 0.6;
+/// Longest period of whoever plans [s].
+const LONGEST_PERIOD: f64 = 2e-3;
 /// What a joint that is not there may do, so that the planner has numbers.
 const IDLE: f64 = 1.0;
 
@@ -20,6 +34,19 @@ pub struct Follower {
     output: OutputParameter<MAX_JOINTS>,
     limits: Limits,
     fastest: Joints,
+    ahead: LookAhead,
+    /// Since the speeds were set.
+    periods: u32,
+}
+
+/// What is left free before a joint's stop for whoever looks ahead whether the joint can be braked.
+#[derive(Debug, Clone, Copy)]
+enum LookAhead {
+    /// Nothing: the speed limit where the joint is counts alone.
+    No,
+    /// Until a stop begins the joint goes on, as long as turning the highest acceleration into the highest deceleration
+    /// takes, and this long [s].
+    Stop(f64),
 }
 
 impl Follower {
@@ -40,19 +67,22 @@ impl Follower {
             output: OutputParameter::new(None),
             limits,
             fastest: *fastest,
+            ahead: LookAhead::No,
+            periods: 0,
         }
     }
 
-    /// The same with four fifths of the limits of acceleration and jerk: what is left lets whoever looks after the arm see a stop
-    /// from wherever it is. It goes no way before [`Follower::set_speed`].
+    /// The same with four fifths of the limits of acceleration and jerk, and slower towards the joints' stops: what is left
+    /// lets whoever looks after the arm see a stop from wherever it is. It goes no way before [`Follower::set_speed`].
     #[must_use]
     pub fn calm(q: &Joints, limits: &Limits, period_s: f64) -> Self {
-        let mut calmer = *limits;
-        for joint in &mut calmer.joints {
-            joint.acceleration = CALM * joint.acceleration.min(joint.deceleration);
-            joint.jerk *= CALM;
+        let mut calm = Self::at_rest(q, &[0.0; MAX_JOINTS], *limits, period_s);
+        for (i, joint) in limits.counted().enumerate() {
+            calm.input.max_acceleration[i] = CALM * deceleration(joint);
+            calm.input.max_jerk[i] = CALM * joint.jerk;
         }
-        Self::at_rest(q, &[0.0; MAX_JOINTS], calmer, period_s)
+        calm.ahead = LookAhead::Stop(period_s);
+        calm
     }
 
     /// Goes on from another motion: position, velocity and acceleration of every joint that counts, which are numbers.
@@ -66,7 +96,7 @@ impl Follower {
 
     /// From the next target on, no joint goes faster than this share of its highest speed.
     pub fn set_speed(&mut self, share: f64) {
-        self.fastest = std::array::from_fn(|i| share * self.limits.joints[i].velocity);
+        self.fastest = std::array::from_fn(|i| share * CALM_SPEED * self.limits.joints[i].velocity);
     }
 
     /// Goes for `target` from now on.
@@ -75,31 +105,89 @@ impl Follower {
     /// The first joint, from 0, for which that is beyond its limits, or so near to a stop that the speed limit there leaves
     /// nothing; the way goes on as before then.
     pub fn aim(&mut self, target: &Joints) -> Result<(), usize> {
-        let mut speeds = [IDLE; MAX_JOINTS];
         for (i, joint) in self.limits.counted().enumerate() {
             let inside = (joint.q_min..=joint.q_max).contains(&target[i]);
-            speeds[i] = self.fastest[i].min(approach_speed(joint, self.input.current_position[i], target[i]));
             // What is no number is neither inside nor fast enough.
-            if !(inside && speeds[i] >= SLOWEST) {
+            if !(inside && self.fastest[i].min(self.brakeable_speed(i, target[i])) >= SLOWEST) {
                 return Err(i);
             }
         }
         for i in 0..self.limits.dof {
             self.input.target_position[i] = target[i];
-            self.input.max_velocity[i] = speeds[i];
         }
+        self.set_speeds();
+        self.input.synchronization = Synchronization::Time;
         Ok(())
+    }
+
+    /// How fast the joints may go on the way from where they are.
+    fn set_speeds(&mut self) {
+        self.periods = 0;
+        for i in 0..self.limits.dof {
+            let at_target = self.brakeable_speed(i, self.input.target_position[i]);
+            self.input.max_velocity[i] = self.fastest[i].min(at_target.max(self.speed_here(i))).max(SLOWEST);
+        }
+    }
+
+    /// The speed from which a joint can be braked to rest at `target` without ever being faster than the speed limit near the
+    /// stop ahead. With `x` to go, braking at `a` is at `v = sqrt(2 a x)`; the limit there, the time `r` later, is
+    /// `sqrt(2 s (x + left - r v)) - offset`. It is the higher one as long as
+    /// `(s / a - 1) v² - 2 (offset + s r) v + 2 s left - offset² >= 0`, up to the smaller root.
+    fn brakeable_speed(&self, i: usize, target: f64) -> f64 {
+        let (joint, braking) = (&self.limits.joints[i], self.input.max_acceleration[i]);
+        let end = self.way_to_stop(i, target, target);
+        let (stopping, reaction, left) = match self.ahead {
+            LookAhead::No => (joint.deceleration, 0.0, end),
+            LookAhead::Stop(period_s) => (joint.stopping(), reaction(joint, period_s), end - UNSEEN),
+        };
+        let (gain, loss) = (stopping / braking - 1.0, joint.velocity_offset + stopping * reaction);
+        let room = 2.0 * stopping * left - joint.velocity_offset * joint.velocity_offset;
+        let under_root = loss * loss - gain * room;
+        let brakeable = if under_root > 0.0 { room / (loss + under_root.sqrt()) } else { f64::INFINITY };
+        brakeable.clamp(0.0, joint.velocity)
+    }
+
+    /// The speed limit where a joint is, as it will be when it is set anew, by a deceleration that is less than there is: a
+    /// joint that keeps it can go on keeping it. `(v + offset)² = 2 s (left - r v)`.
+    fn speed_here(&self, i: usize) -> f64 {
+        let LookAhead::Stop(period_s) = self.ahead else { return 0.0 };
+        let joint = &self.limits.joints[i];
+        let left = self.way_to_stop(i, self.input.target_position[i], self.input.current_position[i]) - UNSEEN;
+        let (stopping, reaction) = (FALLING * joint.stopping(), reaction(joint, period_s) + f64::from(ANEW) * period_s);
+        let loss = joint.velocity_offset + stopping * reaction;
+        let room = 2.0 * stopping * left - joint.velocity_offset * joint.velocity_offset;
+        // 0 where it is no number, of a joint without stops.
+        (room / (loss + (loss * loss + room).max(0.0).sqrt())).max(0.0).min(joint.velocity)
+    }
+
+    /// From `position` to the stop that lies in the direction of `target` [rad].
+    fn way_to_stop(&self, i: usize, target: f64, position: f64) -> f64 {
+        let joint = &self.limits.joints[i];
+        let upwards = target >= self.input.current_position[i];
+        if upwards { joint.q_max - position } else { position - joint.q_min }
     }
 
     /// A period on: where the joints are to be then. `None` where no way is found.
     pub fn step(&mut self) -> Option<Joints> {
-        let went = self.planner.update(&self.input, &mut self.output);
-        if !matches!(went, Ok(RuckigResult::Working | RuckigResult::Finished)) {
-            return None;
+        self.periods += 1;
+        if self.periods >= ANEW && matches!(self.ahead, LookAhead::Stop(_)) {
+            self.set_speeds();
+        }
+        if !self.goes_on() {
+            // Each by itself where they cannot be made to arrive together.
+            self.input.synchronization = Synchronization::None;
+            if !self.goes_on() {
+                return None;
+            }
         }
         self.output.pass_to_input(&mut self.input);
         let q: Joints = std::array::from_fn(|i| self.input.current_position[i]);
         q.iter().all(|q| q.is_finite()).then_some(q)
+    }
+
+    fn goes_on(&mut self) -> bool {
+        let went = self.planner.update(&self.input, &mut self.output);
+        matches!(went, Ok(RuckigResult::Working | RuckigResult::Finished))
     }
 
     /// How fast the joints are to be at the end of the last period [rad/s].
@@ -113,25 +201,21 @@ impl JointLimits {
     /// Where a target may lie: the range without what is so near to a stop that a joint may hardly move there [rad].
     #[must_use]
     pub fn targets(&self) -> [f64; 2] {
-        let offset = self.velocity_offset;
-        let margin = (offset * offset + 4.0 * offset * SLOWEST) / (2.0 * self.deceleration) + 1e-3;
+        let (offset, stopping) = (self.velocity_offset, self.stopping());
+        let loss = offset + stopping * reaction(self, LONGEST_PERIOD);
+        let margin = (offset * offset + 2.0 * loss * SLOWEST) / (2.0 * stopping) + UNSEEN + 1e-4;
         [self.q_min + margin, self.q_max - margin]
     }
+}
+
+/// How long a joint goes on before it is braked: turning the highest acceleration into the highest deceleration, and a period [s].
+fn reaction(joint: &JointLimits, period_s: f64) -> f64 {
+    2.0 * joint.acceleration / joint.jerk + period_s
 }
 
 /// Deceleration at the end of the way: no more than the speed limit near a stop counts on.
 fn deceleration(joint: &JointLimits) -> f64 {
     joint.acceleration.min(joint.deceleration)
-}
-
-/// The speed from which a joint can be braked to rest at `target` without ever being faster than the speed limit near the
-/// stop ahead. With `x` to go, braking at `a <= dec` is at `v = sqrt(2 a x)`, the limit at `sqrt(2 dec (x + left)) - offset`;
-/// the limit is the higher one as long as `(v + offset)^2 <= v^2 + 2 dec left`.
-fn approach_speed(joint: &JointLimits, from: f64, target: f64) -> f64 {
-    let left = if target >= from { joint.q_max - target } else { target - joint.q_min };
-    let (room, offset) = (2.0 * joint.deceleration * left, joint.velocity_offset);
-    let brakeable = if offset > 0.0 { (room - offset * offset) / (2.0 * offset) } else { f64::INFINITY };
-    brakeable.clamp(0.0, joint.velocity)
 }
 
 #[cfg(test)]
