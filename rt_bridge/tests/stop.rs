@@ -27,7 +27,7 @@ fn player() -> Player {
     let robot = Robot { model: Some("fr3".into()), ..Robot::default() };
     let cell = Cell { robot: Some(robot), ..Cell::default() };
     let workspace = Workspace::of(&cell, &ArmModel::from_cell(&cell).expect("an FR3"));
-    Player::new(Guard { limits: Limits::fr3(), workspace, period_s: 1e-3 }, READY)
+    Player::new(Guard { limits: Limits::fr3(), workspace, trailing: None, period_s: 1e-3 }, READY)
 }
 
 fn elsewhere(stream: u64) -> Joints {

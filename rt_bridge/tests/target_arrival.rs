@@ -146,7 +146,7 @@ fn targets_above_the_table_of_the_cell_that_ships_are_arrived_at() {
     let mut to = ready;
     to[0] = 1.5;
     let mut rng = Pcg64::seed_from_u64(6);
-    for number in 0..200 {
+    for number in 0..60 {
         let mut way = Way::from(guard.clone(), ready);
         assert!(way.arrive(&Target { stream: 5, q: to, speed: 1.0 }).is_some(), "target {number}: {:?}", way.said);
         ready = to;

@@ -218,7 +218,7 @@ mod tests {
         let way = Stopping::of(&trace, &lab.limits, T);
         let told = level.room(&way.at(way.duration()).q);
         let lower = told - lab.least_room(&level, &state, &trace);
-        assert!(lower > 5e-3, "the arm comes {lower} m lower than it is told");
+        assert!(lower > 5e-3, "the arm comes {lower} m lower than its commands");
         let space = lab.above(told - 0.5 * lower);
         let arm = Measured::at_rest(&state, &trace.q, &space);
         assert!(space.keeps(&trace, &lab.limits, T, &space.outside(&LOW)));
@@ -248,7 +248,7 @@ mod tests {
         let by_law = lowest(&|trace| arm.keeps(trace, &lab.trailing, &space, &lab.limits, T));
         let by_gap = lowest(&|trace| arm.keeps_its_gap(trace, &space, &lab.limits, T));
         for room in [by_law, by_gap] {
-            assert!((room - hangs).abs() < 1e-3, "told to come down to {room} m, hangs {hangs} m lower");
+            assert!((room - hangs).abs() < 1e-3, "commanded down to {room} m, hangs {hangs} m lower");
         }
         // Outside already, by what a higher table takes.
         let space = lab.above(lab.above(0.0).room(&state.q) + 0.004);

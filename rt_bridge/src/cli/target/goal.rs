@@ -70,6 +70,8 @@ impl Place {
         let guard = Guard {
             limits: Limits::of(&cell, &model),
             workspace: Workspace::of(&cell, &model),
+            // The way is that of the commands: how the arm comes after them is the bridge's to watch.
+            trailing: None,
             period_s: TICK_NS as f64 * 1e-9,
         };
         Ok(Self { model, guard, first: *first })
