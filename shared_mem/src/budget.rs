@@ -155,7 +155,8 @@ mod tests {
 
     #[test]
     fn what_takes_no_memory_takes_steps() {
-        let budget = Budget::with(0, 10);
+        // A step for each, and one in which they are taken.
+        let budget = Budget::with(0, 11);
         budget.elements(10, 0).expect("ten elements of no size");
         let line = budget.step(1).expect_err("an eleventh").to_string();
         assert!(line.contains("steps") && !line.contains('\n'), "{line}");
