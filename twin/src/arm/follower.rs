@@ -112,8 +112,8 @@ impl Follower {
                 return Err(i);
             }
         }
-        for i in 0..self.limits.dof {
-            self.input.target_position[i] = target[i];
+        for (i, q) in target.iter().enumerate().take(self.limits.dof) {
+            self.input.target_position[i] = *q;
         }
         self.set_speeds();
         self.input.synchronization = Synchronization::Time;

@@ -68,7 +68,11 @@ pub(crate) fn all(programs: &[String]) -> Vec<Verb> {
     add("pictures", &["photo.jpg", "photo.json"], "calibration", PHOTO);
     for (log, damaged, line) in [
         ("rosbag2_mcap", &["rosbag2_mcap/rosbag2_mcap.mcap"][..], "import {dir}/rosbag2_mcap --out {dir}/out --json"),
-        ("rosbag2_sqlite3", &["rosbag2_sqlite3/rosbag2_sqlite3.db3"], "import {dir}/rosbag2_sqlite3 --out {dir}/out --json"),
+        (
+            "rosbag2_sqlite3",
+            &["rosbag2_sqlite3/rosbag2_sqlite3.db3"],
+            "import {dir}/rosbag2_sqlite3 --out {dir}/out --json",
+        ),
         ("franka_state.bag", &["franka_state.bag"], "import {dir}/franka_state.bag --out {dir}/out --json"),
         ("joint_states_bz2.bag", &["joint_states_bz2.bag"], "import {dir}/joint_states_bz2.bag --out {dir}/out --json"),
         ("joint_states_lz4.bag", &["joint_states_lz4.bag"], "import {dir}/joint_states_lz4.bag --out {dir}/out --json"),
@@ -92,7 +96,12 @@ pub(crate) fn all(programs: &[String]) -> Vec<Verb> {
     ] {
         add(log, damaged, "calibration", line);
     }
-    add("scan", &["transforms.json", "transforms.json", "masks/03.png"], "twin", "reconstruct object {dir} --out {dir}/out");
+    add(
+        "scan",
+        &["transforms.json", "transforms.json", "masks/03.png"],
+        "twin",
+        "reconstruct object {dir} --out {dir}/out",
+    );
     add("own", &["effects.toml", "effects.toml", "cell.toml"], "rt_bridge", BRIDGE);
     all
 }
