@@ -24,8 +24,11 @@ fn kernel(readings: &Readings) -> Finding {
     if readings.is_realtime {
         return Finding::ok("kernel", format!("{version}, PREEMPT_RT"));
     }
-    let share = if readings.isolated { "has core {core} for itself" } else { "shares core {core} with other programs" };
-    let share = share.replace("{core}", &core.to_string());
+    let share = if readings.isolated {
+        format!("has core {core} for itself")
+    } else {
+        format!("shares core {core} with other programs")
+    };
     Finding::warning(
         "kernel",
         format!("{version}, not PREEMPT_RT; the control thread {share}"),
