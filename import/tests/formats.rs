@@ -5,6 +5,8 @@ mod lab;
 use import::Outcome;
 use lab::{ROWS, fixture, holds_the_motion, imported, motion};
 use shared_mem::cell::ClipKind;
+use shared_mem::origin::Origin;
+use shared_mem::recording::{Format, Order, Session, export_session};
 
 const EXACT: f64 = 1e-12;
 
@@ -46,6 +48,22 @@ fn a_bag_reads_the_same_imported_and_as_it_is() {
     assert!(clip.measured == own.measured, "measured");
     assert!(clip.desired == own.desired, "desired");
     assert!(own.desired.tau_row(0).is_some(), "torques and all");
+    assert_eq!(own.origins, Origin::elsewhere("ROS 2 bag").into());
+    assert_eq!(Some(clip.origins), Origin::import("rosbag2_mcap", "ROS 2 bag (mcap)").map(Into::into));
+}
+
+#[test]
+fn what_a_bag_says_about_where_it_comes_from_is_brought_back() {
+    let lab = imported("rosbag2_mcap");
+    let out = lab.folder.path().join("bags");
+    let order = Order { to: Format::Ros2, out: &out, force: false, flange_at: &|_| None, robot: None };
+    let bags = export_session(&lab.session, order, |_| {}).expect("an export");
+    let back = lab.folder.path().join("back");
+    let outcome = lab::run(&out.join(&bags[0].file), &back).expect("a bag");
+    assert!(matches!(outcome, Outcome::Done { .. }), "{outcome:?}");
+    let session = Session::open(&back).expect("a session");
+    let clip = session.read(&session.clips[0]).expect("a clip");
+    assert_eq!(clip.origins, lab.clip(0).origins, "the import of before, and not of the bag between");
 }
 
 #[test]
