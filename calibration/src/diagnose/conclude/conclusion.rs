@@ -93,9 +93,8 @@ pub fn conclude<E: Evidence>(
     options: &Options,
 ) -> Result<Diagnosis, DiagnoseError> {
     let first = &found.steps[0];
-    let last_weights = &found.steps.last().unwrap_or(first).weights;
     let (baseline, before) = unseen(bench, split, (&first.from, &first.weights))?;
-    let (with, after) = unseen(bench, split, (&found.last, last_weights))?;
+    let (with, after) = unseen(bench, split, (&found.last, &found.steps.last().unwrap_or(first).weights))?;
     let (places, rest) = (localise::localise(bench.evidence, &before), localise::localise(bench.evidence, &after));
     let typical = typical(bench, found, admitted).ok_or(DiagnoseError::NoBaseline)?;
     let left = Left::of_groups(&typical.0, &typical.1);
@@ -134,11 +133,10 @@ pub fn conclude<E: Evidence>(
         }
     };
     let largest = rest.first().map(|place| (place.channel.as_str(), place.regime.as_str()));
-    let rest_is_open = partly.is_some() || finding.open().is_some();
     let site = Site::of(session, options.report.as_deref());
     let next = match &unproven {
         Some((open, _)) if verdict.kind == Kind::Unexplained => advice::proving(open.effect(bench), open.more, &site),
-        _ => next(&verdict, rest_is_open, largest, &site),
+        _ => next(&verdict, partly.is_some() || finding.open().is_some(), largest, &site),
     };
     let theta = bench.library.theta(&kept.full);
     // Of an object that no clip shows nothing was found but what was given.
