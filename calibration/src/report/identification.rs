@@ -195,6 +195,7 @@ mod tests {
             warnings: vec![None, None, None, None, None, None, Some("at its lower bound".into())],
         };
         Sheet {
+            origin: "the simulation".into(),
             target: "arm".into(),
             session: "monday & <co>".into(),
             files: SessionFiles { session: "monday & <co>".into(), cell: Some("lab/cell.toml".into()) },
