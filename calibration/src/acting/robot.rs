@@ -177,8 +177,8 @@ impl Robot {
             Err(fault) => return Ok(Some(fault)),
         }
         // A bridge ignores a message that holds more, and nobody would hear of it.
-        let wanted = target.q.iter().copied().chain(action.width);
-        if let Some(beyond) = wanted.into_iter().find(|value| !(value.abs() <= LARGEST)) {
+        let mut wanted = target.q.iter().copied().chain(action.width);
+        if let Some(beyond) = wanted.find(|value| !value.is_finite() || value.abs() > LARGEST) {
             return Ok(Some(format!("the policy wants {beyond:e} rad or m, which no target may be")));
         }
         if !stream.go(Leg { q: target.q, width: action.width, over: period }) {

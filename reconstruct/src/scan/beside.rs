@@ -27,8 +27,9 @@ impl<'a> Beside<'a> {
         for place in [parent.parent().unwrap_or(Path::new("")), Path::new("")] {
             for folder in names.iter().map(|name| self.scan.join(place).join(name)) {
                 let there = self.entries(&folder);
-                let found = own.iter().filter(|file| there.contains(file.as_os_str())).map(|file| folder.join(file));
-                if let Some(file) = found.into_iter().find(|file| file.is_file()) {
+                let mut found =
+                    own.iter().filter(|file| there.contains(file.as_os_str())).map(|file| folder.join(file));
+                if let Some(file) = found.find(|file| file.is_file()) {
                     return Some(file);
                 }
             }
