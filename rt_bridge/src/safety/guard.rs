@@ -94,11 +94,8 @@ impl Guard {
             self.check_joint(i, limits, last, &next, point)?;
         }
         let holds = next == Trace::at_rest(last.q);
-        if !holds && !(self.workspace.keeps(&next, &self.limits, self.period_s, outside) && self.keeps_arm(&next, arm))
-        {
-            return Err(Violation::Workspace);
-        }
-        Ok(next)
+        let keeps = || self.workspace.keeps(&next, &self.limits, self.period_s, outside) && self.keeps_arm(&next, arm);
+        if holds || keeps() { Ok(next) } else { Err(Violation::Workspace) }
     }
 
     /// Whether the arm itself stays in the workspace while it is told to stop from `next` on.
