@@ -199,7 +199,7 @@ fn motions(count: u64) {
         }
         let (braked, seen) = (bridge.braked(), bridge.seen.lock().expect("one thread"));
         let millimetres = |metres: f64| 1e3 * metres;
-        println!(
+        eprintln!(
             "{interface:?}: {count} motions, {braked} of them braked: the arm came down to {:.2} mm above the table, its commands to \
              {:.2} mm",
             millimetres(seen.lowest),

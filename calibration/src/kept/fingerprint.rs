@@ -82,6 +82,7 @@ impl Fingerprint {
 mod tests {
     use super::*;
     use shared_mem::cell::ClipKind;
+    use shared_mem::origin::Origins;
     use shared_mem::recording::{JointSeries, ObjectSeries};
     use std::path::Path;
 
@@ -104,6 +105,7 @@ mod tests {
                 torques_end_at_rows: false,
                 object: ObjectSeries::default(),
                 others: Vec::new(),
+                origins: Origins::default(),
                 warnings: Vec::new(),
                 damage: None,
             };

@@ -10,7 +10,7 @@ use rmpv::Value;
 #[derive(Debug)]
 pub enum Policy {
     /// By its server.
-    Served(Box<Served>),
+    Served(Served),
     /// Here.
     Onnx(Onnx),
 }
@@ -42,7 +42,7 @@ impl Policy {
     pub fn open(source: &Source) -> Result<Option<Self>, PolicyError> {
         Ok(match source {
             Source::Expert { .. } => None,
-            Source::Served(address) => Some(Self::Served(Box::new(Served::connect(address)?))),
+            Source::Served(address) => Some(Self::Served(Served::connect(address)?)),
             Source::Onnx(path) => Some(Self::Onnx(Onnx::open(path)?)),
         })
     }

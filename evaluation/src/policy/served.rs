@@ -64,7 +64,8 @@ pub enum ServedError {
 #[derive(Debug)]
 pub struct Served {
     address: String,
-    socket: WebSocket<Patient>,
+    /// Large, beside what else a policy may be.
+    socket: Box<WebSocket<Patient>>,
     metadata: Value,
 }
 
@@ -99,7 +100,7 @@ impl Served {
                 HandshakeError::Failure(error) => absent(&error),
                 HandshakeError::Interrupted(_) => absent(&"it does not answer as a websocket"),
             })?;
-        let mut served = Self { address: address.to_owned(), socket, metadata: Value::Nil };
+        let mut served = Self { address: address.to_owned(), socket: Box::new(socket), metadata: Value::Nil };
         served.metadata = served.receive()?;
         Ok(served)
     }

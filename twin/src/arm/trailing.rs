@@ -169,11 +169,10 @@ mod tests {
     /// A stop from `v` by a constant deceleration of 10 rad/s², `t` seconds after it began.
     fn stopping(from: &Joints, v: &Joints, t: f64) -> JointState {
         let mut command = JointState::at_rest(*from);
-        for i in 0..7 {
-            let (speed, end) = (v[i].abs(), v[i].abs() / 10.0);
-            let braked = t.min(end);
-            command.q[i] += v[i].signum() * (speed * braked - 5.0 * braked * braked);
-            command.dq[i] = v[i].signum() * (speed - 10.0 * braked);
+        for (i, v) in v.iter().enumerate() {
+            let braked = t.min(v.abs() / 10.0);
+            command.q[i] += v.signum() * (v.abs() * braked - 5.0 * braked * braked);
+            command.dq[i] = v.signum() * (v.abs() - 10.0 * braked);
         }
         command
     }
@@ -202,9 +201,9 @@ mod tests {
                 }
                 let command = stopping(&from, &v, f64::from(step + 1) * 1e-2);
                 trailing.step(&mut trail, &command, 1e-2);
-                for i in 0..7 {
+                for (i, swing) in swing.iter().enumerate().take(7) {
                     worst = worst.max((trail.state.q[i] - arm.q[i]).abs());
-                    prop_assert!((arm.q[i] - command.q[i]).abs() <= swing[i] + 1e-3, "joint {i}: beyond {}", swing[i]);
+                    prop_assert!((arm.q[i] - command.q[i]).abs() <= swing + 1e-3, "joint {i}: beyond {swing}");
                 }
             }
             prop_assert!(worst < 2.5e-3, "{worst} rad");
