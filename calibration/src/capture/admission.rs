@@ -96,7 +96,7 @@ impl Admission {
     }
 
     fn origin_in_words(&self) -> String {
-        if self.known.is_unknown() { "an origin that they do not say".to_owned() } else { self.known.to_string() }
+        if self.known.is_unknown() { "unknown origin".to_owned() } else { self.known.to_string() }
     }
 
     /// What to type: the same with the arm of the clips, where a bridge drives it.
@@ -149,7 +149,7 @@ mod tests {
         for (arm, words, command) in [
             ("fci://172.16.0.2", "the robot at fci://172.16.0.2", "--arm fci://172.16.0.2`"),
             ("sim", "the simulation", "--arm sim`"),
-            ("", "an origin that they do not say", "--arm fci://HOST` for a robot"),
+            ("", "unknown origin", "--arm fci://HOST` for a robot"),
             ("replay://x.mcap", "a replay of x.mcap", "--arm sim --mix`"),
         ] {
             let of = session(&[arm]);
