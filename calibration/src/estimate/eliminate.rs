@@ -43,7 +43,7 @@ impl Eliminated {
             form[(0, 0)] += precision * u * u;
         }
         let Some(inner) = Cholesky::new(inner) else {
-            return Err(Impossible("slopes by a clip's own numbers are too large to be told apart".into()));
+            return Err(Impossible("slopes by a clip's own numbers are too large to be separated".into()));
         };
         let follows = -inner.solve(&cross);
         form += cross.tr_mul(&follows);
