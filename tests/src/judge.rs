@@ -5,7 +5,7 @@ use rt_bridge::safety::{Limits, Trace, Workspace};
 use shared_mem::cell::Cell;
 use shared_mem::msg::Joints;
 use shared_mem::msg::arm::{ArmCommand, ArmState};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, VecDeque};
 use twin::arm::ArmModel;
 
 /// What rounding may add to the ratio of a command.
@@ -16,6 +16,16 @@ const FOLLOWING: f64 = 1e-3;
 const T: f64 = 1e-3;
 /// Below this a joint stands [rad/s]: the rounding of differences of positions.
 const STANDING: f64 = 1e-9;
+
+/// States whose torque is remembered until their command comes: those of a look at both topics, and some more.
+const REMEMBERED: usize = 256;
+
+/// The torque that a robot has in force in a cycle.
+#[derive(Debug)]
+struct InForce {
+    cycle: u64,
+    tau: Joints,
+}
 
 /// What was commanded last.
 #[derive(Debug)]
@@ -33,6 +43,7 @@ pub struct Judge {
     limits: Limits,
     workspace: Workspace,
     last: Option<Last>,
+    in_force: VecDeque<InForce>,
     worst: BTreeMap<&'static str, f64>,
     /// Commands and states that were judged.
     pub judged: [u64; 2],
@@ -54,6 +65,7 @@ impl Judge {
             limits: Limits::of(cell, &model),
             workspace: Workspace::of(cell, &model),
             last: None,
+            in_force: VecDeque::new(),
             worst: BTreeMap::new(),
             judged: [0; 2],
             overlooked: 0,
@@ -83,6 +95,7 @@ impl Judge {
             Some(last) => (last.trace, last.tau),
             None => (Trace::at_rest(command.q_d), command.tau_J_d),
         };
+        let in_force = self.in_force.iter().find(|state| state.cycle == command.cycle).map(|state| state.tau);
         let mut trace = before.after(&command.q_d, T);
         if row < 2 {
             trace.a = [0.0; 8];
@@ -100,15 +113,22 @@ impl Judge {
                 self.note("command: jerk", ((trace.a[i] - before.a[i]) / T).abs() / joint.jerk);
             }
             self.note("command: torque", command.tau_J_d[i].abs() / joint.torque);
-            self.note("command: torque rate", (command.tau_J_d[i] - tau[i]).abs() / (joint.torque_rate * T));
+            // A command that came too late never was in force: the robot steps from the one that is.
+            let step = (command.tau_J_d[i] - tau[i]).abs();
+            let step = in_force.map_or(step, |in_force| step.min((command.tau_J_d[i] - in_force[i]).abs()));
+            self.note("command: torque rate", step / (joint.torque_rate * T));
         }
         self.place("command: workspace", &command.q_d, 0.0);
         self.last = Some(Last { cycle: command.cycle, trace, tau: command.tau_J_d, row });
     }
 
-    /// Judges what the arm does.
+    /// Judges what the arm does. Read before the commands that answer it, so that their steps count from the torque in force.
     pub fn state(&mut self, state: &ArmState) {
         self.judged[1] += 1;
+        if self.in_force.len() == REMEMBERED {
+            self.in_force.pop_front();
+        }
+        self.in_force.push_back(InForce { cycle: state.cycle, tau: state.tau_J_d });
         let limits = self.limits;
         for (i, joint) in limits.counted().enumerate() {
             self.note("state: position", share_of_range(state.q[i], joint.q_min, joint.q_max));

@@ -133,13 +133,13 @@ fn steer(domain: &str, judge: Judge, over: &AtomicBool) -> Steered {
     let mut steered = Steered { judge, stopped: 0, places: 0 };
     let (mut stream, mut sent, mut q) = (1, REPEATED, MIDDLE);
     while !over.load(Ordering::Relaxed) {
-        while let Some(command) = commands.receive().expect("a command") {
-            steered.judge.command(&command);
-        }
         let mut newest = None::<ArmState>;
         while let Some(state) = states.receive().expect("a state") {
             steered.judge.state(&state);
             newest = Some(state);
+        }
+        while let Some(command) = commands.receive().expect("a command") {
+            steered.judge.command(&command);
         }
         let stopped = newest.is_some_and(|state| {
             state.motion_id == stream && [MotionStatus::Braked, MotionStatus::Refused].contains(&state.motion)
