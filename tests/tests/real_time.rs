@@ -45,3 +45,22 @@ fn states_are_as_fresh_as_a_ping() {
     eprintln!("medians: age {age:.1} / {ping:.1} us = {:.2}", age / ping);
     assert!(age > 0.0);
 }
+
+/// The long run is `soak --minutes 60`; here only that it watches everything that it says it does.
+#[test]
+fn a_cell_that_runs_beside_other_work_is_watched() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let table = folder.path().join("memory.csv");
+    let arguments = ["--minutes", "0.1", "--load", "none", "--table", table.to_str().expect("a UTF-8 path")];
+    // Whether a busy machine keeps time is no matter of this test, so it may fail by its own measure.
+    let answer = Program::start("soak", "soak", &arguments).wait(Duration::from_secs(120)).json();
+    for cell in ["simulated", "served"] {
+        let watched = &answer["cells"][cell];
+        assert!(watched["states"].as_u64() > Some(1000) && watched["clip"]["states"].as_u64() > Some(1000), "{answer}");
+        assert!(watched["worst_ratio"]["command: workspace"].as_f64() > Some(0.0), "{answer}");
+        assert!(watched["programs"]["bridge"]["cycles"].as_u64() > Some(1000), "{answer}");
+        assert!(answer["memory"][format!("{cell}: recorder")]["last_mib"].as_f64() > Some(1.0), "{answer}");
+    }
+    let rows = std::fs::read_to_string(&table).expect("the table");
+    assert!(rows.lines().any(|row| row.contains("simulated: twin")), "{rows}");
+}

@@ -10,6 +10,7 @@ use shared_mem::msg::target::{ArmTarget, TargetKind};
 use shared_mem::time::now_ns;
 use shared_mem::topics;
 use shared_mem::transport::Node;
+use std::net::{TcpListener, TcpStream};
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -26,8 +27,6 @@ const MIDDLE: [f64; MAX_JOINTS] = [0.0, -0.6, 0.0, -2.2, 0.0, 1.6, 0.785, 0.0];
 const REACH: f64 = 0.25;
 /// Share of each joint's highest speed.
 const SPEED: f64 = 0.5;
-/// A free port of the served robot's arm; other than the one of a robot, so that one may run beside.
-const PORT: &str = "13370";
 
 /// The programs of a cell and who steers its arm.
 pub(crate) struct Running {
@@ -60,14 +59,15 @@ impl Running {
     /// A served robot, the bridge that drives it over FCI, and its recorder, in a domain of their own.
     pub(crate) fn served(cell: &Cell) -> Self {
         let domain = format!("{}-fci", cell.domain());
-        let (toml, clip, address) =
-            (cell.text("cell.toml"), cell.text("served.mcap"), format!("fci://127.0.0.1:{PORT}"));
-        let serve = ["serve", "--cell", &toml, "--port", PORT, "--no-hand", "--json"];
+        // Any that is free: a robot, or another one that is served, may be there beside.
+        let port = TcpListener::bind("127.0.0.1:0").and_then(|free| free.local_addr()).expect("a free port").port();
+        let (toml, clip) = (cell.text("cell.toml"), cell.text("served.mcap"));
+        let (address, port) = (format!("127.0.0.1:{port}"), port.to_string());
+        let serve = ["serve", "--cell", &toml, "--port", &port, "--no-hand", "--json"];
         let robot = Program::start("rt_bridge", &domain, &serve);
-        Cell::until("the served robot listens", Duration::from_secs(20), || {
-            std::net::TcpStream::connect(format!("127.0.0.1:{PORT}")).is_ok()
-        });
-        let run = ["run", "--cell", &toml, "--arm", &address, "--realtime", "ignore", "--record", &clip, "--json"];
+        Cell::until("the served robot listens", Duration::from_secs(20), || TcpStream::connect(&address).is_ok());
+        let arm = format!("fci://{address}");
+        let run = ["run", "--cell", &toml, "--arm", &arm, "--realtime", "ignore", "--record", &clip, "--json"];
         let bridge = Program::start("rt_bridge", &domain, &run);
         Self::steer("served", cell, &domain, cell.path("served.mcap"), vec![("bridge", bridge), ("robot", robot)])
     }
