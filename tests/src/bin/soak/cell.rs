@@ -11,7 +11,7 @@ use shared_mem::time::now_ns;
 use shared_mem::topics;
 use shared_mem::transport::Node;
 use std::net::{TcpListener, TcpStream};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
@@ -88,6 +88,11 @@ impl Running {
 
     pub(crate) fn name(&self) -> &'static str {
         self.name
+    }
+
+    /// What is recorded.
+    pub(crate) fn clip(&self) -> &Path {
+        &self.clip
     }
 
     /// Its domain of shared memory.

@@ -54,8 +54,11 @@ fn main() -> ExitCode {
     let arguments = Arguments::parse();
     let whole = Duration::from_secs_f64(60.0 * arguments.minutes);
     let cell = Cell::with(&cell_toml());
-    let loaded = Loaded::start(&arguments.load, &cell.path("load"));
     let mut running = [Running::simulated(&cell), Running::served(&cell)];
+    for cell in &running {
+        Cell::until("the recording begins", Duration::from_secs(20), || Cell::size(cell.clip()) > 0);
+    }
+    let loaded = Loaded::start(&arguments.load, &cell.path("load"));
     let mut table = Table::create(&arguments.table, start_of_growth(whole));
     let begin = Instant::now();
     let mut dead = Vec::new();
