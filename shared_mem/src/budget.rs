@@ -85,7 +85,7 @@ impl Budget {
         if taken > self.0.memory {
             return Err(BudgetError::Memory(self.0.memory));
         }
-        // One thread reads an input; the other at work is never an input's.
+        // One thread alone reads an input: nobody draws between the two lines.
         self.0.taken.store(taken, Ordering::Relaxed);
         Ok(())
     }
