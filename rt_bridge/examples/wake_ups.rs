@@ -1,9 +1,9 @@
 //! How late the control loop wakes beside how late `cyclictest` does, in turns on one machine: a table, and the ratios of the
-//! medians over the rounds. `cargo run --release -p rt_bridge --example wake_ups -- ROUNDS SECONDS`, as root, on an idle machine,
+//! medians over the rounds, beside the time that a virtual machine's host took the last core away. `cargo run --release -p rt_bridge --example wake_ups -- ROUNDS SECONDS`, as root, on an idle machine,
 //! with Debian's `rt-tests` installed. The loop drives the shipped cell's simulated arm, without a camera.
 
 use anyhow::{Context, Result, bail, ensure};
-use rt_bridge::rt::Realtime;
+use rt_bridge::rt::{Realtime, process};
 use rt_bridge::run::{ArmChoice, CameraChoice, Settings, run};
 use shared_mem::answer;
 use std::path::Path;
@@ -18,6 +18,8 @@ struct Late {
     median: f64,
     p999: f64,
     max: f64,
+    /// Time within the run for which the host gave the last core to somebody else [ms].
+    stolen_ms: f64,
 }
 
 fn main() -> Result<()> {
@@ -26,19 +28,23 @@ fn main() -> Result<()> {
         bail!("give the number of rounds and the seconds of each, as in `6 10`")
     };
     ensure!(rounds > 0 && seconds > 0, "give at least one round of one second");
-    answer::words("[us]     cyclictest: p50   p99.9     max |  loop: p50   p99.9     max  missed | p50 x  p99.9 x")?;
+    answer::words(
+        "[us]     cyclictest: p50   p99.9     max  stolen ms |  loop: p50   p99.9     max  missed  stolen ms | p50 x  p99.9 x",
+    )?;
     let mut pairs = Vec::new();
     for round in 1..=rounds {
         let peer = cyclictest(seconds)?;
         let (own, missed) = control_loop(seconds)?;
         answer::words(format!(
-            "round {round:>2} {:>15.0} {:>7.0} {:>7.0} | {:>10.1} {:>7.1} {:>7.1} {missed:>7} | {:>5.2} {:>8.2}",
+            "round {round:>2} {:>15.0} {:>7.0} {:>7.0} {:>10.0} | {:>10.1} {:>7.1} {:>7.1} {missed:>7} {:>10.0} | {:>5.2} {:>8.2}",
             peer.median,
             peer.p999,
             peer.max,
+            peer.stolen_ms,
             own.median,
             own.p999,
             own.max,
+            own.stolen_ms,
             own.median / peer.median,
             own.p999 / peer.p999
         ))?;
@@ -60,6 +66,7 @@ fn main() -> Result<()> {
 fn cyclictest(seconds: u32) -> Result<Late> {
     let mut command = Command::new("cyclictest");
     command.args(["-m", "-q", "-t1", "-p80", "-i1000", "-h20000", "-D"]).arg(format!("{seconds}s"));
+    let before = stolen_ms()?;
     let output = command.output().context("cyclictest does not start; install Debian's rt-tests")?;
     let text = String::from_utf8_lossy(&output.stdout);
     // The histogram's lines are a latency and its count; all others are comments.
@@ -82,7 +89,18 @@ fn cyclictest(seconds: u32) -> Result<Late> {
         });
         reached.map_or(f64::NAN, |(late, _)| *late)
     };
-    Ok(Late { median: at(0.5), p999: at(0.999), max: at(1.0) })
+    Ok(Late { median: at(0.5), p999: at(0.999), max: at(1.0), stolen_ms: stolen_ms()? - before })
+}
+
+/// For how long since the machine's start the host of a virtual machine has given the last core, the control thread's, to somebody
+/// else [ms]: `steal` of proc_stat(5).
+fn stolen_ms() -> Result<f64> {
+    const MS_A_TICK: f64 = 10.0; // USER_HZ is 100 on every Linux of x86-64 and ARM
+    let core = process::last_core().context("there is no core")?;
+    let text = std::fs::read_to_string("/proc/stat")?;
+    let line = text.lines().find_map(|line| line.strip_prefix(&format!("cpu{core} ")));
+    let steal = line.and_then(|line| line.split_whitespace().nth(7)).context("/proc/stat names no stolen time")?;
+    Ok(MS_A_TICK * steal.parse::<f64>()?)
 }
 
 /// The control loop, and its missed cycles.
@@ -104,10 +122,11 @@ fn control_loop(seconds: u32) -> Result<(Late, u64)> {
         duration: Some(Duration::from_secs(seconds.into())),
         realtime: Realtime::Enforce,
     };
+    let before = stolen_ms()?;
     let report = run(&settings, &Arc::new(AtomicBool::new(false)))?;
     let wake = report.wake_us;
     let [median, p999, max] = [wake.p50, wake.p999, wake.max].map(|us| us.unwrap_or(f64::NAN));
-    Ok((Late { median, p999, max }, report.missed_cycles))
+    Ok((Late { median, p999, max, stolen_ms: stolen_ms()? - before }, report.missed_cycles))
 }
 
 fn median(mut values: Vec<f64>) -> f64 {
