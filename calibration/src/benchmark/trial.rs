@@ -52,7 +52,8 @@ pub fn examine(world: &World, clips: Vec<Clip>, interrupt: &Interrupt) -> Result
 }
 
 /// A world's clips as a session that was read and admitted.
-pub(super) fn sealed(world: &World, clips: Vec<Clip>) -> (Session, Admitted) {
+#[must_use]
+pub fn sealed(world: &World, clips: Vec<Clip>) -> (Session, Admitted) {
     let files: Vec<String> = clips.iter().map(|clip| clip.file.display().to_string()).collect();
     let entry = |clip: &Clip| ClipEntry { file: clip.file.clone(), kind: clip.kind };
     let session = Session {
