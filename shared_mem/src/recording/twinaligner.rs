@@ -12,6 +12,7 @@ use crate::budget::Budget;
 use crate::cell::{CameraPose, Cell, ClipKind};
 use crate::frames::{Base, Camera, Object, Pose};
 use crate::input;
+use crate::json;
 use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion};
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
@@ -174,6 +175,30 @@ fn nanoseconds(seconds: f64) -> u64 {
 
 fn read_json<T: DeserializeOwned>(path: &Path) -> Result<T, ReadError> {
     let bytes = input::bytes(path, input::Kind::List)?;
-    serde_json::from_slice(&bytes)
-        .map_err(|e| ReadError::kind(path, format!("is not what a TwinAligner recorder writes ({e}); record it again")))
+    parse_json(path, &bytes, &Budget::of(bytes.len() as u64))
+}
+
+fn parse_json<T: DeserializeOwned>(path: &Path, bytes: &[u8], budget: &Budget) -> Result<T, ReadError> {
+    json::read(bytes, budget).map_err(|what| {
+        ReadError::kind(path, format!("is not what a TwinAligner recorder writes: it {what}; record it again"))
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_list_is_read_within_its_budget_and_what_is_wrong_is_said_in_words() {
+        let path = Path::new("clip/control.json");
+        let read = |text: &str, room: u64| {
+            parse_json::<Vec<Control>>(path, text.as_bytes(), &Budget::with(room, 1 << 20)).map_err(|e| e.to_string())
+        };
+        let rows = format!("[{}]", vec![r#"{"ros_timestamp": 0.1, "cmd": [1, 2]}"#; 100].join(","));
+        assert_eq!(read(&rows, 1 << 20).expect("room enough").len(), 100);
+        let line = read(&rows, 1 << 10).expect_err("too little room");
+        assert!(line.contains("control.json") && line.contains("becomes more than"), "{line}");
+        let line = read(r#"[{"ros_timestamp": 0.1, "cmd": 7}]"#, 1 << 20).expect_err("no list");
+        assert!(line.contains("where a list is wanted") && !line.contains("expected"), "{line}");
+    }
 }
