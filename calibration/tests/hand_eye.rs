@@ -7,6 +7,7 @@ use rand::SeedableRng as _;
 use rand_pcg::Pcg64;
 use serde_json::{Value, json};
 use shared_mem::hand_eye::{HandEye, Mount};
+use shared_mem::lens::Distortion;
 use std::path::Path;
 use std::process::{Command, Output};
 
@@ -71,6 +72,43 @@ fn corners_of_another_detector_give_the_mount_and_its_file() {
         let left = file.residual.expect("what is left");
         assert!(left.held_out_px > left.corner_sigma_px && left.held_out_px < 8.0 && left.pictures == 11, "{left:?}");
         assert!(pose.covariance.is_some() && answer["not_identifiable"] == json!([]));
+    }
+}
+
+#[test]
+fn corners_through_lenses_of_every_model_give_the_same_mount() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let (truth, views) = drawn(&WORLD);
+    let cases = [
+        (
+            Distortion::Polynomial([0.45, -2.55, 4e-4, 1e-4, 1.48, 0.33, -2.37, 1.41]),
+            json!({ "k1": 0.45, "k2": -2.55, "p1": 4e-4, "p2": 1e-4, "k3": 1.48, "k4": 0.33, "k5": -2.37, "k6": 1.41 }),
+        ),
+        (
+            Distortion::Fisheye([-0.04, 0.02, -0.006, 0.001]),
+            json!({ "camera_model": "OPENCV_FISHEYE", "k1": -0.04, "k2": 0.02, "k3": -0.006, "k4": 0.001 }),
+        ),
+    ];
+    for (distortion, keys) in cases {
+        let mut bent = views.clone();
+        for view in &mut bent {
+            view.seen.iter_mut().for_each(|seen| seen.pixel = view.lens.bent(&distortion, seen.pixel));
+        }
+        let mut list = list(&bent);
+        list.as_object_mut().expect("keys").extend(keys.as_object().expect("keys").clone());
+        let output = hand_eye(folder.path(), &list, &["--force"]);
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        let file = HandEye::read(&folder.path().join("hand_eye.toml")).expect("the file");
+        let pose = file.EE_T_camera.and_then(|pose| pose.isometry()).expect("a mount");
+        assert!(off(&pose, &truth.camera).iter().all(|off| off.abs() < 5e-3), "{distortion:?}");
+        // What was used stands in the file, and comes back from it.
+        assert_eq!(file.camera.expect("a camera").distortion, distortion);
+    }
+    for (keys, what) in [(json!({ "k4": 0.1 }), "`k4`"), (json!({ "s1": 0.1 }), "`s1`")] {
+        let mut list = list(&views);
+        list.as_object_mut().expect("keys").extend(keys.as_object().expect("keys").clone());
+        let line = refused(&hand_eye(folder.path(), &list, &["--force"]));
+        assert!(line.contains(what), "{line}");
     }
 }
 

@@ -1,7 +1,7 @@
 //! Boxes seen by cameras around them.
 
 use nalgebra::{Isometry3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
-use splat::{Camera, Lens};
+use splat::{Camera, Distortion, Lens};
 
 /// A box: its frame, and half its edges [m].
 #[derive(Clone, Copy)]
@@ -11,7 +11,7 @@ pub(crate) struct Solid {
 }
 
 pub(crate) const SIZE: [usize; 2] = [96, 72];
-pub(crate) const LENS: Lens = Lens { focal: [95.0; 2], centre: [47.5, 35.5], distortion: [0.0; 5] };
+pub(crate) const LENS: Lens = Lens { focal: [95.0; 2], centre: [47.5, 35.5], distortion: Distortion::NONE };
 
 /// Cameras above and around a point, all looking there.
 pub(crate) fn cameras(count: usize, far: f64) -> Vec<Camera> {

@@ -4,6 +4,7 @@
 
 use crate::cell::Intrinsics;
 use crate::frames::Pose;
+use crate::lens::Distortion;
 use crate::toml_file::{self, TomlFileError};
 use nalgebra::{Isometry3, Matrix3, Matrix4, Rotation3, Translation3, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
@@ -44,9 +45,9 @@ pub struct MountedPose {
 pub struct CalibratedCamera {
     /// Pinhole [pixel], the first pixel's middle at 0, 0.
     pub intrinsics: Intrinsics,
-    /// Brown-Conrady k1, k2, p1, p2, k3.
+    /// The lens, as in `[camera]` of cell.toml.
     #[serde(default)]
-    pub distortion: [f64; 5],
+    pub distortion: Distortion,
 }
 
 /// What is left.

@@ -15,6 +15,7 @@
 //! | [`frames`] | typed poses: `Pose<To, From>` |
 //! | [`hand_eye`] | `hand_eye.toml`: where a camera is mounted, and `O_T_EE` in lists of pictures |
 //! | [`json`] | JSON of other programs: within a budget, and what is wrong with it in words |
+//! | [`lens`] | what lenses do to a pinhole's picture, both ways, and how other programs write them |
 //! | [`origin`] | where a recording comes from: a simulation, a robot, another recording |
 //! | [`budget`] | what reading one input may cost: memory and steps |
 //! | [`input`] | the one way in for files: regular ones only, each kind up to a size |
@@ -44,6 +45,7 @@ pub mod frames;
 pub mod hand_eye;
 pub mod input;
 pub mod json;
+pub mod lens;
 pub mod msg;
 pub mod origin;
 pub mod output;

@@ -2,11 +2,12 @@
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion};
+use shared_mem::lens::Distortion;
 use splat::{Body, Camera, Lens, Photograph, Settings, Shape, SplatCloud, Surroundings, render, train};
 use std::ops::ControlFlow;
 
 const SIZE: [usize; 2] = [320, 240];
-const LENS: Lens = Lens { focal: [300.0; 2], centre: [159.5, 119.5], distortion: [0.0; 5] };
+const LENS: Lens = Lens { focal: [300.0; 2], centre: [159.5, 119.5], distortion: Distortion::NONE };
 const RINGS: u32 = 122;
 const AROUND: u32 = 123;
 const STEPS: usize = 10;

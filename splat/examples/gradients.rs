@@ -4,11 +4,12 @@
 use nalgebra::{Isometry3, Translation3, UnitQuaternion};
 use rand::{RngExt as _, SeedableRng as _};
 use rand_pcg::Pcg64Mcg;
+use shared_mem::lens::Distortion;
 use splat::{COLOR_DEPTH, Frame, Lens, Parameters, Planes};
 use std::io::Write as _;
 
 const SIZE: [usize; 2] = [64, 48];
-const LENS: Lens = Lens { focal: [70.0, 66.0], centre: [30.2, 24.9], distortion: [0.0; 5] };
+const LENS: Lens = Lens { focal: [70.0, 66.0], centre: [30.2, 24.9], distortion: Distortion::NONE };
 const SPLATS: usize = 200;
 
 fn main() -> std::io::Result<()> {

@@ -12,7 +12,7 @@
 //! | `real` | single and double precision |
 //! | `harmonics` | colour by direction |
 //! | `links` | a folder with one file for each link |
-//! | `lens` | pinhole and Brown-Conrady distortion, both ways |
+//! | `lens` | pinhole and distortion, both ways |
 //! | `project` | one splat in a picture |
 //! | `gradient` | the picture once more, and from pixels back to splats |
 //! | `loss` | how far a picture is from a photograph |
@@ -49,5 +49,6 @@ pub use project::{Projected, project, slope_ends};
 pub use raster::{Pinhole, Raster};
 pub use real::Real;
 pub use reference::{Body, Canvas, Picture, Shape, Surroundings, render};
+pub use shared_mem::lens::Distortion;
 pub use straight::{NOWHERE, Straight};
 pub use train::{Camera, Photograph, Progress, Quality, Rates, Settings, StateError, TrainError, train};

@@ -3,9 +3,10 @@
 
 use super::cloud::SplatCloud;
 use super::harmonics::values;
-use super::lens::{Lens, bend};
+use super::lens::Lens;
 use super::real::Real;
 use nalgebra::{Isometry3, Matrix2, Matrix2x3, Matrix3, Vector2, Vector3};
+use shared_mem::lens::Distortion;
 
 /// Splats whose centre is nearer are not drawn [m].
 const NEAR: f64 = 0.05;
@@ -57,7 +58,7 @@ pub(super) struct View<T: Real> {
     eye: Vector3<T>,
     pub(super) focal: [T; 2],
     pub(super) centre: [T; 2],
-    pub(super) distortion: [T; 5],
+    pub(super) distortion: Distortion<T>,
     /// Between which ends the slope of the projection is taken.
     ends: [[T; 2]; 2],
     pub(super) size: [usize; 2],
@@ -94,7 +95,7 @@ impl<T: Real> View<T> {
             eye: eye.map(T::of),
             focal: lens.focal.map(T::of),
             centre: lens.centre.map(T::of),
-            distortion: lens.distortion.map(T::of),
+            distortion: lens.distortion.of(),
             ends: slope_ends(lens, size).map(|ends| ends.map(T::of)),
             size,
         }
@@ -109,10 +110,10 @@ impl<T: Real> View<T> {
         let inverse = T::one() / at.z;
         let plane = [at.x * inverse, at.y * inverse];
         let [fx, fy] = self.focal;
-        let pixel = bend(&self.distortion, plane[0], plane[1]).0;
+        let pixel = self.distortion.bend(plane[0], plane[1]).0;
         let pixel = Vector2::new(fx * pixel.x + self.centre[0], fy * pixel.y + self.centre[1]);
         let held = [0, 1].map(|i| within(plane[i], self.ends[i]));
-        let (_, bent) = bend(&self.distortion, held[0], held[1]);
+        let (_, bent) = self.distortion.bend(held[0], held[1]);
         let none = T::zero();
         let divided = Matrix2x3::new(inverse, none, -held[0] * inverse, none, inverse, -held[1] * inverse);
         let slope = Matrix2::new(fx, none, none, fy) * bent * divided;
@@ -221,7 +222,11 @@ pub(super) fn project_from(cloud: &SplatCloud, number: usize, view: &View<f64>) 
 #[must_use]
 pub fn slope_ends(lens: &Lens, size: [usize; 2]) -> [[f64; 2]; 2] {
     [0, 1].map(|i| {
-        let ends = [-lens.centre[i], size[i] as f64 - 1.0 - lens.centre[i]].map(|end| end / lens.focal[i]);
+        let ends = [0.0, size[i] as f64 - 1.0].map(|edge| {
+            let mut pixel = lens.centre;
+            pixel[i] = edge;
+            lens.ray(pixel)[i]
+        });
         let spare = (OUTSIDE - 1.0) * 0.5 * (ends[1] - ends[0]);
         [ends[0] - spare, ends[1] + spare]
     })

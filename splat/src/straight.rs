@@ -4,6 +4,8 @@ use super::lens::Lens;
 use super::raster::Pinhole;
 use rayon::prelude::*;
 
+/// Pixels of each side of the border that are looked at.
+const BORDER: usize = 64;
 /// A pixel that sees nothing of the straight picture.
 pub const NOWHERE: u32 = u32::MAX;
 
@@ -18,12 +20,33 @@ pub struct Straight {
     pub lookup: Vec<u32>,
 }
 
+/// A lens that bends sees a little more or less than its pinhole, a fisheye much more: pixels by which that one's picture is made
+/// larger on every side, half its own size at most.
+fn margin(lens: &Lens, seen: [usize; 2]) -> [usize; 2] {
+    if !lens.is_bent() {
+        return [0, 0];
+    }
+    let last = seen.map(|pixels| pixels.saturating_sub(1) as f64);
+    let border = (0..=BORDER).map(|i| i as f64 / BORDER as f64);
+    let pixels = border.flat_map(|s| {
+        let [x, y] = last.map(|last| last * s);
+        [[x, 0.0], [x, last[1]], [0.0, y], [last[0], y]]
+    });
+    let mut most = [0.0f64; 2];
+    for ray in pixels.map(|pixel| lens.ray(pixel)) {
+        for i in 0..2 {
+            let at = ray[i] * lens.focal[i] + lens.centre[i];
+            most[i] = most[i].max(-at).max(at - last[i]);
+        }
+    }
+    [0, 1].map(|i| (most[i].ceil() as usize + 1).min(seen[i] / 2))
+}
+
 impl Straight {
     /// For pictures behind the lens of so many columns and rows.
     #[must_use]
     pub fn new(lens: &Lens, seen: [usize; 2]) -> Self {
-        // A lens that bends sees a little more or less than its pinhole: that one's picture is made large enough.
-        let margin = if lens.is_bent() { seen.map(|pixels| pixels / 4) } else { [0, 0] };
+        let margin = margin(lens, seen);
         let size = [0, 1].map(|i| seen[i] + 2 * margin[i]);
         let [fx, fy] = lens.focal.map(|f| f as f32);
         let [cx, cy] = [0, 1].map(|i| (lens.centre[i] + margin[i] as f64) as f32);

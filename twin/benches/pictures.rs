@@ -11,12 +11,13 @@ use eye::camera_from_base;
 use nalgebra::Vector3;
 use robot_splats::robot_splats;
 use shared_mem::cell::Cell;
+use shared_mem::lens::Distortion;
 use splat::{Body, Canvas, Lens, Shape, Surroundings};
 use std::path::Path;
 use twin::render::{Hand, RobotSurface};
 
 const SIZE: [usize; 2] = [640, 480];
-const LENS: Lens = Lens { focal: [600.0; 2], centre: [319.5, 239.5], distortion: [0.0; 5] };
+const LENS: Lens = Lens { focal: [600.0; 2], centre: [319.5, 239.5], distortion: Distortion::NONE };
 
 fn pictures(criterion: &mut Criterion) {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../config/fr3_cell.toml");

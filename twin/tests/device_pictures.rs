@@ -9,14 +9,15 @@ mod robot_splats;
 use eye::camera_from_base;
 use nalgebra::{Isometry3, Matrix2, Matrix3, Point3, Translation3, UnitQuaternion, Vector2, Vector3};
 use robot_splats::robot_splats;
+use shared_mem::lens::Distortion;
 use splat::{Body, Lens, Picture, Shape, Splat, SplatCloud, Surroundings, render};
 use std::path::Path;
 use twin::render::device::{Device, DeviceCanvas, DeviceError};
 use twin::render::{Drawer, Hand, Mesh, Model, Painter, RobotSurface};
 
 const SIZE: [usize; 2] = [323, 241];
-const LENS: Lens = Lens { focal: [290.0, 285.0], centre: [163.2, 118.7], distortion: [0.0; 5] };
-const BENT: Lens = Lens { distortion: [-0.08, 0.04, 6e-4, -4e-4, 0.01], ..LENS };
+const LENS: Lens = Lens { focal: [290.0, 285.0], centre: [163.2, 118.7], distortion: Distortion::NONE };
+const BENT: Lens = Lens { distortion: Distortion::brown([-0.08, 0.04, 6e-4, -4e-4, 0.01]), ..LENS };
 const SKY: Surroundings = Surroundings { background: [0.66, 0.73, 0.8], light: Vector3::new(0.3, -0.8, -0.5) };
 
 /// The device, or the reason why the test has nothing to say.
@@ -108,6 +109,10 @@ fn splats_and_meshes_share_a_picture_through_a_bent_lens() {
     let view = camera_from_base([1.2, 0.8, 0.8], [0.2, 0.0, 0.4]);
     bodies.push(Body { shape: Shape::Mesh(&table), camera_from_body: view, instance: 99 });
     compare("mixed", &both(&device, &bodies, BENT));
+    let rational = Distortion::Polynomial([1.2, 0.35, 4e-4, -7e-4, 0.02, 1.45, 0.52, 0.06]);
+    compare("rational", &both(&device, &bodies, Lens { distortion: rational, ..LENS }));
+    let fisheye = Distortion::Fisheye([-0.03, 0.008, -0.004, 6e-4]);
+    compare("fisheye", &both(&device, &bodies, Lens { distortion: fisheye, ..LENS }));
 }
 
 #[test]

@@ -21,6 +21,7 @@ use serde_json::{Value, json};
 use shared_mem::cell::{Cell, Intrinsics, Table};
 use shared_mem::console;
 use shared_mem::hand_eye::{HandEye, Matrix};
+use shared_mem::lens::Distortion;
 use shared_mem::msg::Joints;
 use shared_mem::msg::motion::SetPoint;
 use shared_mem::output;
@@ -143,17 +144,21 @@ pub fn capture(options: &Options, interrupt: &Interrupt) -> anyhow::Result<Summa
 fn list(cell: &Cell, hand_eye: &HandEye) -> anyhow::Result<(Value, Intrinsics)> {
     let of_cell = cell.camera.as_ref().map(|camera| (camera.pinhole(), camera.distortion));
     let calibrated = hand_eye.camera.map(|camera| (camera.intrinsics, camera.distortion));
-    let (pinhole, [k1, k2, p1, p2, k3]) =
+    let (pinhole, distortion) =
         calibrated.or(of_cell).context("no intrinsics: neither hand_eye.toml nor cell.toml has a `[camera]`")?;
-    ensure!(
-        k3 == 0.0,
-        "the lens has a k3 of {k3}, which `twin reconstruct` does not know: calibrate the camera without k3, and the mount again"
-    );
     let Intrinsics { fx, fy, cx, cy } = pinhole;
-    let list = json!({
-        "fl_x": fx, "fl_y": fy, "cx": cx + HALF, "cy": cy + HALF,
-        "k1": k1, "k2": k2, "p1": p1, "p2": p2, "frames": [],
-    });
+    let lens = match distortion {
+        Distortion::Fisheye([k1, k2, k3, k4]) => {
+            json!({ "camera_model": "OPENCV_FISHEYE", "k1": k1, "k2": k2, "k3": k3, "k4": k4 })
+        }
+        Distortion::Polynomial([k1, k2, p1, p2, k3, k4, k5, k6]) => {
+            json!({ "k1": k1, "k2": k2, "p1": p1, "p2": p2, "k3": k3, "k4": k4, "k5": k5, "k6": k6 })
+        }
+    };
+    let mut list = json!({ "fl_x": fx, "fl_y": fy, "cx": cx + HALF, "cy": cy + HALF, "frames": [] });
+    if let (Value::Object(list), Value::Object(lens)) = (&mut list, lens) {
+        list.extend(lens);
+    }
     Ok((list, pinhole))
 }
 

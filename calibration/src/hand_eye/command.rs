@@ -32,7 +32,7 @@ const MANY: usize = 8;
 /// One line: what is missing or does not fit together, and what to do.
 pub fn run(options: &Options) -> anyhow::Result<Answer> {
     let began = Instant::now();
-    let Taken { views, without_board, camera } = input::taken(&options.source)?;
+    let Taken { views, without_board, camera, remarks } = input::taken(&options.source)?;
     ensure!(
         !views.is_empty() || without_board.is_empty(),
         "no picture shows the board: check --board, the light, and that the intrinsics are of this camera"
@@ -51,7 +51,7 @@ pub fn run(options: &Options) -> anyhow::Result<Answer> {
         residual: Some(residual(&found, &views)),
     };
     let answer = Answer {
-        warnings: warnings(&found, &without_board),
+        warnings: remarks.into_iter().chain(warnings(&found, &without_board)).collect(),
         views: views.iter().zip(&found.views).map(|(view, judged)| view_answer(view, judged)).collect(),
         without_board,
         not_identifiable: found.open.iter().map(|open| not_identifiable(open, &found)).collect(),

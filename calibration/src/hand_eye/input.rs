@@ -3,19 +3,28 @@
 
 use super::view::View;
 use crate::viewpoint::board::Board;
-use crate::viewpoint::lens::{Lens, distorted};
+use crate::viewpoint::lens::Lens;
 use crate::viewpoint::picture::Pixels;
 use crate::viewpoint::planar::Seen;
 use crate::viewpoint::session;
-use anyhow::{Context as _, bail, ensure};
+use anyhow::{Context as _, anyhow, bail, ensure};
 use nalgebra::Isometry3;
 use rayon::prelude::*;
 use serde::Deserialize;
+use serde::de::IgnoredAny;
+use serde_json::{Map, Value};
+use shared_mem::budget::Budget;
 use shared_mem::cell::{Cell, Intrinsics};
 use shared_mem::ending;
 use shared_mem::hand_eye::{CalibratedCamera, Matrix};
 use shared_mem::input::{self, Kind};
-use shared_mem::recording::{PictureKind, Session};
+use shared_mem::json;
+use shared_mem::lens::Distortion;
+use shared_mem::lens::calibration::Calibration;
+use shared_mem::lens::coefficients::Keys;
+use shared_mem::lens::listed::{ListedCamera, Numbers};
+use shared_mem::recording::{PictureKind, Session, picture_size};
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use twin::arm::{ArmModel, Joints, MAX_JOINTS};
 
@@ -43,28 +52,18 @@ pub struct Taken {
     pub without_board: Vec<String>,
     /// The camera.
     pub camera: CalibratedCamera,
+    /// What was chosen where the files leave it open.
+    pub remarks: Vec<String>,
 }
 
 /// A list of pictures, as a scan of a robot has it (docs/reconstruct.md). Pixels count from the picture's upper left corner.
 #[derive(Debug, Deserialize)]
 struct List {
-    fl_x: Option<f64>,
-    fl_y: Option<f64>,
-    cx: Option<f64>,
-    cy: Option<f64>,
-    w: Option<f64>,
-    h: Option<f64>,
-    #[serde(default)]
-    k1: f64,
-    #[serde(default)]
-    k2: f64,
-    #[serde(default)]
-    p1: f64,
-    #[serde(default)]
-    p2: f64,
-    #[serde(default)]
-    k3: f64,
+    #[serde(flatten)]
+    camera: Numbers,
     frames: Vec<Listed>,
+    #[serde(flatten)]
+    others: BTreeMap<String, IgnoredAny>,
 }
 
 #[derive(Debug, Deserialize)]
@@ -74,15 +73,10 @@ struct Listed {
     O_T_EE: Option<Matrix>,
     /// Corners that another detector has found: x, y on the board [m], column, row [pixel].
     points: Option<Vec<[f64; 4]>>,
-}
-
-/// A file beside a picture; intrinsics as ROS and OpenCV name them, the first pixel's middle at 0, 0.
-#[derive(Debug, Deserialize)]
-#[allow(non_snake_case, reason = "names of ROS and of the Franka Control Interface")]
-struct Beside {
-    O_T_EE: Option<Matrix>,
-    K: Option<[f64; 9]>,
-    D: Option<Vec<f64>>,
+    #[serde(flatten)]
+    camera: Numbers,
+    #[serde(flatten)]
+    others: BTreeMap<String, IgnoredAny>,
 }
 
 /// The pixels of a picture, or what another detector has found in it.
@@ -96,20 +90,26 @@ struct Shot {
     name: String,
     base_from_end_effector: Isometry3<f64>,
     content: Content,
+    /// Columns and rows that the intrinsics beside it are for.
+    size: Option<[usize; 2]>,
+}
+
+/// Pictures with what the files beside them say of their camera.
+struct Shots {
+    camera: Option<CalibratedCamera>,
+    shots: Vec<Shot>,
+    remarks: Vec<String>,
 }
 
 /// From the middle of a pixel to the corner that lists count from.
 const HALF: f64 = 0.5;
-/// Rounds that take the lens's distortion back; each gains more than a digit within the picture.
-const ROUNDS: usize = 20;
-
 /// Reads the pictures and finds the board in them.
 ///
 /// # Errors
 /// One line: what is missing or does not fit together, and what to do.
 pub fn taken(source: &Source) -> anyhow::Result<Taken> {
     let list = source.target.join("poses.json");
-    let (own, shots) = if list.is_file() {
+    let Shots { camera: own, shots, remarks } = if list.is_file() {
         listed(&source.target, &list)?
     } else if source.target.is_dir() && source.cell.is_none() && !source.target.join("cell.toml").is_file()
         || has_pictures(&source.target)
@@ -129,7 +129,7 @@ pub fn taken(source: &Source) -> anyhow::Result<Taken> {
             Err(name) => without_board.push(name),
         }
     }
-    Ok(Taken { views, without_board, camera })
+    Ok(Taken { views, without_board, camera, remarks })
 }
 
 fn is_picture(path: &Path) -> bool {
@@ -148,67 +148,110 @@ fn has_pictures(folder: &Path) -> bool {
     !pictures(folder).is_empty()
 }
 
-fn listed(folder: &Path, path: &Path) -> anyhow::Result<(Option<CalibratedCamera>, Vec<Shot>)> {
-    let text = input::text(path, Kind::List)?;
-    let list: List = serde_json::from_str(&text)
-        .with_context(|| format!("{} is no list of pictures; docs/hand_eye.md has its keys", path.display()))?;
-    let camera = list.fl_x.map(|fx| CalibratedCamera {
-        intrinsics: Intrinsics {
-            fx,
-            fy: list.fl_y.unwrap_or(fx),
-            cx: list.cx.or(list.w.map(|w| w / 2.0)).unwrap_or(0.0) - HALF,
-            cy: list.cy.or(list.h.map(|h| h / 2.0)).unwrap_or(0.0) - HALF,
-        },
-        distortion: [list.k1, list.k2, list.p1, list.p2, list.k3],
-    });
-    let shots = list.frames.into_iter().map(|frame| {
+fn listed(folder: &Path, path: &Path) -> anyhow::Result<Shots> {
+    let bytes = input::bytes(path, Kind::List)?;
+    let list = parsed(path, &bytes, &Budget::of(bytes.len() as u64))?;
+    let in_list = |what: String| anyhow!("{}: {what}", path.display());
+    Keys::none_unread(list.others.keys().map(String::as_str)).map_err(in_list)?;
+    let (mut camera, mut shots) = (None, Vec::new());
+    for frame in list.frames {
         let name = frame.file_path.display().to_string();
+        let in_frame = |what: String| in_list(format!("{name}: {what}"));
+        Keys::none_unread(frame.others.keys().map(String::as_str)).map_err(in_frame)?;
+        let picture = folder.join(&frame.file_path);
+        let here = listed_camera(&frame.camera, &list.camera, &picture).map_err(in_frame)?;
+        let camera_of_all = *camera.get_or_insert(here);
+        ensure!(
+            camera_of_all == here,
+            "{}: the camera of {name} differs from that of the pictures before; give pictures of one camera",
+            path.display()
+        );
         let matrix = frame.O_T_EE.with_context(|| format!("{}: {name} has no `O_T_EE`", path.display()))?;
-        let pose = matrix.isometry().map_err(|what| anyhow::anyhow!("{}: {name}: {what}", path.display()))?;
-        let content = match frame.points {
-            Some(points) => Content::Points(points),
-            None => Content::Picture(folder.join(&frame.file_path)),
-        };
-        Ok(Shot { name, base_from_end_effector: pose, content })
-    });
-    Ok((camera, shots.collect::<anyhow::Result<_>>()?))
+        let base_from_end_effector = matrix.isometry().map_err(in_frame)?;
+        let content = frame.points.map_or(Content::Picture(picture), Content::Points);
+        shots.push(Shot { name, base_from_end_effector, content, size: None });
+    }
+    Ok(Shots { camera: camera.flatten(), shots, remarks: Vec::new() })
 }
 
-fn beside(folder: &Path) -> anyhow::Result<(Option<CalibratedCamera>, Vec<Shot>)> {
+fn parsed(path: &Path, bytes: &[u8], budget: &Budget) -> anyhow::Result<List> {
+    json::read(bytes, budget).map_err(|what| anyhow!("{} {what}; docs/hand_eye.md has its keys", path.display()))
+}
+
+/// The camera of a frame; `None` where the list says nothing about it.
+fn listed_camera(own: &Numbers, all: &Numbers, picture: &Path) -> Result<Option<CalibratedCamera>, String> {
+    if !own.has_focal() && !all.has_focal() && !own.has_lens() && !all.has_lens() {
+        return Ok(None);
+    }
+    let size = || picture_size(picture).map_err(|error| format!("`w` and `h` are missing, and {error}"));
+    let ListedCamera { focal: [fx, fy], centre: [cx, cy], lens } = own.camera(all, || own.size(all, size))?;
+    let intrinsics = Intrinsics { fx, fy, cx: cx - HALF, cy: cy - HALF };
+    Ok(Some(CalibratedCamera { intrinsics, distortion: lens }))
+}
+
+fn beside(folder: &Path) -> anyhow::Result<Shots> {
     let found = pictures(folder);
     ensure!(
         !found.is_empty(),
         "{}: neither poses.json nor pictures (png, jpg) with a JSON file beside each; docs/hand_eye.md has both forms",
         folder.display()
     );
-    let (mut camera, mut shots) = (None, Vec::new());
-    for picture in found {
-        let path = picture.with_extension("json");
-        let text = input::text(&path, Kind::List)
+    let mut out = Shots { camera: None, shots: Vec::new(), remarks: Vec::new() };
+    for picture in &found {
+        let path = json_of(picture, &found)?;
+        let text = input::bytes(&path, Kind::List)
             .with_context(|| format!("{} needs `O_T_EE` in a JSON file of its name beside it", picture.display()))?;
-        let file: Beside = serde_json::from_str(&text)
-            .with_context(|| format!("{} is not what stands beside a picture; docs/hand_eye.md", path.display()))?;
-        let matrix = file.O_T_EE.with_context(|| format!("{} has no `O_T_EE`", path.display()))?;
-        let pose = matrix.isometry().map_err(|what| anyhow::anyhow!("{}: {what}", path.display()))?;
-        if let Some(k) = file.K {
-            let mut distortion = [0.0; 5];
-            distortion.iter_mut().zip(file.D.unwrap_or_default()).for_each(|(to, from)| *to = from);
-            let intrinsics = Intrinsics { fx: k[0], fy: k[4], cx: k[2], cy: k[5] };
-            let here = CalibratedCamera { intrinsics, distortion };
+        let in_file = |what: String| anyhow!("{}: {what}", path.display());
+        let mut file: Map<String, Value> = json::read(&text, &Budget::of(text.len() as u64))
+            .map_err(|what| anyhow!("{} {what}; docs/hand_eye.md has what stands beside a picture", path.display()))?;
+        let matrix = file.remove("O_T_EE").with_context(|| format!("{} has no `O_T_EE`", path.display()))?;
+        let matrix: Matrix = serde_json::from_value(matrix)
+            .map_err(|_| in_file("`O_T_EE` is no matrix: 16 numbers, or four rows of four".into()))?;
+        let pose = matrix.isometry().map_err(in_file)?;
+        let here = Calibration::of(&file).map_err(in_file)?;
+        if let Some(here) = &here {
+            let [fx, fy, cx, cy] = here.pinhole;
+            let camera = CalibratedCamera { intrinsics: Intrinsics { fx, fy, cx, cy }, distortion: here.distortion };
             ensure!(
-                camera.is_none_or(|before| before == here),
+                out.camera.is_none_or(|before| before == camera),
                 "{}: intrinsics differ from those of the pictures before; give pictures of one camera",
                 path.display()
             );
-            camera = Some(here);
+            if out.camera.is_none() {
+                out.remarks.extend(here.remark());
+            }
+            out.camera = Some(camera);
         }
-        let name = picture.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
-        shots.push(Shot { name, base_from_end_effector: pose, content: Content::Picture(picture) });
+        out.shots.push(Shot {
+            name: picture.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned()),
+            base_from_end_effector: pose,
+            content: Content::Picture(picture.clone()),
+            size: here.and_then(|here| here.size),
+        });
     }
-    Ok((camera, shots))
+    Ok(out)
 }
 
-fn recorded(source: &Source) -> anyhow::Result<(Option<CalibratedCamera>, Vec<Shot>)> {
+/// The JSON file beside a picture: `a.jpg.json`, or `a.json` where no other picture is an `a`.
+fn json_of(picture: &Path, all: &[PathBuf]) -> anyhow::Result<PathBuf> {
+    let whole = PathBuf::from(format!("{}.json", picture.display()));
+    if whole.is_file() {
+        return Ok(whole);
+    }
+    let other = all.iter().find(|other| *other != picture && other.file_stem() == picture.file_stem());
+    let short = picture.with_extension("json");
+    ensure!(
+        other.is_none(),
+        "{} could be of {} or of {}: give each its own, {}",
+        short.display(),
+        picture.display(),
+        other.map_or(picture, PathBuf::as_path).display(),
+        whole.display()
+    );
+    Ok(short)
+}
+
+fn recorded(source: &Source) -> anyhow::Result<Shots> {
     let session = Session::open_with(&source.target, source.cell.as_deref())?;
     let arm = ArmModel::from_cell(&session.cell)?;
     let shots = session::shots(&session, PictureKind::Color, source.frames)?;
@@ -222,14 +265,14 @@ fn recorded(source: &Source) -> anyhow::Result<(Option<CalibratedCamera>, Vec<Sh
         ensure!(shot.q.len() == arm.dof(), "{}: {} joints, the arm has {}", shot.name, shot.q.len(), arm.dof());
         q[..shot.q.len()].copy_from_slice(&shot.q);
         let pose = arm.flange(&q).isometry();
-        Ok(Shot { name: shot.name, base_from_end_effector: pose, content: Content::Pixels(shot.pixels) })
+        Ok(Shot { name: shot.name, base_from_end_effector: pose, content: Content::Pixels(shot.pixels), size: None })
     });
     let camera = session
         .cell
         .camera
         .as_ref()
         .map(|camera| CalibratedCamera { intrinsics: camera.pinhole(), distortion: camera.distortion });
-    Ok((camera, shots.collect::<anyhow::Result<_>>()?))
+    Ok(Shots { camera, shots: shots.collect::<anyhow::Result<_>>()?, remarks: Vec::new() })
 }
 
 /// The camera's numbers: those given, else those beside the pictures, else the cell's.
@@ -241,7 +284,7 @@ fn camera(source: &Source, own: Option<CalibratedCamera>) -> anyhow::Result<Cali
     };
     let found = match source.intrinsics {
         Some([fx, fy, cx, cy]) => {
-            let distortion = own.map_or([0.0; 5], |own| own.distortion);
+            let distortion = own.map_or(Distortion::NONE, |own| own.distortion);
             Some(CalibratedCamera { intrinsics: Intrinsics { fx, fy, cx, cy }, distortion })
         }
         None => own.map_or_else(of_cell, |own| Ok(Some(own)))?,
@@ -250,9 +293,8 @@ fn camera(source: &Source, own: Option<CalibratedCamera>) -> anyhow::Result<Cali
         bail!("no intrinsics: give --intrinsics fx,fy,cx,cy, --cell with a `[camera]`, or `fl_x` in poses.json")
     };
     let Intrinsics { fx, fy, cx, cy } = camera.intrinsics;
-    let finite = [fx, fy, cx, cy].iter().chain(&camera.distortion).all(|v| v.is_finite());
     ensure!(
-        finite && fx > 0.0 && fy > 0.0,
+        [fx, fy, cx, cy].iter().all(|v| v.is_finite()) && fx > 0.0 && fy > 0.0,
         "intrinsics {fx}, {fy}, {cx}, {cy} are none: focal lengths are above 0 [pixel]"
     );
     Ok(camera)
@@ -261,14 +303,16 @@ fn camera(source: &Source, own: Option<CalibratedCamera>) -> anyhow::Result<Cali
 /// The board in a picture; the picture's name where it is not seen.
 fn view(source: &Source, camera: &CalibratedCamera, lens: Lens, shot: Shot) -> anyhow::Result<Result<View, String>> {
     ensure!(!ending::asked(), "interrupted; nothing was written, start again");
-    let Shot { name, base_from_end_effector, content } = shot;
+    let Shot { name, base_from_end_effector, content, size } = shot;
     let pixels = match content {
         Content::Points(points) => {
-            let seen = points.iter().map(|[x, y, u, v]| Seen {
-                place: [*x, *y],
-                pixel: straight(&lens, &camera.distortion, [u - HALF, v - HALF]),
+            let seen = points.iter().map(|[x, y, u, v]| {
+                let pixel = lens.straight(&camera.distortion, [u - HALF, v - HALF]);
+                let pixel = pixel.with_context(|| format!("{name}: the lens shows nothing at the corner {u}, {v}"))?;
+                Ok(Seen { place: [*x, *y], pixel })
             });
-            return Ok(Ok(View { name, base_from_end_effector, seen: seen.collect(), lens }));
+            let seen = seen.collect::<anyhow::Result<_>>()?;
+            return Ok(Ok(View { name, base_from_end_effector, seen, lens }));
         }
         Content::Picture(path) => Pixels::read(&path)?,
         Content::Pixels(pixels) => pixels,
@@ -279,6 +323,13 @@ fn view(source: &Source, camera: &CalibratedCamera, lens: Lens, shot: Shot) -> a
         )
     };
     ensure!(!pixels.is_depth(), "{name} holds depth; give colour pictures");
+    if let Some([width, height]) = size.filter(|size| *size != pixels.size) {
+        bail!(
+            "{name} has {} x {} pixels, and its `K` is for {width} x {height}: give intrinsics of this resolution",
+            pixels.size[0],
+            pixels.size[1]
+        );
+    }
     let off = [(lens.centre[0], pixels.size[0]), (lens.centre[1], pixels.size[1])];
     ensure!(
         off.iter().all(|(at, size)| (0.2..0.8).contains(&(at / *size as f64))),
@@ -288,19 +339,24 @@ fn view(source: &Source, camera: &CalibratedCamera, lens: Lens, shot: Shot) -> a
         lens.centre[0],
         lens.centre[1]
     );
-    let pixels = if camera.distortion == [0.0; 5] { pixels } else { pixels.undistorted(&lens, &camera.distortion) };
+    let pixels = pixels.undistorted(&lens, &camera.distortion);
     Ok(match board.seen(&pixels, &lens)? {
         Some(reading) => Ok(View { name, base_from_end_effector, seen: reading.seen, lens }),
         None => Err(name),
     })
 }
 
-/// Where a pixel would be without the lens's distortion.
-fn straight(lens: &Lens, distortion: &[f64; 5], pixel: [f64; 2]) -> [f64; 2] {
-    let mut at = pixel;
-    for _ in 0..ROUNDS {
-        let there = distorted(lens, distortion, at);
-        at = [at[0] + pixel[0] - there[0], at[1] + pixel[1] - there[1]];
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_list_is_read_within_its_budget() {
+        let frame = r#"{"file_path": "a.png", "points": [[0, 0, 1, 1], [1, 0, 2, 1]]}"#;
+        let list = format!(r#"{{"fl_x": 600, "frames": [{}]}}"#, vec![frame; 50].join(","));
+        let read = |room: u64| parsed(Path::new("poses.json"), list.as_bytes(), &Budget::with(room, 1 << 20));
+        assert_eq!(read(1 << 20).expect("room enough").frames.len(), 50);
+        let line = read(1 << 10).expect_err("too little room").to_string();
+        assert!(line.contains("poses.json becomes more than"), "{line}");
     }
-    at
 }

@@ -27,4 +27,6 @@ pub mod variance;
 pub mod view;
 
 #[cfg(test)]
+mod lens_tests;
+#[cfg(test)]
 mod tests;

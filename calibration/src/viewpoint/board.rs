@@ -128,7 +128,7 @@ impl Board {
     }
 
     /// Every field of every marker, for a board whose first square is black (0) or white (1).
-    fn fields(&self, first: u32) -> Vec<Field> {
+    pub(super) fn fields(&self, first: u32) -> Vec<Field> {
         let Some(dictionary) = Dictionary::named(&self.dictionary) else { return Vec::new() };
         let fields = dictionary.side + 2;
         let [columns, rows] = self.squares;
@@ -216,51 +216,17 @@ fn lattices(grey: &Grid, factor: usize) -> anyhow::Result<Vec<Vec<Crossing>>> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use nalgebra::{Translation3, UnitQuaternion, Vector3};
+    use crate::viewpoint::test_board::picture;
+    use nalgebra::{Translation3, UnitQuaternion};
+    use shared_mem::lens::Distortion;
 
     const LENS: Lens = Lens { focal: [520.0, 520.0], centre: [319.5, 239.5] };
 
-    /// A picture of the board, every pixel the mean of four rays; the room around is grey.
-    fn picture(board: &Board, first: u32, camera_from_board: &Isometry3<f64>) -> Pixels {
-        let fields = board.fields(first);
-        let across = Dictionary::named(&board.dictionary).expect("a dictionary").side as usize + 2;
-        let board_from_camera = camera_from_board.inverse();
-        let eye = board_from_camera * Point3::origin();
-        let shade = |u: f64, v: f64| {
-            let ray = Vector3::new((u - LENS.centre[0]) / LENS.focal[0], (v - LENS.centre[1]) / LENS.focal[1], 1.0);
-            let ray = board_from_camera * ray;
-            let at = eye + ray * (-eye.z / ray.z);
-            let [column, row] = [at.x, at.y].map(|v| (v / board.square).floor());
-            let beyond = [column - f64::from(board.squares[0]), row - f64::from(board.squares[1])];
-            if column.min(row) < -1.0 || beyond[0].max(beyond[1]) > 0.0 {
-                return 120.0;
-            }
-            if column.min(row) < 0.0 || beyond[0].max(beyond[1]) >= 0.0 {
-                return 235.0;
-            }
-            // Where in its marker, in fields; beyond it the square is bare.
-            let field = |v: f64| ((v / board.square).fract() - 0.5) * board.square / board.marker + 0.5;
-            let [i, j] = [at.x, at.y].map(|v| (field(v) * across as f64).floor());
-            let marked = i.min(j) >= 0.0 && i.max(j) < across as f64;
-            let before = board.squares[0] as usize * row as usize + first as usize;
-            let number = before / 2 + column as usize / 2;
-            let is_light = match (column + row + f64::from(first)).rem_euclid(2.0) > 0.5 {
-                true if marked => fields[(number * across + j as usize) * across + i as usize].1,
-                is_white => is_white,
-            };
-            if is_light { 235.0 } else { 20.0 }
-        };
-        let halves = [-0.25, 0.25];
-        let grid = Grid::from_fn(640, 480, |x, y| {
-            let rays = halves.iter().flat_map(|dv| halves.iter().map(move |du| (*du, *dv)));
-            rays.map(|(du, dv)| shade(x as f64 + du, y as f64 + dv)).sum::<f64>() as f32 / 4.0
-        });
-        Pixels { size: [640, 480], channels: vec![grid.clone(), grid.clone(), grid] }
-    }
-
     fn close(board: &str, first: u32, camera_from_board: &Isometry3<f64>) {
         let board = Board::parse(board).expect("a board");
-        let found = board.camera_from_board(&[picture(&board, first, camera_from_board)], &LENS).expect("a pose");
+        let found = board
+            .camera_from_board(&[picture(&board, first, camera_from_board, &LENS, &Distortion::NONE)], &LENS)
+            .expect("a pose");
         let off = (found.translation.vector - camera_from_board.translation.vector).norm();
         let angle = found.rotation.angle_to(&camera_from_board.rotation);
         assert!(off < 3e-3 && angle < 0.01, "{off} m and {angle} rad off");

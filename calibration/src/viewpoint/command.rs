@@ -5,7 +5,8 @@ use super::board::Board;
 use super::fit::{Fit, Method, fit};
 use super::frame::Frame;
 use super::lens::Lens;
-use super::picture::{Moment, Pixels};
+use super::moment::Moment;
+use super::picture::Pixels;
 use super::search::Reach;
 use super::shape::Shape;
 use super::{overlay, refine, session, start, step};
@@ -15,6 +16,7 @@ use shared_mem::cell::{Camera, CameraPose, Cell, Intrinsics, Robot};
 use shared_mem::ending;
 use shared_mem::frames::{Base, Camera as CameraFrame, Pose as FramePose};
 use shared_mem::input;
+use shared_mem::lens::calibration::Calibration;
 use shared_mem::output::Destination;
 use shared_mem::recording::{PictureKind, Session, write_png_to};
 use shared_mem::toml_file;
@@ -197,6 +199,7 @@ fn prepared(options: &Options) -> anyhow::Result<Prepared> {
 fn of_pictures(options: &Options, cell: Cell, taken: Vec<Taken>) -> anyhow::Result<Prepared> {
     let mut warnings = Vec::new();
     let camera = camera(&cell, options, &taken)?;
+    warnings.extend(own_camera(&taken)?.and_then(|own| own.remark()));
     let lens = Lens::new(&camera.pinhole());
     let surface = RobotSurface::new(&cell, options.hand)?;
     ensure!(
@@ -248,24 +251,38 @@ fn gather(options: &Options, kind: PictureKind) -> anyhow::Result<(Cell, Vec<Tak
         if kind == PictureKind::Color { "colour" } else { "depth" }
     );
     let taken = shots.into_iter().map(|shot| {
-        let moment = Moment { q: shot.q, size: None, pinhole: None, distortion: [0.0; 5] };
+        let moment = Moment { q: shot.q, camera: None };
         Taken { name: shot.name, pixels: shot.pixels, moment }
     });
     Ok((session.cell, taken.collect()))
+}
+
+/// The camera that files beside the pictures name: one for all of them.
+fn own_camera(taken: &[Taken]) -> anyhow::Result<Option<Calibration>> {
+    let mut said = taken.iter().filter_map(|picture| Some((picture, picture.moment.camera?)));
+    let Some((first, camera)) = said.next() else { return Ok(None) };
+    let other = said.find(|(_, other)| *other != camera);
+    ensure!(
+        other.is_none(),
+        "the camera of {} differs from that of {}: give pictures of one camera",
+        other.map_or("", |(picture, _)| picture.name.as_str()),
+        first.name
+    );
+    Ok(Some(camera))
 }
 
 /// The camera whose intrinsics hold for the pictures.
 fn camera(cell: &Cell, options: &Options, taken: &[Taken]) -> anyhow::Result<Camera> {
     let mut camera = cell.camera.clone().unwrap_or_default();
     let first = taken.first().context("no pictures")?;
-    let given = options.intrinsics.or(first.moment.pinhole);
+    let own = own_camera(taken)?;
     let mut size = [camera.width as usize, camera.height as usize];
-    if let Some([fx, fy, cx, cy]) = given {
+    if let Some([fx, fy, cx, cy]) = options.intrinsics.or(own.map(|own| own.pinhole)) {
         ensure!(fx > 0.0 && fy > 0.0, "focal lengths must be above 0, not {fx} and {fy}");
-        size = first.moment.size.unwrap_or(first.pixels.size);
+        size = own.and_then(|own| own.size).unwrap_or(first.pixels.size);
         camera.intrinsics = Some(Intrinsics { fx, fy, cx, cy });
-        if first.moment.pinhole.is_some() {
-            camera.distortion = first.moment.distortion;
+        if let Some(own) = own {
+            camera.distortion = own.distortion;
         }
     } else if cell.camera.is_none() {
         bail!("no intrinsics: give --cell with a `[camera]`, --intrinsics fx,fy,cx,cy, or a joint file with `K`");

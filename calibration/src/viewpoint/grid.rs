@@ -1,6 +1,7 @@
 //! A picture of one number a pixel, row by row; pixel centres lie at whole numbers.
 
-use super::lens::{Lens, distorted};
+use super::lens::Lens;
+use shared_mem::lens::Distortion;
 
 /// The picture.
 #[derive(Debug, Clone, PartialEq)]
@@ -77,24 +78,24 @@ impl Grid {
     /// What a lens without distortion and otherwise the same numbers would have shown; `outside` where the picture has
     /// nothing to show.
     #[must_use]
-    pub fn undistorted(self, lens: &Lens, distortion: &[f64; 5], outside: f32) -> Self {
-        if distortion.iter().all(|k| *k == 0.0) {
+    pub fn undistorted(self, lens: &Lens, distortion: &Distortion, outside: f32) -> Self {
+        if !distortion.is_bent() {
             return self;
         }
         Self::from_fn(self.width, self.height, |x, y| {
-            let [u, v] = distorted(lens, distortion, [x as f64, y as f64]);
+            let [u, v] = lens.bent(distortion, [x as f64, y as f64]);
             self.sample(u, v).map_or(outside, |value| value as f32)
         })
     }
 
     /// The same of numbers between which there is nothing: every pixel shows the one that lies nearest, 0 outside.
     #[must_use]
-    pub fn undistorted_nearest(self, lens: &Lens, distortion: &[f64; 5]) -> Self {
-        if distortion.iter().all(|k| *k == 0.0) {
+    pub fn undistorted_nearest(self, lens: &Lens, distortion: &Distortion) -> Self {
+        if !distortion.is_bent() {
             return self;
         }
         Self::from_fn(self.width, self.height, |x, y| {
-            let [u, v] = distorted(lens, distortion, [x as f64, y as f64]).map(f64::round);
+            let [u, v] = lens.bent(distortion, [x as f64, y as f64]).map(f64::round);
             let inside = u >= 0.0 && v >= 0.0 && u < self.width as f64 && v < self.height as f64;
             if inside { self.at(u as usize, v as usize) } else { 0.0 }
         })

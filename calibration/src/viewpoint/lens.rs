@@ -1,7 +1,8 @@
-//! How the camera projects: a pinhole, and the lens in front of it as Brown and Conrady describe it.
+//! How the camera projects: a pinhole, and the lens in front of it.
 
 use nalgebra::Point3;
 use shared_mem::cell::Intrinsics;
+use shared_mem::lens::Distortion;
 use twin::render::Pinhole;
 
 /// A pinhole [pixel]; the optical frame looks along z, x right, y down.
@@ -33,22 +34,30 @@ impl Lens {
         [self.focal[0] * p.x / p.z + self.centre[0], self.focal[1] * p.y / p.z + self.centre[1]]
     }
 
+    /// Where a lens that bends shows what the pinhole alone would put at `pixel`.
+    #[must_use]
+    pub fn bent(&self, distortion: &Distortion, pixel: [f64; 2]) -> [f64; 2] {
+        let [x, y] = self.plane(pixel);
+        let seen = distortion.bend(x, y).0;
+        [0, 1].map(|i| self.focal[i] * seen[i] + self.centre[i])
+    }
+
+    /// The way back; `None` where the lens shows nothing at `pixel`.
+    #[must_use]
+    pub fn straight(&self, distortion: &Distortion, pixel: [f64; 2]) -> Option<[f64; 2]> {
+        let plane = distortion.straight(self.plane(pixel))?;
+        Some([0, 1].map(|i| self.focal[i] * plane[i] + self.centre[i]))
+    }
+
+    /// A pixel's place in the plane z = 1.
+    fn plane(&self, pixel: [f64; 2]) -> [f64; 2] {
+        [0, 1].map(|i| (pixel[i] - self.centre[i]) / self.focal[i])
+    }
+
     /// For the rasteriser.
     #[must_use]
     pub fn pinhole(&self) -> Pinhole {
         let [fx, fy, cx, cy] = [self.focal[0], self.focal[1], self.centre[0], self.centre[1]].map(|value| value as f32);
         Pinhole { fx, fy, cx, cy }
     }
-}
-
-/// Where the lens with the coefficients k1, k2, p1, p2, k3 puts what the pinhole alone would put at `pixel`
-/// (Brown 1971, with the signs and the order of OpenCV).
-#[must_use]
-pub fn distorted(lens: &Lens, [k1, k2, p1, p2, k3]: &[f64; 5], pixel: [f64; 2]) -> [f64; 2] {
-    let [x, y] = [0, 1].map(|i| (pixel[i] - lens.centre[i]) / lens.focal[i]);
-    let r2 = x * x + y * y;
-    let radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3));
-    let dx = 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x);
-    let dy = p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y;
-    [lens.focal[0] * (x * radial + dx) + lens.centre[0], lens.focal[1] * (y * radial + dy) + lens.centre[1]]
 }

@@ -4,7 +4,7 @@
 //! | module | owns |
 //! |---|---|
 //! | [`command`], [`answer`], [`overlay`] | what was asked, what is said, the picture with the outline |
-//! | [`picture`], [`session`] | pictures, masks, differences, joints: from files and from clips |
+//! | [`picture`], [`moment`], [`session`] | pictures, masks, differences, joints: from files and from clips |
 //! | [`depth`] | the robot in a depth picture without one of the empty cell |
 //! | [`frame`] | one picture with its joints, at three resolutions |
 //! | [`silhouette`], [`photo`], [`pull`], `profile` | what a mask and what a photo without one say about the outline, and where an edge lies between pixels |
@@ -28,6 +28,7 @@ pub mod grid;
 pub mod interval;
 pub mod lattice;
 pub mod lens;
+pub mod moment;
 pub mod outline;
 pub mod overlay;
 pub mod photo;
@@ -44,5 +45,7 @@ pub mod silhouette;
 pub mod start;
 pub mod step;
 
+#[cfg(test)]
+pub(crate) mod test_board;
 #[cfg(test)]
 mod tests;

@@ -5,8 +5,8 @@ use super::depth;
 use super::frame::Evidence;
 use super::grid::Grid;
 use super::lens::Lens;
-use anyhow::{Context as _, ensure};
-use shared_mem::input;
+use anyhow::ensure;
+use shared_mem::lens::Distortion;
 use shared_mem::msg::image::{ImageHeader, PixelEncoding};
 use shared_mem::recording::{Picture, read_picture};
 use std::path::Path;
@@ -80,7 +80,10 @@ impl Pixels {
 
     /// Free of the lens's distortion; what lies outside of the picture is black.
     #[must_use]
-    pub fn undistorted(self, lens: &Lens, distortion: &[f64; 5]) -> Self {
+    pub fn undistorted(self, lens: &Lens, distortion: &Distortion) -> Self {
+        if !distortion.is_bent() {
+            return self;
+        }
         let is_depth = self.is_depth();
         let flat = |grid: Grid| {
             // Between two depths there is nothing.
@@ -156,52 +159,4 @@ fn checked(share: Grid, name: &str, what: &str) -> anyhow::Result<Evidence> {
     ensure!(covered >= COVERED.start, "{name}: nothing to fit: no pixel of it {what}");
     ensure!(covered <= COVERED.end, "{name}: nothing to fit: all of it {what}");
     Ok(Evidence::Mask(share))
-}
-
-/// Joint positions and, where the file tells them, intrinsics.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Moment {
-    /// Joint positions [rad].
-    pub q: Vec<f64>,
-    /// Columns and rows that `pinhole` and `distortion` are for.
-    pub size: Option<[usize; 2]>,
-    /// fx, fy, cx, cy [pixel].
-    pub pinhole: Option<[f64; 4]>,
-    /// k1, k2, p1, p2, k3.
-    pub distortion: [f64; 5],
-}
-
-impl Moment {
-    /// From numbers with commas between them, or from a JSON file: a list of joint positions, or an object with `q`, or
-    /// with `states` (each with `q`) and `nearest_state_index`; beside them `K`, `D`, `width` and `height` as ROS names
-    /// them.
-    ///
-    /// # Errors
-    /// When it is neither, with what was expected.
-    pub fn parse(text: &str) -> anyhow::Result<Self> {
-        let numbers: Result<Vec<f64>, _> = text.split(',').map(|part| part.trim().parse::<f64>()).collect();
-        if let Ok(q) = numbers {
-            return Ok(Self { q, size: None, pinhole: None, distortion: [0.0; 5] });
-        }
-        let file = input::bytes(Path::new(text), input::Kind::List)
-            .with_context(|| format!("{text} is neither numbers with commas between them nor a readable JSON file"))?;
-        let value: serde_json::Value = serde_json::from_slice(&file).with_context(|| format!("{text} is no JSON"))?;
-        let numbers = |value: &serde_json::Value| -> Option<Vec<f64>> {
-            value.as_array()?.iter().map(serde_json::Value::as_f64).collect()
-        };
-        let at = value.get("nearest_state_index").and_then(serde_json::Value::as_u64).unwrap_or(0) as usize;
-        let state = value.get("states").and_then(|states| states.get(at));
-        let q = numbers(&value).or_else(|| numbers(value.get("q")?)).or_else(|| numbers(state?.get("q")?));
-        let q = q.with_context(|| {
-            format!("{text} holds no joint positions: give a list of numbers or an object with `q`")
-        })?;
-        let count = |key: &str| value.get(key)?.as_u64().map(|n| n as usize);
-        let k = value.get("K").and_then(numbers).filter(|k| k.len() == 9);
-        let mut distortion = [0.0; 5];
-        for (to, from) in distortion.iter_mut().zip(value.get("D").and_then(numbers).unwrap_or_default()) {
-            *to = from;
-        }
-        let size = count("width").zip(count("height")).map(|(width, height)| [width, height]);
-        Ok(Self { q, size, pinhole: k.map(|k| [k[0], k[4], k[2], k[5]]), distortion })
-    }
 }

@@ -4,6 +4,7 @@
 //! everywhere there, and every plane is linear in it.
 
 use nalgebra::{Isometry3, Vector3};
+use shared_mem::lens::Distortion;
 use shared_mem::msg::image::{CameraInfo, ImageHeader, PixelEncoding};
 use twin::render::Pinhole;
 
@@ -34,7 +35,8 @@ impl View {
         if !(fx > 0.0 && fy > 0.0 && width > 0 && height > 0) {
             return None;
         }
-        let source = info.distortion.iter().any(|k| *k != 0.0).then(|| undistorted(info));
+        let lens = Distortion::brown(info.distortion);
+        let source = lens.is_bent().then(|| undistorted(info, &lens));
         Some(Self { width, height, pinhole: Pinhole { fx, fy, cx, cy }, base_from_camera: pose.isometry(), source })
     }
 
@@ -70,19 +72,14 @@ impl View {
     }
 }
 
-/// Brown and Conrady's lens, for every pixel of the picture that a pinhole would have taken.
-fn undistorted(info: &CameraInfo) -> Vec<u32> {
+/// For every pixel of the picture that a pinhole would have taken.
+fn undistorted(info: &CameraInfo, lens: &Distortion) -> Vec<u32> {
     let [fx, fy, cx, cy] = info.intrinsics;
-    let [k1, k2, p1, p2, k3] = info.distortion;
     let mut source = Vec::with_capacity((info.width * info.height) as usize);
     for v in 0..info.height {
         for u in 0..info.width {
-            let (x, y) = ((f64::from(u) - cx) / fx, (f64::from(v) - cy) / fy);
-            let r2 = x * x + y * y;
-            let radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3));
-            let seen_x = x * radial + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x);
-            let seen_y = y * radial + p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y;
-            let (column, row) = ((seen_x * fx + cx).round(), (seen_y * fy + cy).round());
+            let seen = lens.bend((f64::from(u) - cx) / fx, (f64::from(v) - cy) / fy).0;
+            let (column, row) = ((seen.x * fx + cx).round(), (seen.y * fy + cy).round());
             let inside = (0.0..f64::from(info.width)).contains(&column) && (0.0..f64::from(info.height)).contains(&row);
             source.push(if inside { row as u32 * info.width + column as u32 } else { OUTSIDE });
         }

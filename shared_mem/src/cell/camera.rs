@@ -2,6 +2,7 @@
 
 use super::within;
 use crate::frames::{Base, Camera as CameraFrame, Pose};
+use crate::lens::Distortion;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -21,15 +22,27 @@ pub struct Camera {
     /// Pinhole; absent: a D455's colour camera, scaled to the picture's size.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub intrinsics: Option<Intrinsics>,
-    /// Brown-Conrady k1, k2, p1, p2, k3.
+    /// k1, k2, p1, p2, k3, with k4, k5, k6 behind them of OpenCV's rational model; `{ fisheye = [k1, k2, k3, k4] }` of a fisheye.
     #[serde(default)]
-    pub distortion: [f64; 5],
+    #[schemars(with = "WrittenDistortion")]
+    pub distortion: Distortion,
     /// Where the camera stands.
     #[serde(default)]
     pub pose: CameraPose,
     /// From the picture to its pose becoming known [s].
     #[serde(default)]
     pub latency: f64,
+}
+
+/// How a [`Distortion`] is written.
+#[derive(Serialize, JsonSchema)]
+#[serde(untagged)]
+#[allow(dead_code, reason = "only its schema is used")]
+enum WrittenDistortion {
+    /// Five numbers, or eight.
+    Polynomial(Vec<f64>),
+    /// Four numbers by name.
+    Fisheye { fisheye: [f64; 4] },
 }
 
 /// Pinhole intrinsics [pixel].
@@ -80,7 +93,7 @@ impl Default for Camera {
             height: default_height(),
             rate: default_rate(),
             intrinsics: None,
-            distortion: [0.0; 5],
+            distortion: Distortion::NONE,
             pose: CameraPose::default(),
             latency: 0.0,
         }

@@ -77,7 +77,8 @@ pub use npy::{Array, ArrayError, parse as parse_npy};
 pub use own::{read_arm_states, read_clip_info};
 pub use picture::Picture;
 pub use picture_file::{
-    pack_picture, pack_quickly, pack_with_alpha, read_alpha, read_picture, unpack_picture, write_png, write_png_to,
+    pack_picture, pack_quickly, pack_with_alpha, picture_size, read_alpha, read_picture, unpack_picture, write_png,
+    write_png_to,
 };
 pub use pictures::{PictureKind, for_pictures};
 pub use provenance::{ClipOrigins, Provenance, read_origins};

@@ -24,6 +24,16 @@ pub fn read_picture(path: &Path) -> Result<Picture, ReadError> {
     unpack_picture(&bytes, 0).map_err(|what| ReadError::kind(path, what))
 }
 
+/// Columns and rows of a PNG or JPEG file.
+///
+/// # Errors
+/// As [`read_picture`].
+pub fn picture_size(path: &Path) -> Result<[u32; 2], ReadError> {
+    let bytes = input::bytes(path, input::Kind::Picture)?;
+    let size = if bytes.starts_with(b"\x89PNG") { png_size(&bytes) } else { jpeg_size(&bytes) };
+    size.map_err(|what| ReadError::kind(path, what))
+}
+
 /// Opacity of each pixel of a PNG file, row by row, 0 to 255; `None` where the picture has no alpha channel.
 ///
 /// # Errors
@@ -42,33 +52,55 @@ pub fn unpack_picture(bytes: &[u8], stamp_ns: u64) -> Result<Picture, String> {
     if bytes.starts_with(b"\x89PNG") {
         return unpack_png(bytes, stamp_ns);
     }
-    if bytes.starts_with(&[0xff, 0xd8]) {
-        return unpack_jpeg(bytes, stamp_ns);
-    }
-    Err("is neither a PNG nor a JPEG picture".into())
+    unpack_jpeg(bytes, stamp_ns)
 }
 
-fn unpack_jpeg(bytes: &[u8], stamp_ns: u64) -> Result<Picture, String> {
+/// A JPEG of which the header is read, and its columns and rows.
+fn opened_jpeg(bytes: &[u8]) -> Result<(JpegDecoder<ZCursor<&[u8]>>, [u32; 2]), String> {
     let options = DecoderOptions::default()
         .jpeg_set_out_colorspace(ColorSpace::RGB)
         .set_max_width(LONGEST)
         .set_max_height(LONGEST)
         .set_strict_mode(true);
+    if !bytes.starts_with(&[0xff, 0xd8]) {
+        return Err("is neither a PNG nor a JPEG picture".into());
+    }
     let mut decoder = JpegDecoder::new_with_options(ZCursor::new(bytes), options);
-    let fail = |error: zune_jpeg::errors::DecodeErrors| format!("the JPEG is damaged ({error})").replace('\n', " ");
-    decoder.decode_headers().map_err(fail)?;
+    decoder.decode_headers().map_err(damaged_jpeg)?;
     let (width, height) = decoder.dimensions().ok_or("the JPEG is damaged (it tells no size)")?;
-    check_size(u32::try_from(width).unwrap_or(u32::MAX), u32::try_from(height).unwrap_or(u32::MAX))?;
-    let pixels = decoder.decode().map_err(fail)?;
-    if pixels.len() != width * height * 3 {
+    let size = [width, height].map(|side| u32::try_from(side).unwrap_or(u32::MAX));
+    check_size(size[0], size[1])?;
+    Ok((decoder, size))
+}
+
+fn damaged_jpeg(error: zune_jpeg::errors::DecodeErrors) -> String {
+    format!("the JPEG is damaged ({error})").replace('\n', " ")
+}
+
+fn jpeg_size(bytes: &[u8]) -> Result<[u32; 2], String> {
+    Ok(opened_jpeg(bytes)?.1)
+}
+
+/// Of the header's first part, which stands at one place in every PNG.
+fn png_size(bytes: &[u8]) -> Result<[u32; 2], String> {
+    let number = |at: usize| bytes.get(at..at + 4)?.try_into().ok().map(u32::from_be_bytes);
+    let size = number(16).zip(number(20)).ok_or("the PNG is cut short")?;
+    check_size(size.0, size.1)?;
+    Ok([size.0, size.1])
+}
+
+fn unpack_jpeg(bytes: &[u8], stamp_ns: u64) -> Result<Picture, String> {
+    let (mut decoder, [width, height]) = opened_jpeg(bytes)?;
+    let pixels = decoder.decode().map_err(damaged_jpeg)?;
+    if pixels.len() != width as usize * height as usize * 3 {
         return Err(format!("a picture of {width} x {height} pixels holds {} bytes", pixels.len()));
     }
     let header = ImageHeader {
         stamp_ns,
         device_ns: stamp_ns,
-        width: width as u32,
-        height: height as u32,
-        stride: width as u32 * 3,
+        width,
+        height,
+        stride: width * 3,
         encoding: PixelEncoding::Rgb8,
         stamp_domain: StampDomain::SystemTime,
         ..ImageHeader::default()

@@ -3,6 +3,8 @@
 //! Units are those of the definitions: rad, rad/s, N m, m; quaternions are `x, y, z, w` on the wire and `w, x, y, z` here.
 
 use super::cdr::{CdrError, CdrReader};
+use crate::lens::Distortion;
+use crate::lens::coefficients::of_list;
 use crate::msg::image::CameraInfo;
 
 /// Type names of the messages that are told apart by type alone.
@@ -157,15 +159,14 @@ impl<'a> CameraCalibration<'a> {
 
     /// As the project's payload; a sentence for a lens that five coefficients do not describe. The pose is not known.
     pub(super) fn camera_info(&self) -> Result<CameraInfo, String> {
-        let (used, beyond) = self.d.split_at_checked(5).unwrap_or((&self.d, &[]));
-        let bent = self.d.iter().any(|d| *d != 0.0);
-        if beyond.iter().any(|d| *d != 0.0) || (bent && !matches!(self.model, "plumb_bob" | "rational_polynomial")) {
-            return Err(format!("the lens model `{}` is not plumb_bob; calibrate with plumb_bob", self.model));
-        }
-        let mut distortion = [0.0; 5];
-        for (out, d) in distortion.iter_mut().zip(used) {
-            *out = *d;
-        }
+        let is_bent = self.d.iter().any(|d| *d != 0.0);
+        let lens = if is_bent { of_list(Some(self.model), &self.d)? } else { Distortion::NONE };
+        let distortion = lens.as_brown().ok_or_else(|| {
+            format!(
+                "the lens model `{}` has more than the five numbers of plumb_bob; calibrate with plumb_bob",
+                self.model
+            )
+        })?;
         let [fx, _, cx, _, fy, cy, ..] = self.k;
         let intrinsics = [fx, fy, cx, cy];
         Ok(CameraInfo {

@@ -4,7 +4,6 @@ use super::blend::Sums;
 use super::tiles::{Drawn, normal};
 use super::{COLOR_PLANE, Parameters};
 use crate::harmonics::{slopes, values};
-use crate::lens::{bend, bend_curvature};
 use crate::project::{Bell, View, Way, unit};
 use crate::real::Real;
 use nalgebra::{Matrix2, Matrix2x3, Matrix3, Vector2, Vector3};
@@ -87,7 +86,7 @@ fn slope_back<T: Real>(view: &View<T>, way: &Way<T>, g: &Matrix2x3<T>) -> Vector
     let [x, y] = way.held;
     let bent = g * way.divided.transpose();
     let divided = way.bent.transpose() * g;
-    let [over_x, over_y] = bend_curvature(&view.distortion, x, y);
+    let [over_x, over_y] = view.distortion.curvature(x, y);
     let mut held = [bent.dot(&over_x) - divided[(0, 2)] * inverse, bent.dot(&over_y) - divided[(1, 2)] * inverse];
     let mut over_inverse = divided[(0, 0)] + divided[(1, 1)] - divided[(0, 2)] * x - divided[(1, 2)] * y;
     // What is held at an end does not follow the centre.
@@ -100,7 +99,7 @@ fn slope_back<T: Real>(view: &View<T>, way: &Way<T>, g: &Matrix2x3<T>) -> Vector
 fn pixel_back<T: Real>(view: &View<T>, way: &Way<T>, g: &Vector2<T>) -> Vector3<T> {
     let inverse = way.divided[(0, 0)];
     let (x, y) = (way.at.x * inverse, way.at.y * inverse);
-    let plane = bend(&view.distortion, x, y).1.transpose() * g * inverse;
+    let plane = view.distortion.bend(x, y).1.transpose() * g * inverse;
     Vector3::new(plane.x, plane.y, -(plane.x * x + plane.y * y))
 }
 

@@ -6,9 +6,11 @@ use crate::reference::{Body, Shape, Surroundings, render};
 use nalgebra::{Translation3, UnitQuaternion, Vector3};
 use rand::{RngExt as _, SeedableRng as _};
 use rand_pcg::Pcg64Mcg;
+use shared_mem::lens::Distortion;
 
 const SIZE: [usize; 2] = [53, 37];
-const LENS: Lens = Lens { focal: [60.0, 57.0], centre: [25.3, 18.8], distortion: [-0.08, 0.04, 6e-4, -4e-4, 0.01] };
+const LENS: Lens =
+    Lens { focal: [60.0, 57.0], centre: [25.3, 18.8], distortion: Distortion::brown([-0.08, 0.04, 6e-4, -4e-4, 0.01]) };
 
 /// Splats before a camera, some beyond the picture's edges.
 fn scene(count: usize, seed: u64) -> (Parameters<f64>, Isometry3<f64>) {

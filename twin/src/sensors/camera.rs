@@ -15,6 +15,7 @@ use crate::sim::SimError;
 use crate::sim::generator;
 use nalgebra::{Isometry3, Vector3};
 use shared_mem::cell::{Camera, CameraPose, Cell};
+use shared_mem::lens::Distortion;
 use shared_mem::msg::image::{CameraInfo, ImageHeader, PixelEncoding, StampDomain};
 use splat::{Lens, Picture, read_links};
 use std::path::Path;
@@ -105,7 +106,8 @@ impl SimCamera {
     /// [`ViewError`] when the splats cannot be used, or who shall draw cannot.
     pub fn with_splats(mut self, cell: &Cell, folder: &Path, drawer: Drawer) -> Result<Self, ViewError> {
         let pinhole = self.settings.pinhole();
-        let lens = Lens { focal: [pinhole.fx, pinhole.fy], centre: [pinhole.cx, pinhole.cy], distortion: [0.0; 5] };
+        let lens =
+            Lens { focal: [pinhole.fx, pinhole.fy], centre: [pinhole.cx, pinhole.cy], distortion: Distortion::NONE };
         let view = (lens, [self.settings.width as usize, self.settings.height as usize]);
         if let Some(robot) = &self.robot {
             let scans = read_links(folder)?.into_iter();

@@ -172,10 +172,7 @@ impl File {
         );
         let middle = [0.5 * f64::from(camera.width - 1), 0.5 * f64::from(camera.height - 1)];
         let off = (pinhole.cx - middle[0]).abs().max((pinhole.cy - middle[1]).abs());
-        if off > 1.0
-            || (pinhole.fx - pinhole.fy).abs() > 1e-3 * pinhole.fy
-            || camera.distortion.iter().any(|k| *k != 0.0)
-        {
+        if off > 1.0 || (pinhole.fx - pinhole.fy).abs() > 1e-3 * pinhole.fy || camera.distortion.is_bent() {
             self.sheet.lacks(
                 "the camera's principal point, distortion and unequal focal lengths",
                 "fovy stands for a pinhole in the middle of the picture: correct the pictures instead",

@@ -4,6 +4,7 @@
 //! Source: librealsense, `rs2_deproject_pixel_to_point`, `RS2_DISTORTION_INVERSE_BROWN_CONRADY`.
 
 use nalgebra::{Matrix5, Vector5};
+use shared_mem::lens::Distortion;
 
 /// Points along a row and a column that the fit looks at.
 const POINTS: u32 = 24;
@@ -17,7 +18,8 @@ pub(super) fn inverted(inverse: &[f64; 5], pinhole: [f64; 4], [width, height]: [
         for column in 0..=POINTS {
             let share = |i: u32, size: u32| f64::from(i) / f64::from(POINTS) * f64::from(size - 1);
             let (xd, yd) = ((share(column, width) - cx) / fx, (share(row, height) - cy) / fy);
-            let (x, y) = bent(inverse, xd, yd);
+            let bent = Distortion::brown(*inverse).bend(xd, yd).0;
+            let (x, y) = (bent.x, bent.y);
             // What distortion adds is linear in its coefficients.
             let r2 = x * x + y * y;
             let along_x = Vector5::new(x * r2, x * r2 * r2, 2.0 * x * y, r2 + 2.0 * x * x, x * r2.powi(3));
@@ -31,13 +33,6 @@ pub(super) fn inverted(inverse: &[f64; 5], pinhole: [f64; 4], [width, height]: [
     square.cholesky().map_or([0.0; 5], |square| square.solve(&right).into())
 }
 
-/// Brown and Conrady's formula.
-fn bent([k1, k2, p1, p2, k3]: &[f64; 5], x: f64, y: f64) -> (f64, f64) {
-    let r2 = x * x + y * y;
-    let radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3));
-    (x * radial + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x), y * radial + p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -49,9 +44,9 @@ mod tests {
         let forward = inverted(&inverse, pinhole, [640, 480]);
         for (u, v) in [(0.0, 0.0), (639.0, 479.0), (100.0, 400.0), (320.0, 10.0)] {
             let (xd, yd) = ((u - pinhole[2]) / pinhole[0], (v - pinhole[3]) / pinhole[1]);
-            let (x, y) = bent(&inverse, xd, yd);
-            let (back_x, back_y) = bent(&forward, x, y);
-            let off = (back_x - xd).hypot(back_y - yd) * pinhole[0];
+            let there = Distortion::brown(inverse).bend(xd, yd).0;
+            let back = Distortion::brown(forward).bend(there.x, there.y).0;
+            let off = (back.x - xd).hypot(back.y - yd) * pinhole[0];
             assert!(off < 0.1, "{off} pixels at {u}, {v}");
         }
         assert_eq!(inverted(&[0.0; 5], pinhole, [640, 480]), [0.0; 5]);

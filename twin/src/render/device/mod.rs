@@ -155,6 +155,7 @@ fn wait<T>(future: impl Future<Output = T>) -> T {
 mod tests {
     use super::*;
     use nalgebra::{Point3, UnitQuaternion, Vector3};
+    use shared_mem::lens::Distortion;
     use splat::{Lens, Shape, Splat, SplatCloud};
 
     #[test]
@@ -176,7 +177,7 @@ mod tests {
             opacity: 0.5,
         };
         let cloud = |count| SplatCloud { splats: vec![splat; count], degree: 0, harmonics: vec![[0.0; 3]; count] };
-        let lens = Lens { focal: [100.0; 2], centre: [50.0; 2], distortion: [0.0; 5] };
+        let lens = Lens { focal: [100.0; 2], centre: [50.0; 2], distortion: Distortion::NONE };
         let make = |cloud: &SplatCloud| DeviceCanvas::new(&device, &[(Shape::Splats(cloud), 1)], lens, [100, 100]);
         assert!(make(&cloud(60_000)).is_ok());
         let error = make(&cloud(70_000)).expect_err("too many").to_string();

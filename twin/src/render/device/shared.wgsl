@@ -3,9 +3,9 @@
 struct View {
     focal: vec2f,
     centre: vec2f,
-    // k1, k2, p1, p2
+    // k1, k2, p1, p2; of a fisheye k1, k2, k3, k4
     bend: vec4f,
-    // k3, and three unused
+    // k3, k4, k5, k6
     more: vec4f,
     // Ends of the held slope: left, right, top, bottom in the plane z = 1.
     held: vec4f,
@@ -20,7 +20,7 @@ struct View {
     splats: u32,
     // Room for splats in tiles.
     room: u32,
-    // Bit 0: there are meshes; bit 1: the lens bends.
+    // Bit 0: there are meshes; bit 1: the lens bends; bit 2: it is a fisheye.
     flags: u32,
     row_of_groups: u32,
     spare: vec2u,

@@ -30,21 +30,56 @@ const SPENT = 1e-4;
 
 struct Bent { at: vec2f, xx: f32, xy: f32, yy: f32 }
 
-// Brown-Conrady distortion of a point of the plane z = 1, and its slope, which is symmetric.
+// A power series of four terms over s, and its slope.
+fn series(k: vec4f, s: f32) -> vec2f {
+    return vec2f(k.x + s * (k.y + s * (k.z + s * k.w)), k.y + s * (2.0 * k.z + 3.0 * s * k.w));
+}
+
+// The factor of a polynomial lens over the square of the distance from the axis, and its slope.
+fn polynomial(s: f32) -> vec2f {
+    let above = series(vec4f(1.0, view.bend.xy, view.more.x), s);
+    let below = series(vec4f(1.0, view.more.yzw), s);
+    let factor = above.x / below.x;
+    return vec2f(factor, (above.y - factor * below.y) / below.x);
+}
+
+// The same of a fisheye: the angle over the distance, times a series over the angle's square.
+fn fisheye(s: f32) -> vec2f {
+    var near: vec2f;
+    if s < 0.05 {
+        // The quotients lose digits beside the axis.
+        near = series(vec4f(1.0, -1.0 / 3.0, 1.0 / 5.0, -1.0 / 7.0), s) + s * s * s * vec2f(s / 9.0, 4.0 / 9.0);
+    } else {
+        near.x = atan(sqrt(s)) / sqrt(s);
+        near.y = (1.0 / (1.0 + s) - near.x) / (2.0 * s);
+    }
+    let t = s * near.x * near.x;
+    let t_rise = near.x * near.x + 2.0 * s * near.x * near.y;
+    let high = series(view.bend, t);
+    let sum = vec2f(1.0 + t * high.x, (high.x + t * high.y) * t_rise);
+    return vec2f(near.x * sum.x, near.y * sum.x + near.x * sum.y);
+}
+
+// The distortion of a point of the plane z = 1, and its slope, which is symmetric.
 fn bend(p: vec2f) -> Bent {
-    let k = view.bend;
-    let k3 = view.more.x;
     let r2 = dot(p, p);
-    let radial = 1.0 + r2 * (k.x + r2 * (k.y + r2 * k3));
-    let rise = k.x + r2 * (2.0 * k.y + 3.0 * r2 * k3);
+    let is_fisheye = (view.flags & 4u) == 4u;
+    var factor: vec2f;
+    var k = view.bend.zw;
+    if is_fisheye {
+        factor = fisheye(r2);
+        k = vec2f(0.0);
+    } else {
+        factor = polynomial(r2);
+    }
     var out: Bent;
-    out.at = p * radial + vec2f(
-        2.0 * k.z * p.x * p.y + k.w * (r2 + 2.0 * p.x * p.x),
-        k.z * (r2 + 2.0 * p.y * p.y) + 2.0 * k.w * p.x * p.y,
+    out.at = p * factor.x + vec2f(
+        2.0 * k.x * p.x * p.y + k.y * (r2 + 2.0 * p.x * p.x),
+        k.x * (r2 + 2.0 * p.y * p.y) + 2.0 * k.y * p.x * p.y,
     );
-    out.xx = radial + 2.0 * p.x * p.x * rise + 2.0 * k.z * p.y + 6.0 * k.w * p.x;
-    out.xy = 2.0 * p.x * p.y * rise + 2.0 * k.z * p.x + 2.0 * k.w * p.y;
-    out.yy = radial + 2.0 * p.y * p.y * rise + 6.0 * k.z * p.y + 2.0 * k.w * p.x;
+    out.xx = factor.x + 2.0 * p.x * p.x * factor.y + 2.0 * k.x * p.y + 6.0 * k.y * p.x;
+    out.xy = 2.0 * p.x * p.y * factor.y + 2.0 * k.x * p.x + 2.0 * k.y * p.y;
+    out.yy = factor.x + 2.0 * p.y * p.y * factor.y + 6.0 * k.x * p.y + 2.0 * k.y * p.x;
     return out;
 }
 

@@ -2,6 +2,7 @@
 
 use super::upload::Part;
 use nalgebra::{Isometry3, Point3};
+use shared_mem::lens::Distortion;
 use splat::{Lens, Straight, Surroundings, slope_ends};
 
 /// Bytes of `View` and of `Body`.
@@ -25,7 +26,12 @@ pub(super) fn view_bytes(facts: &Facts<'_>) -> Vec<u8> {
     let Facts { lens, straight, around, .. } = facts;
     let [fx, fy] = lens.focal;
     let [cx, cy] = lens.centre;
-    let [k1, k2, p1, p2, k3] = lens.distortion;
+    // k1, k2, p1, p2, k3, k4, k5, k6 of a polynomial, or k1, k2, k3, k4 of a fisheye.
+    let (bend, is_fisheye) = match lens.distortion {
+        Distortion::Polynomial(eight) => (eight, false),
+        Distortion::Fisheye([k1, k2, k3, k4]) => ([k1, k2, k3, k4, 0.0, 0.0, 0.0, 0.0], true),
+    };
+    let [bend, more] = [0, 4].map(|from| [0, 1, 2, 3].map(|i| bend[from + i]));
     let [[left, right], [top, bottom]] = slope_ends(lens, facts.size);
     let [r, g, b] = around.background;
     let light = around.light.normalize();
@@ -33,8 +39,8 @@ pub(super) fn view_bytes(facts: &Facts<'_>) -> Vec<u8> {
     let mut out = Vec::with_capacity(VIEW as usize);
     let numbers = [
         [fx, fy, cx, cy],
-        [k1, k2, p1, p2],
-        [k3, 0.0, 0.0, 0.0],
+        bend,
+        more,
         [left, right, top, bottom],
         [r, g, b, 0.0],
         [light.x, light.y, light.z, 0.0],
@@ -42,7 +48,7 @@ pub(super) fn view_bytes(facts: &Facts<'_>) -> Vec<u8> {
     ];
     numbers.iter().flatten().for_each(|number| out.extend((*number as f32).to_ne_bytes()));
     let [size, straight_size] = [facts.size, straight.size].map(|size| size.map(|pixels| pixels as u32));
-    let flags = u32::from(facts.has_meshes) | u32::from(!straight.lookup.is_empty()) << 1;
+    let flags = u32::from(facts.has_meshes) | u32::from(!straight.lookup.is_empty()) << 1 | u32::from(is_fisheye) << 2;
     let words = [size, facts.tiles, straight_size, [facts.splats, facts.room], [flags, facts.row_of_groups], [0, 0]];
     words.iter().flatten().for_each(|word| out.extend(word.to_ne_bytes()));
     out
