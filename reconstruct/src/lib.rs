@@ -3,6 +3,7 @@
 //!
 //! | module | owns |
 //! |---|---|
+//! | `remark` | what is said beside a result |
 //! | [`scan`] | pictures, masks, depth, poses; COLMAP, nerfstudio, robot-held cameras |
 //! | [`field`] | signed distance and colour at the nodes of a box |
 //! | `sweep` | signed distance from signs |
@@ -23,8 +24,11 @@ mod closing;
 pub mod field;
 pub mod mesh;
 pub mod object;
+mod remark;
 pub mod scan;
 pub mod scene;
 mod splats;
 mod sweep;
 pub mod views;
+
+pub use remark::Remark;

@@ -1,6 +1,6 @@
 //! Splats of a scan: photographs as they are trained on, the picture of a cloud, and how near it comes.
 
-use crate::scan::{self, Camera, Frame};
+use crate::scan::{Camera, Frame};
 use nalgebra::{Isometry3, Vector3};
 use shared_mem::ending;
 use shared_mem::progress::Progress;
@@ -15,12 +15,7 @@ const ROOM: usize = 12;
 
 /// A camera as splats are drawn with: the middle of its first pixel is (0, 0).
 fn lens(camera: &Camera) -> Lens {
-    let distortion = match camera.lens {
-        scan::Lens::Straight => [0.0; 5],
-        scan::Lens::Radial([k1, k2]) => [k1, k2, 0.0, 0.0, 0.0],
-        scan::Lens::OpenCv([k1, k2, p1, p2]) => [k1, k2, p1, p2, 0.0],
-    };
-    Lens { focal: camera.focal, centre: camera.centre.map(|c| c - 0.5), distortion }
+    Lens { focal: camera.focal, centre: camera.centre.map(|c| c - 0.5), distortion: camera.lens }
 }
 
 /// A view from a pose (scan from camera), for the splats of what its mask shows: the part of the picture around the mask.

@@ -1,8 +1,8 @@
 //! Views as all reconstructions read them: all at once, those that are blurred left out, every eighth held out.
 
+use crate::remark::Remark;
 use crate::scan::{Frame, Scan, ScanError};
 use rayon::prelude::*;
-use serde::Serialize;
 use shared_mem::ending;
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -10,10 +10,6 @@ use std::sync::atomic::{AtomicU64, Ordering};
 const HOLD_OUT: usize = 8;
 /// A view is blurred whose detail is so much weaker than the middle of all views'.
 const BLURRED: f64 = 0.25;
-
-/// Something that a person should know about the result.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
-pub struct Remark(pub String);
 
 /// Whether a view takes no part and shows how good the result is.
 pub(crate) fn is_held_out(number: usize) -> bool {

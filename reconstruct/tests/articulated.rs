@@ -5,7 +5,8 @@ mod states;
 use nalgebra::{Isometry3, Point3, Unit, Vector3};
 use reconstruct::articulated::{Articulated, ArticulatedError, Joint, MarkedView, between, marked};
 use reconstruct::mesh::Mesh;
-use reconstruct::scan::{Camera, Lens};
+use reconstruct::scan::Camera;
+use shared_mem::lens::Distortion;
 use states::{Kind, State, kinds};
 
 /// What was found beside the truth.
@@ -114,7 +115,7 @@ fn ten_states_of_a_box_with_a_lid() {
 
 /// A picture of a state from a place in the object's frame, with the part marked.
 fn view(kind: &Kind, state: &State, eye: Point3<f64>, axis: Option<[Point3<f64>; 2]>) -> MarkedView {
-    let camera = Camera { width: 160, height: 120, focal: [190.0; 2], centre: [80.0, 60.0], lens: Lens::Straight };
+    let camera = Camera { width: 160, height: 120, focal: [190.0; 2], centre: [80.0, 60.0], lens: Distortion::NONE };
     let pose = state.frame * Isometry3::face_towards(&eye, &Point3::new(0.08, 0.0, 0.05), &-Vector3::z());
     let is_part = |pixel: usize| {
         let [x, y] = camera.direction([(pixel % 160) as f64 + 0.5, (pixel / 160) as f64 + 0.5]);

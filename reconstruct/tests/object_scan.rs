@@ -5,9 +5,10 @@ use reconstruct::assets::{Labels, dataset_files, files};
 use reconstruct::field::{Field, Grid};
 use reconstruct::mesh::{Solid, surface};
 use reconstruct::object::{Object, ObjectError, Options, draw, forget, reconstruct};
-use reconstruct::scan::{Camera, Lens, ScaleSource, Scan};
+use reconstruct::scan::{Camera, ScaleSource, Scan};
 use serde_json::json;
 use shared_mem::ending;
+use shared_mem::lens::Distortion;
 use shared_mem::msg::image::PixelEncoding;
 use shared_mem::recording::pack_picture;
 use splat::SplatCloud;
@@ -36,9 +37,9 @@ fn ring() -> Field<f32> {
     Field { grid, distance, colour: points.iter().map(|p| colour(*p)).collect() }
 }
 
-fn camera() -> Camera {
+fn camera(lens: Distortion) -> Camera {
     let centre = [f64::from(WIDTH) / 2.0, f64::from(HEIGHT) / 2.0];
-    Camera { width: WIDTH, height: HEIGHT, focal: [FOCAL; 2], centre, lens: Lens::Straight }
+    Camera { width: WIDTH, height: HEIGHT, focal: [FOCAL; 2], centre, lens }
 }
 
 /// From all sides along a spiral, looking at the origin.
@@ -62,15 +63,20 @@ enum Poses {
     OpenGl,
 }
 
-/// Writes the scan.
+/// Writes the scan of a pinhole.
 fn write(folder: &Path, poses_are: Poses) {
+    write_through(Distortion::NONE, &json!({}), folder, poses_are);
+}
+
+/// Writes the scan of a lens, with the keys that say which.
+fn write_through(lens: Distortion, keys: &serde_json::Value, folder: &Path, poses_are: Poses) {
     let field = ring();
     let mut frames = Vec::new();
     for part in ["images", "masks", "depth"] {
         std::fs::create_dir_all(folder.join(part)).expect("a folder");
     }
     for (number, pose) in poses().enumerate() {
-        let drawn = draw(&field, &camera(), &pose);
+        let drawn = draw(&field, &camera(lens), &pose);
         let mask: Vec<u8> = drawn.opacity.iter().flat_map(|o| [if *o > 0.5 { 255 } else { 0 }; 3]).collect();
         let depth: Vec<u8> = drawn
             .depth
@@ -101,10 +107,36 @@ fn write(folder: &Path, poses_are: Poses) {
         let pose = [place.x, place.y, place.z, w, i, j, k];
         frames.push(json!({ "file_path": format!("images/{name}"), "base_from_camera": pose }));
     }
-    let scan = json!({
+    let mut scan = json!({
         "fl_x": FOCAL, "w": WIDTH, "h": HEIGHT, "depth_unit_scale_factor": 1e-4, "frames": frames
     });
+    let keys = keys.as_object().expect("keys").clone();
+    scan.as_object_mut().expect("keys").extend(keys);
     std::fs::write(folder.join("poses.json"), scan.to_string()).expect("a file");
+}
+
+#[test]
+fn a_ring_comes_out_of_pictures_through_a_fisheye_and_a_rational_lens() {
+    let (truth, _) = surface(&ring()).expect("a ring");
+    for (lens, keys) in [
+        (
+            Distortion::Fisheye([-0.2, 0.3, -0.1, 0.02]),
+            json!({ "camera_model": "OPENCV_FISHEYE", "k1": -0.2, "k2": 0.3, "k3": -0.1, "k4": 0.02 }),
+        ),
+        (
+            Distortion::Polynomial([0.1, -0.3, 1e-3, -2e-3, 0.1, 0.5, 0.2, 0.1]),
+            json!({ "k1": 0.1, "k2": -0.3, "p1": 1e-3, "p2": -2e-3, "k3": 0.1, "k4": 0.5, "k5": 0.2, "k6": 0.1 }),
+        ),
+    ] {
+        let folder = tempfile::tempdir().expect("a folder");
+        write_through(lens, &keys, folder.path(), Poses::Right);
+        let scan = Scan::open(folder.path()).expect("a scan");
+        assert!(scan.views.iter().all(|view| view.camera == camera(lens)));
+        let object = reconstruct(scan, &COARSE, &folder.path().join("ring.state")).expect("an object");
+        let volume = Solid::of(&object.fine).volume / Solid::of(&truth).volume;
+        assert!(object.topology.genus == 1 && (volume - 1.0).abs() < 0.1, "{lens:?}: {volume}");
+        assert!(object.psnr() > 26.0 && object.psnr_splats() > 28.0, "{} {}", object.psnr(), object.psnr_splats());
+    }
 }
 
 #[test]

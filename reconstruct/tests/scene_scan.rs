@@ -8,6 +8,7 @@ use reconstruct::scan::Scan;
 use reconstruct::scene::{Options, Scene, SceneError, reconstruct};
 use serde_json::json;
 use shared_mem::ending;
+use shared_mem::lens::Distortion;
 use shared_mem::msg::image::PixelEncoding;
 use shared_mem::recording::pack_picture;
 use splat::{Body, Lens, Mesh, Shape, SplatCloud, Surroundings, render};
@@ -72,7 +73,7 @@ fn write(folder: &Path, poses_are: Poses, is_blurred: bool) {
     let lens = Lens {
         focal: [FOCAL; 2],
         centre: [SIZE[0] as f64 / 2.0 - 0.5, SIZE[1] as f64 / 2.0 - 0.5],
-        distortion: [0.0; 5],
+        distortion: Distortion::NONE,
     };
     let mut random = Pcg64::seed_from_u64(3);
     for part in ["images", "depth"] {

@@ -3,8 +3,8 @@
 use super::{DENSITY, Labels};
 use crate::mesh::{Mesh, Solid, Topology};
 use crate::object::Object;
+use crate::remark::Remark;
 use crate::scan::Scale;
-use crate::views::Remark;
 use serde::Serialize;
 
 /// The numbers of an object.

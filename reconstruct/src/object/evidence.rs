@@ -142,7 +142,7 @@ pub(super) mod tests {
     use super::*;
     use crate::field::Grid;
     use crate::mesh::surface;
-    use crate::scan::Lens;
+    use shared_mem::lens::Distortion;
 
     const WIDTH: u32 = 120;
     const HEIGHT: u32 = 90;
@@ -150,7 +150,7 @@ pub(super) mod tests {
     /// Sixteen views from above of the box with its hollow.
     pub(in crate::object) fn scan() -> (Vec<Frame>, Vec<Isometry3<f64>>) {
         let centre = [f64::from(WIDTH) / 2.0, f64::from(HEIGHT) / 2.0];
-        let camera = Camera { width: WIDTH, height: HEIGHT, focal: [180.0; 2], centre, lens: Lens::Straight };
+        let camera = Camera { width: WIDTH, height: HEIGHT, focal: [180.0; 2], centre, lens: Distortion::NONE };
         let pose = |i: u32| {
             let (sin, cos) = (f64::from(i) * 2.4).sin_cos();
             let high = 0.9 - 0.06 * f64::from(i);

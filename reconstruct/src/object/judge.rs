@@ -7,9 +7,9 @@ use super::pool;
 use super::view::{Drawn, draw};
 use crate::field::{Field, Grid};
 use crate::mesh::{Islands, Mesh};
+use crate::remark::Remark;
 use crate::scan::Frame;
 use crate::splats;
-use crate::views::Remark;
 use rayon::prelude::*;
 use splat::SplatCloud;
 

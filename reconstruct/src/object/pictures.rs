@@ -1,7 +1,8 @@
 //! The views' pixels: those to learn from, those held out, and those that say nothing, each with the reason.
 
+use crate::remark::Remark;
 use crate::scan::{FEWEST_VIEWS, Frame, Scan, ScanError};
-use crate::views::{Remark, grey, is_held_out, named, read_all, spread, without_blurred};
+use crate::views::{grey, is_held_out, named, read_all, spread, without_blurred};
 
 /// Longest edge of a picture [pixel]; larger ones are reduced.
 const LONGEST: u32 = 1300;
@@ -27,7 +28,7 @@ pub(super) struct Pictures {
 /// Reads all views. `done` is called with the number of views that are read.
 pub(super) fn read(scan: &Scan, done: impl Fn(u64) + Sync) -> Result<Pictures, ScanError> {
     let frames = read_all(scan, LONGEST, |view, by| scan.frame(view, by), done)?;
-    let mut remarks = Vec::new();
+    let mut remarks = scan.remarks.clone();
     let frames = useful(frames, &mut remarks);
     if frames.len() < FEWEST_VIEWS {
         let most = remarks.iter().map(|remark| remark.0.as_str()).collect::<Vec<_>>().join("; ");

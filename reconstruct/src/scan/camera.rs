@@ -1,18 +1,8 @@
-//! Cameras of a scan: pinhole with the distortions that COLMAP and nerfstudio name. Pixels count from the upper left corner of
+//! Cameras of a scan: a pinhole behind a lens, and COLMAP's names for both. Pixels count from the upper left corner of
 //! the picture, so that the middle of its first pixel is (0.5, 0.5), as both have it. Axes: x right, y down, z forwards.
 
 use nalgebra::Point3;
-
-/// How rays bend in the lens; coefficients of COLMAP's and OpenCV's models.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Lens {
-    /// They do not.
-    Straight,
-    /// `SIMPLE_RADIAL`, `RADIAL`: k1, k2.
-    Radial([f64; 2]),
-    /// `OPENCV`: k1, k2, p1, p2.
-    OpenCv([f64; 4]),
-}
+use shared_mem::lens::Distortion;
 
 /// One camera.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -26,11 +16,8 @@ pub struct Camera {
     /// Principal point [pixel].
     pub centre: [f64; 2],
     /// Its distortion.
-    pub lens: Lens,
+    pub lens: Distortion,
 }
-
-/// Rounds of the fixed-point iteration that takes a distortion back; each gains more than a digit within the picture.
-const ROUNDS: usize = 20;
 
 impl Camera {
     /// Where a point of the camera's frame appears [pixel]; `None` behind the camera.
@@ -39,23 +26,14 @@ impl Camera {
         if point.z <= 1e-9 {
             return None;
         }
-        let [x, y] = self.lens.bent([point.x / point.z, point.y / point.z]);
-        Some([self.focal[0] * x + self.centre[0], self.focal[1] * y + self.centre[1]])
+        let seen = self.lens.bend(point.x / point.z, point.y / point.z).0;
+        Some([0, 1].map(|i| self.focal[i] * seen[i] + self.centre[i]))
     }
 
     /// Direction of the ray through a place of the picture, as x/z and y/z, distortion taken back.
     #[must_use]
     pub fn direction(&self, [u, v]: [f64; 2]) -> [f64; 2] {
-        let seen = [(u - self.centre[0]) / self.focal[0], (v - self.centre[1]) / self.focal[1]];
-        let mut straight = seen;
-        if self.lens == Lens::Straight {
-            return straight;
-        }
-        for _ in 0..ROUNDS {
-            let bent = self.lens.bent(straight);
-            straight = [straight[0] + seen[0] - bent[0], straight[1] + seen[1] - bent[1]];
-        }
-        straight
+        self.lens.direction([(u - self.centre[0]) / self.focal[0], (v - self.centre[1]) / self.focal[1]])
     }
 
     /// The same camera with a picture of fewer pixels: `by` of them in each direction become one.
@@ -77,14 +55,33 @@ impl Camera {
     /// A sentence for a model that is not known here, or too few parameters.
     pub fn from_colmap(model: &str, [width, height]: [u32; 2], parameters: &[f64]) -> Result<Self, String> {
         let (focal, centre, lens) = match (model, parameters) {
-            ("SIMPLE_PINHOLE", [f, x, y]) => ([*f; 2], [*x, *y], Lens::Straight),
-            ("PINHOLE", [fx, fy, x, y]) => ([*fx, *fy], [*x, *y], Lens::Straight),
-            ("SIMPLE_RADIAL", [f, x, y, k]) => ([*f; 2], [*x, *y], Lens::Radial([*k, 0.0])),
-            ("RADIAL", [f, x, y, k1, k2]) => ([*f; 2], [*x, *y], Lens::Radial([*k1, *k2])),
-            ("OPENCV", [fx, fy, x, y, k @ ..]) if k.len() == 4 => {
-                ([*fx, *fy], [*x, *y], Lens::OpenCv([k[0], k[1], k[2], k[3]]))
+            ("SIMPLE_PINHOLE", [f, x, y]) => ([*f; 2], [*x, *y], Distortion::NONE),
+            ("PINHOLE", [fx, fy, x, y]) => ([*fx, *fy], [*x, *y], Distortion::NONE),
+            ("SIMPLE_RADIAL", [f, x, y, k]) => ([*f; 2], [*x, *y], Distortion::brown([*k, 0.0, 0.0, 0.0, 0.0])),
+            ("RADIAL", [f, x, y, k1, k2]) => ([*f; 2], [*x, *y], Distortion::brown([*k1, *k2, 0.0, 0.0, 0.0])),
+            ("OPENCV", [fx, fy, x, y, k1, k2, p1, p2]) => {
+                ([*fx, *fy], [*x, *y], Distortion::brown([*k1, *k2, *p1, *p2, 0.0]))
             }
-            ("SIMPLE_PINHOLE" | "PINHOLE" | "SIMPLE_RADIAL" | "RADIAL" | "OPENCV", _) => {
+            ("FULL_OPENCV", [fx, fy, x, y, k1, k2, p1, p2, k3, k4, k5, k6]) => {
+                ([*fx, *fy], [*x, *y], Distortion::Polynomial([*k1, *k2, *p1, *p2, *k3, *k4, *k5, *k6]))
+            }
+            ("SIMPLE_RADIAL_FISHEYE", [f, x, y, k]) => ([*f; 2], [*x, *y], Distortion::Fisheye([*k, 0.0, 0.0, 0.0])),
+            ("RADIAL_FISHEYE", [f, x, y, k1, k2]) => ([*f; 2], [*x, *y], Distortion::Fisheye([*k1, *k2, 0.0, 0.0])),
+            ("OPENCV_FISHEYE", [fx, fy, x, y, k1, k2, k3, k4]) => {
+                ([*fx, *fy], [*x, *y], Distortion::Fisheye([*k1, *k2, *k3, *k4]))
+            }
+            (
+                "SIMPLE_PINHOLE"
+                | "PINHOLE"
+                | "SIMPLE_RADIAL"
+                | "RADIAL"
+                | "OPENCV"
+                | "FULL_OPENCV"
+                | "SIMPLE_RADIAL_FISHEYE"
+                | "RADIAL_FISHEYE"
+                | "OPENCV_FISHEYE",
+                _,
+            ) => {
                 return Err(format!("a camera of the model {model} with {} parameters", parameters.len()));
             }
             _ => {
@@ -99,13 +96,14 @@ impl Camera {
     /// COLMAP's name of its model, and the parameters.
     #[must_use]
     pub fn to_colmap(&self) -> (&'static str, Vec<f64>) {
-        let ([fx, fy], [x, y]) = (self.focal, self.centre);
-        match self.lens {
-            Lens::Straight => ("PINHOLE", vec![fx, fy, x, y]),
-            // Their own models have one focal length.
-            Lens::Radial([k1, k2]) => ("OPENCV", vec![fx, fy, x, y, k1, k2, 0.0, 0.0]),
-            Lens::OpenCv([k1, k2, p1, p2]) => ("OPENCV", vec![fx, fy, x, y, k1, k2, p1, p2]),
-        }
+        let (model, coefficients): (_, &[f64]) = match &self.lens {
+            Distortion::Polynomial([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]) => ("PINHOLE", &[]),
+            // Models of fewer numbers have one focal length.
+            Distortion::Polynomial([few @ .., 0.0, 0.0, 0.0, 0.0]) => ("OPENCV", few),
+            Distortion::Polynomial(all) => ("FULL_OPENCV", all),
+            Distortion::Fisheye(all) => ("OPENCV_FISHEYE", all),
+        };
+        (model, [&self.focal[..], &self.centre, coefficients].concat())
     }
 
     /// Refuses a camera that cannot be one.
@@ -113,6 +111,13 @@ impl Camera {
     /// # Errors
     /// A sentence that names what is wrong.
     pub fn checked(self) -> Result<Self, String> {
+        let coefficients: &[f64] = match &self.lens {
+            Distortion::Polynomial(k) => k,
+            Distortion::Fisheye(k) => k,
+        };
+        if let Some(bad) = coefficients.iter().find(|k| !k.is_finite()) {
+            return Err(format!("a camera whose lens has the coefficient {bad}"));
+        }
         let finite = self.focal.iter().chain(&self.centre).all(|v| v.is_finite());
         if !finite || self.focal.iter().any(|f| *f <= 0.0) || self.width == 0 || self.height == 0 {
             return Err(format!(
@@ -121,27 +126,6 @@ impl Camera {
             ));
         }
         Ok(self)
-    }
-}
-
-impl Lens {
-    fn bent(self, [x, y]: [f64; 2]) -> [f64; 2] {
-        let square = x * x + y * y;
-        match self {
-            Self::Straight => [x, y],
-            Self::Radial([k1, k2]) => {
-                let factor = 1.0 + square * (k1 + square * k2);
-                [x * factor, y * factor]
-            }
-            Self::OpenCv([k1, k2, p1, p2]) => {
-                let factor = 1.0 + square * (k1 + square * k2);
-                let across = 2.0 * x * y;
-                [
-                    x * factor + p1 * across + p2 * (square + 2.0 * x * x),
-                    y * factor + p2 * across + p1 * (square + 2.0 * y * y),
-                ]
-            }
-        }
     }
 }
 
@@ -155,6 +139,9 @@ mod tests {
             ("PINHOLE", vec![600.0, 610.0, 321.0, 239.0]),
             ("SIMPLE_RADIAL", vec![600.0, 320.0, 240.0, -0.08]),
             ("OPENCV", vec![600.0, 610.0, 321.0, 239.0, -0.1, 0.02, 0.001, -0.002]),
+            ("FULL_OPENCV", vec![600.0, 610.0, 321.0, 239.0, 1.2, 0.35, 4e-4, -7e-4, 0.02, 1.45, 0.52, 0.06]),
+            ("SIMPLE_RADIAL_FISHEYE", vec![420.0, 320.0, 240.0, -0.03]),
+            ("OPENCV_FISHEYE", vec![420.0, 425.0, 321.0, 239.0, -0.03, 0.008, -0.004, 6e-4]),
         ];
         for (model, parameters) in cameras {
             let camera = Camera::from_colmap(model, [640, 480], &parameters).expect("a camera");

@@ -5,6 +5,7 @@
 use super::camera::Camera;
 use super::error::ScanError;
 use nalgebra::{Isometry3, Point3, Quaternion, Translation3, UnitQuaternion, Vector3};
+use shared_mem::budget::{Budget, BudgetError};
 use shared_mem::input::{self, Kind};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -25,6 +26,13 @@ pub(crate) struct Model {
     pub(crate) images: Vec<Image>,
     pub(crate) points: HashMap<u64, Point3<f64>>,
 }
+
+/// What a point becomes, with the room that a table keeps free [bytes].
+const POINT: usize = 2 * size_of::<(u64, Point3<f64>)>();
+/// What a place in a picture becomes [bytes].
+const SEEN: usize = size_of::<([f64; 2], u64)>();
+/// Characters of a line that are shown.
+const SHOWN: usize = 80;
 
 /// Names of the camera models by their numbers in binary files; the count of parameters of each.
 const MODELS: [(&str, usize); 11] = [
@@ -51,19 +59,18 @@ pub(crate) fn read(folder: &Path) -> Result<Model, ScanError> {
     if folder.join("images.bin").is_file() { read_binary(folder) } else { read_text(folder) }
 }
 
-fn pose(path: &Path, q: [f64; 4], t: [f64; 3]) -> Result<Isometry3<f64>, ScanError> {
+fn pose(q: [f64; 4], t: [f64; 3]) -> Result<Isometry3<f64>, String> {
     let turn = Quaternion::new(q[0], q[1], q[2], q[3]);
     if !(0.5..2.0).contains(&turn.norm()) || t.iter().any(|v| !v.is_finite()) {
-        return Err(ScanError::content(path, "an image has no pose; write the model anew with COLMAP"));
+        return Err("an image has no pose; write the model anew with COLMAP".into());
     }
     let camera_from_model =
         Isometry3::from_parts(Translation3::from(Vector3::from(t)), UnitQuaternion::from_quaternion(turn));
     Ok(camera_from_model.inverse())
 }
 
-fn camera_of(path: &Path, cameras: &HashMap<u32, Camera>, number: u32) -> Result<Camera, ScanError> {
-    let found = cameras.get(&number).copied();
-    found.ok_or_else(|| ScanError::content(path, format!("names camera {number}, which the model does not have")))
+fn camera_of(cameras: &HashMap<u32, Camera>, number: u32) -> Result<Camera, String> {
+    cameras.get(&number).copied().ok_or_else(|| format!("names camera {number}, which the model does not have"))
 }
 
 /// Lines of a text file that are no comments; empty ones stay, because an image without points has one.
@@ -75,170 +82,238 @@ fn numbers<T: std::str::FromStr>(words: &[&str]) -> Option<Vec<T>> {
     words.iter().map(|word| word.parse().ok()).collect()
 }
 
+/// A text file of a model, and what reading it may cost.
+struct Text {
+    path: PathBuf,
+    text: String,
+    budget: Budget,
+}
+
+impl Text {
+    fn read(path: PathBuf) -> Result<Self, ScanError> {
+        let text = input::text(&path, Kind::List)?;
+        let budget = Budget::of(text.len() as u64);
+        Ok(Self { path, text, budget })
+    }
+
+    /// The words of a line, with what they become drawn from the budget.
+    fn words<'a>(&self, line: &'a str) -> Result<Vec<&'a str>, ScanError> {
+        let count = line.split_whitespace().count();
+        spend(&self.path, self.budget.elements(count, size_of::<&str>() + size_of::<f64>()))?;
+        Ok(line.split_whitespace().collect())
+    }
+}
+
+fn spend(path: &Path, drawn: Result<(), BudgetError>) -> Result<(), ScanError> {
+    drawn.map_err(|spent| match spent {
+        BudgetError::Ended => ScanError::Interrupted,
+        BudgetError::Memory(_) | BudgetError::Steps(_) => ScanError::content(path, spent.to_string()),
+    })
+}
+
 fn read_text(folder: &Path) -> Result<Model, ScanError> {
-    let path = folder.join("cameras.txt");
-    let text = input::text(&path, Kind::List)?;
+    let file = Text::read(folder.join("cameras.txt"))?;
+    let path = &file.path;
     let mut cameras = HashMap::new();
-    for line in lines(&text).filter(|line| !line.trim().is_empty()) {
-        let words: Vec<&str> = line.split_whitespace().collect();
-        let bad = || ScanError::content(&path, format!("the line `{}` is no camera", line.trim()));
+    for line in lines(&file.text).filter(|line| !line.trim().is_empty()) {
+        let words = file.words(line)?;
+        let bad = || ScanError::content(path, format!("the line `{}` is no camera", shown(line)));
         let [number, model, width, height, rest @ ..] = &words[..] else { return Err(bad()) };
         let size: Vec<u32> = numbers(&[width, height]).ok_or_else(bad)?;
         let parameters: Vec<f64> = numbers(rest).ok_or_else(bad)?;
         let camera = Camera::from_colmap(model, [size[0], size[1]], &parameters);
-        let camera = camera.map_err(|what| ScanError::content(&path, what))?;
+        let camera = camera.map_err(|what| ScanError::content(path, what))?;
         cameras.insert(number.parse::<u32>().map_err(|_| bad())?, camera);
     }
-    let path = folder.join("images.txt");
-    let text = input::text(&path, Kind::List)?;
+    let images = text_images(&Text::read(folder.join("images.txt"))?, &cameras)?;
+    let path = folder.join("points3D.txt");
+    let points = if path.is_file() { text_points(&Text::read(path)?)? } else { HashMap::new() };
+    Ok(Model { images, points })
+}
+
+fn text_images(file: &Text, cameras: &HashMap<u32, Camera>) -> Result<Vec<Image>, ScanError> {
+    let content = |what: String| ScanError::content(&file.path, what);
     let mut images = Vec::new();
-    let mut rest = lines(&text);
+    let mut rest = lines(&file.text);
     while let Some(line) = rest.next() {
         if line.trim().is_empty() {
             continue;
         }
-        let words: Vec<&str> = line.split_whitespace().collect();
-        let bad = || ScanError::content(&path, format!("the line `{}` is no image", line.trim()));
+        let words = file.words(line)?;
+        let bad = || content(format!("the line `{}` is no image", shown(line)));
         let [_, q0, q1, q2, q3, x, y, z, camera, name @ ..] = &words[..] else { return Err(bad()) };
         let v: Vec<f64> = numbers(&[q0, q1, q2, q3, x, y, z]).ok_or_else(bad)?;
-        let seen: Vec<f64> =
-            numbers(&rest.next().unwrap_or("").split_whitespace().collect::<Vec<_>>()).ok_or_else(bad)?;
+        let seen: Vec<f64> = numbers(&file.words(rest.next().unwrap_or(""))?).ok_or_else(bad)?;
         let seen = seen.chunks_exact(3).filter(|three| three[2] >= 0.0);
         images.push(Image {
             name: name.join(" "),
-            camera: camera_of(&path, &cameras, camera.parse().map_err(|_| bad())?)?,
-            model_from_camera: pose(&path, [v[0], v[1], v[2], v[3]], [v[4], v[5], v[6]])?,
+            camera: camera_of(cameras, camera.parse().map_err(|_| bad())?).map_err(content)?,
+            model_from_camera: pose([v[0], v[1], v[2], v[3]], [v[4], v[5], v[6]]).map_err(content)?,
             seen: seen.map(|three| ([three[0], three[1]], three[2] as u64)).collect(),
         });
     }
-    let path = folder.join("points3D.txt");
-    let mut points = HashMap::new();
-    if path.is_file() {
-        for line in lines(&input::text(&path, Kind::List)?).filter(|line| !line.trim().is_empty()) {
-            let words: Vec<&str> = line.split_whitespace().take(4).collect();
-            let place: Option<Vec<f64>> = numbers(&words);
-            let Some([number, x, y, z]) = place.as_deref() else {
-                return Err(ScanError::content(&path, format!("the line `{}` is no point", line.trim())));
-            };
-            points.insert(*number as u64, Point3::new(*x, *y, *z));
-        }
-    }
-    Ok(Model { images, points })
+    Ok(images)
 }
 
-/// Bytes from the front on; `None` past the end.
-struct Bytes<'a>(&'a [u8]);
+fn text_points(file: &Text) -> Result<HashMap<u64, Point3<f64>>, ScanError> {
+    let mut points = HashMap::new();
+    for line in lines(&file.text).filter(|line| !line.trim().is_empty()) {
+        spend(&file.path, file.budget.take(POINT))?;
+        let words: Vec<&str> = line.split_whitespace().take(4).collect();
+        let place: Option<Vec<f64>> = numbers(&words);
+        let Some([number, x, y, z]) = place.as_deref() else {
+            return Err(ScanError::content(&file.path, format!("the line `{}` is no point", shown(line))));
+        };
+        points.insert(*number as u64, Point3::new(*x, *y, *z));
+    }
+    Ok(points)
+}
 
-impl Bytes<'_> {
-    fn take<const N: usize>(&mut self) -> Option<[u8; N]> {
-        let (first, rest) = self.0.split_first_chunk::<N>()?;
-        self.0 = rest;
-        Some(*first)
+/// The beginning of a line, which may be as long as its file.
+fn shown(line: &str) -> String {
+    let mut characters = line.trim().chars();
+    let cut: String = characters.by_ref().take(SHOWN).collect();
+    if characters.next().is_some() { cut + "..." } else { cut }
+}
+
+/// Bytes of a binary file from the front on, and what reading them may cost.
+struct Bytes<'a> {
+    left: &'a [u8],
+    budget: Budget,
+}
+
+/// Why a binary file is not read.
+enum Unread {
+    /// It ends too early.
+    Cut,
+    /// What is read of it costs too much.
+    Spent(BudgetError),
+    /// It says something that cannot be.
+    Content(String),
+}
+
+type Read<T> = Result<T, Unread>;
+
+impl Unread {
+    fn of(self, path: &Path) -> ScanError {
+        match self {
+            Self::Cut => ScanError::content(path, "is cut short; write the model anew with COLMAP"),
+            Self::Spent(BudgetError::Ended) => ScanError::Interrupted,
+            Self::Spent(spent) => ScanError::content(path, spent.to_string()),
+            Self::Content(what) => ScanError::content(path, what),
+        }
+    }
+}
+
+impl<'a> Bytes<'a> {
+    fn of(bytes: &'a [u8]) -> Self {
+        Self { left: bytes, budget: Budget::of(bytes.len() as u64) }
     }
 
-    fn u32(&mut self) -> Option<u32> {
+    fn take<const N: usize>(&mut self) -> Read<[u8; N]> {
+        let (first, rest) = self.left.split_first_chunk::<N>().ok_or(Unread::Cut)?;
+        self.left = rest;
+        Ok(*first)
+    }
+
+    fn u32(&mut self) -> Read<u32> {
         self.take().map(u32::from_le_bytes)
     }
 
-    fn u64(&mut self) -> Option<u64> {
+    fn u64(&mut self) -> Read<u64> {
         self.take().map(u64::from_le_bytes)
     }
 
-    fn f64(&mut self) -> Option<f64> {
-        self.take().map(f64::from_le_bytes)
-    }
-
-    fn f64s<const N: usize>(&mut self) -> Option<[f64; N]> {
+    fn f64s<const N: usize>(&mut self) -> Read<[f64; N]> {
         let mut out = [0.0; N];
         for value in &mut out {
-            *value = self.f64()?;
+            *value = f64::from_le_bytes(self.take()?);
         }
-        Some(out)
+        Ok(out)
     }
 
     /// Up to a zero byte.
-    fn name(&mut self) -> Option<String> {
-        let end = self.0.iter().position(|byte| *byte == 0)?;
-        let name = String::from_utf8_lossy(&self.0[..end]).into_owned();
-        self.0 = &self.0[end + 1..];
-        Some(name)
+    fn name(&mut self) -> Read<String> {
+        let end = self.left.iter().position(|byte| *byte == 0).ok_or(Unread::Cut)?;
+        self.draw(end)?;
+        let name = String::from_utf8_lossy(&self.left[..end]).into_owned();
+        self.left = &self.left[end + 1..];
+        Ok(name)
     }
 
-    fn skip(&mut self, count: u64) -> Option<()> {
-        self.0 = self.0.get(usize::try_from(count).ok()?..)?;
-        Some(())
+    fn skip(&mut self, count: u64) -> Read<()> {
+        self.left = usize::try_from(count).ok().and_then(|count| self.left.get(count..)).ok_or(Unread::Cut)?;
+        Ok(())
+    }
+
+    /// Draws so many bytes before they are set aside.
+    fn draw(&self, bytes: usize) -> Read<()> {
+        self.budget.take(bytes).map_err(Unread::Spent)
     }
 }
 
 fn read_binary(folder: &Path) -> Result<Model, ScanError> {
-    let whole = |name: &str| -> Result<(PathBuf, Vec<u8>), ScanError> {
-        let path = folder.join(name);
-        let bytes = input::bytes(&path, Kind::List)?;
-        Ok((path, bytes))
-    };
-    let cut = |path: &Path| ScanError::content(path, "is cut short; write the model anew with COLMAP");
-    let (path, bytes) = whole("cameras.bin")?;
-    let cameras = binary_cameras(&mut Bytes(&bytes)).ok_or_else(|| cut(&path))?;
-    let cameras = cameras.map_err(|what| ScanError::content(&path, what))?;
-    let (path, bytes) = whole("images.bin")?;
-    let mut bytes = Bytes(&bytes);
-    let count = bytes.u64().ok_or_else(|| cut(&path))?;
-    let mut images = Vec::new();
-    for _ in 0..count {
-        let (q, t, camera, name, seen) = binary_image(&mut bytes).ok_or_else(|| cut(&path))?;
-        let camera = camera_of(&path, &cameras, camera)?;
-        images.push(Image { name, camera, model_from_camera: pose(&path, q, t)?, seen });
-    }
-    let mut points = HashMap::new();
-    if folder.join("points3D.bin").is_file() {
-        let (path, bytes) = whole("points3D.bin")?;
-        points = binary_points(&mut Bytes(&bytes)).ok_or_else(|| cut(&path))?;
-    }
+    let cameras = read_file(folder.join("cameras.bin"), binary_cameras)?;
+    let images = read_file(folder.join("images.bin"), |bytes| {
+        let count = bytes.u64()?;
+        let mut images = Vec::new();
+        for _ in 0..count {
+            bytes.draw(size_of::<Image>())?;
+            images.push(binary_image(bytes, &cameras)?);
+        }
+        Ok(images)
+    })?;
+    let path = folder.join("points3D.bin");
+    let points = if path.is_file() { read_file(path, binary_points)? } else { HashMap::new() };
     Ok(Model { images, points })
 }
 
-fn binary_cameras(bytes: &mut Bytes<'_>) -> Option<Result<HashMap<u32, Camera>, String>> {
-    let mut cameras = HashMap::new();
-    for _ in 0..bytes.u64()? {
-        let (number, model, width, height) = (bytes.u32()?, bytes.u32()?, bytes.u64()?, bytes.u64()?);
-        let Some((name, count)) = MODELS.get(model as usize) else {
-            return Some(Err(format!("a camera of the model number {model}, which is not known here")));
-        };
-        let parameters: Vec<f64> = (0..*count).map(|_| bytes.f64()).collect::<Option<_>>()?;
-        let size = [width, height].map(|side| u32::try_from(side).unwrap_or(0));
-        match Camera::from_colmap(name, size, &parameters) {
-            Ok(camera) => cameras.insert(number, camera),
-            Err(what) => return Some(Err(what)),
-        };
-    }
-    Some(Ok(cameras))
+fn read_file<T>(path: PathBuf, read: impl FnOnce(&mut Bytes<'_>) -> Read<T>) -> Result<T, ScanError> {
+    let bytes = input::bytes(&path, Kind::List)?;
+    read(&mut Bytes::of(&bytes)).map_err(|unread| unread.of(&path))
 }
 
-type BinaryImage = ([f64; 4], [f64; 3], u32, String, Vec<([f64; 2], u64)>);
+fn binary_cameras(bytes: &mut Bytes<'_>) -> Read<HashMap<u32, Camera>> {
+    let mut cameras = HashMap::new();
+    for _ in 0..bytes.u64()? {
+        bytes.draw(2 * size_of::<(u32, Camera)>())?;
+        let (number, model, width, height) = (bytes.u32()?, bytes.u32()?, bytes.u64()?, bytes.u64()?);
+        let Some((name, count)) = MODELS.get(model as usize) else {
+            return Err(Unread::Content(format!("a camera of the model number {model}, which is not known here")));
+        };
+        let parameters: Vec<f64> = (0..*count).map(|_| Ok(bytes.f64s::<1>()?[0])).collect::<Read<_>>()?;
+        let size = [width, height].map(|side| u32::try_from(side).unwrap_or(0));
+        cameras.insert(number, Camera::from_colmap(name, size, &parameters).map_err(Unread::Content)?);
+    }
+    Ok(cameras)
+}
 
-fn binary_image(bytes: &mut Bytes<'_>) -> Option<BinaryImage> {
+fn binary_image(bytes: &mut Bytes<'_>, cameras: &HashMap<u32, Camera>) -> Read<Image> {
     let _number = bytes.u32()?;
     let (q, t, camera, name) = (bytes.f64s()?, bytes.f64s()?, bytes.u32()?, bytes.name()?);
     let mut seen = Vec::new();
     for _ in 0..bytes.u64()? {
+        bytes.draw(SEEN)?;
         let (place, point) = (bytes.f64s()?, bytes.u64()?);
         if point != u64::MAX {
             seen.push((place, point));
         }
     }
-    Some((q, t, camera, name, seen))
+    let camera = camera_of(cameras, camera).map_err(Unread::Content)?;
+    Ok(Image { name, camera, model_from_camera: pose(q, t).map_err(Unread::Content)?, seen })
 }
 
-fn binary_points(bytes: &mut Bytes<'_>) -> Option<HashMap<u64, Point3<f64>>> {
+fn binary_points(bytes: &mut Bytes<'_>) -> Read<HashMap<u64, Point3<f64>>> {
     let mut points = HashMap::new();
     for _ in 0..bytes.u64()? {
+        bytes.draw(POINT)?;
         let (number, place): (u64, [f64; 3]) = (bytes.u64()?, bytes.f64s()?);
-        let (_colour, _error) = (bytes.take::<3>()?, bytes.f64()?);
+        let (_colour, _error) = (bytes.take::<3>()?, bytes.f64s::<1>()?);
         let track = bytes.u64()?;
-        bytes.skip(track.checked_mul(8)?)?;
+        bytes.skip(track.checked_mul(8).ok_or(Unread::Cut)?)?;
         points.insert(number, Point3::from(place));
     }
-    Some(points)
+    Ok(points)
 }
 
 #[cfg(test)]
@@ -294,5 +369,19 @@ mod tests {
             std::fs::write(folder.path().join("images.bin"), &images[..length]).expect("a file");
             assert!(read(folder.path()).expect_err("cut").to_string().contains("cut short"), "{length}");
         }
+    }
+
+    #[test]
+    fn what_a_model_becomes_is_drawn_from_its_budget() {
+        let (_, images, points) = model();
+        let budget = || Budget::with(64, 1 << 20);
+        let text = |text: &str| Text { path: "points3D.txt".into(), text: text.into(), budget: budget() };
+        let line = text_points(&text(&points.repeat(2))).expect_err("too many points").to_string();
+        assert!(line.starts_with("points3D.txt: becomes more than"), "{line}");
+        let line = text_images(&text(images), &HashMap::new()).expect_err("too many words").to_string();
+        assert!(line.contains("becomes more than"), "{line}");
+        let bytes = [&2u64.to_le_bytes()[..], &[0; 200]].concat();
+        let mut bytes = Bytes { left: &bytes, budget: budget() };
+        assert!(matches!(binary_points(&mut bytes), Err(Unread::Spent(BudgetError::Memory(64)))));
     }
 }

@@ -151,10 +151,10 @@ fn one_depth(depths: impl Iterator<Item = f32>) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scan::Lens;
+    use shared_mem::lens::Distortion;
 
     fn frame(mask: Vec<bool>, width: u32, height: u32) -> Frame {
-        let camera = Camera { width, height, focal: [1.0; 2], centre: [0.0; 2], lens: Lens::Straight };
+        let camera = Camera { width, height, focal: [1.0; 2], centre: [0.0; 2], lens: Distortion::NONE };
         let count = mask.len();
         let pose = Isometry3::identity();
         Frame {

@@ -6,6 +6,7 @@
 //! | `camera` | pixels to rays and back |
 //! | `colmap` | poses and cameras out of a COLMAP model |
 //! | `transforms` | the same out of `transforms.json` and `poses.json` |
+//! | `picture` | where the picture of a frame lies |
 //! | `held` | poses of a camera that a robot holds, from those of its end effector |
 //! | `frame` | the pixels of one view |
 //! | `scale` | metres for one unit of the poses |
@@ -17,14 +18,16 @@ mod colmap;
 mod error;
 mod frame;
 mod held;
+mod picture;
 mod scale;
 mod transforms;
 
-pub use camera::{Camera, Lens};
+pub use camera::Camera;
 pub use error::ScanError;
 pub use frame::Frame;
 pub use scale::{Scale, ScaleSource};
 
+use crate::remark::Remark;
 use beside::Beside;
 use nalgebra::Isometry3;
 use shared_mem::ending;
@@ -67,6 +70,8 @@ pub struct Scan {
     depth_unit: f64,
     /// Places in pictures where the poses' file knows how far a point is: view, pixel, distance along the axis [unit of the poses].
     known_depths: Vec<(usize, [f64; 2], f64)>,
+    /// What was not read of the poses' file.
+    pub(crate) remarks: Vec<Remark>,
     /// Whether the poses are in metres.
     pub(crate) says_metres: bool,
     of_robot: bool,
@@ -107,11 +112,11 @@ impl Scan {
         let poses = poses_of(scan)?;
         let folder = if scan.is_file() { scan.parent().unwrap_or(Path::new("")).to_owned() } else { scan.to_owned() };
         let mut known_depths = Vec::new();
-        let mut table = None;
+        let (mut table, mut remarks) = (None, Vec::new());
         let (listed, depth_unit, says_metres) = match &poses {
             Poses::File(file) => {
                 let list = transforms::read(file)?;
-                table = list.table;
+                (table, remarks) = (list.table, list.remarks);
                 (list.listed, list.depth_unit, list.of_robot)
             }
             Poses::Colmap(model) => {
@@ -128,10 +133,12 @@ impl Scan {
                 (images.into_iter().map(|image| from_colmap(&folder, image)).collect(), None, false)
             }
         };
-        let (mut views, mut beside) = (Vec::with_capacity(listed.len()), Beside::of(&folder));
-        for listed in listed {
-            views.push(view(&folder, listed, &mut beside)?);
-        }
+        let pictures: Vec<&Path> = listed.iter().map(|listed| listed.picture.as_path()).collect();
+        let mut beside = Beside::of(&folder);
+        let masks = beside.pairs(&pictures, &["masks", "mask"]);
+        let depths = beside.pairs(&pictures, &["depth", "depths"]);
+        let views = listed.into_iter().zip(masks.into_iter().zip(depths));
+        let mut views = views.map(|(listed, found)| view(&folder, listed, found)).collect::<Result<Vec<_>, _>>()?;
         if views.len() < FEWEST_VIEWS {
             return Err(ScanError::Missing(format!(
                 "{}: {} pictures with poses; a scan needs {FEWEST_VIEWS} at least, from all sides",
@@ -147,6 +154,7 @@ impl Scan {
             views,
             depth_unit: depth_unit.unwrap_or(1e-3),
             known_depths,
+            remarks,
             says_metres,
             of_robot: says_metres,
             table,
@@ -200,34 +208,23 @@ fn from_colmap(folder: &Path, image: colmap::Image) -> transforms::Listed {
     let [first, ..] = &places;
     let picture = places.iter().find(|place| folder.join(place).is_file()).unwrap_or(first).clone();
     let (camera, scan_from_camera) = (image.camera, image.model_from_camera);
-    transforms::Listed { picture, mask: None, depth: None, camera, scan_from_camera }
+    transforms::Listed { pixels: folder.join(&picture), picture, mask: None, depth: None, camera, scan_from_camera }
 }
 
-fn view(folder: &Path, listed: transforms::Listed, beside: &mut Beside<'_>) -> Result<View, ScanError> {
+type Found = Result<Option<PathBuf>, ScanError>;
+
+/// A view with the mask and the depth that the list names, or else those that were found beside the pictures.
+fn view(folder: &Path, listed: transforms::Listed, (mask, depth): (Found, Found)) -> Result<View, ScanError> {
     if ending::asked() {
         return Err(ScanError::Interrupted);
     }
-    let name = listed.picture.display().to_string();
-    let mut picture = folder.join(&listed.picture);
-    // nerfstudio's own files leave the ending out now and then.
-    if !picture.is_file() && picture.extension().is_none() {
-        picture = ["png", "jpg", "jpeg"]
-            .map(|e| picture.with_extension(e))
-            .into_iter()
-            .find(|p| p.is_file())
-            .unwrap_or(picture);
-    }
-    let mut found = |said: Option<PathBuf>, names: &[&str]| {
-        said.map(|file| folder.join(file)).or_else(|| beside.find(&listed.picture, names))
-    };
-    let mask = found(listed.mask, &["masks", "mask"]);
-    let depth = found(listed.depth, &["depth", "depths"]);
+    let or = |said: Option<PathBuf>, found: Found| said.map_or(found, |file| Ok(Some(folder.join(file))));
     Ok(View {
-        name,
+        name: listed.picture.display().to_string(),
         camera: listed.camera,
         scan_from_camera: listed.scan_from_camera,
-        picture,
-        mask: mask.map_or(Mask::Alpha, Mask::File),
-        depth,
+        picture: listed.pixels,
+        mask: or(listed.mask, mask)?.map_or(Mask::Alpha, Mask::File),
+        depth: or(listed.depth, depth)?,
     })
 }

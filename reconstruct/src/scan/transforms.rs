@@ -1,32 +1,24 @@
-//! nerfstudio's `transforms.json`, and `poses.json` of a camera that a robot held. In the first, a camera looks along its -z and
-//! y is up (OpenGL); in the second x is right, y down, z forwards, lengths are metres and poses are `x, y, z, qw, qx, qy, qz`, or
-//! those of the end effector, `O_T_EE`.
+//! `transforms.json` of nerfstudio, instant-ngp and Blender, and `poses.json` of a camera that a robot held. In the first, a camera
+//! looks along its -z and y is up (OpenGL); in the second x is right, y down, z forwards, lengths are metres and poses are `x, y, z,
+//! qw, qx, qy, qz`, or those of the end effector, `O_T_EE`.
 
-use super::camera::{Camera, Lens};
+use super::camera::Camera;
 use super::error::ScanError;
 use super::held::Held;
-use nalgebra::{Isometry3, Matrix3, Matrix4, Quaternion, Rotation3, Translation3, UnitQuaternion, Vector3};
+use super::picture;
+use crate::remark::Remark;
+use nalgebra::{Isometry3, Matrix3, Quaternion, Rotation3, Translation3, UnitQuaternion, Vector3};
 use serde::Deserialize;
+use serde::de::IgnoredAny;
+use shared_mem::budget::Budget;
 use shared_mem::hand_eye::Matrix;
 use shared_mem::input::{self, Kind};
+use shared_mem::json;
+use shared_mem::lens::coefficients::Keys;
+use shared_mem::lens::listed::{ListedCamera, Numbers};
+use shared_mem::recording::picture_size;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
-
-/// Numbers of a camera as they stand beside the frames or in each of them.
-#[derive(Debug, Clone, Default, Deserialize)]
-struct Numbers {
-    camera_model: Option<String>,
-    fl_x: Option<f64>,
-    fl_y: Option<f64>,
-    cx: Option<f64>,
-    cy: Option<f64>,
-    w: Option<f64>,
-    h: Option<f64>,
-    k1: Option<f64>,
-    k2: Option<f64>,
-    k3: Option<f64>,
-    p1: Option<f64>,
-    p2: Option<f64>,
-}
 
 #[derive(Debug, Deserialize)]
 struct File {
@@ -38,14 +30,17 @@ struct File {
     /// How high the table is on which the object stands [m].
     table: Option<f64>,
     frames: Vec<Frame>,
+    #[serde(flatten)]
+    others: BTreeMap<String, IgnoredAny>,
 }
 
 #[derive(Debug, Deserialize)]
 struct Frame {
-    file_path: PathBuf,
-    mask_path: Option<PathBuf>,
-    depth_file_path: Option<PathBuf>,
-    transform_matrix: Option<[[f64; 4]; 4]>,
+    file_path: String,
+    mask_path: Option<String>,
+    #[serde(alias = "depth_path")]
+    depth_file_path: Option<String>,
+    transform_matrix: Option<Vec<Vec<f64>>>,
     /// Of `poses.json` in place of the matrix.
     base_from_camera: Option<[f64; 7]>,
     /// And in place of both.
@@ -53,12 +48,45 @@ struct Frame {
     end_effector: Option<Matrix>,
     #[serde(flatten)]
     camera: Numbers,
+    #[serde(flatten)]
+    others: BTreeMap<String, IgnoredAny>,
 }
 
-/// A picture as the file lists it; paths are relative to the file.
+/// Keys of other programs that change nothing here: the volume and the exposure that their networks are trained with, numbers of
+/// pictures, poses' frames that are as good as any other, and corners that `calibration hand-eye` reads.
+const PASSED_OVER: [&str; 25] = [
+    "aabb",
+    "aabb_scale",
+    "applied_scale",
+    "applied_transform",
+    "auto_orient_and_center_poses",
+    "bounding_box",
+    "camera_label",
+    "cam_label",
+    "colmap_im_id",
+    "enable_depth_loading",
+    "exposure",
+    "frame_id",
+    "image_id",
+    "is_hdr",
+    "n_extra_learnable_dims",
+    "offset",
+    "orientation_override",
+    "ply_file_path",
+    "points",
+    "render_aabb",
+    "rotation",
+    "scale",
+    "sharpness",
+    "time",
+    "timestamp",
+];
+
+/// A picture as the file lists it, and the file of its pixels.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Listed {
     pub(crate) picture: PathBuf,
+    pub(crate) pixels: PathBuf,
     pub(crate) mask: Option<PathBuf>,
     pub(crate) depth: Option<PathBuf>,
     pub(crate) camera: Camera,
@@ -75,52 +103,81 @@ pub(crate) struct List {
     pub(crate) of_robot: bool,
     /// How high the table is, where a robot's file says it [m].
     pub(crate) table: Option<f64>,
+    /// What was not read of the file.
+    pub(crate) remarks: Vec<Remark>,
 }
 
 /// Reads a file and, where it gives the end effector's poses, how the camera is mounted.
 pub(crate) fn read(path: &Path) -> Result<List, ScanError> {
     let bad = |what: String| ScanError::content(path, what);
-    let text = input::text(path, Kind::Poses)?;
-    let file: File = serde_json::from_str(&text).map_err(|error| bad(format!("{error}; see docs/reconstruct.md")))?;
+    let bytes = input::bytes(path, Kind::Poses)?;
+    let file: File = json::read(&bytes, &Budget::of(bytes.len() as u64))
+        .map_err(|what| bad(format!("{what}; docs/reconstruct.md has its keys")))?;
+    let folder = path.parent().unwrap_or(Path::new(""));
     let is_held = file.frames.iter().any(|frame| frame.end_effector.is_some());
     let held = is_held.then(|| Held::read(path, file.hand_eye.as_deref())).transpose()?;
     let listed = file.frames.iter().map(|frame| {
-        let name = frame.file_path.display();
-        let camera = camera(&file.camera, &frame.camera).map_err(|what| bad(format!("{name}: {what}")))?;
+        let picture = picture::path_of(&frame.file_path);
+        let in_frame = |what: String| bad(format!("{}: {what}", picture.display()));
+        Keys::none_unread(frame.others.keys().map(String::as_str)).map_err(in_frame)?;
+        let pixels = picture::found(folder, &picture);
+        let size = || picture_size(&pixels).map_err(|error| format!("`w` and `h` are missing, and {error}"));
+        let [width, height] = frame.camera.size(&file.camera, size).map_err(in_frame)?;
+        let ListedCamera { focal, centre, lens } =
+            frame.camera.camera(&file.camera, || Ok([width, height])).map_err(in_frame)?;
         let pose = match (&held, &frame.end_effector) {
             (Some(held), Some(end_effector)) => held.base_from_camera(end_effector),
             (Some(_), None) => Err("has no `O_T_EE`, as other frames do".into()),
             (None, _) => pose(frame),
         };
         Ok(Listed {
-            picture: frame.file_path.clone(),
-            mask: frame.mask_path.clone(),
-            depth: frame.depth_file_path.clone(),
-            camera,
-            scan_from_camera: pose.map_err(|what| bad(format!("{name}: {what}")))?,
+            mask: frame.mask_path.as_deref().map(picture::path_of),
+            depth: frame.depth_file_path.as_deref().map(picture::path_of),
+            camera: Camera { width, height, focal, centre, lens },
+            scan_from_camera: pose.map_err(in_frame)?,
+            pixels,
+            picture,
         })
     });
+    let listed = listed.collect::<Result<_, ScanError>>()?;
+    Keys::none_unread(file.others.keys().map(String::as_str)).map_err(bad)?;
     let of_robot = is_held || path.file_name().is_some_and(|name| name == "poses.json");
     if file.table.is_some_and(|height| !height.is_finite() || !of_robot) {
         return Err(bad(
             "`table` is the height of the table in a robot's base frame [m], and goes with poses in it".into()
         ));
     }
-    Ok(List {
-        table: file.table,
-        of_robot,
-        listed: listed.collect::<Result<_, ScanError>>()?,
-        depth_unit: file.depth_unit_scale_factor,
-    })
+    Ok(List { table: file.table, of_robot, listed, depth_unit: file.depth_unit_scale_factor, remarks: unread(&file) })
+}
+
+/// A remark on keys that say something here nobody knows.
+fn unread(file: &File) -> Vec<Remark> {
+    let frames = file.frames.iter().flat_map(|frame| frame.others.keys());
+    let names: BTreeSet<&str> = file.others.keys().chain(frames).map(String::as_str).collect();
+    let names: Vec<String> =
+        names.into_iter().filter(|name| !PASSED_OVER.contains(name)).map(|name| format!("`{name}`")).collect();
+    if names.is_empty() {
+        Vec::new()
+    } else {
+        vec![Remark(format!("not read of the poses' file: {}", names.join(", ")))]
+    }
 }
 
 fn pose(frame: &Frame) -> Result<Isometry3<f64>, String> {
     match (&frame.transform_matrix, &frame.base_from_camera) {
         (Some(rows), _) => {
-            let matrix = Matrix4::from_fn(|row, column| rows[row][column]);
-            let turn: Matrix3<f64> = matrix.fixed_view::<3, 3>(0, 0).into_owned();
+            let is_matrix = matches!(rows.len(), 3 | 4) && rows.iter().all(|row| row.len() == 4);
+            // Where it is left out, the last row is the one that all poses have.
+            if !is_matrix || rows.get(3).is_some_and(|last| last != &[0.0, 0.0, 0.0, 1.0]) {
+                return Err(
+                    "`transform_matrix` is no pose; it has three rows of four numbers, and 0, 0, 0, 1 as its fourth \
+                            where it has one"
+                        .into(),
+                );
+            }
+            let turn = Matrix3::from_fn(|row, column| rows[row][column]);
             let opencv = turn * Matrix3::from_diagonal(&Vector3::new(1.0, -1.0, -1.0));
-            isometry(&opencv, matrix.fixed_view::<3, 1>(0, 3).into_owned())
+            isometry(&opencv, Vector3::from_fn(|row, _| rows[row][3]))
         }
         (None, Some([x, y, z, w, i, j, k])) => {
             let turn = Quaternion::new(*w, *i, *j, *k);
@@ -150,75 +207,71 @@ fn isometry(turn: &Matrix3<f64>, place: Vector3<f64>) -> Result<Isometry3<f64>, 
     Ok(Isometry3::from_parts(Translation3::from(place), turn))
 }
 
-fn camera(common: &Numbers, own: &Numbers) -> Result<Camera, String> {
-    let number = |of: fn(&Numbers) -> Option<f64>| of(own).or_else(|| of(common));
-    let needed = |of: fn(&Numbers) -> Option<f64>, key: &str| number(of).ok_or_else(|| format!("`{key}` is missing"));
-    let model = own.camera_model.as_ref().or(common.camera_model.as_ref());
-    if let Some(model) = model
-        .filter(|model| !["PINHOLE", "SIMPLE_PINHOLE", "SIMPLE_RADIAL", "RADIAL", "OPENCV"].contains(&model.as_str()))
-    {
-        return Err(format!("the camera model {model} is not known here; undistort the pictures"));
-    }
-    let (width, height) = (needed(|n| n.w, "w")?, needed(|n| n.h, "h")?);
-    let fx = needed(|n| n.fl_x, "fl_x")?;
-    let or_zero = |of: fn(&Numbers) -> Option<f64>| number(of).unwrap_or(0.0);
-    if or_zero(|n| n.k3) != 0.0 {
-        return Err("`k3` is not known here; undistort the pictures".into());
-    }
-    let bends = [or_zero(|n| n.k1), or_zero(|n| n.k2), or_zero(|n| n.p1), or_zero(|n| n.p2)];
-    let camera = Camera {
-        width: width as u32,
-        height: height as u32,
-        focal: [fx, number(|n| n.fl_y).unwrap_or(fx)],
-        centre: [number(|n| n.cx).unwrap_or(width / 2.0), number(|n| n.cy).unwrap_or(height / 2.0)],
-        lens: if bends == [0.0; 4] { Lens::Straight } else { Lens::OpenCv(bends) },
-    };
-    camera.checked()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use shared_mem::lens::Distortion;
 
-    fn read_text(text: &str) -> Result<Vec<Listed>, String> {
+    fn read_text(text: &str) -> Result<List, String> {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("transforms.json");
         std::fs::write(&path, text).expect("a file");
-        read(&path).map(|list| list.listed).map_err(|error| error.to_string())
+        read(&path).map_err(|error| error.to_string())
     }
 
     const HEAD: &str = r#""fl_x": 600, "w": 640, "h": 480, "k1": -0.1"#;
 
+    fn frame(matrix: &str) -> String {
+        format!(r#"{{{HEAD}, "frames": [{{"file_path": "a.png", "transform_matrix": {matrix}}}]}}"#)
+    }
+
     #[test]
     fn a_camera_of_opengl_looks_the_other_way_and_robot_poses_are_taken_as_they_are() {
-        let matrix = "[[1,0,0,0.1],[0,1,0,0],[0,0,1,0.5],[0,0,0,1]]";
-        let text = format!(r#"{{{HEAD}, "frames": [{{"file_path": "a.png", "transform_matrix": {matrix}}}]}}"#);
-        let listed = read_text(&text).expect("a scan");
+        let listed = read_text(&frame("[[1,0,0,0.1],[0,1,0,0],[0,0,1,0.5],[0,0,0,1]]")).expect("a scan").listed;
         let forwards = listed[0].scan_from_camera.rotation * Vector3::z();
         assert!((forwards + Vector3::z()).norm() < 1e-12);
         assert_eq!(
             (listed[0].camera.centre, listed[0].camera.lens),
-            ([320.0, 240.0], Lens::OpenCv([-0.1, 0.0, 0.0, 0.0]))
+            ([320.0, 240.0], Distortion::brown([-0.1, 0.0, 0.0, 0.0, 0.0]))
         );
         let text = format!(r#"{{{HEAD}, "frames": [{{"file_path": "a.png", "base_from_camera": [0,0,1,1,0,0,0]}}]}}"#);
-        let listed = read_text(&text).expect("a scan");
+        let listed = read_text(&text).expect("a scan").listed;
         assert!((listed[0].scan_from_camera.rotation * Vector3::z() - Vector3::z()).norm() < 1e-12);
     }
 
     #[test]
+    fn three_rows_are_a_matrix_and_what_other_programs_say_is_passed_over_or_named() {
+        let full = read_text(&frame("[[1,0,0,0.1],[0,1,0,0],[0,0,1,0.5],[0,0,0,1]]")).expect("a scan");
+        let rows = read_text(&frame("[[1,0,0,0.1],[0,1,0,0],[0,0,1,0.5]]")).expect("a scan");
+        let seen = |list: &List| (list.listed[0].camera, list.listed[0].scan_from_camera);
+        assert_eq!((seen(&rows), &rows.remarks), (seen(&full), &full.remarks));
+        let more =
+            frame("[[1,0,0,0.1],[0,1,0,0],[0,0,1,0.5]]").replace("\"k1\"", "\"aabb_scale\": 16, \"fog\": {}, \"k1\"");
+        let read = read_text(&more).expect("a scan");
+        assert_eq!(seen(&read), seen(&full));
+        assert_eq!(read.remarks, [Remark("not read of the poses' file: `fog`".into())]);
+    }
+
+    #[test]
     fn what_is_no_pose_or_no_camera_is_named_with_its_picture() {
-        let frame =
-            |matrix: &str| format!(r#"{{{HEAD}, "frames": [{{"file_path": "a.png", "transform_matrix": {matrix}}}]}}"#);
         let cases = [
             (frame("[[1,0,0,0],[0,1,0,0],[0,0,-1,0],[0,0,0,1]]"), "mirrored"),
             (frame("[[2,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,1]]"), "no rotation"),
-            (r#"{"w": 640, "h": 480, "frames": [{"file_path": "a.png"}]}"#.into(), "`fl_x` is missing"),
+            (frame("[[1,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,1,1]]"), "three rows of four"),
+            (frame("[[1,0,0],[0,1,0],[0,0,1]]"), "three rows of four"),
+            (frame("[1,0,0,0]"), "a list is wanted"),
+            (
+                r#"{"w": 640, "h": 480, "frames": [{"file_path": "a.png"}]}"#.into(),
+                "a.png: says nothing about its focal",
+            ),
+            (r#"{"fl_x": 640, "frames": [{"file_path": "a.png"}]}"#.into(), "`w` and `h` are missing"),
+            (r#"{"fl_x": 640, "w": 9, "h": 9, "s1": 0.1, "frames": []}"#.into(), "`s1`"),
             (format!(r#"{{{HEAD}, "table": 0.1, "frames": []}}"#), "a robot's base frame"),
-            ("{}".into(), "frames"),
+            ("{}".into(), "has no `frames`"),
         ];
         for (text, what) in cases {
             let line = read_text(&text).expect_err("it is refused");
-            assert!(line.contains(what) && !line.contains('\n'), "{line}");
+            assert!(line.contains(what) && !line.contains('\n') && !line.contains("expected"), "{line}");
         }
     }
 }

@@ -1,8 +1,8 @@
 //! How good it is, by pictures that took no part.
 
+use crate::remark::Remark;
 use crate::scan::Frame;
 use crate::splats;
-use crate::views::Remark;
 use fusion::Surface;
 use fusion::plane::Level;
 use splat::{Mesh, SplatCloud};

@@ -14,9 +14,10 @@ mod views;
 pub use judge::HeldOut;
 
 use crate::mesh::{self, Mesh};
+use crate::remark::Remark;
 use crate::scan::{Frame, Scale, ScaleSource, Scan, ScanError};
 use crate::splats;
-use crate::views::{Remark, spread};
+use crate::views::spread;
 use fusion::Surface;
 use fusion::fuse::{Grid, Settings as Fineness, View};
 use fusion::plane::{Level, levels, table};

@@ -1,8 +1,9 @@
 //! The views of a scene: sharp ones with depth, those held out apart; and whether poses and depth belong together.
 
 use super::SceneError;
+use crate::remark::Remark;
 use crate::scan::{FEWEST_VIEWS, Frame, Scan, ScanError};
-use crate::views::{Remark, is_held_out, read_all, without_blurred};
+use crate::views::{is_held_out, read_all, without_blurred};
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, UnitQuaternion, Vector3};
 use rayon::prelude::*;
 
@@ -41,7 +42,7 @@ pub(super) fn read(scan: &Scan, done: impl Fn(u64) + Sync) -> Result<Views, Scen
     }
     let frames = read_all(scan, LONGEST, |view, by| scan.whole_frame(view, by), done)?;
     let count = frames.len();
-    let mut remarks = Vec::new();
+    let mut remarks = scan.remarks.clone();
     let (frames, empty): (Vec<Frame>, Vec<Frame>) =
         frames.into_iter().partition(|frame| frame.depth.iter().any(|z| *z > 0.0));
     if !empty.is_empty() {
