@@ -1,10 +1,12 @@
 //! Marks of a person or of a network in pictures of a scan, as a JSON file: docs/reconstruct.md says what stands in it.
 
 use super::MarkedView;
-use crate::scan::{Scan, ScanError};
+use crate::scan::{Scan, ScanError, View};
 use nalgebra::Isometry3;
 use serde::Deserialize;
+use shared_mem::budget::Budget;
 use shared_mem::input;
+use shared_mem::json;
 use shared_mem::msg::image::PixelEncoding;
 use shared_mem::recording::{Picture, read_picture};
 use std::path::{Path, PathBuf};
@@ -56,8 +58,9 @@ impl Marks {
     /// # Errors
     /// [`ScanError`] in one line.
     pub fn read(path: &Path) -> Result<Self, ScanError> {
-        let text = input::text(path, input::Kind::Configuration)?;
-        let file: File = serde_json::from_str(&text).map_err(|error| ScanError::content(path, error.to_string()))?;
+        let bytes = input::bytes(path, input::Kind::Configuration)?;
+        let file: File = json::read(&bytes, &Budget::of(bytes.len() as u64))
+            .map_err(|what| ScanError::content(path, format!("{what}; docs/reconstruct.md has its keys")))?;
         let [lower, upper] = file.limits;
         let fine =
             file.limits.iter().all(|limit| LIMITS.contains(limit)) && lower <= 0.0 && upper >= 0.0 && lower < upper;
@@ -79,17 +82,7 @@ impl Marks {
     pub fn views(&self, scan: &Scan, mesh_from_scan: &Isometry3<f64>) -> Result<Vec<MarkedView>, ScanError> {
         let folder = self.path.parent().unwrap_or(Path::new(""));
         let view = |entry: &Entry| {
-            let named =
-                |name: &str| name == entry.picture || Path::new(name).file_name() == Some(entry.picture.as_ref());
-            let view = scan.views.iter().find(|view| named(&view.name)).ok_or_else(|| {
-                let what = format!(
-                    "the scan {} has no picture `{}`; its first is `{}`",
-                    scan.folder.display(),
-                    entry.picture,
-                    scan.views.first().map_or("", |view| view.name.as_str())
-                );
-                ScanError::content(&self.path, what)
-            })?;
+            let view = named(scan, &entry.picture).map_err(|what| ScanError::content(&self.path, what))?;
             Ok(MarkedView {
                 name: view.name.clone(),
                 camera: view.camera,
@@ -99,6 +92,25 @@ impl Marks {
             })
         };
         self.views.iter().map(view).collect()
+    }
+}
+
+/// The view of a picture: of its whole path, or of its name where no other has it.
+fn named<'a>(scan: &'a Scan, picture: &str) -> Result<&'a View, String> {
+    if let Some(view) = scan.views.iter().find(|view| view.name == picture) {
+        return Ok(view);
+    }
+    let mut bare = scan.views.iter().filter(|view| Path::new(&view.name).file_name() == Some(picture.as_ref()));
+    match (bare.next(), bare.next()) {
+        (Some(view), None) => Ok(view),
+        (Some(one), Some(other)) => {
+            Err(format!("`{picture}` could be `{}` or `{}`: give the whole path", one.name, other.name))
+        }
+        (None, _) => Err(format!(
+            "the scan {} has no picture `{picture}`; its first is `{}`",
+            scan.folder.display(),
+            scan.views.first().map_or("", |view| view.name.as_str())
+        )),
     }
 }
 

@@ -1,7 +1,7 @@
 //! What other trainers of splats begin with: pictures with the mask as alpha, where their cameras stand as a COLMAP model, and the splats, which such
 //! a trainer takes in place of the model's points (`init.ply`). The format: <https://colmap.github.io/format.html>.
 
-use super::stem;
+use super::stems::stems;
 use crate::scan::Frame;
 use nalgebra::{Isometry3, Point3};
 use shared_mem::msg::image::PixelEncoding;
@@ -17,12 +17,13 @@ pub fn dataset_files(frames: &[Frame], splats: &SplatCloud, origin: &Point3<f64>
     let mut cameras = String::from("# number, model, width, height, parameters\n");
     let mut images = String::from("# number, qw qx qy qz, x y z, camera, name; places of points in it\n");
     let mut files = Vec::new();
-    for (number, frame) in (1..).zip(frames) {
+    let stems = stems(frames.iter().map(|frame| frame.name.as_str()));
+    for ((number, frame), stem) in (1..).zip(frames).zip(stems) {
         let (model, parameters) = frame.camera.to_colmap();
         let (width, height) = (frame.camera.width, frame.camera.height);
         // A string takes whatever is written to it.
         let _written = writeln!(cameras, "{number} {model} {width} {height} {}", listed(&parameters));
-        let name = format!("{}.png", stem(&frame.name));
+        let name = format!("{stem}.png");
         let pose = listed(&camera_from(&frame.scan_from_camera, origin));
         let _written = writeln!(images, "{number} {pose} {number} {name}\n");
         let packed = if frame.mask.iter().all(|inside| *inside) {

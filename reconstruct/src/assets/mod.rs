@@ -7,6 +7,7 @@
 //! | `description` | URDF and the block for cell.toml |
 //! | `frame` | what all reports have in common |
 //! | `page` | the report |
+//! | `stems` | names of files that pictures become |
 //! | `summary` | the numbers as JSON |
 //! | `articulated` | the same for an object with a part that moves |
 //! | `scene` | the files of a scene, in the scan's frame |
@@ -17,6 +18,7 @@ mod description;
 mod frame;
 mod page;
 mod scene;
+mod stems;
 mod summary;
 
 pub use articulated::{
@@ -27,6 +29,7 @@ pub use scene::{LevelNumbers, SceneSummary, ViewNumbers, scene_files};
 pub use summary::Summary;
 
 use description::escaped;
+use stems::stems;
 
 use crate::mesh::{Mesh, obj, ply};
 use crate::object::{Object, is_certain};
@@ -85,20 +88,14 @@ pub fn files(object: &Object, pieces: &[Mesh], labels: &Labels) -> Vec<(PathBuf,
     for (number, piece) in pieces.iter().enumerate() {
         files.push((description::piece_file(number).into(), obj(piece).into_bytes()));
     }
-    for view in &object.held_out {
-        let stem = stem(&view.name);
+    let stems = stems(object.held_out.iter().map(|view| view.name.as_str()));
+    for (view, stem) in object.held_out.iter().zip(stems) {
         for (rgb, of) in [(&view.drawn.rgb, ""), (&view.splats, "_splats")] {
             let packed = pack_picture(PixelEncoding::Rgb8, view.width, view.height, rgb.as_flattened());
             files.extend(packed.ok().map(|bytes| (format!("held_out/{stem}{of}.png").into(), bytes)));
         }
     }
     files
-}
-
-/// A picture's path as one name, without its ending.
-fn stem(name: &str) -> String {
-    let joined = name.replace(['/', '\\'], "_");
-    joined.rsplit_once('.').map_or(joined.as_str(), |(stem, _)| stem).to_owned()
 }
 
 /// Of a corner of the fine mesh; grey where it is a guess.

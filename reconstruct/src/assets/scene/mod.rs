@@ -2,11 +2,11 @@
 
 mod page;
 
-use super::stem;
+use super::stems::stems;
 use crate::mesh::{Mesh, obj, ply};
+use crate::remark::Remark;
 use crate::scan::Scale;
 use crate::scene::{HeldOut, Scene};
-use crate::views::Remark;
 use serde::Serialize;
 use shared_mem::msg::image::PixelEncoding;
 use shared_mem::recording::pack_picture;
@@ -146,8 +146,8 @@ pub fn scene_files(scene: &Scene, command: &str) -> Vec<(PathBuf, Vec<u8>)> {
         ("report.html".into(), page::page(scene, &summary, command).into_bytes()),
     ];
     files.extend(summary.block().map(|block| ("cell_scene.toml".into(), block.into_bytes())));
-    for view in &scene.held_out {
-        let stem = stem(&view.name);
+    let stems = stems(scene.held_out.iter().map(|view| view.name.as_str()));
+    for (view, stem) in scene.held_out.iter().zip(stems) {
         let rgb = pack_picture(PixelEncoding::Rgb8, view.width, view.height, view.splats.as_flattened());
         files.extend(rgb.ok().map(|bytes| (format!("held_out/{stem}.png").into(), bytes)));
         // Beyond what 16 bits hold there is none.
