@@ -83,17 +83,13 @@ impl SplatCloud {
         Self { splats: splats.collect(), degree: self.degree, harmonics }
     }
 
-    pub(super) fn check(&self) -> Result<(), String> {
-        let bad =
-            self.splats.iter().zip(self.harmonics.chunks_exact(self.coefficients())).position(|(splat, colour)| {
-                let place = splat.centre.coords.iter().chain(splat.sigma.iter()).chain(splat.rotation.coords.iter());
-                !place.chain([&splat.opacity]).chain(colour.iter().flatten()).all(|value| value.is_finite())
-            });
-        match bad {
-            Some(number) => {
-                Err(format!("splat {number} of {} holds a value that is no finite number", self.splats.len()))
-            }
-            None => Ok(()),
-        }
+    /// Of each splat whether all its values are finite numbers.
+    pub(super) fn finite(&self) -> Vec<bool> {
+        let colours = self.harmonics.chunks_exact(self.coefficients());
+        let finite = |(splat, colour): (&Splat, &[[f32; 3]])| {
+            let place = splat.centre.coords.iter().chain(splat.sigma.iter()).chain(splat.rotation.coords.iter());
+            place.chain([&splat.opacity]).chain(colour.iter().flatten()).all(|value| value.is_finite())
+        };
+        self.splats.iter().zip(colours).map(finite).collect()
     }
 }

@@ -3,7 +3,7 @@
 
 use super::cloud::{Splat, SplatCloud};
 use super::harmonics::FIRST;
-use super::ply::{Header, Kind, degree, float, word};
+use super::ply::{File, Kind, Read, degree, float, word};
 use nalgebra::{Point3, Quaternion, UnitQuaternion, Vector3};
 
 const CHUNK: usize = 256;
@@ -12,9 +12,9 @@ const CHUNK: usize = 256;
 struct Bounds([[[f32; 3]; 2]; 3]);
 
 /// The splats of such a file.
-pub(super) fn read(header: &Header, bytes: &[u8]) -> Result<SplatCloud, String> {
-    let chunks = header.element("chunk").ok_or("it has no table `chunk`")?;
-    let vertices = header.element("vertex").ok_or("it has no table `vertex`")?;
+pub(super) fn read(file: &File<'_>) -> Result<Read, String> {
+    let chunks = file.element("chunk").ok_or("it has no table `chunk`")?;
+    let vertices = file.element("vertex").ok_or("it has no table `vertex`")?;
     let places = bounds_columns(chunks)?;
     let packed = |name: &str| vertices.column(name, Kind::Word).ok_or_else(|| format!("it has no column `{name}`"));
     let columns =
@@ -22,18 +22,24 @@ pub(super) fn read(header: &Header, bytes: &[u8]) -> Result<SplatCloud, String> 
     if chunks.count < vertices.count.div_ceil(CHUNK) {
         return Err(format!("it has {} chunks for {} splats, of which each holds 256", chunks.count, vertices.count));
     }
-    let bounds: Vec<Bounds> = chunks
-        .rows(bytes)
+    let bounds: Vec<Bounds> = file
+        .rows(chunks)
         .map(|row| {
             Bounds(places.map(|ends| ends.map(|three| three.map(|at| at.map_or(f32::NAN, |at| float(row, at))))))
         })
         .collect();
-    let harmonics = header.element("sh").filter(|sh| sh.count == vertices.count);
+    let harmonics = file.element("sh");
+    if let Some(sh) = harmonics.filter(|sh| sh.count != vertices.count) {
+        return Err(format!("it has {} rows of colours for {} splats", sh.count, vertices.count));
+    }
     let rest = harmonics.map_or(0, |sh| sh.stride());
     let degree = degree(rest)?;
+    if degree > 3 {
+        return Err(format!("its colours are of degree {degree}, and compressed ones go up to 3"));
+    }
     let mut cloud = SplatCloud { degree, ..SplatCloud::default() };
-    let mut more = harmonics.map(|sh| sh.rows(bytes));
-    for (number, row) in vertices.rows(bytes).enumerate() {
+    let mut more = harmonics.map(|sh| file.rows(sh));
+    for (number, row) in file.rows(vertices).enumerate() {
         let [position, rotation, scale, color] = columns.map(|at| word(row, at));
         let Bounds([place, size, light]) = &bounds[number / CHUNK];
         let [r, g, b] = [color >> 24, color >> 16 & 255, color >> 8 & 255].map(|v| v as f32 / 255.0);
@@ -52,7 +58,7 @@ pub(super) fn read(header: &Header, bytes: &[u8]) -> Result<SplatCloud, String> 
             cloud.harmonics.extend((0..third).map(|k| [value(k), value(third + k), value(2 * third + k)]));
         }
     }
-    Ok(cloud)
+    Ok(Read { cloud, remarks: Vec::new() })
 }
 
 type Columns = [[[Option<usize>; 3]; 2]; 3];

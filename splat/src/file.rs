@@ -2,6 +2,7 @@
 
 use super::cloud::SplatCloud;
 use super::{compressed, ply};
+use shared_mem::console;
 use shared_mem::input::{self, InputError};
 use shared_mem::output::{self, Output, OutputError};
 use std::io::Write as _;
@@ -38,13 +39,18 @@ pub enum SplatError {
 }
 
 impl SplatCloud {
-    /// Reads a PLY file of either kind.
+    /// Reads a PLY file of either kind, and says on standard error what was left out of it.
     ///
     /// # Errors
-    /// [`SplatError`] when it is missing, cut short, holds values that are no numbers, or is another kind of file.
+    /// [`SplatError`] when it is missing, cut short, most of its splats hold values that are no numbers, or it is another kind of
+    /// file.
     pub fn read(path: &Path) -> Result<Self, SplatError> {
         let bytes = input::bytes(path, input::Kind::Splats)?;
-        Self::parse(&bytes).map_err(|what| SplatError::Content { path: path.to_owned(), what })
+        let read = parsed(&bytes).map_err(|what| SplatError::Content { path: path.to_owned(), what })?;
+        for remark in &read.remarks {
+            console::line(format_args!("{}: {remark}", path.display()));
+        }
+        Ok(read.cloud)
     }
 
     /// The same from a file's bytes.
@@ -52,14 +58,7 @@ impl SplatCloud {
     /// # Errors
     /// A sentence that says what is wrong.
     pub fn parse(bytes: &[u8]) -> Result<Self, String> {
-        let header = ply::Header::parse(bytes)?;
-        let cloud = if header.element("chunk").is_some() {
-            compressed::read(&header, bytes)?
-        } else {
-            ply::read(&header, bytes)?
-        };
-        cloud.check()?;
-        Ok(cloud)
+        Ok(parsed(bytes)?.cloud)
     }
 
     /// A 3DGS PLY.
@@ -83,4 +82,20 @@ impl SplatCloud {
     pub fn write_to(&self, output: &mut Output) -> Result<(), OutputError> {
         output.write_all(&self.ply()).map_err(|error| OutputError::of(output.path(), error))
     }
+}
+
+/// The splats of a file whose values are numbers. Trainers leave a few in a million that are none.
+fn parsed(bytes: &[u8]) -> Result<ply::Read, String> {
+    let file = ply::File::parse(bytes)?;
+    let mut read = if file.element("chunk").is_some() { compressed::read(&file)? } else { ply::read(&file)? };
+    let (all, fine) = (read.cloud.splats.len(), read.cloud.finite());
+    let left_out = fine.iter().filter(|fine| !**fine).count();
+    if 2 * left_out > all {
+        return Err(format!("{left_out} of {all} splats hold a value that is no finite number"));
+    }
+    if left_out > 0 {
+        read.cloud = read.cloud.only(|number| fine[number]);
+        read.remarks.push(format!("{left_out} of {all} splats left out: they hold a value that is no finite number"));
+    }
+    Ok(read)
 }

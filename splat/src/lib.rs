@@ -31,6 +31,7 @@ mod links;
 mod loss;
 mod mesh;
 mod ply;
+mod ply_rows;
 mod project;
 mod raster;
 mod real;

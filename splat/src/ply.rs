@@ -1,29 +1,52 @@
-//! PLY: the header of any binary little-endian file, and the columns of 3D Gaussian splats as their first
-//! implementation writes them (Kerbl et al. 2023): `x y z f_dc_* f_rest_* opacity scale_* rot_*`, all `float`; opacity
-//! as a logit, scales as logarithms, rotations `w, x, y, z`.
+//! PLY: the header of any file, and the columns of 3D Gaussian splats as their first implementation writes them (Kerbl et al.
+//! 2023): `x y z f_dc_* f_rest_* opacity scale_* rot_*`, in any order, `float` or `double`; opacity as a logit, scales as
+//! logarithms, rotations `w, x, y, z`. 2D splats (Huang et al. 2024) have two scales: along the normal they have no extent.
 
 use super::cloud::{Splat, SplatCloud};
+use super::ply_rows::{self, Format};
 use nalgebra::{Point3, Quaternion, UnitQuaternion, Vector3};
+use std::borrow::Cow;
 
 /// Longest header that is looked for [bytes].
 const LONGEST: usize = 1 << 16;
+/// Highest degree of the colours that is drawn, and that is read.
+const MOST: usize = 3;
+const HIGHEST: usize = 8;
+/// Thickness of a splat that has none, of its smaller extent: a rotation needs three axes.
+const THIN: f32 = 1e-3;
 
-/// What the header says.
+/// A file: what its header says, and its rows.
 #[derive(Debug)]
-pub(super) struct Header {
+pub(super) struct File<'a> {
     elements: Vec<Element>,
+    /// Binary and little-endian.
+    rows: Cow<'a, [u8]>,
 }
 
 /// One table of the file.
 #[derive(Debug)]
 pub(super) struct Element {
-    name: String,
+    pub(super) name: String,
     /// Rows.
     pub(super) count: usize,
     /// Names and sizes of the columns [bytes].
     columns: Vec<(String, Kind)>,
-    /// Where it begins [bytes].
+    /// Where it begins among the rows [bytes].
     begin: usize,
+}
+
+/// Splats, and what is to be said about them.
+#[derive(Debug, Default)]
+pub(super) struct Read {
+    pub(super) cloud: SplatCloud,
+    pub(super) remarks: Vec<String>,
+}
+
+/// Where a number stands in a row, and what it is.
+#[derive(Debug, Clone, Copy)]
+struct Column {
+    at: usize,
+    kind: Kind,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -47,7 +70,7 @@ impl Kind {
         })
     }
 
-    fn bytes(self) -> usize {
+    pub(super) fn bytes(self) -> usize {
         match self {
             Self::Byte => 1,
             Self::Short => 2,
@@ -57,22 +80,29 @@ impl Kind {
     }
 }
 
-impl Header {
-    pub(super) fn parse(bytes: &[u8]) -> Result<Self, String> {
-        const END: &[u8] = b"end_header\n";
-        if !bytes.starts_with(b"ply") {
-            return Err("it is no PLY file".into());
-        }
-        let head = &bytes[..bytes.len().min(LONGEST)];
-        let end = head.windows(END.len()).position(|window| window == END).ok_or("its header has no end")?;
-        let text = std::str::from_utf8(&head[..end]).map_err(|_| "its header is no text")?;
-        let mut elements: Vec<Element> = Vec::new();
-        for line in text.lines().skip(1) {
+/// The header's text, and where the rows begin. Lines end as the first one does: the bytes of a row may be anything.
+fn header(bytes: &[u8]) -> Result<(&str, usize), String> {
+    let end: &[u8] = match bytes {
+        [b'p', b'l', b'y', b'\r', b'\n', ..] => b"\r\n",
+        [b'p', b'l', b'y', b'\r', ..] => b"\r",
+        [b'p', b'l', b'y', ..] => b"\n",
+        _ => return Err("it is no PLY file".into()),
+    };
+    let last = [end, b"end_header", end].concat();
+    let head = &bytes[..bytes.len().min(LONGEST)];
+    let at = head.windows(last.len()).position(|window| window == last).ok_or("its header has no end")?;
+    let text = std::str::from_utf8(&head[..at]).map_err(|_| "its header is no text")?;
+    Ok((text, at + last.len()))
+}
+
+impl<'a> File<'a> {
+    pub(super) fn parse(bytes: &'a [u8]) -> Result<Self, String> {
+        let (text, begin) = header(bytes)?;
+        let (mut elements, mut format) = (Vec::<Element>::new(), None);
+        for line in text.split(['\r', '\n']).skip(1) {
             let words: Vec<&str> = line.split_whitespace().collect();
             match words[..] {
-                ["format", format, _] if format != "binary_little_endian" => {
-                    return Err(format!("its format is {format}, not binary_little_endian"));
-                }
+                ["format", name, ..] => format = Some(Format::parse(name)?),
                 ["element", name, count] => {
                     let count = count.parse().map_err(|_| format!("it has `{count}` rows of {name}"))?;
                     elements.push(Element { name: name.into(), count, columns: Vec::new(), begin: 0 });
@@ -86,16 +116,33 @@ impl Header {
                 _ => {}
             }
         }
-        let mut begin = end + END.len();
+        let format = format.ok_or("its header does not say its format")?;
+        let body = &bytes[begin..];
+        let mut end = 0usize;
+        for element in &elements {
+            let size = element.count.checked_mul(format.least(element)).and_then(|size| end.checked_add(size));
+            end = size.ok_or("it claims more rows than any file holds")?;
+        }
+        if end > body.len() {
+            return Err(format!("it is cut short: {} bytes of {}", bytes.len(), begin + end));
+        }
+        let rows = match format {
+            Format::Little => Cow::Borrowed(body),
+            Format::Big => Cow::Owned(ply_rows::turned(&elements, body)),
+            Format::Ascii => Cow::Owned(ply_rows::parsed(&elements, body)?),
+        };
+        let mut begin = 0;
         for element in &mut elements {
             element.begin = begin;
-            let size = element.count.checked_mul(element.stride()).and_then(|size| begin.checked_add(size));
-            begin = size.ok_or("it claims more rows than any file holds")?;
+            begin += element.count * element.stride();
         }
-        if begin > bytes.len() {
-            return Err(format!("it is cut short: {} bytes of {begin}", bytes.len()));
-        }
-        Ok(Self { elements })
+        Ok(Self { elements, rows })
+    }
+
+    /// The rows of one of its tables.
+    pub(super) fn rows(&self, of: &Element) -> impl Iterator<Item = &[u8]> {
+        let stride = of.stride();
+        self.rows[of.begin..of.begin + of.count * stride].chunks_exact(stride.max(1))
     }
 
     pub(super) fn element(&self, name: &str) -> Option<&Element> {
@@ -105,25 +152,44 @@ impl Header {
 
 impl Element {
     pub(super) fn stride(&self) -> usize {
-        self.columns.iter().map(|(_, kind)| kind.bytes()).sum()
+        self.kinds().map(Kind::bytes).sum()
+    }
+
+    /// What its columns hold.
+    pub(super) fn kinds(&self) -> impl Iterator<Item = Kind> {
+        self.columns.iter().map(|(_, kind)| *kind)
     }
 
     /// Where a column of this type begins within a row [bytes].
     pub(super) fn column(&self, wanted: &str, kind: Kind) -> Option<usize> {
+        self.find(wanted).filter(|column| column.kind == kind).map(|column| column.at)
+    }
+
+    fn find(&self, wanted: &str) -> Option<Column> {
         let mut at = 0;
-        for (name, own) in &self.columns {
+        for (name, kind) in &self.columns {
             if name == wanted {
-                return (*own == kind).then_some(at);
+                return Some(Column { at, kind: *kind });
             }
-            at += own.bytes();
+            at += kind.bytes();
         }
         None
     }
 
-    /// The rows; the header made sure that all are there.
-    pub(super) fn rows<'a>(&self, bytes: &'a [u8]) -> impl Iterator<Item = &'a [u8]> {
-        let stride = self.stride();
-        bytes[self.begin..self.begin + self.count * stride].chunks_exact(stride.max(1))
+    fn has(&self, wanted: &str) -> bool {
+        self.columns.iter().any(|(name, _)| name == wanted)
+    }
+}
+
+impl Column {
+    fn value(self, row: &[u8]) -> f32 {
+        match self.kind {
+            Kind::Double => {
+                let bytes = row.get(self.at..self.at + 8).and_then(|b| b.try_into().ok());
+                bytes.map_or(f32::NAN, |bytes| f64::from_le_bytes(bytes) as f32)
+            }
+            _ => float(row, self.at),
+        }
     }
 }
 
@@ -138,48 +204,60 @@ pub(super) fn word(row: &[u8], at: usize) -> u32 {
 }
 
 /// The splats of a file with the usual columns.
-pub(super) fn read(header: &Header, bytes: &[u8]) -> Result<SplatCloud, String> {
-    let vertices = header.element("vertex").ok_or("it has no table `vertex`")?;
+pub(super) fn read(file: &File<'_>) -> Result<Read, String> {
+    let vertices = file.element("vertex").ok_or("it has no table `vertex`")?;
     let column = |name: &str| {
-        vertices.column(name, Kind::Float).ok_or_else(|| format!("it has no column `{name}` of floats: no splats"))
+        let found = vertices.find(name).filter(|column| matches!(column.kind, Kind::Float | Kind::Double));
+        found.ok_or_else(|| format!("it has no column `{name}` of floats or doubles: no splats"))
     };
-    let columns = |names: [&str; 3]| -> Result<[usize; 3], String> {
+    let columns = |names: [&str; 3]| -> Result<[Column; 3], String> {
         Ok([column(names[0])?, column(names[1])?, column(names[2])?])
     };
     let place = columns(["x", "y", "z"])?;
-    let scale = columns(["scale_0", "scale_1", "scale_2"])?;
+    let scale = [column("scale_0")?, column("scale_1")?];
+    let thickness = vertices.has("scale_2").then(|| column("scale_2")).transpose()?;
     let first = columns(["f_dc_0", "f_dc_1", "f_dc_2"])?;
     let turn = [column("rot_0")?, column("rot_1")?, column("rot_2")?, column("rot_3")?];
     let opacity = column("opacity")?;
-    let rest: Vec<usize> = (0..45).map_while(|n| column(&format!("f_rest_{n}")).ok()).collect();
-    let degree = degree(rest.len())?;
-    let more = rest.len() / 3;
-    let mut cloud = SplatCloud { degree, ..SplatCloud::default() };
-    for row in vertices.rows(bytes) {
-        let three = |at: [usize; 3]| at.map(|at| float(row, at));
-        let [w, x, y, z] = turn.map(|at| float(row, at));
+    let names = (0..).map(|n| format!("f_rest_{n}")).take_while(|name| vertices.has(name));
+    let rest = names.map(|name| column(&name)).collect::<Result<Vec<_>, _>>()?;
+    let whole = degree(rest.len())?;
+    let (degree, third) = (whole.min(MOST), rest.len() / 3);
+    let more = (degree + 1).pow(2) - 1;
+    let mut read = Read { cloud: SplatCloud { degree, ..SplatCloud::default() }, remarks: Vec::new() };
+    if degree < whole {
+        read.remarks.push(format!("its colours are of degree {whole}, and those above degree {MOST} were left out"));
+    }
+    if thickness.is_none() {
+        read.remarks.push("its splats have two scales: they were read as discs without thickness".into());
+    }
+    for row in file.rows(vertices) {
+        let three = |of: [Column; 3]| of.map(|column| column.value(row));
+        let [w, x, y, z] = turn.map(|column| column.value(row));
         let turn = Quaternion::new(w, x, y, z);
         // A rotation without length says nothing, and a splat that is a ball needs none.
         let rotation =
             if turn.norm() == 0.0 { UnitQuaternion::identity() } else { UnitQuaternion::from_quaternion(turn) };
-        cloud.splats.push(Splat {
+        let [a, b] = scale.map(|column| column.value(row).exp());
+        let c = thickness.map_or(THIN * a.min(b), |column| column.value(row).exp());
+        read.cloud.splats.push(Splat {
             centre: Point3::from(three(place)),
             rotation,
-            sigma: Vector3::from(three(scale)).map(f32::exp),
-            opacity: 1.0 / (1.0 + (-float(row, opacity)).exp()),
+            sigma: Vector3::new(a, b, c),
+            opacity: 1.0 / (1.0 + (-opacity.value(row)).exp()),
         });
-        cloud.harmonics.push(three(first));
+        read.cloud.harmonics.push(three(first));
         // All of red, then green, then blue.
-        cloud.harmonics.extend((0..more).map(|k| three([rest[k], rest[more + k], rest[2 * more + k]])));
+        let coefficient = |k: usize| three([rest[k], rest[third + k], rest[2 * third + k]]);
+        read.cloud.harmonics.extend((0..more).map(coefficient));
     }
-    Ok(cloud)
+    Ok(read)
 }
 
 /// The degree with so many coefficients beyond the first, three colours together.
 pub(super) fn degree(rest: usize) -> Result<usize, String> {
-    [0, 9, 24, 45]
-        .iter()
-        .position(|known| *known == rest)
+    (0..=HIGHEST)
+        .find(|degree| 3 * ((degree + 1).pow(2) - 1) == rest)
         .ok_or_else(|| format!("it has {rest} columns `f_rest_*`; degrees 0 to 3 have 0, 9, 24 or 45"))
 }
 

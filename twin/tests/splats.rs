@@ -2,14 +2,15 @@
 
 use nalgebra::{Isometry3, Matrix2, Matrix3, Point3, Translation3, UnitQuaternion, Vector2, Vector3};
 use proptest::prelude::*;
+use shared_mem::lens::Distortion;
 use splat::{Body, Lens, Picture, Shape, Splat, SplatCloud, Surroundings, render};
 use std::path::Path;
 use twin::render::{Hand, RobotSurface};
 
 const SIZE: [usize; 2] = [160, 120];
-const LENS: Lens = Lens { focal: [150.0, 140.0], centre: [81.3, 58.6], distortion: [0.0; 5] };
+const LENS: Lens = Lens { focal: [150.0, 140.0], centre: [81.3, 58.6], distortion: Distortion::NONE };
 const DARK: Surroundings = Surroundings { background: [0.0; 3], light: Vector3::new(0.0, 0.0, -1.0) };
-const BENT: Lens = Lens { distortion: [-0.08, 0.04, 6e-4, -4e-4, 0.0], ..LENS };
+const BENT: Lens = Lens { distortion: Distortion::brown([-0.08, 0.04, 6e-4, -4e-4, 0.0]), ..LENS };
 
 fn splat(centre: [f32; 3], sigma: [f32; 3], turn: [f32; 3], opacity: f32) -> Splat {
     let rotation = UnitQuaternion::from_scaled_axis(Vector3::from(turn));
@@ -103,7 +104,10 @@ fn the_robots_silhouette_is_what_rays_hit() {
     let camera_from_base = flip * Isometry3::look_at_rh(&eye, &Point3::new(0.2, 0.0, 0.35), &up);
     let mut placed = Vec::new();
     surface.for_each(&q, |part, pose| placed.push((part, camera_from_base * pose)));
-    for lens in [LENS, BENT] {
+    let fisheye = Lens { distortion: Distortion::Fisheye([-0.03, 0.008, -0.004, 6e-4]), ..LENS };
+    let rational = [1.2, 0.35, 4e-4, -7e-4, 0.02, 1.45, 0.52, 0.06];
+    let rational = Lens { distortion: Distortion::Polynomial(rational), ..LENS };
+    for lens in [LENS, BENT, rational, fisheye] {
         let bodies: Vec<Body<'_>> = (placed.iter())
             .map(|(part, pose)| Body {
                 shape: Shape::Mesh(&surface.parts()[*part]),
@@ -191,6 +195,113 @@ fn a_file_is_read_as_its_columns_say() {
     assert_eq!((cloud.degree, cloud.harmonics.len()), (0, 2));
 }
 
+/// Three splats of the second degree, and a file of them with a header and rows as another program would write them.
+fn written(change: impl Fn(&str) -> String, row: impl Fn(&[f32], &mut Vec<u8>)) -> (SplatCloud, Vec<u8>) {
+    let splat = |i: usize| Splat {
+        centre: Point3::new(0.1 * i as f32, -0.2, 0.3),
+        rotation: UnitQuaternion::from_euler_angles(0.1 * i as f32, 0.2, -0.3),
+        sigma: Vector3::new(0.01, 0.02, 0.03 + 0.01 * i as f32),
+        opacity: 0.3 + 0.1 * i as f32,
+    };
+    let harmonics = (0..27).map(|i| [0.01 * i as f32, 0.02, -0.03 * i as f32]).collect();
+    let cloud = SplatCloud { splats: (0..3).map(splat).collect(), degree: 2, harmonics };
+    let bytes = cloud.ply();
+    let end = bytes.windows(11).position(|window| window == b"end_header\n").expect("an end") + 11;
+    let mut out = change(&String::from_utf8_lossy(&bytes[..end])).into_bytes();
+    let values: Vec<f32> =
+        bytes[end..].chunks_exact(4).map(|four| f32::from_le_bytes(four.try_into().expect("four"))).collect();
+    values.chunks_exact(values.len() / 3).for_each(|values| row(values, &mut out));
+    (cloud, out)
+}
+
+#[test]
+fn files_of_other_systems_and_in_other_numbers_hold_the_same_splats() {
+    let little = |values: &[f32], out: &mut Vec<u8>| values.iter().for_each(|v| out.extend(v.to_le_bytes()));
+    let cases = [
+        written(|header| header.replace('\n', "\r\n"), little),
+        written(|header| header.replace('\n', "\r"), little),
+        written(|header| header.replace("element", "comment of a trainer\nobj_info x\nelement"), little),
+        written(
+            |header| header.replace("little", "big"),
+            |values, out| values.iter().for_each(|v| out.extend(v.to_be_bytes())),
+        ),
+        written(
+            |header| header.replace("property float", "property double"),
+            |values, out| values.iter().for_each(|v| out.extend(f64::from(*v).to_le_bytes())),
+        ),
+        written(
+            |header| header.replace("binary_little_endian", "ascii"),
+            |values, out| values.iter().for_each(|v| out.extend(format!("{v} ").into_bytes())),
+        ),
+        // The last column first.
+        written(
+            |header| {
+                header
+                    .replace("property float rot_3\n", "")
+                    .replace("property float x\n", "property float rot_3\nproperty float x\n")
+            },
+            |values, out| little(&[&values[values.len() - 1..], &values[..values.len() - 1]].concat(), out),
+        ),
+    ];
+    for (cloud, bytes) in cases {
+        let read = SplatCloud::parse(&bytes).expect("splats");
+        assert_eq!((read.degree, read.splats.len()), (2, 3));
+        let off = |a: f32, b: f32| (a - b).abs() < 1e-5;
+        for (read, splat) in read.splats.iter().zip(&cloud.splats) {
+            assert!((read.centre - splat.centre).norm() < 1e-5 && (read.sigma - splat.sigma).norm() < 1e-5);
+            assert!(read.rotation.angle_to(&splat.rotation) < 1e-3 && off(read.opacity, splat.opacity));
+        }
+        let colours = read.harmonics.as_flattened().iter().zip(cloud.harmonics.as_flattened());
+        assert!(colours.into_iter().all(|(a, b)| off(*a, *b)));
+    }
+}
+
+#[test]
+fn a_splat_that_holds_no_number_costs_none_of_the_others() {
+    let nan_in = |column: usize| {
+        let nan = move |values: &[f32], out: &mut Vec<u8>| {
+            let is_second = (values[0] - 0.1).abs() < 1e-6;
+            for (number, value) in values.iter().enumerate() {
+                let value = if is_second && number == column { f32::NAN } else { *value };
+                out.extend(value.to_le_bytes());
+            }
+        };
+        written(str::to_owned, nan)
+    };
+    for column in [1, 4, 10, 30, 33, 36] {
+        let (cloud, bytes) = nan_in(column);
+        let read = SplatCloud::parse(&bytes).expect("splats");
+        let centres: Vec<Point3<f32>> = read.splats.iter().map(|splat| splat.centre).collect();
+        assert_eq!(centres, [cloud.splats[0].centre, cloud.splats[2].centre], "column {column}");
+        assert_eq!(read.harmonics.len(), 18);
+    }
+}
+
+#[test]
+fn discs_and_colours_of_a_higher_degree_are_read_as_far_as_they_are_drawn() {
+    let without = |values: &[f32], out: &mut Vec<u8>| {
+        let values = values.iter().enumerate().filter(|(number, _)| *number != values.len() - 5);
+        values.for_each(|(_, v)| out.extend(v.to_le_bytes()));
+    };
+    let (cloud, bytes) = written(|header| header.replace("property float scale_2\n", ""), without);
+    let read = SplatCloud::parse(&bytes).expect("discs");
+    for (read, splat) in read.splats.iter().zip(&cloud.splats) {
+        assert!((read.sigma.xy() - splat.sigma.xy()).norm() < 1e-5 && read.sigma.z < 0.01 * splat.sigma.x);
+    }
+    // The fourth degree has 24 coefficients of each colour beyond the first; here each says its own number.
+    let more: String = (0..72).map(|n| format!("property float f_rest_{n}\n")).collect();
+    let header = format!("ply\nformat binary_little_endian 1.0\nelement vertex 1\n{}end_header\n", {
+        let names = "x y z f_dc_0 f_dc_1 f_dc_2 opacity scale_0 scale_1 scale_2 rot_0 rot_1 rot_2 rot_3";
+        names.split(' ').map(|name| format!("property float {name}\n")).collect::<String>() + &more
+    });
+    let rest = (0..72).map(|n| n as f32);
+    let values: Vec<f32> = [0.5; 14].into_iter().chain(rest).collect();
+    let bytes = [header.into_bytes(), values.iter().flat_map(|v| v.to_le_bytes()).collect()].concat();
+    let read = SplatCloud::parse(&bytes).expect("splats");
+    assert_eq!((read.degree, read.harmonics.len()), (3, 16));
+    assert_eq!((read.harmonics[1], read.harmonics[15]), ([0.0, 24.0, 48.0], [14.0, 38.0, 62.0]));
+}
+
 #[test]
 fn what_is_wrong_with_a_file_is_said_in_one_line() {
     let whole = file(&[[0.0; 3], [1.0; 3]], 0.5);
@@ -203,11 +314,13 @@ fn what_is_wrong_with_a_file_is_said_in_one_line() {
     for (bytes, told) in [
         (whole[..whole.len() - 1].to_vec(), "cut short"),
         (whole[..60].to_vec(), "no end"),
-        (file(&[[0.0; 3], [f32::NAN, 0.0, 0.0]], 0.5), "splat 1 of 2"),
+        (file(&[[0.0; 3], [f32::NAN, 0.0, 0.0], [f32::NAN; 3]], 0.5), "2 of 3 splats"),
         (file(&[[f32::INFINITY; 3]], 0.5), "no finite number"),
         (file(&[[0.0; 3]], 200.0), "no finite number"),
         (b"glTF".to_vec(), "no PLY"),
         (changed("binary_little_endian", "ascii"), "format is ascii"),
+        (changed("binary_little_endian", "binary"), "format is binary"),
+        (changed("format binary_little_endian 1.0\n", ""), "does not say its format"),
         (changed("vertex 2", "vertex 10000000"), "cut short"),
         (changed("vertex 2", "vertex 18446744073709551615"), "more rows"),
         (changed("scale_2", "size"), "`scale_2`"),
