@@ -18,6 +18,7 @@
 //! | [`lens`] | what lenses do to a pinhole's picture, both ways, and how other programs write them |
 //! | [`origin`] | where a recording comes from: a simulation, a robot, another recording |
 //! | [`budget`] | what reading one input may cost: memory and steps |
+//! | [`checksum`] | whether a file that was kept is still what was written |
 //! | [`input`] | the one way in for files: regular ones only, each kind up to a size |
 //! | [`output`] | files that are whole or not there: every writer but the live recorder goes through it |
 //! | [`ending`] | whether the process was asked to end |
@@ -37,6 +38,7 @@ pub mod answer;
 mod blocks;
 pub mod budget;
 pub mod cell;
+pub mod checksum;
 pub mod command_line;
 pub mod console;
 pub mod ending;

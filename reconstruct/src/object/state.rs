@@ -9,6 +9,8 @@ use super::pictures::Pictures;
 use super::pool::Pixel;
 use crate::field::{Field, Grid};
 use nalgebra::Point3;
+use shared_mem::checksum::{with_checksum, without_checksum};
+use shared_mem::console;
 use shared_mem::input::{self, InputError, Kind};
 use shared_mem::output::{self, OutputError};
 use std::hash::{DefaultHasher, Hash as _, Hasher as _};
@@ -18,7 +20,7 @@ use std::time::{Duration, Instant};
 /// How often it is written.
 const PAUSE: Duration = Duration::from_secs(45);
 /// First bytes of the file.
-const MAGIC: &[u8; 8] = b"TWINOBJ2";
+const MAGIC: &[u8; 8] = b"TWINOBJ3";
 
 /// What was kept cannot be read or written.
 #[derive(Debug, thiserror::Error)]
@@ -60,6 +62,7 @@ impl<'a> Keeper<'a> {
         options.edge.hash(&mut hasher);
         for frame in &pictures.train {
             frame.name.hash(&mut hasher);
+            format!("{:?}", frame.camera).hash(&mut hasher);
             frame.rgb.hash(&mut hasher);
             frame.mask.hash(&mut hasher);
             frame.depth.iter().for_each(|z| z.to_bits().hash(&mut hasher));
@@ -75,12 +78,18 @@ impl<'a> Keeper<'a> {
         if !self.path.is_file() {
             return Ok(None);
         }
-        Ok(parse(&input::bytes(self.path, Kind::Array)?, self.question))
+        let bytes = input::bytes(self.path, Kind::Array)?;
+        let content = without_checksum(&bytes);
+        if content.is_none() && bytes.starts_with(MAGIC) {
+            let file = self.path.display();
+            console::line(format_args!("{file} is damaged: its checksum is another one; the work starts anew"));
+        }
+        Ok(content.and_then(|content| parse(content, self.question)))
     }
 
     pub(super) fn keep(&mut self, state: &State) -> Result<(), StateError> {
         self.last = Instant::now();
-        Ok(output::write(self.path, bytes(state, self.question))?)
+        Ok(output::write(self.path, with_checksum(bytes(state, self.question)))?)
     }
 
     /// Where the training of the splats is kept.
@@ -179,6 +188,15 @@ mod tests {
         (state.level, state.step, state.corrections[1][4]) = (1, 77, 0.5);
         state.adam.second[59] = [1.0, 2.0, 3.0, 4.0];
         state.band = Some(Band::new(&grid, &state.field.distance, 20.0));
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("a.state");
+        let mut keeper = Keeper { path: &path, question: 9, last: Instant::now() };
+        keeper.keep(&state).expect("room");
+        assert_eq!(keeper.take().expect("a file").as_ref(), Some(&state));
+        let mut damaged = std::fs::read(&path).expect("a file");
+        damaged[200] ^= 1;
+        std::fs::write(&path, damaged).expect("a file");
+        assert!(keeper.take().expect("a file").is_none());
         let whole = bytes(&state, 9);
         assert_eq!(parse(&whole, 9).as_ref(), Some(&state));
         assert!(parse(&whole, 8).is_none());

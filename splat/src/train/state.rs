@@ -4,6 +4,7 @@ use super::adam::Moments;
 use super::{Photograph, Settings};
 use crate::cloud::SplatCloud;
 use crate::gradient::Parameters;
+use shared_mem::checksum::{with_checksum, without_checksum};
 use shared_mem::input::{self, InputError};
 use shared_mem::output::{self, OutputError};
 use std::hash::{DefaultHasher, Hash as _, Hasher as _};
@@ -23,7 +24,7 @@ pub enum StateError {
     Other(PathBuf),
 }
 
-const MAGIC: &[u8; 8] = b"splats 1";
+const MAGIC: &[u8; 8] = b"splats 2";
 /// Magic, mark, step.
 const HEAD: usize = 24;
 
@@ -51,7 +52,7 @@ pub(super) fn read(path: &Path, mark: u64, cloud: &SplatCloud) -> Result<Option<
 }
 
 fn parse(bytes: &[u8], mark: u64, cloud: &SplatCloud) -> Option<Moments> {
-    let (head, numbers) = bytes.split_at_checked(HEAD)?;
+    let (head, numbers) = without_checksum(bytes)?.split_at_checked(HEAD)?;
     let word = |at: usize| Some(u64::from_le_bytes(head.get(at..at + 8)?.try_into().ok()?));
     if !head.starts_with(MAGIC) || word(8)? != mark {
         return None;
@@ -74,5 +75,5 @@ pub(super) fn write(path: &Path, mark: u64, moments: &Moments) -> Result<(), Sta
     for part in [&moments.at, &moments.mean, &moments.square] {
         part.columns().into_iter().flatten().for_each(|value| bytes.extend(value.to_le_bytes()));
     }
-    Ok(output::write(path, bytes)?)
+    Ok(output::write(path, with_checksum(bytes))?)
 }

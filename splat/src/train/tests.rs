@@ -4,9 +4,10 @@ use super::*;
 use crate::cloud::Splat;
 use crate::lens::Lens;
 use nalgebra::{Isometry3, Point3, UnitQuaternion};
+use shared_mem::lens::Distortion;
 
 const SIZE: [usize; 2] = [64, 48];
-const LENS: Lens = Lens { focal: [80.0; 2], centre: [31.5, 23.5], distortion: [0.0; 5] };
+const LENS: Lens = Lens { focal: [80.0; 2], centre: [31.5, 23.5], distortion: Distortion::NONE };
 
 /// A ball of discs; `color` of a direction.
 fn ball(color: impl Fn(&Vector3<f32>) -> [f32; 3]) -> SplatCloud {
@@ -93,6 +94,14 @@ fn a_training_that_is_stopped_goes_on_to_the_same_end() {
     assert_eq!((first, resumed.expect("a cloud")), (12, whole.clone()));
     let again = train(&grey, &photographs, &settings, |_| panic!("it has come to its end"));
     assert_eq!(again.expect("a cloud"), whole);
+    // A bit of a number that flipped on the disk.
+    let path = folder.path().join("state");
+    let mut bytes = std::fs::read(&path).expect("the state");
+    let middle = bytes.len() / 2;
+    bytes[middle] ^= 1;
+    std::fs::write(&path, bytes).expect("a file");
+    let damaged = train(&grey, &photographs, &settings, going).expect_err("damaged").to_string();
+    assert!(damaged.contains("is damaged"), "{damaged}");
 }
 
 #[test]
