@@ -21,6 +21,7 @@
 //! | [`checksum`] | whether a file that was kept is still what was written |
 //! | [`input`] | the one way in for files: regular ones only, each kind up to a size |
 //! | [`output`] | files that are whole or not there: every writer but the live recorder goes through it |
+//! | [`place`] | paths that are copied from one file into another |
 //! | [`ending`] | whether the process was asked to end |
 //! | [`parent`] | programs that end when the one that started them is gone |
 //! | [`error_line()`] | an error with its causes in one line |
@@ -52,6 +53,7 @@ pub mod msg;
 pub mod origin;
 pub mod output;
 pub mod parent;
+pub mod place;
 pub mod printable;
 pub mod progress;
 pub mod quantity;

@@ -12,7 +12,6 @@ use evaluation::rollout::{self, Asking, Outcome, RunError};
 use evaluation::statistics::Share;
 use serde::Serialize;
 use shared_mem::cell::Cell;
-use shared_mem::input;
 use shared_mem::origin::Origin;
 use shared_mem::output::Destination;
 use shared_mem::progress::Progress;
@@ -176,7 +175,7 @@ fn scripted(task: &Task, seed: u64, noise: f64) -> Result<(Outcome, Episode), Ru
 /// What a clip's cell is where an arm carries something.
 fn cell_toml(arguments: &RunArguments, task: &Task) -> anyhow::Result<Option<String>> {
     Ok(match &arguments.cell {
-        Some(file) => Some(input::text(file, input::Kind::Configuration)?),
+        Some(file) => Some(Cell::read(file)?.at_home_anywhere().to_toml()),
         None => (!task.arm_joints().is_empty()).then(|| "[robot]\nmodel = \"fr3\"\n".to_owned()),
     })
 }

@@ -39,6 +39,7 @@ use serde_json::Value;
 use shared_mem::cell::{Cell, ClipKind};
 use shared_mem::ending;
 use shared_mem::frames::{Base, Object, Pose};
+use shared_mem::place;
 use shared_mem::recording::Clip;
 use shared_mem::theta::Theta;
 use shared_mem::time::TICK;
@@ -135,14 +136,13 @@ impl Engine {
         interrupt: &Interrupt,
     ) -> Result<Arc<Self>, EngineError> {
         let wrong = |what: String| EngineError::Wrong { command: call.command.clone(), what };
-        let folder = std::path::absolute(folder).unwrap_or_else(|_| folder.to_owned());
         let greeting = Greeting {
             message: "hello",
             protocol: VERSION,
             joints,
             period: TICK,
-            cell: cell_as_json(cell),
-            folder: folder.display().to_string(),
+            cell: cell_as_json(&cell.at_home_anywhere()),
+            folder: place::from_anywhere(folder).display().to_string(),
         };
         let greeting = frame::bytes(&greeting, &[]).map_err(|error| wrong(format!("cannot be greeted: {error}")))?;
         let running = Arc::new(Running::default());

@@ -161,7 +161,9 @@ pub fn run(options: &Options) -> anyhow::Result<Viewpoint> {
 fn cell_text(cell: &Cell, file: &Path) -> String {
     let before = input::text(file, input::Kind::Configuration).ok().filter(|_| file.is_file());
     let camera = Cell { camera: cell.camera.clone(), ..Cell::default() };
-    before.and_then(|before| toml_file::updated(&before, &camera.to_toml(), &[])).unwrap_or_else(|| cell.to_toml())
+    before
+        .and_then(|before| toml_file::updated(&before, &camera.to_toml(), &[]))
+        .unwrap_or_else(|| cell.at_home_anywhere().to_toml())
 }
 
 /// Kinds of pictures to try, the better first.

@@ -49,7 +49,7 @@ impl ConvertArguments {
         drop(input::open(&self.bag)?);
         let cell = self.cell.as_deref().map(Cell::read).transpose()?;
         let info = ClipInfo {
-            cell_toml: cell.as_ref().map(Cell::to_toml),
+            cell_toml: cell.as_ref().map(|cell| cell.at_home_anywhere().to_toml()),
             configuration: format!("bag = {:?}\n", self.bag.display().to_string()),
             program: concat!("rt_bridge ", env!("CARGO_PKG_VERSION")).into(),
             torques_begin_at_rows: false,

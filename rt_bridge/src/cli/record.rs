@@ -55,7 +55,7 @@ impl RecordArguments {
         let stop = stop_flag(None)?;
         let cell = self.cell.as_deref().map(Cell::read).transpose()?;
         let info = ClipInfo {
-            cell_toml: cell.as_ref().map(Cell::to_toml),
+            cell_toml: cell.as_ref().map(|cell| cell.at_home_anywhere().to_toml()),
             configuration: self.configuration,
             program: concat!("rt_bridge ", env!("CARGO_PKG_VERSION")).into(),
             // The arm says where it comes from.

@@ -28,6 +28,7 @@ pub use wrench::{WrenchNoise, WrenchSensor};
 
 use crate::blocks;
 use crate::input;
+use crate::place;
 use crate::toml_file::{self, TomlFileError};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -164,12 +165,11 @@ impl Cell {
         robot.and_then(|robot| robot.base_frame.as_deref()).or(built_in).unwrap_or("base")
     }
 
-    /// The same cell with paths that hold from any folder.
+    /// The same cell with paths that hold from any folder, the same however its file was spelt: what goes into another file.
     #[must_use]
     pub fn at_home_anywhere(&self) -> Self {
         let mut cell = self.clone();
-        let folder = std::path::absolute(&cell.folder).unwrap_or_else(|_| cell.folder.clone());
-        let anchor = |path: &mut PathBuf| *path = folder.join(&*path);
+        let anchor = |path: &mut PathBuf| *path = place::from_anywhere(&self.folder.join(&*path));
         cell.robot.iter_mut().filter_map(|robot| robot.urdf.as_mut()).for_each(anchor);
         cell.objects
             .iter_mut()

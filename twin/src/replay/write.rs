@@ -27,7 +27,7 @@ pub fn write_clip(
     prediction: &Prediction,
 ) -> Result<(), WriteError> {
     let info = ClipInfo {
-        cell_toml: Some(replayer.cell().to_toml()),
+        cell_toml: Some(replayer.cell().at_home_anywhere().to_toml()),
         configuration: replayer.theta().map_or_else(String::new, |theta| theta.to_toml()),
         program: concat!("twin ", env!("CARGO_PKG_VERSION"), " replay").to_owned(),
         torques_begin_at_rows: !clip.torques_end_at_rows,

@@ -22,6 +22,7 @@ use crate::forward::motion::{commands, states};
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
 use shared_mem::cell::Cell;
 use shared_mem::frames::Pose;
+use shared_mem::place;
 use shared_mem::theta::Theta;
 use shared_mem::time::TICK_NS;
 use std::sync::Arc;
@@ -120,7 +121,7 @@ pub(super) fn is_whole((theta, known): (&Theta, &Theta), own: &Values) -> bool {
 fn body(model: &ObjectModel, cell: &Cell) -> Result<ObjectBody, Impossible> {
     let inertia = Outline::of(model, &Effects::default()).map_err(impossible)?.inertia;
     let mesh = cell.object().and_then(|object| object.mesh.as_ref()).map(|mesh| cell.folder.join(mesh));
-    let mesh = mesh.map(|mesh| std::path::absolute(&mesh).unwrap_or(mesh).display().to_string());
+    let mesh = mesh.map(|mesh| place::from_anywhere(&mesh).display().to_string());
     Ok(ObjectBody {
         mass: model.mass,
         centre_of_mass: model.centre_of_mass.into(),
