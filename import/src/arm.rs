@@ -12,12 +12,22 @@ use std::sync::Arc;
 pub struct Arm {
     /// Its joints, from base to flange.
     pub joints: Vec<String>,
-    /// Joints of its description that move and are none of its own, such as fingers.
-    pub held: Vec<String>,
+    /// Joints of its description that move and are none of its own, such as fingers, with why, in words; empty where there are none.
+    pub held: String,
+    /// What its description says nothing of, and without which it could not move.
+    pub rotors: Option<Rotors>,
     /// Gravity's torques, where it has a shape.
     pub gravity: Option<Gravity>,
     /// What viewers of the clips are shown, where it has a shape.
     pub shown: Option<Arc<RobotModel>>,
+}
+
+/// Rotors that stand in for the inertia of joints that move none in an arm's description.
+pub struct Rotors {
+    /// Those joints.
+    pub without_inertia: Vec<String>,
+    /// Of every joint [kg m²].
+    pub rotor_inertia: Vec<f64>,
 }
 
 /// Tells of the arm of a cell; with a URDF's text, of that one in place of the arm that the cell names. `None` where the cell has

@@ -1,5 +1,6 @@
 //! The cell.toml of an imported session: what the log tells, and for the rest what is usual, with a comment that says so.
 
+use crate::arm::Rotors;
 use crate::log::Log;
 use serde::Serialize;
 use shared_mem::cell::ClipEntry;
@@ -81,6 +82,25 @@ pub(crate) fn proposed(log: &Log, joints: &[String], base: Option<&str>) -> Stri
         toml_value(joints)
     );
     format!("{head}{robot}\n{}", controller(joints))
+}
+
+/// What is said of joints that move no inertia.
+pub(crate) fn stand_in(rotors: &Rotors) -> String {
+    format!(
+        "{} moves no inertia in it: a servo's rotor stands in, `rotor_inertia` in [controller]",
+        rotors.without_inertia.join(", ")
+    )
+}
+
+/// The text with rotors, where its `[controller]`, the last block, has none.
+pub(crate) fn with_rotors(text: String, rotors: Option<&Rotors>) -> String {
+    match rotors.filter(|_| !text.contains("\nrotor_inertia")) {
+        Some(rotors) => {
+            let (why, numbers) = (stand_in(rotors), toml_value(&rotors.rotor_inertia));
+            format!("{text}# {why}; write the motors' own.\nrotor_inertia = {numbers}\n")
+        }
+        None => text,
+    }
 }
 
 /// The block with its remark above it.

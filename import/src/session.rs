@@ -109,6 +109,7 @@ pub fn import(order: Order<'_>, mut told: impl FnMut(&Imported, (u64, u64))) -> 
     let folder = session_folder(order.out, order.force, &paths)?;
     let mut writing = Writing {
         folder: &folder,
+        out: order.out,
         mapping: &mapping,
         given: given.as_ref(),
         arms: order.arms,
@@ -179,11 +180,11 @@ fn proposal(log: &Log, given: Option<&Cell>, arms: Arms<'_>) -> Result<Proposal,
     let plain = propose(log, (None, &[]), &by_name);
     let (mut proposal, why) = match described(log, &plain.mapping.joints, arms) {
         Ok(None) => return Ok(plain),
-        Ok(Some((text, Arm { joints, held, .. }))) => {
+        Ok(Some((text, Arm { joints, held, rotors, .. }))) => {
             let gravity = |_: &[String]| arms(&Cell::default(), Some(&text)).ok()??.gravity;
-            let held =
-                if held.is_empty() { String::new() } else { format!("; held where they are: {}", held.join(", ")) };
-            (propose(log, (None, &joints), &gravity), format!("the log's robot_description{held}"))
+            let held = if held.is_empty() { String::new() } else { format!("; held where they are: {held}") };
+            let rotors = rotors.map_or_else(String::new, |rotors| format!("; {}", cell::stand_in(&rotors)));
+            (propose(log, (None, &joints), &gravity), format!("the log's robot_description{held}{rotors}"))
         }
         Err(what) => (plain, format!("the log's robot_description is not used: {what}")),
     };
@@ -206,6 +207,8 @@ fn open(order: Order<'_>, log: &Log, mapping: &Mapping, notes: Vec<Note>) -> Res
 /// A session as it grows.
 struct Writing<'a> {
     folder: &'a OutputFolder,
+    /// Where the folder will be.
+    out: &'a Path,
     mapping: &'a Mapping,
     given: Option<&'a Cell>,
     arms: Arms<'a>,
@@ -275,7 +278,8 @@ impl Writing<'_> {
             let described = described.filter(|(_, arm)| arm.joints == self.mapping.joints);
             let shown = described.as_ref().map(|(_, arm)| arm.shown.as_ref());
             let base = shown.map(|shown| shown.map_or("base", |shown| shown.root.as_str()));
-            let text = cell::proposed(log, &self.mapping.joints, base);
+            let rotors = described.as_ref().and_then(|(_, arm)| arm.rotors.as_ref());
+            let text = cell::with_rotors(cell::proposed(log, &self.mapping.joints, base), rotors);
             let cell = Cell::parse(&text, Path::new(CELL_TOML))?;
             let (urdf, arm) = match described {
                 Some((urdf, arm)) => (Some(urdf), Some(arm)),
@@ -286,7 +290,8 @@ impl Writing<'_> {
         let mut cell = given.at_home_anywhere();
         cell.clips.clear();
         let text = cell.to_toml();
-        let cell = Cell::parse(&text, Path::new(CELL_TOML))?;
+        // As the next command reads it, from where it will lie: a session whose robot is not found from there is none.
+        let cell = Cell::parse(&text, &self.out.join(CELL_TOML))?;
         let arm = (self.arms)(&cell, None).map_err(failed)?;
         Ok(About { text, cell, arm, urdf: None, log: log_alone })
     }
@@ -350,7 +355,8 @@ mod tests {
             Some("broken") => Err("it is no URDF".into()),
             Some(_) => Ok(Some(Arm {
                 joints: vec!["shoulder".into(), "elbow".into()],
-                held: vec!["finger".into()],
+                held: "finger (named as a finger is)".into(),
+                rotors: None,
                 gravity: None,
                 shown: None,
             })),

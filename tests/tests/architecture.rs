@@ -60,7 +60,7 @@ fn each_big_dependency_has_one_door() {
         ("mcap", &["shared_mem/src/recording/"]),
         ("parry3d_f64", &["twin/src/physics/"]),
         ("urdf_rs", &["twin/src/arm/urdf.rs", "twin/src/arm/urdf/"]),
-        ("quick_xml", &["urdf/src/", "twin/src/xml.rs"]),
+        ("quick_xml", &["urdf/src/", "twin/src/xml.rs", "twin/src/xml/"]),
         ("axum", &["twin/src/teleop/server.rs"]),
         ("tokio", &["twin/src/teleop/server.rs"]),
         ("foxglove", &["twin/src/viewer", "shared_mem/src/recording/"]),

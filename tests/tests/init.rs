@@ -144,3 +144,86 @@ fn the_schema_is_one_json_object_that_names_the_blocks() {
     assert!(output.status.success() && schema["properties"]["controller"].is_object());
     assert!(!lab.path().join("cell.toml").exists());
 }
+
+/// Six joints that turn all the way round with 30 N m, and what stands for the seventh.
+fn six(more: &str) -> String {
+    let link = |name: &str, inertial: &str| format!("<link name='{name}'>{inertial}</link>");
+    let solid = "<inertial><origin xyz='0.01 0 0.1'/><mass value='0.8'/><inertia ixx='.004' iyy='.004' izz='.002' ixy='0' ixz='0' iyz='0'/></inertial>";
+    let mut urdf = format!("<robot name='six'>{}", link("link_0", ""));
+    for k in 1..=6 {
+        let axis = if k % 2 == 1 { "0 0 1" } else { "0 1 0" };
+        urdf += &link(&format!("link_{k}"), solid);
+        urdf += &format!(
+            "<joint name='joint_{k}' type='continuous'><origin xyz='0 0 .15'/><parent link='link_{}'/><child link='link_{k}'/><axis \
+             xyz='{axis}'/><limit effort='30' velocity='1'/></joint>",
+            k - 1
+        );
+    }
+    format!("{urdf}{more}</robot>")
+}
+
+#[test]
+fn what_hangs_on_the_arm_is_named_and_where_it_cannot_be_told_the_user_says_it() {
+    let lab = tempfile::tempdir().expect("a folder");
+    let jaw = |name: &str| {
+        format!(
+            "<link name='l7'/><joint name='{name}' type='revolute'><parent link='link_6'/><child link='l7'/><axis xyz='0 1 0'/><limit lower='0' \
+             upper='1.5' effort='2' velocity='1'/></joint>"
+        )
+    };
+    let six_names: Vec<String> = (1..=6).map(|k| format!("joint_{k}")).collect();
+    std::fs::write(lab.path().join("arm.urdf"), six(&jaw("finger_joint"))).expect("room");
+    let output = run(lab.path(), &["init", "--urdf", "arm.urdf", "--json"]);
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(said.contains("joint_6; held where they are: finger_joint (named as a finger is)"), "{said}");
+    let answer: Value = serde_json::from_slice(&output.stdout).expect("one JSON object");
+    assert_eq!(answer["arm"], serde_json::json!(six_names));
+    assert_eq!(answer["held"], serde_json::json!([{"joint": "finger_joint", "why": "named as a finger is"}]));
+
+    // What the refusal names can be done where it names it.
+    std::fs::write(lab.path().join("arm.urdf"), six(&jaw("joint_7"))).expect("room");
+    let refused = line(&run(lab.path(), &["init", "--urdf", "arm.urdf", "--force"]));
+    let (_, command) = refused.split_once("`calibration ").expect("a command");
+    let (command, _) = command.split_once('`').expect("its end");
+    let words: Vec<&str> = command.split(' ').chain(["--force"]).collect();
+    let (answer, cell) = written(lab.path(), &words);
+    assert_eq!(answer["arm"], serde_json::json!(six_names));
+    assert_eq!(cell.robot.as_ref().map(|robot| &robot.joints), Some(&six_names));
+    assert_eq!(twin::arm::ArmModel::from_cell(&cell).expect("an arm").dof(), 6);
+    let names = six_names.join(",").replace("joint", "q");
+    let (_, cell) = written(lab.path(), &["init", "--urdf", "arm.urdf", "--joints", &(names + ",q_7"), "--force"]);
+    let refused = twin::arm::ArmModel::from_cell(&cell).expect_err("other names do not say which").to_string();
+    assert!(refused.contains("--joints"), "{refused}");
+}
+
+#[test]
+fn a_joint_that_moves_no_inertia_gets_a_rotor_to_be_filled_in() {
+    let lab = tempfile::tempdir().expect("a folder");
+    let seventh = |inertial: &str| {
+        format!(
+            "<link name='l7'>{inertial}</link><joint name='joint_7' type='continuous'><parent link='link_6'/><child link='l7'/><axis \
+             xyz='0 0 1'/></joint>"
+        )
+    };
+    let point = "<inertial><origin xyz='0 0 .05'/><mass value='.2'/><inertia ixx='0' ixy='0' ixz='0' iyy='0' iyz='0' izz='0'/></inertial>";
+    for inertial in [point, ""] {
+        std::fs::write(lab.path().join("arm.urdf"), six(&seventh(inertial))).expect("room");
+        let (answer, cell) = written(lab.path(), &["init", "--urdf", "arm.urdf", "--force"]);
+        let warnings = answer["warnings"].to_string();
+        assert!(warnings.contains("joint_7 moves no inertia") && warnings.contains("`rotor_inertia`"), "{answer}");
+        let rotors = &cell.controller.as_ref().expect("a controller").rotor_inertia;
+        assert!(rotors[..6].iter().all(|rotor| *rotor == 0.0) && rotors[6] > 0.0, "{rotors:?}");
+        assert_eq!(twin::arm::ArmModel::from_cell(&cell).expect("an arm").dof(), 7);
+        let text = std::fs::read_to_string(lab.path().join("cell.toml")).expect("the file");
+        assert!(text.contains("# joint_7 moves no inertia in the URDF"), "{text}");
+    }
+}
+
+#[test]
+fn a_motor_that_turns_against_its_joint_has_a_negative_constant() {
+    let lab = tempfile::tempdir().expect("a folder");
+    let (_, cell) = written(lab.path(), &["init", "--joints", "a,b,c,d"]);
+    let text = cell.to_toml().replace("[controller]", "[controller]\ntorque_constant = [32.0, 32.0, 45.0, -48.0]");
+    let read = Cell::parse(&text, Path::new("cell.toml")).expect("a cell");
+    assert_eq!(read.controller.expect("a controller").torque_constant, [32.0, 32.0, 45.0, -48.0]);
+}

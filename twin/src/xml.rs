@@ -1,5 +1,9 @@
 //! The only code that writes XML: elements, attributes, comments, all of them escaped. For descriptions of robots and for models of
-//! other simulators.
+//! other simulators. `tree` reads a document that is changed and written again.
+
+mod tree;
+
+pub use tree::{Element, Node};
 
 use quick_xml::Writer;
 use quick_xml::events::{BytesEnd, BytesStart, BytesText, Event};
@@ -65,6 +69,11 @@ impl Document {
         self.write(Event::Start(Self::start(name, attributes)));
         self.write(Event::Text(BytesText::new(text)));
         self.write(Event::End(BytesEnd::new(name)));
+    }
+
+    /// Words between elements.
+    pub fn words(&mut self, text: &str) {
+        self.write(Event::Text(BytesText::new(text)));
     }
 
     /// A comment, in which XML allows no `--`.

@@ -1,4 +1,4 @@
-//! A joint's friction written into a URDF: everything else of the file stays as it is, byte for byte.
+//! Numbers of a joint written into a URDF, its friction or its limits: everything else of the file stays as it is, byte for byte.
 
 use crate::UrdfError;
 use crate::tag::{Tag, one_line, quoted};
@@ -19,12 +19,24 @@ enum Place {
 /// # Errors
 /// [`UrdfError`] where the text is no XML, or has no joint of this name.
 pub fn with_dynamics(text: &str, joint: &str, friction: f64, damping: f64) -> Result<String, UrdfError> {
-    let numbers = format!("friction=\"{friction}\" damping=\"{damping}\"");
-    Ok(match place(text, joint)? {
+    with_numbers(text, joint, "dynamics", &[("friction", friction), ("damping", damping)])
+}
+
+/// The text of a URDF with these attributes of a joint's `<dynamics>` or `<limit>`, in the format's units; other attributes stay. A
+/// `<limit>` that is not there stays away, since the format wants more of one than single numbers.
+///
+/// # Errors
+/// [`UrdfError`] where the text is no XML, or has no joint of this name.
+pub fn with_numbers(text: &str, joint: &str, tag: &str, values: &[(&str, f64)]) -> Result<String, UrdfError> {
+    let numbers: Vec<String> = values.iter().map(|(key, value)| format!("{key}=\"{value}\"")).collect();
+    let numbers = numbers.join(" ");
+    let keys: Vec<&str> = values.iter().map(|(key, _)| *key).collect();
+    Ok(match place(text, joint, tag, &keys)? {
         Place::Tag(range, others, is_empty) => {
             let end = if is_empty { "/>" } else { ">" };
-            format!("{}<dynamics {numbers}{others}{end}{}", &text[..range.start], &text[range.end..])
+            format!("{}<{tag} {numbers}{others}{end}{}", &text[..range.start], &text[range.end..])
         }
+        Place::End(_) if tag == "limit" => text.to_owned(),
         Place::End(at) => {
             // On a line of its own where the end of the joint is.
             let before = &text[..at];
@@ -32,12 +44,12 @@ pub fn with_dynamics(text: &str, joint: &str, friction: f64, damping: f64) -> Re
             let indent = if before[..at - indent].ends_with('\n') { &before[at - indent..] } else { "" };
             let line = if indent.is_empty() { String::new() } else { format!("\n{indent}") };
             let step = if indent.is_empty() { "" } else { "  " };
-            format!("{before}{step}<dynamics {numbers}/>{line}{}", &text[at..])
+            format!("{before}{step}<{tag} {numbers}/>{line}{}", &text[at..])
         }
     })
 }
 
-fn place(text: &str, joint: &str) -> Result<Place, UrdfError> {
+fn place(text: &str, joint: &str, tag: &str, keys: &[&str]) -> Result<Place, UrdfError> {
     let mut reader = Reader::from_str(text);
     let (mut depth, mut within) = (0_usize, false);
     let position = |reader: &Reader<&[u8]>| usize::try_from(reader.buffer_position()).unwrap_or(text.len());
@@ -51,15 +63,15 @@ fn place(text: &str, joint: &str) -> Result<Place, UrdfError> {
         let range = before..position(&reader);
         match event {
             Event::Start(start) => {
-                if within && depth == 2 && start.name().0 == "dynamics" {
-                    let others = others(&start).map_err(|what| fault(before, what))?;
+                if within && depth == 2 && start.name().0 == tag {
+                    let others = others(&start, keys).map_err(|what| fault(before, what))?;
                     return Ok(Place::Tag(range, others, false));
                 }
                 within |= depth == 1 && is_joint(&start, joint).map_err(|what| fault(before, what))?;
                 depth += 1;
             }
-            Event::Empty(start) if within && depth == 2 && start.name().0 == "dynamics" => {
-                return Ok(Place::Tag(range, others(&start).map_err(|what| fault(before, what))?, true));
+            Event::Empty(start) if within && depth == 2 && start.name().0 == tag => {
+                return Ok(Place::Tag(range, others(&start, keys).map_err(|what| fault(before, what))?, true));
             }
             Event::End(_) => {
                 depth = depth.saturating_sub(1);
@@ -78,13 +90,13 @@ fn is_joint(start: &BytesStart<'_>, joint: &str) -> Result<bool, String> {
     Ok(name == "joint" && Tag::new(start, name)?.find("name") == Some(joint))
 }
 
-/// Attributes beside the two numbers, as they stand there.
-fn others(start: &BytesStart<'_>) -> Result<String, String> {
+/// Attributes beside those of these names, as they stand there.
+fn others(start: &BytesStart<'_>, keys: &[&str]) -> Result<String, String> {
     let mut out = String::new();
     for attribute in start.attributes() {
-        let attribute = attribute.map_err(|error| format!("<dynamics>: {}", one_line(&error)))?;
+        let attribute = attribute.map_err(|error| format!("<{}>: {}", start.name().0, one_line(&error)))?;
         let key = attribute.key.0;
-        if key != "friction" && key != "damping" {
+        if !keys.contains(&key) {
             let quote = if attribute.value.contains('"') { '\'' } else { '"' };
             out.push_str(&format!(" {key}={quote}{}{quote}", attribute.value));
         }

@@ -12,7 +12,7 @@
 //! | `lib` | what a URDF says of links and joints |
 //! | `tree` | from the stream of tags to links and joints, and which tags must be there |
 //! | `tag` | the attributes of one tag: names and numbers |
-//! | `dynamics` | a joint's friction written into a file |
+//! | `dynamics` | a joint's friction and limits written into a file |
 
 mod dynamics;
 mod tag;
@@ -20,7 +20,7 @@ mod tag;
 mod tests;
 mod tree;
 
-pub use dynamics::with_dynamics;
+pub use dynamics::{with_dynamics, with_numbers};
 
 /// A robot: its links and joints in file order.
 #[derive(Debug, Clone, Default, PartialEq)]

@@ -11,7 +11,7 @@ use shared_mem::progress::Progress;
 use shared_mem::typed::Command;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use twin::arm::ArmModel;
+use twin::arm::{ArmModel, HeldJoint};
 use twin::description::{shown_robot, shown_urdf};
 
 #[derive(Debug, Args)]
@@ -121,19 +121,22 @@ fn arm(cell: &Cell, urdf: Option<&str>) -> Result<Option<Arm>, String> {
     let told = |error: twin::arm::ModelError| error.to_string();
     let (model, shown) = match urdf {
         Some(text) => {
-            let model = ArmModel::from_urdf(text, Path::new("robot_description")).map_err(told)?;
+            let model = ArmModel::from_urdf(text, Path::new("robot_description"), &[]).map_err(told)?;
             let shown = shown_urdf(text, &model).map_err(told)?;
             (model, Some(shown))
         }
         None if cell.robot.is_none() => return Ok(None),
         None => (ArmModel::from_cell(cell).map_err(told)?, shown_robot(cell).map_err(told)?),
     };
-    let (joints, held) = (model.joint_names().to_vec(), model.held_joints().to_vec());
+    let (joints, held) = (model.joint_names().to_vec(), HeldJoint::in_words(model.held_joints()));
+    let without_inertia = model.joints_without_inertia().into_iter().map(str::to_owned).collect::<Vec<_>>();
+    let rotor_inertia = model.rotor_inertia()[..model.dof()].to_vec();
+    let rotors = (!without_inertia.is_empty()).then_some(Rotors { without_inertia, rotor_inertia });
     let shown = shown.map(Arc::new);
     let gravity: Option<Gravity> = model.has_geometry().then_some(Box::new(move |q: &[f64]| {
         (q.len() == model.dof()).then(|| model.gravity(&joints_from(q)).get(..q.len()).unwrap_or(&[]).to_vec())
     }));
-    Ok(Some(Arm { joints, held, gravity, shown }))
+    Ok(Some(Arm { joints, held, rotors, gravity, shown }))
 }
 
 /// The same import, with a mapping.

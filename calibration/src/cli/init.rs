@@ -19,12 +19,16 @@ comment with its meaning, its unit and what holds without it. Without a flag it 
 
 Examples:
   calibration init --urdf arm.urdf --tool 0.25,0.16,0.012 --table 0
+  calibration init --urdf two_arms.urdf --joints left_1,left_2,left_3,left_4,left_5,left_6
   calibration init --bag last_week.mcap --out cell.toml
   calibration init --clips session --out session/cell.toml
   calibration init --model fr3 --object 0.08,0.06,0.10 --out cell.toml --json
   calibration init --schema > cell.schema.json      # for an editor
 
-JSON: file, urdf, taken [{key, from}], not_known [blocks], warnings.")]
+Which of a URDF's joints are the arm's is found by names, limits and where the tool's frame hangs; what else moves, fingers, wheels, a
+base that drives, is held where it is and named. --joints says it where the URDF does not tell.
+
+JSON: file, urdf, arm [joints], held [{joint, why}], taken [{key, from}], not_known [blocks], warnings.")]
 pub(super) struct InitArguments {
     /// A built-in model: fr3.
     #[arg(long, group = "robot", value_parser = ["fr3"])]
@@ -32,8 +36,9 @@ pub(super) struct InitArguments {
     /// The robot's URDF, or a .xacro file.
     #[arg(long, group = "robot", value_name = "FILE")]
     urdf: Option<PathBuf>,
-    /// Names of the joints, in the order of the recordings, where no model is known.
-    #[arg(long, group = "robot", value_name = "NAME,...", value_delimiter = ',')]
+    /// Alone, the names of the joints in the order of the recordings, where no model is known. With --urdf, which of its joints are the
+    /// arm's, from base to flange; other names than its own are what recordings call them.
+    #[arg(long, conflicts_with = "model", value_name = "NAME,...", value_delimiter = ',')]
     joints: Vec<String>,
     /// A ROS 2 bag, or another log that `calibration import` reads: its robot_description, joints and topics.
     #[arg(long, value_name = "FILE")]
@@ -84,9 +89,13 @@ pub(super) fn run(arguments: InitArguments) -> anyhow::Result<()> {
     }
     let InitArguments { model, urdf, joints, bag, clips, out, force, json, .. } = arguments;
     let robot = model.map(Named::Model).or(urdf.map(Named::Urdf));
-    let robot = robot.or_else(|| (!joints.is_empty()).then_some(Named::Joints(joints)));
+    let (robot, joints) = match robot {
+        None if !joints.is_empty() => (Some(Named::Joints(joints)), Vec::new()),
+        robot => (robot, joints),
+    };
     let said = Facts {
         robot,
+        joints,
         controller: arguments.controller,
         stiffness: arguments.stiffness,
         damping: arguments.damping,
@@ -97,6 +106,11 @@ pub(super) fn run(arguments: InitArguments) -> anyhow::Result<()> {
     let facts = if said == Facts::default() && bag.is_none() && clips.is_none() { asked()? } else { said };
     let order = Order { facts: &facts, bag: bag.as_deref(), clips: clips.as_deref(), out: &out, force };
     let written = init::init(order)?;
+    if !written.held.is_empty() {
+        let held = written.held.iter().map(|held| format!("{} ({})", held.joint, held.why));
+        let (arm, held) = (written.arm.join(", "), held.collect::<Vec<_>>().join("; "));
+        console::line(format_args!("the arm's joints are {arm}; held where they are: {held}"));
+    }
     for warning in &written.warnings {
         console::line(warning);
     }

@@ -15,6 +15,7 @@ pub fn ask(answer: &mut dyn FnMut(&str) -> io::Result<Option<String>>) -> io::Re
     let kind = asking.open("Controller: joint_impedance, or joint_pd for a servo", controller)?;
     Ok(Facts {
         robot: Some(robot),
+        joints: Vec::new(),
         controller: kind,
         stiffness: asking.open("Stiffness [N m/rad], one a joint with commas", gains)?.unwrap_or_default(),
         damping: asking.open("Damping [N m s/rad], one a joint with commas", gains)?.unwrap_or_default(),

@@ -1,9 +1,9 @@
 //! Recorded clips: which lie in a folder, what the first of them says about its robot, and at which rates they were recorded.
 
-use super::path::relative;
 use anyhow::{Context as _, ensure};
 use import::Contents;
 use shared_mem::cell::{Cell, ClipEntry, ClipKind};
+use shared_mem::place;
 use shared_mem::recording::{Clip, ObjectSeries, read_clip, read_clip_info};
 use std::path::{Path, PathBuf};
 use twin::arm::ArmModel;
@@ -70,8 +70,8 @@ pub(super) fn about(clip: &Path) -> anyhow::Result<About> {
         return Ok(About { cell: None, contents });
     }
     if let Some(info) = if is_mcap(clip) { read_clip_info(clip)? } else { None } {
-        let mut cell = info.cell_toml.map(|text| Cell::parse(&text, clip)).transpose()?;
-        cell.iter_mut().for_each(|cell| cell.clips.clear());
+        let cell = info.cell_toml.map(|text| Cell::parse(&text, clip)).transpose()?;
+        let cell = cell.map(|cell| Cell { clips: Vec::new(), ..cell.at_home_anywhere() });
         return Ok(About { cell, contents: Contents { format: "own clip", ..Contents::default() } });
     }
     Ok(About { cell: None, contents: import::look(clip)? })
@@ -98,7 +98,7 @@ pub(super) fn listed(
     if let Some(arm) = arm.filter(|_| !read.joint_names.is_empty()) {
         in_model_order(read, arm)?;
     }
-    Ok((ClipEntry { file: relative(clip, out), kind }, remark))
+    Ok((ClipEntry { file: place::beside(out, clip), kind }, remark))
 }
 
 /// Whether an object lies elsewhere in the end than in the beginning: an arm may have moved beside one that nothing hit.

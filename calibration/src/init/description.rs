@@ -19,20 +19,23 @@ pub(super) struct Description {
 }
 
 impl Description {
-    /// Of a file; what xacro makes of it goes beside the cell.toml `out`.
-    pub(super) fn of_file(file: &Path, out: &Path) -> anyhow::Result<Self> {
+    /// Of a file; what xacro makes of it goes beside the cell.toml `out`. `joints` say which of its joints are the arm's, where they are
+    /// given.
+    pub(super) fn of_file(file: &Path, out: &Path, joints: &[String]) -> anyhow::Result<Self> {
         if file.extension().is_some_and(|end| end == "xacro") {
-            return Self::of_text(expanded(file)?, out);
+            let text = expanded(file)?;
+            let arm = ArmModel::from_urdf(&text, file, joints)?;
+            return Ok(Self { path: out.with_extension("urdf"), text: Some(text), arm });
         }
         let text = input::text(file, input::Kind::Robot)?;
-        let arm = ArmModel::from_urdf(&text, file)?;
+        let arm = ArmModel::from_urdf(&text, file, joints)?;
         Ok(Self { path: file.to_owned(), text: None, arm })
     }
 
     /// Of a text, which goes beside the cell.toml `out`.
     pub(super) fn of_text(text: String, out: &Path) -> anyhow::Result<Self> {
         let path = out.with_extension("urdf");
-        let arm = ArmModel::from_urdf(&text, &path)?;
+        let arm = ArmModel::from_urdf(&text, &path, &[])?;
         Ok(Self { path, text: Some(text), arm })
     }
 }

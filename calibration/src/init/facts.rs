@@ -9,6 +9,8 @@ use std::path::PathBuf;
 pub struct Facts {
     /// The arm.
     pub robot: Option<Named>,
+    /// With a URDF: which of its joints are the arm's, from base to flange, or what recordings call them.
+    pub joints: Vec<String>,
     /// The law between command and torque.
     pub controller: Option<ControllerKind>,
     /// Nominal stiffness, one a joint [N m/rad].

@@ -3,13 +3,13 @@
 use super::clips::{self, About};
 use super::description::Description;
 use super::facts::{Facts, Named};
-use super::path::relative;
 use super::{Order, Taken};
 use anyhow::bail;
 use import::{UsualController, is_franka, usual_controller};
 use shared_mem::cell::{Cell, Controller, Object, Robot, Table, Tool, Topics};
+use shared_mem::place;
 use std::path::{Path, PathBuf};
-use twin::arm::ArmModel;
+use twin::arm::{ArmModel, HeldJoint};
 
 /// What stands in the new file.
 #[derive(Debug, Clone, Default)]
@@ -23,7 +23,7 @@ pub(super) struct Known {
     /// A URDF that goes beside the file.
     pub(super) urdf: Option<(PathBuf, String)>,
     pub(super) warnings: Vec<String>,
-    arm: Option<ArmModel>,
+    pub(super) arm: Option<ArmModel>,
 }
 
 /// What was recorded, and by which flag it came.
@@ -44,7 +44,7 @@ impl Known {
             known.cell = cell.clone();
             known.take("the cell.toml in the first clip", recorded.flag);
         }
-        known.robot(facts.robot.as_ref(), recorded.as_ref(), out)?;
+        known.robot(facts, recorded.as_ref(), out)?;
         known.controller(facts)?;
         known.rest(facts);
         if let Some(recorded) = &recorded {
@@ -58,8 +58,8 @@ impl Known {
         self.taken.push(Taken { key: key.to_owned(), from: from.to_owned() });
     }
 
-    fn robot(&mut self, named: Option<&Named>, recorded: Option<&Recorded>, out: &Path) -> anyhow::Result<()> {
-        match (named, recorded) {
+    fn robot(&mut self, facts: &Facts, recorded: Option<&Recorded>, out: &Path) -> anyhow::Result<()> {
+        match (facts.robot.as_ref(), recorded) {
             (Some(Named::Model(model)), _) => {
                 self.set_robot(Robot { model: Some(model.clone()), ..Robot::default() }, "--model")
             }
@@ -67,8 +67,13 @@ impl Known {
                 self.set_robot(Robot { joints: joints.clone(), ..Robot::default() }, "--joints");
             }
             (Some(Named::Urdf(file)), recorded) => {
-                self.set_description(Description::of_file(file, out)?, "--urdf", out);
-                self.recorded_names(recorded)?;
+                self.set_description(Description::of_file(file, out, &facts.joints)?, "--urdf", out);
+                if facts.joints.is_empty() {
+                    self.recorded_names(recorded)?;
+                } else if let Some(robot) = &mut self.cell.robot {
+                    robot.joints.clone_from(&facts.joints);
+                    self.take("robot.joints", "--joints");
+                }
             }
             (None, Some(_)) if self.cell.robot.is_some() => {}
             (None, Some(recorded)) => self.recorded_robot(recorded, out),
@@ -150,13 +155,13 @@ impl Known {
         let urdf = match &text {
             // Beside cell.toml.
             Some(_) => path.file_name().map_or_else(|| path.clone(), PathBuf::from),
-            None => relative(&path, out),
+            None => place::beside(out, &path),
         };
         self.urdf = text.map(|text| (path, text));
-        let held = arm.held_joints().join(", ");
-        if !held.is_empty() {
-            self.remarks.push(("robot", format!("Held where they are: {held}.")));
+        if let held @ [_, ..] = arm.held_joints() {
+            self.remarks.push(("robot", format!("Held where they are: {}.", HeldJoint::in_words(held))));
         }
+        self.warnings.extend(arm.doubts().iter().cloned());
         self.arm = Some(arm);
         self.set_robot(Robot { urdf: Some(urdf), ..Robot::default() }, from);
     }
@@ -184,6 +189,18 @@ impl Known {
                 nominal.clone_from(given);
                 *range = None;
             }
+        }
+        if let without @ [_, ..] = &arm.joints_without_inertia()[..]
+            && controller.rotor_inertia.is_empty()
+        {
+            controller.rotor_inertia = arm.rotor_inertia()[..dof].to_vec();
+            let what = format!(
+                "{} moves no inertia in the URDF: what it carries has no <inertial>, or is a point mass on the joint's axis. A servo's rotor \
+                 stands in for it: write the motor's own as `rotor_inertia` in [controller].",
+                without.join(", ")
+            );
+            self.remarks.push(("controller", what.clone()));
+            self.warnings.push(what);
         }
         self.cell.controller = Some(controller);
         let whole = !facts.stiffness.is_empty() && !facts.damping.is_empty();

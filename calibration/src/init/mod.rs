@@ -8,7 +8,6 @@
 //! | `description` | a URDF from a file or a bag, xacro expanded |
 //! | `clips` | recorded clips: their robot, topics and rates |
 //! | `known` | all of it put together, with where each came from |
-//! | `path` | files beside the new one, as it may name them |
 //! | `text` | the file's text |
 
 mod ask;
@@ -16,7 +15,6 @@ mod clips;
 mod description;
 mod facts;
 mod known;
-mod path;
 #[cfg(test)]
 mod tests;
 mod text;
@@ -29,6 +27,7 @@ use serde::Serialize;
 use shared_mem::cell::Cell;
 use shared_mem::output::Destination;
 use std::path::{Path, PathBuf};
+use twin::arm::ArmModel;
 
 /// What a cell.toml is made of.
 #[derive(Debug, Clone, Copy)]
@@ -54,6 +53,15 @@ pub struct Taken {
     pub from: String,
 }
 
+/// A joint that is held.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Held {
+    /// Its name.
+    pub joint: String,
+    /// Why it is none of the arm's.
+    pub why: String,
+}
+
 /// What was written.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Written {
@@ -61,6 +69,10 @@ pub struct Written {
     pub file: PathBuf,
     /// The URDF beside it, where one was expanded or taken out of a bag.
     pub urdf: Option<PathBuf>,
+    /// Names of the arm's joints, from base to flange; empty where no arm is known.
+    pub arm: Vec<String>,
+    /// Joints of its URDF that move and are none of the arm's; they are held where they are.
+    pub held: Vec<Held>,
     /// What stands in it, and from where.
     pub taken: Vec<Taken>,
     /// Blocks that stand in it as comments, since nothing is known of them.
@@ -86,8 +98,11 @@ pub fn init(order: Order<'_>) -> anyhow::Result<Written> {
         place.write(urdf)?;
     }
     place.write(&text)?;
+    let held = known.arm.iter().flat_map(ArmModel::held_joints);
     Ok(Written {
         file: order.out.to_owned(),
+        arm: known.arm.iter().flat_map(ArmModel::joint_names).cloned().collect(),
+        held: held.map(|held| Held { joint: held.name.clone(), why: held.why.clone() }).collect(),
         urdf: beside.map(|(place, _)| place.path().to_owned()),
         not_known: text::not_known(&known.cell),
         taken: known.taken,

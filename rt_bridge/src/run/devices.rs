@@ -23,7 +23,7 @@ use std::fmt;
 use std::path::PathBuf;
 use std::str::FromStr;
 use std::time::{SystemTime, UNIX_EPOCH};
-use twin::arm::{ArmModel, ControlLaw};
+use twin::arm::{ArmModel, ControlLaw, HeldJoint};
 use twin::effects::CameraEffects;
 use twin::scene::SceneSnapshot;
 
@@ -149,7 +149,7 @@ impl Devices {
     pub(super) fn open(settings: &Settings, cell: &Cell) -> Result<Self> {
         let model = ArmModel::from_cell(cell)?;
         if let held @ [_, ..] = model.held_joints() {
-            tracing::info!("no joints of the arm, and held at 0: {} of the URDF", held.join(", "));
+            tracing::info!("no joints of the arm, and held where they are: {}", HeldJoint::in_words(held));
         }
         if settings.arm != ArmChoice::Sim && (settings.effects.is_some() || settings.parameters.is_some()) {
             bail!("--effects and --parameters change the simulated cell only; use them with --arm sim");

@@ -37,7 +37,8 @@ pub struct Controller {
     /// Largest torque at standstill of drives whose voltage is limited, as of servos with pulse-width modulation [N m].
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub voltage_limit: Vec<f64>,
-    /// Torque at the joint over the current of the motor, where currents were logged in place of torques [N m/A].
+    /// Torque at the joint over the current of the motor, where currents were logged in place of torques [N m/A]; negative where
+    /// motor or gear turn against the joint.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub torque_constant: Vec<f64>,
     /// Where logged torques are measured.
@@ -121,7 +122,9 @@ impl Controller {
             ("controller.torque_constant", &self.torque_constant),
         ];
         for (key, values) in blocks {
-            within(key, values, 0.0, 1e6)?;
+            // A motor that is mounted the other way round has a torque against its current.
+            let least = if key == "controller.torque_constant" { -1e6 } else { 0.0 };
+            within(key, values, least, 1e6)?;
             if values.len() > MAX_JOINTS {
                 return Err(format!(
                     "`{key}` holds {} numbers; at most {MAX_JOINTS} joints are supported",

@@ -15,8 +15,9 @@ pub struct Robot {
     /// URDF file, relative to cell.toml.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub urdf: Option<PathBuf>,
-    /// Names of the joints in recordings. Beside `urdf` those of its joints from base to flange, where recordings call them
-    /// otherwise. Alone, in the order of the recordings, where no model is known: one second-order model a joint then.
+    /// Names of the joints in recordings. Beside `urdf`, from base to flange: names of its own say which of its joints are the arm's, where
+    /// fingers, wheels or a second arm hang there, too; other names are what recordings call the arm's. Alone, in the order of
+    /// the recordings, where no model is known: one second-order model a joint then.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub joints: Vec<String>,
     /// Name of the base frame, in recordings, bags and viewers alike; absent: the first link of the model, else `base`.

@@ -2,6 +2,7 @@
 
 use super::inertia::MassProperties;
 use nalgebra::{Isometry3, Unit, Vector3};
+use std::collections::HashSet;
 
 /// An arm as its source tells it, before it is laid out for computing.
 pub(super) struct Chain {
@@ -9,7 +10,9 @@ pub(super) struct Chain {
     /// The flange in the last link's frame.
     pub(super) flange: Isometry3<f64>,
     /// Movable joints of its source that are no joints of the arm, such as fingers.
-    pub(super) held: Vec<String>,
+    pub(super) held: Vec<HeldJoint>,
+    /// What of the choice between them may be meant otherwise, one sentence each.
+    pub(super) doubts: Vec<String>,
 }
 
 /// One movable joint and the body behind it.
@@ -29,4 +32,28 @@ pub(super) struct Joint {
     pub(super) torque: f64,
     pub(super) rotor_inertia: f64,
     pub(super) ready: f64,
+}
+
+/// A joint of the arm's file that moves and is none of the arm's: of a finger, a wheel, a base that drives.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct HeldJoint {
+    /// Its name.
+    pub name: String,
+    /// Why it is none of the arm's, in a few words.
+    pub why: String,
+}
+
+impl HeldJoint {
+    /// All of them in one line, those of one reason together: `a, b (named as a finger is); c (follows `a`)`.
+    #[must_use]
+    pub fn in_words(held: &[Self]) -> String {
+        let mut reasons: Vec<&str> = held.iter().map(|joint| joint.why.as_str()).collect();
+        let mut seen = HashSet::new();
+        reasons.retain(|why| seen.insert(*why));
+        let of = |why: &str| {
+            let names: Vec<&str> = held.iter().filter(|j| j.why == why).map(|j| j.name.as_str()).collect();
+            format!("{} ({why})", names.join(", "))
+        };
+        reasons.into_iter().map(of).collect::<Vec<_>>().join("; ")
+    }
 }

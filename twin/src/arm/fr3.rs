@@ -105,5 +105,5 @@ pub(super) fn chain() -> Chain {
             }
         })
         .collect();
-    Chain { joints, flange: Isometry3::translation(0.0, 0.0, FLANGE), held: Vec::new() }
+    Chain { joints, flange: Isometry3::translation(0.0, 0.0, FLANGE), held: Vec::new(), doubts: Vec::new() }
 }

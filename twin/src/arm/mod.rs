@@ -50,6 +50,7 @@ mod transmission;
 mod urdf;
 mod yielding;
 
+pub use chain::HeldJoint;
 pub use control::{ControlLaw, GainError};
 pub use dry_friction::Presliding;
 pub use dynamics::PointForce;
@@ -67,7 +68,9 @@ pub use parts::Part;
 pub use shared_mem::msg::{Joints, MAX_JOINTS};
 pub use trailing::{Trail, Trailing};
 pub use transmission::{Passed, Spring, Transmission};
-pub use urdf::{LinkFrame, UrdfBody, UrdfForm, UrdfFrames, UrdfJoint, UrdfShape, with_joint_friction};
+pub use urdf::{
+    LinkFrame, UrdfBody, UrdfForm, UrdfFrames, UrdfJoint, UrdfShape, with_joint_friction, with_joint_numbers,
+};
 pub use yielding::{FlangeMotion, Yielding};
 
 /// Positions and velocities of all joints.

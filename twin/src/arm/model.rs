@@ -1,7 +1,7 @@
 //! What an arm is: a chain of joints with bodies, limits and a flange, and how cell.toml, a tool and a payload make one.
 //! Built once by the bridge, the simulation and every rollout; then only read.
 
-use super::chain::{Chain, Joint};
+use super::chain::{Chain, HeldJoint, Joint};
 use super::error::ModelError;
 use super::inertia::{MassProperties, TenParameters};
 use super::kernel::Link;
@@ -15,7 +15,7 @@ use std::path::Path;
 /// Free fall in the base frame [m/s²].
 pub(crate) const FREE_FALL: Vec3 = [0.0, 0.0, -GRAVITY];
 
-/// Inertia of a joint where no model is known [kg m²]: the reflected rotor of a common hobby servo (Feetech STS3215,
+/// Inertia of a joint where no model is known, or the model gives it none [kg m²]: the reflected rotor of a common hobby servo (Feetech STS3215,
 /// 0.028 after Rhoban's BAM identification). Only its ratio to the gains matters, and those are identified.
 const UNKNOWN_INERTIA: f64 = 0.03;
 
@@ -37,7 +37,10 @@ pub struct ArmModel {
     /// Names of the links behind the joints, and each one's frame here in that of its source.
     link_names: Vec<String>,
     turns: Vec<UnitQuaternion<f64>>,
-    held_joints: Vec<String>,
+    held_joints: Vec<HeldJoint>,
+    doubts: Vec<String>,
+    /// Joints that would move no inertia without the rotor that stands in for it.
+    without_inertia: Vec<usize>,
     q_min: Joints,
     q_max: Joints,
     velocity_limit: Joints,
@@ -52,12 +55,27 @@ impl ArmModel {
         Self::from_chain(fr3::chain()).expect("the built-in chain has seven joints with inertia")
     }
 
-    /// The arm of a URDF's text, as a robot publishes it; `name` stands for the file in errors.
+    /// The arm of a URDF's text, as a robot publishes it; `name` stands for the file in errors. `joints` say which of the URDF's are
+    /// the arm's, where they are its names, else what recordings call them; nothing is said by none. Where a joint moves no inertia, a
+    /// rotor stands in for it, which a cell.toml then has to name: see [`Self::joints_without_inertia`].
     ///
     /// # Errors
     /// [`ModelError`] naming joint or link, and the remedy.
-    pub fn from_urdf(text: &str, name: &Path) -> Result<Self, ModelError> {
-        Self::from_chain(urdf::chain_of(text, name)?)
+    pub fn from_urdf(text: &str, name: &Path, joints: &[String]) -> Result<Self, ModelError> {
+        let mut arm = Self::unchecked(urdf::chain_of(text, name, joints)?)?;
+        while let Some(joint) = arm.massless_joint().filter(|joint| !arm.without_inertia.contains(joint)) {
+            arm.links[joint].rotor = UNKNOWN_INERTIA;
+            arm.without_inertia.push(joint);
+        }
+        arm.check_inertia()?;
+        arm.call_by(joints)?;
+        Ok(arm)
+    }
+
+    /// Joints of a URDF's text that move no inertia; a rotor stands in for it.
+    #[must_use]
+    pub fn joints_without_inertia(&self) -> Vec<&str> {
+        self.without_inertia.iter().map(|joint| self.joint_names[*joint].as_str()).collect()
     }
 
     /// The arm of a cell.toml: robot, rotor inertia and torque limits of its controller, tool.
@@ -67,7 +85,7 @@ impl ArmModel {
     pub fn from_cell(cell: &Cell) -> Result<Self, ModelError> {
         let robot = cell.robot.as_ref().ok_or(ModelError::NoRobot)?;
         let mut chain = match &robot.urdf {
-            Some(file) => urdf::chain(&cell.folder.join(file))?,
+            Some(file) => urdf::chain(&cell.folder.join(file), &robot.joints)?,
             None if robot.joints_only() => joints_only(robot),
             None => fr3::chain(),
         };
@@ -76,8 +94,8 @@ impl ArmModel {
         }
         let mut arm = Self::from_chain(chain)?;
         arm.has_geometry = !robot.joints_only();
-        if robot.urdf.is_some() && !robot.joints.is_empty() {
-            arm.call_joints(&robot.joints)?;
+        if robot.urdf.is_some() {
+            arm.call_by(&robot.joints)?;
         }
         if let Some(tool) = &cell.tool {
             arm.tool = MassProperties::of_tool(tool);
@@ -88,6 +106,13 @@ impl ArmModel {
     }
 
     pub(super) fn from_chain(chain: Chain) -> Result<Self, ModelError> {
+        let arm = Self::unchecked(chain)?;
+        arm.check_inertia()?;
+        Ok(arm)
+    }
+
+    /// Of any chain, whether it can move or not.
+    fn unchecked(chain: Chain) -> Result<Self, ModelError> {
         let dof = chain.joints.len();
         if dof == 0 || dof > MAX_JOINTS {
             return Err(ModelError::Joints(dof));
@@ -100,7 +125,7 @@ impl ArmModel {
             out
         };
         let (links, last) = lay_out(&chain.joints);
-        let arm = Self {
+        Ok(Self {
             dof,
             links,
             gravity: FREE_FALL,
@@ -118,9 +143,14 @@ impl ArmModel {
             joint_names: chain.joints.into_iter().map(|j| j.name).collect(),
             described_names: None,
             held_joints: chain.held,
-        };
-        arm.check_inertia()?;
-        Ok(arm)
+            doubts: chain.doubts,
+            without_inertia: Vec::new(),
+        })
+    }
+
+    /// Gives the joints other names, where there are some.
+    fn call_by(&mut self, names: &[String]) -> Result<(), ModelError> {
+        if names.is_empty() || names == self.joint_names { Ok(()) } else { self.call_joints(names) }
     }
 
     /// Gives the joints, from base to flange, the names that recordings have for them.
@@ -136,15 +166,16 @@ impl ArmModel {
     }
 
     fn check_inertia(&self) -> Result<(), ModelError> {
+        self.massless_joint().map_or(Ok(()), |joint| Err(ModelError::Massless(self.joint_names[joint].clone())))
+    }
+
+    fn massless_joint(&self) -> Option<usize> {
         // A pose off the zero pose: there a chain of pure point masses is regular if it is anywhere.
         let mut q = self.ready;
         for (i, q) in q.iter_mut().enumerate() {
             *q += 0.1 + 0.05 * i as f64;
         }
-        match self.first_massless_joint(&JointState::at_rest(q)) {
-            Some(joint) => Err(ModelError::Massless(self.joint_names[joint].clone())),
-            None => Ok(()),
-        }
+        self.first_massless_joint(&JointState::at_rest(q))
     }
 
     /// Hangs a body, given in the flange frame, rigidly on the flange.
@@ -210,11 +241,17 @@ impl ArmModel {
         &self.turns
     }
 
-    /// Movable joints of the URDF that are no joints of the arm, by name: fingers and the like, which are held where they are at
-    /// 0, or as near to it as their limits allow.
+    /// Movable joints of the URDF that are no joints of the arm: fingers and the like, which are held where they are at 0, or as
+    /// near to it as their limits allow.
     #[must_use]
-    pub fn held_joints(&self) -> &[String] {
+    pub fn held_joints(&self) -> &[HeldJoint] {
         &self.held_joints
+    }
+
+    /// What may be meant otherwise by the URDF, one sentence each: a last joint that may be a finger's.
+    #[must_use]
+    pub fn doubts(&self) -> &[String] {
+        &self.doubts
     }
 
     /// `false` where only joint names are known: then positions in space mean nothing.
@@ -336,7 +373,7 @@ fn joints_only(robot: &Robot) -> Chain {
             ready: 0.0,
         })
         .collect();
-    Chain { joints, flange: Isometry3::identity(), held: Vec::new() }
+    Chain { joints, flange: Isometry3::identity(), held: Vec::new(), doubts: Vec::new() }
 }
 
 fn apply_controller(chain: &mut Chain, controller: &Controller) -> Result<(), ModelError> {

@@ -1,11 +1,11 @@
 //! The way in from a URDF file, which `urdf-rs` reads. Finds the one chain of movable joints, folds what is fixed
 //! into the link it is fixed to, and names line, joint and remedy where the file is no serial arm.
 //!
-//! Joints that branch off and have no further joint behind them are no joints of the arm where it goes on beside them, or ends
-//! there and they slide, as fingers do; nor are those that follow another one (`<mimic>`). They are held at 0, or at the end of
-//! their range that is nearest to it, and what they carry is folded into the link that they hang on.
+//! Other joints than the arm's, of fingers, wheels or a base that drives, are held at 0, or at the end of their range that is nearest to
+//! it, and what they carry is folded into the link that they hang on. `choice` tells them apart.
 
 mod bodies;
+mod choice;
 mod frames;
 
 pub use bodies::{UrdfBody, UrdfForm, UrdfJoint, UrdfShape};
@@ -35,15 +35,30 @@ pub fn with_joint_friction(
     urdf_rs::with_dynamics(text, joint, friction, damping).map_err(fault)
 }
 
-/// Reads the serial chain of a URDF. The flange is the end of the fixed joints behind the last movable one, following
-/// the first of them in file order at each fork.
-pub(super) fn chain(file: &Path) -> Result<Chain, ModelError> {
-    chain_of(&input::text(file, input::Kind::Robot)?, file)
+/// The text of a URDF with these attributes of `<dynamics>` or `<limit>` of a joint, in the format's units, all else as it is; a `<limit>`
+/// that is not there stays away. `file` names it in errors.
+///
+/// # Errors
+/// [`ModelError`] with the line, where it is no XML or has no such joint.
+pub fn with_joint_numbers(
+    text: &str,
+    file: &Path,
+    (joint, tag): (&str, &str),
+    values: &[(&str, f64)],
+) -> Result<String, ModelError> {
+    let fault = |error: urdf_rs::UrdfError| ModelError::Read { path: file.to_owned(), what: error.to_string() };
+    urdf_rs::with_numbers(text, joint, tag, values).map_err(fault)
+}
+
+/// Reads the serial chain of a URDF: of the `joints` with these names, or where they are none of its joints' names of those that
+/// it tells itself. The flange is the end of the fixed joints behind the last one, following the first of them in file order at each fork.
+pub(super) fn chain(file: &Path, joints: &[String]) -> Result<Chain, ModelError> {
+    chain_of(&input::text(file, input::Kind::Robot)?, file, joints)
 }
 
 /// The same of a text; `file` names it in errors.
-pub(super) fn chain_of(text: &str, file: &Path) -> Result<Chain, ModelError> {
-    Tree::of(&read(text, file)?, file)?.chain()
+pub(super) fn chain_of(text: &str, file: &Path, joints: &[String]) -> Result<Chain, ModelError> {
+    Tree::of(&read(text, file)?, file)?.chain(joints)
 }
 
 fn read(text: &str, file: &Path) -> Result<Robot, ModelError> {
@@ -106,17 +121,22 @@ impl<'a> Tree<'a> {
         usize::from(counts) + self.reach.get(joint.child.link.as_str()).copied().unwrap_or(0)
     }
 
-    fn chain(&self) -> Result<Chain, ModelError> {
-        let mut chain = Chain { joints: Vec::new(), flange: Isometry3::identity(), held: Vec::new() };
-        let mut link = self.root;
+    fn chain(&self, named: &[String]) -> Result<Chain, ModelError> {
+        let choice = self.choose(named)?;
+        let mut chain = Chain {
+            joints: Vec::new(),
+            flange: Isometry3::identity(),
+            held: self.held_beside(&choice),
+            doubts: choice.doubts,
+        };
+        let (mut link, mut next) = (self.root, choice.joints.into_iter());
         loop {
-            let next = self.next(link, chain.joints.is_empty())?;
-            let rigid = self.rigid_group(link, next)?;
+            let joint = next.next();
+            let rigid = self.rigid_group(link, joint)?;
             if let Some(last) = chain.joints.last_mut() {
                 last.body = rigid.body;
             }
-            chain.held.extend(rigid.held);
-            let (Some(joint), Some(at)) = (next, rigid.next) else {
+            let (Some(joint), Some(at)) = (joint, rigid.next) else {
                 chain.flange = rigid.end;
                 return Ok(chain);
             };
@@ -125,40 +145,7 @@ impl<'a> Tree<'a> {
         }
     }
 
-    /// The joint with which the arm goes on behind the rigid body of `link`; `None` at its end.
-    fn next(&self, link: &str, first: bool) -> Result<Option<&'a urdf_rs::Joint>, ModelError> {
-        let (mut movable, mut open) = (Vec::new(), vec![link]);
-        while let Some(link) = open.pop() {
-            for joint in self.behind(link) {
-                match joint.joint_type {
-                    JointType::Fixed => open.push(&joint.child.link),
-                    _ => movable.push(joint),
-                }
-            }
-        }
-        movable.sort_by_key(|joint| joint.line);
-        let with =
-            |least: usize| movable.iter().copied().filter(|joint| self.joints_from(joint) >= least).collect::<Vec<_>>();
-        match (&with(2)[..], &with(1)[..]) {
-            ([arm], _) => Ok(Some(*arm)),
-            ([], [last]) if first || movable.len() == 1 => Ok(Some(*last)),
-            ([], branches) if !first && are_fingers(branches) || branches.is_empty() => Ok(None),
-            (several, branches) => {
-                let branches = if several.is_empty() { branches } else { several };
-                let names: Vec<_> = branches.iter().map(|j| format!("`{}` (line {})", j.name, j.line)).collect();
-                let line = branches.first().map_or(1, |joint| joint.line);
-                Err(self.error(
-                    line,
-                    &format!(
-                        "joints {} branch off link `{link}`; only serial arms are supported: make all but one of them fixed",
-                        names.join(" and ")
-                    ),
-                ))
-            }
-        }
-    }
-
-    /// Everything rigid with `link`: its mass, where `next` starts, the joints that are held, and the end of the fixed joints.
+    /// Everything rigid with `link`, joints that are held included: its mass, where `next` starts, and the end of the fixed joints.
     fn rigid_group(&self, link: &str, next: Option<&urdf_rs::Joint>) -> Result<RigidGroup, ModelError> {
         let mut group = RigidGroup::default();
         let mut end = None;
@@ -174,7 +161,6 @@ impl<'a> Tree<'a> {
                     open.push((&joint.child.link, to_joint, on_path && !path_goes_on));
                     path_goes_on = true;
                 } else {
-                    group.held.push(joint.name.clone());
                     open.push((&joint.child.link, to_joint * self.held(joint)?, false));
                 }
             }
@@ -272,11 +258,6 @@ fn rest(joint: &urdf_rs::Joint) -> f64 {
     if joint.joint_type != JointType::Continuous && upper > lower { 0.0_f64.clamp(lower, upper) } else { 0.0 }
 }
 
-/// Whether joints without further ones behind them may be a gripper's: one that is driven, or several that slide.
-fn are_fingers(joints: &[&urdf_rs::Joint]) -> bool {
-    joints.len() < 2 || joints.iter().all(|joint| joint.joint_type == JointType::Prismatic)
-}
-
 fn at_line(file: &Path, line: usize, what: &str) -> ModelError {
     ModelError::Chain { path: file.to_owned(), what: format!("line {line}: {what}") }
 }
@@ -302,8 +283,6 @@ struct RigidGroup {
     body: MassProperties,
     /// Where the arm's next joint starts.
     next: Option<Isometry3<f64>>,
-    /// Joints that are held, by name.
-    held: Vec<String>,
     end: Isometry3<f64>,
 }
 
