@@ -15,6 +15,7 @@ pub(crate) mod at {
     pub(crate) const GENERATOR: usize = 1288;
     pub(crate) const CONTROLLER: usize = 1289;
     pub(crate) const ERRORS: usize = 1290;
+    pub(crate) const REASON: usize = 1331;
     pub(crate) const ROBOT_MODE: usize = 1372;
     pub(crate) const SUCCESS_RATE: usize = 1373;
     pub(crate) const Q_C: usize = 8;

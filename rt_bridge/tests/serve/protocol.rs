@@ -111,8 +111,77 @@ fn a_client_that_falls_silent_is_stopped_and_can_recover() {
     assert_eq!(client.ask(1, &motion(2, 4)), 1);
     drop(client);
     let report = served.finish();
-    assert_eq!((report.robot.reflexes, report.robot.motions, report.clients), (1, 2, 1));
+    assert_eq!((report.robot.motions, report.clients), (2, 1));
+    // The second motion may be seen to be left behind before all ends.
+    assert!((1..=2).contains(&report.robot.reflexes), "{report:?}");
     assert!(report.robot.lost_commands >= 20);
+}
+
+#[test]
+fn at_rest_after_a_reflex_no_error_is_left_but_its_reason_until_it_is_recovered() {
+    let served = Served::start(Pace::Fast);
+    let mut client = Client::connected(served.address);
+    client.state();
+    client.send(1, &motion(0, 0));
+    assert_eq!(client.reply().payload, [1]);
+    let mut state = client.state_in_mode(MOVE);
+    for _ in 0..20 {
+        client.answer(&state, |_| {});
+        state = client.state();
+    }
+    // A step of the position, which no joint can follow.
+    client.answer(&state, |command| {
+        let place = at::Q_C..at::Q_C + 8;
+        let q = f64::from_le_bytes(command[place.clone()].try_into().expect("eight bytes"));
+        command[place].copy_from_slice(&(q + 0.1).to_le_bytes());
+    });
+    let first = client.state_in_mode(REFLEX);
+    let raised = flags(&first, at::ERRORS);
+    assert!(!raised.is_empty() && raised == flags(&first, at::REASON), "{raised:?}");
+    let resting = loop {
+        let state = client.state();
+        assert_eq!((state[at::ROBOT_MODE], flags(&state, at::REASON)), (REFLEX, raised.clone()));
+        if flags(&state, at::ERRORS).is_empty() {
+            break state;
+        }
+    };
+    let fastest = numbers(&resting, at::DQ, 7).into_iter().map(f64::abs).fold(0.0, f64::max);
+    assert!(fastest < 0.05, "still {fastest} rad/s");
+    assert_eq!(client.reply().payload, [8]);
+    assert_eq!(client.ask(1, &motion(2, 4)), 5, "no motion in a reflex");
+    assert_eq!(client.ask(10, &[]), 0);
+    let idle = client.state_in_mode(IDLE);
+    assert_eq!((flags(&idle, at::ERRORS), flags(&idle, at::REASON)), (vec![], raised));
+}
+
+#[test]
+fn a_client_that_is_gone_in_a_motion_leaves_a_reflex_to_the_next_one() {
+    let served = Served::start(Pace::Fast);
+    let mut client = Client::connected(served.address);
+    client.state();
+    client.send(1, &motion(0, 0));
+    assert_eq!(client.reply().payload, [1]);
+    let mut state = client.state_in_mode(MOVE);
+    for _ in 0..20 {
+        client.answer(&state, |_| {});
+        state = client.state();
+    }
+    // Its system closes the connection of a program that is killed, as here.
+    drop(client);
+    let mut next = Client::connected(served.address);
+    let state = next.state();
+    assert_eq!(state[at::ROBOT_MODE], REFLEX);
+    assert_eq!(flags(&state, at::REASON), [COMMUNICATION]);
+    assert_eq!(next.ask(1, &motion(0, 0)), 5, "no motion in a reflex");
+    assert_eq!(next.ask(10, &[]), 0);
+    next.state_in_mode(IDLE);
+    assert_eq!(next.ask(1, &motion(0, 0)), 1);
+    // One that leaves an arm at rest leaves it idle.
+    next.send(2, &[]);
+    next.state_in_mode(IDLE);
+    drop(next);
+    let mut last = Client::connected(served.address);
+    assert_eq!(last.state()[at::ROBOT_MODE], IDLE);
 }
 
 #[test]
@@ -147,6 +216,11 @@ fn a_port_that_is_taken_is_named_with_the_way_to_choose_another() {
         assert!(matches!(error, ServeError::PortTaken { .. }));
         assert!(text.contains(&format!("port {port} of 127.0.0.1 is taken")) && text.contains(flag), "{text}");
     }
+}
+
+/// Places of the errors that are set among the 41 from `offset` on.
+fn flags(state: &crate::client::State, offset: usize) -> Vec<usize> {
+    (0..41).filter(|i| state[offset + i] != 0).collect()
 }
 
 fn counter(state: &crate::client::State) -> u64 {

@@ -13,7 +13,8 @@
 //! ```
 //!
 //! In any mode but moving, an arm that is too fast, beyond its range or held by too much torque is a reflex as well, and
-//! its brakes close: there the robot's own controller is what failed.
+//! its brakes close: there the robot's own controller is what failed. A client that is gone during a motion leaves a reflex behind,
+//! `communication_constraints_violation`. At rest a state in reflex shows no errors, but why the last motion ended.
 //!
 //! Deterministic: the same requests and set points give the same states.
 #![allow(non_snake_case)] // the field's own symbols
@@ -189,11 +190,13 @@ impl Robot {
         }
     }
 
-    /// The client is gone: its motion ends, and what it has set goes with it. Errors stay.
+    /// The client is gone, and what it has set goes with it. A motion that it leaves behind gets no commands any more, which is a
+    /// reflex as any other loss of them; the next client finds it.
     pub(super) fn client_left(&mut self) {
         self.waiting = None;
-        if self.end().is_some() {
+        if self.running().is_some() {
             self.notices.warn(About::Client, "the client left during a motion; the arm comes to rest");
+            self.reflex(Fault::CommunicationConstraints.alone());
         }
         if let Mode::Recovering { id, .. } = &mut self.mode {
             *id = None;
@@ -230,6 +233,7 @@ impl Robot {
 
     /// Lets a millisecond pass; `set_point` is the newest that has arrived since the last one.
     pub(super) fn tick(&mut self, set_point: Option<&SetPoint>) {
+        self.forget_what_is_over();
         self.go_on_recovering();
         self.begin_waiting();
         self.cycle(set_point);
@@ -244,6 +248,14 @@ impl Robot {
         self.tally.cycles += 1;
         self.watch();
         self.show();
+    }
+
+    /// Of an arm that has come to rest after a reflex nothing is wrong any more: why it stopped stays, the reason of its last motion's end.
+    fn forget_what_is_over(&mut self) {
+        let rests = if self.braked { self.body.stands() } else { self.hold.rests() };
+        if matches!(self.mode, Mode::Reflex) && rests {
+            self.errors = ReflexErrors::default();
+        }
     }
 
     fn cycle(&mut self, set_point: Option<&SetPoint>) {
