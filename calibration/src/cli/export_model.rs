@@ -1,7 +1,7 @@
 //! `calibration export-model`.
 
 use super::print;
-use calibration::model::{self, Format, LeftOut, Line, ModelFile};
+use calibration::model::{self, Base, Format, LeftOut, Line, ModelFile};
 use clap::{Args, ValueEnum};
 use serde::Serialize;
 use shared_mem::answer;
@@ -15,9 +15,9 @@ use std::path::{Path, PathBuf};
 #[command(after_help = "\
 What was identified and diagnosed, in the keys of your simulator: rotor inertia, friction and limits of the joints,
 gains and delay of the controller, loads, the object's mass, inertia and friction, the contact of tip and object, the
-camera's true place. Elements carry the names of the robot's joints, so that a model of your own is brought up to
-date by name (docs/export_model.md has the lines for it); the file loads as it stands, too. Above each number a comment
-says what it is, its unit and where it comes from.
+camera's true place. The file loads as it stands; above each number a comment says what it is, its unit and where it comes
+from. With --base a model of your own is brought up to date: by the names of its joints, its shapes, names, order of controls and
+keyframes kept, wherever its base stands (docs/export_model.md).
 
 What the format has no key for is left out: it is named in the file, here, and in --json. Without a theta.toml the
 numbers are those of cell.toml.
@@ -26,6 +26,8 @@ Examples:
   calibration export-model session --to mjcf --out cell.xml
   calibration export-model theta.toml --cell cell.toml --to urdf --out arm.urdf
   calibration export-model session --parameters theta.toml --to sdf --out world.sdf --json
+  calibration export-model session --to mjcf --base lab.xml --out lab_found.xml
+  calibration export-model session --to mjcf --base two_arms.xml --base-joints l1,l2,l3,l4,l5,l6,l7 --out found.xml
 
 JSON: to, file, lines [{of, what, values, unit, from}], left_out [{what, why}].")]
 pub(super) struct ExportModelArguments {
@@ -41,6 +43,13 @@ pub(super) struct ExportModelArguments {
     /// The format.
     #[arg(long, value_enum)]
     to: Target,
+    /// Your own model of the arm, MJCF or URDF: the answer is this model with what is known of the cell in it, its names, the order of its
+    /// controls and its keyframes kept.
+    #[arg(long, value_name = "MODEL")]
+    base: Option<PathBuf>,
+    /// Joints of --base that are the cell's, from base to flange [default: those of the same names].
+    #[arg(long, requires = "base", value_name = "NAME,...", value_delimiter = ',')]
+    base_joints: Vec<String>,
     /// Where the model goes [default: standard output].
     #[arg(long, value_name = "MODEL")]
     out: Option<PathBuf>,
@@ -73,7 +82,7 @@ struct Answer<'a> {
 }
 
 pub(super) fn run(arguments: &ExportModelArguments) -> anyhow::Result<()> {
-    let ExportModelArguments { from, cell, parameters, to, out, force, json } = arguments;
+    let ExportModelArguments { from, cell, parameters, to, base, base_joints, out, force, json } = arguments;
     let place = Destination::of(out.as_deref(), *force)?;
     let is_session = from.is_dir();
     let folder = if is_session { from.as_path() } else { from.parent().unwrap_or(Path::new("")) };
@@ -98,7 +107,11 @@ pub(super) fn run(arguments: &ExportModelArguments) -> anyhow::Result<()> {
         Target::Urdf => Format::Urdf,
         Target::Sdf => Format::Sdf,
     };
-    let ModelFile { text, lines, left_out } = model::write(&cell, &theta, format)?;
+    let base = base.as_deref().map(|file| Base { file, joints: base_joints, out: out.as_deref() });
+    let ModelFile { text, lines, left_out } = match &base {
+        Some(base) => model::write_into(&cell, &theta, format, base)?,
+        None => model::write(&cell, &theta, format)?,
+    };
     let Some(place) = place else {
         left_out.iter().for_each(|LeftOut { what, why }| console::line(format_args!("left out: {what}: {why}")));
         return Ok(answer::bytes(text.as_bytes())?);

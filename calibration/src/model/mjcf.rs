@@ -9,7 +9,8 @@ use super::sheet::Sheet;
 use nalgebra::{Isometry3, Matrix3, UnitQuaternion};
 
 /// Of the file [s]: a tenth of the controller's period, short enough for the contact of a hard tip.
-const STEP: f64 = 1e-4;
+pub(super) const STEP: f64 = 1e-4;
+
 /// The file, what stands in it, and what it cannot hold.
 pub(super) fn write(model: &CellModel) -> Sheet {
     let mut file = File { sheet: Sheet::new() };

@@ -5,6 +5,7 @@
 //! itself what it changes there ([`twin::effects::Change`]); a writer for each format knows which keys hold it. What the format
 //! has no key for, or no law, is left out and named.
 
+mod base;
 mod cell_model;
 mod known;
 mod mjcf;
@@ -12,6 +13,7 @@ mod sdf;
 mod sheet;
 mod urdf;
 
+pub use base::Base;
 pub use known::{LeftOut, Line};
 
 use cell_model::CellModel;
@@ -46,7 +48,19 @@ pub struct ModelFile {
 /// # Errors
 /// Robot, mesh or effect that cannot be used; one line with the remedy.
 pub fn write(cell: &Cell, theta: &Theta, format: Format) -> anyhow::Result<ModelFile> {
+    Ok(written(CellModel::of(cell, theta)?, format))
+}
+
+/// The user's own model, in the same format, with what is known of the cell.
+///
+/// # Errors
+/// As [`write`], and what of the user's model cannot be used.
+pub fn write_into(cell: &Cell, theta: &Theta, format: Format, base: &Base<'_>) -> anyhow::Result<ModelFile> {
     let model = CellModel::of(cell, theta)?;
+    base::merge(written(CellModel::of(cell, theta)?, format), &model, format, base)
+}
+
+fn written(model: CellModel, format: Format) -> ModelFile {
     let writer = match format {
         Format::Mjcf => mjcf::write,
         Format::Urdf => urdf::write,
@@ -60,7 +74,7 @@ pub fn write(cell: &Cell, theta: &Theta, format: Format) -> anyhow::Result<Model
     for LeftOut { what, why } in &left_out {
         xml.comment(&format!("{what}: {why}"));
     }
-    Ok(ModelFile { text: xml.finish(), lines, left_out })
+    ModelFile { text: xml.finish(), lines, left_out }
 }
 
 #[cfg(test)]
