@@ -95,10 +95,62 @@ fn update_blocks(before: &ArrayOfTables, update: &ArrayOfTables, others: bool) -
     kept.chain(update.iter().map(one)).collect()
 }
 
+/// Turns serde's words about types and lengths into those of a file.
+fn plainly(message: &str) -> String {
+    let message = message.replace('\n', " ");
+    let split =
+        |rest: &str| rest.split_once(", expected ").map(|(found, wanted)| (found.to_owned(), wanted.to_owned()));
+    if let Some((found, wanted)) = message.strip_prefix("invalid length ").and_then(split) {
+        let number = wanted.split(|c: char| !c.is_ascii_digit()).find(|digits| !digits.is_empty());
+        return match number {
+            Some(number) => format!("{found} values stand there; expected {number}"),
+            None => format!("{found} values stand there; expected {wanted}"),
+        };
+    }
+    let rest = message.strip_prefix("invalid type: ").or_else(|| message.strip_prefix("invalid value: "));
+    if let Some((found, wanted)) = rest.and_then(split) {
+        return format!("{} stands there; expected {}", found_in_words(&found), wanted_in_words(&wanted));
+    }
+    if let Some(key) = message.strip_prefix("missing field ") {
+        return format!("the key {key} is missing");
+    }
+    if let Some((found, wanted)) = message.strip_prefix("unknown variant ").and_then(split) {
+        return format!("{found} is none of the known words; expected {}", wanted.trim_start_matches("one of "));
+    }
+    message
+}
+
+fn found_in_words(found: &str) -> String {
+    let kinds = ["string ", "integer ", "floating point ", "boolean "];
+    let value = kinds.iter().find_map(|kind| found.strip_prefix(kind));
+    value.map_or_else(
+        || match found {
+            "map" => "a table".to_owned(),
+            "sequence" => "a list".to_owned(),
+            other => other.to_owned(),
+        },
+        |value| value.trim_matches('`').to_owned(),
+    )
+}
+
+fn wanted_in_words(wanted: &str) -> &str {
+    match wanted {
+        "f64" | "f32" => "a number",
+        "a string" => "text in quotes",
+        "a sequence" => "a list",
+        "a boolean" => "true or false",
+        _ if wanted.starts_with(['u', 'i']) && wanted[1..].parse::<u8>().is_ok() || wanted == "usize" => {
+            "a whole number"
+        }
+        _ if wanted.starts_with("an array of length ") => wanted.trim_start_matches("an array of length "),
+        _ => wanted,
+    }
+}
+
 /// Turns serde's "unknown field `x`, expected one of `a`, `b`" into advice.
 fn with_nearest_name(message: &str) -> String {
     let Some(rest) = message.strip_prefix("unknown field ") else {
-        return message.replace('\n', " ");
+        return plainly(message);
     };
     let mut names = rest.split('`').skip(1).step_by(2);
     let unknown = names.next().unwrap_or("");
@@ -154,6 +206,25 @@ mod tests {
                 }
                 Err(error) => prop_assert!(error.to_string().starts_with("a.toml"), "{}", error),
             }
+        }
+    }
+
+    #[test]
+    fn no_word_of_a_library_is_left_in_what_is_wrong_with_a_value() {
+        for (text, said) in [
+            ("[camera]\ndistortion = [0.1, 0.2, 0.3]\n", "3 values stand there; expected"),
+            ("[table]\nheight = \"low\"\n", "\"low\" stands there; expected a number"),
+            ("[tool]\nmass = 0.2\nlength = 0.1\n", "the key `radius` is missing"),
+            ("[controller]\nkind = \"pd\"\n", "`pd` is none of the known words; expected `joint_impedance`"),
+            ("[camera]\nwidth = 1.5\n", "1.5 stands there; expected a whole number"),
+            ("[topics]\nmeasured = 5\n", "5 stands there; expected text in quotes"),
+        ] {
+            let error = Cell::parse(text, Path::new("cell.toml")).expect_err(said).to_string();
+            assert!(error.contains(said), "{error}");
+            assert!(
+                ["invalid", "variant", "field", "f64", "u32", "usize", "sequence"].iter().all(|w| !error.contains(w)),
+                "{error}"
+            );
         }
     }
 

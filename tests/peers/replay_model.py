@@ -29,8 +29,7 @@ def document():
         blocks = [block.split("```")[0] for block in stream.read().split("```python\n")[1:]]
     names = {}
     for block in blocks:
-        # The last lines of the second block are an example with files of a reader's own.
-        exec(block.split("\n\n\nspec = ")[0], names)
+        exec(block, names)
     return names
 
 
@@ -53,13 +52,11 @@ def arguments():
 
 
 def own(text):
-    """The model of the peers, with joint names of its own and nothing that was found, brought up to date."""
+    """A model of the peers for the cell of `text`, with joint names of its own and nothing that was found."""
     build = peers.Build(peers.Engine(substeps=10), peers.Tool(), rotor=np.zeros(7))
-    with_object = "object_position" in text
-    build.on_table = ['<geom name="table" type="plane" size="3 3 0.1"/>'] if with_object else []
+    build.on_table = ['<geom name="table" type="plane" size="3 3 0.1"/>'] if "object_position" in text else []
     bare = peers.mjcf(build).replace("</worldbody>", "".join(build.on_table) + "</worldbody>")
-    names = {f"fr3_joint{i + 1}": f"motor{i}" for i in range(7)}
-    return DOCUMENT["merged"](mujoco.MjSpec.from_string(bare).to_xml(), text, names)
+    return mujoco.MjSpec.from_string(bare).to_xml()
 
 
 class Replay:
@@ -180,10 +177,16 @@ def session(given, folder, theta, place):
     calibration, twin = (os.path.join(given.programs, name) for name in ("calibration", "twin"))
     parameters = ["--parameters", theta] if theta else []
     model, out = os.path.join(place, "cell.xml"), os.path.join(place, "clip.mcap")
-    answer([calibration, "export-model", folder, *parameters, "--to", "mjcf", "--out", model, "--force", "--json"])
+    export = [calibration, "export-model", folder, *parameters, "--to", "mjcf", "--force", "--json"]
+    answer([*export, "--out", model])
+    if given.own:
+        bare = os.path.join(place, "own.xml")
+        with open(model) as stream, open(bare, "w") as into:
+            into.write(own(stream.read()))
+        names = ",".join(f"motor{i}" for i in range(7))
+        answer([*export, "--base", bare, "--base-joints", names, "--out", model])
     with open(model) as stream:
-        text = stream.read()
-    cell, joints, adds = Cell(own(text) if given.own else text, not given.continuous), [], []
+        cell, joints, adds = Cell(stream.read(), not given.continuous), [], []
     clips = sorted(name for name in os.listdir(folder) if name.endswith(".mcap"))[:given.clips]
     for clip in clips:
         answer([twin, "replay", os.path.join(folder, clip), *parameters, "--out", out, "--force", "--json"])

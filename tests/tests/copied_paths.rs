@@ -78,7 +78,7 @@ fn a_session_is_the_same_by_the_bare_name_a_dot_and_the_whole_path() {
     for (number, spelt) in spelt.iter().take(3).enumerate() {
         let begun = if number == 0 { "" } else { " --arm sim" };
         let line =
-            format!("capture excitation --cell {spelt} --clips 1 --duration 1 --realtime ignore --out far/new{begun}");
+            format!("capture excitation --cell {spelt} --clips 1 --duration 2 --realtime ignore --out far/new{begun}");
         done(&cell, "calibration", &line);
     }
     let urdf = robot_of(&cell.path("far/new/cell.toml")).expect("a URDF");

@@ -187,9 +187,9 @@ fn of_two_arms_the_user_names_the_joints_of_one() {
     assert_eq!(arm.held_joints().len(), 9);
     for (wrong, said) in [
         (&["right_2", "right_1"][..], "from base to flange"),
-        (&["left_1", "right_2"], "of one arm"),
-        (&["right_1", "right_9"], "`right_9`, which is none of its joints"),
-        (&["to_tool0"], "branch off"),
+        (&["left_1", "right_2"][..], "of one arm"),
+        (&["right_1", "right_9"][..], "`right_9`, which is none of its joints"),
+        (&["to_tool0"][..], "branch off"),
     ] {
         let error = robot.refused(wrong);
         assert!(error.contains(said) && !error.contains('\n'), "{error}");

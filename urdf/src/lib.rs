@@ -13,14 +13,17 @@
 //! | `tree` | from the stream of tags to links and joints, and which tags must be there |
 //! | `tag` | the attributes of one tag: names and numbers |
 //! | `dynamics` | a joint's friction and limits written into a file |
+//! | `files` | meshes and textures named otherwise |
 
 mod dynamics;
+mod files;
 mod tag;
 #[cfg(test)]
 mod tests;
 mod tree;
 
 pub use dynamics::{with_dynamics, with_numbers};
+pub use files::with_files;
 
 /// A robot: its links and joints in file order.
 #[derive(Debug, Clone, Default, PartialEq)]

@@ -7,7 +7,7 @@ use shared_mem::printable;
 use std::io;
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use twin::arm::ArmModel;
+use twin::arm::{ArmModel, with_files_found_from};
 
 /// A URDF that was read and is an arm.
 pub(super) struct Description {
@@ -25,6 +25,7 @@ impl Description {
         if file.extension().is_some_and(|end| end == "xacro") {
             let text = expanded(file)?;
             let arm = ArmModel::from_urdf(&text, file, joints)?;
+            let text = with_files_found_from(&text, file, out)?;
             return Ok(Self { path: out.with_extension("urdf"), text: Some(text), arm });
         }
         let text = input::text(file, input::Kind::Robot)?;

@@ -6,7 +6,7 @@ use super::facts::{Facts, Named};
 use super::{Order, Taken};
 use anyhow::bail;
 use import::{UsualController, is_franka, usual_controller};
-use shared_mem::cell::{Cell, Controller, Object, Robot, Table, Tool, Topics};
+use shared_mem::cell::{Cell, Controller, ControllerKind, Object, Robot, Table, Tool, Topics};
 use shared_mem::place;
 use std::path::{Path, PathBuf};
 use twin::arm::{ArmModel, HeldJoint};
@@ -172,10 +172,14 @@ impl Known {
         let dof = arm.dof();
         let recorded = self.cell.controller.is_some();
         let fits = |controller: &Controller| facts.controller.is_none_or(|kind| kind == controller.kind);
-        let usual = Cell::parse(toml, Path::new("cell.toml"))?.controller;
-        let begun = self.cell.controller.take().or(usual).filter(fits);
-        let mut controller =
-            begun.unwrap_or_else(|| Controller { kind: facts.controller.unwrap_or_default(), ..Controller::default() });
+        let usual = Cell::parse(toml, Path::new("cell.toml"))?.controller.filter(fits);
+        let begun = self.cell.controller.take().map(|recorded| match facts.controller {
+            Some(kind) => under(recorded, kind, &mut self.warnings),
+            None => recorded,
+        });
+        let mut controller = begun
+            .or(usual)
+            .unwrap_or_else(|| Controller { kind: facts.controller.unwrap_or_default(), ..Controller::default() });
         for (flag, given, nominal, range) in [
             ("stiffness", &facts.stiffness, &mut controller.stiffness, &mut controller.stiffness_range),
             ("damping", &facts.damping, &mut controller.damping, &mut controller.damping_range),
@@ -267,6 +271,28 @@ impl Known {
             self.take("clip", recorded.flag);
         }
         Ok(())
+    }
+}
+
+/// A recorded controller under a law that a person names: what its motors are like stays; gains of another law mean something else, and are
+/// left out with a word.
+fn under(recorded: Controller, kind: ControllerKind, warnings: &mut Vec<String>) -> Controller {
+    let Some(name) = recorded.kind.name().filter(|_| recorded.kind != kind) else {
+        return Controller { kind, ..recorded };
+    };
+    warnings.push(format!(
+        "the first clip says controller `{name}`, and --controller `{}`: its gains are left out, what its motors are like stays",
+        kind.name().unwrap_or("of no name")
+    ));
+    let Controller { rotor_inertia, torque_limit, voltage_limit, torque_constant, torque_sensing, .. } = recorded;
+    Controller {
+        kind,
+        rotor_inertia,
+        torque_limit,
+        voltage_limit,
+        torque_constant,
+        torque_sensing,
+        ..Controller::default()
     }
 }
 

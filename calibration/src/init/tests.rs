@@ -129,3 +129,37 @@ fn too_few_gains_are_counted() {
     let error = Known::gather(order).expect_err("six gains for seven joints").to_string();
     assert!(error.contains("--stiffness holds 6 numbers") && error.contains("7 joints"), "{error}");
 }
+
+#[test]
+fn a_recorded_controller_keeps_its_motors_under_another_law_and_that_is_said() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let cell = Cell {
+        robot: Some(shared_mem::cell::Robot { model: Some("fr3".into()), ..Default::default() }),
+        controller: Some(Controller {
+            kind: ControllerKind::JointImpedance,
+            stiffness: vec![600.0; 7],
+            rotor_inertia: vec![0.2; 7],
+            ..Controller::default()
+        }),
+        ..Cell::default()
+    };
+    let info = shared_mem::recording::ClipInfo { cell_toml: Some(cell.to_toml()), ..Default::default() };
+    let mut writer = shared_mem::recording::ClipWriter::create(&folder.path().join("a.mcap"), &info).expect("a file");
+    for k in 0..50 {
+        let state = shared_mem::msg::arm::ArmState { stamp_ns: 1_000_000 * (1 + k), cycle: k, ..Default::default() };
+        writer.arm_state(&state).expect("room");
+    }
+    writer.finish().expect("a clip");
+    let facts = Facts { controller: Some(ControllerKind::JointPd), ..Facts::default() };
+    let out = folder.path().join("cell.toml");
+    let order = Order { facts: &facts, bag: None, clips: Some(folder.path()), out: &out, force: false };
+    let known = Known::gather(order).expect("a clip tells its robot");
+    let controller = known.cell.controller.expect("a controller");
+    assert_eq!((controller.kind, controller.rotor_inertia), (ControllerKind::JointPd, vec![0.2; 7]));
+    assert!(controller.stiffness.is_empty());
+    assert!(
+        known.warnings.iter().any(|line| line.contains("`joint_impedance`") && line.contains("`joint_pd`")),
+        "{:?}",
+        known.warnings
+    );
+}

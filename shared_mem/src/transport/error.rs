@@ -76,19 +76,19 @@ pub enum TransportError {
 
 impl TransportError {
     pub(super) fn node(reason: impl Debug) -> Self {
-        Self::Node { what: format!("{reason:?}") }
+        Self::Node { what: in_words(&reason) }
     }
 
     pub(super) fn port(topic: &'static str, reason: impl Debug) -> Self {
-        Self::Port { topic, what: format!("{reason:?}") }
+        Self::Port { topic, what: in_words(&reason) }
     }
 
     pub(super) fn open(topic: &'static str, reason: impl Debug) -> Self {
-        Self::Open { topic, what: format!("{reason:?}") }
+        Self::Open { topic, what: in_words(&reason) }
     }
 
     fn incompatible(topic: &'static str, reason: impl Debug) -> Self {
-        Self::Incompatible { topic, what: format!("{reason:?}") }
+        Self::Incompatible { topic, what: in_words(&reason) }
     }
 
     fn full(topic: &'static str, limit: usize, side: &'static str) -> Self {
@@ -175,6 +175,41 @@ pub(super) fn listener_error(topic: &'static str, error: ListenerCreateError) ->
         }
         _ => TransportError::open(topic, error),
     }
+}
+
+/// What a person can act upon, by words in the name of iceoryx2's reason.
+fn in_words(reason: &dyn Debug) -> String {
+    let name = format!("{reason:?}");
+    let known = [
+        ("HangsInCreation", "another process was ended while it opened it, or is still at it"),
+        ("IsBeingCreatedByAnotherInstance", "another process is opening it at this moment"),
+        ("IsMarkedForDestruction", "another process is closing it at this moment"),
+        ("InsufficientPermissions", "it belongs to another user"),
+        ("CorruptedState", "a process that was ended left it half done"),
+        ("ServiceInCorruptedState", "a process that was ended left it half done"),
+        ("InternalFailure", "the system refuses a file or a piece of memory"),
+        ("OutOfMemory", "there is no memory left"),
+        ("LoanError", "all places for messages are taken"),
+        ("Incompatible", "its messages or its limits are others"),
+        ("DoesNotSupport", "its limits are others"),
+        ("VersionMismatch", "its files are of another version"),
+        ("BufferSize", "its queues are shorter"),
+        ("Interrupt", "a signal came in between"),
+    ];
+    known.iter().find(|(word, _)| name.contains(word)).map_or_else(|| words_of(&name), |(_, words)| (*words).to_owned())
+}
+
+/// The innermost name of a reason, `Opening(UnableToCreateSegment)`, as words: `unable to create segment`.
+fn words_of(name: &str) -> String {
+    let innermost = name.trim_end_matches(')').rsplit('(').next().unwrap_or(name);
+    let mut words = String::new();
+    for c in innermost.chars() {
+        if c.is_uppercase() && !words.is_empty() {
+            words.push(' ');
+        }
+        words.extend(c.to_lowercase());
+    }
+    words
 }
 
 /// The program that usually sits on a side of a topic, for error messages.

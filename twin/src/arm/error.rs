@@ -30,7 +30,9 @@ pub enum ModelError {
         what: String,
     },
     /// More joints than a message carries.
-    #[error("the arm has {0} movable joints; 1 to {MAX_JOINTS} are supported: say with `joints` which are the arm's, from base to flange")]
+    #[error(
+        "the arm has {0} movable joints; 1 to {MAX_JOINTS} are supported: say with `joints` which are the arm's, from base to flange"
+    )]
     Joints(usize),
     /// A vector of cell.toml does not fit the arm.
     #[error("`{key}` in cell.toml holds {given} values; this arm has {dof} joints: give one for each")]

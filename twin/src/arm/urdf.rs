@@ -7,6 +7,7 @@
 mod bodies;
 mod choice;
 mod frames;
+mod moving_base;
 
 pub use bodies::{UrdfBody, UrdfForm, UrdfJoint, UrdfShape};
 pub use frames::{LinkFrame, UrdfFrames};
@@ -15,7 +16,7 @@ use super::chain::{Chain, Joint};
 use super::error::ModelError;
 use super::inertia::MassProperties;
 use nalgebra::{Isometry3, Translation3, Unit, UnitQuaternion, Vector3};
-use shared_mem::input;
+use shared_mem::{input, place};
 use std::collections::HashMap;
 use std::path::Path;
 use urdf_rs::{JointType, Pose, Robot};
@@ -48,6 +49,25 @@ pub fn with_joint_numbers(
 ) -> Result<String, ModelError> {
     let fault = |error: urdf_rs::UrdfError| ModelError::Read { path: file.to_owned(), what: error.to_string() };
     urdf_rs::with_numbers(text, joint, tag, values).map_err(fault)
+}
+
+/// The text of the URDF `file` as it finds its meshes and textures from the folder of `out`.
+///
+/// # Errors
+/// [`ModelError`] with the line, where it is no XML.
+pub fn with_files_found_from(text: &str, file: &Path, out: &Path) -> Result<String, ModelError> {
+    let (from, to) = (place::from_anywhere(file), place::from_anywhere(out));
+    if from.parent() == to.parent() {
+        return Ok(text.to_owned());
+    }
+    let folder = from.parent().unwrap_or(Path::new("/"));
+    let rename = |name: &str| {
+        // package:// and the like are looked up elsewhere.
+        let is_relative = !name.contains("://") && Path::new(name).is_relative();
+        is_relative.then(|| place::from_anywhere(&folder.join(name)).display().to_string())
+    };
+    urdf_rs::with_files(text, &rename)
+        .map_err(|error| ModelError::Read { path: file.to_owned(), what: error.to_string() })
 }
 
 /// Reads the serial chain of a URDF: of the `joints` with these names, or where they are none of its joints' names of those that

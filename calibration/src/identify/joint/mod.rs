@@ -43,7 +43,7 @@ use shared_mem::recording::{ReadError, Session};
 use std::path::PathBuf;
 use std::time::Instant;
 use subject::Subject;
-use twin::arm::{ModelError, with_joint_friction};
+use twin::arm::{ModelError, with_files_found_from, with_joint_friction};
 use twin::world::LoneJoint;
 
 /// A part that rests nearer than this to the end of its joint's range may lie on a stop, as a share of the range.
@@ -263,10 +263,9 @@ fn write(
         return Ok(());
     }
     let text = with_joint_friction(&subject.text, &subject.file, &subject.joint.name, found.numbers())?;
-    output::write(out, text)?;
+    output::write(out, with_files_found_from(&text, &subject.file, out)?)?;
     answer.warnings.push(format!(
-        "{} is the URDF with what was found: give it as `urdf` of the object, or of a task's [[articulated]]; its meshes are named relative \
-         to it",
+        "{} is the URDF with what was found: give it as `urdf` of the object, or of a task's [[articulated]]",
         out.display()
     ));
     Ok(())

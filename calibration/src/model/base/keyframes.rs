@@ -26,10 +26,10 @@ pub(super) fn rewrite(merging: &mut Merging, controls: &Controls, shifts: &Shift
     });
     for (what, key) in lacking {
         let why = match key {
-            "ctrl" => "its controls cannot be told in the new order: give one for each actuator",
+            "ctrl" => "its controls cannot be given in the new order: give one for each actuator",
             "act" => "actuators have other states than before: MuJoCo begins with 0",
             _ => {
-                "its positions cannot be told in the new order: MuJoCo begins with those in which the model is written"
+                "its positions cannot be given in the new order: MuJoCo begins with those in which the model is written"
             }
         };
         merging.lacks(what, why);

@@ -6,6 +6,7 @@ use super::places::{self, Angles, Places};
 use super::{Base, LeftOut, Merging, arms, classes::numbers, source};
 use anyhow::ensure;
 use nalgebra::{Isometry3, Vector3};
+use std::collections::HashSet;
 use twin::xml::{Element, Node};
 
 /// What the cell knows of a joint.
@@ -78,11 +79,8 @@ fn is_called(element: &Element, kind: &str, name: &str) -> bool {
 
 /// The body of the user's that this joint moves.
 fn body_of<'a>(root: &'a mut Element, joint: &str) -> Option<&'a mut Element> {
-    let own = |body: &Element| {
-        let in_frames = body.elements().filter(|element| element.name == "frame").flat_map(Element::elements);
-        body.elements().chain(in_frames).any(|element| is_called(element, "joint", joint))
-    };
-    root.find_mut(&|element| element.name == "body" && own(element))
+    let moves = |body: &Element| beside_frames(body).iter().any(|element| is_called(element, "joint", joint));
+    root.find_mut(&|element| element.name == "body" && moves(element))
 }
 
 /// Gives the joints what the cell knows; how much more each one's position reads than before [rad or m].
@@ -91,7 +89,7 @@ fn joints(root: &mut Element, cell: &Element, of_cell: &[String], own: &[String]
     let mut more = Vec::new();
     for (theirs, name) in of_cell.iter().zip(own) {
         let new = cell.all().into_iter().find(|element| is_called(element, "joint", theirs));
-        let old = root.find_mut(&|element| element.name == "joint" && element.get("name") == Some(name));
+        let old = root.find_mut(&|element| is_called(element, "joint", name) && element.get("joint1").is_none());
         let (Some(new), Some(old)) = (new, old) else { continue };
         for key in OF_JOINT {
             if let Some(value) = new.get(key) {
@@ -172,9 +170,9 @@ fn world(element: &Element) -> impl Iterator<Item = &Element> {
 /// The object, the camera and, where the model has none, the table; positions of what is new at the end.
 fn surroundings(merging: &mut Merging, cell: &Element, frame: &Isometry3<f64>) -> anyhow::Result<Vec<f64>> {
     let mut added = Vec::new();
-    let own: Vec<Element> =
-        merging.root.all().into_iter().cloned().map(|e| Element { nodes: Vec::new(), ..e }).collect();
-    let has = |kind: &str, name: &str| own.iter().any(|element| is_called(element, kind, name));
+    let named = |element: &Element| Some((element.name.clone(), element.get("name")?.to_owned()));
+    let own: HashSet<(String, String)> = merging.root.all().into_iter().filter_map(named).collect();
+    let has = |kind: &str, name: &str| own.contains(&(kind.to_owned(), name.to_owned()));
     for mut new in world(cell).cloned().collect::<Vec<_>>() {
         let name = new.get("name").unwrap_or("").to_owned();
         let is_object = new.name == "body" && new.elements().any(|element| element.name == "freejoint");
@@ -304,22 +302,42 @@ fn into_section(root: &mut Element, kind: &str, new: Element) {
     root.last_or_new(kind).nodes.push(Node::Element(new));
 }
 
-/// The cell's base frame as a site of what the arm stands on.
+/// The cell's base frame as a site of the body that the arm stands on, where that has a name, else of the world.
 fn base_site(root: &mut Element, frame: &Isometry3<f64>, first: &str) {
     let here = Places::of(root);
-    let carries = |body: &Element| {
-        body.elements().any(|link| link.name == "body" && link.elements().any(|joint| is_called(joint, "joint", first)))
+    let is_stand = |body: &Element| {
+        ["body", "worldbody"].contains(&body.name.as_str())
+            && beside_frames(body).iter().any(|link| beside_frames(link).iter().any(|e| is_called(e, "joint", first)))
     };
-    let Some(parent) =
-        root.find_mut(&|element| ["body", "worldbody"].contains(&element.name.as_str()) && carries(element))
-    else {
-        return;
-    };
-    let at = parent.get("name").and_then(|name| here.bodies.get(name)).copied().unwrap_or_else(Isometry3::identity);
+    let stand = root.all().into_iter().find(|body| is_stand(body)).and_then(|body| body.get("name")).map(str::to_owned);
+    let at = stand.as_ref().and_then(|name| here.bodies.get(name)).copied().unwrap_or_else(Isometry3::identity);
     let mut site = Element::new("site", &[("name", BASE_SITE.into()), ("group", "4".into())]);
     put(&mut site, &(at.inverse() * frame));
-    parent.nodes.retain(|node| !matches!(node, Node::Element(old) if is_called(old, "site", BASE_SITE)));
-    parent.nodes.push(Node::Element(site));
+    root.each_mut(&mut |body| {
+        body.nodes.retain(|node| !matches!(node, Node::Element(old) if is_called(old, "site", BASE_SITE)));
+    });
+    let holder = match &stand {
+        Some(name) => root.find_mut(&|body| is_called(body, "body", name)),
+        None => root.find_mut(&|body| body.name == "worldbody"),
+    };
+    if let Some(holder) = holder {
+        holder.nodes.push(Node::Element(site));
+    }
+}
+
+/// What is in a body, in its frames as well.
+fn beside_frames(body: &Element) -> Vec<&Element> {
+    let (mut found, mut open) = (Vec::new(), vec![body]);
+    while let Some(element) = open.pop() {
+        for inner in element.elements() {
+            if inner.name == "frame" {
+                open.push(inner);
+            } else {
+                found.push(inner);
+            }
+        }
+    }
+    found
 }
 
 /// Free fall, where the base stands in the model as it does in the cell.

@@ -23,19 +23,9 @@ fn lab(base: &str, prefix: &str, more: &str) -> String {
     let arm = ArmModel::from_cell(&shipped()).expect("the arm");
     let mut bodies = String::new();
     for (k, part) in arm.parts().iter().enumerate() {
-        let turn = |angle: f64| {
-            Isometry3::from_parts(Translation3::identity(), UnitQuaternion::from_axis_angle(&part.axis, angle))
-        };
-        let before = if k == 0 {
-            Isometry3::identity()
-        } else {
-            {
-                let last = &arm.parts()[k - 1];
-                Isometry3::from_parts(Translation3::identity(), UnitQuaternion::from_axis_angle(&last.axis, 0.3))
-                    .inverse()
-            }
-        };
-        let at = before * part.origin * turn(0.3);
+        let turn = |axis| Isometry3::from_parts(Translation3::identity(), UnitQuaternion::from_axis_angle(axis, 0.3));
+        let before = k.checked_sub(1).map_or_else(Isometry3::identity, |last| turn(&arm.parts()[last].axis).inverse());
+        let at = before * part.origin * turn(&part.axis);
         let (p, q, a) = (at.translation.vector, at.rotation, part.axis);
         let _written = write!(
             bodies,
@@ -185,7 +175,7 @@ fn one_of_several_arms_is_asked_for_and_an_arm_of_another_build_is_refused() {
     assert!(numbers(named(&root, "body", "object").get("pos").expect("a place"))[1] > 0.99);
     assert!(named(&root, "joint", "right_fr3_joint1").get("armature").is_some());
     assert!(named(&root, "joint", "left_fr3_joint1").get("armature").is_none());
-    let longer = lab("", "", "").replace("<body name='link3' pos='", "<body name='link3' pos='0.5");
+    let longer = lab("", "", "").replace("<body name='link3' pos='", "<body name='link3' pos='0.5 0 0' user='");
     let refused = merged(&longer, "", &[]).expect_err("another arm");
     assert!(refused.contains("not built as the cell's"), "{refused}");
 }

@@ -6,7 +6,8 @@ use super::{Base, LeftOut, arms};
 use anyhow::{anyhow, ensure};
 use nalgebra::Isometry3;
 use shared_mem::input;
-use twin::arm::{ArmModel, with_joint_numbers};
+use std::path::Path;
+use twin::arm::{ArmModel, with_files_found_from, with_joint_numbers};
 
 /// The text, and what is not in it.
 ///
@@ -54,7 +55,8 @@ pub(super) fn merge(model: &CellModel, base: &Base<'_>) -> anyhow::Result<(Strin
     }
     let end = text.rfind("</robot>").ok_or_else(|| anyhow!("{} does not end with </robot>", base.file.display()))?;
     text.insert_str(end, &more);
-    Ok((text, left_out))
+    let out = base.out.unwrap_or(Path::new("model.urdf"));
+    Ok((with_files_found_from(&text, base.file, out)?, left_out))
 }
 
 /// A load with the joint by which it hangs.
