@@ -10,8 +10,23 @@ use shared_mem::recording::{Clip, JointSeries, ObjectSeries};
 /// Largest share of rows that may be without stamp, or without pose.
 const LARGEST_BAD_SHARE: f64 = 0.01;
 
-/// Gravity's torques [N m] at positions [rad] by the nominal model.
-pub type Gravity = Box<dyn Fn(&[f64]) -> Option<Vec<f64>>>;
+/// Torques [N m] that hold the nominal model at positions [rad] against a free fall in its base frame [m/s²].
+pub type Holds = Box<dyn Fn(&[f64], [f64; 3]) -> Option<Vec<f64>>>;
+
+/// Gravity of the nominal model.
+pub struct Gravity {
+    /// Its free fall in the base frame [m/s²].
+    pub falls: [f64; 3],
+    /// What holds it.
+    pub holds: Holds,
+}
+
+impl Gravity {
+    /// Torques that hold the model still [N m] at positions [rad].
+    pub(crate) fn torques(&self, q: &[f64]) -> Option<Vec<f64>> {
+        (self.holds)(q, self.falls)
+    }
+}
 
 /// Rows of one kind with stamps that may lie before the clip's beginning.
 struct Rows {
@@ -108,10 +123,47 @@ fn series(
         out.dq = gather(&pick("dq", &columns.dq)?, columns.dq_unit.si());
     }
     if !columns.tau.is_empty() && columns.torque != Torque::NotKnown {
-        out.tau = gather(&pick("tau", &columns.tau)?, 1.0);
+        let tau = pick("tau", &columns.tau)?;
+        // What is no measurement must not be taken for one that lacks gravity.
+        match still(&tau) {
+            Some(what) => warnings.push(format!("torques of `{}` are left out: {what}", columns.table)),
+            None => out.tau = gather(&tau, 1.0),
+        }
     }
     Ok((out, rows.stamps_ns))
 }
+
+/// Why columns of a quantity that never rests are no measurement, where none of them is: each holds one or two numbers in all of
+/// its rows, as drivers fill in that measure none.
+pub(crate) fn still(columns: &[&[f64]]) -> Option<String> {
+    let numbers = |values: &&[f64]| {
+        let mut seen: Vec<f64> = Vec::new();
+        for value in values.iter().filter(|v| v.is_finite()) {
+            if !seen.contains(value) {
+                seen.push(*value);
+            }
+            if seen.len() > 2 {
+                return None;
+            }
+        }
+        Some(seen)
+    };
+    let rows = columns.iter().map(|values| values.len()).max()?;
+    if rows <= FEW_ROWS {
+        return None;
+    }
+    let all: Vec<Vec<f64>> = columns.iter().map(numbers).collect::<Option<_>>()?;
+    Some(match all.iter().flatten().copied().reduce(f64::max) {
+        None => "no row holds a number".to_owned(),
+        Some(_) if all.iter().flatten().all(|v| *v == 0.0) => {
+            format!("they are 0 in all {rows} rows, which no joint measures")
+        }
+        Some(_) => format!("each holds one or two numbers in all {rows} rows, which no joint measures"),
+    })
+}
+
+/// Fewer rows may hold one number by chance.
+const FEW_ROWS: usize = 20;
 
 /// Measured torques hold gravity: where it was taken off, the nominal model's is put back, or they are left out.
 fn torques(columns: &JointColumns, measured: &mut JointSeries, gravity: Option<&Gravity>, warnings: &mut Vec<String>) {
@@ -119,7 +171,7 @@ fn torques(columns: &JointColumns, measured: &mut JointSeries, gravity: Option<&
         return;
     }
     let whole = (0..measured.len())
-        .map(|row| gravity.and_then(|gravity| gravity(measured.q_row(row))))
+        .map(|row| gravity.and_then(|gravity| gravity.torques(measured.q_row(row))))
         .collect::<Option<Vec<_>>>();
     match whole {
         Some(rows) => {

@@ -11,6 +11,7 @@
 //! | `clip` | a log by its mapping, in SI |
 //! | `cell`, `arm` | the cell.toml of the new session, and what is known of its arm |
 //! | `session` | the whole way |
+//! | [`weight`], [`lag`] | what torques say about the arm's weight, and motion about the time to its command: for those who look at clips, too |
 //! | `contents` | what a log holds of a robot, for those who only look |
 //! | `data_set` | writes LeRobot data sets |
 
@@ -20,6 +21,7 @@ mod clip;
 mod contents;
 mod data_set;
 mod error;
+pub mod lag;
 mod log;
 mod mapping;
 mod naming;
@@ -27,10 +29,11 @@ mod propose;
 mod ros;
 mod session;
 mod sources;
+pub mod weight;
 
 pub use arm::{Arm, Arms};
 pub use cell::{UsualController, is_franka, usual_controller};
-pub use clip::Gravity;
+pub use clip::{Gravity, Holds};
 pub use contents::{Contents, look};
 pub use data_set::{DataSetError, DataSetPlan, DataSetWriter, Feature, FeatureKind, Frames};
 pub use error::ImportError;

@@ -133,9 +133,14 @@ fn arm(cell: &Cell, urdf: Option<&str>) -> Result<Option<Arm>, String> {
     let rotor_inertia = model.rotor_inertia()[..model.dof()].to_vec();
     let rotors = (!without_inertia.is_empty()).then_some(Rotors { without_inertia, rotor_inertia });
     let shown = shown.map(Arc::new);
-    let gravity: Option<Gravity> = model.has_geometry().then_some(Box::new(move |q: &[f64]| {
-        (q.len() == model.dof()).then(|| model.gravity(&joints_from(q)).get(..q.len()).unwrap_or(&[]).to_vec())
-    }));
+    let falls = model.free_fall();
+    let gravity = model.has_geometry().then(|| Gravity {
+        falls,
+        holds: Box::new(move |q: &[f64], falls| {
+            (q.len() == model.dof())
+                .then(|| model.holding(&joints_from(q), falls).get(..q.len()).unwrap_or(&[]).to_vec())
+        }),
+    });
     Ok(Some(Arm { joints, held, rotors, gravity, shown }))
 }
 

@@ -1,21 +1,19 @@
-//! How far the arm lags behind its commands: where their velocities correlate best. An arm that follows is late; one that is
-//! early was stamped by another clock. A delay is nothing to take out: the twin explains it.
+//! How far the arm lags behind its commands. An arm that follows is late; one that is early was stamped by another clock. A
+//! delay is nothing to take out: the twin explains it. Nothing is shifted that the motion does not tell.
 
 use super::Notes;
 use super::track::Track;
+use crate::lag::{self, Lag, Motion};
 use crate::mapping::JointColumns;
 
-/// Lags that are looked at [s].
-const LONGEST: f64 = 0.5;
 /// Correlation below which nothing is said.
 const CLEAR: f64 = 0.5;
-/// Rows that are compared at each lag.
-const MOST_ROWS: usize = 4000;
 /// Fast and slow parts that differ by this factor tell a constant phase from a constant delay.
 const FASTER: f64 = 1.5;
-
-/// Lag [s] and correlation at it.
-type Best = (f64, f64);
+/// A motion goes back where it does so by this share of the longest way of a joint [1]; a choice, far beyond noise.
+const BACK: f64 = 0.2;
+/// Parts of a log whose speeds are compared.
+const PARTS: usize = 8;
 
 /// Tells the lag, and proposes a shift where commands come behind what they cause.
 pub(super) fn look(measured: &Track, desired: &Track, columns: &mut JointColumns, notes: &mut Notes) {
@@ -28,89 +26,105 @@ pub(super) fn look(measured: &Track, desired: &Track, columns: &mut JointColumns
         );
         return;
     }
-    let Some((lag, r)) = best(measured, desired, 0..measured.t.len()) else { return };
-    if r < CLEAR {
-        notes.why(line, format!("the arm does not clearly follow its commands (correlation {r:.2} at best)"));
+    let joints = measured.q.len().min(desired.q.len());
+    let [did, told] = [measured, desired].map(|track| Motion { t: &track.t, q: &track.q[..joints] });
+    let Some(lag) = lag::between(told, did) else { return };
+    let step = measured.step();
+    let [low, high] = lag.interval.map(|end| end * 1e3);
+    if lag.open {
+        notes.why(
+            line,
+            format!(
+                "this motion does not tell the lag between commands and states: any from {low:.0} to {high:.0} ms fits about as \
+                 well; nothing is shifted. A motion that goes forth and back tells it"
+            ),
+        );
         return;
     }
-    let step = median_step(&measured.t);
-    let ms = lag * 1e3;
-    if lag < -1.5 * step {
-        columns.shift = (lag / step).round() * step;
-        let what = format!(
-            "the arm moves {:.0} ms before its commands, which no arm does: the commands were stamped by another clock",
-            -ms
-        );
+    if lag.correlation < CLEAR {
+        let what = format!("the arm does not clearly follow its commands (correlation {:.2} at best)", lag.correlation);
         notes.why(line, what);
         return;
     }
-    let mut told = format!(
-        "the arm follows its commands by {ms:.0} ms (correlation {r:.2}); nothing is shifted, since a delay is the twin's to explain"
-    );
-    if let Some(((slow, slow_hz), (fast, fast_hz))) = by_speed(measured, desired)
-        && slow > 2.0 * step
-        && slow / fast.max(step) > FASTER
-    {
-        told += &format!(
-            ". It shrinks from {:.0} ms at {slow_hz:.1} Hz to {:.0} ms at {fast_hz:.1} Hz: a constant phase, as friction or a log \
-             that was stretched make it, and no constant delay",
-            slow * 1e3,
-            fast * 1e3
+    let ms = lag.seconds * 1e3;
+    let within = format!("95 % {low:.0} to {high:.0} ms");
+    if lag.interval[1] < 0.0 && lag.seconds < -1.5 * step {
+        let early = format!(
+            "the arm moves {:.0} ms before its commands ({within}), which no arm does: the commands were stamped by another clock",
+            -ms
         );
-    }
-    notes.why(line, told);
-}
-
-/// The lag at which measured and desired velocities correlate best within some rows.
-fn best(measured: &Track, desired: &Track, rows: std::ops::Range<usize>) -> Option<Best> {
-    let every = (rows.len() / MOST_ROWS).max(1);
-    let rows: Vec<usize> = rows.step_by(every).collect();
-    let step = median_step(&measured.t);
-    let count = measured.q.len().min(desired.q.len());
-    let did: Vec<Vec<f64>> = (0..count).map(|joint| pick(&measured.slopes(joint), &rows)).collect();
-    let told: Vec<Track> = (0..count)
-        .map(|joint| Track { t: desired.t.clone(), q: vec![desired.slopes(joint)], ..Track::default() })
-        .collect();
-    let times = pick(&measured.t, &rows);
-    let score = |lag: f64| {
-        let at: Vec<f64> = times.iter().map(|t| t - lag).collect();
-        let (mut ab, mut aa, mut bb) = (0.0, 0.0, 0.0);
-        for (did, told) in did.iter().zip(&told) {
-            for (a, b) in did.iter().zip(told.at(0, &at)).filter(|(a, b)| a.is_finite() && b.is_finite()) {
-                ab += a * b;
-                aa += a * a;
-                bb += b * b;
-            }
+        if turns(measured) {
+            columns.shift = (lag.seconds / step).round() * step;
+            notes.why(line, early);
+        } else {
+            let what = format!(
+                "{early}. The motion goes one way only, where a lead and an arm that is ahead look alike: nothing is shifted; \
+                 {:.3} here shifts them",
+                lag.seconds
+            );
+            notes.why(line, what);
         }
-        if aa > 0.0 && bb > 0.0 { ab / (aa * bb).sqrt() } else { 0.0 }
-    };
-    let coarse = step.max(0.01);
-    let reach = (LONGEST / coarse) as i32;
-    let lags = (-reach..=reach).map(|i| f64::from(i) * coarse);
-    let (centre, r) = lags.map(|lag| (lag, score(lag))).max_by(|a, b| a.1.total_cmp(&b.1))?;
-    // The top of a parabola through it and its neighbours.
-    let (before, after) = (score(centre - coarse), score(centre + coarse));
-    let bend = before - 2.0 * r + after;
-    let off = if bend < 0.0 { 0.5 * (before - after) / bend } else { 0.0 };
-    Some((centre + off.clamp(-1.0, 1.0) * coarse, r))
+        return;
+    }
+    let mut said = format!(
+        "the arm follows its commands by {ms:.0} ms ({within}, correlation {:.2}); nothing is shifted, since a delay is the twin's \
+         to explain",
+        lag.correlation
+    );
+    let groups = lag::groups(told, did);
+    if groups.len() > 1 {
+        said += &format!(". The joints do not lag alike: {}", lag::in_words(&groups));
+    }
+    said += &with_speed(measured, desired, step).unwrap_or_default();
+    notes.why(line, said);
 }
 
-/// Lag and frequency [Hz] of the slower and of the faster half of the log.
-fn by_speed(measured: &Track, desired: &Track) -> Option<(Best, Best)> {
-    let parts = 8;
-    let length = measured.t.len() / parts;
-    let mut found: Vec<(f64, Best)> = (0..parts)
-        .filter(|_| length > 50)
-        .filter_map(|part| {
-            let rows = part * length..(part + 1) * length;
-            let hz = frequency(measured, rows.clone())?;
-            let best = best(measured, desired, rows).filter(|(_, r)| *r > CLEAR)?;
-            Some((hz, best))
+/// A lag that shrinks as the motion gets faster.
+fn with_speed(measured: &Track, desired: &Track, step: f64) -> Option<String> {
+    let ((slow_hz, slow), (fast_hz, fast)) = by_speed(measured, desired)?;
+    (slow.seconds > 2.0 * step && slow.seconds / fast.seconds.max(step) > FASTER && slow.interval[0] > fast.interval[1])
+        .then(|| {
+            format!(
+                ". It shrinks from {:.0} ms at {slow_hz:.1} Hz to {:.0} ms at {fast_hz:.1} Hz: a constant phase, as friction or a \
+                 log that was stretched make it, and no constant delay",
+                slow.seconds * 1e3,
+                fast.seconds * 1e3
+            )
         })
-        .collect();
+}
+
+/// Frequency [Hz] and lag of the slowest and of the fastest part of the log.
+fn by_speed(measured: &Track, desired: &Track) -> Option<((f64, Lag), (f64, Lag))> {
+    let length = measured.t.len() / PARTS;
+    let part = |number: usize| {
+        let rows = number * length..(number + 1) * length;
+        let hz = frequency(measured, rows.clone())?;
+        let did = measured.rows(rows);
+        let (from, to) = (*did.t.first()?, *did.t.last()?);
+        let start = desired.t.partition_point(|t| *t < from);
+        let told = desired.rows(start..desired.t.partition_point(|t| *t <= to).max(start));
+        let lag = lag::between(Motion { t: &told.t, q: &told.q }, Motion { t: &did.t, q: &did.q })?;
+        (!lag.open && lag.correlation > CLEAR).then_some((hz, lag))
+    };
+    let mut found: Vec<(f64, Lag)> = (0..PARTS).filter(|_| length > 50).filter_map(part).collect();
     found.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let ((slow_hz, slow), (fast_hz, fast)) = (*found.first()?, *found.last()?);
-    (fast_hz > FASTER * slow_hz).then_some(((slow.0, slow_hz), (fast.0, fast_hz)))
+    let (slow, fast) = (*found.first()?, *found.last()?);
+    (fast.0 > FASTER * slow.0).then_some((slow, fast))
+}
+
+/// Whether a joint that moves much turns back: a lead is told from an arm that is ahead where it does.
+fn turns(track: &Track) -> bool {
+    let ways = track.q.iter().map(|q| {
+        let (mut top, mut bottom, mut down, mut up) = (f64::NEG_INFINITY, f64::INFINITY, 0.0_f64, 0.0_f64);
+        for q in q {
+            (top, bottom) = (top.max(*q), bottom.min(*q));
+            (down, up) = (down.max(top - q), up.max(q - bottom));
+        }
+        [down, up]
+    });
+    let ways: Vec<[f64; 2]> = ways.collect();
+    let most = ways.iter().flatten().copied().fold(0.0, f64::max);
+    ways.iter().any(|[down, up]| down.min(*up) > BACK * most)
 }
 
 /// How often the joint that moves most turns back, over two [Hz].
@@ -127,16 +141,6 @@ fn frequency(track: &Track, rows: std::ops::Range<usize>) -> Option<f64> {
     let signs: Vec<bool> = part.iter().filter(|v| v.abs() > 0.1 * peak).map(|v| *v > 0.0).collect();
     let turns = signs.windows(2).filter(|w| w[0] != w[1]).count();
     (turns >= 2 && seconds > 0.0).then(|| turns as f64 / 2.0 / seconds)
-}
-
-fn median_step(t: &[f64]) -> f64 {
-    let mut steps: Vec<f64> = t.windows(2).map(|w| w[1] - w[0]).filter(|step| *step > 0.0).collect();
-    steps.sort_by(f64::total_cmp);
-    steps.get(steps.len() / 2).copied().unwrap_or(1e-3)
-}
-
-fn pick(values: &[f64], rows: &[usize]) -> Vec<f64> {
-    rows.iter().filter_map(|row| values.get(*row)).copied().collect()
 }
 
 #[cfg(test)]
@@ -177,5 +181,15 @@ mod tests {
         assert!(told.contains("a constant phase"), "{told}");
         let (_, told) = shift(&moved(|t| turn(t - 0.05, 0.0)), &desired);
         assert!(!told.contains("a constant phase"), "{told}");
+    }
+
+    #[test]
+    fn a_stroke_that_goes_one_way_shifts_nothing() {
+        let slow = |t: f64| 0.1 * t + 0.02 * t * t;
+        let (by, said) = shift(&moved(|t| slow(t + 0.05)), &moved(slow));
+        assert!(by == 0.0 && (said.contains("nothing is shifted")), "{by} {said}");
+        let even = |t: f64| 0.2 * t;
+        let (by, said) = shift(&moved(|t| even(t + 0.05)), &moved(even));
+        assert!(by == 0.0 && said.contains("does not tell the lag"), "{by} {said}");
     }
 }

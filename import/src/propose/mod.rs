@@ -109,6 +109,7 @@ fn joints(log: &Log, chosen: &Chosen, (mapping, gravity): (&mut Mapping, Model<'
         if let (Some(did), Some(told)) = (track(&measured), track(&desired)) {
             lag::look(&did, &told, &mut desired, notes);
         }
+        leave_out_placeholders(log, (&mut measured, &mut desired), notes);
         if !measured.tau.is_empty()
             && let Some(did) = track(&measured)
         {
@@ -123,6 +124,15 @@ fn joints(log: &Log, chosen: &Chosen, (mapping, gravity): (&mut Mapping, Model<'
     }
     mapping.measured = Some(measured);
     mapping.desired = Some(desired);
+}
+
+/// Torques that nobody measured are none, whatever gravity shows in them.
+fn leave_out_placeholders(log: &Log, (measured, desired): (&mut JointColumns, &mut JointColumns), notes: &mut Notes) {
+    for (line, columns) in [("measured", measured), ("desired", desired)] {
+        if let Some(table) = log.table(&columns.table).filter(|_| !columns.tau.is_empty()) {
+            torque::measured_at_all(table, columns, line, notes);
+        }
+    }
 }
 
 fn velocities(log: &Log, name: &str, columns: &mut JointColumns, notes: &mut Notes) {

@@ -1,18 +1,28 @@
-//! Whether a log's torques hold gravity: the format says so, or the nominal model's gravity shows in them or does not.
+//! Whether a log's torques are measured and hold gravity: the format says so, or the weight that is fitted to them does.
 
 use super::Notes;
 use super::track::Track;
-use crate::clip::Gravity;
-use crate::log::Log;
+use crate::clip::{Gravity, still};
+use crate::log::{Log, Table};
 use crate::mapping::{JointColumns, Torque};
+use crate::weight::{Finding, Moment, Weight};
 
-/// Rows that are compared.
-const MOST_ROWS: usize = 500;
-/// Share of the model's gravity that shows in the torques: all of it, or none.
-const ALL: std::ops::Range<f64> = 0.6..1.5;
-const NONE: std::ops::Range<f64> = -0.35..0.35;
-/// Below this a model has no gravity to compare with [N m].
-const LEAST: f64 = 0.5;
+/// Moments that are compared.
+const MOMENTS: usize = 600;
+/// Half the time over which velocities and accelerations are taken [s].
+const HALF: f64 = 0.04;
+/// What a person can do where the log does not tell.
+const UNLESS: &str = "they are left out, unless this says with_gravity or without_gravity";
+
+/// Leaves out torques that nobody measured: `line` is the block's.
+pub(super) fn measured_at_all(table: &Table, columns: &mut JointColumns, line: &str, notes: &mut Notes) {
+    let tau: Vec<&[f64]> =
+        columns.tau.iter().filter_map(|name| table.column(name)).map(|column| column.values.as_slice()).collect();
+    if let Some(what) = still(&tau) {
+        columns.tau.clear();
+        notes.why(&format!("{line}.tau"), format!("no torques: {what}"));
+    }
+}
 
 /// Proposes which torque the log holds.
 pub(super) fn which(
@@ -27,27 +37,67 @@ pub(super) fn which(
         notes.why(line, why);
         return;
     }
-    let share = gravity.as_ref().and_then(|gravity| share(track, gravity));
-    match share {
-        Some(share) if ALL.contains(&share) => {
-            columns.torque = Torque::WithGravity;
-            notes.why(line, format!("{:.0} % of the model's gravity shows in them", share * 100.0));
-        }
-        Some(share) if NONE.contains(&share) => {
-            columns.torque = Torque::WithoutGravity;
-            notes.why(line, format!("{:.0} % of the model's gravity shows in them: it was taken off", share * 100.0));
-        }
-        Some(share) => notes.why(
+    let Some(gravity) = gravity else {
+        notes.why(line, format!("no model is known that could tell whether they hold gravity: {UNLESS}"));
+        return;
+    };
+    let Some(weight) = Weight::of(&moments(track, &gravity)) else {
+        notes.why(
             line,
-            format!("{:.0} % of the model's gravity shows in them, neither all nor none: they are left out, unless this says \
-                     with_gravity or without_gravity", share * 100.0),
+            format!(
+                "too few rows hold positions and torques of all joints to tell whether they hold gravity: {UNLESS}"
+            ),
+        );
+        return;
+    };
+    let percent = |share: f64| format!("{:.0} %", share * 100.0);
+    let (torque, why) = match weight.finding(gravity.falls) {
+        Finding::Whole(share) => {
+            (Torque::WithGravity, format!("{} of the model's gravity shows in them", percent(share)))
+        }
+        Finding::Elsewhere => (
+            Torque::WithGravity,
+            format!(
+                "they hold the arm's weight, which pulls {}, and not as in the model: the base is mounted another way than the \
+                 model stands. Nothing is added; turn the base in the URDF by a fixed joint between its root link and the base",
+                weight.in_words()
+            ),
         ),
-        None => notes.why(
-            line,
-            "no model is known that could tell whether they hold gravity: they are left out, unless this says with_gravity or \
-             without_gravity",
+        Finding::Absent(share) => {
+            let [along, half] = [share, weight.share(gravity.falls)[1]].map(|v| 100.0 * v);
+            let why = format!(
+                "{along:.0} % of the model's gravity shows in them (95 % within {half:.0} %), and no weight along any other axis of \
+                 the base: it was taken off"
+            );
+            (Torque::WithoutGravity, why)
+        }
+        Finding::Turned(joint, factor) => (
+            Torque::NotKnown,
+            format!(
+                "the torque of joint {} is {factor:.2} times what holds it by the weight that the others show: it is counted the \
+                 other way round. Turn its sign in the log; until then {UNLESS}",
+                joint + 1
+            ),
         ),
-    }
+        Finding::Scaled(joint, factor) => {
+            let who =
+                joint.map_or_else(|| "they are".to_owned(), |joint| format!("the torque of joint {} is", joint + 1));
+            let why = format!(
+                "{who} {factor:.3} times what holds the model's weight: another unit than N m, or a torque constant or gear ratio \
+                 is missing. Multiply in the log; until then {UNLESS}"
+            );
+            (Torque::NotKnown, why)
+        }
+        Finding::Partly(share) => (
+            Torque::NotKnown,
+            format!("{} of the model's gravity shows in them, neither all nor none: {UNLESS}", percent(share)),
+        ),
+        Finding::NotTold => {
+            (Torque::NotKnown, format!("this motion does not tell how much of the arm's weight they hold: {UNLESS}"))
+        }
+    };
+    columns.torque = torque;
+    notes.why(line, why);
 }
 
 /// What an arm was told beside its gravity: known of a Franka alone.
@@ -60,49 +110,117 @@ pub(super) fn desired(log: &Log, columns: &mut JointColumns, notes: &mut Notes) 
     }
 }
 
-/// Share of the model's gravity in the torques, over all joints, by least squares.
-fn share(track: &Track, gravity: &Gravity) -> Option<f64> {
-    let every = (track.t.len() / MOST_ROWS).max(1);
-    let rows: Vec<(Vec<f64>, Vec<f64>)> = (0..track.t.len())
-        .step_by(every)
-        .filter_map(|row| {
-            let q: Vec<f64> = track.q.iter().map(|column| column[row]).collect();
-            let tau: Vec<f64> = track.tau.iter().map(|column| column[row]).collect();
-            let g = gravity(&q)?;
-            (tau.iter().all(|v| v.is_finite()) && g.len() == tau.len()).then_some((g, tau))
-        })
-        .collect();
-    let (mut product, mut square) = (0.0, 0.0);
-    for (g, tau) in &rows {
-        for (g, tau) in g.iter().zip(tau) {
-            product += g * tau;
-            square += g * g;
-        }
-    }
-    let mean = (square / rows.len().max(1) as f64).sqrt();
-    (rows.len() > 10 && mean > LEAST).then_some(product / square)
+/// Moments at which all joints have position, velocity, acceleration and torque.
+fn moments(track: &Track, gravity: &Gravity) -> Vec<Moment> {
+    let every = (track.t.len() / MOMENTS).max(1);
+    let rows: Vec<usize> =
+        (0..track.t.len()).step_by(every).filter(|row| track.tau.iter().all(|tau| tau[*row].is_finite())).collect();
+    let half = HALF.max(2.0 * track.step());
+    let at = |offset: f64| {
+        let times: Vec<f64> = rows.iter().map(|row| track.t[*row] + offset).collect();
+        (0..track.q.len()).map(|joint| track.at(joint, &times)).collect::<Vec<_>>()
+    };
+    let [before, now, after] = [at(-half), at(0.0), at(half)];
+    let moment = |(place, row): (usize, &usize)| {
+        let [before, now, after] =
+            [&before, &now, &after].map(|all| all.iter().map(|q| q[place]).collect::<Vec<f64>>());
+        let of = |joint: usize| (before[joint], now[joint], after[joint]);
+        let dq: Vec<f64> = (0..now.len()).map(of).map(|(a, _, c)| (c - a) / (2.0 * half)).collect();
+        let ddq: Vec<f64> = (0..now.len()).map(of).map(|(a, b, c)| (c - 2.0 * b + a) / (half * half)).collect();
+        let unit = |axis: usize| std::array::from_fn(|k| if k == axis { 1.0 } else { 0.0 });
+        let holds = [0, 1, 2].map(|axis| (gravity.holds)(&now, unit(axis)));
+        let [Some(x), Some(y), Some(z)] = holds else { return None };
+        let tau = track.tau.iter().map(|tau| tau[*row]).collect();
+        // Both ends of the log have no velocity.
+        ddq.iter().all(|v| v.is_finite()).then_some(Moment { tau, holds: [x, y, z], dq, ddq })
+    };
+    rows.iter().enumerate().filter_map(moment).collect()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::log::Column;
+
+    /// Two joints that lean about the base's y, one on the other: first moments of mass [kg m].
+    fn model() -> Gravity {
+        let holds = |q: &[f64], a: [f64; 3]| {
+            let [first, second] = [q[0], q[0] + q[1]].map(|lean| (lean.sin(), lean.cos()));
+            let pull = |(sin, cos): (f64, f64)| -(cos * a[0] - sin * a[2]);
+            Some(vec![2.0 * pull(first) + 0.8 * pull(second), 0.8 * pull(second)])
+        };
+        Gravity { falls: [0.0, 0.0, -9.81], holds: Box::new(holds) }
+    }
+
+    fn proposed(change: impl Fn(&[f64], &Gravity) -> Vec<f64>) -> (Torque, String) {
+        let t: Vec<f64> = (0..1500).map(|i| f64::from(i) * 1e-2).collect();
+        let wave = |w: f64| t.iter().map(|t| 1.1 * (w * t).sin()).collect::<Vec<f64>>();
+        let q = vec![wave(0.7), wave(1.3)];
+        let rows: Vec<Vec<f64>> = (0..t.len()).map(|row| change(&[q[0][row], q[1][row]], &model())).collect();
+        // Dry friction.
+        let friction = |joint: usize, row: usize| 0.3 * [0.7, 1.3].map(|w| (w * t[row]).cos().signum())[joint];
+        let tau = |joint: usize| (0..t.len()).map(|row| rows[row][joint] + friction(joint, row)).collect();
+        let track = Track { tau: vec![tau(0), tau(1)], q, t, ..Track::default() };
+        let (mut columns, mut notes) = (JointColumns::default(), Notes::default());
+        which(&Log::default(), &track, (&mut columns, Some(model())), &mut notes);
+        (columns.torque, notes.0[0].why.clone())
+    }
 
     #[test]
-    fn gravity_shows_or_was_taken_off_and_without_a_model_nobody_knows() {
-        let pull = |q: f64| 20.0 * q.cos();
-        let t: Vec<f64> = (0..1000).map(|i| f64::from(i) * 1e-2).collect();
-        let q: Vec<f64> = t.iter().map(|t| (0.7 * t).sin()).collect();
-        let rest: Vec<f64> = t.iter().map(|t| 2.0 * (3.0 * t).sin()).collect();
-        for (share, expected) in [(1.0, Torque::WithGravity), (0.0, Torque::WithoutGravity), (0.5, Torque::NotKnown)] {
-            let tau = q.iter().zip(&rest).map(|(q, rest)| share * pull(*q) + rest).collect();
-            let track = Track { t: t.clone(), q: vec![q.clone()], dq: vec![], tau: vec![tau] };
-            let model: Gravity = Box::new(move |q: &[f64]| Some(q.iter().map(|q| pull(*q)).collect()));
-            let mut columns = JointColumns::default();
-            which(&Log::default(), &track, (&mut columns, Some(model)), &mut Notes::default());
-            assert_eq!(columns.torque, expected, "{share}");
-            let (mut columns, mut notes) = (JointColumns::default(), Notes::default());
-            which(&Log::default(), &track, (&mut columns, None), &mut notes);
-            assert!(columns.torque == Torque::NotKnown && notes.0[0].why.contains("no model"), "{:?}", notes.0);
+    fn gravity_shows_or_was_taken_off_or_pulls_another_way() {
+        let along = |falls: [f64; 3]| move |q: &[f64], model: &Gravity| (model.holds)(q, falls).expect("a model");
+        for (falls, expected, said) in [
+            ([0.0, 0.0, -9.81], Torque::WithGravity, "100 %"),
+            ([9.81, 0.0, 0.0], Torque::WithGravity, "along +x of the base by 9.8"),
+            ([0.0, 0.0, 0.0], Torque::WithoutGravity, "no weight along any other axis"),
+            ([0.0, 0.0, -5.0], Torque::NotKnown, "neither all nor none"),
+        ] {
+            let (torque, why) = proposed(along(falls));
+            assert!(torque == expected && why.contains(said), "{falls:?}: {torque:?}, {why}");
+        }
+    }
+
+    #[test]
+    fn a_turned_joint_and_a_missing_torque_constant_are_named_and_nothing_is_added() {
+        let changed = |factors: [f64; 2]| {
+            proposed(move |q, model| {
+                let tau = model.torques(q).expect("a model");
+                vec![factors[0] * tau[0], factors[1] * tau[1]]
+            })
+        };
+        let (torque, why) = changed([1.0, -1.0]);
+        assert!(
+            torque == Torque::NotKnown && why.contains("torque of joint 2") && why.contains("other way round"),
+            "{why}"
+        );
+        let (torque, why) = changed([20.0, 20.0]);
+        assert!(torque == Torque::NotKnown && why.contains("torque constant"), "{why}");
+    }
+
+    #[test]
+    fn without_a_model_nobody_knows() {
+        let (mut columns, mut notes) = (JointColumns::default(), Notes::default());
+        which(&Log::default(), &Track::default(), (&mut columns, None), &mut notes);
+        assert!(columns.torque == Torque::NotKnown && notes.0[0].why.contains("no model"), "{:?}", notes.0);
+    }
+
+    #[test]
+    fn columns_of_one_number_are_no_torques() {
+        let table = |of: &dyn Fn(usize) -> f64| Table {
+            columns: ["a", "b"].map(|name| Column { name: name.into(), values: (0..300).map(of).collect() }).into(),
+            ..Table::default()
+        };
+        for (of, said) in [
+            (&(|_| 0.0) as &dyn Fn(usize) -> f64, Some("0 in all 300 rows")),
+            (&|_| f64::NAN, Some("no row holds a number")),
+            (&|row| if row % 7 == 0 { 0.1 } else { -0.1 }, Some("one or two numbers")),
+            (&|row| row as f64, None),
+        ] {
+            let mut columns = JointColumns { tau: vec!["a".into(), "b".into()], ..JointColumns::default() };
+            let mut notes = Notes::default();
+            measured_at_all(&table(of), &mut columns, "measured", &mut notes);
+            assert_eq!(columns.tau.is_empty(), said.is_some());
+            assert!(said.is_none_or(|said| notes.0[0].why.contains(said)), "{:?}", notes.0);
         }
     }
 }

@@ -53,6 +53,17 @@ impl Track {
         (good.len() > 2).then(|| Self { t: at(&t), q: all(&q), dq: all(&dq), tau: all(&tau) })
     }
 
+    /// Usual time from row to row [s].
+    pub(super) fn step(&self) -> f64 {
+        crate::lag::usual_step(&self.t)
+    }
+
+    /// Some of its rows, of the positions alone.
+    pub(super) fn rows(&self, rows: std::ops::Range<usize>) -> Self {
+        let q = self.q.iter().map(|q| q[rows.clone()].to_vec()).collect();
+        Self { t: self.t[rows].to_vec(), q, ..Self::default() }
+    }
+
     /// Slopes of a joint's positions, in the middle between the rows around each [1/s]; NaN at both ends.
     pub(super) fn slopes(&self, joint: usize) -> Vec<f64> {
         let q = &self.q[joint];

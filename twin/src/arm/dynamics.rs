@@ -30,11 +30,23 @@ impl ArmModel {
     /// Torques that hold the arm still against gravity [N m].
     #[must_use]
     pub fn gravity(&self, q: &Joints) -> Joints {
+        self.holding(q, self.gravity)
+    }
+
+    /// Torques that hold the arm still against a free fall that is given in the base frame [m/s²] [N m].
+    #[must_use]
+    pub fn holding(&self, q: &Joints, falls: [f64; 3]) -> Joints {
         with_dof!(self, N => {
             let links = first::<N, _>(&self.links);
             let chain = Chain::at(links, first(q));
-            filled(&chain.gravity(&chain.bodies(links), self.gravity))
+            filled(&chain.gravity(&chain.bodies(links), falls))
         })
+    }
+
+    /// Free fall in the base frame [m/s²].
+    #[must_use]
+    pub fn free_fall(&self) -> [f64; 3] {
+        self.gravity
     }
 
     /// Torques of centrifugal and Coriolis forces [N m].
