@@ -90,6 +90,8 @@ fn defaults_and_the_meaning_of_limits_follow_the_version_of_the_format() {
     assert_eq!((bare.axis.xyz, bare.limit), (Vec3([1.0, 0.0, 0.0]), JointLimit::default()));
     let old = joint(" version=\"1.1\"", "<limit velocity=\"2\"/>").expect("a speed alone");
     assert_eq!(old.limit, JointLimit { velocity: 2.0, ..JointLimit::default() });
+    let none = joint("", "<limit lower=\"-1\" upper=\"1\"/>").expect("stops alone").limit;
+    assert_eq!((none.effort, none.velocity), (0.0, 0.0), "as exporters write that they know none");
     let all = JointLimit { lower: f64::NEG_INFINITY, upper: f64::INFINITY, effort: f64::INFINITY, velocity: 2.0 };
     assert_eq!(joint(" version=\"1.2\"", "<limit velocity=\"2\"/>").expect("a speed alone").limit, all);
     assert_eq!(
@@ -123,7 +125,6 @@ fn what_is_wrong_is_named_with_line_and_element() {
         ("0 0 -0.4", "0 0 0 0", "line 11: `xyz` of <origin> must be 3 numbers"),
         ("0 0 -0.4", "0 0 inf", "line 11: `xyz` of <origin> must be 3 numbers"),
         ("<axis xyz=\"0 0 2\"/>", "<axis/>", "line 22: joint `turn`: <axis> has no `xyz`"),
-        ("velocity=\"4\"", "", "line 21: joint `turn`: <limit> has no `velocity`"),
         ("<parent link=\"base\"/>", "", "line 23: joint `turn` has no <parent>"),
         ("revolute", "helical", "line 16: joint `turn` is of type `helical`; known are revolute"),
         ("type=\"revolute\"", "", "line 16: joint `turn`: <joint> has no `type`"),

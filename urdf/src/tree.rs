@@ -327,12 +327,11 @@ fn moments(tag: &Tag<'_>) -> Result<Inertia, String> {
     })
 }
 
-/// Before version 1.2 a speed must be given and nothing else is checked; from then on what is left out is unlimited.
+/// Before version 1.2 what is left out is 0 and nothing is checked; from then on it is unlimited.
 fn limits(tag: &Tag<'_>, version: (u32, u32)) -> Result<JointLimit, String> {
     let [lower, upper, effort, velocity] =
         [tag.number("lower")?, tag.number("upper")?, tag.number("effort")?, tag.number("velocity")?];
     if version < (1, 2) {
-        tag.needed("velocity")?;
         let [lower, upper, effort, velocity] = [lower, upper, effort, velocity].map(Option::unwrap_or_default);
         return Ok(JointLimit { lower, upper, effort, velocity });
     }

@@ -2,6 +2,7 @@
 //!
 //! Knows no physics. A bridge that falls silent or starts anew is an error with its remedy, never a wait without end.
 
+use super::quality::{FAR, FAST, GAINS};
 use shared_mem::console;
 use shared_mem::msg::arm::{ArmMode, ArmState};
 use shared_mem::msg::event::{Event, EventLevel, EventSource};
@@ -41,6 +42,20 @@ pub enum LinkError {
         moves: u32,
         /// Joints of cell.toml's.
         described: usize,
+    },
+    /// It does not stay where it is commanded to.
+    #[error(
+        "the arm does not hold still: joint {} is {off:.2} rad away from its command and turns at {speed:.2} rad/s; {}",
+        joint + 1,
+        GAINS
+    )]
+    DoesNotHold {
+        /// The joint that is worst, from 0.
+        joint: usize,
+        /// How far it is from its command [rad].
+        off: f64,
+        /// How fast it turns [rad/s].
+        speed: f64,
     },
     /// The robot is in no state to move.
     #[error("the robot is not ready to move: {what}{}; {remedy}", said(last_words))]
@@ -181,16 +196,22 @@ impl Link {
         Err(LinkError::NotReady { what, remedy, last_words: self.last_words() })
     }
 
-    /// [`Self::ready_state`] of an arm with so many joints.
+    /// [`Self::ready_state`] of an arm with so many joints, which holds still.
     ///
     /// # Errors
-    /// [`LinkError::OtherArm`], and those of [`Self::ready_state`].
+    /// [`LinkError::OtherArm`], [`LinkError::DoesNotHold`], and those of [`Self::ready_state`].
     pub fn ready_arm(&mut self, described: usize) -> Result<ArmState, LinkError> {
         let state = self.ready_state()?;
-        if state.dof as usize == described {
-            Ok(state)
-        } else {
-            Err(LinkError::OtherArm { moves: state.dof, described })
+        if state.dof as usize != described {
+            return Err(LinkError::OtherArm { moves: state.dof, described });
+        }
+        let joints = (0..described.min(state.q.len()))
+            .map(|joint| (joint, (state.q_d[joint] - state.q[joint]).abs(), state.dq[joint].abs()));
+        let holds = |off: f64, speed: f64| off <= FAR && speed <= FAST;
+        let loose = joints.filter(|(_, off, speed)| !holds(*off, *speed)).max_by(|a, b| a.2.total_cmp(&b.2));
+        match loose {
+            Some((joint, off, speed)) => Err(LinkError::DoesNotHold { joint, off, speed }),
+            None => Ok(state),
         }
     }
 

@@ -8,6 +8,18 @@ use shared_mem::msg::arm::ArmState;
 const LOSS_BEARABLE: f64 = 0.01;
 /// Share of the planned peak speed below which the arm did not do what was asked.
 const SPEED_EXPECTED: f64 = 0.5;
+/// So many times the planned peak speed, and so much more [rad/s], is no motion that was asked for: an overshoot stays within a
+/// factor of two, a velocity's noise within the other. Both are choices.
+const SPEED_BEYOND: f64 = 3.0;
+const SPEED_MORE: f64 = 0.5;
+/// An arm that is farther from its command does not follow it [rad]: a servo that gives way under a load hangs by less. A choice.
+pub(super) const FAR: f64 = 0.5;
+/// An arm that turns faster does not hold still [rad/s]: the noise of a velocity stays below. A choice.
+pub(super) const FAST: f64 = 3.0;
+
+/// What a person does about an arm that does not follow.
+pub(super) const GAINS: &str = "look at `stiffness` and `damping` of `[controller]` in cell.toml, which have to hold this arm (a light link \
+     takes little damping), and at the arm's masses and limits";
 
 /// Watches one clip.
 #[derive(Debug, Clone, Default)]
@@ -50,7 +62,8 @@ impl Watch {
         self.last_device_ns = Some(state.device_ns);
         let dof = (state.dof as usize).min(state.q.len());
         for joint in 0..dof {
-            let (speed, error) = (state.dq[joint].abs(), (state.q_d[joint] - state.q[joint]).abs());
+            let finite = |value: f64| if value.is_nan() { f64::INFINITY } else { value.abs() };
+            let (speed, error) = (finite(state.dq[joint]), finite(state.q_d[joint] - state.q[joint]));
             seen.peak_speed = Some(seen.peak_speed.map_or(speed, |peak| peak.max(speed)));
             seen.tracking_error = Some(seen.tracking_error.map_or(error, |worst| worst.max(error)));
         }
@@ -77,6 +90,16 @@ impl Quality {
         };
         if seen < SPEED_EXPECTED * planned_speed {
             return Verdict::Repeat(format!("the arm reached {seen:.2} rad/s of {planned_speed:.2} planned"));
+        }
+        if seen > SPEED_BEYOND * planned_speed + SPEED_MORE {
+            return Verdict::Repeat(format!(
+                "the arm reached {seen:.2} rad/s where {planned_speed:.2} were planned: it does not do as it is commanded; {GAINS}"
+            ));
+        }
+        if let Some(error) = self.tracking_error.filter(|error| *error > FAR) {
+            return Verdict::Repeat(format!(
+                "the arm was {error:.2} rad away from its command: it does not follow; {GAINS}"
+            ));
         }
         Verdict::Keep
     }
@@ -117,6 +140,28 @@ mod tests {
         let json = serde_json::to_value(states([])).expect("JSON");
         assert!(json["peak_speed"].is_null() && json["tracking_error"].is_null(), "{json}");
         assert!(matches!(states([]).verdict(0.0), Verdict::Repeat(_)));
+    }
+
+    #[test]
+    fn an_arm_that_does_not_follow_or_is_far_faster_than_planned_is_never_kept() {
+        let seen = |dq: f64, off: f64| {
+            let mut watch = Watch::default();
+            for ms in 0..100 {
+                let mut state = ArmState { device_ns: ms * 1_000_000, dof: 4, ..ArmState::default() };
+                (state.dq[3], state.q_d[1]) = (dq, off);
+                watch.see(&state);
+            }
+            watch.quality().verdict(1.2)
+        };
+        assert_eq!(seen(1.5, 0.1), Verdict::Keep);
+        for (dq, off, word) in [
+            (11_764.76, 0.1, "does not do as it is commanded"),
+            (f64::NAN, 0.1, "does not do as it is commanded"),
+            (1.2, 2.0, "does not follow"),
+            (1.2, f64::NAN, "does not follow"),
+        ] {
+            assert!(matches!(seen(dq, off), Verdict::Repeat(why) if why.contains(word)), "{dq} {off}");
+        }
     }
 
     #[test]

@@ -162,6 +162,7 @@ impl Known {
             self.remarks.push(("robot", format!("Held where they are: {}.", HeldJoint::in_words(held))));
         }
         self.warnings.extend(arm.doubts().iter().cloned());
+        self.warnings.extend(without_limits(&arm));
         self.arm = Some(arm);
         self.set_robot(Robot { urdf: Some(urdf), ..Robot::default() }, from);
     }
@@ -294,6 +295,24 @@ fn under(recorded: Controller, kind: ControllerKind, warnings: &mut Vec<String>)
         torque_sensing,
         ..Controller::default()
     }
+}
+
+/// What is taken where a description gives no limits: exporters write 0 for those they do not know.
+fn without_limits(arm: &ArmModel) -> Option<String> {
+    let named = |key: &str, limits: &[f64]| {
+        let joints = arm.described_joint_names().iter().zip(limits).filter(|(_, limit)| limit.is_infinite());
+        let joints: Vec<&str> = joints.map(|(name, _)| name.as_str()).collect();
+        (!joints.is_empty()).then(|| format!("`{key}` is 0 or missing for {}", joints.join(", ")))
+    };
+    let known = [named("effort", arm.torque_limit()), named("velocity", arm.velocity_limit())];
+    let missing: Vec<String> = known.into_iter().flatten().collect();
+    (!missing.is_empty()).then(|| {
+        format!(
+            "<limit> of the URDF: {}: no limit is taken in its place, neither by the simulated arm nor by a capture's plan; write \
+             the arm's own into the URDF, or its torques as `torque_limit` of [controller]",
+            missing.join("; ")
+        )
+    })
 }
 
 fn recorded(order: Order<'_>) -> anyhow::Result<Option<Recorded>> {
