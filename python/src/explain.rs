@@ -83,7 +83,7 @@ pub(crate) fn diagnose(
         let mut session = Session::open_with(&session, cell.as_deref())?;
         session.about(object.as_deref())?;
         let theta = theta.map(|theta| theta.about(&session.cell));
-        let looked = gate::look(&session, Allowed { as_recorded, mix })?;
+        let looked = gate::look(&session, Allowed { as_recorded, mix, ..Allowed::default() })?;
         let engine = engine(engine_command, engine_limit, &session, interrupt)?;
         let budget = budget.map(Duration::try_from_secs_f64).transpose()?;
         let options = Options { theta, seed, torques, budget, engine, ..Options::default() };

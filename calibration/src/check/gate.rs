@@ -15,6 +15,8 @@ pub struct Allowed {
     pub as_recorded: bool,
     /// Clips of several sources.
     pub mix: bool,
+    /// Commands that nobody gave: torques are explained without commands.
+    pub copied_commands: bool,
 }
 
 /// What was seen in a session before it is explained.
@@ -60,8 +62,9 @@ pub fn look(session: &Session, allowed: Allowed) -> Result<Looked, Stopped> {
     let provenance = origins::provenance(&clips);
     unmixed(&provenance, allowed.mix)?;
     let Found { remarks, .. } = check_clips(&session.cell, &clips);
-    // That is what was asked for, and said at once.
-    let worst = remarks.into_iter().find(|remark| remark.fault != Fault::MixedOrigins);
+    // The one is what was asked for, and said at once; the other is of no use for what was asked.
+    let unused = |fault: Fault| allowed.copied_commands && fault == Fault::CopiedCommands;
+    let worst = remarks.into_iter().find(|remark| remark.fault != Fault::MixedOrigins && !unused(remark.fault));
     if let Some(worst) = &worst {
         let check = session.files.command("calibration check");
         if worst.severity == Severity::Wrong && !allowed.as_recorded {

@@ -37,6 +37,19 @@ pub(super) const JUMP_BACK: f64 = 0.3;
 /// ...at least so often in a clip, and in this share of its rows [1]. Fewer are single spoilt rows.
 pub(super) const JUMPS: usize = 5;
 pub(super) const JUMP_SHARE: f64 = 2e-3;
+/// Rows of two publishers take turns for this many seconds at least, one after the other, with this many jumps in each...
+pub(super) const TURNS_LAST: usize = 2;
+pub(super) const TURNS_A_SECOND: usize = 2;
+/// ...of which nearly all [1] last so many rows at most, as the slower of two publishers comes in between...
+pub(super) const TURNS_ALIKE: f64 = 0.9;
+pub(super) const TURN_ROWS: usize = 2;
+/// ...and go to the same side as the jump before: another arm stands on one side of this one for a while, noise on either. Noise
+/// has a share of a half.
+pub(super) const SAME_SIDE: f64 = 0.8;
+/// Commands are copies where this share of the rows of a moving arm [1] holds the measured positions to the bit, so many rows
+/// earlier or later at most.
+pub(super) const COPIED: f64 = 0.95;
+pub(super) const COPIED_WITHIN: usize = 20;
 
 /// Rows that repeat the one before to the bit while the joints move by more than so many steps of their encoders a row [1]...
 pub(super) const REPEAT_MOTION: f64 = 3.0;
@@ -52,11 +65,6 @@ pub(super) const FEWEST_POSES: usize = 8;
 /// are known to a percent.
 pub(super) const BEAT: f64 = 0.03;
 
-/// Lags are searched this far both ways [s], but no further than this share of a clip [1].
-pub(super) const FARTHEST_LAG: f64 = 3.0;
-pub(super) const LAG_SHARE: f64 = 0.4;
-/// Of several peaks of a correlation that reach this share of the highest [1] the one nearest to no lag counts.
-pub(super) const SAME_PEAK: f64 = 0.97;
 /// Velocities that correlate less than this do not tell a lag [1]: an arm that does not follow, for which another motion is as
 /// near.
 pub(super) const LEAST_CORRELATION: f64 = 0.9;
@@ -84,8 +92,6 @@ pub(super) const LEAST_GRAVITY: f64 = 0.4;
 /// A log carries the arm's weight when the share of the model's gravity in it exceeds this [1]: an undeclared load of a
 /// kilogram or a sensor's bias of 2 N m moves the share by less than 0.3.
 pub(super) const CARRIES_GRAVITY: f64 = 0.5;
-/// Blocks of a clip from which the interval of a share comes [s].
-pub(super) const BLOCK: f64 = 0.5;
 /// Rows of a clip at which torques are compared with the model: the inverse dynamics of some thousand hypotheses stay below
 /// a tenth of a second.
 pub(super) const TORQUE_ROWS: usize = 120;

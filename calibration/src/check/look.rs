@@ -4,7 +4,8 @@ use super::columns::Columns;
 use super::lag::{self, Lag};
 use super::remark::{Fault, Remark, Severity};
 use super::{
-    constant, elsewhere, fall, order, publishers, range, rates, reader, stamps, standing, torque, units, velocity,
+    constant, copied, elsewhere, fall, order, publishers, range, rates, reader, stamps, standing, torque, units,
+    velocity,
 };
 use nalgebra::Point3;
 use shared_mem::cell::Cell;
@@ -54,6 +55,7 @@ pub(super) fn look(file: &str, clip: &Clip, known: &Known<'_>) -> Looked {
         remarks.extend(publishers::remarks(&columns));
     }
     remarks.extend(constant::remarks(&columns));
+    remarks.extend(copied::remark(&columns));
     let mut lag = None;
     if !is_known(Fault::TwoPublishers, &remarks) {
         remarks.extend(rates::remarks(&columns));

@@ -12,6 +12,7 @@
 //! | `stamps` | clocks in other units, uneven steps |
 //! | `rates` | rows that repeat older ones, rates that beat |
 //! | `publishers` | two publishers on one topic |
+//! | `copied` | commands that are the measurements
 //! | `constant` | placeholders that look like measurements |
 //! | `velocity` | velocities against the slope of the positions |
 //! | `units` | commands against measurements: another unit |
@@ -33,6 +34,7 @@
 mod columns;
 mod constant;
 mod conversion;
+mod copied;
 mod elsewhere;
 mod fall;
 pub mod gate;

@@ -27,6 +27,8 @@ pub enum Fault {
     DifferentClocks,
     /// Stamps in ms or us.
     StampUnit,
+    /// Commands that are the measurements themselves.
+    CopiedCommands,
     /// Commands in another unit than what was measured.
     CommandUnit,
     /// Positions in degrees.
@@ -47,6 +49,8 @@ pub enum Fault {
     TwoPublishers,
     /// Torques without the arm's weight, or commanded ones with it.
     TorqueGravity,
+    /// Torques that hold a weight along another axis of the base than the model's.
+    GravityDirection,
     /// Torques of another sign or unit than the model's.
     TorqueUnit,
     /// Samples that did not arrive.
@@ -81,11 +85,12 @@ pub enum Fault {
 
 impl Fault {
     /// All of them, in the order in which a session is looked at.
-    pub const ALL: [Self; 29] = [
+    pub const ALL: [Self; 31] = [
         Self::MixedOrigins,
         Self::MisalignedLogs,
         Self::DifferentClocks,
         Self::StampUnit,
+        Self::CopiedCommands,
         Self::CommandUnit,
         Self::Degrees,
         Self::JointOrder,
@@ -96,6 +101,7 @@ impl Fault {
         Self::AngleWraps,
         Self::TwoPublishers,
         Self::TorqueGravity,
+        Self::GravityDirection,
         Self::TorqueUnit,
         Self::LostSamples,
         Self::UnevenStamps,
@@ -121,6 +127,7 @@ impl Fault {
             Self::MisalignedLogs => "misaligned_logs",
             Self::DifferentClocks => "different_clocks",
             Self::StampUnit => "stamp_unit",
+            Self::CopiedCommands => "copied_commands",
             Self::CommandUnit => "command_unit",
             Self::Degrees => "degrees",
             Self::JointOrder => "joint_order",
@@ -131,6 +138,7 @@ impl Fault {
             Self::AngleWraps => "angle_wraps",
             Self::TwoPublishers => "two_publishers",
             Self::TorqueGravity => "torque_gravity",
+            Self::GravityDirection => "gravity_direction",
             Self::TorqueUnit => "torque_unit",
             Self::LostSamples => "lost_samples",
             Self::UnevenStamps => "uneven_stamps",
@@ -157,6 +165,7 @@ impl Fault {
             | Self::MisalignedLogs
             | Self::DifferentClocks
             | Self::StampUnit
+            | Self::CopiedCommands
             | Self::CommandUnit
             | Self::Degrees
             | Self::JointOrder
@@ -164,6 +173,7 @@ impl Fault {
             | Self::VelocityUnit
             | Self::TwoPublishers
             | Self::TorqueGravity
+            | Self::GravityDirection
             | Self::TorqueUnit
             | Self::LengthUnit
             | Self::Quaternion

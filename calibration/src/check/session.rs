@@ -8,6 +8,7 @@ use super::look::{Known, Looked, look};
 use super::origins;
 use super::picture::{self, Picture};
 use super::remark::{Fault, Remark, merged};
+use import::lag::Group;
 use rayon::prelude::*;
 use serde::Serialize;
 use shared_mem::cell::{Cell, ClipEntry, ClipKind};
@@ -53,6 +54,8 @@ pub struct ClipFacts {
     pub rates_hz: [Option<f64>; 3],
     /// How much later than commanded the arm moves; null where no motion tells it.
     pub lag: Option<Lag>,
+    /// Joints in groups of one lag each; empty where all lag alike.
+    pub lag_groups: Vec<Group>,
     /// What it is good for, verb by verb.
     pub good_for: Vec<Fitness>,
 }
@@ -98,6 +101,7 @@ pub fn check(session: &Session) -> Checked {
             seconds: clip.map(|clip| clip.measured.duration().max(clip.object.duration())),
             rates_hz: seen.map_or([None; 3], rates_of),
             lag: seen.and_then(|looked| looked.lag),
+            lag_groups: seen.map_or_else(Vec::new, |looked| lag::groups(&looked.columns)),
             good_for,
             file,
         }

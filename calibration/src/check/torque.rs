@@ -1,16 +1,16 @@
-//! Measured and commanded torques against the arm's model: whether they carry its weight, their unit, and whether another order
-//! or sign of the joints explains them better. A fault that both joint topics share shows here alone.
+//! Measured and commanded torques against the arm's model: whether they carry its weight and along which axis of the base
+//! ([`import::weight`] owns the fit), their unit, and whether another order or sign of the joints explains them better. A fault that both joint topics share shows here alone.
 //!
 //! Inverse dynamics of the links: `tau_J = M(q) ddq + c(q, dq) + g(q)`, M without the rotors, which lie before the sensor.
 
 use super::columns::{Columns, Signals, between};
 use super::conversion;
 use super::limits::{
-    ACCELERATION, BLOCK, CARRIES_GRAVITY, LEAST_GRAVITY, NOT_ITS_SLOPE, TORQUE_BETTER, TORQUE_LEFT, TORQUE_ROWS,
+    ACCELERATION, CARRIES_GRAVITY, LEAST_GRAVITY, NOT_ITS_SLOPE, TORQUE_BETTER, TORQUE_LEFT, TORQUE_ROWS,
 };
 use super::remark::{Fault, Remark, Size};
-use super::statistics::{deviation, mean};
-use crate::estimate::interval::student_95;
+use super::statistics::mean;
+use import::weight::{self, Finding, Weight};
 use shared_mem::msg::{Joints, MAX_JOINTS};
 use twin::arm::{ArmModel, JointState};
 
@@ -59,18 +59,54 @@ pub(super) fn beside(clip: &Columns, arm: &ArmModel) -> Option<Beside> {
 pub(super) fn remarks(clip: &Columns, arm: &ArmModel) -> Vec<Remark> {
     let mut found = Vec::new();
     if let Some(moments) = moments(&clip.measured, &clip.measured.t, &clip.measured.tau, arm.dof()) {
-        let models: Vec<Model> = moments.iter().map(|moment| model(arm, moment)).collect();
-        let other = otherwise(clip, arm, &moments, &models);
-        let share = shares(&moments, &models, arm.dof()).filter(|share| share.value + share.half < CARRIES_GRAVITY);
-        let weightless = || share.map(|share| without(clip, share));
-        found.extend(unit(clip, &moments, &models, arm.dof()).or(other).or_else(weightless));
+        found.extend(of_measured(clip, arm, &moments));
     }
     if let Some(moments) = moments(&clip.measured, &clip.desired.t, &clip.desired.tau, arm.dof()) {
         let models: Vec<Model> = moments.iter().map(|moment| model(arm, moment)).collect();
-        let share = shares(&moments, &models, arm.dof());
-        found.extend(share.filter(|share| share.value - share.half > CARRIES_GRAVITY).map(|share| with(clip, share)));
+        let share = weight(arm, &moments, &models).map(|weight| weight.share(arm.free_fall()));
+        found.extend(share.filter(|[share, half]| share - half > CARRIES_GRAVITY).map(|share| with(clip, share)));
     }
     found
+}
+
+/// What explains the measured torques where the model does not: joints first, then the base, units, and weight that is missing.
+fn of_measured(clip: &Columns, arm: &ArmModel, moments: &[Moment]) -> Option<Remark> {
+    let models: Vec<Model> = moments.iter().map(|moment| model(arm, moment)).collect();
+    let weight = weight(arm, moments, &models);
+    let finding = weight.as_ref().map(|weight| weight.finding(arm.free_fall()));
+    let other = otherwise(clip, arm, moments, &models);
+    if let (Some(weight), Some(Finding::Elsewhere)) = (&weight, finding) {
+        let turned: Vec<Model> =
+            moments.iter().zip(&models).map(|(m, model)| model.falling(arm, m, weight.pull)).collect();
+        let better = left(moments, &turned, arm.dof());
+        if other.as_ref().is_none_or(|(_, by_joints)| better < *by_joints) {
+            return Some(elsewhere(clip, weight));
+        }
+    }
+    other.map(|(remark, _)| remark).or_else(|| match finding {
+        Some(Finding::Turned(joint, factor)) => Some(of_joint(clip, joint, factor, ", counted the other way round")),
+        Some(Finding::Scaled(Some(joint), factor)) => {
+            Some(of_joint(clip, joint, factor, ": another unit, or a torque constant or gear ratio is missing"))
+        }
+        finding => unit(clip, moments, &models, arm.dof()).or_else(|| match (finding, &weight) {
+            (Some(Finding::Absent(_)), Some(weight)) => Some(without(clip, weight.share(arm.free_fall()))),
+            (Some(Finding::Scaled(None, factor)), _) => Some(scaled(clip, factor, [factor; 2], "")),
+            _ => None,
+        }),
+    })
+}
+
+/// The weight in torques, what the motion needs taken off.
+fn weight(arm: &ArmModel, moments: &[Moment], models: &[Model]) -> Option<Weight> {
+    let dof = arm.dof();
+    let unit = |axis: usize| std::array::from_fn(|k| if k == axis { 1.0 } else { 0.0 });
+    let of = |(moment, model): (&Moment, &Model)| weight::Moment {
+        tau: (0..dof).map(|j| moment.tau[j] - model.tau[j] + model.gravity[j]).collect(),
+        holds: [0, 1, 2].map(|axis| arm.holding(&moment.q, unit(axis))[..dof].to_vec()),
+        dq: moment.dq[..dof].to_vec(),
+        ddq: moment.ddq[..dof].to_vec(),
+    };
+    Weight::of(&moments.iter().zip(models).map(of).collect::<Vec<_>>())
 }
 
 /// Moments of a clip: motion of the arm, and torques of a topic; `None` where too little is logged.
@@ -119,65 +155,61 @@ fn model(arm: &ArmModel, moment: &Moment) -> Model {
     Model { tau, gravity: arm.gravity(&moment.q) }
 }
 
-/// A share with half its 95 % interval [1].
-#[derive(Debug, Clone, Copy)]
-struct Share {
-    value: f64,
-    half: f64,
-}
-
-/// The share of the model's gravity that torques carry; `None` where gravity is small.
-fn shares(moments: &[Moment], models: &[Model], dof: usize) -> Option<Share> {
-    let sums = |from: usize, to: usize| {
-        let rows = moments[from..to].iter().zip(&models[from..to]);
-        rows.fold([0.0, 0.0], |[gt, gg], (moment, model)| {
-            let each = (0..dof).map(|j| {
-                let g = model.gravity[j];
-                [g * (moment.tau[j] - model.tau[j] + g), g * g]
-            });
-            each.fold([gt, gg], |[gt, gg], [a, b]| [gt + a, gg + b])
-        })
-    };
-    let [gt, gg] = sums(0, moments.len());
-    if (gg / (moments.len() * dof) as f64).sqrt() < LEAST_GRAVITY {
-        return None;
+impl Model {
+    /// The same where the base falls another way [m/s^2].
+    fn falling(&self, arm: &ArmModel, moment: &Moment, falls: [f64; 3]) -> Self {
+        let gravity = arm.holding(&moment.q, falls);
+        Self { tau: std::array::from_fn(|j| self.tau[j] - self.gravity[j] + gravity[j]), gravity }
     }
-    let span = moments.last()?.t - moments.first()?.t;
-    let blocks = ((span / BLOCK) as usize).clamp(2, moments.len() / 4);
-    let length = moments.len().div_ceil(blocks);
-    let parts: Vec<f64> = (0..moments.len())
-        .step_by(length)
-        .map(|from| sums(from, (from + length).min(moments.len())))
-        .filter(|[_, gg]| *gg > 0.0)
-        .map(|[gt, gg]| gt / gg)
-        .collect();
-    let half = student_95(parts.len().saturating_sub(1)) * deviation(&parts) / (parts.len() as f64).sqrt();
-    Some(Share { value: gt / gg, half })
 }
 
-fn sized(remark: Remark, share: Share) -> Remark {
-    remark.sized(Size {
-        value: share.value,
-        interval: [share.value - share.half, share.value + share.half],
-        unit: "share of gravity",
-    })
+/// `share`: of the model's weight, with half its interval.
+fn sized(remark: Remark, [share, half]: [f64; 2]) -> Remark {
+    remark.sized(Size { value: share, interval: [share - half, share + half], unit: "share of gravity" })
 }
 
-fn without(clip: &Columns, share: Share) -> Remark {
+/// The base is mounted another way than the model stands.
+fn elsewhere(clip: &Columns, weight: &Weight) -> Remark {
     let what = format!(
-        "measured torques carry {:.0} % of the arm's weight by the model: gravity was taken off before they were logged, so that \
-         stiction hides in an offset",
-        100.0 * share.value
+        "measured torques hold a weight that pulls {}, and not as in the model: the base is mounted another way than the model \
+         stands",
+        weight.in_words()
+    );
+    let half = weight.half.iter().copied().fold(0.0, f64::max);
+    let size = weight.size();
+    Remark::new(Fault::GravityDirection, &clip.file, "measured effort", what)
+        .sized(Size { value: size, interval: [size - half, size + half], unit: "m/s^2" })
+        .mended_by(
+            "turn the base in the URDF: a fixed joint between its root link and the base, with the `rpy` at which it is mounted",
+        )
+}
+
+/// The torque of one joint beside the weight that the others show.
+fn of_joint(clip: &Columns, joint: usize, factor: f64, meaning: &str) -> Remark {
+    let who = clip.joint(joint);
+    let what = format!(
+        "the measured torque of {who} is {factor:.2} times what holds it by the weight that the other joints show{meaning}"
+    );
+    Remark::new(Fault::TorqueUnit, &clip.file, format!("measured effort, {who}"), what)
+        .sized(Size::count(factor, "1"))
+        .mended_by("publish the torque behind the gear in N m, positive in the direction of q")
+}
+
+fn without(clip: &Columns, share: [f64; 2]) -> Remark {
+    let what = format!(
+        "measured torques carry {:.0} % of the arm's weight by the model, and no weight along any other axis of the base: gravity \
+         was taken off before they were logged, so that stiction hides in an offset",
+        100.0 * share[0]
     );
     sized(Remark::new(Fault::TorqueGravity, &clip.file, "measured effort", what), share).mended_by(
         "log tau_J with gravity (libfranka `tau_J`, not `tau_ext_hat_filtered`), or leave effort out of the topic",
     )
 }
 
-fn with(clip: &Columns, share: Share) -> Remark {
+fn with(clip: &Columns, share: [f64; 2]) -> Remark {
     let what = format!(
         "commanded torques carry {:.0} % of the arm's weight by the model: tau_J_d is without gravity",
-        100.0 * share.value
+        100.0 * share[0]
     );
     sized(Remark::new(Fault::TorqueGravity, &clip.file, "desired effort", what), share).mended_by(
         "log what the controller asks for without the gravity that the robot adds, or leave effort out of the topic",
@@ -204,16 +236,14 @@ fn unit(clip: &Columns, moments: &[Moment], models: &[Model], dof: usize) -> Opt
         _ => String::new(),
     };
     let half = 1.96 * (factor * factor * (1.0 / (correlation * correlation) - 1.0) / pairs().count() as f64).sqrt();
-    Some(
-        Remark::new(
-            Fault::TorqueUnit,
-            &clip.file,
-            "measured effort",
-            format!("measured torques are {factor:.4} times those of the model{meaning}"),
-        )
-        .sized(Size { value: factor, interval: [factor - half, factor + half], unit: "1" })
-        .mended_by("publish the torque behind the gear in N m, positive in the direction of q"),
-    )
+    Some(scaled(clip, factor, [factor - half, factor + half], &meaning))
+}
+
+fn scaled(clip: &Columns, factor: f64, interval: [f64; 2], meaning: &str) -> Remark {
+    let what = format!("measured torques are {factor:.4} times those of the model{meaning}");
+    Remark::new(Fault::TorqueUnit, &clip.file, "measured effort", what)
+        .sized(Size { value: factor, interval, unit: "1" })
+        .mended_by("publish the torque behind the gear in N m, positive in the direction of q")
 }
 
 /// Another meaning of the joints.
@@ -223,13 +253,15 @@ enum Other {
     Turned(usize),
     /// The joint's position and velocity alone do.
     PositionTurned(usize),
+    /// The joint's torque alone does.
+    TorqueTurned(usize),
     /// The two are exchanged.
     Swapped(usize, usize),
 }
 
 impl Other {
     fn all(dof: usize) -> Vec<Self> {
-        let turned = (0..dof).flat_map(|j| [Self::Turned(j), Self::PositionTurned(j)]);
+        let turned = (0..dof).flat_map(|j| [Self::Turned(j), Self::PositionTurned(j), Self::TorqueTurned(j)]);
         turned.chain((0..dof).flat_map(|a| (a + 1..dof).map(move |b| Self::Swapped(a, b)))).collect()
     }
 
@@ -244,6 +276,7 @@ impl Other {
                     other.tau[j] = -other.tau[j];
                 }
             }
+            Self::TorqueTurned(j) => other.tau[j] = -other.tau[j],
             Self::Swapped(a, b) => {
                 for joints in [&mut other.q, &mut other.dq, &mut other.ddq, &mut other.tau] {
                     joints.swap(a, b);
@@ -269,8 +302,8 @@ fn carrying(moment: &Moment, model: &Model) -> Moment {
     Moment { tau, ..*moment }
 }
 
-/// The order or sign of the joints that explains torques which the model does not.
-fn otherwise(clip: &Columns, arm: &ArmModel, moments: &[Moment], models: &[Model]) -> Option<Remark> {
+/// The order or sign of the joints that explains torques which the model does not, and what it leaves of them [1].
+fn otherwise(clip: &Columns, arm: &ArmModel, moments: &[Moment], models: &[Model]) -> Option<(Remark, f64)> {
     let dof = arm.dof();
     let as_is = left(moments, models, dof);
     let weight = models.iter().map(|m| m.gravity.iter().map(|g| g * g).sum::<f64>()).sum::<f64>();
@@ -296,6 +329,12 @@ fn otherwise(clip: &Columns, arm: &ArmModel, moments: &[Moment], models: &[Model
             let said = format!("{leaves} if {who} {what} the other way round");
             (Fault::JointSign, who, said, "turn the joint's sign in the driver, or its axis in the URDF")
         }
+        Other::TorqueTurned(j) => {
+            let who = clip.joint(j);
+            let said = format!("{leaves} if the torque of {who} is counted the other way round");
+            let channel = format!("measured effort, {who}");
+            (Fault::TorqueUnit, channel, said, "publish its torque in N m, positive in the direction of q")
+        }
         Other::Swapped(a, b) => (
             Fault::JointOrder,
             "joint order".to_owned(),
@@ -303,9 +342,8 @@ fn otherwise(clip: &Columns, arm: &ArmModel, moments: &[Moment], models: &[Model
             "put the names of `[robot] joints` or of the topics into the order of their columns",
         ),
     };
-    Some(
-        Remark::new(fault, &clip.file, channel, what)
-            .sized(Size { value: as_is, interval: [better, as_is], unit: "share of tau^2" })
-            .mended_by(remedy),
-    )
+    let remark = Remark::new(fault, &clip.file, channel, what)
+        .sized(Size { value: as_is, interval: [better, as_is], unit: "share of tau^2" })
+        .mended_by(remedy);
+    Some((remark, better))
 }

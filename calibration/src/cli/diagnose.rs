@@ -115,7 +115,7 @@ pub(super) struct Arguments {
 impl Arguments {
     /// What is taken all the same.
     pub(super) fn allowed(&self) -> Allowed {
-        Allowed { as_recorded: self.as_recorded, mix: self.mix }
+        Allowed { as_recorded: self.as_recorded, mix: self.mix, copied_commands: self.torques }
     }
 }
 

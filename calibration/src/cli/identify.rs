@@ -226,7 +226,8 @@ impl Task {
         Destination::of(self.out.as_deref(), self.force)?;
         let page = Destination::of(self.report.as_deref(), self.force)?;
         let session = Session::open_with(&self.session, self.cell.as_deref())?;
-        let looked = gate::look(&session, Allowed { as_recorded: self.as_recorded, mix: self.mix })?;
+        let allowed = Allowed { as_recorded: self.as_recorded, mix: self.mix, ..Allowed::default() };
+        let looked = gate::look(&session, allowed)?;
         let json = self.json;
         let mut found = identify(self, &session)?;
         gate::add(&mut found.warnings, &looked);

@@ -67,6 +67,9 @@ pub fn words(found: &Checked) -> String {
             lines.push(format!("    mend: {}", remark.remedy));
         }
     }
+    for clip in found.clips.iter().filter(|clip| !clip.lag_groups.is_empty()) {
+        lines.push(format!("{}: the joints do not lag alike: {}", clip.file, import::lag::in_words(&clip.lag_groups)));
+    }
     for (number, verb) in VERBS.into_iter().enumerate() {
         let good = found.clips.iter().filter(|clip| clip.good_for[number].good).count();
         if good > 0 {

@@ -86,7 +86,22 @@ fn damage(fault: Injected, clip: &mut Clip, draw: &Draw, rng: &mut Pcg64, cell: 
         Injected::TwoPublishers => clip.measured = interleaved(&clip.measured, draw, rng),
         Injected::AngleWraps => wrap(&mut clip.measured, draw, true),
         Injected::VelocitySpikes => wrap(&mut clip.measured, draw, false),
-        Injected::TorqueWithoutGravity => take_gravity_off(clip, cell)?,
+        Injected::TorqueWithoutGravity => exchange_weight(clip, cell, [0.0; 3])?,
+        Injected::BaseOnItsSide => {
+            let (side, size) = (usize::from(draw.first), draw.sign * 9.81);
+            exchange_weight(clip, cell, std::array::from_fn(|k| if k == side { size } else { 0.0 }))?;
+        }
+        Injected::TorqueSignOfOneJoint => {
+            // The first joint carries no weight, and the last one none where the tool is round.
+            let joint = [1, 3, 5][a % 3].min(dof - 1);
+            clip.measured.tau.iter_mut().skip(joint).step_by(dof).for_each(|tau| *tau = -*tau);
+        }
+        Injected::CopiedCommands => {
+            clip.desired.stamps_ns.clone_from(&clip.measured.stamps_ns);
+            clip.desired.q.clone_from(&clip.measured.q);
+            clip.desired.dq.clone_from(&clip.measured.dq);
+            clip.desired.tau.clear();
+        }
         Injected::HalfWidths => {}
         Injected::Millimetres => change_poses(&mut clip.object, |pose| {
             Isometry3::from_parts(Translation3::from(pose.translation.vector * 1e3), pose.rotation)
@@ -232,7 +247,8 @@ fn spread(series: &JointSeries, joint: usize) -> f64 {
     values().copied().fold(f64::MIN, f64::max) - values().copied().fold(f64::MAX, f64::min)
 }
 
-fn take_gravity_off(clip: &mut Clip, cell: &Cell) -> Option<()> {
+/// Measured torques that hold the arm against another free fall in the base frame than the model's [m/s²].
+fn exchange_weight(clip: &mut Clip, cell: &Cell, falls: [f64; 3]) -> Option<()> {
     let arm = ArmModel::from_cell(cell).ok()?;
     let ordered = in_model_order(clip.clone(), &arm).ok()?;
     let dof = ordered.measured.dof;
@@ -241,8 +257,9 @@ fn take_gravity_off(clip: &mut Clip, cell: &Cell) -> Option<()> {
     }
     *clip = ordered;
     for row in 0..clip.measured.len() {
-        let gravity = arm.gravity(&joints_from(clip.measured.q_row(row)));
-        clip.measured.tau.iter_mut().skip(row * dof).take(dof).zip(gravity).for_each(|(tau, g)| *tau -= g);
+        let q = joints_from(clip.measured.q_row(row));
+        let more = arm.holding(&q, falls).into_iter().zip(arm.gravity(&q)).map(|(new, old)| new - old);
+        clip.measured.tau.iter_mut().skip(row * dof).take(dof).zip(more).for_each(|(tau, more)| *tau += more);
     }
     Some(())
 }

@@ -25,6 +25,12 @@ pub enum Injected {
     VelocitySpikes,
     /// Measured torques less gravity.
     TorqueWithoutGravity,
+    /// Measured torques of an arm that hangs on its side, beside a model that stands.
+    BaseOnItsSide,
+    /// The torque of one joint turned round.
+    TorqueSignOfOneJoint,
+    /// Commands that are the measured positions.
+    CopiedCommands,
     /// Half widths in `object.size`.
     HalfWidths,
     /// Poses in millimetres.
@@ -71,7 +77,7 @@ pub enum Injected {
 
 impl Injected {
     /// All of them.
-    pub const ALL: [Self; 30] = [
+    pub const ALL: [Self; 33] = [
         Self::LostPackets,
         Self::StartGlitch,
         Self::UnevenStamps,
@@ -81,6 +87,9 @@ impl Injected {
         Self::AngleWraps,
         Self::VelocitySpikes,
         Self::TorqueWithoutGravity,
+        Self::BaseOnItsSide,
+        Self::TorqueSignOfOneJoint,
+        Self::CopiedCommands,
         Self::HalfWidths,
         Self::Millimetres,
         Self::QuaternionWFirst,
@@ -117,6 +126,9 @@ impl Injected {
             Self::AngleWraps => "angle wraps with velocity spikes",
             Self::VelocitySpikes => "velocity spikes at wraps, q unwrapped",
             Self::TorqueWithoutGravity => "torque without gravity",
+            Self::BaseOnItsSide => "base on its side",
+            Self::TorqueSignOfOneJoint => "torque sign of one joint",
+            Self::CopiedCommands => "commands copied from measurements",
             Self::HalfWidths => "half widths as size",
             Self::Millimetres => "poses in mm",
             Self::QuaternionWFirst => "quaternions w first",
@@ -152,6 +164,9 @@ impl Injected {
             Self::TwoPublishers => fault == Fault::TwoPublishers,
             Self::AngleWraps | Self::VelocitySpikes => fault == Fault::AngleWraps,
             Self::TorqueWithoutGravity => fault == Fault::TorqueGravity,
+            Self::BaseOnItsSide => fault == Fault::GravityDirection,
+            Self::TorqueSignOfOneJoint => fault == Fault::TorqueUnit,
+            Self::CopiedCommands => fault == Fault::CopiedCommands,
             Self::HalfWidths | Self::Millimetres => fault == Fault::LengthUnit,
             Self::QuaternionWFirst => fault == Fault::Quaternion,
             Self::HeldStates | Self::HeldPoses => fault == Fault::HeldRows,
@@ -180,7 +195,9 @@ impl Injected {
                 session.has_poses() && !tossed
             }
             // Of both topics alike only torques tell, and these only where the joints move much.
-            Self::SignOfBothTopics | Self::OrderOfBothTopics => session.has_arm() && !session.has_poses(),
+            Self::SignOfBothTopics | Self::OrderOfBothTopics | Self::TorqueSignOfOneJoint => {
+                session.has_arm() && !session.has_poses()
+            }
             Self::MisalignedLogs => session.has_arm() && session.paces() > PACES,
             _ => session.has_arm(),
         }
