@@ -92,3 +92,30 @@ fn every_remark_stands_in_the_documents_and_no_other() {
     let named: Vec<&str> = rows.filter_map(|row| row.split('`').next()).collect();
     assert_eq!(named, Fault::ALL.map(Fault::key));
 }
+
+#[test]
+fn numbers_of_no_size_that_can_be_end_in_sentences() {
+    let odd = [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 1e308, -1e308, 1e-310, -0.0];
+    for seed in 0..24_usize {
+        let mut session = CLEAN[seed % CLEAN.len()].clone();
+        // Places and values go on by steps that have no common factor with what they walk through.
+        let mut place = 7919 * (seed + 1);
+        for (_, clip) in &mut session.clips {
+            let Clip { measured, desired, .. } = clip;
+            for values in [&mut measured.q, &mut measured.dq, &mut measured.tau, &mut desired.q, &mut desired.tau] {
+                for _ in 0..=seed % 5 {
+                    place = place.wrapping_mul(31).wrapping_add(104_729) % 1_000_003;
+                    let at = place % values.len().max(1);
+                    if let Some(value) = values.get_mut(at) {
+                        *value = odd[place % odd.len()];
+                    }
+                }
+            }
+        }
+        let as_it_is = remarks(&session);
+        session.clips.retain_mut(|(_, clip)| clip.clone().checked().map(|whole| *clip = whole).is_ok());
+        for remark in as_it_is.iter().chain(&remarks(&session)) {
+            assert!(!remark.what.is_empty() && !remark.what.contains('\n'), "{remark}");
+        }
+    }
+}

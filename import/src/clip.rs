@@ -170,6 +170,19 @@ fn torques(columns: &JointColumns, measured: &mut JointSeries, gravity: Option<&
     if columns.torque != Torque::WithoutGravity || measured.tau.is_empty() {
         return;
     }
+    let still_joint = (0..measured.dof).find(|joint| {
+        let column: Vec<f64> = measured.tau.iter().skip(*joint).step_by(measured.dof).copied().collect();
+        still(&[&column]).is_some()
+    });
+    if let Some(joint) = still_joint {
+        measured.tau.clear();
+        warnings.push(format!(
+            "torques are left out: that of joint {} holds one or two numbers in all rows, and gravity is not added to what was not \
+             measured",
+            joint + 1
+        ));
+        return;
+    }
     let whole = (0..measured.len())
         .map(|row| gravity.and_then(|gravity| gravity.torques(measured.q_row(row))))
         .collect::<Option<Vec<_>>>();

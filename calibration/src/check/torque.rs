@@ -76,11 +76,17 @@ fn of_measured(clip: &Columns, arm: &ArmModel, moments: &[Moment]) -> Option<Rem
     let finding = weight.as_ref().map(|weight| weight.finding(arm.free_fall()));
     let other = otherwise(clip, arm, moments, &models);
     if let (Some(weight), Some(Finding::Elsewhere)) = (&weight, finding) {
-        let turned: Vec<Model> =
-            moments.iter().zip(&models).map(|(m, model)| model.falling(arm, m, weight.pull)).collect();
-        let better = left(moments, &turned, arm.dof());
-        if other.as_ref().is_none_or(|(_, by_joints)| better < *by_joints) {
+        let falling = |(moment, model): (&Moment, &Model)| model.falling(arm, moment, weight.pull);
+        let leaning: Vec<Model> = moments.iter().zip(&models).map(falling).collect();
+        let by_base = left(moments, &leaning, arm.dof());
+        // Upside down, or every torque turned round: what the motion needs tells them apart.
+        let negative: Vec<Moment> = moments.iter().map(|m| Moment { tau: m.tau.map(|tau| -tau), ..*m }).collect();
+        let by_sign = left(&negative, &models, arm.dof());
+        if by_base <= by_sign && other.as_ref().is_none_or(|(_, by_joints)| by_base < *by_joints) {
             return Some(elsewhere(clip, weight));
+        }
+        if by_sign < by_base {
+            return Some(scaled(clip, -1.0, [-1.0; 2], ": counted the other way round"));
         }
     }
     other.map(|(remark, _)| remark).or_else(|| match finding {
