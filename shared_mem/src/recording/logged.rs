@@ -15,6 +15,7 @@ use std::io::{Read, Seek};
 const RECORD: &str = "twinalign.logged";
 const COMMANDS: &str = "commands";
 const APART: &str = "in /arm/command, at stamps of their own";
+const NONE: &str = "none were logged";
 const LACKING: &str = "lacking";
 const QUANTITIES: [&str; 4] = ["dq", "tau_J", "dq_d", "tau_J_d"];
 
@@ -23,20 +24,24 @@ const QUANTITIES: [&str; 4] = ["dq", "tau_J", "dq_d", "tau_J_d"];
 pub(super) struct Logged {
     /// Whether what the arm was told stands in messages of its own.
     pub(super) commands_apart: bool,
+    /// Whether nobody logged what the arm was told.
+    without_commands: bool,
     /// Which of [`QUANTITIES`] nobody logged.
     lacking: [bool; 4],
 }
 
 impl Logged {
     /// An arm that is moved without being pushed.
-    pub(super) const WITHOUT_TORQUES: Self = Self { commands_apart: false, lacking: [false, true, false, true] };
+    pub(super) const WITHOUT_TORQUES: Self =
+        Self { commands_apart: false, without_commands: false, lacking: [false, true, false, true] };
 
     /// What a clip of any kind holds.
     pub(super) fn of(clip: &Clip) -> Self {
         let lacks = |series: &JointSeries| [series.dq_row(0).is_none(), series.tau_row(0).is_none()];
         let ([dq, tau], [dq_d, tau_d]) = (lacks(&clip.measured), lacks(&clip.desired));
-        let commands_apart = clip.measured.stamps_ns != clip.desired.stamps_ns;
-        Self { commands_apart, lacking: [dq, tau, dq_d, tau_d] }
+        let without_commands = clip.desired.is_empty() && !clip.measured.is_empty();
+        let commands_apart = !without_commands && clip.measured.stamps_ns != clip.desired.stamps_ns;
+        Self { commands_apart, without_commands, lacking: [dq, tau, dq_d, tau_d] }
     }
 
     /// The record to write; `None` where states say all there is.
@@ -44,6 +49,8 @@ impl Logged {
         let mut pairs = BTreeMap::new();
         if self.commands_apart {
             pairs.insert(COMMANDS.to_owned(), APART.to_owned());
+        } else if self.without_commands {
+            pairs.insert(COMMANDS.to_owned(), NONE.to_owned());
         }
         let lacking: Vec<&str> =
             QUANTITIES.iter().zip(self.lacking).filter(|(_, lacks)| *lacks).map(|(name, _)| *name).collect();
@@ -59,6 +66,7 @@ impl Logged {
         let lacking = record.pairs.get(LACKING).map_or("", String::as_str);
         Self {
             commands_apart: record.pairs.get(COMMANDS).is_some_and(|said| said == APART),
+            without_commands: record.pairs.get(COMMANDS).is_some_and(|said| said == NONE),
             lacking: QUANTITIES.map(|name| lacking.split(' ').any(|word| word == name)),
         }
     }
@@ -66,6 +74,9 @@ impl Logged {
     /// Takes what nobody logged out of what was read.
     pub(super) fn strip(self, measured: &mut JointSeries, desired: &mut JointSeries) {
         let [dq, tau, dq_d, tau_d] = self.lacking;
+        if self.without_commands {
+            *desired = JointSeries::default();
+        }
         for (lacks, numbers) in
             [(dq, &mut measured.dq), (tau, &mut measured.tau), (dq_d, &mut desired.dq), (tau_d, &mut desired.tau)]
         {

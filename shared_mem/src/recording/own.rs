@@ -103,7 +103,7 @@ impl Rows {
     fn use_device_clock(&mut self) -> DeviceClock {
         let clock = DeviceClock::new(&self.measured.stamps_ns, &self.device_ns);
         if let Some(stamps_ns) = clock.stamps() {
-            for series in [&mut self.measured, &mut self.desired] {
+            for series in [&mut self.measured, &mut self.desired].into_iter().filter(|series| !series.is_empty()) {
                 series.stamps_ns = stamps_ns.to_vec();
             }
         }
@@ -221,6 +221,10 @@ fn take_joints(path: &Path, cell: &Cell, rows: Rows, clip: &mut Clip) -> Result<
     let apart = !rows.commands.is_empty();
     let (commands, told) = if apart { (rows.commands, ArmCommand::TOPIC) } else { (rows.desired, topic) };
     for (series, topic, into) in [(rows.measured, topic, &mut clip.measured), (commands, told, &mut clip.desired)] {
+        // An object alone, or an arm whose commands nobody logged.
+        if series.is_empty() {
+            continue;
+        }
         let fail = |what| ReadError::content(path, topic, what);
         let (series, warnings) = checks::joints(series, topic, &clip.joint_names).map_err(fail)?;
         *into = series;

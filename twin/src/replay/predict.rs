@@ -61,6 +61,11 @@ pub enum ReplayError {
     /// Too little was recorded.
     #[error("{0}: too short to replay: it holds {1}; record it again or remove it from cell.toml")]
     TooShort(String, &'static str),
+    /// Nobody logged what the arm was told.
+    #[error(
+        "{0}: it holds no commands, without which the twin's arm cannot be led: what can be explained are its torques, where it has any, by `calibration diagnose --torques`"
+    )]
+    NoCommands(String),
     /// The object cannot be where the poses say.
     #[error("{0}: {1}")]
     Buried(String, Buried),
@@ -165,8 +170,7 @@ impl Replayer {
 
     fn with_arm(&self, clip: &Clip, object: Option<&ObjectState>) -> Result<Prediction, ReplayError> {
         let arm = self.rollout.arm().ok_or_else(|| ReplayError::NoArm(name(clip)))?;
-        let commands =
-            CommandTrack::new(&clip.desired).ok_or_else(|| ReplayError::TooShort(name(clip), "no commands"))?;
+        let commands = CommandTrack::new(&clip.desired).ok_or_else(|| ReplayError::NoCommands(name(clip)))?;
         let (stamps_ns, poses_ns) = (&clip.measured.stamps_ns, &clip.object.stamps_ns);
         let start_state = |row: usize| {
             let state = arm.start_state(&clip.measured, row, &commands);

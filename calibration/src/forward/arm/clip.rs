@@ -44,8 +44,13 @@ pub enum ArmClipError {
     #[error(transparent)]
     Joints(#[from] ReadError),
     /// Nothing was logged.
-    #[error("it holds no {0}; record it again")]
-    Empty(&'static str),
+    #[error("it holds no measured joints; record it again")]
+    Empty,
+    /// Nobody logged what the arm was told.
+    #[error(
+        "it holds no commands, without which the twin's arm cannot be led: what can be explained are its torques, where it has any, by `calibration diagnose --torques`"
+    )]
+    NoCommands,
     /// The log is too slow.
     #[error("it is logged at {0:.0} Hz; below 30 Hz a log does not show how a joint follows: record at 100 Hz or more")]
     Slow(f64),
@@ -102,10 +107,10 @@ impl ArmClip {
     pub(super) fn new(recorded: Clip, cell: &Cell, arm: &ArmModel) -> Result<Self, ArmClipError> {
         let mut recorded = in_model_order(recorded, arm)?;
         if recorded.measured.len() < 2 {
-            return Err(ArmClipError::Empty("measured joints"));
+            return Err(ArmClipError::Empty);
         }
         if recorded.desired.is_empty() {
-            return Err(ArmClipError::Empty("commands"));
+            return Err(ArmClipError::NoCommands);
         }
         let step_ns = usual_step(&recorded.measured.stamps_ns);
         let rate = 1e9 / step_ns as f64;
@@ -122,7 +127,7 @@ impl ArmClip {
         }
         let given = dead.contains(&true).then(|| recorded.desired.clone());
         hold_dead(&mut recorded, &dead);
-        let commands = CommandTrack::new(&recorded.desired).ok_or(ArmClipError::Empty("commands"))?;
+        let commands = CommandTrack::new(&recorded.desired).ok_or(ArmClipError::NoCommands)?;
         let mut warnings = warnings(&recorded, &commands, &dead);
         if velocity::late_in(&recorded.measured).is_some() {
             // What the filter did is no gap of the twin; the positions say the same without it.
