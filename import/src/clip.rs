@@ -1,7 +1,7 @@
 //! A log by its mapping: a clip in SI, joints in one order, stamps in nanoseconds.
 
 use crate::log::{Column, HEADER, Log, Table};
-use crate::mapping::{Clock, JointColumns, Mapping, PoseColumns, Torque, TorquesAct};
+use crate::mapping::{Clock, Factor, JointColumns, Mapping, PoseColumns, Torque, TorquesAct};
 use shared_mem::frames::Pose;
 use shared_mem::msg::MAX_JOINTS;
 use shared_mem::origin::{Origin, Origins};
@@ -98,6 +98,18 @@ fn series(
     if dof == 0 || dof > MAX_JOINTS {
         return Err(format!("import.toml names {dof} joints; a clip has 1 to {MAX_JOINTS}: list those of one arm"));
     }
+    let factors =
+        [("q_factor", &columns.q_factor), ("dq_factor", &columns.dq_factor), ("tau_factor", &columns.tau_factor)];
+    if let Some((key, why)) = factors.iter().find_map(|(key, factor)| Some((key, factor.refused(dof)?))) {
+        return Err(format!("import.toml's `{key}` of `{}` {why}", columns.table));
+    }
+    if !columns.sign.is_empty() && columns.sign.len() != dof {
+        let count = columns.sign.len();
+        return Err(format!(
+            "import.toml's `sign` of `{}` has {count} numbers for {dof} joints: give one a joint",
+            columns.table
+        ));
+    }
     let sign = |i: usize| columns.sign.get(i).copied().unwrap_or(1.0);
     let pick = |key: &str, names: &[String]| -> Result<Vec<&[f64]>, String> {
         if names.len() != dof {
@@ -111,23 +123,25 @@ fn series(
     let q = pick("q", &columns.q)?;
     let has_position = |row: &usize| q.iter().any(|values| values.get(*row).is_some_and(|v| !v.is_nan()));
     let rows = stamps(table, columns.clock(), has_position, warnings)?;
-    let gather = |values: &[&[f64]], factor: f64| -> Vec<f64> {
+    let gather = |values: &[&[f64]], unit: f64, factor: &Factor| -> Vec<f64> {
         let row = |row: &usize| {
-            let of = |(i, column): (usize, &&[f64])| column.get(*row).map_or(f64::NAN, |v| v * factor * sign(i));
+            let of = |(i, column): (usize, &&[f64])| {
+                column.get(*row).map_or(f64::NAN, |v| v * unit * factor.of(i) * sign(i))
+            };
             values.iter().enumerate().map(of).collect::<Vec<_>>()
         };
         rows.kept.iter().flat_map(row).collect()
     };
-    let mut out = JointSeries { dof, q: gather(&q, columns.q_unit.si()), ..JointSeries::default() };
+    let mut out = JointSeries { dof, q: gather(&q, columns.q_unit.si(), &columns.q_factor), ..JointSeries::default() };
     if !columns.dq.is_empty() {
-        out.dq = gather(&pick("dq", &columns.dq)?, columns.dq_unit.si());
+        out.dq = gather(&pick("dq", &columns.dq)?, columns.dq_unit.si(), &columns.dq_factor);
     }
     if !columns.tau.is_empty() && columns.torque != Torque::NotKnown {
         let tau = pick("tau", &columns.tau)?;
         // What is no measurement must not be taken for one that lacks gravity.
         match still(&tau) {
             Some(what) => warnings.push(format!("torques of `{}` are left out: {what}", columns.table)),
-            None => out.tau = gather(&tau, 1.0),
+            None => out.tau = gather(&tau, 1.0, &columns.tau_factor),
         }
     }
     Ok((out, rows.stamps_ns))

@@ -4,7 +4,7 @@
 use crate::error::ImportError;
 use crate::propose::propose;
 use crate::session::longest;
-use crate::sources;
+use crate::{runs, sources};
 use std::path::Path;
 
 /// What a log holds.
@@ -31,10 +31,11 @@ pub struct Contents {
 pub fn look(path: &Path) -> Result<Contents, ImportError> {
     let mut logs = Vec::new();
     for source in sources::find(path)? {
-        logs.extend(source.read()?);
+        logs.extend(runs::apart(source.read()?));
     }
     let log = longest(&logs, path)?;
-    let mapping = propose(log, (None, &[]), &|_| None).mapping;
+    let proposal = propose(log, (None, &[]), &|_| None).map_err(|what| ImportError::log(path, what))?;
+    let mapping = proposal.mapping;
     // A second publisher on a topic is a table of its own, behind a colon.
     let topic = |table: &str| table.split(':').next().unwrap_or(table).to_owned();
     let joints = |columns: Option<crate::JointColumns>| {

@@ -7,8 +7,10 @@
 //! | `log` | what every format is read into: tables of named columns with stamps |
 //! | `naming` | what the names of columns say |
 //! | `mapping` | `import.toml`: which columns are which quantity, in which unit |
+//! | `runs` | which logs a file holds: each of several runs by itself |
 //! | `propose` | a mapping out of a log, with the reasons |
 //! | `clip` | a log by its mapping, in SI |
+//! | `pieces` | one long log of many motions as clips |
 //! | `cell`, `arm` | the cell.toml of the new session, and what is known of its arm |
 //! | `session` | the whole way |
 //! | [`weight`], [`lag`] | what torques say about the arm's weight, and motion about the time to its command: for those who look at clips, too |
@@ -25,8 +27,10 @@ pub mod lag;
 mod log;
 mod mapping;
 mod naming;
+mod pieces;
 mod propose;
 mod ros;
+mod runs;
 mod session;
 mod sources;
 pub mod weight;
@@ -39,6 +43,7 @@ pub use data_set::{DataSetError, DataSetPlan, DataSetWriter, Feature, FeatureKin
 pub use error::ImportError;
 pub use log::LeftOut;
 pub use mapping::{
-    AngleUnit, JointColumns, LengthUnit, Mapping, Note, PoseColumns, RateUnit, TimeUnit, Torque, TorquesAct,
+    AngleUnit, Factor, JointColumns, LengthUnit, Mapping, Note, Pieces, PoseColumns, RateUnit, TimeUnit, Torque,
+    TorquesAct,
 };
 pub use session::{Imported, Order, Outcome, import};

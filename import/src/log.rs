@@ -64,6 +64,10 @@ pub(crate) struct Facts {
     pub(crate) robot: Option<String>,
     /// The robot's URDF, where the log holds it.
     pub(crate) description: Option<String>,
+    /// Which two columns are one stamp, and why, where stamps were put together.
+    pub(crate) two_columns: Option<String>,
+    /// Which runs the file holds, where it is one of several.
+    pub(crate) runs: Option<String>,
 }
 
 /// Something that is there and is not imported.

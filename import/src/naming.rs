@@ -1,7 +1,7 @@
 //! What the names of columns say: which of them belong together, and which quantity they may be.
 
 use crate::log::Table;
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 /// Columns of one quantity: `q[0]` to `q[6]`, `joint1_pos` to `joint6_pos`.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -12,6 +12,8 @@ pub(crate) struct Group {
     pub(crate) labels: Vec<String>,
     /// Their names.
     pub(crate) names: Vec<String>,
+    /// Their places in the table.
+    pub(crate) at: Vec<usize>,
 }
 
 /// A quantity of a joint or of an object.
@@ -32,34 +34,48 @@ pub(crate) struct Role {
     pub(crate) score: u32,
 }
 
-const VELOCITY: [&str; 9] = ["dq", "vel", "velocity", "velocities", "speed", "speeds", "qvel", "qdot", "vels"];
-const TORQUE: [&str; 8] = ["tau", "effort", "efforts", "torque", "torques", "trq", "qfrc", "load"];
-const POSITION: [&str; 14] = [
+const VELOCITY: [&str; 10] = ["dq", "vel", "velocity", "velocities", "speed", "speeds", "qvel", "qdot", "qd", "vels"];
+const TORQUE: [&str; 10] =
+    ["tau", "effort", "efforts", "torque", "torques", "trq", "qfrc", "load", "moment", "moments"];
+/// With what is short for a joint or an axis in the logs of industrial arms.
+const POSITION: [&str; 24] = [
     "q",
     "pos",
     "position",
     "positions",
     "qpos",
+    "jpos",
+    "posn",
+    "psn",
     "angle",
     "angles",
+    "ang",
     "theta",
     "joint",
     "joints",
+    "jnt",
+    "jt",
+    "j",
+    "axis",
+    "axes",
+    "ax",
     "state",
     "action",
     "dof",
     "actions",
 ];
-const DESIRED: [&str; 17] = [
+const DESIRED: [&str; 23] = [
     "d",
     "des",
     "desired",
     "cmd",
+    "cmnd",
     "command",
     "commands",
     "commanded",
     "target",
     "targets",
+    "tgt",
     "goal",
     "ref",
     "reference",
@@ -67,10 +83,22 @@ const DESIRED: [&str; 17] = [
     "actions",
     "control",
     "setpoint",
+    "setpoints",
+    "soll",
+    "planned",
+    "nominal",
     "leader",
 ];
-/// Columns of these words are something else: external torques, tool poses, errors, second derivatives.
-const OTHER: [&str; 44] = [
+/// What a measurement is called.
+const MEASURED: [&str; 11] =
+    ["measured", "meas", "msr", "actual", "actl", "act", "feedback", "fbk", "ist", "encoder", "enc"];
+/// Words of angles before the gear.
+const MOTOR: [&str; 2] = ["motor", "rotor"];
+/// Words of where a hand is, or how it is turned; a joint has no such thing.
+const POSE: [&str; 12] =
+    ["pose", "quat", "quaternion", "orientation", "rotvec", "rpy", "euler", "xyz", "translation", "ee", "eef", "tcp"];
+/// Columns of these words are something else: external torques, tool poses, errors, second derivatives, gains, sines of angles.
+const OTHER: [&str; 60] = [
     "ext",
     "hat",
     "filtered",
@@ -115,6 +143,22 @@ const OTHER: [&str; 44] = [
     "limits",
     "elbow",
     "dp",
+    "sin",
+    "cos",
+    "sine",
+    "cosine",
+    "stiffness",
+    "damping",
+    "gain",
+    "gains",
+    "kp",
+    "kd",
+    "ki",
+    "impedance",
+    "inertia",
+    "gravity",
+    "coriolis",
+    "friction",
 ];
 /// Words at the end of a name that say what the joint before them did.
 const ENDINGS: [&str; 14] = [
@@ -177,18 +221,19 @@ pub(crate) fn may_serve(name: &str) -> bool {
 pub(crate) fn groups(table: &Table) -> Vec<Group> {
     let mut groups: Vec<Group> = Vec::new();
     let mut first: HashMap<String, usize> = HashMap::new();
-    for column in &table.columns {
+    for (at, column) in table.columns.iter().enumerate() {
         let (base, label) = split(&column.name);
         // Without a label a column stands by itself.
         let known = first.get(&base).filter(|_| !label.is_empty());
-        match known.and_then(|at| groups.get_mut(*at)) {
+        match known.and_then(|group| groups.get_mut(*group)) {
             Some(group) => {
                 group.labels.push(label);
                 group.names.push(column.name.clone());
+                group.at.push(at);
             }
             None => {
                 first.entry(base.clone()).or_insert(groups.len());
-                groups.push(Group { base, labels: vec![label], names: vec![column.name.clone()] });
+                groups.push(Group { base, labels: vec![label], names: vec![column.name.clone()], at: vec![at] });
             }
         }
     }
@@ -204,7 +249,7 @@ pub(crate) fn role(table: &str, group: &Group) -> Option<Role> {
     let around = words(table);
     // A coordinate in space is no joint's.
     let space = ["x", "y", "z", "w", "qx", "qy", "qz", "qw"];
-    if own.iter().any(|word| word == "pose") || own.last().is_some_and(|word| space.contains(&word.as_str())) {
+    if is_pose(&group.base) || own.last().is_some_and(|word| space.contains(&word.as_str())) {
         return None;
     }
     let has = |words: &[String], list: &[&str]| words.iter().any(|word| list.contains(&word.as_str()));
@@ -226,10 +271,37 @@ pub(crate) fn role(table: &str, group: &Group) -> Option<Role> {
         "q" | "dq" | "tau_J" | "q_d" | "dq_d" | "tau_J_d"
     ));
     score += 2 * u32::from(has(&around, &["measured", "desired"]));
+    score += u32::from(has(&own, &MEASURED));
     score += u32::from(own.iter().any(|word| word == "state") || has(&around, &["state", "states"]));
     score +=
         u32::from(matches!(group.base.as_str(), "position" | "velocity" | "effort" | "observation.state" | "action"));
-    Some(Role { quantity, desired, score })
+    Some(Role { quantity, desired, score: score.saturating_sub(u32::from(has(&own, &MOTOR))) })
+}
+
+/// Whether a name says where a hand is, or how it is turned.
+pub(crate) fn is_pose(base: &str) -> bool {
+    words(base).iter().any(|word| POSE.contains(&word.as_str()))
+}
+
+/// Whether the labels of a group are those of a pose: `x, y, z, roll, pitch, yaw`, alone or behind one name, and not joints that
+/// are called `wrist_roll` or `shoulder_pitch`.
+pub(crate) fn are_pose(labels: &[String]) -> bool {
+    let parts: Vec<(String, String)> = labels
+        .iter()
+        .filter_map(|label| words(label).split_last().map(|(last, before)| (before.join(" "), last.clone())))
+        .collect();
+    let together = |words: [&str; 3], alone: bool| {
+        let of = |word: &str| -> HashSet<&String> {
+            parts.iter().filter(|(_, last)| last == word).map(|(before, _)| before).collect()
+        };
+        let all = words.map(of);
+        all[0].iter().any(|before| all.iter().all(|there| there.contains(before)) && !(alone && !before.is_empty()))
+    };
+    together(["x", "y", "z"], false)
+        || together(["rx", "ry", "rz"], false)
+        || together(["roll", "pitch", "yaw"], true)
+        || together(["qx", "qy", "qz"], false)
+        || labels.iter().filter(|label| is_pose(label)).count() > 2
 }
 
 /// Whether a column of this name counts time.
@@ -258,7 +330,7 @@ mod tests {
 
     fn role_of(table: &str, name: &str) -> Option<(Quantity, bool)> {
         let (base, label) = split(name);
-        let group = Group { base, labels: vec![label], names: vec![name.to_owned()] };
+        let group = Group { base, labels: vec![label], names: vec![name.to_owned()], at: vec![0] };
         role(table, &group).map(|role| (role.quantity, role.desired))
     }
 
@@ -288,6 +360,13 @@ mod tests {
             ("rows", "O_T_EE[2]", None),
             ("/object/pose", "pose.position.z", None),
             ("rows", "object_pos_x", None),
+            ("rows", "actual_qd_3", Some((Velocity, false))),
+            ("rows", "target_moment_3", Some((Torque, true))),
+            ("rows", "Jnt3PosActl", Some((Position, false))),
+            ("rows", "field.position3", Some((Position, false))),
+            ("rows", "obs.robot0_joint_pos_sin[3]", None),
+            ("rows", "obs.robot0_eef_quat[3]", None),
+            ("rows", "joint_stiffness[3]", None),
             ("rows", "temperature1", None),
             ("rows", "time", None),
         ] {
@@ -306,6 +385,24 @@ mod tests {
             (found[1].labels.clone(), found[1].names.clone()),
             (vec!["j1".into(), "j2".into()], vec!["j1_pos".into(), "j2_pos".into()])
         );
+    }
+
+    #[test]
+    fn the_pose_of_a_hand_is_no_joints() {
+        let labels = |list: &str| list.split(' ').map(str::to_owned).collect::<Vec<_>>();
+        for (list, expected) in [
+            ("x y z roll pitch yaw gripper", true),
+            ("x y z rx ry rz", true),
+            ("eef_x eef_y eef_z eef_roll eef_pitch eef_yaw", true),
+            ("hand.position.x hand.position.y hand.position.z", true),
+            ("roll pitch yaw", true),
+            ("x y z axis_angle1 axis_angle2 axis_angle3", true),
+            ("shoulder_pan shoulder_lift elbow_flex wrist_flex wrist_roll", false),
+            ("shoulder_pitch shoulder_roll shoulder_yaw elbow_pitch wrist_yaw", false),
+            ("0 1 2", false),
+        ] {
+            assert_eq!(are_pose(&labels(list)), expected, "{list}");
+        }
     }
 
     #[test]

@@ -6,18 +6,22 @@ use crate::clip;
 use crate::error::ImportError;
 use crate::log::{LeftOut, Log};
 use crate::mapping::{Mapping, Note, to_toml};
+use crate::pieces;
 use crate::propose::{Proposal, propose};
+use crate::runs;
 use crate::sources::{self, Source};
 use serde::Serialize;
 use shared_mem::cell::{Cell, ClipEntry, ClipKind};
 use shared_mem::output::{Destination, OutputFolder};
-use shared_mem::recording::{read_clip, session_folder, write_clip};
+use shared_mem::recording::{Clip, read_clip, session_folder, write_clip};
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
 /// Names in the session.
 const CELL_TOML: &str = "cell.toml";
 const IMPORT_TOML: &str = "import.toml";
+/// So many logs are clips enough as they are: a diagnosis splits eight.
+const ENOUGH_LOGS: usize = 9;
 const PROGRAM: &str = concat!("twinalign ", env!("CARGO_PKG_VERSION"), ", import");
 
 /// What is to be imported.
@@ -97,9 +101,12 @@ pub fn import(order: Order<'_>, mut told: impl FnMut(&Imported, (u64, u64))) -> 
         None => {
             let (number, logs) = largest(&found)?;
             let log = longest(&logs, found[number].path())?;
-            let Proposal { mapping, notes } = proposal(log, given.as_ref(), order.arms)?;
+            let Proposal { mut mapping, mut notes } = proposal(log, given.as_ref(), order.arms)?;
             if mapping.clone().completed().open_line().is_some() {
                 return open(order, log, &mapping, notes);
+            }
+            if found.len() + logs.len() < ENOUGH_LOGS {
+                cut(log, &mut mapping, &mut notes);
             }
             first = Some((number, logs));
             (mapping, notes)
@@ -123,13 +130,14 @@ pub fn import(order: Order<'_>, mut told: impl FnMut(&Imported, (u64, u64))) -> 
             Some((read, logs)) if read == number => logs,
             other => {
                 first = other;
-                source.read()?
+                runs::apart(source.read()?)
             }
         };
         for log in &logs {
-            let imported = writing.clip(log)?;
-            told(&imported, (number as u64 + 1, all));
-            clips.push(imported);
+            for imported in writing.clips(log)? {
+                told(&imported, (number as u64 + 1, all));
+                clips.push(imported);
+            }
         }
     }
     writing.finish(order, &notes)?;
@@ -151,7 +159,7 @@ fn given_mapping(path: &Path) -> Result<Mapping, ImportError> {
 fn largest(found: &[Source]) -> Result<(usize, Vec<Log>), ImportError> {
     let bytes = found.iter().map(Source::bytes).collect::<Result<Vec<_>, _>>()?;
     let number = (0..found.len()).max_by_key(|number| (bytes[*number], std::cmp::Reverse(*number))).unwrap_or(0);
-    Ok((number, found[number].read()?))
+    Ok((number, runs::apart(found[number].read()?)))
 }
 
 pub(crate) fn longest<'a>(logs: &'a [Log], path: &Path) -> Result<&'a Log, ImportError> {
@@ -165,30 +173,39 @@ pub(crate) fn longest<'a>(logs: &'a [Log], path: &Path) -> Result<&'a Log, Impor
     })
 }
 
+/// Proposes how the log is cut into clips.
+fn cut(log: &Log, mapping: &mut Mapping, notes: &mut Vec<Note>) {
+    let long = clip::clip(log, mapping, None).ok().as_ref().and_then(pieces::propose);
+    if let Some((pieces, why)) = long {
+        mapping.pieces = pieces;
+        notes.push(Note { line: "pieces".into(), why, open: false, instead: vec!["pieces = \"whole\"".into()] });
+    }
+}
+
 /// The mapping by what is known of the arm: the one that was given, the log's own, or the one that its joints' names tell.
 fn proposal(log: &Log, given: Option<&Cell>, arms: Arms<'_>) -> Result<Proposal, ImportError> {
     let failed = |what: String| ImportError::log(&log.file, what);
     if let Some(cell) = given {
         let named = || cell.robot.as_ref().map_or_else(Vec::new, |robot| robot.joints.clone());
         let wanted = arms(cell, None).map_err(failed)?.map_or_else(named, |arm| arm.joints);
-        return Ok(propose(log, (given, &wanted), &|_| arms(cell, None).ok()??.gravity));
+        return propose(log, (given, &wanted), &|_| arms(cell, None).ok()??.gravity).map_err(failed);
     }
     let by_name = |joints: &[String]| {
         let cell = Cell::parse(&cell::proposed(log, joints, None), Path::new(CELL_TOML)).ok()?;
         arms(&cell, None).ok()??.gravity
     };
-    let plain = propose(log, (None, &[]), &by_name);
+    let plain = propose(log, (None, &[]), &by_name).map_err(failed)?;
     let (mut proposal, why) = match described(log, &plain.mapping.joints, arms) {
         Ok(None) => return Ok(plain),
         Ok(Some((text, Arm { joints, held, rotors, .. }))) => {
             let gravity = |_: &[String]| arms(&Cell::default(), Some(&text)).ok()??.gravity;
             let held = if held.is_empty() { String::new() } else { format!("; held where they are: {held}") };
             let rotors = rotors.map_or_else(String::new, |rotors| format!("; {}", cell::stand_in(&rotors)));
-            (propose(log, (None, &joints), &gravity), format!("the log's robot_description{held}{rotors}"))
+            (propose(log, (None, &joints), &gravity).map_err(failed)?, format!("the log's robot_description{held}{rotors}"))
         }
         Err(what) => (plain, format!("the log's robot_description is not used: {what}")),
     };
-    proposal.notes.insert(0, Note { line: "robot".into(), why, open: false });
+    proposal.notes.insert(0, Note { line: "robot".into(), why, open: false, instead: Vec::new() });
     Ok(proposal)
 }
 
@@ -229,8 +246,27 @@ struct About {
     log: Log,
 }
 
+impl About {
+    /// Whether the mapping's joints are as many as the arm's; a sentence where they are not.
+    fn fits(&self, mapping: &Mapping) -> Result<(), String> {
+        let named = self.cell.robot.as_ref().map_or(&[][..], |robot| &robot.joints);
+        let joints = self.arm.as_ref().map_or(named, |arm| &arm.joints);
+        if mapping.measured.is_none() || joints.is_empty() || joints.len() == mapping.joints.len() {
+            return Ok(());
+        }
+        Err(format!(
+            "gives {} joints ({}), the arm of the cell has {} ({}): give the cell of the arm that was logged, or list that arm's joints in import.toml",
+            mapping.joints.len(),
+            mapping.joints.join(", "),
+            joints.len(),
+            joints.join(", ")
+        ))
+    }
+}
+
 impl Writing<'_> {
-    fn clip(&mut self, log: &Log) -> Result<Imported, ImportError> {
+    /// The clips of a log.
+    fn clips(&mut self, log: &Log) -> Result<Vec<Imported>, ImportError> {
         let failed = |what: String| ImportError::log(&log.file, what);
         if self.about.is_none() {
             let about = self.about(log)?;
@@ -238,13 +274,29 @@ impl Writing<'_> {
                 let what = "holds poses of an object that no cell.toml describes; give one with an `[object]` block: --cell cell.toml";
                 return Err(failed(what.into()));
             }
+            about.fits(self.mapping).map_err(failed)?;
             self.about = Some(about);
         }
-        let name = self.name(&log.name);
-        let Some(About { cell, arm, .. }) = &self.about else { return Err(failed("holds nothing".into())) };
-        let gravity = arm.as_ref().and_then(|arm| arm.gravity.as_ref());
+        let gravity = self.about.as_ref().and_then(|about| about.arm.as_ref()?.gravity.as_ref());
         let clip = clip::clip(log, self.mapping, gravity).map_err(failed)?;
-        let file = PathBuf::from(format!("{name}.mcap"));
+        let pieces = pieces::cut(clip, self.mapping.pieces);
+        let count = pieces.len();
+        let mut imported = Vec::new();
+        for (number, piece) in pieces.into_iter().enumerate() {
+            let name = if count > 1 { format!("{}_{:02}", log.name, number + 1) } else { log.name.clone() };
+            imported.push(self.clip(piece, &name, log)?);
+        }
+        // Said once of a log.
+        for later in imported.iter_mut().skip(1) {
+            later.left_out.clear();
+        }
+        Ok(imported)
+    }
+
+    fn clip(&mut self, clip: Clip, name: &str, log: &Log) -> Result<Imported, ImportError> {
+        let failed = |what: String| ImportError::log(&log.file, what);
+        let file = PathBuf::from(format!("{}.mcap", self.name(name)));
+        let Some(About { cell, arm, .. }) = &self.about else { return Err(failed("holds nothing".into())) };
         let output = self.folder.file(&file)?;
         let place = output.unfinished_path().to_owned();
         let robot = arm.as_ref().and_then(|arm| arm.shown.as_ref());

@@ -91,6 +91,10 @@ impl ReplayArm {
         model: &ArmModel,
     ) -> Result<(Self, Consumer<Sighting>, ReplayClock), ReadError> {
         let clip = read_clip(path, ClipKind::Excitation, cell)?.reorder(model.joint_names())?;
+        if clip.desired.is_empty() {
+            let what = "nobody logged commands, and an arm that is replayed reports what it was commanded; replay a clip that holds them";
+            return Err(ReadError::Content { path: path.to_owned(), topic: ArmCommand::TOPIC.to_owned(), what: what.to_owned() });
+        }
         for warning in clip.warnings.iter().chain(&clip.damage) {
             tracing::warn!("{}: {warning}", path.display());
         }

@@ -19,9 +19,10 @@ use twin::description::{shown_robot, shown_urdf};
 Reads ROS 2 bags (mcap and sqlite3, files or folders), ROS 1 bags, LeRobot data sets (v2 and v3), CSV and TSV with a line of
 names, npz, logs of libfranka and folders of SAGE; of a folder, all of these in it. Which columns are q, dq and tau, their
 units, the order and sign of the joints, the clock and which torque it is, is proposed from names and numbers and said with
-the reason. It stands in import.toml of the new session, to be changed and given back with --mapping. What cannot be known
-is asked once: import.toml is written here with the open lines marked. Pictures are not imported. A damaged log is refused,
-and then nothing is written.
+the reason and with what else there was (--explain: with the line that takes it). It stands in import.toml of the new
+session, to be changed and given back with --mapping. What cannot be known is asked once: import.toml is written here with
+the open lines marked. A log without commands becomes clips without commands; one long log of many motions is cut where it
+rests. Pictures are not imported. A damaged log is refused, and then nothing is written.
 
 Examples:
   calibration import last_week --out session          # every log in the folder
@@ -33,7 +34,7 @@ Examples:
 Then: `twin replay session`, `calibration identify arm session`, `calibration diagnose session`.
 
 JSON: clips [{file, source, format, measured, desired, poses, left_out [{what, why, count}], warnings}], notes [{line, why,
-open}].")]
+open, instead [line]}].")]
 pub(super) struct ImportArguments {
     /// Logs, or folders of logs.
     #[arg(value_name = "FILES", required = true)]
@@ -50,6 +51,9 @@ pub(super) struct ImportArguments {
     /// Replaces a session that is there already, and an import.toml with open lines.
     #[arg(long)]
     force: bool,
+    /// Shows for each choice the lines of import.toml that would say otherwise.
+    #[arg(long)]
+    explain: bool,
     /// Prints one JSON object on stdout at the end.
     #[arg(long)]
     json: bool,
@@ -62,7 +66,7 @@ struct Answer {
 }
 
 pub(super) fn run(arguments: &ImportArguments) -> anyhow::Result<()> {
-    let ImportArguments { files, out, mapping, cell, force, json } = arguments;
+    let ImportArguments { files, out, mapping, cell, force, explain, json } = arguments;
     let command = |mapping: &Path| command(arguments, mapping);
     let order = Order {
         files,
@@ -83,7 +87,7 @@ pub(super) fn run(arguments: &ImportArguments) -> anyhow::Result<()> {
     match outcome {
         Outcome::Open { file, notes } => {
             let (open, known): (Vec<&Note>, Vec<&Note>) = notes.iter().partition(|note| note.open);
-            known.iter().chain(&open).for_each(|note| console::line(format_args!("{}: {}", note.line, note.why)));
+            known.iter().chain(&open).for_each(|note| reason(note, *explain));
             let lines: Vec<&str> = open.iter().map(|note| note.line.as_str()).collect();
             let file = file.as_path();
             anyhow::bail!(
@@ -94,11 +98,19 @@ pub(super) fn run(arguments: &ImportArguments) -> anyhow::Result<()> {
             );
         }
         Outcome::Done { clips, notes } => {
-            notes.iter().for_each(|note| console::line(format_args!("{}: {}", note.line, note.why)));
+            notes.iter().for_each(|note| reason(note, *explain));
             let noun = if clips.len() == 1 { "clip" } else { "clips" };
             let words = format!("{} {noun} in {}", clips.len(), out.display());
             print(*json, &Answer { clips, notes }, words)
         }
+    }
+}
+
+/// Why a line is as it is; `explain`: and what would say otherwise.
+fn reason(note: &Note, explain: bool) {
+    console::line(format_args!("{}: {}", note.line, note.why));
+    for instead in note.instead.iter().filter(|_| explain) {
+        console::line(format_args!("  instead: {instead}"));
     }
 }
 

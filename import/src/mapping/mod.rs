@@ -1,11 +1,13 @@
 //! `import.toml`: which columns of a log are which quantity, in which unit and by which clock. Proposed from the log, written
 //! with the reasons, and final once it is given.
 
+mod factor;
 mod text;
 mod units;
 
+pub use factor::Factor;
 pub use text::Note;
-pub(crate) use text::to_toml;
+pub(crate) use text::{instead, to_toml};
 pub use units::{AngleUnit, LengthUnit, RateUnit, TimeUnit, Torque, TorquesAct};
 
 use serde::{Deserialize, Serialize};
@@ -13,12 +15,28 @@ use shared_mem::cell::ClipKind;
 use shared_mem::toml_file::{self, TomlFileError};
 use std::path::Path;
 
+/// How a log becomes clips.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Pieces {
+    /// One clip.
+    #[default]
+    Whole,
+    /// A clip of each motion, cut where the commands rest, or the joints where there are no commands.
+    AtRests,
+    /// Clips of equal length.
+    Equal,
+}
+
 /// What the columns of a log are.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Mapping {
     /// What was done in the clips.
     pub kind: ClipKind,
+    /// How the log becomes clips.
+    #[serde(default)]
+    pub pieces: Pieces,
     /// Joint names, in the order of the columns below. Empty where no arm was recorded.
     #[serde(default)]
     pub joints: Vec<String>,
@@ -89,7 +107,10 @@ block! {
         /// Their unit.
         #[serde(default)]
         pub q_unit: AngleUnit,
-        /// 1 or -1 a joint; empty: all 1.
+        /// What the positions are multiplied with, beside their unit.
+        #[serde(default, skip_serializing_if = "Factor::is_one")]
+        pub q_factor: Factor,
+        /// 1 or -1 a joint, for positions, velocities and torques alike; empty: all 1.
         #[serde(default, skip_serializing_if = "Vec::is_empty")]
         pub sign: Vec<f64>,
         /// Columns of the velocities; empty: none.
@@ -98,9 +119,16 @@ block! {
         /// Their unit.
         #[serde(default)]
         pub dq_unit: RateUnit,
+        /// What the velocities are multiplied with, beside their unit.
+        #[serde(default, skip_serializing_if = "Factor::is_one")]
+        pub dq_factor: Factor,
         /// Columns of the torques [N m]; empty: none.
         #[serde(default, skip_serializing_if = "Vec::is_empty")]
         pub tau: Vec<String>,
+        /// What the torques are multiplied with: the constant of a motor whose current was logged, -1 for a joint that counts them
+        /// the other way round.
+        #[serde(default, skip_serializing_if = "Factor::is_one")]
+        pub tau_factor: Factor,
         /// Which torque it is.
         #[serde(default)]
         pub torque: Torque,
@@ -157,7 +185,7 @@ impl Mapping {
         let lacks_clock = |c: &JointColumns| c.stamps.is_none() && c.rate.is_none_or(|rate| rate <= 0.0);
         if measured.is_some_and(|m| m.q.is_empty()) {
             Some("[measured] q")
-        } else if measured.is_some() && desired.is_none_or(|d| d.q.is_empty()) {
+        } else if desired.is_some_and(|d| d.q.is_empty()) {
             Some("[desired] q")
         } else if measured.is_some_and(lacks_clock) {
             Some("[measured] rate")

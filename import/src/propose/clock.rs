@@ -25,6 +25,9 @@ pub(super) struct Clock {
 
 pub(super) fn choose(log: &Log, table: &Table, block: &str, notes: &mut Notes) -> Clock {
     if table.stamps_ns.is_some() {
+        if let Some(why) = &log.facts.two_columns {
+            notes.why(&format!("{block}.stamps"), why.clone());
+        }
         if let Some(rate) = log.facts.rate {
             notes.why(&format!("{block}.stamps"), format!("the data set says {rate} rows a second"));
         }
@@ -52,7 +55,9 @@ fn column(table: &Table) -> Option<&Column> {
         values.len() > 1 && values.windows(2).filter(|w| w[1] > w[0]).count() * 10 >= 9 * (values.len() - 1)
     };
     let named = table.columns.iter().filter(|column| naming::is_time(&column.name) && rises(&column.values));
-    named.min_by_key(|column| naming::words(&column.name).len())
+    // When it was measured counts, and not when it was written down.
+    let is_header = |name: &str| naming::words(name).windows(2).any(|pair| pair == ["header", "stamp"]);
+    named.min_by_key(|column| (!is_header(&column.name), naming::words(&column.name).len()))
 }
 
 fn unit(log: &Log, name: &str, values: &[f64]) -> (TimeUnit, String) {

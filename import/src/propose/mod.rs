@@ -3,7 +3,13 @@
 //!
 //! | file | owns |
 //! |---|---|
-//! | `columns` | which columns are which quantity, by their names |
+//! | `columns` | which columns are which quantity |
+//! | `candidates` | groups of columns that may be a quantity of joints |
+//! | `shape` | what columns of numbers are by themselves: one number over and over, sines, a quaternion |
+//! | `follow` | what two groups say about each other: slopes, and joints that go where commands say |
+//! | `judged` | groups of positions with what speaks for them |
+//! | `measured`, `commands` | which of them is what the arm did, and what it was told |
+//! | `members` | which columns of a group are the arm's joints, and in which order |
 //! | `object` | which columns are the object's pose |
 //! | `clock` | stamps and their unit |
 //! | `track` | numbers over time, for what follows |
@@ -12,18 +18,25 @@
 //! | `lag` | how far the arm lags behind its commands |
 //! | `torque` | whether torques hold gravity |
 
+mod candidates;
 mod clock;
 mod columns;
+mod commands;
+mod follow;
+mod judged;
 mod lag;
+mod measured;
+mod members;
 mod object;
 mod order;
+mod shape;
 mod torque;
 mod track;
 mod units;
 
 use crate::clip::Gravity;
 use crate::log::{HEADER, Log, Table};
-use crate::mapping::{JointColumns, Mapping, Note, RateUnit, TorquesAct};
+use crate::mapping::{JointColumns, Mapping, Note, Pieces, RateUnit, TorquesAct};
 use columns::Chosen;
 use shared_mem::cell::{Cell, ClipKind};
 use track::Track;
@@ -41,34 +54,58 @@ struct Notes(Vec<Note>);
 
 impl Notes {
     fn why(&mut self, line: &str, why: impl Into<String>) {
-        self.0.push(Note { line: line.to_owned(), why: why.into(), open: false });
+        self.chosen(line, why, Vec::new());
     }
 
     fn open(&mut self, line: &str, question: impl Into<String>) {
-        self.0.push(Note { line: line.to_owned(), why: question.into(), open: true });
+        self.ask(line, question, Vec::new());
+    }
+
+    /// A reason, with the lines that would say otherwise.
+    fn chosen(&mut self, line: &str, why: impl Into<String>, instead: Vec<String>) {
+        self.0.push(Note { line: line.to_owned(), why: why.into(), open: false, instead });
+    }
+
+    /// A question, with the lines that may answer it.
+    fn ask(&mut self, line: &str, question: impl Into<String>, instead: Vec<String>) {
+        self.0.push(Note { line: line.to_owned(), why: question.into(), open: true, instead });
     }
 }
 
 /// Proposes what the columns of `log` are. `cell`: what the laboratory knows, where it was given; `wanted`: the arm's joints from base
 /// to flange, where they are known; `gravity`: the nominal model's, of the joints that were found.
+///
+/// # Errors
+/// A sentence where the log is one of another arm.
 pub(crate) fn propose(
     log: &Log,
     (cell, wanted): (Option<&Cell>, &[String]),
     gravity: &dyn Fn(&[String]) -> Option<Gravity>,
-) -> Proposal {
+) -> Result<Proposal, String> {
     let mut notes = Notes::default();
-    let chosen = columns::choose(log, wanted, &mut notes);
-    let object = object::choose(log, &mut notes);
-    let mut mapping =
-        Mapping { kind: ClipKind::Excitation, joints: chosen.joints.clone(), measured: None, desired: None, object };
-    if chosen.measured.is_none() && chosen.desired.is_none() && mapping.object.is_some() {
-        mapping.kind = ClipKind::FreeMotion;
-        notes.why("kind", "the log holds poses of an object and no joints");
-        return Proposal { mapping, notes: notes.0 };
+    if let Some(runs) = &log.facts.runs {
+        notes.why("log", runs.clone());
     }
+    let (mut of_joints, mut of_object) = (Notes::default(), Notes::default());
+    let chosen = columns::choose(log, wanted, &mut of_joints)?;
+    let mut mapping = Mapping {
+        kind: ClipKind::Excitation,
+        pieces: Pieces::Whole,
+        joints: chosen.joints.clone(),
+        measured: None,
+        desired: None,
+        object: object::choose(log, &mut of_object),
+    };
+    if chosen.measured.is_none() && chosen.asked.is_none() && mapping.object.is_some() {
+        mapping.kind = ClipKind::FreeMotion;
+        notes.0.extend(of_object.0);
+        notes.why("kind", "the log holds poses of an object and no joints");
+        return Ok(Proposal { mapping, notes: notes.0 });
+    }
+    notes.0.extend(of_joints.0.into_iter().chain(of_object.0));
     kind(&mut mapping, cell, &mut notes);
     joints(log, &chosen, (&mut mapping, gravity), &mut notes);
-    Proposal { mapping, notes: notes.0 }
+    Ok(Proposal { mapping, notes: notes.0 })
 }
 
 fn kind(mapping: &mut Mapping, cell: Option<&Cell>, notes: &mut Notes) {
@@ -91,23 +128,35 @@ type Model<'a> = &'a dyn Fn(&[String]) -> Option<Gravity>;
 
 /// The two blocks of joints, with everything that their numbers tell.
 fn joints(log: &Log, chosen: &Chosen, (mapping, gravity): (&mut Mapping, Model<'_>), notes: &mut Notes) {
-    let mut measured = block(log, "measured", chosen.measured.as_ref(), notes);
-    let mut desired = block(log, "desired", chosen.desired.as_ref(), notes);
-    for columns in [&mut measured, &mut desired] {
+    let mut measured = block(log, "measured", (chosen.measured.as_ref(), chosen.asked.as_deref()), notes);
+    let mut desired = (chosen.desired.is_some() || chosen.commands_are_open).then(|| {
+        if chosen.measured.is_none() {
+            notes.open(
+                "desired.q",
+                "which columns are the commanded positions? Take the block out where there are none",
+            );
+        }
+        block(log, "desired", (chosen.desired.as_ref(), Some(&measured.table)), notes)
+    });
+    for columns in std::iter::once(&mut measured).chain(&mut desired) {
         columns.torques_act =
             if log.facts.torques_end_at_rows { TorquesAct::UntilStamp } else { TorquesAct::FromStamp };
     }
     let track = |columns: &JointColumns| -> Option<Track> { Track::of(log.table(&columns.table)?, columns) };
     if let Some(rows) = track(&measured) {
-        let told = track(&desired);
-        units::angles(&rows, told.as_ref(), (&mut measured, &mut desired), notes);
-        if chosen.order_is_open
-            && let (Some(did), Some(told)) = (track(&measured), track(&desired))
-        {
-            order::match_up(&did, &told, &mut desired, notes);
-        }
-        if let (Some(did), Some(told)) = (track(&measured), track(&desired)) {
-            lag::look(&did, &told, &mut desired, notes);
+        units::measured(&rows, &mut measured, notes);
+        if let Some(desired) = &mut desired {
+            if let Some(told) = track(desired) {
+                units::desired((&rows, &told), chosen.commands_factor, (&mut measured, desired), notes);
+            }
+            if chosen.order_is_open
+                && let (Some(did), Some(told)) = (track(&measured), track(desired))
+            {
+                order::match_up(&did, &told, desired, notes);
+            }
+            if let (Some(did), Some(told)) = (track(&measured), track(desired)) {
+                lag::look(&did, &told, desired, notes);
+            }
         }
         leave_out_placeholders(log, (&mut measured, &mut desired), notes);
         if !measured.tau.is_empty()
@@ -116,14 +165,22 @@ fn joints(log: &Log, chosen: &Chosen, (mapping, gravity): (&mut Mapping, Model<'
             torque::which(log, &did, (&mut measured, gravity(&mapping.joints)), notes);
         }
     }
-    if !desired.tau.is_empty() {
-        torque::desired(log, &mut desired, notes);
-    }
-    for (name, columns) in [("measured", &mut measured), ("desired", &mut desired)] {
-        velocities(log, name, columns, notes);
+    velocities(log, "measured", &mut measured, notes);
+    match &mut desired {
+        Some(desired) => {
+            if !desired.tau.is_empty() {
+                torque::desired(log, desired, notes);
+            }
+            velocities(log, "desired", desired, notes);
+        }
+        None => notes.why(
+            "desired",
+            "no column is a command by its name or its numbers: the clips hold none, and `calibration diagnose --torques` is what \
+             explains them, where torques were logged",
+        ),
     }
     mapping.measured = Some(measured);
-    mapping.desired = Some(desired);
+    mapping.desired = desired;
 }
 
 /// Torques that nobody measured are none, whatever gravity shows in them.
@@ -145,29 +202,27 @@ fn velocities(log: &Log, name: &str, columns: &mut JointColumns, notes: &mut Not
     }
 }
 
-/// A block as the names and the format tell it.
-fn block(log: &Log, name: &str, chosen: Option<&columns::Block>, notes: &mut Notes) -> JointColumns {
-    let Some(chosen) = chosen else {
-        let table = log.tables.first().map_or_else(String::new, |table| table.name.clone());
-        let what = if name == "measured" { "measured positions" } else { "commanded positions" };
-        notes.open(
-            &format!("{name}.q"),
-            format!("which columns are the {what}? One name a joint, of those at the end of this file"),
-        );
-        let mut columns = JointColumns { table, ..JointColumns::default() };
-        if let Some(table) = log.table(&columns.table) {
-            set_clock(log, table, name, &mut columns, notes);
+/// A block as the names and the format tell it; where its columns are asked for, of the table that this is about.
+fn block(
+    log: &Log,
+    name: &str,
+    (chosen, asked): (Option<&columns::Block>, Option<&str>),
+    notes: &mut Notes,
+) -> JointColumns {
+    let mut columns = match chosen {
+        Some(columns::Block { table, q, dq, tau }) => JointColumns {
+            table: table.clone(),
+            q: q.clone(),
+            dq: dq.clone(),
+            tau: tau.clone(),
+            ..JointColumns::default()
+        },
+        None => {
+            let first = || log.tables.first().map_or("", |table| table.name.as_str());
+            JointColumns { table: asked.map_or_else(first, |asked| asked).to_owned(), ..JointColumns::default() }
         }
-        return columns;
     };
-    let mut columns = JointColumns {
-        table: chosen.table.clone(),
-        q: chosen.q.clone(),
-        dq: chosen.dq.clone(),
-        tau: chosen.tau.clone(),
-        ..JointColumns::default()
-    };
-    if let Some(table) = log.table(&chosen.table) {
+    if let Some(table) = log.table(&columns.table) {
         set_clock(log, table, name, &mut columns, notes);
     }
     columns

@@ -1,7 +1,7 @@
 //! Numbers of joints over time, as far as a mapping gives them so far.
 
 use crate::log::{HEADER, Table};
-use crate::mapping::JointColumns;
+use crate::mapping::{Factor, JointColumns};
 use shared_mem::time::seconds_between;
 
 /// Rows that are looked at: evenly taken ones of a longer log would hide fast motion, so its first are.
@@ -35,14 +35,15 @@ impl Track {
             (None, None) => return None,
         };
         let sign = |i: usize| columns.sign.get(i).copied().unwrap_or(1.0);
-        let pick = |names: &[String], factor: f64| -> Option<Vec<Vec<f64>>> {
+        let pick = |names: &[String], unit: f64, factor: &Factor| -> Option<Vec<Vec<f64>>> {
             let of = |(i, name): (usize, &String)| {
-                Some(table.column(name)?.values.iter().take(rows).map(|v| v * factor * sign(i)).collect::<Vec<f64>>())
+                let factor = unit * factor.of(i) * sign(i);
+                Some(table.column(name)?.values.iter().take(rows).map(|v| v * factor).collect::<Vec<f64>>())
             };
             names.iter().enumerate().map(of).collect()
         };
-        let q = pick(&columns.q, columns.q_unit.si()).filter(|q| !q.is_empty())?;
-        let (dq, tau) = (pick(&columns.dq, 1.0)?, pick(&columns.tau, 1.0)?);
+        let q = pick(&columns.q, columns.q_unit.si(), &columns.q_factor).filter(|q| !q.is_empty())?;
+        let (dq, tau) = (pick(&columns.dq, 1.0, &columns.dq_factor)?, pick(&columns.tau, 1.0, &columns.tau_factor)?);
         // Rows of other tables' stamps, or without position, are none of this one's.
         let good: Vec<usize> = (0..t.len())
             .filter(|row| t[*row].is_finite() && q.iter().all(|column| column.get(*row).is_some_and(|v| v.is_finite())))

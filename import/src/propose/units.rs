@@ -2,7 +2,7 @@
 
 use super::Notes;
 use super::track::{Track, rms};
-use crate::mapping::{AngleUnit, JointColumns, RateUnit};
+use crate::mapping::{AngleUnit, Factor, JointColumns, RateUnit};
 use std::f64::consts::TAU;
 
 /// Beyond this a joint position is no plausible angle in radians [rad].
@@ -12,35 +12,72 @@ const IN_DEGREES: std::ops::Range<f64> = 40.0..80.0;
 /// How far a velocity may differ from the slope of its position, over all rows.
 const ALIKE: std::ops::Range<f64> = 0.75..1.33;
 
-/// Proposes the units of both positions.
-pub(super) fn angles(
-    measured: &Track,
-    desired: Option<&Track>,
-    (did, told): (&mut JointColumns, &mut JointColumns),
+/// How far joints turn at most [as logged].
+fn largest(track: &Track) -> f64 {
+    track.q.iter().flatten().filter(|v| v.is_finite()).fold(0.0, |m: f64, v| m.max(v.abs()))
+}
+
+fn by_size(value: f64) -> (AngleUnit, String) {
+    if value > LARGEST_ANGLE {
+        (AngleUnit::Degree, format!("they reach {value:.1}, and no joint turns that far in radians"))
+    } else {
+        (AngleUnit::Radian, format!("they reach {value:.2}, as joints do in radians"))
+    }
+}
+
+/// Proposes the unit of the measured positions.
+pub(super) fn measured(track: &Track, columns: &mut JointColumns, notes: &mut Notes) {
+    let (unit, why) = by_size(largest(track));
+    columns.q_unit = unit;
+    notes.why("measured.q_unit", why);
+}
+
+/// Proposes the unit of the commanded positions. `factor`: positions are so many times the commands, as both are logged, where
+/// their numbers tell.
+pub(super) fn desired(
+    (did, told): (&Track, &Track),
+    factor: Option<f64>,
+    (measured, desired): (&mut JointColumns, &mut JointColumns),
     notes: &mut Notes,
 ) {
-    let largest = |track: &Track| track.q.iter().flatten().fold(0.0, |m: f64, v| m.max(v.abs()));
-    let (m, d) = (largest(measured), desired.map(largest));
-    let by_size = |value: f64| {
-        if value > LARGEST_ANGLE {
-            (AngleUnit::Degree, format!("they reach {value:.1}, and no joint turns that far in radians"))
+    let line = "desired.q_unit";
+    let (unit, why) = by_size(largest(told));
+    desired.q_unit = unit;
+    let ratio = rms(told.q.iter().flatten()) / rms(did.q.iter().flatten());
+    let Some(factor) = factor else {
+        // A motion too small to tell is told by the other's.
+        if measured.q_unit != unit && !IN_DEGREES.contains(&ratio) && !IN_DEGREES.contains(&ratio.recip()) {
+            (measured.q_unit, desired.q_unit) = (AngleUnit::Degree, AngleUnit::Degree);
+            notes.why(line, format!("they are {ratio:.2} times the measured positions: one unit for both"));
         } else {
-            (AngleUnit::Radian, format!("they reach {value:.2}, as joints do in radians"))
+            notes.why(line, why);
         }
+        return;
     };
-    let (unit, why) = by_size(m);
-    did.q_unit = unit;
-    notes.why("measured.q_unit", why);
-    let Some(d) = d else { return };
-    let (unit, why) = by_size(d);
-    told.q_unit = unit;
-    // A motion too small to tell is told by the other's.
-    let ratio = desired.map_or(1.0, |desired| rms(desired.q.iter().flatten()) / rms(measured.q.iter().flatten()));
-    if did.q_unit != told.q_unit && !IN_DEGREES.contains(&ratio) && !IN_DEGREES.contains(&ratio.recip()) {
-        (did.q_unit, told.q_unit) = (AngleUnit::Degree, AngleUnit::Degree);
-        notes.why("desired.q_unit", format!("they are {ratio:.2} times the measured positions: one unit for both"));
-    } else {
-        notes.why("desired.q_unit", why);
+    let times = if factor > 1.0 { "57.3 times smaller than" } else { "57.3 times as large as" };
+    match (measured.q_unit, (factor - 1.0).abs() < 1e-9) {
+        (_, true) if measured.q_unit == unit => notes.why(line, why),
+        (_, true) => {
+            (measured.q_unit, desired.q_unit) = (AngleUnit::Degree, AngleUnit::Degree);
+            notes.why(line, "they go where the measured positions go: one unit for both");
+        }
+        (AngleUnit::Radian, false) if factor < 1.0 => {
+            desired.q_unit = AngleUnit::Degree;
+            notes.why(line, format!("they are {times} the measured positions: degrees, where those are radians"));
+        }
+        (AngleUnit::Degree, false) if factor > 1.0 => {
+            desired.q_unit = AngleUnit::Radian;
+            notes.why(line, format!("they are {times} the measured positions: radians, where those are degrees"));
+        }
+        (unit, false) => {
+            desired.q_unit = unit;
+            desired.q_factor = Factor::All(factor);
+            let what = format!(
+                "the commands are {times} the measured positions, as if they had been converted once too often: they are brought to \
+                 the same unit; 1.0 takes them as they are logged"
+            );
+            notes.why("desired.q_factor", what);
+        }
     }
 }
 
@@ -85,6 +122,7 @@ pub(super) fn velocities(track: &Track, block: &str, columns: &mut JointColumns,
 
 #[cfg(test)]
 mod tests {
+    use super::super::follow::DEGREES;
     use super::*;
 
     fn track(scale: f64, rate_scale: f64) -> Track {
@@ -96,17 +134,28 @@ mod tests {
 
     #[test]
     fn degrees_are_told_by_size_and_by_the_other_topic() {
-        let units = |measured: &Track, desired: &Track| {
-            let (mut did, mut told) = (JointColumns::default(), JointColumns::default());
-            angles(measured, Some(desired), (&mut did, &mut told), &mut Notes::default());
-            (did.q_unit, told.q_unit)
+        let units = |did: &Track, told: &Track, factor: Option<f64>| {
+            let (mut own, mut other) = (JointColumns::default(), JointColumns::default());
+            measured(did, &mut own, &mut Notes::default());
+            desired((did, told), factor, (&mut own, &mut other), &mut Notes::default());
+            (own.q_unit, other.q_unit, other.q_factor.of(0))
         };
         use AngleUnit::{Degree, Radian};
-        assert_eq!(units(&track(1.0, 1.0), &track(1.0, 1.0)), (Radian, Radian));
-        assert_eq!(units(&track(57.3, 1.0), &track(57.3, 1.0)), (Degree, Degree));
-        assert_eq!(units(&track(1.0, 1.0), &track(57.3, 1.0)), (Radian, Degree));
-        // One of two topics just below the bound.
-        assert_eq!(units(&track(9.4, 1.0), &track(9.5, 1.0)), (Degree, Degree));
+        let small = DEGREES.recip();
+        for (did, told, factor, expected) in [
+            (1.0, 1.0, None, (Radian, Radian, 1.0)),
+            (57.3, 57.3, None, (Degree, Degree, 1.0)),
+            (1.0, 57.3, None, (Radian, Degree, 1.0)),
+            // One of two topics just below the bound.
+            (9.4, 9.5, None, (Degree, Degree, 1.0)),
+            (9.4, 9.5, Some(1.0), (Degree, Degree, 1.0)),
+            (0.1, 5.73, Some(small), (Radian, Degree, 1.0)),
+            (1.0, 0.0175, Some(DEGREES), (Radian, Radian, DEGREES)),
+            (57.3, 1.0, Some(DEGREES), (Degree, Radian, 1.0)),
+            (57.3, 3283.0, Some(small), (Degree, Degree, small)),
+        ] {
+            assert_eq!(units(&track(did, 1.0), &track(told, 1.0), factor), expected, "{did} {told}");
+        }
     }
 
     #[test]

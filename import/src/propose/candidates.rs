@@ -1,0 +1,167 @@
+//! Groups of columns that may be a quantity of an arm's joints; and those that may not, with the reason.
+
+use super::shape;
+use crate::log::{Log, Table};
+use crate::mapping::instead;
+use crate::naming::{self, Group, Quantity, Role};
+use std::collections::BTreeSet;
+
+/// Words of joints that are none of an arm's.
+const APART: [&str; 6] = ["finger", "gripper", "wheel", "caster", "knuckle", "mimic"];
+/// Sines are looked for among so many groups behind one: cosines stand near them.
+const NEIGHBOURS: usize = 64;
+
+/// A group of columns that may be some quantity of joints.
+#[derive(Debug, Clone)]
+pub(super) struct Candidate<'a> {
+    pub(super) table: &'a Table,
+    pub(super) group: Group,
+    pub(super) role: Role,
+}
+
+/// What a log has for an arm.
+#[derive(Debug, Default)]
+pub(super) struct Found<'a> {
+    pub(super) candidates: Vec<Candidate<'a>>,
+    /// Quantities by their name that are none, with the reason.
+    pub(super) refused: Vec<String>,
+    /// Joints that are none of an arm's.
+    pub(super) apart: Vec<String>,
+}
+
+impl Candidate<'_> {
+    pub(super) fn size(&self) -> usize {
+        self.group.names.len()
+    }
+
+    /// Labels that are joint names, and not numbers.
+    pub(super) fn joints(&self) -> Option<&[String]> {
+        let named = self.group.labels.iter().all(|label| label.parse::<u64>().is_err() && !label.is_empty());
+        named.then_some(&self.group.labels[..])
+    }
+
+    pub(super) fn is(&self, quantity: Quantity, desired: bool) -> bool {
+        self.role.quantity == quantity && self.role.desired == desired
+    }
+
+    pub(super) fn values(&self) -> Vec<&[f64]> {
+        columns(self.table, &self.group)
+    }
+
+    /// The message, or the group of an archive, that it is a part of.
+    pub(super) fn parent(&self) -> &str {
+        self.group.base.rsplit_once(['.', '/']).map_or("", |(parent, _)| parent)
+    }
+
+    /// What it is called in a sentence.
+    pub(super) fn named(&self) -> String {
+        format!("`{}` of `{}`", self.group.base, self.table.name)
+    }
+
+    /// Whether it is the same columns.
+    pub(super) fn is_same(&self, other: &Self) -> bool {
+        std::ptr::eq(self.table, other.table) && self.group.at == other.group.at
+    }
+
+    /// The names of its columns at `places`.
+    pub(super) fn pick(&self, places: &[usize]) -> Vec<String> {
+        places.iter().filter_map(|i| self.group.names.get(*i)).cloned().collect()
+    }
+
+    /// The line of import.toml that takes it, as `key`.
+    pub(super) fn line(&self, key: &str) -> String {
+        instead(&self.table.name, key, &self.group.names)
+    }
+}
+
+fn columns<'a>(table: &'a Table, group: &Group) -> Vec<&'a [f64]> {
+    group.at.iter().filter_map(|at| table.columns.get(*at)).map(|column| column.values.as_slice()).collect()
+}
+
+/// Every group that may be a quantity of joints, without fingers and wheels, unless they are `wanted`.
+pub(super) fn find<'a>(log: &'a Log, wanted: &[String]) -> Found<'a> {
+    let mut found = Found::default();
+    let mut apart = BTreeSet::new();
+    for table in log.tables.iter().filter(|table| table.rows() > 1) {
+        let groups = naming::groups(table);
+        let circles = sines(table, &groups);
+        for (number, group) in groups.into_iter().enumerate() {
+            let Some(role) = naming::role(&table.name, &group) else { continue };
+            let group = without_apart(group, wanted, &mut apart);
+            if group.names.is_empty() {
+                continue;
+            }
+            let candidate = Candidate { table, group, role };
+            match no_joints(&candidate, wanted, circles.contains(&number)) {
+                Some(why) => found.refused.push(format!("{}: {why}", candidate.named())),
+                None => found.candidates.push(candidate),
+            }
+        }
+    }
+    found.apart = apart.into_iter().collect();
+    found
+}
+
+/// The group without joints that are none of an arm's.
+fn without_apart(group: Group, wanted: &[String], apart: &mut BTreeSet<String>) -> Group {
+    let is_wanted = |label: &str| wanted.iter().any(|wanted| wanted.eq_ignore_ascii_case(label));
+    let is_apart = |text: &str| {
+        let text = text.to_ascii_lowercase();
+        APART.iter().any(|word| text.contains(word))
+    };
+    let of_hand = is_apart(&group.base);
+    let (mut out, mut kept) = (Vec::new(), Vec::new());
+    for (place, label) in group.labels.iter().enumerate() {
+        let leaves = !is_wanted(label) && (of_hand || is_apart(label));
+        if leaves { &mut out } else { &mut kept }.push(place);
+    }
+    for place in out {
+        let label = group.labels.get(place).filter(|label| !of_hand && !label.is_empty());
+        apart.insert(label.unwrap_or(&group.base).clone());
+    }
+    let pick = |list: &[String]| kept.iter().filter_map(|place| list.get(*place)).cloned().collect();
+    Group {
+        labels: pick(&group.labels),
+        names: pick(&group.names),
+        at: kept.iter().filter_map(|place| group.at.get(*place)).copied().collect(),
+        base: group.base,
+    }
+}
+
+/// Why a group is no quantity of joints, by its labels and by its numbers.
+fn no_joints(candidate: &Candidate<'_>, wanted: &[String], on_circle: bool) -> Option<&'static str> {
+    let labels = &candidate.group.labels;
+    let values = candidate.values();
+    if !labels.iter().all(|label| wanted.contains(label)) && naming::are_pose(labels) {
+        Some("the pose of a hand by its names, and no joints")
+    } else if shape::is_empty(&values) {
+        Some("it holds no number")
+    } else if candidate.role.quantity != Quantity::Position {
+        None
+    } else if on_circle {
+        Some("sines and cosines of angles: their squares add up to 1 in every row")
+    } else if shape::is_turned(&values) {
+        Some("it holds a quaternion: four numbers in a row whose squares add up to 1 in every row")
+    } else if shape::is_window(&values) {
+        Some("each of its rows goes on like a motion over time: write one row a stamp")
+    } else {
+        None
+    }
+}
+
+/// Groups whose squares and those of another group add up to 1, by their numbers.
+fn sines(table: &Table, groups: &[Group]) -> Vec<usize> {
+    let mut found = Vec::new();
+    for (number, group) in groups.iter().enumerate() {
+        let own = columns(table, group);
+        if shape::are_sines(&own) {
+            found.push(number);
+        }
+        for (other, near) in groups.iter().enumerate().skip(number + 1).take(NEIGHBOURS) {
+            if near.names.len() == group.names.len() && shape::on_circle(&own, &columns(table, near)) {
+                found.extend([number, other]);
+            }
+        }
+    }
+    found
+}

@@ -1,0 +1,216 @@
+//! Logs as their readers give them, and what is one log among them: each of several runs that one file holds is a log of its own, and
+//! seconds and nanoseconds in two columns are one stamp.
+
+use crate::log::{Column, LeftOut, Log, Table};
+use crate::naming;
+use std::collections::{BTreeMap, BTreeSet};
+
+/// What runs are called, where they are numbered.
+const RUNS: [&str; 15] = [
+    "demo",
+    "demonstration",
+    "episode",
+    "ep",
+    "run",
+    "trial",
+    "traj",
+    "trajectory",
+    "rollout",
+    "sequence",
+    "seq",
+    "take",
+    "clip",
+    "motion",
+    "recording",
+];
+/// Numbered parts of a robot, or of a log, that are none.
+const PARTS: [&str; 16] = [
+    "robot", "arm", "joint", "joints", "jnt", "axis", "motor", "link", "leg", "finger", "camera", "cam", "sensor",
+    "device", "port", "body",
+];
+/// Names of the two columns of a stamp.
+const SECONDS: [&str; 4] = ["s", "sec", "secs", "seconds"];
+const NANOSECONDS: [&str; 5] = ["ns", "nsec", "nsecs", "nanosec", "nanoseconds"];
+const BILLION: f64 = 1e9;
+/// Runs that are listed in a sentence.
+const LISTED: usize = 12;
+/// Seconds since 1970 are more than this from 2001 on, as no other column of whole numbers beside one of nanoseconds is.
+const RECENT: f64 = 1e9;
+
+/// Takes each log apart into its runs, and puts stamps of two columns together.
+pub(crate) fn apart(logs: Vec<Log>) -> Vec<Log> {
+    let mut all: Vec<Log> = logs.into_iter().flat_map(by_run).collect();
+    for log in &mut all {
+        for table in log.tables.iter_mut().filter(|table| table.stamps_ns.is_none()) {
+            if let Some((seconds, nanoseconds, stamps_ns)) = stamps(table) {
+                log.facts.two_columns = Some(format!(
+                    "`{seconds}` and `{nanoseconds}` are the seconds and nanoseconds of one stamp: they rise together"
+                ));
+                table.stamps_ns = Some(stamps_ns);
+            }
+        }
+    }
+    all
+}
+
+/// A log of each run, where one holds several; else the log as it is.
+fn by_run(mut log: Log) -> Vec<Log> {
+    let runs = names_of_runs(&log);
+    if runs.is_empty() {
+        return vec![log];
+    }
+    let called: Vec<String> = runs.iter().map(|(stem, number)| format!("`{stem}{number}`")).collect();
+    let some = called.iter().take(LISTED).cloned().collect::<Vec<_>>().join(", ");
+    log.facts.runs = Some(format!("the file holds {} runs, a clip of each: {some}", called.len()));
+    let mut parts: BTreeMap<(String, u64), Log> = BTreeMap::new();
+    for Table { name, stamps_ns, columns } in std::mem::take(&mut log.tables) {
+        let mut own: BTreeMap<(String, u64), Table> = BTreeMap::new();
+        for column in columns {
+            let Some((run, rest)) = split(&column.name).filter(|(run, _)| runs.contains(run)) else {
+                let why = "it belongs to none of the file's runs";
+                log.left_out.push(LeftOut { what: column.name, why, count: 1 });
+                continue;
+            };
+            let begun = || Table { name: name.clone(), stamps_ns: stamps_ns.clone(), columns: Vec::new() };
+            own.entry(run).or_insert_with(begun).columns.push(Column { name: rest, values: column.values });
+        }
+        for (run, table) in own {
+            let called = format!("{}_{}{}", log.name, run.0.replace(['.', '/'], "_"), run.1);
+            parts.entry(run).or_insert_with(|| Log { name: called, ..log.without_numbers() }).tables.push(table);
+        }
+    }
+    let mut parts: Vec<Log> = parts.into_values().collect();
+    for part in &mut parts {
+        // The rows that most columns have are those of the run, and called alike in all runs.
+        part.tables.sort_by_key(|table| std::cmp::Reverse(table.columns.len()));
+        for (number, table) in part.tables.iter_mut().enumerate() {
+            let first = table.columns.first().map_or("", |column| column.name.as_str());
+            table.name = if number == 0 { "rows".to_owned() } else { format!("rows of {first}") };
+        }
+    }
+    if let Some(first) = parts.first_mut() {
+        (first.left_out, first.warnings) = (log.left_out, log.warnings);
+    }
+    parts
+}
+
+/// The runs of a log, by what stands before the names of their columns. None, where what is numbered are parts of a robot.
+fn names_of_runs(log: &Log) -> BTreeSet<(String, u64)> {
+    let mut columns: BTreeMap<(String, u64), usize> = BTreeMap::new();
+    let mut rows = BTreeSet::new();
+    for table in &log.tables {
+        for column in &table.columns {
+            if let Some((run, _)) = split(&column.name) {
+                *columns.entry(run).or_default() += 1;
+                rows.insert(table.rows());
+            }
+        }
+    }
+    let words: BTreeSet<String> = columns.keys().filter_map(|(stem, _)| naming::words(stem).pop()).collect();
+    let are = |list: &[&str]| words.iter().any(|word| list.contains(&word.as_str()));
+    // A joint has a column each of some quantities, a run has many; runs differ in length, parts of a robot do not.
+    let wide = columns.values().all(|count| *count > 1);
+    let is_file_of_runs = columns.len() > 1 && wide && !are(&PARTS) && (are(&RUNS) || rows.len() > 1);
+    if is_file_of_runs { columns.into_keys().collect() } else { BTreeSet::new() }
+}
+
+/// A name as its run and the rest: `data.demo_3.obs.q[0]` is `q[0]` of `obs` in the run `data.demo_`, 3.
+fn split(name: &str) -> Option<((String, u64), String)> {
+    let whole = name.split_once('[').map_or(name, |(whole, _)| whole);
+    let mut begin = 0;
+    for (end, _) in whole.match_indices(['.', '/']) {
+        let part = &whole[begin..end];
+        let digits = part
+            .rfind(|c: char| !c.is_ascii_digit())
+            .map_or(0, |at| at + part[at..].chars().next().map_or(1, char::len_utf8));
+        if let Ok(number) = part[digits..].parse() {
+            return Some(((name[..begin + digits].to_owned(), number), name[end + 1..].to_owned()));
+        }
+        begin = end + 1;
+    }
+    None
+}
+
+/// Two columns that are the seconds and nanoseconds of one stamp, and that stamp [ns].
+fn stamps(table: &Table) -> Option<(String, String, Vec<u64>)> {
+    table.columns.windows(2).find_map(|pair| {
+        let [seconds, nanoseconds] = pair else { return None };
+        let last = |column: &Column| naming::words(&column.name).pop().unwrap_or_default();
+        let named = SECONDS.contains(&last(seconds).as_str()) && NANOSECONDS.contains(&last(nanoseconds).as_str());
+        let whole = |v: &f64| v.fract() == 0.0 && *v >= 0.0;
+        let is_time = seconds.values.iter().all(|v| whole(v) && *v < 1e10 && (named || *v > RECENT))
+            && nanoseconds.values.iter().all(|v| whole(v) && *v < BILLION);
+        if !is_time || seconds.values.is_empty() {
+            return None;
+        }
+        let both = seconds.values.iter().zip(&nanoseconds.values);
+        let stamps: Vec<u64> = both.map(|(s, ns)| *s as u64 * 1_000_000_000 + *ns as u64).collect();
+        let rising = stamps.windows(2).filter(|w| w[1] > w[0]).count();
+        (stamps.len() > 1 && rising * 10 >= 9 * (stamps.len() - 1))
+            .then(|| (seconds.name.clone(), nanoseconds.name.clone(), stamps))
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn log(columns: &[(&str, usize)]) -> Log {
+        let mut by_rows: BTreeMap<usize, Vec<Column>> = BTreeMap::new();
+        for (name, rows) in columns {
+            let column = Column { name: (*name).into(), values: vec![0.0; *rows] };
+            by_rows.entry(*rows).or_default().push(column);
+        }
+        let table =
+            |(rows, columns): (usize, Vec<Column>)| Table { name: rows.to_string(), columns, ..Table::default() };
+        Log { name: "file".into(), tables: by_rows.into_iter().map(table).collect(), ..Log::default() }
+    }
+
+    fn names(log: Log) -> Vec<String> {
+        apart(vec![log]).into_iter().map(|log| log.name).collect()
+    }
+
+    #[test]
+    fn runs_of_one_file_are_logs_and_numbered_parts_of_a_robot_are_none() {
+        let demos = [
+            ("data.demo_0.q[0]", 5),
+            ("data.demo_0.a", 5),
+            ("data.demo_10.q[0]", 5),
+            ("data.demo_10.a", 5),
+            ("mask", 5),
+        ];
+        assert_eq!(names(log(&demos)), ["file_data_demo_0", "file_data_demo_10"]);
+        // Numbers alone, of runs of other lengths.
+        assert_eq!(names(log(&[("0.q[0]", 5), ("0.q[1]", 5), ("1.q[0]", 7), ("1.q[1]", 7)])), ["file_0", "file_1"]);
+        for plain in [
+            &[("joint_0.pos", 5), ("joint_0.vel", 5), ("joint_1.pos", 5), ("joint_1.vel", 5)][..],
+            &[("robot_0.q[0]", 5), ("robot_0.q[1]", 5), ("robot_1.q[0]", 6), ("robot_1.q[1]", 6)],
+            &[("q[0]", 5), ("q[1]", 5), ("obs.robot0_joint_pos[0]", 5)],
+            &[("demo_0.q[0]", 5), ("demo_0.q[1]", 5)],
+        ] {
+            assert_eq!(names(log(plain)), ["file"], "{plain:?}");
+        }
+        let parts = apart(vec![log(&demos)]);
+        let columns: Vec<&str> = parts[1].tables[0].columns.iter().map(|column| column.name.as_str()).collect();
+        assert_eq!((columns, parts[0].left_out[0].what.as_str()), (vec!["q[0]", "a"], "mask"));
+    }
+
+    #[test]
+    fn seconds_and_nanoseconds_are_one_stamp() {
+        let table = |names: [&str; 2], first: f64| {
+            let values = |of: fn(u32) -> f64, first: f64| (0..30).map(|i| first + of(i)).collect();
+            let seconds = Column { name: names[0].into(), values: values(|i| f64::from(i / 10), first) };
+            let rest = Column { name: names[1].into(), values: values(|i| f64::from(i % 10) * 1e8, 0.0) };
+            Table { columns: vec![seconds, rest], ..Table::default() }
+        };
+        for (names, first, found) in [
+            (["column[1]", "column[2]"], 1.76e9, true),
+            (["header.stamp.sec", "header.stamp.nanosec"], 0.0, true),
+            (["column[1]", "column[2]"], 0.0, false),
+        ] {
+            let stamps = stamps(&table(names, first)).map(|(_, _, stamps)| stamps);
+            let expected = found.then(|| (0..30).map(|i| first as u64 * 1_000_000_000 + i * 100_000_000).collect());
+            assert_eq!(stamps, expected, "{names:?}");
+        }
+    }
+}
