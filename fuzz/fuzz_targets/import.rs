@@ -44,7 +44,12 @@ fn seeds() -> Vec<Vec<u8>> {
         let bytes = std::fs::read(file.map_or(whole.clone(), |file| whole.join(file))).expect("a fixture");
         [&[first as u8][..], &bytes].concat()
     };
-    LOGS.iter().enumerate().map(seed).collect()
+    let mut seeds: Vec<Vec<u8>> = LOGS.iter().enumerate().map(seed).collect();
+    // The same table in UTF-16, with decimal commas.
+    let table = LOGS.iter().position(|(log, _)| *log == "plain.csv").expect("a table");
+    let text = std::fs::read_to_string(fixture("plain.csv")).expect("a fixture").replace(',', ";").replace('.', ",");
+    seeds.push(std::iter::once(table as u8).chain(text.encode_utf16().flat_map(u16::to_le_bytes)).collect());
+    seeds
 }
 
 fuzz_target!(

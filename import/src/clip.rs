@@ -5,10 +5,7 @@ use crate::mapping::{Clock, Factor, JointColumns, Mapping, PoseColumns, Torque, 
 use shared_mem::frames::Pose;
 use shared_mem::msg::MAX_JOINTS;
 use shared_mem::origin::{Origin, Origins};
-use shared_mem::recording::{Clip, JointSeries, ObjectSeries};
-
-/// Largest share of rows that may be without stamp, or without pose.
-const LARGEST_BAD_SHARE: f64 = 0.01;
+use shared_mem::recording::{Clip, JointSeries, ObjectSeries, few_rows};
 
 /// Torques [N m] that hold the nominal model at positions [rad] against a free fall in its base frame [m/s²].
 pub type Holds = Box<dyn Fn(&[f64], [f64; 3]) -> Option<Vec<f64>>>;
@@ -287,7 +284,7 @@ fn told(bad: usize, all: usize, table: &str, what: &str, warnings: &mut Vec<Stri
         return Ok(());
     }
     let line = format!("`{table}`: {bad} of {all} rows {what}");
-    if bad as f64 > LARGEST_BAD_SHARE * all as f64 {
+    if bad > few_rows(all) {
         return Err(format!("{line}; at most 1 % may be left out: look at what wrote the log"));
     }
     warnings.push(format!("{line}; they are left out"));

@@ -4,7 +4,7 @@
 use crate::error::ImportError;
 use crate::propose::propose;
 use crate::session::longest;
-use crate::{runs, sources};
+use crate::sources::Found;
 use std::path::Path;
 
 /// What a log holds.
@@ -29,9 +29,12 @@ pub struct Contents {
 /// # Errors
 /// [`ImportError`] when there is no log that can be read, or none of a robot.
 pub fn look(path: &Path) -> Result<Contents, ImportError> {
-    let mut logs = Vec::new();
-    for source in sources::find(path)? {
-        logs.extend(runs::apart(source.read()?));
+    let (mut found, mut logs) = (Found::at(&[path.to_owned()])?, Vec::new());
+    for number in 0..found.len() {
+        logs.extend(found.read(number)?.unwrap_or_default());
+    }
+    if logs.is_empty() {
+        return Err(found.refusal());
     }
     let log = longest(&logs, path)?;
     let proposal = propose(log, (None, &[]), &|_| None).map_err(|what| ImportError::log(path, what))?;

@@ -72,6 +72,15 @@ impl ImportError {
         Self::Log { path: path.to_owned(), what: printable::one_line(&what.into()) }
     }
 
+    /// Itself where it is about a log, which may be left out for it; `Err` where the import ends with it.
+    pub(crate) fn about_a_log(self) -> Result<Self, Self> {
+        match self {
+            Self::Read(ReadError::Interrupted { .. }) => Err(self),
+            Self::Log { .. } | Self::Budget { .. } | Self::Read(_) | Self::Input(_) => Ok(self),
+            other => Err(other),
+        }
+    }
+
     /// A budget is spent, or the process was asked to end.
     pub(crate) fn budget(path: &Path) -> impl Fn(BudgetError) -> Self + '_ {
         move |source| match source {

@@ -8,8 +8,7 @@ use crate::log::{LeftOut, Log};
 use crate::mapping::{Mapping, Note, to_toml};
 use crate::pieces;
 use crate::propose::{Proposal, propose};
-use crate::runs;
-use crate::sources::{self, Source};
+use crate::sources::Found;
 use serde::Serialize;
 use shared_mem::cell::{Cell, ClipEntry, ClipKind};
 use shared_mem::output::{Destination, OutputFolder};
@@ -90,20 +89,17 @@ pub enum Outcome {
 /// # Errors
 /// [`ImportError`]; nothing is there then, and what was there before is unchanged.
 pub fn import(order: Order<'_>, mut told: impl FnMut(&Imported, (u64, u64))) -> Result<Outcome, ImportError> {
-    let mut found = Vec::new();
-    for file in order.files {
-        found.extend(sources::find(file)?);
-    }
+    let mut found = Found::at(order.files)?;
     let given = order.cell.map(Cell::read).transpose()?;
     let mut first = None;
     let (mapping, notes) = match order.mapping {
         Some(path) => (given_mapping(path)?, Vec::new()),
         None => {
-            let (number, logs) = largest(&found)?;
-            let log = longest(&logs, found[number].path())?;
+            let (number, logs) = found.largest()?;
+            let log = longest(&logs, &found.paths()[number])?;
             let Proposal { mut mapping, mut notes } = proposal(log, given.as_ref(), order.arms)?;
             if mapping.clone().completed().open_line().is_some() {
-                return open(order, log, &mapping, notes);
+                return open(order, log, &mapping, (notes, &found));
             }
             if found.len() + logs.len() < ENOUGH_LOGS {
                 cut(log, &mut mapping, &mut notes);
@@ -112,8 +108,7 @@ pub fn import(order: Order<'_>, mut told: impl FnMut(&Imported, (u64, u64))) -> 
             (mapping, notes)
         }
     };
-    let paths: Vec<PathBuf> = found.iter().map(|source| source.path().to_owned()).collect();
-    let folder = session_folder(order.out, order.force, &paths)?;
+    let folder = session_folder(order.out, order.force, &found.paths())?;
     let mut writing = Writing {
         folder: &folder,
         out: order.out,
@@ -125,24 +120,46 @@ pub fn import(order: Order<'_>, mut told: impl FnMut(&Imported, (u64, u64))) -> 
         about: None,
     };
     let (mut clips, all) = (Vec::new(), found.len() as u64);
-    for (number, source) in found.iter().enumerate() {
+    for number in 0..found.len() {
         let logs = match first.take() {
-            Some((read, logs)) if read == number => logs,
+            Some((read, logs)) if read == number => Some(logs),
             other => {
                 first = other;
-                runs::apart(source.read()?)
+                found.read(number)?
             }
         };
+        let logs = logs.unwrap_or_default();
         for log in &logs {
-            for imported in writing.clips(log)? {
+            let imported = match writing.clips(log) {
+                Ok(imported) => imported,
+                // One episode of a data set takes none of the others along.
+                Err(error) if logs.len() > 1 => {
+                    found.refuse(error)?;
+                    continue;
+                }
+                Err(error) => {
+                    found.leave_out(number, error)?;
+                    continue;
+                }
+            };
+            for imported in imported {
                 told(&imported, (number as u64 + 1, all));
                 clips.push(imported);
             }
         }
     }
+    if clips.is_empty() {
+        return Err(found.refusal());
+    }
     writing.finish(order, &notes)?;
     folder.finish(CELL_TOML)?;
-    Ok(Outcome::Done { clips, notes })
+    Ok(Outcome::Done { clips, notes: with_left_out(notes, &found) })
+}
+
+/// The notes of a mapping, and what is left out of what was found.
+fn with_left_out(mut notes: Vec<Note>, found: &Found) -> Vec<Note> {
+    notes.extend(found.left_out().iter().map(|why| Note { line: "left out".into(), why: why.clone(), open: false }));
+    notes
 }
 
 fn given_mapping(path: &Path) -> Result<Mapping, ImportError> {
@@ -153,13 +170,6 @@ fn given_mapping(path: &Path) -> Result<Mapping, ImportError> {
         }
         None => Ok(mapping),
     }
-}
-
-/// The source with most bytes, and its logs: its numbers tell most.
-fn largest(found: &[Source]) -> Result<(usize, Vec<Log>), ImportError> {
-    let bytes = found.iter().map(Source::bytes).collect::<Result<Vec<_>, _>>()?;
-    let number = (0..found.len()).max_by_key(|number| (bytes[*number], std::cmp::Reverse(*number))).unwrap_or(0);
-    Ok((number, runs::apart(found[number].read()?)))
 }
 
 pub(crate) fn longest<'a>(logs: &'a [Log], path: &Path) -> Result<&'a Log, ImportError> {
@@ -210,7 +220,12 @@ fn proposal(log: &Log, given: Option<&Cell>, arms: Arms<'_>) -> Result<Proposal,
 }
 
 /// Writes the mapping with its open lines to where the command is typed.
-fn open(order: Order<'_>, log: &Log, mapping: &Mapping, notes: Vec<Note>) -> Result<Outcome, ImportError> {
+fn open(
+    order: Order<'_>,
+    log: &Log,
+    mapping: &Mapping,
+    (notes, found): (Vec<Note>, &Found),
+) -> Result<Outcome, ImportError> {
     let file = order.questions.to_owned();
     let command = (order.command)(&file);
     if file.is_file() && !order.force {
@@ -218,6 +233,9 @@ fn open(order: Order<'_>, log: &Log, mapping: &Mapping, notes: Vec<Note>) -> Res
     }
     let place = Destination::new(&file, order.force)?;
     place.write(to_toml(mapping, &notes, log, &command))?;
+    let mut notes = with_left_out(notes, found);
+    let odd = log.warnings.iter().map(|why| Note { line: log.name.clone(), why: why.clone(), open: false });
+    notes.extend(odd);
     Ok(Outcome::Open { file, notes })
 }
 

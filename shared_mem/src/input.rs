@@ -3,6 +3,20 @@
 //! A path given by mistake may name a folder, a pipe that nobody writes to, a device without an end, or a file of another
 //! kind that is larger than the memory. Each is refused in one line before anything is read. Recordings are opened here
 //! too, but read piece by piece, so that their size does not matter.
+//!
+//! | file | owns |
+//! |---|---|
+//! | `encoding` | which letters the bytes of a text are, and where its lines end |
+//! | `decimal` | which sign is the decimal one of a table |
+//! | `packing` | what is packed as a whole |
+
+mod decimal;
+mod encoding;
+mod packing;
+
+pub use decimal::{Decimal, Said};
+pub use encoding::{Encoding, NoText, Text, decode};
+pub use packing::Packing;
 
 use rustix::fs::OFlags;
 use std::fs::{File, OpenOptions};
@@ -125,11 +139,13 @@ pub enum InputError {
         /// Its size [bytes]; `None` where the system does not tell it.
         size: Option<u64>,
     },
-    /// The bytes are no text.
-    #[error("cannot read {}: it is no text (UTF-8); give the path of a text file", path.display())]
+    /// The bytes are no text, or one in an encoding that is not known.
+    #[error("cannot read {}: {what}", path.display())]
     NotText {
         /// The file.
         path: PathBuf,
+        /// What it is.
+        what: NoText,
     },
 }
 
@@ -174,9 +190,18 @@ pub fn bytes(path: &Path, kind: Kind) -> Result<Vec<u8>, InputError> {
 /// The text of a regular file that is no larger than its kind can be.
 ///
 /// # Errors
-/// As [`bytes`], and when it is no UTF-8.
+/// As [`bytes`], and when it is neither UTF-8 nor UTF-16. What may be Windows-1252 alone is read where the text itself says so, as an
+/// XML document does: elsewhere a name could come out wrong.
 pub fn text(path: &Path, kind: Kind) -> Result<String, InputError> {
-    String::from_utf8(bytes(path, kind)?).map_err(|_| InputError::NotText { path: path.to_owned() })
+    let bytes = bytes(path, kind)?;
+    let is_no_text = |what| InputError::NotText { path: path.to_owned(), what };
+    let first_other = bytes.iter().position(|byte| !byte.is_ascii());
+    let line = 1 + bytes.iter().take(first_other.unwrap_or(0)).filter(|byte| **byte == b'\n').count();
+    let Text { text, encoding } = decode(bytes).map_err(is_no_text)?;
+    if encoding == Encoding::Windows1252 && !encoding::declares_latin(&text) {
+        return Err(is_no_text(NoText::Encoding(line)));
+    }
+    Ok(text)
 }
 
 fn check(path: &Path, metadata: &std::fs::Metadata) -> Result<(), InputError> {
@@ -208,8 +233,26 @@ mod tests {
         assert_eq!(text(&path, Kind::Configuration).expect("text"), "a = 1\n");
         std::os::unix::fs::symlink(&path, folder.path().join("b.toml")).expect("a link");
         assert_eq!(bytes(&folder.path().join("b.toml"), Kind::Configuration).expect("bytes"), b"a = 1\n");
-        std::fs::write(&path, [0xff, 0xfe]).expect("a file");
+        std::fs::write(&path, [0xff, 0xfe, 0, 0]).expect("a file");
         assert!(matches!(text(&path, Kind::Configuration), Err(InputError::NotText { .. })));
+    }
+
+    #[test]
+    fn a_text_of_another_system_is_read_or_has_to_be_saved_as_utf_8() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("cell.toml");
+        let read = |bytes: &[u8]| {
+            std::fs::write(&path, bytes).expect("a file");
+            text(&path, Kind::Configuration).map_err(|error| error.to_string())
+        };
+        let wide: Vec<u8> = "\u{feff}a = 1 # Größe\r\n".encode_utf16().flat_map(u16::to_le_bytes).collect();
+        assert_eq!(read(&wide), Ok("a = 1 # Größe\r\n".into()));
+        let line = read(b"b = 2\na = 1 # Gr\xf6\xdfe\n").expect_err("another encoding");
+        assert!(line.contains("cell.toml: line 2 is no UTF-8") && line.contains("save it as UTF-8"), "{line}");
+        let document = b"<?xml version=\"1.0\" encoding=\"ISO-8859-1\"?><robot name=\"Gr\xf6\xdfe\"/>";
+        assert!(read(document).is_ok_and(|text| text.contains("Größe")));
+        let line = read(b"\x1f\x8b\x08\x00.....").expect_err("packed");
+        assert!(line.contains("it is packed with gzip; unpack it with `gunzip`"), "{line}");
     }
 
     #[test]

@@ -16,13 +16,15 @@ use twin::description::{shown_robot, shown_urdf};
 
 #[derive(Debug, Args)]
 #[command(after_help = "\
-Reads ROS 2 bags (mcap and sqlite3, files or folders), ROS 1 bags, LeRobot data sets (v2 and v3), CSV and TSV with a line of
-names, npz, logs of libfranka and folders of SAGE; of a folder, all of these in it. Which columns are q, dq and tau, their
+Reads ROS 2 bags (mcap and sqlite3, files or folders, packed or not), ROS 1 bags, LeRobot data sets (v2 and v3), CSV and TSV
+(in UTF-8, UTF-16 or Latin 1, with decimal points or commas, as `rostopic echo` prints them), npz, logs of libfranka and folders of
+SAGE; of a folder, all of these in it. Which columns are q, dq and tau, their
 units, the order and sign of the joints, the clock and which torque it is, is proposed from names and numbers and said with
 the reason and with what else there was (--explain: with the line that takes it). It stands in import.toml of the new
 session, to be changed and given back with --mapping. What cannot be known is asked once: import.toml is written here with
 the open lines marked. A log without commands becomes clips without commands; one long log of many motions is cut where it
-rests. Pictures are not imported. A damaged log is refused, and then nothing is written.
+rests. Pictures are not imported. Of a log that is cut or damaged what is whole is read, and what is missing is said. Of a
+folder, what is no log, or cannot be read at all, is named and left out.
 
 Examples:
   calibration import last_week --out session          # every log in the folder

@@ -3,13 +3,11 @@
 use super::definition::{self, Arity, Field, Kind, Undefined};
 use super::flat::{Flat, Unread};
 use super::known;
-use super::wire::{Broken, Encoding, Reader};
-use crate::error::ImportError;
+use super::wire::{Encoding, Reader};
 use crate::log::{Column, LeftOut, Table};
 use crate::naming;
 use shared_mem::budget::{Budget, BudgetError};
 use std::collections::{BTreeMap, HashMap};
-use std::path::Path;
 use std::rc::Rc;
 
 /// Publishers, or transforms, of one topic that are read separately.
@@ -20,6 +18,8 @@ const PICTURES: &str = "pictures and other arrays of bytes are not imported";
 const UNDEFINED: &str = "the bag holds no definition of its type that can be read";
 const NUMBERLESS: &str = "it holds no number that a clip has a place for";
 const CROWDED: &str = "its messages have too many forms";
+const BROKEN: &str = "these of its messages are not what their type says";
+const UNKNOWN: &str = "its messages are in a form that is not known; `ros2 bag convert` writes them in another";
 const LONG: &str = "its messages hold more numbers than a row of any use";
 
 /// What a topic, a column or a text takes beside its own bytes.
@@ -68,31 +68,6 @@ pub(crate) struct Incoming<'a> {
     pub(crate) data: &'a [u8],
 }
 
-/// A message is not taken over.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) enum Refused {
-    /// It is not what its type says: a sentence to be put behind the bag's name.
-    Message(String),
-    /// The bag's budget is spent.
-    Budget(BudgetError),
-}
-
-impl Refused {
-    /// Of the bag at `path`.
-    pub(crate) fn of(self, path: &Path) -> ImportError {
-        match self {
-            Self::Message(what) => ImportError::log(path, what),
-            Self::Budget(over) => ImportError::budget(path)(over),
-        }
-    }
-}
-
-impl From<BudgetError> for Refused {
-    fn from(over: BudgetError) -> Self {
-        Self::Budget(over)
-    }
-}
-
 impl<'a> Collector<'a> {
     /// `budget`: that of the bag.
     pub(crate) fn new(encoding: Encoding, budget: &'a Budget) -> Self {
@@ -104,11 +79,11 @@ impl<'a> Collector<'a> {
         self.budget
     }
 
-    /// Takes a message over.
+    /// Takes a message over; one that is not what its type says is left out.
     ///
     /// # Errors
-    /// [`Refused`] where it is not what its type says, or the budget is spent.
-    pub(crate) fn take(&mut self, message: &Incoming<'_>) -> Result<(), Refused> {
+    /// [`BudgetError`] when the budget is spent.
+    pub(crate) fn take(&mut self, message: &Incoming<'_>) -> Result<(), BudgetError> {
         let (budget, fields) = (self.budget, self.fields(message)?);
         let topic = match self.topics.get_mut(message.topic) {
             Some(topic) => topic,
@@ -121,29 +96,24 @@ impl<'a> Collector<'a> {
             topic.leave_out(UNDEFINED);
             return Ok(());
         };
-        let broken = |_| {
-            Refused::Message(format!(
-                "a message on `{}` is no {}: the bag is damaged; take it from its source again",
-                message.topic, message.type_name
-            ))
+        let Ok(mut reader) = Reader::new(message.data, self.encoding) else {
+            topic.leave_out(UNKNOWN);
+            return Ok(());
         };
-        let unread = |unread: Unread| match unread {
-            Unread::Broken => broken(Broken),
-            Unread::Budget(over) => Refused::Budget(over),
-        };
-        let mut reader = Reader::new(message.data, self.encoding).map_err(broken)?;
-        if TEXT.contains(&message.type_name) && message.topic.ends_with(DESCRIPTION) {
-            self.description = Some(reader.clone().text().map_err(broken)?.to_owned());
+        if TEXT.contains(&message.type_name)
+            && message.topic.ends_with(DESCRIPTION)
+            && let Ok(text) = reader.clone().text()
+        {
+            self.description = Some(text.to_owned());
         }
-        // A list of messages is as many of them: transforms.
-        if let [Field { kind: Kind::Message(inner), arity: Arity::Sequence, .. }] = &fields[..] {
-            for _ in 0..reader.length().map_err(broken)? {
-                topic.row(inner, (&mut reader, budget), message.log_time_ns).map_err(unread)?;
+        match topic.message(&fields, (&mut reader, budget), message.log_time_ns) {
+            Ok(()) => Ok(()),
+            Err(Unread::Broken) => {
+                topic.leave_out(BROKEN);
+                Ok(())
             }
-        } else {
-            topic.row(&fields, (&mut reader, budget), message.log_time_ns).map_err(unread)?;
+            Err(Unread::Budget(over)) => Err(over),
         }
-        if reader.is_at_end() { Ok(()) } else { Err(broken(Broken)) }
     }
 
     /// The fields of a message's type, where they are known.
@@ -193,14 +163,35 @@ impl Topic {
         *self.left_out.entry(why).or_default() += 1;
     }
 
-    fn row(
+    /// Takes a message over: one row, or, of a list of messages, as many of them (transforms).
+    fn message(
         &mut self,
         fields: &[Field],
         (reader, budget): (&mut Reader<'_>, &Budget),
         log_time_ns: u64,
     ) -> Result<(), Unread> {
+        let [Field { kind: Kind::Message(inner), arity: Arity::Sequence, .. }] = fields else {
+            return self.row(fields, (reader, budget), (log_time_ns, true));
+        };
+        let rows = reader.length()?;
+        for row in 1..=rows {
+            self.row(inner, (reader, budget), (log_time_ns, row == rows))?;
+        }
+        if reader.is_at_end() { Ok(()) } else { Err(Unread::Broken) }
+    }
+
+    /// Takes a row over; with the last one the message has to end.
+    fn row(
+        &mut self,
+        fields: &[Field],
+        (reader, budget): (&mut Reader<'_>, &Budget),
+        (log_time_ns, is_last): (u64, bool),
+    ) -> Result<(), Unread> {
         let again = reader.clone();
         let flat = Flat::read(fields, reader, false, budget)?;
+        if is_last && !reader.is_at_end() {
+            return Err(Unread::Broken);
+        }
         if flat.has_bytes || flat.is_long {
             self.leave_out(if flat.has_bytes { PICTURES } else { LONG });
             return Ok(());

@@ -14,5 +14,5 @@ mod flat;
 mod known;
 mod wire;
 
-pub(crate) use collect::{Collector, Incoming, Refused};
+pub(crate) use collect::{Collector, Incoming};
 pub(crate) use wire::Encoding;

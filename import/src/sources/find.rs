@@ -1,12 +1,11 @@
 //! Which logs lie at a path: a file, a folder that is one log, or a folder of logs.
 
 use super::walk::{self, Seen};
-use super::{lerobot, npz, ros1, rosbag2, sage, sqlite, table};
+use super::{lerobot, npz, packed, ros1, rosbag2, run, sage, sqlite, table};
 use crate::error::ImportError;
 use crate::log::Log;
 use shared_mem::budget::Budget;
-use std::fs::File;
-use std::io::Read as _;
+use shared_mem::input::Packing;
 use std::path::{Path, PathBuf};
 
 /// A folder of logs is searched to this depth.
@@ -14,34 +13,37 @@ const DEPTH: usize = 3;
 
 /// A log, or a data set of some, by its kind.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) enum Source {
+pub(super) enum Source {
     /// A ROS 2 bag: its files in order.
     Rosbag2(PathBuf, Vec<PathBuf>),
     Ros1(PathBuf),
     LeRobot(PathBuf),
     Sage(PathBuf),
     Table(PathBuf),
+    /// Tables of a folder that may be topics of one run.
+    Run(PathBuf, Vec<PathBuf>),
     Npz(PathBuf),
 }
 
 impl Source {
     /// Reads it, within a budget that goes by its bytes: one log, or one an episode.
-    pub(crate) fn read(&self) -> Result<Vec<Log>, ImportError> {
+    pub(super) fn read(&self) -> Result<Vec<Log>, ImportError> {
         let budget = &Budget::of(self.bytes()?);
         match self {
             Self::Rosbag2(path, files) => Ok(vec![rosbag2::read(path, files, budget)?]),
-            Self::Ros1(path) => Ok(vec![ros1::read(path, budget)?]),
+            Self::Ros1(path) => Ok(vec![packed::log(path, budget, ros1::read)?]),
             Self::LeRobot(path) => lerobot::read(path, budget),
             Self::Sage(path) => Ok(vec![sage::read(path, budget)?]),
-            Self::Table(path) => Ok(vec![table::read(path, budget)?]),
-            Self::Npz(path) => Ok(vec![npz::read(path, budget)?]),
+            Self::Table(path) => Ok(vec![packed::log(path, budget, table::read).map_err(|error| notes(error, path))?]),
+            Self::Run(path, files) => run::read(path, files, budget),
+            Self::Npz(path) => Ok(vec![packed::log(path, budget, npz::read)?]),
         }
     }
 
     /// How many bytes of it are read: pictures beside a data set are not.
-    pub(crate) fn bytes(&self) -> Result<u64, ImportError> {
+    pub(super) fn bytes(&self) -> Result<u64, ImportError> {
         let files = match self {
-            Self::Rosbag2(_, files) => files.clone(),
+            Self::Rosbag2(_, files) | Self::Run(_, files) => files.clone(),
             Self::LeRobot(path) => lerobot::files(path)?,
             Self::Sage(path) => walk::files(path)?,
             Self::Ros1(path) | Self::Table(path) | Self::Npz(path) => vec![path.clone()],
@@ -51,40 +53,55 @@ impl Source {
     }
 
     /// File or folder.
-    pub(crate) fn path(&self) -> &Path {
+    pub(super) fn path(&self) -> &Path {
         match self {
             Self::Rosbag2(path, _)
             | Self::Ros1(path)
             | Self::LeRobot(path)
             | Self::Sage(path)
             | Self::Table(path)
+            | Self::Run(path, _)
             | Self::Npz(path) => path,
         }
     }
+
+    /// Whether it is text, which may be anything.
+    pub(super) fn is_text(&self) -> bool {
+        matches!(self, Self::Table(_))
+    }
 }
 
-/// All logs at `path`.
-pub(crate) fn find(path: &Path) -> Result<Vec<Source>, ImportError> {
-    let metadata = std::fs::metadata(path).map_err(|e| {
-        ImportError::log(
-            path,
-            format!("cannot be read ({e}); give the path of an existing log, or of a folder of logs"),
-        )
-    })?;
-    if metadata.is_dir() {
-        let mut found = Vec::new();
-        in_folder(path, DEPTH, (&mut Seen::default(), &mut found))?;
-        if found.is_empty() {
-            let what = "holds no log that is known: .mcap, .db3, .bag, .csv, .tsv, .npz, a LeRobot data set or SAGE folders; \
-                        what is there as HDF5 or .mat becomes .npz with numpy.savez";
-            return Err(ImportError::log(path, what));
+/// An error about a text that need not be a table: a person's notes, a program's log.
+fn notes(error: ImportError, path: &Path) -> ImportError {
+    match error {
+        ImportError::Log { what, .. } if matches!(extension(path).as_str(), "txt" | "log") => {
+            ImportError::log(path, format!("is no table of numbers: {what}"))
         }
-        return Ok(found);
+        other => other,
     }
-    match of_file(path)? {
-        Some(source) => Ok(vec![source]),
-        None => Err(ImportError::log(path, unknown(path))),
-    }
+}
+
+/// The log that a file is.
+pub(super) fn file(path: &Path) -> Result<Source, ImportError> {
+    of_file(path)?.ok_or_else(|| ImportError::log(path, unknown(path)))
+}
+
+/// What a folder holds.
+#[derive(Debug, Default)]
+pub(super) struct Folder {
+    /// Logs.
+    pub(super) sources: Vec<Source>,
+    /// Files that are none.
+    pub(super) others: Vec<PathBuf>,
+    /// Files that should be logs by their names, and are none.
+    pub(super) refused: Vec<ImportError>,
+}
+
+/// The logs in a folder, which may be one itself.
+pub(super) fn folder(path: &Path) -> Result<Folder, ImportError> {
+    let mut found = Folder::default();
+    in_folder(path, DEPTH, (&mut Seen::default(), &mut found))?;
+    Ok(found)
 }
 
 /// Why a file cannot be imported, by what it is called.
@@ -95,31 +112,35 @@ fn unknown(path: &Path) -> String {
                           'shape') else None); numpy.savez(sys.argv[2], **d)\" FILE.h5 FILE.npz`"
             .into(),
         "mat" => "is a MATLAB file; save its vectors with `writetable` as .csv".into(),
-        "zstd" | "zst" => "is compressed as a whole; unpack it with `zstd -d`".into(),
-        "gz" => "is compressed as a whole; unpack it with `gunzip`".into(),
-        "active" => "is a bag that its recorder did not close; mend it with `rosbag reindex`".into(),
+        "xls" | "xlsx" | "ods" => "is a spreadsheet; save its sheet as .csv".into(),
+        "tar" | "tgz" => "is an archive; unpack it with `tar -xf`".into(),
         "parquet" => "is one file of a data set; give the folder that holds its meta/info.json".into(),
-        _ => "is no log that is known: .mcap, .db3, .bag, .csv, .tsv, .npz, a LeRobot data set or a SAGE folder".into(),
+        _ => match packed::start(path).ok().and_then(|start| Packing::of(&start)) {
+            Some(packing) => format!("is packed with {}; {}", packing.name(), packing.remedy()),
+            None => "is no log that is known: .mcap, .db3, .bag, .csv, .tsv, .npz, a LeRobot data set or a SAGE folder".into(),
+        },
     }
 }
 
-fn in_folder(folder: &Path, depth: usize, (seen, found): (&mut Seen, &mut Vec<Source>)) -> Result<(), ImportError> {
+fn in_folder(folder: &Path, depth: usize, (seen, found): (&mut Seen, &mut Folder)) -> Result<(), ImportError> {
     if lerobot::is_data_set(folder) {
-        found.push(Source::LeRobot(folder.to_owned()));
+        found.sources.push(Source::LeRobot(folder.to_owned()));
         return Ok(());
     }
     if sage::is_motion(folder) {
-        found.push(Source::Sage(folder.to_owned()));
+        found.sources.push(Source::Sage(folder.to_owned()));
         return Ok(());
     }
     let mut entries = seen.entries(folder)?;
     entries.retain(|path| !path.file_name().is_some_and(|name| name.to_string_lossy().starts_with('.')));
     entries.sort_by_key(|path| natural(&path.file_name().unwrap_or_default().to_string_lossy()));
     if folder.join("metadata.yaml").is_file() {
-        let files: Vec<PathBuf> =
+        let mut files: Vec<PathBuf> =
             entries.iter().filter(|path| matches!(extension(path).as_str(), "mcap" | "db3")).cloned().collect();
+        // `ros2 bag play` leaves what it has unpacked beside the packed file.
+        files.dedup_by(|packed, plain| packed::inner(packed) == *plain);
         if !files.is_empty() {
-            found.push(Source::Rosbag2(folder.to_owned(), files));
+            found.sources.push(Source::Rosbag2(folder.to_owned(), files));
             return Ok(());
         }
     }
@@ -128,37 +149,47 @@ fn in_folder(folder: &Path, depth: usize, (seen, found): (&mut Seen, &mut Vec<So
             if depth > 1 {
                 in_folder(&path, depth - 1, (seen, found))?;
             }
-        } else if KNOWN.contains(&extension(&path).as_str())
-            && let Some(source) = of_file(&path)?
-        {
-            found.push(source);
+        } else {
+            match of_file(&path) {
+                Ok(Some(source)) => found.sources.push(source),
+                Ok(None) if is_companion(&path) => {}
+                Ok(None) => found.others.push(path),
+                Err(_) if !KNOWN.contains(&extension(&path).as_str()) => found.others.push(path),
+                Err(error) => found.refused.push(error.about_a_log()?),
+            }
         }
     }
     Ok(())
 }
 
-/// Extensions that are taken out of a folder.
+/// Extensions of logs.
 const KNOWN: [&str; 8] = ["mcap", "db3", "bag", "csv", "tsv", "txt", "log", "npz"];
 
+/// Whether a file belongs to a bag beside it.
+fn is_companion(path: &Path) -> bool {
+    let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    name == "metadata.yaml" || ["db3-wal", "db3-shm", "db3-journal"].contains(&extension(path).as_str())
+}
+
 fn of_file(path: &Path) -> Result<Option<Source>, ImportError> {
-    let mut start = Vec::new();
-    let file: File = shared_mem::input::open(path)?;
-    let read = file.take(64).read_to_end(&mut start);
-    read.map_err(|e| ImportError::log(path, format!("cannot be read ({e}); copy it again")))?;
     let own = path.to_owned();
-    Ok(Some(match start.as_slice() {
+    let inside = extension(path);
+    Ok(Some(match packed::start(path)?.as_slice() {
         [] => {
             return Err(ImportError::log(path, "is empty: its recorder ended before it wrote anything; leave it out"));
         }
         s if s.starts_with(b"\x89MCAP0\r\n") => Source::Rosbag2(own.clone(), vec![own]),
-        s if s.starts_with(b"SQLite format 3\0") => Source::Rosbag2(own.clone(), vec![own]),
+        s if s.starts_with(sqlite::MAGIC) => Source::Rosbag2(own.clone(), vec![own]),
         s if s.starts_with(b"#ROSBAG V") => Source::Ros1(own),
-        s if s.starts_with(b"PK\x03\x04") => Source::Npz(own),
-        _ => match extension(path).as_str() {
-            "csv" | "tsv" | "txt" | "log" => Source::Table(own),
-            "mcap" | "db3" | "bag" | "npz" => {
-                let what =
-                    format!("does not begin like a .{}: it is damaged; copy it from its source again", extension(path));
+        s if inside == "npz" && s.starts_with(b"PK\x03\x04") => Source::Npz(own),
+        s => match (Packing::of(s), inside.as_str()) {
+            (Some(packing), kind) if KNOWN.contains(&kind) => {
+                let what = format!("is packed with {}; {}", packing.name(), packing.remedy());
+                return Err(ImportError::log(path, what));
+            }
+            (_, "csv" | "tsv" | "txt" | "log") => Source::Table(own),
+            (_, "mcap" | "db3" | "bag" | "npz") => {
+                let what = format!("does not begin like a .{inside}: it is damaged; copy it from its source again");
                 return Err(ImportError::log(path, what));
             }
             _ => return Ok(None),
@@ -166,8 +197,9 @@ fn of_file(path: &Path) -> Result<Option<Source>, ImportError> {
     }))
 }
 
+/// The extension of what is in a file.
 fn extension(path: &Path) -> String {
-    path.extension().map_or_else(String::new, |e| e.to_string_lossy().to_ascii_lowercase())
+    packed::inner(path).extension().map_or_else(String::new, |e| e.to_string_lossy().to_ascii_lowercase())
 }
 
 /// A key by which `run_10` stands behind `run_9`.
@@ -208,7 +240,7 @@ mod tests {
         ] {
             let path = folder.path().join(name);
             std::fs::write(&path, bytes).expect("room");
-            let line = find(&path).expect_err("no log").to_string();
+            let line = file(&path).expect_err("no log").to_string();
             assert!(line.contains(hint) && line.lines().count() == 1, "{line}");
         }
     }

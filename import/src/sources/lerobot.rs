@@ -64,24 +64,64 @@ pub(super) fn read(folder: &Path, budget: &Budget) -> Result<Vec<Log>, ImportErr
         return Err(ImportError::log(&path, format!("says {} frames a second; write the data set's rate", info.fps)));
     }
     let mut episodes: BTreeMap<u64, Log> = BTreeMap::new();
-    let mut frames = 0_usize;
+    let (mut frames, mut refused) = (0_usize, Vec::new());
     for file in &files(folder)? {
         // What is said of the rows costs nothing to read; the rows may cost more than there is.
         let left = info.total_frames.saturating_sub(frames);
-        let (rows, columns) = parquet_file::read(file, left, budget)?;
-        frames += rows;
-        take(file, (rows, &columns), (folder, &info, budget), &mut episodes)?;
+        let mut of_file = BTreeMap::new();
+        let read = parquet_file::read(file, left, budget).and_then(|(rows, columns)| {
+            take(file, (rows, &columns), (folder, &info, budget), &mut of_file).map(|()| rows)
+        });
+        match read {
+            Ok(rows) => {
+                frames += rows;
+                of_file.into_iter().for_each(|(episode, log)| append(&mut episodes, episode, log));
+            }
+            // A file takes none of the others along.
+            Err(error) => refused.push(error.about_a_log()?),
+        }
     }
-    if frames != info.total_frames || episodes.len() != info.total_episodes {
-        let what = format!(
-            "is not whole: {frames} of {} frames and {} of {} episodes are there; download it again",
-            info.total_frames,
-            episodes.len(),
-            info.total_episodes
-        );
-        return Err(ImportError::log(folder, what));
+    let is_whole = frames == info.total_frames && episodes.len() == info.total_episodes;
+    let missing = format!(
+        "{frames} of {} frames and {} of {} episodes are there",
+        info.total_frames,
+        episodes.len(),
+        info.total_episodes
+    );
+    match (episodes.values_mut().next(), refused.first()) {
+        (None, Some(_)) => return refused.into_iter().next().map_or(Ok(Vec::new()), Err),
+        (None, None) => {
+            let what = format!("holds no episode: {missing}; take its parquet files from their source again");
+            return Err(ImportError::log(folder, what));
+        }
+        (Some(first), _) if !is_whole => {
+            let why = refused.iter().map(|error| format!("left out: {error}"));
+            first.warnings.push(format!("the data set is not whole: {missing}; these are read"));
+            first.warnings.extend(why);
+        }
+        (Some(_), _) => {}
     }
     Ok(episodes.into_values().collect())
+}
+
+/// Puts the frames of an episode behind those that an earlier file holds of it.
+fn append(episodes: &mut BTreeMap<u64, Log>, episode: u64, mut log: Log) {
+    let Some(before) = episodes.get_mut(&episode).and_then(|before| before.tables.first_mut()) else {
+        episodes.insert(episode, log);
+        return;
+    };
+    let Some(after) = log.tables.first_mut() else { return };
+    let filled = before.stamps_ns.as_ref().map_or(0, Vec::len);
+    before.stamps_ns.get_or_insert_default().append(after.stamps_ns.get_or_insert_default());
+    for mut column in after.columns.drain(..) {
+        match before.columns.iter_mut().find(|known| known.name == column.name) {
+            Some(known) => known.values.append(&mut column.values),
+            None => {
+                column.values.splice(0..0, std::iter::repeat_n(f64::NAN, filled));
+                before.columns.push(column);
+            }
+        }
+    }
 }
 
 /// Takes the episodes of a file over.
@@ -116,7 +156,9 @@ fn take(
         else {
             return Err(ImportError::log(
                 file,
-                format!("row {row} belongs to no episode: the file is damaged; download it again"),
+                format!(
+                    "row {row} belongs to no episode: the file is damaged; copy it from its source again, or leave it out"
+                ),
             ));
         };
         budget.elements(width + 1, size_of::<f64>()).map_err(&spent)?;

@@ -34,7 +34,11 @@ pub(super) fn read(path: &Path, most: usize, budget: &Budget) -> Result<(usize, 
         Some(spent) => ImportError::budget(path)(spent),
         None => {
             let error = error.to_string().replace('\n', " ");
-            ImportError::log(path, format!("is no whole parquet file ({error}); copy it from its source again"))
+            let what = format!(
+                "is no whole parquet file ({error}); copy it from its source again, or leave it out: one whose recorder did not \
+                 close it has no index, and cannot be read"
+            );
+            ImportError::log(path, what)
         }
     };
     let reader = SerializedFileReader::new(file).map_err(broken)?;
@@ -42,7 +46,7 @@ pub(super) fn read(path: &Path, most: usize, budget: &Budget) -> Result<(usize, 
     let rows = usize::try_from(metadata.file_metadata().num_rows()).unwrap_or(0);
     if rows > most {
         let what = format!(
-            "has {rows} rows, and meta/info.json leaves {most} for it: the data set is damaged; download it again"
+            "has {rows} rows, and meta/info.json leaves {most} for it: the data set is damaged; take it from its source again, or mend that file"
         );
         return Err(ImportError::log(path, what));
     }

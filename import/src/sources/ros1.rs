@@ -1,13 +1,14 @@
-//! ROS 1 bags (version 2.0): records front to back, chunks as they are, in bzip2 or in LZ4. The index is not needed. Memory
-//! holds one chunk at a time.
+//! ROS 1 bags (version 2.0): records front to back, chunks as they are, in bzip2 or in LZ4. The index is not needed, so that a bag
+//! reads whose recorder was killed (`.bag.active`). Memory holds one chunk at a time.
 //!
 //! The format is that of <http://wiki.ros.org/Bags/Format/2.0>.
 
 use super::{go_on, stem};
 use crate::error::ImportError;
 use crate::log::{Facts, Log};
-use crate::ros::{Collector, Encoding, Incoming, Refused};
-use shared_mem::budget::{self, Budget};
+use crate::ros::{Collector, Encoding, Incoming};
+use shared_mem::budget::{self, Budget, BudgetError};
+use shared_mem::input::Packing;
 use std::collections::HashMap;
 use std::io::{BufReader, Read};
 use std::path::Path;
@@ -37,104 +38,170 @@ struct Connection {
 
 type Connections = HashMap<u32, Connection>;
 
+/// A bag as it is read.
+struct Bag<'a> {
+    path: &'a Path,
+    collector: Collector<'a>,
+    connections: Connections,
+    /// What is missing of it, in the order of the file.
+    missing: Vec<String>,
+    /// Chunks that were unpacked, and those that its header says it has.
+    chunks: u32,
+    expected: Option<u32>,
+    /// Chunks that could not be unpacked, and their bytes.
+    lost: [u64; 2],
+}
+
+/// Why a record is not taken over.
+enum Bad {
+    /// It is cut or has changed.
+    Record,
+    Budget(BudgetError),
+}
+
+impl From<BudgetError> for Bad {
+    fn from(over: BudgetError) -> Self {
+        Self::Budget(over)
+    }
+}
+
 pub(super) fn read(path: &Path, budget: &Budget) -> Result<Log, ImportError> {
     let file = shared_mem::input::open(path)?;
+    let length = file.metadata().map_or(0, |about| about.len());
     let mut source = BufReader::with_capacity(1 << 16, file);
-    let cut = || {
-        let what = "is cut or damaged; `rosbag reindex` mends a bag whose recorder was stopped, or leave it out";
-        ImportError::log(path, what)
-    };
     let mut magic = [0; MAGIC.len()];
-    source.read_exact(&mut magic).map_err(|_| cut())?;
-    if magic != MAGIC {
+    let is_whole = source.read_exact(&mut magic).is_ok();
+    if is_whole && magic != MAGIC {
         let what = "is a bag of another version than 2.0; `rosbag fix` or `rosbag reindex` writes one of 2.0";
         return Err(ImportError::log(path, what));
     }
-    let refused = |what: Option<Refused>| what.map_or_else(cut, |what| what.of(path));
-    let mut collector = Collector::new(Encoding::Ros1, budget);
-    let mut connections = Connections::new();
-    let (mut chunks, mut expected) = (0_u32, None);
-    while let Some((header, data)) = record(&mut source).map_err(|Cut| cut())? {
-        go_on(path)?;
-        let fields = Fields::parse(&header).ok_or_else(cut)?;
-        match fields.op().ok_or_else(cut)? {
-            op::BAG => expected = fields.number("chunk_count"),
-            op::CHUNK => {
-                chunks += 1;
-                let size = fields.number("size").ok_or_else(cut)? as usize;
-                let compression = fields.get("compression").ok_or_else(cut)?;
-                let bytes = unpack(&data, compression, size).ok_or_else(cut)?;
-                let mut inside = &bytes[..];
-                while let Some((header, data)) = record(&mut inside).map_err(|Cut| cut())? {
-                    let fields = Fields::parse(&header).ok_or_else(cut)?;
-                    message(&fields, &data, &mut connections, &mut collector).map_err(refused)?;
-                }
-            }
-            op::CONNECTION | op::MESSAGE => {
-                message(&fields, &data, &mut connections, &mut collector).map_err(refused)?
-            }
-            op::INDEX | op::CHUNK_INFO => {}
-            _ => return Err(cut()),
-        }
+    let mut bag = Bag {
+        path,
+        collector: Collector::new(Encoding::Ros1, budget),
+        connections: Connections::new(),
+        missing: Vec::new(),
+        chunks: 0,
+        expected: None,
+        lost: [0; 2],
+    };
+    let at = bag.records(&mut source)?;
+    if at < length {
+        bag.missing.push(format!("the file is cut or damaged from byte {at} of {length} on"));
     }
-    // A bag that was closed says how many chunks it has.
-    if expected.is_some_and(|expected| expected != chunks) {
-        return Err(cut());
-    }
-    let (tables, left_out) = collector.finish();
-    let franka = tables.iter().any(|table| table.name.contains("franka"));
-    let torque = franka.then_some((true, "franka_ros publishes tau_J, which holds gravity"));
-    Ok(Log {
-        file: path.to_owned(),
-        name: stem(path),
-        format: "ROS 1 bag",
-        tables,
-        facts: Facts { franka, torque, ..Facts::default() },
-        left_out,
-        ..Log::default()
-    })
+    bag.log(is_whole)
 }
 
-/// A connection, or a message of one; `Err(None)` where the record is broken.
-fn message(
-    fields: &Fields<'_>,
-    data: &[u8],
-    connections: &mut Connections,
-    collector: &mut Collector<'_>,
-) -> Result<(), Option<Refused>> {
-    // Records without a message in them are steps, too.
-    let spent = |over| Some(Refused::Budget(over));
-    collector.budget().step(STEPS_OF_A_RECORD).map_err(spent)?;
-    let id = fields.number("conn");
-    match fields.op() {
-        Some(op::CONNECTION) => {
-            collector.budget().take(data.len() + size_of::<Connection>()).map_err(spent)?;
-            let about = Fields::parse(data).ok_or(None)?;
-            let text = |bytes: Option<&[u8]>| bytes.map(|b| String::from_utf8_lossy(b).into_owned()).ok_or(None);
-            let connection = Connection {
-                topic: text(fields.get("topic"))?,
-                type_name: text(about.get("type"))?,
-                definition: about.get("message_definition").ok_or(None)?.to_vec(),
-            };
-            connections.insert(id.ok_or(None)?, connection);
-            Ok(())
+impl Bag<'_> {
+    /// Takes records over to the last whole one; where the file is damaged from there on.
+    fn records(&mut self, source: &mut impl Read) -> Result<u64, ImportError> {
+        let mut at = MAGIC.len() as u64;
+        while let Ok(Some((header, data))) = record(source) {
+            go_on(self.path)?;
+            match Fields::parse(&header).ok_or(Bad::Record).and_then(|fields| self.record(&fields, &data)) {
+                Ok(()) => at += (header.len() + data.len() + 8) as u64,
+                Err(Bad::Record) => break,
+                Err(Bad::Budget(over)) => return Err(ImportError::budget(self.path)(over)),
+            }
         }
-        Some(op::MESSAGE) => {
-            let connection = connections.get(&id.ok_or(None)?).ok_or(None)?;
-            let time = fields.get("time").and_then(|t| t.first_chunk::<8>()).ok_or(None)?;
-            let [seconds, rest] =
-                [0, 4].map(|at| u64::from(u32::from_le_bytes([time[at], time[at + 1], time[at + 2], time[at + 3]])));
-            let incoming = Incoming {
-                topic: &connection.topic,
-                type_name: &connection.type_name,
-                definition: &connection.definition,
-                log_time_ns: seconds * 1_000_000_000 + rest,
-                data,
-            };
-            collector.take(&incoming).map_err(Some)
+        Ok(at)
+    }
+
+    /// A record that stands by itself.
+    fn record(&mut self, fields: &Fields<'_>, data: &[u8]) -> Result<(), Bad> {
+        match fields.op().ok_or(Bad::Record)? {
+            op::BAG => self.expected = fields.number("chunk_count").filter(|count| *count > 0),
+            op::CHUNK => match self.chunk(fields, data) {
+                Err(Bad::Record) => self.lost = [self.lost[0] + 1, self.lost[1] + data.len() as u64],
+                other => other?,
+            },
+            op::CONNECTION | op::MESSAGE => self.message(fields, data)?,
+            op::INDEX | op::CHUNK_INFO => {}
+            _ => return Err(Bad::Record),
         }
-        Some(op::INDEX) => Ok(()),
-        _ => Err(None),
+        Ok(())
+    }
+
+    fn chunk(&mut self, fields: &Fields<'_>, data: &[u8]) -> Result<(), Bad> {
+        self.chunks += 1;
+        let size = fields.number("size").ok_or(Bad::Record)? as usize;
+        let compression = fields.get("compression").ok_or(Bad::Record)?;
+        let bytes = unpack(data, compression, size).ok_or(Bad::Record)?;
+        let mut inside = &bytes[..];
+        while let Some((header, data)) = record(&mut inside).map_err(|Cut| Bad::Record)? {
+            let fields = Fields::parse(&header).ok_or(Bad::Record)?;
+            self.message(&fields, &data)?;
+        }
+        Ok(())
+    }
+
+    /// A connection, or a message of one.
+    fn message(&mut self, fields: &Fields<'_>, data: &[u8]) -> Result<(), Bad> {
+        // Records without a message in them are steps, too.
+        self.collector.budget().step(STEPS_OF_A_RECORD)?;
+        let id = fields.number("conn").ok_or(Bad::Record);
+        match fields.op() {
+            Some(op::CONNECTION) => {
+                self.collector.budget().take(data.len() + size_of::<Connection>())?;
+                let about = Fields::parse(data).ok_or(Bad::Record)?;
+                let text =
+                    |bytes: Option<&[u8]>| bytes.map(|b| String::from_utf8_lossy(b).into_owned()).ok_or(Bad::Record);
+                let connection = Connection {
+                    topic: text(fields.get("topic"))?,
+                    type_name: text(about.get("type"))?,
+                    definition: about.get("message_definition").ok_or(Bad::Record)?.to_vec(),
+                };
+                self.connections.insert(id?, connection);
+                Ok(())
+            }
+            Some(op::MESSAGE) => {
+                let connection = self.connections.get(&id?).ok_or(Bad::Record)?;
+                let time = fields.get("time").and_then(|t| t.first_chunk::<8>()).ok_or(Bad::Record)?;
+                let [seconds, rest] = [0, 4]
+                    .map(|at| u64::from(u32::from_le_bytes([time[at], time[at + 1], time[at + 2], time[at + 3]])));
+                let incoming = Incoming {
+                    topic: &connection.topic,
+                    type_name: &connection.type_name,
+                    definition: &connection.definition,
+                    log_time_ns: seconds * 1_000_000_000 + rest,
+                    data,
+                };
+                Ok(self.collector.take(&incoming)?)
+            }
+            Some(op::INDEX) => Ok(()),
+            _ => Err(Bad::Record),
+        }
+    }
+
+    /// What was read; an error where nothing is left.
+    fn log(mut self, is_whole: bool) -> Result<Log, ImportError> {
+        let [chunks, bytes] = self.lost;
+        if chunks > 0 {
+            self.missing
+                .push(format!("{chunks} of {} chunks ({bytes} bytes) cannot be unpacked or are damaged", self.chunks));
+        }
+        // A bag that was closed says how many chunks it has.
+        if let Some(expected) = self.expected.filter(|expected| *expected != self.chunks) {
+            self.missing.push(format!("{} of the {expected} chunks that it should have are there", self.chunks));
+        }
+        let (tables, left_out) = self.collector.finish();
+        if tables.is_empty() && (!is_whole || !self.missing.is_empty()) {
+            let what = "is cut or damaged, and nothing of a robot is left of it; copy it from its source again, or leave it out";
+            return Err(ImportError::log(self.path, what));
+        }
+        let missing = self.missing.join("; ");
+        let warnings = if missing.is_empty() { vec![] } else { vec![format!("{missing}; what is whole is read")] };
+        let franka = tables.iter().any(|table| table.name.contains("franka"));
+        let torque = franka.then_some((true, "franka_ros publishes tau_J, which holds gravity"));
+        Ok(Log {
+            file: self.path.to_owned(),
+            name: stem(self.path),
+            format: "ROS 1 bag",
+            tables,
+            facts: Facts { franka, torque, ..Facts::default() },
+            left_out,
+            warnings,
+            ..Log::default()
+        })
     }
 }
 
@@ -174,15 +241,13 @@ fn unpack(data: &[u8], compression: &[u8], size: usize) -> Option<Vec<u8>> {
     if size as u64 > budget::unpacked(data.len()) {
         return None;
     }
-    let mut bytes = Vec::new();
-    let limit = size as u64 + 1;
-    match compression {
-        b"none" => bytes.extend_from_slice(data),
-        b"bz2" => drop(bzip2::read::BzDecoder::new(data).take(limit).read_to_end(&mut bytes).ok()?),
-        b"lz4" => drop(lz4_flex::frame::FrameDecoder::new(data).take(limit).read_to_end(&mut bytes).ok()?),
+    let packing = match compression {
+        b"none" => return (data.len() == size).then(|| data.to_vec()),
+        b"bz2" => Packing::Bzip2,
+        b"lz4" => Packing::Lz4,
         _ => return None,
-    }
-    (bytes.len() == size).then_some(bytes)
+    };
+    packing.unpack(data, size as u64).ok().filter(|bytes| bytes.len() == size)
 }
 
 /// `name=value` fields, each behind its length.

@@ -24,7 +24,7 @@ pub(super) fn read(folder: &Path, budget: &Budget) -> Result<Log, ImportError> {
         Vec::new()
     };
     let window = window(folder)?;
-    let mut tables = Vec::new();
+    let (mut tables, mut warnings) = (Vec::new(), Vec::new());
     for (file, kind) in [(CONTROL, "CONTROL"), (STATE, "STATE_MOTOR")] {
         let path = folder.join(file);
         let mut text = table::text(&path, budget)?;
@@ -46,6 +46,7 @@ pub(super) fn read(folder: &Path, budget: &Budget) -> Result<Log, ImportError> {
                 column.name = format!("{base}[{joint}]");
             }
         }
+        warnings.extend(text.warnings.iter().map(|warning| format!("{file}: {warning}")));
         tables.push(Table { name: file.into(), stamps_ns: None, columns: text.columns });
     }
     Ok(Log {
@@ -54,6 +55,7 @@ pub(super) fn read(folder: &Path, budget: &Budget) -> Result<Log, ImportError> {
         format: "SAGE folder",
         tables,
         facts: Facts::default(),
+        warnings,
         ..Log::default()
     })
 }

@@ -6,6 +6,8 @@ use shared_mem::cell::{Cell, ClipEntry};
 use shared_mem::recording::{Clip, Session};
 use std::path::{Path, PathBuf};
 
+/// Numbers that were written with all their digits.
+pub(crate) const EXACT: f64 = 1e-12;
 pub(crate) const ROWS: usize = 60;
 pub(crate) const LAG: f64 = 0.03;
 pub(crate) const STEP_NS: u64 = 20_000_000;
@@ -78,6 +80,33 @@ pub(crate) fn imported(name: &str) -> Imported {
     Imported { folder, outcome, session }
 }
 
+/// What came of a log.
+pub(crate) struct Read {
+    /// How many clips, and the first of them.
+    pub(crate) clips: usize,
+    pub(crate) clip: Clip,
+    /// What was odd in any of them.
+    pub(crate) warnings: Vec<String>,
+    /// What was left out of the folder.
+    pub(crate) left_out: Vec<String>,
+}
+
+/// Imports a log into a session beside it that is gone afterwards.
+pub(crate) fn read(log: &Path) -> Read {
+    let out = log.with_file_name("session");
+    let outcome = run(log, &out).unwrap_or_else(|e| panic!("{e}"));
+    let Outcome::Done { clips, notes } = outcome else { panic!("{}: {outcome:?}", log.display()) };
+    let session = Session::open(&out).expect("a session");
+    let clip = session.read(&session.clips[0]).expect("a clip");
+    std::fs::remove_dir_all(&out).expect("a folder of ours");
+    Read {
+        clips: clips.len(),
+        clip,
+        warnings: clips.into_iter().flat_map(|clip| clip.warnings).collect(),
+        left_out: notes.into_iter().filter(|note| note.line == "left out").map(|note| note.why).collect(),
+    }
+}
+
 impl Imported {
     pub(crate) fn clip(&self, number: usize) -> Clip {
         let entry: &ClipEntry = &self.session.clips[number];
@@ -104,6 +133,19 @@ pub(crate) fn holds_the_motion(clip: &Clip, (first, rows): (usize, usize), dof: 
                     let (dq, near) = (dq[i], near * 30.0);
                     assert!((dq - velocity).abs() <= near, "row {row}, joint {i}: {dq} for {velocity}");
                 }
+            }
+        }
+    }
+}
+
+/// Holds what is left of a clip against the motion: rows from the first on, of commands perhaps one more or less.
+pub(crate) fn holds_the_motion_from(clip: &Clip, rows: usize, near: f64) {
+    assert_eq!(clip.measured.len(), rows);
+    assert!(clip.desired.len().abs_diff(rows) <= 1, "{} commands", clip.desired.len());
+    for (series, lag) in [(&clip.measured, LAG), (&clip.desired, 0.0)] {
+        for row in 0..series.len() {
+            for (i, q) in series.q_row(row).iter().enumerate() {
+                assert!((q - motion(row, i, lag).0).abs() <= near, "row {row}, joint {i}: {q}");
             }
         }
     }

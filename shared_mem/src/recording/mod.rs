@@ -64,6 +64,7 @@ mod twinaligner;
 mod wire;
 mod writer;
 
+pub use checks::few_rows;
 pub use clip::{Clip, TrackedObject};
 pub use definitions::definition as ros2_definition;
 pub use encoded::{

@@ -13,8 +13,9 @@ pub(super) use outlying::find as outlying_rows;
 
 use super::series::JointSeries;
 
-/// Largest share of rows that may be left out before reading fails.
+/// Largest share of rows that may be left out before reading fails; one may be in any case, of this many and more.
 const LARGEST_BAD_SHARE: f64 = 0.01;
+const ROWS_OF_ONE: usize = 20;
 
 /// Beyond this no number of a joint was measured [rad, rad/s, N m], and sums of squares lose all others.
 const LARGEST_NUMBER: f64 = 1e6;
@@ -84,9 +85,14 @@ fn unlogged_block(
     block.clear();
 }
 
+/// How many of so many rows may be left out: 1 %, and one of 20 and more.
+#[must_use]
+pub fn few_rows(rows: usize) -> usize {
+    ((rows as f64 * LARGEST_BAD_SHARE) as usize).max(usize::from(rows >= ROWS_OF_ONE))
+}
+
 fn left_out(topic: &str, bad: usize, total: usize, first: &str) -> Result<String, String> {
-    let share = bad as f64 / total.max(1) as f64;
-    if share > LARGEST_BAD_SHARE {
+    if bad > few_rows(total) {
         return Err(format!(
             "{bad} of {total} rows cannot be used ({first}); at most 1 % may be left out: record again, or cut the clip"
         ));

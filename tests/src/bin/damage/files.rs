@@ -95,6 +95,9 @@ pub(crate) fn write(whole: &Path) {
     for log in LOGS {
         copy(&fixtures().join(log), &whole.join(log).join(log));
     }
+    let plain = fs::read_to_string(fixtures().join("plain.csv")).expect("a table");
+    let wide = plain.replace(',', ";").replace('.', ",");
+    put(&folder("wide").join("wide.csv"), wide.encode_utf16().flat_map(u16::to_le_bytes).collect::<Vec<u8>>());
     scan(&folder("scan"));
 }
 

@@ -87,6 +87,7 @@ pub(crate) fn all(programs: &[String]) -> Vec<Verb> {
             "import {dir}/lerobot_v3 --out {dir}/out --json",
         ),
         ("plain.csv", &["plain.csv", "plain.csv"], "import {dir}/plain.csv --out {dir}/out --json"),
+        ("wide", &["wide.csv", "wide.csv"], "import {dir}/wide.csv --out {dir}/out --json"),
         ("log.npz", &["log.npz", "log.npz"], "import {dir}/log.npz --out {dir}/out --json"),
         (
             "sage_motion",
