@@ -35,7 +35,7 @@ mod session;
 mod sources;
 pub mod weight;
 
-pub use arm::{Arm, Arms};
+pub use arm::{Arm, Arms, Rotors};
 pub use cell::{UsualController, is_franka, usual_controller};
 pub use clip::{Gravity, Holds};
 pub use contents::{Contents, look};

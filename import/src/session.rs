@@ -158,7 +158,7 @@ pub fn import(order: Order<'_>, mut told: impl FnMut(&Imported, (u64, u64))) -> 
 
 /// The notes of a mapping, and what is left out of what was found.
 fn with_left_out(mut notes: Vec<Note>, found: &Found) -> Vec<Note> {
-    notes.extend(found.left_out().iter().map(|why| Note { line: "left out".into(), why: why.clone(), open: false }));
+    notes.extend(found.left_out().iter().map(|why| Note { line: "left out".into(), why: why.clone(), ..Note::default() }));
     notes
 }
 
@@ -234,7 +234,7 @@ fn open(
     let place = Destination::new(&file, order.force)?;
     place.write(to_toml(mapping, &notes, log, &command))?;
     let mut notes = with_left_out(notes, found);
-    let odd = log.warnings.iter().map(|why| Note { line: log.name.clone(), why: why.clone(), open: false });
+    let odd = log.warnings.iter().map(|why| Note { line: log.name.clone(), why: why.clone(), ..Note::default() });
     notes.extend(odd);
     Ok(Outcome::Open { file, notes })
 }

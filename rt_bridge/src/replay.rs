@@ -93,7 +93,7 @@ impl ReplayArm {
         let clip = read_clip(path, ClipKind::Excitation, cell)?.reorder(model.joint_names())?;
         if clip.desired.is_empty() {
             let what = "nobody logged commands, and an arm that is replayed reports what it was commanded; replay a clip that holds them";
-            return Err(ReadError::Content { path: path.to_owned(), topic: ArmCommand::TOPIC.to_owned(), what: what.to_owned() });
+            return Err(ReadError::Content { path: path.to_owned(), topic: "desired".into(), what: what.into() });
         }
         for warning in clip.warnings.iter().chain(&clip.damage) {
             tracing::warn!("{}: {warning}", path.display());

@@ -2,7 +2,7 @@
 
 use super::print;
 use clap::Args;
-use import::{Arm, Gravity, Imported, Note, Order, Outcome};
+use import::{Arm, Gravity, Imported, Note, Order, Outcome, Rotors};
 use serde::Serialize;
 use shared_mem::cell::Cell;
 use shared_mem::console;

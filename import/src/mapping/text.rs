@@ -10,7 +10,7 @@ const OPEN: &str = "OPEN: ";
 const FIRST_ROWS: usize = 3;
 
 /// Why a line is as it is, or what it still needs.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize)]
 pub struct Note {
     /// Block and key: `measured.q_unit`.
     pub line: String,

@@ -158,7 +158,7 @@ fn joints(log: &Log, chosen: &Chosen, (mapping, gravity): (&mut Mapping, Model<'
                 lag::look(&did, &told, desired, notes);
             }
         }
-        leave_out_placeholders(log, (&mut measured, &mut desired), notes);
+        leave_out_placeholders(log, (&mut measured, desired.as_mut()), notes);
         if !measured.tau.is_empty()
             && let Some(did) = track(&measured)
         {
@@ -184,8 +184,13 @@ fn joints(log: &Log, chosen: &Chosen, (mapping, gravity): (&mut Mapping, Model<'
 }
 
 /// Torques that nobody measured are none, whatever gravity shows in them.
-fn leave_out_placeholders(log: &Log, (measured, desired): (&mut JointColumns, &mut JointColumns), notes: &mut Notes) {
-    for (line, columns) in [("measured", measured), ("desired", desired)] {
+fn leave_out_placeholders(
+    log: &Log,
+    (measured, desired): (&mut JointColumns, Option<&mut JointColumns>),
+    notes: &mut Notes,
+) {
+    let both = std::iter::once(("measured", measured)).chain(desired.map(|desired| ("desired", desired)));
+    for (line, columns) in both {
         if let Some(table) = log.table(&columns.table).filter(|_| !columns.tau.is_empty()) {
             torque::measured_at_all(table, columns, line, notes);
         }
