@@ -5,17 +5,20 @@
 //!
 //! Without sessions they are simulated: motions, motions at two speeds, strokes, tosses, and sessions with an effect of the twin,
 //! which is a cause and no fault. Recorded sessions that are given are taken for clean, and stand beside the simulated ones.
+//!
+//! `--write FOLDER` also writes each session for other programs: `tests/peers/recording_doctors.py` makes bags and data sets of them.
 
 #![allow(clippy::print_stdout, reason = "its output is the measurement")]
 
-use calibration::check::injected::{Clean, Injected, Sort, Trial, table};
+use calibration::check::injected::{Clean, Injected, Sort, Trial, inject, table};
 use clap::Parser;
 use rayon::prelude::*;
-use shared_mem::cell::Cell;
-use shared_mem::console;
+use serde_json::json;
+use shared_mem::cell::{Cell, ClipEntry};
 use shared_mem::progress::Progress;
-use shared_mem::recording::Session;
-use std::path::PathBuf;
+use shared_mem::recording::{JointSeries, Session};
+use shared_mem::{console, output};
+use std::path::{Path, PathBuf};
 
 #[derive(Debug, Parser)]
 struct Arguments {
@@ -28,6 +31,9 @@ struct Arguments {
     /// Cell that all simulated sessions share.
     #[arg(long, default_value = "config/fr3_cell.toml")]
     cell: PathBuf,
+    /// New folder for the sessions, a folder each: `clean/SESSION` and `FAULT/NUMBER`, as they are after reading.
+    #[arg(long, value_name = "FOLDER")]
+    write: Option<PathBuf>,
     /// Recorded sessions that are taken for clean, instead of simulated ones.
     #[arg(value_name = "SESSION")]
     sessions: Vec<PathBuf>,
@@ -35,7 +41,7 @@ struct Arguments {
 
 fn main() -> anyhow::Result<()> {
     let _last_lines = console::start();
-    let Arguments { trials, seed, cell, sessions } = Arguments::parse();
+    let Arguments { trials, seed, cell, write, sessions } = Arguments::parse();
     let clean = if sessions.is_empty() { simulated(&Cell::read(&cell)?, trials, seed) } else { recorded(&sessions)? };
     let bar = Progress::new("check", (clean.len() + Injected::ALL.len()) as u64);
     let mut done = 0;
@@ -45,6 +51,9 @@ fn main() -> anyhow::Result<()> {
     };
     let mut all: Vec<Trial> = Vec::new();
     for (name, session) in &clean {
+        if let Some(folder) = &write {
+            put(&folder.join("clean").join(name.replace([' ', '/'], "_")), session, name)?;
+        }
         let trial = Trial::clean(session);
         if !trial.right {
             let said: Vec<&str> = trial.beside.iter().map(|fault| fault.key()).collect();
@@ -54,16 +63,20 @@ fn main() -> anyhow::Result<()> {
         step("clean sessions");
     }
     // Sessions with a cause are there for false alarms alone.
-    let whole: Vec<&Clean> =
-        clean.iter().filter(|(name, _)| !name.starts_with("causes")).map(|(_, session)| session).collect();
+    let whole: Vec<&(String, Clean)> = clean.iter().filter(|(name, _)| !name.starts_with("causes")).collect();
     for fault in Injected::ALL {
         let tried = |k: u64| {
             let number = seed + k;
-            let fitting: Vec<&&Clean> = whole.iter().filter(|session| fault.fits(session)).collect();
-            let session = fitting.get(number as usize % fitting.len().max(1))?;
-            Some((number, Trial::with(fault, session, number)?))
+            let fitting: Vec<_> = whole.iter().filter(|(_, session)| fault.fits(session)).collect();
+            let (name, session) = fitting.get(number as usize % fitting.len().max(1))?;
+            let trial = Trial::with(fault, session, number)?;
+            let written = write.as_ref().map_or(Ok(()), |folder| {
+                let folder = folder.join(format!("{fault:?}")).join(number.to_string());
+                inject(fault, session, number).map_or(Ok(()), |damaged| put(&folder, &damaged, name))
+            });
+            Some(written.map(|()| (number, trial)))
         };
-        let found: Vec<(u64, Trial)> = (0..trials).into_par_iter().filter_map(tried).collect();
+        let found: Vec<(u64, Trial)> = (0..trials).into_par_iter().filter_map(tried).collect::<anyhow::Result<_>>()?;
         for (number, _) in found.iter().filter(|(_, trial)| !trial.right) {
             println!("missed, {}: number {number}", fault.name());
         }
@@ -93,4 +106,44 @@ fn simulated(cell: &Cell, trials: u64, seed: u64) -> Vec<(String, Clean)> {
 fn recorded(folders: &[PathBuf]) -> anyhow::Result<Vec<(String, Clean)>> {
     let open = |folder: &PathBuf| Ok((folder.display().to_string(), Clean::recorded(&Session::open(folder)?)));
     folders.iter().map(open).collect()
+}
+
+/// Writes a session for programs that know nothing of this one: cell.toml, session.json and the rows of each series as f64, little
+/// endian: stamp [ns] and q, dq, tau as far as there are any, of an object stamp, position and orientation (w, x, y, z).
+fn put(folder: &Path, session: &Clean, clean: &str) -> anyhow::Result<()> {
+    std::fs::create_dir_all(folder)?;
+    let mut cell = session.cell.at_home_anywhere();
+    cell.clips.clear();
+    let mut clips = Vec::new();
+    for (number, (_, clip)) in session.clips.iter().enumerate() {
+        let stem = format!("clip_{number:02}");
+        let object = clip.object.stamps_ns.iter().zip(&clip.object.poses);
+        let object = object.map(|(stamp, pose)| [&[*stamp as f64], &pose.position()[..], &pose.wxyz()].concat());
+        for (series, rows) in
+            [("measured", rows(&clip.measured)), ("desired", rows(&clip.desired)), ("object", object.collect())]
+        {
+            let bytes: Vec<u8> = rows.iter().flatten().flat_map(|value| value.to_le_bytes()).collect();
+            output::write(&folder.join(format!("{stem}.{series}.f64")), bytes)?;
+        }
+        let blocks = |series: &JointSeries| json!({ "dof": series.dof, "dq": !series.dq.is_empty(), "tau": !series.tau.is_empty() });
+        clips.push(json!({
+            "stem": stem,
+            "joints": clip.joint_names,
+            "measured": blocks(&clip.measured),
+            "desired": blocks(&clip.desired),
+            "mended": clip.warnings,
+        }));
+        cell.clips.push(ClipEntry { file: format!("{stem}.mcap").into(), kind: clip.kind });
+    }
+    let said = json!({ "clean": clean, "clips": clips });
+    output::write(&folder.join("session.json"), said.to_string())?;
+    Ok(output::write(&folder.join("cell.toml"), cell.to_toml())?)
+}
+
+fn rows(series: &JointSeries) -> Vec<Vec<f64>> {
+    let row = |i: usize| {
+        let more = [series.dq_row(i), series.tau_row(i)].into_iter().flatten();
+        [&[series.stamps_ns[i] as f64], series.q_row(i)].into_iter().chain(more).flatten().copied().collect()
+    };
+    (0..series.len()).map(row).collect()
 }

@@ -8,6 +8,7 @@
 //! | `naming` | what the names of columns say |
 //! | `mapping` | `import.toml`: which columns are which quantity, in which unit |
 //! | `runs` | which logs a file holds: each of several runs by itself |
+//! | `windows` | arrays with a motion in each row |
 //! | `propose` | a mapping out of a log, with the reasons |
 //! | `clip` | a log by its mapping, in SI |
 //! | `pieces` | one long log of many motions as clips |
@@ -33,6 +34,7 @@ mod ros;
 mod runs;
 mod session;
 mod sources;
+mod windows;
 pub mod weight;
 
 pub use arm::{Arm, Arms, Rotors};

@@ -245,13 +245,11 @@ pub(crate) fn role(table: &str, group: &Group) -> Option<Role> {
     if !may_serve(&group.base) || is_time(&group.base) {
         return None;
     }
-    let own = words(&group.base);
-    let around = words(table);
-    // A coordinate in space is no joint's.
-    let space = ["x", "y", "z", "w", "qx", "qy", "qz", "qw"];
-    if is_pose(&group.base) || own.last().is_some_and(|word| space.contains(&word.as_str())) {
+    if is_pose(&group.base) || is_coordinate(&group.base) {
         return None;
     }
+    let own = words(&group.base);
+    let around = words(table);
     let has = |words: &[String], list: &[&str]| words.iter().any(|word| list.contains(&word.as_str()));
     let quantity = if has(&own, &VELOCITY) {
         Quantity::Velocity
@@ -276,6 +274,18 @@ pub(crate) fn role(table: &str, group: &Group) -> Option<Role> {
     score +=
         u32::from(matches!(group.base.as_str(), "position" | "velocity" | "effort" | "observation.state" | "action"));
     Some(Role { quantity, desired, score: score.saturating_sub(u32::from(has(&own, &MOTOR))) })
+}
+
+/// Whether a name ends like one coordinate in space, which is no joint's.
+fn is_coordinate(name: &str) -> bool {
+    const SPACE: [&str; 8] = ["x", "y", "z", "w", "qx", "qy", "qz", "qw"];
+    words(name).last().is_some_and(|word| SPACE.contains(&word.as_str()))
+}
+
+/// Whether a name is that of one number of a pose.
+pub(crate) fn is_of_pose(name: &str) -> bool {
+    const TURN: [&str; 6] = ["rx", "ry", "rz", "roll", "pitch", "yaw"];
+    is_coordinate(name) || words(name).last().is_some_and(|word| TURN.contains(&word.as_str()))
 }
 
 /// Whether a name says where a hand is, or how it is turned.

@@ -3,6 +3,7 @@
 
 use crate::log::{Column, LeftOut, Log, Table};
 use crate::naming;
+use crate::windows;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// What runs are called, where they are numbered.
@@ -39,7 +40,7 @@ const RECENT: f64 = 1e9;
 
 /// Takes each log apart into its runs, and puts stamps of two columns together.
 pub(crate) fn apart(logs: Vec<Log>) -> Vec<Log> {
-    let mut all: Vec<Log> = logs.into_iter().flat_map(by_run).collect();
+    let mut all: Vec<Log> = logs.into_iter().flat_map(windows::apart).flat_map(by_run).collect();
     for log in &mut all {
         for table in log.tables.iter_mut().filter(|table| table.stamps_ns.is_none()) {
             if let Some((seconds, nanoseconds, stamps_ns)) = stamps(table) {

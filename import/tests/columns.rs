@@ -10,7 +10,7 @@ use import::{
 use shared_mem::output::OutputFolder;
 use shared_mem::recording::{Clip, Session};
 use std::path::{Path, PathBuf};
-use written::{JointState, Signal, bag, npz, state_definition, table};
+use written::{JointState, Signal, bag, npz, npz_of, state_definition, table};
 
 const DT: f64 = 0.01;
 
@@ -348,12 +348,34 @@ fn gains_sines_and_motions_in_a_row_are_no_positions_and_the_later_of_two_is_wha
     let lab = Lab::of("one.csv", table(&columns, 300, DT));
     lab.done();
     follows_q(&lab.clips()[0].measured, 0.0, 1e-9);
-    // A window of time in each row.
-    let windows: Vec<Vec<f64>> =
-        (0..40).map(|file| (0..50).map(|row| q(file * 3 % 7, f64::from(row) * DT)).collect()).collect();
-    let lab = Lab::of("windows.npz", npz(&[("q".to_owned(), windows)]));
-    let (open, notes) = lab.asked(None);
-    assert!(open[0] == "measured.q" && why(&notes, "measured.q").contains("motion over time"), "{notes:?}");
+}
+
+#[test]
+fn arrays_of_many_motions_are_a_clip_of_each() {
+    let at = |run: usize, row: usize| 2.5 * (run * 3 % 40) as f64 + row as f64 * DT;
+    let of = |value: &dyn Fn(f64) -> f64| -> Vec<f64> {
+        (0..40).flat_map(|run| (0..50).map(move |row| at(run, row))).map(value).collect()
+    };
+    // A motion in each row of an array a joint, and an array of runs, rows and joints.
+    let a_joint_each = (0..7).map(|joint| (format!("q{}", joint + 1), vec![40, 50], of(&|t| q(joint, t))));
+    let mut by_joint: Vec<_> = a_joint_each.collect();
+    let mut stacked = vec![("q".to_owned(), vec![40, 50, 7], Vec::new())];
+    for t in of(&|t| t) {
+        stacked[0].2.extend((0..7).map(|joint| q(joint, t)));
+    }
+    for arrays in [&mut by_joint, &mut stacked] {
+        arrays.push(("time".to_owned(), vec![40, 50], of(&|t| t)));
+        arrays.push(("label".to_owned(), vec![40], vec![1.0; 40]));
+        let lab = Lab::of("motions.npz", npz_of(arrays));
+        let notes = lab.done();
+        assert!(why(&notes, "log").contains("40 "), "{notes:?}");
+        let clips = lab.clips();
+        assert_eq!((clips.len(), clips[7].measured.len()), (40, 50));
+        for (run, clip) in clips.iter().enumerate() {
+            let off = |row: usize, joint: usize| (clip.measured.q_row(row)[joint] - q(joint, at(run, row))).abs();
+            assert!((0..50).all(|row| off(row, 0) < 1e-9 && off(row, 6) < 1e-9), "motion {run}");
+        }
+    }
 }
 
 #[test]

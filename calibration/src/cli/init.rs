@@ -10,6 +10,7 @@ use shared_mem::cell::{Cell, ControllerKind};
 use shared_mem::console;
 use std::io::{self, BufRead as _};
 use std::path::PathBuf;
+use twin::arm::HeldJoint;
 
 #[derive(Debug, Args)]
 #[command(after_help = "\
@@ -107,8 +108,7 @@ pub(super) fn run(arguments: InitArguments) -> anyhow::Result<()> {
     let order = Order { facts: &facts, bag: bag.as_deref(), clips: clips.as_deref(), out: &out, force };
     let written = init::init(order)?;
     if !written.held.is_empty() {
-        let held = written.held.iter().map(|held| format!("{} ({})", held.joint, held.why));
-        let (arm, held) = (written.arm.join(", "), held.collect::<Vec<_>>().join("; "));
+        let (arm, held) = (written.arm.join(", "), HeldJoint::in_words(&written.held));
         console::line(format_args!("the arm's joints are {arm}; held where they are: {held}"));
     }
     for warning in &written.warnings {

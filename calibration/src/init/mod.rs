@@ -27,7 +27,7 @@ use serde::Serialize;
 use shared_mem::cell::Cell;
 use shared_mem::output::Destination;
 use std::path::{Path, PathBuf};
-use twin::arm::ArmModel;
+use twin::arm::{ArmModel, HeldJoint};
 
 /// What a cell.toml is made of.
 #[derive(Debug, Clone, Copy)]
@@ -53,15 +53,6 @@ pub struct Taken {
     pub from: String,
 }
 
-/// A joint that is held.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
-pub struct Held {
-    /// Its name.
-    pub joint: String,
-    /// Why it is none of the arm's.
-    pub why: String,
-}
-
 /// What was written.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Written {
@@ -72,7 +63,7 @@ pub struct Written {
     /// Names of the arm's joints, from base to flange; empty where no arm is known.
     pub arm: Vec<String>,
     /// Joints of its URDF that move and are none of the arm's; they are held where they are.
-    pub held: Vec<Held>,
+    pub held: Vec<HeldJoint>,
     /// What stands in it, and from where.
     pub taken: Vec<Taken>,
     /// Blocks that stand in it as comments, since nothing is known of them.
@@ -102,7 +93,7 @@ pub fn init(order: Order<'_>) -> anyhow::Result<Written> {
     Ok(Written {
         file: order.out.to_owned(),
         arm: known.arm.iter().flat_map(ArmModel::joint_names).cloned().collect(),
-        held: held.map(|held| Held { joint: held.name.clone(), why: held.why.clone() }).collect(),
+        held: held.cloned().collect(),
         urdf: beside.map(|(place, _)| place.path().to_owned()),
         not_known: text::not_known(&known.cell),
         taken: known.taken,

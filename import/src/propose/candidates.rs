@@ -98,8 +98,22 @@ pub(super) fn find<'a>(log: &'a Log, wanted: &[String]) -> Found<'a> {
             }
         }
     }
+    if !found.candidates.iter().any(|candidate| candidate.is(Quantity::Position, false)) {
+        // What a person may have taken for joints.
+        found.refused.extend(log.tables.iter().filter_map(pose_of_columns));
+    }
     found.apart = apart.into_iter().collect();
     found
+}
+
+/// A sentence about columns of one number each that are a pose together: `x`, `y`, `z`, `rx`, `ry`, `rz`.
+fn pose_of_columns(table: &Table) -> Option<String> {
+    let groups = naming::groups(table);
+    let alone: Vec<String> = groups.iter().filter(|group| group.names.len() == 1).map(|g| g.names[0].clone()).collect();
+    let ends: Vec<&str> = alone.iter().map(String::as_str).filter(|name| naming::is_of_pose(name)).collect();
+    naming::are_pose(&alone).then(|| {
+        format!("`{}` of `{}`: a pose in space by their names, and no joints", ends.join("`, `"), table.name)
+    })
 }
 
 /// The group without joints that are none of an arm's.
@@ -142,8 +156,6 @@ fn no_joints(candidate: &Candidate<'_>, wanted: &[String], on_circle: bool) -> O
         Some("sines and cosines of angles: their squares add up to 1 in every row")
     } else if shape::is_turned(&values) {
         Some("it holds a quaternion: four numbers in a row whose squares add up to 1 in every row")
-    } else if shape::is_window(&values) {
-        Some("each of its rows goes on like a motion over time: write one row a stamp")
     } else {
         None
     }

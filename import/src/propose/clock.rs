@@ -8,6 +8,10 @@ use crate::naming;
 /// Rows of a robot's log come between these rates [Hz]; a thousand apart, so that one unit alone fits.
 const SLOWEST: f64 = 4.0;
 const FASTEST: f64 = 4000.0;
+/// Steps of a clock differ by less than this share of the one in the middle, but for one in ten.
+const SAME_STEP: f64 = 0.25;
+/// So many steps show that they are the same.
+const FEWEST_STEPS: usize = 20;
 const UNITS: [(TimeUnit, &str); 4] = [
     (TimeUnit::Second, "seconds"),
     (TimeUnit::Millisecond, "milliseconds"),
@@ -38,6 +42,10 @@ pub(super) fn choose(log: &Log, table: &Table, block: &str, notes: &mut Notes) -
         notes.open(&format!("{block}.rate"), question);
         return Clock::default();
     };
+    if !naming::is_time(&column.name) {
+        let why = format!("`{}` rises by the same in every row, as a clock does and no joint", column.name);
+        notes.why(&format!("{block}.stamps"), why);
+    }
     let line = format!("{block}.stamp_unit");
     let (unit, why) = unit(log, &column.name, &column.values);
     notes.why(&line, why);
@@ -49,7 +57,7 @@ pub(super) fn is_missing(table: &Table) -> bool {
     table.stamps_ns.is_none() && column(table).is_none()
 }
 
-/// The column of stamps: named so, and rising.
+/// The column of stamps: named so and rising, or, where none is, the only one that rises by the same in every row.
 fn column(table: &Table) -> Option<&Column> {
     let rises = |values: &[f64]| {
         values.len() > 1 && values.windows(2).filter(|w| w[1] > w[0]).count() * 10 >= 9 * (values.len() - 1)
@@ -57,7 +65,24 @@ fn column(table: &Table) -> Option<&Column> {
     let named = table.columns.iter().filter(|column| naming::is_time(&column.name) && rises(&column.values));
     // When it was measured counts, and not when it was written down.
     let is_header = |name: &str| naming::words(name).windows(2).any(|pair| pair == ["header", "stamp"]);
-    named.min_by_key(|column| (!is_header(&column.name), naming::words(&column.name).len()))
+    named.min_by_key(|column| (!is_header(&column.name), naming::words(&column.name).len())).or_else(|| ticking(table))
+}
+
+/// The only column that rises by the same in every row and counts no rows.
+fn ticking(table: &Table) -> Option<&Column> {
+    let ticks = |column: &&Column| {
+        let mut steps: Vec<f64> = column.values.windows(2).map(|w| w[1] - w[0]).collect();
+        steps.sort_by(f64::total_cmp);
+        let middle = steps.get(steps.len() / 2).copied().unwrap_or(0.0);
+        let equal = steps.iter().filter(|step| (*step - middle).abs() < SAME_STEP * middle).count();
+        let counts = middle == 1.0 && steps.iter().all(|step| step.fract() == 0.0);
+        steps.len() >= FEWEST_STEPS
+            && steps.first().is_some_and(|step| *step > 0.0)
+            && 10 * equal >= 9 * steps.len()
+            && !counts
+    };
+    let mut ticking = table.columns.iter().filter(ticks);
+    ticking.next().filter(|_| ticking.next().is_none())
 }
 
 fn unit(log: &Log, name: &str, values: &[f64]) -> (TimeUnit, String) {
@@ -75,6 +100,8 @@ fn unit(log: &Log, name: &str, values: &[f64]) -> (TimeUnit, String) {
     let mut steps: Vec<f64> = values.windows(2).map(|w| w[1] - w[0]).filter(|step| *step > 0.0).collect();
     steps.sort_by(f64::total_cmp);
     let step = steps.get(steps.len() / 2).copied().unwrap_or(f64::NAN);
+    // As many digits as a person reads: differences of decimal numbers end in rounding.
+    let step = format!("{step:.5e}").parse().unwrap_or(step);
     let fits = |(unit, _): &&(TimeUnit, &str)| (SLOWEST..FASTEST).contains(&(1.0 / (step * unit.seconds())));
     match UNITS.iter().find(fits) {
         Some((unit, word)) => {
@@ -108,6 +135,15 @@ mod tests {
             assert_eq!((clock.stamps.as_deref(), clock.unit), (Some("t"), expected), "{step}");
             assert!(notes.0[0].why.contains("rows a second in"), "{:?}", notes.0);
         }
+        let clock = Column { name: "Zeit [s]".into(), values: (0..100).map(|i| 0.01 * f64::from(i)).collect() };
+        let sine = Column { name: "q1".into(), values: (0..100).map(|i| (0.1 * f64::from(i)).sin()).collect() };
+        let row = Column { name: "row".into(), values: (0..100).map(f64::from).collect() };
+        let mut table = Table { columns: vec![row, sine, clock], ..Table::default() };
+        let mut notes = Notes::default();
+        let found = choose(&Log::default(), &table, "measured", &mut notes);
+        assert_eq!((found.stamps.as_deref(), found.unit), (Some("Zeit [s]"), TimeUnit::Second), "{:?}", notes.0);
+        table.columns.pop();
+        assert!(is_missing(&table), "a counter of rows is no clock");
         let mut notes = Notes::default();
         choose(&Log::default(), &Table::default(), "measured", &mut notes);
         assert!(notes.0[0].open && notes.0[0].line == "measured.rate");

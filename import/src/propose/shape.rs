@@ -1,12 +1,8 @@
 //! What columns of numbers are by themselves, whatever they are called: nothing, one number over and over, sines and cosines, a
-//! quaternion, a motion over time in each row.
+//! quaternion.
 
 /// How far sums of squares may be off 1: those of single precision are off by less.
 const ROUNDED: f64 = 1e-3;
-/// More columns than any arm has joints; only those may be a motion in each row.
-const WIDE: usize = 16;
-/// A motion goes on within a row when its steps there are so many times shorter than from row to row.
-const SMOOTHER: f64 = 0.5;
 
 /// Whether there is no finite number in them.
 pub(super) fn is_empty(columns: &[&[f64]]) -> bool {
@@ -65,26 +61,6 @@ pub(super) fn is_turned(columns: &[&[f64]]) -> bool {
     columns.windows(4).any(is_one)
 }
 
-/// Whether rows go on like a motion over time: many columns, each near the one beside it and far from itself one row on.
-pub(super) fn is_window(columns: &[&[f64]]) -> bool {
-    let apart = |pairs: &mut dyn Iterator<Item = (f64, f64)>| {
-        let mut differences: Vec<f64> = pairs.map(|(a, b)| (a - b).abs()).filter(|d| d.is_finite()).collect();
-        differences.sort_by(f64::total_cmp);
-        differences.get(differences.len() / 2).copied()
-    };
-    if columns.len() < WIDE {
-        return false;
-    }
-    let across = |row: usize| columns.windows(2).filter_map(move |w| Some((*w[0].get(row)?, *w[1].get(row)?)));
-    let rows = columns.first().map_or(0, |column| column.len());
-    // A few rows tell as much as all.
-    let some = || (0..rows).step_by((rows / 50).max(1));
-    let within = apart(&mut some().flat_map(across));
-    let between =
-        apart(&mut columns.iter().flat_map(|c| some().filter_map(|row| Some((*c.get(row)?, *c.get(row + 1)?)))));
-    within.zip(between).is_some_and(|(within, between)| within < SMOOTHER * between)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -108,18 +84,6 @@ mod tests {
         let (w, z, none, x) = (wave(1.0, f64::cos), wave(1.0, f64::sin), vec![0.0; 50], wave(5.0, f64::sin));
         assert!(is_turned(&[&x, &x, &w, &none, &none, &z]));
         assert!(!is_turned(&[&x, &w, &none, &x, &z]));
-    }
-
-    #[test]
-    fn a_motion_in_each_row_is_told_from_joints_in_each_row() {
-        // Twenty files of 30 rows: angles that begin anywhere and go on smoothly.
-        let at = |file: i32, row: i32| f64::from(file * 37 % 20) + 0.1 * (f64::from(row) * 0.1).sin();
-        let windows: Vec<Vec<f64>> = (0..30).map(|row| (0..20).map(|file| at(file, row)).collect()).collect();
-        let columns: Vec<&[f64]> = windows.iter().map(Vec::as_slice).collect();
-        assert!(is_window(&columns));
-        let joints: Vec<Vec<f64>> = (0..30).map(|j| (0..20).map(|k| at(j, k)).collect()).collect();
-        let columns: Vec<&[f64]> = joints.iter().map(Vec::as_slice).collect();
-        assert!(!is_window(&columns));
     }
 
     #[test]

@@ -10,8 +10,10 @@ use std::collections::BTreeMap;
 use std::io::{Cursor, Read as _};
 use std::path::Path;
 
-/// A wider array is no quantity of joints.
-const WIDEST: usize = 64;
+/// A wider array is neither a quantity of joints nor, a motion in each row, one of theirs over time.
+const WIDEST: usize = 4096;
+/// So many joints have several arms together.
+const MOST_JOINTS: usize = 64;
 
 pub(super) fn read(path: &Path, budget: &Budget) -> Result<Log, ImportError> {
     let bytes = input::bytes(path, Kind::Array)?;
@@ -27,6 +29,7 @@ pub(super) fn read(path: &Path, budget: &Budget) -> Result<Log, ImportError> {
         return Err(broken(&"two arrays share their bytes"));
     }
     let mut by_rows: BTreeMap<usize, Vec<(String, Array)>> = BTreeMap::new();
+    let mut runs: BTreeMap<[usize; 2], Vec<(String, Array)>> = BTreeMap::new();
     let mut log = Log { file: path.to_owned(), name: stem(path), format: "npz", ..Log::default() };
     for number in 0..archive.len() {
         go_on(path)?;
@@ -41,10 +44,11 @@ pub(super) fn read(path: &Path, budget: &Budget) -> Result<Log, ImportError> {
         let read = parse_npy(&npy, budget);
         budget.give_back(npy.len());
         match read {
-            Ok(array) => match (array.shape.first(), array.shape.len(), array.shape.get(1)) {
-                (Some(rows), 1, _) => by_rows.entry(*rows).or_default().push((name, array)),
-                (Some(rows), 2, Some(width)) if *width <= WIDEST => {
-                    by_rows.entry(*rows).or_default().push((name, array))
+            Ok(array) => match *array.shape.as_slice() {
+                [rows] => by_rows.entry(rows).or_default().push((name, array)),
+                [rows, width] if width <= WIDEST => by_rows.entry(rows).or_default().push((name, array)),
+                [count, rows, width] if rows > 1 && count <= WIDEST && width <= MOST_JOINTS => {
+                    runs.entry([count, rows]).or_default().push((name, array));
                 }
                 _ => {
                     budget.give_back(size_of_val(array.values.as_slice()));
@@ -57,6 +61,16 @@ pub(super) fn read(path: &Path, budget: &Budget) -> Result<Log, ImportError> {
                 log.left_out.push(LeftOut { what: name, why: "it is no array of numbers", count: 1 });
             }
         }
+    }
+    for ([count, rows], arrays) in runs {
+        // What those runs have one number of a row: `runs x rows`, as their stamps.
+        let beside = by_rows.get_mut(&count).map(|all| all.extract_if(.., |(_, array)| array.shape == [count, rows]));
+        let arrays: Vec<(String, Array)> = beside.into_iter().flatten().chain(arrays).collect();
+        // There twice until the arrays are gone.
+        let doubled = arrays.iter().map(|(_, array)| array.values.len()).sum();
+        budget.elements(doubled, size_of::<f64>()).map_err(&spent)?;
+        by_rows.entry(rows).or_default().extend(arrays.into_iter().flat_map(|(name, array)| by_run(&name, &array)));
+        budget.give_back(doubled * size_of::<f64>());
     }
     // The rows that most arrays have are those of the clip.
     let mut tables: Vec<(usize, Vec<(String, Array)>)> = by_rows.into_iter().filter(|(rows, _)| *rows > 1).collect();
@@ -75,6 +89,17 @@ pub(super) fn read(path: &Path, budget: &Budget) -> Result<Log, ImportError> {
         log.tables.push(table);
     }
     Ok(log)
+}
+
+/// An array of `runs x rows x joints`, or of `runs x rows`, as one of each run, called so.
+fn by_run(name: &str, array: &Array) -> Vec<(String, Array)> {
+    let (count, shape) = array.shape.split_first().map_or((0, &[][..]), |(count, shape)| (*count, shape));
+    let size: usize = shape.iter().product();
+    let run = |k: usize| {
+        let values = array.values.get(k * size..(k + 1) * size).unwrap_or(&[]).to_vec();
+        (format!("run_{k}.{name}"), Array { shape: shape.to_vec(), values })
+    };
+    (0..count).map(run).collect()
 }
 
 fn columns(name: &str, array: Array) -> Vec<Column> {

@@ -16,16 +16,24 @@ pub(crate) fn table(columns: &[(String, Signal)], rows: u32, dt: f64) -> String 
 
 /// An archive of arrays of two dimensions.
 pub(crate) fn npz(arrays: &[(String, Vec<Vec<f64>>)]) -> Vec<u8> {
+    let of = |(name, rows): &(String, Vec<Vec<f64>>)| {
+        (name.clone(), vec![rows.len(), rows.first().map_or(0, Vec::len)], rows.concat())
+    };
+    npz_of(&arrays.iter().map(of).collect::<Vec<_>>())
+}
+
+/// An archive of arrays: name, shape and numbers row by row.
+pub(crate) fn npz_of(arrays: &[(String, Vec<usize>, Vec<f64>)]) -> Vec<u8> {
     let mut archive = zip::ZipWriter::new(std::io::Cursor::new(Vec::new()));
-    for (name, rows) in arrays {
-        let width = rows.first().map_or(0, Vec::len);
-        let header = format!("{{'descr': '<f8', 'fortran_order': False, 'shape': ({}, {width}), }}\n", rows.len());
+    for (name, shape, values) in arrays {
+        let shape = shape.iter().map(|length| format!("{length}, ")).collect::<String>();
+        let header = format!("{{'descr': '<f8', 'fortran_order': False, 'shape': ({shape}), }}\n");
         let plain = zip::write::SimpleFileOptions::default().compression_method(zip::CompressionMethod::Stored);
         archive.start_file(format!("{name}.npy"), plain).expect("room");
         archive.write_all(b"\x93NUMPY\x01\x00").expect("room");
         archive.write_all(&(header.len() as u16).to_le_bytes()).expect("room");
         archive.write_all(header.as_bytes()).expect("room");
-        let bytes: Vec<u8> = rows.iter().flatten().flat_map(|v| v.to_le_bytes()).collect();
+        let bytes: Vec<u8> = values.iter().flat_map(|v| v.to_le_bytes()).collect();
         archive.write_all(&bytes).expect("room");
     }
     archive.finish().expect("room").into_inner()

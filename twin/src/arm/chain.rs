@@ -2,6 +2,7 @@
 
 use super::inertia::MassProperties;
 use nalgebra::{Isometry3, Unit, Vector3};
+use serde::Serialize;
 use std::collections::HashSet;
 
 /// An arm as its source tells it, before it is laid out for computing.
@@ -35,9 +36,10 @@ pub(super) struct Joint {
 }
 
 /// A joint of the arm's file that moves and is none of the arm's: of a finger, a wheel, a base that drives.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct HeldJoint {
-    /// Its name.
+    /// Its name; `joint` where it is written out.
+    #[serde(rename = "joint")]
     pub name: String,
     /// Why it is none of the arm's, in a few words.
     pub why: String,
