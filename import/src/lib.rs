@@ -34,8 +34,8 @@ mod ros;
 mod runs;
 mod session;
 mod sources;
-mod windows;
 pub mod weight;
+mod windows;
 
 pub use arm::{Arm, Arms, Rotors};
 pub use cell::{UsualController, is_franka, usual_controller};

@@ -158,7 +158,11 @@ pub fn import(order: Order<'_>, mut told: impl FnMut(&Imported, (u64, u64))) -> 
 
 /// The notes of a mapping, and what is left out of what was found.
 fn with_left_out(mut notes: Vec<Note>, found: &Found) -> Vec<Note> {
-    notes.extend(found.left_out().iter().map(|why| Note { line: "left out".into(), why: why.clone(), ..Note::default() }));
+    notes.extend(found.left_out().iter().map(|why| Note {
+        line: "left out".into(),
+        why: why.clone(),
+        ..Note::default()
+    }));
     notes
 }
 
@@ -211,7 +215,10 @@ fn proposal(log: &Log, given: Option<&Cell>, arms: Arms<'_>) -> Result<Proposal,
             let gravity = |_: &[String]| arms(&Cell::default(), Some(&text)).ok()??.gravity;
             let held = if held.is_empty() { String::new() } else { format!("; held where they are: {held}") };
             let rotors = rotors.map_or_else(String::new, |rotors| format!("; {}", cell::stand_in(&rotors)));
-            (propose(log, (None, &joints), &gravity).map_err(failed)?, format!("the log's robot_description{held}{rotors}"))
+            (
+                propose(log, (None, &joints), &gravity).map_err(failed)?,
+                format!("the log's robot_description{held}{rotors}"),
+            )
         }
         Err(what) => (plain, format!("the log's robot_description is not used: {what}")),
     };

@@ -85,7 +85,8 @@ mod tests {
 
     #[test]
     fn a_motion_in_each_row_is_a_log_of_its_own() {
-        let columns = [array("q1", 30, angle), array("time", 30, |_, i| 0.02 * i as f64), array("label", 2, |_, _| 0.0)];
+        let columns =
+            [array("q1", 30, angle), array("time", 30, |_, i| 0.02 * i as f64), array("label", 2, |_, _| 0.0)];
         let table = Table { name: "rows".into(), columns: columns.concat(), ..Table::default() };
         let logs = apart(Log { name: "all".into(), tables: vec![table], ..Log::default() });
         assert_eq!((logs.len(), logs[4].name.as_str(), logs[0].left_out[0].what.as_str()), (20, "all_005", "label"));

@@ -544,6 +544,10 @@ def limits_of(root):
 
 # The table.
 
+def words(fault):
+    return re.sub(r"(?<=[a-z])([A-Z])", r" \1", fault).lower()
+
+
 def table(results, doctors):
     clean = [one for one in results if one["fault"] == "clean" and not one["clean"].startswith("causes")]
     by_name = {one["clean"]: one["said"] for one in clean}
@@ -569,7 +573,7 @@ def table(results, doctors):
             cells.append(f"{sum(map(bool, raised))}/{len(raised)}")
             for one in raised:
                 kinds[fault, doctor].update(one)
-        lines.append(f"| {fault} | " + " | ".join(cells) + " |")
+        lines.append(f"| {words(fault)} | " + " | ".join(cells) + " |")
     total = [one for fault, ones in groups.items() if not fault.startswith("clean") for one in ones]
     shares = [[bool(alarms(one, doctor)) for one in total if doctor in one["said"]] for doctor in doctors]
     lines.append("| all | " + " | ".join(f"{100 * np.mean(share):.0f} %" if share else "" for share in shares) + " |")
@@ -583,6 +587,7 @@ def main():
     arguments.add_argument("--out", type=Path, default=Path("doctors.jsonl"), help="a line a session")
     arguments.add_argument("--jobs", type=int, default=2)
     arguments.add_argument("--trials", type=int, default=10**9, help="at most so many of each fault")
+    arguments.add_argument("--clean", type=int, default=10**9, help="at most so many clean sessions of each sort")
     arguments.add_argument("--doctors", nargs="+", choices=DOCTORS, default=DOCTORS)
     arguments.add_argument("--faults", nargs="+", help="only these, and clean ones")
     arguments.add_argument("--table", action="store_true")
@@ -596,7 +601,7 @@ def main():
         for fault in sorted(wanted.sessions.iterdir(), key=lambda fault: (fault.name != "clean", fault.name)):
             names = sorted((one.name for one in fault.iterdir()), key=lambda name: (len(name), name))
             if fault.name == "clean":
-                names = [name for name in names if not name.startswith("causes")]
+                names = [name for name in names if not name.startswith("causes") and int(name.split("_")[-1]) <= wanted.clean]
             elif wanted.faults and fault.name not in wanted.faults:
                 continue
             else:

@@ -219,6 +219,7 @@ mod tests {
             seconds: Some(6.0),
             rates_hz: [Some(1000.0), None, None],
             lag: None,
+            lag_groups: vec![],
             good_for: VERBS.into_iter().enumerate().map(fitness).collect(),
         };
         let picture = Picture {

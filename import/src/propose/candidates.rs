@@ -111,9 +111,8 @@ fn pose_of_columns(table: &Table) -> Option<String> {
     let groups = naming::groups(table);
     let alone: Vec<String> = groups.iter().filter(|group| group.names.len() == 1).map(|g| g.names[0].clone()).collect();
     let ends: Vec<&str> = alone.iter().map(String::as_str).filter(|name| naming::is_of_pose(name)).collect();
-    naming::are_pose(&alone).then(|| {
-        format!("`{}` of `{}`: a pose in space by their names, and no joints", ends.join("`, `"), table.name)
-    })
+    naming::are_pose(&alone)
+        .then(|| format!("`{}` of `{}`: a pose in space by their names, and no joints", ends.join("`, `"), table.name))
 }
 
 /// The group without joints that are none of an arm's.

@@ -74,7 +74,9 @@ pub(super) fn choose<'a>(
         let there: Vec<String> = others.iter().map(|other| other.candidate.named()).collect();
         why += &format!("; also there: {}", there.join(", "));
     }
-    refused.extend(misfits.into_iter().map(|misfit| format!("{}, which the arm of the cell has not", with_joints(misfit))));
+    refused.extend(
+        misfits.into_iter().map(|misfit| format!("{}, which the arm of the cell has not", with_joints(misfit))),
+    );
     notes.chosen(LINE, why + &not_taken(&refused), others.iter().map(|other| other.candidate.line("q")).collect());
     Ok(best.clone())
 }
@@ -84,13 +86,18 @@ fn no_positions(misfits: &[&Judged<'_>], wanted: &[String], refused: &[String], 
     let there: Vec<String> = misfits.iter().map(|misfit| with_joints(misfit)).collect();
     let known = format!("the arm of the cell has {} joints ({})", wanted.len(), wanted.join(", "));
     // Among more columns than the arm has joints, its own may be.
-    let may_hold_it = |misfit: &&Judged<'_>| misfit.candidate.joints().is_none() && misfit.candidate.size() > wanted.len();
+    let may_hold_it =
+        |misfit: &&Judged<'_>| misfit.candidate.joints().is_none() && misfit.candidate.size() > wanted.len();
     let what = if misfits.is_empty() {
         "which columns are the measured positions? One name a joint, of those at the end of this file".to_owned()
     } else if misfits.iter().any(may_hold_it) {
-        format!("{known}, and the log has {}: which of these columns are its joints, in their order?", listed(&there, " and "))
+        format!(
+            "{known}, and the log has {}: which of these columns are its joints, in their order?",
+            listed(&there, " and ")
+        )
     } else {
-        let what = format!("{known}, and the log has {}: give the cell of the arm that was logged", listed(&there, " and "));
+        let what =
+            format!("{known}, and the log has {}: give the cell of the arm that was logged", listed(&there, " and "));
         return Untaken::OtherArm(what);
     };
     notes.open(LINE, what + &not_taken(refused));

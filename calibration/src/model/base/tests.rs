@@ -4,7 +4,7 @@ use super::super::{Format, ModelFile, write_into};
 use super::Base;
 use super::classes::numbers;
 use super::places::Places;
-use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Point3, Translation3, Unit, UnitQuaternion, Vector3};
 use shared_mem::cell::Cell;
 use shared_mem::theta::Theta;
 use std::fmt::Write as _;
@@ -23,7 +23,9 @@ fn lab(base: &str, prefix: &str, more: &str) -> String {
     let arm = ArmModel::from_cell(&shipped()).expect("the arm");
     let mut bodies = String::new();
     for (k, part) in arm.parts().iter().enumerate() {
-        let turn = |axis| Isometry3::from_parts(Translation3::identity(), UnitQuaternion::from_axis_angle(axis, 0.3));
+        let turn = |axis: &Unit<Vector3<f64>>| {
+            Isometry3::from_parts(Translation3::identity(), UnitQuaternion::from_axis_angle(axis, 0.3))
+        };
         let before = k.checked_sub(1).map_or_else(Isometry3::identity, |last| turn(&arm.parts()[last].axis).inverse());
         let at = before * part.origin * turn(&part.axis);
         let (p, q, a) = (at.translation.vector, at.rotation, part.axis);
