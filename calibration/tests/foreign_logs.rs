@@ -85,7 +85,7 @@ fn noise(t: f64, joint: usize) -> f64 {
 
 /// Torques of the arm under a free fall in the base frame, with dry friction of 0.3 N m, and a factor a joint.
 fn torques(falls: [f64; 3], factors: Row) -> impl Fn(f64) -> (Row, Row, Option<Row>) {
-    let arm = ArmModel::from_urdf(&urdf("effort='40' velocity='2'"), Path::new("arm.urdf")).expect("an arm");
+    let arm = ArmModel::from_urdf(&urdf("effort='40' velocity='2'"), Path::new("arm.urdf"), &[]).expect("an arm");
     move |t| {
         let [q, dq] = waves(t);
         let weight = arm.holding(&joints_from(&q), falls);
