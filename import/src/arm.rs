@@ -1,7 +1,7 @@
 //! The arm of a log as whoever knows kinematics and dynamics tells of it: of the cell that was given, or of the description that
 //! the log holds itself.
 
-use crate::cell::is_franka;
+use crate::cell::{Rotors, is_franka};
 use crate::clip::Gravity;
 use crate::log::Log;
 use shared_mem::cell::Cell;
@@ -20,14 +20,6 @@ pub struct Arm {
     pub gravity: Option<Gravity>,
     /// What viewers of the clips are shown, where it has a shape.
     pub shown: Option<Arc<RobotModel>>,
-}
-
-/// Rotors that stand in for the inertia of joints that move none in an arm's description.
-pub struct Rotors {
-    /// Those joints.
-    pub without_inertia: Vec<String>,
-    /// Of every joint [kg m²].
-    pub rotor_inertia: Vec<f64>,
 }
 
 /// Tells of the arm of a cell; with a URDF's text, of that one in place of the arm that the cell names. `None` where the cell has

@@ -1,6 +1,5 @@
 //! The cell.toml of an imported session: what the log tells, and for the rest what is usual, with a comment that says so.
 
-use crate::arm::Rotors;
 use crate::log::Log;
 use serde::Serialize;
 use shared_mem::cell::ClipEntry;
@@ -82,6 +81,14 @@ pub(crate) fn proposed(log: &Log, joints: &[String], base: Option<&str>) -> Stri
         toml_value(joints)
     );
     format!("{head}{robot}\n{}", controller(joints))
+}
+
+/// Rotors that stand in for the inertia of joints that move none in an arm's description.
+pub struct Rotors {
+    /// Those joints.
+    pub without_inertia: Vec<String>,
+    /// Of every joint [kg m²].
+    pub rotor_inertia: Vec<f64>,
 }
 
 /// What is said of joints that move no inertia.

@@ -37,8 +37,8 @@ mod sources;
 pub mod weight;
 mod windows;
 
-pub use arm::{Arm, Arms, Rotors};
-pub use cell::{UsualController, is_franka, usual_controller};
+pub use arm::{Arm, Arms};
+pub use cell::{Rotors, UsualController, is_franka, usual_controller};
 pub use clip::{Gravity, Holds};
 pub use contents::{Contents, look};
 pub use data_set::{DataSetError, DataSetPlan, DataSetWriter, Feature, FeatureKind, Frames};

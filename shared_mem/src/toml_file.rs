@@ -212,7 +212,7 @@ mod tests {
     #[test]
     fn no_word_of_a_library_is_left_in_what_is_wrong_with_a_value() {
         for (text, said) in [
-            ("[camera]\ndistortion = [0.1, 0.2, 0.3]\n", "3 values stand there; expected"),
+            ("[simulation]\nobject_position = [0.1, 0.2, 0.3]\n", "3 values stand there; expected"),
             ("[table]\nheight = \"low\"\n", "\"low\" stands there; expected a number"),
             ("[tool]\nmass = 0.2\nlength = 0.1\n", "the key `radius` is missing"),
             ("[controller]\nkind = \"pd\"\n", "`pd` is none of the known words; expected `joint_impedance`"),
@@ -244,6 +244,6 @@ mod tests {
     #[test]
     fn a_missing_key_is_named() {
         let error = parse::<Sample>("", Path::new("cell.toml")).unwrap_err().to_string();
-        assert!(error.contains("missing field `stiffness`"), "{error}");
+        assert!(error.contains("the key `stiffness` is missing"), "{error}");
     }
 }
