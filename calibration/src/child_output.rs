@@ -35,6 +35,7 @@ pub(crate) fn whole(mut from: impl Read, most: u64) -> io::Result<Option<Vec<u8>
 
 /// What a program leaves that was run to its end.
 pub(crate) struct Ended {
+    /// How it ended.
     pub(crate) status: ExitStatus,
     /// Its standard output; `None` where that was longer than it may be.
     pub(crate) answer: Option<Vec<u8>>,
@@ -43,6 +44,9 @@ pub(crate) struct Ended {
 }
 
 /// Runs a program without input to its end; its answer may have so many bytes.
+///
+/// # Errors
+/// The system's, where it does not start or its pipes break.
 pub(crate) fn of(command: &mut Command, most: u64) -> io::Result<Ended> {
     let mut child = command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn()?;
     let (Some(stdout), Some(stderr)) = (child.stdout.take(), child.stderr.take()) else {

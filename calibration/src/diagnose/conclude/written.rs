@@ -142,10 +142,14 @@ mod tests {
     use shared_mem::msg::arm::ArmState;
     use shared_mem::recording::{ClipInfo, ClipWriter, SessionFiles};
 
+    fn shipped() -> Cell {
+        let text = include_str!("../../../../config/fr3_cell.toml");
+        shared_mem::toml_file::parse(text, "fr3_cell.toml".as_ref()).expect("the shipped file")
+    }
+
     /// A session of the shipped cell with one state of the arm at `q`.
     fn session(folder: &Path, q: Joints) -> Session {
-        let text = include_str!("../../../../config/fr3_cell.toml");
-        let cell: Cell = shared_mem::toml_file::parse(text, "fr3_cell.toml".as_ref()).expect("the shipped file");
+        let cell = shipped();
         let mut writer = ClipWriter::create(&folder.join("a.mcap"), &ClipInfo::default()).expect("a new file");
         for row in 0..10 {
             let stamp_ns = 5_000_000_000 + row * 1_000_000;
@@ -159,7 +163,7 @@ mod tests {
     }
 
     fn ready() -> Joints {
-        *limits::shipped().0.model().ready()
+        *Body::of(&shipped()).expect("its arm").model().ready()
     }
 
     #[test]
@@ -183,7 +187,8 @@ mod tests {
         assert!((rows[1][0] - 1.0 / RATE).abs() < 1e-9 && (motions[0].seconds.expect("planned") - 16.0).abs() < 0.1);
         assert!(motions[0].in_words().contains("1000 rows a second"), "{}", motions[0].in_words());
         // It begins where the clips begin, goes somewhere, and breaks no limit of the cell.
-        let (body, all) = limits::shipped();
+        let body = Body::of(&session.cell).expect("its arm");
+        let all = limits::of(&session.cell, &body);
         let reach = rows.iter().map(|row| (row[1] - ready()[0]).abs()).fold(0.0, f64::max);
         assert!((rows[0][1] - ready()[0]).abs() < 1e-6 && reach > 0.05, "{reach}");
         for row in &rows {
